@@ -1,0 +1,363 @@
+//! One cycle of the controller: reading → FK → pose → control → IK → limited command.
+//!
+//! Pure: time and readings come in, what to send goes out, nothing is allocated. A cycle is
+//! [`Controller::observe`] then [`Controller::decide`], so that the process can stamp the time
+//! between them; [`Controller::fill_command`] and [`Controller::fill_state`] write the messages
+//! where they will be read. It knows nothing of iceoryx2, of clocks or of CAN.
+
+use masseter_shared::config::{ControllerConfig, Scenario};
+use masseter_shared::geometry::{AXES, Actuators, Joints, LEGS, Mechanism, Pose};
+use masseter_shared::messages::codes::{
+    Cause, ControllerState, DriveCondition, DriveRequest, EventKind, NO_AXIS, Source,
+};
+use masseter_shared::messages::{Command, Event, Reading, State, pose_fields};
+
+use crate::kinematics::{ForwardTracker, Solution};
+use crate::playback::Playback;
+use crate::pose_control::PoseControl;
+use crate::safety::{self, Fault};
+use crate::sequence::{Happening, next};
+use crate::trajectory::Trajectory;
+
+/// Angular columns of the Jacobian are scaled by this length for the condition number, m: the
+/// platform's side.
+const CONDITION_LENGTH_M: f64 = 0.05;
+
+/// Bits of [`Reading::fresh_axes`] when all axes are fresh.
+const ALL_AXES: u32 = (1 << AXES) - 1;
+
+/// Cycles for which the last command is repeated at the end, so that it arrives.
+const FAREWELL_CYCLES: u64 = 5;
+/// How long a safe stop waits for the drives to be off, s.
+const SAFE_STOP_S: f64 = 0.3;
+
+/// A cycle's place in time.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Tick {
+    /// Number of the cycle, from 1; skipped ones leave a gap.
+    pub cycle: u64,
+    /// The cycle's time, ns.
+    pub now_ns: u64,
+}
+
+/// What the last complete reading said of the mechanism.
+#[derive(Debug, Clone, Copy)]
+struct Estimate {
+    reading_cycle: u64,
+    sampled_ns: u64,
+    measured: Actuators,
+    solution: Solution,
+}
+
+/// The controller's whole memory.
+#[derive(Debug)]
+pub struct Controller {
+    mechanism: Mechanism,
+    config: ControllerConfig,
+    period_s: f64,
+    velocity_limit_m_s: [f64; AXES],
+    tracker: ForwardTracker,
+    playback: Playback,
+    control: PoseControl,
+
+    state: ControllerState,
+    cycles_in_state: u64,
+    last_cycle: u64,
+    steady_readings: u32,
+    silent_cycles: u64,
+    stop_requested: bool,
+    estimate: Option<Estimate>,
+    drive_state: [u32; AXES],
+    /// What went wrong since the last decision.
+    fault: Option<Fault>,
+    wanted: Option<Pose>,
+    target: Option<Actuators>,
+}
+
+impl Controller {
+    /// A controller that will play `trajectory` on `mechanism` once the rig is ready.
+    pub fn new(scenario: &Scenario, mechanism: Mechanism, trajectory: Trajectory) -> Self {
+        let config = scenario.controller;
+        let drives = &scenario.drives;
+        let velocity_limit_m_s = std::array::from_fn(|axis| {
+            if axis < LEGS { drives.slide.max_velocity_m_s } else { drives.leg.max_velocity_m_s }
+        });
+        Self {
+            tracker: ForwardTracker::new(mechanism.clone()),
+            playback: Playback::new(trajectory, config.ease_s, config.stop_ramp_s),
+            control: PoseControl::new(&config),
+            mechanism,
+            config,
+            period_s: scenario.period_s(),
+            velocity_limit_m_s,
+            state: ControllerState::WaitReadings,
+            cycles_in_state: 0,
+            last_cycle: 0,
+            steady_readings: 0,
+            silent_cycles: 0,
+            stop_requested: false,
+            estimate: None,
+            drive_state: [DriveCondition::Unknown.code(); AXES],
+            fault: None,
+            wanted: None,
+            target: None,
+        }
+    }
+
+    /// Where the sequence stands.
+    pub fn state(&self) -> ControllerState {
+        self.state
+    }
+
+    /// Whether there is nothing left to do: the drives are off, or a safe stop cannot wait longer.
+    pub fn is_done(&self) -> bool {
+        let has_parted = self.cycles_in_state >= FAREWELL_CYCLES;
+        match self.state {
+            ControllerState::Finished => has_parted,
+            ControllerState::SafeStop => {
+                let waited_s = self.cycles_in_state as f64 * self.period_s;
+                (has_parted && self.drives_are_off()) || waited_s >= SAFE_STOP_S
+            }
+            _ => false,
+        }
+    }
+
+    /// Whether all drives report that they give no force.
+    fn drives_are_off(&self) -> bool {
+        self.drive_state.iter().all(|&code| {
+            !matches!(
+                DriveCondition::try_from(code),
+                Ok(DriveCondition::OperationEnabled
+                    | DriveCondition::QuickStopActive
+                    | DriveCondition::FaultReaction
+                    | DriveCondition::SwitchedOn)
+            )
+        })
+    }
+
+    /// Takes the newest reading, if one came, and solves the forward kinematics for it.
+    pub fn observe(&mut self, reading: Option<&Reading>) {
+        self.silent_cycles += 1;
+        let Some(reading) = reading else { return };
+        if let Err(fault) = self.take(reading) {
+            self.steady_readings = 0;
+            self.fault.get_or_insert(fault);
+        }
+    }
+
+    fn take(&mut self, reading: &Reading) -> Result<(), Fault> {
+        safety::check_reading(reading)?;
+        safety::check_commander(reading, self.last_cycle)?;
+        self.drive_state = reading.drive_state;
+        safety::check_drives(reading, self.is_moving())?;
+        if reading.fresh_axes != ALL_AXES {
+            self.steady_readings = 0;
+            return Ok(());
+        }
+        let measured = Actuators::from_axes(reading.position_m);
+        let solution = self.tracker.update(&measured).map_err(|error| Fault::from(&error))?;
+        self.estimate = Some(Estimate {
+            reading_cycle: reading.cycle,
+            sampled_ns: reading.sampled_ns,
+            measured,
+            solution,
+        });
+        self.silent_cycles = 0;
+        self.steady_readings = self.steady_readings.saturating_add(1);
+        Ok(())
+    }
+
+    /// Asks for an orderly stop.
+    pub fn request_stop(&mut self) {
+        self.stop_requested = true;
+    }
+
+    /// Moves the sequence on, decides what to ask of the drives, and reports a change of state.
+    pub fn decide(&mut self, tick: Tick) -> Option<Event> {
+        let dt_s = tick.cycle.saturating_sub(self.last_cycle).max(1) as f64 * self.period_s;
+        self.last_cycle = tick.cycle;
+        self.playback.advance(dt_s);
+        let fault = self.fault.take().or_else(|| self.overdue()).or_else(|| self.control(dt_s).err());
+        let happening = self.happening(fault.is_some());
+        let event = happening.and_then(|happening| self.follow(happening, fault, tick));
+        self.cycles_in_state += 1;
+        event
+    }
+
+    /// What has been waited for too long.
+    fn overdue(&self) -> Option<Fault> {
+        let patience = self.config.start_timeout_s / self.period_s;
+        let waited = self.cycles_in_state as f64;
+        let silent = self.silent_cycles as f64;
+        let stale_limit = f64::from(self.config.stale_cycles);
+        match self.state {
+            ControllerState::WaitReadings if waited > patience => {
+                Some(Fault::new(Cause::StaleReading, waited, patience))
+            }
+            ControllerState::Enabling | ControllerState::Disabling if waited > patience => {
+                Some(Fault::new(Cause::EnableTimeout, waited, patience))
+            }
+            ControllerState::WaitReadings | ControllerState::Finished | ControllerState::SafeStop => None,
+            _ if silent > stale_limit => Some(Fault::new(Cause::StaleReading, silent, stale_limit)),
+            _ => None,
+        }
+    }
+
+    /// Pose control, inverse kinematics and limits: the targets of this cycle.
+    fn control(&mut self, dt_s: f64) -> Result<(), Fault> {
+        let wanted = self.playback.pose_ahead(-self.reading_age_s());
+        self.wanted = Some(wanted);
+        if !self.is_moving() {
+            return Ok(());
+        }
+        if let Some(estimate) = &self.estimate
+            && self.silent_cycles == 0
+        {
+            safety::check_tracking(&wanted, &estimate.solution.pose, self.config.tracking_limit_m)?;
+            self.control.observe(&wanted, &estimate.solution.pose, dt_s);
+        }
+        let ahead = self.playback.pose_ahead(self.config.lead_cycles * self.period_s);
+        let joints = self
+            .mechanism
+            .inverse(&self.control.correct(&ahead))
+            .map_err(|_| Fault::new(Cause::InverseKinematics, f64::NAN, 0.0))?;
+        let before = self.target.unwrap_or(joints.actuators);
+        let strokes = self.mechanism.strokes();
+        safety::check_targets(&joints.actuators, &before, strokes, &self.velocity_limit_m_s, dt_s)?;
+        self.target = Some(joints.actuators);
+        Ok(())
+    }
+
+    /// Age of the estimate's sample against that of a reading in time, s.
+    fn reading_age_s(&self) -> f64 {
+        let reading_cycle = self.estimate.map_or(self.last_cycle, |estimate| estimate.reading_cycle);
+        self.last_cycle.saturating_sub(reading_cycle) as f64 * self.period_s
+    }
+
+    fn is_moving(&self) -> bool {
+        matches!(self.state, ControllerState::Easing | ControllerState::Running | ControllerState::Holding)
+    }
+
+    /// The most urgent thing that happened.
+    fn happening(&self, faulty: bool) -> Option<Happening> {
+        let enabled = DriveCondition::OperationEnabled.code();
+        let held_s = self.cycles_in_state as f64 * self.period_s;
+        let progress = match self.state {
+            ControllerState::WaitReadings => {
+                (self.steady_readings >= self.config.steady_readings).then_some(Happening::Steady)
+            }
+            ControllerState::Enabling => {
+                self.drive_state.iter().all(|&code| code == enabled).then_some(Happening::Enabled)
+            }
+            ControllerState::Easing => self.playback.is_over().then_some(Happening::Eased),
+            ControllerState::Running => self.playback.is_over().then_some(Happening::Played),
+            ControllerState::Holding => {
+                (self.playback.is_at_rest() && held_s >= self.config.hold_s).then_some(Happening::Rested)
+            }
+            ControllerState::Disabling => self.drives_are_off().then_some(Happening::Released),
+            ControllerState::Finished | ControllerState::SafeStop => None,
+        };
+        let stop = self.stop_requested.then_some(Happening::StopRequested);
+        let stop = stop.filter(|&stop| next(self.state, stop) != self.state);
+        faulty.then_some(Happening::Fault).or(stop).or(progress)
+    }
+
+    /// Enters the state that follows, and reports it.
+    fn follow(&mut self, happening: Happening, fault: Option<Fault>, tick: Tick) -> Option<Event> {
+        let (from, to) = (self.state, next(self.state, happening));
+        if from == to {
+            return None;
+        }
+        self.enter(to);
+        let mut event = Event {
+            time_ns: tick.now_ns,
+            cycle: tick.cycle,
+            source: Source::Controller.code(),
+            kind: EventKind::Transition.code(),
+            cause: Cause::Sequence.code(),
+            axis: NO_AXIS,
+            from: from.code(),
+            to: to.code(),
+            ..Default::default()
+        };
+        if happening == Happening::StopRequested {
+            event.cause = Cause::StopRequested.code();
+        }
+        if let Some(fault) = fault {
+            event.kind = EventKind::Fault.code();
+            fault.explain(&mut event);
+        }
+        Some(event)
+    }
+
+    fn enter(&mut self, state: ControllerState) {
+        match state {
+            ControllerState::Enabling => {
+                if let Some(estimate) = &self.estimate {
+                    self.target = Some(estimate.measured);
+                    self.playback.hold(estimate.solution.pose);
+                }
+            }
+            ControllerState::Easing => self.playback.ease(),
+            ControllerState::Running => self.playback.play(),
+            ControllerState::Holding => self.playback.stop(),
+            ControllerState::SafeStop => self.target = self.estimate.map(|estimate| estimate.measured),
+            _ => {}
+        }
+        (self.state, self.cycles_in_state) = (state, 0);
+    }
+
+    /// What to ask of the drives in the present state.
+    fn request(&self) -> DriveRequest {
+        match self.state {
+            ControllerState::Enabling
+            | ControllerState::Easing
+            | ControllerState::Running
+            | ControllerState::Holding => DriveRequest::Enable,
+            ControllerState::SafeStop => DriveRequest::QuickStop,
+            ControllerState::WaitReadings | ControllerState::Disabling | ControllerState::Finished => {
+                DriveRequest::Off
+            }
+        }
+    }
+
+    /// Writes this cycle's command. Before the first reading the targets are zero and the request is
+    /// `Off`: nobody follows them.
+    pub fn fill_command(&self, command: &mut Command) {
+        *command = Command {
+            cycle: self.last_cycle,
+            reading_cycle: self.estimate.map_or(0, |estimate| estimate.reading_cycle),
+            target_m: self.target.map_or([0.0; AXES], Actuators::to_axes),
+            request: self.request().code(),
+            controller_state: self.state.code(),
+            ..Default::default()
+        };
+    }
+
+    /// Conditioning at a solution. Only reported, so it is computed after the command has gone out.
+    fn condition(&self, measured: &Actuators, solution: &Solution) -> f64 {
+        let joints = Joints { actuators: *measured, theta_rad: solution.theta_rad };
+        self.mechanism.jacobian(&solution.pose, &joints).condition(CONDITION_LENGTH_M)
+    }
+
+    /// Writes what this cycle made of the reading; the process adds its stamps.
+    pub fn fill_state(&self, state: &mut State) {
+        *state = State {
+            cycle: self.last_cycle,
+            motion_time_s: self.playback.motion_time_s(),
+            controller_state: self.state.code(),
+            ..Default::default()
+        };
+        if let Some(wanted) = &self.wanted {
+            (state.desired_position_m, state.desired_quaternion_wxyz) = pose_fields(wanted);
+        }
+        if let Some(estimate) = &self.estimate {
+            let Estimate { reading_cycle, sampled_ns, measured, solution } = estimate;
+            (state.reading_cycle, state.sampled_ns) = (*reading_cycle, *sampled_ns);
+            (state.estimated_position_m, state.estimated_quaternion_wxyz) = pose_fields(&solution.pose);
+            state.leg_angle_rad = solution.theta_rad;
+            (state.residual_m, state.iterations) = (solution.residual_m, solution.iterations);
+            state.condition = self.condition(measured, solution);
+        }
+    }
+}

@@ -1,0 +1,143 @@
+//! Which solution of the equations is the mechanism as it was assembled.
+//!
+//! The seed selects the true solution by two conditions: every Bᵢ below the plane of A₁A₂A₃, and A₂
+//! beyond A₃ along slide 1. Read without a sign for the plane they leave several candidates, so the
+//! plane is oriented here by (A₂−A₁)×(A₃−A₁), the legs must stand above the base, and the Jacobian's
+//! determinant must be positive. That these together leave one solution has been observed over
+//! thousands of inputs; it is *not* proven, and nothing here relies on it.
+
+use std::fmt;
+
+use masseter_shared::geometry::{Actuators, LEGS, Mechanism};
+use nalgebra::Vector3;
+
+use super::{Equations, Evaluation};
+
+/// What must hold for a true solution.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Condition {
+    /// Corner Aᵢ lies above the base.
+    LegAboveBase {
+        /// Index of the leg, from 0.
+        leg: usize,
+    },
+    /// Seed, condition 1: hinge Bᵢ lies on the negative side of the platform's plane.
+    HingeBelowPlatform {
+        /// Index of the leg, from 0.
+        leg: usize,
+    },
+    /// Seed, condition 2: A₂ lies beyond A₃ in the direction of slide 1.
+    CornersInOrder,
+    /// The determinant of the Jacobian is positive, as at the neutral pose.
+    PositiveDeterminant,
+}
+
+impl fmt::Display for Condition {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::LegAboveBase { leg } => write!(f, "leg {} does not stand above the base", leg + 1),
+            Self::HingeBelowPlatform { leg } => {
+                write!(f, "hinge B{} is not below the plane of the platform (condition 1)", leg + 1)
+            }
+            Self::CornersInOrder => write!(f, "A2 is not beyond A3 along slide 1 (condition 2)"),
+            Self::PositiveDeterminant => write!(f, "the determinant of the Jacobian is not positive"),
+        }
+    }
+}
+
+/// Which conditions hold at a set of leg angles; NaN fulfils none.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Assembly {
+    /// [`Condition::LegAboveBase`] of each leg.
+    pub legs_above_base: [bool; LEGS],
+    /// [`Condition::HingeBelowPlatform`] of each leg.
+    pub hinges_below_platform: [bool; LEGS],
+    /// [`Condition::CornersInOrder`].
+    pub corners_in_order: bool,
+    /// [`Condition::PositiveDeterminant`].
+    pub positive_determinant: bool,
+}
+
+impl Assembly {
+    /// Judges leg angles in radians.
+    pub fn new(mechanism: &Mechanism, actuators: &Actuators, theta_rad: &[f64; LEGS]) -> Self {
+        let equations = Equations::new(mechanism, actuators);
+        let at = equations.evaluate(Vector3::from(*theta_rad));
+        Self::of(mechanism, actuators, &at, equations.determinant(&at))
+    }
+
+    pub(super) fn of(
+        mechanism: &Mechanism,
+        actuators: &Actuators,
+        at: &Evaluation,
+        determinant: f64,
+    ) -> Self {
+        let [a1, a2, a3] = at.corners;
+        let normal = (a2 - a1).cross(&(a3 - a1));
+        let below = |leg| (mechanism.hinge(leg, actuators.slide_m[leg]) - a1).dot(&normal) < 0.0;
+        Self {
+            legs_above_base: at.corners.map(|corner| corner.z > 0.0),
+            hinges_below_platform: std::array::from_fn(below),
+            corners_in_order: (a2 - a3).dot(&mechanism.slide_direction(0)) > 0.0,
+            positive_determinant: determinant > 0.0,
+        }
+    }
+
+    /// The first condition that does not hold.
+    pub fn violated(&self) -> Option<Condition> {
+        let fails = |holds: &[bool; LEGS]| holds.iter().position(|holds| !holds);
+        if let Some(leg) = fails(&self.legs_above_base) {
+            return Some(Condition::LegAboveBase { leg });
+        }
+        if let Some(leg) = fails(&self.hinges_below_platform) {
+            return Some(Condition::HingeBelowPlatform { leg });
+        }
+        if !self.corners_in_order {
+            return Some(Condition::CornersInOrder);
+        }
+        (!self.positive_determinant).then_some(Condition::PositiveDeterminant)
+    }
+
+    /// Whether all conditions hold.
+    pub fn is_true(&self) -> bool {
+        self.violated().is_none()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::kinematics::samples::seed_mechanism;
+
+    /// The eight solutions above the base at the neutral input, by their angles in degrees.
+    #[test]
+    fn only_the_upright_solution_of_the_neutral_input_is_true() {
+        let mechanism = seed_mechanism();
+        let neutral = Actuators { slide_m: [0.0; LEGS], leg_m: [0.27; LEGS] };
+        let judge = |deg: [f64; LEGS]| Assembly::new(&mechanism, &neutral, &deg.map(f64::to_radians));
+        assert!(judge([83.8624; LEGS]).is_true());
+        assert!(!judge([71.29; LEGS]).is_true());
+        for leg in 0..LEGS {
+            let with = |one: f64, others: f64| std::array::from_fn(|i| if i == leg { one } else { others });
+            assert!(!judge(with(66.04, 83.86)).is_true());
+            assert!(!judge(with(89.49, 71.29)).is_true());
+        }
+    }
+
+    #[test]
+    fn the_violated_condition_is_named() {
+        let mechanism = seed_mechanism();
+        let neutral = Actuators { slide_m: [0.0; LEGS], leg_m: [0.27; LEGS] };
+        let mirrored = Assembly::new(&mechanism, &neutral, &[-83.8624_f64.to_radians(); LEGS]);
+        assert_eq!(mirrored.violated(), Some(Condition::LegAboveBase { leg: 0 }));
+        let inverted = Assembly::new(&mechanism, &neutral, &[71.29_f64.to_radians(); LEGS]);
+        assert!(inverted.violated().unwrap().to_string().contains("condition"));
+    }
+
+    #[test]
+    fn no_number_fulfils_no_condition() {
+        let mechanism = seed_mechanism();
+        let neutral = Actuators { slide_m: [0.0; LEGS], leg_m: [0.27; LEGS] };
+        assert!(!Assembly::new(&mechanism, &neutral, &[f64::NAN; LEGS]).is_true());
+    }
+}

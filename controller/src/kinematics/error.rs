@@ -1,0 +1,74 @@
+//! Why a forward kinematics came to no pose.
+
+use super::Condition;
+
+/// An input without a true solution, as far as the solver could find.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum ForwardError {
+    /// An actuator or the guess is no finite number.
+    #[error("an actuator coordinate or the guess is not a finite number; check the input")]
+    NotFinite,
+    /// The iteration reached its bound.
+    #[error(
+        "no convergence: after {iterations} iterations a side of the platform is still off by \
+         {residual_m:e} m; start closer to the solution, or check that the mechanism can be assembled"
+    )]
+    NoConvergence {
+        /// The largest |fₖ| at the end, metres.
+        residual_m: f64,
+        /// Iterations made.
+        iterations: u32,
+    },
+    /// No halving of the increment decreases the error: a local minimum.
+    #[error(
+        "stalled in a local minimum after {iterations} iterations: a side of the platform is off by \
+         {residual_m:e} m; start closer to the solution, or check that the mechanism can be assembled"
+    )]
+    Stalled {
+        /// The largest |fₖ| at the minimum, metres.
+        residual_m: f64,
+        /// Iterations made.
+        iterations: u32,
+    },
+    /// The Jacobian has no inverse where the iteration stands.
+    #[error(
+        "singular: the Jacobian's determinant is {determinant:e} with a side of the platform off by \
+         {residual_m:e} m; start elsewhere or keep away from this input"
+    )]
+    Singular {
+        /// Determinant with every leg's length taken as 1.
+        determinant: f64,
+        /// The largest |fₖ| there, metres.
+        residual_m: f64,
+    },
+    /// A solution of the equations at which the mechanism cannot stand.
+    #[error("solved, but not as the mechanism is assembled: {violated}; start closer to the true solution")]
+    WrongAssembly {
+        /// The first condition that does not hold.
+        violated: Condition,
+    },
+}
+
+impl ForwardError {
+    /// One word for a status column.
+    pub fn reason(&self) -> &'static str {
+        match self {
+            Self::NotFinite => "not_finite",
+            Self::NoConvergence { .. } => "no_convergence",
+            Self::Stalled { .. } => "stalled",
+            Self::Singular { .. } => "singular",
+            Self::WrongAssembly { .. } => "wrong_assembly",
+        }
+    }
+
+    /// What a side of the platform is off by where the iteration ended, metres; none where no
+    /// iteration ended short of a solution.
+    pub fn residual_m(&self) -> Option<f64> {
+        match *self {
+            Self::NoConvergence { residual_m, .. }
+            | Self::Stalled { residual_m, .. }
+            | Self::Singular { residual_m, .. } => Some(residual_m),
+            Self::NotFinite | Self::WrongAssembly { .. } => None,
+        }
+    }
+}

@@ -1,0 +1,42 @@
+//! Random mechanisms and poses for the tests of this module.
+
+use masseter_shared::geometry::{Mechanism, MechanismConfig, Pose, SlideConfig, Vec3};
+use nalgebra::{Translation3, UnitQuaternion};
+use proptest::prelude::*;
+
+pub(super) fn seed_mechanism() -> Mechanism {
+    Mechanism::new(&MechanismConfig::default()).expect("the default is a mechanism")
+}
+
+/// Mechanisms like the seed's with every dimension off: no equal sides, no even azimuths.
+pub(super) fn mechanisms() -> impl Strategy<Value = Mechanism> {
+    let slide = |azimuth: f64| {
+        (0.05..0.065f64, -8.0..8.0f64, -6.0..6.0f64).prop_map(move |(radius, shift, skew)| {
+            let (sin, cos) = (azimuth + shift).to_radians().sin_cos();
+            SlideConfig { centre_m: [radius * cos, radius * sin], azimuth_deg: azimuth + shift + 90.0 + skew }
+        })
+    };
+    let sides = [0.045..0.056f64, 0.045..0.056f64, 0.045..0.056f64];
+    (slide(0.0), slide(120.0), slide(240.0), sides).prop_map(|(s1, s2, s3, platform_sides_m)| {
+        let config = MechanismConfig { slides: [s1, s2, s3], platform_sides_m, ..Default::default() };
+        Mechanism::new(&config).expect("the ranges hold mechanisms only")
+    })
+}
+
+/// Poses in the middle of the workspace, turned by at most `turn_deg` about each axis.
+pub(super) fn poses(turn_deg: f64) -> impl Strategy<Value = Pose> {
+    let turn = turn_deg.to_radians();
+    let angles = [-turn..turn, -turn..turn, -turn..turn];
+    ([-0.015..0.015f64, -0.015..0.015f64, 0.245..0.29f64], angles).prop_map(
+        |([x, y, z], [roll, pitch, yaw])| {
+            let rotation = UnitQuaternion::from_euler_angles(roll, pitch, yaw);
+            Pose::from_parts(Translation3::new(x, y, z), rotation)
+        },
+    )
+}
+
+/// Angle between two orientations, radians; unlike the arc cosine it is exact near zero.
+pub(super) fn angle_between(a: &Pose, b: &Pose) -> f64 {
+    let turn: Vec3 = (a.rotation.inverse() * b.rotation).scaled_axis();
+    turn.norm()
+}

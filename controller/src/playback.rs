@@ -1,0 +1,113 @@
+//! Where the motion stands: the move to its first pose, the motion itself, and coming to rest when
+//! it is stopped halfway. Time comes in as the cycles that have passed.
+
+use masseter_shared::geometry::Pose;
+
+use crate::trajectory::Trajectory;
+
+/// Which part is being played.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Part {
+    /// Standing at a pose.
+    Hold(Pose),
+    /// From a pose to the first one of the motion.
+    Ease(Pose),
+    /// The motion.
+    Motion,
+}
+
+/// The pose wanted, as a function of the time since playing began.
+#[derive(Debug)]
+pub(crate) struct Playback {
+    trajectory: Trajectory,
+    ease_s: f64,
+    stop_ramp_s: f64,
+    part: Part,
+    elapsed_s: f64,
+    /// Speed of the part's own clock: 1, or less while it comes to rest.
+    rate: f64,
+    stopping: bool,
+}
+
+impl Playback {
+    pub(crate) fn new(trajectory: Trajectory, ease_s: f64, stop_ramp_s: f64) -> Self {
+        let part = Part::Hold(trajectory.pose(0.0));
+        Self { trajectory, ease_s, stop_ramp_s, part, elapsed_s: 0.0, rate: 1.0, stopping: false }
+    }
+
+    /// Stands at `pose`.
+    pub(crate) fn hold(&mut self, pose: Pose) {
+        self.begin(Part::Hold(pose));
+    }
+
+    /// Begins the move from where it stands to the first pose of the motion.
+    pub(crate) fn ease(&mut self) {
+        self.begin(Part::Ease(self.pose_ahead(0.0)));
+    }
+
+    /// Begins the motion.
+    pub(crate) fn play(&mut self) {
+        self.begin(Part::Motion);
+    }
+
+    /// Lets the part come to rest on its own path.
+    pub(crate) fn stop(&mut self) {
+        self.stopping = true;
+    }
+
+    fn begin(&mut self, part: Part) {
+        (self.part, self.elapsed_s, self.rate, self.stopping) = (part, 0.0, 1.0, false);
+    }
+
+    /// Lets `dt_s` pass.
+    pub(crate) fn advance(&mut self, dt_s: f64) {
+        let before = self.rate;
+        if self.stopping {
+            self.rate = (self.rate - dt_s / self.stop_ramp_s).max(0.0);
+        }
+        self.elapsed_s += dt_s * (before + self.rate) / 2.0;
+    }
+
+    /// The pose wanted `ahead_s` from now.
+    pub(crate) fn pose_ahead(&self, ahead_s: f64) -> Pose {
+        let time_s = self.elapsed_s + self.rate * ahead_s;
+        match self.part {
+            Part::Hold(pose) => pose,
+            Part::Ease(from) => {
+                interpolate(&from, &self.trajectory.pose(0.0), minimum_jerk(time_s / self.ease_s))
+            }
+            Part::Motion => self.trajectory.pose(time_s),
+        }
+    }
+
+    /// Whether the current part has reached its end.
+    pub(crate) fn is_over(&self) -> bool {
+        match self.part {
+            Part::Hold(_) => true,
+            Part::Ease(_) => self.elapsed_s >= self.ease_s,
+            Part::Motion => self.elapsed_s >= self.trajectory.duration_s(),
+        }
+    }
+
+    /// Whether the pose wanted no longer changes.
+    pub(crate) fn is_at_rest(&self) -> bool {
+        self.is_over() || self.rate == 0.0
+    }
+
+    /// Time on the motion's clock, s; negative before the motion.
+    pub(crate) fn motion_time_s(&self) -> f64 {
+        if self.part == Part::Motion { self.elapsed_s } else { -1.0 }
+    }
+}
+
+/// 10u³ − 15u⁴ + 6u⁵ on 0..1: from rest to rest with the least jerk.
+fn minimum_jerk(u: f64) -> f64 {
+    let u = u.clamp(0.0, 1.0);
+    u * u * u * (10.0 + u * (6.0 * u - 15.0))
+}
+
+fn interpolate(from: &Pose, to: &Pose, share: f64) -> Pose {
+    let turn = from.rotation.rotation_to(&to.rotation).scaled_axis() * share;
+    let position = from.translation.vector.lerp(&to.translation.vector, share);
+    Pose::from_parts(position.into(), nalgebra::UnitQuaternion::from_scaled_axis(turn) * from.rotation)
+}

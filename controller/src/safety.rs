@@ -1,0 +1,118 @@
+//! What makes the controller stop: each check names the cause, the value and the limit it broke.
+
+use masseter_shared::geometry::{AXES, Actuators, LimitViolation, Pose, StrokeLimits};
+use masseter_shared::messages::codes::{Cause, DriveCondition, NO_AXIS};
+use masseter_shared::messages::{Event, Reading};
+
+use crate::kinematics::ForwardError;
+
+/// Something wrong, as an event reports it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Fault {
+    /// What it is.
+    pub cause: Cause,
+    /// The axis concerned, if one is.
+    pub axis: Option<usize>,
+    /// The value that broke the limit, in the cause's unit.
+    pub value: f64,
+    /// The limit.
+    pub limit: f64,
+}
+
+impl Fault {
+    /// A fault of the whole rig.
+    pub fn new(cause: Cause, value: f64, limit: f64) -> Self {
+        Self { cause, axis: None, value, limit }
+    }
+
+    fn of_axis(cause: Cause, axis: usize, value: f64, limit: f64) -> Self {
+        Self { cause, axis: Some(axis), value, limit }
+    }
+
+    /// Fills the event's explanation.
+    pub(crate) fn explain(&self, event: &mut Event) {
+        event.cause = self.cause.code();
+        event.axis = self.axis.map_or(NO_AXIS, |axis| axis as u32);
+        (event.value, event.limit) = (self.value, self.limit);
+    }
+}
+
+impl From<LimitViolation> for Fault {
+    fn from(violation: LimitViolation) -> Self {
+        Self::of_axis(Cause::StrokeLimit, violation.axis, violation.value_m, violation.limit_m())
+    }
+}
+
+impl From<&ForwardError> for Fault {
+    fn from(error: &ForwardError) -> Self {
+        let residual_m = error.residual_m().unwrap_or(f64::NAN);
+        Self::new(Cause::ForwardKinematics, residual_m, 0.0)
+    }
+}
+
+/// Whether every value of a reading is a number and every code known.
+pub(crate) fn check_reading(reading: &Reading) -> Result<(), Fault> {
+    for axis in 0..AXES {
+        let (position_m, force_n) = (reading.position_m[axis], reading.force_n[axis]);
+        if !(position_m.is_finite() && force_n.is_finite()) {
+            return Err(Fault::of_axis(Cause::BadMessage, axis, position_m, 0.0));
+        }
+        let code = reading.drive_state[axis];
+        if DriveCondition::try_from(code).is_err() {
+            return Err(Fault::of_axis(Cause::BadMessage, axis, f64::from(code), 0.0));
+        }
+    }
+    Ok(())
+}
+
+/// Whether the reading answers a command of this controller, whose last one was `last_sent`.
+pub(crate) fn check_commander(reading: &Reading, last_sent: u64) -> Result<(), Fault> {
+    if reading.answers_cycle > last_sent {
+        return Err(Fault::new(Cause::ForeignCommand, reading.answers_cycle as f64, last_sent as f64));
+    }
+    Ok(())
+}
+
+/// Whether the master still serves, no drive is in fault, and, once `moving`, all are enabled.
+pub(crate) fn check_drives(reading: &Reading, moving: bool) -> Result<(), Fault> {
+    if reading.master_fault != 0 {
+        return Err(Fault::new(Cause::MasterFault, 1.0, 0.0));
+    }
+    for (axis, &code) in reading.drive_state.iter().enumerate() {
+        let condition = DriveCondition::try_from(code).unwrap_or(DriveCondition::Unknown);
+        let faulty = matches!(condition, DriveCondition::Fault | DriveCondition::FaultReaction);
+        if faulty || (moving && condition != DriveCondition::OperationEnabled) {
+            let enabled = f64::from(DriveCondition::OperationEnabled.code());
+            return Err(Fault::of_axis(Cause::DriveFault, axis, f64::from(code), enabled));
+        }
+    }
+    Ok(())
+}
+
+/// Whether the platform is where it should be, within `limit_m`.
+pub(crate) fn check_tracking(wanted: &Pose, found: &Pose, limit_m: f64) -> Result<(), Fault> {
+    let distance_m = (wanted.translation.vector - found.translation.vector).norm();
+    if distance_m > limit_m {
+        return Err(Fault::new(Cause::TrackingLost, distance_m, limit_m));
+    }
+    Ok(())
+}
+
+/// Whether the targets lie within the strokes and can be reached in `dt_s` at the drives' speed.
+pub(crate) fn check_targets(
+    targets: &Actuators,
+    before: &Actuators,
+    strokes: &StrokeLimits,
+    velocity_limit_m_s: &[f64; AXES],
+    dt_s: f64,
+) -> Result<(), Fault> {
+    strokes.check(targets)?;
+    let steps = targets.to_axes().into_iter().zip(before.to_axes()).map(|(to, from)| (to - from).abs());
+    for (axis, (step_m, limit_m_s)) in steps.zip(velocity_limit_m_s).enumerate() {
+        let velocity_m_s = step_m / dt_s;
+        if velocity_m_s > *limit_m_s {
+            return Err(Fault::of_axis(Cause::VelocityLimit, axis, velocity_m_s, *limit_m_s));
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,108 @@
+//! The controller's sequence as a table: which state follows when something happens.
+//!
+//! What makes something happen is judged elsewhere ([`core`](crate::core)); here is only what follows.
+
+use masseter_shared::messages::codes::ControllerState as State;
+
+/// What can move the sequence on. In one cycle only the most urgent counts: the last in this order.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Happening {
+    /// Enough complete readings in a row, and a pose found.
+    Steady,
+    /// All drives in operation enabled.
+    Enabled,
+    /// The first pose of the motion is reached.
+    Eased,
+    /// The motion has been played to its end.
+    Played,
+    /// The last pose has been held long enough.
+    Rested,
+    /// All drives are off.
+    Released,
+    /// Somebody wants the rig to stop.
+    StopRequested,
+    /// Something is wrong.
+    Fault,
+}
+
+impl Happening {
+    /// Every happening, in order of urgency.
+    pub const ALL: [Self; 8] = [
+        Self::Steady,
+        Self::Enabled,
+        Self::Eased,
+        Self::Played,
+        Self::Rested,
+        Self::Released,
+        Self::StopRequested,
+        Self::Fault,
+    ];
+}
+
+use State::{Disabling, Easing, Enabling, Finished, Holding, Running, SafeStop, WaitReadings};
+
+/// One row a state in the order of the codes, one column a happening; a state that stands in its own
+/// row stays.
+#[rustfmt::skip]
+const TABLE: [[State; 8]; 8] = [
+    // Steady      Enabled       Eased         Played        Rested        Released      StopRequested Fault
+    [Enabling,     WaitReadings, WaitReadings, WaitReadings, WaitReadings, WaitReadings, Finished,     SafeStop],
+    [Enabling,     Easing,       Enabling,     Enabling,     Enabling,     Enabling,     Disabling,    SafeStop],
+    [Easing,       Easing,       Running,      Easing,       Easing,       Easing,       Holding,      SafeStop],
+    [Running,      Running,      Running,      Holding,      Running,      Running,      Holding,      SafeStop],
+    [Holding,      Holding,      Holding,      Holding,      Disabling,    Holding,      Holding,      SafeStop],
+    [Disabling,    Disabling,    Disabling,    Disabling,    Disabling,    Finished,     Disabling,    SafeStop],
+    [Finished,     Finished,     Finished,     Finished,     Finished,     Finished,     Finished,     Finished],
+    [SafeStop,     SafeStop,     SafeStop,     SafeStop,     SafeStop,     SafeStop,     SafeStop,     SafeStop],
+];
+
+/// The state that follows `state` when `happening` happens.
+pub fn next(state: State, happening: Happening) -> State {
+    TABLE[state as usize][happening as usize]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Every pair that changes the state; all others must leave it.
+    const MOVES: [(State, Happening, State); 16] = [
+        (WaitReadings, Happening::Steady, Enabling),
+        (WaitReadings, Happening::StopRequested, Finished),
+        (WaitReadings, Happening::Fault, SafeStop),
+        (Enabling, Happening::Enabled, Easing),
+        (Enabling, Happening::StopRequested, Disabling),
+        (Enabling, Happening::Fault, SafeStop),
+        (Easing, Happening::Eased, Running),
+        (Easing, Happening::StopRequested, Holding),
+        (Easing, Happening::Fault, SafeStop),
+        (Running, Happening::Played, Holding),
+        (Running, Happening::StopRequested, Holding),
+        (Running, Happening::Fault, SafeStop),
+        (Holding, Happening::Rested, Disabling),
+        (Holding, Happening::Fault, SafeStop),
+        (Disabling, Happening::Released, Finished),
+        (Disabling, Happening::Fault, SafeStop),
+    ];
+
+    #[test]
+    fn every_pair_moves_as_specified_and_no_other_moves() {
+        for &state in State::ALL {
+            for happening in Happening::ALL {
+                let specified = MOVES.iter().find(|(from, when, _)| (*from, *when) == (state, happening));
+                let expected = specified.map_or(state, |(_, _, to)| *to);
+                assert_eq!(next(state, happening), expected, "{state} on {happening:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_safe_stop_is_never_left_and_every_moving_state_reaches_it() {
+        for happening in Happening::ALL {
+            assert_eq!(next(SafeStop, happening), SafeStop);
+        }
+        for state in [WaitReadings, Enabling, Easing, Running, Holding, Disabling] {
+            assert_eq!(next(state, Happening::Fault), SafeStop);
+        }
+    }
+}

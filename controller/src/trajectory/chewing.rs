@@ -1,0 +1,171 @@
+//! Chewing: a tear-drop loop of the incisal point.
+//!
+//! The incisal point goes down and back, near the midline at first, swings to the working side, and
+//! closes from there to rest in occlusion. Defaults after published figures: cycle of 0.70 s (Dental
+//! Biotribology; rates of 1.46 ± 0.21 Hz, Fuentes 2018, and 1.57 Hz, Po 2011), 16–20 mm of opening,
+//! lateral 3–5 mm and anteroposterior 3–6 mm (textbook), condylar inclination 40°, Bennett angle 8°
+//! (about 42° and 7–9°, IADR 177411), phases of 43, 40 and 17 %.
+//!
+//! Simplified: every cycle is the same, the sagittal path is a straight line, food does not matter.
+
+use masseter_shared::config::{ChewingConfig, JawConfig};
+use masseter_shared::geometry::Pose;
+
+use super::TrajectoryError;
+use super::cycle::Cycle;
+use super::error::require;
+use super::mandible::{Guidance, Mandible, Posture, reach};
+
+/// Advance of the balancing condyle beyond which no jaw goes, metres.
+const LARGEST_BALANCING_M: f64 = 0.02;
+/// A condyle may go back from the closed pose by as much as to the retruded contact, metres.
+const LARGEST_RETRUSION_M: f64 = 0.001;
+/// Points of the cycle at which the path is proven before it is played.
+const PROOF_POINTS: u32 = 256;
+
+/// The generator.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Chewing {
+    mandible: Mandible,
+    cycle: Cycle,
+    down_m: f64,
+    back_m: f64,
+    balancing_m: f64,
+}
+
+impl Chewing {
+    pub(super) fn new(config: &ChewingConfig, jaw: &JawConfig) -> Result<Self, TrajectoryError> {
+        let ChewingConfig { vertical_mm, lateral_mm, anterior_posterior_mm, .. } = *config;
+        require("vertical_mm", vertical_mm, (0.0..=60.0).contains(&vertical_mm), "0 to 60 mm")?;
+        require("lateral_mm", lateral_mm, (0.0..=15.0).contains(&lateral_mm), "0 to 15 mm")?;
+        let range = -15.0..=40.0;
+        let holds = range.contains(&anterior_posterior_mm);
+        require("anterior_posterior_mm", anterior_posterior_mm, holds, "-15 to 40 mm")?;
+        let guidance = Guidance {
+            inclination_deg: config.condylar_inclination_deg,
+            bennett_angle_deg: config.bennett_angle_deg,
+            working: config.side,
+        };
+        let mut chewing = Self {
+            mandible: Mandible::new(jaw, &guidance)?,
+            cycle: Cycle::new(config.cycle_rate_hz, &config.phases)?,
+            down_m: vertical_mm / 1000.0,
+            back_m: anterior_posterior_mm / 1000.0,
+            balancing_m: 0.0,
+        };
+        chewing.balancing_m = chewing.balancing_for(lateral_mm, config.side.sign())?;
+        chewing.prove()?;
+        Ok(chewing)
+    }
+
+    pub(super) fn cycle(&self) -> &Cycle {
+        &self.cycle
+    }
+
+    /// Displacement of the jaw from the closed pose, jaw frame.
+    pub(super) fn displacement(&self, motion_s: f64) -> Pose {
+        // Postures exist at all proven points; a gap between two would be a jump, which `check` stops.
+        let posture = self.posture(self.cycle.phase(motion_s)).unwrap_or_default();
+        self.mandible.displacement(&posture)
+    }
+
+    fn posture(&self, phase: f64) -> Option<Posture> {
+        let opened = self.cycle.opened(phase);
+        let balancing_m = self.balancing_m * self.cycle.swung(phase);
+        self.mandible.posture_at(-self.back_m * opened, -self.down_m * opened, balancing_m)
+    }
+
+    /// The balancing condyle's advance that swings the widest open jaw this far to the side.
+    fn balancing_for(&self, lateral_mm: f64, sign: f64) -> Result<f64, TrajectoryError> {
+        if lateral_mm == 0.0 {
+            return Ok(0.0);
+        }
+        let swing_m = |balancing_m| {
+            let widest = Self { balancing_m, ..*self }.posture(self.cycle.widest());
+            widest.map_or(f64::INFINITY, |p| sign * self.mandible.displacement(&p).translation.y)
+        };
+        let balancing_m = reach(lateral_mm / 1000.0, LARGEST_BALANCING_M, swing_m);
+        let reached_mm = 1000.0 * swing_m(balancing_m);
+        if (reached_mm - lateral_mm).abs() > 1e-6 {
+            return Err(TrajectoryError::OutOfReach {
+                name: "lateral_mm",
+                wanted_mm: lateral_mm,
+                reached_mm,
+            });
+        }
+        Ok(balancing_m)
+    }
+
+    fn prove(&self) -> Result<(), TrajectoryError> {
+        for point in 0..PROOF_POINTS {
+            let phase = f64::from(point) / f64::from(PROOF_POINTS);
+            let advance_m = self.posture(phase).map_or(f64::NAN, |posture| posture.advance_m);
+            if advance_m.is_nan() || advance_m < -LARGEST_RETRUSION_M {
+                return Err(TrajectoryError::Dislocated { phase, advance_mm: 1000.0 * advance_m });
+            }
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use masseter_shared::config::Side;
+
+    use super::*;
+
+    fn chewing(config: &ChewingConfig) -> Chewing {
+        Chewing::new(config, &JawConfig::default()).unwrap()
+    }
+
+    #[test]
+    fn amplitudes_are_reached_on_the_working_side() {
+        for (side, sign) in [(Side::Left, 1.0), (Side::Right, -1.0)] {
+            let config = ChewingConfig { side, ..Default::default() };
+            let widest_s = config.phases.opening / config.cycle_rate_hz;
+            let incisal_mm = chewing(&config).displacement(widest_s).translation.vector * 1000.0;
+            assert!((incisal_mm.x + 5.0).abs() < 1e-6);
+            assert!((incisal_mm.y - sign * 4.0).abs() < 1e-6);
+            assert!((incisal_mm.z + 18.0).abs() < 1e-6);
+        }
+    }
+
+    #[test]
+    fn sides_are_mirror_images() {
+        let left = chewing(&ChewingConfig { side: Side::Left, ..Default::default() });
+        let right = chewing(&ChewingConfig { side: Side::Right, ..Default::default() });
+        for step in 0..70 {
+            let (a, b) =
+                (left.displacement(f64::from(step) / 100.0), right.displacement(f64::from(step) / 100.0));
+            let (p, q) = (a.translation.vector, b.translation.vector);
+            assert!((p.x - q.x).abs() < 1e-12 && (p.y + q.y).abs() < 1e-12 && (p.z - q.z).abs() < 1e-12);
+            let (r, s) = (a.rotation.scaled_axis(), b.rotation.scaled_axis());
+            assert!((r.x + s.x).abs() < 1e-12 && (r.y - s.y).abs() < 1e-12 && (r.z + s.z).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn the_loop_opens_medially_and_closes_laterally() {
+        let config = ChewingConfig::default();
+        let chewing = chewing(&config);
+        // Half open, going down and coming up.
+        let [down, up] =
+            [0.215, 0.63].map(|phase| chewing.displacement(phase / config.cycle_rate_hz).translation);
+        assert!((down.z - up.z).abs() < 1e-9);
+        assert!(up.y - down.y > 0.0005);
+    }
+
+    #[test]
+    fn what_no_mandible_can_do_is_refused_with_its_name() {
+        let bad = [
+            (ChewingConfig { vertical_mm: f64::NAN, ..Default::default() }, "vertical_mm"),
+            (ChewingConfig { lateral_mm: -1.0, ..Default::default() }, "lateral_mm"),
+            (ChewingConfig { condylar_inclination_deg: 90.0, ..Default::default() }, "inclination"),
+            (ChewingConfig { anterior_posterior_mm: 25.0, ..Default::default() }, "anterior_posterior_mm"),
+        ];
+        for (config, name) in bad {
+            let error = Chewing::new(&config, &JawConfig::default()).unwrap_err().to_string();
+            assert!(error.contains(name), "{error}");
+        }
+    }
+}

@@ -1,0 +1,52 @@
+//! From displacements of the lower jaw to poses of the platform.
+//!
+//! Platform = closed · X · T · X⁻¹, where X is the jaw frame in the platform frame at the closed pose:
+//! origin at the incisal point, axes parallel to the base's.
+
+use masseter_shared::config::JawConfig;
+use masseter_shared::geometry::{Actuators, LEGS, Mechanism, Pose};
+use nalgebra::Translation3;
+
+use crate::kinematics::{Options, solve_cold};
+
+use super::TrajectoryError;
+use super::error::require;
+
+/// The jaw on the platform.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct JawFrame {
+    /// closed · X: the jaw frame in the base frame.
+    jaw: Pose,
+    /// X⁻¹.
+    platform_in_jaw: Pose,
+}
+
+impl JawFrame {
+    pub(super) fn new(jaw: &JawConfig, mechanism: &Mechanism) -> Result<Self, TrajectoryError> {
+        let closed_leg_m = require("jaw.closed_leg_m", jaw.closed_leg_m, jaw.closed_leg_m > 0.0, "above 0")?;
+        for (name, point) in
+            [("jaw.reference_point_m", jaw.reference_point_m), ("jaw.closed_offset_m", jaw.closed_offset_m)]
+        {
+            for coordinate in point {
+                require(name, coordinate, coordinate.is_finite(), "finite")?;
+            }
+        }
+        let actuators = Actuators { slide_m: [0.0; LEGS], leg_m: [closed_leg_m; LEGS] };
+        let closed = solve_cold(mechanism, &actuators, &Options::default())
+            .map_err(|source| TrajectoryError::NoClosedPose { closed_leg_m, source })?
+            .pose;
+        let closed = Translation3::from(jaw.closed_offset_m) * closed;
+        let jaw_in_platform =
+            Pose::from_parts(Translation3::from(jaw.reference_point_m), closed.rotation.inverse());
+        Ok(Self { jaw: closed * jaw_in_platform, platform_in_jaw: jaw_in_platform.inverse() })
+    }
+
+    /// The platform in the base frame when the jaw is displaced from the closed pose.
+    pub(super) fn platform(&self, displacement: &Pose) -> Pose {
+        self.jaw * displacement * self.platform_in_jaw
+    }
+
+    pub(super) fn closed(&self) -> Pose {
+        self.platform(&Pose::identity())
+    }
+}

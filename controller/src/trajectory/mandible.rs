@@ -1,0 +1,234 @@
+//! The mandible as a rigid body on two condylar paths.
+//!
+//! Condyles and incisal point form Bonwill's triangle, inclined to the occlusal plane by Balkwill's
+//! angle. A posture is how far both condyles have advanced along the sagittal path, how much further
+//! the balancing condyle has, and the pitch about the line between them. The balancing path turns
+//! inward by the Bennett angle; the working condyle is free to shift sideways by as much as the
+//! fixed distance between the condyles demands (the Bennett movement, about half a millimetre).
+//!
+//! Simplified: the paths are straight, working and balancing side share their inclination, and
+//! neither discs, muscles nor tooth contacts guide anything.
+
+use masseter_shared::config::{JawConfig, Side};
+use masseter_shared::geometry::{Pose, Vec3};
+use nalgebra::{Quaternion, UnitQuaternion};
+
+use super::TrajectoryError;
+use super::error::require;
+
+/// Along which paths the condyles glide.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Guidance {
+    pub inclination_deg: f64,
+    pub bennett_angle_deg: f64,
+    pub working: Side,
+}
+
+impl Guidance {
+    /// Paths for motions in which both sides do the same.
+    pub(super) fn symmetric(inclination_deg: f64) -> Self {
+        Self { inclination_deg, bennett_angle_deg: 0.0, working: Side::Left }
+    }
+}
+
+/// A rigid mandible; jaw frame at the closed pose.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Mandible {
+    /// Middle between the condyles.
+    middle: Vec3,
+    width_m: f64,
+    path: Vec3,
+    balancing_path: Vec3,
+    /// +1 when the left side works, −1 when the right does.
+    working: f64,
+}
+
+/// Where the mandible stands on its paths.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(super) struct Posture {
+    /// Opening about the line between the condyles, radians.
+    pub pitch_rad: f64,
+    /// Advance of both condyles along the sagittal path, metres.
+    pub advance_m: f64,
+    /// Further advance of the balancing condyle along its own path, metres.
+    pub balancing_m: f64,
+}
+
+impl Posture {
+    pub(super) fn scaled(&self, share: f64) -> Self {
+        Self {
+            pitch_rad: self.pitch_rad * share,
+            advance_m: self.advance_m * share,
+            balancing_m: self.balancing_m * share,
+        }
+    }
+}
+
+/// What the balancing condyle alone does to the line between the condyles.
+struct CondylarLine {
+    shift: Vec3,
+    turn: UnitQuaternion<f64>,
+    /// Its direction, from right to left.
+    direction: Vec3,
+}
+
+/// The middle between the condyles in the jaw frame at the closed pose.
+pub(super) fn condylar_middle(jaw: &JawConfig) -> Result<Vec3, TrajectoryError> {
+    let side_m = jaw.bonwill_side_m;
+    let balkwill_deg = jaw.balkwill_angle_deg;
+    require("jaw.bonwill_side_m", side_m, side_m > 0.01, "above 0.01 m")?;
+    require("jaw.balkwill_angle_deg", balkwill_deg, (0.0..90.0).contains(&balkwill_deg), "0 to below 90")?;
+    let height_m = side_m * 3f64.sqrt() / 2.0;
+    let (sin, cos) = balkwill_deg.to_radians().sin_cos();
+    Ok(Vec3::new(-height_m * cos, 0.0, height_m * sin))
+}
+
+impl Mandible {
+    pub(super) fn new(jaw: &JawConfig, guidance: &Guidance) -> Result<Self, TrajectoryError> {
+        let Guidance { inclination_deg, bennett_angle_deg, working } = *guidance;
+        let range = 0.0..=80.0;
+        require("condylar_inclination_deg", inclination_deg, range.contains(&inclination_deg), "0 to 80")?;
+        let range = 0.0..=45.0;
+        require("bennett_angle_deg", bennett_angle_deg, range.contains(&bennett_angle_deg), "0 to 45")?;
+        let (down, forward) = inclination_deg.to_radians().sin_cos();
+        let (inward, straight) = bennett_angle_deg.to_radians().sin_cos();
+        let working = working.sign();
+        Ok(Self {
+            middle: condylar_middle(jaw)?,
+            width_m: jaw.bonwill_side_m,
+            path: Vec3::new(forward, 0.0, -down),
+            balancing_path: Vec3::new(forward * straight, working * forward * inward, -down),
+            working,
+        })
+    }
+
+    /// Displacement of the jaw from the closed pose: where the incisal point went, and the turn.
+    pub(super) fn displacement(&self, posture: &Posture) -> Pose {
+        let line = self.condylar_line(posture.balancing_m);
+        let pitch = UnitQuaternion::from_axis_angle(&Vec3::y_axis(), posture.pitch_rad);
+        let rotation = line.turn * pitch;
+        let middle = self.middle + line.shift + self.path * posture.advance_m;
+        Pose::from_parts((middle - rotation * self.middle).into(), rotation)
+    }
+
+    /// The posture that brings the incisal point to these coordinates in the midsagittal plane with
+    /// the balancing condyle advanced; where to the side it comes to lie follows. None out of reach.
+    ///
+    /// The incisal point lies at its fixed distance from the condyles' middle M + c u, in the plane
+    /// across their line: a quadratic in the advance c.
+    pub(super) fn posture_at(&self, anterior_m: f64, up_m: f64, balancing_m: f64) -> Option<Posture> {
+        let line = self.condylar_line(balancing_m);
+        let across = |x: f64, z: f64| {
+            Vec3::new(x, -(x * line.direction.x + z * line.direction.z) / line.direction.y, z)
+        };
+        let from = self.middle + line.shift;
+        let arm = across(anterior_m - from.x, up_m - from.z);
+        let path = across(self.path.x, self.path.z);
+        let half = arm.dot(&path);
+        let root_squared =
+            half * half - path.norm_squared() * (arm.norm_squared() - self.middle.norm_squared());
+        if root_squared < 0.0 {
+            return None;
+        }
+        let advance_m = (half - root_squared.sqrt()) / path.norm_squared();
+        let arm = line.turn.inverse() * (arm - path * advance_m);
+        let pitch_rad = declination(&arm) - declination(&-self.middle);
+        Some(Posture { pitch_rad, advance_m, balancing_m })
+    }
+
+    fn condylar_line(&self, balancing_m: f64) -> CondylarLine {
+        let advance = self.balancing_path * balancing_m;
+        let across_m = (self.width_m.powi(2) - advance.x.powi(2) - advance.z.powi(2)).max(0.0).sqrt();
+        let side_shift_m = self.working * advance.y - self.width_m + across_m;
+        let shift = (advance + Vec3::y() * (self.working * side_shift_m)) / 2.0;
+        let direction =
+            Vec3::new(-self.working * advance.x, across_m, -self.working * advance.z) / self.width_m;
+        CondylarLine { shift, turn: turn_of_y_to(&direction), direction }
+    }
+}
+
+/// Angle below the horizontal in the sagittal plane, radians.
+fn declination(arm: &Vec3) -> f64 {
+    (-arm.z).atan2(arm.x)
+}
+
+/// The shortest rotation of ŷ to a unit vector that is not −ŷ.
+fn turn_of_y_to(direction: &Vec3) -> UnitQuaternion<f64> {
+    let half = Quaternion::from_parts(1.0 + direction.y, Vec3::y().cross(direction));
+    UnitQuaternion::from_quaternion(half)
+}
+
+/// The argument in 0..=`highest` at which a rising function reaches a value; `highest` if it does not.
+/// Sixty halvings exhaust double precision.
+pub(super) fn reach(value: f64, highest: f64, function: impl Fn(f64) -> f64) -> f64 {
+    let (mut below, mut above) = (0.0, highest);
+    for _ in 0..60 {
+        let middle = f64::midpoint(below, above);
+        if function(middle) < value { below = middle } else { above = middle }
+    }
+    above
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn mandible(working: Side) -> Mandible {
+        let guidance = Guidance { inclination_deg: 40.0, bennett_angle_deg: 8.0, working };
+        Mandible::new(&JawConfig::default(), &guidance).unwrap()
+    }
+
+    /// Where the condyles have gone, working and balancing, metres.
+    fn condyles(mandible: &Mandible, displacement: &Pose) -> [Vec3; 2] {
+        [1.0, -1.0].map(|side| {
+            let at = mandible.middle + Vec3::y() * (side * mandible.working * mandible.width_m / 2.0);
+            displacement.rotation * at + displacement.translation.vector - at
+        })
+    }
+
+    proptest! {
+        #[test]
+        fn condyles_stay_on_their_paths(
+            pitch_rad in 0.0..0.7f64, advance_m in 0.0..0.02f64, balancing_m in 0.0..0.012f64, left: bool,
+        ) {
+            let mandible = mandible(if left { Side::Left } else { Side::Right });
+            let displacement = mandible.displacement(&Posture { pitch_rad, advance_m, balancing_m });
+            let [working, balancing] = condyles(&mandible, &displacement);
+            let common = mandible.path * advance_m;
+            prop_assert!((balancing - common - mandible.balancing_path * balancing_m).norm() < 1e-12);
+            let shift = working - common;
+            prop_assert!(shift.x.abs() < 1e-12 && shift.z.abs() < 1e-12);
+            prop_assert!(shift.y.abs() < 0.0011);
+        }
+
+        #[test]
+        fn the_posture_for_a_point_is_the_one_that_led_there(
+            pitch_rad in 0.0..0.7f64, advance_m in 0.0..0.02f64, balancing_m in 0.0..0.012f64,
+        ) {
+            let mandible = mandible(Side::Left);
+            let posture = Posture { pitch_rad, advance_m, balancing_m };
+            let incisal = mandible.displacement(&posture).translation;
+            let again = mandible.posture_at(incisal.x, incisal.z, balancing_m).unwrap();
+            prop_assert!((again.pitch_rad - pitch_rad).abs() < 1e-9);
+            prop_assert!((again.advance_m - advance_m).abs() < 1e-10);
+        }
+    }
+
+    #[test]
+    fn opening_lowers_the_incisal_point_and_balancing_swings_it_to_the_working_side() {
+        for (side, sign) in [(Side::Left, 1.0), (Side::Right, -1.0)] {
+            let mandible = mandible(side);
+            let opened = mandible.displacement(&Posture { pitch_rad: 0.2, ..Default::default() });
+            assert!(opened.translation.z < -0.01 && opened.translation.x < 0.0);
+            let swung = mandible.displacement(&Posture { balancing_m: 0.005, ..Default::default() });
+            assert!(swung.translation.y * sign > 0.002);
+        }
+    }
+
+    #[test]
+    fn what_lies_beyond_the_mandible_is_out_of_reach() {
+        assert_eq!(mandible(Side::Left).posture_at(-0.3, -0.3, 0.0), None);
+    }
+}

@@ -1,0 +1,136 @@
+//! Trajectories: the desired pose of the platform as a function of time.
+//!
+//! A trajectory is built once from a scenario (here files are read, motions solved and memory
+//! allocated) and then evaluated in the loop, without allocation and without iteration. It comes
+//! from a generator on a rigid mandible ([`MotionConfig`]'s kinds) or from a recording, starts and
+//! ends at rest, and moves nothing by itself: [`check`] tells beforehand whether the mechanism can
+//! follow it. How the rig gets to its first pose is the controller's matter.
+
+mod axes;
+mod check;
+mod chewing;
+mod clock;
+mod cycle;
+mod error;
+mod excursion;
+mod import;
+mod jaw_frame;
+mod lowpass;
+mod mandible;
+mod markers;
+mod pose_csv;
+mod recording;
+mod spline;
+mod table;
+
+use masseter_shared::config::{JawConfig, MotionConfig};
+use masseter_shared::geometry::{Mechanism, Pose};
+
+pub use check::{CheckError, CheckProblem, TrajectoryReport, check};
+pub use error::TrajectoryError;
+pub use import::{ImportError, ImportProblem, SourceLine};
+
+use chewing::Chewing;
+use clock::{MotionClock, RAMP_S};
+use excursion::Excursion;
+use jaw_frame::JawFrame;
+use recording::Recording;
+
+/// How long a generated motion lasts if nobody says, s.
+const GENERATED_DURATION_S: f64 = 10.0;
+
+/// The desired pose of the platform as a function of time.
+#[derive(Debug, Clone)]
+pub struct Trajectory {
+    motion: Motion,
+    clock: MotionClock,
+    frame: JawFrame,
+}
+
+#[derive(Debug, Clone)]
+enum Motion {
+    Chewing(Chewing),
+    Excursion(Excursion),
+    Recording(Recording),
+}
+
+impl Trajectory {
+    /// Builds the motion. `duration_s` cuts it or holds its last pose; by default a generator runs
+    /// for 10 s and a recording to its end.
+    ///
+    /// # Errors
+    /// When a value lies outside its range, the file cannot be used, or no closed pose exists.
+    pub fn new(
+        config: &MotionConfig,
+        jaw: &JawConfig,
+        mechanism: &Mechanism,
+        duration_s: Option<f64>,
+    ) -> Result<Self, TrajectoryError> {
+        if let Some(duration_s) = duration_s {
+            error::require("duration_s", duration_s, duration_s > 0.0, "above 0")?;
+        }
+        let frame = JawFrame::new(jaw, mechanism)?;
+        let motion = match config {
+            MotionConfig::Chewing(config) => Motion::Chewing(Chewing::new(config, jaw)?),
+            MotionConfig::Opening(config) => Motion::Excursion(Excursion::opening(config, jaw)?),
+            MotionConfig::Protrusion(config) => Motion::Excursion(Excursion::protrusion(config, jaw)?),
+            MotionConfig::Lateral(config) => Motion::Excursion(Excursion::lateral(config, jaw)?),
+            MotionConfig::File(config) => Motion::Recording(import::import(config, jaw)?),
+        };
+        let clock = motion.clock(duration_s);
+        Ok(Self { motion, clock, frame })
+    }
+
+    /// The platform in the base frame `t_s` seconds after the start; at rest before 0 and after
+    /// [`duration_s`](Self::duration_s).
+    pub fn pose(&self, t_s: f64) -> Pose {
+        let motion_s = self.clock.motion_time_s(t_s);
+        self.frame.platform(&self.motion.displacement(motion_s))
+    }
+
+    /// How long the trajectory lasts, s.
+    pub fn duration_s(&self) -> f64 {
+        self.clock.duration_s()
+    }
+
+    /// The platform at the closed (intercuspal) pose, base frame.
+    pub fn closed_pose(&self) -> Pose {
+        self.frame.closed()
+    }
+
+    /// The line of the recording nearest to a time of the trajectory; none for a generator.
+    pub fn source_line(&self, t_s: f64) -> Option<SourceLine> {
+        match &self.motion {
+            Motion::Recording(recording) => Some(recording.source_line(self.clock.motion_time_s(t_s))),
+            Motion::Chewing(_) | Motion::Excursion(_) => None,
+        }
+    }
+}
+
+impl Motion {
+    /// Generators play whole cycles only, so that they end closed.
+    fn clock(&self, duration_s: Option<f64>) -> MotionClock {
+        let cycle = match self {
+            Self::Chewing(chewing) => chewing.cycle(),
+            Self::Excursion(excursion) => excursion.cycle(),
+            Self::Recording(recording) => {
+                let length_s = recording.length_s();
+                return MotionClock::new(length_s, duration_s.unwrap_or(length_s + RAMP_S));
+            }
+        };
+        let duration_s = duration_s.unwrap_or(GENERATED_DURATION_S);
+        MotionClock::new(cycle.whole_cycles_s(duration_s - RAMP_S), duration_s)
+    }
+
+    /// Displacement of the lower jaw from the closed pose, jaw frame.
+    fn displacement(&self, motion_s: f64) -> Pose {
+        match self {
+            Self::Chewing(chewing) => chewing.displacement(motion_s),
+            Self::Excursion(excursion) => excursion.displacement(motion_s),
+            Self::Recording(recording) => recording.displacement(motion_s),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,133 @@
+//! A recording as a smooth curve of jaw displacements.
+//!
+//! Samples become translation and rotation vector (from the first sample's orientation), are spread
+//! to an even grid, low-passed and joined by a spline, twice continuously differentiable.
+
+use std::path::PathBuf;
+
+use masseter_shared::geometry::{Pose, Vec3};
+use nalgebra::{UnitQuaternion, Vector6};
+
+use super::import::{ImportProblem, Located, Samples, SourceLine};
+use super::lowpass::lowpass;
+use super::spline::Spline;
+
+/// Rate of the even grid, Hz: well above what a jaw tracker records and a jaw does.
+const GRID_HZ: f64 = 200.0;
+/// Beyond this, rotation vectors are no longer a good measure of the way between two poses.
+const LARGEST_TURN_DEG: f64 = 90.0;
+
+/// Jaw displacements over the recording's own time, from 0.
+#[derive(Debug, Clone)]
+pub(super) struct Recording {
+    path: PathBuf,
+    time_s: Vec<f64>,
+    lines: Vec<u64>,
+    first_rotation: UnitQuaternion<f64>,
+    curve: Spline<6>,
+}
+
+impl Recording {
+    /// From samples at strictly increasing times; a corner of 0 leaves them unfiltered.
+    pub(super) fn new(path: PathBuf, samples: Samples, lowpass_hz: f64) -> Result<Self, Located> {
+        let first_rotation = samples.displacements[0].rotation;
+        let coordinates = coordinates(&samples, &first_rotation)?;
+        let time_s: Vec<f64> = samples.time_s.iter().map(|t_s| t_s - samples.time_s[0]).collect();
+        let curve = smoothed(Spline::through(time_s.clone(), coordinates), length(&time_s), lowpass_hz);
+        Ok(Self { path, time_s, lines: samples.lines, first_rotation, curve })
+    }
+
+    pub(super) fn length_s(&self) -> f64 {
+        length(&self.time_s)
+    }
+
+    /// Displacement of the jaw from the closed pose, jaw frame.
+    pub(super) fn displacement(&self, motion_s: f64) -> Pose {
+        let at = self.curve.at(motion_s);
+        let turn = UnitQuaternion::from_scaled_axis(Vec3::new(at[3], at[4], at[5]));
+        Pose::from_parts(Vec3::new(at[0], at[1], at[2]).into(), self.first_rotation * turn)
+    }
+
+    /// The line whose time is nearest.
+    pub(super) fn source_line(&self, motion_s: f64) -> SourceLine {
+        let right = self.time_s.partition_point(|&t_s| t_s < motion_s).min(self.time_s.len() - 1);
+        let left = right.saturating_sub(1);
+        let nearest = if motion_s - self.time_s[left] < self.time_s[right] - motion_s { left } else { right };
+        SourceLine { path: self.path.clone(), line: self.lines[nearest] }
+    }
+}
+
+fn length(time_s: &[f64]) -> f64 {
+    time_s.last().copied().unwrap_or_default()
+}
+
+/// Translation (m) and rotation vector from the first orientation (rad) of each sample.
+fn coordinates(samples: &Samples, first: &UnitQuaternion<f64>) -> Result<Vec<Vector6<f64>>, Located> {
+    let coordinates = |(pose, &line): (&Pose, &u64)| {
+        let turn = (first.inverse() * pose.rotation).scaled_axis();
+        let angle_deg = turn.norm().to_degrees();
+        if angle_deg > LARGEST_TURN_DEG {
+            return Err(Located::at(line, ImportProblem::Turned { angle_deg, limit_deg: LARGEST_TURN_DEG }));
+        }
+        let at = pose.translation.vector;
+        Ok(Vector6::new(at.x, at.y, at.z, turn.x, turn.y, turn.z))
+    };
+    samples.displacements.iter().zip(&samples.lines).map(coordinates).collect()
+}
+
+fn smoothed(raw: Spline<6>, length_s: f64, lowpass_hz: f64) -> Spline<6> {
+    if lowpass_hz == 0.0 {
+        return raw;
+    }
+    let steps = (length_s * GRID_HZ).ceil().max(1.0) as u32;
+    let grid_s: Vec<f64> = (0..=steps).map(|k| length_s * f64::from(k) / f64::from(steps)).collect();
+    let even: Vec<_> = grid_s.iter().map(|&t_s| raw.at(t_s)).collect();
+    let filtered = lowpass(&even, f64::from(steps) / length_s, lowpass_hz);
+    Spline::through(grid_s, filtered)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn samples(poses: impl Fn(f64) -> Pose) -> Samples {
+        let time_s: Vec<f64> = (0..=100).map(|k| 5.0 + f64::from(k) / 50.0).collect();
+        let displacements = time_s.iter().map(|t_s| poses(t_s - 5.0)).collect();
+        Samples { lines: (3..).take(time_s.len()).collect(), time_s, displacements }
+    }
+
+    fn swaying(t_s: f64) -> Pose {
+        let sway = (2.0 * t_s).sin();
+        let rotation = UnitQuaternion::from_scaled_axis(Vec3::new(0.02, 0.3 * sway, 0.1));
+        Pose::from_parts(Vec3::new(0.001, -0.002 * sway, -0.02 * sway).into(), rotation)
+    }
+
+    #[test]
+    fn a_smooth_motion_is_kept_with_and_without_the_filter() {
+        for lowpass_hz in [0.0, 12.0] {
+            let recording = Recording::new("a.csv".into(), samples(swaying), lowpass_hz).ok().unwrap();
+            assert!((recording.length_s() - 2.0).abs() < 1e-12);
+            for k in 0..=200 {
+                let t_s = f64::from(k) / 100.0;
+                let (got, wanted) = (recording.displacement(t_s), swaying(t_s));
+                assert!((got.translation.vector - wanted.translation.vector).norm() < 5e-5, "{t_s}");
+                assert!(got.rotation.angle_to(&wanted.rotation) < 5e-4, "{t_s}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_nearest_line_is_named() {
+        let recording = Recording::new("a.csv".into(), samples(swaying), 12.0).ok().unwrap();
+        for (t_s, line) in [(0.0, 3), (0.009, 3), (0.011, 4), (2.0, 103), (9.0, 103)] {
+            assert_eq!(recording.source_line(t_s).line, line);
+        }
+    }
+
+    #[test]
+    fn a_turn_beyond_what_a_jaw_does_is_refused() {
+        let spinning = |t_s: f64| Pose::rotation(Vec3::y() * t_s);
+        let error = Recording::new("a.csv".into(), samples(spinning), 12.0).err().unwrap();
+        assert!(matches!(error.problem, ImportProblem::Turned { .. }) && error.line.is_some());
+    }
+}

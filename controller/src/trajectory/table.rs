@@ -1,0 +1,161 @@
+//! The recording as a table of finite numbers over increasing time.
+//!
+//! Plain CSV: no quotes, comments from `#`, blank lines ignored. What the columns mean is not known
+//! here beyond their names.
+
+use super::import::{ImportProblem, Located};
+
+/// Fewer rows are no motion.
+const FEWEST_ROWS: usize = 4;
+/// The longest time without a sample that interpolation may bridge, s.
+const LARGEST_GAP_S: f64 = 0.25;
+
+const POSES: [&str; 8] = ["time_s", "x_mm", "y_mm", "z_mm", "qw", "qx", "qy", "qz"];
+const MARKERS: [&str; 10] = [
+    "time_s", "m1_x_mm", "m1_y_mm", "m1_z_mm", "m2_x_mm", "m2_y_mm", "m2_z_mm", "m3_x_mm", "m3_y_mm",
+    "m3_z_mm",
+];
+
+/// What a header announces.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Format {
+    Poses,
+    Markers,
+}
+
+/// A row: time and the other columns, as written.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Row {
+    pub line: u64,
+    pub time_s: f64,
+    pub values: Vec<f64>,
+}
+
+/// A file's content.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Table {
+    pub format: Format,
+    pub rows: Vec<Row>,
+}
+
+impl Format {
+    fn columns(self) -> &'static [&'static str] {
+        match self {
+            Self::Poses => &POSES,
+            Self::Markers => &MARKERS,
+        }
+    }
+
+    fn of_header(line: u64, header: &str) -> Result<Self, Located> {
+        let found: Vec<&str> = header.split(',').map(str::trim).collect();
+        let format =
+            if found.iter().any(|name| name.starts_with("m1")) { Self::Markers } else { Self::Poses };
+        let columns = format.columns();
+        let name = |names: &[&'static str], position: usize| names.get(position).copied().unwrap_or_default();
+        let differs = |&position: &usize| found.get(position) != columns.get(position);
+        match (0..found.len().max(columns.len())).find(differs) {
+            None => Ok(format),
+            Some(position) => Err(Located::at(
+                line,
+                ImportProblem::Column {
+                    position: position + 1,
+                    found: found.get(position).copied().unwrap_or_default().to_owned(),
+                    expected: name(columns, position),
+                    header: columns.join(","),
+                },
+            )),
+        }
+    }
+}
+
+impl Table {
+    pub(super) fn parse(text: &str) -> Result<Self, Located> {
+        let text = text.trim_start_matches('\u{feff}');
+        let lines = (1..).zip(text.lines().map(str::trim));
+        let mut content = lines.filter(|(_, line)| !line.is_empty() && !line.starts_with('#'));
+        let too_few = |rows| Located::whole(ImportProblem::TooFewRows { rows, needed: FEWEST_ROWS });
+        let (line, header) = content.next().ok_or_else(|| too_few(0))?;
+        let format = Format::of_header(line, header)?;
+        let mut rows: Vec<Row> = Vec::new();
+        for (line, text) in content {
+            let row = parse_row(line, text, format.columns())?;
+            if let Some(previous) = rows.last() {
+                check_time(&row, previous.time_s)?;
+            }
+            rows.push(row);
+        }
+        if rows.len() < FEWEST_ROWS {
+            return Err(too_few(rows.len()));
+        }
+        Ok(Self { format, rows })
+    }
+}
+
+fn parse_row(line: u64, text: &str, columns: &[&'static str]) -> Result<Row, Located> {
+    let fields: Vec<&str> = text.split(',').map(str::trim).collect();
+    if fields.len() != columns.len() {
+        let problem = ImportProblem::Fields { found: fields.len(), expected: columns.len() };
+        return Err(Located::at(line, problem));
+    }
+    let number = |(text, &column): (&&str, &&'static str)| {
+        let finite = text.parse().ok().filter(|value: &f64| value.is_finite());
+        let problem = || ImportProblem::NotANumber { column, text: (*text).to_owned() };
+        finite.ok_or_else(|| Located::at(line, problem()))
+    };
+    let mut values = fields.iter().zip(columns).map(number).collect::<Result<Vec<f64>, _>>()?;
+    let time_s = values.remove(0);
+    Ok(Row { line, time_s, values })
+}
+
+fn check_time(row: &Row, previous_s: f64) -> Result<(), Located> {
+    let gap_s = row.time_s - previous_s;
+    if gap_s <= 0.0 {
+        return Err(Located::at(row.line, ImportProblem::TimeOrder { time_s: row.time_s, previous_s }));
+    }
+    if gap_s > LARGEST_GAP_S {
+        return Err(Located::at(row.line, ImportProblem::Gap { gap_s, largest_s: LARGEST_GAP_S }));
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const HEADER: &str = "time_s,x_mm,y_mm,z_mm,qw,qx,qy,qz\n";
+    const ROWS: &str = "0.00,0,0,0,1,0,0,0\n0.01,0,0,-1,1,0,0,0\n0.02,0,0,-2,1,0,0,0\n0.03,0,0,-3,1,0,0,0\n";
+
+    #[test]
+    fn lines_are_counted_past_comments_blank_lines_and_a_byte_order_mark() {
+        let text = format!("\u{feff}# a comment\r\n\r\n{HEADER}# another\n{ROWS}");
+        let table = Table::parse(&text).ok().unwrap();
+        assert_eq!(table.format, Format::Poses);
+        assert_eq!(table.rows.iter().map(|row| row.line).collect::<Vec<_>>(), [5, 6, 7, 8]);
+        assert_eq!(table.rows[2].values[2].to_bits(), (-2.0f64).to_bits());
+    }
+
+    #[test]
+    fn bad_files_are_refused_with_line_and_reason() {
+        let with = |row: &str| format!("{HEADER}{ROWS}{row}\n");
+        let table = [
+            (String::new(), None, "0 rows"),
+            (HEADER.to_owned(), None, "0 rows"),
+            (ROWS.to_owned(), Some(1), "column 1 is `0.00`, expected `time_s`"),
+            ("time_s,x_mm,ymm,z_mm,qw,qx,qy,qz".to_owned(), Some(1), "column 3 is `ymm`, expected `y_mm`"),
+            ("time_s,m1_x_mm,m1_y_mm".to_owned(), Some(1), "column 4 is ``, expected `m1_z_mm`"),
+            ("time_s,x_mm,y_mm,z_mm,qw,qx,qy,qz,more".to_owned(), Some(1), "column 9 is `more`"),
+            (with("0.04,0,0,0,1,0,0"), Some(6), "7 fields"),
+            (with("0.04,0,zero,0,1,0,0,0"), Some(6), "`zero` in column `y_mm`"),
+            (with("0.04,0,0,NaN,1,0,0,0"), Some(6), "`NaN` in column `z_mm`"),
+            (with("inf,0,0,0,1,0,0,0"), Some(6), "`inf` in column `time_s`"),
+            (with("0.03,0,0,0,1,0,0,0"), Some(6), "does not come after"),
+            (with("0.02,0,0,0,1,0,0,0"), Some(6), "does not come after"),
+            (with("9.03,0,0,0,1,0,0,0"), Some(6), "without a sample"),
+        ];
+        for (text, line, reason) in table {
+            let error = Table::parse(&text).err().unwrap();
+            assert_eq!(error.line, line, "{text}");
+            assert!(error.problem.to_string().contains(reason), "{}", error.problem);
+        }
+    }
+}

@@ -1,0 +1,180 @@
+//! Whole trajectories: smoothness, rest at the ends, the check, and the two real recordings.
+
+use std::io::Write;
+use std::path::PathBuf;
+
+use masseter_shared::config::{
+    ChewingConfig, FileConfig, JawConfig, LateralConfig, MotionConfig, OpeningConfig, ProtrusionConfig, Side,
+    TrajectoryLimitsConfig,
+};
+use masseter_shared::geometry::{AXES, Mechanism, MechanismConfig};
+use nalgebra::SVector;
+
+use super::*;
+
+const PERIOD_S: f64 = 0.001;
+
+fn mechanism() -> Mechanism {
+    Mechanism::new(&MechanismConfig::default()).unwrap()
+}
+
+fn build(motion: &MotionConfig, duration_s: Option<f64>) -> Trajectory {
+    Trajectory::new(motion, &JawConfig::default(), &mechanism(), duration_s).unwrap()
+}
+
+fn judge(trajectory: &Trajectory) -> Result<TrajectoryReport, CheckError> {
+    check(trajectory, &mechanism(), &TrajectoryLimitsConfig::default(), PERIOD_S)
+}
+
+fn generators() -> [MotionConfig; 6] {
+    [
+        MotionConfig::default(),
+        MotionConfig::Chewing(ChewingConfig { cycle_rate_hz: 2.17, side: Side::Right, ..Default::default() }),
+        MotionConfig::Opening(OpeningConfig::default()),
+        MotionConfig::Opening(OpeningConfig { amplitude_mm: 56.1, ..Default::default() }),
+        MotionConfig::Protrusion(ProtrusionConfig::default()),
+        MotionConfig::Lateral(LateralConfig::default()),
+    ]
+}
+
+/// The actuators over the whole trajectory.
+fn axes(trajectory: &Trajectory, period_s: f64) -> Vec<SVector<f64, AXES>> {
+    let samples = (trajectory.duration_s() / period_s) as u32;
+    let at = |sample| mechanism().inverse(&trajectory.pose(f64::from(sample) * period_s)).unwrap();
+    (0..=samples).map(|sample| at(sample).actuators.to_axes().into()).collect()
+}
+
+fn differences(values: &[SVector<f64, AXES>], period_s: f64) -> Vec<SVector<f64, AXES>> {
+    values.windows(2).map(|pair| (pair[1] - pair[0]) / period_s).collect()
+}
+
+fn largest(values: &[SVector<f64, AXES>]) -> f64 {
+    values.iter().map(SVector::amax).fold(0.0, f64::max)
+}
+
+/// A jump of the acceleration would show as a jerk that grows as the period shrinks.
+#[test]
+fn generated_motions_are_twice_continuously_differentiable() {
+    for motion in generators() {
+        let trajectory = build(&motion, Some(3.0));
+        let jerk = |period_s| {
+            let velocity = differences(&axes(&trajectory, period_s), period_s);
+            largest(&differences(&differences(&velocity, period_s), period_s))
+        };
+        assert!(jerk(0.0005) < 1.1 * jerk(0.001), "{motion:?}");
+    }
+}
+
+#[test]
+fn trajectories_start_and_end_at_rest_in_the_closed_pose() {
+    for motion in generators() {
+        let trajectory = build(&motion, None);
+        assert!((trajectory.duration_s() - 10.0).abs() < 1e-12);
+        for t_s in [-1.0, 0.0, 10.0, 12.0] {
+            let away = trajectory.pose(t_s).translation.vector - trajectory.closed_pose().translation.vector;
+            assert!(away.norm() < 1e-12, "{motion:?} at {t_s} s");
+        }
+    }
+}
+
+#[test]
+fn a_duration_cuts_a_motion_and_still_lets_it_come_to_rest() {
+    let trajectory = build(&MotionConfig::default(), Some(0.6));
+    let speed = |t_s: f64| {
+        let step_s = 1e-4;
+        let way = trajectory.pose(t_s + step_s).translation.vector - trajectory.pose(t_s).translation.vector;
+        way.norm() / step_s
+    };
+    assert!(speed(0.3) > 0.01);
+    assert!(speed(0.0) < 1e-6 && speed(0.6 - 1e-4) < 1e-6 && speed(0.6) < 1e-12);
+}
+
+#[test]
+fn every_generator_passes_the_check_with_its_defaults() {
+    for motion in generators() {
+        let report = judge(&build(&motion, None)).unwrap_or_else(|error| panic!("{motion:?}: {error}"));
+        assert_eq!(report.samples, 10_001);
+        assert!(report.margin_m(mechanism().strokes()).iter().all(|&margin_m| margin_m > 0.0));
+        assert!(report.condition < 4.0);
+    }
+}
+
+#[test]
+fn the_closed_pose_follows_the_jaws_configuration() {
+    let jaw = JawConfig { closed_leg_m: 0.28, closed_offset_m: [0.004, 0.0, 0.0], ..Default::default() };
+    let trajectory = Trajectory::new(&MotionConfig::default(), &jaw, &mechanism(), None).unwrap();
+    let legs =
+        mechanism().inverse(&(nalgebra::Translation3::new(-0.004, 0.0, 0.0) * trajectory.closed_pose()));
+    assert!(legs.unwrap().actuators.leg_m.iter().all(|leg_m| (leg_m - 0.28).abs() < 1e-12));
+    let jaw = JawConfig { closed_leg_m: 0.01, ..Default::default() };
+    let error = Trajectory::new(&MotionConfig::default(), &jaw, &mechanism(), None).unwrap_err();
+    assert!(error.to_string().contains("closed_leg_m"));
+}
+
+#[test]
+fn what_exceeds_a_limit_is_refused_with_time_axis_and_limit() {
+    let chewing = build(&MotionConfig::default(), None);
+    let refuse =
+        |limits: TrajectoryLimitsConfig| check(&chewing, &mechanism(), &limits, PERIOD_S).unwrap_err();
+    let default = TrajectoryLimitsConfig::default();
+    let table = [
+        (TrajectoryLimitsConfig { leg_velocity_m_s: 0.05, ..default }, "axis l1 would move"),
+        (TrajectoryLimitsConfig { slide_velocity_m_s: 0.01, ..default }, "limit 0.01 m/s"),
+        (TrajectoryLimitsConfig { leg_acceleration_m_s2: 0.5, ..default }, "axis l1 would accelerate"),
+        (TrajectoryLimitsConfig { max_condition: 2.0, ..default }, "condition number"),
+    ];
+    for (limits, reason) in table {
+        let error = refuse(limits);
+        assert!(error.to_string().contains(reason), "{error}");
+        assert!(error.time_s < 1.5 && error.source_line.is_none());
+    }
+    let low = JawConfig { closed_leg_m: 0.245, ..Default::default() };
+    let trajectory = Trajectory::new(&MotionConfig::default(), &low, &mechanism(), None).unwrap();
+    assert!(matches!(judge(&trajectory).unwrap_err().problem, CheckProblem::Stroke(_)));
+}
+
+#[test]
+fn an_absent_file_is_named() {
+    let motion = MotionConfig::File(FileConfig::new("no/such/jaw.csv"));
+    let error = Trajectory::new(&motion, &JawConfig::default(), &mechanism(), None).unwrap_err();
+    assert!(error.to_string().contains("no/such/jaw.csv"), "{error}");
+}
+
+/// A real recording from beside the repository; says so when it is not there.
+fn recording(name: &str) -> Option<FileConfig> {
+    let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../shared/data/jaw").join(name);
+    if path.exists() {
+        return Some(FileConfig::new(path));
+    }
+    // Not eprintln, which the test harness keeps to itself when the test passes.
+    writeln!(std::io::stderr(), "SKIPPED: {} absent", path.display()).unwrap();
+    None
+}
+
+#[test]
+fn the_patients_recording_plays_with_all_defaults() {
+    let Some(file) = recording("patient_jaws3d.csv") else { return };
+    let trajectory = build(&MotionConfig::File(file), None);
+    assert!((trajectory.duration_s() - 15.606).abs() < 1e-9);
+    let report = judge(&trajectory).unwrap();
+    // 0.21 rad about the condyles lowers the incisal point by about 18 mm.
+    assert!(report.lowest_m[3] < 0.283);
+}
+
+/// Its 34.5 mm backwards take the whole stroke of two slides, so the closed pose moves forward.
+#[test]
+fn the_tracker_recording_plays_with_its_axes_and_a_closed_pose_further_forward() {
+    let Some(mut file) = recording("jma_markers.csv") else { return };
+    file.axes = ["+y", "-x", "+z"].map(String::from);
+    let motion = MotionConfig::File(file);
+    let jaw = JawConfig { closed_offset_m: [0.005, 0.0, 0.0], ..Default::default() };
+    let trajectory = Trajectory::new(&motion, &jaw, &mechanism(), None).unwrap();
+    judge(&trajectory).unwrap();
+    let lowest_m = (0..13_000).map(|ms| trajectory.pose(f64::from(ms) / 1000.0).translation.z);
+    let travel_m = trajectory.closed_pose().translation.z - lowest_m.fold(f64::INFINITY, f64::min);
+    assert!((travel_m - 0.044).abs() < 0.001);
+
+    let without = judge(&build(&motion, None)).unwrap_err();
+    assert!(matches!(without.problem, CheckProblem::Stroke(_)));
+    assert_eq!(without.source_line.unwrap().line, 191);
+}

@@ -1,0 +1,288 @@
+//! Builds master, wires, drives and mechanism from a scenario, and refuses what cannot work.
+
+use masseter_shared::can::canopen::{NodeId, NodeIdError};
+use masseter_shared::can::{Bitrate, BitrateError, VirtualWire, WireConfig};
+use masseter_shared::config::{CanConfig, DriveConfig, DynamicsConfig, Scenario};
+use masseter_shared::geometry::{AXES, AXIS_NAMES, GeometryError, LEGS, Mechanism, Pose};
+
+use crate::drive::{DriveNode, DriveSettings};
+use crate::encoder::Encoder;
+use crate::link::{Place, VirtualLink};
+use crate::master::{Master, MasterSettings, Scale};
+use crate::mechanism::{Dynamics, DynamicsError};
+
+/// Node id of the master.
+const MASTER_ID: u8 = 127;
+/// Frames a port may have to send, and to receive between two looks; a millisecond holds 21.
+const TRANSMIT_CAPACITY: usize = 64;
+const RECEIVE_CAPACITY: usize = 256;
+const MS_NS: u64 = 1_000_000;
+
+/// A plant that cannot be built or cannot go on.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum PlantError {
+    /// The mechanism's dimensions.
+    #[error(transparent)]
+    Geometry(#[from] GeometryError),
+    /// The mechanism's dynamics.
+    #[error(transparent)]
+    Dynamics(#[from] DynamicsError),
+    /// The bit rate.
+    #[error("can.bitrate_bps: {0}")]
+    Bitrate(#[from] BitrateError),
+    /// A node id out of range.
+    #[error("can.node_ids: {0}")]
+    NodeId(#[from] NodeIdError),
+    /// Two nodes of one id.
+    #[error(
+        "can.node_ids: node {id} stands twice, or is the master's ({MASTER_ID}); give every drive its own"
+    )]
+    SharedNodeId {
+        /// The id.
+        id: u8,
+    },
+    /// An axis on no bus, on two, or of no such number.
+    #[error("can.buses: axis {axis} is named {times} times; name each of the axes 0 to 5 ({axes}) once", axes = AXIS_NAMES.join(" "))]
+    Axis {
+        /// The axis.
+        axis: usize,
+        /// How often it is named.
+        times: usize,
+    },
+    /// A quantity that must be above 0, or at least not below.
+    #[error("{key} = {value}: {need}")]
+    Quantity {
+        /// The key.
+        key: &'static str,
+        /// What stands there.
+        value: f64,
+        /// What may stand there.
+        need: &'static str,
+    },
+}
+
+/// Master and link of a scenario's plant, switched on at `now_ns`.
+pub(crate) fn build(scenario: &Scenario, now_ns: u64) -> Result<(Master, VirtualLink), PlantError> {
+    check_quantities(scenario)?;
+    let places = places(&scenario.can)?;
+    let ids = node_ids(&scenario.can)?;
+    let mechanism = Mechanism::new(&scenario.mechanism)?;
+    let dynamics = resting(mechanism, &scenario.dynamics)?;
+    let positions_m = dynamics.positions_m();
+    let drive_of = |axis: usize| if axis < LEGS { scenario.drives.slide } else { scenario.drives.leg };
+    let drives = (0..AXES)
+        .map(|axis| {
+            let drive = drive_of(axis);
+            let encoder =
+                Encoder::new(drive.encoder_resolution_m, drive.encoder_noise_m, scenario.seed, axis);
+            let settings = drive_settings(scenario, ids[axis], drive);
+            DriveNode::new(settings, encoder, now_ns, positions_m[axis])
+        })
+        .collect();
+    let link =
+        VirtualLink::new(wires(&scenario.can)?, drives, places, dynamics, scenario.dynamics.step_ns, now_ns);
+    let drives = std::array::from_fn(|axis| {
+        let drive = drive_of(axis);
+        let scale = Scale { increment_m: drive.encoder_resolution_m, rated_force_n: drive.rated_force_n };
+        (ids[axis], places[axis].bus, scale)
+    });
+    Ok((Master::new(master_settings(&scenario.can, drives), now_ns), link))
+}
+
+fn master_settings(can: &CanConfig, drives: [(NodeId, usize, Scale); AXES]) -> MasterSettings {
+    MasterSettings {
+        id: master_id(),
+        drives,
+        buses: can.buses.len(),
+        heartbeat_ns: u64::from(can.heartbeat_producer_ms) * MS_NS,
+        heartbeat_timeout_ns: u64::from(can.heartbeat_consumer_ms) * MS_NS,
+        boot_timeout_ns: u64::from(can.boot_timeout_ms) * MS_NS,
+        command_timeout_cycles: can.command_timeout_cycles,
+    }
+}
+
+fn drive_settings(scenario: &Scenario, node: NodeId, drive: DriveConfig) -> DriveSettings {
+    DriveSettings {
+        node,
+        master: master_id(),
+        drive,
+        heartbeat_ns: u64::from(scenario.can.heartbeat_producer_ms) * MS_NS,
+        link_timeout_ns: u64::from(scenario.can.heartbeat_consumer_ms) * MS_NS,
+        period_s: scenario.period_s(),
+        step_s: scenario.dynamics.step_ns as f64 * 1e-9,
+    }
+}
+
+fn master_id() -> NodeId {
+    NodeId::new(MASTER_ID).expect("a node id")
+}
+
+fn wires(can: &CanConfig) -> Result<Vec<VirtualWire>, PlantError> {
+    let bitrate = Bitrate::new(can.bitrate_bps)?;
+    let wire = |axes: &Vec<usize>| {
+        VirtualWire::new(&WireConfig {
+            bitrate,
+            ports: 1 + axes.len(),
+            transmit_capacity: TRANSMIT_CAPACITY,
+            receive_capacity: RECEIVE_CAPACITY,
+        })
+    };
+    Ok(can.buses.iter().map(wire).collect())
+}
+
+/// Where each axis hangs; port 0 of a bus is the master's.
+fn places(can: &CanConfig) -> Result<[Place; AXES], PlantError> {
+    let named = || can.buses.iter().flatten().copied();
+    if let Some(axis) = named().find(|&axis| axis >= AXES) {
+        return Err(PlantError::Axis { axis, times: named().filter(|&other| other == axis).count() });
+    }
+    let mut places = [Place { bus: 0, port: 0 }; AXES];
+    for (axis, place) in places.iter_mut().enumerate() {
+        let times = named().filter(|&other| other == axis).count();
+        if times != 1 {
+            return Err(PlantError::Axis { axis, times });
+        }
+        for (bus, axes) in can.buses.iter().enumerate() {
+            if let Some(index) = axes.iter().position(|&other| other == axis) {
+                *place = Place { bus, port: index + 1 };
+            }
+        }
+    }
+    Ok(places)
+}
+
+fn node_ids(can: &CanConfig) -> Result<[NodeId; AXES], PlantError> {
+    let mut ids = [master_id(); AXES];
+    for (axis, &id) in can.node_ids.iter().enumerate() {
+        let is_taken = id == MASTER_ID || can.node_ids[..axis].contains(&id);
+        if is_taken {
+            return Err(PlantError::SharedNodeId { id });
+        }
+        ids[axis] = NodeId::new(id)?;
+    }
+    Ok(ids)
+}
+
+/// The platform level on three legs of the initial length, slides in the middle: found as the height at
+/// which inverse kinematics gives that length, by bisection, for the legs' mean.
+fn resting(mechanism: Mechanism, config: &DynamicsConfig) -> Result<Dynamics, PlantError> {
+    let mean_leg_m = |height_m: f64| {
+        let joints = mechanism.inverse(&Pose::translation(0.0, 0.0, height_m));
+        joints.map_or(0.0, |joints| joints.actuators.leg_m.iter().sum::<f64>() / LEGS as f64)
+    };
+    let (mut low_m, mut high_m) = (0.0, config.initial_leg_m);
+    for _ in 0..60 {
+        let middle_m = f64::midpoint(low_m, high_m);
+        if mean_leg_m(middle_m) < config.initial_leg_m { low_m = middle_m } else { high_m = middle_m }
+    }
+    let pose = Pose::translation(0.0, 0.0, low_m);
+    if let Ok(joints) = mechanism.inverse(&pose)
+        && let Err(violation) = mechanism.strokes().check(&joints.actuators)
+    {
+        return Err(PlantError::Quantity {
+            key: "dynamics.initial_leg_m",
+            value: violation.value_m,
+            need: "the rig must be switched on within its strokes",
+        });
+    }
+    Ok(Dynamics::new(mechanism, *config, pose)?)
+}
+
+fn check_quantities(scenario: &Scenario) -> Result<(), PlantError> {
+    let dynamics = &scenario.dynamics;
+    let can = &scenario.can;
+    let above_zero = [
+        ("dynamics.step_ns", dynamics.step_ns as f64),
+        ("dynamics.carriage_mass_kg", dynamics.carriage_mass_kg),
+        ("dynamics.rod_mass_kg", dynamics.rod_mass_kg),
+        ("dynamics.platform_mass_kg", dynamics.platform_mass_kg),
+        ("dynamics.initial_leg_m", dynamics.initial_leg_m),
+        ("can.heartbeat_producer_ms", f64::from(can.heartbeat_producer_ms)),
+        ("can.heartbeat_consumer_ms", f64::from(can.heartbeat_consumer_ms)),
+        ("can.boot_timeout_ms", f64::from(can.boot_timeout_ms)),
+        ("can.command_timeout_cycles", f64::from(can.command_timeout_cycles)),
+    ];
+    let not_below = [
+        ("dynamics.leg_inertia_kg_m2", dynamics.leg_inertia_kg_m2),
+        ("dynamics.slide_friction_n", dynamics.slide_friction_n),
+        ("dynamics.viscous_friction_n_s_per_m", dynamics.viscous_friction_n_s_per_m),
+        ("dynamics.gravity_m_s2", dynamics.gravity_m_s2),
+    ];
+    for (key, value) in
+        above_zero.into_iter().chain(drive_quantities(&scenario.drives.slide, &scenario.drives.leg))
+    {
+        if !(value.is_finite() && value > 0.0) {
+            return Err(PlantError::Quantity { key, value, need: "use a finite number above 0" });
+        }
+    }
+    for (key, value) in not_below
+        .into_iter()
+        .chain(dynamics.platform_inertia_kg_m2.map(|i| ("dynamics.platform_inertia_kg_m2", i)))
+    {
+        if !(value.is_finite() && value >= 0.0) {
+            return Err(PlantError::Quantity { key, value, need: "use a finite number not below 0" });
+        }
+    }
+    Ok(())
+}
+
+fn drive_quantities(slide: &DriveConfig, leg: &DriveConfig) -> impl Iterator<Item = (&'static str, f64)> {
+    [("drives.slide", *slide), ("drives.leg", *leg)].into_iter().flat_map(|(key, drive)| {
+        [
+            drive.rated_force_n,
+            drive.max_force_n,
+            drive.max_velocity_m_s,
+            drive.quick_stop_deceleration_m_s2,
+            drive.following_error_m,
+            drive.position_gain_per_s,
+            drive.velocity_gain_n_s_per_m,
+            drive.velocity_integral_time_s,
+            drive.encoder_resolution_m,
+            // The noise may be zero; that it is a number is all it needs.
+            1.0 + drive.encoder_noise_m.abs(),
+        ]
+        .map(|value| (key, value))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_cannot_work_is_refused_with_its_key() {
+        let default = Scenario::default;
+        let with = |change: fn(&mut Scenario)| {
+            let mut scenario = default();
+            change(&mut scenario);
+            build(&scenario, 0).map(|_| ()).unwrap_err().to_string()
+        };
+        let cases: [(String, &str); 8] = [
+            (with(|s| s.can.node_ids[3] = 1), "node 1 stands twice"),
+            (with(|s| s.can.node_ids[3] = 0), "node id"),
+            (with(|s| s.can.node_ids[3] = 127), "master"),
+            (with(|s| s.can.buses = vec![vec![0, 1, 2], vec![3, 4]]), "axis 5 is named 0 times"),
+            (with(|s| s.can.buses = vec![vec![0, 1, 2], vec![3, 4, 5, 0]]), "axis 0 is named 2 times"),
+            (with(|s| s.can.buses = vec![vec![0, 1, 2], vec![3, 4, 5, 6]]), "axis 6"),
+            (with(|s| s.drives.leg.rated_force_n = f64::NAN), "drives.leg"),
+            (with(|s| s.dynamics.initial_leg_m = 0.4), "initial_leg_m"),
+        ];
+        for (error, expected) in cases {
+            assert!(error.contains(expected), "{error}");
+        }
+        assert!(build(&default(), 0).is_ok());
+    }
+
+    #[test]
+    fn the_rig_is_switched_on_level_on_its_initial_legs() {
+        let scenario = Scenario::default();
+        let (_, link) = build(&scenario, 0).unwrap();
+        let [d1, d2, d3, l1, l2, l3] = link.truth().joint_m;
+        for slide_m in [d1, d2, d3] {
+            assert!(slide_m.abs() < 1e-12);
+        }
+        for leg_m in [l1, l2, l3] {
+            assert!((leg_m - scenario.dynamics.initial_leg_m).abs() < 1e-9);
+        }
+    }
+}

@@ -1,0 +1,112 @@
+//! The plant as one pure step function: master, wires, drives and mechanism, moved by the times that
+//! are passed in.
+//!
+//! A cycle is [`PlantCore::begin_cycle`], [`PlantCore::collect`] until the process data are in,
+//! [`PlantCore::reading`] and [`PlantCore::truth`], then [`PlantCore::apply`]. Called with irregular
+//! times, as real time has them, or with exact ones.
+
+use masseter_shared::can::canopen::{Cob, CobError};
+use masseter_shared::can::tap;
+use masseter_shared::config::Scenario;
+use masseter_shared::messages::{Command, Event, FrameTap, Reading, Truth};
+use masseter_shared::realtime::Wake;
+
+pub use crate::build::PlantError;
+use crate::build::build;
+use crate::link::VirtualLink;
+use crate::master::Master;
+
+/// Tapped frames kept between two drains; a drain follows every cycle.
+const TAPPED: usize = 4096;
+
+/// The plant's whole memory.
+#[derive(Debug)]
+pub struct PlantCore {
+    master: Master,
+    link: VirtualLink,
+    buses: usize,
+    cycle: u64,
+    tapped: Vec<FrameTap>,
+    command_sent_ns: u64,
+}
+
+impl PlantCore {
+    /// The scenario's plant, switched on at `now_ns`.
+    pub fn new(scenario: &Scenario, now_ns: u64) -> Result<Self, PlantError> {
+        let (master, link) = build(scenario, now_ns)?;
+        Ok(Self {
+            master,
+            link,
+            buses: scenario.can.buses.len(),
+            cycle: 0,
+            tapped: Vec::with_capacity(TAPPED),
+            command_sent_ns: 0,
+        })
+    }
+
+    /// Begins a cycle: SYNC.
+    pub fn begin_cycle(&mut self, wake: Wake) -> Result<(), PlantError> {
+        self.cycle = wake.cycle;
+        self.link.advance(wake.woke_ns)?;
+        self.collect_taps(wake.woke_ns);
+        self.master.begin_cycle(wake, &mut self.link);
+        Ok(())
+    }
+
+    /// Lets time pass and takes what has arrived; whether the process data of all drives are in.
+    pub fn collect(&mut self, now_ns: u64) -> Result<bool, PlantError> {
+        self.link.advance(now_ns)?;
+        self.collect_taps(now_ns);
+        Ok(self.master.collect(now_ns, &mut self.link))
+    }
+
+    /// The cycle's reading.
+    pub fn fill_reading(&self, reading: &mut Reading) {
+        self.master.fill_reading(reading);
+        reading.command_sent_ns = self.command_sent_ns;
+    }
+
+    /// What the mechanism really did at the cycle's SYNC.
+    pub fn fill_truth(&self, truth: &mut Truth) {
+        *truth = Truth { cycle: self.cycle, ..self.link.truth() };
+    }
+
+    /// Answers the cycle with the newest command, if one came.
+    pub fn apply(&mut self, now_ns: u64, command: Option<&Command>) -> Result<(), PlantError> {
+        self.link.advance(now_ns)?;
+        self.master.apply(now_ns, command, &mut self.link);
+        Ok(())
+    }
+
+    /// Whether no drive gives force, as far as they tell.
+    pub fn drives_are_off(&self) -> bool {
+        self.master.drives_are_off()
+    }
+
+    /// Hands out the frames seen on the wires since the last drain.
+    pub fn drain_frames(&mut self, out: &mut impl FnMut(FrameTap)) {
+        self.tapped.drain(..).for_each(out);
+    }
+
+    /// Hands out what happened since the last drain.
+    pub fn drain_events(&mut self, out: &mut impl FnMut(Event)) {
+        self.master.drain_events(out);
+    }
+
+    fn collect_taps(&mut self, now_ns: u64) {
+        for bus in 0..self.buses {
+            while self.tapped.len() < TAPPED
+                && let Ok(Some(received)) = self.link.tap(bus, now_ns)
+            {
+                let cob: Result<Cob, CobError> = received.frame.id().try_into();
+                if matches!(cob, Ok(Cob::Rpdo1(_))) {
+                    self.command_sent_ns = self.command_sent_ns.max(received.time_ns);
+                }
+                self.tapped.push(tap::encode(bus as u16, &received));
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,272 @@
+//! Scenarios of the whole plant under virtual time, with a commander that knows inverse kinematics only.
+
+use masseter_shared::can::canopen::{Cob, NodeId};
+use masseter_shared::can::cia402::DriveState;
+use masseter_shared::can::tap;
+use masseter_shared::geometry::{AXES, Mechanism, MechanismConfig, Pose, Vec3};
+use masseter_shared::messages::codes::{Cause, DriveCondition, DriveRequest, EventKind};
+
+use super::*;
+
+const PERIOD_NS: u64 = 1_000_000;
+const EPOCH_NS: u64 = 1_000_000_000;
+const ENABLED: [u32; AXES] = [DriveCondition::OperationEnabled as u32; AXES];
+
+/// Targets and request for a reading.
+type Answer<'a> = dyn Fn(&Reading) -> ([f64; AXES], DriveRequest) + 'a;
+
+struct Bench {
+    plant: PlantCore,
+    mechanism: Mechanism,
+    cycle: u64,
+    reading: Reading,
+    truth: Truth,
+    frames: Vec<FrameTap>,
+    events: Vec<Event>,
+}
+
+impl Bench {
+    fn new(scenario: &Scenario) -> Self {
+        Self {
+            plant: PlantCore::new(scenario, EPOCH_NS).unwrap(),
+            mechanism: Mechanism::new(&MechanismConfig::default()).unwrap(),
+            cycle: 0,
+            reading: Reading::default(),
+            truth: Truth::default(),
+            frames: Vec::new(),
+            events: Vec::new(),
+        }
+    }
+
+    /// One cycle, answered by `answer` (which sees the reading) or by nobody.
+    fn cycle(&mut self, answer: Option<&Answer<'_>>) {
+        self.cycle += 1;
+        let sync_ns = EPOCH_NS + (self.cycle - 1) * PERIOD_NS;
+        let wake = Wake { cycle: self.cycle, due_ns: sync_ns, woke_ns: sync_ns, skipped: 0, stalled_ns: 0 };
+        self.plant.begin_cycle(wake).unwrap();
+        self.plant.collect(sync_ns + 525_000).unwrap();
+        self.plant.fill_reading(&mut self.reading);
+        self.plant.fill_truth(&mut self.truth);
+        let command = answer.map(|answer| {
+            let (target_m, request) = answer(&self.reading);
+            Command { cycle: self.cycle, target_m, request: request.code(), ..Command::default() }
+        });
+        self.plant.apply(sync_ns + 545_000, command.as_ref()).unwrap();
+        self.plant.drain_frames(&mut |frame| self.frames.push(frame));
+        self.plant.drain_events(&mut |event| self.events.push(event));
+    }
+
+    /// Cycles in which the drives are asked to hold where they stand, until all are enabled.
+    fn enable(&mut self) {
+        for _ in 0..200 {
+            self.cycle(Some(&|reading| (reading.position_m, DriveRequest::Enable)));
+            if self.reading.drive_state == ENABLED {
+                return;
+            }
+        }
+        panic!("not enabled: {:?}", self.reading.drive_state);
+    }
+
+    fn causes(&self, kind: EventKind) -> Vec<Cause> {
+        let events = self.events.iter().filter(|event| event.kind == kind.code());
+        events.map(|event| Cause::try_from(event.cause).unwrap()).collect()
+    }
+
+    fn fastest_axis_m_s(&self) -> f64 {
+        self.truth.joint_m_s.iter().fold(0.0, |fastest: f64, speed| fastest.max(speed.abs()))
+    }
+}
+
+/// Joint positions of a smooth motion about the pose the rig is switched on in: 15 mm up and down, some
+/// pitch, 1.4 times a second; at rest at its beginning.
+fn targets(mechanism: &Mechanism, start: &Pose, time_s: f64) -> [f64; AXES] {
+    let share = (1.0 - (time_s * 1.4 * std::f64::consts::TAU).cos()) / 2.0;
+    let shift = Vec3::new(-0.003, 0.002, -0.015) * share;
+    let pose = Pose::from_parts(
+        (start.translation.vector + shift).into(),
+        nalgebra::UnitQuaternion::from_scaled_axis(Vec3::new(0.0, 0.15, 0.02) * share),
+    );
+    mechanism.inverse(&pose).unwrap().actuators.to_axes()
+}
+
+fn start_pose(bench: &Bench) -> Pose {
+    Pose::translation(bench.truth.position_m[0], bench.truth.position_m[1], bench.truth.position_m[2])
+}
+
+/// Plays the motion for so many cycles; the largest distance of an axis from the target two cycles old.
+fn play(bench: &mut Bench, cycles: u64) -> f64 {
+    let start = start_pose(bench);
+    let began = bench.cycle;
+    let mechanism = bench.mechanism.clone();
+    let at = |cycle: u64| targets(&mechanism, &start, cycle.saturating_sub(began) as f64 * 1e-3);
+    let mut worst_m: f64 = 0.0;
+    for _ in 0..cycles {
+        let next = bench.cycle + 1;
+        bench.cycle(Some(&|_| (at(next + 2), DriveRequest::Enable)));
+        for (wanted, is) in at(next).into_iter().zip(bench.truth.joint_m) {
+            worst_m = worst_m.max((wanted - is).abs());
+        }
+    }
+    worst_m
+}
+
+#[test]
+fn drives_boot_enable_and_follow_within_a_tenth_of_a_millimetre() {
+    let mut bench = Bench::new(&Scenario::default());
+    bench.enable();
+    let worst_m = play(&mut bench, 2000);
+    println!("largest error of an axis: {:.1} µm", worst_m * 1e6);
+    assert!(worst_m < 1e-4, "{worst_m}");
+    assert_eq!(bench.causes(EventKind::Fault), []);
+    for _ in 0..50 {
+        bench.cycle(Some(&|reading| (reading.position_m, DriveRequest::Off)));
+    }
+    assert!(bench.plant.drives_are_off());
+}
+
+#[test]
+fn nothing_moves_while_the_drives_are_enabled() {
+    let mut bench = Bench::new(&Scenario::default());
+    bench.cycle(None);
+    let before = bench.truth.joint_m;
+    bench.enable();
+    for _ in 0..50 {
+        bench.cycle(Some(&|reading| (reading.position_m, DriveRequest::Enable)));
+    }
+    for (before, after) in before.iter().zip(bench.truth.joint_m) {
+        assert!((before - after).abs() < 2e-4, "{before} became {after}");
+    }
+}
+
+#[test]
+fn without_commands_the_master_stops_the_drives_and_stays_stopped() {
+    let mut bench = Bench::new(&Scenario::default());
+    bench.enable();
+    play(&mut bench, 200);
+    assert!(bench.fastest_axis_m_s() > 0.02);
+    for _ in 0..60 {
+        bench.cycle(None);
+    }
+    assert!(bench.plant.drives_are_off());
+    assert!(bench.fastest_axis_m_s() < 1e-3);
+    assert_eq!(bench.causes(EventKind::Fault), [Cause::CommandLost]);
+    assert_eq!(bench.reading.master_fault, 1);
+    for _ in 0..50 {
+        bench.cycle(Some(&|reading| (reading.position_m, DriveRequest::Enable)));
+    }
+    assert!(bench.plant.drives_are_off(), "a late commander moved the rig again");
+}
+
+#[test]
+fn without_the_master_the_drives_stop_by_themselves() {
+    let scenario = Scenario::default();
+    let mut bench = Bench::new(&scenario);
+    bench.enable();
+    play(&mut bench, 200);
+    let silent_from_ns = EPOCH_NS + bench.cycle * PERIOD_NS;
+    let bound_ns = u64::from(scenario.can.heartbeat_consumer_ms) * PERIOD_NS + 60 * PERIOD_NS;
+    bench.plant.link.advance(silent_from_ns + bound_ns).unwrap();
+    for drive in bench.plant.link.drives() {
+        assert_eq!(drive.power(), DriveState::SwitchOnDisabled);
+    }
+}
+
+#[test]
+fn a_bad_command_stops_the_rig() {
+    for (target_m, request) in [([f64::NAN; AXES], 1), ([0.0; AXES], 77)] {
+        let mut bench = Bench::new(&Scenario::default());
+        bench.enable();
+        let command = Command { cycle: 1, target_m, request, ..Command::default() };
+        let now_ns = EPOCH_NS + bench.cycle * PERIOD_NS;
+        bench.plant.apply(now_ns, Some(&command)).unwrap();
+        for _ in 0..60 {
+            bench.cycle(Some(&|reading| (reading.position_m, DriveRequest::Enable)));
+        }
+        assert!(bench.plant.drives_are_off());
+        assert_eq!(bench.causes(EventKind::Fault), [Cause::BadMessage]);
+    }
+}
+
+#[test]
+fn a_target_out_of_reach_makes_a_following_error_or_is_cut_but_never_a_jump() {
+    let mut bench = Bench::new(&Scenario::default());
+    bench.enable();
+    let far = bench.truth.joint_m.map(|position_m| position_m - 0.01);
+    let limit_m_s = Scenario::default().drives.leg.max_velocity_m_s;
+    for _ in 0..20 {
+        bench.cycle(Some(&|_| (far, DriveRequest::Enable)));
+        assert!(bench.fastest_axis_m_s() < 1.5 * limit_m_s, "{}", bench.fastest_axis_m_s());
+    }
+}
+
+#[test]
+fn a_cycle_on_the_wire_is_sync_then_process_data_up_then_down() {
+    let mut bench = Bench::new(&Scenario::default());
+    bench.enable();
+    bench.cycle(Some(&|reading| (reading.position_m, DriveRequest::Enable)));
+    bench.frames.clear();
+    let sync_ns = EPOCH_NS + bench.cycle * PERIOD_NS;
+    bench.cycle(Some(&|reading| (reading.position_m, DriveRequest::Enable)));
+    bench.cycle(Some(&|reading| (reading.position_m, DriveRequest::Enable)));
+    let node = |id| NodeId::new(id).unwrap();
+    let on_bus = |bus: u16| {
+        let frames = bench.frames.iter().filter(move |frame| frame.bus == bus);
+        frames
+            .map(|frame| tap::decode(frame).unwrap())
+            .filter(|frame| (sync_ns..sync_ns + PERIOD_NS).contains(&frame.time_ns))
+            .map(|frame| Cob::try_from(frame.frame.id()).unwrap())
+            .filter(|cob| !matches!(cob, Cob::Heartbeat(_)))
+            .collect::<Vec<_>>()
+    };
+    for (bus, ids) in [(0, [1, 2, 3]), (1, [4, 5, 6])] {
+        let [a, b, c] = ids.map(node);
+        let expected = [
+            Cob::Sync,
+            Cob::Tpdo1(a),
+            Cob::Tpdo1(b),
+            Cob::Tpdo1(c),
+            Cob::Rpdo1(a),
+            Cob::Rpdo1(b),
+            Cob::Rpdo1(c),
+        ];
+        assert_eq!(on_bus(bus), expected);
+    }
+}
+
+#[test]
+fn process_data_of_the_sync_before_are_no_answer_to_this_one() {
+    let mut bench = Bench::new(&Scenario::default());
+    bench.enable();
+    // A cycle whose process data are not waited for; they lie in the queue when the next one begins.
+    let sync_ns = EPOCH_NS + bench.cycle * PERIOD_NS;
+    let wake = |cycle, woke_ns| Wake { cycle, due_ns: woke_ns, woke_ns, skipped: 0, stalled_ns: 0 };
+    bench.plant.begin_cycle(wake(bench.cycle + 1, sync_ns)).unwrap();
+    bench.plant.begin_cycle(wake(bench.cycle + 2, sync_ns + PERIOD_NS)).unwrap();
+    assert!(!bench.plant.collect(sync_ns + PERIOD_NS + 300_000).unwrap());
+    assert!(bench.plant.collect(sync_ns + PERIOD_NS + 525_000).unwrap());
+}
+
+#[test]
+fn the_same_seed_gives_the_same_bytes_and_another_seed_other_noise() {
+    let run = |seed| {
+        let mut bench = Bench::new(&Scenario { seed, ..Scenario::default() });
+        bench.enable();
+        play(&mut bench, 300);
+        (bench.reading, bench.truth, bench.frames)
+    };
+    assert_eq!(run(5), run(5));
+    assert_ne!(run(5).2, run(6).2);
+}
+
+#[test]
+fn a_drive_that_never_boots_is_named() {
+    let mut bench = Bench::new(&Scenario {
+        can: masseter_shared::config::CanConfig { boot_timeout_ms: 10, ..Default::default() },
+        ..Scenario::default()
+    });
+    for _ in 0..30 {
+        bench.cycle(Some(&|reading| (reading.position_m, DriveRequest::Enable)));
+    }
+    assert_eq!(bench.causes(EventKind::Fault), [Cause::BootTimeout]);
+    assert_eq!(bench.events[0].axis, 0);
+}

@@ -1,0 +1,149 @@
+//! The servo loops of a drive: P position loop with velocity feed-forward, PI velocity loop, force
+//! limit; and the holding brake.
+//!
+//! Knows nothing of CANopen: the node above tells it what to do.
+
+use masseter_shared::config::DriveConfig;
+
+/// Time constant of the filter on the measured velocity, s.
+const VELOCITY_FILTER_S: f64 = 5e-4;
+/// Stiffness of the closed brake, N/m, and its damping, N per m/s.
+const BRAKE_STIFFNESS_N_M: f64 = 2e5;
+const BRAKE_DAMPING_N_S_M: f64 = 400.0;
+
+/// What the servo shall do.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Task {
+    /// No current; the brake holds where it closed.
+    Brake,
+    /// Follow a position with its velocity.
+    Follow {
+        /// Position wanted, m.
+        position_m: f64,
+        /// Its velocity, m/s.
+        velocity_m_s: f64,
+    },
+}
+
+/// The loops' memory.
+#[derive(Debug, Clone)]
+pub(crate) struct Servo {
+    config: DriveConfig,
+    step_s: f64,
+    position_m: f64,
+    velocity_m_s: f64,
+    integral_n: f64,
+    brake_at_m: Option<f64>,
+    is_limited: bool,
+}
+
+impl Servo {
+    /// At rest at a measured position, brake closed.
+    pub(crate) fn new(config: DriveConfig, step_s: f64, position_m: f64) -> Self {
+        Self {
+            config,
+            step_s,
+            position_m,
+            velocity_m_s: 0.0,
+            integral_n: 0.0,
+            brake_at_m: Some(position_m),
+            is_limited: false,
+        }
+    }
+
+    /// The last measured position, m.
+    pub(crate) fn position_m(&self) -> f64 {
+        self.position_m
+    }
+
+    /// Whether force or velocity was limited in the last step.
+    pub(crate) fn is_limited(&self) -> bool {
+        self.is_limited
+    }
+
+    /// One step of the loops: the force for the next `step_s`, N.
+    pub(crate) fn step(&mut self, measured_m: f64, task: Task) -> f64 {
+        let raw = (measured_m - self.position_m) / self.step_s;
+        self.velocity_m_s += (raw - self.velocity_m_s) * self.step_s / (self.step_s + VELOCITY_FILTER_S);
+        self.position_m = measured_m;
+        match task {
+            Task::Brake => self.brake(),
+            Task::Follow { position_m, velocity_m_s } => self.follow(position_m, velocity_m_s),
+        }
+    }
+
+    fn brake(&mut self) -> f64 {
+        let at_m = *self.brake_at_m.get_or_insert(self.position_m);
+        self.is_limited = false;
+        // When the loops take over they begin with the load that the brake carried.
+        self.integral_n = BRAKE_STIFFNESS_N_M * (at_m - self.position_m);
+        self.integral_n - BRAKE_DAMPING_N_S_M * self.velocity_m_s
+    }
+
+    fn follow(&mut self, position_m: f64, velocity_m_s: f64) -> f64 {
+        let config = &self.config;
+        self.brake_at_m = None;
+        let wanted = velocity_m_s + config.position_gain_per_s * (position_m - self.position_m);
+        let speed = wanted.clamp(-config.max_velocity_m_s, config.max_velocity_m_s);
+        let proportional_n = config.velocity_gain_n_s_per_m * (speed - self.velocity_m_s);
+        let asked_n = proportional_n + self.integral_n;
+        let force_n = asked_n.clamp(-config.max_force_n, config.max_force_n);
+        self.is_limited = force_n.to_bits() != asked_n.to_bits() || speed.to_bits() != wanted.to_bits();
+        if !self.is_limited {
+            self.integral_n += proportional_n * self.step_s / config.velocity_integral_time_s;
+        }
+        force_n
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use masseter_shared::config::DrivesConfig;
+
+    use super::*;
+
+    const STEP_S: f64 = 1.25e-4;
+
+    /// A mass with a constant load.
+    fn simulate(task: impl Fn(f64) -> Task, mass_kg: f64, load_n: f64, seconds: f64) -> (f64, f64) {
+        let mut servo = Servo::new(DrivesConfig::default().leg, STEP_S, 0.27);
+        let (mut position_m, mut velocity_m_s, mut time_s) = (0.27, 0.0, 0.0);
+        while time_s < seconds {
+            let force_n = servo.step(position_m, task(time_s));
+            velocity_m_s += (force_n - load_n) / mass_kg * STEP_S;
+            position_m += velocity_m_s * STEP_S;
+            time_s += STEP_S;
+        }
+        (position_m, velocity_m_s)
+    }
+
+    #[test]
+    fn it_holds_a_position_against_a_load() {
+        let hold = |_| Task::Follow { position_m: 0.27, velocity_m_s: 0.0 };
+        let (position_m, _) = simulate(hold, 0.6, 20.0, 1.0);
+        assert!((position_m - 0.27).abs() < 1e-6, "{position_m}");
+    }
+
+    #[test]
+    fn it_follows_a_ramp_without_lasting_error() {
+        let ramp = |t: f64| Task::Follow { position_m: 0.27 + 0.1 * (t + STEP_S), velocity_m_s: 0.1 };
+        let (position_m, velocity_m_s) = simulate(ramp, 0.6, 20.0, 0.3);
+        assert!((position_m - 0.30).abs() < 5e-5, "{position_m}");
+        assert!((velocity_m_s - 0.1).abs() < 1e-3, "{velocity_m_s}");
+    }
+
+    #[test]
+    fn the_brake_holds_a_load_nearly_where_it_closed() {
+        let (position_m, velocity_m_s) = simulate(|_| Task::Brake, 0.6, 20.0, 1.0);
+        assert!((position_m - 0.27).abs() < 2e-4, "{position_m}");
+        assert!(velocity_m_s.abs() < 1e-6);
+    }
+
+    #[test]
+    fn force_and_velocity_stay_within_their_limits() {
+        let config = DrivesConfig::default().leg;
+        let mut servo = Servo::new(config, STEP_S, 0.27);
+        let force_n = servo.step(0.27, Task::Follow { position_m: 5.0, velocity_m_s: 0.0 });
+        assert!(force_n.abs() <= config.max_force_n && servo.is_limited());
+    }
+}

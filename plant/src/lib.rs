@@ -1,0 +1,16 @@
+//! The rig's plant: CAN master, emulated CiA 402 drives and the mechanism they move.
+//!
+//! [`core`] is a pure step function; [`process`] binds it to iceoryx2 and to real time. It never sees
+//! the controller, and never solves the forward kinematics: its truth is the integrated mechanism.
+
+mod build;
+pub mod core;
+mod drive;
+mod encoder;
+mod link;
+mod master;
+mod mechanism;
+pub mod process;
+
+pub use build::PlantError;
+pub use mechanism::DynamicsError;

@@ -1,0 +1,338 @@
+//! The master's cycle: SYNC and heartbeat, process data in, process data out, supervision.
+
+use masseter_shared::can::canopen::{
+    Cob, Emergency, Heartbeat, Nmt, NmtCommand, NmtState, NmtTarget, NodeId, sync,
+};
+use masseter_shared::can::{Bus, Frame, Received, SendError, Tpdo1};
+use masseter_shared::geometry::AXES;
+use masseter_shared::messages::codes::{Cause, DriveCondition, DriveRequest, EventKind, NO_AXIS, Source};
+use masseter_shared::messages::{Command, Event, Reading};
+use masseter_shared::realtime::Wake;
+
+use super::node::Node;
+pub(crate) use super::node::Scale;
+use crate::link::Buses;
+
+/// Events kept between two drains; a drain follows every cycle.
+const EVENTS: usize = 256;
+/// Frames taken from a bus in one go, so that a babbling node cannot hold the cycle up.
+const FRAMES_AT_ONCE: usize = 512;
+/// Cycles that an operational drive's process data may be missing.
+const MISSING_CYCLES: u32 = 3;
+
+/// What the master is configured with.
+#[derive(Debug, Clone)]
+pub(crate) struct MasterSettings {
+    /// Its own node id, for its heartbeat.
+    pub(crate) id: NodeId,
+    /// The drives in the order of the axes: node id, bus, scale.
+    pub(crate) drives: [(NodeId, usize, Scale); AXES],
+    /// Buses.
+    pub(crate) buses: usize,
+    /// Interval of its own heartbeat, ns.
+    pub(crate) heartbeat_ns: u64,
+    /// Silence of a drive that counts as its loss, ns.
+    pub(crate) heartbeat_timeout_ns: u64,
+    /// How long the drives may take to become operational, ns.
+    pub(crate) boot_timeout_ns: u64,
+    /// Cycles without a fresh command before the drives are stopped.
+    pub(crate) command_timeout_cycles: u32,
+}
+
+/// The master.
+#[derive(Debug)]
+pub(crate) struct Master {
+    settings: MasterSettings,
+    nodes: [Node; AXES],
+    began_ns: u64,
+    wake: Wake,
+    sync_ns: u64,
+    complete_ns: u64,
+    next_heartbeat_ns: u64,
+    command: Option<Command>,
+    command_received_ns: u64,
+    silent_cycles: u32,
+    were_enabled: bool,
+    has_fault: bool,
+    events: Vec<Event>,
+}
+
+impl Master {
+    /// A master that begins at `now_ns` and knows nothing of its drives yet.
+    pub(crate) fn new(settings: MasterSettings, now_ns: u64) -> Self {
+        Self {
+            nodes: settings.drives.map(|(id, bus, scale)| Node::new(id, bus, scale)),
+            settings,
+            began_ns: now_ns,
+            wake: Wake { cycle: 0, due_ns: 0, woke_ns: 0, skipped: 0, stalled_ns: 0 },
+            sync_ns: 0,
+            complete_ns: 0,
+            next_heartbeat_ns: now_ns,
+            command: None,
+            command_received_ns: 0,
+            silent_cycles: 0,
+            were_enabled: false,
+            has_fault: false,
+            events: Vec::with_capacity(EVENTS),
+        }
+    }
+
+    /// SYNC on every bus, and the heartbeat when it is due.
+    pub(crate) fn begin_cycle(&mut self, wake: Wake, buses: &mut impl Buses) {
+        (self.wake, self.sync_ns, self.complete_ns) = (wake, wake.woke_ns, 0);
+        let beats = wake.woke_ns >= self.next_heartbeat_ns;
+        if beats {
+            self.next_heartbeat_ns = wake.woke_ns + self.settings.heartbeat_ns;
+        }
+        for node in &mut self.nodes {
+            node.is_fresh = false;
+        }
+        for bus in 0..self.settings.buses {
+            let result = buses.port(bus).send(wake.woke_ns, sync::frame());
+            self.check_sent(result);
+            if beats {
+                let heartbeat = Heartbeat { state: NmtState::Operational }.frame(self.settings.id);
+                let result = buses.port(bus).send(wake.woke_ns, heartbeat);
+                self.check_sent(result);
+            }
+        }
+    }
+
+    /// Takes what has arrived; whether the process data of all drives are in.
+    pub(crate) fn collect(&mut self, now_ns: u64, buses: &mut impl Buses) -> bool {
+        for bus in 0..self.settings.buses {
+            for _ in 0..FRAMES_AT_ONCE {
+                // What an overrun or a dead interface withholds is missed as process data below.
+                let Ok(Some(received)) = buses.port(bus).receive(now_ns) else { break };
+                if let Some(answer) = self.take(bus, &received) {
+                    let result = buses.port(bus).send(now_ns, answer);
+                    self.check_sent(result);
+                }
+            }
+        }
+        self.nodes.iter().all(|node| node.is_fresh)
+    }
+
+    /// Takes a frame; returns what it is to be answered with. Malformed frames have no effect.
+    fn take(&mut self, bus: usize, received: &Received) -> Option<Frame> {
+        let data = received.frame.data();
+        match Cob::try_from(received.frame.id()).ok()? {
+            Cob::Heartbeat(id) => {
+                let axis = self.axis_of(id, bus)?;
+                let state = Heartbeat::decode(data).ok()?.state;
+                let node = &mut self.nodes[axis];
+                (node.nmt, node.heard_ns) = (Some(state), received.time_ns);
+                let waits = matches!(state, NmtState::BootUp | NmtState::PreOperational);
+                (waits && !self.has_fault)
+                    .then(|| Nmt { command: NmtCommand::Start, target: NmtTarget::Node(id) }.frame())
+            }
+            Cob::Tpdo1(id) => {
+                let axis = self.axis_of(id, bus)?;
+                let tpdo = Tpdo1::decode(data).ok()?;
+                self.take_process_data(axis, tpdo, received.time_ns);
+                None
+            }
+            Cob::Emergency(id) => {
+                let axis = self.axis_of(id, bus)?;
+                let emergency = Emergency::decode(data).ok()?;
+                let kind = if emergency.is_reset() { EventKind::Notice } else { EventKind::Fault };
+                let code = f64::from(emergency.code.0);
+                self.report(received.time_ns, Source::Drive, kind, Cause::Emergency, Some(axis), [code, 0.0]);
+                None
+            }
+            _ => None,
+        }
+    }
+
+    fn axis_of(&self, id: NodeId, bus: usize) -> Option<usize> {
+        self.nodes.iter().position(|node| node.id == id && node.bus == bus)
+    }
+
+    fn take_process_data(&mut self, axis: usize, tpdo: Tpdo1, time_ns: u64) {
+        let node = &mut self.nodes[axis];
+        // Only an operational node sends process data.
+        (node.nmt, node.heard_ns, node.missing_cycles) = (Some(NmtState::Operational), time_ns, 0);
+        let before = node.condition();
+        // Process data of an earlier SYNC may come late; they are no answer to this one.
+        node.take(tpdo, time_ns > self.sync_ns);
+        let after = node.condition();
+        self.complete_ns = self.complete_ns.max(time_ns);
+        if before != after {
+            self.report(time_ns, Source::Drive, EventKind::Transition, Cause::Sequence, Some(axis), [0.0; 2]);
+            if let Some(event) = self.events.last_mut() {
+                (event.from, event.to) = (before.code(), after.code());
+            }
+        }
+    }
+
+    /// This cycle's reading, without the times that the link alone knows.
+    pub(crate) fn fill_reading(&self, reading: &mut Reading) {
+        *reading = Reading {
+            cycle: self.wake.cycle,
+            answers_cycle: self.command.map_or(0, |command| command.cycle),
+            sampled_ns: self.sync_ns,
+            complete_ns: self.complete_ns,
+            command_received_ns: self.command_received_ns,
+            due_ns: self.wake.due_ns,
+            woke_ns: self.wake.woke_ns,
+            skipped_cycles: self.wake.skipped,
+            stalled_ns: self.wake.stalled_ns,
+            master_fault: u32::from(self.has_fault),
+            ..Reading::default()
+        };
+        for (axis, node) in self.nodes.iter().enumerate() {
+            reading.position_m[axis] = node.position_m();
+            reading.force_n[axis] = node.force_n();
+            reading.drive_state[axis] = node.condition().code();
+            reading.fresh_axes |= u32::from(node.is_fresh) << axis;
+        }
+    }
+
+    /// Judges the cycle, takes the newest command, and sends every drive its process data.
+    pub(crate) fn apply(&mut self, now_ns: u64, command: Option<&Command>, buses: &mut impl Buses) {
+        self.supervise(now_ns);
+        self.take_command(now_ns, command);
+        let request = self.request();
+        let targets_m = self.command.map_or([0.0; AXES], |command| command.target_m);
+        for (axis, target_m) in targets_m.into_iter().enumerate() {
+            let node = &mut self.nodes[axis];
+            if node.is_operational() {
+                let frame = node.process_data(request, target_m).frame(node.id);
+                let result = buses.port(node.bus).send(now_ns, frame);
+                self.check_sent(result);
+            }
+        }
+    }
+
+    /// What is asked of the drives: what the last good command asks, unless something is wrong.
+    fn request(&self) -> DriveRequest {
+        if self.has_fault {
+            return DriveRequest::QuickStop;
+        }
+        let request = self.command.map(|command| DriveRequest::try_from(command.request));
+        request.and_then(Result::ok).unwrap_or(DriveRequest::Off)
+    }
+
+    fn take_command(&mut self, now_ns: u64, command: Option<&Command>) {
+        let Some(command) = command else {
+            self.silent_cycles = self.silent_cycles.saturating_add(1);
+            let limit = self.settings.command_timeout_cycles;
+            if self.command.is_some() && self.silent_cycles > limit {
+                self.fail(
+                    now_ns,
+                    Cause::CommandLost,
+                    None,
+                    [f64::from(self.silent_cycles), f64::from(limit)],
+                );
+            }
+            return;
+        };
+        self.silent_cycles = 0;
+        let bad_target = command.target_m.iter().position(|target_m| !target_m.is_finite());
+        if bad_target.is_some() || DriveRequest::try_from(command.request).is_err() {
+            let code = f64::from(command.request);
+            self.fail(now_ns, Cause::BadMessage, bad_target, [code, 0.0]);
+            return;
+        }
+        (self.command, self.command_received_ns) = (Some(*command), now_ns);
+    }
+
+    fn supervise(&mut self, now_ns: u64) {
+        let mut all_enabled = true;
+        for axis in 0..AXES {
+            let node = &mut self.nodes[axis];
+            if node.is_operational() && !node.is_fresh {
+                node.missing_cycles += 1;
+            }
+            let (nmt, missing) = (node.nmt, node.missing_cycles);
+            let silent_ns = now_ns.saturating_sub(node.heard_ns);
+            let condition = node.condition();
+            all_enabled &= condition == DriveCondition::OperationEnabled;
+            if nmt.is_some() && silent_ns > self.settings.heartbeat_timeout_ns {
+                let limit_ns = self.settings.heartbeat_timeout_ns;
+                self.fail(now_ns, Cause::HeartbeatLost, Some(axis), [silent_ns, limit_ns].map(in_ms));
+            } else if missing > MISSING_CYCLES {
+                let values = [missing, MISSING_CYCLES].map(f64::from);
+                self.fail(now_ns, Cause::ProcessDataLost, Some(axis), values);
+            } else if self.were_enabled && is_faulty(condition) {
+                self.fail(now_ns, Cause::DriveFault, Some(axis), [f64::from(condition.code()), 0.0]);
+            } else if nmt != Some(NmtState::Operational) {
+                self.watch_boot(now_ns, axis);
+            }
+        }
+        self.were_enabled |= all_enabled;
+    }
+
+    fn watch_boot(&mut self, now_ns: u64, axis: usize) {
+        let waited_ns = now_ns.saturating_sub(self.began_ns);
+        if waited_ns > self.settings.boot_timeout_ns {
+            let limit_ns = self.settings.boot_timeout_ns;
+            self.fail(now_ns, Cause::BootTimeout, Some(axis), [waited_ns, limit_ns].map(in_ms));
+        }
+    }
+
+    /// Stops the drives for good. The first cause is reported, its consequences are not.
+    fn fail(&mut self, now_ns: u64, cause: Cause, axis: Option<usize>, values: [f64; 2]) {
+        if !self.has_fault {
+            self.has_fault = true;
+            self.report(now_ns, Source::Master, EventKind::Fault, cause, axis, values);
+        }
+    }
+
+    fn check_sent(&mut self, result: Result<(), SendError>) {
+        if result.is_err() {
+            self.fail(self.wake.woke_ns, Cause::BusRefused, None, [0.0; 2]);
+        }
+    }
+
+    fn report(
+        &mut self,
+        time_ns: u64,
+        source: Source,
+        kind: EventKind,
+        cause: Cause,
+        axis: Option<usize>,
+        [value, limit]: [f64; 2],
+    ) {
+        if self.events.len() == EVENTS {
+            return;
+        }
+        self.events.push(Event {
+            time_ns,
+            cycle: self.wake.cycle,
+            source: source.code(),
+            kind: kind.code(),
+            cause: cause.code(),
+            axis: axis.map_or(NO_AXIS, |axis| axis as u32),
+            value,
+            limit,
+            ..Event::default()
+        });
+    }
+
+    /// Whether no drive gives force, as far as they tell.
+    pub(crate) fn drives_are_off(&self) -> bool {
+        self.nodes.iter().all(|node| {
+            !matches!(
+                node.condition(),
+                DriveCondition::SwitchedOn
+                    | DriveCondition::OperationEnabled
+                    | DriveCondition::QuickStopActive
+                    | DriveCondition::FaultReaction
+            )
+        })
+    }
+
+    /// Hands out the events since the last drain.
+    pub(crate) fn drain_events(&mut self, out: &mut impl FnMut(Event)) {
+        self.events.drain(..).for_each(out);
+    }
+}
+
+fn is_faulty(condition: DriveCondition) -> bool {
+    matches!(condition, DriveCondition::Fault | DriveCondition::FaultReaction)
+}
+
+fn in_ms(ns: u64) -> f64 {
+    ns as f64 / 1e6
+}

@@ -1,0 +1,86 @@
+//! What the master knows of one drive.
+
+use masseter_shared::can::canopen::{NmtState, NodeId};
+use masseter_shared::can::cia402::{Controlword, DriveState, toward};
+use masseter_shared::can::{Rpdo1, Tpdo1};
+use masseter_shared::messages::codes::{DriveCondition, DriveRequest};
+
+/// How a position object counts, and what a force object is a share of.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Scale {
+    /// One increment of 607A and 6064, m.
+    pub(crate) increment_m: f64,
+    /// Force at 1000 ‰ of 6077, N.
+    pub(crate) rated_force_n: f64,
+}
+
+/// One drive, as the master sees it.
+#[derive(Debug, Clone)]
+pub(super) struct Node {
+    pub(super) id: NodeId,
+    pub(super) bus: usize,
+    pub(super) nmt: Option<NmtState>,
+    pub(super) heard_ns: u64,
+    pub(super) is_fresh: bool,
+    pub(super) missing_cycles: u32,
+    scale: Scale,
+    power: Option<DriveState>,
+    actual_increments: i32,
+    torque_permille: i16,
+    controlword: Controlword,
+}
+
+impl Node {
+    pub(super) fn new(id: NodeId, bus: usize, scale: Scale) -> Self {
+        Self {
+            id,
+            bus,
+            nmt: None,
+            heard_ns: 0,
+            is_fresh: false,
+            missing_cycles: 0,
+            scale,
+            power: None,
+            actual_increments: 0,
+            torque_permille: 0,
+            controlword: Controlword::DISABLE_VOLTAGE,
+        }
+    }
+
+    pub(super) fn is_operational(&self) -> bool {
+        self.nmt == Some(NmtState::Operational)
+    }
+
+    /// Takes process data; a statusword without a meaning keeps the last state.
+    pub(super) fn take(&mut self, tpdo: Tpdo1, is_fresh: bool) {
+        if let Ok(state) = tpdo.statusword.state() {
+            self.power = Some(state);
+        }
+        self.actual_increments = tpdo.actual_increments;
+        self.torque_permille = tpdo.torque_permille;
+        self.is_fresh = is_fresh;
+    }
+
+    pub(super) fn condition(&self) -> DriveCondition {
+        self.power.filter(|_| self.is_operational()).map_or(DriveCondition::Unknown, DriveCondition::from)
+    }
+
+    pub(super) fn position_m(&self) -> f64 {
+        f64::from(self.actual_increments) * self.scale.increment_m
+    }
+
+    pub(super) fn force_n(&self) -> f64 {
+        f64::from(self.torque_permille) / 1000.0 * self.scale.rated_force_n
+    }
+
+    /// The process data that bring the drive where it is wanted. Until it follows targets, its target is
+    /// where it stands, so that nothing jumps when it begins to (607A := 6064).
+    pub(super) fn process_data(&mut self, request: DriveRequest, target_m: f64) -> Rpdo1 {
+        let state = self.power.unwrap_or(DriveState::NotReadyToSwitchOn);
+        self.controlword = toward(state, request, self.controlword);
+        let follows = state == DriveState::OperationEnabled && request == DriveRequest::Enable;
+        let target_increments =
+            if follows { (target_m / self.scale.increment_m).round() as i32 } else { self.actual_increments };
+        Rpdo1 { controlword: self.controlword, target_increments }
+    }
+}

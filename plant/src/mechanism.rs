@@ -1,0 +1,204 @@
+//! Forward dynamics of the mechanism in task space: forces of six actuators and gravity in, motion of
+//! the platform out.
+//!
+//! State is the platform's pose and twist. Joint positions come from inverse kinematics and joint
+//! rates from the Jacobian: the forward kinematics is never solved here, so the mechanism is an
+//! independent oracle for it. Masses: platform with jaw, carriages (moved by the slides), rods (moved
+//! along and across by the legs) as constant joint inertias. Left out: the velocity products of legs
+//! and carriages (centripetal terms, below 0.02 m/s² at jaw speeds), play, and elasticity.
+
+use masseter_shared::config::DynamicsConfig;
+use masseter_shared::geometry::{AXES, InverseError, Jacobian, Joints, LEGS, Mechanism, Pose, Twist, Vec3};
+use nalgebra::{Matrix3, Matrix6, UnitQuaternion, Vector6};
+
+/// Below this speed Coulomb friction fades towards zero, m/s.
+const STICTION_SPEED_M_S: f64 = 1e-3;
+/// Share of the slides' Coulomb friction that a leg has.
+const LEG_FRICTION_SHARE: f64 = 0.25;
+
+/// The moving mechanism.
+#[derive(Debug, Clone)]
+pub(crate) struct Dynamics {
+    mechanism: Mechanism,
+    config: DynamicsConfig,
+    pose: Pose,
+    twist: Twist,
+    joints: Joints,
+    jacobian: Jacobian,
+}
+
+/// A step that left the mechanism without a configuration.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum DynamicsError {
+    /// The pose has no joint coordinates.
+    #[error("the mechanism came to a pose without joint coordinates: {0}")]
+    Inverse(#[from] InverseError),
+    /// The mass matrix cannot be inverted: masses or inertias are not positive.
+    #[error("the mechanism's mass matrix is not positive definite; check [dynamics]")]
+    Mass,
+}
+
+impl Dynamics {
+    /// At rest in `pose`.
+    pub(crate) fn new(
+        mechanism: Mechanism,
+        config: DynamicsConfig,
+        pose: Pose,
+    ) -> Result<Self, DynamicsError> {
+        let joints = mechanism.inverse(&pose)?;
+        let jacobian = mechanism.jacobian(&pose, &joints);
+        let dynamics = Self { mechanism, config, pose, twist: Twist::zeros(), joints, jacobian };
+        match dynamics.mass().cholesky() {
+            Some(_) => Ok(dynamics),
+            None => Err(DynamicsError::Mass),
+        }
+    }
+
+    /// The platform in the base frame.
+    pub(crate) fn pose(&self) -> &Pose {
+        &self.pose
+    }
+
+    /// Joint positions d₁ d₂ d₃ l₁ l₂ l₃, m.
+    pub(crate) fn positions_m(&self) -> [f64; AXES] {
+        self.joints.actuators.to_axes()
+    }
+
+    /// Joint velocities, m/s.
+    pub(crate) fn velocities_m_s(&self) -> [f64; AXES] {
+        (self.jacobian.actuators * self.twist).into()
+    }
+
+    /// Lets the actuators' forces (N) act for `dt_s`: semi-implicit Euler.
+    pub(crate) fn step(&mut self, force_n: &[f64; AXES], dt_s: f64) -> Result<(), DynamicsError> {
+        let joint_forces = Vector6::from(*force_n) - self.friction();
+        let wrench = self.jacobian.actuators.transpose() * joint_forces + self.gravity() - self.gyroscopic();
+        let solver = self.mass().cholesky().ok_or(DynamicsError::Mass)?;
+        self.twist += solver.solve(&wrench) * dt_s;
+        self.move_by(dt_s)
+    }
+
+    fn move_by(&mut self, dt_s: f64) -> Result<(), DynamicsError> {
+        let linear = self.twist.fixed_rows::<3>(0) * dt_s;
+        let angular = self.twist.fixed_rows::<3>(3) * dt_s;
+        let mut rotation = UnitQuaternion::from_scaled_axis(angular) * self.pose.rotation;
+        rotation.renormalize();
+        self.pose = Pose::from_parts((self.pose.translation.vector + linear).into(), rotation);
+        self.joints = self.mechanism.inverse(&self.pose)?;
+        self.jacobian = self.mechanism.jacobian(&self.pose, &self.joints);
+        Ok(())
+    }
+
+    /// Inertia of the platform about its origin in base axes, kg m².
+    fn platform_inertia(&self) -> Matrix3<f64> {
+        let rotation = self.pose.rotation.to_rotation_matrix().into_inner();
+        rotation
+            * Matrix3::from_diagonal(&Vec3::from(self.config.platform_inertia_kg_m2))
+            * rotation.transpose()
+    }
+
+    /// Mass matrix against the twist: platform + Jᵀ·M·J of slides and rods + hinges.
+    fn mass(&self) -> Matrix6<f64> {
+        let config = &self.config;
+        let (slide, rod) = (config.carriage_mass_kg + config.rod_mass_kg, config.rod_mass_kg);
+        let axes = Matrix6::from_diagonal(&Vector6::new(slide, slide, slide, rod, rod, rod));
+        let mut mass = self.jacobian.actuators.transpose() * axes * self.jacobian.actuators;
+        mass += self.jacobian.hinges.transpose() * self.jacobian.hinges * config.leg_inertia_kg_m2;
+        for i in 0..3 {
+            mass[(i, i)] += config.platform_mass_kg;
+        }
+        let mut rotational = mass.fixed_view_mut::<3, 3>(3, 3);
+        rotational += self.platform_inertia();
+        mass
+    }
+
+    /// Coulomb and viscous friction of each axis, N.
+    fn friction(&self) -> Vector6<f64> {
+        let velocity = self.jacobian.actuators * self.twist;
+        Vector6::from_fn(|axis, _| {
+            let share = if axis < LEGS { 1.0 } else { LEG_FRICTION_SHARE };
+            let coulomb_n = self.config.slide_friction_n * share;
+            let speed = velocity[axis];
+            coulomb_n * (speed / STICTION_SPEED_M_S).tanh() + self.config.viscous_friction_n_s_per_m * speed
+        })
+    }
+
+    /// Weight of platform and rods as a wrench on the platform; a rod's centre is taken at its joint.
+    fn gravity(&self) -> Vector6<f64> {
+        let mut wrench = Vector6::zeros();
+        wrench[2] = -self.config.platform_mass_kg * self.config.gravity_m_s2;
+        let rod_n = self.config.rod_mass_kg * self.config.gravity_m_s2;
+        for corner in self.mechanism.platform_corners() {
+            let arm = self.pose.rotation * corner;
+            wrench[2] -= rod_n;
+            // r × (0, 0, −w)
+            wrench[3] -= arm.y * rod_n;
+            wrench[4] += arm.x * rod_n;
+        }
+        wrench
+    }
+
+    /// ω × Iω of the platform.
+    fn gyroscopic(&self) -> Vector6<f64> {
+        let omega: Vec3 = self.twist.fixed_rows::<3>(3).into();
+        let moment = omega.cross(&(self.platform_inertia() * omega));
+        Vector6::new(0.0, 0.0, 0.0, moment.x, moment.y, moment.z)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use masseter_shared::geometry::MechanismConfig;
+
+    use super::*;
+
+    fn at_rest(config: DynamicsConfig) -> Dynamics {
+        let mechanism = Mechanism::new(&MechanismConfig::default()).unwrap();
+        Dynamics::new(mechanism, config, Pose::translation(0.0, 0.0, 0.268_452_355)).unwrap()
+    }
+
+    fn frictionless() -> DynamicsConfig {
+        DynamicsConfig {
+            slide_friction_n: 0.0,
+            viscous_friction_n_s_per_m: 0.0,
+            leg_inertia_kg_m2: 0.0,
+            ..DynamicsConfig::default()
+        }
+    }
+
+    #[test]
+    fn forces_that_carry_the_weight_keep_it_at_rest() {
+        let mut dynamics = at_rest(frictionless());
+        let transposed = dynamics.jacobian.actuators.transpose();
+        let force_n: [f64; AXES] = transposed.lu().solve(&-dynamics.gravity()).unwrap().into();
+        for _ in 0..8000 {
+            dynamics.step(&force_n, 1.25e-4).unwrap();
+        }
+        assert!((dynamics.pose().translation.z - 0.268_452_355).abs() < 1e-6);
+        assert!(dynamics.twist.norm() < 1e-4);
+    }
+
+    #[test]
+    fn released_it_falls_as_all_its_moving_masses_weigh() {
+        let config = frictionless();
+        let mut dynamics = at_rest(config);
+        dynamics.step(&[0.0; AXES], 1.25e-4).unwrap();
+        let acceleration = dynamics.twist[2] / 1.25e-4;
+        assert!((-9.9..-9.0).contains(&acceleration), "{acceleration}");
+    }
+
+    #[test]
+    fn without_forces_energy_is_only_lost() {
+        let config = DynamicsConfig { gravity_m_s2: 0.0, ..DynamicsConfig::default() };
+        let mut dynamics = at_rest(config);
+        dynamics.twist = Twist::new(0.05, 0.02, 0.03, 0.3, -0.2, 0.1);
+        let energy = |dynamics: &Dynamics| (dynamics.twist.transpose() * dynamics.mass() * dynamics.twist)[0];
+        let mut before = energy(&dynamics);
+        for _ in 0..400 {
+            dynamics.step(&[0.0; AXES], 1.25e-4).unwrap();
+            let now = energy(&dynamics);
+            assert!(now <= before * (1.0 + 1e-4), "{now} after {before}");
+            before = now;
+        }
+    }
+}

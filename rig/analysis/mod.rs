@@ -1,0 +1,208 @@
+//! What a recording says of its run, in one pass: latencies, tracking, losses, events; and the same
+//! as files for other tools.
+//!
+//! Nothing is judged here; see [`report::verdict`](crate::report::verdict).
+
+mod events;
+mod exports;
+mod intervals;
+mod join;
+mod sequence;
+mod skips;
+mod tracking;
+
+use std::path::PathBuf;
+
+use masseter_shared::messages::codes::ControllerState;
+use masseter_shared::messages::{Command, Event, FrameTap, Message, Reading, State, Truth};
+use serde::Serialize;
+
+use crate::recording::{ReadError, Reader, Recorded};
+use crate::run::folder::RunFolder;
+use events::EventLog;
+pub use events::EventRecord;
+use exports::CandumpLogs;
+pub use intervals::IntervalFigures;
+use intervals::Intervals;
+use sequence::SequenceCheck;
+pub use sequence::TopicFigures;
+pub use skips::SkipFigures;
+use skips::Skips;
+use tracking::Tracking;
+pub use tracking::{TrackingFigures, TrackingSample};
+
+/// Why a run could not be analysed.
+#[derive(Debug, thiserror::Error)]
+pub enum AnalysisError {
+    /// The recording.
+    #[error(transparent)]
+    Read(#[from] ReadError),
+    /// A message on topic `frame` that holds no CAN frame.
+    #[error("the recording holds a frame that is none: {0}")]
+    Frame(#[from] masseter_shared::can::FrameError),
+    /// One of the files made from it.
+    #[error("cannot write {}: {error}", path.display())]
+    Write {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        error: std::io::Error,
+    },
+}
+
+/// Everything a run is reported and judged by.
+#[derive(Debug, Clone, Serialize)]
+pub struct Figures {
+    /// Cycles that the controller ran.
+    pub cycles: u64,
+    /// From the first to the last reading, s.
+    pub duration_s: f64,
+    /// Deadlines that the controller skipped after overruns.
+    pub controller_skips: SkipFigures,
+    /// Deadlines that the plant skipped after overruns.
+    pub plant_skips: SkipFigures,
+    /// Where the controller's sequence ended; none without a single state message.
+    pub final_state: Option<&'static str>,
+    /// Distance of the platform from where it should be, while the motion played.
+    pub tracking: TrackingFigures,
+    /// Measured intervals.
+    pub intervals: Vec<IntervalFigures>,
+    /// Messages and losses of each topic.
+    pub topics: Vec<TopicFigures>,
+    /// Frames on each bus.
+    pub frames: Vec<u64>,
+    /// What happened, in order.
+    pub events: Vec<EventRecord>,
+    /// Whether the recording ends in the middle of a record.
+    pub cut_short: bool,
+    /// Tracking over time, for plots.
+    #[serde(skip)]
+    pub track: Vec<TrackingSample>,
+}
+
+impl Figures {
+    /// Deadlines that the two processes skipped, and those of them that the machine is to blame for.
+    pub fn skipped(&self) -> (u64, u64) {
+        let (controller, plant) = (&self.controller_skips, &self.plant_skips);
+        (controller.skipped + plant.skipped, controller.by_machine + plant.by_machine)
+    }
+
+    /// Messages that were published and not recorded.
+    pub fn missing_messages(&self) -> u64 {
+        self.topics.iter().map(|topic| topic.missing).sum()
+    }
+}
+
+/// Reads the run's recording, writes `hist/`, `can*.log` and `events.jsonl` beside it, and returns
+/// the figures.
+pub fn analyse(folder: &RunFolder, period_ns: u64) -> Result<Figures, AnalysisError> {
+    let mut reader = Reader::open(&folder.recording())?;
+    let mut pass = Pass::new(folder, period_ns)?;
+    while let Some(message) = reader.next_message()? {
+        pass.take(&message)?;
+    }
+    pass.finish(reader.was_cut_short())
+}
+
+/// The state of the one pass over a recording.
+struct Pass {
+    period_ns: u64,
+    intervals: Intervals,
+    tracking: Tracking,
+    sequence: SequenceCheck,
+    candump: CandumpLogs,
+    events: EventLog,
+    cycles: u64,
+    first_sample_ns: Option<u64>,
+    last_sample_ns: u64,
+    controller_skips: Skips,
+    plant_skips: Skips,
+    final_state: Option<&'static str>,
+}
+
+impl Pass {
+    fn new(folder: &RunFolder, period_ns: u64) -> Result<Self, AnalysisError> {
+        Ok(Self {
+            period_ns,
+            intervals: Intervals::new(&folder.histograms())?,
+            tracking: Tracking::default(),
+            sequence: SequenceCheck::default(),
+            candump: CandumpLogs::new(folder),
+            events: EventLog::create(folder.events())?,
+            cycles: 0,
+            first_sample_ns: None,
+            last_sample_ns: 0,
+            controller_skips: Skips::default(),
+            plant_skips: Skips::default(),
+            final_state: None,
+        })
+    }
+
+    fn take(&mut self, message: &Recorded) -> Result<(), AnalysisError> {
+        match message {
+            Recorded::Command(command) => self.command(command),
+            Recorded::Reading(reading) => self.reading(reading),
+            Recorded::State(state) => self.state(state),
+            Recorded::Truth(truth) => self.truth(truth),
+            Recorded::Frame(frame) => self.frame(frame)?,
+            Recorded::Event(event) => self.event(event),
+        }
+        Ok(())
+    }
+
+    fn command(&mut self, command: &Command) {
+        self.sequence.check(Command::TOPIC, 0, command.seq);
+        self.intervals.command(command);
+    }
+
+    fn reading(&mut self, reading: &Reading) {
+        self.sequence.check(Reading::TOPIC, 0, reading.seq);
+        self.intervals.reading(reading);
+        self.plant_skips.take(reading.skipped_cycles, reading.stalled_ns, self.period_ns);
+        self.first_sample_ns.get_or_insert(reading.sampled_ns);
+        self.last_sample_ns = reading.sampled_ns;
+    }
+
+    fn state(&mut self, state: &State) {
+        self.sequence.check(State::TOPIC, 0, state.seq);
+        self.intervals.state(state);
+        self.tracking.state(state);
+        self.cycles += 1;
+        self.controller_skips.take(state.skipped_cycles, state.stalled_ns, self.period_ns);
+        self.final_state = ControllerState::try_from(state.controller_state).ok().map(ControllerState::name);
+    }
+
+    fn truth(&mut self, truth: &Truth) {
+        self.sequence.check(Truth::TOPIC, 0, truth.seq);
+        self.tracking.truth(truth);
+    }
+
+    fn frame(&mut self, frame: &FrameTap) -> Result<(), AnalysisError> {
+        self.sequence.check(FrameTap::TOPIC, 0, frame.seq);
+        self.candump.write(frame)
+    }
+
+    fn event(&mut self, event: &Event) {
+        self.sequence.check(Event::TOPIC, sequence::publisher_of(event), event.seq);
+        self.events.write(event);
+    }
+
+    fn finish(self, cut_short: bool) -> Result<Figures, AnalysisError> {
+        let (tracking, track) = self.tracking.finish();
+        let duration_ns = self.last_sample_ns - self.first_sample_ns.unwrap_or(self.last_sample_ns);
+        Ok(Figures {
+            cycles: self.cycles,
+            duration_s: duration_ns as f64 / 1e9,
+            controller_skips: self.controller_skips.finish(),
+            plant_skips: self.plant_skips.finish(),
+            final_state: self.final_state,
+            tracking,
+            intervals: self.intervals.finish()?,
+            topics: self.sequence.finish(),
+            frames: self.candump.finish()?,
+            events: self.events.finish()?,
+            cut_short,
+            track,
+        })
+    }
+}

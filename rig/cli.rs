@@ -1,0 +1,196 @@
+//! The command line: arguments, and which verb they lead to.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::time::Duration;
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use masseter_controller::process::Outcome;
+use masseter_shared::lifecycle::Assignment;
+
+use crate::exit::{Exit, Failure};
+use crate::{clean, kinematics, logger, report, run};
+
+/// A hardware-in-the-loop rig for a 6-DOF mastication robot.
+#[derive(Debug, Parser)]
+#[command(name = "masseter", version, max_term_width = 100)]
+struct Cli {
+    #[command(subcommand)]
+    verb: Verb,
+}
+
+#[derive(Debug, Subcommand)]
+enum Verb {
+    /// Play a jaw motion through controller, plant and logger
+    Run(RunArgs),
+    /// Forward kinematics: actuator columns to poses, CSV to CSV
+    Fk(FkArgs),
+    /// Inverse kinematics: poses to actuator and hinge columns, CSV to CSV
+    Ik(CsvArgs),
+    /// The report of a run folder, again
+    Report(ReportArgs),
+    /// Remove what killed runs left in shared memory
+    Clean,
+    #[command(hide = true)]
+    Controller(ProcessArgs),
+    #[command(hide = true)]
+    Plant(ProcessArgs),
+    #[command(hide = true)]
+    Logger(LoggerArgs),
+}
+
+/// What `run` takes.
+#[derive(Debug, Clone, Default, Args)]
+pub struct RunArgs {
+    /// Scenario file; without one, ten seconds of chewing
+    pub scenario: Option<PathBuf>,
+    /// Recorded jaw motion (CSV) to play instead of the scenario's motion
+    #[arg(long, value_name = "FILE.csv")]
+    pub trajectory: Option<PathBuf>,
+    /// How long the motion lasts, such as 10s or 2min
+    #[arg(long, value_parser = humantime::parse_duration)]
+    pub duration: Option<Duration>,
+    /// Cycles per second
+    #[arg(long)]
+    pub rate_hz: Option<u32>,
+    /// Real time in three processes, or virtual time in one thread
+    #[arg(long, value_enum, default_value_t)]
+    pub clock: ClockKind,
+    /// Cores of controller and plant
+    #[arg(long, value_name = "N,N", value_parser = parse_cores)]
+    pub cores: Option<[usize; 2]>,
+    /// Seed of every random number
+    #[arg(long)]
+    pub seed: Option<u64>,
+    /// The run folder; must not exist [default: runs/<UTC time>-<name>]
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// How the result is written to standard output
+    #[arg(long, value_enum, default_value_t)]
+    pub format: Format,
+    /// Exit with 3 unless core, SCHED_FIFO and locked memory are all granted
+    #[arg(long)]
+    pub require_rt: bool,
+}
+
+/// Which time a run lives in.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
+pub enum ClockKind {
+    /// Real time.
+    #[default]
+    Rt,
+    /// Virtual time: as fast as it goes, the same bytes every time.
+    Virtual,
+}
+
+/// How results are written.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
+pub enum Format {
+    /// For people.
+    #[default]
+    Human,
+    /// The content of `summary.json`.
+    Json,
+}
+
+/// CSV in, CSV out.
+#[derive(Debug, Clone, Args)]
+pub struct CsvArgs {
+    /// CSV file to read [default: standard input]
+    #[arg(long, value_name = "FILE.csv")]
+    pub input: Option<PathBuf>,
+    /// Scenario whose mechanism is meant [default: the published one]
+    #[arg(long, value_name = "SCENARIO.toml")]
+    pub scenario: Option<PathBuf>,
+}
+
+/// What `fk` takes.
+#[derive(Debug, Clone, Args)]
+pub struct FkArgs {
+    #[command(flatten)]
+    pub(crate) csv: CsvArgs,
+    /// Start each line from the solution of the one before
+    #[arg(long)]
+    pub(crate) continuous: bool,
+}
+
+/// What `report` takes.
+#[derive(Debug, Clone, Args)]
+struct ReportArgs {
+    /// Run folder
+    #[arg(default_value = "runs/latest")]
+    folder: PathBuf,
+    /// How the result is written to standard output
+    #[arg(long, value_enum, default_value_t)]
+    format: Format,
+}
+
+#[derive(Debug, Clone, Args)]
+struct ProcessArgs {
+    #[arg(long)]
+    scenario: PathBuf,
+    #[arg(long)]
+    domain: String,
+}
+
+impl ProcessArgs {
+    fn assignment(self) -> Assignment {
+        Assignment { scenario: self.scenario, domain: self.domain }
+    }
+}
+
+#[derive(Debug, Clone, Args)]
+struct LoggerArgs {
+    #[command(flatten)]
+    process: ProcessArgs,
+    #[arg(long)]
+    recording: PathBuf,
+}
+
+fn parse_cores(text: &str) -> Result<[usize; 2], String> {
+    let cores: Result<Vec<usize>, _> = text.split(',').map(|core| core.trim().parse()).collect();
+    match cores.as_deref() {
+        Ok([controller, plant]) => Ok([*controller, *plant]),
+        _ => Err("give two cores, such as 0,1".to_owned()),
+    }
+}
+
+/// An error and what caused it; an error that quotes its cause is not followed by it again.
+fn in_one_line(error: &anyhow::Error) -> String {
+    error.chain().fold(String::new(), |said, cause| {
+        let cause = cause.to_string();
+        match said.as_str() {
+            "" => cause,
+            _ if said.contains(&cause) => said,
+            _ => said + ": " + &cause,
+        }
+    })
+}
+
+/// Parses the arguments, carries the verb out, and reports what went wrong.
+pub fn main() -> ExitCode {
+    let result = match Cli::parse().verb {
+        Verb::Run(args) => run::run(&args),
+        Verb::Fk(args) => kinematics::forward(&args),
+        Verb::Ik(args) => kinematics::inverse(&args),
+        Verb::Report(args) => report::again(&args.folder, args.format),
+        Verb::Clean => clean::clean(),
+        Verb::Controller(args) => masseter_controller::process::run(&args.assignment())
+            .map(|outcome| match outcome {
+                Outcome::Finished => Exit::Passed,
+                Outcome::SafeStop => Exit::SafeStop,
+            })
+            .map_err(Failure::from),
+        Verb::Plant(args) => {
+            masseter_plant::process::run(&args.assignment()).map(|()| Exit::Passed).map_err(Failure::from)
+        }
+        Verb::Logger(args) => logger::run(&args.process.assignment(), &args.recording).map_err(Failure::from),
+    };
+    match result {
+        Ok(exit) => exit.into(),
+        Err(Failure { exit, error }) => {
+            eprintln!("masseter: {}", in_one_line(&error));
+            exit.into()
+        }
+    }
+}

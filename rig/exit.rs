@@ -1,0 +1,59 @@
+//! Exit codes, the same for every verb.
+
+use std::process::ExitCode;
+
+/// How a command ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Exit {
+    /// All is well.
+    Passed = 0,
+    /// A check of the run failed.
+    Failed = 1,
+    /// Wrong usage, scenario or input file.
+    Usage = 2,
+    /// The environment is invalid: too disturbed to measure, or real time wanted and not granted.
+    Invalid = 3,
+    /// A process died.
+    Died = 4,
+    /// An unexpected safe stop.
+    SafeStop = 5,
+    /// The recording is incomplete.
+    Incomplete = 6,
+    /// Interrupted by the user.
+    Interrupted = 130,
+}
+
+impl serde::Serialize for Exit {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_u8(*self as u8)
+    }
+}
+
+impl From<Exit> for ExitCode {
+    fn from(exit: Exit) -> Self {
+        Self::from(exit as u8)
+    }
+}
+
+/// An error with the exit code it leads to.
+#[derive(Debug)]
+pub struct Failure {
+    /// The code.
+    pub exit: Exit,
+    /// What to tell the user.
+    pub error: anyhow::Error,
+}
+
+/// Wrong input is what most errors are; the others say so with [`Failure::with`].
+impl<E: Into<anyhow::Error>> From<E> for Failure {
+    fn from(error: E) -> Self {
+        Self { exit: Exit::Usage, error: error.into() }
+    }
+}
+
+impl Failure {
+    /// An error that leads to `exit`.
+    pub fn with(exit: Exit) -> impl FnOnce(anyhow::Error) -> Self {
+        move |error| Self { exit, error }
+    }
+}

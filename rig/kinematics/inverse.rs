@@ -1,0 +1,46 @@
+//! `masseter ik`: poses to joint coordinates.
+
+use masseter_shared::geometry::{InverseError, Mechanism, Pose};
+use masseter_shared::messages::pose_of_fields;
+
+use super::table::{Row, convert, mechanism};
+use crate::cli::CsvArgs;
+use crate::exit::{Exit, Failure};
+
+/// How far a quaternion's norm may be from 1.
+const UNIT_TOLERANCE: f64 = 1e-3;
+
+const COLUMNS_IN: [&str; 7] = ["x_m", "y_m", "z_m", "qw", "qx", "qy", "qz"];
+const COLUMNS_OUT: [&str; 9] =
+    ["d1_m", "d2_m", "d3_m", "l1_m", "l2_m", "l3_m", "theta1_rad", "theta2_rad", "theta3_rad"];
+
+/// Status `ok`, `outside_stroke` (the values stand all the same) or `singular` (a leg without length).
+pub(crate) fn inverse(args: &CsvArgs) -> Result<Exit, Failure> {
+    let mechanism = mechanism(args)?;
+    convert(args, COLUMNS_IN, COLUMNS_OUT, |values| Ok(solve(&mechanism, &pose(values)?)))
+}
+
+fn pose([x, y, z, qw, qx, qy, qz]: [f64; 7]) -> Result<Pose, String> {
+    let norm = nalgebra::Vector4::new(qw, qx, qy, qz).norm();
+    if (norm - 1.0).abs() > UNIT_TOLERANCE {
+        return Err(format!("the quaternion has norm {norm}, not 1"));
+    }
+    Ok(pose_of_fields([x, y, z], [qw, qx, qy, qz]))
+}
+
+fn solve(mechanism: &Mechanism, pose: &Pose) -> Row<9> {
+    match mechanism.inverse(pose) {
+        Ok(joints) => {
+            let [d1, d2, d3, l1, l2, l3] = joints.actuators.to_axes();
+            let [t1, t2, t3] = joints.theta_rad;
+            let is_inside = mechanism.strokes().check(&joints.actuators).is_ok();
+            Row {
+                values: Some([d1, d2, d3, l1, l2, l3, t1, t2, t3]),
+                status: if is_inside { "ok" } else { "outside_stroke" },
+            }
+        }
+        Err(InverseError::NoLength { .. } | InverseError::NotFinite) => {
+            Row { values: None, status: "singular" }
+        }
+    }
+}

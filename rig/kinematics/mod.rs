@@ -1,0 +1,11 @@
+//! `masseter fk` and `masseter ik`: CSV in, CSV out, one mechanism state a line.
+//!
+//! Every input line gives one output line, in order. A line that cannot be read gives one with the
+//! status `bad_line`, is explained on standard error, and makes the command exit with 2 at the end.
+
+mod forward;
+mod inverse;
+mod table;
+
+pub(crate) use forward::forward;
+pub(crate) use inverse::inverse;

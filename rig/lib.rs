@@ -1,0 +1,16 @@
+//! The `masseter` command: one module per verb, and what the verbs share.
+//!
+//! `run` starts controller, plant and logger as processes of this same executable
+//! ([`run::supervisor`]), or steps their cores in one thread under virtual time
+//! ([`run::virtual_time`]). Whatever a run tells of itself comes from its recording
+//! ([`analysis`]), so it can be told again.
+
+pub mod analysis;
+pub mod clean;
+pub mod cli;
+pub mod exit;
+pub mod kinematics;
+pub mod logger;
+pub mod recording;
+pub mod report;
+pub mod run;

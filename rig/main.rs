@@ -1,0 +1,7 @@
+//! The `masseter` command.
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    masseter::cli::main()
+}

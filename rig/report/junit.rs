@@ -1,0 +1,42 @@
+//! `junit.xml`: each check of the run as a test case, as CI systems show it.
+
+use crate::analysis::Figures;
+use crate::exit::Exit;
+use crate::report::verdict::Verdict;
+use crate::run::manifest::Manifest;
+
+/// One suite; a run that ended wrongly or cannot be judged has an `error` case of its own.
+pub(super) fn of_run(manifest: &Manifest, figures: &Figures, verdict: &Verdict) -> String {
+    let failures = verdict.checks.iter().filter(|check| !check.passed).count();
+    let judged = matches!(verdict.exit, Exit::Passed | Exit::Failed);
+    let tests = verdict.checks.len() + 1;
+    let mut xml = format!(
+        "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n\
+         <testsuite name=\"masseter.{}\" tests=\"{tests}\" failures=\"{failures}\" errors=\"{}\" time=\"{:.3}\" timestamp=\"{}\">\n",
+        escape(&manifest.scenario.name),
+        usize::from(!judged),
+        figures.duration_s,
+        escape(manifest.began.trim_end_matches('Z')),
+    );
+    let problem = (!judged).then(|| ("error", format!("{}: {}", verdict.word, verdict.reason)));
+    xml += &case("run", problem);
+    for check in &verdict.checks {
+        xml += &case(check.name, (!check.passed).then(|| ("failure", check.finding.clone())));
+    }
+    xml + "</testsuite>\n"
+}
+
+fn case(name: &str, problem: Option<(&str, String)>) -> String {
+    match problem {
+        None => format!("  <testcase classname=\"masseter.run\" name=\"{name}\"/>\n"),
+        Some((kind, message)) => format!(
+            "  <testcase classname=\"masseter.run\" name=\"{name}\"><{kind} message=\"{}\"/></testcase>\n",
+            escape(&message)
+        ),
+    }
+}
+
+/// Text that may stand in XML and HTML.
+pub(super) fn escape(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+}

@@ -1,0 +1,66 @@
+//! The report of a run: on the screen, as JSON, as JUnit XML and as a page.
+//!
+//! Everything is computed from the manifest and the recording, so `masseter report` can do it again.
+
+mod html;
+mod junit;
+mod plot;
+mod table;
+pub mod verdict;
+
+use std::fs;
+use std::path::Path;
+
+use anyhow::Context;
+use serde::Serialize;
+
+use crate::analysis::{self, Figures};
+use crate::cli::Format;
+use crate::exit::{Exit, Failure};
+use crate::run::folder::RunFolder;
+use crate::run::manifest::Manifest;
+use verdict::Verdict;
+
+/// Version of the summary's form.
+const FORM: u32 = 1;
+
+/// `summary.json`.
+#[derive(Debug, Serialize)]
+struct Summary<'a> {
+    form: u32,
+    verdict: &'a Verdict,
+    figures: &'a Figures,
+}
+
+/// `masseter report`: the report of a past run.
+pub(crate) fn again(path: &Path, format: Format) -> Result<Exit, Failure> {
+    let folder = RunFolder::open(path)?;
+    let manifest = Manifest::read(&folder).context("cannot read manifest.json")?;
+    let figures = analysis::analyse(&folder, manifest.scenario.period_ns())?;
+    write(&folder, &manifest, &figures, format)
+}
+
+/// Judges the run, writes the report's files and prints the result.
+pub(crate) fn write(
+    folder: &RunFolder,
+    manifest: &Manifest,
+    figures: &Figures,
+    format: Format,
+) -> Result<Exit, Failure> {
+    let verdict = Verdict::of(manifest, figures);
+    let summary = Summary { form: FORM, verdict: &verdict, figures };
+    let json = serde_json::to_string_pretty(&summary).context("cannot write the summary")? + "\n";
+    let table = table::of_run(manifest, figures, &verdict);
+    for (path, text) in [
+        (folder.summary(), &json),
+        (folder.junit(), &junit::of_run(manifest, figures, &verdict)),
+        (folder.report(), &html::of_run(manifest, figures, &verdict)),
+    ] {
+        fs::write(&path, text).with_context(|| format!("cannot write {}", path.display()))?;
+    }
+    match format {
+        Format::Human => print!("{table}\nfiles: {}\n", folder.path().display()),
+        Format::Json => print!("{json}"),
+    }
+    Ok(verdict.exit)
+}

@@ -1,0 +1,116 @@
+//! The result of a run as text for a terminal.
+
+use std::fmt::Write;
+
+use crate::analysis::{EventRecord, Figures, IntervalFigures};
+use crate::report::verdict::Verdict;
+use crate::run::manifest::Manifest;
+
+/// Verdict, checks, latencies, losses and noteworthy events.
+pub(super) fn of_run(manifest: &Manifest, figures: &Figures, verdict: &Verdict) -> String {
+    let mut text = String::new();
+    write_all(&mut text, manifest, figures, verdict).expect("a string takes any text");
+    text
+}
+
+fn write_all(
+    text: &mut String,
+    manifest: &Manifest,
+    figures: &Figures,
+    verdict: &Verdict,
+) -> std::fmt::Result {
+    let scenario = &manifest.scenario;
+    writeln!(text, "{}: {}", verdict.word, verdict.reason)?;
+    writeln!(
+        text,
+        "{}: {:.1} s of motion at {} Hz ({} clock), {} cycles in {:.1} s, seed {}\n",
+        scenario.name,
+        manifest.motion_s,
+        scenario.rate_hz,
+        manifest.clock,
+        figures.cycles,
+        figures.duration_s,
+        scenario.seed,
+    )?;
+    for check in &verdict.checks {
+        let mark = if check.passed { "ok  " } else { "FAIL" };
+        writeln!(text, "  {mark} {:<18} {}", check.name, check.finding)?;
+    }
+    let tracking = &figures.tracking;
+    writeln!(
+        text,
+        "\nplatform, true against wanted: rms {:.4} mm, max {:.4} mm; rms {:.4}°, max {:.4}°",
+        tracking.rms_mm, tracking.max_mm, tracking.rms_deg, tracking.max_deg
+    )?;
+    writeln!(text, "platform, estimated against true: rms {:.4} mm\n", tracking.estimate_rms_mm)?;
+    latencies(text, &figures.intervals)?;
+    writeln!(
+        text,
+        "\nskipped cycles: controller {}, plant {}; machine stood still: {:.2} ms of the controller's, {:.2} ms of the plant's waiting",
+        figures.controller_skips.skipped,
+        figures.plant_skips.skipped,
+        figures.controller_skips.stalled_ns as f64 / 1e6,
+        figures.plant_skips.stalled_ns as f64 / 1e6
+    )?;
+    losses(text, figures)?;
+    events(text, figures)
+}
+
+fn latencies(text: &mut String, intervals: &[IntervalFigures]) -> std::fmt::Result {
+    writeln!(
+        text,
+        "{:<20} {:>8} {:>10} {:>10} {:>10} {:>10}",
+        "interval, µs", "n", "p50", "p99", "p99.9", "max"
+    )?;
+    for interval in intervals {
+        writeln!(
+            text,
+            "{:<20} {:>8} {:>10} {:>10} {:>10} {:>10}",
+            interval.name,
+            interval.n,
+            microseconds(interval.p50_ns),
+            microseconds(interval.p99_ns),
+            interval.p999_ns.map_or_else(|| "–".to_owned(), microseconds),
+            microseconds(interval.max_ns),
+        )?;
+    }
+    Ok(())
+}
+
+/// Nanoseconds as microseconds with two decimals.
+pub(super) fn microseconds(ns: u64) -> String {
+    format!("{:.2}", ns as f64 / 1e3)
+}
+
+fn losses(text: &mut String, figures: &Figures) -> std::fmt::Result {
+    let topics: Vec<_> = figures
+        .topics
+        .iter()
+        .map(|topic| format!("{} {} ({} dropped)", topic.topic, topic.messages, topic.missing))
+        .collect();
+    writeln!(text, "messages: {}", topics.join(", "))?;
+    let frames: Vec<_> = figures.frames.iter().enumerate().map(|(bus, n)| format!("can{bus} {n}")).collect();
+    writeln!(text, "frames: {}", frames.join(", "))
+}
+
+fn events(text: &mut String, figures: &Figures) -> std::fmt::Result {
+    let faults: Vec<_> = figures.events.iter().filter(|event| event.kind == "fault").collect();
+    if faults.is_empty() {
+        return Ok(());
+    }
+    writeln!(text, "\nfaults:")?;
+    for event in faults {
+        writeln!(text, "  {}", in_words(event))?;
+    }
+    Ok(())
+}
+
+/// An event in a line.
+pub(super) fn in_words(event: &EventRecord) -> String {
+    let axis = event.axis.map_or_else(String::new, |axis| format!(" on {axis}"));
+    let moved = event.transition.as_ref().map_or_else(String::new, |[from, to]| format!(", {from} → {to}"));
+    format!(
+        "cycle {:>6} {}: {}{axis} (value {}, limit {}){moved}",
+        event.cycle, event.source, event.cause, event.value, event.limit
+    )
+}

@@ -1,0 +1,154 @@
+//! How a run is judged: its end, then its recording, then the machine, then its checks.
+
+use serde::{Deserialize, Serialize};
+
+use crate::analysis::Figures;
+use crate::exit::Exit;
+use crate::run::manifest::Manifest;
+
+/// How a run came to its end.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum Ending {
+    /// The motion was played to its end.
+    Completed,
+    /// The controller stopped safely because of a fault.
+    SafeStop,
+    /// A process died.
+    Died {
+        /// Which.
+        process: String,
+        /// Exit code or signal.
+        how: String,
+    },
+    /// The user interrupted it.
+    Interrupted,
+    /// Real time was required and refused.
+    NotStarted,
+    /// The logger could not write everything.
+    RecordingFailed,
+}
+
+impl Ending {
+    /// The death of a process.
+    pub fn died(process: &str, how: String) -> Self {
+        Self::Died { process: process.to_owned(), how }
+    }
+}
+
+/// One thing that was judged.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Check {
+    /// What.
+    pub name: &'static str,
+    /// What was found, with its limit.
+    pub finding: String,
+    /// Whether it is as it should be.
+    pub passed: bool,
+}
+
+/// The judgement of a run.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Verdict {
+    /// PASS, FAIL, INVALID, …
+    pub word: &'static str,
+    /// The reason in a sentence.
+    pub reason: String,
+    /// Exit code.
+    #[serde(rename = "exit_code")]
+    pub exit: Exit,
+    /// Every check, also those that passed.
+    pub checks: Vec<Check>,
+}
+
+impl Verdict {
+    /// Judges a run.
+    pub fn of(manifest: &Manifest, figures: &Figures) -> Self {
+        let checks = checks(manifest, figures);
+        let (exit, word, reason) = ending(&manifest.ending)
+            .or_else(|| incomplete(figures))
+            .or_else(|| disturbed(manifest, figures))
+            .or_else(|| failed(&checks))
+            .unwrap_or_else(|| (Exit::Passed, "PASS", "every check passed".to_owned()));
+        Self { word, reason, exit, checks }
+    }
+}
+
+type Judgement = (Exit, &'static str, String);
+
+fn ending(ending: &Ending) -> Option<Judgement> {
+    match ending {
+        Ending::Completed => None,
+        Ending::SafeStop => Some((
+            Exit::SafeStop,
+            "SAFE STOP",
+            "the controller stopped the rig; its event says why".to_owned(),
+        )),
+        Ending::Died { process, how } => {
+            Some((Exit::Died, "DIED", format!("the {process} died: {how}; the others stopped safely")))
+        }
+        Ending::Interrupted => Some((Exit::Interrupted, "INTERRUPTED", "stopped by the user".to_owned())),
+        Ending::NotStarted => {
+            Some((Exit::Invalid, "INVALID", "real time was required and refused".to_owned()))
+        }
+        Ending::RecordingFailed => {
+            Some((Exit::Incomplete, "INCOMPLETE", "the logger could not write everything".to_owned()))
+        }
+    }
+}
+
+fn incomplete(figures: &Figures) -> Option<Judgement> {
+    let missing = figures.missing_messages();
+    let reason = if missing > 0 {
+        format!("{missing} messages are missing from the recording")
+    } else if figures.cut_short {
+        "the recording ends in the middle of a record".to_owned()
+    } else {
+        return None;
+    };
+    Some((Exit::Incomplete, "INCOMPLETE", reason))
+}
+
+/// Too many skipped cycles, all of them the machine's doing: there is nothing to judge the rig by.
+fn disturbed(manifest: &Manifest, figures: &Figures) -> Option<Judgement> {
+    let (skipped, by_machine) = figures.skipped();
+    let is_disturbed = skipped > manifest.scenario.checks.missed_cycles && by_machine == skipped;
+    is_disturbed.then(|| {
+        let stalled_ns = figures.controller_skips.stalled_ns + figures.plant_skips.stalled_ns;
+        let reason = format!(
+            "the machine stood still for {:.1} ms while the rig waited, and {skipped} cycles were missed",
+            stalled_ns as f64 / 1e6
+        );
+        (Exit::Invalid, "INVALID", reason)
+    })
+}
+
+fn failed(checks: &[Check]) -> Option<Judgement> {
+    let failed: Vec<_> = checks.iter().filter(|check| !check.passed).map(|check| check.name).collect();
+    (!failed.is_empty()).then(|| (Exit::Failed, "FAIL", format!("failed: {}", failed.join(", "))))
+}
+
+fn checks(manifest: &Manifest, figures: &Figures) -> Vec<Check> {
+    let limits = &manifest.scenario.checks;
+    let tracking = &figures.tracking;
+    let (skipped, by_machine) = figures.skipped();
+    let missing = figures.missing_messages();
+    let state = figures.final_state.unwrap_or("none");
+    vec![
+        Check { name: "sequence", finding: format!("ended in state {state}"), passed: state == "finished" },
+        Check {
+            name: "tracking",
+            finding: format!(
+                "rms {:.4} mm over {} samples, limit {} mm",
+                tracking.rms_mm, tracking.samples, limits.tracking_rms_mm
+            ),
+            passed: tracking.samples > 0 && tracking.rms_mm <= limits.tracking_rms_mm,
+        },
+        Check {
+            name: "missed cycles",
+            finding: format!("{skipped} ({by_machine} by the machine), limit {}", limits.missed_cycles),
+            passed: skipped <= limits.missed_cycles,
+        },
+        Check { name: "dropped messages", finding: missing.to_string(), passed: missing == 0 },
+    ]
+}

@@ -1,0 +1,119 @@
+//! The folder a run leaves, and the names of what lies in it.
+
+use std::fs;
+use std::io;
+use std::os::unix::fs::symlink;
+use std::path::{Path, PathBuf};
+use std::time::UNIX_EPOCH;
+
+use masseter_shared::clock;
+
+/// A run folder.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct RunFolder(PathBuf);
+
+/// Why a run folder could not be made or opened.
+#[derive(Debug, thiserror::Error)]
+pub enum FolderError {
+    /// It is there already.
+    #[error("{} exists and is not overwritten; choose another --out", .0.display())]
+    Exists(PathBuf),
+    /// It is no run folder.
+    #[error("{} is no run folder: it holds no recording.mcap", .0.display())]
+    NoRun(PathBuf),
+    /// The system refused.
+    #[error("cannot create {}: {error}", path.display())]
+    Create {
+        /// The folder.
+        path: PathBuf,
+        /// What the system said.
+        error: io::Error,
+    },
+}
+
+impl RunFolder {
+    /// Creates `<parent>/<UTC time>-<name>/` and points `<parent>/latest` at it.
+    pub fn create_in(parent: &Path, name: &str) -> Result<Self, FolderError> {
+        let time = humantime::format_rfc3339_millis(UNIX_EPOCH + clock::wall_time()).to_string();
+        let file_name = format!("{}-{name}", time.replace([':', '-'], ""));
+        let folder = Self::create(&parent.join(&file_name))?;
+        let latest = parent.join("latest");
+        // A folder of the user's own under that name stays as it is; the run is named in the report.
+        if latest.is_symlink() || !latest.exists() {
+            let _ = fs::remove_file(&latest);
+            let _ = symlink(&file_name, &latest);
+        }
+        Ok(folder)
+    }
+
+    /// Creates this very folder, which must not exist.
+    pub fn create(path: &Path) -> Result<Self, FolderError> {
+        let failed = |error| FolderError::Create { path: path.to_owned(), error };
+        if let Some(parent) = path.parent() {
+            fs::create_dir_all(parent).map_err(failed)?;
+        }
+        match fs::create_dir(path) {
+            Ok(()) => Ok(Self(path.canonicalize().map_err(failed)?)),
+            Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {
+                Err(FolderError::Exists(path.to_owned()))
+            }
+            Err(error) => Err(failed(error)),
+        }
+    }
+
+    /// Opens the folder of a past run.
+    pub fn open(path: &Path) -> Result<Self, FolderError> {
+        let folder = Self(path.to_owned());
+        if folder.recording().is_file() { Ok(folder) } else { Err(FolderError::NoRun(path.to_owned())) }
+    }
+
+    /// The folder itself.
+    pub fn path(&self) -> &Path {
+        &self.0
+    }
+
+    /// The scenario as resolved; it runs the same again.
+    pub fn scenario(&self) -> PathBuf {
+        self.0.join("scenario.toml")
+    }
+
+    /// What was run, on what, and with which scheduling.
+    pub fn manifest(&self) -> PathBuf {
+        self.0.join("manifest.json")
+    }
+
+    /// Every message of the run.
+    pub fn recording(&self) -> PathBuf {
+        self.0.join("recording.mcap")
+    }
+
+    /// HdrHistogram interval logs.
+    pub fn histograms(&self) -> PathBuf {
+        self.0.join("hist")
+    }
+
+    /// Frames of a bus as candump logs them.
+    pub fn candump(&self, bus: usize) -> PathBuf {
+        self.0.join(format!("can{bus}.log"))
+    }
+
+    /// Events, a line of JSON each.
+    pub fn events(&self) -> PathBuf {
+        self.0.join("events.jsonl")
+    }
+
+    /// Verdict and figures.
+    pub fn summary(&self) -> PathBuf {
+        self.0.join("summary.json")
+    }
+
+    /// The checks for CI systems.
+    pub fn junit(&self) -> PathBuf {
+        self.0.join("junit.xml")
+    }
+
+    /// The report for people.
+    pub fn report(&self) -> PathBuf {
+        self.0.join("report.html")
+    }
+}

@@ -1,0 +1,100 @@
+//! `manifest.json`: what was run, on what machine, with which scheduling, and how it ended.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::io;
+use std::time::UNIX_EPOCH;
+
+use masseter_shared::clock;
+use masseter_shared::config::Scenario;
+use masseter_shared::realtime::scheduling::{Obtained, cores};
+use serde::{Deserialize, Serialize};
+
+use super::folder::RunFolder;
+use super::plan::Plan;
+use crate::cli::ClockKind;
+use crate::report::verdict::Ending;
+
+/// Version of the manifest's form.
+const FORM: u32 = 1;
+
+/// The circumstances of a run.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Manifest {
+    /// Version of this form.
+    pub form: u32,
+    /// Version of the program.
+    pub masseter: String,
+    /// When the run began, UTC.
+    pub began: String,
+    /// `rt` or `virtual`.
+    pub clock: String,
+    /// The scenario as resolved.
+    pub scenario: Scenario,
+    /// Duration of the motion, s.
+    pub motion_s: f64,
+    /// The machine.
+    pub machine: Machine,
+    /// What each process asked of the kernel and obtained; empty under virtual time.
+    pub scheduling: BTreeMap<String, Obtained>,
+    /// How the run ended.
+    pub ending: Ending,
+}
+
+/// The machine a run was made on.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Machine {
+    /// Processor model.
+    pub cpu: String,
+    /// Cores online.
+    pub cores: usize,
+    /// Kernel name, release and version.
+    pub kernel: String,
+}
+
+impl Machine {
+    fn this() -> Self {
+        let uname = rustix::system::uname();
+        let [name, release, version] =
+            [uname.sysname(), uname.release(), uname.version()].map(std::ffi::CStr::to_string_lossy);
+        let cpuinfo = fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+        let model = cpuinfo.lines().find_map(|line| line.strip_prefix("model name")?.split_once(": "));
+        Self {
+            cpu: model.map_or_else(|| std::env::consts::ARCH.to_owned(), |(_, name)| name.to_owned()),
+            cores: cores(),
+            kernel: format!("{name} {release} {version}"),
+        }
+    }
+}
+
+impl Manifest {
+    /// The circumstances as far as they are known before the start.
+    pub fn new(plan: &Plan, clock: ClockKind) -> Self {
+        let began = humantime::format_rfc3339_seconds(UNIX_EPOCH + clock::wall_time());
+        Self {
+            form: FORM,
+            masseter: env!("CARGO_PKG_VERSION").to_owned(),
+            began: began.to_string(),
+            clock: match clock {
+                ClockKind::Rt => "rt".to_owned(),
+                ClockKind::Virtual => "virtual".to_owned(),
+            },
+            scenario: plan.scenario.clone(),
+            motion_s: plan.trajectory.duration_s(),
+            machine: Machine::this(),
+            scheduling: BTreeMap::new(),
+            ending: Ending::Completed,
+        }
+    }
+
+    /// Writes the file.
+    pub fn write(&self, folder: &RunFolder) -> io::Result<()> {
+        let text = serde_json::to_string_pretty(self)?;
+        fs::write(folder.manifest(), text + "\n")
+    }
+
+    /// Reads the file of a past run.
+    pub fn read(folder: &RunFolder) -> io::Result<Self> {
+        Ok(serde_json::from_str(&fs::read_to_string(folder.manifest())?)?)
+    }
+}

@@ -1,0 +1,51 @@
+//! `masseter run`: from arguments to a verdict.
+//!
+//! [`plan`] refuses whatever cannot run before anything starts; then [`supervisor`] runs the three
+//! processes, or [`virtual_time`] their cores; then the recording is analysed and the run judged.
+
+pub mod child;
+pub mod folder;
+pub mod manifest;
+pub mod plan;
+pub mod supervisor;
+pub mod virtual_time;
+
+use anyhow::Context;
+
+use crate::analysis;
+use crate::cli::{ClockKind, RunArgs};
+use crate::exit::{Exit, Failure};
+use crate::report::{self, verdict::Ending};
+use folder::RunFolder;
+use manifest::Manifest;
+use plan::Plan;
+
+/// Plays the motion, judges the run and leaves its folder.
+pub fn run(args: &RunArgs) -> Result<Exit, Failure> {
+    let plan = Plan::resolve(args)?;
+    let folder = match &args.out {
+        Some(path) => RunFolder::create(path)?,
+        None => RunFolder::create_in("runs".as_ref(), &plan.scenario.name)?,
+    };
+    std::fs::write(folder.scenario(), plan.scenario.to_toml()).context("cannot write the scenario")?;
+    eprintln!("{}", plan.announcement());
+
+    let mut manifest = Manifest::new(&plan, args.clock);
+    let ending = match args.clock {
+        ClockKind::Virtual => virtual_time::run(&plan, &folder).map_err(Failure::with(Exit::Incomplete))?,
+        ClockKind::Rt => {
+            let ended = supervisor::run(&plan, &folder, args.require_rt)?;
+            manifest.scheduling = ended.scheduling;
+            ended.ending
+        }
+    };
+    manifest.ending = ending;
+    manifest.write(&folder).context("cannot write the manifest")?;
+    if manifest.ending == Ending::NotStarted {
+        return Ok(Exit::Invalid);
+    }
+    let figures = analysis::analyse(&folder, plan.scenario.period_ns())
+        .context("the run's recording cannot be analysed")
+        .map_err(Failure::with(Exit::Incomplete))?;
+    report::write(&folder, &manifest, &figures, args.format)
+}

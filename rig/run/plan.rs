@@ -1,0 +1,88 @@
+//! What is to be run, resolved from scenario and arguments, and refused before anything starts if it
+//! cannot be run.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::Context;
+use masseter_controller::trajectory::{self, Trajectory, TrajectoryReport};
+use masseter_plant::core::PlantCore;
+use masseter_shared::config::{FileConfig, MotionConfig, Scenario};
+use masseter_shared::geometry::Mechanism;
+use masseter_shared::schedule::CycleSchedule;
+
+use crate::cli::RunArgs;
+
+/// A run that can be made.
+#[derive(Debug)]
+pub struct Plan {
+    /// The scenario with every argument applied.
+    pub scenario: Scenario,
+    /// Its mechanism.
+    pub mechanism: Mechanism,
+    /// Its motion, checked against strokes, velocities, accelerations and conditioning.
+    pub trajectory: Trajectory,
+    /// What the motion asks of the axes.
+    pub demands: TrajectoryReport,
+    /// The cycle's time table on the bus.
+    pub schedule: CycleSchedule,
+}
+
+impl Plan {
+    /// Resolves and checks everything that can be wrong with the input.
+    pub fn resolve(args: &RunArgs) -> anyhow::Result<Self> {
+        let mut scenario = match &args.scenario {
+            Some(path) => Scenario::read(path)?,
+            None => Scenario::default(),
+        };
+        apply(args, &mut scenario)?;
+        scenario.validate()?;
+        let mechanism = Mechanism::new(&scenario.mechanism)?;
+        let schedule = CycleSchedule::new(&scenario.can, scenario.period_ns())?;
+        PlantCore::new(&scenario, 0).context("the plant cannot be built")?;
+        let trajectory = Trajectory::new(&scenario.motion, &scenario.jaw, &mechanism, scenario.duration_s)?;
+        let demands = trajectory::check(&trajectory, &mechanism, &scenario.limits, scenario.period_s())?;
+        Ok(Self { scenario, mechanism, trajectory, demands, schedule })
+    }
+
+    /// One line that says what is about to run.
+    pub fn announcement(&self) -> String {
+        format!(
+            "{}: {:.1} s at {} Hz, seed {}",
+            self.scenario.name,
+            self.trajectory.duration_s(),
+            self.scenario.rate_hz,
+            self.scenario.seed
+        )
+    }
+}
+
+fn apply(args: &RunArgs, scenario: &mut Scenario) -> anyhow::Result<()> {
+    if let Some(path) = &args.trajectory {
+        apply_trajectory(path, scenario);
+    }
+    if let MotionConfig::File(file) = &mut scenario.motion {
+        file.path = absolute(&file.path)?;
+    }
+    if let Some(duration) = args.duration {
+        scenario.duration_s = Some(duration.as_secs_f64());
+    }
+    scenario.rate_hz = args.rate_hz.unwrap_or(scenario.rate_hz);
+    scenario.seed = args.seed.unwrap_or(scenario.seed);
+    scenario.realtime.cores = args.cores.unwrap_or(scenario.realtime.cores);
+    Ok(())
+}
+
+/// A scenario that plays a recording keeps its axes and filter for another one.
+fn apply_trajectory(path: &Path, scenario: &mut Scenario) {
+    match &mut scenario.motion {
+        MotionConfig::File(file) => path.clone_into(&mut file.path),
+        motion => *motion = MotionConfig::File(FileConfig::new(path)),
+    }
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    scenario.name = stem.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '-' }).take(64).collect();
+}
+
+/// The scenario in the run folder must find the file from anywhere.
+fn absolute(path: &Path) -> anyhow::Result<PathBuf> {
+    path.canonicalize().with_context(|| format!("cannot read {}", path.display()))
+}

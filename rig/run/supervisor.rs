@@ -1,0 +1,212 @@
+//! Starts the three processes, watches them, stops them in order, and sweeps what they leave.
+//!
+//! Order of ending: the controller first (it brings the drives to rest), then the plant, then the
+//! logger, which drains what is left. A process that dies is not restarted: the survivors come to a
+//! safe stop by their own watchdogs, and the supervisor only waits for them.
+
+use std::collections::BTreeMap;
+use std::io;
+use std::process::ExitStatus;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::Duration;
+
+use anyhow::Context;
+use masseter_shared::clock::{self, SECOND_NS};
+use masseter_shared::lifecycle::Start;
+use masseter_shared::realtime::scheduling::Obtained;
+use masseter_shared::transport::Domain;
+use signal_hook::consts::{SIGINT, SIGTERM};
+use signal_hook::iterator::Signals;
+
+use super::child::{Process, Role, describe};
+use super::folder::RunFolder;
+use super::plan::Plan;
+use crate::clean::sweep_dead;
+use crate::exit::Exit;
+use crate::report::verdict::Ending;
+
+/// How often the processes are looked after.
+const WATCH: Duration = Duration::from_millis(2);
+/// From the word to begin to the first SYNC, ns.
+const LEAD_NS: u64 = 100_000_000;
+/// SYNC and the controller's deadline keep this clear of whole milliseconds, where the kernel's timer
+/// tick falls, ns.
+const OFF_TICK_NS: u64 = 230_000;
+/// How long a process may take to end when asked to.
+const END_WITHIN_NS: u64 = 5 * SECOND_NS;
+/// How long the plant goes on after the controller has died, so that its master notices and stops the
+/// drives, ns.
+const SAFE_STOP_NS: u64 = SECOND_NS / 2;
+
+/// How the processes ended, and with which scheduling they ran.
+#[derive(Debug)]
+pub struct Ended {
+    /// The end.
+    pub ending: Ending,
+    /// What each process obtained.
+    pub scheduling: BTreeMap<String, Obtained>,
+}
+
+/// Runs the rig in real time.
+pub fn run(plan: &Plan, folder: &RunFolder, require_rt: bool) -> anyhow::Result<Ended> {
+    sweep_dead()?;
+    let interrupts = count_interrupts().context("cannot listen for signals")?;
+    let domain = Domain::named(&format!("{}-{:x}", std::process::id(), clock::now_ns()))?;
+    let claim = domain.claim()?;
+    let result = Rig::spawn(folder, &domain).and_then(|mut rig| rig.run(plan, require_rt, &interrupts));
+    drop(claim);
+    domain.sweep()?;
+    result
+}
+
+/// Counts SIGINT and SIGTERM: the first asks for an orderly stop, the second ends at once.
+fn count_interrupts() -> io::Result<Arc<AtomicUsize>> {
+    let count = Arc::new(AtomicUsize::new(0));
+    let mut signals = Signals::new([SIGINT, SIGTERM])?;
+    std::thread::spawn({
+        let count = Arc::clone(&count);
+        move || {
+            for _ in signals.forever() {
+                count.fetch_add(1, Ordering::Relaxed);
+            }
+        }
+    });
+    Ok(count)
+}
+
+/// The three processes, in the order of their starting.
+struct Rig {
+    logger: Process,
+    plant: Process,
+    controller: Process,
+}
+
+impl Rig {
+    fn spawn(folder: &RunFolder, domain: &Domain) -> anyhow::Result<Self> {
+        let scenario = folder.scenario();
+        let scenario = scenario.to_str().context("the run folder's path is not UTF-8")?;
+        let recording = folder.recording();
+        let recording = recording.to_str().context("the run folder's path is not UTF-8")?;
+        let common = ["--scenario", scenario, "--domain", domain.id()];
+        let with_recording = [&common[..], &["--recording", recording]].concat();
+        Ok(Self {
+            logger: Process::spawn(Role::Logger, &with_recording)?,
+            plant: Process::spawn(Role::Plant, &common)?,
+            controller: Process::spawn(Role::Controller, &common)?,
+        })
+    }
+
+    fn run(&mut self, plan: &Plan, require_rt: bool, interrupts: &AtomicUsize) -> anyhow::Result<Ended> {
+        let scheduling = self.wait_ready()?;
+        let refusals = show_refusals(&scheduling);
+        if require_rt && refusals > 0 {
+            eprintln!("masseter: real time was required and not granted; nothing was started");
+            return Ok(Ended { ending: Ending::NotStarted, scheduling });
+        }
+        self.start(plan.scenario.period_ns())?;
+        let ending = self.watch(interrupts)?;
+        Ok(Ended { ending, scheduling })
+    }
+
+    fn wait_ready(&mut self) -> anyhow::Result<BTreeMap<String, Obtained>> {
+        let mut scheduling = BTreeMap::new();
+        for process in [&mut self.logger, &mut self.plant, &mut self.controller] {
+            let ready = process.wait_ready()?;
+            scheduling.insert(process.role().name().to_owned(), ready.scheduling);
+        }
+        Ok(scheduling)
+    }
+
+    fn start(&mut self, period_ns: u64) -> io::Result<()> {
+        let millisecond = SECOND_NS / 1000;
+        let earliest = clock::now_ns() + LEAD_NS;
+        let epoch_ns = earliest.next_multiple_of(millisecond.max(period_ns)) + OFF_TICK_NS.min(period_ns / 4);
+        for process in [&mut self.logger, &mut self.plant, &mut self.controller] {
+            process.start(Start { epoch_ns })?;
+        }
+        Ok(())
+    }
+
+    /// Watches until the controller's part is over, then ends plant and logger.
+    fn watch(&mut self, interrupts: &AtomicUsize) -> anyhow::Result<Ending> {
+        let mut ending = Ending::Completed;
+        let status = loop {
+            if interrupts.load(Ordering::Relaxed) > 1 {
+                return Ok(Ending::Interrupted);
+            }
+            if ending == Ending::Completed {
+                ending = self.disturbance(interrupts)?;
+            }
+            if let Some(status) = self.controller.ended()? {
+                break status;
+            }
+            clock::sleep(WATCH);
+        };
+        if ending == Ending::Completed {
+            ending = self.after_controller(status)?;
+        }
+        end(&mut self.plant)?;
+        let logger_status = end(&mut self.logger)?;
+        let incomplete = logger_status.is_some_and(|status| status.code() == Some(Exit::Incomplete as i32));
+        Ok(if incomplete && ending == Ending::Completed { Ending::RecordingFailed } else { ending })
+    }
+
+    /// What ends the run before the controller's part is over, if anything does. Without the plant the
+    /// controller stops by its own watchdog; otherwise it is asked to.
+    fn disturbance(&mut self, interrupts: &AtomicUsize) -> io::Result<Ending> {
+        if interrupts.load(Ordering::Relaxed) > 0 {
+            self.controller.terminate();
+            return Ok(Ending::Interrupted);
+        }
+        if let Some(status) = self.logger.ended()? {
+            self.controller.terminate();
+            return Ok(Ending::died(Role::Logger.name(), describe(status)));
+        }
+        match self.plant.ended()? {
+            Some(status) => Ok(Ending::died(Role::Plant.name(), describe(status))),
+            None => Ok(Ending::Completed),
+        }
+    }
+
+    /// How the controller ended; if it died, the plant's master is given time to stop the drives.
+    fn after_controller(&mut self, status: ExitStatus) -> io::Result<Ending> {
+        match status.code() {
+            Some(code) if code == Exit::Passed as i32 => Ok(Ending::Completed),
+            Some(code) if code == Exit::SafeStop as i32 => Ok(Ending::SafeStop),
+            _ => {
+                wait_for(&mut self.plant, SAFE_STOP_NS)?;
+                Ok(Ending::died(Role::Controller.name(), describe(status)))
+            }
+        }
+    }
+}
+
+/// Asks a process to end, and ends it if it does not.
+fn end(process: &mut Process) -> io::Result<Option<ExitStatus>> {
+    process.terminate();
+    let status = wait_for(process, END_WITHIN_NS)?;
+    if status.is_none() {
+        process.kill();
+    }
+    Ok(status)
+}
+
+fn wait_for(process: &mut Process, within_ns: u64) -> io::Result<Option<ExitStatus>> {
+    let deadline_ns = clock::now_ns() + within_ns;
+    loop {
+        let status = process.ended()?;
+        if status.is_some() || clock::now_ns() >= deadline_ns {
+            return Ok(status);
+        }
+        clock::sleep(WATCH);
+    }
+}
+
+/// Says on the screen what the kernel refused; returns how much that was.
+fn show_refusals(scheduling: &BTreeMap<String, Obtained>) -> usize {
+    let refusals = scheduling.iter().flat_map(|(name, obtained)| {
+        obtained.refusals.iter().map(move |refusal| format!("  {name}: {refusal}"))
+    });
+    refusals.map(|line| eprintln!("{line}")).count()
+}

@@ -1,0 +1,139 @@
+//! The run under virtual time: the same cores in one thread, as fast as they go.
+//!
+//! Every step happens exactly when the time table has it, so the same scenario and seed leave the
+//! same bytes. Latencies are those of the bus alone; computing takes no time here.
+
+use masseter_controller::core::{Controller, Tick};
+use masseter_plant::core::PlantCore;
+use masseter_shared::clock::SECOND_NS;
+use masseter_shared::messages::codes::ControllerState;
+use masseter_shared::messages::{Message, State};
+use masseter_shared::realtime::Wake;
+
+use super::folder::RunFolder;
+use super::plan::Plan;
+use crate::recording::{Recorder, WriteError};
+use crate::report::verdict::Ending;
+
+/// Virtual time of the first SYNC, ns.
+const EPOCH_NS: u64 = SECOND_NS;
+
+/// Runs the rig under virtual time.
+pub fn run(plan: &Plan, folder: &RunFolder) -> anyhow::Result<Ending> {
+    let scenario = &plan.scenario;
+    let mut plant = PlantCore::new(scenario, EPOCH_NS)?;
+    let mut controller = Controller::new(scenario, plan.mechanism.clone(), plan.trajectory.clone());
+    let mut log = Log::new(Recorder::create(&folder.recording())?);
+
+    let mut cycle = 0;
+    while !controller.is_done() {
+        cycle += 1;
+        let sync_ns = EPOCH_NS + (cycle - 1) * scenario.period_ns();
+        step(cycle, sync_ns, plan, &mut plant, &mut controller, &mut log)?;
+    }
+    log.recorder.finish()?;
+    Ok(match controller.state() {
+        ControllerState::SafeStop => Ending::SafeStop,
+        _ => Ending::Completed,
+    })
+}
+
+/// One cycle: SYNC, process data, reading, controller, command.
+fn step(
+    cycle: u64,
+    sync_ns: u64,
+    plan: &Plan,
+    plant: &mut PlantCore,
+    controller: &mut Controller,
+    log: &mut Log,
+) -> anyhow::Result<()> {
+    plant.begin_cycle(Wake { cycle, due_ns: sync_ns, woke_ns: sync_ns, skipped: 0, stalled_ns: 0 })?;
+    let reading_ns = sync_ns + plan.schedule.reading_by_ns;
+    plant.collect(reading_ns)?;
+    let reading =
+        log.readings.record(&mut log.recorder, reading_ns, |reading| plant.fill_reading(reading))?;
+    log.truths.record(&mut log.recorder, reading_ns, |truth| plant.fill_truth(truth))?;
+
+    let now_ns = sync_ns + plan.schedule.controller_at_ns;
+    controller.observe(Some(&reading));
+    let event = controller.decide(Tick { cycle, now_ns });
+    let command =
+        log.commands.record(&mut log.recorder, now_ns, |command| controller.fill_command(command))?;
+    log.states.record(&mut log.recorder, now_ns, |state: &mut State| {
+        controller.fill_state(state);
+        (state.due_ns, state.woke_ns, state.received_ns) = (now_ns, now_ns, now_ns);
+        (state.solved_ns, state.commanded_ns) = (now_ns, now_ns);
+    })?;
+    if let Some(event) = event {
+        log.controller_events.record(&mut log.recorder, now_ns, |message| *message = event)?;
+    }
+    plant.apply(now_ns, Some(&command))?;
+    Ok(log.drain(plant, now_ns)?)
+}
+
+/// Numbers and records the messages of one publisher on one topic, as its outlet would.
+#[derive(Default)]
+struct Outlet(u64);
+
+impl Outlet {
+    fn record<M: Message>(
+        &mut self,
+        recorder: &mut Recorder,
+        now_ns: u64,
+        fill: impl FnOnce(&mut M),
+    ) -> Result<M, WriteError> {
+        let mut message = M::default();
+        fill(&mut message);
+        self.0 += 1;
+        message.stamp(self.0, now_ns);
+        recorder.record(&message, now_ns)?;
+        Ok(message)
+    }
+}
+
+/// The recording and the publishers it hears.
+struct Log {
+    recorder: Recorder,
+    commands: Outlet,
+    readings: Outlet,
+    states: Outlet,
+    truths: Outlet,
+    frames: Outlet,
+    controller_events: Outlet,
+    plant_events: Outlet,
+}
+
+impl Log {
+    fn new(recorder: Recorder) -> Self {
+        Self {
+            recorder,
+            commands: Outlet::default(),
+            readings: Outlet::default(),
+            states: Outlet::default(),
+            truths: Outlet::default(),
+            frames: Outlet::default(),
+            controller_events: Outlet::default(),
+            plant_events: Outlet::default(),
+        }
+    }
+
+    /// Records the frames and events of a cycle.
+    fn drain(&mut self, plant: &mut PlantCore, now_ns: u64) -> Result<(), WriteError> {
+        let mut result = Ok(());
+        plant.drain_frames(&mut |frame| {
+            if result.is_ok() {
+                result =
+                    self.frames.record(&mut self.recorder, now_ns, |message| *message = frame).map(|_| ());
+            }
+        });
+        plant.drain_events(&mut |event| {
+            if result.is_ok() {
+                result = self
+                    .plant_events
+                    .record(&mut self.recorder, now_ns, |message| *message = event)
+                    .map(|_| ());
+            }
+        });
+        result
+    }
+}

@@ -1,0 +1,126 @@
+//! The bus trait: one node's port onto a wire, as one `SocketCAN` socket is.
+//!
+//! Time is an argument: a simulated wire lives by it, a real one ignores it in favour of the kernel's
+//! time stamps, both in ns of `CLOCK_MONOTONIC`. No call blocks or allocates. Opening, configuring
+//! and restarting an interface are not part of it.
+
+use std::io;
+
+use super::frame::Frame;
+
+/// One node's port onto a wire.
+pub trait Bus {
+    /// Queues a frame for transmission at `now_ns`; it goes out by priority as the wire gets free.
+    ///
+    /// # Errors
+    /// [`SendError`]; a refused frame is not queued, and sending it again is up to the caller.
+    fn send(&mut self, now_ns: u64, frame: Frame) -> Result<(), SendError>;
+
+    /// The next frame of another node that had arrived at `now_ns`, oldest first; `None` when there is
+    /// none. A port never receives its own frames.
+    ///
+    /// # Errors
+    /// [`ReceiveError`]; frames received before and after the failure are still delivered by later
+    /// calls.
+    fn receive(&mut self, now_ns: u64) -> Result<Option<Received>, ReceiveError>;
+
+    /// The port's fault confinement, as last known.
+    fn status(&self) -> BusStatus;
+}
+
+impl<B: Bus + ?Sized> Bus for &mut B {
+    fn send(&mut self, now_ns: u64, frame: Frame) -> Result<(), SendError> {
+        (**self).send(now_ns, frame)
+    }
+
+    fn receive(&mut self, now_ns: u64) -> Result<Option<Received>, ReceiveError> {
+        (**self).receive(now_ns)
+    }
+
+    fn status(&self) -> BusStatus {
+        (**self).status()
+    }
+}
+
+/// A frame with the time it was received.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Received {
+    /// The frame.
+    pub frame: Frame,
+    /// When its last end-of-frame bit was on the wire, ns.
+    pub time_ns: u64,
+}
+
+/// Why a frame was not queued.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum SendError {
+    /// The transmit queue is full (`ENOBUFS`).
+    #[error("transmit queue full ({capacity} frames): the bus is overloaded, or nobody acknowledges")]
+    QueueFull {
+        /// Frames the queue holds.
+        capacity: usize,
+    },
+    /// The controller took itself off the bus after too many errors.
+    #[error("bus-off (transmit error counter {tec}): check bit rate, termination and wiring, then restart")]
+    BusOff {
+        /// Transmit error counter.
+        tec: u16,
+    },
+    /// The interface is down or gone.
+    #[error("interface down: {}", io::Error::from_raw_os_error(*.errno))]
+    InterfaceDown {
+        /// Error number of the operating system.
+        errno: i32,
+    },
+    /// Any other failure of the operating system.
+    #[error("sending failed: {}", io::Error::from_raw_os_error(*.errno))]
+    Os {
+        /// Error number of the operating system.
+        errno: i32,
+    },
+}
+
+/// Why nothing could be received.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum ReceiveError {
+    /// Frames arrived while the receive queue was full. Reported once for each group of losses.
+    #[error("{lost} received frames lost: the receive queue was not emptied in time")]
+    Overrun {
+        /// Frames lost since the last report.
+        lost: u64,
+    },
+    /// The interface is down or gone.
+    #[error("interface down: {}", io::Error::from_raw_os_error(*.errno))]
+    InterfaceDown {
+        /// Error number of the operating system.
+        errno: i32,
+    },
+    /// Any other failure of the operating system.
+    #[error("receiving failed: {}", io::Error::from_raw_os_error(*.errno))]
+    Os {
+        /// Error number of the operating system.
+        errno: i32,
+    },
+}
+
+/// State of fault confinement (ISO 11898-1).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ErrorState {
+    /// Takes full part and signals errors actively.
+    Active,
+    /// An error counter reached 128: signals errors passively.
+    Passive,
+    /// The transmit error counter passed 255: neither sends nor receives.
+    BusOff,
+}
+
+/// Fault confinement of one port.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct BusStatus {
+    /// State.
+    pub state: ErrorState,
+    /// Transmit error counter.
+    pub tec: u16,
+    /// Receive error counter.
+    pub rec: u16,
+}

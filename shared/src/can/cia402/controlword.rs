@@ -1,0 +1,132 @@
+//! The controlword, object 6040, and the command its bits mean.
+//!
+//! Bits of the modes of operation (4 to 6) and halt (8) are carried but not interpreted.
+
+use std::fmt;
+
+const SWITCH_ON: u16 = 1 << 0;
+const ENABLE_VOLTAGE: u16 = 1 << 1;
+/// Low-active: cleared, it asks for a quick stop.
+const NO_QUICK_STOP: u16 = 1 << 2;
+const ENABLE_OPERATION: u16 = 1 << 3;
+const FAULT_RESET: u16 = 1 << 7;
+
+/// What a controlword asks of a drive.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Command {
+    /// To ready to switch on.
+    Shutdown,
+    /// To switched on. From operation enabled the same bits are "disable operation".
+    SwitchOn,
+    /// To operation enabled.
+    EnableOperation,
+    /// To switch on disabled at once, without braking.
+    DisableVoltage,
+    /// Brake along the quick-stop ramp.
+    QuickStop,
+    /// Leave fault.
+    FaultReset,
+}
+
+/// Object 6040 as it is on the wire.
+#[derive(Clone, Copy, PartialEq, Eq, Hash)]
+pub struct Controlword(pub u16);
+
+impl Controlword {
+    /// Disable voltage.
+    pub const DISABLE_VOLTAGE: Self = Self(0x0000);
+    /// Quick stop.
+    pub const QUICK_STOP: Self = Self(ENABLE_VOLTAGE);
+    /// Shutdown.
+    pub const SHUTDOWN: Self = Self(ENABLE_VOLTAGE | NO_QUICK_STOP);
+    /// Switch on.
+    pub const SWITCH_ON: Self = Self(Self::SHUTDOWN.0 | SWITCH_ON);
+    /// Disable operation: the bits of switch on, sent in operation enabled.
+    pub const DISABLE_OPERATION: Self = Self::SWITCH_ON;
+    /// Enable operation.
+    pub const ENABLE_OPERATION: Self = Self(Self::SWITCH_ON.0 | ENABLE_OPERATION);
+    /// Fault reset; it takes a controlword without this bit before it.
+    pub const FAULT_RESET: Self = Self(FAULT_RESET);
+
+    /// What the drive is asked to do, given the controlword it had before.
+    ///
+    /// Fault reset is the rising edge of bit 7. A bit 7 that stays set is ignored rather than taken to
+    /// void the other bits, so that it can never mask a quick stop.
+    pub const fn command(self, previous: Self) -> Command {
+        if self.has(FAULT_RESET) && !previous.has(FAULT_RESET) {
+            Command::FaultReset
+        } else if !self.has(ENABLE_VOLTAGE) {
+            Command::DisableVoltage
+        } else if !self.has(NO_QUICK_STOP) {
+            Command::QuickStop
+        } else if !self.has(SWITCH_ON) {
+            Command::Shutdown
+        } else if !self.has(ENABLE_OPERATION) {
+            Command::SwitchOn
+        } else {
+            Command::EnableOperation
+        }
+    }
+
+    /// Whether the fault reset bit is set, so that the next word cannot raise it.
+    pub(super) const fn holds_fault_reset(self) -> bool {
+        self.has(FAULT_RESET)
+    }
+
+    const fn has(self, bit: u16) -> bool {
+        self.0 & bit != 0
+    }
+}
+
+impl fmt::Debug for Controlword {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "Controlword({:04X}h)", self.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const IDLE: Controlword = Controlword::DISABLE_VOLTAGE;
+
+    #[test]
+    fn words_are_those_of_the_standard() {
+        let table = [
+            (Controlword::SHUTDOWN, 0x06, Command::Shutdown),
+            (Controlword::SWITCH_ON, 0x07, Command::SwitchOn),
+            (Controlword::DISABLE_OPERATION, 0x07, Command::SwitchOn),
+            (Controlword::ENABLE_OPERATION, 0x0F, Command::EnableOperation),
+            (Controlword::DISABLE_VOLTAGE, 0x00, Command::DisableVoltage),
+            (Controlword::QUICK_STOP, 0x02, Command::QuickStop),
+            (Controlword::FAULT_RESET, 0x80, Command::FaultReset),
+        ];
+        for (word, bits, command) in table {
+            assert_eq!(word.0, bits);
+            assert_eq!(word.command(IDLE), command);
+        }
+    }
+
+    #[test]
+    fn dont_care_bits_do_not_matter() {
+        let table = [
+            (0b0000_1110, Command::Shutdown),
+            (0b0000_1101, Command::DisableVoltage),
+            (0b0000_1011, Command::QuickStop),
+            (0b1_0111_1111, Command::EnableOperation),
+        ];
+        for (bits, command) in table {
+            assert_eq!(Controlword(bits).command(IDLE), command, "{bits:04X}h");
+        }
+    }
+
+    #[test]
+    fn only_the_rising_edge_of_bit_7_resets() {
+        for previous in 0..=0xFF {
+            let command = Controlword::FAULT_RESET.command(Controlword(previous));
+            assert_eq!(command == Command::FaultReset, previous & FAULT_RESET == 0);
+        }
+        let held = Controlword(Controlword::QUICK_STOP.0 | FAULT_RESET);
+        assert_eq!(held.command(Controlword::FAULT_RESET), Command::QuickStop);
+    }
+}

@@ -1,0 +1,16 @@
+//! The drive profile (CiA 402, IEC 61800-7-201): states, statusword, controlword and the state machine
+//! between them.
+//!
+//! Pure values and tables, for both ends: a drive asks [`DriveState::after`], a master asks [`toward`].
+//! Modes of operation, targets, ramps and the policy of restarting after a fault are not here.
+
+mod controlword;
+mod machine;
+mod state;
+mod statusword;
+mod toward;
+
+pub use controlword::{Command, Controlword};
+pub use state::DriveState;
+pub use statusword::{StatusBit, Statusword, StatuswordError};
+pub use toward::toward;

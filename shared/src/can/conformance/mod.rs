@@ -1,0 +1,140 @@
+//! The laws every [`Bus`] keeps, as checks for whoever implements one.
+//!
+//! An implementation provides a [`Pair`]: two ports of one wire and a way to let time pass. The checks
+//! fetch with [`Bus::receive`] only after [`Pair::settle`]; timing and fault confinement are not checked.
+
+#[cfg(test)]
+mod tests;
+
+use super::bus::{Bus, ReceiveError, Received, SendError};
+use super::frame::{CanId, Frame};
+
+/// Frames sent at once by the check for losses: more than any sensible queue holds.
+const BURST: u32 = 20_000;
+
+/// One of the two ports.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum End {
+    /// The first.
+    A,
+    /// The second.
+    B,
+}
+
+/// Two fresh ports of one wire that nobody else uses.
+pub trait Pair {
+    /// A port.
+    fn end(&mut self, end: End) -> impl Bus;
+    /// The time, ns.
+    fn now_ns(&self) -> u64;
+    /// Lets time pass until all frames sent have arrived or were lost.
+    fn settle(&mut self);
+}
+
+/// A law that an implementation broke.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{law}: {observed}")]
+pub struct Violation {
+    /// The law.
+    pub law: &'static str,
+    /// What happened instead.
+    pub observed: String,
+}
+
+/// Checks the laws of every bus, each on a pair of its own.
+///
+/// # Errors
+/// The first [`Violation`].
+pub fn check<P: Pair>(mut pair: impl FnMut() -> P) -> Result<(), Violation> {
+    frames_arrive_once_unchanged_and_in_order(&mut pair())?;
+    senders_do_not_hear_themselves(&mut pair())?;
+    nothing_is_lost_silently(&mut pair())
+}
+
+/// Checks the law of buses that send by priority; a virtual CAN interface of the kernel does not.
+///
+/// # Errors
+/// The [`Violation`].
+pub fn check_arbitration<P: Pair>(mut pair: impl FnMut() -> P) -> Result<(), Violation> {
+    const LAW: &str = "of frames sent at once, the lowest identifier goes first";
+    let mut pair = pair();
+    let frames = [0x7FF, 0x181, 0x080].map(|id| frame(id, 0));
+    frames.iter().try_for_each(|&frame| send(&mut pair, frame)).map_err(|error| violated(LAW, &error))?;
+    pair.settle();
+    let (received, _) = drain(&mut pair, End::B).map_err(|error| violated(LAW, &error))?;
+    let ids: Vec<_> = received.iter().map(|received| received.frame.id()).collect();
+    if ids.is_sorted() && ids.len() == frames.len() { Ok(()) } else { Err(violated(LAW, &ids)) }
+}
+
+fn frames_arrive_once_unchanged_and_in_order(pair: &mut impl Pair) -> Result<(), Violation> {
+    const LAW: &str = "a frame is received once, unchanged, at a time not before its predecessor's";
+    let mut last_ns = 0;
+    for number in 0..=u32::from(u8::MAX) {
+        let sent = frame(0x100 + (number % 7) as u16, number);
+        send(pair, sent).map_err(|error| violated(LAW, &error))?;
+        pair.settle();
+        let (received, lost) = drain(pair, End::B).map_err(|error| violated(LAW, &error))?;
+        match received[..] {
+            [Received { frame, time_ns }] if frame == sent && time_ns >= last_ns && lost == 0 => {
+                last_ns = time_ns;
+            }
+            _ => return Err(violated(LAW, &(sent, received, lost))),
+        }
+    }
+    Ok(())
+}
+
+fn senders_do_not_hear_themselves(pair: &mut impl Pair) -> Result<(), Violation> {
+    const LAW: &str = "a port does not receive its own frames";
+    send(pair, frame(0x123, 0)).map_err(|error| violated(LAW, &error))?;
+    pair.settle();
+    match drain(pair, End::A) {
+        Ok((received, 0)) if received.is_empty() => Ok(()),
+        other => Err(violated(LAW, &other)),
+    }
+}
+
+fn nothing_is_lost_silently(pair: &mut impl Pair) -> Result<(), Violation> {
+    const LAW: &str = "a frame is refused because the queue is full, or received, or reported as lost";
+    let mut accepted = 0;
+    for number in 0..BURST {
+        match send(pair, frame(0x123, number)) {
+            Ok(()) => accepted += 1,
+            Err(SendError::QueueFull { .. }) => break,
+            Err(other) => return Err(violated(LAW, &other)),
+        }
+    }
+    pair.settle();
+    let (received, lost) = drain(pair, End::B).map_err(|error| violated(LAW, &error))?;
+    let accounted = received.len() as u64 + lost;
+    if accounted == accepted { Ok(()) } else { Err(violated(LAW, &(accepted, received.len(), lost))) }
+}
+
+fn frame(id: u16, number: u32) -> Frame {
+    let id = CanId::standard(id).expect("the checks use 11-bit identifiers");
+    Frame::fixed(id, number.to_be_bytes())
+}
+
+fn send(pair: &mut impl Pair, frame: Frame) -> Result<(), SendError> {
+    let now_ns = pair.now_ns();
+    pair.end(End::A).send(now_ns, frame)
+}
+
+/// All frames that a port has received, and how many it reports as lost.
+fn drain(pair: &mut impl Pair, end: End) -> Result<(Vec<Received>, u64), ReceiveError> {
+    let now_ns = pair.now_ns();
+    let mut port = pair.end(end);
+    let (mut frames, mut lost_in_all) = (Vec::new(), 0);
+    loop {
+        match port.receive(now_ns) {
+            Ok(Some(received)) => frames.push(received),
+            Ok(None) => return Ok((frames, lost_in_all)),
+            Err(ReceiveError::Overrun { lost }) => lost_in_all += lost,
+            Err(other) => return Err(other),
+        }
+    }
+}
+
+fn violated(law: &'static str, observed: &impl std::fmt::Debug) -> Violation {
+    Violation { law, observed: format!("{observed:?}") }
+}

@@ -1,0 +1,24 @@
+//! The CAN link: frames and what they cost on the wire, the CANopen objects the rig exchanges, the
+//! drive profile, the bus trait and its simulated implementation.
+//!
+//! Everything here is a value or a pure step: no clock, no thread, no I/O. What drives the robot's
+//! real interface implements [`Bus`] elsewhere. CAN FD, remote frames and SDO are not represented.
+
+mod bus;
+pub mod candump;
+pub mod canopen;
+pub mod cia402;
+pub mod conformance;
+mod frame;
+mod load;
+mod pdo;
+pub mod tap;
+mod virtual_bus;
+pub mod wire;
+
+pub use bus::{Bus, BusStatus, ErrorState, ReceiveError, Received, SendError};
+pub use frame::{CanId, Frame, FrameError};
+pub use load::{CycleLoad, FrameGroup, Overload};
+pub use pdo::{Rpdo1, Tpdo1};
+pub use virtual_bus::{Port, Statistics, VirtualWire, WireConfig};
+pub use wire::{Bitrate, BitrateError};

@@ -1,0 +1,89 @@
+//! A port's bounded queues. They allocate when made and never after.
+
+use std::collections::VecDeque;
+
+use crate::can::bus::{ReceiveError, Received, SendError};
+use crate::can::frame::Frame;
+
+/// A frame waiting for the wire.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Queued {
+    pub(super) frame: Frame,
+    pub(super) queued_ns: u64,
+}
+
+/// Frames in the order of priority; those of one identifier in the order they were queued.
+#[derive(Debug)]
+pub(super) struct TransmitQueue {
+    frames: Vec<Queued>,
+    capacity: usize,
+}
+
+impl TransmitQueue {
+    pub(super) fn new(capacity: usize) -> Self {
+        Self { frames: Vec::with_capacity(capacity), capacity }
+    }
+
+    pub(super) fn push(&mut self, queued: Queued) -> Result<(), SendError> {
+        if self.frames.len() == self.capacity {
+            return Err(SendError::QueueFull { capacity: self.capacity });
+        }
+        let place = self.frames.partition_point(|other| other.frame.id() <= queued.frame.id());
+        self.frames.insert(place, queued);
+        Ok(())
+    }
+
+    /// When the frame that waits longest was queued.
+    pub(super) fn earliest_ns(&self) -> Option<u64> {
+        self.frames.iter().map(|queued| queued.queued_ns).min()
+    }
+
+    /// The most urgent of the frames queued up to that time.
+    pub(super) fn most_urgent(&self, at_ns: u64) -> Option<Queued> {
+        self.place_of_most_urgent(at_ns).map(|place| self.frames[place])
+    }
+
+    /// Takes it out.
+    pub(super) fn remove_most_urgent(&mut self, at_ns: u64) {
+        if let Some(place) = self.place_of_most_urgent(at_ns) {
+            self.frames.remove(place);
+        }
+    }
+
+    fn place_of_most_urgent(&self, at_ns: u64) -> Option<usize> {
+        self.frames.iter().position(|queued| queued.queued_ns <= at_ns)
+    }
+}
+
+/// Frames received and not fetched yet, oldest first. What does not fit is lost and counted.
+#[derive(Debug)]
+pub(super) struct ReceiveQueue {
+    frames: VecDeque<Received>,
+    capacity: usize,
+    lost: u64,
+}
+
+impl ReceiveQueue {
+    pub(super) fn new(capacity: usize) -> Self {
+        Self { frames: VecDeque::with_capacity(capacity), capacity, lost: 0 }
+    }
+
+    pub(super) fn push(&mut self, received: Received) {
+        if self.frames.len() == self.capacity {
+            self.lost += 1;
+        } else {
+            self.frames.push_back(received);
+        }
+    }
+
+    /// The oldest frame, if it had arrived by then; losses are reported first, once.
+    pub(super) fn pop(&mut self, now_ns: u64) -> Result<Option<Received>, ReceiveError> {
+        match std::mem::take(&mut self.lost) {
+            0 if self.frames.front().is_some_and(|oldest| oldest.time_ns <= now_ns) => {
+                Ok(self.frames.pop_front())
+            }
+            0 => Ok(None),
+            lost => Err(ReceiveError::Overrun { lost }),
+        }
+    }
+}

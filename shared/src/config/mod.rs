@@ -1,0 +1,15 @@
+//! Scenario files: what a run is made of, resolved and validated before anything starts.
+//!
+//! A scenario is TOML; every key has a default, so an empty file is the default run. Each part
+//! stands beside what it configures; checks that need more than the values themselves (does a
+//! trajectory fit the strokes?) are made by those who own the subject.
+
+mod control;
+mod motion;
+mod plant;
+mod scenario;
+
+pub use control::{ChecksConfig, ControllerConfig, RealtimeConfig};
+pub use motion::*;
+pub use plant::{CanConfig, DriveConfig, DrivesConfig, DynamicsConfig};
+pub use scenario::{Scenario, ScenarioError};

@@ -1,0 +1,316 @@
+//! What the jaw shall do, where the jaw sits on the platform, and how fast the axes may move, as a
+//! scenario declares them.
+//!
+//! Jaw frame: origin at the incisal point, x anterior, y left, z up, upper jaw fixed; every motion
+//! is a displacement from the closed (intercuspal) pose. Values are checked by whoever builds the
+//! trajectory, not here. Defaults are figures of published studies; the generators name them.
+
+use std::path::PathBuf;
+
+use serde::{Deserialize, Serialize};
+
+/// A side of the jaw, seen by its owner.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Side {
+    /// +y.
+    Left,
+    /// −y.
+    Right,
+}
+
+impl Side {
+    /// +1 for left, −1 for right: the sign of y on this side.
+    pub fn sign(self) -> f64 {
+        match self {
+            Self::Left => 1.0,
+            Self::Right => -1.0,
+        }
+    }
+}
+
+/// The desired motion of the jaw.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum MotionConfig {
+    /// Cyclic chewing on one side.
+    Chewing(ChewingConfig),
+    /// Symmetric opening and closing.
+    Opening(OpeningConfig),
+    /// Both condyles forward and back.
+    Protrusion(ProtrusionConfig),
+    /// Excursion to one side and back.
+    Lateral(LateralConfig),
+    /// A recorded motion.
+    File(FileConfig),
+}
+
+impl Default for MotionConfig {
+    fn default() -> Self {
+        Self::Chewing(ChewingConfig::default())
+    }
+}
+
+/// Chewing: a tear-drop loop of the incisal point, once a cycle.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct ChewingConfig {
+    /// Chewing cycles per second, Hz.
+    pub cycle_rate_hz: f64,
+    /// Shares of a cycle; together 1.
+    pub phases: PhaseShares,
+    /// How far the incisal point goes down, mm.
+    pub vertical_mm: f64,
+    /// How far the incisal point swings to the working side, mm.
+    pub lateral_mm: f64,
+    /// How far the incisal point goes back while it goes down, mm.
+    pub anterior_posterior_mm: f64,
+    /// The working side.
+    pub side: Side,
+    /// Inclination of the condylar path below the horizontal, degrees.
+    pub condylar_inclination_deg: f64,
+    /// Inward turn of the balancing condyle's path, degrees.
+    pub bennett_angle_deg: f64,
+}
+
+impl Default for ChewingConfig {
+    fn default() -> Self {
+        Self {
+            cycle_rate_hz: 1.43,
+            phases: PhaseShares::default(),
+            vertical_mm: 18.0,
+            lateral_mm: 4.0,
+            anterior_posterior_mm: 5.0,
+            side: Side::Left,
+            condylar_inclination_deg: 40.0,
+            bennett_angle_deg: 8.0,
+        }
+    }
+}
+
+/// How a motion's cycle divides into going out, coming back and resting at the closed pose.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct PhaseShares {
+    /// Share of the cycle in which the jaw leaves the closed pose.
+    pub opening: f64,
+    /// Share of the cycle in which it returns.
+    pub closing: f64,
+    /// Share of the cycle in which it stays closed.
+    pub occlusion: f64,
+}
+
+impl Default for PhaseShares {
+    fn default() -> Self {
+        Self { opening: 0.43, closing: 0.40, occlusion: 0.17 }
+    }
+}
+
+/// Symmetric opening: the condyles glide forward in proportion to the opening angle.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct OpeningConfig {
+    /// Distance of the incisal point from its closed place at the widest, mm.
+    pub amplitude_mm: f64,
+    /// Openings per second, Hz.
+    pub cycle_rate_hz: f64,
+    /// Shares of a cycle; together 1.
+    pub phases: PhaseShares,
+    /// Inclination of the condylar path below the horizontal, degrees.
+    pub condylar_inclination_deg: f64,
+}
+
+impl Default for OpeningConfig {
+    fn default() -> Self {
+        Self {
+            amplitude_mm: 35.0,
+            cycle_rate_hz: 0.5,
+            phases: PhaseShares::default(),
+            condylar_inclination_deg: 40.0,
+        }
+    }
+}
+
+/// Protrusion: the jaw glides along the condylar path without turning.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct ProtrusionConfig {
+    /// Length of the glide, mm.
+    pub amplitude_mm: f64,
+    /// Protrusions per second, Hz.
+    pub cycle_rate_hz: f64,
+    /// Shares of a cycle; together 1.
+    pub phases: PhaseShares,
+    /// Inclination of the condylar path below the horizontal, degrees.
+    pub condylar_inclination_deg: f64,
+}
+
+impl Default for ProtrusionConfig {
+    fn default() -> Self {
+        Self {
+            amplitude_mm: 9.0,
+            cycle_rate_hz: 0.5,
+            phases: PhaseShares::default(),
+            condylar_inclination_deg: 40.0,
+        }
+    }
+}
+
+/// Lateral excursion: the balancing condyle advances, the working condyle only shifts sideways.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct LateralConfig {
+    /// How far the incisal point goes to the side, mm.
+    pub amplitude_mm: f64,
+    /// The working side, to which the jaw goes.
+    pub side: Side,
+    /// Excursions per second, Hz.
+    pub cycle_rate_hz: f64,
+    /// Shares of a cycle; together 1.
+    pub phases: PhaseShares,
+    /// Inclination of the condylar path below the horizontal, degrees.
+    pub condylar_inclination_deg: f64,
+    /// Inward turn of the balancing condyle's path, degrees.
+    pub bennett_angle_deg: f64,
+}
+
+impl Default for LateralConfig {
+    fn default() -> Self {
+        Self {
+            amplitude_mm: 8.0,
+            side: Side::Left,
+            cycle_rate_hz: 0.5,
+            phases: PhaseShares::default(),
+            condylar_inclination_deg: 40.0,
+            bennett_angle_deg: 8.0,
+        }
+    }
+}
+
+/// A recorded motion of the lower jaw, as CSV.
+///
+/// The header decides the format: `time_s,x_mm,y_mm,z_mm,qw,qx,qy,qz` (pose relative to the closed
+/// pose) or `time_s,m1_x_mm,…,m3_z_mm` (three markers, the first row closed).
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FileConfig {
+    /// The CSV file.
+    pub path: PathBuf,
+    /// Which signed axis of the file points anterior, left and up; right-handed.
+    #[serde(default = "FileConfig::default_axes")]
+    pub axes: [String; 3],
+    /// Pose files: where the recorded reference point lies in the jaw frame at the closed pose, mm.
+    /// By default the middle between the condyles, about which trackers of the hinge axis report.
+    #[serde(default)]
+    pub reference_point_mm: Option<[f64; 3]>,
+    /// Marker files: where the incisal point lies in file coordinates at the closed pose, mm.
+    /// By default the markers' centroid.
+    #[serde(default)]
+    pub marker_origin_mm: Option<[f64; 3]>,
+    /// Corner of the zero-phase low-pass, Hz; 0 for none.
+    #[serde(default = "FileConfig::default_lowpass_hz")]
+    pub lowpass_hz: f64,
+}
+
+impl FileConfig {
+    /// A file read with the default axes, reference point and low-pass.
+    pub fn new(path: impl Into<PathBuf>) -> Self {
+        Self {
+            path: path.into(),
+            axes: Self::default_axes(),
+            reference_point_mm: None,
+            marker_origin_mm: None,
+            lowpass_hz: Self::default_lowpass_hz(),
+        }
+    }
+
+    fn default_axes() -> [String; 3] {
+        ["+x", "+y", "+z"].map(String::from)
+    }
+
+    fn default_lowpass_hz() -> f64 {
+        12.0
+    }
+}
+
+/// Where the lower jaw sits on the platform, and the mandible's own dimensions.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct JawConfig {
+    /// Length of all three legs at the closed pose, slides in the middle, metres.
+    pub closed_leg_m: f64,
+    /// Shift of the closed pose from there, base frame, metres. A jaw that opens far back gains
+    /// stroke by being closed further forward.
+    pub closed_offset_m: [f64; 3],
+    /// The incisal point (origin of the jaw frame) in the platform frame, metres.
+    /// By default corner A₁ of the seed's platform.
+    pub reference_point_m: [f64; 3],
+    /// Side of Bonwill's triangle (both condyles and the incisal point), metres.
+    pub bonwill_side_m: f64,
+    /// Balkwill angle between Bonwill's triangle and the occlusal plane, degrees.
+    pub balkwill_angle_deg: f64,
+}
+
+impl Default for JawConfig {
+    fn default() -> Self {
+        Self {
+            closed_leg_m: 0.2974,
+            closed_offset_m: [0.0; 3],
+            reference_point_m: [0.05 / 3f64.sqrt(), 0.0, 0.0],
+            bonwill_side_m: 0.100,
+            balkwill_angle_deg: 22.5,
+        }
+    }
+}
+
+/// What the axes may be asked for by a trajectory. Strokes are the mechanism's own.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct TrajectoryLimitsConfig {
+    /// Speed of a slide, m/s.
+    pub slide_velocity_m_s: f64,
+    /// Speed of a leg, m/s.
+    pub leg_velocity_m_s: f64,
+    /// Acceleration of a slide, m/s².
+    pub slide_acceleration_m_s2: f64,
+    /// Acceleration of a leg, m/s².
+    pub leg_acceleration_m_s2: f64,
+    /// Condition number of the 6×6 Jacobian, angular velocities scaled by 5 cm.
+    pub max_condition: f64,
+}
+
+impl Default for TrajectoryLimitsConfig {
+    /// Velocities stay a quarter below the drives' own limits. Fast human chewing (0.46 s a cycle)
+    /// takes 3.5 m/s² of a leg, and a jaw tracker's own jumps, low-passed at 12 Hz, up to 5.8 m/s² of
+    /// a slide: 8 m/s² lets both pass and stops what is no jaw motion.
+    fn default() -> Self {
+        Self {
+            slide_velocity_m_s: 0.15,
+            leg_velocity_m_s: 0.30,
+            slide_acceleration_m_s2: 8.0,
+            leg_acceleration_m_s2: 8.0,
+            max_condition: 10.0,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_kind_alone_takes_every_default() {
+        let motion: MotionConfig = toml::from_str("kind = 'chewing'").unwrap();
+        assert_eq!(motion, MotionConfig::default());
+        let motion: MotionConfig = toml::from_str("kind = 'file'\npath = 'jaw.csv'").unwrap();
+        assert_eq!(motion, MotionConfig::File(FileConfig::new("jaw.csv")));
+    }
+
+    #[test]
+    fn an_unknown_key_is_named() {
+        for text in ["kind = 'opening'\namplitude = 35.0", "kind = 'file'\npath = 'a'\nlowpass = 1.0"] {
+            let error = toml::from_str::<MotionConfig>(text).unwrap_err().to_string();
+            assert!(error.contains("unknown field"), "{error}");
+        }
+    }
+}

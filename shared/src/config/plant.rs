@@ -1,0 +1,146 @@
+//! The CAN link, the drives and the mechanism's dynamics, as a scenario declares them.
+
+use serde::{Deserialize, Serialize};
+
+use crate::geometry::AXES;
+
+/// The CAN link between the master and the six drives.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct CanConfig {
+    /// Bit rate of every bus, bit/s.
+    pub bitrate_bps: u32,
+    /// Which axes (0 to 5: d₁ d₂ d₃ l₁ l₂ l₃) hang on which bus.
+    pub buses: Vec<Vec<usize>>,
+    /// Node id of each axis, in the axis order.
+    pub node_ids: [u8; AXES],
+    /// Heartbeat of the master and of every drive (object 1017), ms.
+    pub heartbeat_producer_ms: u16,
+    /// Silence after which a heartbeat counts as lost (object 1016), ms.
+    pub heartbeat_consumer_ms: u16,
+    /// How long the drives may take to boot, ms.
+    pub boot_timeout_ms: u32,
+    /// Cycles without a fresh command after which the master quick-stops the drives.
+    pub command_timeout_cycles: u32,
+}
+
+impl Default for CanConfig {
+    fn default() -> Self {
+        Self {
+            bitrate_bps: 1_000_000,
+            buses: vec![vec![0, 1, 2], vec![3, 4, 5]],
+            node_ids: [1, 2, 3, 4, 5, 6],
+            heartbeat_producer_ms: 50,
+            heartbeat_consumer_ms: 150,
+            boot_timeout_ms: 2000,
+            command_timeout_cycles: 20,
+        }
+    }
+}
+
+/// A servo drive with its encoder, as emulated.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DriveConfig {
+    /// Force at 1000 ‰ of the torque objects (6077), N.
+    pub rated_force_n: f64,
+    /// Force limit of the drive, N.
+    pub max_force_n: f64,
+    /// Velocity limit of the drive, m/s.
+    pub max_velocity_m_s: f64,
+    /// Deceleration of the quick-stop ramp (6085), m/s².
+    pub quick_stop_deceleration_m_s2: f64,
+    /// Following error window (6065), m.
+    pub following_error_m: f64,
+    /// How long the window may be exceeded (6066), ms.
+    pub following_error_timeout_ms: u16,
+    /// Gain of the position loop, 1/s.
+    pub position_gain_per_s: f64,
+    /// Gain of the velocity loop, N per m/s.
+    pub velocity_gain_n_s_per_m: f64,
+    /// Integral time of the velocity loop, s.
+    pub velocity_integral_time_s: f64,
+    /// One increment of the encoder, m.
+    pub encoder_resolution_m: f64,
+    /// Standard deviation of the encoder's noise, m.
+    pub encoder_noise_m: f64,
+}
+
+/// The drives of slides and of legs.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct DrivesConfig {
+    /// Drives of d₁ d₂ d₃.
+    pub slide: DriveConfig,
+    /// Drives of l₁ l₂ l₃.
+    pub leg: DriveConfig,
+}
+
+impl Default for DrivesConfig {
+    fn default() -> Self {
+        let leg = DriveConfig {
+            rated_force_n: 500.0,
+            max_force_n: 1000.0,
+            max_velocity_m_s: 0.4,
+            quick_stop_deceleration_m_s2: 10.0,
+            following_error_m: 0.002,
+            following_error_timeout_ms: 20,
+            position_gain_per_s: 100.0,
+            velocity_gain_n_s_per_m: 600.0,
+            velocity_integral_time_s: 0.01,
+            encoder_resolution_m: 1e-6,
+            encoder_noise_m: 0.2e-6,
+        };
+        let slide = DriveConfig {
+            rated_force_n: 250.0,
+            max_force_n: 500.0,
+            max_velocity_m_s: 0.2,
+            velocity_gain_n_s_per_m: 2000.0,
+            ..leg
+        };
+        Self { slide, leg }
+    }
+}
+
+/// The moving masses and their friction.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct DynamicsConfig {
+    /// Integration step of the mechanism and of the drives' inner loops, ns.
+    pub step_ns: u64,
+    /// Carriage with the fixed part of its leg, moved by a slide, kg.
+    pub carriage_mass_kg: f64,
+    /// Telescoping part of a leg, kg.
+    pub rod_mass_kg: f64,
+    /// Inertia of a leg about its hinge, kg m².
+    pub leg_inertia_kg_m2: f64,
+    /// Platform with the lower jaw, kg.
+    pub platform_mass_kg: f64,
+    /// Principal inertia of the platform about its origin, platform axes, kg m².
+    pub platform_inertia_kg_m2: [f64; 3],
+    /// Coulomb friction of a slide, N; of a leg a quarter of it.
+    pub slide_friction_n: f64,
+    /// Viscous friction of every axis, N per m/s.
+    pub viscous_friction_n_s_per_m: f64,
+    /// Gravity along −z, m/s².
+    pub gravity_m_s2: f64,
+    /// Length of the legs when the rig is switched on, m.
+    pub initial_leg_m: f64,
+}
+
+impl Default for DynamicsConfig {
+    fn default() -> Self {
+        Self {
+            step_ns: 125_000,
+            carriage_mass_kg: 1.2,
+            rod_mass_kg: 0.4,
+            leg_inertia_kg_m2: 0.03,
+            platform_mass_kg: 0.5,
+            platform_inertia_kg_m2: [2.0e-4, 2.0e-4, 3.5e-4],
+            slide_friction_n: 8.0,
+            viscous_friction_n_s_per_m: 20.0,
+            gravity_m_s2: 9.81,
+            initial_leg_m: 0.29,
+        }
+    }
+}

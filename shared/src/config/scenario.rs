@@ -1,0 +1,234 @@
+//! A scenario as a whole: read from TOML, checked, and written back as resolved.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+
+use super::{
+    CanConfig, ChecksConfig, ControllerConfig, DrivesConfig, DynamicsConfig, JawConfig, MotionConfig,
+    RealtimeConfig, TrajectoryLimitsConfig,
+};
+use crate::clock::SECOND_NS;
+use crate::geometry::MechanismConfig;
+
+/// Rates at which the rig can be asked to run, Hz.
+const RATES_HZ: std::ops::RangeInclusive<u32> = 10..=20_000;
+/// Longest run, s.
+const LONGEST_S: f64 = 86_400.0;
+
+/// Everything a run is made of.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Scenario {
+    /// Name of the run folder.
+    pub name: String,
+    /// Seed of every random number.
+    pub seed: u64,
+    /// Cycles per second, Hz.
+    pub rate_hz: u32,
+    /// Duration of the motion, s; when absent a recording's own length, or ten seconds.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub duration_s: Option<f64>,
+    /// What the jaw does.
+    pub motion: MotionConfig,
+    /// Where the jaw sits on the platform.
+    pub jaw: JawConfig,
+    /// What a motion may ask of the axes.
+    pub limits: TrajectoryLimitsConfig,
+    /// The mechanism's dimensions.
+    pub mechanism: MechanismConfig,
+    /// The controller.
+    pub controller: ControllerConfig,
+    /// The CAN link.
+    pub can: CanConfig,
+    /// The emulated drives.
+    pub drives: DrivesConfig,
+    /// The emulated mechanism.
+    pub dynamics: DynamicsConfig,
+    /// What the real-time processes ask of the system.
+    pub realtime: RealtimeConfig,
+    /// What the run is judged by.
+    pub checks: ChecksConfig,
+}
+
+impl Default for Scenario {
+    fn default() -> Self {
+        Self {
+            name: "chewing".to_owned(),
+            seed: 1,
+            rate_hz: 1000,
+            duration_s: None,
+            motion: MotionConfig::default(),
+            jaw: JawConfig::default(),
+            limits: TrajectoryLimitsConfig::default(),
+            mechanism: MechanismConfig::default(),
+            controller: ControllerConfig::default(),
+            can: CanConfig::default(),
+            drives: DrivesConfig::default(),
+            dynamics: DynamicsConfig::default(),
+            realtime: RealtimeConfig::default(),
+            checks: ChecksConfig::default(),
+        }
+    }
+}
+
+/// Why a scenario was refused.
+#[derive(Debug, thiserror::Error)]
+pub enum ScenarioError {
+    /// The file cannot be read.
+    #[error("{}: {error}", path.display())]
+    Unreadable {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        error: std::io::Error,
+    },
+    /// It is no TOML, has an unknown key, or a value of the wrong type.
+    #[error("{}:{line}: {reason}", path.display())]
+    Malformed {
+        /// The file.
+        path: PathBuf,
+        /// Line of the fault, from 1.
+        line: usize,
+        /// What is wrong, with the nearest key that exists.
+        reason: String,
+    },
+    /// A value that no run can have.
+    #[error("{key} = {value}: {need}")]
+    BadValue {
+        /// The key, with its table.
+        key: &'static str,
+        /// What stands there.
+        value: String,
+        /// What may stand there.
+        need: String,
+    },
+}
+
+impl Scenario {
+    /// Reads a scenario; a recording's path is taken relative to the scenario's folder.
+    pub fn read(path: &Path) -> Result<Self, ScenarioError> {
+        let text = fs::read_to_string(path)
+            .map_err(|error| ScenarioError::Unreadable { path: path.to_owned(), error })?;
+        let mut scenario: Self = toml::from_str(&text).map_err(|error| malformed(path, &text, &error))?;
+        if let (MotionConfig::File(file), Some(folder)) = (&mut scenario.motion, path.parent()) {
+            file.path = folder.join(&file.path);
+        }
+        Ok(scenario)
+    }
+
+    /// The scenario with every default filled in, as TOML.
+    pub fn to_toml(&self) -> String {
+        toml::to_string_pretty(self).expect("every part of a scenario has a TOML form")
+    }
+
+    /// Checks the values that stand for themselves.
+    pub fn validate(&self) -> Result<(), ScenarioError> {
+        let bad = |key, value: String, need: &str| {
+            Err(ScenarioError::BadValue { key, value, need: need.to_owned() })
+        };
+        let named = self.name.bytes().all(|b| b.is_ascii_alphanumeric() || b == b'-' || b == b'_');
+        if !named || !(1..=64).contains(&self.name.len()) {
+            return bad("name", format!("'{}'", self.name), "use 1 to 64 letters, digits, '-' or '_'");
+        }
+        if !RATES_HZ.contains(&self.rate_hz) {
+            let need = format!("use {} to {} Hz", RATES_HZ.start(), RATES_HZ.end());
+            return bad("rate_hz", self.rate_hz.to_string(), &need);
+        }
+        if let Some(duration_s) = self.duration_s
+            && !(duration_s > 0.0 && duration_s <= LONGEST_S)
+        {
+            return bad("duration_s", duration_s.to_string(), "use more than 0 and at most 86400 s");
+        }
+        if !(1..=99).contains(&self.realtime.priority) {
+            return bad("realtime.priority", self.realtime.priority.to_string(), "use 1 to 99 (SCHED_FIFO)");
+        }
+        self.controller.validate()?;
+        self.checks.validate()
+    }
+
+    /// Duration of a cycle, ns.
+    pub fn period_ns(&self) -> u64 {
+        SECOND_NS / u64::from(self.rate_hz)
+    }
+
+    /// Duration of a cycle, s.
+    pub fn period_s(&self) -> f64 {
+        self.period_ns() as f64 / SECOND_NS as f64
+    }
+}
+
+/// Refuses the first of `values` that is not a finite number above 0.
+pub(super) fn require_positive(values: &[(&'static str, f64)]) -> Result<(), ScenarioError> {
+    match values.iter().find(|(_, value)| !(value.is_finite() && *value > 0.0)) {
+        Some(&(key, value)) => {
+            let need = "use a finite number above 0".to_owned();
+            Err(ScenarioError::BadValue { key, value: value.to_string(), need })
+        }
+        None => Ok(()),
+    }
+}
+
+fn malformed(path: &Path, text: &str, error: &toml::de::Error) -> ScenarioError {
+    let offset = error.span().map_or(0, |span| span.start);
+    let line = text[..offset].matches('\n').count() + 1;
+    let mut reason = error.message().to_owned();
+    if let Some(nearest) = nearest_key(&reason) {
+        reason = format!("{reason}; did you mean `{nearest}`?");
+    }
+    ScenarioError::Malformed { path: path.to_owned(), line, reason }
+}
+
+/// The expected key most like the unknown one, both taken from serde's message.
+fn nearest_key(message: &str) -> Option<&str> {
+    let mut quoted = message.split('`').skip(1).step_by(2);
+    let unknown = message.starts_with("unknown field").then(|| quoted.next())??;
+    quoted.max_by(|a, b| strsim::jaro_winkler(unknown, a).total_cmp(&strsim::jaro_winkler(unknown, b)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parse(text: &str) -> Result<Scenario, String> {
+        let scenario = toml::from_str::<Scenario>(text)
+            .map_err(|error| malformed(Path::new("s.toml"), text, &error).to_string())?;
+        scenario.validate().map_err(|error| error.to_string())?;
+        Ok(scenario)
+    }
+
+    #[test]
+    fn an_empty_file_is_the_default_run() {
+        assert_eq!(parse("").unwrap(), Scenario::default());
+    }
+
+    #[test]
+    fn what_is_written_back_reads_as_the_same() {
+        let scenario = parse("name = 'x'\nduration_s = 3.0\n[motion]\nkind = 'opening'").unwrap();
+        assert_eq!(parse(&scenario.to_toml()).unwrap(), scenario);
+    }
+
+    #[test]
+    fn faults_are_refused_with_place_and_remedy() {
+        let cases = [
+            ("seed = 1\nrate_hzz = 5", "s.toml:2: unknown field `rate_hzz`"),
+            ("seed = 1\nrate_hzz = 5", "did you mean `rate_hz`?"),
+            ("[controller]\nease = 1.0", "did you mean `ease_s`?"),
+            ("[mechanism.strokes]\nslide_m = [0, 1]\nleg = [1, 2]", "did you mean `leg_m`?"),
+            ("rate_hz = 'fast'", "invalid type"),
+            ("rate_hz = 1", "use 10 to 20000 Hz"),
+            ("duration_s = -1.0", "duration_s = -1: use more than 0"),
+            ("duration_s = nan", "use more than 0"),
+            ("name = '../x'", "letters"),
+            ("[realtime]\npriority = 0", "use 1 to 99"),
+            ("[controller]\nease_s = 0.0", "controller.ease_s = 0: use a finite number above 0"),
+            ("[checks]\ntracking_rms_mm = inf", "checks.tracking_rms_mm"),
+            ("name = ", "s.toml:1"),
+        ];
+        for (text, expected) in cases {
+            let error = parse(text).unwrap_err();
+            assert!(error.contains(expected), "{text:?} gave {error:?}");
+        }
+    }
+}

@@ -1,0 +1,98 @@
+//! The six actuated coordinates, the three passive hinge angles, and the strokes that bound them.
+
+use serde::{Deserialize, Serialize};
+
+/// Legs of the mechanism; each has one slide and one telescopic stroke.
+pub const LEGS: usize = 3;
+/// Actuated axes, in the order d₁ d₂ d₃ l₁ l₂ l₃ everywhere: messages, nodes, CSV columns.
+pub const AXES: usize = 2 * LEGS;
+/// The axes' names, in their order.
+pub const AXIS_NAMES: [&str; AXES] = ["d1", "d2", "d3", "l1", "l2", "l3"];
+
+/// The inputs of the forward kinematics: slide displacements and leg lengths.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Actuators {
+    /// dᵢ: displacement of hinge Bᵢ from the middle of its slide, metres.
+    pub slide_m: [f64; LEGS],
+    /// lᵢ: distance AᵢBᵢ, metres.
+    pub leg_m: [f64; LEGS],
+}
+
+impl Actuators {
+    /// From the axis order d₁ d₂ d₃ l₁ l₂ l₃, metres.
+    pub fn from_axes([d1, d2, d3, l1, l2, l3]: [f64; AXES]) -> Self {
+        Self { slide_m: [d1, d2, d3], leg_m: [l1, l2, l3] }
+    }
+
+    /// In the axis order d₁ d₂ d₃ l₁ l₂ l₃, metres.
+    pub fn to_axes(self) -> [f64; AXES] {
+        let ([d1, d2, d3], [l1, l2, l3]) = (self.slide_m, self.leg_m);
+        [d1, d2, d3, l1, l2, l3]
+    }
+
+    /// Whether every coordinate is a finite number.
+    pub fn is_finite(&self) -> bool {
+        self.to_axes().iter().all(|x| x.is_finite())
+    }
+}
+
+/// A full joint state: what the drives hold and what the passive hinges follow.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Joints {
+    /// Slides and legs.
+    pub actuators: Actuators,
+    /// θᵢ: angle of leg i against the base, measured from the inward horizontal, radians.
+    pub theta_rad: [f64; LEGS],
+}
+
+/// How far slides and legs may go, both ends included.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct StrokeLimits {
+    /// Slide displacement, lowest and highest, metres.
+    pub slide_m: [f64; 2],
+    /// Leg length, lowest and highest, metres.
+    pub leg_m: [f64; 2],
+}
+
+/// An axis outside its stroke.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[error(
+    "axis {} at {value_m:.6} m is outside its stroke of {lowest_m} to {highest_m} m",
+    AXIS_NAMES[*axis]
+)]
+pub struct LimitViolation {
+    /// Axis index in the order d₁ d₂ d₃ l₁ l₂ l₃.
+    pub axis: usize,
+    /// Where the axis is or was asked to go.
+    pub value_m: f64,
+    /// The lower end of the stroke.
+    pub lowest_m: f64,
+    /// The upper end of the stroke.
+    pub highest_m: f64,
+}
+
+impl LimitViolation {
+    /// The end of the stroke that was passed.
+    pub fn limit_m(&self) -> f64 {
+        if self.value_m > self.highest_m { self.highest_m } else { self.lowest_m }
+    }
+}
+
+impl StrokeLimits {
+    /// Lowest and highest position of an axis, metres.
+    pub fn of_axis(&self, axis: usize) -> [f64; 2] {
+        if axis < LEGS { self.slide_m } else { self.leg_m }
+    }
+
+    /// The first axis outside its stroke, if any; a value that is no number is outside.
+    pub fn check(&self, actuators: &Actuators) -> Result<(), LimitViolation> {
+        for (axis, value_m) in actuators.to_axes().into_iter().enumerate() {
+            let [lowest_m, highest_m] = self.of_axis(axis);
+            if !(lowest_m..=highest_m).contains(&value_m) {
+                return Err(LimitViolation { axis, value_m, lowest_m, highest_m });
+            }
+        }
+        Ok(())
+    }
+}

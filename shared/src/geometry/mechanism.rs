@@ -1,0 +1,312 @@
+//! The mechanism's dimensions, validated once, and what follows from them at any pose.
+
+use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion};
+use serde::{Deserialize, Serialize};
+
+use super::{Actuators, LEGS, Pose, StrokeLimits, Vec3};
+
+/// One slide in the base plane.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SlideConfig {
+    /// The middle of the slide (hinge Bᵢ at dᵢ = 0), x and y in the base plane, metres.
+    pub centre_m: [f64; 2],
+    /// Direction of positive displacement ûᵢ, degrees from the base's x axis, counter-clockwise.
+    /// The leg swings in the vertical plane perpendicular to it; inward is 90° further on.
+    pub azimuth_deg: f64,
+}
+
+/// The dimensions a builder declares. The default is the seed's mechanism.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct MechanismConfig {
+    /// Slides 1, 2, 3.
+    pub slides: [SlideConfig; LEGS],
+    /// Sides of the platform triangle: A₁A₂, A₂A₃, A₃A₁, metres.
+    pub platform_sides_m: [f64; LEGS],
+    /// Strokes of slides and legs.
+    pub strokes: StrokeLimits,
+}
+
+impl Default for MechanismConfig {
+    fn default() -> Self {
+        let radius_m = 0.10 / 3f64.sqrt();
+        let slide = |leg_azimuth_deg: f64| {
+            let (sin, cos) = leg_azimuth_deg.to_radians().sin_cos();
+            SlideConfig { centre_m: [radius_m * cos, radius_m * sin], azimuth_deg: leg_azimuth_deg + 90.0 }
+        };
+        Self {
+            slides: [slide(0.0), slide(120.0), slide(240.0)],
+            platform_sides_m: [0.05; LEGS],
+            strokes: StrokeLimits { slide_m: [-0.03, 0.03], leg_m: [0.24, 0.30] },
+        }
+    }
+}
+
+/// Dimensions that describe no mechanism.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum GeometryError {
+    /// A dimension is not a finite number.
+    #[error("mechanism: {name} is {value}; give a finite number")]
+    NotFinite {
+        /// Configuration key.
+        name: &'static str,
+        /// What stands there.
+        value: f64,
+    },
+    /// The sides do not close to a triangle with an area.
+    #[error(
+        "mechanism.platform_sides_m: {sides_m:?} close to no triangle; each side must be shorter than the other two together"
+    )]
+    NoPlatform {
+        /// The sides as given.
+        sides_m: [f64; LEGS],
+    },
+    /// The three slides' centres lie on one line.
+    #[error(
+        "mechanism.slides: the three centres lie on one line (area {area_m2:e} m²); spread them around the base"
+    )]
+    NoBase {
+        /// Area of the triangle of the centres.
+        area_m2: f64,
+    },
+    /// A slide's inward direction points away from the middle of the base.
+    #[error("mechanism.slides[{leg}]: with azimuth {azimuth_deg}° the leg leans outward; add 180°")]
+    LeansOutward {
+        /// Index of the slide, from 0.
+        leg: usize,
+        /// Azimuth as given.
+        azimuth_deg: f64,
+    },
+    /// A stroke without length, or a leg that may vanish.
+    #[error("mechanism.strokes.{name}: {lowest_m} to {highest_m} m is no stroke; {need}")]
+    NoStroke {
+        /// `slide_m` or `leg_m`.
+        name: &'static str,
+        /// Lower end as given.
+        lowest_m: f64,
+        /// Upper end as given.
+        highest_m: f64,
+        /// What a stroke needs.
+        need: &'static str,
+    },
+}
+
+/// A slide with its directions resolved; base frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Slide {
+    pub centre: Vec3,
+    /// ûᵢ: positive displacement.
+    pub along: Vec3,
+    /// −r̂ᵢ: horizontal, perpendicular to the slide, towards the middle of the base.
+    pub inward: Vec3,
+}
+
+/// A mechanism whose dimensions have been checked.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Mechanism {
+    pub(super) slides: [Slide; LEGS],
+    corners: [Vec3; LEGS],
+    sides_m: [f64; LEGS],
+    strokes: StrokeLimits,
+}
+
+impl Mechanism {
+    /// Checks the dimensions and resolves directions and corners.
+    pub fn new(config: &MechanismConfig) -> Result<Self, GeometryError> {
+        check_finite(config)?;
+        check_strokes(&config.strokes)?;
+        Ok(Self {
+            slides: resolve_slides(&config.slides)?,
+            corners: platform_corners(config.platform_sides_m)?,
+            sides_m: config.platform_sides_m,
+            strokes: config.strokes,
+        })
+    }
+
+    /// Strokes of slides and legs.
+    pub fn strokes(&self) -> &StrokeLimits {
+        &self.strokes
+    }
+
+    /// Sides of the platform triangle: A₁A₂, A₂A₃, A₃A₁, metres.
+    pub fn platform_sides_m(&self) -> [f64; LEGS] {
+        self.sides_m
+    }
+
+    /// Corners A₁, A₂, A₃ in the platform frame, metres.
+    pub fn platform_corners(&self) -> &[Vec3; LEGS] {
+        &self.corners
+    }
+
+    /// Hinges Bᵢ in the base frame for slide displacements, metres.
+    pub fn hinge(&self, leg: usize, slide_m: f64) -> Vec3 {
+        self.slides[leg].centre + self.slides[leg].along * slide_m
+    }
+
+    /// The slide's direction ûᵢ in the base frame.
+    pub fn slide_direction(&self, leg: usize) -> Vec3 {
+        self.slides[leg].along
+    }
+
+    /// The horizontal direction v̂ᵢ = −r̂ᵢ from which θᵢ is measured, base frame.
+    pub fn inward_direction(&self, leg: usize) -> Vec3 {
+        self.slides[leg].inward
+    }
+
+    /// The direction of leg i from Bᵢ to Aᵢ at angle θᵢ, base frame.
+    pub fn leg_direction(&self, leg: usize, theta_rad: f64) -> Vec3 {
+        let (sin, cos) = theta_rad.sin_cos();
+        self.slides[leg].inward * cos + Vec3::z() * sin
+    }
+
+    /// Corners A₁, A₂, A₃ in the base frame from actuators and leg angles:
+    /// Aᵢ = Bᵢ + lᵢ (−cos θᵢ r̂ᵢ + sin θᵢ ẑ).
+    pub fn corners_from_angles(&self, actuators: &Actuators, theta_rad: &[f64; LEGS]) -> [Vec3; LEGS] {
+        std::array::from_fn(|leg| {
+            self.hinge(leg, actuators.slide_m[leg])
+                + self.leg_direction(leg, theta_rad[leg]) * actuators.leg_m[leg]
+        })
+    }
+
+    /// Corners A₁, A₂, A₃ in the base frame at a pose.
+    pub fn corners_at(&self, pose: &Pose) -> [Vec3; LEGS] {
+        self.corners.map(|corner| pose.rotation * corner + pose.translation.vector)
+    }
+}
+
+/// The pose of the frame fixed by three corners: origin at their centroid, x towards A₁, z along
+/// the normal (A₂−A₁)×(A₃−A₁). The corners must span an area.
+pub(super) fn frame_of_corners(corners: &[Vec3; LEGS]) -> Pose {
+    let [a1, a2, a3] = corners;
+    let centroid = (a1 + a2 + a3) / 3.0;
+    let z = (a2 - a1).cross(&(a3 - a1)).normalize();
+    let x = (a1 - centroid).normalize();
+    let rotation = Rotation3::from_matrix_unchecked(Matrix3::from_columns(&[x, z.cross(&x), z]));
+    Isometry3::from_parts(Translation3::from(centroid), UnitQuaternion::from_rotation_matrix(&rotation))
+}
+
+impl Mechanism {
+    /// The pose that carries the platform's corners to these points of the base frame.
+    pub fn pose_from_corners(&self, corners: &[Vec3; LEGS]) -> Pose {
+        frame_of_corners(corners)
+    }
+}
+
+fn check_finite(config: &MechanismConfig) -> Result<(), GeometryError> {
+    let slides = config.slides.iter().flat_map(|s| {
+        [
+            ("slides.centre_m", s.centre_m[0]),
+            ("slides.centre_m", s.centre_m[1]),
+            ("slides.azimuth_deg", s.azimuth_deg),
+        ]
+    });
+    let sides = config.platform_sides_m.iter().map(|&side| ("platform_sides_m", side));
+    let strokes = config.strokes.slide_m.iter().chain(&config.strokes.leg_m).map(|&end| ("strokes", end));
+    match slides.chain(sides).chain(strokes).find(|(_, value)| !value.is_finite()) {
+        Some((name, value)) => Err(GeometryError::NotFinite { name, value }),
+        None => Ok(()),
+    }
+}
+
+fn check_strokes(strokes: &StrokeLimits) -> Result<(), GeometryError> {
+    let fault = |name, [lowest_m, highest_m]: [f64; 2], need| {
+        Err(GeometryError::NoStroke { name, lowest_m, highest_m, need })
+    };
+    if strokes.slide_m[0] >= strokes.slide_m[1] {
+        return fault("slide_m", strokes.slide_m, "the first must be below the second");
+    }
+    if strokes.leg_m[0] >= strokes.leg_m[1] || strokes.leg_m[0] <= 0.0 {
+        return fault("leg_m", strokes.leg_m, "the first must be above 0 and below the second");
+    }
+    Ok(())
+}
+
+fn resolve_slides(configs: &[SlideConfig; LEGS]) -> Result<[Slide; LEGS], GeometryError> {
+    let slides = configs.map(|config| {
+        let (sin, cos) = config.azimuth_deg.to_radians().sin_cos();
+        Slide {
+            centre: Vec3::new(config.centre_m[0], config.centre_m[1], 0.0),
+            along: Vec3::new(cos, sin, 0.0),
+            inward: Vec3::new(-sin, cos, 0.0),
+        }
+    });
+    let [b1, b2, b3] = slides.map(|slide| slide.centre);
+    let area_m2 = (b2 - b1).cross(&(b3 - b1)).norm() / 2.0;
+    if area_m2 < 1e-6 {
+        return Err(GeometryError::NoBase { area_m2 });
+    }
+    let middle = (b1 + b2 + b3) / 3.0;
+    for (leg, slide) in slides.iter().enumerate() {
+        if slide.inward.dot(&(middle - slide.centre)) <= 0.0 {
+            return Err(GeometryError::LeansOutward { leg, azimuth_deg: configs[leg].azimuth_deg });
+        }
+    }
+    Ok(slides)
+}
+
+/// Corners in the platform frame, counter-clockwise seen from +z.
+fn platform_corners(sides_m: [f64; LEGS]) -> Result<[Vec3; LEGS], GeometryError> {
+    let [a12, a23, a31] = sides_m;
+    let x3 = (a12 * a12 + a31 * a31 - a23 * a23) / (2.0 * a12);
+    let height_squared = a31 * a31 - x3 * x3;
+    let positive = sides_m.iter().all(|&side| side > 0.0);
+    if !positive || height_squared <= 1e-6 * a31 * a31 {
+        return Err(GeometryError::NoPlatform { sides_m });
+    }
+    let flat = [Vec3::zeros(), Vec3::new(a12, 0.0, 0.0), Vec3::new(x3, height_squared.sqrt(), 0.0)];
+    let to_platform = frame_of_corners(&flat).inverse();
+    Ok(flat.map(|corner| to_platform.rotation * corner + to_platform.translation.vector))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_default_is_the_seeds_mechanism() {
+        let mechanism = Mechanism::new(&MechanismConfig::default()).unwrap();
+        let [b1, b2, b3] = [0, 1, 2].map(|leg| mechanism.hinge(leg, 0.0));
+        for side in [b2 - b1, b3 - b2, b1 - b3] {
+            assert!((side.norm() - 0.10).abs() < 1e-12);
+        }
+        // Condition 2 of the seed fixes the reading: slide 1 is parallel to A₂A₃, A₂ beyond A₃.
+        let [_, a2, a3] = mechanism.platform_corners();
+        assert!(((a2 - a3).normalize() - mechanism.slide_direction(0)).norm() < 1e-12);
+    }
+
+    #[test]
+    fn corners_keep_the_declared_sides_and_the_frame() {
+        let config = MechanismConfig { platform_sides_m: [0.05, 0.06, 0.045], ..Default::default() };
+        let mechanism = Mechanism::new(&config).unwrap();
+        let [a1, a2, a3] = *mechanism.platform_corners();
+        assert!(((a1 - a2).norm() - 0.05).abs() < 1e-12);
+        assert!(((a2 - a3).norm() - 0.06).abs() < 1e-12);
+        assert!(((a3 - a1).norm() - 0.045).abs() < 1e-12);
+        assert!((a1 + a2 + a3).norm() < 1e-12);
+        assert!(a1.x > 0.0 && a1.y.abs() < 1e-12);
+        assert!((a2 - a1).cross(&(a3 - a1)).z > 0.0);
+    }
+
+    #[test]
+    fn impossible_dimensions_are_refused_with_their_reason() {
+        let good = MechanismConfig::default();
+        let mut outward = good.clone();
+        outward.slides[1].azimuth_deg += 180.0;
+        let mut flat = good.clone();
+        flat.slides = [0.0, 0.05, 0.1].map(|x| SlideConfig { centre_m: [x, 0.0], azimuth_deg: 90.0 });
+        let mut vanishing = good.clone();
+        vanishing.strokes.leg_m = [0.0, 0.3];
+        let cases = [
+            (MechanismConfig { platform_sides_m: [0.05, 0.05, 0.1], ..good.clone() }, "close to no triangle"),
+            (MechanismConfig { platform_sides_m: [f64::NAN, 0.05, 0.1], ..good }, "finite"),
+            (outward, "add 180"),
+            (flat, "one line"),
+            (vanishing, "above 0"),
+        ];
+        for (config, reason) in cases {
+            let error = Mechanism::new(&config).unwrap_err().to_string();
+            assert!(error.contains(reason), "{error}");
+        }
+    }
+}

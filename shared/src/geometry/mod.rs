@@ -1,0 +1,25 @@
+//! The mechanism: three slides, three telescopic legs, the platform they carry.
+//!
+//! Frames, as reconstructed from the seed (Fig. 1 and its two conditions):
+//! *base* has its origin at the centre of the base, x anterior, y left, z up;
+//! *platform* has its origin at the centroid of A₁A₂A₃, x towards A₁, z along the
+//! normal (A₂−A₁)×(A₃−A₁). A pose is the platform frame in the base frame.
+//!
+//! Here stand the geometry, the closed-form inverse kinematics and the Jacobian, which both sides
+//! of the rig share. Forward kinematics is *not* here: it belongs to the controller alone, so that
+//! the plant stays an independent oracle.
+
+mod inverse;
+mod jacobian;
+mod joints;
+mod mechanism;
+
+pub use inverse::InverseError;
+pub use jacobian::{Jacobian, Twist};
+pub use joints::{AXES, AXIS_NAMES, Actuators, Joints, LEGS, LimitViolation, StrokeLimits};
+pub use mechanism::{GeometryError, Mechanism, MechanismConfig, SlideConfig};
+
+/// Platform frame in the base frame; metres.
+pub type Pose = nalgebra::Isometry3<f64>;
+/// A point or direction; metres or unitless.
+pub type Vec3 = nalgebra::Vector3<f64>;

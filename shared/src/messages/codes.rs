@@ -1,0 +1,205 @@
+//! The enumerations that messages carry as numbers. A number without a meaning is refused, never guessed.
+
+/// A code that names nothing in its enumeration.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("{code} is no {enumeration}; sender and receiver may be of different versions")]
+pub struct UnknownCode {
+    /// Name of the enumeration.
+    pub enumeration: &'static str,
+    /// The number.
+    pub code: u32,
+}
+
+/// [`Event::axis`](super::Event::axis) when no axis is concerned.
+pub const NO_AXIS: u32 = u32::MAX;
+
+macro_rules! codes {
+    ($($(#[$doc:meta])* $name:ident { $($(#[$variant_doc:meta])* $variant:ident = $code:literal $text:literal,)* })*) => {$(
+        $(#[$doc])*
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+        #[repr(u32)]
+        pub enum $name {
+            $($(#[$variant_doc])* $variant = $code,)*
+        }
+
+        impl $name {
+            /// Every value, in the order of the codes.
+            pub const ALL: &'static [Self] = &[$(Self::$variant),*];
+
+            /// The number that messages carry.
+            pub const fn code(self) -> u32 {
+                self as u32
+            }
+
+            /// The word that files and reports show.
+            pub const fn name(self) -> &'static str {
+                match self {
+                    $(Self::$variant => $text,)*
+                }
+            }
+        }
+
+        impl TryFrom<u32> for $name {
+            type Error = UnknownCode;
+
+            fn try_from(code: u32) -> Result<Self, UnknownCode> {
+                match code {
+                    $($code => Ok(Self::$variant),)*
+                    _ => Err(UnknownCode { enumeration: stringify!($name), code }),
+                }
+            }
+        }
+
+        impl std::fmt::Display for $name {
+            fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                f.pad(self.name())
+            }
+        }
+    )*};
+}
+
+codes! {
+    /// What the controller asks of all six drives.
+    DriveRequest {
+        /// No voltage: the drives are free.
+        Off = 0 "off",
+        /// Operation enabled, following the targets.
+        Enable = 1 "enable",
+        /// Stop along the quick-stop ramp, then switch on disabled.
+        QuickStop = 2 "quick_stop",
+    }
+
+    /// What a drive reports of itself: the states of CiA 402, and that nothing is known.
+    DriveCondition {
+        /// Not heard of yet, or lost.
+        Unknown = 0 "unknown",
+        /// Initialising.
+        NotReady = 1 "not_ready_to_switch_on",
+        /// No voltage allowed.
+        SwitchOnDisabled = 2 "switch_on_disabled",
+        /// Voltage may be applied.
+        ReadyToSwitchOn = 3 "ready_to_switch_on",
+        /// Voltage applied, no force.
+        SwitchedOn = 4 "switched_on",
+        /// Following targets.
+        OperationEnabled = 5 "operation_enabled",
+        /// Braking along the quick-stop ramp.
+        QuickStopActive = 6 "quick_stop_active",
+        /// Reacting to a fault.
+        FaultReaction = 7 "fault_reaction_active",
+        /// In fault, free of force.
+        Fault = 8 "fault",
+    }
+
+    /// Where the controller stands in its sequence.
+    ControllerState {
+        /// No steady readings yet; drives off.
+        WaitReadings = 0 "wait_readings",
+        /// Bringing all drives to operation enabled, holding where they are.
+        Enabling = 1 "enabling",
+        /// Easing from the measured pose to the first pose of the motion.
+        Easing = 2 "easing",
+        /// Playing the motion.
+        Running = 3 "running",
+        /// Holding the last pose.
+        Holding = 4 "holding",
+        /// Switching the drives off.
+        Disabling = 5 "disabling",
+        /// Done: drives off.
+        Finished = 6 "finished",
+        /// Stopped by a fault: quick stop asked for, nothing moves again.
+        SafeStop = 7 "safe_stop",
+    }
+
+    /// Who reports an event.
+    Source {
+        /// The supervisor.
+        Supervisor = 0 "supervisor",
+        /// The controller.
+        Controller = 1 "controller",
+        /// The plant: CAN master.
+        Master = 2 "master",
+        /// The plant: an emulated drive.
+        Drive = 3 "drive",
+        /// The logger.
+        Logger = 4 "logger",
+    }
+
+    /// What kind of event it is.
+    EventKind {
+        /// A state machine moved; `from` and `to` name the states.
+        Transition = 0 "transition",
+        /// Something is wrong and was reacted to; `cause`, `value` and `limit` explain it.
+        Fault = 1 "fault",
+        /// Something is worth knowing and was not reacted to.
+        Notice = 2 "notice",
+    }
+
+    /// Why something happened. The unit of an event's `value` and `limit` stands in brackets.
+    Cause {
+        /// In the course of the sequence.
+        Sequence = 0 "sequence",
+        /// Asked for from outside (signal).
+        StopRequested = 1 "stop_requested",
+        /// No fresh reading for too long (cycles).
+        StaleReading = 2 "stale_reading",
+        /// A drive is in fault or fell out of operation (drive condition).
+        DriveFault = 3 "drive_fault",
+        /// Forward kinematics gave no acceptable pose (residual, m).
+        ForwardKinematics = 4 "forward_kinematics",
+        /// An axis outside its stroke (m).
+        StrokeLimit = 5 "stroke_limit",
+        /// An axis asked to go faster than its drive may (m/s).
+        VelocityLimit = 6 "velocity_limit",
+        /// The pose wanted has no joint coordinates.
+        InverseKinematics = 7 "inverse_kinematics",
+        /// A reading answers a command that this controller never sent (cycle).
+        ForeignCommand = 8 "foreign_command",
+        /// The drives did not reach operation enabled in time (cycles).
+        EnableTimeout = 9 "enable_timeout",
+        /// Platform too far from where it should be (m).
+        TrackingLost = 10 "tracking_lost",
+        /// No fresh command for too long (cycles).
+        CommandLost = 11 "command_lost",
+        /// A drive's heartbeat is overdue (ms).
+        HeartbeatLost = 12 "heartbeat_lost",
+        /// The master's heartbeat is overdue at a drive (ms).
+        LinkLost = 13 "link_lost",
+        /// Following error beyond its window (m).
+        FollowingError = 14 "following_error",
+        /// An emergency message of a drive (EMCY code).
+        Emergency = 15 "emergency",
+        /// Process data of a drive missing (cycles).
+        ProcessDataLost = 16 "process_data_lost",
+        /// A drive asked for too much force for too long (N).
+        ForceLimit = 17 "force_limit",
+        /// The bus refused a frame.
+        BusRefused = 18 "bus_refused",
+        /// A value in a message is not a finite number or no known code.
+        BadMessage = 19 "bad_message",
+        /// A drive did not boot in time (ms).
+        BootTimeout = 20 "boot_timeout",
+        /// Another process of the rig ended (process id).
+        ProcessDied = 21 "process_died",
+        /// Deadlines were skipped after an overrun (cycles).
+        Overrun = 22 "overrun",
+        /// The CAN master refuses to move anything; its own event says why.
+        MasterFault = 23 "master_fault",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_code_means_itself_and_others_are_refused() {
+        for &cause in Cause::ALL {
+            assert_eq!(Cause::try_from(cause.code()), Ok(cause));
+        }
+        assert_eq!(
+            ControllerState::try_from(99),
+            Err(UnknownCode { enumeration: "ControllerState", code: 99 })
+        );
+    }
+}

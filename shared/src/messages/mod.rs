@@ -1,0 +1,247 @@
+//! What the processes tell each other: one fixed-size message type per topic.
+//!
+//! Every message begins with its sequence number, the time it was published and the version of its
+//! layout. All times are nanoseconds of `CLOCK_MONOTONIC`, 0 where nothing happened yet. Fields lie
+//! on their natural alignment without padding, so that the bytes in shared memory are at the same
+//! time a valid CDR body: the recording writes them as they are, under the schema that
+//! [`Message::schema`] derives from the same table.
+//!
+//! Codes of enumerations stand in [`codes`]; how messages travel is not here but in
+//! [`transport`](crate::transport).
+
+pub mod codes;
+mod schema;
+
+use bytemuck::{Pod, Zeroable};
+use iceoryx2::prelude::ZeroCopySend;
+
+use crate::geometry::{AXES, LEGS, Pose};
+use schema::FieldType;
+
+/// A message type: what every topic's payload has in common.
+pub trait Message: Pod + ZeroCopySend + Default + std::fmt::Debug + PartialEq {
+    /// The topic the message travels on.
+    const TOPIC: &'static str;
+    /// Messages a subscriber may fall behind before it loses the oldest.
+    const DEPTH: usize;
+    /// Type name in recordings.
+    const TYPE_NAME: &'static str;
+    /// The layout in the ROS 2 message definition language, as recordings carry it.
+    fn schema() -> String;
+    /// Number of this message on its topic, from 1, without gaps at the publisher.
+    fn seq(&self) -> u64;
+    /// When it was published, ns.
+    fn published_ns(&self) -> u64;
+    /// Stamps sequence number, time and version just before it is sent.
+    fn stamp(&mut self, seq: u64, published_ns: u64);
+}
+
+/// Version of the layouts below; it changes with any of them.
+pub const LAYOUT_VERSION: u64 = 1;
+
+macro_rules! messages {
+    ($($(#[$doc:meta])* $name:ident on $topic:literal keeping $depth:literal {
+        $($(#[$field_doc:meta])* $field:ident: $type:ty,)*
+    })*) => {$(
+        $(#[$doc])*
+        #[repr(C)]
+        #[derive(Debug, Clone, Copy, Default, PartialEq, Pod, Zeroable, ZeroCopySend)]
+        pub struct $name {
+            /// Number of this message on its topic, from 1.
+            pub seq: u64,
+            /// When it was published, ns.
+            pub published_ns: u64,
+            /// [`LAYOUT_VERSION`] of the sender.
+            pub version: u64,
+            $($(#[$field_doc])* pub $field: $type,)*
+        }
+
+        impl Message for $name {
+            const TOPIC: &'static str = $topic;
+            const DEPTH: usize = $depth;
+            const TYPE_NAME: &'static str = concat!("masseter/", stringify!($name));
+
+            fn schema() -> String {
+                let header = [("seq", u64::ros_type()), ("published_ns", u64::ros_type()), ("version", u64::ros_type())];
+                let fields = [$((stringify!($field), <$type>::ros_type()),)*];
+                schema::definition(header.into_iter().chain(fields))
+            }
+
+            fn seq(&self) -> u64 {
+                self.seq
+            }
+
+            fn published_ns(&self) -> u64 {
+                self.published_ns
+            }
+
+            fn stamp(&mut self, seq: u64, published_ns: u64) {
+                (self.seq, self.published_ns, self.version) = (seq, published_ns, LAYOUT_VERSION);
+            }
+        }
+    )*};
+}
+
+messages! {
+    /// What the controller wants of the drives, once a cycle.
+    Command on "command" keeping 2048 {
+        /// Cycle of the controller, from 1.
+        cycle: u64,
+        /// Cycle of the reading it was computed from; 0 when there was none.
+        reading_cycle: u64,
+        /// Wanted positions d₁ d₂ d₃ l₁ l₂ l₃, m.
+        target_m: [f64; AXES],
+        /// Wanted drive state, a [`codes::DriveRequest`].
+        request: u32,
+        /// State of the controller, a [`codes::ControllerState`].
+        controller_state: u32,
+    }
+
+    /// What the encoders and drives reported, once a cycle.
+    Reading on "reading" keeping 2048 {
+        /// Cycle of the plant, from 1.
+        cycle: u64,
+        /// Cycle of the last command received when the sample was taken; 0 before the first.
+        answers_cycle: u64,
+        /// When SYNC made the drives sample, ns.
+        sampled_ns: u64,
+        /// When the last process data of the six drives had arrived, ns.
+        complete_ns: u64,
+        /// When the command named by `answers_cycle` was received, ns.
+        command_received_ns: u64,
+        /// When the last process data of that command had left onto the wire, ns.
+        command_sent_ns: u64,
+        /// Cycle of the master's own deadline, ns.
+        due_ns: u64,
+        /// When the master woke for it, ns.
+        woke_ns: u64,
+        /// Deadlines skipped since start because an earlier cycle overran.
+        skipped_cycles: u64,
+        /// Time that the machine withheld from the process while it waited, since start, ns.
+        stalled_ns: u64,
+        /// Encoder positions d₁ d₂ d₃ l₁ l₂ l₃, m.
+        position_m: [f64; AXES],
+        /// Actuator forces, positive towards increasing position, N.
+        force_n: [f64; AXES],
+        /// Drive states, [`codes::DriveCondition`].
+        drive_state: [u32; AXES],
+        /// Axes whose process data arrived this cycle, bit i for axis i.
+        fresh_axes: u32,
+        /// 1 once the master refuses to move anything, with the cause in an event.
+        master_fault: u32,
+    }
+
+    /// What the controller made of a reading, once a cycle.
+    State on "state" keeping 2048 {
+        /// Cycle of the controller, from 1.
+        cycle: u64,
+        /// Cycle of the reading it was computed from; 0 when there was none.
+        reading_cycle: u64,
+        /// When that reading was sampled, ns.
+        sampled_ns: u64,
+        /// Deadline of the cycle, ns.
+        due_ns: u64,
+        /// When the loop woke for it, ns.
+        woke_ns: u64,
+        /// When the reading had been received, ns.
+        received_ns: u64,
+        /// When the forward kinematics was done, ns.
+        solved_ns: u64,
+        /// When the command was ready to be published, ns.
+        commanded_ns: u64,
+        /// Deadlines skipped since start because an earlier cycle overran.
+        skipped_cycles: u64,
+        /// Time that the machine withheld from the process while it waited, since start, ns.
+        stalled_ns: u64,
+        /// Time on the motion's own clock at the sample, s; negative before the motion begins.
+        motion_time_s: f64,
+        /// Pose wanted at the sample: position in the base frame, m.
+        desired_position_m: [f64; 3],
+        /// Pose wanted at the sample: unit quaternion w x y z.
+        desired_quaternion_wxyz: [f64; 4],
+        /// Pose found by forward kinematics: position in the base frame, m.
+        estimated_position_m: [f64; 3],
+        /// Pose found by forward kinematics: unit quaternion w x y z.
+        estimated_quaternion_wxyz: [f64; 4],
+        /// θ₁ θ₂ θ₃, rad.
+        leg_angle_rad: [f64; LEGS],
+        /// Largest difference of a platform side from its length, m.
+        residual_m: f64,
+        /// Condition number of the actuators' Jacobian, angular columns scaled by 0.05 m.
+        condition: f64,
+        /// Iterations of the forward kinematics.
+        iterations: u32,
+        /// State of the controller, a [`codes::ControllerState`].
+        controller_state: u32,
+    }
+
+    /// What the mechanism really did, once a cycle; the controller never reads it.
+    Truth on "truth" keeping 2048 {
+        /// Cycle of the plant, from 1.
+        cycle: u64,
+        /// The instant it describes: that of the reading's sample, ns.
+        sampled_ns: u64,
+        /// Platform origin in the base frame, m.
+        position_m: [f64; 3],
+        /// Platform orientation, unit quaternion w x y z.
+        quaternion_wxyz: [f64; 4],
+        /// Joint positions d₁ d₂ d₃ l₁ l₂ l₃, m.
+        joint_m: [f64; AXES],
+        /// Joint velocities, m/s.
+        joint_m_s: [f64; AXES],
+        /// Actuator forces, N.
+        force_n: [f64; AXES],
+        /// Bite force on the platform, N.
+        bite_force_n: f64,
+    }
+
+    /// A CAN frame as a tap on the wire would see it.
+    FrameTap on "frame" keeping 16384 {
+        /// When its last bit was on the wire, ns.
+        time_ns: u64,
+        /// Identifier; bit 31 set for a 29-bit one.
+        id: u32,
+        /// Index of the bus, from 0.
+        bus: u16,
+        /// Bytes of `data` in use.
+        length: u16,
+        /// Data bytes, unused ones zero.
+        data: [u8; 8],
+    }
+
+    /// Something that happened once: a change of state, a fault, an alarm.
+    Event on "event" keeping 1024 {
+        /// When, ns.
+        time_ns: u64,
+        /// Cycle of the process that reports it.
+        cycle: u64,
+        /// Who reports it, a [`codes::Source`].
+        source: u32,
+        /// What it is, a [`codes::EventKind`].
+        kind: u32,
+        /// Why, a [`codes::Cause`].
+        cause: u32,
+        /// Axis concerned, from 0; [`codes::NO_AXIS`] when none is.
+        axis: u32,
+        /// State before, as a code of the source's state type.
+        from: u32,
+        /// State after.
+        to: u32,
+        /// The value that explains it, in the cause's unit.
+        value: f64,
+        /// The limit it is held against, in the same unit.
+        limit: f64,
+    }
+}
+
+/// Position and w x y z quaternion of a pose, as messages carry it.
+pub fn pose_fields(pose: &Pose) -> ([f64; 3], [f64; 4]) {
+    let rotation = pose.rotation.quaternion();
+    (pose.translation.vector.into(), [rotation.w, rotation.i, rotation.j, rotation.k])
+}
+
+/// The pose that [`pose_fields`] took apart.
+pub fn pose_of_fields(position_m: [f64; 3], [w, x, y, z]: [f64; 4]) -> Pose {
+    let rotation = nalgebra::UnitQuaternion::from_quaternion(nalgebra::Quaternion::new(w, x, y, z));
+    Pose::from_parts(nalgebra::Translation3::from(position_m), rotation)
+}

@@ -1,0 +1,101 @@
+//! Deadlines on a fixed grid: the n-th at `epoch + phase + n · period`.
+
+use super::Waiter;
+use crate::clock;
+
+/// Waits for the deadlines of a periodic task.
+///
+/// Overrun policy: a deadline that passed while the task was still busy is skipped and counted, never
+/// caught up in a burst; cycle numbers keep counting deadlines, so a skipped one leaves a gap.
+#[derive(Debug)]
+pub struct Cycle {
+    first_due_ns: u64,
+    period_ns: u64,
+    waiter: Waiter,
+    next: u64,
+    skipped: u64,
+}
+
+/// A deadline that came.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Wake {
+    /// Number of the deadline, from 1.
+    pub cycle: u64,
+    /// When it was due, ns.
+    pub due_ns: u64,
+    /// When the task woke, ns.
+    pub woke_ns: u64,
+    /// Deadlines skipped since the start.
+    pub skipped: u64,
+    /// Time that the machine has withheld from this task since the start, see [`Waiter::stalled_ns`].
+    pub stalled_ns: u64,
+}
+
+impl Cycle {
+    /// Deadlines every `period_ns` from `first_due_ns` on.
+    pub fn new(first_due_ns: u64, period_ns: u64) -> Self {
+        Self { first_due_ns, period_ns, waiter: Waiter::new(period_ns), next: 0, skipped: 0 }
+    }
+
+    /// When deadline `cycle` (from 1) is due, ns.
+    fn due_ns(&self, cycle: u64) -> u64 {
+        self.first_due_ns + (cycle - 1) * self.period_ns
+    }
+
+    /// The next deadline that is still ahead at `now_ns`, counting those that are not as skipped.
+    fn claim(&mut self, now_ns: u64) -> u64 {
+        self.next += 1;
+        let late_ns = now_ns.saturating_sub(self.due_ns(self.next));
+        let missed = late_ns / self.period_ns;
+        self.skipped += missed;
+        self.next += missed;
+        self.next
+    }
+
+    /// Waits for the next deadline: sleeps, then spins the last stretch.
+    pub fn wait(&mut self) -> Wake {
+        let cycle = self.claim(clock::now_ns());
+        let due_ns = self.due_ns(cycle);
+        let woke_ns = self.waiter.until(due_ns);
+        Wake { cycle, due_ns, woke_ns, skipped: self.skipped, stalled_ns: self.waiter.stalled_ns() }
+    }
+
+    /// For the waits within a cycle.
+    pub fn waiter(&mut self) -> &mut Waiter {
+        &mut self.waiter
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PERIOD: u64 = 1_000_000;
+
+    #[test]
+    fn deadlines_in_time_are_taken_one_by_one() {
+        let mut cycle = Cycle::new(10 * PERIOD, PERIOD);
+        assert_eq!(cycle.claim(0), 1);
+        assert_eq!(cycle.claim(10 * PERIOD + 300), 2);
+        assert_eq!(cycle.due_ns(2), 11 * PERIOD);
+        assert_eq!(cycle.skipped, 0);
+    }
+
+    #[test]
+    fn a_late_cycle_starts_late_but_is_not_skipped_within_its_period() {
+        let mut cycle = Cycle::new(10 * PERIOD, PERIOD);
+        cycle.claim(0);
+        assert_eq!(cycle.claim(11 * PERIOD + PERIOD - 1), 2);
+        assert_eq!(cycle.skipped, 0);
+    }
+
+    #[test]
+    fn passed_deadlines_are_skipped_counted_and_never_caught_up() {
+        let mut cycle = Cycle::new(10 * PERIOD, PERIOD);
+        cycle.claim(0);
+        assert_eq!(cycle.claim(15 * PERIOD + 7), 6);
+        assert_eq!(cycle.skipped, 4);
+        assert_eq!(cycle.claim(15 * PERIOD + 100), 7);
+        assert_eq!(cycle.skipped, 4);
+    }
+}

@@ -1,0 +1,150 @@
+//! What a process asks of the kernel, and what it got, read back.
+//!
+//! Nothing here fails a run: a refusal is a fact that screen, manifest and `--require-rt` judge.
+
+use std::fs;
+
+use rustix::io::Errno;
+use rustix::mm::{MlockAllFlags, mlockall};
+use rustix::process::getpid;
+use rustix::thread::{CpuSet, sched_getaffinity, sched_setaffinity};
+use serde::{Deserialize, Serialize};
+
+/// What a process asks for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Wanted {
+    /// The core to stay on; none leaves the choice to the kernel.
+    pub core: Option<usize>,
+    /// SCHED_FIFO priority, 1 to 99; none keeps the ordinary policy.
+    pub fifo_priority: Option<u8>,
+    /// Whether all memory is to be locked into RAM.
+    pub locked_memory: bool,
+}
+
+/// What it has, as the kernel reports it, and why anything was refused.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Obtained {
+    /// The request.
+    pub wanted: Wanted,
+    /// The only core the process may run on, if there is only one.
+    pub core: Option<usize>,
+    /// Its SCHED_FIFO priority, if it has that policy.
+    pub fifo_priority: Option<u8>,
+    /// Whether its memory is locked.
+    pub locked_memory: bool,
+    /// One line a refusal, with what helps.
+    pub refusals: Vec<String>,
+}
+
+impl Obtained {
+    /// Whether everything asked for was granted.
+    pub fn is_complete(&self) -> bool {
+        self.refusals.is_empty()
+    }
+}
+
+/// Asks for `wanted` on behalf of the calling thread (memory: of the process), then reads back.
+pub fn obtain(wanted: Wanted) -> Obtained {
+    let mut refusals = Vec::new();
+    if let Some(core) = wanted.core
+        && let Err(error) = pin(core)
+    {
+        refusals
+            .push(format!("core {core} refused ({error}): choose one of 0 to {} with --cores", last_core()));
+    }
+    if let Some(priority) = wanted.fifo_priority
+        && let Err(error) = fifo::set(priority)
+    {
+        refusals.push(format!(
+            "SCHED_FIFO {priority} refused ({error}): run as root, or allow it with `ulimit -r {priority}` (limits.conf: rtprio)"
+        ));
+    }
+    if wanted.locked_memory
+        && let Err(error) = mlockall(MlockAllFlags::CURRENT | MlockAllFlags::FUTURE)
+    {
+        refusals.push(format!(
+            "locked memory refused ({error}): run as root, or allow it with `ulimit -l unlimited` (limits.conf: memlock)"
+        ));
+    }
+    Obtained { wanted, core: pinned_core(), fifo_priority: fifo::get(), locked_memory: is_locked(), refusals }
+}
+
+/// Number of the machine's last core.
+pub fn last_core() -> usize {
+    cores().saturating_sub(1)
+}
+
+/// Cores of this machine that are online.
+pub fn cores() -> usize {
+    std::thread::available_parallelism().map_or(1, usize::from)
+}
+
+fn pin(core: usize) -> Result<(), Errno> {
+    if core >= CpuSet::MAX_CPU {
+        return Err(Errno::INVAL);
+    }
+    let mut set = CpuSet::new();
+    set.set(core);
+    sched_setaffinity(None, &set)
+}
+
+fn pinned_core() -> Option<usize> {
+    let set = sched_getaffinity(None).ok()?;
+    let mut allowed = (0..CpuSet::MAX_CPU).filter(|&core| set.is_set(core));
+    match (allowed.next(), allowed.next()) {
+        (Some(only), None) => Some(only),
+        _ => None,
+    }
+}
+
+fn is_locked() -> bool {
+    let status =
+        fs::read_to_string(format!("/proc/{}/status", getpid().as_raw_nonzero())).unwrap_or_default();
+    let locked_kb = status.lines().find_map(|line| line.strip_prefix("VmLck:"));
+    locked_kb.is_some_and(|kb| !kb.trim().starts_with("0 "))
+}
+
+/// The one file section with `unsafe`: no kept crate wraps the scheduling policy of a thread.
+#[allow(unsafe_code)]
+mod fifo {
+    use std::io;
+
+    /// Gives the calling thread SCHED_FIFO at `priority`.
+    pub(super) fn set(priority: u8) -> io::Result<()> {
+        let parameters = libc::sched_param { sched_priority: i32::from(priority) };
+        // SAFETY: `parameters` outlives the call, which only reads it; 0 names the calling thread.
+        match unsafe { libc::sched_setscheduler(0, libc::SCHED_FIFO, &raw const parameters) } {
+            0 => Ok(()),
+            _ => Err(io::Error::last_os_error()),
+        }
+    }
+
+    /// The calling thread's SCHED_FIFO priority, if it has that policy.
+    pub(super) fn get() -> Option<u8> {
+        let mut parameters = libc::sched_param { sched_priority: 0 };
+        // SAFETY: `parameters` outlives both calls; the second only writes it; 0 names the calling thread.
+        let (policy, result) =
+            unsafe { (libc::sched_getscheduler(0), libc::sched_getparam(0, &raw mut parameters)) };
+        (policy == libc::SCHED_FIFO && result == 0).then_some(parameters.sched_priority as u8)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_core_that_does_not_exist_is_refused_and_said() {
+        let wanted = Wanted { core: Some(4096), fifo_priority: None, locked_memory: false };
+        let obtained = std::thread::spawn(move || obtain(wanted)).join().unwrap();
+        assert!(!obtained.is_complete());
+        assert!(obtained.refusals[0].contains("--cores"), "{:?}", obtained.refusals);
+    }
+
+    #[test]
+    fn pinning_is_read_back() {
+        let wanted = Wanted { core: Some(0), fifo_priority: None, locked_memory: false };
+        let obtained = std::thread::spawn(move || obtain(wanted)).join().unwrap();
+        assert_eq!(obtained.core, Some(0));
+    }
+}

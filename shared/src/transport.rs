@@ -1,0 +1,11 @@
+//! How messages travel: iceoryx2 publish–subscribe, one service a topic, one domain a run.
+//!
+//! A message is built in the loaned sample and never copied. Nothing here ever waits for a
+//! subscriber: a subscriber that falls behind loses its oldest messages, and sees the gap in the
+//! sequence numbers. Two rigs never meet, because each [`Domain`] has names of its own.
+
+mod domain;
+mod ports;
+
+pub use domain::{Domain, DomainError};
+pub use ports::{Inlet, Node, Outlet, Received, TransportError};

@@ -1,0 +1,179 @@
+//! The names a run uses in the file system, who still lives under them, and their removal.
+//!
+//! iceoryx2 leaves files in two places: below a root folder and, with a prefix, in `/dev/shm`. Every
+//! process of a run holds an inherited lock on `<root>/lock`; while anyone holds it, the run is alive.
+
+use std::fs::{self, File, TryLockError};
+use std::io;
+use std::path::{Path, PathBuf};
+
+use rustix::io::{FdFlags, fcntl_setfd};
+use rustix::process::getuid;
+
+const SHARED_MEMORY: &str = "/dev/shm";
+const LOCK: &str = "lock";
+
+/// The names of one run.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Domain {
+    id: String,
+}
+
+/// Why a domain could not be claimed or removed.
+#[derive(Debug, thiserror::Error)]
+pub enum DomainError {
+    /// Another run uses the name.
+    #[error("a rig named '{id}' is running; wait for it, stop it, or give this one another name")]
+    InUse {
+        /// The domain's id.
+        id: String,
+    },
+    /// The id cannot be a file name.
+    #[error("'{id}' cannot name a rig: use 1 to 32 letters, digits, '-' or '_'")]
+    BadName {
+        /// The id as given.
+        id: String,
+    },
+    /// The file system refused.
+    #[error("cannot {action} {path}: {error}")]
+    File {
+        /// What was tried.
+        action: &'static str,
+        /// Where.
+        path: PathBuf,
+        /// What the system said.
+        error: io::Error,
+    },
+}
+
+/// Proof that the domain is ours; children started while it lives share it.
+#[derive(Debug)]
+pub struct Claim {
+    _lock: File,
+}
+
+impl Domain {
+    /// A domain by its id.
+    pub fn named(id: &str) -> Result<Self, DomainError> {
+        let fits = (1..=32).contains(&id.len());
+        if fits && id.bytes().all(|b| b.is_ascii_alphanumeric() || b == b'-' || b == b'_') {
+            Ok(Self { id: id.to_owned() })
+        } else {
+            Err(DomainError::BadName { id: id.to_owned() })
+        }
+    }
+
+    /// The id.
+    pub fn id(&self) -> &str {
+        &self.id
+    }
+
+    /// Where the domain's root folder lies: one folder a user, so that users never share files.
+    pub fn root(&self) -> PathBuf {
+        domains_of_this_user().join(&self.id)
+    }
+
+    /// What the names of its shared-memory files begin with.
+    pub fn prefix(&self) -> String {
+        format!("masseter_{}_{}_", getuid().as_raw(), self.id)
+    }
+
+    /// Makes the domain ours until the claim and every process started meanwhile are gone.
+    pub fn claim(&self) -> Result<Claim, DomainError> {
+        let root = self.root();
+        fs::create_dir_all(&root).map_err(|error| file_error("create", &root, error))?;
+        let path = root.join(LOCK);
+        let lock = File::create(&path).map_err(|error| file_error("create", &path, error))?;
+        match lock.try_lock() {
+            Ok(()) => {}
+            Err(TryLockError::WouldBlock) => return Err(DomainError::InUse { id: self.id.clone() }),
+            Err(TryLockError::Error(error)) => return Err(file_error("lock", &path, error)),
+        }
+        // Children inherit the lock, so the domain counts as alive until the last of them ended.
+        fcntl_setfd(&lock, FdFlags::empty()).map_err(|error| file_error("share", &path, error.into()))?;
+        Ok(Claim { _lock: lock })
+    }
+
+    /// Whether any process of the run still lives.
+    pub fn is_alive(&self) -> bool {
+        File::open(self.root().join(LOCK))
+            .is_ok_and(|lock| matches!(lock.try_lock(), Err(TryLockError::WouldBlock)))
+    }
+
+    /// Removes everything the domain left in shared memory and in the file system; returns how many
+    /// files that were. The caller knows that no process of it lives.
+    pub fn sweep(&self) -> Result<usize, DomainError> {
+        let prefix = self.prefix();
+        let mut removed = 0;
+        for path in entries(Path::new(SHARED_MEMORY))? {
+            if file_name(&path).starts_with(&prefix) {
+                remove(&path, fs::remove_file(&path))?;
+                removed += 1;
+            }
+        }
+        let root = self.root();
+        remove(&root, fs::remove_dir_all(&root))?;
+        Ok(removed)
+    }
+
+    /// Every domain of this user that left something behind.
+    pub fn all() -> Result<Vec<Self>, DomainError> {
+        let folder = domains_of_this_user();
+        if !folder.exists() {
+            return Ok(Vec::new());
+        }
+        Ok(entries(&folder)?.iter().filter_map(|path| Self::named(file_name(path)).ok()).collect())
+    }
+}
+
+fn domains_of_this_user() -> PathBuf {
+    std::env::temp_dir().join(format!("masseter-{}", getuid().as_raw()))
+}
+
+fn entries(folder: &Path) -> Result<Vec<PathBuf>, DomainError> {
+    let list = fs::read_dir(folder).map_err(|error| file_error("list", folder, error))?;
+    Ok(list.filter_map(|entry| Some(entry.ok()?.path())).collect())
+}
+
+fn file_name(path: &Path) -> &str {
+    path.file_name().and_then(|name| name.to_str()).unwrap_or_default()
+}
+
+fn remove(path: &Path, result: io::Result<()>) -> Result<(), DomainError> {
+    match result {
+        Err(error) if error.kind() != io::ErrorKind::NotFound => Err(file_error("remove", path, error)),
+        _ => Ok(()),
+    }
+}
+
+fn file_error(action: &'static str, path: &Path, error: io::Error) -> DomainError {
+    DomainError::File { action, path: path.to_owned(), error }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn unique(name: &str) -> Domain {
+        Domain::named(&format!("test-{name}-{}", std::process::id())).unwrap()
+    }
+
+    #[test]
+    fn a_claimed_domain_is_alive_and_refused_to_others() {
+        let domain = unique("claim");
+        let claim = domain.claim().unwrap();
+        assert!(domain.is_alive());
+        assert!(matches!(domain.claim(), Err(DomainError::InUse { .. })));
+        drop(claim);
+        assert!(!domain.is_alive());
+        domain.sweep().unwrap();
+        assert!(!domain.root().exists());
+    }
+
+    #[test]
+    fn names_that_could_leave_their_folder_are_refused() {
+        for id in ["", "..", "a/b", "a b", &"x".repeat(33)] {
+            assert!(matches!(Domain::named(id), Err(DomainError::BadName { .. })), "{id}");
+        }
+    }
+}

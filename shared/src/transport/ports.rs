@@ -1,0 +1,190 @@
+//! Typed ends of the topics: [`Outlet`] publishes, [`Inlet`] receives.
+
+use std::ops::Deref;
+
+use iceoryx2::config::Config;
+use iceoryx2::node::{Node as IceoryxNode, NodeBuilder};
+use iceoryx2::port::backpressure_strategy::BackpressureStrategy;
+use iceoryx2::port::publisher::Publisher;
+use iceoryx2::port::subscriber::Subscriber;
+use iceoryx2::prelude::{LogLevel, SemanticString, SignalHandlingMode, ipc, set_log_level};
+use iceoryx2::sample::Sample;
+use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
+
+use super::Domain;
+use crate::clock;
+use crate::messages::Message;
+use crate::realtime::Waiter;
+
+/// Publishers a topic may have: every process may publish events.
+const MAX_PUBLISHERS: usize = 4;
+/// Subscribers a topic may have: the counterpart, the logger, and two observers. Shared memory is
+/// reserved, and locked, for all of them.
+const MAX_SUBSCRIBERS: usize = 4;
+
+/// Why a port could not be made or used.
+#[derive(Debug, thiserror::Error)]
+#[error("iceoryx2: {action} failed ({reason}); {help}", help = help(reason))]
+pub struct TransportError {
+    action: String,
+    reason: String,
+}
+
+/// What helps against the refusals users meet.
+fn help(reason: &str) -> &'static str {
+    if reason.contains("Permission") {
+        "another user owns files of this name in /dev/shm or the temporary folder"
+    } else if reason.contains("Incompatible") {
+        "a process of another version uses this topic; stop it"
+    } else {
+        "`masseter clean` removes what killed runs left behind"
+    }
+}
+
+fn failed<E: std::fmt::Debug>(action: impl Into<String>) -> impl FnOnce(E) -> TransportError {
+    let action = action.into();
+    move |error| TransportError { action, reason: format!("{error:?}") }
+}
+
+/// A process's place in a domain.
+#[derive(Debug)]
+pub struct Node {
+    node: IceoryxNode<ipc::Service>,
+}
+
+impl Node {
+    /// Joins the domain. Signals stay the process's own affair.
+    pub fn join(domain: &Domain) -> Result<Self, TransportError> {
+        set_log_level(LogLevel::Fatal);
+        let action = || format!("joining domain '{}'", domain.id());
+        let root = domain.root();
+        let mut config = Config::default();
+        config.global.prefix = domain.prefix().as_str().try_into().map_err(failed(action()))?;
+        let root =
+            iceoryx2::prelude::Path::new(root.as_os_str().as_encoded_bytes()).map_err(failed(action()))?;
+        config.global.set_root_path(&root);
+        let node = NodeBuilder::new()
+            .config(&config)
+            .signal_handling_mode(SignalHandlingMode::Disabled)
+            .create()
+            .map_err(failed(action()))?;
+        Ok(Self { node })
+    }
+
+    fn service<M: Message>(&self) -> Result<PortFactory<ipc::Service, M, ()>, TransportError> {
+        let action = || format!("opening topic '{}'", M::TOPIC);
+        self.node
+            .service_builder(&M::TOPIC.try_into().map_err(failed(action()))?)
+            .publish_subscribe::<M>()
+            .enable_safe_overflow(true)
+            .max_publishers(MAX_PUBLISHERS)
+            .max_subscribers(MAX_SUBSCRIBERS)
+            .subscriber_max_buffer_size(M::DEPTH)
+            .open_or_create()
+            .map_err(failed(action()))
+    }
+
+    /// The publishing end of a topic.
+    pub fn outlet<M: Message>(&self) -> Result<Outlet<M>, TransportError> {
+        let publisher = self
+            .service::<M>()?
+            .publisher_builder()
+            .backpressure_strategy(BackpressureStrategy::DiscardData)
+            .create()
+            .map_err(failed(format!("publishing '{}'", M::TOPIC)))?;
+        Ok(Outlet { publisher, sent: 0 })
+    }
+
+    /// The receiving end of a topic, which keeps up to [`Message::DEPTH`] messages.
+    pub fn inlet<M: Message>(&self) -> Result<Inlet<M>, TransportError> {
+        let subscriber = self
+            .service::<M>()?
+            .subscriber_builder()
+            .create()
+            .map_err(failed(format!("subscribing to '{}'", M::TOPIC)))?;
+        Ok(Inlet { subscriber })
+    }
+}
+
+/// Publishes one message type and numbers its messages.
+#[derive(Debug)]
+pub struct Outlet<M: Message> {
+    publisher: Publisher<ipc::Service, M, ()>,
+    sent: u64,
+}
+
+impl<M: Message> Outlet<M> {
+    /// Lets `fill` write the message where subscribers will read it, stamps and publishes it.
+    pub fn publish(&mut self, fill: impl FnOnce(&mut M)) -> Result<(), TransportError> {
+        let mut sample = self.publisher.loan().map_err(failed(format!("loaning '{}'", M::TOPIC)))?;
+        let message = sample.payload_mut();
+        fill(message);
+        self.sent += 1;
+        message.stamp(self.sent, clock::now_ns());
+        sample.send().map_err(failed(format!("sending '{}'", M::TOPIC)))?;
+        Ok(())
+    }
+
+    /// Touches the port's memory once, so that the first message of the loop costs no page fault.
+    pub fn warm_up(&self) -> Result<(), TransportError> {
+        drop(self.publisher.loan().map_err(failed(format!("loaning '{}'", M::TOPIC)))?);
+        Ok(())
+    }
+}
+
+/// Receives one message type, oldest first.
+#[derive(Debug)]
+pub struct Inlet<M: Message> {
+    subscriber: Subscriber<ipc::Service, M, ()>,
+}
+
+/// A message still lying in shared memory.
+#[derive(Debug)]
+pub struct Received<M: Message>(Sample<ipc::Service, M, ()>);
+
+impl<M: Message> Deref for Received<M> {
+    type Target = M;
+
+    fn deref(&self) -> &M {
+        &self.0
+    }
+}
+
+impl<M: Message> Inlet<M> {
+    /// The oldest message not yet received; never waits.
+    pub fn receive(&self) -> Result<Option<Received<M>>, TransportError> {
+        let sample = self.subscriber.receive().map_err(failed(format!("receiving '{}'", M::TOPIC)))?;
+        Ok(sample.map(Received))
+    }
+
+    /// The newest message not yet received; older ones are passed over. Bounded by the port's buffer.
+    pub fn latest(&self) -> Result<Option<Received<M>>, TransportError> {
+        let mut latest = None;
+        for _ in 0..=self.subscriber.buffer_size() {
+            match self.receive()? {
+                Some(message) => latest = Some(message),
+                None => break,
+            }
+        }
+        Ok(latest)
+    }
+
+    /// The newest message, waited for until one `is_awaited` has come or `deadline_ns` has passed. Polls
+    /// without sleeping: for waits of microseconds.
+    pub fn latest_by(
+        &self,
+        deadline_ns: u64,
+        waiter: &mut Waiter,
+        is_awaited: impl Fn(&M) -> bool,
+    ) -> Result<Option<Received<M>>, TransportError> {
+        let mut newest = None;
+        let mut spin = waiter.spin();
+        loop {
+            newest = self.latest()?.or(newest);
+            let is_here = newest.as_deref().is_some_and(&is_awaited);
+            if is_here || spin.now_ns() >= deadline_ns {
+                return Ok(newest);
+            }
+        }
+    }
+}

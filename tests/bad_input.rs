@@ -1,0 +1,74 @@
+//! What bad input gets: refused before anything starts, with place and reason, exit code 2.
+
+mod common;
+
+use common::{Bench, masseter, stderr};
+
+#[test]
+fn scenarios_are_refused_with_place_and_remedy() {
+    let cases = [
+        ("seeed = 1", "did you mean `seed`?"),
+        ("[motion]\nkind = 'chewing'\nvertical = 3.0", "did you mean `vertical_mm`?"),
+        ("[motion]\nkind = 'yawning'", "yawning"),
+        ("rate_hz = 0", "use 10 to 20000 Hz"),
+        ("[can]\nbuses = [[0, 1, 2, 3, 4, 5]]", "bits"),
+        ("[can]\nbuses = [[0, 1, 2], [3, 4]]", "axis"),
+        ("[can]\nnode_ids = [1, 1, 2, 3, 4, 5]", "node"),
+        ("[mechanism]\nplatform_sides_m = [0.05, 0.05, 0.2]", "no triangle"),
+        ("[motion]\nkind = 'opening'\namplitude_mm = 90.0", "out of reach"),
+        ("[jaw]\nclosed_offset_m = [0.04, 0.0, 0.0]", "stroke"),
+        ("[motion]\nkind = 'chewing'\ncycle_rate_hz = 5.0", "limit"),
+        ("[motion]\nkind = 'file'\npath = 'nowhere.csv'", "nowhere.csv"),
+    ];
+    for (scenario, reason) in cases {
+        let bench = Bench::new(scenario);
+        let output = bench.run(&["--clock", "virtual"]);
+        assert_eq!(output.status.code(), Some(2), "{scenario}: {}", stderr(&output));
+        assert!(stderr(&output).contains(reason), "{scenario:?} gave {:?}", stderr(&output));
+        assert!(!bench.run_folder().exists(), "{scenario}: something was started");
+    }
+}
+
+#[test]
+fn recordings_are_refused_with_file_line_and_reason() {
+    let head = "time_s,x_mm,y_mm,z_mm,qw,qx,qy,qz\n";
+    let rest = |t: f64| format!("{t},0,0,0,1,0,0,0\n");
+    let good: String = (0..50).map(|i| rest(f64::from(i) * 0.02)).collect();
+    let cases = [
+        (format!("time,x_mm,y_mm,z_mm,qw,qx,qy,qz\n{good}"), ":1", "time"),
+        (format!("{head}{good}1.0,NaN,0,0,1,0,0,0\n"), ":52", "x_mm"),
+        (format!("{head}{good}1.0,inf,0,0,1,0,0,0\n"), ":52", "x_mm"),
+        (format!("{head}{good}1.0,a,0,0,1,0,0,0\n"), ":52", "x_mm"),
+        (format!("{head}{good}0.5,0,0,0,1,0,0,0\n"), ":52", "time"),
+        (format!("{head}{good}1.0,0,0,0,1,1,0,0\n"), ":52", "quaternion"),
+        (format!("{head}{good}1.0,0,0\n"), ":52", "3 fields"),
+        (format!("{head}{good}1.0,0,0,200,1,0,0,0\n"), "jaw.csv", ""),
+        (head.to_owned(), "jaw.csv", ""),
+    ];
+    for (text, place, reason) in cases {
+        let bench = Bench::new("");
+        let file = bench.write("jaw.csv", &text);
+        let output = bench.run(&["--clock", "virtual", "--trajectory", file.to_str().unwrap()]);
+        let said = stderr(&output);
+        assert_eq!(output.status.code(), Some(2), "{said}");
+        assert!(said.contains("jaw.csv") && said.contains(place) && said.contains(reason), "{said}");
+        assert!(!bench.run_folder().exists(), "something was started");
+    }
+}
+
+#[test]
+fn a_run_folder_is_never_overwritten() {
+    let bench = Bench::new("duration_s = 1.0");
+    std::fs::create_dir(bench.run_folder()).unwrap();
+    let output = bench.run(&["--clock", "virtual"]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(stderr(&output).contains("not overwritten"), "{}", stderr(&output));
+}
+
+#[test]
+fn wrong_usage_exits_with_2() {
+    for arguments in [&["run", "--cores", "0"][..], &["run", "--duration", "soon"], &["fly"], &[]] {
+        assert_eq!(masseter(arguments).status.code(), Some(2), "{arguments:?}");
+    }
+    assert_eq!(masseter(&["report", "/nowhere"]).status.code(), Some(2));
+}

@@ -1,0 +1,101 @@
+//! What the whole-rig tests share: the real executable, and what it leaves.
+#![allow(dead_code, reason = "each test file uses its own part")]
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use serde_json::Value;
+
+/// The executable under test.
+pub(crate) const MASSETER: &str = env!("CARGO_BIN_EXE_masseter");
+
+/// A scenario that judges nothing by the clock: test machines are shared and noisy.
+pub(crate) const UNHURRIED: &str = "[checks]\nmissed_cycles = 1000000\ntracking_rms_mm = 1000.0\n";
+
+/// A place of its own for a test, with scenario and run folder.
+pub(crate) struct Bench {
+    folder: tempfile::TempDir,
+}
+
+impl Bench {
+    pub(crate) fn new(scenario: &str) -> Self {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        fs::write(folder.path().join("scenario.toml"), scenario).expect("the scenario is written");
+        Self { folder }
+    }
+
+    pub(crate) fn file(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    pub(crate) fn write(&self, name: &str, text: &str) -> PathBuf {
+        let path = self.file(name);
+        fs::write(&path, text).expect("the file is written");
+        path
+    }
+
+    /// `masseter run` with this bench's scenario into its run folder, ready to be started.
+    pub(crate) fn run_command(&self, arguments: &[&str]) -> Command {
+        let mut command = Command::new(MASSETER);
+        command
+            .arg("run")
+            .arg(self.file("scenario.toml"))
+            .arg("--out")
+            .arg(self.run_folder())
+            .args(arguments);
+        command
+    }
+
+    pub(crate) fn run(&self, arguments: &[&str]) -> Output {
+        self.run_command(arguments).output().expect("masseter starts")
+    }
+
+    pub(crate) fn run_folder(&self) -> PathBuf {
+        self.file("run")
+    }
+
+    pub(crate) fn summary(&self) -> Value {
+        json(&self.run_folder().join("summary.json"))
+    }
+
+    pub(crate) fn manifest(&self) -> Value {
+        json(&self.run_folder().join("manifest.json"))
+    }
+}
+
+pub(crate) fn json(path: &Path) -> Value {
+    let text = fs::read_to_string(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+    serde_json::from_str(&text).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
+}
+
+pub(crate) fn masseter(arguments: &[&str]) -> Output {
+    Command::new(MASSETER).args(arguments).output().expect("masseter starts")
+}
+
+pub(crate) fn stderr(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+pub(crate) fn stdout(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stdout).into_owned()
+}
+
+/// The recordings handed to developers; they are not part of the project.
+pub(crate) fn jaw_recording(name: &str) -> Option<PathBuf> {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data/jaw").join(name);
+    if path.is_file() {
+        return Some(path);
+    }
+    eprintln!("SKIPPED: {name} is absent");
+    None
+}
+
+/// Files with the rig's prefix in shared memory whose names hold `id`.
+pub(crate) fn shared_memory_of(id: &str) -> Vec<String> {
+    let entries = fs::read_dir("/dev/shm").expect("/dev/shm can be listed");
+    entries
+        .filter_map(|entry| entry.ok()?.file_name().into_string().ok())
+        .filter(|name| name.starts_with("masseter_") && name.contains(id))
+        .collect()
+}

@@ -1,0 +1,31 @@
+"""Reads a recording with Python's `mcap` packages, which know nothing of Masseter.
+
+Prints the messages of each topic and fails when a topic is missing or a value makes no sense.
+"""
+
+import sys
+from collections import Counter
+
+from mcap_ros2.reader import read_ros2_messages
+
+counts = Counter()
+last_seq = {}
+largest_angle_rad = 0.0
+for message in read_ros2_messages(sys.argv[1]):
+    topic, body = message.channel.topic, message.ros_msg
+    counts[topic] += 1
+    assert body.version == 1, (topic, body.version)
+    if topic not in ("event",):
+        assert body.seq == last_seq.get(topic, 0) + 1, (topic, body.seq)
+        last_seq[topic] = body.seq
+    if topic == "state":
+        norm = sum(q * q for q in body.desired_quaternion_wxyz)
+        assert abs(norm - 1.0) < 1e-9, norm
+        largest_angle_rad = max(largest_angle_rad, *body.leg_angle_rad)
+    if topic == "reading" and body.fresh_axes == 63:
+        assert all(0.24 <= length <= 0.30 for length in body.position_m[3:]), body.position_m
+
+for topic in ("command", "reading", "state", "truth", "frame", "event"):
+    print(f"{topic:8} {counts[topic]:8}")
+    assert counts[topic] > 0, f"no message on {topic}"
+assert 1.0 < largest_angle_rad < 1.6, largest_angle_rad

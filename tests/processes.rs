@@ -1,0 +1,175 @@
+//! Runs in real time: three processes, their deaths, interruption, two rigs at once. Nothing here
+//! judges speed.
+
+mod common;
+
+use std::fs;
+use std::process::{Child, Command, Stdio};
+use std::time::Duration;
+
+use common::{Bench, UNHURRIED, masseter, shared_memory_of, stderr, stdout};
+use masseter_shared::clock;
+use rustix::process::{Pid, Signal, kill_process};
+
+/// Ends accepted from a machine that may stand still for a while: passed, or too disturbed to judge.
+const PASSED_OR_INVALID: [Option<i32>; 2] = [Some(0), Some(3)];
+
+fn start(bench: &Bench, arguments: &[&str]) -> Child {
+    bench.run_command(arguments).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap()
+}
+
+/// The process of this rig that plays `role`, once it runs.
+fn child_of(supervisor: &Child, role: &str) -> Pid {
+    for _ in 0..500 {
+        let path = format!("/proc/{0}/task/{0}/children", supervisor.id());
+        let children = fs::read_to_string(path).unwrap_or_default();
+        for id in children.split_whitespace().filter_map(|id| id.parse::<i32>().ok()) {
+            let command = fs::read_to_string(format!("/proc/{id}/cmdline")).unwrap_or_default();
+            if command.split('\0').nth(1) == Some(role) {
+                return Pid::from_raw(id).unwrap();
+            }
+        }
+        clock::sleep(Duration::from_millis(10));
+    }
+    panic!("no {role} appeared");
+}
+
+/// Waits until the recording shows that the rig runs.
+fn wait_until_it_records(bench: &Bench) {
+    for _ in 0..1000 {
+        let recorded = fs::metadata(bench.run_folder().join("recording.mcap")).map_or(0, |file| file.len());
+        if recorded > 500_000 {
+            return;
+        }
+        clock::sleep(Duration::from_millis(10));
+    }
+    panic!("the rig did not begin to record");
+}
+
+#[test]
+fn a_run_plays_through_three_processes_and_leaves_nothing_in_shared_memory() {
+    let bench = Bench::new(&format!("duration_s = 2.0\n{UNHURRIED}"));
+    let child = start(&bench, &[]);
+    let id = format!("{}-", child.id());
+    let output = child.wait_with_output().unwrap();
+    assert!(PASSED_OR_INVALID.contains(&output.status.code()), "{}{}", stdout(&output), stderr(&output));
+    let summary = bench.summary();
+    assert_eq!(summary["figures"]["final_state"], "finished");
+    assert_eq!(summary["verdict"]["checks"][3]["name"], "dropped messages");
+    assert_eq!(summary["verdict"]["checks"][3]["passed"], true, "{summary}");
+    let scheduling = &bench.manifest()["scheduling"];
+    for role in ["controller", "plant", "logger"] {
+        assert!(scheduling[role]["wanted"].is_object(), "{scheduling}");
+    }
+    assert_eq!(shared_memory_of(&id), Vec::<String>::new());
+}
+
+#[test]
+fn the_death_of_any_process_stops_the_rig_safely_and_keeps_the_recording() {
+    for role in ["controller", "plant", "logger"] {
+        let bench = Bench::new(&format!("duration_s = 60.0\n{UNHURRIED}"));
+        let child = start(&bench, &[]);
+        let victim = child_of(&child, role);
+        wait_until_it_records(&bench);
+        kill_process(victim, Signal::KILL).unwrap();
+        let id = format!("{}-", child.id());
+        let output = child.wait_with_output().unwrap();
+        assert_eq!(output.status.code(), Some(4), "{role}: {}{}", stdout(&output), stderr(&output));
+        let summary = bench.summary();
+        let reason = summary["verdict"]["reason"].as_str().unwrap();
+        assert!(reason.contains(role) && reason.contains("SIGKILL"), "{reason}");
+        assert!(summary["figures"]["cycles"].as_u64().unwrap() > 100, "{role}: the recording is empty");
+        assert_eq!(shared_memory_of(&id), Vec::<String>::new(), "{role}");
+        let causes: Vec<_> = summary["figures"]["events"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .filter(|event| event["kind"] == "fault")
+            .map(|event| event["cause"].as_str().unwrap().to_owned())
+            .collect();
+        match role {
+            "controller" => assert!(causes.contains(&"command_lost".to_owned()), "{causes:?}"),
+            "plant" => assert!(causes.contains(&"stale_reading".to_owned()), "{causes:?}"),
+            _ => {}
+        }
+    }
+}
+
+#[test]
+fn an_interrupt_ends_the_motion_in_order() {
+    let bench = Bench::new(&format!("duration_s = 60.0\n{UNHURRIED}"));
+    let child = start(&bench, &[]);
+    wait_until_it_records(&bench);
+    kill_process(Pid::from_child(&child), Signal::INT).unwrap();
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(130), "{}", stderr(&output));
+    assert_eq!(bench.summary()["figures"]["final_state"], "finished");
+}
+
+#[test]
+fn a_killed_supervisor_takes_its_processes_along_and_clean_sweeps_what_is_left() {
+    let bench = Bench::new(&format!("duration_s = 60.0\n{UNHURRIED}"));
+    let mut child = start(&bench, &[]);
+    wait_until_it_records(&bench);
+    let id = format!("{}-", child.id());
+    child.kill().unwrap();
+    child.wait().unwrap();
+    for _ in 0..500 {
+        assert_eq!(masseter(&["clean"]).status.code(), Some(0));
+        if shared_memory_of(&id).is_empty() {
+            return;
+        }
+        clock::sleep(Duration::from_millis(10));
+    }
+    panic!("left in shared memory: {:?}", shared_memory_of(&id));
+}
+
+#[test]
+fn two_rigs_on_one_machine_do_not_meet() {
+    let benches = [1, 2].map(|seed| Bench::new(&format!("seed = {seed}\nduration_s = 2.0\n{UNHURRIED}")));
+    let children: Vec<_> = benches.iter().map(|bench| start(bench, &[])).collect();
+    for (child, bench) in children.into_iter().zip(&benches) {
+        let output = child.wait_with_output().unwrap();
+        // Both want the same two cores, so either may be starved into a safe stop; but no message may
+        // cross, which a foreign command or a gap in a sequence would show.
+        let summary = bench.summary();
+        assert!(!stdout(&output).contains("foreign_command"), "{}", stdout(&output));
+        assert_eq!(summary["verdict"]["checks"][3]["passed"], true, "{summary}");
+    }
+}
+
+#[test]
+fn what_the_kernel_refuses_is_said_and_required_real_time_exits_with_3() {
+    let bench = Bench::new(&format!("duration_s = 1.0\n[realtime]\ncores = [0, 4000]\n{UNHURRIED}"));
+    let output = bench.run(&["--require-rt"]);
+    assert_eq!(output.status.code(), Some(3), "{}", stderr(&output));
+    assert!(stderr(&output).contains("core 4000 refused"), "{}", stderr(&output));
+    assert!(!bench.manifest()["scheduling"]["plant"]["refusals"].as_array().unwrap().is_empty());
+}
+
+#[test]
+fn an_ordinary_user_runs_the_rig_without_real_time() {
+    if !rustix::process::getuid().is_root() {
+        eprintln!("SKIPPED: needs root to become an ordinary user; every other test here ran as one");
+        return;
+    }
+    let bench = Bench::new(&format!("duration_s = 1.0\n{UNHURRIED}"));
+    // The executable and the folder must be reachable for that user.
+    let folder = bench.file("home");
+    fs::create_dir(&folder).unwrap();
+    let executable = folder.join("masseter");
+    fs::copy(common::MASSETER, &executable).unwrap();
+    fs::copy(bench.file("scenario.toml"), folder.join("scenario.toml")).unwrap();
+    let status = Command::new("chown").args(["-R", "65534:65534"]).arg(bench.file("")).status().unwrap();
+    assert!(status.success());
+    let output = Command::new("setpriv")
+        .args(["--reuid=65534", "--regid=65534", "--clear-groups"])
+        .arg(&executable)
+        .args(["run", "scenario.toml", "--out", "run"])
+        .current_dir(&folder)
+        .output()
+        .unwrap();
+    let code = output.status.code();
+    assert!(code == Some(0) || code == Some(3) || code == Some(5), "{}{}", stdout(&output), stderr(&output));
+    assert!(stderr(&output).contains("SCHED_FIFO 80 refused"), "{}", stderr(&output));
+}

@@ -1,0 +1,137 @@
+//! Runs under virtual time: determinism, tracking, the files a run leaves, recordings played.
+
+mod common;
+
+use std::fs;
+
+use common::{Bench, jaw_recording, json, stderr, stdout};
+use serde_json::json;
+
+#[test]
+fn a_run_passes_tracks_within_a_tenth_of_a_millimetre_and_leaves_its_folder() {
+    let bench = Bench::new("duration_s = 4.0");
+    let output = bench.run(&["--clock", "virtual"]);
+    assert_eq!(output.status.code(), Some(0), "{}{}", stdout(&output), stderr(&output));
+    let figures = &bench.summary()["figures"];
+    assert!(figures["tracking"]["rms_mm"].as_f64().unwrap() < 0.1, "{}", figures["tracking"]);
+    assert!(figures["tracking"]["samples"].as_u64().unwrap() >= 3999);
+    assert_eq!(figures["final_state"], "finished");
+    for name in [
+        "scenario.toml",
+        "manifest.json",
+        "recording.mcap",
+        "events.jsonl",
+        "summary.json",
+        "junit.xml",
+        "report.html",
+        "can0.log",
+        "can1.log",
+        "hist/forward-kinematics.hlog",
+    ] {
+        let file = bench.run_folder().join(name);
+        assert!(fs::metadata(&file).is_ok_and(|file| file.len() > 0), "{name} is missing or empty");
+    }
+    let table = stdout(&output);
+    assert!(table.starts_with("PASS"), "{table}");
+    assert!(table.contains("forward kinematics"), "{table}");
+}
+
+#[test]
+fn the_same_scenario_and_seed_leave_the_same_bytes_and_another_seed_others() {
+    let recording = |seed: &str| {
+        let bench = Bench::new("duration_s = 2.0");
+        let output = bench.run(&["--clock", "virtual", "--seed", seed]);
+        assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+        fs::read(bench.run_folder().join("recording.mcap")).unwrap()
+    };
+    let first = recording("7");
+    assert!(first == recording("7"), "two runs of one seed differ");
+    assert!(first != recording("8"), "the seed changes nothing");
+}
+
+#[test]
+fn a_run_folder_runs_again_from_its_own_scenario() {
+    let bench = Bench::new("duration_s = 1.0\n[motion]\nkind = 'protrusion'");
+    assert_eq!(bench.run(&["--clock", "virtual"]).status.code(), Some(0));
+    let scenario = bench.run_folder().join("scenario.toml");
+    let again = bench.file("again");
+    let output = common::masseter(&[
+        "run",
+        scenario.to_str().unwrap(),
+        "--clock",
+        "virtual",
+        "--out",
+        again.to_str().unwrap(),
+    ]);
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    let [first, second] =
+        [bench.run_folder(), again].map(|run| fs::read(run.join("recording.mcap")).unwrap());
+    assert!(first == second);
+}
+
+#[test]
+fn every_generated_motion_plays() {
+    for kind in ["chewing", "opening", "protrusion", "lateral"] {
+        let bench = Bench::new(&format!("duration_s = 3.0\n[motion]\nkind = '{kind}'"));
+        let output = bench.run(&["--clock", "virtual"]);
+        assert_eq!(output.status.code(), Some(0), "{kind}: {}{}", stdout(&output), stderr(&output));
+    }
+}
+
+#[test]
+fn recorded_patients_play() {
+    let markers = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/markers.toml");
+    let patient = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/patient.toml");
+    for (name, scenario) in [("patient_jaws3d.csv", patient), ("jma_markers.csv", markers)] {
+        let Some(path) = jaw_recording(name) else { continue };
+        let bench = Bench::new(&fs::read_to_string(scenario).unwrap());
+        let output = bench.run(&["--clock", "virtual", "--trajectory", path.to_str().unwrap()]);
+        assert_eq!(output.status.code(), Some(0), "{name}: {}{}", stdout(&output), stderr(&output));
+        let tracking = &bench.summary()["figures"]["tracking"];
+        assert!(tracking["rms_mm"].as_f64().unwrap() < 0.1, "{name}: {tracking}");
+    }
+}
+
+#[test]
+fn another_builders_mechanism_runs() {
+    let scenario = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/builder.toml");
+    let bench = Bench::new(&fs::read_to_string(scenario).unwrap());
+    let output = bench.run(&["--clock", "virtual", "--duration", "5s"]);
+    assert_eq!(output.status.code(), Some(0), "{}{}", stdout(&output), stderr(&output));
+}
+
+#[test]
+fn a_check_that_fails_fails_the_run() {
+    let bench = Bench::new("duration_s = 1.0\n[checks]\ntracking_rms_mm = 1e-9");
+    let output = bench.run(&["--clock", "virtual", "--format", "json"]);
+    assert_eq!(output.status.code(), Some(1), "{}", stderr(&output));
+    let printed: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(printed["verdict"]["word"], "FAIL");
+    assert_eq!(printed["verdict"]["exit_code"], json!(1));
+    let junit = fs::read_to_string(bench.run_folder().join("junit.xml")).unwrap();
+    assert!(junit.contains("failures=\"1\""), "{junit}");
+}
+
+#[test]
+fn a_report_can_be_made_again_and_a_cut_recording_is_said_to_be_cut() {
+    let bench = Bench::new("duration_s = 2.0");
+    assert_eq!(bench.run(&["--clock", "virtual"]).status.code(), Some(0));
+    let folder = bench.run_folder();
+    let before = fs::read(folder.join("summary.json")).unwrap();
+    let report = || common::masseter(&["report", folder.to_str().unwrap()]);
+    assert_eq!(report().status.code(), Some(0));
+    assert_eq!(fs::read(folder.join("summary.json")).unwrap(), before);
+
+    let recording = folder.join("recording.mcap");
+    let whole = fs::read(&recording).unwrap();
+    for cut in [whole.len() / 3, whole.len() / 2, whole.len() * 2 / 3] {
+        fs::write(&recording, &whole[..cut]).unwrap();
+        let output = report();
+        assert_eq!(output.status.code(), Some(6), "{}", stdout(&output));
+        let figures = &json(&folder.join("summary.json"))["figures"];
+        assert_eq!(figures["cut_short"], json!(true));
+        assert!(figures["cycles"].as_u64().unwrap() > 0);
+    }
+    fs::write(&recording, "no recording").unwrap();
+    assert_eq!(report().status.code(), Some(2));
+}
