@@ -1,6 +1,7 @@
 //! Builds master, wires, drives and mechanism from a scenario, and refuses what cannot work.
 
-use masseter_shared::can::canopen::{NodeId, NodeIdError};
+use masseter_shared::can::canopen::{NodeId, NodeIdError, sync};
+use masseter_shared::can::wire::{INTERFRAME_BITS, wire_bits};
 use masseter_shared::can::{Bitrate, BitrateError, VirtualWire, WireConfig};
 use masseter_shared::config::{CanConfig, DriveConfig, DynamicsConfig, Scenario};
 use masseter_shared::geometry::{AXES, AXIS_NAMES, GeometryError, LEGS, Mechanism, Pose};
@@ -17,6 +18,8 @@ const MASTER_ID: u8 = 127;
 const TRANSMIT_CAPACITY: usize = 64;
 const RECEIVE_CAPACITY: usize = 256;
 const MS_NS: u64 = 1_000_000;
+/// Integration steps that resolve the stiffest parts and cost a bearable time, ns.
+const STEPS_NS: std::ops::RangeInclusive<u64> = 10_000..=250_000;
 
 /// A plant that cannot be built or cannot go on.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -64,18 +67,21 @@ pub enum PlantError {
 /// Master and link of a scenario's plant, switched on at `now_ns`.
 pub(crate) fn build(scenario: &Scenario, now_ns: u64) -> Result<(Master, VirtualLink), PlantError> {
     check_quantities(scenario)?;
+    check_times(&scenario.can, &scenario.dynamics)?;
     let places = places(&scenario.can)?;
     let ids = node_ids(&scenario.can)?;
     let mechanism = Mechanism::new(&scenario.mechanism)?;
     let dynamics = resting(mechanism, &scenario.dynamics)?;
     let positions_m = dynamics.positions_m();
+    let strokes = scenario.mechanism.strokes;
     let drive_of = |axis: usize| if axis < LEGS { scenario.drives.slide } else { scenario.drives.leg };
     let drives = (0..AXES)
         .map(|axis| {
             let drive = drive_of(axis);
             let encoder =
                 Encoder::new(drive.encoder_resolution_m, drive.encoder_noise_m, scenario.seed, axis);
-            let settings = drive_settings(scenario, ids[axis], drive);
+            let stroke_m = strokes.of_axis(axis);
+            let settings = drive_settings(scenario, ids[axis], drive, stroke_m);
             DriveNode::new(settings, encoder, now_ns, positions_m[axis])
         })
         .collect();
@@ -86,22 +92,32 @@ pub(crate) fn build(scenario: &Scenario, now_ns: u64) -> Result<(Master, Virtual
         let scale = Scale { increment_m: drive.encoder_resolution_m, rated_force_n: drive.rated_force_n };
         (ids[axis], places[axis].bus, scale)
     });
-    Ok((Master::new(master_settings(&scenario.can, drives), now_ns), link))
+    Ok((Master::new(master_settings(&scenario.can, drives)?, now_ns), link))
 }
 
-fn master_settings(can: &CanConfig, drives: [(NodeId, usize, Scale); AXES]) -> MasterSettings {
-    MasterSettings {
+fn master_settings(
+    can: &CanConfig,
+    drives: [(NodeId, usize, Scale); AXES],
+) -> Result<MasterSettings, PlantError> {
+    let sync_bits = wire_bits(&sync::frame()) - INTERFRAME_BITS;
+    Ok(MasterSettings {
         id: master_id(),
         drives,
         buses: can.buses.len(),
+        sync_ns: Bitrate::new(can.bitrate_bps)?.bits_to_ns(sync_bits),
         heartbeat_ns: u64::from(can.heartbeat_producer_ms) * MS_NS,
         heartbeat_timeout_ns: u64::from(can.heartbeat_consumer_ms) * MS_NS,
         boot_timeout_ns: u64::from(can.boot_timeout_ms) * MS_NS,
         command_timeout_cycles: can.command_timeout_cycles,
-    }
+    })
 }
 
-fn drive_settings(scenario: &Scenario, node: NodeId, drive: DriveConfig) -> DriveSettings {
+fn drive_settings(
+    scenario: &Scenario,
+    node: NodeId,
+    drive: DriveConfig,
+    stroke_m: [f64; 2],
+) -> DriveSettings {
     DriveSettings {
         node,
         master: master_id(),
@@ -110,6 +126,7 @@ fn drive_settings(scenario: &Scenario, node: NodeId, drive: DriveConfig) -> Driv
         link_timeout_ns: u64::from(scenario.can.heartbeat_consumer_ms) * MS_NS,
         period_s: scenario.period_s(),
         step_s: scenario.dynamics.step_ns as f64 * 1e-9,
+        position_limit_increments: stroke_m.map(|end_m| (end_m / drive.encoder_resolution_m).round() as i32),
     }
 }
 
@@ -226,6 +243,20 @@ fn check_quantities(scenario: &Scenario) -> Result<(), PlantError> {
     Ok(())
 }
 
+/// A heartbeat must be able to arrive before it counts as lost, and the stiffest parts of the rig, brakes
+/// and velocity loops, must be resolved by the integration.
+fn check_times(can: &CanConfig, dynamics: &DynamicsConfig) -> Result<(), PlantError> {
+    let quantity = |key, value, need| Err(PlantError::Quantity { key, value, need });
+    if can.heartbeat_consumer_ms <= can.heartbeat_producer_ms {
+        let value = f64::from(can.heartbeat_consumer_ms);
+        return quantity("can.heartbeat_consumer_ms", value, "use more than can.heartbeat_producer_ms");
+    }
+    if !STEPS_NS.contains(&dynamics.step_ns) {
+        return quantity("dynamics.step_ns", dynamics.step_ns as f64, "use 10000 to 250000 ns");
+    }
+    Ok(())
+}
+
 fn drive_quantities(slide: &DriveConfig, leg: &DriveConfig) -> impl Iterator<Item = (&'static str, f64)> {
     [("drives.slide", *slide), ("drives.leg", *leg)].into_iter().flat_map(|(key, drive)| {
         [
@@ -257,7 +288,9 @@ mod tests {
             change(&mut scenario);
             build(&scenario, 0).map(|_| ()).unwrap_err().to_string()
         };
-        let cases: [(String, &str); 8] = [
+        let cases: [(String, &str); 10] = [
+            (with(|s| s.can.heartbeat_consumer_ms = 50), "can.heartbeat_consumer_ms = 50: use more"),
+            (with(|s| s.dynamics.step_ns = 1_000_000), "dynamics.step_ns"),
             (with(|s| s.can.node_ids[3] = 1), "node 1 stands twice"),
             (with(|s| s.can.node_ids[3] = 0), "node id"),
             (with(|s| s.can.node_ids[3] = 127), "master"),

@@ -5,7 +5,7 @@
 //! sees [`Buses`] either way.
 
 use masseter_shared::can::canopen::Cob;
-use masseter_shared::can::{Bus, CanId, ReceiveError, Received, VirtualWire};
+use masseter_shared::can::{Bus, CanId, Frame, ReceiveError, Received, VirtualWire};
 use masseter_shared::geometry::AXES;
 use masseter_shared::messages::{Truth, pose_fields};
 
@@ -118,22 +118,29 @@ impl VirtualLink {
     /// A frame arrives: the drives on the wire take it where their axes stand at that instant.
     fn arrive(&mut self, bus: usize, now_ns: u64) -> Result<(), DynamicsError> {
         self.wires[bus].advance(now_ns);
-        self.move_mechanism(now_ns)?;
-        let positions_m = self.dynamics.positions_m();
-        for (axis, position_m) in positions_m.into_iter().enumerate() {
+        for axis in 0..AXES {
             let Place { bus: own_bus, port } = self.places[axis];
             if own_bus != bus {
                 continue;
             }
             // An overrun drops the drive's oldest frames, as in a real node; the next ones follow.
             while let Ok(Some(received)) = self.wires[bus].receive(port, now_ns) {
-                if received.frame.id() == CanId::from(Cob::Sync) && axis == 0 {
-                    self.sample_truth(now_ns);
-                }
-                self.drives[axis].receive(now_ns, &received.frame, position_m);
+                self.deliver(axis, &received.frame, now_ns)?;
             }
             self.send_outgoing(axis, now_ns);
         }
+        Ok(())
+    }
+
+    /// Hands a frame to a drive. Only SYNC asks where the mechanism is at this very instant.
+    fn deliver(&mut self, axis: usize, frame: &Frame, now_ns: u64) -> Result<(), DynamicsError> {
+        if frame.id() == CanId::from(Cob::Sync) {
+            self.move_mechanism(now_ns)?;
+            if axis == 0 {
+                self.sample_truth(now_ns);
+            }
+        }
+        self.drives[axis].receive(now_ns, frame, self.dynamics.positions_m()[axis]);
         Ok(())
     }
 

@@ -4,14 +4,18 @@
 //! State is the platform's pose and twist. Joint positions come from inverse kinematics and joint
 //! rates from the Jacobian: the forward kinematics is never solved here, so the mechanism is an
 //! independent oracle for it. Masses: platform with jaw, carriages (moved by the slides), rods (moved
-//! along and across by the legs) as constant joint inertias. Left out: the velocity products of legs
-//! and carriages (centripetal terms, below 0.02 m/s² at jaw speeds), play, and elasticity.
+//! along and across by the legs) as constant joint inertias. With J the Jacobian of slides, legs and
+//! hinges and M_q their inertias,
+//!
+//! (M_platform + Jᵀ M_q J) V̇ = Jᵀ(τ − friction − M_q J̇V) + gravity − gyroscopic moment.
+//!
+//! Left out: end stops, play, and elasticity.
 
 use masseter_shared::config::DynamicsConfig;
 use masseter_shared::geometry::{AXES, InverseError, Jacobian, Joints, LEGS, Mechanism, Pose, Twist, Vec3};
-use nalgebra::{Matrix3, Matrix6, UnitQuaternion, Vector6};
+use nalgebra::{Matrix3, Matrix6, UnitQuaternion, Vector3, Vector6};
 
-/// Below this speed Coulomb friction fades towards zero, m/s.
+/// Below about this speed Coulomb friction fades towards zero, m/s.
 const STICTION_SPEED_M_S: f64 = 1e-3;
 /// Share of the slides' Coulomb friction that a leg has.
 const LEG_FRICTION_SHARE: f64 = 0.25;
@@ -71,8 +75,13 @@ impl Dynamics {
 
     /// Lets the actuators' forces (N) act for `dt_s`: semi-implicit Euler.
     pub(crate) fn step(&mut self, force_n: &[f64; AXES], dt_s: f64) -> Result<(), DynamicsError> {
-        let joint_forces = Vector6::from(*force_n) - self.friction();
-        let wrench = self.jacobian.actuators.transpose() * joint_forces + self.gravity() - self.gyroscopic();
+        let (axes, hinges) = self.bias();
+        let axes_n = Vector6::from(*force_n) - self.friction() - self.axis_mass_kg().component_mul(&axes);
+        let hinges_nm = hinges * -self.config.leg_inertia_kg_m2;
+        let wrench = self.jacobian.actuators.tr_mul(&axes_n)
+            + self.jacobian.hinges.tr_mul(&hinges_nm)
+            + self.gravity()
+            - self.gyroscopic();
         let solver = self.mass().cholesky().ok_or(DynamicsError::Mass)?;
         self.twist += solver.solve(&wrench) * dt_s;
         self.move_by(dt_s)
@@ -97,13 +106,44 @@ impl Dynamics {
             * rotation.transpose()
     }
 
+    /// Mass that each axis moves along itself, kg.
+    fn axis_mass_kg(&self) -> Vector6<f64> {
+        let (rod, slide) = (self.config.rod_mass_kg, self.config.carriage_mass_kg + self.config.rod_mass_kg);
+        Vector6::new(slide, slide, slide, rod, rod, rod)
+    }
+
+    /// J̇V: accelerations of axes (m/s²) and hinges (rad/s²) while the twist stays constant.
+    ///
+    /// A corner is then accelerated by ω×(ω×r) alone. Slide and leg see their component of it, the leg
+    /// also the centrifugal lθ̇², the hinge the Coriolis −2l̇θ̇/l. The first three columns of a row of the
+    /// Jacobian are the direction to project on.
+    fn bias(&self) -> (Vector6<f64>, Vector3<f64>) {
+        let omega: Vec3 = self.twist.fixed_rows::<3>(3).into();
+        let rates = self.jacobian.actuators * self.twist;
+        let swings = self.jacobian.hinges * self.twist;
+        let along_axes = self.jacobian.actuators.fixed_columns::<3>(0);
+        let about_hinges = self.jacobian.hinges.fixed_columns::<3>(0);
+        let (mut axes, mut hinges) = (Vector6::zeros(), Vector3::zeros());
+        for (leg, corner) in self.mechanism.platform_corners().iter().enumerate() {
+            let corner = omega.cross(&omega.cross(&(self.pose.rotation * corner)));
+            let (length_m, swing, stretch) =
+                (self.joints.actuators.leg_m[leg], swings[leg], rates[LEGS + leg]);
+            axes[leg] = (along_axes.row(leg) * corner).x;
+            axes[LEGS + leg] = (along_axes.row(LEGS + leg) * corner).x + length_m * swing * swing;
+            hinges[leg] = (about_hinges.row(leg) * corner).x - 2.0 * stretch * swing / length_m;
+        }
+        (axes, hinges)
+    }
+
     /// Mass matrix against the twist: platform + Jᵀ·M·J of slides and rods + hinges.
     fn mass(&self) -> Matrix6<f64> {
         let config = &self.config;
-        let (slide, rod) = (config.carriage_mass_kg + config.rod_mass_kg, config.rod_mass_kg);
-        let axes = Matrix6::from_diagonal(&Vector6::new(slide, slide, slide, rod, rod, rod));
-        let mut mass = self.jacobian.actuators.transpose() * axes * self.jacobian.actuators;
-        mass += self.jacobian.hinges.transpose() * self.jacobian.hinges * config.leg_inertia_kg_m2;
+        let mut moved = self.jacobian.actuators;
+        for (mut row, mass_kg) in moved.row_iter_mut().zip(&self.axis_mass_kg()) {
+            row *= *mass_kg;
+        }
+        let mut mass = self.jacobian.actuators.tr_mul(&moved);
+        mass += self.jacobian.hinges.tr_mul(&self.jacobian.hinges) * config.leg_inertia_kg_m2;
         for i in 0..3 {
             mass[(i, i)] += config.platform_mass_kg;
         }
@@ -119,7 +159,8 @@ impl Dynamics {
             let share = if axis < LEGS { 1.0 } else { LEG_FRICTION_SHARE };
             let coulomb_n = self.config.slide_friction_n * share;
             let speed = velocity[axis];
-            coulomb_n * (speed / STICTION_SPEED_M_S).tanh() + self.config.viscous_friction_n_s_per_m * speed
+            coulomb_n * speed / speed.hypot(STICTION_SPEED_M_S)
+                + self.config.viscous_friction_n_s_per_m * speed
         })
     }
 
@@ -185,6 +226,48 @@ mod tests {
         dynamics.step(&[0.0; AXES], 1.25e-4).unwrap();
         let acceleration = dynamics.twist[2] / 1.25e-4;
         assert!((-9.9..-9.0).contains(&acceleration), "{acceleration}");
+    }
+
+    /// Kinetic and potential energy, J.
+    fn energy_j(dynamics: &Dynamics) -> f64 {
+        let kinetic = 0.5 * dynamics.twist.dot(&(dynamics.mass() * dynamics.twist));
+        let rods_m: f64 = dynamics.mechanism.corners_at(&dynamics.pose).iter().map(|corner| corner.z).sum();
+        let config = &dynamics.config;
+        let moment = config.platform_mass_kg * dynamics.pose.translation.z + config.rod_mass_kg * rods_m;
+        kinetic + config.gravity_m_s2 * moment
+    }
+
+    /// The law that ties every term to the mass matrix: none makes or loses energy but the axes' forces.
+    #[test]
+    fn work_of_the_axes_is_all_the_energy_gains_even_in_a_tumble() {
+        let config = DynamicsConfig { leg_inertia_kg_m2: 0.03, ..frictionless() };
+        let mut dynamics = at_rest(config);
+        dynamics.twist = Twist::new(0.2, -0.1, 0.5, 4.0, -3.0, 2.0);
+        let force_n = [3.0, -2.0, 1.0, 2.0, 3.0, 4.0];
+        let (start_j, start_m) = (energy_j(&dynamics), dynamics.positions_m());
+        for _ in 0..50_000 {
+            dynamics.step(&force_n, 2e-6).unwrap();
+        }
+        let moved_m = dynamics.positions_m().into_iter().zip(start_m).map(|(end, start)| end - start);
+        let work_j: f64 = moved_m.zip(force_n).map(|(moved_m, force_n)| moved_m * force_n).sum();
+        let gained_j = energy_j(&dynamics) - start_j;
+        assert!((gained_j - work_j).abs() < 1e-4, "work {work_j} J, gained {gained_j} J of {start_j} J");
+    }
+
+    /// Central differences of the rates along a constant twist agree with J̇V.
+    #[test]
+    fn bias_is_the_derivative_of_the_rates() {
+        let mut dynamics = at_rest(frictionless());
+        dynamics.twist = Twist::new(0.1, -0.2, 0.15, 2.0, -3.0, 1.0);
+        let after = |seconds: f64| {
+            let mut moved = dynamics.clone();
+            moved.move_by(seconds).unwrap();
+            (moved.jacobian.actuators * moved.twist, moved.jacobian.hinges * moved.twist)
+        };
+        let h = 1e-5;
+        let ((axes, hinges), (later, before)) = (dynamics.bias(), (after(h), after(-h)));
+        assert!(((later.0 - before.0) / (2.0 * h) - axes).amax() < 1e-5);
+        assert!(((later.1 - before.1) / (2.0 * h) - hinges).amax() < 1e-4);
     }
 
     #[test]

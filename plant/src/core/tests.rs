@@ -270,3 +270,5 @@ fn a_drive_that_never_boots_is_named() {
     assert_eq!(bench.causes(EventKind::Fault), [Cause::BootTimeout]);
     assert_eq!(bench.events[0].axis, 0);
 }
+
+mod stops;

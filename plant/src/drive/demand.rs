@@ -72,9 +72,10 @@ impl Demand {
         (target_m - from_m).abs() > most_m
     }
 
-    /// Begins the quick-stop ramp from the present demand.
-    pub(super) fn slow_down(&mut self, now_ns: u64) {
-        if let Some((position_m, velocity_m_s)) = self.at(now_ns) {
+    /// Begins the quick-stop ramp at the present demand and the axis' actual velocity. The demanded one
+    /// is no guide: SYNC brings the command just when a line ends, or after it, where it is zero.
+    pub(super) fn slow_down(&mut self, now_ns: u64, velocity_m_s: f64) {
+        if let Some(position_m) = self.position_m(now_ns) {
             self.shape = Shape::Ramp { position_m, velocity_m_s, from_ns: now_ns };
         }
     }
@@ -120,10 +121,10 @@ mod tests {
     fn the_quick_stop_ramp_slows_down_evenly_and_stays() {
         let mut demand = Demand::new(1e-3, 10.0);
         demand.head_for(0, 0.2702, 0.27, 0.4);
-        demand.slow_down(MS / 2);
+        demand.slow_down(MS, 0.2);
         // 0.2 m/s at 10 m/s²: 20 ms and 2 mm.
-        assert!(!demand.is_at_rest(MS / 2 + 19 * MS));
-        assert!(demand.is_at_rest(MS / 2 + 21 * MS));
-        assert!((demand.position_m(100 * MS).unwrap() - 0.2721).abs() < 1e-9);
+        assert!(!demand.is_at_rest(MS + 19 * MS));
+        assert!(demand.is_at_rest(MS + 21 * MS));
+        assert!((demand.position_m(100 * MS).unwrap() - 0.2722).abs() < 1e-9);
     }
 }

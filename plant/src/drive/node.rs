@@ -1,7 +1,7 @@
 //! The drive as a CANopen node: NMT, heartbeats, SYNC-driven process data, CiA 402.
 //!
 //! Objects whose values are fixed here: 6060 = 8 (cyclic synchronous position), 605A = 2 (quick-stop
-//! ramp, then switch on disabled), 6007 = 3 (quick stop on loss of the link), 1029:1 = 0 (then
+//! ramp, then switch on disabled), 605E = 2 (the same ramp on a fault), 6007 = 3 (quick stop on loss of the link), 1029:1 = 0 (then
 //! pre-operational). There is no SDO server: everything is set at construction.
 
 use masseter_shared::can::canopen::{
@@ -40,6 +40,8 @@ pub(crate) struct DriveSettings {
     pub(crate) period_s: f64,
     /// Step of the servo loops, s.
     pub(crate) step_s: f64,
+    /// Software position limit (object 607D): lowest and highest target, increments.
+    pub(crate) position_limit_increments: [i32; 2],
 }
 
 /// One drive.
@@ -166,10 +168,7 @@ impl DriveNode {
             self.controlword = rpdo.controlword;
             self.command_power(command, now_ns);
             if self.power == DriveState::OperationEnabled {
-                let target_m = self.encoder.metres(rpdo.target_increments);
-                let limit_m_s = self.settings.drive.max_velocity_m_s;
-                let actual_m = self.servo.position_m();
-                self.is_cut = self.demand.head_for(now_ns, target_m, actual_m, limit_m_s);
+                self.head_for(now_ns, rpdo.target_increments);
             }
         }
         let tpdo = Tpdo1 {
@@ -178,6 +177,16 @@ impl DriveNode {
             torque_permille: (self.force_n / self.settings.drive.rated_force_n * 1000.0).round() as i16,
         };
         self.send(tpdo.frame(self.settings.node));
+    }
+
+    /// Follows a target within the software position limit and the velocity limit.
+    fn head_for(&mut self, now_ns: u64, target_increments: i32) {
+        let [lowest, highest] = self.settings.position_limit_increments;
+        let within = target_increments.clamp(lowest, highest);
+        let target_m = self.encoder.metres(within);
+        let limit_m_s = self.settings.drive.max_velocity_m_s;
+        let is_too_fast = self.demand.head_for(now_ns, target_m, self.servo.position_m(), limit_m_s);
+        self.is_cut = is_too_fast || within != target_increments;
     }
 
     fn statusword(&self) -> Statusword {
@@ -206,7 +215,9 @@ impl DriveNode {
         self.straying_since_ns = None;
         match state {
             DriveState::OperationEnabled => {}
-            DriveState::QuickStopActive => self.demand.slow_down(now_ns),
+            DriveState::QuickStopActive | DriveState::FaultReactionActive => {
+                self.demand.slow_down(now_ns, self.servo.velocity_m_s());
+            }
             _ => self.demand.release(),
         }
     }
@@ -254,7 +265,8 @@ impl DriveNode {
 
     /// The drive's own transitions: initialised, quick stop ended, fault reaction ended.
     fn complete(&mut self, now_ns: u64) {
-        if self.power != DriveState::QuickStopActive || self.demand.is_at_rest(now_ns) {
+        let ramps = matches!(self.power, DriveState::QuickStopActive | DriveState::FaultReactionActive);
+        if !ramps || self.demand.is_at_rest(now_ns) {
             self.enter(self.power.after_completion(), now_ns);
         }
     }

@@ -56,6 +56,11 @@ impl Servo {
         self.position_m
     }
 
+    /// The filtered velocity, m/s.
+    pub(crate) fn velocity_m_s(&self) -> f64 {
+        self.velocity_m_s
+    }
+
     /// Whether force or velocity was limited in the last step.
     pub(crate) fn is_limited(&self) -> bool {
         self.is_limited

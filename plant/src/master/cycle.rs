@@ -29,6 +29,8 @@ pub(crate) struct MasterSettings {
     pub(crate) drives: [(NodeId, usize, Scale); AXES],
     /// Buses.
     pub(crate) buses: usize,
+    /// From the first to the last bit of SYNC, which makes the drives sample, ns.
+    pub(crate) sync_ns: u64,
     /// Interval of its own heartbeat, ns.
     pub(crate) heartbeat_ns: u64,
     /// Silence of a drive that counts as its loss, ns.
@@ -170,7 +172,7 @@ impl Master {
         *reading = Reading {
             cycle: self.wake.cycle,
             answers_cycle: self.command.map_or(0, |command| command.cycle),
-            sampled_ns: self.sync_ns,
+            sampled_ns: self.sync_ns + self.settings.sync_ns,
             complete_ns: self.complete_ns,
             command_received_ns: self.command_received_ns,
             due_ns: self.wake.due_ns,
@@ -217,7 +219,8 @@ impl Master {
         let Some(command) = command else {
             self.silent_cycles = self.silent_cycles.saturating_add(1);
             let limit = self.settings.command_timeout_cycles;
-            if self.command.is_some() && self.silent_cycles > limit {
+            // Who has switched the drives off may go.
+            if self.request() != DriveRequest::Off && self.silent_cycles > limit {
                 self.fail(
                     now_ns,
                     Cause::CommandLost,
@@ -228,7 +231,7 @@ impl Master {
             return;
         };
         self.silent_cycles = 0;
-        let bad_target = command.target_m.iter().position(|target_m| !target_m.is_finite());
+        let bad_target = (0..AXES).find(|&axis| !self.nodes[axis].can_go_to(command.target_m[axis]));
         if bad_target.is_some() || DriveRequest::try_from(command.request).is_err() {
             let code = f64::from(command.request);
             self.fail(now_ns, Cause::BadMessage, bad_target, [code, 0.0]);
@@ -238,6 +241,7 @@ impl Master {
     }
 
     fn supervise(&mut self, now_ns: u64) {
+        let shall_be_enabled = self.request() == DriveRequest::Enable;
         let mut all_enabled = true;
         for axis in 0..AXES {
             let node = &mut self.nodes[axis];
@@ -254,13 +258,13 @@ impl Master {
             } else if missing > MISSING_CYCLES {
                 let values = [missing, MISSING_CYCLES].map(f64::from);
                 self.fail(now_ns, Cause::ProcessDataLost, Some(axis), values);
-            } else if self.were_enabled && is_faulty(condition) {
+            } else if shall_be_enabled && self.were_enabled && condition != DriveCondition::OperationEnabled {
                 self.fail(now_ns, Cause::DriveFault, Some(axis), [f64::from(condition.code()), 0.0]);
             } else if nmt != Some(NmtState::Operational) {
                 self.watch_boot(now_ns, axis);
             }
         }
-        self.were_enabled |= all_enabled;
+        self.were_enabled = shall_be_enabled && (self.were_enabled || all_enabled);
     }
 
     fn watch_boot(&mut self, now_ns: u64, axis: usize) {
@@ -327,10 +331,6 @@ impl Master {
     pub(crate) fn drain_events(&mut self, out: &mut impl FnMut(Event)) {
         self.events.drain(..).for_each(out);
     }
-}
-
-fn is_faulty(condition: DriveCondition) -> bool {
-    matches!(condition, DriveCondition::Fault | DriveCondition::FaultReaction)
 }
 
 fn in_ms(ns: u64) -> f64 {

@@ -73,6 +73,11 @@ impl Node {
         f64::from(self.torque_permille) / 1000.0 * self.scale.rated_force_n
     }
 
+    /// Whether a target has a number of increments that 607A can hold; what is no number has none.
+    pub(super) fn can_go_to(&self, target_m: f64) -> bool {
+        (f64::from(i32::MIN)..=f64::from(i32::MAX)).contains(&(target_m / self.scale.increment_m).round())
+    }
+
     /// The process data that bring the drive where it is wanted. Until it follows targets, its target is
     /// where it stands, so that nothing jumps when it begins to (607A := 6064).
     pub(super) fn process_data(&mut self, request: DriveRequest, target_m: f64) -> Rpdo1 {

@@ -1,0 +1,126 @@
+//! Stops and limits of the whole plant: how hard, how far, and who may start it again.
+
+use masseter_shared::can::canopen::{Nmt, NmtCommand, NmtTarget};
+use masseter_shared::can::cia402::Controlword;
+use masseter_shared::can::{Bus, Frame, Rpdo1};
+
+use super::*;
+use crate::link::Buses;
+
+/// Close enough before the next SYNC to be the last word, early enough to be there in time.
+const LATE_NS: u64 = 850_000;
+
+/// A plant at full speed, and the commander that keeps it there.
+struct Moving {
+    bench: Bench,
+    start: Pose,
+    began: u64,
+}
+
+impl Moving {
+    fn new() -> Self {
+        let mut bench = Bench::new(&Scenario::default());
+        bench.enable();
+        let (start, began) = (start_pose(&bench), bench.cycle);
+        let mut moving = Self { bench, start, began };
+        (0..180).for_each(|_| moving.cycle());
+        assert!(moving.bench.fastest_axis_m_s() > 0.05);
+        moving
+    }
+
+    fn cycle(&mut self) {
+        let time_s = (self.bench.cycle + 3 - self.began) as f64 * 1e-3;
+        let targets_m = targets(&self.bench.mechanism.clone(), &self.start, time_s);
+        self.bench.cycle(Some(&|_| (targets_m, DriveRequest::Enable)));
+    }
+
+    /// A frame that somebody puts on the bus late in the present cycle.
+    fn disturb(&mut self, bus: usize, frame: Frame) {
+        let now_ns = EPOCH_NS + (self.bench.cycle - 1) * PERIOD_NS + LATE_NS;
+        self.bench.plant.link.port(bus).send(now_ns, frame).unwrap();
+    }
+}
+
+#[test]
+fn a_quick_stop_slows_down_along_its_ramp() {
+    let Moving { mut bench, .. } = Moving::new();
+    let ramp_m_s2 = Scenario::default().drives.leg.quick_stop_deceleration_m_s2;
+    let mut hardest_m_s2: f64 = 0.0;
+    let mut cycles = 0;
+    while cycles < 2 || !bench.plant.drives_are_off() {
+        let before = bench.truth.joint_m_s;
+        bench.cycle(Some(&|reading| (reading.position_m, DriveRequest::QuickStop)));
+        let slowed = before.into_iter().zip(bench.truth.joint_m_s).map(|(was, is)| (was - is).abs() / 1e-3);
+        hardest_m_s2 = slowed.fold(hardest_m_s2, f64::max);
+        cycles += 1;
+        assert!(cycles < 30, "still moving");
+    }
+    println!("off after {cycles} ms, at most {hardest_m_s2:.1} m/s²");
+    assert!(hardest_m_s2 < 1.5 * ramp_m_s2, "{hardest_m_s2} m/s²");
+}
+
+/// The drive obeys a quick stop that the master did not ask for: nobody may switch it on again.
+#[test]
+fn a_drive_that_leaves_operation_stops_them_all_for_good() {
+    let mut moving = Moving::new();
+    let stop = Rpdo1 { controlword: Controlword::QUICK_STOP, target_increments: 0 };
+    moving.disturb(1, stop.frame(NodeId::new(4).unwrap()));
+    (0..100).for_each(|_| moving.cycle());
+    assert!(moving.bench.plant.drives_are_off(), "{:?}", moving.bench.reading.drive_state);
+    assert_eq!(moving.bench.causes(EventKind::Fault), [Cause::DriveFault]);
+}
+
+#[test]
+fn a_drive_taken_out_of_operational_stops_them_all() {
+    let mut moving = Moving::new();
+    let target = NmtTarget::Node(NodeId::new(4).unwrap());
+    moving.disturb(1, Nmt { command: NmtCommand::EnterPreOperational, target }.frame());
+    (0..200).for_each(|_| moving.cycle());
+    assert!(moving.bench.plant.drives_are_off(), "{:?}", moving.bench.reading.drive_state);
+    assert_eq!(moving.bench.causes(EventKind::Fault), [Cause::ProcessDataLost]);
+}
+
+#[test]
+fn targets_beyond_the_stroke_end_at_it() {
+    let mut bench = Bench::new(&Scenario::default());
+    bench.enable();
+    for _ in 0..500 {
+        bench.cycle(Some(&|_| ([0.0, 0.0, 0.0, 10.0, 10.0, 10.0], DriveRequest::Enable)));
+    }
+    let [_, highest_m] = bench.mechanism.strokes().leg_m;
+    assert!(bench.truth.joint_m[3..].iter().all(|leg_m| (leg_m - highest_m).abs() < 1e-5));
+    assert_eq!(bench.causes(EventKind::Fault), []);
+}
+
+#[test]
+fn a_target_without_increments_stops_the_rig() {
+    let mut bench = Bench::new(&Scenario::default());
+    bench.enable();
+    let before = bench.truth.joint_m;
+    for _ in 0..50 {
+        bench.cycle(Some(&|_| ([1e9; AXES], DriveRequest::Enable)));
+    }
+    assert!(before.iter().zip(bench.truth.joint_m).all(|(before, after)| (before - after).abs() < 2e-4));
+    assert_eq!(bench.causes(EventKind::Fault), [Cause::BadMessage]);
+}
+
+#[test]
+fn a_commander_that_switched_the_drives_off_may_go() {
+    let mut bench = Bench::new(&Scenario::default());
+    bench.enable();
+    for _ in 0..20 {
+        bench.cycle(Some(&|reading| (reading.position_m, DriveRequest::Off)));
+    }
+    for _ in 0..100 {
+        bench.cycle(None);
+    }
+    assert_eq!(bench.causes(EventKind::Fault), []);
+    assert_eq!(bench.reading.master_fault, 0);
+}
+
+#[test]
+fn reading_and_truth_name_the_same_instant() {
+    let mut bench = Bench::new(&Scenario::default());
+    bench.enable();
+    assert_eq!(bench.reading.sampled_ns, bench.truth.sampled_ns);
+}
