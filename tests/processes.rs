@@ -148,6 +148,29 @@ fn what_the_kernel_refuses_is_said_and_required_real_time_exits_with_3() {
 }
 
 #[test]
+fn a_full_disk_does_not_stop_the_rig() {
+    if !rustix::process::getuid().is_root() {
+        eprintln!("SKIPPED: needs root to mount a small disk");
+        return;
+    }
+    let bench = Bench::new(&format!("duration_s = 3.0\n{UNHURRIED}"));
+    let disk = bench.file("disk");
+    fs::create_dir(&disk).unwrap();
+    let mounted =
+        Command::new("mount").args(["-t", "tmpfs", "-o", "size=2m", "tmpfs"]).arg(&disk).status().unwrap();
+    assert!(mounted.success());
+    let scenario = bench.file("scenario.toml");
+    let output =
+        Command::new(common::MASSETER).arg("run").arg(scenario).arg("--out").arg(disk.join("run")).output();
+    Command::new("umount").arg(&disk).status().unwrap();
+    let output = output.unwrap();
+    assert_eq!(output.status.code(), Some(6), "{}{}", stdout(&output), stderr(&output));
+    let said = stderr(&output);
+    assert!(said.contains("the rig goes on"), "{said}");
+    assert!(said.contains("running       cycle     3"), "the rig stopped with its recording: {said}");
+}
+
+#[test]
 fn an_ordinary_user_runs_the_rig_without_real_time() {
     if !rustix::process::getuid().is_root() {
         eprintln!("SKIPPED: needs root to become an ordinary user; every other test here ran as one");

@@ -50,17 +50,20 @@ pub(crate) fn write(
     let verdict = Verdict::of(manifest, figures);
     let summary = Summary { form: FORM, verdict: &verdict, figures };
     let json = serde_json::to_string_pretty(&summary).context("cannot write the summary")? + "\n";
-    let table = table::of_run(manifest, figures, &verdict);
+    match format {
+        Format::Human => {
+            print!("{}\nfiles: {}\n", table::of_run(manifest, figures, &verdict), folder.path().display());
+        }
+        Format::Json => print!("{json}"),
+    }
     for (path, text) in [
         (folder.summary(), &json),
         (folder.junit(), &junit::of_run(manifest, figures, &verdict)),
         (folder.report(), &html::of_run(manifest, figures, &verdict)),
     ] {
-        fs::write(&path, text).with_context(|| format!("cannot write {}", path.display()))?;
-    }
-    match format {
-        Format::Human => print!("{table}\nfiles: {}\n", folder.path().display()),
-        Format::Json => print!("{json}"),
+        fs::write(&path, text)
+            .with_context(|| format!("cannot write {}", path.display()))
+            .map_err(Failure::with(Exit::Incomplete))?;
     }
     Ok(verdict.exit)
 }

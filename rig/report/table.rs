@@ -109,8 +109,10 @@ fn events(text: &mut String, figures: &Figures) -> std::fmt::Result {
 pub(super) fn in_words(event: &EventRecord) -> String {
     let axis = event.axis.map_or_else(String::new, |axis| format!(" on {axis}"));
     let moved = event.transition.as_ref().map_or_else(String::new, |[from, to]| format!(", {from} → {to}"));
-    format!(
-        "cycle {:>6} {}: {}{axis} (value {}, limit {}){moved}",
-        event.cycle, event.source, event.cause, event.value, event.limit
-    )
+    let values = match event.cause.as_str() {
+        "emergency" => format!(" (EMCY {:04X}h)", event.value as u16),
+        "sequence" | "stop_requested" => String::new(),
+        _ => format!(" (value {}, limit {})", event.value, event.limit),
+    };
+    format!("cycle {:>6} {}: {}{axis}{values}{moved}", event.cycle, event.source, event.cause)
 }

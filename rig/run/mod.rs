@@ -40,7 +40,7 @@ pub fn run(args: &RunArgs) -> Result<Exit, Failure> {
         }
     };
     manifest.ending = ending;
-    manifest.write(&folder).context("cannot write the manifest")?;
+    manifest.write(&folder).context("cannot write the manifest").map_err(Failure::with(Exit::Incomplete))?;
     if manifest.ending == Ending::NotStarted {
         return Ok(Exit::Invalid);
     }

@@ -106,7 +106,7 @@ impl VirtualWire {
     /// [`SendError::QueueFull`]; no other.
     pub fn send(&mut self, port: usize, now_ns: u64, frame: Frame) -> Result<(), SendError> {
         let queued_ns = now_ns.max(self.advanced_to_ns);
-        self.ports[port].transmit.push(Queued { frame, queued_ns })
+        self.ports[port].transmit.push(Queued { frame, bits: wire_bits(&frame), since_ns: queued_ns })
     }
 
     /// The next frame that a port had received at `now_ns`.
@@ -187,8 +187,8 @@ impl VirtualWire {
     fn arbitrate(&self, start_ns: u64) -> Option<Flight> {
         let heads = self.ports.iter().enumerate();
         let heads = heads.filter_map(|(port, queues)| Some((port, queues.transmit.most_urgent(start_ns)?)));
-        let (sender, Queued { frame, queued_ns }) = heads.min_by_key(|(_, head)| head.frame.id())?;
-        let bits = wire_bits(&frame);
+        let (sender, Queued { frame, bits, since_ns: queued_ns }) =
+            heads.min_by_key(|(_, head)| head.frame.id())?;
         let end_ns = start_ns + self.bitrate.bits_to_ns(bits - INTERFRAME_BITS);
         Some(Flight { sender, frame, queued_ns, bits, start_ns, end_ns })
     }

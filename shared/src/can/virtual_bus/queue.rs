@@ -9,7 +9,9 @@ use crate::can::frame::Frame;
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Queued {
     pub(super) frame: Frame,
-    pub(super) queued_ns: u64,
+    /// Its length on the wire, found once: arbitration asks for it again and again.
+    pub(super) bits: u32,
+    pub(super) since_ns: u64,
 }
 
 /// Frames in the order of priority; those of one identifier in the order they were queued.
@@ -35,7 +37,7 @@ impl TransmitQueue {
 
     /// When the frame that waits longest was queued.
     pub(super) fn earliest_ns(&self) -> Option<u64> {
-        self.frames.iter().map(|queued| queued.queued_ns).min()
+        self.frames.iter().map(|queued| queued.since_ns).min()
     }
 
     /// The most urgent of the frames queued up to that time.
@@ -51,7 +53,7 @@ impl TransmitQueue {
     }
 
     fn place_of_most_urgent(&self, at_ns: u64) -> Option<usize> {
-        self.frames.iter().position(|queued| queued.queued_ns <= at_ns)
+        self.frames.iter().position(|queued| queued.since_ns <= at_ns)
     }
 }
 
