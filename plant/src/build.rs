@@ -6,6 +6,7 @@ use masseter_shared::can::{Bitrate, BitrateError, VirtualWire, WireConfig};
 use masseter_shared::config::{CanConfig, DriveConfig, DynamicsConfig, Scenario};
 use masseter_shared::geometry::{AXES, AXIS_NAMES, GeometryError, LEGS, Mechanism, Pose};
 
+use crate::checks::check_quantities;
 use crate::drive::{DriveNode, DriveSettings};
 use crate::encoder::Encoder;
 use crate::link::{Place, VirtualLink};
@@ -18,8 +19,6 @@ const MASTER_ID: u8 = 127;
 const TRANSMIT_CAPACITY: usize = 64;
 const RECEIVE_CAPACITY: usize = 256;
 const MS_NS: u64 = 1_000_000;
-/// Integration steps that resolve the stiffest parts and cost a bearable time, ns.
-const STEPS_NS: std::ops::RangeInclusive<u64> = 10_000..=250_000;
 
 /// A plant that cannot be built or cannot go on.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -67,7 +66,6 @@ pub enum PlantError {
 /// Master and link of a scenario's plant, switched on at `now_ns`.
 pub(crate) fn build(scenario: &Scenario, now_ns: u64) -> Result<(Master, VirtualLink), PlantError> {
     check_quantities(scenario)?;
-    check_times(&scenario.can, &scenario.dynamics)?;
     let places = places(&scenario.can)?;
     let ids = node_ids(&scenario.can)?;
     let mechanism = Mechanism::new(&scenario.mechanism)?;
@@ -180,11 +178,13 @@ fn node_ids(can: &CanConfig) -> Result<[NodeId; AXES], PlantError> {
     Ok(ids)
 }
 
-/// The platform level on three legs of the initial length, slides in the middle: found as the height at
-/// which inverse kinematics gives that length, by bisection, for the legs' mean.
+/// The platform level on three legs of the initial length, turned as the hinges are and above their
+/// middle: the height is found by bisection for the legs' mean.
 fn resting(mechanism: Mechanism, config: &DynamicsConfig) -> Result<Dynamics, PlantError> {
+    let hinges = mechanism.pose_from_corners(&std::array::from_fn(|leg| mechanism.hinge(leg, 0.0)));
+    let at_height = |height_m: f64| Pose::translation(0.0, 0.0, height_m) * hinges;
     let mean_leg_m = |height_m: f64| {
-        let joints = mechanism.inverse(&Pose::translation(0.0, 0.0, height_m));
+        let joints = mechanism.inverse(&at_height(height_m));
         joints.map_or(0.0, |joints| joints.actuators.leg_m.iter().sum::<f64>() / LEGS as f64)
     };
     let (mut low_m, mut high_m) = (0.0, config.initial_leg_m);
@@ -192,7 +192,7 @@ fn resting(mechanism: Mechanism, config: &DynamicsConfig) -> Result<Dynamics, Pl
         let middle_m = f64::midpoint(low_m, high_m);
         if mean_leg_m(middle_m) < config.initial_leg_m { low_m = middle_m } else { high_m = middle_m }
     }
-    let pose = Pose::translation(0.0, 0.0, low_m);
+    let pose = at_height(low_m);
     if let Ok(joints) = mechanism.inverse(&pose)
         && let Err(violation) = mechanism.strokes().check(&joints.actuators)
     {
@@ -203,77 +203,6 @@ fn resting(mechanism: Mechanism, config: &DynamicsConfig) -> Result<Dynamics, Pl
         });
     }
     Ok(Dynamics::new(mechanism, *config, pose)?)
-}
-
-fn check_quantities(scenario: &Scenario) -> Result<(), PlantError> {
-    let dynamics = &scenario.dynamics;
-    let can = &scenario.can;
-    let above_zero = [
-        ("dynamics.step_ns", dynamics.step_ns as f64),
-        ("dynamics.carriage_mass_kg", dynamics.carriage_mass_kg),
-        ("dynamics.rod_mass_kg", dynamics.rod_mass_kg),
-        ("dynamics.platform_mass_kg", dynamics.platform_mass_kg),
-        ("dynamics.initial_leg_m", dynamics.initial_leg_m),
-        ("can.heartbeat_producer_ms", f64::from(can.heartbeat_producer_ms)),
-        ("can.heartbeat_consumer_ms", f64::from(can.heartbeat_consumer_ms)),
-        ("can.boot_timeout_ms", f64::from(can.boot_timeout_ms)),
-        ("can.command_timeout_cycles", f64::from(can.command_timeout_cycles)),
-    ];
-    let not_below = [
-        ("dynamics.leg_inertia_kg_m2", dynamics.leg_inertia_kg_m2),
-        ("dynamics.slide_friction_n", dynamics.slide_friction_n),
-        ("dynamics.viscous_friction_n_s_per_m", dynamics.viscous_friction_n_s_per_m),
-        ("dynamics.gravity_m_s2", dynamics.gravity_m_s2),
-    ];
-    for (key, value) in
-        above_zero.into_iter().chain(drive_quantities(&scenario.drives.slide, &scenario.drives.leg))
-    {
-        if !(value.is_finite() && value > 0.0) {
-            return Err(PlantError::Quantity { key, value, need: "use a finite number above 0" });
-        }
-    }
-    for (key, value) in not_below
-        .into_iter()
-        .chain(dynamics.platform_inertia_kg_m2.map(|i| ("dynamics.platform_inertia_kg_m2", i)))
-    {
-        if !(value.is_finite() && value >= 0.0) {
-            return Err(PlantError::Quantity { key, value, need: "use a finite number not below 0" });
-        }
-    }
-    Ok(())
-}
-
-/// A heartbeat must be able to arrive before it counts as lost, and the stiffest parts of the rig, brakes
-/// and velocity loops, must be resolved by the integration.
-fn check_times(can: &CanConfig, dynamics: &DynamicsConfig) -> Result<(), PlantError> {
-    let quantity = |key, value, need| Err(PlantError::Quantity { key, value, need });
-    if can.heartbeat_consumer_ms <= can.heartbeat_producer_ms {
-        let value = f64::from(can.heartbeat_consumer_ms);
-        return quantity("can.heartbeat_consumer_ms", value, "use more than can.heartbeat_producer_ms");
-    }
-    if !STEPS_NS.contains(&dynamics.step_ns) {
-        return quantity("dynamics.step_ns", dynamics.step_ns as f64, "use 10000 to 250000 ns");
-    }
-    Ok(())
-}
-
-fn drive_quantities(slide: &DriveConfig, leg: &DriveConfig) -> impl Iterator<Item = (&'static str, f64)> {
-    [("drives.slide", *slide), ("drives.leg", *leg)].into_iter().flat_map(|(key, drive)| {
-        [
-            drive.rated_force_n,
-            drive.max_force_n,
-            drive.max_velocity_m_s,
-            drive.quick_stop_deceleration_m_s2,
-            drive.following_error_m,
-            drive.position_gain_per_s,
-            drive.velocity_gain_n_s_per_m,
-            drive.velocity_integral_time_s,
-            drive.encoder_resolution_m,
-            // The noise may be zero; that it is a number is all it needs.
-            1.0 + drive.encoder_noise_m.abs(),
-        ]
-        .map(|value| (key, value))
-    })
 }
 
 #[cfg(test)]
@@ -316,6 +245,20 @@ mod tests {
         }
         for leg_m in [l1, l2, l3] {
             assert!((leg_m - scenario.dynamics.initial_leg_m).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn a_turned_base_starts_level_too() {
+        let mut scenario = Scenario::default();
+        for (slide, leg_deg) in scenario.mechanism.slides.iter_mut().zip([40.0, 160.0, 280.0]) {
+            let (sin, cos) = f64::to_radians(leg_deg).sin_cos();
+            slide.centre_m = [0.0577 * cos, 0.0577 * sin];
+            slide.azimuth_deg = leg_deg + 90.0;
+        }
+        let (_, link) = build(&scenario, 0).unwrap();
+        for slide_m in &link.truth().joint_m[..LEGS] {
+            assert!(slide_m.abs() < 1e-9, "{slide_m}");
         }
     }
 }

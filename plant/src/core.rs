@@ -5,8 +5,8 @@
 //! [`PlantCore::reading`] and [`PlantCore::truth`], then [`PlantCore::apply`]. Called with irregular
 //! times, as real time has them, or with exact ones.
 
-use masseter_shared::can::canopen::{Cob, CobError};
-use masseter_shared::can::tap;
+use masseter_shared::can::canopen::Cob;
+use masseter_shared::can::{ReceiveError, Received, tap};
 use masseter_shared::config::Scenario;
 use masseter_shared::messages::{Command, Event, FrameTap, Reading, Truth};
 use masseter_shared::realtime::Wake;
@@ -95,16 +95,21 @@ impl PlantCore {
 
     fn collect_taps(&mut self, now_ns: u64) {
         for bus in 0..self.buses {
-            while self.tapped.len() < TAPPED
-                && let Ok(Some(received)) = self.link.tap(bus, now_ns)
-            {
-                let cob: Result<Cob, CobError> = received.frame.id().try_into();
-                if matches!(cob, Ok(Cob::Rpdo1(_))) {
-                    self.command_sent_ns = self.command_sent_ns.max(received.time_ns);
+            while self.tapped.len() < TAPPED {
+                match self.link.tap(bus, now_ns) {
+                    Ok(Some(received)) => self.take_tapped(bus, &received),
+                    Err(ReceiveError::Overrun { lost }) => self.master.note_lost(now_ns, lost),
+                    Ok(None) | Err(ReceiveError::InterfaceDown { .. } | ReceiveError::Os { .. }) => break,
                 }
-                self.tapped.push(tap::encode(bus as u16, &received));
             }
         }
+    }
+
+    fn take_tapped(&mut self, bus: usize, received: &Received) {
+        if matches!(Cob::try_from(received.frame.id()), Ok(Cob::Rpdo1(_))) {
+            self.command_sent_ns = self.command_sent_ns.max(received.time_ns);
+        }
+        self.tapped.push(tap::encode(bus as u16, received));
     }
 }
 

@@ -4,6 +4,7 @@
 //! the controller, and never solves the forward kinematics: its truth is the integrated mechanism.
 
 mod build;
+mod checks;
 pub mod core;
 mod drive;
 mod encoder;

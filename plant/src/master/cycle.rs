@@ -1,24 +1,21 @@
-//! The master's cycle: SYNC and heartbeat, process data in, process data out, supervision.
+//! The master's cycle: SYNC and heartbeat, process data in, process data out.
 
 use masseter_shared::can::canopen::{
     Cob, Emergency, Heartbeat, Nmt, NmtCommand, NmtState, NmtTarget, NodeId, sync,
 };
-use masseter_shared::can::{Bus, Frame, Received, SendError, Tpdo1};
+use masseter_shared::can::{Bus, Frame, Received, Tpdo1};
 use masseter_shared::geometry::AXES;
-use masseter_shared::messages::codes::{Cause, DriveCondition, DriveRequest, EventKind, NO_AXIS, Source};
+use masseter_shared::messages::codes::{Cause, DriveCondition, DriveRequest, EventKind, Source};
 use masseter_shared::messages::{Command, Event, Reading};
 use masseter_shared::realtime::Wake;
 
+use super::journal::{Journal, overflow};
 use super::node::Node;
 pub(crate) use super::node::Scale;
 use crate::link::Buses;
 
-/// Events kept between two drains; a drain follows every cycle.
-const EVENTS: usize = 256;
 /// Frames taken from a bus in one go, so that a babbling node cannot hold the cycle up.
 const FRAMES_AT_ONCE: usize = 512;
-/// Cycles that an operational drive's process data may be missing.
-const MISSING_CYCLES: u32 = 3;
 
 /// What the master is configured with.
 #[derive(Debug, Clone)]
@@ -44,19 +41,19 @@ pub(crate) struct MasterSettings {
 /// The master.
 #[derive(Debug)]
 pub(crate) struct Master {
-    settings: MasterSettings,
-    nodes: [Node; AXES],
-    began_ns: u64,
-    wake: Wake,
+    pub(super) settings: MasterSettings,
+    pub(super) nodes: [Node; AXES],
+    pub(super) began_ns: u64,
+    pub(super) wake: Wake,
     sync_ns: u64,
     complete_ns: u64,
     next_heartbeat_ns: u64,
     command: Option<Command>,
     command_received_ns: u64,
     silent_cycles: u32,
-    were_enabled: bool,
-    has_fault: bool,
-    events: Vec<Event>,
+    pub(super) were_enabled: bool,
+    pub(super) has_fault: bool,
+    pub(super) journal: Journal,
 }
 
 impl Master {
@@ -75,7 +72,7 @@ impl Master {
             silent_cycles: 0,
             were_enabled: false,
             has_fault: false,
-            events: Vec::with_capacity(EVENTS),
+            journal: Journal::new(),
         }
     }
 
@@ -160,10 +157,17 @@ impl Master {
         let after = node.condition();
         self.complete_ns = self.complete_ns.max(time_ns);
         if before != after {
-            self.report(time_ns, Source::Drive, EventKind::Transition, Cause::Sequence, Some(axis), [0.0; 2]);
-            if let Some(event) = self.events.last_mut() {
-                (event.from, event.to) = (before.code(), after.code());
-            }
+            self.journal.add(Event {
+                time_ns,
+                cycle: self.wake.cycle,
+                source: Source::Drive.code(),
+                kind: EventKind::Transition.code(),
+                cause: Cause::Sequence.code(),
+                axis: axis as u32,
+                from: before.code(),
+                to: after.code(),
+                ..Event::default()
+            });
         }
     }
 
@@ -207,7 +211,7 @@ impl Master {
     }
 
     /// What is asked of the drives: what the last good command asks, unless something is wrong.
-    fn request(&self) -> DriveRequest {
+    pub(super) fn request(&self) -> DriveRequest {
         if self.has_fault {
             return DriveRequest::QuickStop;
         }
@@ -240,80 +244,6 @@ impl Master {
         (self.command, self.command_received_ns) = (Some(*command), now_ns);
     }
 
-    fn supervise(&mut self, now_ns: u64) {
-        let shall_be_enabled = self.request() == DriveRequest::Enable;
-        let mut all_enabled = true;
-        for axis in 0..AXES {
-            let node = &mut self.nodes[axis];
-            if node.is_operational() && !node.is_fresh {
-                node.missing_cycles += 1;
-            }
-            let (nmt, missing) = (node.nmt, node.missing_cycles);
-            let silent_ns = now_ns.saturating_sub(node.heard_ns);
-            let condition = node.condition();
-            all_enabled &= condition == DriveCondition::OperationEnabled;
-            if nmt.is_some() && silent_ns > self.settings.heartbeat_timeout_ns {
-                let limit_ns = self.settings.heartbeat_timeout_ns;
-                self.fail(now_ns, Cause::HeartbeatLost, Some(axis), [silent_ns, limit_ns].map(in_ms));
-            } else if missing > MISSING_CYCLES {
-                let values = [missing, MISSING_CYCLES].map(f64::from);
-                self.fail(now_ns, Cause::ProcessDataLost, Some(axis), values);
-            } else if shall_be_enabled && self.were_enabled && condition != DriveCondition::OperationEnabled {
-                self.fail(now_ns, Cause::DriveFault, Some(axis), [f64::from(condition.code()), 0.0]);
-            } else if nmt != Some(NmtState::Operational) {
-                self.watch_boot(now_ns, axis);
-            }
-        }
-        self.were_enabled = shall_be_enabled && (self.were_enabled || all_enabled);
-    }
-
-    fn watch_boot(&mut self, now_ns: u64, axis: usize) {
-        let waited_ns = now_ns.saturating_sub(self.began_ns);
-        if waited_ns > self.settings.boot_timeout_ns {
-            let limit_ns = self.settings.boot_timeout_ns;
-            self.fail(now_ns, Cause::BootTimeout, Some(axis), [waited_ns, limit_ns].map(in_ms));
-        }
-    }
-
-    /// Stops the drives for good. The first cause is reported, its consequences are not.
-    fn fail(&mut self, now_ns: u64, cause: Cause, axis: Option<usize>, values: [f64; 2]) {
-        if !self.has_fault {
-            self.has_fault = true;
-            self.report(now_ns, Source::Master, EventKind::Fault, cause, axis, values);
-        }
-    }
-
-    fn check_sent(&mut self, result: Result<(), SendError>) {
-        if result.is_err() {
-            self.fail(self.wake.woke_ns, Cause::BusRefused, None, [0.0; 2]);
-        }
-    }
-
-    fn report(
-        &mut self,
-        time_ns: u64,
-        source: Source,
-        kind: EventKind,
-        cause: Cause,
-        axis: Option<usize>,
-        [value, limit]: [f64; 2],
-    ) {
-        if self.events.len() == EVENTS {
-            return;
-        }
-        self.events.push(Event {
-            time_ns,
-            cycle: self.wake.cycle,
-            source: source.code(),
-            kind: kind.code(),
-            cause: cause.code(),
-            axis: axis.map_or(NO_AXIS, |axis| axis as u32),
-            value,
-            limit,
-            ..Event::default()
-        });
-    }
-
     /// Whether no drive gives force, as far as they tell.
     pub(crate) fn drives_are_off(&self) -> bool {
         self.nodes.iter().all(|node| {
@@ -327,12 +257,13 @@ impl Master {
         })
     }
 
+    /// Notes that so many tapped frames had no room.
+    pub(crate) fn note_lost(&mut self, time_ns: u64, lost: u64) {
+        self.journal.add(overflow(time_ns, self.wake.cycle, lost));
+    }
+
     /// Hands out the events since the last drain.
     pub(crate) fn drain_events(&mut self, out: &mut impl FnMut(Event)) {
-        self.events.drain(..).for_each(out);
+        self.journal.drain(out);
     }
-}
-
-fn in_ms(ns: u64) -> f64 {
-    ns as f64 / 1e6
 }

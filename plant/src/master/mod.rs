@@ -5,6 +5,8 @@
 //! same to it. There is no SDO yet: the drives' configuration is taken as given.
 
 mod cycle;
+mod journal;
 mod node;
+mod supervision;
 
 pub(crate) use cycle::{Master, MasterSettings, Scale};

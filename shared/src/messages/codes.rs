@@ -185,6 +185,8 @@ codes! {
         Overrun = 22 "overrun",
         /// The CAN master refuses to move anything; its own event says why.
         MasterFault = 23 "master_fault",
+        /// A bounded buffer had no room (items lost).
+        Overflow = 24 "overflow",
     }
 }
 
