@@ -6,12 +6,10 @@
 use std::path::Path;
 use std::time::Duration;
 
-use anyhow::Context;
 use masseter_shared::clock::{self, SECOND_NS};
-use masseter_shared::lifecycle::{Assignment, StopRequest, ready_and_wait};
+use masseter_shared::lifecycle::Assignment;
 use masseter_shared::messages::codes::ControllerState;
 use masseter_shared::messages::{Command, Event, FrameTap, Message, Reading, State, Truth};
-use masseter_shared::realtime::scheduling::{Wanted, obtain};
 use masseter_shared::transport::{Inlet, Node, TransportError};
 
 use crate::exit::Exit;
@@ -27,17 +25,15 @@ const PROGRESS_NS: u64 = SECOND_NS;
 /// Records until asked to stop, then drains what is left. [`Exit::Incomplete`] when the recording
 /// could not be written to its end.
 pub fn run(assignment: &Assignment, recording: &Path) -> anyhow::Result<Exit> {
-    let (_, domain) = assignment.open()?;
-    let stop = StopRequest::listen().context("cannot listen for signals")?;
-    let node = Node::join(&domain)?;
-    let topics = Topics::open(&node)?;
+    let post = assignment.take_up()?;
+    let topics = Topics::open(&post.node)?;
     let mut sink = Sink { recorder: Some(Recorder::create(recording)?) };
-    let start = ready_and_wait(obtain(Wanted { core: None, fifo_priority: None, locked_memory: false }))?;
+    let start = post.ready()?;
 
     let mut progress = Progress { next_ns: start.epoch_ns + PROGRESS_NS, latest: State::default() };
     let mut flush_ns = start.epoch_ns + FLUSH_NS;
     loop {
-        let last = stop.is_made();
+        let last = post.stop.is_made();
         let now_ns = clock::now_ns();
         topics.drain(&mut sink, now_ns, &mut progress)?;
         if last {

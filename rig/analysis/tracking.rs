@@ -7,6 +7,10 @@ use serde::Serialize;
 
 use super::join::ByCycle;
 
+/// States in which the platform is asked to be somewhere.
+const MOVING: [ControllerState; 3] =
+    [ControllerState::Easing, ControllerState::Running, ControllerState::Holding];
+
 /// Errors of the platform's pose while the motion played.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct TrackingFigures {
@@ -24,7 +28,7 @@ pub struct TrackingFigures {
     pub estimate_rms_mm: f64,
 }
 
-/// One cycle of the track.
+/// One cycle of the track, from the first easing to the last hold.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TrackingSample {
     /// When, ns.
@@ -39,7 +43,7 @@ pub struct TrackingSample {
 struct Wanted {
     desired: Pose,
     estimated: Pose,
-    is_running: bool,
+    state: u32,
 }
 
 /// Joins wanted, estimated and true poses of the same sample.
@@ -83,7 +87,7 @@ impl Tracking {
         let wanted = Wanted {
             desired: pose_of_fields(state.desired_position_m, state.desired_quaternion_wxyz),
             estimated: pose_of_fields(state.estimated_position_m, state.estimated_quaternion_wxyz),
-            is_running: state.controller_state == ControllerState::Running.code(),
+            state: state.controller_state,
         };
         match self.true_poses.take(state.reading_cycle) {
             Some(truth) => self.compare(&wanted, truth),
@@ -101,16 +105,18 @@ impl Tracking {
 
     fn compare(&mut self, wanted: &Wanted, (sampled_ns, truth): (u64, Pose)) {
         let position = truth.translation.vector;
-        if wanted.is_running {
+        if wanted.state == ControllerState::Running.code() {
             self.distances.add((wanted.desired.translation.vector - position).norm());
             self.angles.add(wanted.desired.rotation.angle_to(&truth.rotation));
             self.estimates.add((wanted.estimated.translation.vector - position).norm());
         }
-        self.track.push(TrackingSample {
-            sampled_ns,
-            desired_m: wanted.desired.translation.vector.into(),
-            true_m: position.into(),
-        });
+        if MOVING.iter().any(|state| state.code() == wanted.state) {
+            self.track.push(TrackingSample {
+                sampled_ns,
+                desired_m: wanted.desired.translation.vector.into(),
+                true_m: position.into(),
+            });
+        }
     }
 
     pub(super) fn finish(self) -> (TrackingFigures, Vec<TrackingSample>) {

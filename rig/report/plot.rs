@@ -66,7 +66,12 @@ fn draw(label: &str, curves: &[Curve]) -> Result<String, Box<dyn Error>> {
                 .legend(move |(x, y)| PathElement::new([(x, y), (x + 16, y)], colour));
         }
         if curves.len() > 1 {
-            chart.configure_series_labels().background_style(WHITE).border_style(BLACK).draw()?;
+            chart
+                .configure_series_labels()
+                .position(SeriesLabelPosition::LowerLeft)
+                .background_style(WHITE)
+                .border_style(BLACK)
+                .draw()?;
         }
         area.present()?;
     }

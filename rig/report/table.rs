@@ -107,12 +107,17 @@ fn events(text: &mut String, figures: &Figures) -> std::fmt::Result {
 
 /// An event in a line.
 pub(super) fn in_words(event: &EventRecord) -> String {
-    let axis = event.axis.map_or_else(String::new, |axis| format!(" on {axis}"));
-    let moved = event.transition.as_ref().map_or_else(String::new, |[from, to]| format!(", {from} → {to}"));
+    let axis = event.axis.map_or_else(String::new, |axis| format!(" {axis}"));
+    let moved = event.transition.as_ref().map(|[from, to]| format!("{from} → {to}"));
     let values = match event.cause.as_str() {
         "emergency" => format!(" (EMCY {:04X}h)", event.value as u16),
-        "sequence" | "stop_requested" => String::new(),
+        "stop_requested" => String::new(),
         _ => format!(" (value {}, limit {})", event.value, event.limit),
     };
-    format!("cycle {:>6} {}: {}{axis}{values}{moved}", event.cycle, event.source, event.cause)
+    let moved = moved.unwrap_or_default();
+    let (cycle, source) = (event.cycle, &event.source);
+    match event.cause.as_str() {
+        "sequence" => format!("cycle {cycle:>6} {source}{axis}: {moved}"),
+        cause => format!("cycle {cycle:>6} {source}{axis}: {cause}{values} {moved}").trim_end().to_owned(),
+    }
 }

@@ -14,8 +14,9 @@ use serde::{Deserialize, Serialize};
 use signal_hook::consts::{SIGINT, SIGTERM};
 
 use crate::config::{Scenario, ScenarioError};
-use crate::realtime::scheduling::Obtained;
-use crate::transport::{Domain, DomainError};
+use crate::realtime::scheduling::{Obtained, Wanted, obtain};
+use crate::schedule::{CycleSchedule, ScheduleError};
+use crate::transport::{Domain, DomainError, Node, TransportError};
 
 /// What a process is started with.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -26,22 +27,71 @@ pub struct Assignment {
     pub domain: String,
 }
 
-impl Assignment {
-    /// Reads the scenario and names the domain.
-    pub fn open(&self) -> Result<(Scenario, Domain), AssignmentError> {
-        Ok((Scenario::read(&self.scenario)?, Domain::named(&self.domain)?))
-    }
+/// What every process of the rig has once it has taken up its assignment.
+#[derive(Debug)]
+pub struct Post {
+    /// The resolved scenario.
+    pub scenario: Scenario,
+    /// The cycle's time table.
+    pub schedule: CycleSchedule,
+    /// Its place in the run's domain.
+    pub node: Node,
+    /// The request to end.
+    pub stop: StopRequest,
 }
 
-/// An assignment that cannot be taken up.
+/// Why a process could not do its work.
 #[derive(Debug, thiserror::Error)]
-pub enum AssignmentError {
+pub enum ProcessError {
     /// The scenario cannot be used.
     #[error(transparent)]
     Scenario(#[from] ScenarioError),
     /// The domain cannot be used.
     #[error(transparent)]
     Domain(#[from] DomainError),
+    /// The CAN link's time table.
+    #[error(transparent)]
+    Schedule(#[from] ScheduleError),
+    /// iceoryx2.
+    #[error(transparent)]
+    Transport(#[from] TransportError),
+    /// Signals cannot be received.
+    #[error("cannot listen for signals: {0}")]
+    Signals(io::Error),
+    /// The pipes to the supervisor failed.
+    #[error("talking to the supervisor failed: {0}")]
+    Pipe(io::Error),
+    /// The supervisor went away before it gave the word, or wants no start.
+    #[error("the supervisor gave no start")]
+    NoStart,
+}
+
+impl Assignment {
+    /// Reads the scenario, joins the domain and listens for the request to end.
+    pub fn take_up(&self) -> Result<Post, ProcessError> {
+        let stop = StopRequest::listen().map_err(ProcessError::Signals)?;
+        let scenario = Scenario::read(&self.scenario)?;
+        let schedule = CycleSchedule::new(&scenario.can, scenario.period_ns())?;
+        let node = Node::join(&Domain::named(&self.domain)?)?;
+        Ok(Post { scenario, schedule, node, stop })
+    }
+}
+
+impl Post {
+    /// Asks for real time on a core, says that the process is ready, and waits for the word to begin.
+    pub fn ready_on(&self, core: usize) -> Result<Start, ProcessError> {
+        let realtime = &self.scenario.realtime;
+        ready_and_wait(obtain(Wanted {
+            core: Some(core),
+            fifo_priority: Some(realtime.priority),
+            locked_memory: realtime.lock_memory,
+        }))
+    }
+
+    /// The same without real time.
+    pub fn ready(&self) -> Result<Start, ProcessError> {
+        ready_and_wait(obtain(Wanted { core: None, fifo_priority: None, locked_memory: false }))
+    }
 }
 
 /// A process's word that it is ready.
@@ -58,17 +108,6 @@ pub struct Start {
     pub epoch_ns: u64,
 }
 
-/// Why a process did not begin.
-#[derive(Debug, thiserror::Error)]
-pub enum StartError {
-    /// The pipes to the supervisor failed.
-    #[error("talking to the supervisor failed: {0}")]
-    Pipe(#[from] io::Error),
-    /// The supervisor went away before it gave the word, or wants no start.
-    #[error("the supervisor gave no start")]
-    NoStart,
-}
-
 /// A request to end, as signals make it.
 #[derive(Debug, Clone)]
 pub struct StopRequest(Arc<AtomicBool>);
@@ -76,7 +115,7 @@ pub struct StopRequest(Arc<AtomicBool>);
 impl StopRequest {
     /// Listens for SIGTERM, also on the supervisor's death. SIGINT reaches the whole process group
     /// from a terminal and is the supervisor's affair: here it does nothing.
-    pub fn listen() -> io::Result<Self> {
+    fn listen() -> io::Result<Self> {
         let requested = Arc::new(AtomicBool::new(false));
         signal_hook::flag::register(SIGTERM, Arc::clone(&requested))?;
         signal_hook::flag::register(SIGINT, Arc::new(AtomicBool::new(false)))?;
@@ -91,12 +130,16 @@ impl StopRequest {
 }
 
 /// Says that this process is ready, and waits for the word to begin.
-pub fn ready_and_wait(scheduling: Obtained) -> Result<Start, StartError> {
-    let mut output = io::stdout().lock();
-    serde_json::to_writer(&mut output, &Ready { scheduling }).map_err(io::Error::from)?;
-    writeln!(output)?;
-    output.flush()?;
+fn ready_and_wait(scheduling: Obtained) -> Result<Start, ProcessError> {
+    say(&Ready { scheduling }).map_err(ProcessError::Pipe)?;
     let mut line = String::new();
-    io::stdin().lock().read_line(&mut line)?;
-    serde_json::from_str(&line).map_err(|_| StartError::NoStart)
+    io::stdin().lock().read_line(&mut line).map_err(ProcessError::Pipe)?;
+    serde_json::from_str(&line).map_err(|_| ProcessError::NoStart)
+}
+
+fn say(ready: &Ready) -> io::Result<()> {
+    let mut output = io::stdout().lock();
+    serde_json::to_writer(&mut output, ready)?;
+    writeln!(output)?;
+    output.flush()
 }
