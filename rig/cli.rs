@@ -62,7 +62,7 @@ pub struct RunArgs {
     /// Seed of every random number
     #[arg(long)]
     pub seed: Option<u64>,
-    /// The run folder; must not exist [default: runs/<UTC time>-<name>]
+    /// The run folder; must not exist [default: runs/UTC_TIME-NAME]
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
     /// How the result is written to standard output

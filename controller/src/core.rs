@@ -361,3 +361,6 @@ impl Controller {
         }
     }
 }
+
+#[cfg(test)]
+mod tests;

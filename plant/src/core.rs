@@ -2,7 +2,7 @@
 //! are passed in.
 //!
 //! A cycle is [`PlantCore::begin_cycle`], [`PlantCore::collect`] until the process data are in,
-//! [`PlantCore::reading`] and [`PlantCore::truth`], then [`PlantCore::apply`]. Called with irregular
+//! [`PlantCore::fill_reading`] and [`PlantCore::fill_truth`], then [`PlantCore::apply`]. Called with irregular
 //! times, as real time has them, or with exact ones.
 
 use masseter_shared::can::canopen::Cob;

@@ -21,6 +21,9 @@ const MAX_PUBLISHERS: usize = 4;
 /// Subscribers a topic may have: the counterpart, the logger, and two observers. Shared memory is
 /// reserved, and locked, for all of them.
 const MAX_SUBSCRIBERS: usize = 4;
+/// Messages a subscriber may hold at once: while it looks for a newer one than it has, it holds the one
+/// it has, the newest found so far, and the next.
+const MAX_HELD: usize = 3;
 
 /// Why a port could not be made or used.
 #[derive(Debug, thiserror::Error)]
@@ -80,6 +83,7 @@ impl Node {
             .max_publishers(MAX_PUBLISHERS)
             .max_subscribers(MAX_SUBSCRIBERS)
             .subscriber_max_buffer_size(M::DEPTH)
+            .subscriber_max_borrowed_samples(MAX_HELD)
             .open_or_create()
             .map_err(failed(action()))
     }
@@ -186,5 +190,60 @@ impl<M: Message> Inlet<M> {
                 return Ok(newest);
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::messages::Event;
+
+    #[test]
+    fn the_newest_message_is_found_among_many_and_while_one_is_held() {
+        let domain = Domain::named(&format!("test-ports-{}", std::process::id())).unwrap();
+        let claim = domain.claim().unwrap();
+        {
+            let node = Node::join(&domain).unwrap();
+            let inlet = node.inlet::<Event>().unwrap();
+            let mut outlet = node.outlet::<Event>().unwrap();
+            let mut waiter = Waiter::new(1_000_000);
+            for round in 1..=3 {
+                for cycle in 0..5 {
+                    outlet.publish(|event| event.cycle = round * 10 + cycle).unwrap();
+                }
+                let held = inlet.receive().unwrap().unwrap();
+                assert_eq!(held.cycle, round * 10);
+                let newest = inlet.latest_by(0, &mut waiter, |event| event.cycle > 1000).unwrap().unwrap();
+                assert_eq!((newest.cycle, newest.seq), (round * 10 + 4, round * 5));
+                assert!(inlet.receive().unwrap().is_none());
+            }
+        }
+        drop(claim);
+        domain.sweep().unwrap();
+    }
+
+    /// Each look of a wait may find messages while the newest of the last look is still held.
+    #[test]
+    fn a_wait_that_keeps_finding_messages_never_holds_too_many() {
+        let domain = Domain::named(&format!("test-wait-{}", std::process::id())).unwrap();
+        let claim = domain.claim().unwrap();
+        {
+            let node = Node::join(&domain).unwrap();
+            let inlet = node.inlet::<Event>().unwrap();
+            let mut outlet = node.outlet::<Event>().unwrap();
+            let deadline_ns = clock::now_ns() + 1_000_000_000;
+            let mut waiter = Waiter::new(1_000_000);
+            outlet.publish(|event| event.cycle = 1).unwrap();
+            let outlet = std::cell::RefCell::new(outlet);
+            let newest = inlet.latest_by(deadline_ns, &mut waiter, |event| {
+                let next = event.cycle + 1;
+                outlet.borrow_mut().publish(|event| event.cycle = next).unwrap();
+                outlet.borrow_mut().publish(|event| event.cycle = next + 1).unwrap();
+                event.cycle >= 9
+            });
+            assert_eq!(newest.unwrap().unwrap().cycle, 9);
+        }
+        drop(claim);
+        domain.sweep().unwrap();
     }
 }

@@ -1,0 +1,217 @@
+//! Scenarios of the controller alone: a plant that does what it is told, and one thing that goes wrong.
+
+use masseter_shared::config::MotionConfig;
+use masseter_shared::geometry::MechanismConfig;
+
+use super::*;
+
+const PERIOD_NS: u64 = 1_000_000;
+
+/// A plant that stands two cycles later where it was told to, and does what was requested at once.
+struct Bench {
+    controller: Controller,
+    cycle: u64,
+    commands: [Command; 2],
+    events: Vec<Event>,
+}
+
+impl Bench {
+    fn new() -> Self {
+        let scenario = Scenario { duration_s: Some(1.5), ..Scenario::default() };
+        let mechanism = Mechanism::new(&MechanismConfig::default()).unwrap();
+        let motion = MotionConfig::default();
+        let trajectory = Trajectory::new(&motion, &scenario.jaw, &mechanism, scenario.duration_s).unwrap();
+        let at_start = Actuators { slide_m: [0.0; LEGS], leg_m: [0.29; LEGS] };
+        let start = Command { target_m: at_start.to_axes(), ..Command::default() };
+        Self {
+            controller: Controller::new(&scenario, mechanism, trajectory),
+            cycle: 0,
+            commands: [start; 2],
+            events: Vec::new(),
+        }
+    }
+
+    fn reading(&self) -> Reading {
+        let [told, last] = self.commands;
+        let state = match DriveRequest::try_from(last.request).unwrap() {
+            DriveRequest::Enable => DriveCondition::OperationEnabled,
+            DriveRequest::Off | DriveRequest::QuickStop => DriveCondition::SwitchOnDisabled,
+        };
+        Reading {
+            cycle: self.cycle + 1,
+            answers_cycle: self.cycle,
+            position_m: told.target_m,
+            drive_state: [state.code(); AXES],
+            fresh_axes: ALL_AXES,
+            ..Reading::default()
+        }
+    }
+
+    /// A cycle with the reading that `disturb` makes of the good one.
+    fn cycle(&mut self, disturb: impl FnOnce(Reading) -> Option<Reading>) {
+        let reading = disturb(self.reading());
+        self.cycle += 1;
+        self.controller.observe(reading.as_ref());
+        let tick = Tick { cycle: self.cycle, now_ns: self.cycle * PERIOD_NS };
+        self.events.extend(self.controller.decide(tick));
+        let mut command = Command::default();
+        self.controller.fill_command(&mut command);
+        if command.request == DriveRequest::Off.code() {
+            command.target_m = self.commands[1].target_m;
+        }
+        self.commands.rotate_left(1);
+        self.commands[1] = command;
+    }
+
+    fn run_until(&mut self, state: ControllerState) {
+        for _ in 0..20_000 {
+            if self.controller.state() == state {
+                return;
+            }
+            self.cycle(Some);
+        }
+        panic!("{state} was not reached, but {}", self.controller.state());
+    }
+
+    fn states(&self) -> Vec<ControllerState> {
+        self.events.iter().map(|event| ControllerState::try_from(event.to).unwrap()).collect()
+    }
+
+    fn last_cause(&self) -> Cause {
+        Cause::try_from(self.events.last().unwrap().cause).unwrap()
+    }
+}
+
+#[test]
+fn a_run_goes_through_its_states_in_order_and_ends_with_the_drives_off() {
+    let mut bench = Bench::new();
+    bench.run_until(ControllerState::Finished);
+    assert_eq!(
+        bench.states(),
+        [
+            ControllerState::Enabling,
+            ControllerState::Easing,
+            ControllerState::Running,
+            ControllerState::Holding,
+            ControllerState::Disabling,
+            ControllerState::Finished,
+        ]
+    );
+    assert!(bench.events.iter().all(|event| event.kind == EventKind::Transition.code()));
+    assert!(!bench.controller.is_done(), "the last command must be repeated before the process ends");
+    for _ in 0..FAREWELL_CYCLES {
+        bench.cycle(Some);
+    }
+    assert!(bench.controller.is_done());
+}
+
+#[test]
+fn what_is_wanted_at_a_sample_is_found_there() {
+    let mut bench = Bench::new();
+    bench.run_until(ControllerState::Running);
+    let mut state = State::default();
+    let mut worst_m: f64 = 0.0;
+    for _ in 0..1000 {
+        bench.cycle(Some);
+        bench.controller.fill_state(&mut state);
+        let wanted = nalgebra::Vector3::from(state.desired_position_m);
+        worst_m = worst_m.max((wanted - nalgebra::Vector3::from(state.estimated_position_m)).norm());
+    }
+    // The plant is exact, so what is left is the trim's own doing.
+    assert!(worst_m < 2e-5, "{worst_m}");
+}
+
+#[test]
+fn an_interrupted_motion_slows_down_on_its_path_and_ends_in_order() {
+    let mut bench = Bench::new();
+    bench.run_until(ControllerState::Running);
+    for _ in 0..700 {
+        bench.cycle(Some);
+    }
+    bench.controller.request_stop();
+    bench.run_until(ControllerState::Finished);
+    assert_eq!(bench.last_cause(), Cause::Sequence);
+    let holding = bench.events.iter().find(|event| event.to == ControllerState::Holding.code()).unwrap();
+    assert_eq!(holding.cause, Cause::StopRequested.code());
+}
+
+/// Every disturbance while the motion plays, and the cause it must be reported with.
+#[test]
+fn whatever_goes_wrong_while_moving_ends_in_a_safe_stop_with_its_cause() {
+    type Disturbance = fn(Reading) -> Option<Reading>;
+    let cases: [(Cause, Disturbance); 9] = [
+        (Cause::StaleReading, |_| None),
+        (Cause::StaleReading, |reading| Some(Reading { fresh_axes: ALL_AXES - 1, ..reading })),
+        (Cause::DriveFault, |mut reading| {
+            reading.drive_state[2] = DriveCondition::Fault.code();
+            Some(reading)
+        }),
+        (Cause::DriveFault, |mut reading| {
+            reading.drive_state[4] = DriveCondition::SwitchOnDisabled.code();
+            Some(reading)
+        }),
+        (Cause::MasterFault, |reading| Some(Reading { master_fault: 1, ..reading })),
+        (Cause::BadMessage, |mut reading| {
+            reading.position_m[0] = f64::NAN;
+            Some(reading)
+        }),
+        (Cause::ForeignCommand, |reading| Some(Reading { answers_cycle: u64::MAX, ..reading })),
+        (Cause::ForwardKinematics, |mut reading| {
+            reading.position_m = [0.03, -0.03, 0.0, 0.3, 0.24, 0.24];
+            Some(reading)
+        }),
+        (Cause::TrackingLost, |mut reading| {
+            reading.position_m[LEGS..].iter_mut().for_each(|leg_m| *leg_m -= 0.006);
+            Some(reading)
+        }),
+    ];
+    for (cause, disturb) in cases {
+        let mut bench = Bench::new();
+        bench.run_until(ControllerState::Running);
+        for _ in 0..200 {
+            bench.cycle(Some);
+        }
+        let limit = u64::from(ControllerConfig::default().stale_cycles) + 1;
+        for _ in 0..limit {
+            bench.cycle(disturb);
+        }
+        assert_eq!(bench.controller.state(), ControllerState::SafeStop, "{cause}");
+        assert_eq!(bench.last_cause(), cause);
+        let mut command = Command::default();
+        bench.controller.fill_command(&mut command);
+        assert_eq!(command.request, DriveRequest::QuickStop.code());
+        for _ in 0..100 {
+            bench.cycle(Some);
+        }
+        assert_eq!(bench.controller.state(), ControllerState::SafeStop, "{cause}: it moved again");
+    }
+}
+
+#[test]
+fn a_late_reading_is_compared_with_the_pose_wanted_at_its_own_sample() {
+    let mut bench = Bench::new();
+    bench.run_until(ControllerState::Running);
+    let mut delayed = bench.reading();
+    for _ in 0..600 {
+        bench.cycle(|reading| Some(std::mem::replace(&mut delayed, reading)));
+    }
+    assert_eq!(bench.controller.state(), ControllerState::Running);
+    let mut state = State::default();
+    bench.controller.fill_state(&mut state);
+    assert_eq!(state.reading_cycle + 1, state.cycle);
+    let wanted = nalgebra::Vector3::from(state.desired_position_m);
+    assert!((wanted - nalgebra::Vector3::from(state.estimated_position_m)).norm() < 5e-5);
+}
+
+#[test]
+fn drives_that_never_get_ready_are_not_waited_for_forever() {
+    let mut bench = Bench::new();
+    for _ in 0..20_000 {
+        bench.cycle(|mut reading| {
+            reading.drive_state = [DriveCondition::ReadyToSwitchOn.code(); AXES];
+            Some(reading)
+        });
+    }
+    assert_eq!(bench.controller.state(), ControllerState::SafeStop);
+    assert_eq!(bench.last_cause(), Cause::EnableTimeout);
+}
