@@ -8,13 +8,13 @@
 
 use std::fmt;
 
-use masseter_shared::geometry::{Actuators, LEGS, Mechanism};
+use masseter_shared::geometry::{Actuators, LEGS, Mechanism, Vec3};
 use nalgebra::Vector3;
 
-use super::{Equations, Evaluation};
+use super::Equations;
 
-/// What must hold for a true solution.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+/// What must hold for a true solution, in the order in which it is checked.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Condition {
     /// Corner Aᵢ lies above the base.
     LegAboveBase {
@@ -63,20 +63,20 @@ impl Assembly {
     pub fn new(mechanism: &Mechanism, actuators: &Actuators, theta_rad: &[f64; LEGS]) -> Self {
         let equations = Equations::new(mechanism, actuators);
         let at = equations.evaluate(Vector3::from(*theta_rad));
-        Self::of(mechanism, actuators, &at, equations.determinant(&at))
+        Self::of(mechanism, actuators, &at.corners, equations.determinant(&at))
     }
 
     pub(super) fn of(
         mechanism: &Mechanism,
         actuators: &Actuators,
-        at: &Evaluation,
+        corners: &[Vec3; LEGS],
         determinant: f64,
     ) -> Self {
-        let [a1, a2, a3] = at.corners;
+        let [a1, a2, a3] = *corners;
         let normal = (a2 - a1).cross(&(a3 - a1));
         let below = |leg| (mechanism.hinge(leg, actuators.slide_m[leg]) - a1).dot(&normal) < 0.0;
         Self {
-            legs_above_base: at.corners.map(|corner| corner.z > 0.0),
+            legs_above_base: corners.map(|corner| corner.z > 0.0),
             hinges_below_platform: std::array::from_fn(below),
             corners_in_order: (a2 - a3).dot(&mechanism.slide_direction(0)) > 0.0,
             positive_determinant: determinant > 0.0,

@@ -1,5 +1,7 @@
 //! Why a forward kinematics came to no pose.
 
+use masseter_shared::geometry::AXIS_NAMES;
+
 use super::Condition;
 
 /// An input without a true solution, as far as the solver could find.
@@ -47,6 +49,40 @@ pub enum ForwardError {
         /// The first condition that does not hold.
         violated: Condition,
     },
+    /// A leg's length is zero or negative.
+    #[error("leg {} is {leg_m:e} m long, so its angle is undefined; check the input {}", leg + 1, AXIS_NAMES[3 + leg])]
+    NoLength {
+        /// Index of the leg, from 0.
+        leg: usize,
+        /// Its length.
+        leg_m: f64,
+    },
+    /// No leg angles close the platform's triangle: there are no real solutions.
+    #[error(
+        "the mechanism cannot be assembled: whatever the leg angles, the sides of the platform are off by \
+         {nearest_m:e} m; check the six inputs"
+    )]
+    Unassemblable {
+        /// The least √(f₁² + f₂² + f₃²) that was found, metres.
+        nearest_m: f64,
+    },
+    /// More than one solution fulfils every condition of the true one.
+    #[error(
+        "ambiguous: {count} solutions stand as the mechanism is assembled, {separation_rad} rad apart; \
+         approach this input from a known pose"
+    )]
+    Ambiguous {
+        /// How many.
+        count: usize,
+        /// The distance of the nearest two, the largest difference of any leg, radians.
+        separation_rad: f64,
+    },
+    /// Solutions lie closer together than rounding can tell, or form a continuum.
+    #[error("undecided: solutions cannot be told apart, {solutions} were; keep away from this input")]
+    Undecided {
+        /// Solutions that were told apart.
+        solutions: usize,
+    },
 }
 
 impl ForwardError {
@@ -58,6 +94,10 @@ impl ForwardError {
             Self::Stalled { .. } => "stalled",
             Self::Singular { .. } => "singular",
             Self::WrongAssembly { .. } => "wrong_assembly",
+            Self::NoLength { .. } => "no_length",
+            Self::Unassemblable { .. } => "unassemblable",
+            Self::Ambiguous { .. } => "ambiguous",
+            Self::Undecided { .. } => "undecided",
         }
     }
 
@@ -68,7 +108,12 @@ impl ForwardError {
             Self::NoConvergence { residual_m, .. }
             | Self::Stalled { residual_m, .. }
             | Self::Singular { residual_m, .. } => Some(residual_m),
-            Self::NotFinite | Self::WrongAssembly { .. } => None,
+            Self::Unassemblable { nearest_m } => Some(nearest_m),
+            Self::NotFinite
+            | Self::WrongAssembly { .. }
+            | Self::NoLength { .. }
+            | Self::Ambiguous { .. }
+            | Self::Undecided { .. } => None,
         }
     }
 }

@@ -1,26 +1,40 @@
 //! Forward kinematics: the platform's pose from slide displacements and leg lengths.
 //!
-//! The seed's three equations in the leg angles ([`Equations`]), two iterations that solve them
-//! from a guess ([`solve`]), the conditions that tell the true solution from the mirrored and folded
-//! ones ([`Assembly`]), and what the loop and the command line use: a warm-started
-//! [`ForwardTracker`] and [`solve_cold`] for single inputs.
+//! What the loop and the command line use is [`ForwardTracker`]: Newton's iteration from the last
+//! solution, a [`Certificate`] for its result, and [`solve_completely`] whenever that is not enough.
+//! The latter finds every solution ([`Solutions`]) and picks the one in which the mechanism stands as
+//! it was assembled ([`Assembly`]), or says that there is none, or more than one. The seed's own
+//! algorithm and plain Newton–Raphson ([`solve`], on the seed's form of the [`Equations`]) stand
+//! beside it for comparison.
 //!
 //! Everything is pure, allocates nothing and ends after a fixed number of iterations. It does not
-//! judge strokes, and a failure proves nothing: an input may have a solution that no start reached.
+//! judge strokes or speeds, and believes the mechanism's dimensions.
 
 mod assembly;
-mod cold;
+mod bernstein;
+mod certificate;
+mod closure;
+mod complete;
+mod elimination;
 mod equations;
 mod error;
+mod four_bar;
+mod heading;
+mod nearest;
+mod solution;
+mod solutions;
 mod solver;
 mod tracker;
 
 pub use assembly::{Assembly, Condition};
-pub use cold::solve_cold;
+pub use certificate::Certificate;
+pub use complete::solve_completely;
 pub use equations::{Equations, Evaluation};
 pub use error::ForwardError;
-pub use solver::{MAX_HALVINGS, MAX_ITERATIONS, Method, Options, Solution, solve, solve_newton, solve_seed};
-pub use tracker::ForwardTracker;
+pub use solution::Solution;
+pub use solutions::{MOST_SOLUTIONS, Solutions};
+pub use solver::{MAX_HALVINGS, MAX_ITERATIONS, Method, Options, solve, solve_newton, solve_seed};
+pub use tracker::{ForwardTracker, WARM_ITERATIONS};
 
 #[cfg(test)]
 mod samples;

@@ -4,10 +4,12 @@
 //! decreases; that stops oscillation and divergence but may stall in a local minimum. Either finds
 //! *a* solution near its guess; which one it is, [`Assembly`](super::Assembly) tells.
 
-use masseter_shared::geometry::{Actuators, LEGS, Mechanism, Pose};
+use masseter_shared::geometry::{Actuators, LEGS, Mechanism};
 use nalgebra::Vector3;
 
-use super::{Assembly, Equations, Evaluation, ForwardError};
+use super::closure::{Closed, Closure};
+use super::heading::Heading;
+use super::{Equations, Evaluation, ForwardError, Solution};
 
 /// No options allow more iterations than this.
 pub const MAX_ITERATIONS: u32 = 100;
@@ -45,23 +47,6 @@ pub enum Method {
     Newton,
 }
 
-/// Leg angles that close the platform's triangle.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Solution {
-    /// θ₁ θ₂ θ₃ in (−π, π], radians.
-    pub theta_rad: [f64; LEGS],
-    /// The platform in the base frame, metres.
-    pub pose: Pose,
-    /// Iterations made from the start that led here.
-    pub iterations: u32,
-    /// The largest |fₖ|, metres.
-    pub residual_m: f64,
-    /// Determinant of the Jacobian with every leg's length taken as 1; 0 where solutions meet.
-    pub determinant: f64,
-    /// Which conditions of the true solution hold.
-    pub assembly: Assembly,
-}
-
 /// Solves from a guess of the leg angles (radians) by the method asked for.
 ///
 /// # Errors
@@ -91,7 +76,13 @@ pub fn solve(
                 .ok_or(ForwardError::Stalled { residual_m: at.residual_norm_m(), iterations })?,
         };
     }
-    Ok(Solution::new(mechanism, actuators, &equations, &at, iterations))
+    let closure = Closure::new(mechanism, actuators);
+    let headings = std::array::from_fn(|leg| Heading::from_rad(at.theta_rad[leg]));
+    let closed = Closed { headings, closing: closure.evaluate(&headings), iterations };
+    Ok(Solution {
+        residual_m: at.residual_norm_m(),
+        ..Solution::new(mechanism, actuators, &closure, &closed)
+    })
 }
 
 /// [`solve`] by the seed's algorithm.
@@ -147,32 +138,6 @@ fn halved_until_better(
         increment /= 2.0;
     }
     None
-}
-
-impl Solution {
-    fn new(
-        mechanism: &Mechanism,
-        actuators: &Actuators,
-        equations: &Equations<'_>,
-        at: &Evaluation,
-        iterations: u32,
-    ) -> Self {
-        let determinant = equations.determinant(at);
-        Self {
-            theta_rad: at.theta_rad.map(wrapped).into(),
-            pose: mechanism.pose_from_corners(&at.corners),
-            iterations,
-            residual_m: at.residual_norm_m(),
-            determinant,
-            assembly: Assembly::of(mechanism, actuators, at, determinant),
-        }
-    }
-}
-
-/// The same angle in (−π, π].
-fn wrapped(angle_rad: f64) -> f64 {
-    let (sin, cos) = angle_rad.sin_cos();
-    sin.atan2(cos)
 }
 
 #[cfg(test)]

@@ -1,57 +1,97 @@
-//! Forward kinematics cycle by cycle, each solution the guess for the next.
+//! Forward kinematics cycle by cycle: warm from the last solution, proven, and complete when not.
+//!
+//! A warm result is accepted only if Newton's iteration ended within [`WARM_ITERATIONS`], its
+//! [`Certificate`](super::Certificate) holds, the mechanism can stand there, and it is the last
+//! solution's continuation: each of the two lies in the other's ball of uniqueness, in which neither
+//! input has a second solution to confuse it with. In every other case the complete method decides.
+//! So the guess only saves time; it cannot make the result wrong.
 
 use masseter_shared::geometry::{Actuators, LEGS, Mechanism};
 
-use super::cold::true_solution;
-use super::{ForwardError, Method, Options, Solution, solve_cold};
+use super::closure::Closure;
+use super::complete::choose;
+use super::heading::Heading;
+use super::solutions::check;
+use super::{ForwardError, Solution};
+
+/// Newton's iterations from the last solution; a chewing jaw takes 2 or 3 a millisecond.
+pub const WARM_ITERATIONS: u32 = 4;
 
 /// Solves a stream of inputs, each from the last accepted solution.
 #[derive(Debug, Clone)]
 pub struct ForwardTracker {
     mechanism: Mechanism,
-    method: Method,
-    options: Options,
-    last_rad: Option<[f64; LEGS]>,
+    last: Option<Last>,
+}
+
+/// The last accepted solution.
+#[derive(Debug, Clone, Copy)]
+struct Last {
+    headings: [Heading; LEGS],
+    theta_rad: [f64; LEGS],
+    unique_within_rad: f64,
 }
 
 impl ForwardTracker {
-    /// A tracker that knows no solution yet, with the seed's algorithm.
+    /// A tracker that knows no solution yet.
     pub fn new(mechanism: Mechanism) -> Self {
-        Self::with(mechanism, Method::Seed, Options::default())
+        Self { mechanism, last: None }
     }
 
-    /// A tracker with another iteration for its warm starts.
-    pub fn with(mechanism: Mechanism, method: Method, options: Options) -> Self {
-        Self { mechanism, method, options, last_rad: None }
+    /// A tracker that takes leg angles (radians) from elsewhere for its last solution. Good ones save
+    /// the first cycle the complete method, and settle an ambiguous input; bad ones cost time only.
+    pub fn with_guess(mechanism: Mechanism, theta_rad: [f64; LEGS]) -> Self {
+        Self { mechanism, last: Some(Last::guessed(theta_rad)) }
     }
 
     /// The leg angles of the last accepted solution, radians.
     pub fn last_theta_rad(&self) -> Option<[f64; LEGS]> {
-        self.last_rad
+        self.last.map(|last| last.theta_rad)
     }
 
-    /// Forgets the last solution, so that the next input is solved cold.
+    /// Forgets the last solution, so that the next input is solved on its own.
     pub fn reset(&mut self) {
-        self.last_rad = None;
+        self.last = None;
     }
 
-    /// The true solution for this input, in a bounded number of iterations.
-    ///
-    /// Tries the last accepted solution as the guess, then the starts of [`solve_cold`]. The last
-    /// accepted solution outlives a failure.
+    /// The true solution for this input, certified. The last accepted solution outlives a failure.
     ///
     /// # Errors
-    /// Those of [`solve_cold`].
+    /// Those of [`solve_completely`](super::solve_completely).
     pub fn update(&mut self, actuators: &Actuators) -> Result<Solution, ForwardError> {
-        let warm = self.last_rad.and_then(|guess_rad| {
-            true_solution(self.method, &self.mechanism, actuators, &guess_rad, &self.options).ok()
-        });
-        let solution = match warm {
+        check(actuators)?;
+        let closure = Closure::new(&self.mechanism, actuators);
+        let continued = self.last.and_then(|last| last.continued(&self.mechanism, actuators, &closure));
+        let solution = match continued {
             Some(solution) => solution,
-            None => solve_cold(&self.mechanism, actuators, &self.options)?,
+            None => choose(&self.mechanism, actuators, &closure)?,
         };
-        self.last_rad = Some(solution.theta_rad);
+        self.last = Some(Last::solved(&solution));
         Ok(solution)
+    }
+}
+
+impl Last {
+    fn guessed(theta_rad: [f64; LEGS]) -> Self {
+        Self { headings: theta_rad.map(Heading::from_rad), theta_rad, unique_within_rad: f64::INFINITY }
+    }
+
+    fn solved(solution: &Solution) -> Self {
+        let unique_within_rad = solution.certificate.map_or(0.0, |proof| proof.unique_within_rad);
+        Self { headings: solution.headings, theta_rad: solution.theta_rad, unique_within_rad }
+    }
+
+    /// The true solution that continues this one, if the iteration finds and proves it.
+    fn continued(&self, mechanism: &Mechanism, actuators: &Actuators, closure: &Closure) -> Option<Solution> {
+        let closed = closure.close(&self.headings, WARM_ITERATIONS)?;
+        let solution = Solution::new(mechanism, actuators, closure, &closed);
+        let reach_rad = solution.certificate?.unique_within_rad.min(self.unique_within_rad);
+        (self.is_within(reach_rad, &solution) && solution.assembly.is_true()).then_some(solution)
+    }
+
+    /// Angles on either side of ±π count as far apart, which costs time and nothing else.
+    fn is_within(&self, reach_rad: f64, solution: &Solution) -> bool {
+        self.theta_rad.iter().zip(&solution.theta_rad).all(|(last, now)| (now - last).abs() < reach_rad)
     }
 }
 
@@ -59,9 +99,11 @@ impl ForwardTracker {
 mod tests {
     use masseter_shared::geometry::Pose;
     use nalgebra::{Translation3, UnitQuaternion};
+    use proptest::prelude::*;
 
     use super::*;
     use crate::kinematics::samples::{angle_between, seed_mechanism};
+    use crate::kinematics::solve_completely;
 
     /// A loop through the workspace like a fast chewing cycle, 1 kHz.
     fn on_the_loop(cycle: u32) -> Pose {
@@ -102,12 +144,45 @@ mod tests {
     fn a_jump_or_a_false_last_solution_is_solved_cold() {
         let mechanism = seed_mechanism();
         let neutral = Actuators { slide_m: [0.0; LEGS], leg_m: [0.27; LEGS] };
-        let mut tracker = ForwardTracker::new(mechanism.clone());
-        tracker.last_rad = Some([71.29_f64.to_radians(); LEGS]);
+        let inverted = [71.291_703_191_386_5_f64.to_radians(); LEGS];
+        let mut tracker = ForwardTracker::with_guess(mechanism.clone(), inverted);
         assert!(tracker.update(&neutral).unwrap().assembly.is_true());
         let far = mechanism.inverse(&on_the_loop(230)).unwrap().actuators;
         assert!(tracker.update(&far).unwrap().assembly.is_true());
         tracker.reset();
         assert_eq!(tracker.last_theta_rad(), None);
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(2000))]
+
+        /// Whatever the guess, also one that is no number: the same answer as without one.
+        #[test]
+        fn no_guess_makes_the_result_wrong(
+            slide_m in prop::array::uniform3(-0.03..0.03f64),
+            leg_m in prop::array::uniform3(0.24..0.3f64),
+            guess in prop::array::uniform3(prop_oneof![9 => -4.0..4.0f64, 1 => prop::num::f64::ANY]),
+        ) {
+            let (mechanism, actuators) = (seed_mechanism(), Actuators { slide_m, leg_m });
+            let alone = solve_completely(&mechanism, &actuators);
+            match (alone, ForwardTracker::with_guess(mechanism, guess).update(&actuators)) {
+                (Ok(alone), Ok(guessed)) => {
+                    for leg in 0..LEGS {
+                        prop_assert!((alone.theta_rad[leg] - guessed.theta_rad[leg]).abs() < 1e-9);
+                    }
+                }
+                (alone, guessed) => prop_assert_eq!(alone, guessed),
+            }
+        }
+
+        #[test]
+        fn any_numbers_end_in_a_result(inputs in prop::collection::vec(prop::array::uniform6(prop::num::f64::ANY), 3)) {
+            let mut tracker = ForwardTracker::new(seed_mechanism());
+            for axes in inputs {
+                if let Ok(solution) = tracker.update(&Actuators::from_axes(axes)) {
+                    prop_assert!(solution.assembly.is_true() && solution.certificate.is_some());
+                }
+            }
+        }
     }
 }

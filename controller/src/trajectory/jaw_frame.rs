@@ -7,7 +7,7 @@ use masseter_shared::config::JawConfig;
 use masseter_shared::geometry::{Actuators, LEGS, Mechanism, Pose};
 use nalgebra::Translation3;
 
-use crate::kinematics::{Options, solve_cold};
+use crate::kinematics::solve_completely;
 
 use super::TrajectoryError;
 use super::error::require;
@@ -32,7 +32,7 @@ impl JawFrame {
             }
         }
         let actuators = Actuators { slide_m: [0.0; LEGS], leg_m: [closed_leg_m; LEGS] };
-        let closed = solve_cold(mechanism, &actuators, &Options::default())
+        let closed = solve_completely(mechanism, &actuators)
             .map_err(|source| TrajectoryError::NoClosedPose { closed_leg_m, source })?
             .pose;
         let closed = Translation3::from(jaw.closed_offset_m) * closed;

@@ -1,0 +1,164 @@
+//! Proof that a solution exists near computed leg angles, and that no other is close.
+//!
+//! The theorem of Newton and Kantorovich in its form with an approximate inverse Y of the Jacobian:
+//! with ‖Y g(θ)‖ ≤ y, ‖1 − Y g′(θ)‖ ≤ z and ‖Y (g′(α) − g′(β))‖ ≤ K ‖α − β‖ everywhere, if
+//! (1 − z)² > 2 K y then exactly one zero lies within R of θ, and it lies within r:
+//!
+//! r = 2y / (1 − z + √((1 − z)² − 2Ky)), R = (1 − z + √((1 − z)² − 2Ky)) / K.
+//!
+//! The norm is the largest of the three legs. K holds on the whole torus: with κ = ω cos θᵢ cos θⱼ +
+//! sin θᵢ sin θⱼ and κ′ = ω sin θᵢ sin θⱼ + cos θᵢ cos θⱼ the second derivatives of gₖ are
+//! κ − p cos θᵢ, κ − q cos θⱼ and twice −κ′, and |κ| + |κ′| ≤ 1 + |ω| because κ ± κ′ are
+//! (ω ± 1) times a cosine; so row k of the Jacobian changes by at most |p| + |q| + 2(1 + |ω|) times
+//! the change of the angles. Rounding is covered by explicit margins: y contains the bound of each
+//! residual's rounding, z that of Jacobian and inverse, and r and R are rounded outward and inward.
+//!
+//! The proof is about the input as given, an exact set of numbers, not about what the encoders
+//! measured; and it does not say which solution this is.
+
+use std::f64::consts::PI;
+
+use masseter_shared::geometry::LEGS;
+
+use super::closure::{Closing, Closure, ROUNDINGS, Side};
+
+/// z per unit of K·ε: the derivatives' roundings and as many for the inverse's.
+const INVERSE_ROUNDINGS: f64 = 4.0 * ROUNDINGS;
+/// What r, R and K are moved by to outweigh the roundings of their own formulas.
+const OUTWARD: f64 = 1.0 + 64.0 * f64::EPSILON;
+
+/// What is proven about a solution. Distances are the largest difference of any leg's angle.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Certificate {
+    /// r: an exact solution lies at most this far from the computed angles, radians.
+    pub exists_within_rad: f64,
+    /// The same for the platform's corners, metres: r times the longest leg.
+    pub exists_within_m: f64,
+    /// R: no other solution is closer to the computed angles, radians.
+    pub unique_within_rad: f64,
+    /// The same for the platform's corners as they travel on their circles, metres: R times the
+    /// shortest leg.
+    pub unique_within_m: f64,
+    /// Within this distance the Jacobian is not singular, radians.
+    pub regular_within_rad: f64,
+}
+
+impl Certificate {
+    /// The proof at evaluated leg angles; none where the inequality does not hold or a value is no
+    /// number, as at a singularity.
+    pub(super) fn new(closure: &Closure, at: &Closing) -> Option<Self> {
+        let inverse = at.inverse();
+        let mut offset_rad = 0.0;
+        let mut curvature = 0.0;
+        for row in &inverse {
+            let mut row_offset_rad = 0.0;
+            let mut row_curvature = 0.0;
+            for ((entry, side), value) in row.iter().zip(&closure.sides).zip(at.value) {
+                row_offset_rad += entry.abs() * (value.abs() + side.rounding);
+                row_curvature += entry.abs() * curvature_bound(side);
+            }
+            if !(row_offset_rad + row_curvature).is_finite() {
+                return None;
+            }
+            offset_rad = f64::max(offset_rad, row_offset_rad);
+            curvature = f64::max(curvature, row_curvature);
+        }
+        let margin = 1.0 - INVERSE_ROUNDINGS * f64::EPSILON * curvature;
+        Self::from_bounds(offset_rad * OUTWARD, curvature * OUTWARD, margin, &closure.leg_m)
+    }
+
+    fn from_bounds(offset_rad: f64, curvature: f64, margin: f64, leg_m: &[f64; LEGS]) -> Option<Self> {
+        let discriminant = margin * margin - 2.0 * curvature * offset_rad;
+        if margin <= 0.0 || discriminant <= 0.0 {
+            return None;
+        }
+        let reach = margin + discriminant.sqrt();
+        let exists_within_rad = 2.0 * offset_rad / reach * OUTWARD;
+        // Beyond half a turn the ball would overlap itself on the torus.
+        let unique_within_rad = (reach / curvature / OUTWARD).min(PI);
+        Some(Self {
+            exists_within_rad,
+            exists_within_m: exists_within_rad * leg_m.iter().copied().fold(0.0, f64::max),
+            unique_within_rad,
+            unique_within_m: unique_within_rad * leg_m.iter().copied().fold(f64::INFINITY, f64::min),
+            regular_within_rad: margin / curvature / OUTWARD,
+        })
+    }
+}
+
+/// The most by which row k of the Jacobian changes, in total, per radian of the largest change.
+fn curvature_bound(side: &Side) -> f64 {
+    side.near_cos.abs() + side.far_cos.abs() + 2.0 * (1.0 + side.cos_cos.abs()) + side.rounding
+}
+
+#[cfg(test)]
+mod tests {
+    use masseter_shared::geometry::Actuators;
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::kinematics::heading::Heading;
+    use crate::kinematics::samples::{mechanisms, poses, seed_mechanism};
+
+    fn certify(closure: &Closure, theta_rad: [f64; LEGS]) -> Option<Certificate> {
+        Certificate::new(closure, &closure.evaluate(&theta_rad.map(Heading::from_rad)))
+    }
+
+    #[test]
+    fn the_neutral_pose_is_certain_within_degrees() {
+        let neutral = Actuators { slide_m: [0.0; LEGS], leg_m: [0.27; LEGS] };
+        let closure = Closure::new(&seed_mechanism(), &neutral);
+        let start = [83.862_391_93_f64.to_radians(); LEGS].map(Heading::from_rad);
+        let closed = closure.close(&start, 4).unwrap();
+        let certificate = Certificate::new(&closure, &closed.closing).unwrap();
+        assert!(certificate.exists_within_rad < 1e-12);
+        assert!(certificate.unique_within_rad.to_degrees() > 2.0, "{certificate:?}");
+        // The next solution, with the platform turned over, is 12.57° away.
+        assert!(certificate.unique_within_rad.to_degrees() < 12.57);
+    }
+
+    #[test]
+    fn what_is_no_solution_and_what_is_no_number_is_not_certified() {
+        let neutral = Actuators { slide_m: [0.0; LEGS], leg_m: [0.27; LEGS] };
+        let closure = Closure::new(&seed_mechanism(), &neutral);
+        assert_eq!(certify(&closure, [1.2, 1.5, 1.3]), None);
+        assert_eq!(certify(&closure, [f64::NAN; LEGS]), None);
+        // All legs level: no side changes at first order, the Jacobian vanishes.
+        assert_eq!(certify(&closure, [0.0; LEGS]), None);
+    }
+
+    proptest! {
+        /// Close to a solution the certificate holds, and both radii bracket the true distance.
+        #[test]
+        fn the_solution_lies_within_the_radius_of_existence(
+            mechanism in mechanisms(), pose in poses(20.0),
+            off in [-1e-3..1e-3f64, -1e-3..1e-3f64, -1e-3..1e-3f64],
+        ) {
+            let joints = mechanism.inverse(&pose).unwrap();
+            let closure = Closure::new(&mechanism, &joints.actuators);
+            let theta_rad = std::array::from_fn(|leg| joints.theta_rad[leg] + off[leg]);
+            if let Some(certificate) = certify(&closure, theta_rad) {
+                let distance = off.iter().fold(0.0, |worst: f64, off| worst.max(off.abs()));
+                prop_assert!(distance <= certificate.exists_within_rad + 1e-13);
+                prop_assert!(certificate.exists_within_rad < certificate.unique_within_rad);
+            }
+        }
+
+        /// The bound on the Jacobian's change, against its change.
+        #[test]
+        fn the_jacobian_changes_no_faster_than_bounded(
+            mechanism in mechanisms(), pose in poses(25.0),
+            a in prop::array::uniform3(-3.1..3.1f64), b in prop::array::uniform3(-3.1..3.1f64),
+        ) {
+            let joints = mechanism.inverse(&pose).unwrap();
+            let closure = Closure::new(&mechanism, &joints.actuators);
+            let at = |theta_rad: [f64; LEGS]| closure.evaluate(&theta_rad.map(Heading::from_rad));
+            let (here, there) = (at(a), at(b));
+            let distance = (0..LEGS).map(|leg| (a[leg] - b[leg]).abs()).fold(0.0, f64::max);
+            for side in 0..LEGS {
+                let change = (here.near[side] - there.near[side]).abs() + (here.far[side] - there.far[side]).abs();
+                prop_assert!(change <= curvature_bound(&closure.sides[side]) * distance + 1e-12);
+            }
+        }
+    }
+}

@@ -1,0 +1,109 @@
+//! The true solution among all: what is right when nothing is known but the input.
+
+use masseter_shared::geometry::{Actuators, Mechanism};
+
+use super::closure::Closure;
+use super::nearest::nearest_m;
+use super::solutions::check;
+use super::{Condition, ForwardError, Solution, Solutions};
+
+/// The one solution of an input in which the mechanism stands as it was assembled, certified.
+///
+/// # Errors
+/// [`ForwardError::NotFinite`] and [`ForwardError::NoLength`] for what is no input;
+/// [`ForwardError::Unassemblable`] without any solution, [`ForwardError::WrongAssembly`] without a
+/// true one, [`ForwardError::Ambiguous`] with more than one; [`ForwardError::Singular`] and
+/// [`ForwardError::Undecided`] where solutions meet.
+pub fn solve_completely(mechanism: &Mechanism, actuators: &Actuators) -> Result<Solution, ForwardError> {
+    check(actuators)?;
+    choose(mechanism, actuators, &Closure::new(mechanism, actuators))
+}
+
+pub(super) fn choose(
+    mechanism: &Mechanism,
+    actuators: &Actuators,
+    closure: &Closure,
+) -> Result<Solution, ForwardError> {
+    let solutions = Solutions::of(mechanism, actuators, closure)?;
+    let mut true_ones = solutions.true_ones();
+    match (true_ones.next(), true_ones.count()) {
+        (Some(solution), 0) => certified(solution),
+        (Some(solution), others) => Err(ForwardError::Ambiguous {
+            count: 1 + others,
+            separation_rad: solutions.separation_rad(solution).unwrap_or(0.0),
+        }),
+        (None, _) => Err(match nearly_true(&solutions) {
+            Some(violated) => ForwardError::WrongAssembly { violated },
+            None => ForwardError::Unassemblable { nearest_m: nearest_m(mechanism, actuators, closure) },
+        }),
+    }
+}
+
+fn certified(solution: &Solution) -> Result<Solution, ForwardError> {
+    let Solution { determinant, residual_m, .. } = *solution;
+    solution.certificate.map(|_| *solution).ok_or(ForwardError::Singular { determinant, residual_m })
+}
+
+/// The condition at which the last of the solutions failed.
+fn nearly_true(solutions: &Solutions) -> Option<Condition> {
+    solutions.iter().filter_map(|solution| solution.assembly.violated()).max()
+}
+
+#[cfg(test)]
+mod tests {
+    use masseter_shared::geometry::LEGS;
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::kinematics::samples::{angle_between, mechanisms, poses, seed_mechanism};
+    use crate::kinematics::{Options, solve_newton};
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(1000))]
+
+        #[test]
+        fn a_pose_comes_back_from_its_actuators_alone(mechanism in mechanisms(), pose in poses(30.0)) {
+            let joints = mechanism.inverse(&pose).unwrap();
+            match solve_completely(&mechanism, &joints.actuators) {
+                Ok(solution) => {
+                    prop_assert!((solution.pose.translation.vector - pose.translation.vector).norm() < 1e-10);
+                    prop_assert!(angle_between(&solution.pose, &pose) < 1e-10);
+                }
+                // Poses of this range may stand beyond a singularity, where they are not true.
+                Err(error) => {
+                    let standing = super::super::Assembly::new(&mechanism, &joints.actuators, &joints.theta_rad);
+                    prop_assert!(!standing.is_true(), "{error}");
+                }
+            }
+        }
+
+        /// Over the whole box of strokes, one input in five has no true solution.
+        #[test]
+        fn a_failure_is_one_from_random_starts_too(
+            slide_m in prop::array::uniform3(-0.03..0.03f64), leg_m in prop::array::uniform3(0.24..0.3f64),
+            guesses in prop::array::uniform32([0.7..2.4f64, 0.7..2.4f64, 0.7..2.4f64]),
+        ) {
+            let (mechanism, actuators) = (seed_mechanism(), Actuators { slide_m, leg_m });
+            if let Err(error) = solve_completely(&mechanism, &actuators) {
+                let from = |guess| solve_newton(&mechanism, &actuators, guess, &Options::default());
+                let found = guesses.iter().filter_map(|guess| from(guess).ok());
+                for solution in found {
+                    prop_assert!(!solution.assembly.is_true(), "{error}");
+                    prop_assert!(error.reason() != "unassemblable");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn each_kind_of_failure_is_told_apart() {
+        let failure = |leg_m| {
+            let actuators = Actuators { slide_m: [0.0; LEGS], leg_m };
+            solve_completely(&seed_mechanism(), &actuators).unwrap_err()
+        };
+        let ForwardError::Unassemblable { nearest_m } = failure([0.30, 0.30, 0.20]) else { panic!() };
+        assert!(nearest_m > 1e-4 && nearest_m < 0.1, "{nearest_m}");
+        assert_eq!(failure([0.27, f64::NAN, 0.27]), ForwardError::NotFinite);
+        assert_eq!(failure([0.27, 0.27, -0.27]), ForwardError::NoLength { leg: 2, leg_m: -0.27 });
+    }
+}

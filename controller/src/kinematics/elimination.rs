@@ -1,0 +1,144 @@
+//! Every set of leg angles that closes the platform, by eliminating two of the three.
+//!
+//! At a given θ₁ legs 2 and 3 have two headings each ([`FourBar`]); side 23 decides which of the four
+//! pairs close. With Nⱼ = Bⱼ² + Cⱼ² the product over the pairs,
+//!
+//! r(x) = (N₂ N₃)² ∏ g₂₃, x = cos θ₁,
+//!
+//! is symmetric in both pairs of headings, hence a polynomial in the coefficients of the two lines:
+//! by Poisson's formula the product over the two headings of one leg has the denominator Nⱼ and a
+//! numerator quadratic in Aⱼ, Bⱼ, Cⱼ. So r has degree 8 in (cos θ₁, sin θ₁), and as mirroring all
+//! legs leaves it as it is, degree 8 in x: the known 16 solutions in 8 mirrored pairs.
+//!
+//! Completeness: at every real solution both chains close, so x lies in the one interval where both
+//! do, and r(x) = 0. r is known there from nine values, each of which is a product of real numbers
+//! without cancellation; [`bernstein`](super::bernstein) reports every place where it can be zero.
+//! Where one zero is isolated, the one pair whose g₂₃ changes sign is followed to it. Where several
+//! meet or the polynomial drowns in rounding, as at the neutral input with its triple zeros, which
+//! belong to three different pairs of headings, every pair is tried from three points. Each result is
+//! polished on the three equations themselves, so nothing that is no solution is found.
+//!
+//! What rounding leaves open: two solutions closer than [`MERGED_WITHIN_RAD`](super::solutions) count
+//! as one, and solutions that meet (the input is on a singularity) may be found or missed as a pair.
+
+use masseter_shared::geometry::LEGS;
+
+use super::bernstein::{NODES, Vanishing, Zeros, locate};
+use super::closure::{Closed, Closure};
+use super::four_bar::{Branches, FourBar, Interval};
+use super::heading::Heading;
+
+/// Iterations that polish a solution: where two meet, each only halves the error.
+const MOST_ITERATIONS: u32 = 40;
+/// Steps that narrow a change of sign; half of them gain several digits each.
+const MOST_STEPS: u32 = 50;
+/// g₂₃ at which Newton's iteration takes over.
+const NARROW_ENOUGH: f64 = 1e-10;
+/// Pairs of headings of legs 2 and 3.
+const PAIRS: usize = 4;
+
+/// Legs 2 and 3 as functions of x = cos θ₁, θ₁ in [0, π].
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Elimination<'a> {
+    closure: &'a Closure,
+    second: FourBar,
+    third: FourBar,
+}
+
+impl<'a> Elimination<'a> {
+    pub(super) fn new(closure: &'a Closure) -> Self {
+        Self {
+            closure,
+            second: FourBar::driven_from_near(&closure.sides[0]),
+            third: FourBar::driven_from_far(&closure.sides[2]),
+        }
+    }
+
+    /// Calls `found` for every solution with θ₁ in [0, π], for some more than once.
+    pub(super) fn solve(&self, mut found: impl FnMut(Closed)) -> Result<(), Vanishing> {
+        let range = self.range();
+        if range.low > range.high {
+            return Ok(());
+        }
+        let values = NODES.map(|node| self.product(range.at(node)));
+        locate(&values, |zeros| match zeros {
+            Zeros::One(within) => self.follow(scaled(range, within), &mut found),
+            Zeros::Undecided(within) => self.try_all(scaled(range, within), &mut found),
+        })
+    }
+
+    /// The x at which both chains close.
+    pub(super) fn range(&self) -> Interval {
+        self.second.range().intersect(self.third.range())
+    }
+
+    /// The four sets of headings at x, on which sides 12 and 31 fit, or come closest to it.
+    pub(super) fn headings(&self, x: f64) -> [[Heading; LEGS]; PAIRS] {
+        let (driving, second, third) = self.branches(x);
+        std::array::from_fn(|pair| [driving, second.headings[pair & 1], third.headings[pair >> 1]])
+    }
+
+    fn branches(&self, x: f64) -> (Heading, Branches, Branches) {
+        let driving = Heading { cos: x, sin: ((1.0 - x) * (1.0 + x)).max(0.0).sqrt() };
+        (driving, self.second.branches(driving), self.third.branches(driving))
+    }
+
+    /// r(x).
+    fn product(&self, x: f64) -> f64 {
+        let (_, second, third) = self.branches(x);
+        let values = self.closing_values(x);
+        let norms = second.norm_squared * third.norm_squared;
+        norms * norms * values.iter().product::<f64>()
+    }
+
+    /// g₂₃ for each pair of headings.
+    fn closing_values(&self, x: f64) -> [f64; PAIRS] {
+        self.headings(x).map(|[_, second, third]| self.closure.sides[1].value(second, third))
+    }
+
+    /// The solution in an interval that holds exactly one.
+    fn follow(&self, within: Interval, found: &mut impl FnMut(Closed)) {
+        let (low, high) = (self.closing_values(within.low), self.closing_values(within.high));
+        let Some(pair) = (0..PAIRS).find(|&pair| (low[pair] > 0.0) != (high[pair] > 0.0)) else {
+            return self.try_all(within, found);
+        };
+        let x = narrowed(within, low[pair], high[pair], |x| self.closing_values(x)[pair]);
+        match self.closure.close(&self.headings(x)[pair], MOST_ITERATIONS) {
+            Some(closed) => found(closed),
+            None => self.try_all(within, found),
+        }
+    }
+
+    /// Every solution to which a pair leads from the ends or the middle of an interval.
+    fn try_all(&self, within: Interval, found: &mut impl FnMut(Closed)) {
+        for x in [within.low, within.at(0.5), within.high] {
+            for start in self.headings(x) {
+                self.closure.close(&start, MOST_ITERATIONS).into_iter().for_each(&mut *found);
+            }
+        }
+    }
+}
+
+fn scaled(range: Interval, within: Interval) -> Interval {
+    Interval { low: range.at(within.low), high: range.at(within.high) }
+}
+
+/// Where a function changes sign, by false position with the Illinois rule.
+fn narrowed(within: Interval, at_low: f64, at_high: f64, function: impl Fn(f64) -> f64) -> f64 {
+    let ([mut kept, mut newest], [mut at_kept, mut at_newest]) =
+        ([within.low, within.high], [at_low, at_high]);
+    for _ in 0..MOST_STEPS {
+        if at_newest.abs() < NARROW_ENOUGH {
+            break;
+        }
+        let x = newest - at_newest * (newest - kept) / (at_newest - at_kept);
+        let value = function(x);
+        if (value > 0.0) == (at_newest > 0.0) {
+            at_kept *= 0.5;
+        } else {
+            (kept, at_kept) = (newest, at_newest);
+        }
+        (newest, at_newest) = (x, value);
+    }
+    newest
+}

@@ -1,0 +1,105 @@
+//! How far an input is from one that can be assembled.
+//!
+//! Measured by the least root of the seed's error (eq. 2) over all leg angles, that is, by how much
+//! the platform's sides would have to give. It is searched by descent from the best of a grid of
+//! starts, so it is an upper bound: no promise that no other angles come closer.
+
+use masseter_shared::geometry::{Actuators, Mechanism};
+use nalgebra::{Matrix3, Vector3};
+
+use super::Equations;
+use super::closure::Closure;
+use super::elimination::Elimination;
+use super::heading::Heading;
+
+/// Values of cos θ₁ that are tried, four sets of angles each.
+const GRID: u32 = 32;
+/// Descents, from the best starts of the grid.
+const DESCENTS: usize = 4;
+/// Steps of one descent.
+const STEPS: u32 = 40;
+
+/// The least √(f₁² + f₂² + f₃²) found, metres.
+pub(super) fn nearest_m(mechanism: &Mechanism, actuators: &Actuators, closure: &Closure) -> f64 {
+    let equations = Equations::new(mechanism, actuators);
+    let mut best = [(f64::INFINITY, Vector3::zeros()); DESCENTS];
+    let elimination = Elimination::new(closure);
+    for index in 0..=GRID {
+        let x = 2.0 * f64::from(index) / f64::from(GRID) - 1.0;
+        for headings in elimination.headings(x) {
+            let theta_rad = Vector3::from(headings.map(Heading::to_rad));
+            keep_best(&mut best, (equations.evaluate(theta_rad).error_m2(), theta_rad));
+        }
+    }
+    best.iter().map(|(_, start)| descended_m2(&equations, *start)).fold(f64::INFINITY, f64::min).sqrt()
+}
+
+/// Replaces the worst of the best if the candidate is better.
+fn keep_best(best: &mut [(f64, Vector3<f64>); DESCENTS], candidate: (f64, Vector3<f64>)) {
+    let worst = best.iter_mut().max_by(|a, b| a.0.total_cmp(&b.0));
+    if let Some(worst) = worst.filter(|worst| candidate.0 < worst.0) {
+        *worst = candidate;
+    }
+}
+
+/// Levenberg's and Marquardt's descent: the error at its end, m².
+fn descended_m2(equations: &Equations<'_>, start: Vector3<f64>) -> f64 {
+    let mut at = equations.evaluate(start);
+    let mut damping = 1e-3;
+    for _ in 0..STEPS {
+        let jacobian = equations.jacobian(&at);
+        let normal = jacobian.tr_mul(&jacobian);
+        let damped = normal + Matrix3::identity() * (damping * normal.trace());
+        let Some(factors) = damped.cholesky() else { break };
+        let step = factors.solve(&jacobian.tr_mul(&at.residual_m));
+        let next = equations.evaluate(at.theta_rad - step);
+        if next.error_m2() < at.error_m2() {
+            (at, damping) = (next, damping * 0.2);
+        } else {
+            damping *= 5.0;
+        }
+    }
+    at.error_m2()
+}
+
+#[cfg(test)]
+mod tests {
+    use masseter_shared::geometry::LEGS;
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::kinematics::samples::seed_mechanism;
+
+    /// Least error over a grid of all three angles above the base, m.
+    fn on_a_grid_m(equations: &Equations<'_>) -> f64 {
+        let angle = |index: u32| f64::from(index) * std::f64::consts::PI / 60.0;
+        let mut least_m2 = f64::INFINITY;
+        for (i, j, k) in (0..216_000).map(|n| (n % 60, n / 60 % 60, n / 3600)) {
+            let theta_rad = Vector3::new(angle(i), angle(j), angle(k));
+            least_m2 = least_m2.min(equations.evaluate(theta_rad).error_m2());
+        }
+        least_m2.sqrt()
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(20))]
+
+        #[test]
+        fn nothing_on_a_grid_comes_closer(
+            slide_m in prop::array::uniform3(-0.03..0.03f64), leg_m in prop::array::uniform3(0.2..0.34f64),
+        ) {
+            let (mechanism, actuators) = (seed_mechanism(), Actuators { slide_m, leg_m });
+            let nearest = nearest_m(&mechanism, &actuators, &Closure::new(&mechanism, &actuators));
+            prop_assert!(nearest <= on_a_grid_m(&Equations::new(&mechanism, &actuators)) + 1e-12);
+        }
+    }
+
+    /// Two legs so short that they cannot reach each other: their side alone has to give.
+    #[test]
+    fn legs_that_cannot_meet_are_as_far_off_as_they_are_apart() {
+        let actuators = Actuators { slide_m: [0.0; LEGS], leg_m: [0.01, 0.01, 0.06] };
+        let mechanism = seed_mechanism();
+        let found_m = nearest_m(&mechanism, &actuators, &Closure::new(&mechanism, &actuators));
+        assert!(found_m > 0.03 && found_m < 0.05, "{found_m}");
+    }
+}

@@ -1,0 +1,184 @@
+//! All ways in which the mechanism can be assembled for one input.
+
+use masseter_shared::geometry::{Actuators, LEGS, Mechanism};
+
+use super::closure::{Closed, Closure};
+use super::elimination::Elimination;
+use super::heading::{Heading, coincide, separation_rad};
+use super::{ForwardError, Solution};
+
+/// There are never more; they come in mirrored pairs.
+pub const MOST_SOLUTIONS: usize = 16;
+/// Solutions closer than this are one, radians on every leg.
+pub(super) const MERGED_WITHIN_RAD: f64 = 1e-6;
+/// A leg shorter than this has no direction, metres.
+const SHORTEST_LEG_M: f64 = 1e-9;
+
+/// Every real solution of the equations (seed, eq. 1) for one input, mirrored ones next to each other.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Solutions {
+    solutions: [Option<Solution>; MOST_SOLUTIONS],
+    count: usize,
+}
+
+impl Solutions {
+    /// Solves completely; the module `elimination` says why nothing is missed. No
+    /// solution at all is a result, not an error: the mechanism cannot be assembled.
+    ///
+    /// # Errors
+    /// [`ForwardError::NotFinite`], [`ForwardError::NoLength`], and [`ForwardError::Undecided`] where
+    /// solutions form a continuum but for rounding.
+    pub fn new(mechanism: &Mechanism, actuators: &Actuators) -> Result<Self, ForwardError> {
+        check(actuators)?;
+        Self::of(mechanism, actuators, &Closure::new(mechanism, actuators))
+    }
+
+    pub(super) fn of(
+        mechanism: &Mechanism,
+        actuators: &Actuators,
+        closure: &Closure,
+    ) -> Result<Self, ForwardError> {
+        let mut distinct = Distinct { closed: [None; MOST_SOLUTIONS], count: 0, overflowed: false };
+        let isolated = Elimination::new(closure).solve(|closed| distinct.add_pair(closure, &closed));
+        if isolated.is_err() || distinct.overflowed {
+            return Err(ForwardError::Undecided { solutions: distinct.count });
+        }
+        let solution = |closed: Closed| Solution::new(mechanism, actuators, closure, &closed);
+        Ok(Self { solutions: distinct.closed.map(|closed| closed.map(solution)), count: distinct.count })
+    }
+
+    /// How many there are.
+    pub fn count(&self) -> usize {
+        self.count
+    }
+
+    /// All of them.
+    pub fn iter(&self) -> impl Iterator<Item = &Solution> {
+        self.solutions.iter().flatten()
+    }
+
+    /// Those in which the mechanism can stand.
+    pub fn true_ones(&self) -> impl Iterator<Item = &Solution> {
+        self.iter().filter(|solution| solution.assembly.is_true())
+    }
+
+    /// How far the nearest other solution is from one of these: the largest difference of any leg's
+    /// angle, radians. None where there is no other.
+    pub fn separation_rad(&self, solution: &Solution) -> Option<f64> {
+        let distances = self.iter().map(|other| separation_rad(&solution.headings, &other.headings));
+        distances.filter(|&distance| distance > MERGED_WITHIN_RAD).min_by(f64::total_cmp)
+    }
+}
+
+/// Inputs on which the equations are defined.
+pub(super) fn check(actuators: &Actuators) -> Result<(), ForwardError> {
+    if !actuators.is_finite() {
+        return Err(ForwardError::NotFinite);
+    }
+    match (0..LEGS).find(|&leg| actuators.leg_m[leg] < SHORTEST_LEG_M) {
+        Some(leg) => Err(ForwardError::NoLength { leg, leg_m: actuators.leg_m[leg] }),
+        None => Ok(()),
+    }
+}
+
+/// Closed platforms, none twice.
+struct Distinct {
+    closed: [Option<Closed>; MOST_SOLUTIONS],
+    count: usize,
+    overflowed: bool,
+}
+
+impl Distinct {
+    fn add_pair(&mut self, closure: &Closure, closed: &Closed) {
+        self.add(*closed);
+        let headings = closed.headings.map(Heading::mirrored);
+        self.add(Closed { headings, closing: closure.evaluate(&headings), ..*closed });
+    }
+
+    fn add(&mut self, closed: Closed) {
+        let is_same = |known: &Closed| coincide(&known.headings, &closed.headings, MERGED_WITHIN_RAD);
+        if self.closed.iter().flatten().any(is_same) {
+            return;
+        }
+        match self.closed.get_mut(self.count) {
+            Some(place) => {
+                *place = Some(closed);
+                self.count += 1;
+            }
+            None => self.overflowed = true,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::kinematics::samples::{mechanisms, seed_mechanism};
+    use crate::kinematics::{Options, solve_newton};
+
+    fn boxes() -> impl Strategy<Value = Actuators> {
+        let strokes = (prop::array::uniform3(-0.03..0.03f64), prop::array::uniform3(0.24..0.3f64));
+        strokes.prop_map(|(slide_m, leg_m)| Actuators { slide_m, leg_m })
+    }
+
+    #[test]
+    fn the_neutral_input_has_sixteen_of_which_one_is_true() {
+        let neutral = Actuators { slide_m: [0.0; LEGS], leg_m: [0.27; LEGS] };
+        let solutions = Solutions::new(&seed_mechanism(), &neutral).unwrap();
+        assert_eq!(solutions.count(), MOST_SOLUTIONS);
+        let is_above = |solution: &&Solution| solution.assembly.legs_above_base == [true; LEGS];
+        assert_eq!(solutions.iter().filter(is_above).count(), 8);
+        let mut true_ones = solutions.true_ones();
+        let upright = true_ones.next().unwrap();
+        assert!((upright.theta_rad[1].to_degrees() - 83.862_391_93).abs() < 1e-7);
+        assert_eq!(true_ones.next(), None);
+        // The platform turned over, at 71.29° on all legs.
+        let next_rad = solutions.separation_rad(upright).unwrap();
+        assert!((next_rad.to_degrees() - 12.571).abs() < 1e-2);
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(300))]
+
+        /// What random starts lead to is among the solutions, and each of these is one.
+        #[test]
+        fn no_start_leads_to_a_solution_that_is_not_there(
+            mechanism in mechanisms(), actuators in boxes(),
+            guesses in prop::array::uniform32(prop::array::uniform3(-3.2..3.2f64)),
+        ) {
+            let solutions = Solutions::new(&mechanism, &actuators).unwrap();
+            for guess in guesses {
+                if let Ok(found) = solve_newton(&mechanism, &actuators, &guess, &Options::default()) {
+                    let is_same = |one: &Solution| coincide(&one.headings, &found.headings, 1e-6);
+                    prop_assert!(solutions.iter().any(is_same));
+                }
+            }
+            for solution in solutions.iter() {
+                prop_assert!(solution.residual_m < 1e-13);
+            }
+        }
+
+        /// The four pairs of headings, watched on a dense grid: as many changes of sign as solutions.
+        #[test]
+        fn a_dense_grid_counts_no_more_and_no_fewer(mechanism in mechanisms(), actuators in boxes()) {
+            const GRID: u32 = 20_000;
+            let closure = Closure::new(&mechanism, &actuators);
+            let elimination = Elimination::new(&closure);
+            let range = elimination.range();
+            prop_assume!(range.low < range.high);
+            let signs = |index: u32| {
+                elimination
+                    .headings(range.at(f64::from(index) / f64::from(GRID)))
+                    .map(|[_, second, third]| closure.sides[1].value(second, third) > 0.0)
+            };
+            let mut changes = 0;
+            for index in 0..GRID {
+                let (before, after) = (signs(index), signs(index + 1));
+                changes += before.iter().zip(after).filter(|(before, after)| *before != after).count();
+            }
+            prop_assert_eq!(Solutions::new(&mechanism, &actuators).unwrap().count(), 2 * changes);
+        }
+    }
+}
