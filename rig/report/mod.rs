@@ -9,6 +9,7 @@ mod table;
 pub mod verdict;
 
 use std::fs;
+use std::io::{self, Write};
 use std::path::Path;
 
 use anyhow::Context;
@@ -40,6 +41,11 @@ pub(crate) fn again(path: &Path, format: Format) -> Result<Exit, Failure> {
     write(&folder, &manifest, &figures, format)
 }
 
+/// Writes to standard output. A reader that has had enough is no fault of the run.
+fn show(text: &str) {
+    let _ = io::stdout().write_all(text.as_bytes());
+}
+
 /// Judges the run, writes the report's files and prints the result.
 pub(crate) fn write(
     folder: &RunFolder,
@@ -50,12 +56,12 @@ pub(crate) fn write(
     let verdict = Verdict::of(manifest, figures);
     let summary = Summary { form: FORM, verdict: &verdict, figures };
     let json = serde_json::to_string_pretty(&summary).context("cannot write the summary")? + "\n";
-    match format {
+    show(&match format {
         Format::Human => {
-            print!("{}\nfiles: {}\n", table::of_run(manifest, figures, &verdict), folder.path().display());
+            format!("{}\nfiles: {}\n", table::of_run(manifest, figures, &verdict), folder.path().display())
         }
-        Format::Json => print!("{json}"),
-    }
+        Format::Json => json.clone(),
+    });
     for (path, text) in [
         (folder.summary(), &json),
         (folder.junit(), &junit::of_run(manifest, figures, &verdict)),
