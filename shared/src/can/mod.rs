@@ -2,7 +2,7 @@
 //! drive profile, the bus trait and its simulated implementation.
 //!
 //! Everything here is a value or a pure step: no clock, no thread, no I/O. What drives the robot's
-//! real interface implements [`Bus`] elsewhere. CAN FD, remote frames and SDO are not represented.
+//! real interface implements [`Bus`] elsewhere. CAN FD and remote frames are not represented.
 
 mod bus;
 pub mod candump;
