@@ -13,6 +13,8 @@ use rustix::time::{ClockId, Timespec, clock_gettime};
 
 /// Nanoseconds in a second.
 pub const SECOND_NS: u64 = 1_000_000_000;
+/// What older stamps of the wall clock say is that it was set.
+const PLAUSIBLE_AGE: Duration = Duration::from_secs(60);
 
 /// Now, ns of `CLOCK_MONOTONIC`.
 pub fn now_ns() -> u64 {
@@ -35,7 +37,43 @@ pub fn sleep(duration: Duration) {
     sleep_until(now_ns() + duration.as_nanos() as u64);
 }
 
+/// The instant of `CLOCK_MONOTONIC` at which the wall clock showed `stamp`, ns; now, if that lies in the
+/// future or more than a minute back, because the wall clock was set meanwhile. Never before the true
+/// instant, as long as the wall clock is not set.
+pub fn monotonic_ns(stamp: SystemTime) -> u64 {
+    // In this order, what passes between the two readings makes the result later, but never later than now.
+    let wall = SystemTime::now();
+    let now_ns = now_ns();
+    match wall.duration_since(stamp) {
+        Ok(age) if age < PLAUSIBLE_AGE => now_ns.saturating_sub(age.as_nanos() as u64),
+        _ => now_ns,
+    }
+}
+
 /// Wall-clock time since 1970-01-01 00:00 UTC, for the names of run folders.
 pub fn wall_time() -> Duration {
     SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_stamp_of_the_wall_clock_lies_between_the_monotonic_readings_around_it() {
+        let before_ns = now_ns();
+        let stamp = SystemTime::now();
+        let after_ns = now_ns();
+        assert!(monotonic_ns(stamp) >= before_ns);
+        // A second stamp taken later lies later.
+        assert!(monotonic_ns(SystemTime::now()) >= after_ns);
+    }
+
+    #[test]
+    fn a_stamp_of_a_clock_set_meanwhile_counts_as_now() {
+        for stamp in [UNIX_EPOCH, SystemTime::now() + Duration::from_secs(3600)] {
+            let before_ns = now_ns();
+            assert!(monotonic_ns(stamp) >= before_ns);
+        }
+    }
 }

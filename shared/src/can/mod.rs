@@ -1,8 +1,8 @@
 //! The CAN link: frames and what they cost on the wire, the CANopen objects the rig exchanges, the
-//! drive profile, the bus trait and its simulated implementation.
+//! drive profile, the bus trait and its two implementations: simulated and `SocketCAN`.
 //!
-//! Everything here is a value or a pure step: no clock, no thread, no I/O. What drives the robot's
-//! real interface implements [`Bus`] elsewhere. CAN FD and remote frames are not represented.
+//! Everything here but [`SocketCan`] is a value or a pure step: no clock, no thread, no I/O. CAN FD and
+//! remote frames are not represented.
 
 mod bus;
 pub mod candump;
@@ -12,6 +12,7 @@ pub mod conformance;
 mod frame;
 mod load;
 mod pdo;
+mod socket_can;
 pub mod tap;
 mod virtual_bus;
 pub mod wire;
@@ -20,5 +21,6 @@ pub use bus::{Bus, BusStatus, ErrorState, ReceiveError, Received, SendError};
 pub use frame::{CanId, Frame, FrameError};
 pub use load::{CycleLoad, FrameGroup, Overload};
 pub use pdo::{Rpdo1, Tpdo1};
+pub use socket_can::{OpenError, SocketCan};
 pub use virtual_bus::{Port, Statistics, VirtualWire, WireConfig};
 pub use wire::{Bitrate, BitrateError};

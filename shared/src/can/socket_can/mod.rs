@@ -1,0 +1,242 @@
+//! A node's port on a real wire: a raw `SocketCAN` socket that never waits.
+//!
+//! Frames leave in the order they were sent, through the queue of the interface (`txqueuelen`): who needs
+//! urgent frames to go first sends them first. Frames of other sockets on the same interface are received
+//! like those of other nodes, and in the order in which they were on the wire; so a second port on the
+//! interface is a tap.
+//!
+//! # Time stamps
+//! The kernel stamps a frame when the driver hands it over, in wall-clock time; the stamp is converted to
+//! `CLOCK_MONOTONIC` when the frame is fetched ([`clock::monotonic_ns`]). Stamps of a port never run
+//! backwards. Hardware stamps are not used: they count in the adapter's own clock, which shares no origin
+//! with ours.
+//!
+//! # Fault confinement
+//! The driver reports it by error frames, which change [`status`](Bus::status) and are not handed on. A port
+//! is taken for error active until the first of them. A port that is bus-off refuses to send until the
+//! driver reports a restart (`ip link set … type can restart-ms 100`) or the interface was taken down.
+//!
+//! # Losses
+//! Frames lost because the socket was not emptied in time are counted by the kernel; what the controller
+//! itself lost it does not count, so that each such report stands for one frame at least.
+//!
+//! Remote and CAN FD frames are passed over. An adapter that is unplugged is gone for good: its port
+//! reports [`InterfaceDown`](ReceiveError::InterfaceDown) until it is opened anew; one that was only taken
+//! down works again when it is up.
+
+mod confinement;
+mod interface;
+
+use std::io;
+use std::time::{Duration, SystemTime};
+
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use socketcan::{
+    CanDataFrame, CanFrame, CanSocket, EmbeddedFrame, ExtendedId, Frame as _, Id, Socket, SocketOptions,
+    StandardId,
+};
+
+use self::confinement::Confinement;
+pub use self::interface::OpenError;
+use super::bus::{Bus, BusStatus, ErrorState, ReceiveError, Received, SendError};
+use super::frame::{CanId, Frame};
+use crate::clock;
+
+/// Frames looked at in one call of [`Bus::receive`]: error and remote frames must not hold a cycle up.
+const FRAMES_AT_ONCE: usize = 64;
+/// Receive buffer asked for, bytes; the kernel grants at most `net.core.rmem_max`.
+const RECEIVE_BUFFER: i32 = 1 << 20;
+/// Fields of `SO_MEMINFO` (`linux/sock_diag.h`), 32 bits each, and which of them counts dropped frames.
+const MEMINFO_FIELDS: usize = 9;
+const MEMINFO_DROPS: usize = 8;
+
+/// A port on a real wire.
+#[derive(Debug)]
+pub struct SocketCan {
+    socket: CanSocket,
+    interface: String,
+    transmit_capacity: usize,
+    confinement: Confinement,
+    last_ns: u64,
+    /// Frames were fetched since the drop counter was looked at.
+    drained: bool,
+    /// The kernel's drop counter as last reported.
+    dropped: u32,
+}
+
+impl SocketCan {
+    /// Opens a port on an interface that is there and up.
+    ///
+    /// # Errors
+    /// [`OpenError`], which says what to do.
+    pub fn open(interface: &str) -> Result<Self, OpenError> {
+        let transmit_capacity = interface::check(interface)?;
+        let failed = |error| OpenError::of(interface, errno(&error));
+        let socket = CanSocket::open(interface).map_err(failed)?;
+        configure(&socket).map_err(failed)?;
+        Ok(Self {
+            socket,
+            interface: interface.to_owned(),
+            transmit_capacity,
+            confinement: Confinement::default(),
+            last_ns: 0,
+            drained: false,
+            dropped: 0,
+        })
+    }
+
+    /// Name of the interface.
+    pub fn interface(&self) -> &str {
+        &self.interface
+    }
+
+    /// Waits until one of the ports has something to fetch, or until `deadline_ns`; or less, when a signal
+    /// arrives.
+    pub fn wait<const N: usize>(ports: &[Self; N], deadline_ns: u64) {
+        let left = Duration::from_nanos(deadline_ns.saturating_sub(clock::now_ns()));
+        let left = Timespec { tv_sec: left.as_secs() as i64, tv_nsec: left.subsec_nanos() as _ };
+        let mut watched = ports.each_ref().map(|port| PollFd::new(&port.socket, PollFlags::IN));
+        // A wait that fails is one that ends at once: the caller looks at the ports either way.
+        let _ = poll(&mut watched, Some(&left));
+    }
+
+    /// What a frame just fetched means: a frame for the caller, a loss, or nothing.
+    fn take(
+        &mut self,
+        frame: &CanFrame,
+        stamp: Option<SystemTime>,
+    ) -> Result<Option<Received>, ReceiveError> {
+        self.drained = true;
+        match frame {
+            CanFrame::Data(data) => {
+                let time_ns = stamp.map_or_else(clock::now_ns, clock::monotonic_ns).max(self.last_ns);
+                self.last_ns = time_ns;
+                Ok(from_socket(data).map(|frame| Received { frame, time_ns }))
+            }
+            CanFrame::Error(error) => match self.confinement.take(error.error_bits(), error.data()) {
+                0 => Ok(None),
+                lost => Err(ReceiveError::Overrun { lost }),
+            },
+            CanFrame::Remote(_) => Ok(None),
+        }
+    }
+
+    /// Nothing is left to fetch: tells of frames dropped meanwhile.
+    fn empty(&mut self) -> Result<Option<Received>, ReceiveError> {
+        if !std::mem::take(&mut self.drained) {
+            return Ok(None);
+        }
+        let dropped = self.count_dropped().map_err(|error| ReceiveError::Os { errno: errno(&error) })?;
+        match dropped.wrapping_sub(std::mem::replace(&mut self.dropped, dropped)) {
+            0 => Ok(None),
+            lost => Err(ReceiveError::Overrun { lost: u64::from(lost) }),
+        }
+    }
+
+    /// Frames that the kernel dropped since the socket was opened.
+    fn count_dropped(&self) -> io::Result<u32> {
+        let mut fields = [0; MEMINFO_FIELDS * size_of::<u32>()];
+        self.socket.get_socket_option_bytes(libc::SOL_SOCKET, libc::SO_MEMINFO, &mut fields)?;
+        let (fields, _) = fields.as_chunks();
+        Ok(u32::from_ne_bytes(fields[MEMINFO_DROPS]))
+    }
+
+    fn receive_failed(&mut self, error: &io::Error) -> Result<Option<Received>, ReceiveError> {
+        match error.kind() {
+            io::ErrorKind::WouldBlock => self.empty(),
+            io::ErrorKind::Interrupted => Ok(None),
+            _ if is_down(error) => {
+                self.confinement = Confinement::default();
+                Err(ReceiveError::InterfaceDown { errno: errno(error) })
+            }
+            _ => Err(ReceiveError::Os { errno: errno(error) }),
+        }
+    }
+}
+
+impl Bus for SocketCan {
+    fn send(&mut self, _: u64, frame: Frame) -> Result<(), SendError> {
+        let BusStatus { state, tec, .. } = self.confinement.status();
+        if state == ErrorState::BusOff {
+            return Err(SendError::BusOff { tec });
+        }
+        self.socket.write_frame(&to_socket(&frame)).map_err(|error| match errno(&error) {
+            // ENOBUFS: the interface's queue; EAGAIN: the socket's own share of it.
+            libc::ENOBUFS | libc::EAGAIN => SendError::QueueFull { capacity: self.transmit_capacity },
+            errno if is_down(&error) => SendError::InterfaceDown { errno },
+            errno => SendError::Os { errno },
+        })
+    }
+
+    fn receive(&mut self, _: u64) -> Result<Option<Received>, ReceiveError> {
+        for _ in 0..FRAMES_AT_ONCE {
+            match self.socket.read_frame_with_timestamps() {
+                Ok((frame, stamps)) => {
+                    if let Some(received) = self.take(&frame, stamps.socket)? {
+                        return Ok(Some(received));
+                    }
+                }
+                Err(error) => return self.receive_failed(&error),
+            }
+        }
+        Ok(None)
+    }
+
+    fn status(&self) -> BusStatus {
+        self.confinement.status()
+    }
+}
+
+fn configure(socket: &CanSocket) -> io::Result<()> {
+    socket.set_nonblocking(true)?;
+    socket.set_recv_own_msgs(false)?;
+    socket.set_error_filter_accept_all()?;
+    socket.set_recv_timestamp(true)?;
+    socket.set_socket_option_int(libc::SOL_SOCKET, libc::SO_RCVBUF, RECEIVE_BUFFER)
+}
+
+fn to_socket(frame: &Frame) -> CanDataFrame {
+    let (id, number) = (frame.id(), frame.id().number());
+    let id = if id.is_extended() {
+        ExtendedId::new(number).map(Id::Extended)
+    } else {
+        StandardId::new(number as u16).map(Id::Standard)
+    };
+    let id = id.expect("an identifier of 11 or 29 bits");
+    CanDataFrame::new(id, frame.data()).expect("a classical frame of at most 8 bytes")
+}
+
+fn from_socket(frame: &CanDataFrame) -> Option<Frame> {
+    // The kernel hands out nothing else; what it should not is passed over.
+    Frame::new(CanId::from_flagged(frame.id_word()).ok()?, frame.data()).ok()
+}
+
+fn is_down(error: &io::Error) -> bool {
+    matches!(errno(error), libc::ENETDOWN | libc::ENODEV | libc::ENXIO)
+}
+
+fn errno(error: &io::Error) -> i32 {
+    // Only a frame of an unexpected size has no number of the system's.
+    error.raw_os_error().unwrap_or(libc::EPROTO)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::frame::strategies::any_frame;
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn every_frame_survives_the_form_of_the_kernel(frame in any_frame()) {
+            prop_assert_eq!(from_socket(&to_socket(&frame)), Some(frame));
+        }
+    }
+
+    #[test]
+    fn what_cannot_be_opened_is_refused_with_what_to_do() {
+        let error = SocketCan::open("no-such-can").unwrap_err().to_string();
+        let remedies = ["modprobe can-raw", "no CAN interface `no-such-can`"];
+        assert!(remedies.iter().any(|remedy| error.contains(remedy)), "{error}");
+    }
+}
