@@ -9,7 +9,7 @@ use masseter_controller::process::Outcome;
 use masseter_shared::lifecycle::Assignment;
 
 use crate::exit::{Exit, Failure};
-use crate::{clean, kinematics, logger, report, run};
+use crate::{clean, doctor, kinematics, logger, report, run};
 
 /// A hardware-in-the-loop rig for a 6-DOF mastication robot.
 #[derive(Debug, Parser)]
@@ -29,6 +29,8 @@ enum Verb {
     Ik(CsvArgs),
     /// The report of a run folder, again
     Report(ReportArgs),
+    /// Is this machine fit for real-time runs?
+    Doctor(DoctorArgs),
     /// Remove what killed runs left in shared memory
     Clean,
     #[command(hide = true)]
@@ -89,7 +91,7 @@ pub enum Format {
     /// For people.
     #[default]
     Human,
-    /// The content of `summary.json`.
+    /// For programs.
     Json,
 }
 
@@ -121,6 +123,14 @@ struct ReportArgs {
     #[arg(default_value = "runs/latest")]
     folder: PathBuf,
     /// How the result is written to standard output
+    #[arg(long, value_enum, default_value_t)]
+    format: Format,
+}
+
+/// What `doctor` takes.
+#[derive(Debug, Clone, Args)]
+struct DoctorArgs {
+    /// How the report is written to standard output
     #[arg(long, value_enum, default_value_t)]
     format: Format,
 }
@@ -174,6 +184,7 @@ pub fn main() -> ExitCode {
         Verb::Fk(args) => kinematics::forward(&args),
         Verb::Ik(args) => kinematics::inverse(&args),
         Verb::Report(args) => report::again(&args.folder, args.format),
+        Verb::Doctor(args) => doctor::examine(args.format),
         Verb::Clean => clean::clean(),
         Verb::Controller(args) => masseter_controller::process::run(&args.assignment())
             .map(|outcome| match outcome {

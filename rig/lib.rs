@@ -8,9 +8,11 @@
 pub mod analysis;
 pub mod clean;
 pub mod cli;
+pub mod doctor;
 pub mod exit;
 pub mod kinematics;
 pub mod logger;
+pub mod machine;
 pub mod recording;
 pub mod report;
 pub mod run;

@@ -42,7 +42,7 @@ pub(crate) fn again(path: &Path, format: Format) -> Result<Exit, Failure> {
 }
 
 /// Writes to standard output. A reader that has had enough is no fault of the run.
-fn show(text: &str) {
+pub(crate) fn show(text: &str) {
     let _ = io::stdout().write_all(text.as_bytes());
 }
 

@@ -7,12 +7,14 @@ use std::time::UNIX_EPOCH;
 
 use masseter_shared::clock;
 use masseter_shared::config::Scenario;
-use masseter_shared::realtime::scheduling::{Obtained, cores};
+use masseter_shared::realtime::scheduling::{Obtained, allowed_cores};
 use serde::{Deserialize, Serialize};
 
+use super::dma_latency::DmaLatency;
 use super::folder::RunFolder;
 use super::plan::Plan;
 use crate::cli::ClockKind;
+use crate::machine::SystemRoot;
 use crate::report::verdict::Ending;
 
 /// Version of the manifest's form.
@@ -37,6 +39,8 @@ pub struct Manifest {
     pub machine: Machine,
     /// What each process asked of the kernel and obtained; empty under virtual time.
     pub scheduling: BTreeMap<String, Obtained>,
+    /// What became of `/dev/cpu_dma_latency`; none under virtual time.
+    pub cpu_dma_latency: Option<DmaLatency>,
     /// How the run ended.
     pub ending: Ending,
 }
@@ -46,10 +50,13 @@ pub struct Manifest {
 pub struct Machine {
     /// Processor model.
     pub cpu: String,
-    /// Cores online.
+    /// Cores that may be used.
     pub cores: usize,
     /// Kernel name, release and version.
     pub kernel: String,
+    /// Whether a hypervisor runs it.
+    #[serde(rename = "virtual")]
+    pub is_virtual: bool,
 }
 
 impl Machine {
@@ -61,8 +68,9 @@ impl Machine {
         let model = cpuinfo.lines().find_map(|line| line.strip_prefix("model name")?.split_once(": "));
         Self {
             cpu: model.map_or_else(|| std::env::consts::ARCH.to_owned(), |(_, name)| name.to_owned()),
-            cores: cores(),
+            cores: allowed_cores().len(),
             kernel: format!("{name} {release} {version}"),
+            is_virtual: SystemRoot::of_this_machine().is_virtual(),
         }
     }
 }
@@ -83,6 +91,7 @@ impl Manifest {
             motion_s: plan.trajectory.duration_s(),
             machine: Machine::this(),
             scheduling: BTreeMap::new(),
+            cpu_dma_latency: None,
             ending: Ending::Completed,
         }
     }

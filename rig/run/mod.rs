@@ -4,6 +4,7 @@
 //! processes, or [`virtual_time`] their cores; then the recording is analysed and the run judged.
 
 pub mod child;
+pub mod dma_latency;
 pub mod folder;
 pub mod manifest;
 pub mod plan;
@@ -36,6 +37,7 @@ pub fn run(args: &RunArgs) -> Result<Exit, Failure> {
         ClockKind::Rt => {
             let ended = supervisor::run(&plan, &folder, args.require_rt)?;
             manifest.scheduling = ended.scheduling;
+            manifest.cpu_dma_latency = Some(ended.cpu_dma_latency);
             ended.ending
         }
     };

@@ -20,10 +20,12 @@ use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::iterator::Signals;
 
 use super::child::{Process, Role, describe};
+use super::dma_latency::{self, DmaLatency};
 use super::folder::RunFolder;
 use super::plan::Plan;
 use crate::clean::sweep_dead;
 use crate::exit::Exit;
+use crate::machine::SystemRoot;
 use crate::report::verdict::Ending;
 
 /// How often the processes are looked after.
@@ -46,6 +48,8 @@ pub struct Ended {
     pub ending: Ending,
     /// What each process obtained.
     pub scheduling: BTreeMap<String, Obtained>,
+    /// What became of `/dev/cpu_dma_latency`.
+    pub cpu_dma_latency: DmaLatency,
 }
 
 /// Runs the rig in real time.
@@ -99,14 +103,18 @@ impl Rig {
 
     fn run(&mut self, plan: &Plan, require_rt: bool, interrupts: &AtomicUsize) -> anyhow::Result<Ended> {
         let scheduling = self.wait_ready()?;
-        let refusals = show_refusals(&scheduling);
-        if require_rt && refusals > 0 {
+        let is_virtual = SystemRoot::of_this_machine().is_virtual();
+        let hold = dma_latency::Hold::new(plan.scenario.realtime.cpu_dma_latency, is_virtual);
+        let cpu_dma_latency = hold.obtained().clone();
+        let refusals = show_refusals(&scheduling, &cpu_dma_latency);
+        let ending = if require_rt && refusals > 0 {
             eprintln!("masseter: real time was required and not granted; nothing was started");
-            return Ok(Ended { ending: Ending::NotStarted, scheduling });
-        }
-        self.start(plan.scenario.period_ns())?;
-        let ending = self.watch(interrupts)?;
-        Ok(Ended { ending, scheduling })
+            Ending::NotStarted
+        } else {
+            self.start(plan.scenario.period_ns())?;
+            self.watch(interrupts)?
+        };
+        Ok(Ended { ending, scheduling, cpu_dma_latency })
     }
 
     fn wait_ready(&mut self) -> anyhow::Result<BTreeMap<String, Obtained>> {
@@ -204,9 +212,10 @@ fn wait_for(process: &mut Process, within_ns: u64) -> io::Result<Option<ExitStat
 }
 
 /// Says on the screen what the kernel refused; returns how much that was.
-fn show_refusals(scheduling: &BTreeMap<String, Obtained>) -> usize {
-    let refusals = scheduling.iter().flat_map(|(name, obtained)| {
+fn show_refusals(scheduling: &BTreeMap<String, Obtained>, latency: &DmaLatency) -> usize {
+    let of_processes = scheduling.iter().flat_map(|(name, obtained)| {
         obtained.refusals.iter().map(move |refusal| format!("  {name}: {refusal}"))
     });
-    refusals.map(|line| eprintln!("{line}")).count()
+    let of_latency = latency.refusal.iter().map(|refusal| format!("  {refusal}"));
+    of_processes.chain(of_latency).map(|line| eprintln!("{line}")).count()
 }

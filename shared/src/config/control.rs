@@ -62,11 +62,27 @@ pub struct RealtimeConfig {
     pub priority: u8,
     /// Whether their memory is locked.
     pub lock_memory: bool,
+    /// Whether the cores are kept from idle states for the duration of the run.
+    pub cpu_dma_latency: CpuDmaLatency,
+}
+
+/// What becomes of `/dev/cpu_dma_latency` during a run.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum CpuDmaLatency {
+    /// Held at 0 on a real machine; left alone in a virtual one, where idling virtual cores that poll
+    /// cost more than they gain.
+    #[default]
+    Auto,
+    /// Held at 0: the cores poll instead of idling.
+    Hold,
+    /// Left alone.
+    Leave,
 }
 
 impl Default for RealtimeConfig {
     fn default() -> Self {
-        Self { cores: [0, 1], priority: 80, lock_memory: true }
+        Self { cores: [0, 1], priority: 80, lock_memory: true, cpu_dma_latency: CpuDmaLatency::default() }
     }
 }
 

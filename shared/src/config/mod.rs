@@ -9,7 +9,7 @@ mod motion;
 mod plant;
 mod scenario;
 
-pub use control::{ChecksConfig, ControllerConfig, RealtimeConfig};
+pub use control::{ChecksConfig, ControllerConfig, CpuDmaLatency, RealtimeConfig};
 pub use motion::*;
 pub use plant::{CanConfig, DriveConfig, DrivesConfig, DynamicsConfig};
 pub use scenario::{Scenario, ScenarioError};

@@ -49,8 +49,9 @@ pub fn obtain(wanted: Wanted) -> Obtained {
     if let Some(core) = wanted.core
         && let Err(error) = pin(core)
     {
+        let allowed: Vec<_> = allowed_cores().iter().map(usize::to_string).collect();
         refusals
-            .push(format!("core {core} refused ({error}): choose one of 0 to {} with --cores", last_core()));
+            .push(format!("core {core} refused ({error}): choose among {} with --cores", allowed.join(", ")));
     }
     if let Some(priority) = wanted.fifo_priority
         && let Err(error) = fifo::set(priority)
@@ -69,14 +70,10 @@ pub fn obtain(wanted: Wanted) -> Obtained {
     Obtained { wanted, core: pinned_core(), fifo_priority: fifo::get(), locked_memory: is_locked(), refusals }
 }
 
-/// Number of the machine's last core.
-pub fn last_core() -> usize {
-    cores().saturating_sub(1)
-}
-
-/// Cores of this machine that are online.
-pub fn cores() -> usize {
-    std::thread::available_parallelism().map_or(1, usize::from)
+/// The cores that the calling thread may run on.
+pub fn allowed_cores() -> Vec<usize> {
+    let Ok(set) = sched_getaffinity(None) else { return Vec::new() };
+    (0..CpuSet::MAX_CPU).filter(|&core| set.is_set(core)).collect()
 }
 
 fn pin(core: usize) -> Result<(), Errno> {
@@ -89,10 +86,8 @@ fn pin(core: usize) -> Result<(), Errno> {
 }
 
 fn pinned_core() -> Option<usize> {
-    let set = sched_getaffinity(None).ok()?;
-    let mut allowed = (0..CpuSet::MAX_CPU).filter(|&core| set.is_set(core));
-    match (allowed.next(), allowed.next()) {
-        (Some(only), None) => Some(only),
+    match allowed_cores()[..] {
+        [only] => Some(only),
         _ => None,
     }
 }

@@ -1,0 +1,142 @@
+//! How the kernel schedules: preemption, real-time throttling, isolated cores.
+
+use super::finding::Finding;
+use crate::machine::SystemRoot;
+
+/// All findings of this family.
+pub(super) fn examine(root: &SystemRoot) -> Vec<Finding> {
+    vec![preemption(root), throttling(root), isolation(root)]
+}
+
+fn preemption(root: &SystemRoot) -> Finding {
+    const CHECK: &str = "preemption model";
+    let release = root.text("proc/sys/kernel/osrelease").unwrap_or_default();
+    let version = root.text("proc/sys/kernel/version").unwrap_or_default();
+    let has = |word: &str| version.split_whitespace().any(|found| found == word);
+    if root.number("sys/kernel/realtime") == Some(1) || has("PREEMPT_RT") {
+        return Finding::ok(CHECK, format!("{release}: fully preemptible (PREEMPT_RT)"));
+    }
+    let cost = "a system call of another task may hold a core for up to a millisecond";
+    let install = "sudo apt install linux-image-rt-amd64 && sudo reboot";
+    if !has("PREEMPT_DYNAMIC") {
+        let model = if has("PREEMPT") { "preemptible (PREEMPT)" } else { "not preemptible in the kernel" };
+        return Finding::warn(CHECK, format!("{release}: {model}"), cost).mended_by(install);
+    }
+    match root.text("sys/kernel/debug/sched/preempt") {
+        // The chosen mode stands in brackets: `none voluntary (full) lazy`.
+        Some(modes) if modes.contains("(full)") => {
+            Finding::warn(CHECK, format!("{release}: preemptible (PREEMPT_DYNAMIC, full)"), cost)
+                .mended_by(install)
+        }
+        Some(modes) => Finding::warn(CHECK, format!("{release}: PREEMPT_DYNAMIC, modes {modes}"), cost)
+            .mended_by("echo full | sudo tee /sys/kernel/debug/sched/preempt"),
+        None => Finding::warn(CHECK, format!("{release}: PREEMPT_DYNAMIC, mode not readable"), cost)
+            .mended_by(
+                "sudo mount -t debugfs debugfs /sys/kernel/debug; \
+                 echo full | sudo tee /sys/kernel/debug/sched/preempt",
+            ),
+    }
+}
+
+fn throttling(root: &SystemRoot) -> Finding {
+    const CHECK: &str = "real-time throttling";
+    const RESTORE: &str = "sudo sysctl kernel.sched_rt_runtime_us=950000 kernel.sched_rt_period_us=1000000";
+    let runtime_us = root.number("proc/sys/kernel/sched_rt_runtime_us");
+    let period_us = root.number("proc/sys/kernel/sched_rt_period_us");
+    let (Some(runtime_us), Some(period_us)) = (runtime_us, period_us) else {
+        return Finding::ok(CHECK, "none in this kernel");
+    };
+    let found = format!("{runtime_us} of every {period_us} µs");
+    match runtime_us {
+        ..0 => Finding::warn(CHECK, "off", "a real-time task that never waits takes its core for good")
+            .mended_by(RESTORE),
+        // The rig's loops spin a quarter of a cycle and work less than that.
+        _ if runtime_us * 2 >= period_us => Finding::ok(CHECK, found),
+        0 => Finding::bad(CHECK, found, "real-time tasks get no time at all").mended_by(RESTORE),
+        _ => Finding::warn(CHECK, found, "fast loops are put to sleep for the rest of the period")
+            .mended_by(RESTORE),
+    }
+}
+
+fn isolation(root: &SystemRoot) -> Finding {
+    const CHECK: &str = "isolated cores";
+    let list = |path: &str| root.text(path).filter(|list| !list.is_empty() && list != "(null)");
+    let isolated = list("sys/devices/system/cpu/isolated");
+    let tickless = list("sys/devices/system/cpu/nohz_full");
+    let cores = root.core_folders().len();
+    match (isolated, tickless) {
+        (Some(isolated), Some(tickless)) => {
+            Finding::ok(CHECK, format!("isolcpus={isolated}, nohz_full={tickless}; choose them with --cores"))
+        }
+        (Some(isolated), None) => {
+            Finding::ok(CHECK, format!("isolcpus={isolated}, ticking; choose them with --cores"))
+        }
+        (None, _) if cores <= 2 => Finding::ok(CHECK, format!("none; {cores} cores leave none to spare")),
+        (None, _) => {
+            let list = format!("{},{}", cores - 2, cores - 1);
+            Finding::warn(CHECK, "none", "other tasks and their interrupts come onto the rig's cores")
+                .mended_by(format!(
+                    "sudo sed -i 's/^GRUB_CMDLINE_LINUX=\"/&isolcpus={list} nohz_full={list} /' \
+                     /etc/default/grub && sudo update-grub && sudo reboot, then `masseter run --cores {list}`"
+                ))
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::finding::Level::{self, Bad, Ok, Warn};
+    use super::*;
+    use crate::machine::fixture::Fixture;
+
+    type Files<'a> = &'a [(&'a str, &'a str)];
+
+    #[test]
+    fn preemption_is_read_from_version_and_debugfs() {
+        const VERSION: &str = "proc/sys/kernel/version";
+        const MODES: &str = "sys/kernel/debug/sched/preempt";
+        let cases: [(Files, Level, &str); 6] = [
+            (&[(VERSION, "#1 SMP PREEMPT_RT Debian 6.12")], Ok, "PREEMPT_RT"),
+            (&[("sys/kernel/realtime", "1"), (VERSION, "#1 SMP")], Ok, "PREEMPT_RT"),
+            (&[(VERSION, "#1 SMP")], Warn, "not preemptible"),
+            (&[(VERSION, "#1 SMP PREEMPT_DYNAMIC")], Warn, "not readable"),
+            (&[(VERSION, "#1 SMP PREEMPT_DYNAMIC"), (MODES, "(none) voluntary full")], Warn, "(none)"),
+            (&[(VERSION, "#1 SMP PREEMPT_DYNAMIC"), (MODES, "none voluntary (full)")], Warn, "full)"),
+        ];
+        for (files, level, found) in cases {
+            let finding = preemption(&Fixture::of(files).root());
+            assert_eq!(finding.level, level, "{finding:?}");
+            assert!(finding.found.contains(found), "{finding:?}");
+            assert_eq!(finding.mend.is_some(), level != Ok, "{finding:?}");
+        }
+    }
+
+    #[test]
+    fn throttling_is_judged_by_the_share_it_leaves() {
+        let cases = [("950000", Ok), ("-1", Warn), ("200000", Warn), ("0", Bad)];
+        for (runtime_us, level) in cases {
+            let files = [
+                ("proc/sys/kernel/sched_rt_runtime_us", runtime_us),
+                ("proc/sys/kernel/sched_rt_period_us", "1000000"),
+            ];
+            assert_eq!(throttling(&Fixture::of(&files).root()).level, level, "{runtime_us}");
+        }
+        assert_eq!(throttling(&Fixture::of(&[]).root()).level, Ok);
+    }
+
+    #[test]
+    fn isolation_is_wanted_only_where_there_are_cores_to_spare() {
+        let cores = |n: usize, isolated: &str| {
+            let folders: Vec<_> =
+                (0..n).map(|core| format!("sys/devices/system/cpu/cpu{core}/online")).collect();
+            let mut files: Vec<_> = folders.iter().map(|path| (path.as_str(), "1")).collect();
+            files.push(("sys/devices/system/cpu/isolated", isolated));
+            isolation(&Fixture::of(&files).root())
+        };
+        assert_eq!(cores(2, "\n").level, Ok);
+        assert_eq!(cores(8, "6-7\n").level, Ok);
+        let shared = cores(8, "\n");
+        assert_eq!(shared.level, Warn);
+        assert!(shared.mend.unwrap().contains("isolcpus=6,7 nohz_full=6,7"));
+    }
+}

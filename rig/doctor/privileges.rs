@@ -1,0 +1,72 @@
+//! What the kernel grants this user: SCHED_FIFO and locked memory, really asked for.
+
+use std::thread;
+
+use masseter_shared::config::RealtimeConfig;
+use masseter_shared::realtime::scheduling::{Obtained, Wanted, obtain};
+
+use super::finding::Finding;
+
+/// Raises both limits for this user from the next log-in on.
+const RAISE_LIMITS: &str = "printf '%s - rtprio 95\\n%s - memlock unlimited\\n' \"$USER\" \"$USER\" \
+                            | sudo tee /etc/security/limits.d/masseter.conf, then log in again";
+
+/// All findings of this family.
+pub(super) fn examine() -> Vec<Finding> {
+    let nothing = Wanted { core: None, fifo_priority: None, locked_memory: false };
+    let priority = RealtimeConfig::default().priority;
+    vec![
+        fifo(priority, &try_out(Wanted { fifo_priority: Some(priority), ..nothing })),
+        locked_memory(&try_out(Wanted { locked_memory: true, ..nothing })),
+    ]
+}
+
+/// In a thread of its own, which takes the granted priority along when it ends.
+fn try_out(wanted: Wanted) -> Obtained {
+    thread::spawn(move || obtain(wanted)).join().expect("asking the kernel does not panic")
+}
+
+fn fifo(priority: u8, obtained: &Obtained) -> Finding {
+    const CHECK: &str = "SCHED_FIFO";
+    if obtained.fifo_priority == Some(priority) {
+        return Finding::ok(CHECK, format!("priority {priority} granted"));
+    }
+    Finding::bad(
+        CHECK,
+        format!("priority {priority} refused"),
+        "any ordinary task may delay a cycle by milliseconds",
+    )
+    .mended_by(RAISE_LIMITS)
+}
+
+fn locked_memory(obtained: &Obtained) -> Finding {
+    const CHECK: &str = "locked memory";
+    if obtained.locked_memory {
+        return Finding::ok(CHECK, "granted");
+    }
+    Finding::bad(CHECK, "refused", "a page fault within a cycle costs microseconds, from disk milliseconds")
+        .mended_by(RAISE_LIMITS)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::finding::Level;
+    use super::*;
+
+    #[test]
+    fn what_counts_is_what_was_read_back() {
+        let wanted = Wanted { core: None, fifo_priority: Some(80), locked_memory: true };
+        let obtained = |fifo_priority, locked_memory| Obtained {
+            wanted,
+            core: None,
+            fifo_priority,
+            locked_memory,
+            refusals: Vec::new(),
+        };
+        for (granted, level) in [(Some(80), Level::Ok), (Some(10), Level::Bad), (None, Level::Bad)] {
+            assert_eq!(fifo(80, &obtained(granted, false)).level, level);
+        }
+        assert_eq!(locked_memory(&obtained(None, true)).level, Level::Ok);
+        assert!(locked_memory(&obtained(None, false)).mend.unwrap().contains("memlock"));
+    }
+}

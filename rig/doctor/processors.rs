@@ -1,0 +1,149 @@
+//! The cores: how many may be used, how they idle, and whether they are real.
+
+use masseter_shared::realtime::scheduling::allowed_cores;
+
+use super::finding::Finding;
+use crate::machine::SystemRoot;
+
+/// An idle state that takes longer to leave wakes the loops after their spin should have begun, µs.
+const LATEST_EXIT_US: i64 = 200;
+/// Steal beyond this share of all time since boot is worth a word.
+const STEAL_SHARE: f64 = 0.001;
+
+/// All findings of this family.
+pub(super) fn examine(root: &SystemRoot) -> Vec<Finding> {
+    let online = root.core_folders().len();
+    vec![usable(allowed_cores().len(), online), governor(root), idle(root), hypervisor(root), steal(root)]
+}
+
+fn usable(allowed: usize, online: usize) -> Finding {
+    const CHECK: &str = "cores";
+    let found = format!("{allowed} of {online} may be used");
+    match (allowed, online) {
+        (2.., _) => Finding::ok(CHECK, found),
+        (_, 2..) => Finding::bad(CHECK, found, "controller and plant share a core and delay each other")
+            .mended_by(format!("taskset -cp 0-{} $$", online - 1)),
+        _ => Finding::bad(CHECK, found, "controller and plant share the only core and delay each other"),
+    }
+}
+
+fn governor(root: &SystemRoot) -> Finding {
+    const CHECK: &str = "frequency governor";
+    let path = |core: &String| format!("sys/devices/system/cpu/{core}/cpufreq/scaling_governor");
+    let mut governors: Vec<_> =
+        root.core_folders().iter().filter_map(|core| root.text(&path(core))).collect();
+    governors.sort();
+    governors.dedup();
+    let found = governors.join(", ");
+    match governors.as_slice() {
+        [] => Finding::ok(CHECK, "none: the clock is not this system's to change"),
+        [only] if only == "performance" => Finding::ok(CHECK, found),
+        _ => Finding::warn(CHECK, found, "after a sleep the core computes slower, up to several times")
+            .mended_by("echo performance | sudo tee /sys/devices/system/cpu/cpu*/cpufreq/scaling_governor"),
+    }
+}
+
+fn idle(root: &SystemRoot) -> Finding {
+    const CHECK: &str = "idle states";
+    let folder = "sys/devices/system/cpu/cpu0/cpuidle";
+    let states = root.names(folder);
+    let states = states.iter().filter(|state| {
+        state.starts_with("state") && root.number(&format!("{folder}/{state}/disable")) != Some(1)
+    });
+    let latencies = states.filter_map(|state| {
+        let latency_us = root.number(&format!("{folder}/{state}/latency"))?;
+        Some((latency_us, root.text(&format!("{folder}/{state}/name")).unwrap_or_default()))
+    });
+    match latencies.max() {
+        None => Finding::ok(CHECK, "not managed by this system"),
+        Some((exit_us, name)) if exit_us <= LATEST_EXIT_US => {
+            Finding::ok(CHECK, format!("deepest {name}, {exit_us} µs to leave"))
+        }
+        Some((exit_us, name)) => Finding::warn(
+            CHECK,
+            format!("deepest {name}, {exit_us} µs to leave"),
+            "a loop that slept wakes after its deadline",
+        )
+        .mended_by("set `realtime.cpu_dma_latency = \"hold\"` in the scenario"),
+    }
+}
+
+fn hypervisor(root: &SystemRoot) -> Finding {
+    const CHECK: &str = "virtual machine";
+    if root.is_virtual() {
+        Finding::warn(CHECK, "yes", "the hypervisor may stop a core for milliseconds; such runs are INVALID")
+    } else {
+        Finding::ok(CHECK, "no")
+    }
+}
+
+fn steal(root: &SystemRoot) -> Finding {
+    const CHECK: &str = "steal time";
+    let stat = root.text("proc/stat").unwrap_or_default();
+    let ticks: Vec<u64> = stat
+        .lines()
+        .find_map(|line| line.strip_prefix("cpu "))
+        .map(|line| line.split_whitespace().filter_map(|ticks| ticks.parse().ok()).collect())
+        .unwrap_or_default();
+    // user nice system idle iowait irq softirq steal; guest time is part of user time.
+    let (total, stolen) = (ticks.iter().take(8).sum::<u64>(), ticks.get(7).copied().unwrap_or(0));
+    let share = if total == 0 { 0.0 } else { stolen as f64 / total as f64 };
+    let found = format!("{:.3} % since boot", share * 100.0);
+    if share <= STEAL_SHARE {
+        return Finding::ok(CHECK, found);
+    }
+    Finding::warn(CHECK, found, "other guests of the host take the cores away; such runs are INVALID")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::finding::Level::{Bad, Ok, Warn};
+    use super::*;
+    use crate::machine::fixture::Fixture;
+
+    #[test]
+    fn two_cores_are_needed_and_a_mask_that_hides_one_is_named() {
+        assert_eq!(usable(2, 2).level, Ok);
+        assert_eq!(usable(1, 4).mend.as_deref(), Some("taskset -cp 0-3 $$"));
+        assert_eq!((usable(1, 1).level, usable(1, 1).mend), (Bad, None));
+    }
+
+    #[test]
+    fn one_core_of_another_governor_is_enough_to_warn() {
+        let cases = [
+            (&["performance", "performance"][..], Ok),
+            (&["performance", "powersave"], Warn),
+            (&["schedutil", "schedutil"], Warn),
+            (&[], Ok),
+        ];
+        for (governors, level) in cases {
+            let paths: Vec<_> = (0..governors.len())
+                .map(|core| format!("sys/devices/system/cpu/cpu{core}/cpufreq/scaling_governor"))
+                .collect();
+            let files: Vec<_> = paths.iter().map(String::as_str).zip(governors.iter().copied()).collect();
+            assert_eq!(governor(&Fixture::of(&files).root()).level, level, "{governors:?}");
+        }
+    }
+
+    #[test]
+    fn the_deepest_state_that_is_not_disabled_counts() {
+        let state = |disable: &str| {
+            let folder = "sys/devices/system/cpu/cpu0/cpuidle";
+            let paths = ["state0/latency", "state0/name", "state1/latency", "state1/name", "state1/disable"]
+                .map(|path| format!("{folder}/{path}"));
+            let texts = ["1", "POLL", "890", "C6", disable];
+            let files: Vec<_> = paths.iter().map(String::as_str).zip(texts).collect();
+            idle(&Fixture::of(&files).root())
+        };
+        assert_eq!((state("0").level, state("1").level), (Warn, Ok));
+        assert!(state("0").found.contains("C6, 890"));
+    }
+
+    #[test]
+    fn steal_is_a_share_of_all_time() {
+        let of = |line: &str| steal(&Fixture::of(&[("proc/stat", line)]).root());
+        assert_eq!(of("cpu  500 0 100 9390 0 0 0 10 7 7\ncpu0 1 1 1 1").level, Ok);
+        let stolen = of("cpu  500 0 100 9000 0 0 0 400 0 0\n");
+        assert_eq!((stolen.level, stolen.found.as_str()), (Warn, "4.000 % since boot"));
+    }
+}

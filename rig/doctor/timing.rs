@@ -1,0 +1,99 @@
+//! Clocks and timers: what time is read from, how fine timers are, and who may keep cores awake.
+
+use std::fs::OpenOptions;
+use std::io;
+
+use rustix::time::{ClockId, clock_getres};
+
+use super::finding::Finding;
+use crate::machine::SystemRoot;
+use crate::run::dma_latency;
+
+/// Clock sources that are read without a system call and in tens of nanoseconds.
+const FAST_SOURCES: [&str; 4] = ["tsc", "kvm-clock", "arch_sys_counter", "hyperv_clocksource_tsc_page"];
+
+/// All findings of this family.
+pub(super) fn examine(root: &SystemRoot) -> Vec<Finding> {
+    let resolution = clock_getres(ClockId::Monotonic);
+    let resolution_ns = resolution.tv_sec * 1_000_000_000 + resolution.tv_nsec;
+    let opened = OpenOptions::new().write(true).open(dma_latency::DEVICE).map(drop);
+    vec![clock_source(root), timers(resolution_ns), dma_latency_access(&opened, root.is_virtual())]
+}
+
+fn clock_source(root: &SystemRoot) -> Finding {
+    const CHECK: &str = "clock source";
+    let folder = "sys/devices/system/clocksource/clocksource0";
+    let Some(current) = root.text(&format!("{folder}/current_clocksource")) else {
+        return Finding::ok(CHECK, "not told by this kernel");
+    };
+    if FAST_SOURCES.contains(&current.as_str()) {
+        return Finding::ok(CHECK, current);
+    }
+    let available = root.text(&format!("{folder}/available_clocksource")).unwrap_or_default();
+    let better = available.split_whitespace().find(|source| FAST_SOURCES.contains(source));
+    let finding = Finding::warn(CHECK, current, "each look at the clock costs a microsecond and more");
+    match better {
+        Some(source) => finding.mended_by(format!("echo {source} | sudo tee /{folder}/current_clocksource")),
+        None => finding,
+    }
+}
+
+fn timers(resolution_ns: i64) -> Finding {
+    const CHECK: &str = "timer resolution";
+    if resolution_ns <= 1000 {
+        return Finding::ok(CHECK, format!("{resolution_ns} ns"));
+    }
+    Finding::bad(
+        CHECK,
+        format!("{resolution_ns} ns"),
+        "cycles can only begin at ticks; the kernel needs CONFIG_HIGH_RES_TIMERS and no `highres=off`",
+    )
+    .mended_by("sudo sed -i 's/highres=off//' /etc/default/grub && sudo update-grub && sudo reboot")
+}
+
+fn dma_latency_access(opened: &io::Result<()>, is_virtual: bool) -> Finding {
+    const CHECK: &str = "cpu_dma_latency";
+    match (opened, is_virtual) {
+        (_, true) => Finding::ok(CHECK, "left alone in a virtual machine, where holding it brings stalls"),
+        (Ok(()), false) => Finding::ok(CHECK, "may be held"),
+        (Err(error), false) => Finding::warn(
+            CHECK,
+            format!("cannot be held ({error})"),
+            "cores fall into deep idle states between cycles",
+        )
+        .mended_by(format!("sudo setfacl -m u:\"$USER\":rw {}", dma_latency::DEVICE)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::finding::Level::{Bad, Ok as Fine, Warn};
+    use super::*;
+    use crate::machine::fixture::Fixture;
+
+    #[test]
+    fn a_slow_clock_source_is_named_with_a_better_one_if_there_is_one() {
+        let of = |current, available| {
+            let folder = "sys/devices/system/clocksource/clocksource0";
+            let (one, other) =
+                (format!("{folder}/current_clocksource"), format!("{folder}/available_clocksource"));
+            clock_source(&Fixture::of(&[(&one, current), (&other, available)]).root())
+        };
+        assert_eq!(of("tsc\n", "tsc hpet\n").level, Fine);
+        assert!(of("hpet", "hpet tsc acpi_pm").mend.unwrap().starts_with("echo tsc |"));
+        assert_eq!((of("hpet", "hpet acpi_pm").level, of("hpet", "hpet acpi_pm").mend), (Warn, None));
+    }
+
+    #[test]
+    fn ticks_are_too_coarse_for_cycles() {
+        assert_eq!((timers(1).level, timers(4_000_000).level), (Fine, Bad));
+    }
+
+    #[test]
+    fn the_latency_device_matters_on_real_machines_only() {
+        let refused = || Err(io::Error::from(io::ErrorKind::PermissionDenied));
+        assert_eq!(dma_latency_access(&refused(), true).level, Fine);
+        assert_eq!(dma_latency_access(&refused(), false).level, Warn);
+        assert_eq!(dma_latency_access(&Ok(()), false).level, Fine);
+    }
+}
