@@ -9,7 +9,7 @@ use masseter_controller::process::Outcome;
 use masseter_shared::lifecycle::Assignment;
 
 use crate::exit::{Exit, Failure};
-use crate::{clean, doctor, kinematics, logger, report, run};
+use crate::{clean, doctor, kinematics, logger, plant, report, run};
 
 /// A hardware-in-the-loop rig for a 6-DOF mastication robot.
 #[derive(Debug, Parser)]
@@ -27,6 +27,8 @@ enum Verb {
     Fk(FkArgs),
     /// Inverse kinematics: poses to actuator and hinge columns, CSV to CSV
     Ik(CsvArgs),
+    /// Emulate the six drives and their mechanism on real CAN interfaces, for a master elsewhere
+    Plant(PlantArgs),
     /// The report of a run folder, again
     Report(ReportArgs),
     /// Is this machine fit for real-time runs?
@@ -35,8 +37,6 @@ enum Verb {
     Clean,
     #[command(hide = true)]
     Controller(ProcessArgs),
-    #[command(hide = true)]
-    Plant(ProcessArgs),
     #[command(hide = true)]
     Logger(LoggerArgs),
 }
@@ -58,6 +58,9 @@ pub struct RunArgs {
     /// Real time in three processes, or virtual time in one thread
     #[arg(long, value_enum, default_value_t)]
     pub clock: ClockKind,
+    /// Simulated buses, or the real interface of each, such as can0,can1
+    #[arg(long, value_name = "virtual|IF[,IF]", value_parser = parse_wires)]
+    pub can: Option<Wires>,
     /// Cores of controller and plant
     #[arg(long, value_name = "N,N", value_parser = parse_cores)]
     pub cores: Option<[usize; 2]>,
@@ -73,6 +76,35 @@ pub struct RunArgs {
     /// Exit with 3 unless core, SCHED_FIFO and locked memory are all granted
     #[arg(long)]
     pub require_rt: bool,
+}
+
+/// What the buses run on: real interfaces, or none for simulated buses.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Wires(pub Vec<String>);
+
+/// What `plant` takes.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct PlantArgs {
+    /// Scenario file with the drives and the mechanism; without one, the published mechanism
+    #[arg(value_name = "SCENARIO")]
+    pub(crate) file: Option<PathBuf>,
+    /// The real interface of each bus, such as can0,can1
+    #[arg(long, value_name = "IF[,IF]", value_parser = parse_wires)]
+    pub(crate) can: Option<Wires>,
+    /// Put the emulated drives on the interfaces, until Ctrl-C
+    #[arg(long)]
+    pub(crate) emulate: bool,
+    #[arg(long, hide = true, requires = "domain")]
+    scenario: Option<PathBuf>,
+    #[arg(long, hide = true, requires = "scenario")]
+    domain: Option<String>,
+}
+
+impl PlantArgs {
+    /// What the supervisor started the plant with, if it was the supervisor.
+    pub(crate) fn assignment(&self) -> Option<Assignment> {
+        Some(Assignment { scenario: self.scenario.clone()?, domain: self.domain.clone()? })
+    }
 }
 
 /// Which time a run lives in.
@@ -165,6 +197,17 @@ fn parse_cores(text: &str) -> Result<[usize; 2], String> {
     }
 }
 
+fn parse_wires(text: &str) -> Result<Wires, String> {
+    if text == "virtual" {
+        return Ok(Wires(Vec::new()));
+    }
+    let names: Vec<_> = text.split(',').map(|name| name.trim().to_owned()).collect();
+    if names.iter().any(String::is_empty) {
+        return Err("give `virtual`, or interfaces such as can0,can1".to_owned());
+    }
+    Ok(Wires(names))
+}
+
 /// An error and what caused it; an error that quotes its cause is not followed by it again.
 fn in_one_line(error: &anyhow::Error) -> String {
     error.chain().fold(String::new(), |said, cause| {
@@ -192,9 +235,7 @@ pub fn main() -> ExitCode {
                 Outcome::SafeStop => Exit::SafeStop,
             })
             .map_err(Failure::from),
-        Verb::Plant(args) => {
-            masseter_plant::process::run(&args.assignment()).map(|()| Exit::Passed).map_err(Failure::from)
-        }
+        Verb::Plant(args) => plant::plant(&args),
         Verb::Logger(args) => logger::run(&args.process.assignment(), &args.recording).map_err(Failure::from),
     };
     match result {

@@ -13,6 +13,7 @@ pub mod exit;
 pub mod kinematics;
 pub mod logger;
 pub mod machine;
+pub mod plant;
 pub mod recording;
 pub mod report;
 pub mod run;

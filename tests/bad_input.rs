@@ -57,6 +57,33 @@ fn recordings_are_refused_with_file_line_and_reason() {
 }
 
 #[test]
+fn interfaces_that_cannot_be_used_are_refused_with_what_to_do() {
+    let cases = [
+        (
+            &["run", "--can", "no-such-a,no-such-b"][..],
+            &["modprobe can-raw", "no CAN interface `no-such-a`"][..],
+        ),
+        (&["run", "--can", "can0"], &["name 2 interfaces"]),
+        (&["run", "--can", "can0,can0"], &["name 2 interfaces"]),
+        (&["run", "--can", "can0,"], &["such as can0,can1"]),
+        (&["run", "--clock", "virtual", "--can", "can0,can1"], &["virtual time has no real wires"]),
+        (
+            &["plant", "--emulate", "--can", "no-such-a,no-such-b"],
+            &["modprobe can-raw", "no CAN interface `no-such-a`"],
+        ),
+        (&["plant", "--emulate"], &["no interface to put the drives on"]),
+        (&["plant", "--emulate", "--can", "virtual"], &["no interface to put the drives on"]),
+        (&["plant", "--can", "can0,can1"], &["masseter run --can can0,can1"]),
+    ];
+    for (arguments, remedies) in cases {
+        let output = masseter(arguments);
+        let said = stderr(&output);
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {said}");
+        assert!(remedies.iter().any(|remedy| said.contains(remedy)), "{arguments:?} gave {said}");
+    }
+}
+
+#[test]
 fn a_run_folder_is_never_overwritten() {
     let bench = Bench::new("duration_s = 1.0");
     std::fs::create_dir(bench.run_folder()).unwrap();

@@ -2,16 +2,18 @@
 
 use masseter_shared::can::canopen::{NodeId, NodeIdError, sync};
 use masseter_shared::can::wire::{INTERFRAME_BITS, wire_bits};
-use masseter_shared::can::{Bitrate, BitrateError, VirtualWire, WireConfig};
+use masseter_shared::can::{Bitrate, BitrateError, OpenError, VirtualWire, WireConfig};
 use masseter_shared::config::{CanConfig, DriveConfig, DynamicsConfig, Scenario};
 use masseter_shared::geometry::{AXES, AXIS_NAMES, GeometryError, LEGS, Mechanism, Pose};
 
 use crate::checks::check_quantities;
 use crate::drive::{DriveNode, DriveSettings};
+use crate::emulation::Emulation;
 use crate::encoder::Encoder;
 use crate::link::{Place, VirtualLink};
 use crate::master::{Master, MasterSettings, Scale};
 use crate::mechanism::{Dynamics, DynamicsError};
+use crate::socket_link::SocketLink;
 
 /// Node id of the master.
 const MASTER_ID: u8 = 127;
@@ -29,6 +31,9 @@ pub enum PlantError {
     /// The mechanism's dynamics.
     #[error(transparent)]
     Dynamics(#[from] DynamicsError),
+    /// A real interface.
+    #[error(transparent)]
+    Interface(#[from] OpenError),
     /// The bit rate.
     #[error("can.bitrate_bps: {0}")]
     Bitrate(#[from] BitrateError),
@@ -63,34 +68,56 @@ pub enum PlantError {
     },
 }
 
-/// Master and link of a scenario's plant, switched on at `now_ns`.
-pub(crate) fn build(scenario: &Scenario, now_ns: u64) -> Result<(Master, VirtualLink), PlantError> {
-    check_quantities(scenario)?;
+/// The master of a scenario's plant.
+pub(crate) fn build_master(scenario: &Scenario, now_ns: u64) -> Result<Master, PlantError> {
     let places = places(&scenario.can)?;
     let ids = node_ids(&scenario.can)?;
-    let mechanism = Mechanism::new(&scenario.mechanism)?;
-    let dynamics = resting(mechanism, &scenario.dynamics)?;
+    let drives = std::array::from_fn(|axis| {
+        let drive = drive_of(scenario, axis);
+        let scale = Scale { increment_m: drive.encoder_resolution_m, rated_force_n: drive.rated_force_n };
+        (ids[axis], places[axis].bus, scale)
+    });
+    Ok(Master::new(master_settings(&scenario.can, drives)?, now_ns))
+}
+
+/// The emulated drives on simulated wires, switched on at `now_ns`.
+pub(crate) fn build_virtual(scenario: &Scenario, now_ns: u64) -> Result<VirtualLink, PlantError> {
+    let emulation = build_emulation(scenario, now_ns)?;
+    Ok(VirtualLink::new(wires(&scenario.can)?, places(&scenario.can)?, emulation))
+}
+
+/// The real interfaces.
+pub(crate) fn build_sockets(scenario: &Scenario) -> Result<SocketLink, PlantError> {
+    check_quantities(scenario)?;
+    Ok(SocketLink::open(&scenario.can.interfaces)?)
+}
+
+/// The interface of each axis' bus.
+pub(crate) fn interfaces_of_axes(can: &CanConfig) -> Result<[&str; AXES], PlantError> {
+    Ok(places(can)?.map(|place| can.interfaces[place.bus].as_str()))
+}
+
+/// The drives and their mechanism, switched on at `now_ns`.
+pub(crate) fn build_emulation(scenario: &Scenario, now_ns: u64) -> Result<Emulation, PlantError> {
+    check_quantities(scenario)?;
+    let ids = node_ids(&scenario.can)?;
+    let dynamics = resting(Mechanism::new(&scenario.mechanism)?, &scenario.dynamics)?;
     let positions_m = dynamics.positions_m();
-    let strokes = scenario.mechanism.strokes;
-    let drive_of = |axis: usize| if axis < LEGS { scenario.drives.slide } else { scenario.drives.leg };
     let drives = (0..AXES)
         .map(|axis| {
-            let drive = drive_of(axis);
+            let drive = drive_of(scenario, axis);
             let encoder =
                 Encoder::new(drive.encoder_resolution_m, drive.encoder_noise_m, scenario.seed, axis);
-            let stroke_m = strokes.of_axis(axis);
+            let stroke_m = scenario.mechanism.strokes.of_axis(axis);
             let settings = drive_settings(scenario, ids[axis], drive, stroke_m);
             DriveNode::new(settings, encoder, now_ns, positions_m[axis])
         })
         .collect();
-    let link =
-        VirtualLink::new(wires(&scenario.can)?, drives, places, dynamics, scenario.dynamics.step_ns, now_ns);
-    let drives = std::array::from_fn(|axis| {
-        let drive = drive_of(axis);
-        let scale = Scale { increment_m: drive.encoder_resolution_m, rated_force_n: drive.rated_force_n };
-        (ids[axis], places[axis].bus, scale)
-    });
-    Ok((Master::new(master_settings(&scenario.can, drives)?, now_ns), link))
+    Ok(Emulation::new(drives, dynamics, scenario.dynamics.step_ns, now_ns))
+}
+
+fn drive_of(scenario: &Scenario, axis: usize) -> DriveConfig {
+    if axis < LEGS { scenario.drives.slide } else { scenario.drives.leg }
 }
 
 fn master_settings(
@@ -208,6 +235,7 @@ fn resting(mechanism: Mechanism, config: &DynamicsConfig) -> Result<Dynamics, Pl
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::core::check;
 
     #[test]
     fn what_cannot_work_is_refused_with_its_key() {
@@ -215,7 +243,7 @@ mod tests {
         let with = |change: fn(&mut Scenario)| {
             let mut scenario = default();
             change(&mut scenario);
-            build(&scenario, 0).map(|_| ()).unwrap_err().to_string()
+            check(&scenario).unwrap_err().to_string()
         };
         let cases: [(String, &str); 10] = [
             (with(|s| s.can.heartbeat_consumer_ms = 50), "can.heartbeat_consumer_ms = 50: use more"),
@@ -232,14 +260,14 @@ mod tests {
         for (error, expected) in cases {
             assert!(error.contains(expected), "{error}");
         }
-        assert!(build(&default(), 0).is_ok());
+        assert_eq!(check(&default()), Ok(()));
     }
 
     #[test]
     fn the_rig_is_switched_on_level_on_its_initial_legs() {
         let scenario = Scenario::default();
-        let (_, link) = build(&scenario, 0).unwrap();
-        let [d1, d2, d3, l1, l2, l3] = link.truth().joint_m;
+        let truth = build_emulation(&scenario, 0).unwrap().truth();
+        let [d1, d2, d3, l1, l2, l3] = truth.joint_m;
         for slide_m in [d1, d2, d3] {
             assert!(slide_m.abs() < 1e-12);
         }
@@ -256,8 +284,8 @@ mod tests {
             slide.centre_m = [0.0577 * cos, 0.0577 * sin];
             slide.azimuth_deg = leg_deg + 90.0;
         }
-        let (_, link) = build(&scenario, 0).unwrap();
-        for slide_m in &link.truth().joint_m[..LEGS] {
+        let truth = build_emulation(&scenario, 0).unwrap().truth();
+        for slide_m in &truth.joint_m[..LEGS] {
             assert!(slide_m.abs() < 1e-9, "{slide_m}");
         }
     }

@@ -2,7 +2,7 @@
 //! are passed in.
 //!
 //! A cycle is [`PlantCore::begin_cycle`], [`PlantCore::collect`] until the process data are in,
-//! [`PlantCore::fill_reading`] and [`PlantCore::fill_truth`], then [`PlantCore::apply`]. Called with irregular
+//! [`PlantCore::fill_reading`] and [`PlantCore::truth`], then [`PlantCore::apply`]. Called with irregular
 //! times, as real time has them, or with exact ones.
 
 use masseter_shared::can::canopen::Cob;
@@ -12,18 +12,19 @@ use masseter_shared::messages::{Command, Event, FrameTap, Reading, Truth};
 use masseter_shared::realtime::Wake;
 
 pub use crate::build::PlantError;
-use crate::build::build;
-use crate::link::VirtualLink;
+use crate::build::{build_master, build_sockets, build_virtual};
+use crate::link::{Link, VirtualLink};
 use crate::master::Master;
+use crate::socket_link::SocketLink;
 
 /// Tapped frames kept between two drains; a drain follows every cycle.
 const TAPPED: usize = 4096;
 
 /// The plant's whole memory.
 #[derive(Debug)]
-pub struct PlantCore {
+pub struct PlantCore<L = VirtualLink> {
     master: Master,
-    link: VirtualLink,
+    link: L,
     buses: usize,
     cycle: u64,
     tapped: Vec<FrameTap>,
@@ -31,11 +32,29 @@ pub struct PlantCore {
 }
 
 impl PlantCore {
-    /// The scenario's plant, switched on at `now_ns`.
+    /// The scenario's plant with emulated drives on simulated wires, switched on at `now_ns`.
     pub fn new(scenario: &Scenario, now_ns: u64) -> Result<Self, PlantError> {
-        let (master, link) = build(scenario, now_ns)?;
+        Self::on(build_virtual(scenario, now_ns)?, scenario, now_ns)
+    }
+}
+
+impl PlantCore<SocketLink> {
+    /// The scenario's plant on the real interfaces that it names, with whatever drives are there.
+    pub fn on_interfaces(scenario: &Scenario, now_ns: u64) -> Result<Self, PlantError> {
+        Self::on(build_sockets(scenario)?, scenario, now_ns)
+    }
+}
+
+/// Refuses a scenario whose plant cannot be built, and interfaces that cannot be used.
+pub fn check(scenario: &Scenario) -> Result<(), PlantError> {
+    PlantCore::new(scenario, 0)?;
+    if scenario.can.is_virtual() { Ok(()) } else { PlantCore::on_interfaces(scenario, 0).map(drop) }
+}
+
+impl<L: Link> PlantCore<L> {
+    fn on(link: L, scenario: &Scenario, now_ns: u64) -> Result<Self, PlantError> {
         Ok(Self {
-            master,
+            master: build_master(scenario, now_ns)?,
             link,
             buses: scenario.can.buses.len(),
             cycle: 0,
@@ -66,9 +85,9 @@ impl PlantCore {
         reading.command_sent_ns = self.command_sent_ns;
     }
 
-    /// What the mechanism really did at the cycle's SYNC.
-    pub fn fill_truth(&self, truth: &mut Truth) {
-        *truth = Truth { cycle: self.cycle, ..self.link.truth() };
+    /// What the mechanism really did at the cycle's SYNC, where it is emulated here.
+    pub fn truth(&self) -> Option<Truth> {
+        self.link.truth().map(|truth| Truth { cycle: self.cycle, ..truth })
     }
 
     /// Answers the cycle with the newest command, if one came.

@@ -1,17 +1,21 @@
 //! The rig's plant: CAN master, emulated CiA 402 drives and the mechanism they move.
 //!
-//! [`core`] is a pure step function; [`process`] binds it to iceoryx2 and to real time. It never sees
+//! [`core`] is a pure step function; [`process`] binds it to iceoryx2 and to real time; [`emulator`] puts the
+//! drives on real wires. It never sees
 //! the controller, and never solves the forward kinematics: its truth is the integrated mechanism.
 
 mod build;
 mod checks;
 pub mod core;
 mod drive;
+mod emulation;
+pub mod emulator;
 mod encoder;
 mod link;
 mod master;
 mod mechanism;
 pub mod process;
+mod socket_link;
 
 pub use build::PlantError;
 pub use mechanism::DynamicsError;

@@ -1,13 +1,15 @@
 //! The plant's process: binds the pure core to iceoryx2 and to real time, and decides nothing.
 
 use masseter_shared::clock;
-use masseter_shared::lifecycle::{Assignment, ProcessError};
+use masseter_shared::config::Scenario;
+use masseter_shared::lifecycle::{Assignment, Post, ProcessError};
 use masseter_shared::messages::{Command, Event, FrameTap, Reading, Truth};
 use masseter_shared::realtime::{Cycle, Waiter, Wake};
 use masseter_shared::schedule::CycleSchedule;
 use masseter_shared::transport::{Inlet, Node, Outlet, Received};
 
 use crate::core::{PlantCore, PlantError};
+use crate::link::Link;
 
 /// How long the drives may take to stop after the end has been asked for, ns.
 const STOP_WITHIN_NS: u64 = 500_000_000;
@@ -59,9 +61,11 @@ impl Ports {
     }
 
     /// Publishes what a cycle gave: reading and truth first, since the controller waits.
-    fn publish(&mut self, plant: &mut PlantCore) -> Result<(), ProcessError> {
+    fn publish(&mut self, plant: &mut PlantCore<impl Link>) -> Result<(), ProcessError> {
         self.readings.publish(|reading| plant.fill_reading(reading))?;
-        self.truths.publish(|truth| plant.fill_truth(truth))?;
+        if let Some(truth) = plant.truth() {
+            self.truths.publish(|message| *message = truth)?;
+        }
         let mut result = Ok(());
         plant.drain_frames(&mut |frame| {
             if result.is_ok() {
@@ -80,13 +84,24 @@ impl Ports {
 /// Runs the plant until it is asked to end, then until its drives are off.
 pub fn run(assignment: &Assignment) -> Result<(), PlantProcessError> {
     let post = assignment.take_up()?;
+    if post.scenario.can.is_virtual() {
+        serve(&post, PlantCore::new)
+    } else {
+        serve(&post, PlantCore::on_interfaces)
+    }
+}
+
+fn serve<L: Link>(
+    post: &Post,
+    build: impl Fn(&Scenario, u64) -> Result<PlantCore<L>, PlantError>,
+) -> Result<(), PlantProcessError> {
     let (scenario, schedule) = (&post.scenario, &post.schedule);
     // Built once before the start, so that a plant that cannot be built is never reported ready.
-    PlantCore::new(scenario, 0)?;
+    build(scenario, 0)?;
     let mut ports = Ports::open(&post.node)?;
     let start = post.ready_on(scenario.realtime.cores[1])?;
 
-    let mut plant = PlantCore::new(scenario, start.epoch_ns)?;
+    let mut plant = build(scenario, start.epoch_ns)?;
     let mut cycle = Cycle::new(start.epoch_ns, scenario.period_ns());
     while !post.stop.is_made() {
         let wake = cycle.wait();
@@ -107,7 +122,7 @@ pub fn run(assignment: &Assignment) -> Result<(), PlantProcessError> {
 
 /// SYNC, the drives' process data, and what the cycle publishes.
 fn exchange(
-    plant: &mut PlantCore,
+    plant: &mut PlantCore<impl Link>,
     ports: &mut Ports,
     schedule: &CycleSchedule,
     wake: Wake,

@@ -13,38 +13,48 @@ use crate::run::folder::RunFolder;
 /// Log files, opened as their buses appear.
 pub(super) struct CandumpLogs {
     folder: RunFolder,
+    interfaces: Vec<String>,
     buses: Vec<Log>,
     line: String,
 }
 
 struct Log {
     path: PathBuf,
+    interface: String,
     file: BufWriter<File>,
     frames: u64,
 }
 
 impl Log {
-    fn create(path: PathBuf) -> Result<Self, AnalysisError> {
+    fn create(path: PathBuf, interface: String) -> Result<Self, AnalysisError> {
         match File::create(&path) {
-            Ok(file) => Ok(Self { path, file: BufWriter::new(file), frames: 0 }),
+            Ok(file) => Ok(Self { path, interface, file: BufWriter::new(file), frames: 0 }),
             Err(error) => Err(AnalysisError::Write { path, error }),
         }
     }
 }
 
 impl CandumpLogs {
-    pub(super) fn new(folder: &RunFolder) -> Self {
-        Self { folder: folder.clone(), buses: Vec::new(), line: String::new() }
+    /// Into `folder`, with the buses' real interfaces, or `can0`, `can1` and so on where they have none.
+    pub(super) fn new(folder: &RunFolder, interfaces: &[String]) -> Self {
+        Self {
+            folder: folder.clone(),
+            interfaces: interfaces.to_vec(),
+            buses: Vec::new(),
+            line: String::new(),
+        }
     }
 
     pub(super) fn write(&mut self, tap: &FrameTap) -> Result<(), AnalysisError> {
         let bus = usize::from(tap.bus);
         while self.buses.len() <= bus {
-            self.buses.push(Log::create(self.folder.candump(self.buses.len()))?);
+            let next = self.buses.len();
+            let interface = self.interfaces.get(next).cloned().unwrap_or_else(|| format!("can{next}"));
+            self.buses.push(Log::create(self.folder.candump(next), interface)?);
         }
-        self.line.clear();
-        candump::write_tap(&mut self.line, tap)?;
         let log = &mut self.buses[bus];
+        self.line.clear();
+        candump::write_tap(&mut self.line, &log.interface, tap)?;
         log.frames += 1;
         writeln!(log.file, "{}", self.line)
             .map_err(|error| AnalysisError::Write { path: log.path.clone(), error })

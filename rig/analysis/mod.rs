@@ -13,6 +13,7 @@ mod tracking;
 
 use std::path::PathBuf;
 
+use masseter_shared::config::Scenario;
 use masseter_shared::messages::codes::ControllerState;
 use masseter_shared::messages::{Command, Event, FrameTap, Message, Reading, State, Truth};
 use serde::Serialize;
@@ -29,7 +30,7 @@ pub use sequence::TopicFigures;
 pub use skips::SkipFigures;
 use skips::Skips;
 use tracking::Tracking;
-pub use tracking::{TrackingFigures, TrackingSample};
+pub use tracking::{Reference, TrackingFigures, TrackingSample};
 
 /// Why a run could not be analysed.
 #[derive(Debug, thiserror::Error)]
@@ -95,9 +96,9 @@ impl Figures {
 
 /// Reads the run's recording, writes `hist/`, `can*.log` and `events.jsonl` beside it, and returns
 /// the figures.
-pub fn analyse(folder: &RunFolder, period_ns: u64) -> Result<Figures, AnalysisError> {
+pub fn analyse(folder: &RunFolder, scenario: &Scenario) -> Result<Figures, AnalysisError> {
     let mut reader = Reader::open(&folder.recording())?;
-    let mut pass = Pass::new(folder, period_ns)?;
+    let mut pass = Pass::new(folder, scenario)?;
     while let Some(message) = reader.next_message()? {
         pass.take(&message)?;
     }
@@ -121,13 +122,14 @@ struct Pass {
 }
 
 impl Pass {
-    fn new(folder: &RunFolder, period_ns: u64) -> Result<Self, AnalysisError> {
+    fn new(folder: &RunFolder, scenario: &Scenario) -> Result<Self, AnalysisError> {
+        let reference = if scenario.can.is_virtual() { Reference::Truth } else { Reference::Estimate };
         Ok(Self {
-            period_ns,
+            period_ns: scenario.period_ns(),
             intervals: Intervals::new(&folder.histograms())?,
-            tracking: Tracking::default(),
+            tracking: Tracking::against(reference),
             sequence: SequenceCheck::default(),
-            candump: CandumpLogs::new(folder),
+            candump: CandumpLogs::new(folder, &scenario.can.interfaces),
             events: EventLog::create(folder.events())?,
             cycles: 0,
             first_sample_ns: None,

@@ -1,4 +1,5 @@
-//! How far the platform was from where it should have been, against the plant's truth.
+//! How far the platform was from where it should have been: in truth where the mechanism is emulated, by
+//! the forward kinematics' estimate on the robot, whose truth nobody knows.
 
 use masseter_shared::geometry::Pose;
 use masseter_shared::messages::codes::ControllerState;
@@ -11,21 +12,44 @@ use super::join::ByCycle;
 const MOVING: [ControllerState; 3] =
     [ControllerState::Easing, ControllerState::Running, ControllerState::Holding];
 
+/// What the wanted pose is compared with.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Reference {
+    /// The emulated mechanism's pose.
+    #[default]
+    Truth,
+    /// The pose found by forward kinematics.
+    Estimate,
+}
+
+impl Reference {
+    /// The word for a pose of this kind.
+    pub fn adjective(self) -> &'static str {
+        match self {
+            Self::Truth => "true",
+            Self::Estimate => "estimated",
+        }
+    }
+}
+
 /// Errors of the platform's pose while the motion played.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct TrackingFigures {
+    /// What the wanted pose was compared with.
+    pub reference: Reference,
     /// Cycles compared.
     pub samples: u64,
-    /// Root mean square distance of the platform's origin, true against wanted, mm.
+    /// Root mean square distance of the platform's origin, reference against wanted, mm.
     pub rms_mm: f64,
     /// Largest distance, mm.
     pub max_mm: f64,
-    /// Root mean square angle, true against wanted, degrees.
+    /// Root mean square angle, reference against wanted, degrees.
     pub rms_deg: f64,
     /// Largest angle, degrees.
     pub max_deg: f64,
-    /// Root mean square distance, estimated by forward kinematics against true, mm.
-    pub estimate_rms_mm: f64,
+    /// Root mean square distance, estimated by forward kinematics against true, mm; none without truth.
+    pub estimate_rms_mm: Option<f64>,
 }
 
 /// One cycle of the track, from the first easing to the last hold.
@@ -35,8 +59,8 @@ pub struct TrackingSample {
     pub sampled_ns: u64,
     /// Wanted position of the platform's origin, m.
     pub desired_m: [f64; 3],
-    /// True position, m.
-    pub true_m: [f64; 3],
+    /// Position by the reference, m.
+    pub found_m: [f64; 3],
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -46,9 +70,10 @@ struct Wanted {
     state: u32,
 }
 
-/// Joins wanted, estimated and true poses of the same sample.
+/// Joins wanted, estimated and, where there are any, true poses of the same sample.
 #[derive(Debug, Default)]
 pub(super) struct Tracking {
+    reference: Reference,
     last_reading: u64,
     wanted: ByCycle<Wanted>,
     true_poses: ByCycle<(u64, Pose)>,
@@ -78,6 +103,10 @@ impl Accumulator {
 }
 
 impl Tracking {
+    pub(super) fn against(reference: Reference) -> Self {
+        Self { reference, ..Self::default() }
+    }
+
     pub(super) fn state(&mut self, state: &State) {
         // A repeated reading was compared when it was fresh.
         if state.reading_cycle <= self.last_reading {
@@ -89,6 +118,9 @@ impl Tracking {
             estimated: pose_of_fields(state.estimated_position_m, state.estimated_quaternion_wxyz),
             state: state.controller_state,
         };
+        if self.reference == Reference::Estimate {
+            return self.compare(&wanted, (state.sampled_ns, wanted.estimated));
+        }
         match self.true_poses.take(state.reading_cycle) {
             Some(truth) => self.compare(&wanted, truth),
             None => self.wanted.insert(state.reading_cycle, wanted),
@@ -103,30 +135,32 @@ impl Tracking {
         }
     }
 
-    fn compare(&mut self, wanted: &Wanted, (sampled_ns, truth): (u64, Pose)) {
-        let position = truth.translation.vector;
+    fn compare(&mut self, wanted: &Wanted, (sampled_ns, found): (u64, Pose)) {
+        let position = found.translation.vector;
         if wanted.state == ControllerState::Running.code() {
             self.distances.add((wanted.desired.translation.vector - position).norm());
-            self.angles.add(wanted.desired.rotation.angle_to(&truth.rotation));
+            self.angles.add(wanted.desired.rotation.angle_to(&found.rotation));
             self.estimates.add((wanted.estimated.translation.vector - position).norm());
         }
         if MOVING.iter().any(|state| state.code() == wanted.state) {
             self.track.push(TrackingSample {
                 sampled_ns,
                 desired_m: wanted.desired.translation.vector.into(),
-                true_m: position.into(),
+                found_m: position.into(),
             });
         }
     }
 
     pub(super) fn finish(self) -> (TrackingFigures, Vec<TrackingSample>) {
+        let has_truth = self.reference == Reference::Truth;
         let figures = TrackingFigures {
+            reference: self.reference,
             samples: self.distances.samples,
             rms_mm: self.distances.rms() * 1e3,
             max_mm: self.distances.largest * 1e3,
             rms_deg: self.angles.rms().to_degrees(),
             max_deg: self.angles.largest.to_degrees(),
-            estimate_rms_mm: self.estimates.rms() * 1e3,
+            estimate_rms_mm: has_truth.then(|| self.estimates.rms() * 1e3),
         };
         (figures, self.track)
     }
@@ -155,6 +189,16 @@ mod tests {
             quaternion_wxyz: [1.0, 0.0, 0.0, 0.0],
             ..Default::default()
         }
+    }
+
+    #[test]
+    fn without_truth_the_estimate_takes_its_place() {
+        let mut tracking = Tracking::against(Reference::Estimate);
+        tracking.state(&State { estimated_position_m: [0.001, 0.0, 0.0], ..state(1, 0.003) });
+        let (figures, track) = tracking.finish();
+        assert_eq!((figures.samples, figures.estimate_rms_mm), (1, None));
+        assert!((figures.rms_mm - 2.0).abs() < 1e-9);
+        assert!((track[0].found_m[0] - 0.001).abs() < 1e-12);
     }
 
     #[test]

@@ -59,10 +59,17 @@ fn motion(page: &mut String, figures: &Figures) -> std::fmt::Result {
     let tracking = &figures.tracking;
     writeln!(
         page,
-        "<h2>Motion</h2>\n<p>Platform, true against wanted: rms {:.4} mm, max {:.4} mm; rms {:.4}°, max {:.4}°. \
-         Estimated against true: rms {:.4} mm.</p>",
-        tracking.rms_mm, tracking.max_mm, tracking.rms_deg, tracking.max_deg, tracking.estimate_rms_mm
+        "<h2>Motion</h2>\n<p>Platform, {} against wanted: rms {:.4} mm, max {:.4} mm; rms {:.4}°, max {:.4}°.",
+        tracking.reference.adjective(),
+        tracking.rms_mm,
+        tracking.max_mm,
+        tracking.rms_deg,
+        tracking.max_deg
     )?;
+    if let Some(rms_mm) = tracking.estimate_rms_mm {
+        writeln!(page, "Estimated against true: rms {rms_mm:.4} mm.")?;
+    }
+    page.push_str("</p>\n");
     for svg in plot::of_track(&figures.track).into_iter().flatten() {
         page.push_str(&svg);
     }

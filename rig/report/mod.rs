@@ -37,7 +37,7 @@ struct Summary<'a> {
 pub(crate) fn again(path: &Path, format: Format) -> Result<Exit, Failure> {
     let folder = RunFolder::open(path)?;
     let manifest = Manifest::read(&folder).context("cannot read manifest.json")?;
-    let figures = analysis::analyse(&folder, manifest.scenario.period_ns())?;
+    let figures = analysis::analyse(&folder, &manifest.scenario)?;
     write(&folder, &manifest, &figures, format)
 }
 

@@ -32,10 +32,10 @@ pub(super) fn of_track(track: &[TrackingSample]) -> Option<[String; 2]> {
     };
     let height = [
         curve("wanted", RGBColor(0xd5, 0x5e, 0x00), &|sample| sample.desired_m[2] * 1e3),
-        curve("true", RGBColor(0x00, 0x72, 0xb2), &|sample| sample.true_m[2] * 1e3),
+        curve("true", RGBColor(0x00, 0x72, 0xb2), &|sample| sample.found_m[2] * 1e3),
     ];
     let error = [curve("true against wanted", RGBColor(0x00, 0x72, 0xb2), &|sample| {
-        let squares = (0..3).map(|i| (sample.desired_m[i] - sample.true_m[i]).powi(2));
+        let squares = (0..3).map(|i| (sample.desired_m[i] - sample.found_m[i]).powi(2));
         squares.sum::<f64>().sqrt() * 1e3
     })];
     Some([draw("height of the platform, mm", &height).ok()?, draw("distance, mm", &error).ok()?])

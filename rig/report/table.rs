@@ -39,10 +39,17 @@ fn write_all(
     let tracking = &figures.tracking;
     writeln!(
         text,
-        "\nplatform, true against wanted: rms {:.4} mm, max {:.4} mm; rms {:.4}°, max {:.4}°",
-        tracking.rms_mm, tracking.max_mm, tracking.rms_deg, tracking.max_deg
+        "\nplatform, {} against wanted: rms {:.4} mm, max {:.4} mm; rms {:.4}°, max {:.4}°",
+        tracking.reference.adjective(),
+        tracking.rms_mm,
+        tracking.max_mm,
+        tracking.rms_deg,
+        tracking.max_deg
     )?;
-    writeln!(text, "platform, estimated against true: rms {:.4} mm\n", tracking.estimate_rms_mm)?;
+    if let Some(rms_mm) = tracking.estimate_rms_mm {
+        writeln!(text, "platform, estimated against true: rms {rms_mm:.4} mm")?;
+    }
+    text.push('\n');
     latencies(text, &figures.intervals)?;
     writeln!(
         text,

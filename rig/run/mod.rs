@@ -46,7 +46,7 @@ pub fn run(args: &RunArgs) -> Result<Exit, Failure> {
     if manifest.ending == Ending::NotStarted {
         return Ok(Exit::Invalid);
     }
-    let figures = analysis::analyse(&folder, plan.scenario.period_ns())
+    let figures = analysis::analyse(&folder, &plan.scenario)
         .context("the run's recording cannot be analysed")
         .map_err(Failure::with(Exit::Incomplete))?;
     report::write(&folder, &manifest, &figures, args.format)

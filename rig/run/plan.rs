@@ -3,14 +3,13 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::Context;
+use anyhow::{Context, bail};
 use masseter_controller::trajectory::{self, Trajectory, TrajectoryReport};
-use masseter_plant::core::PlantCore;
 use masseter_shared::config::{FileConfig, MotionConfig, Scenario};
 use masseter_shared::geometry::Mechanism;
 use masseter_shared::schedule::CycleSchedule;
 
-use crate::cli::RunArgs;
+use crate::cli::{ClockKind, RunArgs};
 
 /// A run that can be made.
 #[derive(Debug)]
@@ -36,9 +35,12 @@ impl Plan {
         };
         apply(args, &mut scenario)?;
         scenario.validate()?;
+        if args.clock == ClockKind::Virtual && !scenario.can.is_virtual() {
+            bail!("virtual time has no real wires: use --can virtual, or --clock rt");
+        }
         let mechanism = Mechanism::new(&scenario.mechanism)?;
         let schedule = CycleSchedule::new(&scenario.can, scenario.period_ns())?;
-        PlantCore::new(&scenario, 0).context("the plant cannot be built")?;
+        masseter_plant::core::check(&scenario).context("the plant cannot be built")?;
         let trajectory = Trajectory::new(&scenario.motion, &scenario.jaw, &mechanism, scenario.duration_s)?;
         let demands = trajectory::check(&trajectory, &mechanism, &scenario.limits, scenario.period_s())?;
         Ok(Self { scenario, mechanism, trajectory, demands, schedule })
@@ -46,12 +48,17 @@ impl Plan {
 
     /// One line that says what is about to run.
     pub fn announcement(&self) -> String {
+        let scenario = &self.scenario;
+        let wires = match &scenario.can.interfaces[..] {
+            [] => "virtual CAN".to_owned(),
+            interfaces => interfaces.join(", "),
+        };
         format!(
-            "{}: {:.1} s at {} Hz, seed {}",
-            self.scenario.name,
+            "{}: {:.1} s at {} Hz on {wires}, seed {}",
+            scenario.name,
             self.trajectory.duration_s(),
-            self.scenario.rate_hz,
-            self.scenario.seed
+            scenario.rate_hz,
+            scenario.seed
         )
     }
 }
@@ -65,6 +72,9 @@ fn apply(args: &RunArgs, scenario: &mut Scenario) -> anyhow::Result<()> {
     }
     if let Some(duration) = args.duration {
         scenario.duration_s = Some(duration.as_secs_f64());
+    }
+    if let Some(wires) = &args.can {
+        scenario.can.interfaces.clone_from(&wires.0);
     }
     scenario.rate_hz = args.rate_hz.unwrap_or(scenario.rate_hz);
     scenario.seed = args.seed.unwrap_or(scenario.seed);

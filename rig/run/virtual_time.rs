@@ -52,7 +52,9 @@ fn step(
     plant.collect(reading_ns)?;
     let reading =
         log.readings.record(&mut log.recorder, reading_ns, |reading| plant.fill_reading(reading))?;
-    log.truths.record(&mut log.recorder, reading_ns, |truth| plant.fill_truth(truth))?;
+    if let Some(truth) = plant.truth() {
+        log.truths.record(&mut log.recorder, reading_ns, |message| *message = truth)?;
+    }
 
     let now_ns = sync_ns + plan.schedule.controller_at_ns;
     controller.observe(Some(&reading));

@@ -26,6 +26,8 @@ impl SocketPair {
 }
 
 impl Pair for SocketPair {
+    const COUNTS_LOSSES: bool = false;
+
     fn end(&mut self, end: End) -> impl Bus {
         &mut self.ends[end as usize]
     }

@@ -123,6 +123,15 @@ impl StopRequest {
         Ok(Self(requested))
     }
 
+    /// Listens for SIGTERM and SIGINT, for a process without supervisor.
+    pub fn listen_alone() -> io::Result<Self> {
+        let requested = Arc::new(AtomicBool::new(false));
+        for signal in [SIGTERM, SIGINT] {
+            signal_hook::flag::register(signal, Arc::clone(&requested))?;
+        }
+        Ok(Self(requested))
+    }
+
     /// Whether the end has been asked for.
     pub fn is_made(&self) -> bool {
         self.0.load(Ordering::Relaxed)

@@ -61,7 +61,7 @@ impl CycleSchedule {
         let blocking = worst_case_bits(1, false);
         let up = worst_case_bits(0, false) + axes * worst_case_bits(Tpdo1::LENGTH as u32, false);
         let down = axes * worst_case_bits(Rpdo1::LENGTH as u32, false);
-        let reading_by_ns = time(blocking + up);
+        let reading_by_ns = time(blocking + up) + u64::from(can.answer_us) * 1000;
         let command_by_ns = period_ns.saturating_sub(time(blocking + down));
         let controller_at_ns = reading_by_ns + PUBLISH_NS;
         if controller_at_ns + COMPUTE_NS > command_by_ns {
@@ -90,6 +90,14 @@ mod tests {
         assert_eq!(schedule.reading_by_ns, (65 + 55 + 3 * 135) * 1000);
         assert_eq!(schedule.controller_at_ns, schedule.reading_by_ns + PUBLISH_NS);
         assert_eq!(schedule.command_by_ns, 1_000_000 - (65 + 3 * 115) * 1000);
+    }
+
+    #[test]
+    fn drives_that_take_time_to_answer_delay_the_reading() {
+        let slow = CanConfig { answer_us: 300, ..Default::default() };
+        let [at_once, late] = [CanConfig::default(), slow]
+            .map(|can| CycleSchedule::new(&can, 2_000_000).unwrap().reading_by_ns);
+        assert_eq!(late, at_once + 300_000);
     }
 
     #[test]

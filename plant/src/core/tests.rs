@@ -46,7 +46,7 @@ impl Bench {
         self.plant.begin_cycle(wake).unwrap();
         self.plant.collect(sync_ns + 525_000).unwrap();
         self.plant.fill_reading(&mut self.reading);
-        self.plant.fill_truth(&mut self.truth);
+        self.truth = self.plant.truth().unwrap();
         let command = answer.map(|answer| {
             let (target_m, request) = answer(&self.reading);
             Command { cycle: self.cycle, target_m, request: request.code(), ..Command::default() }
@@ -166,7 +166,7 @@ fn without_the_master_the_drives_stop_by_themselves() {
     let silent_from_ns = EPOCH_NS + bench.cycle * PERIOD_NS;
     let bound_ns = u64::from(scenario.can.heartbeat_consumer_ms) * PERIOD_NS + 60 * PERIOD_NS;
     bench.plant.link.advance(silent_from_ns + bound_ns).unwrap();
-    for drive in bench.plant.link.drives() {
+    for drive in bench.plant.link.emulation().drives() {
         assert_eq!(drive.power(), DriveState::SwitchOnDisabled);
     }
 }

@@ -63,14 +63,13 @@ pub fn write(out: &mut impl Write, time_ns: u64, interface: impl fmt::Display, f
     write!(out, "({}.{:06}) {interface} {frame}", micros / 1_000_000, micros % 1_000_000)
 }
 
-/// Writes one line for a tapped frame, bus 0 being `can0`.
+/// Writes one line for a tapped frame.
 ///
 /// # Errors
 /// [`FrameError`] where the message holds no frame; nothing is written then.
-pub fn write_tap(line: &mut String, tap: &FrameTap) -> Result<(), FrameError> {
+pub fn write_tap(line: &mut String, interface: &str, tap: &FrameTap) -> Result<(), FrameError> {
     let received = tap::decode(tap)?;
-    write(line, received.time_ns, format_args!("can{}", tap.bus), &received.frame)
-        .expect("writing to a string does not fail");
+    write(line, received.time_ns, interface, &received.frame).expect("writing to a string does not fail");
     Ok(())
 }
 
@@ -177,7 +176,7 @@ mod tests {
     fn a_tap_that_holds_no_frame_writes_nothing() {
         let mut line = String::new();
         let tap = FrameTap { length: 9, ..Default::default() };
-        assert_eq!(write_tap(&mut line, &tap), Err(FrameError::DataLength { length: 9 }));
+        assert_eq!(write_tap(&mut line, "can0", &tap), Err(FrameError::DataLength { length: 9 }));
         assert_eq!(line, "");
     }
 

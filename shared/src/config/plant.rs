@@ -2,12 +2,15 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::ScenarioError;
 use crate::geometry::AXES;
 
 /// The CAN link between the master and the six drives.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct CanConfig {
+    /// Real interfaces, one a bus, such as `["can0", "can1"]`; none for simulated buses.
+    pub interfaces: Vec<String>,
     /// Bit rate of every bus, bit/s.
     pub bitrate_bps: u32,
     /// Which axes (0 to 5: d₁ d₂ d₃ l₁ l₂ l₃) hang on which bus.
@@ -18,6 +21,9 @@ pub struct CanConfig {
     pub heartbeat_producer_ms: u16,
     /// Silence after which a heartbeat counts as lost (object 1016), ms.
     pub heartbeat_consumer_ms: u16,
+    /// From SYNC to the moment a drive has its process data ready to be sent, at most, µs; none for the
+    /// emulated drives on simulated buses.
+    pub answer_us: u32,
     /// How long the drives may take to boot, ms.
     pub boot_timeout_ms: u32,
     /// Cycles without a fresh command after which the master quick-stops the drives.
@@ -27,14 +33,36 @@ pub struct CanConfig {
 impl Default for CanConfig {
     fn default() -> Self {
         Self {
+            interfaces: Vec::new(),
             bitrate_bps: 1_000_000,
             buses: vec![vec![0, 1, 2], vec![3, 4, 5]],
             node_ids: [1, 2, 3, 4, 5, 6],
             heartbeat_producer_ms: 50,
             heartbeat_consumer_ms: 150,
+            answer_us: 0,
             boot_timeout_ms: 2000,
             command_timeout_cycles: 20,
         }
+    }
+}
+
+impl CanConfig {
+    /// Whether the buses are simulated.
+    pub fn is_virtual(&self) -> bool {
+        self.interfaces.is_empty()
+    }
+
+    pub(super) fn validate(&self) -> Result<(), ScenarioError> {
+        let names = &self.interfaces;
+        let has_twice = (1..names.len()).any(|index| names[..index].contains(&names[index]));
+        if self.is_virtual() || names.len() == self.buses.len() && !has_twice {
+            return Ok(());
+        }
+        Err(ScenarioError::BadValue {
+            key: "can.interfaces",
+            value: names.join(","),
+            need: format!("name {} interfaces, one for each of can.buses", self.buses.len()),
+        })
     }
 }
 

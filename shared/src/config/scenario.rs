@@ -144,6 +144,7 @@ impl Scenario {
         if !(1..=99).contains(&self.realtime.priority) {
             return bad("realtime.priority", self.realtime.priority.to_string(), "use 1 to 99 (SCHED_FIFO)");
         }
+        self.can.validate()?;
         self.controller.validate()?;
         self.checks.validate()
     }
@@ -222,6 +223,8 @@ mod tests {
             ("duration_s = nan", "use more than 0"),
             ("name = '../x'", "letters"),
             ("[realtime]\npriority = 0", "use 1 to 99"),
+            ("[can]\ninterfaces = ['can0']", "can.interfaces = can0: name 2 interfaces"),
+            ("[can]\ninterfaces = ['can0', 'can0']", "name 2 interfaces"),
             ("[controller]\nease_s = 0.0", "controller.ease_s = 0: use a finite number above 0"),
             ("[checks]\ntracking_rms_mm = inf", "checks.tracking_rms_mm"),
             ("name = ", "s.toml:1"),

@@ -97,6 +97,20 @@ fn a_bus_without_flaw_passes() {
 }
 
 #[test]
+fn a_controller_may_report_several_losses_as_one_but_not_none() {
+    for (received, lost, real, counting) in [
+        (12, 0, true, true),
+        (10, 2, true, true),
+        (10, 1, true, false),
+        (10, 0, false, false),
+        (13, 1, false, false),
+    ] {
+        assert_eq!(is_accounted_for(false, 12, received, lost), real, "{received} {lost}");
+        assert_eq!(is_accounted_for(true, 12, received, lost), counting, "{received} {lost}");
+    }
+}
+
+#[test]
 fn every_flaw_is_caught_by_the_law_it_breaks() {
     let table = [
         (Flaw::Echoes, "does not receive its own"),

@@ -1,0 +1,121 @@
+//! The six drives and the mechanism they move, stepped by whoever carries their frames: simulated wires
+//! ([`link`](crate::link)) or real ones ([`emulator`](crate::emulator)).
+
+use masseter_shared::can::canopen::Cob;
+use masseter_shared::can::{CanId, Frame};
+use masseter_shared::geometry::AXES;
+use masseter_shared::messages::{Truth, pose_fields};
+
+use crate::drive::DriveNode;
+use crate::mechanism::{Dynamics, DynamicsError};
+
+/// Drives and mechanism, co-simulated in the order of time.
+#[derive(Debug)]
+pub(crate) struct Emulation {
+    drives: Vec<DriveNode>,
+    dynamics: Dynamics,
+    step_ns: u64,
+    next_step_ns: u64,
+    moved_to_ns: u64,
+    force_n: [f64; AXES],
+    truth: Truth,
+}
+
+impl Emulation {
+    /// Everything at rest at `now_ns`; `drives` in the order of the axes.
+    pub(crate) fn new(drives: Vec<DriveNode>, dynamics: Dynamics, step_ns: u64, now_ns: u64) -> Self {
+        let mut emulation = Self {
+            drives,
+            dynamics,
+            step_ns,
+            next_step_ns: now_ns,
+            moved_to_ns: now_ns,
+            force_n: [0.0; AXES],
+            truth: Truth::default(),
+        };
+        emulation.sample_truth(now_ns);
+        emulation
+    }
+
+    /// The mechanism at the last SYNC.
+    pub(crate) fn truth(&self) -> Truth {
+        self.truth
+    }
+
+    /// The drives, in the order of the axes.
+    #[cfg(test)]
+    pub(crate) fn drives(&self) -> &[DriveNode] {
+        &self.drives
+    }
+
+    /// When the drives' loops are due next.
+    pub(crate) fn next_step_ns(&self) -> u64 {
+        self.next_step_ns
+    }
+
+    /// How far the mechanism has been moved.
+    pub(crate) fn moved_to_ns(&self) -> u64 {
+        self.moved_to_ns
+    }
+
+    /// Hands a frame to a drive. Only SYNC asks where the mechanism is at this very instant.
+    pub(crate) fn deliver(&mut self, axis: usize, frame: &Frame, now_ns: u64) -> Result<(), DynamicsError> {
+        if frame.id() == CanId::from(Cob::Sync) {
+            self.move_mechanism(now_ns)?;
+            if axis == 0 {
+                self.sample_truth(now_ns);
+            }
+        }
+        self.drives[axis].receive(now_ns, frame, self.dynamics.positions_m()[axis]);
+        Ok(())
+    }
+
+    /// One step of every drive's loops, where the axes stand at the instant it is due.
+    pub(crate) fn step(&mut self) -> Result<(), DynamicsError> {
+        let now_ns = self.next_step_ns;
+        self.move_mechanism(now_ns)?;
+        let positions_m = self.dynamics.positions_m();
+        for (axis, position_m) in positions_m.into_iter().enumerate() {
+            self.force_n[axis] = self.drives[axis].step(now_ns, position_m);
+        }
+        self.next_step_ns += self.step_ns;
+        Ok(())
+    }
+
+    /// Leaves out the steps due before `now_ns`: the mechanism stands still meanwhile. How much was left
+    /// out, ns.
+    pub(crate) fn skip_to(&mut self, now_ns: u64) -> u64 {
+        let steps = now_ns.saturating_sub(self.next_step_ns) / self.step_ns;
+        let skipped_ns = steps * self.step_ns;
+        self.next_step_ns += skipped_ns;
+        self.moved_to_ns += skipped_ns;
+        skipped_ns
+    }
+
+    /// The next frame a drive wants to send.
+    pub(crate) fn outgoing(&mut self, axis: usize) -> Option<Frame> {
+        self.drives[axis].outgoing()
+    }
+
+    /// Integrates under the forces of the last step.
+    fn move_mechanism(&mut self, now_ns: u64) -> Result<(), DynamicsError> {
+        if now_ns > self.moved_to_ns {
+            self.dynamics.step(&self.force_n, (now_ns - self.moved_to_ns) as f64 * 1e-9)?;
+            self.moved_to_ns = now_ns;
+        }
+        Ok(())
+    }
+
+    fn sample_truth(&mut self, now_ns: u64) {
+        let (position_m, quaternion_wxyz) = pose_fields(self.dynamics.pose());
+        self.truth = Truth {
+            sampled_ns: now_ns,
+            position_m,
+            quaternion_wxyz,
+            joint_m: self.dynamics.positions_m(),
+            joint_m_s: self.dynamics.velocities_m_s(),
+            force_n: self.force_n,
+            ..Truth::default()
+        };
+    }
+}

@@ -1,0 +1,68 @@
+//! `masseter plant`: the emulated drives on real interfaces; or, for the supervisor, the plant's process.
+
+use anyhow::{Context, bail};
+use masseter_plant::emulator::{Emulator, Figures};
+use masseter_shared::clock;
+use masseter_shared::config::Scenario;
+use masseter_shared::lifecycle::StopRequest;
+use masseter_shared::realtime::scheduling::{Wanted, obtain};
+
+use crate::cli::PlantArgs;
+use crate::exit::{Exit, Failure};
+
+/// Runs the plant until it is asked to end.
+pub(crate) fn plant(args: &PlantArgs) -> Result<Exit, Failure> {
+    match args.assignment() {
+        Some(assignment) => masseter_plant::process::run(&assignment)?,
+        None => emulate(args)?,
+    }
+    Ok(Exit::Passed)
+}
+
+fn emulate(args: &PlantArgs) -> anyhow::Result<()> {
+    let scenario = resolve(args)?;
+    let stop = StopRequest::listen_alone().context("cannot listen for signals")?;
+    let emulator = Emulator::open(&scenario, clock::now_ns()).context("the drives cannot be emulated")?;
+    let realtime = &scenario.realtime;
+    let obtained = obtain(Wanted {
+        core: None,
+        fifo_priority: Some(realtime.priority),
+        locked_memory: realtime.lock_memory,
+    });
+    obtained.refusals.iter().for_each(|refusal| eprintln!("  plant: {refusal}"));
+    eprintln!("six drives on {}, until Ctrl-C", scenario.can.interfaces.join(", "));
+    tell(emulator.run(&stop)?);
+    Ok(())
+}
+
+fn resolve(args: &PlantArgs) -> anyhow::Result<Scenario> {
+    let mut scenario = match &args.file {
+        Some(path) => Scenario::read(path)?,
+        None => Scenario::default(),
+    };
+    if let Some(wires) = &args.can {
+        scenario.can.interfaces.clone_from(&wires.0);
+    }
+    scenario.validate()?;
+    if scenario.can.is_virtual() {
+        bail!("no interface to put the drives on: name one for each bus, such as --can can0,can1");
+    }
+    if !args.emulate {
+        bail!(
+            "a plant without controller only emulates: add --emulate, or drive the robot with `masseter run \
+             --can {}`",
+            scenario.can.interfaces.join(",")
+        );
+    }
+    Ok(scenario)
+}
+
+fn tell(figures: Figures) {
+    println!(
+        "received {} frames, sent {}, could not send {}; left out {:.1} ms that the machine was too slow for",
+        figures.received,
+        figures.sent,
+        figures.refused,
+        figures.skipped_ns as f64 / 1e6
+    );
+}
