@@ -7,21 +7,72 @@ use std::error::Error;
 use std::time::Duration;
 
 use masseter_shared::can::conformance::{self, End, Pair};
-use masseter_shared::can::{Bus, OpenError, ReceiveError, SocketCan};
+use masseter_shared::can::{Bus, BusStatus, Frame, OpenError, ReceiveError, Received, SendError, SocketCan};
 use masseter_shared::clock;
 
-/// A wire that was quiet for so long has nothing left to send.
-const QUIET: Duration = Duration::from_millis(10);
+/// How often is looked whether all frames have arrived.
+const LOOK: Duration = Duration::from_millis(1);
+/// A frame that has not arrived after so many looks without any progress was lost.
+const PATIENCE: u32 = 500;
 
-/// Two ports, and a third that hears what the first has sent.
+/// Two ports, and two more to know when everything sent has left the one side and reached the other.
 struct SocketPair {
     ends: [SocketCan; 2],
-    echo: SocketCan,
+    sent: u64,
+    watches: [Watch; 2],
+}
+
+/// Counts the frames that pass an interface.
+struct Watch {
+    port: SocketCan,
+    seen: u64,
+}
+
+/// A port whose accepted frames are counted.
+struct Counting<'a> {
+    port: &'a mut SocketCan,
+    sent: &'a mut u64,
 }
 
 impl SocketPair {
     fn open([a, b]: [&str; 2]) -> Result<Self, OpenError> {
-        Ok(Self { ends: [SocketCan::open(a)?, SocketCan::open(b)?], echo: SocketCan::open(a)? })
+        Ok(Self {
+            ends: [SocketCan::open(a)?, SocketCan::open(b)?],
+            sent: 0,
+            watches: [Watch::open(a)?, Watch::open(b)?],
+        })
+    }
+}
+
+impl Watch {
+    fn open(interface: &str) -> Result<Self, OpenError> {
+        Ok(Self { port: SocketCan::open(interface)?, seen: 0 })
+    }
+
+    fn look(&mut self) -> u64 {
+        loop {
+            match self.port.receive(clock::now_ns()) {
+                Ok(Some(_)) => self.seen += 1,
+                Err(ReceiveError::Overrun { lost }) => self.seen += lost,
+                Ok(None) | Err(_) => return self.seen,
+            }
+        }
+    }
+}
+
+impl Bus for Counting<'_> {
+    fn send(&mut self, now_ns: u64, frame: Frame) -> Result<(), SendError> {
+        let result = self.port.send(now_ns, frame);
+        *self.sent += u64::from(result.is_ok());
+        result
+    }
+
+    fn receive(&mut self, now_ns: u64) -> Result<Option<Received>, ReceiveError> {
+        self.port.receive(now_ns)
+    }
+
+    fn status(&self) -> BusStatus {
+        self.port.status()
     }
 }
 
@@ -29,7 +80,7 @@ impl Pair for SocketPair {
     const COUNTS_LOSSES: bool = false;
 
     fn end(&mut self, end: End) -> impl Bus {
-        &mut self.ends[end as usize]
+        Counting { port: &mut self.ends[end as usize], sent: &mut self.sent }
     }
 
     fn now_ns(&self) -> u64 {
@@ -37,16 +88,12 @@ impl Pair for SocketPair {
     }
 
     fn settle(&mut self) {
-        let mut is_quiet = false;
-        while !is_quiet {
-            clock::sleep(QUIET);
-            is_quiet = true;
-            while matches!(
-                self.echo.receive(clock::now_ns()),
-                Ok(Some(_)) | Err(ReceiveError::Overrun { .. })
-            ) {
-                is_quiet = false;
-            }
+        let (mut before, mut idle_looks) = ([0; 2], 0);
+        while before != [self.sent; 2] && idle_looks < PATIENCE {
+            clock::sleep(LOOK);
+            let seen = self.watches.each_mut().map(Watch::look);
+            idle_looks = if seen == before { idle_looks + 1 } else { 0 };
+            before = seen;
         }
     }
 }
