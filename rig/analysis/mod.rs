@@ -3,6 +3,7 @@
 //!
 //! Nothing is judged here; see [`report::verdict`](crate::report::verdict).
 
+mod blame;
 mod events;
 mod exports;
 mod intervals;
@@ -20,6 +21,7 @@ use serde::Serialize;
 
 use crate::recording::{ReadError, Reader, Recorded};
 use crate::run::folder::RunFolder;
+pub use blame::Suspicion;
 use events::EventLog;
 pub use events::EventRecord;
 use exports::CandumpLogs;
@@ -28,7 +30,7 @@ use intervals::Intervals;
 use sequence::SequenceCheck;
 pub use sequence::TopicFigures;
 pub use skips::SkipFigures;
-use skips::Skips;
+use skips::{Counters, Skips};
 use tracking::Tracking;
 pub use tracking::{Reference, TrackingFigures, TrackingSample};
 
@@ -62,6 +64,8 @@ pub struct Figures {
     pub controller_skips: SkipFigures,
     /// Deadlines that the plant skipped after overruns.
     pub plant_skips: SkipFigures,
+    /// Stretches of work that cost deadlines, beside the machine's known stalls; none without any.
+    pub suspicion: Option<Suspicion>,
     /// Where the controller's sequence ended; none without a single state message.
     pub final_state: Option<&'static str>,
     /// Distance of the platform from where it should be, while the motion played.
@@ -82,10 +86,13 @@ pub struct Figures {
 }
 
 impl Figures {
-    /// Deadlines that the two processes skipped, and those of them that the machine is to blame for.
+    /// Deadlines that the two processes skipped, and those of them that the machine is to blame for:
+    /// because it stood still while they waited, or may as well have while they worked.
     pub fn skipped(&self) -> (u64, u64) {
         let (controller, plant) = (&self.controller_skips, &self.plant_skips);
-        (controller.skipped + plant.skipped, controller.by_machine + plant.by_machine)
+        let is_machine = self.suspicion.is_some_and(|suspicion| suspicion.may_be_the_machine());
+        let while_working = if is_machine { controller.while_working + plant.while_working } else { 0 };
+        (controller.skipped + plant.skipped, controller.by_machine + plant.by_machine + while_working)
     }
 
     /// Messages that were published and not recorded.
@@ -160,7 +167,7 @@ impl Pass {
     fn reading(&mut self, reading: &Reading) {
         self.sequence.check(Reading::TOPIC, 0, reading.seq);
         self.intervals.reading(reading);
-        self.plant_skips.take(reading.skipped_cycles, reading.stalled_ns, self.period_ns);
+        self.plant_skips.take(&Counters::from(reading), self.period_ns);
         self.first_sample_ns.get_or_insert(reading.sampled_ns);
         self.last_sample_ns = reading.sampled_ns;
     }
@@ -170,7 +177,7 @@ impl Pass {
         self.intervals.state(state);
         self.tracking.state(state);
         self.cycles += 1;
-        self.controller_skips.take(state.skipped_cycles, state.stalled_ns, self.period_ns);
+        self.controller_skips.take(&Counters::from(state), self.period_ns);
         self.final_state = ControllerState::try_from(state.controller_state).ok().map(ControllerState::name);
     }
 
@@ -195,8 +202,9 @@ impl Pass {
         Ok(Figures {
             cycles: self.cycles,
             duration_s: duration_ns as f64 / 1e9,
-            controller_skips: self.controller_skips.finish(),
-            plant_skips: self.plant_skips.finish(),
+            suspicion: Suspicion::of(&[&self.controller_skips, &self.plant_skips]),
+            controller_skips: self.controller_skips.figures(),
+            plant_skips: self.plant_skips.figures(),
             final_state: self.final_state,
             tracking,
             intervals: self.intervals.finish()?,

@@ -1,44 +1,152 @@
-//! Skipped deadlines, and whose fault they were.
+//! Skipped deadlines, and what the time before them went to.
 //!
-//! A real-time task that waits loses time only to the machine (interrupts, the hypervisor), and counts
-//! it. A skip that the time lost since the cycle before explains is the machine's; any other is the
-//! rig's own.
+//! A skip that time withheld while waiting explains is the machine's. One that only a stretch of work
+//! explains which took too long is suspect: [`blame`](super::blame) weighs those of the whole run. Any
+//! other is the rig's own.
 
+use hdrhistogram::Histogram;
+use masseter_shared::messages::{Reading, State};
 use serde::Serialize;
 
-/// Skipped deadlines of one process.
+/// Skipped deadlines of one process, and the account of its time.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
 pub struct SkipFigures {
     /// Deadlines skipped.
     pub skipped: u64,
-    /// Those that the machine is to blame for.
+    /// Those before which the machine stood still while the process waited.
     pub by_machine: u64,
+    /// Those before which a stretch of work took too long.
+    pub while_working: u64,
     /// Time that the machine withheld from the process while it waited, ns.
     pub stalled_ns: u64,
+    /// Time that the process spun, what was withheld left out, ns.
+    pub spun_ns: u64,
+    /// Time that the process worked, ns.
+    pub worked_ns: u64,
+    /// Part of it in stretches too long for the work alone, ns.
+    pub overlong_ns: u64,
+}
+
+/// What a process counts since its start, as its messages carry it.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Counters {
+    pub(super) skipped: u64,
+    pub(super) stalled_ns: u64,
+    pub(super) spun_ns: u64,
+    pub(super) worked_ns: u64,
+    pub(super) overlong_ns: u64,
+}
+
+impl From<&Reading> for Counters {
+    fn from(reading: &Reading) -> Self {
+        Self {
+            skipped: reading.skipped_cycles,
+            stalled_ns: reading.stalled_ns,
+            spun_ns: reading.spun_ns,
+            worked_ns: reading.worked_ns,
+            overlong_ns: reading.overlong_ns,
+        }
+    }
+}
+
+impl From<&State> for Counters {
+    fn from(state: &State) -> Self {
+        Self {
+            skipped: state.skipped_cycles,
+            stalled_ns: state.stalled_ns,
+            spun_ns: state.spun_ns,
+            worked_ns: state.worked_ns,
+            overlong_ns: state.overlong_ns,
+        }
+    }
 }
 
 /// Follows the counters of one process.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(super) struct Skips {
     figures: SkipFigures,
-    /// Time withheld in the cycle before, ns: a late cycle is skipped after, not before, it was run.
-    recent_ns: u64,
+    /// Time lost in the cycle before, ns: a late cycle is skipped after, not before, it was run.
+    recent_stall_ns: u64,
+    recent_overlong_ns: u64,
+    /// How long the machine stood still at a time, ns.
+    stalls: Histogram<u64>,
+    /// How long the overlong stretches of work were, ns.
+    overlong: Histogram<u64>,
+    shortest_costly_ns: Option<u64>,
+}
+
+impl Default for Skips {
+    fn default() -> Self {
+        let histogram = || Histogram::new(3).expect("three digits are allowed");
+        Self {
+            figures: SkipFigures::default(),
+            recent_stall_ns: 0,
+            recent_overlong_ns: 0,
+            stalls: histogram(),
+            overlong: histogram(),
+            shortest_costly_ns: None,
+        }
+    }
 }
 
 impl Skips {
     /// The process' counters in its next message.
-    pub(super) fn take(&mut self, skipped: u64, stalled_ns: u64, period_ns: u64) {
-        let newly_skipped = skipped.saturating_sub(self.figures.skipped);
-        let newly_stalled_ns = stalled_ns.saturating_sub(self.figures.stalled_ns);
-        let explained = (newly_stalled_ns + self.recent_ns).div_ceil(period_ns);
-        self.figures.by_machine += newly_skipped.min(explained);
-        (self.figures.skipped, self.figures.stalled_ns) = (skipped, stalled_ns);
-        self.recent_ns = newly_stalled_ns;
+    pub(super) fn take(&mut self, counters: &Counters, period_ns: u64) {
+        let past = self.figures;
+        let stall_ns = counters.stalled_ns.saturating_sub(past.stalled_ns);
+        let overlong_ns = counters.overlong_ns.saturating_sub(past.overlong_ns);
+        let skipped = counters.skipped.saturating_sub(past.skipped);
+        let lost_waiting_ns = stall_ns + self.recent_stall_ns;
+        let lost_working_ns = overlong_ns + self.recent_overlong_ns;
+        let (by_machine, while_working) = if lost_waiting_ns >= lost_working_ns {
+            explain(skipped, lost_waiting_ns, lost_working_ns, period_ns)
+        } else {
+            let (while_working, by_machine) = explain(skipped, lost_working_ns, lost_waiting_ns, period_ns);
+            (by_machine, while_working)
+        };
+        if while_working > 0 {
+            let costly_ns = overlong_ns.max(self.recent_overlong_ns);
+            self.shortest_costly_ns =
+                Some(self.shortest_costly_ns.map_or(costly_ns, |shortest| shortest.min(costly_ns)));
+        }
+        self.figures = SkipFigures {
+            skipped: counters.skipped,
+            by_machine: past.by_machine + by_machine,
+            while_working: past.while_working + while_working,
+            stalled_ns: counters.stalled_ns,
+            spun_ns: counters.spun_ns,
+            worked_ns: counters.worked_ns,
+            overlong_ns: counters.overlong_ns,
+        };
+        for (histogram, lost_ns) in [(&mut self.stalls, stall_ns), (&mut self.overlong, overlong_ns)] {
+            if lost_ns > 0 {
+                histogram.record(lost_ns).expect("a histogram that resizes itself takes any value");
+            }
+        }
+        (self.recent_stall_ns, self.recent_overlong_ns) = (stall_ns, overlong_ns);
     }
 
-    pub(super) fn finish(self) -> SkipFigures {
+    pub(super) fn figures(&self) -> SkipFigures {
         self.figures
     }
+
+    /// The shortest overlong stretch of work that cost a deadline, ns.
+    pub(super) fn shortest_costly_ns(&self) -> Option<u64> {
+        self.shortest_costly_ns
+    }
+
+    /// Stalls while waiting, and overlong stretches of work, of at least this length.
+    pub(super) fn as_long_as(&self, least_ns: u64) -> (u64, u64) {
+        let count = |histogram: &Histogram<u64>| histogram.count_between(least_ns, u64::MAX);
+        (count(&self.stalls), count(&self.overlong))
+    }
+}
+
+/// How many of the skipped deadlines the greater loss of time explains, and how many of the rest the
+/// smaller one.
+fn explain(skipped: u64, greater_ns: u64, smaller_ns: u64, period_ns: u64) -> (u64, u64) {
+    let by_greater = skipped.min(greater_ns.div_ceil(period_ns));
+    (by_greater, (skipped - by_greater).min(smaller_ns.div_ceil(period_ns)))
 }
 
 #[cfg(test)]
@@ -47,16 +155,49 @@ mod tests {
 
     const PERIOD_NS: u64 = 1_000_000;
 
-    #[test]
-    fn skips_are_blamed_on_the_machine_as_far_as_it_withheld_time() {
+    /// `(skipped, stalled_ns, overlong_ns)` message by message.
+    type Messages<'a> = &'a [(u64, u64, u64)];
+
+    fn skips_of(messages: Messages) -> Skips {
         let mut skips = Skips::default();
-        // In time; woken 8.6 ms late; the seven passed deadlines skipped.
-        skips.take(0, 0, PERIOD_NS);
-        skips.take(0, 8_600_000, PERIOD_NS);
-        skips.take(7, 8_600_000, PERIOD_NS);
-        // Three skipped without any time withheld.
-        skips.take(7, 8_600_000, PERIOD_NS);
-        skips.take(10, 8_600_000, PERIOD_NS);
-        assert_eq!(skips.finish(), SkipFigures { skipped: 10, by_machine: 7, stalled_ns: 8_600_000 });
+        for &(skipped, stalled_ns, overlong_ns) in messages {
+            let counters = Counters { skipped, stalled_ns, overlong_ns, ..Counters::default() };
+            skips.take(&counters, PERIOD_NS);
+        }
+        skips
+    }
+
+    #[test]
+    fn each_skip_has_one_cause() {
+        const STALL: u64 = 8_600_000;
+        // What is counted message by message; skips by the machine, while working, and all.
+        let cases: [(Messages, [u64; 3]); 7] = [
+            (&[(0, 0, 0), (0, 0, 0)], [0, 0, 0]),
+            // Woken 8.6 ms late; the passed deadlines are skipped after the late cycle.
+            (&[(0, 0, 0), (0, STALL, 0), (7, STALL, 0)], [7, 0, 7]),
+            // A stretch of work of 8.6 ms.
+            (&[(0, 0, 0), (8, 0, STALL)], [0, 8, 8]),
+            // No time lost at all: the rig's own.
+            (&[(0, 0, 0), (3, 0, 0)], [0, 0, 3]),
+            // More skipped than the time lost explains.
+            (&[(0, 0, 0), (20, STALL, 0)], [9, 0, 20]),
+            // The greater loss explains first.
+            (&[(0, 0, 0), (9, 60_000, STALL)], [0, 9, 9]),
+            // Time lost long ago explains nothing.
+            (&[(0, STALL, STALL), (0, STALL, STALL), (0, STALL, STALL), (2, STALL, STALL)], [0, 0, 2]),
+        ];
+        for (messages, expected) in cases {
+            let figures = skips_of(messages).figures();
+            let found = [figures.by_machine, figures.while_working, figures.skipped];
+            assert_eq!(found, expected, "{messages:?}");
+        }
+    }
+
+    #[test]
+    fn stretches_are_counted_from_the_shortest_that_cost_a_deadline() {
+        let skips = skips_of(&[(0, 60_000, 70_000), (1, 60_000, 2_070_000), (5, 4_060_000, 7_070_000)]);
+        assert_eq!(skips.shortest_costly_ns(), Some(2_000_000));
+        assert_eq!(skips.as_long_as(2_000_000), (1, 2));
+        assert_eq!(skips.as_long_as(1), (2, 3));
     }
 }

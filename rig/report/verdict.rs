@@ -109,15 +109,20 @@ fn incomplete(figures: &Figures) -> Option<Judgement> {
     Some((Exit::Incomplete, "INCOMPLETE", reason))
 }
 
-/// Too many skipped cycles, all of them the machine's doing: there is nothing to judge the rig by.
+/// Too many skipped cycles, none of them certainly the rig's doing: there is nothing to judge it by.
 fn disturbed(manifest: &Manifest, figures: &Figures) -> Option<Judgement> {
     let (skipped, by_machine) = figures.skipped();
     let is_disturbed = skipped > manifest.scenario.checks.missed_cycles && by_machine == skipped;
     is_disturbed.then(|| {
-        let stalled_ns = figures.controller_skips.stalled_ns + figures.plant_skips.stalled_ns;
+        let (controller, plant) = (&figures.controller_skips, &figures.plant_skips);
+        let stalled_ms = (controller.stalled_ns + plant.stalled_ns) as f64 / 1e6;
+        let while_working = match controller.while_working + plant.while_working {
+            0 => String::new(),
+            n => format!(", {n} of them while it worked, which the machine may as well have done"),
+        };
         let reason = format!(
-            "the machine stood still for {:.1} ms while the rig waited, and {skipped} cycles were missed",
-            stalled_ns as f64 / 1e6
+            "the machine stood still for {stalled_ms:.1} ms while the rig waited, and {skipped} cycles were \
+             missed{while_working}"
         );
         (Exit::Invalid, "INVALID", reason)
     })

@@ -37,7 +37,7 @@ pub trait Message: Pod + ZeroCopySend + Default + std::fmt::Debug + PartialEq {
 }
 
 /// Version of the layouts below; it changes with any of them.
-pub const LAYOUT_VERSION: u64 = 1;
+pub const LAYOUT_VERSION: u64 = 2;
 
 macro_rules! messages {
     ($($(#[$doc:meta])* $name:ident on $topic:literal keeping $depth:literal {
@@ -119,6 +119,12 @@ messages! {
         skipped_cycles: u64,
         /// Time that the machine withheld from the process while it waited, since start, ns.
         stalled_ns: u64,
+        /// Time that the process spun, what was withheld left out, since start, ns.
+        spun_ns: u64,
+        /// Time that the process worked, since start, ns.
+        worked_ns: u64,
+        /// Part of it in stretches too long for the work alone, ns.
+        overlong_ns: u64,
         /// Encoder positions d₁ d₂ d₃ l₁ l₂ l₃, m.
         position_m: [f64; AXES],
         /// Actuator forces, positive towards increasing position, N.
@@ -153,6 +159,12 @@ messages! {
         skipped_cycles: u64,
         /// Time that the machine withheld from the process while it waited, since start, ns.
         stalled_ns: u64,
+        /// Time that the process spun, what was withheld left out, since start, ns.
+        spun_ns: u64,
+        /// Time that the process worked, since start, ns.
+        worked_ns: u64,
+        /// Part of it in stretches too long for the work alone, ns.
+        overlong_ns: u64,
         /// Time on the motion's own clock at the sample, s; negative before the motion begins.
         motion_time_s: f64,
         /// Pose wanted at the sample: position in the base frame, m.

@@ -27,7 +27,7 @@ pub struct Wake {
     pub woke_ns: u64,
     /// Deadlines skipped since the start.
     pub skipped: u64,
-    /// Time that the machine has withheld from this task since the start, see [`Waiter::stalled_ns`].
+    /// Time that the machine has withheld from this task since the start, see [`Account`](super::Account).
     pub stalled_ns: u64,
 }
 
@@ -57,7 +57,7 @@ impl Cycle {
         let cycle = self.claim(clock::now_ns());
         let due_ns = self.due_ns(cycle);
         let woke_ns = self.waiter.until(due_ns);
-        Wake { cycle, due_ns, woke_ns, skipped: self.skipped, stalled_ns: self.waiter.stalled_ns() }
+        Wake { cycle, due_ns, woke_ns, skipped: self.skipped, stalled_ns: self.waiter.account().stalled_ns }
     }
 
     /// For the waits within a cycle.

@@ -10,4 +10,4 @@ pub mod scheduling;
 mod waiter;
 
 pub use cycle::{Cycle, Wake};
-pub use waiter::{Spin, Waiter};
+pub use waiter::{Account, Spin, Waiter};

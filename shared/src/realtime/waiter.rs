@@ -8,37 +8,59 @@ const SPIN_NS: u64 = 200_000;
 /// The spin takes at most this share of a period, so that real-time throttling never strikes and the
 /// rest of the machine lives.
 const SPIN_SHARE: u64 = 4;
-/// A spinning task reads the clock every fraction of a microsecond. A gap longer than this was spent
-/// elsewhere: interrupts, the hypervisor, a task of higher priority.
+/// A spinning task reads the clock every fraction of a microsecond, and a cycle's work is done in tens of
+/// them. A gap longer than this was spent elsewhere: interrupts, the hypervisor, a task of higher
+/// priority; or, while working, in the work itself, which [`Account`] therefore keeps apart.
 const GAP_NS: u64 = 50_000;
 
-/// How a real-time task waits. Never used for anything but waiting, so the time it loses is the
-/// machine's doing, not the task's.
+/// What a task's time went to since its first wait, ns.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Account {
+    /// Withheld while waiting: late returns from sleep, and gaps while spinning. A waiting task does
+    /// nothing, so this is the machine's doing.
+    pub stalled_ns: u64,
+    /// Spinning, without the gaps.
+    pub spun_ns: u64,
+    /// Between waits.
+    pub worked_ns: u64,
+    /// The part of `worked_ns` in stretches so long that either the machine stood still or the work took
+    /// too long; which of them cannot be told from within.
+    pub overlong_ns: u64,
+}
+
+/// How a real-time task waits, and the account of its time: whatever is not waiting counts as work.
 #[derive(Debug)]
 pub struct Waiter {
     spin_ns: u64,
-    stalled_ns: u64,
+    account: Account,
+    /// Since when the task has not been waiting; none before its first wait.
+    working_since_ns: Option<u64>,
 }
 
 impl Waiter {
     /// For a task of this period.
     pub fn new(period_ns: u64) -> Self {
-        Self { spin_ns: SPIN_NS.min(period_ns / SPIN_SHARE), stalled_ns: 0 }
+        Self {
+            spin_ns: SPIN_NS.min(period_ns / SPIN_SHARE),
+            account: Account::default(),
+            working_since_ns: None,
+        }
     }
 
-    /// Time withheld since the start: late returns from sleep, and gaps while spinning.
-    pub fn stalled_ns(&self) -> u64 {
-        self.stalled_ns
+    /// The account as of the begin of the last wait.
+    pub fn account(&self) -> Account {
+        self.account
     }
 
     /// Sleeps, then spins until `due_ns`; returns the time found at the end.
     pub fn until(&mut self, due_ns: u64) -> u64 {
         let sleep_until_ns = due_ns.saturating_sub(self.spin_ns);
-        if clock::now_ns() < sleep_until_ns {
+        if self.begin() < sleep_until_ns {
             clock::sleep_until(sleep_until_ns);
-            let late_ns = clock::now_ns().saturating_sub(sleep_until_ns);
+            let woke_ns = clock::now_ns();
             // Within the spin's reserve a late return costs nothing.
-            self.stalled_ns += late_ns.saturating_sub(self.spin_ns);
+            self.account.stalled_ns += woke_ns.saturating_sub(sleep_until_ns).saturating_sub(self.spin_ns);
+            self.working_since_ns = None;
         }
         let mut spin = self.spin();
         loop {
@@ -51,7 +73,20 @@ impl Waiter {
 
     /// Begins to spin.
     pub fn spin(&mut self) -> Spin<'_> {
-        Spin { last_ns: clock::now_ns(), stalled_ns: &mut self.stalled_ns }
+        Spin { last_ns: self.begin(), waiter: self }
+    }
+
+    /// Ends a stretch of work; returns the time. Until a wait really spins, the next stretch runs.
+    fn begin(&mut self) -> u64 {
+        let now_ns = clock::now_ns();
+        if let Some(since_ns) = self.working_since_ns.replace(now_ns) {
+            let worked_ns = now_ns - since_ns;
+            self.account.worked_ns += worked_ns;
+            if worked_ns > GAP_NS {
+                self.account.overlong_ns += worked_ns;
+            }
+        }
+        now_ns
     }
 }
 
@@ -59,19 +94,23 @@ impl Waiter {
 #[derive(Debug)]
 pub struct Spin<'a> {
     last_ns: u64,
-    stalled_ns: &'a mut u64,
+    waiter: &'a mut Waiter,
 }
 
 impl Spin<'_> {
-    /// Now; counts the gap since the last call if it is one.
+    /// Now; counts the gap since the last call if it is one. Whatever follows the last call is work.
     pub fn now_ns(&mut self) -> u64 {
         std::hint::spin_loop();
         let now_ns = clock::now_ns();
         let gap_ns = now_ns - self.last_ns;
+        let account = &mut self.waiter.account;
         if gap_ns > GAP_NS {
-            *self.stalled_ns += gap_ns;
+            account.stalled_ns += gap_ns;
+        } else {
+            account.spun_ns += gap_ns;
         }
         self.last_ns = now_ns;
+        self.waiter.working_since_ns = Some(now_ns);
         now_ns
     }
 }
@@ -80,17 +119,51 @@ impl Spin<'_> {
 mod tests {
     use super::*;
 
+    const STALL: std::time::Duration = std::time::Duration::from_millis(2);
+    const STALL_NS: u64 = 2_000_000;
+
     #[test]
-    fn it_never_returns_early_and_gaps_are_counted() {
+    fn it_never_returns_early() {
         let mut waiter = Waiter::new(1_000_000);
         for ahead_ns in [0, 50_000, 2_000_000] {
             let due_ns = clock::now_ns() + ahead_ns;
             assert!(waiter.until(due_ns) >= due_ns);
         }
-        let before_ns = waiter.stalled_ns();
+    }
+
+    #[test]
+    fn a_gap_while_waiting_is_the_machines_and_a_long_stretch_of_work_is_kept_apart() {
+        let mut waiter = Waiter::new(1_000_000);
+        waiter.until(0);
+        let before = waiter.account();
         let mut spin = waiter.spin();
-        clock::sleep(std::time::Duration::from_millis(2));
+        clock::sleep(STALL);
         spin.now_ns();
-        assert!(waiter.stalled_ns() >= before_ns + 2_000_000);
+        let stalled = waiter.account();
+        assert!(stalled.stalled_ns >= before.stalled_ns + STALL_NS);
+
+        clock::sleep(STALL);
+        waiter.spin();
+        let worked = waiter.account();
+        assert_eq!(worked.stalled_ns, stalled.stalled_ns);
+        assert!(worked.worked_ns >= stalled.worked_ns + STALL_NS);
+        assert!(worked.overlong_ns >= stalled.overlong_ns + STALL_NS);
+    }
+
+    #[test]
+    fn a_wait_whose_end_has_come_before_it_spins_belongs_to_the_work_around_it() {
+        let mut waiter = Waiter::new(1_000_000);
+        waiter.spin();
+        clock::sleep(STALL);
+        waiter.spin();
+        assert!(waiter.account().overlong_ns >= STALL_NS);
+    }
+
+    #[test]
+    fn before_the_first_wait_nothing_is_accounted() {
+        let mut waiter = Waiter::new(1_000_000);
+        clock::sleep(STALL);
+        waiter.spin();
+        assert_eq!(waiter.account(), Account::default());
     }
 }
