@@ -13,6 +13,7 @@ use serde::{Deserialize, Serialize};
 use super::dma_latency::DmaLatency;
 use super::folder::RunFolder;
 use super::plan::Plan;
+use super::usage::RunUsage;
 use crate::cli::ClockKind;
 use crate::machine::SystemRoot;
 use crate::report::verdict::Ending;
@@ -41,6 +42,8 @@ pub struct Manifest {
     pub scheduling: BTreeMap<String, Obtained>,
     /// What became of `/dev/cpu_dma_latency`; none under virtual time.
     pub cpu_dma_latency: Option<DmaLatency>,
+    /// What the processes used in their steady state; empty under virtual time.
+    pub usage: RunUsage,
     /// How the run ended.
     pub ending: Ending,
 }
@@ -92,6 +95,7 @@ impl Manifest {
             machine: Machine::this(),
             scheduling: BTreeMap::new(),
             cpu_dma_latency: None,
+            usage: RunUsage::default(),
             ending: Ending::Completed,
         }
     }

@@ -9,6 +9,7 @@ pub mod folder;
 pub mod manifest;
 pub mod plan;
 pub mod supervisor;
+pub mod usage;
 pub mod virtual_time;
 
 use anyhow::Context;
@@ -38,6 +39,7 @@ pub fn run(args: &RunArgs) -> Result<Exit, Failure> {
             let ended = supervisor::run(&plan, &folder, args.require_rt)?;
             manifest.scheduling = ended.scheduling;
             manifest.cpu_dma_latency = Some(ended.cpu_dma_latency);
+            manifest.usage = ended.usage;
             ended.ending
         }
     };

@@ -23,6 +23,7 @@ use super::child::{Process, Role, describe};
 use super::dma_latency::{self, DmaLatency};
 use super::folder::RunFolder;
 use super::plan::Plan;
+use super::usage::{Meter, RunUsage};
 use crate::clean::sweep_dead;
 use crate::exit::Exit;
 use crate::machine::SystemRoot;
@@ -50,6 +51,8 @@ pub struct Ended {
     pub scheduling: BTreeMap<String, Obtained>,
     /// What became of `/dev/cpu_dma_latency`.
     pub cpu_dma_latency: DmaLatency,
+    /// What the processes used.
+    pub usage: RunUsage,
 }
 
 /// Runs the rig in real time.
@@ -107,14 +110,17 @@ impl Rig {
         let hold = dma_latency::Hold::new(plan.scenario.realtime.cpu_dma_latency, is_virtual);
         let cpu_dma_latency = hold.obtained().clone();
         let refusals = show_refusals(&scheduling, &cpu_dma_latency);
-        let ending = if require_rt && refusals > 0 {
+        if require_rt && refusals > 0 {
             eprintln!("masseter: real time was required and not granted; nothing was started");
-            Ending::NotStarted
-        } else {
-            self.start(plan.scenario.period_ns())?;
-            self.watch(interrupts)?
-        };
-        Ok(Ended { ending, scheduling, cpu_dma_latency })
+            let (ending, usage) = (Ending::NotStarted, RunUsage::default());
+            return Ok(Ended { ending, scheduling, cpu_dma_latency, usage });
+        }
+        let epoch_ns = self.start(plan.scenario.period_ns())?;
+        let processes = [&self.logger, &self.plant, &self.controller];
+        let names_and_ids = processes.map(|process| (process.role().name(), process.id()));
+        let mut meter = Meter::new(SystemRoot::of_this_machine(), epoch_ns, names_and_ids);
+        let ending = self.watch(interrupts, &mut meter)?;
+        Ok(Ended { ending, scheduling, cpu_dma_latency, usage: meter.finish() })
     }
 
     fn wait_ready(&mut self) -> anyhow::Result<BTreeMap<String, Obtained>> {
@@ -126,18 +132,19 @@ impl Rig {
         Ok(scheduling)
     }
 
-    fn start(&mut self, period_ns: u64) -> io::Result<()> {
+    /// Gives the word to begin; returns the time of the first SYNC.
+    fn start(&mut self, period_ns: u64) -> io::Result<u64> {
         let millisecond = SECOND_NS / 1000;
         let earliest = clock::now_ns() + LEAD_NS;
         let epoch_ns = earliest.next_multiple_of(millisecond.max(period_ns)) + OFF_TICK_NS.min(period_ns / 4);
         for process in [&mut self.logger, &mut self.plant, &mut self.controller] {
             process.start(Start { epoch_ns })?;
         }
-        Ok(())
+        Ok(epoch_ns)
     }
 
     /// Watches until the controller's part is over, then ends plant and logger.
-    fn watch(&mut self, interrupts: &AtomicUsize) -> anyhow::Result<Ending> {
+    fn watch(&mut self, interrupts: &AtomicUsize, meter: &mut Meter) -> anyhow::Result<Ending> {
         let mut ending = Ending::Completed;
         let status = loop {
             if interrupts.load(Ordering::Relaxed) > 1 {
@@ -149,6 +156,7 @@ impl Rig {
             if let Some(status) = self.controller.ended()? {
                 break status;
             }
+            meter.look(clock::now_ns());
             clock::sleep(WATCH);
         };
         if ending == Ending::Completed {

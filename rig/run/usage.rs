@@ -1,0 +1,199 @@
+//! What the processes of a run used, as the kernel counts it: CPU time, context switches, page faults;
+//! and what a hypervisor stole meanwhile.
+//!
+//! Looked at from outside, twice a second, so that it costs the processes nothing. Counted from the first
+//! look on, when they are in their steady state.
+
+use std::collections::BTreeMap;
+
+use masseter_shared::clock::SECOND_NS;
+use serde::{Deserialize, Serialize};
+
+use crate::machine::SystemRoot;
+
+/// From one look to the next, ns.
+const EVERY_NS: u64 = SECOND_NS / 2;
+/// `/proc/stat` counts in hundredths of a second (USER_HZ) on every platform of the rig.
+const TICKS_PER_S: f64 = 100.0;
+
+/// What the main thread of a process used in its steady state.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+pub struct Usage {
+    /// Duration covered, s.
+    pub observed_s: f64,
+    /// CPU time, s.
+    pub cpu_s: f64,
+    /// Times it gave up its core to wait.
+    pub voluntary_switches: u64,
+    /// Times its core was taken from it.
+    pub involuntary_switches: u64,
+    /// Page faults served from memory.
+    pub minor_faults: u64,
+    /// Page faults served from disk.
+    pub major_faults: u64,
+}
+
+/// What all processes used, by name, and what was stolen from the machine.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct RunUsage {
+    /// Each process.
+    pub processes: BTreeMap<String, Usage>,
+    /// Time that the hypervisor ran something else while a core of this machine wanted to run, as far as
+    /// it tells, s.
+    pub stolen_s: f64,
+}
+
+/// Follows the processes.
+#[derive(Debug)]
+pub(super) struct Meter {
+    root: SystemRoot,
+    next_ns: u64,
+    processes: Vec<Metered>,
+    stolen_from_to: Option<[f64; 2]>,
+}
+
+#[derive(Debug)]
+struct Metered {
+    name: &'static str,
+    id: u32,
+    from_to: Option<[Sample; 2]>,
+}
+
+/// The kernel's counters of a process at an instant.
+#[derive(Debug, Clone, Copy)]
+struct Sample {
+    at_ns: u64,
+    cpu_ns: u64,
+    voluntary_switches: u64,
+    involuntary_switches: u64,
+    minor_faults: u64,
+    major_faults: u64,
+}
+
+impl Meter {
+    /// For processes that begin their work at `start_ns`.
+    pub(super) fn new(
+        root: SystemRoot,
+        start_ns: u64,
+        processes: impl IntoIterator<Item = (&'static str, u32)>,
+    ) -> Self {
+        let processes = processes.into_iter().map(|(name, id)| Metered { name, id, from_to: None }).collect();
+        Self { root, next_ns: start_ns + EVERY_NS, processes, stolen_from_to: None }
+    }
+
+    /// Looks at the processes if it is time to; one that has ended keeps what was seen last.
+    pub(super) fn look(&mut self, now_ns: u64) {
+        if now_ns < self.next_ns {
+            return;
+        }
+        self.next_ns = now_ns + EVERY_NS;
+        for process in &mut self.processes {
+            if let Some(sample) = Sample::of(&self.root, process.id, now_ns) {
+                process.from_to = Some([process.from_to.map_or(sample, |[from, _]| from), sample]);
+            }
+        }
+        if let Some(stolen_s) = stolen_s(&self.root) {
+            self.stolen_from_to = Some([self.stolen_from_to.map_or(stolen_s, |[from, _]| from), stolen_s]);
+        }
+    }
+
+    pub(super) fn finish(self) -> RunUsage {
+        let processes = self.processes.iter();
+        RunUsage {
+            processes: processes
+                .filter_map(|process| {
+                    let [from, to] = process.from_to?;
+                    Some((process.name.to_owned(), to.since(&from)))
+                })
+                .collect(),
+            stolen_s: self.stolen_from_to.map_or(0.0, |[from, to]| to - from),
+        }
+    }
+}
+
+impl Sample {
+    fn of(root: &SystemRoot, id: u32, at_ns: u64) -> Option<Self> {
+        let status = root.text(&format!("proc/{id}/status"))?;
+        let counter = |name: &str| -> Option<u64> {
+            status.lines().find_map(|line| line.strip_prefix(name))?.trim().parse().ok()
+        };
+        // The name in field 2 may hold blanks; field 3 follows its closing bracket.
+        let stat = root.text(&format!("proc/{id}/stat"))?;
+        let fields: Vec<&str> = stat.rsplit_once(')')?.1.split_whitespace().collect();
+        let field = |number: usize| -> Option<u64> { fields.get(number - 3)?.parse().ok() };
+        let schedstat = root.text(&format!("proc/{id}/schedstat"))?;
+        Some(Self {
+            at_ns,
+            cpu_ns: schedstat.split_whitespace().next()?.parse().ok()?,
+            voluntary_switches: counter("voluntary_ctxt_switches:")?,
+            involuntary_switches: counter("nonvoluntary_ctxt_switches:")?,
+            minor_faults: field(10)?,
+            major_faults: field(12)?,
+        })
+    }
+
+    fn since(&self, from: &Self) -> Usage {
+        Usage {
+            observed_s: (self.at_ns - from.at_ns) as f64 / 1e9,
+            cpu_s: (self.cpu_ns - from.cpu_ns) as f64 / 1e9,
+            voluntary_switches: self.voluntary_switches - from.voluntary_switches,
+            involuntary_switches: self.involuntary_switches - from.involuntary_switches,
+            minor_faults: self.minor_faults - from.minor_faults,
+            major_faults: self.major_faults - from.major_faults,
+        }
+    }
+}
+
+/// Steal time of all cores since boot, s.
+fn stolen_s(root: &SystemRoot) -> Option<f64> {
+    let stat = root.text("proc/stat")?;
+    let ticks: f64 = stat.strip_prefix("cpu ")?.split_whitespace().nth(7)?.parse().ok()?;
+    Some(ticks / TICKS_PER_S)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::machine::fixture::Fixture;
+
+    fn files(switches: u64, faults: u64, cpu_ns: u64, stolen: u64) -> Vec<(&'static str, String)> {
+        vec![
+            (
+                "proc/7/status",
+                format!(
+                    "Name:\tmasseter\nvoluntary_ctxt_switches:\t{switches}\nnonvoluntary_ctxt_switches:\t2\n"
+                ),
+            ),
+            ("proc/7/stat", format!("7 (a (b) c) S 1 7 7 0 -1 4194304 {faults} 0 0 0 11 5 0 0 20 0")),
+            ("proc/7/schedstat", format!("{cpu_ns} 500 9\n")),
+            ("proc/stat", format!("cpu  1 2 3 4 5 6 7 {stolen} 0 0\ncpu0 1 2 3 4 5 6 7 8 0 0\n")),
+        ]
+    }
+
+    fn root(files: &[(&'static str, String)]) -> Fixture {
+        let files: Vec<_> = files.iter().map(|(path, text)| (*path, text.as_str())).collect();
+        Fixture::of(&files)
+    }
+
+    #[test]
+    fn usage_is_what_was_added_between_the_first_and_the_last_look() {
+        let early = root(&files(10, 100, 1_000_000_000, 250));
+        let mut meter = Meter::new(early.root(), 0, [("plant", 7), ("gone", 8)]);
+        meter.look(EVERY_NS - 1);
+        meter.look(EVERY_NS);
+        let late = root(&files(1010, 103, 1_300_000_000, 280));
+        meter.root = late.root();
+        meter.look(2 * EVERY_NS);
+        let usage = meter.finish();
+        let plant = Usage {
+            observed_s: 0.5,
+            cpu_s: 0.3,
+            voluntary_switches: 1000,
+            involuntary_switches: 0,
+            minor_faults: 3,
+            major_faults: 0,
+        };
+        assert_eq!(usage.processes, BTreeMap::from([("plant".to_owned(), plant)]));
+        assert!((usage.stolen_s - 0.3).abs() < 1e-9, "{}", usage.stolen_s);
+    }
+}
