@@ -44,9 +44,9 @@ fn help(reason: &str) -> &'static str {
     }
 }
 
-fn failed<E: std::fmt::Debug>(action: impl Into<String>) -> impl FnOnce(E) -> TransportError {
-    let action = action.into();
-    move |error| TransportError { action, reason: format!("{error:?}") }
+/// Builds its text only when something failed: a port's way costs no allocation.
+fn failed<E: std::fmt::Debug>(verb: &'static str, what: &str) -> impl FnOnce(E) -> TransportError {
+    move |error| TransportError { action: format!("{verb} '{what}'"), reason: format!("{error:?}") }
 }
 
 /// A process's place in a domain.
@@ -59,25 +59,29 @@ impl Node {
     /// Joins the domain. Signals stay the process's own affair.
     pub fn join(domain: &Domain) -> Result<Self, TransportError> {
         set_log_level(LogLevel::Fatal);
-        let action = || format!("joining domain '{}'", domain.id());
         let root = domain.root();
         let mut config = Config::default();
-        config.global.prefix = domain.prefix().as_str().try_into().map_err(failed(action()))?;
-        let root =
-            iceoryx2::prelude::Path::new(root.as_os_str().as_encoded_bytes()).map_err(failed(action()))?;
+        config.global.prefix =
+            domain.prefix().as_str().try_into().map_err(failed("joining domain", domain.id()))?;
+        let root = iceoryx2::prelude::Path::new(root.as_os_str().as_encoded_bytes())
+            .map_err(failed("joining domain", domain.id()))?;
         config.global.set_root_path(&root);
         let node = NodeBuilder::new()
             .config(&config)
             .signal_handling_mode(SignalHandlingMode::Disabled)
             .create()
-            .map_err(failed(action()))?;
+            .map_err(failed("joining domain", domain.id()))?;
         Ok(Self { node })
     }
 
+    /// The iceoryx2 node beneath, for measurements against bare iceoryx2.
+    pub fn iceoryx(&self) -> &IceoryxNode<ipc::Service> {
+        &self.node
+    }
+
     fn service<M: Message>(&self) -> Result<PortFactory<ipc::Service, M, ()>, TransportError> {
-        let action = || format!("opening topic '{}'", M::TOPIC);
         self.node
-            .service_builder(&M::TOPIC.try_into().map_err(failed(action()))?)
+            .service_builder(&M::TOPIC.try_into().map_err(failed("opening topic", M::TOPIC))?)
             .publish_subscribe::<M>()
             .enable_safe_overflow(true)
             .max_publishers(MAX_PUBLISHERS)
@@ -85,7 +89,7 @@ impl Node {
             .subscriber_max_buffer_size(M::DEPTH)
             .subscriber_max_borrowed_samples(MAX_HELD)
             .open_or_create()
-            .map_err(failed(action()))
+            .map_err(failed("opening topic", M::TOPIC))
     }
 
     /// The publishing end of a topic.
@@ -95,17 +99,14 @@ impl Node {
             .publisher_builder()
             .backpressure_strategy(BackpressureStrategy::DiscardData)
             .create()
-            .map_err(failed(format!("publishing '{}'", M::TOPIC)))?;
+            .map_err(failed("publishing", M::TOPIC))?;
         Ok(Outlet { publisher, sent: 0 })
     }
 
     /// The receiving end of a topic, which keeps up to [`Message::DEPTH`] messages.
     pub fn inlet<M: Message>(&self) -> Result<Inlet<M>, TransportError> {
-        let subscriber = self
-            .service::<M>()?
-            .subscriber_builder()
-            .create()
-            .map_err(failed(format!("subscribing to '{}'", M::TOPIC)))?;
+        let subscriber =
+            self.service::<M>()?.subscriber_builder().create().map_err(failed("subscribing to", M::TOPIC))?;
         Ok(Inlet { subscriber })
     }
 }
@@ -120,18 +121,18 @@ pub struct Outlet<M: Message> {
 impl<M: Message> Outlet<M> {
     /// Lets `fill` write the message where subscribers will read it, stamps and publishes it.
     pub fn publish(&mut self, fill: impl FnOnce(&mut M)) -> Result<(), TransportError> {
-        let mut sample = self.publisher.loan().map_err(failed(format!("loaning '{}'", M::TOPIC)))?;
+        let mut sample = self.publisher.loan().map_err(failed("loaning", M::TOPIC))?;
         let message = sample.payload_mut();
         fill(message);
         self.sent += 1;
         message.stamp(self.sent, clock::now_ns());
-        sample.send().map_err(failed(format!("sending '{}'", M::TOPIC)))?;
+        sample.send().map_err(failed("sending", M::TOPIC))?;
         Ok(())
     }
 
     /// Touches the port's memory once, so that the first message of the loop costs no page fault.
     pub fn warm_up(&self) -> Result<(), TransportError> {
-        drop(self.publisher.loan().map_err(failed(format!("loaning '{}'", M::TOPIC)))?);
+        drop(self.publisher.loan().map_err(failed("loaning", M::TOPIC))?);
         Ok(())
     }
 }
@@ -157,7 +158,7 @@ impl<M: Message> Deref for Received<M> {
 impl<M: Message> Inlet<M> {
     /// The oldest message not yet received; never waits.
     pub fn receive(&self) -> Result<Option<Received<M>>, TransportError> {
-        let sample = self.subscriber.receive().map_err(failed(format!("receiving '{}'", M::TOPIC)))?;
+        let sample = self.subscriber.receive().map_err(failed("receiving", M::TOPIC))?;
         Ok(sample.map(Received))
     }
 

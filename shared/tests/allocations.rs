@@ -1,0 +1,102 @@
+//! What a cycle allocates: nothing for waiting and receiving, and for each message sent the one small
+//! counter that iceoryx2 keeps a loan with. Alone in its file: the allocator counts for the whole process.
+#![allow(unsafe_code)] // A global allocator is an unsafe trait; this one only counts and passes on.
+
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::hint::black_box;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use masseter_shared::clock;
+use masseter_shared::messages::{Command, Event, FrameTap, Message, Reading, State, Truth};
+use masseter_shared::realtime::Cycle;
+use masseter_shared::transport::{Domain, Node};
+
+struct Counting;
+
+static ALLOCATIONS: AtomicU64 = AtomicU64::new(0);
+static LARGEST: AtomicU64 = AtomicU64::new(0);
+
+#[global_allocator]
+static COUNTING: Counting = Counting;
+
+// SAFETY: every call goes to the system's allocator unchanged, so its guarantees are this one's.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
+        LARGEST.fetch_max(layout.size() as u64, Ordering::Relaxed);
+        // SAFETY: the caller's promises about `layout` are passed on.
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        // SAFETY: `pointer` came from `alloc` above, that is, from `System`.
+        unsafe { System.dealloc(pointer, layout) }
+    }
+}
+
+/// Number and largest size of the allocations that `work` makes.
+fn allocations_of(work: impl FnOnce()) -> (u64, u64) {
+    LARGEST.store(0, Ordering::Relaxed);
+    let before = ALLOCATIONS.load(Ordering::Relaxed);
+    work();
+    (ALLOCATIONS.load(Ordering::Relaxed) - before, LARGEST.load(Ordering::Relaxed))
+}
+
+/// Messages sent and received a measurement.
+const MESSAGES: u64 = 1000;
+/// iceoryx2's counter of a loan, bytes.
+const LOAN_BYTES: u64 = 48;
+const PERIOD_NS: u64 = 200_000;
+
+fn check_topic<M: Message>(node: &Node) {
+    let inlet = node.inlet::<M>().unwrap();
+    let mut outlet = node.outlet::<M>().unwrap();
+    outlet.warm_up().unwrap();
+    outlet.publish(|_| {}).unwrap();
+    assert!(inlet.receive().unwrap().is_some());
+
+    let (count, largest_bytes) = allocations_of(|| {
+        for _ in 0..MESSAGES {
+            outlet.publish(|_| {}).unwrap();
+        }
+    });
+    assert!(count <= MESSAGES && largest_bytes <= LOAN_BYTES, "{}: {count} of {largest_bytes}", M::TOPIC);
+
+    let mut received = 0;
+    let receiving = allocations_of(|| {
+        while let Some(message) = black_box(inlet.receive().unwrap()) {
+            received += u64::from(message.seq() > 1);
+        }
+        assert!(inlet.latest().unwrap().is_none());
+    });
+    assert_eq!((receiving, received), ((0, 0), MESSAGES), "{}", M::TOPIC);
+}
+
+#[test]
+fn waiting_and_receiving_allocate_nothing_and_sending_one_small_counter() {
+    let domain = Domain::named(&format!("test-allocations-{}", std::process::id())).unwrap();
+    let claim = domain.claim().unwrap();
+    {
+        let node = Node::join(&domain).unwrap();
+        check_topic::<Command>(&node);
+        check_topic::<Reading>(&node);
+        check_topic::<State>(&node);
+        check_topic::<Truth>(&node);
+        check_topic::<FrameTap>(&node);
+        check_topic::<Event>(&node);
+
+        let inlet = node.inlet::<Command>().unwrap();
+        let mut cycle = Cycle::new(clock::now_ns() + PERIOD_NS, PERIOD_NS);
+        let waiting = allocations_of(|| {
+            for _ in 0..20 {
+                let wake = cycle.wait();
+                let deadline_ns = wake.woke_ns + PERIOD_NS / 10;
+                assert!(inlet.latest_by(deadline_ns, cycle.waiter(), |_| true).unwrap().is_none());
+            }
+        });
+        assert_eq!(waiting, (0, 0));
+    }
+    drop(claim);
+    domain.sweep().unwrap();
+    assert!(allocations_of(|| drop(black_box(vec![1u8]))).0 > 0, "the counter counts");
+}
