@@ -48,6 +48,16 @@ impl<'a> Equations<'a> {
         jacobian
     }
 
+    /// |A₁A₂|, |A₂A₃|, |A₃A₁|, metres.
+    pub(super) fn distances_m(&self, at: &Evaluation) -> Vector3<f64> {
+        at.residual_m + Vector3::from(self.sides_m)
+    }
+
+    /// |AᵢAⱼ|² − Lᵢⱼ² for the three sides, m²: (|AᵢAⱼ| − Lᵢⱼ)(|AᵢAⱼ| + Lᵢⱼ), so that nothing cancels twice.
+    pub(super) fn squared_residual_m2(&self, at: &Evaluation) -> Vector3<f64> {
+        at.residual_m.component_mul(&(at.residual_m + Vector3::from(self.sides_m) * 2.0))
+    }
+
     /// Determinant of the Jacobian with every leg's length taken as 1: unitless, at most 2, positive
     /// when the platform stands as it does at the neutral pose, 0 where solutions meet.
     pub fn determinant(&self, at: &Evaluation) -> f64 {
@@ -72,9 +82,14 @@ impl<'a> Equations<'a> {
 }
 
 impl Evaluation {
-    /// f₁² + f₂² + f₃² (seed, eq. 2), here in m²: 1 m² is the seed's 10⁴ cm².
+    /// f₁² + f₂² + f₃² (seed, eq. 2), here in m².
     pub fn error_m2(&self) -> f64 {
         self.residual_m.norm_squared()
+    }
+
+    /// The same in the seed's unit, cm².
+    pub fn error_cm2(&self) -> f64 {
+        self.error_m2() * 1e4
     }
 
     /// The largest |fₖ|, metres; NaN as soon as one is NaN.

@@ -33,7 +33,10 @@ pub use equations::{Equations, Evaluation};
 pub use error::ForwardError;
 pub use solution::Solution;
 pub use solutions::{MOST_SOLUTIONS, Solutions};
-pub use solver::{MAX_HALVINGS, MAX_ITERATIONS, Method, Options, solve, solve_newton, solve_seed};
+pub use solver::{
+    Iteration, MAX_HALVINGS, MAX_ITERATIONS, Method, Options, Residual, StepRule, solve, solve_newton,
+    solve_seed, solve_traced,
+};
 pub use tracker::{ForwardTracker, WARM_ITERATIONS};
 
 #[cfg(test)]

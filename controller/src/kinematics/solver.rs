@@ -1,11 +1,18 @@
 //! Two iterations for the equations: the seed's (Fig. 2) and plain Newton–Raphson.
 //!
-//! Both go in the Newton direction. The seed's halves the increment until the error (eq. 2)
-//! decreases; that stops oscillation and divergence but may stall in a local minimum. Either finds
-//! *a* solution near its guess; which one it is, [`Assembly`](super::Assembly) tells.
+//! Both go in the Newton direction. The seed's reduces the increment until the error decreases; that
+//! stops oscillation and divergence but may stall in a local minimum. Either finds *a* solution near
+//! its guess; which one it is, [`Assembly`](super::Assembly) tells.
+//!
+//! The text leaves two things open, and both are options. *The residual*: eq. 1 prints distances, and
+//! [`Residual::Distance`] is that reading. *The step rule*: "the increment is reduced" names no
+//! factor and no amount of decrease. [`StepRule::Halving`] takes the flow chart by the word; its
+//! reference 13 (Numerical Recipes, chapter 9) minimises with [`StepRule::QuadraticBacktracking`].
+//! With any choice the claims "no oscillation, no divergence" (Figs. 3 and 4) hold, because the error
+//! cannot increase; `masseter kinematics` measures what each choice makes of the others.
 
 use masseter_shared::geometry::{Actuators, LEGS, Mechanism};
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 
 use super::closure::{Closed, Closure};
 use super::heading::Heading;
@@ -13,38 +20,90 @@ use super::{Equations, Evaluation, ForwardError, Solution};
 
 /// No options allow more iterations than this.
 pub const MAX_ITERATIONS: u32 = 100;
-/// No options allow more halvings of one increment than this.
+/// No options allow more reductions of one increment than this.
 pub const MAX_HALVINGS: u32 = 40;
 
 /// Below this the Newton direction is noise; unitless, see [`Equations::determinant`].
 const SMALLEST_DETERMINANT: f64 = 1e-10;
+/// The share of the decrease which the slope promises that counts as sufficient (Numerical Recipes).
+const SUFFICIENT_SHARE: f64 = 1e-4;
 
-/// When an iteration ends.
+/// How to iterate, and when to end.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Options {
-    /// Solved when no side of the platform is off by more, metres.
-    pub tolerance_m: f64,
+    /// ε: solved when the error (eq. 2) is not above it, cm². The error in this test is always that of
+    /// the distances, whatever [`residual`](Self::residual) the iteration goes by.
+    pub epsilon_cm2: f64,
+    /// What the iteration drives to zero.
+    pub residual: Residual,
+    /// How the seed's algorithm reduces an increment; Newton–Raphson reduces none.
+    pub step: StepRule,
     /// Iterations allowed; at most [`MAX_ITERATIONS`].
     pub max_iterations: u32,
-    /// Halvings of one increment allowed; at most [`MAX_HALVINGS`].
+    /// Reductions of one increment allowed; at most [`MAX_HALVINGS`].
     pub max_halvings: u32,
 }
 
 impl Default for Options {
-    /// The tolerance lies a few hundred roundings above what double precision reaches at these sizes.
+    /// The tolerance, 10⁻¹⁴ m for each side, lies a few hundred roundings above what double precision
+    /// reaches at these sizes.
     fn default() -> Self {
-        Self { tolerance_m: 1e-14, max_iterations: 20, max_halvings: 12 }
+        Self {
+            epsilon_cm2: 1e-24,
+            residual: Residual::default(),
+            step: StepRule::default(),
+            max_iterations: 20,
+            max_halvings: 12,
+        }
     }
 }
 
 /// Which iteration.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Method {
-    /// The seed's algorithm: Newton's direction, the increment halved until the error decreases.
+    /// The seed's algorithm: Newton's direction, the increment reduced until the error decreases.
     #[default]
     Seed,
     /// Newton–Raphson with the full increment.
     Newton,
+}
+
+/// Which form of the equations gives the increment and must decrease.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Residual {
+    /// |AᵢAⱼ| − Lᵢⱼ, metres: eq. 1 as printed.
+    #[default]
+    Distance,
+    /// |AᵢAⱼ|² − Lᵢⱼ², m²: the same zeros, smooth where two corners meet.
+    SquaredDistance,
+}
+
+/// What "the increment is reduced" (Fig. 2) means.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum StepRule {
+    /// Halved until the error is smaller than before; every iteration begins with the full increment.
+    #[default]
+    Halving,
+    /// The same, but the next iteration begins with twice the accepted share of its increment.
+    CautiousHalving,
+    /// The line search of Numerical Recipes: a sufficient decrease, found through the parabola of
+    /// value, slope and last attempt, cut to between a tenth and a half.
+    QuadraticBacktracking,
+}
+
+/// One iteration as it went: the guess is number 0.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Iteration {
+    /// From 0.
+    pub number: u32,
+    /// θ₁ θ₂ θ₃ it arrived at, not wrapped, radians.
+    pub theta_rad: [f64; LEGS],
+    /// The increment that was made, radians.
+    pub increment_rad: [f64; LEGS],
+    /// How often the increment was reduced before.
+    pub halvings: u32,
+    /// The error there (eq. 2), cm².
+    pub error_cm2: f64,
 }
 
 /// Solves from a guess of the leg angles (radians) by the method asked for.
@@ -58,29 +117,43 @@ pub fn solve(
     guess_rad: &[f64; LEGS],
     options: &Options,
 ) -> Result<Solution, ForwardError> {
+    solve_traced(method, mechanism, actuators, guess_rad, options, |_| {})
+}
+
+/// [`solve`] with a witness: it sees the guess and every iteration, also of a failure.
+///
+/// # Errors
+/// Those of [`solve`].
+pub fn solve_traced(
+    method: Method,
+    mechanism: &Mechanism,
+    actuators: &Actuators,
+    guess_rad: &[f64; LEGS],
+    options: &Options,
+    mut witness: impl FnMut(&Iteration),
+) -> Result<Solution, ForwardError> {
     if !actuators.is_finite() || !guess_rad.iter().all(|x| x.is_finite()) {
         return Err(ForwardError::NotFinite);
     }
-    let equations = Equations::new(mechanism, actuators);
-    let mut at = equations.evaluate(Vector3::from(*guess_rad));
+    let search = Search { equations: Equations::new(mechanism, actuators), method, options };
+    let mut at = Step::guess(&search.equations, guess_rad);
     let mut iterations = 0;
-    while at.residual_norm_m() > options.tolerance_m {
+    witness(&at.told(iterations));
+    while at.is_above(options.epsilon_cm2) {
+        let residual_m = at.evaluation.residual_norm_m();
         if iterations == options.max_iterations.min(MAX_ITERATIONS) {
-            return Err(ForwardError::NoConvergence { residual_m: at.residual_norm_m(), iterations });
+            return Err(ForwardError::NoConvergence { residual_m, iterations });
         }
-        let increment = newton_increment(&equations, &at)?;
+        let increment = search.newton_increment(&at.evaluation)?;
         iterations += 1;
-        at = match method {
-            Method::Newton => equations.evaluate(at.theta_rad + increment),
-            Method::Seed => halved_until_better(&equations, &at, increment, options)
-                .ok_or(ForwardError::Stalled { residual_m: at.residual_norm_m(), iterations })?,
-        };
+        at = search.advanced(&at, increment).ok_or(ForwardError::Stalled { residual_m, iterations })?;
+        witness(&at.told(iterations));
     }
     let closure = Closure::new(mechanism, actuators);
-    let headings = std::array::from_fn(|leg| Heading::from_rad(at.theta_rad[leg]));
+    let headings = std::array::from_fn(|leg| Heading::from_rad(at.evaluation.theta_rad[leg]));
     let closed = Closed { headings, closing: closure.evaluate(&headings), iterations };
     Ok(Solution {
-        residual_m: at.residual_norm_m(),
+        residual_m: at.evaluation.residual_norm_m(),
         ..Solution::new(mechanism, actuators, &closure, &closed)
     })
 }
@@ -111,33 +184,122 @@ pub fn solve_newton(
     solve(Method::Newton, mechanism, actuators, guess_rad, options)
 }
 
-/// −J⁻¹ f, radians.
-fn newton_increment(equations: &Equations<'_>, at: &Evaluation) -> Result<Vector3<f64>, ForwardError> {
-    let determinant = equations.determinant(at);
-    let singular = ForwardError::Singular { determinant, residual_m: at.residual_norm_m() };
-    if determinant.is_nan() || determinant.abs() < SMALLEST_DETERMINANT {
-        return Err(singular);
-    }
-    let inverse = equations.jacobian(at).try_inverse().ok_or(singular)?;
-    Ok(-(inverse * at.residual_m))
+/// What stays the same over the iterations.
+struct Search<'a> {
+    equations: Equations<'a>,
+    method: Method,
+    options: &'a Options,
 }
 
-/// The inner loop of Fig. 2; none when no allowed halving decreases the error.
-fn halved_until_better(
-    equations: &Equations<'_>,
-    at: &Evaluation,
+/// Where an iteration arrived, and how.
+#[derive(Debug, Clone, Copy)]
+struct Step {
+    evaluation: Evaluation,
     increment: Vector3<f64>,
-    options: &Options,
-) -> Option<Evaluation> {
-    let mut increment = increment;
-    for _ in 0..=options.max_halvings.min(MAX_HALVINGS) {
-        let candidate = equations.evaluate(at.theta_rad + increment);
-        if candidate.error_m2() < at.error_m2() {
-            return Some(candidate);
-        }
-        increment /= 2.0;
+    halvings: u32,
+    /// The share of the Newton increment that was made.
+    share: f64,
+}
+
+impl Step {
+    fn guess(equations: &Equations<'_>, guess_rad: &[f64; LEGS]) -> Self {
+        let evaluation = equations.evaluate(Vector3::from(*guess_rad));
+        Self { evaluation, increment: Vector3::zeros(), halvings: 0, share: 1.0 }
     }
-    None
+
+    /// Also where the error is no number.
+    fn is_above(&self, epsilon_cm2: f64) -> bool {
+        self.evaluation.error_cm2().partial_cmp(&epsilon_cm2).is_none_or(std::cmp::Ordering::is_gt)
+    }
+
+    fn told(&self, number: u32) -> Iteration {
+        Iteration {
+            number,
+            theta_rad: self.evaluation.theta_rad.into(),
+            increment_rad: self.increment.into(),
+            halvings: self.halvings,
+            error_cm2: self.evaluation.error_cm2(),
+        }
+    }
+}
+
+impl Search<'_> {
+    /// Residual and Jacobian of the form asked for.
+    fn linearised(&self, at: &Evaluation) -> (Vector3<f64>, Matrix3<f64>) {
+        let jacobian = self.equations.jacobian(at);
+        match self.options.residual {
+            Residual::Distance => (at.residual_m, jacobian),
+            Residual::SquaredDistance => {
+                let by_side = Matrix3::from_diagonal(&(self.equations.distances_m(at) * 2.0));
+                (self.equations.squared_residual_m2(at), by_side * jacobian)
+            }
+        }
+    }
+
+    /// What must decrease: the sum of squares of the residual asked for.
+    fn error(&self, at: &Evaluation) -> f64 {
+        match self.options.residual {
+            Residual::Distance => at.error_m2(),
+            Residual::SquaredDistance => self.equations.squared_residual_m2(at).norm_squared(),
+        }
+    }
+
+    /// −J⁻¹ f, radians.
+    fn newton_increment(&self, at: &Evaluation) -> Result<Vector3<f64>, ForwardError> {
+        let determinant = self.equations.determinant(at);
+        let singular = ForwardError::Singular { determinant, residual_m: at.residual_norm_m() };
+        if determinant.is_nan() || determinant.abs() < SMALLEST_DETERMINANT {
+            return Err(singular);
+        }
+        let (residual, jacobian) = self.linearised(at);
+        let inverse = jacobian.try_inverse().ok_or(singular)?;
+        Ok(-(inverse * residual))
+    }
+
+    /// The inner loop of Fig. 2; none when no allowed reduction decreases the error.
+    fn advanced(&self, from: &Step, newton: Vector3<f64>) -> Option<Step> {
+        let evaluate = |share: f64, halvings| {
+            let increment = newton * share;
+            let evaluation = self.equations.evaluate(from.evaluation.theta_rad + increment);
+            Step { evaluation, increment, halvings, share }
+        };
+        if self.method == Method::Newton {
+            return Some(evaluate(1.0, 0));
+        }
+        let before = self.error(&from.evaluation);
+        let mut share = match self.options.step {
+            StepRule::CautiousHalving => (2.0 * from.share).min(1.0),
+            StepRule::Halving | StepRule::QuadraticBacktracking => 1.0,
+        };
+        for halvings in 0..=self.options.max_halvings.min(MAX_HALVINGS) {
+            let step = evaluate(share, halvings);
+            let after = self.error(&step.evaluation);
+            if after < self.enough(before, share) {
+                return Some(step);
+            }
+            share = self.reduced(share, before, after);
+        }
+        None
+    }
+
+    /// What the error must fall below. Along Newton's direction its slope is −2 errors per increment.
+    fn enough(&self, before: f64, share: f64) -> f64 {
+        match self.options.step {
+            StepRule::QuadraticBacktracking => before * (1.0 - 2.0 * SUFFICIENT_SHARE * share),
+            StepRule::Halving | StepRule::CautiousHalving => before,
+        }
+    }
+
+    fn reduced(&self, share: f64, before: f64, after: f64) -> f64 {
+        match self.options.step {
+            StepRule::Halving | StepRule::CautiousHalving => share / 2.0,
+            StepRule::QuadraticBacktracking => {
+                let lowest = before * share * share / (after - before + 2.0 * before * share);
+                // Without a number for the error there is no parabola: `max` then takes the tenth.
+                lowest.max(share / 10.0).min(share / 2.0)
+            }
+        }
+    }
 }
 
 #[cfg(test)]
@@ -153,6 +315,14 @@ mod tests {
 
     fn neutral() -> Actuators {
         Actuators { slide_m: [0.0; LEGS], leg_m: [0.27; LEGS] }
+    }
+
+    fn step_rules() -> impl Strategy<Value = StepRule> {
+        prop_oneof![
+            Just(StepRule::Halving),
+            Just(StepRule::CautiousHalving),
+            Just(StepRule::QuadraticBacktracking)
+        ]
     }
 
     #[test]
@@ -218,19 +388,67 @@ mod tests {
             }
         }
 
+        /// With every reading of the text that goes by the error of eq. 2.
         #[test]
         fn the_seeds_error_never_increases(
             actuators in [-0.03..0.03f64, -0.03..0.03f64, -0.03..0.03f64, 0.24..0.3f64, 0.24..0.3f64, 0.24..0.3f64],
             guess in [-3.0..3.0f64, -3.0..3.0f64, -3.0..3.0f64],
+            step in step_rules(),
+        ) {
+            let options = Options { step, max_iterations: MAX_ITERATIONS, ..default() };
+            let mut last_cm2 = f64::INFINITY;
+            let mut increased = false;
+            let actuators = Actuators::from_axes(actuators);
+            let _ = solve_traced(Method::Seed, &seed_mechanism(), &actuators, &guess, &options, |iteration| {
+                // Conversion to cm² may round two neighbouring errors to one.
+                increased |= iteration.error_cm2 > last_cm2;
+                last_cm2 = iteration.error_cm2;
+            });
+            prop_assert!(!increased);
+        }
+
+        #[test]
+        fn either_residual_and_every_step_rule_come_to_the_pose_from_near(
+            pose in poses(20.0),
+            off in [-0.02..0.02f64, -0.02..0.02f64, -0.02..0.02f64],
+            step in step_rules(),
         ) {
             let mechanism = seed_mechanism();
-            let equations = Equations::new(&mechanism, &Actuators::from_axes(actuators));
-            let mut at = equations.evaluate(guess.into());
-            for _ in 0..MAX_ITERATIONS {
-                let Ok(increment) = newton_increment(&equations, &at) else { break };
-                let Some(better) = halved_until_better(&equations, &at, increment, &default()) else { break };
-                prop_assert!(better.error_m2() < at.error_m2());
-                at = better;
+            let joints = mechanism.inverse(&pose).unwrap();
+            let here = Equations::new(&mechanism, &joints.actuators);
+            prop_assume!(here.determinant(&here.evaluate(joints.theta_rad.into())).abs() > 0.2);
+            let guess = std::array::from_fn(|leg| joints.theta_rad[leg] + off[leg]);
+            for residual in [Residual::Distance, Residual::SquaredDistance] {
+                let options = Options { residual, step, ..default() };
+                let solution = solve_seed(&mechanism, &joints.actuators, &guess, &options).unwrap();
+                prop_assert!((solution.pose.translation.vector - pose.translation.vector).norm() < 1e-10);
+            }
+        }
+
+        #[test]
+        fn the_trace_tells_every_step_from_the_guess_to_the_solution(
+            pose in poses(20.0),
+            off in [-0.2..0.2f64, -0.2..0.2f64, -0.2..0.2f64],
+        ) {
+            let mechanism = seed_mechanism();
+            let joints = mechanism.inverse(&pose).unwrap();
+            let guess = std::array::from_fn(|leg| joints.theta_rad[leg] + off[leg]);
+            let mut trace = Vec::new();
+            let solved =
+                solve_traced(Method::Seed, &mechanism, &joints.actuators, &guess, &default(), |iteration| {
+                    trace.push(*iteration);
+                });
+            prop_assert!(trace[0].theta_rad.iter().zip(&guess).all(|(told, given)| (told - given).abs() < f64::EPSILON));
+            for (number, pair) in trace.windows(2).enumerate() {
+                prop_assert_eq!(pair[1].number as usize, number + 1);
+                for leg in 0..LEGS {
+                    let arrived = pair[0].theta_rad[leg] + pair[1].increment_rad[leg];
+                    prop_assert!((arrived - pair[1].theta_rad[leg]).abs() < f64::EPSILON);
+                }
+            }
+            if let Ok(solution) = solved {
+                prop_assert_eq!(solution.iterations as usize, trace.len() - 1);
+                prop_assert!(trace[trace.len() - 1].error_cm2 <= default().epsilon_cm2);
             }
         }
 
@@ -242,7 +460,7 @@ mod tests {
             let actuators = Actuators::from_axes(actuators);
             for method in [Method::Seed, Method::Newton] {
                 if let Ok(solution) = solve(method, &seed_mechanism(), &actuators, &guess, &default()) {
-                    prop_assert!(solution.residual_m <= default().tolerance_m);
+                    prop_assert!(solution.residual_m <= 1e-14);
                 }
             }
         }
