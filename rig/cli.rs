@@ -9,6 +9,7 @@ use masseter_controller::process::Outcome;
 use masseter_shared::lifecycle::Assignment;
 
 use crate::exit::{Exit, Failure};
+use crate::log::{self, LogVerb};
 use crate::{clean, doctor, kinematics, logger, plant, report, run};
 
 /// A hardware-in-the-loop rig for a 6-DOF mastication robot.
@@ -33,6 +34,11 @@ enum Verb {
     Report(ReportArgs),
     /// Is this machine fit for real-time runs?
     Doctor(DoctorArgs),
+    /// Look at recordings, prove them complete, repair and convert them
+    Log {
+        #[command(subcommand)]
+        verb: LogVerb,
+    },
     /// Remove what killed runs left in shared memory
     Clean,
     #[command(hide = true)]
@@ -228,6 +234,7 @@ pub fn main() -> ExitCode {
         Verb::Ik(args) => kinematics::inverse(&args),
         Verb::Report(args) => report::again(&args.folder, args.format),
         Verb::Doctor(args) => doctor::examine(args.format),
+        Verb::Log { verb } => log::run(&verb),
         Verb::Clean => clean::clean(),
         Verb::Controller(args) => masseter_controller::process::run(&args.assignment())
             .map(|outcome| match outcome {

@@ -11,6 +11,7 @@ pub mod cli;
 pub mod doctor;
 pub mod exit;
 pub mod kinematics;
+pub mod log;
 pub mod logger;
 pub mod machine;
 pub mod plant;

@@ -4,35 +4,15 @@
 mod common;
 
 use std::fs;
-use std::process::{Child, Command, Stdio};
+use std::process::Command;
 use std::time::Duration;
 
-use common::{Bench, UNHURRIED, masseter, shared_memory_of, stderr, stdout};
+use common::{Bench, UNHURRIED, child_of, masseter, shared_memory_of, start, stderr, stdout};
 use masseter_shared::clock;
 use rustix::process::{Pid, Signal, kill_process};
 
 /// Ends accepted from a machine that may stand still for a while: passed, or too disturbed to judge.
 const PASSED_OR_INVALID: [Option<i32>; 2] = [Some(0), Some(3)];
-
-fn start(bench: &Bench, arguments: &[&str]) -> Child {
-    bench.run_command(arguments).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap()
-}
-
-/// The process of this rig that plays `role`, once it runs.
-fn child_of(supervisor: &Child, role: &str) -> Pid {
-    for _ in 0..500 {
-        let path = format!("/proc/{0}/task/{0}/children", supervisor.id());
-        let children = fs::read_to_string(path).unwrap_or_default();
-        for id in children.split_whitespace().filter_map(|id| id.parse::<i32>().ok()) {
-            let command = fs::read_to_string(format!("/proc/{id}/cmdline")).unwrap_or_default();
-            if command.split('\0').nth(1) == Some(role) {
-                return Pid::from_raw(id).unwrap();
-            }
-        }
-        clock::sleep(Duration::from_millis(10));
-    }
-    panic!("no {role} appeared");
-}
 
 /// Waits until the recording shows that the rig runs.
 fn wait_until_it_records(bench: &Bench) {

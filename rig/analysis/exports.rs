@@ -2,17 +2,16 @@
 
 use std::fs::File;
 use std::io::{BufWriter, Write};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use masseter_shared::can::candump;
 use masseter_shared::messages::FrameTap;
 
 use super::AnalysisError;
-use crate::run::folder::RunFolder;
 
 /// Log files, opened as their buses appear.
-pub(super) struct CandumpLogs {
-    folder: RunFolder,
+pub(crate) struct CandumpLogs {
+    folder: PathBuf,
     interfaces: Vec<String>,
     buses: Vec<Log>,
     line: String,
@@ -36,21 +35,21 @@ impl Log {
 
 impl CandumpLogs {
     /// Into `folder`, with the buses' real interfaces, or `can0`, `can1` and so on where they have none.
-    pub(super) fn new(folder: &RunFolder, interfaces: &[String]) -> Self {
+    pub(crate) fn new(folder: &Path, interfaces: &[String]) -> Self {
         Self {
-            folder: folder.clone(),
+            folder: folder.to_owned(),
             interfaces: interfaces.to_vec(),
             buses: Vec::new(),
             line: String::new(),
         }
     }
 
-    pub(super) fn write(&mut self, tap: &FrameTap) -> Result<(), AnalysisError> {
+    pub(crate) fn write(&mut self, tap: &FrameTap) -> Result<(), AnalysisError> {
         let bus = usize::from(tap.bus);
         while self.buses.len() <= bus {
             let next = self.buses.len();
             let interface = self.interfaces.get(next).cloned().unwrap_or_else(|| format!("can{next}"));
-            self.buses.push(Log::create(self.folder.candump(next), interface)?);
+            self.buses.push(Log::create(self.folder.join(format!("can{next}.log")), interface)?);
         }
         let log = &mut self.buses[bus];
         self.line.clear();
@@ -61,7 +60,7 @@ impl CandumpLogs {
     }
 
     /// Frames on each bus.
-    pub(super) fn finish(self) -> Result<Vec<u64>, AnalysisError> {
+    pub(crate) fn finish(self) -> Result<Vec<u64>, AnalysisError> {
         self.buses
             .into_iter()
             .map(|mut log| match log.file.flush() {

@@ -16,18 +16,18 @@ use std::path::PathBuf;
 
 use masseter_shared::config::Scenario;
 use masseter_shared::messages::codes::ControllerState;
-use masseter_shared::messages::{Command, Event, FrameTap, Message, Reading, State, Truth};
+use masseter_shared::messages::{Command, Event, FrameTap, Reading, State, Truth};
 use serde::Serialize;
 
-use crate::recording::{ReadError, Reader, Recorded};
+use crate::recording::{Damage, ReadError, Reader, Recorded};
 use crate::run::folder::RunFolder;
 pub use blame::Suspicion;
 use events::EventLog;
 pub use events::EventRecord;
-use exports::CandumpLogs;
+pub(crate) use exports::CandumpLogs;
 pub use intervals::IntervalFigures;
 use intervals::Intervals;
-use sequence::SequenceCheck;
+pub(crate) use sequence::SequenceCheck;
 pub use sequence::TopicFigures;
 pub use skips::SkipFigures;
 use skips::{Counters, Skips};
@@ -80,6 +80,8 @@ pub struct Figures {
     pub events: Vec<EventRecord>,
     /// Whether the recording ends in the middle of a record.
     pub cut_short: bool,
+    /// Stretches of the recording that cannot be read.
+    pub damage: Vec<Damage>,
     /// Tracking over time, for plots.
     #[serde(skip)]
     pub track: Vec<TrackingSample>,
@@ -109,7 +111,7 @@ pub fn analyse(folder: &RunFolder, scenario: &Scenario) -> Result<Figures, Analy
     while let Some(message) = reader.next_message()? {
         pass.take(&message)?;
     }
-    pass.finish(reader.was_cut_short())
+    pass.finish(&reader)
 }
 
 /// The state of the one pass over a recording.
@@ -136,7 +138,7 @@ impl Pass {
             intervals: Intervals::new(&folder.histograms())?,
             tracking: Tracking::against(reference),
             sequence: SequenceCheck::default(),
-            candump: CandumpLogs::new(folder, &scenario.can.interfaces),
+            candump: CandumpLogs::new(folder.path(), &scenario.can.interfaces),
             events: EventLog::create(folder.events())?,
             cycles: 0,
             first_sample_ns: None,
@@ -148,6 +150,7 @@ impl Pass {
     }
 
     fn take(&mut self, message: &Recorded) -> Result<(), AnalysisError> {
+        self.sequence.take(message);
         match message {
             Recorded::Command(command) => self.command(command),
             Recorded::Reading(reading) => self.reading(reading),
@@ -160,12 +163,10 @@ impl Pass {
     }
 
     fn command(&mut self, command: &Command) {
-        self.sequence.check(Command::TOPIC, 0, command.seq);
         self.intervals.command(command);
     }
 
     fn reading(&mut self, reading: &Reading) {
-        self.sequence.check(Reading::TOPIC, 0, reading.seq);
         self.intervals.reading(reading);
         self.plant_skips.take(&Counters::from(reading), self.period_ns);
         self.first_sample_ns.get_or_insert(reading.sampled_ns);
@@ -173,7 +174,6 @@ impl Pass {
     }
 
     fn state(&mut self, state: &State) {
-        self.sequence.check(State::TOPIC, 0, state.seq);
         self.intervals.state(state);
         self.tracking.state(state);
         self.cycles += 1;
@@ -182,21 +182,18 @@ impl Pass {
     }
 
     fn truth(&mut self, truth: &Truth) {
-        self.sequence.check(Truth::TOPIC, 0, truth.seq);
         self.tracking.truth(truth);
     }
 
     fn frame(&mut self, frame: &FrameTap) -> Result<(), AnalysisError> {
-        self.sequence.check(FrameTap::TOPIC, 0, frame.seq);
         self.candump.write(frame)
     }
 
     fn event(&mut self, event: &Event) {
-        self.sequence.check(Event::TOPIC, sequence::publisher_of(event), event.seq);
         self.events.write(event);
     }
 
-    fn finish(self, cut_short: bool) -> Result<Figures, AnalysisError> {
+    fn finish(self, reader: &Reader) -> Result<Figures, AnalysisError> {
         let (tracking, track) = self.tracking.finish();
         let duration_ns = self.last_sample_ns - self.first_sample_ns.unwrap_or(self.last_sample_ns);
         Ok(Figures {
@@ -211,7 +208,8 @@ impl Pass {
             topics: self.sequence.finish(),
             frames: self.candump.finish()?,
             events: self.events.finish()?,
-            cut_short,
+            cut_short: reader.was_cut_short(),
+            damage: reader.damage().to_vec(),
             track,
         })
     }

@@ -2,9 +2,11 @@
 
 use std::collections::BTreeMap;
 
-use masseter_shared::messages::Event;
 use masseter_shared::messages::codes::Source;
+use masseter_shared::messages::{Command, Event, FrameTap, Message, Reading, State, Truth};
 use serde::Serialize;
+
+use crate::recording::Recorded;
 
 /// Messages and losses of one topic.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
@@ -18,13 +20,13 @@ pub struct TopicFigures {
 }
 
 /// The process that publishes an event: master and drives are one process.
-pub(super) fn publisher_of(event: &Event) -> u32 {
+fn publisher_of(event: &Event) -> u32 {
     if event.source == Source::Drive.code() { Source::Master.code() } else { event.source }
 }
 
 /// Follows every publisher of every topic. Each counts its own messages from 1.
 #[derive(Debug, Default)]
-pub(super) struct SequenceCheck {
+pub(crate) struct SequenceCheck {
     streams: BTreeMap<(&'static str, u32), Stream>,
 }
 
@@ -35,13 +37,25 @@ struct Stream {
 }
 
 impl SequenceCheck {
-    pub(super) fn check(&mut self, topic: &'static str, publisher: u32, seq: u64) {
+    /// Counts a message.
+    pub(crate) fn take(&mut self, message: &Recorded) {
+        match message {
+            Recorded::Command(command) => self.check(Command::TOPIC, 0, command.seq),
+            Recorded::Reading(reading) => self.check(Reading::TOPIC, 0, reading.seq),
+            Recorded::State(state) => self.check(State::TOPIC, 0, state.seq),
+            Recorded::Truth(truth) => self.check(Truth::TOPIC, 0, truth.seq),
+            Recorded::Frame(frame) => self.check(FrameTap::TOPIC, 0, frame.seq),
+            Recorded::Event(event) => self.check(Event::TOPIC, publisher_of(event), event.seq),
+        }
+    }
+
+    fn check(&mut self, topic: &'static str, publisher: u32, seq: u64) {
         let stream = self.streams.entry((topic, publisher)).or_default();
         stream.messages += 1;
         stream.highest = stream.highest.max(seq);
     }
 
-    pub(super) fn finish(self) -> Vec<TopicFigures> {
+    pub(crate) fn finish(self) -> Vec<TopicFigures> {
         let mut topics: Vec<TopicFigures> = Vec::new();
         for ((topic, _), stream) in self.streams {
             let missing = stream.highest.saturating_sub(stream.messages);

@@ -1,18 +1,33 @@
 //! The recording of a run: an MCAP file with every message of every topic.
 //!
 //! A message's bytes are written as they lay in shared memory, behind the four bytes that make them
-//! CDR, under a ROS 2 message definition: MCAP tools read them without knowing Masseter.
+//! CDR, under a ROS 2 message definition: MCAP tools read them without knowing Masseter. Beside them
+//! stands the mechanism in Foxglove's own schemas, for 3-D views. Chunks are compressed by zstd and carry
+//! checksums, so that any of them can be read without the others.
 
+mod backlog;
+mod chunk;
 mod reader;
+mod recover;
+mod scene;
+#[cfg(test)]
+mod tests;
+mod topic;
+mod walk;
 mod writer;
 
 use masseter_shared::messages::{Command, Event, FrameTap, Reading, State, Truth};
 
-pub use reader::{ReadError, Reader};
-pub use writer::{Recorder, WriteError};
+pub use backlog::{Backlog, Outcome};
+pub use reader::{Chunks, Entry, ReadError, Reader, Schema};
+pub use recover::{RecoverError, Recovered, recover};
+pub use scene::Scene;
+pub use topic::Topic;
+pub use walk::Damage;
+pub use writer::{DurableFile, Recorder, WriteError};
 
 /// Encapsulation header of plain little-endian CDR (version 1).
-const CDR_LITTLE_ENDIAN: [u8; 4] = [0x00, 0x01, 0x00, 0x00];
+pub(crate) const CDR_LITTLE_ENDIAN: [u8; 4] = [0x00, 0x01, 0x00, 0x00];
 const MESSAGE_ENCODING: &str = "cdr";
 const SCHEMA_ENCODING: &str = "ros2msg";
 

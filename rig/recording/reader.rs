@@ -1,33 +1,37 @@
-//! Reads a recording from its beginning in constant memory, also one that was cut short.
+//! Reads a recording from its beginning in constant memory, also one that was cut short or damaged:
+//! what can be read is read, and what cannot is named by its place.
 
-use std::collections::HashMap;
+use std::borrow::Cow;
+use std::collections::BTreeMap;
 use std::fs::File;
-use std::io::{self, BufReader, Read};
+use std::io::{self, BufReader, Read, Seek};
+use std::ops::Range;
 use std::path::Path;
 
-use masseter_shared::messages::{Command, Event, FrameTap, LAYOUT_VERSION, Message, Reading, State, Truth};
-use mcap::McapError;
-use mcap::records::Record;
-use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
+use masseter_shared::messages::LAYOUT_VERSION;
+use mcap::records::{Channel, MessageHeader, Record, SchemaHeader, op};
 
+use super::chunk::Chunk;
+use super::topic::{Stamps, Topic};
+use super::walk::{Damage, Step, Walk};
 use super::{CDR_LITTLE_ENDIAN, Recorded};
 
-/// A record longer than this is taken for damage, bytes: chunks stay far below.
-const LONGEST_RECORD: usize = 64 << 20;
+/// Channel, sequence number and two times, before the data.
+const MESSAGE_HEAD: usize = 2 + 4 + 8 + 8;
 
-/// Why a recording cannot be read, or not further.
+/// Why a recording cannot be read.
 #[derive(Debug, thiserror::Error)]
 pub enum ReadError {
     /// The file cannot be read.
     #[error("cannot read the recording: {0}")]
     File(#[from] io::Error),
-    /// It is no MCAP file, or damaged at this place.
-    #[error("not readable as MCAP after {messages} messages: {error}")]
-    Damaged {
-        /// Messages read before.
-        messages: u64,
-        /// What the MCAP reader found.
-        error: McapError,
+    /// Nothing in it is MCAP.
+    #[error("not readable as MCAP: {} bytes without a single whole record; {}", .size, .first)]
+    NoMcap {
+        /// Bytes of the file.
+        size: u64,
+        /// The first thing wrong with it.
+        first: String,
     },
     /// A topic's message does not have this version's layout.
     #[error(
@@ -36,7 +40,7 @@ pub enum ReadError {
     )]
     Foreign {
         /// The topic.
-        topic: String,
+        topic: &'static str,
         /// Bytes found.
         found: usize,
         /// Bytes expected.
@@ -46,92 +50,247 @@ pub enum ReadError {
     },
 }
 
+/// A message with its circumstances.
+#[derive(Debug)]
+pub struct Entry<'a> {
+    /// The channel it stands on; none when the recording no longer says what that channel is.
+    pub channel: Option<&'a Channel>,
+    /// The channel's schema, if it has one.
+    pub schema: Option<&'a Schema>,
+    /// Its number and times.
+    pub header: MessageHeader,
+    /// Its bytes as recorded.
+    pub data: &'a [u8],
+}
+
+/// A schema that channels refer to.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Schema {
+    /// Its type name.
+    pub name: String,
+    /// The language it is written in.
+    pub encoding: String,
+    /// The definition.
+    pub data: Vec<u8>,
+}
+
+/// How the messages are packed.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Chunks {
+    /// Chunks whose checksum agreed.
+    pub count: u64,
+    /// Bytes of their content.
+    pub uncompressed_bytes: u64,
+    /// Bytes in the file.
+    pub compressed_bytes: u64,
+    /// Compression of the last one; empty for none.
+    pub compression: String,
+}
+
 /// A recording being read.
-pub struct Reader {
-    file: BufReader<File>,
-    mcap: LinearReader,
-    topics: HashMap<u16, String>,
-    messages: u64,
-    cut_short: bool,
+pub struct Reader<R = BufReader<File>> {
+    walk: Walk<R>,
+    chunk: Chunk,
+    definitions: Definitions,
+    chunks: Chunks,
+    damage: Vec<Damage>,
+    records: u64,
+}
+
+#[derive(Debug, Default)]
+struct Definitions {
+    schemas: BTreeMap<u16, Schema>,
+    channels: BTreeMap<u16, Channel>,
 }
 
 impl Reader {
     /// Opens a recording.
     pub fn open(path: &Path) -> Result<Self, ReadError> {
-        let options = LinearReaderOptions::default()
-            .with_skip_end_magic(true)
-            .with_prevalidate_chunk_crcs(true)
-            .with_record_length_limit(LONGEST_RECORD);
+        Self::new(BufReader::with_capacity(1 << 18, File::open(path)?))
+    }
+}
+
+impl<R: Read + Seek> Reader<R> {
+    /// Reads a recording from `source`.
+    pub fn new(source: R) -> Result<Self, ReadError> {
         Ok(Self {
-            file: BufReader::with_capacity(1 << 20, File::open(path)?),
-            mcap: LinearReader::new_with_options(options),
-            topics: HashMap::new(),
-            messages: 0,
-            cut_short: false,
+            walk: Walk::new(source)?,
+            chunk: Chunk::default(),
+            definitions: Definitions::default(),
+            chunks: Chunks::default(),
+            damage: Vec::new(),
+            records: 0,
         })
     }
 
-    /// Whether the file ended in the middle of a record, as a killed logger leaves it.
-    pub fn was_cut_short(&self) -> bool {
-        self.cut_short
+    /// What could not be read so far.
+    pub fn damage(&self) -> &[Damage] {
+        &self.damage
     }
 
-    /// The next message, or none at the end. Topics this program does not know are passed over.
+    /// How the messages so far were packed.
+    pub fn chunks(&self) -> &Chunks {
+        &self.chunks
+    }
+
+    /// The channels defined so far, by their id, each with its schema.
+    pub fn channels(&self) -> impl Iterator<Item = (&Channel, Option<&Schema>)> {
+        let schemas = &self.definitions.schemas;
+        self.definitions.channels.values().map(|channel| (channel, schemas.get(&channel.schema_id)))
+    }
+
+    /// Bytes of the file.
+    pub fn size(&self) -> u64 {
+        self.walk.size()
+    }
+
+    /// At the end: whether the file lacks its own, as a killed logger leaves it.
+    pub fn was_cut_short(&self) -> bool {
+        !self.walk.is_closed()
+    }
+
+    /// The next message of the rig's topics, or none at the end. Other topics are passed over.
     pub fn next_message(&mut self) -> Result<Option<Recorded>, ReadError> {
-        loop {
-            match self.mcap.next_event() {
-                None => return Ok(None),
-                Some(Ok(LinearReadEvent::ReadRequest(wanted))) => {
-                    let read = self.file.read(self.mcap.insert(wanted))?;
-                    self.mcap.notify_read(read);
-                }
-                Some(Ok(LinearReadEvent::Record { data, opcode })) => {
-                    let record = mcap::parse_record(opcode, data)
-                        .map_err(|error| ReadError::Damaged { messages: self.messages, error })?;
-                    match record {
-                        Record::Channel(channel) => {
-                            self.topics.insert(channel.id, channel.topic);
-                        }
-                        Record::Message { header, data } => {
-                            let topic = self.topics.get(&header.channel_id).map_or("", String::as_str);
-                            if let Some(message) = decode(topic, &data)? {
-                                self.messages += 1;
-                                return Ok(Some(message));
-                            }
-                        }
-                        _ => {}
-                    }
-                }
-                Some(Err(McapError::UnexpectedEof)) => {
-                    self.cut_short = true;
-                    return Ok(None);
-                }
-                Some(Err(error)) => return Err(ReadError::Damaged { messages: self.messages, error }),
+        while let Some(entry) = self.next_entry()? {
+            if let Some(message) = entry.recorded() {
+                return message.map(Some);
             }
+        }
+        Ok(None)
+    }
+
+    /// The next message of whatever topic, or none at the end.
+    pub fn next_entry(&mut self) -> Result<Option<Entry<'_>>, ReadError> {
+        let Some(message) = self.next_message_bytes()? else { return Ok(None) };
+        let Ok(Record::Message { header, data: Cow::Borrowed(data) }) =
+            mcap::parse_record(op::MESSAGE, self.chunk.bytes(message))
+        else {
+            unreachable!("a message with a whole head can be parsed, and borrows");
+        };
+        let channel = self.definitions.channels.get(&header.channel_id);
+        let schema = channel.and_then(|channel| self.definitions.schemas.get(&channel.schema_id));
+        Ok(Some(Entry { channel, schema, header, data }))
+    }
+
+    /// Where in the open chunk the next message lies. Definitions on the way are taken up.
+    fn next_message_bytes(&mut self) -> Result<Option<Range<usize>>, ReadError> {
+        loop {
+            match self.chunk.next_record() {
+                Some(Ok((op::MESSAGE, bytes))) if bytes.len() >= MESSAGE_HEAD => return Ok(Some(bytes)),
+                Some(Ok((op::MESSAGE, _))) => self.note("a message without a head"),
+                Some(Ok((opcode, bytes))) => self.definitions.take(opcode, self.chunk.bytes(bytes)),
+                Some(Err(reason)) => self.note(reason),
+                None if self.step()? => {}
+                None => return Ok(None),
+            }
+        }
+    }
+
+    fn note(&mut self, reason: &str) {
+        let damage = self.walk.damaged(reason.to_owned());
+        self.add(damage);
+    }
+
+    /// Damage that follows right behind other damage is part of it.
+    fn add(&mut self, damage: Damage) {
+        match self.damage.last_mut() {
+            Some(last) if last.to == damage.from => last.to = damage.to,
+            _ => self.damage.push(damage),
+        }
+    }
+
+    /// Takes the next record of the file. False at the end.
+    fn step(&mut self) -> Result<bool, ReadError> {
+        match self.walk.step()? {
+            Step::End if self.records == 0 => return Err(self.no_mcap()),
+            Step::End => return Ok(false),
+            Step::Damage(damage) => self.pass_over(damage)?,
+            Step::Record(opcode) => {
+                self.records += 1;
+                if opcode == op::CHUNK {
+                    self.open_chunk()?;
+                } else {
+                    self.definitions.take(opcode, self.walk.body());
+                }
+            }
+        }
+        Ok(true)
+    }
+
+    /// Unpacks a chunk and checks it as a whole; one that is damaged is passed over.
+    fn open_chunk(&mut self) -> Result<(), ReadError> {
+        match self.chunk.open(self.walk.body()) {
+            Ok(header) => {
+                self.chunks.count += 1;
+                self.chunks.uncompressed_bytes += header.uncompressed_size;
+                self.chunks.compressed_bytes += header.compressed_size;
+                self.chunks.compression = header.compression;
+                Ok(())
+            }
+            Err(error) => {
+                let damage = self.walk.damaged(error.to_string());
+                self.pass_over(damage)
+            }
+        }
+    }
+
+    /// Notes damage. When the definitions were hit, the index at the end of the file has them again.
+    fn pass_over(&mut self, damage: Damage) -> Result<(), ReadError> {
+        self.add(damage);
+        if !self.definitions.channels.is_empty() {
+            return Ok(());
+        }
+        let place = self.walk.place();
+        loop {
+            match self.walk.step()? {
+                Step::Record(opcode) if opcode != op::CHUNK => {
+                    self.definitions.take(opcode, self.walk.body());
+                }
+                Step::End => return Ok(self.walk.go_to(place)?),
+                _ => {}
+            }
+        }
+    }
+
+    fn no_mcap(&self) -> ReadError {
+        let first = self.damage.first().map_or_else(|| "it is empty".to_owned(), ToString::to_string);
+        ReadError::NoMcap { size: self.walk.size(), first }
+    }
+}
+
+impl Entry<'_> {
+    /// The message itself, or why this program cannot read it; none on topics that are not the rig's.
+    pub fn recorded(&self) -> Option<Result<Recorded, ReadError>> {
+        let topic = Topic::named(&self.channel?.topic)?;
+        Some(body(topic, self.data).map(|body| topic.read(body)))
+    }
+}
+
+impl Definitions {
+    /// Takes up a schema or a channel; a damaged one is as good as missing.
+    fn take(&mut self, opcode: u8, body: &[u8]) {
+        if !matches!(opcode, op::SCHEMA | op::CHANNEL) {
+            return;
+        }
+        match mcap::parse_record(opcode, body) {
+            Ok(Record::Schema { header: SchemaHeader { id, name, encoding }, data }) => {
+                self.schemas.insert(id, Schema { name, encoding, data: data.into_owned() });
+            }
+            Ok(Record::Channel(channel)) => {
+                self.channels.insert(channel.id, channel);
+            }
+            _ => {}
         }
     }
 }
 
-fn decode(topic: &str, data: &[u8]) -> Result<Option<Recorded>, ReadError> {
-    let recorded = match topic {
-        Command::TOPIC => Recorded::Command(body(data)?),
-        Reading::TOPIC => Recorded::Reading(body(data)?),
-        State::TOPIC => Recorded::State(body(data)?),
-        Truth::TOPIC => Recorded::Truth(body(data)?),
-        FrameTap::TOPIC => Recorded::Frame(body(data)?),
-        Event::TOPIC => Recorded::Event(body(data)?),
-        _ => return Ok(None),
-    };
-    Ok(Some(recorded))
-}
-
-/// The message behind the CDR header, if it has this version's layout.
-fn body<M: Message>(data: &[u8]) -> Result<M, ReadError> {
-    let expected = CDR_LITTLE_ENDIAN.len() + size_of::<M>();
-    let version = data.get(20..28).map_or(0, |bytes| u64::from_le_bytes(bytes.try_into().expect("8 bytes")));
-    let fits = data.len() == expected && data.starts_with(&CDR_LITTLE_ENDIAN) && version == LAYOUT_VERSION;
-    if !fits {
-        return Err(ReadError::Foreign { topic: M::TOPIC.to_owned(), found: data.len(), expected, version });
+/// The message of a topic behind the CDR header, if it has this version's layout.
+fn body(topic: Topic, data: &[u8]) -> Result<&[u8], ReadError> {
+    let expected = CDR_LITTLE_ENDIAN.len() + topic.body_bytes();
+    let body = data.strip_prefix(&CDR_LITTLE_ENDIAN);
+    let version = body.and_then(Stamps::read).map_or(0, |stamps| stamps.version);
+    match body {
+        Some(body) if data.len() == expected && version == LAYOUT_VERSION => Ok(body),
+        _ => Err(ReadError::Foreign { topic: topic.name(), found: data.len(), expected, version }),
     }
-    Ok(bytemuck::pod_read_unaligned(&data[CDR_LITTLE_ENDIAN.len()..]))
 }

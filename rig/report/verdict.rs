@@ -102,7 +102,9 @@ fn incomplete(figures: &Figures) -> Option<Judgement> {
     let reason = if missing > 0 {
         format!("{missing} messages are missing from the recording")
     } else if figures.cut_short {
-        "the recording ends in the middle of a record".to_owned()
+        "the recording lacks its end".to_owned()
+    } else if let Some(damage) = figures.damage.first() {
+        format!("the recording is damaged: {damage}")
     } else {
         return None;
     };

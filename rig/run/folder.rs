@@ -92,11 +92,6 @@ impl RunFolder {
         self.0.join("hist")
     }
 
-    /// Frames of a bus as candump logs them.
-    pub fn candump(&self, bus: usize) -> PathBuf {
-        self.0.join(format!("can{bus}.log"))
-    }
-
     /// Events, a line of JSON each.
     pub fn events(&self) -> PathBuf {
         self.0.join("events.jsonl")

@@ -12,7 +12,7 @@ use masseter_shared::realtime::Wake;
 
 use super::folder::RunFolder;
 use super::plan::Plan;
-use crate::recording::{Recorder, WriteError};
+use crate::recording::{Recorder, Scene, WriteError};
 use crate::report::verdict::Ending;
 
 /// Virtual time of the first SYNC, ns.
@@ -23,7 +23,8 @@ pub fn run(plan: &Plan, folder: &RunFolder) -> anyhow::Result<Ending> {
     let scenario = &plan.scenario;
     let mut plant = PlantCore::new(scenario, EPOCH_NS)?;
     let mut controller = Controller::new(scenario, plan.mechanism.clone(), plan.trajectory.clone());
-    let mut log = Log::new(Recorder::create(&folder.recording())?);
+    let scene = Scene::new(&plan.mechanism, &scenario.jaw);
+    let mut log = Log::new(Recorder::create(&folder.recording(), scene)?);
 
     let mut cycle = 0;
     while !controller.is_done() {

@@ -3,8 +3,11 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::{Child, Command, Output, Stdio};
+use std::time::Duration;
 
+use masseter_shared::clock;
+use rustix::process::Pid;
 use serde_json::Value;
 
 /// The executable under test.
@@ -62,6 +65,27 @@ impl Bench {
     pub(crate) fn manifest(&self) -> Value {
         json(&self.run_folder().join("manifest.json"))
     }
+}
+
+/// Starts a run of this bench.
+pub(crate) fn start(bench: &Bench, arguments: &[&str]) -> Child {
+    bench.run_command(arguments).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap()
+}
+
+/// The process of a running rig that plays `role`, once it runs.
+pub(crate) fn child_of(supervisor: &Child, role: &str) -> Pid {
+    for _ in 0..500 {
+        let path = format!("/proc/{0}/task/{0}/children", supervisor.id());
+        let children = fs::read_to_string(path).unwrap_or_default();
+        for id in children.split_whitespace().filter_map(|id| id.parse::<i32>().ok()) {
+            let command = fs::read_to_string(format!("/proc/{id}/cmdline")).unwrap_or_default();
+            if command.split('\0').nth(1) == Some(role) {
+                return Pid::from_raw(id).unwrap();
+            }
+        }
+        clock::sleep(Duration::from_millis(10));
+    }
+    panic!("no {role} appeared");
 }
 
 pub(crate) fn json(path: &Path) -> Value {

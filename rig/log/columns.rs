@@ -1,0 +1,159 @@
+//! Messages as lines of a table, by the ROS 2 definition that the recording itself carries: so messages of
+//! other versions become tables too.
+//!
+//! Numbers and arrays of fixed length only; a definition with anything else makes no table.
+
+use std::fmt::Write;
+
+/// A primitive of the definition language.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    Unsigned(usize),
+    Signed(usize),
+    Float(usize),
+}
+
+impl Kind {
+    fn named(name: &str) -> Option<Self> {
+        Some(match name {
+            "bool" | "uint8" | "byte" | "char" => Self::Unsigned(1),
+            "uint16" => Self::Unsigned(2),
+            "uint32" => Self::Unsigned(4),
+            "uint64" => Self::Unsigned(8),
+            "int8" => Self::Signed(1),
+            "int16" => Self::Signed(2),
+            "int32" => Self::Signed(4),
+            "int64" => Self::Signed(8),
+            "float32" => Self::Float(4),
+            "float64" => Self::Float(8),
+            _ => return None,
+        })
+    }
+
+    fn size(self) -> usize {
+        let (Self::Unsigned(size) | Self::Signed(size) | Self::Float(size)) = self;
+        size
+    }
+
+    /// Writes the little-endian value at the beginning of `bytes`.
+    fn write(self, line: &mut String, bytes: &[u8]) {
+        let mut wide = [0; 8];
+        wide[..self.size()].copy_from_slice(&bytes[..self.size()]);
+        let unsigned = u64::from_le_bytes(wide);
+        let unused = 64 - 8 * self.size() as u32;
+        let written = match self {
+            Self::Unsigned(_) => write!(line, "{unsigned}"),
+            Self::Signed(_) => write!(line, "{}", (unsigned << unused).cast_signed() >> unused),
+            Self::Float(4) => write!(line, "{}", f32::from_bits(unsigned as u32)),
+            Self::Float(_) => write!(line, "{}", f64::from_bits(unsigned)),
+        };
+        written.expect("a string takes any text");
+    }
+}
+
+/// One column: a field, or an element of one.
+#[derive(Debug, Clone, PartialEq, Eq)]
+struct Column {
+    name: String,
+    kind: Kind,
+    /// Where it lies behind the CDR header.
+    at: usize,
+}
+
+/// The table of a message definition.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Columns {
+    columns: Vec<Column>,
+    bytes: usize,
+}
+
+impl Columns {
+    /// Reads a definition; none where it holds more than numbers.
+    pub(super) fn of(definition: &str) -> Option<Self> {
+        let mut table = Self { columns: Vec::new(), bytes: 0 };
+        for line in definition.lines().map(|line| line.split('#').next().unwrap_or_default().trim()) {
+            if !line.is_empty() {
+                table.add_field(line)?;
+            }
+        }
+        Some(table)
+    }
+
+    fn add_field(&mut self, line: &str) -> Option<()> {
+        let (kind, name) = line.split_once(char::is_whitespace)?;
+        let (kind, elements) = match kind.split_once('[') {
+            Some((kind, length)) => (kind, Some(length.strip_suffix(']')?.parse::<usize>().ok()?)),
+            None => (kind, None),
+        };
+        let kind = Kind::named(kind)?;
+        // CDR aligns each primitive to its own size.
+        self.bytes = self.bytes.next_multiple_of(kind.size());
+        for element in 0..elements.unwrap_or(1) {
+            let name = name.trim();
+            let name = if elements.is_some() { format!("{name}_{element}") } else { name.to_owned() };
+            self.columns.push(Column { name, kind, at: self.bytes });
+            self.bytes += kind.size();
+        }
+        Some(())
+    }
+
+    /// The names, separated by commas.
+    pub(super) fn header(&self) -> String {
+        self.columns.iter().map(|column| column.name.as_str()).collect::<Vec<_>>().join(",")
+    }
+
+    /// Appends the values of a message; false where its length is not the definition's.
+    pub(super) fn write(&self, line: &mut String, body: &[u8]) -> bool {
+        if body.len() != self.bytes {
+            return false;
+        }
+        for (index, column) in self.columns.iter().enumerate() {
+            if index > 0 {
+                line.push(',');
+            }
+            column.kind.write(line, &body[column.at..]);
+        }
+        true
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use masseter_shared::messages::{FrameTap, Message, Reading};
+
+    use super::*;
+
+    #[test]
+    fn a_message_of_ours_becomes_a_line() {
+        let columns = Columns::of(&FrameTap::schema()).unwrap();
+        let frame = FrameTap { seq: 3, id: 0x181, bus: 1, length: 2, data: [7; 8], ..Default::default() };
+        let mut line = String::new();
+        assert!(columns.write(&mut line, bytemuck::bytes_of(&frame)));
+        assert_eq!(line, "3,0,0,0,385,1,2,7,7,7,7,7,7,7,7");
+        assert!(columns.header().starts_with("seq,published_ns,version,time_ns,id,bus,length,data_0,"));
+        assert_eq!(Columns::of(&Reading::schema()).unwrap().bytes, size_of::<Reading>());
+    }
+
+    #[test]
+    fn signs_fractions_and_alignment_are_kept() {
+        let columns = Columns::of("int8 a # sign\n\nfloat32 b\nint16[2] c\nfloat64 d\n").unwrap();
+        let mut body = vec![0xff, 0, 0, 0];
+        body.extend(0.5f32.to_le_bytes());
+        body.extend((-2i16).to_le_bytes());
+        body.extend(300i16.to_le_bytes());
+        body.extend([0; 4]);
+        body.extend((-0.1f64).to_le_bytes());
+        let mut line = String::new();
+        assert!(columns.write(&mut line, &body));
+        assert_eq!((columns.header().as_str(), line.as_str()), ("a,b,c_0,c_1,d", "-1,0.5,-2,300,-0.1"));
+    }
+
+    #[test]
+    fn what_is_no_table_is_refused() {
+        for definition in ["string name", "float64[] values", "geometry_msgs/Pose pose", "uint8"] {
+            assert_eq!(Columns::of(definition), None, "{definition}");
+        }
+        let mut line = String::new();
+        assert!(!Columns::of("uint64 a").unwrap().write(&mut line, &[0; 7]));
+    }
+}

@@ -1,0 +1,79 @@
+//! Writes what can be read of a damaged recording into a new one that is whole.
+//!
+//! Messages, channels and schemas keep their bytes, numbers and times. Attachments and metadata, which
+//! Masseter does not write, are not carried over.
+
+use std::collections::BTreeSet;
+use std::io::{Read, Seek, Write};
+
+use mcap::records::Channel;
+use mcap::{McapError, Writer};
+
+use super::reader::{ReadError, Reader, Schema};
+use super::writer::options;
+
+/// Why a recording could not be recovered.
+#[derive(Debug, thiserror::Error)]
+pub enum RecoverError {
+    /// Nothing can be read.
+    #[error(transparent)]
+    Read(#[from] ReadError),
+    /// The new recording cannot be written.
+    #[error("cannot write the recovered recording: {0}")]
+    Write(#[from] McapError),
+}
+
+/// What was saved.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Recovered {
+    /// Messages saved.
+    pub messages: u64,
+    /// Messages of channels whose definition is lost: nobody can say what they are.
+    pub undefined: u64,
+}
+
+/// Copies everything readable from `reader` to `medium`. What was not is in the reader's
+/// [`damage`](Reader::damage).
+pub fn recover<R: Read + Seek, W: Write + Seek>(
+    reader: &mut Reader<R>,
+    medium: W,
+) -> Result<Recovered, RecoverError> {
+    let mut writer = options().create(medium)?;
+    let mut defined = BTreeSet::new();
+    let mut recovered = Recovered::default();
+    while let Some(entry) = reader.next_entry()? {
+        let Some(channel) = entry.channel else {
+            recovered.undefined += 1;
+            continue;
+        };
+        if defined.insert(channel.id) {
+            define(&mut writer, channel, entry.schema)?;
+        }
+        writer.write_to_known_channel(&entry.header, entry.data)?;
+        recovered.messages += 1;
+    }
+    writer.finish()?;
+    Ok(recovered)
+}
+
+/// A channel whose schema is lost goes without one; its messages are kept for whoever knows them.
+fn define<W: Write + Seek>(
+    writer: &mut Writer<W>,
+    channel: &Channel,
+    schema: Option<&Schema>,
+) -> Result<(), McapError> {
+    let schema_id = match schema {
+        Some(schema) => {
+            writer.add_schema_with_id(channel.schema_id, &schema.name, &schema.encoding, &schema.data)?
+        }
+        None => 0,
+    };
+    writer.add_channel_with_id(
+        channel.id,
+        schema_id,
+        &channel.topic,
+        &channel.message_encoding,
+        &channel.metadata,
+    )?;
+    Ok(())
+}

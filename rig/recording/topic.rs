@@ -1,0 +1,91 @@
+//! The topics of a recording, and the layout of their messages.
+
+use masseter_shared::messages::{Command, Event, FrameTap, Message, Reading, State, Truth};
+
+use super::Recorded;
+
+/// One of the rig's topics.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[repr(u8)]
+pub enum Topic {
+    /// Controller to plant.
+    Command,
+    /// Plant to controller.
+    Reading,
+    /// What the controller made of a reading.
+    State,
+    /// What the mechanism really did.
+    Truth,
+    /// CAN frames.
+    Frame,
+    /// Occurrences.
+    Event,
+}
+
+impl Topic {
+    /// Every topic.
+    pub const ALL: [Self; 6] =
+        [Self::Command, Self::Reading, Self::State, Self::Truth, Self::Frame, Self::Event];
+
+    /// The topic that messages of this type travel on.
+    pub fn of<M: Message>() -> Self {
+        Self::named(M::TOPIC).expect("every message type has its topic here")
+    }
+
+    /// The topic of this name.
+    pub fn named(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|topic| topic.name() == name)
+    }
+
+    /// Its name.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Command => Command::TOPIC,
+            Self::Reading => Reading::TOPIC,
+            Self::State => State::TOPIC,
+            Self::Truth => Truth::TOPIC,
+            Self::Frame => FrameTap::TOPIC,
+            Self::Event => Event::TOPIC,
+        }
+    }
+
+    /// Bytes of its messages.
+    pub fn body_bytes(self) -> usize {
+        match self {
+            Self::Command => size_of::<Command>(),
+            Self::Reading => size_of::<Reading>(),
+            Self::State => size_of::<State>(),
+            Self::Truth => size_of::<Truth>(),
+            Self::Frame => size_of::<FrameTap>(),
+            Self::Event => size_of::<Event>(),
+        }
+    }
+
+    /// The message in `body`, which has [`body_bytes`](Self::body_bytes).
+    pub(super) fn read(self, body: &[u8]) -> Recorded {
+        match self {
+            Self::Command => Recorded::Command(bytemuck::pod_read_unaligned(body)),
+            Self::Reading => Recorded::Reading(bytemuck::pod_read_unaligned(body)),
+            Self::State => Recorded::State(bytemuck::pod_read_unaligned(body)),
+            Self::Truth => Recorded::Truth(bytemuck::pod_read_unaligned(body)),
+            Self::Frame => Recorded::Frame(bytemuck::pod_read_unaligned(body)),
+            Self::Event => Recorded::Event(bytemuck::pod_read_unaligned(body)),
+        }
+    }
+}
+
+/// What every message begins with.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Stamps {
+    pub seq: u64,
+    pub published_ns: u64,
+    pub version: u64,
+}
+
+impl Stamps {
+    /// Reads them, if `body` is long enough for any message.
+    pub(super) fn read(body: &[u8]) -> Option<Self> {
+        let [seq, published_ns, version] = bytemuck::pod_read_unaligned(body.get(..24)?);
+        Some(Self { seq, published_ns, version })
+    }
+}

@@ -1,0 +1,260 @@
+//! Walks an MCAP file record by record, and finds its feet again behind damage.
+//!
+//! MCAP's own reader stops at the first record that makes no sense. A recording that lost a few bytes in
+//! the middle is still good behind them: every chunk can be read on its own, and its header can be told
+//! from other bytes by the lengths in it, which must agree.
+
+use std::io::{self, Read, Seek, SeekFrom};
+
+use crc32fast::Hasher;
+use mcap::MAGIC;
+use mcap::records::op;
+use serde::Serialize;
+
+/// A record longer than this is taken for damage, bytes; chunks stay far below.
+pub(super) const LONGEST_RECORD: u64 = 64 << 20;
+/// Opcode and length.
+const HEAD: usize = 9;
+/// Chunk header up to the compression's name: two times, size, checksum, length of the name.
+const CHUNK_FIXED: usize = 8 + 8 + 8 + 4 + 4;
+/// Longest name of a compression that is believed.
+const LONGEST_NAME: usize = 16;
+/// Bytes from which a chunk's beginning can be told.
+const CHUNK_HEAD: usize = HEAD + CHUNK_FIXED + LONGEST_NAME + 8;
+const SCAN_BYTES: usize = 1 << 16;
+
+/// A stretch of the file that could not be read.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, thiserror::Error)]
+#[error("bytes {from} to {to}: {reason}")]
+pub struct Damage {
+    /// Its first byte.
+    pub from: u64,
+    /// The byte behind it.
+    pub to: u64,
+    /// What is wrong with it.
+    pub reason: String,
+}
+
+/// What comes next in the file.
+#[derive(Debug)]
+pub(super) enum Step {
+    /// A record of this opcode, whole; see [`Walk::record`].
+    Record(u8),
+    /// Bytes that are no record.
+    Damage(Damage),
+    /// The end of the file.
+    End,
+}
+
+/// A walk through a file.
+pub(super) struct Walk<R> {
+    source: R,
+    size: u64,
+    /// Where the next record begins.
+    next: u64,
+    /// Where the current record began.
+    at: u64,
+    /// The current record with opcode and length.
+    record: Vec<u8>,
+    is_closed: bool,
+    /// Checksum of the current section of the file, as long as nothing in it was found damaged.
+    section: Option<Hasher>,
+}
+
+impl<R: Read + Seek> Walk<R> {
+    pub(super) fn new(mut source: R) -> io::Result<Self> {
+        let size = source.seek(SeekFrom::End(0))?;
+        source.rewind()?;
+        Ok(Self {
+            source,
+            size,
+            next: 0,
+            at: 0,
+            record: Vec::new(),
+            is_closed: false,
+            section: Some(Hasher::new()),
+        })
+    }
+
+    /// The current record's content.
+    pub(super) fn body(&self) -> &[u8] {
+        &self.record[HEAD..]
+    }
+
+    /// The current record as a stretch of the file that is damaged.
+    pub(super) fn damaged(&mut self, reason: String) -> Damage {
+        self.section = None;
+        Damage { from: self.at, to: self.next, reason }
+    }
+
+    /// Whether the file ended as MCAP files end.
+    pub(super) fn is_closed(&self) -> bool {
+        self.is_closed
+    }
+
+    /// Where the walk stands: between two records.
+    pub(super) fn place(&self) -> u64 {
+        self.next
+    }
+
+    /// Goes on from a place where the walk once stood.
+    pub(super) fn go_to(&mut self, place: u64) -> io::Result<()> {
+        self.next = place;
+        self.is_closed = false;
+        self.section = None;
+        self.source.seek(SeekFrom::Start(place)).map(|_| ())
+    }
+
+    /// Bytes of the file.
+    pub(super) fn size(&self) -> u64 {
+        self.size
+    }
+
+    /// The next record, or the next stretch that is none.
+    pub(super) fn step(&mut self) -> io::Result<Step> {
+        self.at = self.next;
+        let left = self.size - self.at;
+        let is_start = self.at == 0;
+        if left == 0 {
+            return Ok(Step::End);
+        }
+        if is_start || left == MAGIC.len() as u64 {
+            return self.magic(is_start);
+        }
+        if left < HEAD as u64 {
+            return self.find_feet("the file ends in the middle of a record");
+        }
+        self.record.resize(HEAD, 0);
+        self.source.read_exact(&mut self.record)?;
+        let length = u64::from_le_bytes(self.record[1..].try_into().expect("eight bytes"));
+        if length > left - HEAD as u64 {
+            return self.find_feet("a record that is longer than the rest of the file");
+        }
+        if length > LONGEST_RECORD {
+            return self.find_feet("a record of impossible length");
+        }
+        self.record.resize(HEAD + length as usize, 0);
+        self.source.read_exact(&mut self.record[HEAD..])?;
+        if !is_consistent(self.record[0], self.body()) {
+            return self.find_feet("the lengths in a record contradict each other");
+        }
+        self.next = self.at + self.record.len() as u64;
+        Ok(self.check_section().map_or(Step::Record(self.record[0]), Step::Damage))
+    }
+
+    /// The data end with a checksum of everything before it, the footer with one of everything between.
+    /// They find what lies outside of the chunks; a checksum of 0 says nothing.
+    fn check_section(&mut self) -> Option<Damage> {
+        let section = self.section.as_mut()?;
+        let checksum = match self.record[0] {
+            op::DATA_END => &self.record[HEAD..],
+            op::FOOTER => {
+                section.update(&self.record[..HEAD + 16]);
+                &self.record[HEAD + 16..]
+            }
+            _ => {
+                section.update(&self.record);
+                return None;
+            }
+        };
+        let expected = u32::from_le_bytes(checksum.try_into().expect("four bytes"));
+        let found = self.section.replace(Hasher::new())?.finalize();
+        (expected != 0 && found != expected).then(|| {
+            let what =
+                if self.record[0] == op::FOOTER { "the index" } else { "what lies between the chunks" };
+            let reason = format!("{what} has checksum {found:08x} and should have {expected:08x}");
+            self.damaged(reason)
+        })
+    }
+
+    /// The eight bytes that begin and end every file.
+    fn magic(&mut self, is_start: bool) -> io::Result<Step> {
+        let mut magic = [0; 8];
+        let present = self.size.min(magic.len() as u64) as usize;
+        self.source.read_exact(&mut magic[..present])?;
+        if magic != *MAGIC {
+            let reason =
+                if is_start { "no MCAP file begins like this" } else { "no MCAP file ends like this" };
+            return self.find_feet(reason);
+        }
+        if let Some(section) = &mut self.section {
+            section.update(&magic);
+        }
+        self.next = self.at + MAGIC.len() as u64;
+        self.is_closed = !is_start;
+        self.step()
+    }
+
+    /// Everything from here to the next chunk is damage; without one, to the end of the file.
+    fn find_feet(&mut self, reason: &str) -> io::Result<Step> {
+        let from = self.at;
+        self.section = None;
+        self.next = self.find_chunk(from + 1)?.unwrap_or(self.size);
+        self.source.seek(SeekFrom::Start(self.next))?;
+        Ok(Step::Damage(Damage { from, to: self.next, reason: reason.to_owned() }))
+    }
+
+    /// The first place at or behind `from` where a chunk begins.
+    fn find_chunk(&mut self, from: u64) -> io::Result<Option<u64>> {
+        self.source.seek(SeekFrom::Start(from.min(self.size)))?;
+        let mut window = Vec::new();
+        let mut at = from;
+        loop {
+            let read = (&mut self.source).take(SCAN_BYTES as u64).read_to_end(&mut window)?;
+            let found = window.iter().enumerate().find(|&(place, &byte)| {
+                let rest = self.size - at - place as u64;
+                byte == op::CHUNK && begins_chunk(&window[place..], rest)
+            });
+            if let Some((place, _)) = found {
+                return Ok(Some(at + place as u64));
+            }
+            if read == 0 {
+                return Ok(None);
+            }
+            let done = window.len().saturating_sub(CHUNK_HEAD);
+            window.drain(..done);
+            at += done as u64;
+        }
+    }
+}
+
+/// Whether a chunk of at most `rest` bytes begins with these bytes.
+fn begins_chunk(bytes: &[u8], rest: u64) -> bool {
+    let Some(head) = bytes.get(1..HEAD) else { return false };
+    let length = u64::from_le_bytes(head.try_into().expect("eight bytes"));
+    length <= LONGEST_RECORD
+        && HEAD as u64 + length <= rest
+        && chunk_data(&bytes[HEAD..]).is_some_and(|(header, data)| header as u64 + data == length)
+}
+
+/// Length of a chunk's header, and of the compressed data it announces.
+fn chunk_data(body: &[u8]) -> Option<(usize, u64)> {
+    let name = u32::from_le_bytes(body.get(CHUNK_FIXED - 4..CHUNK_FIXED)?.try_into().ok()?) as usize;
+    if name > LONGEST_NAME {
+        return None;
+    }
+    let header = CHUNK_FIXED + name + 8;
+    let data = u64::from_le_bytes(body.get(header - 8..header)?.try_into().ok()?);
+    Some((header, data))
+}
+
+/// Whether the lengths inside a record agree with its own. Only the kinds that stand between chunks are
+/// looked at: a wrong length there would swallow the chunks behind.
+fn is_consistent(opcode: u8, body: &[u8]) -> bool {
+    let length_at = |at: usize| {
+        let bytes = body.get(at..at + 4)?;
+        Some(u32::from_le_bytes(bytes.try_into().expect("four bytes")) as usize)
+    };
+    match opcode {
+        op::CHUNK => chunk_data(body)
+            .is_some_and(|(header, data)| (header as u64).checked_add(data) == Some(body.len() as u64)),
+        op::MESSAGE_INDEX => length_at(2).is_some_and(|entries| entries + 6 == body.len()),
+        op::HEADER => length_at(0)
+            .and_then(|profile| Some(profile + length_at(profile.checked_add(4)?)? + 8))
+            .is_some_and(|length| length == body.len()),
+        op::FOOTER => body.len() == 20,
+        op::DATA_END => body.len() == 4,
+        op::SCHEMA..=op::SUMMARY_OFFSET => true,
+        _ => false,
+    }
+}

@@ -1,0 +1,181 @@
+//! Recordings as their users meet them: looked at, proved, cut, killed, repaired, converted.
+
+mod common;
+
+use std::fs;
+use std::path::Path;
+use std::process::Output;
+use std::time::Duration;
+
+use common::{Bench, UNHURRIED, child_of, masseter, start, stderr, stdout};
+use masseter::recording::{Reader, Recorded};
+use masseter_shared::can::candump;
+use masseter_shared::clock::{self, SECOND_NS};
+use rustix::process::{Signal, kill_process};
+
+fn virtual_run() -> Bench {
+    let bench = Bench::new("duration_s = 1.0");
+    let output = bench.run(&["--clock", "virtual"]);
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    bench
+}
+
+fn log(verb: &str, recording: &Path, more: &[&str]) -> Output {
+    let recording = recording.to_str().unwrap();
+    masseter(&[&["log", verb, recording], more].concat())
+}
+
+fn messages(recording: &Path) -> Vec<Recorded> {
+    let mut reader = Reader::open(recording).unwrap();
+    let mut messages = Vec::new();
+    while let Some(message) = reader.next_message().unwrap() {
+        messages.push(message);
+    }
+    messages
+}
+
+#[test]
+fn a_whole_recording_is_told_and_proved() {
+    let bench = virtual_run();
+    for of in [bench.run_folder(), bench.run_folder().join("recording.mcap")] {
+        let info = log("info", &of, &[]);
+        assert_eq!(info.status.code(), Some(0), "{}", stdout(&info));
+        for word in ["masseter/Reading (cdr)", "foxglove.FrameTransforms (protobuf)", "zstd", "bytes a cycle"]
+        {
+            assert!(stdout(&info).contains(word), "{word}: {}", stdout(&info));
+        }
+        let proof = log("verify", &of, &[]);
+        assert_eq!(proof.status.code(), Some(0), "{}", stdout(&proof));
+        assert!(!stdout(&proof).contains("FAIL"), "{}", stdout(&proof));
+    }
+}
+
+#[test]
+fn bad_recordings_get_2_and_cut_ones_6_with_the_place() {
+    let bench = virtual_run();
+    let whole = fs::read(bench.run_folder().join("recording.mcap")).unwrap();
+    let cut = whole[..whole.len() * 2 / 3].to_vec();
+    let mut flipped = whole.clone();
+    flipped[whole.len() / 2] ^= 0x10;
+    let cases: [(&str, &[u8], i32, &str); 4] = [
+        ("cut", &cut, 6, "lacks its end"),
+        ("flipped", &flipped, 2, "unreadable: bytes"),
+        ("foreign", b"\x89PNG\r\n\x1a\n and so on and on", 2, "not readable as MCAP"),
+        ("empty", b"", 2, "it is empty"),
+    ];
+    for (name, bytes, code, words) in cases {
+        let path = bench.file(name);
+        fs::write(&path, bytes).unwrap();
+        for verb in ["info", "verify"] {
+            let output = log(verb, &path, &[]);
+            let said = stdout(&output) + &stderr(&output);
+            assert_eq!(output.status.code(), Some(code), "{verb} {name}: {said}");
+            assert!(said.contains(words), "{verb} {name}: {said}");
+        }
+    }
+    assert_eq!(log("info", &bench.file("nowhere"), &[]).status.code(), Some(2));
+}
+
+#[test]
+fn a_cut_recording_is_recovered_beside_the_old_one_and_nothing_is_overwritten() {
+    let bench = virtual_run();
+    let whole = fs::read(bench.run_folder().join("recording.mcap")).unwrap();
+    let cut = bench.file("cut.mcap");
+    fs::write(&cut, &whole[..whole.len() * 2 / 3]).unwrap();
+
+    let output = log("recover", &cut, &[]);
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    assert!(stdout(&output).contains("messages saved"), "{}", stdout(&output));
+    let recovered = bench.file("cut.recovered.mcap");
+    let saved = messages(&recovered);
+    assert!(!saved.is_empty() && saved == messages(&cut));
+    assert_eq!(log("verify", &recovered, &[]).status.code(), Some(0));
+
+    let before = fs::read(&recovered).unwrap();
+    assert_eq!(log("recover", &cut, &[]).status.code(), Some(2));
+    assert!(before == fs::read(&recovered).unwrap());
+
+    let foreign = bench.write("foreign.mcap", "no recording at all");
+    assert_eq!(log("recover", &foreign, &[]).status.code(), Some(2));
+    assert!(!bench.file("foreign.recovered.mcap").exists());
+}
+
+#[test]
+fn a_recording_becomes_tables_and_candump_logs() {
+    let bench = virtual_run();
+    let out = bench.file("tables");
+    let export = || log("export", &bench.run_folder(), &["--out", out.to_str().unwrap()]);
+    assert_eq!(export().status.code(), Some(0), "{}", stderr(&export()));
+    assert_eq!(export().status.code(), Some(2), "an existing folder was written to");
+
+    let mut table = csv::Reader::from_path(out.join("reading.csv")).unwrap();
+    let header = table.headers().unwrap().clone();
+    let column = |name: &str| header.iter().position(|header| header == name).unwrap();
+    let (cycle, length) = (column("cycle"), column("position_m_3"));
+    let lines: Vec<_> = table.records().map(Result::unwrap).collect();
+    let readings = messages(&bench.run_folder().join("recording.mcap")).into_iter().filter_map(|message| {
+        let Recorded::Reading(reading) = message else { return None };
+        Some(reading)
+    });
+    let readings: Vec<_> = readings.collect();
+    assert_eq!(lines.len(), readings.len());
+    for (line, reading) in lines.iter().zip(&readings) {
+        assert_eq!(line[cycle].parse(), Ok(reading.cycle));
+        assert_eq!(line[length].parse(), Ok(reading.position_m[3]));
+    }
+    let frames = fs::read_to_string(out.join("can0.log")).unwrap();
+    assert!(frames.lines().count() > 1000);
+    assert!(frames.lines().all(|line| candump::parse(line).is_ok()));
+    assert_eq!(frames, fs::read_to_string(bench.run_folder().join("can0.log")).unwrap());
+}
+
+/// Cycles after which the logger is killed: they fall before, between and right behind its flushes.
+const KILLED_AT_MS: [u64; 4] = [180, 500, 730, 1490];
+/// What a killed logger may lose, ns.
+const LOSS_NS: u64 = SECOND_NS;
+
+/// Runs until the recording has begun, kills the logger some time later, and returns when that was.
+fn kill_the_logger(bench: &Bench, after: Duration) -> u64 {
+    let child = start(bench, &[]);
+    let logger = child_of(&child, "logger");
+    let recording = bench.run_folder().join("recording.mcap");
+    while !fs::metadata(&recording).is_ok_and(|file| file.len() > 50_000) {
+        clock::sleep(Duration::from_millis(5));
+    }
+    clock::sleep(after);
+    let killed_ns = clock::now_ns();
+    kill_process(logger, Signal::KILL).unwrap();
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(4), "{}{}", stdout(&output), stderr(&output));
+    killed_ns
+}
+
+#[test]
+fn a_killed_logger_leaves_all_but_the_last_second() {
+    for after_ms in KILLED_AT_MS {
+        let bench = Bench::new(&format!("duration_s = 30.0\n{UNHURRIED}"));
+        let killed_ns = kill_the_logger(&bench, Duration::from_millis(after_ms));
+
+        let recording = bench.run_folder().join("recording.mcap");
+        let proof = log("verify", &recording, &[]);
+        assert_eq!(proof.status.code(), Some(6), "{}", stdout(&proof));
+        assert!(!stdout(&proof).contains("missing:"), "{}", stdout(&proof));
+
+        let readings = messages(&recording).into_iter().filter_map(|message| match message {
+            Recorded::Reading(reading) => Some(reading.published_ns),
+            _ => None,
+        });
+        let lost_ns = killed_ns.saturating_sub(readings.max().unwrap());
+        eprintln!(
+            "killed {after_ms} ms after it began to write: the last {} ms are lost",
+            lost_ns / 1_000_000
+        );
+        assert!(lost_ns < LOSS_NS);
+
+        let recovered = bench.file("recovered.mcap");
+        let output = log("recover", &recording, &["--out", recovered.to_str().unwrap()]);
+        assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+        assert_eq!(log("verify", &recovered, &[]).status.code(), Some(0));
+        assert!(messages(&recovered) == messages(&recording));
+    }
+}
