@@ -119,3 +119,25 @@ impl Emulation {
         };
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use masseter_shared::config::Scenario;
+
+    use crate::build::build_emulation;
+
+    #[test]
+    fn time_left_out_is_counted_in_whole_steps_and_moves_nothing() {
+        let scenario = Scenario::default();
+        let step_ns = scenario.dynamics.step_ns;
+        let mut emulation = build_emulation(&scenario, 0).unwrap();
+        (0..10).for_each(|_| emulation.step().unwrap());
+        let (moved_to_ns, positions_m) = (emulation.moved_to_ns(), emulation.dynamics.positions_m());
+
+        assert_eq!(emulation.skip_to(emulation.next_step_ns() + 3 * step_ns + 1), 3 * step_ns);
+        assert_eq!(emulation.next_step_ns(), 13 * step_ns);
+        assert_eq!(emulation.moved_to_ns(), moved_to_ns + 3 * step_ns);
+        assert!(emulation.dynamics.positions_m().iter().eq(&positions_m));
+        assert_eq!(emulation.skip_to(0), 0);
+    }
+}
