@@ -6,11 +6,12 @@ use std::time::Duration;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use masseter_controller::process::Outcome;
+use masseter_shared::geometry::AXIS_NAMES;
 use masseter_shared::lifecycle::Assignment;
 
 use crate::exit::{Exit, Failure};
 use crate::log::{self, LogVerb};
-use crate::{clean, doctor, kinematics, logger, plant, report, run};
+use crate::{can, clean, doctor, kinematics, logger, plant, report, run};
 
 /// A hardware-in-the-loop rig for a 6-DOF mastication robot.
 #[derive(Debug, Parser)]
@@ -39,12 +40,37 @@ enum Verb {
         #[command(subcommand)]
         verb: LogVerb,
     },
+    /// The CAN link: descriptions of the drives for other tools
+    #[command(subcommand)]
+    Can(CanVerb),
     /// Remove what killed runs left in shared memory
     Clean,
     #[command(hide = true)]
     Controller(ProcessArgs),
     #[command(hide = true)]
     Logger(LoggerArgs),
+}
+
+/// Verbs of `can`.
+#[derive(Debug, Subcommand)]
+enum CanVerb {
+    /// The electronic data sheet (EDS, CiA 306) of a drive
+    Eds(EdsArgs),
+    /// The messages of the link as a DBC file
+    Dbc {
+        /// Scenario whose drives are meant [default: the published rig]
+        scenario: Option<PathBuf>,
+    },
+}
+
+/// What `can eds` takes.
+#[derive(Debug, Clone, Args)]
+pub struct EdsArgs {
+    /// Scenario whose drives are meant [default: the published rig]
+    pub(crate) scenario: Option<PathBuf>,
+    /// Axis of the drive: d1, d2, d3, l1, l2 or l3
+    #[arg(long, default_value = "d1", value_parser = parse_axis)]
+    pub(crate) axis: usize,
 }
 
 /// What `run` takes.
@@ -214,6 +240,11 @@ fn parse_wires(text: &str) -> Result<Wires, String> {
     Ok(Wires(names))
 }
 
+fn parse_axis(text: &str) -> Result<usize, String> {
+    let axis = AXIS_NAMES.iter().position(|name| *name == text);
+    axis.ok_or_else(|| format!("the axes are {}", AXIS_NAMES.join(" ")))
+}
+
 /// An error and what caused it; an error that quotes its cause is not followed by it again.
 fn in_one_line(error: &anyhow::Error) -> String {
     error.chain().fold(String::new(), |said, cause| {
@@ -232,6 +263,8 @@ pub fn main() -> ExitCode {
         Verb::Run(args) => run::run(&args),
         Verb::Fk(args) => kinematics::forward(&args),
         Verb::Ik(args) => kinematics::inverse(&args),
+        Verb::Can(CanVerb::Eds(args)) => can::eds(&args),
+        Verb::Can(CanVerb::Dbc { scenario }) => can::dbc(scenario.as_deref()),
         Verb::Report(args) => report::again(&args.folder, args.format),
         Verb::Doctor(args) => doctor::examine(args.format),
         Verb::Log { verb } => log::run(&verb),

@@ -6,6 +6,7 @@
 //! ([`analysis`]), so it can be told again.
 
 pub mod analysis;
+pub mod can;
 pub mod clean;
 pub mod cli;
 pub mod doctor;

@@ -108,16 +108,10 @@ pub(crate) fn build_emulation(scenario: &Scenario, now_ns: u64) -> Result<Emulat
             let drive = drive_of(scenario, axis);
             let encoder =
                 Encoder::new(drive.encoder_resolution_m, drive.encoder_noise_m, scenario.seed, axis);
-            let stroke_m = scenario.mechanism.strokes.of_axis(axis);
-            let settings = drive_settings(scenario, ids[axis], drive, stroke_m);
-            DriveNode::new(settings, encoder, now_ns, positions_m[axis])
+            DriveNode::new(&drive_settings(scenario, ids[axis], axis), encoder, now_ns, positions_m[axis])
         })
         .collect();
     Ok(Emulation::new(drives, dynamics, scenario.dynamics.step_ns, now_ns))
-}
-
-fn drive_of(scenario: &Scenario, axis: usize) -> DriveConfig {
-    if axis < LEGS { scenario.drives.slide } else { scenario.drives.leg }
 }
 
 fn master_settings(
@@ -137,12 +131,19 @@ fn master_settings(
     })
 }
 
-fn drive_settings(
-    scenario: &Scenario,
-    node: NodeId,
-    drive: DriveConfig,
-    stroke_m: [f64; 2],
-) -> DriveSettings {
+fn drive_of(scenario: &Scenario, axis: usize) -> DriveConfig {
+    if axis < LEGS { scenario.drives.slide } else { scenario.drives.leg }
+}
+
+/// What the drives of a scenario that can be are configured with, in the order of the axes.
+pub(crate) fn all_drive_settings(scenario: &Scenario) -> Result<[DriveSettings; AXES], PlantError> {
+    check_quantities(scenario)?;
+    let ids = node_ids(&scenario.can)?;
+    Ok(std::array::from_fn(|axis| drive_settings(scenario, ids[axis], axis)))
+}
+
+fn drive_settings(scenario: &Scenario, node: NodeId, axis: usize) -> DriveSettings {
+    let (drive, stroke_m) = (drive_of(scenario, axis), scenario.mechanism.strokes.of_axis(axis));
     DriveSettings {
         node,
         master: master_id(),

@@ -1,7 +1,25 @@
-//! An absolute encoder: quantisation and seeded Gaussian noise.
+//! An absolute encoder: quantisation, seeded Gaussian noise and reference marks.
 
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
+
+/// Counts from one reference mark to the next; there is one at count 0.
+const MARK_PITCH: i32 = 2000;
+
+/// The reference mark passed on the way from one count to another, the one itself not counting; the
+/// nearest to where it ended where there are several.
+pub(crate) fn mark_between(from: i32, to: i32) -> Option<i32> {
+    let below = |count: i32| count.div_euclid(MARK_PITCH);
+    // The next mark at or above; a count is never so near to the end of its range.
+    let above = |count: i32| below(count.saturating_add(MARK_PITCH - 1));
+    if below(to) > below(from) {
+        Some(below(to) * MARK_PITCH)
+    } else if above(to) < above(from) {
+        Some(above(to) * MARK_PITCH)
+    } else {
+        None
+    }
+}
 
 /// One axis' encoder.
 #[derive(Debug, Clone)]
@@ -22,7 +40,12 @@ impl Encoder {
     /// The counts read at a true position. Positions beyond the counter's range stand at its end.
     pub(crate) fn read(&mut self, position_m: f64) -> i32 {
         let noise_m = self.noise_m * self.gaussian();
-        ((position_m + noise_m) / self.resolution_m).round() as i32
+        self.nearest(position_m + noise_m)
+    }
+
+    /// The counts nearest to a position.
+    pub(crate) fn nearest(&self, position_m: f64) -> i32 {
+        (position_m / self.resolution_m).round() as i32
     }
 
     /// The position of so many counts, m.
@@ -63,6 +86,24 @@ mod tests {
             let position_m = 0.27 + f64::from(step) * 1.37e-7;
             let counts = encoder.read(position_m);
             assert!((encoder.metres(counts) - position_m).abs() <= 0.5e-6 + 1e-15);
+        }
+    }
+
+    #[test]
+    fn a_mark_is_passed_in_either_direction_and_not_left_behind_twice() {
+        let table = [
+            (1999, 2000, Some(2000)),
+            (1990, 2010, Some(2000)),
+            (2000, 2010, None),
+            (2010, 2000, Some(2000)),
+            (2000, 1990, None),
+            (-1, 1, Some(0)),
+            (1, -1, Some(0)),
+            (5, 5, None),
+            (-2001, -1999, Some(-2000)),
+        ];
+        for (from, to, mark) in table {
+            assert_eq!(mark_between(from, to), mark, "from {from} to {to}");
         }
     }
 

@@ -7,6 +7,7 @@
 mod build;
 mod checks;
 pub mod core;
+pub mod description;
 mod drive;
 mod emulation;
 pub mod emulator;

@@ -1,5 +1,7 @@
-//! The position demand of a drive: cyclic synchronous targets, interpolated, or the quick-stop ramp.
+//! What the servo shall do, as a function of time: nothing, a line to the next cyclic target, a
+//! profile, or a constant force.
 
+use super::profile::Profile;
 use super::servo::Task;
 
 /// What the servo follows.
@@ -7,82 +9,114 @@ use super::servo::Task;
 enum Shape {
     /// No demand: the brake is closed.
     Brake,
-    /// On a straight line from one target to the next, then at rest.
-    Interpolate { from_m: f64, to_m: f64, from_ns: u64 },
-    /// Slowing down.
-    Ramp { position_m: f64, velocity_m_s: f64, from_ns: u64 },
+    /// On a straight line from one target to the next within a period, then at rest.
+    Interpolate { from_m: f64, to_m: f64, from_ns: u64, period_s: f64 },
+    /// A ramp or a whole positioning.
+    Profile(Profile),
+    /// A force.
+    Force { force_n: f64 },
 }
 
-/// Position demand as a function of time.
+/// The demand of a drive.
 #[derive(Debug, Clone)]
 pub(super) struct Demand {
     shape: Shape,
-    period_s: f64,
-    deceleration_m_s2: f64,
 }
 
 impl Demand {
-    /// No demand. Targets come every `period_s` (object 60C2); the quick-stop ramp is object 6085.
-    pub(super) fn new(period_s: f64, deceleration_m_s2: f64) -> Self {
-        Self { shape: Shape::Brake, period_s, deceleration_m_s2 }
+    /// No demand.
+    pub(super) fn new() -> Self {
+        Self { shape: Shape::Brake }
     }
 
-    /// Position and velocity demanded, m and m/s; none while the brake is closed.
-    fn at(&self, now_ns: u64) -> Option<(f64, f64)> {
-        let since = |from_ns: u64| now_ns.saturating_sub(from_ns) as f64 * 1e-9;
-        match self.shape {
-            Shape::Brake => None,
-            Shape::Interpolate { from_m, to_m, from_ns } => {
-                let share = since(from_ns) / self.period_s;
-                let velocity_m_s = (to_m - from_m) / self.period_s;
-                Some(if share < 1.0 { (from_m + (to_m - from_m) * share, velocity_m_s) } else { (to_m, 0.0) })
+    /// Position and velocity demanded, m and m/s; none while the brake is closed or a force is asked for.
+    pub(super) fn at(&self, now_ns: u64) -> Option<(f64, f64)> {
+        match &self.shape {
+            Shape::Brake | Shape::Force { .. } => None,
+            Shape::Interpolate { from_m, to_m, from_ns, period_s } => {
+                let share = now_ns.saturating_sub(*from_ns) as f64 * 1e-9 / period_s;
+                let velocity_m_s = (to_m - from_m) / period_s;
+                Some(if share < 1.0 {
+                    (from_m + (to_m - from_m) * share, velocity_m_s)
+                } else {
+                    (*to_m, 0.0)
+                })
             }
-            Shape::Ramp { position_m, velocity_m_s, from_ns } => {
-                let stop_s = velocity_m_s.abs() / self.deceleration_m_s2;
-                let time_s = since(from_ns).min(stop_s);
-                let slowing = self.deceleration_m_s2 * velocity_m_s.signum();
-                let now_m_s = velocity_m_s - slowing * time_s;
-                Some((position_m + f64::midpoint(velocity_m_s, now_m_s) * time_s, now_m_s))
-            }
+            Shape::Profile(profile) => Some(profile.at(now_ns)),
         }
     }
 
-    /// The servo's task `ahead_ns` from now, when its force takes effect.
+    /// The servo's task at that time.
     pub(super) fn task(&self, now_ns: u64) -> Task {
-        self.at(now_ns)
-            .map_or(Task::Brake, |(position_m, velocity_m_s)| Task::Follow { position_m, velocity_m_s })
+        match (&self.shape, self.at(now_ns)) {
+            (Shape::Force { force_n }, _) => Task::Force { force_n: *force_n },
+            (_, Some((position_m, velocity_m_s))) => Task::Follow { position_m, velocity_m_s },
+            (_, None) => Task::Brake,
+        }
     }
 
-    /// The position demanded; none while the brake is closed.
+    /// The position demanded; none where no position is.
     pub(super) fn position_m(&self, now_ns: u64) -> Option<f64> {
         self.at(now_ns).map(|(position_m, _)| position_m)
     }
 
     /// Heads for a target over the coming period, from where the demand ends now or from `actual_m`.
     /// No further than `limit_m_s` allows; returns whether that cut it.
-    pub(super) fn head_for(&mut self, now_ns: u64, target_m: f64, actual_m: f64, limit_m_s: f64) -> bool {
-        let from_m = match self.shape {
-            Shape::Brake => actual_m,
-            Shape::Interpolate { to_m, .. } => to_m,
-            Shape::Ramp { .. } => self.position_m(now_ns).unwrap_or(actual_m),
+    pub(super) fn head_for(
+        &mut self,
+        now_ns: u64,
+        target_m: f64,
+        actual_m: f64,
+        limit_m_s: f64,
+        period_s: f64,
+    ) -> bool {
+        let from_m = match &self.shape {
+            Shape::Brake | Shape::Force { .. } => actual_m,
+            Shape::Interpolate { to_m, .. } => *to_m,
+            Shape::Profile(profile) => profile.at(now_ns).0,
         };
-        let most_m = limit_m_s * self.period_s;
+        let most_m = limit_m_s * period_s;
         let step_m = (target_m - from_m).clamp(-most_m, most_m);
-        self.shape = Shape::Interpolate { from_m, to_m: from_m + step_m, from_ns: now_ns };
+        self.shape = Shape::Interpolate { from_m, to_m: from_m + step_m, from_ns: now_ns, period_s };
         (target_m - from_m).abs() > most_m
     }
 
-    /// Begins the quick-stop ramp at the present demand and the axis' actual velocity. The demanded one
-    /// is no guide: SYNC brings the command just when a line ends, or after it, where it is zero.
-    pub(super) fn slow_down(&mut self, now_ns: u64, velocity_m_s: f64) {
-        if let Some(position_m) = self.position_m(now_ns) {
-            self.shape = Shape::Ramp { position_m, velocity_m_s, from_ns: now_ns };
+    /// Follows a profile.
+    pub(super) fn follow(&mut self, profile: Profile) {
+        self.shape = Shape::Profile(profile);
+    }
+
+    /// Gives a force.
+    pub(super) fn push(&mut self, force_n: f64) {
+        self.shape = Shape::Force { force_n };
+    }
+
+    /// Slows down from the present demand (from `actual_m` where a force is asked for) and the axis' actual
+    /// velocity. The demanded velocity is no guide: SYNC brings the command just when a line ends, or after
+    /// it, where it is zero. A closed brake stays closed.
+    pub(super) fn slow_down(
+        &mut self,
+        now_ns: u64,
+        actual_m: f64,
+        velocity_m_s: f64,
+        deceleration_m_s2: f64,
+    ) {
+        if self.shape != Shape::Brake {
+            let position_m = self.position_m(now_ns).unwrap_or(actual_m);
+            self.follow(Profile::stop(now_ns, position_m, velocity_m_s, deceleration_m_s2));
         }
     }
 
-    /// Whether the demand no longer moves.
+    /// Whether no motion is asked for.
     pub(super) fn is_at_rest(&self, now_ns: u64) -> bool {
-        self.at(now_ns).is_none_or(|(_, velocity_m_s)| velocity_m_s.abs() < 1e-9)
+        match &self.shape {
+            Shape::Brake => true,
+            Shape::Force { .. } => false,
+            Shape::Profile(profile) => profile.is_over(now_ns),
+            Shape::Interpolate { .. } => {
+                self.at(now_ns).is_none_or(|(_, velocity_m_s)| velocity_m_s.abs() < 1e-9)
+            }
+        }
     }
 
     /// Lets the brake close.
@@ -96,15 +130,16 @@ mod tests {
     use super::*;
 
     const MS: u64 = 1_000_000;
+    const PERIOD_S: f64 = 1e-3;
 
     #[test]
     fn targets_are_reached_on_straight_lines_one_period_later() {
-        let mut demand = Demand::new(1e-3, 10.0);
+        let mut demand = Demand::new();
         assert_eq!(demand.position_m(0), None);
-        assert!(!demand.head_for(0, 0.2701, 0.27, 0.4));
+        assert!(!demand.head_for(0, 0.2701, 0.27, 0.4, PERIOD_S));
         let position = |demand: &Demand, ns| demand.position_m(ns).unwrap();
         assert!((position(&demand, MS / 2) - 0.27005).abs() < 1e-12);
-        demand.head_for(MS, 0.2703, 0.0, 0.4);
+        demand.head_for(MS, 0.2703, 0.0, 0.4, PERIOD_S);
         assert!((position(&demand, MS) - 0.2701).abs() < 1e-12);
         assert!((position(&demand, 5 * MS) - 0.2703).abs() < 1e-12);
         assert!(demand.is_at_rest(5 * MS));
@@ -112,19 +147,28 @@ mod tests {
 
     #[test]
     fn a_jump_is_cut_to_what_the_velocity_limit_allows() {
-        let mut demand = Demand::new(1e-3, 10.0);
-        assert!(demand.head_for(0, 0.30, 0.27, 0.4));
+        let mut demand = Demand::new();
+        assert!(demand.head_for(0, 0.30, 0.27, 0.4, PERIOD_S));
         assert!((demand.position_m(MS).unwrap() - 0.2704).abs() < 1e-12);
     }
 
     #[test]
-    fn the_quick_stop_ramp_slows_down_evenly_and_stays() {
-        let mut demand = Demand::new(1e-3, 10.0);
-        demand.head_for(0, 0.2702, 0.27, 0.4);
-        demand.slow_down(MS, 0.2);
+    fn it_slows_down_evenly_and_stays() {
+        let mut demand = Demand::new();
+        demand.head_for(0, 0.2702, 0.27, 0.4, PERIOD_S);
+        demand.slow_down(MS, 0.27, 0.2, 10.0);
         // 0.2 m/s at 10 m/s²: 20 ms and 2 mm.
         assert!(!demand.is_at_rest(MS + 19 * MS));
         assert!(demand.is_at_rest(MS + 21 * MS));
         assert!((demand.position_m(100 * MS).unwrap() - 0.2722).abs() < 1e-9);
+    }
+
+    #[test]
+    fn from_a_force_it_slows_down_where_the_axis_is() {
+        let mut demand = Demand::new();
+        demand.push(20.0);
+        assert_eq!(demand.task(0), Task::Force { force_n: 20.0 });
+        demand.slow_down(0, 0.28, 0.1, 10.0);
+        assert!((demand.position_m(100 * MS).unwrap() - 0.2805).abs() < 1e-9);
     }
 }

@@ -1,7 +1,25 @@
 //! An emulated servo drive: a CANopen node with the CiA 402 profile, its servo loops and its encoder.
+//!
+//! [`node`] speaks CiA 301, [`axis`] is the profile behind it, and the object dictionary lies between
+//! them. What an increment is worth is known to the axis alone: its loops work in SI units.
 
+mod axis;
 mod demand;
+pub(crate) mod dictionary;
+mod errors;
+mod heartbeats;
+mod homing;
 mod node;
+mod outbox;
+mod parameters;
+pub(crate) mod pdo;
+mod positioning;
+mod profile;
+mod rules;
+mod sdo;
+mod service;
 mod servo;
+#[cfg(test)]
+mod tests;
 
 pub(crate) use node::{DriveNode, DriveSettings};

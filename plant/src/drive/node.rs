@@ -1,27 +1,26 @@
-//! The drive as a CANopen node: NMT, heartbeats, SYNC-driven process data, CiA 402.
-//!
-//! Objects whose values are fixed here: 6060 = 8 (cyclic synchronous position), 605A = 2 (quick-stop
-//! ramp, then switch on disabled), 605E = 2 (the same ramp on a fault), 6007 = 3 (quick stop on loss of the link), 1029:1 = 0 (then
-//! pre-operational). There is no SDO server: everything is set at construction.
+//! The drive as a CANopen node (CiA 301): network management, heartbeats, emergencies, SYNC and
+//! process data. What the objects may become is served in [`service`](super::service).
 
 use masseter_shared::can::canopen::{
-    Cob, Emergency, EmergencyCode, Heartbeat, Nmt, NmtCommand, NmtState, NodeId,
+    Cob, Emergency, EmergencyCode, Heartbeat, Nmt, NmtCommand, NmtState, NodeId, ObjectAddress,
 };
-use masseter_shared::can::cia402::{Command, Controlword, DriveState, StatusBit, Statusword};
-use masseter_shared::can::{Frame, Rpdo1, Tpdo1};
+use masseter_shared::can::cia402::Controlword;
+use masseter_shared::can::{CanId, Frame};
 use masseter_shared::config::DriveConfig;
 
-use super::demand::Demand;
-use super::servo::Servo;
+use super::axis::{Axis, NewTargets};
+use super::dictionary::{Objects, PDOS, names};
+use super::errors::{DriveError, Errors};
+use super::heartbeats::{Consumer, Producer};
+use super::outbox::Outbox;
+use super::parameters::configure;
+use super::pdo::{LengthFault, NOT_VALID, Rpdo, Tpdo};
+use super::sdo::SdoServer;
 use crate::encoder::Encoder;
 
 const MS_NS: u64 = 1_000_000;
 /// From power-on to the boot-up message, ns.
 const BOOT_NS: u64 = 20 * MS_NS;
-/// Frames a node may have to send at one instant: boot-up or heartbeat, process data, emergencies.
-const OUTBOX: usize = 4;
-/// Error register 1001: generic error.
-const GENERIC_ERROR: u8 = 0x01;
 
 /// What a node is configured with.
 #[derive(Debug, Clone)]
@@ -44,84 +43,109 @@ pub(crate) struct DriveSettings {
     pub(crate) position_limit_increments: [i32; 2],
 }
 
+impl DriveSettings {
+    /// The object dictionary after power-on.
+    pub(crate) fn objects(&self) -> Objects {
+        let mut objects = Objects::new(self.node);
+        let in_ms = |ns: u64| (ns / MS_NS).min(u64::from(u16::MAX)) as u16;
+        let watched = u32::from(self.master.get()) << 16 | u32::from(in_ms(self.link_timeout_ns));
+        objects.set(names::WATCHED_HEARTBEAT, watched);
+        objects.set(names::HEARTBEAT_MS, in_ms(self.heartbeat_ns));
+        configure(&mut objects, &self.drive, self.period_s, self.position_limit_increments);
+        objects
+    }
+}
+
 /// One drive.
 #[derive(Debug, Clone)]
 pub(crate) struct DriveNode {
-    settings: DriveSettings,
-    encoder: Encoder,
-    servo: Servo,
-    demand: Demand,
-    force_n: f64,
-    nmt: Option<NmtState>,
-    power: DriveState,
-    controlword: Controlword,
-    buffered: Option<Rpdo1>,
-    is_cut: bool,
+    pub(super) node: NodeId,
+    pub(super) objects: Objects,
+    /// What a reset brings back: as configured, or as stored since (object 1010).
+    pub(super) stored: Objects,
+    /// As configured, which object 1011 brings back.
+    pub(super) factory: Objects,
+    pub(super) axis: Axis,
+    pub(super) errors: Errors,
+    pub(super) nmt: Option<NmtState>,
+    pub(super) producer: Producer,
+    pub(super) consumer: Consumer,
+    pub(super) rpdos: [Rpdo; PDOS],
+    pub(super) tpdos: [Tpdo; PDOS],
+    pub(super) sdo: SdoServer,
+    /// Cyclic targets that a client wrote since the last SYNC.
+    pub(super) new_targets: NewTargets,
     boot_at_ns: u64,
-    next_heartbeat_ns: u64,
-    master_heard_ns: Option<u64>,
-    straying_since_ns: Option<u64>,
-    outbox: [Option<Frame>; OUTBOX],
+    outbox: Outbox,
 }
 
 impl DriveNode {
     /// A drive that is switched on at `now_ns` where its axis stands.
-    pub(crate) fn new(settings: DriveSettings, encoder: Encoder, now_ns: u64, position_m: f64) -> Self {
-        let drive = &settings.drive;
+    pub(crate) fn new(settings: &DriveSettings, encoder: Encoder, now_ns: u64, position_m: f64) -> Self {
+        let objects = settings.objects();
         let boot_at_ns = now_ns + BOOT_NS;
         // Staggered, so that the nodes' heartbeats do not meet.
         let stagger_ns = settings.heartbeat_ns / 8 * u64::from(settings.node.get() % 8);
         Self {
-            servo: Servo::new(*drive, settings.step_s, position_m),
-            demand: Demand::new(settings.period_s, drive.quick_stop_deceleration_m_s2),
-            encoder,
-            force_n: 0.0,
+            node: settings.node,
+            axis: Axis::new(settings.drive, encoder, settings.step_s, position_m, &objects),
+            errors: Errors::default(),
             nmt: None,
-            power: DriveState::NotReadyToSwitchOn,
-            controlword: Controlword::DISABLE_VOLTAGE,
-            buffered: None,
-            is_cut: false,
+            producer: Producer::new(&objects, boot_at_ns + stagger_ns),
+            consumer: Consumer::new(&objects),
+            rpdos: std::array::from_fn(|number| Rpdo::new(&objects, number as u16)),
+            tpdos: std::array::from_fn(|number| Tpdo::new(&objects, number as u16)),
+            sdo: SdoServer::default(),
+            new_targets: NewTargets::default(),
             boot_at_ns,
-            next_heartbeat_ns: boot_at_ns + stagger_ns,
-            master_heard_ns: None,
-            straying_since_ns: None,
-            outbox: [None; OUTBOX],
-            settings,
+            outbox: Outbox::default(),
+            stored: objects.clone(),
+            factory: objects.clone(),
+            objects,
         }
     }
 
     /// State of the drive's power.
     #[cfg(test)]
-    pub(crate) fn power(&self) -> DriveState {
-        self.power
+    pub(crate) fn power(&self) -> masseter_shared::can::cia402::DriveState {
+        self.axis.power()
     }
 
     /// The next frame it wants to send.
     pub(crate) fn outgoing(&mut self) -> Option<Frame> {
-        self.outbox.iter_mut().find_map(Option::take)
+        self.outbox.take()
     }
 
-    fn send(&mut self, frame: Frame) {
-        if let Some(place) = self.outbox.iter_mut().find(|place| place.is_none()) {
-            *place = Some(frame);
-        }
+    pub(super) fn send(&mut self, frame: Frame) {
+        self.outbox.add(frame);
+    }
+
+    pub(super) fn is_operational(&self) -> bool {
+        self.nmt == Some(NmtState::Operational)
+    }
+
+    /// Whether it takes part in services other than network management and process data.
+    fn is_served(&self) -> bool {
+        matches!(self.nmt, Some(NmtState::Operational | NmtState::PreOperational))
     }
 
     /// Takes a frame that arrived at `now_ns` while its axis stood at `position_m`. What is not meant
-    /// for it, or malformed, has no effect; a process datum of wrong length is reported by EMCY 8210.
+    /// for it, or malformed, has no effect; process data of a wrong length are reported by EMCY.
     pub(crate) fn receive(&mut self, now_ns: u64, frame: &Frame, position_m: f64) {
         match Cob::try_from(frame.id()) {
             Ok(Cob::Nmt) => {
                 if let Ok(nmt) = Nmt::decode(frame.data())
-                    && nmt.target.includes(self.settings.node)
+                    && nmt.target.includes(self.node)
                 {
                     self.command_nmt(nmt.command, now_ns);
                 }
             }
-            Ok(Cob::Sync) => self.synchronise(now_ns, position_m),
-            Ok(Cob::Rpdo1(node)) if node == self.settings.node => self.buffer(frame),
-            Ok(Cob::Heartbeat(node)) if node == self.settings.master => self.master_heard_ns = Some(now_ns),
-            _ => {}
+            Ok(Cob::Sync) => self.take_sync(now_ns, frame.data(), position_m),
+            Ok(Cob::SdoRequest(node)) if node == self.node && self.is_served() => {
+                self.serve(now_ns, frame.data());
+            }
+            Ok(Cob::Heartbeat(node)) if self.nmt.is_some() => self.hear(now_ns, node, frame.data()),
+            _ => self.take_process_data(now_ns, frame),
         }
     }
 
@@ -130,95 +154,150 @@ impl DriveNode {
             return;
         }
         match command {
-            NmtCommand::Start => self.nmt = Some(NmtState::Operational),
+            NmtCommand::Start if !self.is_operational() => {
+                self.nmt = Some(NmtState::Operational);
+                self.tpdos.iter_mut().for_each(Tpdo::clear);
+            }
+            NmtCommand::Start => {}
             NmtCommand::Stop => self.leave_operational(NmtState::Stopped, now_ns),
             NmtCommand::EnterPreOperational => self.leave_operational(NmtState::PreOperational, now_ns),
-            NmtCommand::ResetNode | NmtCommand::ResetCommunication => {
+            NmtCommand::ResetCommunication => {
                 self.leave_operational(NmtState::PreOperational, now_ns);
-                (self.nmt, self.boot_at_ns) = (None, now_ns + BOOT_NS);
+                self.reset_communication(now_ns);
+            }
+            NmtCommand::ResetNode => self.reset_node(now_ns),
+        }
+    }
+
+    /// Without process data nobody guides the drive: it reacts as object 6007 says.
+    fn leave_operational(&mut self, state: NmtState, now_ns: u64) {
+        if self.is_operational() || state == NmtState::Stopped {
+            self.axis.lose_link(now_ns);
+        }
+        self.nmt = Some(state);
+        self.rpdos.iter_mut().for_each(Rpdo::clear);
+        self.new_targets = NewTargets::default();
+        self.sdo = SdoServer::default();
+    }
+
+    /// The communication objects as stored, then boot-up.
+    fn reset_communication(&mut self, now_ns: u64) {
+        self.objects.copy_range(&self.stored, 0x1000..=0x1FFF);
+        self.errors.forget_communication(&mut self.objects);
+        self.producer.configure(&self.objects, now_ns + BOOT_NS);
+        self.consumer = Consumer::new(&self.objects);
+        for number in 0..PDOS {
+            self.compile_rpdo(number);
+            self.compile_tpdo(number);
+        }
+        self.sdo = SdoServer::default();
+        (self.nmt, self.boot_at_ns) = (None, now_ns + BOOT_NS);
+    }
+
+    /// As after power-on: the brake closes, every object has its stored value, then boot-up.
+    fn reset_node(&mut self, now_ns: u64) {
+        self.objects = self.stored.clone();
+        self.errors = Errors::default();
+        self.rpdos.iter_mut().for_each(Rpdo::clear);
+        self.new_targets = NewTargets::default();
+        self.axis.restart(now_ns, &self.objects);
+        self.reset_communication(now_ns);
+    }
+
+    /// Takes up the parameters of the RPDO of that number.
+    pub(super) fn compile_rpdo(&mut self, number: usize) {
+        self.rpdos[number] = Rpdo::new(&self.objects, number as u16);
+    }
+
+    /// Takes up the parameters of the TPDO of that number.
+    pub(super) fn compile_tpdo(&mut self, number: usize) {
+        self.tpdos[number] = Tpdo::new(&self.objects, number as u16);
+    }
+
+    fn hear(&mut self, now_ns: u64, node: NodeId, data: &[u8]) {
+        // Supervision begins with a heartbeat, not with a boot-up message.
+        if Heartbeat::decode(data).is_ok_and(|heartbeat| heartbeat.state != NmtState::BootUp) {
+            self.consumer.hear(now_ns, node);
+            if self.consumer.hears_all() {
+                self.clear(DriveError::Heartbeat);
             }
         }
     }
 
-    /// Without process data nobody guides the drive: it brakes.
-    fn leave_operational(&mut self, state: NmtState, now_ns: u64) {
-        self.nmt = Some(state);
-        self.buffered = None;
-        self.command_power(Command::QuickStop, now_ns);
-    }
-
-    /// A synchronous RPDO waits for the next SYNC.
-    fn buffer(&mut self, frame: &Frame) {
-        if self.nmt != Some(NmtState::Operational) {
+    /// Process data wait for the next SYNC, or take effect at once where their PDO is event-driven.
+    fn take_process_data(&mut self, now_ns: u64, frame: &Frame) {
+        if !self.is_operational() {
             return;
         }
-        match Rpdo1::decode(frame.data()) {
-            Ok(rpdo) => self.buffered = Some(rpdo),
-            Err(_) => self.report(EmergencyCode::PDO_LENGTH),
+        let Some(number) = self.rpdos.iter().position(|rpdo| rpdo.id() == Some(frame.id())) else { return };
+        match self.rpdos[number].take(now_ns, frame.data()) {
+            Err(LengthFault::Short) => self.raise(DriveError::PdoShort),
+            Err(LengthFault::Long) => self.raise(DriveError::PdoLong),
+            Ok(()) => {
+                self.clear(DriveError::PdoShort);
+                self.clear(DriveError::PdoLong);
+                self.clear(DriveError::RpdoTimeout);
+            }
+        }
+        if !self.rpdos[number].is_synchronous() {
+            self.apply(number, now_ns);
+        }
+    }
+
+    /// Lets a received PDO take effect.
+    fn apply(&mut self, number: usize, now_ns: u64) {
+        let rpdo = &mut self.rpdos[number];
+        if !rpdo.apply(&mut self.objects) {
+            return;
+        }
+        let holds = |index| rpdo.holds(ObjectAddress::new(index, 0));
+        self.new_targets.position |= holds(0x607A);
+        self.new_targets.torque |= holds(0x6071);
+        let (commands, configures) = (holds(0x6040), rpdo.configures());
+        if configures {
+            self.axis.configure(now_ns, &self.objects);
+        }
+        if commands {
+            self.control(now_ns);
+        }
+    }
+
+    /// The controlword in the dictionary takes effect.
+    pub(super) fn control(&mut self, now_ns: u64) {
+        let word = Controlword(self.objects.get(names::CONTROLWORD));
+        if self.axis.control(now_ns, word, &self.objects) {
+            self.clear(DriveError::FollowingError);
         }
     }
 
     /// SYNC: buffered process data take effect, actual values are sampled and sent.
-    fn synchronise(&mut self, now_ns: u64, position_m: f64) {
-        if self.nmt != Some(NmtState::Operational) {
+    fn take_sync(&mut self, now_ns: u64, data: &[u8], position_m: f64) {
+        if !self.is_served() {
             return;
         }
-        if let Some(rpdo) = self.buffered.take() {
-            let command = rpdo.controlword.command(self.controlword);
-            self.controlword = rpdo.controlword;
-            self.command_power(command, now_ns);
-            if self.power == DriveState::OperationEnabled {
-                self.head_for(now_ns, rpdo.target_increments);
-            }
-        }
-        let tpdo = Tpdo1 {
-            statusword: self.statusword(),
-            actual_increments: self.encoder.read(position_m),
-            torque_permille: (self.force_n / self.settings.drive.rated_force_n * 1000.0).round() as i16,
+        let counter = match (data, self.objects.get(names::SYNC_OVERFLOW)) {
+            ([], 0) => 0,
+            ([counter], 2..) => *counter,
+            _ => return self.raise(DriveError::SyncLength),
         };
-        self.send(tpdo.frame(self.settings.node));
-    }
-
-    /// Follows a target within the software position limit and the velocity limit.
-    fn head_for(&mut self, now_ns: u64, target_increments: i32) {
-        let [lowest, highest] = self.settings.position_limit_increments;
-        let within = target_increments.clamp(lowest, highest);
-        let target_m = self.encoder.metres(within);
-        let limit_m_s = self.settings.drive.max_velocity_m_s;
-        let is_too_fast = self.demand.head_for(now_ns, target_m, self.servo.position_m(), limit_m_s);
-        self.is_cut = is_too_fast || within != target_increments;
-    }
-
-    fn statusword(&self) -> Statusword {
-        let is_enabled = self.power == DriveState::OperationEnabled;
-        Statusword::of(self.power)
-            .with(StatusBit::VoltageEnabled, true)
-            .with(StatusBit::Remote, true)
-            .with(StatusBit::TargetFollowed, is_enabled)
-            .with(StatusBit::InternalLimit, is_enabled && (self.is_cut || self.servo.is_limited()))
-            .with(StatusBit::FollowingError, self.straying_since_ns.is_some())
-    }
-
-    fn command_power(&mut self, command: Command, now_ns: u64) {
-        let before = self.power;
-        self.enter(before.after(command), now_ns);
-        if before == DriveState::Fault && self.power != before {
-            self.send(Emergency::RESET.frame(self.settings.node));
-        }
-    }
-
-    fn enter(&mut self, state: DriveState, now_ns: u64) {
-        if state == self.power {
-            return;
-        }
-        self.power = state;
-        self.straying_since_ns = None;
-        match state {
-            DriveState::OperationEnabled => {}
-            DriveState::QuickStopActive | DriveState::FaultReactionActive => {
-                self.demand.slow_down(now_ns, self.servo.velocity_m_s());
+        self.clear(DriveError::SyncLength);
+        if self.is_operational() {
+            for number in 0..PDOS {
+                if self.rpdos[number].is_synchronous() {
+                    self.apply(number, now_ns);
+                }
             }
-            _ => self.demand.release(),
+        }
+        let new_targets = std::mem::take(&mut self.new_targets);
+        self.axis.synchronise(now_ns, new_targets, &self.objects);
+        if self.is_operational() {
+            self.axis.sample(position_m);
+            self.axis.show(now_ns, &mut self.objects);
+            for number in 0..PDOS {
+                if let Some(frame) = self.tpdos[number].at_sync(now_ns, counter, &self.objects) {
+                    self.send(frame);
+                }
+            }
         }
     }
 
@@ -227,68 +306,83 @@ impl DriveNode {
         self.boot(now_ns);
         self.produce_heartbeat(now_ns);
         self.watch_link(now_ns);
-        self.complete(now_ns);
-        let measured_m = {
-            let increments = self.encoder.read(position_m);
-            self.encoder.metres(increments)
-        };
-        self.force_n = self.servo.step(measured_m, self.demand.task(now_ns));
-        self.watch_following(now_ns);
-        self.force_n
+        if let Some(abort) = self.sdo.expire(now_ns) {
+            self.send(abort.frame(self.node));
+        }
+        if let Some(error) = self.axis.step(now_ns, position_m) {
+            self.raise(error);
+        }
+        self.send_events(now_ns);
+        self.axis.force_n()
     }
 
     fn boot(&mut self, now_ns: u64) {
         if self.nmt.is_none() && now_ns >= self.boot_at_ns {
             self.nmt = Some(NmtState::PreOperational);
-            self.send(Heartbeat { state: NmtState::BootUp }.frame(self.settings.node));
+            self.send(Heartbeat { state: NmtState::BootUp }.frame(self.node));
         }
     }
 
     fn produce_heartbeat(&mut self, now_ns: u64) {
         if let Some(state) = self.nmt
-            && now_ns >= self.next_heartbeat_ns
+            && self.producer.is_due(now_ns)
         {
-            self.next_heartbeat_ns += self.settings.heartbeat_ns;
-            self.send(Heartbeat { state }.frame(self.settings.node));
+            self.send(Heartbeat { state }.frame(self.node));
         }
     }
 
-    /// Supervision begins with the master's first heartbeat; its loss quick-stops the drive.
+    /// A lost heartbeat is the loss of the link: objects 6007 and 1029. So is a PDO that does not come.
     fn watch_link(&mut self, now_ns: u64) {
-        let Some(heard_ns) = self.master_heard_ns else { return };
-        if now_ns.saturating_sub(heard_ns) > self.settings.link_timeout_ns {
-            self.master_heard_ns = None;
-            self.report(EmergencyCode::HEARTBEAT);
-            self.leave_operational(NmtState::PreOperational, now_ns);
+        if self.consumer.loses(now_ns) {
+            self.raise(DriveError::Heartbeat);
+            self.axis.lose_link(now_ns);
+            if self.is_operational() {
+                match self.objects.get(names::COMMUNICATION_ERROR) {
+                    0 => self.leave_operational(NmtState::PreOperational, now_ns),
+                    2 => self.leave_operational(NmtState::Stopped, now_ns),
+                    _ => {}
+                }
+            }
+        }
+        if self.is_operational() && self.rpdos.iter_mut().any(|rpdo| rpdo.is_overdue(now_ns)) {
+            self.raise(DriveError::RpdoTimeout);
         }
     }
 
-    /// The drive's own transitions: initialised, quick stop ended, fault reaction ended.
-    fn complete(&mut self, now_ns: u64) {
-        let ramps = matches!(self.power, DriveState::QuickStopActive | DriveState::FaultReactionActive);
-        if !ramps || self.demand.is_at_rest(now_ns) {
-            self.enter(self.power.after_completion(), now_ns);
-        }
-    }
-
-    /// Following error beyond its window (6065) for longer than its time-out (6066): fault.
-    fn watch_following(&mut self, now_ns: u64) {
-        let drive = &self.settings.drive;
-        let error_m =
-            self.demand.position_m(now_ns).map_or(0.0, |demand_m| demand_m - self.servo.position_m());
-        if error_m.abs() <= drive.following_error_m {
-            self.straying_since_ns = None;
+    /// TPDOs that no SYNC drives.
+    fn send_events(&mut self, now_ns: u64) {
+        if !self.is_operational() || !self.tpdos.iter().any(Tpdo::is_event_driven) {
             return;
         }
-        let since_ns = *self.straying_since_ns.get_or_insert(now_ns);
-        if now_ns - since_ns > u64::from(drive.following_error_timeout_ms) * MS_NS {
-            self.report(EmergencyCode::FOLLOWING_ERROR);
-            self.enter(self.power.after_fault(), now_ns);
+        self.axis.show(now_ns, &mut self.objects);
+        for number in 0..PDOS {
+            if let Some(frame) = self.tpdos[number].at_event(now_ns, &self.objects) {
+                self.send(frame);
+            }
         }
     }
 
-    fn report(&mut self, code: EmergencyCode) {
-        let emergency = Emergency { code, register: GENERIC_ERROR, vendor: [0; 5] };
-        self.send(emergency.frame(self.settings.node));
+    fn raise(&mut self, error: DriveError) {
+        let emergency = self.errors.raise(error, &mut self.objects);
+        self.tell(emergency);
+    }
+
+    fn clear(&mut self, error: DriveError) {
+        let emergency = self.errors.clear(error, &mut self.objects);
+        self.tell(emergency);
+    }
+
+    /// Sends an emergency message, in the states in which nodes send them and unless 1014 forbids it.
+    fn tell(&mut self, emergency: Option<Emergency>) {
+        let cob_id = self.objects.get(names::EMERGENCY_COB_ID);
+        if let Some(emergency) = emergency
+            && self.is_served()
+            && cob_id & NOT_VALID == 0
+            && let Ok(id) = CanId::standard((cob_id & 0x7FF) as u16)
+        {
+            self.send(Frame::fixed(id, emergency.encode()));
+        }
     }
 }
+
+const _: () = assert!(EmergencyCode::RESET.0 == 0, "object 603F shows it as no error");

@@ -1,5 +1,5 @@
 //! The servo loops of a drive: P position loop with velocity feed-forward, PI velocity loop, force
-//! limit; and the holding brake.
+//! limit; force control within a range of velocities; and the holding brake.
 //!
 //! Knows nothing of CANopen: the node above tells it what to do.
 
@@ -23,6 +23,22 @@ pub(crate) enum Task {
         /// Its velocity, m/s.
         velocity_m_s: f64,
     },
+    /// Give a force, as long as the velocity keeps to its range.
+    Force {
+        /// Force wanted, N.
+        force_n: f64,
+    },
+}
+
+/// What the servo keeps to, whatever its task.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct ServoLimits {
+    /// Largest force, N.
+    pub(crate) force_n: f64,
+    /// Largest velocity in position control, m/s.
+    pub(crate) velocity_m_s: f64,
+    /// Lowest and highest velocity in force control, m/s.
+    pub(crate) free_velocity_m_s: [f64; 2],
 }
 
 /// The loops' memory.
@@ -67,13 +83,14 @@ impl Servo {
     }
 
     /// One step of the loops: the force for the next `step_s`, N.
-    pub(crate) fn step(&mut self, measured_m: f64, task: Task) -> f64 {
+    pub(crate) fn step(&mut self, measured_m: f64, task: Task, limits: &ServoLimits) -> f64 {
         let raw = (measured_m - self.position_m) / self.step_s;
         self.velocity_m_s += (raw - self.velocity_m_s) * self.step_s / (self.step_s + VELOCITY_FILTER_S);
         self.position_m = measured_m;
         match task {
             Task::Brake => self.brake(),
-            Task::Follow { position_m, velocity_m_s } => self.follow(position_m, velocity_m_s),
+            Task::Follow { position_m, velocity_m_s } => self.follow(position_m, velocity_m_s, limits),
+            Task::Force { force_n } => self.push(force_n, limits),
         }
     }
 
@@ -85,18 +102,32 @@ impl Servo {
         self.integral_n - BRAKE_DAMPING_N_S_M * self.velocity_m_s
     }
 
-    fn follow(&mut self, position_m: f64, velocity_m_s: f64) -> f64 {
+    fn follow(&mut self, position_m: f64, velocity_m_s: f64, limits: &ServoLimits) -> f64 {
         let config = &self.config;
         self.brake_at_m = None;
         let wanted = velocity_m_s + config.position_gain_per_s * (position_m - self.position_m);
-        let speed = wanted.clamp(-config.max_velocity_m_s, config.max_velocity_m_s);
+        let speed = wanted.clamp(-limits.velocity_m_s, limits.velocity_m_s);
         let proportional_n = config.velocity_gain_n_s_per_m * (speed - self.velocity_m_s);
         let asked_n = proportional_n + self.integral_n;
-        let force_n = asked_n.clamp(-config.max_force_n, config.max_force_n);
+        let force_n = asked_n.clamp(-limits.force_n, limits.force_n);
         self.is_limited = force_n.to_bits() != asked_n.to_bits() || speed.to_bits() != wanted.to_bits();
         if !self.is_limited {
             self.integral_n += proportional_n * self.step_s / config.velocity_integral_time_s;
         }
+        force_n
+    }
+
+    /// The velocity loop takes over, without integral, where the velocity would leave its range.
+    fn push(&mut self, asked_n: f64, limits: &ServoLimits) -> f64 {
+        self.brake_at_m = None;
+        let [least_n, most_n] = limits
+            .free_velocity_m_s
+            .map(|speed| self.config.velocity_gain_n_s_per_m * (speed - self.velocity_m_s));
+        let allowed_n = asked_n.max(least_n).min(most_n);
+        let force_n = allowed_n.clamp(-limits.force_n, limits.force_n);
+        self.is_limited = force_n.to_bits() != asked_n.to_bits();
+        // When the position loop takes over it begins with this force.
+        self.integral_n = force_n;
         force_n
     }
 }
@@ -108,13 +139,15 @@ mod tests {
     use super::*;
 
     const STEP_S: f64 = 1.25e-4;
+    const LIMITS: ServoLimits =
+        ServoLimits { force_n: 1000.0, velocity_m_s: 0.4, free_velocity_m_s: [-0.4, 0.4] };
 
     /// A mass with a constant load.
     fn simulate(task: impl Fn(f64) -> Task, mass_kg: f64, load_n: f64, seconds: f64) -> (f64, f64) {
         let mut servo = Servo::new(DrivesConfig::default().leg, STEP_S, 0.27);
         let (mut position_m, mut velocity_m_s, mut time_s) = (0.27, 0.0, 0.0);
         while time_s < seconds {
-            let force_n = servo.step(position_m, task(time_s));
+            let force_n = servo.step(position_m, task(time_s), &LIMITS);
             velocity_m_s += (force_n - load_n) / mass_kg * STEP_S;
             position_m += velocity_m_s * STEP_S;
             time_s += STEP_S;
@@ -146,9 +179,23 @@ mod tests {
 
     #[test]
     fn force_and_velocity_stay_within_their_limits() {
-        let config = DrivesConfig::default().leg;
-        let mut servo = Servo::new(config, STEP_S, 0.27);
-        let force_n = servo.step(0.27, Task::Follow { position_m: 5.0, velocity_m_s: 0.0 });
-        assert!(force_n.abs() <= config.max_force_n && servo.is_limited());
+        let mut servo = Servo::new(DrivesConfig::default().leg, STEP_S, 0.27);
+        let force_n = servo.step(0.27, Task::Follow { position_m: 5.0, velocity_m_s: 0.0 }, &LIMITS);
+        assert!(force_n.abs() <= LIMITS.force_n && servo.is_limited());
+    }
+
+    #[test]
+    fn a_force_is_given_as_it_is_asked_for() {
+        let mut servo = Servo::new(DrivesConfig::default().leg, STEP_S, 0.27);
+        let force_n = servo.step(0.27, Task::Force { force_n: -33.0 }, &LIMITS);
+        assert!((force_n + 33.0).abs() < 1e-12 && !servo.is_limited());
+        let force_n = servo.step(0.27, Task::Force { force_n: 5000.0 }, &LIMITS);
+        assert!((force_n - 240.0).abs() < 1e-9 && servo.is_limited(), "0.4 m/s times the velocity gain");
+    }
+
+    #[test]
+    fn under_a_force_the_axis_keeps_to_its_velocity() {
+        let (position_m, velocity_m_s) = simulate(|_| Task::Force { force_n: 100.0 }, 0.6, 20.0, 0.5);
+        assert!((0.2..0.4).contains(&velocity_m_s), "{velocity_m_s} at {position_m}");
     }
 }

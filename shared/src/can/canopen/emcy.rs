@@ -22,6 +22,10 @@ impl EmergencyCode {
     pub const RECOVERED_FROM_BUS_OFF: Self = Self(0x8140);
     /// A PDO was too short to be used.
     pub const PDO_LENGTH: Self = Self(0x8210);
+    /// A PDO was longer than its mapping.
+    pub const PDO_LENGTH_EXCEEDED: Self = Self(0x8220);
+    /// SYNC had another length than object 1019 says.
+    pub const SYNC_LENGTH: Self = Self(0x8240);
     /// An RPDO is overdue.
     pub const RPDO_TIMEOUT: Self = Self(0x8250);
     /// The following error exceeded its window (6065) for longer than allowed (6066).
@@ -65,9 +69,14 @@ impl Emergency {
 
     /// The frame in which that node sends it.
     pub fn frame(self, node: NodeId) -> Frame {
+        Frame::fixed(Cob::Emergency(node).into(), self.encode())
+    }
+
+    /// The data bytes.
+    pub fn encode(self) -> [u8; Self::LENGTH] {
         let [low, high] = self.code.0.to_le_bytes();
         let [v0, v1, v2, v3, v4] = self.vendor;
-        Frame::fixed(Cob::Emergency(node).into(), [low, high, self.register, v0, v1, v2, v3, v4])
+        [low, high, self.register, v0, v1, v2, v3, v4]
     }
 
     /// Reads the data bytes.

@@ -1,6 +1,7 @@
 //! The controlword, object 6040, and the command its bits mean.
 //!
-//! Bits of the modes of operation (4 to 6) and halt (8) are carried but not interpreted.
+//! Bits of the modes of operation (4 to 6) and halt (8) have their readers; what they lead to is the
+//! drive's.
 
 use std::fmt;
 
@@ -9,7 +10,11 @@ const ENABLE_VOLTAGE: u16 = 1 << 1;
 /// Low-active: cleared, it asks for a quick stop.
 const NO_QUICK_STOP: u16 = 1 << 2;
 const ENABLE_OPERATION: u16 = 1 << 3;
+const MODE_START: u16 = 1 << 4;
+const CHANGE_IMMEDIATELY: u16 = 1 << 5;
+const RELATIVE: u16 = 1 << 6;
 const FAULT_RESET: u16 = 1 << 7;
+const HALT: u16 = 1 << 8;
 
 /// What a controlword asks of a drive.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -71,6 +76,26 @@ impl Controlword {
     /// Whether the fault reset bit is set, so that the next word cannot raise it.
     pub(super) const fn holds_fault_reset(self) -> bool {
         self.has(FAULT_RESET)
+    }
+
+    /// Bit 4: new set-point in profile position, operation start in homing.
+    pub const fn starts(self) -> bool {
+        self.has(MODE_START)
+    }
+
+    /// Bit 5 in profile position: the new set-point does not wait for the end of the present motion.
+    pub const fn changes_immediately(self) -> bool {
+        self.has(CHANGE_IMMEDIATELY)
+    }
+
+    /// Bit 6 in profile position: the target counts from the one before.
+    pub const fn is_relative(self) -> bool {
+        self.has(RELATIVE)
+    }
+
+    /// Bit 8: the axis shall stand still.
+    pub const fn halts(self) -> bool {
+        self.has(HALT)
     }
 
     const fn has(self, bit: u16) -> bool {

@@ -1,8 +1,8 @@
 //! The drive's state machine: what commands, faults and its own progress do to the state.
 //!
 //! T-numbers are the transitions of CiA 402. T0 (power-on) creates the drive. T16 (operation enabled
-//! again out of quick stop) is left out: it exists with quick-stop option code 605A = 5 to 8 only, and
-//! the rig's drives have 2, slow down and switch off.
+//! again out of quick stop) exists only where the quick-stop option code 605A says that the drive stays
+//! in quick stop: [`DriveState::after_in_held_quick_stop`].
 
 use super::{Command, DriveState};
 
@@ -35,6 +35,16 @@ impl DriveState {
             (unmoved, _)                                   => unmoved,
         };
         next
+    }
+
+    /// The state after a command to a drive that stays in quick stop until it is told to leave (605A = 5 or
+    /// 6): as [`after`](Self::after), and T16.
+    #[must_use]
+    pub const fn after_in_held_quick_stop(self, command: Command) -> Self {
+        match (self, command) {
+            (Self::QuickStopActive, Command::EnableOperation) => Self::OperationEnabled,
+            _ => self.after(command),
+        }
     }
 
     /// The state after the drive detected a fault (T13).
@@ -93,6 +103,17 @@ mod tests {
         for (state, expected) in TABLE {
             assert_eq!(COMMANDS.map(|command| state.after(command)), expected, "from {state}");
         }
+    }
+
+    #[test]
+    fn only_a_held_quick_stop_can_be_left_for_operation() {
+        for state in DriveState::ALL {
+            for command in COMMANDS {
+                let differs = state.after_in_held_quick_stop(command) != state.after(command);
+                assert_eq!(differs, state == QuickStopActive && command == Command::EnableOperation);
+            }
+        }
+        assert_eq!(QuickStopActive.after_in_held_quick_stop(Command::EnableOperation), OperationEnabled);
     }
 
     #[test]

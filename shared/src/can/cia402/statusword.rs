@@ -26,12 +26,23 @@ pub enum StatusBit {
     Warning = 7,
     /// The drive obeys the controlword.
     Remote = 9,
+    /// Profile position and homing: the target is reached.
+    TargetReached = 10,
     /// An internal limit is active, such as the software position limit 607D.
     InternalLimit = 11,
     /// Cyclic synchronous modes: the target is being followed.
     TargetFollowed = 12,
     /// Cyclic synchronous position: the following error window was left.
     FollowingError = 13,
+}
+
+impl StatusBit {
+    /// Profile position: the new set-point was taken.
+    pub const SETPOINT_ACKNOWLEDGED: Self = Self::TargetFollowed;
+    /// Homing: the home position was found.
+    pub const HOMING_ATTAINED: Self = Self::TargetFollowed;
+    /// Homing: it failed.
+    pub const HOMING_ERROR: Self = Self::FollowingError;
 }
 
 /// Object 6041 as it is on the wire.
@@ -88,10 +99,11 @@ impl fmt::Debug for Statusword {
 mod tests {
     use super::*;
 
-    const FLAGS: [StatusBit; 6] = [
+    const FLAGS: [StatusBit; 7] = [
         StatusBit::VoltageEnabled,
         StatusBit::Warning,
         StatusBit::Remote,
+        StatusBit::TargetReached,
         StatusBit::InternalLimit,
         StatusBit::TargetFollowed,
         StatusBit::FollowingError,

@@ -1,0 +1,372 @@
+//! The drive's axis under CiA 402: power states, modes of operation, what the servo is to do, and what
+//! the objects of the profile show of it.
+//!
+//! Knows nothing of frames. Profile position and homing have modules of their own.
+
+use masseter_shared::can::cia402::{Command, Controlword, DriveState, StatusBit, Statusword};
+use masseter_shared::config::DriveConfig;
+
+use super::demand::Demand;
+use super::dictionary::{Objects, names};
+use super::errors::DriveError;
+use super::homing::Homing;
+use super::parameters::{LinkReaction, Parameters, Stop};
+use super::positioning::Positioning;
+use super::profile::Profile;
+use super::servo::{Servo, ServoLimits};
+use crate::encoder::Encoder;
+
+/// Mode of operation (object 6060).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Mode {
+    ProfilePosition,
+    Homing,
+    CyclicPosition,
+    CyclicTorque,
+}
+
+impl Mode {
+    /// The mode of that number; `None` where the drive has no such mode.
+    pub(super) const fn of(number: i8) -> Option<Self> {
+        match number {
+            1 => Some(Self::ProfilePosition),
+            6 => Some(Self::Homing),
+            8 => Some(Self::CyclicPosition),
+            10 => Some(Self::CyclicTorque),
+            _ => None,
+        }
+    }
+
+    const fn number(self) -> i8 {
+        match self {
+            Self::ProfilePosition => 1,
+            Self::Homing => 6,
+            Self::CyclicPosition => 8,
+            Self::CyclicTorque => 10,
+        }
+    }
+}
+
+/// Which cyclic targets are new at a SYNC.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(super) struct NewTargets {
+    pub(super) position: bool,
+    pub(super) torque: bool,
+}
+
+/// One axis.
+#[derive(Debug, Clone)]
+pub(super) struct Axis {
+    drive: DriveConfig,
+    encoder: Encoder,
+    servo: Servo,
+    pub(super) parameters: Parameters,
+    pub(super) demand: Demand,
+    pub(super) controlword: Controlword,
+    pub(super) positioning: Positioning,
+    pub(super) homing: Homing,
+    /// What the encoder counted last.
+    pub(super) counts: i32,
+    /// What position 0 of the encoder is called.
+    pub(super) origin_increments: i32,
+    /// Whether a target was cut to a limit.
+    pub(super) is_cut: bool,
+    mode: Mode,
+    power: DriveState,
+    force_n: f64,
+    straying_since_ns: Option<u64>,
+}
+
+impl Axis {
+    /// An axis that is switched on where it stands.
+    pub(super) fn new(
+        drive: DriveConfig,
+        encoder: Encoder,
+        step_s: f64,
+        position_m: f64,
+        objects: &Objects,
+    ) -> Self {
+        let servo = Servo::new(drive, step_s, position_m);
+        Self {
+            counts: encoder.nearest(position_m),
+            parameters: Parameters::of(objects, &drive),
+            drive,
+            encoder,
+            servo,
+            demand: Demand::new(),
+            controlword: Controlword::DISABLE_VOLTAGE,
+            positioning: Positioning::default(),
+            homing: Homing::default(),
+            origin_increments: 0,
+            is_cut: false,
+            mode: Mode::CyclicPosition,
+            power: DriveState::NotReadyToSwitchOn,
+            force_n: 0.0,
+            straying_since_ns: None,
+        }
+    }
+
+    /// State of the power stage.
+    #[cfg(test)]
+    pub(super) fn power(&self) -> DriveState {
+        self.power
+    }
+
+    /// Whether it follows targets.
+    pub(super) fn is_enabled(&self) -> bool {
+        self.power == DriveState::OperationEnabled
+    }
+
+    /// As after power-on, where it stands: the brake closes, the encoder's own zero holds again.
+    pub(super) fn restart(&mut self, now_ns: u64, objects: &Objects) {
+        self.controlword = Controlword::DISABLE_VOLTAGE;
+        self.origin_increments = 0;
+        self.enter(DriveState::NotReadyToSwitchOn, now_ns);
+        self.configure(now_ns, objects);
+    }
+
+    /// Takes up what the dictionary says. A mode that changes in operation brings the axis to rest first.
+    pub(super) fn configure(&mut self, now_ns: u64, objects: &Objects) {
+        self.parameters = Parameters::of(objects, &self.drive);
+        let mode = Mode::of(objects.get(names::MODE)).unwrap_or(self.mode);
+        if mode != self.mode {
+            self.mode = mode;
+            self.is_cut = false;
+            (self.positioning, self.homing) = (Positioning::default(), Homing::default());
+            if self.is_enabled() {
+                self.slow_down(now_ns, self.parameters.profile.deceleration_m_s2);
+            }
+        }
+    }
+
+    /// Obeys a controlword; whether it ended a fault.
+    pub(super) fn control(&mut self, now_ns: u64, word: Controlword, objects: &Objects) -> bool {
+        let before = std::mem::replace(&mut self.controlword, word);
+        let was_fault = self.power == DriveState::Fault;
+        self.obey(word.command(before), now_ns);
+        if self.is_enabled() {
+            match self.mode {
+                Mode::ProfilePosition => self.control_positioning(now_ns, before, objects),
+                Mode::Homing => self.control_homing(now_ns, before),
+                Mode::CyclicPosition | Mode::CyclicTorque => {}
+            }
+        }
+        was_fault && self.power != DriveState::Fault
+    }
+
+    fn obey(&mut self, command: Command, now_ns: u64) {
+        let next = if self.parameters.holds_quick_stop {
+            self.power.after_in_held_quick_stop(command)
+        } else {
+            self.power.after(command)
+        };
+        self.enter(next, now_ns);
+    }
+
+    /// Nobody guides the drive any more (object 6007).
+    pub(super) fn lose_link(&mut self, now_ns: u64) {
+        match self.parameters.link {
+            LinkReaction::Nothing => {}
+            LinkReaction::Fault => self.enter(self.power.after_fault(), now_ns),
+            LinkReaction::DisableVoltage => self.obey(Command::DisableVoltage, now_ns),
+            LinkReaction::QuickStop => self.obey(Command::QuickStop, now_ns),
+        }
+    }
+
+    fn enter(&mut self, state: DriveState, now_ns: u64) {
+        if state == self.power {
+            return;
+        }
+        self.power = state;
+        self.straying_since_ns = None;
+        self.is_cut = false;
+        (self.positioning, self.homing) = (Positioning::default(), Homing::default());
+        match state {
+            DriveState::OperationEnabled => self.begin(),
+            DriveState::QuickStopActive => self.stop(now_ns, self.parameters.quick_stop),
+            DriveState::FaultReactionActive => self.stop(now_ns, self.parameters.fault_stop),
+            _ => self.demand.release(),
+        }
+    }
+
+    /// The cyclic modes wait for their first target behind a closed brake, the others hold the axis.
+    fn begin(&mut self) {
+        let waits = matches!(self.mode, Mode::CyclicPosition | Mode::CyclicTorque);
+        if !waits {
+            self.demand.follow(Profile::hold(self.servo.position_m()));
+        }
+    }
+
+    fn stop(&mut self, now_ns: u64, stop: Stop) {
+        match stop {
+            Stop::Brake => self.demand.release(),
+            Stop::Ramp { deceleration_m_s2 } => self.slow_down(now_ns, deceleration_m_s2),
+        }
+    }
+
+    pub(super) fn slow_down(&mut self, now_ns: u64, deceleration_m_s2: f64) {
+        let (position_m, velocity_m_s) = (self.servo.position_m(), self.servo.velocity_m_s());
+        self.demand.slow_down(now_ns, position_m, velocity_m_s, deceleration_m_s2);
+    }
+
+    /// Where the axis stands, m in the encoder's coordinates.
+    pub(super) fn measured_m(&self) -> f64 {
+        self.servo.position_m()
+    }
+
+    /// A position of the dictionary in the encoder's metres.
+    pub(super) fn metres(&self, increments: i32) -> f64 {
+        self.encoder.metres(increments.saturating_sub(self.origin_increments))
+    }
+
+    /// A position in the encoder's metres as the dictionary has it.
+    fn increments(&self, position_m: f64) -> i32 {
+        self.encoder.nearest(position_m).saturating_add(self.origin_increments)
+    }
+
+    /// The cyclic modes: the targets that were buffered take effect.
+    pub(super) fn synchronise(&mut self, now_ns: u64, new: NewTargets, objects: &Objects) {
+        if !self.is_enabled() {
+            return;
+        }
+        match self.mode {
+            Mode::CyclicPosition if new.position => {
+                self.head_for(now_ns, objects.get(names::TARGET_POSITION));
+            }
+            Mode::CyclicTorque if new.torque => self.push(objects.get(names::TARGET_TORQUE)),
+            _ => {}
+        }
+    }
+
+    /// Follows a target within the software position limit and the velocity limit.
+    fn head_for(&mut self, now_ns: u64, target_increments: i32) {
+        let within = self.within_limits(target_increments);
+        let Parameters { velocity_limit_m_s, period_s, .. } = self.parameters;
+        let (target_m, actual_m) = (self.metres(within), self.servo.position_m());
+        let is_too_fast = self.demand.head_for(now_ns, target_m, actual_m, velocity_limit_m_s, period_s);
+        self.is_cut = is_too_fast || within != target_increments;
+    }
+
+    /// The nearest target that the software position limits allow. Limits in the wrong order allow none:
+    /// the lower one counts.
+    pub(super) fn within_limits(&self, target_increments: i32) -> i32 {
+        let [lowest, highest] = self.parameters.position_limits;
+        target_increments.min(highest).max(lowest)
+    }
+
+    fn push(&mut self, torque_permille: i16) {
+        let asked_n = f64::from(torque_permille) / 1000.0 * self.drive.rated_force_n;
+        let limit_n = self.parameters.force_limit_n;
+        let force_n = asked_n.clamp(-limit_n, limit_n);
+        self.is_cut = force_n.to_bits() != asked_n.to_bits();
+        self.demand.push(force_n);
+    }
+
+    /// A step of the servo loops with the axis at `position_m`; what went wrong in it.
+    pub(super) fn step(&mut self, now_ns: u64, position_m: f64) -> Option<DriveError> {
+        self.complete(now_ns);
+        let before = std::mem::replace(&mut self.counts, self.encoder.read(position_m));
+        if self.is_enabled() {
+            match self.mode {
+                Mode::ProfilePosition => self.continue_positioning(now_ns),
+                Mode::Homing => self.continue_homing(now_ns, before),
+                Mode::CyclicPosition | Mode::CyclicTorque => {}
+            }
+        }
+        let limits = self.servo_limits();
+        let measured_m = self.encoder.metres(self.counts);
+        self.force_n = self.servo.step(measured_m, self.demand.task(now_ns), &limits);
+        self.watch_following(now_ns)
+    }
+
+    /// The force of the last step, N.
+    pub(super) fn force_n(&self) -> f64 {
+        self.force_n
+    }
+
+    /// The drive's own transitions: initialised, quick stop ended, fault reaction ended.
+    fn complete(&mut self, now_ns: u64) {
+        let is_finished = match self.power {
+            DriveState::QuickStopActive => {
+                !self.parameters.holds_quick_stop && self.demand.is_at_rest(now_ns)
+            }
+            DriveState::FaultReactionActive => self.demand.is_at_rest(now_ns),
+            _ => true,
+        };
+        if is_finished {
+            self.enter(self.power.after_completion(), now_ns);
+        }
+    }
+
+    /// Under a force the axis may be no faster than it could still stop before the software limits.
+    fn servo_limits(&self) -> ServoLimits {
+        let Parameters { velocity_limit_m_s, force_limit_n, position_limits, quick_stop, .. } =
+            self.parameters;
+        let mut free_velocity_m_s = [-velocity_limit_m_s, velocity_limit_m_s];
+        if let (Mode::CyclicTorque, Stop::Ramp { deceleration_m_s2 }) = (self.mode, quick_stop) {
+            let [lowest_m, highest_m] = position_limits.map(|end| self.metres(end));
+            let at_m = self.servo.position_m();
+            let braking_m_s = |way_m: f64| (2.0 * deceleration_m_s2 * way_m.max(0.0)).sqrt();
+            free_velocity_m_s = [
+                -braking_m_s(at_m - lowest_m).min(velocity_limit_m_s),
+                braking_m_s(highest_m - at_m).min(velocity_limit_m_s),
+            ];
+        }
+        ServoLimits { force_n: force_limit_n, velocity_m_s: velocity_limit_m_s, free_velocity_m_s }
+    }
+
+    /// Following error beyond its window (6065) for longer than its time-out (6066): fault.
+    fn watch_following(&mut self, now_ns: u64) -> Option<DriveError> {
+        let window_m = self.parameters.following_window_m?;
+        let demand_m = self.demand.position_m(now_ns);
+        let error_m = demand_m.map_or(0.0, |demand_m| demand_m - self.servo.position_m());
+        if error_m.abs() <= window_m {
+            self.straying_since_ns = None;
+            return None;
+        }
+        let since_ns = *self.straying_since_ns.get_or_insert(now_ns);
+        if now_ns - since_ns <= self.parameters.following_timeout_ns {
+            return None;
+        }
+        self.enter(self.power.after_fault(), now_ns);
+        Some(DriveError::FollowingError)
+    }
+
+    /// Reads the encoder with the axis at `position_m`, as SYNC asks for.
+    pub(super) fn sample(&mut self, position_m: f64) {
+        self.counts = self.encoder.read(position_m);
+    }
+
+    /// Writes what the axis does into the objects that show it.
+    pub(super) fn show(&self, now_ns: u64, objects: &mut Objects) {
+        let actual = self.counts.saturating_add(self.origin_increments);
+        let demand = self.demand.position_m(now_ns).map_or(actual, |demand_m| self.increments(demand_m));
+        let torque = self.force_n / self.drive.rated_force_n * 1000.0;
+        objects.set(names::STATUSWORD, self.statusword(now_ns).0);
+        objects.set(names::MODE_DISPLAY, self.mode.number());
+        objects.set(names::POSITION_DEMAND, demand);
+        objects.set(names::POSITION_ACTUAL, actual);
+        objects.set(names::VELOCITY_ACTUAL, self.encoder.nearest(self.servo.velocity_m_s()));
+        objects.set(names::TORQUE_ACTUAL, torque.round() as i16);
+        objects.set(names::FOLLOWING_ERROR, demand.saturating_sub(actual));
+    }
+
+    fn statusword(&self, now_ns: u64) -> Statusword {
+        let is_enabled = self.is_enabled();
+        let word = Statusword::of(self.power)
+            .with(StatusBit::VoltageEnabled, true)
+            .with(StatusBit::Remote, true)
+            .with(StatusBit::InternalLimit, is_enabled && (self.is_cut || self.servo.is_limited()));
+        match self.mode {
+            Mode::CyclicPosition => word
+                .with(StatusBit::TargetFollowed, is_enabled)
+                .with(StatusBit::FollowingError, self.straying_since_ns.is_some()),
+            Mode::CyclicTorque => word.with(StatusBit::TargetFollowed, is_enabled),
+            Mode::ProfilePosition => word
+                .with(StatusBit::TargetReached, is_enabled && self.has_reached_setpoint(now_ns))
+                .with(StatusBit::SETPOINT_ACKNOWLEDGED, is_enabled && self.positioning.is_acknowledged())
+                .with(StatusBit::FollowingError, self.straying_since_ns.is_some()),
+            Mode::Homing => self.homing.show(word, self.demand.is_at_rest(now_ns)),
+        }
+    }
+}

@@ -1,0 +1,158 @@
+//! What the table says of an object and of its entries.
+
+use masseter_shared::can::canopen::ObjectAddress;
+
+/// Data type of an entry (CiA 301, table 44).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum DataType {
+    I8,
+    I16,
+    I32,
+    U8,
+    U16,
+    U32,
+    /// A constant text (VISIBLE_STRING).
+    Text,
+}
+
+impl DataType {
+    /// Bytes of a value; 0 for a text, whose length is its own.
+    pub(crate) const fn bytes(self) -> usize {
+        match self {
+            Self::I8 | Self::U8 => 1,
+            Self::I16 | Self::U16 => 2,
+            Self::I32 | Self::U32 => 4,
+            Self::Text => 0,
+        }
+    }
+
+    /// The type's index in the object dictionary.
+    pub(crate) const fn code(self) -> u16 {
+        match self {
+            Self::I8 => 0x02,
+            Self::I16 => 0x03,
+            Self::I32 => 0x04,
+            Self::U8 => 0x05,
+            Self::U16 => 0x06,
+            Self::U32 => 0x07,
+            Self::Text => 0x09,
+        }
+    }
+
+    /// Whether values may be negative.
+    pub(crate) const fn is_signed(self) -> bool {
+        matches!(self, Self::I8 | Self::I16 | Self::I32)
+    }
+
+    /// The number that the lowest bytes of a memory word mean.
+    pub(crate) const fn number(self, word: u32) -> i64 {
+        match self {
+            Self::I8 => word as i8 as i64,
+            Self::I16 => word as i16 as i64,
+            Self::I32 => word as i32 as i64,
+            Self::U8 => word as u8 as i64,
+            Self::U16 => word as u16 as i64,
+            Self::U32 | Self::Text => word as i64,
+        }
+    }
+}
+
+/// Who may change an entry.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Access {
+    /// Nobody: it never changes.
+    Constant,
+    /// The drive alone.
+    ReadOnly,
+    /// Any client.
+    ReadWrite,
+}
+
+/// Which PDOs an entry may be mapped to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Mapping {
+    Never,
+    /// PDOs that the drive transmits.
+    Tpdo,
+    /// PDOs of both directions.
+    Any,
+}
+
+/// The value that an entry has after power-on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Initial {
+    /// This one.
+    Value(i64),
+    /// This one plus the node id.
+    OfNode(u32),
+    /// One that follows from the scenario.
+    Configured,
+    /// This text.
+    Text(&'static str),
+}
+
+/// An entry of an object.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Entry {
+    pub(crate) subindex: u8,
+    pub(crate) name: &'static str,
+    pub(crate) kind: DataType,
+    pub(crate) access: Access,
+    pub(crate) mapping: Mapping,
+    pub(crate) initial: Initial,
+    /// Lowest and highest value that may be written; `None` where the type alone limits it.
+    pub(crate) limits: Option<(i64, i64)>,
+}
+
+impl Entry {
+    /// An entry that is neither mapped nor limited.
+    pub(super) const fn new(
+        subindex: u8,
+        name: &'static str,
+        kind: DataType,
+        access: Access,
+        initial: Initial,
+    ) -> Self {
+        Self { subindex, name, kind, access, mapping: Mapping::Never, initial, limits: None }
+    }
+
+    /// Sub-index 0 of an object that has others.
+    pub(super) const fn highest(subindex: u8) -> Self {
+        let initial = Initial::Value(subindex as i64);
+        Self::new(0, "Highest sub-index supported", DataType::U8, Access::Constant, initial)
+    }
+
+    pub(super) const fn mapped(mut self, mapping: Mapping) -> Self {
+        self.mapping = mapping;
+        self
+    }
+
+    pub(super) const fn within(mut self, lowest: i64, highest: i64) -> Self {
+        self.limits = Some((lowest, highest));
+        self
+    }
+}
+
+/// How an object is made of entries (CiA 301, table 42).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Shape {
+    Var,
+    Array,
+    Record,
+}
+
+/// An object with its entries, sub-indices ascending.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Object {
+    pub(crate) index: u16,
+    pub(crate) name: &'static str,
+    pub(crate) shape: Shape,
+    pub(crate) entries: &'static [Entry],
+}
+
+/// An entry with its address.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Addressed {
+    pub(crate) address: ObjectAddress,
+    pub(crate) entry: Entry,
+}

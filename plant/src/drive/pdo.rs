@@ -1,0 +1,290 @@
+//! Process data of the drive: PDOs as its object dictionary configures them, compiled into copies of
+//! bytes whenever a parameter changes.
+//!
+//! Which changes are allowed is said in [`rules`](super::rules). Remote requests are not answered.
+
+use masseter_shared::can::canopen::ObjectAddress;
+use masseter_shared::can::{CanId, Frame};
+
+use super::dictionary::{ENTRIES, MAPPED_MAX, Objects, find, within_limits};
+
+/// Bit 31 of a COB-ID: the PDO does not exist.
+pub(crate) const NOT_VALID: u32 = 1 << 31;
+/// The lowest transmission type that SYNC does not drive.
+const EVENT_DRIVEN: u8 = 254;
+/// Unit of an inhibit time, ns.
+const INHIBIT_UNIT_NS: u64 = 100_000;
+const MS_NS: u64 = 1_000_000;
+
+/// A word of a PDO's parameters.
+fn parameter(objects: &Objects, index: u16, subindex: u8) -> u32 {
+    let place = find(ObjectAddress::new(index, subindex)).expect("every PDO has this parameter");
+    objects.word(place)
+}
+
+/// The identifier of a PDO that exists.
+fn identifier(cob_id: u32) -> Option<CanId> {
+    if cob_id & NOT_VALID != 0 {
+        return None;
+    }
+    CanId::standard((cob_id & 0x7FF) as u16).ok()
+}
+
+/// An object of the mapping: where its word is, and how many of its bytes are meant.
+#[derive(Debug, Clone, Copy, Default)]
+struct Part {
+    place: u16,
+    bytes: u8,
+}
+
+/// A compiled mapping.
+#[derive(Debug, Clone, Copy, Default)]
+struct Mapped {
+    parts: [Part; MAPPED_MAX],
+    count: usize,
+    length: usize,
+}
+
+impl Mapped {
+    fn of(objects: &Objects, index: u16) -> Self {
+        let mut mapped = Self { count: parameter(objects, index, 0) as usize, ..Self::default() };
+        for place in 0..mapped.count {
+            let entry = MappingEntry(parameter(objects, index, place as u8 + 1));
+            let object = find(entry.object()).expect("only what exists can be mapped");
+            let bytes = ENTRIES[object].entry.kind.bytes();
+            mapped.parts[place] = Part { place: object as u16, bytes: bytes as u8 };
+            mapped.length += bytes;
+        }
+        mapped
+    }
+
+    fn parts(&self) -> &[Part] {
+        &self.parts[..self.count]
+    }
+
+    fn holds(&self, object: ObjectAddress) -> bool {
+        self.parts().iter().any(|part| ENTRIES[usize::from(part.place)].address == object)
+    }
+
+    fn pack(&self, objects: &Objects) -> [u8; Frame::MAX_DATA] {
+        let mut data = [0; Frame::MAX_DATA];
+        let mut at = 0;
+        for part in self.parts() {
+            let bytes = usize::from(part.bytes);
+            let word = objects.word(usize::from(part.place)).to_le_bytes();
+            data[at..at + bytes].copy_from_slice(&word[..bytes]);
+            at += bytes;
+        }
+        data
+    }
+
+    /// Writes the data into the objects; a value beyond its limits leaves its object as it is.
+    fn unpack(&self, data: [u8; Frame::MAX_DATA], objects: &mut Objects) {
+        let mut at = 0;
+        for part in self.parts() {
+            let bytes = usize::from(part.bytes);
+            let mut word = [0; 4];
+            word[..bytes].copy_from_slice(&data[at..at + bytes]);
+            let (place, word) = (usize::from(part.place), u32::from_le_bytes(word));
+            if within_limits(place, word).is_ok() {
+                objects.set_word(place, word);
+            }
+            at += bytes;
+        }
+    }
+}
+
+/// An entry of a mapping parameter: index, sub-index and length in bits.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct MappingEntry(pub(crate) u32);
+
+impl MappingEntry {
+    pub(crate) const fn object(self) -> ObjectAddress {
+        ObjectAddress::new((self.0 >> 16) as u16, (self.0 >> 8) as u8)
+    }
+
+    pub(crate) const fn bits(self) -> usize {
+        (self.0 & 0xFF) as usize
+    }
+}
+
+/// What is wrong with a received PDO.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum LengthFault {
+    /// Shorter than its mapping: it is not used.
+    Short,
+    /// Longer than its mapping: what is beyond is not used.
+    Long,
+}
+
+/// A PDO that the drive receives.
+#[derive(Debug, Clone)]
+pub(super) struct Rpdo {
+    id: Option<CanId>,
+    is_synchronous: bool,
+    deadline_ns: u64,
+    mapped: Mapped,
+    heard_ns: Option<u64>,
+    buffered: Option<[u8; Frame::MAX_DATA]>,
+    /// Whether it holds objects that more than the next SYNC depends on.
+    configures: bool,
+}
+
+impl Rpdo {
+    /// As configured, nothing received.
+    pub(super) fn new(objects: &Objects, number: u16) -> Self {
+        let (communication, mapping) = (0x1400 + number, 0x1600 + number);
+        let mapped = Mapped::of(objects, mapping);
+        let plain = |index| mapped.holds(ObjectAddress::new(index, 0));
+        Self {
+            id: identifier(parameter(objects, communication, 1)),
+            is_synchronous: parameter(objects, communication, 2) < u32::from(EVENT_DRIVEN),
+            deadline_ns: u64::from(parameter(objects, communication, 5)) * MS_NS,
+            mapped,
+            heard_ns: None,
+            buffered: None,
+            configures: [0x6060, 0x6081, 0x6083, 0x6084].into_iter().any(plain),
+        }
+    }
+
+    pub(super) fn id(&self) -> Option<CanId> {
+        self.id
+    }
+
+    /// Whether its objects take effect at the next SYNC rather than at once.
+    pub(super) fn is_synchronous(&self) -> bool {
+        self.is_synchronous
+    }
+
+    /// Whether it may change how the drive behaves, not only its targets.
+    pub(super) fn configures(&self) -> bool {
+        self.configures
+    }
+
+    /// Whether it holds that object.
+    pub(super) fn holds(&self, object: ObjectAddress) -> bool {
+        self.mapped.holds(object)
+    }
+
+    /// Keeps a frame's data, the newest only.
+    pub(super) fn take(&mut self, now_ns: u64, data: &[u8]) -> Result<(), LengthFault> {
+        if data.len() < self.mapped.length {
+            return Err(LengthFault::Short);
+        }
+        let mut buffer = [0; Frame::MAX_DATA];
+        buffer[..data.len()].copy_from_slice(data);
+        (self.buffered, self.heard_ns) = (Some(buffer), Some(now_ns));
+        if data.len() > self.mapped.length { Err(LengthFault::Long) } else { Ok(()) }
+    }
+
+    /// Lets what was received take effect; whether there was anything.
+    pub(super) fn apply(&mut self, objects: &mut Objects) -> bool {
+        let Some(data) = self.buffered.take() else { return false };
+        self.mapped.unpack(data, objects);
+        true
+    }
+
+    /// Forgets what was received.
+    pub(super) fn clear(&mut self) {
+        (self.buffered, self.heard_ns) = (None, None);
+    }
+
+    /// Whether its event timer ran out since the last frame; told once.
+    pub(super) fn is_overdue(&mut self, now_ns: u64) -> bool {
+        let is_late = |heard_ns: &mut u64| now_ns.saturating_sub(*heard_ns) > self.deadline_ns;
+        self.deadline_ns > 0 && self.heard_ns.take_if(is_late).is_some()
+    }
+}
+
+/// When a TPDO is sent.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Trigger {
+    /// At the next SYNC after a change.
+    ChangeThenSync,
+    /// At every so many SYNCs, beginning with one whose counter is that (0: any).
+    EverySync { every: u8, start: u8 },
+    /// At a change, and at the latest after the event timer.
+    Event,
+}
+
+/// A PDO that the drive transmits.
+#[derive(Debug, Clone)]
+pub(super) struct Tpdo {
+    id: Option<CanId>,
+    trigger: Trigger,
+    inhibit_ns: u64,
+    timer_ns: u64,
+    mapped: Mapped,
+    /// SYNCs since it was sent last; `None` until the start value came.
+    syncs: Option<u8>,
+    sent: Option<([u8; Frame::MAX_DATA], u64)>,
+}
+
+impl Tpdo {
+    /// As configured, nothing sent.
+    pub(super) fn new(objects: &Objects, number: u16) -> Self {
+        let (communication, mapping) = (0x1800 + number, 0x1A00 + number);
+        let start = parameter(objects, communication, 6) as u8;
+        Self {
+            id: identifier(parameter(objects, communication, 1)),
+            trigger: match parameter(objects, communication, 2) as u8 {
+                0 => Trigger::ChangeThenSync,
+                every if every < EVENT_DRIVEN => Trigger::EverySync { every, start },
+                _ => Trigger::Event,
+            },
+            inhibit_ns: u64::from(parameter(objects, communication, 3)) * INHIBIT_UNIT_NS,
+            timer_ns: u64::from(parameter(objects, communication, 5)) * MS_NS,
+            mapped: Mapped::of(objects, mapping),
+            syncs: None,
+            sent: None,
+        }
+    }
+
+    /// Whether a SYNC may make it send; whether anything else may.
+    pub(super) fn is_event_driven(&self) -> bool {
+        self.id.is_some() && self.trigger == Trigger::Event
+    }
+
+    /// Begins anew, as when the node becomes operational.
+    pub(super) fn clear(&mut self) {
+        (self.syncs, self.sent) = (None, None);
+    }
+
+    /// The frame to send at a SYNC of that counter (0 where SYNC has none).
+    pub(super) fn at_sync(&mut self, now_ns: u64, counter: u8, objects: &Objects) -> Option<Frame> {
+        match self.trigger {
+            Trigger::Event => None,
+            Trigger::ChangeThenSync => self.changed(objects).then(|| self.frame(now_ns, objects))?,
+            Trigger::EverySync { every, start } => {
+                let syncs = match self.syncs {
+                    None if counter != 0 && start != 0 && counter != start => return None,
+                    None => every,
+                    Some(syncs) => syncs + 1,
+                };
+                self.syncs = Some(if syncs >= every { 0 } else { syncs });
+                (syncs >= every).then(|| self.frame(now_ns, objects))?
+            }
+        }
+    }
+
+    /// The frame to send because of an event.
+    pub(super) fn at_event(&mut self, now_ns: u64, objects: &Objects) -> Option<Frame> {
+        if !self.is_event_driven() {
+            return None;
+        }
+        let since_ns = self.sent.map(|(_, sent_ns)| now_ns.saturating_sub(sent_ns));
+        let is_inhibited = since_ns.is_some_and(|since_ns| since_ns < self.inhibit_ns);
+        let is_due = self.timer_ns > 0 && since_ns.is_some_and(|since_ns| since_ns >= self.timer_ns);
+        (!is_inhibited && (is_due || self.changed(objects))).then(|| self.frame(now_ns, objects))?
+    }
+
+    fn changed(&self, objects: &Objects) -> bool {
+        self.sent.is_none_or(|(data, _)| data != self.mapped.pack(objects))
+    }
+
+    fn frame(&mut self, now_ns: u64, objects: &Objects) -> Option<Frame> {
+        let data = self.mapped.pack(objects);
+        self.sent = Some((data, now_ns));
+        Frame::new(self.id?, &data[..self.mapped.length]).ok()
+    }
+}

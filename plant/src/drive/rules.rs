@@ -1,0 +1,174 @@
+//! What a client may write beyond type and limits: values without a range, parameters in use, and
+//! the procedure of CiA 301 for changing a PDO.
+
+use masseter_shared::can::canopen::{AbortCode, NodeId, ObjectAddress};
+
+use super::axis::Mode;
+use super::dictionary::{DataType, ENTRIES, MAPPED_MAX, Mapping, Objects, PDOS, WATCHED, find, names};
+use super::homing::Homing;
+use super::pdo::{MappingEntry, NOT_VALID};
+
+/// Signature that object 1010 takes, "save".
+const SAVE: u32 = u32::from_le_bytes(*b"save");
+/// Signature that object 1011 takes, "load".
+const LOAD: u32 = u32::from_le_bytes(*b"load");
+/// Bits of a COB-ID that name the identifier.
+const IDENTIFIER: u32 = 0x1FFF_FFFF;
+/// Bit 29 of a COB-ID: a 29-bit identifier.
+const EXTENDED: u32 = 1 << 29;
+/// Bits that a PDO carries at most.
+const PDO_BITS: usize = 64;
+const PDO_COUNT: u16 = PDOS as u16;
+
+/// The drive's present state, as far as it decides what may be written.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Situation {
+    pub(super) is_operational: bool,
+    pub(super) is_enabled: bool,
+    pub(super) homes: bool,
+}
+
+/// Whether that word may be written to an entry now.
+///
+/// # Errors
+/// The abort code that says why not.
+pub(super) fn check(
+    object: ObjectAddress,
+    word: u32,
+    objects: &Objects,
+    situation: Situation,
+) -> Result<(), AbortCode> {
+    let allow = |is_allowed: bool, code: AbortCode| if is_allowed { Ok(()) } else { Err(code) };
+    let ObjectAddress { index, subindex } = object;
+    match index {
+        0x1003 => allow(word == 0, AbortCode::INVALID_VALUE),
+        0x1010 => {
+            allow(word == SAVE, AbortCode::NOT_STORED)?;
+            allow(!situation.is_enabled, AbortCode::DEVICE_STATE)
+        }
+        0x1011 => allow(word == LOAD, AbortCode::NOT_STORED),
+        0x1014 => cob_id(objects.get(names::EMERGENCY_COB_ID), word),
+        0x1016 => watched(subindex, word, objects),
+        0x1019 => {
+            allow(word != 1, AbortCode::INVALID_VALUE)?;
+            allow(!situation.is_operational, AbortCode::DEVICE_STATE)
+        }
+        0x1400..0x1600 | 0x1800..0x1A00 => communication(object, word, objects),
+        0x1600..0x1800 | 0x1A00..0x1C00 => mapping(object, word, objects),
+        0x605A => allow(!matches!(word, 3 | 4), AbortCode::INVALID_VALUE),
+        0x6060 => allow(Mode::of(word as i8).is_some(), AbortCode::INVALID_VALUE),
+        0x607D => {
+            let (lowest, highest) = match subindex {
+                1 => (word as i32, objects.get(names::HIGHEST_POSITION)),
+                _ => (objects.get(names::LOWEST_POSITION), word as i32),
+            };
+            allow(lowest <= highest, AbortCode::MAXIMUM_BELOW_MINIMUM)
+        }
+        0x6098 => {
+            allow(Homing::is_method(word as i8), AbortCode::INVALID_VALUE)?;
+            allow(!situation.homes, AbortCode::DEVICE_STATE)
+        }
+        0x60C2 => allow(!situation.is_enabled, AbortCode::DEVICE_STATE),
+        _ => Ok(()),
+    }
+}
+
+/// A watched node (bits 16 to 22) with its time-out; 0 for either is none. No node twice.
+fn watched(subindex: u8, word: u32, objects: &Objects) -> Result<(), AbortCode> {
+    let node = |word: u32| (word & 0xFFFF != 0 && word >> 16 != 0).then_some(word >> 16);
+    let Some(watched) = node(word) else { return Ok(()) };
+    if !u8::try_from(watched).is_ok_and(|id| NodeId::new(id).is_ok()) {
+        return Err(AbortCode::INVALID_VALUE);
+    }
+    let is_taken = (1..=WATCHED as u8).filter(|&other| other != subindex).any(|other| {
+        let place = names::WATCHED_HEARTBEAT.place() + usize::from(other) - 1;
+        node(objects.word(place)) == Some(watched)
+    });
+    if is_taken { Err(AbortCode::PARAMETER_INCOMPATIBLE) } else { Ok(()) }
+}
+
+/// A new COB-ID in place of an old one: an identifier may change only while its object does not exist.
+fn cob_id(before: u32, after: u32) -> Result<(), AbortCode> {
+    let exists = |cob_id: u32| cob_id & NOT_VALID == 0;
+    let identifier = after & IDENTIFIER;
+    let is_changed = identifier != before & IDENTIFIER;
+    let is_bad = after & EXTENDED != 0 || identifier > 0x7FF;
+    let keeps_exist = exists(before) && exists(after);
+    if is_bad || exists(after) && is_restricted(identifier) || keeps_exist && is_changed {
+        return Err(AbortCode::INVALID_VALUE);
+    }
+    Ok(())
+}
+
+/// Identifiers that no configurable object may use (CiA 301, table 40).
+const fn is_restricted(identifier: u32) -> bool {
+    matches!(
+        identifier,
+        0x000..=0x080 | 0x101..=0x180 | 0x581..=0x5FF | 0x601..=0x67F | 0x6E0..=0x6FF | 0x701..
+    )
+}
+
+/// The COB-ID of the PDO that a communication or mapping parameter belongs to.
+fn pdo_cob_id(index: u16, objects: &Objects) -> u32 {
+    // 1600h + n belongs to 1400h + n, 1A00h + n to 1800h + n.
+    let communication = index & !0x0200 & 0xFC00 | index & 0x00FF;
+    let place = find(ObjectAddress::new(communication, 1)).expect("every PDO has a COB-ID");
+    objects.word(place)
+}
+
+fn communication(object: ObjectAddress, word: u32, objects: &Objects) -> Result<(), AbortCode> {
+    let before = pdo_cob_id(object.index, objects);
+    let exists = before & NOT_VALID == 0;
+    match object.subindex {
+        1 => {
+            cob_id(before, word)?;
+            let mapped = find(ObjectAddress::new(object.index + 0x0200, 0)).map(|place| objects.word(place));
+            let carries_nothing = mapped == Ok(0);
+            if word & NOT_VALID == 0 && carries_nothing { Err(AbortCode::INVALID_VALUE) } else { Ok(()) }
+        }
+        // 241 to 251 are reserved, 252 and 253 answer remote requests.
+        2 if matches!(word, 241..=253) => Err(AbortCode::INVALID_VALUE),
+        3 | 6 if exists => Err(AbortCode::INVALID_VALUE),
+        _ => Ok(()),
+    }
+}
+
+/// The mapping changes only while the PDO does not exist, its entries only while it holds none.
+fn mapping(object: ObjectAddress, word: u32, objects: &Objects) -> Result<(), AbortCode> {
+    let parameter = |subindex: u8| {
+        let place = find(ObjectAddress::new(object.index, subindex)).expect("a mapping has nine entries");
+        objects.word(place)
+    };
+    let exists = pdo_cob_id(object.index, objects) & NOT_VALID == 0;
+    if exists || object.subindex > 0 && parameter(0) > 0 {
+        return Err(AbortCode::PARAMETER_INCOMPATIBLE);
+    }
+    if object.subindex > 0 {
+        return if word == 0 { Ok(()) } else { mappable(MappingEntry(word), is_transmitted(object.index)) };
+    }
+    let entries = || (1..=word as u8).map(|subindex| MappingEntry(parameter(subindex)));
+    if entries().any(|entry| entry.0 == 0) {
+        return Err(AbortCode::PARAMETER_INCOMPATIBLE);
+    }
+    let bits: usize = entries().map(MappingEntry::bits).sum();
+    if bits > PDO_BITS { Err(AbortCode::PDO_LENGTH) } else { Ok(()) }
+}
+
+/// Whether a mapping parameter is that of a TPDO.
+const fn is_transmitted(index: u16) -> bool {
+    index >= 0x1A00 && index < 0x1A00 + PDO_COUNT
+}
+
+/// Whether an object may be mapped with that length.
+fn mappable(entry: MappingEntry, is_transmitted: bool) -> Result<(), AbortCode> {
+    let table = &ENTRIES[find(entry.object())?].entry;
+    let is_allowed = match table.mapping {
+        Mapping::Never => false,
+        Mapping::Tpdo => is_transmitted,
+        Mapping::Any => true,
+    };
+    let has_length = table.kind != DataType::Text && table.kind.bytes() * 8 == entry.bits();
+    if is_allowed && has_length { Ok(()) } else { Err(AbortCode::NOT_MAPPABLE) }
+}
+
+const _: () = assert!(MAPPED_MAX * 8 == PDO_BITS, "eight bytes hold eight objects at most");

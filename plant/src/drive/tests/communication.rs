@@ -1,0 +1,152 @@
+//! Network management, heartbeats, emergencies.
+
+use super::*;
+
+#[test]
+fn a_node_boots_up_once_and_then_tells_its_state() {
+    let mut bench = Bench::new();
+    assert_eq!(bench.heartbeats(), [NmtState::BootUp]);
+    bench.run_ms(100);
+    bench.nmt(NmtCommand::Start);
+    bench.run_ms(50);
+    bench.nmt(NmtCommand::Stop);
+    bench.run_ms(50);
+    let beats = bench.heartbeats();
+    assert_eq!(
+        beats[1..],
+        [NmtState::PreOperational, NmtState::PreOperational, NmtState::Operational, NmtState::Stopped]
+    );
+}
+
+#[test]
+fn the_heartbeat_is_produced_as_object_1017_says() {
+    let mut bench = Bench::new();
+    bench.write((0x1017, 0), &10_u16.to_le_bytes()).unwrap();
+    bench.sent.clear();
+    bench.run_ms(100);
+    assert_eq!(bench.heartbeats().len(), 10);
+    bench.write((0x1017, 0), &[0, 0]).unwrap();
+    bench.sent.clear();
+    bench.run_ms(100);
+    assert_eq!(bench.heartbeats(), []);
+}
+
+#[test]
+fn a_stopped_node_obeys_network_management_alone() {
+    let mut bench = Bench::operational();
+    bench.nmt(NmtCommand::Stop);
+    assert_eq!(bench.ask(SdoRequest::InitiateUpload { object: ObjectAddress::new(0x1000, 0) }), None);
+    assert_eq!(bench.sync(), []);
+    bench.nmt(NmtCommand::EnterPreOperational);
+    assert!(bench.read((0x1000, 0)).is_ok());
+    assert_eq!(bench.sync(), [], "process data in operational only");
+    bench.nmt(NmtCommand::Start);
+    assert_eq!(bench.sync().len(), 1);
+}
+
+#[test]
+fn a_reset_of_the_communication_leaves_the_profile_alone() {
+    let mut bench = Bench::new();
+    bench.write((0x1017, 0), &10_u16.to_le_bytes()).unwrap();
+    bench.write((0x6065, 0), &777_u32.to_le_bytes()).unwrap();
+    bench.sent.clear();
+    bench.nmt(NmtCommand::ResetCommunication);
+    bench.run_ms(25);
+    assert_eq!(bench.heartbeats()[0], NmtState::BootUp);
+    assert_eq!((bench.read((0x1017, 0)), bench.read((0x6065, 0))), (Ok(50), Ok(777)));
+}
+
+#[test]
+fn a_reset_closes_the_brake_and_boots_anew() {
+    let mut bench = Bench::enabled(1);
+    bench.sent.clear();
+    bench.nmt(NmtCommand::ResetNode);
+    bench.run_ms(25);
+    assert_eq!(bench.heartbeats(), [NmtState::BootUp]);
+    assert_eq!(bench.drive.power(), DriveState::SwitchOnDisabled);
+    assert_eq!(bench.read((0x6061, 0)), Ok(8));
+}
+
+/// Object 6007 and what becomes of an enabled drive whose master falls silent.
+#[test]
+fn a_lost_heartbeat_is_answered_as_object_6007_says() {
+    let table = [
+        (0_u16, DriveState::OperationEnabled),
+        (1, DriveState::Fault),
+        (2, DriveState::SwitchOnDisabled),
+        (3, DriveState::SwitchOnDisabled),
+    ];
+    for (option, state) in table {
+        let mut bench = Bench::enabled(1);
+        bench.write((0x6007, 0), &option.to_le_bytes()).unwrap();
+        bench.master_beats();
+        bench.run_ms(140);
+        assert_eq!(bench.drive.power(), DriveState::OperationEnabled);
+        assert_eq!(bench.emergencies(), []);
+        bench.run_ms(60);
+        assert_eq!(bench.drive.power(), state, "6007 = {option}");
+        assert_eq!(bench.emergencies(), [EmergencyCode::HEARTBEAT]);
+        bench.master_beats();
+        assert_eq!(bench.emergencies(), [EmergencyCode::HEARTBEAT, EmergencyCode::RESET]);
+    }
+}
+
+/// Object 1029:1 and the state in which the loss of a heartbeat leaves a node.
+#[test]
+fn a_lost_heartbeat_changes_the_state_as_object_1029_says() {
+    let table = [(0, NmtState::PreOperational), (1, NmtState::Operational), (2, NmtState::Stopped)];
+    for (behaviour, state) in table {
+        let mut bench = Bench::operational();
+        bench.write((0x1029, 1), &[behaviour]).unwrap();
+        bench.master_beats();
+        bench.run_ms(250);
+        assert_eq!(bench.heartbeats().pop(), Some(state), "1029:1 = {behaviour}");
+    }
+}
+
+#[test]
+fn a_boot_up_message_does_not_begin_the_supervision() {
+    let mut bench = Bench::new();
+    bench.receive(Heartbeat { state: NmtState::BootUp }.frame(id(127)));
+    bench.run_ms(500);
+    assert_eq!(bench.emergencies(), []);
+}
+
+#[test]
+fn errors_are_kept_in_the_history_until_it_is_cleared() {
+    let mut bench = Bench::operational();
+    bench.receive(pdo(0x204, &[0x0F]));
+    assert_eq!(bench.emergencies(), [EmergencyCode::PDO_LENGTH]);
+    assert_eq!((bench.read((0x1003, 0)), bench.read((0x1003, 1))), (Ok(1), Ok(0x8210)));
+    assert_eq!(bench.read((0x1003, 2)), Err(AbortCode::NO_DATA));
+    assert_eq!((bench.read((0x1001, 0)), bench.read((0x603F, 0))), (Ok(0x11), Ok(0x8210)));
+    bench.receive(pdo(0x204, &[0; 6]));
+    assert_eq!(bench.emergencies(), [EmergencyCode::PDO_LENGTH, EmergencyCode::RESET]);
+    assert_eq!((bench.read((0x1001, 0)), bench.read((0x603F, 0))), (Ok(0), Ok(0)));
+    bench.write((0x1003, 0), &[0]).unwrap();
+    assert_eq!((bench.read((0x1003, 0)), bench.read((0x1003, 1))), (Ok(0), Err(AbortCode::NO_DATA)));
+}
+
+#[test]
+fn an_emergency_goes_out_under_its_cob_id_or_not_at_all() {
+    let mut bench = Bench::operational();
+    bench.write((0x1014, 0), &0x8000_0084_u32.to_le_bytes()).unwrap();
+    bench.receive(pdo(0x204, &[0x0F]));
+    assert_eq!(bench.emergencies(), []);
+    bench.write((0x1014, 0), &0x0000_0091_u32.to_le_bytes()).unwrap();
+    bench.receive(pdo(0x204, &[0; 6]));
+    let last = bench.sent.iter().rfind(|frame| frame.id().number() == 0x91).copied();
+    assert_eq!(last.map(|frame| frame.to_string()), Some("091#0000000000000000".to_owned()));
+}
+
+#[test]
+fn an_unfinished_transfer_is_aborted_after_a_second() {
+    let mut bench = Bench::new();
+    let object = ObjectAddress::new(0x1008, 0);
+    bench.ask(SdoRequest::InitiateUpload { object });
+    bench.sent.clear();
+    bench.run_ms(1001);
+    let aborts = bench.sent.iter().filter(|frame| frame.id() == Cob::SdoResponse(id(4)).into());
+    let aborts: Vec<_> = aborts.map(|frame| SdoResponse::decode(frame.data()).unwrap()).collect();
+    assert_eq!(aborts, [SdoResponse::Abort { object, code: AbortCode::TIMED_OUT }]);
+}

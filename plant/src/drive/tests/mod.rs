@@ -1,0 +1,198 @@
+//! Scenarios of a single drive that moves a mass, driven by frames alone.
+
+mod communication;
+mod modes;
+mod objects;
+mod process_data;
+
+use masseter_shared::can::canopen::{
+    AbortCode, Cob, Emergency, EmergencyCode, Expedited, Heartbeat, Nmt, NmtCommand, NmtState, NmtTarget,
+    NodeId, ObjectAddress, SdoRequest, SdoResponse, sync,
+};
+use masseter_shared::can::cia402::{DriveState, Statusword};
+use masseter_shared::can::{CanId, Frame};
+use masseter_shared::config::DrivesConfig;
+
+use super::{DriveNode, DriveSettings};
+use crate::encoder::Encoder;
+
+const STEP_NS: u64 = 125_000;
+const STEPS_PER_MS: u64 = 1_000_000 / STEP_NS;
+const MASS_KG: f64 = 0.6;
+const LOAD_N: f64 = 5.0;
+/// Where the axis stands at first, between two reference marks.
+const START: i32 = 270_700;
+const LIMITS: [i32; 2] = [220_000, 360_000];
+
+const CONTROLWORD: (u16, u8) = (0x6040, 0);
+const STATUSWORD: (u16, u8) = (0x6041, 0);
+const MODE: (u16, u8) = (0x6060, 0);
+const POSITION: (u16, u8) = (0x6064, 0);
+const TARGET_POSITION: (u16, u8) = (0x607A, 0);
+
+/// A drive with its axis, and a client of it.
+struct Bench {
+    drive: DriveNode,
+    now_ns: u64,
+    position_m: f64,
+    velocity_m_s: f64,
+    force_n: f64,
+    load_n: f64,
+    sent: Vec<Frame>,
+}
+
+fn id(number: u8) -> NodeId {
+    NodeId::new(number).unwrap()
+}
+
+fn settings() -> DriveSettings {
+    DriveSettings {
+        node: id(4),
+        master: id(127),
+        drive: DrivesConfig::default().leg,
+        heartbeat_ns: 50_000_000,
+        link_timeout_ns: 150_000_000,
+        period_s: 1e-3,
+        step_s: STEP_NS as f64 * 1e-9,
+        position_limit_increments: LIMITS,
+    }
+}
+
+impl Bench {
+    /// A drive that has booted.
+    fn new() -> Self {
+        let settings = settings();
+        let increment_m = settings.drive.encoder_resolution_m;
+        let position_m = f64::from(START) * increment_m;
+        let mut bench = Self {
+            drive: DriveNode::new(&settings, Encoder::new(increment_m, 0.0, 1, 0), 0, position_m),
+            now_ns: 0,
+            position_m,
+            velocity_m_s: 0.0,
+            force_n: 0.0,
+            load_n: LOAD_N,
+            sent: Vec::new(),
+        };
+        bench.run_ms(25);
+        bench
+    }
+
+    /// A drive that is operational.
+    fn operational() -> Self {
+        let mut bench = Self::new();
+        bench.nmt(NmtCommand::Start);
+        bench
+    }
+
+    /// A drive that is enabled in a mode, over SDO alone.
+    fn enabled(mode: i8) -> Self {
+        let mut bench = Self::new();
+        bench.write(MODE, &[mode as u8]).unwrap();
+        bench.enable();
+        bench
+    }
+
+    fn enable(&mut self) {
+        for word in [0x06_u16, 0x07, 0x0F] {
+            self.control(word);
+            self.run_ms(1);
+        }
+        assert_eq!(self.drive.power(), DriveState::OperationEnabled);
+    }
+
+    fn run_ms(&mut self, ms: u64) {
+        for _ in 0..ms * STEPS_PER_MS {
+            let step_s = STEP_NS as f64 * 1e-9;
+            self.velocity_m_s += (self.force_n - self.load_n) / MASS_KG * step_s;
+            self.position_m += self.velocity_m_s * step_s;
+            self.now_ns += STEP_NS;
+            self.force_n = self.drive.step(self.now_ns, self.position_m);
+            self.collect();
+        }
+    }
+
+    fn collect(&mut self) {
+        while let Some(frame) = self.drive.outgoing() {
+            self.sent.push(frame);
+        }
+    }
+
+    fn receive(&mut self, frame: Frame) {
+        self.drive.receive(self.now_ns, &frame, self.position_m);
+        self.collect();
+    }
+
+    fn nmt(&mut self, command: NmtCommand) {
+        self.receive(Nmt { command, target: NmtTarget::All }.frame());
+    }
+
+    /// SYNC; what the drive answered.
+    fn sync(&mut self) -> Vec<Frame> {
+        let before = self.sent.len();
+        self.receive(sync::frame());
+        self.sent[before..].to_vec()
+    }
+
+    fn master_beats(&mut self) {
+        self.receive(Heartbeat { state: NmtState::Operational }.frame(id(127)));
+    }
+
+    /// What the SDO server answers.
+    fn ask(&mut self, request: SdoRequest) -> Option<SdoResponse> {
+        let before = self.sent.len();
+        self.receive(request.frame(id(4)));
+        let answers = self.sent[before..].iter().filter(|frame| frame.id() == Cob::SdoResponse(id(4)).into());
+        answers.map(|frame| SdoResponse::decode(frame.data()).unwrap()).next()
+    }
+
+    fn write(&mut self, (index, subindex): (u16, u8), data: &[u8]) -> Result<(), AbortCode> {
+        let object = ObjectAddress::new(index, subindex);
+        match self.ask(SdoRequest::Download { object, data: Expedited::new(data).unwrap() }) {
+            Some(SdoResponse::Download { .. }) => Ok(()),
+            Some(SdoResponse::Abort { code, .. }) => Err(code),
+            other => panic!("{object}: {other:?}"),
+        }
+    }
+
+    fn read(&mut self, (index, subindex): (u16, u8)) -> Result<u32, AbortCode> {
+        let object = ObjectAddress::new(index, subindex);
+        match self.ask(SdoRequest::InitiateUpload { object }) {
+            Some(SdoResponse::Upload { data, .. }) => {
+                let mut word = [0; 4];
+                word[..data.data().len()].copy_from_slice(data.data());
+                Ok(u32::from_le_bytes(word))
+            }
+            Some(SdoResponse::Abort { code, .. }) => Err(code),
+            other => panic!("{object}: {other:?}"),
+        }
+    }
+
+    fn control(&mut self, word: u16) {
+        self.write(CONTROLWORD, &word.to_le_bytes()).unwrap();
+    }
+
+    fn statusword(&mut self) -> Statusword {
+        Statusword(self.read(STATUSWORD).unwrap() as u16)
+    }
+
+    fn position(&mut self) -> i32 {
+        self.read(POSITION).unwrap() as i32
+    }
+
+    /// Emergency codes sent so far.
+    fn emergencies(&self) -> Vec<EmergencyCode> {
+        let frames = self.sent.iter().filter(|frame| frame.id() == Cob::Emergency(id(4)).into());
+        frames.map(|frame| Emergency::decode(frame.data()).unwrap().code).collect()
+    }
+
+    /// States in the heartbeats and boot-up messages sent so far.
+    fn heartbeats(&self) -> Vec<NmtState> {
+        let frames = self.sent.iter().filter(|frame| frame.id() == Cob::Heartbeat(id(4)).into());
+        frames.map(|frame| Heartbeat::decode(frame.data()).unwrap().state).collect()
+    }
+}
+
+/// A process data object under any identifier.
+fn pdo(number: u16, data: &[u8]) -> Frame {
+    Frame::new(CanId::standard(number).unwrap(), data).unwrap()
+}

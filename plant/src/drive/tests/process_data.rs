@@ -1,0 +1,154 @@
+//! PDOs: mapping, transmission types, SYNC.
+
+use super::*;
+
+/// CiA 301's procedure for changing a mapping; the PDO is `cob_id` afterwards.
+fn remap(bench: &mut Bench, communication: u16, cob_id: u32, objects: &[u32]) {
+    let mapping = communication + 0x200;
+    bench.write((communication, 1), &(cob_id | 1 << 31).to_le_bytes()).unwrap();
+    bench.write((mapping, 0), &[0]).unwrap();
+    for (place, object) in (1..).zip(objects) {
+        bench.write((mapping, place), &object.to_le_bytes()).unwrap();
+    }
+    bench.write((mapping, 0), &[objects.len() as u8]).unwrap();
+    bench.write((communication, 1), &cob_id.to_le_bytes()).unwrap();
+}
+
+#[test]
+fn the_mapping_after_power_on_is_the_masters() {
+    let mut bench = Bench::operational();
+    let [frame] = bench.sync()[..] else { panic!("one TPDO") };
+    let position = bench.position().to_le_bytes();
+    assert_eq!(frame.id().number(), 0x184);
+    assert_eq!(frame.data()[..6], [0x50, 0x02, position[0], position[1], position[2], position[3]]);
+    assert_eq!(frame.data().len(), 8, "statusword, position and torque");
+}
+
+#[test]
+fn a_remapped_pdo_carries_its_new_objects_at_the_next_sync() {
+    let mut bench = Bench::operational();
+    remap(&mut bench, 0x1800, 0x4000_0184, &[0x6061_0008, 0x603F_0010]);
+    let [frame] = bench.sync()[..] else { panic!("one TPDO") };
+    assert_eq!(frame.to_string(), "184#080000");
+    remap(&mut bench, 0x1400, 0x0000_0310, &[0x6060_0008]);
+    bench.receive(pdo(0x310, &[10]));
+    let [frame] = bench.sync()[..] else { panic!("one TPDO") };
+    assert_eq!(frame.to_string(), "184#0A0000", "the mode was received under its new identifier");
+}
+
+#[test]
+fn a_reset_brings_the_first_mapping_back() {
+    let mut bench = Bench::operational();
+    remap(&mut bench, 0x1800, 0x4000_0184, &[0x6061_0008]);
+    bench.nmt(NmtCommand::ResetNode);
+    bench.run_ms(25);
+    bench.nmt(NmtCommand::Start);
+    assert_eq!(bench.sync()[0].data().len(), 8);
+}
+
+#[test]
+fn a_synchronous_pdo_takes_effect_at_sync_and_the_newest_counts() {
+    let mut bench = Bench::operational();
+    bench.receive(pdo(0x204, &[0x07, 0, 0, 0, 0, 0]));
+    bench.receive(pdo(0x204, &[0x06, 0, 0, 0, 0, 0]));
+    bench.run_ms(1);
+    assert_eq!(bench.drive.power(), DriveState::SwitchOnDisabled);
+    bench.sync();
+    assert_eq!(bench.drive.power(), DriveState::ReadyToSwitchOn);
+}
+
+#[test]
+fn an_event_driven_pdo_takes_effect_at_once() {
+    let mut bench = Bench::operational();
+    bench.write((0x1400, 2), &[255]).unwrap();
+    bench.receive(pdo(0x204, &[0x06, 0, 0, 0, 0, 0]));
+    assert_eq!(bench.drive.power(), DriveState::ReadyToSwitchOn);
+}
+
+#[test]
+fn transmission_types_say_at_which_sync() {
+    let sends = |kind: u8| {
+        let mut bench = Bench::operational();
+        bench.write((0x1800, 2), &[kind]).unwrap();
+        [(); 7].map(|()| bench.sync().len())
+    };
+    assert_eq!(sends(1), [1; 7]);
+    assert_eq!(sends(3), [1, 0, 0, 1, 0, 0, 1]);
+    assert_eq!(sends(0), [1, 0, 0, 0, 0, 0, 0], "nothing changes at standstill");
+    assert_eq!(sends(255), [0; 7]);
+}
+
+#[test]
+fn a_sync_counter_chooses_the_first_sync() {
+    let mut bench = Bench::new();
+    bench.write((0x1019, 0), &[4]).unwrap();
+    bench.write((0x1800, 1), &0xC000_0184_u32.to_le_bytes()).unwrap();
+    bench.write((0x1800, 2), &[4]).unwrap();
+    bench.write((0x1800, 6), &[3]).unwrap();
+    bench.write((0x1800, 1), &0x4000_0184_u32.to_le_bytes()).unwrap();
+    bench.nmt(NmtCommand::Start);
+    let answers = [1, 2, 3, 4, 1, 2, 3, 4].map(|counter| {
+        let before = bench.sent.len();
+        bench.receive(pdo(0x080, &[counter]));
+        bench.sent.len() - before
+    });
+    assert_eq!(answers, [0, 0, 1, 0, 0, 0, 1, 0]);
+    bench.sync();
+    assert_eq!(bench.emergencies(), [EmergencyCode::SYNC_LENGTH], "the counter is missing");
+}
+
+#[test]
+fn an_event_driven_tpdo_is_sent_at_a_change_no_more_often_than_allowed() {
+    let mut bench = Bench::operational();
+    remap(&mut bench, 0x1800, 0xC000_0184, &[]);
+    bench.write((0x1A00, 1), &0x6061_0008_u32.to_le_bytes()).unwrap();
+    bench.write((0x1A00, 0), &[1]).unwrap();
+    bench.write((0x1800, 2), &[255]).unwrap();
+    bench.write((0x1800, 3), &50_u16.to_le_bytes()).unwrap();
+    bench.write((0x1800, 5), &20_u16.to_le_bytes()).unwrap();
+    bench.write((0x1800, 1), &0x4000_0184_u32.to_le_bytes()).unwrap();
+    let count = |bench: &mut Bench, ms| {
+        bench.sent.clear();
+        bench.run_ms(ms);
+        bench.sent.iter().filter(|frame| frame.id().number() == 0x184).count()
+    };
+    assert_eq!(count(&mut bench, 61), 4, "at first, and every 20 ms");
+    bench.write(MODE, &[10]).unwrap();
+    assert_eq!(count(&mut bench, 3), 0, "inhibited for 5 ms");
+    assert_eq!(count(&mut bench, 3), 1);
+}
+
+#[test]
+fn process_data_of_a_wrong_length_are_reported_and_short_ones_not_used() {
+    let mut bench = Bench::operational();
+    bench.receive(pdo(0x204, &[0x06, 0]));
+    bench.sync();
+    assert_eq!(bench.drive.power(), DriveState::SwitchOnDisabled);
+    bench.receive(pdo(0x204, &[0x06, 0, 0, 0, 0, 0, 0]));
+    bench.sync();
+    assert_eq!(bench.drive.power(), DriveState::ReadyToSwitchOn);
+    assert_eq!(bench.emergencies(), [EmergencyCode::PDO_LENGTH, EmergencyCode::PDO_LENGTH_EXCEEDED]);
+}
+
+#[test]
+fn process_data_that_stay_away_are_reported_once() {
+    let mut bench = Bench::operational();
+    bench.write((0x1400, 5), &10_u16.to_le_bytes()).unwrap();
+    bench.run_ms(50);
+    assert_eq!(bench.emergencies(), [], "the timer begins with the first frame");
+    bench.receive(pdo(0x204, &[0; 6]));
+    bench.run_ms(50);
+    assert_eq!(bench.emergencies(), [EmergencyCode::RPDO_TIMEOUT]);
+    bench.receive(pdo(0x204, &[0; 6]));
+    assert_eq!(bench.emergencies(), [EmergencyCode::RPDO_TIMEOUT, EmergencyCode::RESET]);
+}
+
+#[test]
+fn a_value_beyond_its_limits_in_process_data_leaves_its_object_alone() {
+    let mut bench = Bench::operational();
+    remap(&mut bench, 0x1401, 0x304, &[0x6081_0020]);
+    let before = bench.read((0x6081, 0));
+    bench.receive(pdo(0x304, &[0; 4]));
+    bench.sync();
+    assert_eq!(bench.read((0x6081, 0)), before);
+}
