@@ -52,7 +52,7 @@ impl Signal<'_> {
     fn write(&self, text: &mut String, receiver: &str) -> fmt::Result {
         let Self { name, start_bit, bits, is_signed, factor, unit } = self;
         let sign = if *is_signed { '-' } else { '+' };
-        writeln!(text, r#" SG_ {name} : {start_bit}|{bits}@1{sign} ({factor:?},0) [0|0] "{unit}" {receiver}"#)
+        writeln!(text, r#" SG_ {name} : {start_bit}|{bits}@1{sign} ({factor},0) [0|0] "{unit}" {receiver}"#)
     }
 }
 

@@ -28,3 +28,33 @@ pub fn eds(scenario: &Scenario) -> Result<[String; AXES], PlantError> {
 pub fn dbc(scenario: &Scenario) -> Result<String, PlantError> {
     Ok(dbc::write(&all_drive_settings(scenario)?))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::drive::dictionary::{ENTRIES, OBJECTS};
+
+    #[test]
+    fn a_sheet_has_every_object_and_every_entry_once() {
+        let [first, ..] = eds(&Scenario::default()).unwrap();
+        for object in OBJECTS {
+            let heading = format!("[{:04X}]\n", object.index);
+            assert_eq!(first.matches(&heading).count(), 1, "{heading}");
+        }
+        let headings = first.matches("AccessType=").count();
+        assert_eq!(headings, ENTRIES.len());
+    }
+
+    #[test]
+    fn sheets_follow_the_scenario() {
+        let mut scenario = Scenario::default();
+        scenario.can.node_ids = [11, 12, 13, 14, 15, 16];
+        scenario.can.heartbeat_producer_ms = 70;
+        let [first, ..] = eds(&scenario).unwrap();
+        assert!(first.contains("FileName=drive11.eds"));
+        assert!(first.contains("[1017]\nParameterName=Producer heartbeat time\nObjectType=0x7\nDataType=0x0006\nAccessType=rw\nDefaultValue=0x46\n"));
+        assert!(dbc(&scenario).unwrap().contains("BO_ 395 d1_TPDO1: 8 d1"));
+        scenario.can.node_ids[1] = 11;
+        assert!(dbc(&scenario).is_err());
+    }
+}

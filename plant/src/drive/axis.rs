@@ -298,15 +298,15 @@ impl Axis {
         }
     }
 
-    /// Under a force the axis may be no faster than it could still stop before the software limits.
+    /// Under a force the axis may be no faster than it could still stop before the software limits, at the
+    /// profile deceleration (6084).
     fn servo_limits(&self) -> ServoLimits {
-        let Parameters { velocity_limit_m_s, force_limit_n, position_limits, quick_stop, .. } =
-            self.parameters;
+        let Parameters { velocity_limit_m_s, force_limit_n, position_limits, profile, .. } = self.parameters;
         let mut free_velocity_m_s = [-velocity_limit_m_s, velocity_limit_m_s];
-        if let (Mode::CyclicTorque, Stop::Ramp { deceleration_m_s2 }) = (self.mode, quick_stop) {
+        if self.mode == Mode::CyclicTorque {
             let [lowest_m, highest_m] = position_limits.map(|end| self.metres(end));
             let at_m = self.servo.position_m();
-            let braking_m_s = |way_m: f64| (2.0 * deceleration_m_s2 * way_m.max(0.0)).sqrt();
+            let braking_m_s = |way_m: f64| (2.0 * profile.deceleration_m_s2 * way_m.max(0.0)).sqrt();
             free_velocity_m_s = [
                 -braking_m_s(at_m - lowest_m).min(velocity_limit_m_s),
                 braking_m_s(highest_m - at_m).min(velocity_limit_m_s),

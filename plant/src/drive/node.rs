@@ -2,7 +2,7 @@
 //! process data. What the objects may become is served in [`service`](super::service).
 
 use masseter_shared::can::canopen::{
-    Cob, Emergency, EmergencyCode, Heartbeat, Nmt, NmtCommand, NmtState, NodeId, ObjectAddress,
+    Cob, Emergency, Heartbeat, Nmt, NmtCommand, NmtState, NodeId, ObjectAddress,
 };
 use masseter_shared::can::cia402::Controlword;
 use masseter_shared::can::{CanId, Frame};
@@ -384,5 +384,3 @@ impl DriveNode {
         }
     }
 }
-
-const _: () = assert!(EmergencyCode::RESET.0 == 0, "object 603F shows it as no error");

@@ -240,7 +240,7 @@ impl Tpdo {
         }
     }
 
-    /// Whether a SYNC may make it send; whether anything else may.
+    /// Whether it exists and is sent at events rather than at SYNC.
     pub(super) fn is_event_driven(&self) -> bool {
         self.id.is_some() && self.trigger == Trigger::Event
     }
