@@ -9,9 +9,11 @@ use masseter_controller::process::Outcome;
 use masseter_shared::geometry::AXIS_NAMES;
 use masseter_shared::lifecycle::Assignment;
 
+use crate::bench::BenchArgs;
+use crate::bench::ipc::PeerArgs;
 use crate::exit::{Exit, Failure};
 use crate::log::{self, LogVerb};
-use crate::{can, clean, doctor, kinematics, logger, plant, report, run};
+use crate::{bench, can, clean, doctor, kinematics, logger, plant, report, run};
 
 /// A hardware-in-the-loop rig for a 6-DOF mastication robot.
 #[derive(Debug, Parser)]
@@ -43,8 +45,12 @@ enum Verb {
     /// The CAN link: descriptions of the drives for other tools
     #[command(subcommand)]
     Can(CanVerb),
+    /// What the rig's parts cost, each beside a baseline in the same run
+    Bench(BenchArgs),
     /// Remove what killed runs left in shared memory
     Clean,
+    #[command(hide = true)]
+    BenchPeer(PeerArgs),
     #[command(hide = true)]
     Controller(ProcessArgs),
     #[command(hide = true)]
@@ -221,7 +227,7 @@ struct LoggerArgs {
     recording: PathBuf,
 }
 
-fn parse_cores(text: &str) -> Result<[usize; 2], String> {
+pub(crate) fn parse_cores(text: &str) -> Result<[usize; 2], String> {
     let cores: Result<Vec<usize>, _> = text.split(',').map(|core| core.trim().parse()).collect();
     match cores.as_deref() {
         Ok([controller, plant]) => Ok([*controller, *plant]),
@@ -268,6 +274,8 @@ pub fn main() -> ExitCode {
         Verb::Report(args) => report::again(&args.folder, args.format),
         Verb::Doctor(args) => doctor::examine(args.format),
         Verb::Log { verb } => log::run(&verb),
+        Verb::Bench(args) => bench::run(&args),
+        Verb::BenchPeer(args) => bench::ipc::answer(&args).map(|()| Exit::Passed).map_err(Failure::from),
         Verb::Clean => clean::clean(),
         Verb::Controller(args) => masseter_controller::process::run(&args.assignment())
             .map(|outcome| match outcome {

@@ -7,6 +7,7 @@
 
 pub mod analysis;
 pub mod can;
+pub mod bench;
 pub mod clean;
 pub mod cli;
 pub mod doctor;

@@ -1,0 +1,214 @@
+//! Contenders taking turns, and the ratios between them.
+
+use std::fs::File;
+use std::io::BufWriter;
+use std::path::Path;
+use std::time::Duration;
+
+use hdrhistogram::Histogram;
+use hdrhistogram::serialization::V2DeflateSerializer;
+use hdrhistogram::serialization::interval_log::IntervalLogWriterBuilder;
+use serde::Serialize;
+
+/// Below this many samples a round, its 99.9th percentile rests on fewer than ten of them.
+const SAMPLES_FOR_P999: u64 = 10_000;
+
+/// Durations of one round, ns.
+pub(super) type Durations = Histogram<u64>;
+
+/// An empty histogram of durations.
+pub(super) fn durations() -> Durations {
+    Histogram::new(3).expect("three digits are allowed")
+}
+
+/// Adds `count` times the same duration.
+pub(super) fn record(durations: &mut Durations, taken_ns: u64, count: u64) {
+    durations.record_n(taken_ns, count).expect("a histogram that resizes itself takes any value");
+}
+
+/// One round of a contender.
+pub(super) type Turn<'a> = Box<dyn FnMut() -> anyhow::Result<Durations> + 'a>;
+
+/// A contender with what its rounds gave.
+#[derive(Debug, Serialize)]
+pub(super) struct Contender {
+    pub(super) name: String,
+    #[serde(skip)]
+    pub(super) rounds: Vec<Durations>,
+    /// Every figure, round by round.
+    pub(super) figures: Vec<Figure>,
+}
+
+/// A figure of a contender.
+#[derive(Debug, Serialize)]
+pub(super) struct Figure {
+    pub(super) name: &'static str,
+    #[serde(flatten)]
+    pub(super) spread: Spread,
+}
+
+/// How a value varies from round to round.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub(super) struct Spread {
+    pub(super) median: f64,
+    pub(super) min: f64,
+    pub(super) max: f64,
+}
+
+impl Spread {
+    pub(super) fn of(mut values: Vec<f64>) -> Self {
+        values.sort_by(f64::total_cmp);
+        let middle = values.len() / 2;
+        let median = match values.len() {
+            0 => f64::NAN,
+            n if n % 2 == 1 => values[middle],
+            _ => f64::midpoint(values[middle - 1], values[middle]),
+        };
+        let end = |value: Option<&f64>| value.copied().unwrap_or(f64::NAN);
+        Self { median, min: end(values.first()), max: end(values.last()) }
+    }
+}
+
+/// One contender's percentiles over another's, round by round.
+#[derive(Debug, Serialize)]
+pub(super) struct Ratio {
+    pub(super) of: String,
+    pub(super) to: String,
+    pub(super) figures: Vec<Figure>,
+}
+
+/// Everything a bench found.
+#[derive(Debug, Serialize)]
+pub(super) struct Outcome {
+    pub(super) bench: &'static str,
+    /// What the durations are, in a sentence.
+    pub(super) measures: String,
+    pub(super) contenders: Vec<Contender>,
+    pub(super) ratios: Vec<Ratio>,
+    pub(super) notes: Vec<String>,
+}
+
+type Percentile = (&'static str, fn(&Durations) -> f64);
+
+const P50: Percentile = ("p50", |round| round.value_at_quantile(0.5) as f64);
+const P99: Percentile = ("p99", |round| round.value_at_quantile(0.99) as f64);
+const P999: Percentile = ("p99.9", |round| round.value_at_quantile(0.999) as f64);
+const MAX: Percentile = ("max", |round| round.max() as f64);
+
+impl Outcome {
+    /// Lets the contenders take turns; each round begins with another one.
+    pub(super) fn of_turns(
+        bench: &'static str,
+        measures: String,
+        rounds: u32,
+        mut turns: Vec<(String, Turn)>,
+    ) -> anyhow::Result<Self> {
+        let mut results: Vec<Vec<Durations>> = turns.iter().map(|_| Vec::new()).collect();
+        for round in 0..rounds as usize {
+            for turn in 0..turns.len() {
+                let index = (round + turn) % turns.len();
+                results[index].push(turns[index].1()?);
+            }
+        }
+        let names = turns.into_iter().map(|(name, _)| name);
+        let contenders = names.zip(results).map(|(name, rounds)| Contender::of(name, rounds)).collect();
+        Ok(Self { bench, measures, contenders, ratios: Vec::new(), notes: Vec::new() })
+    }
+
+    /// Compares each of the contenders `of` with each of `to`, by their places.
+    #[must_use]
+    pub(super) fn comparing(mut self, pairs: &[(usize, usize)]) -> Self {
+        let ratio = |&(of, to): &(usize, usize)| self.contenders[of].over(&self.contenders[to]);
+        self.ratios = pairs.iter().map(ratio).collect();
+        self
+    }
+
+    #[must_use]
+    pub(super) fn noting(mut self, note: impl Into<String>) -> Self {
+        self.notes.push(note.into());
+        self
+    }
+
+    /// HdrHistogram V2 interval logs, a line a round.
+    pub(super) fn write_logs(&self, folder: &Path) -> std::io::Result<()> {
+        self.contenders.iter().try_for_each(|contender| contender.write_log(self.bench, folder))
+    }
+}
+
+impl Contender {
+    fn of(name: String, rounds: Vec<Durations>) -> Self {
+        let fewest = rounds.iter().map(Durations::len).min().unwrap_or(0);
+        let percentiles = [Some(P50), Some(P99), (fewest >= SAMPLES_FOR_P999).then_some(P999), Some(MAX)];
+        let figure =
+            |(name, of): Percentile| Figure { name, spread: Spread::of(rounds.iter().map(of).collect()) };
+        let figures = percentiles.into_iter().flatten().map(figure).collect();
+        Self { name, rounds, figures }
+    }
+
+    /// This one's percentiles over another's; maxima are the machine's and not compared.
+    fn over(&self, other: &Self) -> Ratio {
+        let compared = [P50, P99, P999].into_iter().filter(|(name, _)| {
+            [self, other].iter().all(|side| side.figures.iter().any(|figure| figure.name == *name))
+        });
+        let figure = |(name, of): Percentile| Figure {
+            name,
+            spread: Spread::of(
+                self.rounds.iter().zip(&other.rounds).map(|(mine, its)| of(mine) / of(its)).collect(),
+            ),
+        };
+        Ratio { of: self.name.clone(), to: other.name.clone(), figures: compared.map(figure).collect() }
+    }
+
+    fn write_log(&self, bench: &str, folder: &Path) -> std::io::Result<()> {
+        let name = self.name.replace(|c: char| !c.is_ascii_alphanumeric(), "-");
+        let mut file = BufWriter::new(File::create(folder.join(format!("{bench}-{name}.hlog")))?);
+        let mut serializer = V2DeflateSerializer::new();
+        let mut log = IntervalLogWriterBuilder::new()
+            .add_comment(&format!("masseter bench {bench}: {}, ns, a line a round", self.name))
+            .with_max_value_divisor(1.0)
+            .begin_log_with(&mut file, &mut serializer)?;
+        for (index, round) in self.rounds.iter().enumerate() {
+            log.write_histogram(round, Duration::from_secs(index as u64), Duration::from_secs(1), None)
+                .map_err(|error| std::io::Error::other(format!("{error:?}")))?;
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn round(value_ns: u64) -> Durations {
+        let mut round = durations();
+        round.record(value_ns).unwrap();
+        round
+    }
+
+    #[test]
+    fn contenders_take_turns_and_are_compared_within_a_round() {
+        let order = std::cell::RefCell::new(Vec::new());
+        // The machine gets slower from round to round; the ratio stays.
+        let turn = |name: &'static str, ns: u64| {
+            let (order, mut pace) = (&order, 0);
+            let turn: Turn = Box::new(move || {
+                order.borrow_mut().push(name);
+                pace += 1;
+                Ok(round(ns * pace))
+            });
+            (name.to_owned(), turn)
+        };
+        let turns = vec![turn("a", 100), turn("b", 400)];
+        let outcome = Outcome::of_turns("x", String::new(), 3, turns).unwrap().comparing(&[(0, 1)]);
+        assert_eq!(*order.borrow(), ["a", "b", "b", "a", "a", "b"]);
+        let [p50, p99] = &outcome.ratios[0].figures[..] else { panic!("{:?}", outcome.ratios) };
+        assert_eq!(p50.spread, Spread { median: 0.25, min: 0.25, max: 0.25 });
+        assert_eq!(p99.name, "p99");
+        assert_eq!(outcome.contenders[0].figures[0].spread, Spread { median: 200.0, min: 100.0, max: 300.0 });
+    }
+
+    #[test]
+    fn the_median_of_an_even_number_lies_between() {
+        assert!((Spread::of(vec![4.0, 1.0, 3.0, 2.0]).median - 2.5).abs() < 1e-12);
+    }
+}

@@ -1,0 +1,181 @@
+//! The rig's two topics, through its own transport and through bare iceoryx2.
+
+use std::process::Stdio;
+use std::time::Duration;
+
+use iceoryx2::port::backpressure_strategy::BackpressureStrategy;
+use iceoryx2::port::publisher::Publisher;
+use iceoryx2::port::subscriber::Subscriber;
+use iceoryx2::prelude::ipc;
+use masseter_shared::clock;
+use masseter_shared::messages::{Command, Message, Reading};
+use masseter_shared::transport::{Domain, Inlet, Node, Outlet};
+
+use super::peer::{Channel, Peer};
+use super::{poll, time};
+use crate::bench::contest::Durations;
+use crate::bench::on_core;
+
+/// Between two attempts to reach a peer that may not have opened its ports yet.
+const AGAIN_AFTER: Duration = Duration::from_millis(2);
+/// As many.
+const ATTEMPTS: u32 = 5000;
+
+/// One side of the two topics.
+pub(super) trait Ends: Sized {
+    /// The commanding side.
+    fn commander(node: &Node) -> anyhow::Result<(Self::Out<Command>, Self::In<Reading>)> {
+        Ok((Self::outlet(node)?, Self::inlet(node)?))
+    }
+    /// Its sending end.
+    type Out<M: Message + Numbered>;
+    /// Its receiving end.
+    type In<M: Message + Numbered>;
+    /// Opens a sending end.
+    fn outlet<M: Message + Numbered>(node: &Node) -> anyhow::Result<Self::Out<M>>;
+    /// Opens a receiving end.
+    fn inlet<M: Message + Numbered>(node: &Node) -> anyhow::Result<Self::In<M>>;
+    /// Sends a message with this number.
+    fn send<M: Message + Numbered>(out: &mut Self::Out<M>, number: u64) -> anyhow::Result<()>;
+    /// The number of the next message, if one is there.
+    fn receive<M: Message + Numbered>(inlet: &Self::In<M>) -> anyhow::Result<Option<u64>>;
+}
+
+/// A message that can carry the number of a round trip.
+pub(super) trait Numbered {
+    fn number(&self) -> u64;
+    fn set_number(&mut self, number: u64);
+}
+
+impl Numbered for Command {
+    fn number(&self) -> u64 {
+        self.cycle
+    }
+    fn set_number(&mut self, number: u64) {
+        self.cycle = number;
+    }
+}
+
+impl Numbered for Reading {
+    fn number(&self) -> u64 {
+        self.cycle
+    }
+    fn set_number(&mut self, number: u64) {
+        self.cycle = number;
+    }
+}
+
+/// The rig's ports.
+pub(super) struct Ports;
+
+impl Ends for Ports {
+    type Out<M: Message + Numbered> = Outlet<M>;
+    type In<M: Message + Numbered> = Inlet<M>;
+
+    fn outlet<M: Message + Numbered>(node: &Node) -> anyhow::Result<Outlet<M>> {
+        Ok(node.outlet()?)
+    }
+
+    fn inlet<M: Message + Numbered>(node: &Node) -> anyhow::Result<Inlet<M>> {
+        Ok(node.inlet()?)
+    }
+
+    fn send<M: Message + Numbered>(out: &mut Outlet<M>, number: u64) -> anyhow::Result<()> {
+        Ok(out.publish(|message| message.set_number(number))?)
+    }
+
+    fn receive<M: Message + Numbered>(inlet: &Inlet<M>) -> anyhow::Result<Option<u64>> {
+        Ok(inlet.receive()?.map(|message| message.number()))
+    }
+}
+
+/// iceoryx2 as it comes.
+pub(super) struct Bare;
+
+impl Bare {
+    /// A topic as iceoryx2 sets it up by default, but for never blocking the sender.
+    fn topic<M: Message>(
+        node: &Node,
+    ) -> anyhow::Result<iceoryx2::service::port_factory::publish_subscribe::PortFactory<ipc::Service, M, ()>>
+    {
+        let builder = node.iceoryx().service_builder(&M::TOPIC.try_into()?).publish_subscribe::<M>();
+        Ok(builder.enable_safe_overflow(true).open_or_create()?)
+    }
+}
+
+impl Ends for Bare {
+    type Out<M: Message + Numbered> = Publisher<ipc::Service, M, ()>;
+    type In<M: Message + Numbered> = Subscriber<ipc::Service, M, ()>;
+
+    fn outlet<M: Message + Numbered>(node: &Node) -> anyhow::Result<Self::Out<M>> {
+        let topic = Self::topic::<M>(node)?;
+        Ok(topic.publisher_builder().backpressure_strategy(BackpressureStrategy::DiscardData).create()?)
+    }
+
+    fn inlet<M: Message + Numbered>(node: &Node) -> anyhow::Result<Self::In<M>> {
+        Ok(Self::topic::<M>(node)?.subscriber_builder().create()?)
+    }
+
+    fn send<M: Message + Numbered>(out: &mut Self::Out<M>, number: u64) -> anyhow::Result<()> {
+        let mut sample = out.loan()?;
+        sample.payload_mut().set_number(number);
+        sample.send()?;
+        Ok(())
+    }
+
+    fn receive<M: Message + Numbered>(inlet: &Self::In<M>) -> anyhow::Result<Option<u64>> {
+        Ok(inlet.receive()?.map(|sample| sample.payload().number()))
+    }
+}
+
+/// Starts the peer and times commands that it answers with readings of the same number.
+pub(super) fn round_trips<E: Ends>(
+    channel: Channel,
+    [own_core, peer_core]: [usize; 2],
+) -> anyhow::Result<Durations> {
+    let domain = Domain::named(&format!("bench-{}", std::process::id()))?;
+    let claim = domain.claim()?;
+    let result = {
+        let peer = Peer::start(channel, peer_core, Some(&domain), [Stdio::null(), Stdio::null()])?;
+        let result = on_core(own_core, || exchange::<E>(&Node::join(&domain)?));
+        drop(peer);
+        result
+    };
+    drop(claim);
+    domain.sweep()?;
+    result
+}
+
+fn exchange<E: Ends>(node: &Node) -> anyhow::Result<Durations> {
+    let (mut commands, readings) = E::commander(node)?;
+    greet::<E>(&mut commands, &readings)?;
+    time(|number| {
+        E::send(&mut commands, number)?;
+        // Answers to greetings may still lie there.
+        poll(|| Ok(E::receive(&readings)?.filter(|&answered| answered == number)))?;
+        Ok(())
+    })
+}
+
+/// Sends number 0 until the peer answers.
+fn greet<E: Ends>(commands: &mut E::Out<Command>, readings: &E::In<Reading>) -> anyhow::Result<()> {
+    for _ in 0..ATTEMPTS {
+        E::send(commands, 0)?;
+        clock::sleep(AGAIN_AFTER);
+        if E::receive(readings)?.is_some() {
+            return Ok(());
+        }
+    }
+    anyhow::bail!("the other side did not open its ports")
+}
+
+/// Answers every command with a reading of the same number, until the process is killed.
+pub(super) fn answer<E: Ends>(domain: &Domain) -> anyhow::Result<()> {
+    let node = Node::join(domain)?;
+    let commands: E::In<Command> = E::inlet(&node)?;
+    let mut readings: E::Out<Reading> = E::outlet(&node)?;
+    loop {
+        let number = poll(|| E::receive(&commands))?;
+        E::send(&mut readings, number)?;
+    }
+}

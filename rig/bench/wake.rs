@@ -1,0 +1,149 @@
+//! `bench loop`: how late the real-time loop wakes at 1 kHz, against cyclictest.
+//!
+//! cyclictest runs as its authors set it up (holding `/dev/cpu_dma_latency`) and with idle states allowed;
+//! where it is not installed, a plain absolute sleep on the same thread settings takes its place. Its
+//! histogram has steps of a microsecond.
+
+use std::process::Command;
+
+use anyhow::{Context, bail};
+use masseter_shared::clock::{self, SECOND_NS};
+use masseter_shared::config::RealtimeConfig;
+use masseter_shared::realtime::Cycle;
+
+use super::contest::{Durations, Outcome, Turn, durations, record};
+use super::on_core;
+
+const PERIOD_NS: u64 = SECOND_NS / 1000;
+/// Wake-ups a round.
+const WAKE_UPS: u64 = 10_000;
+/// As in a run, deadlines keep off whole milliseconds, ns.
+const OFF_TICK_NS: u64 = 230_000;
+/// A wake-up later than this is an outlier, ns.
+const OUTLIER_NS: u64 = 50_000;
+/// Highest lateness in cyclictest's histogram, µs.
+const CYCLICTEST_UP_TO_US: u64 = 20_000;
+
+pub(super) fn measure(rounds: u32, core: usize) -> anyhow::Result<Outcome> {
+    let mut outliers = Outliers::default();
+    let has_cyclictest = Command::new("cyclictest").arg("--help").output().is_ok();
+    let mut turns: Vec<(String, Turn)> = vec![("masseter".to_owned(), {
+        let outliers = &mut outliers;
+        Box::new(move || Ok(on_core(core, || own_loop(outliers))))
+    })];
+    if has_cyclictest {
+        let cyclictest = |more: &'static [&'static str]| -> Turn { Box::new(move || cyclictest(core, more)) };
+        turns.push(("cyclictest".to_owned(), cyclictest(&[])));
+        turns.push(("cyclictest --laptop".to_owned(), cyclictest(&["--laptop"])));
+    } else {
+        turns.push(("plain sleep".to_owned(), Box::new(move || Ok(on_core(core, plain_sleep)))));
+    }
+    let baselines = turns.len() - 1;
+    let measures = "wake-up lateness at 1 kHz, one SCHED_FIFO thread on one core".to_owned();
+    let outcome = Outcome::of_turns("loop", measures, rounds, turns)?;
+    let pairs: Vec<_> = (1..=baselines).map(|baseline| (0, baseline)).collect();
+    let outcome = outcome.comparing(&pairs).noting(outliers.in_words());
+    Ok(if has_cyclictest {
+        outcome
+    } else {
+        outcome.noting("cyclictest is not installed (`sudo apt install rt-tests`): a plain sleep stands in")
+    })
+}
+
+/// Late wake-ups of the own loop, and those of them before which it saw the machine stand still.
+#[derive(Debug, Default)]
+struct Outliers {
+    late: u64,
+    seen: u64,
+}
+
+impl Outliers {
+    fn in_words(&self) -> String {
+        format!(
+            "masseter woke more than {} µs late {} times; the machine was seen to stand still before {} of them",
+            OUTLIER_NS / 1000,
+            self.late,
+            self.seen
+        )
+    }
+}
+
+fn own_loop(outliers: &mut Outliers) -> Durations {
+    let mut late = durations();
+    let first_ns = clock::now_ns().next_multiple_of(PERIOD_NS) + PERIOD_NS + OFF_TICK_NS;
+    let mut cycle = Cycle::new(first_ns, PERIOD_NS);
+    let mut stalled_ns = 0;
+    for _ in 0..WAKE_UPS {
+        let wake = cycle.wait();
+        let late_ns = wake.woke_ns - wake.due_ns;
+        record(&mut late, late_ns, 1);
+        if late_ns > OUTLIER_NS {
+            outliers.late += 1;
+            outliers.seen += u64::from(wake.stalled_ns > stalled_ns);
+        }
+        stalled_ns = wake.stalled_ns;
+    }
+    late
+}
+
+fn plain_sleep() -> Durations {
+    let mut late = durations();
+    let mut due_ns = clock::now_ns() + PERIOD_NS;
+    for _ in 0..WAKE_UPS {
+        clock::sleep_until(due_ns);
+        record(&mut late, clock::now_ns().saturating_sub(due_ns), 1);
+        due_ns += PERIOD_NS;
+    }
+    late
+}
+
+fn cyclictest(core: usize, more: &[&str]) -> anyhow::Result<Durations> {
+    let output = Command::new("cyclictest")
+        .args(["--quiet", "--mlockall", "--threads=1", "--interval=1000"])
+        .arg(format!("--priority={}", RealtimeConfig::default().priority))
+        .arg(format!("--affinity={core}"))
+        .arg(format!("--loops={WAKE_UPS}"))
+        .arg(format!("--histogram={CYCLICTEST_UP_TO_US}"))
+        .args(more)
+        .output()
+        .context("cyclictest cannot be started")?;
+    if !output.status.success() {
+        bail!("cyclictest failed: {}", String::from_utf8_lossy(&output.stderr));
+    }
+    histogram_of(&String::from_utf8_lossy(&output.stdout))
+}
+
+/// Lines `µs count`; what lies beyond the last of them stands as a count in a comment.
+fn histogram_of(output: &str) -> anyhow::Result<Durations> {
+    let mut late = durations();
+    for line in output.lines() {
+        if let Some(beyond) = line.strip_prefix("# Histogram Overflows:") {
+            record(&mut late, CYCLICTEST_UP_TO_US * 1000, beyond.trim().parse()?);
+        }
+        let mut fields = line.split_whitespace().map(str::parse::<u64>);
+        if let (Some(Ok(late_us)), Some(Ok(count)), None) = (fields.next(), fields.next(), fields.next()) {
+            record(&mut late, late_us * 1000, count);
+        }
+    }
+    if late.is_empty() {
+        bail!("cyclictest gave no histogram");
+    }
+    Ok(late)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_histogram_of_cyclictest_is_read_with_its_overflows() {
+        let output = "# /dev/cpu_dma_latency set to 0us\n# Histogram\n000000 000000\n000013 000002\n\
+                      000044 000001\n# Total: 000000003\n# Max Latencies: 25000\n\
+                      # Histogram Overflows: 00001\n# Histogram Overflow at cycle number:\n# Thread 0:\n";
+        let late = histogram_of(output).unwrap();
+        assert_eq!(late.len(), 4);
+        assert_eq!(late.count_between(13_000, 13_000), 2);
+        assert!(late.max() >= CYCLICTEST_UP_TO_US * 1000);
+        assert!(histogram_of("nothing\n").is_err());
+    }
+}
