@@ -1,0 +1,148 @@
+#!/usr/bin/env python3
+"""Kills or stops one process of a running rig at a random moment, again and again, and shows as a
+distribution how soon the survivor reacts, how soon the supervisor has swept up, and what is left behind.
+
+    tests/realtime/kill.py target/release/masseter --kills 200
+    tests/realtime/kill.py target/release/masseter --kills 200 --signal STOP
+
+Fails when a survivor does not react within the bound, or anything stays in shared memory. Only the Python
+standard library is used.
+"""
+
+import argparse
+import json
+import os
+import random
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+# The survivors count 20 silent cycles of 1 ms; the rest is for machines that stand still for a while.
+REACTION_BOUND_MS = 100.0
+STOPPED_S = 0.3
+REACTION = {"controller": "command_lost", "plant": "stale_reading"}
+SCENARIO = "duration_s = 60.0\n[checks]\nmissed_cycles = 1000000\ntracking_rms_mm = 1000.0\n"
+
+
+def child_of(supervisor, role):
+    """Process id of a role, once it runs."""
+    for _ in range(1000):
+        children = Path(f"/proc/{supervisor}/task/{supervisor}/children").read_text().split()
+        for child in children:
+            try:
+                arguments = Path(f"/proc/{child}/cmdline").read_bytes().split(b"\0")
+            except FileNotFoundError:
+                continue
+            if len(arguments) > 1 and arguments[1] == role.encode():
+                return int(child)
+        time.sleep(0.01)
+    raise SystemExit(f"no {role} appeared")
+
+
+def wait_until_it_records(run):
+    """Until the recording shows that the rig runs."""
+    for _ in range(2000):
+        recording = run / "recording.mcap"
+        if recording.exists() and recording.stat().st_size > 500_000:
+            return
+        time.sleep(0.01)
+    raise SystemExit("the rig did not begin to record")
+
+
+class Disturbed(Exception):
+    """The machine stopped the rig before the hit."""
+
+
+def reaction_ms(run, role, hit_ns):
+    """From the signal to the survivor's fault, ms; none if the survivor is not to react."""
+    events = [json.loads(line) for line in (run / "events.jsonl").read_text().splitlines()]
+    faults = [event for event in events if event["kind"] == "fault"]
+    if any(fault["time_ns"] < hit_ns for fault in faults):
+        raise Disturbed
+    if role not in REACTION:
+        return None
+    for fault in faults:
+        if fault["cause"] == REACTION[role]:
+            return (fault["time_ns"] - hit_ns) / 1e6
+    raise SystemExit(f"the {role} was hit and nobody reported {REACTION[role]}: {faults}")
+
+
+def left_behind(supervisor):
+    return [name for name in os.listdir("/dev/shm") if name.startswith(f"masseter_{os.getuid()}_{supervisor}-")]
+
+
+def hit_once(masseter, role, how, chance):
+    """One rig, one hit: reaction and clean-up times, ms."""
+    with tempfile.TemporaryDirectory() as folder:
+        scenario, run = Path(folder) / "scenario.toml", Path(folder) / "run"
+        scenario.write_text(SCENARIO)
+        rig = subprocess.Popen(
+            [masseter, "run", scenario, "--out", run], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+        )
+        victim = child_of(rig.pid, role)
+        wait_until_it_records(run)
+        time.sleep(chance.uniform(0.0, 1.0))
+        hit_ns = time.monotonic_ns()
+        if rig.poll() is not None:
+            raise Disturbed
+        os.kill(victim, signal.SIGKILL if how == "KILL" else signal.SIGSTOP)
+        if how == "STOP":
+            time.sleep(STOPPED_S)
+            os.kill(victim, signal.SIGCONT)
+        rig.wait(timeout=60)
+        over_ms = (time.monotonic_ns() - hit_ns) / 1e6
+        left = left_behind(rig.pid)
+        if left:
+            raise SystemExit(f"after the {role}'s end these stayed in shared memory: {left}")
+        return reaction_ms(run, role, hit_ns), over_ms
+
+
+def hits(masseter, role, how, chance, count):
+    """As many hits of undisturbed rigs, and how many disturbed ones there were."""
+    results, disturbed = [], 0
+    while len(results) < count:
+        try:
+            results.append(hit_once(masseter, role, how, chance))
+        except Disturbed:
+            disturbed += 1
+            if disturbed > 10 + count:
+                raise SystemExit("the machine is too disturbed: rigs stop by themselves") from None
+    return results, disturbed
+
+
+def spread(values):
+    values = sorted(values)
+    at = lambda share: values[min(len(values) - 1, int(share * len(values)))]
+    return f"p50 {at(0.5):8.2f}  p99 {at(0.99):8.2f}  max {values[-1]:8.2f} ms"
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("masseter", type=Path)
+    parser.add_argument("--kills", type=int, default=200, help="of each process")
+    parser.add_argument("--signal", choices=["KILL", "STOP"], default="KILL")
+    parser.add_argument("--seed", type=int, default=1)
+    arguments = parser.parse_args()
+    chance = random.Random(arguments.seed)
+    roles = ["controller", "plant", "logger"] if arguments.signal == "KILL" else list(REACTION)
+    late = False
+    for role in roles:
+        results, disturbed = hits(arguments.masseter.resolve(), role, arguments.signal, chance, arguments.kills)
+        reactions = [reaction for reaction, _ in results if reaction is not None]
+        title = f"{role:<10} SIG{arguments.signal} × {len(results)}"
+        if reactions:
+            print(f"{title}: survivor reacts     {spread(reactions)}")
+            late |= max(reactions) > REACTION_BOUND_MS
+        print(f"{title}: over and swept up   {spread([over for _, over in results])}")
+        if disturbed:
+            print(f"{title}: repeated, because the machine had stopped the rig before: {disturbed}")
+        sys.stdout.flush()
+    if late:
+        sys.exit(f"a survivor took longer than {REACTION_BOUND_MS} ms")
+
+
+if __name__ == "__main__":
+    main()
