@@ -6,8 +6,8 @@
 //! ([`analysis`]), so it can be told again.
 
 pub mod analysis;
-pub mod can;
 pub mod bench;
+pub mod can;
 pub mod clean;
 pub mod cli;
 pub mod doctor;
