@@ -35,7 +35,7 @@ const MOST_STEPS: u32 = 50;
 /// g₂₃ at which Newton's iteration takes over.
 const NARROW_ENOUGH: f64 = 1e-10;
 /// Pairs of headings of legs 2 and 3.
-const PAIRS: usize = 4;
+pub(super) const PAIRS: usize = 4;
 
 /// Legs 2 and 3 as functions of x = cos θ₁, θ₁ in [0, π].
 #[derive(Debug, Clone, Copy)]
