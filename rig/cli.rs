@@ -11,6 +11,7 @@ use masseter_shared::lifecycle::Assignment;
 
 use crate::bench::BenchArgs;
 use crate::bench::ipc::PeerArgs;
+use crate::can::ServeArgs;
 use crate::exit::{Exit, Failure};
 use crate::log::{self, LogVerb};
 use crate::{bench, can, clean, doctor, kinematics, logger, plant, report, run};
@@ -67,6 +68,8 @@ enum CanVerb {
         /// Scenario whose drives are meant [default: the published rig]
         scenario: Option<PathBuf>,
     },
+    /// Let third-party tools onto the simulated buses with the emulated drives (socketcand protocol)
+    Serve(ServeArgs),
 }
 
 /// What `can eds` takes.
@@ -271,6 +274,7 @@ pub fn main() -> ExitCode {
         Verb::Ik(args) => kinematics::inverse(&args),
         Verb::Can(CanVerb::Eds(args)) => can::eds(&args),
         Verb::Can(CanVerb::Dbc { scenario }) => can::dbc(scenario.as_deref()),
+        Verb::Can(CanVerb::Serve(args)) => can::serve(&args),
         Verb::Report(args) => report::again(&args.folder, args.format),
         Verb::Doctor(args) => doctor::examine(args.format),
         Verb::Log { verb } => log::run(&verb),

@@ -80,10 +80,14 @@ pub(crate) fn build_master(scenario: &Scenario, now_ns: u64) -> Result<Master, P
     Ok(Master::new(master_settings(&scenario.can, drives)?, now_ns))
 }
 
-/// The emulated drives on simulated wires, switched on at `now_ns`.
-pub(crate) fn build_virtual(scenario: &Scenario, now_ns: u64) -> Result<VirtualLink, PlantError> {
+/// The emulated drives on simulated wires, switched on at `now_ns`, with so many free ports on each wire.
+pub(crate) fn build_virtual(
+    scenario: &Scenario,
+    free_ports: usize,
+    now_ns: u64,
+) -> Result<VirtualLink, PlantError> {
     let emulation = build_emulation(scenario, now_ns)?;
-    Ok(VirtualLink::new(wires(&scenario.can)?, places(&scenario.can)?, emulation))
+    Ok(VirtualLink::new(wires(&scenario.can, free_ports)?, places(&scenario.can)?, emulation))
 }
 
 /// The real interfaces.
@@ -160,12 +164,12 @@ fn master_id() -> NodeId {
     NodeId::new(MASTER_ID).expect("a node id")
 }
 
-fn wires(can: &CanConfig) -> Result<Vec<VirtualWire>, PlantError> {
+fn wires(can: &CanConfig, free_ports: usize) -> Result<Vec<VirtualWire>, PlantError> {
     let bitrate = Bitrate::new(can.bitrate_bps)?;
     let wire = |axes: &Vec<usize>| {
         VirtualWire::new(&WireConfig {
             bitrate,
-            ports: 1 + axes.len(),
+            ports: 1 + axes.len() + free_ports,
             transmit_capacity: TRANSMIT_CAPACITY,
             receive_capacity: RECEIVE_CAPACITY,
         })

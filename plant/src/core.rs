@@ -34,7 +34,7 @@ pub struct PlantCore<L = VirtualLink> {
 impl PlantCore {
     /// The scenario's plant with emulated drives on simulated wires, switched on at `now_ns`.
     pub fn new(scenario: &Scenario, now_ns: u64) -> Result<Self, PlantError> {
-        Self::on(build_virtual(scenario, now_ns)?, scenario, now_ns)
+        Self::on(build_virtual(scenario, 0, now_ns)?, scenario, now_ns)
     }
 }
 

@@ -15,6 +15,7 @@ mod encoder;
 mod link;
 mod master;
 mod mechanism;
+pub mod open_link;
 pub mod process;
 mod socket_link;
 

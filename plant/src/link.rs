@@ -92,6 +92,11 @@ impl VirtualLink {
         &self.emulation
     }
 
+    /// Any port on a wire: 0 is the master's, those of the drives follow, then the free ones.
+    pub(crate) fn port_at(&mut self, bus: usize, port: usize) -> impl Bus {
+        self.wires[bus].port(port)
+    }
+
     /// The next frame to arrive on any wire.
     fn next_arrival(&self) -> Option<(u64, usize)> {
         let arrivals = self.wires.iter().enumerate();

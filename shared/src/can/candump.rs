@@ -113,7 +113,7 @@ fn parse_frame(id: &str, data: &str) -> Result<Frame, CandumpError> {
     Ok(Frame::new(parse_id(id)?, used)?)
 }
 
-fn parse_id(text: &str) -> Result<CanId, CandumpError> {
+pub(super) fn parse_id(text: &str) -> Result<CanId, CandumpError> {
     let wrong = || CandumpError::Id { text: text.to_owned() };
     let number = digits(text, 16).ok_or_else(wrong)?;
     match text.len() {
@@ -124,7 +124,7 @@ fn parse_id(text: &str) -> Result<CanId, CandumpError> {
 }
 
 /// A number of digits only: `from_str_radix` alone would take a sign.
-fn digits(text: &str, radix: u32) -> Option<u64> {
+pub(super) fn digits(text: &str, radix: u32) -> Option<u64> {
     let all_digits = text.chars().all(|digit| digit.is_digit(radix));
     if all_digits { u64::from_str_radix(text, radix).ok() } else { None }
 }

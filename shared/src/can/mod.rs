@@ -13,6 +13,7 @@ mod frame;
 mod load;
 mod pdo;
 mod socket_can;
+pub mod socketcand;
 pub mod tap;
 mod virtual_bus;
 pub mod wire;

@@ -1,0 +1,228 @@
+//! socketcand's text protocol in raw mode, server's side: how tools reach a bus over TCP.
+//!
+//! After `< hi >` a client says `< open can0 >` and `< rawmode >`, gets `< ok >` for each, and from then on
+//! `< frame … >` for every frame on the bus; with `< send … >` it sends one. The modes for broadcast
+//! management, statistics and ISO-TP are not served, nor are remote frames. No sockets here.
+//!
+//! Source: linux-can/socketcand, `doc/protocol.md`.
+
+use std::fmt::{self, Write};
+
+use super::bus::Received;
+use super::candump::{self, CandumpError};
+use super::frame::{Frame, FrameError};
+
+/// What the server says first.
+pub const GREETING: &str = "< hi >";
+/// What a granted request is answered with.
+pub const OK: &str = "< ok >";
+/// What `< echo >` is answered with.
+pub const ECHO: &str = "< echo >";
+
+/// A request is never longer; what is, is none.
+const LONGEST_REQUEST: usize = 256;
+
+/// What a client asks for.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Request {
+    /// To be let onto a bus.
+    Open(String),
+    /// To get every frame from now on.
+    RawMode,
+    /// To send a frame.
+    Send(Frame),
+    /// To be told that the connection lives.
+    Echo,
+}
+
+/// Why a request cannot be understood.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum RequestError {
+    /// No request of raw mode.
+    #[error("`< {text} >` is no request: expected open, rawmode, send or echo")]
+    Unknown {
+        /// What stands between the brackets.
+        text: String,
+    },
+    /// The bytes sent are not as many as announced.
+    #[error("{announced} data bytes announced, {sent} sent")]
+    Length {
+        /// The length field.
+        announced: String,
+        /// Data bytes that follow.
+        sent: usize,
+    },
+    /// A data byte is none.
+    #[error("`{text}` is no byte in hexadecimal digits")]
+    Byte {
+        /// The word.
+        text: String,
+    },
+    /// The identifier is none.
+    #[error(transparent)]
+    Id(#[from] CandumpError),
+    /// The frame cannot exist.
+    #[error(transparent)]
+    Frame(#[from] FrameError),
+    /// Text that is no request, or one without an end.
+    #[error("text outside of `< … >`, or a request of more than {LONGEST_REQUEST} bytes")]
+    Stray,
+}
+
+/// Requests as they come in pieces over a stream.
+#[derive(Debug, Default)]
+pub struct Requests {
+    pending: Vec<u8>,
+}
+
+impl Requests {
+    /// Takes what has arrived.
+    pub fn push(&mut self, bytes: &[u8]) {
+        self.pending.extend_from_slice(bytes);
+    }
+
+    /// The next whole request, if it has arrived.
+    ///
+    /// # Errors
+    /// [`RequestError`]; the bytes in question are gone then, and later ones are still read.
+    pub fn take(&mut self) -> Option<Result<Request, RequestError>> {
+        let Some(end) = self.pending.iter().position(|byte| *byte == b'>') else {
+            if self.pending.len() <= LONGEST_REQUEST {
+                return None;
+            }
+            self.pending.clear();
+            return Some(Err(RequestError::Stray));
+        };
+        let bytes: Vec<u8> = self.pending.drain(..=end).collect();
+        let text = str::from_utf8(&bytes[..end]).ok();
+        Some(match text.and_then(|text| text.trim_start().strip_prefix('<')) {
+            Some(text) => parse(text.trim()),
+            None => Err(RequestError::Stray),
+        })
+    }
+}
+
+fn parse(text: &str) -> Result<Request, RequestError> {
+    let words: Vec<&str> = text.split_whitespace().collect();
+    match words[..] {
+        ["open", bus] => Ok(Request::Open(bus.to_owned())),
+        ["rawmode"] => Ok(Request::RawMode),
+        ["echo"] => Ok(Request::Echo),
+        ["send", id, length, ref data @ ..] => parse_send(id, length, data),
+        _ => Err(RequestError::Unknown { text: text.to_owned() }),
+    }
+}
+
+fn parse_send(id: &str, length: &str, data: &[&str]) -> Result<Request, RequestError> {
+    if length.parse() != Ok(data.len()) {
+        return Err(RequestError::Length { announced: length.to_owned(), sent: data.len() });
+    }
+    let byte = |text: &&str| {
+        let value = candump::digits(text, 16).and_then(|value| u8::try_from(value).ok());
+        value.ok_or_else(|| RequestError::Byte { text: (*text).to_owned() })
+    };
+    let data = data.iter().map(byte).collect::<Result<Vec<u8>, _>>()?;
+    Ok(Request::Send(Frame::new(candump::parse_id(id)?, &data)?))
+}
+
+/// Writes a received frame. Its time keeps whole microseconds, as the format does.
+///
+/// # Errors
+/// What `out` fails with.
+pub fn write_frame(out: &mut impl Write, received: &Received) -> fmt::Result {
+    let micros = received.time_ns / 1000;
+    write!(out, "< frame {} {}.{:06} ", received.frame.id(), micros / 1_000_000, micros % 1_000_000)?;
+    // Bytes without blanks between them, and two blanks where there are none: python-can splits at blanks.
+    received.frame.data().iter().try_for_each(|byte| write!(out, "{byte:02X}"))?;
+    out.write_str(" >")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::frame::CanId;
+    use super::super::frame::strategies::any_frame;
+    use super::*;
+    use proptest::prelude::*;
+
+    fn requests(text: &str) -> Vec<Result<Request, RequestError>> {
+        let mut requests = Requests::default();
+        requests.push(text.as_bytes());
+        std::iter::from_fn(|| requests.take()).collect()
+    }
+
+    fn sent(id: u16, data: &[u8]) -> Request {
+        Request::Send(Frame::new(CanId::standard(id).unwrap(), data).unwrap())
+    }
+
+    #[test]
+    fn requests_are_read_one_after_the_other() {
+        let read = requests("< open can0 >< rawmode >\n< echo > < send 123 2 11 F1 >< send 080 0  >");
+        let open = Request::Open("can0".to_owned());
+        let expected = [open, Request::RawMode, Request::Echo, sent(0x123, &[0x11, 0xF1]), sent(0x080, &[])];
+        assert_eq!(read, expected.map(Ok));
+        let extended = Frame::fixed(CanId::extended(0x1AAA_AAAA).unwrap(), [1, 0xF1]);
+        assert_eq!(requests("< send 1AAAAAAA 2 1 F1 >"), [Ok(Request::Send(extended))]);
+    }
+
+    #[test]
+    fn what_is_no_request_is_told_and_what_follows_is_read() {
+        let table = [
+            ("< bcmmode >", "is no request"),
+            ("< open >", "is no request"),
+            ("open can0 >", "outside"),
+            ("\u{e9} >", "outside"),
+            ("< send 123 3 11 22 >", "3 data bytes announced, 2 sent"),
+            ("< send 123 x >", "x data bytes announced"),
+            ("< send 123 1 1g >", "no byte"),
+            ("< send 123 1 100 >", "no byte"),
+            ("< send 12 0 >", "no identifier"),
+            ("< send 800 0 >", "does not fit"),
+            ("< send 123 9 1 2 3 4 5 6 7 8 9 >", "9 data bytes"),
+        ];
+        for (text, reason) in table {
+            let read = requests(&format!("{text}< echo >"));
+            let error = read[0].clone().unwrap_err().to_string();
+            assert!(error.contains(reason), "{text}: {error}");
+            assert_eq!(read[1..], [Ok(Request::Echo)]);
+        }
+        assert_eq!(requests(&"x".repeat(LONGEST_REQUEST + 1)), [Err(RequestError::Stray)]);
+    }
+
+    #[test]
+    fn frames_are_written_as_clients_read_them() {
+        let table = [
+            (Frame::fixed(CanId::standard(0x123).unwrap(), [0x11, 0x02]), "< frame 123 23.424242 1102 >"),
+            (Frame::fixed(CanId::standard(0x080).unwrap(), []), "< frame 080 23.424242  >"),
+            (Frame::fixed(CanId::extended(0x123).unwrap(), [0xFF]), "< frame 00000123 23.424242 FF >"),
+        ];
+        for (frame, expected) in table {
+            let mut text = String::new();
+            write_frame(&mut text, &Received { frame, time_ns: 23_424_242_999 }).unwrap();
+            assert_eq!(text, expected);
+        }
+    }
+
+    proptest! {
+        /// However the stream is cut, the frame arrives.
+        #[test]
+        fn a_frame_survives_any_cut(frame in any_frame(), cut in 0..40_usize) {
+            let mut text = format!("< send {} {}", frame.id(), frame.data().len());
+            frame.data().iter().for_each(|byte| write!(text, " {byte:x}").unwrap());
+            text.push_str(" >");
+            let (first, second) = text.split_at(cut.min(text.len() - 1));
+            let mut requests = Requests::default();
+            requests.push(first.as_bytes());
+            prop_assert_eq!(requests.take(), None);
+            requests.push(second.as_bytes());
+            prop_assert_eq!(requests.take(), Some(Ok(Request::Send(frame))));
+            prop_assert_eq!(requests.take(), None);
+        }
+
+        #[test]
+        fn any_bytes_are_read_or_refused(bytes: Vec<u8>) {
+            let mut requests = Requests::default();
+            requests.push(&bytes);
+            while requests.take().is_some() {}
+        }
+    }
+}
