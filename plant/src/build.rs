@@ -1,8 +1,9 @@
 //! Builds master, wires, drives and mechanism from a scenario, and refuses what cannot work.
 
 use masseter_shared::can::canopen::{NodeId, NodeIdError, sync};
-use masseter_shared::can::wire::{INTERFRAME_BITS, wire_bits};
-use masseter_shared::can::{Bitrate, BitrateError, OpenError, VirtualWire, WireConfig};
+use masseter_shared::can::faults::Faults;
+use masseter_shared::can::wire::{INTERFRAME_BITS, frame_bits};
+use masseter_shared::can::{BitrateError, OpenError, VirtualWire, WireConfig};
 use masseter_shared::config::{CanConfig, DriveConfig, DynamicsConfig, Scenario};
 use masseter_shared::geometry::{AXES, AXIS_NAMES, GeometryError, LEGS, Mechanism, Pose};
 
@@ -10,6 +11,7 @@ use crate::checks::check_quantities;
 use crate::drive::{DriveNode, DriveSettings};
 use crate::emulation::Emulation;
 use crate::encoder::Encoder;
+use crate::faults;
 use crate::link::{Place, VirtualLink};
 use crate::master::{Master, MasterSettings, Scale};
 use crate::mechanism::{Dynamics, DynamicsError};
@@ -56,6 +58,16 @@ pub enum PlantError {
         /// How often it is named.
         times: usize,
     },
+    /// A fault of a node that is not there.
+    #[error("faults.node = {node}: bus {bus} has the nodes {present}")]
+    FaultNode {
+        /// The node named.
+        node: u8,
+        /// The bus named.
+        bus: usize,
+        /// Who is on it.
+        present: String,
+    },
     /// A quantity that must be above 0, or at least not below.
     #[error("{key} = {value}: {need}")]
     Quantity {
@@ -87,7 +99,8 @@ pub(crate) fn build_virtual(
     now_ns: u64,
 ) -> Result<VirtualLink, PlantError> {
     let emulation = build_emulation(scenario, now_ns)?;
-    Ok(VirtualLink::new(wires(&scenario.can, free_ports)?, places(&scenario.can)?, emulation))
+    let places = places(&scenario.can)?;
+    Ok(VirtualLink::new(wires(scenario, free_ports, now_ns)?, places, emulation))
 }
 
 /// The real interfaces.
@@ -122,12 +135,13 @@ fn master_settings(
     can: &CanConfig,
     drives: [(NodeId, usize, Scale); AXES],
 ) -> Result<MasterSettings, PlantError> {
-    let sync_bits = wire_bits(&sync::frame()) - INTERFRAME_BITS;
+    let rates = can.rates()?;
+    let sync_bits = frame_bits(&sync::frame().in_format(can.format()));
     Ok(MasterSettings {
         id: master_id(),
         drives,
         buses: can.buses.len(),
-        sync_ns: Bitrate::new(can.bitrate_bps)?.bits_to_ns(sync_bits),
+        sync_ns: rates.duration_ns(sync_bits) - rates.nominal().bits_to_ns(INTERFRAME_BITS),
         heartbeat_ns: u64::from(can.heartbeat_producer_ms) * MS_NS,
         heartbeat_timeout_ns: u64::from(can.heartbeat_consumer_ms) * MS_NS,
         boot_timeout_ns: u64::from(can.boot_timeout_ms) * MS_NS,
@@ -164,17 +178,24 @@ fn master_id() -> NodeId {
     NodeId::new(MASTER_ID).expect("a node id")
 }
 
-fn wires(can: &CanConfig, free_ports: usize) -> Result<Vec<VirtualWire>, PlantError> {
-    let bitrate = Bitrate::new(can.bitrate_bps)?;
-    let wire = |axes: &Vec<usize>| {
-        VirtualWire::new(&WireConfig {
-            bitrate,
-            ports: 1 + axes.len() + free_ports,
+fn wires(scenario: &Scenario, free_ports: usize, now_ns: u64) -> Result<Vec<VirtualWire>, PlantError> {
+    let can = &scenario.can;
+    let (rates, ids) = (can.rates()?, node_ids(can)?);
+    let restart_after_ns = (can.restart_ms > 0).then(|| u64::from(can.restart_ms) * MS_NS);
+    let wire = |(bus, axes): (usize, &Vec<usize>)| {
+        let nodes: Vec<_> = std::iter::once(master_id()).chain(axes.iter().map(|&axis| ids[axis])).collect();
+        let config = WireConfig {
+            rates,
+            format: can.format(),
+            ports: nodes.len() + free_ports,
             transmit_capacity: TRANSMIT_CAPACITY,
             receive_capacity: RECEIVE_CAPACITY,
-        })
+            restart_after_ns,
+        };
+        let faults = faults::of_bus(&scenario.faults, bus, &nodes, now_ns)?;
+        Ok(VirtualWire::with_faults(&config, Faults::new(faults, scenario.seed.wrapping_add(bus as u64))))
     };
-    Ok(can.buses.iter().map(wire).collect())
+    can.buses.iter().enumerate().map(wire).collect()
 }
 
 /// Where each axis hangs; port 0 of a bus is the master's.

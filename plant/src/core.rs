@@ -6,7 +6,7 @@
 //! times, as real time has them, or with exact ones.
 
 use masseter_shared::can::canopen::Cob;
-use masseter_shared::can::{ReceiveError, Received, tap};
+use masseter_shared::can::{ReceiveError, Tapped, tap};
 use masseter_shared::config::Scenario;
 use masseter_shared::messages::{Command, Event, FrameTap, Reading, Truth};
 use masseter_shared::realtime::Wake;
@@ -16,9 +16,12 @@ use crate::build::{build_master, build_sockets, build_virtual};
 use crate::link::{Link, VirtualLink};
 use crate::master::Master;
 use crate::socket_link::SocketLink;
+use crate::wire_events;
 
 /// Tapped frames kept between two drains; a drain follows every cycle.
 const TAPPED: usize = 4096;
+/// Events of the wires kept so long; states change at most every few frames.
+const WIRE_EVENTS: usize = 256;
 
 /// The plant's whole memory.
 #[derive(Debug)]
@@ -28,6 +31,7 @@ pub struct PlantCore<L = VirtualLink> {
     buses: usize,
     cycle: u64,
     tapped: Vec<FrameTap>,
+    wire_events: Vec<Event>,
     command_sent_ns: u64,
 }
 
@@ -59,6 +63,7 @@ impl<L: Link> PlantCore<L> {
             buses: scenario.can.buses.len(),
             cycle: 0,
             tapped: Vec::with_capacity(TAPPED),
+            wire_events: Vec::with_capacity(WIRE_EVENTS),
             command_sent_ns: 0,
         })
     }
@@ -109,6 +114,7 @@ impl<L: Link> PlantCore<L> {
 
     /// Hands out what happened since the last drain.
     pub fn drain_events(&mut self, out: &mut impl FnMut(Event)) {
+        self.wire_events.drain(..).for_each(&mut *out);
         self.master.drain_events(out);
     }
 
@@ -116,19 +122,41 @@ impl<L: Link> PlantCore<L> {
         for bus in 0..self.buses {
             while self.tapped.len() < TAPPED {
                 match self.link.tap(bus, now_ns) {
-                    Ok(Some(received)) => self.take_tapped(bus, &received),
+                    Ok(Some(tapped)) => self.take_tapped(bus, &tapped),
                     Err(ReceiveError::Overrun { lost }) => self.master.note_lost(now_ns, lost),
                     Ok(None) | Err(ReceiveError::InterfaceDown { .. } | ReceiveError::Os { .. }) => break,
                 }
             }
+            while let Some(note) = self.link.next_note(bus, now_ns) {
+                let axis = note.port.and_then(|port| self.link.axis_at(bus, port));
+                self.add_event(wire_events::of_note(&note, axis, self.cycle));
+            }
         }
     }
 
-    fn take_tapped(&mut self, bus: usize, received: &Received) {
-        if matches!(Cob::try_from(received.frame.id()), Ok(Cob::Rpdo1(_))) {
-            self.command_sent_ns = self.command_sent_ns.max(received.time_ns);
+    fn take_tapped(&mut self, bus: usize, tapped: &Tapped) {
+        match tapped {
+            Tapped::Frame(received) => {
+                if matches!(Cob::try_from(received.frame.id()), Ok(Cob::Rpdo1(_))) {
+                    self.command_sent_ns = self.command_sent_ns.max(received.time_ns);
+                }
+            }
+            Tapped::Error(report) => {
+                let axis = self.link.axis_at(bus, usize::from(report.port));
+                if let Some(event) = wire_events::of_report(report, axis, self.cycle) {
+                    self.add_event(event);
+                }
+            }
         }
-        self.tapped.push(tap::encode(bus as u16, received));
+        self.tapped.push(tap::encode(bus as u16, tapped));
+    }
+
+    fn add_event(&mut self, event: Event) {
+        if self.wire_events.len() < WIRE_EVENTS {
+            self.wire_events.push(event);
+        } else {
+            self.master.note_lost(event.time_ns, 1);
+        }
     }
 }
 

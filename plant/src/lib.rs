@@ -12,12 +12,14 @@ mod drive;
 mod emulation;
 pub mod emulator;
 mod encoder;
+mod faults;
 mod link;
 mod master;
 mod mechanism;
 pub mod open_link;
 pub mod process;
 mod socket_link;
+mod wire_events;
 
 pub use build::PlantError;
 pub use mechanism::DynamicsError;

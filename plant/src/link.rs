@@ -2,7 +2,8 @@
 //!
 //! The master sees [`Buses`] either way; the plant around it sees [`Link`].
 
-use masseter_shared::can::{Bus, ReceiveError, Received, VirtualWire};
+use masseter_shared::can::faults::FaultNote;
+use masseter_shared::can::{Bus, ReceiveError, Tapped, VirtualWire};
 use masseter_shared::geometry::AXES;
 use masseter_shared::messages::Truth;
 
@@ -20,8 +21,18 @@ pub trait Link: Buses {
     /// Lets everything happen that happens up to `until_ns`; on real wires it does so by itself.
     fn advance(&mut self, until_ns: u64) -> Result<(), DynamicsError>;
 
-    /// The next frame that a tap on a wire saw up to `now_ns`, whoever sent it.
-    fn tap(&mut self, bus: usize, now_ns: u64) -> Result<Option<Received>, ReceiveError>;
+    /// The next frame or error that a tap on a wire saw up to `now_ns`, whoever caused it.
+    fn tap(&mut self, bus: usize, now_ns: u64) -> Result<Option<Tapped>, ReceiveError>;
+
+    /// What the faults injected into a wire did up to `now_ns`, one note at a time; real wires have none.
+    fn next_note(&mut self, _bus: usize, _now_ns: u64) -> Option<FaultNote> {
+        None
+    }
+
+    /// The axis whose drive is at a port of a simulated wire; none at the master's.
+    fn axis_at(&self, _bus: usize, _port: usize) -> Option<usize> {
+        None
+    }
 
     /// What the mechanism did at the last SYNC, where it is emulated here.
     fn truth(&self) -> Option<Truth>;
@@ -71,8 +82,16 @@ impl Link for VirtualLink {
         Ok(())
     }
 
-    fn tap(&mut self, bus: usize, now_ns: u64) -> Result<Option<Received>, ReceiveError> {
+    fn tap(&mut self, bus: usize, now_ns: u64) -> Result<Option<Tapped>, ReceiveError> {
         self.wires[bus].tap(now_ns)
+    }
+
+    fn next_note(&mut self, bus: usize, now_ns: u64) -> Option<FaultNote> {
+        self.wires[bus].next_note(now_ns)
+    }
+
+    fn axis_at(&self, bus: usize, port: usize) -> Option<usize> {
+        self.places.iter().position(|place| *place == Place { bus, port })
     }
 
     fn truth(&self) -> Option<Truth> {
@@ -129,7 +148,8 @@ impl VirtualLink {
     fn send_outgoing(&mut self, axis: usize, now_ns: u64) {
         let Place { bus, port } = self.places[axis];
         while let Some(frame) = self.emulation.outgoing(axis) {
-            // A full transmit queue loses the frame, as in a real node; the master misses it.
+            // A full transmit queue or a controller off the bus loses the frame, as in a real node; the
+            // master misses it.
             let _ = self.wires[bus].send(port, now_ns, frame);
         }
     }

@@ -1,6 +1,6 @@
 //! The robot: real wires, on which the drives hang. Nothing is known of the mechanism but what they tell.
 
-use masseter_shared::can::{Bus, OpenError, ReceiveError, Received, SocketCan};
+use masseter_shared::can::{Bus, OpenError, ReceiveError, SocketCan, Tapped};
 use masseter_shared::messages::Truth;
 
 use crate::link::{Buses, Link};
@@ -32,8 +32,8 @@ impl Link for SocketLink {
         Ok(())
     }
 
-    fn tap(&mut self, bus: usize, now_ns: u64) -> Result<Option<Received>, ReceiveError> {
-        self.taps[bus].receive(now_ns)
+    fn tap(&mut self, bus: usize, now_ns: u64) -> Result<Option<Tapped>, ReceiveError> {
+        Ok(self.taps[bus].receive(now_ns)?.map(Tapped::Frame))
     }
 
     fn truth(&self) -> Option<Truth> {

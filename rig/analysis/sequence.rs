@@ -19,9 +19,10 @@ pub struct TopicFigures {
     pub missing: u64,
 }
 
-/// The process that publishes an event: master and drives are one process.
+/// The process that publishes an event: master, drives and simulated wires are one process.
 fn publisher_of(event: &Event) -> u32 {
-    if event.source == Source::Drive.code() { Source::Master.code() } else { event.source }
+    let is_of_plant = [Source::Drive, Source::Wire].map(Source::code).contains(&event.source);
+    if is_of_plant { Source::Master.code() } else { event.source }
 }
 
 /// Follows every publisher of every topic. Each counts its own messages from 1.

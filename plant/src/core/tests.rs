@@ -4,7 +4,7 @@ use masseter_shared::can::canopen::{Cob, NodeId};
 use masseter_shared::can::cia402::DriveState;
 use masseter_shared::can::tap;
 use masseter_shared::geometry::{AXES, Mechanism, MechanismConfig, Pose, Vec3};
-use masseter_shared::messages::codes::{Cause, DriveCondition, DriveRequest, EventKind};
+use masseter_shared::messages::codes::{Cause, DriveCondition, DriveRequest, EventKind, Source};
 
 use super::*;
 
@@ -212,7 +212,7 @@ fn a_cycle_on_the_wire_is_sync_then_process_data_up_then_down() {
     let on_bus = |bus: u16| {
         let frames = bench.frames.iter().filter(move |frame| frame.bus == bus);
         frames
-            .map(|frame| tap::decode(frame).unwrap())
+            .map(|frame| *tap::decode(frame).unwrap().frame().unwrap())
             .filter(|frame| (sync_ns..sync_ns + PERIOD_NS).contains(&frame.time_ns))
             .map(|frame| Cob::try_from(frame.frame.id()).unwrap())
             .filter(|cob| !matches!(cob, Cob::Heartbeat(_)))
@@ -272,3 +272,4 @@ fn a_drive_that_never_boots_is_named() {
 }
 
 mod stops;
+mod wire_faults;

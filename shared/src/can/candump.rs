@@ -1,11 +1,13 @@
 //! candump log lines: `(1436509052.249713) vcan0 123#11223344`.
 //!
-//! Time stamps keep whole microseconds, as the format does. Remote frames and CAN FD are refused.
+//! Time stamps keep whole microseconds, as the format does. Remote frames, error messages and FD frames of more
+//! than 8 bytes are written where the rig has them, but not read.
 
 use std::fmt::{self, Write};
 
-use super::frame::{CanId, Frame, FrameError};
-use super::tap;
+use super::error_frame::ErrorReport;
+use super::frame::{CanId, Frame, FrameError, FrameFormat};
+use super::tap::{self, TapError, Tapped};
 use crate::messages::FrameTap;
 
 const STANDARD_DIGITS: usize = 3;
@@ -44,9 +46,15 @@ pub enum CandumpError {
         text: String,
     },
     /// The data are no whole bytes.
-    #[error("`{text}` is no data of whole bytes in hexadecimal digits (remote and FD frames are refused)")]
+    #[error("`{text}` is no data of whole bytes in hexadecimal digits (remote frames are refused)")]
     Data {
         /// What stands behind `#`.
+        text: String,
+    },
+    /// An FD frame without flags.
+    #[error("`{text}` does not begin with the flag digit of an FD frame")]
+    Flags {
+        /// What stands behind the first `#`.
         text: String,
     },
     /// The frame cannot exist.
@@ -59,18 +67,34 @@ pub enum CandumpError {
 /// # Errors
 /// What `out` fails with.
 pub fn write(out: &mut impl Write, time_ns: u64, interface: impl fmt::Display, frame: &Frame) -> fmt::Result {
-    let micros = time_ns / 1000;
-    write!(out, "({}.{:06}) {interface} {frame}", micros / 1_000_000, micros % 1_000_000)
+    write_stamp(out, time_ns, interface)?;
+    write!(out, "{frame}")
 }
 
-/// Writes one line for a tapped frame.
+/// Writes one line for what a tap saw.
 ///
 /// # Errors
-/// [`FrameError`] where the message holds no frame; nothing is written then.
-pub fn write_tap(line: &mut String, interface: &str, tap: &FrameTap) -> Result<(), FrameError> {
-    let received = tap::decode(tap)?;
-    write(line, received.time_ns, interface, &received.frame).expect("writing to a string does not fail");
+/// [`TapError`] where the message holds neither frame nor error report; nothing is written then.
+pub fn write_tap(line: &mut String, interface: &str, tap: &FrameTap) -> Result<(), TapError> {
+    match tap::decode(tap)? {
+        Tapped::Frame(received) => write(line, received.time_ns, interface, &received.frame),
+        Tapped::Error(report) => write_error(line, interface, &report),
+    }
+    .expect("writing to a string does not fail");
     Ok(())
+}
+
+/// An error report goes in as the error message that a `SocketCAN` interface would give.
+fn write_error(out: &mut impl Write, interface: impl fmt::Display, report: &ErrorReport) -> fmt::Result {
+    let (id, data) = report.encode();
+    write_stamp(out, report.time_ns, interface)?;
+    write!(out, "{id:08X}#")?;
+    data.iter().try_for_each(|byte| write!(out, "{byte:02X}"))
+}
+
+fn write_stamp(out: &mut impl Write, time_ns: u64, interface: impl fmt::Display) -> fmt::Result {
+    let micros = time_ns / 1000;
+    write!(out, "({}.{:06}) {interface} ", micros / 1_000_000, micros % 1_000_000)
 }
 
 /// Reads one line.
@@ -86,7 +110,19 @@ pub fn parse(line: &str) -> Result<Line<'_>, CandumpError> {
         return Err(fields());
     };
     let (id, data) = frame.split_once('#').ok_or_else(fields)?;
-    Ok(Line { time_ns: parse_time(time)?, interface, frame: parse_frame(id, data)? })
+    let (data, format) = match data.strip_prefix('#') {
+        Some(flagged) => split_flags(flagged).ok_or_else(|| CandumpError::Flags { text: data.to_owned() })?,
+        None => (data, FrameFormat::Classical),
+    };
+    Ok(Line { time_ns: parse_time(time)?, interface, frame: parse_frame(id, data)?.in_format(format) })
+}
+
+/// The flag digit of an FD frame and what follows it; the error state indicator (2) and FDF itself (4), which
+/// newer candumps write, do not matter here.
+fn split_flags(flagged: &str) -> Option<(&str, FrameFormat)> {
+    let flags = digits(flagged.get(..1)?, 16)?;
+    let format = if flags & 1 == 1 { FrameFormat::FdBitRateSwitch } else { FrameFormat::Fd };
+    Some((&flagged[1..], format))
 }
 
 fn parse_time(text: &str) -> Result<u64, CandumpError> {
@@ -131,7 +167,7 @@ pub(super) fn digits(text: &str, radix: u32) -> Option<u64> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::frame::strategies::any_frame;
+    use super::super::frame::strategies::{any_format, any_frame};
     use super::*;
     use proptest::prelude::*;
 
@@ -161,7 +197,7 @@ mod tests {
             ("(1.000000) can0 800#", "does not fit into 11 bits"),
             ("(1.000000) can0 FFFFFFFF#", "does not fit into 29 bits"),
             ("(1.000000) can0 123#R", "no data"),
-            ("(1.000000) can0 123##011", "no data"),
+            ("(1.000000) can0 123##", "flag digit"),
             ("(1.000000) can0 123#1g", "no data"),
             ("(1.000000) can0 123#é", "no data"),
             ("(1.000000) can0 123#001122334455667788", "9 data bytes"),
@@ -176,13 +212,19 @@ mod tests {
     fn a_tap_that_holds_no_frame_writes_nothing() {
         let mut line = String::new();
         let tap = FrameTap { length: 9, ..Default::default() };
-        assert_eq!(write_tap(&mut line, "can0", &tap), Err(FrameError::DataLength { length: 9 }));
+        assert_eq!(write_tap(&mut line, "can0", &tap), Err(FrameError::DataLength { length: 9 }.into()));
         assert_eq!(line, "");
     }
 
     proptest! {
         #[test]
-        fn every_frame_survives(frame in any_frame(), micros in 0..=u64::MAX / 1000, bus: u16) {
+        fn every_frame_survives(
+            frame in any_frame(),
+            format in any_format(),
+            micros in 0..=u64::MAX / 1000,
+            bus: u16,
+        ) {
+            let frame = frame.in_format(format);
             let time_ns = micros * 1000;
             let mut line = String::new();
             write(&mut line, time_ns, format_args!("can{bus}"), &frame).unwrap();

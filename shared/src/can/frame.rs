@@ -1,6 +1,7 @@
-//! Identifiers and classical data frames, valid by construction.
+//! Identifiers and data frames of up to 8 bytes, valid by construction.
 //!
-//! Remote frames, error frames and CAN FD are not represented: the rig neither sends nor accepts them.
+//! Remote frames are not represented: the rig neither sends nor accepts them. What stands for an error frame is
+//! [`ErrorReport`](super::ErrorReport), and longer FD frames are [`FdFrame`](super::FdFrame).
 
 use std::fmt;
 
@@ -128,11 +129,24 @@ impl fmt::Debug for CanId {
     }
 }
 
-/// A classical data frame of 0 to 8 bytes.
+/// In which form a frame goes over the wire.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
+pub enum FrameFormat {
+    /// Classical CAN.
+    #[default]
+    Classical,
+    /// CAN FD at one bit rate.
+    Fd,
+    /// CAN FD whose data phase goes at the data bit rate.
+    FdBitRateSwitch,
+}
+
+/// A data frame of 0 to 8 bytes, in whichever format.
 #[derive(Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Frame {
     id: CanId,
     length: u8,
+    format: FrameFormat,
     /// Bytes beyond `length` are zero, so that equal frames are equal values.
     bytes: [u8; Frame::MAX_DATA],
 }
@@ -141,7 +155,7 @@ impl Frame {
     /// Bytes a classical frame carries at most.
     pub const MAX_DATA: usize = 8;
 
-    /// A frame of that identifier and data.
+    /// A classical frame of that identifier and data.
     ///
     /// # Errors
     /// [`FrameError::DataLength`] with more than 8 bytes.
@@ -149,15 +163,15 @@ impl Frame {
         let mut bytes = [0; Self::MAX_DATA];
         let used = bytes.get_mut(..data.len()).ok_or(FrameError::DataLength { length: data.len() })?;
         used.copy_from_slice(data);
-        Ok(Self { id, length: data.len() as u8, bytes })
+        Ok(Self { id, length: data.len() as u8, format: FrameFormat::Classical, bytes })
     }
 
-    /// A frame whose length is known when compiling, which then cannot be wrong.
+    /// A classical frame whose length is known when compiling, which then cannot be wrong.
     pub fn fixed<const N: usize>(id: CanId, data: [u8; N]) -> Self {
         const { assert!(N <= Self::MAX_DATA, "a classical frame carries at most 8 bytes") };
         let mut bytes = [0; Self::MAX_DATA];
         bytes[..N].copy_from_slice(&data);
-        Self { id, length: N as u8, bytes }
+        Self { id, length: N as u8, format: FrameFormat::Classical, bytes }
     }
 
     /// The identifier.
@@ -170,6 +184,17 @@ impl Frame {
         &self.bytes[..usize::from(self.length)]
     }
 
+    /// The format.
+    pub const fn format(&self) -> FrameFormat {
+        self.format
+    }
+
+    /// The same frame in that format.
+    #[must_use]
+    pub const fn in_format(self, format: FrameFormat) -> Self {
+        Self { format, ..self }
+    }
+
     /// All eight bytes, zero beyond the data.
     pub(super) const fn padded(&self) -> [u8; Self::MAX_DATA] {
         self.bytes
@@ -177,9 +202,15 @@ impl Frame {
 }
 
 impl fmt::Display for Frame {
-    /// As candump logs it: `123#11223344`.
+    /// As candump logs it: `123#11223344`, or in FD format `123##111223344`, the first digit being the flags (1
+    /// for BRS).
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}#", self.id)?;
+        let mark = match self.format {
+            FrameFormat::Classical => "#",
+            FrameFormat::Fd => "##0",
+            FrameFormat::FdBitRateSwitch => "##1",
+        };
+        write!(f, "{}{mark}", self.id)?;
         self.data().iter().try_for_each(|byte| write!(f, "{byte:02X}"))
     }
 }
@@ -205,6 +236,10 @@ pub(super) mod strategies {
     pub(crate) fn any_frame() -> impl Strategy<Value = Frame> {
         (any_id(), prop::collection::vec(any::<u8>(), 0..=Frame::MAX_DATA))
             .prop_map(|(id, data)| Frame::new(id, &data).unwrap())
+    }
+
+    pub(crate) fn any_format() -> impl Strategy<Value = FrameFormat> {
+        prop_oneof![Just(FrameFormat::Classical), Just(FrameFormat::Fd), Just(FrameFormat::FdBitRateSwitch),]
     }
 }
 

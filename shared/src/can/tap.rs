@@ -1,52 +1,142 @@
-//! Frames as the `frame` topic carries them: what a tap on a bus saw.
+//! Frames and errors as the `frame` topic carries them: what a tap on a bus saw.
 
 use super::bus::Received;
-use super::frame::{CanId, Frame, FrameError};
+use super::error_frame::{ERROR_FLAG, ErrorReport, ErrorReportError};
+use super::frame::{CanId, Frame, FrameError, FrameFormat};
 use crate::messages::FrameTap;
 
-/// The message for a frame seen on the bus of that index; its header is stamped when it is published.
-pub fn encode(bus: u16, received: &Received) -> FrameTap {
-    let frame = received.frame;
-    FrameTap {
-        time_ns: received.time_ns,
-        id: frame.id().flagged(),
-        bus,
-        length: frame.data().len() as u16,
-        data: frame.padded(),
-        ..FrameTap::default()
+/// What a tap saw.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Tapped {
+    /// A frame.
+    Frame(Received),
+    /// An error on the wire, or a controller that changed its error state.
+    Error(ErrorReport),
+}
+
+/// A message that holds neither frame nor error report.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum TapError {
+    /// A frame that cannot be.
+    #[error(transparent)]
+    Frame(#[from] FrameError),
+    /// An error report of no known class.
+    #[error(transparent)]
+    Error(#[from] ErrorReportError),
+}
+
+impl Tapped {
+    /// When it was seen, ns.
+    pub fn time_ns(&self) -> u64 {
+        match self {
+            Self::Frame(received) => received.time_ns,
+            Self::Error(report) => report.time_ns,
+        }
+    }
+
+    /// The frame, if it is one.
+    pub fn frame(&self) -> Option<&Received> {
+        match self {
+            Self::Frame(received) => Some(received),
+            Self::Error(_) => None,
+        }
     }
 }
 
-/// The frame in a message.
+/// The message for what was seen on the bus of that index; its header is stamped when it is published.
+pub fn encode(bus: u16, tapped: &Tapped) -> FrameTap {
+    match tapped {
+        Tapped::Frame(received) => {
+            let frame = received.frame;
+            FrameTap {
+                time_ns: received.time_ns,
+                id: frame.id().flagged(),
+                bus,
+                length: frame.data().len() as u8,
+                flags: flags_of(frame.format()),
+                data: frame.padded(),
+                ..FrameTap::default()
+            }
+        }
+        Tapped::Error(report) => {
+            let (id, data) = report.encode();
+            FrameTap {
+                time_ns: report.time_ns,
+                id,
+                bus,
+                length: data.len() as u8,
+                data,
+                ..FrameTap::default()
+            }
+        }
+    }
+}
+
+/// What a message holds.
 ///
 /// # Errors
-/// [`FrameError`] where identifier or length are those of no frame.
-pub fn decode(tap: &FrameTap) -> Result<Received, FrameError> {
+/// [`TapError`] where it is neither a frame nor an error report.
+pub fn decode(tap: &FrameTap) -> Result<Tapped, TapError> {
+    if tap.id & ERROR_FLAG != 0 && tap.id >> 30 == 0 {
+        return Ok(Tapped::Error(ErrorReport::decode(tap.time_ns, tap.id, tap.data)?));
+    }
     let length = usize::from(tap.length);
     let data = tap.data.get(..length).ok_or(FrameError::DataLength { length })?;
-    let frame = Frame::new(CanId::from_flagged(tap.id)?, data)?;
-    Ok(Received { frame, time_ns: tap.time_ns })
+    let frame = Frame::new(CanId::from_flagged(tap.id)?, data)?.in_format(format_of(tap.flags));
+    Ok(Tapped::Frame(Received { frame, time_ns: tap.time_ns }))
+}
+
+/// Flags of `struct canfd_frame` (`linux/can.h`): bit-rate switch, and that the frame is FD.
+const BIT_RATE_SWITCH: u8 = 0x01;
+const FD: u8 = 0x04;
+
+const fn flags_of(format: FrameFormat) -> u8 {
+    match format {
+        FrameFormat::Classical => 0,
+        FrameFormat::Fd => FD,
+        FrameFormat::FdBitRateSwitch => FD | BIT_RATE_SWITCH,
+    }
+}
+
+const fn format_of(flags: u8) -> FrameFormat {
+    match (flags & FD, flags & BIT_RATE_SWITCH) {
+        (0, _) => FrameFormat::Classical,
+        (_, 0) => FrameFormat::Fd,
+        _ => FrameFormat::FdBitRateSwitch,
+    }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::frame::strategies::any_frame;
+    use super::super::bus::ErrorState;
+    use super::super::error_frame::ErrorKind;
+    use super::super::frame::strategies::{any_format, any_frame};
     use super::*;
     use proptest::prelude::*;
 
     #[test]
     fn what_is_no_frame_is_refused() {
         let tap = FrameTap { length: 9, ..Default::default() };
-        assert_eq!(decode(&tap), Err(FrameError::DataLength { length: 9 }));
+        assert_eq!(decode(&tap), Err(FrameError::DataLength { length: 9 }.into()));
         let tap = FrameTap { id: 0x800, ..Default::default() };
-        assert_eq!(decode(&tap), Err(FrameError::StandardId { id: 0x800 }));
+        assert_eq!(decode(&tap), Err(FrameError::StandardId { id: 0x800 }.into()));
+        let tap = FrameTap { id: ERROR_FLAG, ..Default::default() };
+        assert_eq!(decode(&tap), Err(ErrorReportError { id: ERROR_FLAG }.into()));
+    }
+
+    #[test]
+    fn an_error_report_survives() {
+        let kind = ErrorKind::State(ErrorState::BusOff);
+        let tapped = Tapped::Error(ErrorReport { time_ns: 5, port: 2, kind, tec: 255, rec: 3 });
+        assert_eq!(decode(&encode(1, &tapped)), Ok(tapped));
     }
 
     proptest! {
         #[test]
-        fn every_frame_survives(frame in any_frame(), time_ns: u64, bus: u16) {
-            let received = Received { frame, time_ns };
-            prop_assert_eq!(decode(&encode(bus, &received)), Ok(received));
+        fn every_frame_survives(frame in any_frame(), format in any_format(), time_ns: u64, bus: u16) {
+            let frame = frame.in_format(format);
+            let tapped = Tapped::Frame(Received { frame, time_ns });
+            prop_assert_eq!(decode(&encode(bus, &tapped)), Ok(tapped));
         }
     }
 }

@@ -5,11 +5,13 @@
 //! trajectory fit the strokes?) are made by those who own the subject.
 
 mod control;
+mod faults;
 mod motion;
 mod plant;
 mod scenario;
 
 pub use control::{ChecksConfig, ControllerConfig, CpuDmaLatency, RealtimeConfig};
+pub use faults::{FaultConfig, FaultKindConfig};
 pub use motion::*;
 pub use plant::{CanConfig, DriveConfig, DrivesConfig, DynamicsConfig};
 pub use scenario::{Scenario, ScenarioError};

@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::ScenarioError;
+use crate::can::{Bitrate, BitrateError, FrameFormat, Rates};
 use crate::geometry::AXES;
 
 /// The CAN link between the master and the six drives.
@@ -13,6 +14,13 @@ pub struct CanConfig {
     pub interfaces: Vec<String>,
     /// Bit rate of every bus, bit/s.
     pub bitrate_bps: u32,
+    /// Whether frames go in FD format with bit-rate switch (simulated buses only).
+    pub fd: bool,
+    /// Bit rate of the data phase of FD frames, bit/s.
+    pub data_bitrate_bps: u32,
+    /// How long after bus-off a controller restarts by itself, ms; 0 for never (as `ip link … restart-ms`;
+    /// simulated buses only).
+    pub restart_ms: u32,
     /// Which axes (0 to 5: d₁ d₂ d₃ l₁ l₂ l₃) hang on which bus.
     pub buses: Vec<Vec<usize>>,
     /// Node id of each axis, in the axis order.
@@ -35,6 +43,9 @@ impl Default for CanConfig {
         Self {
             interfaces: Vec::new(),
             bitrate_bps: 1_000_000,
+            fd: false,
+            data_bitrate_bps: 5_000_000,
+            restart_ms: 100,
             buses: vec![vec![0, 1, 2], vec![3, 4, 5]],
             node_ids: [1, 2, 3, 4, 5, 6],
             heartbeat_producer_ms: 50,
@@ -52,7 +63,34 @@ impl CanConfig {
         self.interfaces.is_empty()
     }
 
+    /// Bit rates of every bus.
+    pub fn rates(&self) -> Result<Rates, BitrateError> {
+        let nominal = Bitrate::new(self.bitrate_bps)?;
+        if self.fd { Rates::switching(nominal, self.data_bitrate_bps) } else { Ok(Rates::classical(nominal)) }
+    }
+
+    /// The format of every frame.
+    pub fn format(&self) -> FrameFormat {
+        if self.fd { FrameFormat::FdBitRateSwitch } else { FrameFormat::Classical }
+    }
+
     pub(super) fn validate(&self) -> Result<(), ScenarioError> {
+        if self.fd && !self.is_virtual() {
+            return Err(ScenarioError::BadValue {
+                key: "can.fd",
+                value: "true".to_owned(),
+                need: "leave it away with can.interfaces: on real interfaces frames are classical".to_owned(),
+            });
+        }
+        if let Err(error) = self.rates() {
+            let key = if matches!(error, BitrateError::Data { .. }) {
+                "can.data_bitrate_bps"
+            } else {
+                "can.bitrate_bps"
+            };
+            let value = if self.fd { self.data_bitrate_bps } else { self.bitrate_bps }.to_string();
+            return Err(ScenarioError::BadValue { key, value, need: error.to_string() });
+        }
         let names = &self.interfaces;
         let has_twice = (1..names.len()).any(|index| names[..index].contains(&names[index]));
         if self.is_virtual() || names.len() == self.buses.len() && !has_twice {

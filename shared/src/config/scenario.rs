@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use super::{
-    CanConfig, ChecksConfig, ControllerConfig, DrivesConfig, DynamicsConfig, JawConfig, MotionConfig,
-    RealtimeConfig, TrajectoryLimitsConfig,
+    CanConfig, ChecksConfig, ControllerConfig, DrivesConfig, DynamicsConfig, FaultConfig, JawConfig,
+    MotionConfig, RealtimeConfig, TrajectoryLimitsConfig,
 };
 use crate::clock::SECOND_NS;
 use crate::geometry::MechanismConfig;
@@ -50,6 +50,9 @@ pub struct Scenario {
     pub realtime: RealtimeConfig,
     /// What the run is judged by.
     pub checks: ChecksConfig,
+    /// What goes wrong on the simulated buses.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub faults: Vec<FaultConfig>,
 }
 
 impl Default for Scenario {
@@ -69,6 +72,7 @@ impl Default for Scenario {
             dynamics: DynamicsConfig::default(),
             realtime: RealtimeConfig::default(),
             checks: ChecksConfig::default(),
+            faults: Vec::new(),
         }
     }
 }
@@ -145,6 +149,9 @@ impl Scenario {
             return bad("realtime.priority", self.realtime.priority.to_string(), "use 1 to 99 (SCHED_FIFO)");
         }
         self.can.validate()?;
+        for fault in &self.faults {
+            fault.validate(self.can.buses.len(), self.can.is_virtual())?;
+        }
         self.controller.validate()?;
         self.checks.validate()
     }
@@ -228,6 +235,13 @@ mod tests {
             ("[controller]\nease_s = 0.0", "controller.ease_s = 0: use a finite number above 0"),
             ("[checks]\ntracking_rms_mm = inf", "checks.tracking_rms_mm"),
             ("name = ", "s.toml:1"),
+            ("[can]\nfd = true\ndata_bitrate_bps = 9000000", "data_bitrate_bps"),
+            ("[[faults]]\nkind = 'corrupt'\nbus = 2\nfrom_s = 0.0", "faults.bus = 2: name a bus"),
+            ("[[faults]]\nkind = 'babble'\nbus = 0\nfrom_s = 0.0", "faults.node = none"),
+            ("[[faults]]\nkind = 'delay'\nbus = 0\nfrom_s = 0.0", "faults.delay_us"),
+            ("[[faults]]\nkind = 'lose'\nbus = 0\nfrom_s = 1.0\nuntil_s = 1.0", "faults.until_s = 1"),
+            ("[[faults]]\nkind = 'lose'\nbus = 0\nfrom_s = 1.0\nprobability = 1.5", "faults.probability"),
+            ("[[faults]]\nkind = 'melt'\nbus = 0\nfrom_s = 1.0", "unknown variant `melt`"),
         ];
         for (text, expected) in cases {
             let error = parse(text).unwrap_err();

@@ -123,6 +123,8 @@ codes! {
         Drive = 3 "drive",
         /// The logger.
         Logger = 4 "logger",
+        /// A simulated wire.
+        Wire = 5 "wire",
     }
 
     /// What kind of event it is.
@@ -187,6 +189,16 @@ codes! {
         MasterFault = 23 "master_fault",
         /// A bounded buffer had no room (items lost).
         Overflow = 24 "overflow",
+        /// A CAN controller became error active again (transmit error counter).
+        ErrorActive = 40 "error_active",
+        /// A CAN controller became error passive (transmit error counter).
+        ErrorPassive = 41 "error_passive",
+        /// A CAN controller went off the bus (transmit error counter).
+        BusOff = 42 "bus_off",
+        /// A fault of the scenario began to act (number in its list, from 1).
+        FaultInjected = 43 "fault_injected",
+        /// A fault of the scenario is over (number in its list, from 1; how often it struck).
+        FaultEnded = 44 "fault_ended",
     }
 }
 

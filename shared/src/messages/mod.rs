@@ -207,16 +207,18 @@ messages! {
         bite_force_n: f64,
     }
 
-    /// A CAN frame as a tap on the wire would see it.
+    /// What a tap on a CAN wire saw: a frame, or an error message as `linux/can/error.h` codes it.
     FrameTap on "frame" keeping 16384 {
         /// When its last bit was on the wire, ns.
         time_ns: u64,
-        /// Identifier; bit 31 set for a 29-bit one.
+        /// Identifier; bit 31 set for a 29-bit one, bit 29 for an error message.
         id: u32,
         /// Index of the bus, from 0.
         bus: u16,
         /// Bytes of `data` in use.
-        length: u16,
+        length: u8,
+        /// As in `struct canfd_frame`: 4 for an FD frame, 1 for one with bit-rate switch.
+        flags: u8,
         /// Data bytes, unused ones zero.
         data: [u8; 8],
     }

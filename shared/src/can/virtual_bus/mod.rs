@@ -1,32 +1,47 @@
-//! A simulated wire: bit-exact frame times, arbitration, bounded queues, all in virtual time.
+//! A simulated wire: bit-exact frame times, arbitration, errors and fault confinement, bounded queues, all in
+//! virtual time.
 //!
 //! A frame takes the time of its exact stuffed length. Whenever the bus gets idle, the lowest identifier
 //! among all ports' most urgent frames wins. Every other port and the tap receive the frame when its last
 //! end-of-frame bit is over, which is its time stamp; three bits of interframe space later the bus is
 //! idle again.
 //!
+//! # Errors
+//! A frame that is disturbed ends where the disturbance is: an error flag (6 bits, 12 where error active
+//! nodes echo it), 8 bits of delimiter, 3 of intermission; then the transmitter takes part in the next
+//! arbitration with the same frame. Nobody to acknowledge is such a disturbance. Two ports that send different
+//! frames of one identifier disturb each other where the frames first differ; equal frames pass as one. Each
+//! port counts errors as ISO 11898-1 has it, becomes error passive and goes off the bus; a passive
+//! transmitter pauses for 8 bits. A port off the bus forgets what it had queued, and comes back with 128
+//! times 11 recessive bits once it is restarted: by [`restart`](VirtualWire::restart), or by itself after
+//! [`restart_after_ns`](WireConfig::restart_after_ns), as `ip link … restart-ms` has it.
+//!
 //! # Time
 //! The wire moves in [`advance`](VirtualWire::advance) only. All frames queued at or before an instant take
 //! part in the arbitration of that instant, in whatever order they were queued: the frame that starts at
 //! `t` is settled once the wire advances beyond `t`. A frame queued for a time before the one already
-//! advanced to counts as queued at that time.
+//! advanced to counts as queued at that time. Faults of nodes take effect between frames.
 //!
 //! # What is not modelled
-//! Bit errors, error frames, retransmission and error counters: every port stays error active with both
-//! counters 0. Missing acknowledgement: a lone port sends successfully. Two ports that arbitrate with the
-//! same identifier destroy each other's frame on a real wire unless they are bit for bit the same; here the
-//! lower port goes first, the other follows, and the collision is counted. A run with collisions is that
-//! of a misconfigured bus.
+//! Errors seen by some nodes only, overload frames, and what a disconnected node does on its end of the wire.
 
+mod attempt;
+mod confinement;
+mod ending;
 mod port;
 mod queue;
 mod statistics;
 #[cfg(test)]
 mod tests;
 
-use super::bus::{ReceiveError, Received, SendError};
-use super::frame::Frame;
-use super::wire::{Bitrate, INTERFRAME_BITS, wire_bits};
+use super::bus::{BusStatus, ErrorState, ReceiveError, Received, SendError};
+use super::error_frame::ErrorReport;
+use super::faults::{FaultKind, FaultNote, Faults, Strike};
+use super::frame::{Frame, FrameFormat};
+use super::tap::Tapped;
+use super::wire::{Rates, frame_bits};
+use attempt::{Attempt, PortSet};
+use confinement::{Confinement, SEQUENCE_BITS};
 use queue::{Queued, ReceiveQueue, TransmitQueue};
 
 pub use port::Port;
@@ -35,57 +50,81 @@ pub use statistics::Statistics;
 /// What a wire is made of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct WireConfig {
-    /// Bit rate.
-    pub bitrate: Bitrate,
+    /// Bit rates.
+    pub rates: Rates,
+    /// The format in which every port sends.
+    pub format: FrameFormat,
     /// Ports, one a node.
     pub ports: usize,
     /// Frames a port may have waiting for transmission.
     pub transmit_capacity: usize,
     /// Frames a port may have received and not fetched; the tap's queue is as long for each port.
     pub receive_capacity: usize,
+    /// How long after bus-off a port restarts by itself, ns; `None` when it waits to be restarted.
+    pub restart_after_ns: Option<u64>,
 }
 
 /// A simulated wire and the ports on it.
 #[derive(Debug)]
 pub struct VirtualWire {
-    bitrate: Bitrate,
-    ports: Vec<PortQueues>,
-    tap: ReceiveQueue,
-    in_flight: Option<Flight>,
+    config: WireConfig,
+    stations: Vec<Station>,
+    tap: ReceiveQueue<Tapped>,
+    faults: Faults,
+    on_wire: Option<Attempt>,
+    /// Attempts so far: the number by which faults choose among them.
+    attempts: u64,
     idle_from_ns: u64,
     advanced_to_ns: u64,
     statistics: Statistics,
 }
 
+/// A port with its controller.
 #[derive(Debug)]
-struct PortQueues {
+struct Station {
     transmit: TransmitQueue,
-    receive: ReceiveQueue,
+    receive: ReceiveQueue<Received>,
+    confinement: Confinement,
+    /// Since when it takes part on the bus.
+    on_bus_from_ns: u64,
+    /// Until when a passive transmitter keeps from sending again.
+    suspended_until_ns: u64,
 }
 
-/// A frame on the wire.
+/// A node goes off the bus by a fault, or comes back.
 #[derive(Debug, Clone, Copy)]
-struct Flight {
-    sender: usize,
-    frame: Frame,
-    queued_ns: u64,
-    bits: u32,
-    start_ns: u64,
-    end_ns: u64,
+struct NodeChange {
+    at_ns: u64,
+    port: usize,
+    bus_off: Option<Strike>,
 }
 
 impl VirtualWire {
     /// An idle wire at time 0. Nothing is allocated after this.
     pub fn new(config: &WireConfig) -> Self {
-        let queues = || PortQueues {
+        Self::with_faults(config, Faults::default())
+    }
+
+    /// An idle wire that these faults befall.
+    ///
+    /// # Panics
+    /// With more than 64 ports.
+    pub fn with_faults(config: &WireConfig, faults: Faults) -> Self {
+        assert!(config.ports <= PortSet::CAPACITY, "{} ports", config.ports);
+        let station = || Station {
             transmit: TransmitQueue::new(config.transmit_capacity),
             receive: ReceiveQueue::new(config.receive_capacity),
+            confinement: Confinement::new(),
+            on_bus_from_ns: 0,
+            suspended_until_ns: 0,
         };
         Self {
-            bitrate: config.bitrate,
-            ports: (0..config.ports).map(|_| queues()).collect(),
+            config: *config,
+            stations: (0..config.ports).map(|_| station()).collect(),
             tap: ReceiveQueue::new(config.receive_capacity * config.ports),
-            in_flight: None,
+            faults,
+            on_wire: None,
+            attempts: 0,
             idle_from_ns: 0,
             advanced_to_ns: 0,
             statistics: Statistics::default(),
@@ -103,10 +142,19 @@ impl VirtualWire {
     /// Queues a frame at a port.
     ///
     /// # Errors
-    /// [`SendError::QueueFull`]; no other.
+    /// [`SendError::QueueFull`] and [`SendError::BusOff`]; no other.
     pub fn send(&mut self, port: usize, now_ns: u64, frame: Frame) -> Result<(), SendError> {
-        let queued_ns = now_ns.max(self.advanced_to_ns);
-        self.ports[port].transmit.push(Queued { frame, bits: wire_bits(&frame), since_ns: queued_ns })
+        let status = self.stations[port].confinement.status();
+        if status.state == ErrorState::BusOff {
+            return Err(SendError::BusOff { tec: status.tec });
+        }
+        let frame = frame.in_format(self.config.format);
+        let queued_ns = now_ns.max(self.advanced_to_ns) + self.delay_ns(port, now_ns, &frame);
+        let duration_ns = self.config.rates.duration_ns(frame_bits(&frame));
+        let queued = Queued { frame, duration_ns, since_ns: queued_ns };
+        self.stations[port].transmit.push(queued)?;
+        self.statistics.queued += 1;
+        Ok(())
     }
 
     /// The next frame that a port had received at `now_ns`.
@@ -114,90 +162,141 @@ impl VirtualWire {
     /// # Errors
     /// [`ReceiveError::Overrun`] where frames were lost because the port's queue was full; no other.
     pub fn receive(&mut self, port: usize, now_ns: u64) -> Result<Option<Received>, ReceiveError> {
-        self.ports[port].receive.pop(now_ns)
+        self.stations[port].receive.pop(now_ns)
     }
 
-    /// The next frame that was on the wire up to `now_ns`, whoever sent it.
+    /// The next frame or error that was on the wire up to `now_ns`, whoever caused it.
     ///
     /// # Errors
     /// [`ReceiveError::Overrun`] where the tap missed frames because nobody fetched them; no other.
-    pub fn tap(&mut self, now_ns: u64) -> Result<Option<Received>, ReceiveError> {
+    pub fn tap(&mut self, now_ns: u64) -> Result<Option<Tapped>, ReceiveError> {
         self.tap.pop(now_ns)
     }
 
-    /// When the next frame will have arrived, if nothing else is queued until then, ns; `None` when nothing
-    /// is on the way.
-    pub fn next_event_ns(&self) -> Option<u64> {
-        let flight = self.in_flight.or_else(|| self.arbitrate(self.next_start_ns()?));
-        flight.map(|flight| flight.end_ns)
+    /// What is to be told of the wire's faults up to `now_ns`.
+    pub fn next_note(&mut self, now_ns: u64) -> Option<FaultNote> {
+        self.faults.next_note(now_ns)
     }
 
-    /// Lets time pass: all arbitrations before `until_ns` and all arrivals up to and including it, in the
+    /// Fault confinement of a port.
+    pub fn status(&self, port: usize) -> BusStatus {
+        self.stations[port].confinement.status()
+    }
+
+    /// Restarts the controller of a port that is off the bus, as its host does; no effect on others.
+    pub fn restart(&mut self, port: usize, now_ns: u64) {
+        self.stations[port].confinement.restart(now_ns.max(self.advanced_to_ns));
+    }
+
+    /// When the frame on the wire, or the next one, will have ended if nothing else is queued until then,
+    /// ns; `None` when nothing is on the way.
+    pub fn next_event_ns(&self) -> Option<u64> {
+        let attempt = self.on_wire.or_else(|| self.attempt(self.next_start_ns()?));
+        attempt.map(|attempt| attempt.end_ns)
+    }
+
+    /// Lets time pass: all arbitrations before `until_ns` and all endings up to and including it, in the
     /// order of time. A time already passed changes nothing.
     pub fn advance(&mut self, until_ns: u64) {
-        while self.start_before(until_ns) && self.arrive_until(until_ns) {}
+        while self.start_before(until_ns) && self.end_until(until_ns) {}
         self.advanced_to_ns = self.advanced_to_ns.max(until_ns);
     }
 
-    /// What happened on the wire so far, up to the last frame that arrived.
+    /// What happened on the wire so far, up to the last frame that ended.
     pub fn statistics(&self) -> &Statistics {
         &self.statistics
     }
 
-    /// Puts the next frame on the wire if it starts before `until_ns`; whether one is on it now.
+    /// Puts the next frame on the wire if it starts before `until_ns`; whether one is on it now. Until then
+    /// nodes come back from bus-off, or are sent there.
     fn start_before(&mut self, until_ns: u64) -> bool {
-        if self.in_flight.is_none() {
+        let sequence_ns = self.config.rates.nominal().bits_to_ns(SEQUENCE_BITS);
+        while self.on_wire.is_none() {
             let start_ns = self.next_start_ns().filter(|&start_ns| start_ns < until_ns);
-            if let Some(flight) = start_ns.and_then(|start_ns| self.arbitrate(start_ns)) {
-                self.statistics.collisions += self.collides(&flight) as u64;
-                self.ports[flight.sender].transmit.remove_most_urgent(flight.start_ns);
-                self.in_flight = Some(flight);
+            let idle_until_ns = start_ns.unwrap_or(until_ns);
+            let change = self.next_node_change(sequence_ns).filter(|change| change.at_ns <= idle_until_ns);
+            if let Some(change) = change {
+                self.apply(change);
+                continue;
             }
+            self.stay_idle_until(idle_until_ns, sequence_ns);
+            let Some(attempt) = start_ns.and_then(|start_ns| self.attempt(start_ns)) else { break };
+            self.attempts += 1;
+            self.on_wire = Some(attempt);
         }
-        self.in_flight.is_some()
+        self.on_wire.is_some()
     }
 
-    /// Delivers the frame on the wire if it arrives up to `until_ns`; whether it did.
-    fn arrive_until(&mut self, until_ns: u64) -> bool {
-        let Some(flight) = self.in_flight.take_if(|flight| flight.end_ns <= until_ns) else { return false };
-        self.deliver(&flight);
-        self.idle_from_ns = flight.start_ns + self.bitrate.bits_to_ns(flight.bits);
-        self.statistics.count(
-            flight.bits,
-            self.idle_from_ns - flight.start_ns,
-            flight.end_ns - flight.queued_ns,
-        );
-        true
+    /// Ends the frame on the wire if its end is not after `until_ns`; whether it did.
+    fn end_until(&mut self, until_ns: u64) -> bool {
+        let attempt = self.on_wire.take_if(|attempt| attempt.end_ns <= until_ns);
+        attempt.inspect(|attempt| self.end(attempt)).is_some()
     }
 
-    fn deliver(&mut self, flight: &Flight) {
-        let received = Received { frame: flight.frame, time_ns: flight.end_ns };
-        self.tap.push(received);
-        let others = self.ports.iter_mut().enumerate().filter(|(port, _)| *port != flight.sender);
-        others.for_each(|(_, queues)| queues.receive.push(received));
+    fn stay_idle_until(&mut self, until_ns: u64, sequence_ns: u64) {
+        for station in &mut self.stations {
+            station.confinement.saw_idle(until_ns, sequence_ns);
+        }
+        self.faults.begin_disconnections(until_ns);
     }
 
-    /// When the next arbitration takes place: as soon as the bus is idle and something is queued.
-    fn next_start_ns(&self) -> Option<u64> {
-        let queued_ns = self.ports.iter().filter_map(|queues| queues.transmit.earliest_ns()).min()?;
-        Some(queued_ns.max(self.idle_from_ns))
+    /// What next happens to a node while the wire stays idle.
+    fn next_node_change(&self, sequence_ns: u64) -> Option<NodeChange> {
+        let change = |port: usize, station: &Station| {
+            if let Some(at_ns) = station.confinement.back_at_ns(sequence_ns) {
+                return Some(NodeChange { at_ns: at_ns.max(self.idle_from_ns), port, bus_off: None });
+            }
+            if station.confinement.state() == ErrorState::BusOff {
+                return None;
+            }
+            let strike = self.faults.next_bus_off(station.on_bus_from_ns.max(self.idle_from_ns), port)?;
+            Some(NodeChange { at_ns: strike.at_ns, port, bus_off: Some(strike) })
+        };
+        let changes = self.stations.iter().enumerate().filter_map(|(port, station)| change(port, station));
+        changes.min_by_key(|change| change.at_ns)
     }
 
-    /// The winner of the arbitration at that time: lowest identifier, then lowest port.
-    fn arbitrate(&self, start_ns: u64) -> Option<Flight> {
-        let heads = self.ports.iter().enumerate();
-        let heads = heads.filter_map(|(port, queues)| Some((port, queues.transmit.most_urgent(start_ns)?)));
-        let (sender, Queued { frame, bits, since_ns: queued_ns }) =
-            heads.min_by_key(|(_, head)| head.frame.id())?;
-        let end_ns = start_ns + self.bitrate.bits_to_ns(bits - INTERFRAME_BITS);
-        Some(Flight { sender, frame, queued_ns, bits, start_ns, end_ns })
+    fn apply(&mut self, NodeChange { at_ns, port, bus_off }: NodeChange) {
+        if let Some(strike) = bus_off {
+            self.faults.record(strike);
+            let restart_after_ns = self.config.restart_after_ns;
+            self.confine(port, at_ns, |node| node.leave_bus(at_ns, restart_after_ns));
+        } else {
+            self.stations[port].on_bus_from_ns = at_ns;
+            self.confine(port, at_ns, Confinement::come_back);
+        }
     }
 
-    /// Whether another port arbitrates with the same identifier as the winner.
-    fn collides(&self, winner: &Flight) -> bool {
-        self.ports.iter().enumerate().any(|(port, queues)| {
-            let head = queues.transmit.most_urgent(winner.start_ns);
-            port != winner.sender && head.is_some_and(|head| head.frame.id() == winner.frame.id())
-        })
+    fn delay_ns(&mut self, port: usize, now_ns: u64, frame: &Frame) -> u64 {
+        if self.faults.is_empty() {
+            return 0;
+        }
+        let is_delay = |kind| matches!(kind, FaultKind::Delay { .. });
+        let number = self.statistics.queued;
+        match self.faults.strikes_frame(now_ns, is_delay, port, frame.id(), number) {
+            Some(strike) => {
+                self.faults.record(strike);
+                if let FaultKind::Delay { by_ns } = strike.kind { by_ns } else { 0 }
+            }
+            None => 0,
+        }
+    }
+
+    /// Changes a port's fault confinement; a change of its state is tapped, and who leaves the bus forgets
+    /// what it had queued.
+    fn confine(&mut self, port: usize, now_ns: u64, change: impl FnOnce(&mut Confinement)) {
+        let station = &mut self.stations[port];
+        let before = station.confinement.state();
+        change(&mut station.confinement);
+        let status = station.confinement.status();
+        if status.state == before {
+            return;
+        }
+        let kind = super::ErrorKind::State(status.state);
+        self.tap.push(Tapped::Error(ErrorReport::new(now_ns, port as u8, kind, status)));
+        if status.state == ErrorState::BusOff {
+            self.statistics.bus_offs += 1;
+            self.statistics.abandoned += station.transmit.clear();
+        }
     }
 }

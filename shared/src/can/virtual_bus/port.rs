@@ -1,7 +1,7 @@
 //! One port of a virtual wire as a [`Bus`].
 
 use super::VirtualWire;
-use crate::can::bus::{Bus, BusStatus, ErrorState, ReceiveError, Received, SendError};
+use crate::can::bus::{Bus, BusStatus, ReceiveError, Received, SendError};
 use crate::can::frame::Frame;
 
 /// A port, borrowed from its wire for as long as it is used.
@@ -15,7 +15,7 @@ pub struct Port<'a> {
 
 impl<'a> Port<'a> {
     pub(super) fn new(wire: &'a mut VirtualWire, port: usize) -> Self {
-        assert!(port < wire.ports.len(), "port {port} of a wire with {}", wire.ports.len());
+        assert!(port < wire.stations.len(), "port {port} of a wire with {}", wire.stations.len());
         Self { wire, port }
     }
 }
@@ -30,6 +30,6 @@ impl Bus for Port<'_> {
     }
 
     fn status(&self) -> BusStatus {
-        BusStatus { state: ErrorState::Active, tec: 0, rec: 0 }
+        self.wire.status(self.port)
     }
 }

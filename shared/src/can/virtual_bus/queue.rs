@@ -4,13 +4,14 @@ use std::collections::VecDeque;
 
 use crate::can::bus::{ReceiveError, Received, SendError};
 use crate::can::frame::Frame;
+use crate::can::tap::Tapped;
 
 /// A frame waiting for the wire.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Queued {
     pub(super) frame: Frame,
-    /// Its length on the wire, found once: arbitration asks for it again and again.
-    pub(super) bits: u32,
+    /// Its duration on the wire, interframe space included, found once: arbitration asks for it again and again.
+    pub(super) duration_ns: u64,
     pub(super) since_ns: u64,
 }
 
@@ -52,37 +53,61 @@ impl TransmitQueue {
         }
     }
 
+    /// Forgets everything; how many frames that were.
+    pub(super) fn clear(&mut self) -> u64 {
+        let abandoned = self.frames.len() as u64;
+        self.frames.clear();
+        abandoned
+    }
+
     fn place_of_most_urgent(&self, at_ns: u64) -> Option<usize> {
         self.frames.iter().position(|queued| queued.since_ns <= at_ns)
     }
 }
 
-/// Frames received and not fetched yet, oldest first. What does not fit is lost and counted.
+/// Something with the time of its arrival.
+pub(super) trait Timed {
+    fn time_ns(&self) -> u64;
+}
+
+impl Timed for Received {
+    fn time_ns(&self) -> u64 {
+        self.time_ns
+    }
+}
+
+impl Timed for Tapped {
+    fn time_ns(&self) -> u64 {
+        self.time_ns()
+    }
+}
+
+/// What has arrived and was not fetched yet, oldest first. What does not fit is lost and counted.
 #[derive(Debug)]
-pub(super) struct ReceiveQueue {
-    frames: VecDeque<Received>,
+pub(super) struct ReceiveQueue<T> {
+    arrived: VecDeque<T>,
     capacity: usize,
     lost: u64,
 }
 
-impl ReceiveQueue {
+impl<T: Timed> ReceiveQueue<T> {
     pub(super) fn new(capacity: usize) -> Self {
-        Self { frames: VecDeque::with_capacity(capacity), capacity, lost: 0 }
+        Self { arrived: VecDeque::with_capacity(capacity), capacity, lost: 0 }
     }
 
-    pub(super) fn push(&mut self, received: Received) {
-        if self.frames.len() == self.capacity {
+    pub(super) fn push(&mut self, item: T) {
+        if self.arrived.len() == self.capacity {
             self.lost += 1;
         } else {
-            self.frames.push_back(received);
+            self.arrived.push_back(item);
         }
     }
 
-    /// The oldest frame, if it had arrived by then; losses are reported first, once.
-    pub(super) fn pop(&mut self, now_ns: u64) -> Result<Option<Received>, ReceiveError> {
+    /// The oldest, if it had arrived by then; losses are reported first, once.
+    pub(super) fn pop(&mut self, now_ns: u64) -> Result<Option<T>, ReceiveError> {
         match std::mem::take(&mut self.lost) {
-            0 if self.frames.front().is_some_and(|oldest| oldest.time_ns <= now_ns) => {
-                Ok(self.frames.pop_front())
+            0 if self.arrived.front().is_some_and(|oldest| oldest.time_ns() <= now_ns) => {
+                Ok(self.arrived.pop_front())
             }
             0 => Ok(None),
             lost => Err(ReceiveError::Overrun { lost }),

@@ -1,13 +1,13 @@
 //! What a wire counted.
 
-/// Traffic of a wire since it was made.
+/// Traffic and errors of a wire since it was made.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Statistics {
-    /// Frames that arrived.
+    /// Frames that ports took for transmission.
+    pub queued: u64,
+    /// Frames that arrived, repetitions counted.
     pub frames: u64,
-    /// Their bits on the wire, interframe space included.
-    pub bits: u64,
-    /// How long they occupied the bus, interframe space included, ns.
+    /// How long frames and error frames occupied the bus, interframe space included, ns.
     pub busy_ns: u64,
     /// Longest time from queueing to arrival, ns.
     pub response_max_ns: u64,
@@ -15,6 +15,16 @@ pub struct Statistics {
     pub response_total_ns: u64,
     /// Arbitrations in which several ports sent the same identifier.
     pub collisions: u64,
+    /// Error frames.
+    pub error_frames: u64,
+    /// Those of them that nobody's acknowledgement caused.
+    pub unacknowledged: u64,
+    /// Frames that their transmitters had to repeat, each as often as it was repeated.
+    pub retransmissions: u64,
+    /// Controllers that went off the bus.
+    pub bus_offs: u64,
+    /// Frames they forgot by that.
+    pub abandoned: u64,
 }
 
 impl Statistics {
@@ -28,10 +38,8 @@ impl Statistics {
         (self.frames > 0).then(|| self.response_total_ns as f64 / self.frames as f64)
     }
 
-    pub(super) fn count(&mut self, bits: u32, busy_ns: u64, response_ns: u64) {
+    pub(super) fn count_frame(&mut self, response_ns: u64) {
         self.frames += 1;
-        self.bits += u64::from(bits);
-        self.busy_ns += busy_ns;
         self.response_max_ns = self.response_max_ns.max(response_ns);
         self.response_total_ns += response_ns;
     }

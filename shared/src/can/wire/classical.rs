@@ -1,13 +1,11 @@
-//! What a frame costs on the wire: its exact length in bits, from its content, and its worst case.
-//!
-//! Classical CAN (ISO 11898-1) without errors: neither error frames nor overload frames are counted.
+//! Lengths of classical frames (ISO 11898-1).
 
-use super::frame::{CanId, Frame};
+use super::INTERFRAME_BITS;
+use super::stuffing::stuff_bits;
+use crate::can::frame::{CanId, Frame};
 
 /// CRC delimiter, acknowledge slot and delimiter, end of frame.
 const TRAILER_BITS: u32 = 1 + 2 + 7;
-/// Pause after a frame before the next may start.
-pub const INTERFRAME_BITS: u32 = 3;
 const CRC_BITS: u32 = 15;
 const CRC_POLYNOMIAL: u16 = 0x4599;
 const CRC_MASK: u16 = (1 << CRC_BITS) - 1;
@@ -62,6 +60,30 @@ fn header(id: CanId, length: u32) -> u64 {
     arbitration << 7 | u64::from(length)
 }
 
+/// Where two frames of one identifier first differ on the wire, and which of them is dominant there.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(in crate::can) struct Difference {
+    /// Number of the bit, counted from 1 with stuff bits.
+    pub(in crate::can) bit: u32,
+    /// Whether the first frame sends the dominant level.
+    pub(in crate::can) first_is_dominant: bool,
+}
+
+/// Where two frames of one identifier first differ; `None` where they are the same.
+pub(in crate::can) fn first_difference(first: &Frame, second: &Frame) -> Option<Difference> {
+    let left_aligned = |frame| {
+        let (content, bits) = content(frame);
+        content << (u128::BITS - bits)
+    };
+    let (one, other) = (left_aligned(first), left_aligned(second));
+    // Frames of different length differ in their length codes, which lie before the data.
+    let equal_bits = (one ^ other).leading_zeros();
+    (one != other).then(|| Difference {
+        bit: equal_bits + 1 + stuff_bits(one >> (u128::BITS - equal_bits), equal_bits),
+        first_is_dominant: one < other,
+    })
+}
+
 /// CRC of the content. The zeros above it do not matter, as the CRC starts from zero.
 fn crc15(content: u128) -> u16 {
     content.to_be_bytes().into_iter().fold(0, |crc, byte| {
@@ -90,72 +112,11 @@ const fn crc_table() -> [u16; 256] {
     table
 }
 
-/// Stuff bits that a sequence gets: after five equal bits, one of the other level, which itself counts
-/// towards the next five.
-fn stuff_bits(sequence: u128, length: u32) -> u32 {
-    let mut left = sequence << (u128::BITS - length);
-    let mut length = length;
-    let mut stuffed = 0;
-    loop {
-        let five_equal_end = starts_of_five_equal(left).leading_zeros() + 5;
-        if five_equal_end > length {
-            return stuffed;
-        }
-        // Go on behind the five, with the stuff bit in place of the fifth.
-        stuffed += 1;
-        left = (left << (five_equal_end - 1)) ^ (1 << (u128::BITS - 1));
-        length -= five_equal_end - 1;
-    }
-}
-
-/// A bit set wherever the four bits that follow are equal to it.
-const fn starts_of_five_equal(bits: u128) -> u128 {
-    let two = !(bits ^ (bits << 1));
-    let three = two & (two << 1);
-    three & (three << 2)
-}
-
-/// A bit rate that is none of classical CAN.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("bit rate {bps} bit/s is outside classical CAN (1 to 1000000 bit/s)")]
-pub struct BitrateError {
-    /// Bit rate asked for, bit/s.
-    pub bps: u32,
-}
-
-/// Bit rate of a bus, 1 to 1 000 000 bit/s.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Bitrate {
-    bps: u32,
-}
-
-impl Bitrate {
-    /// The fastest of classical CAN, 1 Mbit/s.
-    pub const MAX: Self = Self { bps: 1_000_000 };
-
-    /// That many bits a second.
-    ///
-    /// # Errors
-    /// [`BitrateError`] for 0 and for more than 1 Mbit/s.
-    pub const fn new(bps: u32) -> Result<Self, BitrateError> {
-        if bps == 0 || bps > Self::MAX.bps { Err(BitrateError { bps }) } else { Ok(Self { bps }) }
-    }
-
-    /// Bits a second.
-    pub const fn bps(self) -> u32 {
-        self.bps
-    }
-
-    /// Duration of that many bits, rounded up, ns.
-    pub const fn bits_to_ns(self, bits: u32) -> u64 {
-        (bits as u64 * 1_000_000_000).div_ceil(self.bps as u64)
-    }
-}
-
 #[cfg(test)]
 mod tests {
-    use super::super::frame::strategies::any_frame;
+    use super::super::stuffing::Stuffer;
     use super::*;
+    use crate::can::frame::strategies::any_frame;
     use proptest::prelude::*;
 
     fn frame(id: u16, data: &[u8]) -> Frame {
@@ -175,18 +136,30 @@ mod tests {
         })
     }
 
-    /// Stuffing as a transmitter does it: count equal bits, insert at five.
     fn reference_stuffing(bits: impl Iterator<Item = bool>) -> u32 {
-        let (mut last, mut run, mut stuffed) = (None, 0, 0);
-        for bit in bits {
-            run = if last == Some(bit) { run + 1 } else { 1 };
-            last = Some(bit);
-            if run == 5 {
-                (last, run) = (Some(!bit), 1);
-                stuffed += 1;
-            }
-        }
-        stuffed
+        let mut stuffer = Stuffer::default();
+        bits.for_each(|bit| stuffer.push(bit));
+        stuffer.with_last()
+    }
+
+    #[test]
+    fn frames_of_one_identifier_differ_first_in_length_or_data() {
+        let base = frame(0x555, &[0b1010_1010, 0]);
+        assert_eq!(first_difference(&base, &base), None);
+        let longer = frame(0x555, &[0b1010_1010, 0, 0]);
+        // Three zeros of the control field and two of the length code make a stuff bit.
+        let bit = 1 + 11 + 3 + 4 + 1;
+        assert_eq!(first_difference(&base, &longer), Some(Difference { bit, first_is_dominant: true }));
+        let other = frame(0x555, &[0b1010_1011, 0]);
+        let bit = bit + 8;
+        assert_eq!(first_difference(&other, &base), Some(Difference { bit, first_is_dominant: false }));
+        let run = frame(0x555, &[0b0000_0001, 0]);
+        let other = frame(0x555, &[0b0000_0000, 0]);
+        // So do the last zero of the length code and four of the data.
+        assert_eq!(
+            first_difference(&run, &other),
+            Some(Difference { bit: bit + 1, first_is_dominant: false })
+        );
     }
 
     #[test]
@@ -219,21 +192,6 @@ mod tests {
         assert_eq!(worst_case_bits(8, false), 135);
         assert_eq!(unstuffed_bits(8, true), 67 + 64);
         assert_eq!(worst_case_bits(8, true), 160);
-    }
-
-    #[test]
-    fn durations_are_exact_at_one_megabit_and_rounded_up_elsewhere() {
-        assert_eq!(Bitrate::MAX.bits_to_ns(135), 135_000);
-        assert_eq!(Bitrate::new(300_000).unwrap().bits_to_ns(1), 3334);
-        assert_eq!(Bitrate::new(0), Err(BitrateError { bps: 0 }));
-        assert_eq!(Bitrate::new(1_000_001), Err(BitrateError { bps: 1_000_001 }));
-    }
-
-    #[test]
-    fn a_run_that_ends_with_the_sequence_is_stuffed_too() {
-        assert_eq!(stuff_bits(0b11111, 5), 1);
-        assert_eq!(stuff_bits(0b1111, 4), 0);
-        assert_eq!(stuff_bits(0b1_1111_0000, 9), 2, "the stuff bit counts towards the next five");
     }
 
     proptest! {

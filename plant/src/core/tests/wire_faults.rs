@@ -1,0 +1,126 @@
+//! Faults of the wires: what the rig bears, what stops it, and what it tells.
+
+use masseter_shared::can::{ErrorKind, Tapped};
+use masseter_shared::config::{FaultConfig, FaultKindConfig};
+
+use super::*;
+
+const BASE: FaultConfig = FaultConfig {
+    kind: FaultKindConfig::Corrupt,
+    bus: 0,
+    from_s: 0.5,
+    until_s: None,
+    node: None,
+    id: None,
+    probability: 1.0,
+    count: None,
+    delay_us: None,
+};
+
+fn struck_by(fault: FaultConfig) -> Bench {
+    Bench::new(&Scenario { faults: vec![fault], ..Scenario::default() })
+}
+
+/// Enables the drives and plays until `until_s`; the largest distance of an axis from its target.
+fn play_until(bench: &mut Bench, until_s: f64) -> f64 {
+    bench.enable();
+    play(bench, (until_s * 1e3) as u64 - bench.cycle)
+}
+
+fn error_frames(bench: &Bench) -> usize {
+    let tapped = bench.frames.iter().map(|frame| tap::decode(frame).unwrap());
+    tapped.filter(|tapped| matches!(tapped, Tapped::Error(report) if report.kind == ErrorKind::Bit)).count()
+}
+
+#[test]
+fn with_one_frame_in_a_hundred_corrupted_the_motion_goes_on_and_errors_are_counted() {
+    let mut bench = struck_by(FaultConfig { probability: 0.01, ..BASE });
+    let worst_m = play_until(&mut bench, 2.5);
+    assert!(worst_m < 1e-3, "{worst_m}");
+    assert_eq!(bench.causes(EventKind::Fault), []);
+    assert_eq!(bench.reading.master_fault, 0);
+    let errors = error_frames(&bench);
+    assert!((80..250).contains(&errors), "{errors} of about 14000 frames");
+    assert!(bench.causes(EventKind::Notice).contains(&Cause::FaultInjected));
+}
+
+#[test]
+fn the_same_seed_corrupts_the_same_frames_and_another_one_others() {
+    let frames = |seed| {
+        let faults = vec![FaultConfig { probability: 0.05, from_s: 0.0, ..BASE }];
+        let mut bench = Bench::new(&Scenario { seed, faults, ..Scenario::default() });
+        (0..300).for_each(|_| bench.cycle(None));
+        bench.frames
+    };
+    let first = frames(1);
+    assert!(first == frames(1));
+    assert!(first != frames(2));
+}
+
+#[test]
+fn a_babbling_node_makes_a_safe_stop() {
+    let mut bench = struck_by(FaultConfig { kind: FaultKindConfig::Babble, node: Some(2), ..BASE });
+    play_until(&mut bench, 1.0);
+    assert_eq!(bench.reading.master_fault, 1);
+    assert_eq!(bench.causes(EventKind::Fault)[0], Cause::ProcessDataLost);
+    for drive in bench.plant.link.emulation().drives() {
+        assert_eq!(
+            drive.power(),
+            DriveState::SwitchOnDisabled,
+            "those behind the babble by loss of the link"
+        );
+    }
+}
+
+#[test]
+fn a_disconnected_node_is_detected_and_all_drives_stop() {
+    let fault = FaultConfig { kind: FaultKindConfig::Disconnect, bus: 1, node: Some(5), ..BASE };
+    let mut bench = struck_by(fault);
+    play_until(&mut bench, 1.0);
+    let fault = bench.events.iter().find(|event| event.kind == EventKind::Fault.code()).unwrap();
+    assert_eq!((fault.cause, fault.axis), (Cause::ProcessDataLost.code(), 4));
+    assert!(fault.time_ns < EPOCH_NS + 510_000_000, "{} ms after", (fault.time_ns - EPOCH_NS) / 1_000_000);
+    assert!(bench.fastest_axis_m_s() < 1e-3, "{}", bench.fastest_axis_m_s());
+}
+
+#[test]
+fn a_drive_off_the_bus_is_told_and_stops_the_rig() {
+    let fault = FaultConfig { kind: FaultKindConfig::BusOff, node: Some(3), ..BASE };
+    let mut bench = struck_by(fault);
+    play_until(&mut bench, 1.0);
+    let told = bench.events.iter().find(|event| event.cause == Cause::BusOff.code()).unwrap();
+    assert_eq!((told.source, told.axis), (Source::Wire.code(), 2));
+    assert!(bench.causes(EventKind::Notice).contains(&Cause::ErrorActive), "restarted after 100 ms");
+    assert_eq!(bench.reading.master_fault, 1);
+}
+
+#[test]
+fn a_lost_synchronisation_costs_one_drive_one_cycle() {
+    let fault =
+        FaultConfig { kind: FaultKindConfig::Lose, node: Some(1), id: Some(0x080), count: Some(1), ..BASE };
+    let mut bench = struck_by(fault);
+    play_until(&mut bench, 1.0);
+    assert_eq!(bench.causes(EventKind::Fault), []);
+    assert_eq!(error_frames(&bench), 0);
+    let ended = bench.events.iter().find(|event| event.cause == Cause::FaultEnded.code()).unwrap();
+    assert_eq!((ended.value, ended.limit, ended.axis), (1.0, 1.0, 0));
+}
+
+#[test]
+fn a_fault_of_an_absent_node_is_refused() {
+    let fault = FaultConfig { kind: FaultKindConfig::Disconnect, node: Some(5), ..BASE };
+    let scenario = Scenario { faults: vec![fault], ..Scenario::default() };
+    let error = PlantCore::new(&scenario, 0).unwrap_err().to_string();
+    assert_eq!(error, "faults.node = 5: bus 0 has the nodes 127, 1, 2, 3");
+}
+
+#[test]
+fn with_fd_one_bus_carries_all_six_axes_at_a_kilohertz() {
+    let mut scenario = Scenario::default();
+    scenario.can.buses = vec![vec![0, 1, 2, 3, 4, 5]];
+    scenario.can.fd = true;
+    let mut bench = Bench::new(&scenario);
+    let worst_m = play_until(&mut bench, 1.0);
+    assert!(worst_m < 1e-4, "{worst_m}");
+    assert_eq!(bench.causes(EventKind::Fault), []);
+}

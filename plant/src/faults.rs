@@ -1,0 +1,73 @@
+//! The scenario's faults as those of its simulated wires: nodes become ports, seconds the wire's time.
+
+use masseter_shared::can::canopen::NodeId;
+use masseter_shared::can::faults::{Fault, FaultKind};
+use masseter_shared::can::{CanId, Frame};
+use masseter_shared::clock::SECOND_NS;
+use masseter_shared::config::{FaultConfig, FaultKindConfig};
+
+use crate::build::PlantError;
+
+/// What a babbling node says unless the scenario has it otherwise: nothing but NMT outranks it.
+const BABBLE_ID: u16 = 0x001;
+const BABBLE_DATA: [u8; 8] = [0x55; 8];
+
+/// The faults of a bus whose ports have the nodes given, switched on at `now_ns`, each with its index in
+/// the scenario's list kept by the order: faults of other buses become faults that never strike.
+pub(crate) fn of_bus(
+    list: &[FaultConfig],
+    bus: usize,
+    nodes: &[NodeId],
+    now_ns: u64,
+) -> Result<Vec<Fault>, PlantError> {
+    if !list.iter().any(|fault| fault.bus == bus) {
+        return Ok(Vec::new());
+    }
+    list.iter()
+        .map(|config| {
+            let port = if config.bus == bus { port_of(config, nodes)? } else { None };
+            let fault = fault(config, port, now_ns);
+            Ok(if config.bus == bus { fault } else { Fault { count: 0, ..fault } })
+        })
+        .collect()
+}
+
+fn fault(config: &FaultConfig, port: Option<usize>, now_ns: u64) -> Fault {
+    let at_ns = |time_s: f64| now_ns.saturating_add((time_s * SECOND_NS as f64) as u64);
+    Fault {
+        kind: kind(config),
+        from_ns: at_ns(config.from_s),
+        until_ns: config.until_s.map_or(u64::MAX, at_ns),
+        id: config.id.filter(|_| config.kind != FaultKindConfig::Babble).map(standard),
+        port,
+        probability: config.probability,
+        count: config.count.unwrap_or(if config.kind == FaultKindConfig::BusOff { 1 } else { u64::MAX }),
+    }
+}
+
+fn kind(config: &FaultConfig) -> FaultKind {
+    match config.kind {
+        FaultKindConfig::Corrupt => FaultKind::Corrupt,
+        FaultKindConfig::Lose => FaultKind::Lose,
+        FaultKindConfig::Delay => {
+            FaultKind::Delay { by_ns: u64::from(config.delay_us.unwrap_or_default()) * 1000 }
+        }
+        FaultKindConfig::Duplicate => FaultKind::Duplicate,
+        FaultKindConfig::Babble => {
+            FaultKind::Babble { frame: Frame::fixed(standard(config.id.unwrap_or(BABBLE_ID)), BABBLE_DATA) }
+        }
+        FaultKindConfig::Disconnect => FaultKind::Disconnect,
+        FaultKindConfig::BusOff => FaultKind::BusOff,
+    }
+}
+
+fn standard(id: u16) -> CanId {
+    CanId::standard(id & 0x7FF).expect("11 bits")
+}
+
+fn port_of(config: &FaultConfig, nodes: &[NodeId]) -> Result<Option<usize>, PlantError> {
+    let Some(node) = config.node else { return Ok(None) };
+    let port = nodes.iter().position(|id| id.get() == node);
+    let present = || nodes.iter().map(|id| id.get().to_string()).collect::<Vec<_>>().join(", ");
+    port.map(Some).ok_or_else(|| PlantError::FaultNode { node, bus: config.bus, present: present() })
+}

@@ -1,0 +1,298 @@
+//! Faults of a CAN link: which frames and nodes they strike, when, and by which chance.
+//!
+//! Purely declarative, and deterministic: whether a fault strikes a frame is a function of the seed, the
+//! fault and the frame's number, not of how often anybody asks. Who carries faults out is the
+//! [`VirtualWire`](super::VirtualWire), which knows all of them, or [`Faulty`](super::wrappers::Faulty) around any
+//! bus, which knows those that a single port can have.
+
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg32;
+
+use super::frame::{CanId, Frame};
+
+/// What a fault does.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FaultKind {
+    /// Destroys a frame on the wire: an error frame follows, then the transmitter repeats.
+    Corrupt,
+    /// Makes a receiver lose a frame without anybody noticing.
+    Lose,
+    /// Holds a frame back before it is queued for transmission.
+    Delay {
+        /// For how long, ns.
+        by_ns: u64,
+    },
+    /// Disturbs the last bit of the end of frame at the transmitter alone: the receivers have taken the
+    /// frame, and the transmitter repeats it.
+    Duplicate,
+    /// Makes a node send a frame whenever the bus is idle.
+    Babble {
+        /// The frame.
+        frame: Frame,
+    },
+    /// Takes a node off the wire: it neither sends nor hears nor acknowledges, and its queue fills.
+    Disconnect,
+    /// Sends a node's controller into bus-off.
+    BusOff,
+}
+
+/// One fault.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Fault {
+    /// What it does.
+    pub kind: FaultKind,
+    /// From when on, ns.
+    pub from_ns: u64,
+    /// Until when, ns.
+    pub until_ns: u64,
+    /// Frames of this identifier only.
+    pub id: Option<CanId>,
+    /// The port concerned: of frames their sender, of lost frames the receiver, else the node itself.
+    pub port: Option<usize>,
+    /// Chance that it strikes a frame, 0 to 1.
+    pub probability: f64,
+    /// Strikes after which it ends.
+    pub count: u64,
+}
+
+/// A fault began or ended to do something.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct FaultNote {
+    /// When, ns.
+    pub time_ns: u64,
+    /// Index of the fault in its list.
+    pub fault: usize,
+    /// The node concerned, if the fault names one.
+    pub port: Option<usize>,
+    /// How often it has struck; 0 at its beginning.
+    pub strikes: u64,
+    /// Whether it is over.
+    pub has_ended: bool,
+}
+
+/// The faults of one bus, and what they did.
+#[derive(Debug, Clone, Default)]
+pub struct Faults {
+    list: Vec<Listed>,
+    seed: u64,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Listed {
+    fault: Fault,
+    strikes: u64,
+    began_ns: Option<u64>,
+    is_begin_told: bool,
+    is_end_told: bool,
+}
+
+impl Listed {
+    fn is_live(&self, now_ns: u64) -> bool {
+        (self.fault.from_ns..self.fault.until_ns).contains(&now_ns) && self.strikes < self.fault.count
+    }
+
+    fn concerns(&self, port: usize, id: CanId) -> bool {
+        self.fault.port.is_none_or(|own| own == port) && self.fault.id.is_none_or(|own| own == id)
+    }
+}
+
+impl Faults {
+    /// These faults; the same seed makes the same choices.
+    pub fn new(faults: Vec<Fault>, seed: u64) -> Self {
+        let listed =
+            |fault| Listed { fault, strikes: 0, began_ns: None, is_begin_told: false, is_end_told: false };
+        Self { list: faults.into_iter().map(listed).collect(), seed }
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.list.is_empty()
+    }
+
+    /// The first fault of a kind that strikes the frame numbered `number` of that port.
+    pub(super) fn strikes_frame(
+        &self,
+        now_ns: u64,
+        is_kind: impl Fn(FaultKind) -> bool,
+        port: usize,
+        id: CanId,
+        number: u64,
+    ) -> Option<Strike> {
+        self.list.iter().enumerate().find_map(|(index, listed)| {
+            let may = is_kind(listed.fault.kind) && listed.is_live(now_ns) && listed.concerns(port, id);
+            let strikes = may && self.chance(index, number).random_bool(listed.fault.probability);
+            strikes.then_some(Strike { fault: index, kind: listed.fault.kind, at_ns: now_ns })
+        })
+    }
+
+    /// A number from 0 to `below` − 1 for a fault and a frame.
+    pub(super) fn pick(&self, strike: Strike, number: u64, below: u32) -> u32 {
+        let mut chance = self.chance(strike.fault, number);
+        let _: f64 = chance.random();
+        chance.random_range(0..below.max(1))
+    }
+
+    /// The fault of a kind that a node has at that time.
+    pub(super) fn of_node(
+        &self,
+        now_ns: u64,
+        is_kind: impl Fn(FaultKind) -> bool,
+        port: usize,
+    ) -> Option<Strike> {
+        self.of_port(is_kind, port).find(|(_, listed)| listed.is_live(now_ns)).map(
+            |(index, Listed { fault, .. })| Strike { fault: index, kind: fault.kind, at_ns: fault.from_ns },
+        )
+    }
+
+    /// When a node is connected, from `from_ns` on.
+    pub(super) fn connected_from_ns(&self, from_ns: u64, port: usize) -> u64 {
+        let is_disconnect = |kind| kind == FaultKind::Disconnect;
+        let mut connected_ns = from_ns;
+        // Each turn leaves one disconnection behind.
+        while let Some((_, off)) =
+            self.of_port(is_disconnect, port).find(|(_, off)| off.is_live(connected_ns))
+        {
+            connected_ns = off.fault.until_ns;
+        }
+        connected_ns
+    }
+
+    /// From when to when a node babbles, for each of its faults that make it.
+    pub(super) fn babbles(&self, port: usize) -> impl Iterator<Item = (u64, u64)> {
+        let is_babble = |kind| matches!(kind, FaultKind::Babble { .. });
+        let babbles = self.of_port(is_babble, port).filter(|(_, listed)| listed.strikes < listed.fault.count);
+        babbles.map(|(_, listed)| (listed.fault.from_ns, listed.fault.until_ns))
+    }
+
+    fn of_port(
+        &self,
+        is_kind: impl Fn(FaultKind) -> bool,
+        port: usize,
+    ) -> impl Iterator<Item = (usize, &Listed)> {
+        self.list.iter().enumerate().filter(move |(_, listed)| {
+            is_kind(listed.fault.kind) && listed.fault.port.is_none_or(|own| own == port)
+        })
+    }
+
+    /// A fault has struck.
+    pub(super) fn record(&mut self, strike: Strike) {
+        let listed = &mut self.list[strike.fault];
+        listed.began_ns.get_or_insert(strike.at_ns);
+        listed.strikes += 1;
+    }
+
+    /// The next forced bus-off of a node that is on the bus from `from_ns` on.
+    pub(super) fn next_bus_off(&self, from_ns: u64, port: usize) -> Option<Strike> {
+        let strikes = self.of_port(|kind| kind == FaultKind::BusOff, port).filter_map(|(index, listed)| {
+            let at_ns = listed.fault.from_ns.max(from_ns);
+            listed.is_live(at_ns).then_some(Strike { fault: index, kind: FaultKind::BusOff, at_ns })
+        });
+        strikes.min_by_key(|strike| strike.at_ns)
+    }
+
+    /// Disconnections act by themselves; what they strike is not counted.
+    pub(super) fn begin_disconnections(&mut self, now_ns: u64) {
+        let off = self.list.iter_mut().filter(|listed| listed.fault.kind == FaultKind::Disconnect);
+        for listed in off.filter(|listed| listed.fault.from_ns <= now_ns && listed.fault.count > 0) {
+            listed.began_ns.get_or_insert(listed.fault.from_ns);
+        }
+    }
+
+    /// What is to be told of the faults up to `now_ns`: each tells once that it acts, and once that it
+    /// is over.
+    pub fn next_note(&mut self, now_ns: u64) -> Option<FaultNote> {
+        self.list.iter_mut().enumerate().find_map(|(fault, listed)| {
+            let began_ns = listed.began_ns?;
+            let port = listed.fault.port;
+            if !listed.is_begin_told {
+                listed.is_begin_told = true;
+                return Some(FaultNote { time_ns: began_ns, fault, port, strikes: 0, has_ended: false });
+            }
+            if !listed.is_end_told && !listed.is_live(now_ns) {
+                listed.is_end_told = true;
+                let strikes = listed.strikes;
+                return Some(FaultNote { time_ns: now_ns, fault, port, strikes, has_ended: true });
+            }
+            None
+        })
+    }
+
+    /// Random numbers for a fault and a frame, the same however often they are asked for.
+    fn chance(&self, fault: usize, number: u64) -> Pcg32 {
+        const ODD: u64 = 0x9E37_79B9_7F4A_7C15;
+        let key = self.seed ^ (fault as u64 + 1).wrapping_mul(ODD).rotate_left(32) ^ number.wrapping_mul(ODD);
+        Pcg32::seed_from_u64(key)
+    }
+}
+
+/// A fault that strikes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Strike {
+    pub(super) fault: usize,
+    pub(super) kind: FaultKind,
+    pub(super) at_ns: u64,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn corrupt(probability: f64) -> Fault {
+        Fault {
+            kind: FaultKind::Corrupt,
+            from_ns: 1000,
+            until_ns: 2000,
+            id: None,
+            port: None,
+            probability,
+            count: u64::MAX,
+        }
+    }
+
+    fn id(number: u16) -> CanId {
+        CanId::standard(number).unwrap()
+    }
+
+    fn strikes(faults: &Faults, now_ns: u64, port: usize, number: u64) -> bool {
+        let is_corrupt = |kind| kind == FaultKind::Corrupt;
+        faults.strikes_frame(now_ns, is_corrupt, port, id(0x181), number).is_some()
+    }
+
+    #[test]
+    fn a_fault_strikes_within_its_time_its_port_and_its_identifier() {
+        let fault = Fault { port: Some(2), id: Some(id(0x181)), ..corrupt(1.0) };
+        let faults = Faults::new(vec![fault], 1);
+        assert!(strikes(&faults, 1000, 2, 0));
+        assert!(!strikes(&faults, 999, 2, 0) && !strikes(&faults, 2000, 2, 0));
+        assert!(!strikes(&faults, 1000, 1, 0));
+        let other = Faults::new(vec![Fault { id: Some(id(0x182)), ..fault }], 1);
+        assert!(!strikes(&other, 1000, 2, 0));
+    }
+
+    #[test]
+    fn the_share_of_frames_struck_is_the_probability_and_the_seed_chooses_them() {
+        let struck = |seed| {
+            let faults = Faults::new(vec![corrupt(0.1)], seed);
+            (0..100_000).filter(|&number| strikes(&faults, 1500, 0, number)).collect::<Vec<_>>()
+        };
+        let share = struck(1).len() as f64 / 100_000.0;
+        assert!((0.095..0.105).contains(&share), "{share}");
+        assert_eq!(struck(1), struck(1));
+        assert_ne!(struck(1), struck(2));
+    }
+
+    #[test]
+    fn a_fault_tells_once_that_it_acts_and_once_that_it_is_over() {
+        let mut faults = Faults::new(vec![Fault { count: 2, ..corrupt(1.0) }], 1);
+        assert_eq!(faults.next_note(1500), None);
+        let strike = |at_ns| Strike { fault: 0, kind: FaultKind::Corrupt, at_ns };
+        faults.record(strike(1200));
+        let note = FaultNote { time_ns: 1200, fault: 0, port: None, strikes: 0, has_ended: false };
+        assert_eq!(faults.next_note(1500), Some(note));
+        assert_eq!(faults.next_note(1500), None);
+        faults.record(strike(1300));
+        let note = FaultNote { time_ns: 1500, strikes: 2, has_ended: true, ..note };
+        assert_eq!(faults.next_note(1500), Some(note));
+        assert_eq!(faults.next_note(3000), None);
+    }
+}

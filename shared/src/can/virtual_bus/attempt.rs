@@ -1,0 +1,264 @@
+//! Who gets the wire next, and how the attempt will end.
+//!
+//! Everything here is a function of the wire's present state, so that the next event can be foretold
+//! without changing anything.
+
+use super::VirtualWire;
+use super::queue::Queued;
+use crate::can::bus::ErrorState;
+use crate::can::error_frame::ErrorKind;
+use crate::can::faults::{FaultKind, Strike};
+use crate::can::frame::Frame;
+use crate::can::wire::{BEHIND_ACKNOWLEDGE_BITS, INTERFRAME_BITS, first_difference, frame_bits};
+
+const ERROR_FLAG_BITS: u32 = 6;
+const ERROR_DELIMITER_BITS: u32 = 8;
+/// A dominant bit behind the end of frame is answered one bit later by overload flags.
+const LATE_FLAG_BITS: u32 = 7;
+
+/// A set of ports.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(super) struct PortSet(u64);
+
+impl PortSet {
+    /// Ports a wire may have.
+    pub(super) const CAPACITY: usize = u64::BITS as usize;
+
+    pub(super) fn contains(self, port: usize) -> bool {
+        self.0 >> port & 1 == 1
+    }
+
+    fn add(&mut self, port: usize) {
+        self.0 |= 1 << port;
+    }
+
+    fn is_several(self) -> bool {
+        self.0.count_ones() > 1
+    }
+}
+
+/// A frame on the wire.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Attempt {
+    pub(super) frame: Frame,
+    pub(super) queued_ns: u64,
+    pub(super) start_ns: u64,
+    /// When the last end-of-frame bit is, or would have been, over.
+    pub(super) received_ns: u64,
+    /// When that is over, or the delimiter of the error frame.
+    pub(super) end_ns: u64,
+    /// When the next frame may start.
+    pub(super) idle_from_ns: u64,
+    /// Who sends it: all that have the same frame to send.
+    pub(super) senders: PortSet,
+    /// Those of them that babble.
+    pub(super) babbling: PortSet,
+    /// Who sent another frame of its identifier, and noticed.
+    pub(super) losers: PortSet,
+    pub(super) ending: Ending,
+    pub(super) strike: Option<Strike>,
+}
+
+/// How an attempt ends.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Ending {
+    /// All receive the frame.
+    Received,
+    /// All receive it, and its transmitter repeats it.
+    ReceivedAndRepeated,
+    /// An error frame ends it.
+    Destroyed(ErrorKind),
+}
+
+/// What a port would send.
+#[derive(Clone, Copy)]
+struct Offer {
+    port: usize,
+    queued: Queued,
+    babbles: Option<Strike>,
+}
+
+impl VirtualWire {
+    /// When the next arbitration takes place: as soon as the bus is idle and somebody has something to send.
+    pub(super) fn next_start_ns(&self) -> Option<u64> {
+        (0..self.stations.len()).filter_map(|port| self.ready_ns(port)).min()
+    }
+
+    /// When a port can next take part in an arbitration, if at all.
+    fn ready_ns(&self, port: usize) -> Option<u64> {
+        let station = &self.stations[port];
+        if station.confinement.state() == ErrorState::BusOff {
+            return None;
+        }
+        let may_ns = station.suspended_until_ns.max(station.on_bus_from_ns).max(self.idle_from_ns);
+        let able_ns = |wants_ns: u64| self.faults.connected_from_ns(may_ns.max(wants_ns), port);
+        let queued = station.transmit.earliest_ns().map(able_ns);
+        let babbles = self.faults.babbles(port).map(|(from_ns, until_ns)| (able_ns(from_ns), until_ns));
+        let babbles = babbles.filter_map(|(at_ns, until_ns)| (at_ns < until_ns).then_some(at_ns));
+        queued.into_iter().chain(babbles).min().filter(|&at_ns| at_ns < u64::MAX)
+    }
+
+    /// The attempt that an arbitration at that time leads to; `None` where nobody can send then.
+    pub(super) fn attempt(&self, start_ns: u64) -> Option<Attempt> {
+        let winner = self.offers(start_ns).min_by_key(|offer| offer.queued.frame.id())?;
+        let (contest, strongest) = self.contest(start_ns, winner);
+        let frame = strongest.queued.frame;
+        let struck = |is_kind: fn(FaultKind) -> bool| {
+            self.faults.strikes_frame(start_ns, is_kind, strongest.port, frame.id(), self.attempts)
+        };
+        let duration_ns = strongest.queued.duration_ns;
+        let interframe_ns = self.config.rates.nominal().bits_to_ns(INTERFRAME_BITS);
+        let mut attempt = Attempt {
+            frame,
+            queued_ns: strongest.queued.since_ns,
+            start_ns,
+            received_ns: start_ns + duration_ns - interframe_ns,
+            end_ns: start_ns + duration_ns - interframe_ns,
+            idle_from_ns: start_ns + duration_ns,
+            senders: contest.senders,
+            babbling: contest.babbling,
+            losers: contest.losers,
+            ending: Ending::Received,
+            strike: strongest.babbles,
+        };
+        if let Some(bit) = contest.destroyed_at {
+            attempt.destroy(self, bit, ErrorKind::Bit);
+        } else if let Some(strike) = struck(|kind| kind == FaultKind::Corrupt) {
+            let last = frame_bits(&frame).total() - INTERFRAME_BITS;
+            attempt.strike = Some(strike);
+            attempt.destroy(self, 1 + self.faults.pick(strike, self.attempts, last), ErrorKind::Bit);
+        } else if !self.is_acknowledged(&attempt) {
+            let slot = frame_bits(&frame).total() - INTERFRAME_BITS - BEHIND_ACKNOWLEDGE_BITS;
+            attempt.destroy(self, slot, ErrorKind::Acknowledge);
+        } else if let Some(strike) = struck(|kind| kind == FaultKind::Duplicate) {
+            attempt.strike = Some(strike);
+            attempt.repeat(self);
+        }
+        Some(attempt)
+    }
+
+    /// Whether a port takes part in what happens on the wire.
+    pub(super) fn is_on_bus(&self, port: usize, now_ns: u64) -> bool {
+        self.stations[port].confinement.state() != ErrorState::BusOff && !self.is_disconnected(port, now_ns)
+    }
+
+    fn is_disconnected(&self, port: usize, now_ns: u64) -> bool {
+        let is_disconnect = |kind| kind == FaultKind::Disconnect;
+        !self.faults.is_empty() && self.faults.of_node(now_ns, is_disconnect, port).is_some()
+    }
+
+    /// What each port would send at that time.
+    fn offers(&self, start_ns: u64) -> impl Iterator<Item = Offer> {
+        (0..self.stations.len()).filter_map(move |port| {
+            let may = self.stations[port].suspended_until_ns <= start_ns && self.is_on_bus(port, start_ns);
+            if may { self.offer(port, start_ns) } else { None }
+        })
+    }
+
+    fn offer(&self, port: usize, start_ns: u64) -> Option<Offer> {
+        let queued = self.stations[port].transmit.most_urgent(start_ns);
+        let queued = queued.map(|queued| Offer { port, queued, babbles: None });
+        let babbled = self.babbled(port, start_ns);
+        queued.into_iter().chain(babbled).min_by_key(|offer| offer.queued.frame.id())
+    }
+
+    fn babbled(&self, port: usize, start_ns: u64) -> Option<Offer> {
+        if self.faults.is_empty() {
+            return None;
+        }
+        let is_babble = |kind| matches!(kind, FaultKind::Babble { .. });
+        let strike = self.faults.of_node(start_ns, is_babble, port)?;
+        let FaultKind::Babble { frame } = strike.kind else { return None };
+        let frame = frame.in_format(self.config.format);
+        let duration_ns = self.config.rates.duration_ns(frame_bits(&frame));
+        let queued = Queued { frame, duration_ns, since_ns: start_ns };
+        Some(Offer { port, queued, babbles: Some(strike) })
+    }
+
+    /// Whether some port that does not send the frame hears it.
+    fn is_acknowledged(&self, attempt: &Attempt) -> bool {
+        (0..self.stations.len())
+            .any(|port| !attempt.senders.contains(port) && self.is_on_bus(port, attempt.start_ns))
+    }
+
+    /// Sorts out who sends the winning identifier too.
+    fn contest(&self, start_ns: u64, winner: Offer) -> (Contest, Offer) {
+        let mut contest = Contest::default();
+        let mut strongest = winner;
+        let same_id =
+            |offer: &Offer| offer.port >= winner.port && offer.queued.frame.id() == winner.queued.frame.id();
+        for rival in self.offers(start_ns).filter(same_id) {
+            let difference = first_difference(&strongest.queued.frame, &rival.queued.frame);
+            let Some(difference) = difference else {
+                contest.admit(rival);
+                continue;
+            };
+            let loser = if difference.first_is_dominant { rival } else { strongest };
+            if self.stations[loser.port].confinement.state() == ErrorState::Active {
+                contest.admit(rival);
+                contest.destroyed_at =
+                    Some(contest.destroyed_at.map_or(difference.bit, |bit| bit.min(difference.bit)));
+            } else if difference.first_is_dominant {
+                // A passive error flag is recessive: the dominant frame goes on.
+                contest.losers.add(rival.port);
+            } else {
+                contest.losers.0 |= contest.senders.0;
+                (contest.senders, contest.babbling) = (PortSet::default(), PortSet::default());
+                contest.admit(rival);
+                strongest = rival;
+            }
+        }
+        (contest, strongest)
+    }
+}
+
+/// Ports that send one identifier at once.
+#[derive(Default)]
+struct Contest {
+    senders: PortSet,
+    babbling: PortSet,
+    losers: PortSet,
+    destroyed_at: Option<u32>,
+}
+
+impl Contest {
+    fn admit(&mut self, offer: Offer) {
+        self.senders.add(offer.port);
+        if offer.babbles.is_some() {
+            self.babbling.add(offer.port);
+        }
+    }
+}
+
+impl Attempt {
+    /// Several ports sent the same identifier.
+    pub(super) fn is_collision(&self) -> bool {
+        self.senders.is_several() || self.losers != PortSet::default()
+    }
+
+    /// An error flag begins behind bit number `bit` of the frame.
+    fn destroy(&mut self, wire: &VirtualWire, bit: u32, kind: ErrorKind) {
+        let is_echoed = (0..wire.stations.len()).any(|port| {
+            !self.senders.contains(port)
+                && wire.is_on_bus(port, self.start_ns)
+                && wire.stations[port].confinement.state() == ErrorState::Active
+        });
+        let flag_bits = if is_echoed { 2 * ERROR_FLAG_BITS } else { ERROR_FLAG_BITS };
+        let rates = wire.config.rates;
+        let error_ns = self.start_ns + rates.time_to_bit_ns(frame_bits(&self.frame), bit);
+        self.end_in_error_frame(wire, error_ns, flag_bits);
+        self.ending = Ending::Destroyed(kind);
+    }
+
+    /// The transmitter alone signals an error in the last bit of the frame.
+    fn repeat(&mut self, wire: &VirtualWire) {
+        self.end_in_error_frame(wire, self.received_ns, LATE_FLAG_BITS);
+        self.ending = Ending::ReceivedAndRepeated;
+    }
+
+    fn end_in_error_frame(&mut self, wire: &VirtualWire, error_ns: u64, flag_bits: u32) {
+        let nominal = wire.config.rates.nominal();
+        self.end_ns = error_ns + nominal.bits_to_ns(flag_bits + ERROR_DELIMITER_BITS);
+        self.idle_from_ns = error_ns + nominal.bits_to_ns(flag_bits + ERROR_DELIMITER_BITS + INTERFRAME_BITS);
+    }
+}

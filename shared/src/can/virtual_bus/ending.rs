@@ -1,0 +1,133 @@
+//! What the end of an attempt does to the ports, the tap and the statistics.
+
+use super::VirtualWire;
+use super::attempt::{Attempt, Ending};
+use crate::can::bus::{ErrorState, Received};
+use crate::can::error_frame::{ErrorKind, ErrorReport};
+use crate::can::faults::FaultKind;
+use crate::can::tap::Tapped;
+
+/// Pause of an error passive transmitter before it may send again, behind the interframe space.
+const SUSPEND_BITS: u32 = 8;
+
+impl VirtualWire {
+    /// Ends an attempt.
+    pub(super) fn end(&mut self, attempt: &Attempt) {
+        self.idle_from_ns = attempt.idle_from_ns;
+        self.statistics.busy_ns += attempt.idle_from_ns - attempt.start_ns;
+        self.statistics.collisions += u64::from(attempt.is_collision());
+        if let Some(strike) = attempt.strike {
+            self.faults.record(strike);
+        }
+        match attempt.ending {
+            Ending::Received => self.complete(attempt),
+            Ending::ReceivedAndRepeated => {
+                self.deliver(attempt);
+                self.fail(attempt, ErrorKind::Bit);
+            }
+            Ending::Destroyed(kind) => self.fail(attempt, kind),
+        }
+        self.suspend_passive(attempt);
+        for station in &mut self.stations {
+            station.confinement.saw_end(attempt.idle_from_ns);
+        }
+    }
+
+    /// The frame has arrived, and its senders are done with it.
+    fn complete(&mut self, attempt: &Attempt) {
+        let end_ns = attempt.end_ns;
+        self.deliver(attempt);
+        for port in 0..self.stations.len() {
+            if attempt.senders.contains(port) {
+                self.confine(port, end_ns, super::Confinement::transmitted);
+                if !attempt.babbling.contains(port) {
+                    self.stations[port].transmit.remove_most_urgent(attempt.start_ns);
+                }
+            } else if attempt.losers.contains(port) {
+                self.statistics.retransmissions += 1;
+                self.transmit_error(port, end_ns);
+            }
+        }
+    }
+
+    /// Hands the frame to all who hear it.
+    fn deliver(&mut self, attempt: &Attempt) {
+        let time_ns = attempt.received_ns;
+        self.statistics.count_frame(time_ns - attempt.queued_ns);
+        let received = Received { frame: attempt.frame, time_ns };
+        self.tap.push(Tapped::Frame(received));
+        for port in 0..self.stations.len() {
+            if attempt.senders.contains(port) || !self.is_on_bus(port, attempt.start_ns) {
+                continue;
+            }
+            if !attempt.losers.contains(port) {
+                self.confine(port, time_ns, super::Confinement::received);
+            }
+            if !self.loses(port, attempt) {
+                self.stations[port].receive.push(received);
+            }
+        }
+    }
+
+    /// Whether a fault makes the port lose the frame.
+    fn loses(&mut self, port: usize, attempt: &Attempt) -> bool {
+        if self.faults.is_empty() {
+            return false;
+        }
+        let is_lose = |kind| kind == FaultKind::Lose;
+        // Receivers choose by numbers of their own, so that one's loss is not the other's.
+        let number = self.attempts ^ (port as u64 + 1) << 48;
+        let id = attempt.frame.id();
+        let strike = self.faults.strikes_frame(attempt.start_ns, is_lose, port, id, number);
+        strike.inspect(|&strike| self.faults.record(strike)).is_some()
+    }
+
+    /// An error frame has ended the attempt; the frame stays queued, to be sent again.
+    fn fail(&mut self, attempt: &Attempt, kind: ErrorKind) {
+        let is_received = attempt.ending == Ending::ReceivedAndRepeated;
+        self.statistics.error_frames += 1;
+        self.statistics.unacknowledged += u64::from(kind == ErrorKind::Acknowledge);
+        for port in 0..self.stations.len() {
+            if attempt.senders.contains(port) || attempt.losers.contains(port) {
+                self.statistics.retransmissions += 1;
+                self.report_error(port, attempt, kind);
+                match kind {
+                    ErrorKind::Acknowledge => {
+                        let restart_after_ns = self.config.restart_after_ns;
+                        let now_ns = attempt.end_ns;
+                        self.confine(port, now_ns, |node| node.unacknowledged(now_ns, restart_after_ns));
+                    }
+                    _ => self.transmit_error(port, attempt.end_ns),
+                }
+            } else if !is_received && self.is_on_bus(port, attempt.start_ns) {
+                self.confine(port, attempt.end_ns, super::Confinement::receive_error);
+            }
+        }
+    }
+
+    /// Taps the error frame once, as the first of the senders reports it.
+    fn report_error(&mut self, port: usize, attempt: &Attempt, kind: ErrorKind) {
+        let is_first =
+            (0..port).all(|other| !attempt.senders.contains(other) && !attempt.losers.contains(other));
+        if is_first {
+            let status = self.stations[port].confinement.status();
+            self.tap.push(Tapped::Error(ErrorReport::new(attempt.end_ns, port as u8, kind, status)));
+        }
+    }
+
+    fn transmit_error(&mut self, port: usize, now_ns: u64) {
+        let restart_after_ns = self.config.restart_after_ns;
+        self.confine(port, now_ns, |node| node.transmit_error(now_ns, restart_after_ns));
+    }
+
+    /// A passive transmitter pauses.
+    fn suspend_passive(&mut self, attempt: &Attempt) {
+        let pause_ns = self.config.rates.nominal().bits_to_ns(SUSPEND_BITS);
+        for (port, station) in self.stations.iter_mut().enumerate() {
+            let sent = attempt.senders.contains(port) || attempt.losers.contains(port);
+            if sent && station.confinement.state() == ErrorState::Passive {
+                station.suspended_until_ns = attempt.idle_from_ns + pause_ns;
+            }
+        }
+    }
+}

@@ -1,0 +1,129 @@
+//! Lengths of CAN FD frames (ISO 11898-1:2015).
+//!
+//! The data phase lies between the sample points of BRS and of the CRC delimiter; with the same sample point
+//! in both phases that is as if BRS went wholly at the nominal rate and the CRC delimiter wholly at the data
+//! rate, which is how they are counted here. The CRC field has fixed stuff bits, so that its length
+//! depends on the data length alone, not on the CRC: the values of CRC-17 and CRC-21 are not computed.
+
+use super::stuffing::Stuffer;
+use super::{BEHIND_ACKNOWLEDGE_BITS, FrameBits, INTERFRAME_BITS};
+use crate::can::frame::CanId;
+
+/// From the start bit to BRS.
+const STANDARD_HEAD_BITS: u32 = 17;
+const EXTENDED_HEAD_BITS: u32 = 36;
+/// Error state indicator and data length code.
+const CONTROL_BITS: u32 = 1 + 4;
+const STUFF_COUNT_BITS: u32 = 4;
+const CRC_DELIMITER_BITS: u32 = 1;
+const ACKNOWLEDGE_BITS: u32 = 1;
+/// Longest data that CRC-17 protects, bytes; CRC-21 protects the others.
+const CRC_17_LENGTH: u32 = 16;
+
+/// Exact length of an FD frame with the control bits and data given.
+pub(in crate::can) fn bits(id: CanId, switches: bool, length_code: u8, data: &[u8]) -> FrameBits {
+    let head_bits = head_bits(id.is_extended());
+    let mut stuffer = Stuffer::default();
+    push(&mut stuffer, head(id, switches), head_bits);
+    let head_stuffed = stuffer.stuffed;
+    push(&mut stuffer, u64::from(length_code), CONTROL_BITS);
+    for &byte in data {
+        push(&mut stuffer, u64::from(byte), 8);
+    }
+    lay_out(switches, head_bits + head_stuffed, stuffer.stuffed - head_stuffed, data.len() as u32)
+}
+
+/// The longest that an FD frame of that many data bytes can be.
+pub const fn worst_case_fd_bits(data_length: u32, extended: bool, switches: bool) -> FrameBits {
+    let head = head_bits(extended);
+    let content = head + CONTROL_BITS + 8 * data_length;
+    // As with classical frames, but the bit behind which a stuff bit would be due must have a successor.
+    let head_stuffed = (head - 2) / 4;
+    lay_out(switches, head + head_stuffed, (content - 2) / 4 - head_stuffed, data_length)
+}
+
+const fn head_bits(extended: bool) -> u32 {
+    if extended { EXTENDED_HEAD_BITS } else { STANDARD_HEAD_BITS }
+}
+
+/// Start bit to BRS. Start, RRS and the reserved bit are 0, FDF is 1.
+fn head(id: CanId, switches: bool) -> u64 {
+    const SRR_AND_IDE: u64 = 0b11;
+    let base = u64::from(id.base());
+    let arbitration = if id.is_extended() {
+        ((base << 2 | SRR_AND_IDE) << 18 | u64::from(id.extension())) << 1
+    } else {
+        base << 2
+    };
+    arbitration << 3 | 0b100 | u64::from(switches)
+}
+
+fn push(stuffer: &mut Stuffer, field: u64, length: u32) {
+    (0..length).rev().for_each(|bit| stuffer.push(field >> bit & 1 == 1));
+}
+
+const fn lay_out(switches: bool, head: u32, stuffed: u32, data_length: u32) -> FrameBits {
+    let crc = if data_length <= CRC_17_LENGTH { 17 } else { 21 };
+    // One before the stuff count, one behind every four bits that have a successor.
+    let fixed = (STUFF_COUNT_BITS + crc).div_ceil(4);
+    let data = CONTROL_BITS + 8 * data_length + stuffed + STUFF_COUNT_BITS + crc + fixed + CRC_DELIMITER_BITS;
+    let tail = ACKNOWLEDGE_BITS + BEHIND_ACKNOWLEDGE_BITS + INTERFRAME_BITS;
+    if switches { FrameBits { head, data, tail } } else { FrameBits::nominal(head + data + tail) }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::can::frame::strategies::any_id;
+    use crate::can::{FdFormat, FdFrame};
+
+    fn standard(id: u16) -> CanId {
+        CanId::standard(id).unwrap()
+    }
+
+    #[test]
+    fn unstuffed_lengths_are_those_that_the_kernel_counts() {
+        // linux/can/length.h: 62 bits with CRC-17 and 67 with CRC-21, data excluded; 19 more with 29-bit identifiers.
+        let alternating = |length: usize| vec![0x55; length];
+        let total = |id, length: usize, code| bits(id, true, code, &alternating(length)).total();
+        assert_eq!(total(standard(0x555), 8, 0b1000), 62 + 64);
+        assert_eq!(total(standard(0x555), 16, 0b1010), 62 + 128);
+        assert_eq!(total(standard(0x555), 64, 0b1111), 67 + 512);
+        let extended = CanId::extended(0x1555_5555).unwrap();
+        assert_eq!(total(extended, 8, 0b1000), 62 + 64 + 19);
+    }
+
+    #[test]
+    fn the_data_phase_begins_behind_brs_and_ends_with_the_crc_delimiter() {
+        let frame = bits(standard(0x555), true, 0b1000, &[0x55; 8]);
+        assert_eq!(frame, FrameBits { head: 17, data: 5 + 64 + 4 + 17 + 6 + 1, tail: 12 });
+        let unswitched = bits(standard(0x555), false, 0b1000, &[0x55; 8]);
+        assert_eq!(unswitched, FrameBits::nominal(frame.total()));
+    }
+
+    #[test]
+    fn no_stuff_bit_precedes_the_fixed_one() {
+        let zeros = |data: &[u8]| bits(standard(0x555), true, 0b0001, data).total();
+        assert_eq!(zeros(&[0b0101_1111]), zeros(&[0b0101_0101]));
+    }
+
+    proptest! {
+        #[test]
+        fn exact_is_within_worst_case(
+            id in any_id(),
+            switches: bool,
+            data in prop::collection::vec(prop_oneof![Just(0_u8), Just(0xFF), any::<u8>()], 0..=64),
+        ) {
+            let format = if switches { FdFormat::BitRateSwitch } else { FdFormat::OneRate };
+            let frame = FdFrame::padded(id, format, &data);
+            let length = frame.data().len() as u32;
+            let (exact, worst) = (frame.bits(), worst_case_fd_bits(length, id.is_extended(), switches));
+            prop_assert!(exact.head <= worst.head && exact.total() <= worst.total(), "{exact:?} {worst:?}");
+            let crc_and_fixed = if length <= 16 { 17 + 6 } else { 21 + 7 };
+            let unstuffed = head_bits(id.is_extended()) + 5 + 8 * length + 4 + crc_and_fixed + 1 + 12;
+            prop_assert!(unstuffed <= exact.total());
+        }
+    }
+}

@@ -1,0 +1,42 @@
+//! What a frame costs on the wire: its exact length in bits, from its content, and its worst case.
+//!
+//! Frames without errors; what an error frame adds is up to the wire it happens on.
+
+mod bitrate;
+mod classical;
+mod fd;
+mod stuffing;
+
+use super::frame::{Frame, FrameFormat};
+
+pub use bitrate::{Bitrate, BitrateError, FrameBits, Rates};
+pub(super) use classical::first_difference;
+pub use classical::{unstuffed_bits, wire_bits, worst_case_bits};
+pub(super) use fd::bits as fd_bits;
+pub use fd::worst_case_fd_bits;
+
+/// Exact length of a frame on the wire from the start bit to the end of the interframe space.
+pub fn frame_bits(frame: &Frame) -> FrameBits {
+    match frame.format() {
+        FrameFormat::Classical => FrameBits::nominal(wire_bits(frame)),
+        format => {
+            let switches = format == FrameFormat::FdBitRateSwitch;
+            // Up to 8 bytes the length code is the length.
+            fd_bits(frame.id(), switches, frame.data().len() as u8, frame.data())
+        }
+    }
+}
+
+/// The longest that a frame of 0 to 8 data bytes can be in a format, interframe space included.
+pub const fn longest_bits(data_length: u32, extended: bool, format: FrameFormat) -> FrameBits {
+    match format {
+        FrameFormat::Classical => FrameBits::nominal(worst_case_bits(data_length, extended)),
+        FrameFormat::Fd => worst_case_fd_bits(data_length, extended, false),
+        FrameFormat::FdBitRateSwitch => worst_case_fd_bits(data_length, extended, true),
+    }
+}
+
+/// Pause after a frame before the next may start.
+pub const INTERFRAME_BITS: u32 = 3;
+/// Acknowledge delimiter and end of frame.
+pub(super) const BEHIND_ACKNOWLEDGE_BITS: u32 = 1 + 7;
