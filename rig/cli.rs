@@ -11,7 +11,7 @@ use masseter_shared::lifecycle::Assignment;
 
 use crate::bench::BenchArgs;
 use crate::bench::ipc::PeerArgs;
-use crate::can::ServeArgs;
+use crate::can::{PlanArgs, ServeArgs};
 use crate::exit::{Exit, Failure};
 use crate::log::{self, LogVerb};
 use crate::{bench, can, clean, doctor, kinematics, logger, plant, report, run};
@@ -43,7 +43,7 @@ enum Verb {
         #[command(subcommand)]
         verb: LogVerb,
     },
-    /// The CAN link: descriptions of the drives for other tools
+    /// The CAN link: its plan, and descriptions of the drives for other tools
     #[command(subcommand)]
     Can(CanVerb),
     /// What the rig's parts cost, each beside a baseline in the same run
@@ -61,6 +61,8 @@ enum Verb {
 /// Verbs of `can`.
 #[derive(Debug, Subcommand)]
 enum CanVerb {
+    /// Worst-case load and response time of every message against the cycle
+    Plan(PlanArgs),
     /// The electronic data sheet (EDS, CiA 306) of a drive
     Eds(EdsArgs),
     /// The messages of the link as a DBC file
@@ -272,6 +274,7 @@ pub fn main() -> ExitCode {
         Verb::Run(args) => run::run(&args),
         Verb::Fk(args) => kinematics::forward(&args),
         Verb::Ik(args) => kinematics::inverse(&args),
+        Verb::Can(CanVerb::Plan(args)) => can::plan(&args),
         Verb::Can(CanVerb::Eds(args)) => can::eds(&args),
         Verb::Can(CanVerb::Dbc { scenario }) => can::dbc(scenario.as_deref()),
         Verb::Can(CanVerb::Serve(args)) => can::serve(&args),

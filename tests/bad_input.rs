@@ -11,7 +11,7 @@ fn scenarios_are_refused_with_place_and_remedy() {
         ("[motion]\nkind = 'chewing'\nvertical = 3.0", "did you mean `vertical_mm`?"),
         ("[motion]\nkind = 'yawning'", "yawning"),
         ("rate_hz = 0", "use 10 to 20000 Hz"),
-        ("[can]\nbuses = [[0, 1, 2, 3, 4, 5]]", "bits"),
+        ("[can]\nbuses = [[0, 1, 2, 3, 4, 5]]", "too late"),
         ("[can]\nbuses = [[0, 1, 2], [3, 4]]", "axis"),
         ("[can]\nnode_ids = [1, 1, 2, 3, 4, 5]", "node"),
         ("[mechanism]\nplatform_sides_m = [0.05, 0.05, 0.2]", "no triangle"),

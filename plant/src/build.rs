@@ -6,6 +6,7 @@ use masseter_shared::can::wire::{INTERFRAME_BITS, frame_bits};
 use masseter_shared::can::{BitrateError, OpenError, VirtualWire, WireConfig};
 use masseter_shared::config::{CanConfig, DriveConfig, DynamicsConfig, Scenario};
 use masseter_shared::geometry::{AXES, AXIS_NAMES, GeometryError, LEGS, Mechanism, Pose};
+use masseter_shared::schedule::MASTER_ID;
 
 use crate::checks::check_quantities;
 use crate::drive::{DriveNode, DriveSettings};
@@ -17,8 +18,6 @@ use crate::master::{Master, MasterSettings, Scale};
 use crate::mechanism::{Dynamics, DynamicsError};
 use crate::socket_link::SocketLink;
 
-/// Node id of the master.
-const MASTER_ID: u8 = 127;
 /// Frames a port may have to send, and to receive between two looks; a millisecond holds 21.
 const TRANSMIT_CAPACITY: usize = 64;
 const RECEIVE_CAPACITY: usize = 256;

@@ -2,7 +2,9 @@
 
 mod client;
 mod describe;
+mod plan;
 mod serve;
 
 pub(crate) use describe::{dbc, eds};
+pub(crate) use plan::{PlanArgs, plan};
 pub(crate) use serve::{ServeArgs, serve};

@@ -3,9 +3,13 @@
 //! SYNC and process data go first, at offset 0; then the controller computes; then its targets go out,
 //! to be on the wire before the next SYNC. Heartbeats and emergencies use what is left.
 
-use crate::can::wire::worst_case_bits;
-use crate::can::{Bitrate, BitrateError, CycleLoad, FrameGroup, Overload, Rpdo1, Tpdo1};
+use crate::can::canopen::{Cob, NodeId, NodeIdError};
+use crate::can::wire::longest_bits;
+use crate::can::{BitrateError, BusPlan, Message, Overload, Rpdo1, Tpdo1};
 use crate::config::CanConfig;
+
+/// Node id of the master.
+pub const MASTER_ID: u8 = 127;
 
 /// From the reading's worst case to the controller's deadline: publishing takes some microseconds, ns.
 const PUBLISH_NS: u64 = 15_000;
@@ -29,8 +33,11 @@ pub enum ScheduleError {
     /// No such bit rate.
     #[error("can.bitrate_bps: {0}")]
     Bitrate(#[from] BitrateError),
-    /// More bits than a cycle has.
-    #[error("can.buses: {0}")]
+    /// No such node id.
+    #[error("can.node_ids: {0}")]
+    NodeId(#[from] NodeIdError),
+    /// Messages that do not arrive in time.
+    #[error("can.buses: the messages of a bus do not fit\n{0}")]
     Overload(#[from] Overload),
     /// The bits fit, but leave the controller no time between reading and command.
     #[error(
@@ -51,18 +58,18 @@ pub enum ScheduleError {
 impl CycleSchedule {
     /// The time table for cycles of `period_ns`, by the busiest bus.
     pub fn new(can: &CanConfig, period_ns: u64) -> Result<Self, ScheduleError> {
-        let bitrate = Bitrate::new(can.bitrate_bps)?;
-        for (bus, axes) in can.buses.iter().enumerate() {
-            load(bus, bitrate, period_ns, axes.len() as u32).check()?;
+        for plan in plans(can, period_ns)? {
+            plan.check()?;
         }
-        let axes = can.buses.iter().map(Vec::len).max().unwrap_or(0) as u32;
-        let time = |bits| bitrate.bits_to_ns(bits);
+        let rates = can.rates()?;
+        let time = |length| rates.duration_ns(longest_bits(length, false, can.format()));
+        let axes = can.buses.iter().map(Vec::len).max().unwrap_or(0) as u64;
         // A heartbeat may just have begun when the bus is wanted.
-        let blocking = worst_case_bits(1, false);
-        let up = worst_case_bits(0, false) + axes * worst_case_bits(Tpdo1::LENGTH as u32, false);
-        let down = axes * worst_case_bits(Rpdo1::LENGTH as u32, false);
-        let reading_by_ns = time(blocking + up) + u64::from(can.answer_us) * 1000;
-        let command_by_ns = period_ns.saturating_sub(time(blocking + down));
+        let blocking_ns = time(HEARTBEAT_LENGTH);
+        let up_ns = time(0) + axes * time(Tpdo1::LENGTH as u32);
+        let down_ns = axes * time(Rpdo1::LENGTH as u32);
+        let reading_by_ns = blocking_ns + up_ns + u64::from(can.answer_us) * 1000;
+        let command_by_ns = period_ns.saturating_sub(blocking_ns + down_ns);
         let controller_at_ns = reading_by_ns + PUBLISH_NS;
         if controller_at_ns + COMPUTE_NS > command_by_ns {
             return Err(ScheduleError::NoTime { reading_by_ns, command_by_ns, period_ns });
@@ -71,13 +78,47 @@ impl CycleSchedule {
     }
 }
 
-fn load(bus: usize, bitrate: Bitrate, period_ns: u64, axes: u32) -> CycleLoad {
-    let groups = vec![
-        FrameGroup { name: "SYNC", count: 1, data_length: 0 },
-        FrameGroup { name: "RPDO", count: axes, data_length: Rpdo1::LENGTH as u32 },
-        FrameGroup { name: "TPDO", count: axes, data_length: Tpdo1::LENGTH as u32 },
-    ];
-    CycleLoad::new(bus, bitrate, period_ns, groups)
+/// Data bytes of a heartbeat.
+const HEARTBEAT_LENGTH: u32 = 1;
+
+/// The plan of every bus: SYNC, process data and heartbeats. The drives' process data are released by SYNC;
+/// SYNC and the commands' process data once a cycle, as if without jitter of the master's own.
+///
+/// # Errors
+/// [`ScheduleError`] for bit rates and node ids that there are not; whether the messages fit, the plans say.
+pub fn plans(can: &CanConfig, period_ns: u64) -> Result<Vec<BusPlan>, ScheduleError> {
+    let plan = |(bus, axes): (usize, &Vec<usize>)| {
+        let ids = axes.iter().filter_map(|&axis| can.node_ids.get(axis)).map(|&id| NodeId::new(id));
+        let messages = messages(&ids.collect::<Result<Vec<_>, _>>()?, can, period_ns)?;
+        Ok(BusPlan::new(bus, can.rates()?, can.format(), period_ns, messages))
+    };
+    can.buses.iter().enumerate().map(plan).collect()
+}
+
+fn messages(drives: &[NodeId], can: &CanConfig, period_ns: u64) -> Result<Vec<Message>, ScheduleError> {
+    let heartbeat_ns = u64::from(can.heartbeat_producer_ms) * 1_000_000;
+    let message = |name: String, cob: Cob, data_length: u32, period_ns: u64| Message {
+        name,
+        id: cob.into(),
+        data_length,
+        period_ns,
+        deadline_ns: period_ns,
+        released_by: None,
+    };
+    let mut messages = vec![message("SYNC".to_owned(), Cob::Sync, 0, period_ns)];
+    for &node in drives {
+        let (tpdo, rpdo) = (Tpdo1::LENGTH as u32, Rpdo1::LENGTH as u32);
+        messages.push(Message {
+            released_by: Some(Cob::Sync.into()),
+            ..message(format!("TPDO1 {}", node.get()), Cob::Tpdo1(node), tpdo, period_ns)
+        });
+        messages.push(message(format!("RPDO1 {}", node.get()), Cob::Rpdo1(node), rpdo, period_ns));
+    }
+    for &node in drives.iter().chain([&NodeId::new(MASTER_ID)?]) {
+        let name = format!("heartbeat {}", node.get());
+        messages.push(message(name, Cob::Heartbeat(node), HEARTBEAT_LENGTH, heartbeat_ns));
+    }
+    Ok(messages)
 }
 
 #[cfg(test)]
@@ -104,8 +145,24 @@ mod tests {
     fn one_bus_at_a_kilohertz_is_refused_with_the_arithmetic() {
         let one = CanConfig { buses: vec![vec![0, 1, 2, 3, 4, 5]], ..Default::default() };
         let error = CycleSchedule::new(&one, 1_000_000).unwrap_err().to_string();
-        assert!(error.contains("= 1555 bits of 1000 bits a cycle") && error.contains("643 Hz"), "{error}");
+        assert!(
+            error.contains("takes 1555.0 µs at worst, at most 643 Hz") && error.contains("too late"),
+            "{error}"
+        );
         assert!(CycleSchedule::new(&one, 4_000_000).is_ok());
+    }
+
+    #[test]
+    fn with_fd_one_bus_holds_a_kilohertz() {
+        let one = CanConfig { buses: vec![vec![0, 1, 2, 3, 4, 5]], fd: true, ..Default::default() };
+        assert!(CycleSchedule::new(&one, 1_000_000).is_ok());
+    }
+
+    #[test]
+    fn the_last_process_data_of_a_cycle_wait_for_all_others_and_a_heartbeat() {
+        let plans = plans(&CanConfig::default(), 1_000_000).unwrap();
+        let last = Cob::Rpdo1(NodeId::new(3).unwrap()).into();
+        assert_eq!(plans[0].response_ns(last), Some((65 + 55 + 3 * 135 + 3 * 115) * 1000));
     }
 
     #[test]

@@ -25,7 +25,7 @@ pub use bus::{Bus, BusStatus, ErrorState, ReceiveError, Received, SendError};
 pub use error_frame::{ErrorKind, ErrorReport, ErrorReportError};
 pub use fd_frame::{FdFormat, FdFrame, FdLengthError};
 pub use frame::{CanId, Frame, FrameError, FrameFormat};
-pub use load::{CycleLoad, FrameGroup, Overload};
+pub use load::{BusPlan, Message, Overload, PlannedMessage};
 pub use pdo::{Rpdo1, Tpdo1};
 pub use socket_can::{OpenError, SocketCan};
 pub use tap::{TapError, Tapped};
