@@ -167,7 +167,7 @@ mod tests {
 
     #[test]
     fn a_cycle_without_time_for_the_controller_is_refused() {
-        let error = CycleSchedule::new(&CanConfig::default(), 900_000).unwrap_err();
+        let error = CycleSchedule::new(&CanConfig::default(), 960_000).unwrap_err();
         assert!(matches!(error, ScheduleError::NoTime { .. }), "{error}");
     }
 }
