@@ -12,9 +12,10 @@ use crate::checks::check_quantities;
 use crate::drive::{DriveNode, DriveSettings};
 use crate::emulation::Emulation;
 use crate::encoder::Encoder;
+use crate::expectation::setup;
 use crate::faults;
 use crate::link::{Place, VirtualLink};
-use crate::master::{Master, MasterSettings, Scale};
+use crate::master::{DriveSettings as ExpectedDrive, Master, MasterSettings, Scale};
 use crate::mechanism::{Dynamics, DynamicsError};
 use crate::socket_link::SocketLink;
 
@@ -86,7 +87,12 @@ pub(crate) fn build_master(scenario: &Scenario, now_ns: u64) -> Result<Master, P
     let drives = std::array::from_fn(|axis| {
         let drive = drive_of(scenario, axis);
         let scale = Scale { increment_m: drive.encoder_resolution_m, rated_force_n: drive.rated_force_n };
-        (ids[axis], places[axis].bus, scale)
+        ExpectedDrive {
+            id: ids[axis],
+            bus: places[axis].bus,
+            scale,
+            setup: setup(scenario, master_id(), axis),
+        }
     });
     Ok(Master::new(master_settings(&scenario.can, drives)?, now_ns))
 }
@@ -130,10 +136,7 @@ pub(crate) fn build_emulation(scenario: &Scenario, now_ns: u64) -> Result<Emulat
     Ok(Emulation::new(drives, dynamics, scenario.dynamics.step_ns, now_ns))
 }
 
-fn master_settings(
-    can: &CanConfig,
-    drives: [(NodeId, usize, Scale); AXES],
-) -> Result<MasterSettings, PlantError> {
+fn master_settings(can: &CanConfig, drives: [ExpectedDrive; AXES]) -> Result<MasterSettings, PlantError> {
     let rates = can.rates()?;
     let sync_bits = frame_bits(&sync::frame().in_format(can.format()));
     Ok(MasterSettings {
@@ -148,7 +151,7 @@ fn master_settings(
     })
 }
 
-fn drive_of(scenario: &Scenario, axis: usize) -> DriveConfig {
+pub(crate) fn drive_of(scenario: &Scenario, axis: usize) -> DriveConfig {
     if axis < LEGS { scenario.drives.slide } else { scenario.drives.leg }
 }
 

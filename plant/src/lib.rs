@@ -12,6 +12,7 @@ mod drive;
 mod emulation;
 pub mod emulator;
 mod encoder;
+mod expectation;
 mod faults;
 mod link;
 mod master;

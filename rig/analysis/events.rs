@@ -5,8 +5,10 @@ use std::io::{BufWriter, Write};
 use std::path::PathBuf;
 
 use masseter_shared::geometry::AXIS_NAMES;
-use masseter_shared::messages::Event;
-use masseter_shared::messages::codes::{Cause, ControllerState, DriveCondition, EventKind, Source};
+use masseter_shared::messages::codes::{
+    BootPhase, Cause, ControllerState, DriveCondition, EventKind, Source,
+};
+use masseter_shared::messages::{Event, explain};
 use serde::Serialize;
 
 use super::AnalysisError;
@@ -30,6 +32,9 @@ pub struct EventRecord {
     /// State before and after.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub transition: Option<[String; 2]>,
+    /// What is wrong, where, and what to do, where figures alone do not say it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub text: Option<String>,
     /// The value that explains it; none where it is no number.
     pub value: f64,
     /// The limit it is held against.
@@ -41,6 +46,8 @@ impl From<&Event> for EventRecord {
         let state = |code: u32| {
             if event.source == Source::Controller.code() {
                 word(ControllerState::try_from(code).map(ControllerState::name), code)
+            } else if event.source == Source::Master.code() {
+                word(BootPhase::try_from(code).map(BootPhase::name), code)
             } else {
                 word(DriveCondition::try_from(code).map(DriveCondition::name), code)
             }
@@ -54,6 +61,7 @@ impl From<&Event> for EventRecord {
             cause: word(Cause::try_from(event.cause).map(Cause::name), event.cause),
             axis: AXIS_NAMES.get(event.axis as usize).copied(),
             transition: moved.then(|| [state(event.from), state(event.to)]),
+            text: explain(event),
             value: event.value,
             limit: event.limit,
         }

@@ -117,12 +117,14 @@ pub(super) fn in_words(event: &EventRecord) -> String {
     let axis = event.axis.map_or_else(String::new, |axis| format!(" {axis}"));
     let moved = event.transition.as_ref().map(|[from, to]| format!("{from} → {to}"));
     let values = match event.cause.as_str() {
-        "emergency" => format!(" (EMCY {:04X}h)", event.value as u16),
         "stop_requested" => String::new(),
         _ => format!(" (value {}, limit {})", event.value, event.limit),
     };
     let moved = moved.unwrap_or_default();
     let (cycle, source) = (event.cycle, &event.source);
+    if let Some(text) = &event.text {
+        return format!("cycle {cycle:>6} {source}: {} ({text})", event.cause);
+    }
     match event.cause.as_str() {
         "sequence" => format!("cycle {cycle:>6} {source}{axis}: {moved}"),
         cause => format!("cycle {cycle:>6} {source}{axis}: {cause}{values} {moved}").trim_end().to_owned(),

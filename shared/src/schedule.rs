@@ -1,7 +1,8 @@
 //! The time table of a cycle, from the worst-case frame lengths on the bus.
 //!
 //! SYNC and process data go first, at offset 0; then the controller computes; then its targets go out,
-//! to be on the wire before the next SYNC. Heartbeats and emergencies use what is left.
+//! to be on the wire before the next SYNC. Heartbeats and emergencies use what is left; SDO takes the place
+//! of the process data of the drive it goes to.
 
 use crate::can::canopen::{Cob, NodeId, NodeIdError};
 use crate::can::wire::longest_bits;
@@ -13,6 +14,8 @@ pub const MASTER_ID: u8 = 127;
 
 /// From the reading's worst case to the controller's deadline: publishing takes some microseconds, ns.
 const PUBLISH_NS: u64 = 15_000;
+/// Data bytes of every SDO message.
+const SDO_LENGTH: u32 = 8;
 /// The least time between the controller's deadline and the latest command, ns.
 const COMPUTE_NS: u64 = 20_000;
 
@@ -58,7 +61,7 @@ pub enum ScheduleError {
 impl CycleSchedule {
     /// The time table for cycles of `period_ns`, by the busiest bus.
     pub fn new(can: &CanConfig, period_ns: u64) -> Result<Self, ScheduleError> {
-        for plan in plans(can, period_ns)? {
+        for plan in plans(can, period_ns)?.into_iter().chain(plans_while_booting(can, period_ns)?) {
             plan.check()?;
         }
         let rates = can.rates()?;
@@ -87,15 +90,41 @@ const HEARTBEAT_LENGTH: u32 = 1;
 /// # Errors
 /// [`ScheduleError`] for bit rates and node ids that there are not; whether the messages fit, the plans say.
 pub fn plans(can: &CanConfig, period_ns: u64) -> Result<Vec<BusPlan>, ScheduleError> {
+    plans_of(can, period_ns, Exchange::ProcessData)
+}
+
+/// The plans while the first drive of every bus is booted beside others that run: request and answer of one SDO
+/// exchange take the place of its process data. With more drives in the same state there is still one
+/// request a cycle, and each answer is no longer than the process data that the drive does not send.
+///
+/// The offsets hold as well: an SDO frame blocks the bus for longer than a heartbeat, but for no longer
+/// than a heartbeat and the process data that are missing.
+fn plans_while_booting(can: &CanConfig, period_ns: u64) -> Result<Vec<BusPlan>, ScheduleError> {
+    plans_of(can, period_ns, Exchange::Sdo)
+}
+
+/// What the first drive of a bus exchanges with the master in a cycle.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Exchange {
+    ProcessData,
+    Sdo,
+}
+
+fn plans_of(can: &CanConfig, period_ns: u64, first: Exchange) -> Result<Vec<BusPlan>, ScheduleError> {
     let plan = |(bus, axes): (usize, &Vec<usize>)| {
         let ids = axes.iter().filter_map(|&axis| can.node_ids.get(axis)).map(|&id| NodeId::new(id));
-        let messages = messages(&ids.collect::<Result<Vec<_>, _>>()?, can, period_ns)?;
+        let messages = messages(&ids.collect::<Result<Vec<_>, _>>()?, can, period_ns, first)?;
         Ok(BusPlan::new(bus, can.rates()?, can.format(), period_ns, messages))
     };
     can.buses.iter().enumerate().map(plan).collect()
 }
 
-fn messages(drives: &[NodeId], can: &CanConfig, period_ns: u64) -> Result<Vec<Message>, ScheduleError> {
+fn messages(
+    drives: &[NodeId],
+    can: &CanConfig,
+    period_ns: u64,
+    first: Exchange,
+) -> Result<Vec<Message>, ScheduleError> {
     let heartbeat_ns = u64::from(can.heartbeat_producer_ms) * 1_000_000;
     let message = |name: String, cob: Cob, data_length: u32, period_ns: u64| Message {
         name,
@@ -106,7 +135,17 @@ fn messages(drives: &[NodeId], can: &CanConfig, period_ns: u64) -> Result<Vec<Me
         released_by: None,
     };
     let mut messages = vec![message("SYNC".to_owned(), Cob::Sync, 0, period_ns)];
-    for &node in drives {
+    for (index, &node) in drives.iter().enumerate() {
+        if index == 0 && first == Exchange::Sdo {
+            // The answer may take until the end of the next cycle.
+            let sdo = |name: &str, cob| Message {
+                deadline_ns: 2 * period_ns,
+                ..message(format!("{name} {}", node.get()), cob, SDO_LENGTH, period_ns)
+            };
+            messages.push(sdo("SDO request", Cob::SdoRequest(node)));
+            messages.push(sdo("SDO response", Cob::SdoResponse(node)));
+            continue;
+        }
         let (tpdo, rpdo) = (Tpdo1::LENGTH as u32, Rpdo1::LENGTH as u32);
         messages.push(Message {
             released_by: Some(Cob::Sync.into()),
@@ -124,6 +163,7 @@ fn messages(drives: &[NodeId], can: &CanConfig, period_ns: u64) -> Result<Vec<Me
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::can::wire::worst_case_bits;
 
     #[test]
     fn two_buses_hold_a_kilohertz_and_the_offsets_follow_the_frames() {
@@ -139,6 +179,20 @@ mod tests {
         let [at_once, late] = [CanConfig::default(), slow]
             .map(|can| CycleSchedule::new(&can, 2_000_000).unwrap().reading_by_ns);
         assert_eq!(late, at_once + 300_000);
+    }
+
+    #[test]
+    fn a_drive_booted_beside_running_ones_keeps_to_the_offsets() {
+        let bits = |length| worst_case_bits(length, false);
+        for axes in 1..=6 {
+            let [sdo, heartbeat] = [SDO_LENGTH, HEARTBEAT_LENGTH].map(bits);
+            let [tpdo, rpdo] = [Tpdo1::LENGTH, Rpdo1::LENGTH].map(|length| bits(length as u32));
+            assert!(sdo + (axes - 1) * tpdo <= heartbeat + axes * tpdo);
+            assert!(sdo + (axes - 1) * rpdo <= heartbeat + axes * rpdo);
+        }
+        for plan in plans_while_booting(&CanConfig::default(), 1_000_000).unwrap() {
+            assert_eq!(plan.check(), Ok(()));
+        }
     }
 
     #[test]

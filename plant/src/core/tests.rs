@@ -259,7 +259,7 @@ fn the_same_seed_gives_the_same_bytes_and_another_seed_other_noise() {
 }
 
 #[test]
-fn a_drive_that_never_boots_is_named() {
+fn drives_that_never_boot_are_named_each() {
     let mut bench = Bench::new(&Scenario {
         can: masseter_shared::config::CanConfig { boot_timeout_ms: 10, ..Default::default() },
         ..Scenario::default()
@@ -267,8 +267,9 @@ fn a_drive_that_never_boots_is_named() {
     for _ in 0..30 {
         bench.cycle(Some(&|reading| (reading.position_m, DriveRequest::Enable)));
     }
-    assert_eq!(bench.causes(EventKind::Fault), [Cause::BootTimeout]);
-    assert_eq!(bench.events[0].axis, 0);
+    assert_eq!(bench.causes(EventKind::Fault), [Cause::BootTimeout; AXES]);
+    let named: Vec<_> = bench.events.iter().map(|event| event.axis).collect();
+    assert_eq!(named[..AXES], [0, 1, 2, 3, 4, 5]);
 }
 
 mod stops;

@@ -1,29 +1,42 @@
 //! The master's cycle: SYNC and heartbeat, process data in, process data out.
 
-use masseter_shared::can::canopen::{
-    Cob, Emergency, Heartbeat, Nmt, NmtCommand, NmtState, NmtTarget, NodeId, sync,
-};
-use masseter_shared::can::{Bus, Frame, Received, Tpdo1};
+use masseter_shared::can::Bus;
+use masseter_shared::can::canopen::{Heartbeat, NmtState, NodeId, sync};
 use masseter_shared::geometry::AXES;
-use masseter_shared::messages::codes::{Cause, DriveCondition, DriveRequest, EventKind, Source};
+use masseter_shared::messages::codes::{Cause, DriveCondition, DriveRequest};
 use masseter_shared::messages::{Command, Event, Reading};
 use masseter_shared::realtime::Wake;
 
 use super::journal::{Journal, overflow};
 use super::node::Node;
 pub(crate) use super::node::Scale;
+use super::plan::Setup;
+use super::supervision::Place;
 use crate::link::Buses;
 
 /// Frames taken from a bus in one go, so that a babbling node cannot hold the cycle up.
 const FRAMES_AT_ONCE: usize = 512;
+
+/// One drive, as the master expects it.
+#[derive(Debug, Clone)]
+pub(crate) struct DriveSettings {
+    /// Its node id.
+    pub(crate) id: NodeId,
+    /// The bus it hangs on.
+    pub(crate) bus: usize,
+    /// What its process data count.
+    pub(crate) scale: Scale,
+    /// What it must be, and is configured with.
+    pub(crate) setup: Setup,
+}
 
 /// What the master is configured with.
 #[derive(Debug, Clone)]
 pub(crate) struct MasterSettings {
     /// Its own node id, for its heartbeat.
     pub(crate) id: NodeId,
-    /// The drives in the order of the axes: node id, bus, scale.
-    pub(crate) drives: [(NodeId, usize, Scale); AXES],
+    /// The drives in the order of the axes.
+    pub(crate) drives: [DriveSettings; AXES],
     /// Buses.
     pub(crate) buses: usize,
     /// From the first to the last bit of SYNC, which makes the drives sample, ns.
@@ -38,21 +51,40 @@ pub(crate) struct MasterSettings {
     pub(crate) command_timeout_cycles: u32,
 }
 
+/// How long the master refuses to move anything.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Stop {
+    /// Until every drive is verified again and the controller has switched them off.
+    UntilRestored,
+    /// For good.
+    ForGood,
+}
+
+/// What the master remembers of a bus.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct BusWatch {
+    pub(super) is_off: bool,
+    /// Nodes reported as unknown, bit i for node i.
+    pub(super) unknown_nodes: u128,
+    /// The axis whose SDO request went out last.
+    pub(super) last_served: usize,
+}
+
 /// The master.
 #[derive(Debug)]
 pub(crate) struct Master {
     pub(super) settings: MasterSettings,
     pub(super) nodes: [Node; AXES],
-    pub(super) began_ns: u64,
+    pub(super) buses: Vec<BusWatch>,
     pub(super) wake: Wake,
-    sync_ns: u64,
-    complete_ns: u64,
+    pub(super) sync_ns: u64,
+    pub(super) complete_ns: u64,
     next_heartbeat_ns: u64,
-    command: Option<Command>,
+    pub(super) command: Option<Command>,
     command_received_ns: u64,
-    silent_cycles: u32,
+    pub(super) silent_cycles: u32,
     pub(super) were_enabled: bool,
-    pub(super) has_fault: bool,
+    pub(super) fault: Option<Stop>,
     pub(super) journal: Journal,
 }
 
@@ -60,9 +92,12 @@ impl Master {
     /// A master that begins at `now_ns` and knows nothing of its drives yet.
     pub(crate) fn new(settings: MasterSettings, now_ns: u64) -> Self {
         Self {
-            nodes: settings.drives.map(|(id, bus, scale)| Node::new(id, bus, scale)),
+            nodes: std::array::from_fn(|axis| {
+                let DriveSettings { id, bus, scale, setup } = &settings.drives[axis];
+                Node::new(*id, *bus, *scale, setup, now_ns)
+            }),
+            buses: vec![BusWatch::default(); settings.buses],
             settings,
-            began_ns: now_ns,
             wake: Wake { cycle: 0, due_ns: 0, woke_ns: 0, skipped: 0, stalled_ns: 0 },
             sync_ns: 0,
             complete_ns: 0,
@@ -71,7 +106,7 @@ impl Master {
             command_received_ns: 0,
             silent_cycles: 0,
             were_enabled: false,
-            has_fault: false,
+            fault: None,
             journal: Journal::new(),
         }
     }
@@ -86,13 +121,14 @@ impl Master {
         for node in &mut self.nodes {
             node.is_fresh = false;
         }
+        self.watch_buses(wake.woke_ns, buses);
         for bus in 0..self.settings.buses {
             let result = buses.port(bus).send(wake.woke_ns, sync::frame());
-            self.check_sent(result);
+            self.check_sent(bus, result);
             if beats {
                 let heartbeat = Heartbeat { state: NmtState::Operational }.frame(self.settings.id);
                 let result = buses.port(bus).send(wake.woke_ns, heartbeat);
-                self.check_sent(result);
+                self.check_sent(bus, result);
             }
         }
     }
@@ -103,72 +139,10 @@ impl Master {
             for _ in 0..FRAMES_AT_ONCE {
                 // What an overrun or a dead interface withholds is missed as process data below.
                 let Ok(Some(received)) = buses.port(bus).receive(now_ns) else { break };
-                if let Some(answer) = self.take(bus, &received) {
-                    let result = buses.port(bus).send(now_ns, answer);
-                    self.check_sent(result);
-                }
+                self.take(bus, &received);
             }
         }
         self.nodes.iter().all(|node| node.is_fresh)
-    }
-
-    /// Takes a frame; returns what it is to be answered with. Malformed frames have no effect.
-    fn take(&mut self, bus: usize, received: &Received) -> Option<Frame> {
-        let data = received.frame.data();
-        match Cob::try_from(received.frame.id()).ok()? {
-            Cob::Heartbeat(id) => {
-                let axis = self.axis_of(id, bus)?;
-                let state = Heartbeat::decode(data).ok()?.state;
-                let node = &mut self.nodes[axis];
-                (node.nmt, node.heard_ns) = (Some(state), received.time_ns);
-                let waits = matches!(state, NmtState::BootUp | NmtState::PreOperational);
-                (waits && !self.has_fault)
-                    .then(|| Nmt { command: NmtCommand::Start, target: NmtTarget::Node(id) }.frame())
-            }
-            Cob::Tpdo1(id) => {
-                let axis = self.axis_of(id, bus)?;
-                let tpdo = Tpdo1::decode(data).ok()?;
-                self.take_process_data(axis, tpdo, received.time_ns);
-                None
-            }
-            Cob::Emergency(id) => {
-                let axis = self.axis_of(id, bus)?;
-                let emergency = Emergency::decode(data).ok()?;
-                let kind = if emergency.is_reset() { EventKind::Notice } else { EventKind::Fault };
-                let code = f64::from(emergency.code.0);
-                self.report(received.time_ns, Source::Drive, kind, Cause::Emergency, Some(axis), [code, 0.0]);
-                None
-            }
-            _ => None,
-        }
-    }
-
-    fn axis_of(&self, id: NodeId, bus: usize) -> Option<usize> {
-        self.nodes.iter().position(|node| node.id == id && node.bus == bus)
-    }
-
-    fn take_process_data(&mut self, axis: usize, tpdo: Tpdo1, time_ns: u64) {
-        let node = &mut self.nodes[axis];
-        // Only an operational node sends process data.
-        (node.nmt, node.heard_ns, node.missing_cycles) = (Some(NmtState::Operational), time_ns, 0);
-        let before = node.condition();
-        // Process data of an earlier SYNC may come late; they are no answer to this one.
-        node.take(tpdo, time_ns > self.sync_ns);
-        let after = node.condition();
-        self.complete_ns = self.complete_ns.max(time_ns);
-        if before != after {
-            self.journal.add(Event {
-                time_ns,
-                cycle: self.wake.cycle,
-                source: Source::Drive.code(),
-                kind: EventKind::Transition.code(),
-                cause: Cause::Sequence.code(),
-                axis: axis as u32,
-                from: before.code(),
-                to: after.code(),
-                ..Event::default()
-            });
-        }
     }
 
     /// This cycle's reading, without the times that the link alone knows.
@@ -183,7 +157,7 @@ impl Master {
             woke_ns: self.wake.woke_ns,
             skipped_cycles: self.wake.skipped,
             stalled_ns: self.wake.stalled_ns,
-            master_fault: u32::from(self.has_fault),
+            master_fault: u32::from(self.fault.is_some()),
             ..Reading::default()
         };
         for (axis, node) in self.nodes.iter().enumerate() {
@@ -194,26 +168,33 @@ impl Master {
         }
     }
 
-    /// Judges the cycle, takes the newest command, and sends every drive its process data.
+    /// Judges the cycle, takes the newest command, sends every drive its process data, and after them
+    /// what drives that have none need to boot.
     pub(crate) fn apply(&mut self, now_ns: u64, command: Option<&Command>, buses: &mut impl Buses) {
         self.supervise(now_ns);
         self.take_command(now_ns, command);
+        self.restore(now_ns);
         let request = self.request();
         let targets_m = self.command.map_or([0.0; AXES], |command| command.target_m);
         for (axis, target_m) in targets_m.into_iter().enumerate() {
             let node = &mut self.nodes[axis];
             if node.is_operational() {
-                let frame = node.process_data(request, target_m).frame(node.id);
-                let result = buses.port(node.bus).send(now_ns, frame);
-                self.check_sent(result);
+                let (bus, frame) = (node.bus, node.process_data(request, target_m).frame(node.id));
+                let result = buses.port(bus).send(now_ns, frame);
+                self.check_sent(bus, result);
             }
         }
+        self.boot(now_ns, buses);
     }
 
-    /// What is asked of the drives: what the last good command asks, unless something is wrong.
+    /// What is asked of the drives: what the last good command asks, unless something is wrong, and nothing
+    /// that moves before every drive is verified.
     pub(super) fn request(&self) -> DriveRequest {
-        if self.has_fault {
+        if self.fault.is_some() {
             return DriveRequest::QuickStop;
+        }
+        if !self.nodes.iter().all(Node::is_ready) {
+            return DriveRequest::Off;
         }
         let request = self.command.map(|command| DriveRequest::try_from(command.request));
         request.and_then(Result::ok).unwrap_or(DriveRequest::Off)
@@ -228,7 +209,7 @@ impl Master {
                 self.fail(
                     now_ns,
                     Cause::CommandLost,
-                    None,
+                    Place::Nowhere,
                     [f64::from(self.silent_cycles), f64::from(limit)],
                 );
             }
@@ -238,7 +219,8 @@ impl Master {
         let bad_target = (0..AXES).find(|&axis| !self.nodes[axis].can_go_to(command.target_m[axis]));
         if bad_target.is_some() || DriveRequest::try_from(command.request).is_err() {
             let code = f64::from(command.request);
-            self.fail(now_ns, Cause::BadMessage, bad_target, [code, 0.0]);
+            let place = bad_target.map_or(Place::Nowhere, Place::Axis);
+            self.fail(now_ns, Cause::BadMessage, place, [code, 0.0]);
             return;
         }
         (self.command, self.command_received_ns) = (Some(*command), now_ns);

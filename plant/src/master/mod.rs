@@ -1,12 +1,21 @@
-//! The CAN master: boots the drives, exchanges process data with them every cycle, watches them, and
-//! stops them when commands stop.
+//! The CAN master: boots the drives and verifies them, exchanges process data with them every cycle,
+//! watches them, and stops them when commands stop.
 //!
 //! Written against the bus trait alone ([`Buses`](crate::link::Buses)), so that simulated and real wires are the
-//! same to it. There is no SDO yet: the drives' configuration is taken as given.
+//! same to it. A drive is configured by SDO before it exchanges process data, never while it does.
 
+mod boot;
+mod booting;
 mod cycle;
 mod journal;
 mod node;
+mod plan;
+mod receive;
+mod sdo;
 mod supervision;
 
-pub(crate) use cycle::{Master, MasterSettings, Scale};
+#[cfg(test)]
+mod tests;
+
+pub(crate) use cycle::{DriveSettings, Master, MasterSettings, Scale};
+pub(crate) use plan::{Setup, interpolation_period};

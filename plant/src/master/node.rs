@@ -1,9 +1,12 @@
 //! What the master knows of one drive.
 
-use masseter_shared::can::canopen::{NmtState, NodeId};
+use masseter_shared::can::canopen::{Cob, NmtState, NodeId};
 use masseter_shared::can::cia402::{Controlword, DriveState, toward};
 use masseter_shared::can::{Rpdo1, Tpdo1};
-use masseter_shared::messages::codes::{DriveCondition, DriveRequest};
+use masseter_shared::messages::codes::{BootPhase, DriveCondition, DriveRequest};
+
+use super::boot::Boot;
+use super::plan::Setup;
 
 /// How a position object counts, and what a force object is a share of.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -14,15 +17,24 @@ pub(crate) struct Scale {
     pub(crate) rated_force_n: f64,
 }
 
+/// Kinds of objects that the master takes from a node.
+const LENGTHS: usize = 4;
+
 /// One drive, as the master sees it.
 #[derive(Debug, Clone)]
 pub(super) struct Node {
     pub(super) id: NodeId,
     pub(super) bus: usize,
+    pub(super) boot: Boot,
     pub(super) nmt: Option<NmtState>,
+    /// Whether it was verified before it was started: only then its process data mean anything.
+    pub(super) is_started: bool,
     pub(super) heard_ns: u64,
     pub(super) is_fresh: bool,
     pub(super) missing_cycles: u32,
+    /// Whether it was told that the node does not come.
+    pub(super) is_missed: bool,
+    has_wrong_length: [bool; LENGTHS],
     scale: Scale,
     power: Option<DriveState>,
     actual_increments: i32,
@@ -31,14 +43,18 @@ pub(super) struct Node {
 }
 
 impl Node {
-    pub(super) fn new(id: NodeId, bus: usize, scale: Scale) -> Self {
+    pub(super) fn new(id: NodeId, bus: usize, scale: Scale, setup: &Setup, now_ns: u64) -> Self {
         Self {
             id,
             bus,
+            boot: Boot::new(id, setup, now_ns),
             nmt: None,
-            heard_ns: 0,
+            is_started: false,
+            heard_ns: now_ns,
             is_fresh: false,
             missing_cycles: 0,
+            is_missed: false,
+            has_wrong_length: [false; LENGTHS],
             scale,
             power: None,
             actual_increments: 0,
@@ -47,8 +63,37 @@ impl Node {
         }
     }
 
+    /// Whether it exchanges process data.
     pub(super) fn is_operational(&self) -> bool {
-        self.nmt == Some(NmtState::Operational)
+        self.is_started && self.nmt == Some(NmtState::Operational)
+    }
+
+    /// Whether it is verified and exchanges process data.
+    pub(super) fn is_ready(&self) -> bool {
+        self.is_operational() && self.boot.phase() == BootPhase::Ready
+    }
+
+    /// Nothing that was found out about it counts any more, its state neither; it has to boot again.
+    pub(super) fn forget(&mut self, now_ns: u64) {
+        self.boot.forget(now_ns);
+        (self.missing_cycles, self.is_missed, self.power) = (0, true, None);
+    }
+
+    /// It is told to boot, or did: what it sends until it is started anew means nothing.
+    pub(super) fn stop_exchange(&mut self) {
+        (self.is_started, self.power, self.is_fresh) = (false, None, false);
+        self.controlword = Controlword::DISABLE_VOLTAGE;
+    }
+
+    /// Whether this is its first object of that kind with a wrong length.
+    pub(super) fn is_first_wrong_length(&mut self, cob: Cob) -> bool {
+        let kind = match cob {
+            Cob::Heartbeat(_) => 0,
+            Cob::Tpdo1(_) => 1,
+            Cob::Emergency(_) => 2,
+            _ => 3,
+        };
+        !std::mem::replace(&mut self.has_wrong_length[kind], true)
     }
 
     /// Takes process data; a statusword without a meaning keeps the last state.

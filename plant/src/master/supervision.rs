@@ -1,15 +1,27 @@
-//! What the master watches, and when it stops the drives for good.
+//! What the master watches, and when it stops the drives.
 
-use masseter_shared::can::SendError;
 use masseter_shared::can::canopen::NmtState;
+use masseter_shared::can::{Bus, ErrorState, SendError};
 use masseter_shared::geometry::AXES;
 use masseter_shared::messages::Event;
-use masseter_shared::messages::codes::{Cause, DriveCondition, DriveRequest, EventKind, NO_AXIS, Source};
+use masseter_shared::messages::codes::{
+    BootPhase, Cause, DriveCondition, DriveRequest, EventKind, NO_AXIS, Source,
+};
 
-use super::cycle::Master;
+use super::boot::BootFault;
+use super::cycle::{Master, Stop};
+use crate::link::Buses;
 
 /// Cycles that an operational drive's process data may be missing.
 const MISSING_CYCLES: u32 = 3;
+
+/// What an event is about.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Place {
+    Nowhere,
+    Axis(usize),
+    Bus(usize),
+}
 
 impl Master {
     /// Judges the cycle: silent drives, missing process data, drives that left operation by themselves.
@@ -17,48 +29,105 @@ impl Master {
         let shall_be_enabled = self.request() == DriveRequest::Enable;
         let mut all_enabled = true;
         for axis in 0..AXES {
-            let node = &mut self.nodes[axis];
-            if node.is_operational() && !node.is_fresh {
-                node.missing_cycles += 1;
+            let phase = self.nodes[axis].boot.phase();
+            match phase {
+                BootPhase::Waiting => self.watch_waiting(now_ns, axis),
+                BootPhase::Configured | BootPhase::Ready => self.watch_node(now_ns, axis),
+                _ => {}
             }
-            let (nmt, missing) = (node.nmt, node.missing_cycles);
-            let silent_ns = now_ns.saturating_sub(node.heard_ns);
-            let condition = node.condition();
-            all_enabled &= condition == DriveCondition::OperationEnabled;
-            if nmt.is_some() && silent_ns > self.settings.heartbeat_timeout_ns {
-                let limit_ns = self.settings.heartbeat_timeout_ns;
-                self.fail(now_ns, Cause::HeartbeatLost, Some(axis), [silent_ns, limit_ns].map(in_ms));
-            } else if missing > MISSING_CYCLES {
-                let values = [missing, MISSING_CYCLES].map(f64::from);
-                self.fail(now_ns, Cause::ProcessDataLost, Some(axis), values);
-            } else if shall_be_enabled && self.were_enabled && condition != DriveCondition::OperationEnabled {
-                self.fail(now_ns, Cause::DriveFault, Some(axis), [f64::from(condition.code()), 0.0]);
-            } else if nmt != Some(NmtState::Operational) {
-                self.watch_boot(now_ns, axis);
+            let condition = self.nodes[axis].condition();
+            let is_enabled = condition == DriveCondition::OperationEnabled;
+            all_enabled &= is_enabled;
+            if shall_be_enabled && self.were_enabled && !is_enabled {
+                let values = [f64::from(condition.code()), 0.0];
+                self.fail(now_ns, Cause::DriveFault, Place::Axis(axis), values);
             }
         }
         self.were_enabled = shall_be_enabled && (self.were_enabled || all_enabled);
     }
 
-    fn watch_boot(&mut self, now_ns: u64, axis: usize) {
-        let waited_ns = now_ns.saturating_sub(self.began_ns);
-        if waited_ns > self.settings.boot_timeout_ns {
-            let limit_ns = self.settings.boot_timeout_ns;
-            self.fail(now_ns, Cause::BootTimeout, Some(axis), [waited_ns, limit_ns].map(in_ms));
+    /// A verified node must be heard, and an operational one answer every SYNC.
+    fn watch_node(&mut self, now_ns: u64, axis: usize) {
+        let node = &mut self.nodes[axis];
+        if node.is_operational() && !node.is_fresh {
+            node.missing_cycles += 1;
+        }
+        let is_lost = node.missing_cycles > MISSING_CYCLES
+            || node.is_started && node.nmt != Some(NmtState::Operational);
+        let silent_ns = now_ns.saturating_sub(node.heard_ns);
+        let (cause, values) = if silent_ns > self.settings.heartbeat_timeout_ns {
+            let limit_ns = self.settings.heartbeat_timeout_ns;
+            (Cause::HeartbeatLost, [silent_ns, limit_ns].map(in_ms))
+        } else if is_lost {
+            (Cause::ProcessDataLost, [node.missing_cycles, MISSING_CYCLES].map(f64::from))
+        } else {
+            return;
+        };
+        let before = node.boot.phase();
+        node.forget(now_ns);
+        self.fail(now_ns, cause, Place::Axis(axis), values);
+        self.note_boot(now_ns, axis, before, Ok(()));
+    }
+
+    /// Tells once that a node which was never there does not come. One that was lost is known to be.
+    fn watch_waiting(&mut self, now_ns: u64, axis: usize) {
+        let limit_ns = self.settings.boot_timeout_ns;
+        let node = &mut self.nodes[axis];
+        let waited_ns = node.boot.waited_ns(now_ns);
+        if waited_ns > limit_ns && !node.is_missed {
+            node.is_missed = true;
+            let [value, limit] = [waited_ns, limit_ns].map(in_ms);
+            self.fail_boot(
+                now_ns,
+                axis,
+                &BootFault { cause: Cause::BootTimeout, object: None, value, limit },
+            );
         }
     }
 
-    /// Stops the drives for good. The first cause is reported, its consequences are not.
-    pub(super) fn fail(&mut self, now_ns: u64, cause: Cause, axis: Option<usize>, values: [f64; 2]) {
-        if !self.has_fault {
-            self.has_fault = true;
-            self.report(now_ns, Source::Master, EventKind::Fault, cause, axis, values);
+    /// A bus that went off is reported, and so is its return; its drives have stopped by themselves.
+    pub(super) fn watch_buses(&mut self, now_ns: u64, buses: &mut impl Buses) {
+        for bus in 0..self.settings.buses {
+            let status = buses.port(bus).status();
+            let is_off = status.state == ErrorState::BusOff;
+            if is_off == self.buses[bus].is_off {
+                continue;
+            }
+            self.buses[bus].is_off = is_off;
+            let values = [f64::from(status.tec), 0.0];
+            if is_off {
+                self.fail(now_ns, Cause::BusOff, Place::Bus(bus), values);
+            } else {
+                self.report(
+                    now_ns,
+                    Source::Master,
+                    EventKind::Notice,
+                    Cause::Recovered,
+                    Place::Bus(bus),
+                    values,
+                );
+            }
         }
     }
 
-    pub(super) fn check_sent(&mut self, result: Result<(), SendError>) {
-        if result.is_err() {
-            self.fail(self.wake.woke_ns, Cause::BusRefused, None, [0.0; 2]);
+    /// Stops the drives. The first cause is reported, its consequences are not.
+    pub(super) fn fail(&mut self, now_ns: u64, cause: Cause, place: Place, values: [f64; 2]) {
+        let stop = match cause {
+            Cause::CommandLost | Cause::BadMessage | Cause::DriveFault => Stop::ForGood,
+            _ => Stop::UntilRestored,
+        };
+        if self.fault.is_none() {
+            self.fault = Some(stop);
+            self.report(now_ns, Source::Master, EventKind::Fault, cause, place, values);
+        }
+    }
+
+    pub(super) fn check_sent(&mut self, bus: usize, result: Result<(), SendError>) {
+        // A bus that is off is reported as such.
+        if let Err(error) = result
+            && !matches!(error, SendError::BusOff { .. })
+        {
+            self.fail(self.wake.woke_ns, Cause::BusRefused, Place::Bus(bus), [0.0; 2]);
         }
     }
 
@@ -69,19 +138,38 @@ impl Master {
         source: Source,
         kind: EventKind,
         cause: Cause,
-        axis: Option<usize>,
+        place: Place,
         [value, limit]: [f64; 2],
     ) {
+        self.add(time_ns, (source, kind, cause), place, Event { value, limit, ..Event::default() });
+    }
+
+    /// Writes an event down whose particulars are in `event`.
+    pub(super) fn add(
+        &mut self,
+        time_ns: u64,
+        (source, kind, cause): (Source, EventKind, Cause),
+        place: Place,
+        event: Event,
+    ) {
+        let (axis, node, bus) = match place {
+            Place::Nowhere => (NO_AXIS, 0, 0),
+            Place::Bus(bus) => (NO_AXIS, event.node, bus),
+            Place::Axis(axis) => {
+                let node = &self.nodes[axis];
+                (axis as u32, u16::from(node.id.get()), node.bus)
+            }
+        };
         self.journal.add(Event {
             time_ns,
             cycle: self.wake.cycle,
             source: source.code(),
             kind: kind.code(),
             cause: cause.code(),
-            axis: axis.map_or(NO_AXIS, |axis| axis as u32),
-            value,
-            limit,
-            ..Event::default()
+            axis,
+            node,
+            bus: bus as u16,
+            ..event
         });
     }
 }

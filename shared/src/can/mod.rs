@@ -26,7 +26,7 @@ pub use error_frame::{ErrorKind, ErrorReport, ErrorReportError};
 pub use fd_frame::{FdFormat, FdFrame, FdLengthError};
 pub use frame::{CanId, Frame, FrameError, FrameFormat};
 pub use load::{BusPlan, Message, Overload, PlannedMessage};
-pub use pdo::{Rpdo1, Tpdo1};
+pub use pdo::{EVERY_SYNC, Rpdo1, Tpdo1};
 pub use socket_can::{OpenError, SocketCan};
 pub use tap::{TapError, Tapped};
 pub use virtual_bus::{Port, Statistics, VirtualWire, WireConfig};

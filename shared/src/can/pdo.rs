@@ -22,7 +22,13 @@ pub struct Rpdo1 {
     pub target_increments: i32,
 }
 
+/// Transmission type of both PDOs (1400:02, 1800:02): with every SYNC.
+pub const EVERY_SYNC: u8 = 1;
+
 impl Rpdo1 {
+    /// Mapping entries (1600:01 onwards): index, sub-index, bits.
+    pub const MAPPING: [u32; 2] = [0x6040_0010, 0x607A_0020];
+
     /// Bytes of the PDO.
     pub const LENGTH: usize = 6;
 
@@ -63,6 +69,9 @@ pub struct Tpdo1 {
 }
 
 impl Tpdo1 {
+    /// Mapping entries (1A00:01 onwards): index, sub-index, bits.
+    pub const MAPPING: [u32; 3] = [0x6041_0010, 0x6064_0020, 0x6077_0010];
+
     /// Bytes of the PDO.
     pub const LENGTH: usize = 8;
 
@@ -97,6 +106,13 @@ impl Tpdo1 {
 mod tests {
     use super::*;
     use proptest::prelude::*;
+
+    #[test]
+    fn the_mapped_bits_fill_the_bytes() {
+        let bytes = |mapping: &[u32]| mapping.iter().map(|entry| (entry & 0xFF) as usize / 8).sum::<usize>();
+        assert_eq!(bytes(&Rpdo1::MAPPING), Rpdo1::LENGTH);
+        assert_eq!(bytes(&Tpdo1::MAPPING), Tpdo1::LENGTH);
+    }
 
     #[test]
     fn bytes_lie_where_the_mapping_puts_them() {

@@ -13,5 +13,5 @@ mod scenario;
 pub use control::{ChecksConfig, ControllerConfig, CpuDmaLatency, RealtimeConfig};
 pub use faults::{FaultConfig, FaultKindConfig};
 pub use motion::*;
-pub use plant::{CanConfig, DriveConfig, DrivesConfig, DynamicsConfig};
+pub use plant::{CanConfig, DriveConfig, DrivesConfig, DynamicsConfig, IdentityConfig};
 pub use scenario::{Scenario, ScenarioError};

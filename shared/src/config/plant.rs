@@ -32,6 +32,8 @@ pub struct CanConfig {
     /// From SYNC to the moment a drive has its process data ready to be sent, at most, µs; none for the
     /// emulated drives on simulated buses.
     pub answer_us: u32,
+    /// What device every drive must be.
+    pub identity: IdentityConfig,
     /// How long the drives may take to boot, ms.
     pub boot_timeout_ms: u32,
     /// Cycles without a fresh command after which the master quick-stops the drives.
@@ -51,6 +53,7 @@ impl Default for CanConfig {
             heartbeat_producer_ms: 50,
             heartbeat_consumer_ms: 150,
             answer_us: 0,
+            identity: IdentityConfig::default(),
             boot_timeout_ms: 2000,
             command_timeout_cycles: 20,
         }
@@ -101,6 +104,32 @@ impl CanConfig {
             value: names.join(","),
             need: format!("name {} interfaces, one for each of can.buses", self.buses.len()),
         })
+    }
+}
+
+/// What a drive must say it is, before anything is written to it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct IdentityConfig {
+    /// Device type (object 1000).
+    pub device_type: u32,
+    /// Vendor (object 1018:01).
+    pub vendor_id: u32,
+    /// Product (object 1018:02).
+    pub product_code: u32,
+    /// Revision (object 1018:03).
+    pub revision: u32,
+}
+
+impl Default for IdentityConfig {
+    /// The emulated drives.
+    fn default() -> Self {
+        Self {
+            device_type: 0x0002_0192,
+            vendor_id: 0x004D_5354,
+            product_code: 0x0000_0402,
+            revision: 0x0001_0000,
+        }
     }
 }
 

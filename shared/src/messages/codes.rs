@@ -111,6 +111,26 @@ codes! {
         SafeStop = 7 "safe_stop",
     }
 
+    /// How far the CAN master is with a node.
+    BootPhase {
+        /// Waiting for its boot-up message.
+        Waiting = 0 "waiting",
+        /// Reading what device it is.
+        Identifying = 1 "identifying",
+        /// Comparing its PDOs with those that will be exchanged.
+        CheckingPdos = 2 "checking_pdos",
+        /// Writing its configuration.
+        Configuring = 3 "configuring",
+        /// Verified and configured; waiting for the others.
+        Configured = 4 "configured",
+        /// Told to become operational.
+        Starting = 5 "starting",
+        /// Operational, exchanging process data.
+        Ready = 6 "ready",
+        /// Given up until it boots again; its own event says why.
+        Failed = 7 "failed",
+    }
+
     /// Who reports an event.
     Source {
         /// The supervisor.
@@ -169,7 +189,7 @@ codes! {
         LinkLost = 13 "link_lost",
         /// Following error beyond its window (m).
         FollowingError = 14 "following_error",
-        /// An emergency message of a drive (EMCY code).
+        /// An emergency message of a drive (EMCY code; the limit is the error register, object 1001).
         Emergency = 15 "emergency",
         /// Process data of a drive missing (cycles).
         ProcessDataLost = 16 "process_data_lost",
@@ -189,6 +209,28 @@ codes! {
         MasterFault = 23 "master_fault",
         /// A bounded buffer had no room (items lost).
         Overflow = 24 "overflow",
+        /// A node is another device than configured (value of the identity object).
+        WrongIdentity = 25 "wrong_identity",
+        /// A node's PDOs are not those that the master exchanges (value of the object).
+        WrongPdo = 26 "wrong_pdo",
+        /// A node does not show a value that it was configured with (value of the object).
+        NotAccepted = 27 "not_accepted",
+        /// A node refused to have an object read or written (SDO abort code).
+        SdoAborted = 28 "sdo_aborted",
+        /// A node did not answer an SDO request (ms).
+        SdoTimeout = 29 "sdo_timeout",
+        /// Two answers came from one node id, of which one was asked for.
+        DuplicateNode = 30 "duplicate_node",
+        /// A node booted although nobody asked it to.
+        NodeRestarted = 31 "node_restarted",
+        /// A drive is in fault and a fault reset does not help (EMCY code, object 603F).
+        FaultAtStart = 32 "fault_at_start",
+        /// A bus or a node works again after a fault.
+        Recovered = 34 "recovered",
+        /// A frame does not have the length of its object (bytes).
+        WrongLength = 35 "wrong_length",
+        /// A node that is not configured is on the bus.
+        UnknownNode = 36 "unknown_node",
         /// A CAN controller became error active again (transmit error counter).
         ErrorActive = 40 "error_active",
         /// A CAN controller became error passive (transmit error counter).

@@ -11,12 +11,15 @@
 
 pub mod codes;
 mod schema;
+mod words;
 
 use bytemuck::{Pod, Zeroable};
 use iceoryx2::prelude::ZeroCopySend;
 
 use crate::geometry::{AXES, LEGS, Pose};
 use schema::FieldType;
+
+pub use words::explain;
 
 /// A message type: what every topic's payload has in common.
 pub trait Message: Pod + ZeroCopySend + Default + std::fmt::Debug + PartialEq {
@@ -37,7 +40,7 @@ pub trait Message: Pod + ZeroCopySend + Default + std::fmt::Debug + PartialEq {
 }
 
 /// Version of the layouts below; it changes with any of them.
-pub const LAYOUT_VERSION: u64 = 2;
+pub const LAYOUT_VERSION: u64 = 3;
 
 macro_rules! messages {
     ($($(#[$doc:meta])* $name:ident on $topic:literal keeping $depth:literal {
@@ -237,6 +240,12 @@ messages! {
         cause: u32,
         /// Axis concerned, from 0; [`codes::NO_AXIS`] when none is.
         axis: u32,
+        /// Object dictionary entry concerned, index · 256 + sub-index, or a COB-ID; 0 when none is.
+        object: u32,
+        /// Node id concerned; 0 when none is.
+        node: u16,
+        /// Index of the bus concerned, from 0, where `node` or the cause is about one.
+        bus: u16,
         /// State before, as a code of the source's state type.
         from: u32,
         /// State after.

@@ -1,0 +1,193 @@
+//! What is done to a drive by SDO before it may move: a list of tasks, made once for each drive.
+//!
+//! The order is the point: who it is, then whether its PDOs are those that will be exchanged, and only
+//! then anything is written. How tasks are carried out is not here but in [`boot`](super::boot).
+
+use masseter_shared::can::canopen::{Cob, NodeId, ObjectAddress};
+use masseter_shared::can::cia402::Controlword;
+use masseter_shared::can::{CanId, EVERY_SYNC, Rpdo1, Tpdo1};
+use masseter_shared::config::IdentityConfig;
+use masseter_shared::messages::codes::{BootPhase, Cause};
+
+/// Object 6041.
+pub(super) const STATUSWORD: ObjectAddress = ObjectAddress::new(0x6041, 0);
+/// Object 6060 and 6061: cyclic synchronous position.
+const CYCLIC_POSITION: u32 = 8;
+/// Object 6007: quick stop on loss of the link.
+const LINK_LOSS_QUICK_STOP: u32 = 3;
+/// Object 605A: along the quick-stop ramp, then switch on disabled.
+const RAMP_THEN_OFF: u32 = 2;
+/// Bit 30 of a TPDO's COB-ID, "no remote request", says nothing about the PDO's use here.
+const COB_ID_BITS: u32 = !(1 << 30);
+
+/// What a drive is configured with.
+#[derive(Debug, Clone)]
+pub(crate) struct Setup {
+    /// What device it must be.
+    pub(crate) identity: IdentityConfig,
+    /// Its heartbeat (1017), ms.
+    pub(crate) heartbeat_ms: u16,
+    /// The node whose heartbeat it watches and the silence it bears (1016), ms.
+    pub(crate) watched: (NodeId, u16),
+    /// Communication cycle (60C2): value and power of ten of seconds.
+    pub(crate) period: (u8, i8),
+    /// Following error window (6065), increments.
+    pub(crate) following_error: u32,
+    /// How long the window may be left (6066), ms.
+    pub(crate) following_error_ms: u16,
+    /// Deceleration of the quick-stop ramp (6085), increments/s².
+    pub(crate) quick_stop_deceleration: u32,
+    /// Software position limits (607D), increments.
+    pub(crate) position_limits: [i32; 2],
+}
+
+/// One thing to do.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Task {
+    /// From here on the node is in that phase.
+    Enter(BootPhase),
+    /// Read the object; of `mask` it must show `value`, now or within a few repetitions.
+    Expect { object: ObjectAddress, mask: u32, value: u32, otherwise: Cause },
+    /// Write the object, so many bytes.
+    Write { object: ObjectAddress, value: u32, bytes: usize },
+    /// Read the object and keep its value.
+    Keep(ObjectAddress),
+    /// Write the value kept.
+    WriteKept(ObjectAddress),
+    /// Read the statusword; unless the drive is in fault, leave out that many tasks.
+    IfInFault { otherwise_skip: usize },
+    /// Read the statusword, now or within a few repetitions without a fault.
+    ExpectNoFault,
+}
+
+/// The tasks for a node, in their order.
+pub(super) fn plan(node: NodeId, setup: &Setup) -> Vec<Task> {
+    let mut tasks = vec![Task::Enter(BootPhase::Identifying)];
+    tasks.extend(identify(&setup.identity));
+    tasks.push(Task::Enter(BootPhase::CheckingPdos));
+    tasks.extend(check_pdo(0x1400, Cob::Rpdo1(node), &Rpdo1::MAPPING));
+    tasks.extend(check_pdo(0x1800, Cob::Tpdo1(node), &Tpdo1::MAPPING));
+    tasks.push(Task::Enter(BootPhase::Configuring));
+    tasks.extend(configure(setup));
+    tasks.extend(reset_fault());
+    tasks.extend(hold_position());
+    tasks.push(Task::Enter(BootPhase::Configured));
+    tasks
+}
+
+fn identify(identity: &IdentityConfig) -> impl Iterator<Item = Task> {
+    [
+        ((0x1000, 0), identity.device_type),
+        ((0x1018, 1), identity.vendor_id),
+        ((0x1018, 2), identity.product_code),
+        ((0x1018, 3), identity.revision),
+    ]
+    .into_iter()
+    .map(|((index, subindex), value)| Task::Expect {
+        object: ObjectAddress::new(index, subindex),
+        mask: u32::MAX,
+        value,
+        otherwise: Cause::WrongIdentity,
+    })
+}
+
+/// COB-ID, transmission type, number of mapped objects and each of them.
+fn check_pdo(communication: u16, cob: Cob, mapping: &[u32]) -> impl Iterator<Item = Task> {
+    let parameter = move |subindex, mask, value| (ObjectAddress::new(communication, subindex), mask, value);
+    let mapped = move |(place, &entry): (usize, &u32)| {
+        (ObjectAddress::new(communication + 0x200, place as u8 + 1), u32::MAX, entry)
+    };
+    let head = [
+        parameter(1, COB_ID_BITS, CanId::from(cob).number()),
+        parameter(2, u32::MAX, u32::from(EVERY_SYNC)),
+        (ObjectAddress::new(communication + 0x200, 0), u32::MAX, mapping.len() as u32),
+    ];
+    let all = head.into_iter().chain(mapping.iter().enumerate().map(mapped));
+    all.map(|(object, mask, value)| Task::Expect { object, mask, value, otherwise: Cause::WrongPdo })
+}
+
+fn configure(setup: &Setup) -> impl Iterator<Item = Task> {
+    let (watched, silence_ms) = setup.watched;
+    let (value, exponent) = setup.period;
+    let [lowest, highest] = setup.position_limits;
+    let write = |(index, subindex, value, bytes)| Task::Write {
+        object: ObjectAddress::new(index, subindex),
+        value,
+        bytes,
+    };
+    let mode_shown = Task::Expect {
+        object: ObjectAddress::new(0x6061, 0),
+        mask: u32::MAX,
+        value: CYCLIC_POSITION,
+        otherwise: Cause::NotAccepted,
+    };
+    [
+        (0x1017, 0, u32::from(setup.heartbeat_ms), 2),
+        (0x1016, 1, u32::from(watched.get()) << 16 | u32::from(silence_ms), 4),
+        (0x6007, 0, LINK_LOSS_QUICK_STOP, 2),
+        (0x605A, 0, RAMP_THEN_OFF, 2),
+        (0x6085, 0, setup.quick_stop_deceleration, 4),
+        (0x6065, 0, setup.following_error, 4),
+        (0x6066, 0, u32::from(setup.following_error_ms), 2),
+        (0x607D, 1, lowest as u32, 4),
+        (0x607D, 2, highest as u32, 4),
+        (0x60C2, 1, u32::from(value), 1),
+        (0x60C2, 2, u32::from(exponent as u8), 1),
+        (0x6060, 0, CYCLIC_POSITION, 1),
+    ]
+    .map(write)
+    .into_iter()
+    .chain([mode_shown])
+}
+
+/// A fault that is only remembered is reset by an edge; one that persists is reported with its code.
+fn reset_fault() -> [Task; 6] {
+    let control = |word: Controlword| Task::Write {
+        object: ObjectAddress::new(0x6040, 0),
+        value: u32::from(word.0),
+        bytes: 2,
+    };
+    [
+        Task::IfInFault { otherwise_skip: 5 },
+        Task::Keep(ObjectAddress::new(0x603F, 0)),
+        control(Controlword::DISABLE_VOLTAGE),
+        control(Controlword::FAULT_RESET),
+        control(Controlword::DISABLE_VOLTAGE),
+        Task::ExpectNoFault,
+    ]
+}
+
+/// 607A := 6064, so that nothing jumps when the drive is enabled.
+const fn hold_position() -> [Task; 2] {
+    [Task::Keep(ObjectAddress::new(0x6064, 0)), Task::WriteKept(ObjectAddress::new(0x607A, 0))]
+}
+
+/// A period as object 60C2 has it: value and power of ten, as near as 255 steps allow, no finer than
+/// 1 µs, with the fewest digits (1 · 10⁻³ rather than 100 · 10⁻⁵; some drives take whole ms only).
+pub(crate) fn interpolation_period(period_ns: u64) -> (u8, i8) {
+    let (mut value, mut exponent) = ((period_ns + 500) / 1000, -6);
+    while value > u64::from(u8::MAX) || value % 10 == 0 && value > 0 && exponent < 0 {
+        (value, exponent) = ((value + 5) / 10, exponent + 1);
+    }
+    (value.max(1) as u8, exponent)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn periods_are_written_with_the_fewest_digits() {
+        let table = [
+            (1_000_000, (1, -3)),
+            (2_500_000, (25, -4)),
+            (4_000_000, (4, -3)),
+            (100_000_000, (1, -1)),
+            (125_000, (125, -6)),
+            (3_333_333, (33, -4)),
+        ];
+        for (period_ns, expected) in table {
+            assert_eq!(interpolation_period(period_ns), expected, "{period_ns} ns");
+        }
+    }
+}

@@ -1,0 +1,145 @@
+//! What the master makes of a frame that arrived.
+
+use masseter_shared::can::canopen::{
+    Cob, Emergency, Heartbeat, HeartbeatError, LengthError, NmtState, NodeId, SdoError, SdoResponse,
+};
+use masseter_shared::can::{CanId, Received, Tpdo1};
+use masseter_shared::messages::Event;
+use masseter_shared::messages::codes::{BootPhase, Cause, EventKind, Source};
+
+use super::cycle::Master;
+use super::supervision::Place;
+
+impl Master {
+    /// Takes a frame. Of a malformed one it is told once that it came; it has no other effect.
+    pub(super) fn take(&mut self, bus: usize, received: &Received) {
+        let Ok(cob) = Cob::try_from(received.frame.id()) else { return };
+        let (Cob::Heartbeat(id) | Cob::Tpdo1(id) | Cob::Emergency(id) | Cob::SdoResponse(id)) = cob else {
+            return;
+        };
+        let (time_ns, data) = (received.time_ns, received.frame.data());
+        let Some(axis) = self.axis_of(id, bus) else { return self.note_unknown(time_ns, id, bus) };
+        let taken = match cob {
+            Cob::Heartbeat(_) => self.take_heartbeat(axis, data, time_ns),
+            Cob::Tpdo1(_) => Tpdo1::decode(data).map(|tpdo| self.take_process_data(axis, tpdo, time_ns)),
+            Cob::Emergency(_) => Emergency::decode(data).map(|emcy| self.note_emergency(axis, emcy, time_ns)),
+            _ => self.take_answer(axis, data, time_ns),
+        };
+        if let Err(error) = taken
+            && self.nodes[axis].is_first_wrong_length(cob)
+        {
+            self.note_wrong_length(axis, cob, &error, time_ns);
+        }
+    }
+
+    fn axis_of(&self, id: NodeId, bus: usize) -> Option<usize> {
+        self.nodes.iter().position(|node| node.id == id && node.bus == bus)
+    }
+
+    fn take_heartbeat(&mut self, axis: usize, data: &[u8], time_ns: u64) -> Result<(), LengthError> {
+        let state = match Heartbeat::decode(data) {
+            Ok(Heartbeat { state }) => state,
+            Err(HeartbeatError::Length(error)) => return Err(error),
+            // Node guarding of somebody else: it says nothing here.
+            Err(HeartbeatError::UnknownState { .. }) => return Ok(()),
+        };
+        let may_boot = self.may_boot();
+        let node = &mut self.nodes[axis];
+        (node.nmt, node.heard_ns) = (Some(state), time_ns);
+        if state == NmtState::BootUp {
+            let was_started = node.is_started;
+            node.stop_exchange();
+            if was_started {
+                node.forget(time_ns);
+                self.fail(time_ns, Cause::NodeRestarted, Place::Axis(axis), [0.0; 2]);
+                return Ok(());
+            }
+        }
+        if may_boot {
+            let before = node.boot.phase();
+            let result = node.boot.hear(time_ns, state);
+            self.note_boot(time_ns, axis, before, result);
+        }
+        Ok(())
+    }
+
+    fn take_answer(&mut self, axis: usize, data: &[u8], time_ns: u64) -> Result<(), LengthError> {
+        match SdoResponse::decode(data) {
+            Ok(response) => {
+                let node = &mut self.nodes[axis];
+                node.heard_ns = time_ns;
+                let before = node.boot.phase();
+                let result = node.boot.take(time_ns, response);
+                self.note_boot(time_ns, axis, before, result);
+                Ok(())
+            }
+            Err(SdoError::Length(error)) => Err(error),
+            // An answer of a service that was not asked for; the time-out deals with it.
+            Err(SdoError::UnknownCommand { .. }) => Ok(()),
+        }
+    }
+
+    fn take_process_data(&mut self, axis: usize, tpdo: Tpdo1, time_ns: u64) {
+        let node = &mut self.nodes[axis];
+        // Only an operational node sends process data.
+        (node.nmt, node.heard_ns, node.missing_cycles) = (Some(NmtState::Operational), time_ns, 0);
+        if !node.is_started {
+            return;
+        }
+        let before = node.condition();
+        // Process data of an earlier SYNC may come late; they are no answer to this one.
+        node.take(tpdo, time_ns > self.sync_ns);
+        let after = node.condition();
+        self.complete_ns = self.complete_ns.max(time_ns);
+        if before != after {
+            let event = Event { from: before.code(), to: after.code(), ..Event::default() };
+            let codes = (Source::Drive, EventKind::Transition, Cause::Sequence);
+            self.add(time_ns, codes, Place::Axis(axis), event);
+        }
+    }
+
+    fn note_emergency(&mut self, axis: usize, emergency: Emergency, time_ns: u64) {
+        let kind = if emergency.is_reset() { EventKind::Notice } else { EventKind::Fault };
+        let values = [f64::from(emergency.code.0), f64::from(emergency.register)];
+        self.report(time_ns, Source::Drive, kind, Cause::Emergency, Place::Axis(axis), values);
+    }
+
+    fn note_wrong_length(&mut self, axis: usize, cob: Cob, error: &LengthError, time_ns: u64) {
+        let (value, limit) = (error.actual as f64, error.expected as f64);
+        let event = Event { object: CanId::from(cob).number(), value, limit, ..Event::default() };
+        let codes = (Source::Master, EventKind::Notice, Cause::WrongLength);
+        self.add(time_ns, codes, Place::Axis(axis), event);
+    }
+
+    /// Tells once of a node that nobody configured.
+    fn note_unknown(&mut self, time_ns: u64, id: NodeId, bus: usize) {
+        let bit = 1 << id.get();
+        let watch = &mut self.buses[bus];
+        if id != self.settings.id && watch.unknown_nodes & bit == 0 {
+            watch.unknown_nodes |= bit;
+            let event = Event { node: u16::from(id.get()), ..Event::default() };
+            let codes = (Source::Master, EventKind::Notice, Cause::UnknownNode);
+            self.add(time_ns, codes, Place::Bus(bus), event);
+        }
+    }
+
+    /// Tells how a node's boot went on: a change of phase, or its failure.
+    pub(super) fn note_boot(
+        &mut self,
+        time_ns: u64,
+        axis: usize,
+        before: BootPhase,
+        result: Result<(), super::boot::BootFault>,
+    ) {
+        if let Err(fault) = result {
+            self.nodes[axis].boot.give_up();
+            self.fail_boot(time_ns, axis, &fault);
+        }
+        let after = self.nodes[axis].boot.phase();
+        if before != after {
+            let event = Event { from: before.code(), to: after.code(), ..Event::default() };
+            let codes = (Source::Master, EventKind::Transition, Cause::Sequence);
+            self.add(time_ns, codes, Place::Axis(axis), event);
+        }
+    }
+}

@@ -1,0 +1,155 @@
+//! What happens from power-on to enabled drives, and what keeps them from it.
+
+use masseter_shared::can::canopen::{AbortCode, NmtState, SdoRequest};
+
+use super::peer::STANDS_AT;
+use super::*;
+
+const PHASES: [BootPhase; 6] = [
+    BootPhase::Identifying,
+    BootPhase::CheckingPdos,
+    BootPhase::Configuring,
+    BootPhase::Configured,
+    BootPhase::Starting,
+    BootPhase::Ready,
+];
+
+#[test]
+fn every_drive_is_identified_checked_configured_and_started_in_that_order() {
+    let bench = Bench::enabled();
+    assert_eq!(bench.causes(EventKind::Fault), []);
+    for axis in 0..AXES {
+        let phases: Vec<_> = bench
+            .events_of(EventKind::Transition)
+            .filter(|event| event.source == Source::Master.code() && event.axis == axis as u32)
+            .map(|event| BootPhase::try_from(event.to).unwrap())
+            .collect();
+        assert_eq!(phases, PHASES, "axis {axis}");
+    }
+}
+
+#[test]
+fn what_is_written_is_what_the_scenario_says() {
+    let mut bench = Bench::enabled();
+    let drive = bench.drive(4);
+    let table = [
+        ((0x1017, 0), 50),
+        ((0x1016, 1), 0x007F_0096),
+        ((0x6007, 0), 3),
+        ((0x605A, 0), 2),
+        ((0x6085, 0), 10_000_000),
+        ((0x6065, 0), 2000),
+        ((0x6066, 0), 20),
+        ((0x60C2, 1), 1),
+        ((0x60C2, 2), 0xFD),
+        ((0x6060, 0), 8),
+        ((0x607A, 0), STANDS_AT as u32),
+    ];
+    for ((index, subindex), value) in table {
+        assert_eq!(drive.written(index, subindex), value, "{index:04X}:{subindex}");
+    }
+    assert!(drive.written(0x607D, 1) < drive.written(0x607D, 2));
+}
+
+#[test]
+fn one_request_a_bus_and_cycle_and_none_beside_process_data() {
+    let mut bench = Bench::enabled();
+    let before = bench.wires.peer(0).asked.len();
+    bench.cycles(100, DriveRequest::Enable);
+    assert_eq!(bench.wires.peer(0).asked.len(), before);
+    for axes in [[0, 1, 2], [3, 4, 5]] {
+        let mut times: Vec<_> = axes
+            .into_iter()
+            .flat_map(|axis| {
+                bench.wires.peer(axis).asked.iter().map(|(time_ns, _)| *time_ns).collect::<Vec<_>>()
+            })
+            .collect();
+        times.sort_unstable();
+        assert!(times.windows(2).all(|pair| pair[1] - pair[0] >= PERIOD_NS));
+    }
+}
+
+#[test]
+fn a_drive_that_is_not_as_expected_is_named_and_nobody_is_enabled() {
+    type Change = fn(&mut Peer);
+    let table: [(Change, Cause, u32); 9] = [
+        (|drive| drop(drive.objects.insert((0x1000, 0), vec![0; 4])), Cause::WrongIdentity, 0x10_0000),
+        (|drive| drop(drive.objects.insert((0x1018, 2), vec![9, 9, 0, 0])), Cause::WrongIdentity, 0x10_1802),
+        (
+            |drive| drop(drive.objects.insert((0x1600, 1), vec![0x10, 0, 0x41, 0x60])),
+            Cause::WrongPdo,
+            0x16_0001,
+        ),
+        (|drive| drop(drive.objects.insert((0x1A00, 0), vec![2])), Cause::WrongPdo, 0x1A_0000),
+        (|drive| drop(drive.objects.insert((0x1400, 2), vec![255])), Cause::WrongPdo, 0x14_0002),
+        (|drive| drop(drive.objects.remove(&(0x6064, 0))), Cause::SdoAborted, 0x60_6400),
+        (|drive| drive.refuses = Some(((0x6007, 0), AbortCode::READ_ONLY)), Cause::SdoAborted, 0x60_0700),
+        (|drive| drive.servers = 2, Cause::DuplicateNode, 0),
+        (|drive| (drive.power, drive.can_reset) = (DriveState::Fault, false), Cause::FaultAtStart, 0x60_4100),
+    ];
+    for (change, cause, object) in table {
+        let mut bench = Bench::new();
+        change(bench.drive(3));
+        for _ in 0..800 {
+            bench.cycle(Some(DriveRequest::Enable));
+            assert!(bench.nobody_is_enabled());
+        }
+        let faults: Vec<_> = bench.events_of(EventKind::Fault).collect();
+        assert_eq!(faults.len(), 1, "{faults:?}");
+        let Event { axis, node, bus, .. } = *faults[0];
+        assert_eq!((faults[0].cause, faults[0].object), (cause.code(), object), "{cause}");
+        assert_eq!((axis, node, bus), (3, 4, 1));
+        assert_eq!(bench.reading.master_fault, 1);
+    }
+}
+
+#[test]
+fn nothing_is_written_to_a_device_that_is_another() {
+    let mut bench = Bench::new();
+    bench.drive(0).objects.insert((0x1018, 1), vec![1, 2, 3, 4]);
+    bench.cycles(300, DriveRequest::Enable);
+    let wrote = |(_, request): &(u64, SdoRequest)| !matches!(request, SdoRequest::InitiateUpload { .. });
+    assert!(!bench.drive(0).asked.iter().any(wrote));
+}
+
+#[test]
+fn a_fault_that_is_only_remembered_is_reset_by_an_edge() {
+    let mut bench = Bench::new();
+    bench.drive(2).power = DriveState::Fault;
+    bench.cycles(400, DriveRequest::Enable);
+    assert!(bench.all_are(DriveState::OperationEnabled));
+    assert_eq!(bench.causes(EventKind::Fault), []);
+}
+
+#[test]
+fn a_drive_that_is_already_alive_is_reset_before_it_is_believed() {
+    let mut bench = Bench::new();
+    bench.drive(1).nmt = Some(NmtState::Operational);
+    bench.cycles(400, DriveRequest::Enable);
+    assert!(bench.all_are(DriveState::OperationEnabled));
+    assert_eq!(bench.causes(EventKind::Fault), []);
+}
+
+#[test]
+fn a_missing_drive_is_named_and_the_others_wait_for_it() {
+    let mut bench = Bench::new();
+    bench.drive(5).is_dead = true;
+    bench.cycles(2100, DriveRequest::Off);
+    assert!(bench.nobody_is_enabled());
+    assert_eq!(bench.causes(EventKind::Fault), [Cause::BootTimeout]);
+    bench.drive(5).is_dead = false;
+    bench.cycles(300, DriveRequest::Off);
+    assert_eq!(bench.causes(EventKind::Notice), [Cause::Recovered]);
+    bench.cycles(20, DriveRequest::Enable);
+    assert!(bench.all_are(DriveState::OperationEnabled));
+}
+
+#[test]
+fn a_drive_that_stops_answering_is_asked_again_and_then_named() {
+    let mut bench = Bench::new();
+    bench.cycles(10, DriveRequest::Enable);
+    bench.drive(3).is_dead = true;
+    bench.cycles(3500, DriveRequest::Enable);
+    assert_eq!(bench.causes(EventKind::Fault), [Cause::SdoTimeout]);
+    assert!(bench.nobody_is_enabled());
+}

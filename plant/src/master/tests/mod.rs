@@ -1,0 +1,101 @@
+//! Scenarios of the master with drives that do what a test wants of them.
+
+mod boot;
+mod peer;
+mod recovery;
+
+use masseter_shared::can::canopen::NodeId;
+use masseter_shared::can::cia402::DriveState;
+use masseter_shared::config::Scenario;
+use masseter_shared::geometry::AXES;
+use masseter_shared::messages::codes::{BootPhase, Cause, DriveRequest, EventKind, Source};
+use masseter_shared::messages::{Command, Event, Reading};
+use masseter_shared::realtime::Wake;
+
+use super::Master;
+use crate::build::build_master;
+use peer::{Peer, Wires};
+
+const PERIOD_NS: u64 = 1_000_000;
+/// When the rig is switched on: time does not begin with it.
+const EPOCH_NS: u64 = 1_000_000_000;
+
+/// A master and six scripted drives on two wires.
+struct Bench {
+    master: Master,
+    wires: Wires,
+    reading: Reading,
+    events: Vec<Event>,
+    cycle: u64,
+}
+
+impl Bench {
+    /// Everything switched on, the drives as the master expects them.
+    fn new() -> Self {
+        let scenario = Scenario::default();
+        let ids = scenario.can.node_ids.map(|id| NodeId::new(id).unwrap());
+        Self {
+            master: build_master(&scenario, EPOCH_NS).unwrap(),
+            wires: Wires::new(ids.map(|id| Peer::new(id, &scenario.can.identity))),
+            reading: Reading::default(),
+            events: Vec::new(),
+            cycle: 0,
+        }
+    }
+
+    /// The drive of an axis.
+    fn drive(&mut self, axis: usize) -> &mut Peer {
+        self.wires.peer(axis)
+    }
+
+    fn now_ns(&self) -> u64 {
+        EPOCH_NS + self.cycle * PERIOD_NS
+    }
+
+    /// A cycle with that request, or without any command.
+    fn cycle(&mut self, request: Option<DriveRequest>) {
+        self.cycle += 1;
+        let sync_ns = self.now_ns();
+        let wake = Wake { cycle: self.cycle, due_ns: sync_ns, woke_ns: sync_ns, skipped: 0, stalled_ns: 0 };
+        self.wires.begin(sync_ns);
+        self.master.begin_cycle(wake, &mut self.wires);
+        self.master.collect(sync_ns + 500_000, &mut self.wires);
+        self.master.fill_reading(&mut self.reading);
+        let command = request.map(|request| Command {
+            cycle: self.cycle,
+            target_m: self.reading.position_m,
+            request: request.code(),
+            ..Command::default()
+        });
+        self.master.apply(sync_ns + 550_000, command.as_ref(), &mut self.wires);
+        self.master.drain_events(&mut |event| self.events.push(event));
+    }
+
+    fn cycles(&mut self, count: u64, request: DriveRequest) {
+        (0..count).for_each(|_| self.cycle(Some(request)));
+    }
+
+    /// Boots and enables all drives.
+    fn enabled() -> Self {
+        let mut bench = Self::new();
+        bench.cycles(400, DriveRequest::Enable);
+        assert!(bench.all_are(DriveState::OperationEnabled), "{:?}", bench.events);
+        bench
+    }
+
+    fn all_are(&mut self, state: DriveState) -> bool {
+        (0..AXES).all(|axis| self.drive(axis).power == state)
+    }
+
+    fn nobody_is_enabled(&mut self) -> bool {
+        (0..AXES).all(|axis| self.drive(axis).power != DriveState::OperationEnabled)
+    }
+
+    fn events_of(&self, kind: EventKind) -> impl Iterator<Item = &Event> {
+        self.events.iter().filter(move |event| event.kind == kind.code())
+    }
+
+    fn causes(&self, kind: EventKind) -> Vec<Cause> {
+        self.events_of(kind).map(|event| Cause::try_from(event.cause).unwrap()).collect()
+    }
+}

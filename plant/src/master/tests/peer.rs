@@ -1,0 +1,271 @@
+//! A scripted drive, and wires on which frames arrive at once. It knows as much of CANopen as the master
+//! asks of it, from a table of objects that a test may change.
+
+use std::collections::{BTreeMap, VecDeque};
+
+use masseter_shared::can::canopen::{
+    AbortCode, Cob, Expedited, Heartbeat, Nmt, NmtCommand, NmtState, NodeId, ObjectAddress, SdoRequest,
+    SdoResponse,
+};
+use masseter_shared::can::cia402::{Controlword, DriveState, Statusword};
+use masseter_shared::can::{
+    Bus, BusStatus, ErrorState, Frame, ReceiveError, Received, Rpdo1, SendError, Tpdo1,
+};
+use masseter_shared::config::IdentityConfig;
+use masseter_shared::geometry::AXES;
+
+use super::PERIOD_NS;
+use crate::link::Buses;
+
+const HEARTBEAT_NS: u64 = 50 * PERIOD_NS;
+/// Where every drive stands, increments.
+pub(super) const STANDS_AT: i32 = 1234;
+
+/// A drive.
+pub(super) struct Peer {
+    pub(super) id: NodeId,
+    pub(super) objects: BTreeMap<(u16, u8), Vec<u8>>,
+    pub(super) nmt: Option<NmtState>,
+    pub(super) power: DriveState,
+    /// Whether a fault reset helps.
+    pub(super) can_reset: bool,
+    /// Whether it is without power.
+    pub(super) is_dead: bool,
+    /// Servers that answer to its id.
+    pub(super) servers: usize,
+    /// An object that it refuses to have written.
+    pub(super) refuses: Option<((u16, u8), AbortCode)>,
+    /// SDO requests that it got, each with the time.
+    pub(super) asked: Vec<(u64, SdoRequest)>,
+    controlword: Controlword,
+    buffered: Option<Rpdo1>,
+    next_beat_ns: u64,
+}
+
+impl Peer {
+    pub(super) fn new(id: NodeId, identity: &IdentityConfig) -> Self {
+        let node = u32::from(id.get());
+        let long = |address, value: u32| (address, value.to_le_bytes().to_vec());
+        let objects = BTreeMap::from([
+            long((0x1000, 0), identity.device_type),
+            long((0x1018, 1), identity.vendor_id),
+            long((0x1018, 2), identity.product_code),
+            long((0x1018, 3), identity.revision),
+            long((0x1400, 1), 0x200 + node),
+            ((0x1400, 2), vec![1]),
+            ((0x1600, 0), vec![2]),
+            long((0x1600, 1), 0x6040_0010),
+            long((0x1600, 2), 0x607A_0020),
+            long((0x1800, 1), 0x4000_0180 + node),
+            ((0x1800, 2), vec![1]),
+            ((0x1A00, 0), vec![3]),
+            long((0x1A00, 1), 0x6041_0010),
+            long((0x1A00, 2), 0x6064_0020),
+            long((0x1A00, 3), 0x6077_0010),
+            ((0x603F, 0), vec![0x20, 0x73]),
+            ((0x6061, 0), vec![1]),
+            ((0x6064, 0), STANDS_AT.to_le_bytes().to_vec()),
+        ]);
+        Self {
+            id,
+            objects,
+            nmt: None,
+            power: DriveState::SwitchOnDisabled,
+            can_reset: true,
+            is_dead: false,
+            servers: 1,
+            refuses: None,
+            asked: Vec::new(),
+            controlword: Controlword::DISABLE_VOLTAGE,
+            buffered: None,
+            next_beat_ns: 0,
+        }
+    }
+
+    /// What was written to an object, as a number.
+    pub(super) fn written(&self, index: u16, subindex: u8) -> u32 {
+        let mut word = [0; 4];
+        let value = &self.objects[&(index, subindex)];
+        word[..value.len()].copy_from_slice(value);
+        u32::from_le_bytes(word)
+    }
+
+    /// Power off and on: it comes back as it left the factory.
+    pub(super) fn cycle_power(&mut self) {
+        (self.nmt, self.power, self.buffered) = (None, DriveState::SwitchOnDisabled, None);
+    }
+
+    fn live(&mut self, now_ns: u64, out: &mut Vec<Frame>) {
+        if self.is_dead {
+            return;
+        }
+        if self.nmt.is_none() {
+            self.nmt = Some(NmtState::PreOperational);
+            self.next_beat_ns = now_ns + HEARTBEAT_NS;
+            out.push(Heartbeat { state: NmtState::BootUp }.frame(self.id));
+        } else if let Some(state) = self.nmt.filter(|_| now_ns >= self.next_beat_ns) {
+            self.next_beat_ns = now_ns + HEARTBEAT_NS;
+            out.push(Heartbeat { state }.frame(self.id));
+        }
+    }
+
+    fn receive(&mut self, now_ns: u64, frame: &Frame, out: &mut Vec<Frame>) {
+        if self.is_dead || self.nmt.is_none() {
+            return;
+        }
+        match Cob::try_from(frame.id()).unwrap() {
+            Cob::Nmt => self.obey(Nmt::decode(frame.data()).unwrap()),
+            Cob::Sync if self.nmt == Some(NmtState::Operational) => self.synchronise(out),
+            Cob::Rpdo1(id) if id == self.id => self.buffered = Some(Rpdo1::decode(frame.data()).unwrap()),
+            Cob::SdoRequest(id) if id == self.id => {
+                let request = SdoRequest::decode(frame.data()).unwrap();
+                self.asked.push((now_ns, request));
+                let answer = self.serve(request);
+                out.extend(std::iter::repeat_n(answer.frame(self.id), self.servers));
+            }
+            _ => {}
+        }
+    }
+
+    fn obey(&mut self, nmt: Nmt) {
+        if nmt.target.includes(self.id) {
+            match nmt.command {
+                NmtCommand::Start => self.nmt = Some(NmtState::Operational),
+                NmtCommand::ResetCommunication => self.cycle_power(),
+                other => panic!("{other:?} is not asked for"),
+            }
+        }
+    }
+
+    fn synchronise(&mut self, out: &mut Vec<Frame>) {
+        if let Some(rpdo) = self.buffered.take() {
+            assert_eq!(rpdo.target_increments, STANDS_AT, "nobody asks it to move");
+            self.control(rpdo.controlword);
+        }
+        self.power = self.power.after_completion();
+        let tpdo = Tpdo1 {
+            statusword: Statusword::of(self.power),
+            actual_increments: STANDS_AT,
+            torque_permille: 0,
+        };
+        out.push(tpdo.frame(self.id));
+    }
+
+    fn control(&mut self, word: Controlword) {
+        let after = self.power.after(word.command(self.controlword));
+        self.controlword = word;
+        if self.power != DriveState::Fault || self.can_reset {
+            self.power = after;
+        }
+    }
+
+    fn serve(&mut self, request: SdoRequest) -> SdoResponse {
+        match request {
+            SdoRequest::InitiateUpload { object } => self.read(object),
+            SdoRequest::Download { object, data } => self.write(object, data.data()),
+            other => panic!("{other:?}: every value here is short"),
+        }
+    }
+
+    fn read(&mut self, object: ObjectAddress) -> SdoResponse {
+        let statusword = Statusword::of(self.power).0.to_le_bytes().to_vec();
+        let value = match (object.index, object.subindex) {
+            (0x6041, 0) => Some(&statusword),
+            address => self.objects.get(&address),
+        };
+        match value {
+            Some(value) => SdoResponse::Upload { object, data: Expedited::new(value).unwrap() },
+            None => SdoResponse::Abort { object, code: AbortCode::NO_OBJECT },
+        }
+    }
+
+    fn write(&mut self, object: ObjectAddress, data: &[u8]) -> SdoResponse {
+        let address = (object.index, object.subindex);
+        if let Some((_, code)) = self.refuses.filter(|(refused, _)| *refused == address) {
+            return SdoResponse::Abort { object, code };
+        }
+        self.objects.insert(address, data.to_vec());
+        match address {
+            (0x6040, 0) => self.control(Controlword(u16::from_le_bytes(data.try_into().unwrap()))),
+            (0x6060, 0) => drop(self.objects.insert((0x6061, 0), data.to_vec())),
+            _ => {}
+        }
+        SdoResponse::Download { object }
+    }
+}
+
+/// One wire with its drives.
+pub(super) struct Wire {
+    peers: Vec<Peer>,
+    arrived: VecDeque<Received>,
+    /// Whether the master's controller is off the bus.
+    pub(super) is_off: bool,
+}
+
+/// Both wires, three drives each.
+pub(super) struct Wires([Wire; 2]);
+
+impl Wires {
+    pub(super) fn new(peers: [Peer; AXES]) -> Self {
+        let mut peers = Vec::from(peers);
+        let second = peers.split_off(AXES / 2);
+        Self([peers, second].map(|peers| Wire { peers, arrived: VecDeque::new(), is_off: false }))
+    }
+
+    pub(super) fn peer(&mut self, axis: usize) -> &mut Peer {
+        &mut self.0[axis / 3].peers[axis % 3]
+    }
+
+    pub(super) fn wire(&mut self, bus: usize) -> &mut Wire {
+        &mut self.0[bus]
+    }
+
+    /// The drives' own doings, before the cycle's SYNC.
+    pub(super) fn begin(&mut self, now_ns: u64) {
+        for wire in &mut self.0 {
+            let mut out = Vec::new();
+            wire.peers.iter_mut().for_each(|peer| peer.live(now_ns, &mut out));
+            for frame in out {
+                wire.arrive(now_ns, frame);
+            }
+        }
+    }
+}
+
+impl Wire {
+    /// A frame that somebody sends to the master.
+    pub(super) fn arrive(&mut self, now_ns: u64, frame: Frame) {
+        if !self.is_off {
+            self.arrived.push_back(Received { frame, time_ns: now_ns + 1000 });
+        }
+    }
+}
+
+impl Bus for &mut Wire {
+    fn send(&mut self, now_ns: u64, frame: Frame) -> Result<(), SendError> {
+        if self.is_off {
+            return Err(SendError::BusOff { tec: 256 });
+        }
+        let mut out = Vec::new();
+        self.peers.iter_mut().for_each(|peer| peer.receive(now_ns, &frame, &mut out));
+        for frame in out {
+            self.arrive(now_ns, frame);
+        }
+        Ok(())
+    }
+
+    fn receive(&mut self, _now_ns: u64) -> Result<Option<Received>, ReceiveError> {
+        Ok(self.arrived.pop_front())
+    }
+
+    fn status(&self) -> BusStatus {
+        let (state, tec) = if self.is_off { (ErrorState::BusOff, 256) } else { (ErrorState::Active, 0) };
+        BusStatus { state, tec, rec: 0 }
+    }
+}
+
+impl Buses for Wires {
+    fn port(&mut self, bus: usize) -> impl Bus {
+        &mut self.0[bus]
+    }
+}

@@ -1,0 +1,101 @@
+//! What happens when a running drive or bus fails, and how it comes back.
+
+use masseter_shared::can::Frame;
+use masseter_shared::can::canopen::{Cob, Emergency, EmergencyCode, Heartbeat, NmtState};
+
+use super::*;
+
+/// Keeps asking for motion, which must not happen, then switches off, after which it may again.
+fn restore(bench: &mut Bench, cause: Cause) {
+    for _ in 0..600 {
+        bench.cycle(Some(DriveRequest::Enable));
+        assert_eq!(bench.reading.master_fault, 1);
+    }
+    assert!(bench.nobody_is_enabled());
+    assert_eq!(bench.causes(EventKind::Fault), [cause]);
+    bench.cycles(20, DriveRequest::Off);
+    assert_eq!(bench.causes(EventKind::Notice).last(), Some(&Cause::Recovered));
+    bench.cycles(30, DriveRequest::Enable);
+    assert!(bench.all_are(DriveState::OperationEnabled));
+    assert_eq!(bench.reading.master_fault, 0);
+}
+
+#[test]
+fn a_drive_that_lost_its_power_is_booted_again_without_a_restart_of_the_master() {
+    let mut bench = Bench::enabled();
+    bench.drive(4).cycle_power();
+    bench.drive(4).objects.insert((0x6060, 0), vec![0]);
+    bench.cycles(5, DriveRequest::Enable);
+    let fault = *bench.events_of(EventKind::Fault).next().unwrap();
+    assert_eq!((fault.cause, fault.axis, fault.node), (Cause::NodeRestarted.code(), 4, 5));
+    restore(&mut bench, Cause::NodeRestarted);
+    assert_eq!(bench.drive(4).written(0x6060, 0), 8);
+}
+
+#[test]
+fn a_drive_that_falls_silent_is_booted_again_when_it_comes_back() {
+    let mut bench = Bench::enabled();
+    bench.drive(0).is_dead = true;
+    bench.cycles(300, DriveRequest::Enable);
+    assert_eq!(bench.causes(EventKind::Fault), [Cause::ProcessDataLost]);
+    let others_are_off = (1..AXES).all(|axis| bench.drive(axis).power == DriveState::SwitchOnDisabled);
+    assert!(others_are_off);
+    bench.drive(0).is_dead = false;
+    restore(&mut bench, Cause::ProcessDataLost);
+}
+
+#[test]
+fn another_drive_in_the_place_of_the_old_one_is_not_started() {
+    let mut bench = Bench::enabled();
+    bench.drive(2).cycle_power();
+    bench.drive(2).objects.insert((0x1018, 3), vec![7, 0, 0, 0]);
+    bench.cycles(600, DriveRequest::Off);
+    assert_eq!(bench.causes(EventKind::Fault), [Cause::NodeRestarted, Cause::WrongIdentity]);
+    bench.cycles(50, DriveRequest::Enable);
+    assert!(bench.nobody_is_enabled());
+}
+
+#[test]
+fn a_bus_that_went_off_stops_the_rig_and_works_again_when_it_returns() {
+    let mut bench = Bench::enabled();
+    bench.wires.wire(1).is_off = true;
+    bench.cycles(300, DriveRequest::Enable);
+    assert_eq!(bench.causes(EventKind::Fault), [Cause::BusOff]);
+    assert_eq!(bench.events_of(EventKind::Fault).next().unwrap().bus, 1);
+    // Drives of their own accord stop when the master falls silent; these are told.
+    (3..AXES).for_each(|axis| bench.drive(axis).power = DriveState::SwitchOnDisabled);
+    bench.wires.wire(1).is_off = false;
+    restore(&mut bench, Cause::BusOff);
+}
+
+#[test]
+fn emergencies_come_with_code_and_register_and_go() {
+    let mut bench = Bench::enabled();
+    let id = bench.drive(3).id;
+    let now_ns = bench.now_ns();
+    let hot = Emergency { code: EmergencyCode(0x4310), register: 0x09, vendor: [0; 5] };
+    bench.wires.wire(1).arrive(now_ns, hot.frame(id));
+    bench.wires.wire(1).arrive(now_ns, Emergency::RESET.frame(id));
+    bench.cycle(Some(DriveRequest::Enable));
+    let told: Vec<_> = bench.events.iter().filter(|event| event.cause == Cause::Emergency.code()).collect();
+    assert_eq!((told[0].kind, told[0].value, told[0].limit), (EventKind::Fault.code(), 17168.0, 9.0));
+    assert_eq!((told[1].kind, told[1].value, told[1].axis), (EventKind::Notice.code(), 0.0, 3));
+}
+
+#[test]
+fn frames_of_wrong_length_are_told_once_and_so_are_unknown_nodes() {
+    let mut bench = Bench::enabled();
+    let id = bench.drive(0).id;
+    let stranger = NodeId::new(9).unwrap();
+    for _ in 0..5 {
+        let now_ns = bench.now_ns();
+        let wire = bench.wires.wire(0);
+        wire.arrive(now_ns, Frame::new(Cob::Emergency(id).into(), &[1, 2, 3]).unwrap());
+        wire.arrive(now_ns, Heartbeat { state: NmtState::Operational }.frame(stranger));
+        bench.cycle(Some(DriveRequest::Enable));
+    }
+    assert_eq!(bench.causes(EventKind::Notice), [Cause::WrongLength, Cause::UnknownNode]);
+    let wrong = bench.events_of(EventKind::Notice).next().unwrap();
+    assert_eq!((wrong.object, wrong.value, wrong.limit), (0x81, 3.0, 8.0));
+    assert!(bench.all_are(DriveState::OperationEnabled));
+}

@@ -1,0 +1,74 @@
+//! The plant allocates nothing in a cycle, not even while it boots its drives.
+#![allow(unsafe_code)] // A global allocator is an unsafe trait; this one only counts and passes on.
+
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::cell::Cell;
+use std::hint::black_box;
+
+use masseter_plant::core::PlantCore;
+use masseter_shared::config::Scenario;
+use masseter_shared::messages::codes::{DriveCondition, DriveRequest};
+use masseter_shared::messages::{Command, Reading};
+use masseter_shared::realtime::Wake;
+
+struct Counting;
+
+thread_local! {
+    /// Of this thread alone: the test harness allocates in its own.
+    static ALLOCATIONS: Cell<u64> = const { Cell::new(0) };
+}
+
+#[global_allocator]
+static COUNTING: Counting = Counting;
+
+// SAFETY: every call goes to the system's allocator unchanged, so its guarantees are this one's.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        ALLOCATIONS.set(ALLOCATIONS.get() + 1);
+        // SAFETY: the caller's promises about `layout` are passed on.
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        // SAFETY: `pointer` came from `alloc` above, that is, from `System`.
+        unsafe { System.dealloc(pointer, layout) }
+    }
+}
+
+fn allocations_of(work: impl FnOnce()) -> u64 {
+    let before = ALLOCATIONS.get();
+    work();
+    ALLOCATIONS.get() - before
+}
+
+/// One cycle in which the drives are asked to hold where they stand.
+fn cycle(plant: &mut PlantCore, cycle: u64, reading: &mut Reading) {
+    let sync_ns = cycle * 1_000_000;
+    let wake = Wake { cycle, due_ns: sync_ns, woke_ns: sync_ns, skipped: 0, stalled_ns: 0 };
+    plant.begin_cycle(wake).unwrap();
+    plant.collect(sync_ns + 525_000).unwrap();
+    plant.fill_reading(reading);
+    let request = DriveRequest::Enable.code();
+    let command = Command { cycle, target_m: reading.position_m, request, ..Command::default() };
+    plant.apply(sync_ns + 545_000, Some(&command)).unwrap();
+    plant.drain_frames(&mut |frame| {
+        black_box(frame);
+    });
+    plant.drain_events(&mut |event| {
+        black_box(event);
+    });
+}
+
+#[test]
+fn no_cycle_of_the_plant_allocates() {
+    let mut plant = PlantCore::new(&Scenario::default(), 0).unwrap();
+    let mut reading = Reading::default();
+    let running = allocations_of(|| (1..1000).for_each(|number| cycle(&mut plant, number, &mut reading)));
+    assert_eq!(
+        reading.drive_state,
+        [DriveCondition::OperationEnabled.code(); 6],
+        "it booted and was enabled"
+    );
+    assert_eq!(running, 0);
+    assert!(allocations_of(|| drop(black_box(vec![1u8]))) > 0, "the counter counts");
+}

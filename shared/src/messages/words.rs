@@ -1,0 +1,118 @@
+//! Events of the CAN master in words: what is wrong, where, and what to do.
+
+use super::Event;
+use super::codes::{Cause, EventKind};
+use crate::can::canopen::{AbortCode, EmergencyCode, ObjectAddress};
+use crate::geometry::AXIS_NAMES;
+
+/// The sentence for an event that names a node, a bus or an object; `None` where the figures alone say
+/// what there is to say.
+pub fn explain(event: &Event) -> Option<String> {
+    let cause = Cause::try_from(event.cause).ok().filter(|_| event.kind != EventKind::Transition.code())?;
+    let what = complaint(cause, event)?;
+    let remedy = remedy(cause).map_or_else(String::new, |remedy| format!("; {remedy}"));
+    Some(format!("{}: {what}{remedy}", place(event)))
+}
+
+fn place(event: &Event) -> String {
+    let Event { node, bus, .. } = event;
+    match (AXIS_NAMES.get(event.axis as usize), node) {
+        (Some(axis), 1..) => format!("axis {axis} (node {node} on bus {bus})"),
+        (Some(axis), 0) => format!("axis {axis}"),
+        (None, 1..) => format!("node {node} on bus {bus}"),
+        (None, 0) => format!("bus {bus}"),
+    }
+}
+
+fn complaint(cause: Cause, event: &Event) -> Option<String> {
+    let object = ObjectAddress::new((event.object >> 8) as u16, event.object as u8);
+    let (value, limit) = (event.value as u32, event.limit as u32);
+    Some(match cause {
+        Cause::WrongIdentity | Cause::WrongPdo | Cause::NotAccepted => {
+            format!("object {object} is {value:08X}h, expected {limit:08X}h")
+        }
+        Cause::SdoAborted => format!("object {object}: {}", AbortCode(value)),
+        Cause::SdoTimeout => {
+            format!("object {object}: no answer for {value} ms, asked anew every {limit} ms")
+        }
+        Cause::DuplicateNode => "two answers to one SDO request".to_owned(),
+        Cause::NodeRestarted => "booted although nobody asked it to".to_owned(),
+        Cause::FaultAtStart => format!(
+            "in fault, and a fault reset does not help; error code {}",
+            EmergencyCode(event.value as u16)
+        ),
+        Cause::BootTimeout => format!("not operational after {value} ms"),
+        Cause::HeartbeatLost => format!("silent for {value} ms"),
+        Cause::ProcessDataLost => format!("process data missing for {value} cycles"),
+        Cause::Emergency if value == 0 => "all errors gone (EMCY 0000h)".to_owned(),
+        Cause::Emergency => {
+            format!("EMCY {}, error register {limit:02X}h", EmergencyCode(event.value as u16))
+        }
+        Cause::BusOff => format!("off after too many errors (transmit error counter {value})"),
+        Cause::BusRefused => "a frame could not be sent".to_owned(),
+        Cause::WrongLength => {
+            format!("frame {:03X}h has {value} data bytes, expected {limit}", event.object)
+        }
+        Cause::UnknownNode => "a node that no axis is configured with".to_owned(),
+        _ => return None,
+    })
+}
+
+const fn remedy(cause: Cause) -> Option<&'static str> {
+    Some(match cause {
+        Cause::WrongIdentity => "connect the drive that is configured, or correct can.identity",
+        Cause::WrongPdo => "give the drive the rig's PDO mapping and store it",
+        Cause::NotAccepted => "see whether the drive supports cyclic synchronous position",
+        Cause::SdoAborted => "see the drive's manual for this object",
+        Cause::SdoTimeout => "see power, wiring and bit rate of this drive",
+        Cause::DuplicateNode => "give every node an id of its own, and let no other client use SDO meanwhile",
+        Cause::NodeRestarted => "see its supply; it is booted again once the drives are off",
+        Cause::FaultAtStart => "remove what the drive complains of and switch it on again",
+        Cause::BootTimeout => "see power, wiring, bit rate and node id of this drive",
+        Cause::BusOff => "see bit rate, termination and wiring",
+        Cause::BusRefused => "see that the interface is up, and that somebody acknowledges",
+        Cause::WrongLength => "see who else sends with this identifier, and how the PDO is mapped",
+        Cause::UnknownNode => "see can.buses and can.node_ids",
+        _ => return None,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::messages::codes::NO_AXIS;
+
+    fn event(cause: Cause) -> Event {
+        Event {
+            kind: EventKind::Fault.code(),
+            cause: cause.code(),
+            axis: 3,
+            node: 4,
+            bus: 1,
+            ..Event::default()
+        }
+    }
+
+    #[test]
+    fn faults_say_what_where_and_what_to_do() {
+        let (value, limit) = (f64::from(0x6041_0010), f64::from(0x6040_0010));
+        let pdo = Event { object: 0x16_0001, value, limit, ..event(Cause::WrongPdo) };
+        assert_eq!(
+            explain(&pdo).unwrap(),
+            "axis l1 (node 4 on bus 1): object 1600h:01h is 60410010h, expected 60400010h; give the drive the \
+             rig's PDO mapping and store it"
+        );
+        let value = f64::from(AbortCode::READ_ONLY.0);
+        let refused = Event { object: 0x10_1700, value, ..event(Cause::SdoAborted) };
+        assert!(explain(&refused).unwrap().contains("object 1017h:00h: 06010002h (object is read-only)"));
+        let off = Event { axis: NO_AXIS, node: 0, value: 256.0, ..event(Cause::BusOff) };
+        assert!(explain(&off).unwrap().starts_with("bus 1: off after"));
+    }
+
+    #[test]
+    fn what_figures_say_alone_is_left_to_them() {
+        assert_eq!(explain(&event(Cause::CommandLost)), None);
+        let moved = Event { kind: EventKind::Transition.code(), ..event(Cause::BootTimeout) };
+        assert_eq!(explain(&moved), None);
+    }
+}
