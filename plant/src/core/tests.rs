@@ -58,7 +58,7 @@ impl Bench {
 
     /// Cycles in which the drives are asked to hold where they stand, until all are enabled.
     fn enable(&mut self) {
-        for _ in 0..200 {
+        for _ in 0..500 {
             self.cycle(Some(&|reading| (reading.position_m, DriveRequest::Enable)));
             if self.reading.drive_state == ENABLED {
                 return;
