@@ -34,7 +34,7 @@ enum Verb {
     Ik(CsvArgs),
     /// Emulate the six drives and their mechanism on real CAN interfaces, for a master elsewhere
     Plant(PlantArgs),
-    /// The report of a run folder, again
+    /// The report of a run folder, again; or two runs side by side
     Report(ReportArgs),
     /// Is this machine fit for real-time runs?
     Doctor(DoctorArgs),
@@ -119,6 +119,9 @@ pub struct RunArgs {
     /// Exit with 3 unless core, SCHED_FIFO and locked memory are all granted
     #[arg(long)]
     pub require_rt: bool,
+    /// Show no progress
+    #[arg(long)]
+    pub quiet: bool,
 }
 
 /// What the buses run on: real interfaces, or none for simulated buses.
@@ -197,6 +200,8 @@ struct ReportArgs {
     /// Run folder
     #[arg(default_value = "runs/latest")]
     folder: PathBuf,
+    /// Another run folder, to set beside the first
+    against: Option<PathBuf>,
     /// How the result is written to standard output
     #[arg(long, value_enum, default_value_t)]
     format: Format,
@@ -230,6 +235,8 @@ struct LoggerArgs {
     process: ProcessArgs,
     #[arg(long)]
     recording: PathBuf,
+    #[arg(long)]
+    quiet: bool,
 }
 
 pub(crate) fn parse_cores(text: &str) -> Result<[usize; 2], String> {
@@ -278,6 +285,9 @@ pub fn main() -> ExitCode {
         Verb::Can(CanVerb::Eds(args)) => can::eds(&args),
         Verb::Can(CanVerb::Dbc { scenario }) => can::dbc(scenario.as_deref()),
         Verb::Can(CanVerb::Serve(args)) => can::serve(&args),
+        Verb::Report(ReportArgs { folder, against: Some(against), format }) => {
+            report::compare::runs(&folder, &against, format)
+        }
         Verb::Report(args) => report::again(&args.folder, args.format),
         Verb::Doctor(args) => doctor::examine(args.format),
         Verb::Log { verb } => log::run(&verb),
@@ -291,7 +301,9 @@ pub fn main() -> ExitCode {
             })
             .map_err(Failure::from),
         Verb::Plant(args) => plant::plant(&args),
-        Verb::Logger(args) => logger::run(&args.process.assignment(), &args.recording).map_err(Failure::from),
+        Verb::Logger(args) => {
+            logger::run(&args.process.assignment(), &args.recording, args.quiet).map_err(Failure::from)
+        }
     };
     match result {
         Ok(exit) => exit.into(),

@@ -17,6 +17,7 @@ use serde::Serialize;
 
 use super::AnalysisError;
 use super::join::ByCycle;
+use super::noise::standard_error;
 
 /// Below this many samples the 99.9th percentile rests on fewer than ten of them and is not given.
 const SAMPLES_FOR_P999: u64 = 10_000;
@@ -34,14 +35,21 @@ pub struct IntervalFigures {
     pub n: u64,
     /// Median, ns.
     pub p50_ns: u64,
+    /// Standard error of the median, by its seconds, ns; none with less than three of them.
+    pub p50_noise_ns: Option<f64>,
     /// 99th percentile, ns.
     pub p99_ns: u64,
+    /// Standard error of the 99th percentile, by its seconds, ns.
+    pub p99_noise_ns: Option<f64>,
     /// 99.9th percentile, ns; only with at least 10,000 samples.
     pub p999_ns: Option<u64>,
     /// Largest, ns.
     pub max_ns: u64,
     /// When the largest was, ns of the run's clock.
     pub max_at_ns: u64,
+    /// The distribution, for plots: 1/(1 − quantile) and value in ns.
+    #[serde(skip)]
+    pub curve: Vec<(f64, u64)>,
 }
 
 /// Names of the intervals, in the order in which a cycle passes through them.
@@ -159,6 +167,13 @@ impl Intervals {
     }
 }
 
+/// The distribution as HdrHistogram plots it; the largest value stands where its own share ends.
+fn curve(total: &Histogram<u64>) -> Vec<(f64, u64)> {
+    let points = total.iter_quantiles(5).map(|step| (step.quantile_iterated_to(), step.value_iterated_to()));
+    let samples = total.len() as f64;
+    points.map(|(quantile, value)| ((1.0 / (1.0 - quantile)).min(samples), value)).collect()
+}
+
 /// One interval: the whole run's histogram, and one for each second of it.
 struct Series {
     name: &'static str,
@@ -169,6 +184,8 @@ struct Series {
     second_began_ns: u64,
     /// Past seconds, serialised: a hundredth of their size in memory.
     seconds: Vec<(u64, Vec<u8>)>,
+    medians_ns: Vec<f64>,
+    p99s_ns: Vec<f64>,
 }
 
 fn histogram() -> Histogram<u64> {
@@ -179,7 +196,17 @@ impl Series {
     fn new(name: &'static str, folder: &Path) -> Self {
         let path = folder.join(format!("{}.hlog", name.replace(' ', "-")));
         let (total, second) = (histogram(), histogram());
-        Self { name, path, total, max_at_ns: 0, second, second_began_ns: 0, seconds: Vec::new() }
+        Self {
+            name,
+            path,
+            total,
+            max_at_ns: 0,
+            second,
+            second_began_ns: 0,
+            seconds: Vec::new(),
+            medians_ns: Vec::new(),
+            p99s_ns: Vec::new(),
+        }
     }
 
     fn add(&mut self, value_ns: u64, at_ns: u64) {
@@ -202,6 +229,8 @@ impl Series {
         let mut bytes = Vec::new();
         V2Serializer::new().serialize(&self.second, &mut bytes).expect("memory takes any histogram");
         self.seconds.push((self.second_began_ns, bytes));
+        self.medians_ns.push(self.second.value_at_quantile(0.50) as f64);
+        self.p99s_ns.push(self.second.value_at_quantile(0.99) as f64);
         self.second.reset();
     }
 
@@ -213,10 +242,13 @@ impl Series {
             name: self.name,
             n: total.len(),
             p50_ns: total.value_at_quantile(0.50),
+            p50_noise_ns: standard_error(&self.medians_ns),
             p99_ns: total.value_at_quantile(0.99),
+            p99_noise_ns: standard_error(&self.p99s_ns),
             p999_ns: (total.len() >= SAMPLES_FOR_P999).then(|| total.value_at_quantile(0.999)),
             max_ns: total.max(),
             max_at_ns: self.max_at_ns,
+            curve: curve(total),
         })
     }
 

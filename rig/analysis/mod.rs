@@ -8,7 +8,11 @@ mod events;
 mod exports;
 mod intervals;
 mod join;
+mod ledger;
+mod noise;
+mod over_time;
 mod sequence;
+mod series;
 mod skips;
 mod tracking;
 
@@ -27,12 +31,16 @@ pub use events::EventRecord;
 pub(crate) use exports::CandumpLogs;
 pub use intervals::IntervalFigures;
 use intervals::Intervals;
+use ledger::Ledger;
+pub use ledger::WorstCycle;
+use over_time::Watch;
+pub use over_time::{Curve, OverTime};
 pub(crate) use sequence::SequenceCheck;
 pub use sequence::TopicFigures;
 pub use skips::SkipFigures;
 use skips::{Counters, Skips};
 use tracking::Tracking;
-pub use tracking::{Reference, TrackingFigures, TrackingSample};
+pub use tracking::{Reference, Track, TrackingFigures, TrackingSample};
 
 /// Why a run could not be analysed.
 #[derive(Debug, thiserror::Error)]
@@ -72,6 +80,8 @@ pub struct Figures {
     pub tracking: TrackingFigures,
     /// Measured intervals.
     pub intervals: Vec<IntervalFigures>,
+    /// The cycles that took longest, with the hop to blame.
+    pub worst_cycles: Vec<WorstCycle>,
     /// Messages and losses of each topic.
     pub topics: Vec<TopicFigures>,
     /// Frames on each bus.
@@ -84,7 +94,10 @@ pub struct Figures {
     pub damage: Vec<Damage>,
     /// Tracking over time, for plots.
     #[serde(skip)]
-    pub track: Vec<TrackingSample>,
+    pub track: Track,
+    /// The run along its time, for plots.
+    #[serde(skip)]
+    pub over_time: OverTime,
 }
 
 impl Figures {
@@ -118,10 +131,12 @@ pub fn analyse(folder: &RunFolder, scenario: &Scenario) -> Result<Figures, Analy
 struct Pass {
     period_ns: u64,
     intervals: Intervals,
+    ledger: Ledger,
     tracking: Tracking,
     sequence: SequenceCheck,
     candump: CandumpLogs,
     events: EventLog,
+    watch: Watch,
     cycles: u64,
     first_sample_ns: Option<u64>,
     last_sample_ns: u64,
@@ -136,10 +151,12 @@ impl Pass {
         Ok(Self {
             period_ns: scenario.period_ns(),
             intervals: Intervals::new(&folder.histograms())?,
+            ledger: Ledger::default(),
             tracking: Tracking::against(reference),
             sequence: SequenceCheck::default(),
             candump: CandumpLogs::new(folder.path(), &scenario.can.interfaces),
             events: EventLog::create(folder.events())?,
+            watch: Watch::on(scenario.can.rates().ok()),
             cycles: 0,
             first_sample_ns: None,
             last_sample_ns: 0,
@@ -164,10 +181,13 @@ impl Pass {
 
     fn command(&mut self, command: &Command) {
         self.intervals.command(command);
+        self.ledger.command(command);
     }
 
     fn reading(&mut self, reading: &Reading) {
         self.intervals.reading(reading);
+        self.ledger.reading(reading);
+        self.watch.reading(reading);
         self.plant_skips.take(&Counters::from(reading), self.period_ns);
         self.first_sample_ns.get_or_insert(reading.sampled_ns);
         self.last_sample_ns = reading.sampled_ns;
@@ -175,6 +195,8 @@ impl Pass {
 
     fn state(&mut self, state: &State) {
         self.intervals.state(state);
+        self.ledger.state(state);
+        self.watch.state(state);
         self.tracking.state(state);
         self.cycles += 1;
         self.controller_skips.take(&Counters::from(state), self.period_ns);
@@ -183,9 +205,11 @@ impl Pass {
 
     fn truth(&mut self, truth: &Truth) {
         self.tracking.truth(truth);
+        self.watch.truth(truth);
     }
 
     fn frame(&mut self, frame: &FrameTap) -> Result<(), AnalysisError> {
+        self.watch.frame(frame);
         self.candump.write(frame)
     }
 
@@ -195,6 +219,7 @@ impl Pass {
 
     fn finish(self, reader: &Reader) -> Result<Figures, AnalysisError> {
         let (tracking, track) = self.tracking.finish();
+        let intervals = self.intervals.finish()?;
         let duration_ns = self.last_sample_ns - self.first_sample_ns.unwrap_or(self.last_sample_ns);
         Ok(Figures {
             cycles: self.cycles,
@@ -204,13 +229,15 @@ impl Pass {
             plant_skips: self.plant_skips.figures(),
             final_state: self.final_state,
             tracking,
-            intervals: self.intervals.finish()?,
+            worst_cycles: self.ledger.finish(&intervals),
+            intervals,
             topics: self.sequence.finish(),
             frames: self.candump.finish()?,
             events: self.events.finish()?,
             cut_short: reader.was_cut_short(),
             damage: reader.damage().to_vec(),
             track,
+            over_time: self.watch.finish(),
         })
     }
 }

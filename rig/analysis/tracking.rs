@@ -1,12 +1,15 @@
 //! How far the platform was from where it should have been: in truth where the mechanism is emulated, by
 //! the forward kinematics' estimate on the robot, whose truth nobody knows.
 
+use masseter_shared::clock::SECOND_NS;
 use masseter_shared::geometry::Pose;
 use masseter_shared::messages::codes::ControllerState;
 use masseter_shared::messages::{State, Truth, pose_of_fields};
 use serde::Serialize;
 
 use super::join::ByCycle;
+use super::noise::standard_error;
+use super::series::{Extremes, Series, Thinned};
 
 /// States in which the platform is asked to be somewhere.
 const MOVING: [ControllerState; 3] =
@@ -42,6 +45,8 @@ pub struct TrackingFigures {
     pub samples: u64,
     /// Root mean square distance of the platform's origin, reference against wanted, mm.
     pub rms_mm: f64,
+    /// Standard error of that figure, by its seconds, mm; none with less than three of them.
+    pub rms_noise_mm: Option<f64>,
     /// Largest distance, mm.
     pub max_mm: f64,
     /// Root mean square angle, reference against wanted, degrees.
@@ -52,15 +57,27 @@ pub struct TrackingFigures {
     pub estimate_rms_mm: Option<f64>,
 }
 
-/// One cycle of the track, from the first easing to the last hold.
+/// One cycle of the track.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TrackingSample {
     /// When, ns.
     pub sampled_ns: u64,
-    /// Wanted position of the platform's origin, m.
-    pub desired_m: [f64; 3],
-    /// Position by the reference, m.
-    pub found_m: [f64; 3],
+    /// Pose wanted.
+    pub desired: Pose,
+    /// Pose found by forward kinematics.
+    pub estimated: Pose,
+    /// Pose by the reference.
+    pub found: Pose,
+}
+
+/// The platform from the first easing to the last hold.
+#[derive(Debug, Clone, Default)]
+pub struct Track {
+    /// Every n-th cycle.
+    pub samples: Vec<TrackingSample>,
+    /// Largest distance from the wanted position in each stretch of time, m, by seconds since the first
+    /// sample.
+    pub distance_m: Vec<(f64, f64)>,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -80,7 +97,12 @@ pub(super) struct Tracking {
     distances: Accumulator,
     angles: Accumulator,
     estimates: Accumulator,
-    track: Vec<TrackingSample>,
+    track: Thinned<TrackingSample>,
+    began_ns: Option<u64>,
+    distance_m: Series<Extremes<1>>,
+    second: Accumulator,
+    second_ends_ns: u64,
+    seconds: Vec<f64>,
 }
 
 #[derive(Debug, Default)]
@@ -136,33 +158,48 @@ impl Tracking {
     }
 
     fn compare(&mut self, wanted: &Wanted, (sampled_ns, found): (u64, Pose)) {
-        let position = found.translation.vector;
+        let distance_m = (wanted.desired.translation.vector - found.translation.vector).norm();
         if wanted.state == ControllerState::Running.code() {
-            self.distances.add((wanted.desired.translation.vector - position).norm());
+            self.distances.add(distance_m);
             self.angles.add(wanted.desired.rotation.angle_to(&found.rotation));
-            self.estimates.add((wanted.estimated.translation.vector - position).norm());
+            self.estimates.add((wanted.estimated.translation.vector - found.translation.vector).norm());
+            self.add_to_second(distance_m, sampled_ns);
         }
         if MOVING.iter().any(|state| state.code() == wanted.state) {
-            self.track.push(TrackingSample {
-                sampled_ns,
-                desired_m: wanted.desired.translation.vector.into(),
-                found_m: position.into(),
-            });
+            let began_ns = *self.began_ns.get_or_insert(sampled_ns);
+            self.distance_m.at(sampled_ns.saturating_sub(began_ns)).take(0, distance_m);
+            let Wanted { desired, estimated, .. } = *wanted;
+            self.track.push(TrackingSample { sampled_ns, desired, estimated, found });
         }
     }
 
-    pub(super) fn finish(self) -> (TrackingFigures, Vec<TrackingSample>) {
+    /// Seconds of the motion, each with an error of its own: how much they differ is the figure's noise.
+    fn add_to_second(&mut self, distance_m: f64, sampled_ns: u64) {
+        if sampled_ns >= self.second_ends_ns {
+            if self.second.samples > 0 {
+                self.seconds.push(self.second.rms() * 1e3);
+            }
+            self.second = Accumulator::default();
+            self.second_ends_ns = sampled_ns + SECOND_NS;
+        }
+        self.second.add(distance_m);
+    }
+
+    pub(super) fn finish(self) -> (TrackingFigures, Track) {
         let has_truth = self.reference == Reference::Truth;
         let figures = TrackingFigures {
             reference: self.reference,
             samples: self.distances.samples,
             rms_mm: self.distances.rms() * 1e3,
+            rms_noise_mm: standard_error(&self.seconds),
             max_mm: self.distances.largest * 1e3,
             rms_deg: self.angles.rms().to_degrees(),
             max_deg: self.angles.largest.to_degrees(),
             estimate_rms_mm: has_truth.then(|| self.estimates.rms() * 1e3),
         };
-        (figures, self.track)
+        let distances = self.distance_m.iter().map(|(at_s, stretch)| (at_s, stretch.highest[0]));
+        let distance_m = distances.filter(|(_, distance_m)| distance_m.is_finite()).collect();
+        (figures, Track { samples: self.track.into_samples(), distance_m })
     }
 }
 
@@ -198,7 +235,7 @@ mod tests {
         let (figures, track) = tracking.finish();
         assert_eq!((figures.samples, figures.estimate_rms_mm), (1, None));
         assert!((figures.rms_mm - 2.0).abs() < 1e-9);
-        assert!((track[0].found_m[0] - 0.001).abs() < 1e-12);
+        assert!((track.samples[0].found.translation.x - 0.001).abs() < 1e-12);
     }
 
     #[test]
@@ -210,7 +247,7 @@ mod tests {
         tracking.truth(&truth(1, 0.000));
         tracking.truth(&truth(3, 9.000));
         let (figures, track) = tracking.finish();
-        assert_eq!((figures.samples, track.len()), (2, 2));
+        assert_eq!((figures.samples, track.samples.len()), (2, 2));
         assert!((figures.max_mm - 4.0).abs() < 1e-9);
         assert!((figures.rms_mm - (12.5f64).sqrt()).abs() < 1e-9);
     }

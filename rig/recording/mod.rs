@@ -22,6 +22,7 @@ pub use backlog::{Backlog, Outcome};
 pub use reader::{Chunks, Entry, ReadError, Reader, Schema};
 pub use recover::{RecoverError, Recovered, recover};
 pub use scene::Scene;
+pub(crate) use scene::jaw_points;
 pub use topic::Topic;
 pub use walk::Damage;
 pub use writer::{DurableFile, Recorder, WriteError};

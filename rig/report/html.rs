@@ -3,18 +3,15 @@
 use std::fmt::Write;
 
 use super::junit::escape;
-use super::plot;
+use super::plot::Drawn;
 use super::table::{self, in_words};
+use super::{charts, events, film};
 use crate::analysis::Figures;
 use crate::report::verdict::Verdict;
 use crate::run::manifest::Manifest;
 
-const STYLE: &str = "body{font:15px/1.5 system-ui,sans-serif;max-width:62rem;margin:2rem auto;padding:0 1rem;color:#222}\
-h1{font-size:1.5rem}h2{font-size:1.1rem;margin-top:2rem}table{border-collapse:collapse}\
-td,th{padding:.15rem .8rem;border-bottom:1px solid #ddd;text-align:right}\
-td:first-child,th:first-child{text-align:left;padding-left:0}\
-.verdict{padding:.6rem 1rem;border-left:.5rem solid #b00020;background:#fbeaec}\
-.verdict.pass{border-color:#1b7f3b;background:#e9f5ec}svg{max-width:100%;height:auto}code{background:#f3f3f3}";
+const STYLE: &str = include_str!("page/style.css");
+const MECHANISM: &str = include_str!("page/mechanism.js");
 
 /// The page.
 pub(super) fn of_run(manifest: &Manifest, figures: &Figures, verdict: &Verdict) -> String {
@@ -30,28 +27,61 @@ fn write_page(
     verdict: &Verdict,
 ) -> std::fmt::Result {
     let name = escape(&manifest.scenario.name);
-    let class = if verdict.word == "PASS" { "verdict pass" } else { "verdict" };
+    let class = if verdict.word == "PASS" { "pass" } else { "" };
     write!(
         page,
         "<!doctype html>\n<html lang=\"en\"><meta charset=\"utf-8\"><title>Masseter: {name}</title>\
-         <style>{STYLE}</style>\n<h1>{name}</h1>\n<p class=\"{class}\"><strong>{}</strong>: {}</p>\n",
+         <style>{STYLE}</style>\n<h1>{name}</h1>\n<p id=\"verdict\" class=\"{class}\"><strong>{}</strong>: {}</p>\n",
         verdict.word,
         escape(&verdict.reason)
     )?;
     checks(page, verdict)?;
+    mechanism(page, manifest, figures)?;
     motion(page, figures)?;
-    latencies(page, figures)?;
+    actuators(page, manifest, figures)?;
+    latencies(page, manifest, figures)?;
+    worst_cycles(page, figures)?;
+    messages(page, figures)?;
     happenings(page, figures)?;
     circumstances(page, manifest)
 }
 
 fn checks(page: &mut String, verdict: &Verdict) -> std::fmt::Result {
-    page.push_str("<h2>Checks</h2>\n<table>\n");
+    page.push_str("<h2>Checks</h2>\n<table id=\"checks\">\n");
     for check in &verdict.checks {
-        let mark = if check.passed { "ok" } else { "FAILED" };
-        writeln!(page, "<tr><td>{}<td>{mark}<td>{}", check.name, escape(&check.finding))?;
+        let (class, mark) = if check.passed { ("", "ok") } else { ("failed", "FAILED") };
+        writeln!(page, "<tr><td>{}<td class=\"{class}\">{mark}<td>{}", check.name, escape(&check.finding))?;
     }
     page.push_str("</table>\n");
+    Ok(())
+}
+
+/// The 3-D view with its data and its program.
+fn mechanism(page: &mut String, manifest: &Manifest, figures: &Figures) -> std::fmt::Result {
+    let Some(film) = film::of_track(&manifest.scenario, &figures.track) else { return Ok(()) };
+    // JSON of numbers and fixed names holds no `<` that could end the element.
+    writeln!(
+        page,
+        "<h2>Mechanism</h2>\n<canvas id=\"mechanism\" width=\"1200\" height=\"640\"></canvas>\n\
+         <p><button id=\"play\">pause</button> <input id=\"time\" type=\"range\" min=\"0\" max=\"1\" step=\"any\" value=\"0\"> \
+         <span id=\"clock\"></span><br>Platform: <span style=\"color:#0072b2\">true</span>, \
+         <span style=\"color:#d55e00\">estimated (dashed)</span>, <span style=\"color:#009e73\">wanted (dotted)</span>; \
+         <span style=\"color:#b00020\">incisal point and condyles</span>. Drag to turn.</p>\n\
+         <script type=\"application/json\" id=\"film\">{film}</script>\n<script>\n{MECHANISM}</script>"
+    )
+}
+
+/// A plot under an id, with what did not fit into it; or why there is none.
+fn plot(page: &mut String, id: &str, drawn: Option<Drawn>, otherwise: &str) -> std::fmt::Result {
+    let Some(Drawn { svg, beyond }) = drawn else {
+        return writeln!(page, "<p id=\"{id}\">{otherwise}</p>");
+    };
+    writeln!(page, "<div id=\"{id}\">{svg}</div>")?;
+    if !beyond.is_empty() {
+        let limits: Vec<_> =
+            beyond.iter().map(|limit| format!("{} {:.0?}", limit.name, limit.values)).collect();
+        writeln!(page, "<p>Limits far beyond the curves: {}.</p>", escape(&limits.join(", ")))?;
+    }
     Ok(())
 }
 
@@ -70,13 +100,21 @@ fn motion(page: &mut String, figures: &Figures) -> std::fmt::Result {
         writeln!(page, "Estimated against true: rms {rms_mm:.4} mm.")?;
     }
     page.push_str("</p>\n");
-    for svg in plot::of_track(&figures.track).into_iter().flatten() {
-        page.push_str(&svg);
+    let [displacement, error] = charts::motion(figures);
+    plot(page, "motion", displacement, "Nothing moved.")?;
+    plot(page, "error", error, "Nothing moved.")
+}
+
+fn actuators(page: &mut String, manifest: &Manifest, figures: &Figures) -> std::fmt::Result {
+    page.push_str("<h2>Actuators</h2>\n<p>Each curve touches the lowest and the highest value of every stretch of time.</p>\n");
+    let ids = ["slides", "legs", "velocities", "forces"];
+    for (id, drawn) in ids.iter().zip(charts::actuators(&manifest.scenario, figures)) {
+        plot(page, id, drawn, "The recording holds no truth.")?;
     }
     Ok(())
 }
 
-fn latencies(page: &mut String, figures: &Figures) -> std::fmt::Result {
+fn latencies(page: &mut String, manifest: &Manifest, figures: &Figures) -> std::fmt::Result {
     page.push_str("<h2>Latencies, µs</h2>\n<table>\n<tr><th>interval<th>n<th>p50<th>p99<th>p99.9<th>max\n");
     for interval in &figures.intervals {
         writeln!(
@@ -99,16 +137,46 @@ fn latencies(page: &mut String, figures: &Figures) -> std::fmt::Result {
         figures.controller_skips.stalled_ns as f64 / 1e6,
         figures.plant_skips.stalled_ns as f64 / 1e6
     )?;
-    page.push_str("<table>\n<tr><th>topic<th>messages<th>dropped\n");
-    for topic in &figures.topics {
-        writeln!(page, "<tr><td>{}<td>{}<td>{}", topic.topic, topic.messages, topic.missing)?;
+    plot(page, "percentiles", charts::percentiles(&manifest.scenario, figures), "No interval was measured.")?;
+    plot(page, "jitter", charts::jitter(figures), "Under virtual time nobody is late.")
+}
+
+/// The longest cycles, with what made them so.
+fn worst_cycles(page: &mut String, figures: &Figures) -> std::fmt::Result {
+    page.push_str(
+        "<h2>Longest cycles, µs</h2>\n<p>From the plant's deadline to the command on the wire, and the hop \
+         furthest above its median.</p>\n<table id=\"worst\">\n\
+         <tr><th>cycle<th>at, s<th>took<th>hop to blame<th>it took<th>its median<th>machine stood still\n",
+    );
+    for worst in &figures.worst_cycles {
+        writeln!(
+            page,
+            "<tr><td>{}<td>{:.3}<td>{}<td>{}<td>{}<td>{}<td>{}",
+            worst.cycle,
+            worst.due_ns.saturating_sub(figures.over_time.began_ns) as f64 / 1e9,
+            table::microseconds(worst.total_ns),
+            worst.hop,
+            table::microseconds(worst.hop_ns),
+            table::microseconds(worst.hop_p50_ns),
+            table::microseconds(worst.stalled_ns),
+        )?;
     }
     page.push_str("</table>\n");
     Ok(())
 }
 
+fn messages(page: &mut String, figures: &Figures) -> std::fmt::Result {
+    page.push_str("<h2>Messages and buses</h2>\n<table>\n<tr><th>topic<th>messages<th>dropped\n");
+    for topic in &figures.topics {
+        writeln!(page, "<tr><td>{}<td>{}<td>{}", topic.topic, topic.messages, topic.missing)?;
+    }
+    page.push_str("</table>\n");
+    plot(page, "buses", charts::bus_load(figures), "No frame was recorded.")
+}
+
 fn happenings(page: &mut String, figures: &Figures) -> std::fmt::Result {
-    page.push_str("<h2>Events</h2>\n<ul>\n");
+    let time_line = events::time_line(figures).unwrap_or_else(|| "Nothing happened.".to_owned());
+    write!(page, "<h2>Events</h2>\n<div id=\"events\">{time_line}</div>\n<ul>\n")?;
     for event in &figures.events {
         writeln!(page, "<li><code>{}</code>", escape(&in_words(event)))?;
     }
@@ -120,7 +188,7 @@ fn circumstances(page: &mut String, manifest: &Manifest) -> std::fmt::Result {
     let machine = &manifest.machine;
     writeln!(
         page,
-        "<h2>Circumstances</h2>\n<p>{} UTC, masseter {}, {} clock. {}, {} cores, {}.</p>\n\
+        "<h2 id=\"circumstances\">Circumstances</h2>\n<p>{} UTC, masseter {}, {} clock. {}, {} cores, {}.</p>\n\
          <p>The same run again: <code>masseter run scenario.toml --clock {}</code> with the scenario of this folder.</p>",
         escape(manifest.began.trim_end_matches('Z')),
         escape(&manifest.masseter),

@@ -2,6 +2,10 @@
 //!
 //! Everything is computed from the manifest and the recording, so `masseter report` can do it again.
 
+mod charts;
+pub(crate) mod compare;
+mod events;
+mod film;
 mod html;
 mod junit;
 mod plot;

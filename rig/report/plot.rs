@@ -1,79 +1,216 @@
-//! Curves over time as SVG.
+//! Curves as SVG.
 
 use std::error::Error;
 
 use plotters::prelude::*;
 
-use crate::analysis::TrackingSample;
-
 const SIZE: (u32, u32) = (960, 260);
-/// Points a curve is thinned to, by taking every n-th.
-const POINTS: usize = 2000;
+/// Colours that colour-blind people can tell apart (Okabe and Ito).
+const COLOURS: [RGBColor; 8] = [
+    RGBColor(0x00, 0x72, 0xb2),
+    RGBColor(0xd5, 0x5e, 0x00),
+    RGBColor(0x00, 0x9e, 0x73),
+    RGBColor(0xcc, 0x79, 0xa7),
+    RGBColor(0xe6, 0x9f, 0x00),
+    RGBColor(0x56, 0xb4, 0xe9),
+    RGBColor(0x66, 0x66, 0x66),
+    RGBColor(0x9a, 0x7d, 0x0a),
+];
+const LIMIT: RGBColor = RGBColor(0xb0, 0x00, 0x20);
+/// Room for the legend, as a share of the plot's width.
+const LEGEND: f64 = 0.2;
+/// A limit further from the curves than this many times their own height is not drawn, but said.
+const FAR: f64 = 1.5;
 
-/// A curve: its name and its points (seconds, value).
-struct Curve {
-    name: &'static str,
-    colour: RGBColor,
-    points: Vec<(f64, f64)>,
+/// How values lie along an axis.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Scale {
+    /// Evenly.
+    Linear,
+    /// By their decades.
+    Log,
+    /// 1/(1 − quantile) by its decades, labelled as percentiles.
+    Percentile,
 }
 
-/// The platform's true height and its distance from the wanted position over time.
-pub(super) fn of_track(track: &[TrackingSample]) -> Option<[String; 2]> {
-    let first_ns = track.first()?.sampled_ns;
-    let every = track.len().div_ceil(POINTS);
-    let curve = |name, colour, value: &dyn Fn(&TrackingSample) -> f64| Curve {
-        name,
-        colour,
-        points: track
-            .iter()
-            .step_by(every)
-            .map(|sample| ((sample.sampled_ns - first_ns) as f64 / 1e9, value(sample)))
-            .collect(),
-    };
-    let height = [
-        curve("wanted", RGBColor(0xd5, 0x5e, 0x00), &|sample| sample.desired_m[2] * 1e3),
-        curve("true", RGBColor(0x00, 0x72, 0xb2), &|sample| sample.found_m[2] * 1e3),
-    ];
-    let error = [curve("true against wanted", RGBColor(0x00, 0x72, 0xb2), &|sample| {
-        let squares = (0..3).map(|i| (sample.desired_m[i] - sample.found_m[i]).powi(2));
-        squares.sum::<f64>().sqrt() * 1e3
-    })];
-    Some([draw("height of the platform, mm", &height).ok()?, draw("distance, mm", &error).ok()?])
-}
-
-fn draw(label: &str, curves: &[Curve]) -> Result<String, Box<dyn Error>> {
-    let points = || curves.iter().flat_map(|curve| curve.points.iter());
-    let end_s = points().map(|point| point.0).fold(0.0, f64::max);
-    let low = points().map(|point| point.1).fold(f64::INFINITY, f64::min);
-    let high = points().map(|point| point.1).fold(f64::NEG_INFINITY, f64::max);
-    let margin = ((high - low) * 0.05).max(1e-6);
-
-    let mut svg = String::new();
-    {
-        let area = SVGBackend::with_string(&mut svg, SIZE).into_drawing_area();
-        area.fill(&WHITE)?;
-        let mut chart = ChartBuilder::on(&area)
-            .margin(12)
-            .x_label_area_size(36)
-            .y_label_area_size(64)
-            .build_cartesian_2d(0.0..end_s, low - margin..high + margin)?;
-        chart.configure_mesh().light_line_style(WHITE).x_desc("time, s").y_desc(label).draw()?;
-        for curve in curves {
-            let colour = curve.colour;
-            chart
-                .draw_series(LineSeries::new(curve.points.iter().copied(), colour))?
-                .label(curve.name)
-                .legend(move |(x, y)| PathElement::new([(x, y), (x + 16, y)], colour));
+impl Scale {
+    fn place(self, value: f64) -> f64 {
+        match self {
+            Self::Linear => value,
+            Self::Log | Self::Percentile => value.log10(),
         }
-        if curves.len() > 1 {
-            chart
-                .configure_series_labels()
-                .position(SeriesLabelPosition::LowerLeft)
-                .background_style(WHITE)
-                .border_style(BLACK)
-                .draw()?;
-        }
-        area.present()?;
     }
-    Ok(svg)
+
+    /// How many labels an axis takes: one a decade where there are some.
+    fn labels(self, from: f64, to: f64) -> usize {
+        if self == Self::Linear || to - from < 2.0 { 10 } else { (to - from).ceil() as usize + 1 }
+    }
+
+    fn label(self, place: f64) -> String {
+        match self {
+            Self::Linear => format!("{}", (place * 1e6).round() / 1e6),
+            Self::Log => {
+                format!("{:.3}", 10f64.powf(place)).trim_end_matches('0').trim_end_matches('.').to_owned()
+            }
+            Self::Percentile => {
+                let decimals = (place.round() as usize).saturating_sub(2);
+                format!("{:.decimals$} %", 100.0 * (1.0 - 10f64.powf(-place)))
+            }
+        }
+    }
+}
+
+/// A named curve.
+pub(super) struct Line {
+    pub name: String,
+    pub points: Vec<(f64, f64)>,
+}
+
+/// Levels that must not be passed.
+pub(super) struct Limit {
+    pub name: String,
+    pub values: Vec<f64>,
+}
+
+/// What is drawn.
+pub(super) struct Chart {
+    pub x_label: &'static str,
+    pub x: Scale,
+    pub y_label: &'static str,
+    pub y: Scale,
+    pub lines: Vec<Line>,
+    pub limits: Vec<Limit>,
+}
+
+/// What was drawn.
+pub(super) struct Drawn {
+    pub svg: String,
+    /// Limits too far away to be drawn.
+    pub beyond: Vec<Limit>,
+}
+
+/// The corners of a plot, in places of its scales.
+struct Frame {
+    left: f64,
+    right: f64,
+    low: f64,
+    high: f64,
+}
+
+impl Chart {
+    /// Curves over time.
+    pub(super) fn over_time(y_label: &'static str, lines: Vec<Line>, limits: Vec<Limit>) -> Self {
+        Self { x_label: "time, s", x: Scale::Linear, y_label, y: Scale::Linear, lines, limits }
+    }
+
+    /// Draws it; none without a single point.
+    pub(super) fn draw(mut self) -> Option<Drawn> {
+        let mut frame = self.frame()?;
+        let (near, beyond) = std::mem::take(&mut self.limits).into_iter().partition(|limit| {
+            let far = FAR * (frame.high - frame.low);
+            let near = frame.low - far..=frame.high + far;
+            self.y != Scale::Linear || limit.values.iter().any(|value| near.contains(value))
+        });
+        self.limits = near;
+        for place in self.limits.iter().flat_map(|limit| &limit.values).map(|value| self.y.place(*value)) {
+            frame.low = frame.low.min(place);
+            frame.high = frame.high.max(place);
+        }
+        frame.right += LEGEND * (frame.right - frame.left);
+        let margin = ((frame.high - frame.low) * 0.05).max(1e-6);
+        frame.low -= margin;
+        frame.high += margin;
+        let svg = self.svg(&frame).ok()?;
+        Some(Drawn { svg, beyond })
+    }
+
+    fn frame(&self) -> Option<Frame> {
+        let points = || self.lines.iter().flat_map(|line| &line.points);
+        points().next()?;
+        let xs = || points().map(|point| self.x.place(point.0));
+        let ys = || points().map(|point| self.y.place(point.1));
+        Some(Frame {
+            left: xs().fold(f64::INFINITY, f64::min).min(0.0),
+            right: xs().fold(f64::NEG_INFINITY, f64::max).max(1e-6),
+            low: ys().fold(f64::INFINITY, f64::min),
+            high: ys().fold(f64::NEG_INFINITY, f64::max),
+        })
+    }
+
+    fn svg(&self, frame: &Frame) -> Result<String, Box<dyn Error>> {
+        let mut svg = String::new();
+        {
+            let area = SVGBackend::with_string(&mut svg, SIZE).into_drawing_area();
+            area.fill(&WHITE)?;
+            let mut chart = ChartBuilder::on(&area)
+                .margin(12)
+                .x_label_area_size(36)
+                .y_label_area_size(64)
+                .build_cartesian_2d(frame.left..frame.right, frame.low..frame.high)?;
+            chart
+                .configure_mesh()
+                .light_line_style(WHITE)
+                .x_desc(self.x_label)
+                .y_desc(self.y_label)
+                .x_labels(self.x.labels(frame.left, frame.right))
+                .y_labels(self.y.labels(frame.low, frame.high))
+                .x_label_formatter(&|place| self.x.label(*place))
+                .y_label_formatter(&|place| self.y.label(*place))
+                .draw()?;
+            for (line, colour) in self.lines.iter().zip(COLOURS.iter().cycle()) {
+                let points = line.points.iter().map(|point| (self.x.place(point.0), self.y.place(point.1)));
+                chart
+                    .draw_series(LineSeries::new(points, *colour))?
+                    .label(&line.name)
+                    .legend(move |(x, y)| PathElement::new([(x, y), (x + 16, y)], *colour));
+            }
+            for limit in &self.limits {
+                let levels = limit.values.iter().map(|value| self.y.place(*value));
+                let ends =
+                    levels.map(|place| PathElement::new([(frame.left, place), (frame.right, place)], LIMIT));
+                chart
+                    .draw_series(ends)?
+                    .label(&limit.name)
+                    .legend(|(x, y)| PathElement::new([(x, y), (x + 16, y)], LIMIT.stroke_width(2)));
+            }
+            if self.lines.len() + self.limits.len() > 1 {
+                chart
+                    .configure_series_labels()
+                    .position(SeriesLabelPosition::UpperRight)
+                    .background_style(WHITE.mix(0.8))
+                    .border_style(RGBColor(0xcc, 0xcc, 0xcc))
+                    .draw()?;
+            }
+            area.present()?;
+        }
+        Ok(svg)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn chart(limit: f64) -> Option<Drawn> {
+        let lines = vec![Line { name: "a".to_owned(), points: vec![(0.0, 1.0), (1.0, 2.0)] }];
+        Chart::over_time("y", lines, vec![Limit { name: "limit".to_owned(), values: vec![limit] }]).draw()
+    }
+
+    #[test]
+    fn a_limit_is_drawn_where_it_leaves_the_curve_room_and_said_otherwise() {
+        assert!(chart(3.0).unwrap().beyond.is_empty());
+        assert_eq!(chart(300.0).unwrap().beyond[0].values, [300.0]);
+    }
+
+    #[test]
+    fn nothing_makes_no_plot() {
+        assert!(Chart::over_time("y", Vec::new(), Vec::new()).draw().is_none());
+    }
+
+    #[test]
+    fn percentiles_are_labelled_as_people_say_them() {
+        let labels = [0.0, 1.0, 2.0, 3.0, 4.0].map(|place| Scale::Percentile.label(place));
+        assert_eq!(labels, ["0 %", "90 %", "99 %", "99.9 %", "99.99 %"]);
+        assert_eq!(Scale::Log.label(2.0), "100");
+    }
 }

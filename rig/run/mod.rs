@@ -30,13 +30,15 @@ pub fn run(args: &RunArgs) -> Result<Exit, Failure> {
         None => RunFolder::create_in("runs".as_ref(), &plan.scenario.name)?,
     };
     std::fs::write(folder.scenario(), plan.scenario.to_toml()).context("cannot write the scenario")?;
-    eprintln!("{}", plan.announcement());
+    if !args.quiet {
+        eprintln!("{}", plan.announcement());
+    }
 
     let mut manifest = Manifest::new(&plan, args.clock);
     let ending = match args.clock {
         ClockKind::Virtual => virtual_time::run(&plan, &folder).map_err(Failure::with(Exit::Incomplete))?,
         ClockKind::Rt => {
-            let ended = supervisor::run(&plan, &folder, args.require_rt)?;
+            let ended = supervisor::run(&plan, &folder, args)?;
             manifest.scheduling = ended.scheduling;
             manifest.cpu_dma_latency = Some(ended.cpu_dma_latency);
             manifest.usage = ended.usage;

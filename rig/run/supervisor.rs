@@ -25,6 +25,7 @@ use super::folder::RunFolder;
 use super::plan::Plan;
 use super::usage::{Meter, RunUsage};
 use crate::clean::sweep_dead;
+use crate::cli::RunArgs;
 use crate::exit::Exit;
 use crate::machine::SystemRoot;
 use crate::report::verdict::Ending;
@@ -56,12 +57,13 @@ pub struct Ended {
 }
 
 /// Runs the rig in real time.
-pub fn run(plan: &Plan, folder: &RunFolder, require_rt: bool) -> anyhow::Result<Ended> {
+pub fn run(plan: &Plan, folder: &RunFolder, args: &RunArgs) -> anyhow::Result<Ended> {
     sweep_dead()?;
     let interrupts = count_interrupts().context("cannot listen for signals")?;
     let domain = Domain::named(&format!("{}-{:x}", std::process::id(), clock::now_ns()))?;
     let claim = domain.claim()?;
-    let result = Rig::spawn(folder, &domain).and_then(|mut rig| rig.run(plan, require_rt, &interrupts));
+    let result = Rig::spawn(folder, &domain, args.quiet)
+        .and_then(|mut rig| rig.run(plan, args.require_rt, &interrupts));
     drop(claim);
     domain.sweep()?;
     result
@@ -90,15 +92,16 @@ struct Rig {
 }
 
 impl Rig {
-    fn spawn(folder: &RunFolder, domain: &Domain) -> anyhow::Result<Self> {
+    fn spawn(folder: &RunFolder, domain: &Domain, quiet: bool) -> anyhow::Result<Self> {
         let scenario = folder.scenario();
         let scenario = scenario.to_str().context("the run folder's path is not UTF-8")?;
         let recording = folder.recording();
         let recording = recording.to_str().context("the run folder's path is not UTF-8")?;
         let common = ["--scenario", scenario, "--domain", domain.id()];
         let with_recording = [&common[..], &["--recording", recording]].concat();
+        let for_logger = if quiet { [&with_recording[..], &["--quiet"]].concat() } else { with_recording };
         Ok(Self {
-            logger: Process::spawn(Role::Logger, &with_recording)?,
+            logger: Process::spawn(Role::Logger, &for_logger)?,
             plant: Process::spawn(Role::Plant, &common)?,
             controller: Process::spawn(Role::Controller, &common)?,
         })

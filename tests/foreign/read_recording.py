@@ -8,10 +8,12 @@ from collections import Counter
 
 from mcap_ros2.reader import read_ros2_messages
 
+TOPICS = ("command", "reading", "state", "truth", "frame", "event")
+
 counts = Counter()
 last_seq = {}
 largest_angle_rad = 0.0
-for message in read_ros2_messages(sys.argv[1]):
+for message in read_ros2_messages(sys.argv[1], topics=TOPICS):
     topic, body = message.channel.topic, message.ros_msg
     counts[topic] += 1
     assert body.version == 2, (topic, body.version)
@@ -25,7 +27,7 @@ for message in read_ros2_messages(sys.argv[1]):
     if topic == "reading" and body.fresh_axes == 63:
         assert all(0.24 <= length <= 0.30 for length in body.position_m[3:]), body.position_m
 
-for topic in ("command", "reading", "state", "truth", "frame", "event"):
+for topic in TOPICS:
     print(f"{topic:8} {counts[topic]:8}")
     assert counts[topic] > 0, f"no message on {topic}"
 assert 1.0 < largest_angle_rad < 1.6, largest_angle_rad

@@ -1,0 +1,181 @@
+//! What happened over time, in memory of a fixed size: the longer the run, the wider the stretches that
+//! are told as one.
+
+/// Stretches or samples kept at most.
+const MOST: usize = 1024;
+/// Width of the first stretches, ns.
+const FIRST_WIDTH_NS: u64 = 10_000_000;
+
+/// What happened within a stretch of time.
+pub(super) trait Merge: Clone + Default {
+    /// Joins it with what happened in the next stretch.
+    fn merge(&mut self, next: &Self);
+}
+
+/// Stretches of equal width from a common beginning.
+#[derive(Debug, Clone)]
+pub(super) struct Series<T> {
+    width_ns: u64,
+    stretches: Vec<T>,
+}
+
+impl<T> Default for Series<T> {
+    fn default() -> Self {
+        Self { width_ns: FIRST_WIDTH_NS, stretches: Vec::new() }
+    }
+}
+
+impl<T: Merge> Series<T> {
+    /// The stretch that holds this time since the beginning.
+    pub(super) fn at(&mut self, since_ns: u64) -> &mut T {
+        while since_ns / self.width_ns >= MOST as u64 {
+            self.join_pairs();
+        }
+        let place = (since_ns / self.width_ns) as usize;
+        if place >= self.stretches.len() {
+            self.stretches.resize(place + 1, T::default());
+        }
+        &mut self.stretches[place]
+    }
+
+    fn join_pairs(&mut self) {
+        let joined = self.stretches.chunks(2).map(|pair| {
+            let mut joined = pair[0].clone();
+            pair.iter().skip(1).for_each(|next| joined.merge(next));
+            joined
+        });
+        self.stretches = joined.collect();
+        self.width_ns *= 2;
+    }
+
+    /// Width of a stretch, s.
+    pub(super) fn width_s(&self) -> f64 {
+        self.width_ns as f64 / 1e9
+    }
+
+    /// Middle of each stretch, s since the beginning, and what happened in it.
+    pub(super) fn iter(&self) -> impl Iterator<Item = (f64, &T)> {
+        let width_s = self.width_s();
+        self.stretches
+            .iter()
+            .enumerate()
+            .map(move |(place, stretch)| ((place as f64 + 0.5) * width_s, stretch))
+    }
+}
+
+/// Smallest and largest of `N` values.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Extremes<const N: usize> {
+    pub lowest: [f64; N],
+    pub highest: [f64; N],
+}
+
+impl<const N: usize> Default for Extremes<N> {
+    fn default() -> Self {
+        Self { lowest: [f64::INFINITY; N], highest: [f64::NEG_INFINITY; N] }
+    }
+}
+
+impl<const N: usize> Extremes<N> {
+    pub(super) fn take(&mut self, index: usize, value: f64) {
+        self.lowest[index] = self.lowest[index].min(value);
+        self.highest[index] = self.highest[index].max(value);
+    }
+}
+
+impl<const N: usize> Merge for Extremes<N> {
+    fn merge(&mut self, next: &Self) {
+        for index in 0..N {
+            self.lowest[index] = self.lowest[index].min(next.lowest[index]);
+            self.highest[index] = self.highest[index].max(next.highest[index]);
+        }
+    }
+}
+
+/// Sums, as many as were asked for so far.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Sums(pub Vec<u64>);
+
+impl Sums {
+    pub(super) fn add(&mut self, index: usize, value: u64) {
+        if index >= self.0.len() {
+            self.0.resize(index + 1, 0);
+        }
+        self.0[index] += value;
+    }
+}
+
+impl Merge for Sums {
+    fn merge(&mut self, next: &Self) {
+        next.0.iter().enumerate().for_each(|(index, value)| self.add(index, *value));
+    }
+}
+
+/// Every n-th sample, with n growing as the run does.
+#[derive(Debug, Clone)]
+pub(super) struct Thinned<T> {
+    every: usize,
+    seen: usize,
+    samples: Vec<T>,
+}
+
+impl<T> Default for Thinned<T> {
+    fn default() -> Self {
+        Self { every: 1, seen: 0, samples: Vec::new() }
+    }
+}
+
+impl<T> Thinned<T> {
+    pub(super) fn push(&mut self, sample: T) {
+        if self.seen.is_multiple_of(self.every) {
+            self.samples.push(sample);
+        }
+        self.seen += 1;
+        if self.samples.len() == 2 * MOST {
+            let mut place = 0;
+            self.samples.retain(|_| {
+                place += 1;
+                place % 2 == 1
+            });
+            self.every *= 2;
+        }
+    }
+
+    pub(super) fn into_samples(self) -> Vec<T> {
+        self.samples
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_long_run_keeps_its_extremes_in_wider_stretches() {
+        let mut series = Series::<Extremes<1>>::default();
+        for millisecond in 0..100_000u64 {
+            let value = if millisecond == 54_321 { 99.0 } else { (millisecond % 7) as f64 };
+            series.at(millisecond * 1_000_000).take(0, value);
+        }
+        assert!(series.iter().count() <= MOST);
+        let (at_s, _) = series.iter().find(|(_, stretch)| stretch.highest[0] > 98.0).unwrap();
+        assert!((at_s - 54.321).abs() <= series.width_s());
+        assert!(series.iter().all(|(_, stretch)| stretch.lowest[0] < 1.0));
+    }
+
+    #[test]
+    fn nothing_is_lost_from_a_sum() {
+        let mut series = Series::<Sums>::default();
+        (0..50_000u64).for_each(|millisecond| series.at(millisecond * 1_000_000).add(1, 3));
+        assert_eq!(series.iter().map(|(_, sums)| sums.0[1]).sum::<u64>(), 150_000);
+    }
+
+    #[test]
+    fn thinning_keeps_samples_evenly_from_the_first() {
+        let mut thinned = Thinned::default();
+        (0..10_000).for_each(|sample| thinned.push(sample));
+        let samples = thinned.into_samples();
+        assert!(samples.len() < 2 * MOST && samples.len() >= MOST / 2);
+        assert!(samples.windows(2).all(|pair| pair[1] - pair[0] == samples[1]));
+    }
+}

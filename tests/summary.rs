@@ -1,0 +1,73 @@
+//! `summary.json` and `junit.xml` are what their descriptions say.
+
+mod common;
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::Path;
+
+use common::Bench;
+use serde_json::Value;
+
+/// Keys in the table of docs/summary.md, and those of them that may be absent.
+fn documented() -> (BTreeSet<String>, BTreeSet<String>) {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/summary.md");
+    let text = fs::read_to_string(path).unwrap();
+    let rows = text.lines().filter_map(|line| line.strip_prefix("| `")?.split_once("` | "));
+    let rows: Vec<_> = rows.collect();
+    let all = rows.iter().map(|(key, _)| (*key).to_owned()).collect();
+    let optional = rows.iter().filter(|(_, what)| what.starts_with("*optional*"));
+    (all, optional.map(|(key, _)| (*key).to_owned()).collect())
+}
+
+/// Every key that leads to a value.
+fn keys(path: &str, value: &Value, found: &mut BTreeSet<String>) {
+    match value {
+        Value::Object(fields) => {
+            for (name, value) in fields {
+                let path = if path.is_empty() { name.clone() } else { format!("{path}.{name}") };
+                keys(&path, value, found);
+            }
+        }
+        Value::Array(items) => items.iter().for_each(|item| keys(&format!("{path}[]"), item, found)),
+        _ => {
+            found.insert(path.to_owned());
+        }
+    }
+}
+
+#[test]
+fn the_summary_has_the_keys_that_are_documented_and_no_others() {
+    let bench = Bench::new("duration_s = 1.0");
+    assert_eq!(bench.run(&["--clock", "virtual"]).status.code(), Some(0));
+    let mut found = BTreeSet::new();
+    keys("", &bench.summary(), &mut found);
+    let (documented, optional) = documented();
+    let undocumented: Vec<_> = found.difference(&documented).collect();
+    assert!(undocumented.is_empty(), "not in docs/summary.md: {undocumented:?}");
+    let absent: Vec<_> = documented.difference(&found).filter(|key| !optional.contains(*key)).collect();
+    assert!(absent.is_empty(), "in docs/summary.md, but not in summary.json: {absent:?}");
+    assert_eq!(bench.summary()["form"], 1);
+}
+
+/// The attributes of the first element of this name.
+fn attribute<'a>(xml: &'a str, element: &str, name: &str) -> &'a str {
+    let tag = xml.split(&format!("<{element} ")).nth(1).unwrap().split('>').next().unwrap();
+    tag.split(&format!("{name}=\"")).nth(1).unwrap().split('"').next().unwrap()
+}
+
+#[test]
+fn the_junit_report_counts_its_cases() {
+    for (limit, code, failures) in [("1.0", 0, "0"), ("1e-9", 1, "1")] {
+        let bench = Bench::new(&format!("duration_s = 1.0\n[checks]\ntracking_rms_mm = {limit}"));
+        assert_eq!(bench.run(&["--clock", "virtual"]).status.code(), Some(code));
+        let xml = fs::read_to_string(bench.run_folder().join("junit.xml")).unwrap();
+        let cases = xml.matches("<testcase ").count();
+        assert_eq!(attribute(&xml, "testsuite", "tests"), cases.to_string());
+        assert_eq!(attribute(&xml, "testsuite", "failures"), failures);
+        assert_eq!(xml.matches("<failure ").count().to_string(), failures);
+        assert_eq!(attribute(&xml, "testsuite", "errors"), "0");
+        let timestamp = attribute(&xml, "testsuite", "timestamp");
+        assert!(humantime::parse_rfc3339(&format!("{timestamp}Z")).is_ok(), "{timestamp}");
+    }
+}
