@@ -1,0 +1,230 @@
+//! What recording costs: every topic at 10 kHz through the real logger, beside a raw write of the same
+//! bytes.
+//!
+//!     cargo bench --bench logger
+//!
+//! The messages are those of a run under virtual time, played again and again at the pace of the clock.
+
+use std::fs::{self, File};
+use std::io::{BufRead, BufReader, Write};
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+
+use anyhow::{Context, ensure};
+use masseter::recording::{Reader, Recorded, Recorder, Scene};
+use masseter_shared::clock::{self, SECOND_NS};
+use masseter_shared::config::Scenario;
+use masseter_shared::geometry::Mechanism;
+use masseter_shared::lifecycle::Start;
+use masseter_shared::messages::{Command as CommandMessage, Event, FrameTap, Message, Reading, State, Truth};
+use masseter_shared::transport::{Domain, Node, Outlet};
+use rustix::process::{Pid, Signal, kill_process};
+
+const MASSETER: &str = env!("CARGO_BIN_EXE_masseter");
+const RATE_HZ: u64 = 10_000;
+const SECONDS: u64 = 10;
+/// Clock ticks that /proc counts in a second, on every Linux of today.
+const TICKS_HZ: f64 = 100.0;
+
+fn main() -> anyhow::Result<()> {
+    let folder = tempfile::tempdir()?;
+    let cycles = cycles_of_a_run(&folder.path().join("run"))?;
+    let recording = folder.path().join("recording.mcap");
+    through_the_logger(&cycles, folder.path(), &recording)?;
+    in_process(&cycles, &folder.path().join("again.mcap"))?;
+    raw(&cycles, &folder.path().join("raw"))?;
+    Ok(())
+}
+
+/// The messages of each cycle of ten seconds of chewing.
+fn cycles_of_a_run(out: &Path) -> anyhow::Result<Vec<Vec<Recorded>>> {
+    let status = Command::new(MASSETER)
+        .args(["run", "--clock", "virtual", "--out"])
+        .arg(out)
+        .stdout(Stdio::null())
+        .status()?;
+    ensure!(status.success(), "the run under virtual time failed");
+    let mut reader = Reader::open(&out.join("recording.mcap"))?;
+    let mut cycles: Vec<Vec<Recorded>> = vec![Vec::new()];
+    while let Some(message) = reader.next_message()? {
+        if matches!(message, Recorded::Reading(_)) {
+            cycles.push(Vec::new());
+        }
+        cycles.last_mut().expect("there is one from the start").push(message);
+    }
+    // The drives boot in the first cycles; those of the motion are alike.
+    Ok(cycles.split_off(1500))
+}
+
+struct Outlets {
+    command: Outlet<CommandMessage>,
+    reading: Outlet<Reading>,
+    state: Outlet<State>,
+    truth: Outlet<Truth>,
+    frame: Outlet<FrameTap>,
+    event: Outlet<Event>,
+}
+
+impl Outlets {
+    fn open(node: &Node) -> anyhow::Result<Self> {
+        Ok(Self {
+            command: node.outlet()?,
+            reading: node.outlet()?,
+            state: node.outlet()?,
+            truth: node.outlet()?,
+            frame: node.outlet()?,
+            event: node.outlet()?,
+        })
+    }
+
+    fn publish(&mut self, message: &Recorded) -> anyhow::Result<()> {
+        match message {
+            Recorded::Command(message) => self.command.publish(|place| *place = *message)?,
+            Recorded::Reading(message) => self.reading.publish(|place| *place = *message)?,
+            Recorded::State(message) => self.state.publish(|place| *place = *message)?,
+            Recorded::Truth(message) => self.truth.publish(|place| *place = *message)?,
+            Recorded::Frame(message) => self.frame.publish(|place| *place = *message)?,
+            Recorded::Event(message) => self.event.publish(|place| *place = *message)?,
+        }
+        Ok(())
+    }
+}
+
+fn through_the_logger(cycles: &[Vec<Recorded>], folder: &Path, recording: &Path) -> anyhow::Result<()> {
+    let scenario = folder.join("scenario.toml");
+    fs::write(&scenario, Scenario::default().to_toml())?;
+    let domain = Domain::named(&format!("bench-{}", std::process::id()))?;
+    let claim = domain.claim()?;
+    {
+        let node = Node::join(&domain)?;
+        let mut outlets = Outlets::open(&node)?;
+        let mut logger = start_logger(&scenario, domain.id(), recording)?;
+        let (sent, publishing_ns) = play(cycles, &mut outlets)?;
+        let cpu_s = cpu_seconds(&logger)?;
+        let memory_kib = peak_memory_kib(&logger)?;
+        kill_process(Pid::from_child(&logger), Signal::TERM)?;
+        let status = logger.wait()?;
+        let bytes = fs::metadata(recording)?.len();
+        let played = RATE_HZ * SECONDS;
+        println!("{played} cycles at {RATE_HZ} Hz, {sent} messages; the logger ended with {status}");
+        println!("  publishing       {:8.0} ns a message", publishing_ns as f64 / sent as f64);
+        println!("  logger           {:8.1} % of a core", cpu_s / SECONDS as f64 * 100.0);
+        println!("  logger's memory  {:8.1} MB at its peak", memory_kib as f64 / 1024.0);
+        println!("  recording        {:8.0} bytes a cycle", bytes as f64 / played as f64);
+    }
+    let proof = Command::new(MASSETER).args(["log", "verify"]).arg(recording).output()?;
+    print!("{}", String::from_utf8_lossy(&proof.stdout));
+    drop(claim);
+    domain.sweep()?;
+    Ok(())
+}
+
+fn start_logger(scenario: &Path, domain: &str, recording: &Path) -> anyhow::Result<Child> {
+    let mut logger = Command::new(MASSETER)
+        .args(["logger", "--quiet", "--domain", domain, "--scenario"])
+        .arg(scenario)
+        .arg("--recording")
+        .arg(recording)
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .spawn()?;
+    let mut ready = String::new();
+    BufReader::new(logger.stdout.as_mut().context("its output is piped")?).read_line(&mut ready)?;
+    let input = logger.stdin.as_mut().context("its input is piped")?;
+    writeln!(input, "{}", serde_json::to_string(&Start { epoch_ns: clock::now_ns() })?)?;
+    Ok(logger)
+}
+
+/// Publishes a cycle at a time by the clock; returns messages and the time spent publishing, ns.
+fn play(cycles: &[Vec<Recorded>], outlets: &mut Outlets) -> anyhow::Result<(u64, u64)> {
+    let period_ns = SECOND_NS / RATE_HZ;
+    let began_ns = clock::now_ns();
+    let (mut sent, mut publishing_ns) = (0, 0);
+    for (number, cycle) in cycles.iter().cycle().take((RATE_HZ * SECONDS) as usize).enumerate() {
+        clock::sleep_until(began_ns + number as u64 * period_ns);
+        let from_ns = clock::now_ns();
+        for message in cycle {
+            outlets.publish(message)?;
+        }
+        publishing_ns += clock::now_ns() - from_ns;
+        sent += cycle.len() as u64;
+    }
+    Ok((sent, publishing_ns))
+}
+
+/// Processor time of a process so far, s.
+fn cpu_seconds(process: &Child) -> anyhow::Result<f64> {
+    let stat = fs::read_to_string(format!("/proc/{}/stat", process.id()))?;
+    let fields: Vec<&str> = stat.rsplit(')').next().unwrap_or_default().split_whitespace().collect();
+    let ticks = fields.get(11).zip(fields.get(12)).context("/proc/PID/stat has user and system time")?;
+    Ok((ticks.0.parse::<f64>()? + ticks.1.parse::<f64>()?) / TICKS_HZ)
+}
+
+/// The most memory that a process had resident, KiB.
+fn peak_memory_kib(process: &Child) -> anyhow::Result<u64> {
+    let status = fs::read_to_string(format!("/proc/{}/status", process.id()))?;
+    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:")).context("VmHWM is told")?;
+    Ok(line.trim().trim_end_matches(" kB").parse()?)
+}
+
+fn in_process(cycles: &[Vec<Recorded>], path: &Path) -> anyhow::Result<()> {
+    let scenario = Scenario::default();
+    let scene = Scene::new(&Mechanism::new(&scenario.mechanism)?, &scenario.jaw);
+    let mut recorder = Recorder::create(path, scene)?;
+    let from_ns = clock::now_ns();
+    let mut messages = 0;
+    for (number, message) in cycles.iter().flatten().enumerate() {
+        let log_time_ns = number as u64;
+        match message {
+            Recorded::Command(message) => recorder.record(message, log_time_ns)?,
+            Recorded::Reading(message) => recorder.record(message, log_time_ns)?,
+            Recorded::State(message) => recorder.record(message, log_time_ns)?,
+            Recorded::Truth(message) => recorder.record(message, log_time_ns)?,
+            Recorded::Frame(message) => recorder.record(message, log_time_ns)?,
+            Recorded::Event(message) => recorder.record(message, log_time_ns)?,
+        }
+        messages += 1;
+    }
+    recorder.finish()?;
+    report("recorded", cycles.len(), messages, clock::now_ns() - from_ns, fs::metadata(path)?.len());
+    Ok(())
+}
+
+/// The same messages' bytes, one behind the other, as a file takes them.
+fn raw(cycles: &[Vec<Recorded>], path: &Path) -> anyhow::Result<()> {
+    let mut bytes = Vec::new();
+    for message in cycles.iter().flatten() {
+        bytes.extend_from_slice(bytes_of(message));
+    }
+    let messages = cycles.iter().map(Vec::len).sum::<usize>() as u64;
+    let mut file = File::create_new(path)?;
+    let from_ns = clock::now_ns();
+    for part in bytes.chunks(1 << 20) {
+        file.write_all(part)?;
+    }
+    file.sync_data()?;
+    report("raw write", cycles.len(), messages, clock::now_ns() - from_ns, bytes.len() as u64);
+    Ok(())
+}
+
+fn bytes_of(message: &Recorded) -> &[u8] {
+    fn of<M: Message>(message: &M) -> &[u8] {
+        bytemuck::bytes_of(message)
+    }
+    match message {
+        Recorded::Command(message) => of(message),
+        Recorded::Reading(message) => of(message),
+        Recorded::State(message) => of(message),
+        Recorded::Truth(message) => of(message),
+        Recorded::Frame(message) => of(message),
+        Recorded::Event(message) => of(message),
+    }
+}
+
+fn report(what: &str, cycles: usize, messages: u64, took_ns: u64, bytes: u64) {
+    println!(
+        "  {what:<16} {:8.0} ns a message, {:8.0} bytes a cycle",
+        took_ns as f64 / messages as f64,
+        bytes as f64 / cycles as f64
+    );
+}
