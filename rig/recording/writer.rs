@@ -8,11 +8,13 @@ use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 use std::path::Path;
+use std::sync::mpsc::{Receiver, SyncSender, channel, sync_channel};
+use std::thread::{self, JoinHandle};
 
 use foxglove::Encode;
 use masseter_shared::messages::{Command, Event, FrameTap, Message, Reading, State, Truth};
 use mcap::records::MessageHeader;
-use mcap::{Compression, WriteOptions, Writer};
+use mcap::{Compression, McapError, WriteOptions, Writer};
 
 use super::scene::Scene;
 use super::topic::{Stamps, Topic};
@@ -33,7 +35,7 @@ pub enum WriteError {
     Create(#[from] io::Error),
     /// Writing failed.
     #[error("cannot write the recording: {0}")]
-    Write(#[from] mcap::McapError),
+    Write(#[from] McapError),
     /// A message could not be put into a Foxglove schema.
     #[error("cannot encode the scene: {0}")]
     Scene(String),
@@ -159,7 +161,7 @@ impl<W: Write + Seek> Recorder<W> {
         Ok(self.writer.write_to_known_channel(&header, &self.bytes)?)
     }
 
-    /// Ends the chunk and hands everything recorded so far to the medium, for good.
+    /// Ends the chunk and hands everything recorded so far to the medium.
     pub fn flush(&mut self) -> Result<(), WriteError> {
         Ok(self.writer.flush()?)
     }
@@ -167,13 +169,22 @@ impl<W: Write + Seek> Recorder<W> {
     /// Ends the file with its index.
     pub fn finish(mut self) -> Result<(), WriteError> {
         self.writer.finish()?;
-        Ok(())
+        Ok(self.writer.into_inner().flush().map_err(McapError::from)?)
     }
 }
 
-/// A file whose flush reaches the disk, not only the system: what was flushed survives a power cut.
+/// A file whose flush reaches the system at once and the disk soon after: what was flushed survives the
+/// death of the process, and, once the disk has taken it, a power cut.
+///
+/// A thread of its own waits for the disk, so that a slow one does not hold the writer up. Dropping the file
+/// waits for the last of it.
 #[derive(Debug)]
-pub struct DurableFile(BufWriter<File>);
+pub struct DurableFile {
+    file: BufWriter<File>,
+    wanted: Option<SyncSender<()>>,
+    done: Receiver<io::Result<()>>,
+    disk: Option<JoinHandle<()>>,
+}
 
 impl DurableFile {
     /// Creates the file, which must not exist, and its entry in the folder.
@@ -182,27 +193,55 @@ impl DurableFile {
         if let Some(folder) = path.parent().filter(|folder| !folder.as_os_str().is_empty()) {
             File::open(folder)?.sync_all()?;
         }
-        Ok(Self(BufWriter::with_capacity(BUFFER_BYTES, file)))
+        // One request may wait while another is carried out: it covers all that came before it.
+        let (wanted, requests) = sync_channel(1);
+        let (report, done) = channel();
+        let for_disk = file.try_clone()?;
+        let disk = thread::spawn(move || {
+            for () in requests {
+                // Nobody listens any more when the file is being dropped.
+                let _ = report.send(for_disk.sync_data());
+            }
+        });
+        let file = BufWriter::with_capacity(BUFFER_BYTES, file);
+        Ok(Self { file, wanted: Some(wanted), done, disk: Some(disk) })
+    }
+}
+
+impl Drop for DurableFile {
+    fn drop(&mut self) {
+        self.wanted = None;
+        if let Some(disk) = self.disk.take() {
+            let _ = disk.join();
+        }
     }
 }
 
 impl Write for DurableFile {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        self.0.write(bytes)
+        self.file.write(bytes)
     }
 
+    /// Also tells of an earlier flush that the disk refused.
     fn flush(&mut self) -> io::Result<()> {
-        self.0.flush()?;
-        self.0.get_ref().sync_data()
+        self.file.flush()?;
+        for earlier in self.done.try_iter() {
+            earlier?;
+        }
+        if let Some(wanted) = &self.wanted {
+            // A request that waits already covers this one too.
+            let _ = wanted.try_send(());
+        }
+        Ok(())
     }
 }
 
 impl Seek for DurableFile {
     fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
-        self.0.seek(to)
+        self.file.seek(to)
     }
 
     fn stream_position(&mut self) -> io::Result<u64> {
-        self.0.stream_position()
+        self.file.stream_position()
     }
 }

@@ -39,6 +39,8 @@ const LEAD_NS: u64 = 100_000_000;
 const OFF_TICK_NS: u64 = 230_000;
 /// How long a process may take to end when asked to.
 const END_WITHIN_NS: u64 = 5 * SECOND_NS;
+/// How long the logger may take to write what is left: as long as a slow disk needs, ns.
+const RECORD_WITHIN_NS: u64 = 60 * SECOND_NS;
 /// How long the plant goes on after the controller has died, so that its master notices and stops the
 /// drives, ns.
 const SAFE_STOP_NS: u64 = SECOND_NS / 2;
@@ -165,9 +167,9 @@ impl Rig {
         if ending == Ending::Completed {
             ending = self.after_controller(status)?;
         }
-        end(&mut self.plant)?;
-        let logger_status = end(&mut self.logger)?;
-        let incomplete = logger_status.is_some_and(|status| status.code() == Some(Exit::Incomplete as i32));
+        end(&mut self.plant, END_WITHIN_NS)?;
+        let logger_status = end(&mut self.logger, RECORD_WITHIN_NS)?;
+        let incomplete = logger_status.is_none_or(|status| status.code() == Some(Exit::Incomplete as i32));
         Ok(if incomplete && ending == Ending::Completed { Ending::RecordingFailed } else { ending })
     }
 
@@ -202,9 +204,9 @@ impl Rig {
 }
 
 /// Asks a process to end, and ends it if it does not.
-fn end(process: &mut Process) -> io::Result<Option<ExitStatus>> {
+fn end(process: &mut Process, within_ns: u64) -> io::Result<Option<ExitStatus>> {
     process.terminate();
-    let status = wait_for(process, END_WITHIN_NS)?;
+    let status = wait_for(process, within_ns)?;
     if status.is_none() {
         process.kill();
     }
