@@ -14,6 +14,7 @@ use crate::bench::ipc::PeerArgs;
 use crate::can::{PlanArgs, ServeArgs};
 use crate::exit::{Exit, Failure};
 use crate::log::{self, LogVerb};
+use crate::uniqueness::{self, UniquenessVerb};
 use crate::{bench, can, clean, doctor, kinematics, logger, plant, report, run};
 
 /// A hardware-in-the-loop rig for a 6-DOF mastication robot.
@@ -48,6 +49,9 @@ enum Verb {
     Can(CanVerb),
     /// What the rig's parts cost, each beside a baseline in the same run
     Bench(BenchArgs),
+    /// How far an input settles the pose: a proof for regions of inputs, and a search for exceptions
+    #[command(subcommand)]
+    Uniqueness(UniquenessVerb),
     /// Remove what killed runs left in shared memory
     Clean,
     #[command(hide = true)]
@@ -189,9 +193,30 @@ pub struct CsvArgs {
 pub struct FkArgs {
     #[command(flatten)]
     pub(crate) csv: CsvArgs,
-    /// Start each line from the solution of the one before
+    /// Which iteration: the controller's certified one, the seed's, or Newton-Raphson
+    #[arg(long, value_enum, default_value_t)]
+    pub(crate) solver: Solver,
+    /// Leg angles to start every line from, radians [default: 1.46 each, the seed's neutral pose]
+    #[arg(long, value_name = "RAD,RAD,RAD", value_parser = parse_guess, allow_hyphen_values = true)]
+    pub(crate) guess: Option<[f64; 3]>,
+    /// Start each line from the solution of the one before; takes one core only
     #[arg(long)]
     pub(crate) continuous: bool,
+    /// Every solution of every line, a line each, with the conditions it meets
+    #[arg(long, conflicts_with_all = ["solver", "guess", "continuous"])]
+    pub(crate) all: bool,
+}
+
+/// Which forward solver.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
+pub enum Solver {
+    /// The certified one of the control loop: the true solution, or the reason why there is none.
+    #[default]
+    Controller,
+    /// The seed's: some solution, from the guess.
+    Seed,
+    /// Newton-Raphson: some solution, from the guess.
+    Newton,
 }
 
 /// What `report` takes.
@@ -263,6 +288,14 @@ fn parse_axis(text: &str) -> Result<usize, String> {
     axis.ok_or_else(|| format!("the axes are {}", AXIS_NAMES.join(" ")))
 }
 
+fn parse_guess(text: &str) -> Result<[f64; 3], String> {
+    let angles: Result<Vec<f64>, _> = text.split(',').map(|angle| angle.trim().parse()).collect();
+    match angles.as_deref() {
+        Ok(&[t1, t2, t3]) if t1.is_finite() && t2.is_finite() && t3.is_finite() => Ok([t1, t2, t3]),
+        _ => Err("give three leg angles in radians, such as 1.4,1.5,1.4".to_owned()),
+    }
+}
+
 /// An error and what caused it; an error that quotes its cause is not followed by it again.
 fn in_one_line(error: &anyhow::Error) -> String {
     error.chain().fold(String::new(), |said, cause| {
@@ -288,6 +321,7 @@ pub fn main() -> ExitCode {
         Verb::Report(ReportArgs { folder, against: Some(against), format }) => {
             report::compare::runs(&folder, &against, format)
         }
+        Verb::Uniqueness(verb) => uniqueness::uniqueness(&verb),
         Verb::Report(args) => report::again(&args.folder, args.format),
         Verb::Doctor(args) => doctor::examine(args.format),
         Verb::Log { verb } => log::run(&verb),

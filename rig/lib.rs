@@ -20,3 +20,4 @@ pub mod plant;
 pub mod recording;
 pub mod report;
 pub mod run;
+pub mod uniqueness;

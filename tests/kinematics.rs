@@ -6,6 +6,9 @@ use std::fmt::Write as _;
 use std::io::Write;
 use std::process::{Command, Output, Stdio};
 
+use masseter_controller::kinematics::Equations;
+use masseter_shared::geometry::{Actuators, Mechanism, MechanismConfig};
+
 use common::{MASSETER, masseter, stderr, stdout};
 
 fn pipe(arguments: &[&str], input: &str) -> Output {
@@ -18,6 +21,15 @@ fn pipe(arguments: &[&str], input: &str) -> Output {
         .unwrap();
     child.stdin.take().unwrap().write_all(input.as_bytes()).unwrap();
     child.wait_with_output().unwrap()
+}
+
+/// [`pipe`] for input that does not fit into a pipe.
+fn pipe_at_once(arguments: &[&str], input: &str) -> Output {
+    let file = tempfile::NamedTempFile::new().unwrap();
+    std::fs::write(file.path(), input).unwrap();
+    let mut command = Command::new(MASSETER);
+    command.args(arguments).stdin(std::fs::File::open(file.path()).unwrap());
+    command.output().unwrap()
 }
 
 fn columns(line: &str) -> Vec<f64> {
@@ -66,6 +78,20 @@ fn a_bad_line_is_named_and_the_rest_is_done() {
 }
 
 #[test]
+fn a_line_that_is_no_text_is_named_and_the_rest_is_done() {
+    let input =
+        [ACTUATORS.as_bytes(), b"0,0,0,0.27,0.27,0.27\n0,0,\xff,0.27,0.27,0.27\n0,0,0,0.28,0.28,0.28\n"];
+    let file = tempfile::NamedTempFile::new().unwrap();
+    std::fs::write(file.path(), input.concat()).unwrap();
+    let name = file.path().to_str().unwrap();
+    let output = masseter(&["fk", "--input", name]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(stderr(&output).contains(&format!("{name}:3: ")), "{}", stderr(&output));
+    let endings = [",ok", ",bad_line", ",ok"];
+    assert!(stdout(&output).lines().skip(1).zip(endings).all(|(line, ending)| line.ends_with(ending)));
+}
+
+#[test]
 fn statuses_name_what_the_mechanism_cannot_do() {
     let outside = pipe(&["ik"], "x_m,y_m,z_m,qw,qx,qy,qz\n0,0,0.5,1,0,0,0\n");
     assert_eq!(outside.status.code(), Some(0));
@@ -82,4 +108,88 @@ fn wrong_columns_are_refused_with_the_right_ones() {
     assert_eq!(output.status.code(), Some(2));
     assert!(stderr(&output).contains("expected 'd1_m,d2_m,d3_m,l1_m,l2_m,l3_m'"), "{}", stderr(&output));
     assert_eq!(masseter(&["ik", "--input", "/nowhere.csv"]).status.code(), Some(2));
+}
+
+const ACTUATORS: &str = "d1_m,d2_m,d3_m,l1_m,l2_m,l3_m\n";
+
+#[test]
+fn all_solutions_of_the_neutral_input_are_told_with_their_conditions() {
+    let output = pipe(&["fk", "--all"], &format!("{ACTUATORS}0,0,0,0.27,0.27,0.27\n"));
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    let output = stdout(&output);
+    let (header, lines) = output.split_once('\n').unwrap();
+    assert!(header.starts_with("line,x_m,") && header.ends_with(",nearest_m,status"), "{header}");
+    assert_eq!(lines.lines().count(), 16);
+    let true_ones: Vec<_> = lines.lines().filter(|line| line.ends_with(",true")).collect();
+    assert_eq!(true_ones.len(), 1);
+    let values = columns(true_ones[0]);
+    assert!((values[3] - 0.268_452_355).abs() < 1e-9);
+    assert_eq!(values[11..15], [1.0; 4]);
+    assert!(values[16] > 0.5 && values[17] > 1.0);
+}
+
+/// Least root of the error on a grid of all leg angles, 5° apart.
+fn nearest_on_a_grid_m(actuators: &Actuators) -> f64 {
+    let mechanism = Mechanism::new(&MechanismConfig::default()).unwrap();
+    let equations = Equations::new(&mechanism, actuators);
+    let angle = |index: u32| f64::from(5 * index).to_radians();
+    let mut least_m2 = f64::INFINITY;
+    for index in 0..72 * 72 * 72 {
+        let theta = [angle(index % 72), angle(index / 72 % 72), angle(index / 72 / 72)];
+        least_m2 = least_m2.min(equations.evaluate(theta.into()).error_m2());
+    }
+    least_m2.sqrt()
+}
+
+#[test]
+fn an_input_without_any_solution_says_how_far_it_is_from_one() {
+    let output = pipe(&["fk", "--all"], &format!("{ACTUATORS}0,0,0,0.01,0.30,0.30\n"));
+    let line = stdout(&output).lines().nth(1).unwrap().to_owned();
+    assert!(line.starts_with("2,,,") && line.ends_with(",unassemblable"), "{line}");
+    let nearest_m: f64 = line.rsplit(',').nth(1).unwrap().parse().unwrap();
+    let on_grid_m = nearest_on_a_grid_m(&Actuators { slide_m: [0.0; 3], leg_m: [0.01, 0.30, 0.30] });
+    // Half a grid step, 0.0436 rad, moves the corners by 0.4 and 13 mm, hence the sides by at most
+    // 13.5, 26.2 and 13.5 mm, and the root of their squares by 33 mm.
+    assert!((on_grid_m - 0.033..=on_grid_m).contains(&nearest_m), "{nearest_m}, on the grid {on_grid_m}");
+}
+
+#[test]
+fn every_solver_finds_the_neutral_pose_and_a_guess_below_the_base_its_mirror_image() {
+    let input = format!("{ACTUATORS}0,0,0,0.27,0.27,0.27\n");
+    for solver in ["controller", "seed", "newton"] {
+        let near = pipe(&["fk", "--solver", solver, "--guess", "1.5,1.4,1.5"], &input);
+        let line = stdout(&near).lines().nth(1).unwrap().to_owned();
+        assert!(line.ends_with(",ok") && (columns(&line)[2] - 0.268_452_355).abs() < 1e-9, "{line}");
+        let below = pipe(&["fk", "--solver", solver, "--guess", "-1.5,-1.4,-1.5"], &input);
+        let line = stdout(&below).lines().nth(1).unwrap().to_owned();
+        let expected = if solver == "controller" { ",ok" } else { ",wrong_assembly" };
+        assert!(line.ends_with(expected), "{solver}: {line}");
+    }
+    for wrong in [["--guess", "1.5,1.5"], ["--guess", "NaN,1,1"], ["--solver", "other"]] {
+        assert_eq!(masseter(&[&["fk"], &wrong[..]].concat()).status.code(), Some(2));
+    }
+}
+
+/// More lines than one batch holds, with a bad one in the second.
+#[test]
+fn many_lines_come_out_in_order() {
+    const LINES: usize = 40_000;
+    const BAD: usize = 30_000;
+    let mut input = ACTUATORS.to_owned();
+    for i in 0..LINES {
+        let leg_m = if i == BAD { "long".to_owned() } else { (0.25 + 1e-6 * i as f64).to_string() };
+        writeln!(input, "0,0,0,{leg_m},{leg_m},{leg_m}").unwrap();
+    }
+    let output = pipe_at_once(&["fk"], &input);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(stderr(&output).contains(&format!("standard input:{}: l1_m is 'long'", BAD + 2)));
+    let heights: Vec<_> = stdout(&output)
+        .lines()
+        .skip(1)
+        .map(|line| columns(line).get(2).copied().ok_or_else(|| line.to_owned()))
+        .collect();
+    assert_eq!(heights.len(), LINES);
+    assert!(heights[BAD].as_ref().is_err_and(|line| line.ends_with(",bad_line")));
+    let good: Vec<_> = heights.into_iter().flatten().collect();
+    assert!(good.len() == LINES - 1 && good.is_sorted());
 }

@@ -1,14 +1,15 @@
 //! `masseter fk`: actuator coordinates to poses.
 
-use masseter_controller::kinematics::{ForwardTracker, Solution};
-use masseter_shared::geometry::Actuators;
+use masseter_controller::kinematics::{ForwardError, ForwardTracker, Method, Options, Solution, solve};
+use masseter_shared::geometry::{Actuators, LEGS, Mechanism, StrokeLimits};
 use masseter_shared::messages::pose_fields;
 
-use super::table::{Row, convert, mechanism};
-use crate::cli::FkArgs;
+use super::every;
+use super::table::{Columns, Lines, convert, convert_in_turn, mechanism};
+use crate::cli::{FkArgs, Solver};
 use crate::exit::{Exit, Failure};
 
-const COLUMNS_IN: [&str; 6] = ["d1_m", "d2_m", "d3_m", "l1_m", "l2_m", "l3_m"];
+pub(super) const COLUMNS_IN: [&str; 6] = ["d1_m", "d2_m", "d3_m", "l1_m", "l2_m", "l3_m"];
 const COLUMNS_OUT: [&str; 12] = [
     "x_m",
     "y_m",
@@ -23,23 +24,84 @@ const COLUMNS_OUT: [&str; 12] = [
     "iterations",
     "residual_m",
 ];
+/// Where the seed's and Newton's iteration start if nobody says: the seed's neutral pose.
+const NEUTRAL_RAD: [f64; LEGS] = [1.46; LEGS];
 
-/// Status `ok`, `outside_stroke`, or the reason of [`ForwardError`](masseter_controller::kinematics::ForwardError).
+/// Status `ok`, `outside_stroke`, or the reason of [`ForwardError`]. The seed's and Newton's iteration
+/// may come to a solution at which the mechanism cannot stand; its status is then `wrong_assembly`,
+/// and the values stand all the same.
 pub(crate) fn forward(args: &FkArgs) -> Result<Exit, Failure> {
     let mechanism = mechanism(&args.csv)?;
+    if args.all {
+        return every::every_solution(&args.csv, &mechanism);
+    }
     let strokes = *mechanism.strokes();
-    let mut tracker = ForwardTracker::new(mechanism);
-    convert(&args.csv, COLUMNS_IN, COLUMNS_OUT, |values| {
+    let columns = Columns { read: COLUMNS_IN, written: &COLUMNS_OUT };
+    let fresh = Chosen::new(args, mechanism);
+    if args.continuous {
+        let mut solver = fresh;
+        return convert_in_turn(&args.csv, columns, |_, values, lines| {
+            let actuators = Actuators::from_axes(values);
+            tell(&strokes, &actuators, solver.solve(&actuators), lines);
+            Ok(())
+        });
+    }
+    convert(&args.csv, columns, |_, values, lines| {
         let actuators = Actuators::from_axes(values);
-        if !args.continuous {
-            tracker.reset();
-        }
-        Ok(match (strokes.check(&actuators), tracker.update(&actuators)) {
-            (Ok(()), Ok(solution)) => Row { values: Some(row(&solution)), status: "ok" },
-            (Err(_), Ok(solution)) => Row { values: Some(row(&solution)), status: "outside_stroke" },
-            (_, Err(error)) => Row { values: None, status: error.reason() },
-        })
+        tell(&strokes, &actuators, fresh.clone().solve(&actuators), lines);
+        Ok(())
     })
+}
+
+/// The solver asked for, and where it starts next.
+#[derive(Clone)]
+enum Chosen {
+    Controller(ForwardTracker),
+    Iteration { method: Method, mechanism: Mechanism, start_rad: [f64; LEGS] },
+}
+
+impl Chosen {
+    fn new(args: &FkArgs, mechanism: Mechanism) -> Self {
+        let iteration = |method, mechanism| Self::Iteration {
+            method,
+            mechanism,
+            start_rad: args.guess.unwrap_or(NEUTRAL_RAD),
+        };
+        match (args.solver, args.guess) {
+            (Solver::Controller, None) => Self::Controller(ForwardTracker::new(mechanism)),
+            (Solver::Controller, Some(guess)) => {
+                Self::Controller(ForwardTracker::with_guess(mechanism, guess))
+            }
+            (Solver::Seed, _) => iteration(Method::Seed, mechanism),
+            (Solver::Newton, _) => iteration(Method::Newton, mechanism),
+        }
+    }
+
+    /// Solves, and starts from there the next time.
+    fn solve(&mut self, actuators: &Actuators) -> Result<Solution, ForwardError> {
+        match self {
+            Self::Controller(tracker) => tracker.update(actuators),
+            Self::Iteration { method, mechanism, start_rad } => {
+                let solution = solve(*method, mechanism, actuators, start_rad, &Options::default())?;
+                *start_rad = solution.theta_rad;
+                Ok(solution)
+            }
+        }
+    }
+}
+
+fn tell(
+    strokes: &StrokeLimits,
+    actuators: &Actuators,
+    solved: Result<Solution, ForwardError>,
+    lines: &mut Lines,
+) {
+    match (strokes.check(actuators), solved) {
+        (_, Err(error)) => lines.empty(COLUMNS_OUT.len(), error.reason()),
+        (_, Ok(solution)) if !solution.assembly.is_true() => lines.row(&row(&solution), "wrong_assembly"),
+        (Ok(()), Ok(solution)) => lines.row(&row(&solution), "ok"),
+        (Err(_), Ok(solution)) => lines.row(&row(&solution), "outside_stroke"),
+    }
 }
 
 fn row(solution: &Solution) -> [f64; 12] {

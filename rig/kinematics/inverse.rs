@@ -3,7 +3,7 @@
 use masseter_shared::geometry::{InverseError, Mechanism, Pose};
 use masseter_shared::messages::pose_of_fields;
 
-use super::table::{Row, convert, mechanism};
+use super::table::{Columns, Lines, convert, mechanism};
 use crate::cli::CsvArgs;
 use crate::exit::{Exit, Failure};
 
@@ -17,7 +17,11 @@ const COLUMNS_OUT: [&str; 9] =
 /// Status `ok`, `outside_stroke` (the values stand all the same) or `singular` (a leg without length).
 pub(crate) fn inverse(args: &CsvArgs) -> Result<Exit, Failure> {
     let mechanism = mechanism(args)?;
-    convert(args, COLUMNS_IN, COLUMNS_OUT, |values| Ok(solve(&mechanism, &pose(values)?)))
+    let columns = Columns { read: COLUMNS_IN, written: &COLUMNS_OUT };
+    convert(args, columns, |_, values, lines| {
+        solve(&mechanism, &pose(values)?, lines);
+        Ok(())
+    })
 }
 
 fn pose([x, y, z, qw, qx, qy, qz]: [f64; 7]) -> Result<Pose, String> {
@@ -28,19 +32,17 @@ fn pose([x, y, z, qw, qx, qy, qz]: [f64; 7]) -> Result<Pose, String> {
     Ok(pose_of_fields([x, y, z], [qw, qx, qy, qz]))
 }
 
-fn solve(mechanism: &Mechanism, pose: &Pose) -> Row<9> {
+fn solve(mechanism: &Mechanism, pose: &Pose, lines: &mut Lines) {
     match mechanism.inverse(pose) {
         Ok(joints) => {
             let [d1, d2, d3, l1, l2, l3] = joints.actuators.to_axes();
             let [t1, t2, t3] = joints.theta_rad;
             let is_inside = mechanism.strokes().check(&joints.actuators).is_ok();
-            Row {
-                values: Some([d1, d2, d3, l1, l2, l3, t1, t2, t3]),
-                status: if is_inside { "ok" } else { "outside_stroke" },
-            }
+            let status = if is_inside { "ok" } else { "outside_stroke" };
+            lines.row(&[d1, d2, d3, l1, l2, l3, t1, t2, t3], status);
         }
         Err(InverseError::NoLength { .. } | InverseError::NotFinite) => {
-            Row { values: None, status: "singular" }
+            lines.empty(COLUMNS_OUT.len(), "singular");
         }
     }
 }

@@ -1,8 +1,9 @@
 //! `masseter fk` and `masseter ik`: CSV in, CSV out, one mechanism state a line.
 //!
-//! Every input line gives one output line, in order. A line that cannot be read gives one with the
+//! Every input line gives one output line, with `fk --all` one for every solution, in order. A line that cannot be read gives one with the
 //! status `bad_line`, is explained on standard error, and makes the command exit with 2 at the end.
 
+mod every;
 mod forward;
 mod inverse;
 mod table;

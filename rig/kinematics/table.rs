@@ -1,22 +1,68 @@
 //! The CSV frame around both commands: columns checked, lines counted, bad ones reported.
+//!
+//! Lines are read in batches, solved on all cores and written in order, so memory stays the same
+//! however long the input is. What is computed from a line is not known here.
 
 use std::fs::File;
-use std::io::{self, BufReader, BufWriter, Read, Write};
+use std::io::{self, BufReader, Read, Write};
 
 use anyhow::{Context, bail};
 use masseter_shared::config::Scenario;
 use masseter_shared::geometry::Mechanism;
+use rayon::prelude::*;
 
 use crate::cli::CsvArgs;
 use crate::exit::{Exit, Failure};
 
 /// Status of a line that could not be read.
 const BAD_LINE: &str = "bad_line";
+/// Lines read before they are solved and written: a few milliseconds of work for every core.
+const BATCH_LINES: usize = 16_384;
+/// Lines that one core takes at a time.
+const CHUNK_LINES: usize = 256;
 
-/// An output line: the values, none where there is nothing to say, and the status.
-pub(super) struct Row<const OUT: usize> {
-    pub values: Option<[f64; OUT]>,
-    pub status: &'static str,
+/// The columns of a command, without the status that ends every output line.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Columns<'a, const IN: usize> {
+    pub read: [&'a str; IN],
+    pub written: &'a [&'a str],
+}
+
+/// Solves one line's values and writes the output lines they lead to. Its error says what is wrong
+/// with the values.
+pub(super) type Solved = Result<(), String>;
+
+/// Output lines under way.
+#[derive(Debug, Default)]
+pub(super) struct Lines {
+    text: Vec<u8>,
+    /// Where and why lines could not be read.
+    refusals: Vec<(u64, String)>,
+}
+
+impl Lines {
+    /// One line: its values, nothing for those that are no number, then its status.
+    pub(super) fn row(&mut self, values: &[f64], status: &str) {
+        for value in values {
+            if !value.is_nan() {
+                // A vector takes all that is written to it.
+                let _ = write!(self.text, "{value}");
+            }
+            self.text.push(b',');
+        }
+        self.end(status);
+    }
+
+    /// A line without values.
+    pub(super) fn empty(&mut self, columns: usize, status: &str) {
+        self.text.resize(self.text.len() + columns, b',');
+        self.end(status);
+    }
+
+    fn end(&mut self, status: &str) {
+        self.text.extend_from_slice(status.as_bytes());
+        self.text.push(b'\n');
+    }
 }
 
 /// The mechanism that the arguments mean.
@@ -25,44 +71,86 @@ pub(super) fn mechanism(args: &CsvArgs) -> anyhow::Result<Mechanism> {
     Ok(Mechanism::new(&scenario.mechanism)?)
 }
 
-/// Passes every line through `solve`. Its error says what is wrong with the values of a line.
-pub(super) fn convert<const IN: usize, const OUT: usize>(
+/// Passes every line through `solve`, on all cores. `solve` gets the line's number as well.
+pub(super) fn convert<const IN: usize>(
     args: &CsvArgs,
-    columns_in: [&str; IN],
-    columns_out: [&str; OUT],
-    mut solve: impl FnMut([f64; IN]) -> Result<Row<OUT>, String>,
+    columns: Columns<'_, IN>,
+    solve: impl Fn(u64, [f64; IN], &mut Lines) -> Solved + Sync,
 ) -> Result<Exit, Failure> {
-    let input: Box<dyn Read> = match &args.input {
-        Some(path) => {
-            let file = File::open(path).with_context(|| format!("cannot read {}", path.display()))?;
-            Box::new(BufReader::new(file))
+    stream(args, columns, |batch| {
+        let chunks = batch.par_chunks(CHUNK_LINES).map(|chunk| {
+            let mut lines = Lines::default();
+            for record in chunk {
+                solve_record(record, &columns, &mut lines, &solve);
+            }
+            lines
+        });
+        chunks.collect()
+    })
+}
+
+/// Passes every line through `solve`, one after the other.
+pub(super) fn convert_in_turn<const IN: usize>(
+    args: &CsvArgs,
+    columns: Columns<'_, IN>,
+    mut solve: impl FnMut(u64, [f64; IN], &mut Lines) -> Solved,
+) -> Result<Exit, Failure> {
+    stream(args, columns, |batch| {
+        let mut lines = Lines::default();
+        for record in batch {
+            solve_record(record, &columns, &mut lines, &mut solve);
         }
-        None => Box::new(io::stdin().lock()),
-    };
-    let name =
-        args.input.as_ref().map_or_else(|| "standard input".to_owned(), |path| path.display().to_string());
+        vec![lines]
+    })
+}
+
+/// What was read of a line, and its number.
+struct Record {
+    line: u64,
+    fields: Result<csv::StringRecord, String>,
+}
+
+fn solve_record<const IN: usize>(
+    record: &Record,
+    columns: &Columns<'_, IN>,
+    lines: &mut Lines,
+    mut solve: impl FnMut(u64, [f64; IN], &mut Lines) -> Solved,
+) {
+    let values = record.fields.as_ref().map_err(Clone::clone);
+    let values = values.and_then(|fields| numbers(fields, &columns.read));
+    if let Err(reason) = values.and_then(|values| solve(record.line, values, lines)) {
+        lines.empty(columns.written.len(), BAD_LINE);
+        lines.refusals.push((record.line, reason));
+    }
+}
+
+fn stream<const IN: usize>(
+    args: &CsvArgs,
+    columns: Columns<'_, IN>,
+    mut solve: impl FnMut(&[Record]) -> Vec<Lines>,
+) -> Result<Exit, Failure> {
+    let (name, input) = open(args)?;
     let mut reader =
         csv::ReaderBuilder::new().trim(csv::Trim::All).comment(Some(b'#')).flexible(true).from_reader(input);
-    check_columns(&name, reader.headers().with_context(|| name.clone())?, &columns_in)?;
+    check_columns(&name, reader.headers().with_context(|| name.clone())?, &columns.read)?;
 
-    let mut output = BufWriter::new(io::stdout().lock());
     let mut exit = Exit::Passed;
+    let mut output = io::stdout().lock();
     let written = (|| -> io::Result<()> {
-        writeln!(output, "{},status", columns_out.join(","))?;
-        let mut record = csv::StringRecord::new();
+        writeln!(output, "{},status", columns.written.join(","))?;
+        let mut batch = Vec::with_capacity(BATCH_LINES);
         loop {
-            let row = match reader.read_record(&mut record) {
-                Ok(false) => return output.flush(),
-                Ok(true) => numbers(&record, &columns_in).and_then(&mut solve),
-                Err(error) => Err(error.to_string()),
-            };
-            let row = row.unwrap_or_else(|reason| {
-                let line = record.position().map_or(0, csv::Position::line);
-                eprintln!("{name}:{line}: {reason}");
-                exit = Exit::Usage;
-                Row { values: None, status: BAD_LINE }
-            });
-            write_row(&mut output, &row)?;
+            read_batch(&mut reader, &mut batch);
+            if batch.is_empty() {
+                return output.flush();
+            }
+            for lines in solve(&batch) {
+                output.write_all(&lines.text)?;
+                for (line, reason) in lines.refusals {
+                    eprintln!("{name}:{line}: {reason}");
+                    exit = Exit::Usage;
+                }
+            }
         }
     })();
     match written {
@@ -70,6 +158,31 @@ pub(super) fn convert<const IN: usize, const OUT: usize>(
         Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(exit),
         Err(error) => Err(Failure::from(anyhow::Error::new(error).context("cannot write standard output"))),
         Ok(()) => Ok(exit),
+    }
+}
+
+/// The input and what it is called in messages.
+fn open(args: &CsvArgs) -> anyhow::Result<(String, Box<dyn Read>)> {
+    let Some(path) = &args.input else {
+        return Ok(("standard input".to_owned(), Box::new(io::stdin().lock())));
+    };
+    let name = path.display().to_string();
+    let file = File::open(path).with_context(|| format!("cannot read {name}"))?;
+    Ok((name, Box::new(BufReader::new(file))))
+}
+
+/// Fills the batch; empty at the end of the input, which an error of the system is as well.
+fn read_batch(reader: &mut csv::Reader<Box<dyn Read>>, batch: &mut Vec<Record>) {
+    batch.clear();
+    while batch.len() < BATCH_LINES {
+        let mut fields = csv::StringRecord::new();
+        let (position, fields) = match reader.read_record(&mut fields) {
+            Ok(false) => return,
+            Ok(true) => (fields.position().cloned(), Ok(fields)),
+            Err(error) => (error.position().cloned(), Err(error.to_string())),
+        };
+        let line = position.as_ref().unwrap_or_else(|| reader.position()).line();
+        batch.push(Record { line, fields });
     }
 }
 
@@ -93,14 +206,4 @@ fn numbers<const IN: usize>(record: &csv::StringRecord, columns: &[&str; IN]) ->
         }
     }
     Ok(values)
-}
-
-fn write_row<const OUT: usize>(output: &mut impl Write, row: &Row<OUT>) -> io::Result<()> {
-    for index in 0..OUT {
-        if let Some(values) = &row.values {
-            write!(output, "{}", values[index])?;
-        }
-        write!(output, ",")?;
-    }
-    writeln!(output, "{}", row.status)
 }

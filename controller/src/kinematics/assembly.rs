@@ -3,8 +3,9 @@
 //! The seed selects the true solution by two conditions: every Bᵢ below the plane of A₁A₂A₃, and A₂
 //! beyond A₃ along slide 1. Read without a sign for the plane they leave several candidates, so the
 //! plane is oriented here by (A₂−A₁)×(A₃−A₁), the legs must stand above the base, and the Jacobian's
-//! determinant must be positive. That these together leave one solution has been observed over
-//! thousands of inputs; it is *not* proven, and nothing here relies on it.
+//! determinant must be positive. These together do *not* always leave one solution: near the
+//! edge of the strokes about one assemblable input in 40,000 has two (see
+//! [`uniqueness`](super::uniqueness)), and nothing here relies on there being one.
 
 use std::fmt;
 

@@ -25,6 +25,7 @@ mod solution;
 mod solutions;
 mod solver;
 mod tracker;
+pub mod uniqueness;
 
 pub use assembly::{Assembly, Condition};
 pub use certificate::Certificate;

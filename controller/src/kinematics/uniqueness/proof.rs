@@ -1,0 +1,262 @@
+//! One step of the proof: what can be said of a box of inputs as it is.
+//!
+//! The reaches h of all its solutions are enclosed by halving and pruning: a part of h-space goes
+//! when a side cannot close in it or a condition cannot hold, and shrinks by Krawczyk's operator
+//! −Y E(m) + (1 − Y S)(h − m), which holds every solution because the slopes S hold every difference.
+
+use masseter_shared::geometry::{LEGS, Mechanism};
+use nalgebra::Matrix3;
+
+use super::platforms::{Dimensions, Platforms, Slopes};
+use super::{Enclosure, InputBox};
+use crate::kinematics::closure::next;
+
+/// Parts of h-space that are looked at for one box of inputs; a bound on time only.
+const MOST_PARTS: usize = 20_000;
+/// Parts narrower than this share of the inputs' own width are not halved again.
+const FINE_ENOUGH: f64 = 0.5;
+/// Nor are parts narrower than this, metres: what is left of them is for the slopes to decide.
+const FINEST_M: f64 = 5e-4;
+/// A shrinking step that leaves more than this share of the width is not repeated.
+const WORTH_REPEATING: f64 = 0.8;
+
+/// Which solutions there shall be at most one of. All stand above the base.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Claim {
+    /// Those that meet the seed's two conditions, with the platform's plane oriented.
+    SeedConditions,
+    /// Of these, those whose [determinant](crate::kinematics::Solution::determinant) is at least this.
+    DeterminantAtLeast(f64),
+}
+
+/// Reaches hᵢ = lᵢ cos θᵢ, metres.
+pub type Reaches = [Enclosure; LEGS];
+
+/// What is known of a box of inputs.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Finding {
+    /// No input in it has a solution that counts.
+    NoSolution,
+    /// No input in it has more than one.
+    AtMostOne,
+    /// Neither is proven. All solutions that count have their reaches in here.
+    Undecided(Reaches),
+}
+
+/// A mechanism and what is to be proven of it.
+#[derive(Debug, Clone)]
+pub struct Proof {
+    dimensions: Dimensions,
+    claim: Claim,
+}
+
+impl Proof {
+    /// Of a claim about a mechanism.
+    pub fn new(mechanism: &Mechanism, claim: Claim) -> Self {
+        Self { dimensions: Dimensions::new(mechanism), claim }
+    }
+
+    /// All reaches that legs of these lengths can have: where the search starts.
+    pub fn any_reaches(inputs: &InputBox) -> Reaches {
+        inputs.leg_m.map(|leg_m| Enclosure::around_zero(leg_m.high()))
+    }
+
+    /// Decides a box of inputs, if it can; `within` must hold the reaches of all its solutions.
+    pub fn examine(&self, inputs: &InputBox, within: &Reaches) -> Finding {
+        let Some(parts) = self.parts(inputs, within) else { return Finding::Undecided(*within) };
+        let hull = |a: Reaches, b: &Reaches| std::array::from_fn(|leg| a[leg].hull(b[leg]));
+        match parts.split_first() {
+            None => Finding::NoSolution,
+            Some((first, others)) => {
+                let all = others.iter().fold(*first, hull);
+                if self.is_regular(inputs, &all) { Finding::AtMostOne } else { Finding::Undecided(all) }
+            }
+        }
+    }
+
+    /// Parts of h-space that together hold all solutions; none when they would be too many.
+    fn parts(&self, inputs: &InputBox, within: &Reaches) -> Option<Vec<Reaches>> {
+        let widest_m = inputs.axes().iter().fold(0.0, |widest, axis| f64::max(widest, axis.width()));
+        let finest_m = FINEST_M.max(FINE_ENOUGH * widest_m);
+        let (mut open, mut kept) = (vec![*within], Vec::new());
+        let mut looked_at = 0;
+        while let Some(part) = open.pop() {
+            looked_at += 1;
+            if looked_at > MOST_PARTS {
+                return None;
+            }
+            let Some(part) = self.shrunk(inputs, part) else { continue };
+            let widest = (0..LEGS).fold(0, |a, b| if part[b].width() > part[a].width() { b } else { a });
+            if part[widest].width() <= finest_m {
+                kept.push(part);
+                continue;
+            }
+            for half in part[widest].halves() {
+                let mut one = part;
+                one[widest] = half;
+                open.push(one);
+            }
+        }
+        Some(kept)
+    }
+
+    /// What of a part may hold solutions; none when nothing does.
+    fn shrunk(&self, inputs: &InputBox, part: Reaches) -> Option<Reaches> {
+        let mut part = part;
+        loop {
+            let platforms = Platforms::new(&self.dimensions, inputs, &part)?;
+            if !self.may_count(&platforms) {
+                return None;
+            }
+            let smaller = self.contracted(inputs, &platforms, &part)?;
+            let share = (0..LEGS).map(|leg| smaller[leg].width() / part[leg].width()).fold(0.0, f64::max);
+            part = smaller;
+            if share.is_nan() || share > WORTH_REPEATING {
+                return Some(part);
+            }
+        }
+    }
+
+    /// Whether a platform in here may be a solution that counts.
+    fn may_count(&self, platforms: &Platforms) -> bool {
+        let closes = platforms.excess_m2(&self.dimensions).iter().all(|excess| excess.contains(0.0));
+        closes && platforms.may_stand_as_assembled(&self.dimensions) && self.may_be_conditioned(platforms)
+    }
+
+    fn may_be_conditioned(&self, platforms: &Platforms) -> bool {
+        let Claim::DeterminantAtLeast(margin) = self.claim else { return true };
+        let slopes = platforms.slopes(&self.dimensions);
+        let determinant = slopes.and_then(|slopes| platforms.determinant(&self.dimensions, &slopes));
+        determinant.is_none_or(|determinant| determinant.high() >= margin)
+    }
+
+    /// Krawczyk's operator; the part as it is where the operator says nothing, none where nothing is left.
+    fn contracted(&self, inputs: &InputBox, platforms: &Platforms, part: &Reaches) -> Option<Reaches> {
+        let middle = part.map(|reach_m| Enclosure::point(reach_m.middle()));
+        let at_middle = Platforms::new(&self.dimensions, inputs, &middle);
+        let preconditioned =
+            platforms.slopes(&self.dimensions).and_then(|slopes| Preconditioned::new(&slopes));
+        let (Some(at_middle), Some(preconditioned)) = (at_middle, preconditioned) else { return Some(*part) };
+        let excess_m2 = at_middle.excess_m2(&self.dimensions);
+        let mut smaller = *part;
+        for leg in 0..LEGS {
+            let mut reach_m = middle[leg];
+            for column in 0..LEGS {
+                reach_m = reach_m - excess_m2[column] * preconditioned.inverse[(leg, column)];
+                reach_m = reach_m + preconditioned.defect[leg][column] * (part[column] - middle[column]);
+            }
+            smaller[leg] = reach_m.intersection(part[leg])?;
+        }
+        Some(smaller)
+    }
+
+    /// Whether the slopes form a regular matrix whatever they are.
+    fn is_regular(&self, inputs: &InputBox, all: &Reaches) -> bool {
+        let platforms = Platforms::new(&self.dimensions, inputs, all);
+        let slopes = platforms.and_then(|platforms| platforms.slopes(&self.dimensions));
+        slopes.and_then(|slopes| Preconditioned::new(&slopes)).is_some_and(|matrix| matrix.is_regular())
+    }
+}
+
+/// The slopes' matrix S, multiplied by an approximate inverse Y of its middle.
+struct Preconditioned {
+    inverse: Matrix3<f64>,
+    /// 1 − Y S.
+    defect: [[Enclosure; LEGS]; LEGS],
+}
+
+impl Preconditioned {
+    fn new(slopes: &Slopes) -> Option<Self> {
+        let mut middle = Matrix3::zeros();
+        for side in 0..LEGS {
+            middle[(side, side)] = slopes.near_m[side].middle();
+            middle[(side, next(side))] = slopes.far_m[side].middle();
+        }
+        let inverse = middle.try_inverse().filter(|inverse| inverse.iter().all(|x| x.is_finite()))?;
+        // Column i of S has the near slope of side i and the far slope of the side before.
+        let defect = std::array::from_fn(|row| {
+            std::array::from_fn(|leg| {
+                let before = (leg + LEGS - 1) % LEGS;
+                let entry =
+                    slopes.near_m[leg] * inverse[(row, leg)] + slopes.far_m[before] * inverse[(row, before)];
+                Enclosure::point(f64::from(u8::from(row == leg))) - entry
+            })
+        });
+        Some(Self { inverse, defect })
+    }
+
+    /// ‖1 − Y S‖ < 1 for every S leaves none of them singular.
+    fn is_regular(&self) -> bool {
+        self.defect.iter().all(|row| {
+            let sum = row.iter().map(|entry| Enclosure::point(entry.magnitude()));
+            sum.reduce(|a, b| a + b).is_some_and(|sum| sum.high() < 1.0)
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use masseter_shared::geometry::Actuators;
+
+    use super::*;
+    use crate::kinematics::Solutions;
+    use crate::kinematics::samples::seed_mechanism;
+
+    fn around(actuators: &Actuators, radius_m: f64) -> InputBox {
+        let around = |value_m: f64| Enclosure::new(value_m - radius_m, value_m + radius_m);
+        InputBox { slide_m: actuators.slide_m.map(around), leg_m: actuators.leg_m.map(around) }
+    }
+
+    fn examine(claim: Claim, actuators: &Actuators, radius_m: f64) -> Finding {
+        let inputs = around(actuators, radius_m);
+        Proof::new(&seed_mechanism(), claim).examine(&inputs, &Proof::any_reaches(&inputs))
+    }
+
+    /// An input with two solutions that meet every condition, the determinants being 0.045 and more.
+    const AMBIGUOUS: Actuators = Actuators {
+        slide_m: [0.010_137_353_810_067_46, 0.015_926_592_372_227_42, 0.020_840_656_757_742_57],
+        leg_m: [0.246_449_456_124_783_5, 0.287_523_749_262_044_8, 0.270_252_791_539_176_8],
+    };
+
+    #[test]
+    fn inputs_near_the_neutral_one_have_at_most_one() {
+        let neutral = Actuators { slide_m: [0.0; LEGS], leg_m: [0.27; LEGS] };
+        assert_eq!(examine(Claim::SeedConditions, &neutral, 1e-3), Finding::AtMostOne);
+        let tilted = Actuators { slide_m: [0.005, -0.004, 0.003], leg_m: [0.26, 0.27, 0.275] };
+        assert_eq!(examine(Claim::SeedConditions, &tilted, 1e-3), Finding::AtMostOne);
+    }
+
+    #[test]
+    fn nothing_is_proven_where_two_true_solutions_are_known() {
+        let known = Solutions::new(&seed_mechanism(), &AMBIGUOUS).unwrap();
+        assert_eq!(known.true_ones().count(), 2);
+        for claim in [Claim::SeedConditions, Claim::DeterminantAtLeast(0.0), Claim::DeterminantAtLeast(0.04)]
+        {
+            for radius_m in [1e-9, 1e-6, 1e-4] {
+                let Finding::Undecided(within) = examine(claim, &AMBIGUOUS, radius_m) else {
+                    panic!("{claim:?} within {radius_m} m")
+                };
+                assert!(within[0].width() < 0.1, "the search gave up: {claim:?}, {radius_m} m");
+                for one in known.true_ones() {
+                    for (leg, reach_m) in within.iter().enumerate() {
+                        assert!(reach_m.contains(AMBIGUOUS.leg_m[leg] * one.theta_rad[leg].cos()));
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_determinant_between_the_two_settles_the_same_input() {
+        let known = Solutions::new(&seed_mechanism(), &AMBIGUOUS).unwrap();
+        let between = known.true_ones().map(|one| one.determinant).sum::<f64>() / 2.0;
+        let claim = Claim::DeterminantAtLeast(between);
+        assert_eq!(examine(claim, &AMBIGUOUS, 1e-7), Finding::AtMostOne);
+    }
+
+    #[test]
+    fn what_cannot_be_assembled_has_no_solution() {
+        let apart = Actuators { slide_m: [0.0; LEGS], leg_m: [0.30, 0.30, 0.20] };
+        assert_eq!(examine(Claim::SeedConditions, &apart, 1e-3), Finding::NoSolution);
+    }
+}

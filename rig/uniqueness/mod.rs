@@ -1,0 +1,111 @@
+//! `masseter uniqueness`: how far an input settles the pose. `prove` proves it for a region of inputs,
+//! `search` looks for inputs with two solutions that count. Both are about the published mechanism.
+
+mod proof;
+mod search;
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use anyhow::Context;
+use clap::{Args, Subcommand, ValueEnum};
+use masseter_controller::kinematics::uniqueness::InputBox;
+use masseter_shared::geometry::{GeometryError, Mechanism, MechanismConfig};
+
+use crate::exit::{Exit, Failure};
+
+/// What `uniqueness` does.
+#[derive(Debug, Clone, Subcommand)]
+pub(crate) enum UniquenessVerb {
+    /// Prove by interval arithmetic that no input of a region has two solutions
+    Prove(ProveArgs),
+    /// Look for inputs with two solutions, at random and then uphill
+    Search(SearchArgs),
+}
+
+/// What `prove` takes.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct ProveArgs {
+    /// Which inputs
+    #[arg(long, value_enum, default_value_t)]
+    region: Region,
+    /// Boxes to examine at most
+    #[arg(long, value_name = "N", default_value_t = 100_000)]
+    boxes: usize,
+    /// Count only solutions whose determinant is at least this [default: the seed's conditions alone]
+    #[arg(long, value_name = "DETERMINANT")]
+    margin: Option<f64>,
+    /// CSV file for the boxes that stay undecided
+    #[arg(long, value_name = "FILE.csv")]
+    out: Option<PathBuf>,
+}
+
+/// What `search` takes.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct SearchArgs {
+    /// Which inputs
+    #[arg(long, value_enum, default_value = "box")]
+    region: Region,
+    /// Random inputs
+    #[arg(long, value_name = "N", default_value_t = 400_000)]
+    inputs: usize,
+    /// Seed of the random numbers
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// CSV file for the inputs found
+    #[arg(long, value_name = "FILE.csv")]
+    out: Option<PathBuf>,
+}
+
+/// Boxes of inputs.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Region {
+    /// Slides within ±5 mm, legs from 260 to 280 mm
+    #[default]
+    Neutral,
+    /// Slides within ±13 mm, legs from 243.6 to 300 mm: what holds every jaw motion
+    Jaw,
+    /// The whole strokes
+    Box,
+}
+
+/// Carries a verb out. Exits with 1 where uniqueness is not proven, or an input with two was found.
+pub(crate) fn uniqueness(verb: &UniquenessVerb) -> Result<Exit, Failure> {
+    let mechanism = published()?;
+    let (settled, rows, out) = match verb {
+        UniquenessVerb::Prove(args) => {
+            let (settled, rows) = proof::prove(args, &mechanism);
+            (settled, rows, &args.out)
+        }
+        UniquenessVerb::Search(args) => {
+            let (settled, rows) = search::search(args, &mechanism);
+            (settled, rows, &args.out)
+        }
+    };
+    if let Some(path) = out {
+        write_rows(path, &rows).with_context(|| format!("cannot write {}", path.display()))?;
+    }
+    Ok(if settled { Exit::Passed } else { Exit::Failed })
+}
+
+fn published() -> Result<Mechanism, GeometryError> {
+    Mechanism::new(&MechanismConfig::default())
+}
+
+fn write_rows(path: &Path, rows: &[String]) -> std::io::Result<()> {
+    let mut file = std::io::BufWriter::new(std::fs::File::create(path)?);
+    for row in rows {
+        writeln!(file, "{row}")?;
+    }
+    file.flush()
+}
+
+impl Region {
+    fn inputs(self, mechanism: &Mechanism) -> InputBox {
+        match self {
+            Self::Neutral => InputBox::uniform([-0.005, 0.005], [0.26, 0.28]),
+            Self::Jaw => InputBox::uniform([-0.013, 0.013], [0.2436, 0.30]),
+            Self::Box => InputBox::uniform(mechanism.strokes().slide_m, mechanism.strokes().leg_m),
+        }
+    }
+}
