@@ -16,6 +16,9 @@ for figures in json.loads((folder / "summary.json").read_text())["figures"]["int
         total.add(interval)
     assert total.get_total_count() == figures["n"], (path, total.get_total_count(), figures["n"])
     for percentile, key in ((50, "p50_ns"), (99, "p99_ns")):
-        found, expected = total.get_value_at_percentile(percentile), figures[key]
-        assert abs(found - expected) <= max(2, expected * 2e-3), (path, percentile, found, expected)
+        # The two libraries round the rank of a percentile differently: one sample more or less, which lie apart
+        # where samples are few.
+        below, above = (total.get_value_at_percentile(percentile + 100 * ranks / figures["n"]) for ranks in (-1, 1))
+        expected, unit = figures[key], max(2, figures[key] * 2e-3)
+        assert below - unit <= expected <= above + unit, (path, percentile, below, expected, above)
     print(f"{figures['name']:20} {figures['n']:8}")

@@ -16,7 +16,7 @@ largest_angle_rad = 0.0
 for message in read_ros2_messages(sys.argv[1], topics=TOPICS):
     topic, body = message.channel.topic, message.ros_msg
     counts[topic] += 1
-    assert body.version == 2, (topic, body.version)
+    assert body.version == 3, (topic, body.version)
     if topic not in ("event",):
         assert body.seq == last_seq.get(topic, 0) + 1, (topic, body.seq)
         last_seq[topic] = body.seq

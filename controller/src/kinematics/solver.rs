@@ -8,8 +8,8 @@
 //! [`Residual::Distance`] is that reading. *The step rule*: "the increment is reduced" names no
 //! factor and no amount of decrease. [`StepRule::Halving`] takes the flow chart by the word; its
 //! reference 13 (Numerical Recipes, chapter 9) minimises with [`StepRule::QuadraticBacktracking`].
-//! With any choice the claims "no oscillation, no divergence" (Figs. 3 and 4) hold, because the error
-//! cannot increase; `masseter kinematics` measures what each choice makes of the others.
+//! With any choice the claims "no oscillation, no divergence" (Figs. 3 and 4) hold in the residual chosen,
+//! because its error cannot increase. Whether the iteration then reaches a solution is another matter.
 
 use masseter_shared::geometry::{Actuators, LEGS, Mechanism};
 use nalgebra::{Matrix3, Vector3};
