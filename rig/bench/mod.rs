@@ -1,7 +1,7 @@
 //! `masseter bench`: what the rig's parts cost, each beside a baseline in the same run.
 //!
 //! Contenders take turns, round by round, because a machine changes its pace from second to second; what
-//! counts is the ratio within a round ([`contest`]). Nothing is judged here.
+//! counts is the ratio within a round (`contest`). Nothing is judged here.
 
 mod contest;
 mod fk;

@@ -2,8 +2,7 @@
 //!
 //! Purely declarative, and deterministic: whether a fault strikes a frame is a function of the seed, the
 //! fault and the frame's number, not of how often anybody asks. Who carries faults out is the
-//! [`VirtualWire`](super::VirtualWire), which knows all of them, or [`Faulty`](super::wrappers::Faulty) around any
-//! bus, which knows those that a single port can have.
+//! [`VirtualWire`](super::VirtualWire).
 
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg32;
