@@ -15,18 +15,19 @@ use masseter_shared::messages::{Command, Event, FrameTap, Message, Reading, Stat
 use masseter_shared::transport::{Inlet, Node, TransportError};
 
 use crate::exit::Exit;
-use crate::recording::{Backlog, Recorded, Recorder, Scene};
+use crate::recording::{Backlog, Pace, Recorded, Recorder, Scene};
 use view::{Mode, View};
 
 /// How often the topics are drained; a fraction of what their buffers hold.
 const DRAIN: Duration = Duration::from_millis(10);
+
 /// Records until asked to stop, then drains what is left. [`Exit::Incomplete`] when anything that was
 /// received is not safe in the recording.
 pub fn run(assignment: &Assignment, recording: &Path, quiet: bool) -> anyhow::Result<Exit> {
     let post = assignment.take_up()?;
     let topics = Topics::open(&post.node)?;
     let scene = Scene::new(&Mechanism::new(&post.scenario.mechanism)?, &post.scenario.jaw);
-    let mut backlog = Backlog::start(Recorder::create(recording, scene)?);
+    let mut backlog = Backlog::start(Recorder::create(recording, scene)?, Pace::RealTime);
     let start = post.ready()?;
 
     let mut view = View::new(Mode::suitable(quiet), post.scenario.can.rates()?, start.epoch_ns);

@@ -1,8 +1,11 @@
 //! Records without waiting for the disk: messages queue in memory of a fixed size, and a thread of its own
 //! compresses and writes them.
 //!
-//! When the disk is too slow for the memory to suffice, messages are lost and counted; when it fails, the
-//! recording ends there and everything after it is lost and counted. It never blocks the caller.
+//! When the disk is too slow for the memory to suffice, the caller's [`Pace`] says whether messages are lost and
+//! counted or waited for; when it fails, the recording ends there and everything after it is lost and counted.
+
+#[cfg(test)]
+mod tests;
 
 use std::io::{Seek, Write};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TryRecvError, TrySendError, sync_channel};
@@ -15,10 +18,34 @@ use masseter_shared::messages::Message;
 use super::topic::Topic;
 use super::writer::{Recorder, WriteError};
 
-/// Memory of one batch, bytes: 0.7 s of every topic at 10 kHz. There are two.
-const BATCH_BYTES: usize = 16 << 20;
-/// How often everything goes to the disk for good: what a power cut may take.
-const FLUSH_EVERY_NS: u64 = SECOND_NS / 2;
+/// Whom the recording may hold up.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Pace {
+    /// Nobody: messages without room are dropped, and all others are soon on the disk for good.
+    RealTime,
+    /// The caller, who waits for room. There are no flushes, whose times would decide where chunks end: the same
+    /// messages give the same bytes.
+    Virtual,
+}
+
+impl Pace {
+    /// Memory of one batch, bytes. There are two. In real time, 0.7 s of every topic at 10 kHz; else no more than
+    /// both ends need to work at the same time.
+    const fn batch_bytes(self) -> usize {
+        match self {
+            Self::RealTime => 16 << 20,
+            Self::Virtual => 1 << 20,
+        }
+    }
+
+    /// How often everything goes to the disk for good, ns: what a power cut may take.
+    const fn flush_every_ns(self) -> Option<u64> {
+        match self {
+            Self::RealTime => Some(SECOND_NS / 2),
+            Self::Virtual => None,
+        }
+    }
+}
 
 /// Messages on their way to the disk: topic, log time and body of each, one behind the other.
 #[derive(Debug, Default)]
@@ -35,8 +62,8 @@ impl Batch {
         self.messages += 1;
     }
 
-    fn has_room_for(&self, body: &[u8]) -> bool {
-        self.bytes.len() + 1 + size_of::<u64>() + body.len() <= BATCH_BYTES
+    fn bytes_with(&self, body: &[u8]) -> usize {
+        self.bytes.len() + 1 + size_of::<u64>() + body.len()
     }
 
     fn clear(&mut self) {
@@ -69,6 +96,7 @@ pub struct Outcome {
 
 /// The offering end.
 pub struct Backlog {
+    pace: Pace,
     pending: Batch,
     to_disk: SyncSender<Batch>,
     emptied: Receiver<Batch>,
@@ -79,27 +107,34 @@ pub struct Backlog {
 
 impl Backlog {
     /// Starts the thread that writes.
-    pub fn start<W: Write + Seek + Send + 'static>(recorder: Recorder<W>) -> Self {
+    pub fn start<W: Write + Seek + Send + 'static>(recorder: Recorder<W>, pace: Pace) -> Self {
         // One batch is filled while the other is written: no more can be under way.
         let (to_disk, batches) = sync_channel(1);
         let (give_back, emptied) = sync_channel(2);
         give_back.try_send(Batch::default()).expect("the channel is new");
-        let disk = thread::spawn(move || write_batches(recorder, &batches, &give_back));
-        Self { pending: Batch::default(), to_disk, emptied, disk, offered: 0, dropped: 0 }
+        let disk = thread::spawn(move || write_batches(recorder, &batches, &give_back, pace));
+        Self { pace, pending: Batch::default(), to_disk, emptied, disk, offered: 0, dropped: 0 }
     }
 
-    /// Takes a message that was received at `log_time_ns`, if there is room for it. Never waits.
+    /// Takes a message that was received at `log_time_ns`, if there is room for it or time to wait.
     pub fn record<M: Message>(&mut self, message: &M, log_time_ns: u64) {
         let body = bytemuck::bytes_of(message);
         self.offered += 1;
-        if !self.pending.has_room_for(body) {
-            self.hand_over();
+        if !self.has_room_for(body) {
+            match self.pace {
+                Pace::RealTime => self.hand_over(),
+                Pace::Virtual => self.hand_over_when_wanted(),
+            }
         }
-        if self.pending.has_room_for(body) {
+        if self.has_room_for(body) {
             self.pending.push(Topic::of::<M>(), log_time_ns, body);
         } else {
             self.dropped += 1;
         }
+    }
+
+    fn has_room_for(&self, body: &[u8]) -> bool {
+        self.pending.bytes_with(body) <= self.pace.batch_bytes()
     }
 
     /// Gives what is pending to the disk, if the disk is through with what it had. Never waits.
@@ -111,6 +146,14 @@ impl Backlog {
             Ok(empty) => self.send(empty),
             Err(TryRecvError::Empty) => {}
             Err(TryRecvError::Disconnected) => self.give_up(),
+        }
+    }
+
+    /// Gives what is pending to the disk as soon as that is through with what it had.
+    fn hand_over_when_wanted(&mut self) {
+        match self.emptied.recv() {
+            Ok(empty) => self.send(empty),
+            Err(_) => self.give_up(),
         }
     }
 
@@ -137,10 +180,7 @@ impl Backlog {
     /// Waits until everything is written and the recording has its index.
     pub fn finish(mut self) -> Outcome {
         if self.pending.messages > 0 {
-            match self.emptied.recv() {
-                Ok(empty) => self.send(empty),
-                Err(_) => self.give_up(),
-            }
+            self.hand_over_when_wanted();
         }
         drop(self.to_disk);
         let (safe, error) = self.disk.join().expect("the writing thread does not panic");
@@ -154,9 +194,10 @@ fn write_batches<W: Write + Seek>(
     mut recorder: Recorder<W>,
     batches: &Receiver<Batch>,
     give_back: &SyncSender<Batch>,
+    pace: Pace,
 ) -> (u64, Option<WriteError>) {
     let mut safe = 0;
-    match write_until_the_end(&mut recorder, batches, give_back, &mut safe) {
+    match write_until_the_end(&mut recorder, batches, give_back, pace, &mut safe) {
         Ok(written) => match recorder.finish() {
             Ok(()) => (written, None),
             Err(error) => (safe, Some(error)),
@@ -172,10 +213,12 @@ fn write_until_the_end<W: Write + Seek>(
     recorder: &mut Recorder<W>,
     batches: &Receiver<Batch>,
     give_back: &SyncSender<Batch>,
+    pace: Pace,
     safe: &mut u64,
 ) -> Result<u64, WriteError> {
     let mut written = 0;
-    let mut flush_ns = clock::now_ns() + FLUSH_EVERY_NS;
+    let next_flush_ns = || pace.flush_every_ns().map_or(u64::MAX, |every_ns| clock::now_ns() + every_ns);
+    let mut flush_ns = next_flush_ns();
     loop {
         let wait = Duration::from_nanos(flush_ns.saturating_sub(clock::now_ns()));
         match batches.recv_timeout(wait) {
@@ -194,101 +237,7 @@ fn write_until_the_end<W: Write + Seek>(
                 recorder.flush()?;
                 *safe = written;
             }
-            flush_ns = clock::now_ns() + FLUSH_EVERY_NS;
+            flush_ns = next_flush_ns();
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use std::io::{self, Cursor, SeekFrom};
-    use std::sync::mpsc::{Receiver, channel};
-
-    use masseter_shared::config::JawConfig;
-    use masseter_shared::geometry::{Mechanism, MechanismConfig};
-    use masseter_shared::messages::Reading;
-
-    use super::super::Scene;
-    use super::*;
-
-    fn scene() -> Scene {
-        Scene::new(&Mechanism::new(&MechanismConfig::default()).unwrap(), &JawConfig::default())
-    }
-
-    /// A disk that does not answer before it is told to, and then does as it is told.
-    struct Stuck {
-        definitions: u64,
-        bytes: Cursor<Vec<u8>>,
-        go_on: Receiver<()>,
-        then: io::ErrorKind,
-    }
-
-    /// What a disk that is well again says.
-    const WELL: io::ErrorKind = io::ErrorKind::Other;
-
-    impl Write for Stuck {
-        fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-            if self.bytes.position() >= self.definitions {
-                // An error means that the test let go.
-                let _ = self.go_on.recv();
-                if self.then != WELL {
-                    return Err(self.then.into());
-                }
-            }
-            self.bytes.write(bytes)
-        }
-
-        fn flush(&mut self) -> io::Result<()> {
-            Ok(())
-        }
-    }
-
-    impl Seek for Stuck {
-        fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
-            self.bytes.seek(to)
-        }
-    }
-
-    /// Length of a recording that holds nothing but its definitions.
-    fn definitions() -> u64 {
-        let mut bytes = Cursor::new(Vec::new());
-        std::mem::forget(Recorder::on(&mut bytes, scene()).unwrap());
-        bytes.position()
-    }
-
-    /// Offers readings until `bytes` of them have come to a disk that is stuck meanwhile.
-    fn record_on_a_stuck_disk(bytes: usize, then: io::ErrorKind) -> (u64, Outcome) {
-        let (let_go, go_on) = channel();
-        let disk = Stuck { definitions: definitions(), bytes: Cursor::default(), go_on, then };
-        let mut backlog = Backlog::start(Recorder::on(disk, scene()).unwrap());
-        let offered = (bytes / size_of::<Reading>()) as u64;
-        for seq in 1..=offered {
-            backlog.record(&Reading { seq, ..Default::default() }, seq);
-        }
-        let dropped = backlog.dropped();
-        drop(let_go);
-        (dropped, backlog.finish())
-    }
-
-    #[test]
-    fn a_disk_that_hangs_for_a_while_loses_nothing() {
-        let (dropped, recorded) = record_on_a_stuck_disk(BATCH_BYTES / 2, WELL);
-        assert_eq!((dropped, recorded.lost), (0, 0));
-        assert!(recorded.error.is_none());
-    }
-
-    #[test]
-    fn a_disk_that_hangs_too_long_loses_what_memory_cannot_hold_and_no_more() {
-        let (dropped, recorded) = record_on_a_stuck_disk(BATCH_BYTES * 4, WELL);
-        assert!(dropped > 0);
-        assert_eq!(recorded.lost, dropped);
-        assert!(recorded.error.is_none());
-    }
-
-    #[test]
-    fn a_disk_that_is_gone_loses_everything_behind_the_last_flush() {
-        let (_, recorded) = record_on_a_stuck_disk(BATCH_BYTES / 2, io::ErrorKind::StorageFull);
-        assert_eq!(recorded.lost, (BATCH_BYTES / 2 / size_of::<Reading>()) as u64);
-        assert!(recorded.error.is_some());
     }
 }

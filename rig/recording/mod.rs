@@ -18,7 +18,7 @@ mod writer;
 
 use masseter_shared::messages::{Command, Event, FrameTap, Reading, State, Truth};
 
-pub use backlog::{Backlog, Outcome};
+pub use backlog::{Backlog, Outcome, Pace};
 pub use reader::{Chunks, Entry, ReadError, Reader, Schema};
 pub use recover::{RecoverError, Recovered, recover};
 pub use scene::Scene;

@@ -1,4 +1,4 @@
-//! The run under virtual time: the same cores in one thread, as fast as they go.
+//! The run under virtual time: the same cores in one thread, as fast as they go, recorded by another.
 //!
 //! Every step happens exactly when the time table has it, so the same scenario and seed leave the
 //! same bytes. Latencies are those of the bus alone; computing takes no time here.
@@ -12,7 +12,7 @@ use masseter_shared::realtime::Wake;
 
 use super::folder::RunFolder;
 use super::plan::Plan;
-use crate::recording::{Recorder, Scene, WriteError};
+use crate::recording::{Backlog, Pace, Recorder, Scene};
 use crate::report::verdict::Ending;
 
 /// Virtual time of the first SYNC, ns.
@@ -24,15 +24,17 @@ pub fn run(plan: &Plan, folder: &RunFolder) -> anyhow::Result<Ending> {
     let mut plant = PlantCore::new(scenario, EPOCH_NS)?;
     let mut controller = Controller::new(scenario, plan.mechanism.clone(), plan.trajectory.clone());
     let scene = Scene::new(&plan.mechanism, &scenario.jaw);
-    let mut log = Log::new(Recorder::create(&folder.recording(), scene)?);
+    let mut log = Log::new(Backlog::start(Recorder::create(&folder.recording(), scene)?, Pace::Virtual));
 
     let mut cycle = 0;
-    while !controller.is_done() {
+    while !controller.is_done() && log.is_safe() {
         cycle += 1;
         let sync_ns = EPOCH_NS + (cycle - 1) * scenario.period_ns();
         step(cycle, sync_ns, plan, &mut plant, &mut controller, &mut log)?;
     }
-    log.recorder.finish()?;
+    if let Some(error) = log.backlog.finish().error {
+        return Err(error.into());
+    }
     Ok(match controller.state() {
         ControllerState::SafeStop => Ending::SafeStop,
         _ => Ending::Completed,
@@ -51,27 +53,26 @@ fn step(
     plant.begin_cycle(Wake { cycle, due_ns: sync_ns, woke_ns: sync_ns, skipped: 0, stalled_ns: 0 })?;
     let reading_ns = sync_ns + plan.schedule.reading_by_ns;
     plant.collect(reading_ns)?;
-    let reading =
-        log.readings.record(&mut log.recorder, reading_ns, |reading| plant.fill_reading(reading))?;
+    let reading = log.readings.record(&mut log.backlog, reading_ns, |reading| plant.fill_reading(reading));
     if let Some(truth) = plant.truth() {
-        log.truths.record(&mut log.recorder, reading_ns, |message| *message = truth)?;
+        log.truths.record(&mut log.backlog, reading_ns, |message| *message = truth);
     }
 
     let now_ns = sync_ns + plan.schedule.controller_at_ns;
     controller.observe(Some(&reading));
     let event = controller.decide(Tick { cycle, now_ns });
-    let command =
-        log.commands.record(&mut log.recorder, now_ns, |command| controller.fill_command(command))?;
-    log.states.record(&mut log.recorder, now_ns, |state: &mut State| {
+    let command = log.commands.record(&mut log.backlog, now_ns, |command| controller.fill_command(command));
+    log.states.record(&mut log.backlog, now_ns, |state: &mut State| {
         controller.fill_state(state);
         (state.due_ns, state.woke_ns, state.received_ns) = (now_ns, now_ns, now_ns);
         (state.solved_ns, state.commanded_ns) = (now_ns, now_ns);
-    })?;
+    });
     if let Some(event) = event {
-        log.controller_events.record(&mut log.recorder, now_ns, |message| *message = event)?;
+        log.controller_events.record(&mut log.backlog, now_ns, |message| *message = event);
     }
     plant.apply(now_ns, Some(&command))?;
-    Ok(log.drain(plant, now_ns)?)
+    log.drain(plant, now_ns);
+    Ok(())
 }
 
 /// Numbers and records the messages of one publisher on one topic, as its outlet would.
@@ -79,24 +80,19 @@ fn step(
 struct Outlet(u64);
 
 impl Outlet {
-    fn record<M: Message>(
-        &mut self,
-        recorder: &mut Recorder,
-        now_ns: u64,
-        fill: impl FnOnce(&mut M),
-    ) -> Result<M, WriteError> {
+    fn record<M: Message>(&mut self, backlog: &mut Backlog, now_ns: u64, fill: impl FnOnce(&mut M)) -> M {
         let mut message = M::default();
         fill(&mut message);
         self.0 += 1;
         message.stamp(self.0, now_ns);
-        recorder.record(&message, now_ns)?;
-        Ok(message)
+        backlog.record(&message, now_ns);
+        message
     }
 }
 
 /// The recording and the publishers it hears.
 struct Log {
-    recorder: Recorder,
+    backlog: Backlog,
     commands: Outlet,
     readings: Outlet,
     states: Outlet,
@@ -107,9 +103,9 @@ struct Log {
 }
 
 impl Log {
-    fn new(recorder: Recorder) -> Self {
+    fn new(backlog: Backlog) -> Self {
         Self {
-            recorder,
+            backlog,
             commands: Outlet::default(),
             readings: Outlet::default(),
             states: Outlet::default(),
@@ -120,23 +116,18 @@ impl Log {
         }
     }
 
+    /// Whether everything so far is or will be recorded, as far as is known.
+    fn is_safe(&self) -> bool {
+        self.backlog.dropped() == 0
+    }
+
     /// Records the frames and events of a cycle.
-    fn drain(&mut self, plant: &mut PlantCore, now_ns: u64) -> Result<(), WriteError> {
-        let mut result = Ok(());
+    fn drain(&mut self, plant: &mut PlantCore, now_ns: u64) {
         plant.drain_frames(&mut |frame| {
-            if result.is_ok() {
-                result =
-                    self.frames.record(&mut self.recorder, now_ns, |message| *message = frame).map(|_| ());
-            }
+            self.frames.record(&mut self.backlog, now_ns, |message| *message = frame);
         });
         plant.drain_events(&mut |event| {
-            if result.is_ok() {
-                result = self
-                    .plant_events
-                    .record(&mut self.recorder, now_ns, |message| *message = event)
-                    .map(|_| ());
-            }
+            self.plant_events.record(&mut self.backlog, now_ns, |message| *message = event);
         });
-        result
     }
 }
