@@ -7,7 +7,7 @@ use super::plot::Drawn;
 use super::table::{self, in_words};
 use super::{charts, events, film};
 use crate::analysis::Figures;
-use crate::report::verdict::Verdict;
+use crate::report::verdict::{CheckResult, Verdict};
 use crate::run::manifest::Manifest;
 
 const STYLE: &str = include_str!("page/style.css");
@@ -49,7 +49,11 @@ fn write_page(
 fn checks(page: &mut String, verdict: &Verdict) -> std::fmt::Result {
     page.push_str("<h2>Checks</h2>\n<table id=\"checks\">\n");
     for check in &verdict.checks {
-        let (class, mark) = if check.passed { ("", "ok") } else { ("failed", "FAILED") };
+        let (class, mark) = match check.result {
+            CheckResult::Passed => ("", "ok"),
+            CheckResult::Failed => ("failed", "FAILED"),
+            CheckResult::NotJudged => ("", "not judged"),
+        };
         writeln!(page, "<tr><td>{}<td class=\"{class}\">{mark}<td>{}", check.name, escape(&check.finding))?;
     }
     page.push_str("</table>\n");

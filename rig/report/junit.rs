@@ -2,17 +2,18 @@
 
 use crate::analysis::Figures;
 use crate::exit::Exit;
-use crate::report::verdict::Verdict;
+use crate::report::verdict::{CheckResult, Verdict};
 use crate::run::manifest::Manifest;
 
 /// One suite; a run that ended wrongly or cannot be judged has an `error` case of its own.
 pub(super) fn of_run(manifest: &Manifest, figures: &Figures, verdict: &Verdict) -> String {
-    let failures = verdict.checks.iter().filter(|check| !check.passed).count();
+    let count = |result| verdict.checks.iter().filter(|check| check.result == result).count();
+    let (failures, skipped) = (count(CheckResult::Failed), count(CheckResult::NotJudged));
     let judged = matches!(verdict.exit, Exit::Passed | Exit::Failed);
     let tests = verdict.checks.len() + 1;
     let mut xml = format!(
         "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n\
-         <testsuite name=\"masseter.{}\" tests=\"{tests}\" failures=\"{failures}\" errors=\"{}\" time=\"{:.3}\" timestamp=\"{}\">\n",
+         <testsuite name=\"masseter.{}\" tests=\"{tests}\" failures=\"{failures}\" skipped=\"{skipped}\" errors=\"{}\" time=\"{:.3}\" timestamp=\"{}\">\n",
         escape(&manifest.scenario.name),
         usize::from(!judged),
         figures.duration_s,
@@ -21,7 +22,12 @@ pub(super) fn of_run(manifest: &Manifest, figures: &Figures, verdict: &Verdict) 
     let problem = (!judged).then(|| ("error", format!("{}: {}", verdict.word, verdict.reason)));
     xml += &case("run", problem);
     for check in &verdict.checks {
-        xml += &case(check.name, (!check.passed).then(|| ("failure", check.finding.clone())));
+        let problem = match check.result {
+            CheckResult::Passed => None,
+            CheckResult::Failed => Some("failure"),
+            CheckResult::NotJudged => Some("skipped"),
+        };
+        xml += &case(check.name, problem.map(|kind| (kind, check.finding.clone())));
     }
     xml + "</testsuite>\n"
 }

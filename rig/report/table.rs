@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use crate::analysis::{EventRecord, Figures, IntervalFigures};
-use crate::report::verdict::Verdict;
+use crate::report::verdict::{CheckResult, Verdict};
 use crate::run::manifest::Manifest;
 
 /// Verdict, checks, latencies, losses and noteworthy events.
@@ -33,7 +33,11 @@ fn write_all(
         scenario.seed,
     )?;
     for check in &verdict.checks {
-        let mark = if check.passed { "ok  " } else { "FAIL" };
+        let mark = match check.result {
+            CheckResult::Passed => "ok  ",
+            CheckResult::Failed => "FAIL",
+            CheckResult::NotJudged => "?   ",
+        };
         writeln!(text, "  {mark} {:<18} {}", check.name, check.finding)?;
     }
     let tracking = &figures.tracking;

@@ -36,6 +36,24 @@ impl Ending {
     }
 }
 
+/// Whether what was checked is as it should be.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum CheckResult {
+    /// It is.
+    Passed,
+    /// It is not.
+    Failed,
+    /// This run cannot tell; the finding says why.
+    NotJudged,
+}
+
+impl CheckResult {
+    fn of(passed: bool) -> Self {
+        if passed { Self::Passed } else { Self::Failed }
+    }
+}
+
 /// One thing that was judged.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Check {
@@ -44,7 +62,7 @@ pub struct Check {
     /// What was found, with its limit.
     pub finding: String,
     /// Whether it is as it should be.
-    pub passed: bool,
+    pub result: CheckResult,
 }
 
 /// The judgement of a run.
@@ -111,11 +129,22 @@ fn incomplete(figures: &Figures) -> Option<Judgement> {
     Some((Exit::Incomplete, "INCOMPLETE", reason))
 }
 
-/// Too many skipped cycles, none of them certainly the rig's doing: there is nothing to judge it by.
-fn disturbed(manifest: &Manifest, figures: &Figures) -> Option<Judgement> {
+/// Whether too many cycles were missed. When none of them is certainly the rig's doing, there is nothing to judge
+/// it by.
+fn missed_cycles(manifest: &Manifest, figures: &Figures) -> CheckResult {
     let (skipped, by_machine) = figures.skipped();
-    let is_disturbed = skipped > manifest.scenario.checks.missed_cycles && by_machine == skipped;
-    is_disturbed.then(|| {
+    if skipped <= manifest.scenario.checks.missed_cycles {
+        CheckResult::Passed
+    } else if by_machine == skipped {
+        CheckResult::NotJudged
+    } else {
+        CheckResult::Failed
+    }
+}
+
+fn disturbed(manifest: &Manifest, figures: &Figures) -> Option<Judgement> {
+    (missed_cycles(manifest, figures) == CheckResult::NotJudged).then(|| {
+        let (skipped, _) = figures.skipped();
         let (controller, plant) = (&figures.controller_skips, &figures.plant_skips);
         let stalled_ms = (controller.stalled_ns + plant.stalled_ns) as f64 / 1e6;
         let while_working = match controller.while_working + plant.while_working {
@@ -131,7 +160,8 @@ fn disturbed(manifest: &Manifest, figures: &Figures) -> Option<Judgement> {
 }
 
 fn failed(checks: &[Check]) -> Option<Judgement> {
-    let failed: Vec<_> = checks.iter().filter(|check| !check.passed).map(|check| check.name).collect();
+    let failed: Vec<_> =
+        checks.iter().filter(|check| check.result == CheckResult::Failed).map(|check| check.name).collect();
     (!failed.is_empty()).then(|| (Exit::Failed, "FAIL", format!("failed: {}", failed.join(", "))))
 }
 
@@ -142,20 +172,28 @@ fn checks(manifest: &Manifest, figures: &Figures) -> Vec<Check> {
     let missing = figures.missing_messages();
     let state = figures.final_state.unwrap_or("none");
     vec![
-        Check { name: "sequence", finding: format!("ended in state {state}"), passed: state == "finished" },
+        Check {
+            name: "sequence",
+            finding: format!("ended in state {state}"),
+            result: CheckResult::of(state == "finished"),
+        },
         Check {
             name: "tracking",
             finding: format!(
                 "rms {:.4} mm over {} samples, limit {} mm",
                 tracking.rms_mm, tracking.samples, limits.tracking_rms_mm
             ),
-            passed: tracking.samples > 0 && tracking.rms_mm <= limits.tracking_rms_mm,
+            result: CheckResult::of(tracking.samples > 0 && tracking.rms_mm <= limits.tracking_rms_mm),
         },
         Check {
             name: "missed cycles",
             finding: format!("{skipped} ({by_machine} by the machine), limit {}", limits.missed_cycles),
-            passed: skipped <= limits.missed_cycles,
+            result: missed_cycles(manifest, figures),
         },
-        Check { name: "dropped messages", finding: missing.to_string(), passed: missing == 0 },
+        Check {
+            name: "dropped messages",
+            finding: missing.to_string(),
+            result: CheckResult::of(missing == 0),
+        },
     ]
 }
