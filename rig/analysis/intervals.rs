@@ -53,7 +53,7 @@ pub struct IntervalFigures {
 }
 
 /// Names of the intervals, in the order in which a cycle passes through them.
-const NAMES: [&str; 10] = [
+const NAMES: [&str; 11] = [
     "plant wake-up",
     "process data",
     "controller wake-up",
@@ -64,6 +64,7 @@ const NAMES: [&str; 10] = [
     "command transport",
     "command to wire",
     "sample to wire",
+    "round trip",
 ];
 
 #[derive(Debug, Clone, Copy)]
@@ -78,6 +79,9 @@ enum Interval {
     CommandTransport,
     CommandToWire,
     SampleToWire,
+    /// From SYNC to the reading's publication and from its reception to the command's: what both processes and
+    /// the wires take, without the waits of the time table.
+    RoundTrip,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -91,7 +95,12 @@ pub(super) struct Intervals {
     series: Vec<Series>,
     readings_published: ByCycle<u64>,
     samples: ByCycle<u64>,
+    /// From SYNC to the publication of the reading, ns.
+    exchanges: ByCycle<u64>,
+    /// When the controller received the reading of the same cycle.
     received: ByCycle<u64>,
+    /// When the plant received the command.
+    answered: ByCycle<u64>,
     commands: ByCycle<Sent>,
     last_answered: u64,
 }
@@ -104,7 +113,9 @@ impl Intervals {
             series: NAMES.iter().map(|name| Series::new(name, folder)).collect(),
             readings_published: ByCycle::default(),
             samples: ByCycle::default(),
+            exchanges: ByCycle::default(),
             received: ByCycle::default(),
+            answered: ByCycle::default(),
             commands: ByCycle::default(),
             last_answered: 0,
         })
@@ -121,6 +132,7 @@ impl Intervals {
         }
         self.readings_published.insert(reading.cycle, reading.published_ns);
         self.samples.insert(reading.cycle, reading.sampled_ns);
+        self.exchanges.insert(reading.cycle, reading.published_ns.saturating_sub(reading.woke_ns));
         self.answer(reading);
     }
 
@@ -132,6 +144,8 @@ impl Intervals {
         }
         self.last_answered = reading.answers_cycle;
         self.add(Interval::CommandTransport, sent.published_ns, reading.command_received_ns);
+        self.answered.insert(reading.answers_cycle, reading.command_received_ns);
+        self.round_trip(reading.answers_cycle);
         if reading.command_sent_ns == 0 {
             return;
         }
@@ -143,10 +157,11 @@ impl Intervals {
 
     pub(super) fn state(&mut self, state: &State) {
         self.add(Interval::ControllerWakeUp, state.due_ns, state.woke_ns);
-        self.received.insert(state.cycle, state.received_ns);
         if state.reading_cycle != state.cycle {
             return;
         }
+        self.received.insert(state.cycle, state.received_ns);
+        self.round_trip(state.cycle);
         if let Some(published_ns) = self.readings_published.get(state.reading_cycle) {
             self.add(Interval::ReadingTransport, published_ns, state.received_ns);
         }
@@ -154,6 +169,16 @@ impl Intervals {
         self.add(Interval::Control, state.solved_ns, state.commanded_ns);
         if let Some(sent) = self.commands.get(state.cycle) {
             self.add(Interval::ControllerCycle, state.received_ns, sent.published_ns);
+        }
+    }
+
+    /// Joins what plant and controller tell of a cycle, whichever is heard first.
+    fn round_trip(&mut self, cycle: u64) {
+        let (Some(from_ns), Some(to_ns)) = (self.received.get(cycle), self.answered.get(cycle)) else {
+            return;
+        };
+        if let Some(exchange_ns) = self.exchanges.take(cycle) {
+            self.add(Interval::RoundTrip, from_ns, to_ns + exchange_ns);
         }
     }
 

@@ -37,6 +37,23 @@ pub(super) struct Contender {
     pub(super) rounds: Vec<Durations>,
     /// Every figure, round by round.
     pub(super) figures: Vec<Figure>,
+    /// What else the rounds tell.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub(super) shares: Vec<Share>,
+}
+
+/// A share that a contender's rounds tell of beside their durations, %.
+#[derive(Debug, Serialize)]
+pub(super) struct Share {
+    pub(super) name: String,
+    #[serde(flatten)]
+    pub(super) percent: Spread,
+}
+
+impl Share {
+    pub(super) fn of(name: String, percent: Vec<f64>) -> Self {
+        Self { name, percent: Spread::of(percent) }
+    }
 }
 
 /// A figure of a contender.
@@ -136,13 +153,13 @@ impl Outcome {
 }
 
 impl Contender {
-    fn of(name: String, rounds: Vec<Durations>) -> Self {
+    pub(super) fn of(name: String, rounds: Vec<Durations>) -> Self {
         let fewest = rounds.iter().map(Durations::len).min().unwrap_or(0);
         let percentiles = [Some(P50), Some(P99), (fewest >= SAMPLES_FOR_P999).then_some(P999), Some(MAX)];
         let figure =
             |(name, of): Percentile| Figure { name, spread: Spread::of(rounds.iter().map(of).collect()) };
         let figures = percentiles.into_iter().flatten().map(figure).collect();
-        Self { name, rounds, figures }
+        Self { name, rounds, figures, shares: Vec::new() }
     }
 
     /// This one's percentiles over another's; maxima are the machine's and not compared.

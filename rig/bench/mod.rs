@@ -7,6 +7,7 @@ mod contest;
 mod fk;
 pub mod ipc;
 mod plot;
+mod rate;
 mod subscribers;
 mod table;
 mod wake;
@@ -37,6 +38,8 @@ pub enum Kind {
     Ipc,
     /// The forward kinematics, warm and cold, against Newton's iteration
     Fk,
+    /// The whole rig at 1 to 20 kHz without bus delays
+    Rate,
     /// Publishing to 1 to 16 observers
     Subscribers,
 }
@@ -77,6 +80,7 @@ pub(crate) fn run(args: &BenchArgs) -> Result<Exit, Failure> {
             Kind::Loop => wake::measure(args.rounds, args.cores[0])?,
             Kind::Ipc => ipc::measure(args.rounds, args.cores)?,
             Kind::Fk => fk::measure(args.rounds, args.cores[0])?,
+            Kind::Rate => rate::measure(args.rounds, args.cores)?,
             Kind::Subscribers => subscribers::measure(args.rounds, args.cores[0])?,
         };
         if args.format == Format::Human {

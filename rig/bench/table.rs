@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use super::contest::{Figure, Outcome};
+use super::contest::{Figure, Outcome, Share};
 
 /// Contenders in µs, then their ratios: median (minimum to maximum) over the rounds.
 pub(super) fn of(outcome: &Outcome) -> String {
@@ -14,6 +14,9 @@ pub(super) fn of(outcome: &Outcome) -> String {
     );
     for contender in &outcome.contenders {
         let _ = writeln!(text, "  {:<34} {}", contender.name, line(&contender.figures, 1e-3));
+        if !contender.shares.is_empty() {
+            let _ = writeln!(text, "  {:<34} {}", "", shares(&contender.shares));
+        }
     }
     if !outcome.ratios.is_empty() {
         text.push_str("ratios within a round\n");
@@ -37,8 +40,19 @@ fn line(figures: &[Figure], scale: f64) -> String {
     cells.collect::<Vec<_>>().join("  ").trim_end().to_owned()
 }
 
+fn shares(shares: &[Share]) -> String {
+    let cells = shares.iter().map(|share| {
+        let [median, min, max] = [share.percent.median, share.percent.min, share.percent.max].map(short);
+        format!("{} {median} % ({min}–{max})", share.name)
+    });
+    cells.collect::<Vec<_>>().join(", ")
+}
+
 /// Three significant digits.
 fn short(value: f64) -> String {
+    if value == 0.0 {
+        return "0".to_owned();
+    }
     let whole_digits = value.abs().max(1e-9).log10().floor() as i32 + 1;
     format!("{value:.*}", (3 - whole_digits).clamp(0, 5) as usize)
 }
@@ -49,8 +63,14 @@ mod tests {
 
     #[test]
     fn three_digits_count() {
-        let cases =
-            [(0.001_234, "0.00123"), (0.5, "0.500"), (1.234, "1.23"), (123.4, "123"), (1234.0, "1234")];
+        let cases = [
+            (0.0, "0"),
+            (0.001_234, "0.00123"),
+            (0.5, "0.500"),
+            (1.234, "1.23"),
+            (123.4, "123"),
+            (1234.0, "1234"),
+        ];
         for (value, expected) in cases {
             assert_eq!(short(value), expected);
         }

@@ -16,7 +16,8 @@ const EVERY_NS: u64 = SECOND_NS / 2;
 /// `/proc/stat` counts in hundredths of a second (USER_HZ) on every platform of the rig.
 const TICKS_PER_S: f64 = 100.0;
 
-/// What the main thread of a process used in its steady state.
+/// What a process used in its steady state: CPU time and page faults by all its threads, the rest by the main
+/// one, which is its loop.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct Usage {
     /// Duration covered, s.
@@ -121,10 +122,13 @@ impl Sample {
         let stat = root.text(&format!("proc/{id}/stat"))?;
         let fields: Vec<&str> = stat.rsplit_once(')')?.1.split_whitespace().collect();
         let field = |number: usize| -> Option<u64> { fields.get(number - 3)?.parse().ok() };
-        let schedstat = root.text(&format!("proc/{id}/schedstat"))?;
+        let tasks = format!("proc/{id}/task");
+        let cpu_ns = |task: String| -> Option<u64> {
+            root.text(&format!("{tasks}/{task}/schedstat"))?.split_whitespace().next()?.parse().ok()
+        };
         Some(Self {
             at_ns,
-            cpu_ns: schedstat.split_whitespace().next()?.parse().ok()?,
+            cpu_ns: root.names(&tasks).into_iter().filter_map(cpu_ns).sum(),
             voluntary_switches: counter("voluntary_ctxt_switches:")?,
             involuntary_switches: counter("nonvoluntary_ctxt_switches:")?,
             minor_faults: field(10)?,
@@ -165,7 +169,8 @@ mod tests {
                 ),
             ),
             ("proc/7/stat", format!("7 (a (b) c) S 1 7 7 0 -1 4194304 {faults} 0 0 0 11 5 0 0 20 0")),
-            ("proc/7/schedstat", format!("{cpu_ns} 500 9\n")),
+            ("proc/7/task/7/schedstat", format!("{} 500 9\n", cpu_ns / 4 * 3)),
+            ("proc/7/task/9/schedstat", format!("{} 0 1\n", cpu_ns / 4)),
             ("proc/stat", format!("cpu  1 2 3 4 5 6 7 {stolen} 0 0\ncpu0 1 2 3 4 5 6 7 8 0 0\n")),
         ]
     }

@@ -213,6 +213,13 @@ mod tests {
     }
 
     #[test]
+    fn an_ideal_bus_holds_twenty_kilohertz() {
+        let ideal = CanConfig { ideal: true, ..Default::default() };
+        let schedule = CycleSchedule::new(&ideal, 50_000).unwrap();
+        assert!(schedule.reading_by_ns < 1000 && schedule.command_by_ns > 49_000, "{schedule:?}");
+    }
+
+    #[test]
     fn the_last_process_data_of_a_cycle_wait_for_all_others_and_a_heartbeat() {
         let plans = plans(&CanConfig::default(), 1_000_000).unwrap();
         let last = Cob::Rpdo1(NodeId::new(3).unwrap()).into();

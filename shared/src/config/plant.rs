@@ -14,6 +14,9 @@ pub struct CanConfig {
     pub interfaces: Vec<String>,
     /// Bit rate of every bus, bit/s.
     pub bitrate_bps: u32,
+    /// Whether a bit takes a nanosecond, whatever `bitrate_bps` says (simulated buses only): for cycles that no CAN
+    /// holds.
+    pub ideal: bool,
     /// Whether frames go in FD format with bit-rate switch (simulated buses only).
     pub fd: bool,
     /// Bit rate of the data phase of FD frames, bit/s.
@@ -45,6 +48,7 @@ impl Default for CanConfig {
         Self {
             interfaces: Vec::new(),
             bitrate_bps: 1_000_000,
+            ideal: false,
             fd: false,
             data_bitrate_bps: 5_000_000,
             restart_ms: 100,
@@ -69,6 +73,9 @@ impl CanConfig {
     /// Bit rates of every bus.
     pub fn rates(&self) -> Result<Rates, BitrateError> {
         let nominal = Bitrate::new(self.bitrate_bps)?;
+        if self.ideal {
+            return Ok(Rates::classical(Bitrate::IDEAL));
+        }
         if self.fd { Rates::switching(nominal, self.data_bitrate_bps) } else { Ok(Rates::classical(nominal)) }
     }
 
@@ -83,6 +90,13 @@ impl CanConfig {
                 key: "can.fd",
                 value: "true".to_owned(),
                 need: "leave it away with can.interfaces: on real interfaces frames are classical".to_owned(),
+            });
+        }
+        if self.ideal && (self.fd || !self.is_virtual()) {
+            return Err(ScenarioError::BadValue {
+                key: "can.ideal",
+                value: "true".to_owned(),
+                need: "leave it away with can.fd and can.interfaces: it replaces their bit rates".to_owned(),
             });
         }
         if let Err(error) = self.rates() {

@@ -235,6 +235,8 @@ mod tests {
             ("[controller]\nease_s = 0.0", "controller.ease_s = 0: use a finite number above 0"),
             ("[checks]\ntracking_rms_mm = inf", "checks.tracking_rms_mm"),
             ("name = ", "s.toml:1"),
+            ("[can]\nideal = true\nfd = true", "can.ideal = true: leave it away"),
+            ("[can]\nideal = true\ninterfaces = ['a', 'b']", "can.ideal = true: leave it away"),
             ("[can]\nfd = true\ndata_bitrate_bps = 9000000", "data_bitrate_bps"),
             ("[[faults]]\nkind = 'corrupt'\nbus = 2\nfrom_s = 0.0", "faults.bus = 2: name a bus"),
             ("[[faults]]\nkind = 'babble'\nbus = 0\nfrom_s = 0.0", "faults.node = none"),
