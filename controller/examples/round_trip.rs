@@ -1,14 +1,15 @@
-//! A million random poses to actuators and back, from the actuators alone and from the last pose:
+//! Random poses to actuators and back: without a guess, from a random one, and from one nearby; a million:
 //! `cargo run --release -p masseter-controller --example round_trip -- 1000000`.
 
 use std::error::Error;
+use std::f64::consts::PI;
 
-use masseter_controller::kinematics::{Assembly, ForwardTracker, solve_completely};
+use masseter_controller::kinematics::{Assembly, ForwardError, ForwardTracker, Solution, solve_completely};
 use masseter_shared::geometry::{Mechanism, MechanismConfig, Pose, Vec3};
 use nalgebra::{Translation3, UnitQuaternion};
 
 /// Turns about each axis reach this far.
-const TURN_RAD: f64 = std::f64::consts::PI / 6.0;
+const TURN_RAD: f64 = PI / 6.0;
 
 /// Vigna's and Steele's splitmix64, as a number in [−1, 1).
 fn random(state: &mut u64) -> f64 {
@@ -33,10 +34,30 @@ fn errors(found: &Pose, pose: &Pose) -> (f64, f64) {
     ((found.translation.vector - pose.translation.vector).norm(), turn.norm())
 }
 
+/// What a way of solving came to over all poses.
+#[derive(Default)]
+struct Score {
+    reached: u32,
+    worst_m: f64,
+    worst_rad: f64,
+}
+
+impl Score {
+    /// Counts as reached what is the true pose within 10⁻⁹ m and rad.
+    fn add(&mut self, solved: Result<Solution, ForwardError>, pose: &Pose) {
+        let Ok(solution) = solved else { return };
+        let (error_m, error_rad) = errors(&solution.pose, pose);
+        self.reached += u32::from(error_m.max(error_rad) < 1e-9 && solution.certificate.is_some());
+        (self.worst_m, self.worst_rad) = (self.worst_m.max(error_m), self.worst_rad.max(error_rad));
+    }
+}
+
 fn main() -> Result<(), Box<dyn Error>> {
     let wanted: u32 = std::env::args().nth(1).map_or(Ok(100_000), |count| count.parse())?;
     let mechanism = Mechanism::new(&MechanismConfig::default())?;
-    let (mut state, mut worst_m, mut worst_rad, mut done, mut drawn) = (1, 0.0f64, 0.0f64, 0, 0);
+    let names = ["without a guess", "from a random guess", "from a near guess"];
+    let mut scores: [Score; 3] = Default::default();
+    let (mut state, mut done, mut drawn) = (1, 0, 0);
     while done < wanted {
         drawn += 1;
         let pose = pose(&mut state);
@@ -47,16 +68,18 @@ fn main() -> Result<(), Box<dyn Error>> {
             continue;
         }
         done += 1;
+        let anywhere = std::array::from_fn(|_| PI * random(&mut state));
         let near = joints.theta_rad.map(|theta| theta + 1e-4);
-        let warm = ForwardTracker::with_guess(mechanism.clone(), near).update(&actuators);
-        for solution in [solve_completely(&mechanism, &actuators), warm] {
-            let solution = solution.map_err(|error| format!("{pose}: {error}"))?;
-            let (error_m, error_rad) = errors(&solution.pose, &pose);
-            (worst_m, worst_rad) = (worst_m.max(error_m), worst_rad.max(error_rad));
+        let from = |guess| ForwardTracker::with_guess(mechanism.clone(), guess).update(&actuators);
+        let solved = [solve_completely(&mechanism, &actuators), from(anywhere), from(near)];
+        for (score, solved) in scores.iter_mut().zip(solved) {
+            score.add(solved, &pose);
         }
     }
-    println!(
-        "{done} poses of {drawn} drawn are feasible; largest errors {worst_m:.2e} m, {worst_rad:.2e} rad"
-    );
-    Ok(())
+    println!("{done} feasible poses of {drawn} drawn");
+    for (name, Score { reached, worst_m, worst_rad }) in names.iter().zip(&scores) {
+        println!("{name:20} reached {reached}, largest errors {worst_m:.2e} m, {worst_rad:.2e} rad");
+    }
+    let all_reached = scores.iter().all(|score| score.reached == done);
+    all_reached.then_some(()).ok_or_else(|| "some poses were not reached".into())
 }

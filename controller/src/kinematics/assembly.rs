@@ -13,6 +13,7 @@ use masseter_shared::geometry::{Actuators, LEGS, Mechanism, Vec3};
 use nalgebra::Vector3;
 
 use super::Equations;
+use super::closure::each;
 
 /// What must hold for a true solution, in the order in which it is checked.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -64,27 +65,29 @@ impl Assembly {
     pub fn new(mechanism: &Mechanism, actuators: &Actuators, theta_rad: &[f64; LEGS]) -> Self {
         let equations = Equations::new(mechanism, actuators);
         let at = equations.evaluate(Vector3::from(*theta_rad));
-        Self::of(mechanism, actuators, &at.corners, equations.determinant(&at))
+        let hinges = std::array::from_fn(|leg| mechanism.hinge(leg, actuators.slide_m[leg]));
+        Self::of(mechanism, &hinges, &at.corners, equations.determinant(&at))
     }
 
+    #[inline]
     pub(super) fn of(
         mechanism: &Mechanism,
-        actuators: &Actuators,
+        hinges: &[Vec3; LEGS],
         corners: &[Vec3; LEGS],
         determinant: f64,
     ) -> Self {
         let [a1, a2, a3] = *corners;
         let normal = (a2 - a1).cross(&(a3 - a1));
-        let below = |leg| (mechanism.hinge(leg, actuators.slide_m[leg]) - a1).dot(&normal) < 0.0;
         Self {
-            legs_above_base: corners.map(|corner| corner.z > 0.0),
-            hinges_below_platform: std::array::from_fn(below),
+            legs_above_base: each(|leg| corners[leg].z > 0.0),
+            hinges_below_platform: each(|leg| (hinges[leg] - a1).dot(&normal) < 0.0),
             corners_in_order: (a2 - a3).dot(&mechanism.slide_direction(0)) > 0.0,
             positive_determinant: determinant > 0.0,
         }
     }
 
     /// The first condition that does not hold.
+    #[inline]
     pub fn violated(&self) -> Option<Condition> {
         let fails = |holds: &[bool; LEGS]| holds.iter().position(|holds| !holds);
         if let Some(leg) = fails(&self.legs_above_base) {
@@ -100,6 +103,7 @@ impl Assembly {
     }
 
     /// Whether all conditions hold.
+    #[inline]
     pub fn is_true(&self) -> bool {
         self.violated().is_none()
     }

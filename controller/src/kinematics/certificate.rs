@@ -10,8 +10,10 @@
 //! sin θᵢ sin θⱼ and κ′ = ω sin θᵢ sin θⱼ + cos θᵢ cos θⱼ the second derivatives of gₖ are
 //! κ − p cos θᵢ, κ − q cos θⱼ and twice −κ′, and |κ| + |κ′| ≤ 1 + |ω| because κ ± κ′ are
 //! (ω ± 1) times a cosine; so row k of the Jacobian changes by at most |p| + |q| + 2(1 + |ω|) times
-//! the change of the angles. Rounding is covered by explicit margins: y contains the bound of each
-//! residual's rounding, z that of Jacobian and inverse, and r and R are rounded outward and inward.
+//! the change of the angles. Rounding is covered by explicit margins: y contains the bound ρₖ of each
+//! residual's rounding, and r and R are rounded outward and inward. ρₖ also bounds the rounding of
+//! each derivative, of which a row has two, and Y's own rounding counts no more than that again; hence
+//! z ≤ 4 max Σ|Yᵢₖ| ρₖ ≤ 4y.
 //!
 //! The proof is about the input as given, an exact set of numbers, not about what the encoders
 //! measured; and it does not say which solution this is.
@@ -20,10 +22,10 @@ use std::f64::consts::PI;
 
 use masseter_shared::geometry::LEGS;
 
-use super::closure::{Closing, Closure, ROUNDINGS, Side};
+use super::closure::{Closing, Closure, Side, each};
 
-/// z per unit of K·ε: the derivatives' roundings and as many for the inverse's.
-const INVERSE_ROUNDINGS: f64 = 4.0 * ROUNDINGS;
+/// z per unit of y.
+const INVERSE_ROUNDINGS: f64 = 4.0;
 /// What r, R and K are moved by to outweigh the roundings of their own formulas.
 const OUTWARD: f64 = 1.0 + 64.0 * f64::EPSILON;
 
@@ -46,28 +48,23 @@ pub struct Certificate {
 impl Certificate {
     /// The proof at evaluated leg angles; none where the inequality does not hold or a value is no
     /// number, as at a singularity.
-    pub(super) fn new(closure: &Closure, at: &Closing) -> Option<Self> {
+    #[inline]
+    pub(super) fn new(closure: &Closure<'_>, at: &Closing) -> Option<Self> {
         let inverse = at.inverse();
-        let mut offset_rad = 0.0;
-        let mut curvature = 0.0;
-        for row in &inverse {
-            let mut row_offset_rad = 0.0;
-            let mut row_curvature = 0.0;
-            for ((entry, side), value) in row.iter().zip(&closure.sides).zip(at.value) {
-                row_offset_rad += entry.abs() * (value.abs() + side.rounding);
-                row_curvature += entry.abs() * curvature_bound(side);
-            }
-            if !(row_offset_rad + row_curvature).is_finite() {
-                return None;
-            }
-            offset_rad = f64::max(offset_rad, row_offset_rad);
-            curvature = f64::max(curvature, row_curvature);
-        }
-        let margin = 1.0 - INVERSE_ROUNDINGS * f64::EPSILON * curvature;
-        Self::from_bounds(offset_rad * OUTWARD, curvature * OUTWARD, margin, &closure.leg_m)
+        let most = |bounds: [f64; LEGS]| {
+            largest(each(|row| {
+                let [a, b, c] = inverse[row];
+                a.abs() * bounds[0] + b.abs() * bounds[1] + c.abs() * bounds[2]
+            }))
+        };
+        let offset_rad = most(each(|side| at.value[side].abs() + closure.sides[side].rounding))?;
+        let curvature = most(each(|side| curvature_bound(&closure.sides[side])))?;
+        Self::from_bounds(offset_rad * OUTWARD, curvature * OUTWARD, &closure.actuators.leg_m)
     }
 
-    fn from_bounds(offset_rad: f64, curvature: f64, margin: f64, leg_m: &[f64; LEGS]) -> Option<Self> {
+    #[inline]
+    fn from_bounds(offset_rad: f64, curvature: f64, leg_m: &[f64; LEGS]) -> Option<Self> {
+        let margin = 1.0 - INVERSE_ROUNDINGS * offset_rad;
         let discriminant = margin * margin - 2.0 * curvature * offset_rad;
         if margin <= 0.0 || discriminant <= 0.0 {
             return None;
@@ -78,15 +75,22 @@ impl Certificate {
         let unique_within_rad = (reach / curvature / OUTWARD).min(PI);
         Some(Self {
             exists_within_rad,
-            exists_within_m: exists_within_rad * leg_m.iter().copied().fold(0.0, f64::max),
+            exists_within_m: exists_within_rad * leg_m[0].max(leg_m[1]).max(leg_m[2]),
             unique_within_rad,
-            unique_within_m: unique_within_rad * leg_m.iter().copied().fold(f64::INFINITY, f64::min),
+            unique_within_m: unique_within_rad * leg_m[0].min(leg_m[1]).min(leg_m[2]),
             regular_within_rad: margin / curvature / OUTWARD,
         })
     }
 }
 
+/// The largest of three; none where one is no finite number.
+#[inline]
+fn largest([a, b, c]: [f64; LEGS]) -> Option<f64> {
+    (a + b + c).is_finite().then(|| a.max(b).max(c))
+}
+
 /// The most by which row k of the Jacobian changes, in total, per radian of the largest change.
+#[inline]
 fn curvature_bound(side: &Side) -> f64 {
     side.near_cos.abs() + side.far_cos.abs() + 2.0 * (1.0 + side.cos_cos.abs()) + side.rounding
 }
@@ -100,14 +104,15 @@ mod tests {
     use crate::kinematics::heading::Heading;
     use crate::kinematics::samples::{mechanisms, poses, seed_mechanism};
 
-    fn certify(closure: &Closure, theta_rad: [f64; LEGS]) -> Option<Certificate> {
+    fn certify(closure: &Closure<'_>, theta_rad: [f64; LEGS]) -> Option<Certificate> {
         Certificate::new(closure, &closure.evaluate(&theta_rad.map(Heading::from_rad)))
     }
 
     #[test]
     fn the_neutral_pose_is_certain_within_degrees() {
         let neutral = Actuators { slide_m: [0.0; LEGS], leg_m: [0.27; LEGS] };
-        let closure = Closure::new(&seed_mechanism(), &neutral);
+        let mechanism = seed_mechanism();
+        let closure = Closure::new(&mechanism, &neutral);
         let start = [83.862_391_93_f64.to_radians(); LEGS].map(Heading::from_rad);
         let closed = closure.close(&start, 4).unwrap();
         let certificate = Certificate::new(&closure, &closed.closing).unwrap();
@@ -120,7 +125,8 @@ mod tests {
     #[test]
     fn what_is_no_solution_and_what_is_no_number_is_not_certified() {
         let neutral = Actuators { slide_m: [0.0; LEGS], leg_m: [0.27; LEGS] };
-        let closure = Closure::new(&seed_mechanism(), &neutral);
+        let mechanism = seed_mechanism();
+        let closure = Closure::new(&mechanism, &neutral);
         assert_eq!(certify(&closure, [1.2, 1.5, 1.3]), None);
         assert_eq!(certify(&closure, [f64::NAN; LEGS]), None);
         // All legs level: no side changes at first order, the Jacobian vanishes.

@@ -10,13 +10,14 @@
 //! gₖ = 0 exactly where the seed's fₖ = 0 (eq. 1). Nothing here knows which solution is wanted; the
 //! seed's own form of the equations is [`Equations`](super::Equations).
 
-use masseter_shared::geometry::{Actuators, LEGS, Mechanism};
+use masseter_shared::geometry::{Actuators, LEGS, Mechanism, Vec3};
 
 use super::heading::Heading;
 
-/// Roundings of gₖ and of its derivatives, in units of the machine epsilon times |κ| + |p| + |q| + 2:
-/// at most 12 operations on terms no larger than that, with headings 2 roundings off the circle.
-pub(super) const ROUNDINGS: f64 = 16.0;
+/// What gₖ and its derivatives may be off by, in units of the machine epsilon times the `scale` of
+/// [`Side::new`]: at most 33 roundings of half an epsilon each, 20 of them on the way from the hinges
+/// to κ, 6 on the sum, 3 in a product, 4 for headings 2 roundings off the circle.
+const ROUNDINGS: f64 = 20.0;
 /// No Newton step is longer; a longer one says only that the Jacobian is nearly singular.
 const LONGEST_STEP_RAD: f64 = 1.0;
 
@@ -35,10 +36,13 @@ pub(super) struct Side {
 }
 
 /// The equations for one input.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Closure {
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Closure<'a> {
+    pub(super) mechanism: &'a Mechanism,
+    pub(super) actuators: Actuators,
+    /// Bᵢ, metres.
+    pub(super) hinges: [Vec3; LEGS],
     pub(super) sides: [Side; LEGS],
-    pub(super) leg_m: [f64; LEGS],
 }
 
 /// Values and derivatives of the three gₖ at one set of headings.
@@ -59,69 +63,116 @@ pub(super) struct Closed {
     pub iterations: u32,
 }
 
-impl Side {
-    fn new(mechanism: &Mechanism, actuators: &Actuators, near: usize) -> Self {
-        let far = next(near);
-        let (near_m, far_m) = (actuators.leg_m[near], actuators.leg_m[far]);
-        let (inward, far_inward) = (mechanism.inward_direction(near), mechanism.inward_direction(far));
-        let hinges =
-            mechanism.hinge(near, actuators.slide_m[near]) - mechanism.hinge(far, actuators.slide_m[far]);
-        let (unit_m2, length_m) = (2.0 * near_m * far_m, mechanism.platform_sides_m()[near]);
-        let squares = hinges.norm_squared() + near_m * near_m + far_m * far_m - length_m * length_m;
-        let constant = squares / unit_m2;
-        let near_cos = inward.dot(&hinges) / far_m;
-        let far_cos = -far_inward.dot(&hinges) / near_m;
-        // |ω| ≤ 1, so no term of gₖ or of its derivatives is larger than this sum.
-        let scale = constant.abs() + near_cos.abs() + far_cos.abs() + 2.0;
+/// One leg's end of the two sides it carries.
+#[derive(Debug, Clone, Copy)]
+struct End {
+    hinge: Vec3,
+    inward: Vec3,
+    leg_m: f64,
+    /// 1/lᵢ.
+    per_leg_m: f64,
+    /// No coordinate of the hinge, nor a term of it, is larger, metres.
+    extent_m: f64,
+}
+
+impl End {
+    #[inline]
+    fn new(mechanism: &Mechanism, actuators: &Actuators, leg: usize) -> Self {
+        let (slide_m, leg_m) = (actuators.slide_m[leg], actuators.leg_m[leg]);
+        let hinge = mechanism.hinge(leg, slide_m);
         Self {
-            constant,
-            near_cos,
-            far_cos,
-            cos_cos: inward.dot(&far_inward),
+            hinge,
+            inward: mechanism.inward_direction(leg),
+            leg_m,
+            per_leg_m: 1.0 / leg_m,
+            extent_m: hinge.x.abs() + hinge.y.abs() + 2.0 * slide_m.abs(),
+        }
+    }
+}
+
+impl Side {
+    #[inline]
+    fn new(near: &End, far: &End, length_m: f64) -> Self {
+        let hinges = near.hinge - far.hinge;
+        let (unit_m2, per_unit) = (2.0 * near.leg_m * far.leg_m, 0.5 * near.per_leg_m * far.per_leg_m);
+        let legs_m2 = near.leg_m * near.leg_m + far.leg_m * far.leg_m;
+        let length_m2 = length_m * length_m;
+        // No term of gₖ or of its derivatives, nor of what they are made of, is larger than this sum.
+        let extent_m = near.extent_m + far.extent_m;
+        let scale = (extent_m * extent_m + legs_m2 + length_m2) * per_unit
+            + extent_m * (near.per_leg_m + far.per_leg_m)
+            + 2.0;
+        Self {
+            constant: (hinges.norm_squared() + legs_m2 - length_m2) * per_unit,
+            near_cos: near.inward.dot(&hinges) * far.per_leg_m,
+            far_cos: -far.inward.dot(&hinges) * near.per_leg_m,
+            cos_cos: near.inward.dot(&far.inward),
             unit_m2,
             length_m,
             rounding: ROUNDINGS * f64::EPSILON * scale,
         }
     }
 
+    /// gₖ.
+    #[inline]
     pub(super) fn value(&self, near: Heading, far: Heading) -> f64 {
-        self.constant + self.near_cos * near.cos + self.far_cos * far.cos
-            - self.cos_cos * near.cos * far.cos
-            - near.sin * far.sin
+        let far_slope = self.far_cos - self.cos_cos * near.cos;
+        self.constant + self.near_cos * near.cos + far_slope * far.cos - near.sin * far.sin
     }
 
+    #[inline]
     fn near_derivative(&self, near: Heading, far: Heading) -> f64 {
         near.sin * (self.cos_cos * far.cos - self.near_cos) - near.cos * far.sin
     }
 
+    #[inline]
     fn far_derivative(&self, near: Heading, far: Heading) -> f64 {
         far.sin * (self.cos_cos * near.cos - self.far_cos) - far.cos * near.sin
     }
 
     /// fₖ = |AᵢAⱼ| − Lₖ for a value of gₖ, metres.
+    #[inline]
     fn excess_m(&self, value: f64) -> f64 {
         let difference_m2 = value * self.unit_m2;
         difference_m2 / ((self.length_m * self.length_m + difference_m2).max(0.0).sqrt() + self.length_m)
     }
 }
 
-impl Closure {
+impl<'a> Closure<'a> {
     /// The equations for an input in metres. No leg may have length zero.
-    pub(super) fn new(mechanism: &Mechanism, actuators: &Actuators) -> Self {
+    #[inline]
+    pub(super) fn new(mechanism: &'a Mechanism, actuators: &Actuators) -> Self {
+        let ends = each(|leg| End::new(mechanism, actuators, leg));
+        let lengths_m = mechanism.platform_sides_m();
         Self {
-            sides: std::array::from_fn(|side| Side::new(mechanism, actuators, side)),
-            leg_m: actuators.leg_m,
+            mechanism,
+            actuators: *actuators,
+            hinges: each(|leg| ends[leg].hinge),
+            sides: each(|side| Side::new(&ends[side], &ends[next(side)], lengths_m[side])),
         }
     }
 
+    #[inline]
     pub(super) fn evaluate(&self, headings: &[Heading; LEGS]) -> Closing {
         let at = |formula: fn(&Side, Heading, Heading) -> f64| {
-            std::array::from_fn(|side| formula(&self.sides[side], headings[side], headings[next(side)]))
+            each(|side| formula(&self.sides[side], headings[side], headings[next(side)]))
         };
         Closing { value: at(Side::value), near: at(Side::near_derivative), far: at(Side::far_derivative) }
     }
 
+    /// The platform's corners Aᵢ in the base frame, metres.
+    #[inline]
+    pub(super) fn corners(&self, headings: &[Heading; LEGS]) -> [Vec3; LEGS] {
+        each(|leg| {
+            let (Heading { cos, sin }, leg_m) = (headings[leg], self.actuators.leg_m[leg]);
+            let mut corner = self.hinges[leg] + self.mechanism.inward_direction(leg) * (cos * leg_m);
+            corner.z += sin * leg_m;
+            corner
+        })
+    }
+
     /// Newton's iteration from these headings; none when `max_iterations` do not close the platform.
+    #[inline]
     pub(super) fn close(&self, start: &[Heading; LEGS], max_iterations: u32) -> Option<Closed> {
         let mut headings = *start;
         for iterations in 0..=max_iterations {
@@ -130,54 +181,82 @@ impl Closure {
                 return Some(Closed { headings, closing, iterations });
             }
             let step_rad = closing.newton_step_rad();
-            headings = std::array::from_fn(|leg| headings[leg].stepped(step_rad[leg]));
+            headings = each(|leg| headings[leg].stepped(step_rad[leg]));
         }
         None
     }
 
+    #[inline]
     fn is_closed(&self, closing: &Closing) -> bool {
-        closing.value.iter().zip(&self.sides).all(|(value, side)| value.abs() <= side.rounding)
+        each(|side| closing.value[side].abs() <= self.sides[side].rounding) == [true; LEGS]
     }
 
     /// The largest |fₖ|, metres.
     pub(super) fn residual_m(&self, closing: &Closing) -> f64 {
-        let excess_m = |side: usize| self.sides[side].excess_m(closing.value[side]).abs();
-        (0..LEGS).map(excess_m).fold(0.0, f64::max)
+        let [f1, f2, f3] = each(|side| self.sides[side].excess_m(closing.value[side]).abs());
+        f1.max(f2).max(f3)
     }
 
     /// [`Equations::determinant`](super::Equations::determinant) where the platform is closed.
     pub(super) fn determinant(&self, closing: &Closing) -> f64 {
-        let legs: f64 = self.leg_m.iter().product();
-        let sides: f64 = self.sides.iter().map(|side| side.length_m).product();
-        closing.determinant() * legs / sides
+        let product = |[a, b, c]: [f64; LEGS]| a * b * c;
+        let sides_m = each(|side| self.sides[side].length_m);
+        closing.determinant() * product(self.actuators.leg_m) / product(sides_m)
     }
 }
 
 impl Closing {
     /// Determinant of ∂g/∂θ.
+    #[inline]
     pub(super) fn determinant(&self) -> f64 {
-        self.near.iter().product::<f64>() + self.far.iter().product::<f64>()
+        let ([a, b, c], [d, e, f]) = (self.near, self.far);
+        a * b * c + d * e * f
+    }
+
+    /// At the mirrored headings, −θ: gₖ is even.
+    pub(super) fn mirrored(&self) -> Self {
+        Self { value: self.value, near: self.near.map(|slope| -slope), far: self.far.map(|slope| -slope) }
     }
 
     /// Inverse of ∂g/∂θ: row for the leg, column for the side. Every cofactor is a single product, so
     /// but for the determinant's rounding, common to all, each entry is right to two roundings.
+    #[inline]
     pub(super) fn inverse(&self) -> [[f64; LEGS]; LEGS] {
         let ([a, b, c], [d, e, f]) = (self.near, self.far);
         let scale = 1.0 / self.determinant();
-        [[b * c, -c * d, d * e], [e * f, a * c, -a * e], [-b * f, d * f, a * b]]
-            .map(|row| row.map(|cofactor| cofactor * scale))
+        let cofactors = [[b * c, -c * d, d * e], [e * f, a * c, -a * e], [-b * f, d * f, a * b]];
+        each(|row| each(|column| cofactors[row][column] * scale))
     }
 
     /// −(∂g/∂θ)⁻¹ g, bounded; zero where the Jacobian has no inverse.
+    #[inline]
     fn newton_step_rad(&self) -> [f64; LEGS] {
-        self.inverse().map(|row| {
-            let step = -(row[0] * self.value[0] + row[1] * self.value[1] + row[2] * self.value[2]);
+        let inverse = self.inverse();
+        each(|leg| {
+            let [a, b, c] = inverse[leg];
+            let step = -(a * self.value[0] + b * self.value[1] + c * self.value[2]);
             if step.is_nan() { 0.0 } else { step.clamp(-LONGEST_STEP_RAD, LONGEST_STEP_RAD) }
         })
     }
 }
 
+impl Closed {
+    /// The same platform below the base.
+    pub(super) fn mirrored(&self) -> Self {
+        let headings = self.headings.map(Heading::mirrored);
+        Self { headings, closing: self.closing.mirrored(), iterations: self.iterations }
+    }
+}
+
+/// One value for each leg or side. `array::map` and `from_fn` do the same, but are not unrolled here, and
+/// then pass everything through memory: a quarter of a warm solve's time.
+#[inline]
+pub(super) fn each<T>(value: impl Fn(usize) -> T) -> [T; LEGS] {
+    [value(0), value(1), value(2)]
+}
+
 /// The leg at the far end of the side that starts at this one.
+#[inline]
 pub(super) fn next(leg: usize) -> usize {
     (leg + 1) % LEGS
 }

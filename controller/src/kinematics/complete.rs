@@ -3,9 +3,10 @@
 use masseter_shared::geometry::{Actuators, Mechanism};
 
 use super::closure::Closure;
+use super::elimination::Wanted;
 use super::nearest::nearest_m;
-use super::solutions::check;
-use super::{Condition, ForwardError, Solution, Solutions};
+use super::platforms::{Platforms, assembly, check, nearest_other_rad};
+use super::{Condition, ForwardError, Solution};
 
 /// The one solution of an input in which the mechanism stands as it was assembled, certified.
 ///
@@ -16,25 +17,37 @@ use super::{Condition, ForwardError, Solution, Solutions};
 /// [`ForwardError::Undecided`] where solutions meet.
 pub fn solve_completely(mechanism: &Mechanism, actuators: &Actuators) -> Result<Solution, ForwardError> {
     check(actuators)?;
-    choose(mechanism, actuators, &Closure::new(mechanism, actuators))
+    choose(&Closure::new(mechanism, actuators))
 }
 
-pub(super) fn choose(
-    mechanism: &Mechanism,
-    actuators: &Actuators,
-    closure: &Closure,
-) -> Result<Solution, ForwardError> {
-    let solutions = Solutions::of(mechanism, actuators, closure)?;
-    let mut true_ones = solutions.true_ones();
+pub(super) fn choose(closure: &Closure<'_>) -> Result<Solution, ForwardError> {
+    match only_true_one(closure) {
+        Some(solution) => Ok(solution),
+        None => judged(closure),
+    }
+}
+
+/// What nearly every input has. Only true ones are looked for, so it does not tell why there is none.
+fn only_true_one(closure: &Closure<'_>) -> Option<Solution> {
+    let platforms = Platforms::of(closure, Wanted::PositiveDeterminant).ok()?;
+    let mut true_ones = platforms.true_ones(closure);
+    let solution = Solution::new(closure, true_ones.next()?);
+    (true_ones.next().is_none() && solution.certificate.is_some()).then_some(solution)
+}
+
+fn judged(closure: &Closure<'_>) -> Result<Solution, ForwardError> {
+    let platforms = Platforms::of(closure, Wanted::All)?;
+    let mut true_ones = platforms.true_ones(closure);
     match (true_ones.next(), true_ones.count()) {
-        (Some(solution), 0) => certified(solution),
-        (Some(solution), others) => Err(ForwardError::Ambiguous {
-            count: 1 + others,
-            separation_rad: solutions.separation_rad(solution).unwrap_or(0.0),
-        }),
-        (None, _) => Err(match nearly_true(&solutions) {
+        (Some(closed), 0) => certified(&Solution::new(closure, closed)),
+        (Some(closed), others) => {
+            let all = platforms.iter().map(|closed| &closed.headings);
+            let separation_rad = nearest_other_rad(&closed.headings, all).unwrap_or(0.0);
+            Err(ForwardError::Ambiguous { count: 1 + others, separation_rad })
+        }
+        (None, _) => Err(match nearly_true(closure, &platforms) {
             Some(violated) => ForwardError::WrongAssembly { violated },
-            None => ForwardError::Unassemblable { nearest_m: nearest_m(mechanism, actuators, closure) },
+            None => ForwardError::Unassemblable { nearest_m: nearest_m(closure) },
         }),
     }
 }
@@ -45,8 +58,8 @@ fn certified(solution: &Solution) -> Result<Solution, ForwardError> {
 }
 
 /// The condition at which the last of the solutions failed.
-fn nearly_true(solutions: &Solutions) -> Option<Condition> {
-    solutions.iter().filter_map(|solution| solution.assembly.violated()).max()
+fn nearly_true(closure: &Closure<'_>, platforms: &Platforms) -> Option<Condition> {
+    platforms.iter().filter_map(|closed| assembly(closure, closed).violated()).max()
 }
 
 #[cfg(test)]

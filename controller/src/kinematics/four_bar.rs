@@ -77,20 +77,33 @@ impl FourBar {
     }
 
     /// Both headings of the driven leg; outside the range the one that comes closest, twice.
+    #[inline]
     pub(super) fn branches(&self, driving: Heading) -> Branches {
         let offset = self.offset[0] + self.offset[1] * driving.cos;
         let (along, across) = (self.along[0] + self.along[1] * driving.cos, -driving.sin);
         let norm_squared = along * along + across * across;
-        let norm = norm_squared.sqrt().max(f64::MIN_POSITIVE);
-        let (normal_cos, normal_sin) = (along / norm, across / norm);
-        let cos = (-offset / norm).clamp(-1.0, 1.0);
-        let sin = ((1.0 - cos) * (1.0 + cos)).sqrt();
-        let turned = |sin: f64| Heading {
-            cos: normal_cos * cos - normal_sin * sin,
-            sin: normal_sin * cos + normal_cos * sin,
-        };
-        Branches { headings: [turned(sin), turned(-sin)], norm_squared }
+        let discriminant = norm_squared - offset * offset;
+        if discriminant <= 0.0 {
+            return Branches {
+                headings: [closest(offset, along, across, norm_squared.sqrt()); 2],
+                norm_squared,
+            };
+        }
+        let (root, per_norm_squared) = (discriminant.sqrt(), 1.0 / norm_squared);
+        let (foot, off) = (-offset * per_norm_squared, root * per_norm_squared);
+        let (foot_cos, foot_sin, off_cos, off_sin) = (foot * along, foot * across, off * across, off * along);
+        let headings = [
+            Heading { cos: foot_cos - off_cos, sin: foot_sin + off_sin },
+            Heading { cos: foot_cos + off_cos, sin: foot_sin - off_sin },
+        ];
+        Branches { headings, norm_squared }
     }
+}
+
+/// The point of the circle next to a line that misses or touches it.
+fn closest(offset: f64, along: f64, across: f64, norm: f64) -> Heading {
+    let to_unit = -1f64.copysign(offset) / norm.max(f64::MIN_POSITIVE);
+    Heading { cos: along * to_unit, sin: across * to_unit }
 }
 
 #[cfg(test)]

@@ -2,6 +2,16 @@
 
 use masseter_shared::geometry::LEGS;
 
+use super::closure::each;
+
+/// The most by which a square may differ from 1 for its root to be had from the series of
+/// 1/√(1 + e): the first term left out, 5e³/16, is then a tenth of a rounding.
+const SERIES_SUFFICES: f64 = 4e-6;
+
+/// The sine up to which five terms of the arc sine's series suffice: the sixth, 0.022 x¹¹, is then less
+/// than a rounding of x.
+const SERIES_REACHES: f64 = 0.03;
+
 /// (cos θ, sin θ) of one leg in its plane: cos inward, sin up. Unit length within 2 roundings.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Heading {
@@ -26,9 +36,15 @@ impl Heading {
     /// Moved along the tangent by `step_rad` and back onto the circle: turned by atan(step), which is
     /// the step up to its third power and never past a right angle.
     #[must_use]
+    #[inline]
     pub(super) fn stepped(self, step_rad: f64) -> Self {
         let (cos, sin) = (self.cos - self.sin * step_rad, self.sin + self.cos * step_rad);
-        let to_unit = 1.0 / (cos * cos + sin * sin).sqrt();
+        let excess = cos * cos + sin * sin - 1.0;
+        let to_unit = if excess.abs() < SERIES_SUFFICES {
+            1.0 - excess * (0.5 - 0.375 * excess)
+        } else {
+            1.0 / (1.0 + excess).sqrt()
+        };
         Self { cos: cos * to_unit, sin: sin * to_unit }
     }
 
@@ -40,16 +56,66 @@ impl Heading {
 
     /// The angle between two headings, in [0, π], radians.
     pub(super) fn angle_to(self, other: Self) -> f64 {
-        let along = self.cos * other.cos + self.sin * other.sin;
-        let across = self.cos * other.sin - self.sin * other.cos;
-        across.abs().atan2(along)
+        self.sine_to(other).abs().atan2(self.cosine_to(other))
     }
+
+    /// The sine of the turn from this heading to another.
+    #[inline]
+    fn sine_to(self, other: Self) -> f64 {
+        self.cos * other.sin - self.sin * other.cos
+    }
+
+    /// Its cosine.
+    #[inline]
+    fn cosine_to(self, other: Self) -> f64 {
+        self.cos * other.cos + self.sin * other.sin
+    }
+}
+
+/// Headings whose angles are known, from which the angles of others nearby follow to 3 roundings without
+/// an arc tangent.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Anchor {
+    headings: [Heading; LEGS],
+    theta_rad: [f64; LEGS],
+}
+
+impl Anchor {
+    /// Near nothing.
+    pub(super) fn nowhere() -> Self {
+        Self { headings: [Heading { cos: 0.0, sin: 0.0 }; LEGS], theta_rad: [0.0; LEGS] }
+    }
+
+    /// The angles in radians; anchored anew where a leg is too far away.
+    #[inline]
+    pub(super) fn angles_rad(&mut self, headings: &[Heading; LEGS]) -> [f64; LEGS] {
+        let sines = each(|leg| self.headings[leg].sine_to(headings[leg]));
+        let are_near = each(|leg| {
+            sines[leg].abs() < SERIES_REACHES && self.headings[leg].cosine_to(headings[leg]) > 0.0
+        });
+        if are_near != [true; LEGS] {
+            *self = Self { headings: *headings, theta_rad: headings.map(Heading::to_rad) };
+            return self.theta_rad;
+        }
+        each(|leg| self.theta_rad[leg] + arc_sine(sines[leg]))
+    }
+}
+
+/// The arc sine of what is smaller than [`SERIES_REACHES`].
+#[inline]
+fn arc_sine(x: f64) -> f64 {
+    let square = x * x;
+    let fourth = 15.0 / 336.0 + square * (105.0 / 3456.0);
+    x + x * square * (1.0 / 6.0 + square * (3.0 / 40.0 + square * fourth))
 }
 
 /// Whether no leg's angle differs by more than a small angle, radians; compares chords, which needs
 /// no arc tangent.
 pub(super) fn coincide(a: &[Heading; LEGS], b: &[Heading; LEGS], within_rad: f64) -> bool {
-    a.iter().zip(b).all(|(a, b)| (a.cos - b.cos).hypot(a.sin - b.sin) <= within_rad)
+    a.iter().zip(b).all(|(a, b)| {
+        let (cos, sin) = (a.cos - b.cos, a.sin - b.sin);
+        cos * cos + sin * sin <= within_rad * within_rad
+    })
 }
 
 /// How far apart two sets of leg angles are: the largest difference of any leg, radians.
@@ -64,6 +130,22 @@ mod tests {
     use super::*;
 
     proptest! {
+        #[test]
+        fn angles_by_an_anchor_are_those_of_the_arc_tangent(
+            theta in prop::array::uniform3(-3.0..3.0f64),
+            near in prop::array::uniform3(-0.04..0.04f64),
+            far in prop::array::uniform3(-3.0..3.0f64),
+        ) {
+            let mut anchor = Anchor::nowhere();
+            let nearby = std::array::from_fn(|leg| theta[leg] + near[leg]);
+            for angles in [theta, nearby, far, theta.map(|angle| angle / 2.0 - 1.6)] {
+                let headings = angles.map(Heading::from_rad);
+                for (angle, heading) in anchor.angles_rad(&headings).into_iter().zip(headings) {
+                    prop_assert!((angle - heading.to_rad()).abs() <= 4.0 * f64::EPSILON);
+                }
+            }
+        }
+
         #[test]
         fn a_step_turns_by_its_arc_tangent(theta in -3.1..3.1f64, step in -2.0..2.0f64) {
             let start = Heading::from_rad(theta);

@@ -21,6 +21,7 @@ mod error;
 mod four_bar;
 mod heading;
 mod nearest;
+mod platforms;
 mod solution;
 mod solutions;
 mod solver;

@@ -4,7 +4,6 @@
 //! the platform's sides would have to give. It is searched by descent from the best of a grid of
 //! starts of a bounded number of steps, so it is an upper bound: other angles may come a little closer.
 
-use masseter_shared::geometry::{Actuators, Mechanism};
 use nalgebra::{Matrix3, Vector3};
 
 use super::Equations;
@@ -21,8 +20,8 @@ const STRETCHES: u32 = 4;
 const STEPS: u32 = 40;
 
 /// The least √(f₁² + f₂² + f₃²) found, metres.
-pub(super) fn nearest_m(mechanism: &Mechanism, actuators: &Actuators, closure: &Closure) -> f64 {
-    let equations = Equations::new(mechanism, actuators);
+pub(super) fn nearest_m(closure: &Closure<'_>) -> f64 {
+    let equations = Equations::new(closure.mechanism, &closure.actuators);
     let elimination = Elimination::new(closure);
     let mut least_m2 = f64::INFINITY;
     for stretch in 0..STRETCHES {
@@ -76,7 +75,7 @@ fn descended_m2(equations: &Equations<'_>, start: Vector3<f64>) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use masseter_shared::geometry::LEGS;
+    use masseter_shared::geometry::{Actuators, LEGS};
     use proptest::prelude::*;
 
     use super::*;
@@ -101,7 +100,7 @@ mod tests {
             slide_m in prop::array::uniform3(-0.03..0.03f64), leg_m in prop::array::uniform3(0.2..0.34f64),
         ) {
             let (mechanism, actuators) = (seed_mechanism(), Actuators { slide_m, leg_m });
-            let nearest = nearest_m(&mechanism, &actuators, &Closure::new(&mechanism, &actuators));
+            let nearest = nearest_m(&Closure::new(&mechanism, &actuators));
             let on_a_grid = on_a_grid_m(&Equations::new(&mechanism, &actuators));
             prop_assert!(nearest <= 1.01 * on_a_grid + 1e-12, "{nearest} m, on a grid {on_a_grid} m");
         }
@@ -112,7 +111,7 @@ mod tests {
     fn legs_that_cannot_meet_are_as_far_off_as_they_are_apart() {
         let actuators = Actuators { slide_m: [0.0; LEGS], leg_m: [0.01, 0.01, 0.06] };
         let mechanism = seed_mechanism();
-        let found_m = nearest_m(&mechanism, &actuators, &Closure::new(&mechanism, &actuators));
+        let found_m = nearest_m(&Closure::new(&mechanism, &actuators));
         assert!(found_m > 0.03 && found_m < 0.05, "{found_m}");
     }
 }

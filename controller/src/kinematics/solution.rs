@@ -1,6 +1,6 @@
 //! What a solver hands back: leg angles that close the platform's triangle, and what is known of them.
 
-use masseter_shared::geometry::{Actuators, LEGS, Mechanism, Pose};
+use masseter_shared::geometry::{LEGS, Pose};
 
 use super::closure::{Closed, Closure};
 use super::heading::Heading;
@@ -27,28 +27,22 @@ pub struct Solution {
 }
 
 impl Solution {
-    pub(super) fn new(
-        mechanism: &Mechanism,
-        actuators: &Actuators,
-        closure: &Closure,
-        closed: &Closed,
-    ) -> Self {
-        let theta_rad = closed.headings.map(Heading::to_rad);
-        let corners = std::array::from_fn(|leg| {
-            let Heading { cos, sin } = closed.headings[leg];
-            let mut corner = mechanism.hinge(leg, actuators.slide_m[leg])
-                + mechanism.inward_direction(leg) * (cos * actuators.leg_m[leg]);
-            corner.z += sin * actuators.leg_m[leg];
-            corner
-        });
+    pub(super) fn new(closure: &Closure<'_>, closed: &Closed) -> Self {
+        Self::with_angles(closure, closed, closed.headings.map(Heading::to_rad))
+    }
+
+    /// The same with the headings' angles from elsewhere, radians.
+    #[inline]
+    pub(super) fn with_angles(closure: &Closure<'_>, closed: &Closed, theta_rad: [f64; LEGS]) -> Self {
+        let corners = closure.corners(&closed.headings);
         let determinant = closure.determinant(&closed.closing);
         Self {
             theta_rad,
-            pose: mechanism.pose_from_corners(&corners),
+            pose: closure.mechanism.pose_from_corners(&corners),
             iterations: closed.iterations,
             residual_m: closure.residual_m(&closed.closing),
             determinant,
-            assembly: Assembly::of(mechanism, actuators, &corners, determinant),
+            assembly: Assembly::of(closure.mechanism, &closure.hinges, &corners, determinant),
             certificate: Certificate::new(closure, &closed.closing),
             headings: closed.headings,
         }

@@ -1,18 +1,14 @@
 //! All ways in which the mechanism can be assembled for one input.
 
-use masseter_shared::geometry::{Actuators, LEGS, Mechanism};
+use masseter_shared::geometry::{Actuators, Mechanism};
 
 use super::closure::{Closed, Closure};
-use super::elimination::Elimination;
-use super::heading::{Heading, coincide, separation_rad};
+use super::elimination::Wanted;
+use super::platforms::{Platforms, check, nearest_other_rad};
 use super::{ForwardError, Solution};
 
 /// There are never more; they come in mirrored pairs.
 pub const MOST_SOLUTIONS: usize = 16;
-/// Solutions closer than this are one, radians on every leg.
-pub(super) const MERGED_WITHIN_RAD: f64 = 1e-6;
-/// A leg shorter than this has no direction, metres.
-const SHORTEST_LEG_M: f64 = 1e-9;
 
 /// Every real solution of the equations (seed, eq. 1) for one input, mirrored ones next to each other.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -30,21 +26,13 @@ impl Solutions {
     /// solutions form a continuum but for rounding.
     pub fn new(mechanism: &Mechanism, actuators: &Actuators) -> Result<Self, ForwardError> {
         check(actuators)?;
-        Self::of(mechanism, actuators, &Closure::new(mechanism, actuators))
+        Self::of(&Closure::new(mechanism, actuators))
     }
 
-    pub(super) fn of(
-        mechanism: &Mechanism,
-        actuators: &Actuators,
-        closure: &Closure,
-    ) -> Result<Self, ForwardError> {
-        let mut distinct = Distinct { closed: [None; MOST_SOLUTIONS], count: 0, overflowed: false };
-        let isolated = Elimination::new(closure).solve(|closed| distinct.add_pair(closure, &closed));
-        if isolated.is_err() || distinct.overflowed {
-            return Err(ForwardError::Undecided { solutions: distinct.count });
-        }
-        let solution = |closed: Closed| Solution::new(mechanism, actuators, closure, &closed);
-        Ok(Self { solutions: distinct.closed.map(|closed| closed.map(solution)), count: distinct.count })
+    fn of(closure: &Closure<'_>) -> Result<Self, ForwardError> {
+        let platforms = Platforms::of(closure, Wanted::All)?;
+        let solution = |closed: Closed| Solution::new(closure, &closed);
+        Ok(Self { solutions: platforms.closed.map(|closed| closed.map(solution)), count: platforms.count })
     }
 
     /// How many there are.
@@ -65,56 +53,19 @@ impl Solutions {
     /// How far the nearest other solution is from one of these: the largest difference of any leg's
     /// angle, radians. None where there is no other.
     pub fn separation_rad(&self, solution: &Solution) -> Option<f64> {
-        let distances = self.iter().map(|other| separation_rad(&solution.headings, &other.headings));
-        distances.filter(|&distance| distance > MERGED_WITHIN_RAD).min_by(f64::total_cmp)
-    }
-}
-
-/// Inputs on which the equations are defined.
-pub(super) fn check(actuators: &Actuators) -> Result<(), ForwardError> {
-    if !actuators.is_finite() {
-        return Err(ForwardError::NotFinite);
-    }
-    match (0..LEGS).find(|&leg| actuators.leg_m[leg] < SHORTEST_LEG_M) {
-        Some(leg) => Err(ForwardError::NoLength { leg, leg_m: actuators.leg_m[leg] }),
-        None => Ok(()),
-    }
-}
-
-/// Closed platforms, none twice.
-struct Distinct {
-    closed: [Option<Closed>; MOST_SOLUTIONS],
-    count: usize,
-    overflowed: bool,
-}
-
-impl Distinct {
-    fn add_pair(&mut self, closure: &Closure, closed: &Closed) {
-        self.add(*closed);
-        let headings = closed.headings.map(Heading::mirrored);
-        self.add(Closed { headings, closing: closure.evaluate(&headings), ..*closed });
-    }
-
-    fn add(&mut self, closed: Closed) {
-        let is_same = |known: &Closed| coincide(&known.headings, &closed.headings, MERGED_WITHIN_RAD);
-        if self.closed.iter().flatten().any(is_same) {
-            return;
-        }
-        match self.closed.get_mut(self.count) {
-            Some(place) => {
-                *place = Some(closed);
-                self.count += 1;
-            }
-            None => self.overflowed = true,
-        }
+        let others = self.iter().map(|other| &other.headings);
+        nearest_other_rad(&solution.headings, others)
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use masseter_shared::geometry::LEGS;
     use proptest::prelude::*;
 
     use super::*;
+    use crate::kinematics::elimination::Elimination;
+    use crate::kinematics::heading::coincide;
     use crate::kinematics::samples::{mechanisms, seed_mechanism};
     use crate::kinematics::{Options, solve_newton};
 

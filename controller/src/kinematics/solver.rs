@@ -154,7 +154,7 @@ pub fn solve_traced(
     let closed = Closed { headings, closing: closure.evaluate(&headings), iterations };
     Ok(Solution {
         residual_m: at.evaluation.residual_norm_m(),
-        ..Solution::new(mechanism, actuators, &closure, &closed)
+        ..Solution::new(&closure, &closed)
     })
 }
 

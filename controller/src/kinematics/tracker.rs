@@ -8,10 +8,10 @@
 
 use masseter_shared::geometry::{Actuators, LEGS, Mechanism};
 
-use super::closure::Closure;
+use super::closure::{Closure, each};
 use super::complete::choose;
-use super::heading::Heading;
-use super::solutions::check;
+use super::heading::{Anchor, Heading};
+use super::platforms::check;
 use super::{ForwardError, Solution};
 
 /// Newton's iterations from the last solution; a chewing jaw takes 2 or 3 a millisecond.
@@ -22,6 +22,7 @@ pub const WARM_ITERATIONS: u32 = 4;
 pub struct ForwardTracker {
     mechanism: Mechanism,
     last: Option<Last>,
+    anchor: Anchor,
 }
 
 /// The last accepted solution.
@@ -35,13 +36,13 @@ struct Last {
 impl ForwardTracker {
     /// A tracker that knows no solution yet.
     pub fn new(mechanism: Mechanism) -> Self {
-        Self { mechanism, last: None }
+        Self { mechanism, last: None, anchor: Anchor::nowhere() }
     }
 
     /// A tracker that takes leg angles (radians) from elsewhere for its last solution. Good ones save
     /// the first cycle the complete method, and settle an ambiguous input; bad ones cost time only.
     pub fn with_guess(mechanism: Mechanism, theta_rad: [f64; LEGS]) -> Self {
-        Self { mechanism, last: Some(Last::guessed(theta_rad)) }
+        Self { mechanism, last: Some(Last::guessed(theta_rad)), anchor: Anchor::nowhere() }
     }
 
     /// The leg angles of the last accepted solution, radians.
@@ -51,7 +52,7 @@ impl ForwardTracker {
 
     /// Forgets the last solution, so that the next input is solved on its own.
     pub fn reset(&mut self) {
-        self.last = None;
+        (self.last, self.anchor) = (None, Anchor::nowhere());
     }
 
     /// The true solution for this input, certified. The last accepted solution outlives a failure.
@@ -61,10 +62,10 @@ impl ForwardTracker {
     pub fn update(&mut self, actuators: &Actuators) -> Result<Solution, ForwardError> {
         check(actuators)?;
         let closure = Closure::new(&self.mechanism, actuators);
-        let continued = self.last.and_then(|last| last.continued(&self.mechanism, actuators, &closure));
+        let continued = self.last.as_ref().and_then(|last| last.continued(&closure, &mut self.anchor));
         let solution = match continued {
             Some(solution) => solution,
-            None => choose(&self.mechanism, actuators, &closure)?,
+            None => choose(&closure)?,
         };
         self.last = Some(Last::solved(&solution));
         Ok(solution)
@@ -76,22 +77,26 @@ impl Last {
         Self { headings: theta_rad.map(Heading::from_rad), theta_rad, unique_within_rad: f64::INFINITY }
     }
 
+    #[inline]
     fn solved(solution: &Solution) -> Self {
         let unique_within_rad = solution.certificate.map_or(0.0, |proof| proof.unique_within_rad);
         Self { headings: solution.headings, theta_rad: solution.theta_rad, unique_within_rad }
     }
 
     /// The true solution that continues this one, if the iteration finds and proves it.
-    fn continued(&self, mechanism: &Mechanism, actuators: &Actuators, closure: &Closure) -> Option<Solution> {
+    #[inline]
+    fn continued(&self, closure: &Closure<'_>, anchor: &mut Anchor) -> Option<Solution> {
         let closed = closure.close(&self.headings, WARM_ITERATIONS)?;
-        let solution = Solution::new(mechanism, actuators, closure, &closed);
+        let theta_rad = anchor.angles_rad(&closed.headings);
+        let solution = Solution::with_angles(closure, &closed, theta_rad);
         let reach_rad = solution.certificate?.unique_within_rad.min(self.unique_within_rad);
         (self.is_within(reach_rad, &solution) && solution.assembly.is_true()).then_some(solution)
     }
 
     /// Angles on either side of ±π count as far apart, which costs time and nothing else.
+    #[inline]
     fn is_within(&self, reach_rad: f64, solution: &Solution) -> bool {
-        self.theta_rad.iter().zip(&solution.theta_rad).all(|(last, now)| (now - last).abs() < reach_rad)
+        each(|leg| (solution.theta_rad[leg] - self.theta_rad[leg]).abs() < reach_rad) == [true; LEGS]
     }
 }
 

@@ -25,12 +25,14 @@ impl Actuators {
     }
 
     /// In the axis order d₁ d₂ d₃ l₁ l₂ l₃, metres.
+    #[inline]
     pub fn to_axes(self) -> [f64; AXES] {
         let ([d1, d2, d3], [l1, l2, l3]) = (self.slide_m, self.leg_m);
         [d1, d2, d3, l1, l2, l3]
     }
 
     /// Whether every coordinate is a finite number.
+    #[inline]
     pub fn is_finite(&self) -> bool {
         self.to_axes().iter().all(|x| x.is_finite())
     }
@@ -81,11 +83,13 @@ impl LimitViolation {
 
 impl StrokeLimits {
     /// Lowest and highest position of an axis, metres.
+    #[inline]
     pub fn of_axis(&self, axis: usize) -> [f64; 2] {
         if axis < LEGS { self.slide_m } else { self.leg_m }
     }
 
     /// The first axis outside its stroke, if any; a value that is no number is outside.
+    #[inline]
     pub fn check(&self, actuators: &Actuators) -> Result<(), LimitViolation> {
         for (axis, value_m) in actuators.to_axes().into_iter().enumerate() {
             let [lowest_m, highest_m] = self.of_axis(axis);

@@ -130,6 +130,7 @@ impl Mechanism {
     }
 
     /// Sides of the platform triangle: A₁A₂, A₂A₃, A₃A₁, metres.
+    #[inline]
     pub fn platform_sides_m(&self) -> [f64; LEGS] {
         self.sides_m
     }
@@ -140,21 +141,25 @@ impl Mechanism {
     }
 
     /// Hinges Bᵢ in the base frame for slide displacements, metres.
+    #[inline]
     pub fn hinge(&self, leg: usize, slide_m: f64) -> Vec3 {
         self.slides[leg].centre + self.slides[leg].along * slide_m
     }
 
     /// The slide's direction ûᵢ in the base frame.
+    #[inline]
     pub fn slide_direction(&self, leg: usize) -> Vec3 {
         self.slides[leg].along
     }
 
     /// The horizontal direction v̂ᵢ = −r̂ᵢ from which θᵢ is measured, base frame.
+    #[inline]
     pub fn inward_direction(&self, leg: usize) -> Vec3 {
         self.slides[leg].inward
     }
 
     /// The direction of leg i from Bᵢ to Aᵢ at angle θᵢ, base frame.
+    #[inline]
     pub fn leg_direction(&self, leg: usize, theta_rad: f64) -> Vec3 {
         let (sin, cos) = theta_rad.sin_cos();
         self.slides[leg].inward * cos + Vec3::z() * sin
@@ -162,6 +167,7 @@ impl Mechanism {
 
     /// Corners A₁, A₂, A₃ in the base frame from actuators and leg angles:
     /// Aᵢ = Bᵢ + lᵢ (−cos θᵢ r̂ᵢ + sin θᵢ ẑ).
+    #[inline]
     pub fn corners_from_angles(&self, actuators: &Actuators, theta_rad: &[f64; LEGS]) -> [Vec3; LEGS] {
         std::array::from_fn(|leg| {
             self.hinge(leg, actuators.slide_m[leg])
@@ -177,6 +183,7 @@ impl Mechanism {
 
 /// The pose of the frame fixed by three corners: origin at their centroid, x towards A₁, z along
 /// the normal (A₂−A₁)×(A₃−A₁). The corners must span an area.
+#[inline]
 pub(super) fn frame_of_corners(corners: &[Vec3; LEGS]) -> Pose {
     let [a1, a2, a3] = corners;
     let centroid = (a1 + a2 + a3) / 3.0;
@@ -188,6 +195,7 @@ pub(super) fn frame_of_corners(corners: &[Vec3; LEGS]) -> Pose {
 
 impl Mechanism {
     /// The pose that carries the platform's corners to these points of the base frame.
+    #[inline]
     pub fn pose_from_corners(&self, corners: &[Vec3; LEGS]) -> Pose {
         frame_of_corners(corners)
     }
