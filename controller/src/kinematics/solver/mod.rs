@@ -11,100 +11,16 @@
 //! With any choice the claims "no oscillation, no divergence" (Figs. 3 and 4) hold in the residual chosen,
 //! because its error cannot increase. Whether the iteration then reaches a solution is another matter.
 
+mod options;
+mod search;
+
 use masseter_shared::geometry::{Actuators, LEGS, Mechanism};
-use nalgebra::{Matrix3, Vector3};
+pub use options::{Iteration, MAX_HALVINGS, MAX_ITERATIONS, Method, Options, Residual, StepRule};
+use search::{Search, Step};
 
 use super::closure::{Closed, Closure};
 use super::heading::Heading;
-use super::{Equations, Evaluation, ForwardError, Solution};
-
-/// No options allow more iterations than this.
-pub const MAX_ITERATIONS: u32 = 100;
-/// No options allow more reductions of one increment than this.
-pub const MAX_HALVINGS: u32 = 40;
-
-/// Below this the Newton direction is noise; unitless, see [`Equations::determinant`].
-const SMALLEST_DETERMINANT: f64 = 1e-10;
-/// The share of the decrease which the slope promises that counts as sufficient (Numerical Recipes).
-const SUFFICIENT_SHARE: f64 = 1e-4;
-
-/// How to iterate, and when to end.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Options {
-    /// ε: solved when the error (eq. 2) is not above it, cm². The error in this test is always that of
-    /// the distances, whatever [`residual`](Self::residual) the iteration goes by.
-    pub epsilon_cm2: f64,
-    /// What the iteration drives to zero.
-    pub residual: Residual,
-    /// How the seed's algorithm reduces an increment; Newton–Raphson reduces none.
-    pub step: StepRule,
-    /// Iterations allowed; at most [`MAX_ITERATIONS`].
-    pub max_iterations: u32,
-    /// Reductions of one increment allowed; at most [`MAX_HALVINGS`].
-    pub max_halvings: u32,
-}
-
-impl Default for Options {
-    /// The tolerance, 10⁻¹⁴ m for each side, lies a few hundred roundings above what double precision
-    /// reaches at these sizes.
-    fn default() -> Self {
-        Self {
-            epsilon_cm2: 1e-24,
-            residual: Residual::default(),
-            step: StepRule::default(),
-            max_iterations: 20,
-            max_halvings: 12,
-        }
-    }
-}
-
-/// Which iteration.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Method {
-    /// The seed's algorithm: Newton's direction, the increment reduced until the error decreases.
-    #[default]
-    Seed,
-    /// Newton–Raphson with the full increment.
-    Newton,
-}
-
-/// Which form of the equations gives the increment and must decrease.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Residual {
-    /// |AᵢAⱼ| − Lᵢⱼ, metres: eq. 1 as printed.
-    #[default]
-    Distance,
-    /// |AᵢAⱼ|² − Lᵢⱼ², m²: the same zeros, smooth where two corners meet.
-    SquaredDistance,
-}
-
-/// What "the increment is reduced" (Fig. 2) means.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum StepRule {
-    /// Halved until the error is smaller than before; every iteration begins with the full increment.
-    #[default]
-    Halving,
-    /// The same, but the next iteration begins with twice the accepted share of its increment.
-    CautiousHalving,
-    /// The line search of Numerical Recipes: a sufficient decrease, found through the parabola of
-    /// value, slope and last attempt, cut to between a tenth and a half.
-    QuadraticBacktracking,
-}
-
-/// One iteration as it went: the guess is number 0.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Iteration {
-    /// From 0.
-    pub number: u32,
-    /// θ₁ θ₂ θ₃ it arrived at, not wrapped, radians.
-    pub theta_rad: [f64; LEGS],
-    /// The increment that was made, radians.
-    pub increment_rad: [f64; LEGS],
-    /// How often the increment was reduced before.
-    pub halvings: u32,
-    /// The error there (eq. 2), cm².
-    pub error_cm2: f64,
-}
+use super::{Equations, ForwardError, Solution};
 
 /// Solves from a guess of the leg angles (radians) by the method asked for.
 ///
@@ -152,10 +68,7 @@ pub fn solve_traced(
     let closure = Closure::new(mechanism, actuators);
     let headings = std::array::from_fn(|leg| Heading::from_rad(at.evaluation.theta_rad[leg]));
     let closed = Closed { headings, closing: closure.evaluate(&headings), iterations };
-    Ok(Solution {
-        residual_m: at.evaluation.residual_norm_m(),
-        ..Solution::new(&closure, &closed)
-    })
+    Ok(Solution { residual_m: at.evaluation.residual_norm_m(), ..Solution::new(&closure, &closed) })
 }
 
 /// [`solve`] by the seed's algorithm.
@@ -182,124 +95,6 @@ pub fn solve_newton(
     options: &Options,
 ) -> Result<Solution, ForwardError> {
     solve(Method::Newton, mechanism, actuators, guess_rad, options)
-}
-
-/// What stays the same over the iterations.
-struct Search<'a> {
-    equations: Equations<'a>,
-    method: Method,
-    options: &'a Options,
-}
-
-/// Where an iteration arrived, and how.
-#[derive(Debug, Clone, Copy)]
-struct Step {
-    evaluation: Evaluation,
-    increment: Vector3<f64>,
-    halvings: u32,
-    /// The share of the Newton increment that was made.
-    share: f64,
-}
-
-impl Step {
-    fn guess(equations: &Equations<'_>, guess_rad: &[f64; LEGS]) -> Self {
-        let evaluation = equations.evaluate(Vector3::from(*guess_rad));
-        Self { evaluation, increment: Vector3::zeros(), halvings: 0, share: 1.0 }
-    }
-
-    /// Also where the error is no number.
-    fn is_above(&self, epsilon_cm2: f64) -> bool {
-        self.evaluation.error_cm2().partial_cmp(&epsilon_cm2).is_none_or(std::cmp::Ordering::is_gt)
-    }
-
-    fn told(&self, number: u32) -> Iteration {
-        Iteration {
-            number,
-            theta_rad: self.evaluation.theta_rad.into(),
-            increment_rad: self.increment.into(),
-            halvings: self.halvings,
-            error_cm2: self.evaluation.error_cm2(),
-        }
-    }
-}
-
-impl Search<'_> {
-    /// Residual and Jacobian of the form asked for.
-    fn linearised(&self, at: &Evaluation) -> (Vector3<f64>, Matrix3<f64>) {
-        let jacobian = self.equations.jacobian(at);
-        match self.options.residual {
-            Residual::Distance => (at.residual_m, jacobian),
-            Residual::SquaredDistance => {
-                let by_side = Matrix3::from_diagonal(&(self.equations.distances_m(at) * 2.0));
-                (self.equations.squared_residual_m2(at), by_side * jacobian)
-            }
-        }
-    }
-
-    /// What must decrease: the sum of squares of the residual asked for.
-    fn error(&self, at: &Evaluation) -> f64 {
-        match self.options.residual {
-            Residual::Distance => at.error_m2(),
-            Residual::SquaredDistance => self.equations.squared_residual_m2(at).norm_squared(),
-        }
-    }
-
-    /// −J⁻¹ f, radians.
-    fn newton_increment(&self, at: &Evaluation) -> Result<Vector3<f64>, ForwardError> {
-        let determinant = self.equations.determinant(at);
-        let singular = ForwardError::Singular { determinant, residual_m: at.residual_norm_m() };
-        if determinant.is_nan() || determinant.abs() < SMALLEST_DETERMINANT {
-            return Err(singular);
-        }
-        let (residual, jacobian) = self.linearised(at);
-        let inverse = jacobian.try_inverse().ok_or(singular)?;
-        Ok(-(inverse * residual))
-    }
-
-    /// The inner loop of Fig. 2; none when no allowed reduction decreases the error.
-    fn advanced(&self, from: &Step, newton: Vector3<f64>) -> Option<Step> {
-        let evaluate = |share: f64, halvings| {
-            let increment = newton * share;
-            let evaluation = self.equations.evaluate(from.evaluation.theta_rad + increment);
-            Step { evaluation, increment, halvings, share }
-        };
-        if self.method == Method::Newton {
-            return Some(evaluate(1.0, 0));
-        }
-        let before = self.error(&from.evaluation);
-        let mut share = match self.options.step {
-            StepRule::CautiousHalving => (2.0 * from.share).min(1.0),
-            StepRule::Halving | StepRule::QuadraticBacktracking => 1.0,
-        };
-        for halvings in 0..=self.options.max_halvings.min(MAX_HALVINGS) {
-            let step = evaluate(share, halvings);
-            let after = self.error(&step.evaluation);
-            if after < self.enough(before, share) {
-                return Some(step);
-            }
-            share = self.reduced(share, before, after);
-        }
-        None
-    }
-
-    /// What the error must fall below. Along Newton's direction its slope is −2 errors per increment.
-    fn enough(&self, before: f64, share: f64) -> f64 {
-        match self.options.step {
-            StepRule::QuadraticBacktracking => before * (1.0 - 2.0 * SUFFICIENT_SHARE * share),
-            StepRule::Halving | StepRule::CautiousHalving => before,
-        }
-    }
-
-    fn reduced(&self, share: f64, before: f64, after: f64) -> f64 {
-        match self.options.step {
-            StepRule::Halving | StepRule::CautiousHalving => share / 2.0,
-            StepRule::QuadraticBacktracking => {
-                let lowest = before * share * share / (after - before + 2.0 * before * share);
-                // Without a number for the error there is no parabola: `max` then takes the tenth.
-                lowest.max(share / 10.0).min(share / 2.0)
-            }
-        }
-    }
 }
 
 #[cfg(test)]
