@@ -117,8 +117,8 @@ impl VirtualLink {
     }
 
     /// The next frame to arrive on any wire.
-    fn next_arrival(&self) -> Option<(u64, usize)> {
-        let arrivals = self.wires.iter().enumerate();
+    fn next_arrival(&mut self) -> Option<(u64, usize)> {
+        let arrivals = self.wires.iter_mut().enumerate();
         arrivals.filter_map(|(bus, wire)| Some((wire.next_event_ns()?, bus))).min()
     }
 

@@ -52,7 +52,7 @@ impl Dynamics {
         let joints = mechanism.inverse(&pose)?;
         let jacobian = mechanism.jacobian(&pose, &joints);
         let dynamics = Self { mechanism, config, pose, twist: Twist::zeros(), joints, jacobian };
-        match dynamics.mass().cholesky() {
+        match dynamics.mass(&dynamics.platform_inertia()).cholesky() {
             Some(_) => Ok(dynamics),
             None => Err(DynamicsError::Mass),
         }
@@ -76,13 +76,14 @@ impl Dynamics {
     /// Lets the actuators' forces (N) act for `dt_s`: semi-implicit Euler.
     pub(crate) fn step(&mut self, force_n: &[f64; AXES], dt_s: f64) -> Result<(), DynamicsError> {
         let (axes, hinges) = self.bias();
+        let inertia = self.platform_inertia();
         let axes_n = Vector6::from(*force_n) - self.friction() - self.axis_mass_kg().component_mul(&axes);
         let hinges_nm = hinges * -self.config.leg_inertia_kg_m2;
         let wrench = self.jacobian.actuators.tr_mul(&axes_n)
             + self.jacobian.hinges.tr_mul(&hinges_nm)
             + self.gravity()
-            - self.gyroscopic();
-        let solver = self.mass().cholesky().ok_or(DynamicsError::Mass)?;
+            - self.gyroscopic(&inertia);
+        let solver = self.mass(&inertia).cholesky().ok_or(DynamicsError::Mass)?;
         self.twist += solver.solve(&wrench) * dt_s;
         self.move_by(dt_s)
     }
@@ -136,7 +137,7 @@ impl Dynamics {
     }
 
     /// Mass matrix against the twist: platform + Jᵀ·M·J of slides and rods + hinges.
-    fn mass(&self) -> Matrix6<f64> {
+    fn mass(&self, platform_inertia: &Matrix3<f64>) -> Matrix6<f64> {
         let config = &self.config;
         let mut moved = self.jacobian.actuators;
         for (mut row, mass_kg) in moved.row_iter_mut().zip(&self.axis_mass_kg()) {
@@ -148,7 +149,7 @@ impl Dynamics {
             mass[(i, i)] += config.platform_mass_kg;
         }
         let mut rotational = mass.fixed_view_mut::<3, 3>(3, 3);
-        rotational += self.platform_inertia();
+        rotational += platform_inertia;
         mass
     }
 
@@ -180,9 +181,9 @@ impl Dynamics {
     }
 
     /// ω × Iω of the platform.
-    fn gyroscopic(&self) -> Vector6<f64> {
+    fn gyroscopic(&self, platform_inertia: &Matrix3<f64>) -> Vector6<f64> {
         let omega: Vec3 = self.twist.fixed_rows::<3>(3).into();
-        let moment = omega.cross(&(self.platform_inertia() * omega));
+        let moment = omega.cross(&(platform_inertia * omega));
         Vector6::new(0.0, 0.0, 0.0, moment.x, moment.y, moment.z)
     }
 }
@@ -230,7 +231,8 @@ mod tests {
 
     /// Kinetic and potential energy, J.
     fn energy_j(dynamics: &Dynamics) -> f64 {
-        let kinetic = 0.5 * dynamics.twist.dot(&(dynamics.mass() * dynamics.twist));
+        let mass = dynamics.mass(&dynamics.platform_inertia());
+        let kinetic = 0.5 * dynamics.twist.dot(&(mass * dynamics.twist));
         let rods_m: f64 = dynamics.mechanism.corners_at(&dynamics.pose).iter().map(|corner| corner.z).sum();
         let config = &dynamics.config;
         let moment = config.platform_mass_kg * dynamics.pose.translation.z + config.rod_mass_kg * rods_m;
@@ -275,7 +277,10 @@ mod tests {
         let config = DynamicsConfig { gravity_m_s2: 0.0, ..DynamicsConfig::default() };
         let mut dynamics = at_rest(config);
         dynamics.twist = Twist::new(0.05, 0.02, 0.03, 0.3, -0.2, 0.1);
-        let energy = |dynamics: &Dynamics| (dynamics.twist.transpose() * dynamics.mass() * dynamics.twist)[0];
+        let energy = |dynamics: &Dynamics| {
+            let mass = dynamics.mass(&dynamics.platform_inertia());
+            (dynamics.twist.transpose() * mass * dynamics.twist)[0]
+        };
         let mut before = energy(&dynamics);
         for _ in 0..400 {
             dynamics.step(&[0.0; AXES], 1.25e-4).unwrap();

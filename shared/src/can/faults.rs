@@ -103,11 +103,6 @@ impl Faults {
         Self { list: faults.into_iter().map(listed).collect(), seed }
     }
 
-    /// Whether there are none.
-    pub fn is_empty(&self) -> bool {
-        self.list.is_empty()
-    }
-
     /// The first fault of a kind that strikes the frame numbered `number` of that port.
     pub(super) fn strikes_frame(
         &self,
@@ -120,8 +115,13 @@ impl Faults {
         self.list.iter().enumerate().find_map(|(index, listed)| {
             let may = is_kind(listed.fault.kind) && listed.is_live(now_ns) && listed.concerns(port, id);
             let strikes = may && self.chance(index, number).random_bool(listed.fault.probability);
-            strikes.then_some(Strike { fault: index, kind: listed.fault.kind, at_ns: now_ns })
+            strikes.then_some(Strike { fault: index, at_ns: now_ns })
         })
+    }
+
+    /// What the fault behind a strike does.
+    pub(super) fn kind_of(&self, strike: Strike) -> FaultKind {
+        self.list[strike.fault].fault.kind
     }
 
     /// A number from 0 to `below` − 1 for a fault and a frame.
@@ -138,9 +138,8 @@ impl Faults {
         is_kind: impl Fn(FaultKind) -> bool,
         port: usize,
     ) -> Option<Strike> {
-        self.of_port(is_kind, port).find(|(_, listed)| listed.is_live(now_ns)).map(
-            |(index, Listed { fault, .. })| Strike { fault: index, kind: fault.kind, at_ns: fault.from_ns },
-        )
+        let (index, listed) = self.of_port(is_kind, port).find(|(_, listed)| listed.is_live(now_ns))?;
+        Some(Strike { fault: index, at_ns: listed.fault.from_ns })
     }
 
     /// When a node is connected, from `from_ns` on.
@@ -184,7 +183,7 @@ impl Faults {
     pub(super) fn next_bus_off(&self, from_ns: u64, port: usize) -> Option<Strike> {
         let strikes = self.of_port(|kind| kind == FaultKind::BusOff, port).filter_map(|(index, listed)| {
             let at_ns = listed.fault.from_ns.max(from_ns);
-            listed.is_live(at_ns).then_some(Strike { fault: index, kind: FaultKind::BusOff, at_ns })
+            listed.is_live(at_ns).then_some(Strike { fault: index, at_ns })
         });
         strikes.min_by_key(|strike| strike.at_ns)
     }
@@ -228,7 +227,6 @@ impl Faults {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Strike {
     pub(super) fault: usize,
-    pub(super) kind: FaultKind,
     pub(super) at_ns: u64,
 }
 
@@ -284,7 +282,7 @@ mod tests {
     fn a_fault_tells_once_that_it_acts_and_once_that_it_is_over() {
         let mut faults = Faults::new(vec![Fault { count: 2, ..corrupt(1.0) }], 1);
         assert_eq!(faults.next_note(1500), None);
-        let strike = |at_ns| Strike { fault: 0, kind: FaultKind::Corrupt, at_ns };
+        let strike = |at_ns| Strike { fault: 0, at_ns };
         faults.record(strike(1200));
         let note = FaultNote { time_ns: 1200, fault: 0, port: None, strikes: 0, has_ended: false };
         assert_eq!(faults.next_note(1500), Some(note));

@@ -79,8 +79,13 @@ struct Offer {
 }
 
 impl VirtualWire {
+    /// The next attempt if nothing else is queued until then.
+    pub(super) fn foretell(&self) -> Option<Attempt> {
+        self.attempt(self.next_start_ns()?)
+    }
+
     /// When the next arbitration takes place: as soon as the bus is idle and somebody has something to send.
-    pub(super) fn next_start_ns(&self) -> Option<u64> {
+    fn next_start_ns(&self) -> Option<u64> {
         (0..self.stations.len()).filter_map(|port| self.ready_ns(port)).min()
     }
 
@@ -99,8 +104,8 @@ impl VirtualWire {
     }
 
     /// The attempt that an arbitration at that time leads to; `None` where nobody can send then.
-    pub(super) fn attempt(&self, start_ns: u64) -> Option<Attempt> {
-        let winner = self.offers(start_ns).min_by_key(|offer| offer.queued.frame.id())?;
+    fn attempt(&self, start_ns: u64) -> Option<Attempt> {
+        let winner = self.offers(0, start_ns).min_by_key(|offer| offer.queued.frame.id())?;
         let (contest, strongest) = self.contest(start_ns, winner);
         let frame = strongest.queued.frame;
         let struck = |is_kind: fn(FaultKind) -> bool| {
@@ -144,12 +149,12 @@ impl VirtualWire {
 
     fn is_disconnected(&self, port: usize, now_ns: u64) -> bool {
         let is_disconnect = |kind| kind == FaultKind::Disconnect;
-        !self.faults.is_empty() && self.faults.of_node(now_ns, is_disconnect, port).is_some()
+        self.faults.of_node(now_ns, is_disconnect, port).is_some()
     }
 
-    /// What each port would send at that time.
-    fn offers(&self, start_ns: u64) -> impl Iterator<Item = Offer> {
-        (0..self.stations.len()).filter_map(move |port| {
+    /// What each port from `first` on would send at that time.
+    fn offers(&self, first: usize, start_ns: u64) -> impl Iterator<Item = Offer> {
+        (first..self.stations.len()).filter_map(move |port| {
             let may = self.stations[port].suspended_until_ns <= start_ns && self.is_on_bus(port, start_ns);
             if may { self.offer(port, start_ns) } else { None }
         })
@@ -157,18 +162,15 @@ impl VirtualWire {
 
     fn offer(&self, port: usize, start_ns: u64) -> Option<Offer> {
         let queued = self.stations[port].transmit.most_urgent(start_ns);
-        let queued = queued.map(|queued| Offer { port, queued, babbles: None });
+        let queued = queued.map(|&queued| Offer { port, queued, babbles: None });
         let babbled = self.babbled(port, start_ns);
         queued.into_iter().chain(babbled).min_by_key(|offer| offer.queued.frame.id())
     }
 
     fn babbled(&self, port: usize, start_ns: u64) -> Option<Offer> {
-        if self.faults.is_empty() {
-            return None;
-        }
         let is_babble = |kind| matches!(kind, FaultKind::Babble { .. });
         let strike = self.faults.of_node(start_ns, is_babble, port)?;
-        let FaultKind::Babble { frame } = strike.kind else { return None };
+        let FaultKind::Babble { frame } = self.faults.kind_of(strike) else { return None };
         let frame = frame.in_format(self.config.format);
         let duration_ns = self.config.rates.duration_ns(frame_bits(&frame));
         let queued = Queued { frame, duration_ns, since_ns: start_ns };
@@ -184,10 +186,10 @@ impl VirtualWire {
     /// Sorts out who sends the winning identifier too.
     fn contest(&self, start_ns: u64, winner: Offer) -> (Contest, Offer) {
         let mut contest = Contest::default();
+        contest.admit(winner);
         let mut strongest = winner;
-        let same_id =
-            |offer: &Offer| offer.port >= winner.port && offer.queued.frame.id() == winner.queued.frame.id();
-        for rival in self.offers(start_ns).filter(same_id) {
+        let same_id = |offer: &Offer| offer.queued.frame.id() == winner.queued.frame.id();
+        for rival in self.offers(winner.port + 1, start_ns).filter(same_id) {
             let difference = first_difference(&strongest.queued.frame, &rival.queued.frame);
             let Some(difference) = difference else {
                 contest.admit(rival);

@@ -71,9 +71,6 @@ impl VirtualWire {
 
     /// Whether a fault makes the port lose the frame.
     fn loses(&mut self, port: usize, attempt: &Attempt) -> bool {
-        if self.faults.is_empty() {
-            return false;
-        }
         let is_lose = |kind| kind == FaultKind::Lose;
         // Receivers choose by numbers of their own, so that one's loss is not the other's.
         let number = self.attempts ^ (port as u64 + 1) << 48;

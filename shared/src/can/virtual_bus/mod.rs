@@ -71,12 +71,25 @@ pub struct VirtualWire {
     stations: Vec<Station>,
     tap: ReceiveQueue<Tapped>,
     faults: Faults,
-    on_wire: Option<Attempt>,
+    traffic: Traffic,
     /// Attempts so far: the number by which faults choose among them.
     attempts: u64,
     idle_from_ns: u64,
     advanced_to_ns: u64,
     statistics: Statistics,
+}
+
+/// What is, or will next be, on the wire.
+#[derive(Debug)]
+enum Traffic {
+    /// The wire is idle, and what comes next was not asked since something changed.
+    Unforeseen,
+    /// The wire is idle, and nobody has anything to send.
+    Nothing,
+    /// The wire is idle until that.
+    Next(Attempt),
+    /// That is on the wire.
+    Now(Attempt),
 }
 
 /// A port with its controller.
@@ -123,7 +136,7 @@ impl VirtualWire {
             stations: (0..config.ports).map(|_| station()).collect(),
             tap: ReceiveQueue::new(config.receive_capacity * config.ports),
             faults,
-            on_wire: None,
+            traffic: Traffic::Unforeseen,
             attempts: 0,
             idle_from_ns: 0,
             advanced_to_ns: 0,
@@ -153,6 +166,7 @@ impl VirtualWire {
         let duration_ns = self.config.rates.duration_ns(frame_bits(&frame));
         let queued = Queued { frame, duration_ns, since_ns: queued_ns };
         self.stations[port].transmit.push(queued)?;
+        self.look_again();
         self.statistics.queued += 1;
         Ok(())
     }
@@ -186,13 +200,17 @@ impl VirtualWire {
     /// Restarts the controller of a port that is off the bus, as its host does; no effect on others.
     pub fn restart(&mut self, port: usize, now_ns: u64) {
         self.stations[port].confinement.restart(now_ns.max(self.advanced_to_ns));
+        self.look_again();
     }
 
     /// When the frame on the wire, or the next one, will have ended if nothing else is queued until then,
     /// ns; `None` when nothing is on the way.
-    pub fn next_event_ns(&self) -> Option<u64> {
-        let attempt = self.on_wire.or_else(|| self.attempt(self.next_start_ns()?));
-        attempt.map(|attempt| attempt.end_ns)
+    pub fn next_event_ns(&mut self) -> Option<u64> {
+        self.foresee();
+        match &self.traffic {
+            Traffic::Next(attempt) | Traffic::Now(attempt) => Some(attempt.end_ns),
+            Traffic::Nothing | Traffic::Unforeseen => None,
+        }
     }
 
     /// Lets time pass: all arbitrations before `until_ns` and all endings up to and including it, in the
@@ -211,26 +229,49 @@ impl VirtualWire {
     /// nodes come back from bus-off, or are sent there.
     fn start_before(&mut self, until_ns: u64) -> bool {
         let sequence_ns = self.config.rates.nominal().bits_to_ns(SEQUENCE_BITS);
-        while self.on_wire.is_none() {
-            let start_ns = self.next_start_ns().filter(|&start_ns| start_ns < until_ns);
-            let idle_until_ns = start_ns.unwrap_or(until_ns);
+        loop {
+            self.foresee();
+            let next = match self.traffic {
+                Traffic::Now(_) => return true,
+                Traffic::Next(attempt) => Some(attempt).filter(|attempt| attempt.start_ns < until_ns),
+                Traffic::Nothing | Traffic::Unforeseen => None,
+            };
+            let idle_until_ns = next.map_or(until_ns, |attempt| attempt.start_ns);
             let change = self.next_node_change(sequence_ns).filter(|change| change.at_ns <= idle_until_ns);
             if let Some(change) = change {
                 self.apply(change);
                 continue;
             }
             self.stay_idle_until(idle_until_ns, sequence_ns);
-            let Some(attempt) = start_ns.and_then(|start_ns| self.attempt(start_ns)) else { break };
+            let Some(attempt) = next else { return false };
             self.attempts += 1;
-            self.on_wire = Some(attempt);
+            self.traffic = Traffic::Now(attempt);
         }
-        self.on_wire.is_some()
+    }
+
+    /// Finds out what comes next, unless that is known.
+    fn foresee(&mut self) {
+        if let Traffic::Unforeseen = self.traffic {
+            self.traffic = self.foretell().map_or(Traffic::Nothing, Traffic::Next);
+        }
+    }
+
+    /// Something changed that what comes next may depend on. What is on the wire stays there.
+    fn look_again(&mut self) {
+        if !matches!(self.traffic, Traffic::Now(_)) {
+            self.traffic = Traffic::Unforeseen;
+        }
     }
 
     /// Ends the frame on the wire if its end is not after `until_ns`; whether it did.
     fn end_until(&mut self, until_ns: u64) -> bool {
-        let attempt = self.on_wire.take_if(|attempt| attempt.end_ns <= until_ns);
-        attempt.inspect(|attempt| self.end(attempt)).is_some()
+        let Traffic::Now(attempt) = self.traffic else { return false };
+        let has_ended = attempt.end_ns <= until_ns;
+        if has_ended {
+            self.traffic = Traffic::Unforeseen;
+            self.end(&attempt);
+        }
+        has_ended
     }
 
     fn stay_idle_until(&mut self, until_ns: u64, sequence_ns: u64) {
@@ -265,18 +306,16 @@ impl VirtualWire {
             self.stations[port].on_bus_from_ns = at_ns;
             self.confine(port, at_ns, Confinement::come_back);
         }
+        self.look_again();
     }
 
     fn delay_ns(&mut self, port: usize, now_ns: u64, frame: &Frame) -> u64 {
-        if self.faults.is_empty() {
-            return 0;
-        }
         let is_delay = |kind| matches!(kind, FaultKind::Delay { .. });
         let number = self.statistics.queued;
         match self.faults.strikes_frame(now_ns, is_delay, port, frame.id(), number) {
             Some(strike) => {
                 self.faults.record(strike);
-                if let FaultKind::Delay { by_ns } = strike.kind { by_ns } else { 0 }
+                if let FaultKind::Delay { by_ns } = self.faults.kind_of(strike) { by_ns } else { 0 }
             }
             None => 0,
         }

@@ -42,13 +42,13 @@ impl TransmitQueue {
     }
 
     /// The most urgent of the frames queued up to that time.
-    pub(super) fn most_urgent(&self, at_ns: u64) -> Option<Queued> {
-        self.place_of_most_urgent(at_ns).map(|place| self.frames[place])
+    pub(super) fn most_urgent(&self, at_ns: u64) -> Option<&Queued> {
+        self.frames.iter().find(|queued| queued.since_ns <= at_ns)
     }
 
     /// Takes it out.
     pub(super) fn remove_most_urgent(&mut self, at_ns: u64) {
-        if let Some(place) = self.place_of_most_urgent(at_ns) {
+        if let Some(place) = self.frames.iter().position(|queued| queued.since_ns <= at_ns) {
             self.frames.remove(place);
         }
     }
@@ -58,10 +58,6 @@ impl TransmitQueue {
         let abandoned = self.frames.len() as u64;
         self.frames.clear();
         abandoned
-    }
-
-    fn place_of_most_urgent(&self, at_ns: u64) -> Option<usize> {
-        self.frames.iter().position(|queued| queued.since_ns <= at_ns)
     }
 }
 

@@ -16,7 +16,7 @@ const EXTENDED_HEADER_BITS: u32 = 39;
 /// Exact length of a frame on the wire from the start bit to the end of the interframe space, bits.
 pub fn wire_bits(frame: &Frame) -> u32 {
     let (content, content_bits) = content(frame);
-    let stuffed = content << CRC_BITS | u128::from(crc15(content));
+    let stuffed = content << CRC_BITS | u128::from(crc15(content, content_bits));
     let stuffed_bits = content_bits + CRC_BITS;
     stuffed_bits + stuff_bits(stuffed, stuffed_bits) + TRAILER_BITS + INTERFRAME_BITS
 }
@@ -84,9 +84,10 @@ pub(in crate::can) fn first_difference(first: &Frame, second: &Frame) -> Option<
     })
 }
 
-/// CRC of the content. The zeros above it do not matter, as the CRC starts from zero.
-fn crc15(content: u128) -> u16 {
-    content.to_be_bytes().into_iter().fold(0, |crc, byte| {
+/// CRC of a content of that many bits. Zeros above it do not matter, as the CRC starts from zero.
+fn crc15(content: u128, bits: u32) -> u16 {
+    let unused = ((u128::BITS - bits) / 8) as usize;
+    content.to_be_bytes()[unused..].iter().fold(0, |crc, &byte| {
         let index = (crc >> (CRC_BITS - 8)) as u8 ^ byte;
         (crc << 8 ^ CRC_TABLE[usize::from(index)]) & CRC_MASK
     })
@@ -165,7 +166,7 @@ mod tests {
     #[test]
     fn the_crc_has_the_check_value_of_the_catalogue() {
         let text = b"123456789".iter().fold(0, |number, byte| number << 8 | u128::from(*byte));
-        assert_eq!(crc15(text), 0x059E, "CRC-15/CAN, reveng.sourceforge.io/crc-catalogue");
+        assert_eq!(crc15(text, 72), 0x059E, "CRC-15/CAN, reveng.sourceforge.io/crc-catalogue");
     }
 
     #[test]
@@ -199,7 +200,7 @@ mod tests {
         fn crc_and_stuffing_are_those_of_the_bit_by_bit_references(frame in any_frame()) {
             let (content, length) = content(&frame);
             let crc = reference_crc(bits_of(content, length));
-            prop_assert_eq!(crc15(content), crc);
+            prop_assert_eq!(crc15(content, length), crc);
             let stuffed = reference_stuffing(bits_of(content, length).chain(bits_of(u128::from(crc), 15)));
             prop_assert_eq!(wire_bits(&frame), length + 15 + stuffed + 13);
         }

@@ -1,29 +1,83 @@
 //! Bit stuffing: after five equal bits, one of the other level, which itself counts towards the next
 //! five (ISO 11898-1, 10.5).
 
-/// Stuff bits that the lowest `length` bits of `sequence` get, first the highest of them.
+/// Stuff bits that the lowest `length` bits of `sequence` get, first the highest of them; one that is due
+/// behind the last bit is counted.
 pub(super) fn stuff_bits(sequence: u128, length: u32) -> u32 {
-    let Some(shift) = u128::BITS.checked_sub(length).filter(|&shift| shift < u128::BITS) else { return 0 };
-    let mut left = sequence << shift;
-    let mut length = length;
+    if length == 0 {
+        return 0;
+    }
+    // Alternating bits before the first get no stuff bit and fill up the first byte.
+    let begins_recessive = sequence >> (length - 1) & 1 == 1;
+    let alternating = if begins_recessive { u128::MAX / 3 * 2 } else { u128::MAX / 3 };
+    let content = sequence & u128::MAX >> (u128::BITS - length);
+    let bytes = length.div_ceil(8);
+    let filled = (alternating.unbounded_shl(length) | content) << (u128::BITS - 8 * bytes);
+    let mut run = Run::of_one(filled.leading_zeros() > 0);
     let mut stuffed = 0;
-    loop {
-        let five_equal_end = starts_of_five_equal(left).leading_zeros() + 5;
-        if five_equal_end > length {
-            return stuffed;
+    for &byte in &filled.to_be_bytes()[..bytes as usize] {
+        let step = STEPS[usize::from(run.0)][usize::from(byte)];
+        run = step.run;
+        stuffed += u32::from(step.stuffed);
+    }
+    stuffed
+}
+
+/// Equal bits that the sequence ends with so far: one to four, as the fifth brings its stuff bit at once. Number
+/// of bits − 1, and 4 for recessive ones.
+#[derive(Debug, Clone, Copy)]
+struct Run(u8);
+
+/// What a byte leads to.
+#[derive(Debug, Clone, Copy)]
+struct Step {
+    run: Run,
+    stuffed: u8,
+}
+
+static STEPS: [[Step; 256]; Run::COUNT] = steps();
+
+impl Run {
+    const COUNT: usize = 8;
+    const RECESSIVE: u8 = 4;
+    const LONGEST: u8 = 3;
+
+    const fn of_one(recessive: bool) -> Self {
+        Self(if recessive { Self::RECESSIVE } else { 0 })
+    }
+
+    const fn is_recessive(self) -> bool {
+        self.0 & Self::RECESSIVE != 0
+    }
+
+    /// The run behind one more bit, and the stuff bits that it brings.
+    const fn push(self, recessive: bool) -> Step {
+        if recessive != self.is_recessive() {
+            Step { run: Self::of_one(recessive), stuffed: 0 }
+        } else if self.0 & Self::LONGEST == Self::LONGEST {
+            Step { run: Self::of_one(!recessive), stuffed: 1 }
+        } else {
+            Step { run: Self(self.0 + 1), stuffed: 0 }
         }
-        // Go on behind the five, with the stuff bit in place of the fifth.
-        stuffed += 1;
-        left = (left << (five_equal_end - 1)) ^ (1 << (u128::BITS - 1));
-        length -= five_equal_end - 1;
     }
 }
 
-/// A bit set wherever the four bits that follow are equal to it.
-const fn starts_of_five_equal(bits: u128) -> u128 {
-    let two = !(bits ^ (bits << 1));
-    let three = two & (two << 1);
-    three & (three << 2)
+const fn steps() -> [[Step; 256]; Run::COUNT] {
+    let mut table = [[Step { run: Run(0), stuffed: 0 }; 256]; Run::COUNT];
+    let mut entry = 0;
+    while entry < Run::COUNT * 256 {
+        let (start, byte) = (entry / 256, entry % 256);
+        let mut total = Step { run: Run(start as u8), stuffed: 0 };
+        let mut bit = 8;
+        while bit > 0 {
+            bit -= 1;
+            let step = total.run.push(byte >> bit & 1 == 1);
+            total = Step { run: step.run, stuffed: total.stuffed + step.stuffed };
+        }
+        table[start][byte] = total;
+        entry += 1;
+    }
+    table
 }
 
 /// Stuffing as a transmitter does it, bit by bit: for sequences of any length.

@@ -123,7 +123,8 @@ fn every_frame_that_passes_counts_as_a_recessive_sequence() {
     let mut sent = 0;
     while wire.status(0).state == ErrorState::BusOff {
         wire.send(1, wire.advanced_to_ns, sync::frame()).unwrap();
-        wire.advance(wire.next_event_ns().unwrap() + 3 * BIT_NS);
+        let arrival_ns = wire.next_event_ns().unwrap();
+        wire.advance(arrival_ns + 3 * BIT_NS);
         sent += 1;
         assert!(sent <= 128);
     }
