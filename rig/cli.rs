@@ -1,5 +1,6 @@
 //! The command line: arguments, and which verb they lead to.
 
+use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Duration;
@@ -14,8 +15,9 @@ use crate::bench::ipc::PeerArgs;
 use crate::can::{PlanArgs, ServeArgs};
 use crate::exit::{Exit, Failure};
 use crate::log::{self, LogVerb};
+use crate::logger::Show;
 use crate::uniqueness::{self, UniquenessVerb};
-use crate::{bench, can, clean, doctor, kinematics, logger, plant, report, run};
+use crate::{bench, can, clean, doctor, kinematics, live, logger, plant, report, run};
 
 /// A hardware-in-the-loop rig for a 6-DOF mastication robot.
 #[derive(Debug, Parser)]
@@ -123,6 +125,15 @@ pub struct RunArgs {
     /// Exit with 3 unless core, SCHED_FIFO and locked memory are all granted
     #[arg(long)]
     pub require_rt: bool,
+    /// Show the run live to Foxglove over a WebSocket, to this machine only unless an address is given
+    #[arg(
+        long,
+        value_name = "ADDR:PORT",
+        num_args = 0..=1,
+        require_equals = true,
+        default_missing_value = live::DEFAULT_ADDRESS
+    )]
+    pub live: Option<SocketAddr>,
     /// Show no progress
     #[arg(long)]
     pub quiet: bool,
@@ -261,6 +272,8 @@ struct LoggerArgs {
     #[arg(long)]
     recording: PathBuf,
     #[arg(long)]
+    live: Option<SocketAddr>,
+    #[arg(long)]
     quiet: bool,
 }
 
@@ -336,7 +349,8 @@ pub fn main() -> ExitCode {
             .map_err(Failure::from),
         Verb::Plant(args) => plant::plant(&args),
         Verb::Logger(args) => {
-            logger::run(&args.process.assignment(), &args.recording, args.quiet).map_err(Failure::from)
+            let (assignment, show) = (args.process.assignment(), Show { live: args.live, quiet: args.quiet });
+            logger::run(&assignment, &args.recording, show).map_err(Failure::from)
         }
     };
     match result {

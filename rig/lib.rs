@@ -13,6 +13,7 @@ pub mod cli;
 pub mod doctor;
 pub mod exit;
 pub mod kinematics;
+pub mod live;
 pub mod log;
 pub mod logger;
 pub mod machine;

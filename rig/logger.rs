@@ -1,10 +1,11 @@
-//! The logger's process: drains every topic into the recording and shows how the run goes.
+//! The logger's process: drains every topic into the recording and to whoever watches the run.
 //!
 //! It runs at ordinary priority on no core of its own, and judges nothing: whatever is said of a run
 //! is computed from the recording afterwards.
 
 mod view;
 
+use std::net::SocketAddr;
 use std::path::Path;
 use std::time::Duration;
 
@@ -15,32 +16,81 @@ use masseter_shared::messages::{Command, Event, FrameTap, Message, Reading, Stat
 use masseter_shared::transport::{Inlet, Node, TransportError};
 
 use crate::exit::Exit;
+use crate::live::Live;
 use crate::recording::{Backlog, Pace, Recorded, Recorder, Scene};
 use view::{Mode, View};
 
 /// How often the topics are drained; a fraction of what their buffers hold.
 const DRAIN: Duration = Duration::from_millis(10);
 
+/// To whom a run is shown while it goes on.
+#[derive(Debug, Clone, Copy)]
+pub struct Show {
+    /// Where Foxglove may watch, if anywhere.
+    pub live: Option<SocketAddr>,
+    /// Whether standard error is spared the progress.
+    pub quiet: bool,
+}
+
 /// Records until asked to stop, then drains what is left. [`Exit::Incomplete`] when anything that was
 /// received is not safe in the recording.
-pub fn run(assignment: &Assignment, recording: &Path, quiet: bool) -> anyhow::Result<Exit> {
+pub fn run(assignment: &Assignment, recording: &Path, show: Show) -> anyhow::Result<Exit> {
     let post = assignment.take_up()?;
     let topics = Topics::open(&post.node)?;
     let scene = Scene::new(&Mechanism::new(&post.scenario.mechanism)?, &post.scenario.jaw);
-    let mut backlog = Backlog::start(Recorder::create(recording, scene)?, Pace::RealTime);
+    let live = match show.live {
+        Some(address) => Some(Live::start(address, scene.clone(), &assignment.domain)?),
+        None => None,
+    };
+    let backlog = Backlog::start(Recorder::create(recording, scene)?, Pace::RealTime);
     let start = post.ready()?;
 
-    let mut view = View::new(Mode::suitable(quiet), post.scenario.can.rates()?, start.epoch_ns);
+    let view = View::new(Mode::suitable(show.quiet), post.scenario.can.rates()?, start.epoch_ns);
+    let mut takers = Takers { backlog, live, view };
+    takers.announce(show.quiet);
     loop {
         let last = post.stop.is_made();
         let now_ns = clock::now_ns();
-        topics.drain(&mut backlog, now_ns, &mut view)?;
+        topics.drain(&mut takers, now_ns)?;
         if last {
-            return Ok(end(backlog));
+            return Ok(takers.end());
         }
-        backlog.hand_over();
-        view.show(now_ns, backlog.dropped());
+        takers.backlog.hand_over();
+        takers.view.show(now_ns, takers.backlog.dropped());
         clock::sleep(DRAIN);
+    }
+}
+
+/// Who gets what is drained.
+struct Takers {
+    backlog: Backlog,
+    live: Option<Live>,
+    view: View,
+}
+
+impl Takers {
+    fn announce(&self, quiet: bool) {
+        if let Some(live) = self.live.as_ref().filter(|_| !quiet) {
+            eprintln!("live on {} for Foxglove", live.url());
+        }
+    }
+
+    fn take<M: Message>(&mut self, message: &M, now_ns: u64, of_topic: impl Fn(M) -> Recorded) {
+        self.backlog.record(message, now_ns);
+        let message = of_topic(*message);
+        self.view.take(&message);
+        if let Some(live) = &self.live {
+            live.offer(&message, now_ns);
+        }
+    }
+
+    /// Ends what is shown and recorded, and says what either lacks.
+    fn end(self) -> Exit {
+        let unseen = self.live.map_or(0, |live| live.finish().dropped);
+        if unseen > 0 {
+            eprintln!("masseter: {unseen} messages were not shown live: their watchers read too slowly");
+        }
+        end(self.backlog)
     }
 }
 
@@ -76,28 +126,26 @@ impl Topics {
         })
     }
 
-    fn drain(&self, backlog: &mut Backlog, now_ns: u64, view: &mut View) -> Result<(), TransportError> {
-        drain(&self.commands, backlog, now_ns, view, Recorded::Command)?;
-        drain(&self.readings, backlog, now_ns, view, Recorded::Reading)?;
-        drain(&self.states, backlog, now_ns, view, Recorded::State)?;
-        drain(&self.truths, backlog, now_ns, view, Recorded::Truth)?;
-        drain(&self.frames, backlog, now_ns, view, Recorded::Frame)?;
-        drain(&self.events, backlog, now_ns, view, Recorded::Event)
+    fn drain(&self, takers: &mut Takers, now_ns: u64) -> Result<(), TransportError> {
+        drain(&self.commands, takers, now_ns, Recorded::Command)?;
+        drain(&self.readings, takers, now_ns, Recorded::Reading)?;
+        drain(&self.states, takers, now_ns, Recorded::State)?;
+        drain(&self.truths, takers, now_ns, Recorded::Truth)?;
+        drain(&self.frames, takers, now_ns, Recorded::Frame)?;
+        drain(&self.events, takers, now_ns, Recorded::Event)
     }
 }
 
 /// Records what has arrived on one topic; bounded, so that a flood cannot hold the others up.
 fn drain<M: Message>(
     inlet: &Inlet<M>,
-    backlog: &mut Backlog,
+    takers: &mut Takers,
     now_ns: u64,
-    view: &mut View,
     of_topic: impl Fn(M) -> Recorded,
 ) -> Result<(), TransportError> {
     for _ in 0..M::DEPTH {
         let Some(message) = inlet.receive()? else { break };
-        backlog.record(&*message, now_ns);
-        view.take(&of_topic(*message));
+        takers.take(&*message, now_ns, &of_topic);
     }
     Ok(())
 }

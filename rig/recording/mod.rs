@@ -7,6 +7,7 @@
 
 mod backlog;
 mod chunk;
+mod encoding;
 mod reader;
 mod recover;
 mod scene;
@@ -19,6 +20,7 @@ mod writer;
 use masseter_shared::messages::{Command, Event, FrameTap, Reading, State, Truth};
 
 pub use backlog::{Backlog, Outcome, Pace};
+pub(crate) use encoding::{Definition, Encoded, Encoder};
 pub use reader::{Chunks, Entry, ReadError, Reader, Schema};
 pub use recover::{RecoverError, Recovered, recover};
 pub use scene::Scene;
@@ -47,4 +49,30 @@ pub enum Recorded {
     Frame(FrameTap),
     /// An occurrence.
     Event(Event),
+}
+
+impl Recorded {
+    /// Its topic.
+    pub fn topic(&self) -> Topic {
+        match self {
+            Self::Command(_) => Topic::Command,
+            Self::Reading(_) => Topic::Reading,
+            Self::State(_) => Topic::State,
+            Self::Truth(_) => Topic::Truth,
+            Self::Frame(_) => Topic::Frame,
+            Self::Event(_) => Topic::Event,
+        }
+    }
+
+    /// Its bytes, as they lay in shared memory.
+    pub fn body(&self) -> &[u8] {
+        match self {
+            Self::Command(message) => bytemuck::bytes_of(message),
+            Self::Reading(message) => bytemuck::bytes_of(message),
+            Self::State(message) => bytemuck::bytes_of(message),
+            Self::Truth(message) => bytemuck::bytes_of(message),
+            Self::Frame(message) => bytemuck::bytes_of(message),
+            Self::Event(message) => bytemuck::bytes_of(message),
+        }
+    }
 }

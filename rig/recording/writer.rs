@@ -11,14 +11,13 @@ use std::path::Path;
 use std::sync::mpsc::{Receiver, SyncSender, channel, sync_channel};
 use std::thread::{self, JoinHandle};
 
-use foxglove::Encode;
-use masseter_shared::messages::{Command, Event, FrameTap, Message, Reading, State, Truth};
+use masseter_shared::messages::Message;
 use mcap::records::MessageHeader;
 use mcap::{Compression, McapError, WriteOptions, Writer};
 
+use super::encoding::{Definition, Encoder};
 use super::scene::Scene;
-use super::topic::{Stamps, Topic};
-use super::{CDR_LITTLE_ENDIAN, MESSAGE_ENCODING, SCHEMA_ENCODING};
+use super::topic::Topic;
 
 /// Bytes of messages in a chunk: what is compressed together, and read together by a tool that seeks.
 const CHUNK_BYTES: u64 = 1 << 20;
@@ -36,9 +35,6 @@ pub enum WriteError {
     /// Writing failed.
     #[error("cannot write the recording: {0}")]
     Write(#[from] McapError),
-    /// A message could not be put into a Foxglove schema.
-    #[error("cannot encode the scene: {0}")]
-    Scene(String),
 }
 
 /// How recordings are laid out: the options of every MCAP file that Masseter writes.
@@ -58,8 +54,7 @@ pub(super) fn options() -> WriteOptions {
 pub struct Recorder<W: Write + Seek = DurableFile> {
     writer: Writer<W>,
     channels: BTreeMap<&'static str, u16>,
-    scene: Scene,
-    bytes: Vec<u8>,
+    encoder: Encoder,
 }
 
 impl Recorder {
@@ -73,33 +68,14 @@ impl<W: Write + Seek> Recorder<W> {
     /// Begins a recording, with a channel a topic. The definitions are flushed at once: without them no
     /// message can be read.
     pub fn on(medium: W, scene: Scene) -> Result<Self, WriteError> {
-        let mut recorder =
-            Self { writer: options().create(medium)?, channels: BTreeMap::new(), scene, bytes: Vec::new() };
-        recorder.add_topic::<Command>()?;
-        recorder.add_topic::<Reading>()?;
-        recorder.add_topic::<State>()?;
-        recorder.add_topic::<Truth>()?;
-        recorder.add_topic::<FrameTap>()?;
-        recorder.add_topic::<Event>()?;
-        recorder.add_foxglove::<foxglove::messages::FrameTransforms>(Scene::TRANSFORMS)?;
-        recorder.add_foxglove::<foxglove::messages::SceneUpdate>(Scene::ENTITIES)?;
-        recorder.flush()?;
-        Ok(recorder)
-    }
-
-    fn add_topic<M: Message>(&mut self) -> Result<(), WriteError> {
-        let schema = self.writer.add_schema(M::TYPE_NAME, SCHEMA_ENCODING, M::schema().as_bytes())?;
-        let channel = self.writer.add_channel(schema, M::TOPIC, MESSAGE_ENCODING, &BTreeMap::new())?;
-        self.channels.insert(M::TOPIC, channel);
-        Ok(())
-    }
-
-    fn add_foxglove<E: Encode>(&mut self, topic: &'static str) -> Result<(), WriteError> {
-        let schema = E::get_schema().expect("Foxglove's own messages have schemas");
-        let schema = self.writer.add_schema(&schema.name, &schema.encoding, &schema.data)?;
-        let channel = self.writer.add_channel(schema, topic, &E::get_message_encoding(), &BTreeMap::new())?;
-        self.channels.insert(topic, channel);
-        Ok(())
+        let mut writer = options().create(medium)?;
+        let mut channels = BTreeMap::new();
+        for Definition { topic, schema, message_encoding } in Definition::all() {
+            let schema = writer.add_schema(&schema.name, &schema.encoding, &schema.data)?;
+            channels.insert(topic, writer.add_channel(schema, topic, &message_encoding, &BTreeMap::new())?);
+        }
+        writer.flush()?;
+        Ok(Self { writer, channels, encoder: Encoder::new(scene) })
     }
 
     /// Appends a message that was received at `log_time_ns`, and what a 3-D view shows of it.
@@ -114,51 +90,16 @@ impl<W: Write + Seek> Recorder<W> {
         body: &[u8],
         log_time_ns: u64,
     ) -> Result<(), WriteError> {
-        self.bytes.clear();
-        self.bytes.extend_from_slice(&CDR_LITTLE_ENDIAN);
-        self.bytes.extend_from_slice(body);
-        let stamps = Stamps::read(body).expect("every message begins with its stamps");
-        self.write(topic.name(), stamps.seq as u32, log_time_ns, stamps.published_ns)?;
-        self.show(topic, body, log_time_ns)
-    }
-
-    /// Lets the scene follow the mechanism.
-    fn show(&mut self, topic: Topic, body: &[u8], log_time_ns: u64) -> Result<(), WriteError> {
-        let shown = match topic {
-            Topic::State => self.scene.state(&bytemuck::pod_read_unaligned(body)),
-            Topic::Truth => self.scene.truth(&bytemuck::pod_read_unaligned(body)),
-            _ => return Ok(()),
-        };
-        let Some(shown) = shown else { return Ok(()) };
-        self.write_foxglove(Scene::TRANSFORMS, &shown.transforms, log_time_ns, shown.time_ns)?;
-        match &shown.entities {
-            Some(entities) => self.write_foxglove(Scene::ENTITIES, entities, log_time_ns, shown.time_ns),
-            None => Ok(()),
-        }
-    }
-
-    fn write_foxglove<E: Encode>(
-        &mut self,
-        topic: &'static str,
-        message: &E,
-        log_time_ns: u64,
-        time_ns: u64,
-    ) -> Result<(), WriteError> {
-        self.bytes.clear();
-        message.encode(&mut self.bytes).map_err(|error| WriteError::Scene(error.to_string()))?;
-        self.write(topic, 0, log_time_ns, time_ns)
-    }
-
-    /// Writes what stands in `self.bytes`.
-    fn write(
-        &mut self,
-        topic: &'static str,
-        sequence: u32,
-        log_time: u64,
-        publish_time: u64,
-    ) -> Result<(), WriteError> {
-        let header = MessageHeader { channel_id: self.channels[topic], sequence, log_time, publish_time };
-        Ok(self.writer.write_to_known_channel(&header, &self.bytes)?)
+        let Self { writer, channels, encoder } = self;
+        encoder.encode(topic, body, |message| {
+            let header = MessageHeader {
+                channel_id: channels[message.topic],
+                sequence: message.sequence,
+                log_time: log_time_ns,
+                publish_time: message.publish_time_ns,
+            };
+            Ok(writer.write_to_known_channel(&header, message.bytes)?)
+        })
     }
 
     /// Ends the chunk and hands everything recorded so far to the medium.

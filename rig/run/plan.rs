@@ -10,6 +10,7 @@ use masseter_shared::geometry::Mechanism;
 use masseter_shared::schedule::CycleSchedule;
 
 use crate::cli::{ClockKind, RunArgs};
+use crate::live;
 
 /// A run that can be made.
 #[derive(Debug)]
@@ -37,6 +38,13 @@ impl Plan {
         scenario.validate()?;
         if args.clock == ClockKind::Virtual && !scenario.can.is_virtual() {
             bail!("virtual time has no real wires: use --can virtual, or --clock rt");
+        }
+        match args.live {
+            Some(_) if args.clock == ClockKind::Virtual => {
+                bail!("virtual time is over before it can be watched: leave out --live, or use --clock rt")
+            }
+            Some(address) => live::check(address)?,
+            None => {}
         }
         let mechanism = Mechanism::new(&scenario.mechanism)?;
         let schedule = CycleSchedule::new(&scenario.can, scenario.period_ns())?;

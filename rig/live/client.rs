@@ -1,0 +1,196 @@
+//! One client: greeted, asked what it wants to see, and sent that, as far as it reads.
+//!
+//! Its socket never blocks. What it does not read in time stays in a buffer of fixed size; when that is
+//! full, messages for this client are dropped and counted.
+
+use std::io::{self, ErrorKind};
+use std::net::TcpStream;
+
+use tungstenite::handshake::server::{ErrorResponse, Request, Response, ServerHandshake};
+use tungstenite::handshake::{HandshakeError, MidHandshake};
+use tungstenite::http::{HeaderValue, StatusCode, header::SEC_WEBSOCKET_PROTOCOL};
+use tungstenite::protocol::frame::{CloseFrame, coding::CloseCode};
+use tungstenite::protocol::{Message, WebSocket, WebSocketConfig};
+use tungstenite::{Error, accept_hdr_with_config};
+
+use super::protocol::{self, Asked, Level, Subscription};
+use crate::recording::Encoded;
+
+/// What may wait for a client that reads slowly, bytes: 0.2 s of every topic at 1 kHz.
+const UNREAD_BYTES: usize = 1 << 20;
+/// Bytes gathered before they go to the system.
+const GATHERED_BYTES: usize = 1 << 16;
+/// The longest message a client may send, bytes; it only subscribes.
+const LONGEST_ASKED: usize = 1 << 16;
+/// Messages of a client that are looked at in one turn, so that none keeps the others waiting.
+const ASKED_IN_A_TURN: usize = 16;
+
+type Greeting = fn(&Request, Response) -> Result<Response, ErrorResponse>;
+type Handshake = MidHandshake<ServerHandshake<TcpStream, Greeting>>;
+
+/// A client.
+pub(super) struct Client {
+    link: Link,
+    /// The client's number for each channel that it sees.
+    subscriptions: Vec<Option<u32>>,
+}
+
+enum Link {
+    /// Still being greeted; taken out while that goes on.
+    Greeted(Option<Handshake>),
+    Open(WebSocket<TcpStream>),
+}
+
+/// A client that is no more.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Gone;
+
+impl Client {
+    /// Takes a new connection in.
+    pub(super) fn welcome(stream: TcpStream, channels: usize, welcome: &[String]) -> Result<Self, Gone> {
+        prepare(&stream).map_err(|_| Gone)?;
+        let config = WebSocketConfig::default()
+            .read_buffer_size(LONGEST_ASKED)
+            .write_buffer_size(GATHERED_BYTES)
+            .max_write_buffer_size(UNREAD_BYTES)
+            .max_message_size(Some(LONGEST_ASKED))
+            .max_frame_size(Some(LONGEST_ASKED));
+        let greeting: Greeting = greet;
+        let mut client = Self { link: Link::Greeted(None), subscriptions: vec![None; channels] };
+        client.greeted(accept_hdr_with_config(stream, greeting, Some(config)), welcome)?;
+        Ok(client)
+    }
+
+    fn greeted(
+        &mut self,
+        result: Result<WebSocket<TcpStream>, HandshakeError<ServerHandshake<TcpStream, Greeting>>>,
+        welcome: &[String],
+    ) -> Result<(), Gone> {
+        match result {
+            Ok(socket) => {
+                self.link = Link::Open(socket);
+                welcome.iter().try_for_each(|text| self.say(text.clone()))
+            }
+            Err(HandshakeError::Interrupted(handshake)) => {
+                self.link = Link::Greeted(Some(handshake));
+                Ok(())
+            }
+            Err(HandshakeError::Failure(_)) => Err(Gone),
+        }
+    }
+
+    /// Whether the client sees a channel.
+    pub(super) fn sees(&self, channel: usize) -> bool {
+        self.subscriptions[channel].is_some()
+    }
+
+    /// Goes on greeting, or hears what the client asks.
+    pub(super) fn hear(&mut self, welcome: &[String]) -> Result<(), Gone> {
+        if let Link::Greeted(handshake) = &mut self.link {
+            let handshake = handshake.take().ok_or(Gone)?;
+            self.greeted(handshake.handshake(), welcome)?;
+        }
+        for _ in 0..ASKED_IN_A_TURN {
+            let Link::Open(socket) = &mut self.link else { break };
+            match socket.read() {
+                Ok(Message::Text(text)) => self.answer(&text)?,
+                Ok(_) => {}
+                Err(error) => return if would_block(&error) { Ok(()) } else { Err(Gone) },
+            }
+        }
+        Ok(())
+    }
+
+    fn answer(&mut self, text: &str) -> Result<(), Gone> {
+        match serde_json::from_str(text) {
+            Ok(Asked::Subscribe { subscriptions }) => {
+                subscriptions.into_iter().try_for_each(|subscription| self.subscribe(subscription))
+            }
+            Ok(Asked::Unsubscribe { subscription_ids }) => {
+                for id in &mut self.subscriptions {
+                    *id = id.filter(|id| !subscription_ids.contains(id));
+                }
+                Ok(())
+            }
+            Ok(Asked::Other) => self.say(protocol::status(Level::Warning, "a run can only be watched")),
+            Err(error) => self.say(protocol::status(Level::Error, &format!("not understood: {error}"))),
+        }
+    }
+
+    fn subscribe(&mut self, subscription: Subscription) -> Result<(), Gone> {
+        let Some(channel) = subscription.channel(self.subscriptions.len()) else {
+            return self.say(protocol::status(Level::Error, "there is no such channel"));
+        };
+        if self.sees(channel) {
+            return self.say(protocol::status(Level::Warning, "this channel is subscribed already"));
+        }
+        self.subscriptions[channel] = Some(subscription.id);
+        Ok(())
+    }
+
+    /// Sends a message if the client sees its channel. False if there was no room for it.
+    pub(super) fn show(&mut self, channel: usize, log_time_ns: u64, message: &Encoded) -> Result<bool, Gone> {
+        match self.subscriptions[channel] {
+            Some(id) => self.send(Message::Binary(protocol::message_data(id, log_time_ns, message).into())),
+            None => Ok(true),
+        }
+    }
+
+    /// Says what a client must not miss: one that has no room for it is given up.
+    fn say(&mut self, text: String) -> Result<(), Gone> {
+        if self.send(Message::Text(text.into()))? { Ok(()) } else { Err(Gone) }
+    }
+
+    fn send(&mut self, message: Message) -> Result<bool, Gone> {
+        let Link::Open(socket) = &mut self.link else { return Ok(true) };
+        match socket.write(message) {
+            Ok(()) => Ok(true),
+            Err(Error::WriteBufferFull(_)) => Ok(false),
+            // It waits in the buffer.
+            Err(error) if would_block(&error) => Ok(true),
+            Err(_) => Err(Gone),
+        }
+    }
+
+    /// Hands what was sent to the system, as far as that takes it.
+    pub(super) fn flush(&mut self) -> Result<(), Gone> {
+        let Link::Open(socket) = &mut self.link else { return Ok(()) };
+        match socket.flush() {
+            Err(error) if !would_block(&error) => Err(Gone),
+            _ => Ok(()),
+        }
+    }
+
+    /// Says goodbye, and waits for nothing.
+    pub(super) fn dismiss(mut self) {
+        if let Link::Open(socket) = &mut self.link {
+            let goodbye = CloseFrame { code: CloseCode::Away, reason: "the run is over".into() };
+            // A client that cannot take it sees the connection end.
+            let _ = socket.close(Some(goodbye));
+            let _ = socket.flush();
+        }
+    }
+}
+
+fn prepare(stream: &TcpStream) -> io::Result<()> {
+    stream.set_nonblocking(true)?;
+    stream.set_nodelay(true)
+}
+
+/// Accepts a client that speaks the protocol, and tells others what is missing.
+#[expect(clippy::result_large_err, reason = "the library's callback returns it by value")]
+fn greet(request: &Request, mut response: Response) -> Result<Response, ErrorResponse> {
+    let mut offered = request.headers().get_all(SEC_WEBSOCKET_PROTOCOL).iter();
+    let chosen = offered.find_map(|offer| protocol::choose(offer.to_str().ok()?));
+    let Some(chosen) = chosen else {
+        let mut refusal = ErrorResponse::new(Some("this is a Foxglove WebSocket server\n".to_owned()));
+        *refusal.status_mut() = StatusCode::BAD_REQUEST;
+        return Err(refusal);
+    };
+    response.headers_mut().insert(SEC_WEBSOCKET_PROTOCOL, HeaderValue::from_static(chosen));
+    Ok(response)
+}
+
+fn would_block(error: &Error) -> bool {
+    matches!(error, Error::Io(error) if error.kind() == ErrorKind::WouldBlock)
+}

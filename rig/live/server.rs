@@ -1,0 +1,121 @@
+//! Serves all clients from one thread: takes what the logger offers, hears what they ask, and sends.
+//!
+//! It looks at its sockets and its queue a hundred times a second and waits for none of them.
+
+use std::convert::Infallible;
+use std::net::TcpListener;
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+use std::sync::mpsc::{Receiver, TryRecvError};
+use std::time::Duration;
+
+use masseter_shared::clock;
+
+use super::client::{Client, Gone};
+use super::{Offer, QUEUE, Shared, bit, protocol};
+use crate::recording::{Definition, Encoded, Encoder, Scene, Topic};
+
+/// How often clients are served.
+const TURN: Duration = Duration::from_millis(10);
+/// How often somebody is looked for while nobody watches.
+const IDLE_TURN: Duration = Duration::from_millis(100);
+/// Most clients at a time: what they leave unread is kept for each.
+const CLIENTS: usize = 8;
+
+/// The serving end.
+pub(super) struct Server {
+    listener: TcpListener,
+    encoder: Encoder,
+    topics: Vec<&'static str>,
+    /// What every client is told first.
+    welcome: [String; 2],
+    clients: Vec<Client>,
+    shared: Arc<Shared>,
+}
+
+impl Server {
+    pub(super) fn new(listener: TcpListener, scene: Scene, session: &str, shared: Arc<Shared>) -> Self {
+        let definitions = Definition::all();
+        Self {
+            listener,
+            encoder: Encoder::new(scene),
+            topics: definitions.iter().map(|definition| definition.topic).collect(),
+            welcome: [protocol::server_info(session), protocol::advertise(&definitions)],
+            clients: Vec::new(),
+            shared,
+        }
+    }
+
+    /// Serves until nobody offers messages any more.
+    pub(super) fn serve(mut self, offers: &Receiver<Offer>) {
+        loop {
+            self.admit();
+            self.keep(Client::hear);
+            self.publish_wants();
+            let is_over = self.show_all(offers);
+            self.keep(|client, _| client.flush());
+            if is_over {
+                return self.clients.drain(..).for_each(Client::dismiss);
+            }
+            clock::sleep(if self.clients.is_empty() { IDLE_TURN } else { TURN });
+        }
+    }
+
+    /// Takes in whoever waits, as long as there is room; others are refused by the end of their connection.
+    fn admit(&mut self) {
+        while let Ok((stream, _)) = self.listener.accept() {
+            if self.clients.len() < CLIENTS {
+                self.clients.extend(Client::welcome(stream, self.topics.len(), &self.welcome));
+            }
+        }
+    }
+
+    /// Does something with each client, and forgets those that are gone.
+    fn keep(&mut self, mut each: impl FnMut(&mut Client, &[String]) -> Result<(), Gone>) {
+        let welcome = &self.welcome;
+        self.clients.retain_mut(|client| each(client, welcome).is_ok());
+    }
+
+    /// Lets the logger know what is worth offering.
+    fn publish_wants(&self) {
+        let is_seen = |topic: &str| self.clients.iter().any(|client| client.sees(place(&self.topics, topic)));
+        let wanted =
+            Topic::ALL.into_iter().filter(|topic| Encoder::channels_of(*topic).into_iter().any(is_seen));
+        self.shared.wanted.store(wanted.fold(0, |bits, topic| bits | bit(topic)), Ordering::Relaxed);
+        self.shared.clients.store(self.clients.len(), Ordering::Relaxed);
+    }
+
+    /// Shows what was offered since the last turn. True when nothing more will come.
+    fn show_all(&mut self, offers: &Receiver<Offer>) -> bool {
+        for _ in 0..QUEUE {
+            match offers.try_recv() {
+                Ok(offer) => self.show(&offer),
+                Err(TryRecvError::Empty) => return false,
+                Err(TryRecvError::Disconnected) => return true,
+            }
+        }
+        false
+    }
+
+    fn show(&mut self, Offer { log_time_ns, message }: &Offer) {
+        let Self { encoder, topics, clients, shared, .. } = self;
+        let to_all = |message: Encoded| -> Result<(), Infallible> {
+            let channel = place(topics, message.topic);
+            clients.retain_mut(|client| match client.show(channel, *log_time_ns, &message) {
+                Ok(true) => true,
+                Ok(false) => {
+                    shared.dropped.fetch_add(1, Ordering::Relaxed);
+                    true
+                }
+                Err(Gone) => false,
+            });
+            Ok(())
+        };
+        let Ok(()) = encoder.encode(message.topic(), message.body(), to_all);
+    }
+}
+
+/// Place of a channel among those that were advertised.
+fn place(topics: &[&str], topic: &str) -> usize {
+    topics.iter().position(|known| *known == topic).expect("every topic is advertised")
+}

@@ -1,0 +1,198 @@
+//! Runs that are watched while they go on: what watchers see, and that the recording does not care.
+
+mod common;
+
+use std::collections::{BTreeMap, HashSet};
+use std::io::{BufRead, BufReader, Read, Write};
+use std::net::{TcpListener, TcpStream};
+use std::process::{Child, ChildStderr, ExitStatus};
+use std::thread;
+
+use common::{Bench, UNHURRIED, masseter, start, stderr, stdout};
+use masseter::recording::Reader;
+use serde_json::{Value, json};
+use tungstenite::client::IntoClientRequest;
+use tungstenite::http::HeaderValue;
+use tungstenite::{Message, WebSocket};
+
+/// Opcode, subscription and time, before the message itself.
+const MESSAGE_HEAD: usize = 13;
+
+/// A run that is shown on a free port.
+struct Shown {
+    run: Child,
+    errors: BufReader<ChildStderr>,
+    address: String,
+}
+
+impl Shown {
+    fn start(bench: &Bench) -> Self {
+        let mut run = start(bench, &["--live=127.0.0.1:0"]);
+        let mut errors = BufReader::new(run.stderr.take().unwrap());
+        let mut line = String::new();
+        while !line.starts_with("live on ") {
+            line.clear();
+            assert!(errors.read_line(&mut line).unwrap() > 0, "the run ended before it was shown");
+        }
+        let url = line.split_whitespace().nth(2).unwrap();
+        Self { address: url.trim_start_matches("ws://").to_owned(), run, errors }
+    }
+
+    /// Waits for the end of the run; returns how it ended, and what it said.
+    fn finish(mut self) -> (ExitStatus, String) {
+        let errors = thread::spawn(move || {
+            let mut said = String::new();
+            self.errors.read_to_string(&mut said).unwrap();
+            said
+        });
+        let output = self.run.wait_with_output().unwrap();
+        (output.status, stdout(&output) + &errors.join().unwrap())
+    }
+}
+
+/// A client that has heard which channels there are.
+struct Watcher {
+    socket: WebSocket<TcpStream>,
+    info: Value,
+    channels: Vec<Value>,
+}
+
+impl Watcher {
+    fn connect(address: &str, protocol: &'static str) -> Self {
+        let mut request = format!("ws://{address}").into_client_request().unwrap();
+        request.headers_mut().insert("Sec-WebSocket-Protocol", HeaderValue::from_static(protocol));
+        let stream = TcpStream::connect(address).unwrap();
+        let (mut socket, _) = tungstenite::client(request, stream).unwrap();
+        let info = text(&mut socket);
+        let mut advertised = text(&mut socket);
+        assert_eq!(advertised["op"], "advertise");
+        let Value::Array(channels) = advertised["channels"].take() else { panic!("{advertised}") };
+        Self { socket, info, channels }
+    }
+
+    /// Subscribes to every channel; its subscription is the channel's id and a hundred.
+    fn subscribe_to_all(&mut self) {
+        let ids = self.channels.iter().map(|channel| channel["id"].as_u64().unwrap());
+        let wanted: Vec<_> = ids.map(|id| json!({"id": id + 100, "channelId": id})).collect();
+        let ask = json!({"op": "subscribe", "subscriptions": wanted});
+        self.socket.send(Message::Text(ask.to_string().into())).unwrap();
+    }
+
+    /// Every message of every topic, until the server says goodbye.
+    fn watch(mut self) -> BTreeMap<String, Vec<Vec<u8>>> {
+        let mut seen: BTreeMap<String, Vec<Vec<u8>>> = BTreeMap::new();
+        loop {
+            match self.socket.read() {
+                Ok(Message::Binary(data)) => {
+                    assert_eq!(data[0], 1);
+                    let id = u32::from_le_bytes(data[1..5].try_into().unwrap()) - 100;
+                    let topic = self.channels[id as usize]["topic"].as_str().unwrap();
+                    seen.entry(topic.to_owned()).or_default().push(data[MESSAGE_HEAD..].to_vec());
+                }
+                Ok(Message::Close(_)) => return seen,
+                other => panic!("{other:?}"),
+            }
+        }
+    }
+}
+
+fn text(socket: &mut WebSocket<TcpStream>) -> Value {
+    serde_json::from_str(socket.read().unwrap().to_text().unwrap()).unwrap()
+}
+
+/// Every message on every topic of a bench's recording.
+fn recorded(bench: &Bench) -> BTreeMap<String, HashSet<Vec<u8>>> {
+    let mut reader = Reader::open(&bench.run_folder().join("recording.mcap")).unwrap();
+    let mut recorded: BTreeMap<String, HashSet<Vec<u8>>> = BTreeMap::new();
+    while let Some(entry) = reader.next_entry().unwrap() {
+        let topic = entry.channel.unwrap().topic.clone();
+        recorded.entry(topic).or_default().insert(entry.data.to_vec());
+    }
+    recorded
+}
+
+/// Whether the run passed, or the machine was too disturbed to judge.
+fn passed(status: ExitStatus) -> bool {
+    matches!(status.code(), Some(0 | 3))
+}
+
+#[test]
+fn a_watcher_sees_the_channels_and_messages_of_the_recording() {
+    let bench = Bench::new(&format!("duration_s = 3.0\n{UNHURRIED}"));
+    let shown = Shown::start(&bench);
+    let mut watcher = Watcher::connect(&shown.address, "foxglove.sdk.v1, foxglove.websocket.v1");
+    assert_eq!(watcher.info["op"], "serverInfo");
+    assert_eq!(watcher.info["capabilities"], json!([]));
+    watcher.subscribe_to_all();
+    let seen = watcher.watch();
+    let (status, said) = shown.finish();
+    assert!(passed(status), "{said}");
+
+    let recorded = recorded(&bench);
+    for topic in ["command", "reading", "state", "truth", "frame"] {
+        let seen = &seen[topic];
+        assert!(seen.len() > 1000, "{} messages on {topic}", seen.len());
+        assert!(seen.iter().all(|message| recorded[topic].contains(message)), "{topic}");
+    }
+    assert!(seen["/tf"].len() > 100 && seen["/scene"].len() > 50);
+}
+
+#[test]
+fn a_watcher_that_does_not_read_is_counted_and_the_recording_is_complete() {
+    let bench = Bench::new(&format!("duration_s = 6.0\n{UNHURRIED}"));
+    let shown = Shown::start(&bench);
+    let mut watcher = Watcher::connect(&shown.address, "foxglove.websocket.v1");
+    watcher.subscribe_to_all();
+    let (status, said) = shown.finish();
+    assert!(passed(status), "{said}");
+    assert!(said.contains("messages were not shown live"), "{said}");
+    let proof = masseter(&["log", "verify", bench.run_folder().to_str().unwrap()]);
+    assert_eq!(proof.status.code(), Some(0), "{}", stdout(&proof));
+}
+
+#[test]
+fn strangers_and_deserters_disturb_neither_the_recording_nor_other_watchers() {
+    let bench = Bench::new(&format!("duration_s = 3.0\n{UNHURRIED}"));
+    let shown = Shown::start(&bench);
+    let _silent = TcpStream::connect(&shown.address).unwrap();
+    let mut browser = TcpStream::connect(&shown.address).unwrap();
+    browser.write_all(b"GET / HTTP/1.1\r\nHost: here\r\n\r\n").unwrap();
+    let mut deserter = Watcher::connect(&shown.address, "foxglove.sdk.v1");
+    deserter.subscribe_to_all();
+    deserter.socket.read().unwrap();
+    // What it has not read makes the kernel reset the connection, as the death of its process would.
+    drop(deserter);
+    let mut chatter = Watcher::connect(&shown.address, "foxglove.sdk.v1");
+    for words in [
+        "chat",
+        r#"{"op": "getParameters"}"#,
+        r#"{"op": "subscribe", "subscriptions": [{"id": 1, "channelId": 99}]}"#,
+    ] {
+        chatter.socket.send(Message::Text(words.into())).unwrap();
+        assert_eq!(text(&mut chatter.socket)["op"], "status", "{words}");
+    }
+    chatter.subscribe_to_all();
+    assert!(chatter.watch()["state"].len() > 500);
+    let (status, said) = shown.finish();
+    assert!(passed(status), "{said}");
+    let proof = masseter(&["log", "verify", bench.run_folder().to_str().unwrap()]);
+    assert_eq!(proof.status.code(), Some(0), "{}", stdout(&proof));
+}
+
+#[test]
+fn what_cannot_be_shown_is_refused_before_anything_is_made() {
+    let taken = TcpListener::bind("127.0.0.1:0").unwrap();
+    let port = format!("--live={}", taken.local_addr().unwrap());
+    let cases: [(&[&str], &str); 3] = [
+        (&[&port], "choose another address with --live=ADDR:PORT"),
+        (&["--live", "--clock", "virtual"], "virtual time is over before it can be watched"),
+        (&["--live=somewhere"], "invalid socket address"),
+    ];
+    for (arguments, words) in cases {
+        let bench = Bench::new("");
+        let output = bench.run(arguments);
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {}", stderr(&output));
+        assert!(stderr(&output).contains(words), "{arguments:?}: {}", stderr(&output));
+        assert!(!bench.run_folder().exists());
+    }
+}
