@@ -6,9 +6,7 @@ use divan::{Bencher, black_box};
 use masseter_plant::core::PlantCore;
 use masseter_shared::can::canopen::{NodeId, sync};
 use masseter_shared::can::cia402::{Controlword, Statusword};
-use masseter_shared::can::pdo::{Rpdo1, Tpdo1};
-use masseter_shared::can::wire::{Bitrate, Rates};
-use masseter_shared::can::{Bus, FrameFormat, VirtualWire, WireConfig};
+use masseter_shared::can::{Bitrate, Bus, FrameFormat, Rates, Rpdo1, Tpdo1, VirtualWire, WireConfig};
 use masseter_shared::config::Scenario;
 use masseter_shared::messages::codes::DriveRequest;
 use masseter_shared::messages::{Command, Reading};
@@ -108,8 +106,12 @@ fn plant(bencher: Bencher<'_, '_>) {
         let request = DriveRequest::Enable.code();
         let command = Command { cycle, target_m: reading.position_m, request, ..Command::default() };
         plant.apply(sync_ns + 545_000, Some(&command)).expect("dynamics");
-        plant.drain_frames(&mut |frame| drop(black_box(frame)));
-        plant.drain_events(&mut |event| drop(black_box(event)));
+        plant.drain_frames(&mut |frame| {
+            black_box(frame);
+        });
+        plant.drain_events(&mut |event| {
+            black_box(event);
+        });
     };
     (1..=BOOT_CYCLES).for_each(&mut run);
     each_cycle(bencher, |cycle| run(BOOT_CYCLES + 1 + cycle));

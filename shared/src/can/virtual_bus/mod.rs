@@ -231,21 +231,24 @@ impl VirtualWire {
         let sequence_ns = self.config.rates.nominal().bits_to_ns(SEQUENCE_BITS);
         loop {
             self.foresee();
-            let next = match self.traffic {
+            let idle_until_ns = match &self.traffic {
                 Traffic::Now(_) => return true,
-                Traffic::Next(attempt) => Some(attempt).filter(|attempt| attempt.start_ns < until_ns),
-                Traffic::Nothing | Traffic::Unforeseen => None,
+                Traffic::Next(attempt) => attempt.start_ns.min(until_ns),
+                Traffic::Nothing | Traffic::Unforeseen => until_ns,
             };
-            let idle_until_ns = next.map_or(until_ns, |attempt| attempt.start_ns);
             let change = self.next_node_change(sequence_ns).filter(|change| change.at_ns <= idle_until_ns);
             if let Some(change) = change {
                 self.apply(change);
                 continue;
             }
             self.stay_idle_until(idle_until_ns, sequence_ns);
-            let Some(attempt) = next else { return false };
-            self.attempts += 1;
-            self.traffic = Traffic::Now(attempt);
+            match self.traffic {
+                Traffic::Next(attempt) if attempt.start_ns < until_ns => {
+                    self.attempts += 1;
+                    self.traffic = Traffic::Now(attempt);
+                }
+                _ => return false,
+            }
         }
     }
 
@@ -265,13 +268,14 @@ impl VirtualWire {
 
     /// Ends the frame on the wire if its end is not after `until_ns`; whether it did.
     fn end_until(&mut self, until_ns: u64) -> bool {
-        let Traffic::Now(attempt) = self.traffic else { return false };
-        let has_ended = attempt.end_ns <= until_ns;
-        if has_ended {
-            self.traffic = Traffic::Unforeseen;
-            self.end(&attempt);
+        match self.traffic {
+            Traffic::Now(attempt) if attempt.end_ns <= until_ns => {
+                self.traffic = Traffic::Unforeseen;
+                self.end(&attempt);
+                true
+            }
+            _ => false,
         }
-        has_ended
     }
 
     fn stay_idle_until(&mut self, until_ns: u64, sequence_ns: u64) {
