@@ -203,7 +203,8 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(1000))]
 
-        /// What is not followed has a negative determinant, but for rounding.
+        /// What is not followed has a negative determinant, but for rounding. Of those that have one, some are
+        /// followed none the less: where two solutions lie in one interval.
         #[test]
         fn no_solution_with_a_positive_determinant_is_passed_over(
             mechanism in mechanisms(),
@@ -219,7 +220,7 @@ mod tests {
             for closed in solved(Wanted::All) {
                 let determinant = closure.determinant(&closed.closing);
                 let is_followed = followed.contains(&closed);
-                prop_assert!(is_followed == (determinant > 0.0) || determinant.abs() < 1e-3, "{determinant}");
+                prop_assert!(is_followed || determinant < 1e-3, "{determinant}");
             }
         }
     }
