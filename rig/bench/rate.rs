@@ -27,7 +27,11 @@ const MOTION_S: f64 = 2.0;
 /// Silence after which the rig stops, ms, whatever the rate: as long as in a run at 1 kHz.
 const PATIENCE_MS: u32 = 20;
 /// The intervals that are compared, as their logs are named.
-const INTERVALS: [(&str, &str); 2] = [("controller cycle", "controller-cycle"), ("round trip", "round-trip")];
+const INTERVALS: [(&str, &str); 3] = [
+    ("wake-up", "controller-wake-up"),
+    ("controller cycle", "controller-cycle"),
+    ("round trip", "round-trip"),
+];
 
 /// What a turn gave.
 struct Turn {
@@ -47,7 +51,7 @@ pub(super) fn measure(rounds: u32, cores: [usize; 2]) -> anyhow::Result<Outcome>
     let mut outcome = Outcome {
         bench: "rate",
         measures:
-            "the whole rig without bus delays: controller cycle (reading received to command published), \
+            "the whole rig without bus delays: wake-up of the controller after its deadline, controller cycle (reading received to command published), \
                    round trip (SYNC to reading published, reading received to command received)"
                 .to_owned(),
         contenders: Vec::new(),

@@ -1,13 +1,8 @@
 //! Waiting for an instant or for a message, and noticing when the machine stood still meanwhile.
 
+use super::reserve::Reserve;
 use crate::clock;
 
-/// The last stretch before a deadline is spun, not slept: a sleeping core takes tens of
-/// microseconds to come back, a spinning one a tenth of one.
-const SPIN_NS: u64 = 200_000;
-/// The spin takes at most this share of a period, so that real-time throttling never strikes and the
-/// rest of the machine lives.
-const SPIN_SHARE: u64 = 4;
 /// A spinning task reads the clock every fraction of a microsecond, and a cycle's work is done in tens of
 /// them. A gap longer than this was spent elsewhere: interrupts, the hypervisor, a task of higher
 /// priority; or, while working, in the work itself, which [`Account`] therefore keeps apart.
@@ -31,8 +26,12 @@ pub struct Account {
 /// How a real-time task waits, and the account of its time: whatever is not waiting counts as work.
 #[derive(Debug)]
 pub struct Waiter {
-    spin_ns: u64,
+    /// The last stretch before a deadline is spun, not slept: a sleeping core takes tens of microseconds to
+    /// come back, a spinning one a tenth of one.
+    reserve: Reserve,
     account: Account,
+    /// End of the last sleep.
+    awake_since_ns: Option<u64>,
     /// Since when the task has not been waiting; none before its first wait.
     working_since_ns: Option<u64>,
 }
@@ -41,8 +40,9 @@ impl Waiter {
     /// For a task of this period.
     pub fn new(period_ns: u64) -> Self {
         Self {
-            spin_ns: SPIN_NS.min(period_ns / SPIN_SHARE),
+            reserve: Reserve::new(period_ns),
             account: Account::default(),
+            awake_since_ns: None,
             working_since_ns: None,
         }
     }
@@ -54,13 +54,10 @@ impl Waiter {
 
     /// Sleeps, then spins until `due_ns`; returns the time found at the end.
     pub fn until(&mut self, due_ns: u64) -> u64 {
-        let sleep_until_ns = due_ns.saturating_sub(self.spin_ns);
-        if self.begin() < sleep_until_ns {
-            clock::sleep_until(sleep_until_ns);
-            let woke_ns = clock::now_ns();
-            // Within the spin's reserve a late return costs nothing.
-            self.account.stalled_ns += woke_ns.saturating_sub(sleep_until_ns).saturating_sub(self.spin_ns);
-            self.working_since_ns = None;
+        let sleep_until_ns = due_ns.saturating_sub(self.reserve.ns());
+        let now_ns = self.begin();
+        if now_ns < sleep_until_ns {
+            self.sleep(now_ns, sleep_until_ns);
         }
         let mut spin = self.spin();
         loop {
@@ -69,6 +66,18 @@ impl Waiter {
                 return now_ns;
             }
         }
+    }
+
+    fn sleep(&mut self, from_ns: u64, until_ns: u64) {
+        clock::sleep_until(until_ns);
+        let woke_ns = clock::now_ns();
+        let late_ns = woke_ns.saturating_sub(until_ns);
+        // Within the reserve a late return costs nothing.
+        self.account.stalled_ns += late_ns.saturating_sub(self.reserve.ns());
+        if let Some(awake_since_ns) = self.awake_since_ns.replace(woke_ns) {
+            self.reserve.learn(from_ns - awake_since_ns, woke_ns - from_ns, late_ns);
+        }
+        self.working_since_ns = None;
     }
 
     /// Begins to spin.

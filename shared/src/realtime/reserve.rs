@@ -1,0 +1,119 @@
+//! How long before a deadline a task stops sleeping and spins: as long as sleeps have lately come back late, as
+//! long as that leaves the core time for others.
+//!
+//! Pure: it is told what sleeps did, and reads no clock.
+
+/// More than this helps nothing: sleeps that come back later are rare, and the machine's stalls are longer, ns.
+const MOST_NS: u64 = 200_000;
+/// The least, ns: what entering and leaving the kernel takes on a busy core.
+const LEAST_NS: u64 = 5_000;
+/// The reserve takes at most this part of a period.
+const MOST_OF_PERIOD: u64 = 2;
+/// The reserve aims at this many times the latest lateness, and at the least on top.
+const TIMES_LATE: u64 = 2;
+/// Sleeps until two thirds of a reserve that was not needed are forgotten, as a power of two: one that is needed
+/// once in a thousand cycles stays.
+const FORGETTING: u32 = 12;
+/// Share of the time that a task may be awake. Well below the 95 % at which the kernel throttles real-time tasks.
+const MOST_AWAKE: f64 = 0.85;
+/// Sleeps over which the share is averaged.
+const AWAKE_MEMORY: f64 = 64.0;
+
+/// The stretch before a deadline that is spun, and what it is learned from.
+#[derive(Debug)]
+pub(super) struct Reserve {
+    most_ns: u64,
+    reserve_ns: u64,
+    awake: f64,
+}
+
+impl Reserve {
+    /// For a task of this period: as much as is allowed, until sleeps have shown what is needed.
+    pub(super) fn new(period_ns: u64) -> Self {
+        let most_ns = MOST_NS.min(period_ns / MOST_OF_PERIOD);
+        Self { most_ns, reserve_ns: most_ns, awake: 0.0 }
+    }
+
+    /// The reserve, ns.
+    pub(super) fn ns(&self) -> u64 {
+        self.reserve_ns
+    }
+
+    /// A sleep of `slept_ns` came back `late_ns` after its end; before it the task had been awake for `awake_ns`.
+    pub(super) fn learn(&mut self, awake_ns: u64, slept_ns: u64, late_ns: u64) {
+        let share = awake_ns as f64 / (awake_ns + slept_ns).max(1) as f64;
+        self.awake += (share - self.awake) / AWAKE_MEMORY;
+        let needed_ns = TIMES_LATE * late_ns + LEAST_NS;
+        let wanted_ns = match self.reserve_ns.checked_sub(needed_ns) {
+            _ if self.awake > MOST_AWAKE => self.reserve_ns - self.reserve_ns / 16,
+            Some(spare_ns) => self.reserve_ns - (spare_ns >> FORGETTING),
+            None => needed_ns,
+        };
+        self.reserve_ns = wanted_ns.clamp(LEAST_NS, self.most_ns);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    const PERIOD: u64 = 1_000_000;
+
+    /// A task at rest most of the time, whose sleeps come back so late.
+    fn after(sleeps: impl IntoIterator<Item = u64>) -> u64 {
+        let mut reserve = Reserve::new(PERIOD);
+        sleeps.into_iter().for_each(|late_ns| reserve.learn(PERIOD / 4, PERIOD * 3 / 4, late_ns));
+        reserve.ns()
+    }
+
+    #[test]
+    fn before_anything_is_known_it_is_as_long_as_allowed() {
+        assert_eq!(Reserve::new(PERIOD).ns(), MOST_NS);
+        assert_eq!(Reserve::new(50_000).ns(), 25_000);
+    }
+
+    #[test]
+    fn a_punctual_machine_is_not_spun_on_for_long() {
+        assert!((25_000..35_000).contains(&after([10_000; 40_000])), "{}", after([10_000; 40_000]));
+    }
+
+    #[test]
+    fn one_late_sleep_is_remembered_for_thousands_of_cycles() {
+        let late = |after_it: usize| {
+            after(
+                [10_000; 40_000]
+                    .into_iter()
+                    .chain([80_000])
+                    .chain([10_000; 10_000].into_iter().take(after_it)),
+            )
+        };
+        assert_eq!(late(0), 165_000);
+        assert!(late(1000) > 130_000, "{}", late(1000));
+        assert!(late(10_000) < 60_000, "{}", late(10_000));
+    }
+
+    #[test]
+    fn a_task_that_is_nearly_always_awake_gives_its_reserve_up() {
+        let mut reserve = Reserve::new(50_000);
+        for _ in 0..1000 {
+            reserve.learn(46_000, 4_000, 20_000);
+        }
+        assert_eq!(reserve.ns(), LEAST_NS);
+    }
+
+    proptest! {
+        #[test]
+        fn it_keeps_its_bounds_whatever_sleeps_do(
+            period_ns in 50_000_u64..100_000_000,
+            sleeps in prop::collection::vec((0_u64..1_000_000_000, 0_u64..1_000_000_000, 0_u64..1_000_000_000), 0..200),
+        ) {
+            let mut reserve = Reserve::new(period_ns);
+            for (awake_ns, slept_ns, late_ns) in sleeps {
+                reserve.learn(awake_ns, slept_ns, late_ns);
+                prop_assert!((LEAST_NS..=MOST_NS.min(period_ns / 2)).contains(&reserve.ns()));
+            }
+        }
+    }
+}
