@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::analysis::Figures;
 use crate::exit::Exit;
 use crate::run::manifest::Manifest;
+use crate::run::usage::RunUsage;
 
 /// How a run came to its end.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -83,13 +84,34 @@ impl Verdict {
     /// Judges a run.
     pub fn of(manifest: &Manifest, figures: &Figures) -> Self {
         let checks = checks(manifest, figures);
-        let (exit, word, reason) = ending(&manifest.ending)
+        let (exit, word, mut reason) = ending(&manifest.ending)
             .or_else(|| incomplete(figures))
             .or_else(|| disturbed(manifest, figures))
             .or_else(|| failed(&checks))
             .unwrap_or_else(|| (Exit::Passed, "PASS", "every check passed".to_owned()));
+        if exit != Exit::Passed {
+            reason += &overload(&manifest.usage, manifest.scenario.rate_hz).unwrap_or_default();
+        }
         Self { word, reason, exit, checks }
     }
+}
+
+/// Share of its core above which a real-time process is too busy: the kernel throttles at 95 %, by default.
+const TOO_BUSY: f64 = 0.9;
+
+/// What to do about a real-time process that hardly ever slept.
+fn overload(usage: &RunUsage, rate_hz: u32) -> Option<String> {
+    let busy = |name: &'static str| {
+        let usage = usage.processes.get(name)?;
+        let share = usage.cpu_s / usage.observed_s;
+        (share > TOO_BUSY).then_some((name, share))
+    };
+    let (name, share) = ["controller", "plant"].into_iter().find_map(busy)?;
+    Some(format!(
+        "; the {name} kept its core busy for {:.0} % of the time, and the kernel throttles real-time tasks at 95 %: \
+         use a rate_hz below {rate_hz}",
+        share * 100.0
+    ))
 }
 
 type Judgement = (Exit, &'static str, String);
@@ -196,4 +218,21 @@ fn checks(manifest: &Manifest, figures: &Figures) -> Vec<Check> {
             result: CheckResult::of(missing == 0),
         },
     ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::run::usage::Usage;
+
+    #[test]
+    fn a_process_that_hardly_sleeps_is_named_with_what_to_do() {
+        let usage = |cpu_s| {
+            let plant = Usage { observed_s: 2.0, cpu_s, ..Usage::default() };
+            RunUsage { processes: [("plant".to_owned(), plant)].into(), ..RunUsage::default() }
+        };
+        assert_eq!(overload(&usage(1.0), 20_000), None);
+        let said = overload(&usage(1.9), 20_000).unwrap();
+        assert!(said.contains("plant kept its core busy for 95 %") && said.contains("below 20000"), "{said}");
+    }
 }

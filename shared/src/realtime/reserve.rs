@@ -23,7 +23,7 @@ const AWAKE_MEMORY: f64 = 64.0;
 #[derive(Debug)]
 pub(super) struct Reserve {
     most_ns: u64,
-    reserve_ns: u64,
+    current_ns: u64,
     awake: f64,
 }
 
@@ -31,12 +31,12 @@ impl Reserve {
     /// For a task of this period: as much as is allowed, until sleeps have shown what is needed.
     pub(super) fn new(period_ns: u64) -> Self {
         let most_ns = MOST_NS.min(period_ns / MOST_OF_PERIOD);
-        Self { most_ns, reserve_ns: most_ns, awake: 0.0 }
+        Self { most_ns, current_ns: most_ns, awake: 0.0 }
     }
 
     /// The reserve, ns.
     pub(super) fn ns(&self) -> u64 {
-        self.reserve_ns
+        self.current_ns
     }
 
     /// A sleep of `slept_ns` came back `late_ns` after its end; before it the task had been awake for `awake_ns`.
@@ -44,12 +44,12 @@ impl Reserve {
         let share = awake_ns as f64 / (awake_ns + slept_ns).max(1) as f64;
         self.awake += (share - self.awake) / AWAKE_MEMORY;
         let needed_ns = TIMES_LATE * late_ns + LEAST_NS;
-        let wanted_ns = match self.reserve_ns.checked_sub(needed_ns) {
-            _ if self.awake > MOST_AWAKE => self.reserve_ns - self.reserve_ns / 16,
-            Some(spare_ns) => self.reserve_ns - (spare_ns >> FORGETTING),
+        let wanted_ns = match self.current_ns.checked_sub(needed_ns) {
+            _ if self.awake > MOST_AWAKE => self.current_ns - self.current_ns / 16,
+            Some(spare_ns) => self.current_ns - (spare_ns >> FORGETTING),
             None => needed_ns,
         };
-        self.reserve_ns = wanted_ns.clamp(LEAST_NS, self.most_ns);
+        self.current_ns = wanted_ns.clamp(LEAST_NS, self.most_ns);
     }
 }
 
