@@ -55,6 +55,8 @@ impl Reserve {
 
 #[cfg(test)]
 mod tests {
+    use std::iter::repeat_n;
+
     use proptest::prelude::*;
 
     use super::*;
@@ -76,18 +78,17 @@ mod tests {
 
     #[test]
     fn a_punctual_machine_is_not_spun_on_for_long() {
-        assert!((25_000..35_000).contains(&after([10_000; 40_000])), "{}", after([10_000; 40_000]));
+        assert!(
+            (25_000..35_000).contains(&after(repeat_n(10_000, 40_000))),
+            "{}",
+            after(repeat_n(10_000, 40_000))
+        );
     }
 
     #[test]
     fn one_late_sleep_is_remembered_for_thousands_of_cycles() {
         let late = |after_it: usize| {
-            after(
-                [10_000; 40_000]
-                    .into_iter()
-                    .chain([80_000])
-                    .chain([10_000; 10_000].into_iter().take(after_it)),
-            )
+            after(repeat_n(10_000, 40_000).chain([80_000]).chain(repeat_n(10_000, after_it)))
         };
         assert_eq!(late(0), 165_000);
         assert!(late(1000) > 130_000, "{}", late(1000));
