@@ -5,7 +5,7 @@ use std::fmt::Write;
 use super::junit::escape;
 use super::plot::Drawn;
 use super::table::{self, in_words};
-use super::{charts, events, film};
+use super::{charts, events, film, usage};
 use crate::analysis::Figures;
 use crate::report::verdict::{CheckResult, Verdict};
 use crate::run::manifest::Manifest;
@@ -213,5 +213,5 @@ fn circumstances(page: &mut String, manifest: &Manifest) -> std::fmt::Result {
             writeln!(page, "<p>{name}: {}</p>", escape(refusal))?;
         }
     }
-    Ok(())
+    usage::table(page, &manifest.usage)
 }

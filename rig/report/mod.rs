@@ -10,6 +10,7 @@ mod html;
 mod junit;
 mod plot;
 mod table;
+mod usage;
 pub mod verdict;
 
 use std::fs;

@@ -2,6 +2,7 @@
 
 use std::fmt::Write;
 
+use super::usage;
 use crate::analysis::{EventRecord, Figures, IntervalFigures};
 use crate::report::verdict::{CheckResult, Verdict};
 use crate::run::manifest::Manifest;
@@ -63,6 +64,7 @@ fn write_all(
         figures.controller_skips.stalled_ns as f64 / 1e6,
         figures.plant_skips.stalled_ns as f64 / 1e6
     )?;
+    usage::line(text, &manifest.usage)?;
     losses(text, figures)?;
     events(text, figures)
 }

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::analysis::Figures;
+use crate::analysis::{Figures, Suspicion};
 use crate::exit::Exit;
 use crate::run::manifest::Manifest;
 use crate::run::usage::RunUsage;
@@ -94,6 +94,18 @@ impl Verdict {
         }
         Self { word, reason, exit, checks }
     }
+}
+
+/// What stretches of work that cost deadlines were held against.
+fn weighed(suspicion: Suspicion) -> String {
+    format!(
+        "; {} stretches of work against {} stalls as long while waiting, {:.1} % of the time at work: chance does so \
+         with probability {:.2}",
+        suspicion.while_working,
+        suspicion.while_waiting,
+        suspicion.work_share * 100.0,
+        suspicion.chance
+    )
 }
 
 /// Share of its core above which a real-time process is too busy: the kernel throttles at 95 %, by default.
@@ -209,7 +221,11 @@ fn checks(manifest: &Manifest, figures: &Figures) -> Vec<Check> {
         },
         Check {
             name: "missed cycles",
-            finding: format!("{skipped} ({by_machine} by the machine), limit {}", limits.missed_cycles),
+            finding: format!(
+                "{skipped} ({by_machine} by the machine{}), limit {}",
+                figures.suspicion.map(weighed).unwrap_or_default(),
+                limits.missed_cycles
+            ),
             result: missed_cycles(manifest, figures),
         },
         Check {
