@@ -33,7 +33,7 @@ impl Link for SocketLink {
     }
 
     fn tap(&mut self, bus: usize, now_ns: u64) -> Result<Option<Tapped>, ReceiveError> {
-        Ok(self.taps[bus].receive(now_ns)?.map(Tapped::Frame))
+        Ok(self.taps[bus].receive(now_ns)?.map(|received| Tapped::Frame(received.into())))
     }
 
     fn truth(&self) -> Option<Truth> {

@@ -11,6 +11,7 @@ mod join;
 mod ledger;
 mod noise;
 mod over_time;
+mod response;
 mod sequence;
 mod series;
 mod skips;
@@ -35,6 +36,8 @@ use ledger::Ledger;
 pub use ledger::WorstCycle;
 use over_time::Watch;
 pub use over_time::{Curve, OverTime};
+use response::Responses;
+pub use response::{BusResponse, ResponseFigures};
 pub(crate) use sequence::SequenceCheck;
 pub use sequence::TopicFigures;
 pub use skips::SkipFigures;
@@ -86,6 +89,8 @@ pub struct Figures {
     pub topics: Vec<TopicFigures>,
     /// Frames on each bus.
     pub frames: Vec<u64>,
+    /// Response times of the buses' messages, beside their bounds.
+    pub bus_response: BusResponse,
     /// What happened, in order.
     pub events: Vec<EventRecord>,
     /// Whether the recording ends in the middle of a record.
@@ -137,6 +142,7 @@ struct Pass {
     candump: CandumpLogs,
     events: EventLog,
     watch: Watch,
+    responses: Responses,
     cycles: u64,
     first_sample_ns: Option<u64>,
     last_sample_ns: u64,
@@ -157,6 +163,7 @@ impl Pass {
             candump: CandumpLogs::new(folder.path(), &scenario.can.interfaces),
             events: EventLog::create(folder.events())?,
             watch: Watch::on(scenario.can.rates().ok()),
+            responses: Responses::on(&scenario.can, scenario.period_ns()),
             cycles: 0,
             first_sample_ns: None,
             last_sample_ns: 0,
@@ -210,6 +217,7 @@ impl Pass {
 
     fn frame(&mut self, frame: &FrameTap) -> Result<(), AnalysisError> {
         self.watch.frame(frame);
+        self.responses.frame(frame)?;
         self.candump.write(frame)
     }
 
@@ -233,6 +241,7 @@ impl Pass {
             intervals,
             topics: self.sequence.finish(),
             frames: self.candump.finish()?,
+            bus_response: self.responses.finish(),
             events: self.events.finish()?,
             cut_short: reader.was_cut_short(),
             damage: reader.damage().to_vec(),

@@ -6,7 +6,7 @@ use super::junit::escape;
 use super::plot::Drawn;
 use super::table::{self, in_words};
 use super::{charts, events, film, usage};
-use crate::analysis::Figures;
+use crate::analysis::{BusResponse, Figures};
 use crate::report::verdict::{CheckResult, Verdict};
 use crate::run::manifest::Manifest;
 
@@ -49,12 +49,9 @@ fn write_page(
 fn checks(page: &mut String, verdict: &Verdict) -> std::fmt::Result {
     page.push_str("<h2>Checks</h2>\n<table id=\"checks\">\n");
     for check in &verdict.checks {
-        let (class, mark) = match check.result {
-            CheckResult::Passed => ("", "ok"),
-            CheckResult::Failed => ("failed", "FAILED"),
-            CheckResult::NotJudged => ("", "not judged"),
-        };
-        writeln!(page, "<tr><td>{}<td class=\"{class}\">{mark}<td>{}", check.name, escape(&check.finding))?;
+        let class = if check.result == CheckResult::Failed { "failed" } else { "" };
+        let finding = escape(&check.finding);
+        writeln!(page, "<tr><td>{}<td class=\"{class}\">{}<td>{finding}", check.name, check.result.mark())?;
     }
     page.push_str("</table>\n");
     Ok(())
@@ -175,7 +172,31 @@ fn messages(page: &mut String, figures: &Figures) -> std::fmt::Result {
         writeln!(page, "<tr><td>{}<td>{}<td>{}", topic.topic, topic.messages, topic.missing)?;
     }
     page.push_str("</table>\n");
-    plot(page, "buses", charts::bus_load(figures), "No frame was recorded.")
+    plot(page, "buses", charts::bus_load(figures), "No frame was recorded.")?;
+    responses(page, &figures.bus_response)
+}
+
+/// Measured response times beside the bounds of the plan.
+fn responses(page: &mut String, response: &BusResponse) -> std::fmt::Result {
+    page.push_str(
+        "<p>From being queued to the end of the frame, beside the worst case of the plan, µs.</p>\n\
+         <table id=\"responses\">\n<tr><th>bus<th>message<th>n<th>max<th>bound\n",
+    );
+    for message in &response.messages {
+        let us = |ns: Option<u64>| ns.map_or_else(|| "–".to_owned(), table::microseconds);
+        let (max, bound) = (us(message.max_ns), us(message.bound_ns));
+        let class = if message.exceeds() { "failed" } else { "" };
+        writeln!(
+            page,
+            "<tr><td>{}<td>{}<td>{}<td class=\"{class}\">{max}<td>{bound}",
+            message.bus, message.message, message.frames
+        )?;
+    }
+    page.push_str("</table>\n");
+    if let Some(why) = &response.unbounded {
+        writeln!(page, "<p>No bounds hold for this run: {}.</p>", escape(why))?;
+    }
+    Ok(())
 }
 
 fn happenings(page: &mut String, figures: &Figures) -> std::fmt::Result {

@@ -3,8 +3,8 @@
 use std::fmt::Write;
 
 use super::usage;
-use crate::analysis::{EventRecord, Figures, IntervalFigures};
-use crate::report::verdict::{CheckResult, Verdict};
+use crate::analysis::{BusResponse, EventRecord, Figures, IntervalFigures, ResponseFigures};
+use crate::report::verdict::Verdict;
 use crate::run::manifest::Manifest;
 
 /// Verdict, checks, latencies, losses and noteworthy events.
@@ -34,12 +34,7 @@ fn write_all(
         scenario.seed,
     )?;
     for check in &verdict.checks {
-        let mark = match check.result {
-            CheckResult::Passed => "ok  ",
-            CheckResult::Failed => "FAIL",
-            CheckResult::NotJudged => "?   ",
-        };
-        writeln!(text, "  {mark} {:<18} {}", check.name, check.finding)?;
+        writeln!(text, "  {:<4} {:<18} {}", check.result.mark(), check.name, check.finding)?;
     }
     let tracking = &figures.tracking;
     writeln!(
@@ -56,6 +51,7 @@ fn write_all(
     }
     text.push('\n');
     latencies(text, &figures.intervals)?;
+    responses(text, &figures.bus_response)?;
     writeln!(
         text,
         "\nskipped cycles: controller {}, plant {}; machine stood still: {:.2} ms of the controller's, {:.2} ms of the plant's waiting",
@@ -85,6 +81,41 @@ fn latencies(text: &mut String, intervals: &[IntervalFigures]) -> std::fmt::Resu
             microseconds(interval.p99_ns),
             interval.p999_ns.map_or_else(|| "–".to_owned(), microseconds),
             microseconds(interval.max_ns),
+        )?;
+    }
+    Ok(())
+}
+
+/// Of each kind of message the one that used most of its bound, or took longest where it has none.
+fn responses(text: &mut String, response: &BusResponse) -> std::fmt::Result {
+    let measured = response.messages.iter().filter(|message| message.frames > 0);
+    let kind = |message: &ResponseFigures| {
+        let name = message.message.split(' ').next().unwrap_or_default().to_owned();
+        (message.bus, name)
+    };
+    let mut closest: Vec<&ResponseFigures> = Vec::new();
+    for message in measured {
+        let rank = |message: &ResponseFigures| (message.share(), message.max_ns);
+        match closest.iter_mut().find(|other| kind(other) == kind(message)) {
+            Some(other) if rank(message) > rank(other) => *other = message,
+            Some(_) => {}
+            None => closest.push(message),
+        }
+    }
+    if closest.is_empty() {
+        return Ok(());
+    }
+    writeln!(text, "\n{:<20} {:>4} {:>8} {:>10} {:>10}", "response, µs", "bus", "n", "max", "bound")?;
+    for message in closest {
+        let us = |ns: Option<u64>| ns.map_or_else(|| "–".to_owned(), microseconds);
+        writeln!(
+            text,
+            "{:<20} {:>4} {:>8} {:>10} {:>10}",
+            message.message,
+            message.bus,
+            message.frames,
+            us(message.max_ns),
+            us(message.bound_ns)
         )?;
     }
     Ok(())

@@ -2,8 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::analysis::{Figures, Suspicion};
+use crate::analysis::{BusResponse, Figures, ResponseFigures, Suspicion};
 use crate::exit::Exit;
+use crate::report::table;
 use crate::run::manifest::Manifest;
 use crate::run::usage::RunUsage;
 
@@ -53,6 +54,15 @@ impl CheckResult {
     fn of(passed: bool) -> Self {
         if passed { Self::Passed } else { Self::Failed }
     }
+
+    /// In a word.
+    pub fn mark(self) -> &'static str {
+        match self {
+            Self::Passed => "ok",
+            Self::Failed => "FAIL",
+            Self::NotJudged => "skip",
+        }
+    }
 }
 
 /// One thing that was judged.
@@ -64,6 +74,16 @@ pub struct Check {
     pub finding: String,
     /// Whether it is as it should be.
     pub result: CheckResult,
+}
+
+impl Check {
+    fn judged(name: &'static str, finding: String, passed: bool) -> Self {
+        Self { name, finding, result: CheckResult::of(passed) }
+    }
+
+    fn not_judged(name: &'static str, why: String) -> Self {
+        Self { name, finding: why, result: CheckResult::NotJudged }
+    }
 }
 
 /// The judgement of a run.
@@ -206,19 +226,15 @@ fn checks(manifest: &Manifest, figures: &Figures) -> Vec<Check> {
     let missing = figures.missing_messages();
     let state = figures.final_state.unwrap_or("none");
     vec![
-        Check {
-            name: "sequence",
-            finding: format!("ended in state {state}"),
-            result: CheckResult::of(state == "finished"),
-        },
-        Check {
-            name: "tracking",
-            finding: format!(
+        Check::judged("sequence", format!("ended in state {state}"), state == "finished"),
+        Check::judged(
+            "tracking",
+            format!(
                 "rms {:.4} mm over {} samples, limit {} mm",
                 tracking.rms_mm, tracking.samples, limits.tracking_rms_mm
             ),
-            result: CheckResult::of(tracking.samples > 0 && tracking.rms_mm <= limits.tracking_rms_mm),
-        },
+            tracking.samples > 0 && tracking.rms_mm <= limits.tracking_rms_mm,
+        ),
         Check {
             name: "missed cycles",
             finding: format!(
@@ -228,12 +244,32 @@ fn checks(manifest: &Manifest, figures: &Figures) -> Vec<Check> {
             ),
             result: missed_cycles(manifest, figures),
         },
-        Check {
-            name: "dropped messages",
-            finding: missing.to_string(),
-            result: CheckResult::of(missing == 0),
-        },
+        Check::judged("dropped messages", missing.to_string(), missing == 0),
+        bus_response(&figures.bus_response, !manifest.scenario.faults.is_empty()),
     ]
+}
+
+/// No message may take longer on its bus than the plan allows at worst.
+fn bus_response(response: &BusResponse, has_faults: bool) -> Check {
+    const NAME: &str = "bus response";
+    if has_faults {
+        return Check::not_judged(NAME, "the scenario's faults are in no plan".to_owned());
+    }
+    if let Some(why) = &response.unbounded {
+        return Check::not_judged(NAME, why.clone());
+    }
+    let in_words = |message: &ResponseFigures| {
+        let us = |ns: Option<u64>| ns.map_or_else(|| "–".to_owned(), table::microseconds);
+        let (max_us, bound_us) = (us(message.max_ns), us(message.bound_ns));
+        format!("{} on bus {} took {max_us} µs, bound {bound_us} µs", message.message, message.bus)
+    };
+    let exceeding: Vec<_> = response.exceeding().map(in_words).collect();
+    if exceeding.is_empty() {
+        let tightest = response.tightest().map_or_else(|| "no message has a bound".to_owned(), in_words);
+        Check::judged(NAME, format!("closest: {tightest}"), response.tightest().is_some())
+    } else {
+        Check::judged(NAME, exceeding.join("; "), false)
+    }
 }
 
 #[cfg(test)]
@@ -250,5 +286,32 @@ mod tests {
         assert_eq!(overload(&usage(1.0), 20_000), None);
         let said = overload(&usage(1.9), 20_000).unwrap();
         assert!(said.contains("plant kept its core busy for 95 %") && said.contains("below 20000"), "{said}");
+    }
+
+    fn response(max_ns: u64, unbounded: Option<&str>) -> BusResponse {
+        let sync = ResponseFigures {
+            bus: 1,
+            message: "SYNC".to_owned(),
+            frames: 1,
+            max_ns: Some(max_ns),
+            bound_ns: Some(190_000),
+        };
+        BusResponse { messages: vec![sync], unbounded: unbounded.map(str::to_owned) }
+    }
+
+    #[test]
+    fn a_message_beyond_its_bound_fails_unless_the_bound_does_not_hold() {
+        let cases = [
+            (190_000, None, false, "ok"),
+            (191_000, None, false, "FAIL"),
+            (191_000, None, true, "skip"),
+            (191_000, Some("bus 0 had 1 errors"), false, "skip"),
+        ];
+        for (max_ns, unbounded, has_faults, mark) in cases {
+            let check = bus_response(&response(max_ns, unbounded), has_faults);
+            assert_eq!(check.result.mark(), mark, "{check:?}");
+        }
+        let failed = bus_response(&response(191_000, None), false);
+        assert_eq!(failed.finding, "SYNC on bus 1 took 191.00 µs, bound 190.00 µs");
     }
 }

@@ -92,6 +92,16 @@ impl BusPlan {
         self.bus
     }
 
+    /// Bit rates.
+    pub fn rates(&self) -> Rates {
+        self.rates
+    }
+
+    /// Length of a cycle, ns.
+    pub fn cycle_ns(&self) -> u64 {
+        self.cycle_ns
+    }
+
     /// The messages, the most urgent first.
     pub fn messages(&self) -> &[PlannedMessage] {
         &self.messages

@@ -28,6 +28,6 @@ pub use frame::{CanId, Frame, FrameError, FrameFormat};
 pub use load::{BusPlan, Message, Overload, PlannedMessage};
 pub use pdo::{EVERY_SYNC, Rpdo1, Tpdo1};
 pub use socket_can::{OpenError, SocketCan};
-pub use tap::{TapError, Tapped};
+pub use tap::{TapError, Tapped, TappedFrame};
 pub use virtual_bus::{Port, Statistics, VirtualWire, WireConfig};
 pub use wire::{Bitrate, BitrateError, FrameBits, Rates};

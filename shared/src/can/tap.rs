@@ -9,9 +9,26 @@ use crate::messages::FrameTap;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Tapped {
     /// A frame.
-    Frame(Received),
+    Frame(TappedFrame),
     /// An error on the wire, or a controller that changed its error state.
     Error(ErrorReport),
+}
+
+/// A frame as a tap saw it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct TappedFrame {
+    /// The frame.
+    pub frame: Frame,
+    /// When its last end-of-frame bit was on the wire, ns.
+    pub time_ns: u64,
+    /// When its transmitter had it queued, ns; `None` where the wire does not tell, as real ones do not.
+    pub queued_ns: Option<u64>,
+}
+
+impl From<Received> for TappedFrame {
+    fn from(Received { frame, time_ns }: Received) -> Self {
+        Self { frame, time_ns, queued_ns: None }
+    }
 }
 
 /// A message that holds neither frame nor error report.
@@ -29,15 +46,15 @@ impl Tapped {
     /// When it was seen, ns.
     pub fn time_ns(&self) -> u64 {
         match self {
-            Self::Frame(received) => received.time_ns,
+            Self::Frame(tapped) => tapped.time_ns,
             Self::Error(report) => report.time_ns,
         }
     }
 
     /// The frame, if it is one.
-    pub fn frame(&self) -> Option<&Received> {
+    pub fn frame(&self) -> Option<&TappedFrame> {
         match self {
-            Self::Frame(received) => Some(received),
+            Self::Frame(tapped) => Some(tapped),
             Self::Error(_) => None,
         }
     }
@@ -46,18 +63,16 @@ impl Tapped {
 /// The message for what was seen on the bus of that index; its header is stamped when it is published.
 pub fn encode(bus: u16, tapped: &Tapped) -> FrameTap {
     match tapped {
-        Tapped::Frame(received) => {
-            let frame = received.frame;
-            FrameTap {
-                time_ns: received.time_ns,
-                id: frame.id().flagged(),
-                bus,
-                length: frame.data().len() as u8,
-                flags: flags_of(frame.format()),
-                data: frame.padded(),
-                ..FrameTap::default()
-            }
-        }
+        Tapped::Frame(TappedFrame { frame, time_ns, queued_ns }) => FrameTap {
+            time_ns: *time_ns,
+            queued_ns: queued_ns.unwrap_or(0),
+            id: frame.id().flagged(),
+            bus,
+            length: frame.data().len() as u8,
+            flags: flags_of(frame.format()),
+            data: frame.padded(),
+            ..FrameTap::default()
+        },
         Tapped::Error(report) => {
             let (id, data) = report.encode();
             FrameTap {
@@ -83,7 +98,8 @@ pub fn decode(tap: &FrameTap) -> Result<Tapped, TapError> {
     let length = usize::from(tap.length);
     let data = tap.data.get(..length).ok_or(FrameError::DataLength { length })?;
     let frame = Frame::new(CanId::from_flagged(tap.id)?, data)?.in_format(format_of(tap.flags));
-    Ok(Tapped::Frame(Received { frame, time_ns: tap.time_ns }))
+    let queued_ns = Some(tap.queued_ns).filter(|&queued_ns| queued_ns > 0);
+    Ok(Tapped::Frame(TappedFrame { frame, time_ns: tap.time_ns, queued_ns }))
 }
 
 /// Flags of `struct canfd_frame` (`linux/can.h`): bit-rate switch, and that the frame is FD.
@@ -133,9 +149,15 @@ mod tests {
 
     proptest! {
         #[test]
-        fn every_frame_survives(frame in any_frame(), format in any_format(), time_ns: u64, bus: u16) {
+        fn every_frame_survives(
+            frame in any_frame(),
+            format in any_format(),
+            time_ns: u64,
+            queued_ns in prop::option::of(1..u64::MAX),
+            bus: u16,
+        ) {
             let frame = frame.in_format(format);
-            let tapped = Tapped::Frame(Received { frame, time_ns });
+            let tapped = Tapped::Frame(TappedFrame { frame, time_ns, queued_ns });
             prop_assert_eq!(decode(&encode(bus, &tapped)), Ok(tapped));
         }
     }

@@ -40,7 +40,7 @@ pub trait Message: Pod + ZeroCopySend + Default + std::fmt::Debug + PartialEq {
 }
 
 /// Version of the layouts below; it changes with any of them.
-pub const LAYOUT_VERSION: u64 = 3;
+pub const LAYOUT_VERSION: u64 = 4;
 
 macro_rules! messages {
     ($($(#[$doc:meta])* $name:ident on $topic:literal keeping $depth:literal {
@@ -214,6 +214,8 @@ messages! {
     FrameTap on "frame" keeping 16384 {
         /// When its last bit was on the wire, ns.
         time_ns: u64,
+        /// When its transmitter had it queued, ns; 0 where the wire does not tell, as real ones do not.
+        queued_ns: u64,
         /// Identifier; bit 31 set for a 29-bit one, bit 29 for an error message.
         id: u32,
         /// Index of the bus, from 0.

@@ -5,7 +5,7 @@ use super::attempt::{Attempt, Ending};
 use crate::can::bus::{ErrorState, Received};
 use crate::can::error_frame::{ErrorKind, ErrorReport};
 use crate::can::faults::FaultKind;
-use crate::can::tap::Tapped;
+use crate::can::tap::{Tapped, TappedFrame};
 
 /// Pause of an error passive transmitter before it may send again, behind the interframe space.
 const SUSPEND_BITS: u32 = 8;
@@ -55,7 +55,8 @@ impl VirtualWire {
         let time_ns = attempt.received_ns;
         self.statistics.count_frame(time_ns - attempt.queued_ns);
         let received = Received { frame: attempt.frame, time_ns };
-        self.tap.push(Tapped::Frame(received));
+        let queued_ns = Some(attempt.queued_ns);
+        self.tap.push(Tapped::Frame(TappedFrame { frame: attempt.frame, time_ns, queued_ns }));
         for port in 0..self.stations.len() {
             if attempt.senders.contains(port) || !self.is_on_bus(port, attempt.start_ns) {
                 continue;

@@ -1,0 +1,284 @@
+//! How long the messages of the buses took from being queued to their arrival, beside the bounds of their
+//! plan.
+//!
+//! A bound holds for an undisturbed bus. Where messages were queued closer together than planned, as by a
+//! process that was held up, the plan is worked out again for the closest that they were. Real interfaces do not
+//! tell when a frame was queued.
+
+use masseter_shared::can::{BusPlan, FrameFormat, Message, PlannedMessage, TapError, Tapped, tap};
+use masseter_shared::config::CanConfig;
+use masseter_shared::messages::FrameTap;
+use masseter_shared::schedule::plans;
+use serde::Serialize;
+
+/// The longest response time of a message.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct ResponseFigures {
+    /// Index of the bus.
+    pub bus: usize,
+    /// What it is; `other` for all messages that are in no plan: SDO, NMT, emergencies.
+    pub message: String,
+    /// Frames whose time of queueing is known.
+    pub frames: u64,
+    /// Longest time from being queued to the end of the frame; none without such frames, ns.
+    pub max_ns: Option<u64>,
+    /// The most it may be: by the plan, or if messages were queued closer together than planned, by that, ns.
+    pub bound_ns: Option<u64>,
+}
+
+impl ResponseFigures {
+    /// Whether a frame took longer than the bound.
+    pub fn exceeds(&self) -> bool {
+        self.max_ns.zip(self.bound_ns).is_some_and(|(max_ns, bound_ns)| max_ns > bound_ns)
+    }
+
+    /// Share of the bound that was used.
+    pub fn share(&self) -> Option<f64> {
+        self.max_ns.zip(self.bound_ns).map(|(max_ns, bound_ns)| max_ns as f64 / bound_ns as f64)
+    }
+}
+
+/// Response times of all buses.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize)]
+pub struct BusResponse {
+    /// The messages of each bus, the most urgent first.
+    pub messages: Vec<ResponseFigures>,
+    /// Why there are no bounds for this run; none where there are.
+    pub unbounded: Option<String>,
+}
+
+impl BusResponse {
+    /// Messages that took longer than their bound.
+    pub fn exceeding(&self) -> impl Iterator<Item = &ResponseFigures> {
+        self.messages.iter().filter(|message| message.exceeds())
+    }
+
+    /// The message that used most of its bound.
+    pub fn tightest(&self) -> Option<&ResponseFigures> {
+        let shares = self.messages.iter().filter_map(|message| Some((message, message.share()?)));
+        shares.max_by(|(_, one), (_, other)| one.total_cmp(other)).map(|(message, _)| message)
+    }
+}
+
+/// Follows every frame.
+#[derive(Debug)]
+pub(super) struct Responses {
+    buses: Vec<Followed>,
+    format: FrameFormat,
+}
+
+/// One bus.
+#[derive(Debug)]
+struct Followed {
+    plan: BusPlan,
+    /// In the order of the plan's messages.
+    messages: Vec<Seen>,
+    others: Seen,
+    error_frames: u64,
+}
+
+/// What was seen of a message.
+#[derive(Debug, Clone, Copy, Default)]
+struct Seen {
+    frames: u64,
+    max_ns: u64,
+    last_queued_ns: Option<u64>,
+    /// The least time between two of it being queued.
+    least_period_ns: Option<u64>,
+}
+
+impl Seen {
+    fn take(&mut self, queued_ns: u64, arrived_ns: u64) {
+        self.frames += 1;
+        self.max_ns = self.max_ns.max(arrived_ns.saturating_sub(queued_ns));
+        if let Some(last_ns) = self.last_queued_ns.replace(queued_ns) {
+            let period_ns = queued_ns.saturating_sub(last_ns);
+            self.least_period_ns = Some(self.least_period_ns.map_or(period_ns, |least| least.min(period_ns)));
+        }
+    }
+
+    fn figures(&self, bus: usize, message: &str, bound_ns: Option<u64>) -> ResponseFigures {
+        let max_ns = (self.frames > 0).then_some(self.max_ns);
+        ResponseFigures { bus, message: message.to_owned(), frames: self.frames, max_ns, bound_ns }
+    }
+}
+
+impl Responses {
+    /// On the buses of a rig that was accepted; without plans nothing is told.
+    pub(super) fn on(can: &CanConfig, period_ns: u64) -> Self {
+        Self::with(plans(can, period_ns).unwrap_or_default(), can.format())
+    }
+
+    fn with(plans: Vec<BusPlan>, format: FrameFormat) -> Self {
+        let followed = |plan: BusPlan| Followed {
+            messages: vec![Seen::default(); plan.messages().len()],
+            plan,
+            others: Seen::default(),
+            error_frames: 0,
+        };
+        Self { buses: plans.into_iter().map(followed).collect(), format }
+    }
+
+    pub(super) fn frame(&mut self, tap: &FrameTap) -> Result<(), TapError> {
+        let Some(bus) = self.buses.get_mut(usize::from(tap.bus)) else { return Ok(()) };
+        let planned = bus.plan.messages().iter().position(|planned| planned.message.id.flagged() == tap.id);
+        let seen = match planned {
+            Some(index) => &mut bus.messages[index],
+            None if matches!(tap::decode(tap)?, Tapped::Error(_)) => {
+                bus.error_frames += 1;
+                return Ok(());
+            }
+            None => &mut bus.others,
+        };
+        if tap.queued_ns > 0 {
+            seen.take(tap.queued_ns, tap.time_ns);
+        }
+        Ok(())
+    }
+
+    pub(super) fn finish(self) -> BusResponse {
+        let format = self.format;
+        BusResponse {
+            unbounded: self.buses.iter().find_map(|bus| bus.unbounded(format)),
+            messages: self.buses.iter().flat_map(|bus| bus.figures(format)).collect(),
+        }
+    }
+}
+
+impl Followed {
+    fn figures(&self, format: FrameFormat) -> Vec<ResponseFigures> {
+        let as_queued = self.plan_as_queued(format);
+        let bounds = self.plan.messages().iter().zip(as_queued.messages());
+        let bounds = bounds.map(|(planned, queued)| planned.response_ns.max(queued.response_ns));
+        let planned = self.plan.messages().iter().zip(&self.messages).zip(bounds);
+        let bus = self.plan.bus();
+        let planned =
+            planned.map(|((planned, seen), bound_ns)| seen.figures(bus, &planned.message.name, bound_ns));
+        planned.chain([self.others.figures(bus, "other", None)]).collect()
+    }
+
+    /// Why there are no bounds here.
+    fn unbounded(&self, format: FrameFormat) -> Option<String> {
+        let bus = self.plan.bus();
+        if self.messages.iter().all(|seen| seen.frames == 0) {
+            return Some(format!("bus {bus} does not tell when its frames were queued"));
+        }
+        if self.error_frames > 0 {
+            return Some(format!("bus {bus} had {} errors", self.error_frames));
+        }
+        let as_queued = self.plan_as_queued(format);
+        let unbounded = as_queued.messages().iter().find(|queued| queued.response_ns.is_none())?;
+        let name = &unbounded.message.name;
+        Some(format!("messages of bus {bus} were queued so close together that {name} has no bound"))
+    }
+
+    /// The plan for messages as close to each other as they were queued, whoever released them.
+    fn plan_as_queued(&self, format: FrameFormat) -> BusPlan {
+        let as_queued = |(planned, seen): (&PlannedMessage, &Seen)| {
+            let message = planned.message.clone();
+            let period_ns =
+                seen.least_period_ns.map_or(message.period_ns, |ns| ns.clamp(1, message.period_ns));
+            Message { period_ns, released_by: None, ..message }
+        };
+        let messages = self.plan.messages().iter().zip(&self.messages).map(as_queued).collect();
+        BusPlan::new(self.plan.bus(), self.plan.rates(), format, self.plan.cycle_ns(), messages)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use masseter_shared::can::canopen::Cob;
+    use masseter_shared::can::{Bitrate, CanId, ErrorKind, ErrorReport, Rates};
+
+    use super::*;
+
+    const PERIOD_NS: u64 = 1_000_000;
+
+    fn message(name: &str, id: u16, data_length: u32) -> Message {
+        Message {
+            name: name.to_owned(),
+            id: CanId::standard(id).unwrap(),
+            data_length,
+            period_ns: PERIOD_NS,
+            deadline_ns: PERIOD_NS,
+            released_by: None,
+        }
+    }
+
+    /// SYNC and one message of 8 bytes: bounds of 55 + 135 µs for both.
+    fn responses() -> Responses {
+        let messages = vec![message("SYNC", 0x080, 0), message("TPDO1 1", 0x181, 8)];
+        let rates = Rates::classical(Bitrate::MAX);
+        Responses::with(
+            vec![BusPlan::new(0, rates, FrameFormat::Classical, PERIOD_NS, messages)],
+            FrameFormat::Classical,
+        )
+    }
+
+    fn seen(id: u32, queued_ns: u64, took_us: u64) -> FrameTap {
+        FrameTap { id, queued_ns, time_ns: queued_ns + took_us * 1000, ..FrameTap::default() }
+    }
+
+    fn of(frames: impl IntoIterator<Item = FrameTap>) -> BusResponse {
+        let mut responses = responses();
+        frames.into_iter().for_each(|frame| responses.frame(&frame).unwrap());
+        responses.finish()
+    }
+
+    #[test]
+    fn the_longest_of_each_message_stands_beside_its_bound() {
+        let found = of([
+            seen(0x080, 1000, 51),
+            seen(0x080, 1_001_000, 120),
+            seen(0x181, 1000, 190),
+            seen(0x601, 5, 99),
+        ]);
+        assert_eq!(found.unbounded, None);
+        let told: Vec<_> =
+            found.messages.iter().map(|m| (m.message.as_str(), m.frames, m.max_ns, m.bound_ns)).collect();
+        assert_eq!(
+            told,
+            [
+                ("SYNC", 2, Some(120_000), Some(190_000)),
+                ("TPDO1 1", 1, Some(190_000), Some(190_000)),
+                ("other", 1, Some(99_000), None)
+            ]
+        );
+        assert_eq!(found.exceeding().count(), 0);
+        assert_eq!(found.tightest().unwrap().message, "TPDO1 1");
+    }
+
+    #[test]
+    fn a_message_beyond_its_bound_is_found() {
+        let found = of([seen(0x080, 1000, 191), seen(0x181, 1000, 190)]);
+        assert_eq!(found.unbounded, None);
+        assert!(found.exceeding().map(|message| message.message.as_str()).eq(["SYNC"]));
+    }
+
+    #[test]
+    fn bounds_say_nothing_of_disturbed_buses_of_crowded_ones_and_of_unknown_times() {
+        let report = ErrorReport { time_ns: 2000, port: 1, kind: ErrorKind::Bit, tec: 8, rec: 0 };
+        let error = tap::encode(0, &Tapped::Error(report));
+        let cases = [
+            (vec![seen(0x080, 0, 0)], "does not tell when its frames were queued"),
+            (vec![seen(0x080, 1000, 51), error], "bus 0 had 1 errors"),
+            (vec![seen(0x080, 1000, 51), seen(0x080, 61_000, 51)], "so close together"),
+            (vec![seen(0x080, 1000, 51), seen(0x080, 1000, 102)], "so close together"),
+        ];
+        for (frames, reason) in cases {
+            let found = of(frames.clone()).unbounded;
+            assert!(found.as_ref().is_some_and(|found| found.contains(reason)), "{frames:?}: {found:?}");
+        }
+    }
+
+    #[test]
+    fn every_message_of_a_rig_has_a_bound() {
+        let found = Responses::on(&CanConfig::default(), PERIOD_NS).finish();
+        let sync = CanId::from(Cob::Sync).flagged();
+        assert_eq!(sync, 0x080);
+        assert!(
+            found.messages.iter().all(|message| message.message == "other" || message.bound_ns.is_some())
+        );
+        assert_eq!(found.messages.len(), 2 * (1 + 3 + 3 + 4 + 1));
+    }
+}

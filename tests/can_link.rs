@@ -1,0 +1,130 @@
+//! The CAN link seen from outside: what is planned, what a run measures beside it, and what is served.
+
+mod common;
+
+use std::io::{BufRead, BufReader, Read, Write};
+use std::net::TcpStream;
+use std::process::{Child, Command, Stdio};
+use std::time::Duration;
+
+use common::{Bench, MASSETER, masseter, stdout};
+use serde_json::Value;
+
+#[test]
+fn one_bus_at_a_kilohertz_is_refused_with_its_table() {
+    let bench = Bench::new("[can]\nbuses = [[0, 1, 2, 3, 4, 5]]");
+    let scenario = bench.file("scenario.toml");
+    let output = masseter(&["can", "plan", scenario.to_str().unwrap(), "--rate-hz", "1000"]);
+    let table = stdout(&output);
+    assert_eq!(output.status.code(), Some(2), "{table}");
+    assert!(table.contains("a cycle of 1000.0 µs takes 1555.0 µs at worst, at most 643 Hz"), "{table}");
+    assert!(table.contains("too late"), "{table}");
+    assert!(table.trim_end().ends_with("refused: bus 0 does not fit"), "{table}");
+}
+
+#[test]
+fn two_buses_at_a_kilohertz_are_accepted_and_every_message_has_a_bound() {
+    let output = masseter(&["can", "plan", "--format", "json"]);
+    assert_eq!(output.status.code(), Some(0), "{}", stdout(&output));
+    let plan: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(plan["fits"], true);
+    let buses = plan["buses"].as_array().unwrap();
+    assert_eq!(buses.len(), 2);
+    for message in buses.iter().flat_map(|bus| bus["messages"].as_array().unwrap()) {
+        let (response_ns, deadline_ns) = (message["response_ns"].as_u64(), message["deadline_ns"].as_u64());
+        assert!(response_ns.is_some() && response_ns <= deadline_ns, "{message}");
+    }
+}
+
+/// The check of a run's summary that goes by this name.
+fn check<'a>(summary: &'a Value, name: &str) -> &'a Value {
+    let checks = summary["verdict"]["checks"].as_array().unwrap();
+    checks.iter().find(|check| check["name"] == name).unwrap()
+}
+
+#[test]
+fn every_message_of_a_run_arrives_within_the_bound_of_its_plan() {
+    for scenario in ["duration_s = 2.0", "duration_s = 1.0\n[can]\nfd = true\nbuses = [[0, 1, 2, 3, 4, 5]]"] {
+        let bench = Bench::new(scenario);
+        let output = bench.run(&["--clock", "virtual"]);
+        assert_eq!(output.status.code(), Some(0), "{scenario}: {}", stdout(&output));
+        let summary = bench.summary();
+        let judged = check(&summary, "bus response");
+        assert_eq!(judged["result"], "passed", "{judged}");
+        for message in summary["figures"]["bus_response"]["messages"].as_array().unwrap() {
+            assert!(message["frames"].as_u64() > Some(0), "{message}");
+            let (max_ns, bound_ns) = (message["max_ns"].as_u64(), message["bound_ns"].as_u64());
+            assert!(max_ns <= bound_ns || message["message"] == "other", "{message}");
+        }
+        assert!(stdout(&output).contains("response, µs"), "{}", stdout(&output));
+    }
+}
+
+#[test]
+fn a_disturbed_bus_is_not_held_against_bounds_that_assume_none() {
+    let fault = "[[faults]]\nkind = 'corrupt'\nbus = 0\nfrom_s = 0.5\nprobability = 0.01";
+    let bench = Bench::new(&format!("duration_s = 1.0\n{fault}"));
+    let output = bench.run(&["--clock", "virtual"]);
+    let summary = bench.summary();
+    assert_eq!(check(&summary, "bus response")["result"], "not_judged", "{}", stdout(&output));
+    assert!(stdout(&output).contains("skip bus response"), "{}", stdout(&output));
+}
+
+/// A server on a port that the system chose, ended with the test.
+struct Server {
+    child: Child,
+    address: String,
+}
+
+impl Server {
+    fn start(bench: &Bench) -> Self {
+        let mut child = Command::new(MASSETER)
+            .args(["can", "serve", "--listen", "127.0.0.1:0"])
+            .arg(bench.file("scenario.toml"))
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let mut lines = BufReader::new(child.stderr.take().unwrap()).lines().map(Result::unwrap);
+        let announced = lines.find(|line| line.contains("socketcand protocol on ")).unwrap();
+        let address = announced.split(" on ").nth(1).unwrap().split(';').next().unwrap().to_owned();
+        Self { child, address }
+    }
+}
+
+impl Drop for Server {
+    fn drop(&mut self) {
+        // It may have ended by itself, which the test has noticed then.
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+/// Reads until `text` has come.
+fn expect(stream: &mut TcpStream, text: &str) -> String {
+    let (mut heard, mut bytes) = (String::new(), [0; 4096]);
+    while !heard.contains(text) {
+        let count = stream.read(&mut bytes).unwrap_or_else(|error| panic!("{text:?} in {heard:?}: {error}"));
+        assert!(count > 0, "closed before {text:?}: {heard:?}");
+        heard += std::str::from_utf8(&bytes[..count]).unwrap();
+    }
+    heard
+}
+
+#[test]
+fn a_foreign_tool_reads_an_object_of_a_drive_on_a_classical_and_on_an_fd_bus() {
+    for scenario in ["", "[can]\nfd = true\nbuses = [[0, 1, 2, 3, 4, 5]]"] {
+        let server = Server::start(&Bench::new(scenario));
+        let mut stream = TcpStream::connect(&server.address).unwrap();
+        stream.set_read_timeout(Some(Duration::from_secs(20))).unwrap();
+        expect(&mut stream, "< hi >");
+        stream.write_all(b"< open can0 >").unwrap();
+        expect(&mut stream, "< ok >");
+        stream.write_all(b"< rawmode >").unwrap();
+        expect(&mut stream, "< ok >");
+        // The drive answers no SDO before it has booted, which its boot-up or heartbeat tells.
+        expect(&mut stream, "< frame 701 ");
+        // Upload of 1000, the device type, from node 1: a servo drive is 0002_0192h.
+        stream.write_all(b"< send 601 8 40 0 10 0 0 0 0 0 >").unwrap();
+        expect(&mut stream, "4300100092010200");
+    }
+}
