@@ -2,7 +2,7 @@
 //!
 //! Purely declarative, and deterministic: whether a fault strikes a frame is a function of the seed, the
 //! fault and the frame's number, not of how often anybody asks. Who carries faults out is the
-//! [`VirtualWire`](super::VirtualWire).
+//! [`VirtualWire`](super::VirtualWire), or on any other bus [`PortFaults`](super::wrapped::PortFaults).
 
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg32;

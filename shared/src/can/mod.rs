@@ -20,6 +20,7 @@ pub mod socketcand;
 pub mod tap;
 mod virtual_bus;
 pub mod wire;
+pub mod wrapped;
 
 pub use bus::{Bus, BusStatus, ErrorState, ReceiveError, Received, SendError};
 pub use error_frame::{ErrorKind, ErrorReport, ErrorReportError};

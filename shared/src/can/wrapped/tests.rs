@@ -1,0 +1,184 @@
+//! The conformance suite through every wrapper, and what each adds.
+
+use super::*;
+use crate::can::conformance::{self, End, Pair};
+use crate::can::faults::{Fault, FaultKind};
+use crate::can::wire::Rates;
+use crate::can::{
+    Bitrate, Bus, CanId, ErrorState, Frame, FrameFormat, ReceiveError, SendError, VirtualWire, WireConfig,
+};
+
+const FAULT: Fault = Fault {
+    kind: FaultKind::Lose,
+    from_ns: 0,
+    until_ns: u64::MAX,
+    id: None,
+    port: None,
+    probability: 1.0,
+    count: u64::MAX,
+};
+
+fn wire() -> VirtualWire {
+    VirtualWire::new(&WireConfig {
+        rates: Rates::classical(Bitrate::MAX),
+        format: FrameFormat::Classical,
+        ports: 2,
+        transmit_capacity: 8,
+        receive_capacity: 4,
+        restart_after_ns: None,
+    })
+}
+
+/// Two ports of a simulated wire, each under all wrappers.
+struct Wrapped {
+    wire: VirtualWire,
+    now_ns: u64,
+    counts: [Counts; 2],
+    taps: [CandumpTap<String>; 2],
+    faults: [PortFaults; 2],
+}
+
+impl Wrapped {
+    fn new(of_a: Vec<Fault>, of_b: Vec<Fault>) -> Self {
+        Self {
+            wire: wire(),
+            now_ns: 0,
+            counts: [Counts::default(); 2],
+            taps: ["a", "b"].map(|name| CandumpTap::new(name, String::new())),
+            faults: [(of_a, 0), (of_b, 1)].map(|(faults, port)| PortFaults::new(faults, port, 1).unwrap()),
+        }
+    }
+
+    fn send(&mut self, byte: u8) -> Result<(), SendError> {
+        let now_ns = self.now_ns;
+        self.end(End::A).send(now_ns, frame(byte))
+    }
+
+    /// First bytes of the frames that have arrived at the other end.
+    fn received(&mut self) -> Vec<u8> {
+        self.settle();
+        let now_ns = self.now_ns;
+        let mut port = self.end(End::B);
+        std::iter::from_fn(|| port.receive(now_ns).unwrap())
+            .map(|received| received.frame.data()[0])
+            .collect()
+    }
+}
+
+impl Pair for Wrapped {
+    fn end(&mut self, end: End) -> impl Bus {
+        let index = end as usize;
+        let logged = self.taps[index].over(self.wire.port(index));
+        self.counts[index].over(self.faults[index].over(logged))
+    }
+
+    fn now_ns(&self) -> u64 {
+        self.now_ns
+    }
+
+    fn settle(&mut self) {
+        while let Some(event_ns) = self.wire.next_event_ns() {
+            self.wire.advance(event_ns);
+            self.now_ns = event_ns;
+        }
+    }
+}
+
+fn frame(byte: u8) -> Frame {
+    Frame::fixed(CanId::standard(0x181).unwrap(), [byte])
+}
+
+#[test]
+fn wrapped_ports_conform() {
+    let new = || Wrapped::new(Vec::new(), Vec::new());
+    assert_eq!(conformance::check(new), Ok(()));
+    assert_eq!(conformance::check_arbitration(new), Ok(()));
+}
+
+#[test]
+fn everything_is_counted() {
+    let mut pair = Wrapped::new(Vec::new(), Vec::new());
+    for byte in 0..8 {
+        pair.send(byte).unwrap();
+    }
+    assert_eq!(pair.send(8), Err(SendError::QueueFull { capacity: 8 }));
+    pair.settle();
+    let now_ns = pair.now_ns;
+    assert_eq!(pair.end(End::B).receive(now_ns), Err(ReceiveError::Overrun { lost: 4 }));
+    assert_eq!(pair.received(), [0, 1, 2, 3]);
+    assert_eq!(pair.counts[0], Counts { sent: 8, refused: 1, ..Counts::default() });
+    assert_eq!(pair.counts[1], Counts { received: 4, lost: 4, ..Counts::default() });
+}
+
+#[test]
+fn both_ends_log_the_frame_as_candump_does() {
+    let mut pair = Wrapped::new(Vec::new(), Vec::new());
+    pair.now_ns = 5_000_000;
+    pair.send(0xAB).unwrap();
+    assert_eq!(pair.received(), [0xAB]);
+    assert_eq!(pair.taps[0].out(), "(0.005000) a 181#AB\n");
+    assert_eq!(pair.taps[1].out(), &format!("(0.{:06}) b 181#AB\n", pair.now_ns / 1000));
+    assert!(pair.taps[0].is_complete());
+}
+
+#[test]
+fn a_lost_frame_was_on_the_wire_and_a_duplicated_one_arrives_twice() {
+    let mut pair = Wrapped::new(Vec::new(), vec![Fault { count: 1, ..FAULT }]);
+    (1..=2).for_each(|byte| pair.send(byte).unwrap());
+    assert_eq!(pair.received(), [2]);
+    assert!(pair.taps[1].out().contains("181#01"), "{:?}", pair.taps[1].out());
+    let mut pair = Wrapped::new(vec![Fault { kind: FaultKind::Duplicate, count: 1, ..FAULT }], Vec::new());
+    (1..=2).for_each(|byte| pair.send(byte).unwrap());
+    assert_eq!(pair.received(), [1, 1, 2]);
+}
+
+#[test]
+fn a_delayed_frame_leaves_when_it_is_due() {
+    let kind = FaultKind::Delay { by_ns: 1_000_000 };
+    let mut pair = Wrapped::new(vec![Fault { kind, count: 1, ..FAULT }], Vec::new());
+    (1..=2).for_each(|byte| pair.send(byte).unwrap());
+    assert_eq!(pair.received(), [2]);
+    pair.now_ns = 1_000_000;
+    assert_eq!(pair.end(End::A).receive(1_000_000), Ok(None));
+    assert_eq!(pair.received(), [1]);
+}
+
+#[test]
+fn a_babbling_node_speaks_whenever_its_port_is_used() {
+    let kind = FaultKind::Babble { frame: frame(0xBB) };
+    let mut pair = Wrapped::new(vec![Fault { kind, count: 2, ..FAULT }], Vec::new());
+    pair.send(1).unwrap();
+    let now_ns = pair.now_ns;
+    assert_eq!(pair.end(End::A).receive(now_ns), Ok(None));
+    pair.send(2).unwrap();
+    assert_eq!(pair.received(), [0xBB, 1, 0xBB, 2]);
+}
+
+#[test]
+fn who_is_disconnected_neither_sends_nor_hears_until_it_is_over() {
+    let fault = Fault { kind: FaultKind::Disconnect, until_ns: 1_000_000, ..FAULT };
+    let mut pair = Wrapped::new(Vec::new(), vec![fault]);
+    pair.send(1).unwrap();
+    assert!(pair.received().is_empty());
+    assert!(pair.end(End::B).send(500_000, frame(9)).is_err());
+    pair.now_ns = 1_000_000;
+    pair.send(2).unwrap();
+    assert_eq!(pair.received(), [2]);
+}
+
+#[test]
+fn who_is_off_the_bus_says_so_until_it_is_restarted() {
+    let mut pair = Wrapped::new(vec![Fault { kind: FaultKind::BusOff, count: 1, ..FAULT }], Vec::new());
+    assert_eq!(pair.send(1), Err(SendError::BusOff { tec: 256 }));
+    assert_eq!(pair.end(End::A).status().state, ErrorState::BusOff);
+    pair.faults[0].restart();
+    pair.send(2).unwrap();
+    assert_eq!(pair.received(), [2]);
+    assert_eq!(pair.end(End::A).status().state, ErrorState::Active);
+}
+
+#[test]
+fn corruption_needs_a_wire() {
+    let corrupt = Fault { kind: FaultKind::Corrupt, ..FAULT };
+    assert_eq!(PortFaults::new(vec![FAULT, corrupt], 0, 1).unwrap_err(), NotByPort { index: 1 });
+}
