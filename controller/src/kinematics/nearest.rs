@@ -16,8 +16,12 @@ const GRID: u32 = 32;
 /// Stretches of the grid: from the best start of each, for each of the four sets of angles, one descent. The best
 /// starts of all lie next to each other and lead to one place.
 const STRETCHES: u32 = 4;
-/// Steps of one descent.
+/// Steps of one descent at most; it ends before when the error hardly decreases or the step hardly turns a leg.
 const STEPS: u32 = 40;
+/// A step that leaves more than this share of the error is the last.
+const HARDLY_LESS: f64 = 1.0 - 1e-5;
+/// So is one that turns no leg by more, radians.
+const HARDLY_TURNED_RAD: f64 = 1e-7;
 
 /// The least √(f₁² + f₂² + f₃²) found, metres.
 pub(super) fn nearest_m(closure: &Closure<'_>) -> f64 {
@@ -64,10 +68,14 @@ fn descended_m2(equations: &Equations<'_>, start: Vector3<f64>) -> f64 {
         let Some(factors) = damped.cholesky() else { break };
         let step = factors.solve(&jacobian.tr_mul(&at.residual_m));
         let next = equations.evaluate(at.theta_rad - step);
-        if next.error_m2() < at.error_m2() {
+        let remains = next.error_m2() / at.error_m2();
+        if remains < 1.0 {
             (at, damping) = (next, damping * 0.2);
         } else {
             damping *= 5.0;
+        }
+        if step.amax() < HARDLY_TURNED_RAD || (HARDLY_LESS..1.0).contains(&remains) {
+            break;
         }
     }
     at.error_m2()
