@@ -48,6 +48,8 @@ fn no_path_of_the_forward_kinematics_allocates() {
         for input in [neutral, nearby, neutral] {
             assert!(black_box(tracker.update(&input)).is_ok());
         }
+        let mut guessing = ForwardTracker::with_guess(mechanism.clone(), [0.3, 2.9, 1.0]);
+        assert!(black_box(guessing.update(&nearby)).is_ok());
         assert!(black_box(tracker.update(&unassemblable)).is_err());
         assert_eq!(Solutions::new(&mechanism, &neutral).map(|all| all.count()), Ok(16));
         assert!(black_box(solve_seed(&mechanism, &nearby, &[1.4; LEGS], &options)).is_ok());
