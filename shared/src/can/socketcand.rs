@@ -73,6 +73,8 @@ pub enum RequestError {
 #[derive(Debug, Default)]
 pub struct Requests {
     pending: Vec<u8>,
+    /// What is pending belongs to a request that has been refused for its length.
+    is_overlong: bool,
 }
 
 impl Requests {
@@ -86,20 +88,35 @@ impl Requests {
     /// # Errors
     /// [`RequestError`]; the bytes in question are gone then, and later ones are still read.
     pub fn take(&mut self) -> Option<Result<Request, RequestError>> {
-        let Some(end) = self.pending.iter().position(|byte| *byte == b'>') else {
-            if self.pending.len() <= LONGEST_REQUEST {
-                return None;
+        loop {
+            let end = self.pending.iter().position(|byte| *byte == b'>');
+            if !self.is_overlong && end.unwrap_or(self.pending.len()) > LONGEST_REQUEST {
+                self.is_overlong = true;
+                return Some(Err(RequestError::Stray));
             }
-            self.pending.clear();
-            return Some(Err(RequestError::Stray));
-        };
-        let bytes: Vec<u8> = self.pending.drain(..=end).collect();
-        let text = str::from_utf8(&bytes[..end]).ok();
-        Some(match text.and_then(|text| text.trim_start().strip_prefix('<')) {
-            Some(text) => parse(text.trim()),
-            None => Err(RequestError::Stray),
-        })
+            match end {
+                Some(end) => {
+                    let bytes: Vec<u8> = self.pending.drain(..=end).collect();
+                    if !std::mem::take(&mut self.is_overlong) {
+                        return Some(read(&bytes[..end]));
+                    }
+                }
+                None => {
+                    if self.is_overlong {
+                        self.pending.clear();
+                    }
+                    return None;
+                }
+            }
+        }
     }
+}
+
+/// A request from the bytes up to its closing bracket.
+fn read(bytes: &[u8]) -> Result<Request, RequestError> {
+    let text = str::from_utf8(bytes).ok();
+    let text = text.and_then(|text| text.trim_start().strip_prefix('<')).ok_or(RequestError::Stray)?;
+    parse(text.trim())
 }
 
 fn parse(text: &str) -> Result<Request, RequestError> {
@@ -200,6 +217,20 @@ mod tests {
             write_frame(&mut text, &Received { frame, time_ns: 23_424_242_999 }).unwrap();
             assert_eq!(text, expected);
         }
+    }
+
+    #[test]
+    fn what_is_too_long_is_told_once_up_to_its_end_however_it_comes() {
+        let text = format!("< echo >< {} >< echo >", "x".repeat(2 * LONGEST_REQUEST));
+        let expected = [Ok(Request::Echo), Err(RequestError::Stray), Ok(Request::Echo)];
+        assert_eq!(requests(&text), expected);
+        let mut in_pieces = Requests::default();
+        let mut read = Vec::new();
+        for byte in text.bytes() {
+            in_pieces.push(&[byte]);
+            read.extend(std::iter::from_fn(|| in_pieces.take()));
+        }
+        assert_eq!(read, expected);
     }
 
     proptest! {
