@@ -16,7 +16,7 @@ use masseter_shared::clock::{self, SECOND_NS};
 use masseter_shared::config::Scenario;
 use masseter_shared::geometry::Mechanism;
 use masseter_shared::lifecycle::Start;
-use masseter_shared::messages::{Command as CommandMessage, Event, FrameTap, Message, Reading, State, Truth};
+use masseter_shared::messages::{Command as CommandMessage, Event, FrameTap, Reading, State, Truth};
 use masseter_shared::transport::{Domain, Node, Outlet};
 use rustix::process::{Pid, Signal, kill_process};
 
@@ -194,7 +194,7 @@ fn in_process(cycles: &[Vec<Recorded>], path: &Path) -> anyhow::Result<()> {
 fn raw(cycles: &[Vec<Recorded>], path: &Path) -> anyhow::Result<()> {
     let mut bytes = Vec::new();
     for message in cycles.iter().flatten() {
-        bytes.extend_from_slice(bytes_of(message));
+        bytes.extend_from_slice(message.body());
     }
     let messages = cycles.iter().map(Vec::len).sum::<usize>() as u64;
     let mut file = File::create_new(path)?;
@@ -205,20 +205,6 @@ fn raw(cycles: &[Vec<Recorded>], path: &Path) -> anyhow::Result<()> {
     file.sync_data()?;
     report("raw write", cycles.len(), messages, clock::now_ns() - from_ns, bytes.len() as u64);
     Ok(())
-}
-
-fn bytes_of(message: &Recorded) -> &[u8] {
-    fn of<M: Message>(message: &M) -> &[u8] {
-        bytemuck::bytes_of(message)
-    }
-    match message {
-        Recorded::Command(message) => of(message),
-        Recorded::Reading(message) => of(message),
-        Recorded::State(message) => of(message),
-        Recorded::Truth(message) => of(message),
-        Recorded::Frame(message) => of(message),
-        Recorded::Event(message) => of(message),
-    }
 }
 
 fn report(what: &str, cycles: usize, messages: u64, took_ns: u64, bytes: u64) {

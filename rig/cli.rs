@@ -274,6 +274,8 @@ struct LoggerArgs {
     #[arg(long)]
     live: Option<SocketAddr>,
     #[arg(long)]
+    motion_s: Option<f64>,
+    #[arg(long)]
     quiet: bool,
 }
 
@@ -349,8 +351,9 @@ pub fn main() -> ExitCode {
             .map_err(Failure::from),
         Verb::Plant(args) => plant::plant(&args),
         Verb::Logger(args) => {
-            let (assignment, show) = (args.process.assignment(), Show { live: args.live, quiet: args.quiet });
-            logger::run(&assignment, &args.recording, show).map_err(Failure::from)
+            let LoggerArgs { process, recording, live, motion_s, quiet } = args;
+            let show = Show { live, quiet, motion_s };
+            logger::run(&process.assignment(), &recording, show).map_err(Failure::from)
         }
     };
     match result {

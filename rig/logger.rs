@@ -18,7 +18,7 @@ use masseter_shared::transport::{Inlet, Node, TransportError};
 use crate::exit::Exit;
 use crate::live::Live;
 use crate::recording::{Backlog, Pace, Recorded, Recorder, Scene};
-use view::{Mode, View};
+use view::{Mode, Told, View};
 
 /// How often the topics are drained; a fraction of what their buffers hold.
 const DRAIN: Duration = Duration::from_millis(10);
@@ -30,6 +30,8 @@ pub struct Show {
     pub live: Option<SocketAddr>,
     /// Whether standard error is spared the progress.
     pub quiet: bool,
+    /// How long the motion lasts, s, if that is known.
+    pub motion_s: Option<f64>,
 }
 
 /// Records until asked to stop, then drains what is left. [`Exit::Incomplete`] when anything that was
@@ -45,18 +47,21 @@ pub fn run(assignment: &Assignment, recording: &Path, show: Show) -> anyhow::Res
     let backlog = Backlog::start(Recorder::create(recording, scene)?, Pace::RealTime);
     let start = post.ready()?;
 
-    let view = View::new(Mode::suitable(show.quiet), post.scenario.can.rates()?, start.epoch_ns);
+    let rates = post.scenario.can.rates()?;
+    let view = View::new(Mode::suitable(show.quiet), rates, show.motion_s, start.epoch_ns);
     let mut takers = Takers { backlog, live, view };
     takers.announce(show.quiet);
     loop {
         let last = post.stop.is_made();
         let now_ns = clock::now_ns();
         topics.drain(&mut takers, now_ns)?;
+        let told = takers.told();
         if last {
+            takers.view.end(now_ns, told);
             return Ok(takers.end());
         }
         takers.backlog.hand_over();
-        takers.view.show(now_ns, takers.backlog.dropped());
+        takers.view.show(now_ns, told);
         clock::sleep(DRAIN);
     }
 }
@@ -82,6 +87,10 @@ impl Takers {
         if let Some(live) = &self.live {
             live.offer(&message, now_ns);
         }
+    }
+
+    fn told(&self) -> Told {
+        Told { lost: self.backlog.dropped(), live: self.live.as_ref().map(Live::watched) }
     }
 
     /// Ends what is shown and recorded, and says what either lacks.

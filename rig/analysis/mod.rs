@@ -43,6 +43,7 @@ pub use sequence::TopicFigures;
 pub use skips::SkipFigures;
 use skips::{Counters, Skips};
 use tracking::Tracking;
+pub(crate) use tracking::{Accumulator, MOVING};
 pub use tracking::{Reference, Track, TrackingFigures, TrackingSample};
 
 /// Why a run could not be analysed.

@@ -12,7 +12,7 @@ use super::noise::standard_error;
 use super::series::{Extremes, Series, Thinned};
 
 /// States in which the platform is asked to be somewhere.
-const MOVING: [ControllerState; 3] =
+pub(crate) const MOVING: [ControllerState; 3] =
     [ControllerState::Easing, ControllerState::Running, ControllerState::Holding];
 
 /// What the wanted pose is compared with.
@@ -105,21 +105,23 @@ pub(super) struct Tracking {
     seconds: Vec<f64>,
 }
 
+/// Root mean square and maximum of what is added.
 #[derive(Debug, Default)]
-struct Accumulator {
+pub(crate) struct Accumulator {
     samples: u64,
     squares: f64,
-    largest: f64,
+    /// The largest value.
+    pub largest: f64,
 }
 
 impl Accumulator {
-    fn add(&mut self, value: f64) {
+    pub(crate) fn add(&mut self, value: f64) {
         self.samples += 1;
         self.squares += value * value;
         self.largest = self.largest.max(value);
     }
 
-    fn rms(&self) -> f64 {
+    pub(crate) fn rms(&self) -> f64 {
         (self.squares / self.samples.max(1) as f64).sqrt()
     }
 }

@@ -22,6 +22,8 @@ const UNREAD_BYTES: usize = 1 << 20;
 const GATHERED_BYTES: usize = 1 << 16;
 /// The longest message a client may send, bytes; it only subscribes.
 const LONGEST_ASKED: usize = 1 << 16;
+/// Turns in which a client must have said who it is: 5 s, so that strangers keep nobody's place.
+const GREETING_TURNS: u32 = 500;
 /// Messages of a client that are looked at in one turn, so that none keeps the others waiting.
 const ASKED_IN_A_TURN: usize = 16;
 
@@ -31,6 +33,8 @@ type Handshake = MidHandshake<ServerHandshake<TcpStream, Greeting>>;
 /// A client.
 pub(super) struct Client {
     link: Link,
+    /// Turns that the greeting may still take.
+    turns: u32,
     /// The client's number for each channel that it sees.
     subscriptions: Vec<Option<u32>>,
 }
@@ -56,7 +60,8 @@ impl Client {
             .max_message_size(Some(LONGEST_ASKED))
             .max_frame_size(Some(LONGEST_ASKED));
         let greeting: Greeting = greet;
-        let mut client = Self { link: Link::Greeted(None), subscriptions: vec![None; channels] };
+        let subscriptions = vec![None; channels];
+        let mut client = Self { link: Link::Greeted(None), turns: GREETING_TURNS, subscriptions };
         client.greeted(accept_hdr_with_config(stream, greeting, Some(config)), welcome)?;
         Ok(client)
     }
@@ -87,6 +92,7 @@ impl Client {
     /// Goes on greeting, or hears what the client asks.
     pub(super) fn hear(&mut self, welcome: &[String]) -> Result<(), Gone> {
         if let Link::Greeted(handshake) = &mut self.link {
+            self.turns = self.turns.checked_sub(1).ok_or(Gone)?;
             let handshake = handshake.take().ok_or(Gone)?;
             self.greeted(handshake.handshake(), welcome)?;
         }

@@ -2,29 +2,36 @@
 //! elsewhere.
 //!
 //! It looks at what the logger drains anyway and writes to standard error; no other process knows of it.
+//! It changes nothing of the terminal that outlives a picture.
+
+mod seen;
+#[cfg(test)]
+mod tests;
 
 use std::fmt::Write as _;
 use std::io::{self, IsTerminal, Write as _};
 
-use masseter_shared::can::tap::{self, Tapped};
-use masseter_shared::can::wire::{self, Rates};
+use masseter_shared::can::wire::Rates;
 use masseter_shared::clock::SECOND_NS;
 use masseter_shared::geometry::AXIS_NAMES;
 use masseter_shared::messages::codes::{ControllerState, DriveCondition};
-use masseter_shared::messages::{Reading, State};
-use nalgebra::Vector3;
 
-use crate::recording::{Recorded, Topic};
+use crate::live::Watched;
+use crate::recording::Recorded;
+use seen::{CLASS_NAMES, Lateness, Seen};
 
 /// How often a line is written, ns.
 const LINE_NS: u64 = SECOND_NS;
 /// How often the picture is drawn, ns.
 const PICTURE_NS: u64 = SECOND_NS / 5;
-/// Upper ends of the histogram's classes, ns late; what is later has a class of its own.
-const CLASSES_NS: [u64; 5] = [1_000, 10_000, 100_000, 1_000_000, 10_000_000];
-const CLASS_NAMES: [&str; 6] = ["1 µs", "10 µs", "100 µs", "1 ms", "10 ms", "later"];
-/// Length of the histogram's longest bar.
-const BAR: f64 = 40.0;
+/// Length of the longest bar.
+const BAR: usize = 40;
+/// To the beginning of the line, and nothing of what stood below; a picture begins with it.
+const ERASE_BELOW: &str = "\r\x1b[J";
+/// Lines that are too long end at the edge of the terminal while the picture is drawn, and wrap again
+/// afterwards: a wrapped line would move the picture.
+const CUT_LINES: &str = "\x1b[?7l";
+const WRAP_LINES: &str = "\x1b[?7h";
 
 /// How progress is shown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -40,114 +47,23 @@ pub(super) enum Mode {
 impl Mode {
     /// What suits standard error.
     pub(super) fn suitable(quiet: bool) -> Self {
-        if quiet {
-            Self::Quiet
-        } else if io::stderr().is_terminal() {
-            Self::Picture
-        } else {
-            Self::Lines
+        let can_move_cursor =
+            io::stderr().is_terminal() && std::env::var_os("TERM").is_some_and(|t| t != "dumb");
+        match (quiet, can_move_cursor) {
+            (true, _) => Self::Quiet,
+            (false, true) => Self::Picture,
+            (false, false) => Self::Lines,
         }
     }
 }
 
-/// What has been seen lately.
-#[derive(Debug, Default)]
-struct Seen {
-    state: State,
-    reading: Reading,
-    /// Wake-ups of both loops since the last picture, by their class.
-    late: [u64; CLASS_NAMES.len()],
-    /// Time that frames took on each bus since the last picture, ns.
-    busy_ns: Vec<u64>,
-    /// Last sequence number of each topic with one publisher.
-    last: [u64; Topic::ALL.len()],
-    dropped: u64,
-}
-
-impl Seen {
-    fn take(&mut self, message: &Recorded, rates: Rates) {
-        match message {
-            Recorded::State(state) => {
-                self.late(state.woke_ns.saturating_sub(state.due_ns));
-                self.count(Topic::State, state.seq);
-                self.state = *state;
-            }
-            Recorded::Reading(reading) => {
-                self.late(reading.woke_ns.saturating_sub(reading.due_ns));
-                self.count(Topic::Reading, reading.seq);
-                self.reading = *reading;
-            }
-            Recorded::Frame(frame) => {
-                self.count(Topic::Frame, frame.seq);
-                if let Ok(Tapped::Frame(received)) = tap::decode(frame) {
-                    let bus = usize::from(frame.bus);
-                    self.busy_ns.resize(self.busy_ns.len().max(bus + 1), 0);
-                    self.busy_ns[bus] += rates.duration_ns(wire::frame_bits(&received.frame));
-                }
-            }
-            Recorded::Command(command) => self.count(Topic::Command, command.seq),
-            Recorded::Truth(truth) => self.count(Topic::Truth, truth.seq),
-            Recorded::Event(_) => {}
-        }
-    }
-
-    fn late(&mut self, late_ns: u64) {
-        let class = CLASSES_NS.iter().position(|end_ns| late_ns < *end_ns).unwrap_or(CLASSES_NS.len());
-        self.late[class] += 1;
-    }
-
-    fn count(&mut self, topic: Topic, seq: u64) {
-        let last = &mut self.last[topic as usize];
-        self.dropped += seq.saturating_sub(*last + 1);
-        *last = seq;
-    }
-
-    /// Distance of the estimated from the wanted platform, mm.
-    fn error_mm(&self) -> f64 {
-        let wanted = Vector3::from(self.state.desired_position_m);
-        let found = Vector3::from(self.state.estimated_position_m);
-        (wanted - found).norm() * 1e3
-    }
-
-    fn controller(&self) -> &'static str {
-        ControllerState::try_from(self.state.controller_state).map_or("?", ControllerState::name)
-    }
-
-    fn skipped(&self) -> u64 {
-        self.state.skipped_cycles + self.reading.skipped_cycles
-    }
-
-    fn line(&self, lost: u64) -> String {
-        format!(
-            "  {:<13} cycle {:>8}   motion {:>7.2} s   platform off by {:>6.3} mm   skipped {}   dropped {}",
-            self.controller(),
-            self.state.cycle,
-            self.state.motion_time_s.max(0.0),
-            self.error_mm(),
-            self.skipped(),
-            self.dropped + lost,
-        )
-    }
-
-    /// The picture; `passed_ns` since the last one.
-    fn picture(&self, lost: u64, passed_ns: u64) -> Result<String, std::fmt::Error> {
-        let mut text = self.line(lost) + "\n";
-        let most = self.late.iter().copied().max().unwrap_or(0).max(1) as f64;
-        for (name, count) in CLASS_NAMES.iter().zip(self.late) {
-            let bar = "█".repeat((count as f64 / most * BAR).ceil() as usize);
-            writeln!(text, "  wake-up within {name:>6} {count:>7} {bar}")?;
-        }
-        text.push_str("  buses ");
-        for (bus, busy_ns) in self.busy_ns.iter().enumerate() {
-            write!(text, "  can{bus} {:>3.0} %", *busy_ns as f64 / passed_ns as f64 * 100.0)?;
-        }
-        text.push_str("\n  drives");
-        for (axis, state) in AXIS_NAMES.iter().zip(self.reading.drive_state) {
-            write!(text, "  {axis} {}", DriveCondition::try_from(state).map_or("?", DriveCondition::name))?;
-        }
-        text.push('\n');
-        Ok(text)
-    }
+/// What others have to say of a run.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Told {
+    /// Messages that were received and not recorded.
+    pub lost: u64,
+    /// Who watches elsewhere, if anybody may.
+    pub live: Option<Watched>,
 }
 
 /// Shows how the run goes.
@@ -155,103 +71,170 @@ impl Seen {
 pub(super) struct View {
     mode: Mode,
     seen: Seen,
-    rates: Rates,
+    /// How long the motion lasts, s, if that is known.
+    motion_s: Option<f64>,
     shown_ns: u64,
     /// Lines of the picture that stands on the terminal.
     standing: usize,
 }
 
 impl View {
-    pub(super) fn new(mode: Mode, rates: Rates, now_ns: u64) -> Self {
-        Self { mode, seen: Seen::default(), rates, shown_ns: now_ns, standing: 0 }
+    pub(super) fn new(mode: Mode, rates: Rates, motion_s: Option<f64>, now_ns: u64) -> Self {
+        Self { mode, seen: Seen::new(rates), motion_s, shown_ns: now_ns, standing: 0 }
     }
 
     /// Looks at a message.
     pub(super) fn take(&mut self, message: &Recorded) {
         if self.mode != Mode::Quiet {
-            self.seen.take(message, self.rates);
+            self.seen.take(message);
         }
     }
 
-    /// Shows what was seen, if it is time to. `lost` messages were received and not recorded.
-    pub(super) fn show(&mut self, now_ns: u64, lost: u64) {
+    /// Shows what was seen, if it is time to.
+    pub(super) fn show(&mut self, now_ns: u64, told: Told) {
         let passed_ns = now_ns.saturating_sub(self.shown_ns);
         match self.mode {
-            Mode::Lines if passed_ns >= LINE_NS => eprintln!("{}", self.seen.line(lost)),
-            Mode::Picture if passed_ns >= PICTURE_NS => self.draw(passed_ns, lost),
+            Mode::Lines if passed_ns >= LINE_NS => eprintln!("{}", self.line(told)),
+            Mode::Picture if passed_ns >= PICTURE_NS => self.draw(passed_ns, told),
             _ => return,
         }
         self.shown_ns = now_ns;
-        self.seen.late = Default::default();
-        self.seen.busy_ns.fill(0);
+        self.seen.forget_lately();
+    }
+
+    /// Shows the last that was seen.
+    pub(super) fn end(&mut self, now_ns: u64, told: Told) {
+        if self.mode == Mode::Picture {
+            self.draw(now_ns.saturating_sub(self.shown_ns).max(1), told);
+        }
     }
 
     /// Draws over the picture before. A terminal that is gone is no fault of the run.
-    fn draw(&mut self, passed_ns: u64, lost: u64) {
-        let picture = self.seen.picture(lost, passed_ns).expect("a string takes any text");
+    fn draw(&mut self, passed_ns: u64, told: Told) {
+        let picture = self.picture(told, passed_ns).expect("a string takes any text");
         let up = if self.standing > 0 { format!("\x1b[{}A", self.standing) } else { String::new() };
-        let lines = picture.replace('\n', "\x1b[K\n");
-        let _ = io::stderr().write_all((up + &lines).as_bytes());
+        let text = format!("{up}{ERASE_BELOW}{CUT_LINES}{picture}{WRAP_LINES}");
+        let _ = io::stderr().write_all(text.as_bytes());
         self.standing = picture.lines().count();
+    }
+
+    fn line(&self, told: Told) -> String {
+        let seen = &self.seen;
+        let worst_ns = seen.controller.of_run_ns.max().max(seen.plant.of_run_ns.max());
+        format!(
+            "  {:<13} {}   off by {:>6.3} mm, at most {:.3}   late at most {:.0} µs   missed {}   {}",
+            self.controller(),
+            self.motion(),
+            seen.error_now_mm(),
+            seen.error_mm.largest,
+            worst_ns as f64 / 1e3,
+            seen.missed(),
+            self.dropped(told),
+        )
+    }
+
+    /// The picture; `passed_ns` since the last one.
+    fn picture(&self, told: Told, passed_ns: u64) -> Result<String, std::fmt::Error> {
+        let Seen { state, controller, plant, error_mm, .. } = &self.seen;
+        let mut text = String::new();
+        writeln!(text, "  {:<13} {}  {}", self.controller(), self.motion(), self.progress())?;
+        writeln!(
+            text,
+            "  cycle {:>8}   missed {}   {}",
+            state.cycle,
+            self.seen.missed(),
+            self.dropped(told)
+        )?;
+        writeln!(
+            text,
+            "  platform off by {:.3} mm, rms {:.3}, at most {:.3}",
+            self.seen.error_now_mm(),
+            error_mm.rms(),
+            error_mm.largest,
+        )?;
+        writeln!(text, "  woke late, µs      p50       p99       max")?;
+        write_percentiles(&mut text, "controller", controller)?;
+        write_percentiles(&mut text, "plant", plant)?;
+        write_classes(&mut text, controller, plant)?;
+        self.write_buses(&mut text, passed_ns)?;
+        self.write_drives(&mut text)?;
+        Ok(text)
+    }
+
+    fn controller(&self) -> &'static str {
+        self.seen.controller_state().map_or("?", ControllerState::name)
+    }
+
+    fn motion_time_s(&self) -> f64 {
+        self.seen.state.motion_time_s.max(0.0)
+    }
+
+    fn motion(&self) -> String {
+        let time_s = self.motion_time_s();
+        match self.motion_s {
+            Some(motion_s) => format!("motion {time_s:>7.2} of {motion_s:.2} s"),
+            None => format!("motion {time_s:>7.2} s"),
+        }
+    }
+
+    fn progress(&self) -> String {
+        self.motion_s.map_or_else(String::new, |motion_s| {
+            let share = (self.motion_time_s() / motion_s.max(f64::MIN_POSITIVE)).min(1.0);
+            let done = (share * BAR as f64) as usize;
+            format!("{}{} {:>3.0} %", "█".repeat(done), "░".repeat(BAR - done), share * 100.0)
+        })
+    }
+
+    fn dropped(&self, Told { lost, live }: Told) -> String {
+        let dropped = format!("dropped {}", self.seen.missing + lost);
+        match live {
+            Some(Watched { clients, dropped: unseen }) => {
+                format!("{dropped}   live {clients} watching, {unseen} dropped")
+            }
+            None => dropped,
+        }
+    }
+
+    fn write_buses(&self, text: &mut String, passed_ns: u64) -> std::fmt::Result {
+        text.push_str("  buses ");
+        for (bus, busy_ns) in self.seen.busy_ns.iter().enumerate() {
+            write!(text, "  can{bus} {:>3.0} %", *busy_ns as f64 / passed_ns as f64 * 100.0)?;
+        }
+        writeln!(text)
+    }
+
+    fn write_drives(&self, text: &mut String) -> std::fmt::Result {
+        let name = |code| DriveCondition::try_from(code).map_or("?", DriveCondition::name);
+        let conditions = self.seen.reading.drive_state.map(name);
+        if conditions.iter().all(|condition| *condition == conditions[0]) {
+            return writeln!(text, "  drives   all {}", conditions[0]);
+        }
+        text.push_str("  drives ");
+        for (axis, condition) in AXIS_NAMES.iter().zip(conditions) {
+            write!(text, "  {axis} {condition}")?;
+        }
+        writeln!(text)
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use masseter_shared::can::Bitrate;
-    use masseter_shared::geometry::AXES;
-    use masseter_shared::messages::FrameTap;
+fn write_percentiles(
+    text: &mut String,
+    name: &str,
+    Lateness { of_run_ns, .. }: &Lateness,
+) -> std::fmt::Result {
+    let [p50, p99] = [0.5, 0.99].map(|quantile| of_run_ns.value_at_quantile(quantile) as f64 / 1e3);
+    let max = of_run_ns.max() as f64 / 1e3;
+    writeln!(text, "    {name:<12} {p50:>8.1}  {p99:>8.1}  {max:>8.1}")
+}
 
-    use super::*;
-
-    fn seen() -> Seen {
-        let mut seen = Seen::default();
-        let rates = Rates::classical(Bitrate::MAX);
-        for cycle in 1..=10 {
-            seen.take(
-                &Recorded::State(State {
-                    seq: cycle,
-                    cycle,
-                    due_ns: 1000,
-                    woke_ns: if cycle == 3 { 51_000 } else { 1100 },
-                    controller_state: ControllerState::Running.code(),
-                    estimated_position_m: [0.002, 0.0, 0.0],
-                    ..Default::default()
-                }),
-                rates,
-            );
-        }
-        seen.take(
-            &Recorded::Reading(Reading {
-                seq: 4,
-                drive_state: [DriveCondition::OperationEnabled.code(); AXES],
-                ..Default::default()
-            }),
-            rates,
-        );
-        seen.take(&Recorded::Frame(FrameTap { seq: 1, bus: 1, length: 8, ..Default::default() }), rates);
-        seen
+/// Both loops' wake-ups since the last picture.
+fn write_classes(text: &mut String, controller: &Lateness, plant: &Lateness) -> std::fmt::Result {
+    let counts: [u64; CLASS_NAMES.len()] =
+        std::array::from_fn(|class| controller.lately[class] + plant.lately[class]);
+    let most = counts.iter().copied().max().unwrap_or(0).max(1);
+    for (name, count) in CLASS_NAMES.iter().zip(counts) {
+        let bar = "█".repeat((count * BAR as u64).div_ceil(most) as usize);
+        writeln!(text, "    within {name:>6} {count:>7} {bar}")?;
     }
-
-    #[test]
-    fn the_line_says_state_error_and_losses() {
-        let line = seen().line(2);
-        for words in ["running", "cycle       10", "off by  2.000 mm", "skipped 0", "dropped 5"] {
-            assert!(line.contains(words), "{words}: {line}");
-        }
-    }
-
-    #[test]
-    fn the_picture_shows_histogram_buses_and_drives() {
-        let seen = seen();
-        let picture = seen.picture(0, seen.busy_ns[1] * 4).unwrap();
-        for words in [
-            "within   1 µs      10",
-            "within 100 µs       1",
-            "can0   0 %  can1  25 %",
-            "l3 operation_enabled",
-        ] {
-            assert!(picture.contains(words), "{words}: {picture}");
-        }
-    }
+    Ok(())
 }

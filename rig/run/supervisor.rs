@@ -64,8 +64,8 @@ pub fn run(plan: &Plan, folder: &RunFolder, args: &RunArgs) -> anyhow::Result<En
     let interrupts = count_interrupts().context("cannot listen for signals")?;
     let domain = Domain::named(&format!("{}-{:x}", std::process::id(), clock::now_ns()))?;
     let claim = domain.claim()?;
-    let result =
-        Rig::spawn(folder, &domain, args).and_then(|mut rig| rig.run(plan, args.require_rt, &interrupts));
+    let result = Rig::spawn(plan, folder, &domain, args)
+        .and_then(|mut rig| rig.run(plan, args.require_rt, &interrupts));
     drop(claim);
     domain.sweep()?;
     result
@@ -94,14 +94,15 @@ struct Rig {
 }
 
 impl Rig {
-    fn spawn(folder: &RunFolder, domain: &Domain, args: &RunArgs) -> anyhow::Result<Self> {
+    fn spawn(plan: &Plan, folder: &RunFolder, domain: &Domain, args: &RunArgs) -> anyhow::Result<Self> {
         let scenario = folder.scenario();
         let scenario = scenario.to_str().context("the run folder's path is not UTF-8")?;
         let recording = folder.recording();
         let recording = recording.to_str().context("the run folder's path is not UTF-8")?;
         let common = ["--scenario", scenario, "--domain", domain.id()];
         let live = args.live.map(|address| format!("--live={address}"));
-        let mut for_logger = [&common[..], &["--recording", recording]].concat();
+        let motion = format!("--motion-s={}", plan.trajectory.duration_s());
+        let mut for_logger = [&common[..], &["--recording", recording, &motion]].concat();
         for_logger.extend(args.quiet.then_some("--quiet"));
         for_logger.extend(live.as_deref());
         Ok(Self {

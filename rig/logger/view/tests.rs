@@ -1,0 +1,76 @@
+use masseter_shared::can::Bitrate;
+use masseter_shared::geometry::AXES;
+use masseter_shared::messages::{FrameTap, Reading, State};
+
+use super::*;
+
+fn view() -> View {
+    let mut view = View::new(Mode::Picture, Rates::classical(Bitrate::MAX), Some(4.0), 0);
+    for cycle in 1..=10 {
+        view.take(&Recorded::State(State {
+            seq: cycle,
+            cycle,
+            reading_cycle: cycle,
+            due_ns: 1000,
+            woke_ns: if cycle == 3 { 51_000 } else { 1100 },
+            motion_time_s: 1.0,
+            controller_state: ControllerState::Running.code(),
+            estimated_position_m: [if cycle == 3 { 0.004 } else { 0.002 }, 0.0, 0.0],
+            ..Default::default()
+        }));
+    }
+    view.take(&Recorded::Reading(Reading {
+        seq: 4,
+        drive_state: [DriveCondition::OperationEnabled.code(); AXES],
+        ..Default::default()
+    }));
+    view.take(&Recorded::Frame(FrameTap { seq: 1, bus: 1, length: 8, ..Default::default() }));
+    view
+}
+
+fn assert_says(text: &str, words: &[&str]) {
+    for words in words {
+        assert!(text.contains(words), "{words}: {text}");
+    }
+}
+
+#[test]
+fn the_line_says_state_error_and_losses() {
+    let line = view().line(Told { lost: 2, live: Some(Watched { clients: 1, dropped: 7 }) });
+    let expected = [
+        "running",
+        "motion    1.00 of 4.00 s",
+        "off by  2.000 mm, at most 4.000",
+        "late at most 50 µs",
+        "missed 0",
+        "dropped 5",
+        "live 1 watching, 7 dropped",
+    ];
+    assert_says(&line, &expected);
+}
+
+#[test]
+fn the_picture_shows_progress_error_lateness_buses_and_drives() {
+    let view = view();
+    let picture = view.picture(Told::default(), view.seen.busy_ns[1] * 4).unwrap();
+    let expected = [
+        "25 %",
+        "cycle       10",
+        "rms 2.280, at most 4.000",
+        "controller        0.1",
+        "within   1 µs      10",
+        "within 100 µs       1",
+        "can0   0 %  can1  25 %",
+        "all operation_enabled",
+    ];
+    assert_says(&picture, &expected);
+    assert!(!picture.contains("live"), "{picture}");
+}
+
+#[test]
+fn drives_that_differ_are_told_apart() {
+    let mut view = view();
+    view.seen.reading.drive_state[5] = DriveCondition::Fault.code();
+    let picture = view.picture(Told::default(), 1).unwrap();
+    assert_says(&picture, &["l2 operation_enabled", "l3 fault"]);
+}

@@ -1,0 +1,79 @@
+"""Looks at a run on a terminal: `pyte` renders what a person would see.
+
+Fails when the picture is not redrawn in its place, when the verdict does not stand readable below it, or when the
+terminal is not left as it was: after a run, after Ctrl-C, with --quiet and on a terminal that only prints.
+"""
+
+import os
+import pty
+import signal
+import sys
+import tempfile
+import termios
+import time
+from pathlib import Path
+
+import pyte
+
+# Narrower than the longest line of the picture, and longer than everything that is said.
+COLUMNS, LINES = 60, 300
+INTERRUPTED = 130
+# The rig passed, or the machine was too disturbed: the terminal is judged here, not the rig.
+ACCEPTED = (0, 3, 6)
+PICTURE = "woke late, µs"
+VERDICTS = ("PASS: ", "INVALID: ", "INCOMPLETE: ", "INTERRUPTED: ")
+
+
+def run(masseter, arguments, term="xterm-256color", interrupt_after=None):
+    """Runs on a terminal of its own; returns exit code, output and what stands on the screen."""
+    with tempfile.TemporaryDirectory() as folder:
+        command = [masseter, "run", "--out", str(Path(folder) / "run"), *arguments]
+        process, terminal = pty.fork()
+        if process == 0:
+            os.environ["TERM"] = term
+            os.execv(masseter, command)
+        termios.tcsetwinsize(terminal, (LINES, COLUMNS))
+        before = termios.tcgetattr(terminal)
+        output, interrupted = b"", interrupt_after is None
+        while True:
+            try:
+                output += os.read(terminal, 1 << 16)
+            except OSError:  # The last process has closed it.
+                break
+            if not interrupted and interrupt_after in output.decode(errors="replace"):
+                time.sleep(0.5)
+                os.write(terminal, b"\x03")
+                interrupted = True
+            assert termios.tcgetattr(terminal) == before, "the terminal's modes were changed"
+        code = os.waitstatus_to_exitcode(os.waitpid(process, 0)[1])
+    screen = pyte.Screen(COLUMNS, LINES)
+    pyte.ByteStream(screen).feed(output)
+    assert pyte.modes.DECAWM in screen.mode and not screen.cursor.hidden, "the terminal was not left as it was"
+    return code, output.decode(), [line.rstrip() for line in screen.display]
+
+
+def assert_one_picture_above_a_verdict(shown):
+    pictures = [number for number, line in enumerate(shown) if PICTURE in line]
+    verdicts = [number for number, line in enumerate(shown) if line.startswith(VERDICTS)]
+    assert len(pictures) == 1, "\n".join(shown)
+    assert len(verdicts) == 1 and verdicts[0] > pictures[0], "\n".join(shown)
+
+
+signal.alarm(120)
+masseter = os.path.abspath(sys.argv[1])
+
+code, output, shown = run(masseter, ["--duration", "3s"])
+assert code in ACCEPTED, (code, output)
+assert output.count(PICTURE) >= 2, "the picture was not redrawn"
+assert_one_picture_above_a_verdict(shown)
+print("\n".join(line for line in shown if line))
+
+code, output, shown = run(masseter, ["--duration", "60s"], interrupt_after="running")
+assert code == INTERRUPTED, (code, output)
+assert_one_picture_above_a_verdict(shown)
+
+code, output, shown = run(masseter, ["--duration", "1s"], term="dumb")
+assert code in ACCEPTED and "\x1b" not in output and "off by" in output, (code, output)
+
+code, output, shown = run(masseter, ["--duration", "1s", "--quiet"])
+assert code in ACCEPTED and PICTURE not in output and "\x1b" not in output and "off by" not in output, output
