@@ -1,0 +1,124 @@
+#!/usr/bin/env python3
+"""What being watched costs the loops: runs alone, with the picture on a terminal, and with a WebSocket client that
+takes every message, in turn, again and again.
+
+    tests/realtime/watching.py target/release/masseter --rounds 5 --seconds 12
+
+Prints p50, p99, p99.9 and maximum of both loops' wake-up and of the controller's cycle: the median of the rounds, and
+the least and the most of them. Only the Python standard library is used.
+"""
+
+import argparse
+import json
+import os
+import pty
+import random
+import socket
+import statistics
+import struct
+import subprocess
+import tempfile
+import threading
+from pathlib import Path
+
+CHANNELS = 8
+INTERVALS = ("plant wake-up", "controller wake-up", "controller cycle")
+# p99.9 is told from 10,000 cycles on.
+QUANTILES = ("p50_ns", "p99_ns", "p999_ns", "max_ns")
+
+
+def frame(text):
+    """A WebSocket text frame of a client, masked with zeros."""
+    data = text.encode()
+    assert 126 <= len(data) < 1 << 16
+    return struct.pack(">BBH4x", 0x81, 0xFE, len(data)) + data
+
+
+def take_everything(address):
+    """Subscribes to every channel and reads all that comes; returns how many bytes came."""
+    host, port = address.split(":")
+    with socket.create_connection((host, int(port))) as link:
+        link.sendall(
+            f"GET / HTTP/1.1\r\nHost: {address}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+            "Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\nSec-WebSocket-Version: 13\r\n"
+            "Sec-WebSocket-Protocol: foxglove.sdk.v1\r\n\r\n".encode()
+        )
+        wanted = [{"id": channel, "channelId": channel} for channel in range(CHANNELS)]
+        link.sendall(frame(json.dumps({"op": "subscribe", "subscriptions": wanted})))
+        total = 0
+        while data := link.recv(1 << 20):
+            total += len(data)
+        return total
+
+
+def alone(command):
+    return subprocess.run([*command, "--quiet"], stdout=subprocess.DEVNULL).returncode
+
+
+def terminal(command):
+    """On a terminal of its own, which somebody reads."""
+    process, screen = pty.fork()
+    if process == 0:
+        os.environ["TERM"] = "xterm"
+        os.execv(command[0], command)
+    try:
+        while os.read(screen, 1 << 16):
+            pass
+    except OSError:  # The last process has closed it.
+        pass
+    return os.waitstatus_to_exitcode(os.waitpid(process, 0)[1])
+
+
+def live(command):
+    """With a client that takes every message."""
+    rig = subprocess.Popen(
+        [*command, "--live=127.0.0.1:0"], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
+    )
+    address = next(line.split()[2] for line in rig.stderr if line.startswith("live on ")).removeprefix("ws://")
+    taken = []
+    watcher = threading.Thread(target=lambda: taken.append(take_everything(address)))
+    watcher.start()
+    said = rig.stderr.read()
+    code = rig.wait()
+    watcher.join()
+    assert taken[0] > 1_000_000, taken
+    assert "not shown live" not in said, said
+    return code
+
+
+def figures(masseter, how, seconds):
+    with tempfile.TemporaryDirectory() as folder:
+        run = Path(folder) / "run"
+        how([masseter, "run", "--duration", f"{seconds}s", "--out", str(run)])
+        summary = json.loads((run / "summary.json").read_text())
+        print(f"  {how.__name__:<9} {summary['verdict']['word']}", flush=True)
+        return {interval["name"]: interval for interval in summary["figures"]["intervals"]}
+
+
+def spread(values_ns):
+    """Median, least and most, µs."""
+    middle, least, most = (of(values_ns) / 1e3 for of in (statistics.median, min, max))
+    return f"{middle:.1f} ({least:.1f}–{most:.1f})"
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("masseter", type=Path)
+    parser.add_argument("--rounds", type=int, default=5)
+    parser.add_argument("--seconds", type=int, default=12)
+    arguments = parser.parse_args()
+    ways = [alone, terminal, live]
+    chance = random.Random(1)
+    runs = {way: [] for way in ways}
+    for _ in range(arguments.rounds):
+        for way in chance.sample(ways, len(ways)):
+            runs[way].append(figures(str(arguments.masseter.resolve()), way, arguments.seconds))
+    for name in INTERVALS:
+        print(f"{name + ', µs':<24}" + "".join(f"{quantile.removesuffix('_ns'):>26}" for quantile in QUANTILES))
+        for way in ways:
+            cells = (spread([intervals[name][quantile] for intervals in runs[way]]) for quantile in QUANTILES)
+            print(f"  {way.__name__:<22}" + "".join(f"{cell:>26}" for cell in cells))
+
+
+if __name__ == "__main__":
+    main()
