@@ -1,18 +1,20 @@
 #!/usr/bin/env python3
 """Kills or stops one process of a running rig at a random moment, again and again, and shows as a
-distribution how soon the survivor reacts, how soon the supervisor has swept up, and what is left behind.
+distribution how soon the survivor reacts, how soon the supervisor has swept up, what a killed logger's recording
+lacks, and what is left behind.
 
     tests/realtime/kill.py target/release/masseter --kills 200
     tests/realtime/kill.py target/release/masseter --kills 200 --signal STOP
 
-Fails when a survivor does not react within the bound, or anything stays in shared memory. Only the Python
-standard library is used.
+Fails when a survivor does not react within the bound, when a killed logger's recording lacks more than its last
+second or cannot be recovered, or when anything stays in shared memory. Only the Python standard library is used.
 """
 
 import argparse
 import json
 import os
 import random
+import re
 import signal
 import subprocess
 import sys
@@ -22,6 +24,8 @@ from pathlib import Path
 
 # The survivors count 20 silent cycles of 1 ms; the rest is for machines that stand still for a while.
 REACTION_BOUND_MS = 100.0
+LOSS_BOUND_MS = 1000.0
+INCOMPLETE = 6
 STOPPED_S = 0.3
 REACTION = {"controller": "command_lost", "plant": "stale_reading"}
 SCENARIO = "duration_s = 60.0\n[checks]\nmissed_cycles = 1000000\ntracking_rms_mm = 1000.0\n"
@@ -53,7 +57,7 @@ def wait_until_it_records(run):
 
 
 class Disturbed(Exception):
-    """The machine stopped the rig before the hit."""
+    """The machine stopped or starved the rig before the hit."""
 
 
 def reaction_ms(run, role, hit_ns):
@@ -70,12 +74,34 @@ def reaction_ms(run, role, hit_ns):
     raise SystemExit(f"the {role} was hit and nobody reported {REACTION[role]}: {faults}")
 
 
+def log(masseter, verb, recording, expected, *more):
+    """What `masseter log` says of a recording."""
+    words = [masseter, "log", verb, recording, *more]
+    result = subprocess.run(words, capture_output=True, text=True)
+    if result.returncode != expected:
+        raise SystemExit(f"log {verb} ended with {result.returncode}: {result.stdout}{result.stderr}")
+    return result.stdout
+
+
+def lost_ms(masseter, run, hit_ns):
+    """What the recording of a killed logger lacks at its end, ms; everything before that can be read."""
+    recording, recovered = run / "recording.mcap", run / "recovered.mcap"
+    proof = log(masseter, "verify", recording, INCOMPLETE)
+    if "missing:" in proof:
+        # The logger was starved before the hit, and counted that.
+        raise Disturbed
+    log(masseter, "recover", recording, 0, "--out", recovered)
+    log(masseter, "verify", recovered, 0)
+    told = re.search(r"recorded from (\d+) to (\d+) ns", log(masseter, "info", recording, INCOMPLETE))
+    return max(0.0, (hit_ns - int(told[2])) / 1e6)
+
+
 def left_behind(supervisor):
     return [name for name in os.listdir("/dev/shm") if name.startswith(f"masseter_{os.getuid()}_{supervisor}-")]
 
 
 def hit_once(masseter, role, how, chance):
-    """One rig, one hit: reaction and clean-up times, ms."""
+    """One rig, one hit: reaction, clean-up and loss, ms."""
     with tempfile.TemporaryDirectory() as folder:
         scenario, run = Path(folder) / "scenario.toml", Path(folder) / "run"
         scenario.write_text(SCENARIO)
@@ -97,7 +123,8 @@ def hit_once(masseter, role, how, chance):
         left = left_behind(rig.pid)
         if left:
             raise SystemExit(f"after the {role}'s end these stayed in shared memory: {left}")
-        return reaction_ms(run, role, hit_ns), over_ms
+        loss_ms = lost_ms(masseter, run, hit_ns) if role == "logger" else None
+        return reaction_ms(run, role, hit_ns), over_ms, loss_ms
 
 
 def hits(masseter, role, how, chance, count):
@@ -109,7 +136,7 @@ def hits(masseter, role, how, chance, count):
         except Disturbed:
             disturbed += 1
             if disturbed > 10 + count:
-                raise SystemExit("the machine is too disturbed: rigs stop by themselves") from None
+                raise SystemExit("the machine is too disturbed: rigs stop or starve by themselves") from None
     return results, disturbed
 
 
@@ -124,24 +151,29 @@ def main():
     parser.add_argument("masseter", type=Path)
     parser.add_argument("--kills", type=int, default=200, help="of each process")
     parser.add_argument("--signal", choices=["KILL", "STOP"], default="KILL")
+    parser.add_argument("--role", action="append", choices=["controller", "plant", "logger"], help="only this one")
     parser.add_argument("--seed", type=int, default=1)
     arguments = parser.parse_args()
     chance = random.Random(arguments.seed)
-    roles = ["controller", "plant", "logger"] if arguments.signal == "KILL" else list(REACTION)
-    late = False
+    roles = arguments.role or (["controller", "plant", "logger"] if arguments.signal == "KILL" else list(REACTION))
+    too_much = False
     for role in roles:
         results, disturbed = hits(arguments.masseter.resolve(), role, arguments.signal, chance, arguments.kills)
-        reactions = [reaction for reaction, _ in results if reaction is not None]
+        reactions = [reaction for reaction, _, _ in results if reaction is not None]
+        losses = [loss for _, _, loss in results if loss is not None]
         title = f"{role:<10} SIG{arguments.signal} × {len(results)}"
         if reactions:
             print(f"{title}: survivor reacts     {spread(reactions)}")
-            late |= max(reactions) > REACTION_BOUND_MS
-        print(f"{title}: over and swept up   {spread([over for _, over in results])}")
+            too_much |= max(reactions) > REACTION_BOUND_MS
+        print(f"{title}: over and swept up   {spread([over for _, over, _ in results])}")
+        if losses:
+            print(f"{title}: recording lacks       {spread(losses)}")
+            too_much |= max(losses) > LOSS_BOUND_MS
         if disturbed:
-            print(f"{title}: repeated, because the machine had stopped the rig before: {disturbed}")
+            print(f"{title}: repeated, because the machine had stopped or starved the rig before: {disturbed}")
         sys.stdout.flush()
-    if late:
-        sys.exit(f"a survivor took longer than {REACTION_BOUND_MS} ms")
+    if too_much:
+        sys.exit(f"a survivor took longer than {REACTION_BOUND_MS} ms, or a recording lacks more than {LOSS_BOUND_MS} ms")
 
 
 if __name__ == "__main__":
