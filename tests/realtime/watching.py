@@ -43,6 +43,9 @@ def take_everything(address):
             "Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\nSec-WebSocket-Version: 13\r\n"
             "Sec-WebSocket-Protocol: foxglove.sdk.v1\r\n\r\n".encode()
         )
+        answer = b""
+        while b"\r\n\r\n" not in answer:
+            answer += link.recv(1)
         wanted = [{"id": channel, "channelId": channel} for channel in range(CHANNELS)]
         link.sendall(frame(json.dumps({"op": "subscribe", "subscriptions": wanted})))
         total = 0
@@ -96,7 +99,9 @@ def figures(masseter, how, seconds):
 
 
 def spread(values_ns):
-    """Median, least and most, µs."""
+    """Median, least and most, µs; a dash where a run was too short to tell."""
+    if None in values_ns:
+        return "–"
     middle, least, most = (of(values_ns) / 1e3 for of in (statistics.median, min, max))
     return f"{middle:.1f} ({least:.1f}–{most:.1f})"
 
