@@ -16,6 +16,7 @@ use crate::can::{PlanArgs, ServeArgs};
 use crate::exit::{Exit, Failure};
 use crate::log::{self, LogVerb};
 use crate::logger::Show;
+use crate::study::{self, KinematicsArgs};
 use crate::uniqueness::{self, UniquenessVerb};
 use crate::{bench, can, clean, doctor, kinematics, live, logger, plant, report, run};
 
@@ -54,6 +55,8 @@ enum Verb {
     /// How far an input settles the pose: a proof for regions of inputs, and a search for exceptions
     #[command(subcommand)]
     Uniqueness(UniquenessVerb),
+    /// The paper's study of the forward kinematics again: figures, data and a page of its claims
+    Kinematics(KinematicsArgs),
     /// Remove what killed runs left in shared memory
     Clean,
     #[command(hide = true)]
@@ -337,6 +340,7 @@ pub fn main() -> ExitCode {
             report::compare::runs(&folder, &against, format)
         }
         Verb::Uniqueness(verb) => uniqueness::uniqueness(&verb),
+        Verb::Kinematics(args) => study::kinematics(&args),
         Verb::Report(args) => report::again(&args.folder, args.format),
         Verb::Doctor(args) => doctor::examine(args.format),
         Verb::Log { verb } => log::run(&verb),

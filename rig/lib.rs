@@ -21,4 +21,5 @@ pub mod plant;
 pub mod recording;
 pub mod report;
 pub mod run;
+pub mod study;
 pub mod uniqueness;

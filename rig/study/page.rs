@@ -1,0 +1,70 @@
+//! The page that sets each claim of the seed beside what was measured, in Markdown.
+
+use std::fmt::Write;
+
+use super::claims::Claim;
+use super::plot::Figure;
+use super::{KinematicsArgs, Study};
+
+/// The whole page. Every figure is shown with the caption of its drawing.
+pub(super) fn of(study: &Study, args: &KinematicsArgs, claims: &[Claim], figures: &[Figure]) -> String {
+    let mut page = format!(
+        "# The seed's claims beside what was measured\n\n\
+         The seed is the paper of the 6-DOF mastication mechanism and its forward kinematics; `seed` below is its \
+         solver as printed (residuals are distances, the increment is halved until the error decreases), with at \
+         most 100 iterations and 40 halvings. *From above the base*: {samples} random inputs with one true \
+         solution, each with a random guess of leg angles between 0° and 180°. Verdicts follow from the figures of \
+         this run by the criterion beside them.\n\n\
+         Masseter {version}, seed of the random numbers {seed}; again with\n\n    \
+         masseter kinematics --out DIR --seed {seed} --samples {samples} --cells {cells}{recording}\n\n\
+         Only times differ from run to run.\n\n\
+         | # | The seed's claim | Where | Measured | Criterion | Verdict |\n\
+         | --- | --- | --- | --- | --- | --- |\n",
+        samples = args.samples,
+        cells = args.cells,
+        seed = args.seed,
+        version = env!("CARGO_PKG_VERSION"),
+        recording = args
+            .trajectory
+            .as_ref()
+            .map_or(String::new(), |path| format!(" --trajectory {}", path.display())),
+    );
+    for (index, claim) in claims.iter().enumerate() {
+        let figure = claim.figure.map_or(String::new(), |name| format!(" ([figure](#{name}))"));
+        let Claim { says, place, measured, criterion, verdict, .. } = claim;
+        let number = index + 1;
+        let _ = writeln!(
+            page,
+            "| {number} | {says} | {place} | {measured}{figure} | {criterion} | **{}** |",
+            verdict.name()
+        );
+    }
+    page += &workspace(study);
+    page += "\nNot measured: what the seed says of the Stewart platform, genetic algorithms, friction and dynamics.\n";
+    for Figure { name, caption, .. } in figures {
+        let _ = write!(
+            page,
+            "\n<a id=\"{name}\"></a>\n\n![{name}]({name}.svg)\n\n{caption} ([PNG]({name}.png))\n"
+        );
+    }
+    page
+}
+
+/// How far the platform reaches in each map.
+fn workspace(study: &Study) -> String {
+    let mut lines =
+        "\n## Workspace\n\nReach within the strokes, the other coordinates as at the neutral pose:\n\n\
+                     | map | coordinate | from | to |\n| --- | --- | --- | --- |\n"
+            .to_owned();
+    for map in &study.maps {
+        for coordinate in [map.slice.across, map.slice.up] {
+            let [from, to] = map.reach(coordinate).map_or_else(
+                || ["–".to_owned(), "–".to_owned()],
+                |reach| reach.map(|value| format!("{value:.1}")),
+            );
+            let (name, label) = (map.table_name(), coordinate.label());
+            let _ = writeln!(lines, "| [{name}]({name}.csv) | {label} | {from} | {to} |");
+        }
+    }
+    lines
+}

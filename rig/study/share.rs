@@ -1,0 +1,81 @@
+//! Shares of a sample and medians.
+
+/// So many of so many.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(super) struct Share {
+    pub hits: usize,
+    pub of: usize,
+}
+
+impl Share {
+    pub(super) fn of(holds: impl IntoIterator<Item = bool>) -> Self {
+        holds.into_iter().fold(Self::default(), |share, holds| Self {
+            hits: share.hits + usize::from(holds),
+            of: share.of + 1,
+        })
+    }
+
+    /// From 0 to 1; no number for an empty sample.
+    pub(super) fn value(self) -> f64 {
+        self.hits as f64 / self.of as f64
+    }
+
+    pub(super) fn is_all(self) -> bool {
+        self.of > 0 && self.hits == self.of
+    }
+
+    /// Whether it exceeds another by three standard errors of their difference, so that another sample
+    /// would hardly tell otherwise.
+    pub(super) fn clearly_exceeds(self, other: Self) -> bool {
+        let variance = |share: Self| share.value() * (1.0 - share.value()) / share.of as f64;
+        let difference = self.value() - other.value();
+        difference > 0.0 && difference >= 3.0 * (variance(self) + variance(other)).sqrt()
+    }
+
+    /// In per cent; a share that is nearly all or nearly nothing does not read as all or nothing.
+    pub(super) fn percent(self) -> String {
+        let rounded = format!("{:.1} %", 100.0 * self.value());
+        let pretends = (rounded == "100.0 %" && !self.is_all()) || (rounded == "0.0 %" && self.hits > 0);
+        if pretends { format!("{:.3} %", 100.0 * self.value()) } else { rounded }
+    }
+}
+
+/// The value at a quantile between 0 and 1, of the sample itself; no number for an empty sample.
+pub(super) fn quantile(mut sample: Vec<f64>, quantile: f64) -> f64 {
+    sample.sort_by(f64::total_cmp);
+    let index = (quantile * sample.len().saturating_sub(1) as f64).round() as usize;
+    sample.get(index).copied().unwrap_or(f64::NAN)
+}
+
+/// The middle of a sample.
+pub(super) fn median(sample: Vec<f64>) -> f64 {
+    quantile(sample, 0.5)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_small_difference_of_small_samples_is_not_clear() {
+        let share = |hits, of| Share { hits, of };
+        assert!(!share(6, 10).clearly_exceeds(share(5, 10)));
+        assert!(share(6000, 10_000).clearly_exceeds(share(5000, 10_000)));
+        assert!(!share(5, 10).clearly_exceeds(share(5, 10)));
+        assert!(!share(0, 0).clearly_exceeds(share(0, 0)));
+    }
+
+    #[test]
+    fn nearly_all_does_not_read_as_all() {
+        assert_eq!(Share { hits: 9999, of: 10_000 }.percent(), "99.990 %");
+        assert_eq!(Share { hits: 10, of: 10 }.percent(), "100.0 %");
+        assert_eq!(Share { hits: 1, of: 10_000 }.percent(), "0.010 %");
+    }
+
+    #[test]
+    fn quantiles_are_members_of_the_sample() {
+        assert!((median(vec![3.0, 1.0, 2.0]) - 2.0).abs() < f64::EPSILON);
+        assert!((quantile(vec![1.0, 2.0, 3.0, 4.0], 1.0) - 4.0).abs() < f64::EPSILON);
+        assert!(median(Vec::new()).is_nan());
+    }
+}

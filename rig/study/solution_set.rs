@@ -1,0 +1,140 @@
+//! Figs. 6 and 8 of the seed: all ways to assemble the neutral input.
+
+use masseter_controller::kinematics::{Solution, Solutions};
+use masseter_shared::geometry::{Actuators, LEGS, Mechanism};
+
+use super::sample::distance_rad;
+use super::table::{Table, degrees, flag, number};
+
+/// Angles closer than this are one, radians: two legs' as much as two solutions'.
+const SAME_RAD: f64 = 1e-6;
+
+/// Slides in the middle, legs half out.
+#[derive(Debug, Clone)]
+pub(super) struct SolutionSet {
+    pub actuators: Actuators,
+    pub solutions: Solutions,
+}
+
+impl SolutionSet {
+    /// Of the neutral input.
+    pub(super) fn neutral(mechanism: &Mechanism) -> anyhow::Result<Self> {
+        let middle_m = |[low_m, high_m]: [f64; 2]| f64::midpoint(low_m, high_m);
+        let strokes = mechanism.strokes();
+        let actuators =
+            Actuators { slide_m: [middle_m(strokes.slide_m); LEGS], leg_m: [middle_m(strokes.leg_m); LEGS] };
+        Ok(Self { actuators, solutions: Solutions::new(mechanism, &actuators)? })
+    }
+
+    /// The true solution.
+    pub(super) fn true_one(&self) -> Option<&Solution> {
+        self.solutions.true_ones().next()
+    }
+
+    /// Those above the base: the true one first, then by their angles.
+    pub(super) fn above_base(&self) -> Vec<&Solution> {
+        let above = |solution: &&Solution| solution.assembly.legs_above_base == [true; LEGS];
+        let mut solutions: Vec<_> = self.solutions.iter().filter(above).collect();
+        solutions.sort_by_key(|one| (!one.assembly.is_true(), sorted_microdegrees(&one.theta_rad)));
+        solutions
+    }
+
+    /// Fig. 6: the solution in which only corner A₁ stands elsewhere than in the true one.
+    pub(super) fn corner_folded(&self) -> Option<&Solution> {
+        let truth = self.true_one()?.theta_rad;
+        let others_stand = |one: &&Solution| {
+            let same = |leg: usize| (one.theta_rad[leg] - truth[leg]).abs() < SAME_RAD;
+            same(1) && same(2) && !same(0)
+        };
+        self.solutions.iter().find(others_stand)
+    }
+
+    /// The class of leg angles found by a solver: equal but for the order of the legs. 0 is the true
+    /// one's, none where no solution above the base has these angles.
+    pub(super) fn class_of(&self, theta_rad: &[f64; LEGS]) -> Option<usize> {
+        let near = |one: &&&Solution| distance_rad(&one.theta_rad, theta_rad) < SAME_RAD;
+        let above = self.above_base();
+        let found = above.iter().find(near)?;
+        self.classes().iter().position(|class| *class == sorted_microdegrees(&found.theta_rad))
+    }
+
+    /// Each class's leg angles in order of size, µ°; the true one's first.
+    fn classes(&self) -> Vec<[i64; LEGS]> {
+        let mut classes: Vec<_> =
+            self.above_base().iter().map(|one| sorted_microdegrees(&one.theta_rad)).collect();
+        classes.dedup();
+        classes
+    }
+
+    /// What a legend calls the classes.
+    pub(super) fn class_names(&self) -> Vec<String> {
+        let name = |(index, class): (usize, &[i64; LEGS])| {
+            let angles = class.map(|angle| format!("{:.1}°", angle as f64 / 1e6)).join(", ");
+            if index == 0 { format!("true solution ({angles})") } else { format!("({angles})") }
+        };
+        self.classes().iter().enumerate().map(name).collect()
+    }
+
+    pub(super) fn table(&self) -> Table {
+        let header = [
+            "theta1_deg",
+            "theta2_deg",
+            "theta3_deg",
+            "above_base",
+            "hinges_below_platform",
+            "corners_in_order",
+            "positive_determinant",
+            "true",
+            "determinant",
+            "residual_m",
+            "separation_deg",
+        ];
+        let row = |one: &Solution| {
+            let assembly = &one.assembly;
+            let mut row: Vec<_> = degrees(&one.theta_rad).collect();
+            row.push(flag(assembly.legs_above_base == [true; LEGS]));
+            row.push(flag(assembly.hinges_below_platform == [true; LEGS]));
+            row.extend(
+                [assembly.corners_in_order, assembly.positive_determinant, assembly.is_true()].map(flag),
+            );
+            let separation_rad = self.solutions.separation_rad(one).unwrap_or(f64::NAN);
+            row.extend([one.determinant, one.residual_m, separation_rad.to_degrees()].map(number));
+            row
+        };
+        Table::new("fig8_solutions", &header, self.solutions.iter().map(row).collect())
+    }
+}
+
+fn sorted_microdegrees(theta_rad: &[f64; LEGS]) -> [i64; LEGS] {
+    let mut angles = theta_rad.map(|angle| (angle.to_degrees() * 1e6).round() as i64);
+    angles.sort_unstable();
+    angles
+}
+
+#[cfg(test)]
+mod tests {
+    use masseter_shared::geometry::MechanismConfig;
+
+    use super::*;
+
+    fn set() -> SolutionSet {
+        SolutionSet::neutral(&Mechanism::new(&MechanismConfig::default()).unwrap()).unwrap()
+    }
+
+    #[test]
+    fn the_neutral_input_has_eight_solutions_above_the_base_in_four_classes() {
+        let set = set();
+        assert_eq!((set.solutions.count(), set.above_base().len()), (16, 8));
+        assert_eq!(set.classes().len(), 4);
+        assert_eq!(set.class_of(&set.true_one().unwrap().theta_rad), Some(0));
+        assert_eq!(set.class_of(&[-1.0; LEGS]), None);
+    }
+
+    #[test]
+    fn the_folded_corner_is_the_one_of_the_seed() {
+        let set = set();
+        let folded = set.corner_folded().unwrap();
+        assert!((folded.theta_rad[0].to_degrees() - 66.04).abs() < 0.01);
+        assert!(folded.assembly.legs_above_base == [true; LEGS] && !folded.assembly.is_true());
+    }
+}

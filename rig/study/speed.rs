@@ -1,0 +1,161 @@
+//! Fig. 5 of the seed in time: what a solution costs each contender, all in the same run, in turns.
+
+use std::hint::black_box;
+
+use masseter_controller::kinematics::{ForwardTracker, Method, Options, solve};
+use masseter_shared::clock;
+use masseter_shared::geometry::{Actuators, LEGS, Mechanism};
+
+use super::contender::{Contender, NEWTON, SHOWN};
+use super::motions::Motion;
+use super::sample::Guesses;
+use super::share::{median, quantile};
+use super::table::{Table, number};
+use super::trials::{Trial, Trials};
+
+/// Cases timed in each situation.
+const CASES: usize = 2000;
+/// Calls between two readings of the clock: one alone would mostly time the clock.
+const CALLS: u32 = 8;
+/// A trajectory's cycle, s.
+const CYCLE_S: f64 = 1e-3;
+
+/// From where the iteration starts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Situation {
+    /// From a random guess above the base from which all three arrive.
+    Random,
+    /// From the solution one millisecond of chewing before.
+    Warm,
+}
+
+/// What one contender took in one situation.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Taken {
+    pub situation: Situation,
+    pub contender: Contender,
+    pub cases: usize,
+    pub median_ns: f64,
+    pub p99_ns: f64,
+    /// Its median over Newton–Raphson's in the same situation.
+    pub to_newton: f64,
+}
+
+/// All times of a run.
+#[derive(Debug, Clone)]
+pub(super) struct Speed {
+    pub taken: Vec<Taken>,
+}
+
+impl Situation {
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Self::Random => "random guess above the base",
+            Self::Warm => "solution 1 ms before, chewing",
+        }
+    }
+}
+
+impl Speed {
+    /// Takes one core; nothing else of the study runs meanwhile.
+    pub(super) fn measure(mechanism: &Mechanism, trials: &Trials, chewing: &Motion) -> Self {
+        let random = trials.with(Guesses::AboveBase).iter();
+        let random = random.filter(|trial| all_arrive(mechanism, trial)).take(CASES);
+        let random: Vec<_> = random.map(|trial| (trial.actuators, trial.guess_rad)).collect();
+        let mut taken = in_turns(mechanism, Situation::Random, &random);
+        taken.extend(in_turns(mechanism, Situation::Warm, &warm(mechanism, chewing)));
+        Self { taken }
+    }
+
+    /// What one of [`SHOWN`] took.
+    pub(super) fn of(&self, situation: Situation, contender: Contender) -> Taken {
+        let wanted = |taken: &&Taken| taken.situation == situation && taken.contender == contender;
+        *self.taken.iter().find(wanted).expect("all of SHOWN are timed in every situation")
+    }
+
+    pub(super) fn table(&self) -> Table {
+        let header = ["start", "solver", "cases", "median_ns", "p99_ns", "ratio_of_medians_to_newton"];
+        let row = |taken: &Taken| {
+            vec![
+                taken.situation.name().to_owned(),
+                taken.contender.name(),
+                taken.cases.to_string(),
+                number(taken.median_ns),
+                number(taken.p99_ns),
+                number(taken.to_newton),
+            ]
+        };
+        Table::new("speed", &header, self.taken.iter().map(row).collect())
+    }
+}
+
+fn all_arrive(mechanism: &Mechanism, trial: &Trial) -> bool {
+    let arrives = |contender: Contender| {
+        contender.attempt(mechanism, &trial.actuators, &trial.guess_rad).found_rad.is_ok()
+    };
+    SHOWN.into_iter().all(arrives)
+}
+
+/// Inputs of a motion, each with the leg angles of the cycle before.
+fn warm(mechanism: &Mechanism, motion: &Motion) -> Vec<(Actuators, [f64; LEGS])> {
+    let joints = |cycle: usize| mechanism.inverse(&motion.trajectory.pose(cycle as f64 * CYCLE_S)).ok();
+    let steps = (1..=CASES).filter_map(|cycle| Some((joints(cycle)?, joints(cycle - 1)?)));
+    steps.map(|(now, before)| (now.actuators, before.theta_rad)).collect()
+}
+
+/// Every case goes to every contender before the next one comes.
+fn in_turns(mechanism: &Mechanism, situation: Situation, cases: &[(Actuators, [f64; LEGS])]) -> Vec<Taken> {
+    let mut taken_ns = [(); SHOWN.len()].map(|()| Vec::with_capacity(cases.len()));
+    for (actuators, guess_rad) in cases {
+        for (contender, taken_ns) in SHOWN.into_iter().zip(&mut taken_ns) {
+            taken_ns.push(time_ns(contender, mechanism, actuators, guess_rad));
+        }
+    }
+    let medians = taken_ns.clone().map(median);
+    let newton_ns = SHOWN.into_iter().zip(medians).find(|one| one.0 == NEWTON).map_or(f64::NAN, |one| one.1);
+    let each = SHOWN.into_iter().zip(taken_ns).zip(medians);
+    each.map(|((contender, sample), median_ns)| Taken {
+        situation,
+        contender,
+        cases: cases.len(),
+        median_ns,
+        p99_ns: quantile(sample, 0.99),
+        to_newton: median_ns / newton_ns,
+    })
+    .collect()
+}
+
+/// Time of one solution, ns, without a witness.
+fn time_ns(
+    contender: Contender,
+    mechanism: &Mechanism,
+    actuators: &Actuators,
+    guess_rad: &[f64; LEGS],
+) -> f64 {
+    if let Some((method, options)) = contender.iteration() {
+        return mean_ns(|| iterate(method, mechanism, actuators, guess_rad, &options));
+    }
+    let tracker = ForwardTracker::with_guess(mechanism.clone(), *guess_rad);
+    let mut trackers: Vec<_> = (0..CALLS).map(|_| tracker.clone()).collect();
+    let mut fresh = trackers.iter_mut();
+    mean_ns(|| fresh.next().map(|tracker| tracker.update(black_box(actuators))))
+}
+
+fn iterate(
+    method: Method,
+    mechanism: &Mechanism,
+    actuators: &Actuators,
+    guess_rad: &[f64; LEGS],
+    options: &Options,
+) -> bool {
+    black_box(solve(method, mechanism, black_box(actuators), black_box(guess_rad), options)).is_ok()
+}
+
+/// The mean over [`CALLS`] calls.
+fn mean_ns<R>(mut call: impl FnMut() -> R) -> f64 {
+    let from_ns = clock::now_ns();
+    for _ in 0..CALLS {
+        black_box(call());
+    }
+    (clock::now_ns() - from_ns) as f64 / f64::from(CALLS)
+}

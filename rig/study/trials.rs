@@ -1,0 +1,232 @@
+//! Random guesses for random feasible inputs: who arrives, where, and after how many iterations.
+
+use masseter_controller::kinematics::Assembly;
+use masseter_shared::geometry::{Actuators, LEGS, Mechanism};
+use rayon::prelude::*;
+
+use super::contender::{Attempt, CONTENDERS, Contender, NEWTON, SEED};
+use super::sample::{self, GUESSES, Guesses, Stream, distance_rad};
+use super::share::{Share, median, quantile};
+use super::table::{Table, number};
+
+/// A root counts as the closest when no other is closer by more than this, radians.
+const TIE_RAD: f64 = 1e-6;
+
+/// Where an attempt ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Reached {
+    /// The true solution.
+    True,
+    /// A solution in which the mechanism cannot stand.
+    Other,
+    /// None, for this reason.
+    Nothing(&'static str),
+}
+
+/// An attempt, judged against all solutions of its input.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Judged {
+    pub attempt: Attempt,
+    pub reached: Reached,
+    /// Whether no other solution is closer to the guess.
+    pub closest: bool,
+}
+
+impl Judged {
+    pub(super) fn is_solved(&self) -> bool {
+        !matches!(self.reached, Reached::Nothing(_))
+    }
+}
+
+/// One guess for one input, given to every contender.
+#[derive(Debug, Clone)]
+pub(super) struct Trial {
+    pub actuators: Actuators,
+    pub guess_rad: [f64; LEGS],
+    /// In the order of [`CONTENDERS`].
+    pub judged: [Judged; CONTENDERS.len()],
+}
+
+/// All trials: `samples` for each of [`GUESSES`].
+#[derive(Debug, Clone)]
+pub(super) struct Trials {
+    sets: Vec<Vec<Trial>>,
+}
+
+impl Trials {
+    pub(super) fn run(mechanism: &Mechanism, samples: usize, seed: u64) -> Self {
+        let trial = |guesses: Guesses, case| {
+            let mut random = sample::generator(seed, Stream::Trials, case);
+            let input = sample::feasible(mechanism, &mut random);
+            let guess_rad = guesses.draw(&input.true_one.theta_rad, &mut random);
+            let judged = CONTENDERS.map(|contender| {
+                let attempt = contender.attempt(mechanism, &input.actuators, &guess_rad);
+                judge(mechanism, &input, &guess_rad, attempt)
+            });
+            Trial { actuators: input.actuators, guess_rad, judged }
+        };
+        let set = |guesses| (0..samples).into_par_iter().map(|case| trial(guesses, case)).collect();
+        Self { sets: GUESSES.into_iter().map(set).collect() }
+    }
+
+    /// The trials with guesses from there.
+    pub(super) fn with(&self, guesses: Guesses) -> &[Trial] {
+        let set = GUESSES.iter().position(|&set| set == guesses);
+        set.map_or(&[], |set| &self.sets[set])
+    }
+
+    /// How one contender fared with guesses from there.
+    pub(super) fn of(&self, contender: Contender, guesses: Guesses) -> impl Iterator<Item = &Judged> {
+        let place = CONTENDERS.iter().position(|&other| other == contender);
+        self.with(guesses).iter().filter_map(move |trial| Some(&trial.judged[place?]))
+    }
+
+    /// How often any solution was reached.
+    pub(super) fn solved(&self, contender: Contender, guesses: Guesses) -> Share {
+        Share::of(self.of(contender, guesses).map(Judged::is_solved))
+    }
+
+    /// How often the true solution was reached.
+    pub(super) fn true_ones(&self, contender: Contender, guesses: Guesses) -> Share {
+        Share::of(self.of(contender, guesses).map(|judged| judged.reached == Reached::True))
+    }
+
+    /// Of what was reached, how often it was the solution closest to the guess.
+    pub(super) fn closest(&self, contender: Contender, guesses: Guesses) -> Share {
+        let solved = self.of(contender, guesses).filter(|judged| judged.is_solved());
+        Share::of(solved.map(|judged| judged.closest))
+    }
+
+    /// A contender's iterations and Newton–Raphson's (same residual) where both arrive.
+    pub(super) fn against_newton(&self, contender: Contender, guesses: Guesses) -> Vec<[Attempt; 2]> {
+        let rival = match contender {
+            Contender::Seed(residual, _) => Contender::Newton(residual),
+            Contender::Newton(_) | Contender::Controller => NEWTON,
+        };
+        let both = self.of(contender, guesses).zip(self.of(rival, guesses));
+        both.filter(|(a, b)| a.is_solved() && b.is_solved()).map(|(a, b)| [a.attempt, b.attempt]).collect()
+    }
+
+    /// Success rates, one row for each contender and origin of guesses.
+    pub(super) fn success_table(&self) -> Table {
+        let header = [
+            "guesses",
+            "solver",
+            "trials",
+            "reached_true",
+            "reached_other",
+            "stalled",
+            "singular",
+            "no_convergence",
+            "refused",
+            "reached_closest",
+        ];
+        let mut rows = Vec::new();
+        for guesses in GUESSES {
+            for contender in CONTENDERS {
+                let count = |wanted: &dyn Fn(&Judged) -> bool| {
+                    self.of(contender, guesses).filter(|judged| wanted(judged)).count()
+                };
+                let failed = |reason| count(&|judged| judged.reached == Reached::Nothing(reason));
+                let [reached_true, other] =
+                    [Reached::True, Reached::Other].map(|reached| count(&|judged| judged.reached == reached));
+                let known = ["stalled", "singular", "no_convergence"].map(failed);
+                let trials = self.with(guesses).len();
+                let refused = trials - reached_true - other - known.iter().sum::<usize>();
+                let [stalled, singular, unconverged] = known;
+                let closest = count(&|judged| judged.is_solved() && judged.closest);
+                let counts = [trials, reached_true, other, stalled, singular, unconverged, refused, closest];
+                let names = [guesses.name(), contender.name()];
+                rows.push(names.into_iter().chain(counts.map(|count| count.to_string())).collect());
+            }
+        }
+        Table::new("success", &header, rows)
+    }
+
+    /// Distribution of iterations from guesses anywhere above the base.
+    pub(super) fn iterations_table(&self) -> Table {
+        let header = ["solver", "iterations", "trials"];
+        let mut rows = Vec::new();
+        for contender in CONTENDERS {
+            for (iterations, count) in self.histogram(contender).into_iter().enumerate() {
+                rows.push(vec![contender.name(), iterations.to_string(), count.to_string()]);
+            }
+        }
+        Table::new("iterations", &header, rows)
+    }
+
+    /// How many solved trials took 0, 1, 2 … iterations, from guesses anywhere above the base.
+    pub(super) fn histogram(&self, contender: Contender) -> Vec<usize> {
+        let mut counts = Vec::new();
+        for judged in self.of(contender, Guesses::AboveBase).filter(|judged| judged.is_solved()) {
+            let iterations = judged.attempt.iterations as usize;
+            if counts.len() <= iterations {
+                counts.resize(iterations + 1, 0);
+            }
+            counts[iterations] += 1;
+        }
+        counts
+    }
+
+    /// What the seed's variants and Newton–Raphson cost where both arrive.
+    pub(super) fn cost_table(&self) -> Table {
+        let header = [
+            "guesses",
+            "solver",
+            "solved_by_both",
+            "iterations_median",
+            "iterations_p90",
+            "evaluations_median",
+            "newton_iterations_median",
+            "newton_iterations_p90",
+            "newton_evaluations_median",
+        ];
+        let mut rows = Vec::new();
+        for guesses in GUESSES {
+            for contender in CONTENDERS.into_iter().filter(|one| matches!(one, Contender::Seed(..))) {
+                let both = self.against_newton(contender, guesses);
+                let iterations = |side: usize| both.iter().map(move |pair| f64::from(pair[side].iterations));
+                let evaluations =
+                    |side: usize| both.iter().map(move |pair| f64::from(pair[side].evaluations));
+                let mut row = vec![guesses.name(), contender.name(), both.len().to_string()];
+                for side in 0..2 {
+                    row.push(number(median(iterations(side).collect())));
+                    row.push(number(quantile(iterations(side).collect(), 0.9)));
+                    row.push(number(median(evaluations(side).collect())));
+                }
+                rows.push(row);
+            }
+        }
+        Table::new("cost", &header, rows)
+    }
+
+    /// Trials above the base in which one of the two arrives and the other does not:
+    /// seed alone, Newton–Raphson alone.
+    pub(super) fn alone(&self) -> [Share; 2] {
+        let both = || {
+            let newton = self.of(NEWTON, Guesses::AboveBase);
+            self.of(SEED, Guesses::AboveBase).zip(newton).map(|(a, b)| (a.is_solved(), b.is_solved()))
+        };
+        [Share::of(both().map(|(seed, newton)| seed && !newton)), Share::of(both().map(|(a, b)| b && !a))]
+    }
+}
+
+fn judge(
+    mechanism: &Mechanism,
+    input: &sample::Feasible,
+    guess_rad: &[f64; LEGS],
+    attempt: Attempt,
+) -> Judged {
+    let found_rad = match attempt.found_rad {
+        Ok(found_rad) => found_rad,
+        Err(reason) => return Judged { attempt, reached: Reached::Nothing(reason), closest: false },
+    };
+    let is_true = Assembly::new(mechanism, &input.actuators, &found_rad).is_true();
+    let from_guess = |theta_rad: &[f64; LEGS]| distance_rad(theta_rad, guess_rad);
+    let least = input.solutions.iter().map(|one| from_guess(&one.theta_rad)).fold(f64::INFINITY, f64::min);
+    Judged {
+        attempt,
+        reached: if is_true { Reached::True } else { Reached::Other },
+        closest: from_guess(&found_rad) <= least + TIE_RAD,
+    }
+}

@@ -1,0 +1,150 @@
+//! `masseter kinematics`: the folder it leaves.
+
+mod common;
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::Path;
+use std::process::Output;
+
+use resvg::tiny_skia::Pixmap;
+
+use common::{masseter, stderr, stdout};
+
+const FIGURES: [&str; 13] = [
+    "fig3_diverging",
+    "fig4_oscillating",
+    "fig3b_stalling",
+    "fig5_speed",
+    "fig6_assemblies",
+    "fig8_solutions",
+    "multiplicity",
+    "basins",
+    "success",
+    "workspace_translation",
+    "workspace_orientation",
+    "workspace_singularity",
+    "workspace_separation",
+];
+const TABLES: [(&str, &str); 15] = [
+    ("fig3_diverging", "solver,iteration,error_cm2,d1_m,"),
+    ("fig4_oscillating", "solver,iteration,error_cm2,d1_m,"),
+    ("fig3b_stalling", "solver,iteration,error_cm2,d1_m,"),
+    ("success", "guesses,solver,trials,reached_true,reached_other,stalled,"),
+    ("iterations", "solver,iterations,trials"),
+    ("cost", "guesses,solver,solved_by_both,iterations_median,"),
+    ("speed", "start,solver,cases,median_ns,p99_ns,"),
+    ("fig8_solutions", "theta1_deg,theta2_deg,theta3_deg,above_base,"),
+    ("multiplicity", "counted,solutions,inputs"),
+    ("basins", "guess1_deg,guess2_deg,guess3_deg,seed_reaches,"),
+    ("motions", "motion,within_limits,least_slide_margin_m,"),
+    ("workspace_x_z", "x_mm,z_mm,condition,determinant,regular_within_deg,separation_deg"),
+    ("workspace_y_z", "y_mm,z_mm,condition,"),
+    ("workspace_roll_pitch", "roll_deg,pitch_deg,condition,"),
+    ("workspace_yaw_pitch", "yaw_deg,pitch_deg,condition,"),
+];
+
+fn study(out: &Path, extra: &[&str]) -> Output {
+    let few = ["kinematics", "--samples", "80", "--cells", "6", "--out", out.to_str().unwrap()];
+    masseter(&[&few, extra].concat())
+}
+
+fn read(folder: &Path, name: &str) -> String {
+    fs::read_to_string(folder.join(name)).unwrap_or_else(|error| panic!("{name}: {error}"))
+}
+
+#[test]
+fn the_folder_holds_every_figure_every_table_and_a_verdict_on_every_claim() {
+    let place = tempfile::tempdir().unwrap();
+    let folder = place.path().join("study");
+    let output = study(&folder, &[]);
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+
+    let page = read(&folder, "claims.md");
+    for figure in FIGURES {
+        assert!(read(&folder, &format!("{figure}.svg")).starts_with("<svg"), "{figure}");
+        let png = Pixmap::load_png(folder.join(format!("{figure}.png"))).unwrap();
+        let ink = png.pixels().iter().filter(|pixel| pixel.red() < 200).count();
+        assert!(png.width() >= 1500 && ink > 3000, "{figure}: {} wide, {ink} dark pixels", png.width());
+        assert!(page.contains(&format!("![{figure}]({figure}.svg)")), "{figure} is not on the page");
+    }
+    for (table, header) in TABLES {
+        let text = read(&folder, &format!("{table}.csv"));
+        let mut lines = text.lines();
+        let columns = lines.next().unwrap();
+        assert!(columns.starts_with(header), "{table}: {columns}");
+        // The examples of Figs. 3 and 4 need not occur among few guesses.
+        assert!(lines.next().is_some() || table.starts_with("fig3") || table.starts_with("fig4"), "{table}");
+    }
+
+    let verdicts = ["**holds**", "**holds partly**", "**does not hold**"];
+    let claims: Vec<_> = page.lines().filter(|line| line.split('|').count() == 8).skip(2).collect();
+    assert_eq!(claims.len(), 16);
+    for claim in &claims {
+        assert!(verdicts.iter().any(|verdict| claim.contains(verdict)), "{claim}");
+        assert!(!claim.contains("NaN"), "{claim}");
+    }
+    assert_eq!(stdout(&output).lines().count(), claims.len() + 1);
+}
+
+/// Whatever this sample gives: these follow from the mechanism.
+#[test]
+fn what_is_certain_is_found() {
+    let place = tempfile::tempdir().unwrap();
+    let folder = place.path().join("study");
+    assert_eq!(study(&folder, &[]).status.code(), Some(0));
+    assert_eq!(read(&folder, "fig8_solutions.csv").lines().count(), 1 + 16);
+    assert_eq!(read(&folder, "basins.csv").lines().count(), 1 + 6 * 6);
+    let page = read(&folder, "claims.md");
+    let verdict = |claim: &str| {
+        let line = page.lines().find(|line| line.contains(claim)).unwrap();
+        line.rsplit('|').nth(1).unwrap().trim().to_owned()
+    };
+    assert_eq!(verdict("10⁻¹⁰ s on a Pentium"), "**does not hold**");
+    assert_eq!(verdict("A₁ has two positions"), "**holds**");
+    assert_eq!(verdict("several sets of leg angles"), "**holds**");
+    assert_ne!(verdict("whatever the initial guess"), "**holds**");
+    let controller = read(&folder, "success.csv");
+    for line in controller.lines().filter(|line| line.contains(",controller,")) {
+        assert!(line.contains(",controller,80,80,0,0,0,0,0,"), "{line}");
+    }
+}
+
+#[test]
+fn the_same_seed_gives_the_same_data_and_figures_and_another_seed_others() {
+    let place = tempfile::tempdir().unwrap();
+    let folders = ["a", "b", "c"].map(|name| place.path().join(name));
+    for (folder, seed) in folders.iter().zip(["5", "5", "6"]) {
+        assert_eq!(study(folder, &["--seed", seed]).status.code(), Some(0));
+    }
+    let timed = BTreeSet::from(["speed.csv", "fig5_speed.svg", "fig5_speed.png", "claims.md"]);
+    let mut compared = 0;
+    for entry in fs::read_dir(&folders[0]).unwrap() {
+        let name = entry.unwrap().file_name().into_string().unwrap();
+        if !timed.contains(name.as_str()) {
+            let [a, b] = [0, 1].map(|folder| fs::read(folders[folder].join(&name)).unwrap());
+            assert!(a == b, "{name} differs");
+            compared += 1;
+        }
+    }
+    assert_eq!(compared, 2 * FIGURES.len() + TABLES.len() + 1 - timed.len());
+    assert_ne!(read(&folders[0], "success.csv"), read(&folders[2], "success.csv"));
+}
+
+#[test]
+fn folders_and_values_that_cannot_be_used_are_refused() {
+    let place = tempfile::tempdir().unwrap();
+    let output = study(place.path(), &[]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(stderr(&output).contains("exists and is not overwritten"), "{}", stderr(&output));
+    let file = place.path().join("file");
+    fs::write(&file, "").unwrap();
+    let output = study(&file.join("below"), &[]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(stderr(&output).contains("cannot create"), "{}", stderr(&output));
+    let free = place.path().join("free");
+    for wrong in [["--samples", "0"], ["--cells", "1"], ["--trajectory", "/nowhere.csv"]] {
+        assert_eq!(study(&free, &wrong).status.code(), Some(2), "{wrong:?}");
+        assert!(!free.exists());
+    }
+}
