@@ -36,7 +36,7 @@ mod tests {
     fn the_schema_lists_every_field_in_order() {
         assert_eq!(
             FrameTap::schema(),
-            "uint64 seq\nuint64 published_ns\nuint64 version\nuint64 time_ns\n\
+            "uint64 seq\nuint64 published_ns\nuint64 version\nuint64 time_ns\nuint64 queued_ns\n\
              uint32 id\nuint16 bus\nuint8 length\nuint8 flags\nuint8[8] data\n"
         );
         assert!(Command::schema().contains("float64[6] target_m\n"));
