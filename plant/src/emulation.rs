@@ -19,6 +19,8 @@ pub(crate) struct Emulation {
     moved_to_ns: u64,
     force_n: [f64; AXES],
     truth: Truth,
+    /// Drives that had the SYNC for which the truth was sampled.
+    synchronised: [bool; AXES],
 }
 
 impl Emulation {
@@ -32,6 +34,7 @@ impl Emulation {
             moved_to_ns: now_ns,
             force_n: [0.0; AXES],
             truth: Truth::default(),
+            synchronised: [true; AXES],
         };
         emulation.sample_truth(now_ns);
         emulation
@@ -62,9 +65,7 @@ impl Emulation {
     pub(crate) fn deliver(&mut self, axis: usize, frame: &Frame, now_ns: u64) -> Result<(), DynamicsError> {
         if frame.id() == CanId::from(Cob::Sync) {
             self.move_mechanism(now_ns)?;
-            if axis == 0 {
-                self.sample_truth(now_ns);
-            }
+            self.synchronise(axis, now_ns);
         }
         self.drives[axis].receive(now_ns, frame, self.dynamics.positions_m()[axis]);
         Ok(())
@@ -106,6 +107,16 @@ impl Emulation {
         Ok(())
     }
 
+    /// Samples the truth with the first SYNC of a cycle, on whichever wire it arrives: one that a drive has
+    /// for the second time is a new one, while those that arrive later on busier wires are not.
+    fn synchronise(&mut self, axis: usize, now_ns: u64) {
+        if self.synchronised[axis] {
+            self.synchronised = [false; AXES];
+            self.sample_truth(now_ns);
+        }
+        self.synchronised[axis] = true;
+    }
+
     fn sample_truth(&mut self, now_ns: u64) {
         let (position_m, quaternion_wxyz) = pose_fields(self.dynamics.pose());
         self.truth = Truth {
@@ -122,9 +133,30 @@ impl Emulation {
 
 #[cfg(test)]
 mod tests {
+    use masseter_shared::can::canopen::sync;
     use masseter_shared::config::Scenario;
 
     use crate::build::build_emulation;
+
+    #[test]
+    fn truth_is_sampled_with_the_first_sync_of_a_cycle_on_whichever_wire() {
+        let mut emulation = build_emulation(&Scenario::default(), 0).unwrap();
+        let mut sampled_ns = |axes: [usize; 3], at_ns: u64| {
+            for axis in axes {
+                emulation.deliver(axis, &sync::frame(), at_ns).unwrap();
+            }
+            emulation.truth().sampled_ns
+        };
+        let (first, second) = ([0, 1, 2], [3, 4, 5]);
+        assert_eq!(sampled_ns(first, 1000), 1000);
+        assert_eq!(sampled_ns(second, 1000), 1000);
+        assert_eq!(sampled_ns(second, 2000), 2000, "the first wire is busy");
+        assert_eq!(sampled_ns(first, 2300), 2000);
+        assert_eq!(sampled_ns(second, 3000), 3000);
+        assert_eq!(sampled_ns(second, 4000), 4000, "and does not get through at all");
+        assert_eq!(sampled_ns(first, 4500), 4000);
+        assert_eq!(sampled_ns(first, 5000), 5000, "the second wire is dead");
+    }
 
     #[test]
     fn time_left_out_is_counted_in_whole_steps_and_moves_nothing() {
