@@ -94,19 +94,15 @@ impl Requests {
                 self.is_overlong = true;
                 return Some(Err(RequestError::Stray));
             }
-            match end {
-                Some(end) => {
-                    let bytes: Vec<u8> = self.pending.drain(..=end).collect();
-                    if !std::mem::take(&mut self.is_overlong) {
-                        return Some(read(&bytes[..end]));
-                    }
+            let Some(end) = end else {
+                if self.is_overlong {
+                    self.pending.clear();
                 }
-                None => {
-                    if self.is_overlong {
-                        self.pending.clear();
-                    }
-                    return None;
-                }
+                return None;
+            };
+            let bytes: Vec<u8> = self.pending.drain(..=end).collect();
+            if !std::mem::take(&mut self.is_overlong) {
+                return Some(read(&bytes[..end]));
             }
         }
     }
