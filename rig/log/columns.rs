@@ -129,8 +129,12 @@ mod tests {
         let frame = FrameTap { seq: 3, id: 0x181, bus: 1, length: 2, data: [7; 8], ..Default::default() };
         let mut line = String::new();
         assert!(columns.write(&mut line, bytemuck::bytes_of(&frame)));
-        assert_eq!(line, "3,0,0,0,385,1,2,0,7,7,7,7,7,7,7,7");
-        assert!(columns.header().starts_with("seq,published_ns,version,time_ns,id,bus,length,flags,data_0,"));
+        assert_eq!(line, "3,0,0,0,0,385,1,2,0,7,7,7,7,7,7,7,7");
+        assert!(
+            columns
+                .header()
+                .starts_with("seq,published_ns,version,time_ns,queued_ns,id,bus,length,flags,data_0,")
+        );
         assert_eq!(Columns::of(&Reading::schema()).unwrap().bytes, size_of::<Reading>());
     }
 
