@@ -5,6 +5,7 @@
 //! [`Backlog`](super::Backlog).
 
 use std::collections::BTreeMap;
+use std::error::Error;
 use std::fs::File;
 use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 use std::path::Path;
@@ -33,8 +34,13 @@ pub enum WriteError {
     #[error("cannot create the recording: {0}")]
     Create(#[from] io::Error),
     /// Writing failed.
-    #[error("cannot write the recording: {0}")]
+    #[error("cannot write the recording: {}", root_of(.0))]
     Write(#[from] McapError),
+}
+
+/// The error at the root of another: the system's own word, where there is one.
+fn root_of(error: &dyn Error) -> &dyn Error {
+    error.source().map_or(error, root_of)
 }
 
 /// How recordings are laid out: the options of every MCAP file that Masseter writes.
