@@ -110,6 +110,8 @@ fn serve<L: Link>(
     while !post.stop.is_made() {
         let wake = cycle.wait();
         exchange(&mut plant, &mut ports, schedule, wake, cycle.waiter())?;
+        // No command can come before the controller wakes.
+        cycle.waiter().until(wake.due_ns + schedule.controller_at_ns);
         let deadline_ns = wake.due_ns + schedule.command_by_ns;
         let command = ports.command_of(wake.cycle, deadline_ns, cycle.waiter())?;
         plant.apply(clock::now_ns(), command.as_deref())?;

@@ -47,6 +47,8 @@ impl Reserve {
         let wanted_ns = match self.current_ns.checked_sub(needed_ns) {
             _ if self.awake > MOST_AWAKE => self.current_ns - self.current_ns / 16,
             Some(spare_ns) => self.current_ns - (spare_ns >> FORGETTING),
+            // The machine stood still: no reserve would have covered that.
+            None if late_ns > self.most_ns => self.current_ns,
             None => needed_ns,
         };
         self.current_ns = wanted_ns.clamp(LEAST_NS, self.most_ns);
@@ -93,6 +95,12 @@ mod tests {
         assert_eq!(late(0), 165_000);
         assert!(late(1000) > 130_000, "{}", late(1000));
         assert!(late(10_000) < 60_000, "{}", late(10_000));
+    }
+
+    #[test]
+    fn a_stall_that_no_reserve_covers_teaches_nothing() {
+        let punctual = || repeat_n(10_000, 40_000);
+        assert_eq!(after(punctual().chain([30_000_000])), after(punctual()));
     }
 
     #[test]
