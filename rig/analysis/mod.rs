@@ -10,6 +10,7 @@ mod intervals;
 mod join;
 mod ledger;
 mod noise;
+mod outage;
 mod over_time;
 mod response;
 mod sequence;
@@ -34,6 +35,8 @@ pub use intervals::IntervalFigures;
 use intervals::Intervals;
 use ledger::Ledger;
 pub use ledger::WorstCycle;
+pub use outage::Outage;
+use outage::OutageWatch;
 use over_time::Watch;
 pub use over_time::{Curve, OverTime};
 use response::Responses;
@@ -80,6 +83,8 @@ pub struct Figures {
     pub suspicion: Option<Suspicion>,
     /// Where the controller's sequence ended; none without a single state message.
     pub final_state: Option<&'static str>,
+    /// Deadlines missed just before a safe stop; none without one.
+    pub outage: Option<Outage>,
     /// Distance of the platform from where it should be, while the motion played.
     pub tracking: TrackingFigures,
     /// Measured intervals.
@@ -149,6 +154,7 @@ struct Pass {
     last_sample_ns: u64,
     controller_skips: Skips,
     plant_skips: Skips,
+    outage: OutageWatch,
     final_state: Option<&'static str>,
 }
 
@@ -170,6 +176,7 @@ impl Pass {
             last_sample_ns: 0,
             controller_skips: Skips::default(),
             plant_skips: Skips::default(),
+            outage: OutageWatch::default(),
             final_state: None,
         })
     }
@@ -196,6 +203,7 @@ impl Pass {
         self.intervals.reading(reading);
         self.ledger.reading(reading);
         self.watch.reading(reading);
+        self.outage.reading(reading);
         self.plant_skips.take(&Counters::from(reading), self.period_ns);
         self.first_sample_ns.get_or_insert(reading.sampled_ns);
         self.last_sample_ns = reading.sampled_ns;
@@ -205,6 +213,7 @@ impl Pass {
         self.intervals.state(state);
         self.ledger.state(state);
         self.watch.state(state);
+        self.outage.state(state);
         self.tracking.state(state);
         self.cycles += 1;
         self.controller_skips.take(&Counters::from(state), self.period_ns);
@@ -237,6 +246,7 @@ impl Pass {
             controller_skips: self.controller_skips.figures(),
             plant_skips: self.plant_skips.figures(),
             final_state: self.final_state,
+            outage: self.outage.finish(self.period_ns),
             tracking,
             worst_cycles: self.ledger.finish(&intervals),
             intervals,

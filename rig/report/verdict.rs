@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::analysis::{BusResponse, Figures, ResponseFigures, Suspicion};
+use crate::analysis::{BusResponse, Figures, Outage, ResponseFigures, Suspicion};
 use crate::exit::Exit;
 use crate::report::table;
 use crate::run::manifest::Manifest;
@@ -81,6 +81,14 @@ impl Check {
         Self { name, finding, result: CheckResult::of(passed) }
     }
 
+    /// A failure that `excused` explains is none.
+    fn unless(self, excused: bool) -> Self {
+        match self.result {
+            CheckResult::Failed if excused => Self { result: CheckResult::NotJudged, ..self },
+            _ => self,
+        }
+    }
+
     fn not_judged(name: &'static str, why: String) -> Self {
         Self { name, finding: why, result: CheckResult::NotJudged }
     }
@@ -103,10 +111,12 @@ pub struct Verdict {
 impl Verdict {
     /// Judges a run.
     pub fn of(manifest: &Manifest, figures: &Figures) -> Self {
-        let checks = checks(manifest, figures);
+        let disturbed = disturbed(manifest, figures);
+        let checks = checks(manifest, figures, disturbed.is_some());
         let (exit, word, mut reason) = ending(&manifest.ending)
+            .filter(|(exit, ..)| !(*exit == Exit::SafeStop && disturbed.is_some()))
             .or_else(|| incomplete(figures))
-            .or_else(|| disturbed(manifest, figures))
+            .or(disturbed)
             .or_else(|| failed(&checks))
             .unwrap_or_else(|| (Exit::Passed, "PASS", "every check passed".to_owned()));
         if exit != Exit::Passed {
@@ -196,21 +206,37 @@ fn missed_cycles(manifest: &Manifest, figures: &Figures) -> CheckResult {
     }
 }
 
+/// Whether the machine kept the rig from too many cycles to judge it. A safe stop is excused only when many of them
+/// were missed just before it.
 fn disturbed(manifest: &Manifest, figures: &Figures) -> Option<Judgement> {
-    (missed_cycles(manifest, figures) == CheckResult::NotJudged).then(|| {
-        let (skipped, _) = figures.skipped();
-        let (controller, plant) = (&figures.controller_skips, &figures.plant_skips);
-        let stalled_ms = (controller.stalled_ns + plant.stalled_ns) as f64 / 1e6;
-        let while_working = match controller.while_working + plant.while_working {
-            0 => String::new(),
-            n => format!(", {n} of them while it worked, which the machine may as well have done"),
-        };
-        let reason = format!(
-            "the machine stood still for {stalled_ms:.1} ms while the rig waited, and {skipped} cycles were \
-             missed{while_working}"
-        );
-        (Exit::Invalid, "INVALID", reason)
-    })
+    if missed_cycles(manifest, figures) != CheckResult::NotJudged {
+        return None;
+    }
+    let stop = excuse(&manifest.ending, figures.outage)?;
+    let (skipped, _) = figures.skipped();
+    let (controller, plant) = (&figures.controller_skips, &figures.plant_skips);
+    let stalled_ms = (controller.stalled_ns + plant.stalled_ns) as f64 / 1e6;
+    let while_working = match controller.while_working + plant.while_working {
+        0 => String::new(),
+        n => format!(", {n} of them while it worked, which the machine may as well have done"),
+    };
+    let reason = format!(
+        "the machine stood still for {stalled_ms:.1} ms while the rig waited, and {skipped} cycles were \
+         missed{while_working}{stop}"
+    );
+    Some((Exit::Invalid, "INVALID", reason))
+}
+
+/// What excuses the way a disturbed run ended, in words; nothing to say when it ended as it should, none when there is
+/// no excuse.
+fn excuse(ending: &Ending, outage: Option<Outage>) -> Option<String> {
+    match (ending, outage) {
+        (Ending::SafeStop, Some(outage)) if outage.explains_the_stop() => {
+            Some(format!(", {} of {} just before the safe stop", outage.missed, outage.of))
+        }
+        (Ending::SafeStop, _) => None,
+        _ => Some(String::new()),
+    }
 }
 
 fn failed(checks: &[Check]) -> Option<Judgement> {
@@ -219,14 +245,16 @@ fn failed(checks: &[Check]) -> Option<Judgement> {
     (!failed.is_empty()).then(|| (Exit::Failed, "FAIL", format!("failed: {}", failed.join(", "))))
 }
 
-fn checks(manifest: &Manifest, figures: &Figures) -> Vec<Check> {
+/// `is_disturbed`: the machine kept the rig from too many cycles to hold its sequence or its tracking against it.
+fn checks(manifest: &Manifest, figures: &Figures, is_disturbed: bool) -> Vec<Check> {
     let limits = &manifest.scenario.checks;
     let tracking = &figures.tracking;
     let (skipped, by_machine) = figures.skipped();
     let missing = figures.missing_messages();
     let state = figures.final_state.unwrap_or("none");
     vec![
-        Check::judged("sequence", format!("ended in state {state}"), state == "finished"),
+        Check::judged("sequence", format!("ended in state {state}"), state == "finished")
+            .unless(is_disturbed),
         Check::judged(
             "tracking",
             format!(
@@ -234,7 +262,8 @@ fn checks(manifest: &Manifest, figures: &Figures) -> Vec<Check> {
                 tracking.rms_mm, tracking.samples, limits.tracking_rms_mm
             ),
             tracking.samples > 0 && tracking.rms_mm <= limits.tracking_rms_mm,
-        ),
+        )
+        .unless(is_disturbed),
         Check {
             name: "missed cycles",
             finding: format!(
@@ -286,6 +315,25 @@ mod tests {
         assert_eq!(overload(&usage(1.0), 20_000), None);
         let said = overload(&usage(1.9), 20_000).unwrap();
         assert!(said.contains("plant kept its core busy for 95 %") && said.contains("below 20000"), "{said}");
+    }
+
+    #[test]
+    fn a_safe_stop_is_excused_only_by_what_was_missed_just_before_it() {
+        let outage = |missed| Some(Outage { missed, of: 100 });
+        assert_eq!(excuse(&Ending::SafeStop, outage(9)), None);
+        assert_eq!(excuse(&Ending::SafeStop, None), None);
+        let said = excuse(&Ending::SafeStop, outage(75)).unwrap();
+        assert_eq!(said, ", 75 of 100 just before the safe stop");
+        assert_eq!(excuse(&Ending::Completed, None).unwrap(), "");
+    }
+
+    #[test]
+    fn only_a_failure_is_excused() {
+        let check = |passed| Check::judged("tracking", String::new(), passed);
+        let cases = [(false, true, "skip"), (false, false, "FAIL"), (true, true, "ok"), (true, false, "ok")];
+        for (passed, excused, mark) in cases {
+            assert_eq!(check(passed).unless(excused).result.mark(), mark);
+        }
     }
 
     fn response(max_ns: u64, unbounded: Option<&str>) -> BusResponse {

@@ -1,0 +1,140 @@
+//! Cycles missed just before a safe stop: a controller that is kept from running, or from its readings, stops the
+//! rig as it should, and that says nothing of the rig.
+//!
+//! Whose fault the missed cycles are is not decided here; see [`blame`](super::blame).
+
+use std::collections::VecDeque;
+
+use masseter_shared::messages::codes::ControllerState;
+use masseter_shared::messages::{Reading, State};
+use serde::Serialize;
+
+/// How long before the stop a missed cycle may have led to it.
+const BEFORE_NS: u64 = 100_000_000;
+
+/// A process that comes late counts what it missed in its next message.
+const AFTER_NS: u64 = 10_000_000;
+
+/// How far apart messages of the same time may lie in a recording: the logger drains topic after topic.
+const DISORDER_NS: u64 = 2_000_000_000;
+
+/// Share of the cycles before a stop whose loss may explain it.
+const EXPLAINS: f64 = 0.1;
+
+/// The deadlines that the busier victim of the two processes missed just before a safe stop.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct Outage {
+    /// Deadlines missed.
+    pub missed: u64,
+    /// Deadlines there were.
+    pub of: u64,
+}
+
+impl Outage {
+    /// Whether so many were missed that the stop may come of it.
+    pub fn explains_the_stop(self) -> bool {
+        self.missed as f64 >= self.of as f64 * EXPLAINS
+    }
+}
+
+/// Follows what both processes miss until the rig stops.
+#[derive(Debug, Default)]
+pub(super) struct OutageWatch {
+    stopped_ns: Option<u64>,
+    controller: Misses,
+    plant: Misses,
+}
+
+impl OutageWatch {
+    pub(super) fn state(&mut self, state: &State) {
+        if state.controller_state == ControllerState::SafeStop.code() {
+            self.stopped_ns.get_or_insert(state.woke_ns);
+        }
+        self.controller.take(state.woke_ns, state.skipped_cycles, self.stopped_ns);
+    }
+
+    pub(super) fn reading(&mut self, reading: &Reading) {
+        self.plant.take(reading.woke_ns, reading.skipped_cycles, self.stopped_ns);
+    }
+
+    /// None without a safe stop.
+    pub(super) fn finish(&self, period_ns: u64) -> Option<Outage> {
+        let stopped_ns = self.stopped_ns?;
+        let missed = self.controller.before(stopped_ns).max(self.plant.before(stopped_ns));
+        Some(Outage { missed, of: BEFORE_NS / period_ns })
+    }
+}
+
+/// Recently missed deadlines of a process: when they were counted, and how many.
+#[derive(Debug, Default)]
+struct Misses {
+    counted: u64,
+    recent: VecDeque<(u64, u64)>,
+}
+
+impl Misses {
+    fn take(&mut self, at_ns: u64, counted: u64, stopped_ns: Option<u64>) {
+        let missed = counted.saturating_sub(std::mem::replace(&mut self.counted, counted));
+        if missed == 0 || stopped_ns.is_some_and(|stopped_ns| at_ns > stopped_ns + AFTER_NS) {
+            return;
+        }
+        let is_old = |&(counted_ns, _): &(u64, u64)| counted_ns + BEFORE_NS + DISORDER_NS < at_ns;
+        while self.recent.front().is_some_and(is_old) {
+            self.recent.pop_front();
+        }
+        self.recent.push_back((at_ns, missed));
+    }
+
+    fn before(&self, stopped_ns: u64) -> u64 {
+        let window = stopped_ns.saturating_sub(BEFORE_NS)..=stopped_ns + AFTER_NS;
+        self.recent.iter().filter(|(at_ns, _)| window.contains(at_ns)).map(|(_, missed)| missed).sum()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PERIOD_NS: u64 = 1_000_000;
+
+    /// When deadlines were missed, ms, and how many.
+    type Missed<'a> = &'a [(u64, u64)];
+
+    /// A run that stops safely at one second, and whose plant misses deadlines.
+    fn outage(missed: Missed) -> Option<Outage> {
+        let mut watch = OutageWatch::default();
+        let mut skipped_cycles = 0;
+        for &(at_ms, missed) in missed {
+            skipped_cycles += missed;
+            watch.reading(&Reading { woke_ns: at_ms * PERIOD_NS, skipped_cycles, ..Reading::default() });
+        }
+        let controller_state = ControllerState::SafeStop.code();
+        watch.state(&State { woke_ns: 1000 * PERIOD_NS, controller_state, ..State::default() });
+        watch.finish(PERIOD_NS)
+    }
+
+    #[test]
+    fn only_what_is_missed_just_before_the_stop_explains_it() {
+        let cases: [(Missed, u64, bool); 6] = [
+            (&[], 0, false),
+            (&[(980, 30)], 30, true),
+            (&[(920, 4), (960, 6)], 10, true),
+            (&[(920, 4), (960, 5)], 9, false),
+            (&[(500, 80)], 0, false),
+            // Counted in the message after the stop, and long after it.
+            (&[(1005, 25), (1500, 400)], 25, true),
+        ];
+        for (missed, expected, explains) in cases {
+            let outage = outage(missed).unwrap();
+            assert_eq!(outage, Outage { missed: expected, of: 100 }, "{missed:?}");
+            assert_eq!(outage.explains_the_stop(), explains, "{missed:?}");
+        }
+    }
+
+    #[test]
+    fn a_run_that_did_not_stop_has_no_outage() {
+        let mut watch = OutageWatch::default();
+        watch.reading(&Reading { skipped_cycles: 50, ..Reading::default() });
+        assert_eq!(watch.finish(PERIOD_NS), None);
+    }
+}
