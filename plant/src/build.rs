@@ -3,6 +3,7 @@
 use masseter_shared::can::canopen::{NodeId, NodeIdError, sync};
 use masseter_shared::can::faults::Faults;
 use masseter_shared::can::wire::{INTERFRAME_BITS, frame_bits};
+use masseter_shared::can::wrapped::{NotByPort, PortFaults};
 use masseter_shared::can::{BitrateError, OpenError, VirtualWire, WireConfig};
 use masseter_shared::config::{CanConfig, DriveConfig, DynamicsConfig, Scenario};
 use masseter_shared::geometry::{AXES, AXIS_NAMES, GeometryError, LEGS, Mechanism, Pose};
@@ -14,7 +15,7 @@ use crate::emulation::Emulation;
 use crate::encoder::Encoder;
 use crate::expectation::setup;
 use crate::faults;
-use crate::link::{Place, VirtualLink};
+use crate::link::{MASTER_PORT, Place, VirtualLink};
 use crate::master::{DriveSettings as ExpectedDrive, Master, MasterSettings, Scale};
 use crate::mechanism::{Dynamics, DynamicsError};
 use crate::socket_link::SocketLink;
@@ -68,6 +69,9 @@ pub enum PlantError {
         /// Who is on it.
         present: String,
     },
+    /// A fault that needs a simulated wire.
+    #[error("faults: {0}")]
+    NotByPort(#[from] NotByPort),
     /// A quantity that must be above 0, or at least not below.
     #[error("{key} = {value}: {need}")]
     Quantity {
@@ -108,10 +112,27 @@ pub(crate) fn build_virtual(
     Ok(VirtualLink::new(wires(scenario, free_ports, now_ns)?, places, emulation))
 }
 
-/// The real interfaces.
-pub(crate) fn build_sockets(scenario: &Scenario) -> Result<SocketLink, PlantError> {
+/// The real interfaces, with the faults of the master's ports.
+pub(crate) fn build_sockets(scenario: &Scenario, now_ns: u64) -> Result<SocketLink, PlantError> {
     check_quantities(scenario)?;
-    Ok(SocketLink::open(&scenario.can.interfaces)?)
+    let can = &scenario.can;
+    let port_faults = |bus: usize| {
+        let faults = faults::of_bus(&scenario.faults, bus, &[master_id()], now_ns)?;
+        let faults = PortFaults::new(faults, MASTER_PORT, fault_seed(scenario, bus))?;
+        Ok(faults.restarting_after(restart_after_ns(can)))
+    };
+    let faults = (0..can.buses.len()).map(port_faults).collect::<Result<_, PlantError>>()?;
+    Ok(SocketLink::open(&can.interfaces, faults)?)
+}
+
+/// Each bus makes choices of its own.
+fn fault_seed(scenario: &Scenario, bus: usize) -> u64 {
+    scenario.seed.wrapping_add(bus as u64)
+}
+
+/// Time after which a controller that went off the bus is restarted; none when it is not.
+fn restart_after_ns(can: &CanConfig) -> Option<u64> {
+    (can.restart_ms > 0).then(|| u64::from(can.restart_ms) * MS_NS)
 }
 
 /// The interface of each axis' bus.
@@ -183,7 +204,6 @@ fn master_id() -> NodeId {
 fn wires(scenario: &Scenario, free_ports: usize, now_ns: u64) -> Result<Vec<VirtualWire>, PlantError> {
     let can = &scenario.can;
     let (rates, ids) = (can.rates()?, node_ids(can)?);
-    let restart_after_ns = (can.restart_ms > 0).then(|| u64::from(can.restart_ms) * MS_NS);
     let wire = |(bus, axes): (usize, &Vec<usize>)| {
         let nodes: Vec<_> = std::iter::once(master_id()).chain(axes.iter().map(|&axis| ids[axis])).collect();
         let config = WireConfig {
@@ -192,10 +212,10 @@ fn wires(scenario: &Scenario, free_ports: usize, now_ns: u64) -> Result<Vec<Virt
             ports: nodes.len() + free_ports,
             transmit_capacity: TRANSMIT_CAPACITY,
             receive_capacity: RECEIVE_CAPACITY,
-            restart_after_ns,
+            restart_after_ns: restart_after_ns(can),
         };
         let faults = faults::of_bus(&scenario.faults, bus, &nodes, now_ns)?;
-        Ok(VirtualWire::with_faults(&config, Faults::new(faults, scenario.seed.wrapping_add(bus as u64))))
+        Ok(VirtualWire::with_faults(&config, Faults::new(faults, fault_seed(scenario, bus))))
     };
     can.buses.iter().enumerate().map(wire).collect()
 }

@@ -45,7 +45,7 @@ impl PlantCore {
 impl PlantCore<SocketLink> {
     /// The scenario's plant on the real interfaces that it names, with whatever drives are there.
     pub fn on_interfaces(scenario: &Scenario, now_ns: u64) -> Result<Self, PlantError> {
-        Self::on(build_sockets(scenario)?, scenario, now_ns)
+        Self::on(build_sockets(scenario, now_ns)?, scenario, now_ns)
     }
 }
 

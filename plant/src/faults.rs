@@ -1,4 +1,4 @@
-//! The scenario's faults as those of its simulated wires: nodes become ports, seconds the wire's time.
+//! The scenario's faults as those of its wires: nodes become ports, seconds the wire's time.
 
 use masseter_shared::can::canopen::NodeId;
 use masseter_shared::can::faults::{Fault, FaultKind};

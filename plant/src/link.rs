@@ -24,10 +24,8 @@ pub trait Link: Buses {
     /// The next frame or error that a tap on a wire saw up to `now_ns`, whoever caused it.
     fn tap(&mut self, bus: usize, now_ns: u64) -> Result<Option<Tapped>, ReceiveError>;
 
-    /// What the faults injected into a wire did up to `now_ns`, one note at a time; real wires have none.
-    fn next_note(&mut self, _bus: usize, _now_ns: u64) -> Option<FaultNote> {
-        None
-    }
+    /// What the faults injected into a wire did up to `now_ns`, one note at a time.
+    fn next_note(&mut self, bus: usize, now_ns: u64) -> Option<FaultNote>;
 
     /// The axis whose drive is at a port of a simulated wire; none at the master's.
     fn axis_at(&self, _bus: usize, _port: usize) -> Option<usize> {
@@ -38,8 +36,8 @@ pub trait Link: Buses {
     fn truth(&self) -> Option<Truth>;
 }
 
-/// The master's port on every simulated wire.
-const MASTER_PORT: usize = 0;
+/// The master's port on every wire.
+pub(crate) const MASTER_PORT: usize = 0;
 
 /// Where an axis' drive hangs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

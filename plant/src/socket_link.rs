@@ -1,29 +1,32 @@
 //! The robot: real wires, on which the drives hang. Nothing is known of the mechanism but what they tell.
 
+use masseter_shared::can::faults::FaultNote;
+use masseter_shared::can::wrapped::PortFaults;
 use masseter_shared::can::{Bus, OpenError, ReceiveError, SocketCan, Tapped};
 use masseter_shared::messages::Truth;
 
 use crate::link::{Buses, Link};
 use crate::mechanism::DynamicsError;
 
-/// The master's port and a tap on every wire.
+/// The master's port, the faults laid over it, and a tap on every wire.
 #[derive(Debug)]
 pub struct SocketLink {
     ports: Vec<SocketCan>,
+    faults: Vec<PortFaults>,
     taps: Vec<SocketCan>,
 }
 
 impl SocketLink {
-    /// Opens the interfaces, one a bus.
-    pub(crate) fn open(interfaces: &[String]) -> Result<Self, OpenError> {
+    /// Opens the interfaces, one a bus, each with the faults of the master's port there.
+    pub(crate) fn open(interfaces: &[String], faults: Vec<PortFaults>) -> Result<Self, OpenError> {
         let open = || interfaces.iter().map(|interface| SocketCan::open(interface)).collect::<Result<_, _>>();
-        Ok(Self { ports: open()?, taps: open()? })
+        Ok(Self { ports: open()?, faults, taps: open()? })
     }
 }
 
 impl Buses for SocketLink {
     fn port(&mut self, bus: usize) -> impl Bus {
-        &mut self.ports[bus]
+        self.faults[bus].over(&mut self.ports[bus])
     }
 }
 
@@ -34,6 +37,10 @@ impl Link for SocketLink {
 
     fn tap(&mut self, bus: usize, now_ns: u64) -> Result<Option<Tapped>, ReceiveError> {
         Ok(self.taps[bus].receive(now_ns)?.map(|received| Tapped::Frame(received.into())))
+    }
+
+    fn next_note(&mut self, bus: usize, now_ns: u64) -> Option<FaultNote> {
+        self.faults[bus].next_note(now_ns)
     }
 
     fn truth(&self) -> Option<Truth> {

@@ -1,4 +1,5 @@
-//! Checks that two CAN interfaces on one wire keep the laws of the bus.
+//! Checks that two CAN interfaces on one wire keep the laws of the bus, through everything that may stand between a
+//! node and its port.
 //!
 //! `cargo run --release --example can_conformance -p masseter-shared -- can0 can1`. Nobody else may use the
 //! wire meanwhile. Two ports of one virtual interface of the kernel do as well: `-- vcan0 vcan0`.
@@ -7,7 +8,8 @@ use std::error::Error;
 use std::time::Duration;
 
 use masseter_shared::can::conformance::{self, End, Pair};
-use masseter_shared::can::{Bus, BusStatus, Frame, OpenError, ReceiveError, Received, SendError, SocketCan};
+use masseter_shared::can::wrapped::{CandumpTap, Counts, PortFaults};
+use masseter_shared::can::{Bus, OpenError, ReceiveError, SocketCan};
 use masseter_shared::clock;
 
 /// How often is looked whether all frames have arrived.
@@ -15,11 +17,18 @@ const LOOK: Duration = Duration::from_millis(1);
 /// A frame that has not arrived after so many looks without any progress was lost.
 const PATIENCE: u32 = 500;
 
-/// Two ports, and two more to know when everything sent has left the one side and reached the other.
+/// Two ports under all wrappers, and two more to know when everything sent has left the one side and reached the other.
 struct SocketPair {
-    ends: [SocketCan; 2],
-    sent: u64,
+    ends: [WrappedEnd; 2],
     watches: [Watch; 2],
+}
+
+/// A port with all that may be laid over one.
+struct WrappedEnd {
+    port: SocketCan,
+    counts: Counts,
+    tap: CandumpTap<String>,
+    faults: PortFaults,
 }
 
 /// Counts the frames that pass an interface.
@@ -28,19 +37,27 @@ struct Watch {
     seen: u64,
 }
 
-/// A port whose accepted frames are counted.
-struct Counting<'a> {
-    port: &'a mut SocketCan,
-    sent: &'a mut u64,
-}
-
 impl SocketPair {
     fn open([a, b]: [&str; 2]) -> Result<Self, OpenError> {
         Ok(Self {
-            ends: [SocketCan::open(a)?, SocketCan::open(b)?],
-            sent: 0,
+            ends: [WrappedEnd::open(a)?, WrappedEnd::open(b)?],
             watches: [Watch::open(a)?, Watch::open(b)?],
         })
+    }
+}
+
+impl WrappedEnd {
+    fn open(interface: &str) -> Result<Self, OpenError> {
+        Ok(Self {
+            port: SocketCan::open(interface)?,
+            counts: Counts::default(),
+            tap: CandumpTap::new(interface, String::new()),
+            faults: PortFaults::new(Vec::new(), 0, 1).expect("no fault needs a simulated wire"),
+        })
+    }
+
+    fn wrapped(&mut self) -> impl Bus {
+        self.counts.over(self.faults.over(self.tap.over(&mut self.port)))
     }
 }
 
@@ -60,27 +77,11 @@ impl Watch {
     }
 }
 
-impl Bus for Counting<'_> {
-    fn send(&mut self, now_ns: u64, frame: Frame) -> Result<(), SendError> {
-        let result = self.port.send(now_ns, frame);
-        *self.sent += u64::from(result.is_ok());
-        result
-    }
-
-    fn receive(&mut self, now_ns: u64) -> Result<Option<Received>, ReceiveError> {
-        self.port.receive(now_ns)
-    }
-
-    fn status(&self) -> BusStatus {
-        self.port.status()
-    }
-}
-
 impl Pair for SocketPair {
     const COUNTS_LOSSES: bool = false;
 
     fn end(&mut self, end: End) -> impl Bus {
-        Counting { port: &mut self.ends[end as usize], sent: &mut self.sent }
+        self.ends[end as usize].wrapped()
     }
 
     fn now_ns(&self) -> u64 {
@@ -88,8 +89,9 @@ impl Pair for SocketPair {
     }
 
     fn settle(&mut self) {
+        let sent: u64 = self.ends.iter().map(|end| end.counts.sent).sum();
         let (mut before, mut idle_looks) = ([0; 2], 0);
-        while before != [self.sent; 2] && idle_looks < PATIENCE {
+        while before != [sent; 2] && idle_looks < PATIENCE {
             clock::sleep(LOOK);
             let seen = self.watches.each_mut().map(Watch::look);
             idle_looks = if seen == before { idle_looks + 1 } else { 0 };

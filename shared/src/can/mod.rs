@@ -1,8 +1,8 @@
 //! The CAN link: frames and what they cost on the wire, the CANopen objects the rig exchanges, the
 //! drive profile, the bus trait and its two implementations: simulated and `SocketCAN`.
 //!
-//! Everything here but [`SocketCan`] is a value or a pure step: no clock, no thread, no I/O. CAN FD and
-//! remote frames are not represented.
+//! Everything here but [`SocketCan`] is a value or a pure step: no clock, no thread, no I/O. Frames
+//! on a bus carry up to 8 bytes, in FD format too; remote frames are not represented.
 
 mod bus;
 pub mod candump;

@@ -1,8 +1,10 @@
-//! Faults that a scenario asks for on its simulated buses: `[[faults]]`.
+//! Faults that a scenario asks for on its buses: `[[faults]]`. On a simulated bus they strike any node; on a real one,
+//! only what the master's port can do to itself.
 
 use serde::{Deserialize, Serialize};
 
 use super::ScenarioError;
+use crate::schedule::MASTER_ID;
 
 /// What goes wrong.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -66,11 +68,18 @@ impl FaultConfig {
         let refuse = |key, value: String, need: &str| {
             Err(ScenarioError::BadValue { key, value, need: need.to_owned() })
         };
-        if !is_virtual {
+        if !is_virtual && self.kind == Kind::Corrupt {
             return refuse(
-                "faults",
-                "given".to_owned(),
-                "leave them away with can.interfaces: only simulated buses have faults",
+                "faults.kind",
+                "corrupt".to_owned(),
+                "leave it away with can.interfaces: only on a simulated bus can frames be destroyed on the wire",
+            );
+        }
+        if let Some(node) = self.node.filter(|&node| !is_virtual && node != MASTER_ID) {
+            return refuse(
+                "faults.node",
+                node.to_string(),
+                &format!("on a real interface only the master (node {MASTER_ID}) can be given faults"),
             );
         }
         if self.bus >= buses {

@@ -218,6 +218,13 @@ mod tests {
     }
 
     #[test]
+    fn the_masters_port_may_be_faulty_on_a_real_interface() {
+        let fault = "[[faults]]\nkind = 'disconnect'\nbus = 1\nnode = 127\nfrom_s = 1.0";
+        let scenario = parse(&format!("[can]\ninterfaces = ['a', 'b']\n{fault}")).unwrap();
+        assert_eq!(scenario.faults[0].node, Some(127));
+    }
+
+    #[test]
     fn faults_are_refused_with_place_and_remedy() {
         let cases = [
             ("seed = 1\nrate_hzz = 5", "s.toml:2: unknown field `rate_hzz`"),
@@ -244,6 +251,14 @@ mod tests {
             ("[[faults]]\nkind = 'lose'\nbus = 0\nfrom_s = 1.0\nuntil_s = 1.0", "faults.until_s = 1"),
             ("[[faults]]\nkind = 'lose'\nbus = 0\nfrom_s = 1.0\nprobability = 1.5", "faults.probability"),
             ("[[faults]]\nkind = 'melt'\nbus = 0\nfrom_s = 1.0", "unknown variant `melt`"),
+            (
+                "[can]\ninterfaces = ['a', 'b']\n[[faults]]\nkind = 'corrupt'\nbus = 0\nfrom_s = 1.0",
+                "faults.kind = corrupt: leave it away with can.interfaces",
+            ),
+            (
+                "[can]\ninterfaces = ['a', 'b']\n[[faults]]\nkind = 'disconnect'\nbus = 0\nnode = 1\nfrom_s = 1.0",
+                "faults.node = 1: on a real interface only the master (node 127)",
+            ),
         ];
         for (text, expected) in cases {
             let error = parse(text).unwrap_err();

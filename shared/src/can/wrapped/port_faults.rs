@@ -1,8 +1,8 @@
 //! Seeded faults over a port: those that need no hand on the wire.
 //!
 //! Frames get lost on reception, are delayed or sent twice; the node babbles, is disconnected or off the bus. A
-//! node put off the bus stays off until it is restarted; the 128 sequences of recessive bits that a real
-//! controller then waits for are not waited for.
+//! node put off the bus stays off for the time it is told, as a controller with `restart-ms`; the 128 sequences of
+//! recessive bits that a real one then waits for are not waited for.
 
 use crate::can::bus::{Bus, BusStatus, ErrorState, ReceiveError, Received, SendError};
 use crate::can::faults::{Fault, FaultKind, FaultNote, Faults};
@@ -29,7 +29,8 @@ pub struct PortFaults {
     sent: u64,
     received: u64,
     held: Vec<Held>,
-    is_off: bool,
+    restart_after_ns: Option<u64>,
+    off_since_ns: Option<u64>,
 }
 
 /// A frame held back.
@@ -50,17 +51,19 @@ impl PortFaults {
             return Err(NotByPort { index });
         }
         let held = Vec::with_capacity(HELD);
-        Ok(Self { faults: Faults::new(faults, seed), port, sent: 0, received: 0, held, is_off: false })
+        let faults = Faults::new(faults, seed);
+        Ok(Self { faults, port, sent: 0, received: 0, held, restart_after_ns: None, off_since_ns: None })
+    }
+
+    /// With a node that is back so long after it was put off the bus; without this it stays off.
+    #[must_use]
+    pub fn restarting_after(self, restart_after_ns: Option<u64>) -> Self {
+        Self { restart_after_ns, ..self }
     }
 
     /// Lets the faults befall that port.
     pub fn over<B: Bus>(&mut self, bus: B) -> Faulty<'_, B> {
         Faulty { faults: self, bus }
-    }
-
-    /// Restarts the node if a fault put it off the bus.
-    pub fn restart(&mut self) {
-        self.is_off = false;
     }
 
     /// What is to be told of the faults up to `now_ns`.
@@ -83,15 +86,24 @@ impl PortFaults {
 
     /// Whether the node is off the bus or disconnected at that time.
     fn is_cut_off(&mut self, now_ns: u64) -> bool {
+        self.restart_when_due(now_ns);
         self.faults.begin_disconnections(now_ns);
         let is_bus_off = |kind| kind == FaultKind::BusOff;
         if let Some(strike) = self.faults.of_node(now_ns, is_bus_off, self.port) {
             self.faults.record(strike);
-            self.is_off = true;
+            self.off_since_ns = Some(now_ns);
             self.held.clear();
         }
         let is_disconnect = |kind| kind == FaultKind::Disconnect;
-        self.is_off || self.faults.of_node(now_ns, is_disconnect, self.port).is_some()
+        self.off_since_ns.is_some() || self.faults.of_node(now_ns, is_disconnect, self.port).is_some()
+    }
+
+    fn restart_when_due(&mut self, now_ns: u64) {
+        if let (Some(since_ns), Some(after_ns)) = (self.off_since_ns, self.restart_after_ns)
+            && now_ns >= since_ns.saturating_add(after_ns)
+        {
+            self.off_since_ns = None;
+        }
     }
 
     /// A frame that the node babbles at that time.
@@ -132,7 +144,11 @@ impl<B: Bus> Bus for Faulty<'_, B> {
         if self.faults.is_cut_off(now_ns) {
             // A disconnected controller keeps a frame until its queue is full; here it is full at once.
             let refused = SendError::QueueFull { capacity: 0 };
-            return Err(if self.faults.is_off { SendError::BusOff { tec: OFF_TEC } } else { refused });
+            return Err(if self.faults.off_since_ns.is_some() {
+                SendError::BusOff { tec: OFF_TEC }
+            } else {
+                refused
+            });
         }
         self.send_own(now_ns);
         let number = self.faults.sent;
@@ -173,7 +189,7 @@ impl<B: Bus> Bus for Faulty<'_, B> {
 
     fn status(&self) -> BusStatus {
         let status = self.bus.status();
-        if self.faults.is_off {
+        if self.faults.off_since_ns.is_some() {
             BusStatus { state: ErrorState::BusOff, tec: OFF_TEC, ..status }
         } else {
             status

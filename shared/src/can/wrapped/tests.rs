@@ -167,13 +167,21 @@ fn who_is_disconnected_neither_sends_nor_hears_until_it_is_over() {
 }
 
 #[test]
-fn who_is_off_the_bus_says_so_until_it_is_restarted() {
-    let mut pair = Wrapped::new(vec![Fault { kind: FaultKind::BusOff, count: 1, ..FAULT }], Vec::new());
+fn who_is_off_the_bus_says_so_until_it_restarts() {
+    let off = Fault { kind: FaultKind::BusOff, count: 1, ..FAULT };
+    let mut pair = Wrapped::new(vec![off], Vec::new());
     assert_eq!(pair.send(1), Err(SendError::BusOff { tec: 256 }));
     assert_eq!(pair.end(End::A).status().state, ErrorState::BusOff);
-    pair.faults[0].restart();
-    pair.send(2).unwrap();
-    assert_eq!(pair.received(), [2]);
+    pair.now_ns = 10_000_000_000;
+    assert_eq!(pair.send(2), Err(SendError::BusOff { tec: 256 }), "it was not told to restart");
+    let restarting = PortFaults::new(vec![off], 0, 1).unwrap().restarting_after(Some(1_000_000));
+    let mut pair = Wrapped { faults: [restarting, PortFaults::new(Vec::new(), 1, 1).unwrap()], ..pair };
+    assert_eq!(pair.send(3), Err(SendError::BusOff { tec: 256 }));
+    pair.now_ns += 999_999;
+    assert_eq!(pair.send(4), Err(SendError::BusOff { tec: 256 }));
+    pair.now_ns += 1;
+    pair.send(5).unwrap();
+    assert_eq!(pair.received(), [5]);
     assert_eq!(pair.end(End::A).status().state, ErrorState::Active);
 }
 
