@@ -1,6 +1,8 @@
 //! `masseter uniqueness`: how far an input settles the pose. `prove` proves it for a region of inputs,
-//! `search` looks for inputs with two solutions that count. Both are about the published mechanism.
+//! `search` looks for inputs with two solutions that count. Both are about the published mechanism; a proof around a
+//! motion is about its scenario's.
 
+mod motion;
 mod proof;
 mod search;
 
@@ -12,7 +14,9 @@ use clap::{Args, Subcommand, ValueEnum};
 use masseter_controller::kinematics::uniqueness::InputBox;
 use masseter_shared::geometry::{GeometryError, Mechanism, MechanismConfig};
 
+use crate::cli::RunArgs;
 use crate::exit::{Exit, Failure};
+use crate::run::plan::Plan;
 
 /// What `uniqueness` does.
 #[derive(Debug, Clone, Subcommand)]
@@ -29,6 +33,15 @@ pub(crate) struct ProveArgs {
     /// Which inputs
     #[arg(long, value_enum, default_value_t)]
     region: Region,
+    /// Instead of a region: all inputs at most so far, in each axis, from those of a motion
+    #[arg(long, value_name = "MM", conflicts_with = "region", value_parser = parse_distance)]
+    around_mm: Option<f64>,
+    /// Scenario whose motion is meant [default: ten seconds of chewing]
+    #[arg(long, value_name = "FILE.toml", requires = "around_mm")]
+    scenario: Option<PathBuf>,
+    /// Recorded jaw motion (CSV) instead of the scenario's motion
+    #[arg(long, value_name = "FILE.csv", requires = "around_mm")]
+    trajectory: Option<PathBuf>,
     /// Boxes to examine at most
     #[arg(long, value_name = "N", default_value_t = 100_000)]
     boxes: usize,
@@ -71,14 +84,14 @@ pub(crate) enum Region {
 
 /// Carries a verb out. Exits with 1 where uniqueness is not proven, or an input with two was found.
 pub(crate) fn uniqueness(verb: &UniquenessVerb) -> Result<Exit, Failure> {
-    let mechanism = published()?;
     let (settled, rows, out) = match verb {
         UniquenessVerb::Prove(args) => {
-            let (settled, rows) = proof::prove(args, &mechanism);
+            let (mechanism, wholes) = to_prove(args)?;
+            let (settled, rows) = proof::prove(args, &mechanism, wholes);
             (settled, rows, &args.out)
         }
         UniquenessVerb::Search(args) => {
-            let (settled, rows) = search::search(args, &mechanism);
+            let (settled, rows) = search::search(args, &published()?);
             (settled, rows, &args.out)
         }
     };
@@ -86,6 +99,33 @@ pub(crate) fn uniqueness(verb: &UniquenessVerb) -> Result<Exit, Failure> {
         write_rows(path, &rows).with_context(|| format!("cannot write {}", path.display()))?;
     }
     Ok(if settled { Exit::Passed } else { Exit::Failed })
+}
+
+/// The mechanism and the boxes that something is to be proven of.
+fn to_prove(args: &ProveArgs) -> anyhow::Result<(Mechanism, Vec<InputBox>)> {
+    let Some(around_mm) = args.around_mm else {
+        let mechanism = published()?;
+        let whole = args.region.inputs(&mechanism);
+        return Ok((mechanism, vec![whole]));
+    };
+    let run = RunArgs {
+        scenario: args.scenario.clone(),
+        trajectory: args.trajectory.clone(),
+        ..RunArgs::default()
+    };
+    let plan = Plan::resolve(&run)?;
+    let wholes = motion::boxes(&plan, around_mm * 1e-3)?;
+    println!("{}: {} boxes around its inputs", plan.scenario.name, wholes.len());
+    Ok((plan.mechanism, wholes))
+}
+
+fn parse_distance(text: &str) -> Result<f64, String> {
+    let distance_mm: f64 = text.parse().map_err(|_| format!("{text} is no number"))?;
+    if distance_mm > 0.0 && distance_mm < 100.0 {
+        Ok(distance_mm)
+    } else {
+        Err("use a distance above 0 and below 100 mm".to_owned())
+    }
 }
 
 fn published() -> Result<Mechanism, GeometryError> {

@@ -1,6 +1,6 @@
 //! Branch and bound: level by level every box is examined and what stays undecided is halved, until
 //! nothing is left or the boxes are used up. Shares of volume are exact but for the boxes' own
-//! roundings: every halving halves.
+//! roundings: every halving halves, and of several boxes to begin with each counts the same.
 
 use masseter_controller::kinematics::uniqueness::{Claim, Finding, InputBox, Proof, Reaches};
 use masseter_shared::geometry::{AXIS_NAMES, Mechanism};
@@ -19,11 +19,10 @@ struct Tally {
     unique_share: f64,
 }
 
-/// Whether all of the region is proven, and the undecided boxes as CSV.
-pub(super) fn prove(args: &ProveArgs, mechanism: &Mechanism) -> (bool, Vec<String>) {
+/// Whether all of the boxes are proven, and what of them is undecided as CSV.
+pub(super) fn prove(args: &ProveArgs, mechanism: &Mechanism, wholes: Vec<InputBox>) -> (bool, Vec<String>) {
     let claim = args.margin.map_or(Claim::SeedConditions, Claim::DeterminantAtLeast);
-    let (tally, undecided) =
-        branch_and_bound(&Proof::new(mechanism, claim), args.region.inputs(mechanism), args.boxes);
+    let (tally, undecided) = branch_and_bound(&Proof::new(mechanism, claim), wholes, args.boxes);
     println!("boxes examined       {}", tally.examined);
     println!("no solution          {:.4} % of the volume", 100.0 * tally.unsolvable_share);
     println!("at most one solution {:.4} % of the volume", 100.0 * tally.unique_share);
@@ -35,10 +34,10 @@ pub(super) fn prove(args: &ProveArgs, mechanism: &Mechanism) -> (bool, Vec<Strin
 }
 
 /// The tally, and the boxes that are left when no more than `most` have been examined.
-fn branch_and_bound(proof: &Proof, whole: InputBox, most: usize) -> (Tally, Vec<Open>) {
-    let mut open = vec![(whole, Proof::any_reaches(&whole))];
+fn branch_and_bound(proof: &Proof, wholes: Vec<InputBox>, most: usize) -> (Tally, Vec<Open>) {
+    let mut share_of_one = 1.0 / wholes.len() as f64;
+    let mut open: Vec<Open> = wholes.into_iter().map(|whole| (whole, Proof::any_reaches(&whole))).collect();
     let mut tally = Tally::default();
-    let mut share_of_one = 1.0;
     while !open.is_empty() && tally.examined + open.len() <= most {
         tally.examined += open.len();
         let mut halves = Vec::new();
@@ -69,7 +68,7 @@ mod tests {
     fn bounded(slide_m: [f64; 3], leg_m: [f64; 3], radius_m: f64, most: usize) -> (Tally, Vec<Open>) {
         let around = |value_m: f64| Enclosure::new(value_m - radius_m, value_m + radius_m);
         let whole = InputBox { slide_m: slide_m.map(around), leg_m: leg_m.map(around) };
-        branch_and_bound(&Proof::new(&published().unwrap(), Claim::SeedConditions), whole, most)
+        branch_and_bound(&Proof::new(&published().unwrap(), Claim::SeedConditions), vec![whole], most)
     }
 
     #[test]
