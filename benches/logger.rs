@@ -3,7 +3,8 @@
 //!
 //!     cargo bench --bench logger
 //!
-//! The messages are those of a run under virtual time, played again and again at the pace of the clock.
+//! The messages are those of a run under virtual time, played again and again at the pace of the clock by a thread with
+//! the real time of a run.
 
 use std::fs::{self, File};
 use std::io::{BufRead, BufReader, Write};
@@ -11,12 +12,16 @@ use std::path::Path;
 use std::process::{Child, Command, Stdio};
 
 use anyhow::{Context, ensure};
+use hdrhistogram::Histogram;
 use masseter::recording::{Reader, Recorded, Recorder, Scene};
 use masseter_shared::clock::{self, SECOND_NS};
 use masseter_shared::config::Scenario;
 use masseter_shared::geometry::Mechanism;
 use masseter_shared::lifecycle::Start;
+use masseter_shared::messages::codes::Source;
 use masseter_shared::messages::{Command as CommandMessage, Event, FrameTap, Reading, State, Truth};
+use masseter_shared::realtime::Cycle;
+use masseter_shared::realtime::scheduling::{Wanted, obtain};
 use masseter_shared::transport::{Domain, Node, Outlet};
 use rustix::process::{Pid, Signal, kill_process};
 
@@ -30,7 +35,11 @@ fn main() -> anyhow::Result<()> {
     let folder = tempfile::tempdir()?;
     let cycles = cycles_of_a_run(&folder.path().join("run"))?;
     let recording = folder.path().join("recording.mcap");
-    through_the_logger(&cycles, folder.path(), &recording)?;
+    // On a thread of its own: the real time that it asks for ends with it.
+    std::thread::scope(|scope| {
+        let publisher = scope.spawn(|| through_the_logger(&cycles, folder.path(), &recording));
+        publisher.join().expect("measuring does not panic")
+    })?;
     in_process(&cycles, &folder.path().join("again.mcap"))?;
     raw(&cycles, &folder.path().join("raw"))?;
     Ok(())
@@ -62,7 +71,8 @@ struct Outlets {
     state: Outlet<State>,
     truth: Outlet<Truth>,
     frame: Outlet<FrameTap>,
-    event: Outlet<Event>,
+    /// The controller's, and the plant's.
+    events: [Outlet<Event>; 2],
 }
 
 impl Outlets {
@@ -73,7 +83,7 @@ impl Outlets {
             state: node.outlet()?,
             truth: node.outlet()?,
             frame: node.outlet()?,
-            event: node.outlet()?,
+            events: [node.outlet()?, node.outlet()?],
         })
     }
 
@@ -84,7 +94,10 @@ impl Outlets {
             Recorded::State(message) => self.state.publish(|place| *place = *message)?,
             Recorded::Truth(message) => self.truth.publish(|place| *place = *message)?,
             Recorded::Frame(message) => self.frame.publish(|place| *place = *message)?,
-            Recorded::Event(message) => self.event.publish(|place| *place = *message)?,
+            Recorded::Event(message) => {
+                let is_of_controller = message.source == Source::Controller.code();
+                self.events[usize::from(!is_of_controller)].publish(|place| *place = *message)?;
+            }
         }
         Ok(())
     }
@@ -99,7 +112,7 @@ fn through_the_logger(cycles: &[Vec<Recorded>], folder: &Path, recording: &Path)
         let node = Node::join(&domain)?;
         let mut outlets = Outlets::open(&node)?;
         let mut logger = start_logger(&scenario, domain.id(), recording)?;
-        let (sent, publishing_ns) = play(cycles, &mut outlets)?;
+        let (sent, publishing) = play(cycles, &mut outlets)?;
         let cpu_s = cpu_seconds(&logger)?;
         let memory_kib = peak_memory_kib(&logger)?;
         kill_process(Pid::from_child(&logger), Signal::TERM)?;
@@ -107,7 +120,8 @@ fn through_the_logger(cycles: &[Vec<Recorded>], folder: &Path, recording: &Path)
         let bytes = fs::metadata(recording)?.len();
         let played = RATE_HZ * SECONDS;
         println!("{played} cycles at {RATE_HZ} Hz, {sent} messages; the logger ended with {status}");
-        println!("  publishing       {:8.0} ns a message", publishing_ns as f64 / sent as f64);
+        let [median_ns, p99_ns] = [0.5, 0.99].map(|quantile| publishing.value_at_quantile(quantile));
+        println!("  publishing       {median_ns:8} ns a message, median of the cycles (p99 {p99_ns})");
         println!("  logger           {:8.1} % of a core", cpu_s / SECONDS as f64 * 100.0);
         println!("  logger's memory  {:8.1} MB at its peak", memory_kib as f64 / 1024.0);
         println!("  recording        {:8.0} bytes a cycle", bytes as f64 / played as f64);
@@ -135,21 +149,30 @@ fn start_logger(scenario: &Path, domain: &str, recording: &Path) -> anyhow::Resu
     Ok(logger)
 }
 
-/// Publishes a cycle at a time by the clock; returns messages and the time spent publishing, ns.
-fn play(cycles: &[Vec<Recorded>], outlets: &mut Outlets) -> anyhow::Result<(u64, u64)> {
+/// Publishes a cycle at a time by the clock; returns how many messages, and how long one took, cycle by cycle, ns.
+fn play(cycles: &[Vec<Recorded>], outlets: &mut Outlets) -> anyhow::Result<(u64, Histogram<u64>)> {
+    let realtime = Scenario::default().realtime;
+    let wanted = Wanted {
+        core: Some(realtime.cores[0]),
+        fifo_priority: Some(realtime.priority),
+        locked_memory: realtime.lock_memory,
+    };
+    for refusal in obtain(wanted).refusals {
+        println!("  {refusal}");
+    }
     let period_ns = SECOND_NS / RATE_HZ;
-    let began_ns = clock::now_ns();
-    let (mut sent, mut publishing_ns) = (0, 0);
-    for (number, cycle) in cycles.iter().cycle().take((RATE_HZ * SECONDS) as usize).enumerate() {
-        clock::sleep_until(began_ns + number as u64 * period_ns);
-        let from_ns = clock::now_ns();
+    let mut pace = Cycle::new(clock::now_ns() + period_ns, period_ns);
+    let (mut sent, mut publishing) = (0, Histogram::new(3)?);
+    for cycle in cycles.iter().cycle().take((RATE_HZ * SECONDS) as usize) {
+        let wake = pace.wait();
         for message in cycle {
             outlets.publish(message)?;
         }
-        publishing_ns += clock::now_ns() - from_ns;
+        let messages = cycle.len().max(1) as u64;
+        publishing.record((clock::now_ns() - wake.woke_ns) / messages)?;
         sent += cycle.len() as u64;
     }
-    Ok((sent, publishing_ns))
+    Ok((sent, publishing))
 }
 
 /// Processor time of a process so far, s.

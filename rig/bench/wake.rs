@@ -1,18 +1,20 @@
 //! `bench loop`: how late the real-time loop wakes at 1 kHz, against cyclictest.
 //!
-//! cyclictest runs as its authors set it up (holding `/dev/cpu_dma_latency`) and with idle states allowed;
-//! where it is not installed, a plain absolute sleep on the same thread settings takes its place. Its
+//! Both run holding `/dev/cpu_dma_latency`, as cyclictest's authors set it up, and with idle states allowed: which is
+//! better depends on the machine, and on a virtual one on its host. Where cyclictest is not installed, a plain absolute sleep on the same thread settings takes its place. Its
 //! histogram has steps of a microsecond.
 
+use std::cell::RefCell;
 use std::process::Command;
 
 use anyhow::{Context, bail};
 use masseter_shared::clock::{self, SECOND_NS};
-use masseter_shared::config::RealtimeConfig;
+use masseter_shared::config::{CpuDmaLatency, RealtimeConfig};
 use masseter_shared::realtime::Cycle;
 
 use super::contest::{Durations, Outcome, Turn, durations, record};
 use super::on_core;
+use crate::run::dma_latency::Hold;
 
 const PERIOD_NS: u64 = SECOND_NS / 1000;
 /// Wake-ups a round.
@@ -24,25 +26,44 @@ const OUTLIER_NS: u64 = 50_000;
 /// Highest lateness in cyclictest's histogram, µs.
 const CYCLICTEST_UP_TO_US: u64 = 20_000;
 
+/// The own loop's two turns stand first.
+const OWN: usize = 2;
+
 pub(super) fn measure(rounds: u32, core: usize) -> anyhow::Result<Outcome> {
-    let mut outliers = Outliers::default();
+    let outliers = RefCell::new(Outliers::default());
+    let refusal = RefCell::new(None);
+    let own = |wanted: CpuDmaLatency| -> Turn {
+        let (outliers, refusal) = (&outliers, &refusal);
+        Box::new(move || {
+            let hold = Hold::new(wanted, false);
+            if let Some(why) = &hold.obtained().refusal {
+                refusal.replace(Some(why.clone()));
+            }
+            let mut outliers = outliers.borrow_mut();
+            let outliers = &mut *outliers;
+            Ok(on_core(core, move || own_loop(outliers)))
+        })
+    };
     let has_cyclictest = Command::new("cyclictest").arg("--help").output().is_ok();
-    let mut turns: Vec<(String, Turn)> = vec![("masseter".to_owned(), {
-        let outliers = &mut outliers;
-        Box::new(move || Ok(on_core(core, || own_loop(outliers))))
-    })];
+    let mut turns: Vec<(String, Turn)> = vec![
+        ("masseter".to_owned(), own(CpuDmaLatency::Leave)),
+        ("masseter, latency held".to_owned(), own(CpuDmaLatency::Hold)),
+    ];
     if has_cyclictest {
         let cyclictest = |more: &'static [&'static str]| -> Turn { Box::new(move || cyclictest(core, more)) };
-        turns.push(("cyclictest".to_owned(), cyclictest(&[])));
         turns.push(("cyclictest --laptop".to_owned(), cyclictest(&["--laptop"])));
+        turns.push(("cyclictest".to_owned(), cyclictest(&[])));
     } else {
         turns.push(("plain sleep".to_owned(), Box::new(move || Ok(on_core(core, plain_sleep)))));
     }
-    let baselines = turns.len() - 1;
+    let contenders = turns.len();
     let measures = "wake-up lateness at 1 kHz, one SCHED_FIFO thread on one core".to_owned();
     let outcome = Outcome::of_turns("loop", measures, rounds, turns)?;
-    let pairs: Vec<_> = (1..=baselines).map(|baseline| (0, baseline)).collect();
-    let outcome = outcome.comparing(&pairs).noting(outliers.in_words());
+    let pairs: Vec<_> = (0..OWN).flat_map(|own| (OWN..contenders).map(move |other| (own, other))).collect();
+    let mut outcome = outcome.comparing(&pairs).noting(outliers.borrow().in_words());
+    if let Some(refusal) = refusal.take() {
+        outcome = outcome.noting(refusal);
+    }
     Ok(if has_cyclictest {
         outcome
     } else {
