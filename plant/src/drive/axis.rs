@@ -224,13 +224,14 @@ impl Axis {
         self.encoder.nearest(position_m).saturating_add(self.origin_increments)
     }
 
-    /// The cyclic modes: the targets that were buffered take effect.
+    /// The cyclic modes: the targets that were buffered take effect, and one that the velocity limit put off is
+    /// approached further.
     pub(super) fn synchronise(&mut self, now_ns: u64, new: NewTargets, objects: &Objects) {
         if !self.is_enabled() {
             return;
         }
         match self.mode {
-            Mode::CyclicPosition if new.position => {
+            Mode::CyclicPosition if new.position || self.is_cut && self.demand.is_interpolated() => {
                 self.head_for(now_ns, objects.get(names::TARGET_POSITION));
             }
             Mode::CyclicTorque if new.torque => self.push(objects.get(names::TARGET_TORQUE)),

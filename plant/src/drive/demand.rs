@@ -81,6 +81,11 @@ impl Demand {
         (target_m - from_m).abs() > most_m
     }
 
+    /// Whether it goes from cyclic target to cyclic target.
+    pub(super) fn is_interpolated(&self) -> bool {
+        matches!(self.shape, Shape::Interpolate { .. })
+    }
+
     /// Follows a profile.
     pub(super) fn follow(&mut self, profile: Profile) {
         self.shape = Shape::Profile(profile);

@@ -93,6 +93,23 @@ fn targets_beyond_the_software_limits_end_there_and_are_told() {
     assert!(bench.is_near(START + 1000));
 }
 
+/// A master that was late, or whose process data got lost, may leave a target further off than a period allows.
+#[test]
+fn a_target_too_far_for_one_period_is_reached_over_the_next_syncs() {
+    let mut bench = Bench::operational();
+    for word in [0x06, 0x07, 0x0F] {
+        bench.cycle(word, START);
+    }
+    bench.cycle(0x0F, START + 5000);
+    assert!(bench.has(StatusBit::InternalLimit));
+    for _ in 0..100 {
+        bench.sync();
+        bench.run_ms(1);
+    }
+    assert!(bench.is_near(START + 5000), "{}", bench.position() - START);
+    assert!(!bench.has(StatusBit::InternalLimit));
+}
+
 /// Object 605A, the state at the end, and the deceleration in m/s² on the way there.
 #[test]
 fn a_quick_stop_goes_as_object_605a_says() {
