@@ -8,6 +8,7 @@ from collections import Counter
 
 from mcap_ros2.reader import read_ros2_messages
 
+LAYOUT_VERSION = 4
 TOPICS = ("command", "reading", "state", "truth", "frame", "event")
 
 counts = Counter()
@@ -16,7 +17,7 @@ largest_angle_rad = 0.0
 for message in read_ros2_messages(sys.argv[1], topics=TOPICS):
     topic, body = message.channel.topic, message.ros_msg
     counts[topic] += 1
-    assert body.version == 3, (topic, body.version)
+    assert body.version == LAYOUT_VERSION, (topic, body.version)
     if topic not in ("event",):
         assert body.seq == last_seq.get(topic, 0) + 1, (topic, body.seq)
         last_seq[topic] = body.seq
