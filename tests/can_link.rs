@@ -70,6 +70,39 @@ fn a_disturbed_bus_is_not_held_against_bounds_that_assume_none() {
     assert!(stdout(&output).contains("skip bus response"), "{}", stdout(&output));
 }
 
+/// A percent of the frames may go wrong; a node that is gone, or that talks without end, stops the rig for good.
+#[test]
+fn every_fault_of_a_bus_is_borne_or_stops_the_rig_safely_with_its_cause() {
+    let now_and_then = "probability = 0.01";
+    let cases = [
+        ("corrupt", now_and_then, None),
+        ("lose", now_and_then, None),
+        ("duplicate", now_and_then, None),
+        ("delay", "delay_us = 300\nprobability = 0.01", None),
+        ("babble", "node = 2", Some("process_data_lost")),
+        ("disconnect", "node = 2", Some("process_data_lost")),
+        ("bus_off", "node = 2", Some("process_data_lost")),
+        ("disconnect", "node = 127", Some("process_data_lost")),
+        ("bus_off", "node = 127", Some("bus_off")),
+    ];
+    for (kind, which, stopped_by) in cases {
+        let fault = format!("[[faults]]\nkind = '{kind}'\nbus = 0\nfrom_s = 1.5\n{which}");
+        let bench = Bench::new(&format!("duration_s = 1.0\n{fault}"));
+        let output = bench.run(&["--clock", "virtual"]);
+        let expected = if stopped_by.is_some() { 5 } else { 0 };
+        assert_eq!(output.status.code(), Some(expected), "{fault}: {}", stdout(&output));
+        let summary = bench.summary();
+        let events = summary["figures"]["events"].as_array().unwrap();
+        let first_fault = events.iter().find(|event| event["kind"] == "fault");
+        assert_eq!(
+            first_fault.and_then(|event| event["cause"].as_str()),
+            stopped_by,
+            "{fault}: {first_fault:?}"
+        );
+        assert!(events.iter().any(|event| event["cause"] == "fault_injected"), "{fault}");
+    }
+}
+
 /// A server on a port that the system chose, ended with the test.
 struct Server {
     child: Child,
