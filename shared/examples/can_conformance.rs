@@ -106,6 +106,9 @@ fn main() -> Result<(), Box<dyn Error>> {
     let pair = || SocketPair::open([a, b]).expect("interfaces that could be opened before");
     SocketPair::open([a, b])?;
     conformance::check(pair)?;
-    println!("{a} and {b} keep the laws of the bus");
+    println!("{a} and {b} keep the laws of the bus:");
+    for law in conformance::LAWS {
+        println!("  {law}");
+    }
     Ok(())
 }

@@ -12,6 +12,16 @@ use super::frame::{CanId, Frame};
 /// Frames sent at once by the check for losses: more than any sensible queue holds.
 const BURST: u32 = 20_000;
 
+/// The laws of every bus, in the order in which they are checked.
+pub const LAWS: [&str; 3] = [
+    "a frame is received once, unchanged, at a time not before its predecessor's",
+    "a port does not receive its own frames",
+    "a frame is refused because the queue is full, or received, or reported as lost",
+];
+
+/// The law of buses that send by priority.
+pub const LAW_OF_ARBITRATION: &str = "of frames sent at once, the lowest identifier goes first";
+
 /// One of the two ports.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum End {
@@ -60,60 +70,66 @@ pub fn check<P: Pair>(mut pair: impl FnMut() -> P) -> Result<(), Violation> {
 /// # Errors
 /// The [`Violation`].
 pub fn check_arbitration<P: Pair>(mut pair: impl FnMut() -> P) -> Result<(), Violation> {
-    const LAW: &str = "of frames sent at once, the lowest identifier goes first";
     let mut pair = pair();
     let frames = [0x7FF, 0x181, 0x080].map(|id| frame(id, 0));
-    frames.iter().try_for_each(|&frame| send(&mut pair, frame)).map_err(|error| violated(LAW, &error))?;
+    frames
+        .iter()
+        .try_for_each(|&frame| send(&mut pair, frame))
+        .map_err(|error| violated(LAW_OF_ARBITRATION, &error))?;
     pair.settle();
-    let (received, _) = drain(&mut pair, End::B).map_err(|error| violated(LAW, &error))?;
+    let (received, _) = drain(&mut pair, End::B).map_err(|error| violated(LAW_OF_ARBITRATION, &error))?;
     let ids: Vec<_> = received.iter().map(|received| received.frame.id()).collect();
-    if ids.is_sorted() && ids.len() == frames.len() { Ok(()) } else { Err(violated(LAW, &ids)) }
+    if ids.is_sorted() && ids.len() == frames.len() {
+        Ok(())
+    } else {
+        Err(violated(LAW_OF_ARBITRATION, &ids))
+    }
 }
 
 fn frames_arrive_once_unchanged_and_in_order(pair: &mut impl Pair) -> Result<(), Violation> {
-    const LAW: &str = "a frame is received once, unchanged, at a time not before its predecessor's";
+    let [law, _, _] = LAWS;
     let mut last_ns = 0;
     for number in 0..=u32::from(u8::MAX) {
         let sent = frame(0x100 + (number % 7) as u16, number);
-        send(pair, sent).map_err(|error| violated(LAW, &error))?;
+        send(pair, sent).map_err(|error| violated(law, &error))?;
         pair.settle();
-        let (received, lost) = drain(pair, End::B).map_err(|error| violated(LAW, &error))?;
+        let (received, lost) = drain(pair, End::B).map_err(|error| violated(law, &error))?;
         match received[..] {
             [Received { frame, time_ns }] if frame == sent && time_ns >= last_ns && lost == 0 => {
                 last_ns = time_ns;
             }
-            _ => return Err(violated(LAW, &(sent, received, lost))),
+            _ => return Err(violated(law, &(sent, received, lost))),
         }
     }
     Ok(())
 }
 
 fn senders_do_not_hear_themselves(pair: &mut impl Pair) -> Result<(), Violation> {
-    const LAW: &str = "a port does not receive its own frames";
-    send(pair, frame(0x123, 0)).map_err(|error| violated(LAW, &error))?;
+    let [_, law, _] = LAWS;
+    send(pair, frame(0x123, 0)).map_err(|error| violated(law, &error))?;
     pair.settle();
     match drain(pair, End::A) {
         Ok((received, 0)) if received.is_empty() => Ok(()),
-        other => Err(violated(LAW, &other)),
+        other => Err(violated(law, &other)),
     }
 }
 
 fn nothing_is_lost_silently<P: Pair>(pair: &mut P) -> Result<(), Violation> {
-    const LAW: &str = "a frame is refused because the queue is full, or received, or reported as lost";
+    let [_, _, law] = LAWS;
     let mut accepted = 0;
     for number in 0..BURST {
         match send(pair, frame(0x123, number)) {
             Ok(()) => accepted += 1,
             Err(SendError::QueueFull { .. }) => break,
-            Err(other) => return Err(violated(LAW, &other)),
+            Err(other) => return Err(violated(law, &other)),
         }
     }
     pair.settle();
-    let (received, lost) = drain(pair, End::B).map_err(|error| violated(LAW, &error))?;
+    let (received, lost) = drain(pair, End::B).map_err(|error| violated(law, &error))?;
     if is_accounted_for(P::COUNTS_LOSSES, accepted, received.len() as u64, lost) {
         Ok(())
     } else {
-        Err(violated(LAW, &(accepted, received.len(), lost)))
+        Err(violated(law, &(accepted, received.len(), lost)))
     }
 }
 
