@@ -49,8 +49,8 @@ struct Estimate {
     solution: Solution,
 }
 
-/// The controller's whole memory.
-#[derive(Debug)]
+/// The controller's whole memory. A copy of it is made without allocation.
+#[derive(Debug, Clone)]
 pub struct Controller {
     mechanism: Mechanism,
     config: ControllerConfig,
@@ -165,6 +165,20 @@ impl Controller {
         self.silent_cycles = 0;
         self.steady_readings = self.steady_readings.saturating_add(1);
         Ok(())
+    }
+
+    /// What the controller would be after another cycle with the last measurement. To be thrown away: computing it
+    /// brings code and data of the cycle to come back into the processor's caches.
+    #[must_use]
+    pub fn rehearsal(&self) -> Self {
+        let mut copy = self.clone();
+        if let Some(estimate) = &mut copy.estimate
+            && let Ok(solution) = copy.tracker.update(&estimate.measured)
+        {
+            estimate.solution = solution;
+        }
+        copy.decide(Tick { cycle: self.last_cycle + 1, now_ns: 0 });
+        copy
     }
 
     /// Asks for an orderly stop.

@@ -1,6 +1,8 @@
 //! Where the motion stands: the move to its first pose, the motion itself, and coming to rest when
 //! it is stopped halfway. Time comes in as the cycles that have passed.
 
+use std::sync::Arc;
+
 use masseter_shared::geometry::Pose;
 
 use crate::trajectory::Trajectory;
@@ -17,9 +19,10 @@ enum Part {
 }
 
 /// The pose wanted, as a function of the time since playing began.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(crate) struct Playback {
-    trajectory: Trajectory,
+    /// Shared, so that a copy of the playback is made without allocation.
+    trajectory: Arc<Trajectory>,
     ease_s: f64,
     stop_ramp_s: f64,
     part: Part,
@@ -32,7 +35,15 @@ pub(crate) struct Playback {
 impl Playback {
     pub(crate) fn new(trajectory: Trajectory, ease_s: f64, stop_ramp_s: f64) -> Self {
         let part = Part::Hold(trajectory.pose(0.0));
-        Self { trajectory, ease_s, stop_ramp_s, part, elapsed_s: 0.0, rate: 1.0, stopping: false }
+        Self {
+            trajectory: Arc::new(trajectory),
+            ease_s,
+            stop_ramp_s,
+            part,
+            elapsed_s: 0.0,
+            rate: 1.0,
+            stopping: false,
+        }
     }
 
     /// Stands at `pose`.

@@ -8,7 +8,7 @@ use masseter_shared::geometry::{Pose, Vec3};
 use nalgebra::UnitQuaternion;
 
 /// The correction found so far.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(crate) struct PoseControl {
     gain_per_s: f64,
     limit_m: f64,

@@ -73,13 +73,21 @@ pub fn run(assignment: &Assignment) -> Result<Outcome, ControllerError> {
         if post.stop.is_made() {
             controller.request_stop();
         }
-        let wake = cycle.wait();
+        let wake = cycle.wait_rehearsing(|| rehearse(&controller, &ports))?;
         step(&mut controller, &mut ports, wake, patience_ns, cycle.waiter())?;
     }
     match controller.state() {
         ControllerState::SafeStop => Ok(Outcome::SafeStop),
         _ => Ok(Outcome::Finished),
     }
+}
+
+/// What the cycle to come will do, without effect: after a sleep its code and data are no longer in the caches.
+fn rehearse(controller: &Controller, ports: &Ports) -> Result<(), ProcessError> {
+    std::hint::black_box(controller.rehearsal());
+    ports.commands.warm_up()?;
+    ports.states.warm_up()?;
+    Ok(())
 }
 
 /// One cycle.

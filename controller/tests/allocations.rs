@@ -1,17 +1,25 @@
-//! The solvers allocate nothing, whichever way they go. Alone in its file: the allocator counts for
-//! the whole process.
+//! The solvers and the controller's cycle allocate nothing, whichever way they go. Alone in its file: the allocator is
+//! that of the whole process.
 #![allow(unsafe_code)] // A global allocator is an unsafe trait; this one only counts and passes on.
 
 use std::alloc::{GlobalAlloc, Layout, System};
+use std::cell::Cell;
 use std::hint::black_box;
-use std::sync::atomic::{AtomicU64, Ordering};
 
+use masseter_controller::core::{Controller, Tick};
 use masseter_controller::kinematics::{ForwardTracker, Options, Solutions, solve_newton, solve_seed};
-use masseter_shared::geometry::{Actuators, LEGS, Mechanism, MechanismConfig};
+use masseter_controller::trajectory::Trajectory;
+use masseter_shared::config::Scenario;
+use masseter_shared::geometry::{AXES, Actuators, LEGS, Mechanism, MechanismConfig};
+use masseter_shared::messages::codes::{ControllerState, DriveCondition, DriveRequest};
+use masseter_shared::messages::{Command, Reading, State};
 
 struct Counting;
 
-static ALLOCATIONS: AtomicU64 = AtomicU64::new(0);
+thread_local! {
+    /// Of this thread: the others belong to the test harness.
+    static ALLOCATIONS: Cell<u64> = const { Cell::new(0) };
+}
 
 #[global_allocator]
 static COUNTING: Counting = Counting;
@@ -19,7 +27,7 @@ static COUNTING: Counting = Counting;
 // SAFETY: every call goes to the system's allocator unchanged, so its guarantees are this one's.
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
+        ALLOCATIONS.set(ALLOCATIONS.get() + 1);
         // SAFETY: the caller's promises about `layout` are passed on.
         unsafe { System.alloc(layout) }
     }
@@ -31,9 +39,41 @@ unsafe impl GlobalAlloc for Counting {
 }
 
 fn allocations_of(work: impl FnOnce()) -> u64 {
-    let before = ALLOCATIONS.load(Ordering::Relaxed);
+    let before = ALLOCATIONS.get();
     work();
-    ALLOCATIONS.load(Ordering::Relaxed) - before
+    ALLOCATIONS.get() - before
+}
+
+/// Drives that are where they were told to be, from the wait for readings until the motion is played.
+#[test]
+fn no_cycle_of_the_controller_allocates_nor_does_its_rehearsal() {
+    let scenario = Scenario { duration_s: Some(0.5), ..Scenario::default() };
+    let mechanism = Mechanism::new(&scenario.mechanism).unwrap();
+    let trajectory =
+        Trajectory::new(&scenario.motion, &scenario.jaw, &mechanism, scenario.duration_s).unwrap();
+    let start = Actuators { slide_m: [0.0; LEGS], leg_m: [0.29; LEGS] }.to_axes();
+    let mut controller = Controller::new(&scenario, mechanism, trajectory);
+    let (mut reading, mut command, mut state) = (Reading::default(), Command::default(), State::default());
+    let cycling = allocations_of(|| {
+        for cycle in 1..=3000 {
+            black_box(controller.rehearsal());
+            let is_driven = command.request == DriveRequest::Enable.code();
+            reading = Reading {
+                cycle,
+                answers_cycle: cycle - 1,
+                position_m: if is_driven { command.target_m } else { start },
+                drive_state: [DriveCondition::OperationEnabled.code(); AXES],
+                fresh_axes: (1 << AXES) - 1,
+                ..reading
+            };
+            controller.observe(Some(&reading));
+            controller.decide(Tick { cycle, now_ns: cycle * 1_000_000 });
+            controller.fill_command(&mut command);
+            controller.fill_state(&mut state);
+        }
+    });
+    assert_eq!(cycling, 0);
+    assert_eq!(controller.state(), ControllerState::Disabling, "these drives never switch off");
 }
 
 #[test]

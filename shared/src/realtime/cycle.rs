@@ -57,6 +57,22 @@ impl Cycle {
         let cycle = self.claim(clock::now_ns());
         let due_ns = self.due_ns(cycle);
         let woke_ns = self.waiter.until(due_ns);
+        self.wake(cycle, due_ns, woke_ns)
+    }
+
+    /// As [`Self::wait`]; in between, after a sleep long enough to let the caches go cold, rehearses what is to be
+    /// done then.
+    ///
+    /// # Errors
+    /// That of the rehearsal.
+    pub fn wait_rehearsing<E>(&mut self, rehearse: impl FnOnce() -> Result<(), E>) -> Result<Wake, E> {
+        let cycle = self.claim(clock::now_ns());
+        let due_ns = self.due_ns(cycle);
+        let woke_ns = self.waiter.until_rehearsing(due_ns, rehearse)?;
+        Ok(self.wake(cycle, due_ns, woke_ns))
+    }
+
+    fn wake(&self, cycle: u64, due_ns: u64, woke_ns: u64) -> Wake {
         Wake { cycle, due_ns, woke_ns, skipped: self.skipped, stalled_ns: self.waiter.account().stalled_ns }
     }
 

@@ -8,6 +8,11 @@ use crate::clock;
 /// priority; or, while working, in the work itself, which [`Account`] therefore keeps apart.
 const GAP_NS: u64 = 50_000;
 
+/// A rehearsal ends well within this time, ns.
+const REHEARSAL_NS: u64 = 20_000;
+/// A task that sleeps for less finds its code and data still in the caches, ns.
+const COLD_AFTER_NS: u64 = 300_000;
+
 /// What a task's time went to since its first wait, ns.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Account {
@@ -59,6 +64,25 @@ impl Waiter {
         if now_ns < sleep_until_ns {
             self.sleep(now_ns, sleep_until_ns);
         }
+        self.spin_until(due_ns)
+    }
+
+    /// As [`Self::until`]; before a deadline that is far, wakes early enough to `rehearse`, which counts as work.
+    pub(super) fn until_rehearsing<E>(
+        &mut self,
+        due_ns: u64,
+        rehearse: impl FnOnce() -> Result<(), E>,
+    ) -> Result<u64, E> {
+        let rehearse_at_ns = due_ns.saturating_sub(REHEARSAL_NS);
+        if rehearse_at_ns > clock::now_ns() + COLD_AFTER_NS {
+            self.until(rehearse_at_ns);
+            rehearse()?;
+            return Ok(self.spin_until(due_ns));
+        }
+        Ok(self.until(due_ns))
+    }
+
+    fn spin_until(&mut self, due_ns: u64) -> u64 {
         let mut spin = self.spin();
         loop {
             let now_ns = spin.now_ns();
