@@ -73,7 +73,7 @@ pub fn run(assignment: &Assignment) -> Result<Outcome, ControllerError> {
         if post.stop.is_made() {
             controller.request_stop();
         }
-        let wake = cycle.wait_rehearsing(|| rehearse(&controller, &ports))?;
+        let wake = cycle.wait_preparing(|| rehearse(&controller, &ports))?;
         step(&mut controller, &mut ports, wake, patience_ns, cycle.waiter())?;
     }
     match controller.state() {

@@ -68,6 +68,11 @@ impl<L: Link> PlantCore<L> {
         })
     }
 
+    /// Lets time pass. What happens in it is worked out now, not when the next cycle begins.
+    pub fn advance(&mut self, now_ns: u64) -> Result<(), PlantError> {
+        Ok(self.link.advance(now_ns)?)
+    }
+
     /// Begins a cycle: SYNC.
     pub fn begin_cycle(&mut self, wake: Wake) -> Result<(), PlantError> {
         self.cycle = wake.cycle;

@@ -108,7 +108,7 @@ fn serve<L: Link>(
     let mut plant = build(scenario, start.epoch_ns)?;
     let mut cycle = Cycle::new(start.epoch_ns, scenario.period_ns());
     while !post.stop.is_made() {
-        let wake = cycle.wait();
+        let wake = cycle.wait_preparing(|| plant.advance(clock::now_ns()))?;
         exchange(&mut plant, &mut ports, schedule, wake, cycle.waiter())?;
         // No command can come before the controller wakes.
         cycle.waiter().until(wake.due_ns + schedule.controller_at_ns);

@@ -60,15 +60,15 @@ impl Cycle {
         self.wake(cycle, due_ns, woke_ns)
     }
 
-    /// As [`Self::wait`]; in between, after a sleep long enough to let the caches go cold, rehearses what is to be
-    /// done then.
+    /// As [`Self::wait`]; shortly before a deadline that is far, wakes to prepare for it: to do early what can be, and
+    /// to bring code and data back into caches that a sleep has let go cold.
     ///
     /// # Errors
-    /// That of the rehearsal.
-    pub fn wait_rehearsing<E>(&mut self, rehearse: impl FnOnce() -> Result<(), E>) -> Result<Wake, E> {
+    /// That of the preparation.
+    pub fn wait_preparing<E>(&mut self, prepare: impl FnOnce() -> Result<(), E>) -> Result<Wake, E> {
         let cycle = self.claim(clock::now_ns());
         let due_ns = self.due_ns(cycle);
-        let woke_ns = self.waiter.until_rehearsing(due_ns, rehearse)?;
+        let woke_ns = self.waiter.until_preparing(due_ns, prepare)?;
         Ok(self.wake(cycle, due_ns, woke_ns))
     }
 

@@ -8,8 +8,8 @@ use crate::clock;
 /// priority; or, while working, in the work itself, which [`Account`] therefore keeps apart.
 const GAP_NS: u64 = 50_000;
 
-/// A rehearsal ends well within this time, ns.
-const REHEARSAL_NS: u64 = 20_000;
+/// Preparations end within this time, ns.
+const PREPARE_NS: u64 = 20_000;
 /// A task that sleeps for less finds its code and data still in the caches, ns.
 const COLD_AFTER_NS: u64 = 300_000;
 
@@ -67,16 +67,16 @@ impl Waiter {
         self.spin_until(due_ns)
     }
 
-    /// As [`Self::until`]; before a deadline that is far, wakes early enough to `rehearse`, which counts as work.
-    pub(super) fn until_rehearsing<E>(
+    /// As [`Self::until`]; before a deadline that is far, wakes early enough to `prepare`, which counts as work.
+    pub(super) fn until_preparing<E>(
         &mut self,
         due_ns: u64,
-        rehearse: impl FnOnce() -> Result<(), E>,
+        prepare: impl FnOnce() -> Result<(), E>,
     ) -> Result<u64, E> {
-        let rehearse_at_ns = due_ns.saturating_sub(REHEARSAL_NS);
-        if rehearse_at_ns > clock::now_ns() + COLD_AFTER_NS {
-            self.until(rehearse_at_ns);
-            rehearse()?;
+        let prepare_at_ns = due_ns.saturating_sub(PREPARE_NS);
+        if prepare_at_ns > clock::now_ns() + COLD_AFTER_NS {
+            self.until(prepare_at_ns);
+            prepare()?;
             return Ok(self.spin_until(due_ns));
         }
         Ok(self.until(due_ns))
