@@ -92,6 +92,16 @@ fn recorded_patients_play() {
     }
 }
 
+/// The example's piece of food yields at 35 N.
+#[test]
+fn food_resists_the_jaw_and_the_platform_still_goes_where_it_should() {
+    let bench = Bench::new("duration_s = 3.0\n[food]");
+    let output = bench.run(&["--clock", "virtual"]);
+    assert_eq!(output.status.code(), Some(0), "{}", stdout(&output));
+    let bite_force_n = bench.summary()["figures"]["bite_force_max_n"].as_f64().unwrap();
+    assert!((33.0..37.0).contains(&bite_force_n), "{bite_force_n}");
+}
+
 #[test]
 fn another_builders_mechanism_runs() {
     let scenario = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/builder.toml");

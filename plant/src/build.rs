@@ -5,9 +5,10 @@ use masseter_shared::can::faults::Faults;
 use masseter_shared::can::wire::{INTERFRAME_BITS, frame_bits};
 use masseter_shared::can::wrapped::{NotByPort, PortFaults};
 use masseter_shared::can::{BitrateError, OpenError, VirtualWire, WireConfig};
-use masseter_shared::config::{CanConfig, DriveConfig, DynamicsConfig, Scenario};
+use masseter_shared::config::{CanConfig, DriveConfig, DynamicsConfig, JawConfig, Scenario};
 use masseter_shared::geometry::{AXES, AXIS_NAMES, GeometryError, LEGS, Mechanism, Pose};
 use masseter_shared::schedule::MASTER_ID;
+use nalgebra::Translation3;
 
 use crate::checks::check_quantities;
 use crate::drive::{DriveNode, DriveSettings};
@@ -15,6 +16,7 @@ use crate::emulation::Emulation;
 use crate::encoder::Encoder;
 use crate::expectation::setup;
 use crate::faults;
+use crate::food::Food;
 use crate::link::{MASTER_PORT, Place, VirtualLink};
 use crate::master::{DriveSettings as ExpectedDrive, Master, MasterSettings, Scale};
 use crate::mechanism::{Dynamics, DynamicsError};
@@ -144,7 +146,9 @@ pub(crate) fn interfaces_of_axes(can: &CanConfig) -> Result<[&str; AXES], PlantE
 pub(crate) fn build_emulation(scenario: &Scenario, now_ns: u64) -> Result<Emulation, PlantError> {
     check_quantities(scenario)?;
     let ids = node_ids(&scenario.can)?;
-    let dynamics = resting(Mechanism::new(&scenario.mechanism)?, &scenario.dynamics)?;
+    let mechanism = Mechanism::new(&scenario.mechanism)?;
+    let food = scenario.food.map(|config| Food::new(config, &closed_mouth(&mechanism, &scenario.jaw)));
+    let dynamics = resting(mechanism, &scenario.dynamics)?.chewing(food);
     let positions_m = dynamics.positions_m();
     let drives = (0..AXES)
         .map(|axis| {
@@ -253,21 +257,31 @@ fn node_ids(can: &CanConfig) -> Result<[NodeId; AXES], PlantError> {
     Ok(ids)
 }
 
-/// The platform level on three legs of the initial length, turned as the hinges are and above their
-/// middle: the height is found by bisection for the legs' mean.
-fn resting(mechanism: Mechanism, config: &DynamicsConfig) -> Result<Dynamics, PlantError> {
+/// The platform where the mouth is closed.
+fn closed_mouth(mechanism: &Mechanism, jaw: &JawConfig) -> Pose {
+    Translation3::from(jaw.closed_offset_m) * level(mechanism, jaw.closed_leg_m)
+}
+
+/// The platform level on three legs of that mean length, turned as the hinges are and above their middle: the height
+/// is found by bisection.
+fn level(mechanism: &Mechanism, leg_m: f64) -> Pose {
     let hinges = mechanism.pose_from_corners(&std::array::from_fn(|leg| mechanism.hinge(leg, 0.0)));
     let at_height = |height_m: f64| Pose::translation(0.0, 0.0, height_m) * hinges;
     let mean_leg_m = |height_m: f64| {
         let joints = mechanism.inverse(&at_height(height_m));
         joints.map_or(0.0, |joints| joints.actuators.leg_m.iter().sum::<f64>() / LEGS as f64)
     };
-    let (mut low_m, mut high_m) = (0.0, config.initial_leg_m);
+    let (mut low_m, mut high_m) = (0.0, leg_m);
     for _ in 0..60 {
         let middle_m = f64::midpoint(low_m, high_m);
-        if mean_leg_m(middle_m) < config.initial_leg_m { low_m = middle_m } else { high_m = middle_m }
+        if mean_leg_m(middle_m) < leg_m { low_m = middle_m } else { high_m = middle_m }
     }
-    let pose = at_height(low_m);
+    at_height(low_m)
+}
+
+/// At rest, level on legs of the initial length.
+fn resting(mechanism: Mechanism, config: &DynamicsConfig) -> Result<Dynamics, PlantError> {
+    let pose = level(&mechanism, config.initial_leg_m);
     if let Ok(joints) = mechanism.inverse(&pose)
         && let Err(violation) = mechanism.strokes().check(&joints.actuators)
     {

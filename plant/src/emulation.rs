@@ -126,6 +126,7 @@ impl Emulation {
             joint_m: self.dynamics.positions_m(),
             joint_m_s: self.dynamics.velocities_m_s(),
             force_n: self.force_n,
+            bite_force_n: self.dynamics.bite_force_n(),
             ..Truth::default()
         };
     }

@@ -14,6 +14,7 @@ pub mod emulator;
 mod encoder;
 mod expectation;
 mod faults;
+mod food;
 mod link;
 mod master;
 mod mechanism;

@@ -7,13 +7,15 @@
 //! along and across by the legs) as constant joint inertias. With J the Jacobian of slides, legs and
 //! hinges and M_q their inertias,
 //!
-//! (M_platform + Jᵀ M_q J) V̇ = Jᵀ(τ − friction − M_q J̇V) + gravity − gyroscopic moment.
+//! (M_platform + Jᵀ M_q J) V̇ = Jᵀ(τ − friction − M_q J̇V) + gravity + food − gyroscopic moment.
 //!
 //! Left out: end stops, play, and elasticity.
 
 use masseter_shared::config::DynamicsConfig;
 use masseter_shared::geometry::{AXES, InverseError, Jacobian, Joints, LEGS, Mechanism, Pose, Twist, Vec3};
 use nalgebra::{Matrix3, Matrix6, UnitQuaternion, Vector3, Vector6};
+
+use crate::food::Food;
 
 /// Below about this speed Coulomb friction fades towards zero, m/s.
 const STICTION_SPEED_M_S: f64 = 1e-3;
@@ -29,6 +31,7 @@ pub(crate) struct Dynamics {
     twist: Twist,
     joints: Joints,
     jacobian: Jacobian,
+    food: Option<Food>,
 }
 
 /// A step that left the mechanism without a configuration.
@@ -51,11 +54,21 @@ impl Dynamics {
     ) -> Result<Self, DynamicsError> {
         let joints = mechanism.inverse(&pose)?;
         let jacobian = mechanism.jacobian(&pose, &joints);
-        let dynamics = Self { mechanism, config, pose, twist: Twist::zeros(), joints, jacobian };
+        let dynamics = Self { mechanism, config, pose, twist: Twist::zeros(), joints, jacobian, food: None };
         match dynamics.mass(&dynamics.platform_inertia()).cholesky() {
             Some(_) => Ok(dynamics),
             None => Err(DynamicsError::Mass),
         }
+    }
+
+    /// With food between the teeth.
+    pub(crate) fn chewing(self, food: Option<Food>) -> Self {
+        Self { food, ..self }
+    }
+
+    /// What the food pushes the jaw open with, N.
+    pub(crate) fn bite_force_n(&self) -> f64 {
+        self.food.as_ref().map_or(0.0, Food::force_n)
     }
 
     /// The platform in the base frame.
@@ -78,10 +91,12 @@ impl Dynamics {
         let (axes, hinges) = self.bias();
         let inertia = self.platform_inertia();
         let axes_n = Vector6::from(*force_n) - self.friction() - self.axis_mass_kg().component_mul(&axes);
+        let food = self.food.as_mut().map_or_else(Vector6::zeros, |food| food.bite(&self.pose, &self.twist));
         let hinges_nm = hinges * -self.config.leg_inertia_kg_m2;
         let wrench = self.jacobian.actuators.tr_mul(&axes_n)
             + self.jacobian.hinges.tr_mul(&hinges_nm)
             + self.gravity()
+            + food
             - self.gyroscopic(&inertia);
         let solver = self.mass(&inertia).cholesky().ok_or(DynamicsError::Mass)?;
         self.twist += solver.solve(&wrench) * dt_s;

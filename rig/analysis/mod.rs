@@ -87,6 +87,8 @@ pub struct Figures {
     pub outage: Option<Outage>,
     /// Distance of the platform from where it should be, while the motion played.
     pub tracking: TrackingFigures,
+    /// The greatest force with which the jaw bit on food, N; none without food.
+    pub bite_force_max_n: Option<f64>,
     /// Measured intervals.
     pub intervals: Vec<IntervalFigures>,
     /// The cycles that took longest, with the hop to blame.
@@ -156,6 +158,7 @@ struct Pass {
     plant_skips: Skips,
     outage: OutageWatch,
     final_state: Option<&'static str>,
+    bite_force_max_n: Option<f64>,
 }
 
 impl Pass {
@@ -178,6 +181,7 @@ impl Pass {
             plant_skips: Skips::default(),
             outage: OutageWatch::default(),
             final_state: None,
+            bite_force_max_n: scenario.food.map(|_| 0.0),
         })
     }
 
@@ -222,6 +226,7 @@ impl Pass {
 
     fn truth(&mut self, truth: &Truth) {
         self.tracking.truth(truth);
+        self.bite_force_max_n = self.bite_force_max_n.map(|most_n| most_n.max(truth.bite_force_n));
         self.watch.truth(truth);
     }
 
@@ -248,6 +253,7 @@ impl Pass {
             final_state: self.final_state,
             outage: self.outage.finish(self.period_ns),
             tracking,
+            bite_force_max_n: self.bite_force_max_n,
             worst_cycles: self.ledger.finish(&intervals),
             intervals,
             topics: self.sequence.finish(),

@@ -100,6 +100,9 @@ fn motion(page: &mut String, figures: &Figures) -> std::fmt::Result {
     if let Some(rms_mm) = tracking.estimate_rms_mm {
         writeln!(page, "Estimated against true: rms {rms_mm:.4} mm.")?;
     }
+    if let Some(most_n) = figures.bite_force_max_n {
+        writeln!(page, "Bite force: at most {most_n:.1} N.")?;
+    }
     page.push_str("</p>\n");
     let [displacement, error] = charts::motion(figures);
     plot(page, "motion", displacement, "Nothing moved.")?;

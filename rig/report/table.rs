@@ -49,6 +49,9 @@ fn write_all(
     if let Some(rms_mm) = tracking.estimate_rms_mm {
         writeln!(text, "platform, estimated against true: rms {rms_mm:.4} mm")?;
     }
+    if let Some(most_n) = figures.bite_force_max_n {
+        writeln!(text, "bite force: at most {most_n:.1} N")?;
+    }
     text.push('\n');
     latencies(text, &figures.intervals)?;
     responses(text, &figures.bus_response)?;

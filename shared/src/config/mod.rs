@@ -6,12 +6,14 @@
 
 mod control;
 mod faults;
+mod food;
 mod motion;
 mod plant;
 mod scenario;
 
 pub use control::{ChecksConfig, ControllerConfig, CpuDmaLatency, RealtimeConfig};
 pub use faults::{FaultConfig, FaultKindConfig};
+pub use food::FoodConfig;
 pub use motion::*;
 pub use plant::{CanConfig, DriveConfig, DrivesConfig, DynamicsConfig, IdentityConfig};
 pub use scenario::{Scenario, ScenarioError};

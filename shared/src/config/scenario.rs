@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use super::{
-    CanConfig, ChecksConfig, ControllerConfig, DrivesConfig, DynamicsConfig, FaultConfig, JawConfig,
-    MotionConfig, RealtimeConfig, TrajectoryLimitsConfig,
+    CanConfig, ChecksConfig, ControllerConfig, DrivesConfig, DynamicsConfig, FaultConfig, FoodConfig,
+    JawConfig, MotionConfig, RealtimeConfig, TrajectoryLimitsConfig,
 };
 use crate::clock::SECOND_NS;
 use crate::geometry::MechanismConfig;
@@ -46,6 +46,9 @@ pub struct Scenario {
     pub drives: DrivesConfig,
     /// The emulated mechanism.
     pub dynamics: DynamicsConfig,
+    /// Food between the teeth of the emulated jaw; none when absent.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub food: Option<FoodConfig>,
     /// What the real-time processes ask of the system.
     pub realtime: RealtimeConfig,
     /// What the run is judged by.
@@ -70,6 +73,7 @@ impl Default for Scenario {
             can: CanConfig::default(),
             drives: DrivesConfig::default(),
             dynamics: DynamicsConfig::default(),
+            food: None,
             realtime: RealtimeConfig::default(),
             checks: ChecksConfig::default(),
             faults: Vec::new(),
@@ -151,6 +155,9 @@ impl Scenario {
         self.can.validate()?;
         for fault in &self.faults {
             fault.validate(self.can.buses.len(), self.can.is_virtual())?;
+        }
+        if let Some(food) = &self.food {
+            food.validate()?;
         }
         self.controller.validate()?;
         self.checks.validate()
@@ -250,6 +257,8 @@ mod tests {
             ("[[faults]]\nkind = 'delay'\nbus = 0\nfrom_s = 0.0", "faults.delay_us"),
             ("[[faults]]\nkind = 'lose'\nbus = 0\nfrom_s = 1.0\nuntil_s = 1.0", "faults.until_s = 1"),
             ("[[faults]]\nkind = 'lose'\nbus = 0\nfrom_s = 1.0\nprobability = 1.5", "faults.probability"),
+            ("[food]\nstiffness_n_per_m = 0.0", "food.stiffness_n_per_m = 0: use 1 to 1000000"),
+            ("[food]\nthickness_mm = 10.0", "did you mean `thickness_m`?"),
             ("[[faults]]\nkind = 'melt'\nbus = 0\nfrom_s = 1.0", "unknown variant `melt`"),
             (
                 "[can]\ninterfaces = ['a', 'b']\n[[faults]]\nkind = 'corrupt'\nbus = 0\nfrom_s = 1.0",
