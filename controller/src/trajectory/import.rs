@@ -16,7 +16,7 @@ use super::mandible::condylar_middle;
 use super::markers;
 use super::pose_csv;
 use super::recording::Recording;
-use super::table::{Format, Table};
+use super::table::{Format, LARGEST_MM, Table};
 
 /// A place in a recording.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -91,9 +91,20 @@ pub enum ImportProblem {
         /// What stands there.
         text: String,
     },
-    /// Time that does not increase.
+    /// A coordinate beyond what a tracker can see.
+    #[error("{value_mm:e} in column `{column}` lies beyond ±{largest_mm} mm; is the unit millimetres?")]
+    TooFar {
+        /// The column.
+        column: &'static str,
+        /// What stands there.
+        value_mm: f64,
+        /// What is believed.
+        largest_mm: f64,
+    },
+    /// Time that does not increase, or by less than a microsecond.
     #[error(
-        "time {time_s} s does not come after {previous_s} s of the row before; sort the rows, drop repeats"
+        "time {time_s} s does not come after {previous_s} s of the row before by 1 µs or more; sort the rows, \
+         drop repeats"
     )]
     TimeOrder {
         /// Time of the row.
@@ -189,7 +200,8 @@ pub(super) fn import(config: &FileConfig, jaw: &JawConfig) -> Result<Recording, 
     let holds = lowpass_hz == 0.0 || (0.5..=50.0).contains(&lowpass_hz);
     require("lowpass_hz", lowpass_hz, holds, "0 (none) or 0.5 to 50 Hz")?;
     for &coordinate in config.reference_point_mm.iter().chain(&config.marker_origin_mm).flatten() {
-        require("reference_point_mm or marker_origin_mm", coordinate, coordinate.is_finite(), "finite")?;
+        let is_near = coordinate.abs() <= LARGEST_MM;
+        require("reference_point_mm or marker_origin_mm", coordinate, is_near, "within ±100000 mm")?;
     }
     let reference = match config.reference_point_mm {
         Some(point_mm) => Vec3::from(point_mm) / 1000.0,

@@ -7,8 +7,12 @@ use super::import::{ImportProblem, Located};
 
 /// Fewer rows are no motion.
 const FEWEST_ROWS: usize = 4;
+/// Samples that are closer are repeats: the slope between them would be the clock's noise, s.
+const SHORTEST_STEP_S: f64 = 1e-6;
 /// The longest time without a sample that interpolation may bridge, s.
 const LARGEST_GAP_S: f64 = 0.25;
+/// A marker's place in the frame of any tracker is closer to its origin, mm.
+pub(super) const LARGEST_MM: f64 = 1e5;
 
 const POSES: [&str; 8] = ["time_s", "x_mm", "y_mm", "z_mm", "qw", "qx", "qy", "qz"];
 const MARKERS: [&str; 10] = [
@@ -97,19 +101,26 @@ fn parse_row(line: u64, text: &str, columns: &[&'static str]) -> Result<Row, Loc
         let problem = ImportProblem::Fields { found: fields.len(), expected: columns.len() };
         return Err(Located::at(line, problem));
     }
-    let number = |(text, &column): (&&str, &&'static str)| {
-        let finite = text.parse().ok().filter(|value: &f64| value.is_finite());
-        let problem = || ImportProblem::NotANumber { column, text: (*text).to_owned() };
-        finite.ok_or_else(|| Located::at(line, problem()))
+    let number = |(text, column): (&&str, &&'static str)| {
+        parse_number(text, column).map_err(|problem| Located::at(line, problem))
     };
     let mut values = fields.iter().zip(columns).map(number).collect::<Result<Vec<f64>, _>>()?;
     let time_s = values.remove(0);
     Ok(Row { line, time_s, values })
 }
 
+fn parse_number(text: &str, column: &'static str) -> Result<f64, ImportProblem> {
+    let finite = text.parse().ok().filter(|value: &f64| value.is_finite());
+    let value = finite.ok_or_else(|| ImportProblem::NotANumber { column, text: text.to_owned() })?;
+    if column.ends_with("_mm") && value.abs() > LARGEST_MM {
+        return Err(ImportProblem::TooFar { column, value_mm: value, largest_mm: LARGEST_MM });
+    }
+    Ok(value)
+}
+
 fn check_time(row: &Row, previous_s: f64) -> Result<(), Located> {
     let gap_s = row.time_s - previous_s;
-    if gap_s <= 0.0 {
+    if gap_s < SHORTEST_STEP_S {
         return Err(Located::at(row.line, ImportProblem::TimeOrder { time_s: row.time_s, previous_s }));
     }
     if gap_s > LARGEST_GAP_S {
@@ -150,7 +161,9 @@ mod tests {
             (with("inf,0,0,0,1,0,0,0"), Some(6), "`inf` in column `time_s`"),
             (with("0.03,0,0,0,1,0,0,0"), Some(6), "does not come after"),
             (with("0.02,0,0,0,1,0,0,0"), Some(6), "does not come after"),
+            (with("0.0300001,0,0,0,1,0,0,0"), Some(6), "does not come after"),
             (with("9.03,0,0,0,1,0,0,0"), Some(6), "without a sample"),
+            (with("0.04,0,0,-4e262,1,0,0,0"), Some(6), "-4e262 in column `z_mm` lies beyond"),
         ];
         for (text, line, reason) in table {
             let error = Table::parse(&text).err().unwrap();

@@ -140,6 +140,17 @@ fn an_absent_file_is_named() {
     assert!(error.to_string().contains("no/such/jaw.csv"), "{error}");
 }
 
+#[test]
+fn a_point_beyond_any_trackers_sight_is_refused() {
+    for point_mm in [f64::MAX, f64::NAN, 1.1e5] {
+        let file =
+            FileConfig { reference_point_mm: Some([0.0, point_mm, 0.0]), ..FileConfig::new("jaw.csv") };
+        let motion = MotionConfig::File(file);
+        let error = Trajectory::new(&motion, &JawConfig::default(), &mechanism(), None).unwrap_err();
+        assert!(error.to_string().contains("within ±100000 mm"), "{error}");
+    }
+}
+
 /// A real recording from beside the repository; says so when it is not there.
 fn recording(name: &str) -> Option<FileConfig> {
     let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../shared/data/jaw").join(name);
