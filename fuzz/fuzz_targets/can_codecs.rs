@@ -1,0 +1,111 @@
+//! Any bytes as frames, CANopen messages, tap messages and lines of text: read or refused, and what was read
+//! is written such that it reads the same.
+#![no_main]
+
+use libfuzzer_sys::arbitrary::Unstructured;
+use libfuzzer_sys::fuzz_target;
+use masseter_shared::can::candump::Line;
+use masseter_shared::can::canopen::{Cob, Emergency, Heartbeat, Nmt, NodeId, SdoRequest, SdoResponse};
+use masseter_shared::can::socketcand::Requests;
+use masseter_shared::can::{CanId, ErrorReport, Rpdo1, Tapped, TappedFrame, Tpdo1, candump, tap};
+use masseter_shared::messages::FrameTap;
+
+fuzz_target!(|data: &[u8]| {
+    canopen(data);
+    identifier(data);
+    tapped(data);
+    candump_lines(data);
+    socketcand_stream(data);
+});
+
+fn canopen(data: &[u8]) {
+    let node = NodeId::new(1).expect("a node id");
+    if let Ok(request) = SdoRequest::decode(data) {
+        assert_eq!(SdoRequest::decode(&request.encode()), Ok(request));
+        assert_nothing_invented(data, &request.encode());
+    }
+    if let Ok(response) = SdoResponse::decode(data) {
+        assert_eq!(SdoResponse::decode(&response.encode()), Ok(response));
+        assert_nothing_invented(data, &response.encode());
+    }
+    if let Ok(emergency) = Emergency::decode(data) {
+        assert_eq!(emergency.encode(), data);
+    }
+    if let Ok(nmt) = Nmt::decode(data) {
+        assert_eq!(nmt.frame().data(), data);
+    }
+    if let Ok(heartbeat) = Heartbeat::decode(data) {
+        assert_eq!(heartbeat.frame(node).data(), data);
+    }
+    if let Ok(pdo) = Rpdo1::decode(data) {
+        assert_eq!(pdo.encode(), data);
+    }
+    if let Ok(pdo) = Tpdo1::decode(data) {
+        assert_eq!(pdo.encode(), data);
+    }
+}
+
+/// Bits that a message does not use may be read as 1, and are written as 0.
+fn assert_nothing_invented(read: &[u8], written: &[u8]) {
+    assert_eq!(read.len(), written.len());
+    for (read, written) in read.iter().zip(written) {
+        assert_eq!(read & written, *written, "bits of {read:02X} became others of {written:02X}");
+    }
+}
+
+fn identifier(data: &[u8]) {
+    let Some((bytes, _)) = data.split_first_chunk::<4>() else { return };
+    let flagged = u32::from_le_bytes(*bytes);
+    let Ok(id) = CanId::from_flagged(flagged) else { return };
+    assert_eq!(id.flagged(), flagged);
+    if let Ok(cob) = Cob::try_from(id) {
+        assert_eq!(CanId::from(cob), id);
+    }
+}
+
+fn tapped(data: &[u8]) {
+    let mut bytes = Unstructured::new(data);
+    let Ok((time_ns, id, bus, length, flags, data)) = bytes.arbitrary::<(u64, u32, u16, u8, u8, [u8; 8])>()
+    else {
+        return;
+    };
+    if let Ok(report) = ErrorReport::decode(time_ns, id, data) {
+        let (id, data) = report.encode();
+        assert_eq!(ErrorReport::decode(time_ns, id, data), Ok(report));
+    }
+    let message = FrameTap { time_ns, id, bus, length, flags, data, ..FrameTap::default() };
+    let mut line = String::new();
+    let Ok(tapped) = tap::decode(&message) else {
+        assert!(candump::write_tap(&mut line, "can0", &message).is_err() && line.is_empty());
+        return;
+    };
+    assert_eq!(tap::decode(&tap::encode(bus, &tapped)), Ok(tapped));
+    candump::write_tap(&mut line, "can0", &message).expect("it could be decoded");
+    if let Tapped::Frame(TappedFrame { frame, .. }) = tapped {
+        let time_ns = time_ns - time_ns % 1000;
+        assert_eq!(candump::parse(&line), Ok(Line { time_ns, interface: "can0", frame }));
+    }
+}
+
+fn candump_lines(data: &[u8]) {
+    for line in String::from_utf8_lossy(data).lines() {
+        let Ok(read) = candump::parse(line) else { continue };
+        let mut written = String::new();
+        candump::write(&mut written, read.time_ns, read.interface, &read.frame).expect("strings take all");
+        assert_eq!(candump::parse(&written), Ok(read));
+    }
+}
+
+/// A stream means the same however it comes in pieces.
+fn socketcand_stream(data: &[u8]) {
+    let mut at_once = Requests::default();
+    at_once.push(data);
+    let expected: Vec<_> = std::iter::from_fn(|| at_once.take()).collect();
+    let mut in_pieces = Requests::default();
+    let mut found = Vec::new();
+    for byte in data {
+        in_pieces.push(&[*byte]);
+        found.extend(std::iter::from_fn(|| in_pieces.take()));
+    }
+    assert_eq!(found, expected);
+}
