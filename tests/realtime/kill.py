@@ -136,7 +136,12 @@ def hit_once(masseter, role, how, silent_cycles, chance):
         if role == ALL:
             return {CLEAN: clean_ms(masseter, rig, victims)}
         hit_ns = time.monotonic_ns()
-        os.kill(victims[0], signal.SIGKILL if how == "KILL" else signal.SIGSTOP)
+        try:
+            os.kill(victims[0], signal.SIGKILL if how == "KILL" else signal.SIGSTOP)
+        except ProcessLookupError:
+            # Its part ended in the last moment.
+            rig.wait()
+            raise Disturbed from None
         if how == "STOP":
             time.sleep(silent_cycles / 1000 + STOPPED_MARGIN_S)
             os.kill(victims[0], signal.SIGCONT)

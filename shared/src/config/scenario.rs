@@ -152,6 +152,12 @@ impl Scenario {
         if !(1..=99).contains(&self.realtime.priority) {
             return bad("realtime.priority", self.realtime.priority.to_string(), "use 1 to 99 (SCHED_FIFO)");
         }
+        if let MotionConfig::File(file) = &self.motion
+            && file.path.to_str().is_none()
+        {
+            let need = "use folders and a file whose names are UTF-8: the scenario is written down with them";
+            return bad("motion.path", file.path.display().to_string(), need);
+        }
         self.can.validate()?;
         for fault in &self.faults {
             fault.validate(self.can.buses.len(), self.can.is_virtual())?;
@@ -205,6 +211,7 @@ fn nearest_key(message: &str) -> Option<&str> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::config::FileConfig;
 
     fn parse(text: &str) -> Result<Scenario, String> {
         let scenario = toml::from_str::<Scenario>(text)
@@ -222,6 +229,15 @@ mod tests {
     fn what_is_written_back_reads_as_the_same() {
         let scenario = parse("name = 'x'\nduration_s = 3.0\n[motion]\nkind = 'opening'").unwrap();
         assert_eq!(parse(&scenario.to_toml()).unwrap(), scenario);
+    }
+
+    #[test]
+    fn a_recording_whose_path_is_no_text_is_refused() {
+        use std::os::unix::ffi::OsStrExt;
+        let path = Path::new(std::ffi::OsStr::from_bytes(b"/jaw\xFF/m.csv"));
+        let scenario = Scenario { motion: MotionConfig::File(FileConfig::new(path)), ..Scenario::default() };
+        let error = scenario.validate().unwrap_err().to_string();
+        assert!(error.contains("motion.path") && error.contains("UTF-8"), "{error}");
     }
 
     #[test]
