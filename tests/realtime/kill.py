@@ -156,15 +156,24 @@ def hit_once(masseter, role, how, silent_cycles, chance):
 
 
 def clean_ms(masseter, rig, children):
-    """All processes are killed at once: how long `masseter clean` takes until another rig finds nothing of them."""
+    """All processes are killed at once: how long `masseter clean` then takes, its start included."""
     for process in [rig.pid, *children]:
         os.kill(process, signal.SIGKILL)
     rig.wait()
+    while any(lives(child) for child in children):
+        time.sleep(0.001)
     began_ns = time.monotonic_ns()
     subprocess.run([masseter, "clean"], check=True, stdout=subprocess.DEVNULL)
     taken_ms = (time.monotonic_ns() - began_ns) / 1e6
     assert_clean(rig, ALL)
     return taken_ms
+
+
+def lives(process):
+    try:
+        return Path(f"/proc/{process}/stat").read_text().rsplit(")", 1)[1].split()[0] != "Z"
+    except (FileNotFoundError, ProcessLookupError):
+        return False
 
 
 def assert_clean(rig, role):
