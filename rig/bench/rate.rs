@@ -17,6 +17,7 @@ use masseter_shared::config::Scenario;
 use serde_json::Value;
 
 use super::contest::{Contender, Durations, Outcome, Share, durations};
+use crate::exit::Exit;
 use crate::run::folder::RunFolder;
 use crate::run::manifest::Manifest;
 
@@ -38,6 +39,8 @@ struct Turn {
     durations: Vec<Durations>,
     shares: Vec<(String, f64)>,
     stopped: bool,
+    /// Whether the machine kept the rig from too many cycles to judge it.
+    is_disturbed: bool,
 }
 
 pub(super) fn measure(rounds: u32, cores: [usize; 2]) -> anyhow::Result<Outcome> {
@@ -59,11 +62,16 @@ pub(super) fn measure(rounds: u32, cores: [usize; 2]) -> anyhow::Result<Outcome>
         notes: Vec::new(),
     };
     for (rate_hz, turns) in RATES_HZ.into_iter().zip(turns) {
-        let stopped = turns.iter().filter(|turn| turn.stopped).count();
-        if stopped > 0 {
-            outcome.notes.push(format!(
-                "{rate_hz} Hz: {stopped} of {rounds} runs did not play to their end; the cores do not hold this rate"
-            ));
+        let stopped =
+            |by_machine| turns.iter().filter(|turn| turn.stopped && turn.is_disturbed == by_machine).count();
+        for (count, why) in [
+            (stopped(false), "the cores do not hold this rate"),
+            (stopped(true), "the machine stood still for too long"),
+        ] {
+            if count > 0 {
+                let note = format!("{rate_hz} Hz: {count} of {rounds} runs did not play to their end: {why}");
+                outcome.notes.push(note);
+            }
         }
         outcome.contenders.extend(contenders(rate_hz, turns));
     }
@@ -141,11 +149,17 @@ fn turn(folder: &RunFolder) -> anyhow::Result<Turn> {
         ("missed by the machine".to_owned(), by_machine / deadlines),
         ("dropped".to_owned(), dropped / (recorded + dropped)),
     ];
-    for (process, usage) in &manifest.usage.processes {
+    // A process that ended at once was never observed.
+    for (process, usage) in manifest.usage.processes.iter().filter(|(_, usage)| usage.observed_s > 0.0) {
         shares.push((format!("{process} CPU"), usage.cpu_s / usage.observed_s));
     }
     let shares = shares.into_iter().map(|(name, share)| (name, share * 100.0)).collect();
-    Ok(Turn { durations, shares, stopped: figures["final_state"] != "finished" })
+    Ok(Turn {
+        durations,
+        shares,
+        stopped: figures["final_state"] != "finished",
+        is_disturbed: summary["verdict"]["exit_code"] == Exit::Invalid as u8,
+    })
 }
 
 /// All intervals of a log together.

@@ -11,7 +11,7 @@ const GAP_NS: u64 = 50_000;
 /// Preparations end within this time, ns.
 const PREPARE_NS: u64 = 20_000;
 /// A task that sleeps for less finds its code and data still in the caches, ns.
-const COLD_AFTER_NS: u64 = 300_000;
+const COLD_AFTER_NS: u64 = 100_000;
 
 /// What a task's time went to since its first wait, ns.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
