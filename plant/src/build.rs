@@ -257,7 +257,8 @@ fn node_ids(can: &CanConfig) -> Result<[NodeId; AXES], PlantError> {
     Ok(ids)
 }
 
-/// The platform where the mouth is closed.
+/// The platform where the mouth is closed. Taken as level, which a mechanism of unequal sides need not be there: the
+/// pose itself would take the forward kinematics.
 fn closed_mouth(mechanism: &Mechanism, jaw: &JawConfig) -> Pose {
     Translation3::from(jaw.closed_offset_m) * level(mechanism, jaw.closed_leg_m)
 }

@@ -87,7 +87,7 @@ pub struct Figures {
     pub outage: Option<Outage>,
     /// Distance of the platform from where it should be, while the motion played.
     pub tracking: TrackingFigures,
-    /// The greatest force with which the jaw bit on food, N; none without food.
+    /// The greatest force with which the emulated jaw bit on food, N; none without food, and on the robot.
     pub bite_force_max_n: Option<f64>,
     /// Measured intervals.
     pub intervals: Vec<IntervalFigures>,
@@ -181,7 +181,8 @@ impl Pass {
             plant_skips: Skips::default(),
             outage: OutageWatch::default(),
             final_state: None,
-            bite_force_max_n: scenario.food.map(|_| 0.0),
+            // On the robot nobody knows.
+            bite_force_max_n: scenario.food.filter(|_| scenario.can.is_virtual()).map(|_| 0.0),
         })
     }
 

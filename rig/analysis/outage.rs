@@ -21,7 +21,7 @@ const DISORDER_NS: u64 = 2_000_000_000;
 /// Share of the cycles before a stop whose loss may explain it.
 const EXPLAINS: f64 = 0.1;
 
-/// The deadlines that the busier victim of the two processes missed just before a safe stop.
+/// The deadlines that controller or plant, whichever missed more, missed just before a safe stop.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub struct Outage {
     /// Deadlines missed.

@@ -42,7 +42,7 @@ impl FoodConfig {
         if let Some(&value) = self.point_m.iter().find(|value| !value.is_finite()) {
             return bad("food.point_m", value, "use finite coordinates");
         }
-        // Beyond these the integration of the mechanism would not resolve the contact.
+        // Far from what the integration of the mechanism could not resolve.
         let ranges = [
             ("food.thickness_m", self.thickness_m, 1e-4, 0.05),
             ("food.stiffness_n_per_m", self.stiffness_n_per_m, 1.0, 1e6),

@@ -10,8 +10,8 @@ const GAP_NS: u64 = 50_000;
 
 /// Preparations end within this time, ns.
 const PREPARE_NS: u64 = 20_000;
-/// A task that sleeps for less finds its code and data still in the caches, ns.
-const COLD_AFTER_NS: u64 = 100_000;
+/// Where less than this is left before the preparations, they would take too large a share of the core, ns.
+const WORTH_PREPARING_NS: u64 = 100_000;
 
 /// What a task's time went to since its first wait, ns.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -74,7 +74,7 @@ impl Waiter {
         prepare: impl FnOnce() -> Result<(), E>,
     ) -> Result<u64, E> {
         let prepare_at_ns = due_ns.saturating_sub(PREPARE_NS);
-        if prepare_at_ns > clock::now_ns() + COLD_AFTER_NS {
+        if prepare_at_ns > clock::now_ns() + WORTH_PREPARING_NS {
             self.until(prepare_at_ns);
             prepare()?;
             return Ok(self.spin_until(due_ns));
@@ -162,6 +162,23 @@ mod tests {
             let due_ns = clock::now_ns() + ahead_ns;
             assert!(waiter.until(due_ns) >= due_ns);
         }
+    }
+
+    #[test]
+    fn far_deadlines_are_prepared_for_once_and_near_ones_are_not() {
+        let mut waiter = Waiter::new(1_000_000);
+        for (ahead_ns, expected) in [(0, 0), (50_000, 0), (50_000_000, 1)] {
+            let due_ns = clock::now_ns() + ahead_ns;
+            let mut prepared = 0;
+            let prepare = || -> Result<(), ()> {
+                prepared += 1;
+                Ok(())
+            };
+            assert!(waiter.until_preparing(due_ns, prepare).unwrap() >= due_ns);
+            assert_eq!(prepared, expected, "{ahead_ns} ns ahead");
+        }
+        let refused = waiter.until_preparing(clock::now_ns() + 50_000_000, || Err("no"));
+        assert_eq!(refused, Err("no"));
     }
 
     #[test]
