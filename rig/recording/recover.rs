@@ -1,7 +1,7 @@
 //! Writes what can be read of a damaged recording into a new one that is whole.
 //!
-//! Messages, channels and schemas keep their bytes, numbers and times. Attachments and metadata, which
-//! Masseter does not write, are not carried over.
+//! Messages and channels keep their bytes, numbers and times; schemas are numbered anew, since damage may have given
+//! two of them the same number. Attachments and metadata, which Masseter does not write, are not carried over.
 
 use std::collections::BTreeSet;
 use std::io::{Read, Seek, Write};
@@ -63,9 +63,7 @@ fn define<W: Write + Seek>(
     schema: Option<&Schema>,
 ) -> Result<(), McapError> {
     let schema_id = match schema {
-        Some(schema) => {
-            writer.add_schema_with_id(channel.schema_id, &schema.name, &schema.encoding, &schema.data)?
-        }
+        Some(schema) => writer.add_schema(&schema.name, &schema.encoding, &schema.data)?,
         None => 0,
     };
     writer.add_channel_with_id(
