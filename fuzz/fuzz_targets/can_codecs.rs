@@ -65,11 +65,12 @@ fn identifier(data: &[u8]) {
 
 fn tapped(data: &[u8]) {
     let mut bytes = Unstructured::new(data);
-    let Ok((time_ns, id, bus, length, flags, data)) = bytes.arbitrary::<(u64, u32, u16, u8, u8, [u8; 8])>()
+    let Ok((time_ns, id, bus, length, flags, data)) = bytes.arbitrary::<(u64, u32, u16, u8, u8, [u8; 64])>()
     else {
         return;
     };
-    if let Ok(report) = ErrorReport::decode(time_ns, id, data) {
+    let (&said, _) = data.split_first_chunk().expect("64 bytes");
+    if let Ok(report) = ErrorReport::decode(time_ns, id, said) {
         let (id, data) = report.encode();
         assert_eq!(ErrorReport::decode(time_ns, id, data), Ok(report));
     }

@@ -124,7 +124,7 @@ pub(crate) fn build_sockets(scenario: &Scenario, now_ns: u64) -> Result<SocketLi
         Ok(faults.restarting_after(restart_after_ns(can)))
     };
     let faults = (0..can.buses.len()).map(port_faults).collect::<Result<_, PlantError>>()?;
-    Ok(SocketLink::open(&can.interfaces, faults)?)
+    Ok(SocketLink::open(&can.interfaces, can.format(), faults)?)
 }
 
 /// Each bus makes choices of its own.
@@ -163,7 +163,7 @@ pub(crate) fn build_emulation(scenario: &Scenario, now_ns: u64) -> Result<Emulat
 
 fn master_settings(can: &CanConfig, drives: [ExpectedDrive; AXES]) -> Result<MasterSettings, PlantError> {
     let rates = can.rates()?;
-    let sync_bits = frame_bits(&sync::frame().in_format(can.format()));
+    let sync_bits = frame_bits(&sync::frame().promoted(can.format()));
     Ok(MasterSettings {
         id: master_id(),
         drives,

@@ -45,7 +45,8 @@ impl Emulator {
     /// The scenario's drives, switched on at `now_ns` on the interfaces that it names.
     pub fn open(scenario: &Scenario, now_ns: u64) -> Result<Self, PlantError> {
         let emulation = build_emulation(scenario, now_ns)?;
-        let ports = interfaces_of_axes(&scenario.can)?.map(SocketCan::open);
+        let format = scenario.can.format();
+        let ports = interfaces_of_axes(&scenario.can)?.map(|interface| SocketCan::open(interface, format));
         let ports: Vec<_> = ports.into_iter().collect::<Result<_, OpenError>>()?;
         let ports = ports.try_into().expect("a port for every axis");
         Ok(Self { emulation, ports, waiting: [None; AXES], figures: Figures::default() })

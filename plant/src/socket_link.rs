@@ -2,7 +2,7 @@
 
 use masseter_shared::can::faults::FaultNote;
 use masseter_shared::can::wrapped::PortFaults;
-use masseter_shared::can::{Bus, OpenError, ReceiveError, SocketCan, Tapped};
+use masseter_shared::can::{Bus, FrameFormat, OpenError, ReceiveError, SocketCan, Tapped};
 use masseter_shared::messages::Truth;
 
 use crate::link::{Buses, Link};
@@ -17,9 +17,14 @@ pub struct SocketLink {
 }
 
 impl SocketLink {
-    /// Opens the interfaces, one a bus, each with the faults of the master's port there.
-    pub(crate) fn open(interfaces: &[String], faults: Vec<PortFaults>) -> Result<Self, OpenError> {
-        let open = || interfaces.iter().map(|interface| SocketCan::open(interface)).collect::<Result<_, _>>();
+    /// Opens the interfaces, one a bus, each with the faults of the master's port there, to send in that format.
+    pub(crate) fn open(
+        interfaces: &[String],
+        format: FrameFormat,
+        faults: Vec<PortFaults>,
+    ) -> Result<Self, OpenError> {
+        let port = |interface: &String| SocketCan::open(interface, format);
+        let open = || interfaces.iter().map(port).collect::<Result<_, _>>();
         Ok(Self { ports: open()?, faults, taps: open()? })
     }
 }

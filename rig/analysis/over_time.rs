@@ -129,7 +129,7 @@ mod tests {
     fn a_bus_that_is_half_full_is_said_to_be() {
         let frame = Frame::fixed(CanId::standard(0x123).unwrap(), [0x55; 8]);
         let bits = wire::wire_bits(&frame);
-        let tap = FrameTap { id: 0x123, length: 8, data: [0x55; 8], ..Default::default() };
+        let tap = FrameTap { id: 0x123, length: 8, data: [0x55; 64], ..Default::default() };
         let mut watch = Watch::on(Some(Rates::classical(Bitrate::new(2 * 1000 * bits).unwrap())));
         for millisecond in 0..1000 {
             watch.frame(&FrameTap { time_ns: millisecond * 1_000_000, ..tap });

@@ -126,10 +126,11 @@ mod tests {
     #[test]
     fn a_message_of_ours_becomes_a_line() {
         let columns = Columns::of(&FrameTap::schema()).unwrap();
-        let frame = FrameTap { seq: 3, id: 0x181, bus: 1, length: 2, data: [7; 8], ..Default::default() };
+        let data = [7; 64];
+        let frame = FrameTap { seq: 3, id: 0x181, bus: 1, length: 2, data, ..Default::default() };
         let mut line = String::new();
         assert!(columns.write(&mut line, bytemuck::bytes_of(&frame)));
-        assert_eq!(line, "3,0,0,0,0,385,1,2,0,7,7,7,7,7,7,7,7");
+        assert_eq!(line, "3,0,0,0,0,385,1,2,0".to_owned() + &",7".repeat(data.len()));
         assert!(
             columns
                 .header()

@@ -2,14 +2,15 @@
 //! node and its port.
 //!
 //! `cargo run --release --example can_conformance -p masseter-shared -- can0 can1`. Nobody else may use the
-//! wire meanwhile. Two ports of one virtual interface of the kernel do as well: `-- vcan0 vcan0`.
+//! wire meanwhile. Two ports of one virtual interface of the kernel do as well: `-- vcan0 vcan0`. With `--fd` before
+//! them, interfaces set up for CAN FD.
 
 use std::error::Error;
 use std::time::Duration;
 
 use masseter_shared::can::conformance::{self, End, Pair};
 use masseter_shared::can::wrapped::{CandumpTap, Counts, PortFaults};
-use masseter_shared::can::{Bus, OpenError, ReceiveError, SocketCan};
+use masseter_shared::can::{Bus, FrameFormat, OpenError, ReceiveError, SocketCan};
 use masseter_shared::clock;
 
 /// How often is looked whether all frames have arrived.
@@ -19,6 +20,7 @@ const PATIENCE: u32 = 500;
 
 /// Two ports under all wrappers, and two more to know when everything sent has left the one side and reached the other.
 struct SocketPair {
+    format: FrameFormat,
     ends: [WrappedEnd; 2],
     watches: [Watch; 2],
 }
@@ -38,18 +40,19 @@ struct Watch {
 }
 
 impl SocketPair {
-    fn open([a, b]: [&str; 2]) -> Result<Self, OpenError> {
+    fn open([a, b]: [&str; 2], format: FrameFormat) -> Result<Self, OpenError> {
         Ok(Self {
-            ends: [WrappedEnd::open(a)?, WrappedEnd::open(b)?],
+            format,
+            ends: [WrappedEnd::open(a, format)?, WrappedEnd::open(b, format)?],
             watches: [Watch::open(a)?, Watch::open(b)?],
         })
     }
 }
 
 impl WrappedEnd {
-    fn open(interface: &str) -> Result<Self, OpenError> {
+    fn open(interface: &str, format: FrameFormat) -> Result<Self, OpenError> {
         Ok(Self {
-            port: SocketCan::open(interface)?,
+            port: SocketCan::open(interface, format)?,
             counts: Counts::default(),
             tap: CandumpTap::new(interface, String::new()),
             faults: PortFaults::new(Vec::new(), 0, 1).expect("no fault needs a simulated wire"),
@@ -63,7 +66,7 @@ impl WrappedEnd {
 
 impl Watch {
     fn open(interface: &str) -> Result<Self, OpenError> {
-        Ok(Self { port: SocketCan::open(interface)?, seen: 0 })
+        Ok(Self { port: SocketCan::open(interface, FrameFormat::Classical)?, seen: 0 })
     }
 
     fn look(&mut self) -> u64 {
@@ -84,6 +87,10 @@ impl Pair for SocketPair {
         self.ends[end as usize].wrapped()
     }
 
+    fn format(&self) -> FrameFormat {
+        self.format
+    }
+
     fn now_ns(&self) -> u64 {
         clock::now_ns()
     }
@@ -102,9 +109,14 @@ impl Pair for SocketPair {
 
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<_> = std::env::args().skip(1).collect();
-    let [a, b] = &arguments[..] else { return Err("usage: can_conformance INTERFACE INTERFACE".into()) };
-    let pair = || SocketPair::open([a, b]).expect("interfaces that could be opened before");
-    SocketPair::open([a, b])?;
+    let arguments: Vec<_> = arguments.iter().map(String::as_str).collect();
+    let (format, [a, b]) = match arguments[..] {
+        [a, b] => (FrameFormat::Classical, [a, b]),
+        ["--fd", a, b] => (FrameFormat::FdBitRateSwitch, [a, b]),
+        _ => return Err("usage: can_conformance [--fd] INTERFACE INTERFACE".into()),
+    };
+    let pair = || SocketPair::open([a, b], format).expect("interfaces that could be opened before");
+    SocketPair::open([a, b], format)?;
     conformance::check(pair)?;
     println!("{a} and {b} keep the laws of the bus:");
     for law in conformance::LAWS {

@@ -119,7 +119,7 @@ impl Master {
             self.next_heartbeat_ns = wake.woke_ns + self.settings.heartbeat_ns;
         }
         for node in &mut self.nodes {
-            node.is_fresh = false;
+            node.begin_cycle();
         }
         self.watch_buses(wake.woke_ns, buses);
         for bus in 0..self.settings.buses {

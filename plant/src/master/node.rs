@@ -32,6 +32,10 @@ pub(super) struct Node {
     pub(super) heard_ns: u64,
     pub(super) is_fresh: bool,
     pub(super) missing_cycles: u32,
+    /// New process data beyond one a SYNC, in cycles without a quiet one between them.
+    pub(super) surplus: u32,
+    /// New process data since the last SYNC.
+    news: u32,
     /// Whether it was told that the node does not come.
     pub(super) is_missed: bool,
     has_wrong_length: [bool; LENGTHS],
@@ -53,6 +57,8 @@ impl Node {
             heard_ns: now_ns,
             is_fresh: false,
             missing_cycles: 0,
+            surplus: 0,
+            news: 0,
             is_missed: false,
             has_wrong_length: [false; LENGTHS],
             scale,
@@ -76,7 +82,7 @@ impl Node {
     /// Nothing that was found out about it counts any more, its state neither; it has to boot again.
     pub(super) fn forget(&mut self, now_ns: u64) {
         self.boot.forget(now_ns);
-        (self.missing_cycles, self.is_missed, self.power) = (0, true, None);
+        (self.missing_cycles, self.surplus, self.is_missed, self.power) = (0, 0, true, None);
     }
 
     /// It is told to boot, or did: what it sends until it is started anew means nothing.
@@ -96,13 +102,25 @@ impl Node {
         !std::mem::replace(&mut self.has_wrong_length[kind], true)
     }
 
+    /// SYNC asks it for new process data.
+    pub(super) fn begin_cycle(&mut self) {
+        self.is_fresh = false;
+        self.surplus = match std::mem::take(&mut self.news) {
+            0 => self.surplus,
+            1 => self.surplus.saturating_sub(1),
+            several => self.surplus + several - 1,
+        };
+    }
+
     /// Takes process data; a statusword without a meaning keeps the last state.
     pub(super) fn take(&mut self, tpdo: Tpdo1, is_fresh: bool) {
         if let Ok(state) = tpdo.statusword.state() {
             self.power = Some(state);
         }
-        self.actual_increments = tpdo.actual_increments;
-        self.torque_permille = tpdo.torque_permille;
+        let data = (tpdo.actual_increments, tpdo.torque_permille);
+        // A frame that its transmitter had to repeat says the same twice.
+        self.news += u32::from(data != (self.actual_increments, self.torque_permille));
+        (self.actual_increments, self.torque_permille) = data;
         self.is_fresh = is_fresh;
     }
 

@@ -14,6 +14,9 @@ use crate::link::Buses;
 
 /// Cycles that an operational drive's process data may be missing.
 const MISSING_CYCLES: u32 = 3;
+/// New process data beyond one a SYNC that a single node may send: those that may be missing may also come late, all
+/// at once.
+const SURPLUS: u32 = MISSING_CYCLES + 2;
 
 /// What an event is about.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -46,7 +49,7 @@ impl Master {
         self.were_enabled = shall_be_enabled && (self.were_enabled || all_enabled);
     }
 
-    /// A verified node must be heard, and an operational one answer every SYNC.
+    /// A verified node must be heard, and an operational one answer every SYNC, once.
     fn watch_node(&mut self, now_ns: u64, axis: usize) {
         let node = &mut self.nodes[axis];
         if node.is_operational() && !node.is_fresh {
@@ -58,6 +61,8 @@ impl Master {
         let (cause, values) = if silent_ns > self.settings.heartbeat_timeout_ns {
             let limit_ns = self.settings.heartbeat_timeout_ns;
             (Cause::HeartbeatLost, [silent_ns, limit_ns].map(in_ms))
+        } else if node.surplus > SURPLUS {
+            (Cause::DuplicateNode, [node.surplus, SURPLUS].map(f64::from))
         } else if is_lost {
             (Cause::ProcessDataLost, [node.missing_cycles, MISSING_CYCLES].map(f64::from))
         } else {

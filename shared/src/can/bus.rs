@@ -66,6 +66,12 @@ pub enum SendError {
         /// Transmit error counter.
         tec: u16,
     },
+    /// A frame in FD format for a port that speaks classical CAN only.
+    #[error("an FD frame of {length} bytes on classical CAN: set `can.fd`, and let all nodes speak FD")]
+    NotFd {
+        /// Its data bytes.
+        length: usize,
+    },
     /// The interface is down or gone.
     #[error("interface down: {}", io::Error::from_raw_os_error(*.errno))]
     InterfaceDown {

@@ -7,7 +7,8 @@
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg32;
 
-use super::frame::{CanId, Frame};
+use super::frame::Frame;
+use super::id::CanId;
 
 /// What a fault does.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

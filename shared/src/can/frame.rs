@@ -1,18 +1,16 @@
-//! Identifiers and data frames of up to 8 bytes, valid by construction.
+//! Data frames, valid by construction: classical ones of up to 8 bytes and FD ones of up to 64.
 //!
 //! Remote frames are not represented: the rig neither sends nor accepts them. What stands for an error frame is
-//! [`ErrorReport`](super::ErrorReport), and longer FD frames are [`FdFrame`](super::FdFrame).
+//! [`ErrorReport`](super::ErrorReport).
 
 use std::fmt;
 
-const STANDARD_MAX: u32 = 0x7FF;
-const EXTENDED_MAX: u32 = 0x1FFF_FFFF;
-const EXTENSION_BITS: u32 = 18;
-const EXTENSION_MASK: u32 = (1 << EXTENSION_BITS) - 1;
-const IDE: u32 = 1 << EXTENSION_BITS;
-const EXTENDED_FLAG: u32 = 1 << 31;
+use super::id::CanId;
 
-/// An identifier or a frame that classical CAN cannot carry.
+/// Lengths that an FD frame may have; their index is the data length code.
+const FD_LENGTHS: [u8; 16] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64];
+
+/// An identifier or a frame that CAN cannot carry.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum FrameError {
     /// More than 11 bits in a standard identifier.
@@ -33,100 +31,12 @@ pub enum FrameError {
         /// Bytes asked for.
         length: usize,
     },
-}
-
-/// A frame identifier: 11 bits (standard) or 29 bits (extended).
-///
-/// The order is that of bus arbitration (ISO 11898-1): the smaller identifier wins.
-#[derive(Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct CanId {
-    /// The arbitration field as it goes over the wire, without RTR: 11 bits of base, IDE, 18 bits of
-    /// extension. Dominant is 0, so comparing these numbers is arbitrating.
-    arbitration: u32,
-}
-
-impl CanId {
-    /// An 11-bit identifier.
-    ///
-    /// # Errors
-    /// [`FrameError::StandardId`] above 7FFh.
-    pub const fn standard(id: u16) -> Result<Self, FrameError> {
-        let id = id as u32;
-        if id > STANDARD_MAX {
-            return Err(FrameError::StandardId { id });
-        }
-        Ok(Self { arbitration: id << (EXTENSION_BITS + 1) })
-    }
-
-    /// A 29-bit identifier.
-    ///
-    /// # Errors
-    /// [`FrameError::ExtendedId`] above 1FFFFFFFh.
-    pub const fn extended(id: u32) -> Result<Self, FrameError> {
-        if id > EXTENDED_MAX {
-            return Err(FrameError::ExtendedId { id });
-        }
-        let base = id >> EXTENSION_BITS;
-        Ok(Self { arbitration: base << (EXTENSION_BITS + 1) | IDE | id & EXTENSION_MASK })
-    }
-
-    /// From the form in which `SocketCAN` and [`FrameTap`](crate::messages::FrameTap) keep it: bit 31 set
-    /// for a 29-bit identifier.
-    ///
-    /// # Errors
-    /// [`FrameError`] where the number is too large; also the flags of remote and error frames
-    /// (bits 30 and 29) make it so.
-    pub const fn from_flagged(flagged: u32) -> Result<Self, FrameError> {
-        if flagged & EXTENDED_FLAG != 0 {
-            return Self::extended(flagged & !EXTENDED_FLAG);
-        }
-        if flagged > STANDARD_MAX {
-            return Err(FrameError::StandardId { id: flagged });
-        }
-        Self::standard(flagged as u16)
-    }
-
-    /// The identifier with bit 31 set for a 29-bit one.
-    pub const fn flagged(self) -> u32 {
-        if self.is_extended() { self.number() | EXTENDED_FLAG } else { self.number() }
-    }
-
-    /// Whether it has 29 bits.
-    pub const fn is_extended(self) -> bool {
-        self.arbitration & IDE != 0
-    }
-
-    /// The identifier's number, 11 or 29 bits.
-    pub const fn number(self) -> u32 {
-        if self.is_extended() { self.base() << EXTENSION_BITS | self.extension() } else { self.base() }
-    }
-
-    /// The first 11 bits on the wire.
-    pub(super) const fn base(self) -> u32 {
-        self.arbitration >> (EXTENSION_BITS + 1)
-    }
-
-    /// The last 18 bits of a 29-bit identifier.
-    pub(super) const fn extension(self) -> u32 {
-        self.arbitration & EXTENSION_MASK
-    }
-}
-
-impl fmt::Display for CanId {
-    /// As candump writes it: 3 hexadecimal digits, or 8 for a 29-bit identifier.
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        if self.is_extended() {
-            write!(f, "{:08X}", self.number())
-        } else {
-            write!(f, "{:03X}", self.number())
-        }
-    }
-}
-
-impl fmt::Debug for CanId {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "CanId({self})")
-    }
+    /// A length that no FD frame has.
+    #[error("{length} data bytes: an FD frame carries 0 to 8, 12, 16, 20, 24, 32, 48 or 64")]
+    FdDataLength {
+        /// Bytes asked for.
+        length: usize,
+    },
 }
 
 /// In which form a frame goes over the wire.
@@ -141,7 +51,23 @@ pub enum FrameFormat {
     FdBitRateSwitch,
 }
 
-/// A data frame of 0 to 8 bytes, in whichever format.
+impl FrameFormat {
+    /// Whether it is one of the FD formats.
+    pub const fn is_fd(self) -> bool {
+        !matches!(self, Self::Classical)
+    }
+
+    fn check(self, length: usize) -> Result<(), FrameError> {
+        let has_code = FD_LENGTHS.iter().any(|&allowed| usize::from(allowed) == length);
+        match self.is_fd() {
+            false if length > Frame::MAX_CLASSICAL_DATA => Err(FrameError::DataLength { length }),
+            true if !has_code => Err(FrameError::FdDataLength { length }),
+            _ => Ok(()),
+        }
+    }
+}
+
+/// A data frame.
 #[derive(Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Frame {
     id: CanId,
@@ -152,26 +78,38 @@ pub struct Frame {
 }
 
 impl Frame {
+    /// Bytes a frame carries at most, in FD format.
+    pub const MAX_DATA: usize = 64;
     /// Bytes a classical frame carries at most.
-    pub const MAX_DATA: usize = 8;
+    pub const MAX_CLASSICAL_DATA: usize = 8;
 
     /// A classical frame of that identifier and data.
     ///
     /// # Errors
     /// [`FrameError::DataLength`] with more than 8 bytes.
     pub fn new(id: CanId, data: &[u8]) -> Result<Self, FrameError> {
-        let mut bytes = [0; Self::MAX_DATA];
-        let used = bytes.get_mut(..data.len()).ok_or(FrameError::DataLength { length: data.len() })?;
-        used.copy_from_slice(data);
-        Ok(Self { id, length: data.len() as u8, format: FrameFormat::Classical, bytes })
+        Self::with_format(id, FrameFormat::Classical, data)
     }
 
     /// A classical frame whose length is known when compiling, which then cannot be wrong.
     pub fn fixed<const N: usize>(id: CanId, data: [u8; N]) -> Self {
-        const { assert!(N <= Self::MAX_DATA, "a classical frame carries at most 8 bytes") };
+        const { assert!(N <= Self::MAX_CLASSICAL_DATA, "a classical frame carries at most 8 bytes") };
+        Self::of_valid_length(id, FrameFormat::Classical, &data)
+    }
+
+    /// A frame of that identifier, format and data.
+    ///
+    /// # Errors
+    /// [`FrameError::DataLength`] and [`FrameError::FdDataLength`] for lengths that the format does not have.
+    pub fn with_format(id: CanId, format: FrameFormat, data: &[u8]) -> Result<Self, FrameError> {
+        format.check(data.len())?;
+        Ok(Self::of_valid_length(id, format, data))
+    }
+
+    fn of_valid_length(id: CanId, format: FrameFormat, data: &[u8]) -> Self {
         let mut bytes = [0; Self::MAX_DATA];
-        bytes[..N].copy_from_slice(&data);
-        Self { id, length: N as u8, format: FrameFormat::Classical, bytes }
+        bytes[..data.len()].copy_from_slice(data);
+        Self { id, length: data.len() as u8, format, bytes }
     }
 
     /// The identifier.
@@ -189,15 +127,21 @@ impl Frame {
         self.format
     }
 
-    /// The same frame in that format.
+    /// A classical frame in that format, as whose wire speaks FD sends it; an FD frame as it is.
     #[must_use]
-    pub const fn in_format(self, format: FrameFormat) -> Self {
-        Self { format, ..self }
+    pub const fn promoted(self, format: FrameFormat) -> Self {
+        if self.format.is_fd() { self } else { Self { format, ..self } }
     }
 
-    /// All eight bytes, zero beyond the data.
-    pub(super) const fn padded(&self) -> [u8; Self::MAX_DATA] {
-        self.bytes
+    /// What stands for its length on the wire.
+    pub(super) fn length_code(&self) -> u8 {
+        let code = FD_LENGTHS.iter().position(|&length| length == self.length);
+        code.expect("a valid length") as u8
+    }
+
+    /// All bytes that any frame may have, zero beyond the data.
+    pub(super) const fn padded(&self) -> &[u8; Self::MAX_DATA] {
+        &self.bytes
     }
 }
 
@@ -223,45 +167,51 @@ impl fmt::Debug for Frame {
 
 #[cfg(test)]
 pub(super) mod strategies {
+    use super::super::id::strategies::any_id;
     use super::*;
     use proptest::prelude::*;
 
-    pub(crate) fn any_id() -> impl Strategy<Value = CanId> {
-        prop_oneof![
-            (0..=STANDARD_MAX as u16).prop_map(|id| CanId::standard(id).unwrap()),
-            (0..=EXTENDED_MAX).prop_map(|id| CanId::extended(id).unwrap()),
-        ]
+    /// Of every format and every length it may have.
+    pub(crate) fn any_frame() -> impl Strategy<Value = Frame> {
+        prop_oneof![any_classical_frame(), any_fd_frame()]
     }
 
-    pub(crate) fn any_frame() -> impl Strategy<Value = Frame> {
-        (any_id(), prop::collection::vec(any::<u8>(), 0..=Frame::MAX_DATA))
+    pub(crate) fn any_classical_frame() -> impl Strategy<Value = Frame> {
+        (any_id(), prop::collection::vec(any::<u8>(), 0..=Frame::MAX_CLASSICAL_DATA))
             .prop_map(|(id, data)| Frame::new(id, &data).unwrap())
     }
 
-    pub(crate) fn any_format() -> impl Strategy<Value = FrameFormat> {
-        prop_oneof![Just(FrameFormat::Classical), Just(FrameFormat::Fd), Just(FrameFormat::FdBitRateSwitch),]
+    /// Also of the runs of equal bits that are stuffed most.
+    pub(crate) fn any_fd_frame() -> impl Strategy<Value = Frame> {
+        let byte = prop_oneof![Just(0_u8), Just(0xFF), any::<u8>()];
+        let data = (prop::sample::select(&FD_LENGTHS[..]), prop::array::uniform32(byte))
+            .prop_map(|(length, bytes)| bytes.repeat(2)[..usize::from(length)].to_vec());
+        let format = prop_oneof![Just(FrameFormat::Fd), Just(FrameFormat::FdBitRateSwitch)];
+        (any_id(), format, data).prop_map(|(id, format, data)| Frame::with_format(id, format, &data).unwrap())
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::strategies::{any_frame, any_id};
+    use super::strategies::{any_classical_frame, any_frame};
     use super::*;
     use proptest::prelude::*;
 
-    fn standard(id: u16) -> CanId {
-        CanId::standard(id).unwrap()
-    }
-
-    fn extended(id: u32) -> CanId {
-        CanId::extended(id).unwrap()
+    fn id() -> CanId {
+        CanId::standard(0x123).unwrap()
     }
 
     #[test]
-    fn what_does_not_fit_is_refused_with_its_value() {
-        assert_eq!(CanId::standard(0x800), Err(FrameError::StandardId { id: 0x800 }));
-        assert_eq!(CanId::extended(0x2000_0000), Err(FrameError::ExtendedId { id: 0x2000_0000 }));
-        assert_eq!(Frame::new(standard(1), &[0; 9]), Err(FrameError::DataLength { length: 9 }));
+    fn lengths_are_those_of_the_format() {
+        for length in 0..=65 {
+            let data = vec![1; length];
+            let classical = Frame::new(id(), &data).map(|frame| frame.data().len());
+            let expected = if length <= 8 { Ok(length) } else { Err(FrameError::DataLength { length }) };
+            assert_eq!(classical, expected);
+            let fd = Frame::with_format(id(), FrameFormat::Fd, &data).map(|frame| frame.data().len());
+            let is_fd_length = FD_LENGTHS.contains(&(length as u8));
+            assert_eq!(fd, if is_fd_length { Ok(length) } else { Err(FrameError::FdDataLength { length }) });
+        }
         assert_eq!(
             FrameError::DataLength { length: 9 }.to_string(),
             "9 data bytes: a classical frame carries at most 8"
@@ -269,38 +219,27 @@ mod tests {
     }
 
     #[test]
-    fn flags_of_remote_and_error_frames_are_refused() {
-        for flags in [1 << 30, 1 << 29, 1 << 31 | 1 << 30, 1 << 31 | 1 << 29] {
-            assert!(CanId::from_flagged(flags | 0x123).is_err());
-        }
-    }
-
-    #[test]
-    fn order_is_that_of_arbitration() {
-        assert!(standard(0x080) < standard(0x181));
-        assert!(
-            standard(0x100) < extended(0x100 << 18),
-            "equal base: the standard frame wins by its IDE bit"
-        );
-        assert!(extended(0x0FF << 18 | EXTENSION_MASK) < standard(0x100), "the base decides first");
-        assert!(extended(0x100 << 18) < extended(0x100 << 18 | 1));
-    }
-
-    #[test]
     fn frames_show_as_in_a_candump_log() {
-        assert_eq!(Frame::fixed(standard(0x123), [0x11, 0x22]).to_string(), "123#1122");
-        assert_eq!(Frame::fixed(extended(0x123), []).to_string(), "00000123#");
+        assert_eq!(Frame::fixed(id(), [0x11, 0x22]).to_string(), "123#1122");
+        assert_eq!(Frame::fixed(CanId::extended(0x123).unwrap(), []).to_string(), "00000123#");
+        let frame = Frame::fixed(id(), [0x11, 0x22]);
+        assert_eq!(frame.promoted(FrameFormat::FdBitRateSwitch).to_string(), "123##11122");
+        assert_eq!(frame.promoted(FrameFormat::Fd).to_string(), "123##01122");
     }
 
     proptest! {
         #[test]
-        fn an_identifier_survives_its_flagged_form(id in any_id()) {
-            prop_assert_eq!(CanId::from_flagged(id.flagged()), Ok(id));
+        fn a_frame_keeps_what_it_was_made_of(frame in any_frame()) {
+            prop_assert_eq!(Frame::with_format(frame.id(), frame.format(), frame.data()), Ok(frame));
         }
 
         #[test]
-        fn a_frame_keeps_what_it_was_made_of(frame in any_frame()) {
-            prop_assert_eq!(Frame::new(frame.id(), frame.data()), Ok(frame));
+        fn only_classical_frames_are_promoted(classical in any_classical_frame(), frame in any_frame()) {
+            let promoted = classical.promoted(FrameFormat::Fd);
+            prop_assert_eq!((promoted.format(), promoted.data()), (FrameFormat::Fd, classical.data()));
+            if frame.format().is_fd() {
+                prop_assert_eq!(frame.promoted(FrameFormat::Classical), frame);
+            }
         }
     }
 }

@@ -9,7 +9,8 @@
 
 use std::fmt::{self, Write as _};
 
-use super::frame::{CanId, FrameFormat};
+use super::frame::FrameFormat;
+use super::id::CanId;
 use super::wire::{Rates, longest_bits};
 
 /// A message that is sent again and again.

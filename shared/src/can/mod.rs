@@ -1,8 +1,8 @@
 //! The CAN link: frames and what they cost on the wire, the CANopen objects the rig exchanges, the
 //! drive profile, the bus trait and its two implementations: simulated and `SocketCAN`.
 //!
-//! Everything here but [`SocketCan`] is a value or a pure step: no clock, no thread, no I/O. Frames
-//! on a bus carry up to 8 bytes, in FD format too; remote frames are not represented.
+//! Everything here but [`SocketCan`] is a value or a pure step: no clock, no thread, no I/O. Remote frames are not
+//! represented.
 
 mod bus;
 pub mod candump;
@@ -11,8 +11,8 @@ pub mod cia402;
 pub mod conformance;
 mod error_frame;
 pub mod faults;
-mod fd_frame;
 mod frame;
+mod id;
 mod load;
 mod pdo;
 mod socket_can;
@@ -24,8 +24,8 @@ pub mod wrapped;
 
 pub use bus::{Bus, BusStatus, ErrorState, ReceiveError, Received, SendError};
 pub use error_frame::{ErrorKind, ErrorReport, ErrorReportError};
-pub use fd_frame::{FdFormat, FdFrame, FdLengthError};
-pub use frame::{CanId, Frame, FrameError, FrameFormat};
+pub use frame::{Frame, FrameError, FrameFormat};
+pub use id::CanId;
 pub use load::{BusPlan, Message, Overload, PlannedMessage};
 pub use pdo::{EVERY_SYNC, Rpdo1, Tpdo1};
 pub use socket_can::{OpenError, SocketCan};

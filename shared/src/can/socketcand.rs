@@ -152,8 +152,8 @@ pub fn write_frame(out: &mut impl Write, received: &Received) -> fmt::Result {
 
 #[cfg(test)]
 mod tests {
-    use super::super::frame::CanId;
-    use super::super::frame::strategies::any_frame;
+    use super::super::frame::strategies::any_classical_frame;
+    use super::super::id::CanId;
     use super::*;
     use proptest::prelude::*;
 
@@ -232,7 +232,7 @@ mod tests {
     proptest! {
         /// However the stream is cut, the frame arrives.
         #[test]
-        fn a_frame_survives_any_cut(frame in any_frame(), cut in 0..40_usize) {
+        fn a_frame_survives_any_cut(frame in any_classical_frame(), cut in 0..40_usize) {
             let mut text = format!("< send {} {}", frame.id(), frame.data().len());
             frame.data().iter().for_each(|byte| write!(text, " {byte:x}").unwrap());
             text.push_str(" >");

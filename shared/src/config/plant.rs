@@ -17,7 +17,7 @@ pub struct CanConfig {
     /// Whether a bit takes a nanosecond, whatever `bitrate_bps` says (simulated buses only): for cycles that no CAN
     /// holds.
     pub ideal: bool,
-    /// Whether frames go in FD format with bit-rate switch (simulated buses only).
+    /// Whether frames go in FD format with bit-rate switch. Real interfaces must have been set up for it.
     pub fd: bool,
     /// Bit rate of the data phase of FD frames, bit/s.
     pub data_bitrate_bps: u32,
@@ -85,13 +85,6 @@ impl CanConfig {
     }
 
     pub(super) fn validate(&self) -> Result<(), ScenarioError> {
-        if self.fd && !self.is_virtual() {
-            return Err(ScenarioError::BadValue {
-                key: "can.fd",
-                value: "true".to_owned(),
-                need: "leave it away with can.interfaces: on real interfaces frames are classical".to_owned(),
-            });
-        }
         if self.ideal && (self.fd || !self.is_virtual()) {
             return Err(ScenarioError::BadValue {
                 key: "can.ideal",

@@ -40,7 +40,7 @@ pub trait Message: Pod + ZeroCopySend + Default + std::fmt::Debug + PartialEq {
 }
 
 /// Version of the layouts below; it changes with any of them.
-pub const LAYOUT_VERSION: u64 = 4;
+pub const LAYOUT_VERSION: u64 = 5;
 
 macro_rules! messages {
     ($($(#[$doc:meta])* $name:ident on $topic:literal keeping $depth:literal {
@@ -48,7 +48,7 @@ macro_rules! messages {
     })*) => {$(
         $(#[$doc])*
         #[repr(C)]
-        #[derive(Debug, Clone, Copy, Default, PartialEq, Pod, Zeroable, ZeroCopySend)]
+        #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable, ZeroCopySend)]
         pub struct $name {
             /// Number of this message on its topic, from 1.
             pub seq: u64,
@@ -57,6 +57,13 @@ macro_rules! messages {
             /// [`LAYOUT_VERSION`] of the sender.
             pub version: u64,
             $($(#[$field_doc])* pub $field: $type,)*
+        }
+
+        impl Default for $name {
+            /// All zeros.
+            fn default() -> Self {
+                Self::zeroed()
+            }
         }
 
         impl Message for $name {
@@ -225,7 +232,7 @@ messages! {
         /// As in `struct canfd_frame`: 4 for an FD frame, 1 for one with bit-rate switch.
         flags: u8,
         /// Data bytes, unused ones zero.
-        data: [u8; 8],
+        data: [u8; 64],
     }
 
     /// Something that happened once: a change of state, a fault, an alarm.

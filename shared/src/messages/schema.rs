@@ -37,7 +37,7 @@ mod tests {
         assert_eq!(
             FrameTap::schema(),
             "uint64 seq\nuint64 published_ns\nuint64 version\nuint64 time_ns\nuint64 queued_ns\n\
-             uint32 id\nuint16 bus\nuint8 length\nuint8 flags\nuint8[8] data\n"
+             uint32 id\nuint16 bus\nuint8 length\nuint8 flags\nuint8[64] data\n"
         );
         assert!(Command::schema().contains("float64[6] target_m\n"));
     }

@@ -33,6 +33,8 @@ pub(super) struct Peer {
     pub(super) is_dead: bool,
     /// Servers that answer to its id.
     pub(super) servers: usize,
+    /// Where another drive of its id stands and tells so, increments.
+    pub(super) twin_stands_at: Option<i32>,
     /// An object that it refuses to have written.
     pub(super) refuses: Option<((u16, u8), AbortCode)>,
     /// SDO requests that it got, each with the time.
@@ -74,6 +76,7 @@ impl Peer {
             can_reset: true,
             is_dead: false,
             servers: 1,
+            twin_stands_at: None,
             refuses: None,
             asked: Vec::new(),
             controlword: Controlword::DISABLE_VOLTAGE,
@@ -143,12 +146,11 @@ impl Peer {
             self.control(rpdo.controlword);
         }
         self.power = self.power.after_completion();
-        let tpdo = Tpdo1 {
-            statusword: Statusword::of(self.power),
-            actual_increments: STANDS_AT,
-            torque_permille: 0,
-        };
-        out.push(tpdo.frame(self.id));
+        let statusword = Statusword::of(self.power);
+        for actual_increments in self.twin_stands_at.into_iter().chain([STANDS_AT]) {
+            let tpdo = Tpdo1 { statusword, actual_increments, torque_permille: 0 };
+            out.push(tpdo.frame(self.id));
+        }
     }
 
     fn control(&mut self, word: Controlword) {

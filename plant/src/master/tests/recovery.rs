@@ -3,6 +3,7 @@
 use masseter_shared::can::Frame;
 use masseter_shared::can::canopen::{Cob, Emergency, EmergencyCode, Heartbeat, NmtState};
 
+use super::peer::STANDS_AT;
 use super::*;
 
 /// Keeps asking for motion, which must not happen, then switches off, after which it may again.
@@ -42,6 +43,21 @@ fn a_drive_that_falls_silent_is_booted_again_when_it_comes_back() {
     assert!(others_are_off);
     bench.drive(0).is_dead = false;
     restore(&mut bench, Cause::ProcessDataLost);
+}
+
+#[test]
+fn two_drives_of_one_id_are_told_from_a_frame_sent_twice() {
+    let mut bench = Bench::enabled();
+    bench.drive(3).twin_stands_at = Some(STANDS_AT);
+    bench.cycles(100, DriveRequest::Enable);
+    assert_eq!(bench.causes(EventKind::Fault), []);
+    bench.drive(3).twin_stands_at = Some(STANDS_AT + 1);
+    bench.cycles(10, DriveRequest::Enable);
+    let fault = *bench.events_of(EventKind::Fault).next().unwrap();
+    assert_eq!((fault.cause, fault.axis, fault.node), (Cause::DuplicateNode.code(), 3, 4));
+    assert!(bench.nobody_is_enabled());
+    bench.drive(3).twin_stands_at = None;
+    restore(&mut bench, Cause::DuplicateNode);
 }
 
 #[test]

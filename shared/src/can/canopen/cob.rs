@@ -3,7 +3,7 @@
 //! Of the PDOs only the first of each direction is known, as the rig maps no other.
 
 use super::node::NodeId;
-use crate::can::frame::CanId;
+use crate::can::id::CanId;
 
 /// A communication object, with the node it belongs to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]

@@ -7,16 +7,18 @@
 mod tests;
 
 use super::bus::{Bus, ReceiveError, Received, SendError};
-use super::frame::{CanId, Frame};
+use super::frame::{Frame, FrameFormat};
+use super::id::CanId;
 
 /// Frames sent at once by the check for losses: more than any sensible queue holds.
 const BURST: u32 = 20_000;
 
 /// The laws of every bus, in the order in which they are checked.
-pub const LAWS: [&str; 3] = [
-    "a frame is received once, unchanged, at a time not before its predecessor's",
+pub const LAWS: [&str; 4] = [
+    "a frame is received once, with its identifier and data, at a time not before its predecessor's",
     "a port does not receive its own frames",
     "a frame is refused because the queue is full, or received, or reported as lost",
+    "a frame in FD format arrives unchanged where the ports speak FD, and is refused where they do not",
 ];
 
 /// The law of buses that send by priority.
@@ -39,6 +41,8 @@ pub trait Pair {
 
     /// A port.
     fn end(&mut self, end: End) -> impl Bus;
+    /// The format in which the ports send.
+    fn format(&self) -> FrameFormat;
     /// The time, ns.
     fn now_ns(&self) -> u64;
     /// Lets time pass until all frames sent have arrived or were lost.
@@ -62,7 +66,8 @@ pub struct Violation {
 pub fn check<P: Pair>(mut pair: impl FnMut() -> P) -> Result<(), Violation> {
     frames_arrive_once_unchanged_and_in_order(&mut pair())?;
     senders_do_not_hear_themselves(&mut pair())?;
-    nothing_is_lost_silently(&mut pair())
+    nothing_is_lost_silently(&mut pair())?;
+    fd_frames_arrive_or_are_refused(&mut pair())
 }
 
 /// Checks the law of buses that send by priority; a virtual CAN interface of the kernel does not.
@@ -87,15 +92,17 @@ pub fn check_arbitration<P: Pair>(mut pair: impl FnMut() -> P) -> Result<(), Vio
 }
 
 fn frames_arrive_once_unchanged_and_in_order(pair: &mut impl Pair) -> Result<(), Violation> {
-    let [law, _, _] = LAWS;
-    let mut last_ns = 0;
+    let [law, ..] = LAWS;
+    let (format, mut last_ns) = (pair.format(), 0);
     for number in 0..=u32::from(u8::MAX) {
         let sent = frame(0x100 + (number % 7) as u16, number);
         send(pair, sent).map_err(|error| violated(law, &error))?;
         pair.settle();
         let (received, lost) = drain(pair, End::B).map_err(|error| violated(law, &error))?;
         match received[..] {
-            [Received { frame, time_ns }] if frame == sent && time_ns >= last_ns && lost == 0 => {
+            [Received { frame, time_ns }]
+                if frame == sent.promoted(format) && time_ns >= last_ns && lost == 0 =>
+            {
                 last_ns = time_ns;
             }
             _ => return Err(violated(law, &(sent, received, lost))),
@@ -105,7 +112,7 @@ fn frames_arrive_once_unchanged_and_in_order(pair: &mut impl Pair) -> Result<(),
 }
 
 fn senders_do_not_hear_themselves(pair: &mut impl Pair) -> Result<(), Violation> {
-    let [_, law, _] = LAWS;
+    let [_, law, ..] = LAWS;
     send(pair, frame(0x123, 0)).map_err(|error| violated(law, &error))?;
     pair.settle();
     match drain(pair, End::A) {
@@ -115,7 +122,7 @@ fn senders_do_not_hear_themselves(pair: &mut impl Pair) -> Result<(), Violation>
 }
 
 fn nothing_is_lost_silently<P: Pair>(pair: &mut P) -> Result<(), Violation> {
-    let [_, _, law] = LAWS;
+    let [_, _, law, _] = LAWS;
     let mut accepted = 0;
     for number in 0..BURST {
         match send(pair, frame(0x123, number)) {
@@ -131,6 +138,33 @@ fn nothing_is_lost_silently<P: Pair>(pair: &mut P) -> Result<(), Violation> {
     } else {
         Err(violated(law, &(accepted, received.len(), lost)))
     }
+}
+
+fn fd_frames_arrive_or_are_refused(pair: &mut impl Pair) -> Result<(), Violation> {
+    let [_, _, _, law] = LAWS;
+    for sent in fd_frames() {
+        match send(pair, sent) {
+            Ok(()) if pair.format().is_fd() => {}
+            Err(SendError::NotFd { .. }) if !pair.format().is_fd() => continue,
+            other => return Err(violated(law, &(sent, other))),
+        }
+        pair.settle();
+        let received = drain(pair, End::B).map_err(|error| violated(law, &error))?;
+        let is_it = matches!(&received, (frames, 0) if frames.len() == 1 && frames[0].frame == sent);
+        if !is_it {
+            return Err(violated(law, &(sent, received)));
+        }
+    }
+    Ok(())
+}
+
+/// Every length in both formats.
+fn fd_frames() -> impl Iterator<Item = Frame> {
+    let data: [u8; Frame::MAX_DATA] = std::array::from_fn(|index| index as u8);
+    let id = CanId::standard(0x123).expect("an 11-bit identifier");
+    [FrameFormat::Fd, FrameFormat::FdBitRateSwitch].into_iter().flat_map(move |format| {
+        (0..=data.len()).filter_map(move |length| Frame::with_format(id, format, &data[..length]).ok())
+    })
 }
 
 fn is_accounted_for(counts_losses: bool, accepted: u64, received: u64, lost: u64) -> bool {

@@ -17,6 +17,8 @@ enum Flaw {
     TurnsTimeBack,
     DropsSilently,
     SendsInOrderOfQueueing,
+    CutsFdFrames,
+    TakesFdClassically,
 }
 
 /// Two ports that hand frames over at once; only end A sends.
@@ -37,8 +39,13 @@ impl FlawedPair {
     }
 
     fn hand_over(&mut self, frame: Frame) {
-        let data = if self.flaw == Flaw::AltersData { &[0xFF] } else { frame.data() };
-        let frame = Frame::new(frame.id(), data).unwrap();
+        let data = match self.flaw {
+            Flaw::AltersData => &[0xFF],
+            Flaw::CutsFdFrames => frame.data().get(..8).unwrap_or(frame.data()),
+            _ => frame.data(),
+        };
+        let format = frame.promoted(self.format()).format();
+        let frame = Frame::with_format(frame.id(), format, data).unwrap();
         let time_ns = if self.flaw == Flaw::TurnsTimeBack { u64::MAX - self.now_ns } else { self.now_ns };
         let [own, other] = &mut self.arrived;
         other.push_back(Received { frame, time_ns });
@@ -57,6 +64,10 @@ impl FlawedPair {
 impl Pair for FlawedPair {
     fn end(&mut self, end: End) -> impl Bus {
         FlawedPort { pair: self, end }
+    }
+
+    fn format(&self) -> FrameFormat {
+        if self.flaw == Flaw::TakesFdClassically { FrameFormat::Classical } else { FrameFormat::Fd }
     }
 
     fn now_ns(&self) -> u64 {
@@ -115,9 +126,11 @@ fn every_flaw_is_caught_by_the_law_it_breaks() {
     let table = [
         (Flaw::Echoes, "does not receive its own"),
         (Flaw::Duplicates, "received once"),
-        (Flaw::AltersData, "unchanged"),
+        (Flaw::AltersData, "identifier and data"),
         (Flaw::TurnsTimeBack, "not before its predecessor's"),
         (Flaw::DropsSilently, "reported as lost"),
+        (Flaw::CutsFdFrames, "in FD format"),
+        (Flaw::TakesFdClassically, "in FD format"),
     ];
     for (flaw, law) in table {
         let violation = check(|| FlawedPair::new(flaw)).unwrap_err().to_string();

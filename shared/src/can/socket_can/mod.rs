@@ -20,26 +20,28 @@
 //! Frames lost because the socket was not emptied in time are counted by the kernel; what the controller
 //! itself lost it does not count, so that each such report stands for one frame at least.
 //!
-//! Remote and CAN FD frames are passed over. An adapter that is unplugged is gone for good: its port
-//! reports [`InterfaceDown`](ReceiveError::InterfaceDown) until it is opened anew; one that was only taken
-//! down works again when it is up.
+//! # Formats
+//! A port opened for an FD format sends all its frames in it, and its interface must have been set up for FD.
+//! Whatever a port was opened for, it receives frames of every format; remote frames are passed over.
+//!
+//! An adapter that is unplugged is gone for good: its port reports
+//! [`InterfaceDown`](ReceiveError::InterfaceDown) until it is opened anew; one that was only taken down works
+//! again when it is up.
 
 mod confinement;
+mod conversion;
 mod interface;
 
 use std::io;
 use std::time::{Duration, SystemTime};
 
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
-use socketcan::{
-    CanDataFrame, CanFrame, CanSocket, EmbeddedFrame, ExtendedId, Frame as _, Id, Socket, SocketOptions,
-    StandardId,
-};
+use socketcan::{CanAnyFrame, CanFdSocket, EmbeddedFrame as _, Socket, SocketOptions};
 
 use self::confinement::Confinement;
 pub use self::interface::OpenError;
 use super::bus::{Bus, BusStatus, ErrorState, ReceiveError, Received, SendError};
-use super::frame::{CanId, Frame};
+use super::frame::{Frame, FrameFormat};
 use crate::clock;
 
 /// Frames looked at in one call of [`Bus::receive`]: error and remote frames must not hold a cycle up.
@@ -53,8 +55,9 @@ const MEMINFO_DROPS: usize = 8;
 /// A port on a real wire.
 #[derive(Debug)]
 pub struct SocketCan {
-    socket: CanSocket,
+    socket: CanFdSocket,
     interface: String,
+    format: FrameFormat,
     transmit_capacity: usize,
     confinement: Confinement,
     last_ns: u64,
@@ -65,18 +68,19 @@ pub struct SocketCan {
 }
 
 impl SocketCan {
-    /// Opens a port on an interface that is there and up.
+    /// Opens a port that sends in that format, on an interface that is there and up and has it.
     ///
     /// # Errors
     /// [`OpenError`], which says what to do.
-    pub fn open(interface: &str) -> Result<Self, OpenError> {
-        let transmit_capacity = interface::check(interface)?;
+    pub fn open(interface: &str, format: FrameFormat) -> Result<Self, OpenError> {
+        let transmit_capacity = interface::check(interface, format)?;
         let failed = |error| OpenError::of(interface, errno(&error));
-        let socket = CanSocket::open(interface).map_err(failed)?;
+        let socket = CanFdSocket::open(interface).map_err(failed)?;
         configure(&socket).map_err(failed)?;
         Ok(Self {
             socket,
             interface: interface.to_owned(),
+            format,
             transmit_capacity,
             confinement: Confinement::default(),
             last_ns: 0,
@@ -103,22 +107,23 @@ impl SocketCan {
     /// What a frame just fetched means: a frame for the caller, a loss, or nothing.
     fn take(
         &mut self,
-        frame: &CanFrame,
+        frame: &CanAnyFrame,
         stamp: Option<SystemTime>,
     ) -> Result<Option<Received>, ReceiveError> {
         self.drained = true;
-        match frame {
-            CanFrame::Data(data) => {
-                let time_ns = stamp.map_or_else(clock::now_ns, clock::monotonic_ns).max(self.last_ns);
-                self.last_ns = time_ns;
-                Ok(from_socket(data).map(|frame| Received { frame, time_ns }))
-            }
-            CanFrame::Error(error) => match self.confinement.take(error.error_bits(), error.data()) {
-                0 => Ok(None),
-                lost => Err(ReceiveError::Overrun { lost }),
+        let frame = match frame {
+            CanAnyFrame::Normal(data) => conversion::of_data(data),
+            CanAnyFrame::Fd(fd) => conversion::of_fd(fd),
+            CanAnyFrame::Error(error) => match self.confinement.take(error.error_bits(), error.data()) {
+                0 => None,
+                lost => return Err(ReceiveError::Overrun { lost }),
             },
-            CanFrame::Remote(_) => Ok(None),
-        }
+            CanAnyFrame::Remote(_) => None,
+        };
+        let Some(frame) = frame else { return Ok(None) };
+        let time_ns = stamp.map_or_else(clock::now_ns, clock::monotonic_ns).max(self.last_ns);
+        self.last_ns = time_ns;
+        Ok(Some(Received { frame, time_ns }))
     }
 
     /// Nothing is left to fetch: tells of frames dropped meanwhile.
@@ -160,7 +165,11 @@ impl Bus for SocketCan {
         if state == ErrorState::BusOff {
             return Err(SendError::BusOff { tec });
         }
-        self.socket.write_frame(&to_socket(&frame)).map_err(|error| match errno(&error) {
+        let frame = frame.promoted(self.format);
+        if frame.format().is_fd() && !self.format.is_fd() {
+            return Err(SendError::NotFd { length: frame.data().len() });
+        }
+        self.socket.write_frame(&conversion::to_kernel(&frame)).map_err(|error| match errno(&error) {
             // ENOBUFS: the interface's queue; EAGAIN: the socket's own share of it.
             libc::ENOBUFS | libc::EAGAIN => SendError::QueueFull { capacity: self.transmit_capacity },
             errno if is_down(&error) => SendError::InterfaceDown { errno },
@@ -187,28 +196,12 @@ impl Bus for SocketCan {
     }
 }
 
-fn configure(socket: &CanSocket) -> io::Result<()> {
+fn configure(socket: &CanFdSocket) -> io::Result<()> {
     socket.set_nonblocking(true)?;
     socket.set_recv_own_msgs(false)?;
     socket.set_error_filter_accept_all()?;
     socket.set_recv_timestamp(true)?;
     socket.set_socket_option_int(libc::SOL_SOCKET, libc::SO_RCVBUF, RECEIVE_BUFFER)
-}
-
-fn to_socket(frame: &Frame) -> CanDataFrame {
-    let (id, number) = (frame.id(), frame.id().number());
-    let id = if id.is_extended() {
-        ExtendedId::new(number).map(Id::Extended)
-    } else {
-        StandardId::new(number as u16).map(Id::Standard)
-    };
-    let id = id.expect("an identifier of 11 or 29 bits");
-    CanDataFrame::new(id, frame.data()).expect("a classical frame of at most 8 bytes")
-}
-
-fn from_socket(frame: &CanDataFrame) -> Option<Frame> {
-    // The kernel hands out nothing else; what it should not is passed over.
-    Frame::new(CanId::from_flagged(frame.id_word()).ok()?, frame.data()).ok()
 }
 
 fn is_down(error: &io::Error) -> bool {
@@ -222,20 +215,11 @@ fn errno(error: &io::Error) -> i32 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::frame::strategies::any_frame;
     use super::*;
-    use proptest::prelude::*;
-
-    proptest! {
-        #[test]
-        fn every_frame_survives_the_form_of_the_kernel(frame in any_frame()) {
-            prop_assert_eq!(from_socket(&to_socket(&frame)), Some(frame));
-        }
-    }
 
     #[test]
     fn what_cannot_be_opened_is_refused_with_what_to_do() {
-        let error = SocketCan::open("no-such-can").unwrap_err().to_string();
+        let error = SocketCan::open("no-such-can", FrameFormat::Classical).unwrap_err().to_string();
         let remedies = ["modprobe can-raw", "no CAN interface `no-such-can`"];
         assert!(remedies.iter().any(|remedy| error.contains(remedy)), "{error}");
     }

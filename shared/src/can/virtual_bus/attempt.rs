@@ -171,7 +171,7 @@ impl VirtualWire {
         let is_babble = |kind| matches!(kind, FaultKind::Babble { .. });
         let strike = self.faults.of_node(start_ns, is_babble, port)?;
         let FaultKind::Babble { frame } = self.faults.kind_of(strike) else { return None };
-        let frame = frame.in_format(self.config.format);
+        let frame = frame.promoted(self.config.format);
         let duration_ns = self.config.rates.duration_ns(frame_bits(&frame));
         let queued = Queued { frame, duration_ns, since_ns: start_ns };
         Some(Offer { port, queued, babbles: Some(strike) })

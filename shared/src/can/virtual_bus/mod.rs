@@ -155,13 +155,16 @@ impl VirtualWire {
     /// Queues a frame at a port.
     ///
     /// # Errors
-    /// [`SendError::QueueFull`] and [`SendError::BusOff`]; no other.
+    /// [`SendError::QueueFull`], [`SendError::BusOff`] and [`SendError::NotFd`]; no other.
     pub fn send(&mut self, port: usize, now_ns: u64, frame: Frame) -> Result<(), SendError> {
         let status = self.stations[port].confinement.status();
         if status.state == ErrorState::BusOff {
             return Err(SendError::BusOff { tec: status.tec });
         }
-        let frame = frame.in_format(self.config.format);
+        let frame = frame.promoted(self.config.format);
+        if frame.format().is_fd() && !self.config.format.is_fd() {
+            return Err(SendError::NotFd { length: frame.data().len() });
+        }
         let queued_ns = now_ns.max(self.advanced_to_ns) + self.delay_ns(port, now_ns, &frame);
         let duration_ns = self.config.rates.duration_ns(frame_bits(&frame));
         let queued = Queued { frame, duration_ns, since_ns: queued_ns };

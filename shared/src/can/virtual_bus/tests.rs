@@ -182,6 +182,10 @@ impl Pair for TwoPorts {
         self.wire.port(end as usize)
     }
 
+    fn format(&self) -> FrameFormat {
+        self.wire.config.format
+    }
+
     fn now_ns(&self) -> u64 {
         self.now_ns
     }
@@ -196,9 +200,12 @@ impl Pair for TwoPorts {
 
 #[test]
 fn the_wire_conforms() {
-    let new = || TwoPorts { wire: wire(), now_ns: 0 };
-    assert_eq!(conformance::check(new), Ok(()));
-    assert_eq!(conformance::check_arbitration(new), Ok(()));
+    for format in [FrameFormat::Classical, FrameFormat::Fd, FrameFormat::FdBitRateSwitch] {
+        let wire = || VirtualWire::new(&WireConfig { format, ..CONFIG });
+        let new = || TwoPorts { wire: wire(), now_ns: 0 };
+        assert_eq!(conformance::check(new), Ok(()));
+        assert_eq!(conformance::check_arbitration(new), Ok(()));
+    }
 }
 
 proptest! {

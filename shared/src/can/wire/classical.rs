@@ -1,8 +1,9 @@
 //! Lengths of classical frames (ISO 11898-1).
 
 use super::INTERFRAME_BITS;
-use super::stuffing::stuff_bits;
-use crate::can::frame::{CanId, Frame};
+use super::stuffing::{bits_of, stuff_bits};
+use crate::can::frame::Frame;
+use crate::can::id::CanId;
 
 /// CRC delimiter, acknowledge slot and delimiter, end of frame.
 const TRAILER_BITS: u32 = 1 + 2 + 7;
@@ -43,11 +44,18 @@ const fn header_bits(extended: bool) -> u32 {
 /// number, and how many they are: at most 103.
 fn content(frame: &Frame) -> (u128, u32) {
     let length = frame.data().len() as u32;
-    let data = u64::from_be_bytes(frame.padded());
+    let (&data, _) = frame.padded().split_first_chunk().expect("a frame has room for 8 bytes");
+    let data = u64::from_be_bytes(data);
     let bits = 8 * length;
     let shifted_data = u128::from(data) >> (64 - bits);
     let header = u128::from(header(frame.id(), length));
     (header << bits | shifted_data, header_bits(frame.id().is_extended()) + bits)
+}
+
+/// The same bits in the order of the wire.
+pub(super) fn content_bits(frame: &Frame) -> impl Iterator<Item = bool> {
+    let (content, bits) = content(frame);
+    bits_of(content, bits)
 }
 
 /// Start bit, arbitration and control field. Start, RTR and the reserved bits are 0; the length code
@@ -58,30 +66,6 @@ fn header(id: CanId, length: u32) -> u64 {
     let arbitration =
         if id.is_extended() { (base << 2 | SRR_AND_IDE) << 18 | u64::from(id.extension()) } else { base };
     arbitration << 7 | u64::from(length)
-}
-
-/// Where two frames of one identifier first differ on the wire, and which of them is dominant there.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(in crate::can) struct Difference {
-    /// Number of the bit, counted from 1 with stuff bits.
-    pub(in crate::can) bit: u32,
-    /// Whether the first frame sends the dominant level.
-    pub(in crate::can) first_is_dominant: bool,
-}
-
-/// Where two frames of one identifier first differ; `None` where they are the same.
-pub(in crate::can) fn first_difference(first: &Frame, second: &Frame) -> Option<Difference> {
-    let left_aligned = |frame| {
-        let (content, bits) = content(frame);
-        content << (u128::BITS - bits)
-    };
-    let (one, other) = (left_aligned(first), left_aligned(second));
-    // Frames of different length differ in their length codes, which lie before the data.
-    let equal_bits = (one ^ other).leading_zeros();
-    (one != other).then(|| Difference {
-        bit: equal_bits + 1 + stuff_bits(one >> (u128::BITS - equal_bits), equal_bits),
-        first_is_dominant: one < other,
-    })
 }
 
 /// CRC of a content of that many bits. Zeros above it do not matter, as the CRC starts from zero.
@@ -117,16 +101,11 @@ const fn crc_table() -> [u16; 256] {
 mod tests {
     use super::super::stuffing::Stuffer;
     use super::*;
-    use crate::can::frame::strategies::any_frame;
+    use crate::can::frame::strategies::any_classical_frame;
     use proptest::prelude::*;
 
     fn frame(id: u16, data: &[u8]) -> Frame {
         Frame::new(CanId::standard(id).unwrap(), data).unwrap()
-    }
-
-    /// The bits in the order of the wire, one by one.
-    fn bits_of(number: u128, length: u32) -> impl Iterator<Item = bool> {
-        (0..length).rev().map(move |bit| number >> bit & 1 == 1)
     }
 
     /// The CRC as ISO 11898-1 writes it: a shift register.
@@ -141,26 +120,6 @@ mod tests {
         let mut stuffer = Stuffer::default();
         bits.for_each(|bit| stuffer.push(bit));
         stuffer.with_last()
-    }
-
-    #[test]
-    fn frames_of_one_identifier_differ_first_in_length_or_data() {
-        let base = frame(0x555, &[0b1010_1010, 0]);
-        assert_eq!(first_difference(&base, &base), None);
-        let longer = frame(0x555, &[0b1010_1010, 0, 0]);
-        // Three zeros of the control field and two of the length code make a stuff bit.
-        let bit = 1 + 11 + 3 + 4 + 1;
-        assert_eq!(first_difference(&base, &longer), Some(Difference { bit, first_is_dominant: true }));
-        let other = frame(0x555, &[0b1010_1011, 0]);
-        let bit = bit + 8;
-        assert_eq!(first_difference(&other, &base), Some(Difference { bit, first_is_dominant: false }));
-        let run = frame(0x555, &[0b0000_0001, 0]);
-        let other = frame(0x555, &[0b0000_0000, 0]);
-        // So do the last zero of the length code and four of the data.
-        assert_eq!(
-            first_difference(&run, &other),
-            Some(Difference { bit: bit + 1, first_is_dominant: false })
-        );
     }
 
     #[test]
@@ -197,7 +156,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn crc_and_stuffing_are_those_of_the_bit_by_bit_references(frame in any_frame()) {
+        fn crc_and_stuffing_are_those_of_the_bit_by_bit_references(frame in any_classical_frame()) {
             let (content, length) = content(&frame);
             let crc = reference_crc(bits_of(content, length));
             prop_assert_eq!(crc15(content, length), crc);
@@ -206,7 +165,7 @@ mod tests {
         }
 
         #[test]
-        fn exact_lies_between_unstuffed_and_worst_case(frame in any_frame()) {
+        fn exact_lies_between_unstuffed_and_worst_case(frame in any_classical_frame()) {
             let (length, extended) = (frame.data().len() as u32, frame.id().is_extended());
             let exact = wire_bits(&frame);
             prop_assert!(unstuffed_bits(length, extended) <= exact);

@@ -5,9 +5,10 @@
 //! rate, which is how they are counted here. The CRC field has fixed stuff bits, so that its length
 //! depends on the data length alone, not on the CRC: the values of CRC-17 and CRC-21 are not computed.
 
-use super::stuffing::Stuffer;
+use super::stuffing::{Stuffer, bits_of};
 use super::{BEHIND_ACKNOWLEDGE_BITS, FrameBits, INTERFRAME_BITS};
-use crate::can::frame::CanId;
+use crate::can::frame::{Frame, FrameFormat};
+use crate::can::id::CanId;
 
 /// From the start bit to BRS.
 const STANDARD_HEAD_BITS: u32 = 17;
@@ -20,17 +21,27 @@ const ACKNOWLEDGE_BITS: u32 = 1;
 /// Longest data that CRC-17 protects, bytes; CRC-21 protects the others.
 const CRC_17_LENGTH: u32 = 16;
 
-/// Exact length of an FD frame with the control bits and data given.
-pub(in crate::can) fn bits(id: CanId, switches: bool, length_code: u8, data: &[u8]) -> FrameBits {
-    let head_bits = head_bits(id.is_extended());
-    let mut stuffer = Stuffer::default();
-    push(&mut stuffer, head(id, switches), head_bits);
+/// Exact length of a frame in FD format.
+pub(super) fn bits(frame: &Frame) -> FrameBits {
+    let head_bits = head_bits(frame.id().is_extended());
+    let (mut stuffer, mut content) = (Stuffer::default(), content_bits(frame));
+    content.by_ref().take(head_bits as usize).for_each(|bit| stuffer.push(bit));
     let head_stuffed = stuffer.stuffed;
-    push(&mut stuffer, u64::from(length_code), CONTROL_BITS);
-    for &byte in data {
-        push(&mut stuffer, u64::from(byte), 8);
-    }
-    lay_out(switches, head_bits + head_stuffed, stuffer.stuffed - head_stuffed, data.len() as u32)
+    content.for_each(|bit| stuffer.push(bit));
+    let stuffed = stuffer.stuffed - head_stuffed;
+    lay_out(switches(frame), head_bits + head_stuffed, stuffed, frame.data().len() as u32)
+}
+
+/// The bits from the start bit to the last data bit, in the order of the wire.
+pub(super) fn content_bits(frame: &Frame) -> impl Iterator<Item = bool> {
+    let id = frame.id();
+    let head = bits_of(head(id, switches(frame)).into(), head_bits(id.is_extended()));
+    let control = bits_of(u128::from(frame.length_code()), CONTROL_BITS);
+    head.chain(control).chain(frame.data().iter().flat_map(|&byte| bits_of(u128::from(byte), 8)))
+}
+
+fn switches(frame: &Frame) -> bool {
+    frame.format() == FrameFormat::FdBitRateSwitch
 }
 
 /// The longest that an FD frame of that many data bytes can be.
@@ -58,10 +69,6 @@ fn head(id: CanId, switches: bool) -> u64 {
     arbitration << 3 | 0b100 | u64::from(switches)
 }
 
-fn push(stuffer: &mut Stuffer, field: u64, length: u32) {
-    (0..length).rev().for_each(|bit| stuffer.push(field >> bit & 1 == 1));
-}
-
 const fn lay_out(switches: bool, head: u32, stuffed: u32, data_length: u32) -> FrameBits {
     let crc = if data_length <= CRC_17_LENGTH { 17 } else { 21 };
     // One before the stuff count, one behind every four bits that have a successor.
@@ -76,53 +83,48 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::can::frame::strategies::any_id;
-    use crate::can::{FdFormat, FdFrame};
+    use crate::can::frame::strategies::any_fd_frame;
 
-    fn standard(id: u16) -> CanId {
-        CanId::standard(id).unwrap()
+    fn frame(id: u16, format: FrameFormat, data: &[u8]) -> Frame {
+        Frame::with_format(CanId::standard(id).unwrap(), format, data).unwrap()
     }
 
     #[test]
     fn unstuffed_lengths_are_those_that_the_kernel_counts() {
         // linux/can/length.h: 62 bits with CRC-17 and 67 with CRC-21, data excluded; 19 more with 29-bit identifiers.
-        let alternating = |length: usize| vec![0x55; length];
-        let total = |id, length: usize, code| bits(id, true, code, &alternating(length)).total();
-        assert_eq!(total(standard(0x555), 8, 0b1000), 62 + 64);
-        assert_eq!(total(standard(0x555), 16, 0b1010), 62 + 128);
-        assert_eq!(total(standard(0x555), 64, 0b1111), 67 + 512);
-        let extended = CanId::extended(0x1555_5555).unwrap();
-        assert_eq!(total(extended, 8, 0b1000), 62 + 64 + 19);
+        let total = |id, length| {
+            let frame = Frame::with_format(id, FrameFormat::FdBitRateSwitch, &vec![0x55; length]).unwrap();
+            bits(&frame).total()
+        };
+        let standard = CanId::standard(0x555).unwrap();
+        assert_eq!(total(standard, 8), 62 + 64);
+        assert_eq!(total(standard, 16), 62 + 128);
+        assert_eq!(total(standard, 64), 67 + 512);
+        assert_eq!(total(CanId::extended(0x1555_5555).unwrap(), 8), 62 + 64 + 19);
     }
 
     #[test]
     fn the_data_phase_begins_behind_brs_and_ends_with_the_crc_delimiter() {
-        let frame = bits(standard(0x555), true, 0b1000, &[0x55; 8]);
-        assert_eq!(frame, FrameBits { head: 17, data: 5 + 64 + 4 + 17 + 6 + 1, tail: 12 });
-        let unswitched = bits(standard(0x555), false, 0b1000, &[0x55; 8]);
-        assert_eq!(unswitched, FrameBits::nominal(frame.total()));
+        let switched = bits(&frame(0x555, FrameFormat::FdBitRateSwitch, &[0x55; 8]));
+        assert_eq!(switched, FrameBits { head: 17, data: 5 + 64 + 4 + 17 + 6 + 1, tail: 12 });
+        let unswitched = bits(&frame(0x555, FrameFormat::Fd, &[0x55; 8]));
+        assert_eq!(unswitched, FrameBits::nominal(switched.total()));
     }
 
     #[test]
     fn no_stuff_bit_precedes_the_fixed_one() {
-        let zeros = |data: &[u8]| bits(standard(0x555), true, 0b0001, data).total();
-        assert_eq!(zeros(&[0b0101_1111]), zeros(&[0b0101_0101]));
+        let total = |data: u8| bits(&frame(0x555, FrameFormat::FdBitRateSwitch, &[data])).total();
+        assert_eq!(total(0b0101_1111), total(0b0101_0101));
     }
 
     proptest! {
         #[test]
-        fn exact_is_within_worst_case(
-            id in any_id(),
-            switches: bool,
-            data in prop::collection::vec(prop_oneof![Just(0_u8), Just(0xFF), any::<u8>()], 0..=64),
-        ) {
-            let format = if switches { FdFormat::BitRateSwitch } else { FdFormat::OneRate };
-            let frame = FdFrame::padded(id, format, &data);
-            let length = frame.data().len() as u32;
-            let (exact, worst) = (frame.bits(), worst_case_fd_bits(length, id.is_extended(), switches));
+        fn exact_is_within_worst_case(frame in any_fd_frame()) {
+            let (length, extended) = (frame.data().len() as u32, frame.id().is_extended());
+            let (exact, worst) = (bits(&frame), worst_case_fd_bits(length, extended, switches(&frame)));
             prop_assert!(exact.head <= worst.head && exact.total() <= worst.total(), "{exact:?} {worst:?}");
             let crc_and_fixed = if length <= 16 { 17 + 6 } else { 21 + 7 };
-            let unstuffed = head_bits(id.is_extended()) + 5 + 8 * length + 4 + crc_and_fixed + 1 + 12;
+            let unstuffed = head_bits(extended) + 5 + 8 * length + 4 + crc_and_fixed + 1 + 12;
             prop_assert!(unstuffed <= exact.total());
         }
     }

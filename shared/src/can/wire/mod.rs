@@ -4,30 +4,26 @@
 
 mod bitrate;
 mod classical;
+mod difference;
 mod fd;
 mod stuffing;
 
 use super::frame::{Frame, FrameFormat};
 
 pub use bitrate::{Bitrate, BitrateError, FrameBits, Rates};
-pub(super) use classical::first_difference;
 pub use classical::{unstuffed_bits, wire_bits, worst_case_bits};
-pub(super) use fd::bits as fd_bits;
+pub(super) use difference::first_difference;
 pub use fd::worst_case_fd_bits;
 
 /// Exact length of a frame on the wire from the start bit to the end of the interframe space.
 pub fn frame_bits(frame: &Frame) -> FrameBits {
     match frame.format() {
         FrameFormat::Classical => FrameBits::nominal(wire_bits(frame)),
-        format => {
-            let switches = format == FrameFormat::FdBitRateSwitch;
-            // Up to 8 bytes the length code is the length.
-            fd_bits(frame.id(), switches, frame.data().len() as u8, frame.data())
-        }
+        FrameFormat::Fd | FrameFormat::FdBitRateSwitch => fd::bits(frame),
     }
 }
 
-/// The longest that a frame of 0 to 8 data bytes can be in a format, interframe space included.
+/// The longest that a frame of that many data bytes can be in a format, interframe space included.
 pub const fn longest_bits(data_length: u32, extended: bool, format: FrameFormat) -> FrameBits {
     match format {
         FrameFormat::Classical => FrameBits::nominal(worst_case_bits(data_length, extended)),

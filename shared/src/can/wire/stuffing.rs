@@ -80,6 +80,11 @@ const fn steps() -> [[Step; 256]; Run::COUNT] {
     table
 }
 
+/// The lowest `length` bits of a field in the order of the wire, first the highest of them.
+pub(super) fn bits_of(field: u128, length: u32) -> impl Iterator<Item = bool> {
+    (0..length).rev().map(move |bit| field >> bit & 1 == 1)
+}
+
 /// Stuffing as a transmitter does it, bit by bit: for sequences of any length.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Stuffer {
@@ -127,7 +132,7 @@ mod tests {
             // Masking makes long runs likely.
             let sequence = sequence & mask;
             let mut stuffer = Stuffer::default();
-            (0..length).rev().for_each(|bit| stuffer.push(sequence >> bit & 1 == 1));
+            bits_of(sequence, length).for_each(|bit| stuffer.push(bit));
             prop_assert_eq!(stuff_bits(sequence, length), stuffer.with_last());
         }
     }

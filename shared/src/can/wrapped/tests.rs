@@ -18,10 +18,10 @@ const FAULT: Fault = Fault {
     count: u64::MAX,
 };
 
-fn wire() -> VirtualWire {
+fn wire(format: FrameFormat) -> VirtualWire {
     VirtualWire::new(&WireConfig {
         rates: Rates::classical(Bitrate::MAX),
-        format: FrameFormat::Classical,
+        format,
         ports: 2,
         transmit_capacity: 8,
         receive_capacity: 4,
@@ -32,6 +32,7 @@ fn wire() -> VirtualWire {
 /// Two ports of a simulated wire, each under all wrappers.
 struct Wrapped {
     wire: VirtualWire,
+    format: FrameFormat,
     now_ns: u64,
     counts: [Counts; 2],
     taps: [CandumpTap<String>; 2],
@@ -41,7 +42,8 @@ struct Wrapped {
 impl Wrapped {
     fn new(of_a: Vec<Fault>, of_b: Vec<Fault>) -> Self {
         Self {
-            wire: wire(),
+            wire: wire(FrameFormat::Classical),
+            format: FrameFormat::Classical,
             now_ns: 0,
             counts: [Counts::default(); 2],
             taps: ["a", "b"].map(|name| CandumpTap::new(name, String::new())),
@@ -72,6 +74,10 @@ impl Pair for Wrapped {
         self.counts[index].over(self.faults[index].over(logged))
     }
 
+    fn format(&self) -> FrameFormat {
+        self.format
+    }
+
     fn now_ns(&self) -> u64 {
         self.now_ns
     }
@@ -90,9 +96,11 @@ fn frame(byte: u8) -> Frame {
 
 #[test]
 fn wrapped_ports_conform() {
-    let new = || Wrapped::new(Vec::new(), Vec::new());
-    assert_eq!(conformance::check(new), Ok(()));
-    assert_eq!(conformance::check_arbitration(new), Ok(()));
+    for format in [FrameFormat::Classical, FrameFormat::FdBitRateSwitch] {
+        let new = || Wrapped { wire: wire(format), format, ..Wrapped::new(Vec::new(), Vec::new()) };
+        assert_eq!(conformance::check(new), Ok(()));
+        assert_eq!(conformance::check_arbitration(new), Ok(()));
+    }
 }
 
 #[test]
