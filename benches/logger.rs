@@ -22,7 +22,7 @@ use masseter_shared::messages::codes::Source;
 use masseter_shared::messages::{Command as CommandMessage, Event, FrameTap, Reading, State, Truth};
 use masseter_shared::realtime::Cycle;
 use masseter_shared::realtime::scheduling::{Wanted, obtain};
-use masseter_shared::transport::{Domain, Node, Outlet};
+use masseter_shared::transport::{BatchOutlet, Domain, Node, Outlet};
 use rustix::process::{Pid, Signal, kill_process};
 
 const MASSETER: &str = env!("CARGO_BIN_EXE_masseter");
@@ -70,7 +70,9 @@ struct Outlets {
     reading: Outlet<Reading>,
     state: Outlet<State>,
     truth: Outlet<Truth>,
-    frame: Outlet<FrameTap>,
+    frame: BatchOutlet<FrameTap>,
+    /// Those of a cycle, which travel together.
+    frames: Vec<FrameTap>,
     /// The controller's, and the plant's.
     events: [Outlet<Event>; 2],
 }
@@ -82,9 +84,16 @@ impl Outlets {
             reading: node.outlet()?,
             state: node.outlet()?,
             truth: node.outlet()?,
-            frame: node.outlet()?,
+            frame: node.batch_outlet()?,
+            frames: Vec::new(),
             events: [node.outlet()?, node.outlet()?],
         })
+    }
+
+    fn publish_cycle(&mut self, cycle: &[Recorded]) -> anyhow::Result<()> {
+        self.frames.clear();
+        cycle.iter().try_for_each(|message| self.publish(message))?;
+        Ok(self.frame.publish(&self.frames)?)
     }
 
     fn publish(&mut self, message: &Recorded) -> anyhow::Result<()> {
@@ -93,7 +102,7 @@ impl Outlets {
             Recorded::Reading(message) => self.reading.publish(|place| *place = *message)?,
             Recorded::State(message) => self.state.publish(|place| *place = *message)?,
             Recorded::Truth(message) => self.truth.publish(|place| *place = *message)?,
-            Recorded::Frame(message) => self.frame.publish(|place| *place = *message)?,
+            Recorded::Frame(message) => self.frames.push(*message),
             Recorded::Event(message) => {
                 let is_of_controller = message.source == Source::Controller.code();
                 self.events[usize::from(!is_of_controller)].publish(|place| *place = *message)?;
@@ -165,9 +174,7 @@ fn play(cycles: &[Vec<Recorded>], outlets: &mut Outlets) -> anyhow::Result<(u64,
     let (mut sent, mut publishing) = (0, Histogram::new(3)?);
     for cycle in cycles.iter().cycle().take((RATE_HZ * SECONDS) as usize) {
         let wake = pace.wait();
-        for message in cycle {
-            outlets.publish(message)?;
-        }
+        outlets.publish_cycle(cycle)?;
         let messages = cycle.len().max(1) as u64;
         publishing.record((clock::now_ns() - wake.woke_ns) / messages)?;
         sent += cycle.len() as u64;

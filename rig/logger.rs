@@ -13,7 +13,7 @@ use masseter_shared::clock;
 use masseter_shared::geometry::Mechanism;
 use masseter_shared::lifecycle::Assignment;
 use masseter_shared::messages::{Command, Event, FrameTap, Message, Reading, State, Truth};
-use masseter_shared::transport::{Inlet, Node, TransportError};
+use masseter_shared::transport::{BatchInlet, Inlet, Node, TransportError};
 
 use crate::exit::Exit;
 use crate::live::Live;
@@ -119,7 +119,7 @@ struct Topics {
     readings: Inlet<Reading>,
     states: Inlet<State>,
     truths: Inlet<Truth>,
-    frames: Inlet<FrameTap>,
+    frames: BatchInlet<FrameTap>,
     events: Inlet<Event>,
 }
 
@@ -130,7 +130,7 @@ impl Topics {
             readings: node.inlet()?,
             states: node.inlet()?,
             truths: node.inlet()?,
-            frames: node.inlet()?,
+            frames: node.batch_inlet()?,
             events: node.inlet()?,
         })
     }
@@ -140,7 +140,7 @@ impl Topics {
         drain(&self.readings, takers, now_ns, Recorded::Reading)?;
         drain(&self.states, takers, now_ns, Recorded::State)?;
         drain(&self.truths, takers, now_ns, Recorded::Truth)?;
-        drain(&self.frames, takers, now_ns, Recorded::Frame)?;
+        drain_batches(&self.frames, takers, now_ns, Recorded::Frame)?;
         drain(&self.events, takers, now_ns, Recorded::Event)
     }
 }
@@ -155,6 +155,20 @@ fn drain<M: Message>(
     for _ in 0..M::DEPTH {
         let Some(message) = inlet.receive()? else { break };
         takers.take(&*message, now_ns, &of_topic);
+    }
+    Ok(())
+}
+
+/// The same for a topic that travels in batches.
+fn drain_batches<M: Message>(
+    inlet: &BatchInlet<M>,
+    takers: &mut Takers,
+    now_ns: u64,
+    of_topic: impl Fn(M) -> Recorded,
+) -> Result<(), TransportError> {
+    for _ in 0..M::DEPTH {
+        let Some(batch) = inlet.receive()? else { break };
+        batch.iter().for_each(|message| takers.take(message, now_ns, &of_topic));
     }
     Ok(())
 }

@@ -112,9 +112,11 @@ impl<L: Link> PlantCore<L> {
         self.master.drives_are_off()
     }
 
-    /// Hands out the frames seen on the wires since the last drain.
-    pub fn drain_frames(&mut self, out: &mut impl FnMut(FrameTap)) {
-        self.tapped.drain(..).for_each(out);
+    /// Hands out the frames seen on the wires since the last drain, all at once.
+    pub fn drain_frames<T>(&mut self, out: impl FnOnce(&[FrameTap]) -> T) -> T {
+        let taken = out(&self.tapped);
+        self.tapped.clear();
+        taken
     }
 
     /// Hands out what happened since the last drain.

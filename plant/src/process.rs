@@ -6,7 +6,7 @@ use masseter_shared::lifecycle::{Assignment, Post, ProcessError};
 use masseter_shared::messages::{Command, Event, FrameTap, Reading, Truth};
 use masseter_shared::realtime::{Account, Cycle, Waiter, Wake};
 use masseter_shared::schedule::CycleSchedule;
-use masseter_shared::transport::{Inlet, Node, Outlet, Received};
+use masseter_shared::transport::{BatchOutlet, Inlet, Node, Outlet, Received};
 
 use crate::core::{PlantCore, PlantError};
 use crate::link::Link;
@@ -30,7 +30,7 @@ struct Ports {
     commands: Inlet<Command>,
     readings: Outlet<Reading>,
     truths: Outlet<Truth>,
-    frames: Outlet<FrameTap>,
+    frames: BatchOutlet<FrameTap>,
     events: Outlet<Event>,
 }
 
@@ -40,7 +40,7 @@ impl Ports {
             commands: node.inlet()?,
             readings: node.outlet()?,
             truths: node.outlet()?,
-            frames: node.outlet()?,
+            frames: node.batch_outlet()?,
             events: node.outlet()?,
         };
         ports.readings.warm_up()?;
@@ -70,12 +70,7 @@ impl Ports {
         if let Some(truth) = plant.truth() {
             self.truths.publish(|message| *message = truth)?;
         }
-        let mut result = Ok(());
-        plant.drain_frames(&mut |frame| {
-            if result.is_ok() {
-                result = self.frames.publish(|message| *message = frame);
-            }
-        });
+        let mut result = plant.drain_frames(|frames| self.frames.publish(frames));
         plant.drain_events(&mut |event| {
             if result.is_ok() {
                 result = self.events.publish(|message| *message = event);

@@ -72,6 +72,30 @@ fn check_topic<M: Message>(node: &Node) {
     assert_eq!((receiving, received), ((0, 0), MESSAGES), "{}", M::TOPIC);
 }
 
+fn check_batches(node: &Node) {
+    let inlet = node.batch_inlet::<FrameTap>().unwrap();
+    let mut outlet = node.batch_outlet::<FrameTap>().unwrap();
+    let frames = [FrameTap::default(); 14];
+    outlet.warm_up().unwrap();
+    outlet.publish(&frames).unwrap();
+    assert!(inlet.receive().unwrap().is_some());
+
+    let (count, largest_bytes) = allocations_of(|| {
+        for _ in 0..MESSAGES {
+            outlet.publish(&frames).unwrap();
+        }
+    });
+    assert!(count <= MESSAGES && largest_bytes <= LOAN_BYTES, "{count} of {largest_bytes}");
+
+    let mut received = 0;
+    let receiving = allocations_of(|| {
+        while let Some(batch) = black_box(inlet.receive().unwrap()) {
+            received += batch.len();
+        }
+    });
+    assert_eq!((receiving, received), ((0, 0), MESSAGES as usize * frames.len()));
+}
+
 #[test]
 fn waiting_and_receiving_allocate_nothing_and_sending_one_small_counter() {
     let domain = Domain::named(&format!("test-allocations-{}", std::process::id())).unwrap();
@@ -82,7 +106,7 @@ fn waiting_and_receiving_allocate_nothing_and_sending_one_small_counter() {
         check_topic::<Reading>(&node);
         check_topic::<State>(&node);
         check_topic::<Truth>(&node);
-        check_topic::<FrameTap>(&node);
+        check_batches(&node);
         check_topic::<Event>(&node);
 
         let inlet = node.inlet::<Command>().unwrap();

@@ -17,13 +17,13 @@ use crate::messages::Message;
 use crate::realtime::Waiter;
 
 /// Publishers a topic may have: every process may publish events.
-const MAX_PUBLISHERS: usize = 4;
+pub(super) const MAX_PUBLISHERS: usize = 4;
 /// Subscribers a topic may have: the counterpart, the logger, and two observers. Shared memory is
 /// reserved, and locked, for all of them.
-const MAX_SUBSCRIBERS: usize = 4;
+pub(super) const MAX_SUBSCRIBERS: usize = 4;
 /// Messages a subscriber may hold at once: while it looks for a newer one than it has, it holds the one
 /// it has, the newest found so far, and the next.
-const MAX_HELD: usize = 3;
+pub(super) const MAX_HELD: usize = 3;
 
 /// Why a port could not be made or used.
 #[derive(Debug, thiserror::Error)]
@@ -45,7 +45,7 @@ fn help(reason: &str) -> &'static str {
 }
 
 /// Builds its text only when something failed: a port's way costs no allocation.
-fn failed<E: std::fmt::Debug>(verb: &'static str, what: &str) -> impl FnOnce(E) -> TransportError {
+pub(super) fn failed<E: std::fmt::Debug>(verb: &'static str, what: &str) -> impl FnOnce(E) -> TransportError {
     move |error| TransportError { action: format!("{verb} '{what}'"), reason: format!("{error:?}") }
 }
 

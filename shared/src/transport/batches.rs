@@ -1,0 +1,164 @@
+//! Topics of many small messages a cycle: several travel in one sample, each still a message of its own.
+//!
+//! What a sample costs, to send and to receive, is shared by the messages in it.
+
+use std::ops::Deref;
+
+use iceoryx2::port::backpressure_strategy::BackpressureStrategy;
+use iceoryx2::port::publisher::Publisher;
+use iceoryx2::port::subscriber::Subscriber;
+use iceoryx2::prelude::{AllocationStrategy, ipc};
+use iceoryx2::sample::Sample;
+use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
+
+use super::ports::{MAX_HELD, MAX_PUBLISHERS, MAX_SUBSCRIBERS, Node, TransportError, failed};
+use crate::clock;
+use crate::messages::Message;
+
+/// Messages that a sample holds at most: those that a cycle of six drives gives.
+const BATCH: usize = 16;
+
+impl Node {
+    fn batch_service<M: Message>(&self) -> Result<PortFactory<ipc::Service, [M], ()>, TransportError> {
+        self.iceoryx()
+            .service_builder(&M::TOPIC.try_into().map_err(failed("opening topic", M::TOPIC))?)
+            .publish_subscribe::<[M]>()
+            .enable_safe_overflow(true)
+            .max_publishers(MAX_PUBLISHERS)
+            .max_subscribers(MAX_SUBSCRIBERS)
+            .subscriber_max_buffer_size(M::DEPTH / BATCH)
+            .subscriber_max_borrowed_samples(MAX_HELD)
+            .open_or_create()
+            .map_err(failed("opening topic", M::TOPIC))
+    }
+
+    /// The publishing end of a topic that travels in batches.
+    pub fn batch_outlet<M: Message>(&self) -> Result<BatchOutlet<M>, TransportError> {
+        let publisher = self
+            .batch_service::<M>()?
+            .publisher_builder()
+            .initial_max_slice_len(BATCH)
+            .allocation_strategy(AllocationStrategy::Static)
+            .backpressure_strategy(BackpressureStrategy::DiscardData)
+            .create()
+            .map_err(failed("publishing", M::TOPIC))?;
+        Ok(BatchOutlet { publisher, sent: 0 })
+    }
+
+    /// The receiving end of a topic that travels in batches; it keeps up to [`Message::DEPTH`] messages, less
+    /// where batches are not full.
+    pub fn batch_inlet<M: Message>(&self) -> Result<BatchInlet<M>, TransportError> {
+        let service = self.batch_service::<M>()?;
+        let subscriber = service.subscriber_builder().create().map_err(failed("subscribing to", M::TOPIC))?;
+        Ok(BatchInlet { subscriber })
+    }
+}
+
+/// Publishes one message type in batches and numbers its messages.
+#[derive(Debug)]
+pub struct BatchOutlet<M: Message> {
+    publisher: Publisher<ipc::Service, [M], ()>,
+    sent: u64,
+}
+
+impl<M: Message> BatchOutlet<M> {
+    /// Copies the messages to where subscribers will read them, stamps and publishes them, in their order.
+    pub fn publish(&mut self, messages: &[M]) -> Result<(), TransportError> {
+        for batch in messages.chunks(BATCH) {
+            let sample =
+                self.publisher.loan_slice_uninit(batch.len()).map_err(failed("loaning", M::TOPIC))?;
+            let mut sample = sample.write_from_slice(batch);
+            let published_ns = clock::now_ns();
+            for message in sample.payload_mut() {
+                self.sent += 1;
+                message.stamp(self.sent, published_ns);
+            }
+            sample.send().map_err(failed("sending", M::TOPIC))?;
+        }
+        Ok(())
+    }
+
+    /// Touches the port's memory once, so that the first batch of the loop costs no page fault.
+    pub fn warm_up(&self) -> Result<(), TransportError> {
+        drop(self.publisher.loan_slice_uninit(BATCH).map_err(failed("loaning", M::TOPIC))?);
+        Ok(())
+    }
+}
+
+/// Receives one message type in batches, oldest first.
+#[derive(Debug)]
+pub struct BatchInlet<M: Message> {
+    subscriber: Subscriber<ipc::Service, [M], ()>,
+}
+
+/// Messages still lying in shared memory.
+#[derive(Debug)]
+pub struct ReceivedBatch<M: Message>(Sample<ipc::Service, [M], ()>);
+
+impl<M: Message> Deref for ReceivedBatch<M> {
+    type Target = [M];
+
+    fn deref(&self) -> &[M] {
+        &self.0
+    }
+}
+
+impl<M: Message> BatchInlet<M> {
+    /// The oldest batch not yet received; never waits.
+    pub fn receive(&self) -> Result<Option<ReceivedBatch<M>>, TransportError> {
+        let sample = self.subscriber.receive().map_err(failed("receiving", M::TOPIC))?;
+        Ok(sample.map(ReceivedBatch))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::messages::FrameTap;
+    use crate::transport::Domain;
+
+    #[test]
+    fn messages_arrive_in_order_however_many_come_at_once() {
+        let domain = Domain::named(&format!("test-batches-{}", std::process::id())).unwrap();
+        let claim = domain.claim().unwrap();
+        {
+            let node = Node::join(&domain).unwrap();
+            let inlet = node.batch_inlet::<FrameTap>().unwrap();
+            let mut outlet = node.batch_outlet::<FrameTap>().unwrap();
+            let mut sent = 0;
+            for count in [0, 1, BATCH, BATCH + 1, 5 * BATCH, 3] {
+                let frames: Vec<_> =
+                    (0..count).map(|id| FrameTap { id: id as u32, ..FrameTap::default() }).collect();
+                outlet.publish(&frames).unwrap();
+                let mut received = Vec::new();
+                while let Some(batch) = inlet.receive().unwrap() {
+                    received.extend(batch.iter().map(|frame| (frame.seq, frame.id)));
+                }
+                let expected: Vec<_> = (0..count as u32).map(|id| (sent + 1 + u64::from(id), id)).collect();
+                assert_eq!(received, expected);
+                sent += count as u64;
+            }
+        }
+        drop(claim);
+        domain.sweep().unwrap();
+    }
+
+    #[test]
+    fn who_falls_behind_loses_the_oldest_and_sees_the_gap() {
+        let domain = Domain::named(&format!("test-behind-{}", std::process::id())).unwrap();
+        let claim = domain.claim().unwrap();
+        {
+            let node = Node::join(&domain).unwrap();
+            let inlet = node.batch_inlet::<FrameTap>().unwrap();
+            let mut outlet = node.batch_outlet::<FrameTap>().unwrap();
+            let frames = [FrameTap::default(); BATCH];
+            for _ in 0..FrameTap::DEPTH / BATCH + 2 {
+                outlet.publish(&frames).unwrap();
+            }
+            let oldest = inlet.receive().unwrap().unwrap();
+            assert_eq!(oldest[0].seq, 2 * BATCH as u64 + 1);
+        }
+        drop(claim);
+        domain.sweep().unwrap();
+    }
+}
