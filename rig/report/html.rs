@@ -7,7 +7,8 @@ use super::plot::Drawn;
 use super::table::{self, in_words};
 use super::{charts, events, film, usage};
 use crate::analysis::{BusResponse, Figures};
-use crate::report::verdict::{CheckResult, Verdict};
+use crate::report::checks::CheckResult;
+use crate::report::verdict::Verdict;
 use crate::run::manifest::Manifest;
 
 const STYLE: &str = include_str!("page/style.css");

@@ -2,7 +2,8 @@
 
 use crate::analysis::Figures;
 use crate::exit::Exit;
-use crate::report::verdict::{CheckResult, Verdict};
+use crate::report::checks::CheckResult;
+use crate::report::verdict::Verdict;
 use crate::run::manifest::Manifest;
 
 /// One suite; a run that ended wrongly or cannot be judged has an `error` case of its own.

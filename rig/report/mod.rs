@@ -3,6 +3,7 @@
 //! Everything is computed from the manifest and the recording, so `masseter report` can do it again.
 
 mod charts;
+pub mod checks;
 pub(crate) mod compare;
 mod events;
 mod film;

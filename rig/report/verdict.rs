@@ -1,10 +1,11 @@
-//! How a run is judged: its end, then its recording, then the machine, then its checks.
+//! How a run is judged: its end, then its recording, then the machine, then its [checks](super::checks).
 
 use serde::{Deserialize, Serialize};
 
-use crate::analysis::{BusResponse, Figures, Outage, ResponseFigures, Suspicion};
+use super::checks::{Check, CheckResult, checks, missed_cycles};
+use crate::analysis::{Figures, Outage};
 use crate::exit::Exit;
-use crate::report::table;
+use crate::run::dma_latency::DmaLatency;
 use crate::run::manifest::Manifest;
 use crate::run::usage::RunUsage;
 
@@ -38,62 +39,6 @@ impl Ending {
     }
 }
 
-/// Whether what was checked is as it should be.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum CheckResult {
-    /// It is.
-    Passed,
-    /// It is not.
-    Failed,
-    /// This run cannot tell; the finding says why.
-    NotJudged,
-}
-
-impl CheckResult {
-    fn of(passed: bool) -> Self {
-        if passed { Self::Passed } else { Self::Failed }
-    }
-
-    /// In a word.
-    pub fn mark(self) -> &'static str {
-        match self {
-            Self::Passed => "ok",
-            Self::Failed => "FAIL",
-            Self::NotJudged => "skip",
-        }
-    }
-}
-
-/// One thing that was judged.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Check {
-    /// What.
-    pub name: &'static str,
-    /// What was found, with its limit.
-    pub finding: String,
-    /// Whether it is as it should be.
-    pub result: CheckResult,
-}
-
-impl Check {
-    fn judged(name: &'static str, finding: String, passed: bool) -> Self {
-        Self { name, finding, result: CheckResult::of(passed) }
-    }
-
-    /// A failure that `excused` explains is none.
-    fn unless(self, excused: bool) -> Self {
-        match self.result {
-            CheckResult::Failed if excused => Self { result: CheckResult::NotJudged, ..self },
-            _ => self,
-        }
-    }
-
-    fn not_judged(name: &'static str, why: String) -> Self {
-        Self { name, finding: why, result: CheckResult::NotJudged }
-    }
-}
-
 /// The judgement of a run.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Verdict {
@@ -124,18 +69,6 @@ impl Verdict {
         }
         Self { word, reason, exit, checks }
     }
-}
-
-/// What stretches of work that cost deadlines were held against.
-fn weighed(suspicion: Suspicion) -> String {
-    format!(
-        "; {} stretches of work against {} stalls as long while waiting, {:.1} % of the time at work: chance does so \
-         with probability {:.2}",
-        suspicion.while_working,
-        suspicion.while_waiting,
-        suspicion.work_share * 100.0,
-        suspicion.chance
-    )
 }
 
 /// Share of its core above which a real-time process is too busy: the kernel throttles at 95 %, by default.
@@ -193,19 +126,6 @@ fn incomplete(figures: &Figures) -> Option<Judgement> {
     Some((Exit::Incomplete, "INCOMPLETE", reason))
 }
 
-/// Whether too many cycles were missed. When none of them is certainly the rig's doing, there is nothing to judge
-/// it by.
-fn missed_cycles(manifest: &Manifest, figures: &Figures) -> CheckResult {
-    let (skipped, by_machine) = figures.skipped();
-    if skipped <= manifest.scenario.checks.missed_cycles {
-        CheckResult::Passed
-    } else if by_machine == skipped {
-        CheckResult::NotJudged
-    } else {
-        CheckResult::Failed
-    }
-}
-
 /// Whether the machine kept the rig from too many cycles to judge it. A safe stop is excused only when many of them
 /// were missed just before it.
 fn disturbed(manifest: &Manifest, figures: &Figures) -> Option<Judgement> {
@@ -222,9 +142,20 @@ fn disturbed(manifest: &Manifest, figures: &Figures) -> Option<Judgement> {
     };
     let reason = format!(
         "the machine stood still for {stalled_ms:.1} ms while the rig waited, and {skipped} cycles were \
-         missed{while_working}{stop}"
+         missed{while_working}{stop}; {}",
+        remedy(manifest)
     );
     Some((Exit::Invalid, "INVALID", reason))
+}
+
+/// What may keep the machine from standing still.
+fn remedy(manifest: &Manifest) -> &'static str {
+    match &manifest.cpu_dma_latency {
+        Some(DmaLatency { limit_us: None, .. }) => {
+            "`realtime.cpu_dma_latency = \"hold\"` may help, which `masseter bench loop` tells"
+        }
+        _ => "`masseter doctor` tells what helps",
+    }
 }
 
 /// What excuses the way a disturbed run ended, in words; nothing to say when it ended as it should, none when there is
@@ -243,62 +174,6 @@ fn failed(checks: &[Check]) -> Option<Judgement> {
     let failed: Vec<_> =
         checks.iter().filter(|check| check.result == CheckResult::Failed).map(|check| check.name).collect();
     (!failed.is_empty()).then(|| (Exit::Failed, "FAIL", format!("failed: {}", failed.join(", "))))
-}
-
-/// `is_disturbed`: the machine kept the rig from too many cycles to hold its sequence or its tracking against it.
-fn checks(manifest: &Manifest, figures: &Figures, is_disturbed: bool) -> Vec<Check> {
-    let limits = &manifest.scenario.checks;
-    let tracking = &figures.tracking;
-    let (skipped, by_machine) = figures.skipped();
-    let missing = figures.missing_messages();
-    let state = figures.final_state.unwrap_or("none");
-    vec![
-        Check::judged("sequence", format!("ended in state {state}"), state == "finished")
-            .unless(is_disturbed),
-        Check::judged(
-            "tracking",
-            format!(
-                "rms {:.4} mm over {} samples, limit {} mm",
-                tracking.rms_mm, tracking.samples, limits.tracking_rms_mm
-            ),
-            tracking.samples > 0 && tracking.rms_mm <= limits.tracking_rms_mm,
-        )
-        .unless(is_disturbed),
-        Check {
-            name: "missed cycles",
-            finding: format!(
-                "{skipped} ({by_machine} by the machine{}), limit {}",
-                figures.suspicion.map(weighed).unwrap_or_default(),
-                limits.missed_cycles
-            ),
-            result: missed_cycles(manifest, figures),
-        },
-        Check::judged("dropped messages", missing.to_string(), missing == 0),
-        bus_response(&figures.bus_response, !manifest.scenario.faults.is_empty()),
-    ]
-}
-
-/// No message may take longer on its bus than the plan allows at worst.
-fn bus_response(response: &BusResponse, has_faults: bool) -> Check {
-    const NAME: &str = "bus response";
-    if has_faults {
-        return Check::not_judged(NAME, "the scenario's faults are in no plan".to_owned());
-    }
-    if let Some(why) = &response.unbounded {
-        return Check::not_judged(NAME, why.clone());
-    }
-    let in_words = |message: &ResponseFigures| {
-        let us = |ns: Option<u64>| ns.map_or_else(|| "–".to_owned(), table::microseconds);
-        let (max_us, bound_us) = (us(message.max_ns), us(message.bound_ns));
-        format!("{} on bus {} took {max_us} µs, bound {bound_us} µs", message.message, message.bus)
-    };
-    let exceeding: Vec<_> = response.exceeding().map(in_words).collect();
-    if exceeding.is_empty() {
-        let tightest = response.tightest().map_or_else(|| "no message has a bound".to_owned(), in_words);
-        Check::judged(NAME, format!("closest: {tightest}"), response.tightest().is_some())
-    } else {
-        Check::judged(NAME, exceeding.join("; "), false)
-    }
 }
 
 #[cfg(test)]
@@ -325,41 +200,5 @@ mod tests {
         let said = excuse(&Ending::SafeStop, outage(75)).unwrap();
         assert_eq!(said, ", 75 of 100 just before the safe stop");
         assert_eq!(excuse(&Ending::Completed, None).unwrap(), "");
-    }
-
-    #[test]
-    fn only_a_failure_is_excused() {
-        let check = |passed| Check::judged("tracking", String::new(), passed);
-        let cases = [(false, true, "skip"), (false, false, "FAIL"), (true, true, "ok"), (true, false, "ok")];
-        for (passed, excused, mark) in cases {
-            assert_eq!(check(passed).unless(excused).result.mark(), mark);
-        }
-    }
-
-    fn response(max_ns: u64, unbounded: Option<&str>) -> BusResponse {
-        let sync = ResponseFigures {
-            bus: 1,
-            message: "SYNC".to_owned(),
-            frames: 1,
-            max_ns: Some(max_ns),
-            bound_ns: Some(190_000),
-        };
-        BusResponse { messages: vec![sync], unbounded: unbounded.map(str::to_owned) }
-    }
-
-    #[test]
-    fn a_message_beyond_its_bound_fails_unless_the_bound_does_not_hold() {
-        let cases = [
-            (190_000, None, false, "ok"),
-            (191_000, None, false, "FAIL"),
-            (191_000, None, true, "skip"),
-            (191_000, Some("bus 0 had 1 errors"), false, "skip"),
-        ];
-        for (max_ns, unbounded, has_faults, mark) in cases {
-            let check = bus_response(&response(max_ns, unbounded), has_faults);
-            assert_eq!(check.result.mark(), mark, "{check:?}");
-        }
-        let failed = bus_response(&response(191_000, None), false);
-        assert_eq!(failed.finding, "SYNC on bus 1 took 191.00 µs, bound 190.00 µs");
     }
 }

@@ -1,0 +1,187 @@
+//! What a finished run is checked for, each with its finding and its limit.
+//!
+//! What the checks come to is the [verdict](super::verdict)'s.
+
+use serde::Serialize;
+
+use super::table;
+use crate::analysis::{BusResponse, Figures, ResponseFigures, Suspicion};
+use crate::run::manifest::Manifest;
+
+/// Whether what was checked is as it should be.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum CheckResult {
+    /// It is.
+    Passed,
+    /// It is not.
+    Failed,
+    /// This run cannot tell; the finding says why.
+    NotJudged,
+}
+
+impl CheckResult {
+    fn of(passed: bool) -> Self {
+        if passed { Self::Passed } else { Self::Failed }
+    }
+
+    /// In a word.
+    pub fn mark(self) -> &'static str {
+        match self {
+            Self::Passed => "ok",
+            Self::Failed => "FAIL",
+            Self::NotJudged => "skip",
+        }
+    }
+}
+
+/// One thing that was judged.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Check {
+    /// What.
+    pub name: &'static str,
+    /// What was found, with its limit.
+    pub finding: String,
+    /// Whether it is as it should be.
+    pub result: CheckResult,
+}
+
+impl Check {
+    fn judged(name: &'static str, finding: String, passed: bool) -> Self {
+        Self { name, finding, result: CheckResult::of(passed) }
+    }
+
+    /// A failure that `excused` explains is none.
+    fn unless(self, excused: bool) -> Self {
+        match self.result {
+            CheckResult::Failed if excused => Self { result: CheckResult::NotJudged, ..self },
+            _ => self,
+        }
+    }
+
+    fn not_judged(name: &'static str, why: String) -> Self {
+        Self { name, finding: why, result: CheckResult::NotJudged }
+    }
+}
+
+/// `is_disturbed`: the machine kept the rig from too many cycles to hold its sequence or its tracking against it.
+pub(super) fn checks(manifest: &Manifest, figures: &Figures, is_disturbed: bool) -> Vec<Check> {
+    let limits = &manifest.scenario.checks;
+    let tracking = &figures.tracking;
+    let (skipped, by_machine) = figures.skipped();
+    let missing = figures.missing_messages();
+    let state = figures.final_state.unwrap_or("none");
+    vec![
+        Check::judged("sequence", format!("ended in state {state}"), state == "finished")
+            .unless(is_disturbed),
+        Check::judged(
+            "tracking",
+            format!(
+                "rms {:.4} mm over {} samples, limit {} mm",
+                tracking.rms_mm, tracking.samples, limits.tracking_rms_mm
+            ),
+            tracking.samples > 0 && tracking.rms_mm <= limits.tracking_rms_mm,
+        )
+        .unless(is_disturbed),
+        Check {
+            name: "missed cycles",
+            finding: format!(
+                "{skipped} ({by_machine} by the machine{}), limit {}",
+                figures.suspicion.map(weighed).unwrap_or_default(),
+                limits.missed_cycles
+            ),
+            result: missed_cycles(manifest, figures),
+        },
+        Check::judged("dropped messages", missing.to_string(), missing == 0),
+        bus_response(&figures.bus_response, !manifest.scenario.faults.is_empty()),
+    ]
+}
+
+/// No message may take longer on its bus than the plan allows at worst.
+fn bus_response(response: &BusResponse, has_faults: bool) -> Check {
+    const NAME: &str = "bus response";
+    if has_faults {
+        return Check::not_judged(NAME, "the scenario's faults are in no plan".to_owned());
+    }
+    if let Some(why) = &response.unbounded {
+        return Check::not_judged(NAME, why.clone());
+    }
+    let in_words = |message: &ResponseFigures| {
+        let us = |ns: Option<u64>| ns.map_or_else(|| "–".to_owned(), table::microseconds);
+        let (max_us, bound_us) = (us(message.max_ns), us(message.bound_ns));
+        format!("{} on bus {} took {max_us} µs, bound {bound_us} µs", message.message, message.bus)
+    };
+    let exceeding: Vec<_> = response.exceeding().map(in_words).collect();
+    if exceeding.is_empty() {
+        let tightest = response.tightest().map_or_else(|| "no message has a bound".to_owned(), in_words);
+        Check::judged(NAME, format!("closest: {tightest}"), response.tightest().is_some())
+    } else {
+        Check::judged(NAME, exceeding.join("; "), false)
+    }
+}
+
+/// Whether too many cycles were missed. When none of them is certainly the rig's doing, there is nothing to judge
+/// it by.
+pub(super) fn missed_cycles(manifest: &Manifest, figures: &Figures) -> CheckResult {
+    let (skipped, by_machine) = figures.skipped();
+    if skipped <= manifest.scenario.checks.missed_cycles {
+        CheckResult::Passed
+    } else if by_machine == skipped {
+        CheckResult::NotJudged
+    } else {
+        CheckResult::Failed
+    }
+}
+
+/// What stretches of work that cost deadlines were held against.
+fn weighed(suspicion: Suspicion) -> String {
+    format!(
+        "; {} stretches of work against {} stalls as long while waiting, {:.1} % of the time at work: chance does so \
+         with probability {:.2}",
+        suspicion.while_working,
+        suspicion.while_waiting,
+        suspicion.work_share * 100.0,
+        suspicion.chance
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_a_failure_is_excused() {
+        let check = |passed| Check::judged("tracking", String::new(), passed);
+        let cases = [(false, true, "skip"), (false, false, "FAIL"), (true, true, "ok"), (true, false, "ok")];
+        for (passed, excused, mark) in cases {
+            assert_eq!(check(passed).unless(excused).result.mark(), mark);
+        }
+    }
+
+    fn response(max_ns: u64, unbounded: Option<&str>) -> BusResponse {
+        let sync = ResponseFigures {
+            bus: 1,
+            message: "SYNC".to_owned(),
+            frames: 1,
+            max_ns: Some(max_ns),
+            bound_ns: Some(190_000),
+        };
+        BusResponse { messages: vec![sync], unbounded: unbounded.map(str::to_owned) }
+    }
+
+    #[test]
+    fn a_message_beyond_its_bound_fails_unless_the_bound_does_not_hold() {
+        let cases = [
+            (190_000, None, false, "ok"),
+            (191_000, None, false, "FAIL"),
+            (191_000, None, true, "skip"),
+            (191_000, Some("bus 0 had 1 errors"), false, "skip"),
+        ];
+        for (max_ns, unbounded, has_faults, mark) in cases {
+            let check = bus_response(&response(max_ns, unbounded), has_faults);
+            assert_eq!(check.result.mark(), mark, "{check:?}");
+        }
+        let failed = bus_response(&response(191_000, None), false);
+        assert_eq!(failed.finding, "SYNC on bus 1 took 191.00 µs, bound 190.00 µs");
+    }
+}
