@@ -103,6 +103,8 @@ impl Outlets {
             Recorded::State(message) => self.state.publish(|place| *place = *message)?,
             Recorded::Truth(message) => self.truth.publish(|place| *place = *message)?,
             Recorded::Frame(message) => self.frames.push(*message),
+            // The logger's own.
+            Recorded::Machine(_) => {}
             Recorded::Event(message) => {
                 let is_of_controller = message.source == Source::Controller.code();
                 self.events[usize::from(!is_of_controller)].publish(|place| *place = *message)?;
@@ -154,7 +156,11 @@ fn start_logger(scenario: &Path, domain: &str, recording: &Path) -> anyhow::Resu
     let mut ready = String::new();
     BufReader::new(logger.stdout.as_mut().context("its output is piped")?).read_line(&mut ready)?;
     let input = logger.stdin.as_mut().context("its input is piped")?;
-    writeln!(input, "{}", serde_json::to_string(&Start { epoch_ns: clock::now_ns() })?)?;
+    writeln!(
+        input,
+        "{}",
+        serde_json::to_string(&Start { epoch_ns: clock::now_ns(), loops: [std::process::id(); 2] })?
+    )?;
     Ok(logger)
 }
 
@@ -211,6 +217,7 @@ fn in_process(cycles: &[Vec<Recorded>], path: &Path) -> anyhow::Result<()> {
             Recorded::State(message) => recorder.record(message, log_time_ns)?,
             Recorded::Truth(message) => recorder.record(message, log_time_ns)?,
             Recorded::Frame(message) => recorder.record(message, log_time_ns)?,
+            Recorded::Machine(message) => recorder.record(message, log_time_ns)?,
             Recorded::Event(message) => recorder.record(message, log_time_ns)?,
         }
         messages += 1;

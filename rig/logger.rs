@@ -3,6 +3,7 @@
 //! It runs at ordinary priority on no core of its own, and judges nothing: whatever is said of a run
 //! is computed from the recording afterwards.
 
+mod machine_watch;
 mod view;
 
 use std::net::SocketAddr;
@@ -17,7 +18,9 @@ use masseter_shared::transport::{BatchInlet, Inlet, Node, TransportError};
 
 use crate::exit::Exit;
 use crate::live::Live;
+use crate::machine::SystemRoot;
 use crate::recording::{Backlog, Pace, Recorded, Recorder, Scene};
+use machine_watch::MachineWatch;
 use view::{Mode, Told, View};
 
 /// How often the topics are drained; a fraction of what their buffers hold.
@@ -51,10 +54,14 @@ pub fn run(assignment: &Assignment, recording: &Path, show: Show) -> anyhow::Res
     let view = View::new(Mode::suitable(show.quiet), rates, show.motion_s, start.epoch_ns);
     let mut takers = Takers { backlog, live, view };
     takers.announce(show.quiet);
+    let mut watch = MachineWatch::new(SystemRoot::of_this_machine(), start.loops, start.epoch_ns);
     loop {
         let last = post.stop.is_made();
         let now_ns = clock::now_ns();
         topics.drain(&mut takers, now_ns)?;
+        if let Some(machine) = watch.look(now_ns) {
+            takers.take(&machine, now_ns, Recorded::Machine);
+        }
         let told = takers.told();
         if last {
             takers.view.end(now_ns, told);

@@ -1,7 +1,7 @@
 //! The cycles that took longest from the plant's deadline to the command on the wire, each with the hop
 //! to blame: the one furthest above its own median.
 
-use masseter_shared::messages::{Command, Reading, State};
+use masseter_shared::messages::{Command, Machine, Reading, State};
 use serde::Serialize;
 
 use super::intervals::IntervalFigures;
@@ -38,6 +38,34 @@ pub struct WorstCycle {
     pub hop_p50_ns: u64,
     /// Time that the machine withheld from both processes since the cycle before, ns.
     pub stalled_ns: u64,
+    /// What the kernel counted around it; none where nobody looked.
+    #[serde(flatten)]
+    pub around: Around,
+}
+
+/// What the kernel counted between the looks before and after a cycle.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
+pub struct Around {
+    /// From one look to the other, ns.
+    pub looked_over_ns: Option<u64>,
+    /// Time that the hypervisor took from all cores meanwhile, as far as it tells, ns.
+    pub stolen_ns: Option<u64>,
+    /// Times that one of the loops had its core taken from it.
+    pub involuntary_switches: Option<u64>,
+    /// Page faults of both processes.
+    pub page_faults: Option<u64>,
+}
+
+impl Around {
+    fn between(before: &Machine, after: &Machine) -> Self {
+        let more = |of: fn(&Machine) -> u64| Some(of(after).saturating_sub(of(before)));
+        Self {
+            looked_over_ns: more(|machine| machine.time_ns),
+            stolen_ns: more(|machine| machine.stolen_ns),
+            involuntary_switches: more(|machine| machine.involuntary_switches.iter().sum()),
+            page_faults: more(|machine| machine.page_faults.iter().sum()),
+        }
+    }
 }
 
 /// What is known of a reading's way.
@@ -74,6 +102,7 @@ pub(super) struct Ledger {
     ups: ByCycle<Up>,
     parts: ByCycle<Parts>,
     worst: Vec<Entry>,
+    looks: Vec<Machine>,
     plant_stalled_ns: u64,
     controller_stalled_ns: u64,
     last_answered: u64,
@@ -110,6 +139,20 @@ impl Ledger {
 
     pub(super) fn command(&mut self, command: &Command) {
         self.add(command.cycle, |parts| parts.published_ns = Some(command.published_ns));
+    }
+
+    pub(super) fn machine(&mut self, machine: &Machine) {
+        self.looks.push(*machine);
+    }
+
+    /// What was counted between the last look before a cycle and the first behind it.
+    fn around(&self, entry: &Entry) -> Around {
+        let after = self.looks.partition_point(|look| look.time_ns < entry.due_ns + entry.total_ns);
+        let before = self.looks.partition_point(|look| look.time_ns <= entry.due_ns);
+        match (before.checked_sub(1), self.looks.get(after)) {
+            (Some(before), Some(after)) => Around::between(&self.looks[before], after),
+            _ => Around::default(),
+        }
     }
 
     /// Adds a part; the last one makes the entry.
@@ -159,11 +202,11 @@ impl Ledger {
         let usual_ns = HOPS.map(|name| {
             intervals.iter().find(|interval| interval.name == name).map_or(0, |interval| interval.p50_ns)
         });
-        self.worst.iter().map(|entry| blame(entry, &usual_ns)).collect()
+        self.worst.iter().map(|entry| blame(entry, &usual_ns, self.around(entry))).collect()
     }
 }
 
-fn blame(entry: &Entry, usual_ns: &[u64; HOPS.len()]) -> WorstCycle {
+fn blame(entry: &Entry, usual_ns: &[u64; HOPS.len()], around: Around) -> WorstCycle {
     let excess_ns = |hop: &usize| entry.hops_ns[*hop].saturating_sub(usual_ns[*hop]);
     let hop = (0..HOPS.len()).max_by_key(excess_ns).expect("there are hops");
     WorstCycle {
@@ -174,6 +217,7 @@ fn blame(entry: &Entry, usual_ns: &[u64; HOPS.len()]) -> WorstCycle {
         hop_ns: entry.hops_ns[hop],
         hop_p50_ns: usual_ns[hop],
         stalled_ns: entry.stalled_ns,
+        around,
     }
 }
 
@@ -233,6 +277,11 @@ mod tests {
             }
             cycle(&mut ledger, number, hops_ns);
         }
+        // Looks every 50 cycles: around the worst 3 ms were stolen, and its loop lost its core twice.
+        for (look, stolen_ns, switches) in [(0, 0, 1), (50, 3_000_000, 3), (100, 3_000_000, 3)] {
+            let (time_ns, involuntary_switches) = (look * PERIOD_NS, [switches, 0]);
+            ledger.machine(&Machine { time_ns, stolen_ns, involuntary_switches, ..Default::default() });
+        }
         let usual = |name: &&'static str| IntervalFigures {
             name,
             n: 99,
@@ -249,6 +298,13 @@ mod tests {
         assert_eq!(worst.len(), WORST);
         assert_eq!((worst[0].cycle, worst[0].hop, worst[0].hop_ns), (40, "forward kinematics", 91_000));
         assert_eq!((worst[1].cycle, worst[1].hop, worst[1].hop_ns), (70, "command transport", 52_000));
+        let around = |stolen_ns, switches| Around {
+            looked_over_ns: Some(50 * PERIOD_NS),
+            stolen_ns: Some(stolen_ns),
+            involuntary_switches: Some(switches),
+            page_faults: Some(0),
+        };
+        assert_eq!((worst[0].around, worst[1].around), (around(3_000_000, 2), around(0, 0)));
         assert!(worst.windows(2).all(|pair| pair[0].total_ns >= pair[1].total_ns));
     }
 }

@@ -34,7 +34,7 @@ pub(crate) use exports::CandumpLogs;
 pub use intervals::IntervalFigures;
 use intervals::Intervals;
 use ledger::Ledger;
-pub use ledger::WorstCycle;
+pub use ledger::{Around, WorstCycle};
 pub use outage::Outage;
 use outage::OutageWatch;
 use over_time::Watch;
@@ -195,6 +195,7 @@ impl Pass {
             Recorded::Truth(truth) => self.truth(truth),
             Recorded::Frame(frame) => self.frame(frame)?,
             Recorded::Event(event) => self.event(event),
+            Recorded::Machine(machine) => self.ledger.machine(machine),
         }
         Ok(())
     }

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use masseter_shared::messages::codes::Source;
-use masseter_shared::messages::{Command, Event, FrameTap, Message, Reading, State, Truth};
+use masseter_shared::messages::{Command, Event, FrameTap, Machine, Message, Reading, State, Truth};
 use serde::Serialize;
 
 use crate::recording::Recorded;
@@ -46,6 +46,7 @@ impl SequenceCheck {
             Recorded::State(state) => self.check(State::TOPIC, 0, state.seq),
             Recorded::Truth(truth) => self.check(Truth::TOPIC, 0, truth.seq),
             Recorded::Frame(frame) => self.check(FrameTap::TOPIC, 0, frame.seq),
+            Recorded::Machine(machine) => self.check(Machine::TOPIC, 0, machine.seq),
             Recorded::Event(event) => self.check(Event::TOPIC, publisher_of(event), event.seq),
         }
     }

@@ -2,7 +2,7 @@
 
 use foxglove::Encode;
 use foxglove::messages::{FrameTransforms, SceneUpdate};
-use masseter_shared::messages::{Command, Event, FrameTap, Message, Reading, State, Truth};
+use masseter_shared::messages::{Command, Event, FrameTap, Machine, Message, Reading, State, Truth};
 
 use super::reader::Schema;
 use super::scene::Scene;
@@ -22,7 +22,7 @@ pub(crate) struct Definition {
 
 impl Definition {
     /// Every channel, always in this order.
-    pub(crate) fn all() -> [Self; 8] {
+    pub(crate) fn all() -> [Self; 9] {
         [
             Self::of_topic::<Command>(),
             Self::of_topic::<Reading>(),
@@ -30,6 +30,7 @@ impl Definition {
             Self::of_topic::<Truth>(),
             Self::of_topic::<FrameTap>(),
             Self::of_topic::<Event>(),
+            Self::of_topic::<Machine>(),
             Self::of_foxglove::<FrameTransforms>(Scene::TRANSFORMS),
             Self::of_foxglove::<SceneUpdate>(Scene::ENTITIES),
         ]

@@ -17,7 +17,7 @@ mod topic;
 mod walk;
 mod writer;
 
-use masseter_shared::messages::{Command, Event, FrameTap, Reading, State, Truth};
+use masseter_shared::messages::{Command, Event, FrameTap, Machine, Reading, State, Truth};
 
 pub use backlog::{Backlog, Outcome, Pace};
 pub(crate) use encoding::{Definition, Encoded, Encoder};
@@ -49,6 +49,8 @@ pub enum Recorded {
     Frame(FrameTap),
     /// An occurrence.
     Event(Event),
+    /// What the kernel counted.
+    Machine(Machine),
 }
 
 impl Recorded {
@@ -61,6 +63,7 @@ impl Recorded {
             Self::Truth(_) => Topic::Truth,
             Self::Frame(_) => Topic::Frame,
             Self::Event(_) => Topic::Event,
+            Self::Machine(_) => Topic::Machine,
         }
     }
 
@@ -73,6 +76,7 @@ impl Recorded {
             Self::Truth(message) => bytemuck::bytes_of(message),
             Self::Frame(message) => bytemuck::bytes_of(message),
             Self::Event(message) => bytemuck::bytes_of(message),
+            Self::Machine(message) => bytemuck::bytes_of(message),
         }
     }
 }

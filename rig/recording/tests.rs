@@ -58,6 +58,7 @@ fn record(recorder: &mut Recorder<&mut Cursor<Vec<u8>>>, message: &Recorded, now
         Recorded::Truth(message) => recorder.record(message, now_ns),
         Recorded::Frame(message) => recorder.record(message, now_ns),
         Recorded::Event(message) => recorder.record(message, now_ns),
+        Recorded::Machine(message) => recorder.record(message, now_ns),
     }
     .unwrap();
 }

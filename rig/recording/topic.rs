@@ -1,6 +1,6 @@
 //! The topics of a recording, and the layout of their messages.
 
-use masseter_shared::messages::{Command, Event, FrameTap, Message, Reading, State, Truth};
+use masseter_shared::messages::{Command, Event, FrameTap, Machine, Message, Reading, State, Truth};
 
 use super::Recorded;
 
@@ -20,12 +20,14 @@ pub enum Topic {
     Frame,
     /// Occurrences.
     Event,
+    /// What the kernel counted.
+    Machine,
 }
 
 impl Topic {
     /// Every topic.
-    pub const ALL: [Self; 6] =
-        [Self::Command, Self::Reading, Self::State, Self::Truth, Self::Frame, Self::Event];
+    pub const ALL: [Self; 7] =
+        [Self::Command, Self::Reading, Self::State, Self::Truth, Self::Frame, Self::Event, Self::Machine];
 
     /// The topic that messages of this type travel on.
     pub fn of<M: Message>() -> Self {
@@ -46,6 +48,7 @@ impl Topic {
             Self::Truth => Truth::TOPIC,
             Self::Frame => FrameTap::TOPIC,
             Self::Event => Event::TOPIC,
+            Self::Machine => Machine::TOPIC,
         }
     }
 
@@ -58,6 +61,7 @@ impl Topic {
             Self::Truth => size_of::<Truth>(),
             Self::Frame => size_of::<FrameTap>(),
             Self::Event => size_of::<Event>(),
+            Self::Machine => size_of::<Machine>(),
         }
     }
 
@@ -70,6 +74,7 @@ impl Topic {
             Self::Truth => Recorded::Truth(bytemuck::pod_read_unaligned(body)),
             Self::Frame => Recorded::Frame(bytemuck::pod_read_unaligned(body)),
             Self::Event => Recorded::Event(bytemuck::pod_read_unaligned(body)),
+            Self::Machine => Recorded::Machine(bytemuck::pod_read_unaligned(body)),
         }
     }
 }

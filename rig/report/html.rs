@@ -150,13 +150,16 @@ fn latencies(page: &mut String, manifest: &Manifest, figures: &Figures) -> std::
 fn worst_cycles(page: &mut String, figures: &Figures) -> std::fmt::Result {
     page.push_str(
         "<h2>Longest cycles, µs</h2>\n<p>From the plant's deadline to the command on the wire, and the hop \
-         furthest above its median.</p>\n<table id=\"worst\">\n\
-         <tr><th>cycle<th>at, s<th>took<th>hop to blame<th>it took<th>its median<th>machine stood still\n",
+         furthest above its median; and what the kernel counted between two looks, a tenth of a second apart: time that \
+         the hypervisor took, times that a loop lost its core, and page faults of both processes.</p>\n\
+         <table id=\"worst\">\n<tr><th>cycle<th>at, s<th>took<th>hop to blame<th>it took<th>its median\
+         <th>machine stood still<th>stolen around<th>preempted<th>page faults\n",
     );
+    let unknown = || "–".to_owned();
     for worst in &figures.worst_cycles {
         writeln!(
             page,
-            "<tr><td>{}<td>{:.3}<td>{}<td>{}<td>{}<td>{}<td>{}",
+            "<tr><td>{}<td>{:.3}<td>{}<td>{}<td>{}<td>{}<td>{}<td>{}<td>{}<td>{}",
             worst.cycle,
             worst.due_ns.saturating_sub(figures.over_time.began_ns) as f64 / 1e9,
             table::microseconds(worst.total_ns),
@@ -164,6 +167,9 @@ fn worst_cycles(page: &mut String, figures: &Figures) -> std::fmt::Result {
             table::microseconds(worst.hop_ns),
             table::microseconds(worst.hop_p50_ns),
             table::microseconds(worst.stalled_ns),
+            worst.around.stolen_ns.map_or_else(unknown, table::microseconds),
+            worst.around.involuntary_switches.map_or_else(unknown, |count| count.to_string()),
+            worst.around.page_faults.map_or_else(unknown, |count| count.to_string()),
         )?;
     }
     page.push_str("</table>\n");

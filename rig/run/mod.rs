@@ -4,6 +4,7 @@
 //! processes, or [`virtual_time`] their cores; then the recording is analysed and the run judged.
 
 pub mod child;
+pub(crate) mod counters;
 pub mod dma_latency;
 pub mod folder;
 pub mod manifest;

@@ -145,8 +145,9 @@ impl Rig {
         let millisecond = SECOND_NS / 1000;
         let earliest = clock::now_ns() + LEAD_NS;
         let epoch_ns = earliest.next_multiple_of(millisecond.max(period_ns)) + OFF_TICK_NS.min(period_ns / 4);
+        let loops = [self.controller.id(), self.plant.id()];
         for process in [&mut self.logger, &mut self.plant, &mut self.controller] {
-            process.start(Start { epoch_ns })?;
+            process.start(Start { epoch_ns, loops })?;
         }
         Ok(epoch_ns)
     }

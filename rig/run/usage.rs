@@ -9,12 +9,11 @@ use std::collections::BTreeMap;
 use masseter_shared::clock::SECOND_NS;
 use serde::{Deserialize, Serialize};
 
+use super::counters::{ProcessCounters, stolen_ns};
 use crate::machine::SystemRoot;
 
 /// From one look to the next, ns.
 const EVERY_NS: u64 = SECOND_NS / 2;
-/// `/proc/stat` counts in hundredths of a second (USER_HZ) on every platform of the rig.
-const TICKS_PER_S: f64 = 100.0;
 
 /// What a process used in its steady state: CPU time and page faults by all its threads, the rest by the main
 /// one, which is its loop.
@@ -50,25 +49,14 @@ pub(super) struct Meter {
     root: SystemRoot,
     next_ns: u64,
     processes: Vec<Metered>,
-    stolen_from_to: Option<[f64; 2]>,
+    stolen_from_to_ns: Option<[u64; 2]>,
 }
 
 #[derive(Debug)]
 struct Metered {
     name: &'static str,
     id: u32,
-    from_to: Option<[Sample; 2]>,
-}
-
-/// The kernel's counters of a process at an instant.
-#[derive(Debug, Clone, Copy)]
-struct Sample {
-    at_ns: u64,
-    cpu_ns: u64,
-    voluntary_switches: u64,
-    involuntary_switches: u64,
-    minor_faults: u64,
-    major_faults: u64,
+    from_to: Option<[ProcessCounters; 2]>,
 }
 
 impl Meter {
@@ -79,7 +67,7 @@ impl Meter {
         processes: impl IntoIterator<Item = (&'static str, u32)>,
     ) -> Self {
         let processes = processes.into_iter().map(|(name, id)| Metered { name, id, from_to: None }).collect();
-        Self { root, next_ns: start_ns + EVERY_NS, processes, stolen_from_to: None }
+        Self { root, next_ns: start_ns + EVERY_NS, processes, stolen_from_to_ns: None }
     }
 
     /// Looks at the processes if it is time to; one that has ended keeps what was seen last.
@@ -89,12 +77,13 @@ impl Meter {
         }
         self.next_ns = now_ns + EVERY_NS;
         for process in &mut self.processes {
-            if let Some(sample) = Sample::of(&self.root, process.id, now_ns) {
+            if let Some(sample) = ProcessCounters::of(&self.root, process.id, now_ns) {
                 process.from_to = Some([process.from_to.map_or(sample, |[from, _]| from), sample]);
             }
         }
-        if let Some(stolen_s) = stolen_s(&self.root) {
-            self.stolen_from_to = Some([self.stolen_from_to.map_or(stolen_s, |[from, _]| from), stolen_s]);
+        if let Some(stolen_ns) = stolen_ns(&self.root) {
+            let from_ns = self.stolen_from_to_ns.map_or(stolen_ns, |[from_ns, _]| from_ns);
+            self.stolen_from_to_ns = Some([from_ns, stolen_ns]);
         }
     }
 
@@ -104,55 +93,25 @@ impl Meter {
             processes: processes
                 .filter_map(|process| {
                     let [from, to] = process.from_to?;
-                    Some((process.name.to_owned(), to.since(&from)))
+                    Some((process.name.to_owned(), Usage::between(&from, &to)))
                 })
                 .collect(),
-            stolen_s: self.stolen_from_to.map_or(0.0, |[from, to]| to - from),
+            stolen_s: self.stolen_from_to_ns.map_or(0.0, |[from_ns, to_ns]| (to_ns - from_ns) as f64 / 1e9),
         }
     }
 }
 
-impl Sample {
-    fn of(root: &SystemRoot, id: u32, at_ns: u64) -> Option<Self> {
-        let status = root.text(&format!("proc/{id}/status"))?;
-        let counter = |name: &str| -> Option<u64> {
-            status.lines().find_map(|line| line.strip_prefix(name))?.trim().parse().ok()
-        };
-        // The name in field 2 may hold blanks; field 3 follows its closing bracket.
-        let stat = root.text(&format!("proc/{id}/stat"))?;
-        let fields: Vec<&str> = stat.rsplit_once(')')?.1.split_whitespace().collect();
-        let field = |number: usize| -> Option<u64> { fields.get(number - 3)?.parse().ok() };
-        let tasks = format!("proc/{id}/task");
-        let cpu_ns = |task: String| -> Option<u64> {
-            root.text(&format!("{tasks}/{task}/schedstat"))?.split_whitespace().next()?.parse().ok()
-        };
-        Some(Self {
-            at_ns,
-            cpu_ns: root.names(&tasks).into_iter().filter_map(cpu_ns).sum(),
-            voluntary_switches: counter("voluntary_ctxt_switches:")?,
-            involuntary_switches: counter("nonvoluntary_ctxt_switches:")?,
-            minor_faults: field(10)?,
-            major_faults: field(12)?,
-        })
-    }
-
-    fn since(&self, from: &Self) -> Usage {
-        Usage {
-            observed_s: (self.at_ns - from.at_ns) as f64 / 1e9,
-            cpu_s: (self.cpu_ns - from.cpu_ns) as f64 / 1e9,
-            voluntary_switches: self.voluntary_switches - from.voluntary_switches,
-            involuntary_switches: self.involuntary_switches - from.involuntary_switches,
-            minor_faults: self.minor_faults - from.minor_faults,
-            major_faults: self.major_faults - from.major_faults,
+impl Usage {
+    fn between(from: &ProcessCounters, to: &ProcessCounters) -> Self {
+        Self {
+            observed_s: (to.at_ns - from.at_ns) as f64 / 1e9,
+            cpu_s: (to.cpu_ns - from.cpu_ns) as f64 / 1e9,
+            voluntary_switches: to.voluntary_switches - from.voluntary_switches,
+            involuntary_switches: to.involuntary_switches - from.involuntary_switches,
+            minor_faults: to.minor_faults - from.minor_faults,
+            major_faults: to.major_faults - from.major_faults,
         }
     }
-}
-
-/// Steal time of all cores since boot, s.
-fn stolen_s(root: &SystemRoot) -> Option<f64> {
-    let stat = root.text("proc/stat")?;
-    let ticks: f64 = stat.strip_prefix("cpu ")?.split_whitespace().nth(7)?.parse().ok()?;
-    Some(ticks / TICKS_PER_S)
 }
 
 #[cfg(test)]

@@ -106,6 +106,8 @@ pub struct Ready {
 pub struct Start {
     /// Time of the first SYNC, ns of `CLOCK_MONOTONIC`.
     pub epoch_ns: u64,
+    /// Process ids of controller and plant, for who watches them.
+    pub loops: [u32; 2],
 }
 
 /// A request to end, as signals make it.

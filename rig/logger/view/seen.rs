@@ -90,7 +90,7 @@ impl Seen {
             Recorded::Frame(frame) => self.frame(frame),
             Recorded::Command(command) => self.count(Topic::Command, command.seq),
             Recorded::Truth(truth) => self.count(Topic::Truth, truth.seq),
-            Recorded::Event(_) => {}
+            Recorded::Event(_) | Recorded::Machine(_) => {}
         }
     }
 

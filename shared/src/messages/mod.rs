@@ -235,6 +235,19 @@ messages! {
         data: [u8; 64],
     }
 
+    /// What the kernel had counted of the machine and of both loops; the logger looks and records it, and it travels
+    /// nowhere.
+    Machine on "machine" keeping 1 {
+        /// When it was looked at, ns.
+        time_ns: u64,
+        /// Time that the hypervisor had taken from all cores together, as far as it tells, ns.
+        stolen_ns: u64,
+        /// Times that the controller's and the plant's loop had had its core taken from it.
+        involuntary_switches: [u64; 2],
+        /// Page faults of the controller and of the plant.
+        page_faults: [u64; 2],
+    }
+
     /// Something that happened once: a change of state, a fault, an alarm.
     Event on "event" keeping 1024 {
         /// When, ns.
