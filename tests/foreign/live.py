@@ -21,8 +21,8 @@ from mcap_ros2.decoder import DecoderFactory as Ros2DecoderFactory
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
-TOPICS = ("command", "reading", "state", "truth", "frame", "event", "/tf", "/scene")
-RARE = ("event", "/tf", "/scene")
+TOPICS = ("command", "reading", "state", "truth", "frame", "event", "machine", "/tf", "/scene")
+RARE = ("event", "machine", "/tf", "/scene")
 DECODED_ONE_IN = 20
 PROTOCOLS = ["foxglove.sdk.v1", "foxglove.websocket.v1"]
 # Opcode, subscription and time, before the message itself.
