@@ -141,8 +141,9 @@ fn parse_time(text: &str) -> Result<u64, CandumpError> {
 fn parse_frame(id: &str, format: FrameFormat, data: &str) -> Result<Frame, CandumpError> {
     let wrong_data = || CandumpError::Data { text: data.to_owned() };
     let (pairs, []) = data.as_bytes().as_chunks::<2>() else { return Err(wrong_data()) };
+    format.check(pairs.len())?;
     let mut bytes = [0; Frame::MAX_DATA];
-    let used = bytes.get_mut(..pairs.len()).ok_or(FrameError::FdDataLength { length: pairs.len() })?;
+    let used = &mut bytes[..pairs.len()];
     for (byte, pair) in used.iter_mut().zip(pairs) {
         let value = str::from_utf8(pair).ok().and_then(|pair| digits(pair, 16));
         *byte = value.ok_or_else(wrong_data)? as u8;

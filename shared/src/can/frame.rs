@@ -57,7 +57,8 @@ impl FrameFormat {
         !matches!(self, Self::Classical)
     }
 
-    fn check(self, length: usize) -> Result<(), FrameError> {
+    /// Refuses lengths that it does not have.
+    pub(super) fn check(self, length: usize) -> Result<(), FrameError> {
         let has_code = FD_LENGTHS.iter().any(|&allowed| usize::from(allowed) == length);
         match self.is_fd() {
             false if length > Frame::MAX_CLASSICAL_DATA => Err(FrameError::DataLength { length }),

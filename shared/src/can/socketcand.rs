@@ -2,7 +2,8 @@
 //!
 //! After `< hi >` a client says `< open can0 >` and `< rawmode >`, gets `< ok >` for each, and from then on
 //! `< frame … >` for every frame on the bus; with `< send … >` it sends one. The modes for broadcast
-//! management, statistics and ISO-TP are not served, nor are remote frames. No sockets here.
+//! management, statistics and ISO-TP are not served, nor are remote frames; a frame in FD format is told like a
+//! classical one. No sockets here.
 //!
 //! Source: linux-can/socketcand, `doc/protocol.md`.
 

@@ -95,8 +95,8 @@ pub fn decode(tap: &FrameTap) -> Result<Tapped, TapError> {
     }
     let length = usize::from(tap.length);
     let format = format_of(tap.flags);
-    let data = tap.data.get(..length).ok_or(FrameError::FdDataLength { length })?;
-    let frame = Frame::with_format(CanId::from_flagged(tap.id)?, format, data)?;
+    format.check(length)?;
+    let frame = Frame::with_format(CanId::from_flagged(tap.id)?, format, &tap.data[..length])?;
     let queued_ns = Some(tap.queued_ns).filter(|&queued_ns| queued_ns > 0);
     Ok(Tapped::Frame(TappedFrame { frame, time_ns: tap.time_ns, queued_ns }))
 }
@@ -133,6 +133,10 @@ mod tests {
     fn what_is_no_frame_is_refused() {
         let tap = FrameTap { length: 9, ..Default::default() };
         assert_eq!(decode(&tap), Err(FrameError::DataLength { length: 9 }.into()));
+        let tap = FrameTap { length: 65, ..Default::default() };
+        assert_eq!(decode(&tap), Err(FrameError::DataLength { length: 65 }.into()));
+        let tap = FrameTap { length: 65, flags: FD, ..Default::default() };
+        assert_eq!(decode(&tap), Err(FrameError::FdDataLength { length: 65 }.into()));
         let tap = FrameTap { id: 0x800, ..Default::default() };
         assert_eq!(decode(&tap), Err(FrameError::StandardId { id: 0x800 }.into()));
         let tap = FrameTap { id: ERROR_FLAG, ..Default::default() };
