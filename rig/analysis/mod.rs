@@ -123,6 +123,12 @@ impl Figures {
         (controller.skipped + plant.skipped, controller.by_machine + plant.by_machine + while_working)
     }
 
+    /// Whether the machine is to blame for every deadline that was skipped.
+    pub fn only_the_machine(&self) -> bool {
+        let (skipped, by_machine) = self.skipped();
+        by_machine == skipped
+    }
+
     /// Messages that were published and not recorded.
     pub fn missing_messages(&self) -> u64 {
         self.topics.iter().map(|topic| topic.missing).sum()

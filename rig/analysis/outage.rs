@@ -12,9 +12,6 @@ use serde::Serialize;
 /// How long before the stop a missed cycle may have led to it.
 const BEFORE_NS: u64 = 100_000_000;
 
-/// A process that comes late counts what it missed in its next message.
-const AFTER_NS: u64 = 10_000_000;
-
 /// How far apart messages of the same time may lie in a recording: the logger drains topic after topic.
 const DISORDER_NS: u64 = 2_000_000_000;
 
@@ -60,12 +57,12 @@ impl OutageWatch {
     /// None without a safe stop.
     pub(super) fn finish(&self, period_ns: u64) -> Option<Outage> {
         let stopped_ns = self.stopped_ns?;
-        let missed = self.controller.before(stopped_ns).max(self.plant.before(stopped_ns));
-        Some(Outage { missed, of: BEFORE_NS / period_ns })
+        let before = |misses: &Misses| misses.before(stopped_ns, period_ns);
+        Some(Outage { missed: before(&self.controller).max(before(&self.plant)), of: BEFORE_NS / period_ns })
     }
 }
 
-/// Recently missed deadlines of a process: when they were counted, and how many.
+/// Deadlines that a process missed around the stop: when it counted them, in its next message, and how many.
 #[derive(Debug, Default)]
 struct Misses {
     counted: u64,
@@ -75,19 +72,23 @@ struct Misses {
 impl Misses {
     fn take(&mut self, at_ns: u64, counted: u64, stopped_ns: Option<u64>) {
         let missed = counted.saturating_sub(std::mem::replace(&mut self.counted, counted));
-        if missed == 0 || stopped_ns.is_some_and(|stopped_ns| at_ns > stopped_ns + AFTER_NS) {
+        if missed == 0 {
             return;
         }
         let is_old = |&(counted_ns, _): &(u64, u64)| counted_ns + BEFORE_NS + DISORDER_NS < at_ns;
-        while self.recent.front().is_some_and(is_old) {
+        while stopped_ns.is_none() && self.recent.front().is_some_and(is_old) {
             self.recent.pop_front();
         }
         self.recent.push_back((at_ns, missed));
     }
 
-    fn before(&self, stopped_ns: u64) -> u64 {
-        let window = stopped_ns.saturating_sub(BEFORE_NS)..=stopped_ns + AFTER_NS;
-        self.recent.iter().filter(|(at_ns, _)| window.contains(at_ns)).map(|(_, missed)| missed).sum()
+    /// The deadlines before the stop among those that were missed in a row until they were counted.
+    fn before(&self, stopped_ns: u64, period_ns: u64) -> u64 {
+        let before = |&(at_ns, missed): &(u64, u64)| {
+            let from_ns = at_ns.saturating_sub(missed * period_ns).max(stopped_ns.saturating_sub(BEFORE_NS));
+            at_ns.min(stopped_ns).saturating_sub(from_ns) / period_ns
+        };
+        self.recent.iter().map(before).sum()
     }
 }
 
@@ -115,14 +116,16 @@ mod tests {
 
     #[test]
     fn only_what_is_missed_just_before_the_stop_explains_it() {
-        let cases: [(Missed, u64, bool); 6] = [
+        let cases: [(Missed, u64, bool); 8] = [
             (&[], 0, false),
             (&[(980, 30)], 30, true),
             (&[(920, 4), (960, 6)], 10, true),
             (&[(920, 4), (960, 5)], 9, false),
             (&[(500, 80)], 0, false),
-            // Counted in the message after the stop, and long after it.
-            (&[(1005, 25), (1500, 400)], 25, true),
+            (&[(950, 80)], 50, true),
+            // Counted in the message after the stop, however late it comes.
+            (&[(1005, 25)], 20, true),
+            (&[(1150, 170), (1500, 200)], 20, true),
         ];
         for (missed, expected, explains) in cases {
             let outage = outage(missed).unwrap();

@@ -127,12 +127,14 @@ fn incomplete(figures: &Figures) -> Option<Judgement> {
 }
 
 /// Whether the machine kept the rig from too many cycles to judge it. A safe stop is excused only when many of them
-/// were missed just before it.
+/// were missed just before it, and is so however many may be missed.
 fn disturbed(manifest: &Manifest, figures: &Figures) -> Option<Judgement> {
-    if missed_cycles(manifest, figures) != CheckResult::NotJudged {
-        return None;
-    }
-    let stop = excuse(&manifest.ending, figures.outage)?;
+    let stop = excuse(
+        &manifest.ending,
+        missed_cycles(manifest, figures),
+        figures.outage,
+        figures.only_the_machine(),
+    )?;
     let (skipped, _) = figures.skipped();
     let (controller, plant) = (&figures.controller_skips, &figures.plant_skips);
     let stalled_ms = (controller.stalled_ns + plant.stalled_ns) as f64 / 1e6;
@@ -160,13 +162,18 @@ fn remedy(manifest: &Manifest) -> &'static str {
 
 /// What excuses the way a disturbed run ended, in words; nothing to say when it ended as it should, none when there is
 /// no excuse.
-fn excuse(ending: &Ending, outage: Option<Outage>) -> Option<String> {
+fn excuse(
+    ending: &Ending,
+    missed: CheckResult,
+    outage: Option<Outage>,
+    only_the_machine: bool,
+) -> Option<String> {
     match (ending, outage) {
-        (Ending::SafeStop, Some(outage)) if outage.explains_the_stop() => {
+        (Ending::SafeStop, Some(outage)) if only_the_machine && outage.explains_the_stop() => {
             Some(format!(", {} of {} just before the safe stop", outage.missed, outage.of))
         }
         (Ending::SafeStop, _) => None,
-        _ => Some(String::new()),
+        _ => (missed == CheckResult::NotJudged).then(String::new),
     }
 }
 
@@ -193,12 +200,26 @@ mod tests {
     }
 
     #[test]
-    fn a_safe_stop_is_excused_only_by_what_was_missed_just_before_it() {
-        let outage = |missed| Some(Outage { missed, of: 100 });
-        assert_eq!(excuse(&Ending::SafeStop, outage(9)), None);
-        assert_eq!(excuse(&Ending::SafeStop, None), None);
-        let said = excuse(&Ending::SafeStop, outage(75)).unwrap();
-        assert_eq!(said, ", 75 of 100 just before the safe stop");
-        assert_eq!(excuse(&Ending::Completed, None).unwrap(), "");
+    fn what_the_machine_did_excuses_missed_cycles_and_a_safe_stop_that_follows_them() {
+        use CheckResult::{Failed, NotJudged, Passed};
+        use Ending::{Completed, SafeStop};
+        let short = Some(Outage { missed: 9, of: 100 });
+        let long = Some(Outage { missed: 75, of: 100 });
+        let explained = Some(", 75 of 100 just before the safe stop");
+        let cases = [
+            (Completed, NotJudged, None, true, Some("")),
+            (Completed, Passed, None, true, None),
+            (Completed, Failed, None, false, None),
+            (SafeStop, NotJudged, long, true, explained),
+            (SafeStop, Passed, long, true, explained),
+            (SafeStop, Passed, long, false, None),
+            (SafeStop, Failed, long, false, None),
+            (SafeStop, NotJudged, short, true, None),
+            (SafeStop, NotJudged, None, true, None),
+        ];
+        for (ending, missed, outage, only_the_machine, expected) in cases {
+            let excuse = excuse(&ending, missed, outage, only_the_machine);
+            assert_eq!(excuse.as_deref(), expected, "{ending:?} {missed:?} {outage:?} {only_the_machine}");
+        }
     }
 }

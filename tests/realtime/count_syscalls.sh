@@ -17,6 +17,9 @@ tracking_limit_m = 1.0
 [can]
 command_timeout_cycles = 5000
 heartbeat_consumer_ms = 5000
+[drives]
+slide.following_error_m = 1.0
+leg.following_error_m = 1.0
 END
 "$masseter" run "$work/patient.toml" --duration 60s --rate-hz $rate_hz --out "$work/run" >"$work/said" 2>&1 &
 rig=$!

@@ -46,6 +46,9 @@ command_timeout_cycles = {silent_cycles}
 [checks]
 missed_cycles = 1000000
 tracking_rms_mm = 1000.0
+[drives]
+slide.following_error_m = 1.0
+leg.following_error_m = 1.0
 """
 
 

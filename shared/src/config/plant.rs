@@ -1,6 +1,8 @@
 //! The CAN link, the drives and the mechanism's dynamics, as a scenario declares them.
 
-use serde::{Deserialize, Serialize};
+use serde::de::Error;
+use serde::{Deserialize, Deserializer, Serialize};
+use toml::Table;
 
 use super::ScenarioError;
 use crate::can::{Bitrate, BitrateError, FrameFormat, Rates};
@@ -168,14 +170,30 @@ pub struct DriveConfig {
     pub encoder_noise_m: f64,
 }
 
-/// The drives of slides and of legs.
+/// The drives of slides and of legs; what a table does not give stays as it is by default.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct DrivesConfig {
     /// Drives of d₁ d₂ d₃.
+    #[serde(deserialize_with = "slide")]
     pub slide: DriveConfig,
     /// Drives of l₁ l₂ l₃.
+    #[serde(deserialize_with = "leg")]
     pub leg: DriveConfig,
+}
+
+fn slide<'de, D: Deserializer<'de>>(table: D) -> Result<DriveConfig, D::Error> {
+    over(DrivesConfig::default().slide, table)
+}
+
+fn leg<'de, D: Deserializer<'de>>(table: D) -> Result<DriveConfig, D::Error> {
+    over(DrivesConfig::default().leg, table)
+}
+
+fn over<'de, D: Deserializer<'de>>(defaults: DriveConfig, given: D) -> Result<DriveConfig, D::Error> {
+    let mut table = Table::try_from(defaults).map_err(Error::custom)?;
+    table.extend(Table::deserialize(given)?);
+    table.try_into().map_err(Error::custom)
 }
 
 impl Default for DrivesConfig {

@@ -211,7 +211,7 @@ fn nearest_key(message: &str) -> Option<&str> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::FileConfig;
+    use crate::config::{DriveConfig, FileConfig};
 
     fn parse(text: &str) -> Result<Scenario, String> {
         let scenario = toml::from_str::<Scenario>(text)
@@ -223,6 +223,14 @@ mod tests {
     #[test]
     fn an_empty_file_is_the_default_run() {
         assert_eq!(parse("").unwrap(), Scenario::default());
+    }
+
+    #[test]
+    fn a_drive_keeps_by_default_what_its_table_does_not_give() {
+        let default = Scenario::default().drives;
+        let drives = parse("[drives.slide]\nfollowing_error_m = 1").unwrap().drives;
+        assert_eq!(drives.slide, DriveConfig { following_error_m: 1.0, ..default.slide });
+        assert_eq!(drives.leg, default.leg);
     }
 
     #[test]
@@ -264,6 +272,7 @@ mod tests {
             ("[can]\ninterfaces = ['can0', 'can0']", "name 2 interfaces"),
             ("[controller]\nease_s = 0.0", "controller.ease_s = 0: use a finite number above 0"),
             ("[checks]\ntracking_rms_mm = inf", "checks.tracking_rms_mm"),
+            ("[drives.leg]\nmax_force = 1.0", "did you mean `max_force_n`?"),
             ("name = ", "s.toml:1"),
             ("[can]\nideal = true\nfd = true", "can.ideal = true: leave it away"),
             ("[can]\nideal = true\ninterfaces = ['a', 'b']", "can.ideal = true: leave it away"),
