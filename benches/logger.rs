@@ -65,14 +65,32 @@ fn cycles_of_a_run(out: &Path) -> anyhow::Result<Vec<Vec<Recorded>>> {
     Ok(cycles.split_off(1500))
 }
 
+/// The messages of a cycle, as a loop that has just computed them has them.
+#[derive(Default)]
+struct AtHand {
+    frames: Vec<FrameTap>,
+    others: Vec<Recorded>,
+}
+
+impl AtHand {
+    fn take(&mut self, cycle: &[Recorded]) {
+        self.frames.clear();
+        self.others.clear();
+        for message in cycle {
+            match message {
+                Recorded::Frame(frame) => self.frames.push(*frame),
+                other => self.others.push(*other),
+            }
+        }
+    }
+}
+
 struct Outlets {
     command: Outlet<CommandMessage>,
     reading: Outlet<Reading>,
     state: Outlet<State>,
     truth: Outlet<Truth>,
     frame: BatchOutlet<FrameTap>,
-    /// Those of a cycle, which travel together.
-    frames: Vec<FrameTap>,
     /// The controller's, and the plant's.
     events: [Outlet<Event>; 2],
 }
@@ -85,15 +103,13 @@ impl Outlets {
             state: node.outlet()?,
             truth: node.outlet()?,
             frame: node.batch_outlet()?,
-            frames: Vec::new(),
             events: [node.outlet()?, node.outlet()?],
         })
     }
 
-    fn publish_cycle(&mut self, cycle: &[Recorded]) -> anyhow::Result<()> {
-        self.frames.clear();
-        cycle.iter().try_for_each(|message| self.publish(message))?;
-        Ok(self.frame.publish(&self.frames)?)
+    fn publish_cycle(&mut self, AtHand { frames, others }: &AtHand) -> anyhow::Result<()> {
+        others.iter().try_for_each(|message| self.publish(message))?;
+        Ok(self.frame.publish(frames)?)
     }
 
     fn publish(&mut self, message: &Recorded) -> anyhow::Result<()> {
@@ -102,9 +118,8 @@ impl Outlets {
             Recorded::Reading(message) => self.reading.publish(|place| *place = *message)?,
             Recorded::State(message) => self.state.publish(|place| *place = *message)?,
             Recorded::Truth(message) => self.truth.publish(|place| *place = *message)?,
-            Recorded::Frame(message) => self.frames.push(*message),
-            // The logger's own.
-            Recorded::Machine(_) => {}
+            // Those of a cycle travel together, and the logger has this topic from nobody.
+            Recorded::Frame(_) | Recorded::Machine(_) => {}
             Recorded::Event(message) => {
                 let is_of_controller = message.source == Source::Controller.code();
                 self.events[usize::from(!is_of_controller)].publish(|place| *place = *message)?;
@@ -178,9 +193,11 @@ fn play(cycles: &[Vec<Recorded>], outlets: &mut Outlets) -> anyhow::Result<(u64,
     let period_ns = SECOND_NS / RATE_HZ;
     let mut pace = Cycle::new(clock::now_ns() + period_ns, period_ns);
     let (mut sent, mut publishing) = (0, Histogram::new(3)?);
+    let mut at_hand = AtHand::default();
     for cycle in cycles.iter().cycle().take((RATE_HZ * SECONDS) as usize) {
+        at_hand.take(cycle);
         let wake = pace.wait();
-        outlets.publish_cycle(cycle)?;
+        outlets.publish_cycle(&at_hand)?;
         let messages = cycle.len().max(1) as u64;
         publishing.record((clock::now_ns() - wake.woke_ns) / messages)?;
         sent += cycle.len() as u64;

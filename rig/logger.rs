@@ -89,6 +89,9 @@ impl Takers {
 
     fn take<M: Message>(&mut self, message: &M, now_ns: u64, of_topic: impl Fn(M) -> Recorded) {
         self.backlog.record(message, now_ns);
+        if self.live.is_none() && !self.view.looks() {
+            return;
+        }
         let message = of_topic(*message);
         self.view.take(&message);
         if let Some(live) = &self.live {

@@ -45,7 +45,7 @@ impl CandumpLogs {
     }
 
     pub(crate) fn write(&mut self, tap: &FrameTap) -> Result<(), AnalysisError> {
-        let bus = usize::from(tap.bus);
+        let bus = tap.bus as usize;
         while self.buses.len() <= bus {
             let next = self.buses.len();
             let interface = self.interfaces.get(next).cloned().unwrap_or_else(|| format!("can{next}"));

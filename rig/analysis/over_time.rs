@@ -80,7 +80,7 @@ impl Watch {
         let tapped = tap::decode(frame).ok();
         if let Some((received, rates)) = tapped.as_ref().and_then(Tapped::frame).zip(self.rates) {
             let busy_ns = rates.duration_ns(wire::frame_bits(&received.frame));
-            self.busy_ns.at(since_ns).add(usize::from(frame.bus), busy_ns);
+            self.busy_ns.at(since_ns).add(frame.bus as usize, busy_ns);
         }
     }
 
@@ -122,6 +122,7 @@ where
 #[cfg(test)]
 mod tests {
     use masseter_shared::can::{Bitrate, CanId, Frame};
+    use masseter_shared::messages::CanData;
 
     use super::*;
 
@@ -129,7 +130,10 @@ mod tests {
     fn a_bus_that_is_half_full_is_said_to_be() {
         let frame = Frame::fixed(CanId::standard(0x123).unwrap(), [0x55; 8]);
         let bits = wire::wire_bits(&frame);
-        let tap = FrameTap { id: 0x123, length: 8, data: [0x55; 64], ..Default::default() };
+        let mut bytes = [0; 64];
+        bytes[..8].fill(0x55);
+        let data = CanData::padded(bytes, 8);
+        let tap = FrameTap { id: 0x123, data, ..Default::default() };
         let mut watch = Watch::on(Some(Rates::classical(Bitrate::new(2 * 1000 * bits).unwrap())));
         for millisecond in 0..1000 {
             watch.frame(&FrameTap { time_ns: millisecond * 1_000_000, ..tap });

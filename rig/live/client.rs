@@ -14,7 +14,7 @@ use tungstenite::protocol::{Message, WebSocket, WebSocketConfig};
 use tungstenite::{Error, accept_hdr_with_config};
 
 use super::protocol::{self, Asked, Level, Subscription};
-use crate::recording::Encoded;
+use crate::recording::{Channel, Encoded};
 
 /// What may wait for a client that reads slowly, bytes: 0.2 s of every topic at 1 kHz.
 const UNREAD_BYTES: usize = 1 << 20;
@@ -36,7 +36,7 @@ pub(super) struct Client {
     /// Turns that the greeting may still take.
     turns: u32,
     /// The client's number for each channel that it sees.
-    subscriptions: Vec<Option<u32>>,
+    subscriptions: [Option<u32>; Channel::COUNT],
 }
 
 enum Link {
@@ -51,7 +51,7 @@ pub(super) struct Gone;
 
 impl Client {
     /// Takes a new connection in.
-    pub(super) fn welcome(stream: TcpStream, channels: usize, welcome: &[String]) -> Result<Self, Gone> {
+    pub(super) fn welcome(stream: TcpStream, welcome: &[String]) -> Result<Self, Gone> {
         prepare(&stream).map_err(|_| Gone)?;
         let config = WebSocketConfig::default()
             .read_buffer_size(LONGEST_ASKED)
@@ -60,8 +60,8 @@ impl Client {
             .max_message_size(Some(LONGEST_ASKED))
             .max_frame_size(Some(LONGEST_ASKED));
         let greeting: Greeting = greet;
-        let subscriptions = vec![None; channels];
-        let mut client = Self { link: Link::Greeted(None), turns: GREETING_TURNS, subscriptions };
+        let mut client =
+            Self { link: Link::Greeted(None), turns: GREETING_TURNS, subscriptions: [None; Channel::COUNT] };
         client.greeted(accept_hdr_with_config(stream, greeting, Some(config)), welcome)?;
         Ok(client)
     }
@@ -85,8 +85,8 @@ impl Client {
     }
 
     /// Whether the client sees a channel.
-    pub(super) fn sees(&self, channel: usize) -> bool {
-        self.subscriptions[channel].is_some()
+    pub(super) fn sees(&self, channel: Channel) -> bool {
+        self.subscriptions[channel.place()].is_some()
     }
 
     /// Goes on greeting, or hears what the client asks.
@@ -124,19 +124,19 @@ impl Client {
     }
 
     fn subscribe(&mut self, subscription: Subscription) -> Result<(), Gone> {
-        let Some(channel) = subscription.channel(self.subscriptions.len()) else {
+        let Some(place) = subscription.place() else {
             return self.say(protocol::status(Level::Error, "there is no such channel"));
         };
-        if self.sees(channel) {
+        if self.subscriptions[place].is_some() {
             return self.say(protocol::status(Level::Warning, "this channel is subscribed already"));
         }
-        self.subscriptions[channel] = Some(subscription.id);
+        self.subscriptions[place] = Some(subscription.id);
         Ok(())
     }
 
     /// Sends a message if the client sees its channel. False if there was no room for it.
-    pub(super) fn show(&mut self, channel: usize, log_time_ns: u64, message: &Encoded) -> Result<bool, Gone> {
-        match self.subscriptions[channel] {
+    pub(super) fn show(&mut self, log_time_ns: u64, message: &Encoded) -> Result<bool, Gone> {
+        match self.subscriptions[message.channel.place()] {
             Some(id) => self.send(Message::Binary(protocol::message_data(id, log_time_ns, message).into())),
             None => Ok(true),
         }

@@ -7,7 +7,7 @@
 use data_encoding::BASE64;
 use serde::{Deserialize, Serialize};
 
-use crate::recording::{Definition, Encoded};
+use crate::recording::{Channel, Definition, Encoded};
 
 /// Names of the protocol that clients ask for, the current one first. What is used here is alike in all.
 const SUBPROTOCOLS: [&str; 2] = ["foxglove.sdk.v1", "foxglove.websocket.v1"];
@@ -32,13 +32,13 @@ pub(super) enum Level {
 #[serde(tag = "op", rename_all = "camelCase", rename_all_fields = "camelCase")]
 enum Said<'a> {
     ServerInfo { name: &'a str, capabilities: [&'a str; 0], session_id: &'a str },
-    Advertise { channels: Vec<Channel<'a>> },
+    Advertise { channels: Vec<Advertised<'a>> },
     Status { level: u8, message: &'a str },
 }
 
 #[derive(Serialize)]
 #[serde(rename_all = "camelCase")]
-struct Channel<'a> {
+struct Advertised<'a> {
     id: u64,
     topic: &'a str,
     encoding: &'a str,
@@ -70,8 +70,8 @@ pub(super) struct Subscription {
 
 impl Subscription {
     /// Place of the channel in [`Definition::all`], if there is such a one.
-    pub(super) fn channel(self, channels: usize) -> Option<usize> {
-        usize::try_from(self.channel_id).ok().filter(|channel| *channel < channels)
+    pub(super) fn place(self) -> Option<usize> {
+        usize::try_from(self.channel_id).ok().filter(|place| *place < Channel::COUNT)
     }
 }
 
@@ -86,13 +86,13 @@ pub(super) fn advertise(definitions: &[Definition]) -> String {
     in_json(&Said::Advertise { channels: channels.collect() })
 }
 
-fn channel(id: usize, Definition { topic, schema, message_encoding }: &Definition) -> Channel<'_> {
+fn channel(id: usize, Definition { topic, schema, message_encoding }: &Definition) -> Advertised<'_> {
     // JSON holds no bytes: schemas that are text go as they are, compiled ones in base 64.
     let text = match schema.encoding.as_str() {
         "protobuf" => BASE64.encode(&schema.data),
         _ => String::from_utf8_lossy(&schema.data).into_owned(),
     };
-    Channel {
+    Advertised {
         id: id as u64,
         topic,
         encoding: message_encoding,
@@ -126,6 +126,7 @@ mod tests {
     use serde_json::{Value, json};
 
     use super::*;
+    use crate::recording::Topic;
 
     #[test]
     fn the_newest_protocol_that_both_know_is_spoken() {
@@ -158,8 +159,9 @@ mod tests {
         let ask = |text: &str| serde_json::from_str::<Asked>(text);
         let subscribe = json!({"op": "subscribe", "subscriptions": [{"id": 7, "channelId": 2}]});
         let Ok(Asked::Subscribe { subscriptions }) = ask(&subscribe.to_string()) else { panic!() };
-        assert_eq!((subscriptions[0].id, subscriptions[0].channel(8)), (7, Some(2)));
-        assert_eq!(subscriptions[0].channel(2), None);
+        assert_eq!((subscriptions[0].id, subscriptions[0].place()), (7, Some(2)));
+        let beyond = Subscription { id: 7, channel_id: Channel::COUNT as u64 };
+        assert_eq!(beyond.place(), None);
         let unsubscribe = r#"{"op": "unsubscribe", "subscriptionIds": [7]}"#;
         assert_eq!(ask(unsubscribe).unwrap(), Asked::Unsubscribe { subscription_ids: vec![7] });
         assert_eq!(ask(r#"{"op": "getParameters", "parameterNames": []}"#).unwrap(), Asked::Other);
@@ -168,7 +170,12 @@ mod tests {
 
     #[test]
     fn a_message_is_opcode_subscription_time_and_bytes() {
-        let message = Encoded { topic: "state", sequence: 1, publish_time_ns: 2, bytes: &[0xaa, 0xbb] };
+        let message = Encoded {
+            channel: Channel::Topic(Topic::State),
+            sequence: 1,
+            publish_time_ns: 2,
+            bytes: &[0xaa, 0xbb],
+        };
         let data = message_data(0x0102_0304, 5, &message);
         assert_eq!(data, [1, 4, 3, 2, 1, 5, 0, 0, 0, 0, 0, 0, 0, 0xaa, 0xbb]);
     }

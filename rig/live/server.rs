@@ -13,7 +13,7 @@ use masseter_shared::clock;
 
 use super::client::{Client, Gone};
 use super::{Offer, QUEUE, Shared, bit, protocol};
-use crate::recording::{Definition, Encoded, Encoder, Scene, Topic};
+use crate::recording::{Channel, Definition, Encoded, Encoder, Scene, Topic};
 
 /// How often clients are served.
 const TURN: Duration = Duration::from_millis(10);
@@ -26,7 +26,6 @@ const CLIENTS: usize = 8;
 pub(super) struct Server {
     listener: TcpListener,
     encoder: Encoder,
-    topics: Vec<&'static str>,
     /// What every client is told first.
     welcome: [String; 2],
     clients: Vec<Client>,
@@ -39,7 +38,6 @@ impl Server {
         Self {
             listener,
             encoder: Encoder::new(scene),
-            topics: definitions.iter().map(|definition| definition.topic).collect(),
             welcome: [protocol::server_info(session), protocol::advertise(&definitions)],
             clients: Vec::new(),
             shared,
@@ -65,7 +63,7 @@ impl Server {
     fn admit(&mut self) {
         while let Ok((stream, _)) = self.listener.accept() {
             if self.clients.len() < CLIENTS {
-                self.clients.extend(Client::welcome(stream, self.topics.len(), &self.welcome));
+                self.clients.extend(Client::welcome(stream, &self.welcome));
             }
         }
     }
@@ -78,9 +76,8 @@ impl Server {
 
     /// Lets the logger know what is worth offering.
     fn publish_wants(&self) {
-        let is_seen = |topic: &str| self.clients.iter().any(|client| client.sees(place(&self.topics, topic)));
-        let wanted =
-            Topic::ALL.into_iter().filter(|topic| Encoder::channels_of(*topic).into_iter().any(is_seen));
+        let is_seen = |channel: Channel| self.clients.iter().any(|client| client.sees(channel));
+        let wanted = Topic::ALL.into_iter().filter(|topic| Channel::of(*topic).into_iter().any(is_seen));
         self.shared.wanted.store(wanted.fold(0, |bits, topic| bits | bit(topic)), Ordering::Relaxed);
         self.shared.clients.store(self.clients.len(), Ordering::Relaxed);
     }
@@ -98,10 +95,9 @@ impl Server {
     }
 
     fn show(&mut self, Offer { log_time_ns, message }: &Offer) {
-        let Self { encoder, topics, clients, shared, .. } = self;
+        let Self { encoder, clients, shared, .. } = self;
         let to_all = |message: Encoded| -> Result<(), Infallible> {
-            let channel = place(topics, message.topic);
-            clients.retain_mut(|client| match client.show(channel, *log_time_ns, &message) {
+            clients.retain_mut(|client| match client.show(*log_time_ns, &message) {
                 Ok(true) => true,
                 Ok(false) => {
                     shared.dropped.fetch_add(1, Ordering::Relaxed);
@@ -113,9 +109,4 @@ impl Server {
         };
         let Ok(()) = encoder.encode(message.topic(), message.body(), to_all);
     }
-}
-
-/// Place of a channel among those that were advertised.
-fn place(topics: &[&str], topic: &str) -> usize {
-    topics.iter().position(|known| *known == topic).expect("every topic is advertised")
 }

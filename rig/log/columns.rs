@@ -1,7 +1,8 @@
 //! Messages as lines of a table, by the ROS 2 definition that the recording itself carries: so messages of
 //! other versions become tables too.
 //!
-//! Numbers and arrays of fixed length only; a definition with anything else makes no table.
+//! Numbers, arrays of fixed length, and bytes of any number at the end only; a definition with anything else makes no
+//! table.
 
 use std::fmt::Write;
 
@@ -51,6 +52,14 @@ impl Kind {
     }
 }
 
+/// What stands before bytes of any number, and says how many they are.
+const LENGTH: Kind = Kind::Unsigned(4);
+
+/// Whether the type of a field is bytes of any number, with or without a bound.
+fn is_bytes(kind: &str) -> bool {
+    kind.strip_prefix("uint8[").is_some_and(|bound| bound == "]" || bound.starts_with("<="))
+}
+
 /// One column: a field, or an element of one.
 #[derive(Debug, Clone, PartialEq, Eq)]
 struct Column {
@@ -63,14 +72,17 @@ struct Column {
 /// The table of a message definition.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Columns {
-    columns: Vec<Column>,
+    fixed: Vec<Column>,
+    /// Bytes of all of them.
     bytes: usize,
+    /// Name of the bytes at the end, whose number stands before them: a column in hexadecimal digits.
+    tail: Option<String>,
 }
 
 impl Columns {
     /// Reads a definition; none where it holds more than numbers.
     pub(super) fn of(definition: &str) -> Option<Self> {
-        let mut table = Self { columns: Vec::new(), bytes: 0 };
+        let mut table = Self { fixed: Vec::new(), bytes: 0, tail: None };
         for line in definition.lines().map(|line| line.split('#').next().unwrap_or_default().trim()) {
             if !line.is_empty() {
                 table.add_field(line)?;
@@ -81,6 +93,14 @@ impl Columns {
 
     fn add_field(&mut self, line: &str) -> Option<()> {
         let (kind, name) = line.split_once(char::is_whitespace)?;
+        if self.tail.is_some() {
+            return None;
+        }
+        if is_bytes(kind) {
+            self.bytes = self.bytes.next_multiple_of(LENGTH.size()) + LENGTH.size();
+            self.tail = Some(name.trim().to_owned());
+            return Some(());
+        }
         let (kind, elements) = match kind.split_once('[') {
             Some((kind, length)) => (kind, Some(length.strip_suffix(']')?.parse::<usize>().ok()?)),
             None => (kind, None),
@@ -91,7 +111,7 @@ impl Columns {
         for element in 0..elements.unwrap_or(1) {
             let name = name.trim();
             let name = if elements.is_some() { format!("{name}_{element}") } else { name.to_owned() };
-            self.columns.push(Column { name, kind, at: self.bytes });
+            self.fixed.push(Column { name, kind, at: self.bytes });
             self.bytes += kind.size();
         }
         Some(())
@@ -99,19 +119,29 @@ impl Columns {
 
     /// The names, separated by commas.
     pub(super) fn header(&self) -> String {
-        self.columns.iter().map(|column| column.name.as_str()).collect::<Vec<_>>().join(",")
+        let names = self.fixed.iter().map(|column| &column.name).chain(&self.tail);
+        names.map(String::as_str).collect::<Vec<_>>().join(",")
     }
 
     /// Appends the values of a message; false where its length is not the definition's.
     pub(super) fn write(&self, line: &mut String, body: &[u8]) -> bool {
-        if body.len() != self.bytes {
+        let Some((fixed, tail)) = body.split_at_checked(self.bytes) else { return false };
+        let is_whole = match self.tail {
+            Some(_) => fixed.ends_with(&(tail.len() as u32).to_le_bytes()),
+            None => tail.is_empty(),
+        };
+        if !is_whole {
             return false;
         }
-        for (index, column) in self.columns.iter().enumerate() {
+        for (index, column) in self.fixed.iter().enumerate() {
             if index > 0 {
                 line.push(',');
             }
             column.kind.write(line, &body[column.at..]);
+        }
+        if self.tail.is_some() {
+            line.push(',');
+            tail.iter().try_for_each(|byte| write!(line, "{byte:02X}")).expect("a string takes any text");
         }
         true
     }
@@ -119,23 +149,25 @@ impl Columns {
 
 #[cfg(test)]
 mod tests {
-    use masseter_shared::messages::{FrameTap, Message, Reading};
+    use masseter_shared::messages::{CanData, FrameTap, Message, Reading};
 
     use super::*;
 
     #[test]
     fn a_message_of_ours_becomes_a_line() {
         let columns = Columns::of(&FrameTap::schema()).unwrap();
-        let data = [7; 64];
-        let frame = FrameTap { seq: 3, id: 0x181, bus: 1, length: 2, data, ..Default::default() };
-        let mut line = String::new();
-        assert!(columns.write(&mut line, bytemuck::bytes_of(&frame)));
-        assert_eq!(line, "3,0,0,0,0,385,1,2,0".to_owned() + &",7".repeat(data.len()));
-        assert!(
-            columns
-                .header()
-                .starts_with("seq,published_ns,version,time_ns,queued_ns,id,bus,length,flags,data_0,")
-        );
+        assert_eq!(columns.header(), "seq,published_ns,version,time_ns,queued_ns,id,bus,flags,data");
+        let mut bytes = [0; 64];
+        for length in 0..3 {
+            let data = CanData::padded(bytes, length);
+            let frame = FrameTap { seq: 3, id: 0x181, bus: 1, data, ..Default::default() };
+            let mut line = String::new();
+            assert!(columns.write(&mut line, frame.body()));
+            assert_eq!(line, "3,0,0,0,0,385,1,0,".to_owned() + &"AA".repeat(length));
+            assert!(!columns.write(&mut line, &frame.body()[..frame.body().len() - 1]));
+            assert!(!columns.write(&mut line, &[frame.body(), &[0]].concat()));
+            bytes[length] = 0xAA;
+        }
         assert_eq!(Columns::of(&Reading::schema()).unwrap().bytes, size_of::<Reading>());
     }
 
@@ -155,7 +187,13 @@ mod tests {
 
     #[test]
     fn what_is_no_table_is_refused() {
-        for definition in ["string name", "float64[] values", "geometry_msgs/Pose pose", "uint8"] {
+        for definition in [
+            "string name",
+            "float64[] values",
+            "uint8[] data\nuint8 more",
+            "geometry_msgs/Pose pose",
+            "uint8",
+        ] {
             assert_eq!(Columns::of(definition), None, "{definition}");
         }
         let mut line = String::new();

@@ -83,9 +83,14 @@ impl View {
         Self { mode, seen: Seen::new(rates), motion_s, shown_ns: now_ns, standing: 0 }
     }
 
+    /// Whether anything is to be shown.
+    pub(super) fn looks(&self) -> bool {
+        self.mode != Mode::Quiet
+    }
+
     /// Looks at a message.
     pub(super) fn take(&mut self, message: &Recorded) {
-        if self.mode != Mode::Quiet {
+        if self.looks() {
             self.seen.take(message);
         }
     }

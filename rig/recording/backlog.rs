@@ -8,13 +8,16 @@
 mod tests;
 
 use std::io::{Seek, Write};
+use std::mem::offset_of;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TryRecvError, TrySendError, sync_channel};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
+use bytemuck::{Pod, Zeroable, bytes_of, pod_read_unaligned};
 use masseter_shared::clock::{self, SECOND_NS};
 use masseter_shared::messages::Message;
 
+use super::CDR_LITTLE_ENDIAN;
 use super::topic::Topic;
 use super::writer::{Recorder, WriteError};
 
@@ -47,7 +50,18 @@ impl Pace {
     }
 }
 
-/// Messages on their way to the disk: topic, log time and body of each, one behind the other.
+/// What stands before each message's body in a batch.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+struct Head {
+    log_time_ns: u64,
+    topic: u16,
+    body_bytes: u16,
+    /// With the body behind it, it makes the message CDR.
+    encapsulation: [u8; 4],
+}
+
+/// Messages on their way to the disk, one behind the other.
 #[derive(Debug, Default)]
 struct Batch {
     bytes: Vec<u8>,
@@ -56,14 +70,15 @@ struct Batch {
 
 impl Batch {
     fn push(&mut self, topic: Topic, log_time_ns: u64, body: &[u8]) {
-        self.bytes.push(topic as u8);
-        self.bytes.extend_from_slice(&log_time_ns.to_le_bytes());
+        let (topic, body_bytes) = (topic as u16, body.len() as u16);
+        let head = Head { log_time_ns, topic, body_bytes, encapsulation: CDR_LITTLE_ENDIAN };
+        self.bytes.extend_from_slice(bytes_of(&head));
         self.bytes.extend_from_slice(body);
         self.messages += 1;
     }
 
     fn bytes_with(&self, body: &[u8]) -> usize {
-        self.bytes.len() + 1 + size_of::<u64>() + body.len()
+        self.bytes.len() + size_of::<Head>() + body.len()
     }
 
     fn clear(&mut self) {
@@ -73,12 +88,11 @@ impl Batch {
 
     fn write_to<W: Write + Seek>(&self, recorder: &mut Recorder<W>) -> Result<(), WriteError> {
         let mut rest = self.bytes.as_slice();
-        while let Some((&topic, behind)) = rest.split_first() {
-            let topic = Topic::ALL[usize::from(topic)];
-            let (time, behind) = behind.split_at(size_of::<u64>());
-            let (body, behind) = behind.split_at(topic.body_bytes());
-            let log_time_ns = u64::from_le_bytes(time.try_into().expect("eight bytes"));
-            recorder.record_body(topic, body, log_time_ns)?;
+        while let Some(head) = rest.get(..size_of::<Head>()) {
+            let head: Head = pod_read_unaligned(head);
+            let (message, behind) = rest.split_at(size_of::<Head>() + usize::from(head.body_bytes));
+            let cdr = &message[offset_of!(Head, encapsulation)..];
+            recorder.record_cdr(Topic::ALL[usize::from(head.topic)], cdr, head.log_time_ns)?;
             rest = behind;
         }
         Ok(())
@@ -118,7 +132,7 @@ impl Backlog {
 
     /// Takes a message that was received at `log_time_ns`, if there is room for it or time to wait.
     pub fn record<M: Message>(&mut self, message: &M, log_time_ns: u64) {
-        let body = bytemuck::bytes_of(message);
+        let body = message.body();
         self.offered += 1;
         if !self.has_room_for(body) {
             match self.pace {

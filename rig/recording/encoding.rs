@@ -9,6 +9,40 @@ use super::scene::Scene;
 use super::topic::{Stamps, Topic};
 use super::{CDR_LITTLE_ENDIAN, MESSAGE_ENCODING, SCHEMA_ENCODING};
 
+/// What messages stand on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Channel {
+    /// The rig's own messages.
+    Topic(Topic),
+    /// Where things are, for a 3-D view.
+    Transforms,
+    /// What they look like.
+    Entities,
+}
+
+impl Channel {
+    /// How many there are.
+    pub(crate) const COUNT: usize = Topic::ALL.len() + 2;
+
+    /// Its place in [`Definition::all`].
+    pub(crate) fn place(self) -> usize {
+        match self {
+            Self::Topic(topic) => topic as usize,
+            Self::Transforms => Topic::ALL.len(),
+            Self::Entities => Topic::ALL.len() + 1,
+        }
+    }
+
+    /// The channels that a topic's messages come to stand on.
+    pub(crate) fn of(topic: Topic) -> Vec<Self> {
+        match topic {
+            Topic::State => vec![Self::Topic(topic), Self::Transforms],
+            Topic::Truth => vec![Self::Topic(topic), Self::Transforms, Self::Entities],
+            _ => vec![Self::Topic(topic)],
+        }
+    }
+}
+
 /// A channel as it is told to readers.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Definition {
@@ -22,7 +56,7 @@ pub(crate) struct Definition {
 
 impl Definition {
     /// Every channel, always in this order.
-    pub(crate) fn all() -> [Self; 9] {
+    pub(crate) fn all() -> [Self; Channel::COUNT] {
         [
             Self::of_topic::<Command>(),
             Self::of_topic::<Reading>(),
@@ -56,8 +90,8 @@ impl Definition {
 /// A message as it stands on its channel.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Encoded<'a> {
-    /// The channel's topic.
-    pub topic: &'static str,
+    /// Its channel.
+    pub channel: Channel,
     /// Its number; 0 on channels that count nothing.
     pub sequence: u32,
     /// When it was published, ns.
@@ -70,39 +104,45 @@ pub(crate) struct Encoded<'a> {
 #[derive(Debug)]
 pub(crate) struct Encoder {
     scene: Scene,
-    bytes: Vec<u8>,
+    cdr: Vec<u8>,
+    protobuf: Vec<u8>,
 }
 
 impl Encoder {
     pub(crate) fn new(scene: Scene) -> Self {
-        Self { scene, bytes: Vec::new() }
+        Self { scene, cdr: Vec::new(), protobuf: Vec::new() }
     }
 
-    /// The channels that a topic's messages come to stand on.
-    pub(crate) fn channels_of(topic: Topic) -> Vec<&'static str> {
-        match topic {
-            Topic::State => vec![topic.name(), Scene::TRANSFORMS],
-            Topic::Truth => vec![topic.name(), Scene::TRANSFORMS, Scene::ENTITIES],
-            _ => vec![topic.name()],
-        }
-    }
-
-    /// Hands `put` the message of a topic that lies in `body`, and what a 3-D view shows of it.
+    /// Hands `put` the message of a topic that has this body, and what a 3-D view shows of it.
     pub(crate) fn encode<E>(
         &mut self,
         topic: Topic,
         body: &[u8],
+        put: impl FnMut(Encoded) -> Result<(), E>,
+    ) -> Result<(), E> {
+        let mut cdr = std::mem::take(&mut self.cdr);
+        cdr.clear();
+        cdr.extend_from_slice(&CDR_LITTLE_ENDIAN);
+        cdr.extend_from_slice(body);
+        let result = self.encode_cdr(topic, &cdr, put);
+        self.cdr = cdr;
+        result
+    }
+
+    /// The same for a message that is CDR already.
+    pub(super) fn encode_cdr<E>(
+        &mut self,
+        topic: Topic,
+        cdr: &[u8],
         mut put: impl FnMut(Encoded) -> Result<(), E>,
     ) -> Result<(), E> {
-        self.bytes.clear();
-        self.bytes.extend_from_slice(&CDR_LITTLE_ENDIAN);
-        self.bytes.extend_from_slice(body);
+        let body = &cdr[CDR_LITTLE_ENDIAN.len()..];
         let stamps = Stamps::read(body).expect("every message begins with its stamps");
         put(Encoded {
-            topic: topic.name(),
+            channel: Channel::Topic(topic),
             sequence: stamps.seq as u32,
             publish_time_ns: stamps.published_ns,
-            bytes: &self.bytes,
+            bytes: cdr,
         })?;
         self.show(topic, body, put)
     }
@@ -120,18 +160,36 @@ impl Encoder {
             _ => return Ok(()),
         };
         let Some(shown) = shown else { return Ok(()) };
-        put(self.foxglove(Scene::TRANSFORMS, &shown.transforms, shown.time_ns))?;
+        put(self.foxglove(Channel::Transforms, &shown.transforms, shown.time_ns))?;
         match &shown.entities {
-            Some(entities) => put(self.foxglove(Scene::ENTITIES, entities, shown.time_ns)),
+            Some(entities) => put(self.foxglove(Channel::Entities, entities, shown.time_ns)),
             None => Ok(()),
         }
     }
 
-    fn foxglove(&mut self, topic: &'static str, message: &impl Encode, publish_time_ns: u64) -> Encoded<'_> {
-        self.bytes.clear();
-        if message.encode(&mut self.bytes).is_err() {
+    fn foxglove(&mut self, channel: Channel, message: &impl Encode, publish_time_ns: u64) -> Encoded<'_> {
+        self.protobuf.clear();
+        if message.encode(&mut self.protobuf).is_err() {
             unreachable!("protobuf refuses only buffers that cannot grow");
         }
-        Encoded { topic, sequence: 0, publish_time_ns, bytes: &self.bytes }
+        Encoded { channel, sequence: 0, publish_time_ns, bytes: &self.protobuf }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_channel_stands_at_its_place() {
+        let definitions = Definition::all();
+        let mut found = Vec::new();
+        for topic in Topic::ALL {
+            assert_eq!(definitions[Channel::Topic(topic).place()].topic, topic.name());
+            found.extend(Channel::of(topic));
+        }
+        assert_eq!(definitions[Channel::Transforms.place()].topic, Scene::TRANSFORMS);
+        assert_eq!(definitions[Channel::Entities.place()].topic, Scene::ENTITIES);
+        assert!((0..definitions.len()).all(|place| found.iter().any(|channel| channel.place() == place)));
     }
 }

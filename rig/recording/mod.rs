@@ -1,6 +1,6 @@
 //! The recording of a run: an MCAP file with every message of every topic.
 //!
-//! A message's bytes are written as they lay in shared memory, behind the four bytes that make them
+//! A message's body is written as it lay in shared memory, behind the four bytes that make them
 //! CDR, under a ROS 2 message definition: MCAP tools read them without knowing Masseter. Beside them
 //! stands the mechanism in Foxglove's own schemas, for 3-D views. Chunks are compressed by zstd and carry
 //! checksums, so that any of them can be read without the others.
@@ -17,10 +17,10 @@ mod topic;
 mod walk;
 mod writer;
 
-use masseter_shared::messages::{Command, Event, FrameTap, Machine, Reading, State, Truth};
+use masseter_shared::messages::{Command, Event, FrameTap, Machine, Message, Reading, State, Truth};
 
 pub use backlog::{Backlog, Outcome, Pace};
-pub(crate) use encoding::{Definition, Encoded, Encoder};
+pub(crate) use encoding::{Channel, Definition, Encoded, Encoder};
 pub use reader::{Chunks, Entry, ReadError, Reader, Schema};
 pub use recover::{RecoverError, Recovered, recover};
 pub use scene::Scene;
@@ -67,16 +67,16 @@ impl Recorded {
         }
     }
 
-    /// Its bytes, as they lay in shared memory.
+    /// Its body, as it lay in shared memory.
     pub fn body(&self) -> &[u8] {
         match self {
-            Self::Command(message) => bytemuck::bytes_of(message),
-            Self::Reading(message) => bytemuck::bytes_of(message),
-            Self::State(message) => bytemuck::bytes_of(message),
-            Self::Truth(message) => bytemuck::bytes_of(message),
-            Self::Frame(message) => bytemuck::bytes_of(message),
-            Self::Event(message) => bytemuck::bytes_of(message),
-            Self::Machine(message) => bytemuck::bytes_of(message),
+            Self::Command(message) => message.body(),
+            Self::Reading(message) => message.body(),
+            Self::State(message) => message.body(),
+            Self::Truth(message) => message.body(),
+            Self::Frame(message) => message.body(),
+            Self::Event(message) => message.body(),
+            Self::Machine(message) => message.body(),
         }
     }
 }

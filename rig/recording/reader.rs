@@ -35,15 +35,15 @@ pub enum ReadError {
     },
     /// A topic's message does not have this version's layout.
     #[error(
-        "topic '{topic}' holds messages of {found} bytes, layout version {version}; \
-         this program reads {expected} bytes, version {LAYOUT_VERSION}"
+        "topic '{topic}' holds a message of {found} bytes, layout version {version}; \
+         this program reads up to {expected} bytes, version {LAYOUT_VERSION}"
     )]
     Foreign {
         /// The topic.
         topic: &'static str,
         /// Bytes found.
         found: usize,
-        /// Bytes expected.
+        /// Bytes of the longest that is read.
         expected: usize,
         /// Layout version found.
         version: u64,
@@ -262,7 +262,7 @@ impl Entry<'_> {
     /// The message itself, or why this program cannot read it; none on topics that are not the rig's.
     pub fn recorded(&self) -> Option<Result<Recorded, ReadError>> {
         let topic = Topic::named(&self.channel?.topic)?;
-        Some(body(topic, self.data).map(|body| topic.read(body)))
+        Some(read(topic, self.data))
     }
 }
 
@@ -285,12 +285,12 @@ impl Definitions {
 }
 
 /// The message of a topic behind the CDR header, if it has this version's layout.
-fn body(topic: Topic, data: &[u8]) -> Result<&[u8], ReadError> {
-    let expected = CDR_LITTLE_ENDIAN.len() + topic.body_bytes();
+fn read(topic: Topic, data: &[u8]) -> Result<Recorded, ReadError> {
     let body = data.strip_prefix(&CDR_LITTLE_ENDIAN);
     let version = body.and_then(Stamps::read).map_or(0, |stamps| stamps.version);
-    match body {
-        Some(body) if data.len() == expected && version == LAYOUT_VERSION => Ok(body),
-        _ => Err(ReadError::Foreign { topic: topic.name(), found: data.len(), expected, version }),
-    }
+    let message = body.filter(|_| version == LAYOUT_VERSION).and_then(|body| topic.read(body));
+    message.ok_or_else(|| {
+        let expected = CDR_LITTLE_ENDIAN.len() + topic.body_bytes();
+        ReadError::Foreign { topic: topic.name(), found: data.len(), expected, version }
+    })
 }

@@ -6,7 +6,7 @@ use std::sync::LazyLock;
 
 use masseter_shared::config::JawConfig;
 use masseter_shared::geometry::{Mechanism, MechanismConfig};
-use masseter_shared::messages::{Command, FrameTap, Message, Reading, State, Truth};
+use masseter_shared::messages::{CanData, Command, FrameTap, Message, Reading, State, Truth};
 use mcap::MAGIC;
 use mcap::records::op;
 use proptest::prelude::*;
@@ -35,7 +35,8 @@ fn cycle(cycle: u64) -> Vec<Recorded> {
         quaternion_wxyz: [1.0, 0.0, 0.0, 0.0],
         ..Default::default()
     };
-    let mut frame = FrameTap { time_ns: now_ns, id: 0x181, length: 8, ..Default::default() };
+    let mut frame =
+        FrameTap { time_ns: now_ns, id: 0x181, data: CanData::padded([0; 64], 8), ..Default::default() };
     command.stamp(cycle, now_ns);
     reading.stamp(cycle, now_ns);
     state.stamp(cycle, now_ns);

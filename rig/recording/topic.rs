@@ -52,7 +52,7 @@ impl Topic {
         }
     }
 
-    /// Bytes of its messages.
+    /// Bytes of its messages' bodies, at most.
     pub fn body_bytes(self) -> usize {
         match self {
             Self::Command => size_of::<Command>(),
@@ -65,17 +65,17 @@ impl Topic {
         }
     }
 
-    /// The message in `body`, which has [`body_bytes`](Self::body_bytes).
-    pub(super) fn read(self, body: &[u8]) -> Recorded {
-        match self {
-            Self::Command => Recorded::Command(bytemuck::pod_read_unaligned(body)),
-            Self::Reading => Recorded::Reading(bytemuck::pod_read_unaligned(body)),
-            Self::State => Recorded::State(bytemuck::pod_read_unaligned(body)),
-            Self::Truth => Recorded::Truth(bytemuck::pod_read_unaligned(body)),
-            Self::Frame => Recorded::Frame(bytemuck::pod_read_unaligned(body)),
-            Self::Event => Recorded::Event(bytemuck::pod_read_unaligned(body)),
-            Self::Machine => Recorded::Machine(bytemuck::pod_read_unaligned(body)),
-        }
+    /// The message with this body, if one can have it.
+    pub(super) fn read(self, body: &[u8]) -> Option<Recorded> {
+        Some(match self {
+            Self::Command => Recorded::Command(Command::of_body(body)?),
+            Self::Reading => Recorded::Reading(Reading::of_body(body)?),
+            Self::State => Recorded::State(State::of_body(body)?),
+            Self::Truth => Recorded::Truth(Truth::of_body(body)?),
+            Self::Frame => Recorded::Frame(FrameTap::of_body(body)?),
+            Self::Event => Recorded::Event(Event::of_body(body)?),
+            Self::Machine => Recorded::Machine(Machine::of_body(body)?),
+        })
     }
 }
 

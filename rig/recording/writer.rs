@@ -16,12 +16,13 @@ use masseter_shared::messages::Message;
 use mcap::records::MessageHeader;
 use mcap::{Compression, McapError, WriteOptions, Writer};
 
-use super::encoding::{Definition, Encoder};
+use super::encoding::{Definition, Encoded, Encoder};
 use super::scene::Scene;
 use super::topic::Topic;
 
-/// Bytes of messages in a chunk: what is compressed together, and read together by a tool that seeks.
-const CHUNK_BYTES: u64 = 1 << 20;
+/// Bytes of messages in a chunk: what is compressed together, and read together by a tool that seeks. Beyond 640 KiB
+/// zstd's buffer wraps at this level, which costs more than smaller chunks do.
+const CHUNK_BYTES: u64 = 600 << 10;
 /// zstd's fastest level: its ratio on these messages is within a tenth of the default level's.
 const COMPRESSION_LEVEL: u32 = 1;
 /// Bytes gathered before they go to the system.
@@ -58,9 +59,26 @@ pub(super) fn options() -> WriteOptions {
 
 /// An open recording on `W`.
 pub struct Recorder<W: Write + Seek = DurableFile> {
-    writer: Writer<W>,
-    channels: BTreeMap<&'static str, u16>,
+    channels: Channels<W>,
     encoder: Encoder,
+}
+
+/// The file with the numbers of its channels, by their places.
+struct Channels<W: Write + Seek> {
+    writer: Writer<W>,
+    ids: Vec<u16>,
+}
+
+impl<W: Write + Seek> Channels<W> {
+    fn write(&mut self, message: &Encoded, log_time_ns: u64) -> Result<(), WriteError> {
+        let header = MessageHeader {
+            channel_id: self.ids[message.channel.place()],
+            sequence: message.sequence,
+            log_time: log_time_ns,
+            publish_time: message.publish_time_ns,
+        };
+        Ok(self.writer.write_to_known_channel(&header, message.bytes)?)
+    }
 }
 
 impl Recorder {
@@ -75,48 +93,41 @@ impl<W: Write + Seek> Recorder<W> {
     /// message can be read.
     pub fn on(medium: W, scene: Scene) -> Result<Self, WriteError> {
         let mut writer = options().create(medium)?;
-        let mut channels = BTreeMap::new();
+        let mut ids = Vec::new();
         for Definition { topic, schema, message_encoding } in Definition::all() {
             let schema = writer.add_schema(&schema.name, &schema.encoding, &schema.data)?;
-            channels.insert(topic, writer.add_channel(schema, topic, &message_encoding, &BTreeMap::new())?);
+            ids.push(writer.add_channel(schema, topic, &message_encoding, &BTreeMap::new())?);
         }
         writer.flush()?;
-        Ok(Self { writer, channels, encoder: Encoder::new(scene) })
+        Ok(Self { channels: Channels { writer, ids }, encoder: Encoder::new(scene) })
     }
 
     /// Appends a message that was received at `log_time_ns`, and what a 3-D view shows of it.
     pub fn record<M: Message>(&mut self, message: &M, log_time_ns: u64) -> Result<(), WriteError> {
-        self.record_body(Topic::of::<M>(), bytemuck::bytes_of(message), log_time_ns)
+        let Self { channels, encoder } = self;
+        encoder.encode(Topic::of::<M>(), message.body(), |message| channels.write(&message, log_time_ns))
     }
 
-    /// Appends the message of a topic that lies in `body`, and what a 3-D view shows of it.
-    pub(super) fn record_body(
+    /// Appends the message of a topic that is CDR already, and what a 3-D view shows of it.
+    pub(super) fn record_cdr(
         &mut self,
         topic: Topic,
-        body: &[u8],
+        cdr: &[u8],
         log_time_ns: u64,
     ) -> Result<(), WriteError> {
-        let Self { writer, channels, encoder } = self;
-        encoder.encode(topic, body, |message| {
-            let header = MessageHeader {
-                channel_id: channels[message.topic],
-                sequence: message.sequence,
-                log_time: log_time_ns,
-                publish_time: message.publish_time_ns,
-            };
-            Ok(writer.write_to_known_channel(&header, message.bytes)?)
-        })
+        let Self { channels, encoder } = self;
+        encoder.encode_cdr(topic, cdr, |message| channels.write(&message, log_time_ns))
     }
 
     /// Ends the chunk and hands everything recorded so far to the medium.
     pub fn flush(&mut self) -> Result<(), WriteError> {
-        Ok(self.writer.flush()?)
+        Ok(self.channels.writer.flush()?)
     }
 
     /// Ends the file with its index.
     pub fn finish(mut self) -> Result<(), WriteError> {
-        self.writer.finish()?;
-        Ok(self.writer.into_inner().flush().map_err(McapError::from)?)
+        self.channels.writer.finish()?;
+        Ok(self.channels.writer.into_inner().flush().map_err(McapError::from)?)
     }
 }
 

@@ -209,7 +209,7 @@ fn a_cycle_on_the_wire_is_sync_then_process_data_up_then_down() {
     bench.cycle(Some(&|reading| (reading.position_m, DriveRequest::Enable)));
     bench.cycle(Some(&|reading| (reading.position_m, DriveRequest::Enable)));
     let node = |id| NodeId::new(id).unwrap();
-    let on_bus = |bus: u16| {
+    let on_bus = |bus: u32| {
         let frames = bench.frames.iter().filter(move |frame| frame.bus == bus);
         frames
             .map(|frame| *tap::decode(frame).unwrap().frame().unwrap())

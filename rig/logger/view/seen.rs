@@ -107,7 +107,7 @@ impl Seen {
     fn frame(&mut self, frame: &FrameTap) {
         self.count(Topic::Frame, frame.seq);
         if let Ok(Tapped::Frame(received)) = tap::decode(frame) {
-            let bus = usize::from(frame.bus);
+            let bus = frame.bus as usize;
             self.busy_ns.resize(self.busy_ns.len().max(bus + 1), 0);
             self.busy_ns[bus] += self.rates.duration_ns(wire::frame_bits(&received.frame));
         }

@@ -1,6 +1,6 @@
 use masseter_shared::can::Bitrate;
 use masseter_shared::geometry::AXES;
-use masseter_shared::messages::{FrameTap, Reading, State};
+use masseter_shared::messages::{CanData, FrameTap, Reading, State};
 
 use super::*;
 
@@ -24,7 +24,12 @@ fn view() -> View {
         drive_state: [DriveCondition::OperationEnabled.code(); AXES],
         ..Default::default()
     }));
-    view.take(&Recorded::Frame(FrameTap { seq: 1, bus: 1, length: 8, ..Default::default() }));
+    view.take(&Recorded::Frame(FrameTap {
+        seq: 1,
+        bus: 1,
+        data: CanData::padded([0; 64], 8),
+        ..Default::default()
+    }));
     view
 }
 

@@ -171,6 +171,7 @@ pub(super) fn digits(text: &str, radix: u32) -> Option<u64> {
 mod tests {
     use super::super::frame::strategies::any_frame;
     use super::*;
+    use crate::messages::CanData;
     use proptest::prelude::*;
 
     const EXAMPLE: &str = "(1436509052.249713) vcan0 123#11223344";
@@ -214,7 +215,7 @@ mod tests {
     #[test]
     fn a_tap_that_holds_no_frame_writes_nothing() {
         let mut line = String::new();
-        let tap = FrameTap { length: 9, ..Default::default() };
+        let tap = FrameTap { data: CanData::padded([0; 64], 9), ..Default::default() };
         assert_eq!(write_tap(&mut line, "can0", &tap), Err(FrameError::DataLength { length: 9 }.into()));
         assert_eq!(line, "");
     }

@@ -4,7 +4,7 @@ use super::bus::Received;
 use super::error_frame::{ERROR_FLAG, ErrorReport, ErrorReportError};
 use super::frame::{Frame, FrameError, FrameFormat};
 use super::id::CanId;
-use crate::messages::FrameTap;
+use crate::messages::{CanData, FrameTap};
 
 /// What a tap saw.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -68,18 +68,17 @@ pub fn encode(bus: u16, tapped: &Tapped) -> FrameTap {
             time_ns: *time_ns,
             queued_ns: queued_ns.unwrap_or(0),
             id: frame.id().flagged(),
-            bus,
-            length: frame.data().len() as u8,
+            bus: bus.into(),
             flags: flags_of(frame.format()),
-            data: *frame.padded(),
+            data: CanData::padded(*frame.padded(), frame.data().len()),
             ..FrameTap::default()
         },
         Tapped::Error(report) => {
             let (id, said) = report.encode();
-            let mut data = [0; Frame::MAX_DATA];
-            data[..said.len()].copy_from_slice(&said);
-            let length = said.len() as u8;
-            FrameTap { time_ns: report.time_ns, id, bus, length, data, ..FrameTap::default() }
+            let mut bytes = [0; Frame::MAX_DATA];
+            bytes[..said.len()].copy_from_slice(&said);
+            let data = CanData::padded(bytes, said.len());
+            FrameTap { time_ns: report.time_ns, id, bus: bus.into(), data, ..FrameTap::default() }
         }
     }
 }
@@ -90,22 +89,21 @@ pub fn encode(bus: u16, tapped: &Tapped) -> FrameTap {
 /// [`TapError`] where it is neither a frame nor an error report.
 pub fn decode(tap: &FrameTap) -> Result<Tapped, TapError> {
     if tap.id & ERROR_FLAG != 0 && tap.id >> 30 == 0 {
-        let (said, _) = tap.data.split_first_chunk().expect("an error message has 8 bytes");
+        let (said, _) = tap.data.bytes.split_first_chunk().expect("an error message has 8 bytes");
         return Ok(Tapped::Error(ErrorReport::decode(tap.time_ns, tap.id, *said)?));
     }
-    let length = usize::from(tap.length);
     let format = format_of(tap.flags);
-    format.check(length)?;
-    let frame = Frame::with_format(CanId::from_flagged(tap.id)?, format, &tap.data[..length])?;
+    format.check(tap.data.length as usize)?;
+    let frame = Frame::with_format(CanId::from_flagged(tap.id)?, format, tap.data.as_slice())?;
     let queued_ns = Some(tap.queued_ns).filter(|&queued_ns| queued_ns > 0);
     Ok(Tapped::Frame(TappedFrame { frame, time_ns: tap.time_ns, queued_ns }))
 }
 
 /// Flags of `struct canfd_frame` (`linux/can.h`): bit-rate switch, and that the frame is FD.
-const BIT_RATE_SWITCH: u8 = 0x01;
-const FD: u8 = 0x04;
+const BIT_RATE_SWITCH: u32 = 0x01;
+const FD: u32 = 0x04;
 
-const fn flags_of(format: FrameFormat) -> u8 {
+const fn flags_of(format: FrameFormat) -> u32 {
     match format {
         FrameFormat::Classical => 0,
         FrameFormat::Fd => FD,
@@ -113,7 +111,7 @@ const fn flags_of(format: FrameFormat) -> u8 {
     }
 }
 
-const fn format_of(flags: u8) -> FrameFormat {
+const fn format_of(flags: u32) -> FrameFormat {
     match (flags & FD, flags & BIT_RATE_SWITCH) {
         (0, _) => FrameFormat::Classical,
         (_, 0) => FrameFormat::Fd,
@@ -129,13 +127,17 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
+    fn of_length(length: usize) -> CanData {
+        CanData::padded([0; Frame::MAX_DATA], length)
+    }
+
     #[test]
     fn what_is_no_frame_is_refused() {
-        let tap = FrameTap { length: 9, ..Default::default() };
+        let tap = FrameTap { data: of_length(9), ..Default::default() };
         assert_eq!(decode(&tap), Err(FrameError::DataLength { length: 9 }.into()));
-        let tap = FrameTap { length: 65, ..Default::default() };
+        let tap = FrameTap { data: of_length(65), ..Default::default() };
         assert_eq!(decode(&tap), Err(FrameError::DataLength { length: 65 }.into()));
-        let tap = FrameTap { length: 65, flags: FD, ..Default::default() };
+        let tap = FrameTap { data: of_length(65), flags: FD, ..Default::default() };
         assert_eq!(decode(&tap), Err(FrameError::FdDataLength { length: 65 }.into()));
         let tap = FrameTap { id: 0x800, ..Default::default() };
         assert_eq!(decode(&tap), Err(FrameError::StandardId { id: 0x800 }.into()));

@@ -3,22 +3,24 @@
 //! Every message begins with its sequence number, the time it was published and the version of its
 //! layout. All times are nanoseconds of `CLOCK_MONOTONIC`, 0 where nothing happened yet. Fields lie
 //! on their natural alignment without padding, so that the bytes in shared memory are at the same
-//! time a valid CDR body: the recording writes them as they are, under the schema that
-//! [`Message::schema`] derives from the same table.
+//! time a valid CDR body, but for what a field of variable length leaves unused at the end: the recording
+//! writes [`Message::body`] as it is, under the schema that [`Message::schema`] derives from the same table.
 //!
 //! Codes of enumerations stand in [`codes`]; how messages travel is not here but in
 //! [`transport`](crate::transport).
 
 pub mod codes;
+mod data;
 mod schema;
 mod words;
 
-use bytemuck::{Pod, Zeroable};
+use bytemuck::{Pod, Zeroable, bytes_of, bytes_of_mut};
 use iceoryx2::prelude::ZeroCopySend;
 
 use crate::geometry::{AXES, LEGS, Pose};
 use schema::FieldType;
 
+pub use data::CanData;
 pub use words::explain;
 
 /// A message type: what every topic's payload has in common.
@@ -35,12 +37,16 @@ pub trait Message: Pod + ZeroCopySend + Default + std::fmt::Debug + PartialEq {
     fn seq(&self) -> u64;
     /// When it was published, ns.
     fn published_ns(&self) -> u64;
+    /// Its CDR body: all its bytes but the unused ones at its end.
+    fn body(&self) -> &[u8];
+    /// The message with this body; none when a message of this type cannot have it.
+    fn of_body(body: &[u8]) -> Option<Self>;
     /// Stamps sequence number, time and version just before it is sent.
     fn stamp(&mut self, seq: u64, published_ns: u64);
 }
 
 /// Version of the layouts below; it changes with any of them.
-pub const LAYOUT_VERSION: u64 = 5;
+pub const LAYOUT_VERSION: u64 = 6;
 
 macro_rules! messages {
     ($($(#[$doc:meta])* $name:ident on $topic:literal keeping $depth:literal {
@@ -83,6 +89,17 @@ macro_rules! messages {
 
             fn published_ns(&self) -> u64 {
                 self.published_ns
+            }
+
+            fn body(&self) -> &[u8] {
+                let unused = 0 $(+ self.$field.unused_bytes())*;
+                &bytes_of(self)[..size_of::<Self>() - unused]
+            }
+
+            fn of_body(body: &[u8]) -> Option<Self> {
+                let mut message = Self::default();
+                bytes_of_mut(&mut message).get_mut(..body.len())?.copy_from_slice(body);
+                (message.body().len() == body.len()).then_some(message)
             }
 
             fn stamp(&mut self, seq: u64, published_ns: u64) {
@@ -226,13 +243,11 @@ messages! {
         /// Identifier; bit 31 set for a 29-bit one, bit 29 for an error message.
         id: u32,
         /// Index of the bus, from 0.
-        bus: u16,
-        /// Bytes of `data` in use.
-        length: u8,
+        bus: u32,
         /// As in `struct canfd_frame`: 4 for an FD frame, 1 for one with bit-rate switch.
-        flags: u8,
-        /// Data bytes, unused ones zero.
-        data: [u8; 64],
+        flags: u32,
+        /// Data bytes.
+        data: CanData,
     }
 
     /// What the kernel had counted of the machine and of both loops; the logger looks and records it, and it travels

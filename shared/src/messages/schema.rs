@@ -3,6 +3,11 @@
 /// A type that a message field may have.
 pub(super) trait FieldType {
     fn ros_type() -> String;
+
+    /// Bytes at the end of it that say nothing. Only a message's last field may have any.
+    fn unused_bytes(&self) -> usize {
+        0
+    }
 }
 
 macro_rules! field_types {
@@ -30,16 +35,40 @@ pub(super) fn definition<'a>(fields: impl Iterator<Item = (&'a str, String)>) ->
 
 #[cfg(test)]
 mod tests {
-    use crate::messages::{Command, FrameTap, Message};
+    use crate::messages::{CanData, Command, FrameTap, Message};
 
     #[test]
     fn the_schema_lists_every_field_in_order() {
         assert_eq!(
             FrameTap::schema(),
             "uint64 seq\nuint64 published_ns\nuint64 version\nuint64 time_ns\nuint64 queued_ns\n\
-             uint32 id\nuint16 bus\nuint8 length\nuint8 flags\nuint8[64] data\n"
+             uint32 id\nuint32 bus\nuint32 flags\nuint8[<=64] data\n"
         );
         assert!(Command::schema().contains("float64[6] target_m\n"));
+    }
+
+    #[test]
+    fn a_body_is_what_is_used_and_makes_the_message_again() {
+        for length in [0, 1, 8, 64] {
+            let bytes = std::array::from_fn(|index| if index < length { 0xA5 } else { 0 });
+            let frame = FrameTap { seq: 7, data: CanData::padded(bytes, length), ..Default::default() };
+            assert_eq!(frame.body().len(), size_of::<FrameTap>() - 64 + length);
+            assert_eq!(FrameTap::of_body(frame.body()), Some(frame));
+        }
+        let command = Command { cycle: 3, ..Default::default() };
+        assert_eq!(command.body().len(), size_of::<Command>());
+        assert_eq!(Command::of_body(command.body()), Some(command));
+    }
+
+    #[test]
+    fn a_body_that_no_message_has_makes_none() {
+        let frame = FrameTap { data: CanData::padded([0; 64], 8), ..Default::default() };
+        let bytes = bytemuck::bytes_of(&frame);
+        for cut in (0..frame.body().len()).chain(frame.body().len() + 1..=bytes.len()) {
+            assert_eq!(FrameTap::of_body(&bytes[..cut]), None, "{cut} bytes");
+        }
+        assert_eq!(Command::of_body(&[0; size_of::<Command>() + 1]), None);
+        assert_eq!(Command::of_body(&[0; size_of::<Command>() - 1]), None);
     }
 
     #[test]

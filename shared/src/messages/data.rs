@@ -1,0 +1,41 @@
+//! The data bytes of a CAN frame in a message of fixed size: a CDR sequence with room for the longest.
+
+use bytemuck::{Pod, Zeroable};
+use iceoryx2::prelude::ZeroCopySend;
+
+use super::schema::FieldType;
+
+/// The most that a CAN FD frame carries, bytes.
+const MOST: usize = 64;
+
+/// Data bytes, as CDR writes a sequence: how many, then they themselves. Unused ones are zero.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable, ZeroCopySend)]
+pub struct CanData {
+    /// How many are in use.
+    pub length: u32,
+    /// They, and what is left of the room.
+    pub bytes: [u8; MOST],
+}
+
+impl CanData {
+    /// The first `length` of these bytes; those behind must be zero.
+    pub fn padded(bytes: [u8; MOST], length: usize) -> Self {
+        Self { length: length as u32, bytes }
+    }
+
+    /// Those in use, never more than there are.
+    pub fn as_slice(&self) -> &[u8] {
+        &self.bytes[..MOST - self.unused_bytes()]
+    }
+}
+
+impl FieldType for CanData {
+    fn ros_type() -> String {
+        format!("{}[<={MOST}]", u8::ros_type())
+    }
+
+    fn unused_bytes(&self) -> usize {
+        MOST.saturating_sub(self.length as usize)
+    }
+}
