@@ -8,7 +8,7 @@ use masseter_shared::can::candump::Line;
 use masseter_shared::can::canopen::{Cob, Emergency, Heartbeat, Nmt, NodeId, SdoRequest, SdoResponse};
 use masseter_shared::can::socketcand::Requests;
 use masseter_shared::can::{CanId, ErrorReport, Rpdo1, Tapped, TappedFrame, Tpdo1, candump, tap};
-use masseter_shared::messages::FrameTap;
+use masseter_shared::messages::{CanData, FrameTap, Message};
 
 fuzz_target!(|data: &[u8]| {
     canopen(data);
@@ -65,16 +65,20 @@ fn identifier(data: &[u8]) {
 
 fn tapped(data: &[u8]) {
     let mut bytes = Unstructured::new(data);
-    let Ok((time_ns, id, bus, length, flags, data)) = bytes.arbitrary::<(u64, u32, u16, u8, u8, [u8; 64])>()
+    let Ok((time_ns, id, bus, flags, length, bytes)) = bytes.arbitrary::<(u64, u32, u16, u8, u8, [u8; 64])>()
     else {
         return;
     };
-    let (&said, _) = data.split_first_chunk().expect("64 bytes");
+    let (&said, _) = bytes.split_first_chunk().expect("64 bytes");
     if let Ok(report) = ErrorReport::decode(time_ns, id, said) {
         let (id, data) = report.encode();
         assert_eq!(ErrorReport::decode(time_ns, id, data), Ok(report));
     }
-    let message = FrameTap { time_ns, id, bus, length, flags, data, ..FrameTap::default() };
+    let data = CanData { length: length.into(), bytes };
+    let (bus_index, flags) = (bus.into(), flags.into());
+    let message = FrameTap { time_ns, id, bus: bus_index, flags, data, ..FrameTap::default() };
+    let read = FrameTap::of_body(message.body()).expect("a body makes a message");
+    assert_eq!(read.body(), message.body());
     let mut line = String::new();
     let Ok(tapped) = tap::decode(&message) else {
         assert!(candump::write_tap(&mut line, "can0", &message).is_err() && line.is_empty());
