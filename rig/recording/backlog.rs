@@ -32,7 +32,7 @@ pub enum Pace {
 }
 
 impl Pace {
-    /// Memory of one batch, bytes. There are two. In real time, 0.7 s of every topic at 10 kHz; else no more than
+    /// Memory of one batch, bytes. There are two. In real time, 0.8 s of every topic at 10 kHz; else no more than
     /// both ends need to work at the same time.
     const fn batch_bytes(self) -> usize {
         match self {

@@ -55,16 +55,16 @@ impl Master {
         if node.is_operational() && !node.is_fresh {
             node.missing_cycles += 1;
         }
-        let is_lost = node.missing_cycles > MISSING_CYCLES
-            || node.is_started && node.nmt != Some(NmtState::Operational);
         let silent_ns = now_ns.saturating_sub(node.heard_ns);
         let (cause, values) = if silent_ns > self.settings.heartbeat_timeout_ns {
             let limit_ns = self.settings.heartbeat_timeout_ns;
             (Cause::HeartbeatLost, [silent_ns, limit_ns].map(in_ms))
         } else if node.surplus > SURPLUS {
             (Cause::DuplicateNode, [node.surplus, SURPLUS].map(f64::from))
-        } else if is_lost {
+        } else if node.missing_cycles > MISSING_CYCLES {
             (Cause::ProcessDataLost, [node.missing_cycles, MISSING_CYCLES].map(f64::from))
+        } else if let Some(state) = node.nmt.filter(|_| node.is_started && !node.is_operational()) {
+            (Cause::NodeStopped, [state, NmtState::Operational].map(|state| f64::from(state.code())))
         } else {
             return;
         };

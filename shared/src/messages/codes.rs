@@ -225,6 +225,8 @@ codes! {
         NodeRestarted = 31 "node_restarted",
         /// A drive is in fault and a fault reset does not help (EMCY code, object 603F).
         FaultAtStart = 32 "fault_at_start",
+        /// A node left the NMT state operational by itself (NMT state that it told; the limit is operational's code).
+        NodeStopped = 33 "node_stopped",
         /// A bus or a node works again after a fault.
         Recovered = 34 "recovered",
         /// A frame does not have the length of its object (bytes).

@@ -45,6 +45,7 @@ fn complaint(cause: Cause, event: &Event) -> Option<String> {
         Cause::BootTimeout => format!("not operational after {value} ms"),
         Cause::HeartbeatLost => format!("silent for {value} ms"),
         Cause::ProcessDataLost => format!("process data missing for {value} cycles"),
+        Cause::NodeStopped => format!("left the NMT state operational by itself; it tells state {value}"),
         Cause::Emergency if value == 0 => "all errors gone (EMCY 0000h)".to_owned(),
         Cause::Emergency => {
             format!("EMCY {}, error register {limit:02X}h", EmergencyCode(event.value as u16))
@@ -68,6 +69,9 @@ const fn remedy(cause: Cause) -> Option<&'static str> {
         Cause::SdoTimeout => "see power, wiring and bit rate of this drive",
         Cause::DuplicateNode => "give every node an id of its own, and let no other client use SDO meanwhile",
         Cause::NodeRestarted => "see its supply; it is booted again once the drives are off",
+        Cause::NodeStopped => {
+            "see its own emergency message, if there is one, and who else sends NMT commands"
+        }
         Cause::FaultAtStart => "remove what the drive complains of and switch it on again",
         Cause::BootTimeout => "see power, wiring, bit rate and node id of this drive",
         Cause::BusOff => "see bit rate, termination and wiring",

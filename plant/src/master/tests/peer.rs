@@ -41,7 +41,7 @@ pub(super) struct Peer {
     pub(super) asked: Vec<(u64, SdoRequest)>,
     controlword: Controlword,
     buffered: Option<Rpdo1>,
-    next_beat_ns: u64,
+    pub(super) next_beat_ns: u64,
 }
 
 impl Peer {

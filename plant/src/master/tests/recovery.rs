@@ -46,6 +46,17 @@ fn a_drive_that_falls_silent_is_booted_again_when_it_comes_back() {
 }
 
 #[test]
+fn a_drive_that_tells_it_left_operational_stops_them_all_and_is_booted_again() {
+    let mut bench = Bench::enabled();
+    let drive = bench.drive(2);
+    (drive.nmt, drive.next_beat_ns) = (Some(NmtState::PreOperational), 0);
+    bench.cycles(5, DriveRequest::Enable);
+    let fault = *bench.events_of(EventKind::Fault).next().unwrap();
+    assert_eq!((fault.cause, fault.axis, fault.value), (Cause::NodeStopped.code(), 2, 127.0));
+    restore(&mut bench, Cause::NodeStopped);
+}
+
+#[test]
 fn two_drives_of_one_id_are_told_from_a_frame_sent_twice() {
     let mut bench = Bench::enabled();
     bench.drive(3).twin_stands_at = Some(STANDS_AT);
