@@ -4,7 +4,7 @@ use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-use masseter_shared::can::candump;
+use masseter_shared::can::{candump, tap};
 use masseter_shared::messages::FrameTap;
 
 use super::AnalysisError;
@@ -44,8 +44,8 @@ impl CandumpLogs {
         }
     }
 
-    pub(crate) fn write(&mut self, tap: &FrameTap) -> Result<(), AnalysisError> {
-        let bus = tap.bus as usize;
+    pub(crate) fn write(&mut self, frame: &FrameTap) -> Result<(), AnalysisError> {
+        let bus = tap::bus_of(frame)?;
         while self.buses.len() <= bus {
             let next = self.buses.len();
             let interface = self.interfaces.get(next).cloned().unwrap_or_else(|| format!("can{next}"));
@@ -53,7 +53,7 @@ impl CandumpLogs {
         }
         let log = &mut self.buses[bus];
         self.line.clear();
-        candump::write_tap(&mut self.line, &log.interface, tap)?;
+        candump::write_tap(&mut self.line, &log.interface, frame)?;
         log.frames += 1;
         writeln!(log.file, "{}", self.line)
             .map_err(|error| AnalysisError::Write { path: log.path.clone(), error })
@@ -68,5 +68,19 @@ impl CandumpLogs {
                 Err(error) => Err(AnalysisError::Write { path: log.path, error }),
             })
             .collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_frame_on_a_bus_that_no_link_has_makes_no_logs() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut logs = CandumpLogs::new(folder.path(), &[]);
+        let error = logs.write(&FrameTap { bus: u32::MAX, ..FrameTap::default() }).unwrap_err();
+        assert!(error.to_string().contains("bus 4294967295"), "{error}");
+        assert_eq!(folder.path().read_dir().unwrap().count(), 0);
     }
 }

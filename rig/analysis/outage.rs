@@ -85,7 +85,9 @@ impl Misses {
     /// The deadlines before the stop among those that were missed in a row until they were counted.
     fn before(&self, stopped_ns: u64, period_ns: u64) -> u64 {
         let before = |&(at_ns, missed): &(u64, u64)| {
-            let from_ns = at_ns.saturating_sub(missed * period_ns).max(stopped_ns.saturating_sub(BEFORE_NS));
+            let from_ns = at_ns
+                .saturating_sub(missed.saturating_mul(period_ns))
+                .max(stopped_ns.saturating_sub(BEFORE_NS));
             at_ns.min(stopped_ns).saturating_sub(from_ns) / period_ns
         };
         self.recent.iter().map(before).sum()
@@ -116,13 +118,14 @@ mod tests {
 
     #[test]
     fn only_what_is_missed_just_before_the_stop_explains_it() {
-        let cases: [(Missed, u64, bool); 8] = [
+        let cases: [(Missed, u64, bool); 9] = [
             (&[], 0, false),
             (&[(980, 30)], 30, true),
             (&[(920, 4), (960, 6)], 10, true),
             (&[(920, 4), (960, 5)], 9, false),
             (&[(500, 80)], 0, false),
             (&[(950, 80)], 50, true),
+            (&[(950, u64::MAX)], 50, true),
             // Counted in the message after the stop, however late it comes.
             (&[(1005, 25)], 20, true),
             (&[(1150, 170), (1500, 200)], 20, true),

@@ -1,6 +1,6 @@
 //! How a run went, for plots: wake-ups, axes, buses and the platform's error along one time axis.
 
-use masseter_shared::can::tap::{self, Tapped};
+use masseter_shared::can::tap;
 use masseter_shared::can::wire::{self, Rates};
 use masseter_shared::geometry::AXES;
 use masseter_shared::messages::{FrameTap, Reading, State, Truth};
@@ -77,10 +77,10 @@ impl Watch {
 
     pub(super) fn frame(&mut self, frame: &FrameTap) {
         let since_ns = self.since(frame.time_ns);
-        let tapped = tap::decode(frame).ok();
-        if let Some((received, rates)) = tapped.as_ref().and_then(Tapped::frame).zip(self.rates) {
+        let (Ok(tapped), Ok(bus)) = (tap::decode(frame), tap::bus_of(frame)) else { return };
+        if let Some((received, rates)) = tapped.frame().zip(self.rates) {
             let busy_ns = rates.duration_ns(wire::frame_bits(&received.frame));
-            self.busy_ns.at(since_ns).add(frame.bus as usize, busy_ns);
+            self.busy_ns.at(since_ns).add(bus, busy_ns);
         }
     }
 

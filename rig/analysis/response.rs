@@ -120,7 +120,7 @@ impl Responses {
     }
 
     pub(super) fn frame(&mut self, tap: &FrameTap) -> Result<(), TapError> {
-        let Some(bus) = self.buses.get_mut(tap.bus as usize) else { return Ok(()) };
+        let Some(bus) = self.buses.get_mut(tap::bus_of(tap)?) else { return Ok(()) };
         let planned = bus.plan.messages().iter().position(|planned| planned.message.id.flagged() == tap.id);
         let seen = match planned {
             Some(index) => &mut bus.messages[index],

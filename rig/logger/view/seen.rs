@@ -106,8 +106,7 @@ impl Seen {
 
     fn frame(&mut self, frame: &FrameTap) {
         self.count(Topic::Frame, frame.seq);
-        if let Ok(Tapped::Frame(received)) = tap::decode(frame) {
-            let bus = frame.bus as usize;
+        if let (Ok(Tapped::Frame(received)), Ok(bus)) = (tap::decode(frame), tap::bus_of(frame)) {
             self.busy_ns.resize(self.busy_ns.len().max(bus + 1), 0);
             self.busy_ns[bus] += self.rates.duration_ns(wire::frame_bits(&received.frame));
         }

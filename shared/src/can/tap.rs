@@ -6,6 +6,9 @@ use super::frame::{Frame, FrameError, FrameFormat};
 use super::id::CanId;
 use crate::messages::{CanData, FrameTap};
 
+/// More than anybody needs for six drives.
+const MOST_BUSES: usize = 64;
+
 /// What a tap saw.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Tapped {
@@ -41,6 +44,12 @@ pub enum TapError {
     /// An error report of no known class.
     #[error(transparent)]
     Error(#[from] ErrorReportError),
+    /// An index that no bus has.
+    #[error("a frame on bus {bus}, of {MOST_BUSES} that a link may have")]
+    Bus {
+        /// The index.
+        bus: u32,
+    },
 }
 
 impl Tapped {
@@ -81,6 +90,15 @@ pub fn encode(bus: u16, tapped: &Tapped) -> FrameTap {
             FrameTap { time_ns: report.time_ns, id, bus: bus.into(), data, ..FrameTap::default() }
         }
     }
+}
+
+/// Index of the bus that a message is from: what is kept for each bus may be indexed by it.
+///
+/// # Errors
+/// [`TapError::Bus`] where no link has that many.
+pub fn bus_of(tap: &FrameTap) -> Result<usize, TapError> {
+    let bus = tap.bus as usize;
+    if bus < MOST_BUSES { Ok(bus) } else { Err(TapError::Bus { bus: tap.bus }) }
 }
 
 /// What a message holds.
@@ -143,6 +161,15 @@ mod tests {
         assert_eq!(decode(&tap), Err(FrameError::StandardId { id: 0x800 }.into()));
         let tap = FrameTap { id: ERROR_FLAG, ..Default::default() };
         assert_eq!(decode(&tap), Err(ErrorReportError { id: ERROR_FLAG }.into()));
+    }
+
+    #[test]
+    fn a_bus_that_no_link_has_is_refused() {
+        let of = |bus| bus_of(&FrameTap { bus, ..Default::default() });
+        assert_eq!((of(0), of(63)), (Ok(0), Ok(63)));
+        for bus in [64, u32::MAX] {
+            assert_eq!(of(bus), Err(TapError::Bus { bus }));
+        }
     }
 
     #[test]

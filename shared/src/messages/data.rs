@@ -4,9 +4,9 @@ use bytemuck::{Pod, Zeroable};
 use iceoryx2::prelude::ZeroCopySend;
 
 use super::schema::FieldType;
+use crate::can::Frame;
 
-/// The most that a CAN FD frame carries, bytes.
-const MOST: usize = 64;
+const MOST: usize = Frame::MAX_DATA;
 
 /// Data bytes, as CDR writes a sequence: how many, then they themselves. Unused ones are zero.
 #[repr(C)]
