@@ -3,6 +3,7 @@
 use std::fs::OpenOptions;
 use std::io;
 
+use masseter_shared::clock;
 use rustix::time::{ClockId, clock_getres};
 
 use super::finding::Finding;
@@ -12,12 +13,25 @@ use crate::run::dma_latency;
 /// Clock sources that are read without a system call and in tens of nanoseconds.
 const FAST_SOURCES: [&str; 4] = ["tsc", "kvm-clock", "arch_sys_counter", "hyperv_clocksource_tsc_page"];
 
+/// Sleeps that are tried, each of that length, ns.
+const SLEEPS: u64 = 200;
+const SLEEP_NS: u64 = 200_000;
+/// A sleep that takes more than this of a core leaves the loops of a fast rig little of theirs, ns.
+const CHEAP_SLEEP_NS: u64 = 10_000;
+/// The rate for which the share of sleeping is told, Hz.
+const FAST_RATE_HZ: u64 = 10_000;
+
 /// All findings of this family.
 pub(super) fn examine(root: &SystemRoot) -> Vec<Finding> {
     let resolution = clock_getres(ClockId::Monotonic);
     let resolution_ns = resolution.tv_sec * 1_000_000_000 + resolution.tv_nsec;
     let opened = OpenOptions::new().write(true).open(dma_latency::DEVICE).map(drop);
-    vec![clock_source(root), timers(resolution_ns), dma_latency_access(&opened, root.is_virtual())]
+    vec![
+        clock_source(root),
+        timers(resolution_ns),
+        sleeping(cost_of_a_sleep_ns()),
+        dma_latency_access(&opened, root.is_virtual()),
+    ]
 }
 
 fn clock_source(root: &SystemRoot) -> Finding {
@@ -49,6 +63,30 @@ fn timers(resolution_ns: i64) -> Finding {
         "cycles can only begin at ticks; the kernel needs CONFIG_HIGH_RES_TIMERS and no `highres=off`",
     )
     .mended_by("sudo sed -i 's/highres=off//' /etc/default/grub && sudo update-grub && sudo reboot")
+}
+
+/// CPU time that going to sleep and waking takes, ns.
+fn cost_of_a_sleep_ns() -> u64 {
+    let before_ns = clock::thread_cpu_ns();
+    for _ in 0..SLEEPS {
+        clock::sleep_until(clock::now_ns() + SLEEP_NS);
+    }
+    (clock::thread_cpu_ns() - before_ns) / SLEEPS
+}
+
+fn sleeping(cost_ns: u64) -> Finding {
+    const CHECK: &str = "sleeping";
+    let found = format!("{} µs of the core a time", cost_ns.div_ceil(1000));
+    if cost_ns <= CHEAP_SLEEP_NS {
+        return Finding::ok(CHECK, found);
+    }
+    let share_percent = 100 * cost_ns * FAST_RATE_HZ / clock::SECOND_NS;
+    let cost = format!(
+        "at {} kHz, sleeping once a cycle takes {share_percent} % of each loop's core; setting a timer is dear, \
+         as in many virtual machines",
+        FAST_RATE_HZ / 1000
+    );
+    Finding::warn(CHECK, found, cost)
 }
 
 fn dma_latency_access(opened: &io::Result<()>, is_virtual: bool) -> Finding {
@@ -91,6 +129,19 @@ mod tests {
     #[test]
     fn ticks_are_too_coarse_for_cycles() {
         assert_eq!((timers(1).level, timers(4_000_000).level), (Fine, Bad));
+    }
+
+    #[test]
+    fn a_dear_sleep_is_told_with_its_share_of_a_fast_loops_core() {
+        assert_eq!(sleeping(10_000).level, Fine);
+        let dear = sleeping(33_200);
+        assert_eq!((dear.level, dear.found.as_str()), (Warn, "34 µs of the core a time"));
+        assert!(dear.cost.unwrap().contains("at 10 kHz, sleeping once a cycle takes 33 %"));
+    }
+
+    #[test]
+    fn sleeping_costs_something() {
+        assert!(cost_of_a_sleep_ns() > 0);
     }
 
     #[test]

@@ -18,8 +18,17 @@ const PLAUSIBLE_AGE: Duration = Duration::from_secs(60);
 
 /// Now, ns of `CLOCK_MONOTONIC`.
 pub fn now_ns() -> u64 {
-    let now = clock_gettime(ClockId::Monotonic);
-    now.tv_sec as u64 * SECOND_NS + now.tv_nsec as u64
+    read_ns(ClockId::Monotonic)
+}
+
+/// CPU time that the calling thread has used, ns. A system call.
+pub fn thread_cpu_ns() -> u64 {
+    read_ns(ClockId::ThreadCPUTime)
+}
+
+fn read_ns(clock: ClockId) -> u64 {
+    let time = clock_gettime(clock);
+    time.tv_sec as u64 * SECOND_NS + time.tv_nsec as u64
 }
 
 /// Sleeps until `deadline_ns`; returns at once when it has passed, or early when a signal arrives.

@@ -7,8 +7,9 @@
 const MOST_NS: u64 = 200_000;
 /// The least, ns: what entering and leaving the kernel takes on a busy core.
 const LEAST_NS: u64 = 5_000;
-/// The reserve takes at most this part of a period.
-const MOST_OF_PERIOD: u64 = 2;
+/// The reserve takes at most this part of a period: with a half, two loops at 10 kHz starve the logger (28 % of all
+/// messages dropped; none with a third), and a quarter is less than sleeps come back late there (docs/realtime.md).
+const MOST_OF_PERIOD: u64 = 3;
 /// The reserve aims at this many times the latest lateness, and at the least on top.
 const TIMES_LATE: u64 = 2;
 /// Sleeps until two thirds of a reserve that was not needed are forgotten, as a power of two: one that is needed
@@ -75,7 +76,7 @@ mod tests {
     #[test]
     fn before_anything_is_known_it_is_as_long_as_allowed() {
         assert_eq!(Reserve::new(PERIOD).ns(), MOST_NS);
-        assert_eq!(Reserve::new(50_000).ns(), 25_000);
+        assert_eq!(Reserve::new(60_000).ns(), 20_000);
     }
 
     #[test]
@@ -121,7 +122,7 @@ mod tests {
             let mut reserve = Reserve::new(period_ns);
             for (awake_ns, slept_ns, late_ns) in sleeps {
                 reserve.learn(awake_ns, slept_ns, late_ns);
-                prop_assert!((LEAST_NS..=MOST_NS.min(period_ns / 2)).contains(&reserve.ns()));
+                prop_assert!((LEAST_NS..=MOST_NS.min(period_ns / MOST_OF_PERIOD)).contains(&reserve.ns()));
             }
         }
     }
