@@ -252,9 +252,10 @@ impl Tpdo {
 
     /// The frame to send at a SYNC of that counter (0 where SYNC has none).
     pub(super) fn at_sync(&mut self, now_ns: u64, counter: u8, objects: &Objects) -> Option<Frame> {
+        let id = self.id?;
         match self.trigger {
             Trigger::Event => None,
-            Trigger::ChangeThenSync => self.changed(objects).then(|| self.frame(now_ns, objects))?,
+            Trigger::ChangeThenSync => self.changed(objects).then(|| self.frame(id, now_ns, objects))?,
             Trigger::EverySync { every, start } => {
                 let syncs = match self.syncs {
                     None if counter != 0 && start != 0 && counter != start => return None,
@@ -262,29 +263,27 @@ impl Tpdo {
                     Some(syncs) => syncs + 1,
                 };
                 self.syncs = Some(if syncs >= every { 0 } else { syncs });
-                (syncs >= every).then(|| self.frame(now_ns, objects))?
+                (syncs >= every).then(|| self.frame(id, now_ns, objects))?
             }
         }
     }
 
     /// The frame to send because of an event.
     pub(super) fn at_event(&mut self, now_ns: u64, objects: &Objects) -> Option<Frame> {
-        if !self.is_event_driven() {
-            return None;
-        }
+        let id = self.id.filter(|_| self.is_event_driven())?;
         let since_ns = self.sent.map(|(_, sent_ns)| now_ns.saturating_sub(sent_ns));
         let is_inhibited = since_ns.is_some_and(|since_ns| since_ns < self.inhibit_ns);
         let is_due = self.timer_ns > 0 && since_ns.is_some_and(|since_ns| since_ns >= self.timer_ns);
-        (!is_inhibited && (is_due || self.changed(objects))).then(|| self.frame(now_ns, objects))?
+        (!is_inhibited && (is_due || self.changed(objects))).then(|| self.frame(id, now_ns, objects))?
     }
 
     fn changed(&self, objects: &Objects) -> bool {
         self.sent.is_none_or(|(data, _)| data != self.mapped.pack(objects))
     }
 
-    fn frame(&mut self, now_ns: u64, objects: &Objects) -> Option<Frame> {
+    fn frame(&mut self, id: CanId, now_ns: u64, objects: &Objects) -> Option<Frame> {
         let data = self.mapped.pack(objects);
         self.sent = Some((data, now_ns));
-        Frame::new(self.id?, &data[..self.mapped.length]).ok()
+        Frame::new(id, &data[..self.mapped.length]).ok()
     }
 }

@@ -104,6 +104,16 @@ impl Faults {
         Self { list: faults.into_iter().map(listed).collect(), seed }
     }
 
+    /// Whether there are none.
+    pub(super) fn is_empty(&self) -> bool {
+        self.list.is_empty()
+    }
+
+    /// What each of them does, in their order.
+    pub(super) fn kinds(&self) -> impl Iterator<Item = FaultKind> {
+        self.list.iter().map(|listed| listed.fault.kind)
+    }
+
     /// The first fault of a kind that strikes the frame numbered `number` of that port.
     pub(super) fn strikes_frame(
         &self,

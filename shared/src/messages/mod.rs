@@ -235,7 +235,7 @@ messages! {
     }
 
     /// What a tap on a CAN wire saw: a frame, or an error message as `linux/can/error.h` codes it.
-    FrameTap on "frame" keeping 16384 {
+    FrameTap on "frame" keeping 32768 {
         /// When its last bit was on the wire, ns.
         time_ns: u64,
         /// When its transmitter had it queued, ns; 0 where the wire does not tell, as real ones do not.

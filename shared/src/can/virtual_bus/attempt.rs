@@ -9,6 +9,7 @@ use crate::can::bus::ErrorState;
 use crate::can::error_frame::ErrorKind;
 use crate::can::faults::{FaultKind, Strike};
 use crate::can::frame::Frame;
+use crate::can::id::CanId;
 use crate::can::wire::{BEHIND_ACKNOWLEDGE_BITS, INTERFRAME_BITS, first_difference, frame_bits};
 
 const ERROR_FLAG_BITS: u32 = 6;
@@ -72,10 +73,16 @@ pub(super) enum Ending {
 
 /// What a port would send.
 #[derive(Clone, Copy)]
-struct Offer {
+struct Offer<'a> {
     port: usize,
-    queued: Queued,
+    queued: &'a Queued,
     babbles: Option<Strike>,
+}
+
+impl Offer<'_> {
+    fn id(&self) -> CanId {
+        self.queued.frame.id()
+    }
 }
 
 impl VirtualWire {
@@ -105,17 +112,16 @@ impl VirtualWire {
 
     /// The attempt that an arbitration at that time leads to; `None` where nobody can send then.
     fn attempt(&self, start_ns: u64) -> Option<Attempt> {
-        let winner = self.offers(0, start_ns).min_by_key(|offer| offer.queued.frame.id())?;
+        let winner = self.offers(0, start_ns).min_by_key(Offer::id)?;
         let (contest, strongest) = self.contest(start_ns, winner);
-        let frame = strongest.queued.frame;
+        let Queued { frame, duration_ns, since_ns } = *strongest.queued;
         let struck = |is_kind: fn(FaultKind) -> bool| {
             self.faults.strikes_frame(start_ns, is_kind, strongest.port, frame.id(), self.attempts)
         };
-        let duration_ns = strongest.queued.duration_ns;
         let interframe_ns = self.config.rates.nominal().bits_to_ns(INTERFRAME_BITS);
         let mut attempt = Attempt {
             frame,
-            queued_ns: strongest.queued.since_ns,
+            queued_ns: if strongest.babbles.is_some() { start_ns } else { since_ns },
             start_ns,
             received_ns: start_ns + duration_ns - interframe_ns,
             end_ns: start_ns + duration_ns - interframe_ns,
@@ -153,27 +159,24 @@ impl VirtualWire {
     }
 
     /// What each port from `first` on would send at that time.
-    fn offers(&self, first: usize, start_ns: u64) -> impl Iterator<Item = Offer> {
+    fn offers(&self, first: usize, start_ns: u64) -> impl Iterator<Item = Offer<'_>> {
         (first..self.stations.len()).filter_map(move |port| {
             let may = self.stations[port].suspended_until_ns <= start_ns && self.is_on_bus(port, start_ns);
             if may { self.offer(port, start_ns) } else { None }
         })
     }
 
-    fn offer(&self, port: usize, start_ns: u64) -> Option<Offer> {
+    fn offer(&self, port: usize, start_ns: u64) -> Option<Offer<'_>> {
         let queued = self.stations[port].transmit.most_urgent(start_ns);
-        let queued = queued.map(|&queued| Offer { port, queued, babbles: None });
+        let queued = queued.map(|queued| Offer { port, queued, babbles: None });
         let babbled = self.babbled(port, start_ns);
-        queued.into_iter().chain(babbled).min_by_key(|offer| offer.queued.frame.id())
+        queued.into_iter().chain(babbled).min_by_key(Offer::id)
     }
 
-    fn babbled(&self, port: usize, start_ns: u64) -> Option<Offer> {
+    fn babbled(&self, port: usize, start_ns: u64) -> Option<Offer<'_>> {
         let is_babble = |kind| matches!(kind, FaultKind::Babble { .. });
         let strike = self.faults.of_node(start_ns, is_babble, port)?;
-        let FaultKind::Babble { frame } = self.faults.kind_of(strike) else { return None };
-        let frame = frame.promoted(self.config.format);
-        let duration_ns = self.config.rates.duration_ns(frame_bits(&frame));
-        let queued = Queued { frame, duration_ns, since_ns: start_ns };
+        let queued = self.babble[strike.fault].as_ref()?;
         Some(Offer { port, queued, babbles: Some(strike) })
     }
 
@@ -184,11 +187,11 @@ impl VirtualWire {
     }
 
     /// Sorts out who sends the winning identifier too.
-    fn contest(&self, start_ns: u64, winner: Offer) -> (Contest, Offer) {
+    fn contest<'a>(&'a self, start_ns: u64, winner: Offer<'a>) -> (Contest, Offer<'a>) {
         let mut contest = Contest::default();
         contest.admit(winner);
         let mut strongest = winner;
-        let same_id = |offer: &Offer| offer.queued.frame.id() == winner.queued.frame.id();
+        let same_id = |offer: &Offer| offer.id() == winner.id();
         for rival in self.offers(winner.port + 1, start_ns).filter(same_id) {
             let difference = first_difference(&strongest.queued.frame, &rival.queued.frame);
             let Some(difference) = difference else {
@@ -224,7 +227,7 @@ struct Contest {
 }
 
 impl Contest {
-    fn admit(&mut self, offer: Offer) {
+    fn admit(&mut self, offer: Offer<'_>) {
         self.senders.add(offer.port);
         if offer.babbles.is_some() {
             self.babbling.add(offer.port);

@@ -39,7 +39,7 @@ use super::error_frame::ErrorReport;
 use super::faults::{FaultKind, FaultNote, Faults, Strike};
 use super::frame::{Frame, FrameFormat};
 use super::tap::Tapped;
-use super::wire::{Rates, frame_bits};
+use super::wire::Rates;
 use attempt::{Attempt, PortSet};
 use confinement::{Confinement, SEQUENCE_BITS};
 use queue::{Queued, ReceiveQueue, TransmitQueue};
@@ -71,6 +71,8 @@ pub struct VirtualWire {
     stations: Vec<Station>,
     tap: ReceiveQueue<Tapped>,
     faults: Faults,
+    /// What babbling nodes send, by fault.
+    babble: Vec<Option<Queued>>,
     traffic: Traffic,
     /// Attempts so far: the number by which faults choose among them.
     attempts: u64,
@@ -135,6 +137,7 @@ impl VirtualWire {
             config: *config,
             stations: (0..config.ports).map(|_| station()).collect(),
             tap: ReceiveQueue::new(config.receive_capacity * config.ports),
+            babble: faults.kinds().map(|kind| Queued::babbled(kind, config)).collect(),
             faults,
             traffic: Traffic::Unforeseen,
             attempts: 0,
@@ -166,9 +169,7 @@ impl VirtualWire {
             return Err(SendError::NotFd { length: frame.data().len() });
         }
         let queued_ns = now_ns.max(self.advanced_to_ns) + self.delay_ns(port, now_ns, &frame);
-        let duration_ns = self.config.rates.duration_ns(frame_bits(&frame));
-        let queued = Queued { frame, duration_ns, since_ns: queued_ns };
-        self.stations[port].transmit.push(queued)?;
+        self.stations[port].transmit.push(Queued::new(frame, self.config.rates, queued_ns))?;
         self.look_again();
         self.statistics.queued += 1;
         Ok(())
@@ -231,27 +232,36 @@ impl VirtualWire {
     /// Puts the next frame on the wire if it starts before `until_ns`; whether one is on it now. Until then
     /// nodes come back from bus-off, or are sent there.
     fn start_before(&mut self, until_ns: u64) -> bool {
+        if matches!(self.traffic, Traffic::Now(_)) {
+            return true;
+        }
+        // Behind a frame nothing can start yet, and what its receivers answer would have to be looked at again.
+        if self.idle_from_ns > until_ns {
+            return false;
+        }
         let sequence_ns = self.config.rates.nominal().bits_to_ns(SEQUENCE_BITS);
         loop {
             self.foresee();
             let idle_until_ns = match &self.traffic {
-                Traffic::Now(_) => return true,
                 Traffic::Next(attempt) => attempt.start_ns.min(until_ns),
-                Traffic::Nothing | Traffic::Unforeseen => until_ns,
+                _ => until_ns,
             };
-            let change = self.next_node_change(sequence_ns).filter(|change| change.at_ns <= idle_until_ns);
-            if let Some(change) = change {
-                self.apply(change);
-                continue;
+            if self.is_restless() {
+                let change = self.next_node_change(sequence_ns);
+                if let Some(change) = change.filter(|change| change.at_ns <= idle_until_ns) {
+                    self.apply(change);
+                    continue;
+                }
+                self.stay_idle_until(idle_until_ns, sequence_ns);
             }
-            self.stay_idle_until(idle_until_ns, sequence_ns);
-            match self.traffic {
+            return match self.traffic {
                 Traffic::Next(attempt) if attempt.start_ns < until_ns => {
                     self.attempts += 1;
                     self.traffic = Traffic::Now(attempt);
+                    true
                 }
-                _ => return false,
-            }
+                _ => false,
+            };
         }
     }
 
@@ -279,6 +289,12 @@ impl VirtualWire {
             }
             _ => false,
         }
+    }
+
+    /// Whether a node may leave the bus or come back while the wire is idle.
+    fn is_restless(&self) -> bool {
+        let is_off = |station: &Station| station.confinement.state() == ErrorState::BusOff;
+        !self.faults.is_empty() || self.stations.iter().any(is_off)
     }
 
     fn stay_idle_until(&mut self, until_ns: u64, sequence_ns: u64) {

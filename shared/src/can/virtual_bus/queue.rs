@@ -2,9 +2,12 @@
 
 use std::collections::VecDeque;
 
+use super::WireConfig;
 use crate::can::bus::{ReceiveError, Received, SendError};
+use crate::can::faults::FaultKind;
 use crate::can::frame::Frame;
 use crate::can::tap::Tapped;
+use crate::can::wire::{Rates, frame_bits};
 
 /// A frame waiting for the wire.
 #[derive(Debug, Clone, Copy)]
@@ -13,6 +16,18 @@ pub(super) struct Queued {
     /// Its duration on the wire, interframe space included, found once: arbitration asks for it again and again.
     pub(super) duration_ns: u64,
     pub(super) since_ns: u64,
+}
+
+impl Queued {
+    pub(super) fn new(frame: Frame, rates: Rates, since_ns: u64) -> Self {
+        Self { frame, duration_ns: rates.duration_ns(frame_bits(&frame)), since_ns }
+    }
+
+    /// What a fault makes a node send; since when changes with each attempt.
+    pub(super) fn babbled(kind: FaultKind, config: &WireConfig) -> Option<Self> {
+        let FaultKind::Babble { frame } = kind else { return None };
+        Some(Self::new(frame.promoted(config.format), config.rates, 0))
+    }
 }
 
 /// Frames in the order of priority; those of one identifier in the order they were queued.
