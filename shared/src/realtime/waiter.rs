@@ -60,11 +60,11 @@ impl Waiter {
     /// Sleeps, then spins until `due_ns`; returns the time found at the end.
     pub fn until(&mut self, due_ns: u64) -> u64 {
         let sleep_until_ns = due_ns.saturating_sub(self.reserve.ns());
-        let now_ns = self.begin();
+        let mut now_ns = self.begin();
         if now_ns < sleep_until_ns {
-            self.sleep(now_ns, sleep_until_ns);
+            now_ns = self.sleep(now_ns, sleep_until_ns);
         }
-        self.spin_until(due_ns)
+        self.spin_until(due_ns, now_ns)
     }
 
     /// As [`Self::until`]; before a deadline that is far, wakes early enough to `prepare`, which counts as work.
@@ -77,13 +77,14 @@ impl Waiter {
         if prepare_at_ns > clock::now_ns() + WORTH_PREPARING_NS {
             self.until(prepare_at_ns);
             prepare()?;
-            return Ok(self.spin_until(due_ns));
+            let now_ns = self.begin();
+            return Ok(self.spin_until(due_ns, now_ns));
         }
         Ok(self.until(due_ns))
     }
 
-    fn spin_until(&mut self, due_ns: u64) -> u64 {
-        let mut spin = self.spin();
+    fn spin_until(&mut self, due_ns: u64, from_ns: u64) -> u64 {
+        let mut spin = Spin { last_ns: from_ns, waiter: self };
         loop {
             let now_ns = spin.now_ns();
             if now_ns >= due_ns {
@@ -92,7 +93,8 @@ impl Waiter {
         }
     }
 
-    fn sleep(&mut self, from_ns: u64, until_ns: u64) {
+    /// Returns the time found at its end.
+    fn sleep(&mut self, from_ns: u64, until_ns: u64) -> u64 {
         clock::sleep_until(until_ns);
         let woke_ns = clock::now_ns();
         let late_ns = woke_ns.saturating_sub(until_ns);
@@ -102,6 +104,7 @@ impl Waiter {
             self.reserve.learn(from_ns - awake_since_ns, woke_ns - from_ns, late_ns);
         }
         self.working_since_ns = None;
+        woke_ns
     }
 
     /// Begins to spin.
