@@ -43,11 +43,16 @@ impl Ports {
             frames: node.batch_outlet()?,
             events: node.outlet()?,
         };
-        ports.readings.warm_up()?;
-        ports.truths.warm_up()?;
-        ports.frames.warm_up()?;
-        ports.events.warm_up()?;
+        ports.warm_up()?;
         Ok(ports)
+    }
+
+    /// Touches what the next messages will be written to.
+    fn warm_up(&self) -> Result<(), ProcessError> {
+        self.readings.warm_up()?;
+        self.truths.warm_up()?;
+        self.frames.warm_up()?;
+        Ok(self.events.warm_up()?)
     }
 
     /// The command of a cycle, or the newest one there is at `deadline_ns`.
@@ -103,7 +108,7 @@ fn serve<L: Link>(
     let mut plant = build(scenario, start.epoch_ns)?;
     let mut cycle = Cycle::new(start.epoch_ns, scenario.period_ns());
     while !post.stop.is_made() {
-        let wake = cycle.wait_preparing(|| plant.advance(clock::now_ns()))?;
+        let wake = cycle.wait_preparing(|| prepare(&mut plant, &ports))?;
         exchange(&mut plant, &mut ports, schedule, wake, cycle.waiter())?;
         // No command can come before the controller wakes.
         cycle.waiter().until(wake.due_ns + schedule.controller_at_ns);
@@ -119,6 +124,12 @@ fn serve<L: Link>(
         plant.apply(clock::now_ns(), None)?;
     }
     Ok(())
+}
+
+/// Works out what has happened by now, and brings the way out back into the caches.
+fn prepare(plant: &mut PlantCore<impl Link>, ports: &Ports) -> Result<(), PlantProcessError> {
+    plant.advance(clock::now_ns())?;
+    Ok(ports.warm_up()?)
 }
 
 /// SYNC, the drives' process data, and what the cycle publishes.
