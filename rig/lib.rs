@@ -5,6 +5,9 @@
 //! ([`run::virtual_time`]). Whatever a run tells of itself comes from its recording
 //! ([`analysis`]), so it can be told again.
 
+#[macro_use]
+mod say;
+
 pub mod analysis;
 pub mod bench;
 pub mod can;

@@ -12,6 +12,7 @@ use masseter_shared::messages::codes::{
 };
 use masseter_shared::messages::{Command, Event, Reading, State, pose_fields};
 
+use crate::delivery::Delivery;
 use crate::kinematics::{ForwardTracker, Solution};
 use crate::playback::Playback;
 use crate::pose_control::PoseControl;
@@ -19,12 +20,11 @@ use crate::safety::{self, Fault};
 use crate::sequence::{Happening, next};
 use crate::trajectory::Trajectory;
 
-/// Angular columns of the Jacobian are scaled by this length for the condition number, m: the
-/// platform's side.
-const CONDITION_LENGTH_M: f64 = 0.05;
-
 /// Bits of [`Reading::fresh_axes`] when all axes are fresh.
 const ALL_AXES: u32 = (1 << AXES) - 1;
+
+/// Age of a reading that comes late but is used.
+const LATE_READING_CYCLES: u64 = 1;
 
 /// Cycles for which the last command is repeated at the end, so that it arrives.
 const FAREWELL_CYCLES: u64 = 5;
@@ -58,6 +58,7 @@ pub struct Controller {
     velocity_limit_m_s: [f64; AXES],
     tracker: ForwardTracker,
     playback: Playback,
+    delivery: Delivery,
     control: PoseControl,
 
     state: ControllerState,
@@ -85,6 +86,7 @@ impl Controller {
         Self {
             tracker: ForwardTracker::new(mechanism.clone()),
             playback: Playback::new(trajectory, config.ease_s, config.stop_ramp_s),
+            delivery: Delivery::default(),
             control: PoseControl::new(&config),
             mechanism,
             config,
@@ -122,12 +124,13 @@ impl Controller {
         }
     }
 
-    /// Whether all drives report that they give no force.
+    /// Whether all drives report that they give no force: a lost one reports nothing.
     fn drives_are_off(&self) -> bool {
         self.drive_state.iter().all(|&code| {
             !matches!(
                 DriveCondition::try_from(code),
-                Ok(DriveCondition::OperationEnabled
+                Ok(DriveCondition::Unknown
+                    | DriveCondition::OperationEnabled
                     | DriveCondition::QuickStopActive
                     | DriveCondition::FaultReaction
                     | DriveCondition::SwitchedOn)
@@ -138,7 +141,10 @@ impl Controller {
     /// Takes the newest reading, if one came, and solves the forward kinematics for it.
     pub fn observe(&mut self, reading: Option<&Reading>) {
         self.silent_cycles += 1;
-        let Some(reading) = reading else { return };
+        let Some(reading) = reading else {
+            self.steady_readings = 0;
+            return;
+        };
         if let Err(fault) = self.take(reading) {
             self.steady_readings = 0;
             self.fault.get_or_insert(fault);
@@ -162,6 +168,7 @@ impl Controller {
             measured,
             solution,
         });
+        self.delivery.answer(reading.answers_cycle);
         self.silent_cycles = 0;
         self.steady_readings = self.steady_readings.saturating_add(1);
         Ok(())
@@ -188,10 +195,12 @@ impl Controller {
 
     /// Moves the sequence on, decides what to ask of the drives, and reports a change of state.
     pub fn decide(&mut self, tick: Tick) -> Option<Event> {
-        let dt_s = tick.cycle.saturating_sub(self.last_cycle).max(1) as f64 * self.period_s;
         self.last_cycle = tick.cycle;
-        self.playback.advance(dt_s);
-        let fault = self.fault.take().or_else(|| self.overdue()).or_else(|| self.control(dt_s).err());
+        // A motion that waited goes on at full speed from the target that the drives held: a period's worth, as ever.
+        if self.delivery.takes_step(tick.cycle) {
+            self.playback.advance(self.period_s);
+        }
+        let fault = self.fault.take().or_else(|| self.overdue()).or_else(|| self.control().err());
         let happening = self.happening(fault.is_some());
         let event = happening.and_then(|happening| self.follow(happening, fault, tick));
         self.cycles_in_state += 1;
@@ -218,8 +227,8 @@ impl Controller {
     }
 
     /// Pose control, inverse kinematics and limits: the targets of this cycle.
-    fn control(&mut self, dt_s: f64) -> Result<(), Fault> {
-        let wanted = self.playback.pose_ahead(-self.reading_age_s());
+    fn control(&mut self) -> Result<(), Fault> {
+        let wanted = self.playback.pose_ahead(-self.sample_age_s());
         self.wanted = Some(wanted);
         if !self.is_moving() {
             return Ok(());
@@ -228,24 +237,26 @@ impl Controller {
             && self.silent_cycles == 0
         {
             safety::check_tracking(&wanted, &estimate.solution.pose, self.config.tracking_limit_m)?;
-            self.control.observe(&wanted, &estimate.solution.pose, dt_s);
+            self.control.observe(&wanted, &estimate.solution.pose, self.period_s);
         }
         let ahead = self.playback.pose_ahead(self.config.lead_cycles * self.period_s);
         let joints = self
             .mechanism
             .inverse(&self.control.correct(&ahead))
             .map_err(|_| Fault::new(Cause::InverseKinematics, f64::NAN, 0.0))?;
-        let before = self.target.unwrap_or(joints.actuators);
-        let strokes = self.mechanism.strokes();
-        safety::check_targets(&joints.actuators, &before, strokes, &self.velocity_limit_m_s, dt_s)?;
-        self.target = Some(joints.actuators);
+        // A motion that uses its strokes to the end leaves no room for the trim, nor a start there for the encoders.
+        let target = self.mechanism.strokes().hold(&joints.actuators, self.config.trim_limit_m)?;
+        let before = self.target.unwrap_or(target);
+        safety::check_velocity(&target, &before, &self.velocity_limit_m_s, self.period_s)?;
+        self.target = Some(target);
         Ok(())
     }
 
-    /// Age of the estimate's sample against that of a reading in time, s.
-    fn reading_age_s(&self) -> f64 {
+    /// How far the motion has gone on since the estimate's sample, against a reading in time, s. What comes later than
+    /// a late reading does, it waits for.
+    fn sample_age_s(&self) -> f64 {
         let reading_cycle = self.estimate.map_or(self.last_cycle, |estimate| estimate.reading_cycle);
-        self.last_cycle.saturating_sub(reading_cycle) as f64 * self.period_s
+        self.last_cycle.saturating_sub(reading_cycle).min(LATE_READING_CYCLES) as f64 * self.period_s
     }
 
     fn is_moving(&self) -> bool {
@@ -351,7 +362,7 @@ impl Controller {
     /// Conditioning at a solution. Only reported, so it is computed after the command has gone out.
     fn condition(&self, measured: &Actuators, solution: &Solution) -> f64 {
         let joints = Joints { actuators: *measured, theta_rad: solution.theta_rad };
-        self.mechanism.jacobian(&solution.pose, &joints).condition(CONDITION_LENGTH_M)
+        self.mechanism.condition(&solution.pose, &joints)
     }
 
     /// Writes what this cycle made of the reading; the process adds its stamps.

@@ -4,6 +4,7 @@
 //! sees the plant, only its messages.
 
 pub mod core;
+mod delivery;
 pub mod kinematics;
 mod playback;
 mod pose_control;

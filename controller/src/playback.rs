@@ -1,11 +1,11 @@
 //! Where the motion stands: the move to its first pose, the motion itself, and coming to rest when
-//! it is stopped halfway. Time comes in as the cycles that have passed.
+//! it is stopped halfway. Time comes in as the steps that the motion makes, so that it waits while the drives cannot follow.
 
 use std::sync::Arc;
 
 use masseter_shared::geometry::Pose;
 
-use crate::trajectory::Trajectory;
+use crate::trajectory::{Trajectory, minimum_jerk};
 
 /// Which part is being played.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -109,12 +109,6 @@ impl Playback {
     pub(crate) fn motion_time_s(&self) -> f64 {
         if self.part == Part::Motion { self.elapsed_s } else { -1.0 }
     }
-}
-
-/// 10u³ − 15u⁴ + 6u⁵ on 0..1: from rest to rest with the least jerk.
-fn minimum_jerk(u: f64) -> f64 {
-    let u = u.clamp(0.0, 1.0);
-    u * u * u * (10.0 + u * (6.0 * u - 15.0))
 }
 
 fn interpolate(from: &Pose, to: &Pose, share: f64) -> Pose {

@@ -1,6 +1,6 @@
 //! What makes the controller stop: each check names the cause, the value and the limit it broke.
 
-use masseter_shared::geometry::{AXES, Actuators, LimitViolation, Pose, StrokeLimits};
+use masseter_shared::geometry::{AXES, Actuators, LimitViolation, Pose};
 use masseter_shared::messages::codes::{Cause, DriveCondition, NO_AXIS};
 use masseter_shared::messages::{Event, Reading};
 
@@ -98,18 +98,16 @@ pub(crate) fn check_tracking(wanted: &Pose, found: &Pose, limit_m: f64) -> Resul
     Ok(())
 }
 
-/// Whether the targets lie within the strokes and can be reached in `dt_s` at the drives' speed.
-pub(crate) fn check_targets(
+/// Whether the targets can be reached within a period at the drives' speed.
+pub(crate) fn check_velocity(
     targets: &Actuators,
     before: &Actuators,
-    strokes: &StrokeLimits,
     velocity_limit_m_s: &[f64; AXES],
-    dt_s: f64,
+    period_s: f64,
 ) -> Result<(), Fault> {
-    strokes.check(targets)?;
     let steps = targets.to_axes().into_iter().zip(before.to_axes()).map(|(to, from)| (to - from).abs());
     for (axis, (step_m, limit_m_s)) in steps.zip(velocity_limit_m_s).enumerate() {
-        let velocity_m_s = step_m / dt_s;
+        let velocity_m_s = step_m / period_s;
         if velocity_m_s > *limit_m_s {
             return Err(Fault::of_axis(Cause::VelocityLimit, axis, velocity_m_s, *limit_m_s));
         }

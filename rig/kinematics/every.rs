@@ -1,6 +1,6 @@
 //! `masseter fk --all`: every solution of an input, and which conditions it meets.
 
-use masseter_controller::kinematics::{ForwardError, Solution, Solutions, solve_completely};
+use masseter_controller::kinematics::{ForwardError, Solution, Solutions, nearest_assembly_m};
 use masseter_shared::geometry::{Actuators, LEGS, Mechanism};
 use masseter_shared::messages::pose_fields;
 
@@ -49,20 +49,20 @@ pub(super) fn every_solution(args: &CsvArgs, mechanism: &Mechanism) -> Result<Ex
                     lines.row(&row(line, mechanism, &actuators, &solutions, solution), status);
                 }
             }
-            Ok(_) => tell_none(line, solve_completely(mechanism, &actuators).err(), lines),
-            Err(error) => tell_none(line, Some(error), lines),
+            Ok(_) => {
+                let nearest_m = nearest_assembly_m(mechanism, &actuators);
+                tell_none(line, nearest_m, &ForwardError::Unassemblable, lines);
+            }
+            Err(error) => tell_none(line, f64::NAN, &error, lines),
         }
         Ok(())
     })
 }
 
-fn tell_none(line: u64, error: Option<ForwardError>, lines: &mut Lines) {
+fn tell_none(line: u64, nearest_m: f64, error: &ForwardError, lines: &mut Lines) {
     let mut values = [f64::NAN; COLUMNS_OUT.len()];
-    values[0] = line as f64;
-    if let Some(ForwardError::Unassemblable { nearest_m }) = error {
-        values[COLUMNS_OUT.len() - 1] = nearest_m;
-    }
-    lines.row(&values, error.map_or("unassemblable", |error| error.reason()));
+    (values[0], values[COLUMNS_OUT.len() - 1]) = (line as f64, nearest_m);
+    lines.row(&values, error.reason());
 }
 
 fn row(
@@ -104,5 +104,5 @@ fn row(
 /// Of actuator rates to the platform's twist.
 fn condition(mechanism: &Mechanism, actuators: &Actuators, solution: &Solution) -> f64 {
     let joints = masseter_shared::geometry::Joints { actuators: *actuators, theta_rad: solution.theta_rad };
-    mechanism.jacobian(&solution.pose, &joints).condition(mechanism.platform_sides_m()[0])
+    mechanism.condition(&solution.pose, &joints)
 }

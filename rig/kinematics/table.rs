@@ -147,7 +147,7 @@ fn stream<const IN: usize>(
             for lines in solve(&batch) {
                 output.write_all(&lines.text)?;
                 for (line, reason) in lines.refusals {
-                    eprintln!("{name}:{line}: {reason}");
+                    tell!("{name}:{line}: {reason}");
                     exit = Exit::Usage;
                 }
             }

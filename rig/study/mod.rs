@@ -86,16 +86,16 @@ impl Study {
         let mechanism = Mechanism::new(&MechanismConfig::default())?;
         let motions = motions::motions(&mechanism, args.trajectory.as_deref())?;
         let (samples, cells) = (args.samples as usize, args.cells as usize);
-        eprintln!("{samples} random guesses of each kind");
+        tell!("{samples} random guesses of each kind");
         let trials = Trials::run(&mechanism, samples, args.seed);
         let pairs = Pairs::find(&mechanism, &trials);
         let set = SolutionSet::neutral(&mechanism)?;
         let multiplicity = Multiplicity::count(&mechanism, samples, args.seed);
-        eprintln!("maps of {cells} by {cells} cells");
+        tell!("maps of {cells} by {cells} cells");
         let basins = Basins::map(&mechanism, &set, cells);
         let middle = set.true_one().map_or_else(Vec3::zeros, |truth| truth.pose.translation.vector);
         let maps = SLICES.map(|slice| Map::of(&mechanism, slice, &middle, cells)).into();
-        eprintln!("times");
+        tell!("times");
         let speed = Speed::measure(&mechanism, &trials, &motions[0]);
         Ok(Self { mechanism, trials, pairs, speed, set, multiplicity, basins, motions, maps })
     }
@@ -110,15 +110,15 @@ impl Study {
         for table in self.tables() {
             table.write(folder).with_context(|| written(table.name))?;
         }
-        eprintln!("{} figures", figures.len());
+        tell!("{} figures", figures.len());
         figures
             .par_iter()
             .try_for_each(|figure| write_figure(folder, figure).with_context(|| written(figure.name)))?;
         fs::write(folder.join("claims.md"), page).with_context(|| written("claims.md"))?;
         for claim in &claims {
-            println!("{:<13}  {}", claim.verdict.name(), claim.says);
+            show_line!("{:<13}  {}", claim.verdict.name(), claim.says);
         }
-        println!("{}", folder.join("claims.md").display());
+        show_line!("{}", folder.join("claims.md").display());
         Ok(Exit::Passed)
     }
 

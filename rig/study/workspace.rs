@@ -200,7 +200,7 @@ fn place(mechanism: &Mechanism, pose: &Pose) -> Option<Place> {
     let here = solutions.iter().min_by(|a, b| distance(&a.theta_rad).total_cmp(&distance(&b.theta_rad)))?;
     let regular_rad = here.certificate.map_or(0.0, |proof| proof.regular_within_rad);
     Some(Place {
-        condition: mechanism.jacobian(pose, &joints).condition(mechanism.platform_sides_m()[0]),
+        condition: mechanism.condition(pose, &joints),
         determinant: here.determinant,
         regular_within_deg: regular_rad.to_degrees(),
         separation_deg: solutions.separation_rad(here).unwrap_or(f64::NAN).to_degrees(),

@@ -115,7 +115,7 @@ fn to_prove(args: &ProveArgs) -> anyhow::Result<(Mechanism, Vec<InputBox>)> {
     };
     let plan = Plan::resolve(&run)?;
     let wholes = motion::boxes(&plan, around_mm * 1e-3)?;
-    println!("{}: {} boxes around its inputs", plan.scenario.name, wholes.len());
+    show_line!("{}: {} boxes around its inputs", plan.scenario.name, wholes.len());
     Ok((plan.mechanism, wholes))
 }
 

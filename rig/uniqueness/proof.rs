@@ -23,10 +23,10 @@ struct Tally {
 pub(super) fn prove(args: &ProveArgs, mechanism: &Mechanism, wholes: Vec<InputBox>) -> (bool, Vec<String>) {
     let claim = args.margin.map_or(Claim::SeedConditions, Claim::DeterminantAtLeast);
     let (tally, undecided) = branch_and_bound(&Proof::new(mechanism, claim), wholes, args.boxes);
-    println!("boxes examined       {}", tally.examined);
-    println!("no solution          {:.4} % of the volume", 100.0 * tally.unsolvable_share);
-    println!("at most one solution {:.4} % of the volume", 100.0 * tally.unique_share);
-    println!("undecided            {} boxes", undecided.len());
+    show_line!("boxes examined       {}", tally.examined);
+    show_line!("no solution          {:.4} % of the volume", 100.0 * tally.unsolvable_share);
+    show_line!("at most one solution {:.4} % of the volume", 100.0 * tally.unique_share);
+    show_line!("undecided            {} boxes", undecided.len());
     let header = AXIS_NAMES.map(|axis| format!("{axis}_low_m,{axis}_high_m")).join(",");
     let row =
         |(inputs, _): &Open| inputs.axes().map(|axis| format!("{},{}", axis.low(), axis.high())).join(",");
@@ -51,7 +51,7 @@ fn branch_and_bound(proof: &Proof, wholes: Vec<InputBox>, most: usize) -> (Tally
             }
         }
         let decided = tally.unsolvable_share + tally.unique_share;
-        eprintln!("{} boxes examined, {:.2} % of the volume decided", tally.examined, 100.0 * decided);
+        tell!("{} boxes examined, {:.2} % of the volume decided", tally.examined, 100.0 * decided);
         open = halves;
         share_of_one /= 2.0;
     }

@@ -38,16 +38,16 @@ pub(super) fn search(args: &SearchArgs, mechanism: &Mechanism) -> (bool, Vec<Str
     }
     found.sort_by(|a, b| b.lesser.total_cmp(&a.lesser));
     let both_positive = found.iter().filter(|one| one.lesser > 0.0).count();
-    println!("random inputs                                   {}", args.inputs);
-    println!("with a solution that meets the seed's conditions {standing}");
-    println!("with two of them                                {}", found.len());
-    println!("with two whose determinants are positive        {both_positive}");
+    show_line!("random inputs                                   {}", args.inputs);
+    show_line!("with a solution that meets the seed's conditions {standing}");
+    show_line!("with two of them                                {}", found.len());
+    show_line!("with two whose determinants are positive        {both_positive}");
     found.truncate(CLIMBS);
     let mut climbed: Vec<Found> =
         found.into_iter().map(|start| climb(mechanism, &limits, start, &mut random)).collect();
     climbed.sort_by(|a, b| b.lesser.total_cmp(&a.lesser));
     if let Some(best) = climbed.first() {
-        println!("greatest lesser determinant, after climbing     {:.4} at {:?}", best.lesser, best.axes_m);
+        show_line!("greatest lesser determinant, after climbing     {:.4} at {:?}", best.lesser, best.axes_m);
     }
     let header = AXIS_NAMES.map(|axis| format!("{axis}_m")).join(",") + ",lesser_determinant";
     let row = |one: &Found| one.axes_m.map(|value| value.to_string()).join(",") + &format!(",{}", one.lesser);

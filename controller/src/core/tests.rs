@@ -13,21 +13,28 @@ struct Bench {
     cycle: u64,
     commands: [Command; 2],
     events: Vec<Event>,
+    /// The largest step of any axis from one target that the drives took to the next, m.
+    largest_step_m: f64,
 }
 
 impl Bench {
     fn new() -> Self {
+        Self::standing_at([0.29; LEGS])
+    }
+
+    fn standing_at(leg_m: [f64; LEGS]) -> Self {
         let scenario = Scenario { duration_s: Some(1.5), ..Scenario::default() };
         let mechanism = Mechanism::new(&MechanismConfig::default()).unwrap();
         let motion = MotionConfig::default();
         let trajectory = Trajectory::new(&motion, &scenario.jaw, &mechanism, scenario.duration_s).unwrap();
-        let at_start = Actuators { slide_m: [0.0; LEGS], leg_m: [0.29; LEGS] };
+        let at_start = Actuators { slide_m: [0.0; LEGS], leg_m };
         let start = Command { target_m: at_start.to_axes(), ..Command::default() };
         Self {
             controller: Controller::new(&scenario, mechanism, trajectory),
             cycle: 0,
             commands: [start; 2],
             events: Vec::new(),
+            largest_step_m: 0.0,
         }
     }
 
@@ -39,7 +46,7 @@ impl Bench {
         };
         Reading {
             cycle: self.cycle + 1,
-            answers_cycle: self.cycle,
+            answers_cycle: last.cycle,
             position_m: told.target_m,
             drive_state: [state.code(); AXES],
             fresh_axes: ALL_AXES,
@@ -50,17 +57,51 @@ impl Bench {
     /// A cycle with the reading that `disturb` makes of the good one.
     fn cycle(&mut self, disturb: impl FnOnce(Reading) -> Option<Reading>) {
         let reading = disturb(self.reading());
+        let command = self.controller_cycle(reading.as_ref());
+        self.take(command);
+    }
+
+    fn controller_cycle(&mut self, reading: Option<&Reading>) -> Command {
         self.cycle += 1;
-        self.controller.observe(reading.as_ref());
+        self.controller.observe(reading);
         let tick = Tick { cycle: self.cycle, now_ns: self.cycle * PERIOD_NS };
         self.events.extend(self.controller.decide(tick));
         let mut command = Command::default();
         self.controller.fill_command(&mut command);
+        command
+    }
+
+    fn take(&mut self, mut command: Command) {
+        let last = self.commands[1];
         if command.request == DriveRequest::Off.code() {
-            command.target_m = self.commands[1].target_m;
+            command.target_m = last.target_m;
         }
-        self.commands.rotate_left(1);
-        self.commands[1] = command;
+        let steps_m = command.target_m.iter().zip(last.target_m).map(|(to_m, from_m)| (to_m - from_m).abs());
+        self.largest_step_m = steps_m.fold(self.largest_step_m, f64::max);
+        self.commands = [last, command];
+    }
+
+    /// Cycles that the controller misses: the drives reach their last target and hold it.
+    fn controller_stalls(&mut self, cycles: u64) {
+        self.cycle += cycles;
+        self.commands[0] = self.commands[1];
+    }
+
+    /// Cycles without SYNC: the controller gets no reading, and nobody takes its commands.
+    fn plant_stalls(&mut self, cycles: u64) {
+        for _ in 0..cycles {
+            self.controller_cycle(None);
+        }
+    }
+
+    /// Plays the motion with something happening in its midst.
+    fn played(happening: impl FnOnce(&mut Self)) -> Self {
+        let mut bench = Self::new();
+        bench.run_until(ControllerState::Running);
+        (0..730).for_each(|_| bench.cycle(Some));
+        happening(&mut bench);
+        bench.run_until(ControllerState::Finished);
+        bench
     }
 
     fn run_until(&mut self, state: ControllerState) {
@@ -119,6 +160,19 @@ fn what_is_wanted_at_a_sample_is_found_there() {
     }
     // The plant is exact, so what is left is the trim's own doing.
     assert!(worst_m < 2e-5, "{worst_m}");
+}
+
+/// The encoders count the end of the stroke as a little outside.
+#[test]
+fn a_rig_that_stands_at_the_end_of_its_strokes_eases_away_from_it() {
+    let lowest_m = MechanismConfig::default().strokes.leg_m[0];
+    let mut bench = Bench::standing_at([lowest_m - 1e-6, lowest_m, lowest_m - 2e-6]);
+    bench.run_until(ControllerState::Easing);
+    while bench.controller.state() == ControllerState::Easing {
+        bench.cycle(Some);
+        assert!(bench.commands[1].target_m[LEGS..].iter().all(|&leg_m| leg_m >= lowest_m));
+    }
+    assert_eq!(bench.controller.state(), ControllerState::Running);
 }
 
 #[test]
@@ -187,6 +241,25 @@ fn whatever_goes_wrong_while_moving_ends_in_a_safe_stop_with_its_cause() {
     }
 }
 
+/// Its quick stop may still be under way, and the command must go on asking for it.
+#[test]
+fn a_safe_stop_waits_for_a_lost_drive_until_its_time_is_over() {
+    let mut bench = Bench::new();
+    bench.run_until(ControllerState::Running);
+    let lose = |mut reading: Reading| {
+        reading.drive_state[3] = DriveCondition::Unknown.code();
+        Some(reading)
+    };
+    let waits = (SAFE_STOP_S / bench.controller.period_s) as u64;
+    for _ in 1..waits {
+        bench.cycle(lose);
+        assert_eq!(bench.controller.state(), ControllerState::SafeStop);
+        assert!(!bench.controller.is_done());
+    }
+    bench.cycle(lose);
+    assert!(bench.controller.is_done());
+}
+
 #[test]
 fn a_late_reading_is_compared_with_the_pose_wanted_at_its_own_sample() {
     let mut bench = Bench::new();
@@ -201,6 +274,61 @@ fn a_late_reading_is_compared_with_the_pose_wanted_at_its_own_sample() {
     assert_eq!(state.reading_cycle + 1, state.cycle);
     let wanted = nalgebra::Vector3::from(state.desired_position_m);
     assert!((wanted - nalgebra::Vector3::from(state.estimated_position_m)).norm() < 5e-5);
+}
+
+/// Each for 15 cycles, and what the run is longer by.
+#[test]
+fn after_a_stall_the_motion_goes_on_where_the_drives_stand_and_never_catches_up_in_a_burst() {
+    type Stall = fn(&mut Bench);
+    let undisturbed = Bench::played(|_| ());
+    let stalls: [(&str, Stall); 3] = [
+        ("controller", |bench| bench.controller_stalls(15)),
+        ("plant", |bench| bench.plant_stalls(15)),
+        ("both", |bench| bench.cycle += 15),
+    ];
+    for (who, stall) in stalls {
+        let stalled = Bench::played(stall);
+        let (step_m, usual_m) = (stalled.largest_step_m, undisturbed.largest_step_m);
+        assert!(step_m < 1.01 * usual_m, "{who}: {step_m} m in one cycle, otherwise {usual_m} m");
+        let longer = stalled.cycle - undisturbed.cycle;
+        assert!((14..=16).contains(&longer), "{who}: {longer} cycles longer");
+    }
+}
+
+/// What is wanted stands still with the drives: within what the motion makes in a cycle.
+#[test]
+fn a_stall_is_not_taken_for_lost_tracking() {
+    let usual_m = Bench::played(|_| ()).largest_step_m;
+    for stall in [Bench::controller_stalls, Bench::plant_stalls] {
+        let bench = Bench::played(|bench| {
+            stall(bench, 15);
+            for _ in 0..5 {
+                bench.cycle(Some);
+                let mut state = State::default();
+                bench.controller.fill_state(&mut state);
+                let wanted = nalgebra::Vector3::from(state.desired_position_m);
+                let error_m = (wanted - nalgebra::Vector3::from(state.estimated_position_m)).norm();
+                assert!(error_m < 1.5 * usual_m, "{error_m}");
+            }
+        });
+        assert!(bench.events.iter().all(|event| event.kind == EventKind::Transition.code()));
+    }
+}
+
+/// One missing among every ten is never ten in a row.
+#[test]
+fn the_drives_are_switched_on_only_after_complete_readings_in_a_row() {
+    type Disturbance = fn(Reading) -> Option<Reading>;
+    let gaps: [Disturbance; 2] = [|_| None, |reading| Some(Reading { fresh_axes: ALL_AXES - 1, ..reading })];
+    for gap in gaps {
+        let mut bench = Bench::new();
+        for cycle in 1..=100 {
+            bench.cycle(if cycle % 10 == 0 { gap } else { Some });
+        }
+        assert_eq!(bench.controller.state(), ControllerState::WaitReadings);
+        (0..10).for_each(|_| bench.cycle(Some));
+        assert_eq!(bench.controller.state(), ControllerState::Enabling);
+    }
 }
 
 #[test]

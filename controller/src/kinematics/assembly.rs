@@ -4,7 +4,7 @@
 //! beyond A₃ along slide 1. Read without a sign for the plane they leave several candidates, so the
 //! plane is oriented here by (A₂−A₁)×(A₃−A₁), the legs must stand above the base, and the Jacobian's
 //! determinant must be positive. These together do *not* always leave one solution: near the
-//! edge of the strokes about one assemblable input in 40,000 has two (see
+//! edge of the strokes about one standing input in 23,000 has two (see
 //! [`uniqueness`](super::uniqueness)), and nothing here relies on there being one.
 
 use std::fmt;

@@ -38,9 +38,6 @@ pub struct Certificate {
     pub exists_within_m: f64,
     /// R: no other solution is closer to the computed angles, radians.
     pub unique_within_rad: f64,
-    /// The same for the platform's corners as they travel on their circles, metres: R times the
-    /// shortest leg.
-    pub unique_within_m: f64,
     /// Within this distance the Jacobian is not singular, radians.
     pub regular_within_rad: f64,
 }
@@ -77,7 +74,6 @@ impl Certificate {
             exists_within_rad,
             exists_within_m: exists_within_rad * leg_m[0].max(leg_m[1]).max(leg_m[2]),
             unique_within_rad,
-            unique_within_m: unique_within_rad * leg_m[0].min(leg_m[1]).min(leg_m[2]),
             regular_within_rad: margin / curvature / OUTWARD,
         })
     }

@@ -11,13 +11,16 @@
 //! legs leaves it as it is, degree 8 in x: the known 16 solutions in 8 mirrored pairs.
 //!
 //! Completeness: at every real solution both chains close, so x lies in the one interval where both
-//! do, and r(x) = 0. r is known there from nine values, each of which is a product of real numbers
-//! without cancellation; [`bernstein`](super::bernstein) reports every place where it can be zero.
-//! Where one zero is isolated, the one pair whose g₂₃ changes sign is followed to it: first by Newton's
-//! iteration, whose result is the one that belongs there if its x does. Where several
-//! meet or the polynomial drowns in rounding, as at the neutral input with its triple zeros, which
-//! belong to three different pairs of headings, every pair is tried from three points. Each result is
-//! polished on the three equations themselves, so nothing that is no solution is found.
+//! do, and r(x) = 0. r is known there from nine values, each a product of four g₂₃. A g₂₃ cancels where a
+//! solution is near, so a value is off by roundings of its terms, not of its own size.
+//! [`bernstein`](super::bernstein) reports every place where r can be zero as long as these are small against
+//! the largest of the nine values. That is not proven; tests against random starts and dense grids have found
+//! no exception. Where one zero is isolated and, as it must, exactly one pair's g₂₃ changes sign, that pair is
+//! followed to it: first by Newton's iteration, whose result is the one that belongs there if its x does.
+//! Where another number of pairs does, where several zeros meet, or where the polynomial drowns in rounding, as
+//! at the neutral input with its triple zeros, which belong to three different pairs of headings, every pair is
+//! tried from three points. Each result is polished on the three equations themselves, so nothing that is no
+//! solution is found.
 //!
 //! What rounding leaves open: two solutions closer than `MERGED_WITHIN_RAD` (of [`platforms`](super::platforms)) count
 //! as one, and solutions that meet (the input is on a singularity) may be found or missed as a pair.
@@ -121,7 +124,8 @@ impl<'a> Elimination<'a> {
     /// The solution in an interval that holds exactly one, if it is wanted.
     fn follow(&self, wanted: Wanted, within: Interval, found: &mut impl FnMut(Closed)) {
         let (low, high) = (self.closing_values(within.low), self.closing_values(within.high));
-        let Some(pair) = (0..PAIRS).find(|&pair| (low[pair] > 0.0) != (high[pair] > 0.0)) else {
+        let mut changing = (0..PAIRS).filter(|&pair| (low[pair] > 0.0) != (high[pair] > 0.0));
+        let (Some(pair), None) = (changing.next(), changing.next()) else {
             return self.try_all(within, found);
         };
         if wanted == Wanted::PositiveDeterminant && !has_positive_determinant(pair, low[pair] < high[pair]) {

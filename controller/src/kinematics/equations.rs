@@ -6,6 +6,8 @@
 use masseter_shared::geometry::{Actuators, LEGS, Mechanism, Vec3};
 use nalgebra::{Matrix3, Vector3};
 
+use super::closure::next;
+
 /// The equations for one input: what stays the same while the leg angles vary.
 #[derive(Debug, Clone, Copy)]
 pub struct Equations<'a> {
@@ -96,11 +98,6 @@ impl Evaluation {
     pub fn residual_norm_m(&self) -> f64 {
         self.residual_m.iter().fold(0.0, |worst: f64, f| if f.abs() <= worst { worst } else { f.abs() })
     }
-}
-
-/// The leg at the far end of the side that starts at this one.
-fn next(leg: usize) -> usize {
-    (leg + 1) % LEGS
 }
 
 #[cfg(test)]

@@ -58,14 +58,8 @@ pub enum ForwardError {
         leg_m: f64,
     },
     /// No leg angles close the platform's triangle: there are no real solutions.
-    #[error(
-        "the mechanism cannot be assembled: whatever the leg angles, the sides of the platform are off by \
-         {nearest_m:e} m; check the six inputs"
-    )]
-    Unassemblable {
-        /// The least √(f₁² + f₂² + f₃²) that was found, metres.
-        nearest_m: f64,
-    },
+    #[error("the mechanism cannot be assembled, whatever the leg angles; check the six inputs")]
+    Unassemblable,
     /// More than one solution fulfils every condition of the true one.
     #[error(
         "ambiguous: {count} solutions stand as the mechanism is assembled, {separation_rad} rad apart; \
@@ -95,7 +89,7 @@ impl ForwardError {
             Self::Singular { .. } => "singular",
             Self::WrongAssembly { .. } => "wrong_assembly",
             Self::NoLength { .. } => "no_length",
-            Self::Unassemblable { .. } => "unassemblable",
+            Self::Unassemblable => "unassemblable",
             Self::Ambiguous { .. } => "ambiguous",
             Self::Undecided { .. } => "undecided",
         }
@@ -108,8 +102,8 @@ impl ForwardError {
             Self::NoConvergence { residual_m, .. }
             | Self::Stalled { residual_m, .. }
             | Self::Singular { residual_m, .. } => Some(residual_m),
-            Self::Unassemblable { nearest_m } => Some(nearest_m),
             Self::NotFinite
+            | Self::Unassemblable
             | Self::WrongAssembly { .. }
             | Self::NoLength { .. }
             | Self::Ambiguous { .. }

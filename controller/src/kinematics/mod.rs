@@ -33,13 +33,14 @@ pub use certificate::Certificate;
 pub use complete::solve_completely;
 pub use equations::{Equations, Evaluation};
 pub use error::ForwardError;
+pub use nearest::nearest_assembly_m;
 pub use solution::Solution;
 pub use solutions::{MOST_SOLUTIONS, Solutions};
 pub use solver::{
     Iteration, MAX_HALVINGS, MAX_ITERATIONS, Method, Options, Residual, StepRule, solve, solve_newton,
     solve_seed, solve_traced,
 };
-pub use tracker::{ForwardTracker, WARM_ITERATIONS};
+pub use tracker::ForwardTracker;
 
 #[cfg(test)]
 mod samples;

@@ -4,6 +4,7 @@
 //! the platform's sides would have to give. It is searched by descent from the best of a grid of
 //! starts of a bounded number of steps, so it is an upper bound: other angles may come a little closer.
 
+use masseter_shared::geometry::{Actuators, Mechanism};
 use nalgebra::{Matrix3, Vector3};
 
 use super::Equations;
@@ -23,10 +24,11 @@ const HARDLY_LESS: f64 = 1.0 - 1e-5;
 /// So is one that turns no leg by more, radians.
 const HARDLY_TURNED_RAD: f64 = 1e-7;
 
-/// The least √(f₁² + f₂² + f₃²) found, metres.
-pub(super) fn nearest_m(closure: &Closure<'_>) -> f64 {
-    let equations = Equations::new(closure.mechanism, &closure.actuators);
-    let elimination = Elimination::new(closure);
+/// The least √(f₁² + f₂² + f₃²) found, metres. It takes many times as long as finding that there is no solution.
+pub fn nearest_assembly_m(mechanism: &Mechanism, actuators: &Actuators) -> f64 {
+    let closure = Closure::new(mechanism, actuators);
+    let equations = Equations::new(mechanism, actuators);
+    let elimination = Elimination::new(&closure);
     let mut least_m2 = f64::INFINITY;
     for stretch in 0..STRETCHES {
         for start in best_starts(&equations, &elimination, stretch) {
@@ -83,7 +85,7 @@ fn descended_m2(equations: &Equations<'_>, start: Vector3<f64>) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use masseter_shared::geometry::{Actuators, LEGS};
+    use masseter_shared::geometry::LEGS;
     use proptest::prelude::*;
 
     use super::*;
@@ -108,7 +110,7 @@ mod tests {
             slide_m in prop::array::uniform3(-0.03..0.03f64), leg_m in prop::array::uniform3(0.2..0.34f64),
         ) {
             let (mechanism, actuators) = (seed_mechanism(), Actuators { slide_m, leg_m });
-            let nearest = nearest_m(&Closure::new(&mechanism, &actuators));
+            let nearest = nearest_assembly_m(&mechanism, &actuators);
             let on_a_grid = on_a_grid_m(&Equations::new(&mechanism, &actuators));
             prop_assert!(nearest <= 1.01 * on_a_grid + 1e-12, "{nearest} m, on a grid {on_a_grid} m");
         }
@@ -119,7 +121,7 @@ mod tests {
     fn legs_that_cannot_meet_are_as_far_off_as_they_are_apart() {
         let actuators = Actuators { slide_m: [0.0; LEGS], leg_m: [0.01, 0.01, 0.06] };
         let mechanism = seed_mechanism();
-        let found_m = nearest_m(&Closure::new(&mechanism, &actuators));
+        let found_m = nearest_assembly_m(&mechanism, &actuators);
         assert!(found_m > 0.03 && found_m < 0.05, "{found_m}");
     }
 }

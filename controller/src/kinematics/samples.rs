@@ -1,6 +1,6 @@
 //! Random mechanisms and poses for the tests of this module.
 
-use masseter_shared::geometry::{Mechanism, MechanismConfig, Pose, SlideConfig, Vec3};
+use masseter_shared::geometry::{Actuators, Mechanism, MechanismConfig, Pose, SlideConfig, Vec3};
 use nalgebra::{Translation3, UnitQuaternion};
 use proptest::prelude::*;
 
@@ -40,3 +40,9 @@ pub(super) fn angle_between(a: &Pose, b: &Pose) -> f64 {
     let turn: Vec3 = (a.rotation.inverse() * b.rotation).scaled_axis();
     turn.norm()
 }
+
+/// An input with two solutions that meet every condition, the determinants being 0.045 and more.
+pub(super) const AMBIGUOUS: Actuators = Actuators {
+    slide_m: [0.010_137_353_810_067_46, 0.015_926_592_372_227_42, 0.020_840_656_757_742_57],
+    leg_m: [0.246_449_456_124_783_5, 0.287_523_749_262_044_8, 0.270_252_791_539_176_8],
+};

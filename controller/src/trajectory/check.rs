@@ -2,7 +2,8 @@
 //!
 //! The whole trajectory is sampled at the controller's cycle: inverse kinematics, the conditions of
 //! the true solution, strokes, velocities and accelerations by differences, and conditioning. It does
-//! not look at forces, nor at how the rig gets to the first pose.
+//! not look at forces, nor at how the rig gets to the first pose, nor at the trim: a target that the trim
+//! carries beyond a stroke is held at its end.
 
 use masseter_shared::config::TrajectoryLimitsConfig;
 use masseter_shared::geometry::{
@@ -12,9 +13,6 @@ use masseter_shared::geometry::{
 use crate::kinematics::{Assembly, Condition};
 
 use super::{SourceLine, Trajectory};
-
-/// Length by which angular velocities are made comparable with velocities, metres.
-const CONDITION_LENGTH_M: f64 = 0.05;
 
 /// What a trajectory asks of the axes, in the order d₁ d₂ d₃ l₁ l₂ l₃.
 #[derive(Debug, Clone, PartialEq)]
@@ -29,7 +27,7 @@ pub struct TrajectoryReport {
     pub velocity_m_s: [f64; AXES],
     /// Largest acceleration, m/s².
     pub acceleration_m_s2: [f64; AXES],
-    /// Largest condition number of the 6×6 Jacobian, angular velocities scaled by 5 cm.
+    /// Largest condition number of the 6×6 Jacobian, angular velocities scaled by the platform's side A₁A₂.
     pub condition: f64,
 }
 
@@ -101,7 +99,7 @@ pub enum CheckProblem {
         "condition number {condition:.1}, limit {limit}: too close to a singularity; make the motion smaller"
     )]
     Condition {
-        /// Of the 6×6 Jacobian, angular velocities scaled by 5 cm.
+        /// Of the 6×6 Jacobian, angular velocities scaled by the platform's side A₁A₂.
         condition: f64,
         /// The limit.
         limit: f64,
@@ -179,7 +177,7 @@ impl<'a> Survey<'a> {
         {
             return Err(CheckProblem::Assembly(violated));
         }
-        let condition = self.mechanism.jacobian(&pose, &joints).condition(CONDITION_LENGTH_M);
+        let condition = self.mechanism.condition(&pose, &joints);
         self.report.condition = self.report.condition.max(condition);
         let limit = self.limits.max_condition;
         if condition > limit { Err(CheckProblem::Condition { condition, limit }) } else { Ok(axes_m) }

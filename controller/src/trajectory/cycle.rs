@@ -69,8 +69,8 @@ impl Cycle {
     }
 }
 
-/// 10x³ − 15x⁴ + 6x⁵, held at 0 below and at 1 above.
-pub(super) fn minimum_jerk(x: f64) -> f64 {
+/// 10x³ − 15x⁴ + 6x⁵, from rest to rest with the least jerk; held at 0 below and at 1 above.
+pub(crate) fn minimum_jerk(x: f64) -> f64 {
     let x = x.clamp(0.0, 1.0);
     x * x * x * (10.0 + x * (6.0 * x - 15.0))
 }

@@ -45,8 +45,4 @@ impl JawFrame {
     pub(super) fn platform(&self, displacement: &Pose) -> Pose {
         self.jaw * displacement * self.platform_in_jaw
     }
-
-    pub(super) fn closed(&self) -> Pose {
-        self.platform(&Pose::identity())
-    }
 }

@@ -30,6 +30,8 @@ pub use check::{CheckError, CheckProblem, TrajectoryReport, check};
 pub use error::TrajectoryError;
 pub use import::{ImportError, ImportProblem, SourceLine};
 
+pub(crate) use cycle::minimum_jerk;
+
 use chewing::Chewing;
 use clock::{MotionClock, RAMP_S};
 use excursion::Excursion;
@@ -91,11 +93,6 @@ impl Trajectory {
     /// How long the trajectory lasts, s.
     pub fn duration_s(&self) -> f64 {
         self.clock.duration_s()
-    }
-
-    /// The platform at the closed (intercuspal) pose, base frame.
-    pub fn closed_pose(&self) -> Pose {
-        self.frame.closed()
     }
 
     /// The line of the recording nearest to a time of the trajectory; none for a generator.

@@ -12,8 +12,9 @@ use super::import::{ImportProblem, Located, Samples, SourceLine};
 use super::lowpass::lowpass;
 use super::spline::Spline;
 
-/// Rate of the even grid, Hz: well above what a jaw tracker records and a jaw does.
-const GRID_HZ: f64 = 200.0;
+/// Least rate of the even grid, Hz: well above what a jaw does. What is sampled faster keeps its rate, because what a
+/// slower grid cannot hold would return on it as slow motion, which the filter passes.
+const LEAST_GRID_HZ: f64 = 200.0;
 /// Beyond this, rotation vectors are no longer a good measure of the way between two poses.
 const LARGEST_TURN_DEG: f64 = 90.0;
 
@@ -33,7 +34,8 @@ impl Recording {
         let first_rotation = samples.displacements[0].rotation;
         let coordinates = coordinates(&samples, &first_rotation)?;
         let time_s: Vec<f64> = samples.time_s.iter().map(|t_s| t_s - samples.time_s[0]).collect();
-        let curve = smoothed(Spline::through(time_s.clone(), coordinates), length(&time_s), lowpass_hz);
+        let raw = Spline::through(time_s.clone(), coordinates);
+        let curve = if lowpass_hz == 0.0 { raw } else { smoothed(&raw, &time_s, lowpass_hz) };
         Ok(Self { path, time_s, lines: samples.lines, first_rotation, curve })
     }
 
@@ -75,11 +77,9 @@ fn coordinates(samples: &Samples, first: &UnitQuaternion<f64>) -> Result<Vec<Vec
     samples.displacements.iter().zip(&samples.lines).map(coordinates).collect()
 }
 
-fn smoothed(raw: Spline<6>, length_s: f64, lowpass_hz: f64) -> Spline<6> {
-    if lowpass_hz == 0.0 {
-        return raw;
-    }
-    let steps = (length_s * GRID_HZ).ceil().max(1.0) as u32;
+fn smoothed(raw: &Spline<6>, time_s: &[f64], lowpass_hz: f64) -> Spline<6> {
+    let length_s = length(time_s);
+    let steps = (length_s * LEAST_GRID_HZ).ceil().max((time_s.len() - 1) as f64) as u32;
     let grid_s: Vec<f64> = (0..=steps).map(|k| length_s * f64::from(k) / f64::from(steps)).collect();
     let even: Vec<_> = grid_s.iter().map(|&t_s| raw.at(t_s)).collect();
     let filtered = lowpass(&even, f64::from(steps) / length_s, lowpass_hz);
@@ -91,7 +91,12 @@ mod tests {
     use super::*;
 
     fn samples(poses: impl Fn(f64) -> Pose) -> Samples {
-        let time_s: Vec<f64> = (0..=100).map(|k| 5.0 + f64::from(k) / 50.0).collect();
+        samples_at(50.0, poses)
+    }
+
+    /// Two seconds.
+    fn samples_at(rate_hz: f64, poses: impl Fn(f64) -> Pose) -> Samples {
+        let time_s: Vec<f64> = (0..=(2.0 * rate_hz) as u32).map(|k| 5.0 + f64::from(k) / rate_hz).collect();
         let displacements = time_s.iter().map(|t_s| poses(t_s - 5.0)).collect();
         Samples { lines: (3..).take(time_s.len()).collect(), time_s, displacements }
     }
@@ -113,6 +118,18 @@ mod tests {
                 assert!((got.translation.vector - wanted.translation.vector).norm() < 5e-5, "{t_s}");
                 assert!(got.rotation.angle_to(&wanted.rotation) < 5e-4, "{t_s}");
             }
+        }
+    }
+
+    /// 195 Hz sampled at 200 Hz would be 5 Hz.
+    #[test]
+    fn fast_noise_of_a_fast_recording_does_not_become_slow_motion() {
+        let trembling =
+            |t_s: f64| Pose::translation(0.0, 0.0, 0.001 * (std::f64::consts::TAU * 195.0 * t_s).sin());
+        let recording = Recording::new("a.csv".into(), samples_at(1000.0, trembling), 12.0).ok().unwrap();
+        for k in 20..=180 {
+            let height_m = recording.displacement(f64::from(k) / 100.0).translation.z;
+            assert!(height_m.abs() < 2e-5, "{height_m}");
         }
     }
 

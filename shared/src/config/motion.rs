@@ -275,7 +275,7 @@ pub struct TrajectoryLimitsConfig {
     pub slide_acceleration_m_s2: f64,
     /// Acceleration of a leg, m/s².
     pub leg_acceleration_m_s2: f64,
-    /// Condition number of the 6×6 Jacobian, angular velocities scaled by 5 cm.
+    /// Condition number of the 6×6 Jacobian, angular velocities scaled by the platform's side A₁A₂.
     pub max_condition: f64,
 }
 

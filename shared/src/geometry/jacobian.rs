@@ -36,13 +36,23 @@ impl Mechanism {
         }
         jacobian
     }
+
+    /// Condition number of the actuators' rates at a pose and the joint coordinates that hold it, angular velocities
+    /// scaled by the platform's side A₁A₂. Infinite when singular.
+    pub fn condition(&self, pose: &Pose, joints: &Joints) -> f64 {
+        self.jacobian(pose, joints).condition(self.platform_sides_m()[0])
+    }
 }
 
 impl Jacobian {
     /// Ratio of the largest to the smallest singular value of the actuators' rows, with angular
-    /// velocities scaled by `length_m` so that all columns are velocities. Infinite when singular.
-    pub fn condition(&self, length_m: f64) -> f64 {
+    /// velocities scaled by `length_m` so that all columns are velocities. Infinite when singular, or no number.
+    fn condition(&self, length_m: f64) -> f64 {
         let mut scaled = self.actuators;
+        // The iteration for the eigenvalues ends for finite numbers only.
+        if !scaled.iter().all(|rate| rate.is_finite()) {
+            return f64::INFINITY;
+        }
         scaled.fixed_columns_mut::<3>(3).scale_mut(1.0 / length_m);
         // Eigenvalues of JᵀJ cost half as much as the singular values of J and are as good as long as the
         // condition number stays far below 10⁷, where a mechanism is of no use any more.
@@ -100,11 +110,30 @@ mod tests {
     }
 
     #[test]
+    fn what_is_no_number_is_badly_conditioned() {
+        let no_number = Jacobian { actuators: Matrix6::repeat(f64::NAN), hinges: Matrix3x6::zeros() };
+        assert!(no_number.condition(0.05).is_infinite());
+    }
+
+    #[test]
     fn conditioning_of_the_seeds_mechanism_is_mild_when_neutral() {
         let mechanism = Mechanism::new(&MechanismConfig::default()).unwrap();
         let pose = Pose::translation(0.0, 0.0, 0.268_452_355);
         let joints = mechanism.inverse(&pose).unwrap();
-        let condition = mechanism.jacobian(&pose, &joints).condition(0.05);
+        let condition = mechanism.condition(&pose, &joints);
         assert!((1.0..5.0).contains(&condition), "{condition}");
+    }
+
+    #[test]
+    fn a_mechanism_three_times_as_large_is_as_well_conditioned() {
+        let condition_at_scale = |scale: f64| {
+            let mut config = MechanismConfig::default();
+            config.slides.iter_mut().for_each(|slide| slide.centre_m = slide.centre_m.map(|x| scale * x));
+            config.platform_sides_m = config.platform_sides_m.map(|side_m| scale * side_m);
+            let mechanism = Mechanism::new(&config).unwrap();
+            let pose = Pose::translation(0.0, 0.005 * scale, 0.268 * scale);
+            mechanism.condition(&pose, &mechanism.inverse(&pose).unwrap())
+        };
+        assert!((condition_at_scale(3.0) - condition_at_scale(1.0)).abs() < 1e-9);
     }
 }

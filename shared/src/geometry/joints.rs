@@ -91,12 +91,46 @@ impl StrokeLimits {
     /// The first axis outside its stroke, if any; a value that is no number is outside.
     #[inline]
     pub fn check(&self, actuators: &Actuators) -> Result<(), LimitViolation> {
-        for (axis, value_m) in actuators.to_axes().into_iter().enumerate() {
-            let [lowest_m, highest_m] = self.of_axis(axis);
-            if !(lowest_m..=highest_m).contains(&value_m) {
+        self.hold(actuators, 0.0).map(|_| ())
+    }
+
+    /// The actuators with every axis held within its stroke, unless one is further outside than
+    /// `excess_m` or no number.
+    #[inline]
+    pub fn hold(&self, actuators: &Actuators, excess_m: f64) -> Result<Actuators, LimitViolation> {
+        let mut axes_m = actuators.to_axes();
+        for (axis, axis_m) in axes_m.iter_mut().enumerate() {
+            let (value_m, [lowest_m, highest_m]) = (*axis_m, self.of_axis(axis));
+            if !(lowest_m - excess_m..=highest_m + excess_m).contains(&value_m) {
                 return Err(LimitViolation { axis, value_m, lowest_m, highest_m });
             }
+            *axis_m = value_m.clamp(lowest_m, highest_m);
         }
-        Ok(())
+        Ok(Actuators::from_axes(axes_m))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const STROKES: StrokeLimits = StrokeLimits { slide_m: [-0.03, 0.03], leg_m: [0.24, 0.30] };
+
+    #[test]
+    fn an_axis_is_held_at_the_end_of_its_stroke_unless_it_is_too_far_outside() {
+        let asked = |d1_m: f64, l3_m: f64| Actuators { slide_m: [d1_m, 0.0, 0.0], leg_m: [0.27, 0.27, l3_m] };
+        let holds = [
+            (asked(0.01, 0.25), asked(0.01, 0.25)),
+            (asked(-0.0305, 0.27), asked(-0.03, 0.27)),
+            (asked(0.0, 0.3009), asked(0.0, 0.30)),
+        ];
+        for (actuators, held) in holds {
+            assert_eq!(STROKES.hold(&actuators, 1e-3), Ok(held));
+        }
+        for (actuators, axis) in [(asked(0.0302, 0.238), 5), (asked(f64::NAN, 0.27), 0)] {
+            assert_eq!(STROKES.hold(&actuators, 1e-3).unwrap_err().axis, axis);
+        }
+        assert!(STROKES.check(&asked(0.03, 0.24)).is_ok());
+        assert!(STROKES.check(&asked(0.03, 0.239_999)).is_err());
     }
 }

@@ -160,7 +160,7 @@ impl Mechanism {
 
     /// The direction of leg i from Bᵢ to Aᵢ at angle θᵢ, base frame.
     #[inline]
-    pub fn leg_direction(&self, leg: usize, theta_rad: f64) -> Vec3 {
+    fn leg_direction(&self, leg: usize, theta_rad: f64) -> Vec3 {
         let (sin, cos) = theta_rad.sin_cos();
         self.slides[leg].inward * cos + Vec3::z() * sin
     }

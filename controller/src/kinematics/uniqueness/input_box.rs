@@ -4,10 +4,6 @@ use masseter_shared::geometry::{AXES, LEGS};
 
 use super::Enclosure;
 
-/// How much less a leg's length moves the solution than a slide's displacement does; only a rule
-/// for which axis to halve.
-const LEG_WEIGHT: f64 = 1.0;
-
 /// Six intervals, metres.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct InputBox {
@@ -30,15 +26,11 @@ impl InputBox {
         [d1, d2, d3, l1, l2, l3]
     }
 
-    /// The two halves along the axis that widens the solutions most.
+    /// The two halves along the widest axis.
     pub fn halves(&self) -> [Self; 2] {
-        let effect = |axis: usize| {
-            let width = self.axes()[axis].width();
-            if axis < LEGS { width } else { width * LEG_WEIGHT }
-        };
-        let widest =
-            (0..AXES).fold(0, |widest, axis| if effect(axis) > effect(widest) { axis } else { widest });
-        self.axes()[widest].halves().map(|half| {
+        let axes = self.axes();
+        let widest = (0..AXES).fold(0, |a, b| if axes[b].width() > axes[a].width() { b } else { a });
+        axes[widest].halves().map(|half| {
             let mut part = *self;
             let axis = if widest < LEGS { &mut part.slide_m[widest] } else { &mut part.leg_m[widest - LEGS] };
             *axis = half;

@@ -109,9 +109,11 @@ impl Proof {
                 return None;
             }
             let smaller = self.contracted(inputs, &platforms, &part)?;
-            let share = (0..LEGS).map(|leg| smaller[leg].width() / part[leg].width()).fold(0.0, f64::max);
+            // Also false for a leg without width, which no step makes narrower.
+            let shrinks = |leg: usize| smaller[leg].width() < WORTH_REPEATING * part[leg].width();
+            let repeats = (0..LEGS).all(shrinks);
             part = smaller;
-            if share.is_nan() || share > WORTH_REPEATING {
+            if !repeats {
                 return Some(part);
             }
         }
@@ -200,7 +202,7 @@ mod tests {
 
     use super::*;
     use crate::kinematics::Solutions;
-    use crate::kinematics::samples::seed_mechanism;
+    use crate::kinematics::samples::{AMBIGUOUS, seed_mechanism};
 
     fn around(actuators: &Actuators, radius_m: f64) -> InputBox {
         let around = |value_m: f64| Enclosure::new(value_m - radius_m, value_m + radius_m);
@@ -211,12 +213,6 @@ mod tests {
         let inputs = around(actuators, radius_m);
         Proof::new(&seed_mechanism(), claim).examine(&inputs, &Proof::any_reaches(&inputs))
     }
-
-    /// An input with two solutions that meet every condition, the determinants being 0.045 and more.
-    const AMBIGUOUS: Actuators = Actuators {
-        slide_m: [0.010_137_353_810_067_46, 0.015_926_592_372_227_42, 0.020_840_656_757_742_57],
-        leg_m: [0.246_449_456_124_783_5, 0.287_523_749_262_044_8, 0.270_252_791_539_176_8],
-    };
 
     #[test]
     fn inputs_near_the_neutral_one_have_at_most_one() {
@@ -244,6 +240,20 @@ mod tests {
                 }
             }
         }
+    }
+
+    /// The search of a single point, and of a segment, ends.
+    #[test]
+    fn reaches_without_width_are_examined_as_any_other() {
+        let known = Solutions::new(&seed_mechanism(), &AMBIGUOUS).unwrap();
+        let one = known.true_ones().next().unwrap();
+        let reach_m: [f64; LEGS] = std::array::from_fn(|leg| AMBIGUOUS.leg_m[leg] * one.theta_rad[leg].cos());
+        let inputs = around(&AMBIGUOUS, 1e-6);
+        let proof = Proof::new(&seed_mechanism(), Claim::SeedConditions);
+        let point = reach_m.map(Enclosure::point);
+        assert_eq!(proof.examine(&inputs, &point), Finding::AtMostOne);
+        let segment = [Enclosure::new(reach_m[0] - 1e-3, reach_m[0] + 1e-3), point[1], point[2]];
+        assert_eq!(proof.examine(&inputs, &segment), Finding::AtMostOne);
     }
 
     #[test]

@@ -1,0 +1,77 @@
+//! Whether the motion may go on: its next step is asked for once the drives have got the last one.
+//!
+//! While either process stands still, the drives hold their last target. A motion that ran on meanwhile would ask for
+//! all it missed in one cycle.
+
+/// Cycles until the reading that answers a command: the next one's, and either may be a cycle late.
+const LATEST_ANSWER_CYCLES: u64 = 2;
+
+/// The last step of the motion, and the last command known to have reached the drives; both by their cycle.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Delivery {
+    step_cycle: u64,
+    answered_cycle: u64,
+}
+
+impl Delivery {
+    /// A fresh reading answers this command.
+    pub(crate) fn answer(&mut self, command_cycle: u64) {
+        self.answered_cycle = command_cycle;
+    }
+
+    /// Whether the motion makes a step in this cycle. One without an answer is waited for, not for ever: a motion that
+    /// waits repeats its last target, which will be answered.
+    pub(crate) fn takes_step(&mut self, cycle: u64) -> bool {
+        let is_answered = self.answered_cycle >= self.step_cycle;
+        let is_under_way = cycle.saturating_sub(self.answered_cycle) <= LATEST_ANSWER_CYCLES;
+        let steps = is_answered || is_under_way;
+        if steps {
+            self.step_cycle = cycle;
+        }
+        steps
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Cycles, each with the command answered in it, if any, and whether the motion makes a step.
+    fn plays(cycles: &[(u64, Option<u64>, bool)]) {
+        let mut delivery = Delivery::default();
+        for &(cycle, answered, steps) in cycles {
+            if let Some(command_cycle) = answered {
+                delivery.answer(command_cycle);
+            }
+            assert_eq!(delivery.takes_step(cycle), steps, "cycle {cycle}");
+        }
+    }
+
+    #[test]
+    fn a_motion_answered_in_time_or_a_cycle_late_goes_on() {
+        plays(&[
+            (1, Some(0), true),
+            (2, Some(1), true),
+            (3, None, true),
+            (4, Some(2), true),
+            (5, Some(3), true),
+        ]);
+    }
+
+    #[test]
+    fn a_step_without_answer_is_waited_for_and_made_again_when_the_drives_are_back() {
+        plays(&[
+            (8, Some(7), true),
+            (9, None, true),
+            (10, None, false),
+            (11, None, false),
+            (12, Some(8), false),
+            (13, Some(12), true),
+        ]);
+    }
+
+    #[test]
+    fn skipped_cycles_are_one_step() {
+        plays(&[(8, Some(7), true), (23, Some(8), true), (24, Some(23), true)]);
+    }
+}
