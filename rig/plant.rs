@@ -29,8 +29,8 @@ fn emulate(args: &PlantArgs) -> anyhow::Result<()> {
         fifo_priority: Some(realtime.priority),
         locked_memory: realtime.lock_memory,
     });
-    obtained.refusals.iter().for_each(|refusal| eprintln!("  plant: {refusal}"));
-    eprintln!("six drives on {}, until Ctrl-C", scenario.can.interfaces.join(", "));
+    obtained.refusals.iter().for_each(|refusal| tell!("  plant: {refusal}"));
+    tell!("six drives on {}, until Ctrl-C", scenario.can.interfaces.join(", "));
     tell(emulator.run(&stop)?);
     Ok(())
 }
@@ -58,7 +58,7 @@ fn resolve(args: &PlantArgs) -> anyhow::Result<Scenario> {
 }
 
 fn tell(figures: Figures) {
-    println!(
+    show_line!(
         "received {} frames, sent {}, could not send {}; left out {:.1} ms that the machine was too slow for",
         figures.received,
         figures.sent,

@@ -25,7 +25,7 @@ use crate::socket_link::SocketLink;
 /// Frames a port may have to send, and to receive between two looks; a millisecond holds 21.
 const TRANSMIT_CAPACITY: usize = 64;
 const RECEIVE_CAPACITY: usize = 256;
-const MS_NS: u64 = 1_000_000;
+pub(crate) const MS_NS: u64 = 1_000_000;
 
 /// A plant that cannot be built or cannot go on.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -195,7 +195,7 @@ fn drive_settings(scenario: &Scenario, node: NodeId, axis: usize) -> DriveSettin
         drive,
         heartbeat_ns: u64::from(scenario.can.heartbeat_producer_ms) * MS_NS,
         link_timeout_ns: u64::from(scenario.can.heartbeat_consumer_ms) * MS_NS,
-        period_s: scenario.period_s(),
+        period_ns: scenario.period_ns(),
         step_s: scenario.dynamics.step_ns as f64 * 1e-9,
         position_limit_increments: stroke_m.map(|end_m| (end_m / drive.encoder_resolution_m).round() as i32),
     }
@@ -308,8 +308,11 @@ mod tests {
             change(&mut scenario);
             check(&scenario).unwrap_err().to_string()
         };
-        let cases: [(String, &str); 10] = [
+        let slow = "can.heartbeat_consumer_ms = 90: use more than can.heartbeat_producer_ms and a cycle";
+        let cases: [(String, &str); 12] = [
             (with(|s| s.can.heartbeat_consumer_ms = 50), "can.heartbeat_consumer_ms = 50: use more"),
+            (with(|s| s.can.heartbeat_consumer_ms = 51), "can.heartbeat_consumer_ms = 51: use more"),
+            (with(|s| (s.rate_hz, s.can.heartbeat_consumer_ms) = (10, 90)), slow),
             (with(|s| s.dynamics.step_ns = 1_000_000), "dynamics.step_ns"),
             (with(|s| s.can.node_ids[3] = 1), "node 1 stands twice"),
             (with(|s| s.can.node_ids[3] = 0), "node id"),
@@ -324,6 +327,7 @@ mod tests {
             assert!(error.contains(expected), "{error}");
         }
         assert_eq!(check(&default()), Ok(()));
+        assert_eq!(check(&Scenario { rate_hz: 10, ..default() }), Ok(()));
     }
 
     #[test]

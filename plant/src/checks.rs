@@ -1,8 +1,8 @@
 //! Quantities of a plant that no physics or bus can have.
 
-use masseter_shared::config::{CanConfig, DriveConfig, DynamicsConfig, Scenario};
+use masseter_shared::config::{DriveConfig, Scenario};
 
-use crate::build::PlantError;
+use crate::build::{MS_NS, PlantError};
 
 /// Integration steps that resolve the stiffest parts and cost a bearable time, ns.
 const STEPS_NS: std::ops::RangeInclusive<u64> = 10_000..=250_000;
@@ -10,7 +10,7 @@ const STEPS_NS: std::ops::RangeInclusive<u64> = 10_000..=250_000;
 /// Refuses the first quantity out of its range.
 pub(crate) fn check_quantities(scenario: &Scenario) -> Result<(), PlantError> {
     check_ranges(scenario)?;
-    check_times(&scenario.can, &scenario.dynamics)
+    check_times(scenario)
 }
 
 fn check_ranges(scenario: &Scenario) -> Result<(), PlantError> {
@@ -53,16 +53,24 @@ fn check_ranges(scenario: &Scenario) -> Result<(), PlantError> {
 
 /// A heartbeat must be able to arrive before it counts as lost, and the stiffest parts of the rig, brakes
 /// and velocity loops, must be resolved by the integration.
-fn check_times(can: &CanConfig, dynamics: &DynamicsConfig) -> Result<(), PlantError> {
+fn check_times(scenario: &Scenario) -> Result<(), PlantError> {
+    let Scenario { can, dynamics, .. } = scenario;
     let quantity = |key, value, need| Err(PlantError::Quantity { key, value, need });
-    if can.heartbeat_consumer_ms <= can.heartbeat_producer_ms {
+    if u64::from(can.heartbeat_consumer_ms) * MS_NS <= longest_heartbeat_ns(scenario) {
         let value = f64::from(can.heartbeat_consumer_ms);
-        return quantity("can.heartbeat_consumer_ms", value, "use more than can.heartbeat_producer_ms");
+        let need = "use more than can.heartbeat_producer_ms and a cycle (1000 / rate_hz) together";
+        return quantity("can.heartbeat_consumer_ms", value, need);
     }
     if !STEPS_NS.contains(&dynamics.step_ns) {
         return quantity("dynamics.step_ns", dynamics.step_ns as f64, "use 10000 to 250000 ns");
     }
     Ok(())
+}
+
+/// The master beats at a SYNC alone: the first one after the interval, which by jitter ends late as often as not.
+fn longest_heartbeat_ns(scenario: &Scenario) -> u64 {
+    let interval_ns = u64::from(scenario.can.heartbeat_producer_ms) * MS_NS;
+    (interval_ns / scenario.period_ns() + 1) * scenario.period_ns()
 }
 
 fn drive_quantities(slide: &DriveConfig, leg: &DriveConfig) -> impl Iterator<Item = (&'static str, f64)> {

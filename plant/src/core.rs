@@ -107,6 +107,11 @@ impl<L: Link> PlantCore<L> {
         Ok(())
     }
 
+    /// Stops the drives with the next process data, for the end.
+    pub fn stop(&mut self) {
+        self.master.stop();
+    }
+
     /// Whether no drive gives force, as far as they tell.
     pub fn drives_are_off(&self) -> bool {
         self.master.drives_are_off()

@@ -1,10 +1,11 @@
 //! What a scenario expects of its drives: what the master verifies and configures over the bus.
 
 use masseter_shared::can::canopen::NodeId;
+use masseter_shared::can::cia402::interpolation_period;
 use masseter_shared::config::Scenario;
 
 use crate::build::drive_of;
-use crate::master::{Setup, interpolation_period};
+use crate::master::Setup;
 
 /// What the drive of an axis must be, and is configured with.
 pub(crate) fn setup(scenario: &Scenario, master: NodeId, axis: usize) -> Setup {

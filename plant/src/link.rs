@@ -128,7 +128,7 @@ impl VirtualLink {
             if own_bus != bus {
                 continue;
             }
-            // An overrun drops the drive's oldest frames, as in a real node; the next ones follow.
+            // An overrun has lost the drive's newest frames, as in a real node; the older ones follow.
             while let Ok(Some(received)) = self.wires[bus].receive(port, now_ns) {
                 self.emulation.deliver(axis, &received.frame, now_ns)?;
             }

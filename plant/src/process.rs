@@ -13,6 +13,9 @@ use crate::link::Link;
 
 /// How long the drives may take to stop after the end has been asked for, ns.
 const STOP_WITHIN_NS: u64 = 500_000_000;
+/// Cycles that they may take at least: the word goes out in one, holds from the next, and is answered in the one after
+/// the ramp.
+const STOP_WITHIN_CYCLES: u64 = 10;
 
 /// Why the plant could not do its work.
 #[derive(Debug, thiserror::Error)]
@@ -116,8 +119,8 @@ fn serve<L: Link>(
         let command = ports.command_of(wake.cycle, deadline_ns, cycle.waiter())?;
         plant.apply(clock::now_ns(), command.as_deref())?;
     }
-    // Without commands the master stops the drives.
-    let give_up_ns = clock::now_ns() + STOP_WITHIN_NS;
+    plant.stop();
+    let give_up_ns = clock::now_ns() + STOP_WITHIN_NS.max(STOP_WITHIN_CYCLES * scenario.period_ns());
     while !plant.drives_are_off() && clock::now_ns() < give_up_ns {
         let wake = cycle.wait();
         exchange(&mut plant, &mut ports, schedule, wake, cycle.waiter())?;
@@ -143,9 +146,9 @@ fn exchange(
     let account = waiter.account();
     plant.begin_cycle(wake)?;
     // SYNC went out when the process woke; a late one shifts what follows, so that the reading is late
-    // but complete. Process data take at least half of their worst case.
+    // but complete.
     let reading_by_ns = wake.woke_ns + schedule.reading_by_ns;
-    let mut now_ns = waiter.until(wake.woke_ns + schedule.reading_by_ns / 2);
+    let mut now_ns = waiter.until(wake.woke_ns + schedule.reading_from_ns);
     // Collecting moves the mechanism: each look is work, not a part of one long wait.
     while !plant.collect(now_ns)? && now_ns < reading_by_ns {
         now_ns = waiter.spin().now_ns();

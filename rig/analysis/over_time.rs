@@ -129,7 +129,7 @@ mod tests {
     #[test]
     fn a_bus_that_is_half_full_is_said_to_be() {
         let frame = Frame::fixed(CanId::standard(0x123).unwrap(), [0x55; 8]);
-        let bits = wire::wire_bits(&frame);
+        let bits = wire::frame_bits(&frame).total();
         let mut bytes = [0; 64];
         bytes[..8].fill(0x55);
         let data = CanData::padded(bytes, 8);

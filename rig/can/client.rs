@@ -66,7 +66,7 @@ impl Client {
         });
         let Err(reason) = served else { return true };
         if !matches!(reason, Farewell::Closed) {
-            eprintln!("a client is disconnected: {reason}");
+            tell!("a client is disconnected: {reason}");
             // It may be gone already.
             let _ = self.write_unsent();
             let _ = self.stream.write_all(format!("< error {reason} >").as_bytes());
@@ -136,7 +136,7 @@ impl Client {
                 Ok(Some(received)) => {
                     write_frame(&mut text, &received).expect("writing to a string does not fail");
                 }
-                Err(ReceiveError::Overrun { lost }) => eprintln!("{lost} frames were lost to a client"),
+                Err(ReceiveError::Overrun { lost }) => tell!("{lost} frames were lost to a client"),
                 Ok(None) | Err(_) => break,
             }
         }

@@ -69,9 +69,9 @@ fn announce(listener: &TcpListener, scenario: &Scenario) -> Result<(), Failure> 
     for (bus, axes) in scenario.can.buses.iter().enumerate() {
         let node = |&axis: &usize| format!("{} (node {})", AXIS_NAMES[axis], scenario.can.node_ids[axis]);
         let nodes: Vec<String> = axes.iter().map(node).collect();
-        eprintln!("can{bus}: {}", nodes.join(", "));
+        tell!("can{bus}: {}", nodes.join(", "));
     }
-    eprintln!("socketcand protocol on {address}; end with Ctrl-C");
+    tell!("socketcand protocol on {address}; end with Ctrl-C");
     Ok(())
 }
 

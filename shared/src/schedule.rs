@@ -1,11 +1,12 @@
 //! The time table of a cycle, from the worst-case frame lengths on the bus.
 //!
 //! SYNC and process data go first, at offset 0; then the controller computes; then its targets go out,
-//! to be on the wire before the next SYNC. Heartbeats and emergencies use what is left; SDO takes the place
-//! of the process data of the drive it goes to.
+//! to be on the wire before the next SYNC. Heartbeats use what is left; SDO takes the place of the process data of the
+//! drive it goes to. Emergencies go before process data and are not in the table: in a cycle with one the reading or
+//! the command may be late, as with a disturbed bus.
 
 use crate::can::canopen::{Cob, NodeId, NodeIdError};
-use crate::can::wire::longest_bits;
+use crate::can::wire::{INTERFRAME_BITS, longest_bits, shortest_bits};
 use crate::can::{BitrateError, BusPlan, Message, Overload, Rpdo1, Tpdo1};
 use crate::config::CanConfig;
 
@@ -22,7 +23,9 @@ const COMPUTE_NS: u64 = 20_000;
 /// Offsets from SYNC within one cycle, ns.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct CycleSchedule {
-    /// When the process data of all drives have arrived in the worst case.
+    /// Before this the process data of all drives cannot have arrived: the frames take as long without a stuff bit.
+    pub reading_from_ns: u64,
+    /// When they have arrived in the worst case.
     pub reading_by_ns: u64,
     /// When the controller wakes.
     pub controller_at_ns: u64,
@@ -65,19 +68,24 @@ impl CycleSchedule {
             plan.check()?;
         }
         let rates = can.rates()?;
-        let time = |length| rates.duration_ns(longest_bits(length, false, can.format()));
+        let longest = |length| rates.duration_ns(longest_bits(length, false, can.format()));
+        let shortest = |length| rates.duration_ns(shortest_bits(length, false, can.format()));
         let axes = can.buses.iter().map(Vec::len).max().unwrap_or(0) as u64;
+        let (sync, tpdo, rpdo) = (0, Tpdo1::LENGTH as u32, Rpdo1::LENGTH as u32);
+        // A frame has arrived before the pause behind it.
+        let pause_ns = rates.nominal().bits_to_ns(INTERFRAME_BITS);
+        let reading_from_ns = shortest(sync) + axes * shortest(tpdo) - pause_ns;
         // A heartbeat may just have begun when the bus is wanted.
-        let blocking_ns = time(HEARTBEAT_LENGTH);
-        let up_ns = time(0) + axes * time(Tpdo1::LENGTH as u32);
-        let down_ns = axes * time(Rpdo1::LENGTH as u32);
+        let blocking_ns = longest(HEARTBEAT_LENGTH);
+        let up_ns = longest(sync) + axes * longest(tpdo);
+        let down_ns = axes * longest(rpdo);
         let reading_by_ns = blocking_ns + up_ns + u64::from(can.answer_us) * 1000;
         let command_by_ns = period_ns.saturating_sub(blocking_ns + down_ns);
         let controller_at_ns = reading_by_ns + PUBLISH_NS;
         if controller_at_ns + COMPUTE_NS > command_by_ns {
             return Err(ScheduleError::NoTime { reading_by_ns, command_by_ns, period_ns });
         }
-        Ok(Self { reading_by_ns, controller_at_ns, command_by_ns })
+        Ok(Self { reading_from_ns, reading_by_ns, controller_at_ns, command_by_ns })
     }
 }
 
@@ -168,6 +176,7 @@ mod tests {
     #[test]
     fn two_buses_hold_a_kilohertz_and_the_offsets_follow_the_frames() {
         let schedule = CycleSchedule::new(&CanConfig::default(), 1_000_000).unwrap();
+        assert_eq!(schedule.reading_from_ns, (47 + 3 * 111 - 3) * 1000);
         assert_eq!(schedule.reading_by_ns, (65 + 55 + 3 * 135) * 1000);
         assert_eq!(schedule.controller_at_ns, schedule.reading_by_ns + PUBLISH_NS);
         assert_eq!(schedule.command_by_ns, 1_000_000 - (65 + 3 * 115) * 1000);

@@ -1,5 +1,5 @@
 //! The messages of the link as a DBC file: SYNC, NMT, and of every drive its PDOs as mapped after power-on,
-//! EMCY, SDO and heartbeat. Positions are in metres, velocities in m/s, forces in newtons.
+//! EMCY, SDO and heartbeat. Positions are in metres, forces in newtons.
 //!
 //! Both directions of SDO show their four parts; what is in segments is not taken apart.
 
@@ -139,13 +139,11 @@ fn mapped<'a>(objects: &Objects, index: u16, drive: &DriveConfig) -> Vec<Signal<
     signals.collect()
 }
 
-/// What one step of an object is worth.
+/// What one step of an object is worth that is mapped after power-on.
 fn scale(index: u16, drive: &DriveConfig) -> (f64, &'static str) {
     match index {
-        0x6062 | 0x6064 | 0x607A | 0x60F4 => (drive.encoder_resolution_m, "m"),
-        0x606C | 0x6081 => (drive.encoder_resolution_m, "m/s"),
-        0x6083 | 0x6084 => (drive.encoder_resolution_m, "m/s^2"),
-        0x6071 | 0x6077 => (drive.rated_force_n / 1000.0, "N"),
+        0x6064 | 0x607A => (drive.encoder_resolution_m, "m"),
+        0x6077 => (drive.rated_force_n / 1000.0, "N"),
         _ => (1.0, ""),
     }
 }
@@ -159,7 +157,7 @@ fn message(
     signals: &[Signal<'_>],
     receiver: &str,
 ) -> fmt::Result {
-    debug_assert!(length <= Frame::MAX_DATA, "a classical frame");
+    debug_assert!(length <= Frame::MAX_CLASSICAL_DATA, "a classical frame");
     writeln!(text, "BO_ {} {name}: {length} {sender}", id.number())?;
     signals.iter().try_for_each(|signal| signal.write(text, receiver))?;
     writeln!(text)

@@ -13,7 +13,7 @@ use super::homing::Homing;
 use super::parameters::{LinkReaction, Parameters, Stop};
 use super::positioning::Positioning;
 use super::profile::Profile;
-use super::servo::{Servo, ServoLimits};
+use super::servo::{Servo, ServoLimits, Task};
 use crate::encoder::Encoder;
 
 /// Mode of operation (object 6060).
@@ -74,7 +74,11 @@ pub(super) struct Axis {
     mode: Mode,
     power: DriveState,
     force_n: f64,
+    /// The motor's part of the force: without current the brake holds.
+    motor_n: f64,
     straying_since_ns: Option<u64>,
+    /// Whether the following error window was left for too long; as long as the fault stands.
+    has_strayed: bool,
 }
 
 impl Axis {
@@ -102,7 +106,9 @@ impl Axis {
             mode: Mode::CyclicPosition,
             power: DriveState::NotReadyToSwitchOn,
             force_n: 0.0,
+            motor_n: 0.0,
             straying_since_ns: None,
+            has_strayed: false,
         }
     }
 
@@ -117,10 +123,14 @@ impl Axis {
         self.power == DriveState::OperationEnabled
     }
 
+    fn is_in_fault(&self) -> bool {
+        matches!(self.power, DriveState::FaultReactionActive | DriveState::Fault)
+    }
+
     /// As after power-on, where it stands: the brake closes, the encoder's own zero holds again.
     pub(super) fn restart(&mut self, now_ns: u64, objects: &Objects) {
         self.controlword = Controlword::DISABLE_VOLTAGE;
-        self.origin_increments = 0;
+        (self.homing, self.origin_increments) = (Homing::default(), 0);
         self.enter(DriveState::NotReadyToSwitchOn, now_ns);
         self.configure(now_ns, objects);
     }
@@ -132,7 +142,7 @@ impl Axis {
         if mode != self.mode {
             self.mode = mode;
             self.is_cut = false;
-            (self.positioning, self.homing) = (Positioning::default(), Homing::default());
+            (self.positioning, self.homing) = (Positioning::default(), self.homing.interrupted());
             if self.is_enabled() {
                 self.slow_down(now_ns, self.parameters.profile.deceleration_m_s2);
             }
@@ -163,14 +173,16 @@ impl Axis {
         self.enter(next, now_ns);
     }
 
-    /// Nobody guides the drive any more (object 6007).
-    pub(super) fn lose_link(&mut self, now_ns: u64) {
+    /// Nobody guides the drive any more (object 6007); whether that put it into fault.
+    pub(super) fn lose_link(&mut self, now_ns: u64) -> bool {
+        let was_in_fault = self.is_in_fault();
         match self.parameters.link {
             LinkReaction::Nothing => {}
             LinkReaction::Fault => self.enter(self.power.after_fault(), now_ns),
             LinkReaction::DisableVoltage => self.obey(Command::DisableVoltage, now_ns),
             LinkReaction::QuickStop => self.obey(Command::QuickStop, now_ns),
         }
+        self.is_in_fault() && !was_in_fault
     }
 
     fn enter(&mut self, state: DriveState, now_ns: u64) {
@@ -179,8 +191,9 @@ impl Axis {
         }
         self.power = state;
         self.straying_since_ns = None;
+        self.has_strayed &= self.is_in_fault();
         self.is_cut = false;
-        (self.positioning, self.homing) = (Positioning::default(), Homing::default());
+        (self.positioning, self.homing) = (Positioning::default(), self.homing.interrupted());
         match state {
             DriveState::OperationEnabled => self.begin(),
             DriveState::QuickStopActive => self.stop(now_ns, self.parameters.quick_stop),
@@ -241,18 +254,20 @@ impl Axis {
 
     /// Follows a target within the software position limit and the velocity limit.
     fn head_for(&mut self, now_ns: u64, target_increments: i32) {
-        let within = self.within_limits(target_increments);
+        let within = self.within_limits(now_ns, target_increments);
         let Parameters { velocity_limit_m_s, period_s, .. } = self.parameters;
         let (target_m, actual_m) = (self.metres(within), self.servo.position_m());
         let is_too_fast = self.demand.head_for(now_ns, target_m, actual_m, velocity_limit_m_s, period_s);
         self.is_cut = is_too_fast || within != target_increments;
     }
 
-    /// The nearest target that the software position limits allow. Limits in the wrong order allow none:
-    /// the lower one counts.
-    pub(super) fn within_limits(&self, target_increments: i32) -> i32 {
+    /// The nearest target that the software position limits allow. They count from the home position (CiA 402),
+    /// so that homing leaves their numbers and may leave the axis outside of them: there it may stay or come
+    /// nearer, but go no further.
+    pub(super) fn within_limits(&self, now_ns: u64, target_increments: i32) -> i32 {
         let [lowest, highest] = self.parameters.position_limits;
-        target_increments.min(highest).max(lowest)
+        let here = self.increments(self.demand.position_m(now_ns).unwrap_or(self.measured_m()));
+        target_increments.min(highest.max(here)).max(lowest.min(here))
     }
 
     fn push(&mut self, torque_permille: i16) {
@@ -276,11 +291,13 @@ impl Axis {
         }
         let limits = self.servo_limits();
         let measured_m = self.encoder.metres(self.counts);
-        self.force_n = self.servo.step(measured_m, self.demand.task(now_ns), &limits);
+        let task = self.demand.task(now_ns);
+        self.force_n = self.servo.step(measured_m, task, &limits);
+        self.motor_n = if task == Task::Brake { 0.0 } else { self.force_n };
         self.watch_following(now_ns)
     }
 
-    /// The force of the last step, N.
+    /// The force of the last step on the mechanism, N.
     pub(super) fn force_n(&self) -> f64 {
         self.force_n
     }
@@ -330,6 +347,7 @@ impl Axis {
             return None;
         }
         self.enter(self.power.after_fault(), now_ns);
+        self.has_strayed = true;
         Some(DriveError::FollowingError)
     }
 
@@ -342,7 +360,7 @@ impl Axis {
     pub(super) fn show(&self, now_ns: u64, objects: &mut Objects) {
         let actual = self.counts.saturating_add(self.origin_increments);
         let demand = self.demand.position_m(now_ns).map_or(actual, |demand_m| self.increments(demand_m));
-        let torque = self.force_n / self.drive.rated_force_n * 1000.0;
+        let torque = self.motor_n / self.drive.rated_force_n * 1000.0;
         objects.set(names::STATUSWORD, self.statusword(now_ns).0);
         objects.set(names::MODE_DISPLAY, self.mode.number());
         objects.set(names::POSITION_DEMAND, demand);
@@ -361,12 +379,12 @@ impl Axis {
         match self.mode {
             Mode::CyclicPosition => word
                 .with(StatusBit::TargetFollowed, is_enabled)
-                .with(StatusBit::FollowingError, self.straying_since_ns.is_some()),
+                .with(StatusBit::FollowingError, self.has_strayed),
             Mode::CyclicTorque => word.with(StatusBit::TargetFollowed, is_enabled),
             Mode::ProfilePosition => word
                 .with(StatusBit::TargetReached, is_enabled && self.has_reached_setpoint(now_ns))
                 .with(StatusBit::SETPOINT_ACKNOWLEDGED, is_enabled && self.positioning.is_acknowledged())
-                .with(StatusBit::FollowingError, self.straying_since_ns.is_some()),
+                .with(StatusBit::FollowingError, self.has_strayed),
             Mode::Homing => self.homing.show(word, self.demand.is_at_rest(now_ns)),
         }
     }

@@ -12,7 +12,6 @@ const PROFILE: u8 = 1 << 5;
 
 /// What can be wrong.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[repr(u8)]
 pub(super) enum DriveError {
     /// A watched heartbeat is overdue.
     Heartbeat,
@@ -26,17 +25,16 @@ pub(super) enum DriveError {
     RpdoTimeout,
     /// The following error window was left for too long.
     FollowingError,
+    /// Nobody guided the drive any more, which object 6007 makes a fault.
+    LinkLost,
 }
 
+/// How many there are.
+const COUNT: usize = 7;
+
 impl DriveError {
-    const ALL: [Self; 6] = [
-        Self::Heartbeat,
-        Self::PdoShort,
-        Self::PdoLong,
-        Self::SyncLength,
-        Self::RpdoTimeout,
-        Self::FollowingError,
-    ];
+    /// Those that put the drive into fault, and last until it is reset.
+    pub(super) const FAULTS: [Self; 2] = [Self::FollowingError, Self::LinkLost];
 
     const fn code(self) -> EmergencyCode {
         match self {
@@ -46,6 +44,7 @@ impl DriveError {
             Self::SyncLength => EmergencyCode::SYNC_LENGTH,
             Self::RpdoTimeout => EmergencyCode::RPDO_TIMEOUT,
             Self::FollowingError => EmergencyCode::FOLLOWING_ERROR,
+            Self::LinkLost => EmergencyCode::COMMUNICATION,
         }
     }
 
@@ -55,42 +54,42 @@ impl DriveError {
             _ => GENERIC | COMMUNICATION,
         }
     }
-
-    const fn bit(self) -> u8 {
-        1 << self as u8
-    }
 }
 
-/// The errors that are present.
+/// The errors that are present, the newest first.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Errors {
-    present: u8,
+    present: [Option<DriveError>; COUNT],
 }
 
 impl Errors {
     /// An error came; what to tell, unless it was there already.
     pub(super) fn raise(&mut self, error: DriveError, objects: &mut Objects) -> Option<Emergency> {
-        if self.present & error.bit() != 0 {
+        if self.present.contains(&Some(error)) {
             return None;
         }
-        self.present |= error.bit();
+        // Every error has room once, so that the last place is free.
+        self.present.rotate_right(1);
+        self.present[0] = Some(error);
         remember(error.code(), objects);
-        objects.set(ERROR_CODE, error.code().0);
         Some(self.emergency(error.code(), objects))
     }
 
     /// An error is gone; what to tell, if it was there.
     pub(super) fn clear(&mut self, error: DriveError, objects: &mut Objects) -> Option<Emergency> {
-        if self.present & error.bit() == 0 {
-            return None;
-        }
-        self.present &= !error.bit();
+        let place = self.present.iter().position(|present| *present == Some(error))?;
+        self.present[place] = None;
+        self.present[place..].rotate_left(1);
         Some(self.emergency(EmergencyCode::RESET, objects))
     }
 
-    /// The communication begins anew: its errors are gone without a word, those of the axis stay.
+    /// The communication begins anew: its errors are gone without a word, what holds the drive in fault stays.
     pub(super) fn forget_communication(&mut self, objects: &mut Objects) {
-        self.present &= DriveError::FollowingError.bit();
+        let before = std::mem::take(&mut self.present);
+        let faults = before.into_iter().flatten().filter(|error| DriveError::FAULTS.contains(error));
+        for (place, fault) in self.present.iter_mut().zip(faults) {
+            *place = Some(fault);
+        }
         self.show(objects);
     }
 
@@ -98,14 +97,12 @@ impl Errors {
         Emergency { code, register: self.show(objects), vendor: [0; 5] }
     }
 
-    /// Brings the error register up to date, and 603F once nothing is wrong.
+    /// Brings the error register up to date, and 603F, which shows the newest error still present.
     fn show(self, objects: &mut Objects) -> u8 {
-        let present = DriveError::ALL.into_iter().filter(|error| self.present & error.bit() != 0);
+        let present = self.present.into_iter().flatten();
         let register = present.fold(0, |register, error| register | error.register());
         objects.set(ERROR_REGISTER, register);
-        if register == 0 {
-            objects.set(ERROR_CODE, 0);
-        }
+        objects.set(ERROR_CODE, self.present[0].map_or(0, |error| error.code().0));
         register
     }
 }
@@ -148,6 +145,25 @@ mod tests {
         assert_eq!(told, Emergency::RESET);
         assert_eq!(errors.clear(DriveError::Heartbeat, &mut objects), None);
         assert_eq!((objects.get(ERROR_REGISTER), objects.get(ERROR_CODE)), (0, 0));
+    }
+
+    #[test]
+    fn the_error_code_is_that_of_the_newest_error_still_present() {
+        let mut objects = Objects::new(NodeId::new(3).unwrap());
+        let mut errors = Errors::default();
+        let [following, heartbeat, short] =
+            [DriveError::FollowingError, DriveError::Heartbeat, DriveError::PdoShort];
+        for error in [following, heartbeat, short] {
+            errors.raise(error, &mut objects);
+        }
+        assert_eq!(objects.get(ERROR_CODE), 0x8210);
+        errors.clear(heartbeat, &mut objects);
+        assert_eq!(objects.get(ERROR_CODE), 0x8210);
+        errors.clear(short, &mut objects);
+        assert_eq!(objects.get(ERROR_CODE), 0x8611);
+        errors.raise(heartbeat, &mut objects);
+        errors.forget_communication(&mut objects);
+        assert_eq!((objects.get(ERROR_CODE), objects.get(ERROR_REGISTER)), (0x8611, 0x21));
     }
 
     #[test]

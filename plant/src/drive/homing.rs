@@ -36,6 +36,11 @@ impl Homing {
         matches!(self, Self::Searching | Self::Settling { .. })
     }
 
+    /// After another mode or state was entered: what was attained holds as long as the origin does.
+    pub(super) const fn interrupted(self) -> Self {
+        if matches!(self, Self::Attained) { self } else { Self::Idle }
+    }
+
     /// The statusword with the bits of homing.
     pub(super) const fn show(self, word: Statusword, is_at_rest: bool) -> Statusword {
         let is_attained = matches!(self, Self::Attained);
@@ -60,20 +65,19 @@ impl Axis {
     }
 
     fn begin_homing(&mut self, now_ns: u64) {
-        let [lowest, highest] = self.parameters.position_limits;
         match self.parameters.homing.method {
-            33 => self.search(now_ns, lowest),
-            34 => self.search(now_ns, highest),
+            33 => self.search(now_ns, i32::MIN),
+            34 => self.search(now_ns, i32::MAX),
             _ => self.attain(self.counts),
         }
     }
 
-    /// Moves towards a software limit until a mark comes.
-    fn search(&mut self, now_ns: u64, end_increments: i32) {
+    /// Moves as far that way as the software limits allow, until a mark comes.
+    fn search(&mut self, now_ns: u64, far_increments: i32) {
         self.homing = Homing::Searching;
         let limits = self.parameters.homing.search;
         let (position_m, velocity_m_s) = self.demand.at(now_ns).unwrap_or((self.measured_m(), 0.0));
-        let end_m = self.metres(end_increments);
+        let end_m = self.metres(self.within_limits(now_ns, far_increments));
         self.demand.follow(Profile::to(now_ns, position_m, velocity_m_s, end_m, &limits));
     }
 

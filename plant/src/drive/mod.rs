@@ -1,12 +1,13 @@
 //! An emulated servo drive: a CANopen node with the CiA 402 profile, its servo loops and its encoder.
 //!
-//! [`node`] speaks CiA 301, [`axis`] is the profile behind it, and the object dictionary lies between
+//! [`node`] and [`exchange`] speak CiA 301, [`axis`] is the profile behind it, and the object dictionary lies between
 //! them. What an increment is worth is known to the axis alone: its loops work in SI units.
 
 mod axis;
 mod demand;
 pub(crate) mod dictionary;
 mod errors;
+mod exchange;
 mod heartbeats;
 mod homing;
 mod node;

@@ -1,9 +1,7 @@
-//! The drive as a CANopen node (CiA 301): network management, heartbeats, emergencies, SYNC and
-//! process data. What the objects may become is served in [`service`](super::service).
+//! The drive as a CANopen node (CiA 301): network management, heartbeats and emergencies. SYNC and process data are
+//! exchanged in [`exchange`](super::exchange); what the objects may become is served in [`service`](super::service).
 
-use masseter_shared::can::canopen::{
-    Cob, Emergency, Heartbeat, Nmt, NmtCommand, NmtState, NodeId, ObjectAddress,
-};
+use masseter_shared::can::canopen::{Cob, Emergency, Heartbeat, Nmt, NmtCommand, NmtState, NodeId};
 use masseter_shared::can::cia402::Controlword;
 use masseter_shared::can::{CanId, Frame};
 use masseter_shared::config::DriveConfig;
@@ -14,7 +12,7 @@ use super::errors::{DriveError, Errors};
 use super::heartbeats::{Consumer, Producer};
 use super::outbox::Outbox;
 use super::parameters::configure;
-use super::pdo::{LengthFault, NOT_VALID, Rpdo, Tpdo};
+use super::pdo::{NOT_VALID, Rpdo, Tpdo};
 use super::sdo::SdoServer;
 use crate::encoder::Encoder;
 
@@ -35,8 +33,8 @@ pub(crate) struct DriveSettings {
     pub(crate) heartbeat_ns: u64,
     /// Silence of the master that counts as loss of the link (object 1016), ns.
     pub(crate) link_timeout_ns: u64,
-    /// Communication cycle (object 60C2), s.
-    pub(crate) period_s: f64,
+    /// Communication cycle (object 60C2), ns.
+    pub(crate) period_ns: u64,
     /// Step of the servo loops, s.
     pub(crate) step_s: f64,
     /// Software position limit (object 607D): lowest and highest target, increments.
@@ -51,7 +49,7 @@ impl DriveSettings {
         let watched = u32::from(self.master.get()) << 16 | u32::from(in_ms(self.link_timeout_ns));
         objects.set(names::WATCHED_HEARTBEAT, watched);
         objects.set(names::HEARTBEAT_MS, in_ms(self.heartbeat_ns));
-        configure(&mut objects, &self.drive, self.period_s, self.position_limit_increments);
+        configure(&mut objects, &self.drive, self.period_ns, self.position_limit_increments);
         objects
     }
 }
@@ -125,7 +123,7 @@ impl DriveNode {
     }
 
     /// Whether it takes part in services other than network management and process data.
-    fn is_served(&self) -> bool {
+    pub(super) fn is_served(&self) -> bool {
         matches!(self.nmt, Some(NmtState::Operational | NmtState::PreOperational))
     }
 
@@ -162,18 +160,31 @@ impl DriveNode {
             NmtCommand::Stop => self.leave_operational(NmtState::Stopped, now_ns),
             NmtCommand::EnterPreOperational => self.leave_operational(NmtState::PreOperational, now_ns),
             NmtCommand::ResetCommunication => {
-                self.leave_operational(NmtState::PreOperational, now_ns);
+                // Until it has booted nobody is heard, whoever guided the drive.
+                self.lose_link(now_ns);
+                self.end_exchange(NmtState::PreOperational);
                 self.reset_communication(now_ns);
             }
             NmtCommand::ResetNode => self.reset_node(now_ns),
         }
     }
 
-    /// Without process data nobody guides the drive: it reacts as object 6007 says.
+    /// Nobody guides the drive any more: it reacts as object 6007 says. A fault lasts longer than its cause.
+    fn lose_link(&mut self, now_ns: u64) {
+        if self.axis.lose_link(now_ns) {
+            self.raise(DriveError::LinkLost);
+        }
+    }
+
+    /// Without process data nobody guides the drive.
     fn leave_operational(&mut self, state: NmtState, now_ns: u64) {
         if self.is_operational() || state == NmtState::Stopped {
-            self.axis.lose_link(now_ns);
+            self.lose_link(now_ns);
         }
+        self.end_exchange(state);
+    }
+
+    fn end_exchange(&mut self, state: NmtState) {
         self.nmt = Some(state);
         self.rpdos.iter_mut().for_each(Rpdo::clear);
         self.new_targets = NewTargets::default();
@@ -224,79 +235,12 @@ impl DriveNode {
         }
     }
 
-    /// Process data wait for the next SYNC, or take effect at once where their PDO is event-driven.
-    fn take_process_data(&mut self, now_ns: u64, frame: &Frame) {
-        if !self.is_operational() {
-            return;
-        }
-        let Some(number) = self.rpdos.iter().position(|rpdo| rpdo.id() == Some(frame.id())) else { return };
-        match self.rpdos[number].take(now_ns, frame.data()) {
-            Err(LengthFault::Short) => self.raise(DriveError::PdoShort),
-            Err(LengthFault::Long) => self.raise(DriveError::PdoLong),
-            Ok(()) => {
-                self.clear(DriveError::PdoShort);
-                self.clear(DriveError::PdoLong);
-                self.clear(DriveError::RpdoTimeout);
-            }
-        }
-        if !self.rpdos[number].is_synchronous() {
-            self.apply(number, now_ns);
-        }
-    }
-
-    /// Lets a received PDO take effect.
-    fn apply(&mut self, number: usize, now_ns: u64) {
-        let rpdo = &mut self.rpdos[number];
-        if !rpdo.apply(&mut self.objects) {
-            return;
-        }
-        let holds = |index| rpdo.holds(ObjectAddress::new(index, 0));
-        self.new_targets.position |= holds(0x607A);
-        self.new_targets.torque |= holds(0x6071);
-        let (commands, configures) = (holds(0x6040), rpdo.configures());
-        if configures {
-            self.axis.configure(now_ns, &self.objects);
-        }
-        if commands {
-            self.control(now_ns);
-        }
-    }
-
     /// The controlword in the dictionary takes effect.
     pub(super) fn control(&mut self, now_ns: u64) {
         let word = Controlword(self.objects.get(names::CONTROLWORD));
         if self.axis.control(now_ns, word, &self.objects) {
-            self.clear(DriveError::FollowingError);
-        }
-    }
-
-    /// SYNC: buffered process data take effect, actual values are sampled and sent.
-    fn take_sync(&mut self, now_ns: u64, data: &[u8], position_m: f64) {
-        if !self.is_served() {
-            return;
-        }
-        let counter = match (data, self.objects.get(names::SYNC_OVERFLOW)) {
-            ([], 0) => 0,
-            ([counter], 2..) => *counter,
-            _ => return self.raise(DriveError::SyncLength),
-        };
-        self.clear(DriveError::SyncLength);
-        if self.is_operational() {
-            for number in 0..PDOS {
-                if self.rpdos[number].is_synchronous() {
-                    self.apply(number, now_ns);
-                }
-            }
-        }
-        let new_targets = std::mem::take(&mut self.new_targets);
-        self.axis.synchronise(now_ns, new_targets, &self.objects);
-        if self.is_operational() {
-            self.axis.sample(position_m);
-            self.axis.show(now_ns, &mut self.objects);
-            for number in 0..PDOS {
-                if let Some(frame) = self.tpdos[number].at_sync(now_ns, counter, &self.objects) {
-                    self.send(frame);
-                }
+            for error in DriveError::FAULTS {
+                self.clear(error);
             }
         }
     }
@@ -331,11 +275,12 @@ impl DriveNode {
         }
     }
 
-    /// A lost heartbeat is the loss of the link: objects 6007 and 1029. So is a PDO that does not come.
+    /// A lost heartbeat is the loss of the link: objects 6007 and 1029. A PDO that stays away leaves nobody to guide
+    /// the axis either: object 6007.
     fn watch_link(&mut self, now_ns: u64) {
         if self.consumer.loses(now_ns) {
             self.raise(DriveError::Heartbeat);
-            self.axis.lose_link(now_ns);
+            self.lose_link(now_ns);
             if self.is_operational() {
                 match self.objects.get(names::COMMUNICATION_ERROR) {
                     0 => self.leave_operational(NmtState::PreOperational, now_ns),
@@ -344,30 +289,20 @@ impl DriveNode {
                 }
             }
         }
-        if self.is_operational() && self.rpdos.iter_mut().any(|rpdo| rpdo.is_overdue(now_ns)) {
-            self.raise(DriveError::RpdoTimeout);
+        // Outside of operational none is waited for.
+        let is_one_overdue = self.rpdos.iter_mut().fold(false, |any, rpdo| rpdo.expires(now_ns) | any);
+        if is_one_overdue {
+            self.judge_rpdos();
+            self.lose_link(now_ns);
         }
     }
 
-    /// TPDOs that no SYNC drives.
-    fn send_events(&mut self, now_ns: u64) {
-        if !self.is_operational() || !self.tpdos.iter().any(Tpdo::is_event_driven) {
-            return;
-        }
-        self.axis.show(now_ns, &mut self.objects);
-        for number in 0..PDOS {
-            if let Some(frame) = self.tpdos[number].at_event(now_ns, &self.objects) {
-                self.send(frame);
-            }
-        }
-    }
-
-    fn raise(&mut self, error: DriveError) {
+    pub(super) fn raise(&mut self, error: DriveError) {
         let emergency = self.errors.raise(error, &mut self.objects);
         self.tell(emergency);
     }
 
-    fn clear(&mut self, error: DriveError) {
+    pub(super) fn clear(&mut self, error: DriveError) {
         let emergency = self.errors.clear(error, &mut self.objects);
         self.tell(emergency);
     }

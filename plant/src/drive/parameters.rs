@@ -1,5 +1,6 @@
 //! What the object dictionary configures of an axis, in SI units.
 
+use masseter_shared::can::cia402::interpolation_period;
 use masseter_shared::config::DriveConfig;
 
 use super::dictionary::Objects;
@@ -129,14 +130,14 @@ impl Parameters {
 pub(super) fn configure(
     objects: &mut Objects,
     drive: &DriveConfig,
-    period_s: f64,
+    period_ns: u64,
     position_limits: [i32; 2],
 ) {
     let increments = |metres: f64| (metres / drive.encoder_resolution_m).round() as u32;
     let velocity = increments(drive.max_velocity_m_s).max(1);
     let ramp = increments(drive.quick_stop_deceleration_m_s2).max(1);
     let [lowest, highest] = position_limits;
-    let (value, exponent) = period(period_s);
+    let (value, exponent) = interpolation_period(period_ns);
     objects.set(names::FOLLOWING_WINDOW, increments(drive.following_error_m));
     objects.set(names::FOLLOWING_TIMEOUT_MS, drive.following_error_timeout_ms);
     // Ten times the encoder's noise, and no less than ten increments.
@@ -157,23 +158,6 @@ pub(super) fn configure(
     objects.set(names::PERIOD_INDEX, exponent);
 }
 
-/// A period as object 60C2 has it: value and power of ten, as near as 255 steps allow, no finer than
-/// 1 µs.
-fn period(period_s: f64) -> (u8, i8) {
-    (-6..=0)
-        .map(|exponent| ((period_s / 10.0_f64.powi(i32::from(exponent))).round(), exponent))
-        .find(|(value, _)| *value <= 255.0)
-        .map(|(value, exponent)| (value.max(1.0) as u8, exponent))
-        .map_or((255, 0), |(value, exponent)| {
-            // The same with the fewest digits: 1 · 10⁻³ rather than 100 · 10⁻⁵.
-            let mut shortest = (value, exponent);
-            while shortest.0 % 10 == 0 && shortest.1 < 0 {
-                shortest = (shortest.0 / 10, shortest.1 + 1);
-            }
-            shortest
-        })
-}
-
 #[cfg(test)]
 mod tests {
     use masseter_shared::can::canopen::NodeId;
@@ -182,19 +166,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn periods_are_written_as_the_object_has_them() {
-        let table = [(1e-3, (1, -3)), (2.5e-3, (25, -4)), (4e-3, (4, -3)), (1e-4, (1, -4)), (1.0, (1, 0))];
-        for (period_s, expected) in table {
-            assert_eq!(period(period_s), expected, "{period_s} s");
-        }
-        assert_eq!(period(1.0 / 300.0), (33, -4), "1 % short, as near as the object can say");
-    }
-
-    #[test]
     fn what_the_scenario_says_comes_back_in_si() {
         let drive = DrivesConfig::default().leg;
         let mut objects = Objects::new(NodeId::new(1).unwrap());
-        configure(&mut objects, &drive, 1e-3, [-5, 7]);
+        configure(&mut objects, &drive, MS_NS, [-5, 7]);
         let parameters = Parameters::of(&objects, &drive);
         let near = |a: f64, b: f64| (a - b).abs() < 1e-9;
         assert!(near(parameters.period_s, 1e-3));

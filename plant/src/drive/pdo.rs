@@ -3,6 +3,8 @@
 //!
 //! Which changes are allowed is said in [`rules`](super::rules). Remote requests are not answered.
 
+use std::cmp::Ordering;
+
 use masseter_shared::can::canopen::ObjectAddress;
 use masseter_shared::can::{CanId, Frame};
 
@@ -15,6 +17,9 @@ const EVENT_DRIVEN: u8 = 254;
 /// Unit of an inhibit time, ns.
 const INHIBIT_UNIT_NS: u64 = 100_000;
 const MS_NS: u64 = 1_000_000;
+/// Objects that change with every sample. As in most drives that is no event, or their noise alone would fill the bus:
+/// the event timer (1800:5) sends them.
+const SAMPLED: [u16; 5] = [0x6062, 0x6064, 0x606C, 0x6077, 0x60F4];
 
 /// A word of a PDO's parameters.
 fn parameter(objects: &Objects, index: u16, subindex: u8) -> u32 {
@@ -35,6 +40,12 @@ fn identifier(cob_id: u32) -> Option<CanId> {
 struct Part {
     place: u16,
     bytes: u8,
+}
+
+impl Part {
+    fn address(self) -> ObjectAddress {
+        ENTRIES[usize::from(self.place)].address
+    }
 }
 
 /// A compiled mapping.
@@ -58,12 +69,23 @@ impl Mapped {
         mapped
     }
 
+    /// Only the objects whose change is an event.
+    fn events(&self) -> Self {
+        let mut events = Self::default();
+        for part in self.parts().iter().filter(|part| !SAMPLED.contains(&part.address().index)) {
+            events.parts[events.count] = *part;
+            events.count += 1;
+            events.length += usize::from(part.bytes);
+        }
+        events
+    }
+
     fn parts(&self) -> &[Part] {
         &self.parts[..self.count]
     }
 
     fn holds(&self, object: ObjectAddress) -> bool {
-        self.parts().iter().any(|part| ENTRIES[usize::from(part.place)].address == object)
+        self.parts().iter().any(|part| part.address() == object)
     }
 
     fn pack(&self, objects: &Objects) -> [u8; Frame::MAX_DATA] {
@@ -108,13 +130,19 @@ impl MappingEntry {
     }
 }
 
-/// What is wrong with a received PDO.
+/// What is wrong with a PDO that the drive receives.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum LengthFault {
+pub(super) enum RpdoFault {
     /// Shorter than its mapping: it is not used.
     Short,
     /// Longer than its mapping: what is beyond is not used.
     Long,
+    /// Its event timer ran out.
+    Overdue,
+}
+
+impl RpdoFault {
+    pub(super) const ALL: [Self; 3] = [Self::Short, Self::Long, Self::Overdue];
 }
 
 /// A PDO that the drive receives.
@@ -126,6 +154,8 @@ pub(super) struct Rpdo {
     mapped: Mapped,
     heard_ns: Option<u64>,
     buffered: Option<[u8; Frame::MAX_DATA]>,
+    /// Which of [`RpdoFault::ALL`] it has.
+    faults: [bool; RpdoFault::ALL.len()],
     /// Whether it holds objects that more than the next SYNC depends on.
     configures: bool,
 }
@@ -143,6 +173,7 @@ impl Rpdo {
             mapped,
             heard_ns: None,
             buffered: None,
+            faults: [false; RpdoFault::ALL.len()],
             configures: [0x6060, 0x6081, 0x6083, 0x6084].into_iter().any(plain),
         }
     }
@@ -166,15 +197,27 @@ impl Rpdo {
         self.mapped.holds(object)
     }
 
+    /// Whether it has that fault.
+    pub(super) fn has(&self, fault: RpdoFault) -> bool {
+        self.faults[fault as usize]
+    }
+
     /// Keeps a frame's data, the newest only.
-    pub(super) fn take(&mut self, now_ns: u64, data: &[u8]) -> Result<(), LengthFault> {
-        if data.len() < self.mapped.length {
-            return Err(LengthFault::Short);
+    pub(super) fn take(&mut self, now_ns: u64, data: &[u8]) {
+        match data.len().cmp(&self.mapped.length) {
+            Ordering::Less => {
+                self.faults[RpdoFault::Short as usize] = true;
+                return;
+            }
+            Ordering::Equal => self.faults = Default::default(),
+            Ordering::Greater => {
+                self.faults[RpdoFault::Long as usize] = true;
+                self.faults[RpdoFault::Overdue as usize] = false;
+            }
         }
         let mut buffer = [0; Frame::MAX_DATA];
         buffer[..data.len()].copy_from_slice(data);
         (self.buffered, self.heard_ns) = (Some(buffer), Some(now_ns));
-        if data.len() > self.mapped.length { Err(LengthFault::Long) } else { Ok(()) }
     }
 
     /// Lets what was received take effect; whether there was anything.
@@ -189,10 +232,12 @@ impl Rpdo {
         (self.buffered, self.heard_ns) = (None, None);
     }
 
-    /// Whether its event timer ran out since the last frame; told once.
-    pub(super) fn is_overdue(&mut self, now_ns: u64) -> bool {
+    /// Lets time pass; whether its event timer ran out just now.
+    pub(super) fn expires(&mut self, now_ns: u64) -> bool {
         let is_late = |heard_ns: &mut u64| now_ns.saturating_sub(*heard_ns) > self.deadline_ns;
-        self.deadline_ns > 0 && self.heard_ns.take_if(is_late).is_some()
+        let expires = self.deadline_ns > 0 && self.heard_ns.take_if(is_late).is_some();
+        self.faults[RpdoFault::Overdue as usize] |= expires;
+        expires
     }
 }
 
@@ -215,8 +260,11 @@ pub(super) struct Tpdo {
     inhibit_ns: u64,
     timer_ns: u64,
     mapped: Mapped,
+    /// The objects whose change has it sent.
+    watched: Mapped,
     /// SYNCs since it was sent last; `None` until the start value came.
     syncs: Option<u8>,
+    /// What the watched objects were when it was sent last, and when.
     sent: Option<([u8; Frame::MAX_DATA], u64)>,
 }
 
@@ -225,16 +273,19 @@ impl Tpdo {
     pub(super) fn new(objects: &Objects, number: u16) -> Self {
         let (communication, mapping) = (0x1800 + number, 0x1A00 + number);
         let start = parameter(objects, communication, 6) as u8;
+        let mapped = Mapped::of(objects, mapping);
+        let trigger = match parameter(objects, communication, 2) as u8 {
+            0 => Trigger::ChangeThenSync,
+            every if every < EVENT_DRIVEN => Trigger::EverySync { every, start },
+            _ => Trigger::Event,
+        };
         Self {
             id: identifier(parameter(objects, communication, 1)),
-            trigger: match parameter(objects, communication, 2) as u8 {
-                0 => Trigger::ChangeThenSync,
-                every if every < EVENT_DRIVEN => Trigger::EverySync { every, start },
-                _ => Trigger::Event,
-            },
+            trigger,
             inhibit_ns: u64::from(parameter(objects, communication, 3)) * INHIBIT_UNIT_NS,
             timer_ns: u64::from(parameter(objects, communication, 5)) * MS_NS,
-            mapped: Mapped::of(objects, mapping),
+            watched: if trigger == Trigger::Event { mapped.events() } else { mapped },
+            mapped,
             syncs: None,
             sent: None,
         }
@@ -278,12 +329,12 @@ impl Tpdo {
     }
 
     fn changed(&self, objects: &Objects) -> bool {
-        self.sent.is_none_or(|(data, _)| data != self.mapped.pack(objects))
+        self.sent.is_none_or(|(data, _)| data != self.watched.pack(objects))
     }
 
     fn frame(&mut self, id: CanId, now_ns: u64, objects: &Objects) -> Option<Frame> {
         let data = self.mapped.pack(objects);
-        self.sent = Some((data, now_ns));
+        self.sent = Some((self.watched.pack(objects), now_ns));
         Frame::new(id, &data[..self.mapped.length]).ok()
     }
 }

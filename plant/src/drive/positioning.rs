@@ -50,7 +50,7 @@ impl Axis {
         } else {
             asked_increments
         };
-        let target = self.within_limits(asked);
+        let target = self.within_limits(now_ns, asked);
         let is_free = self.demand.is_at_rest(now_ns) && self.positioning.waiting.is_none();
         if word.changes_immediately() || is_free {
             self.positioning.waiting = None;

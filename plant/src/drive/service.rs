@@ -27,7 +27,10 @@ impl DriveNode {
             0x1003 => errors::forget(&mut self.objects),
             0x1016 => self.consumer = Consumer::new(&self.objects),
             0x1017 => self.producer.configure(&self.objects, now_ns),
-            0x1400..0x1800 => self.compile_rpdo(number),
+            0x1400..0x1800 => {
+                self.compile_rpdo(number);
+                self.judge_rpdos();
+            }
             0x1800..0x1C00 => self.compile_tpdo(number),
             0x6040 => self.control(now_ns),
             0x607A => self.new_targets.position = true,

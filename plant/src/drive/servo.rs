@@ -177,11 +177,22 @@ mod tests {
         assert!(velocity_m_s.abs() < 1e-6);
     }
 
-    #[test]
-    fn force_and_velocity_stay_within_their_limits() {
+    /// The force on an axis at rest that is far from where it shall be, and whether it was limited.
+    fn pull(limits: &ServoLimits) -> (f64, bool) {
         let mut servo = Servo::new(DrivesConfig::default().leg, STEP_S, 0.27);
-        let force_n = servo.step(0.27, Task::Follow { position_m: 5.0, velocity_m_s: 0.0 }, &LIMITS);
-        assert!(force_n.abs() <= LIMITS.force_n && servo.is_limited());
+        let force_n = servo.step(0.27, Task::Follow { position_m: 5.0, velocity_m_s: 0.0 }, limits);
+        (force_n, servo.is_limited())
+    }
+
+    #[test]
+    fn the_velocity_asked_for_stays_within_its_limit() {
+        let (force_n, is_limited) = pull(&ServoLimits { force_n: f64::INFINITY, ..LIMITS });
+        assert!((force_n - 240.0).abs() < 1e-9 && is_limited, "0.4 m/s times the velocity gain: {force_n} N");
+    }
+
+    #[test]
+    fn the_force_stays_within_its_limit() {
+        assert_eq!(pull(&ServoLimits { force_n: 100.0, ..LIMITS }), (100.0, true));
     }
 
     #[test]

@@ -85,6 +85,7 @@ pub(crate) struct Master {
     pub(super) silent_cycles: u32,
     pub(super) were_enabled: bool,
     pub(super) fault: Option<Stop>,
+    is_ending: bool,
     pub(super) journal: Journal,
 }
 
@@ -107,6 +108,7 @@ impl Master {
             silent_cycles: 0,
             were_enabled: false,
             fault: None,
+            is_ending: false,
             journal: Journal::new(),
         }
     }
@@ -187,10 +189,15 @@ impl Master {
         self.boot(now_ns, buses);
     }
 
-    /// What is asked of the drives: what the last good command asks, unless something is wrong, and nothing
-    /// that moves before every drive is verified.
+    /// Stops the drives from the next process data on, for the end: commands are not waited for any more.
+    pub(crate) fn stop(&mut self) {
+        self.is_ending = true;
+    }
+
+    /// What is asked of the drives: what the last good command asks, unless something is wrong or the end was asked
+    /// for, and nothing that moves before every drive is verified.
     pub(super) fn request(&self) -> DriveRequest {
-        if self.fault.is_some() {
+        if self.fault.is_some() || self.is_ending {
             return DriveRequest::QuickStop;
         }
         if !self.nodes.iter().all(Node::is_ready) {
@@ -205,7 +212,8 @@ impl Master {
             self.silent_cycles = self.silent_cycles.saturating_add(1);
             let limit = self.settings.command_timeout_cycles;
             // Who has switched the drives off may go.
-            if self.request() != DriveRequest::Off && self.silent_cycles > limit {
+            let is_waited_for = self.request() != DriveRequest::Off && !self.is_ending;
+            if is_waited_for && self.silent_cycles > limit {
                 self.fail(
                     now_ns,
                     Cause::CommandLost,

@@ -32,7 +32,8 @@ pub(super) struct Node {
     pub(super) heard_ns: u64,
     pub(super) is_fresh: bool,
     pub(super) missing_cycles: u32,
-    /// New process data beyond one a SYNC, in cycles without a quiet one between them.
+    /// New process data beyond one a SYNC. A drive that is late makes up for a cycle without any, two of one id have
+    /// one more every cycle.
     pub(super) surplus: u32,
     /// New process data since the last SYNC.
     news: u32,
@@ -105,11 +106,7 @@ impl Node {
     /// SYNC asks it for new process data.
     pub(super) fn begin_cycle(&mut self) {
         self.is_fresh = false;
-        self.surplus = match std::mem::take(&mut self.news) {
-            0 => self.surplus,
-            1 => self.surplus.saturating_sub(1),
-            several => self.surplus + several - 1,
-        };
+        self.surplus = (self.surplus + std::mem::take(&mut self.news)).saturating_sub(1);
     }
 
     /// Takes process data; a statusword without a meaning keeps the last state.
@@ -150,5 +147,44 @@ impl Node {
         let target_increments =
             if follows { (target_m / self.scale.increment_m).round() as i32 } else { self.actual_increments };
         Rpdo1 { controlword: self.controlword, target_increments }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use masseter_shared::can::cia402::Statusword;
+    use masseter_shared::config::Scenario;
+
+    use super::*;
+    use crate::expectation::setup;
+    use crate::master::supervision::SURPLUS;
+
+    /// The surplus after so many SYNCs of a moving drive, each answered by as many frames as told.
+    fn surplus(syncs: u32, answers: impl Fn(u32) -> u32) -> u32 {
+        let id = NodeId::new(1).unwrap();
+        let scale = Scale { increment_m: 1e-6, rated_force_n: 500.0 };
+        let mut node = Node::new(id, 0, scale, &setup(&Scenario::default(), id, 0), 0);
+        let statusword = Statusword::of(DriveState::OperationEnabled);
+        for sync in 0..syncs {
+            node.begin_cycle();
+            for _ in 0..answers(sync) {
+                let actual_increments = node.actual_increments + 1;
+                node.take(Tpdo1 { statusword, actual_increments, torque_permille: 0 }, true);
+            }
+        }
+        node.begin_cycle();
+        node.surplus
+    }
+
+    #[test]
+    fn a_drive_that_answers_late_is_still_one() {
+        assert!(surplus(100, |sync| if sync % 2 == 0 { 0 } else { 2 }) <= 1, "every other cycle");
+        assert!(surplus(100, |sync| if sync % 4 == 3 { 4 } else { 0 }) <= SURPLUS);
+    }
+
+    #[test]
+    fn two_drives_of_one_id_answer_once_too_often_every_cycle() {
+        assert_eq!(surplus(10, |_| 1), 0);
+        assert_eq!(surplus(10, |_| 2), 10);
     }
 }

@@ -129,8 +129,10 @@ fn configure(setup: &Setup) -> impl Iterator<Item = Task> {
         (0x6085, 0, setup.quick_stop_deceleration, 4),
         (0x6065, 0, setup.following_error, 4),
         (0x6066, 0, u32::from(setup.following_error_ms), 2),
-        (0x607D, 1, lowest as u32, 4),
+        // Wide at first: drives refuse limits that cross, and nobody knows where the old ones are.
+        (0x607D, 1, i32::MIN as u32, 4),
         (0x607D, 2, highest as u32, 4),
+        (0x607D, 1, lowest as u32, 4),
         (0x60C2, 1, u32::from(value), 1),
         (0x60C2, 2, u32::from(exponent as u8), 1),
         (0x6060, 0, CYCLIC_POSITION, 1),
@@ -162,32 +164,27 @@ const fn hold_position() -> [Task; 2] {
     [Task::Keep(ObjectAddress::new(0x6064, 0)), Task::WriteKept(ObjectAddress::new(0x607A, 0))]
 }
 
-/// A period as object 60C2 has it: value and power of ten, as near as 255 steps allow, no finer than
-/// 1 µs, with the fewest digits (1 · 10⁻³ rather than 100 · 10⁻⁵; some drives take whole ms only).
-pub(crate) fn interpolation_period(period_ns: u64) -> (u8, i8) {
-    let (mut value, mut exponent) = ((period_ns + 500) / 1000, -6);
-    while value > u64::from(u8::MAX) || value % 10 == 0 && value > 0 && exponent < 0 {
-        (value, exponent) = ((value + 5) / 10, exponent + 1);
-    }
-    (value.max(1) as u8, exponent)
-}
-
 #[cfg(test)]
 mod tests {
+    use masseter_shared::config::Scenario;
+
     use super::*;
+    use crate::expectation::setup;
 
     #[test]
-    fn periods_are_written_with_the_fewest_digits() {
-        let table = [
-            (1_000_000, (1, -3)),
-            (2_500_000, (25, -4)),
-            (4_000_000, (4, -3)),
-            (100_000_000, (1, -1)),
-            (125_000, (125, -6)),
-            (3_333_333, (33, -4)),
-        ];
-        for (period_ns, expected) in table {
-            assert_eq!(interpolation_period(period_ns), expected, "{period_ns} ns");
+    fn software_limits_never_cross_while_they_are_written_whatever_they_were() {
+        let id = NodeId::new(1).unwrap();
+        let setup = Setup { position_limits: [-10, 20], ..setup(&Scenario::default(), id, 0) };
+        for mut limits in [[-500, -400], [-10, 20], [400, 500], [i32::MIN, i32::MAX], [0, 0]] {
+            for task in plan(id, &setup) {
+                if let Task::Write { object, value, .. } = task
+                    && object.index == 0x607D
+                {
+                    limits[usize::from(object.subindex) - 1] = value as i32;
+                    assert!(limits[0] <= limits[1], "{limits:?}");
+                }
+            }
+            assert_eq!(limits, setup.position_limits);
         }
     }
 }

@@ -16,7 +16,7 @@ use crate::link::Buses;
 const MISSING_CYCLES: u32 = 3;
 /// New process data beyond one a SYNC that a single node may send: those that may be missing may also come late, all
 /// at once.
-const SURPLUS: u32 = MISSING_CYCLES + 2;
+pub(super) const SURPLUS: u32 = MISSING_CYCLES + 2;
 
 /// What an event is about.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -4,14 +4,18 @@
 //! J. Lukkien, *Controller Area Network (CAN) schedulability analysis: refuted, revisited and revised*,
 //! Real-Time Systems 35 (2007), equations 7 to 12: every instance within the longest busy period is looked at,
 //! behind the longest frame of lower priority. Transmit queues by priority are assumed, an undisturbed bus,
-//! and no offsets between messages. Emergencies, SDO and network management are not in a plan: they are
-//! sent while the rig does not move, or stops.
+//! and no offsets between messages. Emergencies and network management are not in the rig's plans: they are
+//! sent while it does not move, or stops.
 
 use std::fmt::{self, Write as _};
 
 use super::frame::FrameFormat;
 use super::id::CanId;
 use super::wire::{Rates, longest_bits};
+
+/// A bus that is not idle for so long has no bound worth the name: near a load of 1 the exact one is found in ever more
+/// steps, and at 1 there is none.
+const LONGEST_BUSY_NS: u64 = 1_000_000_000;
 
 /// A message that is sent again and again.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -162,31 +166,32 @@ fn response_ns(messages: &[PlannedMessage], index: usize, bit_ns: u64) -> Option
             .sum()
     };
     let busy_ns =
-        settle(own.transmission_ns, |busy_ns| blocking_ns + interference_ns(busy_ns, &messages[..=index]));
+        settle(own.transmission_ns, |busy_ns| blocking_ns + interference_ns(busy_ns, &messages[..=index]))?;
     let instances = (busy_ns + own.jitter_ns).div_ceil(own.message.period_ns);
-    let responses = (0..instances).map(|instance| {
+    (0..instances).try_fold(0, |longest_ns, instance| {
         let before_ns = blocking_ns + instance * own.transmission_ns;
         let queued_ns =
-            settle(before_ns, |queued_ns| before_ns + interference_ns(queued_ns + bit_ns, more_urgent));
-        (queued_ns + own.transmission_ns).saturating_sub(instance * own.message.period_ns)
-    });
-    responses.max()
+            settle(before_ns, |queued_ns| before_ns + interference_ns(queued_ns + bit_ns, more_urgent))?;
+        let response_ns = (queued_ns + own.transmission_ns).saturating_sub(instance * own.message.period_ns);
+        Some(longest_ns.max(response_ns))
+    })
 }
 
 fn share(planned: &PlannedMessage) -> f64 {
     planned.transmission_ns as f64 / planned.message.period_ns as f64
 }
 
-/// The least fixed point above `start_ns` of a function that grows; it exists below a load of 1.
-fn settle(start_ns: u64, grow: impl Fn(u64) -> u64) -> u64 {
+/// The least fixed point from `start_ns` on of a function that grows, as far as the longest busy time.
+fn settle(start_ns: u64, grow: impl Fn(u64) -> u64) -> Option<u64> {
     let mut at_ns = start_ns;
-    loop {
+    while at_ns <= LONGEST_BUSY_NS {
         let next_ns = grow(at_ns);
         if next_ns <= at_ns {
-            return at_ns;
+            return Some(at_ns);
         }
         at_ns = next_ns;
     }
+    None
 }
 
 impl fmt::Display for BusPlan {
@@ -291,6 +296,18 @@ mod tests {
         let error = plan(1_000_000, messages).check().unwrap_err().to_string();
         assert!(error.contains("takes 1755.0 µs at worst, at most 569 Hz"), "{error}");
         assert!(error.contains("unbounded") && error.contains("too late"), "{error}");
+    }
+
+    #[test]
+    fn a_bus_without_a_free_moment_has_no_bound() {
+        // SYNC, three TPDO1 and three RPDO1 in just the time that they take, and a heartbeat that blocks them.
+        let mut messages = vec![message(1, 0, 805)];
+        messages.extend((2..5).map(|id| message(id, 8, 805)));
+        messages.extend((5..8).map(|id| message(id, 6, 805)));
+        messages.push(message(8, 1, 50_000));
+        let responses = responses_us(&plan(1_000_000, messages));
+        assert!(responses[0].is_some(), "{responses:?}");
+        assert_eq!(responses[6..], [None, None]);
     }
 
     proptest! {

@@ -43,13 +43,13 @@ pub struct FaultConfig {
     /// absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub node: Option<u8>,
-    /// COB-ID of the frames concerned (11 bits); all when absent.
+    /// COB-ID of the frames concerned, or of those that are babbled (11 bits); all when absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub id: Option<u16>,
-    /// Chance that a frame is struck, 0 to 1.
+    /// Chance that a frame is struck, 0 to 1; only of kinds that strike single frames.
     #[serde(default = "always")]
     pub probability: f64,
-    /// Strikes after which it is over; without end when absent.
+    /// Strikes after which it is over; without end when absent. A disconnection is over by `until_s` alone.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub count: Option<u64>,
     /// How long a frame is delayed, µs.
@@ -98,7 +98,18 @@ impl FaultConfig {
         if let Some(id) = self.id.filter(|&id| id > 0x7FF) {
             return refuse("faults.id", id.to_string(), "use an 11-bit identifier, at most 0x7FF");
         }
-        if self.node.is_none() && matches!(self.kind, Kind::Babble | Kind::Disconnect | Kind::BusOff) {
+        let is_of_node = matches!(self.kind, Kind::Babble | Kind::Disconnect | Kind::BusOff);
+        let has_no_effect = "leave it away: it has no effect on this kind";
+        if is_of_node && self.probability < 1.0 {
+            return refuse("faults.probability", self.probability.to_string(), has_no_effect);
+        }
+        if let Some(id) = self.id.filter(|_| matches!(self.kind, Kind::Disconnect | Kind::BusOff)) {
+            return refuse("faults.id", id.to_string(), has_no_effect);
+        }
+        if let Some(count) = self.count.filter(|_| self.kind == Kind::Disconnect) {
+            return refuse("faults.count", count.to_string(), has_no_effect);
+        }
+        if self.node.is_none() && is_of_node {
             return refuse(
                 "faults.node",
                 "none".to_owned(),

@@ -87,6 +87,13 @@ impl CanConfig {
     }
 
     pub(super) fn validate(&self) -> Result<(), ScenarioError> {
+        if self.heartbeat_producer_ms == 0 {
+            return Err(ScenarioError::BadValue {
+                key: "can.heartbeat_producer_ms",
+                value: "0".to_owned(),
+                need: "use at least 1 ms: nodes are known to be alive by their heartbeats".to_owned(),
+            });
+        }
         if self.ideal && (self.fd || !self.is_virtual()) {
             return Err(ScenarioError::BadValue {
                 key: "can.ideal",
@@ -95,13 +102,11 @@ impl CanConfig {
             });
         }
         if let Err(error) = self.rates() {
-            let key = if matches!(error, BitrateError::Data { .. }) {
-                "can.data_bitrate_bps"
-            } else {
-                "can.bitrate_bps"
+            let (key, bps) = match error {
+                BitrateError::Nominal { bps } => ("can.bitrate_bps", bps),
+                BitrateError::Data { bps, .. } => ("can.data_bitrate_bps", bps),
             };
-            let value = if self.fd { self.data_bitrate_bps } else { self.bitrate_bps }.to_string();
-            return Err(ScenarioError::BadValue { key, value, need: error.to_string() });
+            return Err(ScenarioError::BadValue { key, value: bps.to_string(), need: error.to_string() });
         }
         let names = &self.interfaces;
         let has_twice = (1..names.len()).any(|index| names[..index].contains(&names[index]));

@@ -152,6 +152,14 @@ impl Scenario {
         if !(1..=99).contains(&self.realtime.priority) {
             return bad("realtime.priority", self.realtime.priority.to_string(), "use 1 to 99 (SCHED_FIFO)");
         }
+        if self.realtime.cores[0] == self.realtime.cores[1] {
+            let cores = self.realtime.cores.map(|core| core.to_string()).join(",");
+            return bad(
+                "realtime.cores",
+                cores,
+                "name two: controller and plant wait for each other by spinning",
+            );
+        }
         if let MotionConfig::File(file) = &self.motion
             && file.path.to_str().is_none()
         {
@@ -268,6 +276,7 @@ mod tests {
             ("duration_s = nan", "use more than 0"),
             ("name = '../x'", "letters"),
             ("[realtime]\npriority = 0", "use 1 to 99"),
+            ("[realtime]\ncores = [1, 1]", "realtime.cores = 1,1: name two"),
             ("[can]\ninterfaces = ['can0']", "can.interfaces = can0: name 2 interfaces"),
             ("[can]\ninterfaces = ['can0', 'can0']", "name 2 interfaces"),
             ("[controller]\nease_s = 0.0", "controller.ease_s = 0: use a finite number above 0"),
@@ -282,6 +291,20 @@ mod tests {
             ("[[faults]]\nkind = 'delay'\nbus = 0\nfrom_s = 0.0", "faults.delay_us"),
             ("[[faults]]\nkind = 'lose'\nbus = 0\nfrom_s = 1.0\nuntil_s = 1.0", "faults.until_s = 1"),
             ("[[faults]]\nkind = 'lose'\nbus = 0\nfrom_s = 1.0\nprobability = 1.5", "faults.probability"),
+            (
+                "[[faults]]\nkind = 'bus_off'\nbus = 0\nnode = 1\nfrom_s = 1.0\nprobability = 0.5",
+                "faults.probability = 0.5: leave it away",
+            ),
+            (
+                "[[faults]]\nkind = 'bus_off'\nbus = 0\nnode = 1\nfrom_s = 1.0\nid = 5",
+                "faults.id = 5: leave it",
+            ),
+            (
+                "[[faults]]\nkind = 'disconnect'\nbus = 0\nnode = 1\nfrom_s = 1.0\ncount = 2",
+                "faults.count = 2: leave it away",
+            ),
+            ("[can]\nfd = true\nbitrate_bps = 2000000", "can.bitrate_bps = 2000000: bit rate 2000000"),
+            ("[can]\nheartbeat_producer_ms = 0", "can.heartbeat_producer_ms = 0: use at least 1 ms"),
             ("[food]\nstiffness_n_per_m = 0.0", "food.stiffness_n_per_m = 0: use 1 to 1000000"),
             ("[food]\nthickness_mm = 10.0", "did you mean `thickness_m`?"),
             ("[[faults]]\nkind = 'melt'\nbus = 0\nfrom_s = 1.0", "unknown variant `melt`"),

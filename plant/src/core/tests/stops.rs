@@ -119,6 +119,21 @@ fn a_commander_that_switched_the_drives_off_may_go() {
 }
 
 #[test]
+fn at_the_end_the_drives_are_stopped_at_once_however_long_commands_are_waited_for() {
+    let mut scenario = Scenario::default();
+    scenario.can.command_timeout_cycles = 10_000;
+    let mut bench = Bench::new(&scenario);
+    bench.enable();
+    play(&mut bench, 180);
+    assert!(bench.fastest_axis_m_s() > 0.05);
+    bench.plant.stop();
+    (0..30).for_each(|_| bench.cycle(None));
+    assert!(bench.plant.drives_are_off());
+    assert!(bench.fastest_axis_m_s() < 1e-3);
+    assert_eq!(bench.causes(EventKind::Fault), []);
+}
+
+#[test]
 fn reading_and_truth_name_the_same_instant() {
     let mut bench = Bench::new(&Scenario::default());
     bench.enable();

@@ -2,6 +2,14 @@
 
 use super::*;
 
+/// Object 6007, and where it leaves an enabled drive that nobody guides any more.
+const LINK_REACTIONS: [(u16, DriveState); 4] = [
+    (0, DriveState::OperationEnabled),
+    (1, DriveState::Fault),
+    (2, DriveState::SwitchOnDisabled),
+    (3, DriveState::SwitchOnDisabled),
+];
+
 #[test]
 fn a_node_boots_up_once_and_then_tells_its_state() {
     let mut bench = Bench::new();
@@ -56,6 +64,20 @@ fn a_reset_of_the_communication_leaves_the_profile_alone() {
     assert_eq!((bench.read((0x1017, 0)), bench.read((0x6065, 0))), (Ok(50), Ok(777)));
 }
 
+/// Guided over SDO, as by a tool; the heartbeat would be watched anew only once the master beats again.
+#[test]
+fn a_reset_of_the_communication_stops_the_axis_in_pre_operational_too() {
+    let mut bench = Bench::enabled(1);
+    bench.write((0x607A, 0), &(START + 50_000).to_le_bytes()).unwrap();
+    bench.control(0x1F);
+    bench.run_ms(100);
+    assert!(bench.velocity_m_s > 0.05);
+    bench.nmt(NmtCommand::ResetCommunication);
+    bench.run_ms(100);
+    assert_eq!(bench.drive.power(), DriveState::SwitchOnDisabled);
+    assert!(bench.velocity_m_s.abs() < 1e-3);
+}
+
 #[test]
 fn a_reset_closes_the_brake_and_boots_anew() {
     let mut bench = Bench::enabled(1);
@@ -70,13 +92,7 @@ fn a_reset_closes_the_brake_and_boots_anew() {
 /// Object 6007 and what becomes of an enabled drive whose master falls silent.
 #[test]
 fn a_lost_heartbeat_is_answered_as_object_6007_says() {
-    let table = [
-        (0_u16, DriveState::OperationEnabled),
-        (1, DriveState::Fault),
-        (2, DriveState::SwitchOnDisabled),
-        (3, DriveState::SwitchOnDisabled),
-    ];
-    for (option, state) in table {
+    for (option, state) in LINK_REACTIONS {
         let mut bench = Bench::enabled(1);
         bench.write((0x6007, 0), &option.to_le_bytes()).unwrap();
         bench.master_beats();
@@ -85,9 +101,54 @@ fn a_lost_heartbeat_is_answered_as_object_6007_says() {
         assert_eq!(bench.emergencies(), []);
         bench.run_ms(60);
         assert_eq!(bench.drive.power(), state, "6007 = {option}");
-        assert_eq!(bench.emergencies(), [EmergencyCode::HEARTBEAT]);
+        assert_eq!(bench.emergencies()[0], EmergencyCode::HEARTBEAT);
         bench.master_beats();
-        assert_eq!(bench.emergencies(), [EmergencyCode::HEARTBEAT, EmergencyCode::RESET]);
+        assert_eq!(bench.emergencies().last(), Some(&EmergencyCode::RESET));
+        let fault = if state == DriveState::Fault { (0x11, 0x8100) } else { (0, 0) };
+        assert_eq!(bench.errors(), fault, "6007 = {option}");
+    }
+}
+
+#[test]
+fn a_lost_link_that_is_a_fault_is_told_and_lasts_until_it_is_reset() {
+    for command in [NmtCommand::Stop, NmtCommand::EnterPreOperational, NmtCommand::ResetCommunication] {
+        let mut bench = Bench::enabled(1);
+        bench.write((0x6007, 0), &1_u16.to_le_bytes()).unwrap();
+        bench.nmt(NmtCommand::Start);
+        bench.nmt(command);
+        bench.run_ms(100);
+        assert_eq!(bench.drive.power(), DriveState::Fault);
+        assert_eq!(bench.emergencies(), [EmergencyCode::COMMUNICATION], "{command:?}");
+        bench.nmt(NmtCommand::EnterPreOperational);
+        assert_eq!(bench.errors(), (0x11, 0x8100));
+        bench.control(0x80);
+        assert_eq!(bench.drive.power(), DriveState::SwitchOnDisabled);
+        assert_eq!(bench.emergencies(), [EmergencyCode::COMMUNICATION, EmergencyCode::RESET]);
+        assert_eq!(bench.errors(), (0, 0));
+    }
+}
+
+/// Object 6007 and what becomes of a force whose process data stay away while the master's heartbeat goes on.
+#[test]
+fn process_data_that_stay_away_are_answered_as_object_6007_says() {
+    for (option, state) in LINK_REACTIONS {
+        let mut bench = Bench::enabled(10);
+        bench.write((0x6007, 0), &option.to_le_bytes()).unwrap();
+        remap(&mut bench, 0x1400, 0x204, &[0x6040_0010, 0x6071_0010]);
+        bench.write((0x1400, 5), &10_u16.to_le_bytes()).unwrap();
+        bench.nmt(NmtCommand::Start);
+        for _ in 0..20 {
+            bench.receive(pdo(0x204, &[0x0F, 0, 20, 0]));
+            bench.sync();
+            bench.run_ms(1);
+        }
+        assert_eq!(bench.drive.power(), DriveState::OperationEnabled);
+        for _ in 0..100 {
+            bench.master_beats();
+            bench.run_ms(1);
+        }
+        assert_eq!(bench.drive.power(), state, "6007 = {option}");
+        assert_eq!(bench.emergencies()[0], EmergencyCode::RPDO_TIMEOUT);
     }
 }
 

@@ -1,6 +1,7 @@
 //! Scenarios of a single drive that moves a mass, driven by frames alone.
 
 mod communication;
+mod homing;
 mod modes;
 mod objects;
 mod process_data;
@@ -9,7 +10,7 @@ use masseter_shared::can::canopen::{
     AbortCode, Cob, Emergency, EmergencyCode, Expedited, Heartbeat, Nmt, NmtCommand, NmtState, NmtTarget,
     NodeId, ObjectAddress, SdoRequest, SdoResponse, sync,
 };
-use masseter_shared::can::cia402::{DriveState, Statusword};
+use masseter_shared::can::cia402::{DriveState, StatusBit, Statusword};
 use masseter_shared::can::{CanId, Frame};
 use masseter_shared::config::DrivesConfig;
 
@@ -52,7 +53,7 @@ fn settings() -> DriveSettings {
         drive: DrivesConfig::default().leg,
         heartbeat_ns: 50_000_000,
         link_timeout_ns: 150_000_000,
-        period_s: 1e-3,
+        period_ns: 1_000_000,
         step_s: STEP_NS as f64 * 1e-9,
         position_limit_increments: LIMITS,
     }
@@ -179,6 +180,11 @@ impl Bench {
         self.read(POSITION).unwrap() as i32
     }
 
+    /// Error register and error code (1001, 603F).
+    fn errors(&mut self) -> (u32, u32) {
+        (self.read((0x1001, 0)).unwrap(), self.read((0x603F, 0)).unwrap())
+    }
+
     /// Emergency codes sent so far.
     fn emergencies(&self) -> Vec<EmergencyCode> {
         let frames = self.sent.iter().filter(|frame| frame.id() == Cob::Emergency(id(4)).into());
@@ -195,4 +201,67 @@ impl Bench {
 /// A process data object under any identifier.
 fn pdo(number: u16, data: &[u8]) -> Frame {
     Frame::new(CanId::standard(number).unwrap(), data).unwrap()
+}
+
+/// CiA 301's procedure for changing a mapping; the PDO is `cob_id` afterwards.
+fn remap(bench: &mut Bench, communication: u16, cob_id: u32, objects: &[u32]) {
+    let mapping = communication + 0x200;
+    bench.write((communication, 1), &(cob_id | 1 << 31).to_le_bytes()).unwrap();
+    bench.write((mapping, 0), &[0]).unwrap();
+    for (place, object) in (1..).zip(objects) {
+        bench.write((mapping, place), &object.to_le_bytes()).unwrap();
+    }
+    bench.write((mapping, 0), &[objects.len() as u8]).unwrap();
+    bench.write((communication, 1), &cob_id.to_le_bytes()).unwrap();
+}
+
+const PROFILE_POSITION: i8 = 1;
+const HOMING: i8 = 6;
+const CYCLIC_POSITION: i8 = 8;
+const CYCLIC_TORQUE: i8 = 10;
+
+/// RPDO1 as mapped after power-on.
+fn command(word: u16, target: i32) -> Frame {
+    let [w0, w1] = word.to_le_bytes();
+    let [t0, t1, t2, t3] = target.to_le_bytes();
+    pdo(0x204, &[w0, w1, t0, t1, t2, t3])
+}
+
+impl Bench {
+    /// A cycle of a master: process data, SYNC, a millisecond.
+    fn cycle(&mut self, word: u16, target: i32) {
+        self.receive(command(word, target));
+        self.sync();
+        self.run_ms(1);
+    }
+
+    /// An enabled drive in cyclic synchronous position that moves at 0.1 m/s.
+    fn cycling() -> (Self, i32) {
+        let mut bench = Self::operational();
+        for word in [0x06, 0x07, 0x0F] {
+            bench.cycle(word, START);
+        }
+        let mut target = START;
+        for step in 0..200 {
+            target += step.min(100);
+            bench.cycle(0x0F, target);
+        }
+        assert!((bench.velocity_m_s - 0.1).abs() < 0.01, "{}", bench.velocity_m_s);
+        (bench, target)
+    }
+
+    /// Starts the motion to a set-point: target, then the rising edge of bit 4.
+    fn set_point(&mut self, target: i32, bits: u16) {
+        self.write(TARGET_POSITION, &target.to_le_bytes()).unwrap();
+        self.control(0x0F);
+        self.control(0x1F | bits);
+    }
+
+    fn has(&mut self, bit: StatusBit) -> bool {
+        self.statusword().has(bit)
+    }
+
+    fn is_near(&mut self, target: i32) -> bool {
+        (self.position() - target).abs() <= 10
+    }
 }

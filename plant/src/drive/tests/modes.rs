@@ -1,59 +1,6 @@
 //! CiA 402: power states, stops and modes of operation with an axis that moves.
 
-use masseter_shared::can::cia402::StatusBit;
-
 use super::*;
-
-const PROFILE_POSITION: i8 = 1;
-const HOMING: i8 = 6;
-const CYCLIC_POSITION: i8 = 8;
-const CYCLIC_TORQUE: i8 = 10;
-
-/// RPDO1 as mapped after power-on.
-fn command(word: u16, target: i32) -> Frame {
-    let [w0, w1] = word.to_le_bytes();
-    let [t0, t1, t2, t3] = target.to_le_bytes();
-    pdo(0x204, &[w0, w1, t0, t1, t2, t3])
-}
-
-impl Bench {
-    /// A cycle of a master: process data, SYNC, a millisecond.
-    fn cycle(&mut self, word: u16, target: i32) {
-        self.receive(command(word, target));
-        self.sync();
-        self.run_ms(1);
-    }
-
-    /// An enabled drive in cyclic synchronous position that moves at 0.1 m/s.
-    fn cycling() -> (Self, i32) {
-        let mut bench = Self::operational();
-        for word in [0x06, 0x07, 0x0F] {
-            bench.cycle(word, START);
-        }
-        let mut target = START;
-        for step in 0..200 {
-            target += step.min(100);
-            bench.cycle(0x0F, target);
-        }
-        assert!((bench.velocity_m_s - 0.1).abs() < 0.01, "{}", bench.velocity_m_s);
-        (bench, target)
-    }
-
-    /// Starts the motion to a set-point: target, then the rising edge of bit 4.
-    fn set_point(&mut self, target: i32, bits: u16) {
-        self.write(TARGET_POSITION, &target.to_le_bytes()).unwrap();
-        self.control(0x0F);
-        self.control(0x1F | bits);
-    }
-
-    fn has(&mut self, bit: StatusBit) -> bool {
-        self.statusword().has(bit)
-    }
-
-    fn is_near(&mut self, target: i32) -> bool {
-        (self.position() - target).abs() <= 10
-    }
-}
 
 #[test]
 fn cyclic_targets_are_followed_from_sync_to_sync() {
@@ -62,6 +9,15 @@ fn cyclic_targets_are_followed_from_sync_to_sync() {
     bench.run_ms(50);
     assert!(bench.is_near(target));
     assert!(bench.has(StatusBit::TargetFollowed) && !bench.has(StatusBit::InternalLimit));
+}
+
+#[test]
+fn a_single_controlword_switches_on_and_enables() {
+    let mut bench = Bench::enabled(PROFILE_POSITION);
+    bench.control(0x06);
+    assert_eq!(bench.drive.power(), DriveState::ReadyToSwitchOn);
+    bench.control(0x0F);
+    assert_eq!(bench.drive.power(), DriveState::OperationEnabled);
 }
 
 #[test]
@@ -160,6 +116,7 @@ fn a_following_error_is_a_fault_that_only_an_edge_resets() {
     bench.run_ms(200);
     assert_eq!(bench.emergencies(), [EmergencyCode::FOLLOWING_ERROR]);
     assert_eq!(bench.drive.power(), DriveState::Fault);
+    assert!(bench.has(StatusBit::FollowingError), "as long as the fault stands");
     assert_eq!(bench.read((0x603F, 0)), Ok(0x8611));
     assert_eq!(bench.read((0x1001, 0)), Ok(0x21));
     bench.cycle(0x0F, target);
@@ -168,6 +125,21 @@ fn a_following_error_is_a_fault_that_only_an_edge_resets() {
     assert_eq!(bench.drive.power(), DriveState::SwitchOnDisabled);
     assert_eq!(bench.emergencies().last(), Some(&EmergencyCode::RESET));
     assert_eq!((bench.read((0x603F, 0)), bench.read((0x1001, 0))), (Ok(0), Ok(0)));
+    assert!(!bench.has(StatusBit::FollowingError));
+}
+
+#[test]
+fn a_window_left_for_less_than_its_time_out_is_no_following_error() {
+    let (mut bench, target) = Bench::cycling();
+    bench.write((0x6065, 0), &50_u32.to_le_bytes()).unwrap();
+    bench.write((0x6066, 0), &1000_u16.to_le_bytes()).unwrap();
+    bench.load_n = 1100.0;
+    bench.run_ms(6);
+    assert!((bench.read((0x60F4, 0)).unwrap() as i32).abs() > 50);
+    assert!(!bench.has(StatusBit::FollowingError));
+    bench.load_n = LOAD_N;
+    bench.cycle(0x0F, target);
+    assert_eq!(bench.drive.power(), DriveState::OperationEnabled);
 }
 
 #[test]
@@ -262,57 +234,6 @@ fn a_set_point_beyond_the_software_limit_ends_at_it() {
     assert!(bench.is_near(LIMITS[1]));
 }
 
-#[test]
-fn homing_where_it_stands_only_renames_the_position() {
-    for method in [35, 37] {
-        let mut bench = Bench::enabled(HOMING);
-        bench.write((0x6098, 0), &[method]).unwrap();
-        bench.write((0x607C, 0), &1234_i32.to_le_bytes()).unwrap();
-        let before_m = bench.position_m;
-        bench.control(0x1F);
-        assert!(bench.has(StatusBit::HOMING_ATTAINED) && bench.has(StatusBit::TargetReached));
-        assert!(bench.is_near(1234));
-        bench.run_ms(20);
-        assert!((bench.position_m - before_m).abs() < 2e-5);
-    }
-}
-
-#[test]
-fn homing_to_a_reference_mark_moves_there_and_calls_it_the_offset() {
-    for (method, mark) in [(33, 270_000), (34, 272_000)] {
-        let mut bench = Bench::enabled(HOMING);
-        bench.write((0x6098, 0), &[method]).unwrap();
-        bench.write((0x607C, 0), &50_i32.to_le_bytes()).unwrap();
-        bench.control(0x1F);
-        bench.run_ms(50);
-        assert!(!bench.has(StatusBit::HOMING_ATTAINED) && !bench.has(StatusBit::TargetReached));
-        assert_eq!(bench.write((0x6098, 0), &[35]), Err(AbortCode::DEVICE_STATE));
-        bench.run_ms(500);
-        assert!(bench.has(StatusBit::HOMING_ATTAINED) && bench.has(StatusBit::TargetReached));
-        let counts = (bench.position_m / 1e-6).round() as i32;
-        assert!((bench.position() - (counts - mark + 50)).abs() <= 1, "method {method}");
-        assert!((counts - mark).abs() < 50, "it stopped soon behind the mark");
-    }
-}
-
-#[test]
-fn homing_fails_without_a_mark_before_the_limit_and_ends_when_it_is_told_to() {
-    let mut bench = Bench::enabled(HOMING);
-    bench.write((0x6098, 0), &[34]).unwrap();
-    bench.write((0x607D, 2), &(START + 500).to_le_bytes()).unwrap();
-    bench.control(0x1F);
-    bench.run_ms(500);
-    assert!(bench.has(StatusBit::HOMING_ERROR) && !bench.has(StatusBit::HOMING_ATTAINED));
-    let mut bench = Bench::enabled(HOMING);
-    bench.write((0x6098, 0), &[34]).unwrap();
-    bench.control(0x1F);
-    bench.run_ms(50);
-    bench.control(0x0F);
-    bench.run_ms(500);
-    assert!(!bench.has(StatusBit::HOMING_ERROR) && !bench.has(StatusBit::HOMING_ATTAINED));
-    assert!(bench.has(StatusBit::TargetReached), "interrupted");
-}
-
 impl Bench {
     /// Enabled in cyclic synchronous torque, giving a target every millisecond.
     fn push(&mut self, permille: i16, ms: u64) {
@@ -336,6 +257,15 @@ fn a_torque_is_given_within_its_limit() {
     bench.push(10, 1);
     assert!((bench.force_n - 2.5).abs() < 1e-9);
     assert!(bench.has(StatusBit::InternalLimit));
+}
+
+#[test]
+fn while_the_brake_holds_the_motor_gives_no_torque() {
+    let mut bench = Bench::new();
+    bench.load_n = 50.0;
+    bench.run_ms(100);
+    assert!((bench.force_n - 50.0).abs() < 1.0, "the brake carries the load: {} N", bench.force_n);
+    assert_eq!(bench.read((0x6077, 0)), Ok(0));
 }
 
 #[test]

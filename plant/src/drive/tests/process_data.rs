@@ -2,18 +2,6 @@
 
 use super::*;
 
-/// CiA 301's procedure for changing a mapping; the PDO is `cob_id` afterwards.
-fn remap(bench: &mut Bench, communication: u16, cob_id: u32, objects: &[u32]) {
-    let mapping = communication + 0x200;
-    bench.write((communication, 1), &(cob_id | 1 << 31).to_le_bytes()).unwrap();
-    bench.write((mapping, 0), &[0]).unwrap();
-    for (place, object) in (1..).zip(objects) {
-        bench.write((mapping, place), &object.to_le_bytes()).unwrap();
-    }
-    bench.write((mapping, 0), &[objects.len() as u8]).unwrap();
-    bench.write((communication, 1), &cob_id.to_le_bytes()).unwrap();
-}
-
 #[test]
 fn the_mapping_after_power_on_is_the_masters() {
     let mut bench = Bench::operational();
@@ -119,6 +107,30 @@ fn an_event_driven_tpdo_is_sent_at_a_change_no_more_often_than_allowed() {
 }
 
 #[test]
+fn a_measured_value_is_sent_by_the_event_timer_and_not_at_every_change() {
+    let mut bench = Bench::enabled(10);
+    bench.write((0x1800, 1), &0xC000_0184_u32.to_le_bytes()).unwrap();
+    bench.write((0x1800, 2), &[255]).unwrap();
+    bench.write((0x1800, 5), &20_u16.to_le_bytes()).unwrap();
+    bench.write((0x1800, 1), &0x4000_0184_u32.to_le_bytes()).unwrap();
+    bench.nmt(NmtCommand::Start);
+    bench.write((0x6071, 0), &50_u16.to_le_bytes()).unwrap();
+    bench.sync();
+    bench.run_ms(20);
+    assert!(bench.velocity_m_s > 0.05);
+    bench.sent.clear();
+    bench.run_ms(100);
+    let sent: Vec<_> = bench.sent.iter().filter(|frame| frame.id().number() == 0x184).copied().collect();
+    assert_eq!(sent.len(), 5);
+    let positions = sent.windows(2).map(|two| [two[0].data()[2..6].to_vec(), two[1].data()[2..6].to_vec()]);
+    assert!(positions.into_iter().all(|[before, after]| before != after), "each carries the newest value");
+    bench.sent.clear();
+    bench.control(0x02);
+    bench.run_ms(1);
+    assert!(bench.sent.iter().any(|frame| frame.id().number() == 0x184), "a new state is an event");
+}
+
+#[test]
 fn process_data_of_a_wrong_length_are_reported_and_short_ones_not_used() {
     let mut bench = Bench::operational();
     bench.receive(pdo(0x204, &[0x06, 0]));
@@ -141,6 +153,51 @@ fn process_data_that_stay_away_are_reported_once() {
     assert_eq!(bench.emergencies(), [EmergencyCode::RPDO_TIMEOUT]);
     bench.receive(pdo(0x204, &[0; 6]));
     assert_eq!(bench.emergencies(), [EmergencyCode::RPDO_TIMEOUT, EmergencyCode::RESET]);
+}
+
+/// An operational drive with a second RPDO, 304h with the mode of operation.
+fn with_two_rpdos() -> Bench {
+    let mut bench = Bench::operational();
+    remap(&mut bench, 0x1401, 0x304, &[0x6060_0008]);
+    bench
+}
+
+#[test]
+fn an_error_of_process_data_lasts_until_no_pdo_has_it() {
+    let mut bench = with_two_rpdos();
+    for _ in 0..10 {
+        bench.receive(pdo(0x204, &[0; 2]));
+        bench.receive(pdo(0x304, &[8]));
+    }
+    assert_eq!(bench.emergencies(), [EmergencyCode::PDO_LENGTH]);
+    bench.receive(pdo(0x304, &[]));
+    bench.receive(pdo(0x204, &[0; 6]));
+    assert_eq!(bench.emergencies(), [EmergencyCode::PDO_LENGTH], "the other one is too short now");
+    bench.receive(pdo(0x304, &[8]));
+    assert_eq!(bench.emergencies(), [EmergencyCode::PDO_LENGTH, EmergencyCode::RESET]);
+}
+
+#[test]
+fn a_pdo_that_stays_away_is_missed_while_another_comes() {
+    let mut bench = with_two_rpdos();
+    bench.write((0x1400, 5), &10_u16.to_le_bytes()).unwrap();
+    bench.receive(pdo(0x204, &[0; 6]));
+    for _ in 0..30 {
+        bench.receive(pdo(0x304, &[8]));
+        bench.run_ms(1);
+    }
+    assert_eq!(bench.emergencies(), [EmergencyCode::RPDO_TIMEOUT]);
+    assert_eq!(bench.errors(), (0x11, 0x8250));
+    bench.receive(pdo(0x204, &[0; 7]));
+    assert_eq!(bench.errors(), (0x11, 0x8220), "too long, but it is there again");
+}
+
+#[test]
+fn the_error_of_a_pdo_goes_with_the_pdo() {
+    let mut bench = with_two_rpdos();
+    bench.receive(pdo(0x304, &[]));
+    bench.write((0x1401, 1), &0x8000_0304_u32.to_le_bytes()).unwrap();
+    assert_eq!(bench.emergencies(), [EmergencyCode::PDO_LENGTH, EmergencyCode::RESET]);
 }
 
 #[test]

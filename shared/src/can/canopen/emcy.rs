@@ -12,14 +12,10 @@ pub struct EmergencyCode(pub u16);
 impl EmergencyCode {
     /// No error any more.
     pub const RESET: Self = Self(0x0000);
-    /// Sensor: the encoder failed.
-    pub const ENCODER: Self = Self(0x7300);
-    /// CAN error passive.
-    pub const ERROR_PASSIVE: Self = Self(0x8120);
+    /// Communication, not told in more detail.
+    pub const COMMUNICATION: Self = Self(0x8100);
     /// A heartbeat or node guarding is overdue.
     pub const HEARTBEAT: Self = Self(0x8130);
-    /// Recovered from bus-off.
-    pub const RECOVERED_FROM_BUS_OFF: Self = Self(0x8140);
     /// A PDO was too short to be used.
     pub const PDO_LENGTH: Self = Self(0x8210);
     /// A PDO was longer than its mapping.

@@ -9,8 +9,7 @@ use super::{Command, DriveState};
 impl DriveState {
     /// The state after a command; the same where the command has no effect.
     ///
-    /// Enable operation in ready to switch on performs T3 only: T4 follows when the drive evaluates the
-    /// same controlword again.
+    /// Enable operation in ready to switch on performs T3 and, by itself, T4 after it.
     #[must_use]
     #[expect(clippy::match_same_arms, reason = "one line a transition, as the standard numbers them")]
     pub const fn after(self, command: Command) -> Self {
@@ -21,7 +20,8 @@ impl DriveState {
         #[rustfmt::skip]
         let next = match (self, command) {
             (SwitchOnDisabled, Shutdown)                   => ReadyToSwitchOn,  // T2
-            (ReadyToSwitchOn, SwitchOn | EnableOperation)  => SwitchedOn,       // T3
+            (ReadyToSwitchOn, SwitchOn)                    => SwitchedOn,       // T3
+            (ReadyToSwitchOn, EnableOperation)             => OperationEnabled, // T3, T4
             (SwitchedOn, EnableOperation)                  => OperationEnabled, // T4
             (OperationEnabled, SwitchOn)                   => SwitchedOn,       // T5
             (SwitchedOn, Shutdown)                         => ReadyToSwitchOn,  // T6
@@ -90,7 +90,7 @@ mod tests {
     const TABLE: [(DriveState, [DriveState; 6]); 8] = [
         (NotReadyToSwitchOn,  [NotReadyToSwitchOn; 6]),
         (SwitchOnDisabled,    [ReadyToSwitchOn, SwitchOnDisabled, SwitchOnDisabled, SwitchOnDisabled, SwitchOnDisabled, SwitchOnDisabled]),
-        (ReadyToSwitchOn,     [ReadyToSwitchOn, SwitchedOn, SwitchedOn, SwitchOnDisabled, SwitchOnDisabled, ReadyToSwitchOn]),
+        (ReadyToSwitchOn,     [ReadyToSwitchOn, SwitchedOn, OperationEnabled, SwitchOnDisabled, SwitchOnDisabled, ReadyToSwitchOn]),
         (SwitchedOn,          [ReadyToSwitchOn, SwitchedOn, OperationEnabled, SwitchOnDisabled, SwitchOnDisabled, SwitchedOn]),
         (OperationEnabled,    [ReadyToSwitchOn, SwitchedOn, OperationEnabled, SwitchOnDisabled, QuickStopActive, OperationEnabled]),
         (QuickStopActive,     [QuickStopActive, QuickStopActive, QuickStopActive, SwitchOnDisabled, QuickStopActive, QuickStopActive]),

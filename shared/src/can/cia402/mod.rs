@@ -5,12 +5,14 @@
 //! Modes of operation, targets, ramps and the policy of restarting after a fault are not here.
 
 mod controlword;
+mod interpolation;
 mod machine;
 mod state;
 mod statusword;
 mod toward;
 
 pub use controlword::{Command, Controlword};
+pub use interpolation::interpolation_period;
 pub use state::DriveState;
 pub use statusword::{StatusBit, Statusword, StatuswordError};
 pub use toward::toward;

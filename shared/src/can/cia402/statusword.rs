@@ -32,7 +32,7 @@ pub enum StatusBit {
     InternalLimit = 11,
     /// Cyclic synchronous modes: the target is being followed.
     TargetFollowed = 12,
-    /// Cyclic synchronous position: the following error window was left.
+    /// Position modes: the following error window was left for too long.
     FollowingError = 13,
 }
 

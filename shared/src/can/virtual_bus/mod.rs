@@ -168,8 +168,12 @@ impl VirtualWire {
         if frame.format().is_fd() && !self.config.format.is_fd() {
             return Err(SendError::NotFd { length: frame.data().len() });
         }
-        let queued_ns = now_ns.max(self.advanced_to_ns) + self.delay_ns(port, now_ns, &frame);
+        let delay = self.delay(port, now_ns, &frame);
+        let queued_ns = now_ns.max(self.advanced_to_ns) + delay.map_or(0, |(_, by_ns)| by_ns);
         self.stations[port].transmit.push(Queued::new(frame, self.config.rates, queued_ns))?;
+        if let Some((strike, _)) = delay {
+            self.faults.record(strike);
+        }
         self.look_again();
         self.statistics.queued += 1;
         Ok(())
@@ -332,16 +336,13 @@ impl VirtualWire {
         self.look_again();
     }
 
-    fn delay_ns(&mut self, port: usize, now_ns: u64, frame: &Frame) -> u64 {
+    /// The fault that delays a frame, and by how much.
+    fn delay(&self, port: usize, now_ns: u64, frame: &Frame) -> Option<(Strike, u64)> {
         let is_delay = |kind| matches!(kind, FaultKind::Delay { .. });
         let number = self.statistics.queued;
-        match self.faults.strikes_frame(now_ns, is_delay, port, frame.id(), number) {
-            Some(strike) => {
-                self.faults.record(strike);
-                if let FaultKind::Delay { by_ns } = self.faults.kind_of(strike) { by_ns } else { 0 }
-            }
-            None => 0,
-        }
+        let strike = self.faults.strikes_frame(now_ns, is_delay, port, frame.id(), number)?;
+        let FaultKind::Delay { by_ns } = self.faults.kind_of(strike) else { return None };
+        Some((strike, by_ns))
     }
 
     /// Changes a port's fault confinement; a change of its state is tapped, and who leaves the bus forgets

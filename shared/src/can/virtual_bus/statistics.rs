@@ -33,11 +33,6 @@ impl Statistics {
         self.busy_ns as f64 / elapsed_ns as f64
     }
 
-    /// Mean time from queueing to arrival, ns; `None` before the first frame.
-    pub fn response_mean_ns(&self) -> Option<f64> {
-        (self.frames > 0).then(|| self.response_total_ns as f64 / self.frames as f64)
-    }
-
     pub(super) fn count_frame(&mut self, response_ns: u64) {
         self.frames += 1;
         self.response_max_ns = self.response_max_ns.max(response_ns);

@@ -4,7 +4,7 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::can::conformance::{self, End, Pair};
-use crate::can::wire::{Bitrate, INTERFRAME_BITS, wire_bits};
+use crate::can::wire::{Bitrate, INTERFRAME_BITS, frame_bits};
 use crate::can::{Bus, CanId, canopen::sync};
 
 mod errors;
@@ -32,7 +32,7 @@ fn frame(id: u16, data: &[u8]) -> Frame {
 }
 
 fn duration_ns(frame: &Frame) -> u64 {
-    u64::from(wire_bits(frame) - INTERFRAME_BITS) * BIT_NS
+    u64::from(frame_bits(frame).total() - INTERFRAME_BITS) * BIT_NS
 }
 
 fn fetch(wire: &mut VirtualWire, port: usize) -> Vec<Received> {

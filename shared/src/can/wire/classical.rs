@@ -15,7 +15,7 @@ const STANDARD_HEADER_BITS: u32 = 19;
 const EXTENDED_HEADER_BITS: u32 = 39;
 
 /// Exact length of a frame on the wire from the start bit to the end of the interframe space, bits.
-pub fn wire_bits(frame: &Frame) -> u32 {
+pub(super) fn wire_bits(frame: &Frame) -> u32 {
     let (content, content_bits) = content(frame);
     let stuffed = content << CRC_BITS | u128::from(crc15(content, content_bits));
     let stuffed_bits = content_bits + CRC_BITS;

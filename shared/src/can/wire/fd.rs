@@ -44,8 +44,13 @@ fn switches(frame: &Frame) -> bool {
     frame.format() == FrameFormat::FdBitRateSwitch
 }
 
+/// Length of an FD frame of that many data bytes with no stuff bits but the fixed ones.
+pub(super) const fn unstuffed_fd_bits(data_length: u32, extended: bool, switches: bool) -> FrameBits {
+    lay_out(switches, head_bits(extended), 0, data_length)
+}
+
 /// The longest that an FD frame of that many data bytes can be.
-pub const fn worst_case_fd_bits(data_length: u32, extended: bool, switches: bool) -> FrameBits {
+pub(super) const fn worst_case_fd_bits(data_length: u32, extended: bool, switches: bool) -> FrameBits {
     let head = head_bits(extended);
     let content = head + CONTROL_BITS + 8 * data_length;
     // As with classical frames, but the bit behind which a stuff bit would be due must have a successor.
@@ -119,13 +124,14 @@ mod tests {
 
     proptest! {
         #[test]
-        fn exact_is_within_worst_case(frame in any_fd_frame()) {
+        fn exact_is_within_shortest_and_worst_case(frame in any_fd_frame()) {
             let (length, extended) = (frame.data().len() as u32, frame.id().is_extended());
             let (exact, worst) = (bits(&frame), worst_case_fd_bits(length, extended, switches(&frame)));
             prop_assert!(exact.head <= worst.head && exact.total() <= worst.total(), "{exact:?} {worst:?}");
+            let shortest = unstuffed_fd_bits(length, extended, switches(&frame));
             let crc_and_fixed = if length <= 16 { 17 + 6 } else { 21 + 7 };
-            let unstuffed = head_bits(extended) + 5 + 8 * length + 4 + crc_and_fixed + 1 + 12;
-            prop_assert!(unstuffed <= exact.total());
+            prop_assert_eq!(shortest.total(), head_bits(extended) + 5 + 8 * length + 4 + crc_and_fixed + 1 + 12);
+            prop_assert!(shortest.head <= exact.head && shortest.data <= exact.data, "{exact:?} {shortest:?}");
         }
     }
 }

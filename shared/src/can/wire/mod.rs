@@ -11,9 +11,10 @@ mod stuffing;
 use super::frame::{Frame, FrameFormat};
 
 pub use bitrate::{Bitrate, BitrateError, FrameBits, Rates};
-pub use classical::{unstuffed_bits, wire_bits, worst_case_bits};
+use classical::wire_bits;
+pub use classical::{unstuffed_bits, worst_case_bits};
 pub(super) use difference::first_difference;
-pub use fd::worst_case_fd_bits;
+use fd::{unstuffed_fd_bits, worst_case_fd_bits};
 
 /// Exact length of a frame on the wire from the start bit to the end of the interframe space.
 pub fn frame_bits(frame: &Frame) -> FrameBits {
@@ -29,6 +30,16 @@ pub const fn longest_bits(data_length: u32, extended: bool, format: FrameFormat)
         FrameFormat::Classical => FrameBits::nominal(worst_case_bits(data_length, extended)),
         FrameFormat::Fd => worst_case_fd_bits(data_length, extended, false),
         FrameFormat::FdBitRateSwitch => worst_case_fd_bits(data_length, extended, true),
+    }
+}
+
+/// The shortest that a frame of that many data bytes can be in a format: without any stuff bit that depends on its
+/// content, interframe space included.
+pub const fn shortest_bits(data_length: u32, extended: bool, format: FrameFormat) -> FrameBits {
+    match format {
+        FrameFormat::Classical => FrameBits::nominal(unstuffed_bits(data_length, extended)),
+        FrameFormat::Fd => unstuffed_fd_bits(data_length, extended, false),
+        FrameFormat::FdBitRateSwitch => unstuffed_fd_bits(data_length, extended, true),
     }
 }
 

@@ -71,17 +71,25 @@ impl PortFaults {
         self.faults.next_note(now_ns)
     }
 
-    /// Whether a fault strikes a frame, which is recorded then; what it does.
-    fn strike(
-        &mut self,
-        now_ns: u64,
-        is_kind: fn(FaultKind) -> bool,
-        frame: &Frame,
-        number: u64,
-    ) -> Option<FaultKind> {
-        let strike = self.faults.strikes_frame(now_ns, is_kind, self.port, frame.id(), number)?;
+    /// Whether a fault strikes a frame, which is recorded then.
+    fn strikes(&mut self, now_ns: u64, kind: FaultKind, frame: &Frame, number: u64) -> bool {
+        let is_kind = |other| other == kind;
+        let strike = self.faults.strikes_frame(now_ns, is_kind, self.port, frame.id(), number);
+        strike.inspect(|&strike| self.faults.record(strike)).is_some()
+    }
+
+    /// Holds a frame back if a fault delays it; whether it did.
+    fn holds_back(&mut self, now_ns: u64, frame: Frame, number: u64) -> Result<bool, SendError> {
+        let is_delay = |kind| matches!(kind, FaultKind::Delay { .. });
+        let strike = self.faults.strikes_frame(now_ns, is_delay, self.port, frame.id(), number);
+        let Some(strike) = strike else { return Ok(false) };
+        let FaultKind::Delay { by_ns } = self.faults.kind_of(strike) else { return Ok(false) };
+        if self.held.len() == HELD {
+            return Err(SendError::QueueFull { capacity: HELD });
+        }
         self.faults.record(strike);
-        Some(self.faults.kind_of(strike))
+        self.held.push(Held { due_ns: now_ns.saturating_add(by_ns), frame });
+        Ok(true)
     }
 
     /// Whether the node is off the bus or disconnected at that time.
@@ -89,7 +97,9 @@ impl PortFaults {
         self.restart_when_due(now_ns);
         self.faults.begin_disconnections(now_ns);
         let is_bus_off = |kind| kind == FaultKind::BusOff;
-        if let Some(strike) = self.faults.of_node(now_ns, is_bus_off, self.port) {
+        if self.off_since_ns.is_none()
+            && let Some(strike) = self.faults.of_node(now_ns, is_bus_off, self.port)
+        {
             self.faults.record(strike);
             self.off_since_ns = Some(now_ns);
             self.held.clear();
@@ -153,17 +163,13 @@ impl<B: Bus> Bus for Faulty<'_, B> {
         self.send_own(now_ns);
         let number = self.faults.sent;
         self.faults.sent += 1;
-        let is_delay = |kind| matches!(kind, FaultKind::Delay { .. });
-        if let Some(FaultKind::Delay { by_ns }) = self.faults.strike(now_ns, is_delay, &frame, number) {
-            if self.faults.held.len() == HELD {
-                return Err(SendError::QueueFull { capacity: HELD });
-            }
-            self.faults.held.push(Held { due_ns: now_ns.saturating_add(by_ns), frame });
+        if self.faults.holds_back(now_ns, frame, number)? {
             return Ok(());
         }
         self.bus.send(now_ns, frame)?;
-        if self.faults.strike(now_ns, |kind| kind == FaultKind::Duplicate, &frame, number).is_some() {
-            self.bus.send(now_ns, frame)?;
+        if self.faults.strikes(now_ns, FaultKind::Duplicate, &frame, number) {
+            // The frame itself is queued: that its copy finds no room is no failure of the sender.
+            let _ = self.bus.send(now_ns, frame);
         }
         Ok(())
     }
@@ -179,8 +185,7 @@ impl<B: Bus> Bus for Faulty<'_, B> {
             let Some(Received { frame, time_ns }) = received else { return Ok(None) };
             let number = self.faults.received;
             self.faults.received += 1;
-            let is_lost =
-                self.faults.strike(time_ns, |kind| kind == FaultKind::Lose, &frame, number).is_some();
+            let is_lost = self.faults.strikes(time_ns, FaultKind::Lose, &frame, number);
             if !is_cut_off && !is_lost {
                 return Ok(received);
             }

@@ -194,6 +194,33 @@ fn who_is_off_the_bus_says_so_until_it_restarts() {
 }
 
 #[test]
+fn a_node_is_put_off_the_bus_as_often_as_asked_for() {
+    let off = Fault { kind: FaultKind::BusOff, count: 2, ..FAULT };
+    let mut pair = Wrapped::new(Vec::new(), Vec::new());
+    pair.faults[0] = PortFaults::new(vec![off], 0, 1).unwrap().restarting_after(Some(1_000_000));
+    for _ in 0..2 {
+        for byte in 0..5 {
+            assert_eq!(pair.send(byte), Err(SendError::BusOff { tec: 256 }));
+        }
+        pair.now_ns += 1_000_000;
+    }
+    pair.send(1).unwrap();
+}
+
+#[test]
+fn a_copy_without_room_does_not_fail_the_frame() {
+    let duplicate = Fault { kind: FaultKind::Duplicate, ..FAULT };
+    let mut pair = Wrapped::new(vec![duplicate], Vec::new());
+    // The queue holds eight: four frames with their copies.
+    (0..4).for_each(|byte| pair.send(byte).unwrap());
+    assert_eq!(pair.send(4), Err(SendError::QueueFull { capacity: 8 }));
+    let mut pair = Wrapped::new(vec![Fault { count: 1, from_ns: 1, ..duplicate }], Vec::new());
+    (0..7).for_each(|byte| pair.send(byte).unwrap());
+    pair.now_ns = 1;
+    assert_eq!(pair.send(7), Ok(()), "its copy would be the ninth");
+}
+
+#[test]
 fn corruption_needs_a_wire() {
     let corrupt = Fault { kind: FaultKind::Corrupt, ..FAULT };
     assert_eq!(PortFaults::new(vec![FAULT, corrupt], 0, 1).unwrap_err(), NotByPort { index: 1 });

@@ -76,6 +76,19 @@ fn a_delayed_frame_is_queued_later() {
 }
 
 #[test]
+fn a_frame_that_finds_no_room_is_not_counted_as_delayed() {
+    let mut wire =
+        struck_by(Fault { kind: FaultKind::Delay { by_ns: 300_000 }, from_ns: 1000, count: 1, ..ANY });
+    while wire.send(1, 0, sync::frame()).is_ok() {}
+    assert!(wire.send(1, 1000, sync::frame()).is_err());
+    wire.advance(FOREVER / 4);
+    arrivals(&mut wire);
+    wire.send(1, FOREVER / 2, sync::frame()).unwrap();
+    wire.advance(FOREVER);
+    assert_eq!(arrivals(&mut wire), [(0x080, FOREVER / 2 + 300_000 + 48_000)]);
+}
+
+#[test]
 fn a_duplicated_frame_arrives_twice() {
     let mut wire = struck_by(Fault { kind: FaultKind::Duplicate, count: 1, ..ANY });
     wire.send(1, 0, sync::frame()).unwrap();
@@ -96,7 +109,7 @@ fn a_babbling_node_leaves_no_gap_to_lower_priorities() {
     let (last, babbled) = arrivals.split_last().unwrap();
     assert_eq!(last.0, 0x080, "SYNC comes when the babbling is over");
     assert!(last.1 > 2_000_000);
-    let each_ns = u64::from(wire_bits(&babble)) * BIT_NS;
+    let each_ns = u64::from(frame_bits(&babble).total()) * BIT_NS;
     assert_eq!(babbled.len() as u64, 1_500_000_u64.div_ceil(each_ns));
 }
 

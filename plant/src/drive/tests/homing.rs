@@ -1,0 +1,126 @@
+//! CiA 402: homing, and what becomes of an axis whose origin it has moved.
+
+use super::*;
+
+#[test]
+fn homing_where_it_stands_only_renames_the_position() {
+    for method in [35, 37] {
+        let mut bench = Bench::enabled(HOMING);
+        bench.write((0x6098, 0), &[method]).unwrap();
+        bench.write((0x607C, 0), &1234_i32.to_le_bytes()).unwrap();
+        let before_m = bench.position_m;
+        bench.control(0x1F);
+        assert!(bench.has(StatusBit::HOMING_ATTAINED) && bench.has(StatusBit::TargetReached));
+        assert!(bench.is_near(1234));
+        bench.run_ms(20);
+        assert!((bench.position_m - before_m).abs() < 2e-5);
+    }
+}
+
+#[test]
+fn homing_to_a_reference_mark_moves_there_and_calls_it_the_offset() {
+    for (method, mark) in [(33, 270_000), (34, 272_000)] {
+        let mut bench = Bench::enabled(HOMING);
+        bench.write((0x6098, 0), &[method]).unwrap();
+        bench.write((0x607C, 0), &50_i32.to_le_bytes()).unwrap();
+        bench.control(0x1F);
+        bench.run_ms(50);
+        assert!(!bench.has(StatusBit::HOMING_ATTAINED) && !bench.has(StatusBit::TargetReached));
+        assert_eq!(bench.write((0x6098, 0), &[35]), Err(AbortCode::DEVICE_STATE));
+        bench.run_ms(500);
+        assert!(bench.has(StatusBit::HOMING_ATTAINED) && bench.has(StatusBit::TargetReached));
+        let counts = (bench.position_m / 1e-6).round() as i32;
+        assert!((bench.position() - (counts - mark + 50)).abs() <= 1, "method {method}");
+        assert!((counts - mark).abs() < 50, "it stopped soon behind the mark");
+    }
+}
+
+#[test]
+fn a_home_that_was_attained_stays_so_until_a_restart_or_another_homing() {
+    let mut bench = Bench::enabled(HOMING);
+    bench.control(0x1F);
+    bench.control(0x00);
+    bench.write(MODE, &[CYCLIC_POSITION as u8]).unwrap();
+    bench.write(MODE, &[HOMING as u8]).unwrap();
+    assert!(bench.has(StatusBit::HOMING_ATTAINED) && bench.has(StatusBit::TargetReached));
+    bench.write((0x6098, 0), &[34]).unwrap();
+    bench.enable();
+    bench.control(0x1F);
+    assert!(!bench.has(StatusBit::HOMING_ATTAINED), "searching anew");
+
+    let mut bench = Bench::enabled(HOMING);
+    bench.control(0x1F);
+    bench.nmt(NmtCommand::ResetNode);
+    bench.run_ms(25);
+    bench.write(MODE, &[HOMING as u8]).unwrap();
+    assert!(!bench.has(StatusBit::HOMING_ATTAINED));
+}
+
+#[test]
+fn homing_fails_without_a_mark_before_the_limit_and_ends_when_it_is_told_to() {
+    let mut bench = Bench::enabled(HOMING);
+    bench.write((0x6098, 0), &[34]).unwrap();
+    bench.write((0x607D, 2), &(START + 500).to_le_bytes()).unwrap();
+    bench.control(0x1F);
+    bench.run_ms(500);
+    assert!(bench.has(StatusBit::HOMING_ERROR) && !bench.has(StatusBit::HOMING_ATTAINED));
+    let mut bench = Bench::enabled(HOMING);
+    bench.write((0x6098, 0), &[34]).unwrap();
+    bench.control(0x1F);
+    bench.run_ms(50);
+    bench.control(0x0F);
+    bench.run_ms(500);
+    assert!(!bench.has(StatusBit::HOMING_ERROR) && !bench.has(StatusBit::HOMING_ATTAINED));
+    assert!(bench.has(StatusBit::TargetReached), "interrupted");
+}
+
+impl Bench {
+    /// Enabled in homing where its position is called 0, far below the software limits.
+    fn homed_below_its_limits() -> Self {
+        let mut bench = Self::enabled(HOMING);
+        bench.write((0x6098, 0), &[37]).unwrap();
+        bench.control(0x1F);
+        assert!(bench.has(StatusBit::HOMING_ATTAINED) && bench.is_near(0));
+        bench.control(0x0F);
+        bench
+    }
+}
+
+#[test]
+fn homing_leaves_the_numbers_of_the_software_limits_which_count_from_home() {
+    let mut bench = Bench::homed_below_its_limits();
+    assert_eq!([1, 2].map(|end| bench.read((0x607D, end)).unwrap() as i32), LIMITS);
+}
+
+#[test]
+fn an_axis_outside_its_software_limits_stays_where_it_is_told_to() {
+    let mut bench = Bench::homed_below_its_limits();
+    bench.write(MODE, &[CYCLIC_POSITION as u8]).unwrap();
+    bench.nmt(NmtCommand::Start);
+    (0..100).for_each(|_| bench.cycle(0x0F, 0));
+    assert!(bench.is_near(0), "{}", bench.position());
+}
+
+#[test]
+fn an_axis_outside_its_software_limits_may_come_nearer_but_not_go_further() {
+    let mut bench = Bench::homed_below_its_limits();
+    bench.write(MODE, &[PROFILE_POSITION as u8]).unwrap();
+    bench.set_point(-5000, 0);
+    bench.run_ms(300);
+    assert!(bench.is_near(0) && bench.has(StatusBit::InternalLimit));
+    bench.set_point(5000, 0);
+    bench.run_ms(300);
+    assert!(bench.is_near(5000) && !bench.has(StatusBit::InternalLimit));
+    bench.set_point(4000, 0);
+    bench.run_ms(300);
+    assert!(bench.is_near(5000));
+}
+
+#[test]
+fn a_search_never_goes_against_its_direction() {
+    let mut bench = Bench::homed_below_its_limits();
+    bench.write((0x6098, 0), &[33]).unwrap();
+    bench.control(0x1F);
+    bench.run_ms(100);
+    assert!(bench.has(StatusBit::HOMING_ERROR) && bench.is_near(0));
+}
