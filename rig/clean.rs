@@ -6,25 +6,20 @@ use crate::exit::{Exit, Failure};
 
 /// Sweeps every dead domain of this user and says what was found.
 pub(crate) fn clean() -> Result<Exit, Failure> {
-    let mut swept = 0;
-    for domain in Domain::all()? {
-        if domain.is_alive() {
-            println!("{}: running, left alone", domain.id());
-        } else {
-            println!("{}: {} files removed from shared memory", domain.id(), domain.sweep()?);
-            swept += 1;
+    let domains = Domain::all()?;
+    for domain in &domains {
+        match domain.sweep()? {
+            Some(files) => show_line!("{}: {files} files removed from shared memory", domain.id()),
+            None => show_line!("{}: running, left alone", domain.id()),
         }
     }
-    if swept == 0 {
-        println!("nothing to clean");
+    if domains.is_empty() {
+        show_line!("nothing to clean");
     }
     Ok(Exit::Passed)
 }
 
 /// Sweeps dead domains before a run, silently.
 pub(crate) fn sweep_dead() -> Result<(), DomainError> {
-    for domain in Domain::all()?.iter().filter(|domain| !domain.is_alive()) {
-        domain.sweep()?;
-    }
-    Ok(())
+    Domain::all()?.iter().try_for_each(|domain| domain.sweep().map(drop))
 }

@@ -122,10 +122,13 @@ pub struct RunArgs {
     /// The run folder; must not exist [default: runs/UTC_TIME-NAME]
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
+    /// Name of this rig, which no other running one may have [default: one that none has]
+    #[arg(long)]
+    pub name: Option<String>,
     /// How the result is written to standard output
     #[arg(long, value_enum, default_value_t)]
     pub format: Format,
-    /// Exit with 3 unless core, SCHED_FIFO and locked memory are all granted
+    /// Exit with 3 unless core, SCHED_FIFO, locked memory and, where it is to be held, /dev/cpu_dma_latency are granted
     #[arg(long)]
     pub require_rt: bool,
     /// Show the run live to Foxglove over a WebSocket, to this machine only unless an address is given
@@ -207,10 +210,10 @@ pub struct CsvArgs {
 pub struct FkArgs {
     #[command(flatten)]
     pub(crate) csv: CsvArgs,
-    /// Which iteration: the controller's certified one, the seed's, or Newton-Raphson
+    /// Which iteration: the controller's certified one, the paper's, or Newton-Raphson
     #[arg(long, value_enum, default_value_t)]
     pub(crate) solver: Solver,
-    /// Leg angles to start every line from, radians [default: 1.46 each, the seed's neutral pose]
+    /// Leg angles to start every line from, radians [default: 1.46 each, the paper's neutral pose]
     #[arg(long, value_name = "RAD,RAD,RAD", value_parser = parse_guess, allow_hyphen_values = true)]
     pub(crate) guess: Option<[f64; 3]>,
     /// Start each line from the solution of the one before; takes one core only
@@ -227,8 +230,8 @@ pub enum Solver {
     /// The certified one of the control loop: the true solution, or the reason why there is none.
     #[default]
     Controller,
-    /// The seed's: some solution, from the guess.
-    Seed,
+    /// The paper's: some solution, from the guess.
+    Published,
     /// Newton-Raphson: some solution, from the guess.
     Newton,
 }
@@ -363,7 +366,7 @@ pub fn main() -> ExitCode {
     match result {
         Ok(exit) => exit.into(),
         Err(Failure { exit, error }) => {
-            eprintln!("masseter: {}", in_one_line(&error));
+            tell!("masseter: {}", in_one_line(&error));
             exit.into()
         }
     }

@@ -83,7 +83,7 @@ struct Takers {
 impl Takers {
     fn announce(&self, quiet: bool) {
         if let Some(live) = self.live.as_ref().filter(|_| !quiet) {
-            eprintln!("live on {} for Foxglove", live.url());
+            tell!("live on {} for Foxglove", live.url());
         }
     }
 
@@ -107,7 +107,7 @@ impl Takers {
     fn end(self) -> Exit {
         let unseen = self.live.map_or(0, |live| live.finish().dropped);
         if unseen > 0 {
-            eprintln!("masseter: {unseen} messages were not shown live: their watchers read too slowly");
+            tell!("masseter: {unseen} messages were not shown live: their watchers read too slowly");
         }
         end(self.backlog)
     }
@@ -119,7 +119,7 @@ fn end(backlog: Backlog) -> Exit {
     if outcome.lost == 0 && outcome.error.is_none() {
         return Exit::Passed;
     }
-    eprintln!("masseter: {} messages did not reach the disk", outcome.lost);
+    tell!("masseter: {} messages did not reach the disk", outcome.lost);
     Exit::Incomplete
 }
 

@@ -3,6 +3,7 @@
 mod common;
 
 use common::{Bench, masseter, stderr};
+use serde_json::{Value, json};
 
 #[test]
 fn scenarios_are_refused_with_place_and_remedy() {
@@ -84,6 +85,45 @@ fn interfaces_that_cannot_be_used_are_refused_with_what_to_do() {
 }
 
 #[test]
+fn manifests_that_no_run_wrote_are_refused_and_their_words_are_no_markup() {
+    let bench = Bench::new("duration_s = 1.0");
+    assert_eq!(bench.run(&["--clock", "virtual"]).status.code(), Some(0));
+    let report_on = |edit: &dyn Fn(&mut Value)| {
+        let mut manifest = bench.manifest();
+        edit(&mut manifest);
+        let folder = bench.file("edited");
+        std::fs::create_dir_all(&folder).unwrap();
+        std::fs::copy(bench.run_folder().join("recording.mcap"), folder.join("recording.mcap")).unwrap();
+        std::fs::write(folder.join("manifest.json"), manifest.to_string()).unwrap();
+        masseter(&["report", folder.to_str().unwrap()])
+    };
+    for (rate_hz, form, reason) in
+        [(0, 1, "use 10 to 20000 Hz"), (2_000_000_000, 1, "Hz"), (1000, 9, "form 9")]
+    {
+        let output = report_on(&|manifest| {
+            manifest["scenario"]["rate_hz"] = rate_hz.into();
+            manifest["form"] = form.into();
+        });
+        assert_eq!(output.status.code(), Some(2), "{}", stderr(&output));
+        assert!(stderr(&output).contains(reason), "{}", stderr(&output));
+    }
+    let output = report_on(&|manifest| {
+        manifest["clock"] = "<b>".into();
+        manifest["scheduling"] = json!({
+            "<b>": { "wanted": { "locked_memory": true }, "locked_memory": true, "refusals": ["<b>"] },
+        });
+        let used = json!({
+            "observed_s": 1.0, "cpu_s": 1.0, "voluntary_switches": 0, "involuntary_switches": 0, "minor_faults": 0,
+            "major_faults": 0,
+        });
+        manifest["usage"]["processes"] = json!({ "<b>": used });
+    });
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    let page = std::fs::read_to_string(bench.file("edited").join("report.html")).unwrap();
+    assert!(page.contains("&lt;b&gt;") && !page.contains("<b>"));
+}
+
+#[test]
 fn a_run_folder_is_never_overwritten() {
     let bench = Bench::new("duration_s = 1.0");
     std::fs::create_dir(bench.run_folder()).unwrap();
@@ -94,7 +134,14 @@ fn a_run_folder_is_never_overwritten() {
 
 #[test]
 fn wrong_usage_exits_with_2() {
-    for arguments in [&["run", "--cores", "0"][..], &["run", "--duration", "soon"], &["fly"], &[]] {
+    for arguments in [
+        &["run", "--cores", "0"][..],
+        &["run", "--cores", "1,1"],
+        &["run", "--clock", "virtual", "--require-rt"],
+        &["run", "--duration", "soon"],
+        &["fly"],
+        &[],
+    ] {
         assert_eq!(masseter(arguments).status.code(), Some(2), "{arguments:?}");
     }
     assert_eq!(masseter(&["report", "/nowhere"]).status.code(), Some(2));

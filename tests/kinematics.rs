@@ -156,7 +156,7 @@ fn an_input_without_any_solution_says_how_far_it_is_from_one() {
 #[test]
 fn every_solver_finds_the_neutral_pose_and_a_guess_below_the_base_its_mirror_image() {
     let input = format!("{ACTUATORS}0,0,0,0.27,0.27,0.27\n");
-    for solver in ["controller", "seed", "newton"] {
+    for solver in ["controller", "published", "newton"] {
         let near = pipe(&["fk", "--solver", solver, "--guess", "1.5,1.4,1.5"], &input);
         let line = stdout(&near).lines().nth(1).unwrap().to_owned();
         assert!(line.ends_with(",ok") && (columns(&line)[2] - 0.268_452_355).abs() < 1e-9, "{line}");

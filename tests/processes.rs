@@ -4,11 +4,11 @@
 mod common;
 
 use std::fs;
-use std::process::Command;
+use std::process::{Child, Command};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-use common::{Bench, UNHURRIED, child_of, masseter, shared_memory_of, start, stderr, stdout};
+use common::{Bench, UNHURRIED, child_of, masseter, shared_memory_of, skip, start, stderr, stdout};
 use masseter_shared::clock;
 use rustix::process::{Pid, Signal, kill_process};
 
@@ -31,6 +31,14 @@ fn wait_until_it_records(bench: &Bench) {
         clock::sleep(Duration::from_millis(10));
     }
     panic!("the rig did not begin to record");
+}
+
+/// A rig in the midst of a long run.
+fn running() -> (Bench, Child) {
+    let bench = Bench::new(&format!("duration_s = 60.0\n{UNHURRIED}"));
+    let child = start(&bench, &[]);
+    wait_until_it_records(&bench);
+    (bench, child)
 }
 
 #[test]
@@ -88,9 +96,7 @@ fn the_death_of_any_process_stops_the_rig_safely_and_keeps_the_recording() {
 #[test]
 fn an_interrupt_ends_the_motion_in_order() {
     let _cores = take_the_cores();
-    let bench = Bench::new(&format!("duration_s = 60.0\n{UNHURRIED}"));
-    let child = start(&bench, &[]);
-    wait_until_it_records(&bench);
+    let (bench, child) = running();
     kill_process(Pid::from_child(&child), Signal::INT).unwrap();
     let output = child.wait_with_output().unwrap();
     assert_eq!(output.status.code(), Some(130), "{}", stderr(&output));
@@ -98,17 +104,66 @@ fn an_interrupt_ends_the_motion_in_order() {
 }
 
 #[test]
+fn a_terminal_that_is_gone_ends_the_motion_in_order() {
+    let _cores = take_the_cores();
+    let (bench, mut child) = running();
+    let roles = ["controller", "plant", "logger"].map(|role| child_of(&child, role));
+    // Nobody reads any more what is said, and the whole group hears of it.
+    drop((child.stdout.take(), child.stderr.take()));
+    for id in roles.into_iter().chain([Pid::from_child(&child)]) {
+        kill_process(id, Signal::HUP).unwrap();
+    }
+    assert_eq!(child.wait().unwrap().code(), Some(130));
+    assert_eq!(bench.summary()["figures"]["final_state"], "finished");
+    assert_eq!(bench.summary()["figures"]["cut_short"], false);
+}
+
+#[test]
+fn a_run_goes_on_when_nobody_reads_what_it_says() {
+    let _cores = take_the_cores();
+    let bench = Bench::new(&format!("duration_s = 3.0\n{UNHURRIED}"));
+    let mut child = start(&bench, &[]);
+    drop((child.stdout.take(), child.stderr.take()));
+    let code = child.wait().unwrap().code();
+    assert!(PASSED_OR_INVALID.contains(&code), "{code:?} {}", bench.summary()["verdict"]);
+}
+
+#[test]
+fn a_motion_that_somebody_broke_off_does_not_pass() {
+    let _cores = take_the_cores();
+    let (bench, child) = running();
+    kill_process(child_of(&child, "controller"), Signal::TERM).unwrap();
+    let output = child.wait_with_output().unwrap();
+    let code = output.status.code();
+    assert!(code == Some(1) || code == Some(3), "{code:?} {}", stdout(&output));
+    let sequence = &bench.summary()["verdict"]["checks"][0];
+    assert!(sequence["finding"].as_str().unwrap().contains("asked to stop"), "{sequence}");
+}
+
+#[test]
+fn a_controller_that_does_not_end_when_asked_to_is_killed() {
+    let _cores = take_the_cores();
+    let (_bench, child) = running();
+    kill_process(child_of(&child, "controller"), Signal::STOP).unwrap();
+    kill_process(Pid::from_child(&child), Signal::TERM).unwrap();
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(4), "{}{}", stdout(&output), stderr(&output));
+    assert!(stdout(&output).contains("did not end when asked to"), "{}", stdout(&output));
+}
+
+#[test]
 fn a_killed_supervisor_takes_its_processes_along_and_clean_sweeps_what_is_left() {
     let _cores = take_the_cores();
-    let bench = Bench::new(&format!("duration_s = 60.0\n{UNHURRIED}"));
-    let mut child = start(&bench, &[]);
-    wait_until_it_records(&bench);
+    let (bench, mut child) = running();
     let id = format!("{}-", child.id());
     child.kill().unwrap();
     child.wait().unwrap();
     for _ in 0..500 {
         assert_eq!(masseter(&["clean"]).status.code(), Some(0));
         if shared_memory_of(&id).is_empty() {
+            let report = masseter(&["report", bench.run_folder().to_str().unwrap()]);
+            assert_eq!(report.status.code(), Some(4), "{}{}", stdout(&report), stderr(&report));
+            assert!(stdout(&report).contains("the supervisor died"), "{}", stdout(&report));
             return;
         }
         clock::sleep(Duration::from_millis(10));
@@ -132,6 +187,22 @@ fn two_rigs_on_one_machine_do_not_meet() {
 }
 
 #[test]
+fn a_second_rig_of_the_same_name_is_refused() {
+    let _cores = take_the_cores();
+    let name = format!("robot-{}", std::process::id());
+    let [first, second] = [1, 2].map(|_| Bench::new(&format!("duration_s = 60.0\n{UNHURRIED}")));
+    let running = start(&first, &["--name", &name]);
+    wait_until_it_records(&first);
+    let refused = second.run(&["--name", &name]);
+    assert_eq!(refused.status.code(), Some(2), "{}", stderr(&refused));
+    assert!(stderr(&refused).contains(&format!("a rig named '{name}' is running")), "{}", stderr(&refused));
+    assert!(!second.run_folder().exists());
+    kill_process(Pid::from_child(&running), Signal::INT).unwrap();
+    assert_eq!(running.wait_with_output().unwrap().status.code(), Some(130));
+    assert_eq!(second.run(&["--name", "../robot"]).status.code(), Some(2));
+}
+
+#[test]
 fn what_the_kernel_refuses_is_said_and_required_real_time_exits_with_3() {
     let _cores = take_the_cores();
     let bench = Bench::new(&format!("duration_s = 1.0\n[realtime]\ncores = [0, 4000]\n{UNHURRIED}"));
@@ -145,7 +216,7 @@ fn what_the_kernel_refuses_is_said_and_required_real_time_exits_with_3() {
 fn a_full_disk_does_not_stop_the_rig() {
     let _cores = take_the_cores();
     if !rustix::process::getuid().is_root() {
-        eprintln!("SKIPPED: needs root to mount a small disk");
+        skip("needs root to mount a small disk");
         return;
     }
     let bench = Bench::new(&format!("duration_s = 3.0\n{UNHURRIED}"));
@@ -170,7 +241,7 @@ fn a_full_disk_does_not_stop_the_rig() {
 fn an_ordinary_user_runs_the_rig_without_real_time() {
     let _cores = take_the_cores();
     if !rustix::process::getuid().is_root() {
-        eprintln!("SKIPPED: needs root to become an ordinary user; every other test here ran as one");
+        skip("needs root to become an ordinary user; every other test here ran as one");
         return;
     }
     let bench = Bench::new(&format!("duration_s = 1.0\n{UNHURRIED}"));

@@ -6,11 +6,13 @@ use super::finding::Finding;
 
 /// All findings of this family.
 pub(super) fn examine() -> Vec<Finding> {
-    let count = Domain::all().map(|domains| {
-        let (alive, dead): (Vec<_>, Vec<_>) = domains.iter().partition(|domain| domain.is_alive());
-        (alive.len(), dead.len())
-    });
-    vec![leftovers(&count)]
+    vec![leftovers(&alive_and_dead())]
+}
+
+fn alive_and_dead() -> Result<(usize, usize), DomainError> {
+    let alive = Domain::all()?.iter().map(Domain::is_alive).collect::<Result<Vec<_>, _>>()?;
+    let count = |wanted: bool| alive.iter().filter(|&&is_alive| is_alive == wanted).count();
+    Ok((count(true), count(false)))
 }
 
 fn leftovers(count: &Result<(usize, usize), DomainError>) -> Finding {

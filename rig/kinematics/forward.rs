@@ -72,7 +72,7 @@ impl Chosen {
             (Solver::Controller, Some(guess)) => {
                 Self::Controller(ForwardTracker::with_guess(mechanism, guess))
             }
-            (Solver::Seed, _) => iteration(Method::Seed, mechanism),
+            (Solver::Published, _) => iteration(Method::Seed, mechanism),
             (Solver::Newton, _) => iteration(Method::Newton, mechanism),
         }
     }

@@ -9,7 +9,7 @@ mod seen;
 mod tests;
 
 use std::fmt::Write as _;
-use std::io::{self, IsTerminal, Write as _};
+use std::io::{self, IsTerminal};
 
 use masseter_shared::can::wire::Rates;
 use masseter_shared::clock::SECOND_NS;
@@ -18,6 +18,7 @@ use masseter_shared::messages::codes::{ControllerState, DriveCondition};
 
 use crate::live::Watched;
 use crate::recording::Recorded;
+use crate::say::warn;
 use seen::{CLASS_NAMES, Lateness, Seen};
 
 /// How often a line is written, ns.
@@ -99,7 +100,7 @@ impl View {
     pub(super) fn show(&mut self, now_ns: u64, told: Told) {
         let passed_ns = now_ns.saturating_sub(self.shown_ns);
         match self.mode {
-            Mode::Lines if passed_ns >= LINE_NS => eprintln!("{}", self.line(told)),
+            Mode::Lines if passed_ns >= LINE_NS => tell!("{}", self.line(told)),
             Mode::Picture if passed_ns >= PICTURE_NS => self.draw(passed_ns, told),
             _ => return,
         }
@@ -119,7 +120,7 @@ impl View {
         let picture = self.picture(told, passed_ns).expect("a string takes any text");
         let up = if self.standing > 0 { format!("\x1b[{}A", self.standing) } else { String::new() };
         let text = format!("{up}{ERASE_BELOW}{CUT_LINES}{picture}{WRAP_LINES}");
-        let _ = io::stderr().write_all(text.as_bytes());
+        warn(&text);
         self.standing = picture.lines().count();
     }
 

@@ -13,6 +13,9 @@ use rustix::process::{Pid, Signal, kill_process};
 /// How long a process may take to open its ports and lock its memory.
 const READY_WITHIN: Duration = Duration::from_secs(20);
 
+/// How often a wait looks whether it is still wanted.
+const LOOK: Duration = Duration::from_millis(20);
+
 /// Which process it is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Role {
@@ -97,18 +100,24 @@ impl Process {
         self.child.id()
     }
 
-    /// Waits until it says that it is ready.
-    pub fn wait_ready(&mut self) -> Result<Ready, ChildError> {
+    /// Waits until it says that it is ready; none when `is_given_up` comes first.
+    pub fn wait_ready(&mut self, is_given_up: impl Fn() -> bool) -> Result<Option<Ready>, ChildError> {
         let not_ready = |reason: String| ChildError::NotReady { role: self.role.name(), reason };
-        match self.lines.recv_timeout(READY_WITHIN) {
-            Ok(line) => {
-                serde_json::from_str(&line).map_err(|error| not_ready(format!("{error} in '{line}'")))
-            }
-            Err(RecvTimeoutError::Timeout) => {
-                Err(not_ready(format!("silent for {} s", READY_WITHIN.as_secs())))
-            }
-            Err(RecvTimeoutError::Disconnected) => {
-                Err(not_ready("it ended; its message stands above".to_owned()))
+        let mut looks = READY_WITHIN.as_millis() / LOOK.as_millis();
+        loop {
+            match self.lines.recv_timeout(LOOK) {
+                Ok(line) => {
+                    let ready = serde_json::from_str(&line);
+                    return ready.map(Some).map_err(|error| not_ready(format!("{error} in '{line}'")));
+                }
+                Err(RecvTimeoutError::Timeout) if is_given_up() => return Ok(None),
+                Err(RecvTimeoutError::Timeout) if looks > 0 => looks -= 1,
+                Err(RecvTimeoutError::Timeout) => {
+                    return Err(not_ready(format!("silent for {} s", READY_WITHIN.as_secs())));
+                }
+                Err(RecvTimeoutError::Disconnected) => {
+                    return Err(not_ready("it ended; its message stands above".to_owned()));
+                }
             }
         }
     }

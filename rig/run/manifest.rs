@@ -63,7 +63,7 @@ pub struct Machine {
 }
 
 impl Machine {
-    fn this() -> Self {
+    pub(crate) fn this() -> Self {
         let uname = rustix::system::uname();
         let [name, release, version] =
             [uname.sysname(), uname.release(), uname.version()].map(std::ffi::CStr::to_string_lossy);
@@ -96,18 +96,39 @@ impl Manifest {
             scheduling: BTreeMap::new(),
             cpu_dma_latency: None,
             usage: RunUsage::default(),
-            ending: Ending::Completed,
+            ending: Ending::died("supervisor", "it did not live to judge the run".to_owned()),
         }
     }
 
-    /// Writes the file.
+    /// The first thing that a process did not get of the scheduling it asked for, with what helps.
+    pub fn refusal(&self) -> Option<(&str, &str)> {
+        let refusals = self.scheduling.iter().flat_map(|(process, obtained)| {
+            obtained.refusals.iter().map(move |refusal| (process.as_str(), refusal.as_str()))
+        });
+        refusals.into_iter().next()
+    }
+
+    /// Writes the file, wholly or not at all.
     pub fn write(&self, folder: &RunFolder) -> io::Result<()> {
         let text = serde_json::to_string_pretty(self)?;
-        fs::write(folder.manifest(), text + "\n")
+        let unfinished = folder.manifest().with_extension("json.part");
+        fs::write(&unfinished, text + "\n")?;
+        fs::rename(unfinished, folder.manifest())
     }
 
     /// Reads the file of a past run.
     pub fn read(folder: &RunFolder) -> io::Result<Self> {
-        Ok(serde_json::from_str(&fs::read_to_string(folder.manifest())?)?)
+        #[derive(Deserialize)]
+        struct Form {
+            form: u32,
+        }
+        let text = fs::read_to_string(folder.manifest())?;
+        let Form { form } = serde_json::from_str(&text)?;
+        if form != FORM {
+            return Err(io::Error::other(format!("it has form {form}, this program reads form {FORM}")));
+        }
+        let manifest: Self = serde_json::from_str(&text)?;
+        manifest.scenario.validate().map_err(io::Error::other)?;
+        Ok(manifest)
     }
 }

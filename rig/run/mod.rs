@@ -7,6 +7,7 @@ pub mod child;
 pub(crate) mod counters;
 pub mod dma_latency;
 pub mod folder;
+pub mod interrupts;
 pub mod manifest;
 pub mod plan;
 pub mod supervisor;
@@ -26,28 +27,38 @@ use plan::Plan;
 /// Plays the motion, judges the run and leaves its folder.
 pub fn run(args: &RunArgs) -> Result<Exit, Failure> {
     let plan = Plan::resolve(args)?;
+    let claimed = match args.clock {
+        ClockKind::Virtual => None,
+        ClockKind::Rt => Some(supervisor::claim(args.name.as_deref())?),
+    };
     let folder = match &args.out {
         Some(path) => RunFolder::create(path)?,
         None => RunFolder::create_in("runs".as_ref(), &plan.scenario.name)?,
     };
     std::fs::write(folder.scenario(), plan.scenario.to_toml()).context("cannot write the scenario")?;
     if !args.quiet {
-        eprintln!("{}", plan.announcement());
+        tell!("{}", plan.announcement());
     }
 
     let mut manifest = Manifest::new(&plan, args.clock);
-    let ending = match args.clock {
-        ClockKind::Virtual => virtual_time::run(&plan, &folder).map_err(Failure::with(Exit::Incomplete))?,
-        ClockKind::Rt => {
-            let ended = supervisor::run(&plan, &folder, args)?;
+    let keep = |manifest: &Manifest| {
+        let written = manifest.write(&folder).context("cannot write the manifest");
+        written.map_err(Failure::with(Exit::Incomplete))
+    };
+    // For a recording that nobody lives to judge.
+    keep(&manifest)?;
+    let ending = match claimed {
+        None => virtual_time::run(&plan, &folder).map_err(Failure::with(Exit::Incomplete))?,
+        Some(claimed) => {
+            let ended = supervisor::run(claimed, &plan, &folder, args)?;
             manifest.scheduling = ended.scheduling;
-            manifest.cpu_dma_latency = Some(ended.cpu_dma_latency);
+            manifest.cpu_dma_latency = ended.cpu_dma_latency;
             manifest.usage = ended.usage;
             ended.ending
         }
     };
     manifest.ending = ending;
-    manifest.write(&folder).context("cannot write the manifest").map_err(Failure::with(Exit::Incomplete))?;
+    keep(&manifest)?;
     if manifest.ending == Ending::NotStarted {
         return Ok(Exit::Invalid);
     }

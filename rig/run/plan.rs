@@ -39,6 +39,11 @@ impl Plan {
         if args.clock == ClockKind::Virtual && !scenario.can.is_virtual() {
             bail!("virtual time has no real wires: use --can virtual, or --clock rt");
         }
+        if args.clock == ClockKind::Virtual && (args.require_rt || args.name.is_some()) {
+            bail!(
+                "virtual time needs no real time and has no other rig beside it: leave out --require-rt and --name"
+            );
+        }
         match args.live {
             Some(_) if args.clock == ClockKind::Virtual => {
                 bail!("virtual time is over before it can be watched: leave out --live, or use --clock rt")

@@ -2,31 +2,29 @@
 //!
 //! Order of ending: the controller first (it brings the drives to rest), then the plant, then the
 //! logger, which drains what is left. A process that dies is not restarted: the survivors come to a
-//! safe stop by their own watchdogs, and the supervisor only waits for them.
+//! safe stop by their own watchdogs, and the supervisor only waits for them. One that does not end in time is killed.
 
 use std::collections::BTreeMap;
 use std::io;
 use std::process::ExitStatus;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Duration;
 
 use anyhow::Context;
 use masseter_shared::clock::{self, SECOND_NS};
+use masseter_shared::config::Scenario;
 use masseter_shared::lifecycle::Start;
 use masseter_shared::realtime::scheduling::Obtained;
-use masseter_shared::transport::Domain;
-use signal_hook::consts::{SIGINT, SIGTERM};
-use signal_hook::iterator::Signals;
+use masseter_shared::transport::{Claim, Domain, DomainError};
 
-use super::child::{Process, Role, describe};
+use super::child::{ChildError, Process, Role, describe};
 use super::dma_latency::{self, DmaLatency};
 use super::folder::RunFolder;
+use super::interrupts::Interrupts;
 use super::plan::Plan;
 use super::usage::{Meter, RunUsage};
 use crate::clean::sweep_dead;
 use crate::cli::RunArgs;
-use crate::exit::Exit;
+use crate::exit::{Exit, Failure};
 use crate::machine::SystemRoot;
 use crate::report::verdict::Ending;
 
@@ -41,8 +39,7 @@ const OFF_TICK_NS: u64 = 230_000;
 const END_WITHIN_NS: u64 = 5 * SECOND_NS;
 /// How long the logger may take to write what is left: as long as a slow disk needs, ns.
 const RECORD_WITHIN_NS: u64 = 60 * SECOND_NS;
-/// How long the plant goes on after the controller has died, so that its master notices and stops the
-/// drives, ns.
+/// How long the plant goes on after its master has noticed the controller's death, to stop the drives, ns.
 const SAFE_STOP_NS: u64 = SECOND_NS / 2;
 
 /// How the processes ended, and with which scheduling they ran.
@@ -52,42 +49,63 @@ pub struct Ended {
     pub ending: Ending,
     /// What each process obtained.
     pub scheduling: BTreeMap<String, Obtained>,
-    /// What became of `/dev/cpu_dma_latency`.
-    pub cpu_dma_latency: DmaLatency,
+    /// What became of `/dev/cpu_dma_latency`, if it came to that.
+    pub cpu_dma_latency: Option<DmaLatency>,
     /// What the processes used.
     pub usage: RunUsage,
 }
 
-/// Runs the rig in real time.
-pub fn run(plan: &Plan, folder: &RunFolder, args: &RunArgs) -> anyhow::Result<Ended> {
-    sweep_dead()?;
-    let interrupts = count_interrupts().context("cannot listen for signals")?;
-    let domain = Domain::named(&format!("{}-{:x}", std::process::id(), clock::now_ns()))?;
-    let claim = domain.claim()?;
-    let result = Rig::spawn(plan, folder, &domain, args)
-        .and_then(|mut rig| rig.run(plan, args.require_rt, &interrupts));
-    drop(claim);
-    domain.sweep()?;
-    result
+impl Ended {
+    /// Before the rig was started.
+    fn before_the_start(
+        ending: Ending,
+        scheduling: BTreeMap<String, Obtained>,
+        cpu_dma_latency: Option<DmaLatency>,
+    ) -> Self {
+        Self { ending, scheduling, cpu_dma_latency, usage: RunUsage::default() }
+    }
 }
 
-/// Counts SIGINT and SIGTERM: the first asks for an orderly stop, the second ends at once.
-fn count_interrupts() -> io::Result<Arc<AtomicUsize>> {
-    let count = Arc::new(AtomicUsize::new(0));
-    let mut signals = Signals::new([SIGINT, SIGTERM])?;
-    std::thread::spawn({
-        let count = Arc::clone(&count);
-        move || {
-            for _ in signals.forever() {
-                count.fetch_add(1, Ordering::Relaxed);
-            }
-        }
-    });
-    Ok(count)
+/// The names that a rig has to itself.
+#[derive(Debug)]
+pub struct Claimed {
+    domain: Domain,
+    claim: Claim,
+}
+
+/// Claims the name, or one that no other rig has.
+pub fn claim(name: Option<&str>) -> Result<Claimed, DomainError> {
+    sweep_dead()?;
+    let unique = || format!("{}-{:x}", std::process::id(), clock::now_ns());
+    let domain = Domain::named(&name.map_or_else(unique, str::to_owned))?;
+    let claim = domain.claim()?;
+    Ok(Claimed { domain, claim })
+}
+
+/// Runs the rig in real time, and gives its names back.
+pub fn run(
+    Claimed { domain, claim }: Claimed,
+    plan: &Plan,
+    folder: &RunFolder,
+    args: &RunArgs,
+) -> Result<Ended, Failure> {
+    let interrupts = Interrupts::listen().context("cannot listen for signals")?;
+    let result = Rig::spawn(plan, folder, &domain, args).and_then(|mut rig| rig.run(plan, args, &interrupts));
+    drop(claim);
+    interrupts.let_go();
+    if let Err(error) = domain.sweep() {
+        tell!("masseter: {error}; `masseter clean` removes what is left of this run");
+    }
+    // Whatever can be wrong with the input was looked for before.
+    result.map_err(Failure::with(Exit::Died))
 }
 
 /// The three processes, in the order of their starting.
 struct Rig {
+    /// How long the controller may take to end when asked to.
+    stop_within_ns: u64,
+    /// How long the plant goes on without the controller.
+    plant_alone_ns: u64,
     logger: Process,
     plant: Process,
     controller: Process,
@@ -105,23 +123,27 @@ impl Rig {
         let mut for_logger = [&common[..], &["--recording", recording, &motion]].concat();
         for_logger.extend(args.quiet.then_some("--quiet"));
         for_logger.extend(live.as_deref());
+        let Scenario { controller, can, .. } = &plan.scenario;
         Ok(Self {
+            stop_within_ns: END_WITHIN_NS + (controller.stop_ramp_s * 1e9) as u64,
+            plant_alone_ns: u64::from(can.command_timeout_cycles) * plan.scenario.period_ns() + SAFE_STOP_NS,
             logger: Process::spawn(Role::Logger, &for_logger)?,
             plant: Process::spawn(Role::Plant, &common)?,
             controller: Process::spawn(Role::Controller, &common)?,
         })
     }
 
-    fn run(&mut self, plan: &Plan, require_rt: bool, interrupts: &AtomicUsize) -> anyhow::Result<Ended> {
-        let scheduling = self.wait_ready()?;
+    fn run(&mut self, plan: &Plan, args: &RunArgs, interrupts: &Interrupts) -> anyhow::Result<Ended> {
+        let Some(scheduling) = self.wait_ready(interrupts)? else {
+            return Ok(Ended::before_the_start(Ending::Interrupted, BTreeMap::new(), None));
+        };
         let is_virtual = SystemRoot::of_this_machine().is_virtual();
         let hold = dma_latency::Hold::new(plan.scenario.realtime.cpu_dma_latency, is_virtual);
-        let cpu_dma_latency = hold.obtained().clone();
-        let refusals = show_refusals(&scheduling, &cpu_dma_latency);
-        if require_rt && refusals > 0 {
-            eprintln!("masseter: real time was required and not granted; nothing was started");
-            let (ending, usage) = (Ending::NotStarted, RunUsage::default());
-            return Ok(Ended { ending, scheduling, cpu_dma_latency, usage });
+        let cpu_dma_latency = Some(hold.obtained().clone());
+        let refusals = show_refusals(&scheduling, hold.obtained());
+        if args.require_rt && refusals > 0 {
+            tell!("masseter: real time was required and not granted; nothing was started");
+            return Ok(Ended::before_the_start(Ending::NotStarted, scheduling, cpu_dma_latency));
         }
         let epoch_ns = self.start(plan.scenario.period_ns())?;
         let processes = [&self.logger, &self.plant, &self.controller];
@@ -131,13 +153,17 @@ impl Rig {
         Ok(Ended { ending, scheduling, cpu_dma_latency, usage: meter.finish() })
     }
 
-    fn wait_ready(&mut self) -> anyhow::Result<BTreeMap<String, Obtained>> {
+    /// What each process obtained; none when the user has had enough before all were ready.
+    fn wait_ready(
+        &mut self,
+        interrupts: &Interrupts,
+    ) -> Result<Option<BTreeMap<String, Obtained>>, ChildError> {
         let mut scheduling = BTreeMap::new();
         for process in [&mut self.logger, &mut self.plant, &mut self.controller] {
-            let ready = process.wait_ready()?;
+            let Some(ready) = process.wait_ready(|| interrupts.ask())? else { return Ok(None) };
             scheduling.insert(process.role().name().to_owned(), ready.scheduling);
         }
-        Ok(scheduling)
+        Ok(Some(scheduling))
     }
 
     /// Gives the word to begin; returns the time of the first SYNC.
@@ -153,34 +179,43 @@ impl Rig {
     }
 
     /// Watches until the controller's part is over, then ends plant and logger.
-    fn watch(&mut self, interrupts: &AtomicUsize, meter: &mut Meter) -> anyhow::Result<Ending> {
+    fn watch(&mut self, interrupts: &Interrupts, meter: &mut Meter) -> anyhow::Result<Ending> {
         let mut ending = Ending::Completed;
+        let mut give_up_ns = None;
         let status = loop {
-            if interrupts.load(Ordering::Relaxed) > 1 {
+            if interrupts.insist() {
                 return Ok(Ending::Interrupted);
             }
             if ending == Ending::Completed {
                 ending = self.disturbance(interrupts)?;
             }
             if let Some(status) = self.controller.ended()? {
-                break status;
+                break Some(status);
             }
-            meter.look(clock::now_ns());
+            let now_ns = clock::now_ns();
+            if ending != Ending::Completed && now_ns > *give_up_ns.get_or_insert(now_ns + self.stop_within_ns)
+            {
+                self.controller.kill();
+                break None;
+            }
+            meter.look(now_ns);
             clock::sleep(WATCH);
         };
-        if ending == Ending::Completed {
-            ending = self.after_controller(status)?;
+        if ending == Ending::Completed || status.is_none() {
+            ending = self.after_controller(status, interrupts)?;
         }
-        end(&mut self.plant, END_WITHIN_NS)?;
-        let logger_status = end(&mut self.logger, RECORD_WITHIN_NS)?;
-        let incomplete = logger_status.is_none_or(|status| status.code() == Some(Exit::Incomplete as i32));
-        Ok(if incomplete && ending == Ending::Completed { Ending::RecordingFailed } else { ending })
+        let plant = end(&mut self.plant, END_WITHIN_NS, interrupts)?;
+        let logger = end(&mut self.logger, RECORD_WITHIN_NS, interrupts)?;
+        Ok(match ending {
+            Ending::Completed | Ending::SafeStop => of_the_others(plant, logger).unwrap_or(ending),
+            _ => ending,
+        })
     }
 
     /// What ends the run before the controller's part is over, if anything does. Without the plant the
     /// controller stops by its own watchdog; otherwise it is asked to.
-    fn disturbance(&mut self, interrupts: &AtomicUsize) -> io::Result<Ending> {
-        if interrupts.load(Ordering::Relaxed) > 0 {
+    fn disturbance(&mut self, interrupts: &Interrupts) -> io::Result<Ending> {
+        if interrupts.ask() {
             self.controller.terminate();
             return Ok(Ending::Interrupted);
         }
@@ -195,33 +230,58 @@ impl Rig {
     }
 
     /// How the controller ended; if it died, the plant's master is given time to stop the drives.
-    fn after_controller(&mut self, status: ExitStatus) -> io::Result<Ending> {
-        match status.code() {
+    fn after_controller(
+        &mut self,
+        status: Option<ExitStatus>,
+        interrupts: &Interrupts,
+    ) -> io::Result<Ending> {
+        match status.and_then(|status| status.code()) {
             Some(code) if code == Exit::Passed as i32 => Ok(Ending::Completed),
             Some(code) if code == Exit::SafeStop as i32 => Ok(Ending::SafeStop),
             _ => {
-                wait_for(&mut self.plant, SAFE_STOP_NS)?;
-                Ok(Ending::died(Role::Controller.name(), describe(status)))
+                wait_for(&mut self.plant, self.plant_alone_ns, interrupts)?;
+                Ok(died(Role::Controller, status))
             }
         }
     }
 }
 
-/// Asks a process to end, and ends it if it does not.
-fn end(process: &mut Process, within_ns: u64) -> io::Result<Option<ExitStatus>> {
+/// What plant and logger make of a run whose controller ended as it should.
+fn of_the_others(plant: Option<ExitStatus>, logger: Option<ExitStatus>) -> Option<Ending> {
+    if !plant.is_some_and(|status| status.success()) {
+        return Some(died(Role::Plant, plant));
+    }
+    match logger.and_then(|status| status.code()) {
+        Some(code) if code == Exit::Passed as i32 => None,
+        Some(code) if code == Exit::Incomplete as i32 => Some(Ending::RecordingFailed),
+        _ => Some(died(Role::Logger, logger)),
+    }
+}
+
+fn died(role: Role, status: Option<ExitStatus>) -> Ending {
+    let how = status.map_or_else(|| "it did not end when asked to, and was killed".to_owned(), describe);
+    Ending::died(role.name(), how)
+}
+
+/// Asks a process to end, and ends it if it does not; its status if it did.
+fn end(process: &mut Process, within_ns: u64, interrupts: &Interrupts) -> io::Result<Option<ExitStatus>> {
     process.terminate();
-    let status = wait_for(process, within_ns)?;
+    let status = wait_for(process, within_ns, interrupts)?;
     if status.is_none() {
         process.kill();
     }
     Ok(status)
 }
 
-fn wait_for(process: &mut Process, within_ns: u64) -> io::Result<Option<ExitStatus>> {
+fn wait_for(
+    process: &mut Process,
+    within_ns: u64,
+    interrupts: &Interrupts,
+) -> io::Result<Option<ExitStatus>> {
     let deadline_ns = clock::now_ns() + within_ns;
     loop {
         let status = process.ended()?;
-        if status.is_some() || clock::now_ns() >= deadline_ns {
+        if status.is_some() || interrupts.insist() || clock::now_ns() >= deadline_ns {
             return Ok(status);
         }
         clock::sleep(WATCH);
@@ -234,5 +294,5 @@ fn show_refusals(scheduling: &BTreeMap<String, Obtained>, latency: &DmaLatency) 
         obtained.refusals.iter().map(move |refusal| format!("  {name}: {refusal}"))
     });
     let of_latency = latency.refusal.iter().map(|refusal| format!("  {refusal}"));
-    of_processes.chain(of_latency).map(|line| eprintln!("{line}")).count()
+    of_processes.chain(of_latency).map(|line| tell!("{line}")).count()
 }

@@ -6,7 +6,7 @@
 
 use std::collections::BTreeMap;
 
-use masseter_shared::clock::SECOND_NS;
+use masseter_shared::clock::{self, SECOND_NS};
 use serde::{Deserialize, Serialize};
 
 use super::counters::{ProcessCounters, stolen_ns};
@@ -14,6 +14,9 @@ use crate::machine::SystemRoot;
 
 /// From one look to the next, ns.
 const EVERY_NS: u64 = SECOND_NS / 2;
+
+/// A clock that is disciplined, not set, moves by less than this from one look to the next, ns.
+const DISCIPLINED_NS: i64 = 1_000_000;
 
 /// What a process used in its steady state: CPU time and page faults by all its threads, the rest by the main
 /// one, which is its loop.
@@ -41,6 +44,9 @@ pub struct RunUsage {
     /// Time that the hypervisor ran something else while a core of this machine wanted to run, as far as
     /// it tells, s.
     pub stolen_s: f64,
+    /// The largest jump of the wall clock: it was set, or the machine was suspended, s.
+    #[serde(default)]
+    pub clock_jump_s: f64,
 }
 
 /// Follows the processes.
@@ -50,6 +56,23 @@ pub(super) struct Meter {
     next_ns: u64,
     processes: Vec<Metered>,
     stolen_from_to_ns: Option<[u64; 2]>,
+    wall: Wall,
+}
+
+/// Follows the wall clock.
+#[derive(Debug, Default)]
+struct Wall {
+    ahead_ns: Option<i64>,
+    jump_ns: i64,
+}
+
+impl Wall {
+    fn look(&mut self, ahead_ns: i64) {
+        let jump_ns = self.ahead_ns.replace(ahead_ns).map_or(0, |before_ns| ahead_ns - before_ns);
+        if jump_ns.abs() > DISCIPLINED_NS.max(self.jump_ns.abs()) {
+            self.jump_ns = jump_ns;
+        }
+    }
 }
 
 #[derive(Debug)]
@@ -67,7 +90,8 @@ impl Meter {
         processes: impl IntoIterator<Item = (&'static str, u32)>,
     ) -> Self {
         let processes = processes.into_iter().map(|(name, id)| Metered { name, id, from_to: None }).collect();
-        Self { root, next_ns: start_ns + EVERY_NS, processes, stolen_from_to_ns: None }
+        let (stolen_from_to_ns, wall) = (None, Wall::default());
+        Self { root, next_ns: start_ns + EVERY_NS, processes, stolen_from_to_ns, wall }
     }
 
     /// Looks at the processes if it is time to; one that has ended keeps what was seen last.
@@ -81,6 +105,9 @@ impl Meter {
                 process.from_to = Some([process.from_to.map_or(sample, |[from, _]| from), sample]);
             }
         }
+        if let Some(ahead_ns) = clock::wall_ahead_ns() {
+            self.wall.look(ahead_ns);
+        }
         if let Some(stolen_ns) = stolen_ns(&self.root) {
             let from_ns = self.stolen_from_to_ns.map_or(stolen_ns, |[from_ns, _]| from_ns);
             self.stolen_from_to_ns = Some([from_ns, stolen_ns]);
@@ -92,11 +119,13 @@ impl Meter {
         RunUsage {
             processes: processes
                 .filter_map(|process| {
-                    let [from, to] = process.from_to?;
+                    // A single look tells nothing.
+                    let [from, to] = process.from_to.filter(|[from, to]| from.at_ns < to.at_ns)?;
                     Some((process.name.to_owned(), Usage::between(&from, &to)))
                 })
                 .collect(),
             stolen_s: self.stolen_from_to_ns.map_or(0.0, |[from_ns, to_ns]| (to_ns - from_ns) as f64 / 1e9),
+            clock_jump_s: self.wall.jump_ns as f64 / 1e9,
         }
     }
 }
@@ -137,6 +166,27 @@ mod tests {
     fn root(files: &[(&'static str, String)]) -> Fixture {
         let files: Vec<_> = files.iter().map(|(path, text)| (*path, text.as_str())).collect();
         Fixture::of(&files)
+    }
+
+    #[test]
+    fn a_clock_that_is_set_jumps_and_a_disciplined_one_does_not() {
+        let jump = |looks: &[i64]| {
+            let mut wall = Wall::default();
+            for &ahead_ns in looks {
+                wall.look(ahead_ns);
+            }
+            wall.jump_ns
+        };
+        assert_eq!(jump(&[5_000_000_000, 5_000_250_000, 5_000_500_000]), 0);
+        assert_eq!(jump(&[5_000_000_000, 4_000_000_000, 4_000_000_000, 4_100_000_000]), -1_000_000_000);
+    }
+
+    #[test]
+    fn a_single_look_tells_nothing() {
+        let only = root(&files(10, 100, 1_000_000_000, 250));
+        let mut meter = Meter::new(only.root(), 0, [("plant", 7)]);
+        meter.look(EVERY_NS);
+        assert_eq!(meter.finish().processes, BTreeMap::new());
     }
 
     #[test]

@@ -16,6 +16,9 @@ pub const SECOND_NS: u64 = 1_000_000_000;
 /// What older stamps of the wall clock say is that it was set.
 const PLAUSIBLE_AGE: Duration = Duration::from_secs(60);
 
+/// Two readings in a row take far less than this, ns.
+const UNDISTURBED_NS: u64 = 10_000;
+
 /// Now, ns of `CLOCK_MONOTONIC`.
 pub fn now_ns() -> u64 {
     read_ns(ClockId::Monotonic)
@@ -59,6 +62,13 @@ pub fn monotonic_ns(stamp: SystemTime) -> u64 {
     }
 }
 
+/// By how much the wall clock is ahead of `CLOCK_MONOTONIC`, ns; none when something came between the two readings. It
+/// jumps when the clock is set, and when the machine was suspended.
+pub fn wall_ahead_ns() -> Option<i64> {
+    let (before_ns, wall_ns, after_ns) = (now_ns(), read_ns(ClockId::Realtime), now_ns());
+    (after_ns - before_ns < UNDISTURBED_NS).then(|| wall_ns as i64 - before_ns as i64)
+}
+
 /// Wall-clock time since 1970-01-01 00:00 UTC, for the names of run folders.
 pub fn wall_time() -> Duration {
     SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default()
@@ -76,6 +86,19 @@ mod tests {
         assert!(monotonic_ns(stamp) >= before_ns);
         // A second stamp taken later lies later.
         assert!(monotonic_ns(SystemTime::now()) >= after_ns);
+    }
+
+    #[test]
+    fn an_old_stamp_lies_where_its_age_says() {
+        let stamp = SystemTime::now() - Duration::from_secs(30);
+        let found_ns = monotonic_ns(stamp);
+        assert!(found_ns + 20 * SECOND_NS < now_ns(), "{found_ns}");
+    }
+
+    #[test]
+    fn the_wall_clock_keeps_its_distance() {
+        let look = || (0..1000).find_map(|_| wall_ahead_ns()).expect("one of many looks is undisturbed");
+        assert!((look() - look()).abs() < 1_000_000);
     }
 
     #[test]

@@ -11,7 +11,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use rustix::process::{Signal, set_parent_process_death_signal};
 use serde::{Deserialize, Serialize};
-use signal_hook::consts::{SIGINT, SIGTERM};
+use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 
 use crate::config::{Scenario, ScenarioError};
 use crate::realtime::scheduling::{Obtained, Wanted, obtain};
@@ -115,12 +115,14 @@ pub struct Start {
 pub struct StopRequest(Arc<AtomicBool>);
 
 impl StopRequest {
-    /// Listens for SIGTERM, also on the supervisor's death. SIGINT reaches the whole process group
-    /// from a terminal and is the supervisor's affair: here it does nothing.
+    /// Listens for SIGTERM, also on the supervisor's death. SIGINT and SIGHUP reach the whole process group
+    /// from a terminal and are the supervisor's affair: here they do nothing.
     fn listen() -> io::Result<Self> {
         let requested = Arc::new(AtomicBool::new(false));
         signal_hook::flag::register(SIGTERM, Arc::clone(&requested))?;
-        signal_hook::flag::register(SIGINT, Arc::new(AtomicBool::new(false)))?;
+        for signal in [SIGINT, SIGHUP] {
+            signal_hook::flag::register(signal, Arc::new(AtomicBool::new(false)))?;
+        }
         set_parent_process_death_signal(Some(Signal::TERM))?;
         Ok(Self(requested))
     }

@@ -65,7 +65,7 @@ fn check_topic<M: Message>(node: &Node) {
     let mut received = 0;
     let receiving = allocations_of(|| {
         while let Some(message) = black_box(inlet.receive().unwrap()) {
-            received += u64::from(message.seq() > 1);
+            received += u64::from(!message.body().is_empty());
         }
         assert!(inlet.latest().unwrap().is_none());
     });

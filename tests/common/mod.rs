@@ -2,6 +2,7 @@
 #![allow(dead_code, reason = "each test file uses its own part")]
 
 use std::fs;
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 use std::time::Duration;
@@ -105,13 +106,19 @@ pub(crate) fn stdout(output: &Output) -> String {
     String::from_utf8_lossy(&output.stdout).into_owned()
 }
 
+/// Says that a test is skipped. The harness hides what a passing test prints, but not what is written to standard error
+/// itself.
+pub(crate) fn skip(why: &str) {
+    writeln!(io::stderr(), "SKIPPED: {why}").expect("standard error can be written");
+}
+
 /// The recordings handed to developers; they are not part of the project.
 pub(crate) fn jaw_recording(name: &str) -> Option<PathBuf> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data/jaw").join(name);
     if path.is_file() {
         return Some(path);
     }
-    eprintln!("SKIPPED: {name} is absent");
+    skip(&format!("{name} is absent"));
     None
 }
 

@@ -133,16 +133,12 @@ codes! {
 
     /// Who reports an event.
     Source {
-        /// The supervisor.
-        Supervisor = 0 "supervisor",
         /// The controller.
         Controller = 1 "controller",
         /// The plant: CAN master.
         Master = 2 "master",
         /// The plant: an emulated drive.
         Drive = 3 "drive",
-        /// The logger.
-        Logger = 4 "logger",
         /// A simulated wire.
         Wire = 5 "wire",
     }
@@ -185,26 +181,16 @@ codes! {
         CommandLost = 11 "command_lost",
         /// A drive's heartbeat is overdue (ms).
         HeartbeatLost = 12 "heartbeat_lost",
-        /// The master's heartbeat is overdue at a drive (ms).
-        LinkLost = 13 "link_lost",
-        /// Following error beyond its window (m).
-        FollowingError = 14 "following_error",
         /// An emergency message of a drive (EMCY code; the limit is the error register, object 1001).
         Emergency = 15 "emergency",
         /// Process data of a drive missing (cycles).
         ProcessDataLost = 16 "process_data_lost",
-        /// A drive asked for too much force for too long (N).
-        ForceLimit = 17 "force_limit",
         /// The bus refused a frame.
         BusRefused = 18 "bus_refused",
         /// A value in a message is not a finite number or no known code.
         BadMessage = 19 "bad_message",
         /// A drive did not boot in time (ms).
         BootTimeout = 20 "boot_timeout",
-        /// Another process of the rig ended (process id).
-        ProcessDied = 21 "process_died",
-        /// Deadlines were skipped after an overrun (cycles).
-        Overrun = 22 "overrun",
         /// The CAN master refuses to move anything; its own event says why.
         MasterFault = 23 "master_fault",
         /// A bounded buffer had no room (items lost).

@@ -33,10 +33,6 @@ pub trait Message: Pod + ZeroCopySend + Default + std::fmt::Debug + PartialEq {
     const TYPE_NAME: &'static str;
     /// The layout in the ROS 2 message definition language, as recordings carry it.
     fn schema() -> String;
-    /// Number of this message on its topic, from 1, without gaps at the publisher.
-    fn seq(&self) -> u64;
-    /// When it was published, ns.
-    fn published_ns(&self) -> u64;
     /// Its CDR body: all its bytes but the unused ones at its end.
     fn body(&self) -> &[u8];
     /// The message with this body; none when a message of this type cannot have it.
@@ -81,14 +77,6 @@ macro_rules! messages {
                 let header = [("seq", u64::ros_type()), ("published_ns", u64::ros_type()), ("version", u64::ros_type())];
                 let fields = [$((stringify!($field), <$type>::ros_type()),)*];
                 schema::definition(header.into_iter().chain(fields))
-            }
-
-            fn seq(&self) -> u64 {
-                self.seq
-            }
-
-            fn published_ns(&self) -> u64 {
-                self.published_ns
             }
 
             fn body(&self) -> &[u8] {
@@ -138,7 +126,7 @@ messages! {
         command_received_ns: u64,
         /// When the last process data of that command had left onto the wire, ns.
         command_sent_ns: u64,
-        /// Cycle of the master's own deadline, ns.
+        /// Deadline of the master's cycle, ns.
         due_ns: u64,
         /// When the master woke for it, ns.
         woke_ns: u64,
@@ -206,7 +194,7 @@ messages! {
         leg_angle_rad: [f64; LEGS],
         /// Largest difference of a platform side from its length, m.
         residual_m: f64,
-        /// Condition number of the actuators' Jacobian, angular columns scaled by 0.05 m.
+        /// Condition number of the actuators' Jacobian, angular columns scaled by the platform's side A₁A₂.
         condition: f64,
         /// Iterations of the forward kinematics.
         iterations: u32,

@@ -17,14 +17,15 @@ const TIMES_LATE: u64 = 2;
 const FORGETTING: u32 = 12;
 /// Share of the time that a task may be awake. Well below the 95 % at which the kernel throttles real-time tasks.
 const MOST_AWAKE: f64 = 0.85;
-/// Sleeps over which the share is averaged.
-const AWAKE_MEMORY: f64 = 64.0;
+/// Periods over which the share is averaged.
+const AWAKE_MEMORY: u64 = 64;
 
 /// The stretch before a deadline that is spun, and what it is learned from.
 #[derive(Debug)]
 pub(super) struct Reserve {
     most_ns: u64,
     current_ns: u64,
+    memory_ns: u64,
     awake: f64,
 }
 
@@ -32,7 +33,7 @@ impl Reserve {
     /// For a task of this period: as much as is allowed, until sleeps have shown what is needed.
     pub(super) fn new(period_ns: u64) -> Self {
         let most_ns = MOST_NS.min(period_ns / MOST_OF_PERIOD);
-        Self { most_ns, current_ns: most_ns, awake: 0.0 }
+        Self { most_ns, current_ns: most_ns, memory_ns: AWAKE_MEMORY * period_ns, awake: 0.0 }
     }
 
     /// The reserve, ns.
@@ -42,17 +43,39 @@ impl Reserve {
 
     /// A sleep of `slept_ns` came back `late_ns` after its end; before it the task had been awake for `awake_ns`.
     pub(super) fn learn(&mut self, awake_ns: u64, slept_ns: u64, late_ns: u64) {
-        let share = awake_ns as f64 / (awake_ns + slept_ns).max(1) as f64;
-        self.awake += (share - self.awake) / AWAKE_MEMORY;
+        self.remember(awake_ns, slept_ns);
+        if self.gives_way() {
+            return;
+        }
         let needed_ns = TIMES_LATE * late_ns + LEAST_NS;
         let wanted_ns = match self.current_ns.checked_sub(needed_ns) {
-            _ if self.awake > MOST_AWAKE => self.current_ns - self.current_ns / 16,
             Some(spare_ns) => self.current_ns - (spare_ns >> FORGETTING),
             // The machine stood still: no reserve would have covered that.
             None if late_ns > self.most_ns => self.current_ns,
             None => needed_ns,
         };
         self.current_ns = wanted_ns.clamp(LEAST_NS, self.most_ns);
+    }
+
+    /// There was time left, but no more than the reserve: the task has been awake for `awake_ns` and stays so.
+    pub(super) fn stay_awake(&mut self, awake_ns: u64) {
+        self.remember(awake_ns, 0);
+        self.gives_way();
+    }
+
+    fn remember(&mut self, awake_ns: u64, slept_ns: u64) {
+        let passed_ns = (awake_ns + slept_ns).max(1);
+        let weight = (passed_ns as f64 / self.memory_ns as f64).min(1.0);
+        self.awake += (awake_ns as f64 / passed_ns as f64 - self.awake) * weight;
+    }
+
+    /// Shrinks while the task is awake for too long; whether it is.
+    fn gives_way(&mut self) -> bool {
+        let is_too_busy = self.awake > MOST_AWAKE;
+        if is_too_busy {
+            self.current_ns = (self.current_ns - self.current_ns / 16).max(LEAST_NS);
+        }
+        is_too_busy
     }
 }
 
@@ -104,13 +127,30 @@ mod tests {
         assert_eq!(after(punctual().chain([30_000_000])), after(punctual()));
     }
 
-    #[test]
-    fn a_task_that_is_nearly_always_awake_gives_its_reserve_up() {
-        let mut reserve = Reserve::new(50_000);
-        for _ in 0..1000 {
-            reserve.learn(46_000, 4_000, 20_000);
+    /// The share of the time for which a task is awake in the end that works so long in each period of 50 µs, and whose
+    /// sleeps come back in time.
+    fn awake_share(work_ns: u64) -> f64 {
+        const PERIOD: u64 = 50_000;
+        let (mut reserve, mut awake_ns, mut asleep_ns) = (Reserve::new(PERIOD), 0, 0);
+        for cycle in 0..20_000 {
+            let slept_ns = (PERIOD - work_ns).saturating_sub(reserve.ns());
+            if slept_ns > 0 {
+                reserve.learn(PERIOD - slept_ns, slept_ns, 0);
+            } else {
+                reserve.stay_awake(PERIOD);
+            }
+            if cycle >= 10_000 {
+                (awake_ns, asleep_ns) = (awake_ns + PERIOD - slept_ns, asleep_ns + slept_ns);
+            }
         }
-        assert_eq!(reserve.ns(), LEAST_NS);
+        awake_ns as f64 / (awake_ns + asleep_ns) as f64
+    }
+
+    #[test]
+    fn a_reserve_that_leaves_no_time_to_sleep_is_given_up() {
+        assert!(awake_share(20_000) < MOST_AWAKE);
+        assert!(awake_share(35_000) <= MOST_AWAKE + 0.01, "{}", awake_share(35_000));
+        assert!(awake_share(44_000) < 1.0, "{}", awake_share(44_000));
     }
 
     proptest! {
@@ -121,7 +161,10 @@ mod tests {
         ) {
             let mut reserve = Reserve::new(period_ns);
             for (awake_ns, slept_ns, late_ns) in sleeps {
-                reserve.learn(awake_ns, slept_ns, late_ns);
+                match slept_ns % 3 {
+                    0 => reserve.stay_awake(awake_ns),
+                    _ => reserve.learn(awake_ns, slept_ns, late_ns),
+                }
                 prop_assert!((LEAST_NS..=MOST_NS.min(period_ns / MOST_OF_PERIOD)).contains(&reserve.ns()));
             }
         }

@@ -36,38 +36,54 @@ pub struct Obtained {
     pub refusals: Vec<String>,
 }
 
-impl Obtained {
-    /// Whether everything asked for was granted.
-    pub fn is_complete(&self) -> bool {
-        self.refusals.is_empty()
+/// Asks for `wanted` on behalf of the calling thread (memory: of the process), then reads back.
+pub fn obtain(wanted: Wanted) -> Obtained {
+    let choice = allowed_cores();
+    // What the kernel says of each; where it agrees without effect, what is read back tells.
+    let core = wanted.core.map(|core| pin(core).map_err(|error| error.to_string()));
+    let fifo = wanted.fifo_priority.map(|priority| fifo::set(priority).map_err(|error| error.to_string()));
+    let locked = wanted
+        .locked_memory
+        .then(|| mlockall(MlockAllFlags::CURRENT | MlockAllFlags::FUTURE).map_err(|error| error.to_string()));
+    let mut obtained = Obtained {
+        wanted,
+        core: pinned_core(),
+        fifo_priority: fifo::get(),
+        locked_memory: is_locked(),
+        refusals: Vec::new(),
+    };
+    let pinned = refusal(core, obtained.core == wanted.core);
+    let fifo = refusal(fifo, obtained.fifo_priority == wanted.fifo_priority);
+    let locked = refusal(locked, obtained.locked_memory);
+    obtained.refusals.extend(pinned.zip(wanted.core).map(|(why, core)| refused_core(core, &why, &choice)));
+    obtained.refusals.extend(fifo.zip(wanted.fifo_priority).map(|(why, priority)| {
+        format!("SCHED_FIFO {priority} refused ({why}): `masseter doctor` tells how to allow it")
+    }));
+    obtained.refusals.extend(
+        locked.map(|why| format!("locked memory refused ({why}): `masseter doctor` tells how to allow it")),
+    );
+    obtained
+}
+
+/// Why something asked for was not granted, if it was not.
+fn refusal(asked: Option<Result<(), String>>, is_granted: bool) -> Option<String> {
+    match asked? {
+        Err(error) => Some(error),
+        Ok(()) if !is_granted => Some("without effect".to_owned()),
+        Ok(()) => None,
     }
 }
 
-/// Asks for `wanted` on behalf of the calling thread (memory: of the process), then reads back.
-pub fn obtain(wanted: Wanted) -> Obtained {
-    let mut refusals = Vec::new();
-    if let Some(core) = wanted.core
-        && let Err(error) = pin(core)
-    {
-        let allowed: Vec<_> = allowed_cores().iter().map(usize::to_string).collect();
-        refusals
-            .push(format!("core {core} refused ({error}): choose among {} with --cores", allowed.join(", ")));
-    }
-    if let Some(priority) = wanted.fifo_priority
-        && let Err(error) = fifo::set(priority)
-    {
-        refusals.push(format!(
-            "SCHED_FIFO {priority} refused ({error}): run as root, or allow it with `ulimit -r {priority}` (limits.conf: rtprio)"
-        ));
-    }
-    if wanted.locked_memory
-        && let Err(error) = mlockall(MlockAllFlags::CURRENT | MlockAllFlags::FUTURE)
-    {
-        refusals.push(format!(
-            "locked memory refused ({error}): run as root, or allow it with `ulimit -l unlimited` (limits.conf: memlock)"
-        ));
-    }
-    Obtained { wanted, core: pinned_core(), fifo_priority: fifo::get(), locked_memory: is_locked(), refusals }
+fn refused_core(core: usize, why: &str, choice: &[usize]) -> String {
+    let choice: Vec<_> = choice.iter().map(usize::to_string).collect();
+    let remedy = match &choice[..] {
+        [only] => format!(
+            "only core {only} may be used, on which controller and plant keep each other waiting: allow two, such as \
+             with `taskset -c 0,1`"
+        ),
+        choice => format!("choose two among {} with --cores", choice.join(", ")),
+    };
+    format!("core {core} refused ({why}): {remedy}")
 }
 
 /// The cores that the calling thread may run on.
@@ -132,14 +148,33 @@ mod tests {
     fn a_core_that_does_not_exist_is_refused_and_said() {
         let wanted = Wanted { core: Some(4096), fifo_priority: None, locked_memory: false };
         let obtained = std::thread::spawn(move || obtain(wanted)).join().unwrap();
-        assert!(!obtained.is_complete());
-        assert!(obtained.refusals[0].contains("--cores"), "{:?}", obtained.refusals);
+        assert!(obtained.refusals[0].starts_with("core 4096 refused"), "{:?}", obtained.refusals);
     }
 
     #[test]
     fn pinning_is_read_back() {
-        let wanted = Wanted { core: Some(0), fifo_priority: None, locked_memory: false };
+        let core = allowed_cores()[0];
+        let wanted = Wanted { core: Some(core), fifo_priority: None, locked_memory: false };
         let obtained = std::thread::spawn(move || obtain(wanted)).join().unwrap();
-        assert_eq!(obtained.core, Some(0));
+        assert_eq!((obtained.core, obtained.refusals), (Some(core), Vec::new()));
+    }
+
+    #[test]
+    fn what_is_granted_without_effect_is_refused() {
+        let cases = [
+            (None, false, None),
+            (Some(Ok(())), true, None),
+            (Some(Ok(())), false, Some("without effect")),
+            (Some(Err("no".to_owned())), false, Some("no")),
+        ];
+        for (asked, is_granted, expected) in cases {
+            assert_eq!(refusal(asked, is_granted).as_deref(), expected);
+        }
+    }
+
+    #[test]
+    fn a_refused_core_is_told_with_what_helps() {
+        assert!(refused_core(4, "EINVAL", &[0, 2]).contains("choose two among 0, 2 with --cores"));
+        assert!(refused_core(1, "EINVAL", &[0]).contains("allow two, such as with `taskset -c 0,1`"));
     }
 }

@@ -9,7 +9,7 @@ use crate::clock;
 const GAP_NS: u64 = 50_000;
 
 /// Preparations end within this time, ns.
-const PREPARE_NS: u64 = 20_000;
+const PREPARE_NS: u64 = 40_000;
 /// Where less than this is left before the preparations, they would take too large a share of the core, ns.
 const WORTH_PREPARING_NS: u64 = 100_000;
 
@@ -35,7 +35,7 @@ pub struct Waiter {
     /// come back, a spinning one a tenth of one.
     reserve: Reserve,
     account: Account,
-    /// End of the last sleep.
+    /// End of the last sleep, or of what the reserve has been told of since.
     awake_since_ns: Option<u64>,
     /// Since when the task has not been waiting; none before its first wait.
     working_since_ns: Option<u64>,
@@ -52,7 +52,7 @@ impl Waiter {
         }
     }
 
-    /// The account as of the begin of the last wait.
+    /// The account: of work up to the begin of the last wait, of waiting up to the last look at the clock.
     pub fn account(&self) -> Account {
         self.account
     }
@@ -63,6 +63,10 @@ impl Waiter {
         let mut now_ns = self.begin();
         if now_ns < sleep_until_ns {
             now_ns = self.sleep(now_ns, sleep_until_ns);
+        } else if now_ns < due_ns
+            && let Some(awake_since_ns) = self.awake_since_ns.replace(now_ns)
+        {
+            self.reserve.stay_awake(now_ns - awake_since_ns);
         }
         self.spin_until(due_ns, now_ns)
     }
@@ -154,6 +158,7 @@ impl Spin<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::clock::SECOND_NS;
 
     const STALL: std::time::Duration = std::time::Duration::from_millis(2);
     const STALL_NS: u64 = 2_000_000;
@@ -170,7 +175,7 @@ mod tests {
     #[test]
     fn far_deadlines_are_prepared_for_once_and_near_ones_are_not() {
         let mut waiter = Waiter::new(1_000_000);
-        for (ahead_ns, expected) in [(0, 0), (50_000, 0), (50_000_000, 1)] {
+        for (ahead_ns, expected) in [(0, 0), (50_000, 0), (SECOND_NS, 1)] {
             let due_ns = clock::now_ns() + ahead_ns;
             let mut prepared = 0;
             let prepare = || -> Result<(), ()> {
@@ -180,8 +185,19 @@ mod tests {
             assert!(waiter.until_preparing(due_ns, prepare).unwrap() >= due_ns);
             assert_eq!(prepared, expected, "{ahead_ns} ns ahead");
         }
-        let refused = waiter.until_preparing(clock::now_ns() + 50_000_000, || Err("no"));
+        let refused = waiter.until_preparing(clock::now_ns() + SECOND_NS, || Err("no"));
         assert_eq!(refused, Err("no"));
+    }
+
+    #[test]
+    fn waits_that_leave_no_time_to_sleep_make_the_reserve_give_way() {
+        let mut waiter = Waiter::new(60_000);
+        let at_first_ns = waiter.reserve.ns();
+        let until_ns = clock::now_ns() + SECOND_NS;
+        while waiter.reserve.ns() == at_first_ns && clock::now_ns() < until_ns {
+            waiter.until(clock::now_ns() + at_first_ns / 2);
+        }
+        assert!(waiter.reserve.ns() < at_first_ns);
     }
 
     #[test]

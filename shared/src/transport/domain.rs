@@ -12,6 +12,8 @@ use rustix::process::getuid;
 
 const SHARED_MEMORY: &str = "/dev/shm";
 const LOCK: &str = "lock";
+/// No domain can have this name.
+const TURN: &str = ".turn";
 
 /// The names of one run.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -23,7 +25,7 @@ pub struct Domain {
 #[derive(Debug, thiserror::Error)]
 pub enum DomainError {
     /// Another run uses the name.
-    #[error("a rig named '{id}' is running; wait for it, stop it, or give this one another name")]
+    #[error("a rig named '{id}' is running; wait for it, stop it, or give this one another `--name`")]
     InUse {
         /// The domain's id.
         id: String,
@@ -80,6 +82,7 @@ impl Domain {
 
     /// Makes the domain ours until the claim and every process started meanwhile are gone.
     pub fn claim(&self) -> Result<Claim, DomainError> {
+        let _turn = take_turn()?;
         let root = self.root();
         fs::create_dir_all(&root).map_err(|error| file_error("create", &root, error))?;
         let path = root.join(LOCK);
@@ -95,14 +98,18 @@ impl Domain {
     }
 
     /// Whether any process of the run still lives.
-    pub fn is_alive(&self) -> bool {
-        File::open(self.root().join(LOCK))
-            .is_ok_and(|lock| matches!(lock.try_lock(), Err(TryLockError::WouldBlock)))
+    pub fn is_alive(&self) -> Result<bool, DomainError> {
+        let _turn = take_turn()?;
+        Ok(self.is_locked())
     }
 
-    /// Removes everything the domain left in shared memory and in the file system; returns how many
-    /// files that were. The caller knows that no process of it lives.
-    pub fn sweep(&self) -> Result<usize, DomainError> {
+    /// Removes everything that a domain without a living process left in shared memory and in the file system;
+    /// how many files of shared memory that were, none while it is alive.
+    pub fn sweep(&self) -> Result<Option<usize>, DomainError> {
+        let _turn = take_turn()?;
+        if self.is_locked() {
+            return Ok(None);
+        }
         let prefix = self.prefix();
         let mut removed = 0;
         for path in entries(Path::new(SHARED_MEMORY))? {
@@ -113,7 +120,13 @@ impl Domain {
         }
         let root = self.root();
         remove(&root, fs::remove_dir_all(&root))?;
-        Ok(removed)
+        Ok(Some(removed))
+    }
+
+    /// Asking takes the lock for a moment, which only one may do at a time.
+    fn is_locked(&self) -> bool {
+        File::open(self.root().join(LOCK))
+            .is_ok_and(|lock| matches!(lock.try_lock(), Err(TryLockError::WouldBlock)))
     }
 
     /// Every domain of this user that left something behind.
@@ -128,6 +141,17 @@ impl Domain {
 
 fn domains_of_this_user() -> PathBuf {
     std::env::temp_dir().join(format!("masseter-{}", getuid().as_raw()))
+}
+
+/// Waits until no other process of this user claims or sweeps a domain: a lock not yet taken must not look like one
+/// that was let go. The turn ends with the file.
+fn take_turn() -> Result<File, DomainError> {
+    let folder = domains_of_this_user();
+    fs::create_dir_all(&folder).map_err(|error| file_error("create", &folder, error))?;
+    let path = folder.join(TURN);
+    let turn = File::create(&path).map_err(|error| file_error("create", &path, error))?;
+    turn.lock().map_err(|error| file_error("lock", &path, error))?;
+    Ok(turn)
 }
 
 fn entries(folder: &Path) -> Result<Vec<PathBuf>, DomainError> {
@@ -152,6 +176,8 @@ fn file_error(action: &'static str, path: &Path, error: io::Error) -> DomainErro
 
 #[cfg(test)]
 mod tests {
+    use std::sync::atomic::{AtomicBool, Ordering};
+
     use super::*;
 
     fn unique(name: &str) -> Domain {
@@ -159,15 +185,41 @@ mod tests {
     }
 
     #[test]
-    fn a_claimed_domain_is_alive_and_refused_to_others() {
+    fn a_claimed_domain_is_alive_refused_to_others_and_not_swept() {
         let domain = unique("claim");
         let claim = domain.claim().unwrap();
-        assert!(domain.is_alive());
+        assert!(domain.is_alive().unwrap());
         assert!(matches!(domain.claim(), Err(DomainError::InUse { .. })));
+        assert_eq!(domain.sweep().unwrap(), None);
+        assert!(domain.root().exists());
         drop(claim);
-        assert!(!domain.is_alive());
-        domain.sweep().unwrap();
+        assert!(!domain.is_alive().unwrap());
+        assert_eq!(domain.sweep().unwrap(), Some(0));
         assert!(!domain.root().exists());
+    }
+
+    #[test]
+    fn who_sweeps_all_the_time_never_takes_a_domain_that_is_being_claimed() {
+        let domain = unique("race");
+        let is_over = AtomicBool::new(false);
+        std::thread::scope(|scope| {
+            scope.spawn(|| {
+                while !is_over.load(Ordering::Relaxed) {
+                    domain.sweep().unwrap();
+                }
+            });
+            for _ in 0..500 {
+                let claim = domain.claim();
+                let is_whole =
+                    claim.is_ok() && domain.root().join(LOCK).exists() && domain.is_alive().unwrap();
+                if !is_whole {
+                    is_over.store(true, Ordering::Relaxed);
+                }
+                assert!(is_whole, "{claim:?}");
+            }
+            is_over.store(true, Ordering::Relaxed);
+        });
+        domain.sweep().unwrap();
     }
 
     #[test]

@@ -130,7 +130,8 @@ impl<M: Message> Outlet<M> {
         Ok(())
     }
 
-    /// Touches the port's memory once, so that the first message of the loop costs no page fault.
+    /// Touches the memory of the next message: so the first one of the loop costs no page fault, and a later one finds it
+    /// in the caches.
     pub fn warm_up(&self) -> Result<(), TransportError> {
         drop(self.publisher.loan().map_err(failed("loaning", M::TOPIC))?);
         Ok(())
