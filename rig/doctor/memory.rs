@@ -2,6 +2,7 @@
 
 use rustix::fs::statvfs;
 
+use super::container;
 use super::finding::Finding;
 use crate::machine::SystemRoot;
 
@@ -12,7 +13,7 @@ const ENOUGH_BYTES: u64 = 64 << 20;
 /// All findings of this family.
 pub(super) fn examine(root: &SystemRoot) -> Vec<Finding> {
     let free = statvfs(SHARED_MEMORY).ok().map(|of| of.f_bavail * of.f_frsize);
-    vec![huge_pages(root), room(free)]
+    vec![huge_pages(root), room(root, free)]
 }
 
 fn huge_pages(root: &SystemRoot) -> Finding {
@@ -33,15 +34,16 @@ fn huge_pages(root: &SystemRoot) -> Finding {
     Finding::ok(CHECK, found)
 }
 
-fn room(free_bytes: Option<u64>) -> Finding {
+fn room(root: &SystemRoot, free_bytes: Option<u64>) -> Finding {
     const CHECK: &str = "shared memory";
+    let enlarge = |mount: String| container::start_with(root, "--shm-size 1g", mount);
     match free_bytes {
         None => Finding::bad(CHECK, format!("no {SHARED_MEMORY}"), "the processes cannot exchange messages")
-            .mended_by(format!("sudo mount -t tmpfs tmpfs {SHARED_MEMORY}")),
+            .mended_by(enlarge(format!("sudo mount -t tmpfs tmpfs {SHARED_MEMORY}"))),
         Some(free) if free < ENOUGH_BYTES => {
             let found = format!("{} MiB free in {SHARED_MEMORY}", free >> 20);
             Finding::bad(CHECK, found, "a run may not find room for its topics")
-                .mended_by(format!("sudo mount -o remount,size=1g {SHARED_MEMORY}"))
+                .mended_by(enlarge(format!("sudo mount -o remount,size=1g {SHARED_MEMORY}")))
         }
         Some(free) => Finding::ok(CHECK, format!("{} MiB free in {SHARED_MEMORY}", free >> 20)),
     }
@@ -65,6 +67,9 @@ mod tests {
 
     #[test]
     fn a_container_with_little_shared_memory_is_bad() {
-        assert_eq!([None, Some(60 << 20), Some(1 << 30)].map(|free| room(free).level), [Bad, Bad, Ok]);
+        let container = Fixture::of(&[(".dockerenv", "")]);
+        let of = |free| room(&container.root(), free);
+        assert_eq!([None, Some(60 << 20), Some(1 << 30)].map(|free| of(free).level), [Bad, Bad, Ok]);
+        assert_eq!(of(Some(60 << 20)).mend.as_deref(), Some("docker run --shm-size 1g …"));
     }
 }

@@ -4,12 +4,15 @@
 //! machine. The form of the JSON report is written down in `docs/doctor.md`.
 
 mod can;
+mod container;
+mod cores;
 mod finding;
 mod kernel;
 mod leftovers;
 mod memory;
 mod privileges;
 mod processors;
+mod realtime_kernel;
 mod timing;
 
 use std::fmt::Write;
@@ -21,7 +24,7 @@ pub use finding::{Finding, Level};
 use crate::cli::Format;
 use crate::exit::{Exit, Failure};
 use crate::machine::SystemRoot;
-use crate::report::show;
+use crate::say::show;
 
 /// Version of the report's form.
 const FORM: u32 = 1;
@@ -48,7 +51,7 @@ pub(crate) fn examine(format: Format) -> Result<Exit, Failure> {
 
 fn findings(root: &SystemRoot) -> Vec<Finding> {
     [
-        privileges::examine(),
+        privileges::examine(root),
         processors::examine(root),
         kernel::examine(root),
         timing::examine(root),

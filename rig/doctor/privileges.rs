@@ -5,19 +5,21 @@ use std::thread;
 use masseter_shared::config::RealtimeConfig;
 use masseter_shared::realtime::scheduling::{Obtained, Wanted, obtain};
 
+use super::container;
 use super::finding::Finding;
+use crate::machine::SystemRoot;
 
 /// Raises both limits for this user from the next log-in on.
 const RAISE_LIMITS: &str = "printf '%s - rtprio 95\\n%s - memlock unlimited\\n' \"$USER\" \"$USER\" \
-                            | sudo tee /etc/security/limits.d/masseter.conf, then log in again";
+                            | sudo tee /etc/security/limits.d/masseter.conf  # then log in again";
 
 /// All findings of this family.
-pub(super) fn examine() -> Vec<Finding> {
+pub(super) fn examine(root: &SystemRoot) -> Vec<Finding> {
     let nothing = Wanted { core: None, fifo_priority: None, locked_memory: false };
     let priority = RealtimeConfig::default().priority;
     vec![
-        fifo(priority, &try_out(Wanted { fifo_priority: Some(priority), ..nothing })),
-        locked_memory(&try_out(Wanted { locked_memory: true, ..nothing })),
+        fifo(root, priority, &try_out(Wanted { fifo_priority: Some(priority), ..nothing })),
+        locked_memory(root, &try_out(Wanted { locked_memory: true, ..nothing })),
     ]
 }
 
@@ -26,7 +28,7 @@ fn try_out(wanted: Wanted) -> Obtained {
     thread::spawn(move || obtain(wanted)).join().expect("asking the kernel does not panic")
 }
 
-fn fifo(priority: u8, obtained: &Obtained) -> Finding {
+fn fifo(root: &SystemRoot, priority: u8, obtained: &Obtained) -> Finding {
     const CHECK: &str = "SCHED_FIFO";
     if obtained.fifo_priority == Some(priority) {
         return Finding::ok(CHECK, format!("priority {priority} granted"));
@@ -36,22 +38,23 @@ fn fifo(priority: u8, obtained: &Obtained) -> Finding {
         format!("priority {priority} refused"),
         "any ordinary task may delay a cycle by milliseconds",
     )
-    .mended_by(RAISE_LIMITS)
+    .mended_by(container::start_with(root, "--cap-add SYS_NICE --ulimit rtprio=95", RAISE_LIMITS))
 }
 
-fn locked_memory(obtained: &Obtained) -> Finding {
+fn locked_memory(root: &SystemRoot, obtained: &Obtained) -> Finding {
     const CHECK: &str = "locked memory";
     if obtained.locked_memory {
         return Finding::ok(CHECK, "granted");
     }
     Finding::bad(CHECK, "refused", "a page fault within a cycle costs microseconds, from disk milliseconds")
-        .mended_by(RAISE_LIMITS)
+        .mended_by(container::start_with(root, "--ulimit memlock=-1", RAISE_LIMITS))
 }
 
 #[cfg(test)]
 mod tests {
     use super::super::finding::Level;
     use super::*;
+    use crate::machine::fixture::Fixture;
 
     #[test]
     fn what_counts_is_what_was_read_back() {
@@ -63,10 +66,20 @@ mod tests {
             locked_memory,
             refusals: Vec::new(),
         };
+        let machine = Fixture::of(&[]);
         for (granted, level) in [(Some(80), Level::Ok), (Some(10), Level::Bad), (None, Level::Bad)] {
-            assert_eq!(fifo(80, &obtained(granted, false)).level, level);
+            assert_eq!(fifo(&machine.root(), 80, &obtained(granted, false)).level, level);
         }
-        assert_eq!(locked_memory(&obtained(None, true)).level, Level::Ok);
-        assert!(locked_memory(&obtained(None, false)).mend.unwrap().contains("memlock"));
+        assert_eq!(locked_memory(&machine.root(), &obtained(None, true)).level, Level::Ok);
+        let mends = |root: &SystemRoot| {
+            [fifo(root, 80, &obtained(None, false)), locked_memory(root, &obtained(None, false))]
+                .map(|finding| finding.mend.unwrap())
+        };
+        assert!(mends(&machine.root()).iter().all(|mend| mend.contains("limits.d")));
+        let container = Fixture::of(&[(".dockerenv", "")]);
+        assert_eq!(
+            mends(&container.root()),
+            ["docker run --cap-add SYS_NICE --ulimit rtprio=95 …", "docker run --ulimit memlock=-1 …"]
+        );
     }
 }

@@ -6,6 +6,7 @@ use std::io;
 use masseter_shared::clock;
 use rustix::time::{ClockId, clock_getres};
 
+use super::container;
 use super::finding::Finding;
 use crate::machine::SystemRoot;
 use crate::run::dma_latency;
@@ -25,13 +26,27 @@ const FAST_RATE_HZ: u64 = 10_000;
 pub(super) fn examine(root: &SystemRoot) -> Vec<Finding> {
     let resolution = clock_getres(ClockId::Monotonic);
     let resolution_ns = resolution.tv_sec * 1_000_000_000 + resolution.tv_nsec;
-    let opened = OpenOptions::new().write(true).open(dma_latency::DEVICE).map(drop);
     vec![
         clock_source(root),
         timers(resolution_ns),
         sleeping(cost_of_a_sleep_ns()),
-        dma_latency_access(&opened, root.is_virtual()),
+        dma_latency_access(root, &open_latency_device()),
     ]
+}
+
+/// Whether runs may hold the cores awake.
+pub(super) fn open_latency_device() -> io::Result<()> {
+    OpenOptions::new().write(true).open(dma_latency::DEVICE).map(drop)
+}
+
+/// What grants that.
+pub(super) fn grant_latency_device(root: &SystemRoot) -> String {
+    let device = dma_latency::DEVICE;
+    container::start_with(
+        root,
+        &format!("--device {device}"),
+        format!("sudo setfacl -m u:\"$USER\":rw {device}"),
+    )
 }
 
 fn clock_source(root: &SystemRoot) -> Finding {
@@ -89,9 +104,9 @@ fn sleeping(cost_ns: u64) -> Finding {
     Finding::warn(CHECK, found, cost)
 }
 
-fn dma_latency_access(opened: &io::Result<()>, is_virtual: bool) -> Finding {
+fn dma_latency_access(root: &SystemRoot, opened: &io::Result<()>) -> Finding {
     const CHECK: &str = "cpu_dma_latency";
-    match (opened, is_virtual) {
+    match (opened, root.is_virtual()) {
         (_, true) => Finding::ok(
             CHECK,
             "left alone in a virtual machine; `masseter bench loop` tells whether holding it \
@@ -103,7 +118,7 @@ fn dma_latency_access(opened: &io::Result<()>, is_virtual: bool) -> Finding {
             format!("cannot be held ({error})"),
             "cores fall into deep idle states between cycles",
         )
-        .mended_by(format!("sudo setfacl -m u:\"$USER\":rw {}", dma_latency::DEVICE)),
+        .mended_by(grant_latency_device(root)),
     }
 }
 
@@ -147,8 +162,10 @@ mod tests {
     #[test]
     fn the_latency_device_matters_on_real_machines_only() {
         let refused = || Err(io::Error::from(io::ErrorKind::PermissionDenied));
-        assert_eq!(dma_latency_access(&refused(), true).level, Fine);
-        assert_eq!(dma_latency_access(&refused(), false).level, Warn);
-        assert_eq!(dma_latency_access(&Ok(()), false).level, Fine);
+        let guest = Fixture::of(&[("sys/hypervisor/type", "xen")]);
+        assert_eq!(dma_latency_access(&guest.root(), &refused()).level, Fine);
+        let real = Fixture::of(&[]);
+        assert_eq!(dma_latency_access(&real.root(), &refused()).level, Warn);
+        assert_eq!(dma_latency_access(&real.root(), &Ok(())).level, Fine);
     }
 }

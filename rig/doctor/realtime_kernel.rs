@@ -1,0 +1,53 @@
+//! Where a distribution keeps its fully preemptible kernel.
+
+use crate::machine::SystemRoot;
+
+/// The command that installs it on this machine; none where no package is known.
+pub(super) fn installation(root: &SystemRoot) -> Option<String> {
+    command(&root.text("etc/os-release")?, std::env::consts::ARCH)
+}
+
+fn command(os_release: &str, architecture: &str) -> Option<String> {
+    let install = match (id(os_release)?, architecture) {
+        ("debian", "x86_64") => "apt install linux-image-rt-amd64",
+        ("debian", "aarch64") => "apt install linux-image-rt-arm64",
+        ("debian", "arm") => "apt install linux-image-rt-armmp",
+        ("ubuntu", "x86_64" | "aarch64") => "pro enable realtime-kernel",
+        ("centos" | "rocky" | "almalinux", "x86_64") => "dnf --enablerepo=rt install kernel-rt",
+        ("arch", "x86_64") => "pacman -S linux-rt",
+        ("opensuse-tumbleweed" | "opensuse-leap", "x86_64") => "zypper install kernel-rt",
+        _ => return None,
+    };
+    Some(format!("sudo {install} && sudo reboot"))
+}
+
+fn id(os_release: &str) -> Option<&str> {
+    Some(os_release.lines().find_map(|line| line.strip_prefix("ID="))?.trim_matches('"'))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_package_depends_on_distribution_and_architecture() {
+        let cases = [
+            (
+                "PRETTY_NAME=\"Debian\"\nVERSION_ID=\"13\"\nID=debian\n",
+                "x86_64",
+                Some("linux-image-rt-amd64"),
+            ),
+            ("ID=debian\n", "aarch64", Some("linux-image-rt-arm64")),
+            ("ID=ubuntu\nID_LIKE=debian\n", "x86_64", Some("pro enable realtime-kernel")),
+            ("ID=\"rocky\"\n", "x86_64", Some("install kernel-rt")),
+            ("ID=debian\n", "riscv64", None),
+            ("ID=alpine\n", "x86_64", None),
+            ("", "x86_64", None),
+        ];
+        for (os_release, architecture, said) in cases {
+            let command = command(os_release, architecture);
+            assert_eq!(command.is_some(), said.is_some(), "{os_release} {architecture}");
+            assert!(command.unwrap_or_default().contains(said.unwrap_or_default()), "{os_release}");
+        }
+    }
+}
