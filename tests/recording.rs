@@ -134,6 +134,17 @@ fn a_recording_becomes_tables_and_candump_logs() {
     assert_eq!(frames, fs::read_to_string(bench.run_folder().join("can0.log")).unwrap());
 }
 
+#[test]
+fn a_topic_that_the_recording_does_not_have_is_refused_with_those_it_has() {
+    let bench = virtual_run();
+    let out = bench.file("tables");
+    let output = log("export", &bench.run_folder(), &["--topic", "raeding", "--out", out.to_str().unwrap()]);
+    assert_eq!(output.status.code(), Some(2));
+    let said = stderr(&output);
+    assert!(said.contains("no topic 'raeding'") && said.contains(", reading, "), "{said}");
+    assert!(!out.exists());
+}
+
 /// Bytes of a recording that holds nothing but its definitions.
 fn definitions() -> usize {
     let scenario = Scenario::default();

@@ -1,8 +1,8 @@
 //! Messages as lines of a table, by the ROS 2 definition that the recording itself carries: so messages of
 //! other versions become tables too.
 //!
-//! Numbers, arrays of fixed length, and bytes of any number at the end only; a definition with anything else makes no
-//! table.
+//! Numbers, arrays of fixed length, and bytes of any number at the end only; a definition with anything else, or of a
+//! message longer than any of the rig's, makes no table.
 
 use std::fmt::Write;
 
@@ -52,6 +52,11 @@ impl Kind {
     }
 }
 
+/// Bytes of the longest message that becomes a line, and so the most columns. No message of the rig is longer.
+const MOST_BYTES: usize = u16::MAX as usize;
+/// Bytes of the longest name of a field.
+const LONGEST_NAME: usize = 255;
+
 /// What stands before bytes of any number, and says how many they are.
 const LENGTH: Kind = Kind::Unsigned(4);
 
@@ -93,12 +98,13 @@ impl Columns {
 
     fn add_field(&mut self, line: &str) -> Option<()> {
         let (kind, name) = line.split_once(char::is_whitespace)?;
-        if self.tail.is_some() {
+        let name = name.trim();
+        if self.tail.is_some() || name.len() > LONGEST_NAME {
             return None;
         }
         if is_bytes(kind) {
             self.bytes = self.bytes.next_multiple_of(LENGTH.size()) + LENGTH.size();
-            self.tail = Some(name.trim().to_owned());
+            self.tail = Some(name.to_owned());
             return Some(());
         }
         let (kind, elements) = match kind.split_once('[') {
@@ -108,8 +114,10 @@ impl Columns {
         let kind = Kind::named(kind)?;
         // CDR aligns each primitive to its own size.
         self.bytes = self.bytes.next_multiple_of(kind.size());
+        if elements.unwrap_or(1) > MOST_BYTES.saturating_sub(self.bytes) / kind.size() {
+            return None;
+        }
         for element in 0..elements.unwrap_or(1) {
-            let name = name.trim();
             let name = if elements.is_some() { format!("{name}_{element}") } else { name.to_owned() };
             self.fixed.push(Column { name, kind, at: self.bytes });
             self.bytes += kind.size();
@@ -193,6 +201,11 @@ mod tests {
             "uint8[] data\nuint8 more",
             "geometry_msgs/Pose pose",
             "uint8",
+            // More than any message holds, alone or together.
+            "uint8[99999999999] a",
+            "float64[18446744073709551615] a",
+            "uint8[40000] a\nuint8[40000] b",
+            &format!("uint8[9] {}", "a".repeat(300)),
         ] {
             assert_eq!(Columns::of(definition), None, "{definition}");
         }

@@ -1,8 +1,9 @@
 //! `masseter log`: looks at recordings, proves them complete, saves what is left of damaged ones, and
 //! writes them in other tools' formats.
 //!
-//! Every verb ends alike: 0 when the recording is whole and complete, 6 when messages or its end are
-//! missing, 2 when it holds bytes that Masseter did not write like this.
+//! `info`, `verify` and `export` end alike: 0 when the recording is whole and complete, 6 when messages or its end are
+//! missing, 2 when it holds bytes that Masseter did not write like this. `recover` ends with 0 once it has saved what
+//! can be read.
 
 mod columns;
 mod export;
@@ -17,8 +18,8 @@ use clap::{Args, Subcommand};
 
 use crate::exit::{Exit, Failure};
 use crate::recording::{Reader, Recovered, recover};
-use crate::report::show;
 use crate::run::folder::RunFolder;
+use crate::say::show;
 use survey::Survey;
 
 /// What `log` does.
@@ -121,6 +122,7 @@ fn in_words(recovered: Recovered) -> String {
 fn export(args: &ExportArgs) -> Result<Exit, Failure> {
     let path = args.from.path()?;
     let survey = Survey::of(&mut open(&path)?).with_context(|| path.display().to_string())?;
+    survey.refuse_unknown(&args.topics)?;
     fs::create_dir(&args.out).with_context(|| format!("cannot create {}", args.out.display()))?;
     let written = export::write(&mut open(&path)?, &args.out, &args.topics)?;
     for (name, lines) in written {

@@ -7,7 +7,6 @@
 #[cfg(test)]
 mod tests;
 
-use std::io::{Seek, Write};
 use std::mem::offset_of;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TryRecvError, TrySendError, sync_channel};
 use std::thread::{self, JoinHandle};
@@ -19,7 +18,7 @@ use masseter_shared::messages::Message;
 
 use super::CDR_LITTLE_ENDIAN;
 use super::topic::Topic;
-use super::writer::{Recorder, WriteError};
+use super::writer::{Medium, Recorder, WriteError};
 
 /// Whom the recording may hold up.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -86,7 +85,7 @@ impl Batch {
         self.messages = 0;
     }
 
-    fn write_to<W: Write + Seek>(&self, recorder: &mut Recorder<W>) -> Result<(), WriteError> {
+    fn write_to<W: Medium>(&self, recorder: &mut Recorder<W>) -> Result<(), WriteError> {
         let mut rest = self.bytes.as_slice();
         while let Some(head) = rest.get(..size_of::<Head>()) {
             let head: Head = pod_read_unaligned(head);
@@ -121,7 +120,7 @@ pub struct Backlog {
 
 impl Backlog {
     /// Starts the thread that writes.
-    pub fn start<W: Write + Seek + Send + 'static>(recorder: Recorder<W>, pace: Pace) -> Self {
+    pub fn start<W: Medium + Send + 'static>(recorder: Recorder<W>, pace: Pace) -> Self {
         // One batch is filled while the other is written: no more can be under way.
         let (to_disk, batches) = sync_channel(1);
         let (give_back, emptied) = sync_channel(2);
@@ -204,7 +203,7 @@ impl Backlog {
 
 /// The disk's thread: writes, flushes every now and then, and ends the file when no more can come. Returns
 /// how many messages are safe.
-fn write_batches<W: Write + Seek>(
+fn write_batches<W: Medium>(
     mut recorder: Recorder<W>,
     batches: &Receiver<Batch>,
     give_back: &SyncSender<Batch>,
@@ -217,13 +216,13 @@ fn write_batches<W: Write + Seek>(
             Err(error) => (safe, Some(error)),
         },
         Err(error) => {
-            eprintln!("masseter: {error}; the rig goes on, what follows is not recorded");
+            tell!("masseter: {error}; the rig goes on, what follows is not recorded");
             (safe, Some(error))
         }
     }
 }
 
-fn write_until_the_end<W: Write + Seek>(
+fn write_until_the_end<W: Medium>(
     recorder: &mut Recorder<W>,
     batches: &Receiver<Batch>,
     give_back: &SyncSender<Batch>,

@@ -27,7 +27,7 @@ pub use scene::Scene;
 pub(crate) use scene::jaw_points;
 pub use topic::Topic;
 pub use walk::Damage;
-pub use writer::{DurableFile, Recorder, WriteError};
+pub use writer::{DurableFile, Medium, Recorder, WriteError};
 
 /// Encapsulation header of plain little-endian CDR (version 1).
 pub(crate) const CDR_LITTLE_ENDIAN: [u8; 4] = [0x00, 0x01, 0x00, 0x00];

@@ -95,6 +95,8 @@ pub struct Reader<R = BufReader<File>> {
     chunks: Chunks,
     damage: Vec<Damage>,
     records: u64,
+    /// Whether the index has been asked for lost definitions.
+    index_is_known: bool,
 }
 
 #[derive(Debug, Default)]
@@ -120,6 +122,7 @@ impl<R: Read + Seek> Reader<R> {
             chunks: Chunks::default(),
             damage: Vec::new(),
             records: 0,
+            index_is_known: false,
         })
     }
 
@@ -207,10 +210,11 @@ impl<R: Read + Seek> Reader<R> {
             Step::Damage(damage) => self.pass_over(damage)?,
             Step::Record(opcode) => {
                 self.records += 1;
-                if opcode == op::CHUNK {
-                    self.open_chunk()?;
-                } else {
-                    self.definitions.take(opcode, self.walk.body());
+                match opcode {
+                    op::CHUNK => self.open_chunk()?,
+                    // Damage turns other records into such, and no checksum of their own tells.
+                    op::MESSAGE => self.note("messages outside of chunks (`mcap compress` packs them)"),
+                    _ => self.definitions.take(opcode, self.walk.body()),
                 }
             }
         }
@@ -237,9 +241,10 @@ impl<R: Read + Seek> Reader<R> {
     /// Notes damage. When the definitions were hit, the index at the end of the file has them again.
     fn pass_over(&mut self, damage: Damage) -> Result<(), ReadError> {
         self.add(damage);
-        if !self.definitions.channels.is_empty() {
+        if !self.definitions.channels.is_empty() || self.index_is_known {
             return Ok(());
         }
+        self.index_is_known = true;
         let place = self.walk.place();
         loop {
             match self.walk.step()? {

@@ -222,20 +222,18 @@ impl<R: Read + Seek> Walk<R> {
 fn begins_chunk(bytes: &[u8], rest: u64) -> bool {
     let Some(head) = bytes.get(1..HEAD) else { return false };
     let length = u64::from_le_bytes(head.try_into().expect("eight bytes"));
-    length <= LONGEST_RECORD
-        && HEAD as u64 + length <= rest
-        && chunk_data(&bytes[HEAD..]).is_some_and(|(header, data)| header as u64 + data == length)
+    length <= LONGEST_RECORD && HEAD as u64 + length <= rest && chunk_length(&bytes[HEAD..]) == Some(length)
 }
 
-/// Length of a chunk's header, and of the compressed data it announces.
-fn chunk_data(body: &[u8]) -> Option<(usize, u64)> {
+/// Length of a chunk by its header and the compressed data it announces.
+fn chunk_length(body: &[u8]) -> Option<u64> {
     let name = u32::from_le_bytes(body.get(CHUNK_FIXED - 4..CHUNK_FIXED)?.try_into().ok()?) as usize;
     if name > LONGEST_NAME {
         return None;
     }
     let header = CHUNK_FIXED + name + 8;
     let data = u64::from_le_bytes(body.get(header - 8..header)?.try_into().ok()?);
-    Some((header, data))
+    data.checked_add(header as u64)
 }
 
 /// Whether the lengths inside a record agree with its own. Only the kinds that stand between chunks are
@@ -246,8 +244,7 @@ fn is_consistent(opcode: u8, body: &[u8]) -> bool {
         Some(u32::from_le_bytes(bytes.try_into().expect("four bytes")) as usize)
     };
     match opcode {
-        op::CHUNK => chunk_data(body)
-            .is_some_and(|(header, data)| (header as u64).checked_add(data) == Some(body.len() as u64)),
+        op::CHUNK => chunk_length(body) == Some(body.len() as u64),
         op::MESSAGE_INDEX => length_at(2).is_some_and(|entries| entries + 6 == body.len()),
         op::HEADER => length_at(0)
             .and_then(|profile| Some(profile + length_at(profile.checked_add(4)?)? + 8))

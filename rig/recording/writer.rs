@@ -7,7 +7,7 @@
 use std::collections::BTreeMap;
 use std::error::Error;
 use std::fs::File;
-use std::io::{self, BufWriter, Seek, SeekFrom, Write};
+use std::io::{self, BufWriter, Cursor, Seek, SeekFrom, Write};
 use std::path::Path;
 use std::sync::mpsc::{Receiver, SyncSender, channel, sync_channel};
 use std::thread::{self, JoinHandle};
@@ -44,6 +44,18 @@ fn root_of(error: &dyn Error) -> &dyn Error {
     error.source().map_or(error, root_of)
 }
 
+/// What a recording is written on.
+pub trait Medium: Write + Seek {
+    /// Ends it: everything written is safe, or why it is not.
+    fn close(self) -> io::Result<()>;
+}
+
+impl Medium for &mut Cursor<Vec<u8>> {
+    fn close(self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
 /// How recordings are laid out: the options of every MCAP file that Masseter writes.
 pub(super) fn options() -> WriteOptions {
     // One thread compresses, so that the same messages give the same bytes; chunks go out whole, so that a
@@ -58,18 +70,18 @@ pub(super) fn options() -> WriteOptions {
 }
 
 /// An open recording on `W`.
-pub struct Recorder<W: Write + Seek = DurableFile> {
+pub struct Recorder<W: Medium = DurableFile> {
     channels: Channels<W>,
     encoder: Encoder,
 }
 
 /// The file with the numbers of its channels, by their places.
-struct Channels<W: Write + Seek> {
+struct Channels<W: Medium> {
     writer: Writer<W>,
     ids: Vec<u16>,
 }
 
-impl<W: Write + Seek> Channels<W> {
+impl<W: Medium> Channels<W> {
     fn write(&mut self, message: &Encoded, log_time_ns: u64) -> Result<(), WriteError> {
         let header = MessageHeader {
             channel_id: self.ids[message.channel.place()],
@@ -88,7 +100,7 @@ impl Recorder {
     }
 }
 
-impl<W: Write + Seek> Recorder<W> {
+impl<W: Medium> Recorder<W> {
     /// Begins a recording, with a channel a topic. The definitions are flushed at once: without them no
     /// message can be read.
     pub fn on(medium: W, scene: Scene) -> Result<Self, WriteError> {
@@ -124,17 +136,17 @@ impl<W: Write + Seek> Recorder<W> {
         Ok(self.channels.writer.flush()?)
     }
 
-    /// Ends the file with its index.
+    /// Ends the file with its index, and waits until it is safe.
     pub fn finish(mut self) -> Result<(), WriteError> {
         self.channels.writer.finish()?;
-        Ok(self.channels.writer.into_inner().flush().map_err(McapError::from)?)
+        Ok(self.channels.writer.into_inner().close().map_err(McapError::from)?)
     }
 }
 
 /// A file whose flush reaches the system at once and the disk soon after: what was flushed survives the
 /// death of the process, and, once the disk has taken it, a power cut.
 ///
-/// A thread of its own waits for the disk, so that a slow one does not hold the writer up. Dropping the file
+/// A thread of its own waits for the disk, so that a slow one does not hold the writer up. Closing the file
 /// waits for the last of it.
 #[derive(Debug)]
 pub struct DurableFile {
@@ -151,13 +163,16 @@ impl DurableFile {
         if let Some(folder) = path.parent().filter(|folder| !folder.as_os_str().is_empty()) {
             File::open(folder)?.sync_all()?;
         }
+        Self::on(file)
+    }
+
+    fn on(file: File) -> io::Result<Self> {
         // One request may wait while another is carried out: it covers all that came before it.
         let (wanted, requests) = sync_channel(1);
         let (report, done) = channel();
         let for_disk = file.try_clone()?;
         let disk = thread::spawn(move || {
             for () in requests {
-                // Nobody listens any more when the file is being dropped.
                 let _ = report.send(for_disk.sync_data());
             }
         });
@@ -166,12 +181,28 @@ impl DurableFile {
     }
 }
 
-impl Drop for DurableFile {
-    fn drop(&mut self) {
+impl DurableFile {
+    /// Waits until the disk has taken, or refused, everything that was flushed.
+    fn settle(&mut self) -> io::Result<()> {
         self.wanted = None;
         if let Some(disk) = self.disk.take() {
-            let _ = disk.join();
+            disk.join().expect("the thread that waits for the disk does not panic");
         }
+        self.done.try_iter().collect()
+    }
+}
+
+impl Medium for DurableFile {
+    fn close(mut self) -> io::Result<()> {
+        self.flush()?;
+        self.settle()
+    }
+}
+
+impl Drop for DurableFile {
+    fn drop(&mut self) {
+        // Only a file that was not closed has anything to tell here, and the reason for that is known.
+        let _ = self.settle();
     }
 }
 
@@ -201,5 +232,18 @@ impl Seek for DurableFile {
 
     fn stream_position(&mut self) -> io::Result<u64> {
         self.file.stream_position()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_disk_that_refuses_the_last_of_it_is_told_of() {
+        // Takes everything and has nothing to bring it to.
+        let null = File::options().write(true).open("/dev/null").unwrap();
+        let error = DurableFile::on(null).unwrap().close().unwrap_err();
+        assert_eq!(error.kind(), io::ErrorKind::InvalidInput);
     }
 }

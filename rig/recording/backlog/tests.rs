@@ -1,4 +1,4 @@
-use std::io::{self, Cursor, SeekFrom};
+use std::io::{self, Cursor, Seek, SeekFrom, Write};
 use std::sync::mpsc::{Receiver, channel};
 
 use masseter_shared::config::JawConfig;
@@ -46,6 +46,12 @@ impl Write for Stuck {
 impl Seek for Stuck {
     fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
         self.bytes.seek(to)
+    }
+}
+
+impl Medium for Stuck {
+    fn close(self) -> io::Result<()> {
+        Ok(())
     }
 }
 
