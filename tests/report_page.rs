@@ -5,7 +5,7 @@ mod common;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-use common::{Bench, stderr};
+use common::{Bench, skip, stderr};
 
 const BROWSERS: [&str; 3] = ["chromium", "chromium-browser", "google-chrome"];
 /// What every report of a run that moved shows.
@@ -33,7 +33,7 @@ fn browser() -> Option<PathBuf> {
         .flat_map(|folder| BROWSERS.map(|name| folder.join(name)))
         .find(|candidate| candidate.is_file());
     if found.is_none() {
-        eprintln!("SKIPPED: no browser among {BROWSERS:?}");
+        skip(&format!("no browser among {BROWSERS:?}"));
     }
     found
 }

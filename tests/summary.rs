@@ -7,12 +7,16 @@ use std::fs;
 use std::path::Path;
 
 use common::Bench;
+use masseter_shared::messages::codes::Source;
 use serde_json::Value;
+
+fn description() -> String {
+    fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/summary.md")).unwrap()
+}
 
 /// Keys in the table of docs/summary.md, and those of them that may be absent.
 fn documented() -> (BTreeSet<String>, BTreeSet<String>) {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/summary.md");
-    let text = fs::read_to_string(path).unwrap();
+    let text = description();
     let rows = text.lines().filter_map(|line| line.strip_prefix("| `")?.split_once("` | "));
     let rows: Vec<_> = rows.collect();
     let all = rows.iter().map(|(key, _)| (*key).to_owned()).collect();
@@ -48,6 +52,26 @@ fn the_summary_has_the_keys_that_are_documented_and_no_others() {
     let absent: Vec<_> = documented.difference(&found).filter(|key| !optional.contains(*key)).collect();
     assert!(absent.is_empty(), "in docs/summary.md, but not in summary.json: {absent:?}");
     assert_eq!(bench.summary()["form"], 1);
+}
+
+#[test]
+fn the_intervals_are_those_that_are_documented_in_their_order() {
+    let bench = Bench::new("duration_s = 1.0");
+    assert_eq!(bench.run(&["--clock", "virtual"]).status.code(), Some(0));
+    let summary = bench.summary();
+    let intervals = summary["figures"]["intervals"].as_array().unwrap();
+    let text = description();
+    let (_, table) = text.split_once("| interval | from | to |\n| --- | --- | --- |\n").unwrap();
+    let rows = table.lines().map_while(|line| line.strip_prefix("| ")?.split(" | ").next());
+    assert!(rows.eq(intervals.iter().map(|interval| interval["name"].as_str().unwrap())));
+}
+
+#[test]
+fn the_sources_of_events_are_those_that_are_documented() {
+    let names: Vec<_> = Source::ALL.iter().map(|source| source.name()).collect();
+    let [others @ .., last] = names.as_slice() else { unreachable!("there are sources") };
+    let row = format!("| `figures.events[].source` | {} or {last} |", others.join(", "));
+    assert!(description().contains(&row), "{row}");
 }
 
 /// The attributes of the first element of this name.

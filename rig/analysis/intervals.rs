@@ -1,62 +1,24 @@
-//! Measured intervals, each an HdrHistogram over every cycle of the run, and an interval log of it.
+//! The intervals that a cycle passes through, each an HdrHistogram over every cycle of the run.
 //!
-//! No series is corrected for coordinated omission: skipped cycles have no samples, and are counted
-//! beside the table instead.
+//! A skipped deadline has no cycle and so no samples. Only the wake-ups have a second series in which it counts, with
+//! the time until the wake-up that skipped it: corrected for coordinated omission once, by the skips as counted.
 
-use std::fs::{self, File};
-use std::io::BufWriter;
-use std::path::{Path, PathBuf};
-use std::time::Duration;
+use std::fs;
+use std::path::Path;
 
-use hdrhistogram::Histogram;
-use hdrhistogram::serialization::interval_log::IntervalLogWriterBuilder;
-use hdrhistogram::serialization::{Deserializer, Serializer, V2DeflateSerializer, V2Serializer};
-use masseter_shared::clock::SECOND_NS;
 use masseter_shared::messages::{Command, Reading, State};
-use serde::Serialize;
 
 use super::AnalysisError;
-use super::join::ByCycle;
-use super::noise::standard_error;
-
-/// Below this many samples the 99.9th percentile rests on fewer than ten of them and is not given.
-const SAMPLES_FOR_P999: u64 = 10_000;
-/// Significant decimal digits of a histogram.
-const DIGITS: u8 = 3;
-/// One line of the interval log covers this much, ns.
-const LOG_INTERVAL_NS: u64 = SECOND_NS;
-
-/// One measured interval.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct IntervalFigures {
-    /// What is measured.
-    pub name: &'static str,
-    /// Samples.
-    pub n: u64,
-    /// Median, ns.
-    pub p50_ns: u64,
-    /// Standard error of the median, by its seconds, ns; none with less than three of them.
-    pub p50_noise_ns: Option<f64>,
-    /// 99th percentile, ns.
-    pub p99_ns: u64,
-    /// Standard error of the 99th percentile, by its seconds, ns.
-    pub p99_noise_ns: Option<f64>,
-    /// 99.9th percentile, ns; only with at least 10,000 samples.
-    pub p999_ns: Option<u64>,
-    /// Largest, ns.
-    pub max_ns: u64,
-    /// When the largest was, ns of the run's clock.
-    pub max_at_ns: u64,
-    /// The distribution, for plots: 1/(1 − quantile) and value in ns.
-    #[serde(skip)]
-    pub curve: Vec<(f64, u64)>,
-}
+use super::join::{ByCycle, Join};
+use super::measured::{IntervalFigures, Measured};
 
 /// Names of the intervals, in the order in which a cycle passes through them.
-const NAMES: [&str; 11] = [
+const NAMES: [&str; 13] = [
     "plant wake-up",
+    "plant wake-up corrected",
     "process data",
     "controller wake-up",
+    "controller wake-up corrected",
     "reading transport",
     "forward kinematics",
     "control",
@@ -70,8 +32,10 @@ const NAMES: [&str; 11] = [
 #[derive(Debug, Clone, Copy)]
 enum Interval {
     PlantWakeUp,
+    PlantWakeUpCorrected,
     ProcessData,
     ControllerWakeUp,
+    ControllerWakeUpCorrected,
     ReadingTransport,
     ForwardKinematics,
     Control,
@@ -84,215 +48,267 @@ enum Interval {
     RoundTrip,
 }
 
+/// What is known of a reading's cycle when a command answers it.
 #[derive(Debug, Clone, Copy)]
-struct Sent {
+struct Sampled {
+    sampled_ns: u64,
+    /// From SYNC to the publication of the reading, ns.
+    exchange_ns: u64,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Received {
+    received_ns: u64,
+    reading_cycle: u64,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Published {
     published_ns: u64,
     reading_cycle: u64,
 }
 
+/// What became of a command.
+#[derive(Debug, Clone, Copy)]
+struct Answer {
+    received_ns: u64,
+    /// None before the drives exchange process data.
+    sent_ns: Option<u64>,
+}
+
 /// All intervals of a run, and what is needed to join the messages they lie between.
 pub(super) struct Intervals {
-    series: Vec<Series>,
-    readings_published: ByCycle<u64>,
-    samples: ByCycle<u64>,
-    /// From SYNC to the publication of the reading, ns.
-    exchanges: ByCycle<u64>,
-    /// When the controller received the reading of the same cycle.
-    received: ByCycle<u64>,
-    /// When the plant received the command.
-    answered: ByCycle<u64>,
-    commands: ByCycle<Sent>,
+    period_ns: u64,
+    measured: Vec<Measured>,
+    plant_skipped: u64,
+    controller_skipped: u64,
     last_answered: u64,
+    /// By the plant's cycle. A reading is recorded before the one that answers it: no join is needed.
+    samples: ByCycle<Sampled>,
+    /// Publication and reception of a reading, by the plant's cycle.
+    transports: Join<u64, u64>,
+    /// Reception of the reading and publication of the command, by the controller's cycle.
+    controller_cycles: Join<u64, u64>,
+    /// By the controller's cycle.
+    commands: Join<Published, Answer>,
+    /// By the controller's cycle.
+    round_trips: Join<Received, Answer>,
 }
 
 impl Intervals {
-    pub(super) fn new(folder: &Path) -> Result<Self, AnalysisError> {
+    pub(super) fn new(folder: &Path, period_ns: u64) -> Result<Self, AnalysisError> {
         fs::create_dir_all(folder)
             .map_err(|error| AnalysisError::Write { path: folder.to_owned(), error })?;
         Ok(Self {
-            series: NAMES.iter().map(|name| Series::new(name, folder)).collect(),
-            readings_published: ByCycle::default(),
-            samples: ByCycle::default(),
-            exchanges: ByCycle::default(),
-            received: ByCycle::default(),
-            answered: ByCycle::default(),
-            commands: ByCycle::default(),
+            period_ns,
+            measured: NAMES.iter().map(|name| Measured::new(name, folder)).collect(),
+            plant_skipped: 0,
+            controller_skipped: 0,
             last_answered: 0,
+            samples: ByCycle::default(),
+            transports: Join::default(),
+            controller_cycles: Join::default(),
+            commands: Join::default(),
+            round_trips: Join::default(),
         })
     }
 
     fn add(&mut self, interval: Interval, from_ns: u64, to_ns: u64) {
-        self.series[interval as usize].add(to_ns.saturating_sub(from_ns), to_ns);
+        self.measured[interval as usize].add(to_ns.saturating_sub(from_ns), to_ns);
+    }
+
+    fn add_joined(&mut self, interval: Interval, ends: Option<(u64, u64)>) {
+        if let Some((from_ns, to_ns)) = ends {
+            self.add(interval, from_ns, to_ns);
+        }
+    }
+
+    /// A wake-up, and the deadlines skipped before it: each was due a period earlier than the next.
+    fn add_wake_up(&mut self, [raw, corrected]: [Interval; 2], [due_ns, woke_ns]: [u64; 2], skipped: u64) {
+        let late_ns = woke_ns.saturating_sub(due_ns);
+        self.measured[raw as usize].add(late_ns, woke_ns);
+        self.measured[corrected as usize].add_steps(late_ns, self.period_ns, skipped, woke_ns);
     }
 
     pub(super) fn reading(&mut self, reading: &Reading) {
-        self.add(Interval::PlantWakeUp, reading.due_ns, reading.woke_ns);
+        let skipped = more(reading.skipped_cycles, &mut self.plant_skipped);
+        let wake_up = [Interval::PlantWakeUp, Interval::PlantWakeUpCorrected];
+        self.add_wake_up(wake_up, [reading.due_ns, reading.woke_ns], skipped);
         if reading.complete_ns > 0 {
             self.add(Interval::ProcessData, reading.sampled_ns, reading.complete_ns);
         }
-        self.readings_published.insert(reading.cycle, reading.published_ns);
-        self.samples.insert(reading.cycle, reading.sampled_ns);
-        self.exchanges.insert(reading.cycle, reading.published_ns.saturating_sub(reading.woke_ns));
+        let exchange_ns = reading.published_ns.saturating_sub(reading.woke_ns);
+        self.samples.insert(reading.cycle, Sampled { sampled_ns: reading.sampled_ns, exchange_ns });
+        let transport = self.transports.left(reading.cycle, reading.published_ns);
+        self.add_joined(Interval::ReadingTransport, transport);
         self.answer(reading);
     }
 
     /// What became of the command that a reading answers; once for each command.
     fn answer(&mut self, reading: &Reading) {
-        let Some(sent) = self.commands.get(reading.answers_cycle) else { return };
-        if reading.answers_cycle == self.last_answered {
+        let cycle = reading.answers_cycle;
+        if cycle <= self.last_answered {
             return;
         }
-        self.last_answered = reading.answers_cycle;
-        self.add(Interval::CommandTransport, sent.published_ns, reading.command_received_ns);
-        self.answered.insert(reading.answers_cycle, reading.command_received_ns);
-        self.round_trip(reading.answers_cycle);
-        if reading.command_sent_ns == 0 {
-            return;
+        self.last_answered = cycle;
+        let (received_ns, sent_ns) = (reading.command_received_ns, reading.command_sent_ns);
+        let answer = Answer { received_ns, sent_ns: (sent_ns > 0).then_some(sent_ns) };
+        if let Some(sent_ns) = answer.sent_ns {
+            self.add(Interval::CommandToWire, received_ns, sent_ns);
         }
-        self.add(Interval::CommandToWire, reading.command_received_ns, reading.command_sent_ns);
-        if let Some(sampled_ns) = self.samples.get(sent.reading_cycle) {
-            self.add(Interval::SampleToWire, sampled_ns, reading.command_sent_ns);
-        }
+        let answered = self.commands.right(cycle, answer);
+        self.answered(answered);
+        let round_trip = self.round_trips.right(cycle, answer);
+        self.round_trip(round_trip);
     }
 
-    pub(super) fn state(&mut self, state: &State) {
-        self.add(Interval::ControllerWakeUp, state.due_ns, state.woke_ns);
-        if state.reading_cycle != state.cycle {
+    /// `is_fresh`: the state's reading is used for the first time.
+    pub(super) fn state(&mut self, state: &State, is_fresh: bool) {
+        let skipped = more(state.skipped_cycles, &mut self.controller_skipped);
+        let wake_up = [Interval::ControllerWakeUp, Interval::ControllerWakeUpCorrected];
+        self.add_wake_up(wake_up, [state.due_ns, state.woke_ns], skipped);
+        if !is_fresh {
             return;
         }
-        self.received.insert(state.cycle, state.received_ns);
-        self.round_trip(state.cycle);
-        if let Some(published_ns) = self.readings_published.get(state.reading_cycle) {
-            self.add(Interval::ReadingTransport, published_ns, state.received_ns);
-        }
-        self.add(Interval::ForwardKinematics, state.received_ns, state.solved_ns);
+        let State { cycle, reading_cycle, received_ns, .. } = *state;
+        self.add(Interval::ForwardKinematics, received_ns, state.solved_ns);
         self.add(Interval::Control, state.solved_ns, state.commanded_ns);
-        if let Some(sent) = self.commands.get(state.cycle) {
-            self.add(Interval::ControllerCycle, state.received_ns, sent.published_ns);
-        }
-    }
-
-    /// Joins what plant and controller tell of a cycle, whichever is heard first.
-    fn round_trip(&mut self, cycle: u64) {
-        let (Some(from_ns), Some(to_ns)) = (self.received.get(cycle), self.answered.get(cycle)) else {
-            return;
-        };
-        if let Some(exchange_ns) = self.exchanges.take(cycle) {
-            self.add(Interval::RoundTrip, from_ns, to_ns + exchange_ns);
-        }
+        let transport = self.transports.right(reading_cycle, received_ns);
+        self.add_joined(Interval::ReadingTransport, transport);
+        let controller_cycle = self.controller_cycles.left(cycle, received_ns);
+        self.add_joined(Interval::ControllerCycle, controller_cycle);
+        let round_trip = self.round_trips.left(cycle, Received { received_ns, reading_cycle });
+        self.round_trip(round_trip);
     }
 
     pub(super) fn command(&mut self, command: &Command) {
-        let sent = Sent { published_ns: command.published_ns, reading_cycle: command.reading_cycle };
-        self.commands.insert(command.cycle, sent);
+        let Command { cycle, published_ns, reading_cycle, .. } = *command;
+        let controller_cycle = self.controller_cycles.right(cycle, published_ns);
+        self.add_joined(Interval::ControllerCycle, controller_cycle);
+        let answered = self.commands.left(cycle, Published { published_ns, reading_cycle });
+        self.answered(answered);
+    }
+
+    fn answered(&mut self, joined: Option<(Published, Answer)>) {
+        let Some((published, answer)) = joined else { return };
+        self.add(Interval::CommandTransport, published.published_ns, answer.received_ns);
+        if let (Some(sample), Some(sent_ns)) = (self.samples.get(published.reading_cycle), answer.sent_ns) {
+            self.add(Interval::SampleToWire, sample.sampled_ns, sent_ns);
+        }
+    }
+
+    fn round_trip(&mut self, joined: Option<(Received, Answer)>) {
+        let Some((received, answer)) = joined else { return };
+        if let Some(sample) = self.samples.get(received.reading_cycle) {
+            let to_ns = answer.received_ns.saturating_add(sample.exchange_ns);
+            self.add(Interval::RoundTrip, received.received_ns, to_ns);
+        }
     }
 
     pub(super) fn finish(self) -> Result<Vec<IntervalFigures>, AnalysisError> {
-        self.series.into_iter().map(Series::finish).collect()
+        self.measured.into_iter().map(Measured::finish).collect()
     }
 }
 
-/// The distribution as HdrHistogram plots it; the largest value stands where its own share ends.
-fn curve(total: &Histogram<u64>) -> Vec<(f64, u64)> {
-    let points = total.iter_quantiles(5).map(|step| (step.quantile_iterated_to(), step.value_iterated_to()));
-    let samples = total.len() as f64;
-    points.map(|(quantile, value)| ((1.0 / (1.0 - quantile)).min(samples), value)).collect()
+/// How much a counter has grown since the last look at it.
+fn more(counted: u64, before: &mut u64) -> u64 {
+    counted.saturating_sub(std::mem::replace(before, counted))
 }
 
-/// One interval: the whole run's histogram, and one for each second of it.
-struct Series {
-    name: &'static str,
-    path: PathBuf,
-    total: Histogram<u64>,
-    max_at_ns: u64,
-    second: Histogram<u64>,
-    second_began_ns: u64,
-    /// Past seconds, serialised: a hundredth of their size in memory.
-    seconds: Vec<(u64, Vec<u8>)>,
-    medians_ns: Vec<f64>,
-    p99s_ns: Vec<f64>,
-}
+#[cfg(test)]
+mod tests {
+    use super::*;
 
-fn histogram() -> Histogram<u64> {
-    Histogram::new(DIGITS).expect("three digits are allowed")
-}
+    const PERIOD_NS: u64 = 1_000_000;
 
-impl Series {
-    fn new(name: &'static str, folder: &Path) -> Self {
-        let path = folder.join(format!("{}.hlog", name.replace(' ', "-")));
-        let (total, second) = (histogram(), histogram());
-        Self {
-            name,
-            path,
-            total,
-            max_at_ns: 0,
-            second,
-            second_began_ns: 0,
-            seconds: Vec::new(),
-            medians_ns: Vec::new(),
-            p99s_ns: Vec::new(),
+    fn intervals() -> (tempfile::TempDir, Intervals) {
+        let folder = tempfile::tempdir().unwrap();
+        let intervals = Intervals::new(folder.path(), PERIOD_NS).unwrap();
+        (folder, intervals)
+    }
+
+    /// Samples and largest value of each interval.
+    fn found(intervals: Intervals) -> Vec<(&'static str, u64, u64)> {
+        let figures = intervals.finish().unwrap();
+        figures.iter().map(|interval| (interval.name, interval.n, interval.max_ns)).collect()
+    }
+
+    /// Samples and largest value of one interval.
+    fn only(name: &str, intervals: Intervals) -> (u64, u64) {
+        let (_, n, max_ns) = found(intervals).into_iter().find(|(other, ..)| *other == name).unwrap();
+        (n, max_ns)
+    }
+
+    /// Reading 4 came too late for cycle 4: cycle 5 used it.
+    fn reading() -> Reading {
+        let (sampled_ns, complete_ns, published_ns) = (130, 530, 600);
+        Reading { cycle: 4, woke_ns: 30, sampled_ns, complete_ns, published_ns, ..Reading::default() }
+    }
+
+    fn state() -> State {
+        let (received_ns, solved_ns, commanded_ns) = (1010, 1020, 1050);
+        State { cycle: 5, reading_cycle: 4, received_ns, solved_ns, commanded_ns, ..State::default() }
+    }
+
+    fn command() -> Command {
+        Command { cycle: 5, reading_cycle: 4, published_ns: 1060, ..Command::default() }
+    }
+
+    fn answer() -> Reading {
+        let (command_received_ns, command_sent_ns) = (1100, 1400);
+        Reading { cycle: 6, answers_cycle: 5, command_received_ns, command_sent_ns, ..Reading::default() }
+    }
+
+    #[test]
+    fn a_late_reading_is_followed_to_the_wire_in_whatever_order_the_topics_are_recorded() {
+        let expected = [
+            ("process data", 1, 400),
+            ("reading transport", 1, 410),
+            ("forward kinematics", 1, 10),
+            ("control", 1, 30),
+            ("controller cycle", 1, 50),
+            ("command transport", 1, 40),
+            ("command to wire", 1, 300),
+            ("sample to wire", 1, 1270),
+            // SYNC to the reading's publication 570, its reception to the command's 90.
+            ("round trip", 1, 660),
+        ];
+        let take = |intervals: &mut Intervals, message: char| match message {
+            'r' => intervals.reading(&reading()),
+            's' => intervals.state(&state(), true),
+            'c' => intervals.command(&command()),
+            _ => intervals.reading(&answer()),
+        };
+        for order in ["rsca", "rsac", "rcsa", "rcas", "rasc", "racs", "srca", "crsa", "scra", "csra"] {
+            let (_folder, mut intervals) = intervals();
+            order.chars().for_each(|message| take(&mut intervals, message));
+            let found = found(intervals);
+            for expected in expected {
+                assert!(found.contains(&expected), "{order}: {expected:?} in {found:?}");
+            }
         }
     }
 
-    fn add(&mut self, value_ns: u64, at_ns: u64) {
-        if value_ns > self.total.max() || self.total.is_empty() {
-            self.max_at_ns = at_ns;
-        }
-        if at_ns >= self.second_began_ns + LOG_INTERVAL_NS {
-            self.close_second();
-            self.second_began_ns = at_ns;
-        }
-        for histogram in [&mut self.total, &mut self.second] {
-            histogram.record(value_ns).expect("a histogram that resizes itself takes any value");
-        }
+    #[test]
+    fn a_reading_used_again_gives_no_samples() {
+        let (_folder, mut intervals) = intervals();
+        intervals.reading(&reading());
+        intervals.state(&state(), true);
+        intervals.state(&State { cycle: 6, ..state() }, false);
+        assert_eq!(only("forward kinematics", intervals), (1, 10));
     }
 
-    fn close_second(&mut self) {
-        if self.second.is_empty() {
-            return;
-        }
-        let mut bytes = Vec::new();
-        V2Serializer::new().serialize(&self.second, &mut bytes).expect("memory takes any histogram");
-        self.seconds.push((self.second_began_ns, bytes));
-        self.medians_ns.push(self.second.value_at_quantile(0.50) as f64);
-        self.p99s_ns.push(self.second.value_at_quantile(0.99) as f64);
-        self.second.reset();
-    }
-
-    fn finish(mut self) -> Result<IntervalFigures, AnalysisError> {
-        self.close_second();
-        self.write_log().map_err(|error| AnalysisError::Write { path: self.path.clone(), error })?;
-        let total = &self.total;
-        Ok(IntervalFigures {
-            name: self.name,
-            n: total.len(),
-            p50_ns: total.value_at_quantile(0.50),
-            p50_noise_ns: standard_error(&self.medians_ns),
-            p99_ns: total.value_at_quantile(0.99),
-            p99_noise_ns: standard_error(&self.p99s_ns),
-            p999_ns: (total.len() >= SAMPLES_FOR_P999).then(|| total.value_at_quantile(0.999)),
-            max_ns: total.max(),
-            max_at_ns: self.max_at_ns,
-            curve: curve(total),
-        })
-    }
-
-    /// HdrHistogram V2 interval log: a line a second, times relative to the first sample.
-    fn write_log(&self) -> std::io::Result<()> {
-        let mut file = BufWriter::new(File::create(&self.path)?);
-        let mut serializer = V2DeflateSerializer::new();
-        let mut log = IntervalLogWriterBuilder::new()
-            .add_comment(&format!("masseter: {}, ns", self.name))
-            .with_max_value_divisor(1.0)
-            .begin_log_with(&mut file, &mut serializer)?;
-        let first_ns = self.seconds.first().map_or(0, |(start, _)| *start);
-        for (start_ns, bytes) in &self.seconds {
-            let second: Histogram<u64> =
-                Deserializer::new().deserialize(&mut bytes.as_slice()).expect("serialised above");
-            let start = Duration::from_nanos(start_ns - first_ns);
-            log.write_histogram(&second, start, Duration::from_nanos(LOG_INTERVAL_NS), None)
-                .map_err(|error| std::io::Error::other(format!("{error:?}")))?;
-        }
-        Ok(())
+    #[test]
+    fn a_skipped_deadline_counts_in_the_corrected_wake_up_only() {
+        let states = || {
+            let (folder, mut intervals) = intervals();
+            intervals.state(&State::default(), false);
+            // Woken 200 µs after deadline 5; 2 to 4 were skipped.
+            let late = State { due_ns: 5 * PERIOD_NS, woke_ns: 5_200_000, ..State::default() };
+            intervals.state(&State { skipped_cycles: 3, ..late }, false);
+            (folder, intervals)
+        };
+        assert_eq!(only("controller wake-up", states().1), (2, 200_000));
+        assert_eq!(only("controller wake-up corrected", states().1), (5, 3_200_000));
     }
 }

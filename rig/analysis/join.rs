@@ -34,9 +34,50 @@ impl<T: Copy> ByCycle<T> {
     }
 }
 
+/// Joins two messages of a cycle when the second of them comes, whichever that is.
+#[derive(Debug)]
+pub(super) struct Join<A, B> {
+    lefts: ByCycle<A>,
+    rights: ByCycle<B>,
+}
+
+impl<A: Copy, B: Copy> Default for Join<A, B> {
+    fn default() -> Self {
+        Self { lefts: ByCycle::default(), rights: ByCycle::default() }
+    }
+}
+
+impl<A: Copy, B: Copy> Join<A, B> {
+    /// Both, if the other one is here already.
+    pub(super) fn left(&mut self, cycle: u64, left: A) -> Option<(A, B)> {
+        let right = self.rights.take(cycle);
+        if right.is_none() {
+            self.lefts.insert(cycle, left);
+        }
+        Some((left, right?))
+    }
+
+    /// As [`Self::left`], from the other side.
+    pub(super) fn right(&mut self, cycle: u64, right: B) -> Option<(A, B)> {
+        let left = self.lefts.take(cycle);
+        if left.is_none() {
+            self.rights.insert(cycle, right);
+        }
+        Some((left?, right))
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn two_messages_of_a_cycle_are_joined_once_in_either_order() {
+        let mut join = Join::default();
+        assert_eq!((join.left(1, 'a'), join.right(2, 'B')), (None, None));
+        assert_eq!((join.right(1, 'A'), join.left(2, 'b')), (Some(('a', 'A')), Some(('b', 'B'))));
+        assert_eq!((join.right(1, 'A'), join.left(2, 'b')), (None, None));
+    }
 
     #[test]
     fn values_are_found_by_their_own_cycle_only() {

@@ -4,8 +4,8 @@
 use masseter_shared::messages::{Command, Machine, Reading, State};
 use serde::Serialize;
 
-use super::intervals::IntervalFigures;
 use super::join::ByCycle;
+use super::measured::IntervalFigures;
 
 /// Cycles told of.
 const WORST: usize = 10;
@@ -128,10 +128,11 @@ impl Ledger {
         }
     }
 
-    pub(super) fn state(&mut self, state: &State) {
+    /// `is_fresh`: the state's reading is used for the first time.
+    pub(super) fn state(&mut self, state: &State, is_fresh: bool) {
         let stalled_ns = state.stalled_ns.saturating_sub(self.controller_stalled_ns);
         self.controller_stalled_ns = state.stalled_ns;
-        if state.reading_cycle == state.cycle {
+        if is_fresh {
             let times = [state.due_ns, state.woke_ns, state.received_ns, state.solved_ns, state.commanded_ns];
             self.add(state.cycle, |parts| parts.state = Some((state.reading_cycle, times, stalled_ns)));
         }
@@ -252,7 +253,7 @@ mod tests {
             command_sent_ns: commanded_ns + command_transport + to_wire,
             ..Default::default()
         });
-        ledger.state(&State {
+        let state = State {
             cycle,
             reading_cycle: cycle,
             due_ns: received_ns,
@@ -261,7 +262,8 @@ mod tests {
             solved_ns: received_ns + solving,
             commanded_ns,
             ..Default::default()
-        });
+        };
+        ledger.state(&state, true);
     }
 
     #[test]
@@ -306,5 +308,18 @@ mod tests {
         };
         assert_eq!((worst[0].around, worst[1].around), (around(3_000_000, 2), around(0, 0)));
         assert!(worst.windows(2).all(|pair| pair[0].total_ns >= pair[1].total_ns));
+    }
+
+    #[test]
+    fn a_cycle_that_used_a_late_reading_is_among_the_longest() {
+        let mut ledger = Ledger::default();
+        let late = Reading { cycle: 7, due_ns: 7_000_000, complete_ns: 7_900_000, ..Default::default() };
+        ledger.reading(&late);
+        ledger.state(&State { cycle: 8, reading_cycle: 7, ..Default::default() }, true);
+        ledger.command(&Command { cycle: 8, ..Default::default() });
+        let (answers_cycle, command_sent_ns) = (8, 8_900_000);
+        ledger.reading(&Reading { cycle: 9, answers_cycle, command_sent_ns, ..Default::default() });
+        let worst = ledger.finish(&[]);
+        assert_eq!((worst[0].cycle, worst[0].due_ns, worst[0].total_ns), (8, 7_000_000, 1_900_000));
     }
 }

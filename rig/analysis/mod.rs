@@ -6,9 +6,11 @@
 mod blame;
 mod events;
 mod exports;
+mod freshness;
 mod intervals;
 mod join;
 mod ledger;
+mod measured;
 mod noise;
 mod outage;
 mod over_time;
@@ -31,10 +33,12 @@ pub use blame::Suspicion;
 use events::EventLog;
 pub use events::EventRecord;
 pub(crate) use exports::CandumpLogs;
-pub use intervals::IntervalFigures;
+use freshness::Freshness;
+pub use freshness::ReadingFigures;
 use intervals::Intervals;
 use ledger::Ledger;
 pub use ledger::{Around, WorstCycle};
+pub use measured::IntervalFigures;
 pub use outage::Outage;
 use outage::OutageWatch;
 use over_time::Watch;
@@ -79,6 +83,8 @@ pub struct Figures {
     pub controller_skips: SkipFigures,
     /// Deadlines that the plant skipped after overruns.
     pub plant_skips: SkipFigures,
+    /// Which readings the controller's cycles used.
+    pub readings: ReadingFigures,
     /// Stretches of work that cost deadlines, beside the machine's known stalls; none without any.
     pub suspicion: Option<Suspicion>,
     /// Where the controller's sequence ended; none without a single state message.
@@ -158,6 +164,7 @@ struct Pass {
     watch: Watch,
     responses: Responses,
     cycles: u64,
+    freshness: Freshness,
     first_sample_ns: Option<u64>,
     last_sample_ns: u64,
     controller_skips: Skips,
@@ -172,7 +179,7 @@ impl Pass {
         let reference = if scenario.can.is_virtual() { Reference::Truth } else { Reference::Estimate };
         Ok(Self {
             period_ns: scenario.period_ns(),
-            intervals: Intervals::new(&folder.histograms())?,
+            intervals: Intervals::new(&folder.histograms(), scenario.period_ns())?,
             ledger: Ledger::default(),
             tracking: Tracking::against(reference),
             sequence: SequenceCheck::default(),
@@ -181,6 +188,7 @@ impl Pass {
             watch: Watch::on(scenario.can.rates().ok()),
             responses: Responses::on(&scenario.can, scenario.period_ns()),
             cycles: 0,
+            freshness: Freshness::default(),
             first_sample_ns: None,
             last_sample_ns: 0,
             controller_skips: Skips::default(),
@@ -222,11 +230,14 @@ impl Pass {
     }
 
     fn state(&mut self, state: &State) {
-        self.intervals.state(state);
-        self.ledger.state(state);
+        let is_fresh = self.freshness.take(state);
+        self.intervals.state(state, is_fresh);
+        self.ledger.state(state, is_fresh);
         self.watch.state(state);
         self.outage.state(state);
-        self.tracking.state(state);
+        if is_fresh {
+            self.tracking.solution(state);
+        }
         self.cycles += 1;
         self.controller_skips.take(&Counters::from(state), self.period_ns);
         self.final_state = ControllerState::try_from(state.controller_state).ok().map(ControllerState::name);
@@ -251,13 +262,15 @@ impl Pass {
     fn finish(self, reader: &Reader) -> Result<Figures, AnalysisError> {
         let (tracking, track) = self.tracking.finish();
         let intervals = self.intervals.finish()?;
-        let duration_ns = self.last_sample_ns - self.first_sample_ns.unwrap_or(self.last_sample_ns);
+        let duration_ns =
+            self.last_sample_ns.saturating_sub(self.first_sample_ns.unwrap_or(self.last_sample_ns));
         Ok(Figures {
             cycles: self.cycles,
             duration_s: duration_ns as f64 / 1e9,
             suspicion: Suspicion::of(&[&self.controller_skips, &self.plant_skips]),
             controller_skips: self.controller_skips.figures(),
             plant_skips: self.plant_skips.figures(),
+            readings: self.freshness.figures(),
             final_state: self.final_state,
             outage: self.outage.finish(self.period_ns),
             tracking,

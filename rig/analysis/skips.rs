@@ -61,13 +61,28 @@ impl From<&State> for Counters {
     }
 }
 
+/// A stretch of lost time, and what of it has explained no skip yet, ns.
+#[derive(Debug, Clone, Copy, Default)]
+struct Loss {
+    length_ns: u64,
+    unused_ns: u64,
+}
+
+impl Loss {
+    /// What is left of a stretch when `used_ns` have explained skips, first of the stretch before.
+    fn left_of(length_ns: u64, before: Self, used_ns: u64) -> Self {
+        let unused_ns = length_ns.min(before.unused_ns.saturating_add(length_ns).saturating_sub(used_ns));
+        if unused_ns == 0 { Self::default() } else { Self { length_ns, unused_ns } }
+    }
+}
+
 /// Follows the counters of one process.
 #[derive(Debug)]
 pub(super) struct Skips {
     figures: SkipFigures,
-    /// Time lost in the cycle before, ns: a late cycle is skipped after, not before, it was run.
-    recent_stall_ns: u64,
-    recent_overlong_ns: u64,
+    /// Time lost in the cycle before: a late cycle is skipped after, not before, it was run.
+    recent_stall: Loss,
+    recent_overlong: Loss,
     /// How long the machine stood still at a time, ns.
     stalls: Histogram<u64>,
     /// How long the overlong stretches of work were, ns.
@@ -80,8 +95,8 @@ impl Default for Skips {
         let histogram = || Histogram::new(3).expect("three digits are allowed");
         Self {
             figures: SkipFigures::default(),
-            recent_stall_ns: 0,
-            recent_overlong_ns: 0,
+            recent_stall: Loss::default(),
+            recent_overlong: Loss::default(),
             stalls: histogram(),
             overlong: histogram(),
             shortest_costly_ns: None,
@@ -96,8 +111,8 @@ impl Skips {
         let stall_ns = counters.stalled_ns.saturating_sub(past.stalled_ns);
         let overlong_ns = counters.overlong_ns.saturating_sub(past.overlong_ns);
         let skipped = counters.skipped.saturating_sub(past.skipped);
-        let lost_waiting_ns = stall_ns + self.recent_stall_ns;
-        let lost_working_ns = overlong_ns + self.recent_overlong_ns;
+        let lost_waiting_ns = stall_ns.saturating_add(self.recent_stall.unused_ns);
+        let lost_working_ns = overlong_ns.saturating_add(self.recent_overlong.unused_ns);
         let (by_machine, while_working) = if lost_waiting_ns >= lost_working_ns {
             explain(skipped, lost_waiting_ns, lost_working_ns, period_ns)
         } else {
@@ -105,7 +120,7 @@ impl Skips {
             (by_machine, while_working)
         };
         if while_working > 0 {
-            let costly_ns = overlong_ns.max(self.recent_overlong_ns);
+            let costly_ns = overlong_ns.max(self.recent_overlong.length_ns);
             self.shortest_costly_ns =
                 Some(self.shortest_costly_ns.map_or(costly_ns, |shortest| shortest.min(costly_ns)));
         }
@@ -123,7 +138,9 @@ impl Skips {
                 histogram.record(lost_ns).expect("a histogram that resizes itself takes any value");
             }
         }
-        (self.recent_stall_ns, self.recent_overlong_ns) = (stall_ns, overlong_ns);
+        let used_ns = |skips: u64| skips.saturating_mul(period_ns);
+        self.recent_stall = Loss::left_of(stall_ns, self.recent_stall, used_ns(by_machine));
+        self.recent_overlong = Loss::left_of(overlong_ns, self.recent_overlong, used_ns(while_working));
     }
 
     pub(super) fn figures(&self) -> SkipFigures {
@@ -171,7 +188,7 @@ mod tests {
     fn each_skip_has_one_cause() {
         const STALL: u64 = 8_600_000;
         // What is counted message by message; skips by the machine, while working, and all.
-        let cases: [(Messages, [u64; 3]); 7] = [
+        let cases: [(Messages, [u64; 3]); 11] = [
             (&[(0, 0, 0), (0, 0, 0)], [0, 0, 0]),
             // Woken 8.6 ms late; the passed deadlines are skipped after the late cycle.
             (&[(0, 0, 0), (0, STALL, 0), (7, STALL, 0)], [7, 0, 7]),
@@ -183,6 +200,12 @@ mod tests {
             (&[(0, 0, 0), (20, STALL, 0)], [9, 0, 20]),
             // The greater loss explains first.
             (&[(0, 0, 0), (9, 60_000, STALL)], [0, 9, 9]),
+            // One loss explains its skips once, also when more are skipped a cycle later.
+            (&[(0, 0, 0), (3, 3_000_000, 0), (6, 3_000_000, 0)], [3, 0, 6]),
+            (&[(0, 0, 0), (3, 0, 3_000_000), (6, 0, 3_000_000)], [0, 3, 6]),
+            // What has explained none yet still may, and what is lost meanwhile is kept for its own.
+            (&[(0, 0, 0), (2, STALL, 0), (8, STALL, 0)], [8, 0, 8]),
+            (&[(0, STALL, 0), (8, STALL + 3_000_000, 0), (11, STALL + 3_000_000, 0)], [11, 0, 11]),
             // Time lost long ago explains nothing.
             (&[(0, STALL, STALL), (0, STALL, STALL), (0, STALL, STALL), (2, STALL, STALL)], [0, 0, 2]),
         ];
@@ -199,5 +222,8 @@ mod tests {
         assert_eq!(skips.shortest_costly_ns(), Some(2_000_000));
         assert_eq!(skips.as_long_as(2_000_000), (1, 2));
         assert_eq!(skips.as_long_as(1), (2, 3));
+        // What is left of a stretch is not a shorter one.
+        let skips = skips_of(&[(0, 0, 0), (3, 0, 5_000_000), (5, 0, 5_000_000)]);
+        assert_eq!(skips.shortest_costly_ns(), Some(5_000_000));
     }
 }

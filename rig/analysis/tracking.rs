@@ -7,7 +7,7 @@ use masseter_shared::messages::codes::ControllerState;
 use masseter_shared::messages::{State, Truth, pose_of_fields};
 use serde::Serialize;
 
-use super::join::ByCycle;
+use super::join::Join;
 use super::noise::standard_error;
 use super::series::{Extremes, Series, Thinned};
 
@@ -91,9 +91,7 @@ struct Wanted {
 #[derive(Debug, Default)]
 pub(super) struct Tracking {
     reference: Reference,
-    last_reading: u64,
-    wanted: ByCycle<Wanted>,
-    true_poses: ByCycle<(u64, Pose)>,
+    poses: Join<Wanted, (u64, Pose)>,
     distances: Accumulator,
     angles: Accumulator,
     estimates: Accumulator,
@@ -131,12 +129,8 @@ impl Tracking {
         Self { reference, ..Self::default() }
     }
 
-    pub(super) fn state(&mut self, state: &State) {
-        // A repeated reading was compared when it was fresh.
-        if state.reading_cycle <= self.last_reading {
-            return;
-        }
-        self.last_reading = state.reading_cycle;
+    /// The state of a cycle with a fresh reading: one used again was compared when it was fresh.
+    pub(super) fn solution(&mut self, state: &State) {
         let wanted = Wanted {
             desired: pose_of_fields(state.desired_position_m, state.desired_quaternion_wxyz),
             estimated: pose_of_fields(state.estimated_position_m, state.estimated_quaternion_wxyz),
@@ -145,17 +139,15 @@ impl Tracking {
         if self.reference == Reference::Estimate {
             return self.compare(&wanted, (state.sampled_ns, wanted.estimated));
         }
-        match self.true_poses.take(state.reading_cycle) {
-            Some(truth) => self.compare(&wanted, truth),
-            None => self.wanted.insert(state.reading_cycle, wanted),
+        if let Some((wanted, truth)) = self.poses.left(state.reading_cycle, wanted) {
+            self.compare(&wanted, truth);
         }
     }
 
     pub(super) fn truth(&mut self, truth: &Truth) {
         let pose = pose_of_fields(truth.position_m, truth.quaternion_wxyz);
-        match self.wanted.take(truth.cycle) {
-            Some(wanted) => self.compare(&wanted, (truth.sampled_ns, pose)),
-            None => self.true_poses.insert(truth.cycle, (truth.sampled_ns, pose)),
+        if let Some((wanted, truth)) = self.poses.right(truth.cycle, (truth.sampled_ns, pose)) {
+            self.compare(&wanted, truth);
         }
     }
 
@@ -233,7 +225,7 @@ mod tests {
     #[test]
     fn without_truth_the_estimate_takes_its_place() {
         let mut tracking = Tracking::against(Reference::Estimate);
-        tracking.state(&State { estimated_position_m: [0.001, 0.0, 0.0], ..state(1, 0.003) });
+        tracking.solution(&State { estimated_position_m: [0.001, 0.0, 0.0], ..state(1, 0.003) });
         let (figures, track) = tracking.finish();
         assert_eq!((figures.samples, figures.estimate_rms_mm), (1, None));
         assert!((figures.rms_mm - 2.0).abs() < 1e-9);
@@ -243,8 +235,8 @@ mod tests {
     #[test]
     fn poses_are_compared_by_cycle_in_whatever_order_they_come() {
         let mut tracking = Tracking::default();
-        tracking.state(&state(1, 0.003));
-        tracking.state(&state(2, 0.000));
+        tracking.solution(&state(1, 0.003));
+        tracking.solution(&state(2, 0.000));
         tracking.truth(&truth(2, 0.004));
         tracking.truth(&truth(1, 0.000));
         tracking.truth(&truth(3, 9.000));

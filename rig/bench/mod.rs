@@ -23,7 +23,7 @@ use serde::Serialize;
 
 use crate::cli::Format;
 use crate::exit::{Exit, Failure};
-use crate::report::show;
+use crate::say::show;
 use contest::Outcome;
 
 /// Version of the result's form.

@@ -69,7 +69,7 @@ pub(super) fn motion(figures: &Figures) -> [Option<Drawn>; 2] {
         let points = samples.iter().map(|sample| {
             let pose = if wanted { &sample.desired } else { &sample.found };
             let moved_m = pose.translation.vector[coordinate] - first.desired.translation.vector[coordinate];
-            ((sample.sampled_ns - first.sampled_ns) as f64 / 1e9, moved_m * 1e3)
+            (sample.sampled_ns.saturating_sub(first.sampled_ns) as f64 / 1e9, moved_m * 1e3)
         });
         Line {
             name: format!("{name} {}", if wanted { "wanted" } else { reference }),

@@ -2,10 +2,11 @@
 //!
 //! What the checks come to is the [verdict](super::verdict)'s.
 
+use masseter_shared::messages::codes::Cause;
 use serde::Serialize;
 
 use super::table;
-use crate::analysis::{BusResponse, Figures, ResponseFigures, Suspicion};
+use crate::analysis::{BusResponse, EventRecord, Figures, ResponseFigures, Suspicion};
 use crate::run::manifest::Manifest;
 
 /// Whether what was checked is as it should be.
@@ -72,8 +73,7 @@ pub(super) fn checks(manifest: &Manifest, figures: &Figures, is_disturbed: bool)
     let missing = figures.missing_messages();
     let state = figures.final_state.unwrap_or("none");
     vec![
-        Check::judged("sequence", format!("ended in state {state}"), state == "finished")
-            .unless(is_disturbed),
+        sequence(state, &figures.events).unless(is_disturbed),
         Check::judged(
             "tracking",
             format!(
@@ -95,6 +95,13 @@ pub(super) fn checks(manifest: &Manifest, figures: &Figures, is_disturbed: bool)
         Check::judged("dropped messages", missing.to_string(), missing == 0),
         bus_response(&figures.bus_response, !manifest.scenario.faults.is_empty()),
     ]
+}
+
+/// The motion must be played to its end, and not be broken off by somebody who asked the controller to stop.
+fn sequence(state: &str, events: &[EventRecord]) -> Check {
+    let was_stopped = events.iter().any(|event| event.cause == Cause::StopRequested.name());
+    let how = if was_stopped { ", asked to stop before the motion's end" } else { "" };
+    Check::judged("sequence", format!("ended in state {state}{how}"), state == "finished" && !was_stopped)
 }
 
 /// No message may take longer on its bus than the plan allows at worst.
@@ -120,12 +127,12 @@ fn bus_response(response: &BusResponse, has_faults: bool) -> Check {
     }
 }
 
-/// Whether too many cycles were missed. When none of them is certainly the rig's doing, there is nothing to judge
-/// it by.
+/// Whether too many cycles were missed. When none of them is certainly the rig's doing, or it was not given the cores
+/// that it asked for, there is nothing to judge it by.
 pub(super) fn missed_cycles(manifest: &Manifest, figures: &Figures) -> CheckResult {
     if figures.skipped().0 <= manifest.scenario.checks.missed_cycles {
         CheckResult::Passed
-    } else if figures.only_the_machine() {
+    } else if figures.only_the_machine() || manifest.refusal().is_some() {
         CheckResult::NotJudged
     } else {
         CheckResult::Failed

@@ -14,8 +14,8 @@ use serde_json::Value;
 
 use crate::cli::Format;
 use crate::exit::{Exit, Failure};
-use crate::report::show;
 use crate::run::folder::RunFolder;
+use crate::say::show;
 
 /// A change beyond this many standard errors of the difference is none of chance's.
 const BEYOND: f64 = 3.0;

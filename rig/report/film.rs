@@ -33,7 +33,7 @@ pub(super) fn of_track(scenario: &Scenario, track: &Track) -> Option<String> {
     let mechanism = Mechanism::new(&scenario.mechanism).ok()?;
     let first = track.samples.first()?;
     let frames = track.samples.iter().map(|sample| {
-        let mut frame = vec![rounded((sample.sampled_ns - first.sampled_ns) as f64 / 1e9)];
+        let mut frame = vec![rounded(sample.sampled_ns.saturating_sub(first.sampled_ns) as f64 / 1e9)];
         for pose in [&sample.found, &sample.estimated, &sample.desired] {
             frame.extend(numbers(pose));
         }

@@ -136,11 +136,14 @@ fn latencies(page: &mut String, manifest: &Manifest, figures: &Figures) -> std::
     writeln!(
         page,
         "</table>\n<p>Skipped cycles: controller {}, plant {}; machine stood still: {:.2} ms of the controller's, {:.2} ms of the plant's waiting. \
-         p99.9 stands only where there are 10,000 samples. No series is corrected for coordinated omission.</p>",
+         Controller's {}.</p>\n\
+         <p>p99.9 stands only where there are 10,000 samples. A skipped deadline has no sample, but in the two wake-ups \
+         named corrected (for coordinated omission): there it counts with the time until the wake-up that skipped it.</p>",
         figures.controller_skips.skipped,
         figures.plant_skips.skipped,
         figures.controller_skips.stalled_ns as f64 / 1e6,
-        figures.plant_skips.stalled_ns as f64 / 1e6
+        figures.plant_skips.stalled_ns as f64 / 1e6,
+        table::readings(&figures.readings),
     )?;
     plot(page, "percentiles", charts::percentiles(&manifest.scenario, figures), "No interval was measured.")?;
     plot(page, "jitter", charts::jitter(figures), "Under virtual time nobody is late.")
@@ -221,19 +224,19 @@ fn happenings(page: &mut String, figures: &Figures) -> std::fmt::Result {
 
 fn circumstances(page: &mut String, manifest: &Manifest) -> std::fmt::Result {
     let machine = &manifest.machine;
+    let clock = escape(&manifest.clock);
     writeln!(
         page,
-        "<h2 id=\"circumstances\">Circumstances</h2>\n<p>{} UTC, masseter {}, {} clock. {}, {} cores, {}.</p>\n\
-         <p>The same run again: <code>masseter run scenario.toml --clock {}</code> with the scenario of this folder.</p>",
+        "<h2 id=\"circumstances\">Circumstances</h2>\n<p>{} UTC, masseter {}, {clock} clock. {}, {} cores, {}.</p>\n\
+         <p>The same run again: <code>masseter run scenario.toml --clock {clock}</code> with the scenario of this folder.</p>",
         escape(manifest.began.trim_end_matches('Z')),
         escape(&manifest.masseter),
-        manifest.clock,
         escape(&machine.cpu),
         machine.cores,
         escape(&machine.kernel),
-        manifest.clock,
     )?;
     for (name, obtained) in &manifest.scheduling {
+        let name = escape(name);
         let core = obtained.core.map_or_else(|| "any core".to_owned(), |core| format!("core {core}"));
         let policy = obtained
             .fifo_priority

@@ -15,7 +15,6 @@ mod usage;
 pub mod verdict;
 
 use std::fs;
-use std::io::{self, Write};
 use std::path::Path;
 
 use anyhow::Context;
@@ -26,6 +25,7 @@ use crate::cli::Format;
 use crate::exit::{Exit, Failure};
 use crate::run::folder::RunFolder;
 use crate::run::manifest::Manifest;
+use crate::say::show;
 use verdict::Verdict;
 
 /// Version of the summary's form.
@@ -45,11 +45,6 @@ pub(crate) fn again(path: &Path, format: Format) -> Result<Exit, Failure> {
     let manifest = Manifest::read(&folder).context("cannot read manifest.json")?;
     let figures = analysis::analyse(&folder, &manifest.scenario)?;
     write(&folder, &manifest, &figures, format)
-}
-
-/// Writes to standard output. A reader that has had enough is no fault of the run.
-pub(crate) fn show(text: &str) {
-    let _ = io::stdout().write_all(text.as_bytes());
 }
 
 /// Judges the run, writes the report's files and prints the result.

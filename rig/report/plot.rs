@@ -103,8 +103,9 @@ impl Chart {
         Self { x_label: "time, s", x: Scale::Linear, y_label, y: Scale::Linear, lines, limits }
     }
 
-    /// Draws it; none without a single point.
+    /// Draws it; none without a single point, or where points are too far apart for numbers to tell.
     pub(super) fn draw(mut self) -> Option<Drawn> {
+        self.keep_finite_points();
         let mut frame = self.frame()?;
         let (near, beyond) = std::mem::take(&mut self.limits).into_iter().partition(|limit| {
             let far = FAR * (frame.high - frame.low);
@@ -117,11 +118,24 @@ impl Chart {
             frame.high = frame.high.max(place);
         }
         frame.right += LEGEND * (frame.right - frame.left);
-        let margin = ((frame.high - frame.low) * 0.05).max(1e-6);
+        // Labels need steps that make a difference to the largest number.
+        let least = frame.low.abs().max(frame.high.abs()) * 1e-9;
+        let margin = ((frame.high - frame.low) * 0.05).max(1e-6).max(least);
         frame.low -= margin;
         frame.high += margin;
+        if !(frame.high - frame.low).is_finite() {
+            return None;
+        }
         let svg = self.svg(&frame).ok()?;
         Some(Drawn { svg, beyond })
+    }
+
+    /// A recording may hold any numbers, and no axis reaches to those that are none.
+    fn keep_finite_points(&mut self) {
+        let (x, y) = (self.x, self.y);
+        for line in &mut self.lines {
+            line.points.retain(|point| x.place(point.0).is_finite() && y.place(point.1).is_finite());
+        }
     }
 
     fn frame(&self) -> Option<Frame> {
@@ -205,6 +219,24 @@ mod tests {
     #[test]
     fn nothing_makes_no_plot() {
         assert!(Chart::over_time("y", Vec::new(), Vec::new()).draw().is_none());
+    }
+
+    #[test]
+    fn no_number_of_a_recording_draws_for_ever() {
+        let draw = |values: [f64; 2]| {
+            let points = vec![(0.0, 1.0), (1.0, values[0]), (2.0, values[1]), (3.0, 2.0)];
+            let limit = Limit { name: "limit".to_owned(), values: vec![1.0] };
+            let line = Line { name: "a".to_owned(), points };
+            Chart::over_time("y", vec![line], vec![limit]).draw()
+        };
+        assert!(draw([f64::INFINITY, f64::NAN]).is_some());
+        assert!(draw([1e307, -1e307]).is_some());
+        assert!(draw([1e308, -1e308]).is_none());
+        let far = |value| vec![(0.0, value), (1.0, value)];
+        for points in [far(1e17), far(1e300), vec![(0.0, 1e300), (1.0, 1e300_f64.next_up())]] {
+            let line = Line { name: "a".to_owned(), points };
+            assert!(Chart::over_time("y", vec![line], Vec::new()).draw().is_some());
+        }
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use super::usage;
-use crate::analysis::{BusResponse, EventRecord, Figures, IntervalFigures, ResponseFigures};
+use crate::analysis::{BusResponse, EventRecord, Figures, IntervalFigures, ReadingFigures, ResponseFigures};
 use crate::report::verdict::Verdict;
 use crate::run::manifest::Manifest;
 
@@ -63,6 +63,7 @@ fn write_all(
         figures.controller_skips.stalled_ns as f64 / 1e6,
         figures.plant_skips.stalled_ns as f64 / 1e6
     )?;
+    writeln!(text, "{}", readings(&figures.readings))?;
     usage::line(text, &manifest.usage)?;
     losses(text, figures)?;
     events(text, figures)
@@ -71,13 +72,13 @@ fn write_all(
 fn latencies(text: &mut String, intervals: &[IntervalFigures]) -> std::fmt::Result {
     writeln!(
         text,
-        "{:<20} {:>8} {:>10} {:>10} {:>10} {:>10}",
+        "{:<28} {:>8} {:>10} {:>10} {:>10} {:>10}",
         "interval, µs", "n", "p50", "p99", "p99.9", "max"
     )?;
     for interval in intervals {
         writeln!(
             text,
-            "{:<20} {:>8} {:>10} {:>10} {:>10} {:>10}",
+            "{:<28} {:>8} {:>10} {:>10} {:>10} {:>10}",
             interval.name,
             interval.n,
             microseconds(interval.p50_ns),
@@ -87,6 +88,14 @@ fn latencies(text: &mut String, intervals: &[IntervalFigures]) -> std::fmt::Resu
         )?;
     }
     Ok(())
+}
+
+/// Which readings the controller's cycles used.
+pub(super) fn readings(readings: &ReadingFigures) -> String {
+    let ReadingFigures { in_time, late, none, before_first } = readings;
+    format!(
+        "cycles by their reading: {in_time} in time, {late} late, {none} without a fresh one, {before_first} before the first"
+    )
 }
 
 /// Of each kind of message the one that used most of its bound, or took longest where it has none.

@@ -2,6 +2,7 @@
 
 use std::fmt::Write;
 
+use super::junit::escape;
 use crate::run::usage::{RunUsage, Usage};
 
 /// A line for the terminal; nothing under virtual time, which has no processes.
@@ -28,7 +29,7 @@ pub(super) fn table(page: &mut String, usage: &RunUsage) -> std::fmt::Result {
     );
     for (name, usage) in &usage.processes {
         let Usage { voluntary_switches, involuntary_switches, minor_faults, major_faults, .. } = usage;
-        let share = share(usage) * 100.0;
+        let (name, share) = (escape(name), share(usage) * 100.0);
         writeln!(
             page,
             "<tr><td>{name}<td>{share:.1}<td>{voluntary_switches}<td>{involuntary_switches}<td>{minor_faults}\

@@ -62,7 +62,7 @@ impl Verdict {
             .filter(|(exit, ..)| !(*exit == Exit::SafeStop && disturbed.is_some()))
             .or_else(|| incomplete(figures))
             .or(disturbed)
-            .or_else(|| failed(&checks))
+            .or_else(|| failed(&checks).map(|failure| clock_jump(&manifest.usage).unwrap_or(failure)))
             .unwrap_or_else(|| (Exit::Passed, "PASS", "every check passed".to_owned()));
         if exit != Exit::Passed {
             reason += &overload(&manifest.usage, manifest.scenario.rate_hz).unwrap_or_default();
@@ -99,9 +99,7 @@ fn ending(ending: &Ending) -> Option<Judgement> {
             "SAFE STOP",
             "the controller stopped the rig; its event says why".to_owned(),
         )),
-        Ending::Died { process, how } => {
-            Some((Exit::Died, "DIED", format!("the {process} died: {how}; the others stopped safely")))
-        }
+        Ending::Died { process, how } => Some((Exit::Died, "DIED", format!("the {process} died: {how}"))),
         Ending::Interrupted => Some((Exit::Interrupted, "INTERRUPTED", "stopped by the user".to_owned())),
         Ending::NotStarted => {
             Some((Exit::Invalid, "INVALID", "real time was required and refused".to_owned()))
@@ -126,28 +124,49 @@ fn incomplete(figures: &Figures) -> Option<Judgement> {
     Some((Exit::Incomplete, "INCOMPLETE", reason))
 }
 
-/// Whether the machine kept the rig from too many cycles to judge it. A safe stop is excused only when many of them
-/// were missed just before it, and is so however many may be missed.
+/// Whether the machine kept the rig from too many cycles to judge it, or never granted it real time. A safe stop is
+/// excused only when many of them were missed just before it, and is so however many may be missed.
 fn disturbed(manifest: &Manifest, figures: &Figures) -> Option<Judgement> {
+    let refusal = manifest.refusal();
     let stop = excuse(
         &manifest.ending,
         missed_cycles(manifest, figures),
         figures.outage,
-        figures.only_the_machine(),
+        figures.only_the_machine() || refusal.is_some(),
     )?;
     let (skipped, _) = figures.skipped();
+    let reason = if let Some((process, refusal)) = refusal {
+        format!("{skipped} cycles were missed without real time{stop}; {process}: {refusal}")
+    } else {
+        format!("{}{stop}; {}", standstill(figures), remedy(manifest))
+    };
+    Some((Exit::Invalid, "INVALID", reason))
+}
+
+/// What the machine did to the rig.
+fn standstill(figures: &Figures) -> String {
     let (controller, plant) = (&figures.controller_skips, &figures.plant_skips);
     let stalled_ms = (controller.stalled_ns + plant.stalled_ns) as f64 / 1e6;
+    let (skipped, _) = figures.skipped();
     let while_working = match controller.while_working + plant.while_working {
         0 => String::new(),
         n => format!(", {n} of them while it worked, which the machine may as well have done"),
     };
-    let reason = format!(
+    format!(
         "the machine stood still for {stalled_ms:.1} ms while the rig waited, and {skipped} cycles were \
-         missed{while_working}{stop}; {}",
-        remedy(manifest)
-    );
-    Some((Exit::Invalid, "INVALID", reason))
+         missed{while_working}"
+    )
+}
+
+/// Stamps of the wall clock, as real interfaces give them, tell nothing once it was set.
+fn clock_jump(usage: &RunUsage) -> Option<Judgement> {
+    let jump_s = usage.clock_jump_s;
+    (jump_s != 0.0).then(|| {
+        let reason = format!(
+            "the wall clock jumped by {jump_s:.3} s, as it does when it is set or the machine was suspended; repeat the run"
+        );
+        (Exit::Invalid, "INVALID", reason)
+    })
 }
 
 /// What may keep the machine from standing still.
@@ -166,10 +185,10 @@ fn excuse(
     ending: &Ending,
     missed: CheckResult,
     outage: Option<Outage>,
-    only_the_machine: bool,
+    is_excusable: bool,
 ) -> Option<String> {
     match (ending, outage) {
-        (Ending::SafeStop, Some(outage)) if only_the_machine && outage.explains_the_stop() => {
+        (Ending::SafeStop, Some(outage)) if is_excusable && outage.explains_the_stop() => {
             Some(format!(", {} of {} just before the safe stop", outage.missed, outage.of))
         }
         (Ending::SafeStop, _) => None,
@@ -200,6 +219,15 @@ mod tests {
     }
 
     #[test]
+    fn a_jump_of_the_clock_is_told_and_none_is_not() {
+        let jump = |clock_jump_s| clock_jump(&RunUsage { clock_jump_s, ..RunUsage::default() });
+        assert_eq!(jump(0.0), None);
+        let (exit, word, reason) = jump(-3.5).unwrap();
+        assert_eq!((exit, word), (Exit::Invalid, "INVALID"));
+        assert!(reason.contains("jumped by -3.500 s"), "{reason}");
+    }
+
+    #[test]
     fn what_the_machine_did_excuses_missed_cycles_and_a_safe_stop_that_follows_them() {
         use CheckResult::{Failed, NotJudged, Passed};
         use Ending::{Completed, SafeStop};
@@ -217,9 +245,9 @@ mod tests {
             (SafeStop, NotJudged, short, true, None),
             (SafeStop, NotJudged, None, true, None),
         ];
-        for (ending, missed, outage, only_the_machine, expected) in cases {
-            let excuse = excuse(&ending, missed, outage, only_the_machine);
-            assert_eq!(excuse.as_deref(), expected, "{ending:?} {missed:?} {outage:?} {only_the_machine}");
+        for (ending, missed, outage, is_excusable, expected) in cases {
+            let excuse = excuse(&ending, missed, outage, is_excusable);
+            assert_eq!(excuse.as_deref(), expected, "{ending:?} {missed:?} {outage:?} {is_excusable}");
         }
     }
 }
