@@ -5,6 +5,9 @@
 //! ([`run::virtual_time`]). Whatever a run tells of itself comes from its recording
 //! ([`analysis`]), so it can be told again.
 
+// What fails to be said must not end a run: see `say`.
+#![warn(clippy::print_stdout, clippy::print_stderr)]
+
 #[macro_use]
 mod say;
 

@@ -1,5 +1,6 @@
 //! Contenders taking turns, and the ratios between them.
 
+use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::BufWriter;
 use std::path::Path;
@@ -9,6 +10,8 @@ use hdrhistogram::Histogram;
 use hdrhistogram::serialization::V2DeflateSerializer;
 use hdrhistogram::serialization::interval_log::IntervalLogWriterBuilder;
 use serde::Serialize;
+
+use super::disturbance::{Disturbance, Watch};
 
 /// Below this many samples a round, its 99.9th percentile rests on fewer than ten of them.
 const SAMPLES_FOR_P999: u64 = 10_000;
@@ -26,15 +29,32 @@ pub(super) fn record(durations: &mut Durations, taken_ns: u64, count: u64) {
     durations.record_n(taken_ns, count).expect("a histogram that resizes itself takes any value");
 }
 
-/// One round of a contender.
-pub(super) type Turn<'a> = Box<dyn FnMut() -> anyhow::Result<Durations> + 'a>;
+/// What a round of a contender gave.
+#[derive(Debug)]
+pub(super) struct Round {
+    pub(super) durations: Durations,
+    /// What else it tells: names and shares, %.
+    pub(super) shares: Vec<(String, f64)>,
+}
+
+impl From<Durations> for Round {
+    fn from(durations: Durations) -> Self {
+        Self { durations, shares: Vec::new() }
+    }
+}
+
+/// Plays a round of a contender.
+pub(super) type Turn<'a> = Box<dyn FnMut() -> anyhow::Result<Round> + 'a>;
 
 /// A contender with what its rounds gave.
 #[derive(Debug, Serialize)]
 pub(super) struct Contender {
     pub(super) name: String,
+    /// Every round; none in place of those that do not count.
     #[serde(skip)]
-    pub(super) rounds: Vec<Durations>,
+    pub(super) rounds: Vec<Option<Durations>>,
+    /// Rounds that count.
+    pub(super) n: usize,
     /// Every figure, round by round.
     pub(super) figures: Vec<Figure>,
     /// What else the rounds tell.
@@ -48,12 +68,6 @@ pub(super) struct Share {
     pub(super) name: String,
     #[serde(flatten)]
     pub(super) percent: Spread,
-}
-
-impl Share {
-    pub(super) fn of(name: String, percent: Vec<f64>) -> Self {
-        Self { name, percent: Spread::of(percent) }
-    }
 }
 
 /// A figure of a contender.
@@ -91,6 +105,8 @@ impl Spread {
 pub(super) struct Ratio {
     pub(super) of: String,
     pub(super) to: String,
+    /// Rounds that count for both.
+    pub(super) n: usize,
     pub(super) figures: Vec<Figure>,
 }
 
@@ -103,6 +119,28 @@ pub(super) struct Outcome {
     pub(super) contenders: Vec<Contender>,
     pub(super) ratios: Vec<Ratio>,
     pub(super) notes: Vec<String>,
+    #[serde(flatten)]
+    pub(super) disturbance: Disturbance,
+}
+
+/// Plays every round of so many contenders, each beginning with another one, and watches the machine from a core.
+/// The results lie by contender.
+pub(super) fn take_turns<T>(
+    rounds: u32,
+    contenders: usize,
+    core: usize,
+    mut play: impl FnMut(usize) -> anyhow::Result<T>,
+) -> anyhow::Result<(Vec<Vec<T>>, Disturbance)> {
+    let mut results: Vec<Vec<T>> = (0..contenders).map(|_| Vec::new()).collect();
+    let mut watch = Watch::begin(core);
+    for round in 0..rounds as usize {
+        for turn in 0..contenders {
+            let index = (round + turn) % contenders;
+            watch.look();
+            results[index].push(play(index)?);
+        }
+    }
+    Ok((results, watch.end()))
 }
 
 type Percentile = (&'static str, fn(&Durations) -> f64);
@@ -113,23 +151,21 @@ const P999: Percentile = ("p99.9", |round| round.value_at_quantile(0.999) as f64
 const MAX: Percentile = ("max", |round| round.max() as f64);
 
 impl Outcome {
-    /// Lets the contenders take turns; each round begins with another one.
+    /// Lets the contenders take turns.
     pub(super) fn of_turns(
         bench: &'static str,
         measures: String,
         rounds: u32,
+        core: usize,
         mut turns: Vec<(String, Turn)>,
     ) -> anyhow::Result<Self> {
-        let mut results: Vec<Vec<Durations>> = turns.iter().map(|_| Vec::new()).collect();
-        for round in 0..rounds as usize {
-            for turn in 0..turns.len() {
-                let index = (round + turn) % turns.len();
-                results[index].push(turns[index].1()?);
-            }
-        }
+        let (results, disturbance) = take_turns(rounds, turns.len(), core, |index| turns[index].1())?;
         let names = turns.into_iter().map(|(name, _)| name);
-        let contenders = names.zip(results).map(|(name, rounds)| Contender::of(name, rounds)).collect();
-        Ok(Self { bench, measures, contenders, ratios: Vec::new(), notes: Vec::new() })
+        let contenders = names
+            .zip(results)
+            .map(|(name, rounds)| Contender::of(name, rounds.into_iter().map(Some).collect()))
+            .collect();
+        Ok(Self { bench, measures, contenders, ratios: Vec::new(), notes: Vec::new(), disturbance })
     }
 
     /// Compares each of the contenders `of` with each of `to`, by their places.
@@ -153,27 +189,56 @@ impl Outcome {
 }
 
 impl Contender {
-    pub(super) fn of(name: String, rounds: Vec<Durations>) -> Self {
-        let fewest = rounds.iter().map(Durations::len).min().unwrap_or(0);
+    /// Of its rounds; one without a duration does not count.
+    pub(super) fn of(name: String, rounds: Vec<Option<Round>>) -> Self {
+        let mut percents: BTreeMap<String, Vec<f64>> = BTreeMap::new();
+        let mut counted = |round: Round| {
+            for (share, percent) in round.shares {
+                percents.entry(share).or_default().push(percent);
+            }
+            round.durations
+        };
+        let has_durations = |round: &Round| !round.durations.is_empty();
+        let rounds: Vec<_> =
+            rounds.into_iter().map(|round| round.filter(has_durations).map(&mut counted)).collect();
+        let shares = percents.into_iter().map(|(name, percent)| Share { name, percent: Spread::of(percent) });
+        let shares = shares.collect();
+        let count = || rounds.iter().flatten();
+        let fewest = count().map(Durations::len).min().unwrap_or(0);
         let percentiles = [Some(P50), Some(P99), (fewest >= SAMPLES_FOR_P999).then_some(P999), Some(MAX)];
-        let figure =
-            |(name, of): Percentile| Figure { name, spread: Spread::of(rounds.iter().map(of).collect()) };
-        let figures = percentiles.into_iter().flatten().map(figure).collect();
-        Self { name, rounds, figures, shares: Vec::new() }
+        let figure = |(name, of): Percentile| Figure { name, spread: Spread::of(count().map(of).collect()) };
+        let figures = match count().count() {
+            0 => Vec::new(),
+            _ => percentiles.into_iter().flatten().map(figure).collect(),
+        };
+        Self { name, n: count().count(), rounds, figures, shares }
     }
 
-    /// This one's percentiles over another's; maxima are the machine's and not compared.
+    /// The median of a figure over the rounds.
+    pub(super) fn median(&self, figure: &str) -> Option<f64> {
+        self.figures.iter().find(|found| found.name == figure).map(|found| found.spread.median)
+    }
+
+    /// This one's percentiles over another's, in the rounds that count for both; maxima are the machine's and not
+    /// compared.
     fn over(&self, other: &Self) -> Ratio {
+        let both = || {
+            let pairs = self.rounds.iter().zip(&other.rounds);
+            pairs.filter_map(|(mine, its)| Some((mine.as_ref()?, its.as_ref()?)))
+        };
         let compared = [P50, P99, P999].into_iter().filter(|(name, _)| {
-            [self, other].iter().all(|side| side.figures.iter().any(|figure| figure.name == *name))
+            both().count() > 0 && [self, other].iter().all(|side| side.median(name).is_some())
         });
         let figure = |(name, of): Percentile| Figure {
             name,
-            spread: Spread::of(
-                self.rounds.iter().zip(&other.rounds).map(|(mine, its)| of(mine) / of(its)).collect(),
-            ),
+            spread: Spread::of(both().map(|(mine, its)| of(mine) / of(its)).collect()),
         };
-        Ratio { of: self.name.clone(), to: other.name.clone(), figures: compared.map(figure).collect() }
+        Ratio {
+            of: self.name.clone(),
+            to: other.name.clone(),
+            n: both().count(),
+            figures: compared.map(figure).collect(),
+        }
     }
 
     fn write_log(&self, bench: &str, folder: &Path) -> std::io::Result<()> {
@@ -185,6 +250,7 @@ impl Contender {
             .with_max_value_divisor(1.0)
             .begin_log_with(&mut file, &mut serializer)?;
         for (index, round) in self.rounds.iter().enumerate() {
+            let Some(round) = round else { continue };
             log.write_histogram(round, Duration::from_secs(index as u64), Duration::from_secs(1), None)
                 .map_err(|error| std::io::Error::other(format!("{error:?}")))?;
         }
@@ -196,10 +262,10 @@ impl Contender {
 mod tests {
     use super::*;
 
-    fn round(value_ns: u64) -> Durations {
+    fn round(value_ns: u64) -> Round {
         let mut round = durations();
         round.record(value_ns).unwrap();
-        round
+        round.into()
     }
 
     #[test]
@@ -216,12 +282,26 @@ mod tests {
             (name.to_owned(), turn)
         };
         let turns = vec![turn("a", 100), turn("b", 400)];
-        let outcome = Outcome::of_turns("x", String::new(), 3, turns).unwrap().comparing(&[(0, 1)]);
+        let outcome = Outcome::of_turns("x", String::new(), 3, 0, turns).unwrap().comparing(&[(0, 1)]);
         assert_eq!(*order.borrow(), ["a", "b", "b", "a", "a", "b"]);
         let [p50, p99] = &outcome.ratios[0].figures[..] else { panic!("{:?}", outcome.ratios) };
         assert_eq!(p50.spread, Spread { median: 0.25, min: 0.25, max: 0.25 });
         assert_eq!(p99.name, "p99");
         assert_eq!(outcome.contenders[0].figures[0].spread, Spread { median: 200.0, min: 100.0, max: 300.0 });
+    }
+
+    #[test]
+    fn rounds_that_do_not_count_neither_improve_a_figure_nor_shift_a_ratio() {
+        let own = [Some(round(100)), None, Some(durations().into()), Some(round(300))];
+        let other = [Some(round(200)), Some(round(1)), Some(round(1)), None];
+        let [own, other] = [own, other].map(|rounds| Contender::of(String::new(), rounds.into()));
+        assert_eq!((own.n, other.n), (2, 3));
+        assert_eq!(own.figures[0].spread, Spread { median: 200.0, min: 100.0, max: 300.0 });
+        let ratio = own.over(&other);
+        assert_eq!(ratio.n, 1);
+        assert_eq!(ratio.figures[0].spread, Spread { median: 0.5, min: 0.5, max: 0.5 });
+        let none = Contender::of(String::new(), vec![None]);
+        assert!(none.figures.is_empty() && none.over(&own).figures.is_empty());
     }
 
     #[test]

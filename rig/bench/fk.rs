@@ -28,7 +28,7 @@ pub(super) fn measure(rounds: u32, core: usize) -> anyhow::Result<Outcome> {
             "warm, certified".to_owned(),
             Box::new(move || {
                 let mut tracker = ForwardTracker::new(mechanism.clone());
-                Ok(on_core(core, || each(inputs, |input| tracker.update(input))))
+                Ok(on_core(core, || each(inputs, |input| tracker.update(input))).into())
             }),
         ),
         (
@@ -41,7 +41,8 @@ pub(super) fn measure(rounds: u32, core: usize) -> anyhow::Result<Outcome> {
                             theta_rad = solution.theta_rad;
                         }
                     })
-                }))
+                })
+                .into())
             }),
         ),
         (
@@ -54,24 +55,28 @@ pub(super) fn measure(rounds: u32, core: usize) -> anyhow::Result<Outcome> {
                             theta_rad = solution.theta_rad;
                         }
                     })
-                }))
+                })
+                .into())
             }),
         ),
         (
             "cold, all solutions".to_owned(),
-            Box::new(move || Ok(on_core(core, || each(inputs, |input| solve_completely(mechanism, input))))),
+            Box::new(move || {
+                Ok(on_core(core, || each(inputs, |input| solve_completely(mechanism, input))).into())
+            }),
         ),
         (
             "cold, Newton from one guess".to_owned(),
             Box::new(move || {
                 Ok(on_core(core, || {
                     each(inputs, |input| solve_newton(mechanism, input, &[1.4; LEGS], options))
-                }))
+                })
+                .into())
             }),
         ),
     ];
     let measures = "one forward solution, inputs of a chewing cycle at 1 kHz".to_owned();
-    Ok(Outcome::of_turns("fk", measures, rounds, turns)?.comparing(&[(0, 1), (0, 2), (3, 4)]))
+    Ok(Outcome::of_turns("fk", measures, rounds, core, turns)?.comparing(&[(0, 1), (0, 2), (3, 4)]))
 }
 
 fn chewing(mechanism: &Mechanism) -> anyhow::Result<Vec<Actuators>> {

@@ -1,13 +1,16 @@
 //! `masseter bench`: what the rig's parts cost, each beside a baseline in the same run.
 //!
 //! Contenders take turns, round by round, because a machine changes its pace from second to second; what
-//! counts is the ratio within a round (`contest`). Nothing is judged here.
+//! counts is the ratio within a round (`contest`). The rig is not judged here, but the machine is: `disturbance`.
 
+mod circumstances;
 mod contest;
+mod disturbance;
 mod fk;
 pub mod ipc;
 mod plot;
 mod rate;
+mod rate_plot;
 mod subscribers;
 mod table;
 mod wake;
@@ -24,6 +27,7 @@ use serde::Serialize;
 use crate::cli::Format;
 use crate::exit::{Exit, Failure};
 use crate::say::show;
+use circumstances::Circumstances;
 use contest::Outcome;
 
 /// Version of the result's form.
@@ -68,53 +72,77 @@ pub struct BenchArgs {
 struct Results {
     form: u32,
     masseter: &'static str,
+    circumstances: Circumstances,
     outcomes: Vec<Outcome>,
 }
 
-/// Measures what was asked for, one after the other.
+/// Measures what was asked for, one after the other; what is done is kept when a later one fails.
 pub(crate) fn run(args: &BenchArgs) -> Result<Exit, Failure> {
-    let mut outcomes = Vec::new();
+    circumstances::check_cores(&args.kinds, args.cores)?;
+    if let Some(folder) = &args.out {
+        fs::create_dir_all(folder).with_context(|| format!("cannot create {}", folder.display()))?;
+    }
+    let mut results = Results {
+        form: FORM,
+        masseter: env!("CARGO_PKG_VERSION"),
+        circumstances: Circumstances::on(args.cores),
+        outcomes: Vec::new(),
+    };
+    let measured = measure_each(args, &mut results);
+    if args.format == Format::Json {
+        show(&results.to_json()?);
+    }
+    measured?;
+    let disturbed = results.outcomes.iter().any(|outcome| outcome.disturbance.disturbed);
+    Ok(if disturbed { Exit::Invalid } else { Exit::Passed })
+}
+
+fn measure_each(args: &BenchArgs, results: &mut Results) -> anyhow::Result<()> {
     for kind in &args.kinds {
-        eprintln!("bench {}: {} rounds …", kind_name(*kind), args.rounds);
-        let outcome = match kind {
-            Kind::Loop => wake::measure(args.rounds, args.cores[0])?,
-            Kind::Ipc => ipc::measure(args.rounds, args.cores)?,
-            Kind::Fk => fk::measure(args.rounds, args.cores[0])?,
-            Kind::Rate => rate::measure(args.rounds, args.cores)?,
-            Kind::Subscribers => subscribers::measure(args.rounds, args.cores[0])?,
-        };
+        let name = kind_name(*kind);
+        tell!("bench {name}: {} rounds …", args.rounds);
+        let outcome = measure(*kind, args).with_context(|| format!("bench {name}"))?;
         if args.format == Format::Human {
             show(&table::of(&outcome));
         }
-        outcomes.push(outcome);
+        results.outcomes.push(outcome);
+        if let Some(folder) = &args.out {
+            results.write(folder).with_context(|| format!("cannot write to {}", folder.display()))?;
+        }
     }
-    let results = Results { form: FORM, masseter: env!("CARGO_PKG_VERSION"), outcomes };
-    let json = serde_json::to_string_pretty(&results).context("cannot write the results")? + "\n";
-    if args.format == Format::Json {
-        show(&json);
+    Ok(())
+}
+
+fn measure(kind: Kind, args: &BenchArgs) -> anyhow::Result<Outcome> {
+    match kind {
+        Kind::Loop => wake::measure(args.rounds, args.cores[0]),
+        Kind::Ipc => ipc::measure(args.rounds, args.cores),
+        Kind::Fk => fk::measure(args.rounds, args.cores[0]),
+        Kind::Rate => rate::measure(args.rounds, args.cores),
+        Kind::Subscribers => subscribers::measure(args.rounds, args.cores[0]),
     }
-    if let Some(folder) = &args.out {
-        write(folder, &json, &results.outcomes)?;
-    }
-    Ok(Exit::Passed)
 }
 
 fn kind_name(kind: Kind) -> String {
     kind.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned())
 }
 
-/// `results.json`, and a log a contender and a plot a bench.
-fn write(folder: &Path, json: &str, outcomes: &[Outcome]) -> anyhow::Result<()> {
-    let failed = || format!("cannot write to {}", folder.display());
-    fs::create_dir_all(folder).with_context(failed)?;
-    fs::write(folder.join("results.json"), json).with_context(failed)?;
-    for outcome in outcomes {
-        outcome.write_logs(folder).with_context(failed)?;
-        if let Some(svg) = plot::of(outcome) {
-            fs::write(folder.join(format!("{}.svg", outcome.bench)), svg).with_context(failed)?;
-        }
+impl Results {
+    fn to_json(&self) -> anyhow::Result<String> {
+        Ok(serde_json::to_string_pretty(self).context("cannot write the results")? + "\n")
     }
-    Ok(())
+
+    /// `results.json`, and of the last bench a log a contender and a plot.
+    fn write(&self, folder: &Path) -> anyhow::Result<()> {
+        fs::write(folder.join("results.json"), self.to_json()?)?;
+        let Some(outcome) = self.outcomes.last() else { return Ok(()) };
+        outcome.write_logs(folder)?;
+        let plot = if outcome.bench == rate::NAME { rate_plot::of(outcome) } else { plot::of(outcome) };
+        if let Some(svg) = plot {
+            fs::write(folder.join(format!("{}.svg", outcome.bench)), svg)?;
+        }
+        Ok(())
+    }
 }
 
 /// Asks for the real time of a run on behalf of the calling thread.
@@ -123,13 +151,11 @@ fn realtime_on(core: usize) -> Obtained {
     obtain(Wanted { core: Some(core), fifo_priority: Some(priority), locked_memory: true })
 }
 
-/// Runs `work` on a thread of its own that has the real time of a run; with what was refused.
+/// Runs `work` on a thread of its own that has the real time of a run; what is refused has been said by then.
 fn on_core<T: Send>(core: usize, work: impl FnOnce() -> T + Send) -> T {
     std::thread::scope(|scope| {
         let thread = scope.spawn(|| {
-            for refusal in realtime_on(core).refusals {
-                eprintln!("  {refusal}");
-            }
+            realtime_on(core);
             work()
         });
         thread.join().expect("measuring does not panic")

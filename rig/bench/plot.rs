@@ -3,6 +3,7 @@
 
 use std::error::Error;
 
+use plotters::coord::ranged1d::ValueFormatter;
 use plotters::prelude::*;
 
 use super::contest::{Contender, Durations, Outcome, durations};
@@ -10,6 +11,8 @@ use super::contest::{Contender, Durations, Outcome, durations};
 const SIZE: (u32, u32) = (960, 420);
 /// Points of a curve for each nine.
 const POINTS_PER_NINE: u32 = 20;
+/// A curve of so few points shows each of them.
+const POINTS_SHOWN: usize = 10;
 const COLOURS: [RGBColor; 6] = [
     RGBColor(0x00, 0x72, 0xb2),
     RGBColor(0xd5, 0x5e, 0x00),
@@ -19,23 +22,39 @@ const COLOURS: [RGBColor; 6] = [
     RGBColor(0x56, 0xb4, 0xe9),
 ];
 
+/// A line of a plot.
+pub(super) struct Curve {
+    pub(super) name: String,
+    pub(super) points: Vec<(f64, f64)>,
+}
+
+/// Where the value of something over all curves is least or most, if there are any points.
+pub(super) fn bound(
+    curves: &[Curve],
+    of: impl Fn(&(f64, f64)) -> f64,
+    better: fn(f64, f64) -> f64,
+) -> Option<f64> {
+    curves.iter().flat_map(|curve| &curve.points).map(of).reduce(better)
+}
+
 /// The plot as SVG; none when there is nothing to draw.
 pub(super) fn of(outcome: &Outcome) -> Option<String> {
-    let curves: Vec<_> =
-        outcome.contenders.iter().map(|contender| (&contender.name, curve(contender))).collect();
-    let points = || curves.iter().flat_map(|(_, curve)| curve);
-    let high_us = points().map(|point| point.1).reduce(f64::max)?;
-    let low_us = points().map(|point| point.1).reduce(f64::min)?;
-    let nines = points().map(|point| point.0).reduce(f64::max)?;
+    let counted = outcome.contenders.iter().filter(|contender| contender.n > 0);
+    let curves: Vec<_> = counted
+        .map(|contender| Curve { name: contender.name.clone(), points: percentiles(contender) })
+        .collect();
+    let high_us = bound(&curves, |point| point.1, f64::max)?;
+    let low_us = bound(&curves, |point| point.1, f64::min)?;
+    let nines = bound(&curves, |point| point.0, f64::max)?;
     let mut svg = String::new();
     draw(&mut svg, outcome, &curves, nines, (low_us / 1.5, high_us * 1.5)).ok()?;
     Some(svg)
 }
 
 /// All rounds together: (nines, µs), as far as ten samples reach.
-fn curve(contender: &Contender) -> Vec<(f64, f64)> {
+fn percentiles(contender: &Contender) -> Vec<(f64, f64)> {
     let mut all: Durations = durations();
-    for round in &contender.rounds {
+    for round in contender.rounds.iter().flatten() {
         all.add(round).expect("a histogram that resizes itself takes any other");
     }
     let most = ((all.len() as f64 / 10.0).log10().max(0.0) * f64::from(POINTS_PER_NINE)) as u32;
@@ -50,7 +69,7 @@ fn curve(contender: &Contender) -> Vec<(f64, f64)> {
 fn draw(
     svg: &mut String,
     outcome: &Outcome,
-    curves: &[(&String, Vec<(f64, f64)>)],
+    curves: &[Curve],
     nines: f64,
     (low_us, high_us): (f64, f64),
 ) -> Result<(), Box<dyn Error>> {
@@ -62,16 +81,28 @@ fn draw(
         .x_label_area_size(36)
         .y_label_area_size(64)
         .build_cartesian_2d(0.0..nines.max(0.1), (low_us..high_us).log_scale())?;
-    chart
-        .configure_mesh()
-        .light_line_style(WHITE)
-        .x_desc("nines of the percentile: 1 = 90 %, 2 = 99 %, 3 = 99.9 %")
-        .y_desc("µs")
-        .draw()?;
-    for ((name, curve), colour) in curves.iter().zip(COLOURS.into_iter().cycle()) {
+    draw_curves(&mut chart, curves, ["nines of the percentile: 1 = 90 %, 2 = 99 %, 3 = 99.9 %", "µs"])?;
+    area.present()?;
+    drop(chart);
+    Ok(())
+}
+
+/// Axes, one colour a curve, and their names.
+pub(super) fn draw_curves<'a, X, Y>(
+    chart: &mut ChartContext<'a, SVGBackend<'a>, Cartesian2d<X, Y>>,
+    curves: &[Curve],
+    [x_desc, y_desc]: [&str; 2],
+) -> Result<(), Box<dyn Error>>
+where
+    X: Ranged<ValueType = f64> + ValueFormatter<f64>,
+    Y: Ranged<ValueType = f64> + ValueFormatter<f64>,
+{
+    chart.configure_mesh().light_line_style(WHITE).x_desc(x_desc).y_desc(y_desc).draw()?;
+    for (curve, colour) in curves.iter().zip(COLOURS) {
+        let dot_size = if curve.points.len() <= POINTS_SHOWN { 3 } else { 0 };
         chart
-            .draw_series(LineSeries::new(curve.iter().copied(), colour))?
-            .label(name.as_str())
+            .draw_series(LineSeries::new(curve.points.iter().copied(), colour.filled()).point_size(dot_size))?
+            .label(&curve.name)
             .legend(move |(x, y)| PathElement::new([(x, y), (x + 16, y)], colour));
     }
     chart
@@ -80,7 +111,5 @@ fn draw(
         .background_style(WHITE)
         .border_style(BLACK)
         .draw()?;
-    area.present()?;
-    drop(chart);
     Ok(())
 }

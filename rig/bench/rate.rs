@@ -3,7 +3,6 @@
 //!
 //! Each turn is a run of its own with three processes, judged by nobody; the durations are those of its recording.
 
-use std::collections::BTreeMap;
 use std::fs::File;
 use std::path::Path;
 use std::process::{Command, Stdio};
@@ -16,87 +15,100 @@ use hdrhistogram::serialization::interval_log::{IntervalLogIterator, LogEntry};
 use masseter_shared::config::Scenario;
 use serde_json::Value;
 
-use super::contest::{Contender, Durations, Outcome, Share, durations};
+use super::contest::{Contender, Durations, Outcome, Round, durations, take_turns};
 use crate::exit::Exit;
 use crate::run::folder::RunFolder;
 use crate::run::manifest::Manifest;
 
-/// Rates, Hz.
-const RATES_HZ: [u32; 5] = [1000, 2000, 5000, 10_000, 20_000];
+/// As it is called in results.
+pub(super) const NAME: &str = "rate";
+/// Rates, Hz; the others are compared with the first.
+pub(super) const RATES_HZ: [u32; 5] = [1000, 2000, 5000, 10_000, 20_000];
 /// Motion of a turn, s; starting, easing in and stopping add more than a second.
 const MOTION_S: f64 = 2.0;
 /// Silence after which the rig stops, ms, whatever the rate: as long as in a run at 1 kHz.
 const PATIENCE_MS: u32 = 20;
+/// The last of the intervals.
+pub(super) const ROUND_TRIP: &str = "round trip";
 /// The intervals that are compared, as their logs are named.
-const INTERVALS: [(&str, &str); 3] = [
-    ("wake-up", "controller-wake-up"),
-    ("controller cycle", "controller-cycle"),
-    ("round trip", "round-trip"),
-];
+const INTERVALS: [(&str, &str); 3] =
+    [("wake-up", "controller-wake-up"), ("controller cycle", "controller-cycle"), (ROUND_TRIP, "round-trip")];
 
 /// What a turn gave.
-struct Turn {
-    durations: Vec<Durations>,
-    shares: Vec<(String, f64)>,
-    stopped: bool,
-    /// Whether the machine kept the rig from too many cycles to judge it.
-    is_disturbed: bool,
+enum Turn {
+    /// The motion was played: an interval's durations each, and what else it tells.
+    Played { durations: Vec<Durations>, shares: Vec<(String, f64)> },
+    /// It was not: a part of one is no run at that rate.
+    Stopped {
+        /// Whether the machine kept the rig from too many cycles to judge it.
+        is_disturbed: bool,
+    },
 }
 
 pub(super) fn measure(rounds: u32, cores: [usize; 2]) -> anyhow::Result<Outcome> {
-    let mut turns: Vec<Vec<Turn>> = RATES_HZ.iter().map(|_| Vec::new()).collect();
-    for round in 0..rounds as usize {
-        for turn in 0..RATES_HZ.len() {
-            let index = (round + turn) % RATES_HZ.len();
-            turns[index].push(run_at(RATES_HZ[index], cores)?);
-        }
-    }
+    let play = |index: usize| run_at(RATES_HZ[index], cores);
+    let (turns, disturbance) = take_turns(rounds, RATES_HZ.len(), cores[0], play)?;
     let mut outcome = Outcome {
-        bench: "rate",
-        measures:
-            "the whole rig without bus delays: wake-up of the controller after its deadline, controller cycle (reading received to command published), \
-                   round trip (SYNC to reading published, reading received to command received)"
-                .to_owned(),
+        bench: NAME,
+        measures: "the whole rig without bus delays: wake-up of the controller after its deadline, controller cycle \
+                   (reading received to command published), round trip (SYNC to reading published, reading received \
+                   to command received)"
+            .to_owned(),
         contenders: Vec::new(),
         ratios: Vec::new(),
         notes: Vec::new(),
+        disturbance,
     };
     for (rate_hz, turns) in RATES_HZ.into_iter().zip(turns) {
-        let stopped =
-            |by_machine| turns.iter().filter(|turn| turn.stopped && turn.is_disturbed == by_machine).count();
-        for (count, why) in [
-            (stopped(false), "the cores do not hold this rate"),
-            (stopped(true), "the machine stood still for too long"),
-        ] {
-            if count > 0 {
-                let note = format!("{rate_hz} Hz: {count} of {rounds} runs did not play to their end: {why}");
-                outcome.notes.push(note);
-            }
-        }
+        outcome.notes.extend(stops(rate_hz, &turns));
         outcome.contenders.extend(contenders(rate_hz, turns));
     }
-    Ok(outcome)
+    let pairs: Vec<_> = (INTERVALS.len()..outcome.contenders.len())
+        .map(|contender| (contender, contender % INTERVALS.len()))
+        .collect();
+    Ok(outcome.comparing(&pairs))
+}
+
+/// Why runs of a rate do not count.
+fn stops(rate_hz: u32, turns: &[Turn]) -> Vec<String> {
+    let stopped = |by_machine| {
+        let is_one =
+            |turn: &&Turn| matches!(turn, Turn::Stopped { is_disturbed } if *is_disturbed == by_machine);
+        turns.iter().filter(is_one).count()
+    };
+    [
+        (stopped(false), "the cores do not hold this rate"),
+        (stopped(true), "the machine stood still for too long"),
+    ]
+    .into_iter()
+    .filter(|(count, _)| *count > 0)
+    .map(|(count, why)| {
+        format!(
+            "{rate_hz} Hz: {count} of {} runs did not play to their end and do not count: {why}",
+            turns.len()
+        )
+    })
+    .collect()
 }
 
 /// A contender an interval; the last one carries the shares.
 fn contenders(rate_hz: u32, turns: Vec<Turn>) -> Vec<Contender> {
-    let mut by_interval: Vec<Vec<Durations>> = INTERVALS.iter().map(|_| Vec::new()).collect();
-    let mut shares: BTreeMap<String, Vec<f64>> = BTreeMap::new();
+    let mut by_interval: Vec<Vec<Option<Round>>> = INTERVALS.iter().map(|_| Vec::new()).collect();
     for turn in turns {
-        turn.durations.into_iter().zip(&mut by_interval).for_each(|(round, rounds)| rounds.push(round));
-        for (name, percent) in turn.shares {
-            shares.entry(name).or_default().push(percent);
-        }
+        let rounds: Vec<_> = match turn {
+            Turn::Stopped { .. } => INTERVALS.iter().map(|_| None).collect(),
+            Turn::Played { durations, shares } => {
+                let mut rounds: Vec<_> = durations.into_iter().map(Round::from).collect();
+                if let Some(last) = rounds.last_mut() {
+                    last.shares = shares;
+                }
+                rounds.into_iter().map(Some).collect()
+            }
+        };
+        rounds.into_iter().zip(&mut by_interval).for_each(|(round, rounds)| rounds.push(round));
     }
-    let mut contenders: Vec<_> = INTERVALS
-        .iter()
-        .zip(by_interval)
-        .map(|((name, _), rounds)| Contender::of(format!("{rate_hz} Hz, {name}"), rounds))
-        .collect();
-    if let Some(last) = contenders.last_mut() {
-        last.shares = shares.into_iter().map(|(name, percent)| Share::of(name, percent)).collect();
-    }
-    contenders
+    let named = INTERVALS.iter().zip(by_interval);
+    named.map(|((name, _), rounds)| Contender::of(format!("{rate_hz} Hz, {name}"), rounds)).collect()
 }
 
 fn scenario(rate_hz: u32, cores: [usize; 2]) -> Scenario {
@@ -129,8 +141,11 @@ fn run_at(rate_hz: u32, cores: [usize; 2]) -> anyhow::Result<Turn> {
 }
 
 fn turn(folder: &RunFolder) -> anyhow::Result<Turn> {
-    let manifest = Manifest::read(folder)?;
     let summary: Value = serde_json::from_reader(File::open(folder.summary())?)?;
+    if summary["figures"]["final_state"] != "finished" {
+        return Ok(Turn::Stopped { is_disturbed: summary["verdict"]["exit_code"] == Exit::Invalid as u8 });
+    }
+    let manifest = Manifest::read(folder)?;
     let log = |(_, name): &(_, &str)| read_log(&folder.histograms().join(format!("{name}.hlog")));
     let durations = INTERVALS.iter().map(log).collect::<anyhow::Result<_>>()?;
     let figures = &summary["figures"];
@@ -149,17 +164,12 @@ fn turn(folder: &RunFolder) -> anyhow::Result<Turn> {
         ("missed by the machine".to_owned(), by_machine / deadlines),
         ("dropped".to_owned(), dropped / (recorded + dropped)),
     ];
-    // A process that ended at once was never observed.
+    // One that was looked at only once has no usage.
     for (process, usage) in manifest.usage.processes.iter().filter(|(_, usage)| usage.observed_s > 0.0) {
         shares.push((format!("{process} CPU"), usage.cpu_s / usage.observed_s));
     }
     let shares = shares.into_iter().map(|(name, share)| (name, share * 100.0)).collect();
-    Ok(Turn {
-        durations,
-        shares,
-        stopped: figures["final_state"] != "finished",
-        is_disturbed: summary["verdict"]["exit_code"] == Exit::Invalid as u8,
-    })
+    Ok(Turn::Played { durations, shares })
 }
 
 /// All intervals of a log together.
@@ -176,4 +186,27 @@ fn read_log(path: &Path) -> anyhow::Result<Durations> {
         all.add(histogram).with_context(unreadable)?;
     }
     Ok(all)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bench::contest::record;
+
+    #[test]
+    fn a_run_that_stopped_is_counted_and_told_but_not_measured() {
+        let mut slow = durations();
+        record(&mut slow, 9000, 1);
+        let played = Turn::Played {
+            durations: vec![slow.clone(), slow.clone(), slow],
+            shares: vec![("missed".to_owned(), 2.0)],
+        };
+        let turns = vec![Turn::Stopped { is_disturbed: true }, played, Turn::Stopped { is_disturbed: false }];
+        assert_eq!(stops(5000, &turns).len(), 2);
+        let contenders = contenders(5000, turns);
+        let trip = contenders.last().unwrap();
+        assert_eq!((trip.name.as_str(), trip.n, trip.rounds.len()), ("5000 Hz, round trip", 1, 3));
+        assert!((trip.median("max").unwrap() - 9000.0).abs() < 10.0);
+        assert_eq!(trip.shares[0].name, "missed");
+    }
 }

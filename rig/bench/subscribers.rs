@@ -24,11 +24,11 @@ pub(super) fn measure(rounds: u32, core: usize) -> anyhow::Result<Outcome> {
     let claim = domain.claim()?;
     let turns = OBSERVERS.map(|observers| {
         let domain = &domain;
-        let turn: Turn = Box::new(move || on_core(core, || publish_to(domain, observers)));
+        let turn: Turn = Box::new(move || Ok(on_core(core, || publish_to(domain, observers))?.into()));
         (format!("{observers} observer{}", if observers == 1 { "" } else { "s" }), turn)
     });
     let measures = "loaning, filling and sending one reading".to_owned();
-    let outcome = Outcome::of_turns("subscribers", measures, rounds, turns.into());
+    let outcome = Outcome::of_turns("subscribers", measures, rounds, core, turns.into());
     drop(claim);
     domain.sweep()?;
     Ok(outcome?.comparing(&[(1, 0), (2, 0), (3, 0), (4, 0)]))

@@ -6,14 +6,14 @@ use super::contest::{Figure, Outcome, Share};
 
 /// Contenders in µs, then their ratios: median (minimum to maximum) over the rounds.
 pub(super) fn of(outcome: &Outcome) -> String {
+    let rounds = outcome.contenders.first().map_or(0, |contender| contender.rounds.len());
     let mut text = format!(
-        "\n{}: {}\nmedian (minimum–maximum) of {} rounds, µs\n",
-        outcome.bench,
-        outcome.measures,
-        outcome.contenders.first().map_or(0, |contender| contender.rounds.len())
+        "\n{}: {}\nmedian (minimum–maximum) of {rounds} rounds, µs\n",
+        outcome.bench, outcome.measures
     );
     for contender in &outcome.contenders {
-        let _ = writeln!(text, "  {:<34} {}", contender.name, line(&contender.figures, 1e-3));
+        let of_rounds = counted(contender.n, contender.rounds.len());
+        let _ = writeln!(text, "  {:<34} {}{of_rounds}", contender.name, line(&contender.figures, 1e-3));
         if !contender.shares.is_empty() {
             let _ = writeln!(text, "  {:<34} {}", "", shares(&contender.shares));
         }
@@ -23,12 +23,22 @@ pub(super) fn of(outcome: &Outcome) -> String {
     }
     for ratio in &outcome.ratios {
         let name = format!("{} / {}", ratio.of, ratio.to);
-        let _ = writeln!(text, "  {name:<34} {}", line(&ratio.figures, 1.0));
+        if ratio.n > 0 {
+            let _ = writeln!(text, "  {name:<34} {}{}", line(&ratio.figures, 1.0), counted(ratio.n, rounds));
+        }
     }
     for note in &outcome.notes {
         let _ = writeln!(text, "  {note}");
     }
+    if let Some(reason) = &outcome.disturbance.reason {
+        let _ = writeln!(text, "INVALID: {reason}");
+    }
     text
+}
+
+/// Said of what not all rounds count for.
+fn counted(n: usize, rounds: usize) -> String {
+    if n == rounds { String::new() } else { format!("  ({n} of {rounds} rounds count)") }
 }
 
 fn line(figures: &[Figure], scale: f64) -> String {

@@ -1,8 +1,8 @@
 //! `bench loop`: how late the real-time loop wakes at 1 kHz, against cyclictest.
 //!
 //! Both run holding `/dev/cpu_dma_latency`, as cyclictest's authors set it up, and with idle states allowed: which is
-//! better depends on the machine, and on a virtual one on its host. Where cyclictest is not installed, a plain absolute sleep on the same thread settings takes its place. Its
-//! histogram has steps of a microsecond.
+//! better depends on the machine, and on a virtual one on its host. Its histogram has steps of a microsecond. Where it
+//! does not run, a plain absolute sleep on the same thread settings takes its place.
 
 use std::cell::RefCell;
 use std::process::Command;
@@ -12,7 +12,7 @@ use masseter_shared::clock::{self, SECOND_NS};
 use masseter_shared::config::{CpuDmaLatency, RealtimeConfig};
 use masseter_shared::realtime::{Cycle, Wake};
 
-use super::contest::{Durations, Outcome, Turn, durations, record};
+use super::contest::{Durations, Outcome, Round, Turn, durations, record};
 use super::on_core;
 use crate::run::dma_latency::Hold;
 
@@ -26,49 +26,48 @@ const OUTLIER_NS: u64 = 50_000;
 /// Highest lateness in cyclictest's histogram, µs.
 const CYCLICTEST_UP_TO_US: u64 = 20_000;
 
-/// The own loop's two turns stand first.
-const OWN: usize = 2;
-
 pub(super) fn measure(rounds: u32, core: usize) -> anyhow::Result<Outcome> {
     let outliers = RefCell::new(Outliers::default());
-    let refusal = RefCell::new(None);
+    let mut notes = Vec::new();
     let own = |wanted: CpuDmaLatency| -> Turn {
-        let (outliers, refusal) = (&outliers, &refusal);
+        let outliers = &outliers;
         Box::new(move || {
-            let hold = Hold::new(wanted, false);
-            if let Some(why) = &hold.obtained().refusal {
-                refusal.replace(Some(why.clone()));
-            }
+            let _hold = Hold::new(wanted, false);
             let mut outliers = outliers.borrow_mut();
             let outliers = &mut *outliers;
             Ok(on_core(core, move || own_loop(outliers)))
         })
     };
-    let has_cyclictest = Command::new("cyclictest").arg("--help").output().is_ok();
-    let mut turns: Vec<(String, Turn)> = vec![
-        ("masseter".to_owned(), own(CpuDmaLatency::Leave)),
-        ("masseter, latency held".to_owned(), own(CpuDmaLatency::Hold)),
-    ];
-    if has_cyclictest {
-        let cyclictest = |more: &'static [&'static str]| -> Turn { Box::new(move || cyclictest(core, more)) };
-        turns.push(("cyclictest --laptop".to_owned(), cyclictest(&["--laptop"])));
-        turns.push(("cyclictest".to_owned(), cyclictest(&[])));
+    let cyclictest = |more: &'static [&'static str]| -> Turn {
+        Box::new(move || Ok(cyclictest(core, WAKE_UPS, more)?.into()))
+    };
+    let mut own_turns = vec![("masseter".to_owned(), own(CpuDmaLatency::Leave))];
+    let mut others: Vec<(String, Turn)> = Vec::new();
+    let refused = try_cyclictest(core).err();
+    if let Some(why) = &refused {
+        notes.push(format!("{why:#}: a plain sleep stands in for cyclictest"));
+        others.push(("plain sleep".to_owned(), Box::new(move || Ok(on_core(core, plain_sleep)))));
     } else {
-        turns.push(("plain sleep".to_owned(), Box::new(move || Ok(on_core(core, plain_sleep)))));
+        notes.push("cyclictest does not tell the deadlines that it skips".to_owned());
+        others.push(("cyclictest --laptop".to_owned(), cyclictest(&["--laptop"])));
     }
-    let contenders = turns.len();
+    if let Some(refusal) = &Hold::new(CpuDmaLatency::Hold, false).obtained().refusal {
+        notes.push(format!("nobody holds the latency device: {refusal}"));
+    } else {
+        own_turns.push(("masseter, latency held".to_owned(), own(CpuDmaLatency::Hold)));
+        if refused.is_none() {
+            others.push(("cyclictest".to_owned(), cyclictest(&[])));
+        }
+    }
+    let pairs: Vec<_> = (0..own_turns.len())
+        .flat_map(|own| (0..others.len()).map(move |other| (own, other)))
+        .map(|(own, other)| (own, own_turns.len() + other))
+        .collect();
     let measures = "wake-up lateness at 1 kHz, one SCHED_FIFO thread on one core".to_owned();
-    let outcome = Outcome::of_turns("loop", measures, rounds, turns)?;
-    let pairs: Vec<_> = (0..OWN).flat_map(|own| (OWN..contenders).map(move |other| (own, other))).collect();
-    let mut outcome = outcome.comparing(&pairs).noting(outliers.borrow().in_words());
-    if let Some(refusal) = refusal.take() {
-        outcome = outcome.noting(refusal);
-    }
-    Ok(if has_cyclictest {
-        outcome
-    } else {
-        outcome.noting("cyclictest is not installed (`sudo apt install rt-tests`): a plain sleep stands in")
-    })
+    let turns = own_turns.into_iter().chain(others).collect();
+    let outcome = Outcome::of_turns("loop", measures, rounds, core, turns)?.comparing(&pairs);
+    notes.push(outliers.borrow().in_words());
+    Ok(notes.into_iter().fold(outcome, Outcome::noting))
 }
 
 /// Late wake-ups of the own loop, and those of them before which it saw the machine stand still.
@@ -110,44 +109,73 @@ impl Outliers {
     }
 }
 
-fn own_loop(outliers: &mut Outliers) -> Durations {
+fn first_deadline_ns() -> u64 {
+    clock::now_ns().next_multiple_of(PERIOD_NS) + PERIOD_NS + OFF_TICK_NS
+}
+
+/// A round with the share of its deadlines that passed before anybody could wait for them.
+fn round(durations: Durations, skipped: u64) -> Round {
+    let percent = 100.0 * skipped as f64 / (skipped + WAKE_UPS) as f64;
+    Round { durations, shares: vec![("skipped deadlines".to_owned(), percent)] }
+}
+
+fn own_loop(outliers: &mut Outliers) -> Round {
     let mut late = durations();
-    let first_ns = clock::now_ns().next_multiple_of(PERIOD_NS) + PERIOD_NS + OFF_TICK_NS;
-    let mut cycle = Cycle::new(first_ns, PERIOD_NS);
+    let mut skipped = 0;
+    let mut cycle = Cycle::new(first_deadline_ns(), PERIOD_NS);
     outliers.last = LastWake::default();
     for _ in 0..WAKE_UPS {
         let wake = cycle.wait();
         record(&mut late, wake.woke_ns - wake.due_ns, 1);
+        skipped = wake.skipped;
         // The work here takes a microsecond: what takes long in it is a stall as well.
         let account = cycle.waiter().account();
         outliers.take(wake, account.stalled_ns + account.overlong_ns);
     }
-    late
+    round(late, skipped)
 }
 
-fn plain_sleep() -> Durations {
+fn plain_sleep() -> Round {
     let mut late = durations();
-    let mut due_ns = clock::now_ns() + PERIOD_NS;
+    let mut skipped = 0;
+    let mut due_ns = first_deadline_ns();
     for _ in 0..WAKE_UPS {
         clock::sleep_until(due_ns);
-        record(&mut late, clock::now_ns().saturating_sub(due_ns), 1);
-        due_ns += PERIOD_NS;
+        let woke_ns = clock::now_ns();
+        record(&mut late, woke_ns.saturating_sub(due_ns), 1);
+        let missed = missed_by(due_ns + PERIOD_NS, woke_ns);
+        skipped += missed;
+        due_ns += PERIOD_NS * (1 + missed);
     }
-    late
+    round(late, skipped)
 }
 
-fn cyclictest(core: usize, more: &[&str]) -> anyhow::Result<Durations> {
+/// Deadlines, from the next one on, that are skipped as the rig's loop skips them: all that passed but the last.
+fn missed_by(next_due_ns: u64, now_ns: u64) -> u64 {
+    now_ns.saturating_sub(next_due_ns) / PERIOD_NS
+}
+
+/// Whether cyclictest runs here, with the rights that it has.
+fn try_cyclictest(core: usize) -> anyhow::Result<()> {
+    cyclictest(core, 10, &["--laptop"]).map(drop)
+}
+
+fn cyclictest(core: usize, loops: u64, more: &[&str]) -> anyhow::Result<Durations> {
     let output = Command::new("cyclictest")
         .args(["--quiet", "--mlockall", "--threads=1", "--interval=1000"])
         .arg(format!("--priority={}", RealtimeConfig::default().priority))
         .arg(format!("--affinity={core}"))
-        .arg(format!("--loops={WAKE_UPS}"))
+        .arg(format!("--loops={loops}"))
         .arg(format!("--histogram={CYCLICTEST_UP_TO_US}"))
         .args(more)
         .output()
-        .context("cyclictest cannot be started")?;
+        .context("cyclictest cannot be started (`sudo apt install rt-tests`)")?;
     if !output.status.success() {
-        bail!("cyclictest failed: {}", String::from_utf8_lossy(&output.stderr));
+        let said = String::from_utf8_lossy(&output.stderr);
+        bail!(
+            "cyclictest failed: {}",
+            said.lines().find(|line| !line.is_empty()).unwrap_or("it says nothing")
+        );
     }
     histogram_of(&String::from_utf8_lossy(&output.stdout))
 }
@@ -188,6 +216,14 @@ mod tests {
         assert_eq!(take(6000, 0, 3400), (2, 2));
         assert_eq!(take(7000, 60, 3400), (3, 2), "late for no reason that was noticed");
         assert_eq!(take(8000, 50, 3500), (3, 2), "in time");
+    }
+
+    #[test]
+    fn a_plain_sleep_skips_what_the_rigs_loop_skips() {
+        let due_ns = 5 * PERIOD_NS;
+        assert_eq!(missed_by(due_ns, 0), 0);
+        assert_eq!(missed_by(due_ns, due_ns + PERIOD_NS - 1), 0, "late within its period");
+        assert_eq!(missed_by(due_ns, due_ns + 4 * PERIOD_NS + 7), 4);
     }
 
     #[test]

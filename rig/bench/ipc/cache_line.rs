@@ -1,9 +1,8 @@
 //! The limit of any exchange between two cores: one cache line, bounced by two polling threads.
 
-use std::hint::spin_loop;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use super::{ROUND_TRIPS, WARM_UP, time};
+use super::{ROUND_TRIPS, WARM_UP, poll, time};
 use crate::bench::contest::Durations;
 use crate::bench::{on_core, realtime_on};
 
@@ -14,23 +13,21 @@ struct Line(AtomicU64);
 /// One thread writes odd numbers, the other answers with the even ones.
 pub(super) fn round_trips([own_core, peer_core]: [usize; 2]) -> anyhow::Result<Durations> {
     let line = Line(AtomicU64::new(0));
-    let wait_for = |number| {
-        while line.0.load(Ordering::Acquire) != number {
-            spin_loop();
-        }
-    };
+    let wait_for = |number| poll(|| Ok((line.0.load(Ordering::Acquire) == number).then_some(())));
     std::thread::scope(|scope| {
         scope.spawn(|| {
             realtime_on(peer_core);
             for number in 1..=WARM_UP + ROUND_TRIPS {
-                wait_for(2 * number - 1);
+                // What keeps this side from its turn keeps the other one, too, and that one says so.
+                if wait_for(2 * number - 1).is_err() {
+                    break;
+                }
                 line.0.store(2 * number, Ordering::Release);
             }
         });
         let round_trip = |number| {
             line.0.store(2 * number - 1, Ordering::Release);
-            wait_for(2 * number);
-            Ok(())
+            wait_for(2 * number)
         };
         on_core(own_core, || time(round_trip))
     })

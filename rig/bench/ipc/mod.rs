@@ -27,17 +27,17 @@ const BYTES: usize = 128;
 
 pub(super) fn measure(rounds: u32, [own_core, peer_core]: [usize; 2]) -> anyhow::Result<Outcome> {
     let turn = |channel: Channel| -> (String, Turn) {
-        let turn = move || round_trips(channel, [own_core, peer_core]);
+        let turn = move || Ok(round_trips(channel, [own_core, peer_core])?.into());
         (channel.in_words().to_owned(), Box::new(turn))
     };
     let mut turns: Vec<_> =
         [Channel::Rig, Channel::Iceoryx2, Channel::Socket, Channel::Pipe].map(turn).into();
     turns.push((
         "cache line (threads)".to_owned(),
-        Box::new(move || cache_line::round_trips([own_core, peer_core])),
+        Box::new(move || Ok(cache_line::round_trips([own_core, peer_core])?.into())),
     ));
     let measures = "round trip between two polling processes on two cores".to_owned();
-    Ok(Outcome::of_turns("ipc", measures, rounds, turns)?.comparing(&[
+    Ok(Outcome::of_turns("ipc", measures, rounds, own_core, turns)?.comparing(&[
         (0, 1),
         (0, 4),
         (0, 2),

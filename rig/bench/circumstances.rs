@@ -1,0 +1,78 @@
+//! On what a bench is made: the machine, its two cores, and the scheduling that the kernel grants there.
+
+use std::collections::BTreeSet;
+
+use anyhow::ensure;
+use masseter_shared::realtime::scheduling::{Obtained, allowed_cores};
+use serde::Serialize;
+
+use super::{Kind, kind_name, realtime_on};
+use crate::run::manifest::Machine;
+
+/// Written with the results.
+#[derive(Debug, Serialize)]
+pub(super) struct Circumstances {
+    machine: Machine,
+    cores: [usize; 2],
+    /// Of a thread on each core.
+    scheduling: [Obtained; 2],
+}
+
+impl Circumstances {
+    /// Asks the kernel, as every turn will, and says what it refuses.
+    pub(super) fn on(cores: [usize; 2]) -> Self {
+        let scheduling = cores.map(|core| {
+            std::thread::spawn(move || realtime_on(core)).join().expect("asking the kernel does not panic")
+        });
+        let refusals: BTreeSet<_> = scheduling.iter().flat_map(|obtained| &obtained.refusals).collect();
+        for refusal in refusals {
+            tell!("  {refusal}");
+        }
+        Self { machine: Machine::this(), cores, scheduling }
+    }
+}
+
+/// Refuses cores on which a bench could not end: two threads that poll at real-time priority need one each.
+pub(super) fn check_cores(kinds: &[Kind], cores: [usize; 2]) -> anyhow::Result<()> {
+    check(kinds, cores, &allowed_cores())
+}
+
+fn check(kinds: &[Kind], [own, peer]: [usize; 2], allowed: &[usize]) -> anyhow::Result<()> {
+    let Some(kind) = kinds.iter().find(|kind| matches!(kind, Kind::Ipc | Kind::Rate)) else { return Ok(()) };
+    let bench = format!("bench {}", kind_name(*kind));
+    let named = allowed.iter().map(usize::to_string).collect::<Vec<_>>().join(", ");
+    ensure!(
+        allowed.len() >= 2,
+        "{bench} needs two cores, and this process may use only core {named}: allow it another (`taskset`, a \
+         container's `--cpuset-cpus`), or measure loop, fk and subscribers, which need one"
+    );
+    ensure!(own != peer, "{bench} needs two cores, and --cores names {own} twice: choose two among {named}");
+    for core in [own, peer] {
+        ensure!(
+            allowed.contains(&core),
+            "{bench} may not use core {core}: choose two among {named} with --cores"
+        );
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn two_sides_need_two_cores_that_may_be_used() {
+        let refusal =
+            |kind, cores, allowed: &[usize]| check(&[kind], cores, allowed).err().map(|e| e.to_string());
+        assert_eq!(refusal(Kind::Ipc, [0, 1], &[0, 1]), None);
+        assert_eq!(refusal(Kind::Loop, [0, 0], &[0]), None, "one side needs one");
+        for (kind, cores, allowed, said) in [
+            (Kind::Ipc, [0, 1], &[3][..], "may use only core 3"),
+            (Kind::Rate, [1, 1], &[0, 1], "names 1 twice: choose two among 0, 1"),
+            (Kind::Ipc, [0, 4], &[0, 1], "may not use core 4"),
+        ] {
+            let refusal = refusal(kind, cores, allowed).unwrap();
+            assert!(refusal.contains(said), "{refusal}");
+        }
+    }
+}
