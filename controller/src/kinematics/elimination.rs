@@ -41,7 +41,7 @@ const FEW_ITERATIONS: u32 = 6;
 /// g₂₃ at which Newton's iteration takes over for good.
 const NARROW_ENOUGH: f64 = 1e-10;
 /// Pairs of headings of legs 2 and 3.
-pub(super) const PAIRS: usize = 4;
+const PAIRS: usize = 4;
 
 /// Which solutions are worth following.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -1,22 +1,19 @@
 //! How far an input is from one that can be assembled.
 //!
 //! Measured by the least root of the seed's error (eq. 2) over all leg angles, that is, by how much
-//! the platform's sides would have to give. It is searched by descent from the best of a grid of
-//! starts of a bounded number of steps, so it is an upper bound: other angles may come a little closer.
+//! the platform's sides would have to give. It is searched by descent from each of a grid of starts, in a
+//! bounded number of steps, so it is an upper bound: other angles may come a little closer.
 
 use masseter_shared::geometry::{Actuators, Mechanism};
 use nalgebra::{Matrix3, Vector3};
 
 use super::Equations;
 use super::closure::Closure;
-use super::elimination::{Elimination, PAIRS};
+use super::elimination::Elimination;
 use super::heading::Heading;
 
-/// Values of cos θ₁ that are tried, four sets of angles each.
+/// Values of cos θ₁, each with four sets of angles to start from.
 const GRID: u32 = 32;
-/// Stretches of the grid: from the best start of each, for each of the four sets of angles, one descent. The best
-/// starts of all lie next to each other and lead to one place.
-const STRETCHES: u32 = 4;
 /// Steps of one descent at most; it ends before when the error hardly decreases or the step hardly turns a leg.
 const STEPS: u32 = 40;
 /// A step that leaves more than this share of the error is the last.
@@ -29,34 +26,10 @@ pub fn nearest_assembly_m(mechanism: &Mechanism, actuators: &Actuators) -> f64 {
     let closure = Closure::new(mechanism, actuators);
     let equations = Equations::new(mechanism, actuators);
     let elimination = Elimination::new(&closure);
-    let mut least_m2 = f64::INFINITY;
-    for stretch in 0..STRETCHES {
-        for start in best_starts(&equations, &elimination, stretch) {
-            least_m2 = least_m2.min(descended_m2(&equations, start));
-        }
-    }
-    least_m2.sqrt()
-}
-
-/// Of each of the four sets of angles the one with the least error in a stretch of the grid.
-fn best_starts(
-    equations: &Equations<'_>,
-    elimination: &Elimination<'_>,
-    stretch: u32,
-) -> [Vector3<f64>; PAIRS] {
-    let mut best = [(f64::INFINITY, Vector3::zeros()); PAIRS];
-    let points = GRID / STRETCHES;
-    for index in stretch * points..=(stretch + 1) * points {
-        let x = 2.0 * f64::from(index) / f64::from(GRID) - 1.0;
-        for (best, headings) in best.iter_mut().zip(elimination.headings(x)) {
-            let theta_rad = Vector3::from(headings.map(Heading::to_rad));
-            let error_m2 = equations.evaluate(theta_rad).error_m2();
-            if error_m2 < best.0 {
-                *best = (error_m2, theta_rad);
-            }
-        }
-    }
-    best.map(|(_, theta_rad)| theta_rad)
+    let starts =
+        (0..=GRID).flat_map(|index| elimination.headings(2.0 * f64::from(index) / f64::from(GRID) - 1.0));
+    let ends_m2 = starts.map(|headings| descended_m2(&equations, headings.map(Heading::to_rad).into()));
+    ends_m2.fold(f64::INFINITY, f64::min).sqrt()
 }
 
 /// Levenberg's and Marquardt's descent: the error at its end, m².
@@ -89,7 +62,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::kinematics::samples::seed_mechanism;
+    use crate::kinematics::samples::{mechanisms, poses, seed_mechanism};
 
     /// Least error over a grid of all three angles above the base, m.
     fn on_a_grid_m(equations: &Equations<'_>) -> f64 {
@@ -113,6 +86,38 @@ mod tests {
             let nearest = nearest_assembly_m(&mechanism, &actuators);
             let on_a_grid = on_a_grid_m(&Equations::new(&mechanism, &actuators));
             prop_assert!(nearest <= 1.01 * on_a_grid + 1e-12, "{nearest} m, on a grid {on_a_grid} m");
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn what_can_be_assembled_is_no_distance_from_it(mechanism in mechanisms(), pose in poses(30.0)) {
+            let actuators = mechanism.inverse(&pose).unwrap().actuators;
+            let found_m = nearest_assembly_m(&mechanism, &actuators);
+            prop_assert!(found_m < 1e-7, "{found_m} m");
+        }
+    }
+
+    /// The start with the least error does not lead to them.
+    #[test]
+    fn solutions_far_from_the_best_start_are_found() {
+        let inputs = [
+            (
+                [0.013_745_080_593, -0.020_808_585_577, -0.015_397_878_121],
+                [0.288_811_952_893, 0.290_133_041_177, 0.309_002_566_259],
+            ),
+            (
+                [0.005_799_786_336, 0.010_761_635_074, 0.005_383_840_607],
+                [0.303_309_286_864, 0.318_823_920_414, 0.296_586_935_017],
+            ),
+            (
+                [-0.016_721_740_924, 0.016_531_109_308, 0.017_909_281_663],
+                [0.256_198_086_386, 0.268_059_167_258, 0.237_177_919_520],
+            ),
+        ];
+        for (slide_m, leg_m) in inputs {
+            let found_m = nearest_assembly_m(&seed_mechanism(), &Actuators { slide_m, leg_m });
+            assert!(found_m < 1e-7, "{found_m} m");
         }
     }
 
