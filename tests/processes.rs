@@ -5,21 +5,14 @@ mod common;
 
 use std::fs;
 use std::process::{Child, Command};
-use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-use common::{Bench, UNHURRIED, child_of, masseter, shared_memory_of, skip, start, stderr, stdout};
+use common::{
+    Bench, PASSED_OR_INVALID, UNHURRIED, child_of, masseter, shared_memory_of, skip, start, stderr, stdout,
+    take_the_cores,
+};
 use masseter_shared::clock;
 use rustix::process::{Pid, Signal, kill_process};
-
-/// Ends accepted from a machine that may stand still for a while: passed, or too disturbed to judge.
-const PASSED_OR_INVALID: [Option<i32>; 2] = [Some(0), Some(3)];
-
-/// The cores are for one test at a time: every rig here wants the same two.
-fn take_the_cores() -> MutexGuard<'static, ()> {
-    static CORES: Mutex<()> = Mutex::new(());
-    CORES.lock().unwrap_or_else(PoisonError::into_inner)
-}
 
 /// Waits until the recording shows that the rig runs.
 fn wait_until_it_records(bench: &Bench) {
@@ -58,39 +51,6 @@ fn a_run_plays_through_three_processes_and_leaves_nothing_in_shared_memory() {
         assert!(scheduling[role]["wanted"].is_object(), "{scheduling}");
     }
     assert_eq!(shared_memory_of(&id), Vec::<String>::new());
-}
-
-#[test]
-fn the_death_of_any_process_stops_the_rig_safely_and_keeps_the_recording() {
-    let _cores = take_the_cores();
-    for role in ["controller", "plant", "logger"] {
-        let bench = Bench::new(&format!("duration_s = 60.0\n{UNHURRIED}"));
-        let child = start(&bench, &[]);
-        let victim = child_of(&child, role);
-        wait_until_it_records(&bench);
-        let killed = kill_process(victim, Signal::KILL);
-        let id = format!("{}-", child.id());
-        let output = child.wait_with_output().unwrap();
-        assert!(killed.is_ok(), "{role} was gone already: {}{}", stdout(&output), stderr(&output));
-        assert_eq!(output.status.code(), Some(4), "{role}: {}{}", stdout(&output), stderr(&output));
-        let summary = bench.summary();
-        let reason = summary["verdict"]["reason"].as_str().unwrap();
-        assert!(reason.contains(role) && reason.contains("SIGKILL"), "{reason}");
-        assert!(summary["figures"]["cycles"].as_u64().unwrap() > 100, "{role}: the recording is empty");
-        assert_eq!(shared_memory_of(&id), Vec::<String>::new(), "{role}");
-        let causes: Vec<_> = summary["figures"]["events"]
-            .as_array()
-            .unwrap()
-            .iter()
-            .filter(|event| event["kind"] == "fault")
-            .map(|event| event["cause"].as_str().unwrap().to_owned())
-            .collect();
-        match role {
-            "controller" => assert!(causes.contains(&"command_lost".to_owned()), "{causes:?}"),
-            "plant" => assert!(causes.contains(&"stale_reading".to_owned()), "{causes:?}"),
-            _ => {}
-        }
-    }
 }
 
 #[test]

@@ -1,8 +1,8 @@
 //! Starts the three processes, watches them, stops them in order, and sweeps what they leave.
 //!
 //! Order of ending: the controller first (it brings the drives to rest), then the plant, then the
-//! logger, which drains what is left. A process that dies is not restarted: the survivors come to a
-//! safe stop by their own watchdogs, and the supervisor only waits for them. One that does not end in time is killed.
+//! logger, which drains what is left. A process that dies is not restarted: the rig ends in that order, and the
+//! survivors have come to a safe stop by their own watchdogs by then. One that does not end in time is killed.
 
 use std::collections::BTreeMap;
 use std::io;
@@ -212,21 +212,20 @@ impl Rig {
         })
     }
 
-    /// What ends the run before the controller's part is over, if anything does. Without the plant the
-    /// controller stops by its own watchdog; otherwise it is asked to.
+    /// What ends the run before the controller's part is over, if anything does: the controller is asked to end then.
+    /// Without the plant its own watchdog stops it sooner, unless it still waits for the first readings.
     fn disturbance(&mut self, interrupts: &Interrupts) -> io::Result<Ending> {
-        if interrupts.ask() {
-            self.controller.terminate();
-            return Ok(Ending::Interrupted);
-        }
-        if let Some(status) = self.logger.ended()? {
-            self.controller.terminate();
-            return Ok(Ending::died(Role::Logger.name(), describe(status)));
-        }
-        match self.plant.ended()? {
-            Some(status) => Ok(Ending::died(Role::Plant.name(), describe(status))),
-            None => Ok(Ending::Completed),
-        }
+        let ending = if interrupts.ask() {
+            Ending::Interrupted
+        } else if let Some(status) = self.logger.ended()? {
+            Ending::died(Role::Logger.name(), describe(status))
+        } else if let Some(status) = self.plant.ended()? {
+            Ending::died(Role::Plant.name(), describe(status))
+        } else {
+            return Ok(Ending::Completed);
+        };
+        self.controller.terminate();
+        Ok(ending)
     }
 
     /// How the controller ended; if it died, the plant's master is given time to stop the drives.

@@ -5,6 +5,7 @@ use std::fs;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use masseter_shared::clock;
@@ -14,8 +15,17 @@ use serde_json::Value;
 /// The executable under test.
 pub(crate) const MASSETER: &str = env!("CARGO_BIN_EXE_masseter");
 
+/// Ends accepted from a machine that may stand still for a while: passed, or too disturbed to judge.
+pub(crate) const PASSED_OR_INVALID: [Option<i32>; 2] = [Some(0), Some(3)];
+
 /// Sections of a scenario that judges nothing by the clock and bears with stalls: test machines are shared and noisy.
 pub(crate) const UNHURRIED: &str = include_str!("../patient.toml");
+
+/// The cores are for one test at a time: every rig in real time wants the same two.
+pub(crate) fn take_the_cores() -> MutexGuard<'static, ()> {
+    static CORES: Mutex<()> = Mutex::new(());
+    CORES.lock().unwrap_or_else(PoisonError::into_inner)
+}
 
 /// A place of its own for a test, with scenario and run folder.
 pub(crate) struct Bench {

@@ -1,0 +1,196 @@
+//! Every process killed, and stopped for a while, at chosen cycles of the controller's sequence. Nothing here judges
+//! speed: `tests/realtime/kill.py` measures how soon a rig reacts, at random cycles.
+
+mod common;
+
+use std::process::{Child, Output};
+use std::time::Duration;
+
+use common::{
+    Bench, PASSED_OR_INVALID, UNHURRIED, child_of, masseter, shared_memory_of, start, stderr, stdout,
+    take_the_cores,
+};
+use masseter::recording::{Reader, Recorded};
+use masseter_shared::clock::{self, SECOND_NS};
+use masseter_shared::messages::State;
+use masseter_shared::messages::codes::ControllerState::{
+    self, Disabling, Easing, Enabling, Holding, Running, WaitReadings,
+};
+use masseter_shared::messages::codes::DriveCondition::{FaultReaction, OperationEnabled, QuickStopActive};
+use masseter_shared::transport::{Domain, Inlet, Node};
+use rustix::process::{Pid, Signal, kill_process};
+use serde_json::Value;
+
+/// A cycle of the sequence, counted from 1 in its state.
+#[derive(Debug, Clone, Copy)]
+struct Moment(ControllerState, u64);
+
+/// Every state that ends by itself.
+const MOMENTS: [Moment; 7] = [
+    Moment(WaitReadings, 30),
+    Moment(Enabling, 1),
+    Moment(Easing, 1),
+    Moment(Running, 1),
+    Moment(Running, 200),
+    Moment(Holding, 1),
+    Moment(Disabling, 1),
+];
+const ROLES: [&str; 3] = ["controller", "plant", "logger"];
+const MOTION: &str = "duration_s = 0.5\n";
+/// Far less than what the unhurried rig bears with.
+const SHORT_STOP: Duration = Duration::from_millis(60);
+/// A machine that stands still may let the moment pass.
+const TRIES: usize = 5;
+/// No moment is as far off, ns.
+const GIVE_UP_NS: u64 = 30 * SECOND_NS;
+
+/// A rig that was hit, and the process that was.
+struct Rig {
+    name: String,
+    bench: Bench,
+    supervisor: Child,
+    victim: Pid,
+}
+
+impl Rig {
+    /// A rig whose `role` gets the signal at the moment; none when that was missed.
+    fn hit(role: &str, signal: Signal, moment: Moment) -> Option<Self> {
+        let name = format!("hit-{}", std::process::id());
+        let bench = Bench::new(&format!("{MOTION}{UNHURRIED}"));
+        let supervisor = start(&bench, &["--name", &name]);
+        let victim = child_of(&supervisor, role);
+        let rig = Self { name, bench, supervisor, victim };
+        let states = rig.states();
+        let was_hit =
+            reaches(&states, moment) && kill_process(victim, signal).is_ok() && stands_in(&states, moment.0);
+        if was_hit {
+            return Some(rig);
+        }
+        let _ = kill_process(victim, Signal::CONT);
+        rig.end();
+        None
+    }
+
+    /// What the controller publishes, as a scope would see it. All processes of the rig have been started.
+    fn states(&self) -> Inlet<State> {
+        Node::join(&Domain::named(&self.name).unwrap()).unwrap().inlet().unwrap()
+    }
+
+    fn end(self) -> (Bench, Output) {
+        (self.bench, self.supervisor.wait_with_output().unwrap())
+    }
+}
+
+/// A rig whose `role` got the signal at the moment.
+fn hit(role: &str, signal: Signal, moment: Moment) -> Rig {
+    let rig = (0..TRIES).find_map(|_| Rig::hit(role, signal, moment));
+    rig.unwrap_or_else(|| panic!("{role}: {moment:?} was missed {TRIES} times"))
+}
+
+/// Follows the sequence to the moment; whether it came.
+fn reaches(states: &Inlet<State>, Moment(wanted, cycle): Moment) -> bool {
+    let mut entered = None;
+    let give_up_ns = clock::now_ns() + GIVE_UP_NS;
+    while clock::now_ns() < give_up_ns {
+        match states.receive().unwrap() {
+            Some(state) if state.controller_state > wanted as u32 => return false,
+            Some(state) if state.controller_state == wanted as u32 => {
+                if state.cycle + 1 >= *entered.get_or_insert(state.cycle) + cycle {
+                    return true;
+                }
+            }
+            Some(_) => {}
+            None => clock::sleep(Duration::from_micros(100)),
+        }
+    }
+    false
+}
+
+/// Whether no later state has been published meanwhile.
+fn stands_in(states: &Inlet<State>, wanted: ControllerState) -> bool {
+    states.latest().unwrap().is_none_or(|state| state.controller_state == wanted as u32)
+}
+
+/// The readable part of a recording whose logger was killed.
+fn is_recovered(bench: &Bench) -> bool {
+    let [recording, recovered] = ["run/recording.mcap", "recovered.mcap"].map(|name| bench.file(name));
+    let [recording, recovered] = [&recording, &recovered].map(|path| path.to_str().unwrap());
+    let codes = [
+        masseter(&["log", "verify", recording]),
+        masseter(&["log", "recover", recording, "--out", recovered]),
+        masseter(&["log", "verify", recovered]),
+    ]
+    .map(|output| output.status.code());
+    codes == [Some(6), Some(0), Some(0)]
+}
+
+#[test]
+fn whoever_is_killed_and_when_the_rig_ends_in_order_and_another_can_start() {
+    let _cores = take_the_cores();
+    for (role, moment) in ROLES.into_iter().flat_map(|role| MOMENTS.map(|moment| (role, moment))) {
+        let rig = hit(role, Signal::KILL, moment);
+        let name = rig.name.clone();
+        let (bench, output) = rig.end();
+        let context = format!("{role} {moment:?}: {}{}", stdout(&output), stderr(&output));
+        assert_eq!(output.status.code(), Some(4), "{context}");
+        assert_eq!(shared_memory_of(&name), Vec::<String>::new(), "{context}");
+        let summary = bench.summary();
+        assert_eq!(summary["verdict"]["reason"], format!("the {role} died: SIGKILL (9)"), "{context}");
+        let is_moving = matches!(moment.0, Easing | Running | Holding);
+        match role {
+            "controller" => {
+                assert!(drives_are_off(&bench), "{context}");
+                assert!(!is_moving || has_fault(&summary, "command_lost"), "{context}");
+            }
+            "plant" => {
+                let last = summary["figures"]["final_state"].as_str().unwrap();
+                assert!(ends_without_plant(moment.0).contains(&last), "{last}: {context}");
+                assert!(!is_moving || has_fault(&summary, "stale_reading"), "{context}");
+            }
+            _ => assert!(is_recovered(&bench), "{context}"),
+        }
+    }
+}
+
+fn has_fault(summary: &Value, cause: &str) -> bool {
+    let mut events = summary["figures"]["events"].as_array().unwrap().iter();
+    events.any(|event| event["kind"] == "fault" && event["cause"] == cause)
+}
+
+/// How a controller may end that has lost its plant.
+fn ends_without_plant(state: ControllerState) -> &'static [&'static str] {
+    match state {
+        // Nothing moves yet.
+        WaitReadings => &["finished"],
+        // The drives may be off, as far as it knows.
+        Enabling | Disabling => &["finished", "safe_stop"],
+        _ => &["safe_stop"],
+    }
+}
+
+/// Whether no drive gave force in the end.
+fn drives_are_off(bench: &Bench) -> bool {
+    let mut reader = Reader::open(&bench.run_folder().join("recording.mcap")).unwrap();
+    let mut last = None;
+    while let Some(message) = reader.next_message().unwrap() {
+        if let Recorded::Reading(reading) = message {
+            last = Some(reading);
+        }
+    }
+    let with_force = [OperationEnabled, QuickStopActive, FaultReaction].map(|condition| condition as u32);
+    last.unwrap().drive_state.iter().all(|state| !with_force.contains(state))
+}
+
+#[test]
+fn whoever_stands_still_for_a_moment_and_when_the_rig_goes_on() {
+    let _cores = take_the_cores();
+    for (role, moment) in ROLES.into_iter().flat_map(|role| MOMENTS.map(|moment| (role, moment))) {
+        let rig = hit(role, Signal::STOP, moment);
+        clock::sleep(SHORT_STOP);
+        kill_process(rig.victim, Signal::CONT).unwrap();
+        let (bench, output) = rig.end();
+        let context = format!("{role} {moment:?}: {}{}", stdout(&output), stderr(&output));
+        assert_eq!(bench.summary()["figures"]["final_state"], "finished", "{context}");
+        assert!(PASSED_OR_INVALID.contains(&output.status.code()), "{context}");
+    }
+}
