@@ -2,6 +2,8 @@
 
 use masseter_shared::config::MotionConfig;
 use masseter_shared::geometry::MechanismConfig;
+use masseter_shared::messages::codes::{DriveRequest, EventKind};
+use masseter_shared::messages::{Command, State};
 
 use super::*;
 

@@ -1,7 +1,8 @@
 //! The drive's axis under CiA 402: power states, modes of operation, what the servo is to do, and what
 //! the objects of the profile show of it.
 //!
-//! Knows nothing of frames. Profile position and homing have modules of their own.
+//! Knows nothing of frames. What is particular to a mode of operation stands in [`cyclic`](super::cyclic),
+//! [`positioning`](super::positioning) and [`homing`](super::homing).
 
 use masseter_shared::can::cia402::{Command, Controlword, DriveState, StatusBit, Statusword};
 use masseter_shared::config::DriveConfig;
@@ -10,54 +11,17 @@ use super::demand::Demand;
 use super::dictionary::{Objects, names};
 use super::errors::DriveError;
 use super::homing::Homing;
+use super::mode::Mode;
 use super::parameters::{LinkReaction, Parameters, Stop};
 use super::positioning::Positioning;
 use super::profile::Profile;
-use super::servo::{Servo, ServoLimits, Task};
+use super::servo::{Servo, Task};
 use crate::encoder::Encoder;
-
-/// Mode of operation (object 6060).
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Mode {
-    ProfilePosition,
-    Homing,
-    CyclicPosition,
-    CyclicTorque,
-}
-
-impl Mode {
-    /// The mode of that number; `None` where the drive has no such mode.
-    pub(super) const fn of(number: i8) -> Option<Self> {
-        match number {
-            1 => Some(Self::ProfilePosition),
-            6 => Some(Self::Homing),
-            8 => Some(Self::CyclicPosition),
-            10 => Some(Self::CyclicTorque),
-            _ => None,
-        }
-    }
-
-    const fn number(self) -> i8 {
-        match self {
-            Self::ProfilePosition => 1,
-            Self::Homing => 6,
-            Self::CyclicPosition => 8,
-            Self::CyclicTorque => 10,
-        }
-    }
-}
-
-/// Which cyclic targets are new at a SYNC.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub(super) struct NewTargets {
-    pub(super) position: bool,
-    pub(super) torque: bool,
-}
 
 /// One axis.
 #[derive(Debug, Clone)]
 pub(super) struct Axis {
-    drive: DriveConfig,
+    pub(super) drive: DriveConfig,
     encoder: Encoder,
     servo: Servo,
     pub(super) parameters: Parameters,
@@ -71,7 +35,7 @@ pub(super) struct Axis {
     pub(super) origin_increments: i32,
     /// Whether a target was cut to a limit.
     pub(super) is_cut: bool,
-    mode: Mode,
+    pub(super) mode: Mode,
     power: DriveState,
     force_n: f64,
     /// The motor's part of the force: without current the brake holds.
@@ -233,32 +197,8 @@ impl Axis {
     }
 
     /// A position in the encoder's metres as the dictionary has it.
-    fn increments(&self, position_m: f64) -> i32 {
+    pub(super) fn increments(&self, position_m: f64) -> i32 {
         self.encoder.nearest(position_m).saturating_add(self.origin_increments)
-    }
-
-    /// The cyclic modes: the targets that were buffered take effect, and one that the velocity limit put off is
-    /// approached further.
-    pub(super) fn synchronise(&mut self, now_ns: u64, new: NewTargets, objects: &Objects) {
-        if !self.is_enabled() {
-            return;
-        }
-        match self.mode {
-            Mode::CyclicPosition if new.position || self.is_cut && self.demand.is_interpolated() => {
-                self.head_for(now_ns, objects.get(names::TARGET_POSITION));
-            }
-            Mode::CyclicTorque if new.torque => self.push(objects.get(names::TARGET_TORQUE)),
-            _ => {}
-        }
-    }
-
-    /// Follows a target within the software position limit and the velocity limit.
-    fn head_for(&mut self, now_ns: u64, target_increments: i32) {
-        let within = self.within_limits(now_ns, target_increments);
-        let Parameters { velocity_limit_m_s, period_s, .. } = self.parameters;
-        let (target_m, actual_m) = (self.metres(within), self.servo.position_m());
-        let is_too_fast = self.demand.head_for(now_ns, target_m, actual_m, velocity_limit_m_s, period_s);
-        self.is_cut = is_too_fast || within != target_increments;
     }
 
     /// The nearest target that the software position limits allow. They count from the home position (CiA 402),
@@ -268,14 +208,6 @@ impl Axis {
         let [lowest, highest] = self.parameters.position_limits;
         let here = self.increments(self.demand.position_m(now_ns).unwrap_or(self.measured_m()));
         target_increments.min(highest.max(here)).max(lowest.min(here))
-    }
-
-    fn push(&mut self, torque_permille: i16) {
-        let asked_n = f64::from(torque_permille) / 1000.0 * self.drive.rated_force_n;
-        let limit_n = self.parameters.force_limit_n;
-        let force_n = asked_n.clamp(-limit_n, limit_n);
-        self.is_cut = force_n.to_bits() != asked_n.to_bits();
-        self.demand.push(force_n);
     }
 
     /// A step of the servo loops with the axis at `position_m`; what went wrong in it.
@@ -314,23 +246,6 @@ impl Axis {
         if is_finished {
             self.enter(self.power.after_completion(), now_ns);
         }
-    }
-
-    /// Under a force the axis may be no faster than it could still stop before the software limits, at the
-    /// profile deceleration (6084).
-    fn servo_limits(&self) -> ServoLimits {
-        let Parameters { velocity_limit_m_s, force_limit_n, position_limits, profile, .. } = self.parameters;
-        let mut free_velocity_m_s = [-velocity_limit_m_s, velocity_limit_m_s];
-        if self.mode == Mode::CyclicTorque {
-            let [lowest_m, highest_m] = position_limits.map(|end| self.metres(end));
-            let at_m = self.servo.position_m();
-            let braking_m_s = |way_m: f64| (2.0 * profile.deceleration_m_s2 * way_m.max(0.0)).sqrt();
-            free_velocity_m_s = [
-                -braking_m_s(at_m - lowest_m).min(velocity_limit_m_s),
-                braking_m_s(highest_m - at_m).min(velocity_limit_m_s),
-            ];
-        }
-        ServoLimits { force_n: force_limit_n, velocity_m_s: velocity_limit_m_s, free_velocity_m_s }
     }
 
     /// Following error beyond its window (6065) for longer than its time-out (6066): fault.

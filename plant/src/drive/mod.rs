@@ -4,12 +4,14 @@
 //! them. What an increment is worth is known to the axis alone: its loops work in SI units.
 
 mod axis;
+mod cyclic;
 mod demand;
 pub(crate) mod dictionary;
 mod errors;
 mod exchange;
 mod heartbeats;
 mod homing;
+mod mode;
 mod node;
 mod outbox;
 mod parameters;

@@ -6,7 +6,8 @@ use masseter_shared::can::cia402::Controlword;
 use masseter_shared::can::{CanId, Frame};
 use masseter_shared::config::DriveConfig;
 
-use super::axis::{Axis, NewTargets};
+use super::axis::Axis;
+use super::cyclic::NewTargets;
 use super::dictionary::{Objects, PDOS, names};
 use super::errors::{DriveError, Errors};
 use super::heartbeats::{Consumer, Producer};

@@ -3,9 +3,9 @@
 
 use masseter_shared::can::canopen::{AbortCode, NodeId, ObjectAddress};
 
-use super::axis::Mode;
 use super::dictionary::{DataType, ENTRIES, MAPPED_MAX, Mapping, Objects, PDOS, WATCHED, find, names};
 use super::homing::Homing;
+use super::mode::Mode;
 use super::pdo::{MappingEntry, NOT_VALID};
 
 /// Signature that object 1010 takes, "save".
