@@ -16,6 +16,8 @@ const RAW: Option<Protocol> = match NonZeroU32::new(1) {
     None => None,
 };
 
+/// Flag of an interface that is up.
+const IFF_UP: u32 = 1;
 /// A folder an interface.
 const INTERFACES: &str = "sys/class/net";
 
@@ -40,23 +42,59 @@ fn support(opened: &io::Result<()>) -> Finding {
     }
 }
 
+/// What keeps an interface from sending.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Obstacle {
+    Down,
+    /// Up, but its controller has gone off the bus.
+    BusOff,
+}
+
+impl Obstacle {
+    /// By the flags and the carrier, which tell the moment: `operstate` follows up to a second later.
+    fn of(root: &SystemRoot, name: &str) -> Option<Self> {
+        let flags = root.text(&of_interface(name, "flags"))?;
+        let flags = u32::from_str_radix(flags.trim_start_matches("0x"), 16).ok()?;
+        if flags & IFF_UP == 0 {
+            return Some(Self::Down);
+        }
+        (root.number(&of_interface(name, "carrier")) == Some(0)).then_some(Self::BusOff)
+    }
+
+    fn in_words(self) -> &'static str {
+        match self {
+            Self::Down => "down",
+            Self::BusOff => "off the bus",
+        }
+    }
+
+    fn mend(self, root: &SystemRoot, name: &str) -> String {
+        match self {
+            Self::Down => bring_up(root, name),
+            Self::BusOff => format!("sudo ip link set {name} type can restart"),
+        }
+    }
+}
+
 fn interfaces(root: &SystemRoot) -> Finding {
     const CHECK: &str = "CAN interfaces";
     let is_can = |name: &String| root.number(&of_interface(name, "type")) == Some(HARDWARE_TYPE);
     let names: Vec<_> = root.names(INTERFACES).into_iter().filter(is_can).collect();
-    let is_down = |name: &&String| root.text(&of_interface(name, "operstate")).as_deref() == Some("down");
-    let down: Vec<_> = names.iter().filter(is_down).cloned().collect();
     if names.is_empty() {
         return Finding::ok(CHECK, "none; the virtual bus needs none");
     }
-    if down.is_empty() {
+    let obstructed: Vec<_> =
+        names.iter().filter_map(|name| Some((name, Obstacle::of(root, name)?))).collect();
+    if obstructed.is_empty() {
         return Finding::ok(CHECK, names.join(", "));
     }
-    let mends: Vec<_> = down.iter().map(|name| bring_up(root, name)).collect();
+    let told: Vec<_> =
+        obstructed.iter().map(|(name, obstacle)| format!("{name} {}", obstacle.in_words())).collect();
+    let mends: Vec<_> = obstructed.iter().map(|(name, obstacle)| obstacle.mend(root, name)).collect();
     Finding::warn(
         CHECK,
-        format!("{}; down: {}", names.join(", "), down.join(", ")),
-        "nothing can be sent on an interface that is down",
+        format!("{}; {}", names.join(", "), told.join(", ")),
+        "nothing can be sent on such an interface",
     )
     .mended_by(mends.join(" && "))
 }
@@ -93,20 +131,26 @@ mod tests {
     }
 
     #[test]
-    fn interfaces_are_told_by_their_hardware_type() {
-        let of = |state| {
-            interfaces(
-                &Fixture::of(&[
-                    ("sys/class/net/eth0/type", "1"),
-                    ("sys/class/net/eth0/operstate", "down"),
-                    ("sys/class/net/can0/type", "280"),
-                    ("sys/class/net/can0/operstate", state),
-                ])
-                .root(),
-            )
+    fn interfaces_are_told_by_their_hardware_type_flags_and_carrier() {
+        let of = |flags, carrier| {
+            let fixture = Fixture::of(&[
+                ("sys/class/net/eth0/type", "1"),
+                ("sys/class/net/eth0/flags", "0x1002"),
+                ("sys/class/net/can0/type", "280"),
+                ("sys/class/net/can0/flags", flags),
+                // As soon after a change.
+                ("sys/class/net/can0/operstate", "down"),
+                ("sys/class/net/can0/carrier", carrier),
+            ]);
+            let finding = interfaces(&fixture.root());
+            (finding.level, finding.found, finding.mend)
         };
-        assert_eq!((of("up").level, of("up").found.as_str()), (Fine, "can0"));
-        assert_eq!(of("down").level, Warn);
+        assert_eq!(of("0x400c1", "1"), (Fine, "can0".to_owned(), None));
+        let (level, found, _) = of("0x400c0", "");
+        assert_eq!((level, found.as_str()), (Warn, "can0; can0 down"));
+        let (level, found, mend) = of("0x400c1", "0");
+        assert_eq!((level, found.as_str()), (Warn, "can0; can0 off the bus"));
+        assert_eq!(mend.as_deref(), Some("sudo ip link set can0 type can restart"));
         assert_eq!(interfaces(&Fixture::of(&[]).root()).level, Fine);
     }
 
@@ -114,10 +158,10 @@ mod tests {
     fn a_bit_rate_is_set_where_a_controller_has_one() {
         let down = Fixture::of(&[
             ("sys/class/net/can0/type", "280"),
-            ("sys/class/net/can0/operstate", "down"),
+            ("sys/class/net/can0/flags", "0x400c0"),
             ("sys/class/net/can0/device/vendor", "0x10e8"),
             ("sys/class/net/vcan0/type", "280"),
-            ("sys/class/net/vcan0/operstate", "down"),
+            ("sys/class/net/vcan0/flags", "0x80"),
         ]);
         assert_eq!(
             interfaces(&down.root()).mend.as_deref(),
