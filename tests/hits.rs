@@ -71,7 +71,7 @@ impl Rig {
         None
     }
 
-    /// What the controller publishes, as a scope would see it. All processes of the rig have been started.
+    /// What the controller publishes, as a scope would see it. The rig has claimed its name, as one of its processes runs.
     fn states(&self) -> Inlet<State> {
         Node::join(&Domain::named(&self.name).unwrap()).unwrap().inlet().unwrap()
     }
