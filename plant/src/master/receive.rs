@@ -98,8 +98,10 @@ impl Master {
         }
     }
 
+    /// Before its boot-up a node tells of a time before this master, which resets it.
     fn note_emergency(&mut self, axis: usize, emergency: Emergency, time_ns: u64) {
-        let kind = if emergency.is_reset() { EventKind::Notice } else { EventKind::Fault };
+        let is_past = emergency.is_reset() || self.nodes[axis].boot.phase() == BootPhase::Waiting;
+        let kind = if is_past { EventKind::Notice } else { EventKind::Fault };
         let values = [f64::from(emergency.code.0), f64::from(emergency.register)];
         self.report(time_ns, Source::Drive, kind, Cause::Emergency, Place::Axis(axis), values);
     }

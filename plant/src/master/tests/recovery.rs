@@ -109,6 +109,20 @@ fn emergencies_come_with_code_and_register_and_go() {
     assert_eq!((told[1].kind, told[1].value, told[1].axis), (EventKind::Notice.code(), 0.0, 3));
 }
 
+/// A drive that missed the heartbeat of a rig before this one may tell so only now.
+#[test]
+fn an_emergency_before_the_boot_up_is_no_fault_of_this_rig() {
+    let mut bench = Bench::new();
+    let id = bench.drive(0).id;
+    let silent = Emergency { code: EmergencyCode::HEARTBEAT, register: 0x11, vendor: [0; 5] };
+    let now_ns = bench.now_ns();
+    bench.wires.wire(0).arrive(now_ns, silent.frame(id));
+    bench.cycles(400, DriveRequest::Enable);
+    assert_eq!(bench.causes(EventKind::Fault), []);
+    assert!(bench.causes(EventKind::Notice).contains(&Cause::Emergency));
+    assert!(bench.all_are(DriveState::OperationEnabled));
+}
+
 #[test]
 fn frames_of_wrong_length_are_told_once_and_so_are_unknown_nodes() {
     let mut bench = Bench::enabled();
