@@ -213,7 +213,7 @@ impl Rig {
     }
 
     /// What ends the run before the controller's part is over, if anything does: the controller is asked to end then.
-    /// Without the plant its own watchdog stops it sooner, unless it still waits for the first readings.
+    /// Without the plant its own watchdog stops it on the way, unless it still waits for the first readings.
     fn disturbance(&mut self, interrupts: &Interrupts) -> io::Result<Ending> {
         let ending = if interrupts.ask() {
             Ending::Interrupted
