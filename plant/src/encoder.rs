@@ -1,6 +1,7 @@
 //! An absolute encoder: quantisation, seeded Gaussian noise and reference marks.
 
 use rand::{RngExt, SeedableRng};
+use rand_distr::StandardNormal;
 use rand_pcg::Pcg64Mcg;
 
 /// Counts from one reference mark to the next; there is one at count 0.
@@ -39,8 +40,8 @@ impl Encoder {
 
     /// The counts read at a true position. Positions beyond the counter's range stand at its end.
     pub(crate) fn read(&mut self, position_m: f64) -> i32 {
-        let noise_m = self.noise_m * self.gaussian();
-        self.nearest(position_m + noise_m)
+        let noise: f64 = self.random.sample(StandardNormal);
+        self.nearest(position_m + self.noise_m * noise)
     }
 
     /// The counts nearest to a position.
@@ -51,12 +52,6 @@ impl Encoder {
     /// The position of so many counts, m.
     pub(crate) fn metres(&self, increments: i32) -> f64 {
         f64::from(increments) * self.resolution_m
-    }
-
-    /// Box–Muller; one of the pair is enough here.
-    fn gaussian(&mut self) -> f64 {
-        let radius = (-2.0 * (1.0 - self.random.random::<f64>()).ln()).sqrt();
-        radius * (std::f64::consts::TAU * self.random.random::<f64>()).cos()
     }
 }
 
