@@ -30,7 +30,8 @@ impl Emulation {
             drives,
             dynamics,
             step_ns,
-            next_step_ns: now_ns,
+            // Half a step beside the SYNCs of a cycle that is a multiple of it, which have enough to do.
+            next_step_ns: now_ns + step_ns / 2,
             moved_to_ns: now_ns,
             force_n: [0.0; AXES],
             truth: Truth::default(),
@@ -79,6 +80,7 @@ impl Emulation {
         for (axis, position_m) in positions_m.into_iter().enumerate() {
             self.force_n[axis] = self.drives[axis].step(now_ns, position_m);
         }
+        self.dynamics.push(&self.force_n)?;
         self.next_step_ns += self.step_ns;
         Ok(())
     }
@@ -98,10 +100,10 @@ impl Emulation {
         self.drives[axis].outgoing()
     }
 
-    /// Integrates under the forces of the last step.
+    /// Under the forces of the last step.
     fn move_mechanism(&mut self, now_ns: u64) -> Result<(), DynamicsError> {
         if now_ns > self.moved_to_ns {
-            self.dynamics.step(&self.force_n, (now_ns - self.moved_to_ns) as f64 * 1e-9)?;
+            self.dynamics.advance((now_ns - self.moved_to_ns) as f64 * 1e-9)?;
             self.moved_to_ns = now_ns;
         }
         Ok(())
@@ -164,11 +166,12 @@ mod tests {
         let scenario = Scenario::default();
         let step_ns = scenario.dynamics.step_ns;
         let mut emulation = build_emulation(&scenario, 0).unwrap();
+        let first_ns = emulation.next_step_ns();
         (0..10).for_each(|_| emulation.step().unwrap());
         let (moved_to_ns, positions_m) = (emulation.moved_to_ns(), emulation.dynamics.positions_m());
 
         assert_eq!(emulation.skip_to(emulation.next_step_ns() + 3 * step_ns + 1), 3 * step_ns);
-        assert_eq!(emulation.next_step_ns(), 13 * step_ns);
+        assert_eq!(emulation.next_step_ns(), first_ns + 13 * step_ns);
         assert_eq!(emulation.moved_to_ns(), moved_to_ns + 3 * step_ns);
         assert!(emulation.dynamics.positions_m().iter().eq(&positions_m));
         assert_eq!(emulation.skip_to(0), 0);

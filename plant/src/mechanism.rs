@@ -29,6 +29,8 @@ pub(crate) struct Dynamics {
     config: DynamicsConfig,
     pose: Pose,
     twist: Twist,
+    /// V̇ under the forces that act.
+    acceleration: Twist,
     joints: Joints,
     jacobian: Jacobian,
     food: Option<Food>,
@@ -54,7 +56,8 @@ impl Dynamics {
     ) -> Result<Self, DynamicsError> {
         let joints = mechanism.inverse(&pose)?;
         let jacobian = mechanism.jacobian(&pose, &joints);
-        let dynamics = Self { mechanism, config, pose, twist: Twist::zeros(), joints, jacobian, food: None };
+        let (twist, acceleration) = (Twist::zeros(), Twist::zeros());
+        let dynamics = Self { mechanism, config, pose, twist, acceleration, joints, jacobian, food: None };
         match dynamics.mass(&dynamics.platform_inertia()).cholesky() {
             Some(_) => Ok(dynamics),
             None => Err(DynamicsError::Mass),
@@ -86,8 +89,9 @@ impl Dynamics {
         (self.jacobian.actuators * self.twist).into()
     }
 
-    /// Lets the actuators' forces (N) act for `dt_s`: semi-implicit Euler.
-    pub(crate) fn step(&mut self, force_n: &[f64; AXES], dt_s: f64) -> Result<(), DynamicsError> {
+    /// Lets these forces of the actuators (N) act from now on: the platform accelerates as it does here until
+    /// the next call.
+    pub(crate) fn push(&mut self, force_n: &[f64; AXES]) -> Result<(), DynamicsError> {
         let (axes, hinges) = self.bias();
         let inertia = self.platform_inertia();
         let axes_n = Vector6::from(*force_n) - self.friction() - self.axis_mass_kg().component_mul(&axes);
@@ -99,11 +103,13 @@ impl Dynamics {
             + food
             - self.gyroscopic(&inertia);
         let solver = self.mass(&inertia).cholesky().ok_or(DynamicsError::Mass)?;
-        self.twist += solver.solve(&wrench) * dt_s;
-        self.move_by(dt_s)
+        self.acceleration = solver.solve(&wrench);
+        Ok(())
     }
 
-    fn move_by(&mut self, dt_s: f64) -> Result<(), DynamicsError> {
+    /// Lets time pass: semi-implicit Euler.
+    pub(crate) fn advance(&mut self, dt_s: f64) -> Result<(), DynamicsError> {
+        self.twist += self.acceleration * dt_s;
         let linear = self.twist.fixed_rows::<3>(0) * dt_s;
         let angular = self.twist.fixed_rows::<3>(3) * dt_s;
         let mut rotation = UnitQuaternion::from_scaled_axis(angular) * self.pose.rotation;
@@ -223,13 +229,18 @@ mod tests {
         }
     }
 
+    fn step(dynamics: &mut Dynamics, force_n: &[f64; AXES], dt_s: f64) {
+        dynamics.push(force_n).unwrap();
+        dynamics.advance(dt_s).unwrap();
+    }
+
     #[test]
     fn forces_that_carry_the_weight_keep_it_at_rest() {
         let mut dynamics = at_rest(frictionless());
         let transposed = dynamics.jacobian.actuators.transpose();
         let force_n: [f64; AXES] = transposed.lu().solve(&-dynamics.gravity()).unwrap().into();
         for _ in 0..8000 {
-            dynamics.step(&force_n, 1.25e-4).unwrap();
+            step(&mut dynamics, &force_n, 1.25e-4);
         }
         assert!((dynamics.pose().translation.z - 0.268_452_355).abs() < 1e-6);
         assert!(dynamics.twist.norm() < 1e-4);
@@ -239,7 +250,7 @@ mod tests {
     fn released_it_falls_as_all_its_moving_masses_weigh() {
         let config = frictionless();
         let mut dynamics = at_rest(config);
-        dynamics.step(&[0.0; AXES], 1.25e-4).unwrap();
+        step(&mut dynamics, &[0.0; AXES], 1.25e-4);
         let acceleration = dynamics.twist[2] / 1.25e-4;
         assert!((-9.9..-9.0).contains(&acceleration), "{acceleration}");
     }
@@ -263,7 +274,7 @@ mod tests {
         let force_n = [3.0, -2.0, 1.0, 2.0, 3.0, 4.0];
         let (start_j, start_m) = (energy_j(&dynamics), dynamics.positions_m());
         for _ in 0..50_000 {
-            dynamics.step(&force_n, 2e-6).unwrap();
+            step(&mut dynamics, &force_n, 2e-6);
         }
         let moved_m = dynamics.positions_m().into_iter().zip(start_m).map(|(end, start)| end - start);
         let work_j: f64 = moved_m.zip(force_n).map(|(moved_m, force_n)| moved_m * force_n).sum();
@@ -278,7 +289,7 @@ mod tests {
         dynamics.twist = Twist::new(0.1, -0.2, 0.15, 2.0, -3.0, 1.0);
         let after = |seconds: f64| {
             let mut moved = dynamics.clone();
-            moved.move_by(seconds).unwrap();
+            moved.advance(seconds).unwrap();
             (moved.jacobian.actuators * moved.twist, moved.jacobian.hinges * moved.twist)
         };
         let h = 1e-5;
@@ -298,7 +309,7 @@ mod tests {
         };
         let mut before = energy(&dynamics);
         for _ in 0..400 {
-            dynamics.step(&[0.0; AXES], 1.25e-4).unwrap();
+            step(&mut dynamics, &[0.0; AXES], 1.25e-4);
             let now = energy(&dynamics);
             assert!(now <= before * (1.0 + 1e-4), "{now} after {before}");
             before = now;
