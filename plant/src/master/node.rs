@@ -32,8 +32,8 @@ pub(super) struct Node {
     pub(super) heard_ns: u64,
     pub(super) is_fresh: bool,
     pub(super) missing_cycles: u32,
-    /// New process data beyond one a SYNC. A drive that is late makes up for a cycle without any, two of one id have
-    /// one more every cycle.
+    /// New process data beyond one a SYNC, of late. A drive that is late makes up for a cycle without any, one that hears
+    /// a repeated SYNC answers it again, two of one id have one more every cycle.
     pub(super) surplus: u32,
     /// New process data since the last SYNC.
     news: u32,
@@ -106,7 +106,10 @@ impl Node {
     /// SYNC asks it for new process data.
     pub(super) fn begin_cycle(&mut self) {
         self.is_fresh = false;
-        self.surplus = (self.surplus + std::mem::take(&mut self.news)).saturating_sub(1);
+        self.surplus = match std::mem::take(&mut self.news) {
+            0 | 1 => self.surplus.saturating_sub(1),
+            several => self.surplus + several - 1,
+        };
     }
 
     /// Takes process data; a statusword without a meaning keeps the last state.
@@ -180,6 +183,11 @@ mod tests {
     fn a_drive_that_answers_late_is_still_one() {
         assert!(surplus(100, |sync| if sync % 2 == 0 { 0 } else { 2 }) <= 1, "every other cycle");
         assert!(surplus(100, |sync| if sync % 4 == 3 { 4 } else { 0 }) <= SURPLUS);
+    }
+
+    #[test]
+    fn a_drive_that_answers_a_repeated_sync_again_is_still_one() {
+        assert!(surplus(10_000, |sync| if sync % 3 == 0 { 2 } else { 1 }) <= 1);
     }
 
     #[test]
