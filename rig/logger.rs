@@ -1,7 +1,8 @@
 //! The logger's process: drains every topic into the recording and to whoever watches the run.
 //!
-//! It runs at ordinary priority on no core of its own, and judges nothing: whatever is said of a run
-//! is computed from the recording afterwards.
+//! It runs at ordinary priority on no core of its own, beside the controller's where only two are left, since the
+//! plant's has less time to spare. It judges nothing: whatever is said of a run is computed from the recording
+//! afterwards.
 
 mod machine_watch;
 mod view;
@@ -14,6 +15,7 @@ use masseter_shared::clock;
 use masseter_shared::geometry::Mechanism;
 use masseter_shared::lifecycle::Assignment;
 use masseter_shared::messages::{Command, Event, FrameTap, Message, Reading, State, Truth};
+use masseter_shared::realtime::scheduling::keep_off;
 use masseter_shared::transport::{BatchInlet, Inlet, Node, TransportError};
 
 use crate::exit::Exit;
@@ -41,6 +43,8 @@ pub struct Show {
 /// received is not safe in the recording.
 pub fn run(assignment: &Assignment, recording: &Path, show: Show) -> anyhow::Result<Exit> {
     let post = assignment.take_up()?;
+    // Before its threads are started.
+    keep_off(&post.scenario.realtime.cores);
     let topics = Topics::open(&post.node)?;
     let scene = Scene::new(&Mechanism::new(&post.scenario.mechanism)?, &post.scenario.jaw);
     let live = match show.live {

@@ -6,6 +6,7 @@
 //! a cycle is not decided here.
 
 mod cycle;
+mod load;
 mod reserve;
 pub mod scheduling;
 mod waiter;

@@ -96,9 +96,32 @@ fn pin(core: usize) -> Result<(), Errno> {
     if core >= CpuSet::MAX_CPU {
         return Err(Errno::INVAL);
     }
+    stay_on(&[core])
+}
+
+fn stay_on(cores: &[usize]) -> Result<(), Errno> {
     let mut set = CpuSet::new();
-    set.set(core);
+    for &core in cores {
+        set.set(core);
+    }
     sched_setaffinity(None, &set)
+}
+
+/// Keeps the calling thread, and those that it starts, off the cores of real-time tasks: off all of them, or off the
+/// last ones where nothing else is left. On the only core it stays.
+pub fn keep_off(cores: &[usize]) {
+    if let Some(left) = cores_beside(&allowed_cores(), cores) {
+        // They are some of those that it runs on; if they are refused all the same, it runs on as before.
+        let _ = stay_on(&left);
+    }
+}
+
+/// Those of the allowed ones that are none of these, or of as many of the last of these as possible.
+fn cores_beside(allowed: &[usize], cores: &[usize]) -> Option<Vec<usize>> {
+    (0..cores.len()).find_map(|first| {
+        let left: Vec<_> = allowed.iter().copied().filter(|core| !cores[first..].contains(core)).collect();
+        (!left.is_empty()).then_some(left)
+    })
 }
 
 fn pinned_core() -> Option<usize> {
@@ -157,6 +180,20 @@ mod tests {
         let wanted = Wanted { core: Some(core), fifo_priority: None, locked_memory: false };
         let obtained = std::thread::spawn(move || obtain(wanted)).join().unwrap();
         assert_eq!((obtained.core, obtained.refusals), (Some(core), Vec::new()));
+    }
+
+    #[test]
+    fn who_has_no_core_of_his_own_leaves_the_last_one_alone_longest() {
+        let cases: [(&[usize], Option<&[usize]>); 5] = [
+            (&[0, 1, 2, 3], Some(&[2, 3])),
+            (&[0, 1], Some(&[0])),
+            (&[0], Some(&[0])),
+            (&[1], None),
+            (&[5], Some(&[5])),
+        ];
+        for (allowed, expected) in cases {
+            assert_eq!(cores_beside(allowed, &[0, 1]).as_deref(), expected, "{allowed:?}");
+        }
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! Waiting for an instant or for a message, and noticing when the machine stood still meanwhile.
 
+use super::load::Load;
 use super::reserve::Reserve;
 use crate::clock;
 
@@ -34,9 +35,8 @@ pub struct Waiter {
     /// The last stretch before a deadline is spun, not slept: a sleeping core takes tens of microseconds to
     /// come back, a spinning one a tenth of one.
     reserve: Reserve,
+    load: Load,
     account: Account,
-    /// End of the last sleep, or of what the reserve has been told of since.
-    awake_since_ns: Option<u64>,
     /// Since when the task has not been waiting; none before its first wait.
     working_since_ns: Option<u64>,
 }
@@ -46,8 +46,8 @@ impl Waiter {
     pub fn new(period_ns: u64) -> Self {
         Self {
             reserve: Reserve::new(period_ns),
+            load: Load::default(),
             account: Account::default(),
-            awake_since_ns: None,
             working_since_ns: None,
         }
     }
@@ -59,14 +59,13 @@ impl Waiter {
 
     /// Sleeps, then spins until `due_ns`; returns the time found at the end.
     pub fn until(&mut self, due_ns: u64) -> u64 {
-        let sleep_until_ns = due_ns.saturating_sub(self.reserve.ns());
         let mut now_ns = self.begin();
+        if let Some(used) = self.load.look(now_ns, self.account.spun_ns + self.account.worked_ns) {
+            self.reserve.yield_to_others(used);
+        }
+        let sleep_until_ns = due_ns.saturating_sub(self.reserve.ns());
         if now_ns < sleep_until_ns {
-            now_ns = self.sleep(now_ns, sleep_until_ns);
-        } else if now_ns < due_ns
-            && let Some(awake_since_ns) = self.awake_since_ns.replace(now_ns)
-        {
-            self.reserve.stay_awake(now_ns - awake_since_ns);
+            now_ns = self.sleep(sleep_until_ns);
         }
         self.spin_until(due_ns, now_ns)
     }
@@ -98,15 +97,13 @@ impl Waiter {
     }
 
     /// Returns the time found at its end.
-    fn sleep(&mut self, from_ns: u64, until_ns: u64) -> u64 {
+    fn sleep(&mut self, until_ns: u64) -> u64 {
         clock::sleep_until(until_ns);
         let woke_ns = clock::now_ns();
         let late_ns = woke_ns.saturating_sub(until_ns);
         // Within the reserve a late return costs nothing.
         self.account.stalled_ns += late_ns.saturating_sub(self.reserve.ns());
-        if let Some(awake_since_ns) = self.awake_since_ns.replace(woke_ns) {
-            self.reserve.learn(from_ns - awake_since_ns, woke_ns - from_ns, late_ns);
-        }
+        self.reserve.learn(late_ns);
         self.working_since_ns = None;
         woke_ns
     }
