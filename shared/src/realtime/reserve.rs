@@ -3,6 +3,8 @@
 //!
 //! Pure: it is told what sleeps did and what share of its core the task used, and reads no clock.
 
+use super::load::MOST_USED;
+
 /// More than this helps nothing: sleeps that come back later are rare, and the machine's stalls are longer, ns.
 const MOST_NS: u64 = 200_000;
 /// The least, ns: what entering and leaving the kernel takes on a busy core.
@@ -15,10 +17,8 @@ const TIMES_LATE: u64 = 2;
 /// Sleeps until two thirds of a reserve that was not needed are forgotten, as a power of two: one that is needed
 /// once in a thousand cycles stays.
 const FORGETTING: u32 = 12;
-/// Share of its core that a task may use. Well below the 95 % at which the kernel throttles real-time tasks.
-const MOST_USED: f64 = 0.85;
-/// A task that used more has a quarter of what it may spin taken from it at each look, and one that did not gets this
-/// part of the most back.
+/// A task that used more than [`MOST_USED`] has a quarter of what it may spin taken from it at each look, and one that did
+/// not gets this part of the most back.
 const GIVEN_BACK: u64 = 16;
 
 /// The stretch before a deadline that is spun, and its bounds, ns.

@@ -98,6 +98,7 @@ impl Waiter {
 
     /// Returns the time found at its end.
     fn sleep(&mut self, until_ns: u64) -> u64 {
+        self.load.count_sleep();
         clock::sleep_until(until_ns);
         let woke_ns = clock::now_ns();
         let late_ns = woke_ns.saturating_sub(until_ns);
