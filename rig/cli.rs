@@ -213,7 +213,8 @@ pub struct FkArgs {
     /// Which iteration: the controller's certified one, the paper's, or Newton-Raphson
     #[arg(long, value_enum, default_value_t)]
     pub(crate) solver: Solver,
-    /// Leg angles to start every line from, radians [default: 1.46 each, the paper's neutral pose]
+    /// Leg angles to start every line from, with --continuous the first, radians [default: the paper's neutral pose,
+    /// 1.46 each; the controller's solver needs none]
     #[arg(long, value_name = "RAD,RAD,RAD", value_parser = parse_guess, allow_hyphen_values = true)]
     pub(crate) guess: Option<[f64; 3]>,
     /// Start each line from the solution of the one before; takes one core only

@@ -3,7 +3,7 @@
 //! `run` starts controller, plant and logger as processes of this same executable
 //! ([`run::supervisor`]), or steps their cores in one thread under virtual time
 //! ([`run::virtual_time`]). Whatever a run tells of itself comes from its recording
-//! ([`analysis`]), so it can be told again.
+//! and manifest ([`analysis`]), so it can be told again.
 
 // What fails to be said must not end a run: see `say`.
 #![warn(clippy::print_stdout, clippy::print_stderr)]

@@ -43,7 +43,7 @@ enum Interval {
     CommandTransport,
     CommandToWire,
     SampleToWire,
-    /// From SYNC to the reading's publication and from its reception to the command's: what both processes and
+    /// From the plant's wake-up to the reading's publication and from its reception to the command's: what both processes and
     /// the wires take, without the waits of the time table.
     RoundTrip,
 }
@@ -52,7 +52,7 @@ enum Interval {
 #[derive(Debug, Clone, Copy)]
 struct Sampled {
     sampled_ns: u64,
-    /// From SYNC to the publication of the reading, ns.
+    /// From the plant's wake-up to the publication of the reading, ns.
     exchange_ns: u64,
 }
 

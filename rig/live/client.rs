@@ -16,7 +16,7 @@ use tungstenite::{Error, accept_hdr_with_config};
 use super::protocol::{self, Asked, Level, Subscription};
 use crate::recording::{Channel, Encoded};
 
-/// What may wait for a client that reads slowly, bytes: 0.2 s of every topic at 1 kHz.
+/// What may wait for a client that reads slowly, bytes: half a second of every topic at 1 kHz.
 const UNREAD_BYTES: usize = 1 << 20;
 /// Bytes gathered before they go to the system.
 const GATHERED_BYTES: usize = 1 << 16;

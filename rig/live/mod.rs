@@ -21,7 +21,7 @@ use server::Server;
 
 /// Where a run is shown unless told otherwise: to this machine only, on Foxglove's usual port.
 pub const DEFAULT_ADDRESS: &str = "127.0.0.1:8765";
-/// Messages on their way to the serving thread: 0.3 s of every topic at 1 kHz.
+/// Messages on their way to the serving thread: almost half a second of every topic at 1 kHz.
 const QUEUE: usize = 8192;
 
 /// Why a run cannot be shown.

@@ -1,7 +1,8 @@
 //! The run under virtual time: the same cores in one thread, as fast as they go, recorded by another.
 //!
 //! Every step happens exactly when the time table has it, so the same scenario and seed leave the
-//! same bytes. Latencies are those of the bus alone; computing takes no time here.
+//! same bytes. Computing takes no time here, and readings and commands go out when the time table has them at the
+//! latest: what varies is the bus.
 
 use masseter_controller::core::{Controller, Tick};
 use masseter_plant::core::PlantCore;

@@ -1,7 +1,7 @@
 //! The one place that asks the machine for time. Cores never come here: they get time as an argument.
 //!
 //! All times are nanoseconds of `CLOCK_MONOTONIC`, the same for every process of a machine. Wall-clock
-//! time serves only to name run folders.
+//! time names and dates runs, and dates what the kernel stamps.
 
 #![allow(clippy::disallowed_methods)]
 

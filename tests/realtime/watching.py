@@ -22,7 +22,7 @@ import tempfile
 import threading
 from pathlib import Path
 
-CHANNELS = 8
+CHANNELS = 9
 TRIES = 5
 INTERVALS = ("plant wake-up", "controller wake-up", "controller cycle")
 # p99.9 is told from 10,000 cycles on.

@@ -1,8 +1,8 @@
 //! Booting the nodes side by side: who may boot, whose SDO request goes out, and when they are started.
 //!
 //! SDO takes place only with nodes that exchange no process data, with one request a bus and cycle,
-//! queued after the process data. So a bus never carries more than the time table allows for
-//! ([`CycleLoad`](masseter_shared::can::CycleLoad)).
+//! queued after the process data. So a bus never carries more than the
+//! [time table](masseter_shared::schedule) allows for.
 
 use masseter_shared::can::Bus;
 use masseter_shared::can::canopen::{Nmt, NmtCommand, NmtTarget};

@@ -11,7 +11,7 @@ use super::scenario::require_positive;
 pub struct ControllerConfig {
     /// Complete readings in a row before the drives are switched on.
     pub steady_readings: u32,
-    /// How long the first readings, and then the enabling of the drives, may take, s.
+    /// How long the first readings, the enabling of the drives, and at the end their switching off may take each, s.
     pub start_timeout_s: f64,
     /// Duration of the move from the measured pose to the first pose of the motion, s.
     pub ease_s: f64,

@@ -40,7 +40,7 @@ pub struct FaultConfig {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub until_s: Option<f64>,
     /// Node id concerned: the sender of a frame, the receiver that loses it, or the node itself. All when
-    /// absent.
+    /// absent; never absent where a node babbles, is cut off or goes off the bus.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub node: Option<u8>,
     /// COB-ID of the frames concerned, or of those that are babbled (11 bits); all when absent.
@@ -49,7 +49,7 @@ pub struct FaultConfig {
     /// Chance that a frame is struck, 0 to 1; only of kinds that strike single frames.
     #[serde(default = "always")]
     pub probability: f64,
-    /// Strikes after which it is over; without end when absent. A disconnection is over by `until_s` alone.
+    /// Strikes after which it is over; when absent one for going off the bus, any number for the others. A disconnection is over by `until_s` alone.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub count: Option<u64>,
     /// How long a frame is delayed, µs.

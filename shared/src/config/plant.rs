@@ -23,8 +23,8 @@ pub struct CanConfig {
     pub fd: bool,
     /// Bit rate of the data phase of FD frames, bit/s.
     pub data_bitrate_bps: u32,
-    /// How long after bus-off a controller restarts by itself, ms; 0 for never (as `ip link … restart-ms`;
-    /// simulated buses only).
+    /// How long after bus-off a controller restarts by itself, ms; 0 for never (as `ip link … restart-ms`).
+    /// On real interfaces only for faults of the scenario; their own setting holds otherwise.
     pub restart_ms: u32,
     /// Which axes (0 to 5: d₁ d₂ d₃ l₁ l₂ l₃) hang on which bus.
     pub buses: Vec<Vec<usize>>,
@@ -147,7 +147,7 @@ impl Default for IdentityConfig {
     }
 }
 
-/// A servo drive with its encoder, as emulated.
+/// A servo drive with its encoder. Scales and limits hold for real ones too, gains and noise for emulated ones.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct DriveConfig {

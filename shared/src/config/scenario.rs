@@ -42,7 +42,7 @@ pub struct Scenario {
     pub controller: ControllerConfig,
     /// The CAN link.
     pub can: CanConfig,
-    /// The emulated drives.
+    /// The drives.
     pub drives: DrivesConfig,
     /// The emulated mechanism.
     pub dynamics: DynamicsConfig,
@@ -53,7 +53,7 @@ pub struct Scenario {
     pub realtime: RealtimeConfig,
     /// What the run is judged by.
     pub checks: ChecksConfig,
-    /// What goes wrong on the simulated buses.
+    /// What goes wrong on the buses.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub faults: Vec<FaultConfig>,
 }

@@ -137,9 +137,9 @@ codes! {
         Controller = 1 "controller",
         /// The plant: CAN master.
         Master = 2 "master",
-        /// The plant: an emulated drive.
+        /// The plant: what a drive told its master.
         Drive = 3 "drive",
-        /// A simulated wire.
+        /// A simulated wire, or the faults of a real one.
         Wire = 5 "wire",
     }
 
@@ -173,7 +173,7 @@ codes! {
         InverseKinematics = 7 "inverse_kinematics",
         /// A reading answers a command that this controller never sent (cycle).
         ForeignCommand = 8 "foreign_command",
-        /// The drives did not reach operation enabled in time (cycles).
+        /// The drives did not reach operation enabled, or at the end off, in time (cycles).
         EnableTimeout = 9 "enable_timeout",
         /// Platform too far from where it should be (m).
         TrackingLost = 10 "tracking_lost",
@@ -205,7 +205,7 @@ codes! {
         SdoAborted = 28 "sdo_aborted",
         /// A node did not answer an SDO request (ms).
         SdoTimeout = 29 "sdo_timeout",
-        /// Two answers came from one node id, of which one was asked for.
+        /// Two nodes have one id: they answer one SDO request twice, or SYNCs more than once again and again.
         DuplicateNode = 30 "duplicate_node",
         /// A node booted although nobody asked it to.
         NodeRestarted = 31 "node_restarted",

@@ -56,7 +56,6 @@ const MEMINFO_DROPS: usize = 8;
 #[derive(Debug)]
 pub struct SocketCan {
     socket: CanFdSocket,
-    interface: String,
     format: FrameFormat,
     transmit_capacity: usize,
     confinement: Confinement,
@@ -79,7 +78,6 @@ impl SocketCan {
         configure(&socket).map_err(failed)?;
         Ok(Self {
             socket,
-            interface: interface.to_owned(),
             format,
             transmit_capacity,
             confinement: Confinement::default(),
@@ -87,11 +85,6 @@ impl SocketCan {
             drained: false,
             dropped: 0,
         })
-    }
-
-    /// Name of the interface.
-    pub fn interface(&self) -> &str {
-        &self.interface
     }
 
     /// Waits until one of the ports has something to fetch, or until `deadline_ns`; or less, when a signal
