@@ -75,9 +75,9 @@ impl Domain {
         domains_of_this_user().join(&self.id)
     }
 
-    /// What the names of its shared-memory files begin with.
+    /// What the names of its shared-memory files begin with, and those of no other domain: no id holds the dot.
     pub fn prefix(&self) -> String {
-        format!("masseter_{}_{}_", getuid().as_raw(), self.id)
+        format!("masseter_{}_{}.", getuid().as_raw(), self.id)
     }
 
     /// Makes the domain ours until the claim and every process started meanwhile are gone.
@@ -196,6 +196,19 @@ mod tests {
         assert!(!domain.is_alive().unwrap());
         assert_eq!(domain.sweep().unwrap(), Some(0));
         assert!(!domain.root().exists());
+    }
+
+    #[test]
+    fn a_domain_whose_id_begins_another_ones_leaves_it_its_files() {
+        let (short, long) =
+            (unique("prefix"), Domain::named(&format!("{}_2", unique("prefix").id())).unwrap());
+        let file = Path::new(SHARED_MEMORY).join(format!("{}segment", long.prefix()));
+        let claim = long.claim().unwrap();
+        fs::write(&file, "").unwrap();
+        assert_eq!(short.sweep().unwrap(), Some(0));
+        assert!(file.exists());
+        drop(claim);
+        assert_eq!(long.sweep().unwrap(), Some(1));
     }
 
     #[test]
