@@ -2,6 +2,7 @@
 
 use anyhow::{Context, bail};
 use masseter_plant::emulator::{Emulator, Figures};
+use masseter_plant::process::{self, Reason};
 use masseter_shared::clock;
 use masseter_shared::config::Scenario;
 use masseter_shared::lifecycle::StopRequest;
@@ -10,13 +11,17 @@ use masseter_shared::realtime::scheduling::{Wanted, obtain};
 use crate::cli::PlantArgs;
 use crate::exit::{Exit, Failure};
 
-/// Runs the plant until it is asked to end.
+/// Runs the plant until it is asked to end. As the supervisor's process, it also ends by a safe stop for want of a
+/// controller.
 pub(crate) fn plant(args: &PlantArgs) -> Result<Exit, Failure> {
-    match args.assignment() {
-        Some(assignment) => masseter_plant::process::run(&assignment)?,
-        None => emulate(args)?,
-    }
-    Ok(Exit::Passed)
+    let Some(assignment) = args.assignment() else {
+        emulate(args)?;
+        return Ok(Exit::Passed);
+    };
+    Ok(match process::run(&assignment)? {
+        Reason::Asked => Exit::Passed,
+        Reason::Abandoned => Exit::SafeStop,
+    })
 }
 
 fn emulate(args: &PlantArgs) -> anyhow::Result<()> {

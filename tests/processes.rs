@@ -4,7 +4,8 @@
 mod common;
 
 use std::fs;
-use std::process::{Child, Command};
+use std::os::unix::process::{CommandExt, ExitStatusExt};
+use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
 use common::{
@@ -12,7 +13,7 @@ use common::{
     take_the_cores,
 };
 use masseter_shared::clock;
-use rustix::process::{Pid, Signal, kill_process};
+use rustix::process::{Pid, Signal, kill_process, kill_process_group};
 
 /// Waits until the recording shows that the rig runs.
 fn wait_until_it_records(bench: &Bench) {
@@ -28,7 +29,11 @@ fn wait_until_it_records(bench: &Bench) {
 
 /// A rig in the midst of a long run.
 fn running() -> (Bench, Child) {
-    let bench = Bench::new(&format!("duration_s = 60.0\n{UNHURRIED}"));
+    running_with(UNHURRIED)
+}
+
+fn running_with(scenario: &str) -> (Bench, Child) {
+    let bench = Bench::new(&format!("duration_s = 60.0\n{scenario}"));
     let child = start(&bench, &[]);
     wait_until_it_records(&bench);
     (bench, child)
@@ -109,6 +114,58 @@ fn a_controller_that_does_not_end_when_asked_to_is_killed() {
     let output = child.wait_with_output().unwrap();
     assert_eq!(output.status.code(), Some(4), "{}{}", stdout(&output), stderr(&output));
     assert!(stdout(&output).contains("did not end when asked to"), "{}", stdout(&output));
+}
+
+#[test]
+fn a_controller_that_hangs_stops_the_rig_though_nobody_asks() {
+    let _cores = take_the_cores();
+    let (bench, child) = running();
+    kill_process(child_of(&child, "controller"), Signal::STOP).unwrap();
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(4), "{}{}", stdout(&output), stderr(&output));
+    let reason = &bench.summary()["verdict"]["reason"];
+    assert_eq!(reason, "the controller died: it sent no command any more, and was killed");
+}
+
+/// As a terminal sends it: to the supervisor and its processes, which may not listen yet.
+#[test]
+fn an_interrupt_before_anything_is_recorded_is_one_too() {
+    let _cores = take_the_cores();
+    for after_ms in [0, 5, 10, 15, 20, 30, 50, 80, 120, 200] {
+        let bench = Bench::new(&format!("duration_s = 60.0\n{UNHURRIED}"));
+        let mut command = bench.run_command(&[]);
+        let child = command.process_group(0).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+        clock::sleep(Duration::from_millis(after_ms));
+        kill_process_group(Pid::from_child(&child), Signal::INT).unwrap();
+        let output = child.wait_with_output().unwrap();
+        let (code, signal) = (output.status.code(), output.status.signal());
+        let is_told = code == Some(130) || signal == Some(Signal::INT.as_raw());
+        assert!(is_told, "after {after_ms} ms: {:?} {}", output.status, stderr(&output));
+    }
+}
+
+#[test]
+fn an_interrupt_hides_no_death() {
+    let _cores = take_the_cores();
+    for role in ["plant", "controller", "logger"] {
+        let (bench, child) = running();
+        let victim = child_of(&child, role);
+        kill_process(Pid::from_child(&child), Signal::INT).unwrap();
+        kill_process(victim, Signal::KILL).unwrap();
+        let output = child.wait_with_output().unwrap();
+        assert_eq!(output.status.code(), Some(4), "{role}: {}{}", stdout(&output), stderr(&output));
+        let reason = &bench.summary()["verdict"]["reason"];
+        assert_eq!(reason, &format!("the {role} died: SIGKILL (9)"));
+    }
+}
+
+#[test]
+fn an_interrupted_motion_may_be_held_for_longer_than_a_process_takes_to_end() {
+    let _cores = take_the_cores();
+    let (_bench, child) = running_with(&UNHURRIED.replace("[controller]", "[controller]\nhold_s = 6.0"));
+    kill_process(Pid::from_child(&child), Signal::INT).unwrap();
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(130), "{}{}", stdout(&output), stderr(&output));
 }
 
 #[test]

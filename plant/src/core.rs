@@ -107,6 +107,11 @@ impl<L: Link> PlantCore<L> {
         Ok(())
     }
 
+    /// Cycles since the last command.
+    pub fn silent_cycles(&self) -> u32 {
+        self.master.silent_cycles()
+    }
+
     /// Stops the drives with the next process data, for the end.
     pub fn stop(&mut self) {
         self.master.stop();

@@ -16,6 +16,17 @@ const STOP_WITHIN_NS: u64 = 500_000_000;
 /// Cycles that they may take at least: the word goes out in one, holds from the next, and is answered in the one after
 /// the ramp.
 const STOP_WITHIN_CYCLES: u64 = 10;
+/// Cycles without a command after which none will come, beyond those that stop the drives, ns.
+const ABANDONED_AFTER_NS: u64 = 5_000_000_000;
+
+/// Why the plant ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Reason {
+    /// It was asked to.
+    Asked,
+    /// Its controller has been silent for so long that it will not speak again.
+    Abandoned,
+}
 
 /// Why the plant could not do its work.
 #[derive(Debug, thiserror::Error)]
@@ -88,8 +99,8 @@ impl Ports {
     }
 }
 
-/// Runs the plant until it is asked to end, then until its drives are off.
-pub fn run(assignment: &Assignment) -> Result<(), PlantProcessError> {
+/// Runs the plant until it is asked to end or its controller hangs, then until its drives are off.
+pub fn run(assignment: &Assignment) -> Result<Reason, PlantProcessError> {
     let post = assignment.take_up()?;
     if post.scenario.can.is_virtual() {
         serve(&post, PlantCore::new)
@@ -101,8 +112,9 @@ pub fn run(assignment: &Assignment) -> Result<(), PlantProcessError> {
 fn serve<L: Link>(
     post: &Post,
     build: impl Fn(&Scenario, u64) -> Result<PlantCore<L>, PlantError>,
-) -> Result<(), PlantProcessError> {
+) -> Result<Reason, PlantProcessError> {
     let (scenario, schedule) = (&post.scenario, &post.schedule);
+    let silence = u64::from(scenario.can.command_timeout_cycles) + ABANDONED_AFTER_NS / scenario.period_ns();
     // Built once before the start, so that a plant that cannot be built is never reported ready.
     build(scenario, 0)?;
     let mut ports = Ports::open(&post.node)?;
@@ -110,7 +122,7 @@ fn serve<L: Link>(
 
     let mut plant = build(scenario, start.epoch_ns)?;
     let mut cycle = Cycle::new(start.epoch_ns, scenario.period_ns());
-    while !post.stop.is_made() {
+    while !post.stop.is_made() && u64::from(plant.silent_cycles()) <= silence {
         let wake = cycle.wait_preparing(|| prepare(&mut plant, &ports))?;
         exchange(&mut plant, &mut ports, schedule, wake, cycle.waiter())?;
         // No command can come before the controller wakes.
@@ -126,7 +138,7 @@ fn serve<L: Link>(
         exchange(&mut plant, &mut ports, schedule, wake, cycle.waiter())?;
         plant.apply(clock::now_ns(), None)?;
     }
-    Ok(())
+    Ok(if post.stop.is_made() { Reason::Asked } else { Reason::Abandoned })
 }
 
 /// Works out what has happened by now, and brings the way out back into the caches.

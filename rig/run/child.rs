@@ -110,7 +110,8 @@ impl Process {
                     let ready = serde_json::from_str(&line);
                     return ready.map(Some).map_err(|error| not_ready(format!("{error} in '{line}'")));
                 }
-                Err(RecvTimeoutError::Timeout) if is_given_up() => return Ok(None),
+                // A key on the terminal reaches it as well, before it listens for signals.
+                Err(_) if is_given_up() => return Ok(None),
                 Err(RecvTimeoutError::Timeout) if looks > 0 => looks -= 1,
                 Err(RecvTimeoutError::Timeout) => {
                     return Err(not_ready(format!("silent for {} s", READY_WITHIN.as_secs())));

@@ -6,6 +6,7 @@
 pub mod child;
 pub(crate) mod counters;
 pub mod dma_latency;
+mod ending;
 pub mod folder;
 pub mod interrupts;
 pub mod manifest;
@@ -50,7 +51,11 @@ pub fn run(args: &RunArgs) -> Result<Exit, Failure> {
     let ending = match claimed {
         None => virtual_time::run(&plan, &folder).map_err(Failure::with(Exit::Incomplete))?,
         Some(claimed) => {
-            let ended = supervisor::run(claimed, &plan, &folder, args)?;
+            let ended = supervisor::run(claimed, &plan, &folder, args).or_else(|failure| {
+                manifest.ending = Ending::died("rig", format!("{:#}", failure.error));
+                keep(&manifest)?;
+                Err(failure)
+            })?;
             manifest.scheduling = ended.scheduling;
             manifest.cpu_dma_latency = ended.cpu_dma_latency;
             manifest.usage = ended.usage;
@@ -59,8 +64,11 @@ pub fn run(args: &RunArgs) -> Result<Exit, Failure> {
     };
     manifest.ending = ending;
     keep(&manifest)?;
-    if manifest.ending == Ending::NotStarted {
-        return Ok(Exit::Invalid);
+    match manifest.ending {
+        Ending::NotStarted => return Ok(Exit::Invalid),
+        // Before there was anything to record.
+        Ending::Interrupted if !folder.recording().exists() => return Ok(Exit::Interrupted),
+        _ => {}
     }
     let figures = analysis::analyse(&folder, &plan.scenario)
         .context("the run's recording cannot be analysed")

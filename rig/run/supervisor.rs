@@ -2,7 +2,8 @@
 //!
 //! Order of ending: the controller first (it brings the drives to rest), then the plant, then the
 //! logger, which drains what is left. A process that dies is not restarted: the rig ends in that order, and the
-//! survivors have come to a safe stop by their own watchdogs by then. One that does not end in time is killed.
+//! survivors have come to a safe stop by their own watchdogs by then. One that does not end in time is killed, and so is
+//! a controller that hangs, of which the plant tells.
 
 use std::collections::BTreeMap;
 use std::io;
@@ -16,8 +17,9 @@ use masseter_shared::lifecycle::Start;
 use masseter_shared::realtime::scheduling::Obtained;
 use masseter_shared::transport::{Claim, Domain, DomainError};
 
-use super::child::{ChildError, Process, Role, describe};
+use super::child::{ChildError, Process, Role};
 use super::dma_latency::{self, DmaLatency};
+use super::ending::{died, of_all, of_the_others};
 use super::folder::RunFolder;
 use super::interrupts::Interrupts;
 use super::plan::Plan;
@@ -35,10 +37,12 @@ const LEAD_NS: u64 = 100_000_000;
 /// SYNC and the controller's deadline keep this clear of whole milliseconds, where the kernel's timer
 /// tick falls, ns.
 const OFF_TICK_NS: u64 = 230_000;
-/// How long a process may take to end when asked to.
+/// How long a process may take to end when asked to, beyond what it has to do first.
 const END_WITHIN_NS: u64 = 5 * SECOND_NS;
 /// How long the logger may take to write what is left: as long as a slow disk needs, ns.
 const RECORD_WITHIN_NS: u64 = 60 * SECOND_NS;
+/// How a controller died that the plant had to end without.
+const SILENT: &str = "it sent no command any more, and was killed";
 /// How long the plant goes on after its master has noticed the controller's death, to stop the drives, ns.
 const SAFE_STOP_NS: u64 = SECOND_NS / 2;
 
@@ -124,8 +128,10 @@ impl Rig {
         for_logger.extend(args.quiet.then_some("--quiet"));
         for_logger.extend(live.as_deref());
         let Scenario { controller, can, .. } = &plan.scenario;
+        // The motion stops, is held, and the drives are switched off.
+        let stop_s = controller.stop_ramp_s + controller.hold_s + controller.start_timeout_s;
         Ok(Self {
-            stop_within_ns: END_WITHIN_NS + (controller.stop_ramp_s * 1e9) as u64,
+            stop_within_ns: ((stop_s * 1e9) as u64).saturating_add(END_WITHIN_NS),
             plant_alone_ns: u64::from(can.command_timeout_cycles) * plan.scenario.period_ns() + SAFE_STOP_NS,
             logger: Process::spawn(Role::Logger, &for_logger)?,
             plant: Process::spawn(Role::Plant, &common)?,
@@ -193,23 +199,18 @@ impl Rig {
                 break Some(status);
             }
             let now_ns = clock::now_ns();
-            if ending != Ending::Completed && now_ns > *give_up_ns.get_or_insert(now_ns + self.stop_within_ns)
-            {
+            let give_up_after_ns = now_ns.saturating_add(self.stop_within_ns);
+            if ending != Ending::Completed && now_ns > *give_up_ns.get_or_insert(give_up_after_ns) {
                 self.controller.kill();
                 break None;
             }
             meter.look(now_ns);
             clock::sleep(WATCH);
         };
-        if ending == Ending::Completed || status.is_none() {
-            ending = self.after_controller(status, interrupts)?;
-        }
+        let controller = self.after_controller(status, interrupts)?;
         let plant = end(&mut self.plant, END_WITHIN_NS, interrupts)?;
         let logger = end(&mut self.logger, RECORD_WITHIN_NS, interrupts)?;
-        Ok(match ending {
-            Ending::Completed | Ending::SafeStop => of_the_others(plant, logger).unwrap_or(ending),
-            _ => ending,
-        })
+        Ok(of_all(ending, controller, of_the_others(plant, logger)))
     }
 
     /// What ends the run before the controller's part is over, if anything does: the controller is asked to end then.
@@ -218,9 +219,13 @@ impl Rig {
         let ending = if interrupts.ask() {
             Ending::Interrupted
         } else if let Some(status) = self.logger.ended()? {
-            Ending::died(Role::Logger.name(), describe(status))
+            died(Role::Logger, Some(status))
         } else if let Some(status) = self.plant.ended()? {
-            Ending::died(Role::Plant.name(), describe(status))
+            if status.code() == Some(Exit::SafeStop as i32) {
+                self.controller.kill();
+                return Ok(Ending::died(Role::Controller.name(), SILENT.to_owned()));
+            }
+            died(Role::Plant, Some(status))
         } else {
             return Ok(Ending::Completed);
         };
@@ -243,23 +248,6 @@ impl Rig {
             }
         }
     }
-}
-
-/// What plant and logger make of a run whose controller ended as it should.
-fn of_the_others(plant: Option<ExitStatus>, logger: Option<ExitStatus>) -> Option<Ending> {
-    if !plant.is_some_and(|status| status.success()) {
-        return Some(died(Role::Plant, plant));
-    }
-    match logger.and_then(|status| status.code()) {
-        Some(code) if code == Exit::Passed as i32 => None,
-        Some(code) if code == Exit::Incomplete as i32 => Some(Ending::RecordingFailed),
-        _ => Some(died(Role::Logger, logger)),
-    }
-}
-
-fn died(role: Role, status: Option<ExitStatus>) -> Ending {
-    let how = status.map_or_else(|| "it did not end when asked to, and was killed".to_owned(), describe);
-    Ending::died(role.name(), how)
 }
 
 /// Asks a process to end, and ends it if it does not; its status if it did.

@@ -234,6 +234,11 @@ impl Master {
         (self.command, self.command_received_ns) = (Some(*command), now_ns);
     }
 
+    /// Cycles since the last command.
+    pub(crate) fn silent_cycles(&self) -> u32 {
+        self.silent_cycles
+    }
+
     /// Whether no drive gives force, as far as they tell.
     pub(crate) fn drives_are_off(&self) -> bool {
         self.nodes.iter().all(|node| {
