@@ -1,12 +1,12 @@
 //! Builds master, wires, drives and mechanism from a scenario, and refuses what cannot work.
 
-use masseter_shared::can::canopen::{NodeId, NodeIdError, sync};
+use masseter_shared::can::canopen::{NodeId, sync};
 use masseter_shared::can::faults::Faults;
 use masseter_shared::can::wire::{INTERFRAME_BITS, frame_bits};
-use masseter_shared::can::wrapped::{NotByPort, PortFaults};
-use masseter_shared::can::{BitrateError, OpenError, VirtualWire, WireConfig};
+use masseter_shared::can::wrapped::PortFaults;
+use masseter_shared::can::{VirtualWire, WireConfig};
 use masseter_shared::config::{CanConfig, DriveConfig, DynamicsConfig, JawConfig, Scenario};
-use masseter_shared::geometry::{AXES, AXIS_NAMES, GeometryError, LEGS, Mechanism, Pose};
+use masseter_shared::geometry::{AXES, LEGS, Mechanism, Pose};
 use masseter_shared::schedule::MASTER_ID;
 use nalgebra::Translation3;
 
@@ -14,77 +14,19 @@ use crate::checks::check_quantities;
 use crate::drive::{DriveNode, DriveSettings};
 use crate::emulation::Emulation;
 use crate::encoder::Encoder;
+use crate::error::PlantError;
 use crate::expectation::setup;
 use crate::faults;
 use crate::food::Food;
 use crate::link::{MASTER_PORT, Place, VirtualLink};
 use crate::master::{DriveSettings as ExpectedDrive, Master, MasterSettings, Scale};
-use crate::mechanism::{Dynamics, DynamicsError};
+use crate::mechanism::Dynamics;
 use crate::socket_link::SocketLink;
 
 /// Frames a port may have to send, and to receive between two looks; a millisecond holds 21.
 const TRANSMIT_CAPACITY: usize = 64;
 const RECEIVE_CAPACITY: usize = 256;
 pub(crate) const MS_NS: u64 = 1_000_000;
-
-/// A plant that cannot be built or cannot go on.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum PlantError {
-    /// The mechanism's dimensions.
-    #[error(transparent)]
-    Geometry(#[from] GeometryError),
-    /// The mechanism's dynamics.
-    #[error(transparent)]
-    Dynamics(#[from] DynamicsError),
-    /// A real interface.
-    #[error(transparent)]
-    Interface(#[from] OpenError),
-    /// The bit rate.
-    #[error("can.bitrate_bps: {0}")]
-    Bitrate(#[from] BitrateError),
-    /// A node id out of range.
-    #[error("can.node_ids: {0}")]
-    NodeId(#[from] NodeIdError),
-    /// Two nodes of one id.
-    #[error(
-        "can.node_ids: node {id} stands twice, or is the master's ({MASTER_ID}); give every drive its own"
-    )]
-    SharedNodeId {
-        /// The id.
-        id: u8,
-    },
-    /// An axis on no bus, on two, or of no such number.
-    #[error("can.buses: axis {axis} is named {times} times; name each of the axes 0 to 5 ({axes}) once", axes = AXIS_NAMES.join(" "))]
-    Axis {
-        /// The axis.
-        axis: usize,
-        /// How often it is named.
-        times: usize,
-    },
-    /// A fault of a node that is not there.
-    #[error("faults.node = {node}: bus {bus} has the nodes {present}")]
-    FaultNode {
-        /// The node named.
-        node: u8,
-        /// The bus named.
-        bus: usize,
-        /// Who is on it.
-        present: String,
-    },
-    /// A fault that needs a simulated wire.
-    #[error("faults: {0}")]
-    NotByPort(#[from] NotByPort),
-    /// A quantity that must be above 0, or at least not below.
-    #[error("{key} = {value}: {need}")]
-    Quantity {
-        /// The key.
-        key: &'static str,
-        /// What stands there.
-        value: f64,
-        /// What may stand there.
-        need: &'static str,
-    },
-}
 
 /// The master of a scenario's plant.
 pub(crate) fn build_master(scenario: &Scenario, now_ns: u64) -> Result<Master, PlantError> {
@@ -201,7 +143,7 @@ fn drive_settings(scenario: &Scenario, node: NodeId, axis: usize) -> DriveSettin
     }
 }
 
-fn master_id() -> NodeId {
+pub(crate) fn master_id() -> NodeId {
     NodeId::new(MASTER_ID).expect("a node id")
 }
 
@@ -327,7 +269,13 @@ mod tests {
             assert!(error.contains(expected), "{error}");
         }
         assert_eq!(check(&default()), Ok(()));
-        assert_eq!(check(&Scenario { rate_hz: 10, ..default() }), Ok(()));
+        let boots_within = |start_timeout_s: f64| {
+            let mut scenario = Scenario { rate_hz: 10, ..default() };
+            scenario.controller.start_timeout_s = start_timeout_s;
+            check(&scenario)
+        };
+        assert!(boots_within(5.0).unwrap_err().to_string().contains("the drives take 10.6 s to boot"));
+        assert_eq!(boots_within(11.0), Ok(()));
     }
 
     #[test]

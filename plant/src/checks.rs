@@ -2,7 +2,10 @@
 
 use masseter_shared::config::{DriveConfig, Scenario};
 
-use crate::build::{MS_NS, PlantError};
+use crate::build::{MS_NS, master_id};
+use crate::error::PlantError;
+use crate::expectation::setup;
+use crate::master::exchanges;
 
 /// Integration steps that resolve the stiffest parts and cost a bearable time, ns.
 const STEPS_NS: std::ops::RangeInclusive<u64> = 10_000..=250_000;
@@ -65,6 +68,20 @@ fn check_times(scenario: &Scenario) -> Result<(), PlantError> {
         return quantity("dynamics.step_ns", dynamics.step_ns as f64, "use 10000 to 250000 ns");
     }
     Ok(())
+}
+
+/// The drives must be able to boot in the time that the controller gives them: every bus carries one SDO request a
+/// cycle, and then some readings in a row have to be whole.
+pub(crate) fn check_boot_time(scenario: &Scenario) -> Result<(), PlantError> {
+    let Scenario { can, controller, rate_hz, .. } = scenario;
+    let fullest = can.buses.iter().map(Vec::len).max().unwrap_or(0);
+    let of_a_drive = exchanges(master_id(), &setup(scenario, master_id(), 0));
+    let cycles = of_a_drive * fullest + controller.steady_readings as usize;
+    let least_s = cycles as f64 * scenario.period_s();
+    if controller.start_timeout_s > least_s {
+        return Ok(());
+    }
+    Err(PlantError::BootTime { start_timeout_s: controller.start_timeout_s, rate_hz: *rate_hz, least_s })
 }
 
 /// The master beats at a SYNC alone: the first one after the interval, which by jitter ends late as often as not.

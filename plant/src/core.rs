@@ -11,8 +11,9 @@ use masseter_shared::config::Scenario;
 use masseter_shared::messages::{Command, Event, FrameTap, Reading, Truth};
 use masseter_shared::realtime::Wake;
 
-pub use crate::build::PlantError;
 use crate::build::{build_master, build_sockets, build_virtual};
+use crate::checks::check_boot_time;
+pub use crate::error::PlantError;
 use crate::link::{Link, VirtualLink};
 use crate::master::Master;
 use crate::socket_link::SocketLink;
@@ -52,6 +53,7 @@ impl PlantCore<SocketLink> {
 /// Refuses a scenario whose plant cannot be built, and interfaces that cannot be used.
 pub fn check(scenario: &Scenario) -> Result<(), PlantError> {
     PlantCore::new(scenario, 0)?;
+    check_boot_time(scenario)?;
     if scenario.can.is_virtual() { Ok(()) } else { PlantCore::on_interfaces(scenario, 0).map(drop) }
 }
 

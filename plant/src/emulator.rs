@@ -10,8 +10,9 @@ use masseter_shared::config::Scenario;
 use masseter_shared::geometry::AXES;
 use masseter_shared::lifecycle::StopRequest;
 
-use crate::build::{PlantError, build_emulation, interfaces_of_axes};
+use crate::build::{build_emulation, interfaces_of_axes};
 use crate::emulation::Emulation;
+use crate::error::PlantError;
 use crate::mechanism::DynamicsError;
 
 /// How often the drives are stepped at least; between two looks only frames wake them, ns.

@@ -6,7 +6,7 @@ use masseter_shared::can::{CanId, Frame};
 use masseter_shared::clock::SECOND_NS;
 use masseter_shared::config::{FaultConfig, FaultKindConfig};
 
-use crate::build::PlantError;
+use crate::error::PlantError;
 
 /// What a babbling node says unless the scenario has it otherwise: nothing but NMT outranks it.
 const BABBLE_ID: u16 = 0x001;

@@ -12,6 +12,7 @@ mod drive;
 mod emulation;
 pub mod emulator;
 mod encoder;
+mod error;
 mod expectation;
 mod faults;
 mod food;
@@ -23,5 +24,5 @@ pub mod process;
 mod socket_link;
 mod wire_events;
 
-pub use build::PlantError;
+pub use error::PlantError;
 pub use mechanism::DynamicsError;

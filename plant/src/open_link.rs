@@ -4,7 +4,8 @@
 use masseter_shared::can::Bus;
 use masseter_shared::config::Scenario;
 
-use crate::build::{PlantError, build_virtual};
+use crate::build::build_virtual;
+use crate::error::PlantError;
 use crate::link::{Link, VirtualLink};
 
 /// Drives, mechanism, buses, and ports for others.

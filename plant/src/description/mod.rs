@@ -11,7 +11,8 @@ use masseter_shared::config::Scenario;
 
 use masseter_shared::geometry::AXES;
 
-use crate::build::{PlantError, all_drive_settings};
+use crate::build::all_drive_settings;
+use crate::error::PlantError;
 
 /// The electronic data sheets of the drives, in the order of the axes.
 ///

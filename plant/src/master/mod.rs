@@ -18,4 +18,4 @@ mod supervision;
 mod tests;
 
 pub(crate) use cycle::{DriveSettings, Master, MasterSettings, Scale};
-pub(crate) use plan::Setup;
+pub(crate) use plan::{Setup, exchanges};

@@ -75,6 +75,17 @@ pub(super) fn plan(node: NodeId, setup: &Setup) -> Vec<Task> {
     tasks
 }
 
+/// SDO exchanges that the tasks take at least: of a drive without a fault that answers as expected at once.
+pub(crate) fn exchanges(node: NodeId, setup: &Setup) -> usize {
+    let tasks = plan(node, setup);
+    let without = |task: &Task| match task {
+        Task::Enter(_) => 1,
+        Task::IfInFault { otherwise_skip } => *otherwise_skip,
+        _ => 0,
+    };
+    tasks.len() - tasks.iter().map(without).sum::<usize>()
+}
+
 fn identify(identity: &IdentityConfig) -> impl Iterator<Item = Task> {
     [
         ((0x1000, 0), identity.device_type),

@@ -1,0 +1,81 @@
+//! Why a plant cannot be built or cannot go on.
+
+use masseter_shared::can::canopen::NodeIdError;
+use masseter_shared::can::wrapped::NotByPort;
+use masseter_shared::can::{BitrateError, OpenError};
+use masseter_shared::geometry::{AXIS_NAMES, GeometryError};
+use masseter_shared::schedule::MASTER_ID;
+
+use crate::mechanism::DynamicsError;
+
+/// A plant that cannot be built or cannot go on.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum PlantError {
+    /// The mechanism's dimensions.
+    #[error(transparent)]
+    Geometry(#[from] GeometryError),
+    /// The mechanism's dynamics.
+    #[error(transparent)]
+    Dynamics(#[from] DynamicsError),
+    /// A real interface.
+    #[error(transparent)]
+    Interface(#[from] OpenError),
+    /// The bit rate.
+    #[error("can.bitrate_bps: {0}")]
+    Bitrate(#[from] BitrateError),
+    /// A node id out of range.
+    #[error("can.node_ids: {0}")]
+    NodeId(#[from] NodeIdError),
+    /// Two nodes of one id.
+    #[error(
+        "can.node_ids: node {id} stands twice, or is the master's ({MASTER_ID}); give every drive its own"
+    )]
+    SharedNodeId {
+        /// The id.
+        id: u8,
+    },
+    /// An axis on no bus, on two, or of no such number.
+    #[error("can.buses: axis {axis} is named {times} times; name each of the axes 0 to 5 ({axes}) once", axes = AXIS_NAMES.join(" "))]
+    Axis {
+        /// The axis.
+        axis: usize,
+        /// How often it is named.
+        times: usize,
+    },
+    /// A fault of a node that is not there.
+    #[error("faults.node = {node}: bus {bus} has the nodes {present}")]
+    FaultNode {
+        /// The node named.
+        node: u8,
+        /// The bus named.
+        bus: usize,
+        /// Who is on it.
+        present: String,
+    },
+    /// A fault that needs a simulated wire.
+    #[error("faults: {0}")]
+    NotByPort(#[from] NotByPort),
+    /// A quantity that must be above 0, or at least not below.
+    #[error("{key} = {value}: {need}")]
+    Quantity {
+        /// The key.
+        key: &'static str,
+        /// What stands there.
+        value: f64,
+        /// What may stand there.
+        need: &'static str,
+    },
+    /// Drives that cannot boot in time.
+    #[error(
+        "controller.start_timeout_s = {start_timeout_s}: at {rate_hz} Hz the drives take {least_s:.1} s to boot, since a bus \
+         carries one SDO request a cycle; use more, or a higher rate_hz"
+    )]
+    BootTime {
+        /// How long they may take, s.
+        start_timeout_s: f64,
+        /// Cycles per second.
+        rate_hz: u32,
+        /// How long they take at least, s.
+        least_s: f64,
+    },
+}
