@@ -66,8 +66,8 @@ pub fn run(args: &RunArgs) -> Result<Exit, Failure> {
     keep(&manifest)?;
     match manifest.ending {
         Ending::NotStarted => return Ok(Exit::Invalid),
-        // Before there was anything to record.
-        Ending::Interrupted if !folder.recording().exists() => return Ok(Exit::Interrupted),
+        // Before the processes were ready, and anything was recorded.
+        Ending::Interrupted if manifest.scheduling.is_empty() => return Ok(Exit::Interrupted),
         _ => {}
     }
     let figures = analysis::analyse(&folder, &plan.scenario)
