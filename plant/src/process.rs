@@ -16,7 +16,7 @@ const STOP_WITHIN_NS: u64 = 500_000_000;
 /// Cycles that they may take at least: the word goes out in one, holds from the next, and is answered in the one after
 /// the ramp.
 const STOP_WITHIN_CYCLES: u64 = 10;
-/// Cycles without a command after which none will come, beyond those that stop the drives, ns.
+/// Silence after which no command will come any more, beyond the one that stops the drives, ns.
 const ABANDONED_AFTER_NS: u64 = 5_000_000_000;
 
 /// Why the plant ended.
@@ -114,7 +114,8 @@ fn serve<L: Link>(
     build: impl Fn(&Scenario, u64) -> Result<PlantCore<L>, PlantError>,
 ) -> Result<Reason, PlantProcessError> {
     let (scenario, schedule) = (&post.scenario, &post.schedule);
-    let silence = u64::from(scenario.can.command_timeout_cycles) + ABANDONED_AFTER_NS / scenario.period_ns();
+    let timeout_cycles = u64::from(scenario.can.command_timeout_cycles);
+    let patience_cycles = timeout_cycles + ABANDONED_AFTER_NS / scenario.period_ns();
     // Built once before the start, so that a plant that cannot be built is never reported ready.
     build(scenario, 0)?;
     let mut ports = Ports::open(&post.node)?;
@@ -122,7 +123,7 @@ fn serve<L: Link>(
 
     let mut plant = build(scenario, start.epoch_ns)?;
     let mut cycle = Cycle::new(start.epoch_ns, scenario.period_ns());
-    while !post.stop.is_made() && u64::from(plant.silent_cycles()) <= silence {
+    while !post.stop.is_made() && u64::from(plant.silent_cycles()) <= patience_cycles {
         let wake = cycle.wait_preparing(|| prepare(&mut plant, &ports))?;
         exchange(&mut plant, &mut ports, schedule, wake, cycle.waiter())?;
         // No command can come before the controller wakes.

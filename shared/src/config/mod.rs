@@ -1,6 +1,6 @@
 //! Scenario files: what a run is made of, resolved and validated before anything starts.
 //!
-//! A scenario is TOML; whatever is left out has a default, so an empty file is the default run. Each part
+//! A scenario is TOML; every table left out has a default, so an empty file is the default run. Each part
 //! stands beside what it configures; checks that need more than the values themselves (does a
 //! trajectory fit the strokes?) are made by those who own the subject.
 
