@@ -24,6 +24,10 @@ impl Outbox {
 
     /// Takes the oldest frame.
     pub(super) fn take(&mut self) -> Option<Frame> {
+        // Asked far more often than there is one: nothing is moved then.
+        if self.count == 0 {
+            return None;
+        }
         let frame = self.frames[self.first].take()?;
         (self.first, self.count) = ((self.first + 1) % CAPACITY, self.count - 1);
         Some(frame)
