@@ -118,7 +118,7 @@ impl Takers {
 }
 
 /// Ends the recording and says what it lacks.
-fn end(backlog: Backlog) -> Exit {
+pub(crate) fn end(backlog: Backlog) -> Exit {
     let outcome = backlog.finish();
     if outcome.lost == 0 && outcome.error.is_none() {
         return Exit::Passed;

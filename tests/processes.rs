@@ -5,7 +5,7 @@ mod common;
 
 use std::fs;
 use std::os::unix::process::{CommandExt, ExitStatusExt};
-use std::process::{Child, Command, Stdio};
+use std::process::{Child, Command, Output, Stdio};
 use std::time::Duration;
 
 use common::{
@@ -13,7 +13,7 @@ use common::{
     take_the_cores,
 };
 use masseter_shared::clock;
-use rustix::process::{Pid, Signal, kill_process, kill_process_group};
+use rustix::process::{Pid, Signal, kill_process, kill_process_group, test_kill_process};
 
 /// Waits until the recording shows that the rig runs.
 fn wait_until_it_records(bench: &Bench) {
@@ -177,6 +177,22 @@ fn an_interrupt_hides_no_death() {
 }
 
 #[test]
+fn who_insists_is_not_told_that_a_process_died_of_it() {
+    let _cores = take_the_cores();
+    let (bench, child) = running();
+    kill_process(child_of(&child, "logger"), Signal::STOP).unwrap();
+    let plant = child_of(&child, "plant");
+    kill_process(Pid::from_child(&child), Signal::TERM).unwrap();
+    while test_kill_process(plant).is_ok() {
+        clock::sleep(Duration::from_millis(10));
+    }
+    kill_process(Pid::from_child(&child), Signal::TERM).unwrap();
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(130), "{}{}", stdout(&output), stderr(&output));
+    assert_eq!(bench.manifest()["ending"]["kind"], "interrupted", "{}", bench.manifest()["ending"]);
+}
+
+#[test]
 fn an_interrupted_motion_may_be_held_for_longer_than_a_process_takes_to_end() {
     let _cores = take_the_cores();
     let (_bench, child) = running_with(&UNHURRIED.replace("[controller]", "[controller]\nhold_s = 6.0"));
@@ -246,29 +262,40 @@ fn what_the_kernel_refuses_is_said_and_required_real_time_exits_with_3() {
     assert!(!bench.manifest()["scheduling"]["plant"]["refusals"].as_array().unwrap().is_empty());
 }
 
-#[test]
-fn a_full_disk_does_not_stop_the_rig() {
-    let _cores = take_the_cores();
+/// What a run says whose folder has room for 2 MiB; none where that cannot be had.
+fn run_on_a_small_disk(arguments: &[&str]) -> Option<Output> {
     if !rustix::process::getuid().is_root() {
         skip("needs root to mount a small disk");
-        return;
+        return None;
     }
-    let bench = Bench::new(&format!("duration_s = 3.0\n{UNHURRIED}"));
-    let disk = bench.file("disk");
-    fs::create_dir(&disk).unwrap();
+    let bench = Bench::new("");
+    let disk = bench.file("");
     let mounted =
         Command::new("mount").args(["-t", "tmpfs", "-o", "size=2m", "tmpfs"]).arg(&disk).status().unwrap();
     assert!(mounted.success());
-    let scenario = bench.file("scenario.toml");
-    let output =
-        Command::new(common::MASSETER).arg("run").arg(scenario).arg("--out").arg(disk.join("run")).output();
-    Command::new("umount").arg(&disk).status().unwrap();
-    let output = output.unwrap();
+    bench.write("scenario.toml", UNHURRIED);
+    let output = bench.run(arguments);
+    let unmounted = Command::new("umount").arg(&disk).status().unwrap();
+    assert!(unmounted.success());
+    Some(output)
+}
+
+#[test]
+fn a_full_disk_does_not_stop_the_rig() {
+    let _cores = take_the_cores();
+    let Some(output) = run_on_a_small_disk(&["--duration", "3s"]) else { return };
     assert_eq!(output.status.code(), Some(6), "{}{}", stdout(&output), stderr(&output));
     let said = stderr(&output);
     assert!(said.contains("the rig goes on"), "{said}");
     assert!(said.contains("No space left on device"), "{said}");
     assert!(said.contains("running       motion    2."), "the rig stopped with its recording: {said}");
+}
+
+#[test]
+fn a_full_disk_ends_a_run_under_virtual_time() {
+    let Some(output) = run_on_a_small_disk(&["--clock", "virtual", "--duration", "3s"]) else { return };
+    assert_eq!(output.status.code(), Some(6), "{}{}", stdout(&output), stderr(&output));
+    assert!(stderr(&output).contains("the run ends here"), "{}", stderr(&output));
 }
 
 #[test]

@@ -110,6 +110,19 @@ fn another_builders_mechanism_runs() {
     assert_eq!(output.status.code(), Some(0), "{}{}", stdout(&output), stderr(&output));
 }
 
+/// A velocity loop far too stiff for the step that it is integrated with.
+#[test]
+fn a_plant_that_fails_is_a_death_as_in_real_time_and_is_told_again() {
+    let bench = Bench::new(
+        "[drives.leg]\nvelocity_gain_n_s_per_m = 6e7\nrated_force_n = 1e7\nmax_force_n = 1e8\nfollowing_error_m = 1.0",
+    );
+    let output = bench.run(&["--clock", "virtual"]);
+    assert_eq!(output.status.code(), Some(4), "{}{}", stdout(&output), stderr(&output));
+    let again = common::masseter(&["report", bench.run_folder().to_str().unwrap()]);
+    assert_eq!(stdout(&again), stdout(&output));
+    assert!(stdout(&again).contains("the plant died: the mechanism"), "{}", stdout(&again));
+}
+
 #[test]
 fn a_check_that_fails_fails_the_run() {
     let bench = Bench::new("duration_s = 1.0\n[checks]\ntracking_rms_mm = 1e-9");

@@ -40,6 +40,14 @@ impl Pace {
         }
     }
 
+    /// What becomes of a run whose recording fails.
+    const fn goes_on(self) -> &'static str {
+        match self {
+            Self::RealTime => "the rig goes on, what follows is not recorded",
+            Self::Virtual => "the run ends here",
+        }
+    }
+
     /// How often everything goes to the disk for good, ns: what a power cut may take.
     const fn flush_every_ns(self) -> Option<u64> {
         match self {
@@ -216,7 +224,7 @@ fn write_batches<W: Medium>(
             Err(error) => (safe, Some(error)),
         },
         Err(error) => {
-            tell!("masseter: {error}; the rig goes on, what follows is not recorded");
+            tell!("masseter: {error}; {}", pace.goes_on());
             (safe, Some(error))
         }
     }

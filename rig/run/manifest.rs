@@ -21,6 +21,9 @@ use crate::report::verdict::Ending;
 /// Version of the manifest's form.
 const FORM: u32 = 1;
 
+/// How the supervisor ended as long as nothing else was written.
+const UNJUDGED: &str = "it did not live to judge the run, or could not write how it ended";
+
 /// The circumstances of a run.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Manifest {
@@ -96,7 +99,7 @@ impl Manifest {
             scheduling: BTreeMap::new(),
             cpu_dma_latency: None,
             usage: RunUsage::default(),
-            ending: Ending::died("supervisor", "it did not live to judge the run".to_owned()),
+            ending: Ending::died("supervisor", UNJUDGED.to_owned()),
         }
     }
 

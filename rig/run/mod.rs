@@ -24,6 +24,7 @@ use crate::report::{self, verdict::Ending};
 use folder::RunFolder;
 use manifest::Manifest;
 use plan::Plan;
+use supervisor::Ended;
 
 /// Plays the motion, judges the run and leaves its folder.
 pub fn run(args: &RunArgs) -> Result<Exit, Failure> {
@@ -48,21 +49,19 @@ pub fn run(args: &RunArgs) -> Result<Exit, Failure> {
     };
     // For a recording that nobody lives to judge.
     keep(&manifest)?;
-    let ending = match claimed {
-        None => virtual_time::run(&plan, &folder).map_err(Failure::with(Exit::Incomplete))?,
-        Some(claimed) => {
-            let ended = supervisor::run(claimed, &plan, &folder, args).or_else(|failure| {
-                manifest.ending = Ending::died("rig", format!("{:#}", failure.error));
-                keep(&manifest)?;
-                Err(failure)
-            })?;
-            manifest.scheduling = ended.scheduling;
-            manifest.cpu_dma_latency = ended.cpu_dma_latency;
-            manifest.usage = ended.usage;
-            ended.ending
-        }
+    let ended = match claimed {
+        None => virtual_time::run(&plan, &folder).map(Ended::from).map_err(Failure::with(Exit::Incomplete)),
+        Some(claimed) => supervisor::run(claimed, &plan, &folder, args),
     };
-    manifest.ending = ending;
+    let ended = ended.or_else(|failure| {
+        manifest.ending = Ending::died("rig", format!("{:#}", failure.error));
+        keep(&manifest)?;
+        Err(failure)
+    })?;
+    manifest.scheduling = ended.scheduling;
+    manifest.cpu_dma_latency = ended.cpu_dma_latency;
+    manifest.usage = ended.usage;
+    manifest.ending = ended.ending;
     keep(&manifest)?;
     match manifest.ending {
         Ending::NotStarted => return Ok(Exit::Invalid),

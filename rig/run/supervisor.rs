@@ -59,14 +59,11 @@ pub struct Ended {
     pub usage: RunUsage,
 }
 
-impl Ended {
-    /// Before the rig was started.
-    fn before_the_start(
-        ending: Ending,
-        scheduling: BTreeMap<String, Obtained>,
-        cpu_dma_latency: Option<DmaLatency>,
-    ) -> Self {
-        Self { ending, scheduling, cpu_dma_latency, usage: RunUsage::default() }
+/// Where no process was started, or none is.
+impl From<Ending> for Ended {
+    fn from(ending: Ending) -> Self {
+        let (scheduling, usage) = (BTreeMap::new(), RunUsage::default());
+        Self { ending, scheduling, cpu_dma_latency: None, usage }
     }
 }
 
@@ -141,7 +138,7 @@ impl Rig {
 
     fn run(&mut self, plan: &Plan, args: &RunArgs, interrupts: &Interrupts) -> anyhow::Result<Ended> {
         let Some(scheduling) = self.wait_ready(interrupts)? else {
-            return Ok(Ended::before_the_start(Ending::Interrupted, BTreeMap::new(), None));
+            return Ok(Ending::Interrupted.into());
         };
         let is_virtual = SystemRoot::of_this_machine().is_virtual();
         let hold = dma_latency::Hold::new(plan.scenario.realtime.cpu_dma_latency, is_virtual);
@@ -149,7 +146,7 @@ impl Rig {
         let refusals = show_refusals(&scheduling, hold.obtained());
         if args.require_rt && refusals > 0 {
             tell!("masseter: real time was required and not granted; nothing was started");
-            return Ok(Ended::before_the_start(Ending::NotStarted, scheduling, cpu_dma_latency));
+            return Ok(Ended { scheduling, cpu_dma_latency, ..Ending::NotStarted.into() });
         }
         let epoch_ns = self.start(plan.scenario.period_ns())?;
         let processes = [&self.logger, &self.plant, &self.controller];
@@ -210,6 +207,9 @@ impl Rig {
         let controller = self.after_controller(status, interrupts)?;
         let plant = end(&mut self.plant, END_WITHIN_NS, interrupts)?;
         let logger = end(&mut self.logger, RECORD_WITHIN_NS, interrupts)?;
+        if interrupts.insist() {
+            return Ok(Ending::Interrupted);
+        }
         Ok(of_all(ending, controller, of_the_others(plant, logger)))
     }
 

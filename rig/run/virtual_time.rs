@@ -5,21 +5,24 @@
 //! latest: what varies is the bus.
 
 use masseter_controller::core::{Controller, Tick};
-use masseter_plant::core::PlantCore;
+use masseter_plant::core::{PlantCore, PlantError};
 use masseter_shared::clock::SECOND_NS;
 use masseter_shared::messages::codes::ControllerState;
 use masseter_shared::messages::{Message, State};
 use masseter_shared::realtime::Wake;
 
+use super::child::Role;
 use super::folder::RunFolder;
 use super::plan::Plan;
+use crate::exit::Exit;
+use crate::logger;
 use crate::recording::{Backlog, Pace, Recorder, Scene};
 use crate::report::verdict::Ending;
 
 /// Virtual time of the first SYNC, ns.
 const EPOCH_NS: u64 = SECOND_NS;
 
-/// Runs the rig under virtual time.
+/// Runs the rig under virtual time; it ends as the processes would.
 pub fn run(plan: &Plan, folder: &RunFolder) -> anyhow::Result<Ending> {
     let scenario = &plan.scenario;
     let mut plant = PlantCore::new(scenario, EPOCH_NS)?;
@@ -27,18 +30,18 @@ pub fn run(plan: &Plan, folder: &RunFolder) -> anyhow::Result<Ending> {
     let scene = Scene::new(&plan.mechanism, &scenario.jaw);
     let mut log = Log::new(Backlog::start(Recorder::create(&folder.recording(), scene)?, Pace::Virtual));
 
-    let mut cycle = 0;
-    while !controller.is_done() && log.is_safe() {
+    let (mut cycle, mut plant_error) = (0, None);
+    while plant_error.is_none() && !controller.is_done() && log.is_safe() {
         cycle += 1;
         let sync_ns = EPOCH_NS + (cycle - 1) * scenario.period_ns();
-        step(cycle, sync_ns, plan, &mut plant, &mut controller, &mut log)?;
+        plant_error = step(cycle, sync_ns, plan, &mut plant, &mut controller, &mut log).err();
     }
-    if let Some(error) = log.backlog.finish().error {
-        return Err(error.into());
-    }
-    Ok(match controller.state() {
-        ControllerState::SafeStop => Ending::SafeStop,
-        _ => Ending::Completed,
+    let is_whole = logger::end(log.backlog) == Exit::Passed;
+    Ok(match (plant_error, controller.state()) {
+        (Some(error), _) => Ending::died(Role::Plant.name(), error.to_string()),
+        _ if !is_whole => Ending::RecordingFailed,
+        (None, ControllerState::SafeStop) => Ending::SafeStop,
+        (None, _) => Ending::Completed,
     })
 }
 
@@ -50,7 +53,7 @@ fn step(
     plant: &mut PlantCore,
     controller: &mut Controller,
     log: &mut Log,
-) -> anyhow::Result<()> {
+) -> Result<(), PlantError> {
     plant.begin_cycle(Wake { cycle, due_ns: sync_ns, woke_ns: sync_ns, skipped: 0, stalled_ns: 0 })?;
     let reading_ns = sync_ns + plan.schedule.reading_by_ns;
     plant.collect(reading_ns)?;
