@@ -31,6 +31,23 @@ fn scenarios_are_refused_with_place_and_remedy() {
 }
 
 #[test]
+fn what_no_rig_can_be_is_neither_planned_nor_described() {
+    let refused = |scenario: &str, verbs: &[&str]| {
+        let bench = Bench::new(scenario);
+        for verb in verbs {
+            let output = masseter(&["can", verb, bench.file("scenario.toml").to_str().unwrap()]);
+            assert_eq!(output.status.code(), Some(2), "can {verb}, {scenario}: {}", stderr(&output));
+        }
+    };
+    refused("rate_hz = 0", &["plan", "eds", "dbc"]);
+    refused("[can]\nnode_ids = [1, 1, 2, 3, 4, 5]", &["plan", "eds", "dbc"]);
+    refused("rate_hz = 10", &["plan"]);
+    for buses in ["[]", "[[0, 1, 2], [3, 4]]", "[[0, 1, 2], [3, 4, 99]]", "[[0, 1, 2], [3, 4, 5], []]"] {
+        refused(&format!("[can]\nbuses = {buses}"), &["plan"]);
+    }
+}
+
+#[test]
 fn recordings_are_refused_with_file_line_and_reason() {
     let head = "time_s,x_mm,y_mm,z_mm,qw,qx,qy,qz\n";
     let rest = |t: f64| format!("{t},0,0,0,1,0,0,0\n");

@@ -172,6 +172,9 @@ fn places(can: &CanConfig) -> Result<[Place; AXES], PlantError> {
     if let Some(axis) = named().find(|&axis| axis >= AXES) {
         return Err(PlantError::Axis { axis, times: named().filter(|&other| other == axis).count() });
     }
+    if let Some(bus) = can.buses.iter().position(Vec::is_empty) {
+        return Err(PlantError::EmptyBus { bus });
+    }
     let mut places = [Place { bus: 0, port: 0 }; AXES];
     for (axis, place) in places.iter_mut().enumerate() {
         let times = named().filter(|&other| other == axis).count();
@@ -251,7 +254,8 @@ mod tests {
             check(&scenario).unwrap_err().to_string()
         };
         let slow = "can.heartbeat_consumer_ms = 90: use more than can.heartbeat_producer_ms and a cycle";
-        let cases: [(String, &str); 12] = [
+        let too_fine = "drives.leg.encoder_resolution_m = 0.000000000001: use more";
+        let cases: [(String, &str); 17] = [
             (with(|s| s.can.heartbeat_consumer_ms = 50), "can.heartbeat_consumer_ms = 50: use more"),
             (with(|s| s.can.heartbeat_consumer_ms = 51), "can.heartbeat_consumer_ms = 51: use more"),
             (with(|s| (s.rate_hz, s.can.heartbeat_consumer_ms) = (10, 90)), slow),
@@ -262,7 +266,12 @@ mod tests {
             (with(|s| s.can.buses = vec![vec![0, 1, 2], vec![3, 4]]), "axis 5 is named 0 times"),
             (with(|s| s.can.buses = vec![vec![0, 1, 2], vec![3, 4, 5, 0]]), "axis 0 is named 2 times"),
             (with(|s| s.can.buses = vec![vec![0, 1, 2], vec![3, 4, 5, 6]]), "axis 6"),
-            (with(|s| s.drives.leg.rated_force_n = f64::NAN), "drives.leg"),
+            (with(|s| s.can.buses.push(Vec::new())), "bus 2 has no drive"),
+            (with(|s| s.drives.leg.rated_force_n = f64::NAN), "drives.leg.rated_force_n = NaN"),
+            (with(|s| s.drives.slide.encoder_noise_m = 1e300), "drives.slide.encoder_noise_m"),
+            (with(|s| s.drives.leg.encoder_resolution_m = 1e-12), too_fine),
+            (with(|s| s.dynamics.viscous_friction_n_s_per_m = 20_000.0), "a dynamics.step_ns of at most"),
+            (with(|s| s.dynamics.slide_friction_n = 1e4), "a dynamics.step_ns of at most"),
             (with(|s| s.dynamics.initial_leg_m = 0.4), "initial_leg_m"),
         ];
         for (error, expected) in cases {

@@ -1,6 +1,7 @@
 //! Quantities of a plant that no physics or bus can have.
 
-use masseter_shared::config::{DriveConfig, Scenario};
+use masseter_shared::config::Scenario;
+use masseter_shared::geometry::LEGS;
 
 use crate::build::{MS_NS, master_id};
 use crate::error::PlantError;
@@ -9,49 +10,91 @@ use crate::master::exchanges;
 
 /// Integration steps that resolve the stiffest parts and cost a bearable time, ns.
 const STEPS_NS: std::ops::RangeInclusive<u64> = 10_000..=250_000;
+/// More is no encoder's, m.
+const NOISIEST_M: f64 = 1e-3;
 
 /// Refuses the first quantity out of its range.
 pub(crate) fn check_quantities(scenario: &Scenario) -> Result<(), PlantError> {
     check_ranges(scenario)?;
+    check_counts(scenario)?;
     check_times(scenario)
 }
 
+/// Each quantity of both kinds of drives, with its key.
+macro_rules! of_both {
+    ($drives:expr, $($field:ident),+) => {
+        [$(
+            (concat!("drives.slide.", stringify!($field)), $drives.slide.$field),
+            (concat!("drives.leg.", stringify!($field)), $drives.leg.$field),
+        )+]
+    };
+}
+
 fn check_ranges(scenario: &Scenario) -> Result<(), PlantError> {
-    let dynamics = &scenario.dynamics;
-    let can = &scenario.can;
+    let Scenario { can, dynamics, drives, .. } = scenario;
     let above_zero = [
-        ("dynamics.step_ns", dynamics.step_ns as f64),
         ("dynamics.carriage_mass_kg", dynamics.carriage_mass_kg),
         ("dynamics.rod_mass_kg", dynamics.rod_mass_kg),
         ("dynamics.platform_mass_kg", dynamics.platform_mass_kg),
         ("dynamics.initial_leg_m", dynamics.initial_leg_m),
-        ("can.heartbeat_producer_ms", f64::from(can.heartbeat_producer_ms)),
         ("can.heartbeat_consumer_ms", f64::from(can.heartbeat_consumer_ms)),
         ("can.boot_timeout_ms", f64::from(can.boot_timeout_ms)),
         ("can.command_timeout_cycles", f64::from(can.command_timeout_cycles)),
     ];
+    let of_drives = of_both!(
+        drives,
+        rated_force_n,
+        max_force_n,
+        max_velocity_m_s,
+        quick_stop_deceleration_m_s2,
+        following_error_m,
+        position_gain_per_s,
+        velocity_gain_n_s_per_m,
+        velocity_integral_time_s,
+        encoder_resolution_m
+    );
     let not_below = [
         ("dynamics.leg_inertia_kg_m2", dynamics.leg_inertia_kg_m2),
         ("dynamics.slide_friction_n", dynamics.slide_friction_n),
         ("dynamics.viscous_friction_n_s_per_m", dynamics.viscous_friction_n_s_per_m),
         ("dynamics.gravity_m_s2", dynamics.gravity_m_s2),
     ];
-    for (key, value) in
-        above_zero.into_iter().chain(drive_quantities(&scenario.drives.slide, &scenario.drives.leg))
-    {
-        if !(value.is_finite() && value > 0.0) {
-            return Err(PlantError::Quantity { key, value, need: "use a finite number above 0" });
-        }
+    let inertia = dynamics.platform_inertia_kg_m2.map(|inertia| ("dynamics.platform_inertia_kg_m2", inertia));
+    require(above_zero.into_iter().chain(of_drives), |value| value > 0.0, "use a finite number above 0")?;
+    require(not_below.into_iter().chain(inertia), |value| value >= 0.0, "use a finite number not below 0")?;
+    let noise = of_both!(drives, encoder_noise_m);
+    require(noise, |value| (0.0..=NOISIEST_M).contains(&value), "use 0 to 0.001 m")
+}
+
+/// Refuses the first of `values` that is not finite, or not as it should be.
+fn require(
+    values: impl IntoIterator<Item = (&'static str, f64)>,
+    is_good: impl Fn(f64) -> bool,
+    need: &'static str,
+) -> Result<(), PlantError> {
+    match values.into_iter().find(|(_, value)| !(value.is_finite() && is_good(*value))) {
+        Some((key, value)) => Err(PlantError::Quantity { key, value, need }),
+        None => Ok(()),
     }
-    for (key, value) in not_below
-        .into_iter()
-        .chain(dynamics.platform_inertia_kg_m2.map(|i| ("dynamics.platform_inertia_kg_m2", i)))
-    {
-        if !(value.is_finite() && value >= 0.0) {
-            return Err(PlantError::Quantity { key, value, need: "use a finite number not below 0" });
+}
+
+/// A drive counts increments in 32 bits (objects 6064 and 607A).
+fn check_counts(scenario: &Scenario) -> Result<(), PlantError> {
+    let Scenario { drives, mechanism, .. } = scenario;
+    let farthest_m =
+        |stroke_m: [f64; 2]| stroke_m.into_iter().fold(0.0, |most_m: f64, end_m| most_m.max(end_m.abs()));
+    let [slide_m, leg_m] = [0, LEGS].map(|axis| farthest_m(mechanism.strokes.of_axis(axis)));
+    let too_fine = [
+        ("drives.slide.encoder_resolution_m", drives.slide.encoder_resolution_m, slide_m),
+        ("drives.leg.encoder_resolution_m", drives.leg.encoder_resolution_m, leg_m),
+    ];
+    match too_fine.into_iter().find(|(_, increment_m, end_m)| end_m / increment_m > f64::from(i32::MAX)) {
+        Some((key, value, _)) => {
+            let need = "use more: the end of the stroke does not fit into 32 bits";
+            Err(PlantError::Quantity { key, value, need })
         }
+        None => Ok(()),
     }
-    Ok(())
 }
 
 /// A heartbeat must be able to arrive before it counts as lost, and the stiffest parts of the rig, brakes
@@ -88,23 +131,4 @@ pub(crate) fn check_boot_time(scenario: &Scenario) -> Result<(), PlantError> {
 fn longest_heartbeat_ns(scenario: &Scenario) -> u64 {
     let interval_ns = u64::from(scenario.can.heartbeat_producer_ms) * MS_NS;
     (interval_ns / scenario.period_ns() + 1) * scenario.period_ns()
-}
-
-fn drive_quantities(slide: &DriveConfig, leg: &DriveConfig) -> impl Iterator<Item = (&'static str, f64)> {
-    [("drives.slide", *slide), ("drives.leg", *leg)].into_iter().flat_map(|(key, drive)| {
-        [
-            drive.rated_force_n,
-            drive.max_force_n,
-            drive.max_velocity_m_s,
-            drive.quick_stop_deceleration_m_s2,
-            drive.following_error_m,
-            drive.position_gain_per_s,
-            drive.velocity_gain_n_s_per_m,
-            drive.velocity_integral_time_s,
-            drive.encoder_resolution_m,
-            // The noise may be zero; that it is a number is all it needs.
-            1.0 + drive.encoder_noise_m.abs(),
-        ]
-        .map(|value| (key, value))
-    })
 }

@@ -42,6 +42,14 @@ pub enum PlantError {
         /// How often it is named.
         times: usize,
     },
+    /// A bus without a drive.
+    #[error(
+        "can.buses: bus {bus} has no drive, and nobody would acknowledge what the master sends; leave it away"
+    )]
+    EmptyBus {
+        /// The bus.
+        bus: usize,
+    },
     /// A fault of a node that is not there.
     #[error("faults.node = {node}: bus {bus} has the nodes {present}")]
     FaultNode {
@@ -55,7 +63,7 @@ pub enum PlantError {
     /// A fault that needs a simulated wire.
     #[error("faults: {0}")]
     NotByPort(#[from] NotByPort),
-    /// A quantity that must be above 0, or at least not below.
+    /// A quantity out of its range.
     #[error("{key} = {value}: {need}")]
     Quantity {
         /// The key.

@@ -16,6 +16,7 @@ mod error;
 mod expectation;
 mod faults;
 mod food;
+mod friction;
 mod link;
 mod master;
 mod mechanism;

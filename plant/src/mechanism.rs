@@ -16,11 +16,7 @@ use masseter_shared::geometry::{AXES, InverseError, Jacobian, Joints, LEGS, Mech
 use nalgebra::{Matrix3, Matrix6, UnitQuaternion, Vector3, Vector6};
 
 use crate::food::Food;
-
-/// Below about this speed Coulomb friction fades towards zero, m/s.
-const STICTION_SPEED_M_S: f64 = 1e-3;
-/// Share of the slides' Coulomb friction that a leg has.
-const LEG_FRICTION_SHARE: f64 = 0.25;
+use crate::friction::Friction;
 
 /// The moving mechanism.
 #[derive(Debug, Clone)]
@@ -33,6 +29,7 @@ pub(crate) struct Dynamics {
     acceleration: Twist,
     joints: Joints,
     jacobian: Jacobian,
+    friction: Friction,
     food: Option<Food>,
 }
 
@@ -45,6 +42,14 @@ pub enum DynamicsError {
     /// The mass matrix cannot be inverted: masses or inertias are not positive.
     #[error("the mechanism's mass matrix is not positive definite; check [dynamics]")]
     Mass,
+    /// Friction that the integration cannot resolve.
+    #[error(
+        "[dynamics]: too much friction for the masses it brakes; use less, or a dynamics.step_ns of at most {longest_step_ns}"
+    )]
+    Friction {
+        /// The longest step that resolves it, ns.
+        longest_step_ns: u64,
+    },
 }
 
 impl Dynamics {
@@ -56,12 +61,26 @@ impl Dynamics {
     ) -> Result<Self, DynamicsError> {
         let joints = mechanism.inverse(&pose)?;
         let jacobian = mechanism.jacobian(&pose, &joints);
+        let friction = Friction::new(&config);
         let (twist, acceleration) = (Twist::zeros(), Twist::zeros());
-        let dynamics = Self { mechanism, config, pose, twist, acceleration, joints, jacobian, food: None };
-        match dynamics.mass(&dynamics.platform_inertia()).cholesky() {
-            Some(_) => Ok(dynamics),
-            None => Err(DynamicsError::Mass),
+        let dynamics =
+            Self { mechanism, config, pose, twist, acceleration, joints, jacobian, friction, food: None };
+        let longest_step_ns = dynamics.longest_step_ns()?;
+        if config.step_ns > longest_step_ns {
+            return Err(DynamicsError::Friction { longest_step_ns });
         }
+        Ok(dynamics)
+    }
+
+    /// The longest step in which friction does not turn a motion into a faster one back: 2 by the greatest
+    /// eigenvalue of M⁻¹ Jᵀ C J, C being how steeply friction grows with speed at rest.
+    fn longest_step_ns(&self) -> Result<u64, DynamicsError> {
+        let mass = self.mass(&self.platform_inertia()).cholesky().ok_or(DynamicsError::Mass)?;
+        let jacobian = &self.jacobian.actuators;
+        let damping =
+            jacobian.transpose() * Matrix6::from_diagonal(&self.friction.damping_n_s_per_m()) * jacobian;
+        let rates_per_s = (mass.inverse() * damping).complex_eigenvalues().map(|rate| rate.re);
+        Ok((2e9 / rates_per_s.max()) as u64)
     }
 
     /// With food between the teeth.
@@ -94,7 +113,9 @@ impl Dynamics {
     pub(crate) fn push(&mut self, force_n: &[f64; AXES]) -> Result<(), DynamicsError> {
         let (axes, hinges) = self.bias();
         let inertia = self.platform_inertia();
-        let axes_n = Vector6::from(*force_n) - self.friction() - self.axis_mass_kg().component_mul(&axes);
+        let axes_n = Vector6::from(*force_n)
+            - self.friction.force_n(&self.velocities_m_s().into())
+            - self.axis_mass_kg().component_mul(&axes);
         let food = self.food.as_mut().map_or_else(Vector6::zeros, |food| food.bite(&self.pose, &self.twist));
         let hinges_nm = hinges * -self.config.leg_inertia_kg_m2;
         let wrench = self.jacobian.actuators.tr_mul(&axes_n)
@@ -174,18 +195,6 @@ impl Dynamics {
         mass
     }
 
-    /// Coulomb and viscous friction of each axis, N.
-    fn friction(&self) -> Vector6<f64> {
-        let velocity = self.jacobian.actuators * self.twist;
-        Vector6::from_fn(|axis, _| {
-            let share = if axis < LEGS { 1.0 } else { LEG_FRICTION_SHARE };
-            let coulomb_n = self.config.slide_friction_n * share;
-            let speed = velocity[axis];
-            coulomb_n * speed / speed.hypot(STICTION_SPEED_M_S)
-                + self.config.viscous_friction_n_s_per_m * speed
-        })
-    }
-
     /// Weight of platform and rods as a wrench on the platform; a rod's centre is taken at its joint.
     fn gravity(&self) -> Vector6<f64> {
         let mut wrench = Vector6::zeros();
@@ -232,6 +241,20 @@ mod tests {
     fn step(dynamics: &mut Dynamics, force_n: &[f64; AXES], dt_s: f64) {
         dynamics.push(force_n).unwrap();
         dynamics.advance(dt_s).unwrap();
+    }
+
+    #[test]
+    fn friction_ends_a_motion_in_steps_that_it_bears_and_feeds_it_in_longer_ones() {
+        let slow = 1e-6;
+        let speed_after = |share_of_longest: f64| {
+            let mut dynamics = at_rest(DynamicsConfig { gravity_m_s2: 0.0, ..DynamicsConfig::default() });
+            let dt_s = share_of_longest * 1e-9 * dynamics.longest_step_ns().unwrap() as f64;
+            dynamics.twist = Twist::repeat(slow);
+            (0..100).for_each(|_| step(&mut dynamics, &[0.0; AXES], dt_s));
+            dynamics.twist.amax()
+        };
+        assert!(speed_after(0.95) < slow);
+        assert!(speed_after(1.05) > 10.0 * slow);
     }
 
     #[test]

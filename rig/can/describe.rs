@@ -21,7 +21,9 @@ pub(crate) fn dbc(path: Option<&Path>) -> Result<Exit, Failure> {
 }
 
 fn scenario(path: Option<&Path>) -> anyhow::Result<Scenario> {
-    Ok(path.map_or_else(|| Ok(Scenario::default()), Scenario::read)?)
+    let scenario = path.map_or_else(|| Ok(Scenario::default()), Scenario::read)?;
+    scenario.validate()?;
+    Ok(scenario)
 }
 
 fn print(text: &str) -> Result<Exit, Failure> {

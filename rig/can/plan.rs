@@ -4,6 +4,7 @@ use std::io::{self, Write as _};
 use std::path::PathBuf;
 
 use clap::Args;
+use masseter_plant::core as plant;
 use masseter_shared::can::{BusPlan, PlannedMessage};
 use masseter_shared::config::Scenario;
 use masseter_shared::schedule::{CycleSchedule, plans};
@@ -31,13 +32,7 @@ pub(crate) fn plan(args: &PlanArgs) -> Result<Exit, Failure> {
     scenario.rate_hz = args.rate_hz.unwrap_or(scenario.rate_hz);
     scenario.validate()?;
     let plans = plans(&scenario.can, scenario.period_ns())?;
-    let schedule = CycleSchedule::new(&scenario.can, scenario.period_ns());
-    let refusal = schedule.as_ref().err().map(|error| {
-        plans
-            .iter()
-            .find_map(|plan| plan.check().err())
-            .map_or_else(|| error.to_string(), |overload| format!("bus {} does not fit", overload.0.bus()))
-    });
+    let refusal = refusal(&scenario, &plans);
     let text = match args.format {
         Format::Human => {
             let tables: String =
@@ -53,6 +48,16 @@ pub(crate) fn plan(args: &PlanArgs) -> Result<Exit, Failure> {
     // A reader that has had enough is no fault of the plan.
     let _ = io::stdout().write_all(text.as_bytes());
     Ok(if refusal.is_none() { Exit::Passed } else { Exit::Usage })
+}
+
+/// Why the rig could not run by the plan.
+fn refusal(scenario: &Scenario, plans: &[BusPlan]) -> Option<String> {
+    if let Some(overload) = plans.iter().find_map(|plan| plan.check().err()) {
+        return Some(format!("bus {} does not fit", overload.0.bus()));
+    }
+    let schedule = CycleSchedule::new(&scenario.can, scenario.period_ns()).map_err(|error| error.to_string());
+    let plant = plant::check(scenario).map_err(|error| error.to_string());
+    schedule.and(plant).err()
 }
 
 fn of_bus(plan: &BusPlan) -> Value {

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
 use masseter_controller::trajectory::{self, Trajectory, TrajectoryReport};
+use masseter_plant::core as plant;
 use masseter_shared::config::{FileConfig, MotionConfig, Scenario};
 use masseter_shared::geometry::Mechanism;
 use masseter_shared::schedule::CycleSchedule;
@@ -53,7 +54,8 @@ impl Plan {
         }
         let mechanism = Mechanism::new(&scenario.mechanism)?;
         let schedule = CycleSchedule::new(&scenario.can, scenario.period_ns())?;
-        masseter_plant::core::check(&scenario).context("the plant cannot be built")?;
+        let is_buildable = plant::check(&scenario).and_then(|()| plant::check_interfaces(&scenario));
+        is_buildable.context("the plant cannot be built")?;
         let trajectory = Trajectory::new(&scenario.motion, &scenario.jaw, &mechanism, scenario.duration_s)?;
         let demands = trajectory::check(&trajectory, &mechanism, &scenario.limits, scenario.period_s())?;
         Ok(Self { scenario, mechanism, trajectory, demands, schedule })

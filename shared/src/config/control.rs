@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::ScenarioError;
-use super::scenario::require_positive;
+use super::need::{require_duration, require_positive};
 
 /// Sequence, pose control and safety of the controller.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -104,12 +104,14 @@ impl Default for ChecksConfig {
 
 impl ControllerConfig {
     pub(super) fn validate(&self) -> Result<(), ScenarioError> {
-        require_positive(&[
-            ("controller.steady_readings", f64::from(self.steady_readings)),
+        require_duration(&[
             ("controller.start_timeout_s", self.start_timeout_s),
             ("controller.ease_s", self.ease_s),
             ("controller.hold_s", self.hold_s),
             ("controller.stop_ramp_s", self.stop_ramp_s),
+        ])?;
+        require_positive(&[
+            ("controller.steady_readings", f64::from(self.steady_readings)),
             ("controller.lead_cycles", self.lead_cycles),
             ("controller.integral_gain_per_s", self.integral_gain_per_s),
             ("controller.trim_limit_m", self.trim_limit_m),

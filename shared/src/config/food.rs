@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::ScenarioError;
+use super::need::require_within;
 
 /// A piece of food, as a body that resists being bitten. The defaults are a soft round piece of 10 mm between the
 /// first molars on the left side.
@@ -36,24 +37,16 @@ impl Default for FoodConfig {
 
 impl FoodConfig {
     pub(super) fn validate(&self) -> Result<(), ScenarioError> {
-        let bad = |key, value: f64, need: &str| {
-            Err(ScenarioError::BadValue { key, value: value.to_string(), need: need.to_owned() })
-        };
-        if let Some(&value) = self.point_m.iter().find(|value| !value.is_finite()) {
-            return bad("food.point_m", value, "use finite coordinates");
-        }
+        let [x_m, y_m, z_m] = self.point_m;
         // Far from what the integration of the mechanism could not resolve.
-        let ranges = [
+        require_within(&[
+            ("food.point_m", x_m, -0.5, 0.5),
+            ("food.point_m", y_m, -0.5, 0.5),
+            ("food.point_m", z_m, -0.5, 0.5),
             ("food.thickness_m", self.thickness_m, 1e-4, 0.05),
             ("food.stiffness_n_per_m", self.stiffness_n_per_m, 1.0, 1e6),
             ("food.damping_n_s_per_m", self.damping_n_s_per_m, 0.0, 1e3),
             ("food.yield_n", self.yield_n, 0.1, 1500.0),
-        ];
-        for (key, value, least, most) in ranges {
-            if !(least..=most).contains(&value) {
-                return bad(key, value, &format!("use {least} to {most}"));
-            }
-        }
-        Ok(())
+        ])
     }
 }

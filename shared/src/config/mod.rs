@@ -7,13 +7,16 @@
 mod control;
 mod faults;
 mod food;
+mod limits;
 mod motion;
+mod need;
 mod plant;
 mod scenario;
 
 pub use control::{ChecksConfig, ControllerConfig, CpuDmaLatency, RealtimeConfig};
 pub use faults::{FaultConfig, FaultKindConfig};
 pub use food::FoodConfig;
+pub use limits::TrajectoryLimitsConfig;
 pub use motion::*;
 pub use plant::{CanConfig, DriveConfig, DrivesConfig, DynamicsConfig, IdentityConfig};
 pub use scenario::{Scenario, ScenarioError};

@@ -231,7 +231,7 @@ impl Default for DrivesConfig {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct DynamicsConfig {
-    /// Integration step of the mechanism and of the drives' inner loops, ns.
+    /// Integration step of the mechanism and of the drives' inner loops, ns; the more friction, the shorter.
     pub step_ns: u64,
     /// Carriage with the fixed part of its leg, moved by a slide, kg.
     pub carriage_mass_kg: f64,

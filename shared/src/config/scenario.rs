@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
+use super::need::require_duration;
 use super::{
     CanConfig, ChecksConfig, ControllerConfig, DrivesConfig, DynamicsConfig, FaultConfig, FoodConfig,
     JawConfig, MotionConfig, RealtimeConfig, TrajectoryLimitsConfig,
@@ -14,8 +15,6 @@ use crate::geometry::MechanismConfig;
 
 /// Rates at which the rig can be asked to run, Hz.
 const RATES_HZ: std::ops::RangeInclusive<u32> = 10..=20_000;
-/// Longest run, s.
-const LONGEST_S: f64 = 86_400.0;
 
 /// Everything a run is made of.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -144,10 +143,8 @@ impl Scenario {
             let need = format!("use {} to {} Hz", RATES_HZ.start(), RATES_HZ.end());
             return bad("rate_hz", self.rate_hz.to_string(), &need);
         }
-        if let Some(duration_s) = self.duration_s
-            && !(duration_s > 0.0 && duration_s <= LONGEST_S)
-        {
-            return bad("duration_s", duration_s.to_string(), "use more than 0 and at most 86400 s");
+        if let Some(duration_s) = self.duration_s {
+            require_duration(&[("duration_s", duration_s)])?;
         }
         if !(1..=99).contains(&self.realtime.priority) {
             return bad("realtime.priority", self.realtime.priority.to_string(), "use 1 to 99 (SCHED_FIFO)");
@@ -173,6 +170,7 @@ impl Scenario {
         if let Some(food) = &self.food {
             food.validate()?;
         }
+        self.limits.validate()?;
         self.controller.validate()?;
         self.checks.validate()
     }
@@ -185,17 +183,6 @@ impl Scenario {
     /// Duration of a cycle, s.
     pub fn period_s(&self) -> f64 {
         self.period_ns() as f64 / SECOND_NS as f64
-    }
-}
-
-/// Refuses the first of `values` that is not a finite number above 0.
-pub(super) fn require_positive(values: &[(&'static str, f64)]) -> Result<(), ScenarioError> {
-    match values.iter().find(|(_, value)| !(value.is_finite() && *value > 0.0)) {
-        Some(&(key, value)) => {
-            let need = "use a finite number above 0".to_owned();
-            Err(ScenarioError::BadValue { key, value: value.to_string(), need })
-        }
-        None => Ok(()),
     }
 }
 
@@ -305,6 +292,16 @@ mod tests {
             ),
             ("[can]\nfd = true\nbitrate_bps = 2000000", "can.bitrate_bps = 2000000: bit rate 2000000"),
             ("[can]\nheartbeat_producer_ms = 0", "can.heartbeat_producer_ms = 0: use at least 1 ms"),
+            (
+                "[controller]\nhold_s = 1e9",
+                "controller.hold_s = 1000000000: use more than 0 and at most 86400 s",
+            ),
+            (
+                "[limits]\nleg_velocity_m_s = nan",
+                "limits.leg_velocity_m_s = NaN: use a finite number above 0",
+            ),
+            ("[limits]\nmax_condition = -1.0", "limits.max_condition = -1: use a finite number above 0"),
+            ("[food]\npoint_m = [0.0, 1e150, 0.0]", "food.point_m"),
             ("[food]\nstiffness_n_per_m = 0.0", "food.stiffness_n_per_m = 0: use 1 to 1000000"),
             ("[food]\nthickness_mm = 10.0", "did you mean `thickness_m`?"),
             ("[[faults]]\nkind = 'melt'\nbus = 0\nfrom_s = 1.0", "unknown variant `melt`"),
