@@ -63,6 +63,8 @@ pub struct Controller {
 
     state: ControllerState,
     cycles_in_state: u64,
+    /// Of those, the cycles since the pose wanted no longer changes.
+    cycles_at_rest: u64,
     last_cycle: u64,
     steady_readings: u32,
     silent_cycles: u64,
@@ -94,6 +96,7 @@ impl Controller {
             velocity_limit_m_s,
             state: ControllerState::WaitReadings,
             cycles_in_state: 0,
+            cycles_at_rest: 0,
             last_cycle: 0,
             steady_readings: 0,
             silent_cycles: 0,
@@ -204,6 +207,7 @@ impl Controller {
         let happening = self.happening(fault.is_some());
         let event = happening.and_then(|happening| self.follow(happening, fault, tick));
         self.cycles_in_state += 1;
+        self.cycles_at_rest = if self.playback.is_at_rest() { self.cycles_at_rest + 1 } else { 0 };
         event
     }
 
@@ -266,7 +270,7 @@ impl Controller {
     /// The most urgent thing that happened.
     fn happening(&self, faulty: bool) -> Option<Happening> {
         let enabled = DriveCondition::OperationEnabled.code();
-        let held_s = self.cycles_in_state as f64 * self.period_s;
+        let held_s = self.cycles_at_rest as f64 * self.period_s;
         let progress = match self.state {
             ControllerState::WaitReadings => {
                 (self.steady_readings >= self.config.steady_readings).then_some(Happening::Steady)
@@ -276,9 +280,7 @@ impl Controller {
             }
             ControllerState::Easing => self.playback.is_over().then_some(Happening::Eased),
             ControllerState::Running => self.playback.is_over().then_some(Happening::Played),
-            ControllerState::Holding => {
-                (self.playback.is_at_rest() && held_s >= self.config.hold_s).then_some(Happening::Rested)
-            }
+            ControllerState::Holding => (held_s >= self.config.hold_s).then_some(Happening::Rested),
             ControllerState::Disabling => self.drives_are_off().then_some(Happening::Released),
             ControllerState::Finished | ControllerState::SafeStop => None,
         };
@@ -311,7 +313,7 @@ impl Controller {
             ControllerState::SafeStop => self.target = self.estimate.map(|estimate| estimate.measured),
             _ => {}
         }
-        (self.state, self.cycles_in_state) = (state, 0);
+        (self.state, self.cycles_in_state, self.cycles_at_rest) = (state, 0, 0);
     }
 }
 

@@ -159,11 +159,11 @@ impl<L: Link> PlantCore<L> {
 
     fn take_tapped(&mut self, bus: usize, tapped: &Tapped) {
         match tapped {
-            Tapped::Frame(received) => {
-                if matches!(Cob::try_from(received.frame.id()), Ok(Cob::Rpdo1(_))) {
-                    self.command_sent_ns = self.command_sent_ns.max(received.time_ns);
-                }
-            }
+            Tapped::Frame(received) => match Cob::try_from(received.frame.id()) {
+                Ok(Cob::Rpdo1(_)) => self.command_sent_ns = self.command_sent_ns.max(received.time_ns),
+                Ok(Cob::Sync) => self.master.note_sync(bus, received.time_ns),
+                _ => {}
+            },
             Tapped::Error(report) => {
                 let axis = self.link.axis_at(bus, usize::from(report.port));
                 if let Some(event) = wire_events::of_report(report, axis, self.cycle) {

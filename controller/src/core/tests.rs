@@ -1,6 +1,6 @@
 //! Scenarios of the controller alone: a plant that does what it is told, and one thing that goes wrong.
 
-use masseter_shared::config::MotionConfig;
+use masseter_shared::config::{ControllerConfig, MotionConfig};
 use masseter_shared::geometry::MechanismConfig;
 use masseter_shared::messages::codes::{DriveRequest, EventKind};
 use masseter_shared::messages::{Command, State};
@@ -187,8 +187,13 @@ fn an_interrupted_motion_slows_down_on_its_path_and_ends_in_order() {
     bench.controller.request_stop();
     bench.run_until(ControllerState::Finished);
     assert_eq!(bench.last_cause(), Cause::Sequence);
-    let holding = bench.events.iter().find(|event| event.to == ControllerState::Holding.code()).unwrap();
+    let entered =
+        |state: ControllerState| bench.events.iter().find(|event| event.to == state.code()).unwrap();
+    let (holding, disabling) = (entered(ControllerState::Holding), entered(ControllerState::Disabling));
     assert_eq!(holding.cause, Cause::StopRequested.code());
+    let ControllerConfig { stop_ramp_s, hold_s, .. } = ControllerConfig::default();
+    let took_s = (disabling.time_ns - holding.time_ns) as f64 * 1e-9;
+    assert!(took_s >= stop_ramp_s + hold_s, "the last pose is held once it stands still: {took_s} s");
 }
 
 /// Every disturbance while the motion plays, and the cause it must be reported with.

@@ -117,7 +117,7 @@ impl Axis {
     pub(super) fn control(&mut self, now_ns: u64, word: Controlword, objects: &Objects) -> bool {
         let before = std::mem::replace(&mut self.controlword, word);
         let was_fault = self.power == DriveState::Fault;
-        self.obey(word.command(before), now_ns);
+        self.obey(word.command(before, self.power), now_ns);
         if self.is_enabled() {
             match self.mode {
                 Mode::ProfilePosition => self.control_positioning(now_ns, before, objects),

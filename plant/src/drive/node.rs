@@ -192,9 +192,10 @@ impl DriveNode {
         self.sdo = SdoServer::default();
     }
 
-    /// The communication objects as stored, then boot-up.
+    /// The communication objects as stored, then boot-up. The history of errors (1003) is kept, as the faults are.
     fn reset_communication(&mut self, now_ns: u64) {
-        self.objects.copy_range(&self.stored, 0x1000..=0x1FFF);
+        self.objects.copy_range(&self.stored, 0x1000..=0x1002);
+        self.objects.copy_range(&self.stored, 0x1004..=0x1FFF);
         self.errors.forget_communication(&mut self.objects);
         self.producer.configure(&self.objects, now_ns + BOOT_NS);
         self.consumer = Consumer::new(&self.objects);

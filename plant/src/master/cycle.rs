@@ -1,7 +1,7 @@
 //! The master's cycle: SYNC and heartbeat, process data in, process data out.
 
-use masseter_shared::can::Bus;
 use masseter_shared::can::canopen::{Heartbeat, NmtState, NodeId, sync};
+use masseter_shared::can::{Bus, ReceiveError};
 use masseter_shared::geometry::AXES;
 use masseter_shared::messages::codes::{Cause, DriveCondition, DriveRequest};
 use masseter_shared::messages::{Command, Event, Reading};
@@ -64,6 +64,10 @@ pub(super) enum Stop {
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct BusWatch {
     pub(super) is_off: bool,
+    /// When the last SYNC was on the wire, as far as the tap tells.
+    pub(super) sync_ns: u64,
+    /// Whether any drive was ever heard.
+    pub(super) is_heard: bool,
     /// Nodes reported as unknown, bit i for node i.
     pub(super) unknown_nodes: u128,
     /// The axis whose SDO request went out last.
@@ -139,12 +143,27 @@ impl Master {
     pub(crate) fn collect(&mut self, now_ns: u64, buses: &mut impl Buses) -> bool {
         for bus in 0..self.settings.buses {
             for _ in 0..FRAMES_AT_ONCE {
-                // What an overrun or a dead interface withholds is missed as process data below.
-                let Ok(Some(received)) = buses.port(bus).receive(now_ns) else { break };
-                self.take(bus, &received);
+                match buses.port(bus).receive(now_ns) {
+                    Ok(Some(received)) => self.take(bus, &received),
+                    // What it lost is missed as process data; what came before and after it is still there.
+                    Err(ReceiveError::Overrun { .. }) => {}
+                    Ok(None) | Err(ReceiveError::InterfaceDown { .. } | ReceiveError::Os { .. }) => break,
+                }
             }
         }
-        self.nodes.iter().all(|node| node.is_fresh)
+        (0..AXES).all(|axis| self.is_fresh(axis))
+    }
+
+    /// A SYNC was seen on a wire, whoever sent it.
+    pub(crate) fn note_sync(&mut self, bus: usize, time_ns: u64) {
+        self.buses[bus].sync_ns = time_ns;
+    }
+
+    /// Whether a drive has answered this cycle's SYNC. Process data of an earlier one may come late, even between the
+    /// moment this one was queued and that in which it was on the wire.
+    pub(super) fn is_fresh(&self, axis: usize) -> bool {
+        let node = &self.nodes[axis];
+        node.answered_ns > self.sync_ns.max(self.buses[node.bus].sync_ns)
     }
 
     /// This cycle's reading, without the times that the link alone knows.
@@ -166,7 +185,7 @@ impl Master {
             reading.position_m[axis] = node.position_m();
             reading.force_n[axis] = node.force_n();
             reading.drive_state[axis] = node.condition().code();
-            reading.fresh_axes |= u32::from(node.is_fresh) << axis;
+            reading.fresh_axes |= u32::from(self.is_fresh(axis)) << axis;
         }
     }
 

@@ -30,7 +30,8 @@ pub(super) struct Node {
     /// Whether it was verified before it was started: only then its process data mean anything.
     pub(super) is_started: bool,
     pub(super) heard_ns: u64,
-    pub(super) is_fresh: bool,
+    /// When its newest process data came.
+    pub(super) answered_ns: u64,
     pub(super) missing_cycles: u32,
     /// New process data beyond one a SYNC, of late. A drive that is late makes up for a cycle without any, one that hears
     /// a repeated SYNC answers it again, two of one id have one more every cycle.
@@ -56,7 +57,7 @@ impl Node {
             nmt: None,
             is_started: false,
             heard_ns: now_ns,
-            is_fresh: false,
+            answered_ns: 0,
             missing_cycles: 0,
             surplus: 0,
             news: 0,
@@ -88,7 +89,7 @@ impl Node {
 
     /// It is told to boot, or did: what it sends until it is started anew means nothing.
     pub(super) fn stop_exchange(&mut self) {
-        (self.is_started, self.power, self.is_fresh) = (false, None, false);
+        (self.is_started, self.power, self.answered_ns) = (false, None, 0);
         self.controlword = Controlword::DISABLE_VOLTAGE;
     }
 
@@ -105,7 +106,6 @@ impl Node {
 
     /// SYNC asks it for new process data.
     pub(super) fn begin_cycle(&mut self) {
-        self.is_fresh = false;
         self.surplus = match std::mem::take(&mut self.news) {
             0 | 1 => self.surplus.saturating_sub(1),
             several => self.surplus + several - 1,
@@ -113,7 +113,7 @@ impl Node {
     }
 
     /// Takes process data; a statusword without a meaning keeps the last state.
-    pub(super) fn take(&mut self, tpdo: Tpdo1, is_fresh: bool) {
+    pub(super) fn take(&mut self, tpdo: Tpdo1, time_ns: u64) {
         if let Ok(state) = tpdo.statusword.state() {
             self.power = Some(state);
         }
@@ -121,7 +121,7 @@ impl Node {
         // A frame that its transmitter had to repeat says the same twice.
         self.news += u32::from(data != (self.actual_increments, self.torque_permille));
         (self.actual_increments, self.torque_permille) = data;
-        self.is_fresh = is_fresh;
+        self.answered_ns = time_ns;
     }
 
     pub(super) fn condition(&self) -> DriveCondition {
@@ -172,7 +172,7 @@ mod tests {
             node.begin_cycle();
             for _ in 0..answers(sync) {
                 let actual_increments = node.actual_increments + 1;
-                node.take(Tpdo1 { statusword, actual_increments, torque_permille: 0 }, true);
+                node.take(Tpdo1 { statusword, actual_increments, torque_permille: 0 }, 0);
             }
         }
         node.begin_cycle();

@@ -18,7 +18,12 @@ impl Master {
             return;
         };
         let (time_ns, data) = (received.time_ns, received.frame.data());
+        // Its own frames do not come back to it.
+        if id == self.settings.id {
+            return self.fail(time_ns, Cause::SecondMaster, Place::Bus(bus), [0.0; 2]);
+        }
         let Some(axis) = self.axis_of(id, bus) else { return self.note_unknown(time_ns, id, bus) };
+        self.buses[bus].is_heard = true;
         let taken = match cob {
             Cob::Heartbeat(_) => self.take_heartbeat(axis, data, time_ns),
             Cob::Tpdo1(_) => Tpdo1::decode(data).map(|tpdo| self.take_process_data(axis, tpdo, time_ns)),
@@ -87,8 +92,7 @@ impl Master {
             return;
         }
         let before = node.condition();
-        // Process data of an earlier SYNC may come late; they are no answer to this one.
-        node.take(tpdo, time_ns > self.sync_ns);
+        node.take(tpdo, time_ns);
         let after = node.condition();
         self.complete_ns = self.complete_ns.max(time_ns);
         if before != after {
@@ -117,7 +121,7 @@ impl Master {
     fn note_unknown(&mut self, time_ns: u64, id: NodeId, bus: usize) {
         let bit = 1 << id.get();
         let watch = &mut self.buses[bus];
-        if id != self.settings.id && watch.unknown_nodes & bit == 0 {
+        if watch.unknown_nodes & bit == 0 {
             watch.unknown_nodes |= bit;
             let event = Event { node: u16::from(id.get()), ..Event::default() };
             let codes = (Source::Master, EventKind::Notice, Cause::UnknownNode);

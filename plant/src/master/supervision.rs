@@ -51,8 +51,9 @@ impl Master {
 
     /// A verified node must be heard, and an operational one answer every SYNC, once.
     fn watch_node(&mut self, now_ns: u64, axis: usize) {
+        let is_fresh = self.is_fresh(axis);
         let node = &mut self.nodes[axis];
-        if node.is_operational() && !node.is_fresh {
+        if node.is_operational() && !is_fresh {
             node.missing_cycles += 1;
         }
         let silent_ns = now_ns.saturating_sub(node.heard_ns);
@@ -128,10 +129,15 @@ impl Master {
     }
 
     pub(super) fn check_sent(&mut self, bus: usize, result: Result<(), SendError>) {
-        // A bus that is off is reported as such.
-        if let Err(error) = result
-            && !matches!(error, SendError::BusOff { .. })
-        {
+        let is_known = match result {
+            Ok(()) => return,
+            // A bus that is off is reported as such.
+            Err(SendError::BusOff { .. }) => true,
+            // Before any drive is switched on, nobody acknowledges; those that do not come are reported.
+            Err(SendError::QueueFull { .. }) => !self.buses[bus].is_heard,
+            Err(_) => false,
+        };
+        if !is_known {
             self.fail(self.wake.woke_ns, Cause::BusRefused, Place::Bus(bus), [0.0; 2]);
         }
     }

@@ -266,7 +266,7 @@ mod tests {
             ("[realtime]\ncores = [1, 1]", "realtime.cores = 1,1: name two"),
             ("[can]\ninterfaces = ['can0']", "can.interfaces = can0: name 2 interfaces"),
             ("[can]\ninterfaces = ['can0', 'can0']", "name 2 interfaces"),
-            ("[controller]\nease_s = 0.0", "controller.ease_s = 0: use a finite number above 0"),
+            ("[controller]\nease_s = 0.0", "controller.ease_s = 0: use more than 0"),
             ("[checks]\ntracking_rms_mm = inf", "checks.tracking_rms_mm"),
             ("[drives.leg]\nmax_force = 1.0", "did you mean `max_force_n`?"),
             ("name = ", "s.toml:1"),

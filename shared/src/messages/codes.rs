@@ -219,6 +219,8 @@ codes! {
         WrongLength = 35 "wrong_length",
         /// A node that is not configured is on the bus.
         UnknownNode = 36 "unknown_node",
+        /// Another node has the master's id: its heartbeats would keep the drives going without this master.
+        SecondMaster = 37 "second_master",
         /// A CAN controller became error active again (transmit error counter).
         ErrorActive = 40 "error_active",
         /// A CAN controller became error passive (transmit error counter).

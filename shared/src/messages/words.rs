@@ -56,6 +56,7 @@ fn complaint(cause: Cause, event: &Event) -> Option<String> {
             format!("frame {:03X}h has {value} data bytes, expected {limit}", event.object)
         }
         Cause::UnknownNode => "a node that no axis is configured with".to_owned(),
+        Cause::SecondMaster => "another node has the master's id".to_owned(),
         _ => return None,
     })
 }
@@ -78,6 +79,9 @@ const fn remedy(cause: Cause) -> Option<&'static str> {
         Cause::BusRefused => "see that the interface is up, and that somebody acknowledges",
         Cause::WrongLength => "see who else sends with this identifier, and how the PDO is mapped",
         Cause::UnknownNode => "see can.buses and can.node_ids",
+        Cause::SecondMaster => {
+            "let one master guide the drives: end the other, or give that node an id of its own"
+        }
         _ => return None,
     })
 }

@@ -106,6 +106,38 @@ fn a_lost_synchronisation_costs_one_drive_one_cycle() {
     assert_eq!((ended.value, ended.limit, ended.axis), (1.0, 1.0, 0));
 }
 
+/// Those of 855 µs even come between the moment the next SYNC is queued and that in which it is on the wire.
+#[test]
+fn process_data_of_the_cycle_before_are_no_answer_however_late_they_come() {
+    for delay_us in [600, 700, 855] {
+        let fault = FaultConfig {
+            kind: FaultKindConfig::Delay,
+            id: Some(0x181),
+            node: Some(1),
+            delay_us: Some(delay_us),
+            ..BASE
+        };
+        let mut bench = struck_by(fault);
+        play_until(&mut bench, 0.6);
+        assert_eq!(bench.reading.fresh_axes & 1, 0, "late by {delay_us} µs");
+    }
+}
+
+#[test]
+fn drives_that_are_switched_on_after_the_master_are_waited_for() {
+    let faults = [1, 2, 3].map(|node| FaultConfig {
+        kind: FaultKindConfig::Disconnect,
+        node: Some(node),
+        from_s: 0.0,
+        until_s: Some(0.5),
+        ..BASE
+    });
+    let mut bench = Bench::new(&Scenario { faults: faults.into(), ..Scenario::default() });
+    (0..600).for_each(|_| bench.cycle(None));
+    bench.enable();
+    assert_eq!(bench.causes(EventKind::Fault), []);
+}
+
 #[test]
 fn a_fault_of_an_absent_node_is_refused() {
     let fault = FaultConfig { kind: FaultKindConfig::Disconnect, node: Some(5), ..BASE };

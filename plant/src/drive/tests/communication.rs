@@ -184,6 +184,9 @@ fn errors_are_kept_in_the_history_until_it_is_cleared() {
     bench.receive(pdo(0x204, &[0; 6]));
     assert_eq!(bench.emergencies(), [EmergencyCode::PDO_LENGTH, EmergencyCode::RESET]);
     assert_eq!((bench.read((0x1001, 0)), bench.read((0x603F, 0))), (Ok(0), Ok(0)));
+    bench.nmt(NmtCommand::ResetCommunication);
+    bench.run_ms(25);
+    assert_eq!((bench.read((0x1003, 0)), bench.read((0x1003, 1))), (Ok(1), Ok(0x8210)));
     bench.write((0x1003, 0), &[0]).unwrap();
     assert_eq!((bench.read((0x1003, 0)), bench.read((0x1003, 1))), (Ok(0), Err(AbortCode::NO_DATA)));
 }

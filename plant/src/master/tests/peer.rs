@@ -154,7 +154,7 @@ impl Peer {
     }
 
     fn control(&mut self, word: Controlword) {
-        let after = self.power.after(word.command(self.controlword));
+        let after = self.power.after(word.command(self.controlword, self.power));
         self.controlword = word;
         if self.power != DriveState::Fault || self.can_reset {
             self.power = after;
@@ -202,6 +202,8 @@ pub(super) struct Wire {
     arrived: VecDeque<Received>,
     /// Whether the master's controller is off the bus.
     pub(super) is_off: bool,
+    /// Frames lost for want of room, which is told once.
+    pub(super) lost: u64,
 }
 
 /// Both wires, three drives each.
@@ -211,7 +213,7 @@ impl Wires {
     pub(super) fn new(peers: [Peer; AXES]) -> Self {
         let mut peers = Vec::from(peers);
         let second = peers.split_off(AXES / 2);
-        Self([peers, second].map(|peers| Wire { peers, arrived: VecDeque::new(), is_off: false }))
+        Self([peers, second].map(|peers| Wire { peers, arrived: VecDeque::new(), is_off: false, lost: 0 }))
     }
 
     pub(super) fn peer(&mut self, axis: usize) -> &mut Peer {
@@ -257,7 +259,10 @@ impl Bus for &mut Wire {
     }
 
     fn receive(&mut self, _now_ns: u64) -> Result<Option<Received>, ReceiveError> {
-        Ok(self.arrived.pop_front())
+        match std::mem::take(&mut self.lost) {
+            0 => Ok(self.arrived.pop_front()),
+            lost => Err(ReceiveError::Overrun { lost }),
+        }
     }
 
     fn status(&self) -> BusStatus {

@@ -140,3 +140,23 @@ fn frames_of_wrong_length_are_told_once_and_so_are_unknown_nodes() {
     assert_eq!((wrong.object, wrong.value, wrong.limit), (0x81, 3.0, 8.0));
     assert!(bench.all_are(DriveState::OperationEnabled));
 }
+
+#[test]
+fn a_second_master_stops_the_drives() {
+    let mut bench = Bench::enabled();
+    let (now_ns, id) = (bench.now_ns(), bench.master.settings.id);
+    bench.wires.wire(1).arrive(now_ns, Heartbeat { state: NmtState::Operational }.frame(id));
+    bench.cycles(3, DriveRequest::Enable);
+    assert_eq!(bench.causes(EventKind::Fault), [Cause::SecondMaster]);
+    assert!(bench.nobody_is_enabled());
+}
+
+#[test]
+fn an_overrun_withholds_no_frame_that_is_still_there() {
+    let mut bench = Bench::enabled();
+    for _ in 0..20 {
+        bench.wires.wire(0).lost = 1;
+        bench.cycle(Some(DriveRequest::Enable));
+        assert_eq!(bench.reading.fresh_axes, 0b11_1111);
+    }
+}

@@ -5,6 +5,8 @@
 
 use std::fmt;
 
+use super::DriveState;
+
 const SWITCH_ON: u16 = 1 << 0;
 const ENABLE_VOLTAGE: u16 = 1 << 1;
 /// Low-active: cleared, it asks for a quick stop.
@@ -53,12 +55,13 @@ impl Controlword {
     /// Fault reset; it takes a controlword without this bit before it.
     pub const FAULT_RESET: Self = Self(FAULT_RESET);
 
-    /// What the drive is asked to do, given the controlword it had before.
+    /// What a drive in that state is asked to do, given the controlword it had before.
     ///
-    /// Fault reset is the rising edge of bit 7. A bit 7 that stays set is ignored rather than taken to
+    /// Fault reset is the rising edge of bit 7 in the state fault. Any other bit 7 is ignored rather than taken to
     /// void the other bits, so that it can never mask a quick stop.
-    pub const fn command(self, previous: Self) -> Command {
-        if self.has(FAULT_RESET) && !previous.has(FAULT_RESET) {
+    pub const fn command(self, previous: Self, state: DriveState) -> Command {
+        let is_edge = self.has(FAULT_RESET) && !previous.has(FAULT_RESET);
+        if is_edge && matches!(state, DriveState::Fault) {
             Command::FaultReset
         } else if !self.has(ENABLE_VOLTAGE) {
             Command::DisableVoltage
@@ -128,7 +131,7 @@ mod tests {
         ];
         for (word, bits, command) in table {
             assert_eq!(word.0, bits);
-            assert_eq!(word.command(IDLE), command);
+            assert_eq!(word.command(IDLE, DriveState::Fault), command);
         }
     }
 
@@ -141,17 +144,25 @@ mod tests {
             (0b1_0111_1111, Command::EnableOperation),
         ];
         for (bits, command) in table {
-            assert_eq!(Controlword(bits).command(IDLE), command, "{bits:04X}h");
+            assert_eq!(Controlword(bits).command(IDLE, DriveState::Fault), command, "{bits:04X}h");
         }
     }
 
     #[test]
     fn only_the_rising_edge_of_bit_7_resets() {
         for previous in 0..=0xFF {
-            let command = Controlword::FAULT_RESET.command(Controlword(previous));
+            let command = Controlword::FAULT_RESET.command(Controlword(previous), DriveState::Fault);
             assert_eq!(command == Command::FaultReset, previous & FAULT_RESET == 0);
         }
+    }
+
+    #[test]
+    fn bit_7_masks_no_stop() {
         let held = Controlword(Controlword::QUICK_STOP.0 | FAULT_RESET);
-        assert_eq!(held.command(Controlword::FAULT_RESET), Command::QuickStop);
+        assert_eq!(held.command(Controlword::FAULT_RESET, DriveState::Fault), Command::QuickStop);
+        let enabled = DriveState::OperationEnabled;
+        assert_eq!(held.command(Controlword::ENABLE_OPERATION, enabled), Command::QuickStop);
+        let off = Controlword::FAULT_RESET.command(Controlword::ENABLE_OPERATION, enabled);
+        assert_eq!(off, Command::DisableVoltage);
     }
 }

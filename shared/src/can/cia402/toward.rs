@@ -42,7 +42,8 @@ mod tests {
         let mut states = vec![start];
         for _ in 0..STEPS {
             let word = toward(state, wanted, previous);
-            state = state.after_completion().after(word.command(previous));
+            state = state.after_completion();
+            state = state.after(word.command(previous, state));
             previous = word;
             states.push(state);
         }

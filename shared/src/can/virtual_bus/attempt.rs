@@ -182,8 +182,7 @@ impl VirtualWire {
 
     /// Whether some port that does not send the frame hears it.
     fn is_acknowledged(&self, attempt: &Attempt) -> bool {
-        (0..self.stations.len())
-            .any(|port| !attempt.senders.contains(port) && self.is_on_bus(port, attempt.start_ns))
+        (0..self.stations.len()).any(|port| !attempt.is_from(port) && self.is_on_bus(port, attempt.start_ns))
     }
 
     /// Sorts out who sends the winning identifier too.
@@ -236,6 +235,11 @@ impl Contest {
 }
 
 impl Attempt {
+    /// Whether the port sent that identifier: who lost has signalled an error and hears no more of the frame.
+    pub(super) fn is_from(&self, port: usize) -> bool {
+        self.senders.contains(port) || self.losers.contains(port)
+    }
+
     /// Several ports sent the same identifier.
     pub(super) fn is_collision(&self) -> bool {
         self.senders.is_several() || self.losers != PortSet::default()

@@ -58,12 +58,10 @@ impl VirtualWire {
         let queued_ns = Some(attempt.queued_ns);
         self.tap.push(Tapped::Frame(TappedFrame { frame: attempt.frame, time_ns, queued_ns }));
         for port in 0..self.stations.len() {
-            if attempt.senders.contains(port) || !self.is_on_bus(port, attempt.start_ns) {
+            if attempt.is_from(port) || !self.is_on_bus(port, attempt.start_ns) {
                 continue;
             }
-            if !attempt.losers.contains(port) {
-                self.confine(port, time_ns, super::Confinement::received);
-            }
+            self.confine(port, time_ns, super::Confinement::received);
             if !self.loses(port, attempt) {
                 self.stations[port].receive.push(received);
             }
@@ -86,7 +84,7 @@ impl VirtualWire {
         self.statistics.error_frames += 1;
         self.statistics.unacknowledged += u64::from(kind == ErrorKind::Acknowledge);
         for port in 0..self.stations.len() {
-            if attempt.senders.contains(port) || attempt.losers.contains(port) {
+            if attempt.is_from(port) {
                 self.statistics.retransmissions += 1;
                 self.report_error(port, attempt, kind);
                 match kind {
@@ -105,9 +103,7 @@ impl VirtualWire {
 
     /// Taps the error frame once, as the first of the senders reports it.
     fn report_error(&mut self, port: usize, attempt: &Attempt, kind: ErrorKind) {
-        let is_first =
-            (0..port).all(|other| !attempt.senders.contains(other) && !attempt.losers.contains(other));
-        if is_first {
+        if !(0..port).any(|other| attempt.is_from(other)) {
             let status = self.stations[port].confinement.status();
             self.tap.push(Tapped::Error(ErrorReport::new(attempt.end_ns, port as u8, kind, status)));
         }
@@ -122,8 +118,7 @@ impl VirtualWire {
     fn suspend_passive(&mut self, attempt: &Attempt) {
         let pause_ns = self.config.rates.nominal().bits_to_ns(SUSPEND_BITS);
         for (port, station) in self.stations.iter_mut().enumerate() {
-            let sent = attempt.senders.contains(port) || attempt.losers.contains(port);
-            if sent && station.confinement.state() == ErrorState::Passive {
+            if attempt.is_from(port) && station.confinement.state() == ErrorState::Passive {
                 station.suspended_until_ns = attempt.idle_from_ns + pause_ns;
             }
         }

@@ -78,6 +78,7 @@ fn two_frames_of_one_identifier_destroy_each_other_until_their_senders_are_passi
     wire.advance(FOREVER / 2);
     let bytes: Vec<_> = fetch(&mut wire, 0).iter().map(|received| received.frame.data()[0]).collect();
     assert_eq!(bytes, [1, 2], "the dominant one first: a passive error flag does not disturb it");
+    assert_eq!(fetch(&mut wire, 2), [], "who signalled an error heard no more of the frame");
     let statistics = wire.statistics();
     assert_eq!((statistics.error_frames, statistics.collisions), (16, 17));
     assert_eq!(wire.status(1), BusStatus { state: ErrorState::Active, tec: 127, rec: 0 });
