@@ -75,12 +75,13 @@ impl CycleSchedule {
         // A frame has arrived before the pause behind it.
         let pause_ns = rates.nominal().bits_to_ns(INTERFRAME_BITS);
         let reading_from_ns = shortest(sync) + axes * shortest(tpdo) - pause_ns;
-        // A heartbeat may just have begun when the bus is wanted.
-        let blocking_ns = longest(HEARTBEAT_LENGTH);
+        // A heartbeat may just have begun when the bus is wanted: by SYNC, and by drives that leave it idle at first.
+        let heartbeat_ns = longest(HEARTBEAT_LENGTH);
+        let blocking_ns = if can.answer_us > 0 { 2 * heartbeat_ns } else { heartbeat_ns };
         let up_ns = longest(sync) + axes * longest(tpdo);
         let down_ns = axes * longest(rpdo);
         let reading_by_ns = blocking_ns + up_ns + u64::from(can.answer_us) * 1000;
-        let command_by_ns = period_ns.saturating_sub(blocking_ns + down_ns);
+        let command_by_ns = period_ns.saturating_sub(heartbeat_ns + down_ns);
         let controller_at_ns = reading_by_ns + PUBLISH_NS;
         if controller_at_ns + COMPUTE_NS > command_by_ns {
             return Err(ScheduleError::NoTime { reading_by_ns, command_by_ns, period_ns });
@@ -187,7 +188,7 @@ mod tests {
         let slow = CanConfig { answer_us: 300, ..Default::default() };
         let [at_once, late] = [CanConfig::default(), slow]
             .map(|can| CycleSchedule::new(&can, 2_000_000).unwrap().reading_by_ns);
-        assert_eq!(late, at_once + 300_000);
+        assert_eq!(late, at_once + 300_000 + 65_000, "meanwhile another heartbeat may begin");
     }
 
     #[test]

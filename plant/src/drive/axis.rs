@@ -201,9 +201,8 @@ impl Axis {
         self.encoder.nearest(position_m).saturating_add(self.origin_increments)
     }
 
-    /// The nearest target that the software position limits allow. They count from the home position (CiA 402),
-    /// so that homing leaves their numbers and may leave the axis outside of them: there it may stay or come
-    /// nearer, but go no further.
+    /// The nearest target that the software position limits allow. Homing moves them with the home position, and may
+    /// leave the axis outside of them: there it may stay or come nearer, but go no further.
     pub(super) fn within_limits(&self, now_ns: u64, target_increments: i32) -> i32 {
         let [lowest, highest] = self.parameters.position_limits;
         let here = self.increments(self.demand.position_m(now_ns).unwrap_or(self.measured_m()));

@@ -97,9 +97,10 @@ impl Axis {
         }
     }
 
-    /// From now on that count is called the home offset (607C).
+    /// From now on zero is the home offset (607C) beyond that count, which is called minus the offset (CiA 402).
     fn attain(&mut self, home_counts: i32) {
-        self.origin_increments = self.parameters.homing.offset_increments.saturating_sub(home_counts);
+        self.origin_increments =
+            0_i32.saturating_sub(home_counts).saturating_sub(self.parameters.homing.offset_increments);
         self.homing = Homing::Attained;
     }
 }

@@ -53,7 +53,8 @@ pub(super) struct Parameters {
     pub(super) velocity_limit_m_s: f64,
     /// Force limit of every mode (6072, and what the drive can), N.
     pub(super) force_limit_n: f64,
-    /// Software position limits (607D), increments.
+    /// Software position limits as positions of the application: 607D counts from the home position, so that it is
+    /// less the home offset (607C); increments.
     pub(super) position_limits: [i32; 2],
     /// Following error window (6065), m; none where it is not supervised.
     pub(super) following_window_m: Option<f64>,
@@ -94,12 +95,14 @@ impl Parameters {
         let window = Some(objects.get(names::FOLLOWING_WINDOW)).filter(|&window| window != NO_WINDOW);
         let torque_limit_n = f64::from(objects.get(names::MAX_TORQUE)) / 1000.0 * drive.rated_force_n;
         let exponent = i32::from(objects.get(names::PERIOD_INDEX));
+        let offset_increments = objects.get(names::HOME_OFFSET);
         let homing_m_s2 = metres(objects.get(names::HOMING_ACCELERATION));
         Self {
             period_s: f64::from(objects.get(names::PERIOD_VALUE)) * 10.0_f64.powi(exponent),
             velocity_limit_m_s,
             force_limit_n: torque_limit_n.min(drive.max_force_n),
-            position_limits: [names::LOWEST_POSITION, names::HIGHEST_POSITION].map(|end| objects.get(end)),
+            position_limits: [names::LOWEST_POSITION, names::HIGHEST_POSITION]
+                .map(|end| objects.get(end).saturating_sub(offset_increments)),
             following_window_m: window.map(metres),
             following_timeout_ns: u64::from(objects.get(names::FOLLOWING_TIMEOUT_MS)) * MS_NS,
             position_window_m: metres(objects.get(names::POSITION_WINDOW)),
@@ -120,7 +123,7 @@ impl Parameters {
                     acceleration_m_s2: homing_m_s2,
                     deceleration_m_s2: homing_m_s2,
                 },
-                offset_increments: objects.get(names::HOME_OFFSET),
+                offset_increments,
             },
         }
     }

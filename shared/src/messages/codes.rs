@@ -147,7 +147,7 @@ codes! {
     EventKind {
         /// A state machine moved; `from` and `to` name the states.
         Transition = 0 "transition",
-        /// Something is wrong and was reacted to; `cause`, `value` and `limit` explain it.
+        /// Something is wrong; `cause`, `value` and `limit` explain it.
         Fault = 1 "fault",
         /// Something is worth knowing and was not reacted to.
         Notice = 2 "notice",

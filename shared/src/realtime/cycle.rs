@@ -5,8 +5,9 @@ use crate::clock;
 
 /// Waits for the deadlines of a periodic task.
 ///
-/// Overrun policy: a deadline that passed while the task was still busy is skipped and counted, never
-/// caught up in a burst; cycle numbers keep counting deadlines, so a skipped one leaves a gap.
+/// Overrun policy: a deadline that the task is late for by less than a period is kept, late; those that passed before
+/// are skipped and counted, never caught up in a burst. Cycle numbers keep counting deadlines, so a skipped one leaves a
+/// gap.
 #[derive(Debug)]
 pub struct Cycle {
     first_due_ns: u64,
@@ -42,7 +43,7 @@ impl Cycle {
         self.first_due_ns + (cycle - 1) * self.period_ns
     }
 
-    /// The next deadline that is still ahead at `now_ns`, counting those that are not as skipped.
+    /// The next deadline that is at most a period past at `now_ns`, counting those before it as skipped.
     fn claim(&mut self, now_ns: u64) -> u64 {
         self.next += 1;
         let late_ns = now_ns.saturating_sub(self.due_ns(self.next));

@@ -11,14 +11,14 @@ fn homing_where_it_stands_only_renames_the_position() {
         let before_m = bench.position_m;
         bench.control(0x1F);
         assert!(bench.has(StatusBit::HOMING_ATTAINED) && bench.has(StatusBit::TargetReached));
-        assert!(bench.is_near(1234));
+        assert!(bench.is_near(-1234), "zero lies the offset beyond home");
         bench.run_ms(20);
         assert!((bench.position_m - before_m).abs() < 2e-5);
     }
 }
 
 #[test]
-fn homing_to_a_reference_mark_moves_there_and_calls_it_the_offset() {
+fn homing_to_a_reference_mark_moves_there_and_puts_zero_the_offset_beyond() {
     for (method, mark) in [(33, 270_000), (34, 272_000)] {
         let mut bench = Bench::enabled(HOMING);
         bench.write((0x6098, 0), &[method]).unwrap();
@@ -30,9 +30,26 @@ fn homing_to_a_reference_mark_moves_there_and_calls_it_the_offset() {
         bench.run_ms(500);
         assert!(bench.has(StatusBit::HOMING_ATTAINED) && bench.has(StatusBit::TargetReached));
         let counts = (bench.position_m / 1e-6).round() as i32;
-        assert!((bench.position() - (counts - mark + 50)).abs() <= 1, "method {method}");
+        assert!((bench.position() - (counts - mark - 50)).abs() <= 1, "method {method}");
         assert!((counts - mark).abs() < 50, "it stopped soon behind the mark");
     }
+}
+
+#[test]
+fn software_limits_count_from_the_home_position() {
+    let mut bench = Bench::enabled(HOMING);
+    bench.write((0x607C, 0), &1000_i32.to_le_bytes()).unwrap();
+    bench.write((0x607D, 1), &(-6000_i32).to_le_bytes()).unwrap();
+    bench.write((0x607D, 2), &6000_i32.to_le_bytes()).unwrap();
+    bench.control(0x1F);
+    let home_m = bench.position_m;
+    bench.control(0x00);
+    bench.write(MODE, &[PROFILE_POSITION as u8]).unwrap();
+    bench.enable();
+    bench.set_point(100_000, 0);
+    bench.run_ms(1000);
+    assert!(bench.is_near(5000));
+    assert!((bench.position_m - home_m - 6000.0 * 1e-6).abs() < 2e-5);
 }
 
 #[test]

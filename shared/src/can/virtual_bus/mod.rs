@@ -23,7 +23,8 @@
 //! advanced to counts as queued at that time. Faults of nodes take effect between frames.
 //!
 //! # What is not modelled
-//! Errors seen by some nodes only, overload frames, and what a disconnected node does on its end of the wire.
+//! Errors seen by some nodes only, overload frames, what a disconnected node does on its end of the wire, and the
+//! recessive ESI bit of an error passive node's FD frames, which may change their stuffing.
 
 mod attempt;
 mod confinement;
