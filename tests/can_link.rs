@@ -144,6 +144,27 @@ fn expect(stream: &mut TcpStream, text: &str) -> String {
 }
 
 #[test]
+fn more_clients_than_there_are_places_disturb_nobody() {
+    let server = Server::start(&Bench::new(""));
+    let connect = || {
+        let stream = TcpStream::connect(&server.address).unwrap();
+        stream.set_read_timeout(Some(Duration::from_secs(20))).unwrap();
+        stream
+    };
+    let mut placed: Vec<_> = (0..16).map(|_| connect()).collect();
+    for stream in &mut placed {
+        expect(stream, "< hi >");
+    }
+    assert_eq!(connect().read(&mut [0; 16]).unwrap(), 0, "closed at once");
+    placed[0].write_all(b"< open can0 >").unwrap();
+    expect(&mut placed[0], "< ok >");
+    drop(placed.pop());
+    // The server may take a moment to notice.
+    let is_greeted = |_| connect().read(&mut [0; 16]).is_ok_and(|count| count > 0);
+    assert!((0..100).any(is_greeted), "a place that was left can be taken");
+}
+
+#[test]
 fn a_foreign_tool_reads_an_object_of_a_drive_on_a_classical_and_on_an_fd_bus() {
     for scenario in ["", "[can]\nfd = true\nbuses = [[0, 1, 2, 3, 4, 5]]"] {
         let server = Server::start(&Bench::new(scenario));

@@ -243,7 +243,8 @@ fn a_second_rig_of_the_same_name_is_refused() {
     let [first, second] = [1, 2].map(|_| Bench::new(&format!("duration_s = 60.0\n{UNHURRIED}")));
     let running = start(&first, &["--name", &name]);
     wait_until_it_records(&first);
-    let refused = second.run(&["--name", &name]);
+    // The folder for temporary files does not make it another machine.
+    let refused = second.run_command(&["--name", &name]).env("TMPDIR", second.file("")).output().unwrap();
     assert_eq!(refused.status.code(), Some(2), "{}", stderr(&refused));
     assert!(stderr(&refused).contains(&format!("a rig named '{name}' is running")), "{}", stderr(&refused));
     assert!(!second.run_folder().exists());

@@ -50,7 +50,7 @@ pub(crate) fn serve(args: &ServeArgs) -> Result<Exit, Failure> {
         wait(&listener, &clients).context("cannot wait for clients")?;
         let now_ns = clock::now_ns();
         link.advance(now_ns)?;
-        accept(&listener, &mut clients)?;
+        accept(&listener, &mut clients, CLIENTS * link.buses());
         clients.retain_mut(|client| client.serve(&mut link, now_ns));
     }
     Ok(Exit::Passed)
@@ -85,12 +85,13 @@ fn wait(listener: &TcpListener, clients: &[Client]) -> io::Result<()> {
     }
 }
 
-fn accept(listener: &TcpListener, clients: &mut Vec<Client>) -> Result<(), Failure> {
-    loop {
-        match listener.accept() {
-            Ok((stream, _)) => clients.push(Client::greet(stream).context("cannot greet a client")?),
-            Err(error) if error.kind() == io::ErrorKind::WouldBlock => return Ok(()),
-            Err(error) => return Err(anyhow::Error::from(error).context("cannot accept a client").into()),
+/// Takes connections as long as there are places; the others are closed. One that cannot be taken concerns nobody else.
+fn accept(listener: &TcpListener, clients: &mut Vec<Client>, places: usize) {
+    while let Ok((stream, address)) = listener.accept() {
+        if clients.len() == places {
+            tell!("no place is left for a client from {address}");
+        } else {
+            clients.extend(Client::greet(stream));
         }
     }
 }

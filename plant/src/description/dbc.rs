@@ -5,14 +5,14 @@
 
 use std::fmt::{self, Write};
 
-use masseter_shared::can::canopen::{Cob, NmtCommand, NmtState, NodeId, ObjectAddress};
+use masseter_shared::can::canopen::{COB_ID_NOT_VALID, Cob, NmtCommand, NmtState, NodeId, ObjectAddress};
 use masseter_shared::can::{CanId, Frame};
 use masseter_shared::config::DriveConfig;
 use masseter_shared::geometry::{AXES, AXIS_NAMES};
 
 use crate::drive::DriveSettings;
 use crate::drive::dictionary::{ENTRIES, Objects, PDOS, find};
-use crate::drive::pdo::{MappingEntry, NOT_VALID};
+use crate::drive::pdo::MappingEntry;
 
 const MASTER: &str = "Master";
 /// Receiver of what everybody listens to.
@@ -106,7 +106,7 @@ fn process_data(text: &mut String, settings: &DriveSettings, name: &str) -> fmt:
     for number in 0..PDOS as u16 {
         for (direction, communication, mapping) in [("RPDO", 0x1400, 0x1600), ("TPDO", 0x1800, 0x1A00)] {
             let cob_id = word(&objects, communication + number, 1);
-            if cob_id & NOT_VALID != 0 {
+            if cob_id & COB_ID_NOT_VALID != 0 {
                 continue;
             }
             let id = CanId::standard((cob_id & 0x7FF) as u16).expect("eleven bits");

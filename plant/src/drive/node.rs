@@ -1,7 +1,9 @@
 //! The drive as a CANopen node (CiA 301): network management, heartbeats and emergencies. SYNC and process data are
 //! exchanged in [`exchange`](super::exchange); what the objects may become is served in [`service`](super::service).
 
-use masseter_shared::can::canopen::{Cob, Emergency, Heartbeat, Nmt, NmtCommand, NmtState, NodeId};
+use masseter_shared::can::canopen::{
+    COB_ID_NOT_VALID, Cob, Emergency, Heartbeat, Nmt, NmtCommand, NmtState, NodeId,
+};
 use masseter_shared::can::cia402::Controlword;
 use masseter_shared::can::{CanId, Frame};
 use masseter_shared::config::DriveConfig;
@@ -13,7 +15,7 @@ use super::errors::{DriveError, Errors};
 use super::heartbeats::{Consumer, Producer};
 use super::outbox::Outbox;
 use super::parameters::configure;
-use super::pdo::{NOT_VALID, Rpdo, Tpdo};
+use super::pdo::{Rpdo, Tpdo};
 use super::sdo::SdoServer;
 use crate::encoder::Encoder;
 
@@ -314,7 +316,7 @@ impl DriveNode {
         let cob_id = self.objects.get(names::EMERGENCY_COB_ID);
         if let Some(emergency) = emergency
             && self.is_served()
-            && cob_id & NOT_VALID == 0
+            && cob_id & COB_ID_NOT_VALID == 0
             && let Ok(id) = CanId::standard((cob_id & 0x7FF) as u16)
         {
             self.send(Frame::fixed(id, emergency.encode()));

@@ -5,13 +5,11 @@
 
 use std::cmp::Ordering;
 
-use masseter_shared::can::canopen::ObjectAddress;
+use masseter_shared::can::canopen::{COB_ID_NOT_VALID, ObjectAddress};
 use masseter_shared::can::{CanId, Frame};
 
 use super::dictionary::{ENTRIES, MAPPED_MAX, Objects, find, within_limits};
 
-/// Bit 31 of a COB-ID: the PDO does not exist.
-pub(crate) const NOT_VALID: u32 = 1 << 31;
 /// The lowest transmission type that SYNC does not drive.
 const EVENT_DRIVEN: u8 = 254;
 /// Unit of an inhibit time, ns.
@@ -29,7 +27,7 @@ fn parameter(objects: &Objects, index: u16, subindex: u8) -> u32 {
 
 /// The identifier of a PDO that exists.
 fn identifier(cob_id: u32) -> Option<CanId> {
-    if cob_id & NOT_VALID != 0 {
+    if cob_id & COB_ID_NOT_VALID != 0 {
         return None;
     }
     CanId::standard((cob_id & 0x7FF) as u16).ok()

@@ -1,12 +1,12 @@
 //! What a client may write beyond type and limits: values without a range, parameters in use, and
 //! the procedure of CiA 301 for changing a PDO.
 
-use masseter_shared::can::canopen::{AbortCode, NodeId, ObjectAddress};
+use masseter_shared::can::canopen::{AbortCode, COB_ID_NOT_VALID, NodeId, ObjectAddress};
 
 use super::dictionary::{DataType, ENTRIES, MAPPED_MAX, Mapping, Objects, PDOS, WATCHED, find, names};
 use super::homing::Homing;
 use super::mode::Mode;
-use super::pdo::{MappingEntry, NOT_VALID};
+use super::pdo::MappingEntry;
 
 /// Signature that object 1010 takes, "save".
 const SAVE: u32 = u32::from_le_bytes(*b"save");
@@ -89,7 +89,7 @@ fn watched(subindex: u8, word: u32, objects: &Objects) -> Result<(), AbortCode> 
 
 /// A new COB-ID in place of an old one: an identifier may change only while its object does not exist.
 fn cob_id(before: u32, after: u32) -> Result<(), AbortCode> {
-    let exists = |cob_id: u32| cob_id & NOT_VALID == 0;
+    let exists = |cob_id: u32| cob_id & COB_ID_NOT_VALID == 0;
     let identifier = after & IDENTIFIER;
     let is_changed = identifier != before & IDENTIFIER;
     let is_bad = after & EXTENDED != 0 || identifier > 0x7FF;
@@ -118,13 +118,17 @@ fn pdo_cob_id(index: u16, objects: &Objects) -> u32 {
 
 fn communication(object: ObjectAddress, word: u32, objects: &Objects) -> Result<(), AbortCode> {
     let before = pdo_cob_id(object.index, objects);
-    let exists = before & NOT_VALID == 0;
+    let exists = before & COB_ID_NOT_VALID == 0;
     match object.subindex {
         1 => {
             cob_id(before, word)?;
             let mapped = find(ObjectAddress::new(object.index + 0x0200, 0)).map(|place| objects.word(place));
             let carries_nothing = mapped == Ok(0);
-            if word & NOT_VALID == 0 && carries_nothing { Err(AbortCode::INVALID_VALUE) } else { Ok(()) }
+            if word & COB_ID_NOT_VALID == 0 && carries_nothing {
+                Err(AbortCode::INVALID_VALUE)
+            } else {
+                Ok(())
+            }
         }
         // 241 to 251 are reserved, 252 and 253 answer remote requests.
         2 if matches!(word, 241..=253) => Err(AbortCode::INVALID_VALUE),
@@ -139,7 +143,7 @@ fn mapping(object: ObjectAddress, word: u32, objects: &Objects) -> Result<(), Ab
         let place = find(ObjectAddress::new(object.index, subindex)).expect("a mapping has nine entries");
         objects.word(place)
     };
-    let exists = pdo_cob_id(object.index, objects) & NOT_VALID == 0;
+    let exists = pdo_cob_id(object.index, objects) & COB_ID_NOT_VALID == 0;
     if exists || object.subindex > 0 && parameter(0) > 0 {
         return Err(AbortCode::PARAMETER_INCOMPATIBLE);
     }

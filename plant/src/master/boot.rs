@@ -3,7 +3,9 @@
 //! A pure state machine that carries out its [plan](super::plan) over its SDO client. It judges one node
 //! alone; when nodes are started, and what a failure means for the rig, is the master's.
 
-use masseter_shared::can::canopen::{NmtCommand, NmtState, NodeId, ObjectAddress, SdoResponse};
+use masseter_shared::can::canopen::{
+    AbortCode, COB_ID_NOT_VALID, NmtCommand, NmtState, NodeId, ObjectAddress, SdoResponse,
+};
 use masseter_shared::can::cia402::{DriveState, Statusword};
 use masseter_shared::messages::codes::{BootPhase, Cause};
 
@@ -191,8 +193,10 @@ impl Boot {
 
     /// Ends the task whose answer is there, and begins the next.
     fn carry_on(&mut self, now_ns: u64) -> Result<(), BootFault> {
-        if let Some(outcome) = self.client.outcome() {
-            self.conclude(outcome?)?;
+        match self.client.outcome() {
+            Some(Err(SdoFailure::Aborted { code, .. })) if self.may_be_absent(code) => self.next += 2,
+            Some(outcome) => self.conclude(outcome?)?,
+            None => {}
         }
         while self.client.is_idle() && self.next < self.tasks.len() {
             self.begin(self.tasks[self.next]);
@@ -203,13 +207,21 @@ impl Boot {
         Ok(())
     }
 
+    /// Whether the task under way asks for something that a drive need not have, and this one has not.
+    fn may_be_absent(&self, code: AbortCode) -> bool {
+        matches!(self.tasks[self.next], Task::IfExchanged(_))
+            && matches!(code, AbortCode::NO_OBJECT | AbortCode::NO_SUBINDEX)
+    }
+
     fn begin(&mut self, task: Task) {
         match task {
             Task::Enter(phase) => {
                 self.phase = phase;
                 self.next += 1;
             }
-            Task::Expect { object, .. } | Task::Keep(object) => self.client.read(object),
+            Task::Expect { object, .. } | Task::Keep(object) | Task::IfExchanged(object) => {
+                self.client.read(object);
+            }
             Task::IfInFault { .. } | Task::ExpectNoFault => self.client.read(STATUSWORD),
             Task::Write { object, value, bytes } => {
                 let value = Data::new(&value.to_le_bytes()[..bytes]).expect("at most four bytes");
@@ -240,6 +252,10 @@ impl Boot {
             }
             Task::IfInFault { otherwise_skip } if !in_fault(number) => self.next += otherwise_skip,
             Task::Keep(_) => self.kept = read,
+            Task::IfExchanged(_) if number & COB_ID_NOT_VALID != 0 => self.next += 1,
+            Task::IfExchanged(_) => {
+                self.kept = Data::new(&(number | COB_ID_NOT_VALID).to_le_bytes()).expect("four bytes");
+            }
             _ => {}
         }
         (self.next, self.readings) = (self.next + 1, 0);

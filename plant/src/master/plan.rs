@@ -20,6 +20,10 @@ const RAMP_THEN_OFF: u32 = 2;
 /// Bit 30 of a TPDO's COB-ID, "no remote request", says nothing about the PDO's use here.
 const COB_ID_BITS: u32 = !(1 << 30);
 
+/// Communication parameters of the PDOs that CiA 301 gives identifiers to beside the first: many drives send them as
+/// delivered, and no plan of the bus counts with them.
+const OTHER_PDOS: [u16; 6] = [0x1401, 0x1402, 0x1403, 0x1801, 0x1802, 0x1803];
+
 /// What a drive is configured with.
 #[derive(Debug, Clone)]
 pub(crate) struct Setup {
@@ -52,6 +56,9 @@ pub(super) enum Task {
     Write { object: ObjectAddress, value: u32, bytes: usize },
     /// Read the object and keep its value.
     Keep(ObjectAddress),
+    /// Read the COB-ID of a PDO and keep it as one that is not valid; unless there is such a PDO and it is valid, leave
+    /// out the next task.
+    IfExchanged(ObjectAddress),
     /// Write the value kept.
     WriteKept(ObjectAddress),
     /// Read the statusword; unless the drive is in fault, leave out that many tasks.
@@ -68,6 +75,7 @@ pub(super) fn plan(node: NodeId, setup: &Setup) -> Vec<Task> {
     tasks.extend(check_pdo(0x1400, Cob::Rpdo1(node), &Rpdo1::MAPPING));
     tasks.extend(check_pdo(0x1800, Cob::Tpdo1(node), &Tpdo1::MAPPING));
     tasks.push(Task::Enter(BootPhase::Configuring));
+    tasks.extend(OTHER_PDOS.into_iter().flat_map(switch_off_pdo));
     tasks.extend(configure(setup));
     tasks.extend(reset_fault());
     tasks.extend(hold_position());
@@ -75,11 +83,12 @@ pub(super) fn plan(node: NodeId, setup: &Setup) -> Vec<Task> {
     tasks
 }
 
-/// SDO exchanges that the tasks take at least: of a drive without a fault that answers as expected at once.
+/// SDO exchanges that the tasks take at least: of a drive without a fault and other PDOs that answers as expected at
+/// once.
 pub(crate) fn exchanges(node: NodeId, setup: &Setup) -> usize {
     let tasks = plan(node, setup);
     let without = |task: &Task| match task {
-        Task::Enter(_) => 1,
+        Task::Enter(_) | Task::IfExchanged(_) => 1,
         Task::IfInFault { otherwise_skip } => *otherwise_skip,
         _ => 0,
     };
@@ -115,6 +124,11 @@ fn check_pdo(communication: u16, cob: Cob, mapping: &[u32]) -> impl Iterator<Ite
     ];
     let all = head.into_iter().chain(mapping.iter().enumerate().map(mapped));
     all.map(|(object, mask, value)| Task::Expect { object, mask, value, otherwise: Cause::WrongPdo })
+}
+
+const fn switch_off_pdo(communication: u16) -> [Task; 2] {
+    let cob_id = ObjectAddress::new(communication, 1);
+    [Task::IfExchanged(cob_id), Task::WriteKept(cob_id)]
 }
 
 fn configure(setup: &Setup) -> impl Iterator<Item = Task> {

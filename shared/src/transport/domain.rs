@@ -1,6 +1,6 @@
 //! The names a run uses in the file system, who still lives under them, and their removal.
 //!
-//! iceoryx2 leaves files in two places: below a root folder and, with a prefix, in `/dev/shm`. Every
+//! iceoryx2 leaves files in two places, both in `/dev/shm`: below a root folder, and beside it with a prefix. Every
 //! process of a run holds an inherited lock on `<root>/lock`; while anyone holds it, the run is alive.
 
 use std::fs::{self, File, TryLockError};
@@ -139,8 +139,10 @@ impl Domain {
     }
 }
 
+/// Beside the files that are named after the domains, so that whoever sees these sees who lives: temporary folders may
+/// differ from process to process.
 fn domains_of_this_user() -> PathBuf {
-    std::env::temp_dir().join(format!("masseter-{}", getuid().as_raw()))
+    Path::new(SHARED_MEMORY).join(format!("masseter-{}", getuid().as_raw()))
 }
 
 /// Waits until no other process of this user claims or sweeps a domain: a lock not yet taken must not look like one

@@ -3,6 +3,8 @@
 //! Positions are encoder increments, velocities increments/s, accelerations increments/s², torques per
 //! mille of the rated torque (of the rated force, for a linear axis).
 
+use masseter_shared::can::canopen::COB_ID_NOT_VALID;
+
 use super::entry::Access::{Constant, ReadOnly, ReadWrite};
 use super::entry::DataType::{I8, I16, I32, Text, U8, U16, U32};
 use super::entry::Initial::{Configured, OfNode, Value};
@@ -29,8 +31,6 @@ pub(crate) const DEVICE_TYPE: u32 = 0x0002_0192;
 /// Object 6502: profile position, homing, cyclic synchronous position and torque.
 const SUPPORTED_MODES: i64 = 1 << 0 | 1 << 5 | 1 << 7 | 1 << 9;
 
-/// Bit 31 of a COB-ID: the PDO does not exist.
-const NOT_VALID: u32 = 1 << 31;
 /// Bit 30 of a TPDO's COB-ID: no remote request.
 const NO_RTR: u32 = 1 << 30;
 
@@ -52,7 +52,7 @@ const fn positive(subindex: u8, name: &'static str) -> Entry {
 struct Rpdo<const N: usize>;
 
 impl<const N: usize> Rpdo<N> {
-    const COB_ID: u32 = (0x200 + 0x100 * N as u32) | if N == 0 { 0 } else { NOT_VALID };
+    const COB_ID: u32 = (0x200 + 0x100 * N as u32) | if N == 0 { 0 } else { COB_ID_NOT_VALID };
     const COMMUNICATION: &'static [Entry] = &[
         Entry::highest(5),
         Entry::new(1, "COB-ID used by RPDO", U32, ReadWrite, OfNode(Self::COB_ID)),
@@ -66,7 +66,7 @@ impl<const N: usize> Rpdo<N> {
 struct TpdoOf<const N: usize>;
 
 impl<const N: usize> TpdoOf<N> {
-    const COB_ID: u32 = NO_RTR | (0x180 + 0x100 * N as u32) | if N == 0 { 0 } else { NOT_VALID };
+    const COB_ID: u32 = NO_RTR | (0x180 + 0x100 * N as u32) | if N == 0 { 0 } else { COB_ID_NOT_VALID };
     const COMMUNICATION: &'static [Entry] = &[
         Entry::highest(6),
         Entry::new(1, "COB-ID used by TPDO", U32, ReadWrite, OfNode(Self::COB_ID)),

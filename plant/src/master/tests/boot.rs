@@ -104,6 +104,19 @@ fn a_drive_that_is_not_as_expected_is_named_and_nobody_is_enabled() {
 }
 
 #[test]
+fn pdos_that_the_rig_does_not_exchange_are_switched_off_where_a_drive_has_them() {
+    let mut bench = Bench::new();
+    let drive = bench.drive(1);
+    drive.objects.insert((0x1801, 1), 0x4000_0282_u32.to_le_bytes().to_vec());
+    drive.objects.insert((0x1802, 1), 0xC000_0382_u32.to_le_bytes().to_vec());
+    bench.cycles(400, DriveRequest::Enable);
+    assert!(bench.all_are(DriveState::OperationEnabled), "{:?}", bench.events);
+    assert_eq!(bench.drive(1).written(0x1801, 1), 0xC000_0282);
+    let wrote_1802 = |(_, request): &(u64, SdoRequest)| matches!(request, SdoRequest::Download { object, .. } if object.index == 0x1802);
+    assert!(!bench.drive(1).asked.iter().any(wrote_1802));
+}
+
+#[test]
 fn nothing_is_written_to_a_device_that_is_another() {
     let mut bench = Bench::new();
     bench.drive(0).objects.insert((0x1018, 1), vec![1, 2, 3, 4]);

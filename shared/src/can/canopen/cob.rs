@@ -5,6 +5,9 @@
 use super::node::NodeId;
 use crate::can::id::CanId;
 
+/// Bit 31 of a COB-ID in an object dictionary: what it identifies does not exist.
+pub const COB_ID_NOT_VALID: u32 = 1 << 31;
+
 /// A communication object, with the node it belongs to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Cob {
