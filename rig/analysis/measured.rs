@@ -62,7 +62,7 @@ pub(super) struct Measured {
     p99s_ns: Vec<f64>,
 }
 
-fn histogram() -> Histogram<u64> {
+pub(super) fn histogram() -> Histogram<u64> {
     Histogram::new(DIGITS).expect("three digits are allowed")
 }
 

@@ -3,10 +3,12 @@
 //!
 //! Nothing is judged here; see [`report::verdict`](crate::report::verdict).
 
+mod around;
 mod blame;
 mod events;
 mod exports;
 mod freshness;
+mod hops;
 mod intervals;
 mod join;
 mod ledger;
@@ -18,7 +20,9 @@ mod response;
 mod sequence;
 mod series;
 mod skips;
+mod stalls;
 mod tracking;
+mod way;
 
 use std::path::PathBuf;
 
@@ -29,6 +33,7 @@ use serde::Serialize;
 
 use crate::recording::{Damage, ReadError, Reader, Recorded};
 use crate::run::folder::RunFolder;
+pub use around::Around;
 pub use blame::Suspicion;
 use events::EventLog;
 pub use events::EventRecord;
@@ -37,7 +42,7 @@ use freshness::Freshness;
 pub use freshness::ReadingFigures;
 use intervals::Intervals;
 use ledger::Ledger;
-pub use ledger::{Around, WorstCycle};
+pub use ledger::WorstCycle;
 pub use measured::IntervalFigures;
 pub use outage::Outage;
 use outage::OutageWatch;
@@ -261,7 +266,6 @@ impl Pass {
 
     fn finish(self, reader: &Reader) -> Result<Figures, AnalysisError> {
         let (tracking, track) = self.tracking.finish();
-        let intervals = self.intervals.finish()?;
         let duration_ns =
             self.last_sample_ns.saturating_sub(self.first_sample_ns.unwrap_or(self.last_sample_ns));
         Ok(Figures {
@@ -275,8 +279,8 @@ impl Pass {
             outage: self.outage.finish(self.period_ns),
             tracking,
             bite_force_max_n: self.bite_force_max_n,
-            worst_cycles: self.ledger.finish(&intervals),
-            intervals,
+            worst_cycles: self.ledger.finish(),
+            intervals: self.intervals.finish()?,
             topics: self.sequence.finish(),
             frames: self.candump.finish()?,
             bus_response: self.responses.finish(),

@@ -1,0 +1,72 @@
+//! What the kernel counted around a cycle: what made it long is often not in the rig.
+
+use masseter_shared::messages::Machine;
+use serde::Serialize;
+
+/// What the kernel counted between the looks before and after a cycle.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
+pub struct Around {
+    /// From one look to the other, ns.
+    pub looked_over_ns: Option<u64>,
+    /// Time that the hypervisor took from all cores meanwhile, as far as it tells, ns.
+    pub stolen_ns: Option<u64>,
+    /// Times that one of the loops had its core taken from it.
+    pub involuntary_switches: Option<u64>,
+    /// Page faults of both processes.
+    pub page_faults: Option<u64>,
+}
+
+impl Around {
+    fn between(before: &Machine, after: &Machine) -> Self {
+        let more = |of: fn(&Machine) -> u64| Some(of(after).saturating_sub(of(before)));
+        Self {
+            looked_over_ns: more(|machine| machine.time_ns),
+            stolen_ns: more(|machine| machine.stolen_ns),
+            involuntary_switches: more(|machine| machine.involuntary_switches.iter().sum()),
+            page_faults: more(|machine| machine.page_faults.iter().sum()),
+        }
+    }
+}
+
+/// All looks of a run.
+#[derive(Debug, Default)]
+pub(super) struct Looks(Vec<Machine>);
+
+impl Looks {
+    pub(super) fn take(&mut self, look: &Machine) {
+        self.0.push(*look);
+    }
+
+    /// What was counted between the last look before a stretch of time and the first behind it.
+    pub(super) fn around(&self, from_ns: u64, to_ns: u64) -> Around {
+        let before = self.0.partition_point(|look| look.time_ns <= from_ns);
+        let after = self.0.partition_point(|look| look.time_ns < to_ns);
+        match (before.checked_sub(1), self.0.get(after)) {
+            (Some(before), Some(after)) => Around::between(&self.0[before], after),
+            _ => Around::default(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_was_counted_is_that_between_the_looks_before_and_behind() {
+        let mut looks = Looks::default();
+        for (time_ns, stolen_ns, switches) in [(0, 0, 1), (50, 3_000, 3), (100, 3_000, 3)] {
+            let involuntary_switches = [switches, 0];
+            looks.take(&Machine { time_ns, stolen_ns, involuntary_switches, ..Default::default() });
+        }
+        let told = |stolen_ns, switches| Around {
+            looked_over_ns: Some(50),
+            stolen_ns: Some(stolen_ns),
+            involuntary_switches: Some(switches),
+            page_faults: Some(0),
+        };
+        assert_eq!(looks.around(40, 41), told(3_000, 2));
+        assert_eq!(looks.around(70, 71), told(0, 0));
+        assert_eq!(looks.around(100, 101), Around::default());
+    }
+}
