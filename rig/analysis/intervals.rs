@@ -9,6 +9,7 @@ use std::path::Path;
 use masseter_shared::messages::{Command, Reading, State};
 
 use super::AnalysisError;
+use super::answer::{Answer, Answers};
 use super::join::{ByCycle, Join};
 use super::measured::{IntervalFigures, Measured};
 
@@ -68,21 +69,13 @@ struct Published {
     reading_cycle: u64,
 }
 
-/// What became of a command.
-#[derive(Debug, Clone, Copy)]
-struct Answer {
-    received_ns: u64,
-    /// None before the drives exchange process data.
-    sent_ns: Option<u64>,
-}
-
 /// All intervals of a run, and what is needed to join the messages they lie between.
 pub(super) struct Intervals {
     period_ns: u64,
     measured: Vec<Measured>,
     plant_skipped: u64,
     controller_skipped: u64,
-    last_answered: u64,
+    answers: Answers,
     /// By the plant's cycle. A reading is recorded before the one that answers it: no join is needed.
     samples: ByCycle<Sampled>,
     /// Publication and reception of a reading, by the plant's cycle.
@@ -104,7 +97,7 @@ impl Intervals {
             measured: NAMES.iter().map(|name| Measured::new(name, folder)).collect(),
             plant_skipped: 0,
             controller_skipped: 0,
-            last_answered: 0,
+            answers: Answers::default(),
             samples: ByCycle::default(),
             transports: Join::default(),
             controller_cycles: Join::default(),
@@ -141,24 +134,18 @@ impl Intervals {
         self.samples.insert(reading.cycle, Sampled { sampled_ns: reading.sampled_ns, exchange_ns });
         let transport = self.transports.left(reading.cycle, reading.published_ns);
         self.add_joined(Interval::ReadingTransport, transport);
-        self.answer(reading);
+        if let Some(answer) = self.answers.take(reading) {
+            self.answer(answer);
+        }
     }
 
-    /// What became of the command that a reading answers; once for each command.
-    fn answer(&mut self, reading: &Reading) {
-        let cycle = reading.answers_cycle;
-        if cycle <= self.last_answered {
-            return;
-        }
-        self.last_answered = cycle;
-        let (received_ns, sent_ns) = (reading.command_received_ns, reading.command_sent_ns);
-        let answer = Answer { received_ns, sent_ns: (sent_ns > 0).then_some(sent_ns) };
+    fn answer(&mut self, answer: Answer) {
         if let Some(sent_ns) = answer.sent_ns {
-            self.add(Interval::CommandToWire, received_ns, sent_ns);
+            self.add(Interval::CommandToWire, answer.received_ns, sent_ns);
         }
-        let answered = self.commands.right(cycle, answer);
+        let answered = self.commands.right(answer.cycle, answer);
         self.answered(answered);
-        let round_trip = self.round_trips.right(cycle, answer);
+        let round_trip = self.round_trips.right(answer.cycle, answer);
         self.round_trip(round_trip);
     }
 
@@ -296,6 +283,18 @@ mod tests {
         intervals.state(&state(), true);
         intervals.state(&State { cycle: 6, ..state() }, false);
         assert_eq!(only("forward kinematics", intervals), (1, 10));
+    }
+
+    #[test]
+    fn a_command_that_never_reached_the_wire_has_no_way_there() {
+        let (_folder, mut intervals) = intervals();
+        intervals.reading(&reading());
+        intervals.command(&command());
+        intervals.reading(&Reading { command_sent_ns: 400, ..answer() });
+        let found = found(intervals);
+        for expected in [("command transport", 1, 40), ("command to wire", 0, 0), ("sample to wire", 0, 0)] {
+            assert!(found.contains(&expected), "{expected:?} in {found:?}");
+        }
     }
 
     #[test]

@@ -4,6 +4,7 @@
 use masseter_shared::messages::{Command, Machine, Reading, State};
 use serde::Serialize;
 
+use super::answer::{Answer, Answers};
 use super::around::{Around, Looks};
 use super::hops::Usual;
 use super::join::ByCycle;
@@ -47,7 +48,7 @@ pub(super) struct Ledger {
     plant_stalls: Stalls,
     controller_stalls: Stalls,
     last_cycle: Option<u64>,
-    last_answered: u64,
+    answers: Answers,
 }
 
 impl Ledger {
@@ -57,14 +58,9 @@ impl Ledger {
         if reading.complete_ns > 0 {
             self.samples.insert(reading.cycle, Sampled::of(reading, stalled_ns));
         }
-        if reading.answers_cycle > self.last_answered && reading.command_sent_ns > 0 {
-            self.last_answered = reading.answers_cycle;
-            let sent = Sent {
-                received_ns: reading.command_received_ns,
-                sent_ns: reading.command_sent_ns,
-                stalled_when_next_due_ns: stalled_ns,
-            };
-            self.add(reading.answers_cycle, |parts| parts.sent = Some(sent));
+        if let Some(Answer { cycle, received_ns, sent_ns: Some(sent_ns) }) = self.answers.take(reading) {
+            let sent = Sent { received_ns, sent_ns, stalled_when_next_due_ns: stalled_ns };
+            self.add(cycle, |parts| parts.sent = Some(sent));
         }
     }
 

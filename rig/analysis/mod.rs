@@ -3,6 +3,7 @@
 //!
 //! Nothing is judged here; see [`report::verdict`](crate::report::verdict).
 
+mod answer;
 mod around;
 mod blame;
 mod events;
