@@ -6,6 +6,7 @@
 mod answer;
 mod around;
 mod blame;
+mod bus_response;
 mod events;
 mod exports;
 mod freshness;
@@ -36,6 +37,7 @@ use crate::recording::{Damage, ReadError, Reader, Recorded};
 use crate::run::folder::RunFolder;
 pub use around::Around;
 pub use blame::Suspicion;
+pub use bus_response::{BusResponse, ResponseFigures};
 use events::EventLog;
 pub use events::EventRecord;
 pub(crate) use exports::CandumpLogs;
@@ -50,7 +52,6 @@ use outage::OutageWatch;
 use over_time::Watch;
 pub use over_time::{Curve, OverTime};
 use response::Responses;
-pub use response::{BusResponse, ResponseFigures};
 pub(crate) use sequence::SequenceCheck;
 pub use sequence::TopicFigures;
 pub use skips::SkipFigures;
@@ -192,7 +193,7 @@ impl Pass {
             candump: CandumpLogs::new(folder.path(), &scenario.can.interfaces),
             events: EventLog::create(folder.events())?,
             watch: Watch::on(scenario.can.rates().ok()),
-            responses: Responses::on(&scenario.can, scenario.period_ns()),
+            responses: Responses::on(scenario),
             cycles: 0,
             freshness: Freshness::default(),
             first_sample_ns: None,

@@ -1,70 +1,23 @@
 //! How long the messages of the buses took from being queued to their arrival, beside the bounds of their
 //! plan.
 //!
-//! A bound holds for an undisturbed bus. Where messages were queued closer together than planned, as by a
+//! A bound holds for undisturbed buses. Where messages were queued closer together than planned, as by a
 //! process that was held up, the plan is worked out again for the closest that they were. Real interfaces do not
 //! tell when a frame was queued.
 
 use masseter_shared::can::{BusPlan, FrameFormat, Message, PlannedMessage, TapError, Tapped, tap};
-use masseter_shared::config::CanConfig;
+use masseter_shared::config::Scenario;
 use masseter_shared::messages::FrameTap;
 use masseter_shared::schedule::plans;
-use serde::Serialize;
 
-/// The longest response time of a message.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct ResponseFigures {
-    /// Index of the bus.
-    pub bus: usize,
-    /// What it is; `other` for all messages that are in no plan: SDO, NMT, emergencies.
-    pub message: String,
-    /// Frames whose time of queueing is known.
-    pub frames: u64,
-    /// Longest time from being queued to the end of the frame; none without such frames, ns.
-    pub max_ns: Option<u64>,
-    /// The most it may be: by the plan, or if messages were queued closer together than planned, by that, ns.
-    pub bound_ns: Option<u64>,
-}
-
-impl ResponseFigures {
-    /// Whether a frame took longer than the bound.
-    pub fn exceeds(&self) -> bool {
-        self.max_ns.zip(self.bound_ns).is_some_and(|(max_ns, bound_ns)| max_ns > bound_ns)
-    }
-
-    /// Share of the bound that was used.
-    pub fn share(&self) -> Option<f64> {
-        self.max_ns.zip(self.bound_ns).map(|(max_ns, bound_ns)| max_ns as f64 / bound_ns as f64)
-    }
-}
-
-/// Response times of all buses.
-#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize)]
-pub struct BusResponse {
-    /// The messages of each bus, the most urgent first.
-    pub messages: Vec<ResponseFigures>,
-    /// Why there are no bounds for this run; none where there are.
-    pub unbounded: Option<String>,
-}
-
-impl BusResponse {
-    /// Messages that took longer than their bound.
-    pub fn exceeding(&self) -> impl Iterator<Item = &ResponseFigures> {
-        self.messages.iter().filter(|message| message.exceeds())
-    }
-
-    /// The message that used most of its bound.
-    pub fn tightest(&self) -> Option<&ResponseFigures> {
-        let shares = self.messages.iter().filter_map(|message| Some((message, message.share()?)));
-        shares.max_by(|(_, one), (_, other)| one.total_cmp(other)).map(|(message, _)| message)
-    }
-}
+use super::bus_response::{BusResponse, ResponseFigures};
 
 /// Follows every frame.
 #[derive(Debug)]
 pub(super) struct Responses {
     buses: Vec<Followed>,
     format: FrameFormat,
+    has_faults: bool,
 }
 
 /// One bus.
@@ -74,6 +27,8 @@ struct Followed {
     /// In the order of the plan's messages.
     messages: Vec<Seen>,
     others: Seen,
+    /// Whether or not the time of queueing is known.
+    frames: u64,
     error_frames: u64,
 }
 
@@ -105,18 +60,20 @@ impl Seen {
 
 impl Responses {
     /// On the buses of a rig that was accepted; without plans nothing is told.
-    pub(super) fn on(can: &CanConfig, period_ns: u64) -> Self {
-        Self::with(plans(can, period_ns).unwrap_or_default(), can.format())
+    pub(super) fn on(scenario: &Scenario) -> Self {
+        let plans = plans(&scenario.can, scenario.period_ns()).unwrap_or_default();
+        Self::with(plans, scenario.can.format(), !scenario.faults.is_empty())
     }
 
-    fn with(plans: Vec<BusPlan>, format: FrameFormat) -> Self {
+    fn with(plans: Vec<BusPlan>, format: FrameFormat, has_faults: bool) -> Self {
         let followed = |plan: BusPlan| Followed {
             messages: vec![Seen::default(); plan.messages().len()],
             plan,
             others: Seen::default(),
+            frames: 0,
             error_frames: 0,
         };
-        Self { buses: plans.into_iter().map(followed).collect(), format }
+        Self { buses: plans.into_iter().map(followed).collect(), format, has_faults }
     }
 
     pub(super) fn frame(&mut self, tap: &FrameTap) -> Result<(), TapError> {
@@ -130,6 +87,7 @@ impl Responses {
             }
             None => &mut bus.others,
         };
+        bus.frames += 1;
         if tap.queued_ns > 0 {
             seen.take(tap.queued_ns, tap.time_ns);
         }
@@ -137,29 +95,47 @@ impl Responses {
     }
 
     pub(super) fn finish(self) -> BusResponse {
-        let format = self.format;
-        BusResponse {
-            unbounded: self.buses.iter().find_map(|bus| bus.unbounded(format)),
-            messages: self.buses.iter().flat_map(|bus| bus.figures(format)).collect(),
+        let unbounded = self.unbounded();
+        let figures = |bus: &Followed| bus.figures(&bus.bounds_ns(self.format, unbounded.is_none()));
+        let messages = self.buses.iter().flat_map(figures).collect();
+        BusResponse { messages, unbounded }
+    }
+
+    /// Why there are no bounds for this run.
+    fn unbounded(&self) -> Option<String> {
+        if self.has_faults {
+            return Some("the scenario's faults are in no plan".to_owned());
         }
+        self.buses.iter().find_map(|bus| bus.unbounded(self.format))
     }
 }
 
 impl Followed {
-    fn figures(&self, format: FrameFormat) -> Vec<ResponseFigures> {
-        let as_queued = self.plan_as_queued(format);
-        let bounds = self.plan.messages().iter().zip(as_queued.messages());
-        let bounds = bounds.map(|(planned, queued)| planned.response_ns.max(queued.response_ns));
-        let planned = self.plan.messages().iter().zip(&self.messages).zip(bounds);
+    fn figures(&self, bounds_ns: &[Option<u64>]) -> Vec<ResponseFigures> {
         let bus = self.plan.bus();
+        let planned = self.plan.messages().iter().zip(&self.messages).zip(bounds_ns);
         let planned =
-            planned.map(|((planned, seen), bound_ns)| seen.figures(bus, &planned.message.name, bound_ns));
+            planned.map(|((planned, seen), bound_ns)| seen.figures(bus, &planned.message.name, *bound_ns));
         planned.chain([self.others.figures(bus, "other", None)]).collect()
+    }
+
+    /// For the plan's messages, both as planned and as they were queued.
+    fn bounds_ns(&self, format: FrameFormat, are_bounded: bool) -> Vec<Option<u64>> {
+        let as_queued = self.plan_as_queued(format);
+        let both = self.plan.messages().iter().zip(as_queued.messages());
+        let bound_ns = |(planned, queued): (&PlannedMessage, &PlannedMessage)| {
+            let (planned_ns, queued_ns) = planned.response_ns.zip(queued.response_ns)?;
+            are_bounded.then_some(planned_ns.max(queued_ns))
+        };
+        both.map(bound_ns).collect()
     }
 
     /// Why there are no bounds here.
     fn unbounded(&self, format: FrameFormat) -> Option<String> {
         let bus = self.plan.bus();
+        if self.frames == 0 {
+            return Some(format!("no frame of bus {bus} was recorded"));
+        }
         if self.messages.iter().all(|seen| seen.frames == 0) {
             return Some(format!("bus {bus} does not tell when its frames were queued"));
         }
@@ -206,13 +182,11 @@ mod tests {
     }
 
     /// SYNC and one message of 8 bytes: bounds of 55 + 135 µs for both.
-    fn responses() -> Responses {
+    fn responses(has_faults: bool) -> Responses {
         let messages = vec![message("SYNC", 0x080, 0), message("TPDO1 1", 0x181, 8)];
         let rates = Rates::classical(Bitrate::MAX);
-        Responses::with(
-            vec![BusPlan::new(0, rates, FrameFormat::Classical, PERIOD_NS, messages)],
-            FrameFormat::Classical,
-        )
+        let plan = BusPlan::new(0, rates, FrameFormat::Classical, PERIOD_NS, messages);
+        Responses::with(vec![plan], FrameFormat::Classical, has_faults)
     }
 
     fn seen(id: u32, queued_ns: u64, took_us: u64) -> FrameTap {
@@ -220,7 +194,10 @@ mod tests {
     }
 
     fn of(frames: impl IntoIterator<Item = FrameTap>) -> BusResponse {
-        let mut responses = responses();
+        followed(responses(false), frames)
+    }
+
+    fn followed(mut responses: Responses, frames: impl IntoIterator<Item = FrameTap>) -> BusResponse {
         frames.into_iter().for_each(|frame| responses.frame(&frame).unwrap());
         responses.finish()
     }
@@ -256,26 +233,37 @@ mod tests {
     }
 
     #[test]
-    fn bounds_say_nothing_of_disturbed_buses_of_crowded_ones_and_of_unknown_times() {
+    fn there_are_no_bounds_of_disturbed_buses_of_crowded_ones_and_of_unknown_times() {
         let report = ErrorReport { time_ns: 2000, port: 1, kind: ErrorKind::Bit, tec: 8, rec: 0 };
         let error = tap::encode(0, &Tapped::Error(report));
         let cases = [
+            (vec![], "no frame of bus 0 was recorded"),
             (vec![seen(0x080, 0, 0)], "does not tell when its frames were queued"),
             (vec![seen(0x080, 1000, 51), error], "bus 0 had 1 errors"),
             (vec![seen(0x080, 1000, 51), seen(0x080, 61_000, 51)], "so close together"),
             (vec![seen(0x080, 1000, 51), seen(0x080, 1000, 102)], "so close together"),
         ];
         for (frames, reason) in cases {
-            let found = of(frames.clone()).unbounded;
-            assert!(found.as_ref().is_some_and(|found| found.contains(reason)), "{frames:?}: {found:?}");
+            let found = of(frames.clone());
+            let why = found.unbounded.as_ref();
+            assert!(why.is_some_and(|why| why.contains(reason)), "{frames:?}: {found:?}");
+            assert!(found.messages.iter().all(|message| message.bound_ns.is_none()), "{found:?}");
         }
     }
 
     #[test]
+    fn with_faults_there_are_no_bounds() {
+        let found = followed(responses(true), [seen(0x080, 1000, 191), seen(0x181, 1000, 190)]);
+        assert_eq!(found.unbounded.as_deref(), Some("the scenario's faults are in no plan"));
+        assert_eq!((found.exceeding().count(), found.tightest()), (0, None));
+    }
+
+    #[test]
     fn every_message_of_a_rig_has_a_bound() {
-        let found = Responses::on(&CanConfig::default(), PERIOD_NS).finish();
         let sync = CanId::from(Cob::Sync).flagged();
         assert_eq!(sync, 0x080);
+        let syncs = [0, 1].map(|bus| FrameTap { bus, ..seen(sync, 1000, 51) });
+        let found = followed(Responses::on(&Scenario::default()), syncs);
         assert!(
             found.messages.iter().all(|message| message.message == "other" || message.bound_ns.is_some())
         );

@@ -93,7 +93,7 @@ pub(super) fn checks(manifest: &Manifest, figures: &Figures, is_disturbed: bool)
             result: missed_cycles(manifest, figures),
         },
         Check::judged("dropped messages", missing.to_string(), missing == 0),
-        bus_response(&figures.bus_response, !manifest.scenario.faults.is_empty()),
+        bus_response(&figures.bus_response),
     ]
 }
 
@@ -105,11 +105,8 @@ fn sequence(state: &str, events: &[EventRecord]) -> Check {
 }
 
 /// No message may take longer on its bus than the plan allows at worst.
-fn bus_response(response: &BusResponse, has_faults: bool) -> Check {
+fn bus_response(response: &BusResponse) -> Check {
     const NAME: &str = "bus response";
-    if has_faults {
-        return Check::not_judged(NAME, "the scenario's faults are in no plan".to_owned());
-    }
     if let Some(why) = &response.unbounded {
         return Check::not_judged(NAME, why.clone());
     }
@@ -170,24 +167,20 @@ mod tests {
             message: "SYNC".to_owned(),
             frames: 1,
             max_ns: Some(max_ns),
-            bound_ns: Some(190_000),
+            bound_ns: unbounded.is_none().then_some(190_000),
         };
         BusResponse { messages: vec![sync], unbounded: unbounded.map(str::to_owned) }
     }
 
     #[test]
     fn a_message_beyond_its_bound_fails_unless_the_bound_does_not_hold() {
-        let cases = [
-            (190_000, None, false, "ok"),
-            (191_000, None, false, "FAIL"),
-            (191_000, None, true, "skip"),
-            (191_000, Some("bus 0 had 1 errors"), false, "skip"),
-        ];
-        for (max_ns, unbounded, has_faults, mark) in cases {
-            let check = bus_response(&response(max_ns, unbounded), has_faults);
+        let cases =
+            [(190_000, None, "ok"), (191_000, None, "FAIL"), (191_000, Some("bus 0 had 1 errors"), "skip")];
+        for (max_ns, unbounded, mark) in cases {
+            let check = bus_response(&response(max_ns, unbounded));
             assert_eq!(check.result.mark(), mark, "{check:?}");
         }
-        let failed = bus_response(&response(191_000, None), false);
+        let failed = bus_response(&response(191_000, None));
         assert_eq!(failed.finding, "SYNC on bus 1 took 191.00 µs, bound 190.00 µs");
     }
 }
