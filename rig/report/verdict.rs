@@ -1,5 +1,6 @@
 //! How a run is judged: its end, then its recording, then the machine, then its [checks](super::checks).
 
+use masseter_shared::config::CanConfig;
 use serde::{Deserialize, Serialize};
 
 use super::checks::{Check, CheckResult, checks, missed_cycles};
@@ -62,7 +63,10 @@ impl Verdict {
             .filter(|(exit, ..)| !(*exit == Exit::SafeStop && disturbed.is_some()))
             .or_else(|| incomplete(figures))
             .or(disturbed)
-            .or_else(|| failed(&checks).map(|failure| clock_jump(&manifest.usage).unwrap_or(failure)))
+            .or_else(|| {
+                failed(&checks)
+                    .map(|failure| clock_jump(&manifest.usage, &manifest.scenario.can).unwrap_or(failure))
+            })
             .unwrap_or_else(|| (Exit::Passed, "PASS", "every check passed".to_owned()));
         if exit != Exit::Passed {
             reason += &overload(&manifest.usage, manifest.scenario.rate_hz).unwrap_or_default();
@@ -158,10 +162,10 @@ fn standstill(figures: &Figures) -> String {
     )
 }
 
-/// Stamps of the wall clock, as real interfaces give them, tell nothing once it was set.
-fn clock_jump(usage: &RunUsage) -> Option<Judgement> {
+/// Stamps of the wall clock, which real interfaces give and simulated ones do not, tell nothing once it was set.
+fn clock_jump(usage: &RunUsage, can: &CanConfig) -> Option<Judgement> {
     let jump_s = usage.clock_jump_s;
-    (jump_s != 0.0).then(|| {
+    (jump_s != 0.0 && !can.is_virtual()).then(|| {
         let reason = format!(
             "the wall clock jumped by {jump_s:.3} s, as it does when it is set or the machine was suspended; repeat the run"
         );
@@ -219,10 +223,13 @@ mod tests {
     }
 
     #[test]
-    fn a_jump_of_the_clock_is_told_and_none_is_not() {
-        let jump = |clock_jump_s| clock_jump(&RunUsage { clock_jump_s, ..RunUsage::default() });
-        assert_eq!(jump(0.0), None);
-        let (exit, word, reason) = jump(-3.5).unwrap();
+    fn a_jump_of_the_clock_excuses_runs_on_real_interfaces_alone() {
+        let simulated = CanConfig::default();
+        let real = CanConfig { interfaces: vec!["can0".to_owned()], ..simulated.clone() };
+        let jump = |clock_jump_s, can| clock_jump(&RunUsage { clock_jump_s, ..RunUsage::default() }, can);
+        assert_eq!(jump(0.0, &real), None);
+        assert_eq!(jump(-3.5, &simulated), None);
+        let (exit, word, reason) = jump(-3.5, &real).unwrap();
         assert_eq!((exit, word), (Exit::Invalid, "INVALID"));
         assert!(reason.contains("jumped by -3.500 s"), "{reason}");
     }
