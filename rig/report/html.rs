@@ -6,7 +6,7 @@ use super::junit::escape;
 use super::plot::Drawn;
 use super::table::{self, in_words};
 use super::{charts, events, film, usage};
-use crate::analysis::{BusResponse, Figures};
+use crate::analysis::{BusResponse, Figures, Reference};
 use crate::report::checks::CheckResult;
 use crate::report::verdict::Verdict;
 use crate::run::manifest::Manifest;
@@ -60,17 +60,27 @@ fn checks(page: &mut String, verdict: &Verdict) -> std::fmt::Result {
 
 /// The 3-D view with its data and its program.
 fn mechanism(page: &mut String, manifest: &Manifest, figures: &Figures) -> std::fmt::Result {
-    let Some(film) = film::of_track(&manifest.scenario, &figures.track) else { return Ok(()) };
+    let Some(film) = film::of_run(&manifest.scenario, figures) else { return Ok(()) };
+    let outlines = outlines(figures.tracking.reference);
     // JSON of numbers and fixed names holds no `<` that could end the element.
     writeln!(
         page,
         "<h2>Mechanism</h2>\n<canvas id=\"mechanism\" width=\"1200\" height=\"640\"></canvas>\n\
          <p><button id=\"play\">pause</button> <input id=\"time\" type=\"range\" min=\"0\" max=\"1\" step=\"any\" value=\"0\"> \
-         <span id=\"clock\"></span><br>Platform: <span style=\"color:#0072b2\">true</span>, \
-         <span style=\"color:#d55e00\">estimated (dashed)</span>, <span style=\"color:#009e73\">wanted (dotted)</span>; \
+         <span id=\"clock\"></span><br>Platform: {outlines}; \
          <span style=\"color:#b00020\">incisal point and condyles</span>. Drag to turn.</p>\n\
          <script type=\"application/json\" id=\"film\">{film}</script>\n<script>\n{MECHANISM}</script>"
     )
+}
+
+/// What the platform's outlines stand for.
+fn outlines(reference: Reference) -> String {
+    let found = format!("<span style=\"color:#0072b2\">{}</span>", reference.adjective());
+    let estimated = match reference {
+        Reference::Truth => ", <span style=\"color:#d55e00\">estimated (dashed)</span>",
+        Reference::Estimate => "",
+    };
+    format!("{found}{estimated}, <span style=\"color:#009e73\">wanted (dotted)</span>")
 }
 
 /// A plot under an id, with what did not fit into it; or why there is none.
@@ -248,4 +258,15 @@ fn circumstances(page: &mut String, manifest: &Manifest) -> std::fmt::Result {
         }
     }
     usage::table(page, &manifest.usage)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn without_truth_nothing_is_called_true() {
+        assert!(outlines(Reference::Truth).contains("true"));
+        assert!(!outlines(Reference::Estimate).contains("true"));
+    }
 }

@@ -7,8 +7,8 @@
   const play = document.getElementById('play');
   const time = document.getElementById('time');
   const clock = document.getElementById('clock');
-  const COLOURS = { still: '#888', leg: '#444', true: '#0072b2', estimated: '#d55e00', wanted: '#009e73', jaw: '#b00020' };
-  const TRUE = 1, ESTIMATED = 8, WANTED = 15;
+  const COLOURS = { still: '#888', leg: '#444', reference: '#0072b2', estimated: '#d55e00', wanted: '#009e73', jaw: '#b00020' };
+  const REFERENCE = 1, WANTED = 8, ESTIMATED = 15;
   const end = film.frames[film.frames.length - 1][0];
   let turn = -2.2, tilt = 0.35, at = 0, playing = true, before = null, drag = null;
 
@@ -71,17 +71,18 @@
     film.corners.forEach((corner, leg) => {
       const [centre, along] = [film.centres[leg], film.along[leg]];
       path(film.slide_ends.map((end) => add(centre, scale(along, end))), COLOURS.still, 4);
-      const top = placed(corner, frame, TRUE);
+      const top = placed(corner, frame, REFERENCE);
       const hinge = add(centre, scale(along, dot(add(top, scale(centre, -1)), along)));
       path([hinge, top], COLOURS.leg, 5);
       dot2d(hinge, COLOURS.leg, 5);
     });
-    const jaw = film.jaw.map((point) => placed(point, frame, TRUE));
+    const jaw = film.jaw.map((point) => placed(point, frame, REFERENCE));
     path(jaw, COLOURS.jaw, 1, true);
     jaw.forEach((point) => dot2d(point, COLOURS.jaw, 4));
     platform(frame, WANTED, COLOURS.wanted, 2, [2, 6]);
-    platform(frame, TRUE, COLOURS.true, 3);
-    platform(frame, ESTIMATED, COLOURS.estimated, 2, [8, 8]);
+    platform(frame, REFERENCE, COLOURS.reference, 3);
+    // Without truth the estimate is the reference.
+    if (frame.length > ESTIMATED) platform(frame, ESTIMATED, COLOURS.estimated, 2, [8, 8]);
     clock.textContent = at.toFixed(2) + ' s';
     time.value = end > 0 ? at / end : 0;
   }
