@@ -28,20 +28,20 @@ pub struct IntervalFigures {
     pub name: &'static str,
     /// Samples.
     pub n: u64,
-    /// Median, ns.
-    pub p50_ns: u64,
+    /// Median, ns; none without samples, as the others.
+    pub p50_ns: Option<u64>,
     /// Standard error of the median, by its seconds, ns; none with less than three of them.
     pub p50_noise_ns: Option<f64>,
     /// 99th percentile, ns.
-    pub p99_ns: u64,
+    pub p99_ns: Option<u64>,
     /// Standard error of the 99th percentile, by its seconds, ns.
     pub p99_noise_ns: Option<f64>,
     /// 99.9th percentile, ns; only with at least 10,000 samples.
     pub p999_ns: Option<u64>,
     /// Largest, ns.
-    pub max_ns: u64,
+    pub max_ns: Option<u64>,
     /// When the largest was, ns of the run's clock.
-    pub max_at_ns: u64,
+    pub max_at_ns: Option<u64>,
     /// The distribution, for plots: 1/(1 − quantile) and value in ns.
     #[serde(skip)]
     pub curve: Vec<(f64, u64)>,
@@ -138,16 +138,17 @@ impl Measured {
         }
         self.write_log().map_err(|error| AnalysisError::Write { path: self.path.clone(), error })?;
         let n = self.total.len();
+        let measured = |ns: u64| (n > 0).then_some(ns);
         Ok(IntervalFigures {
             name: self.name,
             n,
-            p50_ns: self.quantile_ns(0.50),
+            p50_ns: measured(self.quantile_ns(0.50)),
             p50_noise_ns: standard_error(&self.medians_ns),
-            p99_ns: self.quantile_ns(0.99),
+            p99_ns: measured(self.quantile_ns(0.99)),
             p99_noise_ns: standard_error(&self.p99s_ns),
             p999_ns: (n >= SAMPLES_FOR_P999).then(|| self.quantile_ns(0.999)),
-            max_ns: self.max_ns,
-            max_at_ns: self.max_at_ns,
+            max_ns: measured(self.max_ns),
+            max_at_ns: measured(self.max_at_ns),
             curve: self.curve(),
         })
     }
@@ -202,8 +203,16 @@ mod tests {
         let (_folder, mut measured) = measured();
         measured.add(410_123, 0);
         let figures = measured.finish().unwrap();
-        assert_eq!((figures.p50_ns, figures.p99_ns, figures.max_ns), (410_123, 410_123, 410_123));
+        assert_eq!([figures.p50_ns, figures.p99_ns, figures.max_ns], [Some(410_123); 3]);
         assert_eq!(figures.curve.last().unwrap().1, 410_123);
+    }
+
+    #[test]
+    fn without_samples_there_are_no_figures() {
+        let (_folder, measured) = measured();
+        let figures = measured.finish().unwrap();
+        assert_eq!(figures.n, 0);
+        assert_eq!([figures.p50_ns, figures.p99_ns, figures.max_ns, figures.max_at_ns], [None; 4]);
     }
 
     #[test]
@@ -224,6 +233,6 @@ mod tests {
         assert_eq!(measured.finish().unwrap().n, 20_001);
         let (_folder, mut measured) = self::measured();
         measured.add_steps(7, 1_000_000, u64::MAX, u64::MAX);
-        assert!(measured.finish().unwrap().max_ns > u64::MAX - 1_100_000);
+        assert!(measured.finish().unwrap().max_ns > Some(u64::MAX - 1_100_000));
     }
 }

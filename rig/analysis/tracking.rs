@@ -43,16 +43,17 @@ pub struct TrackingFigures {
     pub reference: Reference,
     /// Cycles compared.
     pub samples: u64,
-    /// Root mean square distance of the platform's origin, reference against wanted, mm.
-    pub rms_mm: f64,
+    /// Root mean square distance of the platform's origin, reference against wanted, mm; none without samples, as the
+    /// others.
+    pub rms_mm: Option<f64>,
     /// Standard error of that figure, by its seconds, mm; none with less than three of them.
     pub rms_noise_mm: Option<f64>,
     /// Largest distance, mm.
-    pub max_mm: f64,
+    pub max_mm: Option<f64>,
     /// Root mean square angle, reference against wanted, degrees.
-    pub rms_deg: f64,
+    pub rms_deg: Option<f64>,
     /// Largest angle, degrees.
-    pub max_deg: f64,
+    pub max_deg: Option<f64>,
     /// Root mean square distance, estimated by forward kinematics against true, mm; none without truth.
     pub estimate_rms_mm: Option<f64>,
 }
@@ -180,16 +181,18 @@ impl Tracking {
     }
 
     pub(super) fn finish(self) -> (TrackingFigures, Track) {
+        let samples = self.distances.samples;
+        let compared = |value: f64| (samples > 0).then_some(value);
         let has_truth = self.reference == Reference::Truth;
         let figures = TrackingFigures {
             reference: self.reference,
-            samples: self.distances.samples,
-            rms_mm: self.distances.rms() * 1e3,
+            samples,
+            rms_mm: compared(self.distances.rms() * 1e3),
             rms_noise_mm: standard_error(&self.seconds),
-            max_mm: self.distances.largest * 1e3,
-            rms_deg: self.angles.rms().to_degrees(),
-            max_deg: self.angles.largest.to_degrees(),
-            estimate_rms_mm: has_truth.then(|| self.estimates.rms() * 1e3),
+            max_mm: compared(self.distances.largest * 1e3),
+            rms_deg: compared(self.angles.rms().to_degrees()),
+            max_deg: compared(self.angles.largest.to_degrees()),
+            estimate_rms_mm: compared(self.estimates.rms() * 1e3).filter(|_| has_truth),
         };
         let distances = self.distance_m.iter().map(|(at_s, stretch)| (at_s, stretch.highest[0]));
         let distance_m = distances.filter(|(_, distance_m)| distance_m.is_finite()).collect();
@@ -228,8 +231,18 @@ mod tests {
         tracking.solution(&State { estimated_position_m: [0.001, 0.0, 0.0], ..state(1, 0.003) });
         let (figures, track) = tracking.finish();
         assert_eq!((figures.samples, figures.estimate_rms_mm), (1, None));
-        assert!((figures.rms_mm - 2.0).abs() < 1e-9);
+        assert!((figures.rms_mm.unwrap() - 2.0).abs() < 1e-9);
         assert!((track.samples[0].found.translation.x - 0.001).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_platform_that_never_ran_was_nowhere_perfectly() {
+        let mut tracking = Tracking::default();
+        tracking.solution(&State { controller_state: ControllerState::Easing.code(), ..state(1, 0.0) });
+        tracking.truth(&truth(1, 0.0));
+        let (figures, _) = tracking.finish();
+        assert_eq!(figures, TrackingFigures::default());
+        assert_eq!((figures.rms_mm, figures.estimate_rms_mm), (None, None));
     }
 
     #[test]
@@ -242,7 +255,7 @@ mod tests {
         tracking.truth(&truth(3, 9.000));
         let (figures, track) = tracking.finish();
         assert_eq!((figures.samples, track.samples.len()), (2, 2));
-        assert!((figures.max_mm - 4.0).abs() < 1e-9);
-        assert!((figures.rms_mm - (12.5f64).sqrt()).abs() < 1e-9);
+        assert!((figures.max_mm.unwrap() - 4.0).abs() < 1e-9);
+        assert!((figures.rms_mm.unwrap() - (12.5f64).sqrt()).abs() < 1e-9);
     }
 }

@@ -12,7 +12,7 @@ const LEAST_US: f64 = 0.01;
 
 /// Percentiles of every interval, with the cycle's budgets.
 pub(super) fn percentiles(scenario: &Scenario, figures: &Figures) -> Option<Drawn> {
-    let measured = figures.intervals.iter().filter(|interval| interval.max_ns > 0);
+    let measured = figures.intervals.iter().filter(|interval| interval.max_ns > Some(0));
     let line = |interval: &IntervalFigures| Line {
         name: interval.name.to_owned(),
         points: interval.curve.iter().map(|&(x, value)| (x, microseconds(value as f64))).collect(),

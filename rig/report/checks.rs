@@ -77,10 +77,12 @@ pub(super) fn checks(manifest: &Manifest, figures: &Figures, is_disturbed: bool)
         Check::judged(
             "tracking",
             format!(
-                "rms {:.4} mm over {} samples, limit {} mm",
-                tracking.rms_mm, tracking.samples, limits.tracking_rms_mm
+                "rms {} mm over {} samples, limit {} mm",
+                table::or_dash(tracking.rms_mm, table::decimals),
+                tracking.samples,
+                limits.tracking_rms_mm
             ),
-            tracking.samples > 0 && tracking.rms_mm <= limits.tracking_rms_mm,
+            tracking.rms_mm.is_some_and(|rms_mm| rms_mm <= limits.tracking_rms_mm),
         )
         .unless(is_disturbed),
         Check {
@@ -111,8 +113,8 @@ fn bus_response(response: &BusResponse) -> Check {
         return Check::not_judged(NAME, why.clone());
     }
     let in_words = |message: &ResponseFigures| {
-        let us = |ns: Option<u64>| ns.map_or_else(|| "–".to_owned(), table::microseconds);
-        let (max_us, bound_us) = (us(message.max_ns), us(message.bound_ns));
+        let [max_us, bound_us] =
+            [message.max_ns, message.bound_ns].map(|ns| table::or_dash(ns, table::microseconds));
         format!("{} on bus {} took {max_us} µs, bound {bound_us} µs", message.message, message.bus)
     };
     let exceeding: Vec<_> = response.exceeding().map(in_words).collect();

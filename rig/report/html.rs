@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use super::junit::escape;
 use super::plot::Drawn;
-use super::table::{self, in_words};
+use super::table::{self, in_words, microseconds, or_dash};
 use super::{charts, events, film, usage};
 use crate::analysis::{BusResponse, Figures, Reference};
 use crate::report::checks::CheckResult;
@@ -99,15 +99,7 @@ fn plot(page: &mut String, id: &str, drawn: Option<Drawn>, otherwise: &str) -> s
 
 fn motion(page: &mut String, figures: &Figures) -> std::fmt::Result {
     let tracking = &figures.tracking;
-    writeln!(
-        page,
-        "<h2>Motion</h2>\n<p>Platform, {} against wanted: rms {:.4} mm, max {:.4} mm; rms {:.4}°, max {:.4}°.",
-        tracking.reference.adjective(),
-        tracking.rms_mm,
-        tracking.max_mm,
-        tracking.rms_deg,
-        tracking.max_deg
-    )?;
+    writeln!(page, "<h2>Motion</h2>\n<p>Platform, {}.", table::distances(tracking))?;
     if let Some(rms_mm) = tracking.estimate_rms_mm {
         writeln!(page, "Estimated against true: rms {rms_mm:.4} mm.")?;
     }
@@ -137,10 +129,10 @@ fn latencies(page: &mut String, manifest: &Manifest, figures: &Figures) -> std::
             "<tr><td>{}<td>{}<td>{}<td>{}<td>{}<td>{}",
             interval.name,
             interval.n,
-            table::microseconds(interval.p50_ns),
-            table::microseconds(interval.p99_ns),
-            interval.p999_ns.map_or_else(|| "–".to_owned(), table::microseconds),
-            table::microseconds(interval.max_ns),
+            or_dash(interval.p50_ns, microseconds),
+            or_dash(interval.p99_ns, microseconds),
+            or_dash(interval.p999_ns, microseconds),
+            or_dash(interval.max_ns, microseconds),
         )?;
     }
     writeln!(
@@ -168,21 +160,20 @@ fn worst_cycles(page: &mut String, figures: &Figures) -> std::fmt::Result {
          <table id=\"worst\">\n<tr><th>cycle<th>at, s<th>took<th>hop to blame<th>it took<th>its median\
          <th>machine stood still<th>stolen around<th>preempted<th>page faults\n",
     );
-    let unknown = || "–".to_owned();
     for worst in &figures.worst_cycles {
         writeln!(
             page,
             "<tr><td>{}<td>{:.3}<td>{}<td>{}<td>{}<td>{}<td>{}<td>{}<td>{}<td>{}",
             worst.cycle,
             worst.due_ns.saturating_sub(figures.over_time.began_ns) as f64 / 1e9,
-            table::microseconds(worst.total_ns),
+            microseconds(worst.total_ns),
             worst.hop,
-            table::microseconds(worst.hop_ns),
-            table::microseconds(worst.hop_p50_ns),
-            table::microseconds(worst.stalled_ns),
-            worst.around.stolen_ns.map_or_else(unknown, table::microseconds),
-            worst.around.involuntary_switches.map_or_else(unknown, |count| count.to_string()),
-            worst.around.page_faults.map_or_else(unknown, |count| count.to_string()),
+            microseconds(worst.hop_ns),
+            microseconds(worst.hop_p50_ns),
+            microseconds(worst.stalled_ns),
+            or_dash(worst.around.stolen_ns, microseconds),
+            or_dash(worst.around.involuntary_switches, |count| count.to_string()),
+            or_dash(worst.around.page_faults, |count| count.to_string()),
         )?;
     }
     page.push_str("</table>\n");
@@ -206,8 +197,7 @@ fn responses(page: &mut String, response: &BusResponse) -> std::fmt::Result {
          <table id=\"responses\">\n<tr><th>bus<th>message<th>n<th>max<th>bound\n",
     );
     for message in &response.messages {
-        let us = |ns: Option<u64>| ns.map_or_else(|| "–".to_owned(), table::microseconds);
-        let (max, bound) = (us(message.max_ns), us(message.bound_ns));
+        let [max, bound] = [message.max_ns, message.bound_ns].map(|ns| or_dash(ns, microseconds));
         let class = if message.exceeds() { "failed" } else { "" };
         writeln!(
             page,

@@ -3,7 +3,9 @@
 use std::fmt::Write;
 
 use super::usage;
-use crate::analysis::{BusResponse, EventRecord, Figures, IntervalFigures, ReadingFigures, ResponseFigures};
+use crate::analysis::{
+    BusResponse, EventRecord, Figures, IntervalFigures, ReadingFigures, ResponseFigures, TrackingFigures,
+};
 use crate::report::verdict::Verdict;
 use crate::run::manifest::Manifest;
 
@@ -37,15 +39,7 @@ fn write_all(
         writeln!(text, "  {:<4} {:<18} {}", check.result.mark(), check.name, check.finding)?;
     }
     let tracking = &figures.tracking;
-    writeln!(
-        text,
-        "\nplatform, {} against wanted: rms {:.4} mm, max {:.4} mm; rms {:.4}°, max {:.4}°",
-        tracking.reference.adjective(),
-        tracking.rms_mm,
-        tracking.max_mm,
-        tracking.rms_deg,
-        tracking.max_deg
-    )?;
+    writeln!(text, "\nplatform, {}", distances(tracking))?;
     if let Some(rms_mm) = tracking.estimate_rms_mm {
         writeln!(text, "platform, estimated against true: rms {rms_mm:.4} mm")?;
     }
@@ -81,10 +75,10 @@ fn latencies(text: &mut String, intervals: &[IntervalFigures]) -> std::fmt::Resu
             "{:<28} {:>8} {:>10} {:>10} {:>10} {:>10}",
             interval.name,
             interval.n,
-            microseconds(interval.p50_ns),
-            microseconds(interval.p99_ns),
-            interval.p999_ns.map_or_else(|| "–".to_owned(), microseconds),
-            microseconds(interval.max_ns),
+            or_dash(interval.p50_ns, microseconds),
+            or_dash(interval.p99_ns, microseconds),
+            or_dash(interval.p999_ns, microseconds),
+            or_dash(interval.max_ns, microseconds),
         )?;
     }
     Ok(())
@@ -119,18 +113,38 @@ fn responses(text: &mut String, response: &BusResponse) -> std::fmt::Result {
     }
     writeln!(text, "\n{:<20} {:>4} {:>8} {:>10} {:>10}", "response, µs", "bus", "n", "max", "bound")?;
     for message in closest {
-        let us = |ns: Option<u64>| ns.map_or_else(|| "–".to_owned(), microseconds);
         writeln!(
             text,
             "{:<20} {:>4} {:>8} {:>10} {:>10}",
             message.message,
             message.bus,
             message.frames,
-            us(message.max_ns),
-            us(message.bound_ns)
+            or_dash(message.max_ns, microseconds),
+            or_dash(message.bound_ns, microseconds)
         )?;
     }
     Ok(())
+}
+
+/// How far the platform was from where it was wanted.
+pub(super) fn distances(tracking: &TrackingFigures) -> String {
+    let TrackingFigures { rms_mm, max_mm, rms_deg, max_deg, .. } = *tracking;
+    let [rms_mm, max_mm, rms_deg, max_deg] =
+        [rms_mm, max_mm, rms_deg, max_deg].map(|value| or_dash(value, decimals));
+    format!(
+        "{} against wanted: rms {rms_mm} mm, max {max_mm} mm; rms {rms_deg}°, max {max_deg}°",
+        tracking.reference.adjective()
+    )
+}
+
+/// A dash where there is no such figure.
+pub(super) fn or_dash<T>(figure: Option<T>, in_words: impl Fn(T) -> String) -> String {
+    figure.map_or_else(|| "–".to_owned(), in_words)
+}
+
+/// Millimetres or degrees, with four decimals.
+pub(super) fn decimals(value: f64) -> String {
+    format!("{value:.4}")
 }
 
 /// Nanoseconds as microseconds with two decimals.
