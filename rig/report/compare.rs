@@ -3,7 +3,7 @@
 //! Noise is known of figures that each second of a run has a value of: their standard error stands in the
 //! summary beside them. Of extremes and counts it is not, and nothing is claimed.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 use std::fs;
 use std::path::Path;
@@ -12,6 +12,7 @@ use anyhow::Context;
 use serde::Serialize;
 use serde_json::Value;
 
+use super::table::or_dash;
 use crate::cli::Format;
 use crate::exit::{Exit, Failure};
 use crate::run::folder::RunFolder;
@@ -19,15 +20,16 @@ use crate::say::show;
 
 /// A change beyond this many standard errors of the difference is none of chance's.
 const BEYOND: f64 = 3.0;
-/// Figures that say when something was or what was known of it, and are no results.
-const NO_RESULTS: [&str; 3] = ["_noise_", "_at_ns", "events"];
+/// Figures that say when or where something was or what was known of it, and are no results.
+const NO_RESULTS: [&str; 6] = ["_noise_", "_at_ns", "events", "worst_cycles", "damage", ".bus"];
 
-/// One figure of both runs.
+/// One figure of two runs.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 struct Change {
     figure: String,
-    a: f64,
-    b: f64,
+    /// None where the run has no such figure.
+    a: Option<f64>,
+    b: Option<f64>,
     /// Standard error of the difference, where it is known.
     noise: Option<f64>,
     judgement: &'static str,
@@ -63,23 +65,30 @@ fn flatten(path: String, value: &Value, figures: &mut BTreeMap<String, f64>) {
         Value::Object(fields) => fields.iter().for_each(|(name, value)| flatten(below(name), value, figures)),
         Value::Array(items) => {
             for (index, item) in items.iter().enumerate() {
-                let name = item["name"].as_str().or(item["topic"].as_str());
-                flatten(below(&name.map_or_else(|| index.to_string(), str::to_owned)), item, figures);
+                flatten(below(&name_of(item).unwrap_or_else(|| index.to_string())), item, figures);
             }
         }
         _ => {}
     }
 }
 
+/// What tells an item of a list from the others, in whatever order they stand.
+fn name_of(item: &Value) -> Option<String> {
+    let text = |key: &str| item[key].as_str().map(str::to_owned);
+    let message = || Some(format!("can{} {}", item["bus"].as_u64()?, text("message")?));
+    text("name").or_else(|| text("topic")).or_else(message)
+}
+
 fn changes(a: &BTreeMap<String, f64>, b: &BTreeMap<String, f64>) -> Vec<Change> {
-    let results = a.iter().filter(|(name, _)| !NO_RESULTS.iter().any(|part| name.contains(part)));
-    let both = results.filter_map(|(name, in_a)| Some((name, *in_a, *b.get(name)?)));
-    both.map(|(name, in_a, in_b)| {
-        let noise = noise_of(name).and_then(|noise| Some(a.get(&noise)?.hypot(*b.get(&noise)?)));
-        let judgement = judge(in_b - in_a, noise);
-        Change { figure: name.clone(), a: in_a, b: in_b, noise, judgement }
-    })
-    .collect()
+    let names: BTreeSet<&String> = a.keys().chain(b.keys()).collect();
+    let results = names.into_iter().filter(|name| !NO_RESULTS.iter().any(|part| name.contains(part)));
+    results
+        .map(|name| {
+            let (in_a, in_b) = (a.get(name).copied(), b.get(name).copied());
+            let noise = noise_of(name).and_then(|noise| Some(a.get(&noise)?.hypot(*b.get(&noise)?)));
+            Change { figure: name.clone(), a: in_a, b: in_b, noise, judgement: judge(in_a, in_b, noise) }
+        })
+        .collect()
 }
 
 /// Where the noise of a figure stands: `p50_noise_ns` beside `p50_ns`.
@@ -88,7 +97,9 @@ fn noise_of(figure: &str) -> Option<String> {
     Some(format!("{name}_noise_{unit}"))
 }
 
-fn judge(difference: f64, noise: Option<f64>) -> &'static str {
+fn judge(a: Option<f64>, b: Option<f64>, noise: Option<f64>) -> &'static str {
+    let (Some(a), Some(b)) = (a, b) else { return if a.is_some() { "only in A" } else { "only in B" } };
+    let difference = b - a;
     match noise {
         _ if difference == 0.0 => "same",
         Some(noise) if difference.abs() > BEYOND * noise => "beyond noise",
@@ -99,11 +110,13 @@ fn judge(difference: f64, noise: Option<f64>) -> &'static str {
 
 fn table(a: &Path, b: &Path, changes: &[Change]) -> String {
     let mut text = format!("A: {}\nB: {}\n\n", a.display(), b.display());
-    writeln!(text, "{:<44} {:>14} {:>14} {:>9}", "figure", "A", "B", "change")
+    writeln!(text, "{:<50} {:>14} {:>14} {:>9}", "figure", "A", "B", "change")
         .expect("a string takes any text");
     for Change { figure, a, b, judgement, .. } in changes {
-        let change = if *a == 0.0 { "–".to_owned() } else { format!("{:+.1} %", (b / a - 1.0) * 100.0) };
-        writeln!(text, "{figure:<44} {:>14} {:>14} {change:>9}  {judgement}", number(*a), number(*b))
+        let share = a.zip(*b).filter(|(a, _)| *a != 0.0).map(|(a, b)| b / a - 1.0);
+        let change = or_dash(share, |share| format!("{:+.1} %", share * 100.0));
+        let [a, b] = [a, b].map(|value| or_dash(*value, number));
+        writeln!(text, "{figure:<50} {a:>14} {b:>14} {change:>9}  {judgement}")
             .expect("a string takes any text");
     }
     text
@@ -144,7 +157,38 @@ mod tests {
                 ("tracking.rms_mm", "within noise"),
             ]
         );
-        assert_eq!(judge(-20.0, Some(4.0)), "beyond noise");
-        assert_eq!(judge(0.0, None), "same");
+        assert_eq!(judge(Some(30.0), Some(10.0), Some(4.0)), "beyond noise");
+        assert_eq!(judge(Some(10.0), Some(10.0), None), "same");
+    }
+
+    #[test]
+    fn messages_are_compared_by_bus_and_name_and_what_one_run_lacks_is_told() {
+        let message =
+            |bus: u64, message: &str, max_ns: u64| json!({"bus": bus, "message": message, "max_ns": max_ns});
+        let run = |messages: [Value; 3], cycle: u64| {
+            let longest = json!({"cycle": cycle});
+            flat(&json!({"bus_response": {"messages": messages}, "worst_cycles": [longest]}))
+        };
+        let a = run([message(0, "SYNC", 48), message(0, "TPDO1 1", 190), message(1, "SYNC", 50)], 7);
+        let b = run([message(0, "SYNC", 49), message(1, "SYNC", 50), message(1, "TPDO1 4", 200)], 9);
+        let changes = changes(&a, &b);
+        let told: Vec<_> = changes
+            .iter()
+            .map(|change| {
+                let message = change.figure.strip_prefix("bus_response.messages.").unwrap();
+                (message, change.a, change.b, change.judgement)
+            })
+            .collect();
+        assert_eq!(
+            told,
+            [
+                ("can0 SYNC.max_ns", Some(48.0), Some(49.0), "noise unknown"),
+                ("can0 TPDO1 1.max_ns", Some(190.0), None, "only in A"),
+                ("can1 SYNC.max_ns", Some(50.0), Some(50.0), "same"),
+                ("can1 TPDO1 4.max_ns", None, Some(200.0), "only in B"),
+            ]
+        );
+        let text = table(Path::new("A"), Path::new("B"), &changes);
+        assert!(text.contains("190              –         –  only in A"), "{text}");
     }
 }
