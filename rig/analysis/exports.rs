@@ -21,13 +21,21 @@ struct Log {
     path: PathBuf,
     interface: String,
     file: BufWriter<File>,
-    frames: u64,
+    logged: Logged,
+}
+
+/// What a log holds.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(crate) struct Logged {
+    pub(crate) frames: u64,
+    /// Error messages, as a `SocketCAN` interface gives them.
+    pub(crate) errors: u64,
 }
 
 impl Log {
     fn create(path: PathBuf, interface: String) -> Result<Self, AnalysisError> {
         match File::create(&path) {
-            Ok(file) => Ok(Self { path, interface, file: BufWriter::new(file), frames: 0 }),
+            Ok(file) => Ok(Self { path, interface, file: BufWriter::new(file), logged: Logged::default() }),
             Err(error) => Err(AnalysisError::Write { path, error }),
         }
     }
@@ -54,17 +62,18 @@ impl CandumpLogs {
         let log = &mut self.buses[bus];
         self.line.clear();
         candump::write_tap(&mut self.line, &log.interface, frame)?;
-        log.frames += 1;
+        let count = if tap::is_error(frame) { &mut log.logged.errors } else { &mut log.logged.frames };
+        *count += 1;
         writeln!(log.file, "{}", self.line)
             .map_err(|error| AnalysisError::Write { path: log.path.clone(), error })
     }
 
-    /// Frames on each bus.
-    pub(crate) fn finish(self) -> Result<Vec<u64>, AnalysisError> {
+    /// Of each bus.
+    pub(crate) fn finish(self) -> Result<Vec<Logged>, AnalysisError> {
         self.buses
             .into_iter()
             .map(|mut log| match log.file.flush() {
-                Ok(()) => Ok(log.frames),
+                Ok(()) => Ok(log.logged),
                 Err(error) => Err(AnalysisError::Write { path: log.path, error }),
             })
             .collect()
@@ -73,7 +82,22 @@ impl CandumpLogs {
 
 #[cfg(test)]
 mod tests {
+    use masseter_shared::can::{ErrorKind, ErrorReport, Tapped};
+
     use super::*;
+
+    #[test]
+    fn an_error_message_is_logged_and_is_no_frame() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut logs = CandumpLogs::new(folder.path(), &[]);
+        let report = ErrorReport { time_ns: 2000, port: 1, kind: ErrorKind::Bit, tec: 8, rec: 0 };
+        for tap in [FrameTap { id: 0x080, ..FrameTap::default() }, tap::encode(0, &Tapped::Error(report))] {
+            logs.write(&tap).unwrap();
+        }
+        assert_eq!(logs.finish().unwrap(), [Logged { frames: 1, errors: 1 }]);
+        let log = std::fs::read_to_string(folder.path().join("can0.log")).unwrap();
+        assert_eq!(log.lines().count(), 2, "{log}");
+    }
 
     #[test]
     fn a_frame_on_a_bus_that_no_link_has_makes_no_logs() {

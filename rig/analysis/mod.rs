@@ -284,7 +284,7 @@ impl Pass {
             worst_cycles: self.ledger.finish(),
             intervals: self.intervals.finish()?,
             topics: self.sequence.finish(),
-            frames: self.candump.finish()?,
+            frames: self.candump.finish()?.iter().map(|logged| logged.frames).collect(),
             bus_response: self.responses.finish(),
             events: self.events.finish()?,
             cut_short: reader.was_cut_short(),

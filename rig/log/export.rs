@@ -51,8 +51,8 @@ pub(super) fn write<R: Read + Seek>(
     for csv in tables.into_values().flatten() {
         written.push(csv.finish()?);
     }
-    for (bus, frames) in candump.finish()?.into_iter().enumerate() {
-        written.push((format!("can{bus}.log"), frames));
+    for (bus, logged) in candump.finish()?.into_iter().enumerate() {
+        written.push((format!("can{bus}.log"), logged.frames + logged.errors));
     }
     Ok(written)
 }

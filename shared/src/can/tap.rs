@@ -101,12 +101,17 @@ pub fn bus_of(tap: &FrameTap) -> Result<usize, TapError> {
     if bus < MOST_BUSES { Ok(bus) } else { Err(TapError::Bus { bus: tap.bus }) }
 }
 
+/// Whether a message holds an error report, not a frame.
+pub fn is_error(tap: &FrameTap) -> bool {
+    tap.id & ERROR_FLAG != 0 && tap.id >> 30 == 0
+}
+
 /// What a message holds.
 ///
 /// # Errors
 /// [`TapError`] where it is neither a frame nor an error report.
 pub fn decode(tap: &FrameTap) -> Result<Tapped, TapError> {
-    if tap.id & ERROR_FLAG != 0 && tap.id >> 30 == 0 {
+    if is_error(tap) {
         let (said, _) = tap.data.bytes.split_first_chunk().expect("an error message has 8 bytes");
         return Ok(Tapped::Error(ErrorReport::decode(tap.time_ns, tap.id, *said)?));
     }
