@@ -82,6 +82,14 @@ struct Metered {
     from_to: Option<[ProcessCounters; 2]>,
 }
 
+impl Metered {
+    /// The threads of a process that is about to end take their time along with them: it keeps what was seen last.
+    fn see(&mut self, sample: ProcessCounters) {
+        let [from, to] = self.from_to.unwrap_or([sample; 2]);
+        self.from_to = Some([from, if sample.cpu_ns < to.cpu_ns { to } else { sample }]);
+    }
+}
+
 impl Meter {
     /// For processes that begin their work at `start_ns`.
     pub(super) fn new(
@@ -102,7 +110,7 @@ impl Meter {
         self.next_ns = now_ns + EVERY_NS;
         for process in &mut self.processes {
             if let Some(sample) = ProcessCounters::of(&self.root, process.id, now_ns) {
-                process.from_to = Some([process.from_to.map_or(sample, |[from, _]| from), sample]);
+                process.see(sample);
             }
         }
         if let Some(ahead_ns) = clock::wall_ahead_ns() {
@@ -124,7 +132,9 @@ impl Meter {
                     Some((process.name.to_owned(), Usage::between(&from, &to)))
                 })
                 .collect(),
-            stolen_s: self.stolen_from_to_ns.map_or(0.0, |[from_ns, to_ns]| (to_ns - from_ns) as f64 / 1e9),
+            stolen_s: self
+                .stolen_from_to_ns
+                .map_or(0.0, |[from_ns, to_ns]| to_ns.saturating_sub(from_ns) as f64 / 1e9),
             clock_jump_s: self.wall.jump_ns as f64 / 1e9,
         }
     }
@@ -187,6 +197,22 @@ mod tests {
         let mut meter = Meter::new(only.root(), 0, [("plant", 7)]);
         meter.look(EVERY_NS);
         assert_eq!(meter.finish().processes, BTreeMap::new());
+    }
+
+    #[test]
+    fn a_process_that_loses_threads_keeps_what_was_seen_last() {
+        let early = root(&files(10, 100, 1_000_000_000, 250));
+        let mut meter = Meter::new(early.root(), 0, [("logger", 7)]);
+        meter.look(EVERY_NS);
+        let late = root(&files(20, 100, 1_300_000_000, 250));
+        meter.root = late.root();
+        meter.look(2 * EVERY_NS);
+        let dying = root(&files(30, 100, 400_000_000, 250));
+        meter.root = dying.root();
+        meter.look(3 * EVERY_NS);
+        let logger = &meter.finish().processes["logger"];
+        assert!((logger.cpu_s - 0.3).abs() < 1e-9, "{}", logger.cpu_s);
+        assert_eq!(logger.voluntary_switches, 10);
     }
 
     #[test]
