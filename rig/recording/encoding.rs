@@ -4,7 +4,7 @@ use foxglove::Encode;
 use foxglove::messages::{FrameTransforms, SceneUpdate};
 use masseter_shared::messages::{Command, Event, FrameTap, Machine, Message, Reading, State, Truth};
 
-use super::reader::Schema;
+use super::definitions::Schema;
 use super::scene::Scene;
 use super::topic::{Stamps, Topic};
 use super::{CDR_LITTLE_ENDIAN, MESSAGE_ENCODING, SCHEMA_ENCODING};

@@ -7,6 +7,7 @@
 
 mod backlog;
 mod chunk;
+mod definitions;
 mod encoding;
 mod reader;
 mod recover;
@@ -20,8 +21,9 @@ mod writer;
 use masseter_shared::messages::{Command, Event, FrameTap, Machine, Message, Reading, State, Truth};
 
 pub use backlog::{Backlog, Outcome, Pace};
+pub use definitions::Schema;
 pub(crate) use encoding::{Channel, Definition, Encoded, Encoder};
-pub use reader::{Chunks, Entry, ReadError, Reader, Schema};
+pub use reader::{Chunks, Entry, ReadError, Reader};
 pub use recover::{RecoverError, Recovered, recover};
 pub use scene::Scene;
 pub(crate) use scene::jaw_points;

@@ -2,18 +2,19 @@
 //! what can be read is read, and what cannot is named by its place.
 
 use std::borrow::Cow;
-use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{self, BufReader, Read, Seek};
 use std::ops::Range;
 use std::path::Path;
 
 use masseter_shared::messages::LAYOUT_VERSION;
-use mcap::records::{Channel, MessageHeader, Record, SchemaHeader, op};
+use mcap::records::{Channel, MessageHeader, Record, op};
 
 use super::chunk::Chunk;
+use super::definitions::{Definitions, Schema};
 use super::topic::{Stamps, Topic};
 use super::walk::{Damage, Step, Walk};
+use super::writer::LIBRARY;
 use super::{CDR_LITTLE_ENDIAN, Recorded};
 
 /// Channel, sequence number and two times, before the data.
@@ -63,17 +64,6 @@ pub struct Entry<'a> {
     pub data: &'a [u8],
 }
 
-/// A schema that channels refer to.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Schema {
-    /// Its type name.
-    pub name: String,
-    /// The language it is written in.
-    pub encoding: String,
-    /// The definition.
-    pub data: Vec<u8>,
-}
-
 /// How the messages are packed.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Chunks {
@@ -97,12 +87,8 @@ pub struct Reader<R = BufReader<File>> {
     records: u64,
     /// Whether the index has been asked for lost definitions.
     index_is_known: bool,
-}
-
-#[derive(Debug, Default)]
-struct Definitions {
-    schemas: BTreeMap<u16, Schema>,
-    channels: BTreeMap<u16, Channel>,
+    /// Whether this version of the program recorded it.
+    is_own: bool,
 }
 
 impl Reader {
@@ -123,6 +109,7 @@ impl<R: Read + Seek> Reader<R> {
             damage: Vec::new(),
             records: 0,
             index_is_known: false,
+            is_own: false,
         })
     }
 
@@ -138,8 +125,7 @@ impl<R: Read + Seek> Reader<R> {
 
     /// The channels defined so far, by their id, each with its schema.
     pub fn channels(&self) -> impl Iterator<Item = (&Channel, Option<&Schema>)> {
-        let schemas = &self.definitions.schemas;
-        self.definitions.channels.values().map(|channel| (channel, schemas.get(&channel.schema_id)))
+        self.definitions.channels()
     }
 
     /// Bytes of the file.
@@ -170,9 +156,8 @@ impl<R: Read + Seek> Reader<R> {
         else {
             unreachable!("a message with a whole head can be parsed, and borrows");
         };
-        let channel = self.definitions.channels.get(&header.channel_id);
-        let schema = channel.and_then(|channel| self.definitions.schemas.get(&channel.schema_id));
-        Ok(Some(Entry { channel, schema, header, data }))
+        let (channel, schema) = self.definitions.of(header.channel_id).unzip();
+        Ok(Some(Entry { channel, schema: schema.flatten(), header, data }))
     }
 
     /// Where in the open chunk the next message lies. Definitions on the way are taken up.
@@ -211,9 +196,12 @@ impl<R: Read + Seek> Reader<R> {
             Step::Record(opcode) => {
                 self.records += 1;
                 match opcode {
+                    op::HEADER => self.is_own = is_own(self.walk.body()),
                     op::CHUNK => self.open_chunk()?,
                     // Damage turns other records into such, and no checksum of their own tells.
                     op::MESSAGE => self.note("messages outside of chunks (`mcap compress` packs them)"),
+                    // No message comes any more, and what is damaged here is told only by the footer.
+                    _ if self.walk.is_in_index() => {}
                     _ => self.definitions.take(opcode, self.walk.body()),
                 }
             }
@@ -238,23 +226,18 @@ impl<R: Read + Seek> Reader<R> {
         }
     }
 
-    /// Notes damage. When the definitions were hit, the index at the end of the file has them again.
+    /// Notes damage. Definitions that it hit are looked for elsewhere.
     fn pass_over(&mut self, damage: Damage) -> Result<(), ReadError> {
         self.add(damage);
-        if !self.definitions.channels.is_empty() || self.index_is_known {
-            return Ok(());
+        if self.definitions.is_empty() && !self.index_is_known {
+            self.index_is_known = true;
+            let place = self.walk.place();
+            let found = Definitions::of_index(&mut self.walk)?;
+            self.walk.go_to(place)?;
+            let is_own = found.is_empty() && self.is_own;
+            self.definitions.add(if is_own { Definitions::of_this_version() } else { found });
         }
-        self.index_is_known = true;
-        let place = self.walk.place();
-        loop {
-            match self.walk.step()? {
-                Step::Record(opcode) if opcode != op::CHUNK => {
-                    self.definitions.take(opcode, self.walk.body());
-                }
-                Step::End => return Ok(self.walk.go_to(place)?),
-                _ => {}
-            }
-        }
+        Ok(())
     }
 
     fn no_mcap(&self) -> ReadError {
@@ -271,22 +254,9 @@ impl Entry<'_> {
     }
 }
 
-impl Definitions {
-    /// Takes up a schema or a channel; a damaged one is as good as missing.
-    fn take(&mut self, opcode: u8, body: &[u8]) {
-        if !matches!(opcode, op::SCHEMA | op::CHANNEL) {
-            return;
-        }
-        match mcap::parse_record(opcode, body) {
-            Ok(Record::Schema { header: SchemaHeader { id, name, encoding }, data }) => {
-                self.schemas.insert(id, Schema { name, encoding, data: data.into_owned() });
-            }
-            Ok(Record::Channel(channel)) => {
-                self.channels.insert(channel.id, channel);
-            }
-            _ => {}
-        }
-    }
+/// Whether this is the header of a recording of this version.
+fn is_own(header: &[u8]) -> bool {
+    matches!(mcap::parse_record(op::HEADER, header), Ok(Record::Header(header)) if header.library == LIBRARY)
 }
 
 /// The message of a topic behind the CDR header, if it has this version's layout.

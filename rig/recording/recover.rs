@@ -9,8 +9,9 @@ use std::io::{Read, Seek, Write};
 use mcap::records::Channel;
 use mcap::{McapError, Writer};
 
-use super::reader::{ReadError, Reader, Schema};
-use super::writer::options;
+use super::definitions::Schema;
+use super::reader::{ReadError, Reader};
+use super::writer::{LIBRARY, options};
 
 /// Why a recording could not be recovered.
 #[derive(Debug, thiserror::Error)]
@@ -38,7 +39,8 @@ pub fn recover<R: Read + Seek, W: Write + Seek>(
     reader: &mut Reader<R>,
     medium: W,
 ) -> Result<Recovered, RecoverError> {
-    let mut writer = options().create(medium)?;
+    // Its channels need not be numbered as this version numbers those of its own recordings.
+    let mut writer = options().library(format!("{LIBRARY} recover")).create(medium)?;
     let mut defined = BTreeSet::new();
     let mut recovered = Recovered::default();
     while let Some(entry) = reader.next_entry()? {

@@ -2,6 +2,7 @@
 //! anything.
 
 mod forged;
+mod lost_definitions;
 
 use std::io::Cursor;
 use std::sync::LazyLock;
@@ -170,16 +171,6 @@ fn a_hole_in_the_middle_costs_its_chunk_alone() {
     assert!(read.messages == expected, "{} messages", read.messages.len());
     assert_eq!(read.damage.len(), 1, "{:?}", read.damage);
     assert!(!read.cut_short);
-}
-
-#[test]
-fn lost_definitions_are_found_again_in_the_index() {
-    let mut bytes = WHOLE.bytes.clone();
-    let (first_chunk_ends, _) = FLUSHED[0];
-    bytes[first_chunk_ends - 100] ^= 0xff;
-    let read = read(&bytes).unwrap();
-    assert!(read.messages == WHOLE.messages);
-    assert_eq!(read.damage.len(), 1, "{:?}", read.damage);
 }
 
 proptest! {

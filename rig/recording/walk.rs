@@ -57,6 +57,7 @@ pub(super) struct Walk<R> {
     /// The current record with opcode and length.
     record: Vec<u8>,
     is_closed: bool,
+    is_in_index: bool,
     /// Checksum of the current section of the file, as long as nothing in it was found damaged.
     section: Option<Hasher>,
 }
@@ -72,6 +73,7 @@ impl<R: Read + Seek> Walk<R> {
             at: 0,
             record: Vec::new(),
             is_closed: false,
+            is_in_index: false,
             section: Some(Hasher::new()),
         })
     }
@@ -92,6 +94,11 @@ impl<R: Read + Seek> Walk<R> {
         self.is_closed
     }
 
+    /// Whether the walk is between the end of the data and the footer.
+    pub(super) fn is_in_index(&self) -> bool {
+        self.is_in_index
+    }
+
     /// Where the walk stands: between two records.
     pub(super) fn place(&self) -> u64 {
         self.next
@@ -101,6 +108,7 @@ impl<R: Read + Seek> Walk<R> {
     pub(super) fn go_to(&mut self, place: u64) -> io::Result<()> {
         self.next = place;
         self.is_closed = false;
+        self.is_in_index = false;
         self.section = None;
         self.source.seek(SeekFrom::Start(place)).map(|_| ())
     }
@@ -145,25 +153,24 @@ impl<R: Read + Seek> Walk<R> {
     /// The data end with a checksum of everything before it, the footer with one of everything between.
     /// They find what lies outside of the chunks; a checksum of 0 says nothing.
     fn check_section(&mut self) -> Option<Damage> {
-        let section = self.section.as_mut()?;
-        let checksum = match self.record[0] {
-            op::DATA_END => &self.record[HEAD..],
-            op::FOOTER => {
-                section.update(&self.record[..HEAD + 16]);
-                &self.record[HEAD + 16..]
-            }
-            _ => {
-                section.update(&self.record);
-                return None;
-            }
+        let (covered, ended) = match self.record[0] {
+            op::DATA_END => (0, Some("what lies between the chunks")),
+            op::FOOTER => (HEAD + 16, Some("the index")),
+            _ => (self.record.len(), None),
         };
-        let expected = u32::from_le_bytes(checksum.try_into().expect("four bytes"));
+        if let Some(section) = &mut self.section {
+            section.update(&self.record[..covered]);
+        }
+        let ended = ended?;
+        self.is_in_index = self.record[0] == op::DATA_END;
+        // Damage to the data says nothing of the index.
         let found = self.section.replace(Hasher::new())?.finalize();
-        (expected != 0 && found != expected).then(|| {
-            let what =
-                if self.record[0] == op::FOOTER { "the index" } else { "what lies between the chunks" };
-            let reason = format!("{what} has checksum {found:08x} and should have {expected:08x}");
-            self.damaged(reason)
+        let expected =
+            u32::from_le_bytes(*self.record.last_chunk().expect("both are longer than their checksum"));
+        (expected != 0 && found != expected).then(|| Damage {
+            from: self.at,
+            to: self.next,
+            reason: format!("{ended} has checksum {found:08x} and should have {expected:08x}"),
         })
     }
 
@@ -189,6 +196,7 @@ impl<R: Read + Seek> Walk<R> {
     fn find_feet(&mut self, reason: &str) -> io::Result<Step> {
         let from = self.at;
         self.section = None;
+        self.is_in_index = false;
         self.next = self.find_chunk(from + 1)?.unwrap_or(self.size);
         self.source.seek(SeekFrom::Start(self.next))?;
         Ok(Step::Damage(Damage { from, to: self.next, reason: reason.to_owned() }))

@@ -25,6 +25,8 @@ use super::topic::Topic;
 const CHUNK_BYTES: u64 = 600 << 10;
 /// zstd's fastest level: its ratio on these messages is within a tenth of the default level's.
 const COMPRESSION_LEVEL: u32 = 1;
+/// What a recording's header says of who recorded it.
+pub(super) const LIBRARY: &str = concat!("masseter ", env!("CARGO_PKG_VERSION"));
 /// Bytes gathered before they go to the system.
 const BUFFER_BYTES: usize = 1 << 18;
 
@@ -66,7 +68,7 @@ pub(super) fn options() -> WriteOptions {
         .compression_threads(0)
         .chunk_size(Some(CHUNK_BYTES))
         .disable_seeking(true)
-        .library(concat!("masseter ", env!("CARGO_PKG_VERSION")))
+        .library(LIBRARY)
 }
 
 /// An open recording on `W`.
