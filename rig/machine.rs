@@ -1,6 +1,7 @@
 //! What the kernel tells of the machine in `/proc` and `/sys`, read below a root that tests can choose.
 
 use std::fs;
+use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
 /// The folder below which `proc` and `sys` lie.
@@ -36,12 +37,18 @@ impl SystemRoot {
         names
     }
 
-    /// Names of the folders of the machine's cores, `cpu0`, `cpu1`, …
-    pub fn core_folders(&self) -> Vec<String> {
-        let is_core = |name: &str| name.strip_prefix("cpu").is_some_and(|rest| rest.parse::<usize>().is_ok());
-        let mut folders = self.names("sys/devices/system/cpu");
-        folders.retain(|name| is_core(name));
-        folders
+    /// The cores that are online; none where the kernel does not tell.
+    pub fn online_cores(&self) -> Vec<usize> {
+        self.cores("sys/devices/system/cpu/online")
+    }
+
+    /// A file with a list of cores as the kernel writes it: `0,4-6`.
+    pub fn cores(&self, path: &str) -> Vec<usize> {
+        let range = |part: &str| -> Option<RangeInclusive<usize>> {
+            let (from, to) = part.split_once('-').unwrap_or((part, part));
+            Some(from.parse().ok()?..=to.parse().ok()?)
+        };
+        self.text(path).unwrap_or_default().split(',').filter_map(range).flatten().collect()
     }
 
     /// Whether a hypervisor runs this machine, as the processor says (x86) or the device tree (Arm).
@@ -98,10 +105,11 @@ mod tests {
     }
 
     #[test]
-    fn folders_of_cores_are_told_from_their_neighbours() {
-        let files =
-            ["cpu1", "cpu0", "cpufreq", "cpuidle"].map(|name| format!("sys/devices/system/cpu/{name}/x"));
-        let files: Vec<_> = files.iter().map(|path| (path.as_str(), "")).collect();
-        assert_eq!(Fixture::of(&files).root().core_folders(), ["cpu0", "cpu1"]);
+    fn cores_that_are_offline_do_not_count() {
+        let online = |list| Fixture::of(&[("sys/devices/system/cpu/online", list)]).root().online_cores();
+        assert_eq!(online("0-3,6\n"), [0, 1, 2, 3, 6]);
+        assert_eq!(online("0\n"), [0]);
+        let offline = Fixture::of(&[("sys/devices/system/cpu/cpu4/online", "0")]);
+        assert_eq!(offline.root().online_cores(), [0; 0]);
     }
 }

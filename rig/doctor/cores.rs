@@ -4,9 +4,7 @@ use crate::machine::SystemRoot;
 
 /// The last core, and the last one that does not share its arithmetic units.
 pub(super) fn to_spare(root: &SystemRoot) -> Option<[usize; 2]> {
-    let mut cores: Vec<usize> =
-        root.core_folders().iter().filter_map(|name| name.strip_prefix("cpu")?.parse().ok()).collect();
-    cores.sort_unstable();
+    let mut cores = root.online_cores();
     let last = cores.pop()?;
     let siblings = siblings(root, last);
     let other = cores.into_iter().rfind(|core| !siblings.contains(core))?;
@@ -15,17 +13,7 @@ pub(super) fn to_spare(root: &SystemRoot) -> Option<[usize; 2]> {
 
 /// The cores that share a physical one with `core`.
 fn siblings(root: &SystemRoot, core: usize) -> Vec<usize> {
-    let path = format!("sys/devices/system/cpu/cpu{core}/topology/thread_siblings_list");
-    parse(&root.text(&path).unwrap_or_default())
-}
-
-/// A list as the kernel writes it: `0,4-6`.
-fn parse(list: &str) -> Vec<usize> {
-    let range = |part: &str| -> Option<std::ops::RangeInclusive<usize>> {
-        let (from, to) = part.split_once('-').unwrap_or((part, part));
-        Some(from.parse().ok()?..=to.parse().ok()?)
-    };
-    list.split(',').filter_map(range).flatten().collect()
+    root.cores(&format!("sys/devices/system/cpu/cpu{core}/topology/thread_siblings_list"))
 }
 
 #[cfg(test)]
@@ -36,17 +24,26 @@ mod tests {
     #[test]
     fn cores_of_one_physical_core_are_not_taken_for_two() {
         let of = |siblings: &[&str]| {
+            let online = format!("0-{}", siblings.len() - 1);
             let path = |core| format!("sys/devices/system/cpu/cpu{core}/topology/thread_siblings_list");
             let paths: Vec<_> = (0..siblings.len()).map(path).collect();
-            let files: Vec<_> = paths.iter().map(String::as_str).zip(siblings.iter().copied()).collect();
+            let mut files: Vec<_> = paths.iter().map(String::as_str).zip(siblings.iter().copied()).collect();
+            files.push(("sys/devices/system/cpu/online", &online));
             to_spare(&Fixture::of(&files).root())
         };
         assert_eq!(of(&["0-1", "0-1", "2-3", "2-3"]), Some([1, 3]));
         assert_eq!(of(&["0,2", "1,3", "0,2", "1,3"]), Some([2, 3]));
         assert_eq!(of(&["", "", "", ""]), Some([2, 3]), "siblings not told");
         assert_eq!(of(&["0-1", "0-1"]), None);
-        let twelve: Vec<_> = (0..12).map(|core| core.to_string()).collect();
-        let twelve: Vec<_> = twelve.iter().map(String::as_str).collect();
-        assert_eq!(of(&twelve), Some([10, 11]), "counted, not spelled");
+    }
+
+    #[test]
+    fn cores_that_are_offline_are_not_spared() {
+        let smt_off = [
+            ("sys/devices/system/cpu/online", "0,2,4,6"),
+            ("sys/devices/system/cpu/cpu6/topology/thread_siblings_list", "6"),
+            ("sys/devices/system/cpu/cpu7/online", "0"),
+        ];
+        assert_eq!(to_spare(&Fixture::of(&smt_off).root()), Some([4, 6]));
     }
 }

@@ -13,7 +13,7 @@ const STEAL_SHARE: f64 = 0.001;
 
 /// All findings of this family.
 pub(super) fn examine(root: &SystemRoot) -> Vec<Finding> {
-    let online = root.core_folders().len();
+    let online = root.online_cores().len();
     let may_hold = timing::open_latency_device().is_ok();
     vec![
         usable(root, allowed_cores().len(), online),
@@ -40,9 +40,9 @@ fn usable(root: &SystemRoot, allowed: usize, online: usize) -> Finding {
 
 fn governor(root: &SystemRoot) -> Finding {
     const CHECK: &str = "frequency governor";
-    let path = |core: &String| format!("sys/devices/system/cpu/{core}/cpufreq/scaling_governor");
+    let path = |core| format!("sys/devices/system/cpu/cpu{core}/cpufreq/scaling_governor");
     let mut governors: Vec<_> =
-        root.core_folders().iter().filter_map(|core| root.text(&path(core))).collect();
+        root.online_cores().into_iter().filter_map(|core| root.text(&path(core))).collect();
     governors.sort();
     governors.dedup();
     let found = governors.join(", ");
@@ -139,7 +139,8 @@ mod tests {
             let paths: Vec<_> = (0..governors.len())
                 .map(|core| format!("sys/devices/system/cpu/cpu{core}/cpufreq/scaling_governor"))
                 .collect();
-            let files: Vec<_> = paths.iter().map(String::as_str).zip(governors.iter().copied()).collect();
+            let mut files: Vec<_> = paths.iter().map(String::as_str).zip(governors.iter().copied()).collect();
+            files.push(("sys/devices/system/cpu/online", "0-1"));
             assert_eq!(governor(&Fixture::of(&files).root()).level, level, "{governors:?}");
         }
     }
