@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use anyhow::ensure;
-use masseter_shared::realtime::scheduling::{Obtained, allowed_cores};
+use masseter_shared::realtime::scheduling::{Obtained, usable_cores};
 use serde::Serialize;
 
 use super::{Kind, kind_name, realtime_on};
@@ -34,7 +34,7 @@ impl Circumstances {
 
 /// Refuses cores on which a bench could not end: two threads that poll at real-time priority need one each.
 pub(super) fn check_cores(kinds: &[Kind], cores: [usize; 2]) -> anyhow::Result<()> {
-    check(kinds, cores, &allowed_cores())
+    check(kinds, cores, &usable_cores())
 }
 
 fn check(kinds: &[Kind], [own, peer]: [usize; 2], allowed: &[usize]) -> anyhow::Result<()> {
@@ -43,8 +43,8 @@ fn check(kinds: &[Kind], [own, peer]: [usize; 2], allowed: &[usize]) -> anyhow::
     let named = allowed.iter().map(usize::to_string).collect::<Vec<_>>().join(", ");
     ensure!(
         allowed.len() >= 2,
-        "{bench} needs two cores, and this process may use only core {named}: allow it another (`taskset`, a \
-         container's `--cpuset-cpus`), or measure loop, fk and subscribers, which need one"
+        "{bench} needs two cores, and this process may use only core {named}: allow it another (`masseter \
+         doctor` tells how), or measure loop, fk and subscribers, which need one"
     );
     ensure!(own != peer, "{bench} needs two cores, and --cores names {own} twice: choose two among {named}");
     for core in [own, peer] {

@@ -1,6 +1,6 @@
 //! The cores: how many may be used, how they idle, and whether they are real.
 
-use masseter_shared::realtime::scheduling::allowed_cores;
+use masseter_shared::realtime::scheduling::usable_cores;
 
 use super::finding::Finding;
 use super::{container, timing};
@@ -11,12 +11,14 @@ const LATEST_EXIT_US: i64 = 200;
 /// Steal beyond this share of all time since boot is worth a word.
 const STEAL_SHARE: f64 = 0.001;
 
+/// What a session may use is bounded by the cpuset of its control group, which a scope of the system is not part of.
+const LEAVE_CPUSET: &str = "sudo systemd-run --scope masseter run";
+
 /// All findings of this family.
 pub(super) fn examine(root: &SystemRoot) -> Vec<Finding> {
-    let online = root.online_cores().len();
     let may_hold = timing::open_latency_device().is_ok();
     vec![
-        usable(root, allowed_cores().len(), online),
+        number(root, usable_cores().len(), &root.online_cores()),
         governor(root),
         idle(root, may_hold),
         hypervisor(root),
@@ -24,15 +26,14 @@ pub(super) fn examine(root: &SystemRoot) -> Vec<Finding> {
     ]
 }
 
-fn usable(root: &SystemRoot, allowed: usize, online: usize) -> Finding {
+fn number(root: &SystemRoot, usable: usize, online: &[usize]) -> Finding {
     const CHECK: &str = "cores";
-    let found = format!("{allowed} of {online} may be used");
-    match (allowed, online) {
+    let found = format!("{usable} of {} may be used", online.len());
+    match (usable, online) {
         (2.., _) => Finding::ok(CHECK, found),
-        (_, 2..) => {
-            Finding::bad(CHECK, found, "controller and plant share a core and delay each other").mended_by(
-                container::start_with(root, "--cpuset-cpus 0,1", format!("taskset -cp 0-{} $$", online - 1)),
-            )
+        (_, [one, other, ..]) => {
+            Finding::bad(CHECK, found, "controller and plant share a core and delay each other")
+                .mended_by(container::start_with(root, &format!("--cpuset-cpus {one},{other}"), LEAVE_CPUSET))
         }
         _ => Finding::bad(CHECK, found, "controller and plant share the only core and delay each other"),
     }
@@ -117,14 +118,19 @@ mod tests {
     use crate::machine::fixture::Fixture;
 
     #[test]
-    fn two_cores_are_needed_and_a_mask_that_hides_one_is_named() {
+    fn two_cores_are_needed_and_a_cpuset_that_hides_them_is_left() {
         let machine = Fixture::of(&[]);
-        let of = |allowed, online| usable(&machine.root(), allowed, online);
-        assert_eq!(of(2, 2).level, Ok);
-        assert_eq!(of(1, 4).mend.as_deref(), Some("taskset -cp 0-3 $$"));
-        assert_eq!((of(1, 1).level, of(1, 1).mend), (Bad, None));
+        let of = |usable, online: &[usize]| number(&machine.root(), usable, online);
+        assert_eq!(of(2, &[0, 1]).level, Ok);
+        let hidden = of(1, &[0, 1, 2, 3]);
+        assert_eq!((hidden.level, hidden.found.as_str()), (Bad, "1 of 4 may be used"));
+        assert!(hidden.mend.unwrap().contains("systemd-run --scope"));
+        assert_eq!((of(1, &[0]).level, of(1, &[0]).mend), (Bad, None));
         let container = Fixture::of(&[(".dockerenv", "")]);
-        assert_eq!(usable(&container.root(), 1, 4).mend.as_deref(), Some("docker run --cpuset-cpus 0,1 …"));
+        assert_eq!(
+            number(&container.root(), 1, &[0, 2, 3]).mend.as_deref(),
+            Some("docker run --cpuset-cpus 0,2 …")
+        );
     }
 
     #[test]

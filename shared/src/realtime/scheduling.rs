@@ -2,7 +2,7 @@
 //!
 //! Nothing here fails a run: a refusal is a fact that screen, manifest and `--require-rt` judge.
 
-use std::fs;
+use std::{fs, thread};
 
 use rustix::io::Errno;
 use rustix::mm::{MlockAllFlags, mlockall};
@@ -38,7 +38,6 @@ pub struct Obtained {
 
 /// Asks for `wanted` on behalf of the calling thread (memory: of the process), then reads back.
 pub fn obtain(wanted: Wanted) -> Obtained {
-    let choice = allowed_cores();
     // What the kernel says of each; where it agrees without effect, what is read back tells.
     let core = wanted.core.map(|core| pin(core).map_err(|error| error.to_string()));
     let fifo = wanted.fifo_priority.map(|priority| fifo::set(priority).map_err(|error| error.to_string()));
@@ -55,7 +54,9 @@ pub fn obtain(wanted: Wanted) -> Obtained {
     let pinned = refusal(core, obtained.core == wanted.core);
     let fifo = refusal(fifo, obtained.fifo_priority == wanted.fifo_priority);
     let locked = refusal(locked, obtained.locked_memory);
-    obtained.refusals.extend(pinned.zip(wanted.core).map(|(why, core)| refused_core(core, &why, &choice)));
+    obtained
+        .refusals
+        .extend(pinned.zip(wanted.core).map(|(why, core)| refused_core(core, &why, &usable_cores())));
     obtained.refusals.extend(fifo.zip(wanted.fifo_priority).map(|(why, priority)| {
         format!("SCHED_FIFO {priority} refused ({why}): `masseter doctor` tells how to allow it")
     }));
@@ -78,8 +79,8 @@ fn refused_core(core: usize, why: &str, choice: &[usize]) -> String {
     let choice: Vec<_> = choice.iter().map(usize::to_string).collect();
     let remedy = match &choice[..] {
         [only] => format!(
-            "only core {only} may be used, on which controller and plant keep each other waiting: allow two, such as \
-             with `taskset -c 0,1`"
+            "only core {only} may be used, on which controller and plant keep each other waiting: `masseter doctor` \
+             tells how to allow two"
         ),
         choice => format!("choose two among {} with --cores", choice.join(", ")),
     };
@@ -90,6 +91,15 @@ fn refused_core(core: usize, why: &str, choice: &[usize]) -> String {
 pub fn allowed_cores() -> Vec<usize> {
     let Ok(set) = sched_getaffinity(None) else { return Vec::new() };
     (0..CpuSet::MAX_CPU).filter(|&core| set.is_set(core)).collect()
+}
+
+/// The cores on which a thread of this process can be made to stay. An affinity mask that was inherited is no bound, nor
+/// is `isolcpus=`, which takes cores out of every mask; a cpuset is.
+pub fn usable_cores() -> Vec<usize> {
+    let stays_on = |core: &usize| pin(*core).is_ok() && pinned_core() == Some(*core);
+    // In a thread of its own, which takes the mask along when it ends.
+    let tried = thread::spawn(move || (0..CpuSet::MAX_CPU).filter(stays_on).collect());
+    tried.join().expect("asking the kernel does not panic")
 }
 
 fn pin(core: usize) -> Result<(), Errno> {
@@ -183,6 +193,19 @@ mod tests {
     }
 
     #[test]
+    fn a_mask_that_was_inherited_is_no_bound() {
+        let usable = usable_cores();
+        let within = thread::spawn(move || {
+            let before = allowed_cores();
+            stay_on(&before[..1]).unwrap();
+            (before, usable_cores(), allowed_cores().len())
+        });
+        let (before, usable_within, allowed_within) = within.join().unwrap();
+        assert!(before.iter().all(|core| usable.contains(core)), "{before:?} of {usable:?}");
+        assert_eq!((usable_within, allowed_within), (usable, 1));
+    }
+
+    #[test]
     fn who_has_no_core_of_his_own_leaves_the_last_one_alone_longest() {
         let cases: [(&[usize], Option<&[usize]>); 5] = [
             (&[0, 1, 2, 3], Some(&[2, 3])),
@@ -212,6 +235,6 @@ mod tests {
     #[test]
     fn a_refused_core_is_told_with_what_helps() {
         assert!(refused_core(4, "EINVAL", &[0, 2]).contains("choose two among 0, 2 with --cores"));
-        assert!(refused_core(1, "EINVAL", &[0]).contains("allow two, such as with `taskset -c 0,1`"));
+        assert!(refused_core(1, "EINVAL", &[0]).contains("`masseter doctor` tells how to allow two"));
     }
 }
