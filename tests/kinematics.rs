@@ -66,13 +66,21 @@ fn poses_survive_the_way_through_the_joints() {
 #[test]
 fn a_bad_line_is_named_and_the_rest_is_done() {
     let input = "d1_m,d2_m,d3_m,l1_m,l2_m,l3_m\n0,0,0,0.27,0.27,0.27\n0,0,zero,0.27,0.27,0.27\n\
-                 0,0,0,NaN,0.27,0.27\n0,0\n0,0,0,0.28,0.28,0.28\n";
+                 0,0,0,NaN,0.27,0.27\n0,0\n\n\"0,0,0,0.27,0.27,0.27\n\
+                 0,0,0,0.28,0.28,0.28\n";
     let output = pipe(&["fk"], input);
     assert_eq!(output.status.code(), Some(2));
     let statuses: Vec<_> =
         stdout(&output).lines().skip(1).map(|line| line.rsplit(',').next().unwrap().to_owned()).collect();
-    assert_eq!(statuses, ["ok", "bad_line", "bad_line", "bad_line", "ok"]);
-    for (line, reason) in [(3, "d3_m is 'zero'"), (4, "l1_m is NaN"), (5, "2 values, expected 6")] {
+    assert_eq!(statuses, ["ok", "bad_line", "bad_line", "bad_line", "bad_line", "bad_line", "ok"]);
+    let reasons = [
+        (3, "d3_m is 'zero'"),
+        (4, "l1_m is NaN"),
+        (5, "2 values, expected 6"),
+        (6, "an empty line"),
+        (7, "d1_m is '\"0'"),
+    ];
+    for (line, reason) in reasons {
         assert!(stderr(&output).contains(&format!("standard input:{line}: {reason}")), "{}", stderr(&output));
     }
 }
@@ -89,6 +97,13 @@ fn a_line_that_is_no_text_is_named_and_the_rest_is_done() {
     assert!(stderr(&output).contains(&format!("{name}:3: ")), "{}", stderr(&output));
     let endings = [",ok", ",bad_line", ",ok"];
     assert!(stdout(&output).lines().skip(1).zip(endings).all(|(line, ending)| line.ends_with(ending)));
+}
+
+#[test]
+fn quotes_around_names_and_numbers_are_borne() {
+    let quoted = ACTUATORS.trim().split(',').map(|name| format!("\"{name}\"")).collect::<Vec<_>>().join(",");
+    let output = pipe(&["fk"], &format!("{quoted}\n\"0\",0,0,0.27,\"0.27\",0.27\n"));
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
 }
 
 #[test]

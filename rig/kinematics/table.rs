@@ -3,14 +3,14 @@
 //! Lines are read in batches, solved on all cores and written in order, so memory stays the same
 //! however long the input is. What is computed from a line is not known here.
 
-use std::fs::File;
-use std::io::{self, BufReader, Read, Write};
+use std::io::{self, Write};
 
-use anyhow::{Context, bail};
+use anyhow::{anyhow, bail};
 use masseter_shared::config::Scenario;
 use masseter_shared::geometry::Mechanism;
 use rayon::prelude::*;
 
+use super::input::{Input, Line};
 use crate::cli::CsvArgs;
 use crate::exit::{Exit, Failure};
 
@@ -80,8 +80,8 @@ pub(super) fn convert<const IN: usize>(
     stream(args, columns, |batch| {
         let chunks = batch.par_chunks(CHUNK_LINES).map(|chunk| {
             let mut lines = Lines::default();
-            for record in chunk {
-                solve_record(record, &columns, &mut lines, &solve);
+            for line in chunk {
+                solve_line(line, &columns, &mut lines, &solve);
             }
             lines
         });
@@ -97,57 +97,48 @@ pub(super) fn convert_in_turn<const IN: usize>(
 ) -> Result<Exit, Failure> {
     stream(args, columns, |batch| {
         let mut lines = Lines::default();
-        for record in batch {
-            solve_record(record, &columns, &mut lines, &mut solve);
+        for line in batch {
+            solve_line(line, &columns, &mut lines, &mut solve);
         }
         vec![lines]
     })
 }
 
-/// What was read of a line, and its number.
-struct Record {
-    line: u64,
-    fields: Result<csv::StringRecord, String>,
-}
-
-fn solve_record<const IN: usize>(
-    record: &Record,
+fn solve_line<const IN: usize>(
+    line: &Line,
     columns: &Columns<'_, IN>,
     lines: &mut Lines,
     mut solve: impl FnMut(u64, [f64; IN], &mut Lines) -> Solved,
 ) {
-    let values = record.fields.as_ref().map_err(Clone::clone);
-    let values = values.and_then(|fields| numbers(fields, &columns.read));
-    if let Err(reason) = values.and_then(|values| solve(record.line, values, lines)) {
+    let values = line.text.as_deref().map_err(Clone::clone);
+    let values = values.and_then(|text| numbers(text, &columns.read));
+    if let Err(reason) = values.and_then(|values| solve(line.number, values, lines)) {
         lines.empty(columns.written.len(), BAD_LINE);
-        lines.refusals.push((record.line, reason));
+        lines.refusals.push((line.number, reason));
     }
 }
 
 fn stream<const IN: usize>(
     args: &CsvArgs,
     columns: Columns<'_, IN>,
-    mut solve: impl FnMut(&[Record]) -> Vec<Lines>,
+    mut solve: impl FnMut(&[Line]) -> Vec<Lines>,
 ) -> Result<Exit, Failure> {
-    let (name, input) = open(args)?;
-    let mut reader =
-        csv::ReaderBuilder::new().trim(csv::Trim::All).comment(Some(b'#')).flexible(true).from_reader(input);
-    check_columns(&name, reader.headers().with_context(|| name.clone())?, &columns.read)?;
+    let mut input = Input::open(args.input.as_deref())?;
+    check_columns(&mut input, &columns.read)?;
 
     let mut exit = Exit::Passed;
     let mut output = io::stdout().lock();
     let written = (|| -> io::Result<()> {
         writeln!(output, "{},status", columns.written.join(","))?;
-        let mut batch = Vec::with_capacity(BATCH_LINES);
         loop {
-            read_batch(&mut reader, &mut batch);
+            let batch: Vec<_> = input.by_ref().take(BATCH_LINES).collect();
             if batch.is_empty() {
                 return output.flush();
             }
             for lines in solve(&batch) {
                 output.write_all(&lines.text)?;
                 for (line, reason) in lines.refusals {
-                    tell!("{name}:{line}: {reason}");
+                    tell!("{}:{line}: {reason}", input.name());
                     exit = Exit::Usage;
                 }
             }
@@ -161,49 +152,40 @@ fn stream<const IN: usize>(
     }
 }
 
-/// The input and what it is called in messages.
-fn open(args: &CsvArgs) -> anyhow::Result<(String, Box<dyn Read>)> {
-    let Some(path) = &args.input else {
-        return Ok(("standard input".to_owned(), Box::new(io::stdin().lock())));
-    };
-    let name = path.display().to_string();
-    let file = File::open(path).with_context(|| format!("cannot read {name}"))?;
-    Ok((name, Box::new(BufReader::new(file))))
-}
-
-/// Fills the batch; empty at the end of the input, which an error of the system is as well.
-fn read_batch(reader: &mut csv::Reader<Box<dyn Read>>, batch: &mut Vec<Record>) {
-    batch.clear();
-    while batch.len() < BATCH_LINES {
-        let mut fields = csv::StringRecord::new();
-        let (position, fields) = match reader.read_record(&mut fields) {
-            Ok(false) => return,
-            Ok(true) => (fields.position().cloned(), Ok(fields)),
-            Err(error) => (error.position().cloned(), Err(error.to_string())),
-        };
-        let line = position.as_ref().unwrap_or_else(|| reader.position()).line();
-        batch.push(Record { line, fields });
-    }
-}
-
-fn check_columns(name: &str, found: &csv::StringRecord, expected: &[&str]) -> anyhow::Result<()> {
-    if found.iter().eq(expected.iter().copied()) {
+fn check_columns(input: &mut Input, expected: &[&str]) -> anyhow::Result<()> {
+    let header = input.next().unwrap_or(Line { number: 1, text: Ok(String::new()) });
+    let place = format!("{}:{}", input.name(), header.number);
+    let text = header.text.map_err(|reason| anyhow!("{place}: {reason}"))?;
+    if fields(&text).eq(expected.iter().copied()) {
         return Ok(());
     }
-    let found: Vec<_> = found.iter().collect();
-    bail!("{name}:1: the columns are '{}', expected '{}'", found.join(","), expected.join(","))
+    let found: Vec<_> = fields(&text).collect();
+    bail!("{place}: the columns are '{}', expected '{}'", found.join(","), expected.join(","))
 }
 
-fn numbers<const IN: usize>(record: &csv::StringRecord, columns: &[&str; IN]) -> Result<[f64; IN], String> {
-    if record.len() != IN {
-        return Err(format!("{} values, expected {IN}", record.len()));
+fn numbers<const IN: usize>(line: &str, columns: &[&str; IN]) -> Result<[f64; IN], String> {
+    if line.is_empty() {
+        return Err("an empty line".to_owned());
+    }
+    let found = fields(line).count();
+    if found != IN {
+        return Err(format!("{found} values, expected {IN}"));
     }
     let mut values = [0.0_f64; IN];
-    for ((value, text), column) in values.iter_mut().zip(record).zip(columns) {
+    for ((value, text), column) in values.iter_mut().zip(fields(line)).zip(columns) {
         *value = text.parse().map_err(|_| format!("{column} is '{text}', not a number"))?;
         if !value.is_finite() {
             return Err(format!("{column} is {value}, not a finite number"));
         }
     }
     Ok(values)
+}
+
+/// Some programs write names and numbers in quotes. Neither holds a comma or the end of a line, so a quote without its
+/// other is a part of the field.
+fn fields(line: &str) -> impl Iterator<Item = &str> {
+    line.split(',').map(|field| {
+        let field = field.trim();
+        field.strip_prefix('"').and_then(|rest| rest.strip_suffix('"')).unwrap_or(field)
+    })
 }
