@@ -62,9 +62,11 @@ fn bad_recordings_get_2_and_cut_ones_6_with_the_place() {
     let cut = whole[..whole.len() * 2 / 3].to_vec();
     let mut flipped = whole.clone();
     flipped[whole.len() / 2] ^= 0x10;
-    let cases: [(&str, &[u8], i32, &str); 4] = [
+    let longer = [&whole[..], b"x"].concat();
+    let cases: [(&str, &[u8], i32, &str); 5] = [
         ("cut", &cut, 6, "lacks its end"),
         ("flipped", &flipped, 2, "unreadable: bytes"),
+        ("longer", &longer, 2, "bytes behind the end of the recording"),
         ("foreign", b"\x89PNG\r\n\x1a\n and so on and on", 2, "not readable as MCAP"),
         ("empty", b"", 2, "it is empty"),
     ];
@@ -79,6 +81,32 @@ fn bad_recordings_get_2_and_cut_ones_6_with_the_place() {
         }
     }
     assert_eq!(log("info", &bench.file("nowhere"), &[]).status.code(), Some(2));
+}
+
+#[test]
+fn only_the_line_of_what_is_wrong_says_fail() {
+    let bench = virtual_run();
+    let whole = fs::read(bench.run_folder().join("recording.mcap")).unwrap();
+    let mut flipped = whole.clone();
+    // In the first chunk, that of the definitions.
+    flipped[2000] ^= 0x10;
+    let cases = [
+        (whole[..whole.len() - 1].to_vec(), &["7 of ", "the file lacks its end"][..]),
+        ([&whole[..], b"x"].concat(), &["1 of "]),
+        (flipped, &["checksums, 1 do not", "cannot be read"]),
+    ];
+    for (bytes, expected) in cases {
+        let path = bench.file("hurt");
+        fs::write(&path, bytes).unwrap();
+        let proof = stdout(&log("verify", &path, &[]));
+        for line in proof.lines() {
+            let is_expected = expected.iter().any(|words| line.contains(words));
+            assert!(!line.starts_with("FAIL") || is_expected, "{proof}");
+        }
+        for words in expected {
+            assert!(proof.lines().any(|line| line.starts_with("FAIL") && line.contains(words)), "{proof}");
+        }
+    }
 }
 
 #[test]

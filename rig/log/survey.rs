@@ -170,18 +170,16 @@ impl Survey {
 
     fn write_proof(&self, text: &mut String) -> std::fmt::Result {
         for topic in &self.sequences {
-            let mark = if topic.missing == 0 { "ok  " } else { "FAIL" };
             let TopicFigures { topic, messages, missing } = topic;
+            let mark = mark(*missing);
             writeln!(text, "{mark} {topic:<8} {messages:>9} messages, {missing} missing between them")?;
         }
-        let mark = if self.damage.is_empty() { "ok  " } else { "FAIL" };
-        writeln!(text, "{mark} {} chunks agree with their checksums", self.chunks.count)?;
-        let (mark, end) = if self.was_cut_short {
-            ("FAIL", "the file lacks its end")
-        } else {
-            ("ok  ", "the file has its end")
-        };
-        writeln!(text, "{mark} {end}")
+        let Chunks { count, damaged, .. } = self.chunks;
+        writeln!(text, "{} {count} chunks agree with their checksums, {damaged} do not", mark(damaged))?;
+        let unreadable: u64 = self.damage.iter().map(|damage| damage.to - damage.from).sum();
+        writeln!(text, "{} {unreadable} of {} bytes cannot be read", mark(unreadable), self.size)?;
+        let end = if self.was_cut_short { "lacks" } else { "has" };
+        writeln!(text, "{} the file {end} its end", mark(self.was_cut_short.into()))
     }
 
     /// What is lost, and where.
@@ -211,6 +209,11 @@ impl Survey {
         }
         Ok(())
     }
+}
+
+/// How a line begins, by the number of things that are wrong.
+fn mark(faults: u64) -> &'static str {
+    if faults == 0 { "ok  " } else { "FAIL" }
 }
 
 fn rate(messages: u64, seconds: f64) -> String {

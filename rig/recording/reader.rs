@@ -69,6 +69,8 @@ pub struct Entry<'a> {
 pub struct Chunks {
     /// Chunks whose checksum agreed.
     pub count: u64,
+    /// Chunks that could not be unpacked, or whose checksum did not agree.
+    pub damaged: u64,
     /// Bytes of their content.
     pub uncompressed_bytes: u64,
     /// Bytes in the file.
@@ -220,6 +222,7 @@ impl<R: Read + Seek> Reader<R> {
                 Ok(())
             }
             Err(error) => {
+                self.chunks.damaged += 1;
                 let damage = self.walk.damaged(error.to_string());
                 self.pass_over(damage)
             }

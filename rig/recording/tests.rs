@@ -173,6 +173,40 @@ fn a_hole_in_the_middle_costs_its_chunk_alone() {
     assert!(!read.cut_short);
 }
 
+#[test]
+fn bytes_behind_the_end_are_damage_and_no_cut() {
+    for more in [&b"x"[..], b"12345678", &WHOLE.bytes] {
+        let read = read(&[&WHOLE.bytes, more].concat()).unwrap();
+        assert!(read.messages == WHOLE.messages);
+        let [behind] = read.damage.as_slice() else { panic!("{:?}", read.damage) };
+        assert_eq!(behind.from, WHOLE.bytes.len() as u64);
+        assert!(!read.cut_short);
+    }
+}
+
+#[test]
+fn a_flipped_bit_is_damage_and_no_cut() {
+    let mut medium = Cursor::new(Vec::new());
+    let mut recorder = Recorder::on(&mut medium, scene()).unwrap();
+    for message in cycle(1) {
+        record(&mut recorder, &message, 0);
+    }
+    recorder.finish().unwrap();
+    let mut bytes = medium.into_inner();
+    for place in 0..bytes.len() {
+        for bit in 0..8 {
+            bytes[place] ^= 1 << bit;
+            let read = read(&bytes).unwrap();
+            assert!(
+                !read.damage.is_empty() && !read.cut_short,
+                "bit {bit} of byte {place}: {:?}",
+                read.damage
+            );
+            bytes[place] ^= 1 << bit;
+        }
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(512))]
 

@@ -56,8 +56,11 @@ pub(super) struct Walk<R> {
     at: u64,
     /// The current record with opcode and length.
     record: Vec<u8>,
-    is_closed: bool,
+    /// The byte behind the closing magic, once it was met.
+    end: Option<u64>,
     is_in_index: bool,
+    /// Whether the last record was a footer.
+    is_end_due: bool,
     /// Checksum of the current section of the file, as long as nothing in it was found damaged.
     section: Option<Hasher>,
 }
@@ -72,8 +75,9 @@ impl<R: Read + Seek> Walk<R> {
             next: 0,
             at: 0,
             record: Vec::new(),
-            is_closed: false,
+            end: None,
             is_in_index: false,
+            is_end_due: false,
             section: Some(Hasher::new()),
         })
     }
@@ -86,12 +90,12 @@ impl<R: Read + Seek> Walk<R> {
     /// The current record as a stretch of the file that is damaged.
     pub(super) fn damaged(&mut self, reason: String) -> Damage {
         self.section = None;
-        Damage { from: self.at, to: self.next, reason }
+        self.stretch(reason)
     }
 
     /// Whether the file ended as MCAP files end.
     pub(super) fn is_closed(&self) -> bool {
-        self.is_closed
+        self.end.is_some()
     }
 
     /// Whether the walk is between the end of the data and the footer.
@@ -107,8 +111,8 @@ impl<R: Read + Seek> Walk<R> {
     /// Goes on from a place where the walk once stood.
     pub(super) fn go_to(&mut self, place: u64) -> io::Result<()> {
         self.next = place;
-        self.is_closed = false;
         self.is_in_index = false;
+        self.is_end_due = false;
         self.section = None;
         self.source.seek(SeekFrom::Start(place)).map(|_| ())
     }
@@ -122,18 +126,24 @@ impl<R: Read + Seek> Walk<R> {
     pub(super) fn step(&mut self) -> io::Result<Step> {
         self.at = self.next;
         let left = self.size - self.at;
-        let is_start = self.at == 0;
         if left == 0 {
             return Ok(Step::End);
         }
-        if is_start || left == MAGIC.len() as u64 {
-            return self.magic(is_start);
+        if self.end == Some(self.at) {
+            self.next = self.size;
+            return Ok(Step::Damage(self.stretch("bytes behind the end of the recording".to_owned())));
+        }
+        self.record.resize(left.min(HEAD as u64) as usize, 0);
+        self.source.read_exact(&mut self.record)?;
+        if self.at == 0 {
+            return self.begin();
+        }
+        if self.record.starts_with(MAGIC) || self.is_end_due && left >= MAGIC.len() as u64 {
+            return self.close();
         }
         if left < HEAD as u64 {
             return self.find_feet("the file ends in the middle of a record");
         }
-        self.record.resize(HEAD, 0);
-        self.source.read_exact(&mut self.record)?;
         let length = u64::from_le_bytes(self.record[1..].try_into().expect("eight bytes"));
         if length > left - HEAD as u64 {
             return self.find_feet("a record that is longer than the rest of the file");
@@ -147,6 +157,7 @@ impl<R: Read + Seek> Walk<R> {
             return self.find_feet("the lengths in a record contradict each other");
         }
         self.next = self.at + self.record.len() as u64;
+        self.is_end_due = self.record[0] == op::FOOTER;
         Ok(self.check_section().map_or(Step::Record(self.record[0]), Step::Damage))
     }
 
@@ -167,43 +178,54 @@ impl<R: Read + Seek> Walk<R> {
         let found = self.section.replace(Hasher::new())?.finalize();
         let expected =
             u32::from_le_bytes(*self.record.last_chunk().expect("both are longer than their checksum"));
-        (expected != 0 && found != expected).then(|| Damage {
-            from: self.at,
-            to: self.next,
-            reason: format!("{ended} has checksum {found:08x} and should have {expected:08x}"),
-        })
+        (expected != 0 && found != expected)
+            .then(|| self.stretch(format!("{ended} has checksum {found:08x} and should have {expected:08x}")))
     }
 
-    /// The eight bytes that begin and end every file.
-    fn magic(&mut self, is_start: bool) -> io::Result<Step> {
-        let mut magic = [0; 8];
-        let present = self.size.min(magic.len() as u64) as usize;
-        self.source.read_exact(&mut magic[..present])?;
-        if magic != *MAGIC {
-            let reason =
-                if is_start { "no MCAP file begins like this" } else { "no MCAP file ends like this" };
-            return self.find_feet(reason);
+    /// The eight bytes that begin every file.
+    fn begin(&mut self) -> io::Result<Step> {
+        if !self.record.starts_with(MAGIC) {
+            return self.find_feet("no MCAP file begins like this");
         }
         if let Some(section) = &mut self.section {
-            section.update(&magic);
+            section.update(MAGIC);
         }
-        self.next = self.at + MAGIC.len() as u64;
-        self.is_closed = !is_start;
+        self.pass_magic()?;
         self.step()
     }
 
-    /// Everything from here to the next chunk is damage; without one, to the end of the file.
-    fn find_feet(&mut self, reason: &str) -> io::Result<Step> {
-        let from = self.at;
-        self.section = None;
-        self.is_in_index = false;
-        self.next = self.find_chunk(from + 1)?.unwrap_or(self.size);
-        self.source.seek(SeekFrom::Start(self.next))?;
-        Ok(Step::Damage(Damage { from, to: self.next, reason: reason.to_owned() }))
+    /// The eight bytes that end every file behind its footer; one of both may be damaged.
+    fn close(&mut self) -> io::Result<Step> {
+        self.pass_magic()?;
+        self.end = Some(self.next);
+        if !self.is_end_due || !self.record.starts_with(MAGIC) {
+            return Ok(Step::Damage(self.stretch("no MCAP file ends like this".to_owned())));
+        }
+        self.step()
     }
 
-    /// The first place at or behind `from` where a chunk begins.
-    fn find_chunk(&mut self, from: u64) -> io::Result<Option<u64>> {
+    fn pass_magic(&mut self) -> io::Result<()> {
+        self.next = self.at + MAGIC.len() as u64;
+        self.source.seek(SeekFrom::Start(self.next)).map(|_| ())
+    }
+
+    /// Everything from here to the next landmark is damage; without one, to the end of the file.
+    fn find_feet(&mut self, reason: &str) -> io::Result<Step> {
+        self.section = None;
+        self.is_in_index = false;
+        self.is_end_due = false;
+        self.next = self.find_landmark(self.at + 1)?.unwrap_or(self.size);
+        self.source.seek(SeekFrom::Start(self.next))?;
+        Ok(Step::Damage(self.stretch(reason.to_owned())))
+    }
+
+    /// What lies between the last place and this one.
+    fn stretch(&self, reason: String) -> Damage {
+        Damage { from: self.at, to: self.next, reason }
+    }
+
+    /// The first place at or behind `from` where a chunk begins, or the magic that ends the file.
+    fn find_landmark(&mut self, from: u64) -> io::Result<Option<u64>> {
         self.source.seek(SeekFrom::Start(from.min(self.size)))?;
         let mut window = Vec::new();
         let mut at = from;
@@ -211,7 +233,10 @@ impl<R: Read + Seek> Walk<R> {
             let read = (&mut self.source).take(SCAN_BYTES as u64).read_to_end(&mut window)?;
             let found = window.iter().enumerate().find(|&(place, &byte)| {
                 let rest = self.size - at - place as u64;
-                byte == op::CHUNK && begins_chunk(&window[place..], rest)
+                match byte {
+                    op::CHUNK => begins_chunk(&window[place..], rest),
+                    _ => window[place..].starts_with(MAGIC),
+                }
             });
             if let Some((place, _)) = found {
                 return Ok(Some(at + place as u64));
@@ -245,7 +270,7 @@ fn chunk_length(body: &[u8]) -> Option<u64> {
 }
 
 /// Whether the lengths inside a record agree with its own. Only the kinds that stand between chunks are
-/// looked at: a wrong length there would swallow the chunks behind.
+/// looked at, and that before the footer: a wrong length there would swallow the chunks behind, or the end.
 fn is_consistent(opcode: u8, body: &[u8]) -> bool {
     let length_at = |at: usize| {
         let bytes = body.get(at..at + 4)?;
@@ -259,7 +284,8 @@ fn is_consistent(opcode: u8, body: &[u8]) -> bool {
             .is_some_and(|length| length == body.len()),
         op::FOOTER => body.len() == 20,
         op::DATA_END => body.len() == 4,
-        op::SCHEMA..=op::SUMMARY_OFFSET => true,
+        op::SUMMARY_OFFSET => body.len() == 17,
+        op::SCHEMA..op::SUMMARY_OFFSET => true,
         _ => false,
     }
 }
