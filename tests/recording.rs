@@ -5,7 +5,7 @@ mod common;
 use std::fs;
 use std::io::Cursor;
 use std::path::Path;
-use std::process::Output;
+use std::process::{Command, Output};
 use std::time::Duration;
 
 use common::{Bench, UNHURRIED, child_of, masseter, start, stderr, stdout};
@@ -171,6 +171,44 @@ fn a_topic_that_the_recording_does_not_have_is_refused_with_those_it_has() {
     let said = stderr(&output);
     assert!(said.contains("no topic 'raeding'") && said.contains(", reading, "), "{said}");
     assert!(!out.exists());
+}
+
+#[test]
+fn topics_that_make_no_table_are_named_and_refused_where_they_are_asked_for() {
+    let bench = virtual_run();
+    let out = bench.file("tables");
+    let export = |more: &[&str]| {
+        log("export", &bench.run_folder(), &[&["--out", out.to_str().unwrap()], more].concat())
+    };
+    let refused = export(&["--topic", "reading", "--topic", "/tf"]);
+    assert_eq!(refused.status.code(), Some(2));
+    let said = stderr(&refused);
+    assert!(said.contains("'/tf' makes no table: its messages are protobuf"), "{said}");
+    assert!(!out.exists());
+
+    let said = stdout(&export(&[]));
+    assert!(said.contains("no table  /tf: its messages are protobuf"), "{said}");
+    assert!(said.contains("no table  /scene: "), "{said}");
+    let silent = fs::read_to_string(out.join("machine.csv")).unwrap();
+    assert_eq!(silent.lines().count(), 1, "a topic without messages has its header");
+}
+
+/// Where files may not grow beyond a few kilobytes.
+fn cramped(arguments: &[&str]) -> Output {
+    let limit = "trap '' XFSZ; ulimit -f 8; exec \"$@\"";
+    Command::new("sh").args(["-c", limit, "sh", common::MASSETER]).args(arguments).output().unwrap()
+}
+
+#[test]
+fn a_recovery_that_fails_leaves_nothing_in_the_way_of_the_next() {
+    let bench = virtual_run();
+    let recording = bench.run_folder().join("recording.mcap");
+    let out = bench.file("recovered.mcap");
+    let arguments = ["log", "recover", recording.to_str().unwrap(), "--out", out.to_str().unwrap()];
+    let failed = cramped(&arguments);
+    assert_eq!(failed.status.code(), Some(2), "{}", stderr(&failed));
+    assert!(!out.exists(), "{}", stderr(&failed));
+    assert_eq!(masseter(&arguments).status.code(), Some(0));
 }
 
 /// Bytes of a recording that holds nothing but its definitions.

@@ -5,6 +5,7 @@
 //! missing, 2 when it holds bytes that Masseter did not write like this. `recover` ends with 0 once it has saved what
 //! can be read.
 
+mod choice;
 mod columns;
 mod export;
 mod survey;
@@ -20,6 +21,7 @@ use crate::exit::{Exit, Failure};
 use crate::recording::{Reader, Recovered, recover};
 use crate::run::folder::RunFolder;
 use crate::say::show;
+use choice::Choice;
 use survey::Survey;
 
 /// What `log` does.
@@ -61,7 +63,7 @@ pub(crate) struct ExportArgs {
     /// Folder for the files; must not exist
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// Only these topics [default: all]
+    /// Only these topics [default: all that make a table]
     #[arg(long = "topic", value_name = "TOPIC")]
     topics: Vec<String>,
 }
@@ -106,7 +108,10 @@ fn save(args: &RecoverArgs) -> Result<Exit, Failure> {
     // Nothing is left behind where there is nothing to save.
     let survey = Survey::of(&mut open(&path)?).with_context(|| path.display().to_string())?;
     let file = File::create_new(&out).with_context(|| format!("cannot create {}", out.display()))?;
-    let recovered = recover(&mut reader, BufWriter::new(file))?;
+    let recovered = recover(&mut reader, BufWriter::new(file)).inspect_err(|_| {
+        // What went wrong before is the word to say.
+        let _ = fs::remove_file(&out);
+    })?;
     show(&format!("{}\n{}{}", out.display(), in_words(recovered), survey.loss()));
     Ok(Exit::Passed)
 }
@@ -121,12 +126,16 @@ fn in_words(recovered: Recovered) -> String {
 
 fn export(args: &ExportArgs) -> Result<Exit, Failure> {
     let path = args.from.path()?;
-    let survey = Survey::of(&mut open(&path)?).with_context(|| path.display().to_string())?;
-    survey.refuse_unknown(&args.topics)?;
+    let mut reader = open(&path)?;
+    let survey = Survey::of(&mut reader).with_context(|| path.display().to_string())?;
+    let Choice { tables, left_out } = Choice::of(reader.channels(), &args.topics)?;
     fs::create_dir(&args.out).with_context(|| format!("cannot create {}", args.out.display()))?;
-    let written = export::write(&mut open(&path)?, &args.out, &args.topics)?;
+    let written = export::write(&mut open(&path)?, &args.out, tables)?;
     for (name, lines) in written {
         show(&format!("{:>10}  {}\n", lines, args.out.join(name).display()));
+    }
+    for (topic, why) in left_out {
+        show(&format!("{:>10}  {topic}: {why}\n", "no table"));
     }
     show(&survey.loss());
     Ok(survey.exit())

@@ -1,10 +1,8 @@
 //! One pass over a recording: what is in it, what is missing, and what cannot be read.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::io::{Read, Seek};
-
-use anyhow::bail;
 
 use crate::analysis::{SequenceCheck, TopicFigures};
 use crate::exit::Exit;
@@ -84,18 +82,6 @@ impl Survey {
             [] => true,
             [tail] => self.was_cut_short && tail.to == self.size,
             _ => false,
-        }
-    }
-
-    /// Refuses topics that the recording does not have.
-    pub(super) fn refuse_unknown(&self, wanted: &[String]) -> anyhow::Result<()> {
-        let topics: BTreeSet<&str> = self.channels.values().map(|channel| channel.topic.as_str()).collect();
-        match wanted.iter().find(|topic| !topics.contains(topic.as_str())) {
-            Some(unknown) => {
-                let topics = topics.into_iter().collect::<Vec<_>>().join(", ");
-                bail!("the recording has no topic '{unknown}'; it has {topics}")
-            }
-            None => Ok(()),
         }
     }
 

@@ -34,7 +34,7 @@ pub use writer::{DurableFile, Medium, Recorder, WriteError};
 /// Encapsulation header of plain little-endian CDR (version 1).
 pub(crate) const CDR_LITTLE_ENDIAN: [u8; 4] = [0x00, 0x01, 0x00, 0x00];
 const MESSAGE_ENCODING: &str = "cdr";
-const SCHEMA_ENCODING: &str = "ros2msg";
+pub(crate) const SCHEMA_ENCODING: &str = "ros2msg";
 
 /// A message of any topic.
 #[derive(Debug, Clone, Copy, PartialEq)]
