@@ -5,6 +5,7 @@ use std::num::NonZeroU32;
 
 use rustix::net::{AddressFamily, Protocol, SocketType, socket};
 
+use super::container;
 use super::finding::Finding;
 use crate::machine::SystemRoot;
 
@@ -25,11 +26,11 @@ const INTERFACES: &str = "sys/class/net";
 pub(super) fn examine(root: &SystemRoot) -> Vec<Finding> {
     let opened = socket(AddressFamily::CAN, SocketType::RAW, RAW).map(drop).map_err(io::Error::from);
     let is_supported = opened.is_ok();
-    let support = support(&opened);
+    let support = support(root, &opened);
     if is_supported { vec![support, interfaces(root)] } else { vec![support] }
 }
 
-fn support(opened: &io::Result<()>) -> Finding {
+fn support(root: &SystemRoot, opened: &io::Result<()>) -> Finding {
     const CHECK: &str = "SocketCAN";
     match opened {
         Ok(()) => Finding::ok(CHECK, "supported by the kernel"),
@@ -38,7 +39,7 @@ fn support(opened: &io::Result<()>) -> Finding {
             format!("not supported ({error})"),
             "only the virtual bus can be used, no CAN interface",
         )
-        .mended_by("sudo modprobe can-raw"),
+        .mended_by(container::on_host(root, "sudo modprobe can-raw")),
     }
 }
 
@@ -120,8 +121,9 @@ mod tests {
 
     #[test]
     fn a_kernel_without_can_still_has_the_virtual_bus() {
-        assert_eq!(support(&Ok(())).level, Fine);
-        assert_eq!(support(&Err(io::Error::from_raw_os_error(97))).level, Warn);
+        let machine = Fixture::of(&[]);
+        assert_eq!(support(&machine.root(), &Ok(())).level, Fine);
+        assert_eq!(support(&machine.root(), &Err(io::Error::from_raw_os_error(97))).level, Warn);
     }
 
     #[test]

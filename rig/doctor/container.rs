@@ -1,4 +1,4 @@
-//! Containers: what their engine grants them is chosen when they are started.
+//! Containers: what their engine grants them is chosen when they are started, and their kernel is the host's.
 
 use crate::machine::SystemRoot;
 
@@ -8,6 +8,17 @@ pub(super) fn start_with(root: &SystemRoot, options: &str, otherwise: impl Into<
         Some(engine) => format!("{engine} run {options} …"),
         None => otherwise.into(),
     }
+}
+
+/// The command that changes the kernel or what it runs on.
+pub(super) fn on_host(root: &SystemRoot, command: impl Into<String>) -> String {
+    let command = command.into();
+    if is_container(root) { format!("on the host: {command}") } else { command }
+}
+
+/// Whether the system's files are other than those of the machine itself.
+pub(super) fn is_container(root: &SystemRoot) -> bool {
+    engine(root).is_some()
 }
 
 /// The command of the engine that runs this container, if it is one.
@@ -27,5 +38,12 @@ mod tests {
         assert_eq!(mend(&[]), "mount");
         assert_eq!(mend(&[(".dockerenv", "")]), "docker run --shm-size 1g …");
         assert_eq!(mend(&[("run/.containerenv", "engine=podman")]), "podman run --shm-size 1g …");
+    }
+
+    #[test]
+    fn the_kernel_is_changed_on_the_host() {
+        let mend = |files: &[(&str, &str)]| on_host(&Fixture::of(files).root(), "modprobe");
+        assert_eq!(mend(&[]), "modprobe");
+        assert_eq!(mend(&[(".dockerenv", "")]), "on the host: modprobe");
     }
 }

@@ -1,7 +1,7 @@
 //! How the kernel schedules: preemption, real-time throttling, isolated cores.
 
 use super::finding::Finding;
-use super::{cores, realtime_kernel};
+use super::{container, cores, realtime_kernel};
 use crate::machine::SystemRoot;
 
 /// All findings of this family.
@@ -32,12 +32,13 @@ fn preemption(root: &SystemRoot) -> Finding {
             install(Finding::warn(CHECK, format!("{release}: preemptible (PREEMPT_DYNAMIC, full)"), cost))
         }
         Some(modes) => Finding::warn(CHECK, format!("{release}: PREEMPT_DYNAMIC, modes {modes}"), cost)
-            .mended_by("echo full | sudo tee /sys/kernel/debug/sched/preempt"),
+            .mended_by(container::on_host(root, "echo full | sudo tee /sys/kernel/debug/sched/preempt")),
         None => Finding::warn(CHECK, format!("{release}: PREEMPT_DYNAMIC, mode not readable"), cost)
-            .mended_by(
+            .mended_by(container::on_host(
+                root,
                 "sudo mount -t debugfs debugfs /sys/kernel/debug; \
                  echo full | sudo tee /sys/kernel/debug/sched/preempt",
-            ),
+            )),
     }
 }
 
@@ -49,15 +50,16 @@ fn throttling(root: &SystemRoot) -> Finding {
     let (Some(runtime_us), Some(period_us)) = (runtime_us, period_us) else {
         return Finding::ok(CHECK, "none in this kernel");
     };
+    let restore = container::on_host(root, RESTORE);
     let found = format!("{runtime_us} of every {period_us} µs");
     match runtime_us {
         ..0 => Finding::warn(CHECK, "off", "a real-time task that never waits takes its core for good")
-            .mended_by(RESTORE),
+            .mended_by(restore),
         // As the kernel leaves it by default, and as the loops keep it in mind when they spin.
         _ if runtime_us * 100 >= period_us * 95 => Finding::ok(CHECK, found),
-        0 => Finding::bad(CHECK, found, "real-time tasks get no time at all").mended_by(RESTORE),
+        0 => Finding::bad(CHECK, found, "real-time tasks get no time at all").mended_by(restore),
         _ => Finding::warn(CHECK, found, "fast loops are put to sleep for the rest of the period")
-            .mended_by(RESTORE),
+            .mended_by(restore),
     }
 }
 
@@ -79,7 +81,9 @@ fn isolation(root: &SystemRoot) -> Finding {
             let finding =
                 Finding::warn(CHECK, "none", "other tasks and their interrupts come onto the rig's cores");
             match cores::to_spare(root) {
-                Some([one, other]) => finding.mended_by(isolate(&format!("{one},{other}"))),
+                Some([one, other]) => {
+                    finding.mended_by(container::on_host(root, isolate(&format!("{one},{other}"))))
+                }
                 None => finding,
             }
         }
@@ -117,6 +121,21 @@ mod tests {
             let finding = preemption(&Fixture::of(files).root());
             assert_eq!(finding.level, level, "{finding:?}");
             assert!(finding.found.contains(found), "{finding:?}");
+        }
+    }
+
+    #[test]
+    fn a_container_is_told_to_change_its_host() {
+        let files = [
+            (".dockerenv", ""),
+            ("etc/os-release", "ID=debian"),
+            ("proc/sys/kernel/version", "#1 SMP PREEMPT_DYNAMIC"),
+            ("proc/sys/kernel/sched_rt_runtime_us", "0"),
+            ("proc/sys/kernel/sched_rt_period_us", "1000000"),
+            ("sys/devices/system/cpu/online", "0-7"),
+        ];
+        for finding in examine(&Fixture::of(&files).root()) {
+            assert!(finding.mend.unwrap().starts_with("on the host: "), "{}", finding.check);
         }
     }
 

@@ -29,7 +29,10 @@ fn huge_pages(root: &SystemRoot) -> Finding {
             found,
             "the kernel moves pages about, and a cycle that touches one waits",
         )
-        .mended_by("echo madvise | sudo tee /sys/kernel/mm/transparent_hugepage/enabled");
+        .mended_by(container::on_host(
+            root,
+            "echo madvise | sudo tee /sys/kernel/mm/transparent_hugepage/enabled",
+        ));
     }
     Finding::ok(CHECK, found)
 }

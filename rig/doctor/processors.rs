@@ -51,7 +51,10 @@ fn governor(root: &SystemRoot) -> Finding {
         [] => Finding::ok(CHECK, "none: the clock is not this system's to change"),
         [only] if only == "performance" => Finding::ok(CHECK, found),
         _ => Finding::warn(CHECK, found, "after a sleep the core computes slower, up to several times")
-            .mended_by("echo performance | sudo tee /sys/devices/system/cpu/cpu*/cpufreq/scaling_governor"),
+            .mended_by(container::on_host(
+                root,
+                "echo performance | sudo tee /sys/devices/system/cpu/cpu*/cpufreq/scaling_governor",
+            )),
     }
 }
 

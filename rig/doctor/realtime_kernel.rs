@@ -1,9 +1,14 @@
 //! Where a distribution keeps its fully preemptible kernel.
 
+use super::container;
 use crate::machine::SystemRoot;
 
-/// The command that installs it on this machine; none where no package is known.
+/// The command that installs it on this machine; none where no package is known. A container need not be of its host's
+/// distribution.
 pub(super) fn installation(root: &SystemRoot) -> Option<String> {
+    if container::is_container(root) {
+        return Some("on the host: install its distribution's kernel with PREEMPT_RT".to_owned());
+    }
     command(&root.text("etc/os-release")?, std::env::consts::ARCH)
 }
 
@@ -28,6 +33,14 @@ fn id(os_release: &str) -> Option<&str> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::machine::fixture::Fixture;
+
+    #[test]
+    fn a_containers_distribution_says_nothing_of_its_kernel() {
+        let debian = ("etc/os-release", "ID=debian\n");
+        let command = installation(&Fixture::of(&[debian, (".dockerenv", "")]).root()).unwrap();
+        assert!(command.starts_with("on the host: ") && !command.contains("apt"), "{command}");
+    }
 
     #[test]
     fn the_package_depends_on_distribution_and_architecture() {

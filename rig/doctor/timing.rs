@@ -28,7 +28,7 @@ pub(super) fn examine(root: &SystemRoot) -> Vec<Finding> {
     let resolution_ns = resolution.tv_sec * 1_000_000_000 + resolution.tv_nsec;
     vec![
         clock_source(root),
-        timers(resolution_ns),
+        timers(root, resolution_ns),
         sleeping(cost_of_a_sleep_ns()),
         dma_latency_access(root, &open_latency_device()),
     ]
@@ -62,12 +62,15 @@ fn clock_source(root: &SystemRoot) -> Finding {
     let better = available.split_whitespace().find(|source| FAST_SOURCES.contains(source));
     let finding = Finding::warn(CHECK, current, "each look at the clock costs a microsecond and more");
     match better {
-        Some(source) => finding.mended_by(format!("echo {source} | sudo tee /{folder}/current_clocksource")),
+        Some(source) => finding.mended_by(container::on_host(
+            root,
+            format!("echo {source} | sudo tee /{folder}/current_clocksource"),
+        )),
         None => finding,
     }
 }
 
-fn timers(resolution_ns: i64) -> Finding {
+fn timers(root: &SystemRoot, resolution_ns: i64) -> Finding {
     const CHECK: &str = "timer resolution";
     if resolution_ns <= 1000 {
         return Finding::ok(CHECK, format!("{resolution_ns} ns"));
@@ -77,7 +80,10 @@ fn timers(resolution_ns: i64) -> Finding {
         format!("{resolution_ns} ns"),
         "cycles can only begin at ticks; the kernel needs CONFIG_HIGH_RES_TIMERS and no `highres=off`",
     )
-    .mended_by("sudo sed -i 's/highres=off//' /etc/default/grub && sudo update-grub && sudo reboot")
+    .mended_by(container::on_host(
+        root,
+        "sudo sed -i 's/highres=off//' /etc/default/grub && sudo update-grub && sudo reboot",
+    ))
 }
 
 /// CPU time that going to sleep and waking takes, ns.
@@ -143,7 +149,8 @@ mod tests {
 
     #[test]
     fn ticks_are_too_coarse_for_cycles() {
-        assert_eq!((timers(1).level, timers(4_000_000).level), (Fine, Bad));
+        let machine = Fixture::of(&[]);
+        assert_eq!([1, 4_000_000].map(|ns| timers(&machine.root(), ns).level), [Fine, Bad]);
     }
 
     #[test]
