@@ -1,5 +1,7 @@
 //! What the kernel tells of the machine in `/proc` and `/sys`, read below a root that tests can choose.
 
+mod hypervisor;
+
 use std::fs;
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
@@ -50,15 +52,6 @@ impl SystemRoot {
         };
         self.text(path).unwrap_or_default().split(',').filter_map(range).flatten().collect()
     }
-
-    /// Whether a hypervisor runs this machine, as the processor says (x86) or the device tree (Arm).
-    pub fn is_virtual(&self) -> bool {
-        let cpuinfo = self.text("proc/cpuinfo").unwrap_or_default();
-        let mut flags = cpuinfo.lines().filter(|line| line.starts_with("flags"));
-        flags.any(|line| line.split_whitespace().any(|flag| flag == "hypervisor"))
-            || self.text("sys/hypervisor/type").is_some()
-            || self.text("proc/device-tree/hypervisor/compatible").is_some()
-    }
 }
 
 #[cfg(test)]
@@ -90,19 +83,6 @@ pub(crate) mod fixture {
 #[cfg(test)]
 mod tests {
     use super::fixture::Fixture;
-
-    #[test]
-    fn a_virtual_machine_is_known_by_its_processor_or_its_firmware() {
-        let cases = [
-            (("proc/cpuinfo", "flags\t\t: fpu vme hypervisor lahf_lm\n"), true),
-            (("proc/cpuinfo", "flags\t\t: fpu vme lahf_lm\nmodel name : hypervisor\n"), false),
-            (("sys/hypervisor/type", "xen\n"), true),
-            (("proc/device-tree/hypervisor/compatible", "linux,kvm"), true),
-        ];
-        for (file, expected) in cases {
-            assert_eq!(Fixture::of(&[file]).root().is_virtual(), expected, "{file:?}");
-        }
-    }
 
     #[test]
     fn cores_that_are_offline_do_not_count() {
