@@ -46,23 +46,30 @@ pub(super) enum Step {
     End,
 }
 
+/// A place between two records, and what is known there.
+#[derive(Clone)]
+pub(super) struct Place {
+    /// Where the next record begins.
+    next: u64,
+    /// Whether it is between the end of the data and the footer.
+    is_in_index: bool,
+    /// Whether the last record was a footer.
+    is_end_due: bool,
+    /// Checksum of the current section of the file, as long as nothing in it was found damaged.
+    section: Option<Hasher>,
+}
+
 /// A walk through a file.
 pub(super) struct Walk<R> {
     source: R,
     size: u64,
-    /// Where the next record begins.
-    next: u64,
+    place: Place,
     /// Where the current record began.
     at: u64,
     /// The current record with opcode and length.
     record: Vec<u8>,
     /// The byte behind the closing magic, once it was met.
     end: Option<u64>,
-    is_in_index: bool,
-    /// Whether the last record was a footer.
-    is_end_due: bool,
-    /// Checksum of the current section of the file, as long as nothing in it was found damaged.
-    section: Option<Hasher>,
 }
 
 impl<R: Read + Seek> Walk<R> {
@@ -72,13 +79,10 @@ impl<R: Read + Seek> Walk<R> {
         Ok(Self {
             source,
             size,
-            next: 0,
+            place: Place { next: 0, is_in_index: false, is_end_due: false, section: Some(Hasher::new()) },
             at: 0,
             record: Vec::new(),
             end: None,
-            is_in_index: false,
-            is_end_due: false,
-            section: Some(Hasher::new()),
         })
     }
 
@@ -89,7 +93,7 @@ impl<R: Read + Seek> Walk<R> {
 
     /// The current record as a stretch of the file that is damaged.
     pub(super) fn damaged(&mut self, reason: String) -> Damage {
-        self.section = None;
+        self.place.section = None;
         self.stretch(reason)
     }
 
@@ -100,21 +104,18 @@ impl<R: Read + Seek> Walk<R> {
 
     /// Whether the walk is between the end of the data and the footer.
     pub(super) fn is_in_index(&self) -> bool {
-        self.is_in_index
+        self.place.is_in_index
     }
 
-    /// Where the walk stands: between two records.
-    pub(super) fn place(&self) -> u64 {
-        self.next
+    /// Where the walk stands.
+    pub(super) fn place(&self) -> Place {
+        self.place.clone()
     }
 
-    /// Goes on from a place where the walk once stood.
-    pub(super) fn go_to(&mut self, place: u64) -> io::Result<()> {
-        self.next = place;
-        self.is_in_index = false;
-        self.is_end_due = false;
-        self.section = None;
-        self.source.seek(SeekFrom::Start(place)).map(|_| ())
+    /// Goes on from a place.
+    pub(super) fn go_to(&mut self, place: Place) -> io::Result<()> {
+        self.place = place;
+        self.source.seek(SeekFrom::Start(self.place.next)).map(|_| ())
     }
 
     /// Bytes of the file.
@@ -124,13 +125,13 @@ impl<R: Read + Seek> Walk<R> {
 
     /// The next record, or the next stretch that is none.
     pub(super) fn step(&mut self) -> io::Result<Step> {
-        self.at = self.next;
+        self.at = self.place.next;
         let left = self.size - self.at;
         if left == 0 {
             return Ok(Step::End);
         }
         if self.end == Some(self.at) {
-            self.next = self.size;
+            self.place.next = self.size;
             return Ok(Step::Damage(self.stretch("bytes behind the end of the recording".to_owned())));
         }
         self.record.resize(left.min(HEAD as u64) as usize, 0);
@@ -138,7 +139,7 @@ impl<R: Read + Seek> Walk<R> {
         if self.at == 0 {
             return self.begin();
         }
-        if self.record.starts_with(MAGIC) || self.is_end_due && left >= MAGIC.len() as u64 {
+        if self.record.starts_with(MAGIC) || self.place.is_end_due && left >= MAGIC.len() as u64 {
             return self.close();
         }
         if left < HEAD as u64 {
@@ -156,8 +157,8 @@ impl<R: Read + Seek> Walk<R> {
         if !is_consistent(self.record[0], self.body()) {
             return self.find_feet("the lengths in a record contradict each other");
         }
-        self.next = self.at + self.record.len() as u64;
-        self.is_end_due = self.record[0] == op::FOOTER;
+        self.place.next = self.at + self.record.len() as u64;
+        self.place.is_end_due = self.record[0] == op::FOOTER;
         Ok(self.check_section().map_or(Step::Record(self.record[0]), Step::Damage))
     }
 
@@ -169,13 +170,13 @@ impl<R: Read + Seek> Walk<R> {
             op::FOOTER => (HEAD + 16, Some("the index")),
             _ => (self.record.len(), None),
         };
-        if let Some(section) = &mut self.section {
+        if let Some(section) = &mut self.place.section {
             section.update(&self.record[..covered]);
         }
         let ended = ended?;
-        self.is_in_index = self.record[0] == op::DATA_END;
+        self.place.is_in_index = self.record[0] == op::DATA_END;
         // Damage to the data says nothing of the index.
-        let found = self.section.replace(Hasher::new())?.finalize();
+        let found = self.place.section.replace(Hasher::new())?.finalize();
         let expected =
             u32::from_le_bytes(*self.record.last_chunk().expect("both are longer than their checksum"));
         (expected != 0 && found != expected)
@@ -187,7 +188,7 @@ impl<R: Read + Seek> Walk<R> {
         if !self.record.starts_with(MAGIC) {
             return self.find_feet("no MCAP file begins like this");
         }
-        if let Some(section) = &mut self.section {
+        if let Some(section) = &mut self.place.section {
             section.update(MAGIC);
         }
         self.pass_magic()?;
@@ -197,31 +198,28 @@ impl<R: Read + Seek> Walk<R> {
     /// The eight bytes that end every file behind its footer; one of both may be damaged.
     fn close(&mut self) -> io::Result<Step> {
         self.pass_magic()?;
-        self.end = Some(self.next);
-        if !self.is_end_due || !self.record.starts_with(MAGIC) {
+        self.end = Some(self.place.next);
+        if !self.place.is_end_due || !self.record.starts_with(MAGIC) {
             return Ok(Step::Damage(self.stretch("no MCAP file ends like this".to_owned())));
         }
         self.step()
     }
 
     fn pass_magic(&mut self) -> io::Result<()> {
-        self.next = self.at + MAGIC.len() as u64;
-        self.source.seek(SeekFrom::Start(self.next)).map(|_| ())
+        self.place.next = self.at + MAGIC.len() as u64;
+        self.source.seek(SeekFrom::Start(self.place.next)).map(|_| ())
     }
 
     /// Everything from here to the next landmark is damage; without one, to the end of the file.
     fn find_feet(&mut self, reason: &str) -> io::Result<Step> {
-        self.section = None;
-        self.is_in_index = false;
-        self.is_end_due = false;
-        self.next = self.find_landmark(self.at + 1)?.unwrap_or(self.size);
-        self.source.seek(SeekFrom::Start(self.next))?;
+        let next = self.find_landmark(self.at + 1)?.unwrap_or(self.size);
+        self.go_to(Place { next, is_in_index: false, is_end_due: false, section: None })?;
         Ok(Step::Damage(self.stretch(reason.to_owned())))
     }
 
     /// What lies between the last place and this one.
     fn stretch(&self, reason: String) -> Damage {
-        Damage { from: self.at, to: self.next, reason }
+        Damage { from: self.at, to: self.place.next, reason }
     }
 
     /// The first place at or behind `from` where a chunk begins, or the magic that ends the file.

@@ -81,6 +81,26 @@ fn the_index_is_asked_for_lost_definitions_once() {
     assert!(read.get() <= 3 * size, "{} of {size}", read.get());
 }
 
+#[test]
+fn a_damaged_end_of_the_data_does_not_let_a_damaged_index_pass() {
+    let wrong = 1_u32.to_le_bytes();
+    let bytes = [
+        MAGIC.to_vec(),
+        record_of(op::HEADER, &[&text(""), &text("")]),
+        record_of(op::DATA_END, &[&wrong]),
+        record_of(op::CHANNEL, &[&[1, 0], &[0; 2], &text("topic"), &text("cdr"), &text("")]),
+        record_of(op::FOOTER, &[&[0; 16], &wrong]),
+        MAGIC.to_vec(),
+    ]
+    .concat();
+    let mut reader = Reader::new(Cursor::new(bytes)).unwrap();
+    assert!(reader.next_entry().unwrap().is_none());
+    assert_eq!(reader.channels().count(), 0);
+    let [_, index] = reader.damage() else { panic!("{:?}", reader.damage()) };
+    assert!(index.reason.contains("the index has checksum"), "{index}");
+    assert!(!reader.was_cut_short());
+}
+
 /// A chunk's records: channels 1 and 2 that both name a schema, which is defined anew between them, each with a message.
 fn chunk_with_schema_twice(schema: u16) -> Vec<u8> {
     let records = (1..=2_u16).flat_map(|channel| {
