@@ -64,7 +64,7 @@ pub(super) enum Stop {
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct BusWatch {
     pub(super) is_off: bool,
-    /// When the last SYNC was on the wire, as far as the tap tells.
+    /// When the cycle's SYNC, or the last one seen, was on the wire, as far as the tap tells.
     pub(super) sync_ns: u64,
     /// Whether any drive was ever heard.
     pub(super) is_heard: bool,
@@ -154,9 +154,12 @@ impl Master {
         (0..AXES).all(|axis| self.is_fresh(axis))
     }
 
-    /// A SYNC was seen on a wire, whoever sent it.
+    /// A SYNC was seen on a wire. One that was repeated is answered again, but has its answer already.
     pub(crate) fn note_sync(&mut self, bus: usize, time_ns: u64) {
-        self.buses[bus].sync_ns = time_ns;
+        let seen_ns = &mut self.buses[bus].sync_ns;
+        if *seen_ns < self.sync_ns {
+            *seen_ns = time_ns;
+        }
     }
 
     /// Whether a drive has answered this cycle's SYNC. Process data of an earlier one may come late, even between the
