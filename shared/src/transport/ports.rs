@@ -46,7 +46,11 @@ fn help(reason: &str) -> &'static str {
 
 /// Builds its text only when something failed: a port's way costs no allocation.
 pub(super) fn failed<E: std::fmt::Debug>(verb: &'static str, what: &str) -> impl FnOnce(E) -> TransportError {
-    move |error| TransportError { action: format!("{verb} '{what}'"), reason: format!("{error:?}") }
+    #[cold]
+    fn told(verb: &str, what: &str, error: &dyn std::fmt::Debug) -> TransportError {
+        TransportError { action: format!("{verb} '{what}'"), reason: format!("{error:?}") }
+    }
+    move |error| told(verb, what, &error)
 }
 
 /// A process's place in a domain.
