@@ -32,6 +32,8 @@ use crate::report::verdict::Ending;
 
 /// How often the processes are looked after.
 const WATCH: Duration = Duration::from_millis(2);
+/// How much later than another process this one may hear a signal that both get.
+const HEARD_WITHIN: Duration = Duration::from_millis(100);
 /// From the word to begin to the first SYNC, ns.
 const LEAD_NS: u64 = 100_000_000;
 /// SYNC and the controller's deadline keep this clear of whole milliseconds, where the kernel's timer
@@ -163,8 +165,15 @@ impl Rig {
     ) -> Result<Option<BTreeMap<String, Obtained>>, ChildError> {
         let mut scheduling = BTreeMap::new();
         for process in [&mut self.logger, &mut self.plant, &mut self.controller] {
-            let Some(ready) = process.wait_ready(|| interrupts.ask())? else { return Ok(None) };
-            scheduling.insert(process.role().name().to_owned(), ready.scheduling);
+            match process.wait_ready(|| interrupts.ask()) {
+                Ok(Some(ready)) => scheduling.insert(process.role().name().to_owned(), ready.scheduling),
+                Ok(None) => return Ok(None),
+                Err(error) => {
+                    // A terminal's signal reaches the processes too: one that was getting ready may have ended of it.
+                    clock::sleep(HEARD_WITHIN);
+                    return if interrupts.ask() { Ok(None) } else { Err(error) };
+                }
+            };
         }
         Ok(Some(scheduling))
     }
