@@ -81,9 +81,10 @@ fn require(
 /// A drive counts increments in 32 bits (objects 6064 and 607A).
 fn check_counts(scenario: &Scenario) -> Result<(), PlantError> {
     let Scenario { drives, mechanism, .. } = scenario;
-    let farthest_m =
-        |stroke_m: [f64; 2]| stroke_m.into_iter().fold(0.0, |most_m: f64, end_m| most_m.max(end_m.abs()));
-    let [slide_m, leg_m] = [0, LEGS].map(|axis| farthest_m(mechanism.strokes.of_axis(axis)));
+    let [slide_m, leg_m] = [0, LEGS].map(|axis| {
+        let [low_m, high_m] = mechanism.strokes.of_axis(axis);
+        low_m.abs().max(high_m.abs())
+    });
     let too_fine = [
         ("drives.slide.encoder_resolution_m", drives.slide.encoder_resolution_m, slide_m),
         ("drives.leg.encoder_resolution_m", drives.leg.encoder_resolution_m, leg_m),

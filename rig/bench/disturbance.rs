@@ -70,7 +70,8 @@ impl Watch {
     pub(super) fn end(self) -> Disturbance {
         let root = SystemRoot::of_this_machine();
         let passed_ns = (clock::now_ns() - self.began_ns) * root.online_cores().len().max(1) as u64;
-        let stolen_ns = stolen_ns(&root).zip(self.stolen_before_ns).map_or(0, |(to, from)| to - from);
+        let stolen_ns =
+            stolen_ns(&root).zip(self.stolen_before_ns).map_or(0, |(to, from)| to.saturating_sub(from));
         let percent = |part_ns, of_ns: u64| 100.0 * part_ns as f64 / of_ns.max(1) as f64;
         Disturbance::of(percent(stolen_ns, passed_ns), percent(self.stalled_ns, self.looked_ns))
     }

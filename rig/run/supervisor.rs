@@ -61,7 +61,7 @@ pub struct Ended {
     pub usage: RunUsage,
 }
 
-/// Where no process was started, or none is.
+/// Of a run that came to no process, or has none.
 impl From<Ending> for Ended {
     fn from(ending: Ending) -> Self {
         let (scheduling, usage) = (BTreeMap::new(), RunUsage::default());
