@@ -1,7 +1,6 @@
 //! SYNC and process data (CiA 301): what arrives takes effect, what the axis does is sampled and sent.
 
 use masseter_shared::can::Frame;
-use masseter_shared::can::canopen::ObjectAddress;
 
 use super::dictionary::{PDOS, names};
 use super::errors::DriveError;
@@ -40,18 +39,13 @@ impl DriveNode {
 
     /// Lets a received PDO take effect.
     fn apply(&mut self, number: usize, now_ns: u64) {
-        let rpdo = &mut self.rpdos[number];
-        if !rpdo.apply(&mut self.objects) {
-            return;
-        }
-        let holds = |index| rpdo.holds(ObjectAddress::new(index, 0));
-        self.new_targets.position |= holds(0x607A);
-        self.new_targets.torque |= holds(0x6071);
-        let (commands, configures) = (holds(0x6040), rpdo.configures());
-        if configures {
+        let Some(effects) = self.rpdos[number].apply(&mut self.objects) else { return };
+        self.new_targets.position |= effects.targets.position;
+        self.new_targets.torque |= effects.targets.torque;
+        if effects.configures {
             self.axis.configure(now_ns, &self.objects);
         }
-        if commands {
+        if effects.commands {
             self.control(now_ns);
         }
     }
@@ -69,7 +63,7 @@ impl DriveNode {
         self.clear(DriveError::SyncLength);
         if self.is_operational() {
             for number in 0..PDOS {
-                if self.rpdos[number].is_synchronous() {
+                if self.rpdos[number].waits_for_sync() {
                     self.apply(number, now_ns);
                 }
             }

@@ -8,6 +8,7 @@ use std::cmp::Ordering;
 use masseter_shared::can::canopen::{COB_ID_NOT_VALID, ObjectAddress};
 use masseter_shared::can::{CanId, Frame};
 
+use super::cyclic::NewTargets;
 use super::dictionary::{ENTRIES, MAPPED_MAX, Objects, find, within_limits};
 
 /// The lowest transmission type that SYNC does not drive.
@@ -154,8 +155,18 @@ pub(super) struct Rpdo {
     buffered: Option<[u8; Frame::MAX_DATA]>,
     /// Which of [`RpdoFault::ALL`] it has.
     faults: [bool; RpdoFault::ALL.len()],
-    /// Whether it holds objects that more than the next SYNC depends on.
-    configures: bool,
+    effects: Effects,
+}
+
+/// What an RPDO's objects act on.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Effects {
+    /// The cyclic targets: 607A, 6071.
+    pub(super) targets: NewTargets,
+    /// The power: 6040.
+    pub(super) commands: bool,
+    /// How the drive behaves, not only its targets.
+    pub(super) configures: bool,
 }
 
 impl Rpdo {
@@ -163,7 +174,7 @@ impl Rpdo {
     pub(super) fn new(objects: &Objects, number: u16) -> Self {
         let (communication, mapping) = (0x1400 + number, 0x1600 + number);
         let mapped = Mapped::of(objects, mapping);
-        let plain = |index| mapped.holds(ObjectAddress::new(index, 0));
+        let holds = |index| mapped.holds(ObjectAddress::new(index, 0));
         Self {
             id: identifier(parameter(objects, communication, 1)),
             is_synchronous: parameter(objects, communication, 2) < u32::from(EVENT_DRIVEN),
@@ -172,7 +183,11 @@ impl Rpdo {
             heard_ns: None,
             buffered: None,
             faults: [false; RpdoFault::ALL.len()],
-            configures: [0x6060, 0x6081, 0x6083, 0x6084].into_iter().any(plain),
+            effects: Effects {
+                targets: NewTargets { position: holds(0x607A), torque: holds(0x6071) },
+                commands: holds(0x6040),
+                configures: [0x6060, 0x6081, 0x6083, 0x6084].into_iter().any(holds),
+            },
         }
     }
 
@@ -185,14 +200,9 @@ impl Rpdo {
         self.is_synchronous
     }
 
-    /// Whether it may change how the drive behaves, not only its targets.
-    pub(super) fn configures(&self) -> bool {
-        self.configures
-    }
-
-    /// Whether it holds that object.
-    pub(super) fn holds(&self, object: ObjectAddress) -> bool {
-        self.mapped.holds(object)
+    /// Whether what it received waits for a SYNC.
+    pub(super) fn waits_for_sync(&self) -> bool {
+        self.is_synchronous && self.buffered.is_some()
     }
 
     /// Whether it has that fault.
@@ -218,11 +228,11 @@ impl Rpdo {
         (self.buffered, self.heard_ns) = (Some(buffer), Some(now_ns));
     }
 
-    /// Lets what was received take effect; whether there was anything.
-    pub(super) fn apply(&mut self, objects: &mut Objects) -> bool {
-        let Some(data) = self.buffered.take() else { return false };
+    /// Lets what was received take effect in the dictionary; what else it acts on, if there was anything.
+    pub(super) fn apply(&mut self, objects: &mut Objects) -> Option<Effects> {
+        let data = self.buffered.take()?;
         self.mapped.unpack(data, objects);
-        true
+        Some(self.effects)
     }
 
     /// Forgets what was received.
@@ -304,7 +314,7 @@ impl Tpdo {
         let id = self.id?;
         match self.trigger {
             Trigger::Event => None,
-            Trigger::ChangeThenSync => self.changed(objects).then(|| self.frame(id, now_ns, objects))?,
+            Trigger::ChangeThenSync => self.frame_of_change(id, now_ns, objects),
             Trigger::EverySync { every, start } => {
                 let syncs = match self.syncs {
                     None if counter != 0 && start != 0 && counter != start => return None,
@@ -312,7 +322,7 @@ impl Tpdo {
                     Some(syncs) => syncs + 1,
                 };
                 self.syncs = Some(if syncs >= every { 0 } else { syncs });
-                (syncs >= every).then(|| self.frame(id, now_ns, objects))?
+                if syncs >= every { self.frame(id, objects) } else { None }
             }
         }
     }
@@ -323,16 +333,24 @@ impl Tpdo {
         let since_ns = self.sent.map(|(_, sent_ns)| now_ns.saturating_sub(sent_ns));
         let is_inhibited = since_ns.is_some_and(|since_ns| since_ns < self.inhibit_ns);
         let is_due = self.timer_ns > 0 && since_ns.is_some_and(|since_ns| since_ns >= self.timer_ns);
-        (!is_inhibited && (is_due || self.changed(objects))).then(|| self.frame(id, now_ns, objects))?
+        if is_due {
+            self.sent = None;
+        }
+        if is_inhibited { None } else { self.frame_of_change(id, now_ns, objects) }
     }
 
-    fn changed(&self, objects: &Objects) -> bool {
-        self.sent.is_none_or(|(data, _)| data != self.watched.pack(objects))
+    /// The frame, if a watched object is not what it was when it was sent last.
+    fn frame_of_change(&mut self, id: CanId, now_ns: u64, objects: &Objects) -> Option<Frame> {
+        let watched = self.watched.pack(objects);
+        if self.sent.is_some_and(|(sent, _)| sent == watched) {
+            return None;
+        }
+        self.sent = Some((watched, now_ns));
+        self.frame(id, objects)
     }
 
-    fn frame(&mut self, id: CanId, now_ns: u64, objects: &Objects) -> Option<Frame> {
+    fn frame(&self, id: CanId, objects: &Objects) -> Option<Frame> {
         let data = self.mapped.pack(objects);
-        self.sent = Some((self.watched.pack(objects), now_ns));
         Frame::new(id, &data[..self.mapped.length]).ok()
     }
 }

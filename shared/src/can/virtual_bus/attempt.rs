@@ -36,6 +36,15 @@ impl PortSet {
     fn is_several(self) -> bool {
         self.0.count_ones() > 1
     }
+
+    fn ports(self) -> impl Iterator<Item = usize> {
+        let mut rest = self.0;
+        std::iter::from_fn(move || {
+            let port = rest.trailing_zeros() as usize;
+            rest &= rest.wrapping_sub(1);
+            (port < Self::CAPACITY).then_some(port)
+        })
+    }
 }
 
 /// A frame on the wire.
@@ -88,18 +97,28 @@ impl Offer<'_> {
 impl VirtualWire {
     /// The next attempt if nothing else is queued until then.
     pub(super) fn foretell(&self) -> Option<Attempt> {
-        self.attempt(self.next_start_ns()?)
+        let contenders = self.contenders();
+        // As soon as the bus is idle and somebody has something to send.
+        let start_ns = contenders.ports().filter_map(|port| self.ready_ns(port)).min()?;
+        self.attempt(contenders, start_ns)
     }
 
-    /// When the next arbitration takes place: as soon as the bus is idle and somebody has something to send.
-    fn next_start_ns(&self) -> Option<u64> {
-        (0..self.stations.len()).filter_map(|port| self.ready_ns(port)).min()
+    /// Who may have something to send, now or later.
+    fn contenders(&self) -> PortSet {
+        let mut contenders = PortSet::default();
+        for (port, station) in self.stations.iter().enumerate() {
+            // A node that babbles needs no queue.
+            if !station.transmit.is_empty() || !self.faults.is_empty() {
+                contenders.add(port);
+            }
+        }
+        contenders
     }
 
     /// When a port can next take part in an arbitration, if at all.
     fn ready_ns(&self, port: usize) -> Option<u64> {
         let station = &self.stations[port];
-        if station.confinement.state() == ErrorState::BusOff {
+        if station.confinement.is_off() {
             return None;
         }
         let may_ns = station.suspended_until_ns.max(station.on_bus_from_ns).max(self.idle_from_ns);
@@ -111,20 +130,19 @@ impl VirtualWire {
     }
 
     /// The attempt that an arbitration at that time leads to; `None` where nobody can send then.
-    fn attempt(&self, start_ns: u64) -> Option<Attempt> {
-        let winner = self.offers(0, start_ns).min_by_key(Offer::id)?;
-        let (contest, strongest) = self.contest(start_ns, winner);
+    fn attempt(&self, contenders: PortSet, start_ns: u64) -> Option<Attempt> {
+        let winner = self.offers(contenders, start_ns).min_by_key(Offer::id)?;
+        let (contest, strongest) = self.contest(contenders, start_ns, winner);
         let Queued { frame, duration_ns, since_ns } = *strongest.queued;
         let struck = |is_kind: fn(FaultKind) -> bool| {
             self.faults.strikes_frame(start_ns, is_kind, strongest.port, frame.id(), self.attempts)
         };
-        let interframe_ns = self.config.rates.nominal().bits_to_ns(INTERFRAME_BITS);
         let mut attempt = Attempt {
             frame,
             queued_ns: if strongest.babbles.is_some() { start_ns } else { since_ns },
             start_ns,
-            received_ns: start_ns + duration_ns - interframe_ns,
-            end_ns: start_ns + duration_ns - interframe_ns,
+            received_ns: start_ns + duration_ns - self.interframe_ns,
+            end_ns: start_ns + duration_ns - self.interframe_ns,
             idle_from_ns: start_ns + duration_ns,
             senders: contest.senders,
             babbling: contest.babbling,
@@ -150,7 +168,7 @@ impl VirtualWire {
 
     /// Whether a port takes part in what happens on the wire.
     pub(super) fn is_on_bus(&self, port: usize, now_ns: u64) -> bool {
-        self.stations[port].confinement.state() != ErrorState::BusOff && !self.is_disconnected(port, now_ns)
+        !self.stations[port].confinement.is_off() && !self.is_disconnected(port, now_ns)
     }
 
     fn is_disconnected(&self, port: usize, now_ns: u64) -> bool {
@@ -158,19 +176,22 @@ impl VirtualWire {
         self.faults.of_node(now_ns, is_disconnect, port).is_some()
     }
 
-    /// What each port from `first` on would send at that time.
-    fn offers(&self, first: usize, start_ns: u64) -> impl Iterator<Item = Offer<'_>> {
-        (first..self.stations.len()).filter_map(move |port| {
+    /// What each of those ports would send at that time.
+    fn offers(&self, contenders: PortSet, start_ns: u64) -> impl Iterator<Item = Offer<'_>> {
+        contenders.ports().filter_map(move |port| {
+            let offer = self.offer(port, start_ns)?;
             let may = self.stations[port].suspended_until_ns <= start_ns && self.is_on_bus(port, start_ns);
-            if may { self.offer(port, start_ns) } else { None }
+            may.then_some(offer)
         })
     }
 
     fn offer(&self, port: usize, start_ns: u64) -> Option<Offer<'_>> {
         let queued = self.stations[port].transmit.most_urgent(start_ns);
         let queued = queued.map(|queued| Offer { port, queued, babbles: None });
-        let babbled = self.babbled(port, start_ns);
-        queued.into_iter().chain(babbled).min_by_key(Offer::id)
+        match self.babbled(port, start_ns) {
+            Some(babbled) if queued.is_none_or(|queued| babbled.id() < queued.id()) => Some(babbled),
+            _ => queued,
+        }
     }
 
     fn babbled(&self, port: usize, start_ns: u64) -> Option<Offer<'_>> {
@@ -186,12 +207,12 @@ impl VirtualWire {
     }
 
     /// Sorts out who sends the winning identifier too.
-    fn contest<'a>(&'a self, start_ns: u64, winner: Offer<'a>) -> (Contest, Offer<'a>) {
+    fn contest<'a>(&'a self, contenders: PortSet, start_ns: u64, winner: Offer<'a>) -> (Contest, Offer<'a>) {
         let mut contest = Contest::default();
         contest.admit(winner);
         let mut strongest = winner;
-        let same_id = |offer: &Offer| offer.id() == winner.id();
-        for rival in self.offers(winner.port + 1, start_ns).filter(same_id) {
+        let is_rival = |offer: &Offer| offer.port > winner.port && offer.id() == winner.id();
+        for rival in self.offers(contenders, start_ns).filter(is_rival) {
             let difference = first_difference(&strongest.queued.frame, &rival.queued.frame);
             let Some(difference) = difference else {
                 contest.admit(rival);

@@ -46,8 +46,12 @@ impl Confinement {
         BusStatus { state: self.state(), tec: self.tec, rec: self.rec }
     }
 
+    pub(super) const fn is_off(&self) -> bool {
+        self.off.is_some()
+    }
+
     pub(super) const fn state(&self) -> ErrorState {
-        if self.off.is_some() {
+        if self.is_off() {
             ErrorState::BusOff
         } else if self.tec > ACTIVE_MAX || self.rec > ACTIVE_MAX {
             ErrorState::Passive

@@ -116,9 +116,9 @@ impl VirtualWire {
 
     /// A passive transmitter pauses.
     fn suspend_passive(&mut self, attempt: &Attempt) {
-        let pause_ns = self.config.rates.nominal().bits_to_ns(SUSPEND_BITS);
         for (port, station) in self.stations.iter_mut().enumerate() {
             if attempt.is_from(port) && station.confinement.state() == ErrorState::Passive {
+                let pause_ns = self.config.rates.nominal().bits_to_ns(SUSPEND_BITS);
                 station.suspended_until_ns = attempt.idle_from_ns + pause_ns;
             }
         }

@@ -40,7 +40,7 @@ use super::error_frame::ErrorReport;
 use super::faults::{FaultKind, FaultNote, Faults, Strike};
 use super::frame::{Frame, FrameFormat};
 use super::tap::Tapped;
-use super::wire::Rates;
+use super::wire::{INTERFRAME_BITS, Rates};
 use attempt::{Attempt, PortSet};
 use confinement::{Confinement, SEQUENCE_BITS};
 use queue::{Queued, ReceiveQueue, TransmitQueue};
@@ -79,6 +79,8 @@ pub struct VirtualWire {
     attempts: u64,
     idle_from_ns: u64,
     advanced_to_ns: u64,
+    /// Between two frames.
+    interframe_ns: u64,
     statistics: Statistics,
 }
 
@@ -89,10 +91,8 @@ enum Traffic {
     Unforeseen,
     /// The wire is idle, and nobody has anything to send.
     Nothing,
-    /// The wire is idle until that.
-    Next(Attempt),
-    /// That is on the wire.
-    Now(Attempt),
+    /// That is on the wire, or will be; until then the wire is idle.
+    Coming { attempt: Attempt, is_on_wire: bool },
 }
 
 /// A port with its controller.
@@ -144,6 +144,7 @@ impl VirtualWire {
             attempts: 0,
             idle_from_ns: 0,
             advanced_to_ns: 0,
+            interframe_ns: config.rates.nominal().bits_to_ns(INTERFRAME_BITS),
             statistics: Statistics::default(),
         }
     }
@@ -217,7 +218,7 @@ impl VirtualWire {
     pub fn next_event_ns(&mut self) -> Option<u64> {
         self.foresee();
         match &self.traffic {
-            Traffic::Next(attempt) | Traffic::Now(attempt) => Some(attempt.end_ns),
+            Traffic::Coming { attempt, .. } => Some(attempt.end_ns),
             Traffic::Nothing | Traffic::Unforeseen => None,
         }
     }
@@ -237,21 +238,21 @@ impl VirtualWire {
     /// Puts the next frame on the wire if it starts before `until_ns`; whether one is on it now. Until then
     /// nodes come back from bus-off, or are sent there.
     fn start_before(&mut self, until_ns: u64) -> bool {
-        if matches!(self.traffic, Traffic::Now(_)) {
+        if self.is_busy() {
             return true;
         }
         // Behind a frame nothing can start yet, and what its receivers answer would have to be looked at again.
         if self.idle_from_ns > until_ns {
             return false;
         }
-        let sequence_ns = self.config.rates.nominal().bits_to_ns(SEQUENCE_BITS);
         loop {
             self.foresee();
             let idle_until_ns = match &self.traffic {
-                Traffic::Next(attempt) => attempt.start_ns.min(until_ns),
+                Traffic::Coming { attempt, .. } => attempt.start_ns.min(until_ns),
                 _ => until_ns,
             };
             if self.is_restless() {
+                let sequence_ns = self.config.rates.nominal().bits_to_ns(SEQUENCE_BITS);
                 let change = self.next_node_change(sequence_ns);
                 if let Some(change) = change.filter(|change| change.at_ns <= idle_until_ns) {
                     self.apply(change);
@@ -259,10 +260,10 @@ impl VirtualWire {
                 }
                 self.stay_idle_until(idle_until_ns, sequence_ns);
             }
-            return match self.traffic {
-                Traffic::Next(attempt) if attempt.start_ns < until_ns => {
+            return match &mut self.traffic {
+                Traffic::Coming { attempt, is_on_wire } if attempt.start_ns < until_ns => {
                     self.attempts += 1;
-                    self.traffic = Traffic::Now(attempt);
+                    *is_on_wire = true;
                     true
                 }
                 _ => false,
@@ -273,13 +274,16 @@ impl VirtualWire {
     /// Finds out what comes next, unless that is known.
     fn foresee(&mut self) {
         if let Traffic::Unforeseen = self.traffic {
-            self.traffic = self.foretell().map_or(Traffic::Nothing, Traffic::Next);
+            self.traffic = match self.foretell() {
+                Some(attempt) => Traffic::Coming { attempt, is_on_wire: false },
+                None => Traffic::Nothing,
+            };
         }
     }
 
     /// Something changed that what comes next may depend on. What is on the wire stays there.
     fn look_again(&mut self) {
-        if !matches!(self.traffic, Traffic::Now(_)) {
+        if !self.is_busy() {
             self.traffic = Traffic::Unforeseen;
         }
     }
@@ -287,13 +291,17 @@ impl VirtualWire {
     /// Ends the frame on the wire if its end is not after `until_ns`; whether it did.
     fn end_until(&mut self, until_ns: u64) -> bool {
         match self.traffic {
-            Traffic::Now(attempt) if attempt.end_ns <= until_ns => {
+            Traffic::Coming { attempt, is_on_wire: true } if attempt.end_ns <= until_ns => {
                 self.traffic = Traffic::Unforeseen;
                 self.end(&attempt);
                 true
             }
             _ => false,
         }
+    }
+
+    fn is_busy(&self) -> bool {
+        matches!(self.traffic, Traffic::Coming { is_on_wire: true, .. })
     }
 
     /// Whether a node may leave the bus or come back while the wire is idle.

@@ -51,6 +51,10 @@ impl TransmitQueue {
         Ok(())
     }
 
+    pub(super) fn is_empty(&self) -> bool {
+        self.frames.is_empty()
+    }
+
     /// When the frame that waits longest was queued.
     pub(super) fn earliest_ns(&self) -> Option<u64> {
         self.frames.iter().map(|queued| queued.since_ns).min()
