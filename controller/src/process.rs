@@ -55,6 +55,14 @@ impl Ports {
         ports.events.warm_up()?;
         Ok(ports)
     }
+
+    /// Once everybody's ports are there, so that no cycle has to.
+    fn connect(&self) -> Result<(), ProcessError> {
+        self.readings.connect()?;
+        self.commands.connect()?;
+        self.states.connect()?;
+        Ok(self.events.connect()?)
+    }
 }
 
 /// Runs the controller until its part is done.
@@ -66,6 +74,7 @@ pub fn run(assignment: &Assignment) -> Result<Outcome, ControllerError> {
     let mut controller = Controller::new(scenario, mechanism, trajectory);
     let mut ports = Ports::open(&post.node)?;
     let start = post.ready_on(scenario.realtime.cores[0])?;
+    ports.connect()?;
 
     let mut cycle = Cycle::new(start.epoch_ns + schedule.controller_at_ns, scenario.period_ns());
     let patience_ns = (schedule.command_by_ns - schedule.controller_at_ns) / 2;

@@ -61,6 +61,15 @@ impl Ports {
         Ok(ports)
     }
 
+    /// Once everybody's ports are there, so that no cycle has to.
+    fn connect(&self) -> Result<(), ProcessError> {
+        self.commands.connect()?;
+        self.readings.connect()?;
+        self.truths.connect()?;
+        self.frames.connect()?;
+        Ok(self.events.connect()?)
+    }
+
     /// Touches what the next messages will be written to.
     fn warm_up(&self) -> Result<(), ProcessError> {
         self.readings.warm_up()?;
@@ -120,6 +129,7 @@ fn serve<L: Link>(
     build(scenario, 0)?;
     let mut ports = Ports::open(&post.node)?;
     let start = post.ready_on(scenario.realtime.cores[1])?;
+    ports.connect()?;
 
     let mut plant = build(scenario, start.epoch_ns)?;
     let mut cycle = Cycle::new(start.epoch_ns, scenario.period_ns());

@@ -11,7 +11,7 @@ use iceoryx2::prelude::{AllocationStrategy, ipc};
 use iceoryx2::sample::Sample;
 use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
 
-use super::ports::{MAX_HELD, MAX_PUBLISHERS, MAX_SUBSCRIBERS, Node, TransportError, failed};
+use super::ports::{MAX_HELD, MAX_PUBLISHERS, MAX_SUBSCRIBERS, Node, Refused, TransportError, failed};
 use crate::clock;
 use crate::messages::Message;
 
@@ -34,15 +34,17 @@ impl Node {
 
     /// The publishing end of a topic that travels in batches.
     pub fn batch_outlet<M: Message>(&self) -> Result<BatchOutlet<M>, TransportError> {
+        let refused = Refused::default();
         let publisher = self
             .batch_service::<M>()?
             .publisher_builder()
             .initial_max_slice_len(BATCH)
             .allocation_strategy(AllocationStrategy::Static)
             .backpressure_strategy(BackpressureStrategy::DiscardData)
+            .set_degradation_handler(refused.counter())
             .create()
             .map_err(failed("publishing", M::TOPIC))?;
-        Ok(BatchOutlet { publisher, sent: 0 })
+        Ok(BatchOutlet { publisher, refused, sent: 0 })
     }
 
     /// The receiving end of a topic that travels in batches; it keeps up to [`Message::DEPTH`] messages, less
@@ -58,6 +60,7 @@ impl Node {
 #[derive(Debug)]
 pub struct BatchOutlet<M: Message> {
     publisher: Publisher<ipc::Service, [M], ()>,
+    refused: Refused,
     sent: u64,
 }
 
@@ -76,6 +79,11 @@ impl<M: Message> BatchOutlet<M> {
             sample.send().map_err(failed("sending", M::TOPIC))?;
         }
         Ok(())
+    }
+
+    /// Connects to the subscribers that are there by now, as [`Outlet::connect`](super::Outlet::connect).
+    pub fn connect(&self) -> Result<(), TransportError> {
+        self.refused.connect(&self.publisher, M::TOPIC)
     }
 
     /// Touches the memory of the next batch: so the first one of the loop costs no page fault, and a later one finds it

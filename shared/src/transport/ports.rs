@@ -1,12 +1,16 @@
 //! Typed ends of the topics: [`Outlet`] publishes, [`Inlet`] receives.
 
 use std::ops::Deref;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU32, Ordering};
 
 use iceoryx2::config::Config;
 use iceoryx2::node::{Node as IceoryxNode, NodeBuilder};
 use iceoryx2::port::backpressure_strategy::BackpressureStrategy;
 use iceoryx2::port::publisher::Publisher;
 use iceoryx2::port::subscriber::Subscriber;
+use iceoryx2::port::update_connections::UpdateConnections;
+use iceoryx2::port::{DegradationAction, DegradationFn};
 use iceoryx2::prelude::{LogLevel, SemanticString, SignalHandlingMode, ipc, set_log_level};
 use iceoryx2::sample::Sample;
 use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
@@ -39,6 +43,8 @@ fn help(reason: &str) -> &'static str {
         "another user owns files of this name in /dev/shm"
     } else if reason.contains("Incompatible") {
         "a process of another version uses this topic; stop it"
+    } else if reason.contains("ConnectionsRefused") {
+        "/dev/shm is full, or too little memory may be locked or too few files opened; `masseter doctor` tells which"
     } else {
         "`masseter clean` removes what killed runs left behind"
     }
@@ -52,6 +58,30 @@ pub(super) fn failed<E: std::fmt::Debug>(verb: &'static str, what: &str) -> impl
         TransportError { action: format!("{verb} '{what}'"), reason: format!("{error:?}") }
     }
     move |error| told(verb, what, &error)
+}
+
+/// Connections that a port could not make: iceoryx2 goes on without them, and says so in its log only.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Refused(Arc<AtomicU32>);
+
+impl Refused {
+    /// For the port's builder.
+    pub(super) fn counter(&self) -> impl DegradationFn + use<> {
+        let Self(count) = self.clone();
+        move |_, _| {
+            count.fetch_add(1, Ordering::Relaxed);
+            DegradationAction::Warn
+        }
+    }
+
+    /// Makes a port's connections to the ports that are there by now.
+    pub(super) fn connect(&self, port: &impl UpdateConnections, topic: &str) -> Result<(), TransportError> {
+        port.update_connections().map_err(failed("connecting", topic))?;
+        match self.0.load(Ordering::Relaxed) {
+            0 => Ok(()),
+            count => Err(failed("connecting", topic)(format_args!("ConnectionsRefused({count})"))),
+        }
+    }
 }
 
 /// A process's place in a domain.
@@ -99,20 +129,27 @@ impl Node {
 
     /// The publishing end of a topic.
     pub fn outlet<M: Message>(&self) -> Result<Outlet<M>, TransportError> {
+        let refused = Refused::default();
         let publisher = self
             .service::<M>()?
             .publisher_builder()
             .backpressure_strategy(BackpressureStrategy::DiscardData)
+            .set_degradation_handler(refused.counter())
             .create()
             .map_err(failed("publishing", M::TOPIC))?;
-        Ok(Outlet { publisher, sent: 0 })
+        Ok(Outlet { publisher, refused, sent: 0 })
     }
 
     /// The receiving end of a topic, which keeps up to [`Message::DEPTH`] messages.
     pub fn inlet<M: Message>(&self) -> Result<Inlet<M>, TransportError> {
-        let subscriber =
-            self.service::<M>()?.subscriber_builder().create().map_err(failed("subscribing to", M::TOPIC))?;
-        Ok(Inlet { subscriber })
+        let refused = Refused::default();
+        let subscriber = self
+            .service::<M>()?
+            .subscriber_builder()
+            .set_degradation_handler(refused.counter())
+            .create()
+            .map_err(failed("subscribing to", M::TOPIC))?;
+        Ok(Inlet { subscriber, refused })
     }
 }
 
@@ -120,6 +157,7 @@ impl Node {
 #[derive(Debug)]
 pub struct Outlet<M: Message> {
     publisher: Publisher<ipc::Service, M, ()>,
+    refused: Refused,
     sent: u64,
 }
 
@@ -135,6 +173,12 @@ impl<M: Message> Outlet<M> {
         Ok(())
     }
 
+    /// Connects to the subscribers that are there by now. Whoever does not call this connects with its first message: files
+    /// are made and mapped then.
+    pub fn connect(&self) -> Result<(), TransportError> {
+        self.refused.connect(&self.publisher, M::TOPIC)
+    }
+
     /// Touches the memory of the next message: so the first one of the loop costs no page fault, and a later one finds it
     /// in the caches.
     pub fn warm_up(&self) -> Result<(), TransportError> {
@@ -147,6 +191,7 @@ impl<M: Message> Outlet<M> {
 #[derive(Debug)]
 pub struct Inlet<M: Message> {
     subscriber: Subscriber<ipc::Service, M, ()>,
+    refused: Refused,
 }
 
 /// A message still lying in shared memory.
@@ -162,6 +207,11 @@ impl<M: Message> Deref for Received<M> {
 }
 
 impl<M: Message> Inlet<M> {
+    /// Connects to the publishers that are there by now; else the first look does, as in [`Outlet::connect`].
+    pub fn connect(&self) -> Result<(), TransportError> {
+        self.refused.connect(&self.subscriber, M::TOPIC)
+    }
+
     /// The oldest message not yet received; never waits.
     pub fn receive(&self) -> Result<Option<Received<M>>, TransportError> {
         let sample = self.subscriber.receive().map_err(failed("receiving", M::TOPIC))?;
