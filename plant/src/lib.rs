@@ -22,6 +22,7 @@ mod master;
 mod mechanism;
 pub mod open_link;
 pub mod process;
+mod rehearsal;
 mod socket_link;
 mod wire_events;
 

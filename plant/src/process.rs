@@ -10,6 +10,7 @@ use masseter_shared::transport::{BatchOutlet, Inlet, Node, Outlet, Received};
 
 use crate::core::{PlantCore, PlantError};
 use crate::link::Link;
+use crate::rehearsal::Rehearsal;
 
 /// How long the drives may take to stop after the end has been asked for, ns.
 const STOP_WITHIN_NS: u64 = 500_000_000;
@@ -112,15 +113,17 @@ impl Ports {
 pub fn run(assignment: &Assignment) -> Result<Reason, PlantProcessError> {
     let post = assignment.take_up()?;
     if post.scenario.can.is_virtual() {
-        serve(&post, PlantCore::new)
+        let rehearsal = Rehearsal::new(&post.scenario, post.schedule)?;
+        serve(&post, PlantCore::new, Some(rehearsal))
     } else {
-        serve(&post, PlantCore::on_interfaces)
+        serve(&post, PlantCore::on_interfaces, None)
     }
 }
 
 fn serve<L: Link>(
     post: &Post,
     build: impl Fn(&Scenario, u64) -> Result<PlantCore<L>, PlantError>,
+    mut rehearsal: Option<Rehearsal>,
 ) -> Result<Reason, PlantProcessError> {
     let (scenario, schedule) = (&post.scenario, &post.schedule);
     let timeout_cycles = u64::from(scenario.can.command_timeout_cycles);
@@ -133,14 +136,21 @@ fn serve<L: Link>(
 
     let mut plant = build(scenario, start.epoch_ns)?;
     let mut cycle = Cycle::new(start.epoch_ns, scenario.period_ns());
+    let mut answer = None;
     while !post.stop.is_made() && u64::from(plant.silent_cycles()) <= patience_cycles {
-        let wake = cycle.wait_preparing(|| prepare(&mut plant, &ports))?;
+        let wake = cycle.wait_preparing(|| {
+            prepare(&mut plant, &ports)?;
+            // One that fails has no way left to go through; the plant itself tells why.
+            rehearsal.take_if(|rehearsal| rehearsal.play(answer.as_ref()).is_err());
+            Ok::<_, PlantProcessError>(())
+        })?;
         exchange(&mut plant, &mut ports, schedule, wake, cycle.waiter())?;
         // No command can come before the controller wakes.
         cycle.waiter().until(wake.due_ns + schedule.controller_at_ns);
         let deadline_ns = wake.due_ns + schedule.command_by_ns;
         let command = ports.command_of(wake.cycle, deadline_ns, cycle.waiter())?;
         plant.apply(clock::now_ns(), command.as_deref())?;
+        answer = command.as_deref().copied();
     }
     plant.stop();
     let give_up_ns = clock::now_ns() + STOP_WITHIN_NS.max(STOP_WITHIN_CYCLES * scenario.period_ns());
@@ -171,7 +181,9 @@ fn exchange(
     // SYNC went out when the process woke; a late one shifts what follows, so that the reading is late
     // but complete.
     let reading_by_ns = wake.woke_ns + schedule.reading_by_ns;
-    let mut now_ns = waiter.until(wake.woke_ns + schedule.reading_from_ns);
+    // What the first frames bring about is worked out while the last ones are on their way.
+    let mut now_ns =
+        waiter.until_working(wake.woke_ns + schedule.reading_from_ns, |now_ns| plant.advance(now_ns))?;
     // Collecting moves the mechanism: each look is work, not a part of one long wait.
     while !plant.collect(now_ns)? && now_ns < reading_by_ns {
         now_ns = waiter.spin().now_ns();

@@ -62,11 +62,11 @@ impl Cycle {
     }
 
     /// As [`Self::wait`]; shortly before a deadline that is far, wakes to prepare for it: to do early what can be, and
-    /// to bring code and data back into caches that a sleep has let go cold.
+    /// to bring code and data back into caches that have gone cold meanwhile. May be prepared for more than once.
     ///
     /// # Errors
     /// That of the preparation.
-    pub fn wait_preparing<E>(&mut self, prepare: impl FnOnce() -> Result<(), E>) -> Result<Wake, E> {
+    pub fn wait_preparing<E>(&mut self, prepare: impl FnMut() -> Result<(), E>) -> Result<Wake, E> {
         let cycle = self.claim(clock::now_ns());
         let due_ns = self.due_ns(cycle);
         let woke_ns = self.waiter.until_preparing(due_ns, prepare)?;

@@ -1,5 +1,5 @@
-//! How long before a deadline a task stops sleeping and spins: as long as sleeps have lately come back late, as
-//! long as that leaves the core time for others.
+//! How long before a deadline a task stops sleeping: as long as what may come between has lately taken, as long as
+//! that leaves the core time for others. Of sleeps that is how late they come back, of preparations how long they take.
 //!
 //! Pure: it is told what sleeps did and what share of its core the task used, and reads no clock.
 
@@ -36,6 +36,12 @@ impl Reserve {
     pub(super) fn new(period_ns: u64) -> Self {
         let most_ns = MOST_NS.min(period_ns / MOST_OF_PERIOD);
         Self { most_ns, allowed_ns: most_ns, current_ns: most_ns }
+    }
+
+    /// The same, but so long at first.
+    pub(super) fn beginning_with(period_ns: u64, first_ns: u64) -> Self {
+        let reserve = Self::new(period_ns);
+        Self { current_ns: first_ns.min(reserve.most_ns), ..reserve }
     }
 
     /// The reserve, ns.

@@ -9,7 +9,7 @@ use crate::clock;
 /// priority; or, while working, in the work itself, which [`Account`] therefore keeps apart.
 const GAP_NS: u64 = 50_000;
 
-/// Preparations end within this time, ns.
+/// For how long the first preparation is taken to last, ns.
 const PREPARE_NS: u64 = 40_000;
 /// Where less than this is left before the preparations, they would take too large a share of the core, ns.
 const WORTH_PREPARING_NS: u64 = 100_000;
@@ -35,6 +35,10 @@ pub struct Waiter {
     /// The last stretch before a deadline is spun, not slept: a sleeping core takes tens of microseconds to
     /// come back, a spinning one a tenth of one.
     reserve: Reserve,
+    /// The stretch before a deadline in which it is prepared for.
+    lead: Reserve,
+    /// The shortest of the preparations that were repeated, ns.
+    shortest_ns: Option<u64>,
     load: Load,
     account: Account,
     /// Since when the task has not been waiting; none before its first wait.
@@ -46,6 +50,8 @@ impl Waiter {
     pub fn new(period_ns: u64) -> Self {
         Self {
             reserve: Reserve::new(period_ns),
+            lead: Reserve::beginning_with(period_ns, PREPARE_NS),
+            shortest_ns: None,
             load: Load::default(),
             account: Account::default(),
             working_since_ns: None,
@@ -59,31 +65,60 @@ impl Waiter {
 
     /// Sleeps, then spins until `due_ns`; returns the time found at the end.
     pub fn until(&mut self, due_ns: u64) -> u64 {
-        let mut now_ns = self.begin();
-        if let Some(used) = self.load.look(now_ns, self.account.spun_ns + self.account.worked_ns) {
-            self.reserve.yield_to_others(used);
-        }
-        let sleep_until_ns = due_ns.saturating_sub(self.reserve.ns());
-        if now_ns < sleep_until_ns {
-            now_ns = self.sleep(sleep_until_ns);
-        }
+        let now_ns = self.sleep_before(due_ns);
         self.spin_until(due_ns, now_ns)
     }
 
-    /// As [`Self::until`]; before a deadline that is far, wakes early enough to `prepare`, which counts as work.
+    /// As [`Self::until`]; does what can be done by then instead of a part of the spin.
+    ///
+    /// # Errors
+    /// That of the work.
+    pub fn until_working<E>(
+        &mut self,
+        due_ns: u64,
+        work: impl FnOnce(u64) -> Result<(), E>,
+    ) -> Result<u64, E> {
+        let now_ns = self.sleep_before(due_ns);
+        self.working_since_ns = Some(now_ns);
+        work(now_ns)?;
+        let now_ns = self.begin();
+        Ok(self.spin_until(due_ns, now_ns))
+    }
+
+    /// Sleeps for as long as a sleep is worth it; returns the time found at its end.
+    fn sleep_before(&mut self, due_ns: u64) -> u64 {
+        let now_ns = self.begin();
+        if let Some(used) = self.load.look(now_ns, self.account.spun_ns + self.account.worked_ns) {
+            self.reserve.yield_to_others(used);
+            self.lead.yield_to_others(used);
+        }
+        let sleep_until_ns = due_ns.saturating_sub(self.reserve.ns());
+        if now_ns < sleep_until_ns { self.sleep(sleep_until_ns) } else { now_ns }
+    }
+
+    /// As [`Self::until`]; before a deadline that is far, wakes early enough to `prepare`, which counts as work. As long
+    /// as there is time for it, `prepare` is called again: what it did last is what is still there when the time has come.
     pub(super) fn until_preparing<E>(
         &mut self,
         due_ns: u64,
-        prepare: impl FnOnce() -> Result<(), E>,
+        mut prepare: impl FnMut() -> Result<(), E>,
     ) -> Result<u64, E> {
-        let prepare_at_ns = due_ns.saturating_sub(PREPARE_NS);
-        if prepare_at_ns > clock::now_ns() + WORTH_PREPARING_NS {
-            self.until(prepare_at_ns);
-            prepare()?;
-            let now_ns = self.begin();
-            return Ok(self.spin_until(due_ns, now_ns));
+        let prepare_at_ns = due_ns.saturating_sub(self.lead.ns());
+        if prepare_at_ns <= clock::now_ns() + WORTH_PREPARING_NS {
+            return Ok(self.until(due_ns));
         }
-        Ok(self.until(due_ns))
+        let began_ns = self.until(prepare_at_ns);
+        prepare()?;
+        let mut now_ns = self.begin();
+        // Half as long again is enough: preparations vary less than sleeps.
+        self.lead.learn((now_ns - began_ns) * 3 / 4);
+        while self.shortest_ns.is_none_or(|shortest_ns| now_ns + 2 * shortest_ns < due_ns) {
+            prepare()?;
+            let took_ns = self.begin() - now_ns;
+            self.shortest_ns = Some(self.shortest_ns.unwrap_or(took_ns).min(took_ns));
+            now_ns += took_ns;
+        }
+        Ok(self.spin_until(due_ns, now_ns))
     }
 
     fn spin_until(&mut self, due_ns: u64, from_ns: u64) -> u64 {
@@ -171,9 +206,9 @@ mod tests {
     }
 
     #[test]
-    fn far_deadlines_are_prepared_for_once_and_near_ones_are_not() {
+    fn far_deadlines_are_prepared_for_and_near_ones_are_not() {
         let mut waiter = Waiter::new(1_000_000);
-        for (ahead_ns, expected) in [(0, 0), (50_000, 0), (SECOND_NS, 1)] {
+        for (ahead_ns, is_far) in [(0, false), (50_000, false), (SECOND_NS, true)] {
             let due_ns = clock::now_ns() + ahead_ns;
             let mut prepared = 0;
             let prepare = || -> Result<(), ()> {
@@ -181,10 +216,38 @@ mod tests {
                 Ok(())
             };
             assert!(waiter.until_preparing(due_ns, prepare).unwrap() >= due_ns);
-            assert_eq!(prepared, expected, "{ahead_ns} ns ahead");
+            assert_eq!(prepared > 0, is_far, "{prepared} times {ahead_ns} ns ahead");
         }
         let refused = waiter.until_preparing(clock::now_ns() + SECOND_NS, || Err("no"));
         assert_eq!(refused, Err("no"));
+    }
+
+    #[test]
+    fn what_takes_long_to_prepare_is_begun_earlier() {
+        let mut waiter = Waiter::new(1_000_000);
+        let first_ns = waiter.lead.ns();
+        let prepare = || -> Result<(), ()> {
+            clock::sleep(std::time::Duration::from_nanos(2 * first_ns));
+            Ok(())
+        };
+        let until_ns = clock::now_ns() + SECOND_NS;
+        while waiter.lead.ns() == first_ns && clock::now_ns() < until_ns {
+            waiter.until_preparing(clock::now_ns() + SECOND_NS / 100, prepare).unwrap();
+        }
+        assert!(waiter.lead.ns() > first_ns);
+    }
+
+    #[test]
+    fn work_before_a_deadline_is_accounted_as_such() {
+        let mut waiter = Waiter::new(1_000_000);
+        let due_ns = clock::now_ns() + SECOND_NS / 100;
+        let work = |_| -> Result<(), ()> {
+            clock::sleep(STALL);
+            Ok(())
+        };
+        assert!(waiter.until_working(due_ns, work).unwrap() >= due_ns);
+        assert!(waiter.account().worked_ns >= STALL_NS);
+        assert_eq!(waiter.until_working(0, |_| Err("no")), Err("no"));
     }
 
     #[test]
