@@ -107,13 +107,15 @@ impl Takers {
         Told { lost: self.backlog.dropped(), live: self.live.as_ref().map(Live::watched) }
     }
 
-    /// Ends what is shown and recorded, and says what either lacks.
+    /// Ends what is recorded and shown, and says what either lacks. The recording comes first: whoever watches can
+    /// hold up what comes later.
     fn end(self) -> Exit {
+        let exit = end(self.backlog);
         let unseen = self.live.map_or(0, |live| live.finish().dropped);
         if unseen > 0 {
             tell!("masseter: {unseen} messages were not shown live: their watchers read too slowly");
         }
-        end(self.backlog)
+        exit
     }
 }
 

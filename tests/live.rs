@@ -180,6 +180,22 @@ fn strangers_and_deserters_disturb_neither_the_recording_nor_other_watchers() {
 }
 
 #[test]
+fn a_client_that_sends_without_end_holds_up_neither_the_recording_nor_the_end() {
+    let bench = Bench::new(&format!("duration_s = 1.0\n{UNHURRIED}"));
+    let shown = Shown::start(&bench);
+    let mut flooder = Watcher::connect(&shown.address, "foxglove.sdk.v1");
+    // The beginning of a text, and then nothing but its empty continuation.
+    flooder.socket.get_mut().write_all(&[0x01, 0x80, 0, 0, 0, 0]).unwrap();
+    let flood = [0x00, 0x80, 0, 0, 0, 0].repeat(1 << 16);
+    let flooding = thread::spawn(move || while flooder.socket.get_mut().write_all(&flood).is_ok() {});
+    let (status, said) = shown.finish();
+    assert!(passed(status), "{said}");
+    let proof = masseter(&["log", "verify", bench.run_folder().to_str().unwrap()]);
+    assert_eq!(proof.status.code(), Some(0), "{}", stdout(&proof));
+    flooding.join().unwrap();
+}
+
+#[test]
 fn what_cannot_be_shown_is_refused_before_anything_is_made() {
     let taken = TcpListener::bind("127.0.0.1:0").unwrap();
     let port = format!("--live={}", taken.local_addr().unwrap());

@@ -3,7 +3,7 @@
 //! Its socket never blocks. What it does not read in time stays in a buffer of fixed size; when that is
 //! full, messages for this client are dropped and counted.
 
-use std::io::{self, ErrorKind};
+use std::io::ErrorKind;
 use std::net::TcpStream;
 
 use tungstenite::handshake::server::{ErrorResponse, Request, Response, ServerHandshake};
@@ -14,6 +14,7 @@ use tungstenite::protocol::{Message, WebSocket, WebSocketConfig};
 use tungstenite::{Error, accept_hdr_with_config};
 
 use super::protocol::{self, Asked, Level, Subscription};
+use super::socket::Socket;
 use crate::recording::{Channel, Encoded};
 
 /// What may wait for a client that reads slowly, bytes: half a second of every topic at 1 kHz.
@@ -28,7 +29,7 @@ const GREETING_TURNS: u32 = 500;
 const ASKED_IN_A_TURN: usize = 16;
 
 type Greeting = fn(&Request, Response) -> Result<Response, ErrorResponse>;
-type Handshake = MidHandshake<ServerHandshake<TcpStream, Greeting>>;
+type Handshake = MidHandshake<ServerHandshake<Socket, Greeting>>;
 
 /// A client.
 pub(super) struct Client {
@@ -42,7 +43,7 @@ pub(super) struct Client {
 enum Link {
     /// Still being greeted; taken out while that goes on.
     Greeted(Option<Handshake>),
-    Open(WebSocket<TcpStream>),
+    Open(WebSocket<Socket>),
 }
 
 /// A client that is no more.
@@ -52,7 +53,7 @@ pub(super) struct Gone;
 impl Client {
     /// Takes a new connection in.
     pub(super) fn welcome(stream: TcpStream, welcome: &[String]) -> Result<Self, Gone> {
-        prepare(&stream).map_err(|_| Gone)?;
+        let socket = Socket::of(stream).map_err(|_| Gone)?;
         let config = WebSocketConfig::default()
             .read_buffer_size(LONGEST_ASKED)
             .write_buffer_size(GATHERED_BYTES)
@@ -62,13 +63,13 @@ impl Client {
         let greeting: Greeting = greet;
         let mut client =
             Self { link: Link::Greeted(None), turns: GREETING_TURNS, subscriptions: [None; Channel::COUNT] };
-        client.greeted(accept_hdr_with_config(stream, greeting, Some(config)), welcome)?;
+        client.greeted(accept_hdr_with_config(socket, greeting, Some(config)), welcome)?;
         Ok(client)
     }
 
     fn greeted(
         &mut self,
-        result: Result<WebSocket<TcpStream>, HandshakeError<ServerHandshake<TcpStream, Greeting>>>,
+        result: Result<WebSocket<Socket>, HandshakeError<ServerHandshake<Socket, Greeting>>>,
         welcome: &[String],
     ) -> Result<(), Gone> {
         match result {
@@ -95,6 +96,9 @@ impl Client {
             self.turns = self.turns.checked_sub(1).ok_or(Gone)?;
             let handshake = handshake.take().ok_or(Gone)?;
             self.greeted(handshake.handshake(), welcome)?;
+        }
+        if let Link::Open(socket) = &mut self.link {
+            socket.get_mut().begin_turn();
         }
         for _ in 0..ASKED_IN_A_TURN {
             let Link::Open(socket) = &mut self.link else { break };
@@ -176,11 +180,6 @@ impl Client {
             let _ = socket.flush();
         }
     }
-}
-
-fn prepare(stream: &TcpStream) -> io::Result<()> {
-    stream.set_nonblocking(true)?;
-    stream.set_nodelay(true)
 }
 
 /// Accepts a client that speaks the protocol, and tells others what is missing.

@@ -8,6 +8,7 @@
 mod client;
 mod protocol;
 mod server;
+mod socket;
 
 use std::io;
 use std::net::{SocketAddr, TcpListener};

@@ -59,9 +59,10 @@ impl Server {
         }
     }
 
-    /// Takes in whoever waits, as long as there is room; others are refused by the end of their connection.
+    /// Takes in some of those who wait, as long as there is room; others are refused by the end of their connection.
     fn admit(&mut self) {
-        while let Ok((stream, _)) = self.listener.accept() {
+        for _ in 0..CLIENTS {
+            let Ok((stream, _)) = self.listener.accept() else { return };
             if self.clients.len() < CLIENTS {
                 self.clients.extend(Client::welcome(stream, &self.welcome));
             }
