@@ -19,7 +19,7 @@ use masseter_shared::realtime::scheduling::keep_off;
 use masseter_shared::transport::{BatchInlet, Inlet, Node, TransportError};
 
 use crate::exit::Exit;
-use crate::live::Live;
+use crate::live::{Live, Missed};
 use crate::machine::SystemRoot;
 use crate::recording::{Backlog, Pace, Recorded, Recorder, Scene};
 use machine_watch::MachineWatch;
@@ -111,12 +111,20 @@ impl Takers {
     /// hold up what comes later.
     fn end(self) -> Exit {
         let exit = end(self.backlog);
-        let unseen = self.live.map_or(0, |live| live.finish().dropped);
-        if unseen > 0 {
-            tell!("masseter: {unseen} messages were not shown live: their watchers read too slowly");
+        if let Some(unseen) = self.live.and_then(|live| unseen(live.finish())) {
+            tell!("masseter: {unseen}");
         }
         exit
     }
+}
+
+/// What watchers missed in words, if anything.
+fn unseen(Missed { dropped, cut_off }: Missed) -> Option<String> {
+    let dropped = (dropped > 0)
+        .then(|| format!("{dropped} messages were not shown live: their watchers read too slowly"));
+    let cut_off = (cut_off > 0).then(|| format!("{cut_off} watchers did not read to the end"));
+    let said: Vec<_> = [dropped, cut_off].into_iter().flatten().collect();
+    (!said.is_empty()).then(|| said.join("; "))
 }
 
 /// Ends the recording and says what it lacks.

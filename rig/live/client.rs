@@ -171,13 +171,13 @@ impl Client {
         }
     }
 
-    /// Says goodbye, and waits for nothing.
-    pub(super) fn dismiss(mut self) {
-        if let Link::Open(socket) = &mut self.link {
-            let goodbye = CloseFrame { code: CloseCode::Away, reason: "the run is over".into() };
-            // A client that cannot take it sees the connection end.
-            let _ = socket.close(Some(goodbye));
-            let _ = socket.flush();
+    /// Says goodbye behind all that was sent. A client that answers has read it all, and is gone.
+    pub(super) fn take_leave(&mut self) -> Result<(), Gone> {
+        let Link::Open(socket) = &mut self.link else { return Err(Gone) };
+        let goodbye = CloseFrame { code: CloseCode::Away, reason: "the run is over".into() };
+        match socket.flush().and_then(|()| socket.close(Some(goodbye))) {
+            Err(error) if !would_block(&error) => Err(Gone),
+            _ => Ok(()),
         }
     }
 }

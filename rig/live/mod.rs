@@ -9,6 +9,8 @@ mod client;
 mod protocol;
 mod server;
 mod socket;
+#[cfg(test)]
+mod tests;
 
 use std::io;
 use std::net::{SocketAddr, TcpListener};
@@ -46,6 +48,15 @@ pub struct Watched {
     pub dropped: u64,
 }
 
+/// What those who watched did not get.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Missed {
+    /// Messages that found no room, summed over the clients.
+    pub dropped: u64,
+    /// Clients that did not read what was left when the run was over.
+    pub cut_off: usize,
+}
+
 /// What the serving thread and the logger know of each other.
 #[derive(Debug, Default)]
 struct Shared {
@@ -53,6 +64,7 @@ struct Shared {
     wanted: AtomicU8,
     clients: AtomicUsize,
     dropped: AtomicU64,
+    cut_off: AtomicUsize,
 }
 
 /// A run being shown.
@@ -119,13 +131,15 @@ impl Live {
         }
     }
 
-    /// Says goodbye to the clients; returns what they missed.
-    pub fn finish(self) -> Watched {
-        let watched = self.watched();
+    /// Says goodbye to the clients and gives them half a second to read what is left; returns what they missed.
+    pub fn finish(self) -> Missed {
         drop(self.queue);
         // A serving thread that failed has said so; the recording does not depend on it.
         let _ = self.serving.join();
-        Watched { dropped: self.shared.dropped.load(Ordering::Relaxed), ..watched }
+        Missed {
+            dropped: self.shared.dropped.load(Ordering::Relaxed),
+            cut_off: self.shared.cut_off.load(Ordering::Relaxed),
+        }
     }
 }
 

@@ -19,6 +19,8 @@ use crate::recording::{Channel, Definition, Encoded, Encoder, Scene, Topic};
 const TURN: Duration = Duration::from_millis(10);
 /// How often somebody is looked for while nobody watches.
 const IDLE_TURN: Duration = Duration::from_millis(100);
+/// Turns in which clients may read what is left when the run is over: 0.5 s.
+const LAST_TURNS: u32 = 50;
 /// Most clients at a time: what they leave unread is kept for each.
 const CLIENTS: usize = 8;
 
@@ -50,13 +52,25 @@ impl Server {
             self.admit();
             self.keep(Client::hear);
             self.publish_wants();
-            let is_over = self.show_all(offers);
-            self.keep(|client, _| client.flush());
-            if is_over {
-                return self.clients.drain(..).for_each(Client::dismiss);
+            if self.show_all(offers) {
+                return self.take_leave();
             }
+            self.keep(|client, _| client.flush());
             clock::sleep(if self.clients.is_empty() { IDLE_TURN } else { TURN });
         }
+    }
+
+    /// Says goodbye to the clients, and lets them read what is left. Those that are slow at that are cut off.
+    fn take_leave(mut self) {
+        for _ in 0..LAST_TURNS {
+            self.keep(|client, _| client.take_leave());
+            self.keep(Client::hear);
+            if self.clients.is_empty() {
+                return;
+            }
+            clock::sleep(TURN);
+        }
+        self.shared.cut_off.store(self.clients.len(), Ordering::Relaxed);
     }
 
     /// Takes in some of those who wait, as long as there is room; others are refused by the end of their connection.
