@@ -72,6 +72,7 @@ pub fn run(assignment: &Assignment, recording: &Path, show: Show) -> anyhow::Res
             return Ok(takers.end());
         }
         takers.backlog.hand_over();
+        takers.tell_of_failure();
         takers.view.show(now_ns, told);
         clock::sleep(DRAIN);
     }
@@ -107,14 +108,24 @@ impl Takers {
         Told { lost: self.backlog.dropped(), live: self.live.as_ref().map(Live::watched) }
     }
 
+    fn tell_of_failure(&mut self) {
+        if let Some(error) = self.backlog.failed_just_now() {
+            tell!("masseter: {error}; the rig goes on, what follows is not recorded");
+            self.view.leave_picture();
+        }
+    }
+
     /// Ends what is recorded and shown, and says what either lacks. The recording comes first: whoever watches can
     /// hold up what comes later.
     fn end(self) -> Exit {
-        let exit = end(self.backlog);
+        let loss = self.backlog.finish().loss();
+        if let Some(loss) = &loss {
+            tell!("masseter: {loss}");
+        }
         if let Some(unseen) = self.live.and_then(|live| unseen(live.finish())) {
             tell!("masseter: {unseen}");
         }
-        exit
+        if loss.is_some() { Exit::Incomplete } else { Exit::Passed }
     }
 }
 
@@ -125,16 +136,6 @@ fn unseen(Missed { dropped, cut_off }: Missed) -> Option<String> {
     let cut_off = (cut_off > 0).then(|| format!("{cut_off} watchers did not read to the end"));
     let said: Vec<_> = [dropped, cut_off].into_iter().flatten().collect();
     (!said.is_empty()).then(|| said.join("; "))
-}
-
-/// Ends the recording and says what it lacks.
-pub(crate) fn end(backlog: Backlog) -> Exit {
-    let outcome = backlog.finish();
-    if outcome.lost == 0 && outcome.error.is_none() {
-        return Exit::Passed;
-    }
-    tell!("masseter: {} messages did not reach the disk", outcome.lost);
-    Exit::Incomplete
 }
 
 /// One inlet a topic.

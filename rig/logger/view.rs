@@ -115,6 +115,11 @@ impl View {
         }
     }
 
+    /// Something else was written below the picture: the next one begins there.
+    pub(super) fn leave_picture(&mut self) {
+        self.standing = 0;
+    }
+
     /// Draws over the picture before. A terminal that is gone is no fault of the run.
     fn draw(&mut self, passed_ns: u64, told: Told) {
         let picture = self.picture(told, passed_ns).expect("a string takes any text");

@@ -8,7 +8,9 @@
 mod tests;
 
 use std::mem::offset_of;
-use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TryRecvError, TrySendError, sync_channel};
+use std::sync::mpsc::{
+    Receiver, RecvTimeoutError, Sender, SyncSender, TryRecvError, TrySendError, channel, sync_channel,
+};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
@@ -37,14 +39,6 @@ impl Pace {
         match self {
             Self::RealTime => 16 << 20,
             Self::Virtual => 1 << 20,
-        }
-    }
-
-    /// What becomes of a run whose recording fails.
-    const fn goes_on(self) -> &'static str {
-        match self {
-            Self::RealTime => "the rig goes on, what follows is not recorded",
-            Self::Virtual => "the run ends here",
         }
     }
 
@@ -115,13 +109,31 @@ pub struct Outcome {
     pub error: Option<WriteError>,
 }
 
+impl Outcome {
+    /// What the recording lacks and why, if it lacks anything.
+    pub fn loss(&self) -> Option<String> {
+        let lost = format!("{} messages did not reach the disk", self.lost);
+        match &self.error {
+            None if self.lost == 0 => None,
+            None => Some(lost),
+            // What failed is its end.
+            Some(error) if self.lost == 0 => Some(error.to_string()),
+            Some(error) => Some(format!("{error}; {lost}")),
+        }
+    }
+}
+
 /// The offering end.
 pub struct Backlog {
     pace: Pace,
     pending: Batch,
     to_disk: SyncSender<Batch>,
     emptied: Receiver<Batch>,
-    disk: JoinHandle<(u64, Option<WriteError>)>,
+    /// Its thread; it returns how many messages are safe.
+    disk: JoinHandle<u64>,
+    /// Why it ended early.
+    failures: Receiver<WriteError>,
+    error: Option<WriteError>,
     offered: u64,
     dropped: u64,
 }
@@ -133,8 +145,10 @@ impl Backlog {
         let (to_disk, batches) = sync_channel(1);
         let (give_back, emptied) = sync_channel(2);
         give_back.try_send(Batch::default()).expect("the channel is new");
-        let disk = thread::spawn(move || write_batches(recorder, &batches, &give_back, pace));
-        Self { pace, pending: Batch::default(), to_disk, emptied, disk, offered: 0, dropped: 0 }
+        let (failed, failures) = channel();
+        let disk = thread::spawn(move || write_batches(recorder, &batches, &give_back, &failed, pace));
+        let pending = Batch::default();
+        Self { pace, pending, to_disk, emptied, disk, failures, error: None, offered: 0, dropped: 0 }
     }
 
     /// Takes a message that was received at `log_time_ns`, if there is room for it or time to wait.
@@ -198,14 +212,20 @@ impl Backlog {
         self.dropped
     }
 
+    /// Why nothing is written any more: once, when that has come to be so.
+    pub fn failed_just_now(&mut self) -> Option<&WriteError> {
+        let error = self.failures.try_recv().ok()?;
+        Some(self.error.insert(error))
+    }
+
     /// Waits until everything is written and the recording has its index.
     pub fn finish(mut self) -> Outcome {
         if self.pending.messages > 0 {
             self.hand_over_when_wanted();
         }
         drop(self.to_disk);
-        let (safe, error) = self.disk.join().expect("the writing thread does not panic");
-        Outcome { lost: self.offered - safe, error }
+        let safe = self.disk.join().expect("the writing thread does not panic");
+        Outcome { lost: self.offered - safe, error: self.error.or_else(|| self.failures.try_recv().ok()) }
     }
 }
 
@@ -215,17 +235,17 @@ fn write_batches<W: Medium>(
     mut recorder: Recorder<W>,
     batches: &Receiver<Batch>,
     give_back: &SyncSender<Batch>,
+    failed: &Sender<WriteError>,
     pace: Pace,
-) -> (u64, Option<WriteError>) {
+) -> u64 {
     let mut safe = 0;
-    match write_until_the_end(&mut recorder, batches, give_back, pace, &mut safe) {
-        Ok(written) => match recorder.finish() {
-            Ok(()) => (written, None),
-            Err(error) => (safe, Some(error)),
-        },
+    let written = write_until_the_end(&mut recorder, batches, give_back, pace, &mut safe);
+    match written.and_then(|written| recorder.finish().map(|()| written)) {
+        Ok(written) => written,
         Err(error) => {
-            tell!("masseter: {error}; {}", pace.goes_on());
-            (safe, Some(error))
+            // Who offers messages hears of it as long as there is anybody.
+            let _ = failed.send(error);
+            safe
         }
     }
 }

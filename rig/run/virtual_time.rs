@@ -14,8 +14,6 @@ use masseter_shared::realtime::Wake;
 use super::child::Role;
 use super::folder::RunFolder;
 use super::plan::Plan;
-use crate::exit::Exit;
-use crate::logger;
 use crate::recording::{Backlog, Pace, Recorder, Scene};
 use crate::report::verdict::Ending;
 
@@ -36,10 +34,13 @@ pub fn run(plan: &Plan, folder: &RunFolder) -> anyhow::Result<Ending> {
         let sync_ns = EPOCH_NS + (cycle - 1) * scenario.period_ns();
         plant_error = step(cycle, sync_ns, plan, &mut plant, &mut controller, &mut log).err();
     }
-    let is_whole = logger::end(log.backlog) == Exit::Passed;
+    let loss = log.backlog.finish().loss();
+    if let Some(loss) = &loss {
+        tell!("masseter: {loss}; the run ends here");
+    }
     Ok(match (plant_error, controller.state()) {
         (Some(error), _) => Ending::died(Role::Plant.name(), error.to_string()),
-        _ if !is_whole => Ending::RecordingFailed,
+        _ if loss.is_some() => Ending::RecordingFailed,
         (None, ControllerState::SafeStop) => Ending::SafeStop,
         (None, _) => Ending::Completed,
     })

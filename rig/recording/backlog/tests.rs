@@ -99,6 +99,42 @@ fn a_disk_that_is_gone_loses_everything_behind_the_last_flush() {
 }
 
 #[test]
+fn a_disk_that_fails_is_told_of_once_while_the_recording_goes_on_and_again_at_its_end() {
+    let (let_go, go_on) = channel();
+    let then = io::ErrorKind::StorageFull;
+    let disk = Stuck { definitions: definitions(), bytes: Cursor::default(), go_on, then };
+    let mut backlog = Backlog::start(Recorder::on(disk, scene()).unwrap(), Pace::RealTime);
+    for seq in 1..=(BATCH_BYTES / 2 / size_of::<Reading>()) as u64 {
+        backlog.record(&Reading { seq, ..Default::default() }, seq);
+    }
+    backlog.hand_over();
+    assert!(backlog.failed_just_now().is_none());
+    drop(let_go);
+    while backlog.failed_just_now().is_none() {
+        clock::sleep(Duration::from_millis(1));
+    }
+    assert!(backlog.failed_just_now().is_none());
+    let loss = backlog.finish().loss().unwrap();
+    assert!(loss.starts_with("cannot write the recording: "), "{loss}");
+    assert!(loss.ends_with("messages did not reach the disk"), "{loss}");
+}
+
+#[test]
+fn what_a_recording_lacks_is_said_with_its_reason_and_never_as_nothing() {
+    let loss = |lost, error: Option<io::ErrorKind>| {
+        Outcome { lost, error: error.map(|kind| WriteError::Create(kind.into())) }.loss()
+    };
+    let full = Some(io::ErrorKind::StorageFull);
+    assert_eq!(loss(0, None), None);
+    assert_eq!(loss(3, None).unwrap(), "3 messages did not reach the disk");
+    assert_eq!(loss(0, full).unwrap(), "cannot create the recording: no storage space");
+    assert_eq!(
+        loss(3, full).unwrap(),
+        "cannot create the recording: no storage space; 3 messages did not reach the disk"
+    );
+}
+
+#[test]
 fn a_caller_who_may_wait_loses_nothing_however_slow_the_disk_is() {
     let (let_go, go_on) = channel();
     let disk = Stuck { definitions: definitions(), bytes: Cursor::default(), go_on, then: WELL };
