@@ -5,6 +5,7 @@
 //! afterwards.
 
 mod machine_watch;
+mod screen;
 mod view;
 
 use std::net::SocketAddr;
@@ -23,6 +24,7 @@ use crate::live::{Live, Missed};
 use crate::machine::SystemRoot;
 use crate::recording::{Backlog, Pace, Recorded, Recorder, Scene};
 use machine_watch::MachineWatch;
+use screen::Screen;
 use view::{Mode, Told, View};
 
 /// How often the topics are drained; a fraction of what their buffers hold.
@@ -56,7 +58,7 @@ pub fn run(assignment: &Assignment, recording: &Path, show: Show) -> anyhow::Res
 
     let rates = post.scenario.can.rates()?;
     let view = View::new(Mode::suitable(show.quiet), rates, show.motion_s, start.epoch_ns);
-    let mut takers = Takers { backlog, live, view };
+    let mut takers = Takers { backlog, live, view, screen: Screen::start() };
     takers.announce(show.quiet);
     let mut watch = MachineWatch::new(SystemRoot::of_this_machine(), start.loops, start.epoch_ns);
     loop {
@@ -66,14 +68,11 @@ pub fn run(assignment: &Assignment, recording: &Path, show: Show) -> anyhow::Res
         if let Some(machine) = watch.look(now_ns) {
             takers.take(&machine, now_ns, Recorded::Machine);
         }
-        let told = takers.told();
         if last {
-            takers.view.end(now_ns, told);
-            return Ok(takers.end());
+            return Ok(takers.end(now_ns));
         }
         takers.backlog.hand_over();
-        takers.tell_of_failure();
-        takers.view.show(now_ns, told);
+        takers.show(now_ns);
         clock::sleep(DRAIN);
     }
 }
@@ -83,12 +82,13 @@ struct Takers {
     backlog: Backlog,
     live: Option<Live>,
     view: View,
+    screen: Screen,
 }
 
 impl Takers {
     fn announce(&self, quiet: bool) {
         if let Some(live) = self.live.as_ref().filter(|_| !quiet) {
-            tell!("live on {} for Foxglove", live.url());
+            self.screen.say(format!("live on {} for Foxglove\n", live.url()));
         }
     }
 
@@ -108,23 +108,33 @@ impl Takers {
         Told { lost: self.backlog.dropped(), live: self.live.as_ref().map(Live::watched) }
     }
 
-    fn tell_of_failure(&mut self) {
+    /// Shows how the run goes, if it is time to and somebody reads.
+    fn show(&mut self, now_ns: u64) {
         if let Some(error) = self.backlog.failed_just_now() {
-            tell!("masseter: {error}; the rig goes on, what follows is not recorded");
+            let words = format!("masseter: {error}; the rig goes on, what follows is not recorded\n");
+            self.screen.say(words);
             self.view.leave_picture();
+        }
+        if self.view.is_due(now_ns) && self.screen.is_free() {
+            let text = self.view.next(now_ns, self.told());
+            self.screen.say(text);
         }
     }
 
     /// Ends what is recorded and shown, and says what either lacks. The recording comes first: whoever watches can
     /// hold up what comes later.
-    fn end(self) -> Exit {
+    fn end(mut self, now_ns: u64) -> Exit {
+        if let Some(text) = self.view.last(now_ns, self.told()) {
+            self.screen.say(text);
+        }
         let loss = self.backlog.finish().loss();
         if let Some(loss) = &loss {
-            tell!("masseter: {loss}");
+            self.screen.say(format!("masseter: {loss}\n"));
         }
         if let Some(unseen) = self.live.and_then(|live| unseen(live.finish())) {
-            tell!("masseter: {unseen}");
+            self.screen.say(format!("masseter: {unseen}\n"));
         }
+        self.screen.end();
         if loss.is_some() { Exit::Incomplete } else { Exit::Passed }
     }
 }

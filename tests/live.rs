@@ -3,9 +3,9 @@
 mod common;
 
 use std::collections::{BTreeMap, HashSet};
-use std::io::{BufRead, BufReader, Read, Write};
+use std::io::{self, BufRead, BufReader, Read, Write};
 use std::net::{TcpListener, TcpStream};
-use std::process::{Child, ChildStderr, ExitStatus};
+use std::process::{Child, ChildStderr, ExitStatus, Stdio};
 use std::thread;
 
 use common::{Bench, UNHURRIED, masseter, start, stderr, stdout};
@@ -193,6 +193,28 @@ fn a_client_that_sends_without_end_holds_up_neither_the_recording_nor_the_end() 
     let proof = masseter(&["log", "verify", bench.run_folder().to_str().unwrap()]);
     assert_eq!(proof.status.code(), Some(0), "{}", stdout(&proof));
     flooding.join().unwrap();
+}
+
+#[test]
+fn a_reader_of_the_progress_that_pauses_costs_no_message_and_holds_no_end_up() {
+    let bench = Bench::new(&format!("duration_s = 4.0\n{UNHURRIED}"));
+    let (errors, mut filler) = io::pipe().unwrap();
+    let mut command = bench.run_command(&[]);
+    let run = command.stdout(Stdio::piped()).stderr(filler.try_clone().unwrap()).spawn().unwrap();
+    let mut errors = BufReader::new(errors);
+    let mut line = String::new();
+    while !line.contains("motion") {
+        line.clear();
+        assert!(errors.read_line(&mut line).unwrap() > 0, "the run ended before it was under way");
+    }
+    // From now on the pipe is full.
+    let filling = thread::spawn(move || filler.write_all(&b".".repeat(1 << 20)));
+    let output = run.wait_with_output().unwrap();
+    drop(errors);
+    assert!(filling.join().unwrap().is_err());
+    assert!(passed(output.status), "{}", stdout(&output));
+    let proof = masseter(&["log", "verify", bench.run_folder().to_str().unwrap()]);
+    assert_eq!(proof.status.code(), Some(0), "{}", stdout(&proof));
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! How a run goes, while it goes: a picture that stays in its place on a terminal, a line a second
 //! elsewhere.
 //!
-//! It looks at what the logger drains anyway and writes to standard error; no other process knows of it.
+//! It looks at what the logger drains anyway; no other process knows of it.
 //! It changes nothing of the terminal that outlives a picture.
 
 mod seen;
@@ -18,7 +18,6 @@ use masseter_shared::messages::codes::{ControllerState, DriveCondition};
 
 use crate::live::Watched;
 use crate::recording::Recorded;
-use crate::say::warn;
 use seen::{CLASS_NAMES, Lateness, Seen};
 
 /// How often a line is written, ns.
@@ -96,23 +95,30 @@ impl View {
         }
     }
 
-    /// Shows what was seen, if it is time to.
-    pub(super) fn show(&mut self, now_ns: u64, told: Told) {
+    /// Whether it is time to show what was seen.
+    pub(super) fn is_due(&self, now_ns: u64) -> bool {
         let passed_ns = now_ns.saturating_sub(self.shown_ns);
         match self.mode {
-            Mode::Lines if passed_ns >= LINE_NS => tell!("{}", self.line(told)),
-            Mode::Picture if passed_ns >= PICTURE_NS => self.draw(passed_ns, told),
-            _ => return,
+            Mode::Quiet => false,
+            Mode::Lines => passed_ns >= LINE_NS,
+            Mode::Picture => passed_ns >= PICTURE_NS,
         }
-        self.shown_ns = now_ns;
-        self.seen.forget_lately();
     }
 
-    /// Shows the last that was seen.
-    pub(super) fn end(&mut self, now_ns: u64, told: Told) {
-        if self.mode == Mode::Picture {
-            self.draw(now_ns.saturating_sub(self.shown_ns).max(1), told);
-        }
+    /// What was seen since the last time.
+    pub(super) fn next(&mut self, now_ns: u64, told: Told) -> String {
+        let text = match self.mode {
+            Mode::Picture => self.draw(now_ns, told),
+            Mode::Quiet | Mode::Lines => self.line(told) + "\n",
+        };
+        self.shown_ns = now_ns;
+        self.seen.forget_lately();
+        text
+    }
+
+    /// The last picture, where pictures are shown.
+    pub(super) fn last(&mut self, now_ns: u64, told: Told) -> Option<String> {
+        (self.mode == Mode::Picture).then(|| self.draw(now_ns, told))
     }
 
     /// Something else was written below the picture: the next one begins there.
@@ -120,13 +126,13 @@ impl View {
         self.standing = 0;
     }
 
-    /// Draws over the picture before. A terminal that is gone is no fault of the run.
-    fn draw(&mut self, passed_ns: u64, told: Told) {
+    /// Draws over the picture before.
+    fn draw(&mut self, now_ns: u64, told: Told) -> String {
+        let passed_ns = now_ns.saturating_sub(self.shown_ns).max(1);
         let picture = self.picture(told, passed_ns).expect("a string takes any text");
         let up = if self.standing > 0 { format!("\x1b[{}A", self.standing) } else { String::new() };
-        let text = format!("{up}{ERASE_BELOW}{CUT_LINES}{picture}{WRAP_LINES}");
-        warn(&text);
         self.standing = picture.lines().count();
+        format!("{up}{ERASE_BELOW}{CUT_LINES}{picture}{WRAP_LINES}")
     }
 
     fn line(&self, told: Told) -> String {

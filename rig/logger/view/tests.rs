@@ -79,3 +79,23 @@ fn drives_that_differ_are_told_apart() {
     let picture = view.picture(Told::default(), 1).unwrap();
     assert_says(&picture, &["l2 operation_enabled", "l3 fault"]);
 }
+
+#[test]
+fn a_picture_is_drawn_over_the_one_before_unless_words_stand_below_it() {
+    let mut view = view();
+    let mut next = || view.next(PICTURE_NS, Told::default());
+    let first = next();
+    let lines = first.lines().count() - 1;
+    assert!(first.starts_with(ERASE_BELOW));
+    assert!(next().starts_with(&format!("\x1b[{lines}A{ERASE_BELOW}")));
+    view.leave_picture();
+    assert!(view.next(PICTURE_NS, Told::default()).starts_with(ERASE_BELOW));
+}
+
+#[test]
+fn it_is_time_for_a_line_every_second_for_a_picture_five_times_and_never_when_quiet() {
+    let is_due = |mode, now_ns| View::new(mode, Rates::classical(Bitrate::MAX), None, 0).is_due(now_ns);
+    assert!(is_due(Mode::Lines, SECOND_NS) && !is_due(Mode::Lines, SECOND_NS - 1));
+    assert!(is_due(Mode::Picture, SECOND_NS / 5) && !is_due(Mode::Picture, SECOND_NS / 5 - 1));
+    assert!(!is_due(Mode::Quiet, 9 * SECOND_NS));
+}
