@@ -116,7 +116,7 @@ impl Takers {
             self.view.leave_picture();
         }
         if self.view.is_due(now_ns) && self.screen.is_free() {
-            let text = self.view.next(now_ns, self.told());
+            let text = self.view.next(now_ns, self.told(), screen::rows());
             self.screen.say(text);
         }
     }
@@ -124,7 +124,7 @@ impl Takers {
     /// Ends what is recorded and shown, and says what either lacks. The recording comes first: whoever watches can
     /// hold up what comes later.
     fn end(mut self, now_ns: u64) -> Exit {
-        if let Some(text) = self.view.last(now_ns, self.told()) {
+        if let Some(text) = self.view.last(now_ns, self.told(), screen::rows()) {
             self.screen.say(text);
         }
         let loss = self.backlog.finish().loss();

@@ -1,6 +1,7 @@
 //! Standard error as the logger writes to it: from a thread of its own. A terminal that is stopped and a reader that
 //! pauses hold up whoever writes, and the logger would lose messages meanwhile.
 
+use std::io;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc::{Sender, channel};
@@ -8,6 +9,7 @@ use std::thread;
 use std::time::Duration;
 
 use masseter_shared::clock;
+use rustix::termios::tcgetwinsize;
 
 use crate::say::warn;
 
@@ -61,6 +63,12 @@ impl Screen {
             clock::sleep(LOOK);
         }
     }
+}
+
+/// Rows of the terminal, if it tells.
+pub(super) fn rows() -> Option<usize> {
+    let size = tcgetwinsize(io::stderr()).ok()?;
+    (size.ws_row > 0).then_some(usize::from(size.ws_row))
 }
 
 #[cfg(test)]

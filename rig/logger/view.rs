@@ -105,10 +105,10 @@ impl View {
         }
     }
 
-    /// What was seen since the last time.
-    pub(super) fn next(&mut self, now_ns: u64, told: Told) -> String {
+    /// What was seen since the last time, for a terminal with so many rows.
+    pub(super) fn next(&mut self, now_ns: u64, told: Told, rows: Option<usize>) -> String {
         let text = match self.mode {
-            Mode::Picture => self.draw(now_ns, told),
+            Mode::Picture => self.draw(now_ns, told, rows),
             Mode::Quiet | Mode::Lines => self.line(told) + "\n",
         };
         self.shown_ns = now_ns;
@@ -117,8 +117,8 @@ impl View {
     }
 
     /// The last picture, where pictures are shown.
-    pub(super) fn last(&mut self, now_ns: u64, told: Told) -> Option<String> {
-        (self.mode == Mode::Picture).then(|| self.draw(now_ns, told))
+    pub(super) fn last(&mut self, now_ns: u64, told: Told, rows: Option<usize>) -> Option<String> {
+        (self.mode == Mode::Picture).then(|| self.draw(now_ns, told, rows))
     }
 
     /// Something else was written below the picture: the next one begins there.
@@ -126,13 +126,17 @@ impl View {
         self.standing = 0;
     }
 
-    /// Draws over the picture before.
-    fn draw(&mut self, now_ns: u64, told: Told) -> String {
+    /// Draws over the picture before. What the terminal has no rows for is left out: a picture that scrolls cannot be
+    /// drawn over.
+    fn draw(&mut self, now_ns: u64, told: Told, rows: Option<usize>) -> String {
         let passed_ns = now_ns.saturating_sub(self.shown_ns).max(1);
         let picture = self.picture(told, passed_ns).expect("a string takes any text");
+        // The cursor stands below it.
+        let most = rows.map_or(usize::MAX, |rows| rows - 1);
+        let picture: Vec<_> = picture.split_inclusive('\n').take(most).collect();
         let up = if self.standing > 0 { format!("\x1b[{}A", self.standing) } else { String::new() };
-        self.standing = picture.lines().count();
-        format!("{up}{ERASE_BELOW}{CUT_LINES}{picture}{WRAP_LINES}")
+        self.standing = picture.len();
+        format!("{up}{ERASE_BELOW}{CUT_LINES}{}{WRAP_LINES}", picture.concat())
     }
 
     fn line(&self, told: Told) -> String {

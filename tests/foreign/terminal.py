@@ -1,7 +1,8 @@
 """Looks at a run on a terminal: `pyte` renders what a person would see.
 
-Fails when the picture is not redrawn in its place, when the verdict does not stand readable below it, or when the
-terminal is not left as it was: after a run, after Ctrl-C, with --quiet and on a terminal that only prints.
+Fails when the picture is not redrawn in its place, when the verdict does not stand readable below it, when a picture
+that is higher than the terminal scrolls, or when the terminal is not left as it was: after a run, after Ctrl-C, with
+--quiet and on a terminal that only prints.
 """
 
 import os
@@ -22,10 +23,12 @@ PATIENT = Path(__file__).parents[1] / "patient.toml"
 # A starved logger loses messages: the terminal is judged here, not the rig.
 ACCEPTED = (0, 6)
 PICTURE = "woke late, µs"
+# Lower than the picture, but not than the line that tells it.
+FEW_LINES = 8
 VERDICTS = ("PASS: ", "INCOMPLETE: ", "INTERRUPTED: ")
 
 
-def run(masseter, arguments, term="xterm-256color", interrupt_after=None):
+def run(masseter, arguments, term="xterm-256color", interrupt_after=None, lines=LINES):
     """Runs on a terminal of its own; returns exit code, output and what stands on the screen."""
     with tempfile.TemporaryDirectory() as folder:
         command = [masseter, "run", str(PATIENT), "--out", str(Path(folder) / "run"), *arguments]
@@ -33,7 +36,7 @@ def run(masseter, arguments, term="xterm-256color", interrupt_after=None):
         if process == 0:
             os.environ["TERM"] = term
             os.execv(masseter, command)
-        termios.tcsetwinsize(terminal, (LINES, COLUMNS))
+        termios.tcsetwinsize(terminal, (lines, COLUMNS))
         before = termios.tcgetattr(terminal)
         output, interrupted = b"", interrupt_after is None
         while True:
@@ -47,10 +50,11 @@ def run(masseter, arguments, term="xterm-256color", interrupt_after=None):
                 interrupted = True
             assert termios.tcgetattr(terminal) == before, "the terminal's modes were changed"
         code = os.waitstatus_to_exitcode(os.waitpid(process, 0)[1])
-    screen = pyte.Screen(COLUMNS, LINES)
+    screen = pyte.HistoryScreen(COLUMNS, lines, history=10_000)
     pyte.ByteStream(screen).feed(output)
     assert pyte.modes.DECAWM in screen.mode and not screen.cursor.hidden, "the terminal was not left as it was"
-    return code, output.decode(), [line.rstrip() for line in screen.display]
+    scrolled = ["".join(line[column].data for column in range(COLUMNS)) for line in screen.history.top]
+    return code, output.decode(), [line.rstrip() for line in scrolled + screen.display]
 
 
 def assert_one_picture_above_a_verdict(shown):
@@ -68,6 +72,10 @@ assert code in ACCEPTED, (code, output)
 assert output.count(PICTURE) >= 2, "the picture was not redrawn"
 assert_one_picture_above_a_verdict(shown)
 print("\n".join(line for line in shown if line))
+
+code, output, shown = run(masseter, ["--duration", "3s"], lines=FEW_LINES)
+assert code in ACCEPTED, (code, output)
+assert_one_picture_above_a_verdict(shown)
 
 code, output, shown = run(masseter, ["--duration", "60s"], interrupt_after="running")
 assert code == INTERRUPTED, (code, output)

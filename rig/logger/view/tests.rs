@@ -83,13 +83,24 @@ fn drives_that_differ_are_told_apart() {
 #[test]
 fn a_picture_is_drawn_over_the_one_before_unless_words_stand_below_it() {
     let mut view = view();
-    let mut next = || view.next(PICTURE_NS, Told::default());
+    let mut next = || view.next(PICTURE_NS, Told::default(), None);
     let first = next();
     let lines = first.lines().count() - 1;
     assert!(first.starts_with(ERASE_BELOW));
     assert!(next().starts_with(&format!("\x1b[{lines}A{ERASE_BELOW}")));
     view.leave_picture();
-    assert!(view.next(PICTURE_NS, Told::default()).starts_with(ERASE_BELOW));
+    assert!(view.next(PICTURE_NS, Told::default(), None).starts_with(ERASE_BELOW));
+}
+
+#[test]
+fn a_picture_leaves_out_what_the_terminal_has_no_rows_for() {
+    let mut view = view();
+    let whole = view.next(PICTURE_NS, Told::default(), Some(100)).matches('\n').count();
+    assert!(whole > 10);
+    for (rows, lines) in [(whole + 1, whole), (whole, whole - 1), (5, 4), (1, 0)] {
+        let picture = view.next(PICTURE_NS, Told::default(), Some(rows));
+        assert_eq!(picture.matches('\n').count(), lines, "{rows} rows");
+    }
 }
 
 #[test]
