@@ -18,6 +18,7 @@ pub mod clean;
 pub mod cli;
 pub mod doctor;
 pub mod exit;
+mod hlog;
 pub mod kinematics;
 pub mod live;
 pub mod log;

@@ -1,25 +1,19 @@
 //! One measured interval: the whole run's histogram, and an interval log of it.
 
-use std::fs::File;
-use std::io::BufWriter;
 use std::path::{Path, PathBuf};
-use std::time::Duration;
 
 use hdrhistogram::Histogram;
-use hdrhistogram::serialization::interval_log::IntervalLogWriterBuilder;
-use hdrhistogram::serialization::{Deserializer, Serializer, V2DeflateSerializer, V2Serializer};
-use masseter_shared::clock::SECOND_NS;
+use hdrhistogram::serialization::{Deserializer, Serializer, V2Serializer};
 use serde::Serialize;
 
 use super::AnalysisError;
 use super::noise::standard_error;
+use crate::hlog;
 
 /// Below this many samples the 99.9th percentile rests on fewer than ten of them and is not given.
 const SAMPLES_FOR_P999: u64 = 10_000;
 /// Significant decimal digits of a histogram.
 const DIGITS: u8 = 3;
-/// One line of the interval log covers this much, ns.
-const LOG_INTERVAL_NS: u64 = SECOND_NS;
 
 /// One measured interval.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -95,7 +89,7 @@ impl Measured {
         if largest_ns > self.max_ns || self.total.is_empty() {
             (self.max_ns, self.max_at_ns) = (largest_ns, at_ns);
         }
-        if at_ns >= self.second_began_ns.saturating_add(LOG_INTERVAL_NS) {
+        if at_ns >= self.second_began_ns.saturating_add(hlog::INTERVAL_NS) {
             self.close_second();
             self.second_began_ns = at_ns;
         }
@@ -168,28 +162,22 @@ impl Measured {
             .collect()
     }
 
-    /// HdrHistogram V2 interval log: a line a second, times relative to the first sample.
+    /// The seconds, times relative to the first sample.
     fn write_log(&self) -> std::io::Result<()> {
-        let mut file = BufWriter::new(File::create(&self.path)?);
-        let mut serializer = V2DeflateSerializer::new();
-        let mut log = IntervalLogWriterBuilder::new()
-            .add_comment(&format!("masseter: {}, ns", self.name))
-            .with_max_value_divisor(1.0)
-            .begin_log_with(&mut file, &mut serializer)?;
         let first_ns = self.seconds.first().map_or(0, |(start, _)| *start);
-        for (start_ns, bytes) in &self.seconds {
+        let seconds = self.seconds.iter().map(|(start_ns, bytes)| {
             let second: Histogram<u64> =
                 Deserializer::new().deserialize(&mut bytes.as_slice()).expect("serialised above");
-            let start = Duration::from_nanos(start_ns - first_ns);
-            log.write_histogram(&second, start, Duration::from_nanos(LOG_INTERVAL_NS), None)
-                .map_err(|error| std::io::Error::other(format!("{error:?}")))?;
-        }
-        Ok(())
+            (start_ns - first_ns, second)
+        });
+        hlog::write(&self.path, &format!("masseter: {}, ns", self.name), seconds)
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use masseter_shared::clock::SECOND_NS;
+
     use super::*;
 
     fn measured() -> (tempfile::TempDir, Measured) {

@@ -1,17 +1,13 @@
 //! Contenders taking turns, and the ratios between them.
 
 use std::collections::BTreeMap;
-use std::fs::File;
-use std::io::BufWriter;
 use std::path::Path;
-use std::time::Duration;
 
 use hdrhistogram::Histogram;
-use hdrhistogram::serialization::V2DeflateSerializer;
-use hdrhistogram::serialization::interval_log::IntervalLogWriterBuilder;
 use serde::Serialize;
 
 use super::disturbance::{Disturbance, Watch};
+use crate::hlog;
 
 /// Below this many samples a round, its 99.9th percentile rests on fewer than ten of them.
 const SAMPLES_FOR_P999: u64 = 10_000;
@@ -243,18 +239,11 @@ impl Contender {
 
     fn write_log(&self, bench: &str, folder: &Path) -> std::io::Result<()> {
         let name = self.name.replace(|c: char| !c.is_ascii_alphanumeric(), "-");
-        let mut file = BufWriter::new(File::create(folder.join(format!("{bench}-{name}.hlog")))?);
-        let mut serializer = V2DeflateSerializer::new();
-        let mut log = IntervalLogWriterBuilder::new()
-            .add_comment(&format!("masseter bench {bench}: {}, ns, a line a round", self.name))
-            .with_max_value_divisor(1.0)
-            .begin_log_with(&mut file, &mut serializer)?;
-        for (index, round) in self.rounds.iter().enumerate() {
-            let Some(round) = round else { continue };
-            log.write_histogram(round, Duration::from_secs(index as u64), Duration::from_secs(1), None)
-                .map_err(|error| std::io::Error::other(format!("{error:?}")))?;
-        }
-        Ok(())
+        let path = folder.join(format!("{bench}-{name}.hlog"));
+        let comment = format!("masseter bench {bench}: {}, ns, a line a round", self.name);
+        let starts_ns = (0..).step_by(hlog::INTERVAL_NS as usize);
+        let rounds = starts_ns.zip(&self.rounds);
+        hlog::write(&path, &comment, rounds.filter_map(|(start_ns, round)| Some((start_ns, round.as_ref()?))))
     }
 }
 

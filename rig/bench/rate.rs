@@ -4,19 +4,15 @@
 //! Each turn is a run of its own with three processes, judged by nobody; the durations are those of its recording.
 
 use std::fs::File;
-use std::path::Path;
 use std::process::{Command, Stdio};
 
 use anyhow::{Context, bail};
-use base64::Engine;
-use base64::prelude::BASE64_STANDARD;
-use hdrhistogram::serialization::Deserializer;
-use hdrhistogram::serialization::interval_log::{IntervalLogIterator, LogEntry};
 use masseter_shared::config::Scenario;
 use serde_json::Value;
 
-use super::contest::{Contender, Durations, Outcome, Round, durations, take_turns};
+use super::contest::{Contender, Durations, Outcome, Round, take_turns};
 use crate::exit::Exit;
+use crate::hlog;
 use crate::run::folder::RunFolder;
 use crate::run::manifest::Manifest;
 
@@ -146,7 +142,10 @@ fn turn(folder: &RunFolder) -> anyhow::Result<Turn> {
         return Ok(Turn::Stopped { is_disturbed: summary["verdict"]["exit_code"] == Exit::Invalid as u8 });
     }
     let manifest = Manifest::read(folder)?;
-    let log = |(_, name): &(_, &str)| read_log(&folder.histograms().join(format!("{name}.hlog")));
+    let log = |(_, name): &(_, &str)| {
+        let path = folder.histograms().join(format!("{name}.hlog"));
+        hlog::read(&path).with_context(|| format!("cannot read {}", path.display()))
+    };
     let durations = INTERVALS.iter().map(log).collect::<anyhow::Result<_>>()?;
     let figures = &summary["figures"];
     let count = |value: &Value| value.as_f64().unwrap_or(0.0);
@@ -172,26 +171,10 @@ fn turn(folder: &RunFolder) -> anyhow::Result<Turn> {
     Ok(Turn::Played { durations, shares })
 }
 
-/// All intervals of a log together.
-fn read_log(path: &Path) -> anyhow::Result<Durations> {
-    let unreadable = || format!("cannot read {}", path.display());
-    let bytes = std::fs::read(path).with_context(unreadable)?;
-    let mut deserializer = Deserializer::new();
-    let mut all = durations();
-    for entry in IntervalLogIterator::new(&bytes) {
-        let Ok(LogEntry::Interval(interval)) = entry else { continue };
-        let payload = BASE64_STANDARD.decode(interval.encoded_histogram()).with_context(unreadable)?;
-        let histogram: Durations =
-            deserializer.deserialize(&mut payload.as_slice()).with_context(unreadable)?;
-        all.add(histogram).with_context(unreadable)?;
-    }
-    Ok(all)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::bench::contest::record;
+    use crate::bench::contest::{durations, record};
 
     #[test]
     fn a_run_that_stopped_is_counted_and_told_but_not_measured() {
