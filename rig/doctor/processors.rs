@@ -58,19 +58,11 @@ fn governor(root: &SystemRoot) -> Finding {
     }
 }
 
-/// They only matter where a run does not hold the cores awake.
+/// They only matter where a run does not hold the cores awake. The core that sleeps deepest may be one of the run's.
 fn idle(root: &SystemRoot, may_hold: bool) -> Finding {
     const CHECK: &str = "idle states";
-    let folder = "sys/devices/system/cpu/cpu0/cpuidle";
-    let states = root.names(folder);
-    let states = states.iter().filter(|state| {
-        state.starts_with("state") && root.number(&format!("{folder}/{state}/disable")) != Some(1)
-    });
-    let latencies = states.filter_map(|state| {
-        let latency_us = root.number(&format!("{folder}/{state}/latency"))?;
-        Some((latency_us, root.text(&format!("{folder}/{state}/name")).unwrap_or_default()))
-    });
-    let Some((exit_us, name)) = latencies.max() else {
+    let deepest = root.online_cores().into_iter().filter_map(|core| deepest_state(root, core)).max();
+    let Some((exit_us, name)) = deepest else {
         return Finding::ok(CHECK, "not managed by this system");
     };
     let found = format!("deepest {name}, {exit_us} µs to leave");
@@ -85,6 +77,20 @@ fn idle(root: &SystemRoot, may_hold: bool) -> Finding {
             "masseter bench loop  # tells whether `realtime.cpu_dma_latency = \"hold\"` is better",
         ),
     }
+}
+
+/// What it takes to leave a core's deepest state that is not disabled, µs, and its name.
+fn deepest_state(root: &SystemRoot, core: usize) -> Option<(i64, String)> {
+    let folder = format!("sys/devices/system/cpu/cpu{core}/cpuidle");
+    let states = root.names(&folder);
+    let states = states.iter().filter(|state| {
+        state.starts_with("state") && root.number(&format!("{folder}/{state}/disable")) != Some(1)
+    });
+    let latencies = states.filter_map(|state| {
+        let latency_us = root.number(&format!("{folder}/{state}/latency"))?;
+        Some((latency_us, root.text(&format!("{folder}/{state}/name")).unwrap_or_default()))
+    });
+    latencies.max()
 }
 
 fn hypervisor(root: &SystemRoot) -> Finding {
@@ -162,7 +168,7 @@ mod tests {
                 .map(|path| format!("{folder}/{path}"));
             let texts = ["1", "POLL", "890", "C6", disable];
             let mut files: Vec<_> = paths.iter().map(String::as_str).zip(texts).collect();
-            files.push(("proc/cpuinfo", hypervisor));
+            files.extend([("proc/cpuinfo", hypervisor), ("sys/devices/system/cpu/online", "0")]);
             idle(&Fixture::of(&files).root(), may_hold)
         };
         let [real, guest] = ["flags : fpu", "flags : hypervisor"];
@@ -172,6 +178,23 @@ mod tests {
         assert_eq!(refused.level, Warn);
         assert!(refused.found.contains("C6, 890") && refused.mend.unwrap().contains("setfacl"));
         assert!(state("0", guest, true).mend.unwrap().contains("bench loop"), "left alone there");
+    }
+
+    #[test]
+    fn one_core_that_sleeps_deeper_than_the_others_is_enough_to_warn() {
+        let state = |core, disable| {
+            let folder = format!("sys/devices/system/cpu/cpu{core}/cpuidle/state1");
+            [("latency", "890"), ("name", "C6"), ("disable", disable)]
+                .map(|(name, text)| (format!("{folder}/{name}"), text))
+        };
+        let of = |online| {
+            let states = [state(0, "1"), state(1, "0")].concat();
+            let mut files: Vec<_> = states.iter().map(|(path, text)| (path.as_str(), *text)).collect();
+            files.push(("sys/devices/system/cpu/online", online));
+            idle(&Fixture::of(&files).root(), false)
+        };
+        assert_eq!((of("0").level, of("0-1").level), (Ok, Warn));
+        assert!(of("0-1").found.contains("C6, 890"));
     }
 
     #[test]
