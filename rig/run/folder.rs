@@ -1,7 +1,7 @@
 //! The folder a run leaves, and the names of what lies in it.
 
-use std::fs;
-use std::io;
+use std::fs::{self, File};
+use std::io::{self, Write};
 use std::os::unix::fs::symlink;
 use std::path::{Path, PathBuf};
 use std::time::UNIX_EPOCH;
@@ -53,7 +53,11 @@ impl RunFolder {
             fs::create_dir_all(parent).map_err(failed)?;
         }
         match fs::create_dir(path) {
-            Ok(()) => Ok(Self(path.canonicalize().map_err(failed)?)),
+            Ok(()) => {
+                let folder = path.canonicalize().map_err(failed)?;
+                folder.parent().map(secure_names);
+                Ok(Self(folder))
+            }
             Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {
                 Err(FolderError::Exists(path.to_owned()))
             }
@@ -65,6 +69,18 @@ impl RunFolder {
     pub fn open(path: &Path) -> Result<Self, FolderError> {
         let folder = Self(path.to_owned());
         if folder.recording().is_file() { Ok(folder) } else { Err(FolderError::NoRun(path.to_owned())) }
+    }
+
+    /// Writes one of its files, wholly or not at all: a power cut that the recording outlives must not take what
+    /// explains it.
+    pub fn keep(&self, path: &Path, text: &str) -> io::Result<()> {
+        let unfinished = path.with_extension("part");
+        let mut file = File::create(&unfinished)?;
+        file.write_all(text.as_bytes())?;
+        file.sync_all()?;
+        fs::rename(unfinished, path)?;
+        secure_names(&self.0);
+        Ok(())
     }
 
     /// The folder itself.
@@ -111,4 +127,9 @@ impl RunFolder {
     pub fn report(&self) -> PathBuf {
         self.0.join("report.html")
     }
+}
+
+/// Makes the names in a folder outlive a power cut, on file systems that can.
+fn secure_names(folder: &Path) {
+    let _ = File::open(folder).and_then(|folder| folder.sync_all());
 }

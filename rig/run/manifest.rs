@@ -113,10 +113,7 @@ impl Manifest {
 
     /// Writes the file, wholly or not at all.
     pub fn write(&self, folder: &RunFolder) -> io::Result<()> {
-        let text = serde_json::to_string_pretty(self)?;
-        let unfinished = folder.manifest().with_extension("json.part");
-        fs::write(&unfinished, text + "\n")?;
-        fs::rename(unfinished, folder.manifest())
+        folder.keep(&folder.manifest(), &(serde_json::to_string_pretty(self)? + "\n"))
     }
 
     /// Reads the file of a past run.

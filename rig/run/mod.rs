@@ -37,7 +37,7 @@ pub fn run(args: &RunArgs) -> Result<Exit, Failure> {
         Some(path) => RunFolder::create(path)?,
         None => RunFolder::create_in("runs".as_ref(), &plan.scenario.name)?,
     };
-    std::fs::write(folder.scenario(), plan.scenario.to_toml()).context("cannot write the scenario")?;
+    folder.keep(&folder.scenario(), &plan.scenario.to_toml()).context("cannot write the scenario")?;
     if !args.quiet {
         tell!("{}", plan.announcement());
     }
