@@ -92,7 +92,10 @@ pub(crate) fn run(args: &BenchArgs) -> Result<Exit, Failure> {
     if args.format == Format::Json {
         show(&results.to_json()?);
     }
-    measured?;
+    measured.map_err(|error| {
+        let exit = if error.is::<rate::Interrupted>() { Exit::Interrupted } else { Exit::Usage };
+        Failure { exit, error }
+    })?;
     let disturbed = results.outcomes.iter().any(|outcome| outcome.disturbance.disturbed);
     Ok(if disturbed { Exit::Invalid } else { Exit::Passed })
 }

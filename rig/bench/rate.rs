@@ -3,17 +3,22 @@
 //!
 //! Each turn is a run of its own with three processes, judged by nobody; the durations are those of its recording.
 
-use std::fs::File;
-use std::process::{Command, Stdio};
+use std::fs::{self, File};
+use std::os::unix::process::CommandExt;
+use std::process::{Child, Command, Stdio};
+use std::time::Duration;
 
 use anyhow::{Context, bail};
+use masseter_shared::clock;
 use masseter_shared::config::Scenario;
+use rustix::process::{Pid, Signal, kill_process};
 use serde_json::Value;
 
 use super::contest::{Contender, Durations, Outcome, Round, take_turns};
 use crate::exit::Exit;
 use crate::hlog;
 use crate::run::folder::RunFolder;
+use crate::run::interrupts::Interrupts;
 use crate::run::manifest::Manifest;
 
 /// As it is called in results.
@@ -24,11 +29,18 @@ pub(super) const RATES_HZ: [u32; 5] = [1000, 2000, 5000, 10_000, 20_000];
 const MOTION_S: f64 = 2.0;
 /// Silence after which the rig stops, ms, whatever the rate: as long as in a run at 1 kHz.
 const PATIENCE_MS: u32 = 20;
+/// How often it is looked whether a run has ended or is to end; seldom, since it is measured.
+const LOOK: Duration = Duration::from_millis(50);
 /// The last of the intervals.
 pub(super) const ROUND_TRIP: &str = "round trip";
 /// The intervals that are compared, as their logs are named.
 const INTERVALS: [(&str, &str); 3] =
     [("wake-up", "controller-wake-up"), ("controller cycle", "controller-cycle"), (ROUND_TRIP, "round-trip")];
+
+/// Whoever started the bench has had enough of it.
+#[derive(Debug, thiserror::Error)]
+#[error("interrupted")]
+pub(super) struct Interrupted;
 
 /// What a turn gave.
 enum Turn {
@@ -42,8 +54,11 @@ enum Turn {
 }
 
 pub(super) fn measure(rounds: u32, cores: [usize; 2]) -> anyhow::Result<Outcome> {
-    let play = |index: usize| run_at(RATES_HZ[index], cores);
-    let (turns, disturbance) = take_turns(rounds, RATES_HZ.len(), cores[0], play)?;
+    let interrupts = Interrupts::listen().context("cannot listen for signals")?;
+    let play = |index: usize| run_at(RATES_HZ[index], cores, &interrupts);
+    let played = take_turns(rounds, RATES_HZ.len(), cores[0], play);
+    interrupts.let_go();
+    let (turns, disturbance) = played?;
     let mut outcome = Outcome {
         bench: NAME,
         measures: "the whole rig without bus delays: wake-up of the controller after its deadline, controller cycle \
@@ -119,21 +134,41 @@ fn scenario(rate_hz: u32, cores: [usize; 2]) -> Scenario {
 }
 
 /// Plays a motion at that rate.
-fn run_at(rate_hz: u32, cores: [usize; 2]) -> anyhow::Result<Turn> {
+fn run_at(rate_hz: u32, cores: [usize; 2], interrupts: &Interrupts) -> anyhow::Result<Turn> {
     let place = tempfile::tempdir().context("cannot create a folder for the runs")?;
     let file = place.path().join("scenario.toml");
-    std::fs::write(&file, scenario(rate_hz, cores).to_toml()).context("cannot write the scenario")?;
+    fs::write(&file, scenario(rate_hz, cores).to_toml()).context("cannot write the scenario")?;
     let folder = place.path().join("run");
-    let output = Command::new(std::env::current_exe()?)
+    let errors = place.path().join("errors");
+    let mut run = Command::new(std::env::current_exe()?)
         .args(["run", "--quiet", "--format", "json", "--out"])
         .args([&folder, &file])
         .stdin(Stdio::null())
-        .output()
+        .stdout(Stdio::null())
+        .stderr(File::create(&errors).context("cannot create a file for what a run says")?)
+        // A key on the terminal reaches this process alone, which tells the run.
+        .process_group(0)
+        .spawn()
         .context("cannot start a run")?;
+    wait_for(&mut run, interrupts)?;
     if !folder.join("summary.json").exists() {
-        bail!("a run at {rate_hz} Hz left no summary: {}", String::from_utf8_lossy(&output.stderr).trim());
+        bail!("a run at {rate_hz} Hz left no summary: {}", fs::read_to_string(errors)?.trim());
     }
     turn(&RunFolder::open(&folder)?)
+}
+
+/// Waits for a run. Each interrupt is handed on to it; the bench ends behind it.
+fn wait_for(run: &mut Child, interrupts: &Interrupts) -> anyhow::Result<()> {
+    let mut handed_on = 0;
+    while run.try_wait()?.is_none() {
+        if handed_on < u8::from(interrupts.ask()) + u8::from(interrupts.insist()) {
+            // It may have ended meanwhile.
+            let _ = kill_process(Pid::from_child(run), Signal::TERM);
+            handed_on += 1;
+        }
+        clock::sleep(LOOK);
+    }
+    if interrupts.ask() { Err(Interrupted.into()) } else { Ok(()) }
 }
 
 fn turn(folder: &RunFolder) -> anyhow::Result<Turn> {

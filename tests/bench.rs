@@ -1,0 +1,47 @@
+//! `masseter bench` as its users meet it.
+
+mod common;
+
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::time::Duration;
+
+use common::{MASSETER, child_of};
+use masseter_shared::clock;
+use rustix::process::{Pid, Signal, kill_process, test_kill_process};
+
+/// Waits until a run in one of the folders there is under way.
+fn wait_for_a_run(place: &Path) {
+    let records = || {
+        let mut folders = fs::read_dir(place).unwrap();
+        folders.any(|folder| folder.unwrap().path().join("run/recording.mcap").exists())
+    };
+    for _ in 0..1000 {
+        if records() {
+            return;
+        }
+        clock::sleep(Duration::from_millis(10));
+    }
+    panic!("no run was under way");
+}
+
+#[test]
+fn an_interrupted_bench_ends_behind_its_run_and_leaves_nothing() {
+    for signal in [Signal::INT, Signal::TERM] {
+        let place = tempfile::tempdir().unwrap();
+        let mut bench = Command::new(MASSETER)
+            .args(["bench", "rate", "--rounds", "1"])
+            .env("TMPDIR", place.path())
+            .stdout(Stdio::null())
+            .stderr(Stdio::null())
+            .spawn()
+            .unwrap();
+        let run = child_of(&bench, "run");
+        wait_for_a_run(place.path());
+        kill_process(Pid::from_child(&bench), signal).unwrap();
+        assert_eq!(bench.wait().unwrap().code(), Some(130), "{signal:?}");
+        assert!(test_kill_process(run).is_err(), "{signal:?}: its run still plays");
+        assert_eq!(fs::read_dir(place.path()).unwrap().count(), 0, "{signal:?}: its folder is still there");
+    }
+}
