@@ -138,17 +138,20 @@ fn through_the_logger(cycles: &[Vec<Recorded>], folder: &Path, recording: &Path)
         let node = Node::join(&domain)?;
         let mut outlets = Outlets::open(&node)?;
         let mut logger = start_logger(&scenario, domain.id(), recording)?;
-        let (sent, publishing) = play(cycles, &mut outlets)?;
+        let Played { sent, publishing, skipped, took_s } = play(cycles, &mut outlets)?;
         let cpu_s = cpu_seconds(&logger)?;
         let memory_kib = peak_memory_kib(&logger)?;
         kill_process(Pid::from_child(&logger), Signal::TERM)?;
         let status = logger.wait()?;
         let bytes = fs::metadata(recording)?.len();
         let played = RATE_HZ * SECONDS;
-        println!("{played} cycles at {RATE_HZ} Hz, {sent} messages; the logger ended with {status}");
+        println!(
+            "{played} cycles at {RATE_HZ} Hz in {took_s:.2} s, {skipped} deadlines skipped, {sent} messages; the logger \
+             ended with {status}"
+        );
         let [median_ns, p99_ns] = [0.5, 0.99].map(|quantile| publishing.value_at_quantile(quantile));
         println!("  publishing       {median_ns:8} ns a message, median of the cycles (p99 {p99_ns})");
-        println!("  logger           {:8.1} % of a core", cpu_s / SECONDS as f64 * 100.0);
+        println!("  logger           {:8.1} % of a core", cpu_s / took_s * 100.0);
         println!("  logger's memory  {:8.1} MB at its peak", memory_kib as f64 / 1024.0);
         println!("  recording        {:8.0} bytes a cycle", bytes as f64 / played as f64);
     }
@@ -179,8 +182,19 @@ fn start_logger(scenario: &Path, domain: &str, recording: &Path) -> anyhow::Resu
     Ok(logger)
 }
 
-/// Publishes a cycle at a time by the clock; returns how many messages, and how long one took, cycle by cycle, ns.
-fn play(cycles: &[Vec<Recorded>], outlets: &mut Outlets) -> anyhow::Result<(u64, Histogram<u64>)> {
+/// What was published.
+struct Played {
+    /// Messages.
+    sent: u64,
+    /// How long one took, cycle by cycle, ns.
+    publishing: Histogram<u64>,
+    /// Deadlines that passed before their cycle could be published: it came one later, and all others with it.
+    skipped: u64,
+    took_s: f64,
+}
+
+/// Publishes a cycle at a time by the clock.
+fn play(cycles: &[Vec<Recorded>], outlets: &mut Outlets) -> anyhow::Result<Played> {
     let realtime = Scenario::default().realtime;
     let wanted = Wanted {
         core: Some(realtime.cores[0]),
@@ -191,8 +205,9 @@ fn play(cycles: &[Vec<Recorded>], outlets: &mut Outlets) -> anyhow::Result<(u64,
         println!("  {refusal}");
     }
     let period_ns = SECOND_NS / RATE_HZ;
-    let mut pace = Cycle::new(clock::now_ns() + period_ns, period_ns);
-    let (mut sent, mut publishing) = (0, Histogram::new(3)?);
+    let from_ns = clock::now_ns();
+    let mut pace = Cycle::new(from_ns + period_ns, period_ns);
+    let (mut sent, mut skipped, mut publishing) = (0, 0, Histogram::new(3)?);
     let mut at_hand = AtHand::default();
     for cycle in cycles.iter().cycle().take((RATE_HZ * SECONDS) as usize) {
         at_hand.take(cycle);
@@ -201,8 +216,9 @@ fn play(cycles: &[Vec<Recorded>], outlets: &mut Outlets) -> anyhow::Result<(u64,
         let messages = cycle.len().max(1) as u64;
         publishing.record((clock::now_ns() - wake.woke_ns) / messages)?;
         sent += cycle.len() as u64;
+        skipped = wake.skipped;
     }
-    Ok((sent, publishing))
+    Ok(Played { sent, publishing, skipped, took_s: (clock::now_ns() - from_ns) as f64 / SECOND_NS as f64 })
 }
 
 /// Processor time of a process so far, s.
