@@ -9,12 +9,12 @@ pub(crate) fn clean() -> Result<Exit, Failure> {
     let domains = Domain::all()?;
     for domain in &domains {
         match domain.sweep()? {
-            Some(files) => show_line!("{}: {files} files removed from shared memory", domain.id()),
-            None => show_line!("{}: running, left alone", domain.id()),
+            Some(files) => result_line!("{}: {files} files removed from shared memory", domain.id())?,
+            None => result_line!("{}: running, left alone", domain.id())?,
         }
     }
     if domains.is_empty() {
-        show_line!("nothing to clean");
+        result_line!("nothing to clean")?;
     }
     Ok(Exit::Passed)
 }

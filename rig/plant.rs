@@ -36,8 +36,7 @@ fn emulate(args: &PlantArgs) -> anyhow::Result<()> {
     });
     obtained.refusals.iter().for_each(|refusal| tell!("  plant: {refusal}"));
     tell!("six drives on {}, until Ctrl-C", scenario.can.interfaces.join(", "));
-    tell(emulator.run(&stop)?);
-    Ok(())
+    tell(emulator.run(&stop)?)
 }
 
 fn resolve(args: &PlantArgs) -> anyhow::Result<Scenario> {
@@ -62,12 +61,12 @@ fn resolve(args: &PlantArgs) -> anyhow::Result<Scenario> {
     Ok(scenario)
 }
 
-fn tell(figures: Figures) {
-    show_line!(
+fn tell(figures: Figures) -> anyhow::Result<()> {
+    result_line!(
         "received {} frames, sent {}, could not send {}; left out {:.1} ms that the machine was too slow for",
         figures.received,
         figures.sent,
         figures.refused,
         figures.skipped_ns as f64 / 1e6
-    );
+    )
 }

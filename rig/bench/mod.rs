@@ -26,7 +26,7 @@ use serde::Serialize;
 
 use crate::cli::Format;
 use crate::exit::{Exit, Failure};
-use crate::say::show;
+use crate::say::result;
 use circumstances::Circumstances;
 use contest::Outcome;
 
@@ -90,7 +90,7 @@ pub(crate) fn run(args: &BenchArgs) -> Result<Exit, Failure> {
     };
     let measured = measure_each(args, &mut results);
     if args.format == Format::Json {
-        show(&results.to_json()?);
+        result(&results.to_json()?)?;
     }
     measured.map_err(|error| {
         let exit = if error.is::<rate::Interrupted>() { Exit::Interrupted } else { Exit::Usage };
@@ -105,12 +105,13 @@ fn measure_each(args: &BenchArgs, results: &mut Results) -> anyhow::Result<()> {
         let name = kind_name(*kind);
         tell!("bench {name}: {} rounds …", args.rounds);
         let outcome = measure(*kind, args).with_context(|| format!("bench {name}"))?;
-        if args.format == Format::Human {
-            show(&table::of(&outcome));
-        }
+        let table = table::of(&outcome);
         results.outcomes.push(outcome);
         if let Some(folder) = &args.out {
             results.write(folder).with_context(|| format!("cannot write to {}", folder.display()))?;
+        }
+        if args.format == Format::Human {
+            result(&table)?;
         }
     }
     Ok(())

@@ -1,6 +1,5 @@
 //! `masseter can plan`: the plan of every bus, as a table or as JSON.
 
-use std::io::{self, Write as _};
 use std::path::PathBuf;
 
 use clap::Args;
@@ -12,6 +11,7 @@ use serde_json::{Value, json};
 
 use crate::cli::Format;
 use crate::exit::{Exit, Failure};
+use crate::say::result;
 
 /// What `can plan` takes.
 #[derive(Debug, Clone, Args)]
@@ -45,8 +45,7 @@ pub(crate) fn plan(args: &PlanArgs) -> Result<Exit, Failure> {
             format!("{:#}\n", json!({ "fits": refusal.is_none(), "refusal": refusal, "buses": buses }))
         }
     };
-    // A reader that has had enough is no fault of the plan.
-    let _ = io::stdout().write_all(text.as_bytes());
+    result(&text)?;
     Ok(if refusal.is_none() { Exit::Passed } else { Exit::Usage })
 }
 

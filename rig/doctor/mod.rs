@@ -24,7 +24,7 @@ pub use finding::{Finding, Level};
 use crate::cli::Format;
 use crate::exit::{Exit, Failure};
 use crate::machine::SystemRoot;
-use crate::say::show;
+use crate::say::result;
 
 /// Version of the report's form.
 const FORM: u32 = 1;
@@ -42,10 +42,10 @@ struct Report {
 /// Examines the machine; [`Exit::Invalid`] when something is bad.
 pub(crate) fn examine(format: Format) -> Result<Exit, Failure> {
     let report = Report::of(findings(&SystemRoot::of_this_machine()));
-    match format {
-        Format::Human => show(&report.in_words()),
-        Format::Json => show(&(serde_json::to_string_pretty(&report)? + "\n")),
-    }
+    result(&match format {
+        Format::Human => report.in_words(),
+        Format::Json => serde_json::to_string_pretty(&report)? + "\n",
+    })?;
     Ok(if report.level == Level::Bad { Exit::Invalid } else { Exit::Passed })
 }
 

@@ -13,6 +13,7 @@ use rayon::prelude::*;
 use super::input::{Input, Line};
 use crate::cli::CsvArgs;
 use crate::exit::{Exit, Failure};
+use crate::say::taken;
 
 /// Status of a line that could not be read.
 const BAD_LINE: &str = "bad_line";
@@ -144,12 +145,8 @@ fn stream<const IN: usize>(
             }
         }
     })();
-    match written {
-        // Whoever reads the output has had enough.
-        Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(exit),
-        Err(error) => Err(Failure::from(anyhow::Error::new(error).context("cannot write standard output"))),
-        Ok(()) => Ok(exit),
-    }
+    taken(written)?;
+    Ok(exit)
 }
 
 fn check_columns(input: &mut Input, expected: &[&str]) -> anyhow::Result<()> {

@@ -20,7 +20,7 @@ use clap::{Args, Subcommand};
 use crate::exit::{Exit, Failure};
 use crate::recording::{Reader, Recovered, recover};
 use crate::run::folder::RunFolder;
-use crate::say::show;
+use crate::say::result;
 use choice::Choice;
 use survey::Survey;
 
@@ -97,7 +97,7 @@ fn look(args: &RecordingArgs, words: impl FnOnce(&Survey) -> String) -> Result<E
     let path = args.path()?;
     let mut reader = open(&path)?;
     let survey = Survey::of(&mut reader).with_context(|| path.display().to_string())?;
-    show(&format!("{}\n{}", path.display(), words(&survey)));
+    result(&format!("{}\n{}", path.display(), words(&survey)))?;
     Ok(survey.exit())
 }
 
@@ -112,7 +112,7 @@ fn save(args: &RecoverArgs) -> Result<Exit, Failure> {
         // What went wrong before is the word to say.
         let _ = fs::remove_file(&out);
     })?;
-    show(&format!("{}\n{}{}", out.display(), in_words(recovered), survey.loss()));
+    result(&format!("{}\n{}{}", out.display(), in_words(recovered), survey.loss()))?;
     Ok(Exit::Passed)
 }
 
@@ -132,11 +132,11 @@ fn export(args: &ExportArgs) -> Result<Exit, Failure> {
     fs::create_dir(&args.out).with_context(|| format!("cannot create {}", args.out.display()))?;
     let written = export::write(&mut open(&path)?, &args.out, tables)?;
     for (name, lines) in written {
-        show(&format!("{:>10}  {}\n", lines, args.out.join(name).display()));
+        result(&format!("{:>10}  {}\n", lines, args.out.join(name).display()))?;
     }
     for (topic, why) in left_out {
-        show(&format!("{:>10}  {topic}: {why}\n", "no table"));
+        result(&format!("{:>10}  {topic}: {why}\n", "no table"))?;
     }
-    show(&survey.loss());
+    result(&survey.loss())?;
     Ok(survey.exit())
 }

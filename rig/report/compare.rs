@@ -16,7 +16,7 @@ use super::table::or_dash;
 use crate::cli::Format;
 use crate::exit::{Exit, Failure};
 use crate::run::folder::RunFolder;
-use crate::say::show;
+use crate::say::result;
 
 /// A change beyond this many standard errors of the difference is none of chance's.
 const BEYOND: f64 = 3.0;
@@ -38,10 +38,10 @@ struct Change {
 /// `masseter report A B`.
 pub(crate) fn runs(a: &Path, b: &Path, format: Format) -> Result<Exit, Failure> {
     let changes = changes(&figures(a)?, &figures(b)?);
-    show(&match format {
+    result(&match format {
         Format::Human => table(a, b, &changes),
         Format::Json => serde_json::to_string_pretty(&changes).context("cannot write the changes")? + "\n",
-    });
+    })?;
     Ok(Exit::Passed)
 }
 

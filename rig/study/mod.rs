@@ -116,9 +116,9 @@ impl Study {
             .try_for_each(|figure| write_figure(folder, figure).with_context(|| written(figure.name)))?;
         fs::write(folder.join("claims.md"), page).with_context(|| written("claims.md"))?;
         for claim in &claims {
-            show_line!("{:<13}  {}", claim.verdict.name(), claim.says);
+            result_line!("{:<13}  {}", claim.verdict.name(), claim.says)?;
         }
-        show_line!("{}", folder.join("claims.md").display());
+        result_line!("{}", folder.join("claims.md").display())?;
         Ok(Exit::Passed)
     }
 

@@ -87,11 +87,11 @@ pub(crate) fn uniqueness(verb: &UniquenessVerb) -> Result<Exit, Failure> {
     let (settled, rows, out) = match verb {
         UniquenessVerb::Prove(args) => {
             let (mechanism, wholes) = to_prove(args)?;
-            let (settled, rows) = proof::prove(args, &mechanism, wholes);
+            let (settled, rows) = proof::prove(args, &mechanism, wholes)?;
             (settled, rows, &args.out)
         }
         UniquenessVerb::Search(args) => {
-            let (settled, rows) = search::search(args, &published()?);
+            let (settled, rows) = search::search(args, &published()?)?;
             (settled, rows, &args.out)
         }
     };
@@ -115,7 +115,7 @@ fn to_prove(args: &ProveArgs) -> anyhow::Result<(Mechanism, Vec<InputBox>)> {
     };
     let plan = Plan::resolve(&run)?;
     let wholes = motion::boxes(&plan, around_mm * 1e-3)?;
-    show_line!("{}: {} boxes around its inputs", plan.scenario.name, wholes.len());
+    result_line!("{}: {} boxes around its inputs", plan.scenario.name, wholes.len())?;
     Ok((plan.mechanism, wholes))
 }
 

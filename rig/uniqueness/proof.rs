@@ -20,17 +20,21 @@ struct Tally {
 }
 
 /// Whether all of the boxes are proven, and what of them is undecided as CSV.
-pub(super) fn prove(args: &ProveArgs, mechanism: &Mechanism, wholes: Vec<InputBox>) -> (bool, Vec<String>) {
+pub(super) fn prove(
+    args: &ProveArgs,
+    mechanism: &Mechanism,
+    wholes: Vec<InputBox>,
+) -> anyhow::Result<(bool, Vec<String>)> {
     let claim = args.margin.map_or(Claim::SeedConditions, Claim::DeterminantAtLeast);
     let (tally, undecided) = branch_and_bound(&Proof::new(mechanism, claim), wholes, args.boxes);
-    show_line!("boxes examined       {}", tally.examined);
-    show_line!("no solution          {:.4} % of the volume", 100.0 * tally.unsolvable_share);
-    show_line!("at most one solution {:.4} % of the volume", 100.0 * tally.unique_share);
-    show_line!("undecided            {} boxes", undecided.len());
+    result_line!("boxes examined       {}", tally.examined)?;
+    result_line!("no solution          {:.4} % of the volume", 100.0 * tally.unsolvable_share)?;
+    result_line!("at most one solution {:.4} % of the volume", 100.0 * tally.unique_share)?;
+    result_line!("undecided            {} boxes", undecided.len())?;
     let header = AXIS_NAMES.map(|axis| format!("{axis}_low_m,{axis}_high_m")).join(",");
     let row =
         |(inputs, _): &Open| inputs.axes().map(|axis| format!("{},{}", axis.low(), axis.high())).join(",");
-    (undecided.is_empty(), std::iter::once(header).chain(undecided.iter().map(row)).collect())
+    Ok((undecided.is_empty(), std::iter::once(header).chain(undecided.iter().map(row)).collect()))
 }
 
 /// The tally, and the boxes that are left when no more than `most` have been examined.

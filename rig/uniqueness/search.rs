@@ -26,7 +26,7 @@ struct Found {
 }
 
 /// Whether no input with two true solutions was found, and those found as CSV.
-pub(super) fn search(args: &SearchArgs, mechanism: &Mechanism) -> (bool, Vec<String>) {
+pub(super) fn search(args: &SearchArgs, mechanism: &Mechanism) -> anyhow::Result<(bool, Vec<String>)> {
     let limits: [[f64; 2]; AXES] = args.region.inputs(mechanism).axes().map(|axis| [axis.low(), axis.high()]);
     let mut random = Pcg64Mcg::seed_from_u64(args.seed);
     let (mut standing, mut found) = (0_usize, Vec::new());
@@ -38,21 +38,25 @@ pub(super) fn search(args: &SearchArgs, mechanism: &Mechanism) -> (bool, Vec<Str
     }
     found.sort_by(|a, b| b.lesser.total_cmp(&a.lesser));
     let both_positive = found.iter().filter(|one| one.lesser > 0.0).count();
-    show_line!("random inputs                                   {}", args.inputs);
-    show_line!("with a solution that meets the seed's conditions {standing}");
-    show_line!("with two of them                                {}", found.len());
-    show_line!("with two whose determinants are positive        {both_positive}");
+    result_line!("random inputs                                   {}", args.inputs)?;
+    result_line!("with a solution that meets the seed's conditions {standing}")?;
+    result_line!("with two of them                                {}", found.len())?;
+    result_line!("with two whose determinants are positive        {both_positive}")?;
     found.truncate(CLIMBS);
     let mut climbed: Vec<Found> =
         found.into_iter().map(|start| climb(mechanism, &limits, start, &mut random)).collect();
     climbed.sort_by(|a, b| b.lesser.total_cmp(&a.lesser));
     if let Some(best) = climbed.first() {
-        show_line!("greatest lesser determinant, after climbing     {:.4} at {:?}", best.lesser, best.axes_m);
+        result_line!(
+            "greatest lesser determinant, after climbing     {:.4} at {:?}",
+            best.lesser,
+            best.axes_m
+        )?;
     }
     let header = AXIS_NAMES.map(|axis| format!("{axis}_m")).join(",") + ",lesser_determinant";
     let row = |one: &Found| one.axes_m.map(|value| value.to_string()).join(",") + &format!(",{}", one.lesser);
     let ambiguous = climbed.iter().any(|one| one.lesser > 0.0);
-    (!ambiguous, std::iter::once(header).chain(climbed.iter().map(row)).collect())
+    Ok((!ambiguous, std::iter::once(header).chain(climbed.iter().map(row)).collect()))
 }
 
 /// The determinants of an input's standing solutions, greatest first.
