@@ -43,16 +43,35 @@ impl Default for MechanismConfig {
     }
 }
 
+/// Longest dimension, m.
+const LONGEST_M: f64 = 100.0;
+/// Shortest side of a platform, m.
+const SHORTEST_SIDE_M: f64 = 1e-3;
+/// Least area of the triangle of the slides' centres, m².
+const LEAST_BASE_M2: f64 = 1e-6;
+
 /// Dimensions that describe no mechanism.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum GeometryError {
-    /// A dimension is not a finite number.
-    #[error("mechanism: {name} is {value}; give a finite number")]
-    NotFinite {
+    /// A direction that is not a finite number.
+    #[error("mechanism.slides[{leg}]: the azimuth is {azimuth_deg}; give a finite number")]
+    NoDirection {
+        /// Index of the slide, from 0.
+        leg: usize,
+        /// Azimuth as given.
+        azimuth_deg: f64,
+    },
+    /// A length that is no number, or one that no machine has and whose square double precision may not hold.
+    #[error("mechanism.{name}: {value_m:e} m; use {least_m} to {most_m} m")]
+    OutOfRange {
         /// Configuration key.
         name: &'static str,
         /// What stands there.
-        value: f64,
+        value_m: f64,
+        /// The least that may.
+        least_m: f64,
+        /// The most that may.
+        most_m: f64,
     },
     /// The sides do not close to a triangle with an area.
     #[error(
@@ -70,6 +89,11 @@ pub enum GeometryError {
         /// Area of the triangle of the centres.
         area_m2: f64,
     },
+    /// Slides in the order in which every leg would have to stand crossed.
+    #[error(
+        "mechanism.slides: the three centres go round clockwise; number the slides counter-clockwise seen from above"
+    )]
+    Clockwise,
     /// A slide's inward direction points away from the middle of the base.
     #[error("mechanism.slides[{leg}]: with azimuth {azimuth_deg}° the leg leans outward; add 180°")]
     LeansOutward {
@@ -114,7 +138,7 @@ pub struct Mechanism {
 impl Mechanism {
     /// Checks the dimensions and resolves directions and corners.
     pub fn new(config: &MechanismConfig) -> Result<Self, GeometryError> {
-        check_finite(config)?;
+        check_sizes(config)?;
         check_strokes(&config.strokes)?;
         Ok(Self {
             slides: resolve_slides(&config.slides)?,
@@ -201,18 +225,16 @@ impl Mechanism {
     }
 }
 
-fn check_finite(config: &MechanismConfig) -> Result<(), GeometryError> {
-    let slides = config.slides.iter().flat_map(|s| {
-        [
-            ("slides.centre_m", s.centre_m[0]),
-            ("slides.centre_m", s.centre_m[1]),
-            ("slides.azimuth_deg", s.azimuth_deg),
-        ]
-    });
-    let sides = config.platform_sides_m.iter().map(|&side| ("platform_sides_m", side));
-    let strokes = config.strokes.slide_m.iter().chain(&config.strokes.leg_m).map(|&end| ("strokes", end));
-    match slides.chain(sides).chain(strokes).find(|(_, value)| !value.is_finite()) {
-        Some((name, value)) => Err(GeometryError::NotFinite { name, value }),
+fn check_sizes(config: &MechanismConfig) -> Result<(), GeometryError> {
+    let MechanismConfig { slides, platform_sides_m, strokes } = config;
+    let centres = slides.iter().flat_map(|slide| slide.centre_m.map(|m| ("slides.centre_m", m, -LONGEST_M)));
+    let ends = strokes.slide_m.into_iter().chain(strokes.leg_m).map(|end_m| ("strokes", end_m, -LONGEST_M));
+    let sides = platform_sides_m.map(|side_m| ("platform_sides_m", side_m, SHORTEST_SIDE_M));
+    let mut lengths = centres.chain(ends).chain(sides);
+    match lengths.find(|(_, value_m, least_m)| !(*least_m..=LONGEST_M).contains(value_m)) {
+        Some((name, value_m, least_m)) => {
+            Err(GeometryError::OutOfRange { name, value_m, least_m, most_m: LONGEST_M })
+        }
         None => Ok(()),
     }
 }
@@ -231,6 +253,11 @@ fn check_strokes(strokes: &StrokeLimits) -> Result<(), GeometryError> {
 }
 
 fn resolve_slides(configs: &[SlideConfig; LEGS]) -> Result<[Slide; LEGS], GeometryError> {
+    for (leg, &SlideConfig { azimuth_deg, .. }) in configs.iter().enumerate() {
+        if !azimuth_deg.is_finite() {
+            return Err(GeometryError::NoDirection { leg, azimuth_deg });
+        }
+    }
     let slides = configs.map(|config| {
         let (sin, cos) = config.azimuth_deg.to_radians().sin_cos();
         Slide {
@@ -240,9 +267,13 @@ fn resolve_slides(configs: &[SlideConfig; LEGS]) -> Result<[Slide; LEGS], Geomet
         }
     });
     let [b1, b2, b3] = slides.map(|slide| slide.centre);
-    let area_m2 = (b2 - b1).cross(&(b3 - b1)).norm() / 2.0;
-    if area_m2 < 1e-6 {
-        return Err(GeometryError::NoBase { area_m2 });
+    let area_m2 = (b2 - b1).cross(&(b3 - b1)).z / 2.0;
+    if area_m2.abs() <= LEAST_BASE_M2 {
+        return Err(GeometryError::NoBase { area_m2: area_m2.abs() });
+    }
+    // The platform's corners are numbered counter-clockwise: it would hang turned over.
+    if area_m2 < 0.0 {
+        return Err(GeometryError::Clockwise);
     }
     let middle = (b1 + b2 + b3) / 3.0;
     for (leg, slide) in slides.iter().enumerate() {
@@ -258,8 +289,7 @@ fn platform_corners(sides_m: [f64; LEGS]) -> Result<[Vec3; LEGS], GeometryError>
     let [a12, a23, a31] = sides_m;
     let x3 = (a12 * a12 + a31 * a31 - a23 * a23) / (2.0 * a12);
     let height_squared = a31 * a31 - x3 * x3;
-    let positive = sides_m.iter().all(|&side| side > 0.0);
-    if !positive || height_squared <= 1e-6 * a31 * a31 {
+    if height_squared <= 1e-6 * a31 * a31 {
         return Err(GeometryError::NoPlatform { sides_m });
     }
     let flat = [Vec3::zeros(), Vec3::new(a12, 0.0, 0.0), Vec3::new(x3, height_squared.sqrt(), 0.0)];
@@ -303,13 +333,26 @@ mod tests {
         outward.slides[1].azimuth_deg += 180.0;
         let mut flat = good.clone();
         flat.slides = [0.0, 0.05, 0.1].map(|x| SlideConfig { centre_m: [x, 0.0], azimuth_deg: 90.0 });
+        let mut clockwise = good.clone();
+        clockwise.slides.swap(1, 2);
+        let mut boundless = good.clone();
+        boundless.slides[0].centre_m = [1e200, 1e200];
+        let mut adrift = good.clone();
+        adrift.slides[2].azimuth_deg = f64::NAN;
         let mut vanishing = good.clone();
         vanishing.strokes.leg_m = [0.0, 0.3];
+        let with_sides = |platform_sides_m| MechanismConfig { platform_sides_m, ..good.clone() };
         let cases = [
-            (MechanismConfig { platform_sides_m: [0.05, 0.05, 0.1], ..good.clone() }, "close to no triangle"),
-            (MechanismConfig { platform_sides_m: [f64::NAN, 0.05, 0.1], ..good }, "finite"),
+            (with_sides([0.05, 0.05, 0.1]), "close to no triangle"),
+            (with_sides([f64::NAN, 0.05, 0.1]), "platform_sides_m: NaN m; use 0.001 to 100 m"),
+            (with_sides([1e200; LEGS]), "platform_sides_m: 1e200 m; use 0.001 to 100 m"),
+            (with_sides([1e-100; LEGS]), "use 0.001 to 100 m"),
+            (with_sides([0.05, -0.05, 0.05]), "use 0.001 to 100 m"),
             (outward, "add 180"),
             (flat, "one line"),
+            (clockwise, "counter-clockwise seen from above"),
+            (boundless, "slides.centre_m: 1e200 m; use -100 to 100 m"),
+            (adrift, "slides[2]: the azimuth is NaN; give a finite number"),
             (vanishing, "above 0"),
         ];
         for (config, reason) in cases {
