@@ -19,6 +19,7 @@ fn scenarios_are_refused_with_place_and_remedy() {
         ("[motion]\nkind = 'opening'\namplitude_mm = 90.0", "out of reach"),
         ("[jaw]\nclosed_offset_m = [0.04, 0.0, 0.0]", "stroke"),
         ("[motion]\nkind = 'chewing'\ncycle_rate_hz = 5.0", "limit"),
+        ("[drives.leg]\nmax_velocity_m_s = 0.1", "axis l1 would move at 0.100 m/s, limit 0.1 m/s"),
         ("[motion]\nkind = 'file'\npath = 'nowhere.csv'", "nowhere.csv"),
     ];
     for (scenario, reason) in cases {

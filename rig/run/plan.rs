@@ -57,7 +57,8 @@ impl Plan {
         let is_buildable = plant::check(&scenario).and_then(|()| plant::check_interfaces(&scenario));
         is_buildable.context("the plant cannot be built")?;
         let trajectory = Trajectory::new(&scenario.motion, &scenario.jaw, &mechanism, scenario.duration_s)?;
-        let demands = trajectory::check(&trajectory, &mechanism, &scenario.limits, scenario.period_s())?;
+        let limits = scenario.limits.within(&scenario.drives);
+        let demands = trajectory::check(&trajectory, &mechanism, &limits, scenario.period_s())?;
         Ok(Self { scenario, mechanism, trajectory, demands, schedule })
     }
 

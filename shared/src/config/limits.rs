@@ -2,10 +2,11 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::ScenarioError;
 use super::need::require_positive;
+use super::{DrivesConfig, ScenarioError};
 
-/// What the axes may be asked for by a trajectory. Strokes are the mechanism's own.
+/// What the axes may be asked for by a trajectory, where their drives do not allow less. Strokes are the mechanism's
+/// own.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct TrajectoryLimitsConfig {
@@ -37,6 +38,16 @@ impl Default for TrajectoryLimitsConfig {
 }
 
 impl TrajectoryLimitsConfig {
+    /// The same, where the drives do not allow less.
+    #[must_use]
+    pub fn within(self, drives: &DrivesConfig) -> Self {
+        Self {
+            slide_velocity_m_s: self.slide_velocity_m_s.min(drives.slide.max_velocity_m_s),
+            leg_velocity_m_s: self.leg_velocity_m_s.min(drives.leg.max_velocity_m_s),
+            ..self
+        }
+    }
+
     pub(super) fn validate(&self) -> Result<(), ScenarioError> {
         require_positive(&[
             ("limits.slide_velocity_m_s", self.slide_velocity_m_s),
@@ -45,5 +56,20 @@ impl TrajectoryLimitsConfig {
             ("limits.leg_acceleration_m_s2", self.leg_acceleration_m_s2),
             ("limits.max_condition", self.max_condition),
         ])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_axis_may_be_asked_for_more_than_its_drive_can() {
+        let (limits, mut drives) = (TrajectoryLimitsConfig::default(), DrivesConfig::default());
+        assert_eq!(limits.within(&drives), limits);
+        drives.leg.max_velocity_m_s = 0.1;
+        assert_eq!(limits.within(&drives), TrajectoryLimitsConfig { leg_velocity_m_s: 0.1, ..limits });
+        drives.slide.max_velocity_m_s = 0.05;
+        assert_eq!(limits.within(&drives).slide_velocity_m_s.to_bits(), 0.05_f64.to_bits());
     }
 }
