@@ -76,6 +76,15 @@ fn recordings_are_refused_with_file_line_and_reason() {
 }
 
 #[test]
+fn a_margin_that_is_no_determinant_is_refused() {
+    for margin in ["nan", "inf", "-inf", "-1"] {
+        let output = masseter(&["uniqueness", "prove", "--boxes", "10", &format!("--margin={margin}")]);
+        assert_eq!(output.status.code(), Some(2), "{margin}: {}", stderr(&output));
+        assert!(stderr(&output).contains("use a finite determinant, 0 or above"), "{}", stderr(&output));
+    }
+}
+
+#[test]
 fn interfaces_that_cannot_be_used_are_refused_with_what_to_do() {
     let cases = [
         (

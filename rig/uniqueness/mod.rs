@@ -46,7 +46,7 @@ pub(crate) struct ProveArgs {
     #[arg(long, value_name = "N", default_value_t = 100_000)]
     boxes: usize,
     /// Count only solutions whose determinant is at least this [default: the seed's conditions alone]
-    #[arg(long, value_name = "DETERMINANT")]
+    #[arg(long, value_name = "DETERMINANT", value_parser = parse_margin)]
     margin: Option<f64>,
     /// CSV file for the boxes that stay undecided
     #[arg(long, value_name = "FILE.csv")]
@@ -125,6 +125,16 @@ fn parse_distance(text: &str) -> Result<f64, String> {
         Ok(distance_mm)
     } else {
         Err("use a distance above 0 and below 100 mm".to_owned())
+    }
+}
+
+/// Above every determinant, or beside them as no number, there is nothing to count, and anything is proven.
+fn parse_margin(text: &str) -> Result<f64, String> {
+    let margin: f64 = text.parse().map_err(|_| format!("{text} is no number"))?;
+    if margin.is_finite() && margin >= 0.0 {
+        Ok(margin)
+    } else {
+        Err("use a finite determinant, 0 or above".to_owned())
     }
 }
 
