@@ -231,11 +231,7 @@ fn resting(mechanism: Mechanism, config: &DynamicsConfig) -> Result<Dynamics, Pl
     if let Ok(joints) = mechanism.inverse(&pose)
         && let Err(violation) = mechanism.strokes().check(&joints.actuators)
     {
-        return Err(PlantError::Quantity {
-            key: "dynamics.initial_leg_m",
-            value: violation.value_m,
-            need: "the rig must be switched on within its strokes",
-        });
+        return Err(PlantError::Start { initial_leg_m: config.initial_leg_m, violation });
     }
     Ok(Dynamics::new(mechanism, *config, pose)?)
 }
@@ -255,7 +251,7 @@ mod tests {
         };
         let slow = "can.heartbeat_consumer_ms = 90: use more than can.heartbeat_producer_ms and a cycle";
         let too_fine = "drives.leg.encoder_resolution_m = 0.000000000001: use more";
-        let cases: [(String, &str); 17] = [
+        let cases: [(String, &str); 18] = [
             (with(|s| s.can.heartbeat_consumer_ms = 50), "can.heartbeat_consumer_ms = 50: use more"),
             (with(|s| s.can.heartbeat_consumer_ms = 51), "can.heartbeat_consumer_ms = 51: use more"),
             (with(|s| (s.rate_hz, s.can.heartbeat_consumer_ms) = (10, 90)), slow),
@@ -272,7 +268,8 @@ mod tests {
             (with(|s| s.drives.leg.encoder_resolution_m = 1e-12), too_fine),
             (with(|s| s.dynamics.viscous_friction_n_s_per_m = 20_000.0), "a dynamics.step_ns of at most"),
             (with(|s| s.dynamics.slide_friction_n = 1e4), "a dynamics.step_ns of at most"),
-            (with(|s| s.dynamics.initial_leg_m = 0.4), "initial_leg_m"),
+            (with(|s| s.dynamics.initial_leg_m = 0.4), "dynamics.initial_leg_m = 0.4: "),
+            (with(|s| s.mechanism.strokes.slide_m = [0.001, 0.03]), "initial_leg_m = 0.29: axis d1 at"),
         ];
         for (error, expected) in cases {
             assert!(error.contains(expected), "{error}");
@@ -297,6 +294,15 @@ mod tests {
         }
         for leg_m in [l1, l2, l3] {
             assert!((leg_m - scenario.dynamics.initial_leg_m).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn the_rig_may_be_switched_on_with_its_legs_at_either_end() {
+        for initial_leg_m in Scenario::default().mechanism.strokes.leg_m {
+            let mut scenario = Scenario::default();
+            scenario.dynamics.initial_leg_m = initial_leg_m;
+            assert_eq!(check(&scenario), Ok(()), "{initial_leg_m}");
         }
     }
 

@@ -3,7 +3,7 @@
 use masseter_shared::can::canopen::NodeIdError;
 use masseter_shared::can::wrapped::NotByPort;
 use masseter_shared::can::{BitrateError, OpenError};
-use masseter_shared::geometry::{AXIS_NAMES, GeometryError};
+use masseter_shared::geometry::{AXIS_NAMES, GeometryError, LimitViolation};
 use masseter_shared::schedule::MASTER_ID;
 
 use crate::mechanism::DynamicsError;
@@ -72,6 +72,16 @@ pub enum PlantError {
         value: f64,
         /// What may stand there.
         need: &'static str,
+    },
+    /// Legs on which the platform cannot stand level within the strokes.
+    #[error(
+        "dynamics.initial_leg_m = {initial_leg_m}: {violation}; the rig must be switched on level within its strokes"
+    )]
+    Start {
+        /// Length of the legs, m.
+        initial_leg_m: f64,
+        /// What is outside.
+        violation: LimitViolation,
     },
     /// Drives that cannot boot in time.
     #[error(

@@ -38,6 +38,9 @@ impl Actuators {
     }
 }
 
+/// What rounding may carry a position beyond the end of its stroke, and no encoder sees, m.
+const ROUNDING_M: f64 = 1e-9;
+
 /// A full joint state: what the drives hold and what the passive hinges follow.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Joints {
@@ -91,22 +94,30 @@ impl StrokeLimits {
     /// The first axis outside its stroke, if any; a value that is no number is outside.
     #[inline]
     pub fn check(&self, actuators: &Actuators) -> Result<(), LimitViolation> {
-        self.hold(actuators, 0.0).map(|_| ())
+        self.check_within(ROUNDING_M, actuators)
     }
 
     /// The actuators with every axis held within its stroke, unless one is further outside than
     /// `excess_m` or no number.
     #[inline]
     pub fn hold(&self, actuators: &Actuators, excess_m: f64) -> Result<Actuators, LimitViolation> {
-        let mut axes_m = actuators.to_axes();
-        for (axis, axis_m) in axes_m.iter_mut().enumerate() {
-            let (value_m, [lowest_m, highest_m]) = (*axis_m, self.of_axis(axis));
+        self.check_within(excess_m, actuators)?;
+        let wanted_m = actuators.to_axes();
+        Ok(Actuators::from_axes(std::array::from_fn(|axis| {
+            let [lowest_m, highest_m] = self.of_axis(axis);
+            wanted_m[axis].clamp(lowest_m, highest_m)
+        })))
+    }
+
+    #[inline]
+    fn check_within(&self, excess_m: f64, actuators: &Actuators) -> Result<(), LimitViolation> {
+        for (axis, value_m) in actuators.to_axes().into_iter().enumerate() {
+            let [lowest_m, highest_m] = self.of_axis(axis);
             if !(lowest_m - excess_m..=highest_m + excess_m).contains(&value_m) {
                 return Err(LimitViolation { axis, value_m, lowest_m, highest_m });
             }
-            *axis_m = value_m.clamp(lowest_m, highest_m);
         }
-        Ok(Actuators::from_axes(axes_m))
+        Ok(())
     }
 }
 
@@ -115,6 +126,18 @@ mod tests {
     use super::*;
 
     const STROKES: StrokeLimits = StrokeLimits { slide_m: [-0.03, 0.03], leg_m: [0.24, 0.30] };
+
+    /// Inverse of forward kinematics at the end of a stroke ends up to a few units of the last place beyond it.
+    #[test]
+    fn what_rounding_carries_beyond_a_stroke_is_inside_it() {
+        let legs = |leg_m: f64| Actuators { slide_m: [0.0; LEGS], leg_m: [leg_m; LEGS] };
+        for leg_m in [0.30_f64.next_up(), 0.24_f64.next_down(), 0.30 + 0.9e-9] {
+            assert_eq!(STROKES.check(&legs(leg_m)), Ok(()), "{leg_m}");
+        }
+        for leg_m in [0.30 + 1.1e-9, 0.24 - 1.1e-9] {
+            assert!(STROKES.check(&legs(leg_m)).is_err(), "{leg_m}");
+        }
+    }
 
     #[test]
     fn an_axis_is_held_at_the_end_of_its_stroke_unless_it_is_too_far_outside() {
