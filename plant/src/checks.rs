@@ -9,7 +9,7 @@ use crate::expectation::setup;
 use crate::master::exchanges;
 
 /// Integration steps that resolve the stiffest parts and cost a bearable time, ns.
-const STEPS_NS: std::ops::RangeInclusive<u64> = 10_000..=250_000;
+pub(crate) const STEPS_NS: std::ops::RangeInclusive<u64> = 10_000..=250_000;
 /// More is no encoder's, m.
 const NOISIEST_M: f64 = 1e-3;
 

@@ -15,6 +15,7 @@ use masseter_shared::config::DynamicsConfig;
 use masseter_shared::geometry::{AXES, InverseError, Jacobian, Joints, LEGS, Mechanism, Pose, Twist, Vec3};
 use nalgebra::{Matrix3, Matrix6, UnitQuaternion, Vector3, Vector6};
 
+use crate::checks::STEPS_NS;
 use crate::food::Food;
 use crate::friction::Friction;
 
@@ -50,6 +51,11 @@ pub enum DynamicsError {
         /// The longest step that resolves it, ns.
         longest_step_ns: u64,
     },
+    /// Friction that no step resolves which is allowed.
+    #[error(
+        "[dynamics]: too much friction for the masses it brakes, and no dynamics.step_ns resolves it; use less"
+    )]
+    Stiff,
 }
 
 impl Dynamics {
@@ -66,6 +72,9 @@ impl Dynamics {
         let dynamics =
             Self { mechanism, config, pose, twist, acceleration, joints, jacobian, friction, food: None };
         let longest_step_ns = dynamics.longest_step_ns()?;
+        if longest_step_ns < *STEPS_NS.start() {
+            return Err(DynamicsError::Stiff);
+        }
         if config.step_ns > longest_step_ns {
             return Err(DynamicsError::Friction { longest_step_ns });
         }
@@ -73,14 +82,19 @@ impl Dynamics {
     }
 
     /// The longest step in which friction does not turn a motion into a faster one back: 2 by the greatest
-    /// eigenvalue of M⁻¹ Jᵀ C J, C being how steeply friction grows with speed at rest.
+    /// eigenvalue of M⁻¹ Jᵀ C J, C being how steeply friction grows with speed at rest. With M = L Lᵀ it is that of
+    /// the symmetric B Bᵀ, B = L⁻¹ Jᵀ √C.
     fn longest_step_ns(&self) -> Result<u64, DynamicsError> {
         let mass = self.mass(&self.platform_inertia()).cholesky().ok_or(DynamicsError::Mass)?;
-        let jacobian = &self.jacobian.actuators;
-        let damping =
-            jacobian.transpose() * Matrix6::from_diagonal(&self.friction.damping_n_s_per_m()) * jacobian;
-        let rates_per_s = (mass.inverse() * damping).complex_eigenvalues().map(|rate| rate.re);
-        Ok((2e9 / rates_per_s.max()) as u64)
+        let root = Matrix6::from_diagonal(&self.friction.damping_n_s_per_m().map(f64::sqrt));
+        let braked = self.jacobian.actuators.transpose() * root;
+        let braked = mass.l().solve_lower_triangular(&braked).ok_or(DynamicsError::Mass)?;
+        let rates_per_s = braked * braked.transpose();
+        // The search for eigenvalues of what is no number never ends.
+        if !rates_per_s.iter().all(|rate| rate.is_finite()) {
+            return Err(DynamicsError::Stiff);
+        }
+        Ok((2e9 / rates_per_s.symmetric_eigenvalues().max()) as u64)
     }
 
     /// With food between the teeth.
