@@ -56,6 +56,8 @@ pub struct Controller {
     config: ControllerConfig,
     period_s: f64,
     velocity_limit_m_s: [f64; AXES],
+    /// How far the whole trim may carry an axis.
+    trim_reach_m: f64,
     tracker: ForwardTracker,
     playback: Playback,
     delivery: Delivery,
@@ -90,6 +92,7 @@ impl Controller {
             playback: Playback::new(trajectory, config.ease_s, config.stop_ramp_s),
             delivery: Delivery::default(),
             control: PoseControl::new(&config),
+            trim_reach_m: config.trim_limit_m + config.trim_limit_rad * mechanism.platform_arm_m(),
             mechanism,
             config,
             period_s: scenario.period_s(),
@@ -248,9 +251,9 @@ impl Controller {
             .mechanism
             .inverse(&self.control.correct(&ahead))
             .map_err(|_| Fault::new(Cause::InverseKinematics, f64::NAN, 0.0))?;
-        // A motion that uses its strokes to the end leaves no room for the trim, nor a start there for the encoders.
-        let target = self.mechanism.strokes().hold(&joints.actuators, self.config.trim_limit_m)?;
-        let before = self.target.unwrap_or(target);
+        // A motion that uses its strokes to the end leaves no room for the trim.
+        let before = self.target.unwrap_or(joints.actuators);
+        let target = self.mechanism.strokes().hold(&joints.actuators, &before, self.trim_reach_m)?;
         safety::check_velocity(&target, &before, &self.velocity_limit_m_s, self.period_s)?;
         self.target = Some(target);
         Ok(())

@@ -1,6 +1,6 @@
 //! Scenarios of the controller alone: a plant that does what it is told, and one thing that goes wrong.
 
-use masseter_shared::config::{ControllerConfig, MotionConfig};
+use masseter_shared::config::{ControllerConfig, JawConfig};
 use masseter_shared::geometry::MechanismConfig;
 use masseter_shared::messages::codes::{DriveRequest, EventKind};
 use masseter_shared::messages::{Command, State};
@@ -8,6 +8,18 @@ use masseter_shared::messages::{Command, State};
 use super::*;
 
 const PERIOD_NS: u64 = 1_000_000;
+
+fn short() -> Scenario {
+    Scenario { duration_s: Some(1.5), ..Scenario::default() }
+}
+
+fn mechanism() -> Mechanism {
+    Mechanism::new(&MechanismConfig::default()).unwrap()
+}
+
+fn trajectory(scenario: &Scenario) -> Trajectory {
+    Trajectory::new(&scenario.motion, &scenario.jaw, &mechanism(), scenario.duration_s).unwrap()
+}
 
 /// A plant that stands two cycles later where it was told to, and does what was requested at once.
 struct Bench {
@@ -25,14 +37,14 @@ impl Bench {
     }
 
     fn standing_at(leg_m: [f64; LEGS]) -> Self {
-        let scenario = Scenario { duration_s: Some(1.5), ..Scenario::default() };
-        let mechanism = Mechanism::new(&MechanismConfig::default()).unwrap();
-        let motion = MotionConfig::default();
-        let trajectory = Trajectory::new(&motion, &scenario.jaw, &mechanism, scenario.duration_s).unwrap();
+        Self::of(&short(), leg_m)
+    }
+
+    fn of(scenario: &Scenario, leg_m: [f64; LEGS]) -> Self {
         let at_start = Actuators { slide_m: [0.0; LEGS], leg_m };
         let start = Command { target_m: at_start.to_axes(), ..Command::default() };
         Self {
-            controller: Controller::new(&scenario, mechanism, trajectory),
+            controller: Controller::new(scenario, mechanism(), trajectory(scenario)),
             cycle: 0,
             commands: [start; 2],
             events: Vec::new(),
@@ -164,17 +176,38 @@ fn what_is_wanted_at_a_sample_is_found_there() {
     assert!(worst_m < 2e-5, "{worst_m}");
 }
 
-/// The encoders count the end of the stroke as a little outside.
+/// As after its drives were off: the encoders may count the end of the stroke as outside, or it was pushed there.
 #[test]
-fn a_rig_that_stands_at_the_end_of_its_strokes_eases_away_from_it() {
+fn a_rig_that_stands_a_little_outside_its_strokes_is_eased_back_into_them() {
     let lowest_m = MechanismConfig::default().strokes.leg_m[0];
-    let mut bench = Bench::standing_at([lowest_m - 1e-6, lowest_m, lowest_m - 2e-6]);
+    let start_m = [lowest_m - 1e-6, lowest_m, lowest_m - 0.5e-3];
+    let mut bench = Bench::standing_at(start_m);
     bench.run_until(ControllerState::Easing);
     while bench.controller.state() == ControllerState::Easing {
         bench.cycle(Some);
-        assert!(bench.commands[1].target_m[LEGS..].iter().all(|&leg_m| leg_m >= lowest_m));
+        let target_m = &bench.commands[1].target_m[LEGS..];
+        assert!(target_m.iter().zip(start_m).all(|(to_m, from_m)| *to_m >= from_m.min(lowest_m)));
     }
     assert_eq!(bench.controller.state(), ControllerState::Running);
+    assert!(bench.largest_step_m < 1.2e-4, "{}", bench.largest_step_m);
+}
+
+/// The whole shift and the whole turn together, at the end of the legs' strokes.
+#[test]
+fn what_the_trim_carries_beyond_a_stroke_is_held_at_its_end() {
+    let [_, highest_m] = MechanismConfig::default().strokes.leg_m;
+    let jaw = JawConfig { closed_leg_m: highest_m, ..JawConfig::default() };
+    let mut bench = Bench::of(&Scenario { jaw, ..short() }, [0.29; LEGS]);
+    bench.run_until(ControllerState::Running);
+    while bench.controller.state() != ControllerState::Finished {
+        bench.cycle(|mut reading| {
+            let lacking_m = [2.5e-3, 0.5e-3, 0.5e-3];
+            reading.position_m[LEGS..].iter_mut().zip(lacking_m).for_each(|(leg_m, by_m)| *leg_m -= by_m);
+            Some(reading)
+        });
+        assert_ne!(bench.controller.state(), ControllerState::SafeStop, "{:?}", bench.events.last());
+        assert!(bench.commands[1].target_m[LEGS..].iter().all(|&leg_m| leg_m <= highest_m));
+    }
 }
 
 #[test]

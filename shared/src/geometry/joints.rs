@@ -97,15 +97,20 @@ impl StrokeLimits {
         self.check_within(ROUNDING_M, actuators)
     }
 
-    /// The actuators with every axis held within its stroke, unless one is further outside than
-    /// `excess_m` or no number.
+    /// The actuators with every axis held within its stroke, unless one is further outside than `excess_m` or no
+    /// number. An axis that stood outside before may come back from there, but go no further.
     #[inline]
-    pub fn hold(&self, actuators: &Actuators, excess_m: f64) -> Result<Actuators, LimitViolation> {
+    pub fn hold(
+        &self,
+        actuators: &Actuators,
+        before: &Actuators,
+        excess_m: f64,
+    ) -> Result<Actuators, LimitViolation> {
         self.check_within(excess_m, actuators)?;
-        let wanted_m = actuators.to_axes();
+        let (wanted_m, before_m) = (actuators.to_axes(), before.to_axes());
         Ok(Actuators::from_axes(std::array::from_fn(|axis| {
             let [lowest_m, highest_m] = self.of_axis(axis);
-            wanted_m[axis].clamp(lowest_m, highest_m)
+            wanted_m[axis].clamp(lowest_m.min(before_m[axis]), highest_m.max(before_m[axis]))
         })))
     }
 
@@ -147,13 +152,23 @@ mod tests {
             (asked(-0.0305, 0.27), asked(-0.03, 0.27)),
             (asked(0.0, 0.3009), asked(0.0, 0.30)),
         ];
+        let before = asked(0.0, 0.27);
         for (actuators, held) in holds {
-            assert_eq!(STROKES.hold(&actuators, 1e-3), Ok(held));
+            assert_eq!(STROKES.hold(&actuators, &before, 1e-3), Ok(held));
         }
         for (actuators, axis) in [(asked(0.0302, 0.238), 5), (asked(f64::NAN, 0.27), 0)] {
-            assert_eq!(STROKES.hold(&actuators, 1e-3).unwrap_err().axis, axis);
+            assert_eq!(STROKES.hold(&actuators, &before, 1e-3).unwrap_err().axis, axis);
         }
         assert!(STROKES.check(&asked(0.03, 0.24)).is_ok());
         assert!(STROKES.check(&asked(0.03, 0.239_999)).is_err());
+    }
+
+    #[test]
+    fn an_axis_that_stood_outside_may_come_back_but_go_no_further() {
+        let asked = |l1_m: f64| Actuators { slide_m: [0.0; LEGS], leg_m: [l1_m, 0.27, 0.27] };
+        let moves = [(0.2395, 0.2396, 0.2396), (0.2395, 0.2394, 0.2395), (0.241, 0.2394, 0.24)];
+        for (from_m, to_m, held_m) in moves {
+            assert_eq!(STROKES.hold(&asked(to_m), &asked(from_m), 1e-3), Ok(asked(held_m)));
+        }
     }
 }

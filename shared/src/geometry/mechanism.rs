@@ -159,6 +159,11 @@ impl Mechanism {
         self.sides_m
     }
 
+    /// Distance of the farthest corner from the platform's origin, metres.
+    pub fn platform_arm_m(&self) -> f64 {
+        self.corners.iter().map(Vec3::norm).fold(0.0, f64::max)
+    }
+
     /// Corners A₁, A₂, A₃ in the platform frame, metres.
     pub fn platform_corners(&self) -> &[Vec3; LEGS] {
         &self.corners
