@@ -247,10 +247,7 @@ impl Controller {
             self.control.observe(&wanted, &estimate.solution.pose, self.period_s);
         }
         let ahead = self.playback.pose_ahead(self.config.lead_cycles * self.period_s);
-        let joints = self
-            .mechanism
-            .inverse(&self.control.correct(&ahead))
-            .map_err(|_| Fault::new(Cause::InverseKinematics, f64::NAN, 0.0))?;
+        let joints = self.mechanism.inverse(&self.control.correct(&ahead))?;
         // A motion that uses its strokes to the end leaves no room for the trim.
         let before = self.target.unwrap_or(joints.actuators);
         let target = self.mechanism.strokes().hold(&joints.actuators, &before, self.trim_reach_m)?;

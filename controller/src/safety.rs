@@ -1,7 +1,7 @@
 //! What makes the controller stop: each check names the cause, the value and the limit it broke.
 
-use masseter_shared::geometry::{AXES, Actuators, LimitViolation, Pose};
-use masseter_shared::messages::codes::{Cause, DriveCondition, NO_AXIS};
+use masseter_shared::geometry::{AXES, Actuators, InverseError, LEGS, LimitViolation, Pose};
+use masseter_shared::messages::codes::{Cause, DriveCondition, NO_AXIS, NoPose};
 use masseter_shared::messages::{Event, Reading};
 
 use crate::kinematics::ForwardError;
@@ -17,22 +17,30 @@ pub struct Fault {
     pub value: f64,
     /// The limit.
     pub limit: f64,
+    /// Why there is no pose, where that is what is wrong.
+    pub no_pose: Option<NoPose>,
 }
 
 impl Fault {
     /// A fault of the whole rig.
     pub fn new(cause: Cause, value: f64, limit: f64) -> Self {
-        Self { cause, axis: None, value, limit }
+        Self { cause, axis: None, value, limit, no_pose: None }
     }
 
     fn of_axis(cause: Cause, axis: usize, value: f64, limit: f64) -> Self {
-        Self { cause, axis: Some(axis), value, limit }
+        Self { axis: Some(axis), ..Self::new(cause, value, limit) }
+    }
+
+    /// Kinematics that gave nothing, by the fault of a leg or of all together.
+    fn of_kinematics(cause: Cause, reason: NoPose, leg: Option<usize>, value: f64) -> Self {
+        Self { axis: leg.map(|leg| LEGS + leg), no_pose: Some(reason), ..Self::new(cause, value, 0.0) }
     }
 
     /// Fills the event's explanation.
     pub(crate) fn explain(&self, event: &mut Event) {
         event.cause = self.cause.code();
         event.axis = self.axis.map_or(NO_AXIS, |axis| axis as u32);
+        event.object = self.no_pose.map_or(0, NoPose::code);
         (event.value, event.limit) = (self.value, self.limit);
     }
 }
@@ -45,8 +53,29 @@ impl From<LimitViolation> for Fault {
 
 impl From<&ForwardError> for Fault {
     fn from(error: &ForwardError) -> Self {
+        let (reason, leg) = match *error {
+            ForwardError::NotFinite => (NoPose::NotFinite, None),
+            ForwardError::NoLength { leg, .. } => (NoPose::NoLength, Some(leg)),
+            ForwardError::Unassemblable => (NoPose::Unassemblable, None),
+            ForwardError::WrongAssembly { .. } => (NoPose::WrongAssembly, None),
+            ForwardError::Ambiguous { .. } => (NoPose::Ambiguous, None),
+            ForwardError::Undecided { .. } => (NoPose::Undecided, None),
+            ForwardError::NoConvergence { .. }
+            | ForwardError::Stalled { .. }
+            | ForwardError::Singular { .. } => (NoPose::NotFound, None),
+        };
         let residual_m = error.residual_m().unwrap_or(f64::NAN);
-        Self::new(Cause::ForwardKinematics, residual_m, 0.0)
+        Self::of_kinematics(Cause::ForwardKinematics, reason, leg, residual_m)
+    }
+}
+
+impl From<InverseError> for Fault {
+    fn from(error: InverseError) -> Self {
+        let (reason, leg) = match error {
+            InverseError::NotFinite => (NoPose::NotFinite, None),
+            InverseError::NoLength { leg, .. } => (NoPose::NoLength, Some(leg)),
+        };
+        Self::of_kinematics(Cause::InverseKinematics, reason, leg, f64::NAN)
     }
 }
 

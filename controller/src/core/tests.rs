@@ -3,7 +3,7 @@
 use masseter_shared::config::{ControllerConfig, JawConfig};
 use masseter_shared::geometry::MechanismConfig;
 use masseter_shared::messages::codes::{DriveRequest, EventKind};
-use masseter_shared::messages::{Command, State};
+use masseter_shared::messages::{Command, State, explain};
 
 use super::*;
 
@@ -207,6 +207,21 @@ fn what_the_trim_carries_beyond_a_stroke_is_held_at_its_end() {
         });
         assert_ne!(bench.controller.state(), ControllerState::SafeStop, "{:?}", bench.events.last());
         assert!(bench.commands[1].target_m[LEGS..].iter().all(|&leg_m| leg_m <= highest_m));
+    }
+}
+
+#[test]
+fn a_stop_for_want_of_a_pose_says_why_there_is_none() {
+    let cases = [
+        ([0.03, -0.03, 0.0, 0.3, 0.24, 0.24], "cannot be assembled"),
+        ([0.0, 0.0, 0.0, 0.29, 0.0, 0.29], "axis l2: the leg has no length"),
+    ];
+    for (position_m, reason) in cases {
+        let mut bench = Bench::new();
+        bench.run_until(ControllerState::Running);
+        bench.cycle(|reading| Some(Reading { position_m, ..reading }));
+        let said = explain(bench.events.last().unwrap()).unwrap_or_default();
+        assert!(said.contains(reason) && said.contains("[mechanism]"), "{said}");
     }
 }
 

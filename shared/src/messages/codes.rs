@@ -153,6 +153,24 @@ codes! {
         Notice = 2 "notice",
     }
 
+    /// Why kinematics gave nothing, as an event of the controller tells it in its `object`.
+    NoPose {
+        /// A coordinate is no finite number.
+        NotFinite = 1 "not_finite",
+        /// A leg has no length; the event names its axis.
+        NoLength = 2 "no_length",
+        /// No pose fits the positions.
+        Unassemblable = 3 "unassemblable",
+        /// Only poses fit them in which the mechanism is folded over.
+        WrongAssembly = 4 "wrong_assembly",
+        /// Several poses fit them, and the last one does not settle which.
+        Ambiguous = 5 "ambiguous",
+        /// Poses fit them that cannot be told apart.
+        Undecided = 6 "undecided",
+        /// The pose is singular, or an iteration came to none.
+        NotFound = 7 "not_found",
+    }
+
     /// Why something happened. The unit of an event's `value` and `limit` stands in brackets.
     Cause {
         /// In the course of the sequence.

@@ -265,7 +265,8 @@ messages! {
         cause: u32,
         /// Axis concerned, from 0; [`codes::NO_AXIS`] when none is.
         axis: u32,
-        /// Object dictionary entry concerned, index · 256 + sub-index, or a COB-ID; 0 when none is.
+        /// Object dictionary entry concerned, index · 256 + sub-index, or a COB-ID; of the controller a
+        /// [`codes::NoPose`]; 0 when there is none.
         object: u32,
         /// Node id concerned; 0 when none is.
         node: u16,

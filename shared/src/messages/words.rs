@@ -1,12 +1,12 @@
-//! Events of the CAN master in words: what is wrong, where, and what to do.
+//! Events in words: what is wrong, where, and what to do.
 
 use super::Event;
-use super::codes::{Cause, EventKind};
+use super::codes::{Cause, EventKind, NoPose, Source};
 use crate::can::canopen::{AbortCode, EmergencyCode, ObjectAddress};
 use crate::geometry::AXIS_NAMES;
 
-/// The sentence for an event that names a node, a bus or an object; `None` where the figures alone say
-/// what there is to say.
+/// The sentence for an event that names a node, a bus, an object, or why there is no pose; `None` where the figures
+/// alone say what there is to say.
 pub fn explain(event: &Event) -> Option<String> {
     let cause = Cause::try_from(event.cause).ok().filter(|_| event.kind != EventKind::Transition.code())?;
     let what = complaint(cause, event)?;
@@ -17,6 +17,7 @@ pub fn explain(event: &Event) -> Option<String> {
 fn place(event: &Event) -> String {
     let Event { node, bus, .. } = event;
     match (AXIS_NAMES.get(event.axis as usize), node) {
+        (None, 0) if event.source == Source::Controller.code() => "the mechanism".to_owned(),
         (Some(axis), 1..) => format!("axis {axis} (node {node} on bus {bus})"),
         (Some(axis), 0) => format!("axis {axis}"),
         (None, 1..) => format!("node {node} on bus {bus}"),
@@ -57,8 +58,25 @@ fn complaint(cause: Cause, event: &Event) -> Option<String> {
         }
         Cause::UnknownNode => "a node that no axis is configured with".to_owned(),
         Cause::SecondMaster => "another node has the master's id".to_owned(),
+        Cause::ForwardKinematics | Cause::InverseKinematics => {
+            no_pose(NoPose::try_from(event.object).ok()?).to_owned()
+        }
         _ => return None,
     })
+}
+
+const fn no_pose(reason: NoPose) -> &'static str {
+    match reason {
+        NoPose::NotFinite => "a coordinate is no finite number",
+        NoPose::NoLength => "the leg has no length",
+        NoPose::Unassemblable => "cannot be assembled with the positions that were read",
+        NoPose::WrongAssembly => "could only stand folded over with the positions that were read",
+        NoPose::Ambiguous => {
+            "the positions that were read fit several poses, and the last pose does not settle which"
+        }
+        NoPose::Undecided => "the positions that were read fit poses that cannot be told apart",
+        NoPose::NotFound => "is singular with the positions that were read",
+    }
 }
 
 const fn remedy(cause: Cause) -> Option<&'static str> {
@@ -82,6 +100,10 @@ const fn remedy(cause: Cause) -> Option<&'static str> {
         Cause::SecondMaster => {
             "let one master guide the drives: end the other, or give that node an id of its own"
         }
+        Cause::ForwardKinematics => {
+            "compare what the encoders count with the rig, and the rig with the scenario's [mechanism]"
+        }
+        Cause::InverseKinematics => "see the motion, and the scenario's [mechanism]",
         _ => return None,
     })
 }
@@ -119,8 +141,25 @@ mod tests {
     }
 
     #[test]
+    fn kinematics_without_a_pose_says_why() {
+        let stopped = |cause: Cause, axis: u32, reason: NoPose| {
+            let (source, object) = (Source::Controller.code(), reason.code());
+            explain(&Event { source, axis, object, node: 0, bus: 0, ..event(cause) }).unwrap()
+        };
+        assert_eq!(
+            stopped(Cause::ForwardKinematics, NO_AXIS, NoPose::Unassemblable),
+            "the mechanism: cannot be assembled with the positions that were read; compare what the encoders count \
+             with the rig, and the rig with the scenario's [mechanism]"
+        );
+        let short = stopped(Cause::InverseKinematics, 4, NoPose::NoLength);
+        assert!(short.starts_with("axis l2: the leg has no length; see the motion"), "{short}");
+    }
+
+    #[test]
     fn what_figures_say_alone_is_left_to_them() {
         assert_eq!(explain(&event(Cause::CommandLost)), None);
+        // Of recordings that are older than the reason.
+        assert_eq!(explain(&event(Cause::ForwardKinematics)), None);
         let moved = Event { kind: EventKind::Transition.code(), ..event(Cause::BootTimeout) };
         assert_eq!(explain(&moved), None);
     }
