@@ -79,30 +79,18 @@ impl Chewing {
 
     /// The balancing condyle's advance that swings the widest open jaw this far to the side.
     fn balancing_for(&self, lateral_mm: f64, sign: f64) -> Result<f64, TrajectoryError> {
-        if lateral_mm == 0.0 {
-            return Ok(0.0);
-        }
         let swing_m = |balancing_m| {
-            let widest = Self { balancing_m, ..*self }.posture(self.cycle.widest());
-            widest.map_or(f64::INFINITY, |p| sign * self.mandible.displacement(&p).translation.y)
+            let widest = Self { balancing_m, ..*self }.posture(self.cycle.widest())?;
+            Some(sign * self.mandible.displacement(&widest).translation.y)
         };
-        let balancing_m = reach(lateral_mm / 1000.0, LARGEST_BALANCING_M, swing_m);
-        let reached_mm = 1000.0 * swing_m(balancing_m);
-        if (reached_mm - lateral_mm).abs() > 1e-6 {
-            return Err(TrajectoryError::OutOfReach {
-                name: "lateral_mm",
-                wanted_mm: lateral_mm,
-                reached_mm,
-            });
-        }
-        Ok(balancing_m)
+        reach("lateral_mm", lateral_mm, LARGEST_BALANCING_M, swing_m)
     }
 
     fn prove(&self) -> Result<(), TrajectoryError> {
         for point in 0..PROOF_POINTS {
             let phase = f64::from(point) / f64::from(PROOF_POINTS);
-            let advance_m = self.posture(phase).map_or(f64::NAN, |posture| posture.advance_m);
-            if advance_m.is_nan() || advance_m < -LARGEST_RETRUSION_M {
+            let Posture { advance_m, .. } = self.posture(phase).ok_or(TrajectoryError::TooWide { phase })?;
+            if advance_m < -LARGEST_RETRUSION_M {
                 return Err(TrajectoryError::Dislocated { phase, advance_mm: 1000.0 * advance_m });
             }
         }
@@ -163,6 +151,7 @@ mod tests {
             ChewingConfig { condylar_inclination_deg: 0.0, vertical_mm: 60.0, ..Default::default() };
         let bad = [
             (ChewingConfig { vertical_mm: f64::NAN, ..Default::default() }, "vertical_mm"),
+            (ChewingConfig { lateral_mm: 15.0, vertical_mm: 5.0, ..Default::default() }, "lateral_mm"),
             (ChewingConfig { lateral_mm: -1.0, ..Default::default() }, "lateral_mm"),
             (ChewingConfig { condylar_inclination_deg: 90.0, ..Default::default() }, "inclination"),
             (ChewingConfig { anterior_posterior_mm: 25.0, ..Default::default() }, "anterior_posterior_mm"),
@@ -170,7 +159,7 @@ mod tests {
         ];
         for (config, name) in bad {
             let error = Chewing::new(&config, &JawConfig::default()).unwrap_err().to_string();
-            assert!(error.contains(name) && !error.contains("inf"), "{error}");
+            assert!(error.contains(name) && !error.contains("inf") && !error.contains("NaN mm"), "{error}");
         }
     }
 }

@@ -35,6 +35,15 @@ pub enum TrajectoryError {
         /// The largest one possible, mm.
         reached_mm: f64,
     },
+    /// The incisal path leads to where the mandible's length does not let it get.
+    #[error(
+        "at {phase:.2} of the chewing cycle the incisal point would be out of the mandible's reach; bring vertical_mm or \
+         anterior_posterior_mm closer to the defaults (18 and 5), or condylar_inclination_deg (40)"
+    )]
+    TooWide {
+        /// Where in the cycle, 0 to 1.
+        phase: f64,
+    },
     /// The incisal path would push the condyles out of their sockets.
     #[error(
         "at {phase:.2} of the chewing cycle the condyles would stand {advance_mm:.1} mm along their paths; \
@@ -43,7 +52,7 @@ pub enum TrajectoryError {
     Dislocated {
         /// Where in the cycle, 0 to 1.
         phase: f64,
-        /// Advance of both condyles there, mm; NaN if no advance fits at all.
+        /// Advance of both condyles there, mm.
         advance_mm: f64,
     },
     /// The closed pose is none the mechanism can take.

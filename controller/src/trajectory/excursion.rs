@@ -83,15 +83,7 @@ impl Excursion {
 /// The coordinate at which the incisal point's travel, metres, is the amplitude.
 fn farthest(amplitude_mm: f64, highest: f64, travel_m: impl Fn(f64) -> f64) -> Result<f64, TrajectoryError> {
     require("amplitude_mm", amplitude_mm, amplitude_mm >= 0.0, "0 or above")?;
-    let reached_mm = 1000.0 * travel_m(highest);
-    if amplitude_mm > reached_mm {
-        return Err(TrajectoryError::OutOfReach {
-            name: "amplitude_mm",
-            wanted_mm: amplitude_mm,
-            reached_mm,
-        });
-    }
-    Ok(reach(amplitude_mm / 1000.0, highest, travel_m))
+    reach("amplitude_mm", amplitude_mm, highest, |coordinate| Some(travel_m(coordinate)))
 }
 
 #[cfg(test)]

@@ -16,6 +16,9 @@ use nalgebra::{Quaternion, UnitQuaternion};
 use super::TrajectoryError;
 use super::error::require;
 
+/// An amplitude that is missed by no more is reached, mm.
+const REACHED_MM: f64 = 1e-6;
+
 /// Along which paths the condyles glide.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Guidance {
@@ -158,15 +161,25 @@ fn turn_of_y_to(direction: &Vec3) -> UnitQuaternion<f64> {
     UnitQuaternion::from_quaternion(half)
 }
 
-/// The argument in 0..=`highest` at which a rising function reaches a value; `highest` if it does not.
-/// Sixty halvings exhaust double precision.
-pub(super) fn reach(value: f64, highest: f64, function: impl Fn(f64) -> f64) -> f64 {
+/// The coordinate in 0..=`highest` at which the incisal point's travel (metres, rising from 0) is an amplitude; where
+/// there is no travel, the coordinate is too high. Sixty halvings exhaust double precision.
+pub(super) fn reach(
+    name: &'static str,
+    amplitude_mm: f64,
+    highest: f64,
+    travel_m: impl Fn(f64) -> Option<f64>,
+) -> Result<f64, TrajectoryError> {
     let (mut below, mut above) = (0.0, highest);
     for _ in 0..60 {
         let middle = f64::midpoint(below, above);
-        if function(middle) < value { below = middle } else { above = middle }
+        let is_below = travel_m(middle).is_some_and(|travel_m| 1000.0 * travel_m < amplitude_mm);
+        if is_below { below = middle } else { above = middle }
     }
-    above
+    let reached_mm = 1000.0 * travel_m(below).unwrap_or_default();
+    if amplitude_mm - reached_mm > REACHED_MM {
+        return Err(TrajectoryError::OutOfReach { name, wanted_mm: amplitude_mm, reached_mm });
+    }
+    Ok(below)
 }
 
 #[cfg(test)]
