@@ -43,19 +43,14 @@ impl Input {
         &self.name
     }
 
-    /// The next line without its end; none at the end of the input.
-    fn read(&mut self) -> io::Result<Option<Result<String, String>>> {
+    /// The next line, the longest ones cut behind `LONGEST_LINE` bytes; nothing at the end of the input.
+    fn read(&mut self) -> io::Result<Vec<u8>> {
         let mut line = Vec::new();
         (&mut self.source).take(LONGEST_LINE as u64).read_until(b'\n', &mut line)?;
-        if line.is_empty() {
-            return Ok(None);
-        }
-        if line.len() == LONGEST_LINE && !line.ends_with(b"\n") {
+        if is_cut(&line) {
             self.source.skip_until(b'\n')?;
-            return Ok(Some(Err(format!("longer than {LONGEST_LINE} bytes"))));
         }
-        let Ok(line) = String::from_utf8(line) else { return Ok(Some(Err("not text in UTF-8".to_owned()))) };
-        Ok(Some(Ok(line.trim_start_matches(BYTE_ORDER_MARK).trim().to_owned())))
+        Ok(line)
     }
 }
 
@@ -65,18 +60,41 @@ impl Iterator for Input {
     fn next(&mut self) -> Option<Line> {
         while !self.is_over {
             self.lines += 1;
-            let text = self.read().unwrap_or_else(|error| {
-                self.is_over = true;
-                Some(Err(error.to_string()))
-            });
-            match text {
-                None => self.is_over = true,
-                Some(Ok(comment)) if comment.starts_with('#') => {}
-                Some(text) => return Some(Line { number: self.lines, text }),
-            }
+            let text = match self.read() {
+                Ok(line) if line.is_empty() => {
+                    self.is_over = true;
+                    return None;
+                }
+                Ok(line) if is_comment(&line) => continue,
+                Ok(line) => text(line),
+                Err(error) => {
+                    self.is_over = true;
+                    Err(error.to_string())
+                }
+            };
+            return Some(Line { number: self.lines, text });
         }
         None
     }
+}
+
+fn is_cut(line: &[u8]) -> bool {
+    line.len() == LONGEST_LINE && !line.ends_with(b"\n")
+}
+
+/// Whatever its encoding and however long it is.
+fn is_comment(line: &[u8]) -> bool {
+    let line = line.strip_prefix(BYTE_ORDER_MARK.as_bytes()).unwrap_or(line);
+    line.trim_ascii_start().starts_with(b"#")
+}
+
+/// A line without its end.
+fn text(line: Vec<u8>) -> Result<String, String> {
+    if is_cut(&line) {
+        return Err(format!("longer than {LONGEST_LINE} bytes"));
+    }
+    let line = String::from_utf8(line).map_err(|_| "not text in UTF-8".to_owned())?;
+    Ok(line.trim_start_matches(BYTE_ORDER_MARK).trim().to_owned())
 }
 
 #[cfg(test)]
@@ -98,6 +116,14 @@ mod tests {
         assert_eq!(lines(b""), []);
         assert_eq!(lines(b"\n"), [(1, text(""))]);
         assert!(matches!(&lines(b"\xff\n1\n")[..], [(1, Err(_)), (2, Ok(_))]));
+    }
+
+    #[test]
+    fn comments_are_passed_over_in_any_encoding_and_of_any_length() {
+        let latin_1 = b"# Gr\xf6\xdfe\n \t# \xff\n1\n";
+        assert_eq!(lines(latin_1), [(3, Ok("1".to_owned()))]);
+        let long = [b"\xef\xbb\xbf#", &[b'x'; 2 * LONGEST_LINE][..], b"\n2\n"].concat();
+        assert_eq!(lines(&long), [(2, Ok("2".to_owned()))]);
     }
 
     #[test]
