@@ -69,8 +69,11 @@ impl Plan {
             [] => "virtual CAN".to_owned(),
             interfaces => interfaces.join(", "),
         };
+        let cut = self.trajectory.cut_from_s();
+        let cut = cut
+            .map_or_else(String::new, |whole_s| format!("; cut short: to its end it takes {whole_s:.1} s"));
         format!(
-            "{}: {:.1} s at {} Hz on {wires}, seed {}",
+            "{}: {:.1} s at {} Hz on {wires}, seed {}{cut}",
             scenario.name,
             self.trajectory.duration_s(),
             scenario.rate_hz,

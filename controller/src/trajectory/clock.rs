@@ -6,6 +6,9 @@ use super::cycle::minimum_jerk_integral;
 /// How long the clock takes to reach full speed, and to stop, s.
 pub(super) const RAMP_S: f64 = 0.5;
 
+/// Less is rounding, s.
+const SHORTEST_CUT_S: f64 = 1e-6;
+
 /// Maps the trajectory's time to the motion's time.
 #[derive(Debug, Clone, Copy)]
 #[expect(clippy::struct_field_names, reason = "a unit is part of its name")]
@@ -13,6 +16,8 @@ pub(super) struct MotionClock {
     ramp_s: f64,
     stopped_s: f64,
     duration_s: f64,
+    /// What the motion takes to its end.
+    whole_s: f64,
 }
 
 impl MotionClock {
@@ -22,7 +27,13 @@ impl MotionClock {
     /// of the duration is held; what does not fit into it is cut.
     pub(super) fn new(length_s: f64, duration_s: f64) -> Self {
         let ramp_s = RAMP_S.min(length_s).min(duration_s / 2.0);
-        Self { ramp_s, stopped_s: duration_s.min(length_s + ramp_s), duration_s }
+        let whole_s = length_s + RAMP_S.min(length_s);
+        Self { ramp_s, stopped_s: duration_s.min(length_s + ramp_s), duration_s, whole_s }
+    }
+
+    /// What the motion would take to its end, s, where the duration cuts it by more than rounding.
+    pub(super) fn cut_from_s(&self) -> Option<f64> {
+        (self.duration_s < self.whole_s - SHORTEST_CUT_S).then_some(self.whole_s)
     }
 
     pub(super) fn duration_s(&self) -> f64 {
@@ -51,11 +62,19 @@ mod tests {
 
     #[test]
     fn a_motion_is_played_to_its_end_and_held_there() {
-        let table = [(3.0, 3.5, 3.0), (3.0, 5.0, 3.0), (3.0, 2.0, 1.5), (0.1, 1.0, 0.1), (3.0, 0.2, 0.1)];
+        let table = [
+            (3.0, 3.5, 3.0),
+            (3.0, 5.0, 3.0),
+            (3.0, 2.0, 1.5),
+            (0.1, 1.0, 0.1),
+            (3.0, 0.2, 0.1),
+            (0.1, 0.15, 0.075),
+        ];
         for (length_s, duration_s, end_s) in table {
             let clock = MotionClock::new(length_s, duration_s);
             assert!((clock.motion_time_s(duration_s) - end_s).abs() < 1e-12);
             assert!((clock.motion_time_s(duration_s + 9.0) - end_s).abs() < 1e-12);
+            assert_eq!(clock.cut_from_s().is_some(), end_s < length_s);
             assert!(clock.motion_time_s(-1.0).abs() < 1e-12);
         }
     }

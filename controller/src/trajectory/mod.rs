@@ -95,6 +95,11 @@ impl Trajectory {
         self.clock.duration_s()
     }
 
+    /// How long the whole motion would take, s, where the duration cuts it: it then ends somewhere on its way.
+    pub fn cut_from_s(&self) -> Option<f64> {
+        self.clock.cut_from_s()
+    }
+
     /// The line of the recording nearest to a time of the trajectory; none for a generator.
     pub fn source_line(&self, t_s: f64) -> Option<SourceLine> {
         match &self.motion {
@@ -105,7 +110,7 @@ impl Trajectory {
 }
 
 impl Motion {
-    /// Generators play whole cycles only, so that they end closed.
+    /// Generators play whole cycles only, so that they end closed, but for a duration in which not even one fits.
     fn clock(&self, duration_s: Option<f64>) -> MotionClock {
         let cycle = match self {
             Self::Chewing(chewing) => chewing.cycle(),

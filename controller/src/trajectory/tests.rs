@@ -95,6 +95,15 @@ fn a_duration_cuts_a_motion_and_still_lets_it_come_to_rest() {
 }
 
 #[test]
+fn a_motion_whose_duration_holds_no_whole_cycle_is_known_to_be_cut() {
+    let opening = MotionConfig::Opening(OpeningConfig::default());
+    for (duration_s, whole_s) in [(None, None), (Some(2.5), None), (Some(2.6), None), (Some(1.0), Some(2.5))]
+    {
+        assert_eq!(build(&opening, duration_s).cut_from_s(), whole_s, "{duration_s:?}");
+    }
+}
+
+#[test]
 fn every_generator_passes_the_check_with_its_defaults() {
     for motion in generators() {
         let report = judge(&build(&motion, None)).unwrap_or_else(|error| panic!("{motion:?}: {error}"));

@@ -26,7 +26,8 @@ pub struct Scenario {
     pub seed: u64,
     /// Cycles per second, Hz.
     pub rate_hz: u32,
-    /// Duration of the motion, s; when absent a recording's own length, or ten seconds.
+    /// Duration of the motion, s; when absent a recording's own length, or ten seconds. A generated motion ends closed
+    /// if this holds a cycle and half a second, otherwise on its way.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub duration_s: Option<f64>,
     /// What the jaw does.
