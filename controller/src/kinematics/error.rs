@@ -44,7 +44,9 @@ pub enum ForwardError {
         residual_m: f64,
     },
     /// A solution of the equations at which the mechanism cannot stand.
-    #[error("solved, but not as the mechanism is assembled: {violated}; start closer to the true solution")]
+    #[error(
+        "solved, but not as the mechanism is assembled: {violated}; check the six inputs and the scenario's [mechanism]"
+    )]
     WrongAssembly {
         /// The first condition that does not hold.
         violated: Condition,
