@@ -79,9 +79,14 @@ impl Playback {
         self.elapsed_s += dt_s * (before + self.rate) / 2.0;
     }
 
+    /// The part's own time `ahead_s` from now, s.
+    fn time_ahead_s(&self, ahead_s: f64) -> f64 {
+        self.elapsed_s + self.rate * ahead_s
+    }
+
     /// The pose wanted `ahead_s` from now.
     pub(crate) fn pose_ahead(&self, ahead_s: f64) -> Pose {
-        let time_s = self.elapsed_s + self.rate * ahead_s;
+        let time_s = self.time_ahead_s(ahead_s);
         match self.part {
             Part::Hold(pose) => pose,
             Part::Ease(from) => {
@@ -105,9 +110,9 @@ impl Playback {
         self.is_over() || self.rate == 0.0
     }
 
-    /// Time on the motion's clock, s; negative before the motion.
-    pub(crate) fn motion_time_s(&self) -> f64 {
-        if self.part == Part::Motion { self.elapsed_s } else { -1.0 }
+    /// Time on the motion's clock `ahead_s` from now, s; negative before the motion.
+    pub(crate) fn motion_time_ahead_s(&self, ahead_s: f64) -> f64 {
+        if self.part == Part::Motion { self.time_ahead_s(ahead_s) } else { -1.0 }
     }
 }
 

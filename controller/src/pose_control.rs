@@ -75,11 +75,12 @@ mod tests {
     fn the_correction_is_bounded() {
         let config = ControllerConfig::default();
         let mut control = PoseControl::new(&config);
-        let wanted = Pose::identity();
+        let (wanted, found) = (Pose::identity(), Pose::new(Vec3::repeat(1.0), Vec3::repeat(0.5)));
         for _ in 0..10_000 {
-            control.observe(&wanted, &Pose::translation(1.0, 1.0, 1.0), 1e-3);
+            control.observe(&wanted, &found, 1e-3);
         }
         let asked = control.correct(&wanted);
-        assert!(asked.translation.vector.norm() <= config.trim_limit_m * 1.000_001);
+        assert!((asked.translation.vector.norm() / config.trim_limit_m - 1.0).abs() < 1e-6);
+        assert!((asked.rotation.angle() / config.trim_limit_rad - 1.0).abs() < 1e-6);
     }
 }

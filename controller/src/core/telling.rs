@@ -76,7 +76,7 @@ impl Controller {
     pub fn fill_state(&self, state: &mut State) {
         *state = State {
             cycle: self.last_cycle,
-            motion_time_s: self.playback.motion_time_s(),
+            motion_time_s: self.playback.motion_time_ahead_s(-self.sample_age_s()),
             controller_state: self.state.code(),
             ..Default::default()
         };
