@@ -76,6 +76,28 @@ fn recordings_are_refused_with_file_line_and_reason() {
 }
 
 #[test]
+fn a_point_that_a_recording_has_no_use_for_is_refused() {
+    let poses = "time_s,x_mm,y_mm,z_mm,qw,qx,qy,qz\n";
+    let markers = "time_s,m1_x_mm,m1_y_mm,m1_z_mm,m2_x_mm,m2_y_mm,m2_z_mm,m3_x_mm,m3_y_mm,m3_z_mm\n";
+    let row = |i: i32, values: &str| format!("{},{values}\n", f64::from(i) * 0.02);
+    let rows = |values: &str| (0..50).map(|i| row(i, values)).collect::<String>();
+    let cases = [
+        (poses.to_owned() + &rows("0,0,0,1,0,0,0"), "marker_origin_mm"),
+        (markers.to_owned() + &rows("0,0,0,40,0,0,0,40,0"), "reference_point_mm"),
+    ];
+    for (recording, superfluous) in cases {
+        for key in ["marker_origin_mm", "reference_point_mm"] {
+            let bench =
+                Bench::new(&format!("[motion]\nkind = 'file'\npath = 'jaw.csv'\n{key} = [0.0, 0.0, 0.0]"));
+            bench.write("jaw.csv", &recording);
+            let output = bench.run(&["--clock", "virtual", "--duration", "1s"]);
+            let is_refused = output.status.code() == Some(2) && stderr(&output).contains(key);
+            assert_eq!(is_refused, key == superfluous, "{key}: {}", stderr(&output));
+        }
+    }
+}
+
+#[test]
 fn a_margin_that_is_no_determinant_is_refused() {
     for margin in ["nan", "inf", "-inf", "-1"] {
         let output = masseter(&["uniqueness", "prove", "--boxes", "10", &format!("--margin={margin}")]);

@@ -75,6 +75,16 @@ pub enum ImportProblem {
         /// The whole header of the nearest format.
         header: String,
     },
+    /// A point that this format has no use for.
+    #[error("motion.{key} is for files of {of}, and this one holds {holds}; leave it away")]
+    Superfluous {
+        /// The key.
+        key: &'static str,
+        /// What it is for.
+        of: &'static str,
+        /// What the file holds.
+        holds: &'static str,
+    },
     /// A row with more or fewer fields than the header.
     #[error("{found} fields, but the header names {expected}; complete the row or delete it")]
     Fields {
@@ -217,10 +227,25 @@ fn samples(config: &FileConfig, reference: &Vec3) -> Result<Samples, Located> {
     let axes = Axes::parse(&config.axes).map_err(Located::whole)?;
     let text = std::fs::read_to_string(&config.path).map_err(Located::whole)?;
     let table = Table::parse(&text)?;
+    check_points(config, table.format).map_err(Located::whole)?;
     match table.format {
         Format::Poses => pose_csv::samples(&table, &axes, reference),
         Format::Markers => {
             markers::samples(&table, &axes, config.marker_origin_mm.map(|mm| Vec3::from(mm) / 1000.0))
         }
+    }
+}
+
+/// What nobody would look at is refused: it was meant for something.
+fn check_points(config: &FileConfig, format: Format) -> Result<(), ImportProblem> {
+    let (poses, markers) = ("poses", "markers");
+    match format {
+        Format::Poses if config.marker_origin_mm.is_some() => {
+            Err(ImportProblem::Superfluous { key: "marker_origin_mm", of: markers, holds: poses })
+        }
+        Format::Markers if config.reference_point_mm.is_some() => {
+            Err(ImportProblem::Superfluous { key: "reference_point_mm", of: poses, holds: markers })
+        }
+        _ => Ok(()),
     }
 }
