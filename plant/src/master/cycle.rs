@@ -233,8 +233,8 @@ impl Master {
         let Some(command) = command else {
             self.silent_cycles = self.silent_cycles.saturating_add(1);
             let limit = self.settings.command_timeout_cycles;
-            // Who has switched the drives off may go.
-            let is_waited_for = self.request() != DriveRequest::Off && !self.is_ending;
+            // Who has the drives off or stopping may go: they need nobody for it.
+            let is_waited_for = self.request() == DriveRequest::Enable;
             if is_waited_for && self.silent_cycles > limit {
                 self.fail(
                     now_ns,

@@ -119,6 +119,27 @@ fn a_commander_that_switched_the_drives_off_may_go() {
 }
 
 #[test]
+fn a_commander_that_had_the_drives_stopped_may_go_before_they_stand() {
+    let Moving { mut bench, .. } = Moving::new();
+    bench.cycle(Some(&|reading| (reading.position_m, DriveRequest::QuickStop)));
+    (0..100).for_each(|_| bench.cycle(None));
+    assert!(bench.plant.drives_are_off());
+    assert_eq!(bench.causes(EventKind::Fault), []);
+    assert_eq!(bench.reading.master_fault, 0);
+}
+
+#[test]
+fn a_commander_that_dies_while_it_enables_the_drives_is_missed() {
+    let mut bench = Bench::new(&Scenario::default());
+    while !bench.reading.drive_state.contains(&DriveCondition::SwitchedOn.code()) {
+        bench.cycle(Some(&|reading| (reading.position_m, DriveRequest::Enable)));
+    }
+    (0..100).for_each(|_| bench.cycle(None));
+    assert!(bench.plant.drives_are_off());
+    assert_eq!(bench.causes(EventKind::Fault), [Cause::CommandLost]);
+}
+
+#[test]
 fn at_the_end_the_drives_are_stopped_at_once_however_long_commands_are_waited_for() {
     let mut scenario = Scenario::default();
     scenario.can.command_timeout_cycles = 10_000;
