@@ -17,9 +17,14 @@ use super::supervision::Place;
 use crate::link::Buses;
 
 impl Master {
-    /// Whether nodes may be booted: not while a stop is under way, which needs every drive's attention.
+    /// Whether nodes may be booted: not while a stop is under way, which needs every drive's attention. After one for
+    /// good nobody moves them again, and another master may guide them.
     pub(super) fn may_boot(&self) -> bool {
-        self.fault.is_none() || self.drives_are_off()
+        match self.fault {
+            None => true,
+            Some(Stop::UntilRestored) => self.drives_are_off(),
+            Some(Stop::ForGood) => false,
+        }
     }
 
     /// Sends what the nodes need to boot.

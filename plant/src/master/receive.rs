@@ -14,13 +14,16 @@ impl Master {
     /// Takes a frame. Of a malformed one it is told once that it came; it has no other effect.
     pub(super) fn take(&mut self, bus: usize, received: &Received) {
         let Ok(cob) = Cob::try_from(received.frame.id()) else { return };
-        let (Cob::Heartbeat(id) | Cob::Tpdo1(id) | Cob::Emergency(id) | Cob::SdoResponse(id)) = cob else {
-            return;
+        let id = match cob {
+            // Only a master sends it.
+            Cob::Sync => self.settings.id,
+            Cob::Heartbeat(id) | Cob::Tpdo1(id) | Cob::Emergency(id) | Cob::SdoResponse(id) => id,
+            _ => return,
         };
         let (time_ns, data) = (received.time_ns, received.frame.data());
         // Its own frames do not come back to it.
         if id == self.settings.id {
-            return self.fail(time_ns, Cause::SecondMaster, Place::Bus(bus), [0.0; 2]);
+            return self.give_way(time_ns, bus);
         }
         let Some(axis) = self.axis_of(id, bus) else { return self.note_unknown(time_ns, id, bus) };
         self.buses[bus].is_heard = true;

@@ -128,6 +128,15 @@ impl Master {
         }
     }
 
+    /// Leaves the drives to another master, for good even if something else has stopped them before.
+    pub(super) fn give_way(&mut self, now_ns: u64, bus: usize) {
+        if self.fault != Some(Stop::ForGood) {
+            self.fault = Some(Stop::ForGood);
+            let codes = (Source::Master, EventKind::Fault, Cause::SecondMaster);
+            self.add(now_ns, codes, Place::Bus(bus), Event::default());
+        }
+    }
+
     pub(super) fn check_sent(&mut self, bus: usize, result: Result<(), SendError>) {
         let is_known = match result {
             Ok(()) => return,

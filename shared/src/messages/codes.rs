@@ -237,7 +237,7 @@ codes! {
         WrongLength = 35 "wrong_length",
         /// A node that is not configured is on the bus.
         UnknownNode = 36 "unknown_node",
-        /// Another node has the master's id: its heartbeats would keep the drives going without this master.
+        /// Another node sends SYNC or has the master's id: its heartbeats would keep the drives going without this one.
         SecondMaster = 37 "second_master",
         /// A CAN controller became error active again (transmit error counter).
         ErrorActive = 40 "error_active",

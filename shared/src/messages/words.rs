@@ -57,7 +57,7 @@ fn complaint(cause: Cause, event: &Event) -> Option<String> {
             format!("frame {:03X}h has {value} data bytes, expected {limit}", event.object)
         }
         Cause::UnknownNode => "a node that no axis is configured with".to_owned(),
-        Cause::SecondMaster => "another node has the master's id".to_owned(),
+        Cause::SecondMaster => "another node sends SYNC or has the master's id".to_owned(),
         Cause::ForwardKinematics | Cause::InverseKinematics => {
             no_pose(NoPose::try_from(event.object).ok()?).to_owned()
         }

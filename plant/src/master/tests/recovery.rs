@@ -1,7 +1,7 @@
 //! What happens when a running drive or bus fails, and how it comes back.
 
 use masseter_shared::can::Frame;
-use masseter_shared::can::canopen::{Cob, Emergency, EmergencyCode, Heartbeat, NmtState};
+use masseter_shared::can::canopen::{Cob, Emergency, EmergencyCode, Heartbeat, NmtState, sync};
 
 use super::peer::STANDS_AT;
 use super::*;
@@ -149,6 +149,36 @@ fn a_second_master_stops_the_drives() {
     bench.cycles(3, DriveRequest::Enable);
     assert_eq!(bench.causes(EventKind::Fault), [Cause::SecondMaster]);
     assert!(bench.nobody_is_enabled());
+    bench.cycles(50, DriveRequest::Off);
+    assert_eq!(bench.causes(EventKind::Notice), [], "for good");
+}
+
+#[test]
+fn a_stop_that_could_be_restored_is_for_good_once_there_is_a_second_master() {
+    let mut bench = Bench::enabled();
+    bench.drive(4).cycle_power();
+    bench.cycles(5, DriveRequest::Enable);
+    let (now_ns, id) = (bench.now_ns(), bench.master.settings.id);
+    bench.wires.wire(0).arrive(now_ns, Heartbeat { state: NmtState::Operational }.frame(id));
+    bench.cycles(600, DriveRequest::Off);
+    assert_eq!(bench.causes(EventKind::Fault), [Cause::NodeRestarted, Cause::SecondMaster]);
+    assert_eq!(bench.causes(EventKind::Notice), []);
+}
+
+/// The other one guides them, and is stopped by this one's SYNC already.
+#[test]
+fn drives_that_another_master_guides_are_neither_reset_nor_configured() {
+    let mut bench = Bench::new();
+    (0..AXES).for_each(|axis| bench.drive(axis).nmt = Some(NmtState::Operational));
+    for bus in 0..2 {
+        let now_ns = bench.now_ns();
+        bench.wires.wire(bus).arrive(now_ns, sync::frame());
+    }
+    bench.cycles(3000, DriveRequest::Off);
+    assert_eq!(bench.causes(EventKind::Fault)[0], Cause::SecondMaster);
+    for axis in 0..AXES {
+        assert_eq!((bench.drive(axis).nmt, bench.drive(axis).asked.len()), (Some(NmtState::Operational), 0));
+    }
 }
 
 #[test]
