@@ -103,6 +103,15 @@ fn every_fault_of_a_bus_is_borne_or_stops_the_rig_safely_with_its_cause() {
     }
 }
 
+#[test]
+fn a_run_passes_on_a_bus_where_frames_come_twice_now_and_then_from_the_first_on() {
+    let bench = Bench::new(
+        "duration_s = 1.0\n[[faults]]\nkind = 'duplicate'\nbus = 0\nfrom_s = 0\nprobability = 0.01",
+    );
+    let output = bench.run(&["--clock", "virtual"]);
+    assert_eq!(output.status.code(), Some(0), "{}", stdout(&output));
+}
+
 /// A server on a port that the system chose, ended with the test.
 struct Server {
     child: Child,

@@ -18,6 +18,8 @@ const RESET_EVERY_NS: u64 = 500_000_000;
 const START_WITHIN_NS: u64 = 1_000_000_000;
 /// How often a value is read that a drive may take some time to show.
 const READINGS: u32 = 100;
+/// Answers that nobody asked for in one boot before there must be a second drive: frames may come twice now and then.
+const UNASKED: u32 = 5;
 /// Boot-up messages in the middle of a boot before the node counts as restless.
 const RESTARTS: u32 = 3;
 
@@ -63,6 +65,7 @@ pub(super) struct Boot {
     client: SdoClient,
     restarts: u32,
     has_repeated: bool,
+    unasked: u32,
     reset_at_ns: u64,
     since_ns: u64,
 }
@@ -79,6 +82,7 @@ impl Boot {
             client: SdoClient::default(),
             restarts: 0,
             has_repeated: false,
+            unasked: 0,
             reset_at_ns: now_ns + RESET_EVERY_NS,
             since_ns: now_ns,
         }
@@ -101,9 +105,15 @@ impl Boot {
 
     /// Begins anew: whatever the node was, it is not known to be it any more.
     pub(super) fn forget(&mut self, now_ns: u64) {
-        (self.phase, self.client) = (BootPhase::Waiting, SdoClient::default());
-        (self.restarts, self.has_repeated) = (0, false);
+        self.start_over();
+        (self.phase, self.restarts) = (BootPhase::Waiting, 0);
         (self.reset_at_ns, self.since_ns) = (now_ns + RESET_EVERY_NS, now_ns);
+    }
+
+    /// Nothing of the plan has been done, nothing is under way.
+    fn start_over(&mut self) {
+        (self.next, self.readings, self.client) = (0, 0, SdoClient::default());
+        (self.has_repeated, self.unasked) = (false, 0);
     }
 
     /// The node said in which state it is.
@@ -121,7 +131,7 @@ impl Boot {
                 return Err(BootFault::new(Cause::NodeRestarted));
             }
         }
-        (self.next, self.client, self.has_repeated) = (0, SdoClient::default(), false);
+        self.start_over();
         self.carry_on(now_ns)
     }
 
@@ -168,7 +178,11 @@ impl Boot {
         match self.client.take(response) {
             Taken::Expected => self.carry_on(now_ns),
             Taken::Unasked if self.has_repeated => Ok(()),
-            Taken::Unasked => Err(BootFault::new(Cause::DuplicateNode)),
+            Taken::Unasked => {
+                self.unasked += 1;
+                let are_two = self.unasked > UNASKED;
+                if are_two { Err(BootFault::new(Cause::DuplicateNode)) } else { Ok(()) }
+            }
         }
     }
 

@@ -92,7 +92,8 @@ pub(super) enum SdoFailure {
 pub(super) enum Taken {
     /// The answer waited for.
     Expected,
-    /// One that nobody asked for: of a transfer begun twice, or of a second server with the same node id.
+    /// One that nobody asked for: of a transfer begun twice, of a frame that came twice, or of a second server with the
+    /// same node id.
     Unasked,
 }
 

@@ -223,7 +223,7 @@ codes! {
         SdoAborted = 28 "sdo_aborted",
         /// A node did not answer an SDO request (ms).
         SdoTimeout = 29 "sdo_timeout",
-        /// Two nodes have one id: they answer one SDO request twice, or SYNCs more than once again and again.
+        /// Two nodes have one id: they answer SDO requests or SYNCs more than once, again and again.
         DuplicateNode = 30 "duplicate_node",
         /// A node booted although nobody asked it to.
         NodeRestarted = 31 "node_restarted",

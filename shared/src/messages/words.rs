@@ -36,7 +36,7 @@ fn complaint(cause: Cause, event: &Event) -> Option<String> {
         Cause::SdoTimeout => {
             format!("object {object}: no answer for {value} ms, asked anew every {limit} ms")
         }
-        Cause::DuplicateNode if value == 0 => "two answers to one SDO request".to_owned(),
+        Cause::DuplicateNode if value == 0 => "more answers than SDO requests, again and again".to_owned(),
         Cause::DuplicateNode => "different process data after one SYNC, again and again".to_owned(),
         Cause::NodeRestarted => "booted although nobody asked it to".to_owned(),
         Cause::FaultAtStart => format!(

@@ -95,6 +95,23 @@ fn a_drive_off_the_bus_is_told_and_stops_the_rig() {
 }
 
 #[test]
+fn drives_boot_though_one_frame_in_a_hundred_comes_twice() {
+    for seed in 0..20 {
+        let fault = |bus| FaultConfig {
+            kind: FaultKindConfig::Duplicate,
+            bus,
+            from_s: 0.0,
+            probability: 0.01,
+            ..BASE
+        };
+        let mut bench =
+            Bench::new(&Scenario { seed, faults: [0, 1].map(fault).into(), ..Scenario::default() });
+        bench.enable();
+        assert_eq!(bench.causes(EventKind::Fault), [], "seed {seed}");
+    }
+}
+
+#[test]
 fn a_lost_synchronisation_costs_one_drive_one_cycle() {
     let fault =
         FaultConfig { kind: FaultKindConfig::Lose, node: Some(1), id: Some(0x080), count: Some(1), ..BASE };

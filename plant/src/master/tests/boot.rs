@@ -103,6 +103,19 @@ fn a_drive_that_is_not_as_expected_is_named_and_nobody_is_enabled() {
     }
 }
 
+/// The table above has a drive that answers every request twice.
+#[test]
+fn answers_that_come_twice_now_and_then_are_no_second_drive() {
+    let mut bench = Bench::new();
+    for _ in 0..400 {
+        let is_repeated = bench.drive(3).asked.len() % 8 == 7;
+        bench.drive(3).servers = if is_repeated { 2 } else { 1 };
+        bench.cycle(Some(DriveRequest::Enable));
+    }
+    assert!(bench.all_are(DriveState::OperationEnabled), "{:?}", bench.events);
+    assert_eq!(bench.causes(EventKind::Fault), []);
+}
+
 #[test]
 fn pdos_that_the_rig_does_not_exchange_are_switched_off_where_a_drive_has_them() {
     let mut bench = Bench::new();
