@@ -54,20 +54,19 @@ impl Master {
         let may_boot = self.may_boot();
         let node = &mut self.nodes[axis];
         (node.nmt, node.heard_ns) = (Some(state), time_ns);
-        if state == NmtState::BootUp {
-            let was_started = node.is_started;
+        let before = node.boot.phase();
+        let mut result = Ok(());
+        if state == NmtState::BootUp && node.is_started {
             node.stop_exchange();
-            if was_started {
-                node.forget(time_ns);
-                self.fail(time_ns, Cause::NodeRestarted, Place::Axis(axis), [0.0; 2]);
-                return Ok(());
-            }
+            node.forget(time_ns);
+            self.fail(time_ns, Cause::NodeRestarted, Place::Axis(axis), [0.0; 2]);
+        } else if may_boot {
+            result = node.boot.hear(time_ns, state);
+        } else if state == NmtState::BootUp {
+            // What was written to it is lost. It is told to boot once more when the stop is over.
+            node.boot.forget(time_ns);
         }
-        if may_boot {
-            let before = node.boot.phase();
-            let result = node.boot.hear(time_ns, state);
-            self.note_boot(time_ns, axis, before, result);
-        }
+        self.note_boot(time_ns, axis, before, result);
         Ok(())
     }
 

@@ -29,6 +29,8 @@ pub(super) struct Peer {
     pub(super) power: DriveState,
     /// Whether a fault reset helps.
     pub(super) can_reset: bool,
+    /// Whether its fault reaction goes on.
+    pub(super) is_reacting: bool,
     /// Whether it is without power.
     pub(super) is_dead: bool,
     /// Servers that answer to its id.
@@ -74,6 +76,7 @@ impl Peer {
             nmt: None,
             power: DriveState::SwitchOnDisabled,
             can_reset: true,
+            is_reacting: false,
             is_dead: false,
             servers: 1,
             twin_stands_at: None,
@@ -145,7 +148,8 @@ impl Peer {
             assert_eq!(rpdo.target_increments, STANDS_AT, "nobody asks it to move");
             self.control(rpdo.controlword);
         }
-        self.power = self.power.after_completion();
+        self.power =
+            if self.is_reacting { DriveState::FaultReactionActive } else { self.power.after_completion() };
         let statusword = Statusword::of(self.power);
         for actual_increments in self.twin_stands_at.into_iter().chain([STANDS_AT]) {
             let tpdo = Tpdo1 { statusword, actual_increments, torque_permille: 0 };

@@ -57,6 +57,30 @@ fn a_drive_that_tells_it_left_operational_stops_them_all_and_is_booted_again() {
 }
 
 #[test]
+fn a_drive_that_boots_again_during_a_stop_is_configured_from_the_first_object_on() {
+    for phase in [BootPhase::Configuring, BootPhase::Configured] {
+        let mut bench = Bench::enabled();
+        // The one that is missing keeps the other from being started.
+        bench.drive(0).is_dead = phase == BootPhase::Configured;
+        bench.drive(5).cycle_power();
+        while bench.master.nodes[5].boot.phase() != phase {
+            bench.cycle(Some(DriveRequest::Off));
+        }
+        bench.cycles(10, DriveRequest::Off);
+        bench.drive(2).is_reacting = true;
+        bench.cycles(5, DriveRequest::Off);
+        bench.drive(5).cycle_power();
+        bench.drive(5).objects.remove(&(0x1016, 1));
+        bench.cycles(5, DriveRequest::Off);
+        assert_eq!(bench.master.nodes[5].boot.phase(), BootPhase::Waiting);
+        (bench.drive(0).is_dead, bench.drive(2).is_reacting) = (false, false);
+        bench.cycles(1500, DriveRequest::Off);
+        assert_eq!(bench.drive(5).written(0x1016, 1), 0x007F_0096);
+        assert_eq!(bench.master.nodes[5].boot.phase(), BootPhase::Ready);
+    }
+}
+
+#[test]
 fn two_drives_of_one_id_are_told_from_a_frame_sent_twice() {
     let mut bench = Bench::enabled();
     bench.drive(3).twin_stands_at = Some(STANDS_AT);
