@@ -29,11 +29,23 @@ impl Master {
 
     /// Sends what the nodes need to boot.
     pub(super) fn boot(&mut self, now_ns: u64, buses: &mut impl Buses) {
+        self.complete_nodes(now_ns);
         self.expire(now_ns);
         if self.may_boot() {
             self.command_nodes(now_ns, buses);
             (0..self.settings.buses).for_each(|bus| self.send_sdo(now_ns, bus, buses));
             self.start_nodes(now_ns, buses);
+        }
+    }
+
+    /// Who has become operational has booted, whatever happens to the others meanwhile.
+    fn complete_nodes(&mut self, now_ns: u64) {
+        for axis in 0..AXES {
+            let node = &mut self.nodes[axis];
+            if node.boot.phase() == BootPhase::Starting && node.is_operational() {
+                node.boot.complete();
+                self.note_boot(now_ns, axis, BootPhase::Starting, Ok(()));
+            }
         }
     }
 
@@ -87,17 +99,12 @@ impl Master {
         }
         for axis in 0..AXES {
             let node = &mut self.nodes[axis];
-            let before = node.boot.phase();
-            match before {
-                BootPhase::Configured => {
-                    node.boot.start(now_ns);
-                    (node.is_started, node.missing_cycles) = (true, 0);
-                    self.send_nmt(now_ns, axis, NmtCommand::Start, buses);
-                }
-                BootPhase::Starting if node.is_operational() => node.boot.complete(),
-                _ => continue,
+            if node.boot.phase() == BootPhase::Configured {
+                node.boot.start(now_ns);
+                (node.is_started, node.missing_cycles) = (true, 0);
+                self.send_nmt(now_ns, axis, NmtCommand::Start, buses);
+                self.note_boot(now_ns, axis, BootPhase::Configured, Ok(()));
             }
-            self.note_boot(now_ns, axis, before, Ok(()));
         }
     }
 

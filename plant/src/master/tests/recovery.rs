@@ -81,6 +81,23 @@ fn a_drive_that_boots_again_during_a_stop_is_configured_from_the_first_object_on
 }
 
 #[test]
+fn a_drive_that_became_operational_is_not_given_up_for_another_that_is_lost() {
+    let mut bench = Bench::new();
+    while bench.master.nodes[3].boot.phase() != BootPhase::Starting {
+        bench.cycle(Some(DriveRequest::Off));
+    }
+    bench.drive(3).nmt = Some(NmtState::PreOperational);
+    bench.cycles(20, DriveRequest::Off);
+    bench.drive(0).is_dead = true;
+    bench.cycles(60, DriveRequest::Off);
+    bench.drive(3).nmt = Some(NmtState::Operational);
+    bench.cycles(1500, DriveRequest::Off);
+    assert_eq!(bench.causes(EventKind::Fault), [Cause::ProcessDataLost]);
+    bench.drive(0).is_dead = false;
+    restore(&mut bench, Cause::ProcessDataLost);
+}
+
+#[test]
 fn two_drives_of_one_id_are_told_from_a_frame_sent_twice() {
     let mut bench = Bench::enabled();
     bench.drive(3).twin_stands_at = Some(STANDS_AT);
