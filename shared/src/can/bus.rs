@@ -10,7 +10,8 @@ use super::frame::Frame;
 
 /// One node's port onto a wire.
 pub trait Bus {
-    /// Queues a frame for transmission at `now_ns`; it goes out by priority as the wire gets free.
+    /// Queues a frame for transmission at `now_ns`; it goes out as the wire gets free, by priority on a simulated wire,
+    /// in the order of sending on a real interface.
     ///
     /// # Errors
     /// [`SendError`]; a refused frame is not queued, and sending it again is up to the caller.

@@ -87,7 +87,7 @@ const fn remedy(cause: Cause) -> Option<&'static str> {
         Cause::SdoAborted => "see the drive's manual for this object",
         Cause::SdoTimeout => "see power, wiring and bit rate of this drive",
         Cause::DuplicateNode => "give every node an id of its own, and let no other client use SDO meanwhile",
-        Cause::NodeRestarted => "see its supply; it is booted again once the drives are off",
+        Cause::NodeRestarted => "look at its supply",
         Cause::NodeStopped => {
             "see its own emergency message, if there is one, and who else sends NMT commands"
         }
