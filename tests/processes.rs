@@ -56,6 +56,9 @@ fn a_run_plays_through_three_processes_and_leaves_nothing_in_shared_memory() {
         assert!(scheduling[role]["wanted"].is_object(), "{scheduling}");
     }
     assert_eq!(shared_memory_of(&id), Vec::<String>::new());
+    let log = fs::read_to_string(bench.run_folder().join("can0.log")).unwrap();
+    let (_, last_cycle) = log.rsplit_once(" 080#").unwrap();
+    assert!(last_cycle.contains(" 201#"), "what it ended with is recorded too: {last_cycle}");
 }
 
 #[test]

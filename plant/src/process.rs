@@ -99,6 +99,10 @@ impl Ports {
         if let Some(truth) = plant.truth() {
             self.truths.publish(|message| *message = truth)?;
         }
+        self.publish_frames_and_events(plant)
+    }
+
+    fn publish_frames_and_events(&mut self, plant: &mut PlantCore<impl Link>) -> Result<(), ProcessError> {
         let mut result = plant.drain_frames(|frames| self.frames.publish(frames));
         plant.drain_events(&mut |event| {
             if result.is_ok() {
@@ -159,6 +163,9 @@ fn serve<L: Link>(
         exchange(&mut plant, &mut ports, schedule, wake, cycle.waiter())?;
         plant.apply(clock::now_ns(), None)?;
     }
+    // The last cycle's process data are on the wire only by now.
+    plant.collect(cycle.wait().woke_ns)?;
+    ports.publish_frames_and_events(&mut plant)?;
     Ok(if post.stop.is_made() { Reason::Asked } else { Reason::Abandoned })
 }
 
