@@ -8,7 +8,7 @@ use std::net::{TcpListener, TcpStream};
 use std::process::{Child, ChildStderr, ExitStatus, Stdio};
 use std::thread;
 
-use common::{Bench, UNHURRIED, masseter, start, stderr, stdout};
+use common::{Bench, UNHURRIED, masseter, start, stderr, stdout, take_the_cores};
 use masseter::recording::Reader;
 use serde_json::{Value, json};
 use tungstenite::client::IntoClientRequest;
@@ -118,6 +118,7 @@ fn passed(status: ExitStatus) -> bool {
 
 #[test]
 fn a_watcher_sees_the_channels_and_messages_of_the_recording() {
+    let _cores = take_the_cores();
     let bench = Bench::new(&format!("duration_s = 3.0\n{UNHURRIED}"));
     let shown = Shown::start(&bench);
     let mut watcher = Watcher::connect(&shown.address, "foxglove.sdk.v1, foxglove.websocket.v1");
@@ -139,6 +140,7 @@ fn a_watcher_sees_the_channels_and_messages_of_the_recording() {
 
 #[test]
 fn a_watcher_that_does_not_read_is_counted_and_the_recording_is_complete() {
+    let _cores = take_the_cores();
     let bench = Bench::new(&format!("duration_s = 6.0\n{UNHURRIED}"));
     let shown = Shown::start(&bench);
     let mut watcher = Watcher::connect(&shown.address, "foxglove.websocket.v1");
@@ -152,6 +154,7 @@ fn a_watcher_that_does_not_read_is_counted_and_the_recording_is_complete() {
 
 #[test]
 fn strangers_and_deserters_disturb_neither_the_recording_nor_other_watchers() {
+    let _cores = take_the_cores();
     let bench = Bench::new(&format!("duration_s = 3.0\n{UNHURRIED}"));
     let shown = Shown::start(&bench);
     let _silent = TcpStream::connect(&shown.address).unwrap();
