@@ -72,7 +72,8 @@ impl Obstacle {
     fn mend(self, root: &SystemRoot, name: &str) -> String {
         match self {
             Self::Down => bring_up(root, name),
-            Self::BusOff => format!("sudo ip link set {name} type can restart"),
+            // `type can restart` is refused where the interface restarts by itself after a while.
+            Self::BusOff => format!("sudo ip link set {name} down && sudo ip link set {name} up"),
         }
     }
 }
@@ -152,7 +153,7 @@ mod tests {
         assert_eq!((level, found.as_str()), (Warn, "can0; can0 down"));
         let (level, found, mend) = of("0x400c1", "0");
         assert_eq!((level, found.as_str()), (Warn, "can0; can0 off the bus"));
-        assert_eq!(mend.as_deref(), Some("sudo ip link set can0 type can restart"));
+        assert_eq!(mend.as_deref(), Some("sudo ip link set can0 down && sudo ip link set can0 up"));
         assert_eq!(interfaces(&Fixture::of(&[]).root()).level, Fine);
     }
 
