@@ -1,5 +1,7 @@
 //! The cores: how many may be used, how they idle, and whether they are real.
 
+use std::env;
+
 use masseter_shared::realtime::scheduling::usable_cores;
 
 use super::finding::Finding;
@@ -10,9 +12,6 @@ use crate::machine::SystemRoot;
 const LATEST_EXIT_US: i64 = 200;
 /// Steal beyond this share of all time since boot is worth a word.
 const STEAL_SHARE: f64 = 0.001;
-
-/// What a session may use is bounded by the cpuset of its control group, which a scope of the system is not part of.
-const LEAVE_CPUSET: &str = "sudo systemd-run --scope masseter run";
 
 /// All findings of this family.
 pub(super) fn examine(root: &SystemRoot) -> Vec<Finding> {
@@ -32,11 +31,19 @@ fn number(root: &SystemRoot, usable: usize, online: &[usize]) -> Finding {
     match (usable, online) {
         (2.., _) => Finding::ok(CHECK, found),
         (_, [one, other, ..]) => {
-            Finding::bad(CHECK, found, "controller and plant share a core and delay each other")
-                .mended_by(container::start_with(root, &format!("--cpuset-cpus {one},{other}"), LEAVE_CPUSET))
+            Finding::bad(CHECK, found, "controller and plant share a core and delay each other").mended_by(
+                container::start_with(root, &format!("--cpuset-cpus {one},{other}"), leave_cpuset()),
+            )
         }
         _ => Finding::bad(CHECK, found, "controller and plant share the only core and delay each other"),
     }
+}
+
+/// What a session may use is bounded by the cpuset of its control group, which a scope of the system is not part of.
+fn leave_cpuset() -> String {
+    // By its path and as this user: sudo looks for commands elsewhere, and root's runs are root's.
+    let masseter = env::current_exe().unwrap_or_else(|_| "masseter".into());
+    format!("sudo systemd-run --scope --uid=\"$(id -u)\" '{}' run", masseter.display())
 }
 
 fn governor(root: &SystemRoot) -> Finding {
@@ -133,7 +140,7 @@ mod tests {
         assert_eq!(of(2, &[0, 1]).level, Ok);
         let hidden = of(1, &[0, 1, 2, 3]);
         assert_eq!((hidden.level, hidden.found.as_str()), (Bad, "1 of 4 may be used"));
-        assert!(hidden.mend.unwrap().contains("systemd-run --scope"));
+        assert!(hidden.mend.unwrap().contains("systemd-run --scope --uid=\"$(id -u)\" '/"));
         assert_eq!((of(1, &[0]).level, of(1, &[0]).mend), (Bad, None));
         let container = Fixture::of(&[(".dockerenv", "")]);
         assert_eq!(
