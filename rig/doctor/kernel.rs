@@ -44,13 +44,14 @@ fn preemption(root: &SystemRoot) -> Finding {
 
 fn throttling(root: &SystemRoot) -> Finding {
     const CHECK: &str = "real-time throttling";
-    const RESTORE: &str = "sudo sysctl kernel.sched_rt_runtime_us=950000 kernel.sched_rt_period_us=1000000";
     let runtime_us = root.number("proc/sys/kernel/sched_rt_runtime_us");
     let period_us = root.number("proc/sys/kernel/sched_rt_period_us");
     let (Some(runtime_us), Some(period_us)) = (runtime_us, period_us) else {
         return Finding::ok(CHECK, "none in this kernel");
     };
-    let restore = container::on_host(root, RESTORE);
+    // The kernel's default share, of the period as it is: a share of another is refused in the one order or the other.
+    let restored_us = period_us - period_us / 20;
+    let restore = container::on_host(root, format!("sudo sysctl kernel.sched_rt_runtime_us={restored_us}"));
     let found = format!("{runtime_us} of every {period_us} µs");
     match runtime_us {
         ..0 => Finding::warn(CHECK, "off", "a real-time task that never waits takes its core for good")
@@ -135,6 +136,14 @@ mod tests {
             ("sys/devices/system/cpu/online", "0-7"),
         ];
         for finding in examine(&Fixture::of(&files).root()) {
+    fn throttled(runtime_us: &str, period_us: &str) -> Finding {
+        let files = [
+            ("proc/sys/kernel/sched_rt_runtime_us", runtime_us),
+            ("proc/sys/kernel/sched_rt_period_us", period_us),
+        ];
+        throttling(&Fixture::of(&files).root())
+    }
+
             assert!(finding.mend.unwrap().starts_with("on the host: "), "{}", finding.check);
         }
     }
@@ -143,11 +152,16 @@ mod tests {
     fn throttling_is_judged_by_the_share_it_leaves() {
         let cases = [("950000", Ok), ("940000", Warn), ("-1", Warn), ("200000", Warn), ("0", Bad)];
         for (runtime_us, level) in cases {
-            let files = [
-                ("proc/sys/kernel/sched_rt_runtime_us", runtime_us),
-                ("proc/sys/kernel/sched_rt_period_us", "1000000"),
-            ];
-            assert_eq!(throttling(&Fixture::of(&files).root()).level, level, "{runtime_us}");
+            assert_eq!(throttled(runtime_us, "1000000").level, level, "{runtime_us}");
+    #[test]
+    fn the_default_share_is_asked_for_of_whatever_period_there_is() {
+        for (period_us, restored_us) in [("1000000", "950000"), ("100000", "95000"), ("30", "29")] {
+            let mend = throttled("0", period_us).mend.unwrap();
+            assert_eq!(mend, format!("sudo sysctl kernel.sched_rt_runtime_us={restored_us}"));
+            assert_eq!(throttled(restored_us, period_us).level, Ok);
+        }
+    }
+
         }
         assert_eq!(throttling(&Fixture::of(&[]).root()).level, Ok);
     }
