@@ -1,7 +1,7 @@
 //! How the kernel schedules: preemption, real-time throttling, isolated cores.
 
 use super::finding::Finding;
-use super::{container, cores, realtime_kernel};
+use super::{boot_options, container, cores, realtime_kernel};
 use crate::machine::SystemRoot;
 
 /// All findings of this family.
@@ -82,20 +82,16 @@ fn isolation(root: &SystemRoot) -> Finding {
             let finding =
                 Finding::warn(CHECK, "none", "other tasks and their interrupts come onto the rig's cores");
             match cores::to_spare(root) {
-                Some([one, other]) => {
-                    finding.mended_by(container::on_host(root, isolate(&format!("{one},{other}"))))
-                }
+                Some([one, other]) => finding.mended_by(isolate(root, &format!("{one},{other}"))),
                 None => finding,
             }
         }
     }
 }
 
-fn isolate(list: &str) -> String {
-    format!(
-        "sudo sed -i 's/^GRUB_CMDLINE_LINUX=\"/&isolcpus={list} nohz_full={list} /' /etc/default/grub && \
-         sudo update-grub && sudo reboot  # then: masseter run --cores {list}"
-    )
+fn isolate(root: &SystemRoot, list: &str) -> String {
+    let options = format!("isolcpus={list} nohz_full={list}");
+    format!("{}  # then: masseter run --cores {list}", boot_options::add(root, &options))
 }
 
 #[cfg(test)]
@@ -136,6 +132,10 @@ mod tests {
             ("sys/devices/system/cpu/online", "0-7"),
         ];
         for finding in examine(&Fixture::of(&files).root()) {
+            assert!(finding.mend.unwrap().starts_with("on the host: "), "{}", finding.check);
+        }
+    }
+
     fn throttled(runtime_us: &str, period_us: &str) -> Finding {
         let files = [
             ("proc/sys/kernel/sched_rt_runtime_us", runtime_us),
@@ -144,15 +144,15 @@ mod tests {
         throttling(&Fixture::of(&files).root())
     }
 
-            assert!(finding.mend.unwrap().starts_with("on the host: "), "{}", finding.check);
-        }
-    }
-
     #[test]
     fn throttling_is_judged_by_the_share_it_leaves() {
         let cases = [("950000", Ok), ("940000", Warn), ("-1", Warn), ("200000", Warn), ("0", Bad)];
         for (runtime_us, level) in cases {
             assert_eq!(throttled(runtime_us, "1000000").level, level, "{runtime_us}");
+        }
+        assert_eq!(throttling(&Fixture::of(&[]).root()).level, Ok);
+    }
+
     #[test]
     fn the_default_share_is_asked_for_of_whatever_period_there_is() {
         for (period_us, restored_us) in [("1000000", "950000"), ("100000", "95000"), ("30", "29")] {
@@ -160,10 +160,6 @@ mod tests {
             assert_eq!(mend, format!("sudo sysctl kernel.sched_rt_runtime_us={restored_us}"));
             assert_eq!(throttled(restored_us, period_us).level, Ok);
         }
-    }
-
-        }
-        assert_eq!(throttling(&Fixture::of(&[]).root()).level, Ok);
     }
 
     #[test]
@@ -177,6 +173,6 @@ mod tests {
         assert_eq!(cores("0-7", "6-7\n").level, Ok);
         let shared = cores("0-7", "\n");
         assert_eq!(shared.level, Warn);
-        assert!(shared.mend.unwrap().contains("isolcpus=6,7 nohz_full=6,7 "));
+        assert!(shared.mend.unwrap().contains("isolcpus=6,7 nohz_full=6,7"));
     }
 }

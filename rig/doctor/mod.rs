@@ -3,9 +3,11 @@
 //! Each family of checks has a file; [`Finding`] is a line of the report. Nothing is changed on the
 //! machine. The form of the JSON report is written down in `docs/doctor.md`.
 
+mod boot_options;
 mod can;
 mod container;
 mod cores;
+mod distribution;
 mod finding;
 mod kernel;
 mod leftovers;

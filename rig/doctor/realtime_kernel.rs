@@ -1,6 +1,6 @@
 //! Where a distribution keeps its fully preemptible kernel.
 
-use super::container;
+use super::{container, distribution};
 use crate::machine::SystemRoot;
 
 /// The command that installs it on this machine; none where no package is known. A container need not be of its host's
@@ -9,11 +9,11 @@ pub(super) fn installation(root: &SystemRoot) -> Option<String> {
     if container::is_container(root) {
         return Some("on the host: install its distribution's kernel with PREEMPT_RT".to_owned());
     }
-    command(&root.text("etc/os-release")?, std::env::consts::ARCH)
+    command(&distribution::id(root)?, std::env::consts::ARCH)
 }
 
-fn command(os_release: &str, architecture: &str) -> Option<String> {
-    let install = match (id(os_release)?, architecture) {
+fn command(distribution: &str, architecture: &str) -> Option<String> {
+    let install = match (distribution, architecture) {
         ("debian", "x86_64") => "apt install linux-image-rt-amd64",
         ("debian", "aarch64") => "apt install linux-image-rt-arm64",
         ("debian", "arm") => "apt install linux-image-rt-armmp",
@@ -24,10 +24,6 @@ fn command(os_release: &str, architecture: &str) -> Option<String> {
         _ => return None,
     };
     Some(format!("sudo {install} && sudo reboot"))
-}
-
-fn id(os_release: &str) -> Option<&str> {
-    Some(os_release.lines().find_map(|line| line.strip_prefix("ID="))?.trim_matches('"'))
 }
 
 #[cfg(test)]
@@ -45,22 +41,17 @@ mod tests {
     #[test]
     fn the_package_depends_on_distribution_and_architecture() {
         let cases = [
-            (
-                "PRETTY_NAME=\"Debian\"\nVERSION_ID=\"13\"\nID=debian\n",
-                "x86_64",
-                Some("linux-image-rt-amd64"),
-            ),
-            ("ID=debian\n", "aarch64", Some("linux-image-rt-arm64")),
-            ("ID=ubuntu\nID_LIKE=debian\n", "x86_64", Some("pro enable realtime-kernel")),
-            ("ID=\"rocky\"\n", "x86_64", Some("install kernel-rt")),
-            ("ID=debian\n", "riscv64", None),
-            ("ID=alpine\n", "x86_64", None),
-            ("", "x86_64", None),
+            ("debian", "x86_64", Some("linux-image-rt-amd64")),
+            ("debian", "aarch64", Some("linux-image-rt-arm64")),
+            ("ubuntu", "x86_64", Some("pro enable realtime-kernel")),
+            ("rocky", "x86_64", Some("install kernel-rt")),
+            ("debian", "riscv64", None),
+            ("alpine", "x86_64", None),
         ];
-        for (os_release, architecture, said) in cases {
-            let command = command(os_release, architecture);
-            assert_eq!(command.is_some(), said.is_some(), "{os_release} {architecture}");
-            assert!(command.unwrap_or_default().contains(said.unwrap_or_default()), "{os_release}");
+        for (distribution, architecture, said) in cases {
+            let command = command(distribution, architecture);
+            assert_eq!(command.is_some(), said.is_some(), "{distribution} {architecture}");
+            assert!(command.unwrap_or_default().contains(said.unwrap_or_default()), "{distribution}");
         }
     }
 }

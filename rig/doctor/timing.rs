@@ -6,8 +6,8 @@ use std::io;
 use masseter_shared::clock;
 use rustix::time::{ClockId, clock_getres};
 
-use super::container;
 use super::finding::Finding;
+use super::{boot_options, container};
 use crate::machine::SystemRoot;
 use crate::run::dma_latency;
 
@@ -75,15 +75,17 @@ fn timers(root: &SystemRoot, resolution_ns: i64) -> Finding {
     if resolution_ns <= 1000 {
         return Finding::ok(CHECK, format!("{resolution_ns} ns"));
     }
-    Finding::bad(
+    let finding = Finding::bad(
         CHECK,
         format!("{resolution_ns} ns"),
         "cycles can only begin at ticks; the kernel needs CONFIG_HIGH_RES_TIMERS and no `highres=off`",
-    )
-    .mended_by(container::on_host(
-        root,
-        "sudo sed -i 's/highres=off//' /etc/default/grub && sudo update-grub && sudo reboot",
-    ))
+    );
+    let options = root.text("proc/cmdline").unwrap_or_default();
+    if options.split_whitespace().any(|option| option == "highres=off") {
+        // Of two the kernel takes the last.
+        return finding.mended_by(boot_options::add(root, "highres=on"));
+    }
+    finding
 }
 
 /// CPU time that going to sleep and waking takes, ns.
@@ -151,6 +153,13 @@ mod tests {
     fn ticks_are_too_coarse_for_cycles() {
         let machine = Fixture::of(&[]);
         assert_eq!([1, 4_000_000].map(|ns| timers(&machine.root(), ns).level), [Fine, Bad]);
+    }
+
+    #[test]
+    fn fine_timers_are_asked_for_where_they_were_declined() {
+        let mend = |options| timers(&Fixture::of(&[("proc/cmdline", options)]).root(), 4_000_000).mend;
+        assert!(mend("root=/dev/sda1 highres=off quiet").unwrap().contains("highres=on"));
+        assert_eq!(mend("root=/dev/sda1 quiet"), None, "the kernel has none");
     }
 
     #[test]
