@@ -7,7 +7,7 @@ use std::net::TcpStream;
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
-use common::{Bench, MASSETER, masseter, stdout};
+use common::{Bench, MASSETER, check, masseter, stdout};
 use serde_json::Value;
 
 #[test]
@@ -34,12 +34,6 @@ fn two_buses_at_a_kilohertz_are_accepted_and_every_message_has_a_bound() {
         let (response_ns, deadline_ns) = (message["response_ns"].as_u64(), message["deadline_ns"].as_u64());
         assert!(response_ns.is_some() && response_ns <= deadline_ns, "{message}");
     }
-}
-
-/// The check of a run's summary that goes by this name.
-fn check<'a>(summary: &'a Value, name: &str) -> &'a Value {
-    let checks = summary["verdict"]["checks"].as_array().unwrap();
-    checks.iter().find(|check| check["name"] == name).unwrap()
 }
 
 #[test]

@@ -104,6 +104,13 @@ pub(crate) fn json(path: &Path) -> Value {
     serde_json::from_str(&text).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
 }
 
+/// The check of a run's summary that goes by this name.
+pub(crate) fn check<'a>(summary: &'a Value, name: &str) -> &'a Value {
+    let checks = summary["verdict"]["checks"].as_array().expect("a list of checks");
+    let found = checks.iter().find(|check| check["name"] == name);
+    found.unwrap_or_else(|| panic!("no check {name} among {checks:?}"))
+}
+
 pub(crate) fn masseter(arguments: &[&str]) -> Output {
     Command::new(MASSETER).args(arguments).output().expect("masseter starts")
 }
