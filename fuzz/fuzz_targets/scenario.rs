@@ -15,13 +15,10 @@ use masseter_shared::config::{
 use masseter_shared::geometry::Mechanism;
 
 fuzz_target!(|data: &[u8]| {
-    // Files of other people come as bytes, so they stand alone behind the first.
-    let mut bytes = Unstructured::new(data);
-    let text = match bytes.arbitrary() {
-        Ok(true) => edited(&mut bytes).unwrap_or_default().into_bytes(),
-        _ => bytes.take_rest().to_vec(),
-    };
-    read(&file_of(&text));
+    // As somebody's file, which the examples are, and as a source of edits.
+    read(&file_of(data));
+    let edited = edited(&mut Unstructured::new(data)).unwrap_or_default();
+    read(&file_of(edited.as_bytes()));
 });
 
 fn read(path: &Path) {
