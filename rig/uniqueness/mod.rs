@@ -21,9 +21,9 @@ use crate::run::plan::Plan;
 /// What `uniqueness` does.
 #[derive(Debug, Clone, Subcommand)]
 pub(crate) enum UniquenessVerb {
-    /// Prove by interval arithmetic that no input of a region has two solutions
+    /// Prove by interval arithmetic that no input of a region has two solutions that meet the paper's conditions
     Prove(ProveArgs),
-    /// Look for inputs with two solutions, at random and then uphill
+    /// Look for inputs with two solutions that meet the paper's conditions, at random and then uphill
     Search(SearchArgs),
 }
 
@@ -45,7 +45,7 @@ pub(crate) struct ProveArgs {
     /// Boxes to examine at most
     #[arg(long, value_name = "N", default_value_t = 100_000)]
     boxes: usize,
-    /// Count only solutions whose determinant is at least this [default: the seed's conditions alone]
+    /// Count only solutions whose determinant is at least this [default: the paper's conditions alone]
     #[arg(long, value_name = "DETERMINANT", value_parser = parse_margin)]
     margin: Option<f64>,
     /// CSV file for the boxes that stay undecided

@@ -38,17 +38,17 @@ pub(super) fn search(args: &SearchArgs, mechanism: &Mechanism) -> anyhow::Result
     }
     found.sort_by(|a, b| b.lesser.total_cmp(&a.lesser));
     let both_positive = found.iter().filter(|one| one.lesser > 0.0).count();
-    result_line!("random inputs                                   {}", args.inputs)?;
-    result_line!("with a solution that meets the seed's conditions {standing}")?;
-    result_line!("with two of them                                {}", found.len())?;
-    result_line!("with two whose determinants are positive        {both_positive}")?;
+    result_line!("random inputs                                     {}", args.inputs)?;
+    result_line!("with a solution that meets the paper's conditions {standing}")?;
+    result_line!("with two of them                                  {}", found.len())?;
+    result_line!("with two whose determinants are positive          {both_positive}")?;
     found.truncate(CLIMBS);
     let mut climbed: Vec<Found> =
         found.into_iter().map(|start| climb(mechanism, &limits, start, &mut random)).collect();
     climbed.sort_by(|a, b| b.lesser.total_cmp(&a.lesser));
     if let Some(best) = climbed.first() {
         result_line!(
-            "greatest lesser determinant, after climbing     {:.4} at {:?}",
+            "greatest lesser determinant, after climbing       {:.4} at {:?}",
             best.lesser,
             best.axes_m
         )?;
