@@ -1,8 +1,9 @@
 //! How a process of the rig begins and ends: what it tells its supervisor, and what it is told.
 //!
 //! Over standard output it says once, as a line of JSON, that it is ready and what scheduling it
-//! obtained; over standard input it is told the epoch at which to begin. SIGTERM asks it to end in
-//! order, and comes too when the supervisor dies. Everything else travels over iceoryx2.
+//! obtained; over standard input it is told the epoch at which to begin, and the process ids of both
+//! loops. SIGTERM asks it to end in order, and comes too when the supervisor dies. Everything else
+//! travels over iceoryx2.
 
 use std::io::{self, BufRead, Write};
 use std::path::PathBuf;

@@ -1,7 +1,7 @@
 //! candump log lines: `(1436509052.249713) vcan0 123#11223344`.
 //!
-//! Time stamps keep whole microseconds, as the format does. Remote frames and error messages are written where the rig
-//! has them, but not read.
+//! Time stamps keep whole microseconds, as the format does. Error messages are written, but not read; remote frames are
+//! refused.
 
 use std::fmt::{self, Write};
 

@@ -20,7 +20,7 @@ const RATES_HZ: std::ops::RangeInclusive<u32> = 10..=20_000;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Scenario {
-    /// Name of the run folder.
+    /// Name of the run, with which the name of its folder ends.
     pub name: String,
     /// Seed of every random number.
     pub seed: u64,
