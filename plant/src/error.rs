@@ -20,6 +20,12 @@ pub enum PlantError {
     /// A real interface.
     #[error(transparent)]
     Interface(#[from] OpenError),
+    /// Another master of this machine drives the interface.
+    #[error("{interface}: another rig drives it; end that one, or use other interfaces")]
+    MasterHere {
+        /// The interface.
+        interface: String,
+    },
     /// The bit rate.
     #[error("can.bitrate_bps: {0}")]
     Bitrate(#[from] BitrateError),

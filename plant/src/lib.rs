@@ -6,6 +6,7 @@
 
 mod build;
 mod checks;
+mod claim;
 pub mod core;
 pub mod description;
 mod drive;

@@ -2,9 +2,11 @@
 
 use masseter_shared::can::faults::FaultNote;
 use masseter_shared::can::wrapped::PortFaults;
-use masseter_shared::can::{Bus, FrameFormat, OpenError, ReceiveError, SocketCan, Tapped};
+use masseter_shared::can::{Bus, FrameFormat, ReceiveError, SocketCan, Tapped};
 use masseter_shared::messages::Truth;
 
+use crate::claim::Claim;
+use crate::error::PlantError;
 use crate::link::{Buses, Link};
 use crate::mechanism::DynamicsError;
 
@@ -14,6 +16,7 @@ pub struct SocketLink {
     ports: Vec<SocketCan>,
     faults: Vec<PortFaults>,
     taps: Vec<SocketCan>,
+    _claims: Vec<Claim>,
 }
 
 impl SocketLink {
@@ -22,10 +25,12 @@ impl SocketLink {
         interfaces: &[String],
         format: FrameFormat,
         faults: Vec<PortFaults>,
-    ) -> Result<Self, OpenError> {
+    ) -> Result<Self, PlantError> {
         let port = |interface: &String| SocketCan::open(interface, format);
         let open = || interfaces.iter().map(port).collect::<Result<_, _>>();
-        Ok(Self { ports: open()?, faults, taps: open()? })
+        let (ports, taps) = (open()?, open()?);
+        let claims = interfaces.iter().map(|interface| Claim::on(interface)).collect::<Result<_, _>>()?;
+        Ok(Self { ports, faults, taps, _claims: claims })
     }
 }
 

@@ -96,6 +96,7 @@ mod tests {
         assert_eq!(levels, [Bad, Bad, Ok]);
         assert_eq!(of(Shared::Free(60 << 20)).mend.as_deref(), Some("docker run --shm-size 1g …"));
     }
+
     #[test]
     fn shared_memory_without_a_bound_is_not_full() {
         assert_eq!(Shared::of_blocks(100, 0), Shared::Free(0));

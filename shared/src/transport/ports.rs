@@ -230,8 +230,8 @@ impl<M: Message> Inlet<M> {
         Ok(latest)
     }
 
-    /// The newest message, waited for until one `is_awaited` has come or `deadline_ns` has passed. Polls
-    /// without sleeping: for waits of microseconds.
+    /// The first message that `is_awaited`, or the newest there is when `deadline_ns` has passed. Polls without
+    /// sleeping: for waits of microseconds.
     pub fn latest_by(
         &self,
         deadline_ns: u64,
@@ -241,9 +241,15 @@ impl<M: Message> Inlet<M> {
         let mut newest = None;
         let mut spin = waiter.spin();
         loop {
-            newest = self.latest()?.or(newest);
-            let is_here = newest.as_deref().is_some_and(&is_awaited);
-            if is_here || spin.now_ns() >= deadline_ns {
+            for _ in 0..=self.subscriber.buffer_size() {
+                let Some(message) = self.receive()? else { break };
+                let is_here = is_awaited(&message);
+                newest = Some(message);
+                if is_here {
+                    return Ok(newest);
+                }
+            }
+            if spin.now_ns() >= deadline_ns {
                 return Ok(newest);
             }
         }
@@ -274,6 +280,29 @@ mod tests {
                 assert_eq!((newest.cycle, newest.seq), (round * 10 + 4, round * 5));
                 assert!(inlet.receive().unwrap().is_none());
             }
+        }
+        drop(claim);
+        domain.sweep().unwrap();
+    }
+
+    #[test]
+    fn what_follows_the_awaited_message_is_left_for_the_next_wait() {
+        let domain = Domain::named(&format!("test-awaited-{}", std::process::id())).unwrap();
+        let claim = domain.claim().unwrap();
+        {
+            let node = Node::join(&domain).unwrap();
+            let inlet = node.inlet::<Event>().unwrap();
+            let mut outlet = node.outlet::<Event>().unwrap();
+            for cycle in 1..=5 {
+                outlet.publish(|event| event.cycle = cycle).unwrap();
+            }
+            let mut waiter = Waiter::new(1_000_000);
+            let deadline_ns = clock::now_ns() + 1_000_000_000;
+            let mut wait = |cycle| {
+                let found = inlet.latest_by(deadline_ns, &mut waiter, |event| event.cycle >= cycle).unwrap();
+                found.map(|event| event.cycle)
+            };
+            assert_eq!([3, 4, 2].map(&mut wait), [Some(3), Some(4), Some(5)]);
         }
         drop(claim);
         domain.sweep().unwrap();
