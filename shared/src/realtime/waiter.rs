@@ -114,11 +114,21 @@ impl Waiter {
         self.lead.learn((now_ns - began_ns) * 3 / 4);
         while self.shortest_ns.is_none_or(|shortest_ns| now_ns + 2 * shortest_ns < due_ns) {
             prepare()?;
-            let took_ns = self.begin() - now_ns;
-            self.shortest_ns = Some(self.shortest_ns.unwrap_or(took_ns).min(took_ns));
+            let took_ns = clock::now_ns() - now_ns;
+            self.account_for_repeat(took_ns);
             now_ns += took_ns;
         }
         Ok(self.spin_until(due_ns, now_ns))
+    }
+
+    /// What was done a moment ago in a fraction of the time was held up by the machine, not by itself.
+    fn account_for_repeat(&mut self, took_ns: u64) {
+        let usual_ns = self.shortest_ns.map_or(took_ns, |shortest_ns| shortest_ns.min(took_ns));
+        self.shortest_ns = Some(usual_ns);
+        let worked_ns = if took_ns - usual_ns > GAP_NS { usual_ns } else { took_ns };
+        self.account.worked_ns += worked_ns;
+        self.account.stalled_ns += took_ns - worked_ns;
+        self.working_since_ns = self.working_since_ns.map(|since_ns| since_ns + took_ns);
     }
 
     fn spin_until(&mut self, due_ns: u64, from_ns: u64) -> u64 {
@@ -235,6 +245,19 @@ mod tests {
             waiter.until_preparing(clock::now_ns() + SECOND_NS / 100, prepare).unwrap();
         }
         assert!(waiter.lead.ns() > first_ns);
+    }
+
+    #[test]
+    fn a_repeat_that_takes_much_longer_than_the_one_before_was_held_up_by_the_machine() {
+        let mut waiter = Waiter::new(1_000_000);
+        let spent = |waiter: &Waiter| (waiter.account().worked_ns, waiter.account().stalled_ns);
+        waiter.account_for_repeat(20_000);
+        waiter.account_for_repeat(10_000);
+        assert_eq!(spent(&waiter), (30_000, 0));
+        waiter.account_for_repeat(10_000 + GAP_NS);
+        assert_eq!(spent(&waiter), (40_000 + GAP_NS, 0));
+        waiter.account_for_repeat(10_001 + GAP_NS);
+        assert_eq!(spent(&waiter), (50_000 + GAP_NS, GAP_NS + 1));
     }
 
     #[test]
