@@ -108,7 +108,8 @@ fn reaches(states: &Inlet<State>, Moment(wanted, cycle): Moment) -> bool {
 
 /// Whether no later state has been published meanwhile.
 fn stands_in(states: &Inlet<State>, wanted: ControllerState) -> bool {
-    states.latest().unwrap().is_none_or(|state| state.controller_state == wanted as u32)
+    let newest = std::iter::from_fn(|| states.receive().unwrap()).last();
+    newest.is_none_or(|state| state.controller_state == wanted as u32)
 }
 
 /// The readable part of a recording whose logger was killed.

@@ -117,8 +117,8 @@ impl Ports {
 pub fn run(assignment: &Assignment) -> Result<Reason, PlantProcessError> {
     let post = assignment.take_up()?;
     if post.scenario.can.is_virtual() {
-        let rehearsal = Rehearsal::new(&post.scenario, post.schedule)?;
-        serve(&post, PlantCore::new, Some(rehearsal))
+        let rehearsal = Rehearsal::of(&post.scenario, post.schedule)?;
+        serve(&post, PlantCore::new, rehearsal)
     } else {
         serve(&post, PlantCore::on_interfaces, None)
     }

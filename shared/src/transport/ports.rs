@@ -218,18 +218,6 @@ impl<M: Message> Inlet<M> {
         Ok(sample.map(Received))
     }
 
-    /// The newest message not yet received; older ones are passed over. Bounded by the port's buffer.
-    pub fn latest(&self) -> Result<Option<Received<M>>, TransportError> {
-        let mut latest = None;
-        for _ in 0..=self.subscriber.buffer_size() {
-            match self.receive()? {
-                Some(message) => latest = Some(message),
-                None => break,
-            }
-        }
-        Ok(latest)
-    }
-
     /// The first message that `is_awaited`, or the newest there is when `deadline_ns` has passed. Polls without
     /// sleeping: for waits of microseconds.
     pub fn latest_by(

@@ -1,0 +1,60 @@
+//! Readings that come late, and processes that stand still for a while.
+
+use super::*;
+
+#[test]
+fn a_late_reading_is_compared_with_the_pose_wanted_at_its_own_sample() {
+    let mut bench = Bench::new();
+    bench.run_until(ControllerState::Running);
+    let mut delayed = bench.reading();
+    for _ in 0..600 {
+        bench.cycle(|reading| Some(std::mem::replace(&mut delayed, reading)));
+    }
+    assert_eq!(bench.controller.state(), ControllerState::Running);
+    let mut state = State::default();
+    bench.controller.fill_state(&mut state);
+    assert_eq!(state.reading_cycle + 1, state.cycle);
+    let wanted = nalgebra::Vector3::from(state.desired_position_m);
+    assert!((wanted - nalgebra::Vector3::from(state.estimated_position_m)).norm() < 5e-5);
+    let at_its_time = trajectory(&short()).pose(state.motion_time_s).translation.vector;
+    assert!((wanted - at_its_time).norm() < 1e-12);
+}
+
+/// Each for 15 cycles, and what the run is longer by.
+#[test]
+fn after_a_stall_the_motion_goes_on_where_the_drives_stand_and_never_catches_up_in_a_burst() {
+    type Stall = fn(&mut Bench);
+    let undisturbed = Bench::played(|_| ());
+    let stalls: [(&str, Stall); 3] = [
+        ("controller", |bench| bench.controller_stalls(15)),
+        ("plant", |bench| bench.plant_stalls(15)),
+        ("both", |bench| bench.cycle += 15),
+    ];
+    for (who, stall) in stalls {
+        let stalled = Bench::played(stall);
+        let (step_m, usual_m) = (stalled.largest_step_m, undisturbed.largest_step_m);
+        assert!(step_m < 1.01 * usual_m, "{who}: {step_m} m in one cycle, otherwise {usual_m} m");
+        let longer = stalled.cycle - undisturbed.cycle;
+        assert!((14..=16).contains(&longer), "{who}: {longer} cycles longer");
+    }
+}
+
+/// What is wanted stands still with the drives: within what the motion makes in a cycle.
+#[test]
+fn a_stall_is_not_taken_for_lost_tracking() {
+    let usual_m = Bench::played(|_| ()).largest_step_m;
+    for stall in [Bench::controller_stalls, Bench::plant_stalls] {
+        let bench = Bench::played(|bench| {
+            stall(bench, 15);
+            for _ in 0..5 {
+                bench.cycle(Some);
+                let mut state = State::default();
+                bench.controller.fill_state(&mut state);
+                let wanted = nalgebra::Vector3::from(state.desired_position_m);
+                let error_m = (wanted - nalgebra::Vector3::from(state.estimated_position_m)).norm();
+                assert!(error_m < 1.5 * usual_m, "{error_m}");
+            }
+        });
+        assert!(bench.events.iter().all(|event| event.kind == EventKind::Transition.code()));
+    }
+}
