@@ -47,10 +47,13 @@ impl PortSet {
     }
 }
 
-/// A frame on the wire.
+/// A frame on the wire. It stays where it is until the attempt has ended: to look ahead is not to copy it.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Attempt {
-    pub(super) frame: Frame,
+    /// The port whose frame it is: its most urgent one, or what a fault makes it babble.
+    port: usize,
+    /// That fault.
+    babble: Option<usize>,
     pub(super) queued_ns: u64,
     pub(super) start_ns: u64,
     /// When the last end-of-frame bit is, or would have been, over.
@@ -133,12 +136,13 @@ impl VirtualWire {
     fn attempt(&self, contenders: PortSet, start_ns: u64) -> Option<Attempt> {
         let winner = self.offers(contenders, start_ns).min_by_key(Offer::id)?;
         let (contest, strongest) = self.contest(contenders, start_ns, winner);
-        let Queued { frame, duration_ns, since_ns } = *strongest.queued;
+        let Queued { ref frame, duration_ns, since_ns } = *strongest.queued;
         let struck = |is_kind: fn(FaultKind) -> bool| {
             self.faults.strikes_frame(start_ns, is_kind, strongest.port, frame.id(), self.attempts)
         };
         let mut attempt = Attempt {
-            frame,
+            port: strongest.port,
+            babble: strongest.babbles.map(|strike| strike.fault),
             queued_ns: if strongest.babbles.is_some() { start_ns } else { since_ns },
             start_ns,
             received_ns: start_ns + duration_ns - self.interframe_ns,
@@ -151,19 +155,28 @@ impl VirtualWire {
             strike: strongest.babbles,
         };
         if let Some(bit) = contest.destroyed_at {
-            attempt.destroy(self, bit, ErrorKind::Bit);
+            attempt.destroy(self, frame, bit, ErrorKind::Bit);
         } else if let Some(strike) = struck(|kind| kind == FaultKind::Corrupt) {
-            let last = frame_bits(&frame).total() - INTERFRAME_BITS;
+            let last = frame_bits(frame).total() - INTERFRAME_BITS;
             attempt.strike = Some(strike);
-            attempt.destroy(self, 1 + self.faults.pick(strike, self.attempts, last), ErrorKind::Bit);
+            attempt.destroy(self, frame, 1 + self.faults.pick(strike, self.attempts, last), ErrorKind::Bit);
         } else if !self.is_acknowledged(&attempt) {
-            let slot = frame_bits(&frame).total() - INTERFRAME_BITS - BEHIND_ACKNOWLEDGE_BITS;
-            attempt.destroy(self, slot, ErrorKind::Acknowledge);
+            let slot = frame_bits(frame).total() - INTERFRAME_BITS - BEHIND_ACKNOWLEDGE_BITS;
+            attempt.destroy(self, frame, slot, ErrorKind::Acknowledge);
         } else if let Some(strike) = struck(|kind| kind == FaultKind::Duplicate) {
             attempt.strike = Some(strike);
             attempt.repeat(self);
         }
         Some(attempt)
+    }
+
+    /// The frame of an attempt that has not ended.
+    pub(super) fn frame_of(&self, attempt: &Attempt) -> Frame {
+        let queued = match attempt.babble {
+            Some(fault) => self.babble[fault].as_ref(),
+            None => self.stations[attempt.port].transmit.most_urgent(attempt.start_ns),
+        };
+        queued.expect("a frame stays queued until it was sent").frame
     }
 
     /// Whether a port takes part in what happens on the wire.
@@ -267,7 +280,7 @@ impl Attempt {
     }
 
     /// An error flag begins behind bit number `bit` of the frame.
-    fn destroy(&mut self, wire: &VirtualWire, bit: u32, kind: ErrorKind) {
+    fn destroy(&mut self, wire: &VirtualWire, frame: &Frame, bit: u32, kind: ErrorKind) {
         let is_echoed = (0..wire.stations.len()).any(|port| {
             !self.senders.contains(port)
                 && wire.is_on_bus(port, self.start_ns)
@@ -275,7 +288,7 @@ impl Attempt {
         });
         let flag_bits = if is_echoed { 2 * ERROR_FLAG_BITS } else { ERROR_FLAG_BITS };
         let rates = wire.config.rates;
-        let error_ns = self.start_ns + rates.time_to_bit_ns(frame_bits(&self.frame), bit);
+        let error_ns = self.start_ns + rates.time_to_bit_ns(frame_bits(frame), bit);
         self.end_in_error_frame(wire, error_ns, flag_bits);
         self.ending = Ending::Destroyed(kind);
     }

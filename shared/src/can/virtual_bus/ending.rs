@@ -5,6 +5,7 @@ use super::attempt::{Attempt, Ending};
 use crate::can::bus::{ErrorState, Received};
 use crate::can::error_frame::{ErrorKind, ErrorReport};
 use crate::can::faults::FaultKind;
+use crate::can::id::CanId;
 use crate::can::tap::{Tapped, TappedFrame};
 
 /// Pause of an error passive transmitter before it may send again, behind the interframe space.
@@ -54,26 +55,26 @@ impl VirtualWire {
     fn deliver(&mut self, attempt: &Attempt) {
         let time_ns = attempt.received_ns;
         self.statistics.count_frame(time_ns - attempt.queued_ns);
-        let received = Received { frame: attempt.frame, time_ns };
+        let frame = self.frame_of(attempt);
+        let received = Received { frame, time_ns };
         let queued_ns = Some(attempt.queued_ns);
-        self.tap.push(Tapped::Frame(TappedFrame { frame: attempt.frame, time_ns, queued_ns }));
+        self.tap.push(Tapped::Frame(TappedFrame { frame, time_ns, queued_ns }));
         for port in 0..self.stations.len() {
             if attempt.is_from(port) || !self.is_on_bus(port, attempt.start_ns) {
                 continue;
             }
             self.confine(port, time_ns, super::Confinement::received);
-            if !self.loses(port, attempt) {
+            if !self.loses(port, attempt, frame.id()) {
                 self.stations[port].receive.push(received);
             }
         }
     }
 
     /// Whether a fault makes the port lose the frame.
-    fn loses(&mut self, port: usize, attempt: &Attempt) -> bool {
+    fn loses(&mut self, port: usize, attempt: &Attempt, id: CanId) -> bool {
         let is_lose = |kind| kind == FaultKind::Lose;
         // Receivers choose by numbers of their own, so that one's loss is not the other's.
         let number = self.attempts ^ (port as u64 + 1) << 48;
-        let id = attempt.frame.id();
         let strike = self.faults.strikes_frame(attempt.start_ns, is_lose, port, id, number);
         strike.inspect(|&strike| self.faults.record(strike)).is_some()
     }

@@ -7,18 +7,16 @@ pub(super) fn stuff_bits(sequence: u128, length: u32) -> u32 {
     if length == 0 {
         return 0;
     }
-    // Alternating bits before the first get no stuff bit and fill up the first byte.
+    // Alternating bits before the first get no stuff bit and fill up the number.
     let begins_recessive = sequence >> (length - 1) & 1 == 1;
     let alternating = if begins_recessive { u128::MAX / 3 * 2 } else { u128::MAX / 3 };
     let content = sequence & u128::MAX >> (u128::BITS - length);
-    let bytes = length.div_ceil(8);
-    let filled = (alternating.unbounded_shl(length) | content) << (u128::BITS - 8 * bytes);
-    let mut run = Run::of_one(filled.leading_zeros() > 0);
+    let filled = alternating.unbounded_shl(length) | content;
+    let mut behind = Behind::of(Run::of_one(filled.leading_zeros() > 0), 0);
     let mut stuffed = 0;
-    for &byte in &filled.to_be_bytes()[..bytes as usize] {
-        let step = STEPS[usize::from(run.0)][usize::from(byte)];
-        run = step.run;
-        stuffed += u32::from(step.stuffed);
+    for byte in filled.to_be_bytes() {
+        behind = STEPS[usize::from(byte)].from(behind);
+        stuffed += behind.stuffed();
     }
     stuffed
 }
@@ -28,17 +26,8 @@ pub(super) fn stuff_bits(sequence: u128, length: u32) -> u32 {
 #[derive(Debug, Clone, Copy)]
 struct Run(u8);
 
-/// What a byte leads to.
-#[derive(Debug, Clone, Copy)]
-struct Step {
-    run: Run,
-    stuffed: u8,
-}
-
-static STEPS: [[Step; 256]; Run::COUNT] = steps();
-
 impl Run {
-    const COUNT: usize = 8;
+    const COUNT: u8 = 8;
     const RECESSIVE: u8 = 4;
     const LONGEST: u8 = 3;
 
@@ -51,34 +40,75 @@ impl Run {
     }
 
     /// The run behind one more bit, and the stuff bits that it brings.
-    const fn push(self, recessive: bool) -> Step {
+    const fn push(self, recessive: bool) -> (Self, u8) {
         if recessive != self.is_recessive() {
-            Step { run: Self::of_one(recessive), stuffed: 0 }
+            (Self::of_one(recessive), 0)
         } else if self.0 & Self::LONGEST == Self::LONGEST {
-            Step { run: Self::of_one(!recessive), stuffed: 1 }
+            (Self::of_one(!recessive), 1)
         } else {
-            Step { run: Self(self.0 + 1), stuffed: 0 }
+            (Self(self.0 + 1), 0)
         }
+    }
+
+    /// The same of eight bits.
+    const fn push_byte(self, byte: u8) -> (Self, u8) {
+        let (mut run, mut total, mut bit) = (self, 0, 8);
+        while bit > 0 {
+            bit -= 1;
+            let (next, stuffed) = run.push(byte >> bit & 1 == 1);
+            run = next;
+            total += stuffed;
+        }
+        (run, total)
     }
 }
 
-const fn steps() -> [[Step; 256]; Run::COUNT] {
-    let mut table = [[Step { run: Run(0), stuffed: 0 }; 256]; Run::COUNT];
-    let mut entry = 0;
-    while entry < Run::COUNT * 256 {
-        let (start, byte) = (entry / 256, entry % 256);
-        let mut total = Step { run: Run(start as u8), stuffed: 0 };
-        let mut bit = 8;
-        while bit > 0 {
-            bit -= 1;
-            let step = total.run.push(byte >> bit & 1 == 1);
-            total = Step { run: step.run, stuffed: total.stuffed + step.stuffed };
-        }
-        table[start][byte] = total;
-        entry += 1;
+/// The run behind a byte, times 8, and from bit 6 on the stuff bits that the byte brought, at most two. What stands above
+/// bit 7 means nothing.
+#[derive(Debug, Clone, Copy)]
+struct Behind(u64);
+
+impl Behind {
+    const fn of(run: Run, stuffed: u8) -> Self {
+        Self((run.0 << 3 | stuffed << 6) as u64)
     }
-    table
+
+    const fn stuffed(self) -> u32 {
+        (self.0 >> 6 & 0b11) as u32
+    }
 }
+
+/// What a byte leads to: from run `n`, what stands from bit 8 `n` on. So a step waits only for a shift by what the step
+/// before gave, not for memory.
+#[derive(Debug, Clone, Copy)]
+struct Step(u64);
+
+impl Step {
+    const fn from(self, before: Behind) -> Behind {
+        Behind(self.0.wrapping_shr(before.0 as u32))
+    }
+
+    const fn of(byte: u8) -> Self {
+        let mut step = 0;
+        let mut run = 0;
+        while run < Run::COUNT {
+            let (next, stuffed) = Run(run).push_byte(byte);
+            step |= Behind::of(next, stuffed).0 << (8 * run);
+            run += 1;
+        }
+        Self(step)
+    }
+}
+
+static STEPS: [Step; 256] = {
+    let mut steps = [Step(0); 256];
+    let mut byte = 0;
+    while byte < 256 {
+        steps[byte] = Step::of(byte as u8);
+        byte += 1;
+    }
+    steps
+};
 
 /// The lowest `length` bits of a field in the order of the wire, first the highest of them.
 pub(super) fn bits_of(field: u128, length: u32) -> impl Iterator<Item = bool> {
