@@ -140,12 +140,11 @@ fn serve<L: Link>(
 
     let mut plant = build(scenario, start.epoch_ns)?;
     let mut cycle = Cycle::new(start.epoch_ns, scenario.period_ns());
-    let mut answer = None;
     while !post.stop.is_made() && u64::from(plant.silent_cycles()) <= patience_cycles {
         let wake = cycle.wait_preparing(|| {
             prepare(&mut plant, &ports)?;
-            // One that fails has no way left to go through; the plant itself tells why.
-            rehearsal.take_if(|rehearsal| rehearsal.play(answer.as_ref()).is_err());
+            // One that fails is given up: all that is lost is warm caches.
+            rehearsal.take_if(|rehearsal| rehearsal.play().is_err());
             Ok::<_, PlantProcessError>(())
         })?;
         exchange(&mut plant, &mut ports, schedule, wake, cycle.waiter())?;
@@ -154,7 +153,9 @@ fn serve<L: Link>(
         let deadline_ns = wake.due_ns + schedule.command_by_ns;
         let command = ports.command_of(wake.cycle, deadline_ns, cycle.waiter())?;
         plant.apply(clock::now_ns(), command.as_deref())?;
-        answer = command.as_deref().copied();
+        if let (Some(rehearsal), Some(command)) = (&mut rehearsal, command.as_deref()) {
+            rehearsal.hear(command);
+        }
     }
     plant.stop();
     let give_up_ns = clock::now_ns() + STOP_WITHIN_NS.max(STOP_WITHIN_CYCLES * scenario.period_ns());

@@ -1,8 +1,9 @@
-//! A plant of the same scenario that goes through every cycle shortly before the real one does.
+//! A plant of the same scenario that goes through a cycle whenever the real one prepares for its next.
 //!
 //! A sleep costs a task the processor's knowledge of its way: caches and branch predictors serve whoever runs meanwhile.
 //! What was gone through once since is fast again (docs/realtime.md). Nothing of what this plant does is seen by
-//! anybody, and it shares nothing with the real one.
+//! anybody. It shares nothing with the real one but the commands, lives in a time of its own, which goes faster, and
+//! has none of the scenario's faults: one of them could stop it for good.
 
 use masseter_shared::config::Scenario;
 use masseter_shared::messages::{Command, Reading};
@@ -21,6 +22,8 @@ pub(crate) struct Rehearsal {
     schedule: CycleSchedule,
     period_ns: u64,
     cycle: u64,
+    /// The last that the real plant had: a cycle without one is rehearsed as if it came again.
+    command: Option<Command>,
 }
 
 impl Rehearsal {
@@ -30,11 +33,18 @@ impl Rehearsal {
         if period_ns > LONGEST_PERIOD_NS {
             return Ok(None);
         }
-        Ok(Some(Self { plant: PlantCore::new(scenario, 0)?, schedule, period_ns, cycle: 0 }))
+        let faultless = Scenario { faults: Vec::new(), ..scenario.clone() };
+        let plant = PlantCore::new(&faultless, 0)?;
+        Ok(Some(Self { plant, schedule, period_ns, cycle: 0, command: None }))
     }
 
-    /// Goes through its next cycle: from SYNC to the reading, which is returned, and `command` in answer to it.
-    pub(crate) fn play(&mut self, command: Option<&Command>) -> Result<Reading, PlantError> {
+    /// Hears what the real plant is to do.
+    pub(crate) fn hear(&mut self, command: &Command) {
+        self.command = Some(*command);
+    }
+
+    /// Goes through its next cycle: from SYNC to the reading, which is returned, and the command's answer to it.
+    pub(crate) fn play(&mut self) -> Result<Reading, PlantError> {
         let sync_ns = self.cycle * self.period_ns;
         self.cycle += 1;
         self.plant.begin_cycle(Wake {
@@ -49,21 +59,25 @@ impl Rehearsal {
         self.plant.fill_reading(&mut reading);
         self.plant.drain_frames(|_| ());
         self.plant.drain_events(&mut |_| ());
-        self.plant.apply(sync_ns + self.schedule.command_by_ns, command)?;
+        self.plant.apply(sync_ns + self.schedule.command_by_ns, self.command.as_ref())?;
         Ok(reading)
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use masseter_shared::config::{FaultConfig, FaultKindConfig};
     use masseter_shared::messages::codes::{DriveCondition, DriveRequest};
 
     use super::*;
 
-    fn at(rate_hz: u32) -> Option<Rehearsal> {
-        let scenario = Scenario { rate_hz, ..Scenario::default() };
+    fn of(scenario: &Scenario) -> Option<Rehearsal> {
         let schedule = CycleSchedule::new(&scenario.can, scenario.period_ns()).unwrap();
-        Rehearsal::of(&scenario, schedule).unwrap()
+        Rehearsal::of(scenario, schedule).unwrap()
+    }
+
+    fn at(rate_hz: u32) -> Option<Rehearsal> {
+        of(&Scenario { rate_hz, ..Scenario::default() })
     }
 
     #[test]
@@ -73,17 +87,30 @@ mod tests {
     }
 
     #[test]
-    fn it_goes_the_way_of_the_real_one_from_boot_to_motion() {
-        let mut rehearsal = at(1000).unwrap();
-        let mut reading = rehearsal.play(None).unwrap();
+    fn it_boots_moves_and_stays_enabled_without_new_commands_whatever_the_scenarios_faults() {
+        let bus_off = FaultConfig {
+            kind: FaultKindConfig::BusOff,
+            bus: 0,
+            from_s: 0.01,
+            until_s: None,
+            node: Some(1),
+            id: None,
+            probability: 1.0,
+            count: None,
+            delay_us: None,
+        };
+        let mut rehearsal = of(&Scenario { faults: vec![bus_off], ..Scenario::default() }).unwrap();
+        let first = rehearsal.play().unwrap();
+        let mut reading = first;
         for cycle in 1..500 {
-            let command = Command {
-                cycle,
-                target_m: reading.position_m,
-                request: DriveRequest::Enable.code(),
-                ..Command::default()
-            };
-            reading = rehearsal.play(Some(&command)).unwrap();
+            let target_m = reading.position_m.map(|position_m| position_m + 1e-5);
+            let request = DriveRequest::Enable.code();
+            rehearsal.hear(&Command { cycle, target_m, request, ..Command::default() });
+            reading = rehearsal.play().unwrap();
+        }
+        assert!(reading.position_m.iter().zip(first.position_m).all(|(now_m, first_m)| *now_m > first_m));
+        for _ in 0..500 {
+            reading = rehearsal.play().unwrap();
         }
         assert_eq!(reading.drive_state, [DriveCondition::OperationEnabled.code(); 6]);
         assert_eq!((reading.fresh_axes, reading.master_fault), (0b11_1111, 0));

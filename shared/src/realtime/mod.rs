@@ -7,6 +7,7 @@
 
 mod cycle;
 mod load;
+mod preparation;
 mod reserve;
 pub mod scheduling;
 mod waiter;

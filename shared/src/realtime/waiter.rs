@@ -1,6 +1,7 @@
 //! Waiting for an instant or for a message, and noticing when the machine stood still meanwhile.
 
 use super::load::Load;
+use super::preparation::Preparation;
 use super::reserve::Reserve;
 use crate::clock;
 
@@ -8,11 +9,6 @@ use crate::clock;
 /// them. A gap longer than this was spent elsewhere: interrupts, the hypervisor, a task of higher
 /// priority; or, while working, in the work itself, which [`Account`] therefore keeps apart.
 const GAP_NS: u64 = 50_000;
-
-/// For how long the first preparation is taken to last, ns.
-const PREPARE_NS: u64 = 40_000;
-/// Where less than this is left before the preparations, they would take too large a share of the core, ns.
-const WORTH_PREPARING_NS: u64 = 100_000;
 
 /// What a task's time went to since its first wait, ns.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -35,10 +31,7 @@ pub struct Waiter {
     /// The last stretch before a deadline is spun, not slept: a sleeping core takes tens of microseconds to
     /// come back, a spinning one a tenth of one.
     reserve: Reserve,
-    /// The stretch before a deadline in which it is prepared for.
-    lead: Reserve,
-    /// The shortest of the preparations that were repeated, ns.
-    shortest_ns: Option<u64>,
+    preparation: Preparation,
     load: Load,
     account: Account,
     /// Since when the task has not been waiting; none before its first wait.
@@ -50,8 +43,7 @@ impl Waiter {
     pub fn new(period_ns: u64) -> Self {
         Self {
             reserve: Reserve::new(period_ns),
-            lead: Reserve::beginning_with(period_ns, PREPARE_NS),
-            shortest_ns: None,
+            preparation: Preparation::new(period_ns),
             load: Load::default(),
             account: Account::default(),
             working_since_ns: None,
@@ -81,16 +73,16 @@ impl Waiter {
         let now_ns = self.sleep_before(due_ns);
         self.working_since_ns = Some(now_ns);
         work(now_ns)?;
-        let now_ns = self.begin();
+        let now_ns = self.end_work();
         Ok(self.spin_until(due_ns, now_ns))
     }
 
     /// Sleeps for as long as a sleep is worth it; returns the time found at its end.
     fn sleep_before(&mut self, due_ns: u64) -> u64 {
-        let now_ns = self.begin();
+        let now_ns = self.end_work();
         if let Some(used) = self.load.look(now_ns, self.account.spun_ns + self.account.worked_ns) {
             self.reserve.yield_to_others(used);
-            self.lead.yield_to_others(used);
+            self.preparation.yield_to_others(used);
         }
         let sleep_until_ns = due_ns.saturating_sub(self.reserve.ns());
         if now_ns < sleep_until_ns { self.sleep(sleep_until_ns) } else { now_ns }
@@ -103,16 +95,14 @@ impl Waiter {
         due_ns: u64,
         mut prepare: impl FnMut() -> Result<(), E>,
     ) -> Result<u64, E> {
-        let prepare_at_ns = due_ns.saturating_sub(self.lead.ns());
-        if prepare_at_ns <= clock::now_ns() + WORTH_PREPARING_NS {
+        let Some(begin_ns) = self.preparation.begin_ns(clock::now_ns(), due_ns) else {
             return Ok(self.until(due_ns));
-        }
-        let began_ns = self.until(prepare_at_ns);
+        };
+        let began_ns = self.until(begin_ns);
         prepare()?;
-        let mut now_ns = self.begin();
-        // Half as long again is enough: preparations vary less than sleeps.
-        self.lead.learn((now_ns - began_ns) * 3 / 4);
-        while self.shortest_ns.is_none_or(|shortest_ns| now_ns + 2 * shortest_ns < due_ns) {
+        let mut now_ns = self.end_work();
+        self.preparation.learn_first(now_ns - began_ns);
+        while self.preparation.fits(now_ns, due_ns) {
             prepare()?;
             let took_ns = clock::now_ns() - now_ns;
             self.account_for_repeat(took_ns);
@@ -121,11 +111,8 @@ impl Waiter {
         Ok(self.spin_until(due_ns, now_ns))
     }
 
-    /// What was done a moment ago in a fraction of the time was held up by the machine, not by itself.
     fn account_for_repeat(&mut self, took_ns: u64) {
-        let usual_ns = self.shortest_ns.map_or(took_ns, |shortest_ns| shortest_ns.min(took_ns));
-        self.shortest_ns = Some(usual_ns);
-        let worked_ns = if took_ns - usual_ns > GAP_NS { usual_ns } else { took_ns };
+        let worked_ns = self.preparation.learn_repeat(took_ns);
         self.account.worked_ns += worked_ns;
         self.account.stalled_ns += took_ns - worked_ns;
         self.working_since_ns = self.working_since_ns.map(|since_ns| since_ns + took_ns);
@@ -156,11 +143,11 @@ impl Waiter {
 
     /// Begins to spin.
     pub fn spin(&mut self) -> Spin<'_> {
-        Spin { last_ns: self.begin(), waiter: self }
+        Spin { last_ns: self.end_work(), waiter: self }
     }
 
     /// Ends a stretch of work; returns the time. Until a wait really spins, the next stretch runs.
-    fn begin(&mut self) -> u64 {
+    fn end_work(&mut self) -> u64 {
         let now_ns = clock::now_ns();
         if let Some(since_ns) = self.working_since_ns.replace(now_ns) {
             let worked_ns = now_ns - since_ns;
@@ -216,48 +203,20 @@ mod tests {
     }
 
     #[test]
-    fn far_deadlines_are_prepared_for_and_near_ones_are_not() {
+    fn a_far_deadline_is_prepared_for_and_its_repeats_are_work() {
         let mut waiter = Waiter::new(1_000_000);
-        for (ahead_ns, is_far) in [(0, false), (50_000, false), (SECOND_NS, true)] {
-            let due_ns = clock::now_ns() + ahead_ns;
-            let mut prepared = 0;
-            let prepare = || -> Result<(), ()> {
-                prepared += 1;
-                Ok(())
-            };
-            assert!(waiter.until_preparing(due_ns, prepare).unwrap() >= due_ns);
-            assert_eq!(prepared > 0, is_far, "{prepared} times {ahead_ns} ns ahead");
-        }
-        let refused = waiter.until_preparing(clock::now_ns() + SECOND_NS, || Err("no"));
-        assert_eq!(refused, Err("no"));
-    }
-
-    #[test]
-    fn what_takes_long_to_prepare_is_begun_earlier() {
-        let mut waiter = Waiter::new(1_000_000);
-        let first_ns = waiter.lead.ns();
-        let prepare = || -> Result<(), ()> {
-            clock::sleep(std::time::Duration::from_nanos(2 * first_ns));
+        let mut prepared = 0;
+        let mut prepare = || -> Result<(), ()> {
+            prepared += 1;
             Ok(())
         };
-        let until_ns = clock::now_ns() + SECOND_NS;
-        while waiter.lead.ns() == first_ns && clock::now_ns() < until_ns {
-            waiter.until_preparing(clock::now_ns() + SECOND_NS / 100, prepare).unwrap();
+        for ahead_ns in [0, 20_000_000] {
+            let due_ns = clock::now_ns() + ahead_ns;
+            assert!(waiter.until_preparing(due_ns, &mut prepare).unwrap() >= due_ns);
         }
-        assert!(waiter.lead.ns() > first_ns);
-    }
-
-    #[test]
-    fn a_repeat_that_takes_much_longer_than_the_one_before_was_held_up_by_the_machine() {
-        let mut waiter = Waiter::new(1_000_000);
-        let spent = |waiter: &Waiter| (waiter.account().worked_ns, waiter.account().stalled_ns);
-        waiter.account_for_repeat(20_000);
-        waiter.account_for_repeat(10_000);
-        assert_eq!(spent(&waiter), (30_000, 0));
-        waiter.account_for_repeat(10_000 + GAP_NS);
-        assert_eq!(spent(&waiter), (40_000 + GAP_NS, 0));
-        waiter.account_for_repeat(10_001 + GAP_NS);
-        assert_eq!(spent(&waiter), (50_000 + GAP_NS, GAP_NS + 1));
+        assert!(prepared > 0);
+        assert!(waiter.account().worked_ns > 0);
+        assert_eq!(waiter.until_preparing(clock::now_ns() + 20_000_000, || Err("no")), Err("no"));
     }
 
     #[test]
