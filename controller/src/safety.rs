@@ -82,13 +82,14 @@ impl From<InverseError> for Fault {
 /// Whether every value of a reading is a number and every code known.
 pub(crate) fn check_reading(reading: &Reading) -> Result<(), Fault> {
     for axis in 0..AXES {
-        let (position_m, force_n) = (reading.position_m[axis], reading.force_n[axis]);
-        if !(position_m.is_finite() && force_n.is_finite()) {
-            return Err(Fault::of_axis(Cause::BadMessage, axis, position_m, 0.0));
-        }
         let code = reading.drive_state[axis];
-        if DriveCondition::try_from(code).is_err() {
-            return Err(Fault::of_axis(Cause::BadMessage, axis, f64::from(code), 0.0));
+        let values = [
+            (reading.position_m[axis], reading.position_m[axis].is_finite()),
+            (reading.force_n[axis], reading.force_n[axis].is_finite()),
+            (f64::from(code), DriveCondition::try_from(code).is_ok()),
+        ];
+        if let Some((value, _)) = values.into_iter().find(|(_, is_good)| !is_good) {
+            return Err(Fault::of_axis(Cause::BadMessage, axis, value, 0.0));
         }
     }
     Ok(())

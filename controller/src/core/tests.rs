@@ -298,6 +298,27 @@ fn whatever_goes_wrong_while_moving_ends_in_a_safe_stop_with_its_cause() {
     }
 }
 
+#[test]
+fn a_bad_reading_is_reported_with_its_bad_value() {
+    type Spoil = fn(&mut Reading);
+    let cases: [(Spoil, u32, f64); 3] = [
+        (|reading| reading.position_m[1] = f64::NEG_INFINITY, 1, f64::NEG_INFINITY),
+        (|reading| reading.force_n[5] = f64::INFINITY, 5, f64::INFINITY),
+        (|reading| reading.drive_state[3] = 99, 3, 99.0),
+    ];
+    for (spoil, axis, value) in cases {
+        let mut bench = Bench::new();
+        bench.run_until(ControllerState::Running);
+        bench.cycle(|mut reading| {
+            spoil(&mut reading);
+            Some(reading)
+        });
+        assert_eq!(bench.last_cause(), Cause::BadMessage);
+        let told = bench.events.last().unwrap();
+        assert_eq!((told.axis, told.value.to_bits()), (axis, value.to_bits()), "{}", told.value);
+    }
+}
+
 /// Its quick stop may still be under way, and the command must go on asking for it.
 #[test]
 fn a_safe_stop_waits_for_a_lost_drive_until_its_time_is_over() {

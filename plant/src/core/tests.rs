@@ -4,7 +4,7 @@ use masseter_shared::can::canopen::{Cob, NodeId};
 use masseter_shared::can::cia402::DriveState;
 use masseter_shared::can::tap;
 use masseter_shared::geometry::{AXES, Mechanism, MechanismConfig, Pose, Vec3};
-use masseter_shared::messages::codes::{Cause, DriveCondition, DriveRequest, EventKind, Source};
+use masseter_shared::messages::codes::{Cause, DriveCondition, DriveRequest, EventKind, NO_AXIS, Source};
 
 use super::*;
 
@@ -172,8 +172,20 @@ fn without_the_master_the_drives_stop_by_themselves() {
 }
 
 #[test]
-fn a_bad_command_stops_the_rig() {
-    for (target_m, request) in [([f64::NAN; AXES], 1), ([0.0; AXES], 77)] {
+fn a_bad_command_stops_the_rig_and_its_bad_value_is_told() {
+    let standing = Bench::new(&Scenario::default()).truth.joint_m;
+    let with = |axis: usize, target_m: f64| {
+        let mut targets_m = standing;
+        targets_m[axis] = target_m;
+        targets_m
+    };
+    let cases = [
+        (with(0, f64::NAN), 1, 0, f64::NAN),
+        (with(4, 5000.0), 1, 4, 5000.0),
+        (with(2, f64::INFINITY), 77, 2, f64::INFINITY),
+        (standing, 77, NO_AXIS, 77.0),
+    ];
+    for (target_m, request, axis, value) in cases {
         let mut bench = Bench::new(&Scenario::default());
         bench.enable();
         let command = Command { cycle: 1, target_m, request, ..Command::default() };
@@ -184,6 +196,8 @@ fn a_bad_command_stops_the_rig() {
         }
         assert!(bench.plant.drives_are_off());
         assert_eq!(bench.causes(EventKind::Fault), [Cause::BadMessage]);
+        let told = bench.events.iter().find(|event| event.kind == EventKind::Fault.code()).unwrap();
+        assert_eq!((told.axis, told.value.to_bits()), (axis, value.to_bits()), "{}", told.value);
     }
 }
 

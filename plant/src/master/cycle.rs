@@ -246,14 +246,21 @@ impl Master {
             return;
         };
         self.silent_cycles = 0;
-        let bad_target = (0..AXES).find(|&axis| !self.nodes[axis].can_go_to(command.target_m[axis]));
-        if bad_target.is_some() || DriveRequest::try_from(command.request).is_err() {
-            let code = f64::from(command.request);
-            let place = bad_target.map_or(Place::Nowhere, Place::Axis);
-            self.fail(now_ns, Cause::BadMessage, place, [code, 0.0]);
-            return;
+        if let Some((place, value)) = self.fault_of(command) {
+            self.fail(now_ns, Cause::BadMessage, place, [value, 0.0]);
+        } else {
+            (self.command, self.command_received_ns) = (Some(*command), now_ns);
         }
-        (self.command, self.command_received_ns) = (Some(*command), now_ns);
+    }
+
+    /// The first value of a command that no drive can be told, and whose it is.
+    fn fault_of(&self, command: &Command) -> Option<(Place, f64)> {
+        let bad_target = (0..AXES).find(|&axis| !self.nodes[axis].can_go_to(command.target_m[axis]));
+        if let Some(axis) = bad_target {
+            return Some((Place::Axis(axis), command.target_m[axis]));
+        }
+        let is_unknown = DriveRequest::try_from(command.request).is_err();
+        is_unknown.then(|| (Place::Nowhere, f64::from(command.request)))
     }
 
     /// Cycles since the last command.
