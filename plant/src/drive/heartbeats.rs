@@ -25,13 +25,14 @@ impl Producer {
         self.next_ns += self.interval_ns;
     }
 
-    /// Whether one is due; then the next one is an interval later.
+    /// Whether one is due; then the next one is an interval later. Those that were missed meanwhile are left out.
     pub(super) fn is_due(&mut self, now_ns: u64) -> bool {
-        let is_due = self.interval_ns > 0 && now_ns >= self.next_ns;
-        if is_due {
-            self.next_ns += self.interval_ns;
+        if self.interval_ns == 0 || now_ns < self.next_ns {
+            return false;
         }
-        is_due
+        let missed = (now_ns - self.next_ns) / self.interval_ns;
+        self.next_ns += (missed + 1) * self.interval_ns;
+        true
     }
 }
 

@@ -39,6 +39,19 @@ fn the_heartbeat_is_produced_as_object_1017_says() {
     assert_eq!(bench.heartbeats(), []);
 }
 
+/// As on real wires, when the machine held the drives up.
+#[test]
+fn heartbeats_missed_while_the_drive_stood_still_are_left_out() {
+    let mut bench = Bench::operational();
+    bench.run_ms(100);
+    bench.sent.clear();
+    bench.now_ns += 470_000_000;
+    bench.run_ms(1);
+    assert_eq!(bench.heartbeats().len(), 1, "no burst");
+    bench.run_ms(99);
+    assert_eq!(bench.heartbeats().len(), 3, "and then as ever");
+}
+
 #[test]
 fn a_stopped_node_obeys_network_management_alone() {
     let mut bench = Bench::operational();
