@@ -130,18 +130,11 @@ impl Controller {
         }
     }
 
-    /// Whether all drives report that they give no force: a lost one reports nothing.
+    /// Whether all drives report that they are without voltage: a lost one reports nothing, and may not be.
     fn drives_are_off(&self) -> bool {
-        self.drive_state.iter().all(|&code| {
-            !matches!(
-                DriveCondition::try_from(code),
-                Ok(DriveCondition::Unknown
-                    | DriveCondition::OperationEnabled
-                    | DriveCondition::QuickStopActive
-                    | DriveCondition::FaultReaction
-                    | DriveCondition::SwitchedOn)
-            )
-        })
+        let is_powered =
+            |&code: &u32| DriveCondition::try_from(code).ok().and_then(DriveCondition::is_powered);
+        self.drive_state.iter().all(|code| is_powered(code) == Some(false))
     }
 
     /// Takes the newest reading, if one came, and solves the forward kinematics for it.

@@ -123,7 +123,7 @@ impl<L: Link> PlantCore<L> {
         self.master.stop();
     }
 
-    /// Whether no drive gives force, as far as they tell.
+    /// Whether no drive reports voltage; a lost one reports nothing.
     pub fn drives_are_off(&self) -> bool {
         self.master.drives_are_off()
     }

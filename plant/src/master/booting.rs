@@ -118,7 +118,7 @@ impl Master {
         self.add(now_ns, (Source::Master, EventKind::Fault, fault.cause), Place::Axis(axis), event);
     }
 
-    /// Ends a stop once every drive is verified again, none gives force, and the controller has switched
+    /// Ends a stop once every drive is verified again, none has voltage, and the controller has switched
     /// them off: whoever still asks for motion does not know of the stop.
     pub(super) fn restore(&mut self, now_ns: u64) {
         let wants_off = self.silent_cycles == 0

@@ -3,7 +3,7 @@
 use masseter_shared::can::canopen::{Heartbeat, NmtState, NodeId, sync};
 use masseter_shared::can::{Bus, ReceiveError};
 use masseter_shared::geometry::AXES;
-use masseter_shared::messages::codes::{Cause, DriveCondition, DriveRequest};
+use masseter_shared::messages::codes::{Cause, DriveRequest};
 use masseter_shared::messages::{Command, Event, Reading};
 use masseter_shared::realtime::Wake;
 
@@ -268,17 +268,9 @@ impl Master {
         self.silent_cycles
     }
 
-    /// Whether no drive gives force, as far as they tell.
+    /// Whether no drive reports voltage. A lost one reports nothing, and is not waited for: it stops by itself.
     pub(crate) fn drives_are_off(&self) -> bool {
-        self.nodes.iter().all(|node| {
-            !matches!(
-                node.condition(),
-                DriveCondition::SwitchedOn
-                    | DriveCondition::OperationEnabled
-                    | DriveCondition::QuickStopActive
-                    | DriveCondition::FaultReaction
-            )
-        })
+        self.nodes.iter().all(|node| node.condition().is_powered() != Some(true))
     }
 
     /// Notes that so many tapped frames had no room.

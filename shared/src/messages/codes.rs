@@ -252,6 +252,20 @@ codes! {
     }
 }
 
+impl DriveCondition {
+    /// Whether the drive's voltage is applied: it gives force, or does so at the next command. None where nothing is
+    /// known of it.
+    pub const fn is_powered(self) -> Option<bool> {
+        match self {
+            Self::Unknown => None,
+            Self::NotReady | Self::SwitchOnDisabled | Self::ReadyToSwitchOn | Self::Fault => Some(false),
+            Self::SwitchedOn | Self::OperationEnabled | Self::QuickStopActive | Self::FaultReaction => {
+                Some(true)
+            }
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
