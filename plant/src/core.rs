@@ -14,6 +14,7 @@ use masseter_shared::realtime::Wake;
 use crate::build::{build_master, build_sockets, build_virtual};
 use crate::checks::check_boot_time;
 pub use crate::error::PlantError;
+use crate::journal::Journal;
 use crate::link::{Link, VirtualLink};
 use crate::master::Master;
 use crate::socket_link::SocketLink;
@@ -21,8 +22,6 @@ use crate::wire_events;
 
 /// Tapped frames kept between two drains; a drain follows every cycle.
 const TAPPED: usize = 4096;
-/// Events of the wires kept so long; states change at most every few frames.
-const WIRE_EVENTS: usize = 256;
 
 /// The plant's whole memory.
 #[derive(Debug)]
@@ -32,7 +31,7 @@ pub struct PlantCore<L = VirtualLink> {
     buses: usize,
     cycle: u64,
     tapped: Vec<FrameTap>,
-    wire_events: Vec<Event>,
+    wire_events: Journal,
     command_sent_ns: u64,
 }
 
@@ -69,7 +68,7 @@ impl<L: Link> PlantCore<L> {
             buses: scenario.can.buses.len(),
             cycle: 0,
             tapped: Vec::with_capacity(TAPPED),
-            wire_events: Vec::with_capacity(WIRE_EVENTS),
+            wire_events: Journal::new(),
             command_sent_ns: 0,
         })
     }
@@ -137,7 +136,7 @@ impl<L: Link> PlantCore<L> {
 
     /// Hands out what happened since the last drain.
     pub fn drain_events(&mut self, out: &mut impl FnMut(Event)) {
-        self.wire_events.drain(..).for_each(&mut *out);
+        self.wire_events.drain(out);
         self.master.drain_events(out);
     }
 
@@ -152,7 +151,7 @@ impl<L: Link> PlantCore<L> {
             }
             while let Some(note) = self.link.next_note(bus, now_ns) {
                 let axis = note.port.and_then(|port| self.link.axis_at(bus, port));
-                self.add_event(wire_events::of_note(&note, axis, self.cycle));
+                self.wire_events.add(wire_events::of_note(&note, axis, self.cycle));
             }
         }
     }
@@ -167,19 +166,11 @@ impl<L: Link> PlantCore<L> {
             Tapped::Error(report) => {
                 let axis = self.link.axis_at(bus, usize::from(report.port));
                 if let Some(event) = wire_events::of_report(report, axis, self.cycle) {
-                    self.add_event(event);
+                    self.wire_events.add(event);
                 }
             }
         }
         self.tapped.push(tap::encode(bus as u16, tapped));
-    }
-
-    fn add_event(&mut self, event: Event) {
-        if self.wire_events.len() < WIRE_EVENTS {
-            self.wire_events.push(event);
-        } else {
-            self.master.note_lost(event.time_ns, 1);
-        }
     }
 }
 

@@ -18,6 +18,7 @@ mod expectation;
 mod faults;
 mod food;
 mod friction;
+mod journal;
 mod link;
 mod master;
 mod mechanism;

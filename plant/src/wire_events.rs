@@ -4,7 +4,7 @@
 use masseter_shared::can::faults::FaultNote;
 use masseter_shared::can::{ErrorKind, ErrorReport, ErrorState};
 use masseter_shared::messages::Event;
-use masseter_shared::messages::codes::{Cause, EventKind, NO_AXIS, Source};
+use masseter_shared::messages::codes::{Cause, EventKind, Source};
 
 /// The last error counter value of an error active, and of an error passive controller.
 const ACTIVE_MAX: f64 = 127.0;
@@ -18,25 +18,18 @@ pub(crate) fn of_report(report: &ErrorReport, axis: Option<usize>, cycle: u64) -
         ErrorState::Passive => (Cause::ErrorPassive, ACTIVE_MAX),
         ErrorState::BusOff => (Cause::BusOff, PASSIVE_MAX),
     };
-    Some(notice(report.time_ns, cycle, cause, axis, [f64::from(report.tec), limit]))
+    let value = f64::from(report.tec);
+    Some(Event { time_ns: report.time_ns, cycle, value, limit, ..notice(cause, axis) })
 }
 
 /// The event for the beginning or the end of a fault; `axis` is the axis of the node concerned.
 pub(crate) fn of_note(note: &FaultNote, axis: Option<usize>, cycle: u64) -> Event {
     let cause = if note.has_ended { Cause::FaultEnded } else { Cause::FaultInjected };
-    notice(note.time_ns, cycle, cause, axis, [(note.fault + 1) as f64, note.strikes as f64])
+    let (value, limit) = ((note.fault + 1) as f64, note.strikes as f64);
+    Event { time_ns: note.time_ns, cycle, value, limit, ..notice(cause, axis) }
 }
 
-fn notice(time_ns: u64, cycle: u64, cause: Cause, axis: Option<usize>, [value, limit]: [f64; 2]) -> Event {
-    Event {
-        time_ns,
-        cycle,
-        source: Source::Wire.code(),
-        kind: EventKind::Notice.code(),
-        cause: cause.code(),
-        axis: axis.map_or(NO_AXIS, |axis| axis as u32),
-        value,
-        limit,
-        ..Event::default()
-    }
+fn notice(cause: Cause, axis: Option<usize>) -> Event {
+    let event = Event::new(Source::Wire, EventKind::Notice, cause);
+    Event { axis: axis.map_or(event.axis, |axis| axis as u32), ..event }
 }

@@ -1,7 +1,7 @@
 //! What the controller tells: its command, its state, and the events between states.
 
 use masseter_shared::geometry::{AXES, Actuators, Joints};
-use masseter_shared::messages::codes::{Cause, ControllerState, DriveRequest, EventKind, NO_AXIS, Source};
+use masseter_shared::messages::codes::{Cause, ControllerState, DriveRequest, EventKind, Source};
 use masseter_shared::messages::{Command, Event, State, pose_fields};
 
 use super::{Controller, Estimate, Tick};
@@ -21,13 +21,9 @@ impl Controller {
         let mut event = Event {
             time_ns: tick.now_ns,
             cycle: tick.cycle,
-            source: Source::Controller.code(),
-            kind: EventKind::Transition.code(),
-            cause: Cause::Sequence.code(),
-            axis: NO_AXIS,
             from: from.code(),
             to: self.state.code(),
-            ..Default::default()
+            ..Event::new(Source::Controller, EventKind::Transition, Cause::Sequence)
         };
         if happening == Happening::StopRequested {
             event.cause = Cause::StopRequested.code();

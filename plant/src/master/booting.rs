@@ -114,8 +114,9 @@ impl Master {
         self.fault.get_or_insert(Stop::UntilRestored);
         let object =
             fault.object.map_or(0, |object| u32::from(object.index) << 8 | u32::from(object.subindex));
-        let event = Event { object, value: fault.value, limit: fault.limit, ..Event::default() };
-        self.add(now_ns, (Source::Master, EventKind::Fault, fault.cause), Place::Axis(axis), event);
+        let failed = Event::new(Source::Master, EventKind::Fault, fault.cause);
+        let event = Event { object, value: fault.value, limit: fault.limit, ..failed };
+        self.tell(now_ns, Place::Axis(axis), event);
     }
 
     /// Ends a stop once every drive is verified again, none has voltage, and the controller has switched
@@ -130,14 +131,8 @@ impl Master {
             && self.drives_are_off();
         if is_restored {
             (self.fault, self.were_enabled) = (None, false);
-            self.report(
-                now_ns,
-                Source::Master,
-                EventKind::Notice,
-                Cause::Recovered,
-                Place::Nowhere,
-                [0.0; 2],
-            );
+            let recovered = Event::new(Source::Master, EventKind::Notice, Cause::Recovered);
+            self.tell(now_ns, Place::Nowhere, recovered);
         }
     }
 }

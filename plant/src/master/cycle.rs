@@ -7,11 +7,11 @@ use masseter_shared::messages::codes::{Cause, DriveRequest};
 use masseter_shared::messages::{Command, Event, Reading};
 use masseter_shared::realtime::Wake;
 
-use super::journal::{Journal, overflow};
 use super::node::Node;
 pub(crate) use super::node::Scale;
 use super::plan::Setup;
 use super::supervision::Place;
+use crate::journal::{Journal, overflow};
 use crate::link::Buses;
 
 /// Frames taken from a bus in one go, so that a babbling node cannot hold the cycle up.

@@ -7,7 +7,6 @@
 mod boot;
 mod booting;
 mod cycle;
-mod journal;
 mod node;
 mod plan;
 mod receive;

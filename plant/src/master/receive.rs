@@ -98,9 +98,9 @@ impl Master {
         let after = node.condition();
         self.complete_ns = self.complete_ns.max(time_ns);
         if before != after {
-            let event = Event { from: before.code(), to: after.code(), ..Event::default() };
-            let codes = (Source::Drive, EventKind::Transition, Cause::Sequence);
-            self.add(time_ns, codes, Place::Axis(axis), event);
+            let moved = Event::new(Source::Drive, EventKind::Transition, Cause::Sequence);
+            let event = Event { from: before.code(), to: after.code(), ..moved };
+            self.tell(time_ns, Place::Axis(axis), event);
         }
     }
 
@@ -108,15 +108,16 @@ impl Master {
     fn note_emergency(&mut self, axis: usize, emergency: Emergency, time_ns: u64) {
         let is_past = emergency.is_reset() || self.nodes[axis].boot.phase() == BootPhase::Waiting;
         let kind = if is_past { EventKind::Notice } else { EventKind::Fault };
-        let values = [f64::from(emergency.code.0), f64::from(emergency.register)];
-        self.report(time_ns, Source::Drive, kind, Cause::Emergency, Place::Axis(axis), values);
+        let (value, limit) = (f64::from(emergency.code.0), f64::from(emergency.register));
+        let event = Event { value, limit, ..Event::new(Source::Drive, kind, Cause::Emergency) };
+        self.tell(time_ns, Place::Axis(axis), event);
     }
 
     fn note_wrong_length(&mut self, axis: usize, cob: Cob, error: &LengthError, time_ns: u64) {
         let (value, limit) = (error.actual as f64, error.expected as f64);
-        let event = Event { object: CanId::from(cob).number(), value, limit, ..Event::default() };
-        let codes = (Source::Master, EventKind::Notice, Cause::WrongLength);
-        self.add(time_ns, codes, Place::Axis(axis), event);
+        let wrong = Event::new(Source::Master, EventKind::Notice, Cause::WrongLength);
+        let event = Event { object: CanId::from(cob).number(), value, limit, ..wrong };
+        self.tell(time_ns, Place::Axis(axis), event);
     }
 
     /// Tells once of a node that nobody configured.
@@ -125,9 +126,8 @@ impl Master {
         let watch = &mut self.buses[bus];
         if watch.unknown_nodes & bit == 0 {
             watch.unknown_nodes |= bit;
-            let event = Event { node: u16::from(id.get()), ..Event::default() };
-            let codes = (Source::Master, EventKind::Notice, Cause::UnknownNode);
-            self.add(time_ns, codes, Place::Bus(bus), event);
+            let unknown = Event::new(Source::Master, EventKind::Notice, Cause::UnknownNode);
+            self.tell(time_ns, Place::Bus(bus), Event { node: u16::from(id.get()), ..unknown });
         }
     }
 
@@ -145,9 +145,9 @@ impl Master {
         }
         let after = self.nodes[axis].boot.phase();
         if before != after {
-            let event = Event { from: before.code(), to: after.code(), ..Event::default() };
-            let codes = (Source::Master, EventKind::Transition, Cause::Sequence);
-            self.add(time_ns, codes, Place::Axis(axis), event);
+            let moved = Event::new(Source::Master, EventKind::Transition, Cause::Sequence);
+            let event = Event { from: before.code(), to: after.code(), ..moved };
+            self.tell(time_ns, Place::Axis(axis), event);
         }
     }
 }

@@ -4,9 +4,7 @@ use masseter_shared::can::canopen::NmtState;
 use masseter_shared::can::{Bus, ErrorState, SendError};
 use masseter_shared::geometry::AXES;
 use masseter_shared::messages::Event;
-use masseter_shared::messages::codes::{
-    BootPhase, Cause, DriveCondition, DriveRequest, EventKind, NO_AXIS, Source,
-};
+use masseter_shared::messages::codes::{BootPhase, Cause, DriveCondition, DriveRequest, EventKind, Source};
 
 use super::boot::BootFault;
 use super::cycle::{Master, Stop};
@@ -100,31 +98,27 @@ impl Master {
                 continue;
             }
             self.buses[bus].is_off = is_off;
-            let values = [f64::from(status.tec), 0.0];
+            let value = f64::from(status.tec);
             if is_off {
-                self.fail(now_ns, Cause::BusOff, Place::Bus(bus), values);
+                self.fail(now_ns, Cause::BusOff, Place::Bus(bus), [value, 0.0]);
             } else {
-                self.report(
-                    now_ns,
-                    Source::Master,
-                    EventKind::Notice,
-                    Cause::Recovered,
-                    Place::Bus(bus),
-                    values,
-                );
+                let recovered = Event::new(Source::Master, EventKind::Notice, Cause::Recovered);
+                self.tell(now_ns, Place::Bus(bus), Event { value, ..recovered });
             }
         }
     }
 
-    /// Stops the drives. The first cause is reported, its consequences are not.
-    pub(super) fn fail(&mut self, now_ns: u64, cause: Cause, place: Place, values: [f64; 2]) {
+    /// Stops the drives. The first cause is reported with the value and the limit that explain it, its consequences
+    /// are not.
+    pub(super) fn fail(&mut self, now_ns: u64, cause: Cause, place: Place, [value, limit]: [f64; 2]) {
         let stop = match cause {
             Cause::CommandLost | Cause::BadMessage | Cause::DriveFault => Stop::ForGood,
             _ => Stop::UntilRestored,
         };
         if self.fault.is_none() {
             self.fault = Some(stop);
-            self.report(now_ns, Source::Master, EventKind::Fault, cause, place, values);
+            let fault = Event::new(Source::Master, EventKind::Fault, cause);
+            self.tell(now_ns, place, Event { value, limit, ..fault });
         }
     }
 
@@ -132,8 +126,8 @@ impl Master {
     pub(super) fn give_way(&mut self, now_ns: u64, bus: usize) {
         if self.fault != Some(Stop::ForGood) {
             self.fault = Some(Stop::ForGood);
-            let codes = (Source::Master, EventKind::Fault, Cause::SecondMaster);
-            self.add(now_ns, codes, Place::Bus(bus), Event::default());
+            let second = Event::new(Source::Master, EventKind::Fault, Cause::SecondMaster);
+            self.tell(now_ns, Place::Bus(bus), second);
         }
     }
 
@@ -151,46 +145,19 @@ impl Master {
         }
     }
 
-    /// Writes an event down; `value` and `limit` in the cause's unit.
-    pub(super) fn report(
-        &mut self,
-        time_ns: u64,
-        source: Source,
-        kind: EventKind,
-        cause: Cause,
-        place: Place,
-        [value, limit]: [f64; 2],
-    ) {
-        self.add(time_ns, (source, kind, cause), place, Event { value, limit, ..Event::default() });
-    }
-
-    /// Writes an event down whose particulars are in `event`.
-    pub(super) fn add(
-        &mut self,
-        time_ns: u64,
-        (source, kind, cause): (Source, EventKind, Cause),
-        place: Place,
-        event: Event,
-    ) {
-        let (axis, node, bus) = match place {
-            Place::Nowhere => (NO_AXIS, 0, 0),
-            Place::Bus(bus) => (NO_AXIS, event.node, bus),
+    /// Writes an event down, with when and where it happened.
+    pub(super) fn tell(&mut self, time_ns: u64, place: Place, event: Event) {
+        let mut event = Event { time_ns, cycle: self.wake.cycle, ..event };
+        match place {
+            Place::Nowhere => {}
+            Place::Bus(bus) => event.bus = bus as u16,
             Place::Axis(axis) => {
                 let node = &self.nodes[axis];
-                (axis as u32, u16::from(node.id.get()), node.bus)
+                (event.axis, event.node, event.bus) =
+                    (axis as u32, u16::from(node.id.get()), node.bus as u16);
             }
-        };
-        self.journal.add(Event {
-            time_ns,
-            cycle: self.wake.cycle,
-            source: source.code(),
-            kind: kind.code(),
-            cause: cause.code(),
-            axis,
-            node,
-            bus: bus as u16,
-            ..event
-        });
+        }
+        self.journal.add(event);
     }
 }
 

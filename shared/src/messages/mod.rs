@@ -18,6 +18,7 @@ use bytemuck::{Pod, Zeroable, bytes_of, bytes_of_mut};
 use iceoryx2::prelude::ZeroCopySend;
 
 use crate::geometry::{AXES, LEGS, Pose};
+use codes::{Cause, EventKind, NO_AXIS, Source};
 use schema::FieldType;
 
 pub use data::CanData;
@@ -280,6 +281,19 @@ messages! {
         value: f64,
         /// The limit it is held against, in the same unit.
         limit: f64,
+    }
+}
+
+impl Event {
+    /// An event of that kind, of no axis; everything else is zero.
+    pub fn new(source: Source, kind: EventKind, cause: Cause) -> Self {
+        Self {
+            source: source.code(),
+            kind: kind.code(),
+            cause: cause.code(),
+            axis: NO_AXIS,
+            ..Self::zeroed()
+        }
     }
 }
 
