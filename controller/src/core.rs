@@ -8,7 +8,7 @@
 mod telling;
 
 use masseter_shared::config::{ControllerConfig, Scenario};
-use masseter_shared::geometry::{AXES, Actuators, LEGS, Mechanism, Pose};
+use masseter_shared::geometry::{AXES, Actuators, Mechanism, Pose};
 use masseter_shared::messages::codes::{Cause, ControllerState, DriveCondition};
 use masseter_shared::messages::{Event, Reading};
 
@@ -83,10 +83,7 @@ impl Controller {
     /// A controller that will play `trajectory` on `mechanism` once the rig is ready.
     pub fn new(scenario: &Scenario, mechanism: Mechanism, trajectory: Trajectory) -> Self {
         let config = scenario.controller;
-        let drives = &scenario.drives;
-        let velocity_limit_m_s = std::array::from_fn(|axis| {
-            if axis < LEGS { drives.slide.max_velocity_m_s } else { drives.leg.max_velocity_m_s }
-        });
+        let velocity_limit_m_s = std::array::from_fn(|axis| scenario.drives.of_axis(axis).max_velocity_m_s);
         Self {
             tracker: ForwardTracker::new(mechanism.clone()),
             playback: Playback::new(trajectory, config.ease_s, config.stop_ramp_s),

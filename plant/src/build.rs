@@ -5,9 +5,9 @@ use masseter_shared::can::faults::Faults;
 use masseter_shared::can::wire::{INTERFRAME_BITS, frame_bits};
 use masseter_shared::can::wrapped::PortFaults;
 use masseter_shared::can::{VirtualWire, WireConfig};
-use masseter_shared::config::{CanConfig, DriveConfig, DynamicsConfig, JawConfig, Scenario};
+use masseter_shared::clock::MILLISECOND_NS;
+use masseter_shared::config::{CanConfig, DynamicsConfig, JawConfig, Scenario};
 use masseter_shared::geometry::{AXES, LEGS, Mechanism, Pose};
-use masseter_shared::schedule::MASTER_ID;
 use nalgebra::Translation3;
 
 use crate::checks::check_quantities;
@@ -26,21 +26,15 @@ use crate::socket_link::SocketLink;
 /// Frames a port may have to send, and to receive between two looks; a millisecond holds 21.
 const TRANSMIT_CAPACITY: usize = 64;
 const RECEIVE_CAPACITY: usize = 256;
-pub(crate) const MS_NS: u64 = 1_000_000;
 
 /// The master of a scenario's plant.
 pub(crate) fn build_master(scenario: &Scenario, now_ns: u64) -> Result<Master, PlantError> {
     let places = places(&scenario.can)?;
     let ids = node_ids(&scenario.can)?;
     let drives = std::array::from_fn(|axis| {
-        let drive = drive_of(scenario, axis);
+        let drive = scenario.drives.of_axis(axis);
         let scale = Scale { increment_m: drive.encoder_resolution_m, rated_force_n: drive.rated_force_n };
-        ExpectedDrive {
-            id: ids[axis],
-            bus: places[axis].bus,
-            scale,
-            setup: setup(scenario, master_id(), axis),
-        }
+        ExpectedDrive { id: ids[axis], bus: places[axis].bus, scale, setup: setup(scenario, axis) }
     });
     Ok(Master::new(master_settings(&scenario.can, drives)?, now_ns))
 }
@@ -61,7 +55,7 @@ pub(crate) fn build_sockets(scenario: &Scenario, now_ns: u64) -> Result<SocketLi
     check_quantities(scenario)?;
     let can = &scenario.can;
     let port_faults = |bus: usize| {
-        let faults = faults::of_bus(&scenario.faults, bus, &[master_id()], now_ns)?;
+        let faults = faults::of_bus(&scenario.faults, bus, &[NodeId::MASTER], now_ns)?;
         let faults = PortFaults::new(faults, MASTER_PORT, fault_seed(scenario, bus))?;
         Ok(faults.restarting_after(restart_after_ns(can)))
     };
@@ -76,7 +70,7 @@ fn fault_seed(scenario: &Scenario, bus: usize) -> u64 {
 
 /// Time after which a controller that went off the bus is restarted; none when it is not.
 fn restart_after_ns(can: &CanConfig) -> Option<u64> {
-    (can.restart_ms > 0).then(|| u64::from(can.restart_ms) * MS_NS)
+    (can.restart_ms > 0).then(|| u64::from(can.restart_ms) * MILLISECOND_NS)
 }
 
 /// The interface of each axis' bus.
@@ -94,7 +88,7 @@ pub(crate) fn build_emulation(scenario: &Scenario, now_ns: u64) -> Result<Emulat
     let positions_m = dynamics.positions_m();
     let drives = (0..AXES)
         .map(|axis| {
-            let drive = drive_of(scenario, axis);
+            let drive = scenario.drives.of_axis(axis);
             let encoder =
                 Encoder::new(drive.encoder_resolution_m, drive.encoder_noise_m, scenario.seed, axis);
             DriveNode::new(&drive_settings(scenario, ids[axis], axis), encoder, now_ns, positions_m[axis])
@@ -107,19 +101,15 @@ fn master_settings(can: &CanConfig, drives: [ExpectedDrive; AXES]) -> Result<Mas
     let rates = can.rates()?;
     let sync_bits = frame_bits(&sync::frame().promoted(can.format()));
     Ok(MasterSettings {
-        id: master_id(),
+        id: NodeId::MASTER,
         drives,
         buses: can.buses.len(),
         sync_ns: rates.duration_ns(sync_bits) - rates.nominal().bits_to_ns(INTERFRAME_BITS),
-        heartbeat_ns: u64::from(can.heartbeat_producer_ms) * MS_NS,
-        heartbeat_timeout_ns: u64::from(can.heartbeat_consumer_ms) * MS_NS,
-        boot_timeout_ns: u64::from(can.boot_timeout_ms) * MS_NS,
+        heartbeat_ns: u64::from(can.heartbeat_producer_ms) * MILLISECOND_NS,
+        heartbeat_timeout_ns: u64::from(can.heartbeat_consumer_ms) * MILLISECOND_NS,
+        boot_timeout_ns: u64::from(can.boot_timeout_ms) * MILLISECOND_NS,
         command_timeout_cycles: can.command_timeout_cycles,
     })
-}
-
-pub(crate) fn drive_of(scenario: &Scenario, axis: usize) -> DriveConfig {
-    if axis < LEGS { scenario.drives.slide } else { scenario.drives.leg }
 }
 
 /// What the drives of a scenario that can be are configured with, in the order of the axes.
@@ -130,28 +120,25 @@ pub(crate) fn all_drive_settings(scenario: &Scenario) -> Result<[DriveSettings; 
 }
 
 fn drive_settings(scenario: &Scenario, node: NodeId, axis: usize) -> DriveSettings {
-    let (drive, stroke_m) = (drive_of(scenario, axis), scenario.mechanism.strokes.of_axis(axis));
+    let (drive, stroke_m) = (scenario.drives.of_axis(axis), scenario.mechanism.strokes.of_axis(axis));
     DriveSettings {
         node,
-        master: master_id(),
+        master: NodeId::MASTER,
         drive,
-        heartbeat_ns: u64::from(scenario.can.heartbeat_producer_ms) * MS_NS,
-        link_timeout_ns: u64::from(scenario.can.heartbeat_consumer_ms) * MS_NS,
+        heartbeat_ns: u64::from(scenario.can.heartbeat_producer_ms) * MILLISECOND_NS,
+        link_timeout_ns: u64::from(scenario.can.heartbeat_consumer_ms) * MILLISECOND_NS,
         period_ns: scenario.period_ns(),
         step_s: scenario.dynamics.step_ns as f64 * 1e-9,
-        position_limit_increments: stroke_m.map(|end_m| (end_m / drive.encoder_resolution_m).round() as i32),
+        position_limit_increments: stroke_m.map(|end_m| drive.increments(end_m) as i32),
     }
-}
-
-pub(crate) fn master_id() -> NodeId {
-    NodeId::new(MASTER_ID).expect("a node id")
 }
 
 fn wires(scenario: &Scenario, free_ports: usize, now_ns: u64) -> Result<Vec<VirtualWire>, PlantError> {
     let can = &scenario.can;
     let (rates, ids) = (can.rates()?, node_ids(can)?);
     let wire = |(bus, axes): (usize, &Vec<usize>)| {
-        let nodes: Vec<_> = std::iter::once(master_id()).chain(axes.iter().map(|&axis| ids[axis])).collect();
+        let nodes: Vec<_> =
+            std::iter::once(NodeId::MASTER).chain(axes.iter().map(|&axis| ids[axis])).collect();
         let config = WireConfig {
             rates,
             format: can.format(),
@@ -191,9 +178,9 @@ fn places(can: &CanConfig) -> Result<[Place; AXES], PlantError> {
 }
 
 fn node_ids(can: &CanConfig) -> Result<[NodeId; AXES], PlantError> {
-    let mut ids = [master_id(); AXES];
+    let mut ids = [NodeId::MASTER; AXES];
     for (axis, &id) in can.node_ids.iter().enumerate() {
-        let is_taken = id == MASTER_ID || can.node_ids[..axis].contains(&id);
+        let is_taken = id == NodeId::MASTER.get() || can.node_ids[..axis].contains(&id);
         if is_taken {
             return Err(PlantError::SharedNodeId { id });
         }

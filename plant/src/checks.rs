@@ -1,9 +1,10 @@
 //! Quantities of a plant that no physics or bus can have.
 
+use masseter_shared::can::canopen::NodeId;
+use masseter_shared::clock::MILLISECOND_NS;
 use masseter_shared::config::Scenario;
 use masseter_shared::geometry::LEGS;
 
-use crate::build::{MS_NS, master_id};
 use crate::error::PlantError;
 use crate::expectation::setup;
 use crate::master::exchanges;
@@ -103,7 +104,7 @@ fn check_counts(scenario: &Scenario) -> Result<(), PlantError> {
 fn check_times(scenario: &Scenario) -> Result<(), PlantError> {
     let Scenario { can, dynamics, .. } = scenario;
     let quantity = |key, value, need| Err(PlantError::Quantity { key, value, need });
-    if u64::from(can.heartbeat_consumer_ms) * MS_NS <= longest_heartbeat_ns(scenario) {
+    if u64::from(can.heartbeat_consumer_ms) * MILLISECOND_NS <= longest_heartbeat_ns(scenario) {
         let value = f64::from(can.heartbeat_consumer_ms);
         let need = "use more than can.heartbeat_producer_ms and a cycle (1000 / rate_hz) together";
         return quantity("can.heartbeat_consumer_ms", value, need);
@@ -119,7 +120,7 @@ fn check_times(scenario: &Scenario) -> Result<(), PlantError> {
 pub(crate) fn check_boot_time(scenario: &Scenario) -> Result<(), PlantError> {
     let Scenario { can, controller, rate_hz, .. } = scenario;
     let fullest = can.buses.iter().map(Vec::len).max().unwrap_or(0);
-    let of_a_drive = exchanges(master_id(), &setup(scenario, master_id(), 0));
+    let of_a_drive = exchanges(NodeId::MASTER, &setup(scenario, 0));
     let cycles = of_a_drive * fullest + controller.steady_readings as usize;
     let least_s = cycles as f64 * scenario.period_s();
     if controller.start_timeout_s > least_s {
@@ -130,6 +131,6 @@ pub(crate) fn check_boot_time(scenario: &Scenario) -> Result<(), PlantError> {
 
 /// The master beats at a SYNC alone: the first one after the interval, which by jitter ends late as often as not.
 fn longest_heartbeat_ns(scenario: &Scenario) -> u64 {
-    let interval_ns = u64::from(scenario.can.heartbeat_producer_ms) * MS_NS;
+    let interval_ns = u64::from(scenario.can.heartbeat_producer_ms) * MILLISECOND_NS;
     (interval_ns / scenario.period_ns() + 1) * scenario.period_ns()
 }

@@ -5,7 +5,7 @@
 //! master and publishes nothing.
 
 use masseter_shared::can::{Bus, OpenError, Received, SocketCan};
-use masseter_shared::clock::{self, SECOND_NS};
+use masseter_shared::clock::{self, MILLISECOND_NS};
 use masseter_shared::config::Scenario;
 use masseter_shared::geometry::AXES;
 use masseter_shared::lifecycle::StopRequest;
@@ -16,9 +16,9 @@ use crate::error::PlantError;
 use crate::mechanism::DynamicsError;
 
 /// How often the drives are stepped at least; between two looks only frames wake them, ns.
-const LOOK_NS: u64 = SECOND_NS / 1000;
+const LOOK_NS: u64 = MILLISECOND_NS;
 /// How far the mechanism may fall behind; what it cannot make up for is left out and counted, ns.
-const BEHIND_NS: u64 = SECOND_NS / 20;
+const BEHIND_NS: u64 = 50 * MILLISECOND_NS;
 
 /// What an emulator did.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]

@@ -1,10 +1,9 @@
 //! Why a plant cannot be built or cannot go on.
 
-use masseter_shared::can::canopen::NodeIdError;
+use masseter_shared::can::canopen::{NodeId, NodeIdError};
 use masseter_shared::can::wrapped::NotByPort;
 use masseter_shared::can::{BitrateError, OpenError};
 use masseter_shared::geometry::{AXIS_NAMES, GeometryError, LimitViolation};
-use masseter_shared::schedule::MASTER_ID;
 
 use crate::mechanism::DynamicsError;
 
@@ -34,7 +33,8 @@ pub enum PlantError {
     NodeId(#[from] NodeIdError),
     /// Two nodes of one id.
     #[error(
-        "can.node_ids: node {id} stands twice, or is the master's ({MASTER_ID}); give every drive its own"
+        "can.node_ids: node {id} stands twice, or is the master's ({}); give every drive its own",
+        NodeId::MASTER
     )]
     SharedNodeId {
         /// The id.

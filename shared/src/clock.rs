@@ -1,4 +1,4 @@
-//! The one place that asks the machine for time. Cores never come here: they get time as an argument.
+//! The one place that asks the machine for time. Cores never ask: they get time as an argument.
 //!
 //! All times are nanoseconds of `CLOCK_MONOTONIC`, the same for every process of a machine. Wall-clock
 //! time names and dates runs, and dates what the kernel stamps.
@@ -13,6 +13,8 @@ use rustix::time::{ClockId, Timespec, clock_gettime};
 
 /// Nanoseconds in a second.
 pub const SECOND_NS: u64 = 1_000_000_000;
+/// Nanoseconds in a millisecond.
+pub const MILLISECOND_NS: u64 = 1_000_000;
 /// What older stamps of the wall clock say is that it was set.
 const PLAUSIBLE_AGE: Duration = Duration::from_secs(60);
 

@@ -8,10 +8,8 @@
 use crate::can::canopen::{Cob, NodeId, NodeIdError};
 use crate::can::wire::{INTERFRAME_BITS, longest_bits, shortest_bits};
 use crate::can::{BitrateError, BusPlan, Message, Overload, Rpdo1, Tpdo1};
+use crate::clock::MILLISECOND_NS;
 use crate::config::CanConfig;
-
-/// Node id of the master.
-pub const MASTER_ID: u8 = 127;
 
 /// From the reading's worst case to the controller's deadline: publishing takes some microseconds, ns.
 const PUBLISH_NS: u64 = 15_000;
@@ -122,19 +120,14 @@ enum Exchange {
 fn plans_of(can: &CanConfig, period_ns: u64, first: Exchange) -> Result<Vec<BusPlan>, ScheduleError> {
     let plan = |(bus, axes): (usize, &Vec<usize>)| {
         let ids = axes.iter().filter_map(|&axis| can.node_ids.get(axis)).map(|&id| NodeId::new(id));
-        let messages = messages(&ids.collect::<Result<Vec<_>, _>>()?, can, period_ns, first)?;
+        let messages = messages(&ids.collect::<Result<Vec<_>, _>>()?, can, period_ns, first);
         Ok(BusPlan::new(bus, can.rates()?, can.format(), period_ns, messages))
     };
     can.buses.iter().enumerate().map(plan).collect()
 }
 
-fn messages(
-    drives: &[NodeId],
-    can: &CanConfig,
-    period_ns: u64,
-    first: Exchange,
-) -> Result<Vec<Message>, ScheduleError> {
-    let heartbeat_ns = u64::from(can.heartbeat_producer_ms) * 1_000_000;
+fn messages(drives: &[NodeId], can: &CanConfig, period_ns: u64, first: Exchange) -> Vec<Message> {
+    let heartbeat_ns = u64::from(can.heartbeat_producer_ms) * MILLISECOND_NS;
     let message = |name: String, cob: Cob, data_length: u32, period_ns: u64| Message {
         name,
         id: cob.into(),
@@ -162,11 +155,11 @@ fn messages(
         });
         messages.push(message(format!("RPDO1 {}", node.get()), Cob::Rpdo1(node), rpdo, period_ns));
     }
-    for &node in drives.iter().chain([&NodeId::new(MASTER_ID)?]) {
+    for &node in drives.iter().chain([&NodeId::MASTER]) {
         let name = format!("heartbeat {}", node.get());
         messages.push(message(name, Cob::Heartbeat(node), HEARTBEAT_LENGTH, heartbeat_ns));
     }
-    Ok(messages)
+    messages
 }
 
 #[cfg(test)]

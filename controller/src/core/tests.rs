@@ -1,7 +1,7 @@
 //! Scenarios of the controller alone: a plant that does what it is told, and one thing that goes wrong.
 
 use masseter_shared::config::{ControllerConfig, JawConfig};
-use masseter_shared::geometry::MechanismConfig;
+use masseter_shared::geometry::{LEGS, MechanismConfig};
 use masseter_shared::messages::codes::{DriveRequest, EventKind};
 use masseter_shared::messages::{Command, State, explain};
 

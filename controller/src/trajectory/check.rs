@@ -6,9 +6,7 @@
 //! carries beyond a stroke is held at its end.
 
 use masseter_shared::config::TrajectoryLimitsConfig;
-use masseter_shared::geometry::{
-    AXES, AXIS_NAMES, InverseError, LEGS, LimitViolation, Mechanism, StrokeLimits,
-};
+use masseter_shared::geometry::{AXES, AXIS_NAMES, InverseError, LimitViolation, Mechanism, StrokeLimits};
 
 use crate::kinematics::{Assembly, Condition};
 
@@ -185,8 +183,7 @@ impl<'a> Survey<'a> {
 
     fn visit_velocity(&mut self, velocity_m_s: &[f64; AXES]) -> Result<(), CheckProblem> {
         for (axis, velocity_m_s) in velocity_m_s.iter().map(|v| v.abs()).enumerate() {
-            let limits = self.limits;
-            let limit_m_s = if axis < LEGS { limits.slide_velocity_m_s } else { limits.leg_velocity_m_s };
+            let limit_m_s = self.limits.velocity_m_s(axis);
             self.report.velocity_m_s[axis] = self.report.velocity_m_s[axis].max(velocity_m_s);
             if velocity_m_s > limit_m_s {
                 return Err(CheckProblem::Velocity { axis, velocity_m_s, limit_m_s });
@@ -197,9 +194,7 @@ impl<'a> Survey<'a> {
 
     fn visit_acceleration(&mut self, acceleration_m_s2: &[f64; AXES]) -> Result<(), CheckProblem> {
         for (axis, acceleration_m_s2) in acceleration_m_s2.iter().map(|a| a.abs()).enumerate() {
-            let limits = self.limits;
-            let limit_m_s2 =
-                if axis < LEGS { limits.slide_acceleration_m_s2 } else { limits.leg_acceleration_m_s2 };
+            let limit_m_s2 = self.limits.acceleration_m_s2(axis);
             self.report.acceleration_m_s2[axis] = self.report.acceleration_m_s2[axis].max(acceleration_m_s2);
             if acceleration_m_s2 > limit_m_s2 {
                 return Err(CheckProblem::Acceleration { axis, acceleration_m_s2, limit_m_s2 });

@@ -3,11 +3,11 @@
 use std::fmt::{self, Write};
 
 use masseter_shared::can::canopen::{NodeId, ObjectAddress};
+use masseter_shared::config::IdentityConfig;
 
 use crate::drive::DriveSettings;
 use crate::drive::dictionary::{
-    Access, Entry, Initial, Mapping, OBJECTS, Object, Objects, PDOS, PRODUCT_CODE, REVISION, Shape,
-    VENDOR_ID, find,
+    Access, Entry, IDENTITY, Initial, Mapping, OBJECTS, Object, Objects, PDOS, Shape, find,
 };
 
 /// Objects that CiA 301 makes mandatory.
@@ -41,10 +41,11 @@ fn file_info(text: &mut String, node: NodeId) -> fmt::Result {
 }
 
 fn device_info(text: &mut String) -> fmt::Result {
+    let IdentityConfig { vendor_id, product_code, revision, .. } = IDENTITY;
     writeln!(
         text,
-        "[DeviceInfo]\nVendorName=Masseter\nVendorNumber=0x{VENDOR_ID:08X}\n\
-         ProductName=Masseter emulated drive\nProductNumber=0x{PRODUCT_CODE:08X}\nRevisionNumber=0x{REVISION:08X}\n\
+        "[DeviceInfo]\nVendorName=Masseter\nVendorNumber=0x{vendor_id:08X}\n\
+         ProductName=Masseter emulated drive\nProductNumber=0x{product_code:08X}\nRevisionNumber=0x{revision:08X}\n\
          BaudRate_10=1\nBaudRate_20=1\nBaudRate_50=1\nBaudRate_125=1\nBaudRate_250=1\nBaudRate_500=1\n\
          BaudRate_800=1\nBaudRate_1000=1\nSimpleBootUpMaster=0\nSimpleBootUpSlave=1\nGranularity=8\n\
          DynamicChannelsSupported=0\nGroupMessaging=0\nNrOfRXPDO={PDOS}\nNrOfTXPDO={PDOS}\nLSS_Supported=0\n"

@@ -1,10 +1,9 @@
 //! Heartbeats of the drive: its own (object 1017) and those it watches (object 1016).
 
 use masseter_shared::can::canopen::NodeId;
+use masseter_shared::clock::MILLISECOND_NS;
 
 use super::dictionary::{Objects, WATCHED, names};
-
-const MS_NS: u64 = 1_000_000;
 
 /// When its own heartbeat is due.
 #[derive(Debug, Clone)]
@@ -16,7 +15,7 @@ pub(super) struct Producer {
 impl Producer {
     /// The first one at `first_ns`.
     pub(super) fn new(objects: &Objects, first_ns: u64) -> Self {
-        Self { interval_ns: u64::from(objects.get(names::HEARTBEAT_MS)) * MS_NS, next_ns: first_ns }
+        Self { interval_ns: u64::from(objects.get(names::HEARTBEAT_MS)) * MILLISECOND_NS, next_ns: first_ns }
     }
 
     /// Takes up a new interval, which begins at `now_ns`.
@@ -58,7 +57,7 @@ impl Consumer {
         let watches = std::array::from_fn(|place| {
             let word = objects.word(names::WATCHED_HEARTBEAT.place() + place);
             let node = u8::try_from(word >> 16).ok().and_then(|id| NodeId::new(id).ok());
-            let timeout_ns = u64::from(word & 0xFFFF) * MS_NS;
+            let timeout_ns = u64::from(word & 0xFFFF) * MILLISECOND_NS;
             Watch { node: node.filter(|_| timeout_ns > 0), timeout_ns, heard_ns: None, is_lost: false }
         });
         Self { watches }

@@ -6,6 +6,7 @@ use masseter_shared::can::canopen::{
 };
 use masseter_shared::can::cia402::Controlword;
 use masseter_shared::can::{CanId, Frame};
+use masseter_shared::clock::MILLISECOND_NS;
 use masseter_shared::config::DriveConfig;
 
 use super::axis::Axis;
@@ -19,9 +20,8 @@ use super::pdo::{Rpdo, Tpdo};
 use super::sdo::SdoServer;
 use crate::encoder::Encoder;
 
-const MS_NS: u64 = 1_000_000;
 /// From power-on to the boot-up message, ns.
-const BOOT_NS: u64 = 20 * MS_NS;
+const BOOT_NS: u64 = 20 * MILLISECOND_NS;
 
 /// What a node is configured with.
 #[derive(Debug, Clone)]
@@ -48,7 +48,7 @@ impl DriveSettings {
     /// The object dictionary after power-on.
     pub(crate) fn objects(&self) -> Objects {
         let mut objects = Objects::new(self.node);
-        let in_ms = |ns: u64| (ns / MS_NS).min(u64::from(u16::MAX)) as u16;
+        let in_ms = |ns: u64| (ns / MILLISECOND_NS).min(u64::from(u16::MAX)) as u16;
         let watched = u32::from(self.master.get()) << 16 | u32::from(in_ms(self.link_timeout_ns));
         objects.set(names::WATCHED_HEARTBEAT, watched);
         objects.set(names::HEARTBEAT_MS, in_ms(self.heartbeat_ns));

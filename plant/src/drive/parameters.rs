@@ -1,12 +1,12 @@
 //! What the object dictionary configures of an axis, in SI units.
 
 use masseter_shared::can::cia402::interpolation_period;
+use masseter_shared::clock::MILLISECOND_NS;
 use masseter_shared::config::DriveConfig;
 
 use super::dictionary::Objects;
 use super::dictionary::names;
 
-const MS_NS: u64 = 1_000_000;
 /// Object 6065 that switches the supervision of the following error off.
 const NO_WINDOW: u32 = u32::MAX;
 
@@ -104,7 +104,7 @@ impl Parameters {
             position_limits: [names::LOWEST_POSITION, names::HIGHEST_POSITION]
                 .map(|end| objects.get(end).saturating_sub(offset_increments)),
             following_window_m: window.map(metres),
-            following_timeout_ns: u64::from(objects.get(names::FOLLOWING_TIMEOUT_MS)) * MS_NS,
+            following_timeout_ns: u64::from(objects.get(names::FOLLOWING_TIMEOUT_MS)) * MILLISECOND_NS,
             position_window_m: metres(objects.get(names::POSITION_WINDOW)),
             profile,
             quick_stop: stop(objects.get(names::QUICK_STOP_OPTION)),
@@ -136,7 +136,7 @@ pub(super) fn configure(
     period_ns: u64,
     position_limits: [i32; 2],
 ) {
-    let increments = |metres: f64| (metres / drive.encoder_resolution_m).round() as u32;
+    let increments = |metres: f64| drive.increments(metres) as u32;
     let velocity = increments(drive.max_velocity_m_s).max(1);
     let ramp = increments(drive.quick_stop_deceleration_m_s2).max(1);
     let [lowest, highest] = position_limits;
@@ -172,14 +172,14 @@ mod tests {
     fn what_the_scenario_says_comes_back_in_si() {
         let drive = DrivesConfig::default().leg;
         let mut objects = Objects::new(NodeId::new(1).unwrap());
-        configure(&mut objects, &drive, MS_NS, [-5, 7]);
+        configure(&mut objects, &drive, MILLISECOND_NS, [-5, 7]);
         let parameters = Parameters::of(&objects, &drive);
         let near = |a: f64, b: f64| (a - b).abs() < 1e-9;
         assert!(near(parameters.period_s, 1e-3));
         assert!(near(parameters.velocity_limit_m_s, drive.max_velocity_m_s));
         assert!(near(parameters.force_limit_n, drive.max_force_n));
         assert!(near(parameters.following_window_m.unwrap(), drive.following_error_m));
-        assert_eq!(parameters.following_timeout_ns, 20 * MS_NS);
+        assert_eq!(parameters.following_timeout_ns, 20 * MILLISECOND_NS);
         assert_eq!(parameters.position_limits, [-5, 7]);
         let Stop::Ramp { deceleration_m_s2 } = parameters.quick_stop else { panic!("no ramp") };
         assert!(near(deceleration_m_s2, drive.quick_stop_deceleration_m_s2));

@@ -7,6 +7,7 @@ use std::cmp::Ordering;
 
 use masseter_shared::can::canopen::{COB_ID_NOT_VALID, ObjectAddress};
 use masseter_shared::can::{CanId, Frame};
+use masseter_shared::clock::MILLISECOND_NS;
 
 use super::cyclic::NewTargets;
 use super::dictionary::{ENTRIES, MAPPED_MAX, Objects, find, within_limits};
@@ -15,7 +16,6 @@ use super::dictionary::{ENTRIES, MAPPED_MAX, Objects, find, within_limits};
 const EVENT_DRIVEN: u8 = 254;
 /// Unit of an inhibit time, ns.
 const INHIBIT_UNIT_NS: u64 = 100_000;
-const MS_NS: u64 = 1_000_000;
 /// Objects that change with every sample. As in most drives that is no event, or their noise alone would fill the bus:
 /// the event timer (1800:5) sends them.
 const SAMPLED: [u16; 5] = [0x6062, 0x6064, 0x606C, 0x6077, 0x60F4];
@@ -178,7 +178,7 @@ impl Rpdo {
         Self {
             id: identifier(parameter(objects, communication, 1)),
             is_synchronous: parameter(objects, communication, 2) < u32::from(EVENT_DRIVEN),
-            deadline_ns: u64::from(parameter(objects, communication, 5)) * MS_NS,
+            deadline_ns: u64::from(parameter(objects, communication, 5)) * MILLISECOND_NS,
             mapped,
             heard_ns: None,
             buffered: None,
@@ -291,7 +291,7 @@ impl Tpdo {
             id: identifier(parameter(objects, communication, 1)),
             trigger,
             inhibit_ns: u64::from(parameter(objects, communication, 3)) * INHIBIT_UNIT_NS,
-            timer_ns: u64::from(parameter(objects, communication, 5)) * MS_NS,
+            timer_ns: u64::from(parameter(objects, communication, 5)) * MILLISECOND_NS,
             watched: if trigger == Trigger::Event { mapped.events() } else { mapped },
             mapped,
             syncs: None,

@@ -7,6 +7,7 @@ use masseter_shared::can::canopen::{
     AbortCode, COB_ID_NOT_VALID, NmtCommand, NmtState, NodeId, ObjectAddress, SdoResponse,
 };
 use masseter_shared::can::cia402::{DriveState, Statusword};
+use masseter_shared::clock::MILLISECOND_NS;
 use masseter_shared::messages::codes::{BootPhase, Cause};
 
 use super::plan::{STATUSWORD, Setup, Task, plan};
@@ -47,7 +48,7 @@ impl From<SdoFailure> for BootFault {
         match failure {
             SdoFailure::Aborted { object, code } => Self::new(Cause::SdoAborted).at(object, code.0, 0),
             SdoFailure::Silent { object } => {
-                let timeout_ms = (TIMEOUT_NS / 1_000_000) as u32;
+                let timeout_ms = (TIMEOUT_NS / MILLISECOND_NS) as u32;
                 Self::new(Cause::SdoTimeout).at(object, timeout_ms * ATTEMPTS, timeout_ms)
             }
         }

@@ -17,6 +17,13 @@ pub(crate) struct Scale {
     pub(crate) rated_force_n: f64,
 }
 
+impl Scale {
+    /// The increments nearest to a position.
+    fn increments(self, position_m: f64) -> f64 {
+        (position_m / self.increment_m).round()
+    }
+}
+
 /// Kinds of objects that the master takes from a node.
 const LENGTHS: usize = 4;
 
@@ -138,7 +145,7 @@ impl Node {
 
     /// Whether a target has a number of increments that 607A can hold; what is no number has none.
     pub(super) fn can_go_to(&self, target_m: f64) -> bool {
-        (f64::from(i32::MIN)..=f64::from(i32::MAX)).contains(&(target_m / self.scale.increment_m).round())
+        (f64::from(i32::MIN)..=f64::from(i32::MAX)).contains(&self.scale.increments(target_m))
     }
 
     /// The process data that bring the drive where it is wanted. Until it follows targets, its target is
@@ -148,7 +155,7 @@ impl Node {
         self.controlword = toward(state, request, self.controlword);
         let follows = state == DriveState::OperationEnabled && request == DriveRequest::Enable;
         let target_increments =
-            if follows { (target_m / self.scale.increment_m).round() as i32 } else { self.actual_increments };
+            if follows { self.scale.increments(target_m) as i32 } else { self.actual_increments };
         Rpdo1 { controlword: self.controlword, target_increments }
     }
 }
@@ -166,7 +173,7 @@ mod tests {
     fn surplus(syncs: u32, answers: impl Fn(u32) -> u32) -> u32 {
         let id = NodeId::new(1).unwrap();
         let scale = Scale { increment_m: 1e-6, rated_force_n: 500.0 };
-        let mut node = Node::new(id, 0, scale, &setup(&Scenario::default(), id, 0), 0);
+        let mut node = Node::new(id, 0, scale, &setup(&Scenario::default(), 0), 0);
         let statusword = Statusword::of(DriveState::OperationEnabled);
         for sync in 0..syncs {
             node.begin_cycle();

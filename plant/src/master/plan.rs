@@ -199,7 +199,7 @@ mod tests {
     #[test]
     fn software_limits_never_cross_while_they_are_written_whatever_they_were() {
         let id = NodeId::new(1).unwrap();
-        let setup = Setup { position_limits: [-10, 20], ..setup(&Scenario::default(), id, 0) };
+        let setup = Setup { position_limits: [-10, 20], ..setup(&Scenario::default(), 0) };
         for mut limits in [[-500, -400], [-10, 20], [400, 500], [i32::MIN, i32::MAX], [0, 0]] {
             for task in plan(id, &setup) {
                 if let Task::Write { object, value, .. } = task

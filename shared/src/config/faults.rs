@@ -4,7 +4,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::ScenarioError;
-use crate::schedule::MASTER_ID;
+use crate::can::canopen::NodeId;
 
 /// What goes wrong.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -75,11 +75,11 @@ impl FaultConfig {
                 "leave it away with can.interfaces: only on a simulated bus can frames be destroyed on the wire",
             );
         }
-        if let Some(node) = self.node.filter(|&node| !is_virtual && node != MASTER_ID) {
+        if let Some(node) = self.node.filter(|&node| !is_virtual && node != NodeId::MASTER.get()) {
             return refuse(
                 "faults.node",
                 node.to_string(),
-                &format!("on a real interface only the master (node {MASTER_ID}) can be given faults"),
+                &format!("on a real interface only the master (node {}) can be given faults", NodeId::MASTER),
             );
         }
         if self.bus >= buses {

@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::need::require_positive;
 use super::{DrivesConfig, ScenarioError};
+use crate::geometry::LEGS;
 
 /// What the axes may be asked for by a trajectory, where their drives do not allow less. Strokes are the mechanism's
 /// own.
@@ -38,6 +39,16 @@ impl Default for TrajectoryLimitsConfig {
 }
 
 impl TrajectoryLimitsConfig {
+    /// Speed of an axis, m/s.
+    pub const fn velocity_m_s(&self, axis: usize) -> f64 {
+        if axis < LEGS { self.slide_velocity_m_s } else { self.leg_velocity_m_s }
+    }
+
+    /// Acceleration of an axis, m/s².
+    pub const fn acceleration_m_s2(&self, axis: usize) -> f64 {
+        if axis < LEGS { self.slide_acceleration_m_s2 } else { self.leg_acceleration_m_s2 }
+    }
+
     /// The same, where the drives do not allow less.
     #[must_use]
     pub fn within(self, drives: &DrivesConfig) -> Self {

@@ -6,7 +6,7 @@ use toml::Table;
 
 use super::ScenarioError;
 use crate::can::{Bitrate, BitrateError, FrameFormat, Rates};
-use crate::geometry::AXES;
+use crate::geometry::{AXES, LEGS};
 
 /// The CAN link between the master and the six drives.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -135,15 +135,20 @@ pub struct IdentityConfig {
     pub revision: u32,
 }
 
+impl IdentityConfig {
+    /// The emulated drives: servo drives of CiA 402. The rig's makers have no vendor number of CiA's; this one is not
+    /// registered.
+    pub const EMULATED: Self = Self {
+        device_type: 0x0002_0192,
+        vendor_id: 0x004D_5354,
+        product_code: 0x0000_0402,
+        revision: 0x0001_0000,
+    };
+}
+
 impl Default for IdentityConfig {
-    /// The emulated drives.
     fn default() -> Self {
-        Self {
-            device_type: 0x0002_0192,
-            vendor_id: 0x004D_5354,
-            product_code: 0x0000_0402,
-            revision: 0x0001_0000,
-        }
+        Self::EMULATED
     }
 }
 
@@ -175,6 +180,13 @@ pub struct DriveConfig {
     pub encoder_noise_m: f64,
 }
 
+impl DriveConfig {
+    /// The encoder's increments nearest to so many metres; also of m/s and m/s².
+    pub fn increments(&self, metres: f64) -> f64 {
+        (metres / self.encoder_resolution_m).round()
+    }
+}
+
 /// The drives of slides and of legs; what a table does not give stays as it is by default.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -185,6 +197,13 @@ pub struct DrivesConfig {
     /// Drives of l₁ l₂ l₃.
     #[serde(deserialize_with = "leg")]
     pub leg: DriveConfig,
+}
+
+impl DrivesConfig {
+    /// The drive of an axis.
+    pub const fn of_axis(&self, axis: usize) -> DriveConfig {
+        if axis < LEGS { self.slide } else { self.leg }
+    }
 }
 
 fn slide<'de, D: Deserializer<'de>>(table: D) -> Result<DriveConfig, D::Error> {

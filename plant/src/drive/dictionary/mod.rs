@@ -9,4 +9,4 @@ mod table;
 
 pub(crate) use entry::{Access, DataType, Entry, Initial, Mapping, Object, Shape};
 pub(crate) use objects::{ENTRIES, Objects, find, within_limits, writable};
-pub(crate) use table::{HISTORY, MAPPED_MAX, OBJECTS, PDOS, PRODUCT_CODE, REVISION, VENDOR_ID, WATCHED};
+pub(crate) use table::{HISTORY, IDENTITY, MAPPED_MAX, OBJECTS, PDOS, WATCHED};

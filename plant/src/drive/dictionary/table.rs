@@ -4,6 +4,8 @@
 //! mille of the rated torque (of the rated force, for a linear axis).
 
 use masseter_shared::can::canopen::COB_ID_NOT_VALID;
+use masseter_shared::can::{EVERY_SYNC, Rpdo1, Tpdo1};
+use masseter_shared::config::IdentityConfig;
 
 use super::entry::Access::{Constant, ReadOnly, ReadWrite};
 use super::entry::DataType::{I8, I16, I32, Text, U8, U16, U32};
@@ -20,14 +22,8 @@ pub(crate) const MAPPED_MAX: usize = 8;
 pub(crate) const HISTORY: usize = 8;
 /// Nodes whose heartbeat can be watched (object 1016).
 pub(crate) const WATCHED: usize = 2;
-/// Object 1018:1. The rig's makers have no number of CiA's; this one is not registered.
-pub(crate) const VENDOR_ID: u32 = 0x004D_5354;
-/// Object 1018:2.
-pub(crate) const PRODUCT_CODE: u32 = 0x0000_0402;
-/// Object 1018:3.
-pub(crate) const REVISION: u32 = 0x0001_0000;
-/// Object 1000: servo drive of CiA 402.
-pub(crate) const DEVICE_TYPE: u32 = 0x0002_0192;
+/// What device the drive says it is (objects 1000 and 1018).
+pub(crate) const IDENTITY: IdentityConfig = IdentityConfig::EMULATED;
 /// Object 6502: profile position, homing, cyclic synchronous position and torque.
 const SUPPORTED_MODES: i64 = 1 << 0 | 1 << 5 | 1 << 7 | 1 << 9;
 
@@ -56,10 +52,10 @@ impl<const N: usize> Rpdo<N> {
     const COMMUNICATION: &'static [Entry] = &[
         Entry::highest(5),
         Entry::new(1, "COB-ID used by RPDO", U32, ReadWrite, OfNode(Self::COB_ID)),
-        Entry::new(2, "Transmission type", U8, ReadWrite, Value(1)),
+        Entry::new(2, "Transmission type", U8, ReadWrite, Value(EVERY_SYNC as i64)),
         Entry::new(5, "Event timer", U16, ReadWrite, Value(0)),
     ];
-    const MAPPING: &'static [Entry] = &mapping(if N == 0 { [0x6040_0010, 0x607A_0020, 0] } else { [0; 3] });
+    const MAPPING: &'static [Entry] = &mapping(if N == 0 { &Rpdo1::MAPPING } else { &[] });
 }
 
 /// The transmit PDO of that number, beginning with 0.
@@ -70,17 +66,16 @@ impl<const N: usize> TpdoOf<N> {
     const COMMUNICATION: &'static [Entry] = &[
         Entry::highest(6),
         Entry::new(1, "COB-ID used by TPDO", U32, ReadWrite, OfNode(Self::COB_ID)),
-        Entry::new(2, "Transmission type", U8, ReadWrite, Value(1)),
+        Entry::new(2, "Transmission type", U8, ReadWrite, Value(EVERY_SYNC as i64)),
         Entry::new(3, "Inhibit time", U16, ReadWrite, Value(0)),
         Entry::new(5, "Event timer", U16, ReadWrite, Value(0)),
         Entry::new(6, "SYNC start value", U8, ReadWrite, Value(0)).within(0, 240),
     ];
-    const MAPPING: &'static [Entry] =
-        &mapping(if N == 0 { [0x6041_0010, 0x6064_0020, 0x6077_0010] } else { [0; 3] });
+    const MAPPING: &'static [Entry] = &mapping(if N == 0 { &Tpdo1::MAPPING } else { &[] });
 }
 
-/// The mapping parameter of a PDO that holds these objects at first; 0 is none.
-const fn mapping(objects: [i64; 3]) -> [Entry; MAPPED_MAX + 1] {
+/// The mapping parameter of a PDO that holds these objects at first.
+const fn mapping(objects: &[u32]) -> [Entry; MAPPED_MAX + 1] {
     const NAMES: [&str; MAPPED_MAX] = [
         "Mapped object 1",
         "Mapped object 2",
@@ -93,21 +88,20 @@ const fn mapping(objects: [i64; 3]) -> [Entry; MAPPED_MAX + 1] {
     ];
     let count = plain("Number of mapped objects", U8, ReadWrite, Value(0)).within(0, MAPPED_MAX as i64);
     let mut entries = [count; MAPPED_MAX + 1];
-    let (mut place, mut mapped) = (0, 0);
+    entries[0].initial = Value(objects.len() as i64);
+    let mut place = 0;
     while place < MAPPED_MAX {
-        let object = if place < objects.len() { objects[place] } else { 0 };
-        mapped += (object != 0) as i64;
+        let object = if place < objects.len() { objects[place] as i64 } else { 0 };
         entries[place + 1] = Entry::new(place as u8 + 1, NAMES[place], U32, ReadWrite, Value(object));
         place += 1;
     }
-    entries[0].initial = Value(mapped);
     entries
 }
 
 /// Every object, indices ascending.
 #[rustfmt::skip]
 pub(crate) const OBJECTS: &[Object] = &[
-    object(0x1000, "Device type", Var, &[plain("Device type", U32, Constant, Value(DEVICE_TYPE as i64))]),
+    object(0x1000, "Device type", Var, &[plain("Device type", U32, Constant, Value(IDENTITY.device_type as i64))]),
     object(0x1001, "Error register", Var, &[plain("Error register", U8, ReadOnly, Value(0)).mapped(Tpdo)]),
     object(0x1003, "Pre-defined error field", Array, &[
         plain("Number of errors", U8, ReadWrite, Value(0)),
@@ -141,9 +135,9 @@ pub(crate) const OBJECTS: &[Object] = &[
     object(0x1017, "Producer heartbeat time", Var, &[plain("Producer heartbeat time", U16, ReadWrite, Configured)]),
     object(0x1018, "Identity object", Record, &[
         Entry::highest(4),
-        Entry::new(1, "Vendor-ID", U32, Constant, Value(VENDOR_ID as i64)),
-        Entry::new(2, "Product code", U32, Constant, Value(PRODUCT_CODE as i64)),
-        Entry::new(3, "Revision number", U32, Constant, Value(REVISION as i64)),
+        Entry::new(1, "Vendor-ID", U32, Constant, Value(IDENTITY.vendor_id as i64)),
+        Entry::new(2, "Product code", U32, Constant, Value(IDENTITY.product_code as i64)),
+        Entry::new(3, "Revision number", U32, Constant, Value(IDENTITY.revision as i64)),
         Entry::new(4, "Serial number", U32, Constant, OfNode(0)),
     ]),
     object(0x1019, "Synchronous counter overflow value", Var, &[plain("Synchronous counter overflow value", U8, ReadWrite, Value(0)).within(0, 240)]),
