@@ -6,9 +6,8 @@ use masseter_shared::can::wire::{INTERFRAME_BITS, frame_bits};
 use masseter_shared::can::wrapped::PortFaults;
 use masseter_shared::can::{VirtualWire, WireConfig};
 use masseter_shared::clock::MILLISECOND_NS;
-use masseter_shared::config::{CanConfig, DynamicsConfig, JawConfig, Scenario};
-use masseter_shared::geometry::{AXES, LEGS, Mechanism, Pose};
-use nalgebra::Translation3;
+use masseter_shared::config::{CanConfig, Scenario};
+use masseter_shared::geometry::{AXES, Mechanism};
 
 use crate::checks::check_quantities;
 use crate::drive::{DriveNode, DriveSettings};
@@ -18,9 +17,10 @@ use crate::error::PlantError;
 use crate::expectation::setup;
 use crate::faults;
 use crate::food::Food;
-use crate::link::{MASTER_PORT, Place, VirtualLink};
+use crate::layout::{node_ids, places};
+use crate::link::{MASTER_PORT, VirtualLink};
 use crate::master::{DriveSettings as ExpectedDrive, Master, MasterSettings, Scale};
-use crate::mechanism::Dynamics;
+use crate::resting::{closed_mouth, resting};
 use crate::socket_link::SocketLink;
 
 /// Frames a port may have to send, and to receive between two looks; a millisecond holds 21.
@@ -71,11 +71,6 @@ fn fault_seed(scenario: &Scenario, bus: usize) -> u64 {
 /// Time after which a controller that went off the bus is restarted; none when it is not.
 fn restart_after_ns(can: &CanConfig) -> Option<u64> {
     (can.restart_ms > 0).then(|| u64::from(can.restart_ms) * MILLISECOND_NS)
-}
-
-/// The interface of each axis' bus.
-pub(crate) fn interfaces_of_axes(can: &CanConfig) -> Result<[&str; AXES], PlantError> {
-    Ok(places(can)?.map(|place| can.interfaces[place.bus].as_str()))
 }
 
 /// The drives and their mechanism, switched on at `now_ns`.
@@ -151,161 +146,4 @@ fn wires(scenario: &Scenario, free_ports: usize, now_ns: u64) -> Result<Vec<Virt
         Ok(VirtualWire::with_faults(&config, Faults::new(faults, fault_seed(scenario, bus))))
     };
     can.buses.iter().enumerate().map(wire).collect()
-}
-
-/// Where each axis hangs; port 0 of a bus is the master's.
-fn places(can: &CanConfig) -> Result<[Place; AXES], PlantError> {
-    let named = || can.buses.iter().flatten().copied();
-    if let Some(axis) = named().find(|&axis| axis >= AXES) {
-        return Err(PlantError::Axis { axis, times: named().filter(|&other| other == axis).count() });
-    }
-    if let Some(bus) = can.buses.iter().position(Vec::is_empty) {
-        return Err(PlantError::EmptyBus { bus });
-    }
-    let mut places = [Place { bus: 0, port: 0 }; AXES];
-    for (axis, place) in places.iter_mut().enumerate() {
-        let times = named().filter(|&other| other == axis).count();
-        if times != 1 {
-            return Err(PlantError::Axis { axis, times });
-        }
-        for (bus, axes) in can.buses.iter().enumerate() {
-            if let Some(index) = axes.iter().position(|&other| other == axis) {
-                *place = Place { bus, port: index + 1 };
-            }
-        }
-    }
-    Ok(places)
-}
-
-fn node_ids(can: &CanConfig) -> Result<[NodeId; AXES], PlantError> {
-    let mut ids = [NodeId::MASTER; AXES];
-    for (axis, &id) in can.node_ids.iter().enumerate() {
-        let is_taken = id == NodeId::MASTER.get() || can.node_ids[..axis].contains(&id);
-        if is_taken {
-            return Err(PlantError::SharedNodeId { id });
-        }
-        ids[axis] = NodeId::new(id)?;
-    }
-    Ok(ids)
-}
-
-/// The platform where the mouth is closed. Taken as level, which a mechanism of unequal sides need not be there: the
-/// pose itself would take the forward kinematics.
-fn closed_mouth(mechanism: &Mechanism, jaw: &JawConfig) -> Pose {
-    Translation3::from(jaw.closed_offset_m) * level(mechanism, jaw.closed_leg_m)
-}
-
-/// The platform level on three legs of that mean length, turned as the hinges are and above their middle: the height
-/// is found by bisection.
-fn level(mechanism: &Mechanism, leg_m: f64) -> Pose {
-    let hinges = mechanism.pose_from_corners(&std::array::from_fn(|leg| mechanism.hinge(leg, 0.0)));
-    let at_height = |height_m: f64| Pose::translation(0.0, 0.0, height_m) * hinges;
-    let mean_leg_m = |height_m: f64| {
-        let joints = mechanism.inverse(&at_height(height_m));
-        joints.map_or(0.0, |joints| joints.actuators.leg_m.iter().sum::<f64>() / LEGS as f64)
-    };
-    let (mut low_m, mut high_m) = (0.0, leg_m);
-    for _ in 0..60 {
-        let middle_m = f64::midpoint(low_m, high_m);
-        if mean_leg_m(middle_m) < leg_m { low_m = middle_m } else { high_m = middle_m }
-    }
-    at_height(low_m)
-}
-
-/// At rest, level on legs of the initial length.
-fn resting(mechanism: Mechanism, config: &DynamicsConfig) -> Result<Dynamics, PlantError> {
-    let pose = level(&mechanism, config.initial_leg_m);
-    if let Ok(joints) = mechanism.inverse(&pose)
-        && let Err(violation) = mechanism.strokes().check(&joints.actuators)
-    {
-        return Err(PlantError::Start { initial_leg_m: config.initial_leg_m, violation });
-    }
-    Ok(Dynamics::new(mechanism, *config, pose)?)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::core::check;
-
-    #[test]
-    fn what_cannot_work_is_refused_with_its_key() {
-        let default = Scenario::default;
-        let with = |change: fn(&mut Scenario)| {
-            let mut scenario = default();
-            change(&mut scenario);
-            check(&scenario).unwrap_err().to_string()
-        };
-        let slow = "can.heartbeat_consumer_ms = 90: use more than can.heartbeat_producer_ms and a cycle";
-        let too_fine = "drives.leg.encoder_resolution_m = 0.000000000001: use more";
-        let cases: [(String, &str); 20] = [
-            (with(|s| s.can.heartbeat_consumer_ms = 50), "can.heartbeat_consumer_ms = 50: use more"),
-            (with(|s| s.can.heartbeat_consumer_ms = 51), "can.heartbeat_consumer_ms = 51: use more"),
-            (with(|s| (s.rate_hz, s.can.heartbeat_consumer_ms) = (10, 90)), slow),
-            (with(|s| s.dynamics.step_ns = 1_000_000), "dynamics.step_ns"),
-            (with(|s| s.can.node_ids[3] = 1), "node 1 stands twice"),
-            (with(|s| s.can.node_ids[3] = 0), "node id"),
-            (with(|s| s.can.node_ids[3] = 127), "master"),
-            (with(|s| s.can.buses = vec![vec![0, 1, 2], vec![3, 4]]), "axis 5 is named 0 times"),
-            (with(|s| s.can.buses = vec![vec![0, 1, 2], vec![3, 4, 5, 0]]), "axis 0 is named 2 times"),
-            (with(|s| s.can.buses = vec![vec![0, 1, 2], vec![3, 4, 5, 6]]), "axis 6"),
-            (with(|s| s.can.buses.push(Vec::new())), "bus 2 has no drive"),
-            (with(|s| s.drives.leg.rated_force_n = f64::NAN), "drives.leg.rated_force_n = NaN"),
-            (with(|s| s.drives.slide.encoder_noise_m = 1e300), "drives.slide.encoder_noise_m"),
-            (with(|s| s.drives.leg.encoder_resolution_m = 1e-12), too_fine),
-            (with(|s| s.dynamics.viscous_friction_n_s_per_m = 20_000.0), "a dynamics.step_ns of at most"),
-            (with(|s| s.dynamics.slide_friction_n = 60.0), "a dynamics.step_ns of at most"),
-            (with(|s| s.dynamics.slide_friction_n = 1e4), "no dynamics.step_ns resolves it"),
-            (with(|s| s.dynamics.slide_friction_n = 1e306), "no dynamics.step_ns resolves it"),
-            (with(|s| s.dynamics.initial_leg_m = 0.4), "dynamics.initial_leg_m = 0.4: "),
-            (with(|s| s.mechanism.strokes.slide_m = [0.001, 0.03]), "initial_leg_m = 0.29: axis d1 at"),
-        ];
-        for (error, expected) in cases {
-            assert!(error.contains(expected), "{error}");
-        }
-        assert_eq!(check(&default()), Ok(()));
-        let boots_within = |start_timeout_s: f64| {
-            let mut scenario = Scenario { rate_hz: 10, ..default() };
-            scenario.controller.start_timeout_s = start_timeout_s;
-            check(&scenario)
-        };
-        assert!(boots_within(5.0).unwrap_err().to_string().contains("the drives take 12.4 s to boot"));
-        assert_eq!(boots_within(12.5), Ok(()));
-    }
-
-    #[test]
-    fn the_rig_is_switched_on_level_on_its_initial_legs() {
-        let scenario = Scenario::default();
-        let truth = build_emulation(&scenario, 0).unwrap().truth();
-        let [d1, d2, d3, l1, l2, l3] = truth.joint_m;
-        for slide_m in [d1, d2, d3] {
-            assert!(slide_m.abs() < 1e-12);
-        }
-        for leg_m in [l1, l2, l3] {
-            assert!((leg_m - scenario.dynamics.initial_leg_m).abs() < 1e-9);
-        }
-    }
-
-    #[test]
-    fn the_rig_may_be_switched_on_with_its_legs_at_either_end() {
-        for initial_leg_m in Scenario::default().mechanism.strokes.leg_m {
-            let mut scenario = Scenario::default();
-            scenario.dynamics.initial_leg_m = initial_leg_m;
-            assert_eq!(check(&scenario), Ok(()), "{initial_leg_m}");
-        }
-    }
-
-    #[test]
-    fn a_turned_base_starts_level_too() {
-        let mut scenario = Scenario::default();
-        for (slide, leg_deg) in scenario.mechanism.slides.iter_mut().zip([40.0, 160.0, 280.0]) {
-            let (sin, cos) = f64::to_radians(leg_deg).sin_cos();
-            slide.centre_m = [0.0577 * cos, 0.0577 * sin];
-            slide.azimuth_deg = leg_deg + 90.0;
-        }
-        let truth = build_emulation(&scenario, 0).unwrap().truth();
-        for slide_m in &truth.joint_m[..LEGS] {
-            assert!(slide_m.abs() < 1e-9, "{slide_m}");
-        }
-    }
 }

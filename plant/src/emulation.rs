@@ -7,7 +7,7 @@ use masseter_shared::geometry::AXES;
 use masseter_shared::messages::{Truth, pose_fields};
 
 use crate::drive::DriveNode;
-use crate::mechanism::{Dynamics, DynamicsError};
+use crate::dynamics::{Dynamics, DynamicsError};
 
 /// Drives and mechanism, co-simulated in the order of time.
 #[derive(Debug)]

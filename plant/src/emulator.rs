@@ -10,10 +10,11 @@ use masseter_shared::config::Scenario;
 use masseter_shared::geometry::AXES;
 use masseter_shared::lifecycle::StopRequest;
 
-use crate::build::{build_emulation, interfaces_of_axes};
+use crate::build::build_emulation;
+use crate::dynamics::DynamicsError;
 use crate::emulation::Emulation;
 use crate::error::PlantError;
-use crate::mechanism::DynamicsError;
+use crate::layout::interfaces_of_axes;
 
 /// How often the drives are stepped at least; between two looks only frames wake them, ns.
 const LOOK_NS: u64 = MILLISECOND_NS;

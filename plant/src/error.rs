@@ -5,7 +5,7 @@ use masseter_shared::can::wrapped::NotByPort;
 use masseter_shared::can::{BitrateError, OpenError};
 use masseter_shared::geometry::{AXIS_NAMES, GeometryError, LimitViolation};
 
-use crate::mechanism::DynamicsError;
+use crate::dynamics::DynamicsError;
 
 /// A plant that cannot be built or cannot go on.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

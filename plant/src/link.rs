@@ -7,8 +7,8 @@ use masseter_shared::can::{Bus, ReceiveError, Tapped, VirtualWire};
 use masseter_shared::geometry::AXES;
 use masseter_shared::messages::Truth;
 
+use crate::dynamics::DynamicsError;
 use crate::emulation::Emulation;
-use crate::mechanism::DynamicsError;
 
 /// The wires that a master serves.
 pub trait Buses {

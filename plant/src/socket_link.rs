@@ -6,9 +6,9 @@ use masseter_shared::can::{Bus, FrameFormat, ReceiveError, SocketCan, Tapped};
 use masseter_shared::messages::Truth;
 
 use crate::claim::Claim;
+use crate::dynamics::DynamicsError;
 use crate::error::PlantError;
 use crate::link::{Buses, Link};
-use crate::mechanism::DynamicsError;
 
 /// The master's port, the faults laid over it, and a tap on every wire.
 #[derive(Debug)]

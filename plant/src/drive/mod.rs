@@ -1,6 +1,6 @@
 //! An emulated servo drive: a CANopen node with the CiA 402 profile, its servo loops and its encoder.
 //!
-//! [`node`] and [`exchange`] speak CiA 301, [`axis`] is the profile behind it, and the object dictionary lies between
+//! [`node`], [`nmt`] and [`exchange`] speak CiA 301, [`axis`] is the profile behind it, and the object dictionary lies between
 //! them. What an increment is worth is known to the axis alone: its loops work in SI units.
 
 mod axis;
@@ -12,6 +12,7 @@ mod exchange;
 mod heartbeats;
 mod homing;
 mod mode;
+mod nmt;
 mod node;
 mod outbox;
 mod parameters;

@@ -1,9 +1,9 @@
-//! The drive as a CANopen node (CiA 301): network management, heartbeats and emergencies. SYNC and process data are
-//! exchanged in [`exchange`](super::exchange); what the objects may become is served in [`service`](super::service).
+//! The drive as a CANopen node (CiA 301): who gets a frame, what a step does, heartbeats and emergencies.
+//!
+//! Network management stands in [`nmt`](super::nmt). SYNC and process data are exchanged in
+//! [`exchange`](super::exchange); what the objects may become is served in [`service`](super::service).
 
-use masseter_shared::can::canopen::{
-    COB_ID_NOT_VALID, Cob, Emergency, Heartbeat, Nmt, NmtCommand, NmtState, NodeId,
-};
+use masseter_shared::can::canopen::{COB_ID_NOT_VALID, Cob, Emergency, Heartbeat, Nmt, NmtState, NodeId};
 use masseter_shared::can::cia402::Controlword;
 use masseter_shared::can::{CanId, Frame};
 use masseter_shared::clock::MILLISECOND_NS;
@@ -14,14 +14,12 @@ use super::cyclic::NewTargets;
 use super::dictionary::{Objects, PDOS, names};
 use super::errors::{DriveError, Errors};
 use super::heartbeats::{Consumer, Producer};
+use super::nmt::BOOT_NS;
 use super::outbox::Outbox;
 use super::parameters::configure;
 use super::pdo::{Rpdo, Tpdo};
 use super::sdo::SdoServer;
 use crate::encoder::Encoder;
-
-/// From power-on to the boot-up message, ns.
-const BOOT_NS: u64 = 20 * MILLISECOND_NS;
 
 /// What a node is configured with.
 #[derive(Debug, Clone)]
@@ -76,7 +74,7 @@ pub(crate) struct DriveNode {
     pub(super) sdo: SdoServer,
     /// Cyclic targets that a client wrote since the last SYNC.
     pub(super) new_targets: NewTargets,
-    boot_at_ns: u64,
+    pub(super) boot_at_ns: u64,
     outbox: Outbox,
 }
 
@@ -150,75 +148,6 @@ impl DriveNode {
         }
     }
 
-    fn command_nmt(&mut self, command: NmtCommand, now_ns: u64) {
-        if self.nmt.is_none() {
-            return;
-        }
-        match command {
-            NmtCommand::Start if !self.is_operational() => {
-                self.nmt = Some(NmtState::Operational);
-                self.tpdos.iter_mut().for_each(Tpdo::clear);
-            }
-            NmtCommand::Start => {}
-            NmtCommand::Stop => self.leave_operational(NmtState::Stopped, now_ns),
-            NmtCommand::EnterPreOperational => self.leave_operational(NmtState::PreOperational, now_ns),
-            NmtCommand::ResetCommunication => {
-                // Until it has booted nobody is heard, whoever guided the drive.
-                self.lose_link(now_ns);
-                self.end_exchange(NmtState::PreOperational);
-                self.reset_communication(now_ns);
-            }
-            NmtCommand::ResetNode => self.reset_node(now_ns),
-        }
-    }
-
-    /// Nobody guides the drive any more: it reacts as object 6007 says. A fault lasts longer than its cause.
-    fn lose_link(&mut self, now_ns: u64) {
-        if self.axis.lose_link(now_ns) {
-            self.raise(DriveError::LinkLost);
-        }
-    }
-
-    /// Without process data nobody guides the drive.
-    fn leave_operational(&mut self, state: NmtState, now_ns: u64) {
-        if self.is_operational() || state == NmtState::Stopped {
-            self.lose_link(now_ns);
-        }
-        self.end_exchange(state);
-    }
-
-    fn end_exchange(&mut self, state: NmtState) {
-        self.nmt = Some(state);
-        self.rpdos.iter_mut().for_each(Rpdo::clear);
-        self.new_targets = NewTargets::default();
-        self.sdo = SdoServer::default();
-    }
-
-    /// The communication objects as stored, then boot-up. The history of errors (1003) is kept, as the faults are.
-    fn reset_communication(&mut self, now_ns: u64) {
-        self.objects.copy_range(&self.stored, 0x1000..=0x1002);
-        self.objects.copy_range(&self.stored, 0x1004..=0x1FFF);
-        self.errors.forget_communication(&mut self.objects);
-        self.producer.configure(&self.objects, now_ns + BOOT_NS);
-        self.consumer = Consumer::new(&self.objects);
-        for number in 0..PDOS {
-            self.compile_rpdo(number);
-            self.compile_tpdo(number);
-        }
-        self.sdo = SdoServer::default();
-        (self.nmt, self.boot_at_ns) = (None, now_ns + BOOT_NS);
-    }
-
-    /// As after power-on: the brake closes, every object has its stored value, then boot-up.
-    fn reset_node(&mut self, now_ns: u64) {
-        self.objects = self.stored.clone();
-        self.errors = Errors::default();
-        self.rpdos.iter_mut().for_each(Rpdo::clear);
-        self.new_targets = NewTargets::default();
-        self.axis.restart(now_ns, &self.objects);
-        self.reset_communication(now_ns);
-    }
-
     /// Takes up the parameters of the RPDO of that number.
     pub(super) fn compile_rpdo(&mut self, number: usize) {
         self.rpdos[number] = Rpdo::new(&self.objects, number as u16);
@@ -262,13 +191,6 @@ impl DriveNode {
         }
         self.send_events(now_ns);
         self.axis.force_n()
-    }
-
-    fn boot(&mut self, now_ns: u64) {
-        if self.nmt.is_none() && now_ns >= self.boot_at_ns {
-            self.nmt = Some(NmtState::PreOperational);
-            self.send(Heartbeat { state: NmtState::BootUp }.frame(self.node));
-        }
     }
 
     fn produce_heartbeat(&mut self, now_ns: u64) {

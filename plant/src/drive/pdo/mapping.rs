@@ -1,0 +1,106 @@
+//! A PDO's mapping, compiled into copies of bytes.
+
+use masseter_shared::can::Frame;
+use masseter_shared::can::canopen::ObjectAddress;
+
+use super::parameter;
+use crate::drive::dictionary::{ENTRIES, MAPPED_MAX, Objects, find, within_limits};
+
+/// Bytes that a PDO of the drive carries at most, whatever the format of its frames.
+pub(super) const MAX_BYTES: usize = Frame::MAX_CLASSICAL_DATA;
+
+/// An object of the mapping: where its word is, and how many of its bytes are meant.
+#[derive(Debug, Clone, Copy, Default)]
+struct Part {
+    place: u16,
+    bytes: u8,
+}
+
+impl Part {
+    fn address(self) -> ObjectAddress {
+        ENTRIES[usize::from(self.place)].address
+    }
+}
+
+/// A compiled mapping.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Mapped {
+    parts: [Part; MAPPED_MAX],
+    count: usize,
+    pub(super) length: usize,
+}
+
+impl Mapped {
+    pub(super) fn of(objects: &Objects, index: u16) -> Self {
+        let mut mapped = Self { count: parameter(objects, index, 0) as usize, ..Self::default() };
+        for place in 0..mapped.count {
+            let entry = MappingEntry(parameter(objects, index, place as u8 + 1));
+            let object = find(entry.object()).expect("only what exists can be mapped");
+            let bytes = ENTRIES[object].entry.kind.bytes();
+            mapped.parts[place] = Part { place: object as u16, bytes: bytes as u8 };
+            mapped.length += bytes;
+        }
+        mapped
+    }
+
+    /// Only the objects of which that holds.
+    pub(super) fn only(&self, holds: impl Fn(ObjectAddress) -> bool) -> Self {
+        let mut only = Self::default();
+        for part in self.parts().iter().filter(|part| holds(part.address())) {
+            only.parts[only.count] = *part;
+            only.count += 1;
+            only.length += usize::from(part.bytes);
+        }
+        only
+    }
+
+    fn parts(&self) -> &[Part] {
+        &self.parts[..self.count]
+    }
+
+    pub(super) fn holds(&self, object: ObjectAddress) -> bool {
+        self.parts().iter().any(|part| part.address() == object)
+    }
+
+    /// The objects' data, zero behind them.
+    pub(super) fn pack(&self, objects: &Objects) -> [u8; MAX_BYTES] {
+        let mut data = [0; MAX_BYTES];
+        let mut at = 0;
+        for part in self.parts() {
+            let bytes = usize::from(part.bytes);
+            let word = objects.word(usize::from(part.place)).to_le_bytes();
+            data[at..at + bytes].copy_from_slice(&word[..bytes]);
+            at += bytes;
+        }
+        data
+    }
+
+    /// Writes the data into the objects; a value beyond its limits leaves its object as it is.
+    pub(super) fn unpack(&self, data: [u8; MAX_BYTES], objects: &mut Objects) {
+        let mut at = 0;
+        for part in self.parts() {
+            let bytes = usize::from(part.bytes);
+            let mut word = [0; 4];
+            word[..bytes].copy_from_slice(&data[at..at + bytes]);
+            let (place, word) = (usize::from(part.place), u32::from_le_bytes(word));
+            if within_limits(place, word).is_ok() {
+                objects.set_word(place, word);
+            }
+            at += bytes;
+        }
+    }
+}
+
+/// An entry of a mapping parameter: index, sub-index and length in bits.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct MappingEntry(pub(crate) u32);
+
+impl MappingEntry {
+    pub(crate) const fn object(self) -> ObjectAddress {
+        ObjectAddress::new((self.0 >> 16) as u16, (self.0 >> 8) as u8)
+    }
+
+    pub(crate) const fn bits(self) -> usize {
+        (self.0 & 0xFF) as usize
+    }
+}
