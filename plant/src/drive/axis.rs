@@ -12,7 +12,8 @@ use super::dictionary::{Objects, names};
 use super::errors::DriveError;
 use super::homing::Homing;
 use super::mode::Mode;
-use super::parameters::{LinkReaction, Parameters, Stop};
+use super::motion::Motion;
+use super::parameters::{LinkReaction, MotionLimits, Parameters, Stop};
 use super::positioning::Positioning;
 use super::profile::Profile;
 use super::servo::{Servo, Task};
@@ -170,7 +171,7 @@ impl Axis {
     fn begin(&mut self) {
         let waits = matches!(self.mode, Mode::CyclicPosition | Mode::CyclicTorque);
         if !waits {
-            self.demand.follow(Profile::hold(self.servo.position_m()));
+            self.demand.follow(Profile::hold(self.measured_m()));
         }
     }
 
@@ -182,13 +183,18 @@ impl Axis {
     }
 
     pub(super) fn slow_down(&mut self, now_ns: u64, deceleration_m_s2: f64) {
-        let (position_m, velocity_m_s) = (self.servo.position_m(), self.servo.velocity_m_s());
-        self.demand.slow_down(now_ns, position_m, velocity_m_s, deceleration_m_s2);
+        self.demand.slow_down(now_ns, self.servo.motion(), deceleration_m_s2);
     }
 
     /// Where the axis stands, m in the encoder's coordinates.
     pub(super) fn measured_m(&self) -> f64 {
-        self.servo.position_m()
+        self.servo.motion().position_m
+    }
+
+    /// Moves to rest at a position, from where it is asked to be or stands.
+    pub(super) fn move_to(&mut self, now_ns: u64, target_m: f64, limits: &MotionLimits) {
+        let start = self.demand.at(now_ns).unwrap_or(Motion::at_rest(self.measured_m()));
+        self.demand.follow(Profile::to(now_ns, start, target_m, limits));
     }
 
     /// A position of the dictionary in the encoder's metres.
@@ -251,7 +257,7 @@ impl Axis {
     fn watch_following(&mut self, now_ns: u64) -> Option<DriveError> {
         let window_m = self.parameters.following_window_m?;
         let demand_m = self.demand.position_m(now_ns);
-        let error_m = demand_m.map_or(0.0, |demand_m| demand_m - self.servo.position_m());
+        let error_m = demand_m.map_or(0.0, |demand_m| demand_m - self.measured_m());
         if error_m.abs() <= window_m {
             self.straying_since_ns = None;
             return None;
@@ -279,7 +285,7 @@ impl Axis {
         objects.set(names::MODE_DISPLAY, self.mode.number());
         objects.set(names::POSITION_DEMAND, demand);
         objects.set(names::POSITION_ACTUAL, actual);
-        objects.set(names::VELOCITY_ACTUAL, self.encoder.nearest(self.servo.velocity_m_s()));
+        objects.set(names::VELOCITY_ACTUAL, self.encoder.nearest(self.servo.motion().velocity_m_s));
         objects.set(names::TORQUE_ACTUAL, torque.round() as i16);
         objects.set(names::FOLLOWING_ERROR, demand.saturating_sub(actual));
     }

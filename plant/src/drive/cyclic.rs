@@ -1,6 +1,8 @@
 //! The cyclic modes: targets of position and torque that take effect at SYNC, within the limits.
 
 use super::axis::Axis;
+use super::clamped::clamped_both_ways;
+use super::demand::Approach;
 use super::dictionary::{Objects, names};
 use super::mode::Mode;
 use super::parameters::Parameters;
@@ -32,17 +34,16 @@ impl Axis {
     /// Follows a target within the software position limit and the velocity limit.
     fn head_for(&mut self, now_ns: u64, target_increments: i32) {
         let within = self.within_limits(now_ns, target_increments);
-        let Parameters { velocity_limit_m_s, period_s, .. } = self.parameters;
-        let (target_m, actual_m) = (self.metres(within), self.measured_m());
-        let is_too_fast = self.demand.head_for(now_ns, target_m, actual_m, velocity_limit_m_s, period_s);
+        let Parameters { velocity_limit_m_s: limit_m_s, period_s, .. } = self.parameters;
+        let approach = Approach { target_m: self.metres(within), period_s, limit_m_s };
+        let is_too_fast = self.demand.head_for(now_ns, self.measured_m(), approach);
         self.is_cut = is_too_fast || within != target_increments;
     }
 
     fn push(&mut self, torque_permille: i16) {
         let asked_n = f64::from(torque_permille) / 1000.0 * self.drive.rated_force_n;
-        let limit_n = self.parameters.force_limit_n;
-        let force_n = asked_n.clamp(-limit_n, limit_n);
-        self.is_cut = force_n.to_bits() != asked_n.to_bits();
+        let (force_n, is_cut) = clamped_both_ways(asked_n, self.parameters.force_limit_n);
+        self.is_cut = is_cut;
         self.demand.push(force_n);
     }
 

@@ -1,8 +1,21 @@
 //! What the servo shall do, as a function of time: nothing, a line to the next cyclic target, a
 //! profile, or a constant force.
 
+use super::clamped::clamped_both_ways;
+use super::motion::Motion;
 use super::profile::Profile;
 use super::servo::Task;
+
+/// A cyclic target and how it is approached.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Approach {
+    /// The target, m.
+    pub(super) target_m: f64,
+    /// The time in which it is reached, s.
+    pub(super) period_s: f64,
+    /// How fast the axis may be, m/s.
+    pub(super) limit_m_s: f64,
+}
 
 /// What the servo follows.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -29,18 +42,15 @@ impl Demand {
         Self { shape: Shape::Brake }
     }
 
-    /// Position and velocity demanded, m and m/s; none while the brake is closed or a force is asked for.
-    pub(super) fn at(&self, now_ns: u64) -> Option<(f64, f64)> {
+    /// The motion demanded; none while the brake is closed or a force is asked for.
+    pub(super) fn at(&self, now_ns: u64) -> Option<Motion> {
         match &self.shape {
             Shape::Brake | Shape::Force { .. } => None,
             Shape::Interpolate { from_m, to_m, from_ns, period_s } => {
                 let share = now_ns.saturating_sub(*from_ns) as f64 * 1e-9 / period_s;
-                let velocity_m_s = (to_m - from_m) / period_s;
-                Some(if share < 1.0 {
-                    (from_m + (to_m - from_m) * share, velocity_m_s)
-                } else {
-                    (*to_m, 0.0)
-                })
+                let way_m = to_m - from_m;
+                let moving = Motion { position_m: from_m + way_m * share, velocity_m_s: way_m / period_s };
+                Some(if share < 1.0 { moving } else { Motion::at_rest(*to_m) })
             }
             Shape::Profile(profile) => Some(profile.at(now_ns)),
         }
@@ -50,35 +60,28 @@ impl Demand {
     pub(super) fn task(&self, now_ns: u64) -> Task {
         match (&self.shape, self.at(now_ns)) {
             (Shape::Force { force_n }, _) => Task::Force { force_n: *force_n },
-            (_, Some((position_m, velocity_m_s))) => Task::Follow { position_m, velocity_m_s },
+            (_, Some(motion)) => Task::Follow(motion),
             (_, None) => Task::Brake,
         }
     }
 
     /// The position demanded; none where no position is.
     pub(super) fn position_m(&self, now_ns: u64) -> Option<f64> {
-        self.at(now_ns).map(|(position_m, _)| position_m)
+        self.at(now_ns).map(|motion| motion.position_m)
     }
 
     /// Heads for a target over the coming period, from where the demand ends now or from `actual_m`.
-    /// No further than `limit_m_s` allows; returns whether that cut it.
-    pub(super) fn head_for(
-        &mut self,
-        now_ns: u64,
-        target_m: f64,
-        actual_m: f64,
-        limit_m_s: f64,
-        period_s: f64,
-    ) -> bool {
+    /// No further than the limit allows; returns whether that cut it.
+    pub(super) fn head_for(&mut self, now_ns: u64, actual_m: f64, approach: Approach) -> bool {
+        let Approach { target_m, period_s, limit_m_s } = approach;
         let from_m = match &self.shape {
             Shape::Brake | Shape::Force { .. } => actual_m,
             Shape::Interpolate { to_m, .. } => *to_m,
-            Shape::Profile(profile) => profile.at(now_ns).0,
+            Shape::Profile(profile) => profile.at(now_ns).position_m,
         };
-        let most_m = limit_m_s * period_s;
-        let step_m = (target_m - from_m).clamp(-most_m, most_m);
+        let (step_m, is_cut) = clamped_both_ways(target_m - from_m, limit_m_s * period_s);
         self.shape = Shape::Interpolate { from_m, to_m: from_m + step_m, from_ns: now_ns, period_s };
-        (target_m - from_m).abs() > most_m
+        is_cut
     }
 
     /// Whether it goes from cyclic target to cyclic target.
@@ -96,19 +99,13 @@ impl Demand {
         self.shape = Shape::Force { force_n };
     }
 
-    /// Slows down from the present demand (from `actual_m` where a force is asked for) and the axis' actual
+    /// Slows down from the position demanded (the actual one where a force is asked for) and the axis' actual
     /// velocity. The demanded velocity is no guide: SYNC brings the command just when a line ends, or after
     /// it, where it is zero. A closed brake stays closed.
-    pub(super) fn slow_down(
-        &mut self,
-        now_ns: u64,
-        actual_m: f64,
-        velocity_m_s: f64,
-        deceleration_m_s2: f64,
-    ) {
+    pub(super) fn slow_down(&mut self, now_ns: u64, actual: Motion, deceleration_m_s2: f64) {
         if self.shape != Shape::Brake {
-            let position_m = self.position_m(now_ns).unwrap_or(actual_m);
-            self.follow(Profile::stop(now_ns, position_m, velocity_m_s, deceleration_m_s2));
+            let position_m = self.position_m(now_ns).unwrap_or(actual.position_m);
+            self.follow(Profile::stop(now_ns, Motion { position_m, ..actual }, deceleration_m_s2));
         }
     }
 
@@ -119,7 +116,7 @@ impl Demand {
             Shape::Force { .. } => false,
             Shape::Profile(profile) => profile.is_over(now_ns),
             Shape::Interpolate { .. } => {
-                self.at(now_ns).is_none_or(|(_, velocity_m_s)| velocity_m_s.abs() < 1e-9)
+                self.at(now_ns).is_none_or(|motion| motion.velocity_m_s.abs() < 1e-9)
             }
         }
     }
@@ -135,16 +132,20 @@ mod tests {
     use super::*;
 
     const MS: u64 = 1_000_000;
-    const PERIOD_S: f64 = 1e-3;
+
+    /// At no more than 0.4 m/s, in cycles of a millisecond.
+    const fn towards(target_m: f64) -> Approach {
+        Approach { target_m, period_s: 1e-3, limit_m_s: 0.4 }
+    }
 
     #[test]
     fn targets_are_reached_on_straight_lines_one_period_later() {
         let mut demand = Demand::new();
         assert_eq!(demand.position_m(0), None);
-        assert!(!demand.head_for(0, 0.2701, 0.27, 0.4, PERIOD_S));
+        assert!(!demand.head_for(0, 0.27, towards(0.2701)));
         let position = |demand: &Demand, ns| demand.position_m(ns).unwrap();
         assert!((position(&demand, MS / 2) - 0.27005).abs() < 1e-12);
-        demand.head_for(MS, 0.2703, 0.0, 0.4, PERIOD_S);
+        demand.head_for(MS, 0.0, towards(0.2703));
         assert!((position(&demand, MS) - 0.2701).abs() < 1e-12);
         assert!((position(&demand, 5 * MS) - 0.2703).abs() < 1e-12);
         assert!(demand.is_at_rest(5 * MS));
@@ -153,15 +154,15 @@ mod tests {
     #[test]
     fn a_jump_is_cut_to_what_the_velocity_limit_allows() {
         let mut demand = Demand::new();
-        assert!(demand.head_for(0, 0.30, 0.27, 0.4, PERIOD_S));
+        assert!(demand.head_for(0, 0.27, towards(0.30)));
         assert!((demand.position_m(MS).unwrap() - 0.2704).abs() < 1e-12);
     }
 
     #[test]
     fn it_slows_down_evenly_and_stays() {
         let mut demand = Demand::new();
-        demand.head_for(0, 0.2702, 0.27, 0.4, PERIOD_S);
-        demand.slow_down(MS, 0.27, 0.2, 10.0);
+        demand.head_for(0, 0.27, towards(0.2702));
+        demand.slow_down(MS, Motion { position_m: 0.27, velocity_m_s: 0.2 }, 10.0);
         // 0.2 m/s at 10 m/s²: 20 ms and 2 mm.
         assert!(!demand.is_at_rest(MS + 19 * MS));
         assert!(demand.is_at_rest(MS + 21 * MS));
@@ -173,7 +174,7 @@ mod tests {
         let mut demand = Demand::new();
         demand.push(20.0);
         assert_eq!(demand.task(0), Task::Force { force_n: 20.0 });
-        demand.slow_down(0, 0.28, 0.1, 10.0);
+        demand.slow_down(0, Motion { position_m: 0.28, velocity_m_s: 0.1 }, 10.0);
         assert!((demand.position_m(100 * MS).unwrap() - 0.2805).abs() < 1e-9);
     }
 }

@@ -7,7 +7,6 @@
 use masseter_shared::can::cia402::{Controlword, StatusBit, Statusword};
 
 use super::axis::Axis;
-use super::profile::Profile;
 use crate::encoder::mark_between;
 
 /// Where homing stands.
@@ -76,9 +75,8 @@ impl Axis {
     fn search(&mut self, now_ns: u64, far_increments: i32) {
         self.homing = Homing::Searching;
         let limits = self.parameters.homing.search;
-        let (position_m, velocity_m_s) = self.demand.at(now_ns).unwrap_or((self.measured_m(), 0.0));
         let end_m = self.metres(self.within_limits(now_ns, far_increments));
-        self.demand.follow(Profile::to(now_ns, position_m, velocity_m_s, end_m, &limits));
+        self.move_to(now_ns, end_m, &limits);
     }
 
     /// Looks for the mark between the count before and the present one, and waits for standstill.

@@ -4,6 +4,7 @@
 //! them. What an increment is worth is known to the axis alone: its loops work in SI units.
 
 mod axis;
+mod clamped;
 mod cyclic;
 mod demand;
 pub(crate) mod dictionary;
@@ -12,6 +13,7 @@ mod exchange;
 mod heartbeats;
 mod homing;
 mod mode;
+mod motion;
 mod nmt;
 mod node;
 mod outbox;

@@ -7,7 +7,6 @@ use masseter_shared::can::cia402::Controlword;
 
 use super::axis::Axis;
 use super::dictionary::{Objects, names};
-use super::profile::Profile;
 
 /// The set-points, increments.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -73,10 +72,8 @@ impl Axis {
     fn start(&mut self, now_ns: u64, target_increments: i32) {
         self.positioning.running = Some(target_increments);
         if !self.controlword.halts() {
-            let (position_m, velocity_m_s) = self.demand.at(now_ns).unwrap_or((self.measured_m(), 0.0));
-            let target_m = self.metres(target_increments);
-            let profile = Profile::to(now_ns, position_m, velocity_m_s, target_m, &self.parameters.profile);
-            self.demand.follow(profile);
+            let limits = self.parameters.profile;
+            self.move_to(now_ns, self.metres(target_increments), &limits);
         }
     }
 

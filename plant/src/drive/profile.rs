@@ -3,6 +3,7 @@
 //!
 //! Jerk is not limited.
 
+use super::motion::Motion;
 use super::parameters::MotionLimits;
 
 /// A stretch of constant acceleration.
@@ -16,8 +17,7 @@ struct Phase {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Profile {
     from_ns: u64,
-    position_m: f64,
-    velocity_m_s: f64,
+    start: Motion,
     /// Stop where the way is wrong or too short, speed up (or slow down to the limit), cruise, slow down.
     phases: [Phase; 4],
     end_m: f64,
@@ -26,54 +26,50 @@ pub(super) struct Profile {
 impl Profile {
     /// At rest.
     pub(super) fn hold(position_m: f64) -> Self {
-        Self { from_ns: 0, position_m, velocity_m_s: 0.0, phases: [Phase::default(); 4], end_m: position_m }
+        let start = Motion::at_rest(position_m);
+        Self { from_ns: 0, start, phases: [Phase::default(); 4], end_m: position_m }
     }
 
     /// To rest at that deceleration.
-    pub(super) fn stop(from_ns: u64, position_m: f64, velocity_m_s: f64, deceleration_m_s2: f64) -> Self {
+    pub(super) fn stop(from_ns: u64, start: Motion, deceleration_m_s2: f64) -> Self {
+        let Motion { position_m, velocity_m_s } = start;
         let duration_s = velocity_m_s.abs() / deceleration_m_s2;
         let stop = Phase { duration_s, acceleration_m_s2: -deceleration_m_s2 * velocity_m_s.signum() };
         let end_m = position_m + velocity_m_s * duration_s / 2.0;
         let phases = [stop, Phase::default(), Phase::default(), Phase::default()];
-        Self { from_ns, position_m, velocity_m_s, phases, end_m }
+        Self { from_ns, start, phases, end_m }
     }
 
     /// To rest at a target, as fast as the limits allow.
-    pub(super) fn to(
-        from_ns: u64,
-        position_m: f64,
-        velocity_m_s: f64,
-        target_m: f64,
-        limits: &MotionLimits,
-    ) -> Self {
-        let stop = Self::stop(from_ns, position_m, velocity_m_s, limits.deceleration_m_s2);
-        let way_m = target_m - position_m;
-        let shortest_m = stop.end_m - position_m;
+    pub(super) fn to(from_ns: u64, start: Motion, target_m: f64, limits: &MotionLimits) -> Self {
+        let stop = Self::stop(from_ns, start, limits.deceleration_m_s2);
+        let way_m = target_m - start.position_m;
+        let shortest_m = stop.end_m - start.position_m;
         let is_wrong_way = shortest_m * way_m < 0.0 || shortest_m.abs() > way_m.abs();
-        let (begin_m, begin_m_s, first) = if is_wrong_way {
-            (stop.end_m, 0.0, stop.phases[0])
+        let (begin, first) = if is_wrong_way {
+            (Motion::at_rest(stop.end_m), stop.phases[0])
         } else {
-            (position_m, velocity_m_s, Phase::default())
+            (start, Phase::default())
         };
-        let [speed_up, cruise, slow_down] = trapezoid(target_m - begin_m, begin_m_s, limits);
-        let phases = [first, speed_up, cruise, slow_down];
-        Self { from_ns, position_m, velocity_m_s, phases, end_m: target_m }
+        let [speed_up, cruise, slow_down] =
+            trapezoid(target_m - begin.position_m, begin.velocity_m_s, limits);
+        Self { from_ns, start, phases: [first, speed_up, cruise, slow_down], end_m: target_m }
     }
 
-    /// Position and velocity, m and m/s.
-    pub(super) fn at(&self, now_ns: u64) -> (f64, f64) {
+    /// The motion at that time.
+    pub(super) fn at(&self, now_ns: u64) -> Motion {
         let mut left_s = now_ns.saturating_sub(self.from_ns) as f64 * 1e-9;
-        let (mut position_m, mut velocity_m_s) = (self.position_m, self.velocity_m_s);
+        let Motion { mut position_m, mut velocity_m_s } = self.start;
         for Phase { duration_s, acceleration_m_s2 } in self.phases {
             let time_s = left_s.min(duration_s);
             position_m += (velocity_m_s + acceleration_m_s2 * time_s / 2.0) * time_s;
             velocity_m_s += acceleration_m_s2 * time_s;
             if left_s < duration_s {
-                return (position_m, velocity_m_s);
+                return Motion { position_m, velocity_m_s };
             }
             left_s -= duration_s;
         }
-        (self.end_m, 0.0)
+        Motion::at_rest(self.end_m)
     }
 
     /// Whether it has come to rest.
@@ -116,7 +112,7 @@ mod tests {
     const STEP_NS: u64 = 100_000;
 
     /// The profile sampled every 0.1 ms until it is over.
-    fn samples(profile: &Profile) -> Vec<(f64, f64)> {
+    fn samples(profile: &Profile) -> Vec<Motion> {
         let times = (0..1_000_000).map(|step| step * STEP_NS);
         let until_over = times.take_while(|&time_ns| !profile.is_over(time_ns));
         until_over.map(|time_ns| profile.at(time_ns)).collect()
@@ -125,33 +121,33 @@ mod tests {
     #[test]
     fn from_rest_it_takes_the_time_of_the_trapezoid() {
         // 0.1 s up (5 mm), 0.05 s down (2.5 mm), the other 42.5 mm at 0.1 m/s in 0.425 s.
-        let profile = Profile::to(0, 0.2, 0.0, 0.25, &LIMITS);
+        let profile = Profile::to(0, Motion::at_rest(0.2), 0.25, &LIMITS);
         assert!(!profile.is_over(574_999_000));
         assert!(profile.is_over(575_001_000));
-        let (position_m, velocity_m_s) = profile.at(300_000_000);
+        let Motion { position_m, velocity_m_s } = profile.at(300_000_000);
         assert!((velocity_m_s - 0.1).abs() < 1e-12);
         assert!((position_m - 0.225).abs() < 1e-12);
-        assert_eq!(profile.at(u64::MAX), (0.25, 0.0));
+        assert_eq!(profile.at(u64::MAX), Motion::at_rest(0.25));
     }
 
     #[test]
     fn a_short_way_is_a_triangle() {
-        let profile = Profile::to(0, 0.0, 0.0, -0.001, &LIMITS);
-        let fastest = samples(&profile).iter().fold(0.0_f64, |fastest, (_, speed)| fastest.min(*speed));
+        let profile = Profile::to(0, Motion::at_rest(0.0), -0.001, &LIMITS);
+        let fastest = samples(&profile).iter().fold(0.0_f64, |fastest, at| fastest.min(at.velocity_m_s));
         assert!((-0.0366..-0.0364).contains(&fastest), "{fastest}");
     }
 
     #[test]
     fn an_axis_too_fast_to_stop_in_time_turns_round() {
-        let profile = Profile::to(0, 0.0, 0.1, 0.001, &LIMITS);
-        let furthest = samples(&profile).iter().fold(0.0_f64, |furthest, (at, _)| furthest.max(*at));
+        let profile = Profile::to(0, Motion { position_m: 0.0, velocity_m_s: 0.1 }, 0.001, &LIMITS);
+        let furthest = samples(&profile).iter().fold(0.0_f64, |furthest, at| furthest.max(at.position_m));
         assert!((furthest - 0.0025).abs() < 1e-6, "{furthest}");
-        assert_eq!(profile.at(u64::MAX), (0.001, 0.0));
+        assert_eq!(profile.at(u64::MAX), Motion::at_rest(0.001));
     }
 
     #[test]
     fn a_stop_takes_the_way_of_its_ramp() {
-        let profile = Profile::stop(0, 0.27, 0.2, 10.0);
+        let profile = Profile::stop(0, Motion { position_m: 0.27, velocity_m_s: 0.2 }, 10.0);
         assert!(!profile.is_over(19_000_000) && profile.is_over(21_000_000));
         assert!((profile.end_m - 0.272).abs() < 1e-12);
     }
@@ -171,15 +167,17 @@ mod tests {
                 acceleration_m_s2: up,
                 deceleration_m_s2: down,
             };
-            let profile = Profile::to(0, position_m, velocity_m_s, target_m, &limits);
+            let start = Motion { position_m, velocity_m_s };
+            let profile = Profile::to(0, start, target_m, &limits);
             let step_s = STEP_NS as f64 * 1e-9;
             let fastest = limit_m_s.max(velocity_m_s.abs()) + 1e-9;
-            let mut before = (position_m, velocity_m_s);
-            for (at_m, speed_m_s) in samples(&profile).into_iter().chain([(target_m, 0.0)]) {
-                prop_assert!(speed_m_s.abs() <= fastest);
-                prop_assert!((at_m - before.0).abs() <= fastest * step_s + 1e-9);
-                prop_assert!((speed_m_s - before.1).abs() <= up.max(down) * step_s + 1e-9);
-                before = (at_m, speed_m_s);
+            let mut before = start;
+            for now in samples(&profile).into_iter().chain([Motion::at_rest(target_m)]) {
+                prop_assert!(now.velocity_m_s.abs() <= fastest);
+                prop_assert!((now.position_m - before.position_m).abs() <= fastest * step_s + 1e-9);
+                let change_m_s = now.velocity_m_s - before.velocity_m_s;
+                prop_assert!(change_m_s.abs() <= up.max(down) * step_s + 1e-9);
+                before = now;
             }
         }
     }

@@ -5,6 +5,9 @@
 
 use masseter_shared::config::DriveConfig;
 
+use super::clamped::{clamped, clamped_both_ways};
+use super::motion::Motion;
+
 /// Time constant of the filter on the measured velocity, s.
 const VELOCITY_FILTER_S: f64 = 5e-4;
 /// Stiffness of the closed brake, N/m, and its damping, N per m/s.
@@ -17,12 +20,7 @@ pub(crate) enum Task {
     /// No current; the brake holds where it closed.
     Brake,
     /// Follow a position with its velocity.
-    Follow {
-        /// Position wanted, m.
-        position_m: f64,
-        /// Its velocity, m/s.
-        velocity_m_s: f64,
-    },
+    Follow(Motion),
     /// Give a force, as long as the velocity keeps to its range.
     Force {
         /// Force wanted, N.
@@ -46,8 +44,7 @@ pub(crate) struct ServoLimits {
 pub(crate) struct Servo {
     config: DriveConfig,
     step_s: f64,
-    position_m: f64,
-    velocity_m_s: f64,
+    motion: Motion,
     integral_n: f64,
     brake_at_m: Option<f64>,
     is_limited: bool,
@@ -59,22 +56,16 @@ impl Servo {
         Self {
             config,
             step_s,
-            position_m,
-            velocity_m_s: 0.0,
+            motion: Motion::at_rest(position_m),
             integral_n: 0.0,
             brake_at_m: Some(position_m),
             is_limited: false,
         }
     }
 
-    /// The last measured position, m.
-    pub(crate) fn position_m(&self) -> f64 {
-        self.position_m
-    }
-
-    /// The filtered velocity, m/s.
-    pub(crate) fn velocity_m_s(&self) -> f64 {
-        self.velocity_m_s
+    /// The last measured position with the filtered velocity.
+    pub(crate) fn motion(&self) -> Motion {
+        self.motion
     }
 
     /// Whether force or velocity was limited in the last step.
@@ -84,33 +75,35 @@ impl Servo {
 
     /// One step of the loops: the force for the next `step_s`, N.
     pub(crate) fn step(&mut self, measured_m: f64, task: Task, limits: &ServoLimits) -> f64 {
-        let raw = (measured_m - self.position_m) / self.step_s;
-        self.velocity_m_s += (raw - self.velocity_m_s) * self.step_s / (self.step_s + VELOCITY_FILTER_S);
-        self.position_m = measured_m;
+        let Motion { position_m, velocity_m_s } = &mut self.motion;
+        let raw = (measured_m - *position_m) / self.step_s;
+        *velocity_m_s += (raw - *velocity_m_s) * self.step_s / (self.step_s + VELOCITY_FILTER_S);
+        *position_m = measured_m;
         match task {
             Task::Brake => self.brake(),
-            Task::Follow { position_m, velocity_m_s } => self.follow(position_m, velocity_m_s, limits),
+            Task::Follow(wanted) => self.follow(wanted, limits),
             Task::Force { force_n } => self.push(force_n, limits),
         }
     }
 
     fn brake(&mut self) -> f64 {
-        let at_m = *self.brake_at_m.get_or_insert(self.position_m);
+        let Motion { position_m, velocity_m_s } = self.motion;
+        let at_m = *self.brake_at_m.get_or_insert(position_m);
         self.is_limited = false;
         // When the loops take over they begin with the load that the brake carried.
-        self.integral_n = BRAKE_STIFFNESS_N_M * (at_m - self.position_m);
-        self.integral_n - BRAKE_DAMPING_N_S_M * self.velocity_m_s
+        self.integral_n = BRAKE_STIFFNESS_N_M * (at_m - position_m);
+        self.integral_n - BRAKE_DAMPING_N_S_M * velocity_m_s
     }
 
-    fn follow(&mut self, position_m: f64, velocity_m_s: f64, limits: &ServoLimits) -> f64 {
-        let config = &self.config;
+    fn follow(&mut self, wanted: Motion, limits: &ServoLimits) -> f64 {
+        let (config, actual) = (&self.config, self.motion);
         self.brake_at_m = None;
-        let wanted = velocity_m_s + config.position_gain_per_s * (position_m - self.position_m);
-        let speed = wanted.clamp(-limits.velocity_m_s, limits.velocity_m_s);
-        let proportional_n = config.velocity_gain_n_s_per_m * (speed - self.velocity_m_s);
-        let asked_n = proportional_n + self.integral_n;
-        let force_n = asked_n.clamp(-limits.force_n, limits.force_n);
-        self.is_limited = force_n.to_bits() != asked_n.to_bits() || speed.to_bits() != wanted.to_bits();
+        let asked_m_s =
+            wanted.velocity_m_s + config.position_gain_per_s * (wanted.position_m - actual.position_m);
+        let (speed_m_s, is_slowed) = clamped_both_ways(asked_m_s, limits.velocity_m_s);
+        let proportional_n = config.velocity_gain_n_s_per_m * (speed_m_s - actual.velocity_m_s);
+        let (force_n, is_cut) = clamped_both_ways(proportional_n + self.integral_n, limits.force_n);
+        self.is_limited = is_slowed || is_cut;
         if !self.is_limited {
             self.integral_n += proportional_n * self.step_s / config.velocity_integral_time_s;
         }
@@ -120,12 +113,12 @@ impl Servo {
     /// The velocity loop takes over, without integral, where the velocity would leave its range.
     fn push(&mut self, asked_n: f64, limits: &ServoLimits) -> f64 {
         self.brake_at_m = None;
-        let [least_n, most_n] = limits
-            .free_velocity_m_s
-            .map(|speed| self.config.velocity_gain_n_s_per_m * (speed - self.velocity_m_s));
-        let allowed_n = asked_n.max(least_n).min(most_n);
-        let force_n = allowed_n.clamp(-limits.force_n, limits.force_n);
-        self.is_limited = force_n.to_bits() != asked_n.to_bits();
+        let velocity_m_s = self.motion.velocity_m_s;
+        let range_n =
+            limits.free_velocity_m_s.map(|end| self.config.velocity_gain_n_s_per_m * (end - velocity_m_s));
+        let (allowed_n, is_held) = clamped(asked_n, range_n);
+        let (force_n, is_cut) = clamped_both_ways(allowed_n, limits.force_n);
+        self.is_limited = is_held || is_cut;
         // When the position loop takes over it begins with this force.
         self.integral_n = force_n;
         force_n
@@ -143,7 +136,7 @@ mod tests {
         ServoLimits { force_n: 1000.0, velocity_m_s: 0.4, free_velocity_m_s: [-0.4, 0.4] };
 
     /// A mass with a constant load.
-    fn simulate(task: impl Fn(f64) -> Task, mass_kg: f64, load_n: f64, seconds: f64) -> (f64, f64) {
+    fn simulate(task: impl Fn(f64) -> Task, mass_kg: f64, load_n: f64, seconds: f64) -> Motion {
         let mut servo = Servo::new(DrivesConfig::default().leg, STEP_S, 0.27);
         let (mut position_m, mut velocity_m_s, mut time_s) = (0.27, 0.0, 0.0);
         while time_s < seconds {
@@ -152,27 +145,27 @@ mod tests {
             position_m += velocity_m_s * STEP_S;
             time_s += STEP_S;
         }
-        (position_m, velocity_m_s)
+        Motion { position_m, velocity_m_s }
     }
 
     #[test]
     fn it_holds_a_position_against_a_load() {
-        let hold = |_| Task::Follow { position_m: 0.27, velocity_m_s: 0.0 };
-        let (position_m, _) = simulate(hold, 0.6, 20.0, 1.0);
+        let hold = |_| Task::Follow(Motion::at_rest(0.27));
+        let Motion { position_m, .. } = simulate(hold, 0.6, 20.0, 1.0);
         assert!((position_m - 0.27).abs() < 1e-6, "{position_m}");
     }
 
     #[test]
     fn it_follows_a_ramp_without_lasting_error() {
-        let ramp = |t: f64| Task::Follow { position_m: 0.27 + 0.1 * (t + STEP_S), velocity_m_s: 0.1 };
-        let (position_m, velocity_m_s) = simulate(ramp, 0.6, 20.0, 0.3);
+        let ramp = |t: f64| Task::Follow(Motion { position_m: 0.27 + 0.1 * (t + STEP_S), velocity_m_s: 0.1 });
+        let Motion { position_m, velocity_m_s } = simulate(ramp, 0.6, 20.0, 0.3);
         assert!((position_m - 0.30).abs() < 5e-5, "{position_m}");
         assert!((velocity_m_s - 0.1).abs() < 1e-3, "{velocity_m_s}");
     }
 
     #[test]
     fn the_brake_holds_a_load_nearly_where_it_closed() {
-        let (position_m, velocity_m_s) = simulate(|_| Task::Brake, 0.6, 20.0, 1.0);
+        let Motion { position_m, velocity_m_s } = simulate(|_| Task::Brake, 0.6, 20.0, 1.0);
         assert!((position_m - 0.27).abs() < 2e-4, "{position_m}");
         assert!(velocity_m_s.abs() < 1e-6);
     }
@@ -180,7 +173,7 @@ mod tests {
     /// The force on an axis at rest that is far from where it shall be, and whether it was limited.
     fn pull(limits: &ServoLimits) -> (f64, bool) {
         let mut servo = Servo::new(DrivesConfig::default().leg, STEP_S, 0.27);
-        let force_n = servo.step(0.27, Task::Follow { position_m: 5.0, velocity_m_s: 0.0 }, limits);
+        let force_n = servo.step(0.27, Task::Follow(Motion::at_rest(5.0)), limits);
         (force_n, servo.is_limited())
     }
 
@@ -206,7 +199,8 @@ mod tests {
 
     #[test]
     fn under_a_force_the_axis_keeps_to_its_velocity() {
-        let (position_m, velocity_m_s) = simulate(|_| Task::Force { force_n: 100.0 }, 0.6, 20.0, 0.5);
+        let Motion { position_m, velocity_m_s } =
+            simulate(|_| Task::Force { force_n: 100.0 }, 0.6, 20.0, 0.5);
         assert!((0.2..0.4).contains(&velocity_m_s), "{velocity_m_s} at {position_m}");
     }
 }
