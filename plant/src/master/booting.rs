@@ -100,8 +100,7 @@ impl Master {
         for axis in 0..AXES {
             let node = &mut self.nodes[axis];
             if node.boot.phase() == BootPhase::Configured {
-                node.boot.start(now_ns);
-                (node.is_started, node.missing_cycles) = (true, 0);
+                node.start(now_ns);
                 self.send_nmt(now_ns, axis, NmtCommand::Start, buses);
                 self.note_boot(now_ns, axis, BootPhase::Configured, Ok(()));
             }

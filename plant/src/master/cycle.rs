@@ -166,7 +166,7 @@ impl Master {
     /// moment this one was queued and that in which it was on the wire.
     pub(super) fn is_fresh(&self, axis: usize) -> bool {
         let node = &self.nodes[axis];
-        node.answered_ns > self.sync_ns.max(self.buses[node.bus].sync_ns)
+        node.has_answered_since(self.sync_ns.max(self.buses[node.bus].sync_ns))
     }
 
     /// This cycle's reading, without the times that the link alone knows.

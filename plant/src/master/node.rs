@@ -24,8 +24,29 @@ impl Scale {
     }
 }
 
-/// Kinds of objects that the master takes from a node.
-const LENGTHS: usize = 4;
+/// A kind of object that the master takes from a node.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Kind {
+    Heartbeat,
+    ProcessData,
+    Emergency,
+    SdoAnswer,
+}
+
+impl Kind {
+    const COUNT: usize = 4;
+
+    /// The kind of an object and whose it is; none where the master takes no such object.
+    pub(super) const fn of(cob: Cob) -> Option<(Self, NodeId)> {
+        match cob {
+            Cob::Heartbeat(node) => Some((Self::Heartbeat, node)),
+            Cob::Tpdo1(node) => Some((Self::ProcessData, node)),
+            Cob::Emergency(node) => Some((Self::Emergency, node)),
+            Cob::SdoResponse(node) => Some((Self::SdoAnswer, node)),
+            Cob::Nmt | Cob::Sync | Cob::Rpdo1(_) | Cob::SdoRequest(_) => None,
+        }
+    }
+}
 
 /// One drive, as the master sees it.
 #[derive(Debug, Clone)]
@@ -33,21 +54,21 @@ pub(super) struct Node {
     pub(super) id: NodeId,
     pub(super) bus: usize,
     pub(super) boot: Boot,
-    pub(super) nmt: Option<NmtState>,
+    nmt: Option<NmtState>,
     /// Whether it was verified before it was started: only then its process data mean anything.
-    pub(super) is_started: bool,
-    pub(super) heard_ns: u64,
+    is_started: bool,
+    heard_ns: u64,
     /// When its newest process data came.
-    pub(super) answered_ns: u64,
-    pub(super) missing_cycles: u32,
+    answered_ns: u64,
+    missing_cycles: u32,
     /// New process data beyond one a SYNC, of late. A drive that is late makes up for a cycle without any, one that hears
     /// a repeated SYNC answers it again, two of one id have one more every cycle.
-    pub(super) surplus: u32,
+    surplus: u32,
     /// New process data since the last SYNC.
     news: u32,
     /// Whether it was told that the node does not come.
-    pub(super) is_missed: bool,
-    has_wrong_length: [bool; LENGTHS],
+    is_missed: bool,
+    has_wrong_length: [bool; Kind::COUNT],
     scale: Scale,
     power: Option<DriveState>,
     actual_increments: i32,
@@ -69,13 +90,18 @@ impl Node {
             surplus: 0,
             news: 0,
             is_missed: false,
-            has_wrong_length: [false; LENGTHS],
+            has_wrong_length: [false; Kind::COUNT],
             scale,
             power: None,
             actual_increments: 0,
             torque_permille: 0,
             controlword: Controlword::DISABLE_VOLTAGE,
         }
+    }
+
+    /// Whether it was told to exchange process data, as one that is verified.
+    pub(super) fn is_started(&self) -> bool {
+        self.is_started
     }
 
     /// Whether it exchanges process data.
@@ -86,6 +112,60 @@ impl Node {
     /// Whether it is verified and exchanges process data.
     pub(super) fn is_ready(&self) -> bool {
         self.is_operational() && self.boot.phase() == BootPhase::Ready
+    }
+
+    /// The NMT state in which it does not exchange the process data that it was started for.
+    pub(super) fn stopped_in(&self) -> Option<NmtState> {
+        self.nmt.filter(|&state| self.is_started && state != NmtState::Operational)
+    }
+
+    /// How long nothing was heard of it, ns.
+    pub(super) fn silent_ns(&self, now_ns: u64) -> u64 {
+        now_ns.saturating_sub(self.heard_ns)
+    }
+
+    /// Whether its newest process data are newer than that.
+    pub(super) fn has_answered_since(&self, time_ns: u64) -> bool {
+        self.answered_ns > time_ns
+    }
+
+    /// Cycles in a row without its process data.
+    pub(super) fn missing_cycles(&self) -> u32 {
+        self.missing_cycles
+    }
+
+    /// New process data beyond one a SYNC, of late.
+    pub(super) fn surplus(&self) -> u32 {
+        self.surplus
+    }
+
+    /// It is told to become operational, and verified to be what it should.
+    pub(super) fn start(&mut self, now_ns: u64) {
+        self.boot.start(now_ns);
+        (self.is_started, self.missing_cycles) = (true, 0);
+    }
+
+    /// It sent something.
+    pub(super) fn hear(&mut self, time_ns: u64) {
+        self.heard_ns = time_ns;
+    }
+
+    /// It said in which state it is.
+    pub(super) fn hear_state(&mut self, time_ns: u64, state: NmtState) {
+        self.hear(time_ns);
+        self.nmt = Some(state);
+    }
+
+    /// A cycle is over without its process data.
+    pub(super) fn miss_cycle(&mut self) {
+        if self.is_operational() {
+            self.missing_cycles += 1;
+        }
+    }
+
+    /// It does not come; whether that is news.
+    pub(super) fn miss(&mut self) -> bool {
+        !std::mem::replace(&mut self.is_missed, true)
     }
 
     /// Nothing that was found out about it counts any more, its state neither; it has to boot again.
@@ -101,14 +181,8 @@ impl Node {
     }
 
     /// Whether this is its first object of that kind with a wrong length.
-    pub(super) fn is_first_wrong_length(&mut self, cob: Cob) -> bool {
-        let kind = match cob {
-            Cob::Heartbeat(_) => 0,
-            Cob::Tpdo1(_) => 1,
-            Cob::Emergency(_) => 2,
-            _ => 3,
-        };
-        !std::mem::replace(&mut self.has_wrong_length[kind], true)
+    pub(super) fn is_first_wrong_length(&mut self, kind: Kind) -> bool {
+        !std::mem::replace(&mut self.has_wrong_length[kind as usize], true)
     }
 
     /// SYNC asks it for new process data.
@@ -119,8 +193,15 @@ impl Node {
         };
     }
 
-    /// Takes process data; a statusword without a meaning keeps the last state.
-    pub(super) fn take(&mut self, tpdo: Tpdo1, time_ns: u64) {
+    /// Takes process data, which only an operational node sends; a statusword without a meaning keeps the last state.
+    /// Its condition before and after; none while they mean nothing.
+    pub(super) fn take(&mut self, tpdo: Tpdo1, time_ns: u64) -> Option<[DriveCondition; 2]> {
+        self.hear_state(time_ns, NmtState::Operational);
+        self.missing_cycles = 0;
+        if !self.is_started {
+            return None;
+        }
+        let before = self.condition();
         if let Ok(state) = tpdo.statusword.state() {
             self.power = Some(state);
         }
@@ -129,6 +210,7 @@ impl Node {
         self.news += u32::from(data != (self.actual_increments, self.torque_permille));
         (self.actual_increments, self.torque_permille) = data;
         self.answered_ns = time_ns;
+        Some([before, self.condition()])
     }
 
     pub(super) fn condition(&self) -> DriveCondition {
@@ -174,6 +256,7 @@ mod tests {
         let id = NodeId::new(1).unwrap();
         let scale = Scale { increment_m: 1e-6, rated_force_n: 500.0 };
         let mut node = Node::new(id, 0, scale, &setup(&Scenario::default(), 0), 0);
+        node.start(0);
         let statusword = Statusword::of(DriveState::OperationEnabled);
         for sync in 0..syncs {
             node.begin_cycle();
@@ -183,7 +266,7 @@ mod tests {
             }
         }
         node.begin_cycle();
-        node.surplus
+        node.surplus()
     }
 
     #[test]

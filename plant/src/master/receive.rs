@@ -8,33 +8,32 @@ use masseter_shared::messages::Event;
 use masseter_shared::messages::codes::{BootPhase, Cause, EventKind, Source};
 
 use super::cycle::Master;
+use super::node::Kind;
 use super::supervision::Place;
 
 impl Master {
     /// Takes a frame. Of a malformed one it is told once that it came; it has no other effect.
     pub(super) fn take(&mut self, bus: usize, received: &Received) {
         let Ok(cob) = Cob::try_from(received.frame.id()) else { return };
-        let id = match cob {
-            // Only a master sends it.
-            Cob::Sync => self.settings.id,
-            Cob::Heartbeat(id) | Cob::Tpdo1(id) | Cob::Emergency(id) | Cob::SdoResponse(id) => id,
-            _ => return,
-        };
         let (time_ns, data) = (received.time_ns, received.frame.data());
-        // Its own frames do not come back to it.
+        // Only a master sends it, and this one's own frames do not come back to it.
+        if cob == Cob::Sync {
+            return self.give_way(time_ns, bus);
+        }
+        let Some((kind, id)) = Kind::of(cob) else { return };
         if id == self.settings.id {
             return self.give_way(time_ns, bus);
         }
         let Some(axis) = self.axis_of(id, bus) else { return self.note_unknown(time_ns, id, bus) };
         self.buses[bus].is_heard = true;
-        let taken = match cob {
-            Cob::Heartbeat(_) => self.take_heartbeat(axis, data, time_ns),
-            Cob::Tpdo1(_) => Tpdo1::decode(data).map(|tpdo| self.take_process_data(axis, tpdo, time_ns)),
-            Cob::Emergency(_) => Emergency::decode(data).map(|emcy| self.note_emergency(axis, emcy, time_ns)),
-            _ => self.take_answer(axis, data, time_ns),
+        let taken = match kind {
+            Kind::Heartbeat => self.take_heartbeat(axis, data, time_ns),
+            Kind::ProcessData => Tpdo1::decode(data).map(|tpdo| self.take_process_data(axis, tpdo, time_ns)),
+            Kind::Emergency => Emergency::decode(data).map(|emcy| self.note_emergency(axis, emcy, time_ns)),
+            Kind::SdoAnswer => self.take_answer(axis, data, time_ns),
         };
         if let Err(error) = taken
-            && self.nodes[axis].is_first_wrong_length(cob)
+            && self.nodes[axis].is_first_wrong_length(kind)
         {
             self.note_wrong_length(axis, cob, &error, time_ns);
         }
@@ -53,10 +52,10 @@ impl Master {
         };
         let may_boot = self.may_boot();
         let node = &mut self.nodes[axis];
-        (node.nmt, node.heard_ns) = (Some(state), time_ns);
+        node.hear_state(time_ns, state);
         let before = node.boot.phase();
         let mut result = Ok(());
-        if state == NmtState::BootUp && node.is_started {
+        if state == NmtState::BootUp && node.is_started() {
             node.stop_exchange();
             node.forget(time_ns);
             self.fail(time_ns, Cause::NodeRestarted, Place::Axis(axis), [0.0; 2]);
@@ -74,7 +73,7 @@ impl Master {
         match SdoResponse::decode(data) {
             Ok(response) => {
                 let node = &mut self.nodes[axis];
-                node.heard_ns = time_ns;
+                node.hear(time_ns);
                 let before = node.boot.phase();
                 let result = node.boot.take(time_ns, response);
                 self.note_boot(time_ns, axis, before, result);
@@ -87,15 +86,7 @@ impl Master {
     }
 
     fn take_process_data(&mut self, axis: usize, tpdo: Tpdo1, time_ns: u64) {
-        let node = &mut self.nodes[axis];
-        // Only an operational node sends process data.
-        (node.nmt, node.heard_ns, node.missing_cycles) = (Some(NmtState::Operational), time_ns, 0);
-        if !node.is_started {
-            return;
-        }
-        let before = node.condition();
-        node.take(tpdo, time_ns);
-        let after = node.condition();
+        let Some([before, after]) = self.nodes[axis].take(tpdo, time_ns) else { return };
         self.complete_ns = self.complete_ns.max(time_ns);
         if before != after {
             let moved = Event::new(Source::Drive, EventKind::Transition, Cause::Sequence);

@@ -51,18 +51,18 @@ impl Master {
     fn watch_node(&mut self, now_ns: u64, axis: usize) {
         let is_fresh = self.is_fresh(axis);
         let node = &mut self.nodes[axis];
-        if node.is_operational() && !is_fresh {
-            node.missing_cycles += 1;
+        if !is_fresh {
+            node.miss_cycle();
         }
-        let silent_ns = now_ns.saturating_sub(node.heard_ns);
+        let (silent_ns, surplus, missing) = (node.silent_ns(now_ns), node.surplus(), node.missing_cycles());
         let (cause, values) = if silent_ns > self.settings.heartbeat_timeout_ns {
             let limit_ns = self.settings.heartbeat_timeout_ns;
             (Cause::HeartbeatLost, [silent_ns, limit_ns].map(in_ms))
-        } else if node.surplus > SURPLUS {
-            (Cause::DuplicateNode, [node.surplus, SURPLUS].map(f64::from))
-        } else if node.missing_cycles > MISSING_CYCLES {
-            (Cause::ProcessDataLost, [node.missing_cycles, MISSING_CYCLES].map(f64::from))
-        } else if let Some(state) = node.nmt.filter(|_| node.is_started && !node.is_operational()) {
+        } else if surplus > SURPLUS {
+            (Cause::DuplicateNode, [surplus, SURPLUS].map(f64::from))
+        } else if missing > MISSING_CYCLES {
+            (Cause::ProcessDataLost, [missing, MISSING_CYCLES].map(f64::from))
+        } else if let Some(state) = node.stopped_in() {
             (Cause::NodeStopped, [state, NmtState::Operational].map(|state| f64::from(state.code())))
         } else {
             return;
@@ -78,8 +78,7 @@ impl Master {
         let limit_ns = self.settings.boot_timeout_ns;
         let node = &mut self.nodes[axis];
         let waited_ns = node.boot.waited_ns(now_ns);
-        if waited_ns > limit_ns && !node.is_missed {
-            node.is_missed = true;
+        if waited_ns > limit_ns && node.miss() {
             let [value, limit] = [waited_ns, limit_ns].map(in_ms);
             self.fail_boot(
                 now_ns,
