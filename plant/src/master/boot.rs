@@ -10,7 +10,7 @@ use masseter_shared::can::cia402::{DriveState, Statusword};
 use masseter_shared::clock::MILLISECOND_NS;
 use masseter_shared::messages::codes::{BootPhase, Cause};
 
-use super::plan::{STATUSWORD, Setup, Task, plan};
+use super::plan::{Condition, STATUSWORD, Setup, Task, plan};
 use super::sdo::{ATTEMPTS, Data, SdoClient, SdoFailure, TIMEOUT_NS, Taken};
 
 /// Silence after which a node that may be alive without a heartbeat is told to boot, ns.
@@ -209,7 +209,7 @@ impl Boot {
     /// Ends the task whose answer is there, and begins the next.
     fn carry_on(&mut self, now_ns: u64) -> Result<(), BootFault> {
         match self.client.outcome() {
-            Some(Err(SdoFailure::Aborted { code, .. })) if self.may_be_absent(code) => self.next += 2,
+            Some(Err(SdoFailure::Aborted { code, .. })) if self.may_be_absent(code) => self.go_on(false),
             Some(outcome) => self.conclude(outcome?)?,
             None => {}
         }
@@ -224,20 +224,31 @@ impl Boot {
 
     /// Whether the task under way asks for something that a drive need not have, and this one has not.
     fn may_be_absent(&self, code: AbortCode) -> bool {
-        matches!(self.tasks[self.next], Task::IfExchanged(_))
+        matches!(self.tasks[self.next], Task::If { condition: Condition::Exchanged(_), .. })
             && matches!(code, AbortCode::NO_OBJECT | AbortCode::NO_SUBINDEX)
+    }
+
+    /// Ends the task under way, and leaves out those of a condition that does not hold.
+    fn go_on(&mut self, holds: bool) {
+        let left_out = match self.tasks[self.next] {
+            Task::If { otherwise_skip, .. } if !holds => otherwise_skip,
+            _ => 0,
+        };
+        (self.next, self.readings) = (self.next + 1 + left_out, 0);
     }
 
     fn begin(&mut self, task: Task) {
         match task {
             Task::Enter(phase) => {
                 self.phase = phase;
-                self.next += 1;
+                self.go_on(true);
             }
-            Task::Expect { object, .. } | Task::Keep(object) | Task::IfExchanged(object) => {
-                self.client.read(object);
+            Task::Expect { object, .. }
+            | Task::Keep(object)
+            | Task::If { condition: Condition::Exchanged(object), .. } => self.client.read(object),
+            Task::If { condition: Condition::InFault, .. } | Task::ExpectNoFault => {
+                self.client.read(STATUSWORD);
             }
-            Task::IfInFault { .. } | Task::ExpectNoFault => self.client.read(STATUSWORD),
             Task::Write { object, value, bytes } => {
                 let value = Data::new(&value.to_le_bytes()[..bytes]).expect("at most four bytes");
                 self.client.write(object, value);
@@ -249,6 +260,7 @@ impl Boot {
     /// Judges what the task under way read.
     fn conclude(&mut self, read: Data) -> Result<(), BootFault> {
         let number = read.number().unwrap_or(0);
+        let mut holds = true;
         match self.tasks[self.next] {
             Task::Expect { object, mask, value, otherwise } if number & mask != value & mask => {
                 self.readings += 1;
@@ -265,16 +277,24 @@ impl Boot {
                 let fault = BootFault::new(Cause::FaultAtStart).at(STATUSWORD, code, 0);
                 return if self.readings < READINGS { Ok(()) } else { Err(fault) };
             }
-            Task::IfInFault { otherwise_skip } if !in_fault(number) => self.next += otherwise_skip,
+            Task::If { condition, .. } => holds = self.holds(condition, number),
             Task::Keep(_) => self.kept = read,
-            Task::IfExchanged(_) if number & COB_ID_NOT_VALID != 0 => self.next += 1,
-            Task::IfExchanged(_) => {
-                self.kept = Data::new(&(number | COB_ID_NOT_VALID).to_le_bytes()).expect("four bytes");
-            }
             _ => {}
         }
-        (self.next, self.readings) = (self.next + 1, 0);
+        self.go_on(holds);
         Ok(())
+    }
+
+    /// Whether a condition holds, given what was read of it.
+    fn holds(&mut self, condition: Condition, number: u32) -> bool {
+        match condition {
+            Condition::InFault => in_fault(number),
+            Condition::Exchanged(_) => {
+                let not_valid = number | COB_ID_NOT_VALID;
+                self.kept = Data::new(&not_valid.to_le_bytes()).expect("four bytes");
+                number != not_valid
+            }
+        }
     }
 }
 

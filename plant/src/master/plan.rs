@@ -45,6 +45,15 @@ pub(crate) struct Setup {
     pub(crate) position_limits: [i32; 2],
 }
 
+/// What further tasks may depend on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Condition {
+    /// There is a PDO of which that object is the COB-ID, and it is valid; it is kept as one that is not.
+    Exchanged(ObjectAddress),
+    /// The drive is in fault.
+    InFault,
+}
+
 /// One thing to do.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Task {
@@ -56,13 +65,10 @@ pub(super) enum Task {
     Write { object: ObjectAddress, value: u32, bytes: usize },
     /// Read the object and keep its value.
     Keep(ObjectAddress),
-    /// Read the COB-ID of a PDO and keep it as one that is not valid; unless there is such a PDO and it is valid, leave
-    /// out the next task.
-    IfExchanged(ObjectAddress),
     /// Write the value kept.
     WriteKept(ObjectAddress),
-    /// Read the statusword; unless the drive is in fault, leave out that many tasks.
-    IfInFault { otherwise_skip: usize },
+    /// Read what the condition is about; unless it holds, leave out that many tasks.
+    If { condition: Condition, otherwise_skip: usize },
     /// Read the statusword, now or within a few repetitions without a fault.
     ExpectNoFault,
 }
@@ -88,11 +94,16 @@ pub(super) fn plan(node: NodeId, setup: &Setup) -> Vec<Task> {
 pub(crate) fn exchanges(node: NodeId, setup: &Setup) -> usize {
     let tasks = plan(node, setup);
     let without = |task: &Task| match task {
-        Task::Enter(_) | Task::IfExchanged(_) => 1,
-        Task::IfInFault { otherwise_skip } => *otherwise_skip,
+        Task::Enter(_) => 1,
+        Task::If { otherwise_skip, .. } => *otherwise_skip,
         _ => 0,
     };
     tasks.len() - tasks.iter().map(without).sum::<usize>()
+}
+
+/// Tasks for a drive of which the condition holds.
+fn only_if<const N: usize>(condition: Condition, tasks: [Task; N]) -> impl Iterator<Item = Task> {
+    [Task::If { condition, otherwise_skip: N }].into_iter().chain(tasks)
 }
 
 fn identify(identity: &IdentityConfig) -> impl Iterator<Item = Task> {
@@ -126,9 +137,9 @@ fn check_pdo(communication: u16, cob: Cob, mapping: &[u32]) -> impl Iterator<Ite
     all.map(|(object, mask, value)| Task::Expect { object, mask, value, otherwise: Cause::WrongPdo })
 }
 
-const fn switch_off_pdo(communication: u16) -> [Task; 2] {
+fn switch_off_pdo(communication: u16) -> impl Iterator<Item = Task> {
     let cob_id = ObjectAddress::new(communication, 1);
-    [Task::IfExchanged(cob_id), Task::WriteKept(cob_id)]
+    only_if(Condition::Exchanged(cob_id), [Task::WriteKept(cob_id)])
 }
 
 fn configure(setup: &Setup) -> impl Iterator<Item = Task> {
@@ -168,20 +179,20 @@ fn configure(setup: &Setup) -> impl Iterator<Item = Task> {
 }
 
 /// A fault that is only remembered is reset by an edge; one that persists is reported with its code.
-fn reset_fault() -> [Task; 6] {
+fn reset_fault() -> impl Iterator<Item = Task> {
     let control = |word: Controlword| Task::Write {
         object: ObjectAddress::new(0x6040, 0),
         value: u32::from(word.0),
         bytes: 2,
     };
-    [
-        Task::IfInFault { otherwise_skip: 5 },
+    let tasks = [
         Task::Keep(ObjectAddress::new(0x603F, 0)),
         control(Controlword::DISABLE_VOLTAGE),
         control(Controlword::FAULT_RESET),
         control(Controlword::DISABLE_VOLTAGE),
         Task::ExpectNoFault,
-    ]
+    ];
+    only_if(Condition::InFault, tasks)
 }
 
 /// 607A := 6064, so that nothing jumps when the drive is enabled.
