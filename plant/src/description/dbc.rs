@@ -5,7 +5,7 @@
 
 use std::fmt::{self, Write};
 
-use masseter_shared::can::canopen::{COB_ID_NOT_VALID, Cob, NmtCommand, NmtState, NodeId, ObjectAddress};
+use masseter_shared::can::canopen::{Cob, NmtCommand, NmtState, NodeId};
 use masseter_shared::can::{CanId, Frame};
 use masseter_shared::config::DriveConfig;
 use masseter_shared::geometry::{AXES, AXIS_NAMES};
@@ -105,11 +105,7 @@ fn process_data(text: &mut String, settings: &DriveSettings, name: &str) -> fmt:
     let objects = settings.objects();
     for number in 0..PDOS as u16 {
         for (direction, communication, mapping) in [("RPDO", 0x1400, 0x1600), ("TPDO", 0x1800, 0x1A00)] {
-            let cob_id = word(&objects, communication + number, 1);
-            if cob_id & COB_ID_NOT_VALID != 0 {
-                continue;
-            }
-            let id = CanId::standard((cob_id & 0x7FF) as u16).expect("eleven bits");
+            let Some(id) = objects.cob_id(communication + number, 1).identifier() else { continue };
             let signals = mapped(&objects, mapping + number, &settings.drive);
             let length = signals.iter().map(|signal| signal.bits).sum::<usize>() / 8;
             let (sender, receiver) = if direction == "RPDO" { (MASTER, name) } else { (name, MASTER) };
@@ -120,12 +116,8 @@ fn process_data(text: &mut String, settings: &DriveSettings, name: &str) -> fmt:
     Ok(())
 }
 
-fn word(objects: &Objects, index: u16, subindex: u8) -> u32 {
-    objects.word(find(ObjectAddress::new(index, subindex)).expect("every PDO has this parameter"))
-}
-
 fn mapped<'a>(objects: &Objects, index: u16, drive: &DriveConfig) -> Vec<Signal<'a>> {
-    let entries = (1..=word(objects, index, 0) as u8).map(|place| MappingEntry(word(objects, index, place)));
+    let entries = (1..=objects.at(index, 0) as u8).map(|place| MappingEntry(objects.at(index, place)));
     let mut start_bit = 0;
     let signals = entries.map(|mapping| {
         let entry = &ENTRIES[find(mapping.object()).expect("what is mapped exists")].entry;

@@ -2,12 +2,12 @@
 
 use std::fmt::{self, Write};
 
-use masseter_shared::can::canopen::{NodeId, ObjectAddress};
+use masseter_shared::can::canopen::NodeId;
 use masseter_shared::config::IdentityConfig;
 
 use crate::drive::DriveSettings;
 use crate::drive::dictionary::{
-    Access, Entry, IDENTITY, Initial, Mapping, OBJECTS, Object, Objects, PDOS, Shape, find,
+    Access, Entry, IDENTITY, Initial, Mapping, OBJECTS, Object, Objects, PDOS, Shape,
 };
 
 /// Objects that CiA 301 makes mandatory.
@@ -106,8 +106,7 @@ fn default_value(index: u16, entry: &Entry, objects: &Objects) -> String {
         Initial::Text(text) => text.to_owned(),
         Initial::OfNode(base) => format!("$NODEID+0x{base:X}"),
         Initial::Value(_) | Initial::Configured => {
-            let place = find(ObjectAddress::new(index, entry.subindex)).expect("it is of the table");
-            let word = objects.word(place);
+            let word = objects.at(index, entry.subindex);
             if entry.kind.is_signed() {
                 entry.kind.number(word).to_string()
             } else {

@@ -3,9 +3,9 @@
 //! Network management stands in [`nmt`](super::nmt). SYNC and process data are exchanged in
 //! [`exchange`](super::exchange); what the objects may become is served in [`service`](super::service).
 
-use masseter_shared::can::canopen::{COB_ID_NOT_VALID, Cob, Emergency, Heartbeat, Nmt, NmtState, NodeId};
+use masseter_shared::can::Frame;
+use masseter_shared::can::canopen::{Cob, CobId, Emergency, Heartbeat, Nmt, NmtState, NodeId};
 use masseter_shared::can::cia402::Controlword;
-use masseter_shared::can::{CanId, Frame};
 use masseter_shared::clock::MILLISECOND_NS;
 use masseter_shared::config::DriveConfig;
 
@@ -235,11 +235,10 @@ impl DriveNode {
 
     /// Sends an emergency message, in the states in which nodes send them and unless 1014 forbids it.
     fn tell(&mut self, emergency: Option<Emergency>) {
-        let cob_id = self.objects.get(names::EMERGENCY_COB_ID);
+        let cob_id = CobId(self.objects.get(names::EMERGENCY_COB_ID));
         if let Some(emergency) = emergency
             && self.is_served()
-            && cob_id & COB_ID_NOT_VALID == 0
-            && let Ok(id) = CanId::standard((cob_id & 0x7FF) as u16)
+            && let Some(id) = cob_id.identifier()
         {
             self.send(Frame::fixed(id, emergency.encode()));
         }

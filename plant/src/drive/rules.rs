@@ -1,7 +1,7 @@
 //! What a client may write beyond type and limits: values without a range, parameters in use, and
 //! the procedure of CiA 301 for changing a PDO.
 
-use masseter_shared::can::canopen::{AbortCode, COB_ID_NOT_VALID, NodeId, ObjectAddress};
+use masseter_shared::can::canopen::{AbortCode, CobId, NodeId, ObjectAddress};
 
 use super::dictionary::{DataType, ENTRIES, MAPPED_MAX, Mapping, Objects, PDOS, WATCHED, find, names};
 use super::homing::Homing;
@@ -12,10 +12,6 @@ use super::pdo::MappingEntry;
 const SAVE: u32 = u32::from_le_bytes(*b"save");
 /// Signature that object 1011 takes, "load".
 const LOAD: u32 = u32::from_le_bytes(*b"load");
-/// Bits of a COB-ID that name the identifier.
-const IDENTIFIER: u32 = 0x1FFF_FFFF;
-/// Bit 29 of a COB-ID: a 29-bit identifier.
-const EXTENDED: u32 = 1 << 29;
 /// Bits that a PDO carries at most.
 const PDO_BITS: usize = 64;
 const PDO_COUNT: u16 = PDOS as u16;
@@ -47,7 +43,7 @@ pub(super) fn check(
             allow(!situation.is_enabled, AbortCode::DEVICE_STATE)
         }
         0x1011 => allow(word == LOAD, AbortCode::NOT_STORED),
-        0x1014 => cob_id(objects.get(names::EMERGENCY_COB_ID), word),
+        0x1014 => cob_id(CobId(objects.get(names::EMERGENCY_COB_ID)), CobId(word)),
         0x1016 => watched(subindex, word, objects),
         0x1019 => {
             allow(word != 1, AbortCode::INVALID_VALUE)?;
@@ -88,13 +84,10 @@ fn watched(subindex: u8, word: u32, objects: &Objects) -> Result<(), AbortCode> 
 }
 
 /// A new COB-ID in place of an old one: an identifier may change only while its object does not exist.
-fn cob_id(before: u32, after: u32) -> Result<(), AbortCode> {
-    let exists = |cob_id: u32| cob_id & COB_ID_NOT_VALID == 0;
-    let identifier = after & IDENTIFIER;
-    let is_changed = identifier != before & IDENTIFIER;
-    let is_bad = after & EXTENDED != 0 || identifier > 0x7FF;
-    let keeps_exist = exists(before) && exists(after);
-    if is_bad || exists(after) && is_restricted(identifier) || keeps_exist && is_changed {
+fn cob_id(before: CobId, after: CobId) -> Result<(), AbortCode> {
+    let takes_restricted = after.is_valid() && is_restricted(after.number());
+    let is_changed = before.is_valid() && after.is_valid() && after.number() != before.number();
+    if !after.is_standard() || takes_restricted || is_changed {
         return Err(AbortCode::INVALID_VALUE);
     }
     Ok(())
@@ -109,41 +102,31 @@ const fn is_restricted(identifier: u32) -> bool {
 }
 
 /// The COB-ID of the PDO that a communication or mapping parameter belongs to.
-fn pdo_cob_id(index: u16, objects: &Objects) -> u32 {
+fn pdo_cob_id(index: u16, objects: &Objects) -> CobId {
     // 1600h + n belongs to 1400h + n, 1A00h + n to 1800h + n.
     let communication = index & !0x0200 & 0xFC00 | index & 0x00FF;
-    let place = find(ObjectAddress::new(communication, 1)).expect("every PDO has a COB-ID");
-    objects.word(place)
+    objects.cob_id(communication, 1)
 }
 
 fn communication(object: ObjectAddress, word: u32, objects: &Objects) -> Result<(), AbortCode> {
     let before = pdo_cob_id(object.index, objects);
-    let exists = before & COB_ID_NOT_VALID == 0;
     match object.subindex {
         1 => {
-            cob_id(before, word)?;
-            let mapped = find(ObjectAddress::new(object.index + 0x0200, 0)).map(|place| objects.word(place));
-            let carries_nothing = mapped == Ok(0);
-            if word & COB_ID_NOT_VALID == 0 && carries_nothing {
-                Err(AbortCode::INVALID_VALUE)
-            } else {
-                Ok(())
-            }
+            cob_id(before, CobId(word))?;
+            let carries_nothing = objects.at(object.index + 0x0200, 0) == 0;
+            if CobId(word).is_valid() && carries_nothing { Err(AbortCode::INVALID_VALUE) } else { Ok(()) }
         }
         // 241 to 251 are reserved, 252 and 253 answer remote requests.
         2 if matches!(word, 241..=253) => Err(AbortCode::INVALID_VALUE),
-        3 | 6 if exists => Err(AbortCode::INVALID_VALUE),
+        3 | 6 if before.is_valid() => Err(AbortCode::INVALID_VALUE),
         _ => Ok(()),
     }
 }
 
 /// The mapping changes only while the PDO does not exist, its entries only while it holds none.
 fn mapping(object: ObjectAddress, word: u32, objects: &Objects) -> Result<(), AbortCode> {
-    let parameter = |subindex: u8| {
-        let place = find(ObjectAddress::new(object.index, subindex)).expect("a mapping has nine entries");
-        objects.word(place)
-    };
-    let exists = pdo_cob_id(object.index, objects) & COB_ID_NOT_VALID == 0;
+    let parameter = |subindex: u8| objects.at(object.index, subindex);
+    let exists = pdo_cob_id(object.index, objects).is_valid();
     if exists || object.subindex > 0 && parameter(0) > 0 {
         return Err(AbortCode::PARAMETER_INCOMPATIBLE);
     }

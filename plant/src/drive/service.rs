@@ -2,7 +2,7 @@
 
 use masseter_shared::can::canopen::{AbortCode, Expedited, ObjectAddress};
 
-use super::dictionary::{Access, ENTRIES, Initial, find, writable};
+use super::dictionary::{Access, ENTRIES, Initial, find, names, writable};
 use super::errors;
 use super::heartbeats::Consumer;
 use super::node::DriveNode;
@@ -66,7 +66,7 @@ impl Dictionary for Service<'_> {
             return Ok(Value::Text(text));
         }
         let node = &mut *self.node;
-        if object.index == 0x1003 && u32::from(object.subindex) > node.objects.word(find(ERROR_FIELD)?) {
+        if object.index == 0x1003 && object.subindex > node.objects.get(names::ERROR_COUNT) {
             return Err(AbortCode::NO_DATA);
         }
         node.axis.show(self.now_ns, &mut node.objects);
@@ -101,5 +101,3 @@ impl Dictionary for Service<'_> {
         Ok(())
     }
 }
-
-const ERROR_FIELD: ObjectAddress = ObjectAddress::new(0x1003, 0);

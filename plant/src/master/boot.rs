@@ -4,7 +4,7 @@
 //! alone; when nodes are started, and what a failure means for the rig, is the master's.
 
 use masseter_shared::can::canopen::{
-    AbortCode, COB_ID_NOT_VALID, NmtCommand, NmtState, NodeId, ObjectAddress, SdoResponse,
+    AbortCode, CobId, NmtCommand, NmtState, NodeId, ObjectAddress, SdoResponse,
 };
 use masseter_shared::can::cia402::{DriveState, Statusword};
 use masseter_shared::clock::MILLISECOND_NS;
@@ -290,9 +290,9 @@ impl Boot {
         match condition {
             Condition::InFault => in_fault(number),
             Condition::Exchanged(_) => {
-                let not_valid = number | COB_ID_NOT_VALID;
-                self.kept = Data::new(&not_valid.to_le_bytes()).expect("four bytes");
-                number != not_valid
+                let cob_id = CobId(number);
+                self.kept = Data::new(&cob_id.invalidated().0.to_le_bytes()).expect("four bytes");
+                cob_id.is_valid()
             }
         }
     }

@@ -3,7 +3,7 @@
 //! The order is the point: who it is, then whether its PDOs are those that will be exchanged, and only
 //! then anything is written. How tasks are carried out is not here but in [`boot`](super::boot).
 
-use masseter_shared::can::canopen::{Cob, NodeId, ObjectAddress};
+use masseter_shared::can::canopen::{Cob, CobId, NodeId, ObjectAddress};
 use masseter_shared::can::cia402::Controlword;
 use masseter_shared::can::{CanId, EVERY_SYNC, Rpdo1, Tpdo1};
 use masseter_shared::config::IdentityConfig;
@@ -17,8 +17,8 @@ const CYCLIC_POSITION: u32 = 8;
 const LINK_LOSS_QUICK_STOP: u32 = 3;
 /// Object 605A: along the quick-stop ramp, then switch on disabled.
 const RAMP_THEN_OFF: u32 = 2;
-/// Bit 30 of a TPDO's COB-ID, "no remote request", says nothing about the PDO's use here.
-const COB_ID_BITS: u32 = !(1 << 30);
+/// Whether a TPDO answers remote requests says nothing about its use here.
+const COB_ID_BITS: u32 = !CobId::NO_REMOTE_REQUEST;
 
 /// Communication parameters of the PDOs that CiA 301 gives identifiers to beside the first: many drives send them as
 /// delivered, and no plan of the bus counts with them.

@@ -2,7 +2,7 @@
 
 use std::marker::PhantomData;
 
-use masseter_shared::can::canopen::{AbortCode, NodeId, ObjectAddress};
+use masseter_shared::can::canopen::{AbortCode, CobId, NodeId, ObjectAddress};
 
 use super::entry::{Access, Addressed, DataType, Initial};
 use super::table::OBJECTS;
@@ -151,6 +151,20 @@ impl Objects {
     /// Changes the word at a place of [`ENTRIES`].
     pub(crate) fn set_word(&mut self, place: usize, word: u32) {
         self.words[place] = word;
+    }
+
+    /// The word of an entry that the table is known to have.
+    ///
+    /// # Panics
+    /// Where it has no such entry.
+    pub(crate) fn at(&self, index: u16, subindex: u8) -> u32 {
+        let address = ObjectAddress::new(index, subindex);
+        self.word(find(address).unwrap_or_else(|_| panic!("the table has no entry {address}")))
+    }
+
+    /// The COB-ID of such an entry.
+    pub(crate) fn cob_id(&self, index: u16, subindex: u8) -> CobId {
+        CobId(self.at(index, subindex))
     }
 
     /// Takes all values in that range of indices from another dictionary.

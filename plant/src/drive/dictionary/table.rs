@@ -3,7 +3,7 @@
 //! Positions are encoder increments, velocities increments/s, accelerations increments/s², torques per
 //! mille of the rated torque (of the rated force, for a linear axis).
 
-use masseter_shared::can::canopen::COB_ID_NOT_VALID;
+use masseter_shared::can::canopen::CobId;
 use masseter_shared::can::{EVERY_SYNC, Rpdo1, Tpdo1};
 use masseter_shared::config::IdentityConfig;
 
@@ -27,9 +27,6 @@ pub(crate) const IDENTITY: IdentityConfig = IdentityConfig::EMULATED;
 /// Object 6502: profile position, homing, cyclic synchronous position and torque.
 const SUPPORTED_MODES: i64 = 1 << 0 | 1 << 5 | 1 << 7 | 1 << 9;
 
-/// Bit 30 of a TPDO's COB-ID: no remote request.
-const NO_RTR: u32 = 1 << 30;
-
 const fn object(index: u16, name: &'static str, shape: Shape, entries: &'static [Entry]) -> Object {
     Object { index, name, shape, entries }
 }
@@ -44,14 +41,19 @@ const fn positive(subindex: u8, name: &'static str) -> Entry {
     Entry::new(subindex, name, U32, ReadWrite, Configured).within(1, u32::MAX as i64)
 }
 
+/// The COB-ID of a PDO: of each direction only the first one exists at first.
+const fn first_exists(number: usize, word: u32) -> CobId {
+    if number == 0 { CobId(word) } else { CobId(word).invalidated() }
+}
+
 /// The receive PDO of that number, beginning with 0.
 struct Rpdo<const N: usize>;
 
 impl<const N: usize> Rpdo<N> {
-    const COB_ID: u32 = (0x200 + 0x100 * N as u32) | if N == 0 { 0 } else { COB_ID_NOT_VALID };
+    const COB_ID: CobId = first_exists(N, 0x200 + 0x100 * N as u32);
     const COMMUNICATION: &'static [Entry] = &[
         Entry::highest(5),
-        Entry::new(1, "COB-ID used by RPDO", U32, ReadWrite, OfNode(Self::COB_ID)),
+        Entry::new(1, "COB-ID used by RPDO", U32, ReadWrite, OfNode(Self::COB_ID.0)),
         Entry::new(2, "Transmission type", U8, ReadWrite, Value(EVERY_SYNC as i64)),
         Entry::new(5, "Event timer", U16, ReadWrite, Value(0)),
     ];
@@ -62,10 +64,10 @@ impl<const N: usize> Rpdo<N> {
 struct TpdoOf<const N: usize>;
 
 impl<const N: usize> TpdoOf<N> {
-    const COB_ID: u32 = NO_RTR | (0x180 + 0x100 * N as u32) | if N == 0 { 0 } else { COB_ID_NOT_VALID };
+    const COB_ID: CobId = first_exists(N, CobId::NO_REMOTE_REQUEST | (0x180 + 0x100 * N as u32));
     const COMMUNICATION: &'static [Entry] = &[
         Entry::highest(6),
-        Entry::new(1, "COB-ID used by TPDO", U32, ReadWrite, OfNode(Self::COB_ID)),
+        Entry::new(1, "COB-ID used by TPDO", U32, ReadWrite, OfNode(Self::COB_ID.0)),
         Entry::new(2, "Transmission type", U8, ReadWrite, Value(EVERY_SYNC as i64)),
         Entry::new(3, "Inhibit time", U16, ReadWrite, Value(0)),
         Entry::new(5, "Event timer", U16, ReadWrite, Value(0)),

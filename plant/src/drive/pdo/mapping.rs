@@ -3,7 +3,6 @@
 use masseter_shared::can::Frame;
 use masseter_shared::can::canopen::ObjectAddress;
 
-use super::parameter;
 use crate::drive::dictionary::{ENTRIES, MAPPED_MAX, Objects, find, within_limits};
 
 /// Bytes that a PDO of the drive carries at most, whatever the format of its frames.
@@ -32,9 +31,9 @@ pub(super) struct Mapped {
 
 impl Mapped {
     pub(super) fn of(objects: &Objects, index: u16) -> Self {
-        let mut mapped = Self { count: parameter(objects, index, 0) as usize, ..Self::default() };
+        let mut mapped = Self { count: objects.at(index, 0) as usize, ..Self::default() };
         for place in 0..mapped.count {
-            let entry = MappingEntry(parameter(objects, index, place as u8 + 1));
+            let entry = MappingEntry(objects.at(index, place as u8 + 1));
             let object = find(entry.object()).expect("only what exists can be mapped");
             let bytes = ENTRIES[object].entry.kind.bytes();
             mapped.parts[place] = Part { place: object as u16, bytes: bytes as u8 };

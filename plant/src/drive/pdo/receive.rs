@@ -6,8 +6,8 @@ use masseter_shared::can::CanId;
 use masseter_shared::can::canopen::ObjectAddress;
 use masseter_shared::clock::MILLISECOND_NS;
 
+use super::EVENT_DRIVEN;
 use super::mapping::{MAX_BYTES, Mapped};
-use super::{EVENT_DRIVEN, identifier, parameter};
 use crate::drive::cyclic::NewTargets;
 use crate::drive::dictionary::Objects;
 
@@ -58,9 +58,9 @@ impl Rpdo {
         let mapped = Mapped::of(objects, mapping);
         let holds = |index| mapped.holds(ObjectAddress::new(index, 0));
         Self {
-            id: identifier(parameter(objects, communication, 1)),
-            is_synchronous: parameter(objects, communication, 2) < u32::from(EVENT_DRIVEN),
-            deadline_ns: u64::from(parameter(objects, communication, 5)) * MILLISECOND_NS,
+            id: objects.cob_id(communication, 1).identifier(),
+            is_synchronous: objects.at(communication, 2) < u32::from(EVENT_DRIVEN),
+            deadline_ns: u64::from(objects.at(communication, 5)) * MILLISECOND_NS,
             mapped,
             heard_ns: None,
             buffered: None,

@@ -4,8 +4,8 @@ use masseter_shared::can::canopen::ObjectAddress;
 use masseter_shared::can::{CanId, Frame};
 use masseter_shared::clock::MILLISECOND_NS;
 
+use super::EVENT_DRIVEN;
 use super::mapping::{MAX_BYTES, Mapped};
-use super::{EVENT_DRIVEN, identifier, parameter};
 use crate::drive::dictionary::Objects;
 
 /// Unit of an inhibit time, ns.
@@ -45,19 +45,19 @@ impl Tpdo {
     /// As configured, nothing sent.
     pub(in crate::drive) fn new(objects: &Objects, number: u16) -> Self {
         let (communication, mapping) = (0x1800 + number, 0x1A00 + number);
-        let start = parameter(objects, communication, 6) as u8;
+        let start = objects.at(communication, 6) as u8;
         let mapped = Mapped::of(objects, mapping);
         let is_event = |object: ObjectAddress| !SAMPLED.contains(&object.index);
-        let trigger = match parameter(objects, communication, 2) as u8 {
+        let trigger = match objects.at(communication, 2) as u8 {
             0 => Trigger::ChangeThenSync,
             every if every < EVENT_DRIVEN => Trigger::EverySync { every, start },
             _ => Trigger::Event,
         };
         Self {
-            id: identifier(parameter(objects, communication, 1)),
+            id: objects.cob_id(communication, 1).identifier(),
             trigger,
-            inhibit_ns: u64::from(parameter(objects, communication, 3)) * INHIBIT_UNIT_NS,
-            timer_ns: u64::from(parameter(objects, communication, 5)) * MILLISECOND_NS,
+            inhibit_ns: u64::from(objects.at(communication, 3)) * INHIBIT_UNIT_NS,
+            timer_ns: u64::from(objects.at(communication, 5)) * MILLISECOND_NS,
             watched: if trigger == Trigger::Event { mapped.only(is_event) } else { mapped },
             mapped,
             syncs: None,

@@ -5,8 +5,46 @@
 use super::node::NodeId;
 use crate::can::id::CanId;
 
-/// Bit 31 of a COB-ID in an object dictionary: what it identifies does not exist.
-pub const COB_ID_NOT_VALID: u32 = 1 << 31;
+/// A COB-ID as an object dictionary holds it (CiA 301, 7.5.2): an identifier, and whether the object that it identifies
+/// exists.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct CobId(pub u32);
+
+impl CobId {
+    /// Bit 30 of a TPDO's: it answers no remote request.
+    pub const NO_REMOTE_REQUEST: u32 = 1 << 30;
+
+    const NOT_VALID: u32 = 1 << 31;
+    const IS_EXTENDED: u32 = 1 << 29;
+    const NUMBER: u32 = 0x1FFF_FFFF;
+
+    /// Whether its object exists.
+    pub const fn is_valid(self) -> bool {
+        self.0 & Self::NOT_VALID == 0
+    }
+
+    /// The same of an object that does not exist.
+    #[must_use]
+    pub const fn invalidated(self) -> Self {
+        Self(self.0 | Self::NOT_VALID)
+    }
+
+    /// The number of the identifier.
+    pub const fn number(self) -> u32 {
+        self.0 & Self::NUMBER
+    }
+
+    /// Whether its identifier has 11 bits; the rig uses no other.
+    pub const fn is_standard(self) -> bool {
+        self.0 & Self::IS_EXTENDED == 0 && self.number() <= 0x7FF
+    }
+
+    /// The identifier, if it has 11 bits and its object exists.
+    pub fn identifier(self) -> Option<CanId> {
+        let id = CanId::standard(self.number() as u16).ok();
+        id.filter(|_| self.is_valid() && self.is_standard())
+    }
+}
 
 /// A communication object, with the node it belongs to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -95,6 +133,16 @@ impl TryFrom<CanId> for Cob {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_cob_id_names_an_identifier_of_11_bits_as_long_as_its_object_exists() {
+        let of = |word: u32| CobId(word).identifier().map(CanId::number);
+        assert_eq!(of(0x0000_0185), Some(0x185));
+        assert_eq!(of(CobId::NO_REMOTE_REQUEST | 0x185), Some(0x185));
+        assert_eq!(of(CobId(0x185).invalidated().0), None);
+        assert_eq!([0x2000_0185, 0x0000_0800, 0x0001_0185].map(of), [None; 3], "29 bits");
+        assert_eq!(CobId(0xC000_0185).number(), 0x185);
+    }
 
     #[test]
     fn identifiers_are_those_of_the_predefined_connection_set() {

@@ -13,7 +13,7 @@ mod payload;
 mod sdo;
 pub mod sync;
 
-pub use cob::{COB_ID_NOT_VALID, Cob, CobError};
+pub use cob::{Cob, CobError, CobId};
 pub use emcy::{Emergency, EmergencyCode};
 pub use heartbeat::{Heartbeat, HeartbeatError, NmtState};
 pub use nmt::{Nmt, NmtCommand, NmtError, NmtTarget};
