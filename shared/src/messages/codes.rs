@@ -55,7 +55,17 @@ macro_rules! codes {
                 f.pad(self.name())
             }
         }
-    )*};
+    )*
+    /// Made with the enumerations, so that none is left out.
+    #[cfg(test)]
+    #[test]
+    fn every_code_means_itself_and_others_are_refused() {
+        $(for code in 0..256 {
+            let meant = $name::ALL.iter().copied().find(|value| value.code() == code);
+            let refused = UnknownCode { enumeration: stringify!($name), code };
+            assert_eq!($name::try_from(code), meant.ok_or(refused));
+        })*
+    }};
 }
 
 codes! {
@@ -271,13 +281,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_code_means_itself_and_others_are_refused() {
-        for &cause in Cause::ALL {
-            assert_eq!(Cause::try_from(cause.code()), Ok(cause));
-        }
-        assert_eq!(
-            ControllerState::try_from(99),
-            Err(UnknownCode { enumeration: "ControllerState", code: 99 })
-        );
+    fn a_drive_has_voltage_from_switched_on_to_the_end_of_a_fault_reaction() {
+        use DriveCondition::{FaultReaction, OperationEnabled, QuickStopActive, SwitchedOn, Unknown};
+        let told = |powered| DriveCondition::ALL.iter().copied().filter(move |it| it.is_powered() == powered);
+        assert!(told(Some(true)).eq([SwitchedOn, OperationEnabled, QuickStopActive, FaultReaction]));
+        assert!(told(None).eq([Unknown]));
     }
 }
