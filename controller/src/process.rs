@@ -108,7 +108,6 @@ fn step(
     waiter: &mut Waiter,
 ) -> Result<(), ProcessError> {
     let deadline_ns = wake.due_ns + patience_ns;
-    let account = waiter.account();
     let reading = ports.readings.latest_by(deadline_ns, waiter, |reading| reading.cycle >= wake.cycle)?;
     let received_ns = clock::now_ns();
     controller.observe(reading.as_deref());
@@ -119,9 +118,9 @@ fn step(
     ports.states.publish(|state| {
         controller.fill_state(state);
         (state.due_ns, state.woke_ns) = (wake.due_ns, wake.woke_ns);
-        (state.skipped_cycles, state.stalled_ns) = (wake.skipped, wake.stalled_ns);
-        state.spun_ns = account.spun_ns;
-        (state.worked_ns, state.overlong_ns) = (account.worked_ns, account.overlong_ns);
+        (state.skipped_cycles, state.stalled_ns) = (wake.skipped, wake.account.stalled_ns);
+        (state.spun_ns, state.worked_ns) = (wake.account.spun_ns, wake.account.worked_ns);
+        state.overlong_ns = wake.account.overlong_ns;
         (state.received_ns, state.solved_ns, state.commanded_ns) = (received_ns, solved_ns, commanded_ns);
     })?;
     if let Some(event) = event {

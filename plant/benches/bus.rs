@@ -99,7 +99,7 @@ fn plant(bencher: Bencher<'_, '_>) {
     let mut reading = Reading::default();
     let mut run = |cycle: u64| {
         let sync_ns = cycle * PERIOD_NS;
-        let wake = Wake { cycle, due_ns: sync_ns, woke_ns: sync_ns, skipped: 0, stalled_ns: 0 };
+        let wake = Wake::on_time(cycle, sync_ns);
         plant.begin_cycle(wake).expect("dynamics");
         plant.collect(sync_ns + 525_000).expect("dynamics");
         plant.fill_reading(&mut reading);

@@ -4,7 +4,7 @@ use masseter_shared::clock;
 use masseter_shared::config::Scenario;
 use masseter_shared::lifecycle::{Assignment, Post, ProcessError};
 use masseter_shared::messages::{Command, Event, FrameTap, Reading, Truth};
-use masseter_shared::realtime::{Account, Cycle, Waiter, Wake};
+use masseter_shared::realtime::{Cycle, Waiter, Wake};
 use masseter_shared::schedule::CycleSchedule;
 use masseter_shared::transport::{BatchOutlet, Inlet, Node, Outlet, Received};
 
@@ -90,12 +90,8 @@ impl Ports {
     }
 
     /// Publishes what a cycle gave: reading and truth first, since the controller waits.
-    fn publish(&mut self, plant: &mut PlantCore<impl Link>, account: Account) -> Result<(), ProcessError> {
-        self.readings.publish(|reading| {
-            plant.fill_reading(reading);
-            reading.spun_ns = account.spun_ns;
-            (reading.worked_ns, reading.overlong_ns) = (account.worked_ns, account.overlong_ns);
-        })?;
+    fn publish(&mut self, plant: &mut PlantCore<impl Link>) -> Result<(), ProcessError> {
+        self.readings.publish(|reading| plant.fill_reading(reading))?;
         if let Some(truth) = plant.truth() {
             self.truths.publish(|message| *message = truth)?;
         }
@@ -184,7 +180,6 @@ fn exchange(
     wake: Wake,
     waiter: &mut Waiter,
 ) -> Result<(), PlantProcessError> {
-    let account = waiter.account();
     plant.begin_cycle(wake)?;
     // SYNC went out when the process woke; a late one shifts what follows, so that the reading is late
     // but complete.
@@ -196,5 +191,5 @@ fn exchange(
     while !plant.collect(now_ns)? && now_ns < reading_by_ns {
         now_ns = waiter.spin().now_ns();
     }
-    Ok(ports.publish(plant, account)?)
+    Ok(ports.publish(plant)?)
 }

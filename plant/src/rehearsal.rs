@@ -47,13 +47,7 @@ impl Rehearsal {
     pub(crate) fn play(&mut self) -> Result<Reading, PlantError> {
         let sync_ns = self.cycle * self.period_ns;
         self.cycle += 1;
-        self.plant.begin_cycle(Wake {
-            cycle: self.cycle,
-            due_ns: sync_ns,
-            woke_ns: sync_ns,
-            skipped: 0,
-            stalled_ns: 0,
-        })?;
+        self.plant.begin_cycle(Wake::on_time(self.cycle, sync_ns))?;
         self.plant.collect(sync_ns + self.schedule.reading_by_ns)?;
         let mut reading = Reading::default();
         self.plant.fill_reading(&mut reading);

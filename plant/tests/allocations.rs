@@ -44,7 +44,7 @@ fn allocations_of(work: impl FnOnce()) -> u64 {
 /// One cycle in which the drives are asked to hold where they stand.
 fn cycle(plant: &mut PlantCore, cycle: u64, reading: &mut Reading) {
     let sync_ns = cycle * 1_000_000;
-    let wake = Wake { cycle, due_ns: sync_ns, woke_ns: sync_ns, skipped: 0, stalled_ns: 0 };
+    let wake = Wake::on_time(cycle, sync_ns);
     plant.begin_cycle(wake).unwrap();
     plant.collect(sync_ns + 525_000).unwrap();
     plant.fill_reading(reading);

@@ -87,9 +87,10 @@ struct LastWake {
 }
 
 impl Outliers {
-    /// A wake-up by which stalls of `stalled_ns` were noticed in all. One is before it if it was noticed since the
-    /// last wake-up, or made the last one so late that this one's deadline had passed by then.
-    fn take(&mut self, wake: Wake, stalled_ns: u64) {
+    /// A stall is before a wake-up if it was noticed since the last one, or made that so late that this one's deadline
+    /// had passed by then. The work here takes a microsecond: what takes long in it is a stall as well.
+    fn take(&mut self, wake: Wake) {
+        let stalled_ns = wake.account.stalled_ns + wake.account.overlong_ns;
         let follows = wake.due_ns < self.last.woke_ns && self.last.was_seen;
         let was_seen = stalled_ns > self.last.stalled_ns || follows;
         if wake.woke_ns - wake.due_ns > OUTLIER_NS {
@@ -128,9 +129,7 @@ fn own_loop(outliers: &mut Outliers) -> Round {
         let wake = cycle.wait();
         record(&mut late, wake.woke_ns - wake.due_ns, 1);
         skipped = wake.skipped;
-        // The work here takes a microsecond: what takes long in it is a stall as well.
-        let account = cycle.waiter().account();
-        outliers.take(wake, account.stalled_ns + account.overlong_ns);
+        outliers.take(wake);
     }
     round(late, skipped)
 }
@@ -200,6 +199,8 @@ fn histogram_of(output: &str) -> anyhow::Result<Durations> {
 
 #[cfg(test)]
 mod tests {
+    use masseter_shared::realtime::Account;
+
     use super::*;
 
     #[test]
@@ -207,7 +208,8 @@ mod tests {
         let mut outliers = Outliers::default();
         let mut take = |due_us: u64, late_us: u64, stalled_us: u64| {
             let (due_ns, woke_ns) = (due_us * 1000, (due_us + late_us) * 1000);
-            outliers.take(Wake { cycle: 0, due_ns, woke_ns, skipped: 0, stalled_ns: 0 }, stalled_us * 1000);
+            let account = Account { stalled_ns: stalled_us * 1000, ..Account::default() };
+            outliers.take(Wake { woke_ns, account, ..Wake::on_time(0, due_ns) });
             (outliers.late, outliers.seen)
         };
         assert_eq!(take(1000, 0, 0), (0, 0));

@@ -55,7 +55,7 @@ fn step(
     controller: &mut Controller,
     log: &mut Log,
 ) -> Result<(), PlantError> {
-    plant.begin_cycle(Wake { cycle, due_ns: sync_ns, woke_ns: sync_ns, skipped: 0, stalled_ns: 0 })?;
+    plant.begin_cycle(Wake::on_time(cycle, sync_ns))?;
     let reading_ns = sync_ns + plan.schedule.reading_by_ns;
     plant.collect(reading_ns)?;
     let reading = log.readings.record(&mut log.backlog, reading_ns, |reading| plant.fill_reading(reading));

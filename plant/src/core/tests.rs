@@ -42,7 +42,7 @@ impl Bench {
     fn cycle(&mut self, answer: Option<&Answer<'_>>) {
         self.cycle += 1;
         let sync_ns = EPOCH_NS + (self.cycle - 1) * PERIOD_NS;
-        let wake = Wake { cycle: self.cycle, due_ns: sync_ns, woke_ns: sync_ns, skipped: 0, stalled_ns: 0 };
+        let wake = Wake::on_time(self.cycle, sync_ns);
         self.plant.begin_cycle(wake).unwrap();
         self.plant.collect(sync_ns + 525_000).unwrap();
         self.plant.fill_reading(&mut self.reading);
@@ -262,9 +262,8 @@ fn process_data_of_the_sync_before_are_no_answer_to_this_one() {
     bench.enable();
     // A cycle whose process data are not waited for; they lie in the queue when the next one begins.
     let sync_ns = EPOCH_NS + bench.cycle * PERIOD_NS;
-    let wake = |cycle, woke_ns| Wake { cycle, due_ns: woke_ns, woke_ns, skipped: 0, stalled_ns: 0 };
-    bench.plant.begin_cycle(wake(bench.cycle + 1, sync_ns)).unwrap();
-    bench.plant.begin_cycle(wake(bench.cycle + 2, sync_ns + PERIOD_NS)).unwrap();
+    bench.plant.begin_cycle(Wake::on_time(bench.cycle + 1, sync_ns)).unwrap();
+    bench.plant.begin_cycle(Wake::on_time(bench.cycle + 2, sync_ns + PERIOD_NS)).unwrap();
     assert!(!bench.plant.collect(sync_ns + PERIOD_NS + 300_000).unwrap());
     assert!(bench.plant.collect(sync_ns + PERIOD_NS + 525_000).unwrap());
 }

@@ -103,7 +103,7 @@ impl Master {
             }),
             buses: vec![BusWatch::default(); settings.buses],
             settings,
-            wake: Wake { cycle: 0, due_ns: 0, woke_ns: 0, skipped: 0, stalled_ns: 0 },
+            wake: Wake::on_time(0, 0),
             sync_ns: 0,
             complete_ns: 0,
             next_heartbeat_ns: now_ns,
@@ -180,7 +180,10 @@ impl Master {
             due_ns: self.wake.due_ns,
             woke_ns: self.wake.woke_ns,
             skipped_cycles: self.wake.skipped,
-            stalled_ns: self.wake.stalled_ns,
+            stalled_ns: self.wake.account.stalled_ns,
+            spun_ns: self.wake.account.spun_ns,
+            worked_ns: self.wake.account.worked_ns,
+            overlong_ns: self.wake.account.overlong_ns,
             master_fault: u32::from(self.fault.is_some()),
             ..Reading::default()
         };

@@ -1,6 +1,6 @@
 //! Deadlines on a fixed grid: the n-th at `epoch + phase + n · period`.
 
-use super::Waiter;
+use super::{Account, Waiter};
 use crate::clock;
 
 /// Waits for the deadlines of a periodic task.
@@ -28,8 +28,15 @@ pub struct Wake {
     pub woke_ns: u64,
     /// Deadlines skipped since the start.
     pub skipped: u64,
-    /// Time that the machine has withheld from this task since the start, see [`Account`](super::Account).
-    pub stalled_ns: u64,
+    /// What the task's time went to since the start.
+    pub account: Account,
+}
+
+impl Wake {
+    /// A deadline of virtual time, in which nobody is late.
+    pub fn on_time(cycle: u64, due_ns: u64) -> Self {
+        Self { cycle, due_ns, woke_ns: due_ns, skipped: 0, account: Account::default() }
+    }
 }
 
 impl Cycle {
@@ -74,7 +81,7 @@ impl Cycle {
     }
 
     fn wake(&self, cycle: u64, due_ns: u64, woke_ns: u64) -> Wake {
-        Wake { cycle, due_ns, woke_ns, skipped: self.skipped, stalled_ns: self.waiter.account().stalled_ns }
+        Wake { cycle, due_ns, woke_ns, skipped: self.skipped, account: self.waiter.account() }
     }
 
     /// For the waits within a cycle.

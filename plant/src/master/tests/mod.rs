@@ -56,7 +56,7 @@ impl Bench {
     fn cycle(&mut self, request: Option<DriveRequest>) {
         self.cycle += 1;
         let sync_ns = self.now_ns();
-        let wake = Wake { cycle: self.cycle, due_ns: sync_ns, woke_ns: sync_ns, skipped: 0, stalled_ns: 0 };
+        let wake = Wake::on_time(self.cycle, sync_ns);
         self.wires.begin(sync_ns);
         self.master.begin_cycle(wake, &mut self.wires);
         self.master.collect(sync_ns + 500_000, &mut self.wires);
