@@ -5,78 +5,56 @@
 use std::f64::consts::TAU;
 use std::hint::black_box;
 
-use masseter_controller::kinematics::{ForwardTracker, Options, solve_completely, solve_newton, solve_seed};
+use masseter_controller::kinematics::{
+    ForwardError, ForwardTracker, Options, Solution, solve_completely, solve_newton, solve_seed,
+};
 use masseter_shared::clock;
 use masseter_shared::geometry::{Actuators, LEGS, Mechanism, MechanismConfig, Pose};
 use nalgebra::{Translation3, UnitQuaternion};
 
-use super::contest::{Durations, Outcome, Turn, durations, record};
+use super::contender::{Durations, durations, record};
+use super::contest::{Outcome, Turn};
 use super::on_core;
 
 /// A chewing cycle of 0.46 s, one input a millisecond.
 const CYCLES: usize = 460;
 /// Calls a round.
 const CALLS: usize = 20_000;
+/// Where an iteration starts that knows nothing yet.
+const GUESS_RAD: [f64; LEGS] = [1.4; LEGS];
+
+// The contenders.
+const WARM: &str = "warm, certified";
+const WARM_NEWTON: &str = "warm, Newton";
+const WARM_PAPER: &str = "warm, the paper's iteration";
+const COLD: &str = "cold, all solutions";
+const COLD_NEWTON: &str = "cold, Newton from one guess";
 
 pub(super) fn measure(rounds: u32, core: usize) -> anyhow::Result<Outcome> {
-    let mechanism = Mechanism::new(&MechanismConfig::default())?;
-    let inputs = chewing(&mechanism)?;
-    let (mechanism, inputs) = (&mechanism, inputs.as_slice());
+    let mechanism = &Mechanism::new(&MechanismConfig::default())?;
+    let inputs = &*chewing(mechanism)?;
     let options = &Options::default();
-    let turns: Vec<(String, Turn)> = vec![
-        (
-            "warm, certified".to_owned(),
-            Box::new(move || {
-                let mut tracker = ForwardTracker::new(mechanism.clone());
-                Ok(on_core(core, || each(inputs, |input| tracker.update(input))).into())
-            }),
-        ),
-        (
-            "warm, Newton".to_owned(),
-            Box::new(move || {
-                let mut theta_rad = [1.4; LEGS];
-                Ok(on_core(core, || {
-                    each(inputs, |input| {
-                        if let Ok(solution) = solve_newton(mechanism, input, &theta_rad, options) {
-                            theta_rad = solution.theta_rad;
-                        }
-                    })
-                })
-                .into())
-            }),
-        ),
-        (
-            "warm, the paper's iteration".to_owned(),
-            Box::new(move || {
-                let mut theta_rad = [1.4; LEGS];
-                Ok(on_core(core, || {
-                    each(inputs, |input| {
-                        if let Ok(solution) = solve_seed(mechanism, input, &theta_rad, options) {
-                            theta_rad = solution.theta_rad;
-                        }
-                    })
-                })
-                .into())
-            }),
-        ),
-        (
-            "cold, all solutions".to_owned(),
-            Box::new(move || {
-                Ok(on_core(core, || each(inputs, |input| solve_completely(mechanism, input))).into())
-            }),
-        ),
-        (
-            "cold, Newton from one guess".to_owned(),
-            Box::new(move || {
-                Ok(on_core(core, || {
-                    each(inputs, |input| solve_newton(mechanism, input, &[1.4; LEGS], options))
-                })
-                .into())
-            }),
-        ),
+    let newton =
+        |input: &Actuators, guess_rad: &[f64; LEGS]| solve_newton(mechanism, input, guess_rad, options);
+    let seed = |input: &Actuators, guess_rad: &[f64; LEGS]| solve_seed(mechanism, input, guess_rad, options);
+    let tracked = || {
+        let mut tracker = ForwardTracker::new(mechanism.clone());
+        each(inputs, |input| tracker.update(input))
+    };
+    let turns = vec![
+        turn(WARM, core, tracked),
+        turn(WARM_NEWTON, core, || each_from_the_last(inputs, newton)),
+        turn(WARM_PAPER, core, || each_from_the_last(inputs, seed)),
+        turn(COLD, core, || each(inputs, |input| solve_completely(mechanism, input))),
+        turn(COLD_NEWTON, core, || each(inputs, |input| newton(input, &GUESS_RAD))),
     ];
     let measures = "one forward solution, inputs of a chewing cycle at 1 kHz".to_owned();
-    Ok(Outcome::of_turns("fk", measures, rounds, core, turns)?.comparing(&[(0, 1), (0, 2), (3, 4)]))
+    let outcome = Outcome::of_turns("fk", measures, rounds, core, turns)?;
+    Ok(outcome.comparing([(WARM, WARM_NEWTON), (WARM, WARM_PAPER), (COLD, COLD_NEWTON)]))
+}
+
+fn turn<'a>(name: &str, core: usize, play: impl Fn() -> Durations + Sync + 'a) -> (String, Turn<'a>) {
+    (name.to_owned(), Box::new(move || Ok(on_core(core, &play).into())))
 }
 
 fn chewing(mechanism: &Mechanism) -> anyhow::Result<Vec<Actuators>> {
@@ -88,6 +66,19 @@ fn chewing(mechanism: &Mechanism) -> anyhow::Result<Vec<Actuators>> {
         )
     };
     (0..CYCLES).map(|cycle| Ok(mechanism.inverse(&pose(cycle))?.actuators)).collect()
+}
+
+/// Times an iteration that starts from what it found last.
+fn each_from_the_last(
+    inputs: &[Actuators],
+    solve: impl Fn(&Actuators, &[f64; LEGS]) -> Result<Solution, ForwardError>,
+) -> Durations {
+    let mut theta_rad = GUESS_RAD;
+    each(inputs, |input| {
+        if let Ok(solution) = solve(input, &theta_rad) {
+            theta_rad = solution.theta_rad;
+        }
+    })
 }
 
 /// Times each call; the first cycle warms up.

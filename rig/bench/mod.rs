@@ -4,6 +4,7 @@
 //! counts is the ratio within a round (`contest`). The rig is not judged here, but the machine is: `disturbance`.
 
 mod circumstances;
+mod contender;
 mod contest;
 mod disturbance;
 mod fk;
@@ -11,6 +12,7 @@ pub mod ipc;
 mod plot;
 mod rate;
 mod rate_plot;
+mod rate_summary;
 mod subscribers;
 mod table;
 mod wake;

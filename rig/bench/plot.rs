@@ -6,7 +6,8 @@ use std::error::Error;
 use plotters::coord::ranged1d::ValueFormatter;
 use plotters::prelude::*;
 
-use super::contest::{Contender, Durations, Outcome, durations};
+use super::contender::{Contender, Durations, durations};
+use super::contest::Outcome;
 
 const SIZE: (u32, u32) = (960, 420);
 /// Points of a curve for each nine.

@@ -12,10 +12,10 @@ use anyhow::{Context, bail};
 use masseter_shared::clock;
 use masseter_shared::config::Scenario;
 use rustix::process::{Pid, Signal, kill_process};
-use serde_json::Value;
 
-use super::contest::{Contender, Durations, Outcome, Round, take_turns};
-use crate::exit::Exit;
+use super::contender::{Contender, Durations, Round};
+use super::contest::{Outcome, take_turns};
+use super::rate_summary::Summary;
 use crate::hlog;
 use crate::run::folder::RunFolder;
 use crate::run::interrupts::Interrupts;
@@ -74,10 +74,17 @@ pub(super) fn measure(rounds: u32, cores: [usize; 2]) -> anyhow::Result<Outcome>
         outcome.notes.extend(stops(rate_hz, &turns));
         outcome.contenders.extend(contenders(rate_hz, turns));
     }
-    let pairs: Vec<_> = (INTERVALS.len()..outcome.contenders.len())
-        .map(|contender| (contender, contender % INTERVALS.len()))
-        .collect();
-    Ok(outcome.comparing(&pairs))
+    let [slowest_hz, faster_hz @ ..] = RATES_HZ;
+    let against_slowest = |rate_hz| {
+        INTERVALS
+            .map(|(interval, _)| (contender_name(rate_hz, interval), contender_name(slowest_hz, interval)))
+    };
+    Ok(outcome.comparing(faster_hz.into_iter().flat_map(against_slowest)))
+}
+
+/// What an interval at a rate is called in results.
+pub(super) fn contender_name(rate_hz: u32, interval: &str) -> String {
+    format!("{rate_hz} Hz, {interval}")
 }
 
 /// Why runs of a rate do not count.
@@ -119,7 +126,7 @@ fn contenders(rate_hz: u32, turns: Vec<Turn>) -> Vec<Contender> {
         rounds.into_iter().zip(&mut by_interval).for_each(|(round, rounds)| rounds.push(round));
     }
     let named = INTERVALS.iter().zip(by_interval);
-    named.map(|((name, _), rounds)| Contender::of(format!("{rate_hz} Hz, {name}"), rounds)).collect()
+    named.map(|((interval, _), rounds)| Contender::of(contender_name(rate_hz, interval), rounds)).collect()
 }
 
 fn scenario(rate_hz: u32, cores: [usize; 2]) -> Scenario {
@@ -172,44 +179,30 @@ fn wait_for(run: &mut Child, interrupts: &Interrupts) -> anyhow::Result<()> {
 }
 
 fn turn(folder: &RunFolder) -> anyhow::Result<Turn> {
-    let summary: Value = serde_json::from_reader(File::open(folder.summary())?)?;
-    if summary["figures"]["final_state"] != "finished" {
-        return Ok(Turn::Stopped { is_disturbed: summary["verdict"]["exit_code"] == Exit::Invalid as u8 });
+    let path = folder.summary();
+    let summary: Summary = serde_json::from_reader(File::open(&path)?)
+        .with_context(|| format!("cannot read {}", path.display()))?;
+    if !summary.is_finished() {
+        return Ok(Turn::Stopped { is_disturbed: summary.is_disturbed() });
     }
-    let manifest = Manifest::read(folder)?;
     let log = |(_, name): &(_, &str)| {
         let path = folder.histograms().join(format!("{name}.hlog"));
         hlog::read(&path).with_context(|| format!("cannot read {}", path.display()))
     };
     let durations = INTERVALS.iter().map(log).collect::<anyhow::Result<_>>()?;
-    let figures = &summary["figures"];
-    let count = |value: &Value| value.as_f64().unwrap_or(0.0);
-    let skips = |process: &str, kind: &str| count(&figures[process][kind]);
-    let skipped = skips("controller_skips", "skipped") + skips("plant_skips", "skipped");
-    let by_machine = skips("controller_skips", "by_machine") + skips("plant_skips", "by_machine");
-    let topics = figures["topics"].as_array().into_iter().flatten();
-    let (recorded, dropped) = topics.fold((0.0, 0.0), |(recorded, dropped), topic| {
-        (recorded + count(&topic["messages"]), dropped + count(&topic["missing"]))
-    });
-    // Both processes have a deadline a cycle.
-    let deadlines = 2.0 * count(&figures["cycles"]) + skipped;
-    let mut shares = vec![
-        ("missed".to_owned(), skipped / deadlines),
-        ("missed by the machine".to_owned(), by_machine / deadlines),
-        ("dropped".to_owned(), dropped / (recorded + dropped)),
-    ];
+    let usage = Manifest::read(folder)?.usage.processes;
     // One that was looked at only once has no usage.
-    for (process, usage) in manifest.usage.processes.iter().filter(|(_, usage)| usage.observed_s > 0.0) {
-        shares.push((format!("{process} CPU"), usage.cpu_s / usage.observed_s));
-    }
-    let shares = shares.into_iter().map(|(name, share)| (name, share * 100.0)).collect();
+    let observed = usage.into_iter().filter(|(_, usage)| usage.observed_s > 0.0);
+    let cpu = observed.map(|(process, usage)| (format!("{process} CPU"), usage.cpu_s / usage.observed_s));
+    let lost = summary.shares().into_iter().map(|(name, share)| (name.to_owned(), share));
+    let shares = lost.chain(cpu).map(|(name, share)| (name, share * 100.0)).collect();
     Ok(Turn::Played { durations, shares })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::bench::contest::{durations, record};
+    use crate::bench::contender::{durations, record};
 
     #[test]
     fn a_run_that_stopped_is_counted_and_told_but_not_measured() {

@@ -4,9 +4,10 @@ use std::error::Error;
 
 use plotters::prelude::*;
 
-use super::contest::{Contender, Outcome};
+use super::contender::Contender;
+use super::contest::Outcome;
 use super::plot::{Curve, bound, draw_curves};
-use super::rate::{RATES_HZ, ROUND_TRIP};
+use super::rate::{RATES_HZ, ROUND_TRIP, contender_name};
 
 const SIZE: (u32, u32) = (960, 760);
 
@@ -57,8 +58,8 @@ fn panels(outcome: &Outcome) -> [Panel; 4] {
 
 /// The round trip of every rate in kHz; it carries the shares.
 fn of_rates(outcome: &Outcome) -> Vec<(f64, &Contender)> {
-    let trips = outcome.contenders.iter().filter(|contender| contender.name.ends_with(ROUND_TRIP));
-    RATES_HZ.iter().map(|rate_hz| f64::from(*rate_hz) / 1e3).zip(trips).collect()
+    let trip = |rate_hz| outcome.contender(&contender_name(rate_hz, ROUND_TRIP));
+    RATES_HZ.into_iter().map(|rate_hz| (f64::from(rate_hz) / 1e3, trip(rate_hz))).collect()
 }
 
 fn draw(svg: &mut String, panels: &[Panel; 4]) -> Result<(), Box<dyn Error>> {
@@ -81,7 +82,7 @@ fn draw(svg: &mut String, panels: &[Panel; 4]) -> Result<(), Box<dyn Error>> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::contest::{Round, durations, record};
+    use super::super::contender::{Round, durations, record};
     use super::super::disturbance::Watch;
     use super::*;
 
@@ -92,7 +93,7 @@ mod tests {
             record(&mut taken, 20_000, 1);
             let round = Round { durations: taken, shares: vec![("plant CPU".to_owned(), 40.0)] };
             let counts = rate_hz <= 5000;
-            Contender::of(format!("{rate_hz} Hz, {ROUND_TRIP}"), vec![counts.then_some(round)])
+            Contender::of(contender_name(rate_hz, ROUND_TRIP), vec![counts.then_some(round)])
         };
         let outcome = Outcome {
             bench: "rate",

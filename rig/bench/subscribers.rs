@@ -9,7 +9,8 @@ use masseter_shared::clock;
 use masseter_shared::messages::Reading;
 use masseter_shared::transport::{Domain, Node};
 
-use super::contest::{Durations, Outcome, Turn, durations, record};
+use super::contender::{Durations, durations, record};
+use super::contest::{Outcome, Turn};
 use super::on_core;
 
 /// Numbers of observers.
@@ -25,13 +26,18 @@ pub(super) fn measure(rounds: u32, core: usize) -> anyhow::Result<Outcome> {
     let turns = OBSERVERS.map(|observers| {
         let domain = &domain;
         let turn: Turn = Box::new(move || Ok(on_core(core, || publish_to(domain, observers))?.into()));
-        (format!("{observers} observer{}", if observers == 1 { "" } else { "s" }), turn)
+        (name(observers), turn)
     });
     let measures = "loaning, filling and sending one reading".to_owned();
     let outcome = Outcome::of_turns("subscribers", measures, rounds, core, turns.into());
     drop(claim);
     domain.sweep()?;
-    Ok(outcome?.comparing(&[(1, 0), (2, 0), (3, 0), (4, 0)]))
+    let [fewest, more @ ..] = OBSERVERS;
+    Ok(outcome?.comparing(more.map(|observers| (name(observers), name(fewest)))))
+}
+
+fn name(observers: usize) -> String {
+    format!("{observers} observer{}", if observers == 1 { "" } else { "s" })
 }
 
 fn publish_to(domain: &Domain, observers: usize) -> anyhow::Result<Durations> {

@@ -2,7 +2,8 @@
 
 use std::fmt::Write;
 
-use super::contest::{Figure, Outcome, Share};
+use super::contender::{Figure, Share};
+use super::contest::Outcome;
 
 /// Contenders in µs, then their ratios: median (minimum to maximum) over the rounds.
 pub(super) fn of(outcome: &Outcome) -> String {

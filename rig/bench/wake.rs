@@ -12,7 +12,8 @@ use masseter_shared::clock::{self, SECOND_NS};
 use masseter_shared::config::{CpuDmaLatency, RealtimeConfig};
 use masseter_shared::realtime::{Cycle, Wake};
 
-use super::contest::{Durations, Outcome, Round, Turn, durations, record};
+use super::contender::{Durations, Round, durations, record};
+use super::contest::{Outcome, Turn};
 use super::on_core;
 use crate::run::dma_latency::Hold;
 
@@ -59,13 +60,12 @@ pub(super) fn measure(rounds: u32, core: usize) -> anyhow::Result<Outcome> {
             others.push(("cyclictest".to_owned(), cyclictest(&[])));
         }
     }
-    let pairs: Vec<_> = (0..own_turns.len())
-        .flat_map(|own| (0..others.len()).map(move |other| (own, other)))
-        .map(|(own, other)| (own, own_turns.len() + other))
-        .collect();
+    let names = |turns: &[(String, Turn)]| turns.iter().map(|(name, _)| name.clone()).collect::<Vec<_>>();
+    let (own_names, other_names) = (names(&own_turns), names(&others));
+    let pairs = own_names.iter().flat_map(|own| other_names.iter().map(move |other| (own, other)));
     let measures = "wake-up lateness at 1 kHz, one SCHED_FIFO thread on one core".to_owned();
     let turns = own_turns.into_iter().chain(others).collect();
-    let outcome = Outcome::of_turns("loop", measures, rounds, core, turns)?.comparing(&pairs);
+    let outcome = Outcome::of_turns("loop", measures, rounds, core, turns)?.comparing(pairs);
     notes.push(outliers.borrow().in_words());
     Ok(notes.into_iter().fold(outcome, Outcome::noting))
 }

@@ -3,7 +3,7 @@
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::{ROUND_TRIPS, WARM_UP, poll, time};
-use crate::bench::contest::Durations;
+use crate::bench::contender::Durations;
 use crate::bench::{on_core, realtime_on};
 
 /// Alone on its line, and on the one that is fetched along with it.

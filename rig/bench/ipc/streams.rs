@@ -9,7 +9,7 @@ use rustix::io::{Errno, ioctl_fionbio, read, write};
 
 use super::peer::{Channel, Peer};
 use super::{BYTES, poll, time};
-use crate::bench::contest::Durations;
+use crate::bench::contender::Durations;
 use crate::bench::on_core;
 
 pub(super) fn socket_round_trips([own_core, peer_core]: [usize; 2]) -> anyhow::Result<Durations> {

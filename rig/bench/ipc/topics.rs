@@ -13,7 +13,7 @@ use masseter_shared::transport::{Domain, Inlet, Node, Outlet};
 
 use super::peer::{Channel, Peer};
 use super::{poll, time};
-use crate::bench::contest::Durations;
+use crate::bench::contender::Durations;
 use crate::bench::on_core;
 
 /// Between two attempts to reach a peer that may not have opened its ports yet.
