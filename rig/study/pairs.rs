@@ -3,7 +3,7 @@
 use masseter_shared::geometry::{Actuators, LEGS, Mechanism};
 use rayon::prelude::*;
 
-use super::contender::{CONTENDERS, Contender, NEWTON, SEED};
+use super::contender::{Contender, NEWTON, SEED};
 use super::sample::Guesses;
 use super::share::Share;
 use super::table::{Table, degrees, number};
@@ -43,19 +43,27 @@ pub(super) struct Pair {
     pub newton_cm2: Vec<f64>,
 }
 
+/// A way in which the two iterations part.
+#[derive(Debug, Clone)]
+pub(super) struct Parting {
+    /// Its table and its figure.
+    pub name: &'static str,
+    pub title: &'static str,
+    /// The guess that shows it most clearly, if any shows it.
+    pub clearest: Option<Pair>,
+    /// How often it happens.
+    pub share: Share,
+}
+
 /// What was found among the guesses above the base.
 #[derive(Debug, Clone)]
 pub(super) struct Pairs {
     /// Fig. 3: the seed's converges, Newton–Raphson falls at first and then diverges.
-    pub diverging: Option<Pair>,
+    pub diverging: Parting,
     /// Fig. 4: the seed's converges, Newton–Raphson oscillates.
-    pub oscillating: Option<Pair>,
+    pub oscillating: Parting,
     /// Not in the seed: Newton–Raphson converges, the seed's stalls.
-    pub stalling: Option<Pair>,
-    /// How often each of these happens.
-    pub diverging_share: Share,
-    pub oscillating_share: Share,
-    pub stalling_share: Share,
+    pub stalling: Parting,
 }
 
 impl Pairs {
@@ -65,33 +73,44 @@ impl Pairs {
             .par_iter()
             .map(|trial| {
                 let pair = Pair::of(mechanism, trial);
-                let solved = |contender| judged_solved(trial, contender);
+                let solved = |contender| trial.of(contender).is_solved();
                 let courses =
                     [course(&pair.seed_cm2, solved(SEED)), course(&pair.newton_cm2, solved(NEWTON))];
                 (courses, pair)
             })
             .collect();
-        let with = |wanted: [Course; 2], clearness: fn(&Pair) -> f64| {
+        let parting = |name, title, wanted: [Course; 2], clearness: fn(&[f64]) -> f64| {
             let matching = || traced.iter().filter(|(courses, _)| *courses == wanted).map(|(_, pair)| pair);
+            let clearness = |pair: &Pair| clearness(&pair.newton_cm2);
             let clearest = matching().max_by(|a, b| clearness(a).total_cmp(&clearness(b)));
-            (clearest.cloned(), Share { hits: matching().count(), of: traced.len() })
+            let share = Share { hits: matching().count(), of: traced.len() };
+            Parting { name, title, clearest: clearest.cloned(), share }
         };
-        let (diverging, diverging_share) =
-            with([Course::Converges, Course::Diverges], |pair| fall(&pair.newton_cm2));
-        let (oscillating, oscillating_share) =
-            with([Course::Converges, Course::Oscillates], |pair| swing(&pair.newton_cm2));
-        let (stalling, stalling_share) =
-            with([Course::Fails, Course::Converges], |pair| fall(&pair.newton_cm2));
-        Self { diverging, oscillating, stalling, diverging_share, oscillating_share, stalling_share }
+        Self {
+            diverging: parting(
+                "fig3_diverging",
+                "Fig. 3: Newton–Raphson diverges",
+                [Course::Converges, Course::Diverges],
+                fall,
+            ),
+            oscillating: parting(
+                "fig4_oscillating",
+                "Fig. 4: Newton–Raphson oscillates",
+                [Course::Converges, Course::Oscillates],
+                swing,
+            ),
+            stalling: parting(
+                "fig3b_stalling",
+                "Beside Fig. 3: the seed's solver stalls",
+                [Course::Fails, Course::Converges],
+                fall,
+            ),
+        }
     }
 
-    /// The figures' names with their pairs.
-    pub(super) fn named(&self) -> [(&'static str, Option<&Pair>); 3] {
-        [
-            ("fig3_diverging", self.diverging.as_ref()),
-            ("fig4_oscillating", self.oscillating.as_ref()),
-            ("fig3b_stalling", self.stalling.as_ref()),
-        ]
+    /// In the order of their figures.
+    pub(super) fn all(&self) -> [&Parting; 3] {
+        [&self.diverging, &self.oscillating, &self.stalling]
     }
 
     /// One table a figure; without rows where no such pair was found.
@@ -110,10 +129,11 @@ impl Pairs {
             "guess2_deg",
             "guess3_deg",
         ];
-        let table = |(name, pair): (&'static str, Option<&Pair>)| {
-            Table::new(name, &header, pair.map(Pair::rows).unwrap_or_default())
+        let table = |parting: &Parting| {
+            let rows = parting.clearest.as_ref().map(Pair::rows).unwrap_or_default();
+            Table::new(parting.name, &header, rows)
         };
-        self.named().into_iter().map(table).collect()
+        self.all().map(table).into()
     }
 }
 
@@ -136,11 +156,6 @@ impl Pair {
         }
         rows
     }
-}
-
-fn judged_solved(trial: &Trial, contender: Contender) -> bool {
-    let place = CONTENDERS.iter().position(|&other| other == contender);
-    place.is_some_and(|place| trial.judged[place].is_solved())
 }
 
 /// Judges a trace of errors, the guess's first.

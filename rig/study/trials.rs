@@ -47,6 +47,14 @@ pub(super) struct Trial {
     pub judged: [Judged; CONTENDERS.len()],
 }
 
+impl Trial {
+    /// How one contender fared.
+    pub(super) fn of(&self, contender: Contender) -> &Judged {
+        let place = CONTENDERS.iter().position(|&other| other == contender);
+        &self.judged[place.expect("every contender takes part")]
+    }
+}
+
 /// All trials: `samples` for each of [`GUESSES`].
 #[derive(Debug, Clone)]
 pub(super) struct Trials {
@@ -70,15 +78,17 @@ impl Trials {
     }
 
     /// The trials with guesses from there.
+    ///
+    /// # Panics
+    /// Where there are none from there: where [`GUESSES`] lacks it.
     pub(super) fn with(&self, guesses: Guesses) -> &[Trial] {
         let set = GUESSES.iter().position(|&set| set == guesses);
-        set.map_or(&[], |set| &self.sets[set])
+        &self.sets[set.expect("guesses are drawn from there")]
     }
 
     /// How one contender fared with guesses from there.
     pub(super) fn of(&self, contender: Contender, guesses: Guesses) -> impl Iterator<Item = &Judged> {
-        let place = CONTENDERS.iter().position(|&other| other == contender);
-        self.with(guesses).iter().filter_map(move |trial| Some(&trial.judged[place?]))
+        self.with(guesses).iter().map(move |trial| trial.of(contender))
     }
 
     /// How often any solution was reached.

@@ -57,7 +57,7 @@ pub(super) fn wider_range(study: &Study) -> Claim {
 }
 
 pub(super) fn newton_diverges(study: &Study) -> Claim {
-    let share = study.pairs.diverging_share;
+    let share = study.pairs.diverging.share;
     Claim {
         says: "Typically both seem to converge at first, then Newton–Raphson diverges and the algorithm does not.",
         place: "Results, first advantage; Fig. 3",
@@ -65,7 +65,7 @@ pub(super) fn newton_diverges(study: &Study) -> Claim {
             "{} of guesses above the base show this; the opposite, Newton–Raphson arriving where the seed's \
              solver stalls, {}",
             share.percent(),
-            study.pairs.stalling_share.percent()
+            study.pairs.stalling.share.percent()
         ),
         criterion: "holds if at least half of the guesses show it; partly if any does",
         verdict: Verdict::of(share.value() >= 0.5, share.hits > 0),
@@ -74,7 +74,7 @@ pub(super) fn newton_diverges(study: &Study) -> Claim {
 }
 
 pub(super) fn newton_oscillates(study: &Study) -> Claim {
-    let share = study.pairs.oscillating_share;
+    let share = study.pairs.oscillating.share;
     Claim {
         says: "There are guesses from which the algorithm converges while Newton–Raphson oscillates for ever.",
         place: "Results, first advantage; Fig. 4",
@@ -164,7 +164,7 @@ pub(super) fn always_the_true_one(study: &Study) -> Claim {
 }
 
 pub(super) fn successive_poses(study: &Study) -> Claim {
-    let seed = SHOWN.iter().position(|&contender| contender == SEED).unwrap_or_default();
+    let seed = SHOWN.iter().position(|&contender| contender == SEED).expect("the seed's solver is shown");
     let lost: usize = study.motions.iter().map(|motion| motion.followed[seed].lost).sum();
     let steps: usize = study.motions.iter().map(|motion| motion.followed[seed].steps).sum();
     let chewing = study.motions.first().map_or(f64::NAN, |motion| motion.followed[seed].iterations_mean);

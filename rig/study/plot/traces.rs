@@ -4,7 +4,7 @@ use plotters::prelude::SeriesLabelPosition;
 
 use super::axes::{Axes, curve, named, plain, power_of_ten};
 use super::{Figure, SOLVERS};
-use crate::study::pairs::{Pair, Pairs};
+use crate::study::pairs::{Pair, Pairs, Parting};
 
 /// Iterations shown.
 const SHOWN: usize = 40;
@@ -12,28 +12,16 @@ const SHOWN: usize = 40;
 const LEAST_CM2: f64 = 1e-30;
 
 pub(super) fn figures(pairs: &Pairs) -> anyhow::Result<Vec<Figure>> {
-    let share = |name| match name {
-        "fig3_diverging" => pairs.diverging_share,
-        "fig4_oscillating" => pairs.oscillating_share,
-        _ => pairs.stalling_share,
-    };
-    let draw = |(name, pair): (&'static str, Option<&Pair>)| {
-        let title = match name {
-            "fig3_diverging" => "Fig. 3: Newton–Raphson diverges",
-            "fig4_oscillating" => "Fig. 4: Newton–Raphson oscillates",
-            _ => "Beside Fig. 3: the seed's solver stalls",
-        };
-        let caption = match pair {
-            Some(pair) => format!(
-                "{title}. {}; {} of guesses above the base do so.",
-                guess(pair),
-                share(name).percent()
-            ),
-            None => format!("{title}: no guess of this run does so."),
-        };
-        figure(name, title, caption, pair)
-    };
-    pairs.named().into_iter().map(draw).collect()
+    pairs.all().into_iter().map(figure).collect()
+}
+
+fn caption(Parting { title, clearest, share, .. }: &Parting) -> String {
+    match clearest {
+        Some(pair) => {
+            format!("{title}. {}; {} of guesses above the base do so.", guess(pair), share.percent())
+        }
+        None => format!("{title}: no guess of this run does so."),
+    }
 }
 
 fn guess(pair: &Pair) -> String {
@@ -48,19 +36,20 @@ fn guess(pair: &Pair) -> String {
     )
 }
 
-fn figure(name: &'static str, title: &str, caption: String, pair: Option<&Pair>) -> anyhow::Result<Figure> {
-    Figure::draw(name, caption, (760, 440), |area| {
+fn figure(parting: &Parting) -> anyhow::Result<Figure> {
+    Figure::draw(parting.name, caption(parting), (760, 440), |area| {
         let points = |errors: &[f64]| -> Vec<(f64, f64)> {
             let shown = errors.iter().take(SHOWN + 1).enumerate();
             shown.map(|(at, error)| (at as f64, error.max(LEAST_CM2).log10())).collect()
         };
+        let pair = parting.clearest.as_ref();
         let traces = pair.map(|pair| [points(&pair.seed_cm2), points(&pair.newton_cm2)]).unwrap_or_default();
         let all = || traces.iter().flatten();
         let last = all().map(|point| point.0).fold(1.0, f64::max);
         let low = all().map(|point| point.1).fold(0.0, f64::min).floor();
         let high = all().map(|point| point.1).fold(1.0, f64::max).ceil();
         let axes = Axes {
-            title,
+            title: parting.title,
             x: ("iteration", 0.0..last, plain),
             y: ("error f₁² + f₂² + f₃², cm²", low..high, power_of_ten),
         };
