@@ -143,11 +143,11 @@ fn through_the_logger(cycles: &[Vec<Recorded>], folder: &Path, recording: &Path)
         let memory_kib = peak_memory_kib(&logger)?;
         kill_process(Pid::from_child(&logger), Signal::TERM)?;
         let status = logger.wait()?;
+        ensure!(status.success(), "the logger ended with {status}");
         let bytes = fs::metadata(recording)?.len();
         let played = RATE_HZ * SECONDS;
         println!(
-            "{played} cycles at {RATE_HZ} Hz in {took_s:.2} s, {skipped} deadlines skipped, {sent} messages; the logger \
-             ended with {status}"
+            "{played} cycles at {RATE_HZ} Hz in {took_s:.2} s, {skipped} deadlines skipped, {sent} messages"
         );
         let [median_ns, p99_ns] = [0.5, 0.99].map(|quantile| publishing.value_at_quantile(quantile));
         println!("  publishing       {median_ns:8} ns a message, median of the cycles (p99 {p99_ns})");
@@ -157,6 +157,7 @@ fn through_the_logger(cycles: &[Vec<Recorded>], folder: &Path, recording: &Path)
     }
     let proof = Command::new(MASSETER).args(["log", "verify"]).arg(recording).output()?;
     print!("{}", String::from_utf8_lossy(&proof.stdout));
+    ensure!(proof.status.success(), "the recording is not whole: {}", String::from_utf8_lossy(&proof.stderr));
     drop(claim);
     domain.sweep()?;
     Ok(())
