@@ -19,7 +19,7 @@ pub(crate) const MASSETER: &str = env!("CARGO_BIN_EXE_masseter");
 pub(crate) const PASSED_OR_INVALID: [Option<i32>; 2] = [Some(0), Some(3)];
 
 /// Sections of a scenario that judges nothing by the clock and bears with stalls: test machines are shared and noisy.
-pub(crate) const UNHURRIED: &str = include_str!("../patient.toml");
+pub(crate) const UNHURRIED: &str = include_str!("../unhurried.toml");
 
 /// The cores are for one test at a time: every rig in real time wants the same two.
 pub(crate) fn take_the_cores() -> MutexGuard<'static, ()> {

@@ -27,7 +27,7 @@ DECODED_ONE_IN = 20
 PROTOCOLS = ["foxglove.sdk.v1", "foxglove.websocket.v1"]
 # Opcode, subscription and time, before the message itself.
 MESSAGE_HEAD = struct.Struct("<BIQ")
-PATIENT = Path(__file__).parents[1] / "patient.toml"
+UNHURRIED = Path(__file__).parents[1] / "unhurried.toml"
 
 
 @contextmanager
@@ -65,10 +65,38 @@ def desert(url, is_watching):
         multiprocessing.Event().wait()
 
 
-masseter = sys.argv[1]
-with tempfile.TemporaryDirectory() as folder:
-    out = Path(folder) / "run"
-    arguments = [masseter, "run", PATIENT, "--live=127.0.0.1:0", "--duration", "5s", "--out", out]
+def watch(link, channels, on_thousandth):
+    """Takes every message until the rig says goodbye; returns how many came of each topic, and the parts of the scene."""
+    decoders = {number: decoder_of(channel) for number, channel in channels.items()}
+    counts, parts, last_cycle = Counter(), set(), 0
+    try:
+        while True:
+            data = link.recv()
+            opcode, number, log_time_ns = MESSAGE_HEAD.unpack_from(data)
+            assert opcode == 1, opcode
+            topic = channels[number]["topic"]
+            counts[topic] += 1
+            if counts.total() == 1000:
+                on_thousandth()
+            # Python decodes slower than the rig speaks.
+            if topic not in RARE and counts[topic] % DECODED_ONE_IN > 0:
+                continue
+            message = decoders[number](data[MESSAGE_HEAD.size :])
+            if topic == "state" and message.reading_cycle:
+                assert message.cycle > last_cycle, (message.cycle, last_cycle)
+                last_cycle = message.cycle
+                assert abs(sum(q * q for q in message.estimated_quaternion_wxyz) - 1) < 1e-9
+                assert abs(log_time_ns - message.published_ns) < 1_000_000_000, log_time_ns
+            if topic == "/scene":
+                parts |= {entity.id for entity in message.entities}
+    except ConnectionClosed as end:
+        assert end.rcvd and end.rcvd.code == 1001, end
+    return counts, parts
+
+
+def watch_a_run(masseter, out):
+    """Starts a run, and a second watcher that is killed on the way; returns what the first one saw."""
+    arguments = [masseter, "run", UNHURRIED, "--live=127.0.0.1:0", "--duration", "5s", "--out", out]
     rig = subprocess.Popen(arguments, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True)
     url = next(line.split()[2] for line in rig.stderr if line.startswith("live on "))
 
@@ -77,38 +105,27 @@ with tempfile.TemporaryDirectory() as folder:
     deserter.start()
     assert is_watching.wait(10)
 
-    counts, parts, last_cycle = Counter(), set(), 0
     with open_and_subscribe(url) as (link, channels):
-        decoders = {number: decoder_of(channel) for number, channel in channels.items()}
-        try:
-            while True:
-                data = link.recv()
-                opcode, number, log_time_ns = MESSAGE_HEAD.unpack_from(data)
-                assert opcode == 1, opcode
-                topic = channels[number]["topic"]
-                counts[topic] += 1
-                # Python decodes slower than the rig speaks.
-                if topic not in RARE and counts[topic] % DECODED_ONE_IN > 0:
-                    continue
-                message = decoders[number](data[MESSAGE_HEAD.size :])
-                if counts.total() > 1000:
-                    deserter.kill()
-                if topic == "state" and message.reading_cycle:
-                    assert message.cycle > last_cycle, (message.cycle, last_cycle)
-                    last_cycle = message.cycle
-                    assert abs(sum(q * q for q in message.estimated_quaternion_wxyz) - 1) < 1e-9
-                    assert abs(log_time_ns - message.published_ns) < 1_000_000_000, log_time_ns
-                if topic == "/scene":
-                    parts |= {entity.id for entity in message.entities}
-        except ConnectionClosed as end:
-            assert end.rcvd and end.rcvd.code == 1001, end
+        seen = watch(link, channels, on_thousandth=deserter.kill)
     said = rig.stderr.read()
     assert rig.wait() == 0, (rig.returncode, said)
     deserter.join()
     assert deserter.exitcode == -9, deserter.exitcode
-    subprocess.run([masseter, "log", "verify", out], check=True, stdout=subprocess.DEVNULL)
+    return seen
 
-for topic in TOPICS:
-    print(f"{topic:8} {counts[topic]:8}")
-    assert counts[topic] > 0, f"no message on {topic}"
-assert {"base", "legs", "jaw", "platform"} <= parts, parts
+
+def main():
+    masseter = sys.argv[1]
+    with tempfile.TemporaryDirectory() as folder:
+        out = Path(folder) / "run"
+        counts, parts = watch_a_run(masseter, out)
+        subprocess.run([masseter, "log", "verify", out], check=True, stdout=subprocess.DEVNULL)
+    for topic in TOPICS:
+        print(f"{topic:8} {counts[topic]:8}")
+        assert counts[topic] > 0, f"no message on {topic}"
+    assert {"base", "legs", "jaw", "platform"} <= parts, parts
+
+
+# Processes that are spawned import this file.
+if __name__ == "__main__":
+    main()

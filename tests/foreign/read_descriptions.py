@@ -56,7 +56,7 @@ def check_messages(text):
 
 
 def decode_log(database, path):
-    """Every frame of a candump log has a message of its length; returns the slowest and fastest l1."""
+    """Every frame of a candump log has a message of its length; returns every position of l1, m."""
     positions = []
     for line in path.read_text().splitlines():
         identifier, data = line.split()[2].split("#")
@@ -81,4 +81,5 @@ def main():
         print(f"decoded {len(logs)} logs; l1 between {min(positions):.4f} m and {max(positions):.4f} m")
 
 
-main()
+if __name__ == "__main__":
+    main()
