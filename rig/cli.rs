@@ -18,7 +18,7 @@ use crate::log::{self, LogVerb};
 use crate::logger::Show;
 use crate::study::{self, KinematicsArgs};
 use crate::uniqueness::{self, UniquenessVerb};
-use crate::{bench, can, clean, doctor, kinematics, live, logger, plant, report, run};
+use crate::{bench, can, clean, csv_kinematics, doctor, live, logger, plant, report, run};
 
 /// A hardware-in-the-loop rig for a 6-DOF mastication robot.
 #[derive(Debug, Parser)]
@@ -334,8 +334,8 @@ fn in_one_line(error: &anyhow::Error) -> String {
 pub fn main() -> ExitCode {
     let result = match Cli::parse().verb {
         Verb::Run(args) => run::run(&args),
-        Verb::Fk(args) => kinematics::forward(&args),
-        Verb::Ik(args) => kinematics::inverse(&args),
+        Verb::Fk(args) => csv_kinematics::forward(&args),
+        Verb::Ik(args) => csv_kinematics::inverse(&args),
         Verb::Can(CanVerb::Plan(args)) => can::plan(&args),
         Verb::Can(CanVerb::Eds(args)) => can::eds(&args),
         Verb::Can(CanVerb::Dbc { scenario }) => can::dbc(scenario.as_deref()),

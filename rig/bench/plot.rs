@@ -8,20 +8,14 @@ use plotters::prelude::*;
 
 use super::contender::{Contender, Durations, durations};
 use super::contest::Outcome;
+use crate::palette::{BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION};
 
 const SIZE: (u32, u32) = (960, 420);
 /// Points of a curve for each nine.
 const POINTS_PER_NINE: u32 = 20;
 /// A curve of so few points shows each of them.
 const POINTS_SHOWN: usize = 10;
-const COLOURS: [RGBColor; 6] = [
-    RGBColor(0x00, 0x72, 0xb2),
-    RGBColor(0xd5, 0x5e, 0x00),
-    RGBColor(0x00, 0x9e, 0x73),
-    RGBColor(0xcc, 0x79, 0xa7),
-    RGBColor(0xe6, 0x9f, 0x00),
-    RGBColor(0x56, 0xb4, 0xe9),
-];
+const COLOURS: [RGBColor; 6] = [BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY];
 
 /// A line of a plot.
 pub(super) struct Curve {

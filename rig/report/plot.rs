@@ -4,18 +4,11 @@ use std::error::Error;
 
 use plotters::prelude::*;
 
+use crate::palette::{BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION};
+
 const SIZE: (u32, u32) = (960, 260);
-/// Colours that colour-blind people can tell apart (Okabe and Ito).
-const COLOURS: [RGBColor; 8] = [
-    RGBColor(0x00, 0x72, 0xb2),
-    RGBColor(0xd5, 0x5e, 0x00),
-    RGBColor(0x00, 0x9e, 0x73),
-    RGBColor(0xcc, 0x79, 0xa7),
-    RGBColor(0xe6, 0x9f, 0x00),
-    RGBColor(0x56, 0xb4, 0xe9),
-    RGBColor(0x66, 0x66, 0x66),
-    RGBColor(0x9a, 0x7d, 0x0a),
-];
+const COLOURS: [RGBColor; 8] =
+    [BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY, RGBColor(0x66, 0x66, 0x66), RGBColor(0x9a, 0x7d, 0x0a)];
 const LIMIT: RGBColor = RGBColor(0xb0, 0x00, 0x20);
 /// Room for the legend, as a share of the plot's width.
 const LEGEND: f64 = 0.2;

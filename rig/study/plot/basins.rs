@@ -3,7 +3,8 @@
 use plotters::prelude::*;
 
 use super::axes::{Axes, plain};
-use super::{BLUE, Figure, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILION, legend};
+use super::{Figure, GREY, legend};
+use crate::palette::{BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION};
 use crate::study::basins::{Basin, Basins};
 use crate::study::contender::SHOWN;
 

@@ -8,7 +8,8 @@ use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
 
 use super::axes::{Axes, Chart, curve, named, plain};
-use super::{Area, BLUE, Figure, GREEN, GREY, PURPLE, TEXT, TITLE, VERMILION};
+use super::{Area, Figure, GREY, TEXT, TITLE};
+use crate::palette::{BLUE, GREEN, PURPLE, VERMILION};
 use crate::study::Study;
 
 /// From where the mechanism is seen, degrees around z and above the horizontal.

@@ -14,14 +14,8 @@ use plotters::coord::Shift;
 use plotters::prelude::*;
 
 use super::Study;
+use crate::palette::{BLUE, GREEN, VERMILION};
 
-/// Colours that colour-blind people can tell apart (Okabe and Ito).
-const BLUE: RGBColor = RGBColor(0x00, 0x72, 0xb2);
-const VERMILION: RGBColor = RGBColor(0xd5, 0x5e, 0x00);
-const GREEN: RGBColor = RGBColor(0x00, 0x9e, 0x73);
-const PURPLE: RGBColor = RGBColor(0xcc, 0x79, 0xa7);
-const ORANGE: RGBColor = RGBColor(0xe6, 0x9f, 0x00);
-const SKY: RGBColor = RGBColor(0x56, 0xb4, 0xe9);
 const GREY: RGBColor = RGBColor(0x99, 0x99, 0x99);
 /// Of the seed's solver, Newton–Raphson and the controller's, everywhere.
 const SOLVERS: [RGBColor; 3] = [BLUE, VERMILION, GREEN];

@@ -4,7 +4,8 @@ use masseter_controller::kinematics::MOST_SOLUTIONS;
 use plotters::prelude::*;
 
 use super::axes::{Axes, percent, plain};
-use super::{BLUE, Figure, TEXT};
+use super::{Figure, TEXT};
+use crate::palette::BLUE;
 use crate::study::multiplicity::Multiplicity;
 
 pub(super) fn figure(multiplicity: &Multiplicity) -> anyhow::Result<Figure> {

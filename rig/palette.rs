@@ -1,0 +1,10 @@
+//! Colours of plots that colour-blind people can tell apart (Okabe and Ito).
+
+use plotters::style::RGBColor;
+
+pub(crate) const BLUE: RGBColor = RGBColor(0x00, 0x72, 0xb2);
+pub(crate) const VERMILION: RGBColor = RGBColor(0xd5, 0x5e, 0x00);
+pub(crate) const GREEN: RGBColor = RGBColor(0x00, 0x9e, 0x73);
+pub(crate) const PURPLE: RGBColor = RGBColor(0xcc, 0x79, 0xa7);
+pub(crate) const ORANGE: RGBColor = RGBColor(0xe6, 0x9f, 0x00);
+pub(crate) const SKY: RGBColor = RGBColor(0x56, 0xb4, 0xe9);
