@@ -13,6 +13,7 @@ use std::process::{Child, Command, Stdio};
 
 use anyhow::{Context, ensure};
 use hdrhistogram::Histogram;
+use masseter::machine::SystemRoot;
 use masseter::recording::{Reader, Recorded, Recorder, Scene};
 use masseter_shared::clock::{self, SECOND_NS};
 use masseter_shared::config::Scenario;
@@ -28,8 +29,6 @@ use rustix::process::{Pid, Signal, kill_process};
 const MASSETER: &str = env!("CARGO_BIN_EXE_masseter");
 const RATE_HZ: u64 = 10_000;
 const SECONDS: u64 = 10;
-/// Clock ticks that /proc counts in a second, on every Linux of today.
-const TICKS_HZ: f64 = 100.0;
 
 fn main() -> anyhow::Result<()> {
     let folder = tempfile::tempdir()?;
@@ -139,8 +138,9 @@ fn through_the_logger(cycles: &[Vec<Recorded>], folder: &Path, recording: &Path)
         let mut outlets = Outlets::open(&node)?;
         let mut logger = start_logger(&scenario, domain.id(), recording)?;
         let Played { sent, publishing, skipped, took_s } = play(cycles, &mut outlets)?;
-        let cpu_s = cpu_seconds(&logger)?;
-        let memory_kib = peak_memory_kib(&logger)?;
+        let machine = SystemRoot::of_this_machine();
+        let cpu_s = machine.cpu_time_ns(logger.id()) as f64 / SECOND_NS as f64;
+        let memory_kib = peak_memory_kib(&machine, &logger)?;
         kill_process(Pid::from_child(&logger), Signal::TERM)?;
         let status = logger.wait()?;
         ensure!(status.success(), "the logger ended with {status}");
@@ -222,17 +222,9 @@ fn play(cycles: &[Vec<Recorded>], outlets: &mut Outlets) -> anyhow::Result<Playe
     Ok(Played { sent, publishing, skipped, took_s: (clock::now_ns() - from_ns) as f64 / SECOND_NS as f64 })
 }
 
-/// Processor time of a process so far, s.
-fn cpu_seconds(process: &Child) -> anyhow::Result<f64> {
-    let stat = fs::read_to_string(format!("/proc/{}/stat", process.id()))?;
-    let fields: Vec<&str> = stat.rsplit(')').next().unwrap_or_default().split_whitespace().collect();
-    let ticks = fields.get(11).zip(fields.get(12)).context("/proc/PID/stat has user and system time")?;
-    Ok((ticks.0.parse::<f64>()? + ticks.1.parse::<f64>()?) / TICKS_HZ)
-}
-
 /// The most memory that a process had resident, KiB.
-fn peak_memory_kib(process: &Child) -> anyhow::Result<u64> {
-    let status = fs::read_to_string(format!("/proc/{}/status", process.id()))?;
+fn peak_memory_kib(machine: &SystemRoot, process: &Child) -> anyhow::Result<u64> {
+    let status = machine.text(&format!("proc/{}/status", process.id())).context("the logger runs")?;
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:")).context("VmHWM is told")?;
     Ok(line.trim().trim_end_matches(" kB").parse()?)
 }

@@ -39,6 +39,25 @@ impl SystemRoot {
         names
     }
 
+    /// What all cores together have spent since boot, in ticks: user, nice, system, idle, iowait, irq, softirq and
+    /// steal. A guest's time is part of user time.
+    pub fn core_ticks(&self) -> Option<[u64; 8]> {
+        let stat = self.text("proc/stat")?;
+        let counts = stat.lines().find_map(|line| line.strip_prefix("cpu "))?;
+        let ticks: Vec<u64> =
+            counts.split_whitespace().map_while(|ticks| ticks.parse().ok()).take(8).collect();
+        ticks.try_into().ok()
+    }
+
+    /// CPU time of all threads that a process has, ns. One that has ended takes its time along.
+    pub fn cpu_time_ns(&self, process: u32) -> u64 {
+        let tasks = format!("proc/{process}/task");
+        let of_thread = |task: String| -> Option<u64> {
+            self.text(&format!("{tasks}/{task}/schedstat"))?.split_whitespace().next()?.parse().ok()
+        };
+        self.names(&tasks).into_iter().filter_map(of_thread).sum()
+    }
+
     /// The cores that are online; none where the kernel does not tell.
     pub fn online_cores(&self) -> Vec<usize> {
         self.cores("sys/devices/system/cpu/online")

@@ -111,14 +111,8 @@ fn hypervisor(root: &SystemRoot) -> Finding {
 
 fn steal(root: &SystemRoot) -> Finding {
     const CHECK: &str = "steal time";
-    let stat = root.text("proc/stat").unwrap_or_default();
-    let ticks: Vec<u64> = stat
-        .lines()
-        .find_map(|line| line.strip_prefix("cpu "))
-        .map(|line| line.split_whitespace().filter_map(|ticks| ticks.parse().ok()).collect())
-        .unwrap_or_default();
-    // user nice system idle iowait irq softirq steal; guest time is part of user time.
-    let (total, stolen) = (ticks.iter().take(8).sum::<u64>(), ticks.get(7).copied().unwrap_or(0));
+    let ticks = root.core_ticks().unwrap_or_default();
+    let (total, [.., stolen]) = (ticks.iter().sum::<u64>(), ticks);
     let share = if total == 0 { 0.0 } else { stolen as f64 / total as f64 };
     let found = format!("{:.3} % since boot", share * 100.0);
     if share <= STEAL_SHARE {

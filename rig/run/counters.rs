@@ -30,13 +30,9 @@ impl ProcessCounters {
         let stat = root.text(&format!("proc/{id}/stat"))?;
         let fields: Vec<&str> = stat.rsplit_once(')')?.1.split_whitespace().collect();
         let field = |number: usize| -> Option<u64> { fields.get(number - 3)?.parse().ok() };
-        let tasks = format!("proc/{id}/task");
-        let cpu_ns = |task: String| -> Option<u64> {
-            root.text(&format!("{tasks}/{task}/schedstat"))?.split_whitespace().next()?.parse().ok()
-        };
         Some(Self {
             at_ns,
-            cpu_ns: root.names(&tasks).into_iter().filter_map(cpu_ns).sum(),
+            cpu_ns: root.cpu_time_ns(id),
             voluntary_switches: counter("voluntary_ctxt_switches:")?,
             involuntary_switches: counter("nonvoluntary_ctxt_switches:")?,
             minor_faults: field(10)?,
@@ -47,7 +43,6 @@ impl ProcessCounters {
 
 /// Steal time of all cores since boot, ns.
 pub(crate) fn stolen_ns(root: &SystemRoot) -> Option<u64> {
-    let stat = root.text("proc/stat")?;
-    let ticks: u64 = stat.strip_prefix("cpu ")?.split_whitespace().nth(7)?.parse().ok()?;
-    Some(ticks * TICK_NS)
+    let [.., stolen] = root.core_ticks()?;
+    Some(stolen * TICK_NS)
 }
