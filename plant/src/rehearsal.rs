@@ -1,7 +1,7 @@
 //! A plant of the same scenario that goes through a cycle whenever the real one prepares for its next.
 //!
 //! A sleep costs a task the processor's knowledge of its way: caches and branch predictors serve whoever runs meanwhile.
-//! What was gone through once since is fast again (docs/realtime.md). Nothing of what this plant does is seen by
+//! What was gone through once since is fast again (ARCHITECTURE.md). Nothing of what this plant does is seen by
 //! anybody. It shares nothing with the real one but the commands, lives in a time of its own, which goes faster, and
 //! has none of the scenario's faults: one of them could stop it for good.
 

@@ -10,7 +10,7 @@ const MOST_NS: u64 = 200_000;
 /// The least, ns: what entering and leaving the kernel takes on a busy core.
 const LEAST_NS: u64 = 5_000;
 /// The reserve takes at most this part of a period: with a half, two loops at 10 kHz starve the logger (7 to 41 % of
-/// all messages dropped, none with a third), and a quarter is less than sleeps come back late there (docs/realtime.md).
+/// all messages dropped, none with a third), and a quarter is less than sleeps come back late there (ARCHITECTURE.md).
 const MOST_OF_PERIOD: u64 = 3;
 /// The reserve aims at this many times the latest lateness, and at the least on top.
 const TIMES_LATE: u64 = 2;

@@ -51,7 +51,7 @@ fn help(reason: &str) -> &'static str {
 }
 
 /// Builds its text only when something failed, so that a port's way costs no allocation, and out of that way: composed
-/// on it, the text made a round trip a tenth slower (docs/realtime.md).
+/// on it, the text made a round trip a tenth slower (ARCHITECTURE.md).
 pub(super) fn failed<E: std::fmt::Debug>(verb: &'static str, what: &str) -> impl FnOnce(E) -> TransportError {
     #[cold]
     fn told(verb: &str, what: &str, error: &dyn std::fmt::Debug) -> TransportError {
