@@ -16,6 +16,7 @@ use common::{
 };
 use masseter_shared::clock;
 use rustix::process::{Pid, Signal, kill_process, kill_process_group, test_kill_process};
+use serde_json::Value;
 
 /// Waits until the recording shows that the rig runs.
 fn wait_until_it_records(bench: &Bench) {
@@ -262,10 +263,14 @@ fn a_second_rig_of_the_same_name_is_refused() {
 fn what_the_kernel_refuses_is_said_and_required_real_time_exits_with_3() {
     let _cores = take_the_cores();
     let bench = Bench::new(&format!("duration_s = 1.0\n[realtime]\ncores = [0, 4000]\n{UNHURRIED}"));
-    let output = bench.run(&["--require-rt"]);
+    let output = bench.run(&["--require-rt", "--format", "json"]);
     assert_eq!(output.status.code(), Some(3), "{}", stderr(&output));
     assert!(stderr(&output).contains("core 4000 refused"), "{}", stderr(&output));
     assert!(!bench.manifest()["scheduling"]["plant"]["refusals"].as_array().unwrap().is_empty());
+    let shown: Value = serde_json::from_str(&stdout(&output)).expect("a summary on standard output");
+    assert_eq!(shown["verdict"]["word"], "INVALID", "{shown}");
+    assert_eq!(shown, bench.summary());
+    assert!(bench.run_folder().join("junit.xml").exists());
 }
 
 /// A disk with room for 2 MiB, there as long as this is.

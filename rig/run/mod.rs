@@ -63,11 +63,9 @@ pub fn run(args: &RunArgs) -> Result<Exit, Failure> {
     manifest.usage = ended.usage;
     manifest.ending = ended.ending;
     keep(&manifest)?;
-    match manifest.ending {
-        Ending::NotStarted => return Ok(Exit::Invalid),
-        // Before the processes were ready, and anything was recorded.
-        Ending::Interrupted if manifest.scheduling.is_empty() => return Ok(Exit::Interrupted),
-        _ => {}
+    // Before the processes were ready, and anything was recorded.
+    if manifest.ending == Ending::Interrupted && manifest.scheduling.is_empty() {
+        return Ok(Exit::Interrupted);
     }
     let figures = analysis::analyse(&folder, &plan.scenario)
         .context("the run's recording cannot be analysed")
