@@ -2,10 +2,10 @@
 
 use masseter_shared::transport::{Domain, DomainError};
 
-use crate::exit::{Exit, Failure};
+use crate::exit::Exit;
 
 /// Sweeps every dead domain of this user and says what was found.
-pub(crate) fn clean() -> Result<Exit, Failure> {
+pub(crate) fn clean() -> anyhow::Result<Exit> {
     let domains = Domain::all()?;
     for domain in &domains {
         match domain.sweep()? {

@@ -13,7 +13,7 @@ use masseter_shared::lifecycle::Assignment;
 use crate::bench::BenchArgs;
 use crate::bench::ipc::PeerArgs;
 use crate::can::{PlanArgs, ServeArgs};
-use crate::exit::{Exit, Failure};
+use crate::exit::{Exit, Failure, OrFailure};
 use crate::log::{self, LogVerb};
 use crate::logger::Show;
 use crate::study::{self, KinematicsArgs};
@@ -332,43 +332,51 @@ fn in_one_line(error: &anyhow::Error) -> String {
 
 /// Parses the arguments, carries the verb out, and reports what went wrong.
 pub fn main() -> ExitCode {
-    let result = match Cli::parse().verb {
-        Verb::Run(args) => run::run(&args),
-        Verb::Fk(args) => csv_kinematics::forward(&args),
-        Verb::Ik(args) => csv_kinematics::inverse(&args),
-        Verb::Can(CanVerb::Plan(args)) => can::plan(&args),
-        Verb::Can(CanVerb::Eds(args)) => can::eds(&args),
-        Verb::Can(CanVerb::Dbc { scenario }) => can::dbc(scenario.as_deref()),
-        Verb::Can(CanVerb::Serve(args)) => can::serve(&args),
-        Verb::Report(ReportArgs { folder, against: Some(against), format }) => {
-            report::compare::runs(&folder, &against, format)
-        }
-        Verb::Uniqueness(verb) => uniqueness::uniqueness(&verb),
-        Verb::Kinematics(args) => study::kinematics(&args),
-        Verb::Report(args) => report::again(&args.folder, args.format),
-        Verb::Doctor(args) => doctor::examine(args.format),
-        Verb::Log { verb } => log::run(&verb),
-        Verb::Bench(args) => bench::run(&args),
-        Verb::BenchPeer(args) => bench::ipc::answer(&args).map(|()| Exit::Passed).map_err(Failure::from),
-        Verb::Clean => clean::clean(),
-        Verb::Controller(args) => masseter_controller::process::run(&args.assignment())
-            .map(|outcome| match outcome {
-                Outcome::Finished => Exit::Passed,
-                Outcome::SafeStop => Exit::SafeStop,
-            })
-            .map_err(Failure::from),
-        Verb::Plant(args) => plant::plant(&args),
-        Verb::Logger(args) => {
-            let LoggerArgs { process, recording, live, motion_s, quiet } = args;
-            let show = Show { live, quiet, motion_s };
-            logger::run(&process.assignment(), &recording, show).map_err(Failure::from)
-        }
-    };
-    match result {
+    match carry_out(Cli::parse().verb) {
         Ok(exit) => exit.into(),
         Err(Failure { exit, error }) => {
             tell!("masseter: {}", in_one_line(&error));
             exit.into()
         }
     }
+}
+
+/// What goes wrong in most verbs is for the user to mend; the others say themselves what it leads to.
+fn carry_out(verb: Verb) -> Result<Exit, Failure> {
+    match verb {
+        Verb::Run(args) => run::run(&args),
+        Verb::Report(ReportArgs { folder, against: None, format }) => report::again(&folder, format),
+        Verb::Report(ReportArgs { folder, against: Some(against), format }) => {
+            report::compare::runs(&folder, &against, format).usage()
+        }
+        Verb::Bench(args) => bench::run(&args),
+        Verb::BenchPeer(args) => bench::ipc::answer(&args).map(|()| Exit::Passed).usage(),
+        Verb::Fk(args) => csv_kinematics::forward(&args).usage(),
+        Verb::Ik(args) => csv_kinematics::inverse(&args).usage(),
+        Verb::Can(CanVerb::Plan(args)) => can::plan(&args).usage(),
+        Verb::Can(CanVerb::Eds(args)) => can::eds(&args).usage(),
+        Verb::Can(CanVerb::Dbc { scenario }) => can::dbc(scenario.as_deref()).usage(),
+        Verb::Can(CanVerb::Serve(args)) => can::serve(&args).usage(),
+        Verb::Uniqueness(verb) => uniqueness::uniqueness(&verb).usage(),
+        Verb::Kinematics(args) => study::kinematics(&args).usage(),
+        Verb::Doctor(args) => doctor::examine(args.format).usage(),
+        Verb::Log { verb } => log::run(&verb).usage(),
+        Verb::Clean => clean::clean().usage(),
+        Verb::Controller(args) => control(args).usage(),
+        Verb::Plant(args) => plant::plant(&args).usage(),
+        Verb::Logger(args) => log_run(args).usage(),
+    }
+}
+
+fn control(args: ProcessArgs) -> anyhow::Result<Exit> {
+    Ok(match masseter_controller::process::run(&args.assignment())? {
+        Outcome::Finished => Exit::Passed,
+        Outcome::SafeStop => Exit::SafeStop,
+    })
+}
+
+fn log_run(args: LoggerArgs) -> anyhow::Result<Exit> {
+    let LoggerArgs { process, recording, live, motion_s, quiet } = args;
+    let show = Show { live, quiet, motion_s };
+    logger::run(&process.assignment(), &recording, show)
 }

@@ -44,16 +44,35 @@ pub struct Failure {
     pub error: anyhow::Error,
 }
 
-/// Wrong input is what most errors are; the others say so with [`Failure::with`].
-impl<E: Into<anyhow::Error>> From<E> for Failure {
-    fn from(error: E) -> Self {
-        Self { exit: Exit::Usage, error: error.into() }
+/// Says at the place where an error arises which exit code it leads to.
+pub trait OrFailure<T> {
+    /// To [`Exit::Usage`]: it is for the user to mend what was given.
+    fn usage(self) -> Result<T, Failure>;
+
+    /// To [`Exit::Incomplete`]: what a run leaves could not be written or read.
+    fn incomplete(self) -> Result<T, Failure>;
+
+    /// To [`Exit::Died`]: a process of the rig could not go on.
+    fn died(self) -> Result<T, Failure>;
+}
+
+impl<T, E: Into<anyhow::Error>> OrFailure<T> for Result<T, E> {
+    fn usage(self) -> Result<T, Failure> {
+        self.map_err(|error| Failure::with(Exit::Usage, error))
+    }
+
+    fn incomplete(self) -> Result<T, Failure> {
+        self.map_err(|error| Failure::with(Exit::Incomplete, error))
+    }
+
+    fn died(self) -> Result<T, Failure> {
+        self.map_err(|error| Failure::with(Exit::Died, error))
     }
 }
 
 impl Failure {
     /// An error that leads to `exit`.
-    pub fn with(exit: Exit) -> impl FnOnce(anyhow::Error) -> Self {
-        move |error| Self { exit, error }
+    pub fn with(exit: Exit, error: impl Into<anyhow::Error>) -> Self {
+        Self { exit, error: error.into() }
     }
 }

@@ -9,11 +9,11 @@ use masseter_shared::lifecycle::StopRequest;
 use masseter_shared::realtime::scheduling::{Wanted, obtain};
 
 use crate::cli::PlantArgs;
-use crate::exit::{Exit, Failure};
+use crate::exit::Exit;
 
 /// Runs the plant until it is asked to end. As the supervisor's process, it also ends by a safe stop for want of a
 /// controller.
-pub(crate) fn plant(args: &PlantArgs) -> Result<Exit, Failure> {
+pub(crate) fn plant(args: &PlantArgs) -> anyhow::Result<Exit> {
     let Some(assignment) = args.assignment() else {
         emulate(args)?;
         return Ok(Exit::Passed);

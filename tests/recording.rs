@@ -5,10 +5,10 @@ mod common;
 use std::fs;
 use std::io::Cursor;
 use std::path::Path;
-use std::process::{Command, Output};
+use std::process::Output;
 use std::time::Duration;
 
-use common::{Bench, UNHURRIED, child_of, masseter, start, stderr, stdout};
+use common::{Bench, UNHURRIED, child_of, cramped, masseter, start, stderr, stdout};
 use masseter::recording::{Reader, Recorded, Recorder, Scene};
 use masseter_shared::can::candump;
 use masseter_shared::clock;
@@ -193,19 +193,13 @@ fn topics_that_make_no_table_are_named_and_refused_where_they_are_asked_for() {
     assert_eq!(silent.lines().count(), 1, "a topic without messages has its header");
 }
 
-/// Where files may not grow beyond a few kilobytes.
-fn cramped(arguments: &[&str]) -> Output {
-    let limit = "trap '' XFSZ; ulimit -f 8; exec \"$@\"";
-    Command::new("sh").args(["-c", limit, "sh", common::MASSETER]).args(arguments).output().unwrap()
-}
-
 #[test]
 fn a_recovery_that_fails_leaves_nothing_in_the_way_of_the_next() {
     let bench = virtual_run();
     let recording = bench.run_folder().join("recording.mcap");
     let out = bench.file("recovered.mcap");
     let arguments = ["log", "recover", recording.to_str().unwrap(), "--out", out.to_str().unwrap()];
-    let failed = cramped(&arguments);
+    let failed = cramped(8, &arguments);
     assert_eq!(failed.status.code(), Some(2), "{}", stderr(&failed));
     assert!(!out.exists(), "{}", stderr(&failed));
     assert_eq!(masseter(&arguments).status.code(), Some(0));

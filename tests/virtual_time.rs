@@ -4,7 +4,7 @@ mod common;
 
 use std::fs;
 
-use common::{Bench, jaw_recording, json, stderr, stdout};
+use common::{Bench, cramped, jaw_recording, json, stderr, stdout};
 use serde_json::json;
 
 #[test]
@@ -157,4 +157,13 @@ fn a_report_can_be_made_again_and_a_cut_recording_is_said_to_be_cut() {
     }
     fs::write(&recording, "no recording").unwrap();
     assert_eq!(report().status.code(), Some(2));
+}
+
+#[test]
+fn a_run_folder_that_takes_no_scenario_leaves_the_run_incomplete() {
+    let bench = Bench::new("");
+    let out = bench.run_folder();
+    let output = cramped(0, &["run", "--clock", "virtual", "--out", out.to_str().unwrap()]);
+    assert!(stderr(&output).contains("cannot write the scenario: File too large"), "{}", stderr(&output));
+    assert_eq!(output.status.code(), Some(6), "{}", stderr(&output));
 }

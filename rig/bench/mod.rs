@@ -27,7 +27,7 @@ use masseter_shared::realtime::scheduling::{Obtained, Wanted, obtain};
 use serde::Serialize;
 
 use crate::cli::Format;
-use crate::exit::{Exit, Failure};
+use crate::exit::{Exit, Failure, OrFailure};
 use crate::say::result;
 use circumstances::Circumstances;
 use contest::Outcome;
@@ -80,9 +80,9 @@ struct Results {
 
 /// Measures what was asked for, one after the other; what is done is kept when a later one fails.
 pub(crate) fn run(args: &BenchArgs) -> Result<Exit, Failure> {
-    circumstances::check_cores(&args.kinds, args.cores)?;
+    circumstances::check_cores(&args.kinds, args.cores).usage()?;
     if let Some(folder) = &args.out {
-        fs::create_dir_all(folder).with_context(|| format!("cannot create {}", folder.display()))?;
+        fs::create_dir_all(folder).with_context(|| format!("cannot create {}", folder.display())).usage()?;
     }
     let mut results = Results {
         form: FORM,
@@ -92,11 +92,11 @@ pub(crate) fn run(args: &BenchArgs) -> Result<Exit, Failure> {
     };
     let measured = measure_each(args, &mut results);
     if args.format == Format::Json {
-        result(&results.to_json()?)?;
+        results.to_json().and_then(|json| result(&json)).usage()?;
     }
     measured.map_err(|error| {
         let exit = if error.is::<rate::Interrupted>() { Exit::Interrupted } else { Exit::Usage };
-        Failure { exit, error }
+        Failure::with(exit, error)
     })?;
     let disturbed = results.outcomes.iter().any(|outcome| outcome.disturbance.disturbed);
     Ok(if disturbed { Exit::Invalid } else { Exit::Passed })

@@ -6,18 +6,18 @@ use masseter_plant::description;
 use masseter_shared::config::Scenario;
 
 use crate::cli::EdsArgs;
-use crate::exit::{Exit, Failure};
+use crate::exit::Exit;
 use crate::say::result;
 
 /// The electronic data sheet of one drive.
-pub(crate) fn eds(args: &EdsArgs) -> Result<Exit, Failure> {
+pub(crate) fn eds(args: &EdsArgs) -> anyhow::Result<Exit> {
     let sheets = description::eds(&scenario(args.scenario.as_deref())?)?;
     result(&sheets[args.axis])?;
     Ok(Exit::Passed)
 }
 
 /// The messages of the whole link.
-pub(crate) fn dbc(path: Option<&Path>) -> Result<Exit, Failure> {
+pub(crate) fn dbc(path: Option<&Path>) -> anyhow::Result<Exit> {
     result(&description::dbc(&scenario(path)?)?)?;
     Ok(Exit::Passed)
 }

@@ -10,7 +10,7 @@ use masseter_shared::schedule::{CycleSchedule, plans};
 use serde_json::{Value, json};
 
 use crate::cli::Format;
-use crate::exit::{Exit, Failure};
+use crate::exit::Exit;
 use crate::say::result;
 
 /// What `can plan` takes.
@@ -27,7 +27,7 @@ pub(crate) struct PlanArgs {
 }
 
 /// Prints the plan; exit code 2 where the rig could not run by it.
-pub(crate) fn plan(args: &PlanArgs) -> Result<Exit, Failure> {
+pub(crate) fn plan(args: &PlanArgs) -> anyhow::Result<Exit> {
     let mut scenario = args.scenario.as_deref().map(Scenario::read).transpose()?.unwrap_or_default();
     scenario.rate_hz = args.rate_hz.unwrap_or(scenario.rate_hz);
     scenario.validate()?;

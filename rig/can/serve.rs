@@ -20,7 +20,7 @@ use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::io::Errno;
 
 use super::client::Client;
-use crate::exit::{Exit, Failure};
+use crate::exit::Exit;
 
 /// Clients on one bus at a time.
 const CLIENTS: usize = 8;
@@ -38,7 +38,7 @@ pub(crate) struct ServeArgs {
 }
 
 /// Serves until it is interrupted.
-pub(crate) fn serve(args: &ServeArgs) -> Result<Exit, Failure> {
+pub(crate) fn serve(args: &ServeArgs) -> anyhow::Result<Exit> {
     let scenario = args.scenario.as_deref().map_or_else(|| Ok(Scenario::default()), Scenario::read)?;
     scenario.validate()?;
     let stop = StopRequest::listen_alone().context("cannot listen for signals")?;
@@ -56,7 +56,7 @@ pub(crate) fn serve(args: &ServeArgs) -> Result<Exit, Failure> {
     Ok(Exit::Passed)
 }
 
-fn listen(address: SocketAddr) -> Result<TcpListener, Failure> {
+fn listen(address: SocketAddr) -> anyhow::Result<TcpListener> {
     let listener = TcpListener::bind(address)
         .with_context(|| format!("cannot listen on {address}; choose another address with --listen"))?;
     listener.set_nonblocking(true).context("cannot serve without blocking")?;
@@ -64,7 +64,7 @@ fn listen(address: SocketAddr) -> Result<TcpListener, Failure> {
 }
 
 /// Says on standard error what is served where.
-fn announce(listener: &TcpListener, scenario: &Scenario) -> Result<(), Failure> {
+fn announce(listener: &TcpListener, scenario: &Scenario) -> anyhow::Result<()> {
     let address = listener.local_addr().context("the server has no address")?;
     for (bus, axes) in scenario.can.buses.iter().enumerate() {
         let node = |&axis: &usize| format!("{} (node {})", AXIS_NAMES[axis], scenario.can.node_ids[axis]);

@@ -7,7 +7,7 @@ use masseter_shared::messages::pose_fields;
 use super::forward::COLUMNS_IN;
 use super::table::{Columns, Lines, convert};
 use crate::cli::CsvArgs;
-use crate::exit::{Exit, Failure};
+use crate::exit::Exit;
 
 /// `line` is the input's line. Conditions are 1 where they hold and 0 where not; `separation_rad` is
 /// the largest difference of a leg's angle to the nearest other solution; `condition` is that of the
@@ -38,7 +38,7 @@ const COLUMNS_OUT: [&str; 20] = [
 /// Status `true` of a solution in which the mechanism can stand, `other` of the rest; an input without
 /// any gives one line with the reason of [`ForwardError`], and `nearest_m` the least root of the error
 /// (seed, eq. 2) that was found over all leg angles.
-pub(super) fn every_solution(args: &CsvArgs, mechanism: &Mechanism) -> Result<Exit, Failure> {
+pub(super) fn every_solution(args: &CsvArgs, mechanism: &Mechanism) -> anyhow::Result<Exit> {
     let columns = Columns { read: COLUMNS_IN, written: &COLUMNS_OUT };
     convert(args, columns, |line, values, lines| {
         let actuators = Actuators::from_axes(values);

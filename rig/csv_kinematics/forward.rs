@@ -7,7 +7,7 @@ use masseter_shared::messages::pose_fields;
 use super::every;
 use super::table::{Columns, Lines, convert, convert_in_turn, mechanism};
 use crate::cli::{FkArgs, Solver};
-use crate::exit::{Exit, Failure};
+use crate::exit::Exit;
 
 pub(super) const COLUMNS_IN: [&str; 6] = ["d1_m", "d2_m", "d3_m", "l1_m", "l2_m", "l3_m"];
 const COLUMNS_OUT: [&str; 12] = [
@@ -30,7 +30,7 @@ const NEUTRAL_RAD: [f64; LEGS] = [1.46; LEGS];
 /// Status `ok`, `outside_stroke`, or the reason of [`ForwardError`]. The seed's and Newton's iteration
 /// may come to a solution at which the mechanism cannot stand; its status is then `wrong_assembly`,
 /// and the values stand all the same.
-pub(crate) fn forward(args: &FkArgs) -> Result<Exit, Failure> {
+pub(crate) fn forward(args: &FkArgs) -> anyhow::Result<Exit> {
     let mechanism = mechanism(&args.csv)?;
     if args.all {
         return every::every_solution(&args.csv, &mechanism);

@@ -5,7 +5,7 @@ use masseter_shared::messages::pose_of_fields;
 
 use super::table::{Columns, Lines, convert, mechanism};
 use crate::cli::CsvArgs;
-use crate::exit::{Exit, Failure};
+use crate::exit::Exit;
 
 /// How far a quaternion's norm may be from 1.
 const UNIT_TOLERANCE: f64 = 1e-3;
@@ -15,7 +15,7 @@ const COLUMNS_OUT: [&str; 9] =
     ["d1_m", "d2_m", "d3_m", "l1_m", "l2_m", "l3_m", "theta1_rad", "theta2_rad", "theta3_rad"];
 
 /// Status `ok`, `outside_stroke` (the values stand all the same) or `singular` (a leg without length).
-pub(crate) fn inverse(args: &CsvArgs) -> Result<Exit, Failure> {
+pub(crate) fn inverse(args: &CsvArgs) -> anyhow::Result<Exit> {
     let mechanism = mechanism(args)?;
     let columns = Columns { read: COLUMNS_IN, written: &COLUMNS_OUT };
     convert(args, columns, |_, values, lines| {

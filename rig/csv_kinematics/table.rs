@@ -12,7 +12,7 @@ use rayon::prelude::*;
 
 use super::input::{Input, Line};
 use crate::cli::CsvArgs;
-use crate::exit::{Exit, Failure};
+use crate::exit::Exit;
 use crate::say::taken;
 
 /// Status of a line that could not be read.
@@ -77,7 +77,7 @@ pub(super) fn convert<const IN: usize>(
     args: &CsvArgs,
     columns: Columns<'_, IN>,
     solve: impl Fn(u64, [f64; IN], &mut Lines) -> Solved + Sync,
-) -> Result<Exit, Failure> {
+) -> anyhow::Result<Exit> {
     stream(args, columns, |batch| {
         let chunks = batch.par_chunks(CHUNK_LINES).map(|chunk| {
             let mut lines = Lines::default();
@@ -95,7 +95,7 @@ pub(super) fn convert_in_turn<const IN: usize>(
     args: &CsvArgs,
     columns: Columns<'_, IN>,
     mut solve: impl FnMut(u64, [f64; IN], &mut Lines) -> Solved,
-) -> Result<Exit, Failure> {
+) -> anyhow::Result<Exit> {
     stream(args, columns, |batch| {
         let mut lines = Lines::default();
         for line in batch {
@@ -123,7 +123,7 @@ fn stream<const IN: usize>(
     args: &CsvArgs,
     columns: Columns<'_, IN>,
     mut solve: impl FnMut(&[Line]) -> Vec<Lines>,
-) -> Result<Exit, Failure> {
+) -> anyhow::Result<Exit> {
     let mut input = Input::open(args.input.as_deref())?;
     check_columns(&mut input, &columns.read)?;
 

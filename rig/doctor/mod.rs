@@ -24,7 +24,7 @@ use serde::Serialize;
 pub use finding::{Finding, Level};
 
 use crate::cli::Format;
-use crate::exit::{Exit, Failure};
+use crate::exit::Exit;
 use crate::machine::SystemRoot;
 use crate::say::result;
 
@@ -42,7 +42,7 @@ struct Report {
 }
 
 /// Examines the machine; [`Exit::Invalid`] when something is bad.
-pub(crate) fn examine(format: Format) -> Result<Exit, Failure> {
+pub(crate) fn examine(format: Format) -> anyhow::Result<Exit> {
     let report = Report::of(findings(&SystemRoot::of_this_machine()));
     result(&match format {
         Format::Human => report.in_words(),

@@ -17,7 +17,7 @@ use std::path::{Path, PathBuf};
 use anyhow::Context;
 use clap::{Args, Subcommand};
 
-use crate::exit::{Exit, Failure};
+use crate::exit::Exit;
 use crate::recording::{Reader, Recovered, recover};
 use crate::run::folder::RunFolder;
 use crate::say::result;
@@ -80,7 +80,7 @@ impl RecordingArgs {
 }
 
 /// Carries a verb out.
-pub(crate) fn run(verb: &LogVerb) -> Result<Exit, Failure> {
+pub(crate) fn run(verb: &LogVerb) -> anyhow::Result<Exit> {
     match verb {
         LogVerb::Info(args) => look(args, Survey::info),
         LogVerb::Verify(args) => look(args, Survey::proof),
@@ -93,7 +93,7 @@ fn open(path: &Path) -> anyhow::Result<Reader<BufReader<File>>> {
     Reader::open(path).with_context(|| path.display().to_string())
 }
 
-fn look(args: &RecordingArgs, words: impl FnOnce(&Survey) -> String) -> Result<Exit, Failure> {
+fn look(args: &RecordingArgs, words: impl FnOnce(&Survey) -> String) -> anyhow::Result<Exit> {
     let path = args.path()?;
     let mut reader = open(&path)?;
     let survey = Survey::of(&mut reader).with_context(|| path.display().to_string())?;
@@ -101,7 +101,7 @@ fn look(args: &RecordingArgs, words: impl FnOnce(&Survey) -> String) -> Result<E
     Ok(survey.exit())
 }
 
-fn save(args: &RecoverArgs) -> Result<Exit, Failure> {
+fn save(args: &RecoverArgs) -> anyhow::Result<Exit> {
     let path = args.from.path()?;
     let out = args.out.clone().unwrap_or_else(|| path.with_extension("recovered.mcap"));
     let mut reader = open(&path)?;
@@ -124,7 +124,7 @@ fn in_words(recovered: Recovered) -> String {
     }
 }
 
-fn export(args: &ExportArgs) -> Result<Exit, Failure> {
+fn export(args: &ExportArgs) -> anyhow::Result<Exit> {
     let path = args.from.path()?;
     let mut reader = open(&path)?;
     let survey = Survey::of(&mut reader).with_context(|| path.display().to_string())?;

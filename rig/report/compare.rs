@@ -14,7 +14,7 @@ use serde_json::Value;
 
 use super::table::or_dash;
 use crate::cli::Format;
-use crate::exit::{Exit, Failure};
+use crate::exit::Exit;
 use crate::run::folder::RunFolder;
 use crate::say::result;
 
@@ -36,7 +36,7 @@ struct Change {
 }
 
 /// `masseter report A B`.
-pub(crate) fn runs(a: &Path, b: &Path, format: Format) -> Result<Exit, Failure> {
+pub(crate) fn runs(a: &Path, b: &Path, format: Format) -> anyhow::Result<Exit> {
     let changes = changes(&figures(a)?, &figures(b)?);
     result(&match format {
         Format::Human => table(a, b, &changes),

@@ -20,9 +20,9 @@ use std::path::Path;
 use anyhow::Context;
 use serde::Serialize;
 
-use crate::analysis::{self, Figures};
+use crate::analysis::{self, AnalysisError, Figures};
 use crate::cli::Format;
-use crate::exit::{Exit, Failure};
+use crate::exit::{Exit, Failure, OrFailure};
 use crate::run::folder::RunFolder;
 use crate::run::manifest::Manifest;
 use crate::say::show;
@@ -41,9 +41,12 @@ struct Summary<'a> {
 
 /// `masseter report`: the report of a past run.
 pub(crate) fn again(path: &Path, format: Format) -> Result<Exit, Failure> {
-    let folder = RunFolder::open(path)?;
-    let manifest = Manifest::read(&folder).context("cannot read manifest.json")?;
-    let figures = analysis::analyse(&folder, &manifest.scenario)?;
+    let folder = RunFolder::open(path).usage()?;
+    let manifest = Manifest::read(&folder).context("cannot read manifest.json").usage()?;
+    let figures = match analysis::analyse(&folder, &manifest.scenario) {
+        written @ Err(AnalysisError::Write { .. }) => written.incomplete(),
+        read => read.usage(),
+    }?;
     write(&folder, &manifest, &figures, format)
 }
 
@@ -56,7 +59,8 @@ pub(crate) fn write(
 ) -> Result<Exit, Failure> {
     let verdict = Verdict::of(manifest, figures);
     let summary = Summary { form: FORM, verdict: &verdict, figures };
-    let json = serde_json::to_string_pretty(&summary).context("cannot write the summary")? + "\n";
+    let json =
+        serde_json::to_string_pretty(&summary).context("cannot write the summary").incomplete()? + "\n";
     show(&match format {
         Format::Human => {
             format!("{}\nfiles: {}\n", table::of_run(manifest, figures, &verdict), folder.path().display())
@@ -68,9 +72,7 @@ pub(crate) fn write(
         (folder.junit(), &junit::of_run(manifest, figures, &verdict)),
         (folder.report(), &html::of_run(manifest, figures, &verdict)),
     ] {
-        fs::write(&path, text)
-            .with_context(|| format!("cannot write {}", path.display()))
-            .map_err(Failure::with(Exit::Incomplete))?;
+        fs::write(&path, text).with_context(|| format!("cannot write {}", path.display())).incomplete()?;
     }
     Ok(verdict.exit)
 }

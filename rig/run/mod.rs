@@ -19,7 +19,7 @@ use anyhow::Context;
 
 use crate::analysis;
 use crate::cli::{ClockKind, RunArgs};
-use crate::exit::{Exit, Failure};
+use crate::exit::{Exit, Failure, OrFailure};
 use crate::report::{self, verdict::Ending};
 use folder::RunFolder;
 use manifest::Manifest;
@@ -28,29 +28,28 @@ use supervisor::Ended;
 
 /// Plays the motion, judges the run and leaves its folder.
 pub fn run(args: &RunArgs) -> Result<Exit, Failure> {
-    let plan = Plan::resolve(args)?;
+    let plan = Plan::resolve(args).usage()?;
     let claimed = match args.clock {
         ClockKind::Virtual => None,
-        ClockKind::Rt => Some(supervisor::claim(args.name.as_deref())?),
+        ClockKind::Rt => Some(supervisor::claim(args.name.as_deref()).usage()?),
     };
     let folder = match &args.out {
-        Some(path) => RunFolder::create(path)?,
-        None => RunFolder::create_in("runs".as_ref(), &plan.scenario.name)?,
+        Some(path) => RunFolder::create(path).usage()?,
+        None => RunFolder::create_in("runs".as_ref(), &plan.scenario.name).usage()?,
     };
-    folder.keep(&folder.scenario(), &plan.scenario.to_toml()).context("cannot write the scenario")?;
+    let scenario_kept = folder.keep(&folder.scenario(), &plan.scenario.to_toml());
+    scenario_kept.context("cannot write the scenario").incomplete()?;
     if !args.quiet {
         tell!("{}", plan.announcement());
     }
 
     let mut manifest = Manifest::new(&plan, args.clock);
-    let keep = |manifest: &Manifest| {
-        let written = manifest.write(&folder).context("cannot write the manifest");
-        written.map_err(Failure::with(Exit::Incomplete))
-    };
+    let keep =
+        |manifest: &Manifest| manifest.write(&folder).context("cannot write the manifest").incomplete();
     // For a recording that nobody lives to judge.
     keep(&manifest)?;
     let ended = match claimed {
-        None => virtual_time::run(&plan, &folder).map(Ended::from).map_err(Failure::with(Exit::Incomplete)),
+        None => virtual_time::run(&plan, &folder).map(Ended::from).incomplete(),
         Some(claimed) => supervisor::run(claimed, &plan, &folder, args),
     };
     let ended = ended.or_else(|failure| {
@@ -69,6 +68,6 @@ pub fn run(args: &RunArgs) -> Result<Exit, Failure> {
     }
     let figures = analysis::analyse(&folder, &plan.scenario)
         .context("the run's recording cannot be analysed")
-        .map_err(Failure::with(Exit::Incomplete))?;
+        .incomplete()?;
     report::write(&folder, &manifest, &figures, args.format)
 }

@@ -26,7 +26,7 @@ use super::plan::Plan;
 use super::usage::{Meter, RunUsage};
 use crate::clean::sweep_dead;
 use crate::cli::RunArgs;
-use crate::exit::{Exit, Failure};
+use crate::exit::{Exit, Failure, OrFailure};
 use crate::machine::SystemRoot;
 use crate::report::verdict::Ending;
 
@@ -92,7 +92,7 @@ pub fn run(
     folder: &RunFolder,
     args: &RunArgs,
 ) -> Result<Ended, Failure> {
-    let interrupts = Interrupts::listen().context("cannot listen for signals")?;
+    let interrupts = Interrupts::listen().context("cannot listen for signals").died()?;
     let result = Rig::spawn(plan, folder, &domain, args).and_then(|mut rig| rig.run(plan, args, &interrupts));
     drop(claim);
     interrupts.let_go();
@@ -100,7 +100,7 @@ pub fn run(
         tell!("masseter: {error}; `masseter clean` removes what is left of this run");
     }
     // Whatever can be wrong with the input was looked for before.
-    result.map_err(Failure::with(Exit::Died))
+    result.died()
 }
 
 /// The three processes, in the order of their starting.

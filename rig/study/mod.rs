@@ -26,7 +26,7 @@ use clap::Args;
 use masseter_shared::geometry::{Mechanism, MechanismConfig, Vec3};
 use rayon::prelude::*;
 
-use crate::exit::{Exit, Failure};
+use crate::exit::Exit;
 use basins::Basins;
 use motions::Motion;
 use multiplicity::Multiplicity;
@@ -72,9 +72,9 @@ struct Study {
 }
 
 /// Carries the verb out. That a claim of the seed does not hold is a result, not a failure.
-pub(crate) fn kinematics(args: &KinematicsArgs) -> Result<Exit, Failure> {
+pub(crate) fn kinematics(args: &KinematicsArgs) -> anyhow::Result<Exit> {
     let study = Study::make(args)?;
-    Ok(study.write(args)?)
+    study.write(args)
 }
 
 impl Study {

@@ -15,7 +15,7 @@ use masseter_controller::kinematics::uniqueness::InputBox;
 use masseter_shared::geometry::{GeometryError, Mechanism, MechanismConfig};
 
 use crate::cli::RunArgs;
-use crate::exit::{Exit, Failure};
+use crate::exit::Exit;
 use crate::run::plan::Plan;
 
 /// What `uniqueness` does.
@@ -83,7 +83,7 @@ pub(crate) enum Region {
 }
 
 /// Carries a verb out. Exits with 1 where uniqueness is not proven, or an input with two was found.
-pub(crate) fn uniqueness(verb: &UniquenessVerb) -> Result<Exit, Failure> {
+pub(crate) fn uniqueness(verb: &UniquenessVerb) -> anyhow::Result<Exit> {
     let (settled, rows, out) = match verb {
         UniquenessVerb::Prove(args) => {
             let (mechanism, wholes) = to_prove(args)?;

@@ -115,6 +115,12 @@ pub(crate) fn masseter(arguments: &[&str]) -> Output {
     Command::new(MASSETER).args(arguments).output().expect("masseter starts")
 }
 
+/// Where files may not grow beyond so many blocks of 512 bytes, as on a full disk.
+pub(crate) fn cramped(blocks: u32, arguments: &[&str]) -> Output {
+    let limit = format!("trap '' XFSZ; ulimit -f {blocks}; exec \"$@\"");
+    Command::new("sh").args(["-c", &limit, "sh", MASSETER]).args(arguments).output().expect("a shell starts")
+}
+
 pub(crate) fn stderr(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
 }
