@@ -24,7 +24,7 @@ pub mod live;
 pub mod log;
 pub mod logger;
 pub mod machine;
-mod palette;
+mod output;
 pub mod plant;
 pub mod recording;
 pub mod report;

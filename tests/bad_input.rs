@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{Bench, masseter, stderr};
+use common::{Bench, masseter, stderr, stdout};
 use serde_json::{Value, json};
 
 #[test]
@@ -103,6 +103,20 @@ fn a_margin_that_is_no_determinant_is_refused() {
         let output = masseter(&["uniqueness", "prove", "--boxes", "10", &format!("--margin={margin}")]);
         assert_eq!(output.status.code(), Some(2), "{margin}: {}", stderr(&output));
         assert!(stderr(&output).contains("use a finite determinant, 0 or above"), "{}", stderr(&output));
+    }
+}
+
+#[test]
+fn a_file_that_is_there_already_is_never_overwritten_with_inputs() {
+    let bench = Bench::new("");
+    let mine = bench.write("mine.csv", "mine\n");
+    let out = mine.to_str().unwrap();
+    for verb in [&["search", "--inputs", "10"][..], &["prove", "--boxes", "10"]] {
+        let output = masseter(&[&["uniqueness"], verb, &["--out", out]].concat());
+        assert_eq!(output.status.code(), Some(2), "{verb:?}: {}", stderr(&output));
+        assert!(stderr(&output).contains("mine.csv exists and is not overwritten"), "{}", stderr(&output));
+        assert!(stdout(&output).is_empty(), "{verb:?} had begun: {}", stdout(&output));
+        assert_eq!(std::fs::read_to_string(&mine).unwrap(), "mine\n");
     }
 }
 

@@ -8,6 +8,8 @@ use std::time::UNIX_EPOCH;
 
 use masseter_shared::clock;
 
+use crate::output::{self, OutputError};
+
 /// A run folder.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct RunFolder(PathBuf);
@@ -15,20 +17,12 @@ pub struct RunFolder(PathBuf);
 /// Why a run folder could not be made or opened.
 #[derive(Debug, thiserror::Error)]
 pub enum FolderError {
-    /// It is there already.
-    #[error("{} exists and is not overwritten; choose another --out", .0.display())]
-    Exists(PathBuf),
     /// It is no run folder.
     #[error("{} is no run folder: it holds no recording.mcap", .0.display())]
     NoRun(PathBuf),
-    /// The system refused.
-    #[error("cannot create {}: {error}", path.display())]
-    Create {
-        /// The folder.
-        path: PathBuf,
-        /// What the system said.
-        error: io::Error,
-    },
+    /// It could not be made.
+    #[error(transparent)]
+    New(#[from] OutputError),
 }
 
 impl RunFolder {
@@ -48,21 +42,10 @@ impl RunFolder {
 
     /// Creates this very folder, which must not exist.
     pub fn create(path: &Path) -> Result<Self, FolderError> {
-        let failed = |error| FolderError::Create { path: path.to_owned(), error };
-        if let Some(parent) = path.parent() {
-            fs::create_dir_all(parent).map_err(failed)?;
-        }
-        match fs::create_dir(path) {
-            Ok(()) => {
-                let folder = path.canonicalize().map_err(failed)?;
-                folder.parent().map(secure_names);
-                Ok(Self(folder))
-            }
-            Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {
-                Err(FolderError::Exists(path.to_owned()))
-            }
-            Err(error) => Err(failed(error)),
-        }
+        output::new_folder(path)?;
+        let folder = path.canonicalize().map_err(OutputError::of(path))?;
+        folder.parent().map(secure_names);
+        Ok(Self(folder))
     }
 
     /// Opens the folder of a past run.

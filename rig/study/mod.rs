@@ -21,12 +21,13 @@ mod workspace;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, bail};
+use anyhow::Context;
 use clap::Args;
 use masseter_shared::geometry::{Mechanism, MechanismConfig, Vec3};
 use rayon::prelude::*;
 
 use crate::exit::Exit;
+use crate::output;
 use basins::Basins;
 use motions::Motion;
 use multiplicity::Multiplicity;
@@ -79,12 +80,9 @@ pub(crate) fn kinematics(args: &KinematicsArgs) -> anyhow::Result<Exit> {
 
 impl Study {
     fn make(args: &KinematicsArgs) -> anyhow::Result<Self> {
-        // Before a minute's work, not after it.
-        if args.out.exists() {
-            bail!("{} exists and is not overwritten; choose another --out", args.out.display());
-        }
         let mechanism = Mechanism::new(&MechanismConfig::default())?;
         let motions = motions::motions(&mechanism, args.trajectory.as_deref())?;
+        output::new_folder(&args.out)?;
         let (samples, cells) = (args.samples as usize, args.cells as usize);
         tell!("{samples} random guesses of each kind");
         let trials = Trials::run(&mechanism, samples, args.seed);
@@ -105,7 +103,6 @@ impl Study {
         let claims = claims::judge(self);
         let page = page::of(self, args, &claims, &figures);
         let folder = &args.out;
-        fs::create_dir_all(folder).with_context(|| format!("cannot create {}", folder.display()))?;
         let written = |name: &str| format!("cannot write {}", folder.join(name).display());
         for table in self.tables() {
             table.write(folder).with_context(|| written(table.name))?;

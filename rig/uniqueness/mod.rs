@@ -6,7 +6,8 @@ mod motion;
 mod proof;
 mod search;
 
-use std::io::Write;
+use std::fs::File;
+use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
@@ -16,6 +17,7 @@ use masseter_shared::geometry::{GeometryError, Mechanism, MechanismConfig};
 
 use crate::cli::RunArgs;
 use crate::exit::Exit;
+use crate::output;
 use crate::run::plan::Plan;
 
 /// What `uniqueness` does.
@@ -48,7 +50,7 @@ pub(crate) struct ProveArgs {
     /// Count only solutions whose determinant is at least this [default: the paper's conditions alone]
     #[arg(long, value_name = "DETERMINANT", value_parser = parse_margin)]
     margin: Option<f64>,
-    /// CSV file for the boxes that stay undecided
+    /// CSV file for the boxes that stay undecided; must not exist
     #[arg(long, value_name = "FILE.csv")]
     out: Option<PathBuf>,
 }
@@ -65,7 +67,7 @@ pub(crate) struct SearchArgs {
     /// Seed of the random numbers
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// CSV file for the inputs found
+    /// CSV file for the inputs found; must not exist
     #[arg(long, value_name = "FILE.csv")]
     out: Option<PathBuf>,
 }
@@ -84,21 +86,30 @@ pub(crate) enum Region {
 
 /// Carries a verb out. Exits with 1 where uniqueness is not proven, or an input with two was found.
 pub(crate) fn uniqueness(verb: &UniquenessVerb) -> anyhow::Result<Exit> {
-    let (settled, rows, out) = match verb {
+    let settled = match verb {
         UniquenessVerb::Prove(args) => {
             let (mechanism, wholes) = to_prove(args)?;
-            let (settled, rows) = proof::prove(args, &mechanism, wholes)?;
-            (settled, rows, &args.out)
+            with_output(args.out.as_deref(), || proof::prove(args, &mechanism, wholes))?
         }
         UniquenessVerb::Search(args) => {
-            let (settled, rows) = search::search(args, &published()?)?;
-            (settled, rows, &args.out)
+            let mechanism = published()?;
+            with_output(args.out.as_deref(), || search::search(args, &mechanism))?
         }
     };
-    if let Some(path) = out {
-        write_rows(path, &rows).with_context(|| format!("cannot write {}", path.display()))?;
-    }
     Ok(if settled { Exit::Passed } else { Exit::Failed })
+}
+
+/// Does the work and writes its rows to a new file, if one is named. Whether all was settled.
+fn with_output(
+    out: Option<&Path>,
+    work: impl FnOnce() -> anyhow::Result<(bool, Vec<String>)>,
+) -> anyhow::Result<bool> {
+    let file = out.map(output::new_file).transpose()?;
+    let (settled, rows) = work()?;
+    if let (Some(path), Some(file)) = (out, file) {
+        write_rows(file, &rows).with_context(|| format!("cannot write {}", path.display()))?;
+    }
+    Ok(settled)
 }
 
 /// The mechanism and the boxes that something is to be proven of.
@@ -142,8 +153,8 @@ fn published() -> Result<Mechanism, GeometryError> {
     Mechanism::new(&MechanismConfig::default())
 }
 
-fn write_rows(path: &Path, rows: &[String]) -> std::io::Result<()> {
-    let mut file = std::io::BufWriter::new(std::fs::File::create(path)?);
+fn write_rows(file: File, rows: &[String]) -> io::Result<()> {
+    let mut file = BufWriter::new(file);
     for row in rows {
         writeln!(file, "{row}")?;
     }
