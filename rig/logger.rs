@@ -37,7 +37,7 @@ pub struct Show {
     pub live: Option<SocketAddr>,
     /// Whether standard error is spared the progress.
     pub quiet: bool,
-    /// How long the motion lasts, s, if that is known.
+    /// How far the motion will come, s, if that is known.
     pub motion_s: Option<f64>,
 }
 

@@ -92,6 +92,43 @@ fn recorded_patients_play() {
     }
 }
 
+/// Without turns, the platform is displaced as the jaw.
+#[test]
+fn what_is_wanted_at_a_time_of_the_motion_is_the_recordings_sample_of_that_time() {
+    let lowered_m = |time_s: f64| -0.005 * (2.0 * time_s).sin().powi(2);
+    let row = |i: u32| {
+        let time_s = f64::from(i) / 100.0;
+        format!("{},0,0,{},1,0,0,0\n", 7.0 + time_s, 1e3 * lowered_m(time_s))
+    };
+    let rows: String = (0..=200).map(row).collect();
+    let bench = Bench::new("[motion]\nkind = 'file'\npath = 'jaw.csv'\nlowpass_hz = 0.0");
+    bench.write("jaw.csv", &format!("time_s,x_mm,y_mm,z_mm,qw,qx,qy,qz\n{rows}"));
+    assert_eq!(bench.run(&["--clock", "virtual"]).status.code(), Some(0));
+    let (run, out) = (bench.run_folder(), bench.file("csv"));
+    let [run, out] = [&run, &out].map(|path| path.to_str().unwrap());
+    common::masseter(&["log", "export", run, "--topic", "state", "--out", out]);
+
+    let table = fs::read_to_string(bench.file("csv").join("state.csv")).unwrap();
+    let (header, lines) = table.split_once('\n').unwrap();
+    let column = |name: &str| header.split(',').position(|column| column == name).expect(name);
+    let [time, height] = ["motion_time_s", "desired_position_m_2"].map(column);
+    let value = |line: &str, column| line.split(',').nth(column).unwrap().parse::<f64>().unwrap();
+    let played: Vec<_> = lines
+        .lines()
+        .map(|line| (value(line, time), value(line, height)))
+        .filter(|(time_s, _)| *time_s >= 0.0)
+        .collect();
+    let (_, closed_m) = played[0];
+    for &(time_s, height_m) in &played {
+        assert!(
+            (height_m - closed_m - lowered_m(time_s)).abs() < 1e-6,
+            "{} mm at {time_s} s",
+            1e3 * (height_m - closed_m)
+        );
+    }
+    assert!(played.len() > 2500 && (played.last().unwrap().0 - 2.0).abs() < 1e-9, "{:?}", played.last());
+}
+
 /// The example's piece of food yields at 35 N.
 #[test]
 fn food_resists_the_jaw_and_the_platform_still_goes_where_it_should() {

@@ -110,9 +110,14 @@ impl Playback {
         self.is_over() || self.rate == 0.0
     }
 
-    /// Time on the motion's clock `ahead_s` from now, s; negative before the motion.
+    /// How far the motion has come `ahead_s` from now, as [`Trajectory::motion_time_s`] tells; negative before it
+    /// begins.
     pub(crate) fn motion_time_ahead_s(&self, ahead_s: f64) -> f64 {
-        if self.part == Part::Motion { self.time_ahead_s(ahead_s) } else { -1.0 }
+        if self.part == Part::Motion {
+            self.trajectory.motion_time_s(self.time_ahead_s(ahead_s))
+        } else {
+            -1.0
+        }
     }
 }
 

@@ -71,7 +71,7 @@ pub(super) struct Told {
 pub(super) struct View {
     mode: Mode,
     seen: Seen,
-    /// How long the motion lasts, s, if that is known.
+    /// How far the motion will come, s, if that is known.
     motion_s: Option<f64>,
     shown_ns: u64,
     /// Lines of the picture that stands on the terminal.

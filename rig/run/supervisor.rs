@@ -122,7 +122,8 @@ impl Rig {
         let recording = recording.to_str().context("the run folder's path is not UTF-8")?;
         let common = ["--scenario", scenario, "--domain", domain.id()];
         let live = args.live.map(|address| format!("--live={address}"));
-        let motion = format!("--motion-s={}", plan.trajectory.duration_s());
+        let motion_s = plan.trajectory.motion_time_s(plan.trajectory.duration_s());
+        let motion = format!("--motion-s={motion_s}");
         let mut for_logger = [&common[..], &["--recording", recording, &motion]].concat();
         for_logger.extend(args.quiet.then_some("--quiet"));
         for_logger.extend(live.as_deref());

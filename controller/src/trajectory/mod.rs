@@ -86,8 +86,18 @@ impl Trajectory {
     /// The platform in the base frame `t_s` seconds after the start; at rest before 0 and after
     /// [`duration_s`](Self::duration_s).
     pub fn pose(&self, t_s: f64) -> Pose {
-        let motion_s = self.clock.motion_time_s(t_s);
+        self.pose_in_motion(self.motion_time_s(t_s))
+    }
+
+    /// The platform in the base frame at a time of the motion, s.
+    pub(crate) fn pose_in_motion(&self, motion_s: f64) -> Pose {
         self.frame.platform(&self.motion.displacement(motion_s))
+    }
+
+    /// How far the motion has come `t_s` seconds after the start, s: of a recording, the time since its first row. It
+    /// passes more slowly while the motion gathers speed and while it comes to rest.
+    pub fn motion_time_s(&self, t_s: f64) -> f64 {
+        self.clock.motion_time_s(t_s)
     }
 
     /// How long the trajectory lasts, s.
@@ -103,7 +113,7 @@ impl Trajectory {
     /// The line of the recording nearest to a time of the trajectory; none for a generator.
     pub fn source_line(&self, t_s: f64) -> Option<SourceLine> {
         match &self.motion {
-            Motion::Recording(recording) => Some(recording.source_line(self.clock.motion_time_s(t_s))),
+            Motion::Recording(recording) => Some(recording.source_line(self.motion_time_s(t_s))),
             Motion::Chewing(_) | Motion::Excursion(_) => None,
         }
     }

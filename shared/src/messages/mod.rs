@@ -42,8 +42,8 @@ pub trait Message: Pod + ZeroCopySend + Default + std::fmt::Debug + PartialEq {
     fn stamp(&mut self, seq: u64, published_ns: u64);
 }
 
-/// Version of the layouts below; it changes with any of them.
-pub const LAYOUT_VERSION: u64 = 6;
+/// Version of the layouts below; it changes with any of them, and with what a field means.
+pub const LAYOUT_VERSION: u64 = 7;
 
 macro_rules! messages {
     ($($(#[$doc:meta])* $name:ident on $topic:literal keeping $depth:literal {
@@ -181,7 +181,9 @@ messages! {
         worked_ns: u64,
         /// Part of it in stretches too long for the work alone, ns.
         overlong_ns: u64,
-        /// Time on the motion's own clock at the sample, s; negative before the motion begins.
+        /// How far the motion had come at the sample, s: of a recorded one, the time since the recording's first row. It
+        /// passes more slowly while the motion gathers speed and while it comes to rest. Negative before the motion
+        /// begins.
         motion_time_s: f64,
         /// Pose wanted at the sample: position in the base frame, m.
         desired_position_m: [f64; 3],

@@ -16,7 +16,7 @@ fn a_late_reading_is_compared_with_the_pose_wanted_at_its_own_sample() {
     assert_eq!(state.reading_cycle + 1, state.cycle);
     let wanted = nalgebra::Vector3::from(state.desired_position_m);
     assert!((wanted - nalgebra::Vector3::from(state.estimated_position_m)).norm() < 5e-5);
-    let at_its_time = trajectory(&short()).pose(state.motion_time_s).translation.vector;
+    let at_its_time = trajectory(&short()).pose_in_motion(state.motion_time_s).translation.vector;
     assert!((wanted - at_its_time).norm() < 1e-12);
 }
 
