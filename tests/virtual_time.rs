@@ -129,6 +129,28 @@ fn what_is_wanted_at_a_time_of_the_motion_is_the_recordings_sample_of_that_time(
     assert!(played.len() > 2500 && (played.last().unwrap().0 - 2.0).abs() < 1e-9, "{:?}", played.last());
 }
 
+#[test]
+fn markers_whose_centroid_stands_for_the_incisal_point_are_told_of_once_the_jaw_turns() {
+    // One marker in the axis of the turn, which is that of the condyles.
+    let row = |i: u32, largest_deg: f64| {
+        let time_s = f64::from(i) / 100.0;
+        let (sin, cos) = (largest_deg.to_radians() * (2.0 * time_s).sin().powi(2)).sin_cos();
+        format!("{time_s},0,0,0,{},0,{},0,40,0\n", 40.0 * cos, -40.0 * sin)
+    };
+    let columns = "time_s,m1_x_mm,m1_y_mm,m1_z_mm,m2_x_mm,m2_y_mm,m2_z_mm,m3_x_mm,m3_y_mm,m3_z_mm";
+    let origin = "marker_origin_mm = [0.0, 0.0, 0.0]";
+    for (largest_deg, key, is_told) in [(3.0, "", true), (3.0, origin, false), (1.0, "", false)] {
+        let bench = Bench::new(&format!("[motion]\nkind = 'file'\npath = 'm.csv'\n{key}"));
+        let rows: String = (0..=160).map(|i| row(i, largest_deg)).collect();
+        bench.write("m.csv", &format!("{columns}\n{rows}"));
+        let output = bench.run(&["--clock", "virtual"]);
+        assert_eq!(output.status.code(), Some(0), "{}{}", stdout(&output), stderr(&output));
+        let told = "the jaw turns by up to 3.0°, and the markers' centroid stands for the incisal point; \
+                    set motion.marker_origin_mm";
+        assert_eq!(stderr(&output).contains(told), is_told, "{largest_deg}° {key}: {}", stderr(&output));
+    }
+}
+
 /// The example's piece of food yields at 35 N.
 #[test]
 fn food_resists_the_jaw_and_the_platform_still_goes_where_it_should() {

@@ -62,7 +62,7 @@ impl Plan {
         Ok(Self { scenario, mechanism, trajectory, demands, schedule })
     }
 
-    /// One line that says what is about to run.
+    /// A line that says what is about to run, and one more where the recording does not say all that it should.
     pub fn announcement(&self) -> String {
         let scenario = &self.scenario;
         let wires = match &scenario.can.interfaces[..] {
@@ -72,14 +72,22 @@ impl Plan {
         let cut = self.trajectory.cut_from_s();
         let cut = cut
             .map_or_else(String::new, |whole_s| format!("; cut short: to its end it takes {whole_s:.1} s"));
+        let centroid = self.trajectory.centroid_turn_deg().map_or_else(String::new, of_centroid);
         format!(
-            "{}: {:.1} s at {} Hz on {wires}, seed {}{cut}",
+            "{}: {:.1} s at {} Hz on {wires}, seed {}{cut}{centroid}",
             scenario.name,
             self.trajectory.duration_s(),
             scenario.rate_hz,
             scenario.seed
         )
     }
+}
+
+fn of_centroid(turn_deg: f64) -> String {
+    format!(
+        "\n  the jaw turns by up to {turn_deg:.1}°, and the markers' centroid stands for the incisal point; \
+         set motion.marker_origin_mm"
+    )
 }
 
 fn apply(args: &RunArgs, scenario: &mut Scenario) -> anyhow::Result<()> {

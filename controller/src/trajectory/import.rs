@@ -202,6 +202,8 @@ pub(super) struct Samples {
     pub time_s: Vec<f64>,
     pub lines: Vec<u64>,
     pub displacements: Vec<Pose>,
+    /// Whether they are those of the markers' centroid, because nobody said where the incisal point is.
+    pub are_of_centroid: bool,
 }
 
 /// Reads, converts to the jaw frame and smooths.

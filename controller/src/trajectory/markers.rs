@@ -18,7 +18,7 @@ const SIDES: [(usize, usize); 3] = [(0, 1), (1, 2), (2, 0)];
 /// Displacements of the jaw; `origin` is the incisal point at the closed pose in file coordinates,
 /// metres, by default the markers' centroid.
 pub(super) fn samples(table: &Table, axes: &Axes, origin: Option<Vec3>) -> Result<Samples, Located> {
-    let mut samples = Samples::default();
+    let mut samples = Samples { are_of_centroid: origin.is_none(), ..Samples::default() };
     let Some(first) = table.rows.first() else { return Ok(samples) };
     let closed = markers(first);
     check_spread(&closed).map_err(|problem| Located::at(first.line, problem))?;

@@ -110,6 +110,15 @@ impl Trajectory {
         self.clock.cut_from_s()
     }
 
+    /// The largest turn of the jaw, degrees, where a recording's markers leave open where the incisal point is, their
+    /// centroid stands for it, and the turn makes that matter.
+    pub fn centroid_turn_deg(&self) -> Option<f64> {
+        match &self.motion {
+            Motion::Recording(recording) => recording.centroid_turn_deg(),
+            Motion::Chewing(_) | Motion::Excursion(_) => None,
+        }
+    }
+
     /// The line of the recording nearest to a time of the trajectory; none for a generator.
     pub fn source_line(&self, t_s: f64) -> Option<SourceLine> {
         match &self.motion {

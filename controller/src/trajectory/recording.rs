@@ -15,6 +15,9 @@ use super::spline::Spline;
 /// Least rate of the even grid, Hz: well above what a jaw does. What is sampled faster keeps its rate, because what a
 /// slower grid cannot hold would return on it as slow motion, which the filter passes.
 const LEAST_GRID_HZ: f64 = 200.0;
+/// A turn by more than this moves the incisal point otherwise than the markers' centroid by what matters: 1.4 mm where
+/// they are 40 mm apart.
+const CENTROID_TURN_DEG: f64 = 2.0;
 /// Beyond this, rotation vectors are no longer a good measure of the way between two poses.
 const LARGEST_TURN_DEG: f64 = 90.0;
 
@@ -26,6 +29,7 @@ pub(super) struct Recording {
     lines: Vec<u64>,
     first_rotation: UnitQuaternion<f64>,
     curve: Spline<6>,
+    centroid_turn_deg: Option<f64>,
 }
 
 impl Recording {
@@ -33,10 +37,19 @@ impl Recording {
     pub(super) fn new(path: PathBuf, samples: Samples, lowpass_hz: f64) -> Result<Self, Located> {
         let first_rotation = samples.displacements[0].rotation;
         let coordinates = coordinates(&samples, &first_rotation)?;
+        let turns = coordinates.iter().map(|at| at.fixed_rows::<3>(3).norm().to_degrees());
+        let largest_turn_deg = turns.fold(0.0, f64::max);
         let time_s: Vec<f64> = samples.time_s.iter().map(|t_s| t_s - samples.time_s[0]).collect();
         let raw = Spline::through(time_s.clone(), coordinates);
         let curve = if lowpass_hz == 0.0 { raw } else { smoothed(&raw, &time_s, lowpass_hz) };
-        Ok(Self { path, time_s, lines: samples.lines, first_rotation, curve })
+        let centroid_turn_deg = samples.are_of_centroid.then_some(largest_turn_deg);
+        let centroid_turn_deg = centroid_turn_deg.filter(|&turn_deg| turn_deg > CENTROID_TURN_DEG);
+        Ok(Self { path, time_s, lines: samples.lines, first_rotation, curve, centroid_turn_deg })
+    }
+
+    /// The largest turn, degrees, where it matters that the markers' centroid stands for the incisal point.
+    pub(super) fn centroid_turn_deg(&self) -> Option<f64> {
+        self.centroid_turn_deg
     }
 
     pub(super) fn length_s(&self) -> f64 {
@@ -98,7 +111,8 @@ mod tests {
     fn samples_at(rate_hz: f64, poses: impl Fn(f64) -> Pose) -> Samples {
         let time_s: Vec<f64> = (0..=(2.0 * rate_hz) as u32).map(|k| 5.0 + f64::from(k) / rate_hz).collect();
         let displacements = time_s.iter().map(|t_s| poses(t_s - 5.0)).collect();
-        Samples { lines: (3..).take(time_s.len()).collect(), time_s, displacements }
+        let lines = (3..).take(time_s.len()).collect();
+        Samples { lines, time_s, displacements, are_of_centroid: false }
     }
 
     fn swaying(t_s: f64) -> Pose {
