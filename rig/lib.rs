@@ -25,6 +25,7 @@ pub mod log;
 pub mod logger;
 pub mod machine;
 mod output;
+mod palette;
 pub mod plant;
 pub mod recording;
 pub mod report;

@@ -121,6 +121,18 @@ fn statuses_name_what_the_mechanism_cannot_do() {
     assert!(!line.ends_with(",ok") && line.starts_with(",,,"), "{line}");
 }
 
+/// Upside down, and below the base: the strokes would do, and `fk` tells another pose of them.
+#[test]
+fn a_pose_in_which_the_mechanism_cannot_stand_is_a_wrong_assembly() {
+    let output = pipe(
+        &["ik"],
+        "x_m,y_m,z_m,qw,qx,qy,qz\n0,0,0.27,0,1,0,0\n0,0,-0.27,1,0,0,0\n0,0,0.27,1,0,0,0\n0,0,-0.5,1,0,0,0\n",
+    );
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    assert_eq!(statuses(&output), ["wrong_assembly", "wrong_assembly", "ok", "wrong_assembly"]);
+    assert!(stdout(&output).lines().skip(1).all(|line| columns(line).len() == 9), "{}", stdout(&output));
+}
+
 #[test]
 fn wrong_columns_are_refused_with_the_right_ones() {
     let output = pipe(&["fk"], "a,b\n1,2\n");

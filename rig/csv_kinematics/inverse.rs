@@ -1,6 +1,7 @@
 //! `masseter ik`: poses to joint coordinates.
 
-use masseter_shared::geometry::{InverseError, Mechanism, Pose};
+use masseter_controller::kinematics::Assembly;
+use masseter_shared::geometry::{InverseError, Joints, Mechanism, Pose};
 use masseter_shared::messages::pose_of_fields;
 
 use super::table::{Columns, Lines, convert, mechanism};
@@ -14,7 +15,8 @@ const COLUMNS_IN: [&str; 7] = ["x_m", "y_m", "z_m", "qw", "qx", "qy", "qz"];
 const COLUMNS_OUT: [&str; 9] =
     ["d1_m", "d2_m", "d3_m", "l1_m", "l2_m", "l3_m", "theta1_rad", "theta2_rad", "theta3_rad"];
 
-/// Status `ok`, `outside_stroke` (the values stand all the same) or `singular` (a leg without length).
+/// Status `ok`; `outside_stroke`, or `wrong_assembly` where the mechanism cannot stand as it is built (the values stand
+/// all the same); or `singular` (a leg without length).
 pub(crate) fn inverse(args: &CsvArgs) -> anyhow::Result<Exit> {
     let mechanism = mechanism(args)?;
     let columns = Columns { read: COLUMNS_IN, written: &COLUMNS_OUT };
@@ -32,14 +34,22 @@ fn pose([x, y, z, qw, qx, qy, qz]: [f64; 7]) -> Result<Pose, String> {
     Ok(pose_of_fields([x, y, z], [qw, qx, qy, qz]))
 }
 
+fn status(mechanism: &Mechanism, joints: &Joints) -> &'static str {
+    if !Assembly::new(mechanism, &joints.actuators, &joints.theta_rad).is_true() {
+        "wrong_assembly"
+    } else if mechanism.strokes().check(&joints.actuators).is_err() {
+        "outside_stroke"
+    } else {
+        "ok"
+    }
+}
+
 fn solve(mechanism: &Mechanism, pose: &Pose, lines: &mut Lines) {
     match mechanism.inverse(pose) {
         Ok(joints) => {
             let [d1, d2, d3, l1, l2, l3] = joints.actuators.to_axes();
             let [t1, t2, t3] = joints.theta_rad;
-            let is_inside = mechanism.strokes().check(&joints.actuators).is_ok();
-            let status = if is_inside { "ok" } else { "outside_stroke" };
-            lines.row(&[d1, d2, d3, l1, l2, l3, t1, t2, t3], status);
+            lines.row(&[d1, d2, d3, l1, l2, l3, t1, t2, t3], status(mechanism, &joints));
         }
         Err(InverseError::NoLength { .. } | InverseError::NotFinite) => {
             lines.empty(COLUMNS_OUT.len(), "singular");
