@@ -12,23 +12,11 @@ use std::time::Duration;
 
 use common::{
     Bench, PASSED_OR_INVALID, UNHURRIED, check, child_of, masseter, shared_memory_of, skip, start, stderr,
-    stdout, take_the_cores,
+    stdout, take_the_cores, wait_until_it_records,
 };
 use masseter_shared::clock;
 use rustix::process::{Pid, Signal, kill_process, kill_process_group, test_kill_process};
 use serde_json::Value;
-
-/// Waits until the recording shows that the rig runs.
-fn wait_until_it_records(bench: &Bench) {
-    for _ in 0..1000 {
-        let recorded = fs::metadata(bench.run_folder().join("recording.mcap")).map_or(0, |file| file.len());
-        if recorded > 500_000 {
-            return;
-        }
-        clock::sleep(Duration::from_millis(10));
-    }
-    panic!("the rig did not begin to record");
-}
 
 /// A rig in the midst of a long run.
 fn running() -> (Bench, Child) {

@@ -4,7 +4,10 @@ mod common;
 
 use std::fs;
 
-use common::{Bench, cramped, jaw_recording, json, stderr, stdout};
+use common::{
+    Bench, cramped, jaw_recording, json, start, stderr, stdout, wait_until_it_records,
+};
+use rustix::process::{Pid, Signal, kill_process};
 use serde_json::json;
 
 #[test]
@@ -180,6 +183,22 @@ fn a_plant_that_fails_is_a_death_as_in_real_time_and_is_told_again() {
     let again = common::masseter(&["report", bench.run_folder().to_str().unwrap()]);
     assert_eq!(stdout(&again), stdout(&output));
     assert!(stdout(&again).contains("the plant died: the mechanism"), "{}", stdout(&again));
+}
+
+#[test]
+fn an_interrupt_ends_a_run_in_order_as_in_real_time() {
+    for signal in [Signal::INT, Signal::TERM] {
+        let bench = Bench::new("duration_s = 60.0");
+        let child = start(&bench, &["--clock", "virtual"]);
+        wait_until_it_records(&bench);
+        kill_process(Pid::from_child(&child), signal).unwrap();
+        let output = child.wait_with_output().unwrap();
+        assert_eq!(output.status.code(), Some(130), "{signal:?}: {}", stderr(&output));
+        let summary = bench.summary();
+        assert_eq!(summary["verdict"]["word"], "INTERRUPTED");
+        assert_eq!(summary["figures"]["final_state"], "finished");
+        assert!(bench.run_folder().join("junit.xml").is_file());
+    }
 }
 
 #[test]

@@ -63,7 +63,8 @@ pub fn run(args: &RunArgs) -> Result<Exit, Failure> {
     manifest.ending = ended.ending;
     keep(&manifest)?;
     // Before the processes were ready, and anything was recorded.
-    if manifest.ending == Ending::Interrupted && manifest.scheduling.is_empty() {
+    let is_in_processes = args.clock == ClockKind::Rt;
+    if manifest.ending == Ending::Interrupted && is_in_processes && manifest.scheduling.is_empty() {
         return Ok(Exit::Interrupted);
     }
     let figures = analysis::analyse(&folder, &plan.scenario)

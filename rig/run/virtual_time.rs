@@ -4,6 +4,7 @@
 //! same bytes. Computing takes no time here, and readings and commands go out when the time table has them at the
 //! latest: what varies is the bus.
 
+use anyhow::Context;
 use masseter_controller::core::{Controller, Tick};
 use masseter_plant::core::{PlantCore, PlantError};
 use masseter_shared::clock::SECOND_NS;
@@ -13,6 +14,7 @@ use masseter_shared::realtime::Wake;
 
 use super::child::Role;
 use super::folder::RunFolder;
+use super::interrupts::Interrupts;
 use super::plan::Plan;
 use crate::recording::{Backlog, Pace, Recorder, Scene};
 use crate::report::verdict::Ending;
@@ -20,8 +22,15 @@ use crate::report::verdict::Ending;
 /// Virtual time of the first SYNC, ns.
 const EPOCH_NS: u64 = SECOND_NS;
 
-/// Runs the rig under virtual time; it ends as the processes would.
+/// Runs the rig under virtual time; it ends as the processes would, also when the user stops it.
 pub fn run(plan: &Plan, folder: &RunFolder) -> anyhow::Result<Ending> {
+    let interrupts = Interrupts::listen().context("cannot listen for signals")?;
+    let ending = play(plan, folder, &interrupts);
+    interrupts.let_go();
+    ending
+}
+
+fn play(plan: &Plan, folder: &RunFolder, interrupts: &Interrupts) -> anyhow::Result<Ending> {
     let scenario = &plan.scenario;
     let mut plant = PlantCore::new(scenario, EPOCH_NS)?;
     let mut controller = Controller::new(scenario, plan.mechanism.clone(), plan.trajectory.clone());
@@ -29,8 +38,11 @@ pub fn run(plan: &Plan, folder: &RunFolder) -> anyhow::Result<Ending> {
     let mut log = Log::new(Backlog::start(Recorder::create(&folder.recording(), scene)?, Pace::Virtual));
 
     let (mut cycle, mut plant_error) = (0, None);
-    while plant_error.is_none() && !controller.is_done() && log.is_safe() {
+    while plant_error.is_none() && !controller.is_done() && log.is_safe() && !interrupts.insist() {
         cycle += 1;
+        if interrupts.ask() {
+            controller.request_stop();
+        }
         let sync_ns = EPOCH_NS + (cycle - 1) * scenario.period_ns();
         plant_error = step(cycle, sync_ns, plan, &mut plant, &mut controller, &mut log).err();
     }
@@ -41,6 +53,7 @@ pub fn run(plan: &Plan, folder: &RunFolder) -> anyhow::Result<Ending> {
     Ok(match (plant_error, controller.state()) {
         (Some(error), _) => Ending::died(Role::Plant.name(), error.to_string()),
         _ if loss.is_some() => Ending::RecordingFailed,
+        _ if interrupts.ask() => Ending::Interrupted,
         (None, ControllerState::SafeStop) => Ending::SafeStop,
         (None, _) => Ending::Completed,
     })

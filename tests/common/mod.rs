@@ -83,6 +83,18 @@ pub(crate) fn start(bench: &Bench, arguments: &[&str]) -> Child {
     bench.run_command(arguments).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap()
 }
 
+/// Waits until the recording shows that the rig runs.
+pub(crate) fn wait_until_it_records(bench: &Bench) {
+    for _ in 0..1000 {
+        let recorded = fs::metadata(bench.run_folder().join("recording.mcap")).map_or(0, |file| file.len());
+        if recorded > 500_000 {
+            return;
+        }
+        clock::sleep(Duration::from_millis(10));
+    }
+    panic!("the rig did not begin to record");
+}
+
 /// The process of a running rig that plays `role`, once it runs.
 pub(crate) fn child_of(supervisor: &Child, role: &str) -> Pid {
     for _ in 0..500 {
