@@ -135,6 +135,41 @@ fn the_same_seed_gives_the_same_data_and_figures_and_another_seed_others() {
     assert_ne!(read(&folders[0], "success.csv"), read(&folders[2], "success.csv"));
 }
 
+/// Its anterior is the tracker's y, and its left −x: along the tracker's own axes it would leave the strokes.
+#[test]
+fn a_recording_is_judged_by_the_axes_the_jaw_and_the_limits_of_its_scenario() {
+    let place = tempfile::tempdir().unwrap();
+    let write = |name: &str, text: &str| {
+        let path = place.path().join(name);
+        fs::write(&path, text).unwrap();
+        path.to_str().unwrap().to_owned()
+    };
+    let row = |i: u32| format!("{0},0,{1},0,1,0,0,0\n", f64::from(i) / 50.0, -0.3 * f64::from(i));
+    let rows: String = (0..=100).map(row).collect();
+    let recording = write("jaw.csv", &format!("time_s,x_mm,y_mm,z_mm,qw,qx,qy,qz\n{rows}"));
+    let file = "[motion]\nkind = 'file'\npath = 'other.csv'\naxes = ['+y', '-x', '+z']\n";
+    let forward = write("forward.toml", &format!("{file}[jaw]\nclosed_offset_m = [0.012, 0.0, 0.0]"));
+    let own_axes = write("own-axes.toml", "[jaw]\nclosed_offset_m = [0.012, 0.0, 0.0]");
+    let slow = write("slow.toml", &format!("{file}[limits]\nslide_velocity_m_s = 0.001"));
+    let builders = write("builder.toml", "[mechanism]\nplatform_sides_m = [0.06, 0.06, 0.06]");
+
+    let within_limits = |name: &str, scenario: &str| {
+        let folder = place.path().join(name);
+        let output = study(&folder, &["--trajectory", &recording, "--scenario", scenario]);
+        assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+        assert!(read(&folder, "claims.md").contains(&format!(" --scenario {scenario}")));
+        let motions = read(&folder, "motions.csv");
+        let line = motions.lines().find(|line| line.starts_with("recording,")).unwrap();
+        line.split(',').nth(1).unwrap() == "1"
+    };
+    assert!(within_limits("forward", &forward));
+    assert!(!within_limits("own-axes", &own_axes));
+    assert!(!within_limits("slow", &slow));
+    let output = study(&place.path().join("builder"), &["--scenario", &builders]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(stderr(&output).contains("published mechanism"), "{}", stderr(&output));
+}
+
 #[test]
 fn folders_and_values_that_cannot_be_used_are_refused() {
     let place = tempfile::tempdir().unwrap();

@@ -31,12 +31,7 @@ pub struct Plan {
 impl Plan {
     /// Resolves and checks everything that can be wrong with the input.
     pub fn resolve(args: &RunArgs) -> anyhow::Result<Self> {
-        let mut scenario = match &args.scenario {
-            Some(path) => Scenario::read(path)?,
-            None => Scenario::default(),
-        };
-        apply(args, &mut scenario)?;
-        scenario.validate()?;
+        let scenario = scenario(args)?;
         if args.clock == ClockKind::Virtual && !scenario.can.is_virtual() {
             bail!("virtual time has no real wires: use --can virtual, or --clock rt");
         }
@@ -81,6 +76,17 @@ impl Plan {
             scenario.seed
         )
     }
+}
+
+/// The scenario with every argument applied, its values checked each for itself.
+pub(crate) fn scenario(args: &RunArgs) -> anyhow::Result<Scenario> {
+    let mut scenario = match &args.scenario {
+        Some(path) => Scenario::read(path)?,
+        None => Scenario::default(),
+    };
+    apply(args, &mut scenario)?;
+    scenario.validate()?;
+    Ok(scenario)
 }
 
 fn of_centroid(turn_deg: f64) -> String {

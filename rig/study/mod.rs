@@ -21,13 +21,16 @@ mod workspace;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use anyhow::Context;
+use anyhow::{Context, bail};
 use clap::Args;
+use masseter_shared::config::Scenario;
 use masseter_shared::geometry::{Mechanism, MechanismConfig, Vec3};
 use rayon::prelude::*;
 
+use crate::cli::RunArgs;
 use crate::exit::Exit;
 use crate::output;
+use crate::run::plan;
 use basins::Basins;
 use motions::Motion;
 use multiplicity::Multiplicity;
@@ -54,9 +57,12 @@ pub(crate) struct KinematicsArgs {
     /// Cells along each side of a map
     #[arg(long, value_name = "N", default_value_t = 160, value_parser = clap::value_parser!(u32).range(2..=1000))]
     cells: u32,
-    /// Recorded jaw motion (CSV of poses or markers) to draw into the workspace as well
+    /// Recorded jaw motion (CSV of poses or markers) to judge and to draw into the workspace as well
     #[arg(long, value_name = "FILE.csv")]
     trajectory: Option<PathBuf>,
+    /// Scenario whose motion is meant, or else the recording's axes, with its jaw and its limits
+    #[arg(long, value_name = "FILE.toml")]
+    scenario: Option<PathBuf>,
 }
 
 /// Everything that was measured.
@@ -78,10 +84,29 @@ pub(crate) fn kinematics(args: &KinematicsArgs) -> anyhow::Result<Exit> {
     study.write(args)
 }
 
+impl KinematicsArgs {
+    /// The scenario of the motion that is to be looked at beside the rig's own, if one is given.
+    fn own_scenario(&self) -> anyhow::Result<Option<Scenario>> {
+        if self.scenario.is_none() && self.trajectory.is_none() {
+            return Ok(None);
+        }
+        let run = RunArgs {
+            scenario: self.scenario.clone(),
+            trajectory: self.trajectory.clone(),
+            ..RunArgs::default()
+        };
+        let scenario = plan::scenario(&run)?;
+        if scenario.mechanism != MechanismConfig::default() {
+            bail!("the study is about the published mechanism; leave [mechanism] out of the scenario");
+        }
+        Ok(Some(scenario))
+    }
+}
+
 impl Study {
     fn make(args: &KinematicsArgs) -> anyhow::Result<Self> {
         let mechanism = Mechanism::new(&MechanismConfig::default())?;
-        let motions = motions::motions(&mechanism, args.trajectory.as_deref())?;
+        let motions = motions::motions(&mechanism, args.own_scenario()?.as_ref())?;
         output::new_folder(&args.out)?;
         let (samples, cells) = (args.samples as usize, args.cells as usize);
         tell!("{samples} random guesses of each kind");

@@ -1,11 +1,9 @@
 //! Jaw motions against the mechanism: whether it can follow them, and whether the solvers can.
 
-use std::path::Path;
-
 use masseter_controller::kinematics::ForwardTracker;
 use masseter_controller::trajectory::{self, Trajectory, TrajectoryReport};
 use masseter_shared::config::{
-    ChewingConfig, FileConfig, LateralConfig, MotionConfig, OpeningConfig, ProtrusionConfig, Scenario,
+    ChewingConfig, LateralConfig, MotionConfig, OpeningConfig, ProtrusionConfig, Scenario,
 };
 use masseter_shared::geometry::{LEGS, Mechanism};
 
@@ -38,29 +36,30 @@ pub(super) struct Followed {
     pub iterations_mean: f64,
 }
 
-/// The rig's generators with their defaults, the scenario's own first, and a recording if given.
+/// The rig's generators with their defaults, the default scenario's first, and the motion of `own` if given.
 ///
 /// # Errors
-/// When the recording cannot be used.
-pub(super) fn motions(mechanism: &Mechanism, recording: Option<&Path>) -> anyhow::Result<Vec<Motion>> {
+/// When its recording cannot be used, or a value of it lies outside its range.
+pub(super) fn motions(mechanism: &Mechanism, own: Option<&Scenario>) -> anyhow::Result<Vec<Motion>> {
     let generated = [
         ("chewing", MotionConfig::Chewing(ChewingConfig::default())),
         ("opening", MotionConfig::Opening(OpeningConfig::default())),
         ("protrusion", MotionConfig::Protrusion(ProtrusionConfig::default())),
         ("lateral excursion", MotionConfig::Lateral(LateralConfig::default())),
     ];
-    let recorded = recording.map(|path| ("recording", MotionConfig::File(FileConfig::new(path))));
-    generated
-        .into_iter()
-        .chain(recorded)
-        .map(|(name, config)| Motion::new(name, &config, mechanism))
-        .collect()
+    let generated = generated.map(|(name, motion)| (name, Scenario { motion, ..Scenario::default() }));
+    let own = own.map(|own| {
+        let name = if matches!(own.motion, MotionConfig::File(_)) { "recording" } else { "scenario" };
+        (name, own.clone())
+    });
+    generated.into_iter().chain(own).map(|(name, scenario)| Motion::new(name, &scenario, mechanism)).collect()
 }
 
 impl Motion {
-    fn new(name: &str, config: &MotionConfig, mechanism: &Mechanism) -> anyhow::Result<Self> {
-        let Scenario { jaw, limits, .. } = Scenario::default();
-        let trajectory = Trajectory::new(config, &jaw, mechanism, None)?;
+    fn new(name: &str, scenario: &Scenario, mechanism: &Mechanism) -> anyhow::Result<Self> {
+        let Scenario { motion, jaw, duration_s, .. } = scenario;
+        let trajectory = Trajectory::new(motion, jaw, mechanism, *duration_s)?;
+        let limits = scenario.limits.within(&scenario.drives);
         let demands =
             trajectory::check(&trajectory, mechanism, &limits, CYCLE_S).map_err(|error| error.to_string());
         let followed = SHOWN.map(|contender| follow(contender, mechanism, &trajectory));

@@ -1,6 +1,7 @@
 //! The page that sets each claim of the seed beside what was measured, in Markdown.
 
 use std::fmt::Write;
+use std::path::Path;
 
 use super::claims::Claim;
 use super::plot::Figure;
@@ -16,7 +17,7 @@ pub(super) fn of(study: &Study, args: &KinematicsArgs, claims: &[Claim], figures
          solution, each with a random guess of leg angles between 0° and 180°. Verdicts follow from the figures of \
          this run by the criterion beside them.\n\n\
          Masseter {version}, seed of the random numbers {seed}; again with\n\n    \
-         masseter kinematics --out DIR --seed {seed} --samples {samples} --cells {cells}{recording}\n\n\
+         masseter kinematics --out DIR --seed {seed} --samples {samples} --cells {cells}{motion}\n\n\
          Only times differ from run to run.\n\n\
          | # | The seed's claim | Where | Measured | Criterion | Verdict |\n\
          | --- | --- | --- | --- | --- | --- |\n",
@@ -24,10 +25,8 @@ pub(super) fn of(study: &Study, args: &KinematicsArgs, claims: &[Claim], figures
         cells = args.cells,
         seed = args.seed,
         version = env!("CARGO_PKG_VERSION"),
-        recording = args
-            .trajectory
-            .as_ref()
-            .map_or(String::new(), |path| format!(" --trajectory {}", path.display())),
+        motion =
+            option("trajectory", args.trajectory.as_deref()) + &option("scenario", args.scenario.as_deref()),
     );
     for (index, claim) in claims.iter().enumerate() {
         let figure = claim.figure.map_or(String::new(), |name| format!(" ([figure](#{name}))"));
@@ -48,6 +47,10 @@ pub(super) fn of(study: &Study, args: &KinematicsArgs, claims: &[Claim], figures
         );
     }
     page
+}
+
+fn option(name: &str, path: Option<&Path>) -> String {
+    path.map_or_else(String::new, |path| format!(" --{name} {}", path.display()))
 }
 
 /// How far the platform reaches in each map.

@@ -8,7 +8,7 @@ use crate::study::Study;
 use crate::study::share::quantile;
 use crate::study::workspace::{Coordinate, Map, Place};
 
-/// Of the motions: the default scenario's, the other generators', a recording.
+/// Of the motions: the default scenario's, the other generators', the one given.
 const MOTIONS: [RGBColor; 5] = [
     RGBColor(0xff, 0xff, 0xff),
     RGBColor(0xff, 0xb0, 0x00),
