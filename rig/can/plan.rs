@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use clap::Args;
 use masseter_plant::core as plant;
 use masseter_shared::can::{BusPlan, PlannedMessage};
-use masseter_shared::config::Scenario;
-use masseter_shared::schedule::{CycleSchedule, plans};
+use masseter_shared::config::{CanConfig, Scenario};
+use masseter_shared::schedule::{CycleSchedule, Room, ScheduleError, plans};
 use serde_json::{Value, json};
 
 use crate::cli::Format;
@@ -32,17 +32,23 @@ pub(crate) fn plan(args: &PlanArgs) -> anyhow::Result<Exit> {
     scenario.rate_hz = args.rate_hz.unwrap_or(scenario.rate_hz);
     scenario.validate()?;
     let plans = plans(&scenario.can, scenario.period_ns())?;
-    let refusal = refusal(&scenario, &plans);
+    let room = Room::of(&scenario.can)?;
+    let refusal = refusal(&scenario, &plans, &room);
     let text = match args.format {
         Format::Human => {
             let tables: String =
                 plans.iter().fold(String::new(), |text, plan| text + &plan.to_string() + "\n\n");
-            let verdict = refusal.as_ref().map_or_else(|| "fits".to_owned(), |why| format!("refused: {why}"));
+            let verdict =
+                refusal.as_ref().map_or_else(|| format!("fits; {room}"), |why| format!("refused: {why}"));
             format!("{tables}{verdict}\n")
         }
         Format::Json => {
-            let buses: Vec<_> = plans.iter().map(of_bus).collect();
-            format!("{:#}\n", json!({ "fits": refusal.is_none(), "refusal": refusal, "buses": buses }))
+            let buses: Result<Vec<_>, _> = plans.iter().map(|plan| of_bus(plan, &scenario.can)).collect();
+            let max_rate_hz = room.max_rate_hz;
+            let plan = json!({
+                "fits": refusal.is_none(), "refusal": refusal, "max_rate_hz": max_rate_hz, "buses": buses?,
+            });
+            format!("{plan:#}\n")
         }
     };
     result(&text)?;
@@ -50,24 +56,25 @@ pub(crate) fn plan(args: &PlanArgs) -> anyhow::Result<Exit> {
 }
 
 /// Why the rig could not run by the plan.
-fn refusal(scenario: &Scenario, plans: &[BusPlan]) -> Option<String> {
+fn refusal(scenario: &Scenario, plans: &[BusPlan], room: &Room) -> Option<String> {
     if let Some(overload) = plans.iter().find_map(|plan| plan.check().err()) {
-        return Some(format!("bus {} does not fit", overload.0.bus()));
+        return Some(format!("bus {} does not fit; {room}", overload.0.bus()));
     }
     let schedule = CycleSchedule::new(&scenario.can, scenario.period_ns()).map_err(|error| error.to_string());
     let plant = plant::check(scenario).map_err(|error| error.to_string());
     schedule.and(plant).err()
 }
 
-fn of_bus(plan: &BusPlan) -> Value {
-    json!({
+fn of_bus(plan: &BusPlan, can: &CanConfig) -> Result<Value, ScheduleError> {
+    let alone = CanConfig { buses: vec![can.buses[plan.bus()].clone()], ..can.clone() };
+    Ok(json!({
         "bus": plan.bus(),
         "fits": plan.check().is_ok(),
         "cycle_time_ns": plan.cycle_time_ns(),
         "utilisation": plan.utilisation(),
-        "max_rate_hz": plan.max_rate_hz(),
+        "max_rate_hz": Room::of(&alone)?.max_rate_hz,
         "messages": plan.messages().iter().map(of_message).collect::<Vec<_>>(),
-    })
+    }))
 }
 
 fn of_message(planned: &PlannedMessage) -> Value {
@@ -81,6 +88,7 @@ fn of_message(planned: &PlannedMessage) -> Value {
         "transmission_ns": planned.transmission_ns,
         "jitter_ns": planned.jitter_ns,
         "response_ns": planned.response_ns,
+        "arrival_ns": planned.arrival_ns(),
         "fits": planned.fits(),
     })
 }

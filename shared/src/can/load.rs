@@ -50,7 +50,13 @@ pub struct PlannedMessage {
 impl PlannedMessage {
     /// Whether it always arrives in time.
     pub fn fits(&self) -> bool {
-        self.response_ns.is_some_and(|response_ns| self.jitter_ns + response_ns <= self.message.deadline_ns)
+        self.arrival_ns().is_some_and(|arrival_ns| arrival_ns <= self.message.deadline_ns)
+    }
+
+    /// Longest time from the beginning of its period to arrival, ns: jitter and response; `None` where there is no
+    /// bound.
+    pub fn arrival_ns(&self) -> Option<u64> {
+        self.response_ns.map(|response_ns| self.jitter_ns + response_ns)
     }
 }
 
@@ -122,12 +128,6 @@ impl BusPlan {
     pub fn utilisation(&self) -> f64 {
         let shares = self.messages.iter();
         shares.map(|planned| planned.transmission_ns as f64 / planned.message.period_ns as f64).sum()
-    }
-
-    /// The highest rate at which the cycle's messages take no more than the time there is, Hz; infinite
-    /// without any.
-    pub fn max_rate_hz(&self) -> f64 {
-        1e9 / self.cycle_time_ns() as f64
     }
 
     /// The longest time from release to arrival of a message; `None` for one that is not in the plan, or
@@ -203,24 +203,24 @@ impl fmt::Display for BusPlan {
         }
         writeln!(
             f,
-            "; a cycle of {} µs takes {} µs at worst, at most {:.0} Hz; load {:.1} %",
+            "; a cycle of {} µs takes {} µs at worst; load {:.1} %",
             us(self.cycle_ns),
             us(self.cycle_time_ns()),
-            self.max_rate_hz().floor(),
             self.utilisation() * 100.0
         )?;
         write!(
             f,
-            "  {:<14} {:>4} {:>5} {:>11} {:>9} {:>9} {:>11} {:>11}",
-            "message", "id", "bytes", "period, µs", "wire, µs", "jitter", "response", "deadline"
+            "  {:<14} {:>4} {:>5} {:>11} {:>9} {:>9} {:>11} {:>11} {:>11}",
+            "message", "id", "bytes", "period, µs", "wire, µs", "jitter", "response", "in all", "deadline"
         )?;
         for planned in &self.messages {
             let PlannedMessage { message, transmission_ns, jitter_ns, response_ns } = planned;
-            let response = response_ns.map_or_else(|| "unbounded".to_owned(), us);
+            let [response, in_all] = [*response_ns, planned.arrival_ns()]
+                .map(|bound_ns| bound_ns.map_or_else(|| "unbounded".to_owned(), us));
             let mut line = String::new();
             write!(
                 line,
-                "  {:<14} {:>4} {:>5} {:>11} {:>9} {:>9} {:>11} {:>11}{}",
+                "  {:<14} {:>4} {:>5} {:>11} {:>9} {:>9} {:>11} {:>11} {:>11}{}",
                 message.name,
                 message.id.to_string(),
                 message.data_length,
@@ -228,6 +228,7 @@ impl fmt::Display for BusPlan {
                 us(*transmission_ns),
                 us(*jitter_ns),
                 response,
+                in_all,
                 us(message.deadline_ns),
                 if planned.fits() { "" } else { "  too late" }
             )?;
@@ -287,14 +288,16 @@ mod tests {
         let mut answer = message(2, 8, 1000);
         answer.released_by = Some(CanId::standard(1).unwrap());
         let plan = plan(1_000_000, vec![message(1, 0, 1000), answer]);
-        assert_eq!(plan.messages()[1].jitter_ns, plan.messages()[0].response_ns.unwrap());
+        let [first, second] = plan.messages() else { panic!("{plan}") };
+        assert_eq!(Some(second.jitter_ns), first.response_ns);
+        assert_eq!(second.arrival_ns(), Some(second.jitter_ns + second.response_ns.unwrap()));
     }
 
     #[test]
     fn an_overloaded_bus_has_no_bound_and_says_so() {
         let messages = (1..=13).map(|id| message(id, 8, 1000)).collect();
         let error = plan(1_000_000, messages).check().unwrap_err().to_string();
-        assert!(error.contains("takes 1755.0 µs at worst, at most 569 Hz"), "{error}");
+        assert!(error.contains("takes 1755.0 µs at worst; load"), "{error}");
         assert!(error.contains("unbounded") && error.contains("too late"), "{error}");
     }
 

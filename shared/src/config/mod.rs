@@ -19,4 +19,5 @@ pub use food::FoodConfig;
 pub use limits::TrajectoryLimitsConfig;
 pub use motion::*;
 pub use plant::{CanConfig, DriveConfig, DrivesConfig, DynamicsConfig, IdentityConfig};
+pub(crate) use scenario::RATES_HZ;
 pub use scenario::{Scenario, ScenarioError};

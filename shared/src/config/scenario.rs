@@ -14,7 +14,7 @@ use crate::clock::SECOND_NS;
 use crate::geometry::MechanismConfig;
 
 /// Rates at which the rig can be asked to run, Hz.
-const RATES_HZ: std::ops::RangeInclusive<u32> = 10..=20_000;
+pub(crate) const RATES_HZ: std::ops::RangeInclusive<u32> = 10..=20_000;
 
 /// Everything a run is made of.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -1,0 +1,92 @@
+//! The highest rate that a link allows. Why a rate does not fit is not told here.
+
+use std::fmt;
+
+use super::{CycleSchedule, ScheduleError, answer_ns, heartbeat_ns};
+use crate::clock::SECOND_NS;
+use crate::config::{CanConfig, RATES_HZ};
+
+/// What the link has room for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Room {
+    /// The highest rate for which there is a time table, Hz; none where no rate is low enough.
+    pub max_rate_hz: Option<u32>,
+    /// What the time that the drives take to answer costs of every cycle, ns.
+    pub answer_ns: u64,
+}
+
+impl Room {
+    /// By bisection: a longer cycle holds whatever a shorter one does.
+    ///
+    /// # Errors
+    /// [`ScheduleError`] for bit rates and node ids that there are not.
+    pub fn of(can: &CanConfig) -> Result<Self, ScheduleError> {
+        let fits = |rate_hz: u32| {
+            CycleSchedule::fit(can, SECOND_NS / u64::from(rate_hz)).map(|fitted| fitted.is_ok())
+        };
+        let answer_ns = answer_ns(can, heartbeat_ns(can, &can.rates()?));
+        let (mut max_rate_hz, mut too_high_hz) = (*RATES_HZ.start(), *RATES_HZ.end() + 1);
+        if !fits(max_rate_hz)? {
+            return Ok(Self { max_rate_hz: None, answer_ns });
+        }
+        while too_high_hz - max_rate_hz > 1 {
+            let between_hz = u32::midpoint(max_rate_hz, too_high_hz);
+            if fits(between_hz)? {
+                max_rate_hz = between_hz;
+            } else {
+                too_high_hz = between_hz;
+            }
+        }
+        Ok(Self { max_rate_hz: Some(max_rate_hz), answer_ns })
+    }
+}
+
+impl fmt::Display for Room {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.max_rate_hz {
+            Some(rate_hz) => write!(f, "the highest rate_hz that fits is {rate_hz}")?,
+            None => write!(f, "no rate_hz fits")?,
+        }
+        match self.answer_ns {
+            0 => Ok(()),
+            _ => write!(f, ", since can.answer_us takes {} µs of every cycle", self.answer_ns / 1000),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_highest_rate_is_one_that_fits_and_the_next_does_not() {
+        let one_bus = vec![vec![0, 1, 2, 3, 4, 5]];
+        for can in [
+            CanConfig::default(),
+            CanConfig { answer_us: 10, ..Default::default() },
+            CanConfig { buses: one_bus.clone(), ..Default::default() },
+            CanConfig { buses: one_bus, fd: true, ..Default::default() },
+        ] {
+            let highest_hz = Room::of(&can).unwrap().max_rate_hz.unwrap();
+            let fits = |rate_hz: u32| CycleSchedule::new(&can, SECOND_NS / u64::from(rate_hz)).is_ok();
+            assert!(fits(highest_hz) && !fits(highest_hz + 1), "{highest_hz} Hz: {can:?}");
+        }
+        let ideal = CanConfig { ideal: true, ..Default::default() };
+        assert_eq!(Room::of(&ideal).unwrap().max_rate_hz, Some(*RATES_HZ.end()));
+    }
+
+    #[test]
+    fn a_refusal_names_the_rate_that_fits_and_what_slow_drives_take_of_it() {
+        let slow = CanConfig { answer_us: 10, ..Default::default() };
+        let refusal = |can, period_ns| CycleSchedule::new(can, period_ns).unwrap_err().to_string();
+        let said = refusal(&slow, 1_000_000);
+        assert!(
+            said.ends_with(
+                "the highest rate_hz that fits is 956, since can.answer_us takes 75 µs of every cycle"
+            ),
+            "{said}"
+        );
+        let said = refusal(&CanConfig::default(), 800_000);
+        assert!(said.ends_with("the highest rate_hz that fits is 1030"), "{said}");
+    }
+}
