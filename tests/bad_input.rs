@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{Bench, masseter, stderr, stdout};
+use common::{Workspace, masseter, stderr, stdout};
 use serde_json::{Value, json};
 
 #[test]
@@ -23,20 +23,20 @@ fn scenarios_are_refused_with_place_and_remedy() {
         ("[motion]\nkind = 'file'\npath = 'nowhere.csv'", "nowhere.csv"),
     ];
     for (scenario, reason) in cases {
-        let bench = Bench::new(scenario);
-        let output = bench.run(&["--clock", "virtual"]);
+        let workspace = Workspace::new(scenario);
+        let output = workspace.run(&["--clock", "virtual"]);
         assert_eq!(output.status.code(), Some(2), "{scenario}: {}", stderr(&output));
         assert!(stderr(&output).contains(reason), "{scenario:?} gave {:?}", stderr(&output));
-        assert!(!bench.run_folder().exists(), "{scenario}: something was started");
+        assert!(!workspace.run_folder().exists(), "{scenario}: something was started");
     }
 }
 
 #[test]
 fn what_no_rig_can_be_is_neither_planned_nor_described() {
     let refused = |scenario: &str, verbs: &[&str]| {
-        let bench = Bench::new(scenario);
+        let workspace = Workspace::new(scenario);
         for verb in verbs {
-            let output = masseter(&["can", verb, bench.file("scenario.toml").to_str().unwrap()]);
+            let output = masseter(&["can", verb, workspace.file("scenario.toml").to_str().unwrap()]);
             assert_eq!(output.status.code(), Some(2), "can {verb}, {scenario}: {}", stderr(&output));
         }
     };
@@ -65,13 +65,13 @@ fn recordings_are_refused_with_file_reason_and_the_line_if_it_is_one_lines_fault
         (head.to_owned(), ":", "0 rows of data"),
     ];
     for (text, place, reason) in cases {
-        let bench = Bench::new("");
-        let file = bench.write("jaw.csv", &text);
-        let output = bench.run(&["--clock", "virtual", "--trajectory", file.to_str().unwrap()]);
+        let workspace = Workspace::new("");
+        let file = workspace.write("jaw.csv", &text);
+        let output = workspace.run(&["--clock", "virtual", "--trajectory", file.to_str().unwrap()]);
         let said = stderr(&output);
         assert_eq!(output.status.code(), Some(2), "{said}");
         assert!(said.contains(&format!("jaw.csv{place}")) && said.contains(reason), "{said}");
-        assert!(!bench.run_folder().exists(), "something was started");
+        assert!(!workspace.run_folder().exists(), "something was started");
     }
 }
 
@@ -87,10 +87,11 @@ fn a_point_that_a_recording_has_no_use_for_is_refused() {
     ];
     for (recording, superfluous) in cases {
         for key in ["marker_origin_mm", "reference_point_mm"] {
-            let bench =
-                Bench::new(&format!("[motion]\nkind = 'file'\npath = 'jaw.csv'\n{key} = [0.0, 0.0, 0.0]"));
-            bench.write("jaw.csv", &recording);
-            let output = bench.run(&["--clock", "virtual", "--duration", "1s"]);
+            let workspace = Workspace::new(&format!(
+                "[motion]\nkind = 'file'\npath = 'jaw.csv'\n{key} = [0.0, 0.0, 0.0]"
+            ));
+            workspace.write("jaw.csv", &recording);
+            let output = workspace.run(&["--clock", "virtual", "--duration", "1s"]);
             let is_refused = output.status.code() == Some(2) && stderr(&output).contains(key);
             assert_eq!(is_refused, key == superfluous, "{key}: {}", stderr(&output));
         }
@@ -108,8 +109,8 @@ fn a_margin_that_is_no_determinant_is_refused() {
 
 #[test]
 fn a_file_that_is_there_already_is_never_overwritten_with_inputs() {
-    let bench = Bench::new("");
-    let mine = bench.write("mine.csv", "mine\n");
+    let workspace = Workspace::new("");
+    let mine = workspace.write("mine.csv", "mine\n");
     let out = mine.to_str().unwrap();
     for verb in [&["search", "--inputs", "10"][..], &["prove", "--boxes", "10"]] {
         let output = masseter(&[&["uniqueness"], verb, &["--out", out]].concat());
@@ -149,14 +150,14 @@ fn interfaces_that_cannot_be_used_are_refused_with_what_to_do() {
 
 #[test]
 fn manifests_that_no_run_wrote_are_refused_and_their_words_are_no_markup() {
-    let bench = Bench::new("duration_s = 1.0");
-    assert_eq!(bench.run(&["--clock", "virtual"]).status.code(), Some(0));
+    let workspace = Workspace::new("duration_s = 1.0");
+    assert_eq!(workspace.run(&["--clock", "virtual"]).status.code(), Some(0));
     let report_on = |edit: &dyn Fn(&mut Value)| {
-        let mut manifest = bench.manifest();
+        let mut manifest = workspace.manifest();
         edit(&mut manifest);
-        let folder = bench.file("edited");
+        let folder = workspace.file("edited");
         std::fs::create_dir_all(&folder).unwrap();
-        std::fs::copy(bench.run_folder().join("recording.mcap"), folder.join("recording.mcap")).unwrap();
+        std::fs::copy(workspace.run_folder().join("recording.mcap"), folder.join("recording.mcap")).unwrap();
         std::fs::write(folder.join("manifest.json"), manifest.to_string()).unwrap();
         masseter(&["report", folder.to_str().unwrap()])
     };
@@ -182,15 +183,15 @@ fn manifests_that_no_run_wrote_are_refused_and_their_words_are_no_markup() {
         manifest["usage"]["processes"] = json!({ "<b>": used });
     });
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
-    let page = std::fs::read_to_string(bench.file("edited").join("report.html")).unwrap();
+    let page = std::fs::read_to_string(workspace.file("edited").join("report.html")).unwrap();
     assert!(page.contains("&lt;b&gt;") && !page.contains("<b>"));
 }
 
 #[test]
 fn a_run_folder_is_never_overwritten() {
-    let bench = Bench::new("duration_s = 1.0");
-    std::fs::create_dir(bench.run_folder()).unwrap();
-    let output = bench.run(&["--clock", "virtual"]);
+    let workspace = Workspace::new("duration_s = 1.0");
+    std::fs::create_dir(workspace.run_folder()).unwrap();
+    let output = workspace.run(&["--clock", "virtual"]);
     assert_eq!(output.status.code(), Some(2));
     assert!(stderr(&output).contains("not overwritten"), "{}", stderr(&output));
 }

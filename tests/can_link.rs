@@ -7,13 +7,13 @@ use std::net::TcpStream;
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
-use common::{Bench, MASSETER, check, masseter, stdout};
+use common::{MASSETER, Workspace, check, masseter, stdout};
 use serde_json::Value;
 
 #[test]
 fn one_bus_at_a_kilohertz_is_refused_with_its_table() {
-    let bench = Bench::new("[can]\nbuses = [[0, 1, 2, 3, 4, 5]]");
-    let scenario = bench.file("scenario.toml");
+    let workspace = Workspace::new("[can]\nbuses = [[0, 1, 2, 3, 4, 5]]");
+    let scenario = workspace.file("scenario.toml");
     let output = masseter(&["can", "plan", scenario.to_str().unwrap(), "--rate-hz", "1000"]);
     let table = stdout(&output);
     assert_eq!(output.status.code(), Some(2), "{table}");
@@ -52,10 +52,10 @@ fn the_rate_that_a_plan_promises_is_one_that_fits() {
 #[test]
 fn every_message_of_a_run_arrives_within_the_bound_of_its_plan() {
     for scenario in ["duration_s = 2.0", "duration_s = 1.0\n[can]\nfd = true\nbuses = [[0, 1, 2, 3, 4, 5]]"] {
-        let bench = Bench::new(scenario);
-        let output = bench.run(&["--clock", "virtual"]);
+        let workspace = Workspace::new(scenario);
+        let output = workspace.run(&["--clock", "virtual"]);
         assert_eq!(output.status.code(), Some(0), "{scenario}: {}", stdout(&output));
-        let summary = bench.summary();
+        let summary = workspace.summary();
         let judged = check(&summary, "bus response");
         assert_eq!(judged["result"], "passed", "{judged}");
         for message in summary["figures"]["bus_response"]["messages"].as_array().unwrap() {
@@ -70,9 +70,9 @@ fn every_message_of_a_run_arrives_within_the_bound_of_its_plan() {
 #[test]
 fn a_disturbed_bus_is_not_held_against_bounds_that_assume_none() {
     let fault = "[[faults]]\nkind = 'corrupt'\nbus = 0\nfrom_s = 0.5\nprobability = 0.01";
-    let bench = Bench::new(&format!("duration_s = 1.0\n{fault}"));
-    let output = bench.run(&["--clock", "virtual"]);
-    let summary = bench.summary();
+    let workspace = Workspace::new(&format!("duration_s = 1.0\n{fault}"));
+    let output = workspace.run(&["--clock", "virtual"]);
+    let summary = workspace.summary();
     assert_eq!(check(&summary, "bus response")["result"], "not_judged", "{}", stdout(&output));
     assert!(stdout(&output).contains("skip bus response"), "{}", stdout(&output));
 }
@@ -94,11 +94,11 @@ fn every_fault_of_a_bus_is_borne_or_stops_the_rig_safely_with_its_cause() {
     ];
     for (kind, which, stopped_by) in cases {
         let fault = format!("[[faults]]\nkind = '{kind}'\nbus = 0\nfrom_s = 1.5\n{which}");
-        let bench = Bench::new(&format!("duration_s = 1.0\n{fault}"));
-        let output = bench.run(&["--clock", "virtual"]);
+        let workspace = Workspace::new(&format!("duration_s = 1.0\n{fault}"));
+        let output = workspace.run(&["--clock", "virtual"]);
         let expected = if stopped_by.is_some() { 5 } else { 0 };
         assert_eq!(output.status.code(), Some(expected), "{fault}: {}", stdout(&output));
-        let summary = bench.summary();
+        let summary = workspace.summary();
         let events = summary["figures"]["events"].as_array().unwrap();
         let first_fault = events.iter().find(|event| event["kind"] == "fault");
         assert_eq!(
@@ -112,10 +112,10 @@ fn every_fault_of_a_bus_is_borne_or_stops_the_rig_safely_with_its_cause() {
 
 #[test]
 fn a_run_passes_on_a_bus_where_frames_come_twice_now_and_then_from_the_first_on() {
-    let bench = Bench::new(
+    let workspace = Workspace::new(
         "duration_s = 1.0\n[[faults]]\nkind = 'duplicate'\nbus = 0\nfrom_s = 0\nprobability = 0.01",
     );
-    let output = bench.run(&["--clock", "virtual"]);
+    let output = workspace.run(&["--clock", "virtual"]);
     assert_eq!(output.status.code(), Some(0), "{}", stdout(&output));
 }
 
@@ -126,10 +126,10 @@ struct Server {
 }
 
 impl Server {
-    fn start(bench: &Bench) -> Self {
+    fn start(workspace: &Workspace) -> Self {
         let mut child = Command::new(MASSETER)
             .args(["can", "serve", "--listen", "127.0.0.1:0"])
-            .arg(bench.file("scenario.toml"))
+            .arg(workspace.file("scenario.toml"))
             .stderr(Stdio::piped())
             .spawn()
             .unwrap();
@@ -161,7 +161,7 @@ fn expect(stream: &mut TcpStream, text: &str) -> String {
 
 #[test]
 fn more_clients_than_there_are_places_disturb_nobody() {
-    let server = Server::start(&Bench::new(""));
+    let server = Server::start(&Workspace::new(""));
     let connect = || {
         let stream = TcpStream::connect(&server.address).unwrap();
         stream.set_read_timeout(Some(Duration::from_secs(20))).unwrap();
@@ -183,7 +183,7 @@ fn more_clients_than_there_are_places_disturb_nobody() {
 #[test]
 fn a_foreign_tool_reads_an_object_of_a_drive_on_a_classical_and_on_an_fd_bus() {
     for scenario in ["", "[can]\nfd = true\nbuses = [[0, 1, 2, 3, 4, 5]]"] {
-        let server = Server::start(&Bench::new(scenario));
+        let server = Server::start(&Workspace::new(scenario));
         let mut stream = TcpStream::connect(&server.address).unwrap();
         stream.set_read_timeout(Some(Duration::from_secs(20))).unwrap();
         expect(&mut stream, "< hi >");

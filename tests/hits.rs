@@ -7,7 +7,7 @@ use std::process::{Child, Output};
 use std::time::Duration;
 
 use common::{
-    Bench, PASSED_OR_INVALID, UNHURRIED, child_of, masseter, shared_memory_of, start, stderr, stdout,
+    PASSED_OR_INVALID, UNHURRIED, Workspace, child_of, masseter, shared_memory_of, start, stderr, stdout,
     take_the_cores,
 };
 use masseter::recording::{Reader, Recorded};
@@ -47,7 +47,7 @@ const GIVE_UP_NS: u64 = 30 * SECOND_NS;
 /// A rig that was hit, and the process that was.
 struct Rig {
     name: String,
-    bench: Bench,
+    workspace: Workspace,
     supervisor: Child,
     victim: Pid,
 }
@@ -56,10 +56,10 @@ impl Rig {
     /// A rig whose `role` gets the signal at the moment; none when that was missed.
     fn hit(role: &str, signal: Signal, moment: Moment) -> Option<Self> {
         let name = format!("hit-{}", std::process::id());
-        let bench = Bench::new(&format!("{MOTION}{UNHURRIED}"));
-        let supervisor = start(&bench, &["--name", &name]);
+        let workspace = Workspace::new(&format!("{MOTION}{UNHURRIED}"));
+        let supervisor = start(&workspace, &["--name", &name]);
         let victim = child_of(&supervisor, role);
-        let rig = Self { name, bench, supervisor, victim };
+        let rig = Self { name, workspace, supervisor, victim };
         let states = rig.states();
         let was_hit =
             reaches(&states, moment) && kill_process(victim, signal).is_ok() && stands_in(&states, moment.0);
@@ -76,8 +76,8 @@ impl Rig {
         Node::join(&Domain::named(&self.name).unwrap()).unwrap().inlet().unwrap()
     }
 
-    fn end(self) -> (Bench, Output) {
-        (self.bench, self.supervisor.wait_with_output().unwrap())
+    fn end(self) -> (Workspace, Output) {
+        (self.workspace, self.supervisor.wait_with_output().unwrap())
     }
 }
 
@@ -113,8 +113,8 @@ fn stands_in(states: &Inlet<State>, wanted: ControllerState) -> bool {
 }
 
 /// The readable part of a recording whose logger was killed.
-fn is_recovered(bench: &Bench) -> bool {
-    let [recording, recovered] = ["run/recording.mcap", "recovered.mcap"].map(|name| bench.file(name));
+fn is_recovered(workspace: &Workspace) -> bool {
+    let [recording, recovered] = ["run/recording.mcap", "recovered.mcap"].map(|name| workspace.file(name));
     let [recording, recovered] = [&recording, &recovered].map(|path| path.to_str().unwrap());
     let codes = [
         masseter(&["log", "verify", recording]),
@@ -131,16 +131,16 @@ fn whoever_is_killed_and_when_the_rig_ends_in_order_and_another_can_start() {
     for (role, moment) in ROLES.into_iter().flat_map(|role| MOMENTS.map(|moment| (role, moment))) {
         let rig = hit(role, Signal::KILL, moment);
         let name = rig.name.clone();
-        let (bench, output) = rig.end();
+        let (workspace, output) = rig.end();
         let context = format!("{role} {moment:?}: {}{}", stdout(&output), stderr(&output));
         assert_eq!(output.status.code(), Some(4), "{context}");
         assert_eq!(shared_memory_of(&name), Vec::<String>::new(), "{context}");
-        let summary = bench.summary();
+        let summary = workspace.summary();
         assert_eq!(summary["verdict"]["reason"], format!("the {role} died: SIGKILL (9)"), "{context}");
         let is_moving = matches!(moment.0, Easing | Running | Holding);
         match role {
             "controller" => {
-                assert!(drives_are_off(&bench), "{context}");
+                assert!(drives_are_off(&workspace), "{context}");
                 assert!(!is_moving || has_fault(&summary, "command_lost"), "{context}");
             }
             "plant" => {
@@ -148,7 +148,7 @@ fn whoever_is_killed_and_when_the_rig_ends_in_order_and_another_can_start() {
                 assert!(ends_without_plant(moment.0).contains(&last), "{last}: {context}");
                 assert!(!is_moving || has_fault(&summary, "stale_reading"), "{context}");
             }
-            _ => assert!(is_recovered(&bench), "{context}"),
+            _ => assert!(is_recovered(&workspace), "{context}"),
         }
     }
 }
@@ -170,8 +170,8 @@ fn ends_without_plant(state: ControllerState) -> &'static [&'static str] {
 }
 
 /// Whether no drive gave force in the end.
-fn drives_are_off(bench: &Bench) -> bool {
-    let mut reader = Reader::open(&bench.run_folder().join("recording.mcap")).unwrap();
+fn drives_are_off(workspace: &Workspace) -> bool {
+    let mut reader = Reader::open(&workspace.run_folder().join("recording.mcap")).unwrap();
     let mut last = None;
     while let Some(message) = reader.next_message().unwrap() {
         if let Recorded::Reading(reading) = message {
@@ -189,9 +189,9 @@ fn whoever_stands_still_for_a_moment_and_when_the_rig_goes_on() {
         let rig = hit(role, Signal::STOP, moment);
         clock::sleep(SHORT_STOP);
         kill_process(rig.victim, Signal::CONT).unwrap();
-        let (bench, output) = rig.end();
+        let (workspace, output) = rig.end();
         let context = format!("{role} {moment:?}: {}{}", stdout(&output), stderr(&output));
-        assert_eq!(bench.summary()["figures"]["final_state"], "finished", "{context}");
+        assert_eq!(workspace.summary()["figures"]["final_state"], "finished", "{context}");
         assert!(PASSED_OR_INVALID.contains(&output.status.code()), "{context}");
     }
 }

@@ -8,7 +8,7 @@ use std::net::{TcpListener, TcpStream};
 use std::process::{Child, ChildStderr, ExitStatus, Stdio};
 use std::thread;
 
-use common::{Bench, UNHURRIED, masseter, start, stderr, stdout, take_the_cores};
+use common::{UNHURRIED, Workspace, masseter, start, stderr, stdout, take_the_cores};
 use masseter::recording::Reader;
 use serde_json::{Value, json};
 use tungstenite::client::IntoClientRequest;
@@ -26,8 +26,8 @@ struct Shown {
 }
 
 impl Shown {
-    fn start(bench: &Bench) -> Self {
-        let mut run = start(bench, &["--live=127.0.0.1:0"]);
+    fn start(workspace: &Workspace) -> Self {
+        let mut run = start(workspace, &["--live=127.0.0.1:0"]);
         let mut errors = BufReader::new(run.stderr.take().unwrap());
         let mut line = String::new();
         while !line.starts_with("live on ") {
@@ -100,9 +100,9 @@ fn text(socket: &mut WebSocket<TcpStream>) -> Value {
     serde_json::from_str(socket.read().unwrap().to_text().unwrap()).unwrap()
 }
 
-/// Every message on every topic of a bench's recording.
-fn recorded(bench: &Bench) -> BTreeMap<String, HashSet<Vec<u8>>> {
-    let mut reader = Reader::open(&bench.run_folder().join("recording.mcap")).unwrap();
+/// Every message on every topic of a workspace's recording.
+fn recorded(workspace: &Workspace) -> BTreeMap<String, HashSet<Vec<u8>>> {
+    let mut reader = Reader::open(&workspace.run_folder().join("recording.mcap")).unwrap();
     let mut recorded: BTreeMap<String, HashSet<Vec<u8>>> = BTreeMap::new();
     while let Some(entry) = reader.next_entry().unwrap() {
         let topic = entry.channel.unwrap().topic.clone();
@@ -119,8 +119,8 @@ fn passed(status: ExitStatus) -> bool {
 #[test]
 fn a_watcher_sees_the_channels_and_messages_of_the_recording() {
     let _cores = take_the_cores();
-    let bench = Bench::new(&format!("duration_s = 3.0\n{UNHURRIED}"));
-    let shown = Shown::start(&bench);
+    let workspace = Workspace::new(&format!("duration_s = 3.0\n{UNHURRIED}"));
+    let shown = Shown::start(&workspace);
     let mut watcher = Watcher::connect(&shown.address, "foxglove.sdk.v1, foxglove.websocket.v1");
     assert_eq!(watcher.info["op"], "serverInfo");
     assert_eq!(watcher.info["capabilities"], json!([]));
@@ -129,7 +129,7 @@ fn a_watcher_sees_the_channels_and_messages_of_the_recording() {
     let (status, said) = shown.finish();
     assert!(passed(status), "{said}");
 
-    let recorded = recorded(&bench);
+    let recorded = recorded(&workspace);
     for topic in ["command", "reading", "state", "truth", "frame"] {
         let seen = &seen[topic];
         assert!(seen.len() > 1000, "{} messages on {topic}", seen.len());
@@ -141,22 +141,22 @@ fn a_watcher_sees_the_channels_and_messages_of_the_recording() {
 #[test]
 fn a_watcher_that_does_not_read_is_counted_and_the_recording_is_complete() {
     let _cores = take_the_cores();
-    let bench = Bench::new(&format!("duration_s = 6.0\n{UNHURRIED}"));
-    let shown = Shown::start(&bench);
+    let workspace = Workspace::new(&format!("duration_s = 6.0\n{UNHURRIED}"));
+    let shown = Shown::start(&workspace);
     let mut watcher = Watcher::connect(&shown.address, "foxglove.websocket.v1");
     watcher.subscribe_to_all();
     let (status, said) = shown.finish();
     assert!(passed(status), "{said}");
     assert!(said.contains("messages were not shown live"), "{said}");
-    let proof = masseter(&["log", "verify", bench.run_folder().to_str().unwrap()]);
+    let proof = masseter(&["log", "verify", workspace.run_folder().to_str().unwrap()]);
     assert_eq!(proof.status.code(), Some(0), "{}", stdout(&proof));
 }
 
 #[test]
 fn strangers_and_deserters_disturb_neither_the_recording_nor_other_watchers() {
     let _cores = take_the_cores();
-    let bench = Bench::new(&format!("duration_s = 3.0\n{UNHURRIED}"));
-    let shown = Shown::start(&bench);
+    let workspace = Workspace::new(&format!("duration_s = 3.0\n{UNHURRIED}"));
+    let shown = Shown::start(&workspace);
     let _silent = TcpStream::connect(&shown.address).unwrap();
     let mut browser = TcpStream::connect(&shown.address).unwrap();
     browser.write_all(b"GET / HTTP/1.1\r\nHost: here\r\n\r\n").unwrap();
@@ -178,14 +178,14 @@ fn strangers_and_deserters_disturb_neither_the_recording_nor_other_watchers() {
     assert!(chatter.watch()["state"].len() > 500);
     let (status, said) = shown.finish();
     assert!(passed(status), "{said}");
-    let proof = masseter(&["log", "verify", bench.run_folder().to_str().unwrap()]);
+    let proof = masseter(&["log", "verify", workspace.run_folder().to_str().unwrap()]);
     assert_eq!(proof.status.code(), Some(0), "{}", stdout(&proof));
 }
 
 #[test]
 fn a_client_that_sends_without_end_holds_up_neither_the_recording_nor_the_end() {
-    let bench = Bench::new(&format!("duration_s = 1.0\n{UNHURRIED}"));
-    let shown = Shown::start(&bench);
+    let workspace = Workspace::new(&format!("duration_s = 1.0\n{UNHURRIED}"));
+    let shown = Shown::start(&workspace);
     let mut flooder = Watcher::connect(&shown.address, "foxglove.sdk.v1");
     // The beginning of a text, and then nothing but its empty continuation.
     flooder.socket.get_mut().write_all(&[0x01, 0x80, 0, 0, 0, 0]).unwrap();
@@ -193,16 +193,16 @@ fn a_client_that_sends_without_end_holds_up_neither_the_recording_nor_the_end() 
     let flooding = thread::spawn(move || while flooder.socket.get_mut().write_all(&flood).is_ok() {});
     let (status, said) = shown.finish();
     assert!(passed(status), "{said}");
-    let proof = masseter(&["log", "verify", bench.run_folder().to_str().unwrap()]);
+    let proof = masseter(&["log", "verify", workspace.run_folder().to_str().unwrap()]);
     assert_eq!(proof.status.code(), Some(0), "{}", stdout(&proof));
     flooding.join().unwrap();
 }
 
 #[test]
 fn a_reader_of_the_progress_that_pauses_costs_no_message_and_holds_no_end_up() {
-    let bench = Bench::new(&format!("duration_s = 4.0\n{UNHURRIED}"));
+    let workspace = Workspace::new(&format!("duration_s = 4.0\n{UNHURRIED}"));
     let (errors, mut filler) = io::pipe().unwrap();
-    let mut command = bench.run_command(&[]);
+    let mut command = workspace.run_command(&[]);
     let run = command.stdout(Stdio::piped()).stderr(filler.try_clone().unwrap()).spawn().unwrap();
     let mut errors = BufReader::new(errors);
     let mut line = String::new();
@@ -216,7 +216,7 @@ fn a_reader_of_the_progress_that_pauses_costs_no_message_and_holds_no_end_up() {
     drop(errors);
     assert!(filling.join().unwrap().is_err());
     assert!(passed(output.status), "{}", stdout(&output));
-    let proof = masseter(&["log", "verify", bench.run_folder().to_str().unwrap()]);
+    let proof = masseter(&["log", "verify", workspace.run_folder().to_str().unwrap()]);
     assert_eq!(proof.status.code(), Some(0), "{}", stdout(&proof));
 }
 
@@ -230,10 +230,10 @@ fn what_cannot_be_shown_is_refused_before_anything_is_made() {
         (&["--live=somewhere"], "invalid socket address"),
     ];
     for (arguments, words) in cases {
-        let bench = Bench::new("");
-        let output = bench.run(arguments);
+        let workspace = Workspace::new("");
+        let output = workspace.run(arguments);
         assert_eq!(output.status.code(), Some(2), "{arguments:?}: {}", stderr(&output));
         assert!(stderr(&output).contains(words), "{arguments:?}: {}", stderr(&output));
-        assert!(!bench.run_folder().exists());
+        assert!(!workspace.run_folder().exists());
     }
 }

@@ -11,7 +11,7 @@ use std::thread;
 use std::time::Duration;
 
 use common::{
-    Bench, PASSED_OR_INVALID, UNHURRIED, check, child_of, masseter, shared_memory_of, skip, start, stderr,
+    Workspace, PASSED_OR_INVALID, UNHURRIED, check, child_of, masseter, shared_memory_of, skip, start, stderr,
     stdout, take_the_cores, wait_until_it_records,
 };
 use masseter_shared::clock;
@@ -19,34 +19,34 @@ use rustix::process::{Pid, Signal, kill_process, kill_process_group, test_kill_p
 use serde_json::Value;
 
 /// A rig in the midst of a long run.
-fn running() -> (Bench, Child) {
+fn running() -> (Workspace, Child) {
     running_with(UNHURRIED)
 }
 
-fn running_with(scenario: &str) -> (Bench, Child) {
-    let bench = Bench::new(&format!("duration_s = 60.0\n{scenario}"));
-    let child = start(&bench, &[]);
-    wait_until_it_records(&bench);
-    (bench, child)
+fn running_with(scenario: &str) -> (Workspace, Child) {
+    let workspace = Workspace::new(&format!("duration_s = 60.0\n{scenario}"));
+    let child = start(&workspace, &[]);
+    wait_until_it_records(&workspace);
+    (workspace, child)
 }
 
 #[test]
 fn a_run_plays_through_three_processes_and_leaves_nothing_in_shared_memory() {
     let _cores = take_the_cores();
-    let bench = Bench::new(&format!("duration_s = 2.0\n{UNHURRIED}"));
-    let child = start(&bench, &[]);
+    let workspace = Workspace::new(&format!("duration_s = 2.0\n{UNHURRIED}"));
+    let child = start(&workspace, &[]);
     let id = format!("{}-", child.id());
     let output = child.wait_with_output().unwrap();
     assert!(PASSED_OR_INVALID.contains(&output.status.code()), "{}{}", stdout(&output), stderr(&output));
-    let summary = bench.summary();
+    let summary = workspace.summary();
     assert_eq!(summary["figures"]["final_state"], "finished");
     assert_eq!(check(&summary, "dropped messages")["result"], "passed", "{summary}");
-    let scheduling = &bench.manifest()["scheduling"];
+    let scheduling = &workspace.manifest()["scheduling"];
     for role in ["controller", "plant", "logger"] {
         assert!(scheduling[role]["wanted"].is_object(), "{scheduling}");
     }
     assert_eq!(shared_memory_of(&id), Vec::<String>::new());
-    let log = fs::read_to_string(bench.run_folder().join("can0.log")).unwrap();
+    let log = fs::read_to_string(workspace.run_folder().join("can0.log")).unwrap();
     let (_, last_cycle) = log.rsplit_once(" 080#").unwrap();
     assert!(last_cycle.contains(" 201#"), "what it ended with is recorded too: {last_cycle}");
 }
@@ -54,17 +54,17 @@ fn a_run_plays_through_three_processes_and_leaves_nothing_in_shared_memory() {
 #[test]
 fn an_interrupt_ends_the_motion_in_order() {
     let _cores = take_the_cores();
-    let (bench, child) = running();
+    let (workspace, child) = running();
     kill_process(Pid::from_child(&child), Signal::INT).unwrap();
     let output = child.wait_with_output().unwrap();
     assert_eq!(output.status.code(), Some(130), "{}", stderr(&output));
-    assert_eq!(bench.summary()["figures"]["final_state"], "finished");
+    assert_eq!(workspace.summary()["figures"]["final_state"], "finished");
 }
 
 #[test]
 fn a_terminal_that_is_gone_ends_the_motion_in_order() {
     let _cores = take_the_cores();
-    let (bench, mut child) = running();
+    let (workspace, mut child) = running();
     let roles = ["controller", "plant", "logger"].map(|role| child_of(&child, role));
     // Nobody reads any more what is said, and the whole group hears of it.
     drop((child.stdout.take(), child.stderr.take()));
@@ -72,29 +72,29 @@ fn a_terminal_that_is_gone_ends_the_motion_in_order() {
         kill_process(id, Signal::HUP).unwrap();
     }
     assert_eq!(child.wait().unwrap().code(), Some(130));
-    assert_eq!(bench.summary()["figures"]["final_state"], "finished");
-    assert_eq!(bench.summary()["figures"]["cut_short"], false);
+    assert_eq!(workspace.summary()["figures"]["final_state"], "finished");
+    assert_eq!(workspace.summary()["figures"]["cut_short"], false);
 }
 
 #[test]
 fn a_run_goes_on_when_nobody_reads_what_it_says() {
     let _cores = take_the_cores();
-    let bench = Bench::new(&format!("duration_s = 3.0\n{UNHURRIED}"));
-    let mut child = start(&bench, &[]);
+    let workspace = Workspace::new(&format!("duration_s = 3.0\n{UNHURRIED}"));
+    let mut child = start(&workspace, &[]);
     drop((child.stdout.take(), child.stderr.take()));
     let code = child.wait().unwrap().code();
-    assert!(PASSED_OR_INVALID.contains(&code), "{code:?} {}", bench.summary()["verdict"]);
+    assert!(PASSED_OR_INVALID.contains(&code), "{code:?} {}", workspace.summary()["verdict"]);
 }
 
 #[test]
 fn a_motion_that_somebody_broke_off_does_not_pass() {
     let _cores = take_the_cores();
-    let (bench, child) = running();
+    let (workspace, child) = running();
     kill_process(child_of(&child, "controller"), Signal::TERM).unwrap();
     let output = child.wait_with_output().unwrap();
     let code = output.status.code();
     assert!(code == Some(1) || code == Some(3), "{code:?} {}", stdout(&output));
-    let summary = bench.summary();
+    let summary = workspace.summary();
     let sequence = check(&summary, "sequence");
     assert!(sequence["finding"].as_str().unwrap().contains("asked to stop"), "{sequence}");
 }
@@ -113,11 +113,11 @@ fn a_controller_that_does_not_end_when_asked_to_is_killed() {
 #[test]
 fn a_controller_that_hangs_stops_the_rig_though_nobody_asks() {
     let _cores = take_the_cores();
-    let (bench, child) = running();
+    let (workspace, child) = running();
     kill_process(child_of(&child, "controller"), Signal::STOP).unwrap();
     let output = child.wait_with_output().unwrap();
     assert_eq!(output.status.code(), Some(4), "{}{}", stdout(&output), stderr(&output));
-    let reason = &bench.summary()["verdict"]["reason"];
+    let reason = &workspace.summary()["verdict"]["reason"];
     assert_eq!(reason, "the controller died: it sent no command any more, and was killed");
 }
 
@@ -142,8 +142,8 @@ fn an_interrupt_before_anything_is_recorded_is_one_too() {
     let _cores = take_the_cores();
     for after_ms in [0, 5, 10, 15, 20, 25, 30, 40, 50, 80, 120, 200] {
         // Soon planned.
-        let bench = Bench::new(&format!("duration_s = 5.0\n{UNHURRIED}"));
-        let mut command = bench.run_command(&[]);
+        let workspace = Workspace::new(&format!("duration_s = 5.0\n{UNHURRIED}"));
+        let mut command = workspace.run_command(&[]);
         let mut child =
             command.process_group(0).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
         clock::sleep(Duration::from_millis(after_ms));
@@ -159,13 +159,13 @@ fn an_interrupt_before_anything_is_recorded_is_one_too() {
 fn an_interrupt_hides_no_death() {
     let _cores = take_the_cores();
     for role in ["plant", "controller", "logger"] {
-        let (bench, child) = running();
+        let (workspace, child) = running();
         let victim = child_of(&child, role);
         kill_process(Pid::from_child(&child), Signal::INT).unwrap();
         kill_process(victim, Signal::KILL).unwrap();
         let output = child.wait_with_output().unwrap();
         assert_eq!(output.status.code(), Some(4), "{role}: {}{}", stdout(&output), stderr(&output));
-        let reason = &bench.summary()["verdict"]["reason"];
+        let reason = &workspace.summary()["verdict"]["reason"];
         assert_eq!(reason, &format!("the {role} died: SIGKILL (9)"));
     }
 }
@@ -173,7 +173,7 @@ fn an_interrupt_hides_no_death() {
 #[test]
 fn who_insists_is_not_told_that_a_process_died_of_it() {
     let _cores = take_the_cores();
-    let (bench, child) = running();
+    let (workspace, child) = running();
     kill_process(child_of(&child, "logger"), Signal::STOP).unwrap();
     let plant = child_of(&child, "plant");
     kill_process(Pid::from_child(&child), Signal::TERM).unwrap();
@@ -183,7 +183,7 @@ fn who_insists_is_not_told_that_a_process_died_of_it() {
     kill_process(Pid::from_child(&child), Signal::TERM).unwrap();
     let output = child.wait_with_output().unwrap();
     assert_eq!(output.status.code(), Some(130), "{}{}", stdout(&output), stderr(&output));
-    assert_eq!(bench.manifest()["ending"]["kind"], "interrupted", "{}", bench.manifest()["ending"]);
+    assert_eq!(workspace.manifest()["ending"]["kind"], "interrupted", "{}", workspace.manifest()["ending"]);
 }
 
 #[test]
@@ -198,14 +198,14 @@ fn an_interrupted_motion_may_be_held_for_longer_than_a_process_takes_to_end() {
 #[test]
 fn a_killed_supervisor_takes_its_processes_along_and_clean_sweeps_what_is_left() {
     let _cores = take_the_cores();
-    let (bench, mut child) = running();
+    let (workspace, mut child) = running();
     let id = format!("{}-", child.id());
     child.kill().unwrap();
     child.wait().unwrap();
     for _ in 0..500 {
         assert_eq!(masseter(&["clean"]).status.code(), Some(0));
         if shared_memory_of(&id).is_empty() {
-            let report = masseter(&["report", bench.run_folder().to_str().unwrap()]);
+            let report = masseter(&["report", workspace.run_folder().to_str().unwrap()]);
             assert_eq!(report.status.code(), Some(4), "{}{}", stdout(&report), stderr(&report));
             assert!(stdout(&report).contains("the supervisor died"), "{}", stdout(&report));
             return;
@@ -218,13 +218,14 @@ fn a_killed_supervisor_takes_its_processes_along_and_clean_sweeps_what_is_left()
 #[test]
 fn two_rigs_on_one_machine_do_not_meet() {
     let _cores = take_the_cores();
-    let benches = [1, 2].map(|seed| Bench::new(&format!("seed = {seed}\nduration_s = 2.0\n{UNHURRIED}")));
-    let children: Vec<_> = benches.iter().map(|bench| start(bench, &[])).collect();
-    for (child, bench) in children.into_iter().zip(&benches) {
+    let workspaces =
+        [1, 2].map(|seed| Workspace::new(&format!("seed = {seed}\nduration_s = 2.0\n{UNHURRIED}")));
+    let children: Vec<_> = workspaces.iter().map(|workspace| start(workspace, &[])).collect();
+    for (child, workspace) in children.into_iter().zip(&workspaces) {
         let output = child.wait_with_output().unwrap();
         // Both want the same two cores, so either may be starved into a safe stop; but no message may
         // cross, which a foreign command or a gap in a sequence would show.
-        let summary = bench.summary();
+        let summary = workspace.summary();
         assert!(!stdout(&output).contains("foreign_command"), "{}", stdout(&output));
         assert_eq!(check(&summary, "dropped messages")["result"], "passed", "{summary}");
     }
@@ -234,7 +235,7 @@ fn two_rigs_on_one_machine_do_not_meet() {
 fn a_second_rig_of_the_same_name_is_refused() {
     let _cores = take_the_cores();
     let name = format!("robot-{}", std::process::id());
-    let [first, second] = [1, 2].map(|_| Bench::new(&format!("duration_s = 60.0\n{UNHURRIED}")));
+    let [first, second] = [1, 2].map(|_| Workspace::new(&format!("duration_s = 60.0\n{UNHURRIED}")));
     let running = start(&first, &["--name", &name]);
     wait_until_it_records(&first);
     // The folder for temporary files does not make it another machine.
@@ -250,15 +251,15 @@ fn a_second_rig_of_the_same_name_is_refused() {
 #[test]
 fn what_the_kernel_refuses_is_said_and_required_real_time_exits_with_3() {
     let _cores = take_the_cores();
-    let bench = Bench::new(&format!("duration_s = 1.0\n[realtime]\ncores = [0, 4000]\n{UNHURRIED}"));
-    let output = bench.run(&["--require-rt", "--format", "json"]);
+    let workspace = Workspace::new(&format!("duration_s = 1.0\n[realtime]\ncores = [0, 4000]\n{UNHURRIED}"));
+    let output = workspace.run(&["--require-rt", "--format", "json"]);
     assert_eq!(output.status.code(), Some(3), "{}", stderr(&output));
     assert!(stderr(&output).contains("core 4000 refused"), "{}", stderr(&output));
-    assert!(!bench.manifest()["scheduling"]["plant"]["refusals"].as_array().unwrap().is_empty());
+    assert!(!workspace.manifest()["scheduling"]["plant"]["refusals"].as_array().unwrap().is_empty());
     let shown: Value = serde_json::from_str(&stdout(&output)).expect("a summary on standard output");
     assert_eq!(shown["verdict"]["word"], "INVALID", "{shown}");
-    assert_eq!(shown, bench.summary());
-    assert!(bench.run_folder().join("junit.xml").exists());
+    assert_eq!(shown, workspace.summary());
+    assert!(workspace.run_folder().join("junit.xml").exists());
 }
 
 /// A disk with room for 2 MiB, there as long as this is.
@@ -282,14 +283,14 @@ impl Drop for SmallDisk<'_> {
 
 /// What a run says whose folder lies on a small disk; none where that cannot be had.
 fn run_on_a_small_disk(arguments: &[&str]) -> Option<Output> {
-    let bench = Bench::new("");
-    let folder = bench.file("");
+    let workspace = Workspace::new("");
+    let folder = workspace.file("");
     let Some(_disk) = SmallDisk::on(&folder) else {
         skip("mounting a small disk is refused");
         return None;
     };
-    bench.write("scenario.toml", UNHURRIED);
-    Some(bench.run(arguments))
+    workspace.write("scenario.toml", UNHURRIED);
+    Some(workspace.run(arguments))
 }
 
 #[test]
@@ -317,14 +318,14 @@ fn an_ordinary_user_runs_the_rig_without_real_time() {
         skip("needs root to become an ordinary user; every other test here ran as one");
         return;
     }
-    let bench = Bench::new(&format!("duration_s = 1.0\n{UNHURRIED}"));
+    let workspace = Workspace::new(&format!("duration_s = 1.0\n{UNHURRIED}"));
     // The executable and the folder must be reachable for that user.
-    let folder = bench.file("home");
+    let folder = workspace.file("home");
     fs::create_dir(&folder).unwrap();
     let executable = folder.join("masseter");
     fs::copy(common::MASSETER, &executable).unwrap();
-    fs::copy(bench.file("scenario.toml"), folder.join("scenario.toml")).unwrap();
-    let status = Command::new("chown").args(["-R", "65534:65534"]).arg(bench.file("")).status().unwrap();
+    fs::copy(workspace.file("scenario.toml"), folder.join("scenario.toml")).unwrap();
+    let status = Command::new("chown").args(["-R", "65534:65534"]).arg(workspace.file("")).status().unwrap();
     assert!(status.success());
     let output = Command::new("setpriv")
         .args(["--reuid=65534", "--regid=65534", "--clear-groups"])

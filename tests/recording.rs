@@ -8,7 +8,7 @@ use std::path::Path;
 use std::process::Output;
 use std::time::Duration;
 
-use common::{Bench, UNHURRIED, child_of, cramped, masseter, start, stderr, stdout};
+use common::{UNHURRIED, Workspace, child_of, cramped, masseter, start, stderr, stdout};
 use masseter::recording::{Reader, Recorded, Recorder, Scene};
 use masseter_shared::can::candump;
 use masseter_shared::clock;
@@ -18,11 +18,11 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use rustix::process::{Signal, kill_process};
 
-fn virtual_run() -> Bench {
-    let bench = Bench::new("duration_s = 1.0");
-    let output = bench.run(&["--clock", "virtual"]);
+fn virtual_run() -> Workspace {
+    let workspace = Workspace::new("duration_s = 1.0");
+    let output = workspace.run(&["--clock", "virtual"]);
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
-    bench
+    workspace
 }
 
 fn log(verb: &str, recording: &Path, more: &[&str]) -> Output {
@@ -41,8 +41,8 @@ fn messages(recording: &Path) -> Vec<Recorded> {
 
 #[test]
 fn a_whole_recording_is_told_and_proved() {
-    let bench = virtual_run();
-    for of in [bench.run_folder(), bench.run_folder().join("recording.mcap")] {
+    let workspace = virtual_run();
+    for of in [workspace.run_folder(), workspace.run_folder().join("recording.mcap")] {
         let info = log("info", &of, &[]);
         assert_eq!(info.status.code(), Some(0), "{}", stdout(&info));
         for word in ["masseter/Reading (cdr)", "foxglove.FrameTransforms (protobuf)", "zstd", "bytes a cycle"]
@@ -57,8 +57,8 @@ fn a_whole_recording_is_told_and_proved() {
 
 #[test]
 fn bad_recordings_get_2_and_cut_ones_6_with_the_place() {
-    let bench = virtual_run();
-    let whole = fs::read(bench.run_folder().join("recording.mcap")).unwrap();
+    let workspace = virtual_run();
+    let whole = fs::read(workspace.run_folder().join("recording.mcap")).unwrap();
     let cut = whole[..whole.len() * 2 / 3].to_vec();
     let mut flipped = whole.clone();
     flipped[whole.len() / 2] ^= 0x10;
@@ -71,7 +71,7 @@ fn bad_recordings_get_2_and_cut_ones_6_with_the_place() {
         ("empty", b"", 2, "it is empty"),
     ];
     for (name, bytes, code, words) in cases {
-        let path = bench.file(name);
+        let path = workspace.file(name);
         fs::write(&path, bytes).unwrap();
         for verb in ["info", "verify"] {
             let output = log(verb, &path, &[]);
@@ -80,13 +80,13 @@ fn bad_recordings_get_2_and_cut_ones_6_with_the_place() {
             assert!(said.contains(words), "{verb} {name}: {said}");
         }
     }
-    assert_eq!(log("info", &bench.file("nowhere"), &[]).status.code(), Some(2));
+    assert_eq!(log("info", &workspace.file("nowhere"), &[]).status.code(), Some(2));
 }
 
 #[test]
 fn only_the_line_of_what_is_wrong_says_fail() {
-    let bench = virtual_run();
-    let whole = fs::read(bench.run_folder().join("recording.mcap")).unwrap();
+    let workspace = virtual_run();
+    let whole = fs::read(workspace.run_folder().join("recording.mcap")).unwrap();
     let mut flipped = whole.clone();
     // In the first chunk, that of the definitions.
     flipped[2000] ^= 0x10;
@@ -96,7 +96,7 @@ fn only_the_line_of_what_is_wrong_says_fail() {
         (flipped, &["checksums, 1 do not", "cannot be read"]),
     ];
     for (bytes, expected) in cases {
-        let path = bench.file("hurt");
+        let path = workspace.file("hurt");
         fs::write(&path, bytes).unwrap();
         let proof = stdout(&log("verify", &path, &[]));
         for line in proof.lines() {
@@ -111,15 +111,15 @@ fn only_the_line_of_what_is_wrong_says_fail() {
 
 #[test]
 fn a_cut_recording_is_recovered_beside_the_old_one_and_nothing_is_overwritten() {
-    let bench = virtual_run();
-    let whole = fs::read(bench.run_folder().join("recording.mcap")).unwrap();
-    let cut = bench.file("cut.mcap");
+    let workspace = virtual_run();
+    let whole = fs::read(workspace.run_folder().join("recording.mcap")).unwrap();
+    let cut = workspace.file("cut.mcap");
     fs::write(&cut, &whole[..whole.len() * 2 / 3]).unwrap();
 
     let output = log("recover", &cut, &[]);
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
     assert!(stdout(&output).contains("messages saved"), "{}", stdout(&output));
-    let recovered = bench.file("cut.recovered.mcap");
+    let recovered = workspace.file("cut.recovered.mcap");
     let saved = messages(&recovered);
     assert!(!saved.is_empty() && saved == messages(&cut));
     assert_eq!(log("verify", &recovered, &[]).status.code(), Some(0));
@@ -128,16 +128,16 @@ fn a_cut_recording_is_recovered_beside_the_old_one_and_nothing_is_overwritten() 
     assert_eq!(log("recover", &cut, &[]).status.code(), Some(2));
     assert!(before == fs::read(&recovered).unwrap());
 
-    let foreign = bench.write("foreign.mcap", "no recording at all");
+    let foreign = workspace.write("foreign.mcap", "no recording at all");
     assert_eq!(log("recover", &foreign, &[]).status.code(), Some(2));
-    assert!(!bench.file("foreign.recovered.mcap").exists());
+    assert!(!workspace.file("foreign.recovered.mcap").exists());
 }
 
 #[test]
 fn a_recording_becomes_tables_and_candump_logs() {
-    let bench = virtual_run();
-    let out = bench.file("tables");
-    let export = || log("export", &bench.run_folder(), &["--out", out.to_str().unwrap()]);
+    let workspace = virtual_run();
+    let out = workspace.file("tables");
+    let export = || log("export", &workspace.run_folder(), &["--out", out.to_str().unwrap()]);
     assert_eq!(export().status.code(), Some(0), "{}", stderr(&export()));
     assert_eq!(export().status.code(), Some(2), "an existing folder was written to");
 
@@ -146,10 +146,11 @@ fn a_recording_becomes_tables_and_candump_logs() {
     let column = |name: &str| header.iter().position(|header| header == name).unwrap();
     let (cycle, length) = (column("cycle"), column("position_m_3"));
     let lines: Vec<_> = table.records().map(Result::unwrap).collect();
-    let readings = messages(&bench.run_folder().join("recording.mcap")).into_iter().filter_map(|message| {
-        let Recorded::Reading(reading) = message else { return None };
-        Some(reading)
-    });
+    let readings =
+        messages(&workspace.run_folder().join("recording.mcap")).into_iter().filter_map(|message| {
+            let Recorded::Reading(reading) = message else { return None };
+            Some(reading)
+        });
     let readings: Vec<_> = readings.collect();
     assert_eq!(lines.len(), readings.len());
     for (line, reading) in lines.iter().zip(&readings) {
@@ -159,14 +160,15 @@ fn a_recording_becomes_tables_and_candump_logs() {
     let frames = fs::read_to_string(out.join("can0.log")).unwrap();
     assert!(frames.lines().count() > 1000);
     assert!(frames.lines().all(|line| candump::parse(line).is_ok()));
-    assert_eq!(frames, fs::read_to_string(bench.run_folder().join("can0.log")).unwrap());
+    assert_eq!(frames, fs::read_to_string(workspace.run_folder().join("can0.log")).unwrap());
 }
 
 #[test]
 fn a_topic_that_the_recording_does_not_have_is_refused_with_those_it_has() {
-    let bench = virtual_run();
-    let out = bench.file("tables");
-    let output = log("export", &bench.run_folder(), &["--topic", "raeding", "--out", out.to_str().unwrap()]);
+    let workspace = virtual_run();
+    let out = workspace.file("tables");
+    let output =
+        log("export", &workspace.run_folder(), &["--topic", "raeding", "--out", out.to_str().unwrap()]);
     assert_eq!(output.status.code(), Some(2));
     let said = stderr(&output);
     assert!(said.contains("no topic 'raeding'") && said.contains(", reading, "), "{said}");
@@ -175,10 +177,10 @@ fn a_topic_that_the_recording_does_not_have_is_refused_with_those_it_has() {
 
 #[test]
 fn topics_that_make_no_table_are_named_and_refused_where_they_are_asked_for() {
-    let bench = virtual_run();
-    let out = bench.file("tables");
+    let workspace = virtual_run();
+    let out = workspace.file("tables");
     let export = |more: &[&str]| {
-        log("export", &bench.run_folder(), &[&["--out", out.to_str().unwrap()], more].concat())
+        log("export", &workspace.run_folder(), &[&["--out", out.to_str().unwrap()], more].concat())
     };
     let refused = export(&["--topic", "reading", "--topic", "/tf"]);
     assert_eq!(refused.status.code(), Some(2));
@@ -195,9 +197,9 @@ fn topics_that_make_no_table_are_named_and_refused_where_they_are_asked_for() {
 
 #[test]
 fn a_recovery_that_fails_leaves_nothing_in_the_way_of_the_next() {
-    let bench = virtual_run();
-    let recording = bench.run_folder().join("recording.mcap");
-    let out = bench.file("recovered.mcap");
+    let workspace = virtual_run();
+    let recording = workspace.run_folder().join("recording.mcap");
+    let out = workspace.file("recovered.mcap");
     let arguments = ["log", "recover", recording.to_str().unwrap(), "--out", out.to_str().unwrap()];
     let failed = cramped(8, &arguments);
     assert_eq!(failed.status.code(), Some(2), "{}", stderr(&failed));
@@ -217,13 +219,13 @@ fn definitions() -> usize {
 
 #[test]
 fn a_recording_cut_at_any_byte_lacks_its_end_and_nothing_else() {
-    let bench = virtual_run();
-    let whole = fs::read(bench.run_folder().join("recording.mcap")).unwrap();
+    let workspace = virtual_run();
+    let whole = fs::read(workspace.run_folder().join("recording.mcap")).unwrap();
     let mut chance = Pcg64Mcg::seed_from_u64(6);
     let definitions = definitions();
     for _ in 0..CUTS {
         let cut = chance.random_range(definitions..whole.len());
-        let path = bench.file("cut.mcap");
+        let path = workspace.file("cut.mcap");
         fs::write(&path, &whole[..cut]).unwrap();
         let proof = log("verify", &path, &[]);
         assert_eq!(proof.status.code(), Some(6), "cut at byte {cut}: {}", stdout(&proof));
@@ -240,10 +242,10 @@ const TRIES: usize = 5;
 
 /// Runs until the recording has begun, kills the logger some time later, and returns when that was; none if the
 /// rig had come to a safe stop before.
-fn kill_the_logger(bench: &Bench, after: Duration) -> Option<u64> {
-    let child = start(bench, &[]);
+fn kill_the_logger(workspace: &Workspace, after: Duration) -> Option<u64> {
+    let child = start(workspace, &[]);
     let logger = child_of(&child, "logger");
-    let recording = bench.run_folder().join("recording.mcap");
+    let recording = workspace.run_folder().join("recording.mcap");
     while !fs::metadata(&recording).is_ok_and(|file| file.len() > 50_000) {
         clock::sleep(Duration::from_millis(5));
     }
@@ -263,11 +265,12 @@ fn kill_the_logger(bench: &Bench, after: Duration) -> Option<u64> {
 fn a_killed_logger_leaves_a_recording_that_lacks_its_end_and_is_recovered() {
     for after_ms in KILLED_AT_MS {
         let killed = (0..TRIES).find_map(|_| {
-            let bench = Bench::new(&format!("duration_s = 30.0\n{UNHURRIED}"));
-            kill_the_logger(&bench, Duration::from_millis(after_ms)).map(|killed_ns| (bench, killed_ns))
+            let workspace = Workspace::new(&format!("duration_s = 30.0\n{UNHURRIED}"));
+            kill_the_logger(&workspace, Duration::from_millis(after_ms))
+                .map(|killed_ns| (workspace, killed_ns))
         });
-        let (bench, killed_ns) = killed.expect("a rig that runs until its logger is killed");
-        let recording = bench.run_folder().join("recording.mcap");
+        let (workspace, killed_ns) = killed.expect("a rig that runs until its logger is killed");
+        let recording = workspace.run_folder().join("recording.mcap");
         let proof = log("verify", &recording, &[]);
         assert_eq!(proof.status.code(), Some(6), "{}", stdout(&proof));
         assert!(stdout(&proof).contains("lacks its end"), "{}", stdout(&proof));
@@ -280,7 +283,7 @@ fn a_killed_logger_leaves_a_recording_that_lacks_its_end_and_is_recovered() {
         let lost_ns = killed_ns.saturating_sub(readings.max().unwrap_or(0));
         eprintln!("killed {after_ms} ms after it began: the last {} ms are lost", lost_ns / 1_000_000);
 
-        let recovered = bench.file("recovered.mcap");
+        let recovered = workspace.file("recovered.mcap");
         let output = log("recover", &recording, &["--out", recovered.to_str().unwrap()]);
         assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
         let proof = log("verify", &recovered, &[]);

@@ -5,7 +5,7 @@ mod common;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-use common::{Bench, skip, stderr};
+use common::{Workspace, skip, stderr};
 
 const BROWSERS: [&str; 3] = ["chromium", "chromium-browser", "google-chrome"];
 /// What every report of a run that moved shows.
@@ -52,10 +52,10 @@ fn open(browser: &Path, page: &Path, profile: &Path) -> Output {
 #[test]
 fn the_page_works_in_a_browser() {
     let Some(browser) = browser() else { return };
-    let bench = Bench::new("duration_s = 2.0");
-    assert_eq!(bench.run(&["--clock", "virtual"]).status.code(), Some(0));
-    let page = bench.run_folder().join("report.html");
-    let output = open(&browser, &page, &bench.file("profile"));
+    let workspace = Workspace::new("duration_s = 2.0");
+    assert_eq!(workspace.run(&["--clock", "virtual"]).status.code(), Some(0));
+    let page = workspace.run_folder().join("report.html");
+    let output = open(&browser, &page, &workspace.file("profile"));
     let document = String::from_utf8_lossy(&output.stdout);
     for id in ELEMENTS {
         assert!(document.contains(&format!("id=\"{id}\"")), "{id} is missing: {}", stderr(&output));

@@ -6,13 +6,13 @@ use std::fs::File;
 use std::io;
 use std::process::{Command, Stdio};
 
-use common::{Bench, MASSETER, stderr};
+use common::{MASSETER, Workspace, stderr};
 
 #[test]
 fn results_that_cannot_be_written_are_no_success_and_a_reader_that_had_enough_is_no_failure() {
-    let bench = Bench::new("duration_s = 0.5");
-    assert_eq!(bench.run(&["--clock", "virtual"]).status.code(), Some(0));
-    let folder = bench.run_folder();
+    let workspace = Workspace::new("duration_s = 0.5");
+    assert_eq!(workspace.run(&["--clock", "virtual"]).status.code(), Some(0));
+    let folder = workspace.run_folder();
     let folder = folder.to_str().unwrap();
     let verbs: [&[&str]; 7] = [
         &["can", "plan"],
@@ -34,7 +34,7 @@ fn results_that_cannot_be_written_are_no_success_and_a_reader_that_had_enough_is
         let (reader, writer) = io::pipe().unwrap();
         drop(reader);
         let (code, said) = into(writer.into());
-        // The machine may be too disturbed for a bench.
+        // The machine may be too disturbed for a workspace.
         assert!(matches!(code, Some(0 | 3)), "{verb:?}: {said}");
     }
 }

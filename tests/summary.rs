@@ -6,7 +6,7 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::path::Path;
 
-use common::Bench;
+use common::Workspace;
 use masseter_shared::messages::codes::Source;
 use serde_json::Value;
 
@@ -42,23 +42,23 @@ fn keys(path: &str, value: &Value, found: &mut BTreeSet<String>) {
 
 #[test]
 fn the_summary_has_the_keys_that_are_documented_and_no_others() {
-    let bench = Bench::new("duration_s = 1.0");
-    assert_eq!(bench.run(&["--clock", "virtual"]).status.code(), Some(0));
+    let workspace = Workspace::new("duration_s = 1.0");
+    assert_eq!(workspace.run(&["--clock", "virtual"]).status.code(), Some(0));
     let mut found = BTreeSet::new();
-    keys("", &bench.summary(), &mut found);
+    keys("", &workspace.summary(), &mut found);
     let (documented, optional) = documented();
     let undocumented: Vec<_> = found.difference(&documented).collect();
     assert!(undocumented.is_empty(), "not in docs/summary.md: {undocumented:?}");
     let absent: Vec<_> = documented.difference(&found).filter(|key| !optional.contains(*key)).collect();
     assert!(absent.is_empty(), "in docs/summary.md, but not in summary.json: {absent:?}");
-    assert_eq!(bench.summary()["form"], 1);
+    assert_eq!(workspace.summary()["form"], 1);
 }
 
 #[test]
 fn the_intervals_are_those_that_are_documented_in_their_order() {
-    let bench = Bench::new("duration_s = 1.0");
-    assert_eq!(bench.run(&["--clock", "virtual"]).status.code(), Some(0));
-    let summary = bench.summary();
+    let workspace = Workspace::new("duration_s = 1.0");
+    assert_eq!(workspace.run(&["--clock", "virtual"]).status.code(), Some(0));
+    let summary = workspace.summary();
     let intervals = summary["figures"]["intervals"].as_array().unwrap();
     let text = description();
     let (_, table) = text.split_once("| interval | from | to |\n| --- | --- | --- |\n").unwrap();
@@ -83,9 +83,9 @@ fn attribute<'a>(xml: &'a str, element: &str, name: &str) -> &'a str {
 #[test]
 fn the_junit_report_counts_its_cases() {
     for (limit, code, failures) in [("1.0", 0, "0"), ("1e-9", 1, "1")] {
-        let bench = Bench::new(&format!("duration_s = 1.0\n[checks]\ntracking_rms_mm = {limit}"));
-        assert_eq!(bench.run(&["--clock", "virtual"]).status.code(), Some(code));
-        let xml = fs::read_to_string(bench.run_folder().join("junit.xml")).unwrap();
+        let workspace = Workspace::new(&format!("duration_s = 1.0\n[checks]\ntracking_rms_mm = {limit}"));
+        assert_eq!(workspace.run(&["--clock", "virtual"]).status.code(), Some(code));
+        let xml = fs::read_to_string(workspace.run_folder().join("junit.xml")).unwrap();
         let cases = xml.matches("<testcase ").count();
         assert_eq!(attribute(&xml, "testsuite", "tests"), cases.to_string());
         assert_eq!(attribute(&xml, "testsuite", "failures"), failures);

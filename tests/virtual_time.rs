@@ -5,17 +5,17 @@ mod common;
 use std::fs;
 
 use common::{
-    Bench, cramped, jaw_recording, json, start, stderr, stdout, wait_until_it_records,
+    Workspace, cramped, jaw_recording, json, start, stderr, stdout, wait_until_it_records,
 };
 use rustix::process::{Pid, Signal, kill_process};
 use serde_json::json;
 
 #[test]
 fn a_run_passes_tracks_within_a_tenth_of_a_millimetre_and_leaves_its_folder() {
-    let bench = Bench::new("duration_s = 4.0");
-    let output = bench.run(&["--clock", "virtual"]);
+    let workspace = Workspace::new("duration_s = 4.0");
+    let output = workspace.run(&["--clock", "virtual"]);
     assert_eq!(output.status.code(), Some(0), "{}{}", stdout(&output), stderr(&output));
-    let figures = &bench.summary()["figures"];
+    let figures = &workspace.summary()["figures"];
     assert!(figures["tracking"]["rms_mm"].as_f64().unwrap() < 0.1, "{}", figures["tracking"]);
     assert!(figures["tracking"]["samples"].as_u64().unwrap() >= 3999);
     assert_eq!(figures["final_state"], "finished");
@@ -31,7 +31,7 @@ fn a_run_passes_tracks_within_a_tenth_of_a_millimetre_and_leaves_its_folder() {
         "can1.log",
         "hist/forward-kinematics.hlog",
     ] {
-        let file = bench.run_folder().join(name);
+        let file = workspace.run_folder().join(name);
         assert!(fs::metadata(&file).is_ok_and(|file| file.len() > 0), "{name} is missing or empty");
     }
     let table = stdout(&output);
@@ -42,10 +42,10 @@ fn a_run_passes_tracks_within_a_tenth_of_a_millimetre_and_leaves_its_folder() {
 #[test]
 fn the_same_scenario_and_seed_leave_the_same_bytes_and_another_seed_others() {
     let recording = |seed: &str| {
-        let bench = Bench::new("duration_s = 2.0");
-        let output = bench.run(&["--clock", "virtual", "--seed", seed]);
+        let workspace = Workspace::new("duration_s = 2.0");
+        let output = workspace.run(&["--clock", "virtual", "--seed", seed]);
         assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
-        fs::read(bench.run_folder().join("recording.mcap")).unwrap()
+        fs::read(workspace.run_folder().join("recording.mcap")).unwrap()
     };
     let first = recording("7");
     assert!(first == recording("7"), "two runs of one seed differ");
@@ -54,10 +54,10 @@ fn the_same_scenario_and_seed_leave_the_same_bytes_and_another_seed_others() {
 
 #[test]
 fn a_run_folder_runs_again_from_its_own_scenario() {
-    let bench = Bench::new("duration_s = 1.0\n[motion]\nkind = 'protrusion'");
-    assert_eq!(bench.run(&["--clock", "virtual"]).status.code(), Some(0));
-    let scenario = bench.run_folder().join("scenario.toml");
-    let again = bench.file("again");
+    let workspace = Workspace::new("duration_s = 1.0\n[motion]\nkind = 'protrusion'");
+    assert_eq!(workspace.run(&["--clock", "virtual"]).status.code(), Some(0));
+    let scenario = workspace.run_folder().join("scenario.toml");
+    let again = workspace.file("again");
     let output = common::masseter(&[
         "run",
         scenario.to_str().unwrap(),
@@ -68,15 +68,15 @@ fn a_run_folder_runs_again_from_its_own_scenario() {
     ]);
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
     let [first, second] =
-        [bench.run_folder(), again].map(|run| fs::read(run.join("recording.mcap")).unwrap());
+        [workspace.run_folder(), again].map(|run| fs::read(run.join("recording.mcap")).unwrap());
     assert!(first == second);
 }
 
 #[test]
 fn every_generated_motion_plays() {
     for kind in ["chewing", "opening", "protrusion", "lateral"] {
-        let bench = Bench::new(&format!("duration_s = 3.0\n[motion]\nkind = '{kind}'"));
-        let output = bench.run(&["--clock", "virtual"]);
+        let workspace = Workspace::new(&format!("duration_s = 3.0\n[motion]\nkind = '{kind}'"));
+        let output = workspace.run(&["--clock", "virtual"]);
         assert_eq!(output.status.code(), Some(0), "{kind}: {}{}", stdout(&output), stderr(&output));
     }
 }
@@ -87,10 +87,10 @@ fn recorded_patients_play() {
     let patient = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/patient.toml");
     for (name, scenario) in [("patient_jaws3d.csv", patient), ("jma_markers.csv", markers)] {
         let Some(path) = jaw_recording(name) else { continue };
-        let bench = Bench::new(&fs::read_to_string(scenario).unwrap());
-        let output = bench.run(&["--clock", "virtual", "--trajectory", path.to_str().unwrap()]);
+        let workspace = Workspace::new(&fs::read_to_string(scenario).unwrap());
+        let output = workspace.run(&["--clock", "virtual", "--trajectory", path.to_str().unwrap()]);
         assert_eq!(output.status.code(), Some(0), "{name}: {}{}", stdout(&output), stderr(&output));
-        let tracking = &bench.summary()["figures"]["tracking"];
+        let tracking = &workspace.summary()["figures"]["tracking"];
         assert!(tracking["rms_mm"].as_f64().unwrap() < 0.1, "{name}: {tracking}");
     }
 }
@@ -104,14 +104,14 @@ fn what_is_wanted_at_a_time_of_the_motion_is_the_recordings_sample_of_that_time(
         format!("{},0,0,{},1,0,0,0\n", 7.0 + time_s, 1e3 * lowered_m(time_s))
     };
     let rows: String = (0..=200).map(row).collect();
-    let bench = Bench::new("[motion]\nkind = 'file'\npath = 'jaw.csv'\nlowpass_hz = 0.0");
-    bench.write("jaw.csv", &format!("time_s,x_mm,y_mm,z_mm,qw,qx,qy,qz\n{rows}"));
-    assert_eq!(bench.run(&["--clock", "virtual"]).status.code(), Some(0));
-    let (run, out) = (bench.run_folder(), bench.file("csv"));
+    let workspace = Workspace::new("[motion]\nkind = 'file'\npath = 'jaw.csv'\nlowpass_hz = 0.0");
+    workspace.write("jaw.csv", &format!("time_s,x_mm,y_mm,z_mm,qw,qx,qy,qz\n{rows}"));
+    assert_eq!(workspace.run(&["--clock", "virtual"]).status.code(), Some(0));
+    let (run, out) = (workspace.run_folder(), workspace.file("csv"));
     let [run, out] = [&run, &out].map(|path| path.to_str().unwrap());
     common::masseter(&["log", "export", run, "--topic", "state", "--out", out]);
 
-    let table = fs::read_to_string(bench.file("csv").join("state.csv")).unwrap();
+    let table = fs::read_to_string(workspace.file("csv").join("state.csv")).unwrap();
     let (header, lines) = table.split_once('\n').unwrap();
     let column = |name: &str| header.split(',').position(|column| column == name).expect(name);
     let [time, height] = ["motion_time_s", "desired_position_m_2"].map(column);
@@ -143,10 +143,10 @@ fn markers_whose_centroid_stands_for_the_incisal_point_are_told_of_once_the_jaw_
     let columns = "time_s,m1_x_mm,m1_y_mm,m1_z_mm,m2_x_mm,m2_y_mm,m2_z_mm,m3_x_mm,m3_y_mm,m3_z_mm";
     let origin = "marker_origin_mm = [0.0, 0.0, 0.0]";
     for (largest_deg, key, is_told) in [(3.0, "", true), (3.0, origin, false), (1.0, "", false)] {
-        let bench = Bench::new(&format!("[motion]\nkind = 'file'\npath = 'm.csv'\n{key}"));
+        let workspace = Workspace::new(&format!("[motion]\nkind = 'file'\npath = 'm.csv'\n{key}"));
         let rows: String = (0..=160).map(|i| row(i, largest_deg)).collect();
-        bench.write("m.csv", &format!("{columns}\n{rows}"));
-        let output = bench.run(&["--clock", "virtual"]);
+        workspace.write("m.csv", &format!("{columns}\n{rows}"));
+        let output = workspace.run(&["--clock", "virtual"]);
         assert_eq!(output.status.code(), Some(0), "{}{}", stdout(&output), stderr(&output));
         let told = "the jaw turns by up to 3.0°, and the markers' centroid stands for the incisal point; \
                     set motion.marker_origin_mm";
@@ -157,30 +157,30 @@ fn markers_whose_centroid_stands_for_the_incisal_point_are_told_of_once_the_jaw_
 /// The example's piece of food yields at 35 N.
 #[test]
 fn food_resists_the_jaw_and_the_platform_still_goes_where_it_should() {
-    let bench = Bench::new("duration_s = 3.0\n[food]");
-    let output = bench.run(&["--clock", "virtual"]);
+    let workspace = Workspace::new("duration_s = 3.0\n[food]");
+    let output = workspace.run(&["--clock", "virtual"]);
     assert_eq!(output.status.code(), Some(0), "{}", stdout(&output));
-    let bite_force_n = bench.summary()["figures"]["bite_force_max_n"].as_f64().unwrap();
+    let bite_force_n = workspace.summary()["figures"]["bite_force_max_n"].as_f64().unwrap();
     assert!((33.0..37.0).contains(&bite_force_n), "{bite_force_n}");
 }
 
 #[test]
 fn another_builders_mechanism_runs() {
     let scenario = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/builder.toml");
-    let bench = Bench::new(&fs::read_to_string(scenario).unwrap());
-    let output = bench.run(&["--clock", "virtual", "--duration", "5s"]);
+    let workspace = Workspace::new(&fs::read_to_string(scenario).unwrap());
+    let output = workspace.run(&["--clock", "virtual", "--duration", "5s"]);
     assert_eq!(output.status.code(), Some(0), "{}{}", stdout(&output), stderr(&output));
 }
 
 /// A velocity loop far too stiff for the step that it is integrated with.
 #[test]
 fn a_plant_that_fails_is_a_death_as_in_real_time_and_is_told_again() {
-    let bench = Bench::new(
+    let workspace = Workspace::new(
         "[drives.leg]\nvelocity_gain_n_s_per_m = 6e7\nrated_force_n = 1e7\nmax_force_n = 1e8\nfollowing_error_m = 1.0",
     );
-    let output = bench.run(&["--clock", "virtual"]);
+    let output = workspace.run(&["--clock", "virtual"]);
     assert_eq!(output.status.code(), Some(4), "{}{}", stdout(&output), stderr(&output));
-    let again = common::masseter(&["report", bench.run_folder().to_str().unwrap()]);
+    let again = common::masseter(&["report", workspace.run_folder().to_str().unwrap()]);
     assert_eq!(stdout(&again), stdout(&output));
     assert!(stdout(&again).contains("the plant died: the mechanism"), "{}", stdout(&again));
 }
@@ -188,36 +188,36 @@ fn a_plant_that_fails_is_a_death_as_in_real_time_and_is_told_again() {
 #[test]
 fn an_interrupt_ends_a_run_in_order_as_in_real_time() {
     for signal in [Signal::INT, Signal::TERM] {
-        let bench = Bench::new("duration_s = 60.0");
-        let child = start(&bench, &["--clock", "virtual"]);
-        wait_until_it_records(&bench);
+        let workspace = Workspace::new("duration_s = 60.0");
+        let child = start(&workspace, &["--clock", "virtual"]);
+        wait_until_it_records(&workspace);
         kill_process(Pid::from_child(&child), signal).unwrap();
         let output = child.wait_with_output().unwrap();
         assert_eq!(output.status.code(), Some(130), "{signal:?}: {}", stderr(&output));
-        let summary = bench.summary();
+        let summary = workspace.summary();
         assert_eq!(summary["verdict"]["word"], "INTERRUPTED");
         assert_eq!(summary["figures"]["final_state"], "finished");
-        assert!(bench.run_folder().join("junit.xml").is_file());
+        assert!(workspace.run_folder().join("junit.xml").is_file());
     }
 }
 
 #[test]
 fn a_check_that_fails_fails_the_run() {
-    let bench = Bench::new("duration_s = 1.0\n[checks]\ntracking_rms_mm = 1e-9");
-    let output = bench.run(&["--clock", "virtual", "--format", "json"]);
+    let workspace = Workspace::new("duration_s = 1.0\n[checks]\ntracking_rms_mm = 1e-9");
+    let output = workspace.run(&["--clock", "virtual", "--format", "json"]);
     assert_eq!(output.status.code(), Some(1), "{}", stderr(&output));
     let printed: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
     assert_eq!(printed["verdict"]["word"], "FAIL");
     assert_eq!(printed["verdict"]["exit_code"], json!(1));
-    let junit = fs::read_to_string(bench.run_folder().join("junit.xml")).unwrap();
+    let junit = fs::read_to_string(workspace.run_folder().join("junit.xml")).unwrap();
     assert!(junit.contains("failures=\"1\""), "{junit}");
 }
 
 #[test]
 fn a_report_can_be_made_again_and_a_cut_recording_is_said_to_be_cut() {
-    let bench = Bench::new("duration_s = 2.0");
-    assert_eq!(bench.run(&["--clock", "virtual"]).status.code(), Some(0));
-    let folder = bench.run_folder();
+    let workspace = Workspace::new("duration_s = 2.0");
+    assert_eq!(workspace.run(&["--clock", "virtual"]).status.code(), Some(0));
+    let folder = workspace.run_folder();
     let before = fs::read(folder.join("summary.json")).unwrap();
     let report = || common::masseter(&["report", folder.to_str().unwrap()]);
     assert_eq!(report().status.code(), Some(0));
@@ -239,8 +239,8 @@ fn a_report_can_be_made_again_and_a_cut_recording_is_said_to_be_cut() {
 
 #[test]
 fn a_run_folder_that_takes_no_scenario_leaves_the_run_incomplete() {
-    let bench = Bench::new("");
-    let out = bench.run_folder();
+    let workspace = Workspace::new("");
+    let out = workspace.run_folder();
     let output = cramped(0, &["run", "--clock", "virtual", "--out", out.to_str().unwrap()]);
     assert!(stderr(&output).contains("cannot write the scenario: File too large"), "{}", stderr(&output));
     assert_eq!(output.status.code(), Some(6), "{}", stderr(&output));

@@ -28,11 +28,11 @@ pub(crate) fn take_the_cores() -> MutexGuard<'static, ()> {
 }
 
 /// A place of its own for a test, with scenario and run folder.
-pub(crate) struct Bench {
+pub(crate) struct Workspace {
     folder: tempfile::TempDir,
 }
 
-impl Bench {
+impl Workspace {
     pub(crate) fn new(scenario: &str) -> Self {
         let folder = tempfile::tempdir().expect("a temporary folder");
         fs::write(folder.path().join("scenario.toml"), scenario).expect("the scenario is written");
@@ -49,7 +49,7 @@ impl Bench {
         path
     }
 
-    /// `masseter run` with this bench's scenario into its run folder, ready to be started.
+    /// `masseter run` with this workspace's scenario into its run folder, ready to be started.
     pub(crate) fn run_command(&self, arguments: &[&str]) -> Command {
         let mut command = Command::new(MASSETER);
         command
@@ -78,15 +78,15 @@ impl Bench {
     }
 }
 
-/// Starts a run of this bench.
-pub(crate) fn start(bench: &Bench, arguments: &[&str]) -> Child {
-    bench.run_command(arguments).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap()
+/// Starts a run of this workspace.
+pub(crate) fn start(workspace: &Workspace, arguments: &[&str]) -> Child {
+    workspace.run_command(arguments).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap()
 }
 
 /// Waits until the recording shows that the rig runs.
-pub(crate) fn wait_until_it_records(bench: &Bench) {
+pub(crate) fn wait_until_it_records(workspace: &Workspace) {
     for _ in 0..1000 {
-        let recorded = fs::metadata(bench.run_folder().join("recording.mcap")).map_or(0, |file| file.len());
+        let recorded = fs::metadata(workspace.run_folder().join("recording.mcap")).map_or(0, |file| file.len());
         if recorded > 500_000 {
             return;
         }
