@@ -24,7 +24,7 @@ fn scenarios_are_refused_with_place_and_remedy() {
     ];
     for (scenario, reason) in cases {
         let workspace = Workspace::new(scenario);
-        let output = workspace.run(&["--clock", "virtual"]);
+        let output = workspace.run_virtual(&[]);
         assert_eq!(output.status.code(), Some(2), "{scenario}: {}", stderr(&output));
         assert!(stderr(&output).contains(reason), "{scenario:?} gave {:?}", stderr(&output));
         assert!(!workspace.run_folder().exists(), "{scenario}: something was started");
@@ -67,7 +67,7 @@ fn recordings_are_refused_with_file_reason_and_the_line_if_it_is_one_lines_fault
     for (text, place, reason) in cases {
         let workspace = Workspace::new("");
         let file = workspace.write("jaw.csv", &text);
-        let output = workspace.run(&["--clock", "virtual", "--trajectory", file.to_str().unwrap()]);
+        let output = workspace.run_virtual(&["--trajectory", file.to_str().unwrap()]);
         let said = stderr(&output);
         assert_eq!(output.status.code(), Some(2), "{said}");
         assert!(said.contains(&format!("jaw.csv{place}")) && said.contains(reason), "{said}");
@@ -91,7 +91,7 @@ fn a_point_that_a_recording_has_no_use_for_is_refused() {
                 "[motion]\nkind = 'file'\npath = 'jaw.csv'\n{key} = [0.0, 0.0, 0.0]"
             ));
             workspace.write("jaw.csv", &recording);
-            let output = workspace.run(&["--clock", "virtual", "--duration", "1s"]);
+            let output = workspace.run_virtual(&["--duration", "1s"]);
             let is_refused = output.status.code() == Some(2) && stderr(&output).contains(key);
             assert_eq!(is_refused, key == superfluous, "{key}: {}", stderr(&output));
         }
@@ -151,7 +151,7 @@ fn interfaces_that_cannot_be_used_are_refused_with_what_to_do() {
 #[test]
 fn manifests_that_no_run_wrote_are_refused_and_their_words_are_no_markup() {
     let workspace = Workspace::new("duration_s = 1.0");
-    assert_eq!(workspace.run(&["--clock", "virtual"]).status.code(), Some(0));
+    assert_eq!(workspace.run_virtual(&[]).status.code(), Some(0));
     let report_on = |edit: &dyn Fn(&mut Value)| {
         let mut manifest = workspace.manifest();
         edit(&mut manifest);
@@ -191,7 +191,7 @@ fn manifests_that_no_run_wrote_are_refused_and_their_words_are_no_markup() {
 fn a_run_folder_is_never_overwritten() {
     let workspace = Workspace::new("duration_s = 1.0");
     std::fs::create_dir(workspace.run_folder()).unwrap();
-    let output = workspace.run(&["--clock", "virtual"]);
+    let output = workspace.run_virtual(&[]);
     assert_eq!(output.status.code(), Some(2));
     assert!(stderr(&output).contains("not overwritten"), "{}", stderr(&output));
 }

@@ -53,7 +53,7 @@ fn the_rate_that_a_plan_promises_is_one_that_fits() {
 fn every_message_of_a_run_arrives_within_the_bound_of_its_plan() {
     for scenario in ["duration_s = 2.0", "duration_s = 1.0\n[can]\nfd = true\nbuses = [[0, 1, 2, 3, 4, 5]]"] {
         let workspace = Workspace::new(scenario);
-        let output = workspace.run(&["--clock", "virtual"]);
+        let output = workspace.run_virtual(&[]);
         assert_eq!(output.status.code(), Some(0), "{scenario}: {}", stdout(&output));
         let summary = workspace.summary();
         let judged = check(&summary, "bus response");
@@ -71,7 +71,7 @@ fn every_message_of_a_run_arrives_within_the_bound_of_its_plan() {
 fn a_disturbed_bus_is_not_held_against_bounds_that_assume_none() {
     let fault = "[[faults]]\nkind = 'corrupt'\nbus = 0\nfrom_s = 0.5\nprobability = 0.01";
     let workspace = Workspace::new(&format!("duration_s = 1.0\n{fault}"));
-    let output = workspace.run(&["--clock", "virtual"]);
+    let output = workspace.run_virtual(&[]);
     let summary = workspace.summary();
     assert_eq!(check(&summary, "bus response")["result"], "not_judged", "{}", stdout(&output));
     assert!(stdout(&output).contains("skip bus response"), "{}", stdout(&output));
@@ -95,7 +95,7 @@ fn every_fault_of_a_bus_is_borne_or_stops_the_rig_safely_with_its_cause() {
     for (kind, which, stopped_by) in cases {
         let fault = format!("[[faults]]\nkind = '{kind}'\nbus = 0\nfrom_s = 1.5\n{which}");
         let workspace = Workspace::new(&format!("duration_s = 1.0\n{fault}"));
-        let output = workspace.run(&["--clock", "virtual"]);
+        let output = workspace.run_virtual(&[]);
         let expected = if stopped_by.is_some() { 5 } else { 0 };
         assert_eq!(output.status.code(), Some(expected), "{fault}: {}", stdout(&output));
         let summary = workspace.summary();
@@ -115,7 +115,7 @@ fn a_run_passes_on_a_bus_where_frames_come_twice_now_and_then_from_the_first_on(
     let workspace = Workspace::new(
         "duration_s = 1.0\n[[faults]]\nkind = 'duplicate'\nbus = 0\nfrom_s = 0\nprobability = 0.01",
     );
-    let output = workspace.run(&["--clock", "virtual"]);
+    let output = workspace.run_virtual(&[]);
     assert_eq!(output.status.code(), Some(0), "{}", stdout(&output));
 }
 

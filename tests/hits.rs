@@ -7,8 +7,7 @@ use std::process::{Child, Output};
 use std::time::Duration;
 
 use common::{
-    PASSED_OR_INVALID, UNHURRIED, Workspace, child_of, masseter, shared_memory_of, start, stderr, stdout,
-    take_the_cores,
+    Cores, PASSED_OR_INVALID, UNHURRIED, Workspace, child_of, masseter, shared_memory_of, stderr, stdout,
 };
 use masseter::recording::{Reader, Recorded};
 use masseter_shared::clock::{self, SECOND_NS};
@@ -54,10 +53,10 @@ struct Rig {
 
 impl Rig {
     /// A rig whose `role` gets the signal at the moment; none when that was missed.
-    fn hit(role: &str, signal: Signal, moment: Moment) -> Option<Self> {
+    fn hit(cores: &Cores, role: &str, signal: Signal, moment: Moment) -> Option<Self> {
         let name = format!("hit-{}", std::process::id());
         let workspace = Workspace::new(&format!("{MOTION}{UNHURRIED}"));
-        let supervisor = start(&workspace, &["--name", &name]);
+        let supervisor = workspace.start(cores, &["--name", &name]);
         let victim = child_of(&supervisor, role);
         let rig = Self { name, workspace, supervisor, victim };
         let states = rig.states();
@@ -82,8 +81,8 @@ impl Rig {
 }
 
 /// A rig whose `role` got the signal at the moment.
-fn hit(role: &str, signal: Signal, moment: Moment) -> Rig {
-    let rig = (0..TRIES).find_map(|_| Rig::hit(role, signal, moment));
+fn hit(cores: &Cores, role: &str, signal: Signal, moment: Moment) -> Rig {
+    let rig = (0..TRIES).find_map(|_| Rig::hit(cores, role, signal, moment));
     rig.unwrap_or_else(|| panic!("{role}: {moment:?} was missed {TRIES} times"))
 }
 
@@ -127,9 +126,9 @@ fn is_recovered(workspace: &Workspace) -> bool {
 
 #[test]
 fn whoever_is_killed_and_when_the_rig_ends_in_order_and_another_can_start() {
-    let _cores = take_the_cores();
+    let cores = Cores::take();
     for (role, moment) in ROLES.into_iter().flat_map(|role| MOMENTS.map(|moment| (role, moment))) {
-        let rig = hit(role, Signal::KILL, moment);
+        let rig = hit(&cores, role, Signal::KILL, moment);
         let name = rig.name.clone();
         let (workspace, output) = rig.end();
         let context = format!("{role} {moment:?}: {}{}", stdout(&output), stderr(&output));
@@ -184,9 +183,9 @@ fn drives_are_off(workspace: &Workspace) -> bool {
 
 #[test]
 fn whoever_stands_still_for_a_moment_and_when_the_rig_goes_on() {
-    let _cores = take_the_cores();
+    let cores = Cores::take();
     for (role, moment) in ROLES.into_iter().flat_map(|role| MOMENTS.map(|moment| (role, moment))) {
-        let rig = hit(role, Signal::STOP, moment);
+        let rig = hit(&cores, role, Signal::STOP, moment);
         clock::sleep(SHORT_STOP);
         kill_process(rig.victim, Signal::CONT).unwrap();
         let (workspace, output) = rig.end();

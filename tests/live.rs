@@ -8,7 +8,7 @@ use std::net::{TcpListener, TcpStream};
 use std::process::{Child, ChildStderr, ExitStatus, Stdio};
 use std::thread;
 
-use common::{UNHURRIED, Workspace, masseter, start, stderr, stdout, take_the_cores};
+use common::{Cores, UNHURRIED, Workspace, masseter, stderr, stdout};
 use masseter::recording::Reader;
 use serde_json::{Value, json};
 use tungstenite::client::IntoClientRequest;
@@ -26,8 +26,8 @@ struct Shown {
 }
 
 impl Shown {
-    fn start(workspace: &Workspace) -> Self {
-        let mut run = start(workspace, &["--live=127.0.0.1:0"]);
+    fn start(cores: &Cores, workspace: &Workspace) -> Self {
+        let mut run = workspace.start(cores, &["--live=127.0.0.1:0"]);
         let mut errors = BufReader::new(run.stderr.take().unwrap());
         let mut line = String::new();
         while !line.starts_with("live on ") {
@@ -118,9 +118,9 @@ fn passed(status: ExitStatus) -> bool {
 
 #[test]
 fn a_watcher_sees_the_channels_and_messages_of_the_recording() {
-    let _cores = take_the_cores();
+    let cores = Cores::take();
     let workspace = Workspace::new(&format!("duration_s = 3.0\n{UNHURRIED}"));
-    let shown = Shown::start(&workspace);
+    let shown = Shown::start(&cores, &workspace);
     let mut watcher = Watcher::connect(&shown.address, "foxglove.sdk.v1, foxglove.websocket.v1");
     assert_eq!(watcher.info["op"], "serverInfo");
     assert_eq!(watcher.info["capabilities"], json!([]));
@@ -140,9 +140,9 @@ fn a_watcher_sees_the_channels_and_messages_of_the_recording() {
 
 #[test]
 fn a_watcher_that_does_not_read_is_counted_and_the_recording_is_complete() {
-    let _cores = take_the_cores();
+    let cores = Cores::take();
     let workspace = Workspace::new(&format!("duration_s = 6.0\n{UNHURRIED}"));
-    let shown = Shown::start(&workspace);
+    let shown = Shown::start(&cores, &workspace);
     let mut watcher = Watcher::connect(&shown.address, "foxglove.websocket.v1");
     watcher.subscribe_to_all();
     let (status, said) = shown.finish();
@@ -154,9 +154,9 @@ fn a_watcher_that_does_not_read_is_counted_and_the_recording_is_complete() {
 
 #[test]
 fn strangers_and_deserters_disturb_neither_the_recording_nor_other_watchers() {
-    let _cores = take_the_cores();
+    let cores = Cores::take();
     let workspace = Workspace::new(&format!("duration_s = 3.0\n{UNHURRIED}"));
-    let shown = Shown::start(&workspace);
+    let shown = Shown::start(&cores, &workspace);
     let _silent = TcpStream::connect(&shown.address).unwrap();
     let mut browser = TcpStream::connect(&shown.address).unwrap();
     browser.write_all(b"GET / HTTP/1.1\r\nHost: here\r\n\r\n").unwrap();
@@ -184,8 +184,9 @@ fn strangers_and_deserters_disturb_neither_the_recording_nor_other_watchers() {
 
 #[test]
 fn a_client_that_sends_without_end_holds_up_neither_the_recording_nor_the_end() {
+    let cores = Cores::take();
     let workspace = Workspace::new(&format!("duration_s = 1.0\n{UNHURRIED}"));
-    let shown = Shown::start(&workspace);
+    let shown = Shown::start(&cores, &workspace);
     let mut flooder = Watcher::connect(&shown.address, "foxglove.sdk.v1");
     // The beginning of a text, and then nothing but its empty continuation.
     flooder.socket.get_mut().write_all(&[0x01, 0x80, 0, 0, 0, 0]).unwrap();
@@ -200,9 +201,10 @@ fn a_client_that_sends_without_end_holds_up_neither_the_recording_nor_the_end() 
 
 #[test]
 fn a_reader_of_the_progress_that_pauses_costs_no_message_and_holds_no_end_up() {
+    let cores = Cores::take();
     let workspace = Workspace::new(&format!("duration_s = 4.0\n{UNHURRIED}"));
     let (errors, mut filler) = io::pipe().unwrap();
-    let mut command = workspace.run_command(&[]);
+    let mut command = workspace.command(&cores, &[]);
     let run = command.stdout(Stdio::piped()).stderr(filler.try_clone().unwrap()).spawn().unwrap();
     let mut errors = BufReader::new(errors);
     let mut line = String::new();
@@ -222,6 +224,7 @@ fn a_reader_of_the_progress_that_pauses_costs_no_message_and_holds_no_end_up() {
 
 #[test]
 fn what_cannot_be_shown_is_refused_before_anything_is_made() {
+    let cores = Cores::take();
     let taken = TcpListener::bind("127.0.0.1:0").unwrap();
     let port = format!("--live={}", taken.local_addr().unwrap());
     let cases: [(&[&str], &str); 3] = [
@@ -231,7 +234,7 @@ fn what_cannot_be_shown_is_refused_before_anything_is_made() {
     ];
     for (arguments, words) in cases {
         let workspace = Workspace::new("");
-        let output = workspace.run(arguments);
+        let output = workspace.run(&cores, arguments);
         assert_eq!(output.status.code(), Some(2), "{arguments:?}: {}", stderr(&output));
         assert!(stderr(&output).contains(words), "{arguments:?}: {}", stderr(&output));
         assert!(!workspace.run_folder().exists());

@@ -8,7 +8,7 @@ use std::path::Path;
 use std::process::Output;
 use std::time::Duration;
 
-use common::{UNHURRIED, Workspace, child_of, cramped, masseter, start, stderr, stdout};
+use common::{Cores, UNHURRIED, Workspace, child_of, cramped, masseter, stderr, stdout, wait_until};
 use masseter::recording::{Reader, Recorded, Recorder, Scene};
 use masseter_shared::can::candump;
 use masseter_shared::clock;
@@ -20,7 +20,7 @@ use rustix::process::{Signal, kill_process};
 
 fn virtual_run() -> Workspace {
     let workspace = Workspace::new("duration_s = 1.0");
-    let output = workspace.run(&["--clock", "virtual"]);
+    let output = workspace.run_virtual(&[]);
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
     workspace
 }
@@ -242,13 +242,10 @@ const TRIES: usize = 5;
 
 /// Runs until the recording has begun, kills the logger some time later, and returns when that was; none if the
 /// rig had come to a safe stop before.
-fn kill_the_logger(workspace: &Workspace, after: Duration) -> Option<u64> {
-    let child = start(workspace, &[]);
+fn kill_the_logger(cores: &Cores, workspace: &Workspace, after: Duration) -> Option<u64> {
+    let child = workspace.start(cores, &[]);
     let logger = child_of(&child, "logger");
-    let recording = workspace.run_folder().join("recording.mcap");
-    while !fs::metadata(&recording).is_ok_and(|file| file.len() > 50_000) {
-        clock::sleep(Duration::from_millis(5));
-    }
+    wait_until("the rig records", || workspace.recorded_bytes() > 50_000);
     clock::sleep(after);
     let killed_ns = clock::now_ns();
     kill_process(logger, Signal::KILL).unwrap();
@@ -263,10 +260,11 @@ fn kill_the_logger(workspace: &Workspace, after: Duration) -> Option<u64> {
 /// How much of the end that is, `tests/realtime/kill.py` judges: here machines may starve the logger.
 #[test]
 fn a_killed_logger_leaves_a_recording_that_lacks_its_end_and_is_recovered() {
+    let cores = Cores::take();
     for after_ms in KILLED_AT_MS {
         let killed = (0..TRIES).find_map(|_| {
             let workspace = Workspace::new(&format!("duration_s = 30.0\n{UNHURRIED}"));
-            kill_the_logger(&workspace, Duration::from_millis(after_ms))
+            kill_the_logger(&cores, &workspace, Duration::from_millis(after_ms))
                 .map(|killed_ns| (workspace, killed_ns))
         });
         let (workspace, killed_ns) = killed.expect("a rig that runs until its logger is killed");

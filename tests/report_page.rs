@@ -53,7 +53,7 @@ fn open(browser: &Path, page: &Path, profile: &Path) -> Output {
 fn the_page_works_in_a_browser() {
     let Some(browser) = browser() else { return };
     let workspace = Workspace::new("duration_s = 2.0");
-    assert_eq!(workspace.run(&["--clock", "virtual"]).status.code(), Some(0));
+    assert_eq!(workspace.run_virtual(&[]).status.code(), Some(0));
     let page = workspace.run_folder().join("report.html");
     let output = open(&browser, &page, &workspace.file("profile"));
     let document = String::from_utf8_lossy(&output.stdout);

@@ -11,7 +11,7 @@ use std::path::Path;
 use masseter_shared::config::{Scenario, ScenarioError};
 use serde_json::Value;
 
-use common::Bench;
+use common::Workspace;
 
 /// The rows of one heading: key and default, as written.
 type Rows = BTreeMap<String, String>;
@@ -89,7 +89,7 @@ fn quoted(text: &str) -> impl Iterator<Item = &str> {
 }
 
 fn read(text: &str) -> Result<Scenario, ScenarioError> {
-    Scenario::read(&Bench::new(text).file("scenario.toml"))
+    Scenario::read(&Workspace::new(text).file("scenario.toml"))
 }
 
 /// The names that the error about an unknown one lists.

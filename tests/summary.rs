@@ -43,7 +43,7 @@ fn keys(path: &str, value: &Value, found: &mut BTreeSet<String>) {
 #[test]
 fn the_summary_has_the_keys_that_are_documented_and_no_others() {
     let workspace = Workspace::new("duration_s = 1.0");
-    assert_eq!(workspace.run(&["--clock", "virtual"]).status.code(), Some(0));
+    assert_eq!(workspace.run_virtual(&[]).status.code(), Some(0));
     let mut found = BTreeSet::new();
     keys("", &workspace.summary(), &mut found);
     let (documented, optional) = documented();
@@ -57,7 +57,7 @@ fn the_summary_has_the_keys_that_are_documented_and_no_others() {
 #[test]
 fn the_intervals_are_those_that_are_documented_in_their_order() {
     let workspace = Workspace::new("duration_s = 1.0");
-    assert_eq!(workspace.run(&["--clock", "virtual"]).status.code(), Some(0));
+    assert_eq!(workspace.run_virtual(&[]).status.code(), Some(0));
     let summary = workspace.summary();
     let intervals = summary["figures"]["intervals"].as_array().unwrap();
     let text = description();
@@ -84,7 +84,7 @@ fn attribute<'a>(xml: &'a str, element: &str, name: &str) -> &'a str {
 fn the_junit_report_counts_its_cases() {
     for (limit, code, failures) in [("1.0", 0, "0"), ("1e-9", 1, "1")] {
         let workspace = Workspace::new(&format!("duration_s = 1.0\n[checks]\ntracking_rms_mm = {limit}"));
-        assert_eq!(workspace.run(&["--clock", "virtual"]).status.code(), Some(code));
+        assert_eq!(workspace.run_virtual(&[]).status.code(), Some(code));
         let xml = fs::read_to_string(workspace.run_folder().join("junit.xml")).unwrap();
         let cases = xml.matches("<testcase ").count();
         assert_eq!(attribute(&xml, "testsuite", "tests"), cases.to_string());

@@ -13,7 +13,7 @@ use serde_json::json;
 #[test]
 fn a_run_passes_tracks_within_a_tenth_of_a_millimetre_and_leaves_its_folder() {
     let workspace = Workspace::new("duration_s = 4.0");
-    let output = workspace.run(&["--clock", "virtual"]);
+    let output = workspace.run_virtual(&[]);
     assert_eq!(output.status.code(), Some(0), "{}{}", stdout(&output), stderr(&output));
     let figures = &workspace.summary()["figures"];
     assert!(figures["tracking"]["rms_mm"].as_f64().unwrap() < 0.1, "{}", figures["tracking"]);
@@ -43,7 +43,7 @@ fn a_run_passes_tracks_within_a_tenth_of_a_millimetre_and_leaves_its_folder() {
 fn the_same_scenario_and_seed_leave_the_same_bytes_and_another_seed_others() {
     let recording = |seed: &str| {
         let workspace = Workspace::new("duration_s = 2.0");
-        let output = workspace.run(&["--clock", "virtual", "--seed", seed]);
+        let output = workspace.run_virtual(&["--seed", seed]);
         assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
         fs::read(workspace.run_folder().join("recording.mcap")).unwrap()
     };
@@ -55,7 +55,7 @@ fn the_same_scenario_and_seed_leave_the_same_bytes_and_another_seed_others() {
 #[test]
 fn a_run_folder_runs_again_from_its_own_scenario() {
     let workspace = Workspace::new("duration_s = 1.0\n[motion]\nkind = 'protrusion'");
-    assert_eq!(workspace.run(&["--clock", "virtual"]).status.code(), Some(0));
+    assert_eq!(workspace.run_virtual(&[]).status.code(), Some(0));
     let scenario = workspace.run_folder().join("scenario.toml");
     let again = workspace.file("again");
     let output = common::masseter(&[
@@ -76,7 +76,7 @@ fn a_run_folder_runs_again_from_its_own_scenario() {
 fn every_generated_motion_plays() {
     for kind in ["chewing", "opening", "protrusion", "lateral"] {
         let workspace = Workspace::new(&format!("duration_s = 3.0\n[motion]\nkind = '{kind}'"));
-        let output = workspace.run(&["--clock", "virtual"]);
+        let output = workspace.run_virtual(&[]);
         assert_eq!(output.status.code(), Some(0), "{kind}: {}{}", stdout(&output), stderr(&output));
     }
 }
@@ -88,7 +88,7 @@ fn recorded_patients_play() {
     for (name, scenario) in [("patient_jaws3d.csv", patient), ("jma_markers.csv", markers)] {
         let Some(path) = jaw_recording(name) else { continue };
         let workspace = Workspace::new(&fs::read_to_string(scenario).unwrap());
-        let output = workspace.run(&["--clock", "virtual", "--trajectory", path.to_str().unwrap()]);
+        let output = workspace.run_virtual(&["--trajectory", path.to_str().unwrap()]);
         assert_eq!(output.status.code(), Some(0), "{name}: {}{}", stdout(&output), stderr(&output));
         let tracking = &workspace.summary()["figures"]["tracking"];
         assert!(tracking["rms_mm"].as_f64().unwrap() < 0.1, "{name}: {tracking}");
@@ -158,7 +158,7 @@ fn markers_whose_centroid_stands_for_the_incisal_point_are_told_of_once_the_jaw_
 #[test]
 fn food_resists_the_jaw_and_the_platform_still_goes_where_it_should() {
     let workspace = Workspace::new("duration_s = 3.0\n[food]");
-    let output = workspace.run(&["--clock", "virtual"]);
+    let output = workspace.run_virtual(&[]);
     assert_eq!(output.status.code(), Some(0), "{}", stdout(&output));
     let bite_force_n = workspace.summary()["figures"]["bite_force_max_n"].as_f64().unwrap();
     assert!((33.0..37.0).contains(&bite_force_n), "{bite_force_n}");
@@ -168,7 +168,7 @@ fn food_resists_the_jaw_and_the_platform_still_goes_where_it_should() {
 fn another_builders_mechanism_runs() {
     let scenario = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/builder.toml");
     let workspace = Workspace::new(&fs::read_to_string(scenario).unwrap());
-    let output = workspace.run(&["--clock", "virtual", "--duration", "5s"]);
+    let output = workspace.run_virtual(&["--duration", "5s"]);
     assert_eq!(output.status.code(), Some(0), "{}{}", stdout(&output), stderr(&output));
 }
 
@@ -178,7 +178,7 @@ fn a_plant_that_fails_is_a_death_as_in_real_time_and_is_told_again() {
     let workspace = Workspace::new(
         "[drives.leg]\nvelocity_gain_n_s_per_m = 6e7\nrated_force_n = 1e7\nmax_force_n = 1e8\nfollowing_error_m = 1.0",
     );
-    let output = workspace.run(&["--clock", "virtual"]);
+    let output = workspace.run_virtual(&[]);
     assert_eq!(output.status.code(), Some(4), "{}{}", stdout(&output), stderr(&output));
     let again = common::masseter(&["report", workspace.run_folder().to_str().unwrap()]);
     assert_eq!(stdout(&again), stdout(&output));
@@ -204,7 +204,7 @@ fn an_interrupt_ends_a_run_in_order_as_in_real_time() {
 #[test]
 fn a_check_that_fails_fails_the_run() {
     let workspace = Workspace::new("duration_s = 1.0\n[checks]\ntracking_rms_mm = 1e-9");
-    let output = workspace.run(&["--clock", "virtual", "--format", "json"]);
+    let output = workspace.run_virtual(&["--format", "json"]);
     assert_eq!(output.status.code(), Some(1), "{}", stderr(&output));
     let printed: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
     assert_eq!(printed["verdict"]["word"], "FAIL");
@@ -216,7 +216,7 @@ fn a_check_that_fails_fails_the_run() {
 #[test]
 fn a_report_can_be_made_again_and_a_cut_recording_is_said_to_be_cut() {
     let workspace = Workspace::new("duration_s = 2.0");
-    assert_eq!(workspace.run(&["--clock", "virtual"]).status.code(), Some(0));
+    assert_eq!(workspace.run_virtual(&[]).status.code(), Some(0));
     let folder = workspace.run_folder();
     let before = fs::read(folder.join("summary.json")).unwrap();
     let report = || common::masseter(&["report", folder.to_str().unwrap()]);

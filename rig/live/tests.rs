@@ -25,16 +25,24 @@ fn watcher_of(live: &Live) -> WebSocket<TcpStream> {
     let channel = Channel::Topic(Topic::State).place();
     let ask = format!(r#"{{"op": "subscribe", "subscriptions": [{{"id": 1, "channelId": {channel}}}]}}"#);
     socket.send(Message::Text(ask.into())).unwrap();
-    while live.shared.wanted.load(Ordering::Relaxed) == 0 {
-        clock::sleep(Duration::from_millis(1));
-    }
+    let is_heard = || live.shared.wanted.load(Ordering::Relaxed) > 0;
+    assert!(comes_true(is_heard), "the subscription was not heard");
     socket
+}
+
+/// Whether it comes true within a time far longer than that takes.
+fn comes_true(is_so: impl Fn() -> bool) -> bool {
+    (0..10_000).any(|_| {
+        clock::sleep(Duration::from_millis(1));
+        is_so()
+    })
 }
 
 /// Offers messages until there is no room for more; returns how many were offered.
 fn offer_until_one_is_dropped(live: &Live) -> u64 {
     let mut offered = 0;
     while live.watched().dropped == 0 {
+        assert!(offered < 1_000_000, "there is room for everything");
         for _ in 0..1000 {
             offered += 1;
             live.offer(&Recorded::State(State { seq: offered, ..Default::default() }), offered);

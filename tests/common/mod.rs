@@ -8,7 +8,7 @@ use std::process::{Child, Command, Output, Stdio};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-use masseter_shared::clock;
+use masseter_shared::clock::{self, SECOND_NS};
 use rustix::process::Pid;
 use serde_json::Value;
 
@@ -21,10 +21,32 @@ pub(crate) const PASSED_OR_INVALID: [Option<i32>; 2] = [Some(0), Some(3)];
 /// Sections of a scenario that judges nothing by the clock and bears with stalls: test machines are shared and noisy.
 pub(crate) const UNHURRIED: &str = include_str!("../unhurried.toml");
 
-/// The cores are for one test at a time: every rig in real time wants the same two.
-pub(crate) fn take_the_cores() -> MutexGuard<'static, ()> {
-    static CORES: Mutex<()> = Mutex::new(());
-    CORES.lock().unwrap_or_else(PoisonError::into_inner)
+/// Far longer than anything takes that is waited for, ns.
+const GIVE_UP_NS: u64 = 30 * SECOND_NS;
+
+/// The cores are for one test at a time: every rig in real time wants the same two, so whoever starts one needs this.
+pub(crate) struct Cores(MutexGuard<'static, ()>);
+
+impl Cores {
+    /// Waits until no other test of this file has them.
+    pub(crate) fn take() -> Self {
+        static CORES: Mutex<()> = Mutex::new(());
+        Self(CORES.lock().unwrap_or_else(PoisonError::into_inner))
+    }
+}
+
+/// Waits until the recording shows that the rig runs.
+pub(crate) fn wait_until_it_records(workspace: &Workspace) {
+    wait_until("the rig records", || workspace.recorded_bytes() > 500_000);
+}
+
+/// Waits for what comes within seconds where all is well.
+pub(crate) fn wait_until(what: &str, mut is_so: impl FnMut() -> bool) {
+    let give_up_ns = clock::now_ns() + GIVE_UP_NS;
+    while !is_so() {
+        assert!(clock::now_ns() < give_up_ns, "in {} s it never came that {what}", GIVE_UP_NS / SECOND_NS);
+        clock::sleep(Duration::from_millis(5));
+    }
 }
 
 /// A place of its own for a test, with scenario and run folder.
@@ -49,8 +71,31 @@ impl Workspace {
         path
     }
 
-    /// `masseter run` with this workspace's scenario into its run folder, ready to be started.
-    pub(crate) fn run_command(&self, arguments: &[&str]) -> Command {
+    /// A rig in real time, in the midst of a long run.
+    pub(crate) fn running(cores: &Cores, scenario: &str) -> (Self, Child) {
+        let workspace = Self::new(&format!("duration_s = 60.0\n{scenario}"));
+        let child = workspace.start(cores, &[]);
+        wait_until_it_records(&workspace);
+        (workspace, child)
+    }
+
+    /// Starts a run in real time.
+    pub(crate) fn start(&self, cores: &Cores, arguments: &[&str]) -> Child {
+        let mut command = self.command(cores, arguments);
+        command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("masseter starts")
+    }
+
+    /// Runs the rig in real time, to its end.
+    pub(crate) fn run(&self, cores: &Cores, arguments: &[&str]) -> Output {
+        self.command(cores, arguments).output().expect("masseter starts")
+    }
+
+    /// `masseter run` with this scenario into the run folder, in real time, ready to be started.
+    pub(crate) fn command(&self, _cores: &Cores, arguments: &[&str]) -> Command {
+        self.masseter_run(arguments)
+    }
+
+    fn masseter_run(&self, arguments: &[&str]) -> Command {
         let mut command = Command::new(MASSETER);
         command
             .arg("run")
@@ -61,12 +106,19 @@ impl Workspace {
         command
     }
 
-    pub(crate) fn run(&self, arguments: &[&str]) -> Output {
-        self.run_command(arguments).output().expect("masseter starts")
+    /// Runs the rig under virtual time.
+    pub(crate) fn run_virtual(&self, arguments: &[&str]) -> Output {
+        let mut command = self.masseter_run(arguments);
+        command.args(["--clock", "virtual"]).output().expect("masseter starts")
     }
 
     pub(crate) fn run_folder(&self) -> PathBuf {
         self.file("run")
+    }
+
+    /// Length of the recording so far.
+    pub(crate) fn recorded_bytes(&self) -> u64 {
+        fs::metadata(self.run_folder().join("recording.mcap")).map_or(0, |file| file.len())
     }
 
     pub(crate) fn summary(&self) -> Value {
@@ -78,37 +130,24 @@ impl Workspace {
     }
 }
 
-/// Starts a run of this workspace.
-pub(crate) fn start(workspace: &Workspace, arguments: &[&str]) -> Child {
-    workspace.run_command(arguments).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap()
-}
-
-/// Waits until the recording shows that the rig runs.
-pub(crate) fn wait_until_it_records(workspace: &Workspace) {
-    for _ in 0..1000 {
-        let recorded = fs::metadata(workspace.run_folder().join("recording.mcap")).map_or(0, |file| file.len());
-        if recorded > 500_000 {
-            return;
-        }
-        clock::sleep(Duration::from_millis(10));
-    }
-    panic!("the rig did not begin to record");
-}
-
 /// The process of a running rig that plays `role`, once it runs.
 pub(crate) fn child_of(supervisor: &Child, role: &str) -> Pid {
-    for _ in 0..500 {
-        let path = format!("/proc/{0}/task/{0}/children", supervisor.id());
-        let children = fs::read_to_string(path).unwrap_or_default();
-        for id in children.split_whitespace().filter_map(|id| id.parse::<i32>().ok()) {
-            let command = fs::read_to_string(format!("/proc/{id}/cmdline")).unwrap_or_default();
-            if command.split('\0').nth(1) == Some(role) {
-                return Pid::from_raw(id).unwrap();
-            }
-        }
-        clock::sleep(Duration::from_millis(10));
-    }
-    panic!("no {role} appeared");
+    let mut found = None;
+    wait_until(&format!("a {role} runs"), || {
+        found = running_child_of(supervisor, role);
+        found.is_some()
+    });
+    found.expect("it was waited for")
+}
+
+fn running_child_of(supervisor: &Child, role: &str) -> Option<Pid> {
+    let children = fs::read_to_string(format!("/proc/{0}/task/{0}/children", supervisor.id())).ok()?;
+    let plays = |id: &i32| {
+        let command = fs::read_to_string(format!("/proc/{id}/cmdline")).unwrap_or_default();
+        command.split('\0').nth(1) == Some(role)
+    };
+    let child = children.split_whitespace().filter_map(|id| id.parse().ok()).find(plays)?;
+    Pid::from_raw(child)
 }
 
 pub(crate) fn json(path: &Path) -> Value {
