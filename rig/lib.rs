@@ -30,5 +30,6 @@ pub mod plant;
 pub mod recording;
 pub mod report;
 pub mod run;
+mod scenario;
 pub mod study;
 pub mod uniqueness;

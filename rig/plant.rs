@@ -10,6 +10,7 @@ use masseter_shared::realtime::scheduling::{Wanted, obtain};
 
 use crate::cli::PlantArgs;
 use crate::exit::Exit;
+use crate::scenario;
 
 /// Runs the plant until it is asked to end. As the supervisor's process, it also ends by a safe stop for want of a
 /// controller.
@@ -40,14 +41,12 @@ fn emulate(args: &PlantArgs) -> anyhow::Result<()> {
 }
 
 fn resolve(args: &PlantArgs) -> anyhow::Result<Scenario> {
-    let mut scenario = match &args.file {
-        Some(path) => Scenario::read(path)?,
-        None => Scenario::default(),
-    };
-    if let Some(wires) = &args.can {
-        scenario.can.interfaces.clone_from(&wires.0);
-    }
-    scenario.validate()?;
+    let scenario = scenario::changed(args.file.as_deref(), |scenario| {
+        if let Some(wires) = &args.can {
+            scenario.can.interfaces.clone_from(&wires.0);
+        }
+        Ok(())
+    })?;
     if scenario.can.is_virtual() {
         bail!("no interface to put the drives on: name one for each bus, such as --can can0,can1");
     }

@@ -210,3 +210,26 @@ fn wrong_usage_exits_with_2() {
     }
     assert_eq!(masseter(&["report", "/nowhere"]).status.code(), Some(2));
 }
+
+/// Proofs are made at a desk, for a robot elsewhere.
+#[test]
+fn a_proof_around_a_motion_needs_no_interface_of_its_robot() {
+    let robot = "duration_s = 0.2\n[can]\ninterfaces = ['no-such-a', 'no-such-b']";
+    let workspace = Workspace::new(robot);
+    let scenario = workspace.file("scenario.toml");
+    let prove = ["uniqueness", "prove", "--around-mm", "1", "--boxes", "1", "--scenario"];
+    let output = masseter(&[&prove[..], &[scenario.to_str().unwrap()]].concat());
+    assert!(stdout(&output).contains("boxes around its inputs"), "{}", stderr(&output));
+    assert_ne!(output.status.code(), Some(2), "{}", stderr(&output));
+}
+
+#[test]
+fn kinematics_of_a_scenario_that_cannot_be_are_refused() {
+    let workspace = Workspace::new("rate_hz = 0");
+    let scenario = workspace.file("scenario.toml");
+    for verb in ["fk", "ik"] {
+        let output = masseter(&[verb, "--scenario", scenario.to_str().unwrap()]);
+        assert_eq!(output.status.code(), Some(2), "{verb}: {}", stderr(&output));
+        assert!(stderr(&output).contains("rate_hz"), "{verb}: {}", stderr(&output));
+    }
+}

@@ -34,7 +34,7 @@ fn results_that_cannot_be_written_are_no_success_and_a_reader_that_had_enough_is
         let (reader, writer) = io::pipe().unwrap();
         drop(reader);
         let (code, said) = into(writer.into());
-        // The machine may be too disturbed for a workspace.
+        // The machine may be too disturbed for a bench.
         assert!(matches!(code, Some(0 | 3)), "{verb:?}: {said}");
     }
 }

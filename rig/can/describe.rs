@@ -3,27 +3,21 @@
 use std::path::Path;
 
 use masseter_plant::description;
-use masseter_shared::config::Scenario;
 
 use crate::cli::EdsArgs;
 use crate::exit::Exit;
 use crate::say::result;
+use crate::scenario::given;
 
 /// The electronic data sheet of one drive.
 pub(crate) fn eds(args: &EdsArgs) -> anyhow::Result<Exit> {
-    let sheets = description::eds(&scenario(args.scenario.as_deref())?)?;
+    let sheets = description::eds(&given(args.scenario.as_deref())?)?;
     result(&sheets[args.axis])?;
     Ok(Exit::Passed)
 }
 
 /// The messages of the whole link.
 pub(crate) fn dbc(path: Option<&Path>) -> anyhow::Result<Exit> {
-    result(&description::dbc(&scenario(path)?)?)?;
+    result(&description::dbc(&given(path)?)?)?;
     Ok(Exit::Passed)
-}
-
-fn scenario(path: Option<&Path>) -> anyhow::Result<Scenario> {
-    let scenario = path.map_or_else(|| Ok(Scenario::default()), Scenario::read)?;
-    scenario.validate()?;
-    Ok(scenario)
 }

@@ -12,6 +12,7 @@ use serde_json::{Value, json};
 use crate::cli::Format;
 use crate::exit::Exit;
 use crate::say::result;
+use crate::scenario;
 
 /// What `can plan` takes.
 #[derive(Debug, Clone, Args)]
@@ -28,9 +29,10 @@ pub(crate) struct PlanArgs {
 
 /// Prints the plan; exit code 2 where the rig could not run by it.
 pub(crate) fn plan(args: &PlanArgs) -> anyhow::Result<Exit> {
-    let mut scenario = args.scenario.as_deref().map(Scenario::read).transpose()?.unwrap_or_default();
-    scenario.rate_hz = args.rate_hz.unwrap_or(scenario.rate_hz);
-    scenario.validate()?;
+    let scenario = scenario::changed(args.scenario.as_deref(), |scenario| {
+        scenario.rate_hz = args.rate_hz.unwrap_or(scenario.rate_hz);
+        Ok(())
+    })?;
     let plans = plans(&scenario.can, scenario.period_ns())?;
     let room = Room::of(&scenario.can)?;
     let refusal = refusal(&scenario, &plans, &room);

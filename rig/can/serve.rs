@@ -21,6 +21,7 @@ use rustix::io::Errno;
 
 use super::client::Client;
 use crate::exit::Exit;
+use crate::scenario;
 
 /// Clients on one bus at a time.
 const CLIENTS: usize = 8;
@@ -39,8 +40,7 @@ pub(crate) struct ServeArgs {
 
 /// Serves until it is interrupted.
 pub(crate) fn serve(args: &ServeArgs) -> anyhow::Result<Exit> {
-    let scenario = args.scenario.as_deref().map_or_else(|| Ok(Scenario::default()), Scenario::read)?;
-    scenario.validate()?;
+    let scenario = scenario::given(args.scenario.as_deref())?;
     let stop = StopRequest::listen_alone().context("cannot listen for signals")?;
     let listener = listen(args.listen)?;
     let mut link = OpenLink::new(&scenario, CLIENTS, clock::now_ns())?;

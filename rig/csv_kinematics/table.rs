@@ -6,7 +6,6 @@
 use std::io::{self, Write};
 
 use anyhow::{anyhow, bail};
-use masseter_shared::config::Scenario;
 use masseter_shared::geometry::Mechanism;
 use rayon::prelude::*;
 
@@ -14,6 +13,7 @@ use super::input::{Input, Line};
 use crate::cli::CsvArgs;
 use crate::exit::Exit;
 use crate::say::taken;
+use crate::scenario;
 
 /// Status of a line that could not be read.
 const BAD_LINE: &str = "bad_line";
@@ -68,7 +68,7 @@ impl Lines {
 
 /// The mechanism that the arguments mean.
 pub(super) fn mechanism(args: &CsvArgs) -> anyhow::Result<Mechanism> {
-    let scenario = args.scenario.as_deref().map_or_else(|| Ok(Scenario::default()), Scenario::read)?;
+    let scenario = scenario::given(args.scenario.as_deref())?;
     Ok(Mechanism::new(&scenario.mechanism)?)
 }
 

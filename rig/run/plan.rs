@@ -4,7 +4,7 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
-use masseter_controller::trajectory::{self, Trajectory, TrajectoryReport};
+use masseter_controller::trajectory::{self, CheckError, Trajectory, TrajectoryReport};
 use masseter_plant::core as plant;
 use masseter_shared::config::{FileConfig, MotionConfig, Scenario};
 use masseter_shared::geometry::Mechanism;
@@ -12,6 +12,9 @@ use masseter_shared::schedule::CycleSchedule;
 
 use crate::cli::{ClockKind, RunArgs};
 use crate::live;
+use crate::scenario;
+
+const NOT_BUILDABLE: &str = "the plant cannot be built";
 
 /// A run that can be made.
 #[derive(Debug)]
@@ -29,31 +32,26 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// Resolves and checks everything that can be wrong with the input.
+    /// Plans the run that the arguments ask for, and refuses what this machine has not got for it.
     pub fn resolve(args: &RunArgs) -> anyhow::Result<Self> {
         let scenario = scenario(args)?;
-        if args.clock == ClockKind::Virtual && !scenario.can.is_virtual() {
-            bail!("virtual time has no real wires: use --can virtual, or --clock rt");
-        }
-        if args.clock == ClockKind::Virtual && (args.require_rt || args.name.is_some()) {
-            bail!(
-                "virtual time needs no real time and has no other rig beside it: leave out --require-rt and --name"
-            );
-        }
-        match args.live {
-            Some(_) if args.clock == ClockKind::Virtual => {
-                bail!("virtual time is over before it can be watched: leave out --live, or use --clock rt")
-            }
-            Some(address) => live::check(address)?,
-            None => {}
-        }
+        check_clock(args, &scenario)?;
+        args.live.map_or(Ok(()), live::check)?;
+        let plan = Self::of(scenario)?;
+        plant::check_interfaces(&plan.scenario).context(NOT_BUILDABLE)?;
+        Ok(plan)
+    }
+
+    /// Plans a scenario by what its mechanism, drives and buses can do, on whatever machine.
+    ///
+    /// # Errors
+    /// When the cycle does not fit the buses, the plant cannot be built, or the motion asks too much.
+    pub fn of(scenario: Scenario) -> anyhow::Result<Self> {
         let mechanism = Mechanism::new(&scenario.mechanism)?;
         let schedule = CycleSchedule::new(&scenario.can, scenario.period_ns())?;
-        let is_buildable = plant::check(&scenario).and_then(|()| plant::check_interfaces(&scenario));
-        is_buildable.context("the plant cannot be built")?;
+        plant::check(&scenario).context(NOT_BUILDABLE)?;
         let trajectory = Trajectory::new(&scenario.motion, &scenario.jaw, &mechanism, scenario.duration_s)?;
-        let limits = scenario.limits.within(&scenario.drives);
-        let demands = trajectory::check(&trajectory, &mechanism, &limits, scenario.period_s())?;
+        let demands = demands(&scenario, &trajectory, &mechanism)?;
         Ok(Self { scenario, mechanism, trajectory, demands, schedule })
     }
 
@@ -80,13 +78,7 @@ impl Plan {
 
 /// The scenario with every argument applied, its values checked each for itself.
 pub(crate) fn scenario(args: &RunArgs) -> anyhow::Result<Scenario> {
-    let mut scenario = match &args.scenario {
-        Some(path) => Scenario::read(path)?,
-        None => Scenario::default(),
-    };
-    apply(args, &mut scenario)?;
-    scenario.validate()?;
-    Ok(scenario)
+    scenario::changed(args.scenario.as_deref(), |scenario| apply(args, scenario))
 }
 
 fn of_centroid(turn_deg: f64) -> String {
@@ -96,9 +88,41 @@ fn of_centroid(turn_deg: f64) -> String {
     )
 }
 
+/// What a motion asks of the axes of a scenario.
+///
+/// # Errors
+/// When that is more than its limits or its drives allow.
+pub(crate) fn demands(
+    scenario: &Scenario,
+    trajectory: &Trajectory,
+    mechanism: &Mechanism,
+) -> Result<TrajectoryReport, CheckError> {
+    let limits = scenario.limits.within(&scenario.drives);
+    trajectory::check(trajectory, mechanism, &limits, scenario.period_s())
+}
+
+/// Virtual time leaves no room for what only real time has.
+fn check_clock(args: &RunArgs, scenario: &Scenario) -> anyhow::Result<()> {
+    if args.clock == ClockKind::Rt {
+        return Ok(());
+    }
+    if !scenario.can.is_virtual() {
+        bail!("virtual time has no real wires: use --can virtual, or --clock rt");
+    }
+    if args.require_rt || args.name.is_some() {
+        bail!(
+            "virtual time needs no real time and has no other rig beside it: leave out --require-rt and --name"
+        );
+    }
+    if args.live.is_some() {
+        bail!("virtual time is over before it can be watched: leave out --live, or use --clock rt");
+    }
+    Ok(())
+}
+
 fn apply(args: &RunArgs, scenario: &mut Scenario) -> anyhow::Result<()> {
     if let Some(path) = &args.trajectory {
-        apply_trajectory(path, scenario);
+        play(path, scenario);
     }
     if let MotionConfig::File(file) = &mut scenario.motion {
         file.path = absolute(&file.path)?;
@@ -115,8 +139,8 @@ fn apply(args: &RunArgs, scenario: &mut Scenario) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// A scenario that plays a recording keeps its axes and filter for another one.
-fn apply_trajectory(path: &Path, scenario: &mut Scenario) {
+/// Has a scenario play a recording; one that plays another keeps its axes and filter.
+pub(crate) fn play(path: &Path, scenario: &mut Scenario) {
     match &mut scenario.motion {
         MotionConfig::File(file) => path.clone_into(&mut file.path),
         motion => *motion = MotionConfig::File(FileConfig::new(path)),

@@ -1,7 +1,7 @@
 //! Jaw motions against the mechanism: whether it can follow them, and whether the solvers can.
 
 use masseter_controller::kinematics::ForwardTracker;
-use masseter_controller::trajectory::{self, Trajectory, TrajectoryReport};
+use masseter_controller::trajectory::{Trajectory, TrajectoryReport};
 use masseter_shared::config::{
     ChewingConfig, LateralConfig, MotionConfig, OpeningConfig, ProtrusionConfig, Scenario,
 };
@@ -10,6 +10,7 @@ use masseter_shared::geometry::{LEGS, Mechanism};
 use super::contender::{Contender, SHOWN};
 use super::sample::distance_rad;
 use super::table::{Table, number};
+use crate::run::plan;
 
 /// A cycle of the rig, s.
 const CYCLE_S: f64 = 1e-3;
@@ -59,9 +60,7 @@ impl Motion {
     fn new(name: &str, scenario: &Scenario, mechanism: &Mechanism) -> anyhow::Result<Self> {
         let Scenario { motion, jaw, duration_s, .. } = scenario;
         let trajectory = Trajectory::new(motion, jaw, mechanism, *duration_s)?;
-        let limits = scenario.limits.within(&scenario.drives);
-        let demands =
-            trajectory::check(&trajectory, mechanism, &limits, CYCLE_S).map_err(|error| error.to_string());
+        let demands = plan::demands(scenario, &trajectory, mechanism).map_err(|error| error.to_string());
         let followed = SHOWN.map(|contender| follow(contender, mechanism, &trajectory));
         Ok(Self { name: name.to_owned(), trajectory, demands, followed })
     }

@@ -15,10 +15,10 @@ use clap::{Args, Subcommand, ValueEnum};
 use masseter_controller::kinematics::uniqueness::InputBox;
 use masseter_shared::geometry::{GeometryError, Mechanism, MechanismConfig};
 
-use crate::cli::RunArgs;
 use crate::exit::Exit;
 use crate::output;
-use crate::run::plan::Plan;
+use crate::run::plan::{self, Plan};
+use crate::scenario;
 
 /// What `uniqueness` does.
 #[derive(Debug, Clone, Subcommand)]
@@ -119,12 +119,12 @@ fn to_prove(args: &ProveArgs) -> anyhow::Result<(Mechanism, Vec<InputBox>)> {
         let whole = args.region.inputs(&mechanism);
         return Ok((mechanism, vec![whole]));
     };
-    let run = RunArgs {
-        scenario: args.scenario.clone(),
-        trajectory: args.trajectory.clone(),
-        ..RunArgs::default()
-    };
-    let plan = Plan::resolve(&run)?;
+    let plan = Plan::of(scenario::changed(args.scenario.as_deref(), |scenario| {
+        if let Some(path) = &args.trajectory {
+            plan::play(path, scenario);
+        }
+        Ok(())
+    })?)?;
     let wholes = motion::boxes(&plan, around_mm * 1e-3)?;
     result_line!("{}: {} boxes around its inputs", plan.scenario.name, wholes.len())?;
     Ok((plan.mechanism, wholes))

@@ -58,8 +58,9 @@ fn widened(stretch: InputBox, by_m: f64) -> InputBox {
 
 #[cfg(test)]
 mod tests {
+    use masseter_shared::config::Scenario;
+
     use super::*;
-    use crate::cli::RunArgs;
 
     fn contains(whole: &InputBox, part: &InputBox) -> bool {
         whole
@@ -73,7 +74,7 @@ mod tests {
     #[test]
     fn the_boxes_of_a_motion_hold_its_path_and_what_is_around_it() {
         let around_m = 1e-3;
-        let plan = Plan::resolve(&RunArgs::default()).unwrap();
+        let plan = Plan::of(Scenario::default()).unwrap();
         let boxes = boxes(&plan, around_m).unwrap();
         let at = |cycle: u32| {
             let pose = plan.trajectory.pose(f64::from(cycle) * plan.scenario.period_s());
