@@ -168,14 +168,14 @@ fn run_at(rate_hz: u32, cores: [usize; 2], interrupts: &Interrupts) -> anyhow::R
 fn wait_for(run: &mut Child, interrupts: &Interrupts) -> anyhow::Result<()> {
     let mut handed_on = 0;
     while run.try_wait()?.is_none() {
-        if handed_on < u8::from(interrupts.ask()) + u8::from(interrupts.insist()) {
+        if handed_on < u8::from(interrupts.is_stop_asked()) + u8::from(interrupts.is_end_insisted()) {
             // It may have ended meanwhile.
             let _ = kill_process(Pid::from_child(run), Signal::TERM);
             handed_on += 1;
         }
         clock::sleep(LOOK);
     }
-    if interrupts.ask() { Err(Interrupted.into()) } else { Ok(()) }
+    if interrupts.is_stop_asked() { Err(Interrupted.into()) } else { Ok(()) }
 }
 
 fn turn(folder: &RunFolder) -> anyhow::Result<Turn> {

@@ -1,44 +1,15 @@
 //! How a run is judged: its end, then its recording, then the machine, then its [checks](super::checks).
 
 use masseter_shared::config::CanConfig;
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
 use super::checks::{Check, CheckResult, checks, missed_cycles};
 use crate::analysis::{Figures, Outage};
 use crate::exit::Exit;
 use crate::run::dma_latency::DmaLatency;
+use crate::run::ending::Ending;
 use crate::run::manifest::Manifest;
 use crate::run::usage::RunUsage;
-
-/// How a run came to its end.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(tag = "kind", rename_all = "snake_case")]
-pub enum Ending {
-    /// The motion was played to its end.
-    Completed,
-    /// The controller stopped safely because of a fault.
-    SafeStop,
-    /// A process died.
-    Died {
-        /// Which.
-        process: String,
-        /// Exit code or signal.
-        how: String,
-    },
-    /// The user interrupted it.
-    Interrupted,
-    /// Real time was required and refused.
-    NotStarted,
-    /// The logger could not write everything.
-    RecordingFailed,
-}
-
-impl Ending {
-    /// The death of a process.
-    pub fn died(process: &str, how: String) -> Self {
-        Self::Died { process: process.to_owned(), how }
-    }
-}
 
 /// The judgement of a run.
 #[derive(Debug, Clone, PartialEq, Serialize)]

@@ -1,19 +1,50 @@
-//! What a run's end is called, by how its processes ended.
+//! How a run came to its end, by how its processes ended. What that makes of the run, its verdict says.
 
 use std::process::ExitStatus;
 
+use serde::{Deserialize, Serialize};
+
 use super::child::{Role, describe};
 use crate::exit::Exit;
-use crate::report::verdict::Ending;
+
+/// How a run came to its end.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum Ending {
+    /// The motion was played to its end.
+    Completed,
+    /// The controller stopped safely because of a fault.
+    SafeStop,
+    /// A process died.
+    Died {
+        /// Which.
+        process: String,
+        /// Exit code or signal.
+        how: String,
+    },
+    /// The user interrupted it.
+    Interrupted,
+    /// Real time was required and refused.
+    NotStarted,
+    /// The logger could not write everything.
+    RecordingFailed,
+}
+
+impl Ending {
+    /// The death of a process.
+    pub fn died(process: &str, how: String) -> Self {
+        Self::Died { process: process.to_owned(), how }
+    }
+}
 
 /// What a run's end is called: after the first process that died, or what the recording lacks; else after who broke it
 /// off; else as the controller ended.
-pub(super) fn of_all(broken_off: Ending, controller: Ending, others: Option<Ending>) -> Ending {
+pub(super) fn of_all(broken_off: Option<Ending>, controller: Ending, others: Option<Ending>) -> Ending {
     match (broken_off, controller, others) {
-        (died @ Ending::Died { .. }, ..) | (_, died @ Ending::Died { .. }, _) => died,
+        (Some(died @ Ending::Died { .. }), ..) | (_, died @ Ending::Died { .. }, _) => died,
         (_, _, Some(others)) => others,
-        (Ending::Completed, controller, None) => controller,
-        (broken_off, _, None) => broken_off,
+        (Some(broken_off), _, None) => broken_off,
+        (None, controller, None) => controller,
     }
 }
 
@@ -45,18 +76,18 @@ mod tests {
         let (completed, interrupted, safe_stop) = (Ending::Completed, Ending::Interrupted, Ending::SafeStop);
         let gap = Ending::RecordingFailed;
         for (broken_off, by_controller, others, expected) in [
-            (&completed, &completed, None, &completed),
-            (&completed, &safe_stop, None, &safe_stop),
-            (&completed, &safe_stop, Some(&gap), &gap),
-            (&completed, &controller, Some(&gap), &controller),
-            (&interrupted, &completed, None, &interrupted),
-            (&interrupted, &safe_stop, None, &interrupted),
-            (&interrupted, &completed, Some(&gap), &gap),
-            (&interrupted, &completed, Some(&plant), &plant),
-            (&interrupted, &controller, Some(&plant), &controller),
-            (&logger, &controller, Some(&plant), &logger),
+            (None, &completed, None, &completed),
+            (None, &safe_stop, None, &safe_stop),
+            (None, &safe_stop, Some(&gap), &gap),
+            (None, &controller, Some(&gap), &controller),
+            (Some(&interrupted), &completed, None, &interrupted),
+            (Some(&interrupted), &safe_stop, None, &interrupted),
+            (Some(&interrupted), &completed, Some(&gap), &gap),
+            (Some(&interrupted), &completed, Some(&plant), &plant),
+            (Some(&interrupted), &controller, Some(&plant), &controller),
+            (Some(&logger), &controller, Some(&plant), &logger),
         ] {
-            let found = of_all(broken_off.clone(), by_controller.clone(), others.cloned());
+            let found = of_all(broken_off.cloned(), by_controller.clone(), others.cloned());
             assert_eq!(&found, expected, "{broken_off:?}, {by_controller:?}, {others:?}");
         }
     }

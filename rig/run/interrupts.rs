@@ -37,12 +37,12 @@ impl Interrupts {
     }
 
     /// Whether an orderly stop has been asked for.
-    pub fn ask(&self) -> bool {
+    pub fn is_stop_asked(&self) -> bool {
         self.count.load(Ordering::Relaxed) > 0
     }
 
     /// Whether the end is to come at once.
-    pub fn insist(&self) -> bool {
+    pub fn is_end_insisted(&self) -> bool {
         self.count.load(Ordering::Relaxed) > 1
     }
 

@@ -11,12 +11,12 @@ use masseter_shared::realtime::scheduling::{Obtained, allowed_cores};
 use serde::{Deserialize, Serialize};
 
 use super::dma_latency::DmaLatency;
+use super::ending::Ending;
 use super::folder::RunFolder;
 use super::plan::Plan;
 use super::usage::RunUsage;
 use crate::cli::ClockKind;
 use crate::machine::SystemRoot;
-use crate::report::verdict::Ending;
 
 /// Version of the manifest's form.
 const FORM: u32 = 1;

@@ -6,7 +6,7 @@
 pub mod child;
 pub(crate) mod counters;
 pub mod dma_latency;
-mod ending;
+pub mod ending;
 pub mod folder;
 pub mod interrupts;
 pub mod manifest;
@@ -20,7 +20,8 @@ use anyhow::Context;
 use crate::analysis;
 use crate::cli::{ClockKind, RunArgs};
 use crate::exit::{Exit, Failure, OrFailure};
-use crate::report::{self, verdict::Ending};
+use crate::report;
+use ending::Ending;
 use folder::RunFolder;
 use manifest::Manifest;
 use plan::Plan;

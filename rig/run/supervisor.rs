@@ -19,7 +19,7 @@ use masseter_shared::transport::{Claim, Domain, DomainError};
 
 use super::child::{ChildError, Process, Role};
 use super::dma_latency::{self, DmaLatency};
-use super::ending::{died, of_all, of_the_others};
+use super::ending::{Ending, died, of_all, of_the_others};
 use super::folder::RunFolder;
 use super::interrupts::Interrupts;
 use super::plan::Plan;
@@ -28,7 +28,6 @@ use crate::clean::sweep_dead;
 use crate::cli::RunArgs;
 use crate::exit::{Exit, Failure, OrFailure};
 use crate::machine::SystemRoot;
-use crate::report::verdict::Ending;
 
 /// How often the processes are looked after.
 const WATCH: Duration = Duration::from_millis(2);
@@ -166,13 +165,13 @@ impl Rig {
     ) -> Result<Option<BTreeMap<String, Obtained>>, ChildError> {
         let mut scheduling = BTreeMap::new();
         for process in [&mut self.logger, &mut self.plant, &mut self.controller] {
-            match process.wait_ready(|| interrupts.ask()) {
+            match process.wait_ready(|| interrupts.is_stop_asked()) {
                 Ok(Some(ready)) => scheduling.insert(process.role().name().to_owned(), ready.scheduling),
                 Ok(None) => return Ok(None),
                 Err(error) => {
                     // A terminal's signal reaches the processes too: one that was getting ready may have ended of it.
                     clock::sleep(HEARD_WITHIN);
-                    return if interrupts.ask() { Ok(None) } else { Err(error) };
+                    return if interrupts.is_stop_asked() { Ok(None) } else { Err(error) };
                 }
             };
         }
@@ -193,21 +192,21 @@ impl Rig {
 
     /// Watches until the controller's part is over, then ends plant and logger.
     fn watch(&mut self, interrupts: &Interrupts, meter: &mut Meter) -> anyhow::Result<Ending> {
-        let mut ending = Ending::Completed;
+        let mut broken_off = None;
         let mut give_up_ns = None;
         let status = loop {
-            if interrupts.insist() {
+            if interrupts.is_end_insisted() {
                 return Ok(Ending::Interrupted);
             }
-            if ending == Ending::Completed {
-                ending = self.disturbance(interrupts)?;
+            if broken_off.is_none() {
+                broken_off = self.disturbance(interrupts)?;
             }
             if let Some(status) = self.controller.ended()? {
                 break Some(status);
             }
             let now_ns = clock::now_ns();
             let give_up_after_ns = now_ns.saturating_add(self.stop_within_ns);
-            if ending != Ending::Completed && now_ns > *give_up_ns.get_or_insert(give_up_after_ns) {
+            if broken_off.is_some() && now_ns > *give_up_ns.get_or_insert(give_up_after_ns) {
                 self.controller.kill();
                 break None;
             }
@@ -217,30 +216,30 @@ impl Rig {
         let controller = self.after_controller(status, interrupts)?;
         let plant = end(&mut self.plant, END_WITHIN_NS, interrupts)?;
         let logger = end(&mut self.logger, RECORD_WITHIN_NS, interrupts)?;
-        if interrupts.insist() {
+        if interrupts.is_end_insisted() {
             return Ok(Ending::Interrupted);
         }
-        Ok(of_all(ending, controller, of_the_others(plant, logger)))
+        Ok(of_all(broken_off, controller, of_the_others(plant, logger)))
     }
 
     /// What ends the run before the controller's part is over, if anything does: the controller is asked to end then.
     /// Without the plant its own watchdog stops it on the way, unless it still waits for the first readings.
-    fn disturbance(&mut self, interrupts: &Interrupts) -> io::Result<Ending> {
-        let ending = if interrupts.ask() {
+    fn disturbance(&mut self, interrupts: &Interrupts) -> io::Result<Option<Ending>> {
+        let ending = if interrupts.is_stop_asked() {
             Ending::Interrupted
         } else if let Some(status) = self.logger.ended()? {
             died(Role::Logger, Some(status))
         } else if let Some(status) = self.plant.ended()? {
             if status.code() == Some(Exit::SafeStop as i32) {
                 self.controller.kill();
-                return Ok(Ending::died(Role::Controller.name(), SILENT.to_owned()));
+                return Ok(Some(Ending::died(Role::Controller.name(), SILENT.to_owned())));
             }
             died(Role::Plant, Some(status))
         } else {
-            return Ok(Ending::Completed);
+            return Ok(None);
         };
         self.controller.terminate();
-        Ok(ending)
+        Ok(Some(ending))
     }
 
     /// How the controller ended; if it died, the plant's master is given time to stop the drives.
@@ -278,7 +277,7 @@ fn wait_for(
     let deadline_ns = clock::now_ns() + within_ns;
     loop {
         let status = process.ended()?;
-        if status.is_some() || interrupts.insist() || clock::now_ns() >= deadline_ns {
+        if status.is_some() || interrupts.is_end_insisted() || clock::now_ns() >= deadline_ns {
             return Ok(status);
         }
         clock::sleep(WATCH);

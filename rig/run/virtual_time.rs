@@ -13,11 +13,11 @@ use masseter_shared::messages::{Message, State};
 use masseter_shared::realtime::Wake;
 
 use super::child::Role;
+use super::ending::Ending;
 use super::folder::RunFolder;
 use super::interrupts::Interrupts;
 use super::plan::Plan;
 use crate::recording::{Backlog, Pace, Recorder, Scene};
-use crate::report::verdict::Ending;
 
 /// Virtual time of the first SYNC, ns.
 const EPOCH_NS: u64 = SECOND_NS;
