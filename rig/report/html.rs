@@ -8,6 +8,7 @@ use super::table::{self, in_words, microseconds, or_dash};
 use super::{charts, events, film, usage};
 use crate::analysis::{BusResponse, Figures, Reference};
 use crate::report::checks::CheckResult;
+use crate::report::outcome::Outcome;
 use crate::report::verdict::Verdict;
 use crate::run::manifest::Manifest;
 
@@ -28,12 +29,12 @@ fn write_page(
     verdict: &Verdict,
 ) -> std::fmt::Result {
     let name = escape(&manifest.scenario.name);
-    let class = if verdict.word == "PASS" { "pass" } else { "" };
+    let class = if verdict.outcome == Outcome::Pass { "pass" } else { "" };
     write!(
         page,
         "<!doctype html>\n<html lang=\"en\"><meta charset=\"utf-8\"><title>Masseter: {name}</title>\
          <style>{STYLE}</style>\n<h1>{name}</h1>\n<p id=\"verdict\" class=\"{class}\"><strong>{}</strong>: {}</p>\n",
-        verdict.word,
+        verdict.outcome.word(),
         escape(&verdict.reason)
     )?;
     checks(page, verdict)?;

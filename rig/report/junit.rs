@@ -1,7 +1,6 @@
 //! `junit.xml`: each check of the run as a test case, as CI systems show it.
 
 use crate::analysis::Figures;
-use crate::exit::Exit;
 use crate::report::checks::CheckResult;
 use crate::report::verdict::Verdict;
 use crate::run::manifest::Manifest;
@@ -10,7 +9,7 @@ use crate::run::manifest::Manifest;
 pub(super) fn of_run(manifest: &Manifest, figures: &Figures, verdict: &Verdict) -> String {
     let count = |result| verdict.checks.iter().filter(|check| check.result == result).count();
     let (failures, skipped) = (count(CheckResult::Failed), count(CheckResult::NotJudged));
-    let judged = matches!(verdict.exit, Exit::Passed | Exit::Failed);
+    let judged = verdict.outcome.is_judged();
     let tests = verdict.checks.len() + 1;
     let mut xml = format!(
         "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n\
@@ -20,7 +19,7 @@ pub(super) fn of_run(manifest: &Manifest, figures: &Figures, verdict: &Verdict) 
         figures.duration_s,
         escape(manifest.began.trim_end_matches('Z')),
     );
-    let problem = (!judged).then(|| ("error", format!("{}: {}", verdict.word, verdict.reason)));
+    let problem = (!judged).then(|| ("error", format!("{}: {}", verdict.outcome.word(), verdict.reason)));
     xml += &case("run", problem);
     for check in &verdict.checks {
         let problem = match check.result {

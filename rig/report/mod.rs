@@ -9,6 +9,7 @@ mod events;
 mod film;
 mod html;
 mod junit;
+pub mod outcome;
 mod plot;
 mod table;
 mod usage;
@@ -74,5 +75,5 @@ pub(crate) fn write(
     ] {
         fs::write(&path, text).with_context(|| format!("cannot write {}", path.display())).incomplete()?;
     }
-    Ok(verdict.exit)
+    Ok(verdict.outcome.exit())
 }

@@ -23,7 +23,7 @@ fn write_all(
     verdict: &Verdict,
 ) -> std::fmt::Result {
     let scenario = &manifest.scenario;
-    writeln!(text, "{}: {}", verdict.word, verdict.reason)?;
+    writeln!(text, "{}: {}", verdict.outcome.word(), verdict.reason)?;
     writeln!(
         text,
         "{}: {:.1} s of motion at {} Hz ({} clock), {} cycles in {:.1} s, seed {}\n",

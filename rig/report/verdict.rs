@@ -1,28 +1,37 @@
 //! How a run is judged: its end, then its recording, then the machine, then its [checks](super::checks).
 
 use masseter_shared::config::CanConfig;
-use serde::Serialize;
+use serde::ser::{Serialize, SerializeStruct, Serializer};
 
 use super::checks::{Check, CheckResult, checks, missed_cycles};
+use super::outcome::Outcome;
 use crate::analysis::{Figures, Outage};
-use crate::exit::Exit;
 use crate::run::dma_latency::DmaLatency;
 use crate::run::ending::Ending;
 use crate::run::manifest::Manifest;
 use crate::run::usage::RunUsage;
 
 /// The judgement of a run.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Verdict {
-    /// PASS, FAIL, INVALID, …
-    pub word: &'static str,
+    /// What it came to.
+    pub outcome: Outcome,
     /// The reason in a sentence.
     pub reason: String,
-    /// Exit code.
-    #[serde(rename = "exit_code")]
-    pub exit: Exit,
     /// Every check, also those that passed.
     pub checks: Vec<Check>,
+}
+
+/// With the word and the exit code of its outcome.
+impl Serialize for Verdict {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut fields = serializer.serialize_struct("Verdict", 4)?;
+        fields.serialize_field("word", self.outcome.word())?;
+        fields.serialize_field("reason", &self.reason)?;
+        fields.serialize_field("exit_code", &self.outcome.exit())?;
+        fields.serialize_field("checks", &self.checks)?;
+        fields.end()
+    }
 }
 
 impl Verdict {
@@ -30,19 +39,19 @@ impl Verdict {
     pub fn of(manifest: &Manifest, figures: &Figures) -> Self {
         let disturbed = disturbed(manifest, figures);
         let checks = checks(manifest, figures, disturbed.is_some());
-        let (exit, word, mut reason) = ending(&manifest.ending)
-            .filter(|(exit, ..)| !(*exit == Exit::SafeStop && disturbed.is_some()))
+        let (outcome, mut reason) = ending(&manifest.ending)
+            .filter(|(outcome, _)| !(*outcome == Outcome::SafeStop && disturbed.is_some()))
             .or_else(|| incomplete(figures))
             .or(disturbed)
             .or_else(|| {
                 failed(&checks)
                     .map(|failure| clock_jump(&manifest.usage, &manifest.scenario.can).unwrap_or(failure))
             })
-            .unwrap_or_else(|| (Exit::Passed, "PASS", "every check passed".to_owned()));
-        if exit != Exit::Passed {
+            .unwrap_or_else(|| (Outcome::Pass, "every check passed".to_owned()));
+        if outcome != Outcome::Pass {
             reason += &overload(&manifest.usage, manifest.scenario.rate_hz).unwrap_or_default();
         }
-        Self { word, reason, exit, checks }
+        Self { outcome, reason, checks }
     }
 }
 
@@ -64,23 +73,19 @@ fn overload(usage: &RunUsage, rate_hz: u32) -> Option<String> {
     ))
 }
 
-type Judgement = (Exit, &'static str, String);
+type Judgement = (Outcome, String);
 
 fn ending(ending: &Ending) -> Option<Judgement> {
     match ending {
         Ending::Completed => None,
-        Ending::SafeStop => Some((
-            Exit::SafeStop,
-            "SAFE STOP",
-            "the controller stopped the rig; its event says why".to_owned(),
-        )),
-        Ending::Died { process, how } => Some((Exit::Died, "DIED", format!("the {process} died: {how}"))),
-        Ending::Interrupted => Some((Exit::Interrupted, "INTERRUPTED", "stopped by the user".to_owned())),
-        Ending::NotStarted => {
-            Some((Exit::Invalid, "INVALID", "real time was required and refused".to_owned()))
+        Ending::SafeStop => {
+            Some((Outcome::SafeStop, "the controller stopped the rig; its event says why".to_owned()))
         }
+        Ending::Died { process, how } => Some((Outcome::Died, format!("the {process} died: {how}"))),
+        Ending::Interrupted => Some((Outcome::Interrupted, "stopped by the user".to_owned())),
+        Ending::NotStarted => Some((Outcome::Invalid, "real time was required and refused".to_owned())),
         Ending::RecordingFailed => {
-            Some((Exit::Incomplete, "INCOMPLETE", "the logger could not write everything".to_owned()))
+            Some((Outcome::Incomplete, "the logger could not write everything".to_owned()))
         }
     }
 }
@@ -96,7 +101,7 @@ fn incomplete(figures: &Figures) -> Option<Judgement> {
     } else {
         return None;
     };
-    Some((Exit::Incomplete, "INCOMPLETE", reason))
+    Some((Outcome::Incomplete, reason))
 }
 
 /// Whether the machine kept the rig from too many cycles to judge it, or never granted it real time. A safe stop is
@@ -115,7 +120,7 @@ fn disturbed(manifest: &Manifest, figures: &Figures) -> Option<Judgement> {
     } else {
         format!("{}{stop}; {}", standstill(figures), remedy(manifest))
     };
-    Some((Exit::Invalid, "INVALID", reason))
+    Some((Outcome::Invalid, reason))
 }
 
 /// What the machine did to the rig.
@@ -140,7 +145,7 @@ fn clock_jump(usage: &RunUsage, can: &CanConfig) -> Option<Judgement> {
         let reason = format!(
             "the wall clock jumped by {jump_s:.3} s, as it does when it is set or the machine was suspended; repeat the run"
         );
-        (Exit::Invalid, "INVALID", reason)
+        (Outcome::Invalid, reason)
     })
 }
 
@@ -174,7 +179,7 @@ fn excuse(
 fn failed(checks: &[Check]) -> Option<Judgement> {
     let failed: Vec<_> =
         checks.iter().filter(|check| check.result == CheckResult::Failed).map(|check| check.name).collect();
-    (!failed.is_empty()).then(|| (Exit::Failed, "FAIL", format!("failed: {}", failed.join(", "))))
+    (!failed.is_empty()).then(|| (Outcome::Fail, format!("failed: {}", failed.join(", "))))
 }
 
 #[cfg(test)]
@@ -200,8 +205,8 @@ mod tests {
         let jump = |clock_jump_s, can| clock_jump(&RunUsage { clock_jump_s, ..RunUsage::default() }, can);
         assert_eq!(jump(0.0, &real), None);
         assert_eq!(jump(-3.5, &simulated), None);
-        let (exit, word, reason) = jump(-3.5, &real).unwrap();
-        assert_eq!((exit, word), (Exit::Invalid, "INVALID"));
+        let (outcome, reason) = jump(-3.5, &real).unwrap();
+        assert_eq!(outcome, Outcome::Invalid);
         assert!(reason.contains("jumped by -3.500 s"), "{reason}");
     }
 
