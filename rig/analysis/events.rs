@@ -12,6 +12,7 @@ use masseter_shared::messages::{Event, explain};
 use serde::Serialize;
 
 use super::AnalysisError;
+use super::coded::Coded;
 
 /// An event with its codes resolved.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -21,11 +22,11 @@ pub struct EventRecord {
     /// Cycle of the process that reported it.
     pub cycle: u64,
     /// Who reported it.
-    pub source: String,
+    pub source: Coded<Source>,
     /// What it is.
-    pub kind: String,
+    pub kind: Coded<EventKind>,
     /// Why.
-    pub cause: String,
+    pub cause: Coded<Cause>,
     /// The axis concerned.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub axis: Option<&'static str>,
@@ -43,22 +44,19 @@ pub struct EventRecord {
 
 impl From<&Event> for EventRecord {
     fn from(event: &Event) -> Self {
-        let state = |code: u32| {
-            if event.source == Source::Controller.code() {
-                word(ControllerState::try_from(code).map(ControllerState::name), code)
-            } else if event.source == Source::Master.code() {
-                word(BootPhase::try_from(code).map(BootPhase::name), code)
-            } else {
-                word(DriveCondition::try_from(code).map(DriveCondition::name), code)
-            }
+        let source = Coded::from(event.source);
+        let state = |code: u32| match source {
+            Coded::Known(Source::Controller) => Coded::<ControllerState>::from(code).to_string(),
+            Coded::Known(Source::Master) => Coded::<BootPhase>::from(code).to_string(),
+            _ => Coded::<DriveCondition>::from(code).to_string(),
         };
         let moved = event.from != event.to;
         Self {
             time_ns: event.time_ns,
             cycle: event.cycle,
-            source: word(Source::try_from(event.source).map(Source::name), event.source),
-            kind: word(EventKind::try_from(event.kind).map(EventKind::name), event.kind),
-            cause: word(Cause::try_from(event.cause).map(Cause::name), event.cause),
+            source,
+            kind: event.kind.into(),
+            cause: event.cause.into(),
             axis: AXIS_NAMES.get(event.axis as usize).copied(),
             transition: moved.then(|| [state(event.from), state(event.to)]),
             text: explain(event),
@@ -66,11 +64,6 @@ impl From<&Event> for EventRecord {
             limit: event.limit,
         }
     }
-}
-
-/// The name of a code, or the number where this program knows none.
-fn word<E>(name: Result<&'static str, E>, code: u32) -> String {
-    name.map_or_else(|_| format!("code {code}"), str::to_owned)
 }
 
 /// Collects events and writes a line of JSON for each.

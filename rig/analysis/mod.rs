@@ -7,6 +7,7 @@ mod answer;
 mod around;
 mod blame;
 mod bus_response;
+mod coded;
 mod events;
 mod exports;
 mod freshness;
@@ -38,6 +39,7 @@ use crate::run::folder::RunFolder;
 pub use around::Around;
 pub use blame::Suspicion;
 pub use bus_response::{BusResponse, ResponseFigures};
+pub use coded::Coded;
 use events::EventLog;
 pub use events::EventRecord;
 pub(crate) use exports::CandumpLogs;
@@ -95,7 +97,7 @@ pub struct Figures {
     /// Stretches of work that cost deadlines, beside the machine's known stalls; none without any.
     pub suspicion: Option<Suspicion>,
     /// Where the controller's sequence ended; none without a single state message.
-    pub final_state: Option<&'static str>,
+    pub final_state: Option<Coded<ControllerState>>,
     /// Deadlines missed just before a safe stop; none without one.
     pub outage: Option<Outage>,
     /// Distance of the platform from where it should be, while the motion played.
@@ -177,7 +179,7 @@ struct Pass {
     controller_skips: Skips,
     plant_skips: Skips,
     outage: OutageWatch,
-    final_state: Option<&'static str>,
+    final_state: Option<Coded<ControllerState>>,
     bite_force_max_n: Option<f64>,
 }
 
@@ -247,7 +249,7 @@ impl Pass {
         }
         self.cycles += 1;
         self.controller_skips.take(&Counters::from(state), self.period_ns);
-        self.final_state = ControllerState::try_from(state.controller_state).ok().map(ControllerState::name);
+        self.final_state = Some(state.controller_state.into());
     }
 
     fn truth(&mut self, truth: &Truth) {

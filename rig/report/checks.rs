@@ -2,11 +2,11 @@
 //!
 //! What the checks come to is the [verdict](super::verdict)'s.
 
-use masseter_shared::messages::codes::Cause;
+use masseter_shared::messages::codes::{Cause, ControllerState};
 use serde::Serialize;
 
 use super::table;
-use crate::analysis::{BusResponse, EventRecord, Figures, ResponseFigures, Suspicion};
+use crate::analysis::{BusResponse, Coded, EventRecord, Figures, ResponseFigures, Suspicion};
 use crate::run::manifest::Manifest;
 
 /// Whether what was checked is as it should be.
@@ -71,9 +71,8 @@ pub(super) fn checks(manifest: &Manifest, figures: &Figures, is_disturbed: bool)
     let tracking = &figures.tracking;
     let (skipped, by_machine) = figures.skipped();
     let missing = figures.missing_messages();
-    let state = figures.final_state.unwrap_or("none");
     vec![
-        sequence(state, &figures.events).unless(is_disturbed),
+        sequence(figures.final_state, &figures.events).unless(is_disturbed),
         Check::judged(
             "tracking",
             format!(
@@ -100,10 +99,12 @@ pub(super) fn checks(manifest: &Manifest, figures: &Figures, is_disturbed: bool)
 }
 
 /// The motion must be played to its end, and not be broken off by somebody who asked the controller to stop.
-fn sequence(state: &str, events: &[EventRecord]) -> Check {
-    let was_stopped = events.iter().any(|event| event.cause == Cause::StopRequested.name());
+fn sequence(state: Option<Coded<ControllerState>>, events: &[EventRecord]) -> Check {
+    let was_stopped = events.iter().any(|event| event.cause == Cause::StopRequested);
     let how = if was_stopped { ", asked to stop before the motion's end" } else { "" };
-    Check::judged("sequence", format!("ended in state {state}{how}"), state == "finished" && !was_stopped)
+    let in_words = state.map_or_else(|| "none".to_owned(), |state| state.to_string());
+    let is_finished = state.is_some_and(|state| state == ControllerState::Finished);
+    Check::judged("sequence", format!("ended in state {in_words}{how}"), is_finished && !was_stopped)
 }
 
 /// No message may take longer on its bus than the plan allows at worst.

@@ -2,9 +2,11 @@
 
 use std::fmt::Write;
 
+use masseter_shared::messages::codes::{EventKind, Source};
+
 use super::junit::escape;
 use super::table::in_words;
-use crate::analysis::{EventRecord, Figures};
+use crate::analysis::{Coded, EventRecord, Figures};
 
 const WIDTH: f64 = 960.0;
 const LEFT: f64 = 90.0;
@@ -17,8 +19,8 @@ pub(super) fn time_line(figures: &Figures) -> Option<String> {
     let events = &figures.events[..figures.events.len().min(MOST)];
     let began_ns = figures.over_time.began_ns;
     let seconds = |event: &EventRecord| event.time_ns.saturating_sub(began_ns) as f64 / 1e9;
-    let mut sources: Vec<&str> = events.iter().map(|event| event.source.as_str()).collect();
-    sources.sort_unstable();
+    let mut sources: Vec<_> = events.iter().map(|event| event.source).collect();
+    sources.sort_by_cached_key(Coded::to_string);
     sources.dedup();
     let end_s = events.iter().map(seconds).fold(figures.duration_s, f64::max).max(1e-3);
     (!sources.is_empty()).then(|| {
@@ -31,7 +33,7 @@ pub(super) fn time_line(figures: &Figures) -> Option<String> {
 fn write_svg(
     svg: &mut String,
     events: &[EventRecord],
-    sources: &[&str],
+    sources: &[Coded<Source>],
     end_s: f64,
     seconds: &dyn Fn(&EventRecord) -> f64,
 ) -> std::fmt::Result {
@@ -44,12 +46,12 @@ fn write_svg(
             svg,
             "<text x=\"0\" y=\"{}\">{}</text><path d=\"M{LEFT} {y}H{WIDTH}\" stroke=\"#ddd\"/>",
             y + 4.0,
-            escape(source)
+            escape(&source.to_string())
         )?;
     }
     for event in events {
         let row = sources.iter().position(|source| *source == event.source).unwrap_or(0);
-        let colour = if event.kind == "fault" { "#b00020" } else { "#0072b2" };
+        let colour = if event.kind == EventKind::Fault { "#b00020" } else { "#0072b2" };
         write!(
             svg,
             "<circle cx=\"{:.1}\" cy=\"{}\" r=\"5\" fill=\"{colour}\" fill-opacity=\".6\"><title>{:.3} s: {}</title></circle>",

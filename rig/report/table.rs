@@ -2,9 +2,12 @@
 
 use std::fmt::Write;
 
+use masseter_shared::messages::codes::{Cause, EventKind};
+
 use super::usage;
 use crate::analysis::{
-    BusResponse, EventRecord, Figures, IntervalFigures, ReadingFigures, ResponseFigures, TrackingFigures,
+    BusResponse, Coded, EventRecord, Figures, IntervalFigures, ReadingFigures, ResponseFigures,
+    TrackingFigures,
 };
 use crate::report::verdict::Verdict;
 use crate::run::manifest::Manifest;
@@ -164,7 +167,7 @@ fn losses(text: &mut String, figures: &Figures) -> std::fmt::Result {
 }
 
 fn events(text: &mut String, figures: &Figures) -> std::fmt::Result {
-    let faults: Vec<_> = figures.events.iter().filter(|event| event.kind == "fault").collect();
+    let faults: Vec<_> = figures.events.iter().filter(|event| event.kind == EventKind::Fault).collect();
     if faults.is_empty() {
         return Ok(());
     }
@@ -179,17 +182,17 @@ fn events(text: &mut String, figures: &Figures) -> std::fmt::Result {
 pub(super) fn in_words(event: &EventRecord) -> String {
     let axis = event.axis.map_or_else(String::new, |axis| format!(" {axis}"));
     let moved = event.transition.as_ref().map(|[from, to]| format!("{from} → {to}"));
-    let values = match event.cause.as_str() {
-        "stop_requested" => String::new(),
+    let values = match event.cause {
+        Coded::Known(Cause::StopRequested) => String::new(),
         _ => format!(" (value {}, limit {})", event.value, event.limit),
     };
     let moved = moved.unwrap_or_default();
-    let (cycle, source) = (event.cycle, &event.source);
+    let (cycle, source) = (event.cycle, event.source);
     if let Some(text) = &event.text {
         return format!("cycle {cycle:>6} {source}: {} ({text})", event.cause);
     }
-    match event.cause.as_str() {
-        "sequence" => format!("cycle {cycle:>6} {source}{axis}: {moved}"),
+    match event.cause {
+        Coded::Known(Cause::Sequence) => format!("cycle {cycle:>6} {source}{axis}: {moved}"),
         cause => format!("cycle {cycle:>6} {source}{axis}: {cause}{values} {moved}").trim_end().to_owned(),
     }
 }
