@@ -7,6 +7,7 @@ use std::fs;
 use std::path::Path;
 
 use common::Workspace;
+use masseter::analysis::Hop;
 use masseter_shared::messages::codes::Source;
 use serde_json::Value;
 
@@ -64,6 +65,20 @@ fn the_intervals_are_those_that_are_documented_in_their_order() {
     let (_, table) = text.split_once("| interval | from | to |\n| --- | --- | --- |\n").unwrap();
     let rows = table.lines().map_while(|line| line.strip_prefix("| ")?.split(" | ").next());
     assert!(rows.eq(intervals.iter().map(|interval| interval["name"].as_str().unwrap())));
+}
+
+/// Some are intervals, named in a sentence; the others have a table of their own.
+#[test]
+fn the_hops_are_those_that_are_documented() {
+    let text = description();
+    let (_, hops) = text.split_once("## Hops").unwrap();
+    let (sentence, table) = hops.split_once("| hop | from | to |\n| --- | --- | --- |\n").unwrap();
+    let (_, listed) = sentence.split_once("the intervals ").unwrap();
+    let (listed, _) = listed.split_once(", and three more").unwrap();
+    let intervals = listed.replace('\n', " ").replace(" and ", ", ");
+    let rows = table.lines().map_while(|line| line.strip_prefix("| ")?.split(" | ").next());
+    let documented: BTreeSet<_> = intervals.split(", ").chain(rows).map(str::to_owned).collect();
+    assert_eq!(documented, Hop::ALL.iter().map(|hop| hop.name().to_owned()).collect());
 }
 
 #[test]

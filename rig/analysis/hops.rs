@@ -4,37 +4,88 @@
 //! Between them lie SYNC on the wire and the waits of the time table, so that a delay counts in one of them alone.
 
 use hdrhistogram::Histogram;
+use serde::{Serialize, Serializer};
 
 use super::measured::histogram;
 
-/// The hops, in the order in which a cycle passes through them.
-pub(super) const HOPS: [&str; 10] = [
-    "plant wake-up",
-    "process data",
-    "reading publication",
-    "controller wake-up",
-    "reading pick-up",
-    "forward kinematics",
-    "control",
-    "command publication",
-    "command transport",
-    "command to wire",
-];
+/// A hop.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Hop {
+    /// From the plant's deadline to its wake-up.
+    PlantWakeUp,
+    /// From SYNC to the last process data of the drives.
+    ProcessData,
+    /// From there to the reading's publication.
+    ReadingPublication,
+    /// From the controller's deadline to its wake-up.
+    ControllerWakeUp,
+    /// From there, or the later publication of the reading, until the controller has it.
+    ReadingPickUp,
+    /// Until the pose is solved.
+    ForwardKinematics,
+    /// Until the command is computed.
+    Control,
+    /// Until the command is published.
+    CommandPublication,
+    /// Until the plant has the command.
+    CommandTransport,
+    /// Until its last process data are on the wire.
+    CommandToWire,
+}
 
-/// How long each hop of a cycle took, ns.
-pub(super) type HopTimes = [u64; HOPS.len()];
+impl Hop {
+    /// In the order in which a cycle passes through them.
+    pub const ALL: [Self; 10] = [
+        Self::PlantWakeUp,
+        Self::ProcessData,
+        Self::ReadingPublication,
+        Self::ControllerWakeUp,
+        Self::ReadingPickUp,
+        Self::ForwardKinematics,
+        Self::Control,
+        Self::CommandPublication,
+        Self::CommandTransport,
+        Self::CommandToWire,
+    ];
+
+    /// What tables and files call it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::PlantWakeUp => "plant wake-up",
+            Self::ProcessData => "process data",
+            Self::ReadingPublication => "reading publication",
+            Self::ControllerWakeUp => "controller wake-up",
+            Self::ReadingPickUp => "reading pick-up",
+            Self::ForwardKinematics => "forward kinematics",
+            Self::Control => "control",
+            Self::CommandPublication => "command publication",
+            Self::CommandTransport => "command transport",
+            Self::CommandToWire => "command to wire",
+        }
+    }
+}
+
+/// As its name.
+impl Serialize for Hop {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(self.name())
+    }
+}
+
+/// How long each of [`Hop::ALL`] took in a cycle, ns.
+pub(super) type HopTimes = [u64; Hop::ALL.len()];
 
 /// A hop to blame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Blamed {
-    pub(super) hop: &'static str,
+    pub(super) hop: Hop,
     pub(super) took_ns: u64,
     pub(super) p50_ns: u64,
 }
 
 /// How long the hops usually take.
 #[derive(Debug)]
-pub(super) struct Usual([Histogram<u64>; HOPS.len()]);
+pub(super) struct Usual([Histogram<u64>; Hop::ALL.len()]);
 
 impl Default for Usual {
     fn default() -> Self {
@@ -50,10 +101,8 @@ impl Usual {
     }
 
     pub(super) fn blame(&self, hops_ns: &HopTimes) -> Blamed {
-        let hops = HOPS.iter().zip(hops_ns).zip(&self.0).map(|((hop, &took_ns), histogram)| Blamed {
-            hop,
-            took_ns,
-            p50_ns: histogram.value_at_quantile(0.5).min(histogram.max()),
+        let hops = Hop::ALL.into_iter().zip(hops_ns).zip(&self.0).map(|((hop, &took_ns), histogram)| {
+            Blamed { hop, took_ns, p50_ns: histogram.value_at_quantile(0.5).min(histogram.max()) }
         });
         hops.max_by_key(|hop| hop.took_ns.saturating_sub(hop.p50_ns)).expect("there are hops")
     }
@@ -70,7 +119,7 @@ mod tests {
         (0..9).for_each(|_| usual.take(&usual_ns));
         let mut hops_ns = usual_ns;
         (hops_ns[1], hops_ns[5]) = (450, 100);
-        let expected = Blamed { hop: "forward kinematics", took_ns: 100, p50_ns: 10 };
+        let expected = Blamed { hop: Hop::ForwardKinematics, took_ns: 100, p50_ns: 10 };
         assert_eq!(usual.blame(&hops_ns), expected);
     }
 }

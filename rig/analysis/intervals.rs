@@ -10,44 +10,9 @@ use masseter_shared::messages::{Command, Reading, State};
 
 use super::AnalysisError;
 use super::answer::{Answer, Answers};
+use super::interval::Interval;
 use super::join::{ByCycle, Join};
 use super::measured::{IntervalFigures, Measured};
-
-/// Names of the intervals, in the order in which a cycle passes through them.
-const NAMES: [&str; 13] = [
-    "plant wake-up",
-    "plant wake-up corrected",
-    "process data",
-    "controller wake-up",
-    "controller wake-up corrected",
-    "reading transport",
-    "forward kinematics",
-    "control",
-    "controller cycle",
-    "command transport",
-    "command to wire",
-    "sample to wire",
-    "round trip",
-];
-
-#[derive(Debug, Clone, Copy)]
-enum Interval {
-    PlantWakeUp,
-    PlantWakeUpCorrected,
-    ProcessData,
-    ControllerWakeUp,
-    ControllerWakeUpCorrected,
-    ReadingTransport,
-    ForwardKinematics,
-    Control,
-    ControllerCycle,
-    CommandTransport,
-    CommandToWire,
-    SampleToWire,
-    /// From the plant's wake-up to the reading's publication and from its reception to the command's: what both processes and
-    /// the wires take, without the waits of the time table.
-    RoundTrip,
-}
 
 /// What is known of a reading's cycle when a command answers it.
 #[derive(Debug, Clone, Copy)]
@@ -94,7 +59,7 @@ impl Intervals {
             .map_err(|error| AnalysisError::Write { path: folder.to_owned(), error })?;
         Ok(Self {
             period_ns,
-            measured: NAMES.iter().map(|name| Measured::new(name, folder)).collect(),
+            measured: Interval::ALL.iter().map(|interval| Measured::new(interval.name(), folder)).collect(),
             plant_skipped: 0,
             controller_skipped: 0,
             answers: Answers::default(),

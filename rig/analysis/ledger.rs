@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::answer::{Answer, Answers};
 use super::around::{Around, Looks};
-use super::hops::Usual;
+use super::hops::{Hop, Usual};
 use super::join::ByCycle;
 use super::stalls::Stalls;
 use super::way::{Computed, Parts, Sampled, Sent, Way};
@@ -24,7 +24,7 @@ pub struct WorstCycle {
     /// From there until the last process data of its command were on the wire, ns.
     pub total_ns: u64,
     /// The hop to blame.
-    pub hop: &'static str,
+    pub hop: Hop,
     /// How long that hop took, ns.
     pub hop_ns: u64,
     /// How long it takes in half of all cycles, ns.
@@ -131,7 +131,7 @@ impl Ledger {
 
 #[cfg(test)]
 mod tests {
-    use super::super::hops::{HOPS, HopTimes};
+    use super::super::hops::HopTimes;
     use super::*;
 
     const PERIOD_NS: u64 = 1_000_000;
@@ -200,7 +200,7 @@ mod tests {
         for cycle in 1..100 {
             let mut hops_ns = USUAL_NS;
             // Every ninth cycle, one hop after the other; the later ones a little longer.
-            if cycle % 9 == 0 && cycle / 9 <= HOPS.len() as u64 {
+            if cycle % 9 == 0 && cycle / 9 <= Hop::ALL.len() as u64 {
                 hops_ns[cycle as usize / 9 - 1] += 200_000 + cycle * 1000;
             }
             rig.cycle(cycle, hops_ns);
@@ -210,7 +210,7 @@ mod tests {
         assert!(worst.windows(2).all(|pair| pair[0].total_ns >= pair[1].total_ns));
         for told in worst {
             let hop = told.cycle as usize / 9 - 1;
-            let expected = (HOPS[hop], USUAL_NS[hop] + 200_000 + told.cycle * 1000);
+            let expected = (Hop::ALL[hop], USUAL_NS[hop] + 200_000 + told.cycle * 1000);
             assert_eq!((told.hop, told.hop_ns), expected, "cycle {}", told.cycle);
             assert!(told.hop_p50_ns.abs_diff(USUAL_NS[hop]) <= USUAL_NS[hop] / 500, "{told:?}");
         }

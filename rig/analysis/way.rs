@@ -2,7 +2,7 @@
 
 use masseter_shared::messages::{Reading, State};
 
-use super::hops::HopTimes;
+use super::hops::{Hop, HopTimes};
 
 /// What is known of a reading.
 #[allow(clippy::struct_field_names, reason = "the unit")]
@@ -89,22 +89,21 @@ impl Way {
     }
 }
 
-/// In the order of [`HOPS`](super::hops::HOPS).
 fn hops_ns(sampled: &Sampled, computed: &Computed, published_ns: u64, sent: &Sent) -> HopTimes {
     // Until it wakes, the controller does not wait for the reading.
     let awaited_ns = sampled.published_ns.max(computed.woke_ns);
-    [
-        passed_ns(sampled.due_ns, sampled.woke_ns),
-        passed_ns(sampled.sampled_ns, sampled.complete_ns),
-        passed_ns(sampled.complete_ns, sampled.published_ns),
-        passed_ns(computed.due_ns, computed.woke_ns),
-        passed_ns(awaited_ns, computed.received_ns),
-        passed_ns(computed.received_ns, computed.solved_ns),
-        passed_ns(computed.solved_ns, computed.commanded_ns),
-        passed_ns(computed.commanded_ns, published_ns),
-        passed_ns(published_ns, sent.received_ns),
-        passed_ns(sent.received_ns, sent.sent_ns),
-    ]
+    Hop::ALL.map(|hop| match hop {
+        Hop::PlantWakeUp => passed_ns(sampled.due_ns, sampled.woke_ns),
+        Hop::ProcessData => passed_ns(sampled.sampled_ns, sampled.complete_ns),
+        Hop::ReadingPublication => passed_ns(sampled.complete_ns, sampled.published_ns),
+        Hop::ControllerWakeUp => passed_ns(computed.due_ns, computed.woke_ns),
+        Hop::ReadingPickUp => passed_ns(awaited_ns, computed.received_ns),
+        Hop::ForwardKinematics => passed_ns(computed.received_ns, computed.solved_ns),
+        Hop::Control => passed_ns(computed.solved_ns, computed.commanded_ns),
+        Hop::CommandPublication => passed_ns(computed.commanded_ns, published_ns),
+        Hop::CommandTransport => passed_ns(published_ns, sent.received_ns),
+        Hop::CommandToWire => passed_ns(sent.received_ns, sent.sent_ns),
+    })
 }
 
 /// None where the two are in the wrong order, as in a damaged recording.

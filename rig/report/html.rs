@@ -168,7 +168,7 @@ fn worst_cycles(page: &mut String, figures: &Figures) -> std::fmt::Result {
             worst.cycle,
             worst.due_ns.saturating_sub(figures.over_time.began_ns) as f64 / 1e9,
             microseconds(worst.total_ns),
-            worst.hop,
+            worst.hop.name(),
             microseconds(worst.hop_ns),
             microseconds(worst.hop_p50_ns),
             microseconds(worst.stalled_ns),
