@@ -236,16 +236,7 @@ fn in_process(cycles: &[Vec<Recorded>], path: &Path) -> anyhow::Result<()> {
     let from_ns = clock::now_ns();
     let mut messages = 0;
     for (number, message) in cycles.iter().flatten().enumerate() {
-        let log_time_ns = number as u64;
-        match message {
-            Recorded::Command(message) => recorder.record(message, log_time_ns)?,
-            Recorded::Reading(message) => recorder.record(message, log_time_ns)?,
-            Recorded::State(message) => recorder.record(message, log_time_ns)?,
-            Recorded::Truth(message) => recorder.record(message, log_time_ns)?,
-            Recorded::Frame(message) => recorder.record(message, log_time_ns)?,
-            Recorded::Machine(message) => recorder.record(message, log_time_ns)?,
-            Recorded::Event(message) => recorder.record(message, log_time_ns)?,
-        }
+        recorder.record(message, number as u64)?;
         messages += 1;
     }
     recorder.finish()?;

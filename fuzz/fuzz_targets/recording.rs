@@ -138,7 +138,7 @@ static WHOLE: LazyLock<Vec<u8>> = LazyLock::new(|| {
     let mut recorder =
         Recorder::on(&mut medium, Scene::new(&mechanism, &JawConfig::default())).expect("memory takes all");
     for cycle in 1..=CYCLES {
-        recorder.record(&reading(cycle), cycle).expect("memory takes all");
+        recorder.record(&Recorded::Reading(reading(cycle)), cycle).expect("memory takes all");
         if cycle == CYCLES / 2 {
             recorder.flush().expect("memory takes all");
         }

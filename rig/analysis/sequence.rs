@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use masseter_shared::messages::Event;
 use masseter_shared::messages::codes::Source;
-use masseter_shared::messages::{Command, Event, FrameTap, Machine, Message, Reading, State, Truth};
 use serde::Serialize;
 
 use crate::recording::Recorded;
@@ -40,15 +40,11 @@ struct Stream {
 impl SequenceCheck {
     /// Counts a message.
     pub(crate) fn take(&mut self, message: &Recorded) {
-        match message {
-            Recorded::Command(command) => self.check(Command::TOPIC, 0, command.seq),
-            Recorded::Reading(reading) => self.check(Reading::TOPIC, 0, reading.seq),
-            Recorded::State(state) => self.check(State::TOPIC, 0, state.seq),
-            Recorded::Truth(truth) => self.check(Truth::TOPIC, 0, truth.seq),
-            Recorded::Frame(frame) => self.check(FrameTap::TOPIC, 0, frame.seq),
-            Recorded::Machine(machine) => self.check(Machine::TOPIC, 0, machine.seq),
-            Recorded::Event(event) => self.check(Event::TOPIC, publisher_of(event), event.seq),
-        }
+        let publisher = match message {
+            Recorded::Event(event) => publisher_of(event),
+            _ => 0,
+        };
+        self.check(message.topic().name(), publisher, message.seq());
     }
 
     fn check(&mut self, topic: &'static str, publisher: u32, seq: u64) {

@@ -143,6 +143,8 @@ impl Live {
     }
 }
 
+const _: () = assert!(Topic::ALL.len() <= u8::BITS as usize, "every topic has a bit in `Shared::wanted`");
+
 fn bit(topic: Topic) -> u8 {
     1 << topic as u8
 }

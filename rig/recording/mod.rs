@@ -27,6 +27,7 @@ pub use reader::{Chunks, Entry, ReadError, Reader};
 pub use recover::{RecoverError, Recovered, recover};
 pub use scene::Scene;
 pub(crate) use scene::jaw_points;
+use topic::Stamps;
 pub use topic::Topic;
 pub use walk::Damage;
 pub use writer::{DurableFile, Medium, Recorder, WriteError};
@@ -67,6 +68,11 @@ impl Recorded {
             Self::Event(_) => Topic::Event,
             Self::Machine(_) => Topic::Machine,
         }
+    }
+
+    /// Its number among those of its publisher on its topic.
+    pub fn seq(&self) -> u64 {
+        Stamps::read(self.body()).expect("every message begins with its stamps").seq
     }
 
     /// Its body, as it lay in shared memory.

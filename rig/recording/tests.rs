@@ -52,19 +52,6 @@ fn cycle(cycle: u64) -> Vec<Recorded> {
     ]
 }
 
-fn record(recorder: &mut Recorder<&mut Cursor<Vec<u8>>>, message: &Recorded, now_ns: u64) {
-    match message {
-        Recorded::Command(message) => recorder.record(message, now_ns),
-        Recorded::Reading(message) => recorder.record(message, now_ns),
-        Recorded::State(message) => recorder.record(message, now_ns),
-        Recorded::Truth(message) => recorder.record(message, now_ns),
-        Recorded::Frame(message) => recorder.record(message, now_ns),
-        Recorded::Event(message) => recorder.record(message, now_ns),
-        Recorded::Machine(message) => recorder.record(message, now_ns),
-    }
-    .unwrap();
-}
-
 /// A whole recording.
 struct Whole {
     bytes: Vec<u8>,
@@ -77,7 +64,7 @@ static WHOLE: LazyLock<Whole> = LazyLock::new(|| {
     let mut messages = Vec::new();
     for number in 1..=CYCLES {
         for message in cycle(number) {
-            record(&mut recorder, &message, number * MILLISECOND_NS);
+            recorder.record(&message, number * MILLISECOND_NS).unwrap();
             messages.push(message);
         }
         if number.is_multiple_of(CYCLES_A_FLUSH) {
@@ -98,7 +85,7 @@ static FLUSHED: LazyLock<Vec<(usize, usize)>> = LazyLock::new(|| {
         let mut messages = 0;
         for number in 1..=flushes * CYCLES_A_FLUSH {
             for message in cycle(number) {
-                record(&mut recorder, &message, number * MILLISECOND_NS);
+                recorder.record(&message, number * MILLISECOND_NS).unwrap();
                 messages += 1;
             }
             if number.is_multiple_of(CYCLES_A_FLUSH) {
@@ -153,7 +140,7 @@ fn a_newer_layout_is_named() {
     let mut medium = Cursor::new(Vec::new());
     let mut recorder = Recorder::on(&mut medium, scene()).unwrap();
     let newer = Reading { seq: 1, version: 99, ..Default::default() };
-    recorder.record(&newer, 1).unwrap();
+    recorder.record(&Recorded::Reading(newer), 1).unwrap();
     recorder.finish().unwrap();
     let error = read(medium.get_ref()).err().unwrap().to_string();
     assert!(error.contains("'reading'") && error.contains("version 99"), "{error}");
@@ -189,7 +176,7 @@ fn a_flipped_bit_is_damage_and_no_cut() {
     let mut medium = Cursor::new(Vec::new());
     let mut recorder = Recorder::on(&mut medium, scene()).unwrap();
     for message in cycle(1) {
-        record(&mut recorder, &message, 0);
+        recorder.record(&message, 0).unwrap();
     }
     recorder.finish().unwrap();
     let mut bytes = medium.into_inner();

@@ -12,10 +12,10 @@ use std::path::Path;
 use std::sync::mpsc::{Receiver, SyncSender, channel, sync_channel};
 use std::thread::{self, JoinHandle};
 
-use masseter_shared::messages::Message;
 use mcap::records::MessageHeader;
 use mcap::{Compression, McapError, WriteOptions, Writer};
 
+use super::Recorded;
 use super::encoding::{Definition, Encoded, Encoder};
 use super::scene::Scene;
 use super::topic::Topic;
@@ -117,9 +117,9 @@ impl<W: Medium> Recorder<W> {
     }
 
     /// Appends a message that was received at `log_time_ns`, and what a 3-D view shows of it.
-    pub fn record<M: Message>(&mut self, message: &M, log_time_ns: u64) -> Result<(), WriteError> {
+    pub fn record(&mut self, message: &Recorded, log_time_ns: u64) -> Result<(), WriteError> {
         let Self { channels, encoder } = self;
-        encoder.encode(Topic::of::<M>(), message.body(), |message| channels.write(&message, log_time_ns))
+        encoder.encode(message.topic(), message.body(), |message| channels.write(&message, log_time_ns))
     }
 
     /// Appends the message of a topic that is CDR already, and what a 3-D view shows of it.

@@ -80,22 +80,24 @@ impl Seen {
 
     /// Looks at a message.
     pub(super) fn take(&mut self, message: &Recorded) {
+        // Several publishers number events, each its own.
+        if !matches!(message, Recorded::Event(_)) {
+            self.count(message.topic(), message.seq());
+        }
         match message {
             Recorded::State(state) => self.state(state),
-            Recorded::Reading(reading) => {
-                self.count(Topic::Reading, reading.seq);
-                self.plant.take(reading.due_ns, reading.woke_ns);
-                self.reading = *reading;
-            }
+            Recorded::Reading(reading) => self.reading(reading),
             Recorded::Frame(frame) => self.frame(frame),
-            Recorded::Command(command) => self.count(Topic::Command, command.seq),
-            Recorded::Truth(truth) => self.count(Topic::Truth, truth.seq),
-            Recorded::Event(_) | Recorded::Machine(_) => {}
+            _ => {}
         }
     }
 
+    fn reading(&mut self, reading: &Reading) {
+        self.plant.take(reading.due_ns, reading.woke_ns);
+        self.reading = *reading;
+    }
+
     fn state(&mut self, state: &State) {
-        self.count(Topic::State, state.seq);
         self.controller.take(state.due_ns, state.woke_ns);
         let is_fresh = state.reading_cycle > self.state.reading_cycle;
         self.state = *state;
@@ -105,7 +107,6 @@ impl Seen {
     }
 
     fn frame(&mut self, frame: &FrameTap) {
-        self.count(Topic::Frame, frame.seq);
         if let (Ok(Tapped::Frame(received)), Ok(bus)) = (tap::decode(frame), tap::bus_of(frame)) {
             self.busy_ns.resize(self.busy_ns.len().max(bus + 1), 0);
             self.busy_ns[bus] += self.rates.duration_ns(wire::frame_bits(&received.frame));
