@@ -1,5 +1,6 @@
-//! What happens on simulated wires, and what faults do to the master's port of real ones, as events: controllers that change their error state, and the beginning
-//! and end of injected faults. Single errors are no events; they are in the log and in the figures.
+//! What happens on simulated wires, and what faults do to the master's port of real ones, as events: controllers that
+//! change their error state, and the beginning and end of injected faults. Single errors are no events; they are in the
+//! log and in the figures.
 
 use masseter_shared::can::faults::FaultNote;
 use masseter_shared::can::{ErrorKind, ErrorReport, ErrorState};
