@@ -92,10 +92,10 @@ impl CycleSchedule {
         if let Some(overload) = plans.find_map(|plan| plan.check().err()) {
             return Ok(Err(overload.into()));
         }
-        Ok(Self::offsets(can, &can.rates()?, period_ns))
+        Ok(Self::offsets(can, can.rates()?, period_ns))
     }
 
-    fn offsets(can: &CanConfig, rates: &Rates, period_ns: u64) -> Result<Self, Misfit> {
+    fn offsets(can: &CanConfig, rates: Rates, period_ns: u64) -> Result<Self, Misfit> {
         let longest = |length| rates.duration_ns(longest_bits(length, false, can.format()));
         let shortest = |length| rates.duration_ns(shortest_bits(length, false, can.format()));
         let axes = can.buses.iter().map(Vec::len).max().unwrap_or(0) as u64;
@@ -118,7 +118,7 @@ impl CycleSchedule {
 }
 
 /// The longest time of a heartbeat on the wire, ns.
-fn heartbeat_ns(can: &CanConfig, rates: &Rates) -> u64 {
+fn heartbeat_ns(can: &CanConfig, rates: Rates) -> u64 {
     rates.duration_ns(longest_bits(HEARTBEAT_LENGTH, false, can.format()))
 }
 

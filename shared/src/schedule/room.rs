@@ -24,7 +24,7 @@ impl Room {
         let fits = |rate_hz: u32| {
             CycleSchedule::fit(can, SECOND_NS / u64::from(rate_hz)).map(|fitted| fitted.is_ok())
         };
-        let answer_ns = answer_ns(can, heartbeat_ns(can, &can.rates()?));
+        let answer_ns = answer_ns(can, heartbeat_ns(can, can.rates()?));
         let (mut max_rate_hz, mut too_high_hz) = (*RATES_HZ.start(), *RATES_HZ.end() + 1);
         if !fits(max_rate_hz)? {
             return Ok(Self { max_rate_hz: None, answer_ns });
