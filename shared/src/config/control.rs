@@ -5,6 +5,10 @@ use serde::{Deserialize, Serialize};
 use super::ScenarioError;
 use super::need::{require_duration, require_positive};
 
+/// SYNC takes one cycle and the drives' interpolation one; drives that smooth their targets take some more. The motion
+/// is looked ahead by as much, at the speed that it has.
+const MOST_LEAD_CYCLES: f64 = 10.0;
+
 /// Sequence, pose control and safety of the controller.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -20,9 +24,11 @@ pub struct ControllerConfig {
     /// How long a motion takes to come to rest when it is stopped halfway, s.
     pub stop_ramp_s: f64,
     /// Time from a command's reading to the moment its targets are reached, in cycles: one until SYNC
-    /// makes the drives take the targets, one for their interpolation.
+    /// makes the drives take the targets, one for their interpolation. At most 10: the motion is looked ahead by as
+    /// much.
     pub lead_cycles: f64,
-    /// Integral gain of the pose control, 1/s.
+    /// Integral gain of the pose control, 1/s. At most `rate_hz` / `lead_cycles`: with more, an error would be corrected
+    /// more than once before the first correction shows.
     pub integral_gain_per_s: f64,
     /// The most that pose control may add to the wanted position, m.
     pub trim_limit_m: f64,
@@ -103,7 +109,7 @@ impl Default for ChecksConfig {
 }
 
 impl ControllerConfig {
-    pub(super) fn validate(&self) -> Result<(), ScenarioError> {
+    pub(super) fn validate(&self, rate_hz: u32) -> Result<(), ScenarioError> {
         require_duration(&[
             ("controller.start_timeout_s", self.start_timeout_s),
             ("controller.ease_s", self.ease_s),
@@ -118,12 +124,68 @@ impl ControllerConfig {
             ("controller.trim_limit_rad", self.trim_limit_rad),
             ("controller.stale_cycles", f64::from(self.stale_cycles)),
             ("controller.tracking_limit_m", self.tracking_limit_m),
-        ])
+        ])?;
+        self.validate_loop(f64::from(rate_hz))
+    }
+
+    /// What takes `lead_cycles` to show is neither looked ahead for longer than a drive needs, nor corrected twice.
+    fn validate_loop(&self, rate_hz: f64) -> Result<(), ScenarioError> {
+        let bad =
+            |key, value: f64, need| Err(ScenarioError::BadValue { key, value: value.to_string(), need });
+        if self.lead_cycles > MOST_LEAD_CYCLES {
+            let need = format!(
+                "use at most {MOST_LEAD_CYCLES}: one until SYNC, and what the drives interpolate over"
+            );
+            return bad("controller.lead_cycles", self.lead_cycles, need);
+        }
+        let most_per_s = rate_hz / self.lead_cycles;
+        if self.integral_gain_per_s > most_per_s {
+            let need = format!(
+                "use at most {most_per_s} (rate_hz / lead_cycles): with more, an error is corrected more than once before \
+                 the first correction shows"
+            );
+            return bad("controller.integral_gain_per_s", self.integral_gain_per_s, need);
+        }
+        Ok(())
     }
 }
 
 impl ChecksConfig {
     pub(super) fn validate(&self) -> Result<(), ScenarioError> {
         require_positive(&[("checks.tracking_rms_mm", self.tracking_rms_mm)])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_loop_that_looks_too_far_ahead_or_corrects_twice_is_refused() {
+        let default = ControllerConfig::default();
+        let table = [
+            (default, 1000, None),
+            (default, 10, None),
+            (ControllerConfig { lead_cycles: 10.0, ..default }, 1000, None),
+            (
+                ControllerConfig { lead_cycles: 1000.0, ..default },
+                1000,
+                Some("controller.lead_cycles = 1000: use at most 10"),
+            ),
+            (ControllerConfig { integral_gain_per_s: 500.0, ..default }, 1000, None),
+            (
+                ControllerConfig { integral_gain_per_s: 1e9, ..default },
+                1000,
+                Some("controller.integral_gain_per_s = 1000000000: use at most 500"),
+            ),
+            (ControllerConfig { lead_cycles: 4.0, ..default }, 10, Some("use at most 2.5")),
+        ];
+        for (config, rate_hz, reason) in table {
+            let said = config.validate(rate_hz).map_err(|error| error.to_string());
+            match reason {
+                None => assert_eq!(said, Ok(()), "{config:?}"),
+                Some(reason) => assert!(said.as_ref().is_err_and(|said| said.contains(reason)), "{said:?}"),
+            }
+        }
     }
 }

@@ -172,7 +172,7 @@ impl Scenario {
             food.validate()?;
         }
         self.limits.validate()?;
-        self.controller.validate()?;
+        self.controller.validate(self.rate_hz)?;
         self.checks.validate()
     }
 
