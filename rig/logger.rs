@@ -25,7 +25,7 @@ use crate::machine::SystemRoot;
 use crate::recording::{Backlog, Pace, Recorded, Recorder, Scene};
 use machine_watch::MachineWatch;
 use screen::Screen;
-use view::{Mode, Told, View};
+use view::{Losses, Mode, View};
 
 /// How often the topics are drained; a fraction of what their buffers hold.
 const DRAIN: Duration = Duration::from_millis(10);
@@ -104,8 +104,8 @@ impl Takers {
         }
     }
 
-    fn told(&self) -> Told {
-        Told { lost: self.backlog.dropped(), live: self.live.as_ref().map(Live::watched) }
+    fn losses(&self) -> Losses {
+        Losses { lost: self.backlog.dropped(), live: self.live.as_ref().map(Live::watched) }
     }
 
     /// Shows how the run goes, if it is time to and somebody reads.
@@ -116,7 +116,7 @@ impl Takers {
             self.view.leave_picture();
         }
         if self.view.is_due(now_ns) && self.screen.is_free() {
-            let text = self.view.next(now_ns, self.told(), screen::rows());
+            let text = self.view.next(now_ns, self.losses(), screen::rows());
             self.screen.say(text);
         }
     }
@@ -124,7 +124,7 @@ impl Takers {
     /// Ends what is recorded and shown, and says what either lacks. The recording comes first: whoever watches can
     /// hold up what comes later.
     fn end(mut self, now_ns: u64) -> Exit {
-        if let Some(text) = self.view.last(now_ns, self.told(), screen::rows()) {
+        if let Some(text) = self.view.last(now_ns, self.losses(), screen::rows()) {
             self.screen.say(text);
         }
         let loss = self.backlog.finish().loss();

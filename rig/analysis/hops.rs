@@ -83,17 +83,17 @@ pub(super) struct Blamed {
     pub(super) p50_ns: u64,
 }
 
-/// How long the hops usually take.
+/// How long the hops typically take.
 #[derive(Debug)]
-pub(super) struct Usual([Histogram<u64>; Hop::ALL.len()]);
+pub(super) struct TypicalHops([Histogram<u64>; Hop::ALL.len()]);
 
-impl Default for Usual {
+impl Default for TypicalHops {
     fn default() -> Self {
         Self(std::array::from_fn(|_| histogram()))
     }
 }
 
-impl Usual {
+impl TypicalHops {
     pub(super) fn take(&mut self, hops_ns: &HopTimes) {
         for (histogram, &hop_ns) in self.0.iter_mut().zip(hops_ns) {
             histogram.record(hop_ns).expect("a histogram that resizes itself takes any value");
@@ -114,12 +114,12 @@ mod tests {
 
     #[test]
     fn not_the_longest_hop_is_to_blame_but_the_one_furthest_above_its_median() {
-        let usual_ns = [0, 400, 0, 0, 10, 10, 10, 10, 10, 300];
-        let mut usual = Usual::default();
-        (0..9).for_each(|_| usual.take(&usual_ns));
-        let mut hops_ns = usual_ns;
+        let typical_ns = [0, 400, 0, 0, 10, 10, 10, 10, 10, 300];
+        let mut typical = TypicalHops::default();
+        (0..9).for_each(|_| typical.take(&typical_ns));
+        let mut hops_ns = typical_ns;
         (hops_ns[1], hops_ns[5]) = (450, 100);
         let expected = Blamed { hop: Hop::ForwardKinematics, took_ns: 100, p50_ns: 10 };
-        assert_eq!(usual.blame(&hops_ns), expected);
+        assert_eq!(typical.blame(&hops_ns), expected);
     }
 }

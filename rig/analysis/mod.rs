@@ -4,10 +4,10 @@
 //! Nothing is judged here; see [`report::verdict`](crate::report::verdict).
 
 mod answer;
-mod around;
 mod blame;
 mod bus_response;
 mod coded;
+mod cycle_path;
 mod events;
 mod exports;
 mod freshness;
@@ -15,7 +15,8 @@ mod hops;
 mod interval;
 mod intervals;
 mod join;
-mod ledger;
+mod kernel_counts;
+mod longest_cycles;
 mod measured;
 mod noise;
 mod outage;
@@ -26,7 +27,6 @@ mod series;
 mod skips;
 mod stalls;
 mod tracking;
-mod way;
 
 use std::path::PathBuf;
 
@@ -37,7 +37,6 @@ use serde::Serialize;
 
 use crate::recording::{Damage, ReadError, Reader, Recorded};
 use crate::run::folder::RunFolder;
-pub use around::Around;
 pub use blame::Suspicion;
 pub use bus_response::{BusResponse, ResponseFigures};
 pub use coded::Coded;
@@ -48,8 +47,9 @@ use freshness::Freshness;
 pub use freshness::ReadingFigures;
 pub use hops::Hop;
 use intervals::Intervals;
-use ledger::Ledger;
-pub use ledger::WorstCycle;
+pub use kernel_counts::KernelCounts;
+use longest_cycles::LongestCycles;
+pub use longest_cycles::WorstCycle;
 pub use measured::IntervalFigures;
 pub use outage::Outage;
 use outage::OutageWatch;
@@ -167,7 +167,7 @@ pub fn analyse(folder: &RunFolder, scenario: &Scenario) -> Result<Figures, Analy
 struct Pass {
     period_ns: u64,
     intervals: Intervals,
-    ledger: Ledger,
+    longest_cycles: LongestCycles,
     tracking: Tracking,
     sequence: SequenceCheck,
     candump: CandumpLogs,
@@ -191,7 +191,7 @@ impl Pass {
         Ok(Self {
             period_ns: scenario.period_ns(),
             intervals: Intervals::new(&folder.histograms(), scenario.period_ns())?,
-            ledger: Ledger::default(),
+            longest_cycles: LongestCycles::default(),
             tracking: Tracking::against(reference),
             sequence: SequenceCheck::default(),
             candump: CandumpLogs::new(folder.path(), &scenario.can.interfaces),
@@ -220,19 +220,19 @@ impl Pass {
             Recorded::Truth(truth) => self.truth(truth),
             Recorded::Frame(frame) => self.frame(frame)?,
             Recorded::Event(event) => self.event(event),
-            Recorded::Machine(machine) => self.ledger.machine(machine),
+            Recorded::Machine(machine) => self.longest_cycles.machine(machine),
         }
         Ok(())
     }
 
     fn command(&mut self, command: &Command) {
         self.intervals.command(command);
-        self.ledger.command(command);
+        self.longest_cycles.command(command);
     }
 
     fn reading(&mut self, reading: &Reading) {
         self.intervals.reading(reading);
-        self.ledger.reading(reading);
+        self.longest_cycles.reading(reading);
         self.watch.reading(reading);
         self.outage.reading(reading);
         self.plant_skips.take(&Counters::from(reading), self.period_ns);
@@ -243,7 +243,7 @@ impl Pass {
     fn state(&mut self, state: &State) {
         let is_fresh = self.freshness.take(state);
         self.intervals.state(state, is_fresh);
-        self.ledger.state(state, is_fresh);
+        self.longest_cycles.state(state, is_fresh);
         self.watch.state(state);
         self.outage.state(state);
         if is_fresh {
@@ -285,7 +285,7 @@ impl Pass {
             outage: self.outage.finish(self.period_ns),
             tracking,
             bite_force_max_n: self.bite_force_max_n,
-            worst_cycles: self.ledger.finish(),
+            worst_cycles: self.longest_cycles.finish(),
             intervals: self.intervals.finish()?,
             topics: self.sequence.finish(),
             frames: self.candump.finish()?.iter().map(|logged| logged.frames).collect(),

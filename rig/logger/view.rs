@@ -57,9 +57,9 @@ impl Mode {
     }
 }
 
-/// What others have to say of a run.
+/// What was not recorded, and who watches elsewhere and misses what.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Told {
+pub(super) struct Losses {
     /// Messages that were received and not recorded.
     pub lost: u64,
     /// Who watches elsewhere, if anybody may.
@@ -106,10 +106,10 @@ impl View {
     }
 
     /// What was seen since the last time, for a terminal with so many rows.
-    pub(super) fn next(&mut self, now_ns: u64, told: Told, rows: Option<usize>) -> String {
+    pub(super) fn next(&mut self, now_ns: u64, losses: Losses, rows: Option<usize>) -> String {
         let text = match self.mode {
-            Mode::Picture => self.draw(now_ns, told, rows),
-            Mode::Quiet | Mode::Lines => self.line(told) + "\n",
+            Mode::Picture => self.draw(now_ns, losses, rows),
+            Mode::Quiet | Mode::Lines => self.line(losses) + "\n",
         };
         self.shown_ns = now_ns;
         self.seen.forget_lately();
@@ -117,8 +117,8 @@ impl View {
     }
 
     /// The last picture, where pictures are shown.
-    pub(super) fn last(&mut self, now_ns: u64, told: Told, rows: Option<usize>) -> Option<String> {
-        (self.mode == Mode::Picture).then(|| self.draw(now_ns, told, rows))
+    pub(super) fn last(&mut self, now_ns: u64, losses: Losses, rows: Option<usize>) -> Option<String> {
+        (self.mode == Mode::Picture).then(|| self.draw(now_ns, losses, rows))
     }
 
     /// Something else was written below the picture: the next one begins there.
@@ -128,9 +128,9 @@ impl View {
 
     /// Draws over the picture before. What the terminal has no rows for is left out: a picture that scrolls cannot be
     /// drawn over.
-    fn draw(&mut self, now_ns: u64, told: Told, rows: Option<usize>) -> String {
+    fn draw(&mut self, now_ns: u64, losses: Losses, rows: Option<usize>) -> String {
         let passed_ns = now_ns.saturating_sub(self.shown_ns).max(1);
-        let picture = self.picture(told, passed_ns).expect("a string takes any text");
+        let picture = self.picture(losses, passed_ns).expect("a string takes any text");
         // The cursor stands below it.
         let most = rows.map_or(usize::MAX, |rows| rows - 1);
         let picture: Vec<_> = picture.split_inclusive('\n').take(most).collect();
@@ -139,7 +139,7 @@ impl View {
         format!("{up}{ERASE_BELOW}{CUT_LINES}{}{WRAP_LINES}", picture.concat())
     }
 
-    fn line(&self, told: Told) -> String {
+    fn line(&self, losses: Losses) -> String {
         let seen = &self.seen;
         let worst_ns = seen.controller.of_run_ns.max().max(seen.plant.of_run_ns.max());
         format!(
@@ -150,12 +150,12 @@ impl View {
             seen.error_mm.largest,
             worst_ns as f64 / 1e3,
             seen.missed(),
-            self.dropped(told),
+            self.dropped(losses),
         )
     }
 
     /// The picture; `passed_ns` since the last one.
-    fn picture(&self, told: Told, passed_ns: u64) -> Result<String, std::fmt::Error> {
+    fn picture(&self, losses: Losses, passed_ns: u64) -> Result<String, std::fmt::Error> {
         let Seen { state, controller, plant, error_mm, .. } = &self.seen;
         let mut text = String::new();
         writeln!(text, "  {:<13} {}  {}", self.controller(), self.motion(), self.progress())?;
@@ -164,7 +164,7 @@ impl View {
             "  cycle {:>8}   missed {}   {}",
             state.cycle,
             self.seen.missed(),
-            self.dropped(told)
+            self.dropped(losses)
         )?;
         writeln!(
             text,
@@ -206,7 +206,7 @@ impl View {
         })
     }
 
-    fn dropped(&self, Told { lost, live }: Told) -> String {
+    fn dropped(&self, Losses { lost, live }: Losses) -> String {
         let dropped = format!("dropped {}", self.seen.missing + lost);
         match live {
             Some(Watched { clients, dropped: unseen }) => {

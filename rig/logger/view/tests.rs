@@ -41,7 +41,7 @@ fn assert_says(text: &str, words: &[&str]) {
 
 #[test]
 fn the_line_says_state_error_and_losses() {
-    let line = view().line(Told { lost: 2, live: Some(Watched { clients: 1, dropped: 7 }) });
+    let line = view().line(Losses { lost: 2, live: Some(Watched { clients: 1, dropped: 7 }) });
     let expected = [
         "running",
         "motion    1.00 of 4.00 s",
@@ -57,7 +57,7 @@ fn the_line_says_state_error_and_losses() {
 #[test]
 fn the_picture_shows_progress_error_lateness_buses_and_drives() {
     let view = view();
-    let picture = view.picture(Told::default(), view.seen.busy_ns[1] * 4).unwrap();
+    let picture = view.picture(Losses::default(), view.seen.busy_ns[1] * 4).unwrap();
     let expected = [
         "25 %",
         "cycle       10",
@@ -76,29 +76,29 @@ fn the_picture_shows_progress_error_lateness_buses_and_drives() {
 fn drives_that_differ_are_told_apart() {
     let mut view = view();
     view.seen.reading.drive_state[5] = DriveCondition::Fault.code();
-    let picture = view.picture(Told::default(), 1).unwrap();
+    let picture = view.picture(Losses::default(), 1).unwrap();
     assert_says(&picture, &["l2 operation_enabled", "l3 fault"]);
 }
 
 #[test]
 fn a_picture_is_drawn_over_the_one_before_unless_words_stand_below_it() {
     let mut view = view();
-    let mut next = || view.next(PICTURE_NS, Told::default(), None);
+    let mut next = || view.next(PICTURE_NS, Losses::default(), None);
     let first = next();
     let lines = first.lines().count() - 1;
     assert!(first.starts_with(ERASE_BELOW));
     assert!(next().starts_with(&format!("\x1b[{lines}A{ERASE_BELOW}")));
     view.leave_picture();
-    assert!(view.next(PICTURE_NS, Told::default(), None).starts_with(ERASE_BELOW));
+    assert!(view.next(PICTURE_NS, Losses::default(), None).starts_with(ERASE_BELOW));
 }
 
 #[test]
 fn a_picture_leaves_out_what_the_terminal_has_no_rows_for() {
     let mut view = view();
-    let whole = view.next(PICTURE_NS, Told::default(), Some(100)).matches('\n').count();
+    let whole = view.next(PICTURE_NS, Losses::default(), Some(100)).matches('\n').count();
     assert!(whole > 10);
     for (rows, lines) in [(whole + 1, whole), (whole, whole - 1), (5, 4), (1, 0)] {
-        let picture = view.next(PICTURE_NS, Told::default(), Some(rows));
+        let picture = view.next(PICTURE_NS, Losses::default(), Some(rows));
         assert_eq!(picture.matches('\n').count(), lines, "{rows} rows");
     }
 }

@@ -5,11 +5,11 @@ use masseter_shared::messages::{Command, Machine, Reading, State};
 use serde::Serialize;
 
 use super::answer::{Answer, Answers};
-use super::around::{Around, Looks};
-use super::hops::{Hop, Usual};
+use super::cycle_path::{Computed, CyclePath, Parts, Sampled, Sent};
+use super::hops::{Hop, TypicalHops};
 use super::join::ByCycle;
+use super::kernel_counts::{KernelCounts, KernelLooks};
 use super::stalls::Stalls;
-use super::way::{Computed, Parts, Sampled, Sent, Way};
 
 /// Cycles told of.
 const WORST: usize = 10;
@@ -34,24 +34,24 @@ pub struct WorstCycle {
     pub stalled_ns: u64,
     /// What the kernel counted around it; none where nobody looked.
     #[serde(flatten)]
-    pub around: Around,
+    pub around: KernelCounts,
 }
 
-/// Follows every cycle and keeps the worst.
+/// Follows every cycle and keeps the longest.
 #[derive(Debug, Default)]
-pub(super) struct Ledger {
+pub(super) struct LongestCycles {
     samples: ByCycle<Sampled>,
     parts: ByCycle<Parts>,
-    usual: Usual,
-    worst: Vec<Way>,
-    looks: Looks,
+    typical: TypicalHops,
+    longest: Vec<CyclePath>,
+    looks: KernelLooks,
     plant_stalls: Stalls,
     controller_stalls: Stalls,
     last_cycle: Option<u64>,
     answers: Answers,
 }
 
-impl Ledger {
+impl LongestCycles {
     pub(super) fn reading(&mut self, reading: &Reading) {
         let late_ns = reading.woke_ns.saturating_sub(reading.due_ns);
         let stalled_ns = self.plant_stalls.when_due_ns(reading.stalled_ns, late_ns);
@@ -84,38 +84,38 @@ impl Ledger {
         self.looks.take(machine);
     }
 
-    /// Adds a part; the last one completes the way.
+    /// Adds a part; the last one completes the path.
     fn add(&mut self, cycle: u64, put: impl FnOnce(&mut Parts)) {
         let mut parts = self.parts.take(cycle).unwrap_or_default();
         put(&mut parts);
-        match self.way(cycle, &parts) {
-            Some(way) => self.keep(way),
+        match self.path(cycle, &parts) {
+            Some(path) => self.keep(path),
             None => self.parts.insert(cycle, parts),
         }
     }
 
-    fn way(&self, cycle: u64, parts: &Parts) -> Option<Way> {
+    fn path(&self, cycle: u64, parts: &Parts) -> Option<CyclePath> {
         let sampled = self.samples.get(parts.computed?.reading_cycle)?;
-        Way::of(cycle, &sampled, parts)
+        CyclePath::of(cycle, &sampled, parts)
     }
 
-    fn keep(&mut self, way: Way) {
-        self.usual.take(&way.hops_ns);
-        let place = self.worst.partition_point(|worse| worse.total_ns >= way.total_ns);
+    fn keep(&mut self, path: CyclePath) {
+        self.typical.take(&path.hops_ns);
+        let place = self.longest.partition_point(|worse| worse.total_ns >= path.total_ns);
         if place < WORST {
-            self.worst.insert(place, way);
-            self.worst.truncate(WORST);
+            self.longest.insert(place, path);
+            self.longest.truncate(WORST);
         }
     }
 
     /// The worst cycles, longest first.
     pub(super) fn finish(self) -> Vec<WorstCycle> {
-        self.worst.iter().map(|way| self.told(way)).collect()
+        self.longest.iter().map(|path| self.worst_cycle(path)).collect()
     }
 
-    fn told(&self, way: &Way) -> WorstCycle {
-        let Way { cycle, due_ns, total_ns, stalled_ns, .. } = *way;
-        let blamed = self.usual.blame(&way.hops_ns);
+    fn worst_cycle(&self, path: &CyclePath) -> WorstCycle {
+        let CyclePath { cycle, due_ns, total_ns, stalled_ns, .. } = *path;
+        let blamed = self.typical.blame(&path.hops_ns);
         WorstCycle {
             cycle,
             due_ns,
@@ -138,12 +138,12 @@ mod tests {
     const SYNC_NS: u64 = 48_000;
     const CONTROLLER_AT_NS: u64 = 540_000;
     /// The reading is there 90 µs before the controller wakes.
-    const USUAL_NS: HopTimes = [0, 360_000, 42_000, 0, 1_000, 2_000, 500, 500, 2_000, 280_000];
+    const TYPICAL_NS: HopTimes = [0, 360_000, 42_000, 0, 1_000, 2_000, 500, 500, 2_000, 280_000];
 
     /// Cycles as the time table has them.
     #[derive(Default)]
     struct Rig {
-        ledger: Ledger,
+        longest: LongestCycles,
         /// Command's cycle, reception and end.
         answer: [u64; 3],
         plant_stalled_ns: u64,
@@ -170,13 +170,13 @@ mod tests {
             };
             // Readings are drained first: the answer may be there before the state that explains it.
             let [answers_cycle, command_received_ns, command_sent_ns] = self.answer;
-            self.ledger.reading(&Reading { answers_cycle, command_received_ns, command_sent_ns, ..reading });
+            self.longest.reading(&Reading { answers_cycle, command_received_ns, command_sent_ns, ..reading });
 
             let woke_ns = due_ns + CONTROLLER_AT_NS + late;
             let received_ns = reading.published_ns.max(woke_ns) + pick_up;
             let commanded_ns = received_ns + solving + control;
             let published_ns = commanded_ns + publishing;
-            self.ledger.command(&Command { cycle, published_ns, ..Default::default() });
+            self.longest.command(&Command { cycle, published_ns, ..Default::default() });
             let state = State {
                 cycle,
                 reading_cycle: cycle,
@@ -188,7 +188,7 @@ mod tests {
                 stalled_ns: self.controller_stalled_ns,
                 ..Default::default()
             };
-            self.ledger.state(&state, true);
+            self.longest.state(&state, true);
             let plant_has_it_ns = published_ns + transport;
             self.answer = [cycle, plant_has_it_ns, plant_has_it_ns + to_wire];
         }
@@ -198,21 +198,21 @@ mod tests {
     fn of_the_worst_cycles_the_hop_that_took_unusually_long_is_to_blame_and_no_other() {
         let mut rig = Rig::default();
         for cycle in 1..100 {
-            let mut hops_ns = USUAL_NS;
+            let mut hops_ns = TYPICAL_NS;
             // Every ninth cycle, one hop after the other; the later ones a little longer.
             if cycle % 9 == 0 && cycle / 9 <= Hop::ALL.len() as u64 {
                 hops_ns[cycle as usize / 9 - 1] += 200_000 + cycle * 1000;
             }
             rig.cycle(cycle, hops_ns);
         }
-        let worst = rig.ledger.finish();
+        let worst = rig.longest.finish();
         assert_eq!(worst.len(), WORST);
         assert!(worst.windows(2).all(|pair| pair[0].total_ns >= pair[1].total_ns));
         for told in worst {
             let hop = told.cycle as usize / 9 - 1;
-            let expected = (Hop::ALL[hop], USUAL_NS[hop] + 200_000 + told.cycle * 1000);
+            let expected = (Hop::ALL[hop], TYPICAL_NS[hop] + 200_000 + told.cycle * 1000);
             assert_eq!((told.hop, told.hop_ns), expected, "cycle {}", told.cycle);
-            assert!(told.hop_p50_ns.abs_diff(USUAL_NS[hop]) <= USUAL_NS[hop] / 500, "{told:?}");
+            assert!(told.hop_p50_ns.abs_diff(TYPICAL_NS[hop]) <= TYPICAL_NS[hop] / 500, "{told:?}");
         }
     }
 
@@ -220,7 +220,7 @@ mod tests {
     fn what_a_process_lost_before_its_next_wake_up_is_told_of_the_cycle_that_it_made_long() {
         let mut rig = Rig::default();
         for cycle in 1..20 {
-            let mut hops_ns = USUAL_NS;
+            let mut hops_ns = TYPICAL_NS;
             match cycle {
                 5 => hops_ns[8] += 300_000,
                 // Counters are read in the next wake-up.
@@ -237,21 +237,21 @@ mod tests {
             rig.cycle(cycle, hops_ns);
         }
         let told: Vec<_> =
-            rig.ledger.finish().iter().map(|worst| (worst.cycle, worst.stalled_ns)).take(4).collect();
+            rig.longest.finish().iter().map(|worst| (worst.cycle, worst.stalled_ns)).take(4).collect();
         assert_eq!(told, [(5, 300_000), (10, 200_000), (15, 250_000), (1, 0)]);
     }
 
     #[test]
     fn a_cycle_that_used_a_late_reading_is_among_the_longest() {
-        let mut ledger = Ledger::default();
+        let mut longest = LongestCycles::default();
         let late = Reading { cycle: 7, due_ns: 7_000_000, complete_ns: 7_900_000, ..Default::default() };
-        ledger.reading(&late);
-        ledger.state(&State { cycle: 8, reading_cycle: 7, ..Default::default() }, true);
-        ledger.command(&Command { cycle: 8, ..Default::default() });
+        longest.reading(&late);
+        longest.state(&State { cycle: 8, reading_cycle: 7, ..Default::default() }, true);
+        longest.command(&Command { cycle: 8, ..Default::default() });
         let (answers_cycle, command_sent_ns) = (8, 8_900_000);
-        ledger.reading(&Reading { cycle: 9, answers_cycle, command_sent_ns, ..Default::default() });
-        ledger.state(&State { cycle: 9, reading_cycle: 7, ..Default::default() }, false);
-        let worst = ledger.finish();
+        longest.reading(&Reading { cycle: 9, answers_cycle, command_sent_ns, ..Default::default() });
+        longest.state(&State { cycle: 9, reading_cycle: 7, ..Default::default() }, false);
+        let worst = longest.finish();
         assert_eq!((worst[0].cycle, worst[0].due_ns, worst[0].total_ns), (8, 7_000_000, 1_900_000));
     }
 }

@@ -5,7 +5,7 @@ use serde::Serialize;
 
 /// What the kernel counted between the looks before and after a cycle.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
-pub struct Around {
+pub struct KernelCounts {
     /// From one look to the other, ns.
     pub looked_over_ns: Option<u64>,
     /// Time that the hypervisor took from all cores meanwhile, as far as it tells, ns.
@@ -16,7 +16,7 @@ pub struct Around {
     pub page_faults: Option<u64>,
 }
 
-impl Around {
+impl KernelCounts {
     fn between(before: &Machine, after: &Machine) -> Self {
         let more = |of: fn(&Machine) -> u64| Some(of(after).saturating_sub(of(before)));
         Self {
@@ -30,20 +30,20 @@ impl Around {
 
 /// All looks of a run.
 #[derive(Debug, Default)]
-pub(super) struct Looks(Vec<Machine>);
+pub(super) struct KernelLooks(Vec<Machine>);
 
-impl Looks {
+impl KernelLooks {
     pub(super) fn take(&mut self, look: &Machine) {
         self.0.push(*look);
     }
 
     /// What was counted between the last look before a stretch of time and the first behind it.
-    pub(super) fn around(&self, from_ns: u64, to_ns: u64) -> Around {
+    pub(super) fn around(&self, from_ns: u64, to_ns: u64) -> KernelCounts {
         let before = self.0.partition_point(|look| look.time_ns <= from_ns);
         let after = self.0.partition_point(|look| look.time_ns < to_ns);
         match (before.checked_sub(1), self.0.get(after)) {
-            (Some(before), Some(after)) => Around::between(&self.0[before], after),
-            _ => Around::default(),
+            (Some(before), Some(after)) => KernelCounts::between(&self.0[before], after),
+            _ => KernelCounts::default(),
         }
     }
 }
@@ -54,12 +54,12 @@ mod tests {
 
     #[test]
     fn what_was_counted_is_that_between_the_looks_before_and_behind() {
-        let mut looks = Looks::default();
+        let mut looks = KernelLooks::default();
         for (time_ns, stolen_ns, switches) in [(0, 0, 1), (50, 3_000, 3), (100, 3_000, 3)] {
             let involuntary_switches = [switches, 0];
             looks.take(&Machine { time_ns, stolen_ns, involuntary_switches, ..Default::default() });
         }
-        let told = |stolen_ns, switches| Around {
+        let told = |stolen_ns, switches| KernelCounts {
             looked_over_ns: Some(50),
             stolen_ns: Some(stolen_ns),
             involuntary_switches: Some(switches),
@@ -67,6 +67,6 @@ mod tests {
         };
         assert_eq!(looks.around(40, 41), told(3_000, 2));
         assert_eq!(looks.around(70, 71), told(0, 0));
-        assert_eq!(looks.around(100, 101), Around::default());
+        assert_eq!(looks.around(100, 101), KernelCounts::default());
     }
 }

@@ -1,4 +1,4 @@
-//! A cycle's way from the plant's deadline to the command on the wire, put together from the messages that tell of it.
+//! A cycle's path from the plant's deadline to the command on the wire, put together from the messages that tell of it.
 
 use masseter_shared::messages::{Reading, State};
 
@@ -62,9 +62,9 @@ pub(super) struct Parts {
     pub(super) stalled_when_next_due_ns: Option<u64>,
 }
 
-/// The whole way.
+/// The whole path.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Way {
+pub(super) struct CyclePath {
     /// The controller's cycle.
     pub(super) cycle: u64,
     pub(super) due_ns: u64,
@@ -73,7 +73,7 @@ pub(super) struct Way {
     pub(super) stalled_ns: u64,
 }
 
-impl Way {
+impl CyclePath {
     /// None while a part is missing.
     pub(super) fn of(cycle: u64, sampled: &Sampled, parts: &Parts) -> Option<Self> {
         let (computed, sent) = (parts.computed?, parts.sent?);
