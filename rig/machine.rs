@@ -1,5 +1,6 @@
 //! What the kernel tells of the machine in `/proc` and `/sys`, read below a root that tests can choose.
 
+pub(crate) mod counters;
 mod hypervisor;
 
 use std::fs;

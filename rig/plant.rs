@@ -1,16 +1,44 @@
 //! `masseter plant`: the emulated drives on real interfaces; or, for the supervisor, the plant's process.
 
+use std::path::PathBuf;
+
 use anyhow::{Context, bail};
+use clap::Args;
 use masseter_plant::emulator::{Emulator, Figures};
 use masseter_plant::process::{self, Reason};
 use masseter_shared::clock;
 use masseter_shared::config::Scenario;
-use masseter_shared::lifecycle::StopRequest;
+use masseter_shared::lifecycle::{Assignment, StopRequest};
 use masseter_shared::realtime::scheduling::{Wanted, obtain};
 
-use crate::cli::PlantArgs;
 use crate::exit::Exit;
+use crate::run::args::{Wires, parse_wires};
 use crate::scenario;
+
+/// What `plant` takes.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct PlantArgs {
+    /// Scenario file with the drives and the mechanism; without one, the published mechanism
+    #[arg(value_name = "SCENARIO")]
+    file: Option<PathBuf>,
+    /// The real interface of each bus, such as can0,can1
+    #[arg(long, value_name = "IF[,IF]", value_parser = parse_wires)]
+    can: Option<Wires>,
+    /// Put the emulated drives on the interfaces, until Ctrl-C
+    #[arg(long)]
+    emulate: bool,
+    #[arg(long, hide = true, requires = "domain")]
+    scenario: Option<PathBuf>,
+    #[arg(long, hide = true, requires = "scenario")]
+    domain: Option<String>,
+}
+
+impl PlantArgs {
+    /// What the supervisor started the plant with, if it was the supervisor.
+    fn assignment(&self) -> Option<Assignment> {
+        Some(Assignment { scenario: self.scenario.clone()?, domain: self.domain.clone()? })
+    }
+}
 
 /// Runs the plant until it is asked to end. As the supervisor's process, it also ends by a safe stop for want of a
 /// controller.

@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use super::on_core;
 use crate::machine::SystemRoot;
-use crate::run::counters::stolen_ns;
+use crate::machine::counters::stolen_ns;
 
 /// Above this share of time stolen or stood still, tails are the machine's, %.
 const BOUND_PERCENT: f64 = 1.0;

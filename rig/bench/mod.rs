@@ -60,7 +60,7 @@ pub struct BenchArgs {
     #[arg(long, default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=1000))]
     rounds: u32,
     /// Cores of the two sides
-    #[arg(long, value_name = "N,N", value_parser = crate::cli::parse_cores, default_value = "0,1")]
+    #[arg(long, value_name = "N,N", value_parser = crate::run::args::parse_cores, default_value = "0,1")]
     cores: [usize; 2],
     /// Writes results, HdrHistogram logs and plots there
     #[arg(long, value_name = "DIR")]

@@ -16,12 +16,11 @@ use super::contender::{Durations, Round, durations, record};
 use super::contest::{Outcome, Turn};
 use super::on_core;
 use crate::run::dma_latency::Hold;
+use crate::run::supervisor::OFF_TICK_NS;
 
 const PERIOD_NS: u64 = SECOND_NS / 1000;
 /// Wake-ups a round.
 const WAKE_UPS: u64 = 10_000;
-/// As in a run, deadlines keep off whole milliseconds, ns.
-const OFF_TICK_NS: u64 = 230_000;
 /// A wake-up later than this is an outlier, ns.
 const OUTLIER_NS: u64 = 50_000;
 /// Highest lateness in cyclictest's histogram, µs.

@@ -5,6 +5,6 @@ mod describe;
 mod plan;
 mod serve;
 
-pub(crate) use describe::{dbc, eds};
+pub(crate) use describe::{EdsArgs, dbc, eds};
 pub(crate) use plan::{PlanArgs, plan};
 pub(crate) use serve::{ServeArgs, serve};

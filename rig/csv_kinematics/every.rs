@@ -5,8 +5,7 @@ use masseter_shared::geometry::{Actuators, LEGS, Mechanism};
 use masseter_shared::messages::pose_fields;
 
 use super::forward::COLUMNS_IN;
-use super::table::{Columns, Lines, convert};
-use crate::cli::CsvArgs;
+use super::table::{Columns, CsvArgs, Lines, convert};
 use crate::exit::Exit;
 
 /// `line` is the input's line. Conditions are 1 where they hold and 0 where not; `separation_rad` is

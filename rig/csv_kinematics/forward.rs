@@ -1,12 +1,12 @@
 //! `masseter fk`: actuator coordinates to poses.
 
+use clap::{Args, ValueEnum};
 use masseter_controller::kinematics::{ForwardError, ForwardTracker, Method, Options, Solution, solve};
 use masseter_shared::geometry::{Actuators, LEGS, Mechanism, StrokeLimits};
 use masseter_shared::messages::pose_fields;
 
 use super::every;
-use super::table::{Columns, Lines, convert, convert_in_turn, mechanism};
-use crate::cli::{FkArgs, Solver};
+use super::table::{Columns, CsvArgs, Lines, convert, convert_in_turn, mechanism};
 use crate::exit::Exit;
 
 pub(super) const COLUMNS_IN: [&str; 6] = ["d1_m", "d2_m", "d3_m", "l1_m", "l2_m", "l3_m"];
@@ -26,6 +26,38 @@ const COLUMNS_OUT: [&str; 12] = [
 ];
 /// Where the seed's and Newton's iteration start if nobody says: the seed's neutral pose.
 const NEUTRAL_RAD: [f64; LEGS] = [1.46; LEGS];
+
+/// What `fk` takes.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct FkArgs {
+    #[command(flatten)]
+    csv: CsvArgs,
+    /// Which iteration: the controller's certified one, the paper's, or Newton-Raphson
+    #[arg(long, value_enum, default_value_t)]
+    solver: Solver,
+    /// Leg angles to start every line from, with --continuous the first, radians [default: the paper's neutral pose,
+    /// 1.46 each; the controller's solver needs none]
+    #[arg(long, value_name = "RAD,RAD,RAD", value_parser = parse_guess, allow_hyphen_values = true)]
+    guess: Option<[f64; 3]>,
+    /// Start each line from the solution of the one before; takes one core only
+    #[arg(long)]
+    continuous: bool,
+    /// Every solution of every line, a line each, with the conditions it meets
+    #[arg(long, conflicts_with_all = ["solver", "guess", "continuous"])]
+    all: bool,
+}
+
+/// Which forward solver.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
+enum Solver {
+    /// The certified one of the control loop: the true solution, or the reason why there is none.
+    #[default]
+    Controller,
+    /// The paper's: some solution, from the guess.
+    Published,
+    /// Newton-Raphson: some solution, from the guess.
+    Newton,
+}
 
 /// Status `ok`, `outside_stroke`, or the reason of [`ForwardError`]. The seed's and Newton's iteration
 /// may come to a solution at which the mechanism cannot stand; its status is then `wrong_assembly`,
@@ -108,4 +140,12 @@ fn row(solution: &Solution) -> [f64; 12] {
     let ([x, y, z], [qw, qx, qy, qz]) = pose_fields(&solution.pose);
     let [t1, t2, t3] = solution.theta_rad;
     [x, y, z, qw, qx, qy, qz, t1, t2, t3, f64::from(solution.iterations), solution.residual_m]
+}
+
+fn parse_guess(text: &str) -> Result<[f64; 3], String> {
+    let angles: Result<Vec<f64>, _> = text.split(',').map(|angle| angle.trim().parse()).collect();
+    match angles.as_deref() {
+        Ok(&[t1, t2, t3]) if t1.is_finite() && t2.is_finite() && t3.is_finite() => Ok([t1, t2, t3]),
+        _ => Err("give three leg angles in radians, such as 1.4,1.5,1.4".to_owned()),
+    }
 }

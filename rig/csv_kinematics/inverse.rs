@@ -4,8 +4,7 @@ use masseter_controller::kinematics::Assembly;
 use masseter_shared::geometry::{InverseError, Joints, Mechanism, Pose};
 use masseter_shared::messages::pose_of_fields;
 
-use super::table::{Columns, Lines, convert, mechanism};
-use crate::cli::CsvArgs;
+use super::table::{Columns, CsvArgs, Lines, convert, mechanism};
 use crate::exit::Exit;
 
 /// How far a quaternion's norm may be from 1.

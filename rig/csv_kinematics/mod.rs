@@ -10,5 +10,6 @@ mod input;
 mod inverse;
 mod table;
 
-pub(crate) use forward::forward;
+pub(crate) use forward::{FkArgs, forward};
 pub(crate) use inverse::inverse;
+pub(crate) use table::CsvArgs;

@@ -4,13 +4,14 @@
 //! however long the input is. What is computed from a line is not known here.
 
 use std::io::{self, Write};
+use std::path::PathBuf;
 
 use anyhow::{anyhow, bail};
+use clap::Args;
 use masseter_shared::geometry::Mechanism;
 use rayon::prelude::*;
 
 use super::input::{Input, Line};
-use crate::cli::CsvArgs;
 use crate::exit::Exit;
 use crate::say::taken;
 use crate::scenario;
@@ -21,6 +22,17 @@ const BAD_LINE: &str = "bad_line";
 const BATCH_LINES: usize = 16_384;
 /// Lines that one core takes at a time.
 const CHUNK_LINES: usize = 256;
+
+/// CSV in, CSV out.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct CsvArgs {
+    /// CSV file to read [default: standard input]
+    #[arg(long, value_name = "FILE.csv")]
+    input: Option<PathBuf>,
+    /// Scenario whose mechanism is meant [default: the published one]
+    #[arg(long, value_name = "SCENARIO.toml")]
+    scenario: Option<PathBuf>,
+}
 
 /// The columns of a command, without the status that ends every output line.
 #[derive(Debug, Clone, Copy)]

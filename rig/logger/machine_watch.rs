@@ -3,7 +3,7 @@
 use masseter_shared::messages::{LAYOUT_VERSION, Machine};
 
 use crate::machine::SystemRoot;
-use crate::run::counters::{ProcessCounters, stolen_ns};
+use crate::machine::counters::{ProcessCounters, stolen_ns};
 
 /// From one look to the next, ns.
 const EVERY_NS: u64 = 100_000_000;

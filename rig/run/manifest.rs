@@ -10,12 +10,12 @@ use masseter_shared::config::Scenario;
 use masseter_shared::realtime::scheduling::{Obtained, allowed_cores};
 use serde::{Deserialize, Serialize};
 
+use super::args::ClockKind;
 use super::dma_latency::DmaLatency;
 use super::ending::Ending;
 use super::folder::RunFolder;
 use super::plan::Plan;
 use super::usage::RunUsage;
-use crate::cli::ClockKind;
 use crate::machine::SystemRoot;
 
 /// Version of the manifest's form.

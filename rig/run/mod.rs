@@ -3,8 +3,8 @@
 //! [`plan`] refuses whatever cannot run before anything starts; then [`supervisor`] runs the three
 //! processes, or [`virtual_time`] their cores; then the recording is analysed and the run judged.
 
+pub mod args;
 pub mod child;
-pub(crate) mod counters;
 pub mod dma_latency;
 pub mod ending;
 pub mod folder;
@@ -18,9 +18,9 @@ pub mod virtual_time;
 use anyhow::Context;
 
 use crate::analysis;
-use crate::cli::{ClockKind, RunArgs};
 use crate::exit::{Exit, Failure, OrFailure};
 use crate::report;
+use args::{ClockKind, RunArgs};
 use ending::Ending;
 use folder::RunFolder;
 use manifest::Manifest;

@@ -10,7 +10,7 @@ use masseter_shared::config::{FileConfig, MotionConfig, Scenario};
 use masseter_shared::geometry::Mechanism;
 use masseter_shared::schedule::CycleSchedule;
 
-use crate::cli::{ClockKind, RunArgs};
+use super::args::{ClockKind, RunArgs};
 use crate::live;
 use crate::scenario;
 

@@ -17,6 +17,7 @@ use masseter_shared::lifecycle::Start;
 use masseter_shared::realtime::scheduling::Obtained;
 use masseter_shared::transport::{Claim, Domain, DomainError};
 
+use super::args::RunArgs;
 use super::child::{ChildError, Process, Role};
 use super::dma_latency::{self, DmaLatency};
 use super::ending::{Ending, died, of_all, of_the_others};
@@ -25,7 +26,6 @@ use super::interrupts::Interrupts;
 use super::plan::Plan;
 use super::usage::{Meter, RunUsage};
 use crate::clean::sweep_dead;
-use crate::cli::RunArgs;
 use crate::exit::{Exit, Failure, OrFailure};
 use crate::machine::SystemRoot;
 
@@ -37,7 +37,7 @@ const HEARD_WITHIN: Duration = Duration::from_millis(100);
 const LEAD_NS: u64 = 100_000_000;
 /// SYNC and the controller's deadline keep this clear of whole milliseconds, where the kernel's timer
 /// tick falls, ns.
-const OFF_TICK_NS: u64 = 230_000;
+pub(crate) const OFF_TICK_NS: u64 = 230_000;
 /// How long a process may take to end when asked to, beyond what it has to do first.
 const END_WITHIN_NS: u64 = 5 * SECOND_NS;
 /// How long the logger may take to write what is left: as long as a slow disk needs, ns.

@@ -9,8 +9,8 @@ use std::collections::BTreeMap;
 use masseter_shared::clock::{self, SECOND_NS};
 use serde::{Deserialize, Serialize};
 
-use super::counters::{ProcessCounters, stolen_ns};
 use crate::machine::SystemRoot;
+use crate::machine::counters::{ProcessCounters, stolen_ns};
 
 /// From one look to the next, ns.
 const EVERY_NS: u64 = SECOND_NS / 2;

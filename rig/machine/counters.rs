@@ -1,6 +1,6 @@
 //! What the kernel counts of a process and of the machine, from outside.
 
-use crate::machine::SystemRoot;
+use super::SystemRoot;
 
 /// `/proc/stat` counts in hundredths of a second (USER_HZ) on every platform of the rig.
 const TICK_NS: u64 = 10_000_000;

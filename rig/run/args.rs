@@ -1,0 +1,95 @@
+//! What `masseter run` takes. What it comes to, [`plan`](super::plan) says.
+
+use std::net::SocketAddr;
+use std::path::PathBuf;
+use std::time::Duration;
+
+use clap::{Args, ValueEnum};
+
+use crate::cli::Format;
+use crate::live;
+
+/// What `run` takes.
+#[derive(Debug, Clone, Default, Args)]
+pub struct RunArgs {
+    /// Scenario file; without one, ten seconds of chewing
+    pub scenario: Option<PathBuf>,
+    /// Recorded jaw motion (CSV) to play instead of the scenario's motion
+    #[arg(long, value_name = "FILE.csv")]
+    pub trajectory: Option<PathBuf>,
+    /// How long the motion lasts, such as 10s or 2min
+    #[arg(long, value_parser = humantime::parse_duration)]
+    pub duration: Option<Duration>,
+    /// Cycles per second
+    #[arg(long)]
+    pub rate_hz: Option<u32>,
+    /// Real time in three processes, or virtual time in one thread
+    #[arg(long, value_enum, default_value_t)]
+    pub clock: ClockKind,
+    /// Simulated buses, or the real interface of each, such as can0,can1
+    #[arg(long, value_name = "virtual|IF[,IF]", value_parser = parse_wires)]
+    pub can: Option<Wires>,
+    /// Cores of controller and plant
+    #[arg(long, value_name = "N,N", value_parser = parse_cores)]
+    pub cores: Option<[usize; 2]>,
+    /// Seed of every random number
+    #[arg(long)]
+    pub seed: Option<u64>,
+    /// The run folder; must not exist [default: runs/UTC_TIME-NAME]
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Name of this rig, which no other running one may have [default: one that none has]
+    #[arg(long)]
+    pub name: Option<String>,
+    /// How the result is written to standard output
+    #[arg(long, value_enum, default_value_t)]
+    pub format: Format,
+    /// Exit with 3 unless core, SCHED_FIFO, locked memory and, where it is to be held, /dev/cpu_dma_latency are granted
+    #[arg(long)]
+    pub require_rt: bool,
+    /// Show the run live to Foxglove over a WebSocket, to this machine only unless an address is given
+    #[arg(
+        long,
+        value_name = "ADDR:PORT",
+        num_args = 0..=1,
+        require_equals = true,
+        default_missing_value = live::DEFAULT_ADDRESS
+    )]
+    pub live: Option<SocketAddr>,
+    /// Show no progress
+    #[arg(long)]
+    pub quiet: bool,
+}
+
+/// Which time a run lives in.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
+pub enum ClockKind {
+    /// Real time.
+    #[default]
+    Rt,
+    /// Virtual time: as fast as it goes, the same bytes every time.
+    Virtual,
+}
+
+/// What the buses run on: real interfaces, or none for simulated buses.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Wires(pub Vec<String>);
+
+pub(crate) fn parse_cores(text: &str) -> Result<[usize; 2], String> {
+    let cores: Result<Vec<usize>, _> = text.split(',').map(|core| core.trim().parse()).collect();
+    match cores.as_deref() {
+        Ok([controller, plant]) => Ok([*controller, *plant]),
+        _ => Err("give two cores, such as 0,1".to_owned()),
+    }
+}
+
+pub(crate) fn parse_wires(text: &str) -> Result<Wires, String> {
+    if text == "virtual" {
+        return Ok(Wires(Vec::new()));
+    }
+    let names: Vec<_> = text.split(',').map(|name| name.trim().to_owned()).collect();
+    if names.iter().any(String::is_empty) {
+        return Err("give `virtual`, or interfaces such as can0,can1".to_owned());
+    }
+    Ok(Wires(names))
+}
