@@ -17,7 +17,7 @@ pub enum Exit {
     Died = 4,
     /// An unexpected safe stop.
     SafeStop = 5,
-    /// The recording is incomplete.
+    /// The recording is incomplete, or the run folder took no more.
     Incomplete = 6,
     /// Interrupted by the user.
     Interrupted = 130,

@@ -38,9 +38,9 @@ fn play(plan: &Plan, folder: &RunFolder, interrupts: &Interrupts) -> anyhow::Res
     let mut log = Log::new(Backlog::start(Recorder::create(&folder.recording(), scene)?, Pace::Virtual));
 
     let (mut cycle, mut plant_error) = (0, None);
-    while plant_error.is_none() && !controller.is_done() && log.is_safe() && !interrupts.insist() {
+    while plant_error.is_none() && !controller.is_done() && log.is_safe() && !interrupts.is_end_insisted() {
         cycle += 1;
-        if interrupts.ask() {
+        if interrupts.is_stop_asked() {
             controller.request_stop();
         }
         let sync_ns = EPOCH_NS + (cycle - 1) * scenario.period_ns();
@@ -53,7 +53,7 @@ fn play(plan: &Plan, folder: &RunFolder, interrupts: &Interrupts) -> anyhow::Res
     Ok(match (plant_error, controller.state()) {
         (Some(error), _) => Ending::died(Role::Plant.name(), error.to_string()),
         _ if loss.is_some() => Ending::RecordingFailed,
-        _ if interrupts.ask() => Ending::Interrupted,
+        _ if interrupts.is_stop_asked() => Ending::Interrupted,
         (None, ControllerState::SafeStop) => Ending::SafeStop,
         (None, _) => Ending::Completed,
     })

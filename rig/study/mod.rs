@@ -27,7 +27,7 @@ use masseter_shared::config::Scenario;
 use masseter_shared::geometry::{Mechanism, MechanismConfig, Vec3};
 use rayon::prelude::*;
 
-use crate::cli::RunArgs;
+use crate::run::args::RunArgs;
 use crate::exit::Exit;
 use crate::output;
 use crate::run::plan;
