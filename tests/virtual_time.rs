@@ -4,9 +4,7 @@ mod common;
 
 use std::fs;
 
-use common::{
-    Workspace, cramped, jaw_recording, json, start, stderr, stdout, wait_until_it_records,
-};
+use common::{Workspace, cramped, jaw_recording, json, stderr, stdout, wait_until_it_records};
 use rustix::process::{Pid, Signal, kill_process};
 use serde_json::json;
 
@@ -106,7 +104,7 @@ fn what_is_wanted_at_a_time_of_the_motion_is_the_recordings_sample_of_that_time(
     let rows: String = (0..=200).map(row).collect();
     let workspace = Workspace::new("[motion]\nkind = 'file'\npath = 'jaw.csv'\nlowpass_hz = 0.0");
     workspace.write("jaw.csv", &format!("time_s,x_mm,y_mm,z_mm,qw,qx,qy,qz\n{rows}"));
-    assert_eq!(workspace.run(&["--clock", "virtual"]).status.code(), Some(0));
+    assert_eq!(workspace.run_virtual(&[]).status.code(), Some(0));
     let (run, out) = (workspace.run_folder(), workspace.file("csv"));
     let [run, out] = [&run, &out].map(|path| path.to_str().unwrap());
     common::masseter(&["log", "export", run, "--topic", "state", "--out", out]);
@@ -146,7 +144,7 @@ fn markers_whose_centroid_stands_for_the_incisal_point_are_told_of_once_the_jaw_
         let workspace = Workspace::new(&format!("[motion]\nkind = 'file'\npath = 'm.csv'\n{key}"));
         let rows: String = (0..=160).map(|i| row(i, largest_deg)).collect();
         workspace.write("m.csv", &format!("{columns}\n{rows}"));
-        let output = workspace.run(&["--clock", "virtual"]);
+        let output = workspace.run_virtual(&[]);
         assert_eq!(output.status.code(), Some(0), "{}{}", stdout(&output), stderr(&output));
         let told = "the jaw turns by up to 3.0°, and the markers' centroid stands for the incisal point; \
                     set motion.marker_origin_mm";
@@ -189,7 +187,7 @@ fn a_plant_that_fails_is_a_death_as_in_real_time_and_is_told_again() {
 fn an_interrupt_ends_a_run_in_order_as_in_real_time() {
     for signal in [Signal::INT, Signal::TERM] {
         let workspace = Workspace::new("duration_s = 60.0");
-        let child = start(&workspace, &["--clock", "virtual"]);
+        let child = workspace.start_virtual();
         wait_until_it_records(&workspace);
         kill_process(Pid::from_child(&child), signal).unwrap();
         let output = child.wait_with_output().unwrap();

@@ -27,9 +27,9 @@ use masseter_shared::config::Scenario;
 use masseter_shared::geometry::{Mechanism, MechanismConfig, Vec3};
 use rayon::prelude::*;
 
-use crate::run::args::RunArgs;
 use crate::exit::Exit;
 use crate::output;
+use crate::run::args::RunArgs;
 use crate::run::plan;
 use basins::Basins;
 use motions::Motion;

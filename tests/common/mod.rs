@@ -112,6 +112,12 @@ impl Workspace {
         command.args(["--clock", "virtual"]).output().expect("masseter starts")
     }
 
+    /// Starts a run under virtual time.
+    pub(crate) fn start_virtual(&self) -> Child {
+        let mut command = self.masseter_run(&["--clock", "virtual"]);
+        command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("masseter starts")
+    }
+
     pub(crate) fn run_folder(&self) -> PathBuf {
         self.file("run")
     }
