@@ -1,8 +1,24 @@
-//! A connection that cannot be made. Alone in its file: the limit that refuses it is the whole process's.
+//! Connections that cannot be made. Alone in its file: the limit that refuses them is the whole process's.
 
-use masseter_shared::messages::Event;
-use masseter_shared::transport::{Domain, Node};
+use masseter_shared::messages::{Event, FrameTap};
+use masseter_shared::transport::{Domain, Node, TransportError};
 use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
+
+/// What `connect` says where no file may be opened.
+fn refused<T>(connect: impl FnOnce() -> Result<T, TransportError>) -> String {
+    let before = getrlimit(Resource::Nofile);
+    setrlimit(Resource::Nofile, Rlimit { current: Some(0), ..before }).unwrap();
+    let result = connect();
+    setrlimit(Resource::Nofile, before).unwrap();
+    result.err().map_or_else(String::new, |error| error.to_string())
+}
+
+fn assert_tells(told: &str, topic: &str) {
+    assert!(
+        told.contains(&format!("connecting '{topic}' failed")) && told.contains("masseter doctor"),
+        "{told}"
+    );
+}
 
 #[test]
 fn a_connection_that_is_refused_is_told_of() {
@@ -12,12 +28,21 @@ fn a_connection_that_is_refused_is_told_of() {
         let node = Node::join(&domain).unwrap();
         let outlet = node.outlet::<Event>().unwrap();
         let _inlet = node.inlet::<Event>().unwrap();
-        let before = getrlimit(Resource::Nofile);
-        setrlimit(Resource::Nofile, Rlimit { current: Some(0), ..before }).unwrap();
-        let refused = outlet.connect();
-        setrlimit(Resource::Nofile, before).unwrap();
-        let told = refused.unwrap_err().to_string();
-        assert!(told.contains("connecting 'event' failed") && told.contains("masseter doctor"), "{told}");
+        assert_tells(&refused(|| outlet.connect()), "event");
+    }
+    {
+        let node = Node::join(&domain).unwrap();
+        let inlet = node.inlet::<Event>().unwrap();
+        let mut outlet = node.outlet::<Event>().unwrap();
+        assert_tells(&refused(|| inlet.receive()), "event");
+        outlet.publish(|_| {}).unwrap();
+        assert_tells(&inlet.receive().unwrap_err().to_string(), "event");
+    }
+    {
+        let node = Node::join(&domain).unwrap();
+        let inlet = node.batch_inlet::<FrameTap>().unwrap();
+        let _outlet = node.batch_outlet::<FrameTap>().unwrap();
+        assert_tells(&refused(|| inlet.receive()), "frame");
     }
     drop(claim);
     domain.sweep().unwrap();

@@ -11,7 +11,7 @@ use iceoryx2::prelude::{AllocationStrategy, ipc};
 use iceoryx2::sample::Sample;
 use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
 
-use super::ports::{MAX_HELD, MAX_PUBLISHERS, MAX_SUBSCRIBERS, Node, Refused, TransportError, failed};
+use super::ports::{Node, Refused, TransportError, failed};
 use crate::clock;
 use crate::messages::Message;
 
@@ -20,16 +20,8 @@ const BATCH: usize = 16;
 
 impl Node {
     fn batch_service<M: Message>(&self) -> Result<PortFactory<ipc::Service, [M], ()>, TransportError> {
-        self.iceoryx()
-            .service_builder(&M::TOPIC.try_into().map_err(failed("opening topic", M::TOPIC))?)
-            .publish_subscribe::<[M]>()
-            .enable_safe_overflow(true)
-            .max_publishers(MAX_PUBLISHERS)
-            .max_subscribers(MAX_SUBSCRIBERS)
-            .subscriber_max_buffer_size(M::DEPTH / BATCH)
-            .subscriber_max_borrowed_samples(MAX_HELD)
-            .open_or_create()
-            .map_err(failed("opening topic", M::TOPIC))
+        let builder = self.topic::<M, [M]>(M::DEPTH / BATCH)?;
+        builder.open_or_create().map_err(failed("opening topic", M::TOPIC))
     }
 
     /// The publishing end of a topic that travels in batches.
@@ -50,9 +42,14 @@ impl Node {
     /// The receiving end of a topic that travels in batches; it keeps up to [`Message::DEPTH`] messages, less
     /// where batches are not full.
     pub fn batch_inlet<M: Message>(&self) -> Result<BatchInlet<M>, TransportError> {
-        let service = self.batch_service::<M>()?;
-        let subscriber = service.subscriber_builder().create().map_err(failed("subscribing to", M::TOPIC))?;
-        Ok(BatchInlet { subscriber })
+        let refused = Refused::default();
+        let subscriber = self
+            .batch_service::<M>()?
+            .subscriber_builder()
+            .set_degradation_handler(refused.counter())
+            .create()
+            .map_err(failed("subscribing to", M::TOPIC))?;
+        Ok(BatchInlet { subscriber, refused })
     }
 }
 
@@ -99,6 +96,7 @@ impl<M: Message> BatchOutlet<M> {
 #[derive(Debug)]
 pub struct BatchInlet<M: Message> {
     subscriber: Subscriber<ipc::Service, [M], ()>,
+    refused: Refused,
 }
 
 /// Messages still lying in shared memory.
@@ -114,9 +112,10 @@ impl<M: Message> Deref for ReceivedBatch<M> {
 }
 
 impl<M: Message> BatchInlet<M> {
-    /// The oldest batch not yet received; never waits.
+    /// The oldest batch not yet received, as [`Inlet::receive`](super::Inlet::receive).
     pub fn receive(&self) -> Result<Option<ReceivedBatch<M>>, TransportError> {
         let sample = self.subscriber.receive().map_err(failed("receiving", M::TOPIC))?;
+        self.refused.check(M::TOPIC)?;
         Ok(sample.map(ReceivedBatch))
     }
 }

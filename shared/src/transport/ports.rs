@@ -1,5 +1,6 @@
 //! Typed ends of the topics: [`Outlet`] publishes, [`Inlet`] receives.
 
+use std::fmt::Debug;
 use std::ops::Deref;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -11,8 +12,9 @@ use iceoryx2::port::publisher::Publisher;
 use iceoryx2::port::subscriber::Subscriber;
 use iceoryx2::port::update_connections::UpdateConnections;
 use iceoryx2::port::{DegradationAction, DegradationFn};
-use iceoryx2::prelude::{LogLevel, SemanticString, SignalHandlingMode, ipc, set_log_level};
+use iceoryx2::prelude::{IceoryxSend, LogLevel, SemanticString, SignalHandlingMode, ipc, set_log_level};
 use iceoryx2::sample::Sample;
+use iceoryx2::service::builder::publish_subscribe::Builder;
 use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
 
 use super::Domain;
@@ -21,13 +23,13 @@ use crate::messages::Message;
 use crate::realtime::Waiter;
 
 /// Publishers a topic may have: every process may publish events.
-pub(super) const MAX_PUBLISHERS: usize = 4;
+const MAX_PUBLISHERS: usize = 4;
 /// Subscribers a topic may have: the counterpart, the logger, and two observers. Shared memory is
 /// reserved, and locked, for all of them.
-pub(super) const MAX_SUBSCRIBERS: usize = 4;
+const MAX_SUBSCRIBERS: usize = 4;
 /// Messages a subscriber may hold at once: while it looks for a newer one than it has, it holds the one
 /// it has, the newest found so far, and the next.
-pub(super) const MAX_HELD: usize = 3;
+const MAX_HELD: usize = 3;
 
 /// Why a port could not be made or used.
 #[derive(Debug, thiserror::Error)]
@@ -52,9 +54,9 @@ fn help(reason: &str) -> &'static str {
 
 /// Builds its text only when something failed, so that a port's way costs no allocation, and out of that way: composed
 /// on it, the text made a round trip a tenth slower (ARCHITECTURE.md).
-pub(super) fn failed<E: std::fmt::Debug>(verb: &'static str, what: &str) -> impl FnOnce(E) -> TransportError {
+pub(super) fn failed<E: Debug>(verb: &'static str, what: &str) -> impl FnOnce(E) -> TransportError {
     #[cold]
-    fn told(verb: &str, what: &str, error: &dyn std::fmt::Debug) -> TransportError {
+    fn told(verb: &str, what: &str, error: &dyn Debug) -> TransportError {
         TransportError { action: format!("{verb} '{what}'"), reason: format!("{error:?}") }
     }
     move |error| told(verb, what, &error)
@@ -77,6 +79,11 @@ impl Refused {
     /// Makes a port's connections to the ports that are there by now.
     pub(super) fn connect(&self, port: &impl UpdateConnections, topic: &str) -> Result<(), TransportError> {
         port.update_connections().map_err(failed("connecting", topic))?;
+        self.check(topic)
+    }
+
+    /// What a port could not connect to leaves no gap in any sequence: whoever receives must ask.
+    pub(super) fn check(&self, topic: &str) -> Result<(), TransportError> {
         match self.0.load(Ordering::Relaxed) {
             0 => Ok(()),
             count => Err(failed("connecting", topic)(format_args!("ConnectionsRefused({count})"))),
@@ -114,17 +121,23 @@ impl Node {
         &self.node
     }
 
-    fn service<M: Message>(&self) -> Result<PortFactory<ipc::Service, M, ()>, TransportError> {
-        self.node
-            .service_builder(&M::TOPIC.try_into().map_err(failed("opening topic", M::TOPIC))?)
-            .publish_subscribe::<M>()
+    /// The service of `M`'s topic, to be opened; it carries messages, or slices of them.
+    pub(super) fn topic<M: Message, P: Debug + IceoryxSend + ?Sized>(
+        &self,
+        depth: usize,
+    ) -> Result<Builder<P, (), ipc::Service>, TransportError> {
+        let name = M::TOPIC.try_into().map_err(failed("opening topic", M::TOPIC))?;
+        let builder = self.node.service_builder(&name).publish_subscribe();
+        Ok(builder
             .enable_safe_overflow(true)
             .max_publishers(MAX_PUBLISHERS)
             .max_subscribers(MAX_SUBSCRIBERS)
-            .subscriber_max_buffer_size(M::DEPTH)
-            .subscriber_max_borrowed_samples(MAX_HELD)
-            .open_or_create()
-            .map_err(failed("opening topic", M::TOPIC))
+            .subscriber_max_buffer_size(depth)
+            .subscriber_max_borrowed_samples(MAX_HELD))
+    }
+
+    fn service<M: Message>(&self) -> Result<PortFactory<ipc::Service, M, ()>, TransportError> {
+        self.topic::<M, M>(M::DEPTH)?.open_or_create().map_err(failed("opening topic", M::TOPIC))
     }
 
     /// The publishing end of a topic.
@@ -212,9 +225,11 @@ impl<M: Message> Inlet<M> {
         self.refused.connect(&self.subscriber, M::TOPIC)
     }
 
-    /// The oldest message not yet received; never waits.
+    /// The oldest message not yet received; never waits. Refused once a publisher could not be connected to, whose
+    /// messages would be missing.
     pub fn receive(&self) -> Result<Option<Received<M>>, TransportError> {
         let sample = self.subscriber.receive().map_err(failed("receiving", M::TOPIC))?;
+        self.refused.check(M::TOPIC)?;
         Ok(sample.map(Received))
     }
 
