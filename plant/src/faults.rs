@@ -12,29 +12,22 @@ use crate::error::PlantError;
 const BABBLE_ID: u16 = 0x001;
 const BABBLE_DATA: [u8; 8] = [0x55; 8];
 
-/// The faults of a bus whose ports have the nodes given, switched on at `now_ns`, each with its index in
-/// the scenario's list kept by the order: faults of other buses become faults that never strike.
+/// The faults of a bus whose ports have the nodes given, switched on at `now_ns`, numbered by their place in the
+/// scenario's list.
 pub(crate) fn of_bus(
     list: &[FaultConfig],
     bus: usize,
     nodes: &[NodeId],
     now_ns: u64,
 ) -> Result<Vec<Fault>, PlantError> {
-    if !list.iter().any(|fault| fault.bus == bus) {
-        return Ok(Vec::new());
-    }
-    list.iter()
-        .map(|config| {
-            let port = if config.bus == bus { port_of(config, nodes)? } else { None };
-            let fault = fault(config, port, now_ns);
-            Ok(if config.bus == bus { fault } else { Fault { count: 0, ..fault } })
-        })
-        .collect()
+    let of_bus = list.iter().enumerate().filter(|(_, config)| config.bus == bus);
+    of_bus.map(|(number, config)| Ok(fault(number, config, port_of(config, nodes)?, now_ns))).collect()
 }
 
-fn fault(config: &FaultConfig, port: Option<usize>, now_ns: u64) -> Fault {
+fn fault(number: usize, config: &FaultConfig, port: Option<usize>, now_ns: u64) -> Fault {
     let at_ns = |time_s: f64| now_ns.saturating_add((time_s * SECOND_NS as f64) as u64);
     Fault {
+        number,
         kind: kind(config),
         from_ns: at_ns(config.from_s),
         until_ns: config.until_s.map_or(u64::MAX, at_ns),

@@ -36,9 +36,32 @@ pub enum FaultKind {
     BusOff,
 }
 
+impl FaultKind {
+    fn delay_ns(self) -> Option<u64> {
+        match self {
+            Self::Delay { by_ns } => Some(by_ns),
+            _ => None,
+        }
+    }
+
+    fn babbled(self) -> Option<Frame> {
+        match self {
+            Self::Babble { frame } => Some(frame),
+            _ => None,
+        }
+    }
+
+    /// For faults of which nothing but their kind matters.
+    fn is(wanted: Self) -> impl Fn(Self) -> Option<()> {
+        move |kind| (kind == wanted).then_some(())
+    }
+}
+
 /// One fault.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Fault {
+    /// By which it is told of and makes its choices; its own in the whole link.
+    pub number: usize,
     /// What it does.
     pub kind: FaultKind,
     /// From when on, ns.
@@ -60,7 +83,7 @@ pub struct Fault {
 pub struct FaultNote {
     /// When, ns.
     pub time_ns: u64,
-    /// Index of the fault in its list.
+    /// The fault's number.
     pub fault: usize,
     /// The node concerned, if the fault names one.
     pub port: Option<usize>,
@@ -68,6 +91,18 @@ pub struct FaultNote {
     pub strikes: u64,
     /// Whether it is over.
     pub has_ended: bool,
+}
+
+/// A frame as faults choose it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct NumberedFrame {
+    /// When it would be struck, ns.
+    pub(super) at_ns: u64,
+    /// The port concerned.
+    pub(super) port: usize,
+    pub(super) id: CanId,
+    /// No other frame of which the same is asked has it.
+    pub(super) number: u64,
 }
 
 /// The faults of one bus, and what they did.
@@ -109,58 +144,87 @@ impl Faults {
         self.list.is_empty()
     }
 
-    /// What each of them does, in their order.
-    pub(super) fn kinds(&self) -> impl Iterator<Item = FaultKind> {
-        self.list.iter().map(|listed| listed.fault.kind)
+    /// What each of them makes a node say, in their order.
+    pub(super) fn babbled(&self) -> impl Iterator<Item = Option<Frame>> {
+        self.list.iter().map(|listed| listed.fault.kind.babbled())
     }
 
-    /// The first fault of a kind that strikes the frame numbered `number` of that port.
-    pub(super) fn strikes_frame(
+    /// The fault that destroys a frame.
+    pub(super) fn corrupts(&self, frame: NumberedFrame) -> Option<Strike> {
+        self.strikes(frame, FaultKind::is(FaultKind::Corrupt)).map(|(strike, ())| strike)
+    }
+
+    /// The fault that has a frame sent twice.
+    pub(super) fn duplicates(&self, frame: NumberedFrame) -> Option<Strike> {
+        self.strikes(frame, FaultKind::is(FaultKind::Duplicate)).map(|(strike, ())| strike)
+    }
+
+    /// The fault that holds a frame back, and for how long, ns.
+    pub(super) fn delays(&self, frame: NumberedFrame) -> Option<(Strike, u64)> {
+        self.strikes(frame, FaultKind::delay_ns)
+    }
+
+    /// Whether a fault makes the frame's port, which receives it, lose it; that is recorded.
+    pub(super) fn loses(&mut self, frame: NumberedFrame) -> bool {
+        let strike = self.strikes(frame, FaultKind::is(FaultKind::Lose));
+        strike.inspect(|&(strike, ())| self.record(strike)).is_some()
+    }
+
+    /// The first fault of those that `part` selects that strikes the frame, with what `part` takes from it.
+    fn strikes<T>(
         &self,
-        now_ns: u64,
-        is_kind: impl Fn(FaultKind) -> bool,
-        port: usize,
-        id: CanId,
-        number: u64,
-    ) -> Option<Strike> {
-        self.list.iter().enumerate().find_map(|(index, listed)| {
-            let may = is_kind(listed.fault.kind) && listed.is_live(now_ns) && listed.concerns(port, id);
-            let strikes = may && self.chance(index, number).random_bool(listed.fault.probability);
-            strikes.then_some(Strike { fault: index, at_ns: now_ns })
+        NumberedFrame { at_ns, port, id, number }: NumberedFrame,
+        part: impl Fn(FaultKind) -> Option<T>,
+    ) -> Option<(Strike, T)> {
+        self.list.iter().enumerate().find_map(|(place, listed)| {
+            let part = part(listed.fault.kind)?;
+            let may = listed.is_live(at_ns) && listed.concerns(port, id);
+            let strikes = may && self.chance(place, number).random_bool(listed.fault.probability);
+            strikes.then_some((Strike { place, at_ns }, part))
         })
-    }
-
-    /// What the fault behind a strike does.
-    pub(super) fn kind_of(&self, strike: Strike) -> FaultKind {
-        self.list[strike.fault].fault.kind
     }
 
     /// A number from 0 to `below` − 1 for a fault and a frame.
     pub(super) fn pick(&self, strike: Strike, number: u64, below: u32) -> u32 {
-        let mut chance = self.chance(strike.fault, number);
+        let mut chance = self.chance(strike.place, number);
         let _: f64 = chance.random();
         chance.random_range(0..below.max(1))
     }
 
-    /// The fault of a kind that a node has at that time.
-    pub(super) fn of_node(
+    /// Whether a node is disconnected at that time.
+    pub(super) fn is_disconnected(&self, now_ns: u64, port: usize) -> bool {
+        self.of_node(now_ns, port, FaultKind::is(FaultKind::Disconnect)).is_some()
+    }
+
+    /// The fault that puts a node off the bus at that time.
+    pub(super) fn puts_off(&self, now_ns: u64, port: usize) -> Option<Strike> {
+        self.of_node(now_ns, port, FaultKind::is(FaultKind::BusOff)).map(|(strike, ())| strike)
+    }
+
+    /// The fault that makes a node babble at that time, and what it says.
+    pub(super) fn makes_babble(&self, now_ns: u64, port: usize) -> Option<(Strike, Frame)> {
+        self.of_node(now_ns, port, FaultKind::babbled)
+    }
+
+    fn of_node<T>(
         &self,
         now_ns: u64,
-        is_kind: impl Fn(FaultKind) -> bool,
         port: usize,
-    ) -> Option<Strike> {
-        let (index, listed) = self.of_port(is_kind, port).find(|(_, listed)| listed.is_live(now_ns))?;
-        Some(Strike { fault: index, at_ns: listed.fault.from_ns })
+        part: impl Fn(FaultKind) -> Option<T>,
+    ) -> Option<(Strike, T)> {
+        let mut live = self.of_port(port, part).filter(|(_, listed, _)| listed.is_live(now_ns));
+        live.next().map(|(place, listed, part)| (Strike { place, at_ns: listed.fault.from_ns }, part))
     }
 
     /// When a node is connected, from `from_ns` on.
     pub(super) fn connected_from_ns(&self, from_ns: u64, port: usize) -> u64 {
-        let is_disconnect = |kind| kind == FaultKind::Disconnect;
         let mut connected_ns = from_ns;
+        let off_at = |at_ns| {
+            let mut off = self.of_port(port, FaultKind::is(FaultKind::Disconnect));
+            off.find(|(_, listed, ())| listed.is_live(at_ns))
+        };
         // Each turn leaves one disconnection behind.
-        while let Some((_, off)) =
-            self.of_port(is_disconnect, port).find(|(_, off)| off.is_live(connected_ns))
-        {
+        while let Some((_, off, ())) = off_at(connected_ns) {
             connected_ns = off.fault.until_ns;
         }
         connected_ns
@@ -168,33 +232,34 @@ impl Faults {
 
     /// From when to when a node babbles, for each of its faults that make it.
     pub(super) fn babbles(&self, port: usize) -> impl Iterator<Item = (u64, u64)> {
-        let is_babble = |kind| matches!(kind, FaultKind::Babble { .. });
-        let babbles = self.of_port(is_babble, port).filter(|(_, listed)| listed.strikes < listed.fault.count);
-        babbles.map(|(_, listed)| (listed.fault.from_ns, listed.fault.until_ns))
+        let babbles = self.of_port(port, FaultKind::babbled);
+        let left = babbles.filter(|(_, listed, _)| listed.strikes < listed.fault.count);
+        left.map(|(_, listed, _)| (listed.fault.from_ns, listed.fault.until_ns))
     }
 
-    fn of_port(
+    fn of_port<T>(
         &self,
-        is_kind: impl Fn(FaultKind) -> bool,
         port: usize,
-    ) -> impl Iterator<Item = (usize, &Listed)> {
-        self.list.iter().enumerate().filter(move |(_, listed)| {
-            is_kind(listed.fault.kind) && listed.fault.port.is_none_or(|own| own == port)
-        })
+        part: impl Fn(FaultKind) -> Option<T>,
+    ) -> impl Iterator<Item = (usize, &Listed, T)> {
+        let of_port = move |listed: &&Listed| listed.fault.port.is_none_or(|own| own == port);
+        let list = self.list.iter().enumerate().filter(move |(_, listed)| of_port(listed));
+        list.filter_map(move |(place, listed)| Some((place, listed, part(listed.fault.kind)?)))
     }
 
     /// A fault has struck.
     pub(super) fn record(&mut self, strike: Strike) {
-        let listed = &mut self.list[strike.fault];
+        let listed = &mut self.list[strike.place];
         listed.began_ns.get_or_insert(strike.at_ns);
         listed.strikes += 1;
     }
 
     /// The next forced bus-off of a node that is on the bus from `from_ns` on.
     pub(super) fn next_bus_off(&self, from_ns: u64, port: usize) -> Option<Strike> {
-        let strikes = self.of_port(|kind| kind == FaultKind::BusOff, port).filter_map(|(index, listed)| {
+        let bus_offs = self.of_port(port, FaultKind::is(FaultKind::BusOff));
+        let strikes = bus_offs.filter_map(|(place, listed, ())| {
             let at_ns = listed.fault.from_ns.max(from_ns);
-            listed.is_live(at_ns).then_some(Strike { fault: index, at_ns })
+            listed.is_live(at_ns).then_some(Strike { place, at_ns })
         });
         strikes.min_by_key(|strike| strike.at_ns)
     }
@@ -210,9 +275,9 @@ impl Faults {
     /// What is to be told of the faults up to `now_ns`: each tells once that it acts, and once that it
     /// is over.
     pub fn next_note(&mut self, now_ns: u64) -> Option<FaultNote> {
-        self.list.iter_mut().enumerate().find_map(|(fault, listed)| {
+        self.list.iter_mut().find_map(|listed| {
             let began_ns = listed.began_ns?;
-            let port = listed.fault.port;
+            let Fault { number: fault, port, .. } = listed.fault;
             if !listed.is_begin_told {
                 listed.is_begin_told = true;
                 return Some(FaultNote { time_ns: began_ns, fault, port, strikes: 0, has_ended: false });
@@ -227,9 +292,10 @@ impl Faults {
     }
 
     /// Random numbers for a fault and a frame, the same however often they are asked for.
-    fn chance(&self, fault: usize, number: u64) -> Pcg32 {
+    fn chance(&self, place: usize, number: u64) -> Pcg32 {
         const ODD: u64 = 0x9E37_79B9_7F4A_7C15;
-        let key = self.seed ^ (fault as u64 + 1).wrapping_mul(ODD).rotate_left(32) ^ number.wrapping_mul(ODD);
+        let fault = self.list[place].fault.number as u64;
+        let key = self.seed ^ (fault + 1).wrapping_mul(ODD).rotate_left(32) ^ number.wrapping_mul(ODD);
         Pcg32::seed_from_u64(key)
     }
 }
@@ -237,7 +303,8 @@ impl Faults {
 /// A fault that strikes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Strike {
-    pub(super) fault: usize,
+    /// Of the fault in the list.
+    pub(super) place: usize,
     pub(super) at_ns: u64,
 }
 
@@ -247,6 +314,7 @@ mod tests {
 
     fn corrupt(probability: f64) -> Fault {
         Fault {
+            number: 0,
             kind: FaultKind::Corrupt,
             from_ns: 1000,
             until_ns: 2000,
@@ -262,8 +330,7 @@ mod tests {
     }
 
     fn strikes(faults: &Faults, now_ns: u64, port: usize, number: u64) -> bool {
-        let is_corrupt = |kind| kind == FaultKind::Corrupt;
-        faults.strikes_frame(now_ns, is_corrupt, port, id(0x181), number).is_some()
+        faults.corrupts(NumberedFrame { at_ns: now_ns, port, id: id(0x181), number }).is_some()
     }
 
     #[test]
@@ -290,10 +357,26 @@ mod tests {
     }
 
     #[test]
+    fn a_fault_chooses_and_is_told_of_by_its_number_whatever_else_befalls_the_bus() {
+        let (first, second) = (Fault { number: 3, ..corrupt(0.1) }, Fault { number: 8, ..corrupt(0.1) });
+        let struck = |faults: Vec<Fault>| {
+            let faults = Faults::new(faults, 1);
+            (0..1000).filter(|&number| strikes(&faults, 1500, 0, number)).collect::<Vec<_>>()
+        };
+        let lose = Fault { kind: FaultKind::Lose, ..first };
+        assert_eq!(struck(vec![lose, second]), struck(vec![second]));
+        assert_ne!(struck(vec![first]), struck(vec![second]));
+
+        let mut faults = Faults::new(vec![second], 1);
+        faults.record(Strike { place: 0, at_ns: 1200 });
+        assert_eq!(faults.next_note(1500).map(|note| note.fault), Some(8));
+    }
+
+    #[test]
     fn a_fault_tells_once_that_it_acts_and_once_that_it_is_over() {
         let mut faults = Faults::new(vec![Fault { count: 2, ..corrupt(1.0) }], 1);
         assert_eq!(faults.next_note(1500), None);
-        let strike = |at_ns| Strike { fault: 0, at_ns };
+        let strike = |at_ns| Strike { place: 0, at_ns };
         faults.record(strike(1200));
         let note = FaultNote { time_ns: 1200, fault: 0, port: None, strikes: 0, has_ended: false };
         assert_eq!(faults.next_note(1500), Some(note));

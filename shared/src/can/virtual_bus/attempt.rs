@@ -7,7 +7,7 @@ use super::VirtualWire;
 use super::queue::Queued;
 use crate::can::bus::ErrorState;
 use crate::can::error_frame::ErrorKind;
-use crate::can::faults::{FaultKind, Strike};
+use crate::can::faults::{NumberedFrame, Strike};
 use crate::can::frame::Frame;
 use crate::can::id::CanId;
 use crate::can::wire::{BEHIND_ACKNOWLEDGE_BITS, INTERFRAME_BITS, first_difference, frame_bits};
@@ -137,9 +137,8 @@ impl VirtualWire {
         let winner = self.offers(contenders, start_ns).min_by_key(Offer::id)?;
         let (contest, strongest) = self.contest(contenders, start_ns, winner);
         let Queued { ref frame, duration_ns, since_ns } = *strongest.queued;
-        let struck = |is_kind: fn(FaultKind) -> bool| {
-            self.faults.strikes_frame(start_ns, is_kind, strongest.port, frame.id(), self.attempts)
-        };
+        let numbered =
+            NumberedFrame { at_ns: start_ns, port: strongest.port, id: frame.id(), number: self.attempts };
         let mut attempt = Attempt {
             port: strongest.port,
             babble: strongest.babbles.map(|strike| strike.fault),
@@ -156,14 +155,14 @@ impl VirtualWire {
         };
         if let Some(bit) = contest.destroyed_at {
             attempt.destroy(self, frame, bit, ErrorKind::Bit);
-        } else if let Some(strike) = struck(|kind| kind == FaultKind::Corrupt) {
+        } else if let Some(strike) = self.faults.corrupts(numbered) {
             let last = frame_bits(frame).total() - INTERFRAME_BITS;
             attempt.strike = Some(strike);
             attempt.destroy(self, frame, 1 + self.faults.pick(strike, self.attempts, last), ErrorKind::Bit);
         } else if !self.is_acknowledged(&attempt) {
             let slot = frame_bits(frame).total() - INTERFRAME_BITS - BEHIND_ACKNOWLEDGE_BITS;
             attempt.destroy(self, frame, slot, ErrorKind::Acknowledge);
-        } else if let Some(strike) = struck(|kind| kind == FaultKind::Duplicate) {
+        } else if let Some(strike) = self.faults.duplicates(numbered) {
             attempt.strike = Some(strike);
             attempt.repeat(self);
         }
@@ -181,12 +180,7 @@ impl VirtualWire {
 
     /// Whether a port takes part in what happens on the wire.
     pub(super) fn is_on_bus(&self, port: usize, now_ns: u64) -> bool {
-        !self.stations[port].confinement.is_off() && !self.is_disconnected(port, now_ns)
-    }
-
-    fn is_disconnected(&self, port: usize, now_ns: u64) -> bool {
-        let is_disconnect = |kind| kind == FaultKind::Disconnect;
-        self.faults.of_node(now_ns, is_disconnect, port).is_some()
+        !self.stations[port].confinement.is_off() && !self.faults.is_disconnected(now_ns, port)
     }
 
     /// What each of those ports would send at that time.
@@ -208,9 +202,8 @@ impl VirtualWire {
     }
 
     fn babbled(&self, port: usize, start_ns: u64) -> Option<Offer<'_>> {
-        let is_babble = |kind| matches!(kind, FaultKind::Babble { .. });
-        let strike = self.faults.of_node(start_ns, is_babble, port)?;
-        let queued = self.babble[strike.fault].as_ref()?;
+        let (strike, _) = self.faults.makes_babble(start_ns, port)?;
+        let queued = self.babble[strike.place].as_ref()?;
         Some(Offer { port, queued, babbles: Some(strike) })
     }
 

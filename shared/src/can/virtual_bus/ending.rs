@@ -4,7 +4,7 @@ use super::VirtualWire;
 use super::attempt::{Attempt, Ending};
 use crate::can::bus::{ErrorState, Received};
 use crate::can::error_frame::{ErrorKind, ErrorReport};
-use crate::can::faults::FaultKind;
+use crate::can::faults::NumberedFrame;
 use crate::can::id::CanId;
 use crate::can::tap::{Tapped, TappedFrame};
 
@@ -72,11 +72,9 @@ impl VirtualWire {
 
     /// Whether a fault makes the port lose the frame.
     fn loses(&mut self, port: usize, attempt: &Attempt, id: CanId) -> bool {
-        let is_lose = |kind| kind == FaultKind::Lose;
         // Receivers choose by numbers of their own, so that one's loss is not the other's.
         let number = self.attempts ^ (port as u64 + 1) << 48;
-        let strike = self.faults.strikes_frame(attempt.start_ns, is_lose, port, id, number);
-        strike.inspect(|&strike| self.faults.record(strike)).is_some()
+        self.faults.loses(NumberedFrame { at_ns: attempt.start_ns, port, id, number })
     }
 
     /// An error frame has ended the attempt; the frame stays queued, to be sent again.

@@ -37,7 +37,7 @@ mod tests;
 
 use super::bus::{BusStatus, ErrorState, ReceiveError, Received, SendError};
 use super::error_frame::ErrorReport;
-use super::faults::{FaultKind, FaultNote, Faults, Strike};
+use super::faults::{FaultNote, Faults, NumberedFrame, Strike};
 use super::frame::{Frame, FrameFormat};
 use super::tap::Tapped;
 use super::wire::{INTERFRAME_BITS, Rates};
@@ -138,7 +138,7 @@ impl VirtualWire {
             config: *config,
             stations: (0..config.ports).map(|_| station()).collect(),
             tap: ReceiveQueue::new(config.receive_capacity * config.ports),
-            babble: faults.kinds().map(|kind| Queued::babbled(kind, config)).collect(),
+            babble: faults.babbled().map(|frame| Some(Queued::babbled(frame?, config))).collect(),
             faults,
             traffic: Traffic::Unforeseen,
             attempts: 0,
@@ -170,7 +170,8 @@ impl VirtualWire {
         if frame.format().is_fd() && !self.config.format.is_fd() {
             return Err(SendError::NotFd { length: frame.data().len() });
         }
-        let delay = self.delay(port, now_ns, &frame);
+        let number = self.statistics.queued;
+        let delay = self.faults.delays(NumberedFrame { at_ns: now_ns, port, id: frame.id(), number });
         let queued_ns = now_ns.max(self.advanced_to_ns) + delay.map_or(0, |(_, by_ns)| by_ns);
         self.stations[port].transmit.push(Queued::new(frame, self.config.rates, queued_ns))?;
         if let Some((strike, _)) = delay {
@@ -343,15 +344,6 @@ impl VirtualWire {
             self.confine(port, at_ns, Confinement::come_back);
         }
         self.look_again();
-    }
-
-    /// The fault that delays a frame, and by how much.
-    fn delay(&self, port: usize, now_ns: u64, frame: &Frame) -> Option<(Strike, u64)> {
-        let is_delay = |kind| matches!(kind, FaultKind::Delay { .. });
-        let number = self.statistics.queued;
-        let strike = self.faults.strikes_frame(now_ns, is_delay, port, frame.id(), number)?;
-        let FaultKind::Delay { by_ns } = self.faults.kind_of(strike) else { return None };
-        Some((strike, by_ns))
     }
 
     /// Changes a port's fault confinement; a change of its state is tapped, and who leaves the bus forgets

@@ -4,7 +4,6 @@ use std::collections::VecDeque;
 
 use super::WireConfig;
 use crate::can::bus::{ReceiveError, Received, SendError};
-use crate::can::faults::FaultKind;
 use crate::can::frame::Frame;
 use crate::can::tap::Tapped;
 use crate::can::wire::{Rates, frame_bits};
@@ -24,9 +23,8 @@ impl Queued {
     }
 
     /// What a fault makes a node send; since when changes with each attempt.
-    pub(super) fn babbled(kind: FaultKind, config: &WireConfig) -> Option<Self> {
-        let FaultKind::Babble { frame } = kind else { return None };
-        Some(Self::new(frame.promoted(config.format), config.rates, 0))
+    pub(super) fn babbled(frame: Frame, config: &WireConfig) -> Self {
+        Self::new(frame.promoted(config.format), config.rates, 0)
     }
 }
 

@@ -5,7 +5,7 @@
 //! recessive bits that a real one then waits for are not waited for.
 
 use crate::can::bus::{Bus, BusStatus, ErrorState, ReceiveError, Received, SendError};
-use crate::can::faults::{Fault, FaultKind, FaultNote, Faults};
+use crate::can::faults::{Fault, FaultKind, FaultNote, Faults, NumberedFrame};
 use crate::can::frame::Frame;
 
 /// Frames that may be held back at one time.
@@ -15,10 +15,10 @@ const OFF_TEC: u16 = 256;
 
 /// A fault that no port can carry out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("fault {index}: a frame is corrupted on the wire; inject that into a simulated one")]
+#[error("fault {number}: a frame is corrupted on the wire; inject that into a simulated one")]
 pub struct NotByPort {
-    /// Its place in the list.
-    pub index: usize,
+    /// Its number.
+    pub number: usize,
 }
 
 /// The faults of one port.
@@ -47,8 +47,8 @@ impl PortFaults {
     /// # Errors
     /// [`NotByPort`] for a fault that corrupts frames.
     pub fn new(faults: Vec<Fault>, port: usize, seed: u64) -> Result<Self, NotByPort> {
-        if let Some(index) = faults.iter().position(|fault| fault.kind == FaultKind::Corrupt) {
-            return Err(NotByPort { index });
+        if let Some(fault) = faults.iter().find(|fault| fault.kind == FaultKind::Corrupt) {
+            return Err(NotByPort { number: fault.number });
         }
         let held = Vec::with_capacity(HELD);
         let faults = Faults::new(faults, seed);
@@ -71,19 +71,27 @@ impl PortFaults {
         self.faults.next_note(now_ns)
     }
 
-    /// Whether a fault strikes a frame, which is recorded then.
-    fn strikes(&mut self, now_ns: u64, kind: FaultKind, frame: &Frame, number: u64) -> bool {
-        let is_kind = |other| other == kind;
-        let strike = self.faults.strikes_frame(now_ns, is_kind, self.port, frame.id(), number);
+    fn numbered(&self, at_ns: u64, frame: &Frame, number: u64) -> NumberedFrame {
+        NumberedFrame { at_ns, port: self.port, id: frame.id(), number }
+    }
+
+    /// Whether a fault has a frame sent twice, which is recorded then.
+    fn duplicates(&mut self, now_ns: u64, frame: &Frame, number: u64) -> bool {
+        let strike = self.faults.duplicates(self.numbered(now_ns, frame, number));
         strike.inspect(|&strike| self.faults.record(strike)).is_some()
+    }
+
+    /// Whether a fault makes the port lose a frame that has arrived, which is recorded then.
+    fn loses(&mut self, time_ns: u64, frame: &Frame) -> bool {
+        let number = self.received;
+        self.received += 1;
+        self.faults.loses(self.numbered(time_ns, frame, number))
     }
 
     /// Holds a frame back if a fault delays it; whether it did.
     fn holds_back(&mut self, now_ns: u64, frame: Frame, number: u64) -> Result<bool, SendError> {
-        let is_delay = |kind| matches!(kind, FaultKind::Delay { .. });
-        let strike = self.faults.strikes_frame(now_ns, is_delay, self.port, frame.id(), number);
-        let Some(strike) = strike else { return Ok(false) };
-        let FaultKind::Delay { by_ns } = self.faults.kind_of(strike) else { return Ok(false) };
+        let delay = self.faults.delays(self.numbered(now_ns, &frame, number));
+        let Some((strike, by_ns)) = delay else { return Ok(false) };
         if self.held.len() == HELD {
             return Err(SendError::QueueFull { capacity: HELD });
         }
@@ -96,16 +104,14 @@ impl PortFaults {
     fn is_cut_off(&mut self, now_ns: u64) -> bool {
         self.restart_when_due(now_ns);
         self.faults.begin_disconnections(now_ns);
-        let is_bus_off = |kind| kind == FaultKind::BusOff;
         if self.off_since_ns.is_none()
-            && let Some(strike) = self.faults.of_node(now_ns, is_bus_off, self.port)
+            && let Some(strike) = self.faults.puts_off(now_ns, self.port)
         {
             self.faults.record(strike);
             self.off_since_ns = Some(now_ns);
             self.held.clear();
         }
-        let is_disconnect = |kind| kind == FaultKind::Disconnect;
-        self.off_since_ns.is_some() || self.faults.of_node(now_ns, is_disconnect, self.port).is_some()
+        self.off_since_ns.is_some() || self.faults.is_disconnected(now_ns, self.port)
     }
 
     fn restart_when_due(&mut self, now_ns: u64) {
@@ -118,10 +124,8 @@ impl PortFaults {
 
     /// A frame that the node babbles at that time.
     fn babbled(&mut self, now_ns: u64) -> Option<Frame> {
-        let is_babble = |kind| matches!(kind, FaultKind::Babble { .. });
-        let strike = self.faults.of_node(now_ns, is_babble, self.port)?;
+        let (strike, frame) = self.faults.makes_babble(now_ns, self.port)?;
         self.faults.record(strike);
-        let FaultKind::Babble { frame } = self.faults.kind_of(strike) else { return None };
         Some(frame)
     }
 
@@ -167,7 +171,7 @@ impl<B: Bus> Bus for Faulty<'_, B> {
             return Ok(());
         }
         self.bus.send(now_ns, frame)?;
-        if self.faults.strikes(now_ns, FaultKind::Duplicate, &frame, number) {
+        if self.faults.duplicates(now_ns, &frame, number) {
             // The frame itself is queued: that its copy finds no room is no failure of the sender.
             let _ = self.bus.send(now_ns, frame);
         }
@@ -183,9 +187,7 @@ impl<B: Bus> Bus for Faulty<'_, B> {
         loop {
             let received = self.bus.receive(now_ns)?;
             let Some(Received { frame, time_ns }) = received else { return Ok(None) };
-            let number = self.faults.received;
-            self.faults.received += 1;
-            let is_lost = self.faults.strikes(time_ns, FaultKind::Lose, &frame, number);
+            let is_lost = self.faults.loses(time_ns, &frame);
             if !is_cut_off && !is_lost {
                 return Ok(received);
             }

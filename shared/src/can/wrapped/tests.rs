@@ -9,6 +9,7 @@ use crate::can::{
 };
 
 const FAULT: Fault = Fault {
+    number: 0,
     kind: FaultKind::Lose,
     from_ns: 0,
     until_ns: u64::MAX,
@@ -222,6 +223,6 @@ fn a_copy_without_room_does_not_fail_the_frame() {
 
 #[test]
 fn corruption_needs_a_wire() {
-    let corrupt = Fault { kind: FaultKind::Corrupt, ..FAULT };
-    assert_eq!(PortFaults::new(vec![FAULT, corrupt], 0, 1).unwrap_err(), NotByPort { index: 1 });
+    let corrupt = Fault { kind: FaultKind::Corrupt, number: 5, ..FAULT };
+    assert_eq!(PortFaults::new(vec![FAULT, corrupt], 0, 1).unwrap_err(), NotByPort { number: 5 });
 }

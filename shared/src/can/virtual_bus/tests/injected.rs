@@ -2,9 +2,10 @@
 
 use super::*;
 use crate::can::ErrorKind;
-use crate::can::faults::Fault;
+use crate::can::faults::{Fault, FaultKind};
 
 const ANY: Fault = Fault {
+    number: 0,
     kind: FaultKind::Corrupt,
     from_ns: 0,
     until_ns: FOREVER,
@@ -153,8 +154,9 @@ fn any_fault() -> impl Strategy<Value = Fault> {
         Just(FaultKind::BusOff),
     ];
     let time = 0_u64..3_000_000;
-    (kind, time.clone(), time, prop::option::of(0..PORTS), 0.0..1.0, 1_u64..50).prop_map(
-        |(kind, from_ns, lasts_ns, port, probability, count)| Fault {
+    (0_usize..8, kind, time.clone(), time, prop::option::of(0..PORTS), 0.0..1.0, 1_u64..50).prop_map(
+        |(number, kind, from_ns, lasts_ns, port, probability, count)| Fault {
+            number,
             kind,
             from_ns,
             until_ns: from_ns + lasts_ns,
