@@ -5,7 +5,7 @@
 //! process that was held up, the plan is worked out again for the closest that they were. Real interfaces do not
 //! tell when a frame was queued.
 
-use masseter_shared::can::{BusPlan, FrameFormat, Message, PlannedMessage, TapError, Tapped, tap};
+use masseter_shared::can::{BusPlan, FrameFormat, PeriodicMessage, PlannedMessage, TapError, Tapped, tap};
 use masseter_shared::config::Scenario;
 use masseter_shared::messages::FrameTap;
 use masseter_shared::schedule::plans;
@@ -154,10 +154,11 @@ impl Followed {
             let message = planned.message.clone();
             let period_ns =
                 seen.least_period_ns.map_or(message.period_ns, |ns| ns.clamp(1, message.period_ns));
-            Message { period_ns, released_by: None, ..message }
+            PeriodicMessage { period_ns, released_by: None, ..message }
         };
         let messages = self.plan.messages().iter().zip(&self.messages).map(as_queued).collect();
         BusPlan::new(self.plan.bus(), self.plan.rates(), format, self.plan.cycle_ns(), messages)
+            .expect("no message has a releaser")
     }
 }
 
@@ -170,8 +171,8 @@ mod tests {
 
     const PERIOD_NS: u64 = 1_000_000;
 
-    fn message(name: &str, id: u16, data_length: u32) -> Message {
-        Message {
+    fn message(name: &str, id: u16, data_length: u32) -> PeriodicMessage {
+        PeriodicMessage {
             name: name.to_owned(),
             id: CanId::standard(id).unwrap(),
             data_length,
@@ -185,7 +186,7 @@ mod tests {
     fn responses(has_faults: bool) -> Responses {
         let messages = vec![message("SYNC", 0x080, 0), message("TPDO1 1", 0x181, 8)];
         let rates = Rates::classical(Bitrate::MAX);
-        let plan = BusPlan::new(0, rates, FrameFormat::Classical, PERIOD_NS, messages);
+        let plan = BusPlan::new(0, rates, FrameFormat::Classical, PERIOD_NS, messages).unwrap();
         Responses::with(vec![plan], FrameFormat::Classical, has_faults)
     }
 

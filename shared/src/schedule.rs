@@ -9,7 +9,7 @@ mod room;
 
 use crate::can::canopen::{Cob, NodeId, NodeIdError};
 use crate::can::wire::{INTERFRAME_BITS, Rates, longest_bits, shortest_bits};
-use crate::can::{BitrateError, BusPlan, Message, Overload, Rpdo1, Tpdo1};
+use crate::can::{BitrateError, BusPlan, NoReleaser, Overload, PeriodicMessage, Rpdo1, Tpdo1};
 use crate::clock::MILLISECOND_NS;
 use crate::config::CanConfig;
 
@@ -44,6 +44,9 @@ pub enum ScheduleError {
     /// No such node id.
     #[error("can.node_ids: {0}")]
     NodeId(#[from] NodeIdError),
+    /// A message that nothing releases.
+    #[error(transparent)]
+    NoReleaser(#[from] NoReleaser),
     /// The cycle is too short.
     #[error("can.buses: {misfit}; {room}")]
     Misfit {
@@ -135,7 +138,7 @@ const HEARTBEAT_LENGTH: u32 = 1;
 /// SYNC and the commands' process data once a cycle, as if without jitter of the master's own.
 ///
 /// # Errors
-/// [`ScheduleError`] for bit rates and node ids that there are not; whether the messages fit, the plans say.
+/// [`ScheduleError`] for bit rates, node ids and releasers that there are not; whether the messages fit, the plans say.
 pub fn plans(can: &CanConfig, period_ns: u64) -> Result<Vec<BusPlan>, ScheduleError> {
     plans_of(can, period_ns, Exchange::ProcessData)
 }
@@ -160,15 +163,20 @@ enum Exchange {
 fn plans_of(can: &CanConfig, period_ns: u64, first: Exchange) -> Result<Vec<BusPlan>, ScheduleError> {
     let plan = |(bus, axes): (usize, &Vec<usize>)| {
         let ids = axes.iter().filter_map(|&axis| can.node_ids.get(axis)).map(|&id| NodeId::new(id));
-        let messages = messages(&ids.collect::<Result<Vec<_>, _>>()?, can, period_ns, first);
-        Ok(BusPlan::new(bus, can.rates()?, can.format(), period_ns, messages))
+        let messages = messages(&ids.collect::<Result<Vec<_>, _>>()?, can, period_ns, first)?;
+        Ok(BusPlan::new(bus, can.rates()?, can.format(), period_ns, messages)?)
     };
     can.buses.iter().enumerate().map(plan).collect()
 }
 
-fn messages(drives: &[NodeId], can: &CanConfig, period_ns: u64, first: Exchange) -> Vec<Message> {
+fn messages(
+    drives: &[NodeId],
+    can: &CanConfig,
+    period_ns: u64,
+    first: Exchange,
+) -> Result<Vec<PeriodicMessage>, ScheduleError> {
     let heartbeat_ns = u64::from(can.heartbeat_producer_ms) * MILLISECOND_NS;
-    let message = |name: String, cob: Cob, data_length: u32, period_ns: u64| Message {
+    let message = |name: String, cob: Cob, data_length: u32, period_ns: u64| PeriodicMessage {
         name,
         id: cob.into(),
         data_length,
@@ -180,7 +188,7 @@ fn messages(drives: &[NodeId], can: &CanConfig, period_ns: u64, first: Exchange)
     for (index, &node) in drives.iter().enumerate() {
         if index == 0 && first == Exchange::Sdo {
             // The answer may take until the end of the next cycle.
-            let sdo = |name: &str, cob| Message {
+            let sdo = |name: &str, cob| PeriodicMessage {
                 deadline_ns: 2 * period_ns,
                 ..message(format!("{name} {}", node.get()), cob, SDO_LENGTH, period_ns)
             };
@@ -189,7 +197,7 @@ fn messages(drives: &[NodeId], can: &CanConfig, period_ns: u64, first: Exchange)
             continue;
         }
         let (tpdo, rpdo) = (Tpdo1::LENGTH as u32, Rpdo1::LENGTH as u32);
-        messages.push(Message {
+        messages.push(PeriodicMessage {
             released_by: Some(Cob::Sync.into()),
             ..message(format!("TPDO1 {}", node.get()), Cob::Tpdo1(node), tpdo, period_ns)
         });

@@ -141,7 +141,7 @@ impl VirtualWire {
             NumberedFrame { at_ns: start_ns, port: strongest.port, id: frame.id(), number: self.attempts };
         let mut attempt = Attempt {
             port: strongest.port,
-            babble: strongest.babbles.map(|strike| strike.fault),
+            babble: strongest.babbles.map(|strike| strike.place),
             queued_ns: if strongest.babbles.is_some() { start_ns } else { since_ns },
             start_ns,
             received_ns: start_ns + duration_ns - self.interframe_ns,

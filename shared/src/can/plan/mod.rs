@@ -1,25 +1,18 @@
 //! The plan of a bus: what its messages take at worst, and by when each of them has arrived.
 //!
-//! Worst-case response times of non-preemptive transmission by fixed priority: R. Davis, A. Burns, R. Bril,
-//! J. Lukkien, *Controller Area Network (CAN) schedulability analysis: refuted, revisited and revised*,
-//! Real-Time Systems 35 (2007), equations 7 to 12: every instance within the longest busy period is looked at,
-//! behind the longest frame of lower priority. Transmit queues by priority are assumed, an undisturbed bus,
-//! and no offsets between messages. Emergencies and network management are not in the rig's plans: they are
-//! sent while it does not move, or stops.
+//! Emergencies and network management are not in the rig's plans: they are sent while it does not move, or stops.
 
-use std::fmt::{self, Write as _};
+mod response_time;
+mod table;
 
+use self::response_time::response_ns;
 use super::frame::FrameFormat;
 use super::id::CanId;
 use super::wire::{Rates, longest_bits};
 
-/// A bus that is not idle for so long has no bound worth the name: near a load of 1 the exact one is found in ever more
-/// steps, and at 1 there is none.
-const LONGEST_BUSY_NS: u64 = 1_000_000_000;
-
 /// A message that is sent again and again.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Message {
+pub struct PeriodicMessage {
     /// What it is, as tables show it.
     pub name: String,
     /// Its identifier, which is its priority.
@@ -30,7 +23,7 @@ pub struct Message {
     pub period_ns: u64,
     /// By when it must have arrived after its release, ns.
     pub deadline_ns: u64,
-    /// Where its release is the arrival of another message: that one's worst case is its jitter.
+    /// The more urgent message whose arrival releases it, if one does: that one's latest arrival is its jitter.
     pub released_by: Option<CanId>,
 }
 
@@ -38,12 +31,12 @@ pub struct Message {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct PlannedMessage {
     /// The message.
-    pub message: Message,
+    pub message: PeriodicMessage,
     /// Longest time on the wire, interframe space included, ns.
     pub transmission_ns: u64,
-    /// The most that its release may lie behind the beginning of its period, ns.
-    pub jitter_ns: u64,
-    /// Longest time from release to arrival; `None` where there is no bound.
+    /// The most that its release may lie behind the beginning of its period, ns; `None` where there is no bound.
+    pub jitter_ns: Option<u64>,
+    /// Longest time from release to arrival, ns; `None` where there is no bound.
     pub response_ns: Option<u64>,
 }
 
@@ -53,10 +46,14 @@ impl PlannedMessage {
         self.arrival_ns().is_some_and(|arrival_ns| arrival_ns <= self.message.deadline_ns)
     }
 
-    /// Longest time from the beginning of its period to arrival, ns: jitter and response; `None` where there is no
-    /// bound.
+    /// The most that its arrival may lie behind the beginning of its period, ns; `None` where there is no bound.
     pub fn arrival_ns(&self) -> Option<u64> {
-        self.response_ns.map(|response_ns| self.jitter_ns + response_ns)
+        Some(self.jitter_ns? + self.response_ns?)
+    }
+
+    /// Share of the time that it takes at worst.
+    fn share(&self) -> f64 {
+        self.transmission_ns as f64 / self.message.period_ns as f64
     }
 }
 
@@ -74,28 +71,44 @@ pub struct BusPlan {
 #[error("{0}\nuse a longer period, a faster bit rate, CAN FD or more buses")]
 pub struct Overload(pub Box<BusPlan>);
 
+/// A message whose releaser is not among the more urgent ones of its bus.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{name} is said to be released by {releaser}h, which is no more urgent message of its bus")]
+pub struct NoReleaser {
+    /// The message.
+    pub name: String,
+    /// Who should release it.
+    pub releaser: CanId,
+}
+
 impl BusPlan {
     /// Analyses the messages of a bus whose cycle is `cycle_ns` long.
-    pub fn new(bus: usize, rates: Rates, format: FrameFormat, cycle_ns: u64, messages: Vec<Message>) -> Self {
+    ///
+    /// # Errors
+    /// [`NoReleaser`] for a message that no more urgent one of them can release as it says.
+    pub fn new(
+        bus: usize,
+        rates: Rates,
+        format: FrameFormat,
+        cycle_ns: u64,
+        messages: Vec<PeriodicMessage>,
+    ) -> Result<Self, NoReleaser> {
         let mut planned: Vec<_> = messages
             .into_iter()
             .map(|message| {
                 let bits = longest_bits(message.data_length, message.id.is_extended(), format);
                 let transmission_ns = rates.duration_ns(bits);
-                PlannedMessage { message, transmission_ns, jitter_ns: 0, response_ns: None }
+                PlannedMessage { message, transmission_ns, jitter_ns: None, response_ns: None }
             })
             .collect();
         planned.sort_by_key(|planned| planned.message.id);
         let bit_ns = rates.nominal().bits_to_ns(1);
         for index in 0..planned.len() {
-            // Who releases a message has the higher priority, and is analysed already.
-            let releaser = planned[index].message.released_by;
-            let releaser =
-                releaser.and_then(|id| planned[..index].iter().find(|other| other.message.id == id));
-            planned[index].jitter_ns = releaser.and_then(|other| other.response_ns).unwrap_or(0);
+            // Who releases a message is analysed already.
+            planned[index].jitter_ns = jitter_ns(&planned[index].message, &planned[..index])?;
             planned[index].response_ns = response_ns(&planned, index, bit_ns);
         }
-        Self { bus, rates, cycle_ns, messages: planned }
+        Ok(Self { bus, rates, cycle_ns, messages: planned })
     }
 
     /// Index of the bus.
@@ -126,8 +139,7 @@ impl BusPlan {
 
     /// Share of the time that all messages take at worst; more than 1 does not fit.
     pub fn utilisation(&self) -> f64 {
-        let shares = self.messages.iter();
-        shares.map(|planned| planned.transmission_ns as f64 / planned.message.period_ns as f64).sum()
+        utilisation(&self.messages)
     }
 
     /// The longest time from release to arrival of a message; `None` for one that is not in the plan, or
@@ -149,93 +161,16 @@ impl BusPlan {
     }
 }
 
-/// Worst-case response time of the message of that index (Davis et al. 2007, equations 7 to 12), without its
-/// own jitter; the messages are in the order of priority.
-fn response_ns(messages: &[PlannedMessage], index: usize, bit_ns: u64) -> Option<u64> {
-    let (own, more_urgent) = (&messages[index], &messages[..index]);
-    let load: f64 = messages[..=index].iter().map(share).sum();
-    if load >= 1.0 {
-        return None;
+fn jitter_ns(message: &PeriodicMessage, more_urgent: &[PlannedMessage]) -> Result<Option<u64>, NoReleaser> {
+    let Some(releaser) = message.released_by else { return Ok(Some(0)) };
+    match more_urgent.iter().find(|other| other.message.id == releaser) {
+        Some(other) => Ok(other.arrival_ns()),
+        None => Err(NoReleaser { name: message.name.clone(), releaser }),
     }
-    let blocking_ns = messages[index + 1..].iter().map(|other| other.transmission_ns).max().unwrap_or(0);
-    let interference_ns = |window_ns: u64, of: &[PlannedMessage]| -> u64 {
-        of.iter()
-            .map(|other| {
-                (window_ns + other.jitter_ns).div_ceil(other.message.period_ns) * other.transmission_ns
-            })
-            .sum()
-    };
-    let busy_ns =
-        settle(own.transmission_ns, |busy_ns| blocking_ns + interference_ns(busy_ns, &messages[..=index]))?;
-    let instances = (busy_ns + own.jitter_ns).div_ceil(own.message.period_ns);
-    (0..instances).try_fold(0, |longest_ns, instance| {
-        let before_ns = blocking_ns + instance * own.transmission_ns;
-        let queued_ns =
-            settle(before_ns, |queued_ns| before_ns + interference_ns(queued_ns + bit_ns, more_urgent))?;
-        let response_ns = (queued_ns + own.transmission_ns).saturating_sub(instance * own.message.period_ns);
-        Some(longest_ns.max(response_ns))
-    })
 }
 
-fn share(planned: &PlannedMessage) -> f64 {
-    planned.transmission_ns as f64 / planned.message.period_ns as f64
-}
-
-/// The least fixed point from `start_ns` on of a function that grows, as far as the longest busy time.
-fn settle(start_ns: u64, grow: impl Fn(u64) -> u64) -> Option<u64> {
-    let mut at_ns = start_ns;
-    while at_ns <= LONGEST_BUSY_NS {
-        let next_ns = grow(at_ns);
-        if next_ns <= at_ns {
-            return Some(at_ns);
-        }
-        at_ns = next_ns;
-    }
-    None
-}
-
-impl fmt::Display for BusPlan {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let us = |ns: u64| format!("{:.1}", ns as f64 / 1e3);
-        write!(f, "bus {}: {} bit/s", self.bus, self.rates.nominal().bps())?;
-        if self.rates.data() != self.rates.nominal() {
-            write!(f, ", data phase {} bit/s", self.rates.data().bps())?;
-        }
-        writeln!(
-            f,
-            "; a cycle of {} µs takes {} µs at worst; load {:.1} %",
-            us(self.cycle_ns),
-            us(self.cycle_time_ns()),
-            self.utilisation() * 100.0
-        )?;
-        write!(
-            f,
-            "  {:<14} {:>4} {:>5} {:>11} {:>9} {:>9} {:>11} {:>11} {:>11}",
-            "message", "id", "bytes", "period, µs", "wire, µs", "jitter", "response", "in all", "deadline"
-        )?;
-        for planned in &self.messages {
-            let PlannedMessage { message, transmission_ns, jitter_ns, response_ns } = planned;
-            let [response, in_all] = [*response_ns, planned.arrival_ns()]
-                .map(|bound_ns| bound_ns.map_or_else(|| "unbounded".to_owned(), us));
-            let mut line = String::new();
-            write!(
-                line,
-                "  {:<14} {:>4} {:>5} {:>11} {:>9} {:>9} {:>11} {:>11} {:>11}{}",
-                message.name,
-                message.id.to_string(),
-                message.data_length,
-                us(message.period_ns),
-                us(*transmission_ns),
-                us(*jitter_ns),
-                response,
-                in_all,
-                us(message.deadline_ns),
-                if planned.fits() { "" } else { "  too late" }
-            )?;
-            write!(f, "\n{line}")?;
-        }
-        Ok(())
-    }
+fn utilisation(messages: &[PlannedMessage]) -> f64 {
+    messages.iter().map(PlannedMessage::share).sum()
 }
 
 #[cfg(test)]
@@ -245,9 +180,9 @@ mod tests {
     use super::*;
     use crate::can::Bitrate;
 
-    fn message(id: u16, data_length: u32, period_us: u64) -> Message {
+    fn message(id: u16, data_length: u32, period_us: u64) -> PeriodicMessage {
         let (id, period_ns) = (CanId::standard(id).unwrap(), period_us * 1000);
-        Message {
+        PeriodicMessage {
             name: format!("m{id}"),
             id,
             data_length,
@@ -257,9 +192,9 @@ mod tests {
         }
     }
 
-    fn plan(bps: u32, messages: Vec<Message>) -> BusPlan {
+    fn plan(bps: u32, messages: Vec<PeriodicMessage>) -> BusPlan {
         let rates = Rates::classical(Bitrate::new(bps).unwrap());
-        BusPlan::new(0, rates, FrameFormat::Classical, 1_000_000, messages)
+        BusPlan::new(0, rates, FrameFormat::Classical, 1_000_000, messages).unwrap()
     }
 
     fn responses_us(plan: &BusPlan) -> Vec<Option<u64>> {
@@ -283,14 +218,40 @@ mod tests {
         assert_eq!(responses_us(&plan(1_000_000, messages)), [Some(270), Some(325), Some(325)]);
     }
 
+    fn released(by: u16, message: PeriodicMessage) -> PeriodicMessage {
+        PeriodicMessage { released_by: Some(CanId::standard(by).unwrap()), ..message }
+    }
+
     #[test]
-    fn a_message_released_by_another_inherits_its_response_as_jitter() {
-        let mut answer = message(2, 8, 1000);
-        answer.released_by = Some(CanId::standard(1).unwrap());
-        let plan = plan(1_000_000, vec![message(1, 0, 1000), answer]);
-        let [first, second] = plan.messages() else { panic!("{plan}") };
-        assert_eq!(Some(second.jitter_ns), first.response_ns);
-        assert_eq!(second.arrival_ns(), Some(second.jitter_ns + second.response_ns.unwrap()));
+    fn a_message_released_by_another_inherits_its_latest_arrival_as_jitter() {
+        let messages =
+            vec![message(1, 0, 2000), released(1, message(2, 8, 2000)), released(2, message(3, 8, 2000))];
+        let plan = plan(1_000_000, messages);
+        let [first, second, third] = plan.messages() else { panic!("{plan}") };
+        let latest_ns = |planned: &PlannedMessage| planned.jitter_ns.unwrap() + planned.response_ns.unwrap();
+        assert_eq!(first.jitter_ns, Some(0));
+        assert_eq!(second.jitter_ns, first.response_ns);
+        assert_eq!(third.jitter_ns, Some(latest_ns(second)));
+        assert!(third.jitter_ns > second.response_ns);
+    }
+
+    #[test]
+    fn what_an_unbounded_message_releases_has_no_bound_either() {
+        let messages = vec![message(1, 8, 100), released(1, message(2, 0, 1_000_000))];
+        let plan = plan(1_000_000, messages);
+        assert_eq!((plan.messages()[1].jitter_ns, responses_us(&plan)), (None, vec![None, None]));
+        assert!(plan.check().is_err());
+    }
+
+    #[test]
+    fn a_message_whose_releaser_is_not_there_or_less_urgent_is_refused() {
+        for other in [3, 5] {
+            let messages = vec![released(other, message(4, 8, 1000)), message(5, 8, 1000)];
+            let rates = Rates::classical(Bitrate::MAX);
+            let error = BusPlan::new(0, rates, FrameFormat::Classical, 1_000_000, messages).unwrap_err();
+            assert_eq!(error.releaser, CanId::standard(other).unwrap());
+            assert_eq!(error.name, "m004");
+        }
     }
 
     #[test]
