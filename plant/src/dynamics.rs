@@ -11,7 +11,6 @@
 //!
 //! Left out: end stops, play, and elasticity.
 
-use std::ops::RangeInclusive;
 
 use masseter_shared::config::DynamicsConfig;
 use masseter_shared::geometry::{AXES, InverseError, Jacobian, Joints, LEGS, Mechanism, Pose, Twist, Vec3};
@@ -20,8 +19,6 @@ use nalgebra::{Matrix3, Matrix6, UnitQuaternion, Vector3, Vector6};
 use crate::food::Food;
 use crate::friction::Friction;
 
-/// Integration steps that resolve the stiffest parts and cost a bearable time, ns.
-pub(crate) const STEPS_NS: RangeInclusive<u64> = 10_000..=250_000;
 
 /// The moving mechanism.
 #[derive(Debug, Clone)]
@@ -76,7 +73,7 @@ impl Dynamics {
         let dynamics =
             Self { mechanism, config, pose, twist, acceleration, joints, jacobian, friction, food: None };
         let longest_step_ns = dynamics.longest_step_ns()?;
-        if longest_step_ns < *STEPS_NS.start() {
+        if longest_step_ns < *DynamicsConfig::STEPS_NS.start() {
             return Err(DynamicsError::Stiff);
         }
         if config.step_ns > longest_step_ns {

@@ -69,7 +69,7 @@ pub enum PlantError {
     /// A fault that needs a simulated wire.
     #[error("faults: {0}")]
     NotByPort(#[from] NotByPort),
-    /// A quantity out of its range.
+    /// A quantity that does not go with the others.
     #[error("{key} = {value}: {need}")]
     Quantity {
         /// The key.

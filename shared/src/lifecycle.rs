@@ -72,6 +72,7 @@ impl Assignment {
     pub fn take_up(&self) -> Result<Post, ProcessError> {
         let stop = StopRequest::listen().map_err(ProcessError::Signals)?;
         let scenario = Scenario::read(&self.scenario)?;
+        scenario.validate()?;
         let schedule = CycleSchedule::new(&scenario.can, scenario.period_ns())?;
         let node = Node::join(&Domain::named(&self.domain)?)?;
         Ok(Post { scenario, schedule, node, stop })

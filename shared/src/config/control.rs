@@ -150,6 +150,20 @@ impl ControllerConfig {
     }
 }
 
+impl RealtimeConfig {
+    pub(super) fn validate(&self) -> Result<(), ScenarioError> {
+        if !(1..=99).contains(&self.priority) {
+            return Err(ScenarioError::bad("realtime.priority", &self.priority, "use 1 to 99 (SCHED_FIFO)"));
+        }
+        let [controller, plant] = self.cores;
+        if controller == plant {
+            let need = "name two: controller and plant wait for each other by spinning";
+            return Err(ScenarioError::bad("realtime.cores", &format!("{controller},{plant}"), need));
+        }
+        Ok(())
+    }
+}
+
 impl ChecksConfig {
     pub(super) fn validate(&self) -> Result<(), ScenarioError> {
         require_positive(&[("checks.tracking_rms_mm", self.tracking_rms_mm)])

@@ -1,10 +1,13 @@
 //! Faults that a scenario asks for on its buses: `[[faults]]`. On a simulated bus they strike any node; on a real one,
 //! only what the master's port can do to itself.
 
+use std::fmt::Display;
+
 use serde::{Deserialize, Serialize};
 
 use super::ScenarioError;
 use crate::can::canopen::NodeId;
+use super::need::{require_not_negative, require_within};
 
 /// What goes wrong.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -64,65 +67,71 @@ const fn always() -> f64 {
 impl FaultConfig {
     /// Checks one fault of the list on so many buses.
     pub(super) fn validate(&self, buses: usize, is_virtual: bool) -> Result<(), ScenarioError> {
-        use FaultKindConfig as Kind;
-        let refuse = |key, value: String, need: &str| {
-            Err(ScenarioError::BadValue { key, value, need: need.to_owned() })
-        };
-        if !is_virtual && self.kind == Kind::Corrupt {
-            return refuse(
-                "faults.kind",
-                "corrupt".to_owned(),
-                "leave it away with can.interfaces: only on a simulated bus can frames be destroyed on the wire",
-            );
-        }
-        if let Some(node) = self.node.filter(|&node| !is_virtual && node != NodeId::MASTER.get()) {
-            return refuse(
-                "faults.node",
-                node.to_string(),
-                &format!("on a real interface only the master (node {}) can be given faults", NodeId::MASTER),
-            );
-        }
         if self.bus >= buses {
-            return refuse("faults.bus", self.bus.to_string(), "name a bus of can.buses, from 0");
+            return refuse("faults.bus", &self.bus, "name a bus of can.buses, from 0");
         }
-        if !(self.from_s.is_finite() && self.from_s >= 0.0) {
-            return refuse("faults.from_s", self.from_s.to_string(), "use a finite number not below 0");
+        if !is_virtual {
+            self.check_port()?;
         }
+        self.check_ranges()?;
+        self.check_kind()
+    }
+
+    /// What no port of a real interface can do.
+    fn check_port(&self) -> Result<(), ScenarioError> {
+        if self.kind == FaultKindConfig::Corrupt {
+            let need = "leave it away with can.interfaces: only on a simulated bus can frames be destroyed on the wire";
+            return refuse("faults.kind", &"corrupt", need);
+        }
+        if let Some(node) = self.node.filter(|&node| node != NodeId::MASTER.get()) {
+            let need = format!("on a real interface only the master (node {}) can be given faults", NodeId::MASTER);
+            return refuse("faults.node", &node, need);
+        }
+        Ok(())
+    }
+
+    fn check_ranges(&self) -> Result<(), ScenarioError> {
+        require_not_negative(&[("faults.from_s", self.from_s)])?;
         if let Some(until_s) = self.until_s.filter(|&until_s| !(until_s.is_finite() && until_s > self.from_s))
         {
-            return refuse("faults.until_s", until_s.to_string(), "use a finite number above from_s");
+            return refuse("faults.until_s", &until_s, "use a finite number above from_s");
         }
-        if !(0.0..=1.0).contains(&self.probability) {
-            return refuse("faults.probability", self.probability.to_string(), "use 0 to 1");
+        require_within(&[("faults.probability", self.probability, 0.0, 1.0)])?;
+        match self.id {
+            Some(id) if id > 0x7FF => refuse("faults.id", &id, "use an 11-bit identifier, at most 0x7FF"),
+            _ => Ok(()),
         }
-        if let Some(id) = self.id.filter(|&id| id > 0x7FF) {
-            return refuse("faults.id", id.to_string(), "use an 11-bit identifier, at most 0x7FF");
-        }
+    }
+
+    /// What has an effect on this kind only, or on others.
+    fn check_kind(&self) -> Result<(), ScenarioError> {
+        use FaultKindConfig as Kind;
         let is_of_node = matches!(self.kind, Kind::Babble | Kind::Disconnect | Kind::BusOff);
         let has_no_effect = "leave it away: it has no effect on this kind";
         if is_of_node && self.probability < 1.0 {
-            return refuse("faults.probability", self.probability.to_string(), has_no_effect);
+            return refuse("faults.probability", &self.probability, has_no_effect);
         }
         if let Some(id) = self.id.filter(|_| matches!(self.kind, Kind::Disconnect | Kind::BusOff)) {
-            return refuse("faults.id", id.to_string(), has_no_effect);
+            return refuse("faults.id", &id, has_no_effect);
         }
         if let Some(count) = self.count.filter(|_| self.kind == Kind::Disconnect) {
-            return refuse("faults.count", count.to_string(), has_no_effect);
+            return refuse("faults.count", &count, has_no_effect);
         }
         if self.node.is_none() && is_of_node {
             return refuse(
                 "faults.node",
-                "none".to_owned(),
+                &"none",
                 "name the node that babbles, is cut off or goes off the bus",
             );
         }
         if (self.kind == Kind::Delay) != self.delay_us.is_some() {
-            return refuse(
-                "faults.delay_us",
-                format!("{:?}", self.delay_us),
-                "give it for kind = 'delay', and only there",
-            );
+            let value = format!("{:?}", self.delay_us);
+            return refuse("faults.delay_us", &value, "give it for kind = 'delay', and only there");
         }
         Ok(())
     }
+}
+
+fn refuse(key: &'static str, value: &dyn Display, need: impl Into<String>) -> Result<(), ScenarioError> {
+    Err(ScenarioError::bad(key, value, need))
 }

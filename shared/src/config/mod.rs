@@ -4,20 +4,26 @@
 //! stands beside what it configures; checks that need more than the values themselves (does a
 //! trajectory fit the strokes?) are made by those who own the subject.
 
+mod can;
 mod control;
+mod drives;
+mod dynamics;
 mod faults;
 mod food;
+mod jaw;
 mod limits;
 mod motion;
 mod need;
-mod plant;
 mod scenario;
 
+pub use can::{CanConfig, IdentityConfig};
 pub use control::{ChecksConfig, ControllerConfig, CpuDmaLatency, RealtimeConfig};
+pub use drives::{DriveConfig, DrivesConfig};
+pub use dynamics::DynamicsConfig;
 pub use faults::{FaultConfig, FaultKindConfig};
 pub use food::FoodConfig;
+pub use jaw::JawConfig;
 pub use limits::TrajectoryLimitsConfig;
 pub use motion::*;
-pub use plant::{CanConfig, DriveConfig, DrivesConfig, DynamicsConfig, IdentityConfig};
 pub(crate) use scenario::RATES_HZ;
 pub use scenario::{Scenario, ScenarioError};

@@ -1,7 +1,7 @@
 //! A scenario as a whole: read from TOML, checked, and written back as resolved.
 
-use std::fs;
 use std::path::{Path, PathBuf};
+use std::{fmt, fs};
 
 use serde::{Deserialize, Serialize};
 
@@ -114,6 +114,12 @@ pub enum ScenarioError {
     },
 }
 
+impl ScenarioError {
+    pub(super) fn bad(key: &'static str, value: &dyn fmt::Display, need: impl Into<String>) -> Self {
+        Self::BadValue { key, value: value.to_string(), need: need.into() }
+    }
+}
+
 impl Scenario {
     /// Reads a scenario; a recording's path is taken relative to the scenario's folder.
     pub fn read(path: &Path) -> Result<Self, ScenarioError> {
@@ -133,38 +139,28 @@ impl Scenario {
 
     /// Checks the values that stand for themselves.
     pub fn validate(&self) -> Result<(), ScenarioError> {
-        let bad = |key, value: String, need: &str| {
-            Err(ScenarioError::BadValue { key, value, need: need.to_owned() })
-        };
         let named = self.name.bytes().all(|b| b.is_ascii_alphanumeric() || b == b'-' || b == b'_');
         if !named || !(1..=64).contains(&self.name.len()) {
-            return bad("name", format!("'{}'", self.name), "use 1 to 64 letters, digits, '-' or '_'");
+            let need = "use 1 to 64 letters, digits, '-' or '_'";
+            return Err(ScenarioError::bad("name", &format!("'{}'", self.name), need));
         }
         if !RATES_HZ.contains(&self.rate_hz) {
             let need = format!("use {} to {} Hz", RATES_HZ.start(), RATES_HZ.end());
-            return bad("rate_hz", self.rate_hz.to_string(), &need);
+            return Err(ScenarioError::bad("rate_hz", &self.rate_hz, need));
         }
         if let Some(duration_s) = self.duration_s {
             require_duration(&[("duration_s", duration_s)])?;
         }
-        if !(1..=99).contains(&self.realtime.priority) {
-            return bad("realtime.priority", self.realtime.priority.to_string(), "use 1 to 99 (SCHED_FIFO)");
-        }
-        if self.realtime.cores[0] == self.realtime.cores[1] {
-            let cores = self.realtime.cores.map(|core| core.to_string()).join(",");
-            return bad(
-                "realtime.cores",
-                cores,
-                "name two: controller and plant wait for each other by spinning",
-            );
-        }
+        self.realtime.validate()?;
         if let MotionConfig::File(file) = &self.motion
             && file.path.to_str().is_none()
         {
             let need = "use folders and a file whose names are UTF-8: the scenario is written down with them";
-            return bad("motion.path", file.path.display().to_string(), need);
+            return Err(ScenarioError::bad("motion.path", &file.path.display(), need));
         }
         self.can.validate()?;
+        self.drives.validate()?;
+        self.dynamics.validate()?;
         for fault in &self.faults {
             fault.validate(self.can.buses.len(), self.can.is_virtual())?;
         }
@@ -267,6 +263,21 @@ mod tests {
             ("[realtime]\ncores = [1, 1]", "realtime.cores = 1,1: name two"),
             ("[can]\ninterfaces = ['can0']", "can.interfaces = can0: name 2 interfaces"),
             ("[can]\ninterfaces = ['can0', 'can0']", "name 2 interfaces"),
+            (
+                "[drives.leg]\nrated_force_n = nan",
+                "drives.leg.rated_force_n = NaN: use a finite number above 0",
+            ),
+            ("[drives.slide]\nencoder_noise_m = 1e300", "drives.slide.encoder_noise_m"),
+            ("[dynamics]\nstep_ns = 1000000", "dynamics.step_ns = 1000000: use 10000 to 250000 ns"),
+            (
+                "[dynamics]\ngravity_m_s2 = -1.0",
+                "dynamics.gravity_m_s2 = -1: use a finite number not below 0",
+            ),
+            (
+                "[dynamics]\nplatform_inertia_kg_m2 = [1e-4, -1e-4, 1e-4]",
+                "dynamics.platform_inertia_kg_m2 = -0.0001",
+            ),
+            ("[can]\nboot_timeout_ms = 0", "can.boot_timeout_ms = 0: use a finite number above 0"),
             ("[controller]\nease_s = 0.0", "controller.ease_s = 0: use more than 0"),
             ("[checks]\ntracking_rms_mm = inf", "checks.tracking_rms_mm"),
             ("[drives.leg]\nmax_force = 1.0", "did you mean `max_force_n`?"),

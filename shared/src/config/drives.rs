@@ -1,0 +1,133 @@
+//! The drives with their encoders: `[drives]`.
+
+use serde::de::Error;
+use serde::{Deserialize, Deserializer, Serialize};
+use toml::Table;
+
+use super::ScenarioError;
+use super::need::{require_positive, require_within};
+use crate::geometry::LEGS;
+
+/// More is no encoder's, m.
+const NOISIEST_M: f64 = 1e-3;
+
+/// A servo drive with its encoder. Scales and limits hold for real ones too, gains and noise for emulated ones.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DriveConfig {
+    /// Force at 1000 ‰ of the torque objects (6077), N.
+    pub rated_force_n: f64,
+    /// Force limit of the drive, N.
+    pub max_force_n: f64,
+    /// Velocity limit of the drive, m/s.
+    pub max_velocity_m_s: f64,
+    /// Deceleration of the quick-stop ramp (6085), m/s².
+    pub quick_stop_deceleration_m_s2: f64,
+    /// Following error window (6065), m.
+    pub following_error_m: f64,
+    /// How long the window may be exceeded (6066), ms.
+    pub following_error_timeout_ms: u16,
+    /// Gain of the position loop, 1/s.
+    pub position_gain_per_s: f64,
+    /// Gain of the velocity loop, N per m/s.
+    pub velocity_gain_n_s_per_m: f64,
+    /// Integral time of the velocity loop, s.
+    pub velocity_integral_time_s: f64,
+    /// One increment of the encoder, m.
+    pub encoder_resolution_m: f64,
+    /// Standard deviation of the encoder's noise, m.
+    pub encoder_noise_m: f64,
+}
+
+impl DriveConfig {
+    /// The encoder's increments nearest to so many metres; also of m/s and m/s².
+    pub fn increments(&self, metres: f64) -> f64 {
+        (metres / self.encoder_resolution_m).round()
+    }
+}
+
+/// The drives of slides and of legs; what a table does not give stays as it is by default.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct DrivesConfig {
+    /// Drives of d₁ d₂ d₃.
+    #[serde(deserialize_with = "slide")]
+    pub slide: DriveConfig,
+    /// Drives of l₁ l₂ l₃.
+    #[serde(deserialize_with = "leg")]
+    pub leg: DriveConfig,
+}
+
+fn slide<'de, D: Deserializer<'de>>(table: D) -> Result<DriveConfig, D::Error> {
+    over(DrivesConfig::default().slide, table)
+}
+
+fn leg<'de, D: Deserializer<'de>>(table: D) -> Result<DriveConfig, D::Error> {
+    over(DrivesConfig::default().leg, table)
+}
+
+fn over<'de, D: Deserializer<'de>>(defaults: DriveConfig, given: D) -> Result<DriveConfig, D::Error> {
+    let mut table = Table::try_from(defaults).map_err(Error::custom)?;
+    table.extend(Table::deserialize(given)?);
+    table.try_into().map_err(Error::custom)
+}
+
+impl Default for DrivesConfig {
+    fn default() -> Self {
+        let leg = DriveConfig {
+            rated_force_n: 500.0,
+            max_force_n: 1000.0,
+            max_velocity_m_s: 0.4,
+            quick_stop_deceleration_m_s2: 10.0,
+            following_error_m: 0.002,
+            following_error_timeout_ms: 20,
+            position_gain_per_s: 100.0,
+            velocity_gain_n_s_per_m: 600.0,
+            velocity_integral_time_s: 0.01,
+            encoder_resolution_m: 1e-6,
+            encoder_noise_m: 0.2e-6,
+        };
+        let slide = DriveConfig {
+            rated_force_n: 250.0,
+            max_force_n: 500.0,
+            max_velocity_m_s: 0.2,
+            velocity_gain_n_s_per_m: 2000.0,
+            ..leg
+        };
+        Self { slide, leg }
+    }
+}
+
+/// Each quantity of both kinds of drives, with its key.
+macro_rules! of_both {
+    ($drives:expr, $($field:ident),+) => {
+        [$(
+            (concat!("drives.slide.", stringify!($field)), $drives.slide.$field),
+            (concat!("drives.leg.", stringify!($field)), $drives.leg.$field),
+        )+]
+    };
+}
+
+impl DrivesConfig {
+    /// The drive of an axis.
+    pub const fn of_axis(&self, axis: usize) -> DriveConfig {
+        if axis < LEGS { self.slide } else { self.leg }
+    }
+
+    pub(super) fn validate(&self) -> Result<(), ScenarioError> {
+        require_positive(&of_both!(
+            self,
+            rated_force_n,
+            max_force_n,
+            max_velocity_m_s,
+            quick_stop_deceleration_m_s2,
+            following_error_m,
+            position_gain_per_s,
+            velocity_gain_n_s_per_m,
+            velocity_integral_time_s,
+            encoder_resolution_m
+        ))?;
+        let noise = of_both!(self, encoder_noise_m);
+        require_within(&noise.map(|(key, value_m)| (key, value_m, 0.0, NOISIEST_M)))
+    }
+}
