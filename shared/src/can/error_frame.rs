@@ -32,13 +32,6 @@ pub enum ErrorKind {
     State(ErrorState),
 }
 
-impl ErrorKind {
-    /// Whether it put an error frame on the wire.
-    pub const fn is_error_frame(self) -> bool {
-        matches!(self, Self::Bit | Self::Acknowledge)
-    }
-}
-
 /// An error as a tap reports it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ErrorReport {

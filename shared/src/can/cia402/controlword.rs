@@ -46,10 +46,8 @@ impl Controlword {
     pub const QUICK_STOP: Self = Self(ENABLE_VOLTAGE);
     /// Shutdown.
     pub const SHUTDOWN: Self = Self(ENABLE_VOLTAGE | NO_QUICK_STOP);
-    /// Switch on.
+    /// Switch on; in operation enabled the same bits disable operation.
     pub const SWITCH_ON: Self = Self(Self::SHUTDOWN.0 | SWITCH_ON);
-    /// Disable operation: the bits of switch on, sent in operation enabled.
-    pub const DISABLE_OPERATION: Self = Self::SWITCH_ON;
     /// Enable operation.
     pub const ENABLE_OPERATION: Self = Self(Self::SWITCH_ON.0 | ENABLE_OPERATION);
     /// Fault reset; it takes a controlword without this bit before it.
@@ -123,7 +121,6 @@ mod tests {
         let table = [
             (Controlword::SHUTDOWN, 0x06, Command::Shutdown),
             (Controlword::SWITCH_ON, 0x07, Command::SwitchOn),
-            (Controlword::DISABLE_OPERATION, 0x07, Command::SwitchOn),
             (Controlword::ENABLE_OPERATION, 0x0F, Command::EnableOperation),
             (Controlword::DISABLE_VOLTAGE, 0x00, Command::DisableVoltage),
             (Controlword::QUICK_STOP, 0x02, Command::QuickStop),

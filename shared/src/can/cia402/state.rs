@@ -2,32 +2,31 @@
 
 use std::fmt;
 
-use crate::messages::codes::{DriveCondition, UnknownCode};
+use crate::messages::codes::DriveCondition;
 
 /// State of a drive's power (CiA 402).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[repr(u32)]
 pub enum DriveState {
     /// Initialising.
-    NotReadyToSwitchOn = 1,
+    NotReadyToSwitchOn,
     /// No voltage allowed.
-    SwitchOnDisabled = 2,
+    SwitchOnDisabled,
     /// Voltage may be applied.
-    ReadyToSwitchOn = 3,
+    ReadyToSwitchOn,
     /// Voltage applied, no force.
-    SwitchedOn = 4,
+    SwitchedOn,
     /// Following targets.
-    OperationEnabled = 5,
+    OperationEnabled,
     /// Braking along the quick-stop ramp.
-    QuickStopActive = 6,
+    QuickStopActive,
     /// Reacting to a fault.
-    FaultReactionActive = 7,
+    FaultReactionActive,
     /// In fault, free of force.
-    Fault = 8,
+    Fault,
 }
 
 impl DriveState {
-    /// Every state, in the order of the codes.
+    /// Every state.
     pub const ALL: [Self; 8] = [
         Self::NotReadyToSwitchOn,
         Self::SwitchOnDisabled,
@@ -38,20 +37,6 @@ impl DriveState {
         Self::FaultReactionActive,
         Self::Fault,
     ];
-
-    /// The number that messages carry, the same as the [`DriveCondition`]'s.
-    pub const fn code(self) -> u32 {
-        self as u32
-    }
-}
-
-impl TryFrom<u32> for DriveState {
-    type Error = UnknownCode;
-
-    fn try_from(code: u32) -> Result<Self, UnknownCode> {
-        let unknown = UnknownCode { enumeration: "DriveState", code };
-        Self::ALL.into_iter().find(|state| state.code() == code).ok_or(unknown)
-    }
 }
 
 impl From<DriveState> for DriveCondition {
@@ -72,21 +57,5 @@ impl From<DriveState> for DriveCondition {
 impl fmt::Display for DriveState {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         DriveCondition::from(*self).fmt(f)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn codes_are_those_of_the_messages() {
-        for state in DriveState::ALL {
-            assert_eq!(DriveState::try_from(state.code()), Ok(state));
-            assert_eq!(DriveCondition::from(state).code(), state.code());
-        }
-        for code in [DriveCondition::Unknown.code(), 9] {
-            assert_eq!(DriveState::try_from(code), Err(UnknownCode { enumeration: "DriveState", code }));
-        }
     }
 }

@@ -11,9 +11,6 @@ macro_rules! abort_codes {
         impl AbortCode {
             $(#[doc = concat!("The ", $meaning, ".")] pub const $name: Self = Self($code);)*
 
-            /// The codes that CiA 301 defines.
-            pub const KNOWN: &[Self] = &[$(Self::$name),*];
-
             /// What the standard says it means; `None` for a code of a manufacturer.
             pub const fn meaning(self) -> Option<&'static str> {
                 match self.0 {

@@ -1,7 +1,6 @@
 //! What a single SDO message can carry of an object's value.
 
-/// Flag of an expedited message: the number of bytes is told.
-const SIZED: u8 = super::SIZED;
+use super::{EXPEDITED, SIZED};
 
 /// Data that one SDO message cannot carry.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
@@ -70,7 +69,7 @@ impl Expedited {
 
     pub(super) const fn flags(self) -> u8 {
         let unused = Self::MAX as u8 - self.length;
-        super::EXPEDITED | if self.is_sized { SIZED | unused << 2 } else { 0 }
+        EXPEDITED | if self.is_sized { SIZED | unused << 2 } else { 0 }
     }
 
     pub(super) const fn padded(self) -> [u8; Self::MAX] {

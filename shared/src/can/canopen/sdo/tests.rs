@@ -92,7 +92,6 @@ fn block_transfer_is_refused_with_its_object() {
 fn abort_codes_say_what_they_mean() {
     assert_eq!(AbortCode::NO_SUBINDEX.to_string(), "06090011h (sub-index does not exist)");
     assert_eq!(AbortCode(0x0F00_FFC0).to_string(), "0F00FFC0h");
-    assert!(AbortCode::KNOWN.iter().all(|code| code.meaning().is_some()));
 }
 
 fn any_object() -> impl Strategy<Value = ObjectAddress> {

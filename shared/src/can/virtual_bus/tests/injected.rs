@@ -52,7 +52,7 @@ fn a_frame_that_is_always_corrupted_takes_its_sender_off_the_bus_alone() {
     assert_eq!((wire.statistics().bus_offs, wire.statistics().abandoned), (1, 1));
     assert_eq!(of(&wire), [(0, 32), (0, 0), (0, 32)], "restarted after a millisecond, counters cleared");
     let states: Vec<_> =
-        errors(&mut wire).into_iter().filter(|report| !report.kind.is_error_frame()).collect();
+        errors(&mut wire).into_iter().filter(|report| matches!(report.kind, ErrorKind::State(_))).collect();
     let kinds: Vec<_> = states.iter().map(|report| (report.port, report.kind)).collect();
     let state = |state| (1, ErrorKind::State(state));
     assert_eq!(kinds, [state(ErrorState::Passive), state(ErrorState::BusOff), state(ErrorState::Active)]);
@@ -192,7 +192,7 @@ proptest! {
         prop_assert!(seen.is_sorted_by_key(Tapped::time_ns));
         let frames = seen.iter().filter(|tapped| tapped.frame().is_some()).count() as u64;
         let error_frames = seen.iter().filter(|tapped| {
-            matches!(tapped, Tapped::Error(report) if report.kind.is_error_frame())
+            matches!(tapped, Tapped::Error(report) if !matches!(report.kind, ErrorKind::State(_)))
         }).count() as u64;
         let statistics = wire.statistics();
         prop_assert_eq!((frames, error_frames), (statistics.frames, statistics.error_frames));
