@@ -119,7 +119,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     SocketPair::open([a, b], format)?;
     conformance::check(pair)?;
     println!("{a} and {b} keep the laws of the bus:");
-    for law in conformance::LAWS {
+    for law in conformance::Law::OF_EVERY_BUS {
         println!("  {law}");
     }
     Ok(())

@@ -7,12 +7,9 @@ use std::fmt::{self, Write};
 
 use super::error_frame::ErrorReport;
 use super::frame::{Frame, FrameError, FrameFormat};
-use super::id::CanId;
+use super::id::{CanIdError, digits};
 use super::tap::{self, TapError, Tapped};
 use crate::messages::FrameTap;
-
-const STANDARD_DIGITS: usize = 3;
-const EXTENDED_DIGITS: usize = 8;
 
 /// One line, read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -40,12 +37,9 @@ pub enum CandumpError {
         /// The first field.
         text: String,
     },
-    /// The frame has no identifier of 3 or 8 hexadecimal digits.
-    #[error("`{text}` is no identifier of 3 or 8 hexadecimal digits")]
-    Id {
-        /// What stands before `#`.
-        text: String,
-    },
+    /// What stands before `#` is no identifier.
+    #[error(transparent)]
+    Id(#[from] CanIdError),
     /// The data are no whole bytes.
     #[error("`{text}` is no data of whole bytes in hexadecimal digits (remote frames are refused)")]
     Data {
@@ -148,28 +142,13 @@ fn parse_frame(id: &str, format: FrameFormat, data: &str) -> Result<Frame, Candu
         let value = str::from_utf8(pair).ok().and_then(|pair| digits(pair, 16));
         *byte = value.ok_or_else(wrong_data)? as u8;
     }
-    Ok(Frame::with_format(parse_id(id)?, format, used)?)
-}
-
-pub(super) fn parse_id(text: &str) -> Result<CanId, CandumpError> {
-    let wrong = || CandumpError::Id { text: text.to_owned() };
-    let number = digits(text, 16).ok_or_else(wrong)?;
-    match text.len() {
-        STANDARD_DIGITS => Ok(CanId::standard(number as u16)?),
-        EXTENDED_DIGITS => Ok(CanId::extended(number as u32)?),
-        _ => Err(wrong()),
-    }
-}
-
-/// A number of digits only: `from_str_radix` alone would take a sign.
-pub(super) fn digits(text: &str, radix: u32) -> Option<u64> {
-    let all_digits = text.chars().all(|digit| digit.is_digit(radix));
-    if all_digits { u64::from_str_radix(text, radix).ok() } else { None }
+    Ok(Frame::with_format(id.parse()?, format, used)?)
 }
 
 #[cfg(test)]
 mod tests {
     use super::super::frame::strategies::any_frame;
+    use super::super::id::CanId;
     use super::*;
     use crate::messages::CanData;
     use proptest::prelude::*;

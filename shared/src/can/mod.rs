@@ -25,7 +25,7 @@ pub mod wrapped;
 pub use bus::{Bus, BusStatus, ErrorState, ReceiveError, Received, SendError};
 pub use error_frame::{ErrorKind, ErrorReport, ErrorReportError};
 pub use frame::{Frame, FrameError, FrameFormat};
-pub use id::CanId;
+pub use id::{CanId, CanIdError};
 pub use pdo::{EVERY_SYNC, Rpdo1, Tpdo1};
 pub use plan::{BusPlan, NoReleaser, Overload, PeriodicMessage, PlannedMessage};
 pub use socket_can::{OpenError, SocketCan};

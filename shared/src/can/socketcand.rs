@@ -10,8 +10,8 @@
 use std::fmt::{self, Write};
 
 use super::bus::Received;
-use super::candump::{self, CandumpError};
 use super::frame::{Frame, FrameError};
+use super::id::{CanIdError, digits};
 
 /// What the server says first.
 pub const GREETING: &str = "< hi >";
@@ -61,7 +61,7 @@ pub enum RequestError {
     },
     /// The identifier is none.
     #[error(transparent)]
-    Id(#[from] CandumpError),
+    Id(#[from] CanIdError),
     /// The frame cannot exist.
     #[error(transparent)]
     Frame(#[from] FrameError),
@@ -132,11 +132,11 @@ fn parse_send(id: &str, length: &str, data: &[&str]) -> Result<Request, RequestE
         return Err(RequestError::Length { announced: length.to_owned(), sent: data.len() });
     }
     let byte = |text: &&str| {
-        let value = candump::digits(text, 16).and_then(|value| u8::try_from(value).ok());
+        let value = digits(text, 16).and_then(|value| u8::try_from(value).ok());
         value.ok_or_else(|| RequestError::Byte { text: (*text).to_owned() })
     };
     let data = data.iter().map(byte).collect::<Result<Vec<u8>, _>>()?;
-    Ok(Request::Send(Frame::new(candump::parse_id(id)?, &data)?))
+    Ok(Request::Send(Frame::new(id.parse()?, &data)?))
 }
 
 /// Writes a received frame. Its time keeps whole microseconds, as the format does.

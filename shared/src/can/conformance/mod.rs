@@ -6,6 +6,8 @@
 #[cfg(test)]
 mod tests;
 
+use std::fmt;
+
 use super::bus::{Bus, ReceiveError, Received, SendError};
 use super::frame::{Frame, FrameFormat};
 use super::id::CanId;
@@ -13,16 +15,45 @@ use super::id::CanId;
 /// Frames sent at once by the check for losses: more than any sensible queue holds.
 const BURST: u32 = 20_000;
 
-/// The laws of every bus, in the order in which they are checked.
-pub const LAWS: [&str; 4] = [
-    "a frame is received once, with its identifier and data, at a time not before its predecessor's",
-    "a port does not receive its own frames",
-    "a frame is refused because the queue is full, or received, or reported as lost",
-    "a frame in FD format arrives unchanged where the ports speak FD, and is refused where they do not",
-];
+/// What a bus keeps to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Law {
+    /// What is sent arrives once, unchanged and in order.
+    Delivery,
+    /// Nobody hears himself.
+    NoEcho,
+    /// Nothing is lost silently.
+    Losses,
+    /// Frames in FD format arrive as they are, or are refused.
+    Fd,
+    /// Of buses that send by priority: the smaller identifier goes first.
+    Arbitration,
+}
 
-/// The law of buses that send by priority.
-pub const LAW_OF_ARBITRATION: &str = "of frames sent at once, the lowest identifier goes first";
+impl Law {
+    /// Those of every bus, in the order in which they are checked.
+    pub const OF_EVERY_BUS: [Self; 4] = [Self::Delivery, Self::NoEcho, Self::Losses, Self::Fd];
+
+    fn broken(self, observed: &impl fmt::Debug) -> Violation {
+        Violation { law: self, observed: format!("{observed:?}") }
+    }
+}
+
+impl fmt::Display for Law {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Delivery => {
+                "a frame is received once, with its identifier and data, at a time not before its predecessor's"
+            }
+            Self::NoEcho => "a port does not receive its own frames",
+            Self::Losses => "a frame is refused because the queue is full, or received, or reported as lost",
+            Self::Fd => {
+                "a frame in FD format arrives unchanged where the ports speak FD, and is refused where they do not"
+            }
+            Self::Arbitration => "of frames sent at once, the lowest identifier goes first",
+        })
+    }
+}
 
 /// One of the two ports.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -54,7 +85,7 @@ pub trait Pair {
 #[error("{law}: {observed}")]
 pub struct Violation {
     /// The law.
-    pub law: &'static str,
+    pub law: Law,
     /// What happened instead.
     pub observed: String,
 }
@@ -80,79 +111,71 @@ pub fn check_arbitration<P: Pair>(mut pair: impl FnMut() -> P) -> Result<(), Vio
     frames
         .iter()
         .try_for_each(|&frame| send(&mut pair, frame))
-        .map_err(|error| violated(LAW_OF_ARBITRATION, &error))?;
+        .map_err(|error| Law::Arbitration.broken(&error))?;
     pair.settle();
-    let (received, _) = drain(&mut pair, End::B).map_err(|error| violated(LAW_OF_ARBITRATION, &error))?;
+    let (received, _) = drain(&mut pair, End::B).map_err(|error| Law::Arbitration.broken(&error))?;
     let ids: Vec<_> = received.iter().map(|received| received.frame.id()).collect();
-    if ids.is_sorted() && ids.len() == frames.len() {
-        Ok(())
-    } else {
-        Err(violated(LAW_OF_ARBITRATION, &ids))
-    }
+    if ids.is_sorted() && ids.len() == frames.len() { Ok(()) } else { Err(Law::Arbitration.broken(&ids)) }
 }
 
 fn frames_arrive_once_unchanged_and_in_order(pair: &mut impl Pair) -> Result<(), Violation> {
-    let [law, ..] = LAWS;
     let (format, mut last_ns) = (pair.format(), 0);
     for number in 0..=u32::from(u8::MAX) {
         let sent = frame(0x100 + (number % 7) as u16, number);
-        send(pair, sent).map_err(|error| violated(law, &error))?;
+        send(pair, sent).map_err(|error| Law::Delivery.broken(&error))?;
         pair.settle();
-        let (received, lost) = drain(pair, End::B).map_err(|error| violated(law, &error))?;
+        let (received, lost) = drain(pair, End::B).map_err(|error| Law::Delivery.broken(&error))?;
         match received[..] {
             [Received { frame, time_ns }]
                 if frame == sent.promoted(format) && time_ns >= last_ns && lost == 0 =>
             {
                 last_ns = time_ns;
             }
-            _ => return Err(violated(law, &(sent, received, lost))),
+            _ => return Err(Law::Delivery.broken(&(sent, received, lost))),
         }
     }
     Ok(())
 }
 
 fn senders_do_not_hear_themselves(pair: &mut impl Pair) -> Result<(), Violation> {
-    let [_, law, ..] = LAWS;
-    send(pair, frame(0x123, 0)).map_err(|error| violated(law, &error))?;
+    send(pair, frame(0x123, 0)).map_err(|error| Law::NoEcho.broken(&error))?;
     pair.settle();
     match drain(pair, End::A) {
         Ok((received, 0)) if received.is_empty() => Ok(()),
-        other => Err(violated(law, &other)),
+        other => Err(Law::NoEcho.broken(&other)),
     }
 }
 
 fn nothing_is_lost_silently<P: Pair>(pair: &mut P) -> Result<(), Violation> {
-    let [_, _, law, _] = LAWS;
     let mut accepted = 0;
     for number in 0..BURST {
         match send(pair, frame(0x123, number)) {
             Ok(()) => accepted += 1,
             Err(SendError::QueueFull { .. }) => break,
-            Err(other) => return Err(violated(law, &other)),
+            Err(other) => return Err(Law::Losses.broken(&other)),
         }
     }
     pair.settle();
-    let (received, lost) = drain(pair, End::B).map_err(|error| violated(law, &error))?;
+    let (received, lost) = drain(pair, End::B).map_err(|error| Law::Losses.broken(&error))?;
     if is_accounted_for(P::COUNTS_LOSSES, accepted, received.len() as u64, lost) {
         Ok(())
     } else {
-        Err(violated(law, &(accepted, received.len(), lost)))
+        Err(Law::Losses.broken(&(accepted, received.len(), lost)))
     }
 }
 
 fn fd_frames_arrive_or_are_refused(pair: &mut impl Pair) -> Result<(), Violation> {
-    let [_, _, _, law] = LAWS;
     for sent in fd_frames() {
         match send(pair, sent) {
             Ok(()) if pair.format().is_fd() => {}
             Err(SendError::NotFd { .. }) if !pair.format().is_fd() => continue,
-            other => return Err(violated(law, &(sent, other))),
+            other => return Err(Law::Fd.broken(&(sent, other))),
         }
         pair.settle();
-        let received = drain(pair, End::B).map_err(|error| violated(law, &error))?;
+        let received = drain(pair, End::B).map_err(|error| Law::Fd.broken(&error))?;
         let is_it = matches!(&received, (frames, 0) if frames.len() == 1 && frames[0].frame == sent);
         if !is_it {
-            return Err(violated(law, &(sent, received)));
+            return Err(Law::Fd.broken(&(sent, received)));
         }
     }
     Ok(())
@@ -195,8 +218,4 @@ fn drain(pair: &mut impl Pair, end: End) -> Result<(Vec<Received>, u64), Receive
             Err(other) => return Err(other),
         }
     }
-}
-
-fn violated(law: &'static str, observed: &impl std::fmt::Debug) -> Violation {
-    Violation { law, observed: format!("{observed:?}") }
 }
