@@ -23,7 +23,7 @@ use masseter_shared::messages::codes::Source;
 use masseter_shared::messages::{Command as CommandMessage, Event, FrameTap, Reading, State, Truth};
 use masseter_shared::realtime::Cycle;
 use masseter_shared::realtime::scheduling::{Wanted, obtain};
-use masseter_shared::transport::{BatchOutlet, Domain, Node, Outlet};
+use masseter_shared::transport::{BatchOutlet, Node, Outlet, ScratchDomain};
 use rustix::process::{Pid, Signal, kill_process};
 
 const MASSETER: &str = env!("CARGO_BIN_EXE_masseter");
@@ -131,8 +131,7 @@ impl Outlets {
 fn through_the_logger(cycles: &[Vec<Recorded>], folder: &Path, recording: &Path) -> anyhow::Result<()> {
     let scenario = folder.join("scenario.toml");
     fs::write(&scenario, Scenario::default().to_toml())?;
-    let domain = Domain::named(&format!("bench-{}", std::process::id()))?;
-    let claim = domain.claim()?;
+    let domain = ScratchDomain::claim("bench")?;
     {
         let node = Node::join(&domain)?;
         let mut outlets = Outlets::open(&node)?;
@@ -158,8 +157,6 @@ fn through_the_logger(cycles: &[Vec<Recorded>], folder: &Path, recording: &Path)
     let proof = Command::new(MASSETER).args(["log", "verify"]).arg(recording).output()?;
     print!("{}", String::from_utf8_lossy(&proof.stdout));
     ensure!(proof.status.success(), "the recording is not whole: {}", String::from_utf8_lossy(&proof.stderr));
-    drop(claim);
-    domain.sweep()?;
     Ok(())
 }
 

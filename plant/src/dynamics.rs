@@ -11,14 +11,12 @@
 //!
 //! Left out: end stops, play, and elasticity.
 
-
 use masseter_shared::config::DynamicsConfig;
 use masseter_shared::geometry::{AXES, InverseError, Jacobian, Joints, LEGS, Mechanism, Pose, Twist, Vec3};
 use nalgebra::{Matrix3, Matrix6, UnitQuaternion, Vector3, Vector6};
 
 use crate::food::Food;
 use crate::friction::Friction;
-
 
 /// The moving mechanism.
 #[derive(Debug, Clone)]

@@ -7,7 +7,7 @@
 use iceoryx2::port::backpressure_strategy::BackpressureStrategy;
 use masseter_shared::clock;
 use masseter_shared::messages::Reading;
-use masseter_shared::transport::{Domain, Node};
+use masseter_shared::transport::{Domain, Node, ScratchDomain};
 
 use super::contender::{Durations, durations, record};
 use super::contest::{Outcome, Turn};
@@ -21,19 +21,16 @@ const DEPTH: usize = 64;
 const MESSAGES: usize = 20_000;
 
 pub(super) fn measure(rounds: u32, core: usize) -> anyhow::Result<Outcome> {
-    let domain = Domain::named(&format!("bench-{}", std::process::id()))?;
-    let claim = domain.claim()?;
+    let domain = ScratchDomain::claim("bench")?;
     let turns = OBSERVERS.map(|observers| {
         let domain = &domain;
         let turn: Turn = Box::new(move || Ok(on_core(core, || publish_to(domain, observers))?.into()));
         (name(observers), turn)
     });
     let measures = "loaning, filling and sending one reading".to_owned();
-    let outcome = Outcome::of_turns("subscribers", measures, rounds, core, turns.into());
-    drop(claim);
-    domain.sweep()?;
+    let outcome = Outcome::of_turns("subscribers", measures, rounds, core, turns.into())?;
     let [fewest, more @ ..] = OBSERVERS;
-    Ok(outcome?.comparing(more.map(|observers| (name(observers), name(fewest)))))
+    Ok(outcome.comparing(more.map(|observers| (name(observers), name(fewest)))))
 }
 
 fn name(observers: usize) -> String {

@@ -10,5 +10,5 @@ mod domain;
 mod ports;
 
 pub use batches::{BatchInlet, BatchOutlet, ReceivedBatch};
-pub use domain::{Claim, Domain, DomainError};
+pub use domain::{Claim, Domain, DomainError, ScratchDomain};
 pub use ports::{Inlet, Node, Outlet, Received, TransportError};

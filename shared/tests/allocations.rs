@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use masseter_shared::clock;
 use masseter_shared::messages::{Command, Event, FrameTap, Message, Reading, State, Truth};
 use masseter_shared::realtime::Cycle;
-use masseter_shared::transport::{Domain, Node};
+use masseter_shared::transport::{Node, ScratchDomain};
 
 struct Counting;
 
@@ -98,29 +98,24 @@ fn check_batches(node: &Node) {
 
 #[test]
 fn waiting_and_receiving_allocate_nothing_and_sending_one_small_counter() {
-    let domain = Domain::named(&format!("test-allocations-{}", std::process::id())).unwrap();
-    let claim = domain.claim().unwrap();
-    {
-        let node = Node::join(&domain).unwrap();
-        check_topic::<Command>(&node);
-        check_topic::<Reading>(&node);
-        check_topic::<State>(&node);
-        check_topic::<Truth>(&node);
-        check_batches(&node);
-        check_topic::<Event>(&node);
+    let domain = ScratchDomain::claim("test-allocations").unwrap();
+    let node = Node::join(&domain).unwrap();
+    check_topic::<Command>(&node);
+    check_topic::<Reading>(&node);
+    check_topic::<State>(&node);
+    check_topic::<Truth>(&node);
+    check_batches(&node);
+    check_topic::<Event>(&node);
 
-        let inlet = node.inlet::<Command>().unwrap();
-        let mut cycle = Cycle::new(clock::now_ns() + PERIOD_NS, PERIOD_NS);
-        let waiting = allocations_of(|| {
-            for _ in 0..20 {
-                let wake = cycle.wait();
-                let deadline_ns = wake.woke_ns + PERIOD_NS / 10;
-                assert!(inlet.latest_by(deadline_ns, cycle.waiter(), |_| true).unwrap().is_none());
-            }
-        });
-        assert_eq!(waiting, (0, 0));
-    }
-    drop(claim);
-    domain.sweep().unwrap();
+    let inlet = node.inlet::<Command>().unwrap();
+    let mut cycle = Cycle::new(clock::now_ns() + PERIOD_NS, PERIOD_NS);
+    let waiting = allocations_of(|| {
+        for _ in 0..20 {
+            let wake = cycle.wait();
+            let deadline_ns = wake.woke_ns + PERIOD_NS / 10;
+            assert!(inlet.latest_by(deadline_ns, cycle.waiter(), |_| true).unwrap().is_none());
+        }
+    });
+    assert_eq!(waiting, (0, 0));
     assert!(allocations_of(|| drop(black_box(vec![1u8]))).0 > 0, "the counter counts");
 }

@@ -1,7 +1,7 @@
 //! Connections that cannot be made. Alone in its file: the limit that refuses them is the whole process's.
 
 use masseter_shared::messages::{Event, FrameTap};
-use masseter_shared::transport::{Domain, Node, TransportError};
+use masseter_shared::transport::{Node, ScratchDomain, TransportError};
 use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
 
 /// What `connect` says where no file may be opened.
@@ -22,8 +22,7 @@ fn assert_tells(told: &str, topic: &str) {
 
 #[test]
 fn a_connection_that_is_refused_is_told_of() {
-    let domain = Domain::named(&format!("test-connections-{}", std::process::id())).unwrap();
-    let claim = domain.claim().unwrap();
+    let domain = ScratchDomain::claim("test-connections").unwrap();
     {
         let node = Node::join(&domain).unwrap();
         let outlet = node.outlet::<Event>().unwrap();
@@ -44,6 +43,4 @@ fn a_connection_that_is_refused_is_told_of() {
         let _outlet = node.batch_outlet::<FrameTap>().unwrap();
         assert_tells(&refused(|| inlet.receive()), "frame");
     }
-    drop(claim);
-    domain.sweep().unwrap();
 }

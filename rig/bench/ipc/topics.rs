@@ -9,7 +9,7 @@ use iceoryx2::port::subscriber::Subscriber;
 use iceoryx2::prelude::ipc;
 use masseter_shared::clock;
 use masseter_shared::messages::{Command, Message, Reading};
-use masseter_shared::transport::{Domain, Inlet, Node, Outlet};
+use masseter_shared::transport::{Domain, Inlet, Node, Outlet, ScratchDomain};
 
 use super::peer::{Channel, Peer};
 use super::{poll, time};
@@ -133,17 +133,9 @@ pub(super) fn round_trips<E: Ends>(
     channel: Channel,
     [own_core, peer_core]: [usize; 2],
 ) -> anyhow::Result<Durations> {
-    let domain = Domain::named(&format!("bench-{}", std::process::id()))?;
-    let claim = domain.claim()?;
-    let result = {
-        let peer = Peer::start(channel, peer_core, Some(&domain), [Stdio::null(), Stdio::null()])?;
-        let result = on_core(own_core, || exchange::<E>(&Node::join(&domain)?));
-        drop(peer);
-        result
-    };
-    drop(claim);
-    domain.sweep()?;
-    result
+    let domain = ScratchDomain::claim("bench")?;
+    let _peer = Peer::start(channel, peer_core, Some(&domain), [Stdio::null(), Stdio::null()])?;
+    on_core(own_core, || exchange::<E>(&Node::join(&domain)?))
 }
 
 fn exchange<E: Ends>(node: &Node) -> anyhow::Result<Durations> {

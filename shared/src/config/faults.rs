@@ -6,8 +6,8 @@ use std::fmt::Display;
 use serde::{Deserialize, Serialize};
 
 use super::ScenarioError;
-use crate::can::canopen::NodeId;
 use super::need::{require_not_negative, require_within};
+use crate::can::canopen::NodeId;
 
 /// What goes wrong.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -84,7 +84,8 @@ impl FaultConfig {
             return refuse("faults.kind", &"corrupt", need);
         }
         if let Some(node) = self.node.filter(|&node| node != NodeId::MASTER.get()) {
-            let need = format!("on a real interface only the master (node {}) can be given faults", NodeId::MASTER);
+            let need =
+                format!("on a real interface only the master (node {}) can be given faults", NodeId::MASTER);
             return refuse("faults.node", &node, need);
         }
         Ok(())

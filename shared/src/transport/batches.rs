@@ -124,50 +124,40 @@ impl<M: Message> BatchInlet<M> {
 mod tests {
     use super::*;
     use crate::messages::FrameTap;
-    use crate::transport::Domain;
+    use crate::transport::ScratchDomain;
 
     #[test]
     fn messages_arrive_in_order_however_many_come_at_once() {
-        let domain = Domain::named(&format!("test-batches-{}", std::process::id())).unwrap();
-        let claim = domain.claim().unwrap();
-        {
-            let node = Node::join(&domain).unwrap();
-            let inlet = node.batch_inlet::<FrameTap>().unwrap();
-            let mut outlet = node.batch_outlet::<FrameTap>().unwrap();
-            let mut sent = 0;
-            for count in [0, 1, BATCH, BATCH + 1, 5 * BATCH, 3] {
-                let frames: Vec<_> =
-                    (0..count).map(|id| FrameTap { id: id as u32, ..FrameTap::default() }).collect();
-                outlet.publish(&frames).unwrap();
-                let mut received = Vec::new();
-                while let Some(batch) = inlet.receive().unwrap() {
-                    received.extend(batch.iter().map(|frame| (frame.seq, frame.id)));
-                }
-                let expected: Vec<_> = (0..count as u32).map(|id| (sent + 1 + u64::from(id), id)).collect();
-                assert_eq!(received, expected);
-                sent += count as u64;
+        let domain = ScratchDomain::claim("test-batches").unwrap();
+        let node = Node::join(&domain).unwrap();
+        let inlet = node.batch_inlet::<FrameTap>().unwrap();
+        let mut outlet = node.batch_outlet::<FrameTap>().unwrap();
+        let mut sent = 0;
+        for count in [0, 1, BATCH, BATCH + 1, 5 * BATCH, 3] {
+            let frames: Vec<_> =
+                (0..count).map(|id| FrameTap { id: id as u32, ..FrameTap::default() }).collect();
+            outlet.publish(&frames).unwrap();
+            let mut received = Vec::new();
+            while let Some(batch) = inlet.receive().unwrap() {
+                received.extend(batch.iter().map(|frame| (frame.seq, frame.id)));
             }
+            let expected: Vec<_> = (0..count as u32).map(|id| (sent + 1 + u64::from(id), id)).collect();
+            assert_eq!(received, expected);
+            sent += count as u64;
         }
-        drop(claim);
-        domain.sweep().unwrap();
     }
 
     #[test]
     fn who_falls_behind_loses_the_oldest_and_sees_the_gap() {
-        let domain = Domain::named(&format!("test-behind-{}", std::process::id())).unwrap();
-        let claim = domain.claim().unwrap();
-        {
-            let node = Node::join(&domain).unwrap();
-            let inlet = node.batch_inlet::<FrameTap>().unwrap();
-            let mut outlet = node.batch_outlet::<FrameTap>().unwrap();
-            let frames = [FrameTap::default(); BATCH];
-            for _ in 0..FrameTap::DEPTH / BATCH + 2 {
-                outlet.publish(&frames).unwrap();
-            }
-            let oldest = inlet.receive().unwrap().unwrap();
-            assert_eq!(oldest[0].seq, 2 * BATCH as u64 + 1);
+        let domain = ScratchDomain::claim("test-behind").unwrap();
+        let node = Node::join(&domain).unwrap();
+        let inlet = node.batch_inlet::<FrameTap>().unwrap();
+        let mut outlet = node.batch_outlet::<FrameTap>().unwrap();
+        let frames = [FrameTap::default(); BATCH];
+        for _ in 0..FrameTap::DEPTH / BATCH + 2 {
+            outlet.publish(&frames).unwrap();
         }
-        drop(claim);
-        domain.sweep().unwrap();
+        let oldest = inlet.receive().unwrap().unwrap();
+        assert_eq!(oldest[0].seq, 2 * BATCH as u64 + 1);
     }
 }

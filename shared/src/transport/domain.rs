@@ -5,6 +5,7 @@
 
 use std::fs::{self, File, TryLockError};
 use std::io;
+use std::ops::Deref;
 use std::path::{Path, PathBuf};
 
 use rustix::io::{FdFlags, fcntl_setfd};
@@ -52,6 +53,38 @@ pub enum DomainError {
 #[derive(Debug)]
 pub struct Claim {
     _lock: File,
+}
+
+/// A domain that is swept when it goes, for tests and measurements.
+#[derive(Debug)]
+pub struct ScratchDomain {
+    domain: Domain,
+    claim: Option<Claim>,
+}
+
+impl ScratchDomain {
+    /// Claims a domain of that name that no other process takes.
+    pub fn claim(name: &str) -> Result<Self, DomainError> {
+        let domain = Domain::named(&format!("{name}-{}", std::process::id()))?;
+        let claim = Some(domain.claim()?);
+        Ok(Self { domain, claim })
+    }
+}
+
+impl Deref for ScratchDomain {
+    type Target = Domain;
+
+    fn deref(&self) -> &Domain {
+        &self.domain
+    }
+}
+
+impl Drop for ScratchDomain {
+    fn drop(&mut self) {
+        drop(self.claim.take());
+        // What cannot be removed now is left to `masseter clean`.
+        let _ = self.domain.sweep();
+    }
 }
 
 impl Domain {
@@ -198,6 +231,17 @@ mod tests {
         assert!(!domain.is_alive().unwrap());
         assert_eq!(domain.sweep().unwrap(), Some(0));
         assert!(!domain.root().exists());
+    }
+
+    #[test]
+    fn a_scratch_domain_leaves_nothing_behind() {
+        let scratch = ScratchDomain::claim("test-scratch").unwrap();
+        let domain = (*scratch).clone();
+        let file = Path::new(SHARED_MEMORY).join(format!("{}segment", domain.prefix()));
+        fs::write(&file, "").unwrap();
+        assert!(domain.is_alive().unwrap());
+        drop(scratch);
+        assert!(!file.exists() && !domain.root().exists());
     }
 
     #[test]

@@ -263,76 +263,62 @@ impl<M: Message> Inlet<M> {
 mod tests {
     use super::*;
     use crate::messages::Event;
+    use crate::transport::ScratchDomain;
 
     #[test]
     fn the_newest_message_is_found_among_many_and_while_one_is_held() {
-        let domain = Domain::named(&format!("test-ports-{}", std::process::id())).unwrap();
-        let claim = domain.claim().unwrap();
-        {
-            let node = Node::join(&domain).unwrap();
-            let inlet = node.inlet::<Event>().unwrap();
-            let mut outlet = node.outlet::<Event>().unwrap();
-            let mut waiter = Waiter::new(1_000_000);
-            for round in 1..=3 {
-                for cycle in 0..5 {
-                    outlet.publish(|event| event.cycle = round * 10 + cycle).unwrap();
-                }
-                let held = inlet.receive().unwrap().unwrap();
-                assert_eq!(held.cycle, round * 10);
-                let newest = inlet.latest_by(0, &mut waiter, |event| event.cycle > 1000).unwrap().unwrap();
-                assert_eq!((newest.cycle, newest.seq), (round * 10 + 4, round * 5));
-                assert!(inlet.receive().unwrap().is_none());
+        let domain = ScratchDomain::claim("test-ports").unwrap();
+        let node = Node::join(&domain).unwrap();
+        let inlet = node.inlet::<Event>().unwrap();
+        let mut outlet = node.outlet::<Event>().unwrap();
+        let mut waiter = Waiter::new(1_000_000);
+        for round in 1..=3 {
+            for cycle in 0..5 {
+                outlet.publish(|event| event.cycle = round * 10 + cycle).unwrap();
             }
+            let held = inlet.receive().unwrap().unwrap();
+            assert_eq!(held.cycle, round * 10);
+            let newest = inlet.latest_by(0, &mut waiter, |event| event.cycle > 1000).unwrap().unwrap();
+            assert_eq!((newest.cycle, newest.seq), (round * 10 + 4, round * 5));
+            assert!(inlet.receive().unwrap().is_none());
         }
-        drop(claim);
-        domain.sweep().unwrap();
     }
 
     #[test]
     fn what_follows_the_awaited_message_is_left_for_the_next_wait() {
-        let domain = Domain::named(&format!("test-awaited-{}", std::process::id())).unwrap();
-        let claim = domain.claim().unwrap();
-        {
-            let node = Node::join(&domain).unwrap();
-            let inlet = node.inlet::<Event>().unwrap();
-            let mut outlet = node.outlet::<Event>().unwrap();
-            for cycle in 1..=5 {
-                outlet.publish(|event| event.cycle = cycle).unwrap();
-            }
-            let mut waiter = Waiter::new(1_000_000);
-            let deadline_ns = clock::now_ns() + 1_000_000_000;
-            let mut wait = |cycle| {
-                let found = inlet.latest_by(deadline_ns, &mut waiter, |event| event.cycle >= cycle).unwrap();
-                found.map(|event| event.cycle)
-            };
-            assert_eq!([3, 4, 2].map(&mut wait), [Some(3), Some(4), Some(5)]);
+        let domain = ScratchDomain::claim("test-awaited").unwrap();
+        let node = Node::join(&domain).unwrap();
+        let inlet = node.inlet::<Event>().unwrap();
+        let mut outlet = node.outlet::<Event>().unwrap();
+        for cycle in 1..=5 {
+            outlet.publish(|event| event.cycle = cycle).unwrap();
         }
-        drop(claim);
-        domain.sweep().unwrap();
+        let mut waiter = Waiter::new(1_000_000);
+        let deadline_ns = clock::now_ns() + 1_000_000_000;
+        let mut wait = |cycle| {
+            let found = inlet.latest_by(deadline_ns, &mut waiter, |event| event.cycle >= cycle).unwrap();
+            found.map(|event| event.cycle)
+        };
+        assert_eq!([3, 4, 2].map(&mut wait), [Some(3), Some(4), Some(5)]);
     }
 
     /// Each look of a wait may find messages while the newest of the last look is still held.
     #[test]
     fn a_wait_that_keeps_finding_messages_never_holds_too_many() {
-        let domain = Domain::named(&format!("test-wait-{}", std::process::id())).unwrap();
-        let claim = domain.claim().unwrap();
-        {
-            let node = Node::join(&domain).unwrap();
-            let inlet = node.inlet::<Event>().unwrap();
-            let mut outlet = node.outlet::<Event>().unwrap();
-            let deadline_ns = clock::now_ns() + 1_000_000_000;
-            let mut waiter = Waiter::new(1_000_000);
-            outlet.publish(|event| event.cycle = 1).unwrap();
-            let outlet = std::cell::RefCell::new(outlet);
-            let newest = inlet.latest_by(deadline_ns, &mut waiter, |event| {
-                let next = event.cycle + 1;
-                outlet.borrow_mut().publish(|event| event.cycle = next).unwrap();
-                outlet.borrow_mut().publish(|event| event.cycle = next + 1).unwrap();
-                event.cycle >= 9
-            });
-            assert_eq!(newest.unwrap().unwrap().cycle, 9);
-        }
-        drop(claim);
-        domain.sweep().unwrap();
+        let domain = ScratchDomain::claim("test-wait").unwrap();
+        let node = Node::join(&domain).unwrap();
+        let inlet = node.inlet::<Event>().unwrap();
+        let mut outlet = node.outlet::<Event>().unwrap();
+        let deadline_ns = clock::now_ns() + 1_000_000_000;
+        let mut waiter = Waiter::new(1_000_000);
+        outlet.publish(|event| event.cycle = 1).unwrap();
+        let outlet = std::cell::RefCell::new(outlet);
+        let newest = inlet.latest_by(deadline_ns, &mut waiter, |event| {
+            let next = event.cycle + 1;
+            outlet.borrow_mut().publish(|event| event.cycle = next).unwrap();
+            outlet.borrow_mut().publish(|event| event.cycle = next + 1).unwrap();
+            event.cycle >= 9
+        });
+        assert_eq!(newest.unwrap().unwrap().cycle, 9);
     }
 }
