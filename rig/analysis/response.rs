@@ -154,7 +154,7 @@ impl Followed {
             let message = planned.message.clone();
             let period_ns =
                 seen.least_period_ns.map_or(message.period_ns, |ns| ns.clamp(1, message.period_ns));
-            PeriodicMessage { period_ns, released_by: None, ..message }
+            PeriodicMessage { period_ns, release: None, ..message }
         };
         let messages = self.plan.messages().iter().zip(&self.messages).map(as_queued).collect();
         BusPlan::new(self.plan.bus(), self.plan.rates(), format, self.plan.cycle_ns(), messages)
@@ -178,7 +178,7 @@ mod tests {
             data_length,
             period_ns: PERIOD_NS,
             deadline_ns: PERIOD_NS,
-            released_by: None,
+            release: None,
         }
     }
 

@@ -9,7 +9,7 @@ mod room;
 
 use crate::can::canopen::{Cob, NodeId, NodeIdError};
 use crate::can::wire::{INTERFRAME_BITS, Rates, longest_bits, shortest_bits};
-use crate::can::{BitrateError, BusPlan, NoReleaser, Overload, PeriodicMessage, Rpdo1, Tpdo1};
+use crate::can::{BitrateError, BusPlan, NoReleaser, Overload, PeriodicMessage, Release, Rpdo1, Tpdo1};
 use crate::clock::MILLISECOND_NS;
 use crate::config::CanConfig;
 
@@ -163,18 +163,13 @@ enum Exchange {
 fn plans_of(can: &CanConfig, period_ns: u64, first: Exchange) -> Result<Vec<BusPlan>, ScheduleError> {
     let plan = |(bus, axes): (usize, &Vec<usize>)| {
         let ids = axes.iter().filter_map(|&axis| can.node_ids.get(axis)).map(|&id| NodeId::new(id));
-        let messages = messages(&ids.collect::<Result<Vec<_>, _>>()?, can, period_ns, first)?;
+        let messages = messages(&ids.collect::<Result<Vec<_>, _>>()?, can, period_ns, first);
         Ok(BusPlan::new(bus, can.rates()?, can.format(), period_ns, messages)?)
     };
     can.buses.iter().enumerate().map(plan).collect()
 }
 
-fn messages(
-    drives: &[NodeId],
-    can: &CanConfig,
-    period_ns: u64,
-    first: Exchange,
-) -> Result<Vec<PeriodicMessage>, ScheduleError> {
+fn messages(drives: &[NodeId], can: &CanConfig, period_ns: u64, first: Exchange) -> Vec<PeriodicMessage> {
     let heartbeat_ns = u64::from(can.heartbeat_producer_ms) * MILLISECOND_NS;
     let message = |name: String, cob: Cob, data_length: u32, period_ns: u64| PeriodicMessage {
         name,
@@ -182,7 +177,7 @@ fn messages(
         data_length,
         period_ns,
         deadline_ns: period_ns,
-        released_by: None,
+        release: None,
     };
     let mut messages = vec![message("SYNC".to_owned(), Cob::Sync, 0, period_ns)];
     for (index, &node) in drives.iter().enumerate() {
@@ -198,7 +193,7 @@ fn messages(
         }
         let (tpdo, rpdo) = (Tpdo1::LENGTH as u32, Rpdo1::LENGTH as u32);
         messages.push(PeriodicMessage {
-            released_by: Some(Cob::Sync.into()),
+            release: Some(Release { by: Cob::Sync.into(), within_ns: u64::from(can.answer_us) * 1000 }),
             ..message(format!("TPDO1 {}", node.get()), Cob::Tpdo1(node), tpdo, period_ns)
         });
         messages.push(message(format!("RPDO1 {}", node.get()), Cob::Rpdo1(node), rpdo, period_ns));

@@ -27,7 +27,7 @@ pub use error_frame::{ErrorKind, ErrorReport, ErrorReportError};
 pub use frame::{Frame, FrameError, FrameFormat};
 pub use id::{CanId, CanIdError};
 pub use pdo::{EVERY_SYNC, Rpdo1, Tpdo1};
-pub use plan::{BusPlan, NoReleaser, Overload, PeriodicMessage, PlannedMessage};
+pub use plan::{BusPlan, NoReleaser, Overload, PeriodicMessage, PlannedMessage, Release};
 pub use socket_can::{OpenError, SocketCan};
 pub use tap::{TapError, Tapped, TappedFrame};
 pub use virtual_bus::{Port, Statistics, VirtualWire, WireConfig};

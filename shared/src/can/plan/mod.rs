@@ -23,8 +23,17 @@ pub struct PeriodicMessage {
     pub period_ns: u64,
     /// By when it must have arrived after its release, ns.
     pub deadline_ns: u64,
-    /// The more urgent message whose arrival releases it, if one does: that one's latest arrival is its jitter.
-    pub released_by: Option<CanId>,
+    /// What releases it within its period; without, it is released when that begins.
+    pub release: Option<Release>,
+}
+
+/// The release of a message by another's arrival.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Release {
+    /// The other, which is more urgent.
+    pub by: CanId,
+    /// How long after it the message may come, ns: with the other's latest arrival, its jitter.
+    pub within_ns: u64,
 }
 
 /// A message with what the analysis found.
@@ -162,10 +171,10 @@ impl BusPlan {
 }
 
 fn jitter_ns(message: &PeriodicMessage, more_urgent: &[PlannedMessage]) -> Result<Option<u64>, NoReleaser> {
-    let Some(releaser) = message.released_by else { return Ok(Some(0)) };
-    match more_urgent.iter().find(|other| other.message.id == releaser) {
-        Some(other) => Ok(other.arrival_ns()),
-        None => Err(NoReleaser { name: message.name.clone(), releaser }),
+    let Some(Release { by, within_ns }) = message.release else { return Ok(Some(0)) };
+    match more_urgent.iter().find(|other| other.message.id == by) {
+        Some(other) => Ok(other.arrival_ns().map(|arrival_ns| arrival_ns + within_ns)),
+        None => Err(NoReleaser { name: message.name.clone(), releaser: by }),
     }
 }
 
@@ -188,7 +197,7 @@ mod tests {
             data_length,
             period_ns,
             deadline_ns: period_ns,
-            released_by: None,
+            release: None,
         }
     }
 
@@ -219,7 +228,8 @@ mod tests {
     }
 
     fn released(by: u16, message: PeriodicMessage) -> PeriodicMessage {
-        PeriodicMessage { released_by: Some(CanId::standard(by).unwrap()), ..message }
+        let by = CanId::standard(by).unwrap();
+        PeriodicMessage { release: Some(Release { by, within_ns: 0 }), ..message }
     }
 
     #[test]
@@ -233,6 +243,19 @@ mod tests {
         assert_eq!(second.jitter_ns, first.response_ns);
         assert_eq!(third.jitter_ns, Some(latest_ns(second)));
         assert!(third.jitter_ns > second.response_ns);
+    }
+
+    #[test]
+    fn who_takes_time_to_answer_has_that_for_jitter_too_and_delays_the_others() {
+        let answering = |within_ns: u64| {
+            let by = CanId::standard(1).unwrap();
+            let answer = PeriodicMessage { release: Some(Release { by, within_ns }), ..message(2, 8, 1000) };
+            plan(1_000_000, vec![message(1, 0, 1000), answer, message(3, 8, 1000)])
+        };
+        let [at_once, late] = [0, 890_000].map(|within_ns| answering(within_ns).messages().to_vec());
+        assert_eq!(late[1].jitter_ns, at_once[1].jitter_ns.map(|jitter_ns| jitter_ns + 890_000));
+        assert_eq!(late[1].response_ns, at_once[1].response_ns);
+        assert!(late[2].response_ns > at_once[2].response_ns, "two of it may meet the next");
     }
 
     #[test]
