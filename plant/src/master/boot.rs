@@ -8,7 +8,7 @@ use masseter_shared::can::canopen::{
 };
 use masseter_shared::can::cia402::{DriveState, Statusword};
 use masseter_shared::clock::MILLISECOND_NS;
-use masseter_shared::messages::codes::{BootPhase, Cause};
+use masseter_shared::messages::codes::{BootPhase, Cause, DriveCondition};
 
 use super::plan::{Condition, STATUSWORD, Setup, Task, plan};
 use super::sdo::{ATTEMPTS, Data, SdoClient, SdoFailure, TIMEOUT_NS, Taken};
@@ -209,7 +209,7 @@ impl Boot {
     /// Ends the task whose answer is there, and begins the next.
     fn carry_on(&mut self, now_ns: u64) -> Result<(), BootFault> {
         match self.client.outcome() {
-            Some(Err(SdoFailure::Aborted { code, .. })) if self.may_be_absent(code) => self.go_on(false),
+            Some(Err(SdoFailure::Aborted { code, .. })) if self.may_be_refused(code) => self.go_on(false),
             Some(outcome) => self.conclude(outcome?)?,
             None => {}
         }
@@ -222,10 +222,16 @@ impl Boot {
         Ok(())
     }
 
-    /// Whether the task under way asks for something that a drive need not have, and this one has not.
-    fn may_be_absent(&self, code: AbortCode) -> bool {
-        matches!(self.tasks[self.next], Task::If { condition: Condition::Exchanged(_), .. })
-            && matches!(code, AbortCode::NO_OBJECT | AbortCode::NO_SUBINDEX)
+    /// Whether the task under way may fail with that code: it offers something, or asks for something that a drive need
+    /// not have, and this one has not.
+    fn may_be_refused(&self, code: AbortCode) -> bool {
+        match self.tasks[self.next] {
+            Task::Offer { .. } => true,
+            Task::If { condition: Condition::Exchanged(_), .. } => {
+                matches!(code, AbortCode::NO_OBJECT | AbortCode::NO_SUBINDEX)
+            }
+            _ => false,
+        }
     }
 
     /// Ends the task under way, and leaves out those of a condition that does not hold.
@@ -246,10 +252,10 @@ impl Boot {
             Task::Expect { object, .. }
             | Task::Keep(object)
             | Task::If { condition: Condition::Exchanged(object), .. } => self.client.read(object),
-            Task::If { condition: Condition::InFault, .. } | Task::ExpectNoFault => {
+            Task::If { condition: Condition::InFault, .. } | Task::ExpectNoFault | Task::ExpectOff => {
                 self.client.read(STATUSWORD);
             }
-            Task::Write { object, value, bytes } => {
+            Task::Write { object, value, bytes } | Task::Offer { object, value, bytes } => {
                 let value = Data::new(&value.to_le_bytes()[..bytes]).expect("at most four bytes");
                 self.client.write(object, value);
             }
@@ -277,6 +283,11 @@ impl Boot {
                 let fault = BootFault::new(Cause::FaultAtStart).at(STATUSWORD, code, 0);
                 return if self.readings < READINGS { Ok(()) } else { Err(fault) };
             }
+            Task::ExpectOff if may_be_powered(number) => {
+                self.readings += 1;
+                let fault = BootFault::new(Cause::StillPowered).at(STATUSWORD, number, 0);
+                return if self.readings < READINGS { Ok(()) } else { Err(fault) };
+            }
             Task::If { condition, .. } => holds = self.holds(condition, number),
             Task::Keep(_) => self.kept = read,
             _ => {}
@@ -296,6 +307,12 @@ impl Boot {
             }
         }
     }
+}
+
+/// A statusword without a meaning is none of a drive that is off.
+fn may_be_powered(statusword: u32) -> bool {
+    let state = Statusword(statusword as u16).state();
+    !state.is_ok_and(|state| DriveCondition::from(state).is_powered() == Some(false))
 }
 
 fn in_fault(statusword: u32) -> bool {

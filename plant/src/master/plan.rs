@@ -1,7 +1,8 @@
 //! What is done to a drive by SDO before it may move: a list of tasks, made once for each drive.
 //!
 //! The order is the point: who it is, then whether its PDOs are those that will be exchanged, and only
-//! then anything is written. How tasks are carried out is not here but in [`boot`](super::boot).
+//! then anything is written, first of all what stops it. How tasks are carried out is not here but in
+//! [`boot`](super::boot).
 
 use masseter_shared::can::canopen::{Cob, CobId, NodeId, ObjectAddress};
 use masseter_shared::can::cia402::Controlword;
@@ -11,11 +12,13 @@ use masseter_shared::messages::codes::{BootPhase, Cause};
 
 /// Object 6041.
 pub(super) const STATUSWORD: ObjectAddress = ObjectAddress::new(0x6041, 0);
+/// How a quick stop comes to rest, and what follows.
+const QUICK_STOP_OPTION: ObjectAddress = ObjectAddress::new(0x605A, 0);
 /// Object 6060 and 6061: cyclic synchronous position.
 const CYCLIC_POSITION: u32 = 8;
 /// Object 6007: quick stop on loss of the link.
 const LINK_LOSS_QUICK_STOP: u32 = 3;
-/// Object 605A: along the quick-stop ramp, then switch on disabled.
+/// Of that: along the quick-stop ramp, then switch on disabled.
 const RAMP_THEN_OFF: u32 = 2;
 /// Whether a TPDO answers remote requests says nothing about its use here.
 const COB_ID_BITS: u32 = !CobId::NO_REMOTE_REQUEST;
@@ -63,6 +66,8 @@ pub(super) enum Task {
     Expect { object: ObjectAddress, mask: u32, value: u32, otherwise: Cause },
     /// Write the object, so many bytes.
     Write { object: ObjectAddress, value: u32, bytes: usize },
+    /// Write the object, so many bytes, where the drive lets it.
+    Offer { object: ObjectAddress, value: u32, bytes: usize },
     /// Read the object and keep its value.
     Keep(ObjectAddress),
     /// Write the value kept.
@@ -71,6 +76,8 @@ pub(super) enum Task {
     If { condition: Condition, otherwise_skip: usize },
     /// Read the statusword, now or within a few repetitions without a fault.
     ExpectNoFault,
+    /// Read the statusword, now or within a few repetitions of a drive without voltage.
+    ExpectOff,
 }
 
 /// The tasks for a node, in their order.
@@ -81,8 +88,12 @@ pub(super) fn plan(node: NodeId, setup: &Setup) -> Vec<Task> {
     tasks.extend(check_pdo(0x1400, Cob::Rpdo1(node), &Rpdo1::MAPPING));
     tasks.extend(check_pdo(0x1800, Cob::Tpdo1(node), &Tpdo1::MAPPING));
     tasks.push(Task::Enter(BootPhase::Configuring));
+    tasks.extend(switch_off());
     tasks.extend(OTHER_PDOS.into_iter().flat_map(switch_off_pdo));
     tasks.extend(configure(setup));
+    // A drive may begin to follow its target with the mode, and may have moved by the end.
+    tasks.extend(hold_position());
+    tasks.extend(choose_mode());
     tasks.extend(reset_fault());
     tasks.extend(hold_position());
     tasks.push(Task::Enter(BootPhase::Configured));
@@ -137,12 +148,23 @@ fn check_pdo(communication: u16, cob: Cob, mapping: &[u32]) -> impl Iterator<Ite
     all.map(|(object, mask, value)| Task::Expect { object, mask, value, otherwise: Cause::WrongPdo })
 }
 
+/// Somebody else may have left the drive enabled, and a reset of the communication leaves it so. It comes to rest along
+/// its ramp where it lets that be chosen, and along another where not.
+const fn switch_off() -> [Task; 3] {
+    let quick_stop = Task::Offer { object: QUICK_STOP_OPTION, value: RAMP_THEN_OFF, bytes: 2 };
+    [quick_stop, control(Controlword::QUICK_STOP), Task::ExpectOff]
+}
+
+const fn control(word: Controlword) -> Task {
+    Task::Write { object: ObjectAddress::new(0x6040, 0), value: word.0 as u32, bytes: 2 }
+}
+
 fn switch_off_pdo(communication: u16) -> impl Iterator<Item = Task> {
     let cob_id = ObjectAddress::new(communication, 1);
     only_if(Condition::Exchanged(cob_id), [Task::WriteKept(cob_id)])
 }
 
-fn configure(setup: &Setup) -> impl Iterator<Item = Task> {
+fn configure(setup: &Setup) -> [Task; 12] {
     let (watched, silence_ms) = setup.watched;
     let (value, exponent) = setup.period;
     let [lowest, highest] = setup.position_limits;
@@ -150,12 +172,6 @@ fn configure(setup: &Setup) -> impl Iterator<Item = Task> {
         object: ObjectAddress::new(index, subindex),
         value,
         bytes,
-    };
-    let mode_shown = Task::Expect {
-        object: ObjectAddress::new(0x6061, 0),
-        mask: u32::MAX,
-        value: CYCLIC_POSITION,
-        otherwise: Cause::NotAccepted,
     };
     [
         (0x1017, 0, u32::from(setup.heartbeat_ms), 2),
@@ -171,20 +187,24 @@ fn configure(setup: &Setup) -> impl Iterator<Item = Task> {
         (0x607D, 1, lowest as u32, 4),
         (0x60C2, 1, u32::from(value), 1),
         (0x60C2, 2, u32::from(exponent as u8), 1),
-        (0x6060, 0, CYCLIC_POSITION, 1),
     ]
     .map(write)
-    .into_iter()
-    .chain([mode_shown])
+}
+
+const fn choose_mode() -> [Task; 2] {
+    [
+        Task::Write { object: ObjectAddress::new(0x6060, 0), value: CYCLIC_POSITION, bytes: 1 },
+        Task::Expect {
+            object: ObjectAddress::new(0x6061, 0),
+            mask: u32::MAX,
+            value: CYCLIC_POSITION,
+            otherwise: Cause::NotAccepted,
+        },
+    ]
 }
 
 /// A fault that is only remembered is reset by an edge; one that persists is reported with its code.
 fn reset_fault() -> impl Iterator<Item = Task> {
-    let control = |word: Controlword| Task::Write {
-        object: ObjectAddress::new(0x6040, 0),
-        value: u32::from(word.0),
-        bytes: 2,
-    };
     let tasks = [
         Task::Keep(ObjectAddress::new(0x603F, 0)),
         control(Controlword::DISABLE_VOLTAGE),

@@ -249,6 +249,8 @@ codes! {
         UnknownNode = 36 "unknown_node",
         /// Another node sends SYNC or has the master's id: its heartbeats would keep the drives going without this one.
         SecondMaster = 37 "second_master",
+        /// A drive has voltage although it was told to quick stop (statusword, object 6041).
+        StillPowered = 38 "still_powered",
         /// A CAN controller became error active again (transmit error counter).
         ErrorActive = 40 "error_active",
         /// A CAN controller became error passive (transmit error counter).

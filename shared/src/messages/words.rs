@@ -43,6 +43,9 @@ fn complaint(cause: Cause, event: &Event) -> Option<String> {
             "in fault, and a fault reset does not help; error code {}",
             EmergencyCode(event.value as u16)
         ),
+        Cause::StillPowered => {
+            format!("was left switched on, and a quick stop does not switch it off; statusword {value:04X}h")
+        }
         Cause::BootTimeout => format!("not operational after {value} ms"),
         Cause::HeartbeatLost => format!("silent for {value} ms"),
         Cause::ProcessDataLost => format!("process data missing for {value} cycles"),
@@ -92,6 +95,7 @@ const fn remedy(cause: Cause) -> Option<&'static str> {
             "see its own emergency message, if there is one, and who else sends NMT commands"
         }
         Cause::FaultAtStart => "remove what the drive complains of and switch it on again",
+        Cause::StillPowered => "end what else guides it, and switch its power off and on again",
         Cause::BootTimeout => "see power, wiring, bit rate and node id of this drive",
         Cause::BusOff => "see bit rate, termination and wiring",
         Cause::BusRefused => "see that the interface is up, and that somebody acknowledges",

@@ -72,7 +72,7 @@ fn one_request_a_bus_and_cycle_and_none_beside_process_data() {
 #[test]
 fn a_drive_that_is_not_as_expected_is_named_and_nobody_is_enabled() {
     type Change = fn(&mut Peer);
-    let table: [(Change, Cause, u32); 9] = [
+    let table: [(Change, Cause, u32); 10] = [
         (|drive| drop(drive.objects.insert((0x1000, 0), vec![0; 4])), Cause::WrongIdentity, 0x10_0000),
         (|drive| drop(drive.objects.insert((0x1018, 2), vec![9, 9, 0, 0])), Cause::WrongIdentity, 0x10_1802),
         (
@@ -84,8 +84,9 @@ fn a_drive_that_is_not_as_expected_is_named_and_nobody_is_enabled() {
         (|drive| drop(drive.objects.insert((0x1400, 2), vec![255])), Cause::WrongPdo, 0x14_0002),
         (|drive| drop(drive.objects.remove(&(0x6064, 0))), Cause::SdoAborted, 0x60_6400),
         (|drive| drive.refuses = Some(((0x6007, 0), AbortCode::READ_ONLY)), Cause::SdoAborted, 0x60_0700),
+        (|drive| drive.get_stuck_in(DriveState::QuickStopActive), Cause::StillPowered, 0x60_4100),
         (|drive| drive.servers = 2, Cause::DuplicateNode, 0),
-        (|drive| (drive.power, drive.can_reset) = (DriveState::Fault, false), Cause::FaultAtStart, 0x60_4100),
+        (|drive| drive.get_stuck_in(DriveState::Fault), Cause::FaultAtStart, 0x60_4100),
     ];
     for (change, cause, object) in table {
         let mut bench = Bench::new();
@@ -154,6 +155,42 @@ fn a_drive_that_is_already_alive_is_reset_before_it_is_believed() {
     bench.cycles(400, DriveRequest::Enable);
     assert!(bench.all_are(DriveState::OperationEnabled));
     assert_eq!(bench.causes(EventKind::Fault), []);
+}
+
+/// As a tool leaves it that told it not to care for the link (6007 = 0). The scripted drive minds what else is written
+/// to it before it is off.
+#[test]
+fn a_drive_that_was_left_enabled_is_stopped_before_it_is_configured() {
+    let mut bench = Bench::new();
+    let drive = bench.drive(1);
+    (drive.nmt, drive.power) = (Some(NmtState::Operational), DriveState::OperationEnabled);
+    bench.cycles(400, DriveRequest::Off);
+    assert_eq!(bench.causes(EventKind::Fault), []);
+    assert!(bench.all_are(DriveState::SwitchOnDisabled));
+    bench.cycles(20, DriveRequest::Enable);
+    assert!(bench.all_are(DriveState::OperationEnabled));
+}
+
+#[test]
+fn a_drive_that_is_refused_for_its_quick_stop_is_stopped_all_the_same() {
+    let mut bench = Bench::new();
+    let drive = bench.drive(1);
+    drive.power = DriveState::OperationEnabled;
+    drive.refuses = Some(((0x605A, 0), AbortCode::NO_OBJECT));
+    bench.cycles(400, DriveRequest::Off);
+    assert_eq!(bench.causes(EventKind::Fault), [Cause::SdoAborted]);
+    assert_eq!(bench.drive(1).power, DriveState::SwitchOnDisabled);
+}
+
+#[test]
+fn the_position_is_held_before_the_mode_is_chosen_and_again_at_the_end() {
+    let mut bench = Bench::enabled();
+    let written = bench.drive(0).asked.iter().filter_map(|(_, request)| match request {
+        SdoRequest::Download { object, .. } => Some(object.index),
+        _ => None,
+    });
+    let order: Vec<_> = written.filter(|index| matches!(index, 0x6060 | 0x607A)).collect();
+    assert_eq!(order, [0x607A, 0x6060, 0x607A]);
 }
 
 #[test]

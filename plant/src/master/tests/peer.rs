@@ -13,6 +13,7 @@ use masseter_shared::can::{
 };
 use masseter_shared::config::IdentityConfig;
 use masseter_shared::geometry::AXES;
+use masseter_shared::messages::codes::DriveCondition;
 
 use super::PERIOD_NS;
 use crate::link::Buses;
@@ -27,8 +28,8 @@ pub(super) struct Peer {
     pub(super) objects: BTreeMap<(u16, u8), Vec<u8>>,
     pub(super) nmt: Option<NmtState>,
     pub(super) power: DriveState,
-    /// Whether a fault reset helps.
-    pub(super) can_reset: bool,
+    /// The state that it does not leave.
+    stuck_in: Option<DriveState>,
     /// Whether its fault reaction goes on.
     pub(super) is_reacting: bool,
     /// Whether it is without power.
@@ -75,7 +76,7 @@ impl Peer {
             objects,
             nmt: None,
             power: DriveState::SwitchOnDisabled,
-            can_reset: true,
+            stuck_in: None,
             is_reacting: false,
             is_dead: false,
             servers: 1,
@@ -96,6 +97,11 @@ impl Peer {
         u32::from_le_bytes(word)
     }
 
+    /// Is in a state that it does not leave.
+    pub(super) fn get_stuck_in(&mut self, state: DriveState) {
+        (self.power, self.stuck_in) = (state, Some(state));
+    }
+
     /// Power off and on: it comes back as it left the factory.
     pub(super) fn cycle_power(&mut self) {
         (self.nmt, self.power, self.buffered) = (None, DriveState::SwitchOnDisabled, None);
@@ -104,6 +110,9 @@ impl Peer {
     fn live(&mut self, now_ns: u64, out: &mut Vec<Frame>) {
         if self.is_dead {
             return;
+        }
+        if self.nmt != Some(NmtState::Operational) {
+            self.complete();
         }
         if self.nmt.is_none() {
             self.nmt = Some(NmtState::PreOperational);
@@ -137,7 +146,8 @@ impl Peer {
         if nmt.target.includes(self.id) {
             match nmt.command {
                 NmtCommand::Start => self.nmt = Some(NmtState::Operational),
-                NmtCommand::ResetCommunication => self.cycle_power(),
+                // What the drive does with its motor is another matter.
+                NmtCommand::ResetCommunication => (self.nmt, self.buffered) = (None, None),
                 other => panic!("{other:?} is not asked for"),
             }
         }
@@ -148,8 +158,7 @@ impl Peer {
             assert_eq!(rpdo.target_increments, STANDS_AT, "nobody asks it to move");
             self.control(rpdo.controlword);
         }
-        self.power =
-            if self.is_reacting { DriveState::FaultReactionActive } else { self.power.after_completion() };
+        self.complete();
         let statusword = Statusword::of(self.power);
         for actual_increments in self.twin_stands_at.into_iter().chain([STANDS_AT]) {
             let tpdo = Tpdo1 { statusword, actual_increments, torque_permille: 0 };
@@ -157,10 +166,19 @@ impl Peer {
         }
     }
 
+    /// Its own transitions.
+    fn complete(&mut self) {
+        self.power = match self.power {
+            _ if self.is_reacting => DriveState::FaultReactionActive,
+            power if self.stuck_in == Some(power) => power,
+            power => power.after_completion(),
+        };
+    }
+
     fn control(&mut self, word: Controlword) {
         let after = self.power.after(word.command(self.controlword, self.power));
         self.controlword = word;
-        if self.power != DriveState::Fault || self.can_reset {
+        if self.stuck_in != Some(self.power) {
             self.power = after;
         }
     }
@@ -190,6 +208,9 @@ impl Peer {
         if let Some((_, code)) = self.refuses.filter(|(refused, _)| *refused == address) {
             return SdoResponse::Abort { object, code };
         }
+        let is_powered = DriveCondition::from(self.power).is_powered() == Some(true);
+        let stops = matches!(address, (0x605A | 0x6040, 0));
+        assert!(stops || !is_powered, "{object} of a drive that is {}", self.power);
         self.objects.insert(address, data.to_vec());
         match address {
             (0x6040, 0) => self.control(Controlword(u16::from_le_bytes(data.try_into().unwrap()))),
