@@ -227,7 +227,7 @@ impl Boot {
     fn may_be_refused(&self, code: AbortCode) -> bool {
         match self.tasks[self.next] {
             Task::Offer { .. } => true,
-            Task::If { condition: Condition::Exchanged(_), .. } => {
+            Task::ExpectUnset { .. } | Task::If { condition: Condition::Exchanged(_), .. } => {
                 matches!(code, AbortCode::NO_OBJECT | AbortCode::NO_SUBINDEX)
             }
             _ => false,
@@ -250,6 +250,7 @@ impl Boot {
                 self.go_on(true);
             }
             Task::Expect { object, .. }
+            | Task::ExpectUnset { object, .. }
             | Task::Keep(object)
             | Task::If { condition: Condition::Exchanged(object), .. } => self.client.read(object),
             Task::If { condition: Condition::InFault, .. } | Task::ExpectNoFault | Task::ExpectOff => {
@@ -276,6 +277,9 @@ impl Boot {
                 } else {
                     Err(BootFault::new(otherwise).at(object, number, value))
                 };
+            }
+            Task::ExpectUnset { object, otherwise } if number != 0 => {
+                return Err(BootFault::new(otherwise).at(object, number, 0));
             }
             Task::ExpectNoFault if in_fault(number) => {
                 self.readings += 1;

@@ -23,6 +23,11 @@ const RAMP_THEN_OFF: u32 = 2;
 /// Whether a TPDO answers remote requests says nothing about its use here.
 const COB_ID_BITS: u32 = !CobId::NO_REMOTE_REQUEST;
 
+/// Object 607C: software limits count from home, which must be the zero of the positions for them to be where the rig
+/// has them.
+const NO_HOME_OFFSET: Task =
+    Task::ExpectUnset { object: ObjectAddress::new(0x607C, 0), otherwise: Cause::HomeOffset };
+
 /// Communication parameters of the PDOs that CiA 301 gives identifiers to beside the first: many drives send them as
 /// delivered, and no plan of the bus counts with them.
 const OTHER_PDOS: [u16; 6] = [0x1401, 0x1402, 0x1403, 0x1801, 0x1802, 0x1803];
@@ -64,6 +69,8 @@ pub(super) enum Task {
     Enter(BootPhase),
     /// Read the object; of `mask` it must show `value`, now or within a few repetitions.
     Expect { object: ObjectAddress, mask: u32, value: u32, otherwise: Cause },
+    /// Read the object, which must be 0 where the drive has it.
+    ExpectUnset { object: ObjectAddress, otherwise: Cause },
     /// Write the object, so many bytes.
     Write { object: ObjectAddress, value: u32, bytes: usize },
     /// Write the object, so many bytes, where the drive lets it.
@@ -90,6 +97,7 @@ pub(super) fn plan(node: NodeId, setup: &Setup) -> Vec<Task> {
     tasks.push(Task::Enter(BootPhase::Configuring));
     tasks.extend(switch_off());
     tasks.extend(OTHER_PDOS.into_iter().flat_map(switch_off_pdo));
+    tasks.push(NO_HOME_OFFSET);
     tasks.extend(configure(setup));
     // A drive may begin to follow its target with the mode, and may have moved by the end.
     tasks.extend(hold_position());

@@ -251,6 +251,8 @@ codes! {
         SecondMaster = 37 "second_master",
         /// A drive has voltage although it was told to quick stop (statusword, object 6041).
         StillPowered = 38 "still_powered",
+        /// A drive counts its software limits from elsewhere than its positions (home offset, object 607C).
+        HomeOffset = 39 "home_offset",
         /// A CAN controller became error active again (transmit error counter).
         ErrorActive = 40 "error_active",
         /// A CAN controller became error passive (transmit error counter).

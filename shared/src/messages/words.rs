@@ -46,6 +46,9 @@ fn complaint(cause: Cause, event: &Event) -> Option<String> {
         Cause::StillPowered => {
             format!("was left switched on, and a quick stop does not switch it off; statusword {value:04X}h")
         }
+        Cause::HomeOffset => {
+            format!("object {object} is {} increments, by which its software limits are off", value as i32)
+        }
         Cause::BootTimeout => format!("not operational after {value} ms"),
         Cause::HeartbeatLost => format!("silent for {value} ms"),
         Cause::ProcessDataLost => format!("process data missing for {value} cycles"),
@@ -96,6 +99,7 @@ const fn remedy(cause: Cause) -> Option<&'static str> {
         }
         Cause::FaultAtStart => "remove what the drive complains of and switch it on again",
         Cause::StillPowered => "end what else guides it, and switch its power off and on again",
+        Cause::HomeOffset => "set it to 0, and see that the drive counts from the rig's zero",
         Cause::BootTimeout => "see power, wiring, bit rate and node id of this drive",
         Cause::BusOff => "see bit rate, termination and wiring",
         Cause::BusRefused => "see that the interface is up, and that somebody acknowledges",

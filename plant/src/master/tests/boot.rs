@@ -72,7 +72,7 @@ fn one_request_a_bus_and_cycle_and_none_beside_process_data() {
 #[test]
 fn a_drive_that_is_not_as_expected_is_named_and_nobody_is_enabled() {
     type Change = fn(&mut Peer);
-    let table: [(Change, Cause, u32); 10] = [
+    let table: [(Change, Cause, u32); 11] = [
         (|drive| drop(drive.objects.insert((0x1000, 0), vec![0; 4])), Cause::WrongIdentity, 0x10_0000),
         (|drive| drop(drive.objects.insert((0x1018, 2), vec![9, 9, 0, 0])), Cause::WrongIdentity, 0x10_1802),
         (
@@ -85,6 +85,11 @@ fn a_drive_that_is_not_as_expected_is_named_and_nobody_is_enabled() {
         (|drive| drop(drive.objects.remove(&(0x6064, 0))), Cause::SdoAborted, 0x60_6400),
         (|drive| drive.refuses = Some(((0x6007, 0), AbortCode::READ_ONLY)), Cause::SdoAborted, 0x60_0700),
         (|drive| drive.get_stuck_in(DriveState::QuickStopActive), Cause::StillPowered, 0x60_4100),
+        (
+            |drive| drop(drive.objects.insert((0x607C, 0), vec![0x10, 0x27, 0, 0])),
+            Cause::HomeOffset,
+            0x60_7C00,
+        ),
         (|drive| drive.servers = 2, Cause::DuplicateNode, 0),
         (|drive| drive.get_stuck_in(DriveState::Fault), Cause::FaultAtStart, 0x60_4100),
     ];
@@ -155,6 +160,14 @@ fn a_drive_that_is_already_alive_is_reset_before_it_is_believed() {
     bench.cycles(400, DriveRequest::Enable);
     assert!(bench.all_are(DriveState::OperationEnabled));
     assert_eq!(bench.causes(EventKind::Fault), []);
+}
+
+#[test]
+fn a_drive_may_have_a_home_offset_that_is_zero() {
+    let mut bench = Bench::new();
+    bench.drive(3).objects.insert((0x607C, 0), vec![0; 4]);
+    bench.cycles(400, DriveRequest::Enable);
+    assert!(bench.all_are(DriveState::OperationEnabled), "{:?}", bench.events);
 }
 
 /// As a tool leaves it that told it not to care for the link (6007 = 0). The scripted drive minds what else is written
