@@ -47,7 +47,8 @@ pub(crate) struct Setup {
     pub(crate) following_error: u32,
     /// How long the window may be left (6066), ms.
     pub(crate) following_error_ms: u16,
-    /// Deceleration of the quick-stop ramp (6085), increments/s².
+    /// Deceleration of the quick-stop ramp (6085), increments/s²: the drive's own unit of acceleration (6097, 60AA) is taken
+    /// to be that.
     pub(crate) quick_stop_deceleration: u32,
     /// Software position limits (607D), increments.
     pub(crate) position_limits: [i32; 2],

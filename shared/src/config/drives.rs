@@ -21,7 +21,8 @@ pub struct DriveConfig {
     pub max_force_n: f64,
     /// Velocity limit of the drive, m/s.
     pub max_velocity_m_s: f64,
-    /// Deceleration of the quick-stop ramp (6085), m/s².
+    /// Deceleration of the quick-stop ramp (6085), m/s². The drive's unit of acceleration is taken to be one increment of
+    /// its position a second squared.
     pub quick_stop_deceleration_m_s2: f64,
     /// Following error window (6065), m.
     pub following_error_m: f64,
