@@ -11,8 +11,11 @@ use super::dictionary::{Objects, names};
 /// The set-points, increments.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub(super) struct Positioning {
+    /// Under way, or interrupted by a halt.
     running: Option<i32>,
     waiting: Option<i32>,
+    /// The last that was reached.
+    reached: Option<i32>,
     is_acknowledged: bool,
 }
 
@@ -30,13 +33,14 @@ impl Axis {
         if word.halts() && !before.halts() {
             self.slow_down(now_ns, self.parameters.profile.deceleration_m_s2);
         }
-        if word.starts() && !before.starts() {
-            self.take_setpoint(now_ns, objects.get(names::TARGET_POSITION));
-        } else if before.halts()
+        if before.halts()
             && !word.halts()
             && let Some(target) = self.positioning.running
         {
             self.start(now_ns, target);
+        }
+        if word.starts() && !before.starts() {
+            self.take_setpoint(now_ns, objects.get(names::TARGET_POSITION));
         }
         self.end_handshake();
     }
@@ -50,7 +54,7 @@ impl Axis {
             asked_increments
         };
         let target = self.within_limits(now_ns, asked);
-        let is_free = self.demand.is_at_rest(now_ns) && self.positioning.waiting.is_none();
+        let is_free = self.positioning.running.is_none() && self.positioning.waiting.is_none();
         if word.changes_immediately() || is_free {
             self.positioning.waiting = None;
             self.start(now_ns, target);
@@ -65,8 +69,8 @@ impl Axis {
 
     /// What a relative target counts from: the set-point before, or where the axis stands.
     fn last_target(&self) -> i32 {
-        let Positioning { running, waiting, .. } = self.positioning;
-        waiting.or(running).unwrap_or_else(|| self.counts.saturating_add(self.origin_increments))
+        let Positioning { running, waiting, reached, .. } = self.positioning;
+        waiting.or(running).or(reached).unwrap_or_else(|| self.counts.saturating_add(self.origin_increments))
     }
 
     fn start(&mut self, now_ns: u64, target_increments: i32) {
@@ -79,10 +83,13 @@ impl Axis {
 
     /// Starts the set-point that waits once the running one is over.
     pub(super) fn continue_positioning(&mut self, now_ns: u64) {
-        if !self.controlword.halts()
-            && self.demand.is_at_rest(now_ns)
-            && let Some(target) = self.positioning.waiting.take()
-        {
+        if self.controlword.halts() || !self.demand.is_at_rest(now_ns) {
+            return;
+        }
+        if let Some(target) = self.positioning.running.take() {
+            self.positioning.reached = Some(target);
+        }
+        if let Some(target) = self.positioning.waiting.take() {
             self.start(now_ns, target);
             self.end_handshake();
         }

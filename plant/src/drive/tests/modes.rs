@@ -225,6 +225,30 @@ fn halt_interrupts_a_motion_and_its_end_resumes_it() {
     assert!(bench.is_near(START + 20_000));
 }
 
+/// Without "change immediately" (bit 5), the one that was interrupted is completed first.
+#[test]
+fn a_set_point_given_during_a_halt_waits_for_the_one_that_was_interrupted() {
+    // The halt ends before the new set-point, or with the same controlword.
+    for words in [[0x10F, 0x11F, 0x00F], [0x10F, 0x10F, 0x01F]] {
+        let mut bench = Bench::enabled(PROFILE_POSITION);
+        bench.set_point(START + 20_000, 0);
+        bench.run_ms(100);
+        bench.control(0x11F);
+        bench.run_ms(100);
+        bench.write(TARGET_POSITION, &(START + 5_000).to_le_bytes()).unwrap();
+        for word in words {
+            bench.control(word);
+        }
+        let mut furthest = 0;
+        for _ in 0..1000 {
+            bench.run_ms(1);
+            furthest = furthest.max(bench.position());
+        }
+        assert!((furthest - (START + 20_000)).abs() <= 50, "{words:X?}: {furthest}");
+        assert!(bench.is_near(START + 5_000), "{words:X?}: {}", bench.position());
+    }
+}
+
 #[test]
 fn a_set_point_beyond_the_software_limit_ends_at_it() {
     let mut bench = Bench::enabled(PROFILE_POSITION);
