@@ -35,6 +35,14 @@ impl Producer {
     }
 }
 
+/// Time-out in an entry of object 1016, ms. The node stands in the byte above, and the highest byte is reserved.
+const TIME: u32 = 0xFFFF;
+
+/// The node that an entry of object 1016 means; one without a time or with the number of no node is not used.
+pub(super) fn watched(word: u32) -> Option<NodeId> {
+    NodeId::new((word >> 16) as u8).ok().filter(|_| word & TIME > 0)
+}
+
 /// A watched node.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Watch {
@@ -56,9 +64,8 @@ impl Consumer {
     pub(super) fn new(objects: &Objects) -> Self {
         let watches = std::array::from_fn(|place| {
             let word = objects.word(names::WATCHED_HEARTBEAT.place() + place);
-            let node = u8::try_from(word >> 16).ok().and_then(|id| NodeId::new(id).ok());
-            let timeout_ns = u64::from(word & 0xFFFF) * MILLISECOND_NS;
-            Watch { node: node.filter(|_| timeout_ns > 0), timeout_ns, heard_ns: None, is_lost: false }
+            let timeout_ns = u64::from(word & TIME) * MILLISECOND_NS;
+            Watch { node: watched(word), timeout_ns, heard_ns: None, is_lost: false }
         });
         Self { watches }
     }

@@ -1,9 +1,10 @@
 //! What a client may write beyond type and limits: values without a range, parameters in use, and
 //! the procedure of CiA 301 for changing a PDO.
 
-use masseter_shared::can::canopen::{AbortCode, CobId, NodeId, ObjectAddress};
+use masseter_shared::can::canopen::{AbortCode, CobId, ObjectAddress};
 
 use super::dictionary::{DataType, ENTRIES, MAPPED_MAX, Mapping, Objects, PDOS, WATCHED, find, names};
+use super::heartbeats::watched;
 use super::homing::Homing;
 use super::mode::Mode;
 use super::pdo::MappingEntry;
@@ -44,7 +45,7 @@ pub(super) fn check(
         }
         0x1011 => allow(word == LOAD, AbortCode::NOT_STORED),
         0x1014 => cob_id(CobId(objects.get(names::EMERGENCY_COB_ID)), CobId(word)),
-        0x1016 => watched(subindex, word, objects),
+        0x1016 => allow(!is_watched_elsewhere(subindex, word, objects), AbortCode::PARAMETER_INCOMPATIBLE),
         0x1019 => {
             allow(word != 1, AbortCode::INVALID_VALUE)?;
             allow(!situation.is_operational, AbortCode::DEVICE_STATE)
@@ -69,18 +70,13 @@ pub(super) fn check(
     }
 }
 
-/// A watched node (bits 16 to 22) with its time-out; 0 for either is none. No node twice.
-fn watched(subindex: u8, word: u32, objects: &Objects) -> Result<(), AbortCode> {
-    let node = |word: u32| (word & 0xFFFF != 0 && word >> 16 != 0).then_some(word >> 16);
-    let Some(watched) = node(word) else { return Ok(()) };
-    if !u8::try_from(watched).is_ok_and(|id| NodeId::new(id).is_ok()) {
-        return Err(AbortCode::INVALID_VALUE);
-    }
-    let is_taken = (1..=WATCHED as u8).filter(|&other| other != subindex).any(|other| {
+/// Whether an entry means a node that another entry watches.
+fn is_watched_elsewhere(subindex: u8, word: u32, objects: &Objects) -> bool {
+    let Some(node) = watched(word) else { return false };
+    (1..=WATCHED as u8).filter(|&other| other != subindex).any(|other| {
         let place = names::WATCHED_HEARTBEAT.place() + usize::from(other) - 1;
-        node(objects.word(place)) == Some(watched)
-    });
-    if is_taken { Err(AbortCode::PARAMETER_INCOMPATIBLE) } else { Ok(()) }
+        watched(objects.word(place)) == Some(node)
+    })
 }
 
 /// A new COB-ID in place of an old one: an identifier may change only while its object does not exist.

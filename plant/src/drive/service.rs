@@ -3,7 +3,7 @@
 use masseter_shared::can::canopen::{AbortCode, Expedited, ObjectAddress};
 
 use super::dictionary::{Access, ENTRIES, Initial, find, names, writable};
-use super::errors;
+use super::errors::{self, DriveError};
 use super::heartbeats::Consumer;
 use super::node::DriveNode;
 use super::rules::{Situation, check};
@@ -25,7 +25,11 @@ impl DriveNode {
         let number = usize::from(object.index & 0xFF);
         match object.index {
             0x1003 => errors::forget(&mut self.objects),
-            0x1016 => self.consumer = Consumer::new(&self.objects),
+            0x1016 => {
+                // Supervision begins anew, and nobody is lost any more.
+                self.consumer = Consumer::new(&self.objects);
+                self.clear(DriveError::Heartbeat);
+            }
             0x1017 => self.producer.configure(&self.objects, now_ns),
             0x1400..0x1800 => {
                 self.compile_rpdo(number);

@@ -179,6 +179,29 @@ fn a_lost_heartbeat_changes_the_state_as_object_1029_says() {
 }
 
 #[test]
+fn a_lost_heartbeat_that_is_watched_no_longer_is_no_error_any_more() {
+    let mut bench = Bench::operational();
+    bench.master_beats();
+    bench.run_ms(250);
+    assert_eq!(bench.errors(), (0x11, 0x8130));
+    bench.write((0x1016, 1), &[0; 4]).unwrap();
+    assert_eq!(bench.errors(), (0, 0));
+    assert_eq!(bench.emergencies(), [EmergencyCode::HEARTBEAT, EmergencyCode::RESET]);
+}
+
+/// CiA 301: without a time, or with a number that no node has, an entry is not used; its highest byte is reserved.
+#[test]
+fn an_entry_for_watched_heartbeats_is_used_or_not_as_its_node_and_time_say() {
+    for (word, is_used) in [(0x7F_0064, true), (0x017F_0064, true), (0x80_0064, false), (0x7F_0000, false)] {
+        let mut bench = Bench::operational();
+        bench.write((0x1016, 1), &u32::to_le_bytes(word)).unwrap();
+        bench.master_beats();
+        bench.run_ms(150);
+        assert_eq!(bench.emergencies().contains(&EmergencyCode::HEARTBEAT), is_used, "{word:X}");
+    }
+}
+
+#[test]
 fn a_boot_up_message_does_not_begin_the_supervision() {
     let mut bench = Bench::new();
     bench.receive(Heartbeat { state: NmtState::BootUp }.frame(id(127)));
