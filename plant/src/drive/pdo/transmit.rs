@@ -97,12 +97,14 @@ impl Tpdo {
     pub(in crate::drive) fn at_event(&mut self, now_ns: u64, objects: &Objects) -> Option<Frame> {
         let id = self.id.filter(|_| self.is_event_driven())?;
         let since_ns = self.sent.map(|(_, sent_ns)| now_ns.saturating_sub(sent_ns));
-        let is_inhibited = since_ns.is_some_and(|since_ns| since_ns < self.inhibit_ns);
+        if since_ns.is_some_and(|since_ns| since_ns < self.inhibit_ns) {
+            return None;
+        }
         let is_due = self.timer_ns > 0 && since_ns.is_some_and(|since_ns| since_ns >= self.timer_ns);
         if is_due {
             self.sent = None;
         }
-        if is_inhibited { None } else { self.frame_of_change(id, now_ns, objects) }
+        self.frame_of_change(id, now_ns, objects)
     }
 
     /// The frame, if a watched object is not what it was when it was sent last.

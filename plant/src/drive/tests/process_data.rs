@@ -87,23 +87,39 @@ fn a_sync_counter_chooses_the_first_sync() {
 
 #[test]
 fn an_event_driven_tpdo_is_sent_at_a_change_no_more_often_than_allowed() {
-    let mut bench = Bench::operational();
-    remap(&mut bench, 0x1800, 0xC000_0184, &[]);
-    bench.write((0x1A00, 1), &0x6061_0008_u32.to_le_bytes()).unwrap();
-    bench.write((0x1A00, 0), &[1]).unwrap();
-    bench.write((0x1800, 2), &[255]).unwrap();
-    bench.write((0x1800, 3), &50_u16.to_le_bytes()).unwrap();
-    bench.write((0x1800, 5), &20_u16.to_le_bytes()).unwrap();
-    bench.write((0x1800, 1), &0x4000_0184_u32.to_le_bytes()).unwrap();
-    let count = |bench: &mut Bench, ms| {
-        bench.sent.clear();
-        bench.run_ms(ms);
-        bench.sent.iter().filter(|frame| frame.id().number() == 0x184).count()
-    };
-    assert_eq!(count(&mut bench, 61), 4, "at first, and every 20 ms");
+    let mut bench = Bench::inhibited_for_5_ms(20);
+    assert_eq!(bench.tpdos_within(61), 4, "at first, and every 20 ms");
     bench.write(MODE, &[10]).unwrap();
-    assert_eq!(count(&mut bench, 3), 0, "inhibited for 5 ms");
-    assert_eq!(count(&mut bench, 3), 1);
+    assert_eq!(bench.tpdos_within(3), 0, "inhibited for 5 ms");
+    assert_eq!(bench.tpdos_within(3), 1);
+}
+
+#[test]
+fn an_event_timer_waits_for_the_end_of_the_inhibit_time() {
+    let mut bench = Bench::inhibited_for_5_ms(2);
+    assert_eq!(bench.tpdos_within(51), 11, "at first, and every 5 ms");
+}
+
+impl Bench {
+    /// Operational, with an event-driven TPDO of that event timer.
+    fn inhibited_for_5_ms(timer_ms: u16) -> Self {
+        let mut bench = Self::operational();
+        remap(&mut bench, 0x1800, 0xC000_0184, &[]);
+        bench.write((0x1A00, 1), &0x6061_0008_u32.to_le_bytes()).unwrap();
+        bench.write((0x1A00, 0), &[1]).unwrap();
+        bench.write((0x1800, 2), &[255]).unwrap();
+        bench.write((0x1800, 3), &50_u16.to_le_bytes()).unwrap();
+        bench.write((0x1800, 5), &timer_ms.to_le_bytes()).unwrap();
+        bench.write((0x1800, 1), &0x4000_0184_u32.to_le_bytes()).unwrap();
+        bench
+    }
+
+    /// How often the first TPDO is sent in the milliseconds that follow.
+    fn tpdos_within(&mut self, ms: u64) -> usize {
+        self.sent.clear();
+        self.run_ms(ms);
+        self.sent.iter().filter(|frame| frame.id().number() == 0x184).count()
+    }
 }
 
 #[test]
