@@ -53,7 +53,8 @@ pub(super) fn check(
         0x1400..0x1600 | 0x1800..0x1A00 => communication(object, word, objects),
         0x1600..0x1800 | 0x1A00..0x1C00 => mapping(object, word, objects),
         0x605A => allow(!matches!(word, 3 | 4), AbortCode::INVALID_VALUE),
-        0x6060 => allow(Mode::of(word as i8).is_some(), AbortCode::INVALID_VALUE),
+        // 0 leaves the mode as it is.
+        0x6060 => allow(word as i8 == 0 || Mode::of(word as i8).is_some(), AbortCode::INVALID_VALUE),
         0x607D => {
             let (lowest, highest) = match subindex {
                 1 => (word as i32, objects.get(names::HIGHEST_POSITION)),

@@ -10,7 +10,7 @@ type Refusal<'a> = (&'a str, (u16, u8), &'a [u8], AbortCode);
 #[test]
 fn what_may_not_be_written_is_aborted_with_the_reason() {
     const SAVE: [u8; 4] = *b"save";
-    let table: [Refusal<'_>; 41] = [
+    let table: [Refusal<'_>; 40] = [
         ("no such object", (0x2000, 0), &[1], AbortCode::NO_OBJECT),
         ("no such sub-index", (0x1018, 5), &[1], AbortCode::NO_SUBINDEX),
         ("reserved sub-index", (0x1800, 4), &[1], AbortCode::NO_SUBINDEX),
@@ -22,7 +22,6 @@ fn what_may_not_be_written_is_aborted_with_the_reason() {
         ("below the lowest", (0x6007, 0), &[0xFF, 0xFF], AbortCode::TOO_LOW),
         ("no velocity", (0x6081, 0), &[0; 4], AbortCode::TOO_LOW),
         ("interpolation faster than 1 µs", (0x60C2, 2), &[(-7_i8) as u8], AbortCode::TOO_LOW),
-        ("mode without a number", MODE, &[0], AbortCode::INVALID_VALUE),
         ("profile velocity mode", MODE, &[3], AbortCode::INVALID_VALUE),
         ("quick stop at the current limit", (0x605A, 0), &[3, 0], AbortCode::INVALID_VALUE),
         ("homing onto a switch", (0x6098, 0), &[17], AbortCode::INVALID_VALUE),
@@ -144,9 +143,16 @@ fn supported_modes_are_those_that_can_be_chosen() {
     let mut bench = Bench::new();
     let supported = bench.read((0x6502, 0)).unwrap();
     for mode in -128..=127_i8 {
-        let is_supported = (1..=32).contains(&mode) && supported >> (mode - 1) & 1 == 1;
+        let is_supported = mode == 0 || (1..=32).contains(&mode) && supported >> (mode - 1) & 1 == 1;
         assert_eq!(bench.write(MODE, &[mode as u8]).is_ok(), is_supported, "mode {mode}");
     }
+}
+
+#[test]
+fn mode_0_changes_nothing() {
+    let mut bench = Bench::enabled(PROFILE_POSITION);
+    bench.write(MODE, &[0]).unwrap();
+    assert_eq!(bench.read((0x6061, 0)), Ok(PROFILE_POSITION as u32));
 }
 
 #[test]
