@@ -2,7 +2,7 @@
 //! ([`link`](crate::link)) or real ones ([`emulator`](crate::emulator)).
 
 use masseter_shared::can::canopen::Cob;
-use masseter_shared::can::{CanId, Frame};
+use masseter_shared::can::{CanId, ErrorState, Frame};
 use masseter_shared::geometry::AXES;
 use masseter_shared::messages::{Truth, pose_fields};
 
@@ -70,6 +70,11 @@ impl Emulation {
         }
         self.drives[axis].receive(now_ns, frame, self.dynamics.positions_m()[axis]);
         Ok(())
+    }
+
+    /// A drive's CAN controller is in that error state.
+    pub(crate) fn watch_bus(&mut self, axis: usize, state: ErrorState) {
+        self.drives[axis].watch_bus(self.next_step_ns, state);
     }
 
     /// One step of every drive's loops, where the axes stand at the instant it is due.

@@ -109,6 +109,9 @@ impl Emulator {
     }
 
     fn step(&mut self, now_ns: u64) -> Result<(), DynamicsError> {
+        for (axis, port) in self.ports.iter().enumerate() {
+            self.emulation.watch_bus(axis, port.status().state);
+        }
         self.emulation.step()?;
         (0..AXES).for_each(|axis| self.send_outgoing(axis, now_ns));
         Ok(())

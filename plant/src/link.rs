@@ -138,6 +138,9 @@ impl VirtualLink {
     }
 
     fn step_drives(&mut self, now_ns: u64) -> Result<(), DynamicsError> {
+        for (axis, &Place { bus, port }) in self.places.iter().enumerate() {
+            self.emulation.watch_bus(axis, self.wires[bus].status(port).state);
+        }
         self.emulation.step()?;
         (0..AXES).for_each(|axis| self.send_outgoing(axis, now_ns));
         Ok(())

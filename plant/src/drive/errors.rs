@@ -25,12 +25,16 @@ pub(super) enum DriveError {
     RpdoTimeout,
     /// The following error window was left for too long.
     FollowingError,
+    /// Its CAN controller is error passive.
+    ErrorPassive,
+    /// Its CAN controller was off the bus.
+    WasBusOff,
     /// Nobody guided the drive any more, which object 6007 makes a fault.
     LinkLost,
 }
 
 /// How many there are.
-const COUNT: usize = 7;
+const COUNT: usize = 9;
 
 impl DriveError {
     /// Those that put the drive into fault, and last until it is reset.
@@ -44,6 +48,8 @@ impl DriveError {
             Self::SyncLength => EmergencyCode::SYNC_LENGTH,
             Self::RpdoTimeout => EmergencyCode::RPDO_TIMEOUT,
             Self::FollowingError => EmergencyCode::FOLLOWING_ERROR,
+            Self::ErrorPassive => EmergencyCode::ERROR_PASSIVE,
+            Self::WasBusOff => EmergencyCode::WAS_BUS_OFF,
             Self::LinkLost => EmergencyCode::COMMUNICATION,
         }
     }

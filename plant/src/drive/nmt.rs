@@ -1,10 +1,11 @@
 //! Network management of the drive (CiA 301): its NMT state, its resets, and what becomes of an axis that nobody guides.
 
+use masseter_shared::can::ErrorState;
 use masseter_shared::can::canopen::{Heartbeat, NmtCommand, NmtState};
 use masseter_shared::clock::MILLISECOND_NS;
 
 use super::cyclic::NewTargets;
-use super::dictionary::PDOS;
+use super::dictionary::{PDOS, names};
 use super::errors::{DriveError, Errors};
 use super::heartbeats::Consumer;
 use super::node::DriveNode;
@@ -42,6 +43,38 @@ impl DriveNode {
     pub(super) fn lose_link(&mut self, now_ns: u64) {
         if self.axis.lose_link(now_ns) {
             self.raise(DriveError::LinkLost);
+        }
+    }
+
+    /// Its CAN controller is in that error state: off the bus the communication has failed, which is told once it is back.
+    pub(crate) fn watch_bus(&mut self, now_ns: u64, state: ErrorState) {
+        if state == self.confinement {
+            return;
+        }
+        let before = std::mem::replace(&mut self.confinement, state);
+        if before == ErrorState::BusOff {
+            self.raise(DriveError::WasBusOff);
+            self.clear(DriveError::WasBusOff);
+        }
+        match state {
+            ErrorState::Active => self.clear(DriveError::ErrorPassive),
+            ErrorState::Passive => self.raise(DriveError::ErrorPassive),
+            ErrorState::BusOff => {
+                self.clear(DriveError::ErrorPassive);
+                self.fail_communication(now_ns);
+            }
+        }
+    }
+
+    /// The communication has failed: objects 6007 and 1029.
+    pub(super) fn fail_communication(&mut self, now_ns: u64) {
+        self.lose_link(now_ns);
+        if self.is_operational() {
+            match self.objects.get(names::COMMUNICATION_ERROR) {
+                0 => self.leave_operational(NmtState::PreOperational, now_ns),
+                2 => self.leave_operational(NmtState::Stopped, now_ns),
+                _ => {}
+            }
         }
     }
 

@@ -3,9 +3,9 @@
 //! Network management stands in [`nmt`](super::nmt). SYNC and process data are exchanged in
 //! [`exchange`](super::exchange); what the objects may become is served in [`service`](super::service).
 
-use masseter_shared::can::Frame;
 use masseter_shared::can::canopen::{Cob, CobId, Emergency, Heartbeat, Nmt, NmtState, NodeId};
 use masseter_shared::can::cia402::Controlword;
+use masseter_shared::can::{ErrorState, Frame};
 use masseter_shared::clock::MILLISECOND_NS;
 use masseter_shared::config::DriveConfig;
 
@@ -67,6 +67,8 @@ pub(crate) struct DriveNode {
     pub(super) axis: Axis,
     pub(super) errors: Errors,
     pub(super) nmt: Option<NmtState>,
+    /// What its CAN controller said last.
+    pub(super) confinement: ErrorState,
     pub(super) producer: Producer,
     pub(super) consumer: Consumer,
     pub(super) rpdos: [Rpdo; PDOS],
@@ -90,6 +92,7 @@ impl DriveNode {
             axis: Axis::new(settings.drive, encoder, settings.step_s, position_m, &objects),
             errors: Errors::default(),
             nmt: None,
+            confinement: ErrorState::Active,
             producer: Producer::new(&objects, boot_at_ns + stagger_ns),
             consumer: Consumer::new(&objects),
             rpdos: std::array::from_fn(|number| Rpdo::new(&objects, number as u16)),
@@ -201,19 +204,12 @@ impl DriveNode {
         }
     }
 
-    /// A lost heartbeat is the loss of the link: objects 6007 and 1029. A PDO that stays away leaves nobody to guide
-    /// the axis either: object 6007.
+    /// A lost heartbeat is a failure of the communication. A PDO that stays away leaves nobody to guide the axis either:
+    /// object 6007.
     fn watch_link(&mut self, now_ns: u64) {
         if self.consumer.loses(now_ns) {
             self.raise(DriveError::Heartbeat);
-            self.lose_link(now_ns);
-            if self.is_operational() {
-                match self.objects.get(names::COMMUNICATION_ERROR) {
-                    0 => self.leave_operational(NmtState::PreOperational, now_ns),
-                    2 => self.leave_operational(NmtState::Stopped, now_ns),
-                    _ => {}
-                }
-            }
+            self.fail_communication(now_ns);
         }
         // Outside of operational none is waited for.
         let is_one_overdue = self.rpdos.iter_mut().fold(false, |any, rpdo| rpdo.expires(now_ns) | any);

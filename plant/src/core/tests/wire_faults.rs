@@ -1,5 +1,6 @@
 //! Faults of the wires: what the rig bears, what stops it, and what it tells.
 
+use masseter_shared::can::canopen::EmergencyCode;
 use masseter_shared::can::{ErrorKind, Tapped};
 use masseter_shared::config::{FaultConfig, FaultKindConfig};
 
@@ -91,6 +92,9 @@ fn a_drive_off_the_bus_is_told_and_stops_the_rig() {
     let told = bench.events.iter().find(|event| event.cause == Cause::BusOff.code()).unwrap();
     assert_eq!((told.source, told.axis), (Source::Wire.code(), 2));
     assert!(bench.causes(EventKind::Notice).contains(&Cause::ErrorActive), "restarted after 100 ms");
+    let emergencies = bench.events.iter().filter(|event| event.cause == Cause::Emergency.code());
+    let mut codes = emergencies.map(|event| EmergencyCode(event.value as u16));
+    assert!(codes.any(|code| code == EmergencyCode::WAS_BUS_OFF));
     assert_eq!(bench.reading.master_fault, 1);
 }
 

@@ -11,7 +11,7 @@ use masseter_shared::can::canopen::{
     NodeId, ObjectAddress, SdoRequest, SdoResponse, sync,
 };
 use masseter_shared::can::cia402::{DriveState, StatusBit, Statusword};
-use masseter_shared::can::{CanId, Frame};
+use masseter_shared::can::{CanId, ErrorState, Frame};
 use masseter_shared::config::DrivesConfig;
 
 use super::{DriveNode, DriveSettings};

@@ -14,6 +14,10 @@ impl EmergencyCode {
     pub const RESET: Self = Self(0x0000);
     /// Communication, not told in more detail.
     pub const COMMUNICATION: Self = Self(0x8100);
+    /// The CAN controller became error passive.
+    pub const ERROR_PASSIVE: Self = Self(0x8120);
+    /// The CAN controller was off the bus and is back.
+    pub const WAS_BUS_OFF: Self = Self(0x8140);
     /// A heartbeat or node guarding is overdue.
     pub const HEARTBEAT: Self = Self(0x8130);
     /// A PDO was too short to be used.
