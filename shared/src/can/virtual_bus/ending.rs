@@ -2,6 +2,7 @@
 
 use super::VirtualWire;
 use super::attempt::{Attempt, Ending};
+use super::confinement::Confinement;
 use crate::can::bus::{ErrorState, Received};
 use crate::can::error_frame::{ErrorKind, ErrorReport};
 use crate::can::faults::NumberedFrame;
@@ -40,7 +41,7 @@ impl VirtualWire {
         self.deliver(attempt);
         for port in 0..self.stations.len() {
             if attempt.senders.contains(port) {
-                self.confine(port, end_ns, super::Confinement::transmitted);
+                self.confine(port, end_ns, Confinement::transmitted);
                 if !attempt.babbling.contains(port) {
                     self.stations[port].transmit.remove_most_urgent(attempt.start_ns);
                 }
@@ -63,7 +64,7 @@ impl VirtualWire {
             if attempt.is_from(port) || !self.is_on_bus(port, attempt.start_ns) {
                 continue;
             }
-            self.confine(port, time_ns, super::Confinement::received);
+            self.confine(port, time_ns, Confinement::received);
             if !self.loses(port, attempt, frame.id()) {
                 self.stations[port].receive.push(received);
             }
@@ -85,27 +86,27 @@ impl VirtualWire {
         for port in 0..self.stations.len() {
             if attempt.is_from(port) {
                 self.statistics.retransmissions += 1;
-                self.report_error(port, attempt, kind);
-                match kind {
-                    ErrorKind::Acknowledge => {
-                        let restart_after_ns = self.config.restart_after_ns;
-                        let now_ns = attempt.end_ns;
-                        self.confine(port, now_ns, |node| node.unacknowledged(now_ns, restart_after_ns));
-                    }
-                    _ => self.transmit_error(port, attempt.end_ns),
-                }
+                self.fail_to_send(port, attempt, kind);
             } else if !is_received && self.is_on_bus(port, attempt.start_ns) {
-                self.confine(port, attempt.end_ns, super::Confinement::receive_error);
+                self.confine(port, attempt.end_ns, Confinement::receive_error);
             }
         }
     }
 
-    /// Taps the error frame once, as the first of the senders reports it.
-    fn report_error(&mut self, port: usize, attempt: &Attempt, kind: ErrorKind) {
+    /// Counts the error at a sender. The error frame is tapped once, as the first of them reports it, with what it counts
+    /// behind it and before the change of state that it brings.
+    fn fail_to_send(&mut self, port: usize, attempt: &Attempt, kind: ErrorKind) {
+        let (now_ns, restart_after_ns) = (attempt.end_ns, self.config.restart_after_ns);
+        let count = |node: &mut Confinement| match kind {
+            ErrorKind::Acknowledge => node.unacknowledged(now_ns, restart_after_ns),
+            _ => node.transmit_error(now_ns, restart_after_ns),
+        };
         if !(0..port).any(|other| attempt.is_from(other)) {
-            let status = self.stations[port].confinement.status();
-            self.tap.push(Tapped::Error(ErrorReport::new(attempt.end_ns, port as u8, kind, status)));
+            let mut counted = self.stations[port].confinement;
+            count(&mut counted);
+            self.tap.push(Tapped::Error(ErrorReport::new(now_ns, port as u8, kind, counted.status())));
         }
+        self.confine(port, now_ns, count);
     }
 
     fn transmit_error(&mut self, port: usize, now_ns: u64) {

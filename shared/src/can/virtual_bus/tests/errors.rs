@@ -49,6 +49,17 @@ fn an_unacknowledged_frame_takes_its_bits_to_the_slot_an_error_frame_and_a_passi
 }
 
 #[test]
+fn an_error_is_told_with_the_counter_behind_it_and_before_the_state_it_brings() {
+    let mut wire = alone();
+    wire.send(0, 0, sync::frame()).unwrap();
+    wire.advance(3_000_000);
+    let seen: Vec<_> = errors(&mut wire).iter().map(|report| (report.kind, report.tec)).collect();
+    assert_eq!(seen[..2], [(ErrorKind::Acknowledge, 8), (ErrorKind::Acknowledge, 16)]);
+    let passive = ErrorKind::State(ErrorState::Passive);
+    assert_eq!(seen[15..17], [(ErrorKind::Acknowledge, 128), (passive, 128)]);
+}
+
+#[test]
 fn who_joins_a_lone_node_hears_it_at_once() {
     let mut wire = with(|config| config.ports = 2);
     wire.stations[1].confinement.leave_bus(0, Some(5_000_000));
