@@ -181,6 +181,25 @@ fn more_clients_than_there_are_places_disturb_nobody() {
 }
 
 #[test]
+fn a_request_that_cannot_be_served_is_told_and_costs_no_client_its_connection() {
+    let server = Server::start(&Bench::new(""));
+    let mut stream = TcpStream::connect(&server.address).unwrap();
+    stream.set_read_timeout(Some(Duration::from_secs(20))).unwrap();
+    expect(&mut stream, "< hi >");
+    for (request, answer) in [
+        ("< statistics 1000 >", "< error unknown command"),
+        ("< send 0 0 >", "< error open a bus first >"),
+        ("< send 800 0 >", "< error identifier"),
+        ("< open can0 >", "< ok >"),
+    ] {
+        stream.write_all(request.as_bytes()).unwrap();
+        expect(&mut stream, answer);
+    }
+    stream.write_all(b"no request >").unwrap();
+    expect(&mut stream, "< error text outside");
+}
+
+#[test]
 fn a_foreign_tool_reads_an_object_of_a_drive_on_a_classical_and_on_an_fd_bus() {
     for scenario in ["", "[can]\nfd = true\nbuses = [[0, 1, 2, 3, 4, 5]]"] {
         let server = Server::start(&Workspace::new(scenario));

@@ -2,6 +2,7 @@
 //!
 //! It blocks nobody: what cannot be written now is kept, up to a bound.
 
+use std::fmt::Display;
 use std::io::{self, Read, Write};
 use std::net::TcpStream;
 
@@ -35,8 +36,6 @@ enum Farewell {
     Request(#[from] RequestError),
     #[error("no bus `{name}`, or no place left on it; there are {buses} buses, from can0 on")]
     NoPlace { name: String, buses: usize },
-    #[error("open a bus first")]
-    NoBus,
     #[error("one bus a connection: open another connection for another bus")]
     OpenTwice,
     #[error("{0} bytes wait to be read")]
@@ -68,8 +67,8 @@ impl Client {
         if !matches!(reason, Farewell::Closed) {
             tell!("a client is disconnected: {reason}");
             // It may be gone already.
+            self.refuse(&reason);
             let _ = self.write_unsent();
-            let _ = self.stream.write_all(format!("< error {reason} >").as_bytes());
         }
         if let Some(node) = self.node.take() {
             link.disconnect(node);
@@ -92,24 +91,41 @@ impl Client {
 
     fn answer(&mut self, link: &mut OpenLink, now_ns: u64) -> Result<(), Farewell> {
         while let Some(request) = self.requests.take() {
-            match request? {
-                Request::Open(name) => {
-                    self.open(&name, link)?;
-                    self.say(OK);
-                }
-                Request::RawMode => {
-                    self.frames_from_ns = Some(now_ns + SETTLING_NS);
-                    self.say(OK);
-                }
-                Request::Echo => self.say(ECHO),
-                Request::Send(frame) => {
-                    let node = self.node.as_ref().ok_or(Farewell::NoBus)?;
-                    // A full queue loses the frame, as a controller's does; the client misses its answer.
-                    let _ = link.port(node).send(now_ns, frame);
-                }
+            match request {
+                Ok(request) => self.obey(request, link, now_ns)?,
+                Err(stray @ RequestError::Stray) => return Err(stray.into()),
+                Err(error) => self.refuse(error),
             }
         }
         Ok(())
+    }
+
+    fn obey(&mut self, request: Request, link: &mut OpenLink, now_ns: u64) -> Result<(), Farewell> {
+        match request {
+            Request::Open(name) => {
+                self.open(&name, link)?;
+                self.say(OK);
+            }
+            Request::RawMode => {
+                self.frames_from_ns = Some(now_ns + SETTLING_NS);
+                self.say(OK);
+            }
+            Request::Echo => self.say(ECHO),
+            Request::Send(frame) => {
+                let Some(node) = &self.node else {
+                    self.refuse("open a bus first");
+                    return Ok(());
+                };
+                // A full queue loses the frame, as a controller's does; the client misses its answer.
+                let _ = link.port(node).send(now_ns, frame);
+            }
+        }
+        Ok(())
+    }
+
+    /// Says why a request is not served; the next one may be.
+    fn refuse(&mut self, reason: impl Display) {
+        self.say(&format!("< error {reason} >"));
     }
 
     fn open(&mut self, name: &str, link: &mut OpenLink) -> Result<(), Farewell> {

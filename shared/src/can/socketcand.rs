@@ -11,7 +11,7 @@ use std::fmt::{self, Write};
 
 use super::bus::Received;
 use super::frame::{Frame, FrameError};
-use super::id::{CanIdError, digits};
+use super::id::{CanId, digits};
 
 /// What the server says first.
 pub const GREETING: &str = "< hi >";
@@ -19,6 +19,11 @@ pub const GREETING: &str = "< hi >";
 pub const OK: &str = "< ok >";
 /// What `< echo >` is answered with.
 pub const ECHO: &str = "< echo >";
+
+/// Hexadecimal digits that mean a 29-bit identifier; fewer mean one of 11 bits.
+const EXTENDED_DIGITS: usize = 8;
+/// In which a 29-bit identifier may be marked as such.
+const EXTENDED_FLAG: u32 = 1 << 31;
 
 /// A request is never longer; what is, is none.
 const LONGEST_REQUEST: usize = 256;
@@ -40,7 +45,7 @@ pub enum Request {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum RequestError {
     /// No request of raw mode.
-    #[error("`< {text} >` is no request: expected open, rawmode, send or echo")]
+    #[error("unknown command `{text}`: expected open, rawmode, send or echo")]
     Unknown {
         /// What stands between the brackets.
         text: String,
@@ -53,20 +58,17 @@ pub enum RequestError {
         /// Data bytes that follow.
         sent: usize,
     },
-    /// A data byte is none.
-    #[error("`{text}` is no byte in hexadecimal digits")]
-    Byte {
+    /// An identifier or a data byte is none.
+    #[error("`{text}` is no number in hexadecimal digits")]
+    Number {
         /// The word.
         text: String,
     },
-    /// The identifier is none.
-    #[error(transparent)]
-    Id(#[from] CanIdError),
     /// The frame cannot exist.
     #[error(transparent)]
     Frame(#[from] FrameError),
     /// Text that is no request, or one without an end.
-    #[error("text outside of `< … >`, or a request of more than {LONGEST_REQUEST} bytes")]
+    #[error("text outside of angle brackets, or a request of more than {LONGEST_REQUEST} bytes")]
     Stray,
 }
 
@@ -131,12 +133,24 @@ fn parse_send(id: &str, length: &str, data: &[&str]) -> Result<Request, RequestE
     if length.parse() != Ok(data.len()) {
         return Err(RequestError::Length { announced: length.to_owned(), sent: data.len() });
     }
-    let byte = |text: &&str| {
-        let value = digits(text, 16).and_then(|value| u8::try_from(value).ok());
-        value.ok_or_else(|| RequestError::Byte { text: (*text).to_owned() })
-    };
+    // Clients that keep bytes in signed numbers write FFFFFFFFFFFFFF81 for 81: the lowest byte counts, as in the original.
+    let byte = |text: &&str| parse_number(text).map(|number| number as u8);
     let data = data.iter().map(byte).collect::<Result<Vec<u8>, _>>()?;
-    Ok(Request::Send(Frame::new(id.parse()?, &data)?))
+    Ok(Request::Send(Frame::new(parse_id(id)?, &data)?))
+}
+
+/// Clients need not write leading zeros, so that fewer digits than those of a 29-bit identifier mean one of 11 bits.
+fn parse_id(text: &str) -> Result<CanId, RequestError> {
+    let number = parse_number(text)?;
+    let number = u32::try_from(number).map_err(|_| RequestError::Number { text: text.to_owned() })?;
+    match text.len() {
+        EXTENDED_DIGITS => Ok(CanId::extended(number & !EXTENDED_FLAG)?),
+        _ => Ok(CanId::from_flagged(number)?),
+    }
+}
+
+fn parse_number(text: &str) -> Result<u64, RequestError> {
+    digits(text, 16).ok_or_else(|| RequestError::Number { text: text.to_owned() })
 }
 
 /// Writes a received frame. Its time keeps whole microseconds, as the format does.
@@ -154,7 +168,6 @@ pub fn write_frame(out: &mut impl Write, received: &Received) -> fmt::Result {
 #[cfg(test)]
 mod tests {
     use super::super::frame::strategies::any_classical_frame;
-    use super::super::id::CanId;
     use super::*;
     use proptest::prelude::*;
 
@@ -179,18 +192,32 @@ mod tests {
     }
 
     #[test]
+    fn numbers_are_read_as_loosely_as_clients_write_them() {
+        assert_eq!(requests("< send 1 2 81 ffffffffffffff81 >"), [Ok(sent(0x001, &[0x81, 0x81]))]);
+        assert_eq!(requests("< send 0000081 0 >"), [Ok(sent(0x081, &[]))]);
+        let extended = Frame::fixed(CanId::extended(0x123).unwrap(), []);
+        assert_eq!(
+            requests("< send 80000123 0 >< send 00000123 0 >"),
+            [extended; 2].map(Request::Send).map(Ok)
+        );
+    }
+
+    #[test]
     fn what_is_no_request_is_told_and_what_follows_is_read() {
         let table = [
-            ("< bcmmode >", "is no request"),
-            ("< open >", "is no request"),
+            ("< bcmmode >", "unknown command"),
+            ("< open >", "unknown command"),
             ("open can0 >", "outside"),
             ("\u{e9} >", "outside"),
             ("< send 123 3 11 22 >", "3 data bytes announced, 2 sent"),
             ("< send 123 x >", "x data bytes announced"),
-            ("< send 123 1 1g >", "no byte"),
-            ("< send 123 1 100 >", "no byte"),
-            ("< send 12 0 >", "no identifier"),
+            ("< send 123 1 1g >", "no number"),
+            ("< send 123 1 -1 >", "no number"),
+            ("< send 12x 0 >", "no number"),
+            ("< send 112345678 0 >", "no number"),
             ("< send 800 0 >", "does not fit"),
+            ("< send 1234567 0 >", "does not fit"),
+            ("< send 20000000 0 >", "does not fit"),
             ("< send 123 9 1 2 3 4 5 6 7 8 9 >", "9 data bytes"),
         ];
         for (text, reason) in table {
