@@ -12,7 +12,9 @@
 //! with ours.
 //!
 //! # Fault confinement
-//! The driver reports it by error frames, which change [`status`](Bus::status) and are not handed on. A port
+//! The driver reports it by error frames, which change [`status`](Bus::status) and are handed on to a
+//! [tap](SocketCan::tap) alone: changes of state and, where the driver tells them (`berr-reporting on`), errors on the
+//! wire. Warnings, lost arbitration and faults of the line are passed over. A port
 //! is taken for error active until the first of them. A port that is bus-off refuses to send until the
 //! driver reports a restart (`ip link set … type can restart-ms 100`) or the interface was taken down.
 //!
@@ -38,16 +40,20 @@ use std::time::{Duration, SystemTime};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use socketcan::{CanAnyFrame, CanFdSocket, EmbeddedFrame as _, Socket, SocketOptions};
 
-use self::confinement::Confinement;
+use self::confinement::{Confinement, Told};
 pub use self::interface::OpenError;
 use super::bus::{Bus, BusStatus, ErrorState, ReceiveError, Received, SendError};
+use super::error_frame::ErrorReport;
 use super::frame::{Frame, FrameFormat};
+use super::tap::{Tapped, TappedFrame};
 use crate::clock;
 
 /// Frames looked at in one call of [`Bus::receive`]: error and remote frames must not hold a cycle up.
 const FRAMES_AT_ONCE: usize = 64;
 /// Receive buffer asked for, bytes; the kernel grants at most `net.core.rmem_max`.
 const RECEIVE_BUFFER: i32 = 1 << 20;
+/// The port that errors are told of: the controller of this machine, which all sockets of an interface share.
+const OWN_PORT: u8 = 0;
 /// Fields of `SO_MEMINFO` (`linux/sock_diag.h`), 32 bits each, and which of them counts dropped frames.
 const MEMINFO_FIELDS: usize = 9;
 const MEMINFO_DROPS: usize = 8;
@@ -97,36 +103,63 @@ impl SocketCan {
         let _ = poll(&mut watched, Some(&left));
     }
 
-    /// What a frame just fetched means: a frame for the caller, a loss, or nothing.
+    /// The next frame or error on the wire, for who only looks on; `None` when there is none.
+    ///
+    /// # Errors
+    /// As those of [`Bus::receive`].
+    pub fn tap(&mut self) -> Result<Option<Tapped>, ReceiveError> {
+        self.next(Some)
+    }
+
+    /// The next of what is on the wire that is wanted.
+    fn next<T>(&mut self, wanted: impl Fn(Tapped) -> Option<T>) -> Result<Option<T>, ReceiveError> {
+        for _ in 0..FRAMES_AT_ONCE {
+            match self.socket.read_frame_with_timestamps() {
+                Ok((frame, stamps)) => {
+                    let tapped = self.take(&frame, stamps.socket)?;
+                    if let Some(found) = tapped.and_then(&wanted) {
+                        return Ok(Some(found));
+                    }
+                }
+                Err(error) => return self.receive_failed(&error).map(|()| None),
+            }
+        }
+        Ok(None)
+    }
+
+    /// What a frame just fetched means: a frame or an error on the wire, a loss, or nothing.
     fn take(
         &mut self,
         frame: &CanAnyFrame,
         stamp: Option<SystemTime>,
-    ) -> Result<Option<Received>, ReceiveError> {
+    ) -> Result<Option<Tapped>, ReceiveError> {
         self.drained = true;
-        let frame = match frame {
-            CanAnyFrame::Normal(data) => conversion::of_data(data),
-            CanAnyFrame::Fd(fd) => conversion::of_fd(fd),
-            CanAnyFrame::Error(error) => match self.confinement.take(error.error_bits(), error.data()) {
-                0 => None,
-                lost => return Err(ReceiveError::Overrun { lost }),
-            },
-            CanAnyFrame::Remote(_) => None,
-        };
-        let Some(frame) = frame else { return Ok(None) };
         let time_ns = stamp.map_or_else(clock::now_ns, clock::monotonic_ns).max(self.last_ns);
         self.last_ns = time_ns;
-        Ok(Some(Received { frame, time_ns }))
+        let tapped = |frame| Tapped::Frame(Received { frame, time_ns }.into());
+        match frame {
+            CanAnyFrame::Normal(data) => Ok(conversion::of_data(data).map(tapped)),
+            CanAnyFrame::Fd(fd) => Ok(conversion::of_fd(fd).map(tapped)),
+            CanAnyFrame::Error(error) => {
+                let Told { kind, lost } = self.confinement.take(error.error_bits(), error.data());
+                if lost > 0 {
+                    return Err(ReceiveError::Overrun { lost });
+                }
+                let report = |kind| ErrorReport::new(time_ns, OWN_PORT, kind, self.confinement.status());
+                Ok(kind.map(report).map(Tapped::Error))
+            }
+            CanAnyFrame::Remote(_) => Ok(None),
+        }
     }
 
     /// Nothing is left to fetch: tells of frames dropped meanwhile.
-    fn empty(&mut self) -> Result<Option<Received>, ReceiveError> {
+    fn empty(&mut self) -> Result<(), ReceiveError> {
         if !std::mem::take(&mut self.drained) {
-            return Ok(None);
+            return Ok(());
         }
         let dropped = self.count_dropped().map_err(|error| ReceiveError::Os { errno: errno(&error) })?;
         match dropped.wrapping_sub(std::mem::replace(&mut self.dropped, dropped)) {
-            0 => Ok(None),
+            0 => Ok(()),
             lost => Err(ReceiveError::Overrun { lost: u64::from(lost) }),
         }
     }
@@ -139,10 +172,10 @@ impl SocketCan {
         Ok(u32::from_ne_bytes(fields[MEMINFO_DROPS]))
     }
 
-    fn receive_failed(&mut self, error: &io::Error) -> Result<Option<Received>, ReceiveError> {
+    fn receive_failed(&mut self, error: &io::Error) -> Result<(), ReceiveError> {
         match error.kind() {
             io::ErrorKind::WouldBlock => self.empty(),
-            io::ErrorKind::Interrupted => Ok(None),
+            io::ErrorKind::Interrupted => Ok(()),
             _ if is_down(error) => {
                 self.confinement = Confinement::default();
                 Err(ReceiveError::InterfaceDown { errno: errno(error) })
@@ -171,17 +204,9 @@ impl Bus for SocketCan {
     }
 
     fn receive(&mut self, _: u64) -> Result<Option<Received>, ReceiveError> {
-        for _ in 0..FRAMES_AT_ONCE {
-            match self.socket.read_frame_with_timestamps() {
-                Ok((frame, stamps)) => {
-                    if let Some(received) = self.take(&frame, stamps.socket)? {
-                        return Ok(Some(received));
-                    }
-                }
-                Err(error) => return self.receive_failed(&error),
-            }
-        }
-        Ok(None)
+        self.next(|tapped| {
+            tapped.frame().map(|&TappedFrame { frame, time_ns, .. }| Received { frame, time_ns })
+        })
     }
 
     fn status(&self) -> BusStatus {
