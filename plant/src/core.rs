@@ -151,7 +151,7 @@ impl<L: Link> PlantCore<L> {
             }
             while let Some(note) = self.link.next_note(bus, now_ns) {
                 let axis = note.port.and_then(|port| self.link.axis_at(bus, port));
-                self.wire_events.add(wire_events::of_note(&note, axis, self.cycle));
+                self.wire_events.add(wire_events::of_note(&note, bus, axis, self.cycle));
             }
         }
     }
@@ -165,7 +165,7 @@ impl<L: Link> PlantCore<L> {
             },
             Tapped::Error(report) => {
                 let axis = self.link.axis_at(bus, usize::from(report.port));
-                if let Some(event) = wire_events::of_report(report, axis, self.cycle) {
+                if let Some(event) = wire_events::of_report(report, bus, axis, self.cycle) {
                     self.wire_events.add(event);
                 }
             }

@@ -1,6 +1,6 @@
-//! What happens on simulated wires, and what faults do to the master's port of real ones, as events: controllers that
-//! change their error state, and the beginning and end of injected faults. Single errors are no events; they are in the
-//! log and in the figures.
+//! What happens on the wires as events: controllers that change their error state, of which real interfaces tell their
+//! own alone, and the beginning and end of injected faults. Single errors are no events; they are in the log and in the
+//! figures.
 
 use masseter_shared::can::faults::FaultNote;
 use masseter_shared::can::{ErrorKind, ErrorReport, ErrorState};
@@ -11,8 +11,8 @@ use masseter_shared::messages::codes::{Cause, EventKind, Source};
 const ACTIVE_MAX: f64 = 127.0;
 const PASSIVE_MAX: f64 = 255.0;
 
-/// The event for a report, if it is a change of state; `axis` is the axis of its port.
-pub(crate) fn of_report(report: &ErrorReport, axis: Option<usize>, cycle: u64) -> Option<Event> {
+/// The event for a report from a bus, if it is a change of state; `axis` is the axis of its port.
+pub(crate) fn of_report(report: &ErrorReport, bus: usize, axis: Option<usize>, cycle: u64) -> Option<Event> {
     let ErrorKind::State(state) = report.kind else { return None };
     let (cause, limit) = match state {
         ErrorState::Active => (Cause::ErrorActive, ACTIVE_MAX),
@@ -20,17 +20,17 @@ pub(crate) fn of_report(report: &ErrorReport, axis: Option<usize>, cycle: u64) -
         ErrorState::BusOff => (Cause::BusOff, PASSIVE_MAX),
     };
     let value = f64::from(report.tec);
-    Some(Event { time_ns: report.time_ns, cycle, value, limit, ..notice(cause, axis) })
+    Some(Event { time_ns: report.time_ns, cycle, value, limit, ..notice(cause, bus, axis) })
 }
 
-/// The event for the beginning or the end of a fault; `axis` is the axis of the node concerned.
-pub(crate) fn of_note(note: &FaultNote, axis: Option<usize>, cycle: u64) -> Event {
+/// The event for the beginning or the end of a fault on a bus; `axis` is the axis of the node concerned.
+pub(crate) fn of_note(note: &FaultNote, bus: usize, axis: Option<usize>, cycle: u64) -> Event {
     let cause = if note.has_ended { Cause::FaultEnded } else { Cause::FaultInjected };
     let (value, limit) = ((note.fault + 1) as f64, note.strikes as f64);
-    Event { time_ns: note.time_ns, cycle, value, limit, ..notice(cause, axis) }
+    Event { time_ns: note.time_ns, cycle, value, limit, ..notice(cause, bus, axis) }
 }
 
-fn notice(cause: Cause, axis: Option<usize>) -> Event {
+fn notice(cause: Cause, bus: usize, axis: Option<usize>) -> Event {
     let event = Event::new(Source::Wire, EventKind::Notice, cause);
-    Event { axis: axis.map_or(event.axis, |axis| axis as u32), ..event }
+    Event { axis: axis.map_or(event.axis, |axis| axis as u32), bus: bus as u16, ..event }
 }

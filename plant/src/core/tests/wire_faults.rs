@@ -3,6 +3,7 @@
 use masseter_shared::can::canopen::EmergencyCode;
 use masseter_shared::can::{ErrorKind, Tapped};
 use masseter_shared::config::{FaultConfig, FaultKindConfig};
+use masseter_shared::messages::codes::NO_AXIS;
 
 use super::*;
 
@@ -96,6 +97,14 @@ fn a_drive_off_the_bus_is_told_and_stops_the_rig() {
     let mut codes = emergencies.map(|event| EmergencyCode(event.value as u16));
     assert!(codes.any(|code| code == EmergencyCode::WAS_BUS_OFF));
     assert_eq!(bench.reading.master_fault, 1);
+}
+
+#[test]
+fn the_masters_own_controller_off_a_bus_is_told_with_the_bus() {
+    let mut bench = struck_by(FaultConfig { kind: FaultKindConfig::BusOff, bus: 1, node: Some(127), ..BASE });
+    play_until(&mut bench, 0.6);
+    let told = bench.events.iter().find(|event| event.cause == Cause::BusOff.code()).unwrap();
+    assert_eq!((told.source, told.bus, told.axis), (Source::Wire.code(), 1, NO_AXIS));
 }
 
 #[test]
