@@ -182,7 +182,7 @@ fn more_clients_than_there_are_places_disturb_nobody() {
 
 #[test]
 fn a_request_that_cannot_be_served_is_told_and_costs_no_client_its_connection() {
-    let server = Server::start(&Bench::new(""));
+    let server = Server::start(&Workspace::new(""));
     let mut stream = TcpStream::connect(&server.address).unwrap();
     stream.set_read_timeout(Some(Duration::from_secs(20))).unwrap();
     expect(&mut stream, "< hi >");

@@ -101,7 +101,7 @@ fn who_insists_is_not_told_that_a_process_died_of_it() {
 #[test]
 fn an_interrupted_motion_may_be_held_for_longer_than_a_process_takes_to_end() {
     let cores = Cores::take();
-    let (_bench, child) =
+    let (_workspace, child) =
         Workspace::running(&cores, &UNHURRIED.replace("[controller]", "[controller]\nhold_s = 6.0"));
     kill_process(Pid::from_child(&child), Signal::INT).unwrap();
     let output = child.wait_with_output().unwrap();

@@ -58,7 +58,7 @@ fn a_motion_that_somebody_broke_off_does_not_pass() {
 #[test]
 fn a_controller_that_does_not_end_when_asked_to_is_killed() {
     let cores = Cores::take();
-    let (_bench, child) = Workspace::running(&cores, UNHURRIED);
+    let (_workspace, child) = Workspace::running(&cores, UNHURRIED);
     kill_process(child_of(&child, "controller"), Signal::STOP).unwrap();
     kill_process(Pid::from_child(&child), Signal::TERM).unwrap();
     let output = child.wait_with_output().unwrap();

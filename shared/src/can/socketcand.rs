@@ -22,7 +22,7 @@ pub const ECHO: &str = "< echo >";
 
 /// Hexadecimal digits that mean a 29-bit identifier; fewer mean one of 11 bits.
 const EXTENDED_DIGITS: usize = 8;
-/// In which a 29-bit identifier may be marked as such.
+/// The bit by which some clients mark a 29-bit identifier.
 const EXTENDED_FLAG: u32 = 1 << 31;
 
 /// A request is never longer; what is, is none.
