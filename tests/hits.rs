@@ -39,7 +39,7 @@ const MOTION: &str = "duration_s = 0.5\n";
 /// Far less than what the unhurried rig bears with.
 const SHORT_STOP: Duration = Duration::from_millis(60);
 /// A machine that stands still may let the moment pass.
-const TRIES: usize = 5;
+const TRIES: usize = 10;
 /// No moment is as far off, ns.
 const GIVE_UP_NS: u64 = 30 * SECOND_NS;
 

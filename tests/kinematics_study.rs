@@ -38,7 +38,7 @@ const TABLES: [(&str, &str); 15] = [
     ("speed", "start,solver,cases,median_ns,p99_ns,"),
     ("fig8_solutions", "theta1_deg,theta2_deg,theta3_deg,above_base,"),
     ("multiplicity", "counted,solutions,inputs"),
-    ("basins", "guess1_deg,guess2_deg,guess3_deg,seed_reaches,"),
+    ("basins", "guess1_deg,guess2_deg,guess3_deg,published_reaches,"),
     ("motions", "motion,within_limits,least_slide_margin_m,"),
     ("workspace_x_z", "x_mm,z_mm,condition,determinant,regular_within_deg,separation_deg"),
     ("workspace_y_z", "y_mm,z_mm,condition,"),

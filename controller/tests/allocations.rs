@@ -7,7 +7,7 @@ use std::cell::Cell;
 use std::hint::black_box;
 
 use masseter_controller::core::{Controller, Tick};
-use masseter_controller::kinematics::{ForwardTracker, Options, Solutions, solve_newton, solve_seed};
+use masseter_controller::kinematics::{ForwardTracker, Options, Solutions, solve_newton, solve_published};
 use masseter_controller::trajectory::Trajectory;
 use masseter_shared::config::Scenario;
 use masseter_shared::geometry::{AXES, Actuators, LEGS, Mechanism, MechanismConfig};
@@ -92,7 +92,7 @@ fn no_path_of_the_forward_kinematics_allocates() {
         assert!(black_box(guessing.update(&nearby)).is_ok());
         assert!(black_box(tracker.update(&unassemblable)).is_err());
         assert_eq!(Solutions::new(&mechanism, &neutral).map(|all| all.count()), Ok(16));
-        assert!(black_box(solve_seed(&mechanism, &nearby, &[1.4; LEGS], &options)).is_ok());
+        assert!(black_box(solve_published(&mechanism, &nearby, &[1.4; LEGS], &options)).is_ok());
         assert!(black_box(solve_newton(&mechanism, &nearby, &[1.4; LEGS], &options)).is_ok());
     });
     assert_eq!(solving, 0);

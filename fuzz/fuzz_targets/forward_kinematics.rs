@@ -15,7 +15,7 @@ use nalgebra::Vector3;
 
 /// Roundings between the solver's corners and those made from its angles.
 const ROUNDINGS: f64 = 64.0 * f64::EPSILON;
-/// What a side of a mechanism of the seed's size may be off by, metres.
+/// What a side of a mechanism of the paper's size may be off by, metres.
 const CLOSED_WITHIN_M: f64 = 1e-12;
 /// How far a pose's corners may be from the legs' ends, metres: the platform is rigid, the ends are not quite.
 const CARRIED_WITHIN_M: f64 = 1e-11;
@@ -67,7 +67,7 @@ fn check_closure(mechanism: &Mechanism, actuators: &Actuators, solution: &Soluti
     }
 }
 
-/// On a mechanism of the seed's size the sides close to a picometre, and the pose carries the corners there.
+/// On a mechanism of the paper's size the sides close to a picometre, and the pose carries the corners there.
 fn check_pose(mechanism: &Mechanism, actuators: &Actuators, solution: &Solution) {
     assert!(solution.residual_m < CLOSED_WITHIN_M, "{actuators:?}: {solution:?}");
     let ends = mechanism.corners_from_angles(actuators, &solution.theta_rad);
@@ -92,7 +92,7 @@ fn check_alone(mechanism: &Mechanism, actuators: &Actuators, tracked: &Solution)
     }
 }
 
-/// The seed's mechanism with every dimension off, or any numbers.
+/// The paper's mechanism with every dimension off, or any numbers.
 fn geometry(bytes: &mut Unstructured<'_>, raw: bool) -> Result<MechanismConfig> {
     let mut config = MechanismConfig::default();
     for slide in &mut config.slides {

@@ -6,7 +6,7 @@ use std::f64::consts::TAU;
 use std::hint::black_box;
 
 use masseter_controller::kinematics::{
-    ForwardError, ForwardTracker, Options, Solution, solve_completely, solve_newton, solve_seed,
+    ForwardError, ForwardTracker, Options, Solution, solve_completely, solve_newton, solve_published,
 };
 use masseter_shared::clock;
 use masseter_shared::geometry::{Actuators, LEGS, Mechanism, MechanismConfig, Pose};
@@ -36,7 +36,8 @@ pub(super) fn measure(rounds: u32, core: usize) -> anyhow::Result<Outcome> {
     let options = &Options::default();
     let newton =
         |input: &Actuators, guess_rad: &[f64; LEGS]| solve_newton(mechanism, input, guess_rad, options);
-    let seed = |input: &Actuators, guess_rad: &[f64; LEGS]| solve_seed(mechanism, input, guess_rad, options);
+    let published =
+        |input: &Actuators, guess_rad: &[f64; LEGS]| solve_published(mechanism, input, guess_rad, options);
     let tracked = || {
         let mut tracker = ForwardTracker::new(mechanism.clone());
         each(inputs, |input| tracker.update(input))
@@ -44,7 +45,7 @@ pub(super) fn measure(rounds: u32, core: usize) -> anyhow::Result<Outcome> {
     let turns = vec![
         turn(WARM, core, tracked),
         turn(WARM_NEWTON, core, || each_from_the_last(inputs, newton)),
-        turn(WARM_PAPER, core, || each_from_the_last(inputs, seed)),
+        turn(WARM_PAPER, core, || each_from_the_last(inputs, published)),
         turn(COLD, core, || each(inputs, |input| solve_completely(mechanism, input))),
         turn(COLD_NEWTON, core, || each(inputs, |input| newton(input, &GUESS_RAD))),
     ];

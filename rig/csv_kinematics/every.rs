@@ -36,7 +36,7 @@ const COLUMNS_OUT: [&str; 20] = [
 
 /// Status `true` of a solution in which the mechanism can stand, `other` of the rest; an input without
 /// any gives one line with the reason of [`ForwardError`], and `nearest_m` the least root of the error
-/// (seed, eq. 2) that was found over all leg angles.
+/// (the paper, eq. 2) that was found over all leg angles.
 pub(super) fn every_solution(args: &CsvArgs, mechanism: &Mechanism) -> anyhow::Result<Exit> {
     let columns = Columns { read: COLUMNS_IN, written: &COLUMNS_OUT };
     convert(args, columns, |line, values, lines| {

@@ -24,7 +24,7 @@ const COLUMNS_OUT: [&str; 12] = [
     "iterations",
     "residual_m",
 ];
-/// Where the seed's and Newton's iteration start if nobody says: the seed's neutral pose.
+/// Where the paper's and Newton's iteration start if nobody says: the paper's neutral pose.
 const NEUTRAL_RAD: [f64; LEGS] = [1.46; LEGS];
 
 /// What `fk` takes.
@@ -59,7 +59,7 @@ enum Solver {
     Newton,
 }
 
-/// Status `ok`, `outside_stroke`, or the reason of [`ForwardError`]. The seed's and Newton's iteration
+/// Status `ok`, `outside_stroke`, or the reason of [`ForwardError`]. The paper's and Newton's iteration
 /// may come to a solution at which the mechanism cannot stand; its status is then `wrong_assembly`,
 /// and the values stand all the same.
 pub(crate) fn forward(args: &FkArgs) -> anyhow::Result<Exit> {
@@ -104,7 +104,7 @@ impl Chosen {
             (Solver::Controller, Some(guess)) => {
                 Self::Controller(ForwardTracker::with_guess(mechanism, guess))
             }
-            (Solver::Published, _) => iteration(Method::Seed, mechanism),
+            (Solver::Published, _) => iteration(Method::Published, mechanism),
             (Solver::Newton, _) => iteration(Method::Newton, mechanism),
         }
     }

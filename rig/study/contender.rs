@@ -9,33 +9,33 @@ use masseter_shared::geometry::{Actuators, LEGS, Mechanism};
 /// A solver with its choices.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Contender {
-    /// The seed's algorithm (Fig. 2), with the two choices that its text leaves open.
-    Seed(Residual, StepRule),
+    /// The paper's algorithm (Fig. 2), with the two choices that its text leaves open.
+    Published(Residual, StepRule),
     /// Newton–Raphson with the full increment.
     Newton(Residual),
     /// The controller's certified solver, with the guess as its last solution.
     Controller,
 }
 
-/// The seed's algorithm as printed: distances (eq. 1), the increment halved until the error decreases.
-pub(super) const SEED: Contender = Contender::Seed(Residual::Distance, StepRule::Halving);
+/// The paper's algorithm as printed: distances (eq. 1), the increment halved until the error decreases.
+pub(super) const PUBLISHED: Contender = Contender::Published(Residual::Distance, StepRule::Halving);
 /// Newton–Raphson on the equations as printed.
 pub(super) const NEWTON: Contender = Contender::Newton(Residual::Distance);
 
-/// All of them; where only three are compared, they are [`SEED`], [`NEWTON`] and the controller's.
+/// All of them; where only three are compared, they are [`PUBLISHED`], [`NEWTON`] and the controller's.
 pub(super) const CONTENDERS: [Contender; 9] = [
-    SEED,
-    Contender::Seed(Residual::Distance, StepRule::CautiousHalving),
-    Contender::Seed(Residual::Distance, StepRule::QuadraticBacktracking),
-    Contender::Seed(Residual::SquaredDistance, StepRule::Halving),
-    Contender::Seed(Residual::SquaredDistance, StepRule::CautiousHalving),
-    Contender::Seed(Residual::SquaredDistance, StepRule::QuadraticBacktracking),
+    PUBLISHED,
+    Contender::Published(Residual::Distance, StepRule::CautiousHalving),
+    Contender::Published(Residual::Distance, StepRule::QuadraticBacktracking),
+    Contender::Published(Residual::SquaredDistance, StepRule::Halving),
+    Contender::Published(Residual::SquaredDistance, StepRule::CautiousHalving),
+    Contender::Published(Residual::SquaredDistance, StepRule::QuadraticBacktracking),
     NEWTON,
     Contender::Newton(Residual::SquaredDistance),
     Contender::Controller,
 ];
 /// The three that the figures show.
-pub(super) const SHOWN: [Contender; 3] = [SEED, NEWTON, Contender::Controller];
+pub(super) const SHOWN: [Contender; 3] = [PUBLISHED, NEWTON, Contender::Controller];
 
 /// What came of one guess.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -56,13 +56,13 @@ impl Contender {
             Residual::SquaredDistance => "squared distances",
         };
         match self {
-            Self::Seed(form, step) => {
+            Self::Published(form, step) => {
                 let step = match step {
                     StepRule::Halving => "halving",
                     StepRule::CautiousHalving => "cautious halving",
                     StepRule::QuadraticBacktracking => "quadratic backtracking",
                 };
-                format!("seed, {}, {step}", residual(form))
+                format!("published, {}, {step}", residual(form))
             }
             Self::Newton(form) => format!("Newton–Raphson, {}", residual(form)),
             Self::Controller => "controller".to_owned(),
@@ -72,7 +72,7 @@ impl Contender {
     /// The name in a legend, where only [`SHOWN`] stand.
     pub(super) fn short_name(self) -> &'static str {
         match self {
-            Self::Seed(..) => "seed",
+            Self::Published(..) => "published",
             Self::Newton(_) => "Newton–Raphson",
             Self::Controller => "controller",
         }
@@ -122,7 +122,7 @@ impl Contender {
         let most =
             Options { max_iterations: MAX_ITERATIONS, max_halvings: MAX_HALVINGS, ..Options::default() };
         match self {
-            Self::Seed(residual, step) => Some((Method::Seed, Options { residual, step, ..most })),
+            Self::Published(residual, step) => Some((Method::Published, Options { residual, step, ..most })),
             Self::Newton(residual) => Some((Method::Newton, Options { residual, ..most })),
             Self::Controller => None,
         }

@@ -1,4 +1,4 @@
-//! `masseter kinematics`: the seed's study of the forward kinematics again, as data, figures and a page
+//! `masseter kinematics`: the paper's study of the forward kinematics again, as data, figures and a page
 //! of its claims. It is about the published mechanism. Everything but the times is a function of
 //! `--seed`, `--samples` and `--cells`.
 
@@ -78,7 +78,7 @@ struct Study {
     maps: Vec<Map>,
 }
 
-/// Carries the verb out. That a claim of the seed does not hold is a result, not a failure.
+/// Carries the verb out. That a claim of the paper does not hold is a result, not a failure.
 pub(crate) fn kinematics(args: &KinematicsArgs) -> anyhow::Result<Exit> {
     let study = Study::make(args)?;
     study.write(args)

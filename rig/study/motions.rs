@@ -82,7 +82,7 @@ fn follow(contender: Contender, mechanism: &Mechanism, trajectory: &Trajectory) 
         let found = if contender == Contender::Controller {
             tracker.update(&joints.actuators).ok().map(|solution| (solution.theta_rad, solution.iterations))
         } else {
-            // The first pose is known, as the seed supposes.
+            // The first pose is known, as the paper supposes.
             let guess_rad = last_rad.unwrap_or(joints.theta_rad);
             let attempt = contender.attempt(mechanism, &joints.actuators, &guess_rad);
             attempt.found_rad.ok().map(|found_rad| (found_rad, attempt.iterations))

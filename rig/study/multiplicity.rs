@@ -1,4 +1,4 @@
-//! How many solutions random inputs have, and how many of them the seed's two conditions leave.
+//! How many solutions random inputs have, and how many of them the paper's two conditions leave.
 
 use masseter_controller::kinematics::{MOST_SOLUTIONS, Solution, Solutions};
 use masseter_shared::geometry::{LEGS, Mechanism};
@@ -8,7 +8,7 @@ use super::sample::{self, Stream};
 use super::share::Share;
 use super::table::Table;
 
-/// The readings of the seed's conditions.
+/// The readings of the paper's conditions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Reading {
     /// All hinges on one side of the platform's plane, whichever, and A₂ beyond A₃; legs above the base.

@@ -1,4 +1,4 @@
-//! The page that sets each claim of the seed beside what was measured, in Markdown.
+//! The page that sets each claim of the paper beside what was measured, in Markdown.
 
 use std::fmt::Write;
 use std::path::Path;
@@ -10,16 +10,16 @@ use super::{KinematicsArgs, Study};
 /// The whole page. Every figure is shown with the caption of its drawing.
 pub(super) fn of(study: &Study, args: &KinematicsArgs, claims: &[Claim], figures: &[Figure]) -> String {
     let mut page = format!(
-        "# The seed's claims beside what was measured\n\n\
-         The seed is the paper of the 6-DOF mastication mechanism and its forward kinematics; `seed` below is its \
+        "# The paper's claims beside what was measured\n\n\
+         The paper is that of the 6-DOF mastication mechanism and its forward kinematics; `published` below is its \
          solver as printed (residuals are distances, the increment is halved until the error decreases), with at \
          most 100 iterations and 40 halvings. *From above the base*: {samples} random inputs with one true \
          solution, each with a random guess of leg angles between 0° and 180°. Verdicts follow from the figures of \
          this run by the criterion beside them.\n\n\
-         Masseter {version}, seed of the random numbers {seed}; again with\n\n    \
+         Masseter {version}, random numbers from seed {seed}; again with\n\n    \
          masseter kinematics --out DIR --seed {seed} --samples {samples} --cells {cells}{motion}\n\n\
          Only times differ from run to run.\n\n\
-         | # | The seed's claim | Where | Measured | Criterion | Verdict |\n\
+         | # | The paper's claim | Where | Measured | Criterion | Verdict |\n\
          | --- | --- | --- | --- | --- | --- |\n",
         samples = args.samples,
         cells = args.cells,
@@ -39,7 +39,7 @@ pub(super) fn of(study: &Study, args: &KinematicsArgs, claims: &[Claim], figures
         );
     }
     page += &workspace(study);
-    page += "\nNot measured: what the seed says of the Stewart platform, genetic algorithms, friction and dynamics.\n";
+    page += "\nNot measured: what the paper says of the Stewart platform, genetic algorithms, friction and dynamics.\n";
     for Figure { name, caption, .. } in figures {
         let _ = write!(
             page,

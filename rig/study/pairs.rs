@@ -1,9 +1,9 @@
-//! Figs. 3 and 4 of the seed: single guesses from which the two iterations go different ways.
+//! Figs. 3 and 4 of the paper: single guesses from which the two iterations go different ways.
 
 use masseter_shared::geometry::{Actuators, LEGS, Mechanism};
 use rayon::prelude::*;
 
-use super::contender::{Contender, NEWTON, SEED};
+use super::contender::{Contender, NEWTON, PUBLISHED};
 use super::sample::Guesses;
 use super::share::Share;
 use super::table::{Table, degrees, number};
@@ -39,7 +39,7 @@ pub(super) enum Course {
 pub(super) struct Pair {
     pub actuators: Actuators,
     pub guess_rad: [f64; LEGS],
-    pub seed_cm2: Vec<f64>,
+    pub published_cm2: Vec<f64>,
     pub newton_cm2: Vec<f64>,
 }
 
@@ -58,11 +58,11 @@ pub(super) struct Parting {
 /// What was found among the guesses above the base.
 #[derive(Debug, Clone)]
 pub(super) struct Pairs {
-    /// Fig. 3: the seed's converges, Newton–Raphson falls at first and then diverges.
+    /// Fig. 3: the paper's converges, Newton–Raphson falls at first and then diverges.
     pub diverging: Parting,
-    /// Fig. 4: the seed's converges, Newton–Raphson oscillates.
+    /// Fig. 4: the paper's converges, Newton–Raphson oscillates.
     pub oscillating: Parting,
-    /// Not in the seed: Newton–Raphson converges, the seed's stalls.
+    /// Not in the paper: Newton–Raphson converges, the paper's stalls.
     pub stalling: Parting,
 }
 
@@ -74,8 +74,10 @@ impl Pairs {
             .map(|trial| {
                 let pair = Pair::of(mechanism, trial);
                 let solved = |contender| trial.of(contender).is_solved();
-                let courses =
-                    [course(&pair.seed_cm2, solved(SEED)), course(&pair.newton_cm2, solved(NEWTON))];
+                let courses = [
+                    course(&pair.published_cm2, solved(PUBLISHED)),
+                    course(&pair.newton_cm2, solved(NEWTON)),
+                ];
                 (courses, pair)
             })
             .collect();
@@ -101,7 +103,7 @@ impl Pairs {
             ),
             stalling: parting(
                 "fig3b_stalling",
-                "Beside Fig. 3: the seed's solver stalls",
+                "Beside Fig. 3: the paper's solver stalls",
                 [Course::Fails, Course::Converges],
                 fall,
             ),
@@ -141,12 +143,12 @@ impl Pair {
     fn of(mechanism: &Mechanism, trial: &Trial) -> Self {
         let Trial { actuators, guess_rad, .. } = *trial;
         let errors = |contender: Contender| contender.errors_cm2(mechanism, &actuators, &guess_rad);
-        Self { actuators, guess_rad, seed_cm2: errors(SEED), newton_cm2: errors(NEWTON) }
+        Self { actuators, guess_rad, published_cm2: errors(PUBLISHED), newton_cm2: errors(NEWTON) }
     }
 
     fn rows(&self) -> Vec<Vec<String>> {
         let mut rows = Vec::new();
-        for (contender, errors) in [(SEED, &self.seed_cm2), (NEWTON, &self.newton_cm2)] {
+        for (contender, errors) in [(PUBLISHED, &self.published_cm2), (NEWTON, &self.newton_cm2)] {
             for (iteration, &error) in errors.iter().enumerate() {
                 let mut row = vec![contender.short_name().to_owned(), iteration.to_string(), number(error)];
                 row.extend(self.actuators.to_axes().map(number));

@@ -1,4 +1,4 @@
-//! Figs. 6 and 8 of the seed: all ways to assemble the neutral input.
+//! Figs. 6 and 8 of the paper: all ways to assemble the neutral input.
 
 use masseter_controller::kinematics::{Solution, Solutions};
 use masseter_shared::geometry::{Actuators, LEGS, Mechanism};
@@ -131,7 +131,7 @@ mod tests {
     }
 
     #[test]
-    fn the_folded_corner_is_the_one_of_the_seed() {
+    fn the_folded_corner_is_the_one_of_the_paper() {
         let set = set();
         let folded = set.corner_folded().unwrap();
         assert!((folded.theta_rad[0].to_degrees() - 66.04).abs() < 0.01);

@@ -1,4 +1,4 @@
-//! Fig. 5 of the seed in time: what a solution costs each contender, all in the same run, in turns.
+//! Fig. 5 of the paper in time: what a solution costs each contender, all in the same run, in turns.
 
 use std::hint::black_box;
 

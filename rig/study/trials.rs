@@ -4,7 +4,7 @@ use masseter_controller::kinematics::Assembly;
 use masseter_shared::geometry::{Actuators, LEGS, Mechanism};
 use rayon::prelude::*;
 
-use super::contender::{Attempt, CONTENDERS, Contender, NEWTON, SEED};
+use super::contender::{Attempt, CONTENDERS, Contender, NEWTON, PUBLISHED};
 use super::sample::{self, GUESSES, Guesses, Stream, distance_rad};
 use super::share::{Share, median, quantile};
 use super::table::{Table, number};
@@ -110,7 +110,7 @@ impl Trials {
     /// A contender's iterations and Newton–Raphson's (same residual) where both arrive.
     pub(super) fn against_newton(&self, contender: Contender, guesses: Guesses) -> Vec<[Attempt; 2]> {
         let rival = match contender {
-            Contender::Seed(residual, _) => Contender::Newton(residual),
+            Contender::Published(residual, _) => Contender::Newton(residual),
             Contender::Newton(_) | Contender::Controller => NEWTON,
         };
         let both = self.of(contender, guesses).zip(self.of(rival, guesses));
@@ -178,7 +178,7 @@ impl Trials {
         counts
     }
 
-    /// What the seed's variants and Newton–Raphson cost where both arrive.
+    /// What the paper's variants and Newton–Raphson cost where both arrive.
     pub(super) fn cost_table(&self) -> Table {
         let header = [
             "guesses",
@@ -193,7 +193,7 @@ impl Trials {
         ];
         let mut rows = Vec::new();
         for guesses in GUESSES {
-            for contender in CONTENDERS.into_iter().filter(|one| matches!(one, Contender::Seed(..))) {
+            for contender in CONTENDERS.into_iter().filter(|one| matches!(one, Contender::Published(..))) {
                 let both = self.against_newton(contender, guesses);
                 let iterations = |side: usize| both.iter().map(move |pair| f64::from(pair[side].iterations));
                 let evaluations =
@@ -211,13 +211,16 @@ impl Trials {
     }
 
     /// Trials above the base in which one of the two arrives and the other does not:
-    /// seed alone, Newton–Raphson alone.
+    /// the paper's solver alone, Newton–Raphson alone.
     pub(super) fn alone(&self) -> [Share; 2] {
         let both = || {
             let newton = self.of(NEWTON, Guesses::AboveBase);
-            self.of(SEED, Guesses::AboveBase).zip(newton).map(|(a, b)| (a.is_solved(), b.is_solved()))
+            self.of(PUBLISHED, Guesses::AboveBase).zip(newton).map(|(a, b)| (a.is_solved(), b.is_solved()))
         };
-        [Share::of(both().map(|(seed, newton)| seed && !newton)), Share::of(both().map(|(a, b)| b && !a))]
+        [
+            Share::of(both().map(|(published, newton)| published && !newton)),
+            Share::of(both().map(|(a, b)| b && !a)),
+        ]
     }
 }
 

@@ -25,7 +25,7 @@ pub(super) fn prove(
     mechanism: &Mechanism,
     wholes: Vec<InputBox>,
 ) -> anyhow::Result<(bool, Vec<String>)> {
-    let claim = args.margin.map_or(Claim::SeedConditions, Claim::DeterminantAtLeast);
+    let claim = args.margin.map_or(Claim::PaperConditions, Claim::DeterminantAtLeast);
     let (tally, undecided) = branch_and_bound(&Proof::new(mechanism, claim), wholes, args.boxes);
     result_line!("boxes examined       {}", tally.examined)?;
     result_line!("no solution          {:.4} % of the volume", 100.0 * tally.unsolvable_share)?;
@@ -72,7 +72,7 @@ mod tests {
     fn bounded(slide_m: [f64; 3], leg_m: [f64; 3], radius_m: f64, most: usize) -> (Tally, Vec<Open>) {
         let around = |value_m: f64| Enclosure::new(value_m - radius_m, value_m + radius_m);
         let whole = InputBox { slide_m: slide_m.map(around), leg_m: leg_m.map(around) };
-        branch_and_bound(&Proof::new(&published().unwrap(), Claim::SeedConditions), vec![whole], most)
+        branch_and_bound(&Proof::new(&published().unwrap(), Claim::PaperConditions), vec![whole], most)
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! Inputs with two solutions that meet the seed's conditions, found at random; from the best of
+//! Inputs with two solutions that meet the paper's conditions, found at random; from the best of
 //! them uphill to where both determinants are as great as they get. It proves nothing.
 
 use masseter_controller::kinematics::{Solution, Solutions};

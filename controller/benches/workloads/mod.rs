@@ -30,11 +30,11 @@ pub(crate) type Call = Box<dyn FnMut()>;
 /// Everything that is measured, in the order of the tables.
 pub(crate) const WORKS: &[Work] = &[
     Work { name: "warm: certified", start: warm_certified },
-    Work { name: "warm: seed", start: || warm(Method::Seed) },
+    Work { name: "warm: published", start: || warm(Method::Published) },
     Work { name: "warm: Newton-Raphson", start: || warm(Method::Newton) },
     Work { name: "warm: levenberg-marquardt", start: warm_general_purpose },
     Work { name: "cold: certified true solution", start: cold_certified },
-    Work { name: "cold: seed, any solution or none", start: || cold(Method::Seed) },
+    Work { name: "cold: published, any solution or none", start: || cold(Method::Published) },
     Work { name: "cold: Newton-Raphson, any solution or none", start: || cold(Method::Newton) },
     Work { name: "cold: levenberg-marquardt, any solution or none", start: cold_general_purpose },
     Work { name: "true solution without a guess", start: without_a_guess },

@@ -1,6 +1,6 @@
 //! Which solution of the equations is the mechanism as it was assembled.
 //!
-//! The seed selects the true solution by two conditions: every Bᵢ below the plane of A₁A₂A₃, and A₂
+//! The paper selects the true solution by two conditions: every Bᵢ below the plane of A₁A₂A₃, and A₂
 //! beyond A₃ along slide 1. Read without a sign for the plane they leave several candidates, so the
 //! plane is oriented here by (A₂−A₁)×(A₃−A₁), the legs must stand above the base, and the Jacobian's
 //! determinant must be positive. These together do *not* always leave one solution: near the
@@ -23,12 +23,12 @@ pub enum Condition {
         /// Index of the leg, from 0.
         leg: usize,
     },
-    /// Seed, condition 1: hinge Bᵢ lies on the negative side of the platform's plane.
+    /// The paper, condition 1: hinge Bᵢ lies on the negative side of the platform's plane.
     HingeBelowPlatform {
         /// Index of the leg, from 0.
         leg: usize,
     },
-    /// Seed, condition 2: A₂ lies beyond A₃ in the direction of slide 1.
+    /// The paper, condition 2: A₂ lies beyond A₃ in the direction of slide 1.
     CornersInOrder,
     /// The determinant of the Jacobian is positive, as at the neutral pose.
     PositiveDeterminant,
@@ -112,12 +112,12 @@ impl Assembly {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::kinematics::samples::seed_mechanism;
+    use crate::kinematics::samples::published_mechanism;
 
     /// The eight solutions above the base at the neutral input, by their angles in degrees.
     #[test]
     fn only_the_upright_solution_of_the_neutral_input_is_true() {
-        let mechanism = seed_mechanism();
+        let mechanism = published_mechanism();
         let neutral = Actuators { slide_m: [0.0; LEGS], leg_m: [0.27; LEGS] };
         let judge = |deg: [f64; LEGS]| Assembly::new(&mechanism, &neutral, &deg.map(f64::to_radians));
         assert!(judge([83.8624; LEGS]).is_true());
@@ -131,7 +131,7 @@ mod tests {
 
     #[test]
     fn the_violated_condition_is_named() {
-        let mechanism = seed_mechanism();
+        let mechanism = published_mechanism();
         let neutral = Actuators { slide_m: [0.0; LEGS], leg_m: [0.27; LEGS] };
         let mirrored = Assembly::new(&mechanism, &neutral, &[-83.8624_f64.to_radians(); LEGS]);
         assert_eq!(mirrored.violated(), Some(Condition::LegAboveBase { leg: 0 }));
@@ -141,7 +141,7 @@ mod tests {
 
     #[test]
     fn no_number_fulfils_no_condition() {
-        let mechanism = seed_mechanism();
+        let mechanism = published_mechanism();
         let neutral = Actuators { slide_m: [0.0; LEGS], leg_m: [0.27; LEGS] };
         assert!(!Assembly::new(&mechanism, &neutral, &[f64::NAN; LEGS]).is_true());
     }

@@ -98,7 +98,7 @@ mod tests {
 
     use super::*;
     use crate::kinematics::heading::Heading;
-    use crate::kinematics::samples::{mechanisms, poses, seed_mechanism};
+    use crate::kinematics::samples::{mechanisms, poses, published_mechanism};
 
     fn certify(closure: &Closure<'_>, theta_rad: [f64; LEGS]) -> Option<Certificate> {
         Certificate::new(closure, &closure.evaluate(&theta_rad.map(Heading::from_rad)))
@@ -107,7 +107,7 @@ mod tests {
     #[test]
     fn the_neutral_pose_is_certain_within_degrees() {
         let neutral = Actuators { slide_m: [0.0; LEGS], leg_m: [0.27; LEGS] };
-        let mechanism = seed_mechanism();
+        let mechanism = published_mechanism();
         let closure = Closure::new(&mechanism, &neutral);
         let start = [83.862_391_93_f64.to_radians(); LEGS].map(Heading::from_rad);
         let closed = closure.close(&start, 4).unwrap();
@@ -121,7 +121,7 @@ mod tests {
     #[test]
     fn what_is_no_solution_and_what_is_no_number_is_not_certified() {
         let neutral = Actuators { slide_m: [0.0; LEGS], leg_m: [0.27; LEGS] };
-        let mechanism = seed_mechanism();
+        let mechanism = published_mechanism();
         let closure = Closure::new(&mechanism, &neutral);
         assert_eq!(certify(&closure, [1.2, 1.5, 1.3]), None);
         assert_eq!(certify(&closure, [f64::NAN; LEGS]), None);

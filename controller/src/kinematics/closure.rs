@@ -7,8 +7,8 @@
 //!
 //! κ = (|c|² + lᵢ² + lⱼ² − Lₖ²) / 2lᵢlⱼ, p = v̂ᵢ·c / lⱼ, q = −v̂ⱼ·c / lᵢ, ω = v̂ᵢ·v̂ⱼ.
 //!
-//! gₖ = 0 exactly where the seed's fₖ = 0 (eq. 1). Nothing here knows which solution is wanted; the
-//! seed's own form of the equations is [`Equations`](super::Equations).
+//! gₖ = 0 exactly where the paper's fₖ = 0 (eq. 1). Nothing here knows which solution is wanted; the
+//! paper's own form of the equations is [`Equations`](super::Equations).
 
 use masseter_shared::geometry::{Actuators, LEGS, Mechanism, Vec3};
 
@@ -271,7 +271,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn it_agrees_with_the_seeds_form_of_the_equations(
+        fn it_agrees_with_the_papers_form_of_the_equations(
             mechanism in mechanisms(), pose in poses(25.0), off in -0.5..0.5f64,
         ) {
             let joints = mechanism.inverse(&pose).unwrap();

@@ -73,7 +73,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::kinematics::samples::{AMBIGUOUS, angle_between, mechanisms, poses, seed_mechanism};
+    use crate::kinematics::samples::{AMBIGUOUS, angle_between, mechanisms, poses, published_mechanism};
     use crate::kinematics::{Options, Solutions, solve_newton};
 
     proptest! {
@@ -101,7 +101,7 @@ mod tests {
             slide_m in prop::array::uniform3(-0.03..0.03f64), leg_m in prop::array::uniform3(0.24..0.3f64),
             guesses in prop::array::uniform32([0.7..2.4f64, 0.7..2.4f64, 0.7..2.4f64]),
         ) {
-            let (mechanism, actuators) = (seed_mechanism(), Actuators { slide_m, leg_m });
+            let (mechanism, actuators) = (published_mechanism(), Actuators { slide_m, leg_m });
             let Err(error) = solve_completely(&mechanism, &actuators) else { return Ok(()) };
             let from = |guess| solve_newton(&mechanism, &actuators, guess, &Options::default());
             for found in guesses.iter().filter_map(|guess| from(guess).ok()) {
@@ -115,14 +115,14 @@ mod tests {
     /// Wrong solutions stand nearer to each of the two.
     #[test]
     fn an_ambiguous_input_says_how_far_its_true_solutions_are_apart() {
-        let all = Solutions::new(&seed_mechanism(), &AMBIGUOUS).unwrap();
+        let all = Solutions::new(&published_mechanism(), &AMBIGUOUS).unwrap();
         let [Some(one), Some(other), None] = [0, 1, 2].map(|index| all.true_ones().nth(index)) else {
             panic!()
         };
         let apart_rad =
             (0..LEGS).map(|leg| (one.theta_rad[leg] - other.theta_rad[leg]).abs()).fold(0.0, f64::max);
         assert!(all.separation_rad(one).unwrap() < 0.9 * apart_rad);
-        let error = solve_completely(&seed_mechanism(), &AMBIGUOUS).unwrap_err();
+        let error = solve_completely(&published_mechanism(), &AMBIGUOUS).unwrap_err();
         let ForwardError::Ambiguous { count: 2, separation_rad } = error else { panic!("{error}") };
         assert!((separation_rad - apart_rad).abs() < 1e-9, "{separation_rad}, not {apart_rad}");
     }
@@ -131,7 +131,7 @@ mod tests {
     fn each_kind_of_failure_is_told_apart() {
         let failure = |leg_m| {
             let actuators = Actuators { slide_m: [0.0; LEGS], leg_m };
-            solve_completely(&seed_mechanism(), &actuators).unwrap_err()
+            solve_completely(&published_mechanism(), &actuators).unwrap_err()
         };
         assert_eq!(failure([0.30, 0.30, 0.20]), ForwardError::Unassemblable);
         assert_eq!(failure([0.27, f64::NAN, 0.27]), ForwardError::NotFinite);

@@ -1,4 +1,4 @@
-//! The three equations of the forward kinematics (seed, eq. 1) and their derivatives.
+//! The three equations of the forward kinematics (the paper, eq. 1) and their derivatives.
 //!
 //! fₖ = |Aᵢ − Aⱼ| − Lᵢⱼ for the sides 12, 23, 31 of the platform, each a function of the two leg angles
 //! at its ends. Nothing here searches for a solution.
@@ -84,12 +84,12 @@ impl<'a> Equations<'a> {
 }
 
 impl Evaluation {
-    /// f₁² + f₂² + f₃² (seed, eq. 2), here in m².
+    /// f₁² + f₂² + f₃² (the paper, eq. 2), here in m².
     pub fn error_m2(&self) -> f64 {
         self.residual_m.norm_squared()
     }
 
-    /// The same in the seed's unit, cm².
+    /// The same in the paper's unit, cm².
     pub fn error_cm2(&self) -> f64 {
         self.error_m2() * 1e4
     }
@@ -105,11 +105,11 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::kinematics::samples::{mechanisms, poses, seed_mechanism};
+    use crate::kinematics::samples::{mechanisms, poses, published_mechanism};
 
     #[test]
-    fn neutral_input_of_the_seed_has_the_known_solution_and_a_positive_determinant() {
-        let mechanism = seed_mechanism();
+    fn neutral_input_of_the_paper_has_the_known_solution_and_a_positive_determinant() {
+        let mechanism = published_mechanism();
         let neutral = Actuators { slide_m: [0.0; LEGS], leg_m: [0.27; LEGS] };
         let equations = Equations::new(&mechanism, &neutral);
         let solution = equations.evaluate(Vector3::repeat(83.862_391_93_f64.to_radians()));

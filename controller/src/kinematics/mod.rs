@@ -3,8 +3,8 @@
 //! What the loop and the command line use is [`ForwardTracker`]: Newton's iteration from the last
 //! solution, a [`Certificate`] for its result, and [`solve_completely`] whenever that is not enough.
 //! The latter finds every solution ([`Solutions`]) and picks the one in which the mechanism stands as
-//! it was assembled ([`Assembly`]), or says that there is none, or more than one. The seed's own
-//! algorithm and plain Newton–Raphson ([`solve`], on the seed's form of the [`Equations`]) stand
+//! it was assembled ([`Assembly`]), or says that there is none, or more than one. The paper's own
+//! algorithm and plain Newton–Raphson ([`solve`], on the paper's form of the [`Equations`]) stand
 //! beside it for comparison.
 //!
 //! Everything is pure, allocates nothing and ends after a fixed number of iterations. It does not
@@ -38,7 +38,7 @@ pub use solution::Solution;
 pub use solutions::{MOST_SOLUTIONS, Solutions};
 pub use solver::{
     Iteration, MAX_HALVINGS, MAX_ITERATIONS, Method, Options, Residual, StepRule, solve, solve_newton,
-    solve_seed, solve_traced,
+    solve_published, solve_traced,
 };
 pub use tracker::ForwardTracker;
 

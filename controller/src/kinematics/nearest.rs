@@ -1,6 +1,6 @@
 //! How far an input is from one that can be assembled.
 //!
-//! Measured by the least root of the seed's error (eq. 2) over all leg angles, that is, by how much
+//! Measured by the least root of the paper's error (eq. 2) over all leg angles, that is, by how much
 //! the platform's sides would have to give. It is searched by descent from each of a grid of starts, in a
 //! bounded number of steps, so it is an upper bound: other angles may come a little closer.
 
@@ -62,7 +62,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::kinematics::samples::{mechanisms, poses, seed_mechanism};
+    use crate::kinematics::samples::{mechanisms, poses, published_mechanism};
 
     /// Least error over a grid of all three angles above the base, m.
     fn on_a_grid_m(equations: &Equations<'_>) -> f64 {
@@ -82,7 +82,7 @@ mod tests {
         fn nothing_on_a_grid_comes_closer_by_a_hundredth(
             slide_m in prop::array::uniform3(-0.03..0.03f64), leg_m in prop::array::uniform3(0.2..0.34f64),
         ) {
-            let (mechanism, actuators) = (seed_mechanism(), Actuators { slide_m, leg_m });
+            let (mechanism, actuators) = (published_mechanism(), Actuators { slide_m, leg_m });
             let nearest = nearest_assembly_m(&mechanism, &actuators);
             let on_a_grid = on_a_grid_m(&Equations::new(&mechanism, &actuators));
             prop_assert!(nearest <= 1.01 * on_a_grid + 1e-12, "{nearest} m, on a grid {on_a_grid} m");
@@ -116,7 +116,7 @@ mod tests {
             ),
         ];
         for (slide_m, leg_m) in inputs {
-            let found_m = nearest_assembly_m(&seed_mechanism(), &Actuators { slide_m, leg_m });
+            let found_m = nearest_assembly_m(&published_mechanism(), &Actuators { slide_m, leg_m });
             assert!(found_m < 1e-7, "{found_m} m");
         }
     }
@@ -125,7 +125,7 @@ mod tests {
     #[test]
     fn legs_that_cannot_meet_are_as_far_off_as_they_are_apart() {
         let actuators = Actuators { slide_m: [0.0; LEGS], leg_m: [0.01, 0.01, 0.06] };
-        let mechanism = seed_mechanism();
+        let mechanism = published_mechanism();
         let found_m = nearest_assembly_m(&mechanism, &actuators);
         assert!(found_m > 0.03 && found_m < 0.05, "{found_m}");
     }

@@ -4,11 +4,11 @@ use masseter_shared::geometry::{Actuators, Mechanism, MechanismConfig, Pose, Sli
 use nalgebra::{Translation3, UnitQuaternion};
 use proptest::prelude::*;
 
-pub(super) fn seed_mechanism() -> Mechanism {
+pub(super) fn published_mechanism() -> Mechanism {
     Mechanism::new(&MechanismConfig::default()).expect("the default is a mechanism")
 }
 
-/// Mechanisms like the seed's with every dimension off: no equal sides, no even azimuths.
+/// Mechanisms like the paper's with every dimension off: no equal sides, no even azimuths.
 pub(super) fn mechanisms() -> impl Strategy<Value = Mechanism> {
     let slide = |azimuth: f64| {
         (0.05..0.065f64, -8.0..8.0f64, -6.0..6.0f64).prop_map(move |(radius, shift, skew)| {

@@ -10,7 +10,7 @@ use super::{ForwardError, Solution};
 /// There are never more; they come in mirrored pairs.
 pub const MOST_SOLUTIONS: usize = 16;
 
-/// Every real solution of the equations (seed, eq. 1) for one input, mirrored ones next to each other.
+/// Every real solution of the equations (the paper, eq. 1) for one input, mirrored ones next to each other.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Solutions {
     solutions: [Option<Solution>; MOST_SOLUTIONS],
@@ -66,7 +66,7 @@ mod tests {
     use super::*;
     use crate::kinematics::elimination::Elimination;
     use crate::kinematics::heading::coincide;
-    use crate::kinematics::samples::{mechanisms, seed_mechanism};
+    use crate::kinematics::samples::{mechanisms, published_mechanism};
     use crate::kinematics::{Options, solve_newton};
 
     fn boxes() -> impl Strategy<Value = Actuators> {
@@ -77,7 +77,7 @@ mod tests {
     #[test]
     fn the_neutral_input_has_sixteen_of_which_one_is_true() {
         let neutral = Actuators { slide_m: [0.0; LEGS], leg_m: [0.27; LEGS] };
-        let solutions = Solutions::new(&seed_mechanism(), &neutral).unwrap();
+        let solutions = Solutions::new(&published_mechanism(), &neutral).unwrap();
         assert_eq!(solutions.count(), MOST_SOLUTIONS);
         let is_above = |solution: &&Solution| solution.assembly.legs_above_base == [true; LEGS];
         assert_eq!(solutions.iter().filter(is_above).count(), 8);

@@ -97,7 +97,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::kinematics::samples::{angle_between, seed_mechanism};
+    use crate::kinematics::samples::{angle_between, published_mechanism};
     use crate::kinematics::solve_completely;
 
     /// A loop through the workspace like a fast chewing cycle, 1 kHz.
@@ -119,7 +119,7 @@ mod tests {
 
     #[test]
     fn a_moving_platform_is_followed_in_two_or_three_iterations_a_cycle() {
-        let mechanism = seed_mechanism();
+        let mechanism = published_mechanism();
         let mut tracker = ForwardTracker::new(mechanism.clone());
         for cycle in 0..460 {
             let pose = on_the_loop(cycle);
@@ -132,7 +132,7 @@ mod tests {
 
     #[test]
     fn a_bad_input_leaves_the_tracker_where_it_was() {
-        let mechanism = seed_mechanism();
+        let mechanism = published_mechanism();
         let good = mechanism.inverse(&on_the_loop(0)).unwrap().actuators;
         let mut tracker = ForwardTracker::new(mechanism);
         tracker.update(&good).unwrap();
@@ -143,7 +143,7 @@ mod tests {
 
     #[test]
     fn a_jump_or_a_false_last_solution_is_solved_cold() {
-        let mechanism = seed_mechanism();
+        let mechanism = published_mechanism();
         let neutral = Actuators { slide_m: [0.0; LEGS], leg_m: [0.27; LEGS] };
         let inverted = [71.291_703_191_386_5_f64.to_radians(); LEGS];
         let mut tracker = ForwardTracker::with_guess(mechanism.clone(), inverted);
@@ -170,7 +170,7 @@ mod tests {
             leg_m in prop::array::uniform3(0.24..0.3f64),
             guess in prop::array::uniform3(prop_oneof![9 => -4.0..4.0f64, 1 => prop::num::f64::ANY]),
         ) {
-            let (mechanism, actuators) = (seed_mechanism(), Actuators { slide_m, leg_m });
+            let (mechanism, actuators) = (published_mechanism(), Actuators { slide_m, leg_m });
             let alone = solve_completely(&mechanism, &actuators);
             match (alone, ForwardTracker::with_guess(mechanism, guess).update(&actuators)) {
                 (Ok(alone), Ok(guessed)) => {
@@ -185,9 +185,9 @@ mod tests {
         /// Whatever came before: what an input alone does not settle, the last solution may.
         #[test]
         fn any_numbers_end_in_what_they_mean_alone(inputs in prop::collection::vec(any_numbers(), 3)) {
-            let mut tracker = ForwardTracker::new(seed_mechanism());
+            let mut tracker = ForwardTracker::new(published_mechanism());
             for actuators in inputs {
-                match (tracker.update(&actuators), solve_completely(&seed_mechanism(), &actuators)) {
+                match (tracker.update(&actuators), solve_completely(&published_mechanism(), &actuators)) {
                     (Ok(tracked), Ok(alone)) => {
                         for leg in 0..LEGS {
                             prop_assert!((tracked.theta_rad[leg] - alone.theta_rad[leg]).abs() < 1e-9);

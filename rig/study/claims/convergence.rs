@@ -1,7 +1,7 @@
-//! What the seed claims of where its solver arrives.
+//! What the paper claims of where its solver arrives.
 
 use super::super::Study;
-use super::super::contender::{CONTENDERS, Contender, NEWTON, SEED, SHOWN};
+use super::super::contender::{CONTENDERS, Contender, NEWTON, PUBLISHED, SHOWN};
 use super::super::sample::Guesses;
 use super::super::share::Share;
 use super::{ANY, Claim, RARELY, Verdict};
@@ -10,14 +10,14 @@ use super::{ANY, Claim, RARELY, Verdict};
 const CLOSE: Guesses = Guesses::Within(5.0);
 
 pub(super) fn any_guess_converges(study: &Study) -> Claim {
-    let solved = study.trials.solved(SEED, ANY);
+    let solved = study.trials.solved(PUBLISHED, ANY);
     let best = best_variant(|contender| study.trials.solved(contender, ANY));
-    let close = study.trials.solved(SEED, CLOSE);
+    let close = study.trials.solved(PUBLISHED, CLOSE);
     Claim {
         says: "The algorithm converges whatever the initial guess.",
         place: "Korean summary, first advantage (the results section says otherwise)",
         measured: format!(
-            "from guesses above the base the seed's solver reached a solution in {}; its best variant ({}) in {}",
+            "from guesses above the base the paper's solver reached a solution in {}; its best variant ({}) in {}",
             solved.percent(),
             best.0.name(),
             best.1.percent()
@@ -30,17 +30,17 @@ pub(super) fn any_guess_converges(study: &Study) -> Claim {
 
 pub(super) fn wider_range(study: &Study) -> Claim {
     let solved = |contender| study.trials.solved(contender, ANY);
-    let (seed, newton) = (solved(SEED), solved(NEWTON));
+    let (published, newton) = (solved(PUBLISHED), solved(NEWTON));
     let best = best_variant(solved);
-    let true_ones = [SEED, NEWTON].map(|contender| study.trials.true_ones(contender, ANY).percent());
+    let true_ones = [PUBLISHED, NEWTON].map(|contender| study.trials.true_ones(contender, ANY).percent());
     let [alone, newton_alone] = study.trials.alone();
     Claim {
         says: "It converges for a wider range of guesses than Newton–Raphson.",
         place: "Abstract and Results, first advantage",
         measured: format!(
-            "any solution: seed {}, Newton–Raphson {}; the true one: {} and {}; seed alone {}, Newton–Raphson \
-             alone {}; best variant of the seed ({}) {}",
-            seed.percent(),
+            "any solution: published {}, Newton–Raphson {}; the true one: {} and {}; published alone {}, Newton–Raphson \
+             alone {}; best variant of the paper ({}) {}",
+            published.percent(),
             newton.percent(),
             true_ones[0],
             true_ones[1],
@@ -49,9 +49,9 @@ pub(super) fn wider_range(study: &Study) -> Claim {
             best.0.name(),
             best.1.percent()
         ),
-        criterion: "holds if the seed's solver as printed arrives more often from above the base, by 3 standard \
+        criterion: "holds if the paper's solver as printed arrives more often from above the base, by 3 standard \
                     errors; partly if only a variant of it does",
-        verdict: wider(seed, newton, best.1),
+        verdict: wider(published, newton, best.1),
         figure: Some("success"),
     }
 }
@@ -62,7 +62,7 @@ pub(super) fn newton_diverges(study: &Study) -> Claim {
         says: "Typically both seem to converge at first, then Newton–Raphson diverges and the algorithm does not.",
         place: "Results, first advantage; Fig. 3",
         measured: format!(
-            "{} of guesses above the base show this; the opposite, Newton–Raphson arriving where the seed's \
+            "{} of guesses above the base show this; the opposite, Newton–Raphson arriving where the paper's \
              solver stalls, {}",
             share.percent(),
             study.pairs.stalling.share.percent()
@@ -86,7 +86,7 @@ pub(super) fn newton_oscillates(study: &Study) -> Claim {
 }
 
 pub(super) fn close_guess_converges(study: &Study) -> Claim {
-    let solved = study.trials.solved(SEED, CLOSE);
+    let solved = study.trials.solved(PUBLISHED, CLOSE);
     let true_ones = |contender, guesses| study.trials.true_ones(contender, guesses).percent();
     Claim {
         says: "A guess close to the solution always makes it converge.",
@@ -97,9 +97,9 @@ pub(super) fn close_guess_converges(study: &Study) -> Claim {
             solved.percent(),
             solved.hits,
             solved.of,
-            true_ones(SEED, CLOSE),
+            true_ones(PUBLISHED, CLOSE),
             true_ones(NEWTON, CLOSE),
-            true_ones(SEED, Guesses::Within(2.0))
+            true_ones(PUBLISHED, Guesses::Within(2.0))
         ),
         criterion: "holds if all guesses within ±5° converge; partly if 99 % do",
         verdict: Verdict::of(solved.is_all(), solved.value() >= 1.0 - RARELY),
@@ -109,20 +109,20 @@ pub(super) fn close_guess_converges(study: &Study) -> Claim {
 
 pub(super) fn closest_solution(study: &Study) -> Claim {
     let closest = |contender| study.trials.closest(contender, ANY);
-    let (seed, newton) = (closest(SEED), closest(NEWTON));
+    let (published, newton) = (closest(PUBLISHED), closest(NEWTON));
     Claim {
         says: "It reaches the solution closest to the guess.",
         place: "Abstract and Results, third advantage",
         measured: format!(
             "of the solutions reached from above the base, the closest in {} (Newton–Raphson {}); from within \
              ±20° of the true one {}",
-            seed.percent(),
+            published.percent(),
             newton.percent(),
-            study.trials.closest(SEED, Guesses::Within(20.0)).percent()
+            study.trials.closest(PUBLISHED, Guesses::Within(20.0)).percent()
         ),
         criterion: "holds if 99 % of the solutions reached are the closest (largest difference of any leg's angle); \
                     partly if clearly more than Newton–Raphson's",
-        verdict: Verdict::of(seed.value() >= 1.0 - RARELY, seed.clearly_exceeds(newton)),
+        verdict: Verdict::of(published.value() >= 1.0 - RARELY, published.clearly_exceeds(newton)),
         figure: Some("basins"),
     }
 }
@@ -145,13 +145,13 @@ pub(super) fn unpredictable_newton(study: &Study) -> Claim {
 }
 
 pub(super) fn always_the_true_one(study: &Study) -> Claim {
-    let [anywhere, close] = [ANY, CLOSE].map(|guesses| study.trials.true_ones(SEED, guesses));
+    let [anywhere, close] = [ANY, CLOSE].map(|guesses| study.trials.true_ones(PUBLISHED, guesses));
     let controller = study.trials.true_ones(Contender::Controller, ANY);
     Claim {
         says: "In simulation the algorithm always reached the true solution, without exception.",
         place: "Results, on multiplicity; Korean summary",
         measured: format!(
-            "the seed's solver {} from above the base, {} from within ±5°; the controller's solver {} and {}",
+            "the paper's solver {} from above the base, {} from within ±5°; the controller's solver {} and {}",
             anywhere.percent(),
             close.percent(),
             controller.percent(),
@@ -164,10 +164,11 @@ pub(super) fn always_the_true_one(study: &Study) -> Claim {
 }
 
 pub(super) fn successive_poses(study: &Study) -> Claim {
-    let seed = SHOWN.iter().position(|&contender| contender == SEED).expect("the seed's solver is shown");
-    let lost: usize = study.motions.iter().map(|motion| motion.followed[seed].lost).sum();
-    let steps: usize = study.motions.iter().map(|motion| motion.followed[seed].steps).sum();
-    let chewing = study.motions.first().map_or(f64::NAN, |motion| motion.followed[seed].iterations_mean);
+    let published =
+        SHOWN.iter().position(|&contender| contender == PUBLISHED).expect("the paper's solver is shown");
+    let lost: usize = study.motions.iter().map(|motion| motion.followed[published].lost).sum();
+    let steps: usize = study.motions.iter().map(|motion| motion.followed[published].steps).sum();
+    let chewing = study.motions.first().map_or(f64::NAN, |motion| motion.followed[published].iterations_mean);
     Claim {
         says: "Starting each step from the pose before, the true pose is found all along a movement.",
         place: "Results, last paragraph",
@@ -181,15 +182,15 @@ pub(super) fn successive_poses(study: &Study) -> Claim {
     }
 }
 
-fn wider(seed: Share, newton: Share, best_variant: Share) -> Verdict {
-    Verdict::of(seed.clearly_exceeds(newton), best_variant.clearly_exceeds(newton))
+fn wider(published: Share, newton: Share, best_variant: Share) -> Verdict {
+    Verdict::of(published.clearly_exceeds(newton), best_variant.clearly_exceeds(newton))
 }
 
-/// The seed's variant with the greatest share.
+/// The paper's variant with the greatest share.
 fn best_variant(share: impl Fn(Contender) -> Share) -> (Contender, Share) {
-    let variants = CONTENDERS.into_iter().filter(|one| matches!(one, Contender::Seed(..)));
+    let variants = CONTENDERS.into_iter().filter(|one| matches!(one, Contender::Published(..)));
     let shares = variants.map(|contender| (contender, share(contender)));
-    shares.max_by(|a, b| a.1.value().total_cmp(&b.1.value())).unwrap_or((SEED, Share::default()))
+    shares.max_by(|a, b| a.1.value().total_cmp(&b.1.value())).unwrap_or((PUBLISHED, Share::default()))
 }
 
 #[cfg(test)]

@@ -1,4 +1,4 @@
-//! The seed's claims, judged by what this run measured. The criteria stand here and nowhere else;
+//! The paper's claims, judged by what this run measured. The criteria stand here and nowhere else;
 //! each is a function of figures, so that other figures give another verdict.
 
 mod convergence;
@@ -26,7 +26,7 @@ pub(super) enum Verdict {
 /// A claim with its judgement.
 #[derive(Debug, Clone)]
 pub(super) struct Claim {
-    /// What the seed says, in other words.
+    /// What the paper says, in other words.
     pub says: &'static str,
     /// Where it says so.
     pub place: &'static str,

@@ -1,4 +1,4 @@
-//! What the seed claims of the number of solutions.
+//! What the paper claims of the number of solutions.
 
 use super::super::Study;
 use super::super::multiplicity::{READINGS, Reading};

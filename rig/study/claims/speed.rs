@@ -1,12 +1,12 @@
-//! What the seed claims of its solver's speed.
+//! What the paper claims of its solver's speed.
 
 use super::super::Study;
-use super::super::contender::{Attempt, NEWTON, SEED};
+use super::super::contender::{Attempt, NEWTON, PUBLISHED};
 use super::super::share::median;
 use super::super::speed::Situation;
 use super::{ANY, Claim, Verdict};
 
-/// The time the seed states for one computation, ns.
+/// The time the paper states for one computation, ns.
 const STATED_NS: f64 = 0.1;
 /// What a real-time cycle of 1 ms can spare for one solution, ns: a tenth.
 const REAL_TIME_NS: f64 = 1e5;
@@ -14,45 +14,45 @@ const REAL_TIME_NS: f64 = 1e5;
 const MUCH_MORE: f64 = 2.0;
 
 pub(super) fn fewer_iterations(study: &Study) -> Claim {
-    let both = study.trials.against_newton(SEED, ANY);
+    let both = study.trials.against_newton(PUBLISHED, ANY);
     let of = |side: usize, what: fn(&Attempt) -> u32| {
         median(both.iter().map(|pair| f64::from(what(&pair[side]))).collect())
     };
     let iterations = [0, 1].map(|side| of(side, |attempt| attempt.iterations));
     let evaluations = [0, 1].map(|side| of(side, |attempt| attempt.evaluations));
-    let time = study.speed.of(Situation::Random, SEED).to_newton;
+    let time = study.speed.of(Situation::Random, PUBLISHED).to_newton;
     Claim {
         says: "It converges much faster: Newton–Raphson needs many more iterations.",
         place: "Results, second advantage; Fig. 5",
         measured: format!(
-            "where both arrive from above the base, medians of seed and Newton–Raphson: {} and {} iterations, {} \
-             and {} evaluations of the residuals; time of the seed's solver {time:.2} of Newton–Raphson's",
+            "where both arrive from above the base, medians of the paper's solver and Newton–Raphson: {} and {} iterations, {} \
+             and {} evaluations of the residuals; time of the paper's solver {time:.2} of Newton–Raphson's",
             iterations[0], iterations[1], evaluations[0], evaluations[1]
         ),
-        criterion: "holds if Newton–Raphson's median is at least twice the seed's; partly if it is greater",
+        criterion: "holds if Newton–Raphson's median is at least twice the paper's; partly if it is greater",
         verdict: faster(iterations),
         figure: Some("fig5_speed"),
     }
 }
 
 pub(super) fn stated_time(study: &Study) -> Claim {
-    let [seed_ns, newton_ns] =
-        [SEED, NEWTON].map(|contender| study.speed.of(Situation::Random, contender).median_ns);
+    let [published_ns, newton_ns] =
+        [PUBLISHED, NEWTON].map(|contender| study.speed.of(Situation::Random, contender).median_ns);
     Claim {
         says: "The computation takes not more than 10⁻¹⁰ s on a Pentium.",
         place: "Results, second advantage",
         measured: format!(
-            "median from a random guess: seed {seed_ns:.0} ns, Newton–Raphson {newton_ns:.0} ns on this machine; \
+            "median from a random guess: the paper's solver {published_ns:.0} ns, Newton–Raphson {newton_ns:.0} ns on this machine; \
              10⁻¹⁰ s is less than one cycle of any Pentium's clock"
         ),
         criterion: "holds if the median here is not above 10⁻¹⁰ s",
-        verdict: Verdict::of(seed_ns <= STATED_NS, false),
+        verdict: Verdict::of(published_ns <= STATED_NS, false),
         figure: Some("fig5_speed"),
     }
 }
 
 pub(super) fn real_time(study: &Study) -> Claim {
-    let [warm, random] = [Situation::Warm, Situation::Random].map(|start| study.speed.of(start, SEED));
+    let [warm, random] = [Situation::Warm, Situation::Random].map(|start| study.speed.of(start, PUBLISHED));
     Claim {
         says: "It is fast enough for real-time control.",
         place: "Abstract and Results, second advantage",
@@ -70,8 +70,8 @@ pub(super) fn real_time(study: &Study) -> Claim {
     }
 }
 
-fn faster([seed, newton]: [f64; 2]) -> Verdict {
-    Verdict::of(newton >= MUCH_MORE * seed, newton > seed)
+fn faster([published, newton]: [f64; 2]) -> Verdict {
+    Verdict::of(newton >= MUCH_MORE * published, newton > published)
 }
 
 #[cfg(test)]

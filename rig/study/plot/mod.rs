@@ -17,7 +17,7 @@ use super::Study;
 use crate::palette::{BLUE, GREEN, VERMILION};
 
 const GREY: RGBColor = RGBColor(0x99, 0x99, 0x99);
-/// Of the seed's solver, Newton–Raphson and the controller's, everywhere.
+/// Of the paper's solver, Newton–Raphson and the controller's, everywhere.
 const SOLVERS: [RGBColor; 3] = [BLUE, VERMILION, GREEN];
 
 /// Pixels of the text at the figures' own size.

@@ -43,7 +43,8 @@ fn figure(parting: &Parting) -> anyhow::Result<Figure> {
             shown.map(|(at, error)| (at as f64, error.max(LEAST_CM2).log10())).collect()
         };
         let pair = parting.clearest.as_ref();
-        let traces = pair.map(|pair| [points(&pair.seed_cm2), points(&pair.newton_cm2)]).unwrap_or_default();
+        let traces =
+            pair.map(|pair| [points(&pair.published_cm2), points(&pair.newton_cm2)]).unwrap_or_default();
         let all = || traces.iter().flatten();
         let last = all().map(|point| point.0).fold(1.0, f64::max);
         let low = all().map(|point| point.1).fold(0.0, f64::min).floor();
@@ -54,7 +55,7 @@ fn figure(parting: &Parting) -> anyhow::Result<Figure> {
             y: ("error f₁² + f₂² + f₃², cm²", low..high, power_of_ten),
         };
         let mut chart = axes.on(area)?;
-        for ((points, solver), colour) in traces.iter().zip(["seed's solver", "Newton–Raphson"]).zip(SOLVERS)
+        for ((points, solver), colour) in traces.iter().zip(["paper's solver", "Newton–Raphson"]).zip(SOLVERS)
         {
             curve(&mut chart, solver, points, colour, true)?;
         }

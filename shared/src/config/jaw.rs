@@ -14,7 +14,7 @@ pub struct JawConfig {
     /// stroke by being closed further forward.
     pub closed_offset_m: [f64; 3],
     /// The incisal point (origin of the jaw frame) in the platform frame, metres.
-    /// By default corner A₁ of the seed's platform.
+    /// By default corner A₁ of the paper's platform.
     pub reference_point_m: [f64; 3],
     /// Side of Bonwill's triangle (both condyles and the incisal point), metres.
     pub bonwill_side_m: f64,

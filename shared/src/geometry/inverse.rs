@@ -56,7 +56,7 @@ mod tests {
     use super::*;
     use crate::geometry::{MechanismConfig, SlideConfig, Vec3};
 
-    /// Any mechanism a builder could declare, not only the seed's.
+    /// Any mechanism a builder could declare, not only the paper's.
     fn mechanisms() -> impl Strategy<Value = Mechanism> {
         let slide = |azimuth: f64| {
             (0.04..0.09f64, -15.0..15.0f64, -10.0..10.0f64).prop_map(move |(radius, shift, skew)| {
@@ -104,7 +104,7 @@ mod tests {
     }
 
     #[test]
-    fn neutral_pose_of_the_seed() {
+    fn neutral_pose_of_the_paper() {
         let mechanism = Mechanism::new(&MechanismConfig::default()).unwrap();
         let pose = Pose::translation(0.0, 0.0, 0.268_452_355_053_9);
         let joints = mechanism.inverse(&pose).unwrap();

@@ -116,7 +116,7 @@ mod tests {
     }
 
     #[test]
-    fn conditioning_of_the_seeds_mechanism_is_mild_when_neutral() {
+    fn conditioning_of_the_papers_mechanism_is_mild_when_neutral() {
         let mechanism = Mechanism::new(&MechanismConfig::default()).unwrap();
         let pose = Pose::translation(0.0, 0.0, 0.268_452_355);
         let joints = mechanism.inverse(&pose).unwrap();

@@ -16,7 +16,7 @@ pub struct SlideConfig {
     pub azimuth_deg: f64,
 }
 
-/// The dimensions a builder declares. The default is the seed's mechanism.
+/// The dimensions a builder declares. The default is the paper's mechanism.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct MechanismConfig {
@@ -307,13 +307,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_default_is_the_seeds_mechanism() {
+    fn the_default_is_the_papers_mechanism() {
         let mechanism = Mechanism::new(&MechanismConfig::default()).unwrap();
         let [b1, b2, b3] = [0, 1, 2].map(|leg| mechanism.hinge(leg, 0.0));
         for side in [b2 - b1, b3 - b2, b1 - b3] {
             assert!((side.norm() - 0.10).abs() < 1e-12);
         }
-        // Condition 2 of the seed fixes the reading: slide 1 is parallel to A₂A₃, A₂ beyond A₃.
+        // Condition 2 of the paper fixes the reading: slide 1 is parallel to A₂A₃, A₂ beyond A₃.
         let [_, a2, a3] = mechanism.platform_corners();
         assert!(((a2 - a3).normalize() - mechanism.slide_direction(0)).norm() < 1e-12);
     }

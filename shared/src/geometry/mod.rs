@@ -1,6 +1,6 @@
 //! The mechanism: three slides, three telescopic legs, the platform they carry.
 //!
-//! Frames, as reconstructed from the seed (Fig. 1 and its two conditions):
+//! Frames, as reconstructed from the paper (Fig. 1 and its two conditions):
 //! *base* has its origin at the centre of the base, x anterior, y left, z up;
 //! *platform* has its origin at the centroid of A₁A₂A₃, x towards A₁, z along the
 //! normal (A₂−A₁)×(A₃−A₁). A pose is the platform frame in the base frame.

@@ -1,6 +1,6 @@
-//! Two iterations for the equations: the seed's (Fig. 2) and plain Newton–Raphson.
+//! Two iterations for the equations: the paper's (Fig. 2) and plain Newton–Raphson.
 //!
-//! Both go in the Newton direction. The seed's reduces the increment until the error decreases; that
+//! Both go in the Newton direction. The paper's reduces the increment until the error decreases; that
 //! stops oscillation and divergence but may stall in a local minimum. Either finds *a* solution near
 //! its guess; which one it is, [`Assembly`](super::Assembly) tells.
 //!
@@ -71,17 +71,17 @@ pub fn solve_traced(
     Ok(Solution { residual_m: at.evaluation.residual_norm_m(), ..Solution::new(&closure, &closed) })
 }
 
-/// [`solve`] by the seed's algorithm.
+/// [`solve`] by the paper's algorithm.
 ///
 /// # Errors
 /// Those of [`solve`].
-pub fn solve_seed(
+pub fn solve_published(
     mechanism: &Mechanism,
     actuators: &Actuators,
     guess_rad: &[f64; LEGS],
     options: &Options,
 ) -> Result<Solution, ForwardError> {
-    solve(Method::Seed, mechanism, actuators, guess_rad, options)
+    solve(Method::Published, mechanism, actuators, guess_rad, options)
 }
 
 /// [`solve`] by Newton–Raphson.
@@ -102,7 +102,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::kinematics::samples::{angle_between, mechanisms, poses, seed_mechanism};
+    use crate::kinematics::samples::{angle_between, mechanisms, poses, published_mechanism};
 
     fn default() -> Options {
         Options::default()
@@ -121,9 +121,10 @@ mod tests {
     }
 
     #[test]
-    fn neutral_pose_of_the_seed() {
-        for method in [Method::Seed, Method::Newton] {
-            let solution = solve(method, &seed_mechanism(), &neutral(), &[1.5; LEGS], &default()).unwrap();
+    fn neutral_pose_of_the_paper() {
+        for method in [Method::Published, Method::Newton] {
+            let solution =
+                solve(method, &published_mechanism(), &neutral(), &[1.5; LEGS], &default()).unwrap();
             assert!(solution.assembly.is_true());
             assert!((solution.pose.translation.z - 0.268_452_355).abs() < 1e-9);
             assert!(solution.iterations <= 6);
@@ -134,9 +135,9 @@ mod tests {
     fn no_number_is_refused() {
         let mut actuators = neutral();
         actuators.leg_m[2] = f64::NAN;
-        let mechanism = seed_mechanism();
+        let mechanism = published_mechanism();
         assert_eq!(
-            solve_seed(&mechanism, &actuators, &[1.4; LEGS], &default()),
+            solve_published(&mechanism, &actuators, &[1.4; LEGS], &default()),
             Err(ForwardError::NotFinite)
         );
         let guess = [1.4, f64::INFINITY, 1.4];
@@ -147,10 +148,10 @@ mod tests {
     #[test]
     fn what_cannot_be_assembled_is_a_typed_error() {
         let actuators = Actuators { slide_m: [0.0; LEGS], leg_m: [0.01, 0.30, 0.30] };
-        for method in [Method::Seed, Method::Newton] {
+        for method in [Method::Published, Method::Newton] {
             let error = solve(
                 method,
-                &seed_mechanism(),
+                &published_mechanism(),
                 &actuators,
                 &[1.4; LEGS],
                 &Options { max_iterations: MAX_ITERATIONS, ..default() },
@@ -175,8 +176,8 @@ mod tests {
             let here = Equations::new(&mechanism, &joints.actuators);
             prop_assume!(here.determinant(&here.evaluate(joints.theta_rad.into())).abs() > 0.2);
             let by = |method| solve(method, &mechanism, &joints.actuators, &guess, &default()).unwrap();
-            let (seed, newton) = (by(Method::Seed), by(Method::Newton));
-            for solution in [seed, newton] {
+            let (published, newton) = (by(Method::Published), by(Method::Newton));
+            for solution in [published, newton] {
                 prop_assert!((solution.pose.translation.vector - pose.translation.vector).norm() < 1e-10);
                 prop_assert!(angle_between(&solution.pose, &pose) < 1e-10);
                 prop_assert!(solution.residual_m <= 1e-13);
@@ -185,7 +186,7 @@ mod tests {
 
         /// With every reading of the text that goes by the error of eq. 2.
         #[test]
-        fn the_seeds_error_never_increases(
+        fn the_papers_error_never_increases(
             actuators in [-0.03..0.03f64, -0.03..0.03f64, -0.03..0.03f64, 0.24..0.3f64, 0.24..0.3f64, 0.24..0.3f64],
             guess in [-3.0..3.0f64, -3.0..3.0f64, -3.0..3.0f64],
             step in step_rules(),
@@ -194,7 +195,7 @@ mod tests {
             let mut last_cm2 = f64::INFINITY;
             let mut increased = false;
             let actuators = Actuators::from_axes(actuators);
-            let _ = solve_traced(Method::Seed, &seed_mechanism(), &actuators, &guess, &options, |iteration| {
+            let _ = solve_traced(Method::Published, &published_mechanism(), &actuators, &guess, &options, |iteration| {
                 // Conversion to cm² may round two neighbouring errors to one.
                 increased |= iteration.error_cm2 > last_cm2;
                 last_cm2 = iteration.error_cm2;
@@ -208,14 +209,14 @@ mod tests {
             off in [-0.02..0.02f64, -0.02..0.02f64, -0.02..0.02f64],
             step in step_rules(),
         ) {
-            let mechanism = seed_mechanism();
+            let mechanism = published_mechanism();
             let joints = mechanism.inverse(&pose).unwrap();
             let here = Equations::new(&mechanism, &joints.actuators);
             prop_assume!(here.determinant(&here.evaluate(joints.theta_rad.into())).abs() > 0.2);
             let guess = std::array::from_fn(|leg| joints.theta_rad[leg] + off[leg]);
             for residual in [Residual::Distance, Residual::SquaredDistance] {
                 let options = Options { residual, step, ..default() };
-                let solution = solve_seed(&mechanism, &joints.actuators, &guess, &options).unwrap();
+                let solution = solve_published(&mechanism, &joints.actuators, &guess, &options).unwrap();
                 prop_assert!((solution.pose.translation.vector - pose.translation.vector).norm() < 1e-10);
             }
         }
@@ -225,12 +226,12 @@ mod tests {
             pose in poses(20.0),
             off in [-0.2..0.2f64, -0.2..0.2f64, -0.2..0.2f64],
         ) {
-            let mechanism = seed_mechanism();
+            let mechanism = published_mechanism();
             let joints = mechanism.inverse(&pose).unwrap();
             let guess = std::array::from_fn(|leg| joints.theta_rad[leg] + off[leg]);
             let mut trace = Vec::new();
             let solved =
-                solve_traced(Method::Seed, &mechanism, &joints.actuators, &guess, &default(), |iteration| {
+                solve_traced(Method::Published, &mechanism, &joints.actuators, &guess, &default(), |iteration| {
                     trace.push(*iteration);
                 });
             prop_assert!(trace[0].theta_rad.iter().zip(&guess).all(|(told, given)| (told - given).abs() < f64::EPSILON));
@@ -253,8 +254,8 @@ mod tests {
             guess in prop::array::uniform3(prop::num::f64::ANY),
         ) {
             let actuators = Actuators::from_axes(actuators);
-            for method in [Method::Seed, Method::Newton] {
-                if let Ok(solution) = solve(method, &seed_mechanism(), &actuators, &guess, &default()) {
+            for method in [Method::Published, Method::Newton] {
+                if let Ok(solution) = solve(method, &published_mechanism(), &actuators, &guess, &default()) {
                     prop_assert!(solution.residual_m <= 1e-14);
                 }
             }

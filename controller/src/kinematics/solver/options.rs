@@ -1,4 +1,4 @@
-//! What the seed's text leaves open, as options, and what an iteration tells of itself.
+//! What the paper's text leaves open, as options, and what an iteration tells of itself.
 
 use masseter_shared::geometry::LEGS;
 
@@ -15,7 +15,7 @@ pub struct Options {
     pub epsilon_cm2: f64,
     /// What the iteration drives to zero.
     pub residual: Residual,
-    /// How the seed's algorithm reduces an increment; Newton–Raphson reduces none.
+    /// How the paper's algorithm reduces an increment; Newton–Raphson reduces none.
     pub step: StepRule,
     /// Iterations allowed; at most [`MAX_ITERATIONS`].
     pub max_iterations: u32,
@@ -40,9 +40,9 @@ impl Default for Options {
 /// Which iteration.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Method {
-    /// The seed's algorithm: Newton's direction, the increment reduced until the error decreases.
+    /// The paper's algorithm: Newton's direction, the increment reduced until the error decreases.
     #[default]
-    Seed,
+    Published,
     /// Newton–Raphson with the full increment.
     Newton,
 }

@@ -117,7 +117,7 @@ impl Platforms {
         })
     }
 
-    /// Whether a platform in here may fulfil the seed's conditions 1 and 2, oriented; heights are
+    /// Whether a platform in here may fulfil the paper's conditions 1 and 2, oriented; heights are
     /// never negative here.
     pub(super) fn may_stand_as_assembled(&self, dimensions: &Dimensions) -> bool {
         let [[x12, y12], [x23, y23], [x31, y31]] = self.across_m;

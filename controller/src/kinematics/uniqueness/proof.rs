@@ -23,8 +23,8 @@ const WORTH_REPEATING: f64 = 0.8;
 /// Which solutions there shall be at most one of. All stand above the base.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Claim {
-    /// Those that meet the seed's two conditions, with the platform's plane oriented.
-    SeedConditions,
+    /// Those that meet the paper's two conditions, with the platform's plane oriented.
+    PaperConditions,
     /// Of these, those whose [determinant](crate::kinematics::Solution::determinant) is at least this.
     DeterminantAtLeast(f64),
 }
@@ -202,7 +202,7 @@ mod tests {
 
     use super::*;
     use crate::kinematics::Solutions;
-    use crate::kinematics::samples::{AMBIGUOUS, seed_mechanism};
+    use crate::kinematics::samples::{AMBIGUOUS, published_mechanism};
 
     fn around(actuators: &Actuators, radius_m: f64) -> InputBox {
         let around = |value_m: f64| Enclosure::new(value_m - radius_m, value_m + radius_m);
@@ -211,22 +211,22 @@ mod tests {
 
     fn examine(claim: Claim, actuators: &Actuators, radius_m: f64) -> Finding {
         let inputs = around(actuators, radius_m);
-        Proof::new(&seed_mechanism(), claim).examine(&inputs, &Proof::any_reaches(&inputs))
+        Proof::new(&published_mechanism(), claim).examine(&inputs, &Proof::any_reaches(&inputs))
     }
 
     #[test]
     fn inputs_near_the_neutral_one_have_at_most_one() {
         let neutral = Actuators { slide_m: [0.0; LEGS], leg_m: [0.27; LEGS] };
-        assert_eq!(examine(Claim::SeedConditions, &neutral, 1e-3), Finding::AtMostOne);
+        assert_eq!(examine(Claim::PaperConditions, &neutral, 1e-3), Finding::AtMostOne);
         let tilted = Actuators { slide_m: [0.005, -0.004, 0.003], leg_m: [0.26, 0.27, 0.275] };
-        assert_eq!(examine(Claim::SeedConditions, &tilted, 1e-3), Finding::AtMostOne);
+        assert_eq!(examine(Claim::PaperConditions, &tilted, 1e-3), Finding::AtMostOne);
     }
 
     #[test]
     fn nothing_is_proven_where_two_true_solutions_are_known() {
-        let known = Solutions::new(&seed_mechanism(), &AMBIGUOUS).unwrap();
+        let known = Solutions::new(&published_mechanism(), &AMBIGUOUS).unwrap();
         assert_eq!(known.true_ones().count(), 2);
-        for claim in [Claim::SeedConditions, Claim::DeterminantAtLeast(0.0), Claim::DeterminantAtLeast(0.04)]
+        for claim in [Claim::PaperConditions, Claim::DeterminantAtLeast(0.0), Claim::DeterminantAtLeast(0.04)]
         {
             for radius_m in [1e-9, 1e-6, 1e-4] {
                 let Finding::Undecided(within) = examine(claim, &AMBIGUOUS, radius_m) else {
@@ -245,11 +245,11 @@ mod tests {
     /// The search of a single point, and of a segment, ends.
     #[test]
     fn reaches_without_width_are_examined_as_any_other() {
-        let known = Solutions::new(&seed_mechanism(), &AMBIGUOUS).unwrap();
+        let known = Solutions::new(&published_mechanism(), &AMBIGUOUS).unwrap();
         let one = known.true_ones().next().unwrap();
         let reach_m: [f64; LEGS] = std::array::from_fn(|leg| AMBIGUOUS.leg_m[leg] * one.theta_rad[leg].cos());
         let inputs = around(&AMBIGUOUS, 1e-6);
-        let proof = Proof::new(&seed_mechanism(), Claim::SeedConditions);
+        let proof = Proof::new(&published_mechanism(), Claim::PaperConditions);
         let point = reach_m.map(Enclosure::point);
         assert_eq!(proof.examine(&inputs, &point), Finding::AtMostOne);
         let segment = [Enclosure::new(reach_m[0] - 1e-3, reach_m[0] + 1e-3), point[1], point[2]];
@@ -258,7 +258,7 @@ mod tests {
 
     #[test]
     fn a_determinant_between_the_two_settles_the_same_input() {
-        let known = Solutions::new(&seed_mechanism(), &AMBIGUOUS).unwrap();
+        let known = Solutions::new(&published_mechanism(), &AMBIGUOUS).unwrap();
         let between = known.true_ones().map(|one| one.determinant).sum::<f64>() / 2.0;
         let claim = Claim::DeterminantAtLeast(between);
         assert_eq!(examine(claim, &AMBIGUOUS, 1e-7), Finding::AtMostOne);
@@ -267,6 +267,6 @@ mod tests {
     #[test]
     fn what_cannot_be_assembled_has_no_solution() {
         let apart = Actuators { slide_m: [0.0; LEGS], leg_m: [0.30, 0.30, 0.20] };
-        assert_eq!(examine(Claim::SeedConditions, &apart, 1e-3), Finding::NoSolution);
+        assert_eq!(examine(Claim::PaperConditions, &apart, 1e-3), Finding::NoSolution);
     }
 }
