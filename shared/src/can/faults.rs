@@ -206,12 +206,17 @@ impl Faults {
         self.of_node(now_ns, port, FaultKind::babbled)
     }
 
+    #[inline]
     fn of_node<T>(
         &self,
         now_ns: u64,
         port: usize,
         part: impl Fn(FaultKind) -> Option<T>,
     ) -> Option<(Strike, T)> {
+        // Most wires have none, and ask this several times a frame.
+        if self.is_empty() {
+            return None;
+        }
         let mut live = self.of_port(port, part).filter(|(_, listed, _)| listed.is_live(now_ns));
         live.next().map(|(place, listed, part)| (Strike { place, at_ns: listed.fault.from_ns }, part))
     }
