@@ -3,6 +3,13 @@
 //! A skip that time withheld while waiting explains is the machine's. One that only a stretch of work
 //! explains which took too long is suspect: [`blame`](super::blame) weighs those of the whole run. Any
 //! other is the rig's own.
+//!
+//! To skip n deadlines a process has to come back n + 1 periods after the last one that it kept, or later. One of
+//! them is its own: a cycle that keeps its time takes no longer, whatever it works and waits. The other n must have
+//! been lost, so lost time explains as many skips as it has whole periods, and a moment explains none.
+//!
+//! What counts is the time lost in the cycle before the skip, and what earlier cycles lost as far as it is still felt:
+//! a process that woke late had not made up for so much of it. Whoever wakes in time has made up for everything.
 
 use hdrhistogram::Histogram;
 use masseter_shared::messages::{Reading, State};
@@ -27,7 +34,7 @@ pub struct SkipFigures {
     pub overlong_ns: u64,
 }
 
-/// What a process counts since its start, as its messages carry it.
+/// What a process counts since its start, and how late it woke, as its messages carry it.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Counters {
     pub(super) skipped: u64,
@@ -35,6 +42,8 @@ pub(super) struct Counters {
     pub(super) spun_ns: u64,
     pub(super) worked_ns: u64,
     pub(super) overlong_ns: u64,
+    /// Wake-up after its deadline, ns.
+    pub(super) late_ns: u64,
 }
 
 impl From<&Reading> for Counters {
@@ -45,6 +54,7 @@ impl From<&Reading> for Counters {
             spun_ns: reading.spun_ns,
             worked_ns: reading.worked_ns,
             overlong_ns: reading.overlong_ns,
+            late_ns: reading.woke_ns.saturating_sub(reading.due_ns),
         }
     }
 }
@@ -57,22 +67,46 @@ impl From<&State> for Counters {
             spun_ns: state.spun_ns,
             worked_ns: state.worked_ns,
             overlong_ns: state.overlong_ns,
+            late_ns: state.woke_ns.saturating_sub(state.due_ns),
         }
     }
 }
 
-/// A stretch of lost time, and what of it has explained no skip yet, ns.
+/// Time lost, ns.
 #[derive(Debug, Clone, Copy, Default)]
 struct Loss {
-    length_ns: u64,
-    unused_ns: u64,
+    waiting_ns: u64,
+    working_ns: u64,
 }
 
 impl Loss {
-    /// What is left of a stretch when `used_ns` have explained skips, first of the stretch before.
-    fn left_of(length_ns: u64, before: Self, used_ns: u64) -> Self {
-        let unused_ns = length_ns.min(before.unused_ns.saturating_add(length_ns).saturating_sub(used_ns));
-        if unused_ns == 0 { Self::default() } else { Self { length_ns, unused_ns } }
+    fn and(self, more: Self) -> Self {
+        Self {
+            waiting_ns: self.waiting_ns.saturating_add(more.waiting_ns),
+            working_ns: self.working_ns.saturating_add(more.working_ns),
+        }
+    }
+
+    /// What of it can have made a wake-up that late: which part nobody can tell, so time lost while waiting comes first.
+    fn still_felt(self, late_ns: u64) -> Self {
+        let waiting_ns = self.waiting_ns.min(late_ns);
+        Self { waiting_ns, working_ns: self.working_ns.min(late_ns - waiting_ns) }
+    }
+
+    /// How many of the skipped deadlines it explains: while waiting, and while working. The greater loss explains
+    /// first, and what only both of them together explain counts as work.
+    fn explains(self, skipped: u64, period_ns: u64) -> (u64, u64) {
+        let periods = |lost_ns: u64| lost_ns / period_ns;
+        let all = periods(self.waiting_ns.saturating_add(self.working_ns));
+        let by_waiting = periods(self.waiting_ns);
+        let explained = skipped.min(all);
+        if self.waiting_ns >= self.working_ns {
+            let waiting = explained.min(by_waiting);
+            (waiting, explained - waiting)
+        } else {
+            let working = explained.min(all - by_waiting);
+            (explained - working, working)
+        }
     }
 }
 
@@ -80,9 +114,10 @@ impl Loss {
 #[derive(Debug)]
 pub(super) struct Skips {
     figures: SkipFigures,
-    /// Time lost in the cycle before: a late cycle is skipped after, not before, it was run.
-    recent_stall: Loss,
-    recent_overlong: Loss,
+    /// What the last wake-up was late by: its deadlines are skipped after, not before, the late cycle was run.
+    felt: Loss,
+    /// The stretch of work that is part of it, ns.
+    felt_stretch_ns: u64,
     /// How long the machine stood still at a time, ns.
     stalls: Histogram<u64>,
     /// How long the overlong stretches of work were, ns.
@@ -95,8 +130,8 @@ impl Default for Skips {
         let histogram = || Histogram::new(3).expect("three digits are allowed");
         Self {
             figures: SkipFigures::default(),
-            recent_stall: Loss::default(),
-            recent_overlong: Loss::default(),
+            felt: Loss::default(),
+            felt_stretch_ns: 0,
             stalls: histogram(),
             overlong: histogram(),
             shortest_costly_ns: None,
@@ -111,18 +146,12 @@ impl Skips {
         let stall_ns = counters.stalled_ns.saturating_sub(past.stalled_ns);
         let overlong_ns = counters.overlong_ns.saturating_sub(past.overlong_ns);
         let skipped = counters.skipped.saturating_sub(past.skipped);
-        let lost_waiting_ns = stall_ns.saturating_add(self.recent_stall.unused_ns);
-        let lost_working_ns = overlong_ns.saturating_add(self.recent_overlong.unused_ns);
-        let (by_machine, while_working) = if lost_waiting_ns >= lost_working_ns {
-            explain(skipped, lost_waiting_ns, lost_working_ns, period_ns)
-        } else {
-            let (while_working, by_machine) = explain(skipped, lost_working_ns, lost_waiting_ns, period_ns);
-            (by_machine, while_working)
-        };
+        let lost = self.felt.and(Loss { waiting_ns: stall_ns, working_ns: overlong_ns });
+        let (by_machine, while_working) = lost.explains(skipped, period_ns);
+        let stretch_ns = overlong_ns.max(self.felt_stretch_ns);
         if while_working > 0 {
-            let costly_ns = overlong_ns.max(self.recent_overlong.length_ns);
             self.shortest_costly_ns =
-                Some(self.shortest_costly_ns.map_or(costly_ns, |shortest| shortest.min(costly_ns)));
+                Some(self.shortest_costly_ns.map_or(stretch_ns, |shortest| shortest.min(stretch_ns)));
         }
         self.figures = SkipFigures {
             skipped: counters.skipped,
@@ -138,9 +167,8 @@ impl Skips {
                 histogram.record(lost_ns).expect("a histogram that resizes itself takes any value");
             }
         }
-        let used_ns = |skips: u64| skips.saturating_mul(period_ns);
-        self.recent_stall = Loss::left_of(stall_ns, self.recent_stall, used_ns(by_machine));
-        self.recent_overlong = Loss::left_of(overlong_ns, self.recent_overlong, used_ns(while_working));
+        self.felt = lost.still_felt(counters.late_ns);
+        self.felt_stretch_ns = if self.felt.working_ns > 0 { stretch_ns } else { 0 };
     }
 
     pub(super) fn figures(&self) -> SkipFigures {
@@ -159,26 +187,21 @@ impl Skips {
     }
 }
 
-/// How many of the skipped deadlines the greater loss of time explains, and how many of the rest the
-/// smaller one.
-fn explain(skipped: u64, greater_ns: u64, smaller_ns: u64, period_ns: u64) -> (u64, u64) {
-    let by_greater = skipped.min(greater_ns.div_ceil(period_ns));
-    (by_greater, (skipped - by_greater).min(smaller_ns.div_ceil(period_ns)))
-}
-
 #[cfg(test)]
 mod tests {
+    use proptest::prelude::*;
+
     use super::*;
 
     const PERIOD_NS: u64 = 1_000_000;
 
-    /// `(skipped, stalled_ns, overlong_ns)` message by message.
-    type Messages<'a> = &'a [(u64, u64, u64)];
+    /// `[skipped, stalled_ns, overlong_ns, late_ns]` message by message.
+    type Messages<'a> = &'a [[u64; 4]];
 
     fn skips_of(messages: Messages) -> Skips {
         let mut skips = Skips::default();
-        for &(skipped, stalled_ns, overlong_ns) in messages {
-            let counters = Counters { skipped, stalled_ns, overlong_ns, ..Counters::default() };
+        for &[skipped, stalled_ns, overlong_ns, late_ns] in messages {
+            let counters = Counters { skipped, stalled_ns, overlong_ns, late_ns, ..Counters::default() };
             skips.take(&counters, PERIOD_NS);
         }
         skips
@@ -187,27 +210,31 @@ mod tests {
     #[test]
     fn each_skip_has_one_cause() {
         const STALL: u64 = 8_600_000;
+        const MORE: u64 = STALL + 3_000_000;
         // What is counted message by message; skips by the machine, while working, and all.
-        let cases: [(Messages, [u64; 3]); 11] = [
-            (&[(0, 0, 0), (0, 0, 0)], [0, 0, 0]),
+        let cases: [(Messages, [u64; 3]); 13] = [
+            (&[[0, 0, 0, 0], [0, 0, 0, 0]], [0, 0, 0]),
             // Woken 8.6 ms late; the passed deadlines are skipped after the late cycle.
-            (&[(0, 0, 0), (0, STALL, 0), (7, STALL, 0)], [7, 0, 7]),
+            (&[[0, 0, 0, 0], [0, STALL, 0, STALL], [7, STALL, 0, 100]], [7, 0, 7]),
             // A stretch of work of 8.6 ms.
-            (&[(0, 0, 0), (8, 0, STALL)], [0, 8, 8]),
+            (&[[0, 0, 0, 0], [8, 0, STALL, 0]], [0, 8, 8]),
             // No time lost at all: the rig's own.
-            (&[(0, 0, 0), (3, 0, 0)], [0, 0, 3]),
+            (&[[0, 0, 0, 0], [3, 0, 0, 0]], [0, 0, 3]),
             // More skipped than the time lost explains.
-            (&[(0, 0, 0), (20, STALL, 0)], [9, 0, 20]),
+            (&[[0, 0, 0, 0], [20, STALL, 0, 0]], [8, 0, 20]),
             // The greater loss explains first.
-            (&[(0, 0, 0), (9, 60_000, STALL)], [0, 9, 9]),
+            (&[[0, 0, 0, 0], [8, 60_000, STALL, 0]], [0, 8, 8]),
+            (&[[0, 0, 0, 0], [2, 2_500_000, 3_500_000, 0]], [0, 2, 2]),
+            (&[[0, 0, 0, 0], [2, 3_500_000, 2_500_000, 0]], [2, 0, 2]),
+            // Neither alone explains it.
+            (&[[0, 0, 0, 0], [1, 700_000, 600_000, 0]], [0, 1, 1]),
             // One loss explains its skips once, also when more are skipped a cycle later.
-            (&[(0, 0, 0), (3, 3_000_000, 0), (6, 3_000_000, 0)], [3, 0, 6]),
-            (&[(0, 0, 0), (3, 0, 3_000_000), (6, 0, 3_000_000)], [0, 3, 6]),
-            // What has explained none yet still may, and what is lost meanwhile is kept for its own.
-            (&[(0, 0, 0), (2, STALL, 0), (8, STALL, 0)], [8, 0, 8]),
-            (&[(0, STALL, 0), (8, STALL + 3_000_000, 0), (11, STALL + 3_000_000, 0)], [11, 0, 11]),
-            // Time lost long ago explains nothing.
-            (&[(0, STALL, STALL), (0, STALL, STALL), (0, STALL, STALL), (2, STALL, STALL)], [0, 0, 2]),
+            (&[[0, 0, 0, 0], [3, 3_000_000, 0, 900_000], [6, 3_000_000, 0, 0]], [3, 0, 6]),
+            (&[[0, 0, 0, 0], [3, 0, 3_000_000, 900_000], [6, 0, 3_000_000, 0]], [0, 3, 6]),
+            // What is still felt still may, and what is lost meanwhile is kept for its own.
+            (&[[0, STALL, 0, STALL], [8, MORE, 0, 3_000_000], [11, MORE, 0, 0]], [11, 0, 11]),
+            // Time that a wake-up in time had made up for explains nothing.
+            (&[[0, STALL, STALL, 0], [2, STALL, STALL, 0]], [0, 0, 2]),
         ];
         for (messages, expected) in cases {
             let figures = skips_of(messages).figures();
@@ -216,14 +243,84 @@ mod tests {
         }
     }
 
+    /// A process that skips as the real-time loop does, and its account.
+    #[derive(Default)]
+    struct Process {
+        now_ns: u64,
+        cycle: u64,
+        counters: Counters,
+        skips: Skips,
+    }
+
+    impl Process {
+        /// Works and waits so long after a wake-up, is held up meanwhile, and if it came back in time once more while it
+        /// waits for its deadline.
+        fn cycle(&mut self, own_ns: u64, held_up_ns: u64, held_up_waiting_ns: u64) {
+            self.now_ns += own_ns + held_up_ns;
+            self.counters.stalled_ns += held_up_ns;
+            self.cycle += 1;
+            let missed = self.now_ns.saturating_sub(self.cycle * PERIOD_NS) / PERIOD_NS;
+            self.counters.skipped += missed;
+            self.cycle += missed;
+            let due_ns = self.cycle * PERIOD_NS;
+            if self.now_ns < due_ns {
+                self.now_ns = due_ns + held_up_waiting_ns;
+                self.counters.stalled_ns += held_up_waiting_ns;
+            }
+            self.counters.late_ns = self.now_ns - due_ns;
+            self.skips.take(&self.counters, PERIOD_NS);
+        }
+    }
+
+    #[test]
+    fn a_moment_withheld_in_every_cycle_excuses_no_skip() {
+        let mut process = Process::default();
+        for cycle in 1..=1000 {
+            let own_ns = if cycle % 50 == 0 { 22 * PERIOD_NS / 10 } else { 9 * PERIOD_NS / 10 };
+            process.cycle(own_ns, 1000, 1000);
+        }
+        let figures = process.skips.figures();
+        assert_eq!((figures.by_machine, figures.while_working, figures.skipped), (0, 0, 20));
+    }
+
+    #[test]
+    fn stalls_of_whole_periods_explain_what_they_skip() {
+        for periods in [1, 2, 5] {
+            for [held_up, waiting] in [[periods, 0], [0, periods]] {
+                let mut process = Process::default();
+                let own_ns = if held_up > 0 { PERIOD_NS } else { PERIOD_NS / 2 };
+                process.cycle(own_ns, held_up * PERIOD_NS, waiting * PERIOD_NS);
+                process.cycle(PERIOD_NS, 0, 0);
+                process.cycle(PERIOD_NS, 0, 0);
+                let figures = process.skips.figures();
+                assert_eq!((figures.by_machine, figures.skipped), (periods, periods), "{held_up} {waiting}");
+            }
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn a_process_that_keeps_its_time_has_every_skip_explained(
+            cycles in proptest::collection::vec((0..=PERIOD_NS, 0..3 * PERIOD_NS, 0..3 * PERIOD_NS), 1..100)
+        ) {
+            let mut process = Process::default();
+            for (own_ns, held_up_ns, waiting_ns) in cycles {
+                process.cycle(own_ns, held_up_ns, waiting_ns);
+            }
+            let figures = process.skips.figures();
+            prop_assert_eq!(figures.by_machine, figures.skipped);
+        }
+    }
+
     #[test]
     fn stretches_are_counted_from_the_shortest_that_cost_a_deadline() {
-        let skips = skips_of(&[(0, 60_000, 70_000), (1, 60_000, 2_070_000), (5, 4_060_000, 7_070_000)]);
+        let skips =
+            skips_of(&[[0, 60_000, 70_000, 0], [1, 60_000, 2_070_000, 0], [5, 4_060_000, 7_070_000, 0]]);
         assert_eq!(skips.shortest_costly_ns(), Some(2_000_000));
         assert_eq!(skips.as_long_as(2_000_000), (1, 2));
         assert_eq!(skips.as_long_as(1), (2, 3));
         // What is left of a stretch is not a shorter one.
-        let skips = skips_of(&[(0, 0, 0), (3, 0, 5_000_000), (5, 0, 5_000_000)]);
+        let skips = skips_of(&[[0, 0, 5_000_000, 2_000_000], [2, 0, 5_000_000, 0]]);
         assert_eq!(skips.shortest_costly_ns(), Some(5_000_000));
     }
 }
