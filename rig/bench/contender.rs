@@ -22,6 +22,10 @@ pub(super) fn durations() -> Durations {
 
 /// Adds `count` times the same duration.
 pub(super) fn record(durations: &mut Durations, taken_ns: u64, count: u64) {
+    // None at all would still raise the histogram's maximum.
+    if count == 0 {
+        return;
+    }
     durations.record_n(taken_ns, count).expect("a histogram that resizes itself takes any value");
 }
 

@@ -238,4 +238,11 @@ mod tests {
         assert!(late.max() >= CYCLICTEST_UP_TO_US * 1000);
         assert!(histogram_of("nothing\n").is_err());
     }
+
+    #[test]
+    fn of_cyclictests_empty_bins_none_is_the_maximum() {
+        let output = "000013 000002\n000044 000001\n019999 000000\n# Histogram Overflows: 00000\n";
+        let late = histogram_of(output).unwrap();
+        assert_eq!((late.len(), late.max() / 100), (3, 440));
+    }
 }
