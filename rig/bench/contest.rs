@@ -24,16 +24,16 @@ pub(super) struct Outcome {
     pub(super) disturbance: Disturbance,
 }
 
-/// Plays every round of so many contenders, each beginning with another one, and watches the machine from a core.
-/// The results lie by contender.
+/// Plays every round of so many contenders, each beginning with another one, and watches the machine from the
+/// cores in use. The results lie by contender.
 pub(super) fn take_turns<T>(
     rounds: u32,
     contenders: usize,
-    core: usize,
+    cores: &[usize],
     mut play: impl FnMut(usize) -> anyhow::Result<T>,
 ) -> anyhow::Result<(Vec<Vec<T>>, Disturbance)> {
     let mut results: Vec<Vec<T>> = (0..contenders).map(|_| Vec::new()).collect();
-    let mut watch = Watch::begin(core);
+    let mut watch = Watch::begin(cores);
     for round in 0..rounds as usize {
         for turn in 0..contenders {
             let index = (round + turn) % contenders;
@@ -50,10 +50,10 @@ impl Outcome {
         bench: &'static str,
         measures: String,
         rounds: u32,
-        core: usize,
+        cores: &[usize],
         mut turns: Vec<(String, Turn)>,
     ) -> anyhow::Result<Self> {
-        let (results, disturbance) = take_turns(rounds, turns.len(), core, |index| turns[index].1())?;
+        let (results, disturbance) = take_turns(rounds, turns.len(), cores, |index| turns[index].1())?;
         let names = turns.into_iter().map(|(name, _)| name);
         let contenders = names
             .zip(results)
@@ -122,7 +122,7 @@ mod tests {
             (name.to_owned(), turn)
         };
         let turns = vec![turn("a", 100), turn("b", 400)];
-        let outcome = Outcome::of_turns("x", String::new(), 3, 0, turns).unwrap().comparing([("a", "b")]);
+        let outcome = Outcome::of_turns("x", String::new(), 3, &[0], turns).unwrap().comparing([("a", "b")]);
         assert_eq!(*order.borrow(), ["a", "b", "b", "a", "a", "b"]);
         let [p50, p99] = &outcome.ratios[0].figures[..] else { panic!("{:?}", outcome.ratios) };
         assert_eq!(p50.spread, Spread { median: 0.25, min: 0.25, max: 0.25 });
@@ -134,7 +134,7 @@ mod tests {
     #[should_panic(expected = "no contender is called c")]
     fn a_contender_that_is_none_cannot_be_compared() {
         let turn: Turn = Box::new(|| Ok(round(1)));
-        let outcome = Outcome::of_turns("x", String::new(), 1, 0, vec![("a".to_owned(), turn)]).unwrap();
+        let outcome = Outcome::of_turns("x", String::new(), 1, &[0], vec![("a".to_owned(), turn)]).unwrap();
         let _ = outcome.comparing([("a", "c")]);
     }
 }

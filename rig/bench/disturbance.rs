@@ -20,7 +20,7 @@ const LOOK: Duration = Duration::from_millis(50);
 pub(super) struct Disturbance {
     /// Of all cores' time, as the kernel counts it.
     pub(super) stolen_percent: f64,
-    /// Of the time that a thread of the rig's priority spun before the turns.
+    /// Of the time that a thread of the rig's priority spun before the turns, on the core that lost most.
     pub(super) stalled_percent: f64,
     pub(super) disturbed: bool,
     /// Why it is.
@@ -41,21 +41,49 @@ impl Disturbance {
 /// Looks at the machine now and then.
 #[derive(Debug)]
 pub(super) struct Watch {
-    core: usize,
+    cores: Vec<Looks>,
     began_ns: u64,
     stolen_before_ns: Option<u64>,
+}
+
+impl Watch {
+    /// From the cores that are measured on.
+    pub(super) fn begin(cores: &[usize]) -> Self {
+        let stolen_before_ns = stolen_ns(&SystemRoot::of_this_machine());
+        Self { cores: cores.iter().map(Looks::from).collect(), began_ns: clock::now_ns(), stolen_before_ns }
+    }
+
+    /// On one core after the other.
+    pub(super) fn look(&mut self) {
+        self.cores.iter_mut().for_each(Looks::look);
+    }
+
+    pub(super) fn end(self) -> Disturbance {
+        let root = SystemRoot::of_this_machine();
+        let passed_ns = (clock::now_ns() - self.began_ns) * root.online_cores().len().max(1) as u64;
+        let stolen_ns =
+            stolen_ns(&root).zip(self.stolen_before_ns).map_or(0, |(to, from)| to.saturating_sub(from));
+        Disturbance::of(percent(stolen_ns, passed_ns), worst_percent(&self.cores))
+    }
+}
+
+/// What was seen of a core, ns.
+#[derive(Debug)]
+struct Looks {
+    core: usize,
     looked_ns: u64,
     stalled_ns: u64,
 }
 
-impl Watch {
-    pub(super) fn begin(core: usize) -> Self {
-        let stolen_before_ns = stolen_ns(&SystemRoot::of_this_machine());
-        Self { core, began_ns: clock::now_ns(), stolen_before_ns, looked_ns: 0, stalled_ns: 0 }
+impl From<&usize> for Looks {
+    fn from(core: &usize) -> Self {
+        Self { core: *core, looked_ns: 0, stalled_ns: 0 }
     }
+}
 
+impl Looks {
     /// Spins on the core and counts the gaps.
-    pub(super) fn look(&mut self) {
+    fn look(&mut self) {
         let account = on_core(self.core, || {
             let mut waiter = Waiter::new(SECOND_NS);
             let until_ns = clock::now_ns() + LOOK.as_nanos() as u64;
@@ -66,15 +94,15 @@ impl Watch {
         self.looked_ns += account.spun_ns + account.stalled_ns;
         self.stalled_ns += account.stalled_ns;
     }
+}
 
-    pub(super) fn end(self) -> Disturbance {
-        let root = SystemRoot::of_this_machine();
-        let passed_ns = (clock::now_ns() - self.began_ns) * root.online_cores().len().max(1) as u64;
-        let stolen_ns =
-            stolen_ns(&root).zip(self.stolen_before_ns).map_or(0, |(to, from)| to.saturating_sub(from));
-        let percent = |part_ns, of_ns: u64| 100.0 * part_ns as f64 / of_ns.max(1) as f64;
-        Disturbance::of(percent(stolen_ns, passed_ns), percent(self.stalled_ns, self.looked_ns))
-    }
+/// A bench on two cores waits for the slower one.
+fn worst_percent(cores: &[Looks]) -> f64 {
+    cores.iter().map(|looks| percent(looks.stalled_ns, looks.looked_ns)).fold(0.0, f64::max)
+}
+
+fn percent(part_ns: u64, of_ns: u64) -> f64 {
+    100.0 * part_ns as f64 / of_ns.max(1) as f64
 }
 
 #[cfg(test)]
@@ -93,10 +121,20 @@ mod tests {
     }
 
     #[test]
-    fn what_is_looked_at_is_what_was_spun() {
-        let mut watch = Watch::begin(0);
+    fn what_is_looked_at_is_what_was_spun_on_every_core_in_use() {
+        let mut watch = Watch::begin(&[0, 1]);
         watch.look();
-        assert!(u128::from(watch.looked_ns) > LOOK.as_nanos() / 2, "{watch:?}");
-        assert!(watch.stalled_ns <= watch.looked_ns, "{watch:?}");
+        for looks in &watch.cores {
+            assert!(u128::from(looks.looked_ns) > LOOK.as_nanos() / 2, "{watch:?}");
+            assert!(looks.stalled_ns <= looks.looked_ns, "{watch:?}");
+        }
+        assert_eq!(watch.cores.len(), 2);
+    }
+
+    #[test]
+    fn of_two_cores_the_one_that_lost_most_tells() {
+        let looks = |core, stalled_ns| Looks { core, looked_ns: 1000, stalled_ns };
+        assert!((worst_percent(&[looks(0, 0), looks(1, 30)]) - 3.0).abs() < 1e-9);
+        assert!((worst_percent(&[looks(0, 30), looks(1, 0)]) - 3.0).abs() < 1e-9);
     }
 }

@@ -50,7 +50,7 @@ pub(super) fn measure(rounds: u32, core: usize) -> anyhow::Result<Outcome> {
         turn(COLD_NEWTON, core, || each(inputs, |input| newton(input, &GUESS_RAD))),
     ];
     let measures = "one forward solution, inputs of a chewing cycle at 1 kHz".to_owned();
-    let outcome = Outcome::of_turns("fk", measures, rounds, core, turns)?;
+    let outcome = Outcome::of_turns("fk", measures, rounds, &[core], turns)?;
     Ok(outcome.comparing([(WARM, WARM_NEWTON), (WARM, WARM_PAPER), (COLD, COLD_NEWTON)]))
 }
 

@@ -56,7 +56,7 @@ enum Turn {
 pub(super) fn measure(rounds: u32, cores: [usize; 2]) -> anyhow::Result<Outcome> {
     let interrupts = Interrupts::listen().context("cannot listen for signals")?;
     let play = |index: usize| run_at(RATES_HZ[index], cores, &interrupts);
-    let played = take_turns(rounds, RATES_HZ.len(), cores[0], play);
+    let played = take_turns(rounds, RATES_HZ.len(), &cores, play);
     interrupts.let_go();
     let (turns, disturbance) = played?;
     let mut outcome = Outcome {

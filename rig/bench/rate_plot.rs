@@ -101,7 +101,7 @@ mod tests {
             contenders: RATES_HZ.map(trip).into(),
             ratios: Vec::new(),
             notes: Vec::new(),
-            disturbance: Watch::begin(0).end(),
+            disturbance: Watch::begin(&[0]).end(),
         };
         let [trips, cpu, ..] = panels(&outcome);
         let rates: Vec<_> = trips.curves[0].points.iter().map(|point| point.0).collect();

@@ -28,7 +28,7 @@ pub(super) fn measure(rounds: u32, core: usize) -> anyhow::Result<Outcome> {
         (name(observers), turn)
     });
     let measures = "loaning, filling and sending one reading".to_owned();
-    let outcome = Outcome::of_turns("subscribers", measures, rounds, core, turns.into())?;
+    let outcome = Outcome::of_turns("subscribers", measures, rounds, &[core], turns.into())?;
     let [fewest, more @ ..] = OBSERVERS;
     Ok(outcome.comparing(more.map(|observers| (name(observers), name(fewest)))))
 }

@@ -64,7 +64,7 @@ pub(super) fn measure(rounds: u32, core: usize) -> anyhow::Result<Outcome> {
     let pairs = own_names.iter().flat_map(|own| other_names.iter().map(move |other| (own, other)));
     let measures = "wake-up lateness at 1 kHz, one SCHED_FIFO thread on one core".to_owned();
     let turns = own_turns.into_iter().chain(others).collect();
-    let outcome = Outcome::of_turns("loop", measures, rounds, core, turns)?.comparing(pairs);
+    let outcome = Outcome::of_turns("loop", measures, rounds, &[core], turns)?.comparing(pairs);
     notes.push(outliers.borrow().in_words());
     Ok(notes.into_iter().fold(outcome, Outcome::noting))
 }

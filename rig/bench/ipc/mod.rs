@@ -42,7 +42,7 @@ pub(super) fn measure(rounds: u32, [own_core, peer_core]: [usize; 2]) -> anyhow:
     let measures = "round trip between two polling processes on two cores".to_owned();
     let [rig, bare, socket, pipe] =
         [Channel::Rig, Channel::Iceoryx2, Channel::Socket, Channel::Pipe].map(Channel::in_words);
-    Ok(Outcome::of_turns("ipc", measures, rounds, own_core, turns)?.comparing([
+    Ok(Outcome::of_turns("ipc", measures, rounds, &[own_core, peer_core], turns)?.comparing([
         (rig, bare),
         (rig, CACHE_LINE),
         (rig, socket),
