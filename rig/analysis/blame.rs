@@ -104,6 +104,7 @@ mod tests {
                 counters.worked_ns += STALL_NS;
                 counters.skipped += 2;
             }
+            counters.seq += 1;
             skips.take(&counters, PERIOD_NS);
         }
         skips

@@ -38,8 +38,8 @@ struct Published {
 pub(super) struct Intervals {
     period_ns: u64,
     measured: Vec<Measured>,
-    plant_skipped: u64,
-    controller_skipped: u64,
+    plant_skipped: Skipped,
+    controller_skipped: Skipped,
     answers: Answers,
     /// By the plant's cycle. A reading is recorded before the one that answers it: no join is needed.
     samples: ByCycle<Sampled>,
@@ -60,8 +60,8 @@ impl Intervals {
         Ok(Self {
             period_ns,
             measured: Interval::ALL.iter().map(|interval| Measured::new(interval.name(), folder)).collect(),
-            plant_skipped: 0,
-            controller_skipped: 0,
+            plant_skipped: Skipped::default(),
+            controller_skipped: Skipped::default(),
             answers: Answers::default(),
             samples: ByCycle::default(),
             transports: Join::default(),
@@ -89,7 +89,7 @@ impl Intervals {
     }
 
     pub(super) fn reading(&mut self, reading: &Reading) {
-        let skipped = more(reading.skipped_cycles, &mut self.plant_skipped);
+        let skipped = self.plant_skipped.before(reading.seq, reading.skipped_cycles);
         let wake_up = [Interval::PlantWakeUp, Interval::PlantWakeUpCorrected];
         self.add_wake_up(wake_up, [reading.due_ns, reading.woke_ns], skipped);
         if reading.complete_ns > 0 {
@@ -116,7 +116,7 @@ impl Intervals {
 
     /// `is_fresh`: the state's reading is used for the first time.
     pub(super) fn state(&mut self, state: &State, is_fresh: bool) {
-        let skipped = more(state.skipped_cycles, &mut self.controller_skipped);
+        let skipped = self.controller_skipped.before(state.seq, state.skipped_cycles);
         let wake_up = [Interval::ControllerWakeUp, Interval::ControllerWakeUpCorrected];
         self.add_wake_up(wake_up, [state.due_ns, state.woke_ns], skipped);
         if !is_fresh {
@@ -162,9 +162,20 @@ impl Intervals {
     }
 }
 
-/// How much a counter has grown since the last look at it.
-fn more(counted: u64, before: &mut u64) -> u64 {
-    counted.saturating_sub(std::mem::replace(before, counted))
+/// A process's counter of skipped deadlines, by its messages.
+#[derive(Debug, Default)]
+struct Skipped {
+    seq: u64,
+    counted: u64,
+}
+
+impl Skipped {
+    /// How many were skipped just before this message's wake-up; none where messages before it are missing, since which
+    /// wake-up skipped them is not known.
+    fn before(&mut self, seq: u64, counted: u64) -> u64 {
+        let last = std::mem::replace(self, Self { seq, counted });
+        if seq == last.seq.wrapping_add(1) { counted.saturating_sub(last.counted) } else { 0 }
+    }
 }
 
 #[cfg(test)]
@@ -266,15 +277,17 @@ mod tests {
 
     #[test]
     fn a_skipped_deadline_counts_in_the_corrected_wake_up_only() {
-        let states = || {
+        let states = |seq| {
             let (folder, mut intervals) = intervals();
-            intervals.state(&State::default(), false);
+            intervals.state(&State { seq: 1, ..State::default() }, false);
             // Woken 200 µs after deadline 5; 2 to 4 were skipped.
             let late = State { due_ns: 5 * PERIOD_NS, woke_ns: 5_200_000, ..State::default() };
-            intervals.state(&State { skipped_cycles: 3, ..late }, false);
+            intervals.state(&State { seq, skipped_cycles: 3, ..late }, false);
             (folder, intervals)
         };
-        assert_eq!(only("controller wake-up", states().1), (2, Some(200_000)));
-        assert_eq!(only("controller wake-up corrected", states().1), (5, Some(3_200_000)));
+        assert_eq!(only("controller wake-up", states(2).1), (2, Some(200_000)));
+        assert_eq!(only("controller wake-up corrected", states(2).1), (5, Some(3_200_000)));
+        // Who skipped them is not recorded.
+        assert_eq!(only("controller wake-up corrected", states(3).1), (2, Some(200_000)));
     }
 }

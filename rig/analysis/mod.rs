@@ -32,7 +32,7 @@ use std::path::PathBuf;
 
 use masseter_shared::config::Scenario;
 use masseter_shared::messages::codes::ControllerState;
-use masseter_shared::messages::{Command, Event, FrameTap, Reading, State, Truth};
+use masseter_shared::messages::{Command, Event, FrameTap, Message, Reading, State, Truth};
 use serde::Serialize;
 
 use crate::recording::{Damage, ReadError, Reader, Recorded};
@@ -138,6 +138,11 @@ impl Figures {
         let is_machine = self.suspicion.is_some_and(|suspicion| suspicion.may_be_the_machine());
         let while_working = if is_machine { controller.while_working + plant.while_working } else { 0 };
         (controller.skipped + plant.skipped, controller.by_machine + plant.by_machine + while_working)
+    }
+
+    /// Skipped deadlines whose cause the recording does not tell.
+    pub fn skipped_of_unknown_cause(&self) -> u64 {
+        self.controller_skips.unknown_cause + self.plant_skips.unknown_cause
     }
 
     /// Whether the machine is to blame for every deadline that was skipped.
@@ -249,7 +254,7 @@ impl Pass {
         if is_fresh {
             self.tracking.solution(state);
         }
-        self.cycles += 1;
+        self.cycles = self.cycles.max(state.seq);
         self.controller_skips.take(&Counters::from(state), self.period_ns);
         self.final_state = Some(state.controller_state.into());
     }
@@ -274,6 +279,9 @@ impl Pass {
         let (tracking, track) = self.tracking.finish();
         let duration_ns =
             self.last_sample_ns.saturating_sub(self.first_sample_ns.unwrap_or(self.last_sample_ns));
+        let topics = self.sequence.finish();
+        let missing_frames =
+            topics.iter().find(|topic| topic.topic == FrameTap::TOPIC).map_or(0, |topic| topic.missing);
         Ok(Figures {
             cycles: self.cycles,
             duration_s: duration_ns as f64 / 1e9,
@@ -287,9 +295,9 @@ impl Pass {
             bite_force_max_n: self.bite_force_max_n,
             worst_cycles: self.longest_cycles.finish(),
             intervals: self.intervals.finish()?,
-            topics: self.sequence.finish(),
+            topics,
             frames: self.candump.finish()?.iter().map(|logged| logged.frames).collect(),
-            bus_response: self.responses.finish(),
+            bus_response: self.responses.finish(missing_frames),
             events: self.events.finish()?,
             cut_short: reader.was_cut_short(),
             damage: reader.damage().to_vec(),

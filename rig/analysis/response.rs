@@ -94,17 +94,21 @@ impl Responses {
         Ok(())
     }
 
-    pub(super) fn finish(self) -> BusResponse {
-        let unbounded = self.unbounded();
+    /// `missing`: frames that were not recorded.
+    pub(super) fn finish(self, missing: u64) -> BusResponse {
+        let unbounded = self.unbounded(missing);
         let figures = |bus: &Followed| bus.figures(&bus.bounds_ns(self.format, unbounded.is_none()));
         let messages = self.buses.iter().flat_map(figures).collect();
         BusResponse { messages, unbounded }
     }
 
     /// Why there are no bounds for this run.
-    fn unbounded(&self) -> Option<String> {
+    fn unbounded(&self, missing: u64) -> Option<String> {
         if self.has_faults {
             return Some("the scenario's faults are in no plan".to_owned());
+        }
+        if missing > 0 {
+            return Some(format!("{missing} frames are missing from the recording"));
         }
         self.buses.iter().find_map(|bus| bus.unbounded(self.format))
     }
@@ -200,7 +204,7 @@ mod tests {
 
     fn followed(mut responses: Responses, frames: impl IntoIterator<Item = FrameTap>) -> BusResponse {
         frames.into_iter().for_each(|frame| responses.frame(&frame).unwrap());
-        responses.finish()
+        responses.finish(0)
     }
 
     #[test]
@@ -250,6 +254,15 @@ mod tests {
             assert!(why.is_some_and(|why| why.contains(reason)), "{frames:?}: {found:?}");
             assert!(found.messages.iter().all(|message| message.bound_ns.is_none()), "{found:?}");
         }
+    }
+
+    #[test]
+    fn of_a_part_of_the_frames_nothing_is_judged() {
+        let mut responses = responses(false);
+        responses.frame(&seen(0x080, 1000, 191)).unwrap();
+        let found = responses.finish(3);
+        assert_eq!(found.unbounded.as_deref(), Some("3 frames are missing from the recording"));
+        assert_eq!(found.exceeding().count(), 0);
     }
 
     #[test]

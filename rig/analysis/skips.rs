@@ -10,6 +10,9 @@
 //!
 //! What counts is the time lost in the cycle before the skip, and what earlier cycles lost as far as it is still felt:
 //! a process that woke late had not made up for so much of it. Whoever wakes in time has made up for everything.
+//!
+//! Where messages are missing from the recording, what happened meanwhile is not known cycle by cycle: skips in between
+//! have no known cause, and what was lost is no single stall.
 
 use hdrhistogram::Histogram;
 use masseter_shared::messages::{Reading, State};
@@ -24,6 +27,8 @@ pub struct SkipFigures {
     pub by_machine: u64,
     /// Those before which a stretch of work took too long.
     pub while_working: u64,
+    /// Those behind messages that were not recorded.
+    pub unknown_cause: u64,
     /// Time that the machine withheld from the process while it waited, ns.
     pub stalled_ns: u64,
     /// Time that the process spun, what was withheld left out, ns.
@@ -37,6 +42,8 @@ pub struct SkipFigures {
 /// What a process counts since its start, and how late it woke, as its messages carry it.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Counters {
+    /// Number of the message.
+    pub(super) seq: u64,
     pub(super) skipped: u64,
     pub(super) stalled_ns: u64,
     pub(super) spun_ns: u64,
@@ -49,6 +56,7 @@ pub(super) struct Counters {
 impl From<&Reading> for Counters {
     fn from(reading: &Reading) -> Self {
         Self {
+            seq: reading.seq,
             skipped: reading.skipped_cycles,
             stalled_ns: reading.stalled_ns,
             spun_ns: reading.spun_ns,
@@ -62,6 +70,7 @@ impl From<&Reading> for Counters {
 impl From<&State> for Counters {
     fn from(state: &State) -> Self {
         Self {
+            seq: state.seq,
             skipped: state.skipped_cycles,
             stalled_ns: state.stalled_ns,
             spun_ns: state.spun_ns,
@@ -114,6 +123,7 @@ impl Loss {
 #[derive(Debug)]
 pub(super) struct Skips {
     figures: SkipFigures,
+    last_seq: u64,
     /// What the last wake-up was late by: its deadlines are skipped after, not before, the late cycle was run.
     felt: Loss,
     /// The stretch of work that is part of it, ns.
@@ -130,6 +140,7 @@ impl Default for Skips {
         let histogram = || Histogram::new(3).expect("three digits are allowed");
         Self {
             figures: SkipFigures::default(),
+            last_seq: 0,
             felt: Loss::default(),
             felt_stretch_ns: 0,
             stalls: histogram(),
@@ -147,7 +158,9 @@ impl Skips {
         let overlong_ns = counters.overlong_ns.saturating_sub(past.overlong_ns);
         let skipped = counters.skipped.saturating_sub(past.skipped);
         let lost = self.felt.and(Loss { waiting_ns: stall_ns, working_ns: overlong_ns });
-        let (by_machine, while_working) = lost.explains(skipped, period_ns);
+        let is_next = counters.seq == std::mem::replace(&mut self.last_seq, counters.seq).wrapping_add(1);
+        let known = if is_next { skipped } else { 0 };
+        let (by_machine, while_working) = lost.explains(known, period_ns);
         let stretch_ns = overlong_ns.max(self.felt_stretch_ns);
         if while_working > 0 {
             self.shortest_costly_ns =
@@ -157,13 +170,14 @@ impl Skips {
             skipped: counters.skipped,
             by_machine: past.by_machine + by_machine,
             while_working: past.while_working + while_working,
+            unknown_cause: past.unknown_cause + (skipped - known),
             stalled_ns: counters.stalled_ns,
             spun_ns: counters.spun_ns,
             worked_ns: counters.worked_ns,
             overlong_ns: counters.overlong_ns,
         };
         for (histogram, lost_ns) in [(&mut self.stalls, stall_ns), (&mut self.overlong, overlong_ns)] {
-            if lost_ns > 0 {
+            if is_next && lost_ns > 0 {
                 histogram.record(lost_ns).expect("a histogram that resizes itself takes any value");
             }
         }
@@ -200,8 +214,8 @@ mod tests {
 
     fn skips_of(messages: Messages) -> Skips {
         let mut skips = Skips::default();
-        for &[skipped, stalled_ns, overlong_ns, late_ns] in messages {
-            let counters = Counters { skipped, stalled_ns, overlong_ns, late_ns, ..Counters::default() };
+        for (seq, &[skipped, stalled_ns, overlong_ns, late_ns]) in (1..).zip(messages) {
+            let counters = Counters { seq, skipped, stalled_ns, overlong_ns, late_ns, ..Counters::default() };
             skips.take(&counters, PERIOD_NS);
         }
         skips
@@ -268,6 +282,7 @@ mod tests {
                 self.counters.stalled_ns += held_up_waiting_ns;
             }
             self.counters.late_ns = self.now_ns - due_ns;
+            self.counters.seq += 1;
             self.skips.take(&self.counters, PERIOD_NS);
         }
     }
@@ -310,6 +325,19 @@ mod tests {
             let figures = process.skips.figures();
             prop_assert_eq!(figures.by_machine, figures.skipped);
         }
+    }
+
+    #[test]
+    fn what_happened_behind_missing_messages_has_no_known_cause() {
+        let mut process = Process::default();
+        process.cycle(0, 0, 0);
+        process.counters.seq += 1;
+        process.cycle(0, 5 * PERIOD_NS, 0);
+        assert_eq!(process.skips.as_long_as(1), (0, 0));
+        process.cycle(0, 5 * PERIOD_NS, 0);
+        let figures = process.skips.figures();
+        assert_eq!((figures.skipped, figures.by_machine, figures.unknown_cause), (8, 4, 4));
+        assert_eq!(process.skips.as_long_as(1), (1, 0));
     }
 
     #[test]

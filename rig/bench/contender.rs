@@ -115,18 +115,16 @@ const P999: Percentile = ("p99.9", |round| round.value_at_quantile(0.999) as f64
 const MAX: Percentile = ("max", |round| round.max() as f64);
 
 impl Contender {
-    /// Of its rounds; one without a duration does not count.
+    /// Of its rounds; one without a duration does not count, though its shares are told.
     pub(super) fn of(name: String, rounds: Vec<Option<Round>>) -> Self {
         let mut percents: BTreeMap<String, Vec<f64>> = BTreeMap::new();
         let mut counted = |round: Round| {
             for (share, percent) in round.shares {
                 percents.entry(share).or_default().push(percent);
             }
-            round.durations
+            Some(round.durations).filter(|durations| !durations.is_empty())
         };
-        let has_durations = |round: &Round| !round.durations.is_empty();
-        let rounds: Vec<_> =
-            rounds.into_iter().map(|round| round.filter(has_durations).map(&mut counted)).collect();
+        let rounds: Vec<_> = rounds.into_iter().map(|round| round.and_then(&mut counted)).collect();
         let shares = percents.into_iter().map(|(name, percent)| Share { name, percent: Spread::of(percent) });
         let shares = shares.collect();
         let count = || rounds.iter().flatten();

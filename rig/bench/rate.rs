@@ -13,7 +13,7 @@ use masseter_shared::clock;
 use masseter_shared::config::Scenario;
 use rustix::process::{Pid, Signal, kill_process};
 
-use super::contender::{Contender, Durations, Round};
+use super::contender::{Contender, Durations, Round, durations as empty};
 use super::contest::{Outcome, take_turns};
 use super::rate_summary::Summary;
 use crate::hlog;
@@ -46,6 +46,8 @@ pub(super) struct Interrupted;
 enum Turn {
     /// The motion was played: an interval's durations each, and what else it tells.
     Played { durations: Vec<Durations>, shares: Vec<(String, f64)> },
+    /// It was, but not everything was recorded: the durations are those of some cycles, and perhaps not of the worst.
+    Incomplete { shares: Vec<(String, f64)> },
     /// It was not: a part of one is no run at that rate.
     Stopped {
         /// Whether the machine kept the rig from too many cycles to judge it.
@@ -71,7 +73,7 @@ pub(super) fn measure(rounds: u32, cores: [usize; 2]) -> anyhow::Result<Outcome>
         disturbance,
     };
     for (rate_hz, turns) in RATES_HZ.into_iter().zip(turns) {
-        outcome.notes.extend(stops(rate_hz, &turns));
+        outcome.notes.extend(uncounted(rate_hz, &turns));
         outcome.contenders.extend(contenders(rate_hz, turns));
     }
     let [slowest_hz, faster_hz @ ..] = RATES_HZ;
@@ -88,25 +90,21 @@ pub(super) fn contender_name(rate_hz: u32, interval: &str) -> String {
 }
 
 /// Why runs of a rate do not count.
-fn stops(rate_hz: u32, turns: &[Turn]) -> Vec<String> {
-    let stopped = |by_machine| {
-        let is_one =
-            |turn: &&Turn| matches!(turn, Turn::Stopped { is_disturbed } if *is_disturbed == by_machine);
-        turns.iter().filter(is_one).count()
+fn uncounted(rate_hz: u32, turns: &[Turn]) -> Vec<String> {
+    const REASONS: [&str; 3] = [
+        "did not play to their end: the cores do not hold this rate",
+        "did not play to their end: the machine stood still for too long",
+        "are not judged: messages are missing from their recordings",
+    ];
+    let reason = |turn: &Turn| match turn {
+        Turn::Played { .. } => None,
+        Turn::Stopped { is_disturbed } => Some(REASONS[usize::from(*is_disturbed)]),
+        Turn::Incomplete { .. } => Some(REASONS[2]),
     };
-    [
-        (stopped(false), "the cores do not hold this rate"),
-        (stopped(true), "the machine stood still for too long"),
-    ]
-    .into_iter()
-    .filter(|(count, _)| *count > 0)
-    .map(|(count, why)| {
-        format!(
-            "{rate_hz} Hz: {count} of {} runs did not play to their end and do not count: {why}",
-            turns.len()
-        )
-    })
-    .collect()
+    let count = |why| turns.iter().filter(|turn| reason(turn) == Some(why)).count();
+    let told = REASONS.into_iter().map(|why| (count(why), why)).filter(|(count, _)| *count > 0);
+    told.map(|(count, why)| format!("{rate_hz} Hz: {count} of {} runs do not count, they {why}", turns.len()))
+        .collect()
 }
 
 /// A contender an interval; the last one carries the shares.
@@ -115,18 +113,22 @@ fn contenders(rate_hz: u32, turns: Vec<Turn>) -> Vec<Contender> {
     for turn in turns {
         let rounds: Vec<_> = match turn {
             Turn::Stopped { .. } => INTERVALS.iter().map(|_| None).collect(),
-            Turn::Played { durations, shares } => {
-                let mut rounds: Vec<_> = durations.into_iter().map(Round::from).collect();
-                if let Some(last) = rounds.last_mut() {
-                    last.shares = shares;
-                }
-                rounds.into_iter().map(Some).collect()
-            }
+            Turn::Played { durations, shares } => rounds_of(durations, shares),
+            Turn::Incomplete { shares } => rounds_of(INTERVALS.map(|_| empty()).into(), shares),
         };
         rounds.into_iter().zip(&mut by_interval).for_each(|(round, rounds)| rounds.push(round));
     }
     let named = INTERVALS.iter().zip(by_interval);
     named.map(|((interval, _), rounds)| Contender::of(contender_name(rate_hz, interval), rounds)).collect()
+}
+
+/// A round an interval; the last one carries the shares.
+fn rounds_of(durations: Vec<Durations>, shares: Vec<(String, f64)>) -> Vec<Option<Round>> {
+    let mut rounds: Vec<_> = durations.into_iter().map(Round::from).collect();
+    if let Some(last) = rounds.last_mut() {
+        last.shares = shares;
+    }
+    rounds.into_iter().map(Some).collect()
 }
 
 fn scenario(rate_hz: u32, cores: [usize; 2]) -> Scenario {
@@ -185,39 +187,60 @@ fn turn(folder: &RunFolder) -> anyhow::Result<Turn> {
     if !summary.is_finished() {
         return Ok(Turn::Stopped { is_disturbed: summary.is_disturbed() });
     }
+    let shares = shares(folder, &summary)?;
+    if !summary.is_whole() {
+        return Ok(Turn::Incomplete { shares });
+    }
     let log = |(_, name): &(_, &str)| {
         let path = folder.histograms().join(format!("{name}.hlog"));
         hlog::read(&path).with_context(|| format!("cannot read {}", path.display()))
     };
-    let durations = INTERVALS.iter().map(log).collect::<anyhow::Result<_>>()?;
+    Ok(Turn::Played { durations: INTERVALS.iter().map(log).collect::<anyhow::Result<_>>()?, shares })
+}
+
+/// What a run missed, lost and cost, %.
+fn shares(folder: &RunFolder, summary: &Summary) -> anyhow::Result<Vec<(String, f64)>> {
     let usage = Manifest::read(folder)?.usage.processes;
     // One that was looked at only once has no usage.
     let observed = usage.into_iter().filter(|(_, usage)| usage.observed_s > 0.0);
     let cpu = observed.map(|(process, usage)| (format!("{process} CPU"), usage.cpu_s / usage.observed_s));
     let lost = summary.shares().into_iter().map(|(name, share)| (name.to_owned(), share));
-    let shares = lost.chain(cpu).map(|(name, share)| (name, share * 100.0)).collect();
-    Ok(Turn::Played { durations, shares })
+    Ok(lost.chain(cpu).map(|(name, share)| (name, share * 100.0)).collect())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::bench::contender::{durations, record};
+    use crate::bench::contender::record;
 
     #[test]
-    fn a_run_that_stopped_is_counted_and_told_but_not_measured() {
-        let mut slow = durations();
+    fn runs_that_stopped_or_lost_messages_are_counted_and_told_but_not_measured() {
+        let mut slow = empty();
         record(&mut slow, 9000, 1);
         let played = Turn::Played {
             durations: vec![slow.clone(), slow.clone(), slow],
             shares: vec![("missed".to_owned(), 2.0)],
         };
-        let turns = vec![Turn::Stopped { is_disturbed: true }, played, Turn::Stopped { is_disturbed: false }];
-        assert_eq!(stops(5000, &turns).len(), 2);
+        let dropped = |percent| ("dropped".to_owned(), percent);
+        let turns = vec![
+            Turn::Stopped { is_disturbed: true },
+            played,
+            Turn::Stopped { is_disturbed: false },
+            Turn::Incomplete { shares: vec![dropped(40.0)] },
+            Turn::Incomplete { shares: vec![dropped(60.0)] },
+        ];
+        let notes = uncounted(5000, &turns);
+        assert_eq!(notes.len(), 3);
+        assert!(
+            notes[2].starts_with("5000 Hz: 2 of 5 runs do not count") && notes[2].contains("missing"),
+            "{notes:?}"
+        );
         let contenders = contenders(5000, turns);
         let trip = contenders.last().unwrap();
-        assert_eq!((trip.name.as_str(), trip.n, trip.rounds.len()), ("5000 Hz, round trip", 1, 3));
+        assert_eq!((trip.name.as_str(), trip.n, trip.rounds.len()), ("5000 Hz, round trip", 1, 5));
         assert!((trip.median("max").unwrap() - 9000.0).abs() < 10.0);
-        assert_eq!(trip.shares[0].name, "missed");
+        let shares: Vec<_> =
+            trip.shares.iter().map(|share| (share.name.as_str(), share.percent.median)).collect();
+        assert_eq!(shares, [("dropped", 50.0), ("missed", 2.0)]);
     }
 }

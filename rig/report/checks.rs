@@ -87,7 +87,8 @@ pub(super) fn checks(manifest: &Manifest, figures: &Figures, is_disturbed: bool)
         Check {
             name: "missed cycles",
             finding: format!(
-                "{skipped} ({by_machine} by the machine{}), limit {}",
+                "{skipped} ({by_machine} by the machine{}{}), limit {}",
+                of_unknown_cause(figures),
                 figures.suspicion.map(weighed).unwrap_or_default(),
                 limits.missed_cycles
             ),
@@ -130,12 +131,21 @@ fn bus_response(response: &BusResponse) -> Check {
 /// Whether too many cycles were missed. When none of them is certainly the rig's doing, or it was not given the cores
 /// that it asked for, there is nothing to judge it by.
 pub(super) fn missed_cycles(manifest: &Manifest, figures: &Figures) -> CheckResult {
-    if figures.skipped().0 <= manifest.scenario.checks.missed_cycles {
+    let (skipped, by_machine) = figures.skipped();
+    if skipped <= manifest.scenario.checks.missed_cycles {
         CheckResult::Passed
-    } else if figures.only_the_machine() || manifest.refusal().is_some() {
+    } else if by_machine + figures.skipped_of_unknown_cause() == skipped || manifest.refusal().is_some() {
         CheckResult::NotJudged
     } else {
         CheckResult::Failed
+    }
+}
+
+/// Said of cycles that were missed behind messages which were not recorded.
+fn of_unknown_cause(figures: &Figures) -> String {
+    match figures.skipped_of_unknown_cause() {
+        0 => String::new(),
+        n => format!(", {n} of unknown cause: the messages before them are missing"),
     }
 }
 
