@@ -7,6 +7,7 @@ use serde::Serialize;
 
 use super::table;
 use crate::analysis::{BusResponse, Coded, EventRecord, Figures, ResponseFigures, Suspicion};
+use crate::run::ending::Ending;
 use crate::run::manifest::Manifest;
 
 /// Whether what was checked is as it should be.
@@ -70,7 +71,6 @@ pub(super) fn checks(manifest: &Manifest, figures: &Figures, is_disturbed: bool)
     let limits = &manifest.scenario.checks;
     let tracking = &figures.tracking;
     let (skipped, by_machine) = figures.skipped();
-    let missing = figures.missing_messages();
     vec![
         sequence(figures.final_state, &figures.events).unless(is_disturbed),
         Check::judged(
@@ -94,7 +94,7 @@ pub(super) fn checks(manifest: &Manifest, figures: &Figures, is_disturbed: bool)
             ),
             result: missed_cycles(manifest, figures),
         },
-        Check::judged("dropped messages", missing.to_string(), missing == 0),
+        dropped_messages(manifest, figures),
         bus_response(&figures.bus_response),
     ]
 }
@@ -106,6 +106,30 @@ fn sequence(state: Option<Coded<ControllerState>>, events: &[EventRecord]) -> Ch
     let in_words = state.map_or_else(|| "none".to_owned(), |state| state.to_string());
     let is_finished = state.is_some_and(|state| state == ControllerState::Finished);
     Check::judged("sequence", format!("ended in state {in_words}{how}"), is_finished && !was_stopped)
+}
+
+/// Gaps tell of losses before the last message that was recorded. What came behind it, and what cannot be read, nobody
+/// counts.
+fn dropped_messages(manifest: &Manifest, figures: &Figures) -> Check {
+    let missing = figures.missing_messages();
+    dropped(missing, part_not_known(&manifest.ending, figures.cut_short, !figures.damage.is_empty()))
+}
+
+fn dropped(missing: u64, not_known: Option<&str>) -> Check {
+    const NAME: &str = "dropped messages";
+    match not_known {
+        Some(why) if missing == 0 => Check::not_judged(NAME, format!("no gap, but {why}")),
+        _ => Check::judged(NAME, missing.to_string(), missing == 0),
+    }
+}
+
+fn part_not_known(ending: &Ending, is_cut_short: bool, is_damaged: bool) -> Option<&'static str> {
+    let reasons = [
+        (is_cut_short, "the recording lacks its end"),
+        (is_damaged, "the recording is damaged"),
+        (*ending == Ending::RecordingFailed, "the logger could not write everything"),
+    ];
+    reasons.into_iter().find_map(|(is_so, why)| is_so.then_some(why))
 }
 
 /// No message may take longer on its bus than the plan allows at worst.
@@ -171,6 +195,22 @@ mod tests {
         let cases = [(false, true, "skip"), (false, false, "FAIL"), (true, true, "ok"), (true, false, "ok")];
         for (passed, excused, mark) in cases {
             assert_eq!(check(passed).unless(excused).result.mark(), mark);
+        }
+    }
+
+    #[test]
+    fn no_gap_in_a_part_of_a_recording_says_nothing_of_the_rest() {
+        let cases = [
+            (Ending::Completed, false, false, 0, "ok"),
+            (Ending::Completed, false, false, 1, "FAIL"),
+            (Ending::Completed, true, false, 0, "skip"),
+            (Ending::Completed, false, true, 0, "skip"),
+            (Ending::RecordingFailed, false, false, 0, "skip"),
+            (Ending::RecordingFailed, true, true, 1, "FAIL"),
+        ];
+        for (ending, is_cut_short, is_damaged, missing, mark) in cases {
+            let check = dropped(missing, part_not_known(&ending, is_cut_short, is_damaged));
+            assert_eq!(check.result.mark(), mark, "{ending:?} {check:?}");
         }
     }
 
