@@ -63,10 +63,10 @@ pub fn run(assignment: &Assignment, recording: &Path, show: Show) -> anyhow::Res
     let mut watch = MachineWatch::new(SystemRoot::of_this_machine(), start.loops, start.epoch_ns);
     loop {
         let last = post.stop.is_made();
+        topics.drain(&mut takers)?;
         let now_ns = clock::now_ns();
-        topics.drain(&mut takers, now_ns)?;
         if let Some(machine) = watch.look(now_ns) {
-            takers.take(&machine, now_ns, Recorded::Machine);
+            takers.take(&machine, clock::now_ns(), Recorded::Machine);
         }
         if last {
             return Ok(takers.end(now_ns));
@@ -170,26 +170,26 @@ impl Topics {
         })
     }
 
-    fn drain(&self, takers: &mut Takers, now_ns: u64) -> Result<(), TransportError> {
-        drain(&self.commands, takers, now_ns, Recorded::Command)?;
-        drain(&self.readings, takers, now_ns, Recorded::Reading)?;
-        drain(&self.states, takers, now_ns, Recorded::State)?;
-        drain(&self.truths, takers, now_ns, Recorded::Truth)?;
-        drain_batches(&self.frames, takers, now_ns, Recorded::Frame)?;
-        drain(&self.events, takers, now_ns, Recorded::Event)
+    fn drain(&self, takers: &mut Takers) -> Result<(), TransportError> {
+        drain(&self.commands, takers, Recorded::Command)?;
+        drain(&self.readings, takers, Recorded::Reading)?;
+        drain(&self.states, takers, Recorded::State)?;
+        drain(&self.truths, takers, Recorded::Truth)?;
+        drain_batches(&self.frames, takers, Recorded::Frame)?;
+        drain(&self.events, takers, Recorded::Event)
     }
 }
 
-/// Records what has arrived on one topic; bounded, so that a flood cannot hold the others up.
+/// Records what has arrived on one topic; bounded, so that a flood cannot hold the others up. Each message is logged at a
+/// time of its own: some are published only while others are drained.
 fn drain<M: Message>(
     inlet: &Inlet<M>,
     takers: &mut Takers,
-    now_ns: u64,
     of_topic: impl Fn(M) -> Recorded,
 ) -> Result<(), TransportError> {
     for _ in 0..M::DEPTH {
         let Some(message) = inlet.receive()? else { break };
-        takers.take(&*message, now_ns, &of_topic);
+        takers.take(&*message, clock::now_ns(), &of_topic);
     }
     Ok(())
 }
@@ -198,11 +198,11 @@ fn drain<M: Message>(
 fn drain_batches<M: Message>(
     inlet: &BatchInlet<M>,
     takers: &mut Takers,
-    now_ns: u64,
     of_topic: impl Fn(M) -> Recorded,
 ) -> Result<(), TransportError> {
     for _ in 0..M::DEPTH {
         let Some(batch) = inlet.receive()? else { break };
+        let now_ns = clock::now_ns();
         batch.iter().for_each(|message| takers.take(message, now_ns, &of_topic));
     }
     Ok(())

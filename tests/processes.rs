@@ -30,6 +30,22 @@ fn a_run_plays_through_three_processes_and_leaves_nothing_in_shared_memory() {
     let log = fs::read_to_string(workspace.run_folder().join("can0.log")).unwrap();
     let (_, last_cycle) = log.rsplit_once(" 080#").unwrap();
     assert!(last_cycle.contains(" 201#"), "what it ended with is recorded too: {last_cycle}");
+    assert_logged_in_order(&fs::read(workspace.run_folder().join("recording.mcap")).unwrap());
+}
+
+/// Nothing is logged before it was published, nor before what stands above it.
+fn assert_logged_in_order(recording: &[u8]) {
+    let mut last_ns = 0;
+    for message in mcap::MessageStream::new(recording).unwrap() {
+        let message = message.unwrap();
+        let [published_ns, logged_ns] = [message.publish_time, message.log_time];
+        assert!(
+            logged_ns >= published_ns.max(last_ns),
+            "{}: {published_ns} {logged_ns}",
+            message.channel.topic
+        );
+        last_ns = logged_ns;
+    }
 }
 
 #[test]
