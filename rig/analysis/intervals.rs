@@ -152,8 +152,9 @@ impl Intervals {
     fn round_trip(&mut self, joined: Option<(Received, Answer)>) {
         let Some((received, answer)) = joined else { return };
         if let Some(sample) = self.samples.get(received.reading_cycle) {
-            let to_ns = answer.received_ns.saturating_add(sample.exchange_ns);
-            self.add(Interval::RoundTrip, received.received_ns, to_ns);
+            let answered_ns = answer.received_ns.saturating_sub(received.received_ns);
+            let both_ns = answered_ns.saturating_add(sample.exchange_ns);
+            self.measured[Interval::RoundTrip as usize].add(both_ns, answer.received_ns);
         }
     }
 
@@ -250,6 +251,17 @@ mod tests {
                 assert!(found.contains(&expected), "{order}: {expected:?} in {found:?}");
             }
         }
+    }
+
+    #[test]
+    fn the_longest_round_trip_was_when_the_plant_had_the_command() {
+        let (_folder, mut intervals) = intervals();
+        intervals.reading(&reading());
+        intervals.state(&state(), true);
+        intervals.reading(&answer());
+        let figures = intervals.finish().unwrap();
+        let trip = figures.iter().find(|interval| interval.name == "round trip").unwrap();
+        assert_eq!((trip.max_ns, trip.max_at_ns), (Some(660), Some(1100)));
     }
 
     #[test]
