@@ -1,5 +1,8 @@
 //! The cycles that took longest from the plant's deadline to the command on the wire, each with the hop
 //! to blame.
+//!
+//! A command that the plant never took, since a newer one overtook it, is followed to the first later one that went out:
+//! the cycles that are hit hardest end so. A cycle without a fresh reading has no path.
 
 use masseter_shared::messages::{Command, Machine, Reading, State};
 use serde::Serialize;
@@ -13,6 +16,8 @@ use super::stalls::Stalls;
 
 /// Cycles told of.
 const WORST: usize = 10;
+/// Commands overtaken at once that are followed: more than a rig that still moves can have.
+const OVERTAKEN: u64 = 1 << 12;
 
 /// One of the worst cycles.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -21,7 +26,8 @@ pub struct WorstCycle {
     pub cycle: u64,
     /// The plant's deadline for the reading it used, ns of the run's clock.
     pub due_ns: u64,
-    /// From there until the last process data of its command were on the wire, ns.
+    /// From there until the last process data of its command were on the wire, or of the first later one if it was
+    /// overtaken, ns.
     pub total_ns: u64,
     /// The hop to blame.
     pub hop: Hop,
@@ -49,6 +55,7 @@ pub(super) struct LongestCycles {
     controller_stalls: Stalls,
     last_cycle: Option<u64>,
     answers: Answers,
+    last_sent: Option<u64>,
 }
 
 impl LongestCycles {
@@ -60,7 +67,15 @@ impl LongestCycles {
         }
         if let Some(Answer { cycle, received_ns, sent_ns: Some(sent_ns) }) = self.answers.take(reading) {
             let sent = Sent { received_ns, sent_ns, stalled_when_next_due_ns: stalled_ns };
-            self.add(cycle, |parts| parts.sent = Some(sent));
+            self.sent(cycle, sent);
+        }
+    }
+
+    /// The command of this cycle went out, and ends the wait for those that it overtook.
+    fn sent(&mut self, cycle: u64, sent: Sent) {
+        let first = self.last_sent.replace(cycle).map_or(cycle, |last| last + 1);
+        for ended in first.max(cycle.saturating_sub(OVERTAKEN))..=cycle {
+            self.add(ended, |parts| parts.sent = Some(sent));
         }
     }
 
@@ -239,6 +254,24 @@ mod tests {
         let told: Vec<_> =
             rig.longest.finish().iter().map(|worst| (worst.cycle, worst.stalled_ns)).take(4).collect();
         assert_eq!(told, [(5, 300_000), (10, 200_000), (15, 250_000), (1, 0)]);
+    }
+
+    #[test]
+    fn a_command_that_was_overtaken_ends_with_the_first_later_one_on_the_wire() {
+        let mut rig = Rig::default();
+        (1..7).for_each(|cycle| rig.cycle(cycle, TYPICAL_NS));
+        // The plant stands still behind reading 7, and takes the newest of three commands then.
+        rig.cycle(7, TYPICAL_NS);
+        for cycle in [8, 9] {
+            rig.longest.command(&Command { cycle, published_ns: cycle * PERIOD_NS, ..Default::default() });
+            rig.longest.state(&State { cycle, reading_cycle: 7, ..Default::default() }, false);
+        }
+        let [command_received_ns, command_sent_ns] = [10_300_000, 10_500_000];
+        let reading = Reading { cycle: 10, command_received_ns, command_sent_ns, ..Default::default() };
+        rig.longest.reading(&Reading { answers_cycle: 9, ..reading });
+        let worst = rig.longest.finish();
+        assert_eq!((worst[0].cycle, worst[0].total_ns, worst[0].hop), (7, 3_500_000, Hop::CommandTransport));
+        assert_eq!(worst.len(), 7);
     }
 
     #[test]

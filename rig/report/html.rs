@@ -155,9 +155,10 @@ fn latencies(page: &mut String, manifest: &Manifest, figures: &Figures) -> std::
 /// The longest cycles, with what made them so.
 fn worst_cycles(page: &mut String, figures: &Figures) -> std::fmt::Result {
     page.push_str(
-        "<h2>Longest cycles, µs</h2>\n<p>From the plant's deadline to the command on the wire, and the hop \
-         furthest above its median; and what the kernel counted between two looks, a tenth of a second apart: time that \
-         the hypervisor took (in steps of 10 ms), times that a loop lost its core, and page faults of both processes.</p>\n\
+        "<h2>Longest cycles, µs</h2>\n<p>From the plant's deadline to the command on the wire, or to the first later one \
+         where that was overtaken; the hop furthest above its median; and what the kernel counted between two looks, a \
+         tenth of a second apart: time that the hypervisor took (in steps of 10 ms), times that a loop lost its core, and \
+         page faults of both processes.</p>\n\
          <table id=\"worst\">\n<tr><th>cycle<th>at, s<th>took<th>hop to blame<th>it took<th>its median\
          <th>machine stood still<th>stolen around<th>preempted<th>page faults\n",
     );
