@@ -180,6 +180,11 @@ fn events(text: &mut String, figures: &Figures) -> std::fmt::Result {
 
 /// An event in a line.
 pub(super) fn in_words(event: &EventRecord) -> String {
+    format!("cycle {:>6} {}", event.cycle, happening(event))
+}
+
+/// What an event tells, without its time.
+pub(super) fn happening(event: &EventRecord) -> String {
     let axis = event.axis.map_or_else(String::new, |axis| format!(" {axis}"));
     let moved = event.transition.as_ref().map(|[from, to]| format!("{from} → {to}"));
     let values = match event.cause {
@@ -187,12 +192,12 @@ pub(super) fn in_words(event: &EventRecord) -> String {
         _ => format!(" (value {}, limit {})", event.value, event.limit),
     };
     let moved = moved.unwrap_or_default();
-    let (cycle, source) = (event.cycle, event.source);
+    let source = event.source;
     if let Some(text) = &event.text {
-        return format!("cycle {cycle:>6} {source}: {} ({text})", event.cause);
+        return format!("{source}: {} ({text})", event.cause);
     }
     match event.cause {
-        Coded::Known(Cause::Sequence) => format!("cycle {cycle:>6} {source}{axis}: {moved}"),
-        cause => format!("cycle {cycle:>6} {source}{axis}: {cause}{values} {moved}").trim_end().to_owned(),
+        Coded::Known(Cause::Sequence) => format!("{source}{axis}: {moved}"),
+        cause => format!("{source}{axis}: {cause}{values} {moved}").trim_end().to_owned(),
     }
 }

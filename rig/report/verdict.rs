@@ -1,11 +1,13 @@
 //! How a run is judged: its end, then its recording, then the machine, then its [checks](super::checks).
 
 use masseter_shared::config::CanConfig;
+use masseter_shared::messages::codes::EventKind;
 use serde::ser::{Serialize, SerializeStruct, Serializer};
 
 use super::checks::{Check, CheckResult, checks, missed_cycles};
 use super::outcome::Outcome;
-use crate::analysis::{Figures, Outage};
+use super::table;
+use crate::analysis::{EventRecord, Figures, Outage};
 use crate::run::dma_latency::DmaLatency;
 use crate::run::ending::Ending;
 use crate::run::manifest::Manifest;
@@ -39,7 +41,7 @@ impl Verdict {
     pub fn of(manifest: &Manifest, figures: &Figures) -> Self {
         let disturbed = disturbed(manifest, figures);
         let checks = checks(manifest, figures, disturbed.is_some());
-        let (outcome, mut reason) = ending(&manifest.ending)
+        let (outcome, mut reason) = ending(&manifest.ending, &figures.events)
             .filter(|(outcome, _)| !(*outcome == Outcome::SafeStop && disturbed.is_some()))
             .or_else(|| incomplete(figures))
             .or(disturbed)
@@ -75,12 +77,10 @@ fn overload(usage: &RunUsage, rate_hz: u32) -> Option<String> {
 
 type Judgement = (Outcome, String);
 
-fn ending(ending: &Ending) -> Option<Judgement> {
+fn ending(ending: &Ending, events: &[EventRecord]) -> Option<Judgement> {
     match ending {
         Ending::Completed => None,
-        Ending::SafeStop => {
-            Some((Outcome::SafeStop, "the controller stopped the rig; its event says why".to_owned()))
-        }
+        Ending::SafeStop => Some((Outcome::SafeStop, stopped(events))),
         Ending::Died { process, how } => Some((Outcome::Died, format!("the {process} died: {how}"))),
         Ending::Interrupted => Some((Outcome::Interrupted, "stopped by the user".to_owned())),
         Ending::NotStarted => Some((Outcome::Invalid, "real time was required and refused".to_owned())),
@@ -88,6 +88,13 @@ fn ending(ending: &Ending) -> Option<Judgement> {
             Some((Outcome::Incomplete, "the logger could not write everything".to_owned()))
         }
     }
+}
+
+/// The controller's own event often tells no more than that the master gave up: what went wrong first says why.
+fn stopped(events: &[EventRecord]) -> String {
+    let first = events.iter().find(|event| event.kind == EventKind::Fault);
+    let why = first.map_or_else(String::new, |fault| format!("; first fault: {}", table::happening(fault)));
+    format!("the controller stopped the rig{why}")
 }
 
 fn incomplete(figures: &Figures) -> Option<Judgement> {
@@ -184,8 +191,30 @@ fn failed(checks: &[Check]) -> Option<Judgement> {
 
 #[cfg(test)]
 mod tests {
+    use masseter_shared::messages::Event;
+    use masseter_shared::messages::codes::{Cause, Source};
+
     use super::*;
     use crate::run::usage::Usage;
+
+    #[test]
+    fn a_safe_stop_is_explained_by_what_went_wrong_first() {
+        let event = |source, kind, cause| Event::new(source, kind, cause);
+        let lost = event(Source::Master, EventKind::Fault, Cause::ProcessDataLost);
+        let events = [
+            event(Source::Wire, EventKind::Notice, Cause::FaultInjected),
+            Event { axis: 0, node: 1, value: 4.0, ..lost },
+            event(Source::Controller, EventKind::Fault, Cause::MasterFault),
+        ];
+        let (outcome, reason) = ending(&Ending::SafeStop, &events.map(|event| (&event).into())).unwrap();
+        assert_eq!(outcome, Outcome::SafeStop);
+        assert_eq!(
+            reason,
+            "the controller stopped the rig; first fault: master: process_data_lost \
+             (axis d1 (node 1 on bus 0): process data missing for 4 cycles)"
+        );
+        assert_eq!(ending(&Ending::SafeStop, &[]).unwrap().1, "the controller stopped the rig");
+    }
 
     #[test]
     fn a_process_that_hardly_sleeps_is_named_with_what_to_do() {
