@@ -111,6 +111,16 @@ fn every_fault_of_a_bus_is_borne_or_stops_the_rig_safely_with_its_cause() {
 }
 
 #[test]
+fn a_run_whose_declared_fault_never_strikes_fails() {
+    let never = "[[faults]]\nkind = 'disconnect'\nbus = 0\nnode = 1\nfrom_s = 1000.0";
+    let workspace = Workspace::new(&format!("duration_s = 1.0\n{never}"));
+    let output = workspace.run_virtual(&[]);
+    assert_eq!(output.status.code(), Some(1), "{}", stdout(&output));
+    let summary = workspace.summary();
+    assert_eq!(check(&summary, "faults")["finding"], "0 of 1 declared struck, number 1 never");
+}
+
+#[test]
 fn a_run_passes_on_a_bus_where_frames_come_twice_now_and_then_from_the_first_on() {
     let workspace = Workspace::new(
         "duration_s = 1.0\n[[faults]]\nkind = 'duplicate'\nbus = 0\nfrom_s = 0\nprobability = 0.01",

@@ -6,7 +6,9 @@ use masseter_shared::messages::codes::{Cause, ControllerState};
 use serde::Serialize;
 
 use super::table;
-use crate::analysis::{BusResponse, Coded, EventRecord, Figures, ResponseFigures, Suspicion};
+use crate::analysis::{
+    BusResponse, Coded, EventRecord, Figures, ResponseFigures, Suspicion, TrackingFigures,
+};
 use crate::run::ending::Ending;
 use crate::run::manifest::Manifest;
 
@@ -69,21 +71,12 @@ impl Check {
 /// `is_disturbed`: the machine kept the rig from too many cycles to hold its sequence or its tracking against it.
 pub(super) fn checks(manifest: &Manifest, figures: &Figures, is_disturbed: bool) -> Vec<Check> {
     let limits = &manifest.scenario.checks;
-    let tracking = &figures.tracking;
     let (skipped, by_machine) = figures.skipped();
-    vec![
-        sequence(figures.final_state, &figures.events).unless(is_disturbed),
-        Check::judged(
-            "tracking",
-            format!(
-                "rms {} mm over {} samples, limit {} mm",
-                table::or_dash(tracking.rms_mm, table::decimals),
-                tracking.samples,
-                limits.tracking_rms_mm
-            ),
-            tracking.rms_mm.is_some_and(|rms_mm| rms_mm <= limits.tracking_rms_mm),
-        )
-        .unless(is_disturbed),
+    let sequence = sequence(figures.final_state, &figures.events);
+    let is_played = sequence.result == CheckResult::Passed;
+    let mut checks = vec![
+        sequence.unless(is_disturbed),
+        tracking(&figures.tracking, limits.tracking_rms_mm, is_played).unless(is_disturbed),
         Check {
             name: "missed cycles",
             finding: format!(
@@ -96,7 +89,9 @@ pub(super) fn checks(manifest: &Manifest, figures: &Figures, is_disturbed: bool)
         },
         dropped_messages(manifest, figures),
         bus_response(&figures.bus_response),
-    ]
+    ];
+    checks.extend(faults(manifest.scenario.faults.len(), &figures.events, is_played));
+    checks
 }
 
 /// The motion must be played to its end, and not be broken off by somebody who asked the controller to stop.
@@ -130,6 +125,30 @@ fn part_not_known(ending: &Ending, is_cut_short: bool, is_damaged: bool) -> Opti
         (*ending == Ending::RecordingFailed, "the logger could not write everything"),
     ];
     reasons.into_iter().find_map(|(is_so, why)| is_so.then_some(why))
+}
+
+/// A motion that was played and left nothing to compare is no less a failure than one that was followed badly.
+fn tracking(tracking: &TrackingFigures, limit_mm: f64, is_played: bool) -> Check {
+    const NAME: &str = "tracking";
+    let TrackingFigures { rms_mm, samples, .. } = *tracking;
+    if rms_mm.is_none() && !is_played {
+        return Check::not_judged(NAME, "the motion never began".to_owned());
+    }
+    let in_words = table::or_dash(rms_mm, table::decimals);
+    let finding = format!("rms {in_words} mm over {samples} samples, limit {limit_mm} mm");
+    Check::judged(NAME, finding, rms_mm.is_some_and(|rms_mm| rms_mm <= limit_mm))
+}
+
+/// A test with faults that passes without them has tested nothing. None where none is declared.
+fn faults(declared: usize, events: &[EventRecord], is_played: bool) -> Option<Check> {
+    let struck = |number: usize| {
+        events.iter().any(|event| event.cause == Cause::FaultInjected && event.value as usize == number)
+    };
+    let idle: Vec<_> =
+        (1..=declared).filter(|&number| !struck(number)).map(|number| number.to_string()).collect();
+    let which = if idle.is_empty() { String::new() } else { format!(", number {} never", idle.join(", ")) };
+    let finding = format!("{} of {declared} declared struck{which}", declared - idle.len());
+    (declared > 0).then(|| Check::judged("faults", finding, idle.is_empty()).unless(!is_played))
 }
 
 /// No message may take longer on its bus than the plan allows at worst.
@@ -187,7 +206,48 @@ fn weighed(suspicion: Suspicion) -> String {
 
 #[cfg(test)]
 mod tests {
+    use masseter_shared::messages::Event;
+    use masseter_shared::messages::codes::{EventKind, Source};
+
     use super::*;
+
+    fn struck(number: usize) -> EventRecord {
+        let injected = Event::new(Source::Wire, EventKind::Notice, Cause::FaultInjected);
+        EventRecord::from(&Event { value: number as f64, ..injected })
+    }
+
+    #[test]
+    fn a_declared_fault_that_never_struck_fails_a_run_that_was_played_to_its_end() {
+        let ended = EventRecord { cause: Coded::Known(Cause::FaultEnded), ..struck(2) };
+        let events = [struck(1), ended];
+        let cases = [
+            (0, true, None),
+            (1, true, Some(("ok", "1 of 1 declared struck"))),
+            (2, true, Some(("FAIL", "1 of 2 declared struck, number 2 never"))),
+            (2, false, Some(("skip", "1 of 2 declared struck, number 2 never"))),
+            (3, true, Some(("FAIL", "1 of 3 declared struck, number 2, 3 never"))),
+        ];
+        for (declared, is_played, expected) in cases {
+            let check = faults(declared, &events, is_played);
+            let found = check.as_ref().map(|check| (check.result.mark(), check.finding.as_str()));
+            assert_eq!(found, expected);
+        }
+    }
+
+    #[test]
+    fn a_motion_that_never_began_is_not_judged_unless_the_run_says_that_it_was_played() {
+        let still = TrackingFigures::default();
+        let moved = TrackingFigures { samples: 9, rms_mm: Some(0.2), ..still };
+        let cases = [
+            (still, false, "skip", "the motion never began"),
+            (still, true, "FAIL", "rms – mm over 0 samples, limit 0.1 mm"),
+            (moved, false, "FAIL", "rms 0.2000 mm over 9 samples, limit 0.1 mm"),
+        ];
+        for (figures, is_played, mark, finding) in cases {
+            let check = tracking(&figures, 0.1, is_played);
+            assert_eq!((check.result.mark(), check.finding.as_str()), (mark, finding));
+        }
+    }
 
     #[test]
     fn only_a_failure_is_excused() {
