@@ -71,6 +71,33 @@ fn a_run_folder_runs_again_from_its_own_scenario() {
 }
 
 #[test]
+fn a_run_folder_has_the_recording_that_it_played() {
+    let workspace = Workspace::new("[motion]\nkind = 'file'\npath = 'jaw.csv'");
+    let rows = |lowered_mm: f64| -> String {
+        let row =
+            |i: u32| format!("{},0,0,{},1,0,0,0\n", f64::from(i) / 10.0, -lowered_mm * f64::from(i % 2));
+        "time_s,x_mm,y_mm,z_mm,qw,qx,qy,qz\n".to_owned() + &(0..=10).map(row).collect::<String>()
+    };
+    let original = workspace.write("jaw.csv", &rows(0.5));
+    let output = workspace.run_virtual(&[]);
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    let played = workspace.manifest()["scenario"]["motion"]["path"].as_str().unwrap().to_owned();
+    assert_eq!(played, original.canonicalize().unwrap().to_str().unwrap());
+    assert!(stdout(&output).contains(&format!("recording played: {played}")), "{}", stdout(&output));
+
+    // Elsewhere, and with another recording where the first one was.
+    let moved = workspace.file("moved");
+    fs::rename(workspace.run_folder(), &moved).unwrap();
+    workspace.write("jaw.csv", &rows(0.1));
+    let (scenario, again) = (moved.join("scenario.toml"), workspace.file("again"));
+    let paths = [&scenario, &again].map(|path| path.to_str().unwrap());
+    let output = common::masseter(&["run", paths[0], "--clock", "virtual", "--out", paths[1]]);
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    let [first, second] = [moved, again].map(|run| fs::read(run.join("recording.mcap")).unwrap());
+    assert!(first == second);
+}
+
+#[test]
 fn every_generated_motion_plays() {
     for kind in ["chewing", "opening", "protrusion", "lateral"] {
         let workspace = Workspace::new(&format!("duration_s = 3.0\n[motion]\nkind = '{kind}'"));

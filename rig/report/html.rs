@@ -2,6 +2,8 @@
 
 use std::fmt::Write;
 
+use masseter_shared::config::MotionConfig;
+
 use super::junit::escape;
 use super::plot::Drawn;
 use super::table::{self, in_words, microseconds, or_dash};
@@ -237,6 +239,13 @@ fn circumstances(page: &mut String, manifest: &Manifest) -> std::fmt::Result {
         machine.cores,
         escape(&machine.kernel),
     )?;
+    if let MotionConfig::File(file) = &manifest.scenario.motion {
+        writeln!(
+            page,
+            "<p>Recording played: <code>{}</code>.</p>",
+            escape(&file.path.display().to_string())
+        )?;
+    }
     for (name, obtained) in &manifest.scheduling {
         let name = escape(name);
         let core = obtained.core.map_or_else(|| "any core".to_owned(), |core| format!("core {core}"));

@@ -2,6 +2,7 @@
 
 use std::fmt::Write;
 
+use masseter_shared::config::MotionConfig;
 use masseter_shared::messages::codes::{Cause, EventKind};
 
 use super::usage;
@@ -29,7 +30,7 @@ fn write_all(
     writeln!(text, "{}: {}", verdict.outcome.word(), verdict.reason)?;
     writeln!(
         text,
-        "{}: {:.1} s of motion at {} Hz ({} clock), {} cycles in {:.1} s, seed {}\n",
+        "{}: {:.1} s of motion at {} Hz ({} clock), {} cycles in {:.1} s, seed {}",
         scenario.name,
         manifest.motion_s,
         scenario.rate_hz,
@@ -38,6 +39,10 @@ fn write_all(
         figures.duration_s,
         scenario.seed,
     )?;
+    if let MotionConfig::File(file) = &scenario.motion {
+        writeln!(text, "recording played: {}", file.path.display())?;
+    }
+    text.push('\n');
     for check in &verdict.checks {
         writeln!(text, "  {:<4} {:<18} {}", check.result.mark(), check.name, check.finding)?;
     }

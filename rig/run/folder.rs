@@ -10,6 +10,9 @@ use masseter_shared::clock;
 
 use crate::output::{self, OutputError};
 
+/// Name of the recorded motion within the folder, as its scenario knows it.
+pub(super) const MOTION: &str = "motion.csv";
+
 /// A run folder.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct RunFolder(PathBuf);
@@ -74,6 +77,11 @@ impl RunFolder {
     /// The scenario as resolved; it runs the same again.
     pub fn scenario(&self) -> PathBuf {
         self.0.join("scenario.toml")
+    }
+
+    /// The recorded motion that was played, if it was one; the scenario beside it names it.
+    pub fn motion(&self) -> PathBuf {
+        self.0.join(MOTION)
     }
 
     /// What was run, on what, and with which scheduling.

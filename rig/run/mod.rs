@@ -15,7 +15,10 @@ pub mod supervisor;
 pub mod usage;
 pub mod virtual_time;
 
+use std::fs;
+
 use anyhow::Context;
+use masseter_shared::config::{MotionConfig, Scenario};
 
 use crate::analysis;
 use crate::exit::{Exit, Failure, OrFailure};
@@ -38,8 +41,7 @@ pub fn run(args: &RunArgs) -> Result<Exit, Failure> {
         Some(path) => RunFolder::create(path).usage()?,
         None => RunFolder::create_in("runs".as_ref(), &plan.scenario.name).usage()?,
     };
-    let scenario_kept = folder.keep(&folder.scenario(), &plan.scenario.to_toml());
-    scenario_kept.context("cannot write the scenario").incomplete()?;
+    keep_scenario(&folder, &plan.scenario).incomplete()?;
     if !args.quiet {
         tell!("{}", plan.announcement());
     }
@@ -72,4 +74,17 @@ pub fn run(args: &RunArgs) -> Result<Exit, Failure> {
         .context("the run's recording cannot be analysed")
         .incomplete()?;
     report::write(&folder, &manifest, &figures, args.format)
+}
+
+/// Keeps the scenario and the recording it plays together: another one may lie where that was by the time it is run
+/// again.
+fn keep_scenario(folder: &RunFolder, scenario: &Scenario) -> anyhow::Result<()> {
+    let mut kept = scenario.clone();
+    if let MotionConfig::File(file) = &mut kept.motion {
+        let rows =
+            fs::read_to_string(&file.path).with_context(|| format!("cannot read {}", file.path.display()))?;
+        folder.keep(&folder.motion(), &rows).context("cannot write the recorded motion")?;
+        file.path = folder::MOTION.into();
+    }
+    folder.keep(&folder.scenario(), &kept.to_toml()).context("cannot write the scenario")
 }

@@ -149,7 +149,7 @@ pub(crate) fn play(path: &Path, scenario: &mut Scenario) {
     scenario.name = stem.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '-' }).take(64).collect();
 }
 
-/// The scenario in the run folder must find the file from anywhere.
+/// The manifest must name the file for readers anywhere.
 fn absolute(path: &Path) -> anyhow::Result<PathBuf> {
     path.canonicalize().with_context(|| format!("cannot read {}", path.display()))
 }
