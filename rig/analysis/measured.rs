@@ -60,6 +60,11 @@ pub(super) fn histogram() -> Histogram<u64> {
     Histogram::new(DIGITS).expect("three digits are allowed")
 }
 
+/// How far from this value, ns, another one must be for a histogram to tell them apart.
+pub(crate) fn resolution_ns(value_ns: u64) -> u64 {
+    histogram().equivalent_range(value_ns)
+}
+
 impl Measured {
     pub(super) fn new(name: &'static str, folder: &Path) -> Self {
         let path = folder.join(format!("{}.hlog", name.replace(' ', "-")));

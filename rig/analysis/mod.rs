@@ -51,6 +51,7 @@ pub use kernel_counts::KernelCounts;
 use longest_cycles::LongestCycles;
 pub use longest_cycles::WorstCycle;
 pub use measured::IntervalFigures;
+pub(crate) use measured::resolution_ns;
 pub use outage::Outage;
 use outage::OutageWatch;
 use over_time::Watch;
