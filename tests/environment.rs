@@ -52,6 +52,28 @@ fn an_ordinary_user_runs_the_rig_without_real_time() {
     assert!(stderr(&output).contains("SCHED_FIFO 80 refused"), "{}", stderr(&output));
 }
 
+/// Root may write into any folder.
+#[test]
+fn a_run_in_a_folder_that_takes_nothing_is_reported_all_the_same() {
+    let workspace = Workspace::new("duration_s = 0.5\n[checks]\ntracking_rms_mm = 1e-9");
+    assert_eq!(workspace.run_virtual(&[]).status.code(), Some(1));
+    let (run, executable) = (workspace.run_folder(), workspace.file("masseter"));
+    fs::copy(common::MASSETER, &executable).unwrap();
+    let status = Command::new("chmod").args(["-R", "a=rX"]).arg(workspace.file("")).status().unwrap();
+    assert!(status.success());
+    let mut report = Command::new("setpriv");
+    if rustix::process::getuid().is_root() {
+        report.args(["--reuid=65534", "--regid=65534", "--clear-groups"]);
+    }
+    let output = report.arg(&executable).arg("report").arg(&run).args(["--format", "json"]).output().unwrap();
+    assert_eq!(output.status.code(), Some(1), "{}", stderr(&output));
+    let shown: Value = serde_json::from_str(&stdout(&output)).expect("a summary on standard output");
+    assert_eq!(shown["verdict"]["word"], "FAIL");
+    let warning = format!("cannot write {}", run.display());
+    assert!(stderr(&output).contains(&warning), "{}", stderr(&output));
+    assert_eq!(stderr(&output).lines().count(), 1, "{}", stderr(&output));
+}
+
 /// A disk with room for 2 MiB, there as long as this is.
 struct SmallDisk<'a>(&'a Path);
 

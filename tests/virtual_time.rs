@@ -267,6 +267,6 @@ fn a_run_folder_that_takes_no_scenario_leaves_the_run_incomplete() {
     let workspace = Workspace::new("");
     let out = workspace.run_folder();
     let output = cramped(0, &["run", "--clock", "virtual", "--out", out.to_str().unwrap()]);
-    assert!(stderr(&output).contains("cannot write the scenario: File too large"), "{}", stderr(&output));
+    assert!(stderr(&output).contains("scenario.toml: File too large"), "{}", stderr(&output));
     assert_eq!(output.status.code(), Some(6), "{}", stderr(&output));
 }

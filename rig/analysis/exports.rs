@@ -7,11 +7,11 @@ use std::path::{Path, PathBuf};
 use masseter_shared::can::{candump, tap};
 use masseter_shared::messages::FrameTap;
 
-use super::AnalysisError;
+use super::{AnalysisError, NOWHERE};
 
 /// Log files, opened as their buses appear.
 pub(crate) struct CandumpLogs {
-    folder: PathBuf,
+    folder: Option<PathBuf>,
     interfaces: Vec<String>,
     buses: Vec<Log>,
     line: String,
@@ -42,10 +42,10 @@ impl Log {
 }
 
 impl CandumpLogs {
-    /// Into `folder`, with the buses' real interfaces, or `can0`, `can1` and so on where they have none.
-    pub(crate) fn new(folder: &Path, interfaces: &[String]) -> Self {
+    /// Into `folder`, if there is one to take them, with the buses' real interfaces, or `can0`, `can1` and so on where they have none.
+    pub(crate) fn new(folder: Option<&Path>, interfaces: &[String]) -> Self {
         Self {
-            folder: folder.to_owned(),
+            folder: folder.map(Path::to_owned),
             interfaces: interfaces.to_vec(),
             buses: Vec::new(),
             line: String::new(),
@@ -57,7 +57,9 @@ impl CandumpLogs {
         while self.buses.len() <= bus {
             let next = self.buses.len();
             let interface = self.interfaces.get(next).cloned().unwrap_or_else(|| format!("can{next}"));
-            self.buses.push(Log::create(self.folder.join(format!("can{next}.log")), interface)?);
+            let within = |folder: &PathBuf| folder.join(format!("can{next}.log"));
+            let path = self.folder.as_ref().map_or_else(|| NOWHERE.into(), within);
+            self.buses.push(Log::create(path, interface)?);
         }
         let log = &mut self.buses[bus];
         self.line.clear();
@@ -89,7 +91,7 @@ mod tests {
     #[test]
     fn an_error_message_is_logged_and_is_no_frame() {
         let folder = tempfile::tempdir().unwrap();
-        let mut logs = CandumpLogs::new(folder.path(), &[]);
+        let mut logs = CandumpLogs::new(Some(folder.path()), &[]);
         let report = ErrorReport { time_ns: 2000, port: 1, kind: ErrorKind::Bit, tec: 8, rec: 0 };
         for tap in [FrameTap { id: 0x080, ..FrameTap::default() }, tap::encode(0, &Tapped::Error(report))] {
             logs.write(&tap).unwrap();
@@ -102,7 +104,7 @@ mod tests {
     #[test]
     fn a_frame_on_a_bus_that_no_link_has_makes_no_logs() {
         let folder = tempfile::tempdir().unwrap();
-        let mut logs = CandumpLogs::new(folder.path(), &[]);
+        let mut logs = CandumpLogs::new(Some(folder.path()), &[]);
         let error = logs.write(&FrameTap { bus: u32::MAX, ..FrameTap::default() }).unwrap_err();
         assert!(error.to_string().contains("bus 4294967295"), "{error}");
         assert_eq!(folder.path().read_dir().unwrap().count(), 0);

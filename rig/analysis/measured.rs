@@ -6,8 +6,8 @@ use hdrhistogram::Histogram;
 use hdrhistogram::serialization::{Deserializer, Serializer, V2Serializer};
 use serde::Serialize;
 
-use super::AnalysisError;
 use super::noise::standard_error;
+use super::{AnalysisError, NOWHERE};
 use crate::hlog;
 
 /// Below this many samples the 99.9th percentile rests on fewer than ten of them and is not given.
@@ -66,8 +66,9 @@ pub(crate) fn resolution_ns(value_ns: u64) -> u64 {
 }
 
 impl Measured {
-    pub(super) fn new(name: &'static str, folder: &Path) -> Self {
-        let path = folder.join(format!("{}.hlog", name.replace(' ', "-")));
+    pub(super) fn new(name: &'static str, folder: Option<&Path>) -> Self {
+        let within = |folder: &Path| folder.join(format!("{}.hlog", name.replace(' ', "-")));
+        let path = folder.map_or_else(|| NOWHERE.into(), within);
         let (total, second) = (histogram(), histogram());
         Self {
             name,
@@ -187,7 +188,7 @@ mod tests {
 
     fn measured() -> (tempfile::TempDir, Measured) {
         let folder = tempfile::tempdir().unwrap();
-        let measured = Measured::new("control", folder.path());
+        let measured = Measured::new("control", Some(folder.path()));
         (folder, measured)
     }
 

@@ -65,6 +65,9 @@ use tracking::Tracking;
 pub(crate) use tracking::{Accumulator, MOVING};
 pub use tracking::{Reference, Track, TrackingFigures, TrackingSample};
 
+/// Takes what is not wanted as a file.
+const NOWHERE: &str = "/dev/null";
+
 /// Why a run could not be analysed.
 #[derive(Debug, thiserror::Error)]
 pub enum AnalysisError {
@@ -161,8 +164,21 @@ impl Figures {
 /// Reads the run's recording, writes `hist/`, `can*.log` and `events.jsonl` beside it, and returns
 /// the figures.
 pub fn analyse(folder: &RunFolder, scenario: &Scenario) -> Result<Figures, AnalysisError> {
+    read(folder, Some(folder), scenario)
+}
+
+/// The same without a file: what would be written goes nowhere.
+pub fn look(folder: &RunFolder, scenario: &Scenario) -> Result<Figures, AnalysisError> {
+    read(folder, None, scenario)
+}
+
+fn read(
+    folder: &RunFolder,
+    exports: Option<&RunFolder>,
+    scenario: &Scenario,
+) -> Result<Figures, AnalysisError> {
     let mut reader = Reader::open(&folder.recording())?;
-    let mut pass = Pass::new(folder, scenario)?;
+    let mut pass = Pass::new(exports, scenario)?;
     while let Some(message) = reader.next_message()? {
         pass.take(&message)?;
     }
@@ -192,16 +208,16 @@ struct Pass {
 }
 
 impl Pass {
-    fn new(folder: &RunFolder, scenario: &Scenario) -> Result<Self, AnalysisError> {
+    fn new(exports: Option<&RunFolder>, scenario: &Scenario) -> Result<Self, AnalysisError> {
         let reference = if scenario.can.is_virtual() { Reference::Truth } else { Reference::Estimate };
         Ok(Self {
             period_ns: scenario.period_ns(),
-            intervals: Intervals::new(&folder.histograms(), scenario.period_ns())?,
+            intervals: Intervals::new(exports.map(RunFolder::histograms), scenario.period_ns())?,
             longest_cycles: LongestCycles::default(),
             tracking: Tracking::against(reference),
             sequence: SequenceCheck::default(),
-            candump: CandumpLogs::new(folder.path(), &scenario.can.interfaces),
-            events: EventLog::create(folder.events())?,
+            candump: CandumpLogs::new(exports.map(RunFolder::path), &scenario.can.interfaces),
+            events: EventLog::create(exports.map_or_else(|| NOWHERE.into(), RunFolder::events))?,
             watch: Watch::on(scenario.can.rates().ok()),
             responses: Responses::on(scenario),
             cycles: 0,

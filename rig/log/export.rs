@@ -29,7 +29,7 @@ pub(super) fn write<R: Read + Seek>(
     for (channel, (topic, columns)) in tables {
         files.insert(channel, Csv::create(folder, &topic, columns)?);
     }
-    let mut candump = CandumpLogs::new(folder, &[]);
+    let mut candump = CandumpLogs::new(Some(folder), &[]);
     let mut line = String::new();
     while let Some(entry) = reader.next_entry()? {
         let Some(csv) = files.get_mut(&entry.header.channel_id) else { continue };

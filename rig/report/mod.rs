@@ -16,6 +16,7 @@ mod usage;
 pub mod verdict;
 
 use std::fs;
+use std::io::{self, ErrorKind};
 use std::path::Path;
 
 use anyhow::Context;
@@ -40,24 +41,44 @@ struct Summary<'a> {
     figures: &'a Figures,
 }
 
-/// `masseter report`: the report of a past run.
+/// `masseter report`: the report of a past run. Its folder may be an archive that takes nothing more.
 pub(crate) fn again(path: &Path, format: Format) -> Result<Exit, Failure> {
     let folder = RunFolder::open(path).usage()?;
-    let manifest = Manifest::read(&folder).context("cannot read manifest.json").usage()?;
-    let figures = match analysis::analyse(&folder, &manifest.scenario) {
-        written @ Err(AnalysisError::Write { .. }) => written.incomplete(),
-        read => read.usage(),
-    }?;
-    write(&folder, &manifest, &figures, format)
+    let unread = || format!("cannot read {}", folder.manifest().display());
+    let manifest = Manifest::read(&folder).with_context(unread).usage()?;
+    match analysis::analyse(&folder, &manifest.scenario) {
+        Err(AnalysisError::Write { path, error }) if is_read_only(&error) => {
+            tell!(
+                "masseter: cannot write {}: {error}; the run is shown, and no file written",
+                path.display()
+            );
+            let figures = analysis::look(&folder, &manifest.scenario).usage()?;
+            Ok(present(&folder, &manifest, &figures, format)?.verdict.outcome.exit())
+        }
+        written @ Err(AnalysisError::Write { .. }) => {
+            write(&folder, &manifest, &written.incomplete()?, format)
+        }
+        read => write(&folder, &manifest, &read.usage()?, format),
+    }
 }
 
-/// Judges the run, writes the report's files and prints the result.
-pub(crate) fn write(
+fn is_read_only(error: &io::Error) -> bool {
+    matches!(error.kind(), ErrorKind::PermissionDenied | ErrorKind::ReadOnlyFilesystem)
+}
+
+/// A run judged, and its summary as JSON.
+struct Presented {
+    verdict: Verdict,
+    json: String,
+}
+
+/// Judges the run and prints the result.
+fn present(
     folder: &RunFolder,
     manifest: &Manifest,
     figures: &Figures,
     format: Format,
-) -> Result<Exit, Failure> {
+) -> Result<Presented, Failure> {
     let verdict = Verdict::of(manifest, figures);
     let summary = Summary { form: FORM, verdict: &verdict, figures };
     let json =
@@ -68,6 +89,17 @@ pub(crate) fn write(
         }
         Format::Json => json.clone(),
     });
+    Ok(Presented { verdict, json })
+}
+
+/// Judges the run, prints the result and writes the report's files.
+pub(crate) fn write(
+    folder: &RunFolder,
+    manifest: &Manifest,
+    figures: &Figures,
+    format: Format,
+) -> Result<Exit, Failure> {
+    let Presented { verdict, json } = present(folder, manifest, figures, format)?;
     for (path, text) in [
         (folder.summary(), &json),
         (folder.junit(), &junit::of_run(manifest, figures, &verdict)),

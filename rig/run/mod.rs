@@ -16,6 +16,7 @@ pub mod usage;
 pub mod virtual_time;
 
 use std::fs;
+use std::path::Path;
 
 use anyhow::Context;
 use masseter_shared::config::{MotionConfig, Scenario};
@@ -47,8 +48,8 @@ pub fn run(args: &RunArgs) -> Result<Exit, Failure> {
     }
 
     let mut manifest = Manifest::new(&plan, args.clock);
-    let keep =
-        |manifest: &Manifest| manifest.write(&folder).context("cannot write the manifest").incomplete();
+    let unwritten = || format!("cannot write {}", folder.manifest().display());
+    let keep = |manifest: &Manifest| manifest.write(&folder).with_context(unwritten).incomplete();
     // For a recording that nobody lives to judge.
     keep(&manifest)?;
     let ended = match claimed {
@@ -83,8 +84,12 @@ fn keep_scenario(folder: &RunFolder, scenario: &Scenario) -> anyhow::Result<()> 
     if let MotionConfig::File(file) = &mut kept.motion {
         let rows =
             fs::read_to_string(&file.path).with_context(|| format!("cannot read {}", file.path.display()))?;
-        folder.keep(&folder.motion(), &rows).context("cannot write the recorded motion")?;
+        keep(folder, &folder.motion(), &rows)?;
         file.path = folder::MOTION.into();
     }
-    folder.keep(&folder.scenario(), &kept.to_toml()).context("cannot write the scenario")
+    keep(folder, &folder.scenario(), &kept.to_toml())
+}
+
+fn keep(folder: &RunFolder, path: &Path, text: &str) -> anyhow::Result<()> {
+    folder.keep(path, text).with_context(|| format!("cannot write {}", path.display()))
 }
