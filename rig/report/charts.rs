@@ -4,7 +4,7 @@ use masseter_shared::config::Scenario;
 use masseter_shared::geometry::{AXIS_NAMES, LEGS};
 use masseter_shared::schedule::CycleSchedule;
 
-use super::plot::{Chart, Drawn, Limit, Line, Scale};
+use super::plot::{Chart, Drawn, HIGH, Limit, Line, Scale};
 use crate::analysis::{Curve, Figures, IntervalFigures};
 
 /// The least latency that a logarithmic axis shows, µs.
@@ -18,6 +18,7 @@ pub(super) fn percentiles(scenario: &Scenario, figures: &Figures) -> Option<Draw
         points: interval.curve.iter().map(|&(x, value)| (x, microseconds(value as f64))).collect(),
     };
     Chart {
+        height: HIGH,
         x_label: "percentile",
         x: Scale::Percentile,
         y_label: "µs",
