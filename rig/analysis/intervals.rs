@@ -4,7 +4,7 @@
 //! the time until the wake-up that skipped it: corrected for coordinated omission once, by the skips as counted.
 
 use std::fs;
-use std::path::PathBuf;
+use std::path::Path;
 
 use masseter_shared::messages::{Command, Reading, State};
 
@@ -55,11 +55,11 @@ pub(super) struct Intervals {
 
 impl Intervals {
     /// With logs in `folder`, if they are wanted.
-    pub(super) fn new(folder: Option<PathBuf>, period_ns: u64) -> Result<Self, AnalysisError> {
-        if let Some(path) = &folder {
-            fs::create_dir_all(path).map_err(|error| AnalysisError::Write { path: path.clone(), error })?;
+    pub(super) fn new(folder: Option<&Path>, period_ns: u64) -> Result<Self, AnalysisError> {
+        if let Some(path) = folder {
+            fs::create_dir_all(path)
+                .map_err(|error| AnalysisError::Write { path: path.to_owned(), error })?;
         }
-        let folder = folder.as_deref();
         Ok(Self {
             period_ns,
             measured: Interval::ALL.iter().map(|interval| Measured::new(interval.name(), folder)).collect(),
@@ -190,7 +190,7 @@ mod tests {
 
     fn intervals() -> (tempfile::TempDir, Intervals) {
         let folder = tempfile::tempdir().unwrap();
-        let intervals = Intervals::new(Some(folder.path().to_owned()), PERIOD_NS).unwrap();
+        let intervals = Intervals::new(Some(folder.path()), PERIOD_NS).unwrap();
         (folder, intervals)
     }
 

@@ -212,9 +212,9 @@ impl Pass {
         let reference = if scenario.can.is_virtual() { Reference::Truth } else { Reference::Estimate };
         Ok(Self {
             period_ns: scenario.period_ns(),
-            intervals: Intervals::new(exports.map(RunFolder::histograms), scenario.period_ns())?,
+            intervals: Intervals::new(exports.map(RunFolder::histograms).as_deref(), scenario.period_ns())?,
             longest_cycles: LongestCycles::default(),
-            tracking: Tracking::against(reference),
+            tracking: Tracking::against(reference, scenario.period_ns()),
             sequence: SequenceCheck::default(),
             candump: CandumpLogs::new(exports.map(RunFolder::path), &scenario.can.interfaces),
             events: EventLog::create(exports.map_or_else(|| NOWHERE.into(), RunFolder::events))?,

@@ -94,8 +94,8 @@ impl Watch {
         };
         OverTime {
             began_ns: self.began_ns.unwrap_or(0),
-            controller_late_ns: latest(&self.late, CONTROLLER),
-            plant_late_ns: latest(&self.late, PLANT),
+            controller_late_ns: highest(&self.late, CONTROLLER),
+            plant_late_ns: highest(&self.late, PLANT),
             position_m: bands(0),
             velocity_m_s: bands(1),
             force_n: bands(2),
@@ -104,12 +104,13 @@ impl Watch {
     }
 }
 
-fn latest<const N: usize>(series: &Series<Extremes<N>>, index: usize) -> Curve {
+/// Highest value of each stretch of time.
+pub(super) fn highest<const N: usize>(series: &Series<Extremes<N>>, index: usize) -> Curve {
     let points = series.iter().map(|(at_s, stretch)| (at_s, stretch.highest[index]));
     points.filter(|(_, value)| value.is_finite()).collect()
 }
 
-fn band<const N: usize>(series: &Series<Extremes<N>>, index: usize) -> Band
+pub(super) fn band<const N: usize>(series: &Series<Extremes<N>>, index: usize) -> Band
 where
     Extremes<N>: Merge,
 {

@@ -111,27 +111,34 @@ impl Merge for Sums {
     }
 }
 
-/// Every n-th sample, with n growing as the run does.
+/// Every n-th sample from the first on, with n growing as the run does, but not beyond `coarsest`: then the first ones
+/// stay as they are, and no more are taken.
 #[derive(Debug, Clone)]
 pub(super) struct Thinned<T> {
+    coarsest: usize,
     every: usize,
     seen: usize,
     samples: Vec<T>,
 }
 
-impl<T> Default for Thinned<T> {
-    fn default() -> Self {
-        Self { every: 1, seen: 0, samples: Vec::new() }
-    }
-}
-
 impl<T> Thinned<T> {
+    pub(super) fn no_coarser_than(coarsest: usize) -> Self {
+        Self { coarsest, every: 1, seen: 0, samples: Vec::new() }
+    }
+
     pub(super) fn push(&mut self, sample: T) {
+        if self.samples.len() == 2 * MOST && !self.make_room() {
+            return;
+        }
         if self.seen.is_multiple_of(self.every) {
             self.samples.push(sample);
         }
         self.seen += 1;
-        if self.samples.len() == 2 * MOST {
+    }
+
+    fn make_room(&mut self) -> bool {
+        let is_wanted = 2 * self.every <= self.coarsest;
+        if is_wanted {
             let mut place = 0;
             self.samples.retain(|_| {
                 place += 1;
@@ -139,6 +146,7 @@ impl<T> Thinned<T> {
             });
             self.every *= 2;
         }
+        is_wanted
     }
 
     pub(super) fn into_samples(self) -> Vec<T> {
@@ -171,11 +179,14 @@ mod tests {
     }
 
     #[test]
-    fn thinning_keeps_samples_evenly_from_the_first() {
-        let mut thinned = Thinned::default();
-        (0..10_000).for_each(|sample| thinned.push(sample));
-        let samples = thinned.into_samples();
-        assert!(samples.len() < 2 * MOST && samples.len() >= MOST / 2);
-        assert!(samples.windows(2).all(|pair| pair[1] - pair[0] == samples[1]));
+    fn thinning_keeps_samples_evenly_from_the_first_and_stops_before_it_gets_too_coarse() {
+        for (coarsest, every, last) in [(1000, 8, 9992), (7, 4, 8188), (1, 1, 2047)] {
+            let mut thinned = Thinned::no_coarser_than(coarsest);
+            (0..10_000).for_each(|sample| thinned.push(sample));
+            let samples = thinned.into_samples();
+            assert!(samples.len() <= 2 * MOST && samples.len() >= MOST / 2);
+            assert!(samples.windows(2).all(|pair| pair[1] - pair[0] == every), "{coarsest}");
+            assert_eq!(samples.last(), Some(&last), "{coarsest}");
+        }
     }
 }

@@ -9,6 +9,7 @@ use serde::Serialize;
 
 use super::join::Join;
 use super::noise::standard_error;
+use super::over_time::{Curve, band, highest};
 use super::series::{Extremes, Series, Thinned};
 
 /// States in which the platform is asked to be somewhere.
@@ -71,15 +72,35 @@ pub struct TrackingSample {
     pub found: Pose,
 }
 
-/// The platform from the first easing to the last hold.
+/// The platform from the first easing to the last hold; times in seconds since the first sample.
 #[derive(Debug, Clone, Default)]
 pub struct Track {
-    /// Every n-th cycle.
+    /// Every n-th cycle from the first on, closely enough to see every movement; of a long run not to its end.
     pub samples: Vec<TrackingSample>,
-    /// Largest distance from the wanted position in each stretch of time, m, by seconds since the first
-    /// sample.
-    pub distance_m: Vec<(f64, f64)>,
+    /// How long it went on, s.
+    pub duration_s: f64,
+    /// Wanted displacement along x, y and z, from the first pose wanted, m: lowest and highest of each stretch of time.
+    pub wanted_m: [Curve; 3],
+    /// The same by the reference.
+    pub found_m: [Curve; 3],
+    /// Largest distance from the wanted position in each stretch of time, m.
+    pub distance_m: Curve,
 }
+
+/// Where and when the motion began.
+#[derive(Debug, Clone, Copy)]
+struct Began {
+    at_ns: u64,
+    at: Pose,
+}
+
+/// Places of what moved: x, y and z wanted, found, and the distance.
+const WANTED: usize = 0;
+const FOUND: usize = 3;
+const DISTANCE: usize = 6;
+
+/// No sample stands further from the next, ns: a chewing cycle takes 0.7 s.
+const CLOSE_NS: u64 = 20_000_000;
 
 #[derive(Debug, Clone, Copy)]
 struct Wanted {
@@ -89,7 +110,7 @@ struct Wanted {
 }
 
 /// Joins wanted, estimated and, where there are any, true poses of the same sample.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(super) struct Tracking {
     reference: Reference,
     poses: Join<Wanted, (u64, Pose)>,
@@ -97,8 +118,10 @@ pub(super) struct Tracking {
     angles: Accumulator,
     estimates: Accumulator,
     track: Thinned<TrackingSample>,
-    began_ns: Option<u64>,
-    distance_m: Series<Extremes<1>>,
+    began: Option<Began>,
+    ended_ns: u64,
+    /// Wanted and found displacement along x, y and z, and the distance between the two.
+    moved_m: Series<Extremes<{ DISTANCE + 1 }>>,
     second: Accumulator,
     second_ends_ns: u64,
     seconds: Vec<f64>,
@@ -126,8 +149,21 @@ impl Accumulator {
 }
 
 impl Tracking {
-    pub(super) fn against(reference: Reference) -> Self {
-        Self { reference, ..Self::default() }
+    pub(super) fn against(reference: Reference, period_ns: u64) -> Self {
+        Self {
+            reference,
+            poses: Join::default(),
+            distances: Accumulator::default(),
+            angles: Accumulator::default(),
+            estimates: Accumulator::default(),
+            track: Thinned::no_coarser_than((CLOSE_NS / period_ns) as usize),
+            began: None,
+            ended_ns: 0,
+            moved_m: Series::default(),
+            second: Accumulator::default(),
+            second_ends_ns: 0,
+            seconds: Vec::new(),
+        }
     }
 
     /// The state of a cycle with a fresh reading: one used again was compared when it was fresh.
@@ -161,9 +197,15 @@ impl Tracking {
             self.add_to_second(distance_m, sampled_ns);
         }
         if MOVING.iter().any(|state| state.code() == wanted.state) {
-            let began_ns = *self.began_ns.get_or_insert(sampled_ns);
-            self.distance_m.at(sampled_ns.saturating_sub(began_ns)).take(0, distance_m);
             let Wanted { desired, estimated, .. } = *wanted;
+            let began = *self.began.get_or_insert(Began { at_ns: sampled_ns, at: desired });
+            let stretch = self.moved_m.at(sampled_ns.saturating_sub(began.at_ns));
+            stretch.take(DISTANCE, distance_m);
+            for (first, pose) in [(WANTED, &desired), (FOUND, &found)] {
+                let moved_m = pose.translation.vector - began.at.translation.vector;
+                moved_m.iter().enumerate().for_each(|(axis, moved_m)| stretch.take(first + axis, *moved_m));
+            }
+            self.ended_ns = sampled_ns;
             self.track.push(TrackingSample { sampled_ns, desired, estimated, found });
         }
     }
@@ -194,15 +236,24 @@ impl Tracking {
             max_deg: compared(self.angles.largest.to_degrees()),
             estimate_rms_mm: compared(self.estimates.rms() * 1e3).filter(|_| has_truth),
         };
-        let distances = self.distance_m.iter().map(|(at_s, stretch)| (at_s, stretch.highest[0]));
-        let distance_m = distances.filter(|(_, distance_m)| distance_m.is_finite()).collect();
-        (figures, Track { samples: self.track.into_samples(), distance_m })
+        let began_ns = self.began.map_or(self.ended_ns, |began| began.at_ns);
+        let bands = |first: usize| std::array::from_fn(|axis| band(&self.moved_m, first + axis));
+        let track = Track {
+            duration_s: self.ended_ns.saturating_sub(began_ns) as f64 / 1e9,
+            wanted_m: bands(WANTED),
+            found_m: bands(FOUND),
+            distance_m: highest(&self.moved_m, DISTANCE),
+            samples: self.track.into_samples(),
+        };
+        (figures, track)
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    const PERIOD_NS: u64 = 1_000_000;
 
     fn state(cycle: u64, x: f64) -> State {
         State {
@@ -227,7 +278,7 @@ mod tests {
 
     #[test]
     fn without_truth_the_estimate_takes_its_place() {
-        let mut tracking = Tracking::against(Reference::Estimate);
+        let mut tracking = Tracking::against(Reference::Estimate, PERIOD_NS);
         tracking.solution(&State { estimated_position_m: [0.001, 0.0, 0.0], ..state(1, 0.003) });
         let (figures, track) = tracking.finish();
         assert_eq!((figures.samples, figures.estimate_rms_mm), (1, None));
@@ -237,7 +288,7 @@ mod tests {
 
     #[test]
     fn a_platform_that_never_ran_was_nowhere_perfectly() {
-        let mut tracking = Tracking::default();
+        let mut tracking = Tracking::against(Reference::Truth, PERIOD_NS);
         tracking.solution(&State { controller_state: ControllerState::Easing.code(), ..state(1, 0.0) });
         tracking.truth(&truth(1, 0.0));
         let (figures, _) = tracking.finish();
@@ -246,8 +297,25 @@ mod tests {
     }
 
     #[test]
+    fn a_long_run_keeps_every_turn_of_its_motion_and_a_close_film_of_its_beginning() {
+        let mut tracking = Tracking::against(Reference::Truth, PERIOD_NS);
+        for cycle in 0..100_000 {
+            // To and fro in 0.7 s, as fast as chewing.
+            let x = (cycle as f64 / 700.0 * std::f64::consts::TAU).sin();
+            tracking.solution(&state(cycle, x));
+            tracking.truth(&Truth { sampled_ns: cycle * PERIOD_NS, ..truth(cycle, x) });
+        }
+        let (_, track) = tracking.finish();
+        let reach = track.found_m[0].iter().map(|(_, x)| *x);
+        assert!(reach.clone().filter(|x| *x > 0.99).count() > 140 && reach.fold(0.0, f64::min) < -0.99);
+        assert!((track.duration_s - 99.999).abs() < 1e-9);
+        assert!(track.samples.windows(2).all(|pair| pair[1].sampled_ns - pair[0].sampled_ns <= CLOSE_NS));
+        assert_eq!(track.samples[0].sampled_ns, 0);
+    }
+
+    #[test]
     fn poses_are_compared_by_cycle_in_whatever_order_they_come() {
-        let mut tracking = Tracking::default();
+        let mut tracking = Tracking::against(Reference::Truth, PERIOD_NS);
         tracking.solution(&state(1, 0.003));
         tracking.solution(&state(2, 0.000));
         tracking.truth(&truth(2, 0.004));

@@ -62,30 +62,16 @@ fn microseconds(ns: f64) -> f64 {
 
 /// The platform's displacement, wanted and true, and the distance between the two.
 pub(super) fn motion(figures: &Figures) -> [Option<Drawn>; 2] {
-    let samples = &figures.track.samples;
-    let first = samples.first().copied();
+    let track = &figures.track;
     let reference = figures.tracking.reference.adjective();
-    let line = |name: &str, coordinate: usize, wanted: bool| {
-        let first = first.expect("a line is drawn of samples");
-        let points = samples.iter().map(|sample| {
-            let pose = if wanted { &sample.desired } else { &sample.found };
-            let moved_m = pose.translation.vector[coordinate] - first.desired.translation.vector[coordinate];
-            (sample.sampled_ns.saturating_sub(first.sampled_ns) as f64 / 1e9, moved_m * 1e3)
-        });
-        Line {
-            name: format!("{name} {}", if wanted { "wanted" } else { reference }),
-            points: points.collect(),
-        }
+    let pair = |(axis, name): (usize, &str)| {
+        [("wanted", &track.wanted_m), (reference, &track.found_m)].map(|(kind, curves)| Line {
+            name: format!("{name} {kind}"),
+            points: in_unit(&curves[axis], 1e3),
+        })
     };
-    let axes = ["x", "y", "z"];
-    let lines = first.map_or_else(Vec::new, |_| {
-        let pairs = axes
-            .iter()
-            .enumerate()
-            .flat_map(|(index, name)| [line(name, index, true), line(name, index, false)]);
-        pairs.collect()
-    });
-    let distance = Line { name: "distance".to_owned(), points: in_unit(&figures.track.distance_m, 1e3) };
+    let lines = ["x", "y", "z"].into_iter().enumerate().flat_map(pair).collect();
+    let distance = Line { name: "distance".to_owned(), points: in_unit(&track.distance_m, 1e3) };
     [
         Chart::over_time("displacement of the platform, mm", lines, Vec::new()).draw(),
         Chart::over_time("distance from wanted, mm", vec![distance], Vec::new()).draw(),

@@ -8,7 +8,7 @@ use super::junit::escape;
 use super::plot::Drawn;
 use super::table::{self, in_words, microseconds, or_dash};
 use super::{charts, events, film, usage};
-use crate::analysis::{BusResponse, Figures, Reference};
+use crate::analysis::{BusResponse, Figures, Reference, Track};
 use crate::report::checks::CheckResult;
 use crate::report::outcome::Outcome;
 use crate::report::verdict::Verdict;
@@ -16,6 +16,9 @@ use crate::run::manifest::Manifest;
 
 const STYLE: &str = include_str!("page/style.css");
 const MECHANISM: &str = include_str!("page/mechanism.js");
+
+/// How values are shown that change faster than a chart can tell.
+const BANDS: &str = "Each curve touches the lowest and the highest value of every stretch of time.";
 
 /// The page.
 pub(super) fn of_run(manifest: &Manifest, figures: &Figures, verdict: &Verdict) -> String {
@@ -65,15 +68,29 @@ fn checks(page: &mut String, verdict: &Verdict) -> std::fmt::Result {
 fn mechanism(page: &mut String, manifest: &Manifest, figures: &Figures) -> std::fmt::Result {
     let Some(film) = film::of_run(&manifest.scenario, figures) else { return Ok(()) };
     let outlines = outlines(figures.tracking.reference);
+    let extent = extent(&figures.track);
     // JSON of numbers and fixed names holds no `<` that could end the element.
     writeln!(
         page,
         "<h2>Mechanism</h2>\n<canvas id=\"mechanism\" width=\"1200\" height=\"640\"></canvas>\n\
          <p><button id=\"play\">pause</button> <input id=\"time\" type=\"range\" min=\"0\" max=\"1\" step=\"any\" value=\"0\"> \
          <span id=\"clock\"></span><br>Platform: {outlines}; \
-         <span style=\"color:#b00020\">incisal point and condyles</span>. Drag to turn.</p>\n\
+         <span style=\"color:#b00020\">incisal point and condyles</span>. {extent}Drag to turn.</p>\n\
          <script type=\"application/json\" id=\"film\">{film}</script>\n<script>\n{MECHANISM}</script>"
     )
+}
+
+/// How much of a motion the film shows, where that is not all.
+fn extent(track: &Track) -> String {
+    let (Some(first), Some(last)) = (track.samples.first(), track.samples.last()) else {
+        return String::new();
+    };
+    let shown_s = last.sampled_ns.saturating_sub(first.sampled_ns) as f64 / 1e9;
+    // The last sample of a whole film may stand some cycles before the end.
+    if track.duration_s - shown_s < 0.1 {
+        return String::new();
+    }
+    format!("The first {shown_s:.1} s of {:.1} s. ", track.duration_s)
 }
 
 /// What the platform's outlines stand for.
@@ -109,14 +126,14 @@ fn motion(page: &mut String, figures: &Figures) -> std::fmt::Result {
     if let Some(most_n) = figures.bite_force_max_n {
         writeln!(page, "Bite force: at most {most_n:.1} N.")?;
     }
-    page.push_str("</p>\n");
+    writeln!(page, "{BANDS}</p>")?;
     let [displacement, error] = charts::motion(figures);
     plot(page, "motion", displacement, "Nothing moved.")?;
     plot(page, "error", error, "Nothing moved.")
 }
 
 fn actuators(page: &mut String, manifest: &Manifest, figures: &Figures) -> std::fmt::Result {
-    page.push_str("<h2>Actuators</h2>\n<p>Each curve touches the lowest and the highest value of every stretch of time.</p>\n");
+    writeln!(page, "<h2>Actuators</h2>\n<p>{BANDS}</p>")?;
     let ids = ["slides", "legs", "velocities", "forces"];
     for (id, drawn) in ids.iter().zip(charts::actuators(&manifest.scenario, figures)) {
         plot(page, id, drawn, "The recording holds no truth.")?;
