@@ -108,7 +108,7 @@ impl Outlets {
 
     fn publish_cycle(&mut self, AtHand { frames, others }: &AtHand) -> anyhow::Result<()> {
         others.iter().try_for_each(|message| self.publish(message))?;
-        Ok(self.frame.publish(frames)?)
+        Ok(self.frame.publish(frames.iter().copied())?)
     }
 
     fn publish(&mut self, message: &Recorded) -> anyhow::Result<()> {

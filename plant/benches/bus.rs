@@ -106,9 +106,9 @@ fn plant(bencher: Bencher<'_, '_>) {
         let request = DriveRequest::Enable.code();
         let command = Command { cycle, target_m: reading.position_m, request, ..Command::default() };
         plant.apply(sync_ns + 545_000, Some(&command)).expect("dynamics");
-        plant.drain_frames(|frames| {
-            black_box(frames);
-        });
+        for frame in plant.drain_frames() {
+            black_box(frame);
+        }
         plant.drain_events(&mut |event| {
             black_box(event);
         });

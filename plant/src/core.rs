@@ -30,7 +30,8 @@ pub struct PlantCore<L = VirtualLink> {
     link: L,
     buses: usize,
     cycle: u64,
-    tapped: Vec<FrameTap>,
+    /// With the index of its bus.
+    tapped: Vec<(u16, Tapped)>,
     wire_events: Journal,
     command_sent_ns: u64,
 }
@@ -127,11 +128,9 @@ impl<L: Link> PlantCore<L> {
         self.master.drives_are_off()
     }
 
-    /// Hands out the frames seen on the wires since the last drain, all at once.
-    pub fn drain_frames<T>(&mut self, out: impl FnOnce(&[FrameTap]) -> T) -> T {
-        let taken = out(&self.tapped);
-        self.tapped.clear();
-        taken
+    /// Hands out what was seen on the wires since the last drain. The messages are made only now, behind the reading.
+    pub fn drain_frames(&mut self) -> impl ExactSizeIterator<Item = FrameTap> {
+        self.tapped.drain(..).map(|(bus, tapped)| tap::encode(bus, &tapped))
     }
 
     /// Hands out what happened since the last drain.
@@ -144,7 +143,7 @@ impl<L: Link> PlantCore<L> {
         for bus in 0..self.buses {
             while self.tapped.len() < TAPPED {
                 match self.link.tap(bus, now_ns) {
-                    Ok(Some(tapped)) => self.take_tapped(bus, &tapped),
+                    Ok(Some(tapped)) => self.take_tapped(bus, tapped),
                     Err(ReceiveError::Overrun { lost }) => self.master.note_lost(now_ns, lost),
                     Ok(None) | Err(ReceiveError::InterfaceDown { .. } | ReceiveError::Os { .. }) => break,
                 }
@@ -156,8 +155,8 @@ impl<L: Link> PlantCore<L> {
         }
     }
 
-    fn take_tapped(&mut self, bus: usize, tapped: &Tapped) {
-        match tapped {
+    fn take_tapped(&mut self, bus: usize, tapped: Tapped) {
+        match &tapped {
             Tapped::Frame(received) => match Cob::try_from(received.frame.id()) {
                 Ok(Cob::Rpdo1(_)) => self.command_sent_ns = self.command_sent_ns.max(received.time_ns),
                 Ok(Cob::Sync) => self.master.note_sync(bus, received.time_ns),
@@ -170,7 +169,7 @@ impl<L: Link> PlantCore<L> {
                 }
             }
         }
-        self.tapped.push(tap::encode(bus as u16, tapped));
+        self.tapped.push((bus as u16, tapped));
     }
 }
 

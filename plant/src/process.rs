@@ -99,7 +99,7 @@ impl Ports {
     }
 
     fn publish_frames_and_events(&mut self, plant: &mut PlantCore<impl Link>) -> Result<(), ProcessError> {
-        let mut result = plant.drain_frames(|frames| self.frames.publish(frames));
+        let mut result = self.frames.publish(plant.drain_frames());
         plant.drain_events(&mut |event| {
             if result.is_ok() {
                 result = self.events.publish(|message| *message = event);

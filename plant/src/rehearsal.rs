@@ -51,7 +51,7 @@ impl Rehearsal {
         self.plant.collect(sync_ns + self.schedule.reading_by_ns)?;
         let mut reading = Reading::default();
         self.plant.fill_reading(&mut reading);
-        self.plant.drain_frames(|_| ());
+        drop(self.plant.drain_frames());
         self.plant.drain_events(&mut |_| ());
         self.plant.apply(sync_ns + self.schedule.command_by_ns, self.command.as_ref())?;
         Ok(reading)

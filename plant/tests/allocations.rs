@@ -51,9 +51,9 @@ fn cycle(plant: &mut PlantCore, cycle: u64, reading: &mut Reading) {
     let request = DriveRequest::Enable.code();
     let command = Command { cycle, target_m: reading.position_m, request, ..Command::default() };
     plant.apply(sync_ns + 545_000, Some(&command)).unwrap();
-    plant.drain_frames(|frames| {
-        black_box(frames);
-    });
+    for frame in plant.drain_frames() {
+        black_box(frame);
+    }
     plant.drain_events(&mut |event| {
         black_box(event);
     });

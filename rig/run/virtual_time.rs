@@ -141,11 +141,9 @@ impl Log {
 
     /// Records the frames and events of a cycle.
     fn drain(&mut self, plant: &mut PlantCore, now_ns: u64) {
-        plant.drain_frames(|frames| {
-            for frame in frames {
-                self.frames.record(&mut self.backlog, now_ns, |message| *message = *frame);
-            }
-        });
+        for frame in plant.drain_frames() {
+            self.frames.record(&mut self.backlog, now_ns, |message| *message = frame);
+        }
         plant.drain_events(&mut |event| {
             self.plant_events.record(&mut self.backlog, now_ns, |message| *message = event);
         });

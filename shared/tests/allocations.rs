@@ -82,7 +82,7 @@ fn check_batches(node: &Node) {
 
     let (count, largest_bytes) = allocations_of(|| {
         for _ in 0..MESSAGES {
-            outlet.publish(&frames).unwrap();
+            outlet.publish(frames).unwrap();
         }
     });
     assert!(count <= MESSAGES && largest_bytes <= LOAN_BYTES, "{count} of {largest_bytes}");

@@ -52,7 +52,7 @@ impl Bench {
             Command { cycle: self.cycle, target_m, request: request.code(), ..Command::default() }
         });
         self.plant.apply(sync_ns + 545_000, command.as_ref()).unwrap();
-        self.plant.drain_frames(|frames| self.frames.extend_from_slice(frames));
+        self.frames.extend(self.plant.drain_frames());
         self.plant.drain_events(&mut |event| self.events.push(event));
     }
 

@@ -62,12 +62,16 @@ pub struct BatchOutlet<M: Message> {
 }
 
 impl<M: Message> BatchOutlet<M> {
-    /// Copies the messages to where subscribers will read them, stamps and publishes them, in their order.
-    pub fn publish(&mut self, messages: &[M]) -> Result<(), TransportError> {
-        for batch in messages.chunks(BATCH) {
-            let sample =
-                self.publisher.loan_slice_uninit(batch.len()).map_err(failed("loaning", M::TOPIC))?;
-            let mut sample = sample.write_from_slice(batch);
+    /// Makes the messages where subscribers will read them, stamps and publishes them, in their order.
+    pub fn publish(
+        &mut self,
+        messages: impl IntoIterator<Item = M, IntoIter: ExactSizeIterator>,
+    ) -> Result<(), TransportError> {
+        let mut messages = messages.into_iter();
+        while messages.len() > 0 {
+            let count = messages.len().min(BATCH);
+            let sample = self.publisher.loan_slice_uninit(count).map_err(failed("loaning", M::TOPIC))?;
+            let mut sample = sample.write_from_fn(|_| messages.next().expect("as many as it says"));
             let published_ns = clock::now_ns();
             for message in sample.payload_mut() {
                 self.sent += 1;
@@ -136,7 +140,7 @@ mod tests {
         for count in [0, 1, BATCH, BATCH + 1, 5 * BATCH, 3] {
             let frames: Vec<_> =
                 (0..count).map(|id| FrameTap { id: id as u32, ..FrameTap::default() }).collect();
-            outlet.publish(&frames).unwrap();
+            outlet.publish(frames).unwrap();
             let mut received = Vec::new();
             while let Some(batch) = inlet.receive().unwrap() {
                 received.extend(batch.iter().map(|frame| (frame.seq, frame.id)));
@@ -155,7 +159,7 @@ mod tests {
         let mut outlet = node.batch_outlet::<FrameTap>().unwrap();
         let frames = [FrameTap::default(); BATCH];
         for _ in 0..FrameTap::DEPTH / BATCH + 2 {
-            outlet.publish(&frames).unwrap();
+            outlet.publish(frames).unwrap();
         }
         let oldest = inlet.receive().unwrap().unwrap();
         assert_eq!(oldest[0].seq, 2 * BATCH as u64 + 1);
