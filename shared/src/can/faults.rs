@@ -171,16 +171,19 @@ impl Faults {
     }
 
     /// The first fault of those that `part` selects that strikes the frame, with what `part` takes from it.
+    #[inline]
     fn strikes<T>(
         &self,
         NumberedFrame { at_ns, port, id, number }: NumberedFrame,
         part: impl Fn(FaultKind) -> Option<T>,
     ) -> Option<(Strike, T)> {
-        self.list.iter().enumerate().find_map(|(place, listed)| {
-            let part = part(listed.fault.kind)?;
-            let may = listed.is_live(at_ns) && listed.concerns(port, id);
-            let strikes = may && self.chance(place, number).random_bool(listed.fault.probability);
-            strikes.then_some((Strike { place, at_ns }, part))
+        self.unless_empty(|list| {
+            list.iter().enumerate().find_map(|(place, listed)| {
+                let part = part(listed.fault.kind)?;
+                let may = listed.is_live(at_ns) && listed.concerns(port, id);
+                let strikes = may && self.chance(place, number).random_bool(listed.fault.probability);
+                strikes.then_some((Strike { place, at_ns }, part))
+            })
         })
     }
 
@@ -213,43 +216,34 @@ impl Faults {
         port: usize,
         part: impl Fn(FaultKind) -> Option<T>,
     ) -> Option<(Strike, T)> {
-        // Most wires have none, and ask this several times a frame.
-        if self.is_empty() {
-            return None;
-        }
-        let mut live = self.of_port(port, part).filter(|(_, listed, _)| listed.is_live(now_ns));
-        live.next().map(|(place, listed, part)| (Strike { place, at_ns: listed.fault.from_ns }, part))
+        self.unless_empty(|list| {
+            let mut live = of_port(list, port, part).filter(|(_, listed, _)| listed.is_live(now_ns));
+            live.next().map(|(place, listed, part)| (Strike { place, at_ns: listed.fault.from_ns }, part))
+        })
     }
 
     /// When a node is connected, from `from_ns` on.
+    #[inline]
     pub(super) fn connected_from_ns(&self, from_ns: u64, port: usize) -> u64 {
         let mut connected_ns = from_ns;
-        let off_at = |at_ns| {
-            let mut off = self.of_port(port, FaultKind::is(FaultKind::Disconnect));
-            off.find(|(_, listed, ())| listed.is_live(at_ns))
-        };
         // Each turn leaves one disconnection behind.
-        while let Some((_, off, ())) = off_at(connected_ns) {
-            connected_ns = off.fault.until_ns;
+        while let Some((off, ())) = self.of_node(connected_ns, port, FaultKind::is(FaultKind::Disconnect)) {
+            connected_ns = self.list[off.place].fault.until_ns;
         }
         connected_ns
     }
 
-    /// From when to when a node babbles, for each of its faults that make it.
-    pub(super) fn babbles(&self, port: usize) -> impl Iterator<Item = (u64, u64)> {
-        let babbles = self.of_port(port, FaultKind::babbled);
-        let left = babbles.filter(|(_, listed, _)| listed.strikes < listed.fault.count);
-        left.map(|(_, listed, _)| (listed.fault.from_ns, listed.fault.until_ns))
-    }
-
-    fn of_port<T>(
-        &self,
-        port: usize,
-        part: impl Fn(FaultKind) -> Option<T>,
-    ) -> impl Iterator<Item = (usize, &Listed, T)> {
-        let of_port = move |listed: &&Listed| listed.fault.port.is_none_or(|own| own == port);
-        let list = self.list.iter().enumerate().filter(move |(_, listed)| of_port(listed));
-        list.filter_map(move |(place, listed)| Some((place, listed, part(listed.fault.kind)?)))
+    /// When a fault next makes a node babble that can do so from `able_ns` on.
+    #[inline]
+    pub(super) fn babbles_from_ns(&self, able_ns: u64, port: usize) -> Option<u64> {
+        self.unless_empty(|list| {
+            let babbles = of_port(list, port, FaultKind::babbled);
+            let starts_ns = babbles.filter_map(|(_, listed, _)| {
+                let from_ns = self.connected_from_ns(able_ns.max(listed.fault.from_ns), port);
+                listed.is_live(from_ns).then_some(from_ns)
+            });
+            starts_ns.min()
+        })
     }
 
     /// A fault has struck.
@@ -261,7 +255,7 @@ impl Faults {
 
     /// The next forced bus-off of a node that is on the bus from `from_ns` on.
     pub(super) fn next_bus_off(&self, from_ns: u64, port: usize) -> Option<Strike> {
-        let bus_offs = self.of_port(port, FaultKind::is(FaultKind::BusOff));
+        let bus_offs = of_port(&self.list, port, FaultKind::is(FaultKind::BusOff));
         let strikes = bus_offs.filter_map(|(place, listed, ())| {
             let at_ns = listed.fault.from_ns.max(from_ns);
             listed.is_live(at_ns).then_some(Strike { place, at_ns })
@@ -296,6 +290,16 @@ impl Faults {
         })
     }
 
+    /// Most wires have none, and ask several times a frame: to see that is all that is done there.
+    #[inline(always)]
+    fn unless_empty<T>(&self, ask: impl FnOnce(&[Listed]) -> Option<T>) -> Option<T> {
+        #[cold]
+        fn ask_some<T>(list: &[Listed], ask: impl FnOnce(&[Listed]) -> Option<T>) -> Option<T> {
+            ask(list)
+        }
+        if self.is_empty() { None } else { ask_some(&self.list, ask) }
+    }
+
     /// Random numbers for a fault and a frame, the same however often they are asked for.
     fn chance(&self, place: usize, number: u64) -> Pcg32 {
         const ODD: u64 = 0x9E37_79B9_7F4A_7C15;
@@ -303,6 +307,17 @@ impl Faults {
         let key = self.seed ^ (fault + 1).wrapping_mul(ODD).rotate_left(32) ^ number.wrapping_mul(ODD);
         Pcg32::seed_from_u64(key)
     }
+}
+
+/// Those at a port, with their places and what `part` takes from them.
+fn of_port<T>(
+    list: &[Listed],
+    port: usize,
+    part: impl Fn(FaultKind) -> Option<T>,
+) -> impl Iterator<Item = (usize, &Listed, T)> {
+    let of_port =
+        list.iter().enumerate().filter(move |(_, listed)| listed.fault.port.is_none_or(|own| own == port));
+    of_port.filter_map(move |(place, listed)| Some((place, listed, part(listed.fault.kind)?)))
 }
 
 /// A fault that strikes.
@@ -314,81 +329,4 @@ pub(super) struct Strike {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn corrupt(probability: f64) -> Fault {
-        Fault {
-            number: 0,
-            kind: FaultKind::Corrupt,
-            from_ns: 1000,
-            until_ns: 2000,
-            id: None,
-            port: None,
-            probability,
-            count: u64::MAX,
-        }
-    }
-
-    fn id(number: u16) -> CanId {
-        CanId::standard(number).unwrap()
-    }
-
-    fn strikes(faults: &Faults, now_ns: u64, port: usize, number: u64) -> bool {
-        faults.corrupts(NumberedFrame { at_ns: now_ns, port, id: id(0x181), number }).is_some()
-    }
-
-    #[test]
-    fn a_fault_strikes_within_its_time_its_port_and_its_identifier() {
-        let fault = Fault { port: Some(2), id: Some(id(0x181)), ..corrupt(1.0) };
-        let faults = Faults::new(vec![fault], 1);
-        assert!(strikes(&faults, 1000, 2, 0));
-        assert!(!strikes(&faults, 999, 2, 0) && !strikes(&faults, 2000, 2, 0));
-        assert!(!strikes(&faults, 1000, 1, 0));
-        let other = Faults::new(vec![Fault { id: Some(id(0x182)), ..fault }], 1);
-        assert!(!strikes(&other, 1000, 2, 0));
-    }
-
-    #[test]
-    fn the_share_of_frames_struck_is_the_probability_and_the_seed_chooses_them() {
-        let struck = |seed| {
-            let faults = Faults::new(vec![corrupt(0.1)], seed);
-            (0..100_000).filter(|&number| strikes(&faults, 1500, 0, number)).collect::<Vec<_>>()
-        };
-        let share = struck(1).len() as f64 / 100_000.0;
-        assert!((0.095..0.105).contains(&share), "{share}");
-        assert_eq!(struck(1), struck(1));
-        assert_ne!(struck(1), struck(2));
-    }
-
-    #[test]
-    fn a_fault_chooses_and_is_told_of_by_its_number_whatever_else_befalls_the_bus() {
-        let (first, second) = (Fault { number: 3, ..corrupt(0.1) }, Fault { number: 8, ..corrupt(0.1) });
-        let struck = |faults: Vec<Fault>| {
-            let faults = Faults::new(faults, 1);
-            (0..1000).filter(|&number| strikes(&faults, 1500, 0, number)).collect::<Vec<_>>()
-        };
-        let lose = Fault { kind: FaultKind::Lose, ..first };
-        assert_eq!(struck(vec![lose, second]), struck(vec![second]));
-        assert_ne!(struck(vec![first]), struck(vec![second]));
-
-        let mut faults = Faults::new(vec![second], 1);
-        faults.record(Strike { place: 0, at_ns: 1200 });
-        assert_eq!(faults.next_note(1500).map(|note| note.fault), Some(8));
-    }
-
-    #[test]
-    fn a_fault_tells_once_that_it_acts_and_once_that_it_is_over() {
-        let mut faults = Faults::new(vec![Fault { count: 2, ..corrupt(1.0) }], 1);
-        assert_eq!(faults.next_note(1500), None);
-        let strike = |at_ns| Strike { place: 0, at_ns };
-        faults.record(strike(1200));
-        let note = FaultNote { time_ns: 1200, fault: 0, port: None, strikes: 0, has_ended: false };
-        assert_eq!(faults.next_note(1500), Some(note));
-        assert_eq!(faults.next_note(1500), None);
-        faults.record(strike(1300));
-        let note = FaultNote { time_ns: 1500, strikes: 2, has_ended: true, ..note };
-        assert_eq!(faults.next_note(1500), Some(note));
-        assert_eq!(faults.next_note(3000), None);
-    }
-}
+mod tests;

@@ -3,8 +3,10 @@
 //! Everything here is a function of the wire's present state, so that the next event can be foretold
 //! without changing anything.
 
-use super::VirtualWire;
+use std::cmp::Ordering;
+
 use super::queue::Queued;
+use super::{Traffic, VirtualWire};
 use crate::can::bus::ErrorState;
 use crate::can::error_frame::ErrorKind;
 use crate::can::faults::{NumberedFrame, Strike};
@@ -98,12 +100,15 @@ impl Offer<'_> {
 }
 
 impl VirtualWire {
-    /// The next attempt if nothing else is queued until then.
-    pub(super) fn foretell(&self) -> Option<Attempt> {
+    /// What comes next if nothing else is queued until then.
+    pub(super) fn foretell(&self) -> Traffic {
         let contenders = self.contenders();
         // As soon as the bus is idle and somebody has something to send.
-        let start_ns = contenders.ports().filter_map(|port| self.ready_ns(port)).min()?;
-        self.attempt(contenders, start_ns)
+        let start_ns = contenders.ports().filter_map(|port| self.ready_ns(port)).min();
+        match start_ns.and_then(|start_ns| self.attempt(contenders, start_ns)) {
+            Some(attempt) => Traffic::Coming { attempt, is_on_wire: false },
+            None => Traffic::Nothing,
+        }
     }
 
     /// Who may have something to send, now or later.
@@ -125,17 +130,21 @@ impl VirtualWire {
             return None;
         }
         let may_ns = station.suspended_until_ns.max(station.on_bus_from_ns).max(self.idle_from_ns);
-        let able_ns = |wants_ns: u64| self.faults.connected_from_ns(may_ns.max(wants_ns), port);
-        let queued = station.transmit.earliest_ns().map(able_ns);
-        let babbles = self.faults.babbles(port).map(|(from_ns, until_ns)| (able_ns(from_ns), until_ns));
-        let babbles = babbles.filter_map(|(at_ns, until_ns)| (at_ns < until_ns).then_some(at_ns));
-        queued.into_iter().chain(babbles).min().filter(|&at_ns| at_ns < u64::MAX)
+        let queued_ns = station.transmit.earliest_ns();
+        let sends_ns = queued_ns.map(|since_ns| self.faults.connected_from_ns(may_ns.max(since_ns), port));
+        let babbles_ns = self.faults.babbles_from_ns(may_ns, port);
+        let at_ns = sends_ns.unwrap_or(u64::MAX).min(babbles_ns.unwrap_or(u64::MAX));
+        (at_ns < u64::MAX).then_some(at_ns)
     }
 
     /// The attempt that an arbitration at that time leads to; `None` where nobody can send then.
     fn attempt(&self, contenders: PortSet, start_ns: u64) -> Option<Attempt> {
-        let winner = self.offers(contenders, start_ns).min_by_key(Offer::id)?;
-        let (contest, strongest) = self.contest(contenders, start_ns, winner);
+        let (winner, is_contested) = self.arbitrate(contenders, start_ns)?;
+        let (contest, strongest) = if is_contested {
+            self.contest(contenders, start_ns, winner)
+        } else {
+            (Contest::of(winner), winner)
+        };
         let Queued { ref frame, duration_ns, since_ns } = *strongest.queued;
         let numbered =
             NumberedFrame { at_ns: start_ns, port: strongest.port, id: frame.id(), number: self.attempts };
@@ -212,10 +221,20 @@ impl VirtualWire {
         (0..self.stations.len()).any(|port| !attempt.is_from(port) && self.is_on_bus(port, attempt.start_ns))
     }
 
+    /// The lowest port with the most urgent identifier of all, and whether another port offers that too.
+    fn arbitrate(&self, contenders: PortSet, start_ns: u64) -> Option<(Offer<'_>, bool)> {
+        let mut offers = self.offers(contenders, start_ns);
+        let first = (offers.next()?, false);
+        Some(offers.fold(first, |(winner, is_contested), offer| match offer.id().cmp(&winner.id()) {
+            Ordering::Less => (offer, false),
+            Ordering::Equal => (winner, true),
+            Ordering::Greater => (winner, is_contested),
+        }))
+    }
+
     /// Sorts out who sends the winning identifier too.
     fn contest<'a>(&'a self, contenders: PortSet, start_ns: u64, winner: Offer<'a>) -> (Contest, Offer<'a>) {
-        let mut contest = Contest::default();
-        contest.admit(winner);
+        let mut contest = Contest::of(winner);
         let mut strongest = winner;
         let is_rival = |offer: &Offer| offer.port > winner.port && offer.id() == winner.id();
         for rival in self.offers(contenders, start_ns).filter(is_rival) {
@@ -253,6 +272,12 @@ struct Contest {
 }
 
 impl Contest {
+    fn of(offer: Offer<'_>) -> Self {
+        let mut contest = Self::default();
+        contest.admit(offer);
+        contest
+    }
+
     fn admit(&mut self, offer: Offer<'_>) {
         self.senders.add(offer.port);
         if offer.babbles.is_some() {

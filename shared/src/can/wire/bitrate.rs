@@ -92,7 +92,8 @@ impl Rates {
 
     /// How long a frame takes, each part rounded up, ns.
     pub const fn duration_ns(self, bits: FrameBits) -> u64 {
-        self.nominal.bits_to_ns(bits.head + bits.tail) + self.data.bits_to_ns(bits.data)
+        let data_ns = if bits.data == 0 { 0 } else { self.data.bits_to_ns(bits.data) };
+        self.nominal.bits_to_ns(bits.head + bits.tail) + data_ns
     }
 
     /// From the first bit of a frame to the end of its bit number `bit`, counted from 1, ns.

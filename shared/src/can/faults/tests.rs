@@ -1,0 +1,78 @@
+//! Which frames faults strike, and what is told of them.
+
+use super::*;
+
+fn corrupt(probability: f64) -> Fault {
+    Fault {
+        number: 0,
+        kind: FaultKind::Corrupt,
+        from_ns: 1000,
+        until_ns: 2000,
+        id: None,
+        port: None,
+        probability,
+        count: u64::MAX,
+    }
+}
+
+fn id(number: u16) -> CanId {
+    CanId::standard(number).unwrap()
+}
+
+fn strikes(faults: &Faults, now_ns: u64, port: usize, number: u64) -> bool {
+    faults.corrupts(NumberedFrame { at_ns: now_ns, port, id: id(0x181), number }).is_some()
+}
+
+#[test]
+fn a_fault_strikes_within_its_time_its_port_and_its_identifier() {
+    let fault = Fault { port: Some(2), id: Some(id(0x181)), ..corrupt(1.0) };
+    let faults = Faults::new(vec![fault], 1);
+    assert!(strikes(&faults, 1000, 2, 0));
+    assert!(!strikes(&faults, 999, 2, 0) && !strikes(&faults, 2000, 2, 0));
+    assert!(!strikes(&faults, 1000, 1, 0));
+    let other = Faults::new(vec![Fault { id: Some(id(0x182)), ..fault }], 1);
+    assert!(!strikes(&other, 1000, 2, 0));
+}
+
+#[test]
+fn the_share_of_frames_struck_is_the_probability_and_the_seed_chooses_them() {
+    let struck = |seed| {
+        let faults = Faults::new(vec![corrupt(0.1)], seed);
+        (0..100_000).filter(|&number| strikes(&faults, 1500, 0, number)).collect::<Vec<_>>()
+    };
+    let share = struck(1).len() as f64 / 100_000.0;
+    assert!((0.095..0.105).contains(&share), "{share}");
+    assert_eq!(struck(1), struck(1));
+    assert_ne!(struck(1), struck(2));
+}
+
+#[test]
+fn a_fault_chooses_and_is_told_of_by_its_number_whatever_else_befalls_the_bus() {
+    let (first, second) = (Fault { number: 3, ..corrupt(0.1) }, Fault { number: 8, ..corrupt(0.1) });
+    let struck = |faults: Vec<Fault>| {
+        let faults = Faults::new(faults, 1);
+        (0..1000).filter(|&number| strikes(&faults, 1500, 0, number)).collect::<Vec<_>>()
+    };
+    let lose = Fault { kind: FaultKind::Lose, ..first };
+    assert_eq!(struck(vec![lose, second]), struck(vec![second]));
+    assert_ne!(struck(vec![first]), struck(vec![second]));
+
+    let mut faults = Faults::new(vec![second], 1);
+    faults.record(Strike { place: 0, at_ns: 1200 });
+    assert_eq!(faults.next_note(1500).map(|note| note.fault), Some(8));
+}
+
+#[test]
+fn a_fault_tells_once_that_it_acts_and_once_that_it_is_over() {
+    let mut faults = Faults::new(vec![Fault { count: 2, ..corrupt(1.0) }], 1);
+    assert_eq!(faults.next_note(1500), None);
+    let strike = |at_ns| Strike { place: 0, at_ns };
+    faults.record(strike(1200));
+    let note = FaultNote { time_ns: 1200, fault: 0, port: None, strikes: 0, has_ended: false };
+    assert_eq!(faults.next_note(1500), Some(note));
+    assert_eq!(faults.next_note(1500), None);
+    faults.record(strike(1300));
+    let note = FaultNote { time_ns: 1500, strikes: 2, has_ended: true, ..note };
+    assert_eq!(faults.next_note(1500), Some(note));
+    assert_eq!(faults.next_note(3000), None);
+}
