@@ -16,6 +16,9 @@ pub(super) struct Outbox {
 impl Outbox {
     /// Adds a frame; without room it is lost, as in a node whose transmit queue is full.
     pub(super) fn add(&mut self, frame: Frame) {
+        if self.count == 0 {
+            self.first = 0;
+        }
         if self.count < CAPACITY {
             self.frames[(self.first + self.count) % CAPACITY] = Some(frame);
             self.count += 1;

@@ -109,6 +109,10 @@ impl<T: Timed> ReceiveQueue<T> {
     }
 
     pub(super) fn push(&mut self, item: T) {
+        if self.arrived.is_empty() {
+            // Begins at its front again: what wanders through all of it finds every place cold.
+            self.arrived.clear();
+        }
         if self.arrived.len() == self.capacity {
             self.lost += 1;
         } else {
