@@ -80,7 +80,7 @@ pub(crate) fn build_emulation(scenario: &Scenario, now_ns: u64) -> Result<Emulat
     let mechanism = Mechanism::new(&scenario.mechanism)?;
     let food = scenario.food.map(|config| Food::new(config, &closed_mouth(&mechanism, &scenario.jaw)));
     let dynamics = resting(mechanism, &scenario.dynamics)?.chewing(food);
-    let positions_m = dynamics.positions_m();
+    let positions_m = dynamics.state().positions_m();
     let drives = (0..AXES)
         .map(|axis| {
             let drive = scenario.drives.of_axis(axis);

@@ -18,17 +18,30 @@ use nalgebra::{Matrix3, Matrix6, UnitQuaternion, Vector3, Vector6};
 use crate::food::Food;
 use crate::friction::Friction;
 
+/// Where the mechanism is and how it moves.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct State {
+    /// The platform in the base frame.
+    pub(crate) pose: Pose,
+    twist: Twist,
+    joints: Joints,
+}
+
+impl State {
+    /// Joint positions d₁ d₂ d₃ l₁ l₂ l₃, m.
+    pub(crate) fn positions_m(&self) -> [f64; AXES] {
+        self.joints.actuators.to_axes()
+    }
+}
+
 /// The moving mechanism.
 #[derive(Debug, Clone)]
 pub(crate) struct Dynamics {
     mechanism: Mechanism,
     config: DynamicsConfig,
-    pose: Pose,
-    twist: Twist,
+    state: State,
     /// V̇ under the forces that act.
     acceleration: Twist,
-    joints: Joints,
-    jacobian: Jacobian,
     friction: Friction,
     food: Option<Food>,
 }
@@ -65,11 +78,10 @@ impl Dynamics {
         pose: Pose,
     ) -> Result<Self, DynamicsError> {
         let joints = mechanism.inverse(&pose)?;
-        let jacobian = mechanism.jacobian(&pose, &joints);
         let friction = Friction::new(&config);
         let (twist, acceleration) = (Twist::zeros(), Twist::zeros());
-        let dynamics =
-            Self { mechanism, config, pose, twist, acceleration, joints, jacobian, friction, food: None };
+        let state = State { pose, twist, joints };
+        let dynamics = Self { mechanism, config, state, acceleration, friction, food: None };
         let longest_step_ns = dynamics.longest_step_ns()?;
         if longest_step_ns < *DynamicsConfig::STEPS_NS.start() {
             return Err(DynamicsError::Stiff);
@@ -84,9 +96,10 @@ impl Dynamics {
     /// eigenvalue of M⁻¹ Jᵀ C J, C being how steeply friction grows with speed at rest. With M = L Lᵀ it is that of
     /// the symmetric B Bᵀ, B = L⁻¹ Jᵀ √C.
     fn longest_step_ns(&self) -> Result<u64, DynamicsError> {
-        let mass = self.mass(&self.platform_inertia()).cholesky().ok_or(DynamicsError::Mass)?;
+        let jacobian = self.jacobian_at(&self.state);
+        let mass = self.mass(&jacobian, &self.platform_inertia()).cholesky().ok_or(DynamicsError::Mass)?;
         let root = Matrix6::from_diagonal(&self.friction.damping_n_s_per_m().map(f64::sqrt));
-        let braked = self.jacobian.actuators.transpose() * root;
+        let braked = jacobian.actuators.transpose() * root;
         let braked = mass.l().solve_lower_triangular(&braked).ok_or(DynamicsError::Mass)?;
         let rates_per_s = braked * braked.transpose();
         // The search for eigenvalues of what is no number never ends.
@@ -106,57 +119,58 @@ impl Dynamics {
         self.food.as_ref().map_or(0.0, Food::force_n)
     }
 
-    /// The platform in the base frame.
-    pub(crate) fn pose(&self) -> &Pose {
-        &self.pose
+    /// Where it is and how it moves now.
+    pub(crate) fn state(&self) -> &State {
+        &self.state
     }
 
-    /// Joint positions d₁ d₂ d₃ l₁ l₂ l₃, m.
-    pub(crate) fn positions_m(&self) -> [f64; AXES] {
-        self.joints.actuators.to_axes()
-    }
-
-    /// Joint velocities, m/s.
-    pub(crate) fn velocities_m_s(&self) -> [f64; AXES] {
-        (self.jacobian.actuators * self.twist).into()
+    /// Joint velocities in a state, m/s. Nobody needs them at every step, and they take longer than it does.
+    pub(crate) fn velocities_m_s(&self, state: &State) -> [f64; AXES] {
+        (self.jacobian_at(state).actuators * state.twist).into()
     }
 
     /// Lets these forces of the actuators (N) act from now on: the platform accelerates as it does here until
     /// the next call.
     pub(crate) fn push(&mut self, force_n: &[f64; AXES]) -> Result<(), DynamicsError> {
-        let (axes, hinges) = self.bias();
+        let jacobian = self.jacobian_at(&self.state);
+        let (axes, hinges) = self.bias(&jacobian);
         let inertia = self.platform_inertia();
         let axes_n = Vector6::from(*force_n)
-            - self.friction.force_n(&self.velocities_m_s().into())
+            - self.friction.force_n(&(jacobian.actuators * self.state.twist))
             - self.axis_mass_kg().component_mul(&axes);
-        let food = self.food.as_mut().map_or_else(Vector6::zeros, |food| food.bite(&self.pose, &self.twist));
+        let food = self
+            .food
+            .as_mut()
+            .map_or_else(Vector6::zeros, |food| food.bite(&self.state.pose, &self.state.twist));
         let hinges_nm = hinges * -self.config.leg_inertia_kg_m2;
-        let wrench = self.jacobian.actuators.tr_mul(&axes_n)
-            + self.jacobian.hinges.tr_mul(&hinges_nm)
-            + self.gravity()
-            + food
-            - self.gyroscopic(&inertia);
-        let solver = self.mass(&inertia).cholesky().ok_or(DynamicsError::Mass)?;
+        let wrench =
+            jacobian.actuators.tr_mul(&axes_n) + jacobian.hinges.tr_mul(&hinges_nm) + self.gravity() + food
+                - self.gyroscopic(&inertia);
+        let solver = self.mass(&jacobian, &inertia).cholesky().ok_or(DynamicsError::Mass)?;
         self.acceleration = solver.solve(&wrench);
         Ok(())
     }
 
     /// Lets time pass: semi-implicit Euler.
     pub(crate) fn advance(&mut self, dt_s: f64) -> Result<(), DynamicsError> {
-        self.twist += self.acceleration * dt_s;
-        let linear = self.twist.fixed_rows::<3>(0) * dt_s;
-        let angular = self.twist.fixed_rows::<3>(3) * dt_s;
-        let mut rotation = UnitQuaternion::from_scaled_axis(angular) * self.pose.rotation;
+        let State { pose, twist, joints } = &mut self.state;
+        *twist += self.acceleration * dt_s;
+        let linear = twist.fixed_rows::<3>(0) * dt_s;
+        let angular = twist.fixed_rows::<3>(3) * dt_s;
+        let mut rotation = UnitQuaternion::from_scaled_axis(angular) * pose.rotation;
         rotation.renormalize();
-        self.pose = Pose::from_parts((self.pose.translation.vector + linear).into(), rotation);
-        self.joints = self.mechanism.inverse(&self.pose)?;
-        self.jacobian = self.mechanism.jacobian(&self.pose, &self.joints);
+        *pose = Pose::from_parts((pose.translation.vector + linear).into(), rotation);
+        *joints = self.mechanism.inverse(pose)?;
         Ok(())
+    }
+
+    fn jacobian_at(&self, State { pose, joints, .. }: &State) -> Jacobian {
+        self.mechanism.jacobian(pose, joints)
     }
 
     /// Inertia of the platform about its origin in base axes, kg m².
     fn platform_inertia(&self) -> Matrix3<f64> {
-        let rotation = self.pose.rotation.to_rotation_matrix().into_inner();
+        let rotation = self.state.pose.rotation.to_rotation_matrix().into_inner();
         rotation
             * Matrix3::from_diagonal(&Vec3::from(self.config.platform_inertia_kg_m2))
             * rotation.transpose()
@@ -173,17 +187,17 @@ impl Dynamics {
     /// A corner is then accelerated by ω×(ω×r) alone. Slide and leg see their component of it, the leg
     /// also the centrifugal lθ̇², the hinge the Coriolis −2l̇θ̇/l. The first three columns of a row of the
     /// Jacobian are the direction to project on.
-    fn bias(&self) -> (Vector6<f64>, Vector3<f64>) {
-        let omega: Vec3 = self.twist.fixed_rows::<3>(3).into();
-        let rates = self.jacobian.actuators * self.twist;
-        let swings = self.jacobian.hinges * self.twist;
-        let along_axes = self.jacobian.actuators.fixed_columns::<3>(0);
-        let about_hinges = self.jacobian.hinges.fixed_columns::<3>(0);
+    fn bias(&self, jacobian: &Jacobian) -> (Vector6<f64>, Vector3<f64>) {
+        let State { pose, twist, joints } = &self.state;
+        let omega: Vec3 = twist.fixed_rows::<3>(3).into();
+        let rates = jacobian.actuators * twist;
+        let swings = jacobian.hinges * twist;
+        let along_axes = jacobian.actuators.fixed_columns::<3>(0);
+        let about_hinges = jacobian.hinges.fixed_columns::<3>(0);
         let (mut axes, mut hinges) = (Vector6::zeros(), Vector3::zeros());
         for (leg, corner) in self.mechanism.platform_corners().iter().enumerate() {
-            let corner = omega.cross(&omega.cross(&(self.pose.rotation * corner)));
-            let (length_m, swing, stretch) =
-                (self.joints.actuators.leg_m[leg], swings[leg], rates[LEGS + leg]);
+            let corner = omega.cross(&omega.cross(&(pose.rotation * corner)));
+            let (length_m, swing, stretch) = (joints.actuators.leg_m[leg], swings[leg], rates[LEGS + leg]);
             axes[leg] = (along_axes.row(leg) * corner).x;
             axes[LEGS + leg] = (along_axes.row(LEGS + leg) * corner).x + length_m * swing * swing;
             hinges[leg] = (about_hinges.row(leg) * corner).x - 2.0 * stretch * swing / length_m;
@@ -192,14 +206,14 @@ impl Dynamics {
     }
 
     /// Mass matrix against the twist: platform + Jᵀ·M·J of slides and rods + hinges.
-    fn mass(&self, platform_inertia: &Matrix3<f64>) -> Matrix6<f64> {
+    fn mass(&self, jacobian: &Jacobian, platform_inertia: &Matrix3<f64>) -> Matrix6<f64> {
         let config = &self.config;
-        let mut moved = self.jacobian.actuators;
+        let mut moved = jacobian.actuators;
         for (mut row, mass_kg) in moved.row_iter_mut().zip(&self.axis_mass_kg()) {
             row *= *mass_kg;
         }
-        let mut mass = self.jacobian.actuators.tr_mul(&moved);
-        mass += self.jacobian.hinges.tr_mul(&self.jacobian.hinges) * config.leg_inertia_kg_m2;
+        let mut mass = jacobian.actuators.tr_mul(&moved);
+        mass += jacobian.hinges.tr_mul(&jacobian.hinges) * config.leg_inertia_kg_m2;
         for i in 0..3 {
             mass[(i, i)] += config.platform_mass_kg;
         }
@@ -214,7 +228,7 @@ impl Dynamics {
         wrench[2] = -self.config.platform_mass_kg * self.config.gravity_m_s2;
         let rod_n = self.config.rod_mass_kg * self.config.gravity_m_s2;
         for corner in self.mechanism.platform_corners() {
-            let arm = self.pose.rotation * corner;
+            let arm = self.state.pose.rotation * corner;
             wrench[2] -= rod_n;
             // r × (0, 0, −w)
             wrench[3] -= arm.y * rod_n;
@@ -225,7 +239,7 @@ impl Dynamics {
 
     /// ω × Iω of the platform.
     fn gyroscopic(&self, platform_inertia: &Matrix3<f64>) -> Vector6<f64> {
-        let omega: Vec3 = self.twist.fixed_rows::<3>(3).into();
+        let omega: Vec3 = self.state.twist.fixed_rows::<3>(3).into();
         let moment = omega.cross(&(platform_inertia * omega));
         Vector6::new(0.0, 0.0, 0.0, moment.x, moment.y, moment.z)
     }

@@ -7,7 +7,7 @@ use masseter_shared::geometry::AXES;
 use masseter_shared::messages::{Truth, pose_fields};
 
 use crate::drive::DriveNode;
-use crate::dynamics::{Dynamics, DynamicsError};
+use crate::dynamics::{Dynamics, DynamicsError, State};
 
 /// Drives and mechanism, co-simulated in the order of time.
 #[derive(Debug)]
@@ -18,32 +18,57 @@ pub(crate) struct Emulation {
     next_step_ns: u64,
     moved_to_ns: u64,
     force_n: [f64; AXES],
-    truth: Truth,
-    /// Drives that had the SYNC for which the truth was sampled.
+    sample: Sample,
+    /// Drives that had the SYNC for which it was taken.
     synchronised: [bool; AXES],
+}
+
+/// What the truth of a cycle is worked out from, once the reading is on its way.
+#[derive(Debug, Clone, Copy)]
+struct Sample {
+    time_ns: u64,
+    state: State,
+    force_n: [f64; AXES],
+    bite_force_n: f64,
+}
+
+impl Sample {
+    fn of(dynamics: &Dynamics, force_n: [f64; AXES], time_ns: u64) -> Self {
+        Self { time_ns, state: *dynamics.state(), force_n, bite_force_n: dynamics.bite_force_n() }
+    }
 }
 
 impl Emulation {
     /// Everything at rest at `now_ns`; `drives` in the order of the axes.
     pub(crate) fn new(drives: Vec<DriveNode>, dynamics: Dynamics, step_ns: u64, now_ns: u64) -> Self {
-        let mut emulation = Self {
+        let force_n = [0.0; AXES];
+        Self {
+            sample: Sample::of(&dynamics, force_n, now_ns),
             drives,
             dynamics,
             step_ns,
             // Half a step beside the SYNCs of a cycle that is a multiple of it, which have enough to do.
             next_step_ns: now_ns + step_ns / 2,
             moved_to_ns: now_ns,
-            force_n: [0.0; AXES],
-            truth: Truth::default(),
+            force_n,
             synchronised: [true; AXES],
-        };
-        emulation.sample_truth(now_ns);
-        emulation
+        }
     }
 
     /// The mechanism at the last SYNC.
     pub(crate) fn truth(&self) -> Truth {
-        self.truth
+        let Sample { time_ns, state, force_n, bite_force_n } = self.sample;
+        let (position_m, quaternion_wxyz) = pose_fields(&state.pose);
+        Truth {
+            sampled_ns: time_ns,
+            position_m,
+            quaternion_wxyz,
+            joint_m: state.positions_m(),
+            joint_m_s: self.dynamics.velocities_m_s(&state),
+            force_n,
+            bite_force_n,
+            ..Truth::default()
+        }
     }
 
     /// The drives, in the order of the axes.
@@ -68,7 +93,7 @@ impl Emulation {
             self.move_mechanism(now_ns)?;
             self.synchronise(axis, now_ns);
         }
-        self.drives[axis].receive(now_ns, frame, self.dynamics.positions_m()[axis]);
+        self.drives[axis].receive(now_ns, frame, self.dynamics.state().positions_m()[axis]);
         Ok(())
     }
 
@@ -81,7 +106,7 @@ impl Emulation {
     pub(crate) fn step(&mut self) -> Result<(), DynamicsError> {
         let now_ns = self.next_step_ns;
         self.move_mechanism(now_ns)?;
-        let positions_m = self.dynamics.positions_m();
+        let positions_m = self.dynamics.state().positions_m();
         for (axis, position_m) in positions_m.into_iter().enumerate() {
             self.force_n[axis] = self.drives[axis].step(now_ns, position_m);
         }
@@ -114,28 +139,14 @@ impl Emulation {
         Ok(())
     }
 
-    /// Samples the truth with the first SYNC of a cycle, on whichever wire it arrives: one that a drive has
+    /// Takes the sample with the first SYNC of a cycle, on whichever wire it arrives: one that a drive has
     /// for the second time is a new one, while those that arrive later on busier wires are not.
     fn synchronise(&mut self, axis: usize, now_ns: u64) {
         if self.synchronised[axis] {
             self.synchronised = [false; AXES];
-            self.sample_truth(now_ns);
+            self.sample = Sample::of(&self.dynamics, self.force_n, now_ns);
         }
         self.synchronised[axis] = true;
-    }
-
-    fn sample_truth(&mut self, now_ns: u64) {
-        let (position_m, quaternion_wxyz) = pose_fields(self.dynamics.pose());
-        self.truth = Truth {
-            sampled_ns: now_ns,
-            position_m,
-            quaternion_wxyz,
-            joint_m: self.dynamics.positions_m(),
-            joint_m_s: self.dynamics.velocities_m_s(),
-            force_n: self.force_n,
-            bite_force_n: self.dynamics.bite_force_n(),
-            ..Truth::default()
-        };
     }
 }
 
@@ -173,12 +184,12 @@ mod tests {
         let mut emulation = build_emulation(&scenario, 0).unwrap();
         let first_ns = emulation.next_step_ns();
         (0..10).for_each(|_| emulation.step().unwrap());
-        let (moved_to_ns, positions_m) = (emulation.moved_to_ns(), emulation.dynamics.positions_m());
+        let (moved_to_ns, positions_m) = (emulation.moved_to_ns(), emulation.dynamics.state().positions_m());
 
         assert_eq!(emulation.skip_to(emulation.next_step_ns() + 3 * step_ns + 1), 3 * step_ns);
         assert_eq!(emulation.next_step_ns(), first_ns + 13 * step_ns);
         assert_eq!(emulation.moved_to_ns(), moved_to_ns + 3 * step_ns);
-        assert!(emulation.dynamics.positions_m().iter().eq(&positions_m));
+        assert!(emulation.dynamics.state().positions_m().iter().eq(&positions_m));
         assert_eq!(emulation.skip_to(0), 0);
     }
 }
