@@ -122,17 +122,15 @@ impl VirtualLink {
 
     /// A frame arrives: the drives on the wire take it where their axes stand at that instant.
     fn arrive(&mut self, bus: usize, now_ns: u64) -> Result<(), DynamicsError> {
-        self.wires[bus].advance(now_ns);
-        for axis in 0..AXES {
-            let Place { bus: own_bus, port } = self.places[axis];
-            if own_bus != bus {
-                continue;
-            }
+        let wire = &mut self.wires[bus];
+        wire.advance(now_ns);
+        let at_bus = self.places.iter().enumerate().filter(|(_, place)| place.bus == bus);
+        for (axis, &Place { port, .. }) in at_bus {
             // An overrun has lost the drive's newest frames, as in a real node; the older ones follow.
-            while let Ok(Some(received)) = self.wires[bus].receive(port, now_ns) {
+            while let Ok(Some(received)) = wire.receive(port, now_ns) {
                 self.emulation.deliver(axis, &received.frame, now_ns)?;
             }
-            self.send_outgoing(axis, now_ns);
+            send_outgoing(&mut self.emulation, axis, wire, port, now_ns);
         }
         Ok(())
     }
@@ -142,16 +140,17 @@ impl VirtualLink {
             self.emulation.watch_bus(axis, self.wires[bus].status(port).state);
         }
         self.emulation.step()?;
-        (0..AXES).for_each(|axis| self.send_outgoing(axis, now_ns));
+        for (axis, &Place { bus, port }) in self.places.iter().enumerate() {
+            send_outgoing(&mut self.emulation, axis, &mut self.wires[bus], port, now_ns);
+        }
         Ok(())
     }
+}
 
-    fn send_outgoing(&mut self, axis: usize, now_ns: u64) {
-        let Place { bus, port } = self.places[axis];
-        while let Some(frame) = self.emulation.outgoing(axis) {
-            // A full transmit queue or a controller off the bus loses the frame, as in a real node; the
-            // master misses it.
-            let _ = self.wires[bus].send(port, now_ns, frame);
-        }
+fn send_outgoing(emulation: &mut Emulation, axis: usize, wire: &mut VirtualWire, port: usize, now_ns: u64) {
+    while let Some(frame) = emulation.outgoing(axis) {
+        // A full transmit queue or a controller off the bus loses the frame, as in a real node; the
+        // master misses it.
+        let _ = wire.send(port, now_ns, frame);
     }
 }

@@ -73,9 +73,9 @@ impl DriveNode {
         if self.is_operational() {
             self.axis.sample(position_m);
             self.axis.show(now_ns, &mut self.objects);
-            for number in 0..PDOS {
-                if let Some(frame) = self.tpdos[number].at_sync(now_ns, counter, &self.objects) {
-                    self.send(frame);
+            for tpdo in &mut self.tpdos {
+                if let Some(frame) = tpdo.at_sync(now_ns, counter, &self.objects) {
+                    self.outbox.add(frame);
                 }
             }
         }
@@ -87,9 +87,9 @@ impl DriveNode {
             return;
         }
         self.axis.show(now_ns, &mut self.objects);
-        for number in 0..PDOS {
-            if let Some(frame) = self.tpdos[number].at_event(now_ns, &self.objects) {
-                self.send(frame);
+        for tpdo in &mut self.tpdos {
+            if let Some(frame) = tpdo.at_event(now_ns, &self.objects) {
+                self.outbox.add(frame);
             }
         }
     }

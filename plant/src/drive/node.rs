@@ -77,7 +77,7 @@ pub(crate) struct DriveNode {
     /// Cyclic targets that a client wrote since the last SYNC.
     pub(super) new_targets: NewTargets,
     pub(super) boot_at_ns: u64,
-    outbox: Outbox,
+    pub(super) outbox: Outbox,
 }
 
 impl DriveNode {

@@ -19,6 +19,15 @@ impl Part {
     fn address(self) -> ObjectAddress {
         ENTRIES[usize::from(self.place)].address
     }
+
+    fn bits(self) -> u32 {
+        8 * u32::from(self.bytes)
+    }
+
+    /// The bits of a word that are meant.
+    fn mask(self) -> u32 {
+        u32::MAX >> (u32::BITS - self.bits())
+    }
 }
 
 /// A compiled mapping.
@@ -63,29 +72,24 @@ impl Mapped {
 
     /// The objects' data, zero behind them.
     pub(super) fn pack(&self, objects: &Objects) -> [u8; MAX_BYTES] {
-        let mut data = [0; MAX_BYTES];
-        let mut at = 0;
+        let (mut data, mut at) = (0, 0);
         for part in self.parts() {
-            let bytes = usize::from(part.bytes);
-            let word = objects.word(usize::from(part.place)).to_le_bytes();
-            data[at..at + bytes].copy_from_slice(&word[..bytes]);
-            at += bytes;
+            let word = objects.word(usize::from(part.place)) & part.mask();
+            data |= u64::from(word) << at;
+            at += part.bits();
         }
-        data
+        data.to_le_bytes()
     }
 
     /// Writes the data into the objects; a value beyond its limits leaves its object as it is.
     pub(super) fn unpack(&self, data: [u8; MAX_BYTES], objects: &mut Objects) {
-        let mut at = 0;
+        let mut data = u64::from_le_bytes(data);
         for part in self.parts() {
-            let bytes = usize::from(part.bytes);
-            let mut word = [0; 4];
-            word[..bytes].copy_from_slice(&data[at..at + bytes]);
-            let (place, word) = (usize::from(part.place), u32::from_le_bytes(word));
+            let (place, word) = (usize::from(part.place), data as u32 & part.mask());
             if within_limits(place, word).is_ok() {
                 objects.set_word(place, word);
             }
-            at += bytes;
+            data >>= part.bits();
         }
     }
 }
