@@ -118,7 +118,12 @@ impl Waiter {
         self.working_since_ns = self.working_since_ns.map(|since_ns| since_ns + took_ns);
     }
 
+    /// Returns the time found at its end, or `from_ns`, found just now, where there is nothing to wait for.
     fn spin_until(&mut self, due_ns: u64, from_ns: u64) -> u64 {
+        if from_ns >= due_ns {
+            self.working_since_ns = Some(from_ns);
+            return from_ns;
+        }
         let mut spin = Spin { last_ns: from_ns, waiter: self };
         loop {
             let now_ns = spin.now_ns();
