@@ -170,6 +170,11 @@ impl Controller {
         Ok(())
     }
 
+    /// Works out the poses that the next cycle will want if the motion goes on, while there is time for it.
+    pub fn foresee(&mut self) {
+        self.playback.foresee(self.period_s, [0.0, self.lead_s()]);
+    }
+
     /// What the controller would be after another cycle with the last measurement. To be thrown away: computing it
     /// brings code and data of the cycle to come back into the processor's caches.
     #[must_use]
@@ -236,7 +241,7 @@ impl Controller {
             safety::check_tracking(&wanted, &estimate.solution.pose, self.config.tracking_limit_m)?;
             self.control.observe(&wanted, &estimate.solution.pose, self.period_s);
         }
-        let ahead = self.playback.pose_ahead(self.config.lead_cycles * self.period_s);
+        let ahead = self.playback.pose_ahead(self.lead_s());
         let joints = self.mechanism.inverse(&self.control.correct(&ahead))?;
         // A motion that uses its strokes to the end leaves no room for the trim.
         let before = self.target.unwrap_or(joints.actuators);
@@ -251,6 +256,11 @@ impl Controller {
     fn sample_age_s(&self) -> f64 {
         let reading_cycle = self.estimate.map_or(self.last_cycle, |estimate| estimate.reading_cycle);
         self.last_cycle.saturating_sub(reading_cycle).min(LATE_READING_CYCLES) as f64 * self.period_s
+    }
+
+    /// From a sample to the instant at which the command that answers it is reached, s.
+    fn lead_s(&self) -> f64 {
+        self.config.lead_cycles * self.period_s
     }
 
     fn is_moving(&self) -> bool {

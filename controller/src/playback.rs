@@ -30,6 +30,17 @@ pub(crate) struct Playback {
     /// Speed of the part's own clock: 1, or less while it comes to rest.
     rate: f64,
     stopping: bool,
+    /// Poses of the part that were worked out in advance.
+    foreseen: [Option<Foreseen>; FORESEEN],
+}
+
+/// How many poses are worked out in advance.
+const FORESEEN: usize = 2;
+
+#[derive(Debug, Clone, Copy)]
+struct Foreseen {
+    time_s: f64,
+    pose: Pose,
 }
 
 impl Playback {
@@ -43,6 +54,7 @@ impl Playback {
             elapsed_s: 0.0,
             rate: 1.0,
             stopping: false,
+            foreseen: [None; FORESEEN],
         }
     }
 
@@ -68,15 +80,19 @@ impl Playback {
 
     fn begin(&mut self, part: Part) {
         (self.part, self.elapsed_s, self.rate, self.stopping) = (part, 0.0, 1.0, false);
+        self.foreseen = [None; FORESEEN];
     }
 
     /// Lets `dt_s` pass.
     pub(crate) fn advance(&mut self, dt_s: f64) {
+        (self.elapsed_s, self.rate) = self.advanced(dt_s);
+    }
+
+    /// Elapsed time and rate when `dt_s` will have passed.
+    fn advanced(&self, dt_s: f64) -> (f64, f64) {
         let before = self.rate;
-        if self.stopping {
-            self.rate = (self.rate - dt_s / self.stop_ramp_s).max(0.0);
-        }
-        self.elapsed_s += dt_s * (before + self.rate) / 2.0;
+        let rate = if self.stopping { (before - dt_s / self.stop_ramp_s).max(0.0) } else { before };
+        (self.elapsed_s + dt_s * (before + rate) / 2.0, rate)
     }
 
     /// The part's own time `ahead_s` from now, s.
@@ -84,9 +100,31 @@ impl Playback {
         self.elapsed_s + self.rate * ahead_s
     }
 
+    /// Works out the poses that will be wanted `ahead_s` from when `dt_s` will have passed. They do not depend on
+    /// anything measured; where the motion goes on otherwise, they are not used.
+    pub(crate) fn foresee(&mut self, dt_s: f64, ahead_s: [f64; FORESEEN]) {
+        let (elapsed_s, rate) = self.advanced(dt_s);
+        self.foreseen = ahead_s.map(|ahead_s| {
+            let time_s = elapsed_s + rate * ahead_s;
+            Some(Foreseen { time_s, pose: self.pose_at(time_s) })
+        });
+    }
+
     /// The pose wanted `ahead_s` from now.
     pub(crate) fn pose_ahead(&self, ahead_s: f64) -> Pose {
         let time_s = self.time_ahead_s(ahead_s);
+        self.foreseen_at(time_s).unwrap_or_else(|| self.pose_at(time_s))
+    }
+
+    /// The pose at exactly that time of the part's own, if it was foreseen.
+    fn foreseen_at(&self, time_s: f64) -> Option<Pose> {
+        let foreseen =
+            self.foreseen.iter().flatten().find(|foreseen| foreseen.time_s.total_cmp(&time_s).is_eq());
+        foreseen.map(|foreseen| foreseen.pose)
+    }
+
+    /// The pose at a time of the part's own.
+    fn pose_at(&self, time_s: f64) -> Pose {
         match self.part {
             Part::Hold(pose) => pose,
             Part::Ease(from) => {
@@ -126,3 +164,6 @@ fn interpolate(from: &Pose, to: &Pose, share: f64) -> Pose {
     let position = from.translation.vector.lerp(&to.translation.vector, share);
     Pose::from_parts(position.into(), nalgebra::UnitQuaternion::from_scaled_axis(turn) * from.rotation)
 }
+
+#[cfg(test)]
+mod tests;
