@@ -24,6 +24,13 @@ use serde_json::Value;
 #[derive(Debug, Clone, Copy)]
 struct Moment(ControllerState, u64);
 
+impl Moment {
+    /// Drives are off a cycle after they were asked to be: at 1 kHz, the signal would seldom come in time.
+    fn rate_hz(self) -> u32 {
+        if self.0 == Disabling { 200 } else { 1000 }
+    }
+}
+
 /// Every state that ends by itself.
 const MOMENTS: [Moment; 7] = [
     Moment(WaitReadings, 30),
@@ -35,7 +42,6 @@ const MOMENTS: [Moment; 7] = [
     Moment(Disabling, 1),
 ];
 const ROLES: [&str; 3] = ["controller", "plant", "logger"];
-const MOTION: &str = "duration_s = 0.5\n";
 /// Far less than what the unhurried rig bears with.
 const SHORT_STOP: Duration = Duration::from_millis(60);
 /// A machine that stands still may let the moment pass.
@@ -55,7 +61,8 @@ impl Rig {
     /// A rig whose `role` gets the signal at the moment; none when that was missed.
     fn hit(cores: &Cores, role: &str, signal: Signal, moment: Moment) -> Option<Self> {
         let name = format!("hit-{}", std::process::id());
-        let workspace = Workspace::new(&format!("{MOTION}{UNHURRIED}"));
+        let workspace =
+            Workspace::new(&format!("rate_hz = {}\nduration_s = 0.5\n{UNHURRIED}", moment.rate_hz()));
         let supervisor = workspace.start(cores, &["--name", &name]);
         let victim = child_of(&supervisor, role);
         let rig = Self { name, workspace, supervisor, victim };
