@@ -45,7 +45,7 @@ struct Ports {
 impl Ports {
     fn open(node: &Node) -> Result<Self, ProcessError> {
         let ports = Self {
-            readings: node.inlet()?,
+            readings: node.newest_inlet()?,
             commands: node.outlet()?,
             states: node.outlet()?,
             events: node.outlet()?,

@@ -52,7 +52,7 @@ struct Ports {
 impl Ports {
     fn open(node: &Node) -> Result<Self, ProcessError> {
         let ports = Self {
-            commands: node.inlet()?,
+            commands: node.newest_inlet()?,
             readings: node.outlet()?,
             truths: node.outlet()?,
             frames: node.batch_outlet()?,

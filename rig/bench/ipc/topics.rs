@@ -77,7 +77,7 @@ impl Ends for Ports {
     }
 
     fn inlet<M: Message + Numbered>(node: &Node) -> anyhow::Result<Inlet<M>> {
-        Ok(node.inlet()?)
+        Ok(node.newest_inlet()?)
     }
 
     fn send<M: Message + Numbered>(out: &mut Outlet<M>, number: u64) -> anyhow::Result<()> {

@@ -27,6 +27,8 @@ const MAX_PUBLISHERS: usize = 4;
 /// Subscribers a topic may have: the counterpart, the logger, and two observers. Shared memory is
 /// reserved, and locked, for all of them.
 const MAX_SUBSCRIBERS: usize = 4;
+/// Messages that are kept for whoever wants the newest only.
+const KEPT_FOR_THE_NEWEST: usize = 4;
 /// Messages a subscriber may hold at once: while it looks for a newer one than it has, it holds the one
 /// it has, the newest found so far, and the next.
 const MAX_HELD: usize = 3;
@@ -155,10 +157,21 @@ impl Node {
 
     /// The receiving end of a topic, which keeps up to [`Message::DEPTH`] messages.
     pub fn inlet<M: Message>(&self) -> Result<Inlet<M>, TransportError> {
+        self.inlet_keeping(M::DEPTH)
+    }
+
+    /// The receiving end of a topic for who wants the newest message only. It keeps few: what wanders through a long queue
+    /// finds it cold (ARCHITECTURE.md), and behind a stall nobody looks through what is old.
+    pub fn newest_inlet<M: Message>(&self) -> Result<Inlet<M>, TransportError> {
+        self.inlet_keeping(KEPT_FOR_THE_NEWEST)
+    }
+
+    fn inlet_keeping<M: Message>(&self, messages: usize) -> Result<Inlet<M>, TransportError> {
         let refused = Refused::default();
         let subscriber = self
             .service::<M>()?
             .subscriber_builder()
+            .buffer_size(messages)
             .set_degradation_handler(refused.counter())
             .create()
             .map_err(failed("subscribing to", M::TOPIC))?;
@@ -282,6 +295,17 @@ mod tests {
             assert_eq!((newest.cycle, newest.seq), (round * 10 + 4, round * 5));
             assert!(inlet.receive().unwrap().is_none());
         }
+    }
+
+    #[test]
+    fn who_wants_the_newest_only_finds_few_old_ones_and_it_among_them() {
+        let domain = ScratchDomain::claim("test-newest").unwrap();
+        let node = Node::join(&domain).unwrap();
+        let inlet = node.newest_inlet::<Event>().unwrap();
+        let mut outlet = node.outlet::<Event>().unwrap();
+        (1..=100).for_each(|cycle| outlet.publish(|event| event.cycle = cycle).unwrap());
+        let received = std::iter::from_fn(|| inlet.receive().unwrap()).map(|event| (event.cycle, event.seq));
+        assert!(received.eq((97..=100).map(|cycle| (cycle, cycle))));
     }
 
     #[test]
