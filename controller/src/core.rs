@@ -170,7 +170,7 @@ impl Controller {
         Ok(())
     }
 
-    /// Works out the poses that the next cycle will want if the motion goes on, while there is time for it.
+    /// Works out the poses that the next cycle will want if the motion goes on. Optional: it only saves that cycle time.
     pub fn foresee(&mut self) {
         self.playback.foresee(self.period_s, [0.0, self.lead_s()]);
     }

@@ -82,7 +82,7 @@ pub fn run(assignment: &Assignment) -> Result<Outcome, ControllerError> {
         if post.stop.is_made() {
             controller.request_stop();
         }
-        let wake = cycle.wait_preparing(|| rehearse(&mut controller, &ports))?;
+        let wake = cycle.wait_preparing(|| rehearse(&controller, &ports))?;
         step(&mut controller, &mut ports, wake, patience_ns, cycle.waiter())?;
     }
     match controller.state() {
@@ -91,10 +91,8 @@ pub fn run(assignment: &Assignment) -> Result<Outcome, ControllerError> {
     }
 }
 
-/// What can be known of the cycle to come, and what it will do, without effect: after a sleep its code and data are no
-/// longer in the caches.
-fn rehearse(controller: &mut Controller, ports: &Ports) -> Result<(), ProcessError> {
-    controller.foresee();
+/// What the cycle to come will do, without effect: after a sleep its code and data are no longer in the caches.
+fn rehearse(controller: &Controller, ports: &Ports) -> Result<(), ProcessError> {
     std::hint::black_box(controller.rehearsal());
     ports.commands.warm_up()?;
     ports.states.warm_up()?;
@@ -128,5 +126,7 @@ fn step(
     if let Some(event) = event {
         ports.events.publish(|message| *message = event)?;
     }
+    // Behind the command, where nobody waits.
+    controller.foresee();
     Ok(())
 }
