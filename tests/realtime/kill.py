@@ -199,8 +199,11 @@ def clean_ms(masseter, rig, children):
 
 
 def lives(process):
+    """Whether any of its threads does: the first may be dead while others still hold the process's files, and its lock."""
+    proc = Path(f"/proc/{process}")
     try:
-        return Path(f"/proc/{process}/stat").read_text().rsplit(")", 1)[1].split()[0] != "Z"
+        threads = len(os.listdir(proc / "task"))
+        return threads > 1 or (proc / "stat").read_text().rsplit(")", 1)[1].split()[0] != "Z"
     except (FileNotFoundError, ProcessLookupError):
         return False
 
