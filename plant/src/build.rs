@@ -1,10 +1,10 @@
 //! Builds master, wires, drives and mechanism from a scenario, and refuses what cannot work.
 
-use masseter_shared::can::canopen::{NodeId, sync};
-use masseter_shared::can::faults::Faults;
-use masseter_shared::can::wire::{INTERFRAME_BITS, frame_bits};
-use masseter_shared::can::wrapped::PortFaults;
-use masseter_shared::can::{VirtualWire, WireConfig};
+use masseter_can::PortFaults;
+use masseter_can::canopen::{NodeId, sync};
+use masseter_can::faults::Faults;
+use masseter_can::wire::{INTERFRAME_BITS, frame_bits};
+use masseter_can::{VirtualWire, WireConfig};
 use masseter_shared::clock::MILLISECOND_NS;
 use masseter_shared::config::{CanConfig, Scenario};
 use masseter_shared::geometry::{AXES, Mechanism};

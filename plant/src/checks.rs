@@ -1,6 +1,6 @@
 //! Quantities of a plant that do not go together. Each for itself is checked with the scenario.
 
-use masseter_shared::can::canopen::NodeId;
+use masseter_can::canopen::NodeId;
 use masseter_shared::clock::MILLISECOND_NS;
 use masseter_shared::config::Scenario;
 use masseter_shared::geometry::LEGS;

@@ -5,9 +5,10 @@
 //! [`PlantCore::fill_reading`] and [`PlantCore::truth`], then [`PlantCore::apply`]. Called with irregular
 //! times, as real time has them, or with exact ones.
 
-use masseter_shared::can::canopen::Cob;
-use masseter_shared::can::{ReceiveError, Tapped, tap};
+use masseter_can::canopen::Cob;
+use masseter_can::{ReceiveError, Tapped};
 use masseter_shared::config::Scenario;
+use masseter_shared::messages::tap;
 use masseter_shared::messages::{Command, Event, FrameTap, Reading, Truth};
 use masseter_shared::realtime::Wake;
 

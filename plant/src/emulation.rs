@@ -1,8 +1,8 @@
 //! The six drives and the mechanism they move, stepped by whoever carries their frames: simulated wires
 //! ([`link`](crate::link)) or real ones ([`emulator`](crate::emulator)).
 
-use masseter_shared::can::canopen::Cob;
-use masseter_shared::can::{CanId, ErrorState, Frame};
+use masseter_can::canopen::Cob;
+use masseter_can::{CanId, ErrorState, Frame};
 use masseter_shared::geometry::AXES;
 use masseter_shared::messages::{Truth, pose_fields};
 
@@ -152,7 +152,7 @@ impl Emulation {
 
 #[cfg(test)]
 mod tests {
-    use masseter_shared::can::canopen::sync;
+    use masseter_can::canopen::sync;
     use masseter_shared::config::Scenario;
 
     use crate::build::build_emulation;

@@ -4,7 +4,7 @@
 //! frames are delivered at their time stamps, and the steps between them are made up for. It has no
 //! master and publishes nothing.
 
-use masseter_shared::can::{Bus, OpenError, Received, SocketCan};
+use masseter_can::{Bus, OpenError, Received, SocketCan};
 use masseter_shared::clock::{self, MILLISECOND_NS};
 use masseter_shared::config::Scenario;
 use masseter_shared::geometry::AXES;

@@ -1,8 +1,8 @@
 //! Why a plant cannot be built or cannot go on.
 
-use masseter_shared::can::canopen::{NodeId, NodeIdError};
-use masseter_shared::can::wrapped::NotByPort;
-use masseter_shared::can::{BitrateError, OpenError};
+use masseter_can::NotByPort;
+use masseter_can::canopen::{NodeId, NodeIdError};
+use masseter_can::{BitrateError, OpenError};
 use masseter_shared::geometry::{AXIS_NAMES, GeometryError, LimitViolation};
 
 use crate::dynamics::DynamicsError;

@@ -1,7 +1,7 @@
 //! What a scenario expects of its drives: what the master verifies and configures over the bus.
 
-use masseter_shared::can::canopen::NodeId;
-use masseter_shared::can::cia402::interpolation_period;
+use masseter_can::canopen::NodeId;
+use masseter_can::cia402::interpolation_period;
 use masseter_shared::config::Scenario;
 
 use crate::master::Setup;

@@ -1,8 +1,8 @@
 //! The scenario's faults as those of its wires: nodes become ports, seconds the wire's time.
 
-use masseter_shared::can::canopen::NodeId;
-use masseter_shared::can::faults::{Fault, FaultKind};
-use masseter_shared::can::{CanId, Frame};
+use masseter_can::canopen::NodeId;
+use masseter_can::faults::{Fault, FaultKind};
+use masseter_can::{CanId, Frame};
 use masseter_shared::clock::SECOND_NS;
 use masseter_shared::config::{FaultConfig, FaultKindConfig};
 

@@ -1,6 +1,6 @@
 //! Who the axes are on the buses: where each hangs and which node it is, as a scenario declares it.
 
-use masseter_shared::can::canopen::NodeId;
+use masseter_can::canopen::NodeId;
 use masseter_shared::config::CanConfig;
 use masseter_shared::geometry::AXES;
 

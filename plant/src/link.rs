@@ -2,8 +2,8 @@
 //!
 //! The master sees [`Buses`] either way; the plant around it sees [`Link`].
 
-use masseter_shared::can::faults::FaultNote;
-use masseter_shared::can::{Bus, ReceiveError, Tapped, VirtualWire};
+use masseter_can::faults::FaultNote;
+use masseter_can::{Bus, ReceiveError, Tapped, VirtualWire};
 use masseter_shared::geometry::AXES;
 use masseter_shared::messages::Truth;
 

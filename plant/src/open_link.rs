@@ -1,7 +1,7 @@
 //! The emulated drives and their mechanism on simulated buses, without a master: what a foreign master
 //! meets.
 
-use masseter_shared::can::Bus;
+use masseter_can::Bus;
 use masseter_shared::config::Scenario;
 
 use crate::build::build_virtual;

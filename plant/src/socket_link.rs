@@ -1,8 +1,8 @@
 //! The robot: real wires, on which the drives hang. Nothing is known of the mechanism but what they tell.
 
-use masseter_shared::can::faults::FaultNote;
-use masseter_shared::can::wrapped::PortFaults;
-use masseter_shared::can::{Bus, FrameFormat, ReceiveError, SocketCan, Tapped};
+use masseter_can::PortFaults;
+use masseter_can::faults::FaultNote;
+use masseter_can::{Bus, FrameFormat, ReceiveError, SocketCan, Tapped};
 use masseter_shared::messages::Truth;
 
 use crate::claim::Claim;

@@ -2,8 +2,8 @@
 //! own alone, and the beginning and end of injected faults. Single errors are no events; they are in the log and in the
 //! figures.
 
-use masseter_shared::can::faults::FaultNote;
-use masseter_shared::can::{ErrorKind, ErrorReport, ErrorState};
+use masseter_can::faults::FaultNote;
+use masseter_can::{ErrorKind, ErrorReport, ErrorState};
 use masseter_shared::messages::Event;
 use masseter_shared::messages::codes::{Cause, EventKind, Source};
 

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 
 use masseter_shared::geometry::AXIS_NAMES;
 use masseter_shared::messages::codes::{
-    BootPhase, Cause, ControllerState, DriveCondition, EventKind, Source,
+    BootPhase, Cause, ControllerState, EventKind, Source, drive_state_name,
 };
 use masseter_shared::messages::{Event, explain};
 use serde::Serialize;
@@ -48,7 +48,9 @@ impl From<&Event> for EventRecord {
         let state = |code: u32| match source {
             Coded::Known(Source::Controller) => Coded::<ControllerState>::from(code).to_string(),
             Coded::Known(Source::Master) => Coded::<BootPhase>::from(code).to_string(),
-            _ => Coded::<DriveCondition>::from(code).to_string(),
+            _ => {
+                drive_state_name(code).map_or_else(|unknown| format!("code {}", unknown.code), str::to_owned)
+            }
         };
         let moved = event.from != event.to;
         Self {

@@ -4,8 +4,9 @@ use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-use masseter_shared::can::{candump, tap};
+use masseter_can::candump;
 use masseter_shared::messages::FrameTap;
+use masseter_shared::messages::tap;
 
 use super::{AnalysisError, NOWHERE};
 
@@ -62,9 +63,10 @@ impl CandumpLogs {
             self.buses.push(Log::create(path, interface)?);
         }
         let log = &mut self.buses[bus];
+        let tapped = tap::decode(frame)?;
         self.line.clear();
-        candump::write_tap(&mut self.line, &log.interface, frame)?;
-        let count = if tap::is_error(frame) { &mut log.logged.errors } else { &mut log.logged.frames };
+        candump::write(&mut self.line, &log.interface, &tapped).expect("a string takes any text");
+        let count = if tapped.frame().is_none() { &mut log.logged.errors } else { &mut log.logged.frames };
         *count += 1;
         writeln!(log.file, "{}", self.line)
             .map_err(|error| AnalysisError::Write { path: log.path.clone(), error })
@@ -84,7 +86,7 @@ impl CandumpLogs {
 
 #[cfg(test)]
 mod tests {
-    use masseter_shared::can::{ErrorKind, ErrorReport, Tapped};
+    use masseter_can::{ErrorKind, ErrorReport, Tapped};
 
     use super::*;
 

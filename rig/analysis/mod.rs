@@ -76,7 +76,7 @@ pub enum AnalysisError {
     Read(#[from] ReadError),
     /// A message on topic `frame` that holds no CAN frame.
     #[error("the recording holds a frame that is none: {0}")]
-    Frame(#[from] masseter_shared::can::TapError),
+    Frame(#[from] masseter_shared::messages::tap::TapError),
     /// One of the files made from it.
     #[error("cannot write {}: {error}", path.display())]
     Write {

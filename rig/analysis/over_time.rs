@@ -1,8 +1,8 @@
 //! How a run went, for plots: wake-ups, axes, buses and the platform's error along one time axis.
 
-use masseter_shared::can::tap;
-use masseter_shared::can::wire::{self, Rates};
+use masseter_can::wire::{self, Rates};
 use masseter_shared::geometry::AXES;
+use masseter_shared::messages::tap;
 use masseter_shared::messages::{FrameTap, Reading, State, Truth};
 
 use super::series::{Extremes, Merge, Series, Sums};
@@ -122,7 +122,7 @@ where
 
 #[cfg(test)]
 mod tests {
-    use masseter_shared::can::{Bitrate, CanId, Frame};
+    use masseter_can::{Bitrate, CanId, Frame};
     use masseter_shared::messages::CanData;
 
     use super::*;

@@ -5,9 +5,10 @@
 //! process that was held up, the plan is worked out again for the closest that they were. Real interfaces do not
 //! tell when a frame was queued.
 
-use masseter_shared::can::{BusPlan, FrameFormat, PeriodicMessage, PlannedMessage, TapError, Tapped, tap};
+use masseter_can::{BusPlan, FrameFormat, PeriodicMessage, PlannedMessage, Tapped};
 use masseter_shared::config::Scenario;
 use masseter_shared::messages::FrameTap;
+use masseter_shared::messages::tap::{self, TapError};
 use masseter_shared::schedule::plans;
 
 use super::bus_response::{BusResponse, ResponseFigures};
@@ -168,8 +169,8 @@ impl Followed {
 
 #[cfg(test)]
 mod tests {
-    use masseter_shared::can::canopen::Cob;
-    use masseter_shared::can::{Bitrate, CanId, ErrorKind, ErrorReport, Rates};
+    use masseter_can::canopen::Cob;
+    use masseter_can::{Bitrate, CanId, ErrorKind, ErrorReport, Rates};
 
     use super::*;
 

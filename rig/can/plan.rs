@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use masseter_can::{BusPlan, PlannedMessage};
 use masseter_plant::core as plant;
-use masseter_shared::can::{BusPlan, PlannedMessage};
 use masseter_shared::config::{CanConfig, Scenario};
 use masseter_shared::schedule::{CycleSchedule, Room, ScheduleError, plans};
 use serde_json::{Value, json};

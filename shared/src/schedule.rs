@@ -7,11 +7,11 @@
 
 mod room;
 
-use crate::can::canopen::{Cob, NodeId, NodeIdError};
-use crate::can::wire::{INTERFRAME_BITS, Rates, longest_bits, shortest_bits};
-use crate::can::{BitrateError, BusPlan, NoReleaser, Overload, PeriodicMessage, Release, Rpdo1, Tpdo1};
 use crate::clock::MILLISECOND_NS;
 use crate::config::CanConfig;
+use masseter_can::canopen::{Cob, NodeId, NodeIdError};
+use masseter_can::wire::{INTERFRAME_BITS, Rates, longest_bits, shortest_bits};
+use masseter_can::{BitrateError, BusPlan, NoReleaser, Overload, PeriodicMessage, Release, Rpdo1, Tpdo1};
 
 pub use room::Room;
 
@@ -208,7 +208,7 @@ fn messages(drives: &[NodeId], can: &CanConfig, period_ns: u64, first: Exchange)
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::can::wire::worst_case_bits;
+    use masseter_can::wire::worst_case_bits;
 
     #[test]
     fn two_buses_hold_a_kilohertz_and_the_offsets_follow_the_frames() {

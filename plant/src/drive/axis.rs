@@ -4,7 +4,7 @@
 //! Knows nothing of frames. What is particular to a mode of operation stands in [`cyclic`](super::cyclic),
 //! [`positioning`](super::positioning) and [`homing`](super::homing).
 
-use masseter_shared::can::cia402::{Command, Controlword, DriveState, StatusBit, Statusword};
+use masseter_can::cia402::{Command, Controlword, DriveState, StatusBit, Statusword};
 use masseter_shared::config::DriveConfig;
 
 use super::demand::Demand;

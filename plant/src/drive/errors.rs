@@ -1,6 +1,6 @@
 //! Errors of the drive: which are present, the error register, the history, and what EMCY tells.
 
-use masseter_shared::can::canopen::{Emergency, EmergencyCode};
+use masseter_can::canopen::{Emergency, EmergencyCode};
 
 use super::dictionary::names::{ERROR_CODE, ERROR_COUNT, ERROR_REGISTER, NEWEST_ERROR};
 use super::dictionary::{HISTORY, Objects};
@@ -132,7 +132,7 @@ pub(super) fn forget(objects: &mut Objects) {
 
 #[cfg(test)]
 mod tests {
-    use masseter_shared::can::canopen::NodeId;
+    use masseter_can::canopen::NodeId;
 
     use super::*;
 

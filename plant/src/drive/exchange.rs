@@ -1,6 +1,6 @@
 //! SYNC and process data (CiA 301): what arrives takes effect, what the axis does is sampled and sent.
 
-use masseter_shared::can::Frame;
+use masseter_can::Frame;
 
 use super::dictionary::{PDOS, names};
 use super::errors::DriveError;

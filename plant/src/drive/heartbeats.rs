@@ -1,6 +1,6 @@
 //! Heartbeats of the drive: its own (object 1017) and those it watches (object 1016).
 
-use masseter_shared::can::canopen::NodeId;
+use masseter_can::canopen::NodeId;
 use masseter_shared::clock::MILLISECOND_NS;
 
 use super::dictionary::{Objects, WATCHED, names};

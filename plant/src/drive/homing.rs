@@ -4,7 +4,7 @@
 //! The mechanism has no limit or home switches, so methods that need them are not offered, and the
 //! speed for their search (6099:1) has no use.
 
-use masseter_shared::can::cia402::{Controlword, StatusBit, Statusword};
+use masseter_can::cia402::{Controlword, StatusBit, Statusword};
 
 use super::axis::Axis;
 use crate::encoder::mark_between;

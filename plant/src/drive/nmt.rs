@@ -1,7 +1,7 @@
 //! Network management of the drive (CiA 301): its NMT state, its resets, and what becomes of an axis that nobody guides.
 
-use masseter_shared::can::ErrorState;
-use masseter_shared::can::canopen::{Heartbeat, NmtCommand, NmtState};
+use masseter_can::ErrorState;
+use masseter_can::canopen::{Heartbeat, NmtCommand, NmtState};
 use masseter_shared::clock::MILLISECOND_NS;
 
 use super::cyclic::NewTargets;

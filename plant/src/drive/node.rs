@@ -3,9 +3,9 @@
 //! Network management stands in [`nmt`](super::nmt). SYNC and process data are exchanged in
 //! [`exchange`](super::exchange); what the objects may become is served in [`service`](super::service).
 
-use masseter_shared::can::canopen::{Cob, CobId, Emergency, Heartbeat, Nmt, NmtState, NodeId};
-use masseter_shared::can::cia402::Controlword;
-use masseter_shared::can::{ErrorState, Frame};
+use masseter_can::canopen::{Cob, CobId, Emergency, Heartbeat, Nmt, NmtState, NodeId};
+use masseter_can::cia402::Controlword;
+use masseter_can::{ErrorState, Frame};
 use masseter_shared::clock::MILLISECOND_NS;
 use masseter_shared::config::DriveConfig;
 
@@ -109,7 +109,7 @@ impl DriveNode {
 
     /// State of the drive's power.
     #[cfg(test)]
-    pub(crate) fn power(&self) -> masseter_shared::can::cia402::DriveState {
+    pub(crate) fn power(&self) -> masseter_can::cia402::DriveState {
         self.axis.power()
     }
 

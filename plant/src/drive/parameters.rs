@@ -1,6 +1,6 @@
 //! What the object dictionary configures of an axis, in SI units.
 
-use masseter_shared::can::cia402::interpolation_period;
+use masseter_can::cia402::interpolation_period;
 use masseter_shared::clock::MILLISECOND_NS;
 use masseter_shared::config::DriveConfig;
 
@@ -163,7 +163,7 @@ pub(super) fn configure(
 
 #[cfg(test)]
 mod tests {
-    use masseter_shared::can::canopen::NodeId;
+    use masseter_can::canopen::NodeId;
     use masseter_shared::config::DrivesConfig;
 
     use super::*;

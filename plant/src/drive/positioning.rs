@@ -3,7 +3,7 @@
 //!
 //! Motion through a set-point without stopping (bit 9) is not supported.
 
-use masseter_shared::can::cia402::Controlword;
+use masseter_can::cia402::Controlword;
 
 use super::axis::Axis;
 use super::dictionary::{Objects, names};

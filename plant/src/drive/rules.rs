@@ -1,7 +1,7 @@
 //! What a client may write beyond type and limits: values without a range, parameters in use, and
 //! the procedure of CiA 301 for changing a PDO.
 
-use masseter_shared::can::canopen::{AbortCode, CobId, ObjectAddress};
+use masseter_can::canopen::{AbortCode, CobId, ObjectAddress};
 
 use super::dictionary::{DataType, ENTRIES, MAPPED_MAX, Mapping, Objects, PDOS, WATCHED, find, names};
 use super::heartbeats::watched;

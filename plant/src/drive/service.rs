@@ -1,6 +1,6 @@
 //! The object dictionary as SDO clients see it: reading, writing, and what follows from writing.
 
-use masseter_shared::can::canopen::{AbortCode, Expedited, ObjectAddress};
+use masseter_can::canopen::{AbortCode, Expedited, ObjectAddress};
 
 use super::dictionary::{Access, ENTRIES, Initial, find, names, writable};
 use super::errors::{self, DriveError};

@@ -3,12 +3,10 @@
 //! A pure state machine that carries out its [plan](super::plan) over its SDO client. It judges one node
 //! alone; when nodes are started, and what a failure means for the rig, is the master's.
 
-use masseter_shared::can::canopen::{
-    AbortCode, CobId, NmtCommand, NmtState, NodeId, ObjectAddress, SdoResponse,
-};
-use masseter_shared::can::cia402::{DriveState, Statusword};
+use masseter_can::canopen::{AbortCode, CobId, NmtCommand, NmtState, NodeId, ObjectAddress, SdoResponse};
+use masseter_can::cia402::{DriveState, Statusword};
 use masseter_shared::clock::MILLISECOND_NS;
-use masseter_shared::messages::codes::{BootPhase, Cause, DriveCondition};
+use masseter_shared::messages::codes::{BootPhase, Cause};
 
 use super::plan::{Condition, STATUSWORD, Setup, Task, plan};
 use super::sdo::{ATTEMPTS, Data, SdoClient, SdoFailure, TIMEOUT_NS, Taken};
@@ -316,7 +314,7 @@ impl Boot {
 /// A statusword without a meaning is none of a drive that is off.
 fn may_be_powered(statusword: u32) -> bool {
     let state = Statusword(statusword as u16).state();
-    !state.is_ok_and(|state| DriveCondition::from(state).is_powered() == Some(false))
+    !state.is_ok_and(|state| !state.is_powered())
 }
 
 fn in_fault(statusword: u32) -> bool {

@@ -4,8 +4,8 @@
 //! queued after the process data. So a bus never carries more than the
 //! [time table](masseter_shared::schedule) allows for.
 
-use masseter_shared::can::Bus;
-use masseter_shared::can::canopen::{Nmt, NmtCommand, NmtTarget};
+use masseter_can::Bus;
+use masseter_can::canopen::{Nmt, NmtCommand, NmtTarget};
 use masseter_shared::geometry::AXES;
 use masseter_shared::messages::Event;
 use masseter_shared::messages::codes::{BootPhase, Cause, DriveRequest, EventKind, Source};

@@ -1,9 +1,9 @@
 //! The master's cycle: SYNC and heartbeat, process data in, process data out.
 
-use masseter_shared::can::canopen::{Heartbeat, NmtState, NodeId, sync};
-use masseter_shared::can::{Bus, ReceiveError};
+use masseter_can::canopen::{Heartbeat, NmtState, NodeId, sync};
+use masseter_can::{Bus, ReceiveError};
 use masseter_shared::geometry::AXES;
-use masseter_shared::messages::codes::{Cause, DriveRequest};
+use masseter_shared::messages::codes::{Cause, DriveRequest, DriveState, drive_request, drive_state_code};
 use masseter_shared::messages::{Command, Event, Reading};
 use masseter_shared::realtime::Wake;
 
@@ -190,7 +190,7 @@ impl Master {
         for (axis, node) in self.nodes.iter().enumerate() {
             reading.position_m[axis] = node.position_m();
             reading.force_n[axis] = node.force_n();
-            reading.drive_state[axis] = node.condition().code();
+            reading.drive_state[axis] = drive_state_code(node.drive_state());
             reading.fresh_axes |= u32::from(self.is_fresh(axis)) << axis;
         }
     }
@@ -228,7 +228,7 @@ impl Master {
         if !self.nodes.iter().all(Node::is_ready) {
             return DriveRequest::Off;
         }
-        let request = self.command.map(|command| DriveRequest::try_from(command.request));
+        let request = self.command.map(|command| drive_request(command.request));
         request.and_then(Result::ok).unwrap_or(DriveRequest::Off)
     }
 
@@ -262,7 +262,7 @@ impl Master {
         if let Some(axis) = bad_target {
             return Some((Place::Axis(axis), command.target_m[axis]));
         }
-        let is_unknown = DriveRequest::try_from(command.request).is_err();
+        let is_unknown = drive_request(command.request).is_err();
         is_unknown.then(|| (Place::Nowhere, f64::from(command.request)))
     }
 
@@ -273,7 +273,7 @@ impl Master {
 
     /// Whether no drive reports voltage. A lost one reports nothing, and is not waited for: it stops by itself.
     pub(crate) fn drives_are_off(&self) -> bool {
-        self.nodes.iter().all(|node| node.condition().is_powered() != Some(true))
+        !self.nodes.iter().filter_map(Node::drive_state).any(DriveState::is_powered)
     }
 
     /// Notes that so many tapped frames had no room.

@@ -1,9 +1,9 @@
 //! What the master knows of one drive.
 
-use masseter_shared::can::canopen::{Cob, NmtState, NodeId};
-use masseter_shared::can::cia402::{Controlword, DriveState, toward};
-use masseter_shared::can::{Rpdo1, Tpdo1};
-use masseter_shared::messages::codes::{BootPhase, DriveCondition, DriveRequest};
+use masseter_can::canopen::{Cob, NmtState, NodeId};
+use masseter_can::cia402::{Controlword, DriveRequest, DriveState, next_controlword};
+use masseter_can::{Rpdo1, Tpdo1};
+use masseter_shared::messages::codes::BootPhase;
 
 use super::boot::Boot;
 use super::plan::Setup;
@@ -194,14 +194,14 @@ impl Node {
     }
 
     /// Takes process data, which only an operational node sends; a statusword without a meaning keeps the last state.
-    /// Its condition before and after; none while they mean nothing.
-    pub(super) fn take(&mut self, tpdo: Tpdo1, time_ns: u64) -> Option<[DriveCondition; 2]> {
+    /// The state of the drive before and after; none while they mean nothing.
+    pub(super) fn take(&mut self, tpdo: Tpdo1, time_ns: u64) -> Option<[Option<DriveState>; 2]> {
         self.hear_state(time_ns, NmtState::Operational);
         self.missing_cycles = 0;
         if !self.is_started {
             return None;
         }
-        let before = self.condition();
+        let before = self.drive_state();
         if let Ok(state) = tpdo.statusword.state() {
             self.power = Some(state);
         }
@@ -210,11 +210,11 @@ impl Node {
         self.news += u32::from(data != (self.actual_increments, self.torque_permille));
         (self.actual_increments, self.torque_permille) = data;
         self.answered_ns = time_ns;
-        Some([before, self.condition()])
+        Some([before, self.drive_state()])
     }
 
-    pub(super) fn condition(&self) -> DriveCondition {
-        self.power.filter(|_| self.is_operational()).map_or(DriveCondition::Unknown, DriveCondition::from)
+    pub(super) fn drive_state(&self) -> Option<DriveState> {
+        self.power.filter(|_| self.is_operational())
     }
 
     pub(super) fn position_m(&self) -> f64 {
@@ -234,7 +234,7 @@ impl Node {
     /// where it stands, so that nothing jumps when it begins to (607A := 6064).
     pub(super) fn process_data(&mut self, request: DriveRequest, target_m: f64) -> Rpdo1 {
         let state = self.power.unwrap_or(DriveState::NotReadyToSwitchOn);
-        self.controlword = toward(state, request, self.controlword);
+        self.controlword = next_controlword(state, request, self.controlword);
         let follows = state == DriveState::OperationEnabled && request == DriveRequest::Enable;
         let target_increments =
             if follows { self.scale.increments(target_m) as i32 } else { self.actual_increments };
@@ -244,7 +244,7 @@ impl Node {
 
 #[cfg(test)]
 mod tests {
-    use masseter_shared::can::cia402::Statusword;
+    use masseter_can::cia402::Statusword;
     use masseter_shared::config::Scenario;
 
     use super::*;

@@ -4,9 +4,9 @@
 //! then anything is written, first of all what stops it. How tasks are carried out is not here but in
 //! [`boot`](super::boot).
 
-use masseter_shared::can::canopen::{Cob, CobId, NodeId, ObjectAddress};
-use masseter_shared::can::cia402::Controlword;
-use masseter_shared::can::{CanId, EVERY_SYNC, Rpdo1, Tpdo1};
+use masseter_can::canopen::{Cob, CobId, NodeId, ObjectAddress};
+use masseter_can::cia402::Controlword;
+use masseter_can::{CanId, EVERY_SYNC, Rpdo1, Tpdo1};
 use masseter_shared::config::IdentityConfig;
 use masseter_shared::messages::codes::{BootPhase, Cause};
 

@@ -1,11 +1,11 @@
 //! What the master makes of a frame that arrived.
 
-use masseter_shared::can::canopen::{
+use masseter_can::canopen::{
     Cob, Emergency, Heartbeat, HeartbeatError, LengthError, NmtState, NodeId, SdoError, SdoResponse,
 };
-use masseter_shared::can::{CanId, Received, Tpdo1};
+use masseter_can::{CanId, Received, Tpdo1};
 use masseter_shared::messages::Event;
-use masseter_shared::messages::codes::{BootPhase, Cause, EventKind, Source};
+use masseter_shared::messages::codes::{BootPhase, Cause, EventKind, Source, drive_state_code};
 
 use super::cycle::Master;
 use super::node::Kind;
@@ -90,7 +90,7 @@ impl Master {
         self.complete_ns = self.complete_ns.max(time_ns);
         if before != after {
             let moved = Event::new(Source::Drive, EventKind::Transition, Cause::Sequence);
-            let event = Event { from: before.code(), to: after.code(), ..moved };
+            let event = Event { from: drive_state_code(before), to: drive_state_code(after), ..moved };
             self.tell(time_ns, Place::Axis(axis), event);
         }
     }

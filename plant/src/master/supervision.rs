@@ -1,10 +1,12 @@
 //! What the master watches, and when it stops the drives.
 
-use masseter_shared::can::canopen::NmtState;
-use masseter_shared::can::{Bus, ErrorState, SendError};
+use masseter_can::canopen::NmtState;
+use masseter_can::{Bus, ErrorState, SendError};
 use masseter_shared::geometry::AXES;
 use masseter_shared::messages::Event;
-use masseter_shared::messages::codes::{BootPhase, Cause, DriveCondition, DriveRequest, EventKind, Source};
+use masseter_shared::messages::codes::{
+    BootPhase, Cause, DriveRequest, DriveState, EventKind, Source, drive_state_code,
+};
 
 use super::boot::BootFault;
 use super::cycle::{Master, Stop};
@@ -36,11 +38,11 @@ impl Master {
                 BootPhase::Configured | BootPhase::Ready => self.watch_node(now_ns, axis),
                 _ => {}
             }
-            let condition = self.nodes[axis].condition();
-            let is_enabled = condition == DriveCondition::OperationEnabled;
+            let state = self.nodes[axis].drive_state();
+            let is_enabled = state == Some(DriveState::OperationEnabled);
             all_enabled &= is_enabled;
             if shall_be_enabled && self.were_enabled && !is_enabled {
-                let values = [f64::from(condition.code()), 0.0];
+                let values = [f64::from(drive_state_code(state)), 0.0];
                 self.fail(now_ns, Cause::DriveFault, Place::Axis(axis), values);
             }
         }

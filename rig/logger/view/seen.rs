@@ -1,10 +1,11 @@
 //! What the view has seen of a run, and the figures that it shows.
 
 use hdrhistogram::Histogram;
-use masseter_shared::can::tap::{self, Tapped};
-use masseter_shared::can::wire::{self, Rates};
+use masseter_can::Tapped;
+use masseter_can::wire::{self, Rates};
 use masseter_shared::clock::SECOND_NS;
 use masseter_shared::messages::codes::ControllerState;
+use masseter_shared::messages::tap;
 use masseter_shared::messages::{FrameTap, Reading, State};
 use nalgebra::Vector3;
 

@@ -1,6 +1,6 @@
 //! What the table says of an object and of its entries.
 
-use masseter_shared::can::canopen::ObjectAddress;
+use masseter_can::canopen::ObjectAddress;
 
 /// Data type of an entry (CiA 301, table 44).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -1,7 +1,7 @@
 //! A PDO that the drive transmits.
 
-use masseter_shared::can::canopen::ObjectAddress;
-use masseter_shared::can::{CanId, Frame};
+use masseter_can::canopen::ObjectAddress;
+use masseter_can::{CanId, Frame};
 use masseter_shared::clock::MILLISECOND_NS;
 
 use super::EVENT_DRIVEN;

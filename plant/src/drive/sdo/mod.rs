@@ -2,7 +2,7 @@
 //!
 //! Keeps the order of a transfer only; what an entry is and may become is the dictionary's.
 
-use masseter_shared::can::canopen::{
+use masseter_can::canopen::{
     AbortCode, Expedited, ObjectAddress, SdoError, SdoRequest, SdoResponse, Segment,
 };
 
