@@ -9,7 +9,7 @@ use std::time::Duration;
 use common::{
     Cores, PASSED_OR_INVALID, UNHURRIED, Workspace, child_of, masseter, shared_memory_of, stderr, stdout,
 };
-use masseter::recording::{Reader, Recorded};
+use masseter_recording::{Reader, Recorded};
 use masseter_shared::clock::{self, SECOND_NS};
 use masseter_shared::messages::State;
 use masseter_shared::messages::codes::ControllerState::{

@@ -9,7 +9,7 @@ use std::process::Output;
 use std::time::Duration;
 
 use common::{Cores, UNHURRIED, Workspace, child_of, cramped, masseter, stderr, stdout, wait_until};
-use masseter::recording::{Reader, Recorded, Recorder, Scene};
+use masseter_recording::{Reader, Recorded, Recorder, Scene};
 use masseter_shared::clock;
 use masseter_shared::config::Scenario;
 use masseter_shared::geometry::Mechanism;

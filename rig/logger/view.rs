@@ -17,7 +17,7 @@ use masseter_shared::geometry::AXIS_NAMES;
 use masseter_shared::messages::codes::{ControllerState, drive_state_name};
 
 use crate::live::Watched;
-use crate::recording::Recorded;
+use masseter_recording::Recorded;
 use seen::{CLASS_NAMES, Lateness, Seen};
 
 /// How often a line is written, ns.

@@ -15,6 +15,10 @@ use masseter_can::{BitrateError, BusPlan, NoReleaser, Overload, PeriodicMessage,
 
 pub use room::Room;
 
+/// SYNC and the controller's deadline keep this clear of whole milliseconds, where the kernel's timer
+/// tick falls, ns.
+pub const OFF_TICK_NS: u64 = 230_000;
+
 /// From the reading's worst case to the controller's deadline: publishing takes some microseconds, ns.
 const PUBLISH_NS: u64 = 15_000;
 /// Data bytes of every SDO message.

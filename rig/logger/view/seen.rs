@@ -9,8 +9,8 @@ use masseter_shared::messages::tap;
 use masseter_shared::messages::{FrameTap, Reading, State};
 use nalgebra::Vector3;
 
-use crate::analysis::{Accumulator, MOVING};
-use crate::recording::{Recorded, Topic};
+use masseter_analysis::{Accumulator, MOVING};
+use masseter_recording::{Recorded, Topic};
 
 /// Upper ends of the classes of lateness, ns; what is later has a class of its own.
 const CLASSES_NS: [u64; 5] = [1_000, 10_000, 100_000, 1_000_000, 10_000_000];
