@@ -75,9 +75,14 @@ impl<L: Link> PlantCore<L> {
         })
     }
 
-    /// Lets time pass. What happens in it is worked out now, not when the next cycle begins.
+    /// Lets time pass, so that less is left to do when the next cycle begins.
     pub fn advance(&mut self, now_ns: u64) -> Result<(), PlantError> {
         Ok(self.link.advance(now_ns)?)
+    }
+
+    /// The wires.
+    pub(crate) fn link(&mut self) -> &mut L {
+        &mut self.link
     }
 
     /// Begins a cycle: SYNC.

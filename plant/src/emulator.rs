@@ -59,7 +59,7 @@ impl Emulator {
         while !stop.is_made() {
             // A frame that came while the others were delivered is fetched already: no port would tell of it.
             if self.earliest().is_none() {
-                SocketCan::wait(&self.ports, clock::now_ns() + LOOK_NS);
+                SocketCan::wait::<AXES>(&self.ports, clock::now_ns() + LOOK_NS);
             }
             self.advance(clock::now_ns())?;
         }

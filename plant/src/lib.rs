@@ -25,7 +25,6 @@ mod link;
 mod master;
 pub mod open_link;
 pub mod process;
-mod rehearsal;
 mod resting;
 mod socket_link;
 mod wire_events;

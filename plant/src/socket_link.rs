@@ -3,6 +3,7 @@
 use masseter_can::PortFaults;
 use masseter_can::faults::FaultNote;
 use masseter_can::{Bus, FrameFormat, ReceiveError, SocketCan, Tapped};
+use masseter_shared::geometry::AXES;
 use masseter_shared::messages::Truth;
 
 use crate::claim::Claim;
@@ -31,6 +32,13 @@ impl SocketLink {
         let (ports, taps) = (open()?, open()?);
         let claims = interfaces.iter().map(|interface| Claim::on(interface)).collect::<Result<_, _>>()?;
         Ok(Self { ports, faults, taps, _claims: claims })
+    }
+}
+
+impl SocketLink {
+    /// Blocks until a frame for the master arrives on a wire, at most until `until_ns`.
+    pub(crate) fn wait_for_frame(&self, until_ns: u64) {
+        SocketCan::wait::<AXES>(&self.ports, until_ns);
     }
 }
 
