@@ -8,10 +8,10 @@ use std::path::Path;
 use std::process::Output;
 use std::time::Duration;
 
-use common::{Cores, UNHURRIED, Workspace, child_of, cramped, masseter, stderr, stdout, wait_until};
+use common::{Cores, LENIENT, Workspace, child_of, cramped, masseter, stderr, stdout, wait_until};
 use masseter::recording::{Reader, Recorded, Recorder, Scene};
 use masseter_shared::can::candump;
-use masseter_shared::clock;
+use masseter_shared::clock::{self, SECOND_NS};
 use masseter_shared::config::Scenario;
 use masseter_shared::geometry::Mechanism;
 use rand::{RngExt, SeedableRng};
@@ -202,7 +202,7 @@ fn a_recovery_that_fails_leaves_nothing_in_the_way_of_the_next() {
     let out = workspace.file("recovered.mcap");
     let arguments = ["log", "recover", recording.to_str().unwrap(), "--out", out.to_str().unwrap()];
     let failed = cramped(8, &arguments);
-    assert_eq!(failed.status.code(), Some(2), "{}", stderr(&failed));
+    assert_eq!(failed.status.code(), Some(6), "{}", stderr(&failed));
     assert!(!out.exists(), "{}", stderr(&failed));
     assert_eq!(masseter(&arguments).status.code(), Some(0));
 }
@@ -257,13 +257,12 @@ fn kill_the_logger(cores: &Cores, workspace: &Workspace, after: Duration) -> Opt
     }
 }
 
-/// How much of the end that is, `tests/realtime/kill.py` judges: here machines may starve the logger.
 #[test]
-fn a_killed_logger_leaves_a_recording_that_lacks_its_end_and_is_recovered() {
+fn a_killed_logger_leaves_a_recording_that_lacks_at_most_its_last_second_and_is_recovered() {
     let cores = Cores::take();
     for after_ms in KILLED_AT_MS {
         let killed = (0..TRIES).find_map(|_| {
-            let workspace = Workspace::new(&format!("duration_s = 30.0\n{UNHURRIED}"));
+            let workspace = Workspace::new(&format!("duration_s = 30.0\n{LENIENT}"));
             kill_the_logger(&cores, &workspace, Duration::from_millis(after_ms))
                 .map(|killed_ns| (workspace, killed_ns))
         });
@@ -280,6 +279,7 @@ fn a_killed_logger_leaves_a_recording_that_lacks_its_end_and_is_recovered() {
         });
         let lost_ns = killed_ns.saturating_sub(readings.max().unwrap_or(0));
         eprintln!("killed {after_ms} ms after it began: the last {} ms are lost", lost_ns / 1_000_000);
+        assert!(lost_ns <= SECOND_NS, "killed {after_ms} ms after it began: {lost_ns} ns are lost");
 
         let recovered = workspace.file("recovered.mcap");
         let output = log("recover", &recording, &["--out", recovered.to_str().unwrap()]);

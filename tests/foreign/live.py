@@ -27,7 +27,9 @@ DECODED_ONE_IN = 20
 PROTOCOLS = ["foxglove.sdk.v1", "foxglove.websocket.v1"]
 # Opcode, subscription and time, before the message itself.
 MESSAGE_HEAD = struct.Struct("<BIQ")
-UNHURRIED = Path(__file__).parents[1] / "unhurried.toml"
+LENIENT = Path(__file__).parents[1] / "lenient.toml"
+# Passed, or the verdict names the machine as the cause of missed cycles.
+PASSED_OR_INVALID = (0, 3)
 
 
 @contextmanager
@@ -96,7 +98,7 @@ def watch(link, channels, on_thousandth):
 
 def watch_a_run(masseter, out):
     """Starts a run, and a second watcher that is killed on the way; returns what the first one saw."""
-    arguments = [masseter, "run", UNHURRIED, "--live=127.0.0.1:0", "--duration", "5s", "--out", out]
+    arguments = [masseter, "run", LENIENT, "--live=127.0.0.1:0", "--duration", "5s", "--out", out]
     rig = subprocess.Popen(arguments, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True)
     url = next(line.split()[2] for line in rig.stderr if line.startswith("live on "))
 
@@ -108,7 +110,7 @@ def watch_a_run(masseter, out):
     with open_and_subscribe(url) as (link, channels):
         seen = watch(link, channels, on_thousandth=deserter.kill)
     said = rig.stderr.read()
-    assert rig.wait() == 0, (rig.returncode, said)
+    assert rig.wait() in PASSED_OR_INVALID, (rig.returncode, said)
     deserter.join()
     assert deserter.exitcode == -9, deserter.exitcode
     return seen
