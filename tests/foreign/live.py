@@ -1,6 +1,8 @@
 """Watches a run with Python's `websockets`, and decodes what it sees by the schemas it is told.
 
-A second watcher is killed on the way. Fails when a channel or a message is missing or makes no sense, or when
+    tests/foreign/live.py target/release/masseter RUN_FOLDER
+
+A second watcher is killed during the run. Fails when a channel or a message is missing or makes no sense, or when
 the recording of the watched run is not complete.
 """
 
@@ -9,7 +11,6 @@ import multiprocessing
 import struct
 import subprocess
 import sys
-import tempfile
 from base64 import b64decode
 from collections import Counter
 from contextlib import contextmanager
@@ -117,11 +118,9 @@ def watch_a_run(masseter, out):
 
 
 def main():
-    masseter = sys.argv[1]
-    with tempfile.TemporaryDirectory() as folder:
-        out = Path(folder) / "run"
-        counts, parts = watch_a_run(masseter, out)
-        subprocess.run([masseter, "log", "verify", out], check=True, stdout=subprocess.DEVNULL)
+    masseter, out = sys.argv[1:]
+    counts, parts = watch_a_run(masseter, out)
+    subprocess.run([masseter, "log", "verify", out], check=True, stdout=subprocess.DEVNULL)
     for topic in TOPICS:
         print(f"{topic:8} {counts[topic]:8}")
         assert counts[topic] > 0, f"no message on {topic}"
