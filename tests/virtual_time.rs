@@ -3,6 +3,7 @@
 mod common;
 
 use std::fs;
+use std::path::Path;
 
 use common::{Workspace, cramped, jaw_recording, json, stderr, stdout, wait_until_it_records};
 use rustix::process::{Pid, Signal, kill_process};
@@ -106,17 +107,24 @@ fn every_generated_motion_plays() {
     }
 }
 
+/// The project's own recordings always, those of patients where they are.
 #[test]
-fn recorded_patients_play() {
-    let markers = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/markers.toml");
-    let patient = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/patient.toml");
-    for (name, scenario) in [("patient_jaws3d.csv", patient), ("jma_markers.csv", markers)] {
-        let Some(path) = jaw_recording(name) else { continue };
-        let workspace = Workspace::new(&fs::read_to_string(scenario).unwrap());
-        let output = workspace.run_virtual(&["--trajectory", path.to_str().unwrap()]);
-        assert_eq!(output.status.code(), Some(0), "{name}: {}{}", stdout(&output), stderr(&output));
-        let tracking = &workspace.summary()["figures"]["tracking"];
-        assert!(tracking["rms_mm"].as_f64().unwrap() < 0.1, "{name}: {tracking}");
+fn recordings_play_and_are_tracked() {
+    let examples = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples");
+    for (scenario, own, patients) in [
+        ("patient.toml", "jaw.csv", "patient_jaws3d.csv"),
+        ("markers.toml", "markers.csv", "jma_markers.csv"),
+    ] {
+        let scenario = fs::read_to_string(examples.join(scenario)).unwrap();
+        for path in [Some(examples.join(own)), jaw_recording(patients)].into_iter().flatten() {
+            let workspace = Workspace::new(&scenario);
+            let output = workspace.run_virtual(&["--trajectory", path.to_str().unwrap()]);
+            let name = path.display();
+            assert_eq!(output.status.code(), Some(0), "{name}: {}{}", stdout(&output), stderr(&output));
+            let tracking = &workspace.summary()["figures"]["tracking"];
+            assert!(tracking["rms_mm"].as_f64().unwrap() < 0.1, "{name}: {tracking}");
+            assert!(tracking["samples"].as_u64().unwrap() >= 2000, "{name}: {tracking}");
+        }
     }
 }
 

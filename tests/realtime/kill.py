@@ -141,7 +141,8 @@ def stop_logger(masseter, rig, run, logger):
     return {OVER: over_ms}
 
 
-def left_behind(supervisor):
+def shared_memory_of(supervisor):
+    """A rig's files in shared memory."""
     return [name for name in os.listdir("/dev/shm") if name.startswith(f"masseter_{os.getuid()}_{supervisor}-")]
 
 
@@ -156,8 +157,11 @@ def hit_once(masseter, role, how, silent_cycles, chance):
         victims = [child_of(rig, one) for one in (PROCESSES if role == ALL else [role])]
         wait_until_it_records(rig, run)
         time.sleep(chance.uniform(0.0, 1.0))
+        files = shared_memory_of(rig.pid)
         if rig.poll() is not None:
             raise Disturbed
+        if not files:
+            raise SystemExit("a running rig has no files in shared memory, so their absence would prove nothing")
         if role == ALL:
             return {CLEAN: clean_ms(masseter, rig, victims)}
         if role == "logger" and how == "STOP":
@@ -208,7 +212,7 @@ def lives(process):
 
 
 def assert_clean(rig, role):
-    left = left_behind(rig.pid)
+    left = shared_memory_of(rig.pid)
     if left:
         raise SystemExit(f"after the end of {role} these stayed in shared memory: {left}")
 
