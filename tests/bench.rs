@@ -27,7 +27,7 @@ fn wait_for_a_run(place: &Path) {
 }
 
 #[test]
-fn an_interrupted_bench_ends_behind_its_run_and_leaves_nothing() {
+fn an_interrupted_bench_ends_after_its_run_and_leaves_nothing() {
     let _cores = Cores::take();
     for signal in [Signal::INT, Signal::TERM] {
         let place = tempfile::tempdir().unwrap();

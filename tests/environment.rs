@@ -16,7 +16,7 @@ use masseter_shared::transport::{Domain, Inlet, Node};
 use serde_json::Value;
 
 #[test]
-fn what_the_kernel_refuses_is_said_and_required_real_time_exits_with_3() {
+fn refusals_of_the_kernel_are_reported_and_required_real_time_is_exit_3() {
     let cores = Cores::take();
     let workspace = Workspace::new(&format!("duration_s = 1.0\n[realtime]\ncores = [0, 4000]\n{LENIENT}"));
     let output = workspace.run(&cores, &["--require-rt", "--format", "json"]);
@@ -58,7 +58,7 @@ fn an_ordinary_user_runs_the_rig_without_real_time() {
 
 /// Root may write into any folder.
 #[test]
-fn a_run_in_a_folder_that_takes_nothing_is_reported_all_the_same() {
+fn a_run_in_a_read_only_folder_is_reported() {
     let workspace = Workspace::new("duration_s = 0.5\n[checks]\ntracking_rms_mm = 1e-9");
     assert_eq!(workspace.run_virtual(&[]).status.code(), Some(1));
     let (run, executable) = (workspace.run_folder(), workspace.file("masseter"));

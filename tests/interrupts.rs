@@ -22,7 +22,7 @@ fn an_interrupt_ends_the_motion_in_order() {
 }
 
 #[test]
-fn a_terminal_that_is_gone_ends_the_motion_in_order() {
+fn a_closed_terminal_ends_the_motion_in_order() {
     let cores = Cores::take();
     let (workspace, mut child) = Workspace::running(&cores, LENIENT);
     let roles = ["controller", "plant", "logger"].map(|role| child_of(&child, role));
@@ -61,7 +61,7 @@ fn an_interrupt_before_anything_is_recorded_ends_the_run_in_order() {
 }
 
 #[test]
-fn an_interrupt_hides_no_death() {
+fn a_process_that_dies_after_an_interrupt_is_reported_as_dead() {
     let cores = Cores::take();
     for role in ["plant", "controller", "logger"] {
         let (workspace, child) = Workspace::running(&cores, LENIENT);
@@ -76,7 +76,7 @@ fn an_interrupt_hides_no_death() {
 }
 
 #[test]
-fn who_insists_is_not_told_that_a_process_died_of_it() {
+fn a_second_signal_ends_the_run_at_once_as_interrupted() {
     let cores = Cores::take();
     let (workspace, child) = Workspace::running(&cores, LENIENT);
     kill_process(child_of(&child, "logger"), Signal::STOP).unwrap();
@@ -90,7 +90,7 @@ fn who_insists_is_not_told_that_a_process_died_of_it() {
 }
 
 #[test]
-fn an_interrupted_motion_may_be_held_for_longer_than_a_process_takes_to_end() {
+fn an_interrupted_motion_is_held_for_the_whole_hold_time() {
     let cores = Cores::take();
     let (_workspace, child) =
         Workspace::running(&cores, &LENIENT.replace("[controller]", "[controller]\nhold_s = 6.0"));

@@ -134,7 +134,7 @@ fn a_watcher_sees_the_channels_and_messages_of_the_recording() {
 }
 
 #[test]
-fn a_watcher_that_does_not_read_is_counted_and_the_recording_is_complete() {
+fn messages_for_a_watcher_that_does_not_read_are_counted_and_the_recording_is_complete() {
     let cores = Cores::take();
     let workspace = Workspace::new(&format!("duration_s = 6.0\n{LENIENT}"));
     let shown = Shown::start(&cores, &workspace);
@@ -148,7 +148,7 @@ fn a_watcher_that_does_not_read_is_counted_and_the_recording_is_complete() {
 }
 
 #[test]
-fn strangers_and_deserters_disturb_neither_the_recording_nor_other_watchers() {
+fn clients_that_misbehave_or_vanish_disturb_neither_the_recording_nor_other_watchers() {
     let cores = Cores::take();
     let workspace = Workspace::new(&format!("duration_s = 3.0\n{LENIENT}"));
     let shown = Shown::start(&cores, &workspace);
@@ -178,7 +178,7 @@ fn strangers_and_deserters_disturb_neither_the_recording_nor_other_watchers() {
 }
 
 #[test]
-fn a_client_that_sends_without_end_holds_up_neither_the_recording_nor_the_end() {
+fn a_client_that_sends_without_end_delays_neither_the_recording_nor_the_end() {
     let cores = Cores::take();
     let workspace = Workspace::new(&format!("duration_s = 1.0\n{LENIENT}"));
     let shown = Shown::start(&cores, &workspace);
@@ -195,7 +195,7 @@ fn a_client_that_sends_without_end_holds_up_neither_the_recording_nor_the_end() 
 }
 
 #[test]
-fn a_reader_of_the_progress_that_pauses_costs_no_message_and_holds_no_end_up() {
+fn a_paused_reader_of_the_progress_costs_no_message_and_delays_no_end() {
     let cores = Cores::take();
     let workspace = Workspace::new(&format!("duration_s = 4.0\n{LENIENT}"));
     let (errors, mut filler) = io::pipe().unwrap();
@@ -218,7 +218,7 @@ fn a_reader_of_the_progress_that_pauses_costs_no_message_and_holds_no_end_up() {
 }
 
 #[test]
-fn what_cannot_be_shown_is_refused_before_anything_is_made() {
+fn a_live_view_that_cannot_be_served_is_refused_before_the_run_starts() {
     let cores = Cores::take();
     let taken = TcpListener::bind("127.0.0.1:0").unwrap();
     let port = format!("--live={}", taken.local_addr().unwrap());

@@ -48,7 +48,7 @@ fn assert_logged_in_order(recording: &[u8]) {
 }
 
 #[test]
-fn a_run_goes_on_when_nobody_reads_what_it_says() {
+fn a_run_goes_on_when_nobody_reads_its_output() {
     let cores = Cores::take();
     let workspace = Workspace::new(&format!("duration_s = 3.0\n{LENIENT}"));
     let mut child = workspace.start(&cores, &[]);
@@ -58,7 +58,7 @@ fn a_run_goes_on_when_nobody_reads_what_it_says() {
 }
 
 #[test]
-fn a_motion_that_somebody_broke_off_does_not_pass() {
+fn a_motion_that_is_broken_off_does_not_pass() {
     let cores = Cores::take();
     let (workspace, child) = Workspace::running(&cores, LENIENT);
     kill_process(child_of(&child, "controller"), Signal::TERM).unwrap();
@@ -86,7 +86,7 @@ fn a_controller_that_does_not_end_when_asked_to_is_killed() {
 }
 
 #[test]
-fn a_controller_that_hangs_stops_the_rig_though_nobody_asks() {
+fn a_controller_that_hangs_ends_the_run() {
     let cores = Cores::take();
     let (workspace, child) = Workspace::running(&cores, LENIENT);
     kill_process(child_of(&child, "controller"), Signal::STOP).unwrap();
@@ -97,7 +97,7 @@ fn a_controller_that_hangs_stops_the_rig_though_nobody_asks() {
 }
 
 #[test]
-fn a_killed_supervisor_takes_its_processes_along_and_clean_sweeps_what_is_left() {
+fn the_processes_of_a_killed_supervisor_end_and_clean_removes_their_files() {
     let cores = Cores::take();
     let (workspace, mut child) = Workspace::running(&cores, LENIENT);
     let memory = SharedMemory::of_running(&format!("{}-", child.id()));

@@ -40,7 +40,7 @@ fn messages(recording: &Path) -> Vec<Recorded> {
 }
 
 #[test]
-fn a_whole_recording_is_told_and_proved() {
+fn a_whole_recording_passes_info_and_verify() {
     let workspace = virtual_run();
     for of in [workspace.run_folder(), workspace.run_folder().join("recording.mcap")] {
         let info = log("info", &of, &[]);
@@ -56,7 +56,7 @@ fn a_whole_recording_is_told_and_proved() {
 }
 
 #[test]
-fn bad_recordings_get_2_and_cut_ones_6_with_the_place() {
+fn damaged_recordings_are_exit_2_and_cut_ones_exit_6_with_the_place() {
     let workspace = virtual_run();
     let whole = fs::read(workspace.run_folder().join("recording.mcap")).unwrap();
     let cut = whole[..whole.len() * 2 / 3].to_vec();
@@ -84,7 +84,7 @@ fn bad_recordings_get_2_and_cut_ones_6_with_the_place() {
 }
 
 #[test]
-fn only_the_line_of_what_is_wrong_says_fail() {
+fn only_the_lines_of_failed_proofs_say_fail() {
     let workspace = virtual_run();
     let whole = fs::read(workspace.run_folder().join("recording.mcap")).unwrap();
     let mut flipped = whole.clone();
@@ -176,7 +176,7 @@ fn a_topic_that_the_recording_does_not_have_is_refused_with_those_it_has() {
 }
 
 #[test]
-fn topics_that_make_no_table_are_named_and_refused_where_they_are_asked_for() {
+fn topics_without_a_table_are_listed_and_refused_on_request() {
     let workspace = virtual_run();
     let out = workspace.file("tables");
     let export = |more: &[&str]| {

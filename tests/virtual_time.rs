@@ -130,7 +130,7 @@ fn recordings_play_and_are_tracked() {
 
 /// Without turns, the platform is displaced as the jaw.
 #[test]
-fn what_is_wanted_at_a_time_of_the_motion_is_the_recordings_sample_of_that_time() {
+fn the_desired_pose_at_a_time_is_the_recordings_sample_of_that_time() {
     let lowered_m = |time_s: f64| -0.005 * (2.0 * time_s).sin().powi(2);
     let row = |i: u32| {
         let time_s = f64::from(i) / 100.0;
@@ -166,7 +166,7 @@ fn what_is_wanted_at_a_time_of_the_motion_is_the_recordings_sample_of_that_time(
 }
 
 #[test]
-fn markers_whose_centroid_stands_for_the_incisal_point_are_told_of_once_the_jaw_turns() {
+fn a_warning_says_that_the_centroid_of_the_markers_is_used_where_the_jaw_turns() {
     // One marker in the axis of the turn, which is that of the condyles.
     let row = |i: u32, largest_deg: f64| {
         let time_s = f64::from(i) / 100.0;
@@ -189,7 +189,7 @@ fn markers_whose_centroid_stands_for_the_incisal_point_are_told_of_once_the_jaw_
 
 /// The example's piece of food yields at 35 N.
 #[test]
-fn food_resists_the_jaw_and_the_platform_still_goes_where_it_should() {
+fn food_resists_the_jaw_and_the_platform_still_follows() {
     let workspace = Workspace::new("duration_s = 3.0\n[food]");
     let output = workspace.run_virtual(&[]);
     assert_eq!(output.status.code(), Some(0), "{}", stdout(&output));
@@ -207,7 +207,7 @@ fn another_builders_mechanism_runs() {
 
 /// A velocity loop far too stiff for the step that it is integrated with.
 #[test]
-fn a_plant_that_fails_is_a_death_as_in_real_time_and_is_told_again() {
+fn a_plant_that_fails_is_reported_as_dead_by_the_run_and_by_report() {
     let workspace = Workspace::new(
         "[drives.leg]\nvelocity_gain_n_s_per_m = 6e7\nrated_force_n = 1e7\nmax_force_n = 1e8\nfollowing_error_m = 1.0",
     );
@@ -247,7 +247,7 @@ fn a_check_that_fails_fails_the_run() {
 }
 
 #[test]
-fn a_report_can_be_made_again_and_a_cut_recording_is_said_to_be_cut() {
+fn a_report_can_be_made_again_and_says_that_a_recording_is_cut() {
     let workspace = Workspace::new("duration_s = 2.0");
     assert_eq!(workspace.run_virtual(&[]).status.code(), Some(0));
     let folder = workspace.run_folder();

@@ -1,4 +1,4 @@
-//! What the whole-rig tests share: the real executable, and what it leaves.
+//! Shared by the whole-rig tests: the executable under test, its run folders, and how a run is judged.
 #![allow(dead_code, reason = "each test file uses its own part")]
 
 use std::fs::{self, File};
@@ -23,7 +23,7 @@ pub(crate) const LENIENT: &str = include_str!("../lenient.toml");
 /// Largest tracking error of a run whose cycles the machine may delay, mm.
 const TRACKING_RMS_MM: f64 = 1.0;
 
-/// Far longer than anything takes that is waited for, ns.
+/// Longest wait for an event that normally comes within seconds, ns.
 const GIVE_UP_NS: u64 = 30 * SECOND_NS;
 
 /// The right to start rigs in real time. Every rig uses the same two cores, so one test at a time has this: a locked
@@ -47,16 +47,20 @@ pub(crate) fn wait_until_it_records(workspace: &Workspace) {
     wait_until("the rig records", || workspace.recorded_bytes() > 500_000);
 }
 
-/// Waits for what comes within seconds where all is well.
+/// Waits until it is so; panics with `what` after [`GIVE_UP_NS`].
 pub(crate) fn wait_until(what: &str, mut is_so: impl FnMut() -> bool) {
     let give_up_ns = clock::now_ns() + GIVE_UP_NS;
     while !is_so() {
-        assert!(clock::now_ns() < give_up_ns, "in {} s it never came that {what}", GIVE_UP_NS / SECOND_NS);
+        assert!(
+            clock::now_ns() < give_up_ns,
+            "within {} s it did not become true that {what}",
+            GIVE_UP_NS / SECOND_NS
+        );
         clock::sleep(Duration::from_millis(5));
     }
 }
 
-/// A place of its own for a test, with scenario and run folder.
+/// A temporary folder of a test, with a scenario and a run folder.
 pub(crate) struct Workspace {
     folder: tempfile::TempDir,
 }
@@ -78,7 +82,7 @@ impl Workspace {
         path
     }
 
-    /// A rig in real time, in the midst of a long run.
+    /// A rig in real time during a long run.
     pub(crate) fn running(cores: &Cores, scenario: &str) -> (Self, Child) {
         let workspace = Self::new(&format!("duration_s = 60.0\n{scenario}"));
         let child = workspace.start(cores, &[]);
@@ -196,7 +200,7 @@ pub(crate) fn masseter(arguments: &[&str]) -> Output {
     Command::new(MASSETER).args(arguments).output().expect("masseter starts")
 }
 
-/// Where files may not grow beyond so many blocks of 512 bytes, as on a full disk.
+/// Runs masseter with a limit on the size of files, in blocks of 512 bytes, as on a full disk.
 pub(crate) fn cramped(blocks: u32, arguments: &[&str]) -> Output {
     let limit = format!("trap '' XFSZ; ulimit -f {blocks}; exec \"$@\"");
     Command::new("sh").args(["-c", &limit, "sh", MASSETER]).args(arguments).output().expect("a shell starts")
@@ -210,13 +214,13 @@ pub(crate) fn stdout(output: &Output) -> String {
     String::from_utf8_lossy(&output.stdout).into_owned()
 }
 
-/// Says that a test is skipped. The harness hides what a passing test prints, but not what is written to standard error
-/// itself.
+/// Reports that a test is skipped. The harness hides the output of `eprintln!` in a passing test, but not bytes written
+/// to standard error directly.
 pub(crate) fn skip(why: &str) {
     writeln!(io::stderr(), "SKIPPED: {why}").expect("standard error can be written");
 }
 
-/// The recordings handed to developers; they are not part of the project.
+/// A recording of a patient. These recordings are not part of the project, so they may be absent.
 pub(crate) fn jaw_recording(name: &str) -> Option<PathBuf> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data/jaw").join(name);
     if path.is_file() {
