@@ -6,7 +6,7 @@ use std::fmt::Display;
 use std::io::{self, Read, Write};
 use std::net::TcpStream;
 
-use masseter_plant::open_link::{NodePort, OpenLink};
+use masseter_plant::emulation::{NodePort, OpenLink};
 use masseter_shared::can::socketcand::{ECHO, GREETING, OK, Request, RequestError, Requests, write_frame};
 use masseter_shared::can::{Bus, ReceiveError};
 
