@@ -216,7 +216,7 @@ mod tests {
     fn time_left_out_is_counted_in_whole_steps_and_moves_nothing() {
         let scenario = Scenario::default();
         let step_ns = scenario.dynamics.step_ns;
-        let mut emulation = build_emulation(&scenario, 0).unwrap();
+        let mut emulation = Emulation::new(&scenario, 0).unwrap();
         let first_ns = emulation.next_step_ns();
         (0..10).for_each(|_| emulation.step().unwrap());
         let (moved_to_ns, positions_m) = (emulation.moved_to_ns(), emulation.dynamics.state().positions_m());

@@ -79,6 +79,12 @@ impl DriveNode {
         self.axis.power()
     }
 
+    /// Values of its object dictionary.
+    #[cfg(test)]
+    pub(super) fn objects(&self) -> &Objects {
+        &self.objects
+    }
+
     /// The next frame that the drive transmits.
     pub(crate) fn outgoing(&mut self) -> Option<Frame> {
         self.outbox.take()
