@@ -34,20 +34,20 @@ use masseter_shared::messages::codes::{BootPhase, Cause, DriveCondition, DriveRe
 use masseter_shared::messages::{Command, Event, Reading};
 use masseter_shared::realtime::Wake;
 
-use self::boot::BootFault;
-use self::bus_monitor::BusMonitor;
-use self::commands::Commands;
-use self::drive::RemoteDrive;
-use self::events::{EventLog, Subject};
-use self::exchange::Exchange;
-use self::incoming::{Kind, Message};
-use self::interlock::{Failure, Interlock};
-use self::settings::MasterSettings;
-use self::supervision::{Finding, Supervision};
 use crate::error::PlantError;
 use crate::link::Buses;
+use boot::BootFault;
+use bus_monitor::BusMonitor;
+use commands::Commands;
+use drive::RemoteDrive;
+use events::{EventLog, Subject};
+use exchange::Exchange;
+use incoming::{Kind, Message};
+use interlock::{Failure, Interlock};
+use settings::MasterSettings;
+use supervision::{Finding, Supervision};
 
-pub(crate) use self::boot::shortest_boot;
+pub(crate) use boot::shortest_boot;
 
 /// Frames taken from a bus at once, so that a babbling node cannot stop the cycle.
 const FRAMES_AT_ONCE: usize = 512;

@@ -19,20 +19,20 @@ mod servo;
 use masseter_shared::can::cia402::{Command, Controlword, DriveState, StatusBit, Statusword};
 use masseter_shared::config::DriveConfig;
 
-use self::clamp::clamp_symmetric;
-use self::demand::{Approach, Demand};
-use self::following::FollowingErrorMonitor;
-use self::motion::{Motion, MotionCommand, PositionView};
-use self::parameters::{AbortConnectionReaction, MotionLimits, Parameters, StopMethod};
-use self::positioning::Positioning;
-use self::profile::Profile;
-use self::servo::{Servo, ServoCommand, ServoLimits};
 use crate::drive::dictionary::{Objects, names};
+use clamp::clamp_symmetric;
+use demand::{Approach, Demand};
+use following::FollowingErrorMonitor;
+use motion::{Motion, MotionCommand, PositionView};
+use parameters::{AbortConnectionReaction, MotionLimits, Parameters, StopMethod};
+use positioning::Positioning;
+use profile::Profile;
+use servo::{Servo, ServoCommand, ServoLimits};
 
-pub(crate) use self::encoder::Encoder;
-pub(super) use self::homing::Homing;
-pub(super) use self::mode::Mode;
-pub(super) use self::parameters::configure;
+pub(crate) use encoder::Encoder;
+pub(super) use homing::Homing;
+pub(super) use mode::Mode;
+pub(super) use parameters::configure;
 
 /// The cyclic targets that are new at a SYNC.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]

@@ -21,17 +21,17 @@ use masseter_shared::can::canopen::{
 use masseter_shared::can::cia402::Controlword;
 use masseter_shared::can::{ErrorState, Frame};
 
-use self::access::DictionaryAccess;
-use self::errors::{DriveError, Errors, clear_history};
-use self::heartbeats::{Consumer, Producer};
-use self::nmt::{BOOT_NS, Nmt};
-use self::outbox::Outbox;
-use self::process_data::ProcessData;
-use self::sdo::SdoServer;
-use self::storage::Storage;
 use super::axis::{Axis, Encoder, NewTargets};
 use super::dictionary::{Objects, PDOS, names};
 use super::settings::DriveSettings;
+use access::DictionaryAccess;
+use errors::{DriveError, Errors, clear_history};
+use heartbeats::{Consumer, Producer};
+use nmt::{BOOT_NS, Nmt};
+use outbox::Outbox;
+use process_data::ProcessData;
+use sdo::SdoServer;
+use storage::Storage;
 
 /// One drive.
 #[derive(Debug, Clone)]

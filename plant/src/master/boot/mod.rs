@@ -13,10 +13,10 @@ use masseter_shared::can::cia402::{DriveState, Statusword};
 use masseter_shared::clock::MILLISECOND_NS;
 use masseter_shared::messages::codes::{BootPhase, Cause, DriveCondition};
 
-use self::plan::{Condition, STATUSWORD, Step, plan};
-use self::sdo::{ATTEMPTS, Data, SdoClient, SdoFailure, TIMEOUT_NS, Taken};
+use plan::{Condition, STATUSWORD, Step, plan};
+use sdo::{ATTEMPTS, Data, SdoClient, SdoFailure, TIMEOUT_NS, Taken};
 
-pub(crate) use self::plan::{DriveSetup, shortest_boot};
+pub(crate) use plan::{DriveSetup, shortest_boot};
 
 /// Silence after which the communication of a drive is reset: it may be alive without a heartbeat, ns.
 const RESET_EVERY_NS: u64 = 500_000_000;
