@@ -14,7 +14,7 @@ use std::process::{Child, Command, Stdio};
 use anyhow::{Context, ensure};
 use hdrhistogram::Histogram;
 use masseter::machine::SystemRoot;
-use masseter::recording::{Reader, Recorded, Recorder, Scene};
+use masseter_recording::{Reader, Recorded, Recorder, Scene};
 use masseter_shared::clock::{self, SECOND_NS};
 use masseter_shared::config::Scenario;
 use masseter_shared::geometry::Mechanism;

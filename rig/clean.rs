@@ -2,7 +2,7 @@
 
 use masseter_shared::transport::{Domain, DomainError};
 
-use crate::exit::Exit;
+use masseter_terminal::{Exit, result_line};
 
 /// Sweeps every dead domain of this user and says what was found.
 pub(crate) fn clean() -> anyhow::Result<Exit> {

@@ -4,7 +4,7 @@ use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use clap::{Args, Parser, Subcommand, ValueEnum};
+use clap::{Args, Parser, Subcommand};
 use masseter_controller::process::Outcome;
 use masseter_shared::lifecycle::Assignment;
 
@@ -12,14 +12,14 @@ use crate::bench::BenchArgs;
 use crate::bench::ipc::PeerArgs;
 use crate::can::{EdsArgs, PlanArgs, ServeArgs};
 use crate::csv_kinematics::{self, CsvArgs, FkArgs};
-use crate::exit::{Exit, Failure, OrFailure};
 use crate::log::{self, LogVerb};
 use crate::logger::Show;
 use crate::plant::{self, PlantArgs};
 use crate::run::{self, args::RunArgs};
-use crate::study::{self, KinematicsArgs};
-use crate::uniqueness::{self, UniquenessVerb};
-use crate::{bench, can, clean, doctor, logger, report};
+use crate::{bench, can, clean, doctor, logger};
+use masseter_study::KinematicsArgs;
+use masseter_study::uniqueness::UniquenessVerb;
+use masseter_terminal::{Exit, Failure, Format, OrFailure, status};
 
 /// A hardware-in-the-loop rig for a 6-DOF mastication robot.
 #[derive(Debug, Parser)]
@@ -82,16 +82,6 @@ enum CanVerb {
     },
     /// Let third-party tools onto the simulated buses with the emulated drives (socketcand protocol)
     Serve(ServeArgs),
-}
-
-/// How results are written.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
-pub enum Format {
-    /// For people.
-    #[default]
-    Human,
-    /// For programs.
-    Json,
 }
 
 /// What `report` takes.
@@ -160,7 +150,7 @@ pub fn main() -> ExitCode {
     match carry_out(Cli::parse().verb) {
         Ok(exit) => exit.into(),
         Err(Failure { exit, error }) => {
-            tell!("masseter: {}", in_one_line(&error));
+            status!("masseter: {}", in_one_line(&error));
             exit.into()
         }
     }
@@ -170,9 +160,9 @@ pub fn main() -> ExitCode {
 fn carry_out(verb: Verb) -> Result<Exit, Failure> {
     match verb {
         Verb::Run(args) => run::run(&args),
-        Verb::Report(ReportArgs { folder, against: None, format }) => report::again(&folder, format),
+        Verb::Report(ReportArgs { folder, against: None, format }) => masseter_report::again(&folder, format),
         Verb::Report(ReportArgs { folder, against: Some(against), format }) => {
-            report::compare::runs(&folder, &against, format).usage()
+            masseter_report::compare::runs(&folder, &against, format).usage()
         }
         Verb::Bench(args) => bench::run(&args),
         Verb::BenchPeer(args) => bench::ipc::answer(&args).map(|()| Exit::Passed).usage(),
@@ -182,8 +172,8 @@ fn carry_out(verb: Verb) -> Result<Exit, Failure> {
         Verb::Can(CanVerb::Eds(args)) => can::eds(&args).usage(),
         Verb::Can(CanVerb::Dbc { scenario }) => can::dbc(scenario.as_deref()).usage(),
         Verb::Can(CanVerb::Serve(args)) => can::serve(&args).usage(),
-        Verb::Uniqueness(verb) => uniqueness::uniqueness(&verb).usage(),
-        Verb::Kinematics(args) => study::kinematics(&args).usage(),
+        Verb::Uniqueness(verb) => masseter_study::uniqueness::uniqueness(&verb).usage(),
+        Verb::Kinematics(args) => masseter_study::kinematics(&args).usage(),
         Verb::Doctor(args) => doctor::examine(args.format).usage(),
         Verb::Log { verb } => log::run(&verb).usage(),
         Verb::Clean => clean::clean().usage(),

@@ -19,11 +19,11 @@ use masseter_shared::messages::{Command, Event, FrameTap, Message, Reading, Stat
 use masseter_shared::realtime::scheduling::keep_off;
 use masseter_shared::transport::{BatchInlet, Inlet, Node, TransportError};
 
-use crate::exit::Exit;
 use crate::live::{Live, Missed};
 use crate::machine::SystemRoot;
-use crate::recording::{Backlog, Pace, Recorded, Recorder, Scene};
 use machine_watch::MachineWatch;
+use masseter_recording::{Backlog, Pace, Recorded, Recorder, Scene};
+use masseter_terminal::Exit;
 use screen::Screen;
 use view::{Losses, Mode, View};
 

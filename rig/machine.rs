@@ -1,11 +1,31 @@
 //! What the kernel tells of the machine in `/proc` and `/sys`, read below a root that tests can choose.
 
 pub(crate) mod counters;
+pub(crate) mod dma_latency;
 mod hypervisor;
+pub(crate) mod interrupts;
 
 use std::fs;
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
+
+use masseter_recording::MachineInfo;
+use masseter_shared::realtime::scheduling::allowed_cores;
+
+/// What the manifest keeps of this machine.
+pub(crate) fn describe() -> MachineInfo {
+    let uname = rustix::system::uname();
+    let [name, release, version] =
+        [uname.sysname(), uname.release(), uname.version()].map(std::ffi::CStr::to_string_lossy);
+    let cpuinfo = fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+    let model = cpuinfo.lines().find_map(|line| line.strip_prefix("model name")?.split_once(": "));
+    MachineInfo {
+        cpu: model.map_or_else(|| std::env::consts::ARCH.to_owned(), |(_, name)| name.to_owned()),
+        cores: allowed_cores().len(),
+        kernel: format!("{name} {release} {version}"),
+        is_virtual: SystemRoot::of_this_machine().is_virtual(),
+    }
+}
 
 /// The folder below which `proc` and `sys` lie.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -11,9 +11,9 @@ use masseter_shared::config::Scenario;
 use masseter_shared::lifecycle::{Assignment, StopRequest};
 use masseter_shared::realtime::scheduling::{Wanted, obtain};
 
-use crate::exit::Exit;
-use crate::run::args::{Wires, parse_wires};
-use crate::scenario;
+use crate::arguments::{Wires, parse_wires};
+
+use masseter_terminal::{Exit, result_line, status};
 
 /// What `plant` takes.
 #[derive(Debug, Clone, Args)]
@@ -63,13 +63,13 @@ fn emulate(args: &PlantArgs) -> anyhow::Result<()> {
         fifo_priority: Some(realtime.priority),
         locked_memory: realtime.lock_memory,
     });
-    obtained.refusals.iter().for_each(|refusal| tell!("  plant: {refusal}"));
-    tell!("six drives on {}, until Ctrl-C", scenario.can.interfaces.join(", "));
+    obtained.refusals.iter().for_each(|refusal| status!("  plant: {refusal}"));
+    status!("six drives on {}, until Ctrl-C", scenario.can.interfaces.join(", "));
     tell(emulator.run(&stop)?)
 }
 
 fn resolve(args: &PlantArgs) -> anyhow::Result<Scenario> {
-    let scenario = scenario::changed(args.file.as_deref(), |scenario| {
+    let scenario = masseter_plan::changed(args.file.as_deref(), |scenario| {
         if let Some(wires) = &args.can {
             scenario.can.interfaces.clone_from(&wires.0);
         }

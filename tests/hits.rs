@@ -9,13 +9,13 @@ use std::time::Duration;
 use common::{
     Cores, PASSED_OR_INVALID, UNHURRIED, Workspace, child_of, masseter, shared_memory_of, stderr, stdout,
 };
-use masseter::recording::{Reader, Recorded};
+use masseter_recording::{Reader, Recorded};
 use masseter_shared::clock::{self, SECOND_NS};
 use masseter_shared::messages::State;
 use masseter_shared::messages::codes::ControllerState::{
     self, Disabling, Easing, Enabling, Holding, Running, WaitReadings,
 };
-use masseter_shared::messages::codes::DriveCondition::{FaultReaction, OperationEnabled, QuickStopActive};
+use masseter_shared::messages::codes::DriveState::{FaultReactionActive, OperationEnabled, QuickStopActive};
 use masseter_shared::transport::{Domain, Inlet, Node};
 use rustix::process::{Pid, Signal, kill_process};
 use serde_json::Value;
@@ -184,7 +184,8 @@ fn drives_are_off(workspace: &Workspace) -> bool {
             last = Some(reading);
         }
     }
-    let with_force = [OperationEnabled, QuickStopActive, FaultReaction].map(|condition| condition as u32);
+    let with_force =
+        [OperationEnabled, QuickStopActive, FaultReactionActive].map(|condition| condition as u32);
     last.unwrap().drive_state.iter().all(|state| !with_force.contains(state))
 }
 

@@ -9,7 +9,7 @@ use std::process::{Child, ChildStderr, ExitStatus, Stdio};
 use std::thread;
 
 use common::{Cores, UNHURRIED, Workspace, masseter, stderr, stdout};
-use masseter::recording::Reader;
+use masseter_recording::Reader;
 use serde_json::{Value, json};
 use tungstenite::client::IntoClientRequest;
 use tungstenite::http::HeaderValue;

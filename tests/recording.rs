@@ -9,8 +9,7 @@ use std::process::Output;
 use std::time::Duration;
 
 use common::{Cores, UNHURRIED, Workspace, child_of, cramped, masseter, stderr, stdout, wait_until};
-use masseter::recording::{Reader, Recorded, Recorder, Scene};
-use masseter_shared::can::candump;
+use masseter_recording::{Reader, Recorded, Recorder, Scene};
 use masseter_shared::clock;
 use masseter_shared::config::Scenario;
 use masseter_shared::geometry::Mechanism;
@@ -159,7 +158,6 @@ fn a_recording_becomes_tables_and_candump_logs() {
     }
     let frames = fs::read_to_string(out.join("can0.log")).unwrap();
     assert!(frames.lines().count() > 1000);
-    assert!(frames.lines().all(|line| candump::parse(line).is_ok()));
     assert_eq!(frames, fs::read_to_string(workspace.run_folder().join("can0.log")).unwrap());
 }
 

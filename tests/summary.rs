@@ -7,7 +7,7 @@ use std::fs;
 use std::path::Path;
 
 use common::Workspace;
-use masseter::analysis::Hop;
+use masseter_analysis::Hop;
 use masseter_shared::messages::codes::Source;
 use serde_json::Value;
 

@@ -9,7 +9,7 @@ mod telling;
 
 use masseter_shared::config::{ControllerConfig, Scenario};
 use masseter_shared::geometry::{AXES, Actuators, Mechanism, Pose};
-use masseter_shared::messages::codes::{Cause, ControllerState, DriveCondition};
+use masseter_shared::messages::codes::{Cause, ControllerState, DriveState, NO_DRIVE_STATE, drive_state};
 use masseter_shared::messages::{Event, Reading};
 
 use crate::delivery::Delivery;
@@ -102,7 +102,7 @@ impl Controller {
             silent_cycles: 0,
             stop_requested: false,
             estimate: None,
-            drive_state: [DriveCondition::Unknown.code(); AXES],
+            drive_state: [NO_DRIVE_STATE; AXES],
             fault: None,
             wanted: None,
             target: None,
@@ -129,9 +129,8 @@ impl Controller {
 
     /// Whether all drives report that they are without voltage: a lost one reports nothing, and may not be.
     fn drives_are_off(&self) -> bool {
-        let is_powered =
-            |&code: &u32| DriveCondition::try_from(code).ok().and_then(DriveCondition::is_powered);
-        self.drive_state.iter().all(|code| is_powered(code) == Some(false))
+        let is_off = |&code: &u32| matches!(drive_state(code), Ok(Some(state)) if !state.is_powered());
+        self.drive_state.iter().all(is_off)
     }
 
     /// Takes the newest reading, if one came, and solves the forward kinematics for it.
@@ -269,7 +268,7 @@ impl Controller {
 
     /// The most urgent thing that happened.
     fn happening(&self, faulty: bool) -> Option<Happening> {
-        let enabled = DriveCondition::OperationEnabled.code();
+        let enabled = DriveState::OperationEnabled.code();
         let held_s = self.cycles_at_rest as f64 * self.period_s;
         let progress = match self.state {
             ControllerState::WaitReadings => {

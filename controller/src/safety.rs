@@ -1,7 +1,7 @@
 //! What makes the controller stop: each check names the cause, the value and the limit it broke.
 
 use masseter_shared::geometry::{AXES, Actuators, InverseError, LEGS, LimitViolation, Pose};
-use masseter_shared::messages::codes::{Cause, DriveCondition, NO_AXIS, NoPose};
+use masseter_shared::messages::codes::{Cause, DriveState, NO_AXIS, NoPose, drive_state};
 use masseter_shared::messages::{Event, Reading};
 
 use crate::kinematics::ForwardError;
@@ -86,7 +86,7 @@ pub(crate) fn check_reading(reading: &Reading) -> Result<(), Fault> {
         let values = [
             (reading.position_m[axis], reading.position_m[axis].is_finite()),
             (reading.force_n[axis], reading.force_n[axis].is_finite()),
-            (f64::from(code), DriveCondition::try_from(code).is_ok()),
+            (f64::from(code), drive_state(code).is_ok()),
         ];
         if let Some((value, _)) = values.into_iter().find(|(_, is_good)| !is_good) {
             return Err(Fault::of_axis(Cause::BadMessage, axis, value, 0.0));
@@ -109,10 +109,10 @@ pub(crate) fn check_drives(reading: &Reading, moving: bool) -> Result<(), Fault>
         return Err(Fault::new(Cause::MasterFault, 1.0, 0.0));
     }
     for (axis, &code) in reading.drive_state.iter().enumerate() {
-        let condition = DriveCondition::try_from(code).unwrap_or(DriveCondition::Unknown);
-        let faulty = matches!(condition, DriveCondition::Fault | DriveCondition::FaultReaction);
-        if faulty || (moving && condition != DriveCondition::OperationEnabled) {
-            let enabled = f64::from(DriveCondition::OperationEnabled.code());
+        let state = drive_state(code).ok().flatten();
+        let faulty = matches!(state, Some(DriveState::Fault | DriveState::FaultReactionActive));
+        if faulty || (moving && state != Some(DriveState::OperationEnabled)) {
+            let enabled = f64::from(DriveState::OperationEnabled.code());
             return Err(Fault::of_axis(Cause::DriveFault, axis, f64::from(code), enabled));
         }
     }

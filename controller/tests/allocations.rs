@@ -11,7 +11,7 @@ use masseter_controller::kinematics::{ForwardTracker, Options, Solutions, solve_
 use masseter_controller::trajectory::Trajectory;
 use masseter_shared::config::Scenario;
 use masseter_shared::geometry::{AXES, Actuators, LEGS, Mechanism, MechanismConfig};
-use masseter_shared::messages::codes::{ControllerState, DriveCondition, DriveRequest};
+use masseter_shared::messages::codes::{ControllerState, DriveRequest, DriveState};
 use masseter_shared::messages::{Command, Reading, State};
 
 struct Counting;
@@ -62,7 +62,7 @@ fn no_cycle_of_the_controller_allocates_nor_does_its_rehearsal() {
                 cycle,
                 answers_cycle: cycle - 1,
                 position_m: if is_driven { command.target_m } else { start },
-                drive_state: [DriveCondition::OperationEnabled.code(); AXES],
+                drive_state: [DriveState::OperationEnabled.code(); AXES],
                 fresh_axes: (1 << AXES) - 1,
                 ..reading
             };

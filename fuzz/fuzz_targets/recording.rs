@@ -7,7 +7,7 @@ use std::sync::LazyLock;
 
 use libfuzzer_sys::arbitrary::{Result, Unstructured};
 use libfuzzer_sys::fuzz_target;
-use masseter::recording::{ReadError, Reader, Recorded, Recorder, Scene, Schema, recover};
+use masseter_recording::{ReadError, Reader, Recorded, Recorder, Scene, Schema, recover};
 use masseter_shared::config::JawConfig;
 use masseter_shared::geometry::{Mechanism, MechanismConfig};
 use masseter_shared::messages::{Message, Reading};

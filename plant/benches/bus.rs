@@ -3,10 +3,10 @@
 //! CPU time of a cycle in virtual time: six drives and the master on two classical buses at 1 Mbit/s.
 
 use divan::{Bencher, black_box};
+use masseter_can::canopen::{NodeId, sync};
+use masseter_can::cia402::{Controlword, Statusword};
+use masseter_can::{Bitrate, Bus, FrameFormat, Rates, Rpdo1, Tpdo1, VirtualWire, WireConfig};
 use masseter_plant::core::PlantCore;
-use masseter_shared::can::canopen::{NodeId, sync};
-use masseter_shared::can::cia402::{Controlword, Statusword};
-use masseter_shared::can::{Bitrate, Bus, FrameFormat, Rates, Rpdo1, Tpdo1, VirtualWire, WireConfig};
 use masseter_shared::config::Scenario;
 use masseter_shared::messages::codes::DriveRequest;
 use masseter_shared::messages::{Command, Reading};

@@ -5,10 +5,10 @@
 
 mod wire_events;
 
-use masseter_shared::can::canopen::Cob;
-use masseter_shared::can::{ReceiveError, Tapped, tap};
+use masseter_can::canopen::Cob;
+use masseter_can::{ReceiveError, Tapped};
 use masseter_shared::config::Scenario;
-use masseter_shared::messages::{Command, Event, FrameTap, Reading, Truth};
+use masseter_shared::messages::{Command, Event, FrameTap, Reading, Truth, tap};
 use masseter_shared::realtime::Wake;
 
 use crate::emulation::VirtualLink;

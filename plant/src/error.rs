@@ -1,8 +1,8 @@
 //! Errors of the plant: every reason why it cannot be built or cannot continue.
 
-use masseter_shared::can::canopen::{NodeId, NodeIdError};
-use masseter_shared::can::wrapped::NotByPort;
-use masseter_shared::can::{BitrateError, OpenError};
+use masseter_can::NotByPort;
+use masseter_can::canopen::{NodeId, NodeIdError};
+use masseter_can::{BitrateError, OpenError};
 use masseter_shared::geometry::{AXIS_NAMES, GeometryError};
 
 use crate::mechanism::DynamicsError;

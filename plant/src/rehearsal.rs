@@ -61,7 +61,7 @@ impl Rehearsal {
 #[cfg(test)]
 mod tests {
     use masseter_shared::config::{FaultConfig, FaultKindConfig};
-    use masseter_shared::messages::codes::{DriveCondition, DriveRequest};
+    use masseter_shared::messages::codes::{DriveRequest, DriveState};
 
     use super::*;
 
@@ -106,7 +106,7 @@ mod tests {
         for _ in 0..500 {
             reading = rehearsal.play().unwrap();
         }
-        assert_eq!(reading.drive_state, [DriveCondition::OperationEnabled.code(); 6]);
+        assert_eq!(reading.drive_state, [DriveState::OperationEnabled.code(); 6]);
         assert_eq!((reading.fresh_axes, reading.master_fault), (0b11_1111, 0));
     }
 }

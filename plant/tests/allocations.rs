@@ -7,7 +7,7 @@ use std::hint::black_box;
 
 use masseter_plant::core::PlantCore;
 use masseter_shared::config::Scenario;
-use masseter_shared::messages::codes::{DriveCondition, DriveRequest};
+use masseter_shared::messages::codes::{DriveRequest, DriveState};
 use masseter_shared::messages::{Command, Reading};
 use masseter_shared::realtime::Wake;
 
@@ -64,11 +64,7 @@ fn no_cycle_of_the_plant_allocates() {
     let mut plant = PlantCore::new(&Scenario::default(), 0).unwrap();
     let mut reading = Reading::default();
     let running = allocations_of(|| (1..1000).for_each(|number| cycle(&mut plant, number, &mut reading)));
-    assert_eq!(
-        reading.drive_state,
-        [DriveCondition::OperationEnabled.code(); 6],
-        "it booted and was enabled"
-    );
+    assert_eq!(reading.drive_state, [DriveState::OperationEnabled.code(); 6], "it booted and was enabled");
     assert_eq!(running, 0);
     assert!(allocations_of(|| drop(black_box(vec![1u8]))) > 0, "the counter counts");
 }

@@ -1,5 +1,6 @@
 //! On what a bench is made: the machine, its two cores, and the scheduling that the kernel grants there.
 
+use masseter_terminal::status;
 use std::collections::BTreeSet;
 
 use anyhow::ensure;
@@ -7,12 +8,12 @@ use masseter_shared::realtime::scheduling::{Obtained, usable_cores};
 use serde::Serialize;
 
 use super::{Kind, kind_name, realtime_on};
-use crate::run::manifest::Machine;
+use masseter_recording::MachineInfo;
 
 /// Written with the results.
 #[derive(Debug, Serialize)]
 pub(super) struct Circumstances {
-    machine: Machine,
+    machine: MachineInfo,
     cores: [usize; 2],
     /// Of a thread on each core.
     scheduling: [Obtained; 2],
@@ -26,9 +27,9 @@ impl Circumstances {
         });
         let refusals: BTreeSet<_> = scheduling.iter().flat_map(|obtained| &obtained.refusals).collect();
         for refusal in refusals {
-            tell!("  {refusal}");
+            status!("  {refusal}");
         }
-        Self { machine: Machine::this(), cores, scheduling }
+        Self { machine: crate::machine::describe(), cores, scheduling }
     }
 }
 

@@ -7,7 +7,7 @@ use std::path::Path;
 use hdrhistogram::Histogram;
 use serde::Serialize;
 
-use crate::hlog;
+use masseter_analysis::hlog;
 
 /// Below this many samples a round, its 99.9th percentile rests on fewer than ten of them.
 const SAMPLES_FOR_P999: u64 = 10_000;

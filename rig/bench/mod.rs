@@ -26,11 +26,11 @@ use masseter_shared::config::RealtimeConfig;
 use masseter_shared::realtime::scheduling::{Obtained, Wanted, obtain};
 use serde::Serialize;
 
-use crate::cli::Format;
-use crate::exit::{Exit, Failure, OrFailure};
-use crate::say::result;
 use circumstances::Circumstances;
 use contest::Outcome;
+use masseter_terminal::result;
+use masseter_terminal::{Exit, Failure, OrFailure};
+use masseter_terminal::{Format, status};
 
 /// Version of the result's form.
 const FORM: u32 = 1;
@@ -60,7 +60,7 @@ pub struct BenchArgs {
     #[arg(long, default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=1000))]
     rounds: u32,
     /// Cores of the two sides
-    #[arg(long, value_name = "N,N", value_parser = crate::run::args::parse_cores, default_value = "0,1")]
+    #[arg(long, value_name = "N,N", value_parser = crate::arguments::parse_cores, default_value = "0,1")]
     cores: [usize; 2],
     /// Writes results, HdrHistogram logs and plots there
     #[arg(long, value_name = "DIR")]
@@ -105,7 +105,7 @@ pub(crate) fn run(args: &BenchArgs) -> Result<Exit, Failure> {
 fn measure_each(args: &BenchArgs, results: &mut Results) -> anyhow::Result<()> {
     for kind in &args.kinds {
         let name = kind_name(*kind);
-        tell!("bench {name}: {} rounds …", args.rounds);
+        status!("bench {name}: {} rounds …", args.rounds);
         let outcome = measure(*kind, args).with_context(|| format!("bench {name}"))?;
         let table = table::of(&outcome);
         results.outcomes.push(outcome);

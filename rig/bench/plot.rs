@@ -8,7 +8,7 @@ use plotters::prelude::*;
 
 use super::contender::{Contender, Durations, durations};
 use super::contest::Outcome;
-use crate::palette::{BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION};
+use masseter_charts::palette::{BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION};
 
 const SIZE: (u32, u32) = (960, 420);
 /// Points of a curve for each nine.

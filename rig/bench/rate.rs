@@ -16,10 +16,10 @@ use rustix::process::{Pid, Signal, kill_process};
 use super::contender::{Contender, Durations, Round, durations as empty};
 use super::contest::{Outcome, take_turns};
 use super::rate_summary::Summary;
-use crate::hlog;
-use crate::run::folder::RunFolder;
-use crate::run::interrupts::Interrupts;
-use crate::run::manifest::Manifest;
+use crate::machine::interrupts::Interrupts;
+use masseter_analysis::hlog;
+use masseter_recording::Manifest;
+use masseter_recording::RunFolder;
 
 /// As it is called in results.
 pub(super) const NAME: &str = "rate";

@@ -3,7 +3,7 @@
 
 use serde::{Deserialize, Deserializer};
 
-use crate::exit::Exit;
+use masseter_terminal::Exit;
 
 /// The keys that are read.
 #[derive(Debug, Deserialize)]

@@ -15,8 +15,8 @@ use masseter_shared::realtime::{Cycle, Wake};
 use super::contender::{Durations, Round, durations, record};
 use super::contest::{Outcome, Turn};
 use super::on_core;
-use crate::run::dma_latency::Hold;
-use crate::run::supervisor::OFF_TICK_NS;
+use crate::machine::dma_latency::Hold;
+use masseter_shared::schedule::OFF_TICK_NS;
 
 const PERIOD_NS: u64 = SECOND_NS / 1000;
 /// Wake-ups a round.

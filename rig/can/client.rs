@@ -2,13 +2,14 @@
 //!
 //! It blocks nobody: what cannot be written now is kept, up to a bound.
 
+use masseter_terminal::status;
 use std::fmt::Display;
 use std::io::{self, Read, Write};
 use std::net::TcpStream;
 
+use masseter_can::socketcand::{ECHO, GREETING, OK, Request, RequestError, Requests, write_frame};
+use masseter_can::{Bus, ReceiveError};
 use masseter_plant::emulation::{NodePort, OpenLink};
-use masseter_shared::can::socketcand::{ECHO, GREETING, OK, Request, RequestError, Requests, write_frame};
-use masseter_shared::can::{Bus, ReceiveError};
 
 /// Text that waits for a client to read it; a bus at full load makes about 0.5 MB a second.
 const BACKLOG: usize = 1 << 20;
@@ -65,7 +66,7 @@ impl Client {
         });
         let Err(reason) = served else { return true };
         if !matches!(reason, Farewell::Closed) {
-            tell!("a client is disconnected: {reason}");
+            status!("a client is disconnected: {reason}");
             // It may be gone already.
             self.refuse(&reason);
             let _ = self.write_unsent();
@@ -152,7 +153,7 @@ impl Client {
                 Ok(Some(received)) => {
                     write_frame(&mut text, &received).expect("writing to a string does not fail");
                 }
-                Err(ReceiveError::Overrun { lost }) => tell!("{lost} frames were lost to a client"),
+                Err(ReceiveError::Overrun { lost }) => status!("{lost} frames were lost to a client"),
                 Ok(None) | Err(_) => break,
             }
         }

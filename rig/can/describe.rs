@@ -6,9 +6,9 @@ use clap::Args;
 use masseter_plant::description;
 use masseter_shared::geometry::AXIS_NAMES;
 
-use crate::exit::Exit;
-use crate::say::result;
-use crate::scenario::given;
+use masseter_plan::given;
+use masseter_terminal::Exit;
+use masseter_terminal::result;
 
 /// What `can eds` takes.
 #[derive(Debug, Clone, Args)]

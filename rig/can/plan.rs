@@ -3,16 +3,15 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use masseter_can::{BusPlan, PlannedMessage};
 use masseter_plant::core as plant;
-use masseter_shared::can::{BusPlan, PlannedMessage};
 use masseter_shared::config::{CanConfig, Scenario};
 use masseter_shared::schedule::{CycleSchedule, Room, ScheduleError, plans};
 use serde_json::{Value, json};
 
-use crate::cli::Format;
-use crate::exit::Exit;
-use crate::say::result;
-use crate::scenario;
+use masseter_terminal::Exit;
+use masseter_terminal::Format;
+use masseter_terminal::result;
 
 /// What `can plan` takes.
 #[derive(Debug, Clone, Args)]
@@ -29,7 +28,7 @@ pub(crate) struct PlanArgs {
 
 /// Prints the plan; exit code 2 where the rig could not run by it.
 pub(crate) fn plan(args: &PlanArgs) -> anyhow::Result<Exit> {
-    let scenario = scenario::changed(args.scenario.as_deref(), |scenario| {
+    let scenario = masseter_plan::changed(args.scenario.as_deref(), |scenario| {
         scenario.rate_hz = args.rate_hz.unwrap_or(scenario.rate_hz);
         Ok(())
     })?;

@@ -20,8 +20,8 @@ use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::io::Errno;
 
 use super::client::Client;
-use crate::exit::Exit;
-use crate::scenario;
+
+use masseter_terminal::{Exit, status};
 
 /// Clients on one bus at a time.
 const CLIENTS: usize = 8;
@@ -40,7 +40,7 @@ pub(crate) struct ServeArgs {
 
 /// Serves until it is interrupted.
 pub(crate) fn serve(args: &ServeArgs) -> anyhow::Result<Exit> {
-    let scenario = scenario::given(args.scenario.as_deref())?;
+    let scenario = masseter_plan::given(args.scenario.as_deref())?;
     let stop = StopRequest::listen_alone().context("cannot listen for signals")?;
     let listener = listen(args.listen)?;
     let mut link = OpenLink::new(&scenario, CLIENTS, clock::now_ns())?;
@@ -69,9 +69,9 @@ fn announce(listener: &TcpListener, scenario: &Scenario) -> anyhow::Result<()> {
     for (bus, axes) in scenario.can.buses.iter().enumerate() {
         let node = |&axis: &usize| format!("{} (node {})", AXIS_NAMES[axis], scenario.can.node_ids[axis]);
         let nodes: Vec<String> = axes.iter().map(node).collect();
-        tell!("can{bus}: {}", nodes.join(", "));
+        status!("can{bus}: {}", nodes.join(", "));
     }
-    tell!("socketcand protocol on {address}; end with Ctrl-C");
+    status!("socketcand protocol on {address}; end with Ctrl-C");
     Ok(())
 }
 
@@ -89,7 +89,7 @@ fn wait(listener: &TcpListener, clients: &[Client]) -> io::Result<()> {
 fn accept(listener: &TcpListener, clients: &mut Vec<Client>, places: usize) {
     while let Ok((stream, address)) = listener.accept() {
         if clients.len() == places {
-            tell!("no place is left for a client from {address}");
+            status!("no place is left for a client from {address}");
         } else {
             clients.extend(Client::greet(stream));
         }

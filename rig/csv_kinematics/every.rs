@@ -6,7 +6,7 @@ use masseter_shared::messages::pose_fields;
 
 use super::forward::COLUMNS_IN;
 use super::table::{Columns, CsvArgs, Lines, convert};
-use crate::exit::Exit;
+use masseter_terminal::Exit;
 
 /// `line` is the input's line. Conditions are 1 where they hold and 0 where not; `separation_rad` is
 /// the largest difference of a leg's angle to the nearest other solution; `condition` is that of the

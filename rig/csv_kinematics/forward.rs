@@ -7,7 +7,7 @@ use masseter_shared::messages::pose_fields;
 
 use super::every;
 use super::table::{Columns, CsvArgs, Lines, convert, convert_in_turn, mechanism};
-use crate::exit::Exit;
+use masseter_terminal::Exit;
 
 pub(super) const COLUMNS_IN: [&str; 6] = ["d1_m", "d2_m", "d3_m", "l1_m", "l2_m", "l3_m"];
 const COLUMNS_OUT: [&str; 12] = [

@@ -5,7 +5,7 @@ use masseter_shared::geometry::{InverseError, Joints, Mechanism, Pose};
 use masseter_shared::messages::pose_of_fields;
 
 use super::table::{Columns, CsvArgs, Lines, convert, mechanism};
-use crate::exit::Exit;
+use masseter_terminal::Exit;
 
 /// How far a quaternion's norm may be from 1.
 const UNIT_TOLERANCE: f64 = 1e-3;

@@ -12,9 +12,9 @@ use masseter_shared::geometry::Mechanism;
 use rayon::prelude::*;
 
 use super::input::{Input, Line};
-use crate::exit::Exit;
-use crate::say::taken;
-use crate::scenario;
+
+use masseter_terminal::taken;
+use masseter_terminal::{Exit, status};
 
 /// Status of a line that could not be read.
 const BAD_LINE: &str = "bad_line";
@@ -80,7 +80,7 @@ impl Lines {
 
 /// The mechanism that the arguments mean.
 pub(super) fn mechanism(args: &CsvArgs) -> anyhow::Result<Mechanism> {
-    let scenario = scenario::given(args.scenario.as_deref())?;
+    let scenario = masseter_plan::given(args.scenario.as_deref())?;
     Ok(Mechanism::new(&scenario.mechanism)?)
 }
 
@@ -151,7 +151,7 @@ fn stream<const IN: usize>(
             for lines in solve(&batch) {
                 output.write_all(&lines.text)?;
                 for (line, reason) in lines.refusals {
-                    tell!("{}:{line}: {reason}", input.name());
+                    status!("{}:{line}: {reason}", input.name());
                     exit = Exit::Usage;
                 }
             }

@@ -23,10 +23,10 @@ use serde::Serialize;
 
 pub use finding::{Finding, Level};
 
-use crate::cli::Format;
-use crate::exit::Exit;
 use crate::machine::SystemRoot;
-use crate::say::result;
+use masseter_terminal::Exit;
+use masseter_terminal::Format;
+use masseter_terminal::result;
 
 /// Version of the report's form.
 const FORM: u32 = 1;

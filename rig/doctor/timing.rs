@@ -9,7 +9,7 @@ use rustix::time::{ClockId, clock_getres};
 use super::finding::Finding;
 use super::{boot_options, container};
 use crate::machine::SystemRoot;
-use crate::run::dma_latency;
+use crate::machine::dma_latency;
 
 /// Clock sources that are read without a system call and in tens of nanoseconds.
 const FAST_SOURCES: [&str; 4] = ["tsc", "kvm-clock", "arch_sys_counter", "hyperv_clocksource_tsc_page"];

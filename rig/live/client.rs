@@ -15,7 +15,7 @@ use tungstenite::{Error, accept_hdr_with_config};
 
 use super::protocol::{self, Asked, Level, Subscription};
 use super::socket::Socket;
-use crate::recording::{Channel, Encoded};
+use masseter_recording::{Channel, Encoded};
 
 /// What may wait for a client that reads slowly, bytes: half a second of every topic at 1 kHz.
 const UNREAD_BYTES: usize = 1 << 20;

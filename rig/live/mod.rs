@@ -19,7 +19,7 @@ use std::sync::atomic::{AtomicU8, AtomicU64, AtomicUsize, Ordering};
 use std::sync::mpsc::{SyncSender, sync_channel};
 use std::thread::{self, JoinHandle};
 
-use crate::recording::{Recorded, Scene, Topic};
+use masseter_recording::{Recorded, Scene, Topic};
 use server::Server;
 
 /// Where a run is shown unless told otherwise: to this machine only, on Foxglove's usual port.

@@ -7,7 +7,7 @@
 use data_encoding::BASE64;
 use serde::{Deserialize, Serialize};
 
-use crate::recording::{Channel, Definition, Encoded};
+use masseter_recording::{Channel, Definition, Encoded};
 
 /// Names of the protocol that clients ask for, the current one first. What is used here is alike in all.
 const SUBPROTOCOLS: [&str; 2] = ["foxglove.sdk.v1", "foxglove.websocket.v1"];
@@ -126,7 +126,7 @@ mod tests {
     use serde_json::{Value, json};
 
     use super::*;
-    use crate::recording::Topic;
+    use masseter_recording::Topic;
 
     #[test]
     fn the_newest_protocol_that_both_know_is_spoken() {

@@ -13,7 +13,7 @@ use masseter_shared::clock;
 
 use super::client::{Client, Gone};
 use super::{Offer, QUEUE, Shared, bit, protocol};
-use crate::recording::{Channel, Definition, Encoded, Encoder, Scene, Topic};
+use masseter_recording::{Channel, Definition, Encoded, Encoder, Scene, Topic};
 
 /// How often clients are served.
 const TURN: Duration = Duration::from_millis(10);

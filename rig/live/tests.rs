@@ -10,7 +10,7 @@ use tungstenite::http::HeaderValue;
 use tungstenite::{Message, WebSocket};
 
 use super::*;
-use crate::recording::Channel;
+use masseter_recording::Channel;
 
 fn live() -> Live {
     let scene = Scene::new(&Mechanism::new(&MechanismConfig::default()).unwrap(), &JawConfig::default());

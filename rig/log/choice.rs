@@ -6,7 +6,7 @@ use anyhow::bail;
 use mcap::records::Channel;
 
 use super::columns::Columns;
-use crate::recording::{SCHEMA_ENCODING, Schema};
+use masseter_recording::{SCHEMA_ENCODING, Schema};
 
 /// What becomes a table, and what does not.
 #[derive(Debug, Default)]

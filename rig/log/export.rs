@@ -8,8 +8,8 @@ use std::path::Path;
 use anyhow::Context;
 
 use super::columns::Columns;
-use crate::analysis::CandumpLogs;
-use crate::recording::{CDR_LITTLE_ENDIAN, Entry, Reader, Recorded};
+use masseter_analysis::CandumpLogs;
+use masseter_recording::{CDR_LITTLE_ENDIAN, Entry, Reader, Recorded};
 
 /// A table being written.
 struct Csv {

@@ -17,11 +17,11 @@ use std::path::{Path, PathBuf};
 use anyhow::Context;
 use clap::{Args, Subcommand};
 
-use crate::exit::Exit;
-use crate::recording::{Reader, Recovered, recover};
-use crate::run::folder::RunFolder;
-use crate::say::result;
 use choice::Choice;
+use masseter_recording::RunFolder;
+use masseter_recording::{Reader, Recovered, recover};
+use masseter_terminal::Exit;
+use masseter_terminal::result;
 use survey::Survey;
 
 /// What `log` does.

@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::io::{Read, Seek};
 
-use crate::analysis::{SequenceCheck, TopicFigures};
-use crate::exit::Exit;
-use crate::recording::{Chunks, Damage, Entry, ReadError, Reader};
+use masseter_analysis::{SequenceCheck, TopicFigures};
+use masseter_recording::{Chunks, Damage, Entry, ReadError, Reader};
+use masseter_terminal::Exit;
 
 /// What is known of one channel.
 #[derive(Debug, Clone, Default)]

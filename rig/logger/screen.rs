@@ -11,7 +11,7 @@ use std::time::Duration;
 use masseter_shared::clock;
 use rustix::termios::tcgetwinsize;
 
-use crate::say::warn;
+use masseter_terminal::warn;
 
 /// How often it is looked whether everything is written, and how many times before nobody seems to read.
 const LOOK: Duration = Duration::from_millis(10);

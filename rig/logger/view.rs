@@ -11,13 +11,13 @@ mod tests;
 use std::fmt::Write as _;
 use std::io::{self, IsTerminal};
 
-use masseter_shared::can::wire::Rates;
+use masseter_can::wire::Rates;
 use masseter_shared::clock::SECOND_NS;
 use masseter_shared::geometry::AXIS_NAMES;
-use masseter_shared::messages::codes::{ControllerState, DriveCondition};
+use masseter_shared::messages::codes::{ControllerState, drive_state_name};
 
 use crate::live::Watched;
-use crate::recording::Recorded;
+use masseter_recording::Recorded;
 use seen::{CLASS_NAMES, Lateness, Seen};
 
 /// How often a line is written, ns.
@@ -225,7 +225,7 @@ impl View {
     }
 
     fn write_drives(&self, text: &mut String) -> std::fmt::Result {
-        let name = |code| DriveCondition::try_from(code).map_or("?", DriveCondition::name);
+        let name = |code| drive_state_name(code).unwrap_or("?");
         let conditions = self.seen.reading.drive_state.map(name);
         if conditions.iter().all(|condition| *condition == conditions[0]) {
             return writeln!(text, "  drives   all {}", conditions[0]);

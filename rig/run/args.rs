@@ -1,4 +1,4 @@
-//! What `masseter run` takes. What it comes to, [`plan`](super::plan) says.
+//! The arguments of `masseter run`.
 
 use std::net::SocketAddr;
 use std::path::PathBuf;
@@ -6,8 +6,10 @@ use std::time::Duration;
 
 use clap::{Args, ValueEnum};
 
-use crate::cli::Format;
+use crate::arguments::{Wires, parse_cores, parse_wires};
 use crate::live;
+use masseter_plan::Overrides;
+use masseter_terminal::Format;
 
 /// What `run` takes.
 #[derive(Debug, Clone, Default, Args)]
@@ -61,6 +63,20 @@ pub struct RunArgs {
     pub quiet: bool,
 }
 
+impl RunArgs {
+    /// What the arguments change in the scenario.
+    pub(super) fn overrides(&self) -> Overrides {
+        Overrides {
+            trajectory: self.trajectory.clone(),
+            duration: self.duration,
+            rate_hz: self.rate_hz,
+            interfaces: self.can.as_ref().map(|wires| wires.0.clone()),
+            cores: self.cores,
+            seed: self.seed,
+        }
+    }
+}
+
 /// Which time a run lives in.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
 pub enum ClockKind {
@@ -71,25 +87,12 @@ pub enum ClockKind {
     Virtual,
 }
 
-/// What the buses run on: real interfaces, or none for simulated buses.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Wires(pub Vec<String>);
-
-pub(crate) fn parse_cores(text: &str) -> Result<[usize; 2], String> {
-    let cores: Result<Vec<usize>, _> = text.split(',').map(|core| core.trim().parse()).collect();
-    match cores.as_deref() {
-        Ok([controller, plant]) => Ok([*controller, *plant]),
-        _ => Err("give two cores, such as 0,1".to_owned()),
+impl ClockKind {
+    /// The name in the manifest.
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Self::Rt => "rt",
+            Self::Virtual => "virtual",
+        }
     }
-}
-
-pub(crate) fn parse_wires(text: &str) -> Result<Wires, String> {
-    if text == "virtual" {
-        return Ok(Wires(Vec::new()));
-    }
-    let names: Vec<_> = text.split(',').map(|name| name.trim().to_owned()).collect();
-    if names.iter().any(String::is_empty) {
-        return Err("give `virtual`, or interfaces such as can0,can1".to_owned());
-    }
-    Ok(Wires(names))
 }

@@ -1,16 +1,11 @@
 //! `masseter run`: from arguments to a verdict.
 //!
-//! [`plan`] refuses whatever cannot run before anything starts; then [`supervisor`] runs the three
+//! [`masseter_plan`] refuses whatever cannot run before anything starts; then [`supervisor`] runs the three
 //! processes, or [`virtual_time`] their cores; then the recording is analysed and the run judged.
 
 pub mod args;
 pub mod child;
-pub mod dma_latency;
 pub mod ending;
-pub mod folder;
-pub mod interrupts;
-pub mod manifest;
-pub mod plan;
 pub mod supervisor;
 pub mod usage;
 pub mod virtual_time;
@@ -18,22 +13,20 @@ pub mod virtual_time;
 use std::fs;
 use std::path::Path;
 
-use anyhow::Context;
+use anyhow::{Context, bail};
+use masseter_plan::Plan;
+use masseter_plant::core as plant;
+use masseter_recording::{Ending, MOTION, Manifest, RunFolder};
 use masseter_shared::config::{MotionConfig, Scenario};
 
-use crate::analysis;
-use crate::exit::{Exit, Failure, OrFailure};
-use crate::report;
+use crate::{live, machine};
 use args::{ClockKind, RunArgs};
-use ending::Ending;
-use folder::RunFolder;
-use manifest::Manifest;
-use plan::Plan;
+use masseter_terminal::{Exit, Failure, OrFailure, status};
 use supervisor::Ended;
 
 /// Plays the motion, judges the run and leaves its folder.
 pub fn run(args: &RunArgs) -> Result<Exit, Failure> {
-    let plan = Plan::resolve(args).usage()?;
+    let plan = resolve(args).usage()?;
     let claimed = match args.clock {
         ClockKind::Virtual => None,
         ClockKind::Rt => Some(supervisor::claim(args.name.as_deref()).usage()?),
@@ -44,10 +37,11 @@ pub fn run(args: &RunArgs) -> Result<Exit, Failure> {
     };
     keep_scenario(&folder, &plan.scenario).incomplete()?;
     if !args.quiet {
-        tell!("{}", plan.announcement());
+        status!("{}", plan.announcement());
     }
 
-    let mut manifest = Manifest::new(&plan, args.clock);
+    let motion_s = plan.trajectory.duration_s();
+    let mut manifest = Manifest::new(plan.scenario.clone(), motion_s, args.clock.name(), machine::describe());
     let unwritten = || format!("cannot write {}", folder.manifest().display());
     let keep = |manifest: &Manifest| manifest.write(&folder).with_context(unwritten).incomplete();
     // For a recording that nobody lives to judge.
@@ -71,10 +65,39 @@ pub fn run(args: &RunArgs) -> Result<Exit, Failure> {
     if manifest.ending == Ending::Interrupted && is_in_processes && manifest.scheduling.is_empty() {
         return Ok(Exit::Interrupted);
     }
-    let figures = analysis::analyse(&folder, &plan.scenario)
+    let figures = masseter_analysis::analyse(&folder, &plan.scenario)
         .context("the run's recording cannot be analysed")
         .incomplete()?;
-    report::write(&folder, &manifest, &figures, args.format)
+    masseter_report::write(&folder, &manifest, &figures, args.format)
+}
+
+/// Plans the run that the arguments ask for, and refuses what this machine does not have.
+fn resolve(args: &RunArgs) -> anyhow::Result<Plan> {
+    let scenario = masseter_plan::scenario(args.scenario.as_deref(), &args.overrides())?;
+    check_clock(args, &scenario)?;
+    args.live.map_or(Ok(()), live::check)?;
+    let plan = Plan::of(scenario)?;
+    plant::check_interfaces(&plan.scenario).context("the plant cannot be built")?;
+    Ok(plan)
+}
+
+/// Virtual time leaves no room for what only real time has.
+fn check_clock(args: &RunArgs, scenario: &Scenario) -> anyhow::Result<()> {
+    if args.clock == ClockKind::Rt {
+        return Ok(());
+    }
+    if !scenario.can.is_virtual() {
+        bail!("virtual time has no real wires: use --can virtual, or --clock rt");
+    }
+    if args.require_rt || args.name.is_some() {
+        bail!(
+            "virtual time needs no real time and has no other rig beside it: leave out --require-rt and --name"
+        );
+    }
+    if args.live.is_some() {
+        bail!("virtual time is over before it can be watched: leave out --live, or use --clock rt");
+    }
+    Ok(())
 }
 
 /// Keeps the scenario and the recording it plays together: another one may lie where that was by the time it is run
@@ -85,7 +108,7 @@ fn keep_scenario(folder: &RunFolder, scenario: &Scenario) -> anyhow::Result<()> 
         let rows =
             fs::read_to_string(&file.path).with_context(|| format!("cannot read {}", file.path.display()))?;
         keep(folder, &folder.motion(), &rows)?;
-        file.path = folder::MOTION.into();
+        file.path = MOTION.into();
     }
     keep(folder, &folder.scenario(), &kept.to_toml())
 }

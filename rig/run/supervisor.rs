@@ -11,23 +11,23 @@ use std::process::ExitStatus;
 use std::time::Duration;
 
 use anyhow::Context;
+use masseter_plan::Plan;
+use masseter_recording::{DmaLatency, Ending, RunFolder, RunUsage};
 use masseter_shared::clock::{self, SECOND_NS};
 use masseter_shared::config::Scenario;
 use masseter_shared::lifecycle::Start;
 use masseter_shared::realtime::scheduling::Obtained;
+use masseter_shared::schedule::OFF_TICK_NS;
 use masseter_shared::transport::{Claim, Domain, DomainError};
 
 use super::args::RunArgs;
 use super::child::{ChildError, Process, Role};
-use super::dma_latency::{self, DmaLatency};
-use super::ending::{Ending, died, of_all, of_the_others};
-use super::folder::RunFolder;
-use super::interrupts::Interrupts;
-use super::plan::Plan;
-use super::usage::{Meter, RunUsage};
+use super::ending::{died, of_all, of_the_others};
+use super::usage::Meter;
 use crate::clean::sweep_dead;
-use crate::exit::{Exit, Failure, OrFailure};
-use crate::machine::SystemRoot;
+use crate::machine::interrupts::Interrupts;
+use crate::machine::{SystemRoot, dma_latency};
+use masseter_terminal::{Exit, Failure, OrFailure, status};
 
 /// How often the processes are looked after.
 const WATCH: Duration = Duration::from_millis(2);
@@ -35,9 +35,6 @@ const WATCH: Duration = Duration::from_millis(2);
 const HEARD_WITHIN: Duration = Duration::from_millis(100);
 /// From the word to begin to the first SYNC, ns.
 const LEAD_NS: u64 = 100_000_000;
-/// SYNC and the controller's deadline keep this clear of whole milliseconds, where the kernel's timer
-/// tick falls, ns.
-pub(crate) const OFF_TICK_NS: u64 = 230_000;
 /// How long a process may take to end when asked to, beyond what it has to do first.
 const END_WITHIN_NS: u64 = 5 * SECOND_NS;
 /// How long the logger may take to write what is left: as long as a slow disk needs, ns.
@@ -96,7 +93,7 @@ pub fn run(
     drop(claim);
     interrupts.let_go();
     if let Err(error) = domain.sweep() {
-        tell!("masseter: {error}; `masseter clean` removes what is left of this run");
+        status!("masseter: {error}; `masseter clean` removes what is left of this run");
     }
     // Whatever can be wrong with the input was looked for before.
     result.died()
@@ -147,7 +144,7 @@ impl Rig {
         let cpu_dma_latency = Some(hold.obtained().clone());
         let refusals = show_refusals(&scheduling, hold.obtained());
         if args.require_rt && refusals > 0 {
-            tell!("masseter: real time was required and not granted; nothing was started");
+            status!("masseter: real time was required and not granted; nothing was started");
             return Ok(Ended { scheduling, cpu_dma_latency, ..Ending::NotStarted.into() });
         }
         let epoch_ns = self.start(plan.scenario.period_ns())?;
@@ -290,5 +287,5 @@ fn show_refusals(scheduling: &BTreeMap<String, Obtained>, latency: &DmaLatency) 
         obtained.refusals.iter().map(move |refusal| format!("  {name}: {refusal}"))
     });
     let of_latency = latency.refusal.iter().map(|refusal| format!("  {refusal}"));
-    of_processes.chain(of_latency).map(|line| tell!("{line}")).count()
+    of_processes.chain(of_latency).map(|line| status!("{line}")).count()
 }

@@ -4,10 +4,8 @@
 //! Looked at from outside, twice a second, so that it costs the processes nothing. Counted from the first
 //! look on, when they are in their steady state.
 
-use std::collections::BTreeMap;
-
+use masseter_recording::{RunUsage, Usage};
 use masseter_shared::clock::{self, SECOND_NS};
-use serde::{Deserialize, Serialize};
 
 use crate::machine::SystemRoot;
 use crate::machine::counters::{ProcessCounters, stolen_ns};
@@ -17,37 +15,6 @@ const EVERY_NS: u64 = SECOND_NS / 2;
 
 /// A clock that is disciplined, not set, moves by less than this from one look to the next, ns.
 const DISCIPLINED_NS: i64 = 1_000_000;
-
-/// What a process used in its steady state: CPU time and page faults by all its threads, the rest by the main
-/// one, which is its loop.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
-pub struct Usage {
-    /// Duration covered, s.
-    pub observed_s: f64,
-    /// CPU time, s.
-    pub cpu_s: f64,
-    /// Times it gave up its core to wait.
-    pub voluntary_switches: u64,
-    /// Times its core was taken from it.
-    pub involuntary_switches: u64,
-    /// Page faults served from memory.
-    pub minor_faults: u64,
-    /// Page faults served from disk.
-    pub major_faults: u64,
-}
-
-/// What all processes used, by name, and what was stolen from the machine.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-pub struct RunUsage {
-    /// Each process.
-    pub processes: BTreeMap<String, Usage>,
-    /// Time that the hypervisor ran something else while a core of this machine wanted to run, as far as
-    /// it tells, s.
-    pub stolen_s: f64,
-    /// The largest jump of the wall clock: it was set, or the machine was suspended, s.
-    #[serde(default)]
-    pub clock_jump_s: f64,
-}
 
 /// Follows the processes.
 #[derive(Debug)]
@@ -129,7 +96,7 @@ impl Meter {
                 .filter_map(|process| {
                     // A single look tells nothing.
                     let [from, to] = process.from_to.filter(|[from, to]| from.at_ns < to.at_ns)?;
-                    Some((process.name.to_owned(), Usage::between(&from, &to)))
+                    Some((process.name.to_owned(), usage_between(&from, &to)))
                 })
                 .collect(),
             stolen_s: self
@@ -140,21 +107,21 @@ impl Meter {
     }
 }
 
-impl Usage {
-    fn between(from: &ProcessCounters, to: &ProcessCounters) -> Self {
-        Self {
-            observed_s: (to.at_ns - from.at_ns) as f64 / 1e9,
-            cpu_s: (to.cpu_ns - from.cpu_ns) as f64 / 1e9,
-            voluntary_switches: to.voluntary_switches - from.voluntary_switches,
-            involuntary_switches: to.involuntary_switches - from.involuntary_switches,
-            minor_faults: to.minor_faults - from.minor_faults,
-            major_faults: to.major_faults - from.major_faults,
-        }
+fn usage_between(from: &ProcessCounters, to: &ProcessCounters) -> Usage {
+    Usage {
+        observed_s: (to.at_ns - from.at_ns) as f64 / 1e9,
+        cpu_s: (to.cpu_ns - from.cpu_ns) as f64 / 1e9,
+        voluntary_switches: to.voluntary_switches - from.voluntary_switches,
+        involuntary_switches: to.involuntary_switches - from.involuntary_switches,
+        minor_faults: to.minor_faults - from.minor_faults,
+        major_faults: to.major_faults - from.major_faults,
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use std::collections::BTreeMap;
+
     use super::*;
     use crate::machine::fixture::Fixture;
 

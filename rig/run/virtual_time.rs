@@ -6,18 +6,17 @@
 
 use anyhow::Context;
 use masseter_controller::core::{Controller, Tick};
+use masseter_plan::Plan;
 use masseter_plant::core::{PlantCore, PlantError};
+use masseter_recording::{Backlog, Ending, Pace, Recorder, RunFolder, Scene};
 use masseter_shared::clock::SECOND_NS;
 use masseter_shared::messages::codes::ControllerState;
 use masseter_shared::messages::{Message, State};
 use masseter_shared::realtime::Wake;
+use masseter_terminal::status;
 
 use super::child::Role;
-use super::ending::Ending;
-use super::folder::RunFolder;
-use super::interrupts::Interrupts;
-use super::plan::Plan;
-use crate::recording::{Backlog, Pace, Recorder, Scene};
+use crate::machine::interrupts::Interrupts;
 
 /// Virtual time of the first SYNC, ns.
 const EPOCH_NS: u64 = SECOND_NS;
@@ -48,7 +47,7 @@ fn play(plan: &Plan, folder: &RunFolder, interrupts: &Interrupts) -> anyhow::Res
     }
     let loss = log.backlog.finish().loss();
     if let Some(loss) = &loss {
-        tell!("masseter: {loss}; the run ends here");
+        status!("masseter: {loss}; the run ends here");
     }
     Ok(match (plant_error, controller.state()) {
         (Some(error), _) => Ending::died(Role::Plant.name(), error.to_string()),

@@ -4,7 +4,6 @@
 //! Neither the controller's forward kinematics nor the plant's dynamics are here, and nothing here
 //! knows which process it runs in.
 
-pub mod can;
 pub mod clock;
 pub mod config;
 pub mod geometry;

@@ -7,13 +7,17 @@
 
 mod room;
 
-use crate::can::canopen::{Cob, NodeId, NodeIdError};
-use crate::can::wire::{INTERFRAME_BITS, Rates, longest_bits, shortest_bits};
-use crate::can::{BitrateError, BusPlan, NoReleaser, Overload, PeriodicMessage, Release, Rpdo1, Tpdo1};
 use crate::clock::MILLISECOND_NS;
 use crate::config::CanConfig;
+use masseter_can::canopen::{Cob, NodeId, NodeIdError};
+use masseter_can::wire::{INTERFRAME_BITS, Rates, longest_bits, shortest_bits};
+use masseter_can::{BitrateError, BusPlan, NoReleaser, Overload, PeriodicMessage, Release, Rpdo1, Tpdo1};
 
 pub use room::Room;
+
+/// SYNC and the controller's deadline keep this clear of whole milliseconds, where the kernel's timer
+/// tick falls, ns.
+pub const OFF_TICK_NS: u64 = 230_000;
 
 /// From the reading's worst case to the controller's deadline: publishing takes some microseconds, ns.
 const PUBLISH_NS: u64 = 15_000;
@@ -208,7 +212,7 @@ fn messages(drives: &[NodeId], can: &CanConfig, period_ns: u64, first: Exchange)
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::can::wire::worst_case_bits;
+    use masseter_can::wire::worst_case_bits;
 
     #[test]
     fn two_buses_hold_a_kilohertz_and_the_offsets_follow_the_frames() {

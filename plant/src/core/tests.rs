@@ -1,16 +1,15 @@
 //! Scenarios of the whole plant under virtual time, with a commander that knows inverse kinematics only.
 
-use masseter_shared::can::canopen::{Cob, NodeId};
-use masseter_shared::can::cia402::DriveState;
-use masseter_shared::can::tap;
+use masseter_can::canopen::{Cob, NodeId};
 use masseter_shared::geometry::{AXES, Mechanism, MechanismConfig, Pose, Vec3};
-use masseter_shared::messages::codes::{Cause, DriveCondition, DriveRequest, EventKind, NO_AXIS, Source};
+use masseter_shared::messages::codes::{Cause, DriveRequest, DriveState, EventKind, NO_AXIS, Source};
+use masseter_shared::messages::tap;
 
 use super::*;
 
 const PERIOD_NS: u64 = 1_000_000;
 const EPOCH_NS: u64 = 1_000_000_000;
-const ENABLED: [u32; AXES] = [DriveCondition::OperationEnabled as u32; AXES];
+const ENABLED: [u32; AXES] = [DriveState::OperationEnabled as u32; AXES];
 
 /// Targets and request for a reading.
 type Answer<'a> = dyn Fn(&Reading) -> ([f64; AXES], DriveRequest) + 'a;

@@ -2,8 +2,8 @@
 //!
 //! A real interface reports only its own controller. Single errors are no events; the log and the figures have them.
 
-use masseter_shared::can::faults::FaultNote;
-use masseter_shared::can::{ErrorKind, ErrorReport, ErrorState};
+use masseter_can::faults::FaultNote;
+use masseter_can::{ErrorKind, ErrorReport, ErrorState};
 use masseter_shared::messages::Event;
 use masseter_shared::messages::codes::{Cause, EventKind, Source};
 

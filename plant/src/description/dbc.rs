@@ -5,8 +5,8 @@
 
 use std::fmt::{self, Write};
 
-use masseter_shared::can::canopen::{Cob, NmtCommand, NmtState, NodeId};
-use masseter_shared::can::{CanId, Frame};
+use masseter_can::canopen::{Cob, NmtCommand, NmtState, NodeId};
+use masseter_can::{CanId, Frame};
 use masseter_shared::config::DriveConfig;
 use masseter_shared::geometry::{AXES, AXIS_NAMES};
 

@@ -2,7 +2,7 @@
 
 use std::fmt::{self, Write};
 
-use masseter_shared::can::canopen::NodeId;
+use masseter_can::canopen::NodeId;
 use masseter_shared::config::IdentityConfig;
 
 use crate::drive::DriveSettings;

@@ -1,6 +1,6 @@
 //! The settings of an emulated drive, from the scenario, and the object dictionary that follows from them.
 
-use masseter_shared::can::canopen::NodeId;
+use masseter_can::canopen::NodeId;
 use masseter_shared::clock::MILLISECOND_NS;
 use masseter_shared::config::{DriveConfig, Scenario};
 use masseter_shared::geometry::AXES;

@@ -1,7 +1,7 @@
 //! Drives and mechanism, co-simulated in the order of time.
 
-use masseter_shared::can::canopen::Cob;
-use masseter_shared::can::{CanId, ErrorState, Frame};
+use masseter_can::canopen::Cob;
+use masseter_can::{CanId, ErrorState, Frame};
 use masseter_shared::config::Scenario;
 use masseter_shared::geometry::{AXES, Mechanism};
 use masseter_shared::messages::{Truth, pose_fields};
@@ -18,7 +18,7 @@ use crate::mechanism::{Dynamics, DynamicsError, Food, State, closed_mouth, level
 ///
 /// ```
 /// use masseter_plant::emulation::Emulation;
-/// use masseter_shared::can::canopen::{Cob, NodeId};
+/// use masseter_can::canopen::{Cob, NodeId};
 /// use masseter_shared::config::Scenario;
 ///
 /// let mut emulation = Emulation::new(&Scenario::default(), 0)?;
@@ -188,7 +188,7 @@ impl Emulation {
 
 #[cfg(test)]
 mod tests {
-    use masseter_shared::can::canopen::sync;
+    use masseter_can::canopen::sync;
 
     use super::*;
 

@@ -3,7 +3,7 @@
 //! Every drive has a socket of its own. The mechanism moves in real time: frames are delivered at their time stamps, and
 //! the steps between them are caught up. The emulator has no master and publishes nothing.
 
-use masseter_shared::can::{Bus, OpenError, Received, SocketCan};
+use masseter_can::{Bus, OpenError, Received, SocketCan};
 use masseter_shared::clock::{self, MILLISECOND_NS};
 use masseter_shared::config::Scenario;
 use masseter_shared::geometry::AXES;

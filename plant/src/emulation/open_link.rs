@@ -1,6 +1,6 @@
 //! The emulated drives on simulated wires without a master, for foreign masters and other nodes.
 
-use masseter_shared::can::Bus;
+use masseter_can::Bus;
 use masseter_shared::config::Scenario;
 
 use super::virtual_link::VirtualLink;

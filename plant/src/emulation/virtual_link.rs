@@ -1,8 +1,8 @@
 //! Simulated wires with the emulated drives on them, for a master on port 0 and for free ports.
 
-use masseter_shared::can::canopen::NodeId;
-use masseter_shared::can::faults::{FaultNote, Faults};
-use masseter_shared::can::{Bus, ReceiveError, Tapped, VirtualWire, WireConfig};
+use masseter_can::canopen::NodeId;
+use masseter_can::faults::{FaultNote, Faults};
+use masseter_can::{Bus, ReceiveError, Tapped, VirtualWire, WireConfig};
 use masseter_shared::config::Scenario;
 use masseter_shared::geometry::AXES;
 use masseter_shared::messages::Truth;

@@ -2,9 +2,9 @@
 //!
 //! This module injects nothing; the wires do.
 
-use masseter_shared::can::canopen::NodeId;
-use masseter_shared::can::faults::{Fault, FaultKind};
-use masseter_shared::can::{CanId, Frame};
+use masseter_can::canopen::NodeId;
+use masseter_can::faults::{Fault, FaultKind};
+use masseter_can::{CanId, Frame};
 use masseter_shared::clock::{MILLISECOND_NS, SECOND_NS};
 use masseter_shared::config::{CanConfig, FaultConfig, FaultKindConfig, Scenario};
 

@@ -8,7 +8,7 @@ use std::io::ErrorKind;
 use std::os::linux::net::SocketAddrExt;
 use std::os::unix::net::{SocketAddr, UnixDatagram};
 
-use masseter_shared::can::OpenError;
+use masseter_can::OpenError;
 
 use crate::error::PlantError;
 

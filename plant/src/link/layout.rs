@@ -1,6 +1,6 @@
 //! The axes on the buses: port and node id of each, as a scenario declares them.
 
-use masseter_shared::can::canopen::NodeId;
+use masseter_can::canopen::NodeId;
 use masseter_shared::config::CanConfig;
 use masseter_shared::geometry::AXES;
 

@@ -3,8 +3,8 @@
 //! [`sockets`] connects the master to real interfaces; the emulation brings simulated wires of its own. [`layout`] says
 //! which drive is on which bus, [`faults`] which faults a bus has.
 
-use masseter_shared::can::faults::FaultNote;
-use masseter_shared::can::{Bus, ReceiveError, Tapped};
+use masseter_can::faults::FaultNote;
+use masseter_can::{Bus, ReceiveError, Tapped};
 use masseter_shared::messages::Truth;
 
 use crate::mechanism::DynamicsError;

@@ -1,9 +1,9 @@
 //! The link to real drives: SocketCAN interfaces. It knows no truth of the mechanism.
 
-use masseter_shared::can::canopen::NodeId;
-use masseter_shared::can::faults::FaultNote;
-use masseter_shared::can::wrapped::PortFaults;
-use masseter_shared::can::{Bus, ReceiveError, SocketCan, Tapped};
+use masseter_can::PortFaults;
+use masseter_can::canopen::NodeId;
+use masseter_can::faults::FaultNote;
+use masseter_can::{Bus, ReceiveError, SocketCan, Tapped};
 use masseter_shared::config::Scenario;
 use masseter_shared::messages::Truth;
 

@@ -1,7 +1,7 @@
 //! The state of a bus as the master sees it: bus-off, and nodes that nobody configured.
 
-use masseter_shared::can::canopen::NodeId;
-use masseter_shared::can::{ErrorState, SendError};
+use masseter_can::canopen::NodeId;
+use masseter_can::{ErrorState, SendError};
 
 /// Memory of a bus.
 #[derive(Debug, Clone, Copy, Default)]

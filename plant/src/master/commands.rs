@@ -1,7 +1,7 @@
 //! The controller's commands: the newest valid one, and the silence since the last.
 
 use masseter_shared::geometry::AXES;
-use masseter_shared::messages::codes::{Cause, DriveRequest};
+use masseter_shared::messages::codes::{Cause, DriveRequest, drive_request};
 use masseter_shared::messages::{Command, Reading};
 
 use super::events::Subject;
@@ -29,7 +29,7 @@ impl Commands {
 
     /// The request of the newest valid command.
     pub(super) fn request(&self) -> DriveRequest {
-        let request = self.newest.map(|command| DriveRequest::try_from(command.request));
+        let request = self.newest.map(|command| drive_request(command.request));
         request.and_then(Result::ok).unwrap_or(DriveRequest::Off)
     }
 
@@ -66,7 +66,7 @@ impl Commands {
         if let Some(axis) = (0..AXES).find(|&axis| !can_go_to(axis, command.target_m[axis])) {
             return Err(bad(Subject::Axis(axis), command.target_m[axis]));
         }
-        if DriveRequest::try_from(command.request).is_err() {
+        if drive_request(command.request).is_err() {
             return Err(bad(Subject::Rig, f64::from(command.request)));
         }
         (self.newest, self.received_ns) = (Some(*command), now_ns);

@@ -2,10 +2,10 @@
 //!
 //! A [`RemoteDrive`] sends nothing; it returns frames and judgements.
 
-use masseter_shared::can::canopen::{NmtCommand, NmtState, NodeId, SdoResponse};
-use masseter_shared::can::cia402::{Controlword, DriveState, toward};
-use masseter_shared::can::{Frame, Rpdo1, Tpdo1};
-use masseter_shared::messages::codes::{BootPhase, Cause, DriveCondition, DriveRequest};
+use masseter_can::canopen::{NmtCommand, NmtState, NodeId, SdoResponse};
+use masseter_can::cia402::{Controlword, DriveRequest, DriveState, next_controlword};
+use masseter_can::{Frame, Rpdo1, Tpdo1};
+use masseter_shared::messages::codes::{BootPhase, Cause};
 
 use super::boot::{Boot, BootFault};
 use super::incoming::Kind;
@@ -93,8 +93,8 @@ impl RemoteDrive {
     }
 
     /// State of its power stage, as far as it is known.
-    pub(super) fn condition(&self) -> DriveCondition {
-        self.power.filter(|_| self.is_operational()).map_or(DriveCondition::Unknown, DriveCondition::from)
+    pub(super) fn drive_state(&self) -> Option<DriveState> {
+        self.power.filter(|_| self.is_operational())
     }
 
     /// Position actual value, m.
@@ -147,21 +147,21 @@ impl RemoteDrive {
     }
 
     /// Takes process data, which only an operational drive sends; a statusword without a meaning keeps the last state.
-    /// Returns its condition before and after; none while its process data are not used.
-    pub(super) fn take_process_data(&mut self, time_ns: u64, tpdo: Tpdo1) -> Option<[DriveCondition; 2]> {
+    /// Returns its state before and after; none while its process data are not used.
+    pub(super) fn take_process_data(&mut self, time_ns: u64, tpdo: Tpdo1) -> Option<[Option<DriveState>; 2]> {
         self.hear_state(time_ns, NmtState::Operational);
         self.presence.end_missing();
         if !self.is_started {
             return None;
         }
-        let before = self.condition();
+        let before = self.drive_state();
         if let Ok(state) = tpdo.statusword.state() {
             self.power = Some(state);
         }
         let data = (tpdo.actual_increments, tpdo.torque_permille);
         self.presence.answer(time_ns, data != (self.actual_increments, self.torque_permille));
         (self.actual_increments, self.torque_permille) = data;
-        Some([before, self.condition()])
+        Some([before, self.drive_state()])
     }
 
     /// Takes an answer of its SDO server.
@@ -258,7 +258,7 @@ impl RemoteDrive {
             return None;
         }
         let state = self.power.unwrap_or(DriveState::NotReadyToSwitchOn);
-        self.controlword = toward(state, request, self.controlword);
+        self.controlword = next_controlword(state, request, self.controlword);
         let follows = state == DriveState::OperationEnabled && request == DriveRequest::Enable;
         let target_increments =
             if follows { self.increments(target_m) as i32 } else { self.actual_increments };

@@ -2,7 +2,7 @@
 //!
 //! The log decides nothing; it only completes events and keeps them until they are drained.
 
-use masseter_shared::can::canopen::NodeId;
+use masseter_can::canopen::NodeId;
 use masseter_shared::geometry::AXES;
 use masseter_shared::messages::Event;
 

@@ -2,8 +2,8 @@
 //!
 //! Decoding only: the effect of a message is the master's matter.
 
-use masseter_shared::can::Tpdo1;
-use masseter_shared::can::canopen::{
+use masseter_can::Tpdo1;
+use masseter_can::canopen::{
     Cob, Emergency, Heartbeat, HeartbeatError, LengthError, NmtState, NodeId, SdoError, SdoResponse,
 };
 

@@ -24,13 +24,15 @@ mod supervision;
 #[cfg(test)]
 mod tests;
 
-use masseter_shared::can::canopen::{
+use masseter_can::canopen::{
     Cob, Emergency, Heartbeat, LengthError, Nmt, NmtCommand, NmtState, NmtTarget, NodeId, sync,
 };
-use masseter_shared::can::{Bus, CanId, Frame, ReceiveError, Received, Tpdo1};
+use masseter_can::{Bus, CanId, Frame, ReceiveError, Received, Tpdo1};
 use masseter_shared::config::Scenario;
 use masseter_shared::geometry::AXES;
-use masseter_shared::messages::codes::{BootPhase, Cause, DriveCondition, DriveRequest, EventKind, Source};
+use masseter_shared::messages::codes::{
+    BootPhase, Cause, DriveRequest, DriveState, EventKind, Source, drive_state_code,
+};
 use masseter_shared::messages::{Command, Event, Reading};
 use masseter_shared::realtime::Wake;
 
@@ -131,7 +133,7 @@ impl Master {
         for (axis, drive) in self.drives.iter().enumerate() {
             reading.position_m[axis] = drive.position_m();
             reading.force_n[axis] = drive.force_n();
-            reading.drive_state[axis] = drive.condition().code();
+            reading.drive_state[axis] = drive_state_code(drive.drive_state());
             reading.fresh_axes |= u32::from(self.is_fresh(axis)) << axis;
         }
     }
@@ -163,7 +165,7 @@ impl Master {
 
     /// Whether no drive reports voltage. A lost drive reports nothing and is not waited for: it stops by itself.
     pub(crate) fn drives_are_off(&self) -> bool {
-        self.drives.iter().all(|drive| drive.condition().is_powered() != Some(true))
+        !self.drives.iter().filter_map(RemoteDrive::drive_state).any(DriveState::is_powered)
     }
 
     /// Reports that tapped frames had no room.
@@ -210,9 +212,9 @@ impl Master {
                 }
                 None => {}
             }
-            let condition = self.drives[axis].condition();
-            all_are_enabled &= condition == DriveCondition::OperationEnabled;
-            if let Some(failure) = self.supervision.judge_power(axis, condition, shall_be_enabled) {
+            let state = self.drives[axis].drive_state();
+            all_are_enabled &= state == Some(DriveState::OperationEnabled);
+            if let Some(failure) = self.supervision.judge_power(axis, state, shall_be_enabled) {
                 self.fail(now_ns, failure);
             }
         }
@@ -395,7 +397,7 @@ impl Master {
         let Some([before, after]) = self.drives[axis].take_process_data(time_ns, tpdo) else { return };
         self.exchange.note_answer(time_ns);
         if before != after {
-            let event = transition(Source::Drive, before.code(), after.code());
+            let event = transition(Source::Drive, drive_state_code(before), drive_state_code(after));
             self.events.add(time_ns, Subject::Axis(axis), event);
         }
     }

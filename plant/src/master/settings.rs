@@ -1,7 +1,7 @@
 //! The settings of the master, from the scenario.
 
-use masseter_shared::can::canopen::{NodeId, sync};
-use masseter_shared::can::wire::{INTERFRAME_BITS, frame_bits};
+use masseter_can::canopen::{NodeId, sync};
+use masseter_can::wire::{INTERFRAME_BITS, frame_bits};
 use masseter_shared::clock::MILLISECOND_NS;
 use masseter_shared::config::Scenario;
 use masseter_shared::geometry::AXES;

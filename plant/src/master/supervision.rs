@@ -2,7 +2,7 @@
 //!
 //! The supervision only judges; the master stops the drives.
 
-use masseter_shared::messages::codes::{BootPhase, Cause, DriveCondition};
+use masseter_shared::messages::codes::{BootPhase, Cause, DriveState, drive_state_code};
 
 use super::boot::BootFault;
 use super::drive::RemoteDrive;
@@ -55,11 +55,11 @@ impl Supervision {
     pub(super) fn judge_power(
         &self,
         axis: usize,
-        condition: DriveCondition,
+        state: Option<DriveState>,
         shall_be_enabled: bool,
     ) -> Option<Failure> {
-        let has_left = shall_be_enabled && self.were_enabled && condition != DriveCondition::OperationEnabled;
-        let value = f64::from(condition.code());
+        let has_left = shall_be_enabled && self.were_enabled && state != Some(DriveState::OperationEnabled);
+        let value = f64::from(drive_state_code(state));
         has_left.then(|| Failure { value, ..Failure::new(Cause::DriveFault, Subject::Axis(axis)) })
     }
 

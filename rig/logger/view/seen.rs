@@ -1,15 +1,16 @@
 //! What the view has seen of a run, and the figures that it shows.
 
 use hdrhistogram::Histogram;
-use masseter_shared::can::tap::{self, Tapped};
-use masseter_shared::can::wire::{self, Rates};
+use masseter_can::Tapped;
+use masseter_can::wire::{self, Rates};
 use masseter_shared::clock::SECOND_NS;
 use masseter_shared::messages::codes::ControllerState;
+use masseter_shared::messages::tap;
 use masseter_shared::messages::{FrameTap, Reading, State};
 use nalgebra::Vector3;
 
-use crate::analysis::{Accumulator, MOVING};
-use crate::recording::{Recorded, Topic};
+use masseter_analysis::{Accumulator, MOVING};
+use masseter_recording::{Recorded, Topic};
 
 /// Upper ends of the classes of lateness, ns; what is later has a class of its own.
 const CLASSES_NS: [u64; 5] = [1_000, 10_000, 100_000, 1_000_000, 10_000_000];

@@ -1,6 +1,8 @@
-use masseter_shared::can::Bitrate;
+use masseter_can::Bitrate;
 use masseter_shared::geometry::AXES;
 use masseter_shared::messages::{CanData, FrameTap, Reading, State};
+
+use masseter_can::cia402::DriveState;
 
 use super::*;
 
@@ -21,7 +23,7 @@ fn view() -> View {
     }
     view.take(&Recorded::Reading(Reading {
         seq: 4,
-        drive_state: [DriveCondition::OperationEnabled.code(); AXES],
+        drive_state: [DriveState::OperationEnabled.code(); AXES],
         ..Default::default()
     }));
     view.take(&Recorded::Frame(FrameTap {
@@ -75,7 +77,7 @@ fn the_picture_shows_progress_error_lateness_buses_and_drives() {
 #[test]
 fn drives_that_differ_are_told_apart() {
     let mut view = view();
-    view.seen.reading.drive_state[5] = DriveCondition::Fault.code();
+    view.seen.reading.drive_state[5] = DriveState::Fault.code();
     let picture = view.picture(Losses::default(), 1).unwrap();
     assert_says(&picture, &["l2 operation_enabled", "l3 fault"]);
 }

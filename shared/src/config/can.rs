@@ -4,8 +4,8 @@ use serde::{Deserialize, Serialize};
 
 use super::ScenarioError;
 use super::need::require_positive;
-use crate::can::{Bitrate, BitrateError, FrameFormat, Rates};
 use crate::geometry::AXES;
+use masseter_can::{Bitrate, BitrateError, FrameFormat, Rates};
 
 /// The CAN link between the master and the six drives.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::ScenarioError;
 use super::need::{require_not_negative, require_within};
-use crate::can::canopen::NodeId;
+use masseter_can::canopen::NodeId;
 
 /// What goes wrong.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]

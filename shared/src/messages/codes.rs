@@ -1,5 +1,7 @@
 //! The enumerations that messages carry as numbers. A number without a meaning is refused, never guessed.
 
+pub use masseter_can::cia402::{DriveRequest, DriveState};
+
 /// A code that names nothing in its enumeration.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("{code} is no {enumeration}; sender and receiver may be of different versions")]
@@ -12,6 +14,9 @@ pub struct UnknownCode {
 
 /// [`Event::axis`](super::Event::axis) when no axis is concerned.
 pub const NO_AXIS: u32 = u32::MAX;
+
+/// [`Reading::drive_state`](super::Reading::drive_state) of a drive not heard of yet, or lost.
+pub const NO_DRIVE_STATE: u32 = 0;
 
 macro_rules! codes {
     ($($(#[$doc:meta])* $name:ident { $($(#[$variant_doc:meta])* $variant:ident = $code:literal $text:literal,)* })*) => {$(
@@ -69,38 +74,6 @@ macro_rules! codes {
 }
 
 codes! {
-    /// What the controller asks of all six drives.
-    DriveRequest {
-        /// No voltage: the drives are free.
-        Off = 0 "off",
-        /// Operation enabled, following the targets.
-        Enable = 1 "enable",
-        /// Stop along the quick-stop ramp, then switch on disabled.
-        QuickStop = 2 "quick_stop",
-    }
-
-    /// What a drive reports of itself: the states of CiA 402, and that nothing is known.
-    DriveCondition {
-        /// Not heard of yet, or lost.
-        Unknown = 0 "unknown",
-        /// Initialising.
-        NotReady = 1 "not_ready_to_switch_on",
-        /// No voltage allowed.
-        SwitchOnDisabled = 2 "switch_on_disabled",
-        /// Voltage may be applied.
-        ReadyToSwitchOn = 3 "ready_to_switch_on",
-        /// Voltage applied, no force.
-        SwitchedOn = 4 "switched_on",
-        /// Following targets.
-        OperationEnabled = 5 "operation_enabled",
-        /// Braking along the quick-stop ramp.
-        QuickStopActive = 6 "quick_stop_active",
-        /// Reacting to a fault.
-        FaultReaction = 7 "fault_reaction_active",
-        /// In fault, free of force.
-        Fault = 8 "fault",
-    }
-
     /// Where the controller stands in its sequence.
     ControllerState {
         /// No steady readings yet; drives off.
@@ -266,18 +239,36 @@ codes! {
     }
 }
 
-impl DriveCondition {
-    /// Whether the drive's voltage is applied: it gives force, or does so at the next command. None where nothing is
-    /// known of it.
-    pub const fn is_powered(self) -> Option<bool> {
-        match self {
-            Self::Unknown => None,
-            Self::NotReady | Self::SwitchOnDisabled | Self::ReadyToSwitchOn | Self::Fault => Some(false),
-            Self::SwitchedOn | Self::OperationEnabled | Self::QuickStopActive | Self::FaultReaction => {
-                Some(true)
-            }
-        }
+/// The request that a message carries.
+///
+/// # Errors
+/// [`UnknownCode`] where no request has that number.
+pub fn drive_request(code: u32) -> Result<DriveRequest, UnknownCode> {
+    DriveRequest::from_code(code).ok_or(UnknownCode { enumeration: "DriveRequest", code })
+}
+
+/// What a message carries for the state of a drive; [`NO_DRIVE_STATE`] for none.
+pub fn drive_state_code(state: Option<DriveState>) -> u32 {
+    state.map_or(NO_DRIVE_STATE, DriveState::code)
+}
+
+/// The state of a drive that a message carries; none for 0, a drive not heard of yet, or lost.
+///
+/// # Errors
+/// [`UnknownCode`] where no state has that number.
+pub fn drive_state(code: u32) -> Result<Option<DriveState>, UnknownCode> {
+    if code == NO_DRIVE_STATE {
+        return Ok(None);
     }
+    DriveState::from_code(code).map(Some).ok_or(UnknownCode { enumeration: "DriveState", code })
+}
+
+/// The name of the state of a drive that a message carries.
+///
+/// # Errors
+/// [`UnknownCode`] where no state has that number.
+pub fn drive_state_name(code: u32) -> Result<&'static str, UnknownCode> {
+    Ok(drive_state(code)?.map_or("unknown", DriveState::name))
 }
 
 #[cfg(test)]
@@ -285,10 +276,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_drive_has_voltage_from_switched_on_to_the_end_of_a_fault_reaction() {
-        use DriveCondition::{FaultReaction, OperationEnabled, QuickStopActive, SwitchedOn, Unknown};
-        let told = |powered| DriveCondition::ALL.iter().copied().filter(move |it| it.is_powered() == powered);
-        assert!(told(Some(true)).eq([SwitchedOn, OperationEnabled, QuickStopActive, FaultReaction]));
-        assert!(told(None).eq([Unknown]));
+    fn requests_and_drive_states_survive_their_codes_and_others_are_refused() {
+        for code in 0..256 {
+            assert!(drive_request(code).map_or(code > 2, |request| request.code() == code), "{code}");
+            let state_code = drive_state(code).map(drive_state_code);
+            assert!(state_code.map_or(code > 8, |found| found == code), "{code}");
+        }
     }
 }

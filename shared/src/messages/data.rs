@@ -4,7 +4,7 @@ use bytemuck::{Pod, Zeroable};
 use iceoryx2::prelude::ZeroCopySend;
 
 use super::schema::FieldType;
-use crate::can::Frame;
+use masseter_can::Frame;
 
 const MOST: usize = Frame::MAX_DATA;
 

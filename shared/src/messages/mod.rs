@@ -12,6 +12,7 @@
 pub mod codes;
 mod data;
 mod schema;
+pub mod tap;
 mod words;
 
 use bytemuck::{Pod, Zeroable, bytes_of, bytes_of_mut};
@@ -145,7 +146,7 @@ messages! {
         position_m: [f64; AXES],
         /// Actuator forces, positive towards increasing position, N.
         force_n: [f64; AXES],
-        /// Drive states, [`codes::DriveCondition`].
+        /// Drive states, [`codes::DriveState`], or [`codes::NO_DRIVE_STATE`].
         drive_state: [u32; AXES],
         /// Axes whose process data arrived this cycle, bit i for axis i.
         fresh_axes: u32,

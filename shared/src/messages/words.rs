@@ -2,8 +2,8 @@
 
 use super::Event;
 use super::codes::{Cause, EventKind, NoPose, Source};
-use crate::can::canopen::{AbortCode, EmergencyCode, ObjectAddress};
 use crate::geometry::AXIS_NAMES;
+use masseter_can::canopen::{AbortCode, EmergencyCode, ObjectAddress};
 
 /// The sentence for an event that names a node, a bus, an object, or why there is no pose; `None` where the figures
 /// alone say what there is to say.

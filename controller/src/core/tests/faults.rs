@@ -27,11 +27,11 @@ fn whatever_goes_wrong_while_moving_ends_in_a_safe_stop_with_its_cause() {
         (Cause::StaleReading, |_| None),
         (Cause::StaleReading, |reading| Some(Reading { fresh_axes: ALL_AXES - 1, ..reading })),
         (Cause::DriveFault, |mut reading| {
-            reading.drive_state[2] = DriveCondition::Fault.code();
+            reading.drive_state[2] = DriveState::Fault.code();
             Some(reading)
         }),
         (Cause::DriveFault, |mut reading| {
-            reading.drive_state[4] = DriveCondition::SwitchOnDisabled.code();
+            reading.drive_state[4] = DriveState::SwitchOnDisabled.code();
             Some(reading)
         }),
         (Cause::MasterFault, |reading| Some(Reading { master_fault: 1, ..reading })),
@@ -98,7 +98,7 @@ fn a_safe_stop_waits_for_a_lost_drive_until_its_time_is_over() {
     let mut bench = Bench::new();
     bench.run_until(ControllerState::Running);
     let lose = |mut reading: Reading| {
-        reading.drive_state[3] = DriveCondition::Unknown.code();
+        reading.drive_state[3] = NO_DRIVE_STATE;
         Some(reading)
     };
     let waits = (SAFE_STOP_S / bench.controller.period_s) as u64;
@@ -116,7 +116,7 @@ fn drives_that_never_get_ready_are_not_waited_for_forever() {
     let mut bench = Bench::new();
     for _ in 0..20_000 {
         bench.cycle(|mut reading| {
-            reading.drive_state = [DriveCondition::ReadyToSwitchOn.code(); AXES];
+            reading.drive_state = [DriveState::ReadyToSwitchOn.code(); AXES];
             Some(reading)
         });
     }

@@ -1,8 +1,8 @@
 //! Stops and limits of the whole plant: how hard, how far, and who may start it again.
 
-use masseter_shared::can::canopen::{Nmt, NmtCommand, NmtTarget};
-use masseter_shared::can::cia402::Controlword;
-use masseter_shared::can::{Bus, Frame, Rpdo1};
+use masseter_can::canopen::{Nmt, NmtCommand, NmtTarget};
+use masseter_can::cia402::Controlword;
+use masseter_can::{Bus, Frame, Rpdo1};
 
 use super::*;
 use crate::link::Buses;
@@ -131,7 +131,7 @@ fn a_commander_that_had_the_drives_stopped_may_go_before_they_stand() {
 #[test]
 fn a_commander_that_dies_while_it_enables_the_drives_is_missed() {
     let mut bench = Bench::new(&Scenario::default());
-    while !bench.reading.drive_state.contains(&DriveCondition::SwitchedOn.code()) {
+    while !bench.reading.drive_state.contains(&DriveState::SwitchedOn.code()) {
         bench.cycle(Some(&|reading| (reading.position_m, DriveRequest::Enable)));
     }
     (0..100).for_each(|_| bench.cycle(None));

@@ -1,7 +1,7 @@
 //! Faults of the wires: what the rig bears, what stops it, and what it tells.
 
-use masseter_shared::can::canopen::EmergencyCode;
-use masseter_shared::can::{ErrorKind, Tapped};
+use masseter_can::canopen::EmergencyCode;
+use masseter_can::{ErrorKind, Tapped};
 use masseter_shared::config::{FaultConfig, FaultKindConfig};
 use masseter_shared::messages::codes::NO_AXIS;
 

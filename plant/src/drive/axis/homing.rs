@@ -4,7 +4,7 @@
 //! The state machine returns commands; it moves nothing itself. The mechanism has no limit or home switches, so methods
 //! that need switches are not offered, and the speed for their search (6099h:1) has no use.
 
-use masseter_shared::can::cia402::{Controlword, StatusBit, Statusword};
+use masseter_can::cia402::{Controlword, StatusBit, Statusword};
 
 use super::encoder::mark_between;
 use super::motion::{MotionCommand, PositionView};

@@ -16,7 +16,7 @@ mod positioning;
 mod profile;
 mod servo;
 
-use masseter_shared::can::cia402::{Command, Controlword, DriveState, StatusBit, Statusword};
+use masseter_can::cia402::{Command, Controlword, DriveState, StatusBit, Statusword};
 use masseter_shared::config::DriveConfig;
 
 use crate::drive::dictionary::{Objects, names};

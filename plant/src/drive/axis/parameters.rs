@@ -2,7 +2,7 @@
 //!
 //! Nothing here is checked: the dictionary accepts only values that the axis can use.
 
-use masseter_shared::can::cia402::interpolation_period;
+use masseter_can::cia402::interpolation_period;
 use masseter_shared::clock::MILLISECOND_NS;
 use masseter_shared::config::DriveConfig;
 
@@ -164,7 +164,7 @@ pub(crate) fn configure(
 
 #[cfg(test)]
 mod tests {
-    use masseter_shared::can::canopen::NodeId;
+    use masseter_can::canopen::NodeId;
     use masseter_shared::config::DrivesConfig;
 
     use super::*;

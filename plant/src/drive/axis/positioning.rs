@@ -4,7 +4,7 @@
 //! The state machine returns commands; it moves nothing itself. Motion through a set-point without stopping (bit 9) is
 //! not supported.
 
-use masseter_shared::can::cia402::Controlword;
+use masseter_can::cia402::Controlword;
 
 use super::motion::{MotionCommand, PositionView};
 

@@ -1,6 +1,6 @@
 //! Objects and entries of the table: type, access, mapping, initial value and limits.
 
-use masseter_shared::can::canopen::ObjectAddress;
+use masseter_can::canopen::ObjectAddress;
 
 /// Data type of an entry (CiA 301, table 44).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

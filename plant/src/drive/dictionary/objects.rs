@@ -2,7 +2,7 @@
 
 use std::marker::PhantomData;
 
-use masseter_shared::can::canopen::{AbortCode, CobId, NodeId, ObjectAddress};
+use masseter_can::canopen::{AbortCode, CobId, NodeId, ObjectAddress};
 
 use super::entry::{Access, Addressed, DataType, Initial};
 use super::table::OBJECTS;

@@ -3,8 +3,8 @@
 //! Positions are encoder increments, velocities increments/s, accelerations increments/s², torques per
 //! mille of the rated torque (of the rated force, for a linear axis).
 
-use masseter_shared::can::canopen::CobId;
-use masseter_shared::can::{EVERY_SYNC, Rpdo1, Tpdo1};
+use masseter_can::canopen::CobId;
+use masseter_can::{EVERY_SYNC, Rpdo1, Tpdo1};
 use masseter_shared::config::IdentityConfig;
 
 use super::entry::Access::{Constant, ReadOnly, ReadWrite};

@@ -3,7 +3,7 @@
 //! A write only changes the dictionary; its effect on the drive is the node's matter, which finds the written object in
 //! [`DictionaryAccess::written`].
 
-use masseter_shared::can::canopen::{AbortCode, Expedited, ObjectAddress};
+use masseter_can::canopen::{AbortCode, Expedited, ObjectAddress};
 
 use super::rules::{Situation, check};
 use super::sdo::{Dictionary, Value};

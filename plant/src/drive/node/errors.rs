@@ -2,7 +2,7 @@
 //!
 //! The module sends nothing; its caller does.
 
-use masseter_shared::can::canopen::{Emergency, EmergencyCode};
+use masseter_can::canopen::{Emergency, EmergencyCode};
 
 use crate::drive::dictionary::names::{ERROR_CODE, ERROR_COUNT, ERROR_REGISTER, NEWEST_ERROR};
 use crate::drive::dictionary::{HISTORY, Objects};
@@ -134,7 +134,7 @@ pub(super) fn clear_history(objects: &mut Objects) {
 
 #[cfg(test)]
 mod tests {
-    use masseter_shared::can::canopen::NodeId;
+    use masseter_can::canopen::NodeId;
 
     use super::*;
 

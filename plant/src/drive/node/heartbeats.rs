@@ -2,7 +2,7 @@
 //!
 //! The module only says when a heartbeat is due or lost; the node sends and reacts.
 
-use masseter_shared::can::canopen::NodeId;
+use masseter_can::canopen::NodeId;
 use masseter_shared::clock::MILLISECOND_NS;
 
 use crate::drive::dictionary::{CONSUMED, Objects, names};

@@ -15,11 +15,11 @@ mod rules;
 mod sdo;
 mod storage;
 
-use masseter_shared::can::canopen::{
+use masseter_can::canopen::{
     Cob, CobId, Emergency, Heartbeat, Nmt as NmtMessage, NmtCommand, NmtState, NodeId, ObjectAddress,
 };
-use masseter_shared::can::cia402::Controlword;
-use masseter_shared::can::{ErrorState, Frame};
+use masseter_can::cia402::Controlword;
+use masseter_can::{ErrorState, Frame};
 
 use super::axis::{Axis, Encoder, NewTargets};
 use super::dictionary::{Objects, PDOS, names};
@@ -75,7 +75,7 @@ impl DriveNode {
 
     /// State of the drive's power stage.
     #[cfg(test)]
-    pub(crate) fn power(&self) -> masseter_shared::can::cia402::DriveState {
+    pub(crate) fn power(&self) -> masseter_can::cia402::DriveState {
         self.axis.power()
     }
 

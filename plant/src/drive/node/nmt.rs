@@ -2,7 +2,7 @@
 //!
 //! What a change of state means for the rest of the drive is the node's matter.
 
-use masseter_shared::can::canopen::NmtState;
+use masseter_can::canopen::NmtState;
 use masseter_shared::clock::MILLISECOND_NS;
 
 /// From power-on to the boot-up message, ns.

@@ -1,6 +1,6 @@
 //! Frames that a node transmits at one instant, in their order.
 
-use masseter_shared::can::Frame;
+use masseter_can::Frame;
 
 /// Boot-up or heartbeat, four TPDOs, an SDO answer and emergencies.
 const CAPACITY: usize = 12;
@@ -39,7 +39,7 @@ impl Outbox {
 
 #[cfg(test)]
 mod tests {
-    use masseter_shared::can::CanId;
+    use masseter_can::CanId;
 
     use super::*;
 

@@ -3,7 +3,7 @@
 //! This module copies between frames and the object dictionary. It moves nothing and raises no emergency; it reports
 //! [`Effects`] and errors.
 
-use masseter_shared::can::Frame;
+use masseter_can::Frame;
 
 use super::errors::DriveError;
 use super::outbox::Outbox;

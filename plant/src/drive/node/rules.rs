@@ -3,7 +3,7 @@
 //!
 //! The rules only judge; they change nothing.
 
-use masseter_shared::can::canopen::{AbortCode, CobId, ObjectAddress};
+use masseter_can::canopen::{AbortCode, CobId, ObjectAddress};
 
 use super::heartbeats::consumed_node;
 use crate::drive::axis::{Homing, Mode};

@@ -6,12 +6,12 @@ mod modes;
 mod objects;
 mod process_data;
 
-use masseter_shared::can::canopen::{
+use masseter_can::canopen::{
     AbortCode, Cob, Emergency, EmergencyCode, Expedited, Heartbeat, Nmt, NmtCommand, NmtState, NmtTarget,
     NodeId, ObjectAddress, SdoRequest, SdoResponse, sync,
 };
-use masseter_shared::can::cia402::{DriveState, StatusBit, Statusword};
-use masseter_shared::can::{CanId, ErrorState, Frame};
+use masseter_can::cia402::{DriveState, StatusBit, Statusword};
+use masseter_can::{CanId, ErrorState, Frame};
 use masseter_shared::config::DrivesConfig;
 
 use super::{DriveNode, DriveSettings, Encoder};

@@ -6,12 +6,12 @@
 mod plan;
 mod sdo;
 
-use masseter_shared::can::canopen::{
+use masseter_can::canopen::{
     AbortCode, CobId, NmtCommand, NmtState, NodeId, ObjectAddress, SdoRequest, SdoResponse,
 };
-use masseter_shared::can::cia402::{DriveState, Statusword};
+use masseter_can::cia402::{DriveState, Statusword};
 use masseter_shared::clock::MILLISECOND_NS;
-use masseter_shared::messages::codes::{BootPhase, Cause, DriveCondition};
+use masseter_shared::messages::codes::{BootPhase, Cause};
 
 use plan::{Condition, STATUSWORD, Step, plan};
 use sdo::{ATTEMPTS, Data, SdoClient, SdoFailure, TIMEOUT_NS, Taken};
@@ -322,7 +322,7 @@ impl Boot {
 /// A statusword without a meaning does not prove that a drive is off.
 fn may_be_powered(statusword: u32) -> bool {
     let state = Statusword(statusword as u16).state();
-    !state.is_ok_and(|state| DriveCondition::from(state).is_powered() == Some(false))
+    !state.is_ok_and(|state| !state.is_powered())
 }
 
 fn in_fault(statusword: u32) -> bool {

@@ -3,9 +3,9 @@
 //! Nothing is written before the identity and the PDOs of the drive are verified, and the first write stops it. The plan
 //! executes nothing; the [boot](super) does.
 
-use masseter_shared::can::canopen::{Cob, CobId, NodeId, ObjectAddress};
-use masseter_shared::can::cia402::{Controlword, interpolation_period};
-use masseter_shared::can::{CanId, EVERY_SYNC, Rpdo1, Tpdo1};
+use masseter_can::canopen::{Cob, CobId, NodeId, ObjectAddress};
+use masseter_can::cia402::{Controlword, interpolation_period};
+use masseter_can::{CanId, EVERY_SYNC, Rpdo1, Tpdo1};
 use masseter_shared::config::{IdentityConfig, Scenario};
 use masseter_shared::messages::codes::{BootPhase, Cause};
 

@@ -5,7 +5,7 @@
 //! It knows neither frames nor buses, and keeps values of at most [`Data::MAX`] bytes. Block transfer is not
 //! used.
 
-use masseter_shared::can::canopen::{AbortCode, Expedited, ObjectAddress, SdoRequest, SdoResponse, Segment};
+use masseter_can::canopen::{AbortCode, Expedited, ObjectAddress, SdoRequest, SdoResponse, Segment};
 
 /// Silence of a server after which a transfer begins anew, ns. Drives that store parameters or boot take seconds, and
 /// nothing that moves waits for them.

@@ -1,6 +1,6 @@
 //! What happens from power-on to enabled drives, and what keeps them from it.
 
-use masseter_shared::can::canopen::{AbortCode, NmtState, SdoRequest};
+use masseter_can::canopen::{AbortCode, NmtState, SdoRequest};
 
 use super::peer::STANDS_AT;
 use super::*;

@@ -4,8 +4,8 @@ mod boot;
 mod peer;
 mod recovery;
 
-use masseter_shared::can::canopen::NodeId;
-use masseter_shared::can::cia402::DriveState;
+use masseter_can::canopen::NodeId;
+use masseter_can::cia402::DriveState;
 use masseter_shared::config::Scenario;
 use masseter_shared::geometry::AXES;
 use masseter_shared::messages::codes::{BootPhase, Cause, DriveRequest, EventKind, Source};

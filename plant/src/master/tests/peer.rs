@@ -3,17 +3,14 @@
 
 use std::collections::{BTreeMap, VecDeque};
 
-use masseter_shared::can::canopen::{
+use masseter_can::canopen::{
     AbortCode, Cob, Expedited, Heartbeat, Nmt, NmtCommand, NmtState, NodeId, ObjectAddress, SdoRequest,
     SdoResponse,
 };
-use masseter_shared::can::cia402::{Controlword, DriveState, Statusword};
-use masseter_shared::can::{
-    Bus, BusStatus, ErrorState, Frame, ReceiveError, Received, Rpdo1, SendError, Tpdo1,
-};
+use masseter_can::cia402::{Controlword, DriveState, Statusword};
+use masseter_can::{Bus, BusStatus, ErrorState, Frame, ReceiveError, Received, Rpdo1, SendError, Tpdo1};
 use masseter_shared::config::IdentityConfig;
 use masseter_shared::geometry::AXES;
-use masseter_shared::messages::codes::DriveCondition;
 
 use super::PERIOD_NS;
 use crate::link::Buses;
@@ -208,7 +205,7 @@ impl Peer {
         if let Some((_, code)) = self.refuses.filter(|(refused, _)| *refused == address) {
             return SdoResponse::Abort { object, code };
         }
-        let is_powered = DriveCondition::from(self.power).is_powered() == Some(true);
+        let is_powered = self.power.is_powered();
         let stops = matches!(address, (0x605A | 0x6040, 0));
         assert!(stops || !is_powered, "{object} of a drive that is {}", self.power);
         self.objects.insert(address, data.to_vec());

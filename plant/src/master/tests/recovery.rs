@@ -1,7 +1,7 @@
 //! What happens when a running drive or bus fails, and how it comes back.
 
-use masseter_shared::can::Frame;
-use masseter_shared::can::canopen::{Cob, Emergency, EmergencyCode, Heartbeat, NmtState, sync};
+use masseter_can::Frame;
+use masseter_can::canopen::{Cob, Emergency, EmergencyCode, Heartbeat, NmtState, sync};
 
 use super::peer::STANDS_AT;
 use super::*;

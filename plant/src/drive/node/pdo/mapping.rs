@@ -1,7 +1,7 @@
 //! A PDO's mapping, compiled into copies of bytes.
 
-use masseter_shared::can::Frame;
-use masseter_shared::can::canopen::ObjectAddress;
+use masseter_can::Frame;
+use masseter_can::canopen::ObjectAddress;
 
 use crate::drive::dictionary::{ENTRIES, MAPPED_MAX, MappingEntry, Objects, find, within_limits};
 

@@ -2,8 +2,8 @@
 
 use std::cmp::Ordering;
 
-use masseter_shared::can::CanId;
-use masseter_shared::can::canopen::ObjectAddress;
+use masseter_can::CanId;
+use masseter_can::canopen::ObjectAddress;
 use masseter_shared::clock::MILLISECOND_NS;
 
 use super::mapping::{EVENT_DRIVEN, MAX_BYTES, Mapped};

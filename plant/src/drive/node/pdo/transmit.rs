@@ -1,7 +1,7 @@
 //! A transmit PDO and its trigger.
 
-use masseter_shared::can::canopen::ObjectAddress;
-use masseter_shared::can::{CanId, Frame};
+use masseter_can::canopen::ObjectAddress;
+use masseter_can::{CanId, Frame};
 use masseter_shared::clock::MILLISECOND_NS;
 
 use super::mapping::{EVENT_DRIVEN, MAX_BYTES, Mapped};

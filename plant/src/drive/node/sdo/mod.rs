@@ -2,7 +2,7 @@
 //!
 //! The server only keeps the order of a transfer; [`Dictionary`] reads and writes the entries.
 
-use masseter_shared::can::canopen::{
+use masseter_can::canopen::{
     AbortCode, Expedited, ObjectAddress, SdoError, SdoRequest, SdoResponse, Segment,
 };
 

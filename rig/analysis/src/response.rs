@@ -1,0 +1,287 @@
+//! How long the messages of the buses took from being queued to their arrival, beside the bounds of their
+//! plan.
+//!
+//! A bound holds for undisturbed buses. Where messages were queued closer together than planned, as by a
+//! process that was held up, the plan is worked out again for the closest that they were. Real interfaces do not
+//! tell when a frame was queued.
+
+use masseter_can::{BusPlan, FrameFormat, PeriodicMessage, PlannedMessage, Tapped};
+use masseter_shared::config::Scenario;
+use masseter_shared::messages::FrameTap;
+use masseter_shared::messages::tap::{self, TapError};
+use masseter_shared::schedule::plans;
+
+use super::bus_response::{BusResponse, ResponseFigures};
+
+/// Follows every frame.
+#[derive(Debug)]
+pub(super) struct Responses {
+    buses: Vec<Followed>,
+    format: FrameFormat,
+    has_faults: bool,
+}
+
+/// One bus.
+#[derive(Debug)]
+struct Followed {
+    plan: BusPlan,
+    /// In the order of the plan's messages.
+    messages: Vec<Seen>,
+    others: Seen,
+    /// Whether or not the time of queueing is known.
+    frames: u64,
+    error_frames: u64,
+}
+
+/// What was seen of a message.
+#[derive(Debug, Clone, Copy, Default)]
+struct Seen {
+    frames: u64,
+    max_ns: u64,
+    last_queued_ns: Option<u64>,
+    /// The least time between two of it being queued.
+    least_period_ns: Option<u64>,
+}
+
+impl Seen {
+    fn take(&mut self, queued_ns: u64, arrived_ns: u64) {
+        self.frames += 1;
+        self.max_ns = self.max_ns.max(arrived_ns.saturating_sub(queued_ns));
+        if let Some(last_ns) = self.last_queued_ns.replace(queued_ns) {
+            let period_ns = queued_ns.saturating_sub(last_ns);
+            self.least_period_ns = Some(self.least_period_ns.map_or(period_ns, |least| least.min(period_ns)));
+        }
+    }
+
+    fn figures(&self, bus: usize, message: &str, bound_ns: Option<u64>) -> ResponseFigures {
+        let max_ns = (self.frames > 0).then_some(self.max_ns);
+        ResponseFigures { bus, message: message.to_owned(), frames: self.frames, max_ns, bound_ns }
+    }
+}
+
+impl Responses {
+    /// On the buses of a rig that was accepted; without plans nothing is told.
+    pub(super) fn on(scenario: &Scenario) -> Self {
+        let plans = plans(&scenario.can, scenario.period_ns()).unwrap_or_default();
+        Self::with(plans, scenario.can.format(), !scenario.faults.is_empty())
+    }
+
+    fn with(plans: Vec<BusPlan>, format: FrameFormat, has_faults: bool) -> Self {
+        let followed = |plan: BusPlan| Followed {
+            messages: vec![Seen::default(); plan.messages().len()],
+            plan,
+            others: Seen::default(),
+            frames: 0,
+            error_frames: 0,
+        };
+        Self { buses: plans.into_iter().map(followed).collect(), format, has_faults }
+    }
+
+    pub(super) fn frame(&mut self, tap: &FrameTap) -> Result<(), TapError> {
+        let Some(bus) = self.buses.get_mut(tap::bus_of(tap)?) else { return Ok(()) };
+        let planned = bus.plan.messages().iter().position(|planned| planned.message.id.flagged() == tap.id);
+        let seen = match planned {
+            Some(index) => &mut bus.messages[index],
+            None if matches!(tap::decode(tap)?, Tapped::Error(_)) => {
+                bus.error_frames += 1;
+                return Ok(());
+            }
+            None => &mut bus.others,
+        };
+        bus.frames += 1;
+        if tap.queued_ns > 0 {
+            seen.take(tap.queued_ns, tap.time_ns);
+        }
+        Ok(())
+    }
+
+    /// `missing`: frames that were not recorded.
+    pub(super) fn finish(self, missing: u64) -> BusResponse {
+        let unbounded = self.unbounded(missing);
+        let figures = |bus: &Followed| bus.figures(&bus.bounds_ns(self.format, unbounded.is_none()));
+        let messages = self.buses.iter().flat_map(figures).collect();
+        BusResponse { messages, unbounded }
+    }
+
+    /// Why there are no bounds for this run.
+    fn unbounded(&self, missing: u64) -> Option<String> {
+        if self.has_faults {
+            return Some("the scenario's faults are in no plan".to_owned());
+        }
+        if missing > 0 {
+            return Some(format!("{missing} frames are missing from the recording"));
+        }
+        self.buses.iter().find_map(|bus| bus.unbounded(self.format))
+    }
+}
+
+impl Followed {
+    fn figures(&self, bounds_ns: &[Option<u64>]) -> Vec<ResponseFigures> {
+        let bus = self.plan.bus();
+        let planned = self.plan.messages().iter().zip(&self.messages).zip(bounds_ns);
+        let planned =
+            planned.map(|((planned, seen), bound_ns)| seen.figures(bus, &planned.message.name, *bound_ns));
+        planned.chain([self.others.figures(bus, "other", None)]).collect()
+    }
+
+    /// For the plan's messages, both as planned and as they were queued.
+    fn bounds_ns(&self, format: FrameFormat, are_bounded: bool) -> Vec<Option<u64>> {
+        let as_queued = self.plan_as_queued(format);
+        let both = self.plan.messages().iter().zip(as_queued.messages());
+        let bound_ns = |(planned, queued): (&PlannedMessage, &PlannedMessage)| {
+            let (planned_ns, queued_ns) = planned.response_ns.zip(queued.response_ns)?;
+            are_bounded.then_some(planned_ns.max(queued_ns))
+        };
+        both.map(bound_ns).collect()
+    }
+
+    /// Why there are no bounds here.
+    fn unbounded(&self, format: FrameFormat) -> Option<String> {
+        let bus = self.plan.bus();
+        if self.frames == 0 {
+            return Some(format!("no frame of bus {bus} was recorded"));
+        }
+        if self.messages.iter().all(|seen| seen.frames == 0) {
+            return Some(format!("bus {bus} does not tell when its frames were queued"));
+        }
+        if self.error_frames > 0 {
+            return Some(format!("bus {bus} had {} errors", self.error_frames));
+        }
+        let as_queued = self.plan_as_queued(format);
+        let unbounded = as_queued.messages().iter().find(|queued| queued.response_ns.is_none())?;
+        let name = &unbounded.message.name;
+        Some(format!("messages of bus {bus} were queued so close together that {name} has no bound"))
+    }
+
+    /// The plan for messages as close to each other as they were queued, whoever released them.
+    fn plan_as_queued(&self, format: FrameFormat) -> BusPlan {
+        let as_queued = |(planned, seen): (&PlannedMessage, &Seen)| {
+            let message = planned.message.clone();
+            let period_ns =
+                seen.least_period_ns.map_or(message.period_ns, |ns| ns.clamp(1, message.period_ns));
+            PeriodicMessage { period_ns, release: None, ..message }
+        };
+        let messages = self.plan.messages().iter().zip(&self.messages).map(as_queued).collect();
+        BusPlan::new(self.plan.bus(), self.plan.rates(), format, self.plan.cycle_ns(), messages)
+            .expect("no message has a releaser")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use masseter_can::canopen::Cob;
+    use masseter_can::{Bitrate, CanId, ErrorKind, ErrorReport, Rates};
+
+    use super::*;
+
+    const PERIOD_NS: u64 = 1_000_000;
+
+    fn message(name: &str, id: u16, data_length: u32) -> PeriodicMessage {
+        PeriodicMessage {
+            name: name.to_owned(),
+            id: CanId::standard(id).unwrap(),
+            data_length,
+            period_ns: PERIOD_NS,
+            deadline_ns: PERIOD_NS,
+            release: None,
+        }
+    }
+
+    /// SYNC and one message of 8 bytes: bounds of 55 + 135 µs for both.
+    fn responses(has_faults: bool) -> Responses {
+        let messages = vec![message("SYNC", 0x080, 0), message("TPDO1 1", 0x181, 8)];
+        let rates = Rates::classical(Bitrate::MAX);
+        let plan = BusPlan::new(0, rates, FrameFormat::Classical, PERIOD_NS, messages).unwrap();
+        Responses::with(vec![plan], FrameFormat::Classical, has_faults)
+    }
+
+    fn seen(id: u32, queued_ns: u64, took_us: u64) -> FrameTap {
+        FrameTap { id, queued_ns, time_ns: queued_ns + took_us * 1000, ..FrameTap::default() }
+    }
+
+    fn of(frames: impl IntoIterator<Item = FrameTap>) -> BusResponse {
+        followed(responses(false), frames)
+    }
+
+    fn followed(mut responses: Responses, frames: impl IntoIterator<Item = FrameTap>) -> BusResponse {
+        frames.into_iter().for_each(|frame| responses.frame(&frame).unwrap());
+        responses.finish(0)
+    }
+
+    #[test]
+    fn the_longest_of_each_message_stands_beside_its_bound() {
+        let found = of([
+            seen(0x080, 1000, 51),
+            seen(0x080, 1_001_000, 120),
+            seen(0x181, 1000, 190),
+            seen(0x601, 5, 99),
+        ]);
+        assert_eq!(found.unbounded, None);
+        let told: Vec<_> =
+            found.messages.iter().map(|m| (m.message.as_str(), m.frames, m.max_ns, m.bound_ns)).collect();
+        assert_eq!(
+            told,
+            [
+                ("SYNC", 2, Some(120_000), Some(190_000)),
+                ("TPDO1 1", 1, Some(190_000), Some(190_000)),
+                ("other", 1, Some(99_000), None)
+            ]
+        );
+        assert_eq!(found.exceeding().count(), 0);
+        assert_eq!(found.tightest().unwrap().message, "TPDO1 1");
+    }
+
+    #[test]
+    fn a_message_beyond_its_bound_is_found() {
+        let found = of([seen(0x080, 1000, 191), seen(0x181, 1000, 190)]);
+        assert_eq!(found.unbounded, None);
+        assert!(found.exceeding().map(|message| message.message.as_str()).eq(["SYNC"]));
+    }
+
+    #[test]
+    fn there_are_no_bounds_of_disturbed_buses_of_crowded_ones_and_of_unknown_times() {
+        let report = ErrorReport { time_ns: 2000, port: 1, kind: ErrorKind::Bit, tec: 8, rec: 0 };
+        let error = tap::encode(0, &Tapped::Error(report));
+        let cases = [
+            (vec![], "no frame of bus 0 was recorded"),
+            (vec![seen(0x080, 0, 0)], "does not tell when its frames were queued"),
+            (vec![seen(0x080, 1000, 51), error], "bus 0 had 1 errors"),
+            (vec![seen(0x080, 1000, 51), seen(0x080, 61_000, 51)], "so close together"),
+            (vec![seen(0x080, 1000, 51), seen(0x080, 1000, 102)], "so close together"),
+        ];
+        for (frames, reason) in cases {
+            let found = of(frames.clone());
+            let why = found.unbounded.as_ref();
+            assert!(why.is_some_and(|why| why.contains(reason)), "{frames:?}: {found:?}");
+            assert!(found.messages.iter().all(|message| message.bound_ns.is_none()), "{found:?}");
+        }
+    }
+
+    #[test]
+    fn of_a_part_of_the_frames_nothing_is_judged() {
+        let mut responses = responses(false);
+        responses.frame(&seen(0x080, 1000, 191)).unwrap();
+        let found = responses.finish(3);
+        assert_eq!(found.unbounded.as_deref(), Some("3 frames are missing from the recording"));
+        assert_eq!(found.exceeding().count(), 0);
+    }
+
+    #[test]
+    fn with_faults_there_are_no_bounds() {
+        let found = followed(responses(true), [seen(0x080, 1000, 191), seen(0x181, 1000, 190)]);
+        assert_eq!(found.unbounded.as_deref(), Some("the scenario's faults are in no plan"));
+        assert_eq!((found.exceeding().count(), found.tightest()), (0, None));
+    }
+
+    #[test]
+    fn every_message_of_a_rig_has_a_bound() {
+        let sync = CanId::from(Cob::Sync).flagged();
+        assert_eq!(sync, 0x080);
+        let syncs = [0, 1].map(|bus| FrameTap { bus, ..seen(sync, 1000, 51) });
+        let found = followed(Responses::on(&Scenario::default()), syncs);
+        assert!(
+            found.messages.iter().all(|message| message.message == "other" || message.bound_ns.is_some())
+        );
+        assert_eq!(found.messages.len(), 2 * (1 + 3 + 3 + 4 + 1));
+    }
+}

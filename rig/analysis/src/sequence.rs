@@ -1,0 +1,95 @@
+//! Counts messages and the gaps in their sequence numbers.
+
+use std::collections::BTreeMap;
+
+use masseter_shared::messages::Event;
+use masseter_shared::messages::codes::Source;
+use serde::Serialize;
+
+use masseter_recording::Recorded;
+
+/// Messages and losses of one topic.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct TopicFigures {
+    /// The topic.
+    pub topic: &'static str,
+    /// Messages recorded.
+    pub messages: u64,
+    /// Messages published before the last recorded one, but not recorded.
+    pub missing: u64,
+}
+
+/// The process that publishes an event: master, drives and simulated wires are one process.
+fn publisher_of(event: &Event) -> u32 {
+    let is_of_plant = [Source::Drive, Source::Wire].map(Source::code).contains(&event.source);
+    if is_of_plant { Source::Master.code() } else { event.source }
+}
+
+/// Follows every publisher of every topic. Each counts its own messages from 1.
+#[derive(Debug, Default)]
+pub struct SequenceCheck {
+    streams: BTreeMap<(&'static str, u32), Stream>,
+}
+
+#[derive(Debug, Default)]
+struct Stream {
+    messages: u64,
+    highest: u64,
+}
+
+impl SequenceCheck {
+    /// Counts a message.
+    pub fn take(&mut self, message: &Recorded) {
+        let publisher = match message {
+            Recorded::Event(event) => publisher_of(event),
+            _ => 0,
+        };
+        self.check(message.topic().name(), publisher, message.seq());
+    }
+
+    fn check(&mut self, topic: &'static str, publisher: u32, seq: u64) {
+        let stream = self.streams.entry((topic, publisher)).or_default();
+        stream.messages += 1;
+        stream.highest = stream.highest.max(seq);
+    }
+
+    /// The counts of every topic.
+    pub fn finish(self) -> Vec<TopicFigures> {
+        let mut topics: Vec<TopicFigures> = Vec::new();
+        for ((topic, _), stream) in self.streams {
+            let missing = stream.highest.saturating_sub(stream.messages);
+            match topics.last_mut().filter(|last| last.topic == topic) {
+                Some(last) => {
+                    last.messages += stream.messages;
+                    last.missing += missing;
+                }
+                None => topics.push(TopicFigures { topic, messages: stream.messages, missing }),
+            }
+        }
+        topics
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn gaps_are_counted_at_the_beginning_and_between_for_each_publisher() {
+        let mut check = SequenceCheck::default();
+        for seq in [3, 4, 7] {
+            check.check("event", 0, seq);
+        }
+        for seq in [1, 2] {
+            check.check("event", 1, seq);
+        }
+        check.check("reading", 0, 1);
+        assert_eq!(
+            check.finish(),
+            [
+                TopicFigures { topic: "event", messages: 5, missing: 4 },
+                TopicFigures { topic: "reading", messages: 1, missing: 0 },
+            ]
+        );
+    }
+}

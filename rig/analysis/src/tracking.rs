@@ -1,0 +1,331 @@
+//! How far the platform was from where it should have been: in truth where the mechanism is emulated, by
+//! the forward kinematics' estimate on the robot, whose truth nobody knows.
+
+use masseter_shared::clock::SECOND_NS;
+use masseter_shared::geometry::Pose;
+use masseter_shared::messages::codes::ControllerState;
+use masseter_shared::messages::{State, Truth, pose_of_fields};
+use serde::Serialize;
+
+use super::join::Join;
+use super::noise::standard_error;
+use super::over_time::{Curve, band, highest};
+use super::series::{Extremes, Series, Thinned};
+
+/// States in which the platform is asked to be somewhere.
+pub const MOVING: [ControllerState; 3] =
+    [ControllerState::Easing, ControllerState::Running, ControllerState::Holding];
+
+/// What the wanted pose is compared with.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Reference {
+    /// The emulated mechanism's pose.
+    #[default]
+    Truth,
+    /// The pose found by forward kinematics.
+    Estimate,
+}
+
+impl Reference {
+    /// The word for a pose of this kind.
+    pub fn adjective(self) -> &'static str {
+        match self {
+            Self::Truth => "true",
+            Self::Estimate => "estimated",
+        }
+    }
+}
+
+/// Errors of the platform's pose while the motion played.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+pub struct TrackingFigures {
+    /// What the wanted pose was compared with.
+    pub reference: Reference,
+    /// Cycles compared.
+    pub samples: u64,
+    /// Root mean square distance of the platform's origin, reference against wanted, mm; none without samples, as the
+    /// others.
+    pub rms_mm: Option<f64>,
+    /// Standard error of that figure, by its seconds, mm; none with less than three of them.
+    pub rms_noise_mm: Option<f64>,
+    /// Largest distance, mm.
+    pub max_mm: Option<f64>,
+    /// Root mean square angle, reference against wanted, degrees.
+    pub rms_deg: Option<f64>,
+    /// Largest angle, degrees.
+    pub max_deg: Option<f64>,
+    /// Root mean square distance, estimated by forward kinematics against true, mm; none without truth.
+    pub estimate_rms_mm: Option<f64>,
+}
+
+/// One cycle of the track.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TrackingSample {
+    /// When, ns.
+    pub sampled_ns: u64,
+    /// Pose wanted.
+    pub desired: Pose,
+    /// Pose found by forward kinematics.
+    pub estimated: Pose,
+    /// Pose by the reference.
+    pub found: Pose,
+}
+
+/// The platform from the first easing to the last hold; times in seconds since the first sample.
+#[derive(Debug, Clone, Default)]
+pub struct Track {
+    /// Every n-th cycle from the first on, closely enough to see every movement; of a long run not to its end.
+    pub samples: Vec<TrackingSample>,
+    /// How long it went on, s.
+    pub duration_s: f64,
+    /// Wanted displacement along x, y and z, from the first pose wanted, m: lowest and highest of each stretch of time.
+    pub wanted_m: [Curve; 3],
+    /// The same by the reference.
+    pub found_m: [Curve; 3],
+    /// Largest distance from the wanted position in each stretch of time, m.
+    pub distance_m: Curve,
+}
+
+/// Where and when the motion began.
+#[derive(Debug, Clone, Copy)]
+struct Began {
+    at_ns: u64,
+    at: Pose,
+}
+
+/// Places of what moved: x, y and z wanted, found, and the distance.
+const WANTED: usize = 0;
+const FOUND: usize = 3;
+const DISTANCE: usize = 6;
+
+/// No sample stands further from the next, ns: a chewing cycle takes 0.7 s.
+const CLOSE_NS: u64 = 20_000_000;
+
+#[derive(Debug, Clone, Copy)]
+struct Wanted {
+    desired: Pose,
+    estimated: Pose,
+    state: u32,
+}
+
+/// Joins wanted, estimated and, where there are any, true poses of the same sample.
+#[derive(Debug)]
+pub(super) struct Tracking {
+    reference: Reference,
+    poses: Join<Wanted, (u64, Pose)>,
+    distances: Accumulator,
+    angles: Accumulator,
+    estimates: Accumulator,
+    track: Thinned<TrackingSample>,
+    began: Option<Began>,
+    ended_ns: u64,
+    /// Wanted and found displacement along x, y and z, and the distance between the two.
+    moved_m: Series<Extremes<{ DISTANCE + 1 }>>,
+    second: Accumulator,
+    second_ends_ns: u64,
+    seconds: Vec<f64>,
+}
+
+/// Root mean square and maximum of what is added.
+#[derive(Debug, Default)]
+pub struct Accumulator {
+    samples: u64,
+    squares: f64,
+    /// The largest value.
+    pub largest: f64,
+}
+
+impl Accumulator {
+    /// Takes a value.
+    pub fn add(&mut self, value: f64) {
+        self.samples += 1;
+        self.squares += value * value;
+        self.largest = self.largest.max(value);
+    }
+
+    /// The root of the mean square; 0 without values.
+    pub fn rms(&self) -> f64 {
+        (self.squares / self.samples.max(1) as f64).sqrt()
+    }
+}
+
+impl Tracking {
+    pub(super) fn against(reference: Reference, period_ns: u64) -> Self {
+        Self {
+            reference,
+            poses: Join::default(),
+            distances: Accumulator::default(),
+            angles: Accumulator::default(),
+            estimates: Accumulator::default(),
+            track: Thinned::no_coarser_than((CLOSE_NS / period_ns) as usize),
+            began: None,
+            ended_ns: 0,
+            moved_m: Series::default(),
+            second: Accumulator::default(),
+            second_ends_ns: 0,
+            seconds: Vec::new(),
+        }
+    }
+
+    /// The state of a cycle with a fresh reading: one used again was compared when it was fresh.
+    pub(super) fn solution(&mut self, state: &State) {
+        let wanted = Wanted {
+            desired: pose_of_fields(state.desired_position_m, state.desired_quaternion_wxyz),
+            estimated: pose_of_fields(state.estimated_position_m, state.estimated_quaternion_wxyz),
+            state: state.controller_state,
+        };
+        if self.reference == Reference::Estimate {
+            return self.compare(&wanted, (state.sampled_ns, wanted.estimated));
+        }
+        if let Some((wanted, truth)) = self.poses.left(state.reading_cycle, wanted) {
+            self.compare(&wanted, truth);
+        }
+    }
+
+    pub(super) fn truth(&mut self, truth: &Truth) {
+        let pose = pose_of_fields(truth.position_m, truth.quaternion_wxyz);
+        if let Some((wanted, truth)) = self.poses.right(truth.cycle, (truth.sampled_ns, pose)) {
+            self.compare(&wanted, truth);
+        }
+    }
+
+    fn compare(&mut self, wanted: &Wanted, (sampled_ns, found): (u64, Pose)) {
+        let distance_m = (wanted.desired.translation.vector - found.translation.vector).norm();
+        if wanted.state == ControllerState::Running.code() {
+            self.distances.add(distance_m);
+            self.angles.add(wanted.desired.rotation.angle_to(&found.rotation));
+            self.estimates.add((wanted.estimated.translation.vector - found.translation.vector).norm());
+            self.add_to_second(distance_m, sampled_ns);
+        }
+        if MOVING.iter().any(|state| state.code() == wanted.state) {
+            let Wanted { desired, estimated, .. } = *wanted;
+            let began = *self.began.get_or_insert(Began { at_ns: sampled_ns, at: desired });
+            let stretch = self.moved_m.at(sampled_ns.saturating_sub(began.at_ns));
+            stretch.take(DISTANCE, distance_m);
+            for (first, pose) in [(WANTED, &desired), (FOUND, &found)] {
+                let moved_m = pose.translation.vector - began.at.translation.vector;
+                moved_m.iter().enumerate().for_each(|(axis, moved_m)| stretch.take(first + axis, *moved_m));
+            }
+            self.ended_ns = sampled_ns;
+            self.track.push(TrackingSample { sampled_ns, desired, estimated, found });
+        }
+    }
+
+    /// Seconds of the motion, each with an error of its own: how much they differ is the figure's noise.
+    fn add_to_second(&mut self, distance_m: f64, sampled_ns: u64) {
+        if sampled_ns >= self.second_ends_ns {
+            if self.second.samples > 0 {
+                self.seconds.push(self.second.rms() * 1e3);
+            }
+            self.second = Accumulator::default();
+            self.second_ends_ns = sampled_ns + SECOND_NS;
+        }
+        self.second.add(distance_m);
+    }
+
+    pub(super) fn finish(self) -> (TrackingFigures, Track) {
+        let samples = self.distances.samples;
+        let compared = |value: f64| (samples > 0).then_some(value);
+        let has_truth = self.reference == Reference::Truth;
+        let figures = TrackingFigures {
+            reference: self.reference,
+            samples,
+            rms_mm: compared(self.distances.rms() * 1e3),
+            rms_noise_mm: standard_error(&self.seconds),
+            max_mm: compared(self.distances.largest * 1e3),
+            rms_deg: compared(self.angles.rms().to_degrees()),
+            max_deg: compared(self.angles.largest.to_degrees()),
+            estimate_rms_mm: compared(self.estimates.rms() * 1e3).filter(|_| has_truth),
+        };
+        let began_ns = self.began.map_or(self.ended_ns, |began| began.at_ns);
+        let bands = |first: usize| std::array::from_fn(|axis| band(&self.moved_m, first + axis));
+        let track = Track {
+            duration_s: self.ended_ns.saturating_sub(began_ns) as f64 / 1e9,
+            wanted_m: bands(WANTED),
+            found_m: bands(FOUND),
+            distance_m: highest(&self.moved_m, DISTANCE),
+            samples: self.track.into_samples(),
+        };
+        (figures, track)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PERIOD_NS: u64 = 1_000_000;
+
+    fn state(cycle: u64, x: f64) -> State {
+        State {
+            cycle,
+            reading_cycle: cycle,
+            desired_position_m: [x, 0.0, 0.0],
+            desired_quaternion_wxyz: [1.0, 0.0, 0.0, 0.0],
+            estimated_quaternion_wxyz: [1.0, 0.0, 0.0, 0.0],
+            controller_state: ControllerState::Running.code(),
+            ..Default::default()
+        }
+    }
+
+    fn truth(cycle: u64, x: f64) -> Truth {
+        Truth {
+            cycle,
+            position_m: [x, 0.0, 0.0],
+            quaternion_wxyz: [1.0, 0.0, 0.0, 0.0],
+            ..Default::default()
+        }
+    }
+
+    #[test]
+    fn without_truth_the_estimate_takes_its_place() {
+        let mut tracking = Tracking::against(Reference::Estimate, PERIOD_NS);
+        tracking.solution(&State { estimated_position_m: [0.001, 0.0, 0.0], ..state(1, 0.003) });
+        let (figures, track) = tracking.finish();
+        assert_eq!((figures.samples, figures.estimate_rms_mm), (1, None));
+        assert!((figures.rms_mm.unwrap() - 2.0).abs() < 1e-9);
+        assert!((track.samples[0].found.translation.x - 0.001).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_platform_that_never_ran_was_nowhere_perfectly() {
+        let mut tracking = Tracking::against(Reference::Truth, PERIOD_NS);
+        tracking.solution(&State { controller_state: ControllerState::Easing.code(), ..state(1, 0.0) });
+        tracking.truth(&truth(1, 0.0));
+        let (figures, _) = tracking.finish();
+        assert_eq!(figures, TrackingFigures::default());
+        assert_eq!((figures.rms_mm, figures.estimate_rms_mm), (None, None));
+    }
+
+    #[test]
+    fn a_long_run_keeps_every_turn_of_its_motion_and_a_close_film_of_its_beginning() {
+        let mut tracking = Tracking::against(Reference::Truth, PERIOD_NS);
+        for cycle in 0..100_000 {
+            // To and fro in 0.7 s, as fast as chewing.
+            let x = (cycle as f64 / 700.0 * std::f64::consts::TAU).sin();
+            tracking.solution(&state(cycle, x));
+            tracking.truth(&Truth { sampled_ns: cycle * PERIOD_NS, ..truth(cycle, x) });
+        }
+        let (_, track) = tracking.finish();
+        let reach = track.found_m[0].iter().map(|(_, x)| *x);
+        assert!(reach.clone().filter(|x| *x > 0.99).count() > 140 && reach.fold(0.0, f64::min) < -0.99);
+        assert!((track.duration_s - 99.999).abs() < 1e-9);
+        assert!(track.samples.windows(2).all(|pair| pair[1].sampled_ns - pair[0].sampled_ns <= CLOSE_NS));
+        assert_eq!(track.samples[0].sampled_ns, 0);
+    }
+
+    #[test]
+    fn poses_are_compared_by_cycle_in_whatever_order_they_come() {
+        let mut tracking = Tracking::against(Reference::Truth, PERIOD_NS);
+        tracking.solution(&state(1, 0.003));
+        tracking.solution(&state(2, 0.000));
+        tracking.truth(&truth(2, 0.004));
+        tracking.truth(&truth(1, 0.000));
+        tracking.truth(&truth(3, 9.000));
+        let (figures, track) = tracking.finish();
+        assert_eq!((figures.samples, track.samples.len()), (2, 2));
+        assert!((figures.max_mm.unwrap() - 4.0).abs() < 1e-9);
+        assert!((figures.rms_mm.unwrap() - (12.5f64).sqrt()).abs() < 1e-9);
+    }
+}

@@ -1,0 +1,24 @@
+//! Values of command-line arguments that several verbs take.
+
+/// What the buses run on: real interfaces, or none for simulated buses.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Wires(pub Vec<String>);
+
+pub(crate) fn parse_cores(text: &str) -> Result<[usize; 2], String> {
+    let cores: Result<Vec<usize>, _> = text.split(',').map(|core| core.trim().parse()).collect();
+    match cores.as_deref() {
+        Ok([controller, plant]) => Ok([*controller, *plant]),
+        _ => Err("give two cores, such as 0,1".to_owned()),
+    }
+}
+
+pub(crate) fn parse_wires(text: &str) -> Result<Wires, String> {
+    if text == "virtual" {
+        return Ok(Wires(Vec::new()));
+    }
+    let names: Vec<_> = text.split(',').map(|name| name.trim().to_owned()).collect();
+    if names.iter().any(String::is_empty) {
+        return Err("give `virtual`, or interfaces such as can0,can1".to_owned());
+    }
+    Ok(Wires(names))
+}

@@ -1,0 +1,3 @@
+//! Colours of all charts of the rig.
+
+pub mod palette;

@@ -1,0 +1,82 @@
+//! `/dev/cpu_dma_latency`: keeps the cores from idle states as long as someone holds it open.
+
+use std::fs::{File, OpenOptions};
+use std::io::{self, Read, Seek, Write};
+
+use masseter_recording::DmaLatency;
+use masseter_shared::config::CpuDmaLatency;
+
+/// The kernel's device.
+pub(crate) const DEVICE: &str = "/dev/cpu_dma_latency";
+
+/// Holds the device until it is dropped.
+#[derive(Debug)]
+pub(crate) struct Hold {
+    obtained: DmaLatency,
+    _device: Option<File>,
+}
+
+impl Hold {
+    /// Does what `wanted` says on a machine of this kind.
+    pub(crate) fn new(wanted: CpuDmaLatency, is_virtual: bool) -> Self {
+        let opened = is_to_be_held(wanted, is_virtual).then(open);
+        let (device, limit_us, refusal) = match opened {
+            Some(Ok((device, limit_us))) => (Some(device), Some(limit_us), None),
+            Some(Err(error)) if wanted == CpuDmaLatency::Hold => {
+                let refusal = format!(
+                    "{DEVICE} refused ({error}): run as root, or allow it with `sudo setfacl -m u:\"$USER\":rw {DEVICE}`"
+                );
+                (None, None, Some(refusal))
+            }
+            Some(Err(_)) | None => (None, None, None),
+        };
+        Self { obtained: DmaLatency { wanted, limit_us, refusal }, _device: device }
+    }
+
+    /// For the manifest.
+    pub(crate) fn obtained(&self) -> &DmaLatency {
+        &self.obtained
+    }
+}
+
+fn is_to_be_held(wanted: CpuDmaLatency, is_virtual: bool) -> bool {
+    match wanted {
+        CpuDmaLatency::Auto => !is_virtual,
+        CpuDmaLatency::Hold => true,
+        CpuDmaLatency::Leave => false,
+    }
+}
+
+/// Asks for 0 µs, as a number in the machine's own bytes, and reads the limit back.
+fn open() -> io::Result<(File, i32)> {
+    let mut device = OpenOptions::new().read(true).write(true).open(DEVICE)?;
+    device.write_all(&0_i32.to_ne_bytes())?;
+    device.rewind()?;
+    let mut limit_us = [0; 4];
+    device.read_exact(&mut limit_us)?;
+    Ok((device, i32::from_ne_bytes(limit_us)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_virtual_machine_is_left_alone_unless_asked() {
+        let cases = [
+            (CpuDmaLatency::Auto, false, true),
+            (CpuDmaLatency::Auto, true, false),
+            (CpuDmaLatency::Hold, true, true),
+            (CpuDmaLatency::Leave, false, false),
+        ];
+        for (wanted, is_virtual, expected) in cases {
+            assert_eq!(is_to_be_held(wanted, is_virtual), expected, "{wanted:?} {is_virtual}");
+        }
+    }
+
+    #[test]
+    fn what_is_left_alone_is_neither_opened_nor_refused() {
+        let hold = Hold::new(CpuDmaLatency::Leave, false);
+        assert_eq!((hold.obtained().limit_us, &hold.obtained().refusal), (None, &None));
+    }
+}

@@ -1,0 +1,60 @@
+//! The user's word to end a run: SIGINT, SIGTERM, and SIGHUP of a terminal that is gone.
+
+use std::fs;
+use std::io;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+
+use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+use signal_hook::iterator::Signals;
+use signal_hook::low_level::emulate_default_handler;
+
+/// The signals counted: the first asks for an orderly stop, the second ends at once.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Interrupts {
+    count: Arc<AtomicUsize>,
+    is_over: Arc<AtomicBool>,
+}
+
+impl Interrupts {
+    /// Listens from now on. SIGHUP stays ignored where whoever started this wants that, as `nohup` does.
+    pub(crate) fn listen() -> io::Result<Self> {
+        let interrupts = Self::default();
+        let hang_up = (!is_ignored(SIGHUP)).then_some(SIGHUP);
+        let mut signals = Signals::new([SIGINT, SIGTERM].into_iter().chain(hang_up))?;
+        std::thread::spawn({
+            let Self { count, is_over } = interrupts.clone();
+            move || {
+                for signal in signals.forever() {
+                    if is_over.load(Ordering::Relaxed) {
+                        let _ = emulate_default_handler(signal);
+                    }
+                    count.fetch_add(1, Ordering::Relaxed);
+                }
+            }
+        });
+        Ok(interrupts)
+    }
+
+    /// Whether an orderly stop has been asked for.
+    pub(crate) fn is_stop_asked(&self) -> bool {
+        self.count.load(Ordering::Relaxed) > 0
+    }
+
+    /// Whether the end is to come at once.
+    pub(crate) fn is_end_insisted(&self) -> bool {
+        self.count.load(Ordering::Relaxed) > 1
+    }
+
+    /// The rig has ended: from now on the signals do what they do by default.
+    pub(crate) fn let_go(&self) {
+        self.is_over.store(true, Ordering::Relaxed);
+    }
+}
+
+fn is_ignored(signal: i32) -> bool {
+    let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
+    mask.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok())
+        .is_some_and(|mask| mask >> (signal - 1) & 1 == 1)
+}

@@ -1,0 +1,145 @@
+//! What is to be run, resolved from scenario and arguments, and refused before anything starts if it
+//! cannot be run.
+
+mod scenario;
+
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use anyhow::Context;
+use masseter_controller::trajectory::{self, CheckError, Trajectory, TrajectoryReport};
+use masseter_plant::core as plant;
+use masseter_shared::config::{FileConfig, MotionConfig, Scenario};
+use masseter_shared::geometry::Mechanism;
+use masseter_shared::schedule::CycleSchedule;
+
+pub use scenario::{changed, given};
+
+/// A run that can be made.
+#[derive(Debug)]
+pub struct Plan {
+    /// The scenario with every argument applied.
+    pub scenario: Scenario,
+    /// Its mechanism.
+    pub mechanism: Mechanism,
+    /// Its motion, checked against strokes, velocities, accelerations and conditioning.
+    pub trajectory: Trajectory,
+    /// What the motion asks of the axes.
+    pub demands: TrajectoryReport,
+    /// The cycle's time table on the bus.
+    pub schedule: CycleSchedule,
+}
+
+/// What the arguments of a command change in a scenario.
+#[derive(Debug, Clone, Default)]
+pub struct Overrides {
+    /// A recorded motion instead of the scenario's.
+    pub trajectory: Option<PathBuf>,
+    /// Duration of the motion.
+    pub duration: Option<Duration>,
+    /// Cycles per second.
+    pub rate_hz: Option<u32>,
+    /// The real interface of each bus; none for simulated buses.
+    pub interfaces: Option<Vec<String>>,
+    /// Cores of controller and plant.
+    pub cores: Option<[usize; 2]>,
+    /// Seed of every random number.
+    pub seed: Option<u64>,
+}
+
+impl Plan {
+    /// Plans a scenario by what its mechanism, drives and buses can do, on whatever machine.
+    ///
+    /// # Errors
+    /// When the cycle does not fit the buses, the plant cannot be built, or the motion asks too much.
+    pub fn of(scenario: Scenario) -> anyhow::Result<Self> {
+        let mechanism = Mechanism::new(&scenario.mechanism)?;
+        let schedule = CycleSchedule::new(&scenario.can, scenario.period_ns())?;
+        plant::check(&scenario).context("the plant cannot be built")?;
+        let trajectory = Trajectory::new(&scenario.motion, &scenario.jaw, &mechanism, scenario.duration_s)?;
+        let demands = demands(&scenario, &trajectory, &mechanism)?;
+        Ok(Self { scenario, mechanism, trajectory, demands, schedule })
+    }
+
+    /// A line that says what is about to run, and one more where the recording does not say all that it should.
+    pub fn announcement(&self) -> String {
+        let scenario = &self.scenario;
+        let wires = match &scenario.can.interfaces[..] {
+            [] => "virtual CAN".to_owned(),
+            interfaces => interfaces.join(", "),
+        };
+        let cut = self.trajectory.cut_from_s();
+        let cut = cut
+            .map_or_else(String::new, |whole_s| format!("; cut short: to its end it takes {whole_s:.1} s"));
+        let centroid = self.trajectory.centroid_turn_deg().map_or_else(String::new, of_centroid);
+        format!(
+            "{}: {:.1} s at {} Hz on {wires}, seed {}{cut}{centroid}",
+            scenario.name,
+            self.trajectory.duration_s(),
+            scenario.rate_hz,
+            scenario.seed
+        )
+    }
+}
+
+/// The scenario of a file, or the default one, with every override applied and each value checked by itself.
+///
+/// # Errors
+/// When the file or the motion cannot be read, or a value lies outside its range.
+pub fn scenario(path: Option<&Path>, overrides: &Overrides) -> anyhow::Result<Scenario> {
+    changed(path, |scenario| apply(overrides, scenario))
+}
+
+fn of_centroid(turn_deg: f64) -> String {
+    format!(
+        "\n  the jaw turns by up to {turn_deg:.1}°, and the markers' centroid stands for the incisal point; \
+         set motion.marker_origin_mm"
+    )
+}
+
+/// What a motion asks of the axes of a scenario.
+///
+/// # Errors
+/// When that is more than its limits or its drives allow.
+pub fn demands(
+    scenario: &Scenario,
+    trajectory: &Trajectory,
+    mechanism: &Mechanism,
+) -> Result<TrajectoryReport, CheckError> {
+    let limits = scenario.limits.within(&scenario.drives);
+    trajectory::check(trajectory, mechanism, &limits, scenario.period_s())
+}
+
+fn apply(overrides: &Overrides, scenario: &mut Scenario) -> anyhow::Result<()> {
+    if let Some(path) = &overrides.trajectory {
+        play(path, scenario);
+    }
+    if let MotionConfig::File(file) = &mut scenario.motion {
+        file.path = absolute(&file.path)?;
+    }
+    if let Some(duration) = overrides.duration {
+        scenario.duration_s = Some(duration.as_secs_f64());
+    }
+    if let Some(interfaces) = &overrides.interfaces {
+        scenario.can.interfaces.clone_from(interfaces);
+    }
+    scenario.rate_hz = overrides.rate_hz.unwrap_or(scenario.rate_hz);
+    scenario.seed = overrides.seed.unwrap_or(scenario.seed);
+    scenario.realtime.cores = overrides.cores.unwrap_or(scenario.realtime.cores);
+    Ok(())
+}
+
+/// Has a scenario play a recording; one that plays another keeps its axes and filter.
+pub fn play(path: &Path, scenario: &mut Scenario) {
+    match &mut scenario.motion {
+        MotionConfig::File(file) => path.clone_into(&mut file.path),
+        motion => *motion = MotionConfig::File(FileConfig::new(path)),
+    }
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    scenario.name = stem.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '-' }).take(64).collect();
+}
+
+/// The manifest must name the file for readers anywhere.
+fn absolute(path: &Path) -> anyhow::Result<PathBuf> {
+    path.canonicalize().with_context(|| format!("cannot read {}", path.display()))
+}

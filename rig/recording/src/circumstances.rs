@@ -1,0 +1,62 @@
+//! The circumstances of a run that the manifest keeps: the machine, what its processes used, and their wake-ups' settings.
+
+use std::collections::BTreeMap;
+
+use masseter_shared::config::CpuDmaLatency;
+use serde::{Deserialize, Serialize};
+
+/// What a process used in its steady state: CPU time and page faults by all its threads, the rest by the main
+/// one, which is its loop.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+pub struct Usage {
+    /// Duration covered, s.
+    pub observed_s: f64,
+    /// CPU time, s.
+    pub cpu_s: f64,
+    /// Times it gave up its core to wait.
+    pub voluntary_switches: u64,
+    /// Times its core was taken from it.
+    pub involuntary_switches: u64,
+    /// Page faults served from memory.
+    pub minor_faults: u64,
+    /// Page faults served from disk.
+    pub major_faults: u64,
+}
+
+/// What all processes used, by name, and what was stolen from the machine.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct RunUsage {
+    /// Each process.
+    pub processes: BTreeMap<String, Usage>,
+    /// Time that the hypervisor ran something else while a core of this machine wanted to run, as far as
+    /// it tells, s.
+    pub stolen_s: f64,
+    /// The largest jump of the wall clock: it was set, or the machine was suspended, s.
+    #[serde(default)]
+    pub clock_jump_s: f64,
+}
+
+/// What was asked of `/dev/cpu_dma_latency` and what was obtained.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct DmaLatency {
+    /// The scenario's choice.
+    pub wanted: CpuDmaLatency,
+    /// The machine's limit as read back, µs; none when it was left alone.
+    pub limit_us: Option<i32>,
+    /// Why an explicit wish was refused, with what helps.
+    pub refusal: Option<String>,
+}
+
+/// The machine a run was made on.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Machine {
+    /// Processor model.
+    pub cpu: String,
+    /// Cores that may be used.
+    pub cores: usize,
+    /// Kernel name, release and version.
+    pub kernel: String,
+    /// Whether a hypervisor runs it.
+    #[serde(rename = "virtual")]
+    pub is_virtual: bool,
+}

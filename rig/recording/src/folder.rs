@@ -1,0 +1,126 @@
+//! The folder a run leaves, and the names of what lies in it.
+
+use std::fs::{self, File};
+use std::io::{self, Write};
+use std::os::unix::fs::symlink;
+use std::path::{Path, PathBuf};
+use std::time::UNIX_EPOCH;
+
+use masseter_shared::clock;
+
+use masseter_terminal::{OutputError, new_folder};
+
+/// Name of the recorded motion within the folder, as its scenario knows it.
+pub const MOTION: &str = "motion.csv";
+
+/// A run folder.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct RunFolder(PathBuf);
+
+/// Why a run folder could not be made or opened.
+#[derive(Debug, thiserror::Error)]
+pub enum FolderError {
+    /// It is no run folder.
+    #[error("{} is no run folder: it holds no recording.mcap", .0.display())]
+    NoRun(PathBuf),
+    /// It could not be made.
+    #[error(transparent)]
+    New(#[from] OutputError),
+}
+
+impl RunFolder {
+    /// Creates `<parent>/<UTC time>-<name>/` and points `<parent>/latest` at it.
+    pub fn create_in(parent: &Path, name: &str) -> Result<Self, FolderError> {
+        let time = humantime::format_rfc3339_millis(UNIX_EPOCH + clock::wall_time()).to_string();
+        let file_name = format!("{}-{name}", time.replace([':', '-'], ""));
+        let folder = Self::create(&parent.join(&file_name))?;
+        let latest = parent.join("latest");
+        // A folder of the user's own under that name stays as it is; the run is named in the report.
+        if latest.is_symlink() || !latest.exists() {
+            let _ = fs::remove_file(&latest);
+            let _ = symlink(&file_name, &latest);
+        }
+        Ok(folder)
+    }
+
+    /// Creates this very folder, which must not exist.
+    pub fn create(path: &Path) -> Result<Self, FolderError> {
+        new_folder(path)?;
+        let folder = path.canonicalize().map_err(OutputError::creating(path))?;
+        folder.parent().map(secure_names);
+        Ok(Self(folder))
+    }
+
+    /// Opens the folder of a past run.
+    pub fn open(path: &Path) -> Result<Self, FolderError> {
+        let folder = Self(path.to_owned());
+        if folder.recording().is_file() { Ok(folder) } else { Err(FolderError::NoRun(path.to_owned())) }
+    }
+
+    /// Writes one of its files, wholly or not at all: a power cut that the recording outlives must not take what
+    /// explains it.
+    pub fn keep(&self, path: &Path, text: &str) -> io::Result<()> {
+        let unfinished = path.with_extension("part");
+        let mut file = File::create(&unfinished)?;
+        file.write_all(text.as_bytes())?;
+        file.sync_all()?;
+        fs::rename(unfinished, path)?;
+        secure_names(&self.0);
+        Ok(())
+    }
+
+    /// The folder itself.
+    pub fn path(&self) -> &Path {
+        &self.0
+    }
+
+    /// The scenario as resolved; it runs the same again.
+    pub fn scenario(&self) -> PathBuf {
+        self.0.join("scenario.toml")
+    }
+
+    /// The recorded motion that was played, if it was one; the scenario beside it names it.
+    pub fn motion(&self) -> PathBuf {
+        self.0.join(MOTION)
+    }
+
+    /// What was run, on what, and with which scheduling.
+    pub fn manifest(&self) -> PathBuf {
+        self.0.join("manifest.json")
+    }
+
+    /// Every message of the run.
+    pub fn recording(&self) -> PathBuf {
+        self.0.join("recording.mcap")
+    }
+
+    /// HdrHistogram interval logs.
+    pub fn histograms(&self) -> PathBuf {
+        self.0.join("hist")
+    }
+
+    /// Events, a line of JSON each.
+    pub fn events(&self) -> PathBuf {
+        self.0.join("events.jsonl")
+    }
+
+    /// Verdict and figures.
+    pub fn summary(&self) -> PathBuf {
+        self.0.join("summary.json")
+    }
+
+    /// The checks for CI systems.
+    pub fn junit(&self) -> PathBuf {
+        self.0.join("junit.xml")
+    }
+
+    /// The report for people.
+    pub fn report(&self) -> PathBuf {
+        self.0.join("report.html")
+    }
+}
+
+/// Makes the names in a folder outlive a power cut, on file systems that can.
+fn secure_names(folder: &Path) {
+    let _ = File::open(folder).and_then(|folder| folder.sync_all());
+}

@@ -1,0 +1,97 @@
+//! `manifest.json`: what was run, on what machine, with which scheduling, and how it ended.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::io;
+use std::time::UNIX_EPOCH;
+
+use masseter_shared::clock;
+use masseter_shared::config::Scenario;
+use masseter_shared::realtime::scheduling::Obtained;
+use serde::{Deserialize, Serialize};
+
+use crate::circumstances::{DmaLatency, Machine, RunUsage};
+use crate::ending::Ending;
+use crate::folder::RunFolder;
+
+/// Version of the manifest's form.
+const FORM: u32 = 1;
+
+/// How the supervisor ended as long as nothing else was written.
+const UNJUDGED: &str = "it did not live to judge the run, or could not write how it ended";
+
+/// The circumstances of a run.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Manifest {
+    /// Version of this form.
+    pub form: u32,
+    /// Version of the program.
+    pub masseter: String,
+    /// When the run began, UTC.
+    pub began: String,
+    /// `rt` or `virtual`.
+    pub clock: String,
+    /// The scenario as resolved.
+    pub scenario: Scenario,
+    /// Duration of the motion, s.
+    pub motion_s: f64,
+    /// The machine.
+    pub machine: Machine,
+    /// What each process asked of the kernel and obtained; empty under virtual time.
+    pub scheduling: BTreeMap<String, Obtained>,
+    /// What became of `/dev/cpu_dma_latency`; none under virtual time.
+    pub cpu_dma_latency: Option<DmaLatency>,
+    /// What the processes used in their steady state; empty under virtual time.
+    pub usage: RunUsage,
+    /// How the run ended.
+    pub ending: Ending,
+}
+
+impl Manifest {
+    /// The circumstances as far as they are known before the start.
+    pub fn new(scenario: Scenario, motion_s: f64, clock: &str, machine: Machine) -> Self {
+        let began = humantime::format_rfc3339_seconds(UNIX_EPOCH + clock::wall_time());
+        Self {
+            form: FORM,
+            masseter: env!("CARGO_PKG_VERSION").to_owned(),
+            began: began.to_string(),
+            clock: clock.to_owned(),
+            scenario,
+            motion_s,
+            machine,
+            scheduling: BTreeMap::new(),
+            cpu_dma_latency: None,
+            usage: RunUsage::default(),
+            ending: Ending::died("supervisor", UNJUDGED.to_owned()),
+        }
+    }
+
+    /// The first thing that a process did not get of the scheduling it asked for, with what helps.
+    pub fn refusal(&self) -> Option<(&str, &str)> {
+        let refusals = self.scheduling.iter().flat_map(|(process, obtained)| {
+            obtained.refusals.iter().map(move |refusal| (process.as_str(), refusal.as_str()))
+        });
+        refusals.into_iter().next()
+    }
+
+    /// Writes the file, wholly or not at all.
+    pub fn write(&self, folder: &RunFolder) -> io::Result<()> {
+        folder.keep(&folder.manifest(), &(serde_json::to_string_pretty(self)? + "\n"))
+    }
+
+    /// Reads the file of a past run.
+    pub fn read(folder: &RunFolder) -> io::Result<Self> {
+        #[derive(Deserialize)]
+        struct Form {
+            form: u32,
+        }
+        let text = fs::read_to_string(folder.manifest())?;
+        let Form { form } = serde_json::from_str(&text)?;
+        if form != FORM {
+            return Err(io::Error::other(format!("it has form {form}, this program reads form {FORM}")));
+        }
+        let manifest: Self = serde_json::from_str(&text)?;
+        manifest.scenario.validate().map_err(io::Error::other)?;
+        Ok(manifest)
+    }
+}

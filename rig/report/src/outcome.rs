@@ -1,0 +1,55 @@
+//! What a run came to, in a word and as an exit code. Why it did, its [verdict](super::verdict) says.
+
+use masseter_terminal::Exit;
+
+/// What a run came to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Outcome {
+    /// Every check passed.
+    Pass,
+    /// A check failed.
+    Fail,
+    /// The machine does not allow a judgement.
+    Invalid,
+    /// The recording lacks something.
+    Incomplete,
+    /// The controller stopped safely because of a fault.
+    SafeStop,
+    /// A process died.
+    Died,
+    /// The user ended it.
+    Interrupted,
+}
+
+impl Outcome {
+    /// The word for it.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Pass => "PASS",
+            Self::Fail => "FAIL",
+            Self::Invalid => "INVALID",
+            Self::Incomplete => "INCOMPLETE",
+            Self::SafeStop => "SAFE STOP",
+            Self::Died => "DIED",
+            Self::Interrupted => "INTERRUPTED",
+        }
+    }
+
+    /// How the program ends that tells of it.
+    pub fn exit(self) -> Exit {
+        match self {
+            Self::Pass => Exit::Passed,
+            Self::Fail => Exit::Failed,
+            Self::Invalid => Exit::Invalid,
+            Self::Incomplete => Exit::Incomplete,
+            Self::SafeStop => Exit::SafeStop,
+            Self::Died => Exit::Died,
+            Self::Interrupted => Exit::Interrupted,
+        }
+    }
+
+    /// Whether its checks say what it came to.
+    pub(super) fn is_judged(self) -> bool {
+        matches!(self, Self::Pass | Self::Fail)
+    }
+}

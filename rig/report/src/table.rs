@@ -1,0 +1,208 @@
+//! The result of a run as text for a terminal.
+
+use std::fmt::Write;
+
+use masseter_shared::config::MotionConfig;
+use masseter_shared::messages::codes::{Cause, EventKind};
+
+use super::usage;
+use crate::verdict::Verdict;
+use masseter_analysis::{
+    BusResponse, Coded, EventRecord, Figures, IntervalFigures, ReadingFigures, ResponseFigures,
+    TrackingFigures,
+};
+use masseter_recording::Manifest;
+
+/// Verdict, checks, latencies, losses and noteworthy events.
+pub(super) fn of_run(manifest: &Manifest, figures: &Figures, verdict: &Verdict) -> String {
+    let mut text = String::new();
+    write_all(&mut text, manifest, figures, verdict).expect("a string takes any text");
+    text
+}
+
+fn write_all(
+    text: &mut String,
+    manifest: &Manifest,
+    figures: &Figures,
+    verdict: &Verdict,
+) -> std::fmt::Result {
+    let scenario = &manifest.scenario;
+    writeln!(text, "{}: {}", verdict.outcome.word(), verdict.reason)?;
+    writeln!(
+        text,
+        "{}: {:.1} s of motion at {} Hz ({} clock), {} cycles in {:.1} s, seed {}",
+        scenario.name,
+        manifest.motion_s,
+        scenario.rate_hz,
+        manifest.clock,
+        figures.cycles,
+        figures.duration_s,
+        scenario.seed,
+    )?;
+    if let MotionConfig::File(file) = &scenario.motion {
+        writeln!(text, "recording played: {}", file.path.display())?;
+    }
+    text.push('\n');
+    for check in &verdict.checks {
+        writeln!(text, "  {:<4} {:<18} {}", check.result.mark(), check.name, check.finding)?;
+    }
+    let tracking = &figures.tracking;
+    writeln!(text, "\nplatform, {}", distances(tracking))?;
+    if let Some(rms_mm) = tracking.estimate_rms_mm {
+        writeln!(text, "platform, estimated against true: rms {rms_mm:.4} mm")?;
+    }
+    if let Some(most_n) = figures.bite_force_max_n {
+        writeln!(text, "bite force: at most {most_n:.1} N")?;
+    }
+    text.push('\n');
+    latencies(text, &figures.intervals)?;
+    responses(text, &figures.bus_response)?;
+    writeln!(
+        text,
+        "\nskipped cycles: controller {}, plant {}; machine stood still: {:.2} ms of the controller's, {:.2} ms of the plant's waiting",
+        figures.controller_skips.skipped,
+        figures.plant_skips.skipped,
+        figures.controller_skips.stalled_ns as f64 / 1e6,
+        figures.plant_skips.stalled_ns as f64 / 1e6
+    )?;
+    writeln!(text, "{}", readings(&figures.readings))?;
+    usage::line(text, &manifest.usage)?;
+    losses(text, figures)?;
+    events(text, figures)
+}
+
+fn latencies(text: &mut String, intervals: &[IntervalFigures]) -> std::fmt::Result {
+    writeln!(
+        text,
+        "{:<28} {:>8} {:>10} {:>10} {:>10} {:>10}",
+        "interval, µs", "n", "p50", "p99", "p99.9", "max"
+    )?;
+    for interval in intervals {
+        writeln!(
+            text,
+            "{:<28} {:>8} {:>10} {:>10} {:>10} {:>10}",
+            interval.name,
+            interval.n,
+            or_dash(interval.p50_ns, microseconds),
+            or_dash(interval.p99_ns, microseconds),
+            or_dash(interval.p999_ns, microseconds),
+            or_dash(interval.max_ns, microseconds),
+        )?;
+    }
+    Ok(())
+}
+
+/// Which readings the controller's cycles used.
+pub(super) fn readings(readings: &ReadingFigures) -> String {
+    let ReadingFigures { in_time, late, none, before_first } = readings;
+    format!(
+        "cycles by their reading: {in_time} in time, {late} late, {none} without a fresh one, {before_first} before the first"
+    )
+}
+
+/// Of each kind of message the one that used most of its bound, or took longest where it has none.
+fn responses(text: &mut String, response: &BusResponse) -> std::fmt::Result {
+    let measured = response.messages.iter().filter(|message| message.frames > 0);
+    let kind = |message: &ResponseFigures| {
+        let name = message.message.split(' ').next().unwrap_or_default().to_owned();
+        (message.bus, name)
+    };
+    let mut closest: Vec<&ResponseFigures> = Vec::new();
+    for message in measured {
+        let rank = |message: &ResponseFigures| (message.share(), message.max_ns);
+        match closest.iter_mut().find(|other| kind(other) == kind(message)) {
+            Some(other) if rank(message) > rank(other) => *other = message,
+            Some(_) => {}
+            None => closest.push(message),
+        }
+    }
+    if closest.is_empty() {
+        return Ok(());
+    }
+    writeln!(text, "\n{:<20} {:>4} {:>8} {:>10} {:>10}", "response, µs", "bus", "n", "max", "bound")?;
+    for message in closest {
+        writeln!(
+            text,
+            "{:<20} {:>4} {:>8} {:>10} {:>10}",
+            message.message,
+            message.bus,
+            message.frames,
+            or_dash(message.max_ns, microseconds),
+            or_dash(message.bound_ns, microseconds)
+        )?;
+    }
+    Ok(())
+}
+
+/// How far the platform was from where it was wanted.
+pub(super) fn distances(tracking: &TrackingFigures) -> String {
+    let TrackingFigures { rms_mm, max_mm, rms_deg, max_deg, .. } = *tracking;
+    let [rms_mm, max_mm, rms_deg, max_deg] =
+        [rms_mm, max_mm, rms_deg, max_deg].map(|value| or_dash(value, decimals));
+    format!(
+        "{} against wanted: rms {rms_mm} mm, max {max_mm} mm; rms {rms_deg}°, max {max_deg}°",
+        tracking.reference.adjective()
+    )
+}
+
+/// A dash where there is no such figure.
+pub(super) fn or_dash<T>(figure: Option<T>, in_words: impl Fn(T) -> String) -> String {
+    figure.map_or_else(|| "–".to_owned(), in_words)
+}
+
+/// Millimetres or degrees, with four decimals.
+pub(super) fn decimals(value: f64) -> String {
+    format!("{value:.4}")
+}
+
+/// Nanoseconds as microseconds with two decimals.
+pub(super) fn microseconds(ns: u64) -> String {
+    format!("{:.2}", ns as f64 / 1e3)
+}
+
+fn losses(text: &mut String, figures: &Figures) -> std::fmt::Result {
+    let topics: Vec<_> = figures
+        .topics
+        .iter()
+        .map(|topic| format!("{} {} ({} dropped)", topic.topic, topic.messages, topic.missing))
+        .collect();
+    writeln!(text, "messages: {}", topics.join(", "))?;
+    let frames: Vec<_> = figures.frames.iter().enumerate().map(|(bus, n)| format!("can{bus} {n}")).collect();
+    writeln!(text, "frames: {}", frames.join(", "))
+}
+
+fn events(text: &mut String, figures: &Figures) -> std::fmt::Result {
+    let faults: Vec<_> = figures.events.iter().filter(|event| event.kind == EventKind::Fault).collect();
+    if faults.is_empty() {
+        return Ok(());
+    }
+    writeln!(text, "\nfaults:")?;
+    for event in faults {
+        writeln!(text, "  {}", in_words(event))?;
+    }
+    Ok(())
+}
+
+/// An event in a line.
+pub(super) fn in_words(event: &EventRecord) -> String {
+    format!("cycle {:>6} {}", event.cycle, happening(event))
+}
+
+/// What an event tells, without its time.
+pub(super) fn happening(event: &EventRecord) -> String {
+    let axis = event.axis.map_or_else(String::new, |axis| format!(" {axis}"));
+    let moved = event.transition.as_ref().map(|[from, to]| format!("{from} → {to}"));
+    let values = match event.cause {
+        Coded::Known(Cause::StopRequested) => String::new(),
+        _ => format!(" (value {}, limit {})", event.value, event.limit),
+    };
+    let moved = moved.unwrap_or_default();
+    let source = event.source;
+    if let Some(text) = &event.text {
+        return format!("{source}: {} ({text})", event.cause);
+    }
+    match event.cause {
+        Coded::Known(Cause::Sequence) => format!("{source}{axis}: {moved}"),
+        cause => format!("{source}{axis}: {cause}{values} {moved}").trim_end().to_owned(),
+    }
+}

@@ -1,0 +1,135 @@
+//! Jaw motions against the mechanism: whether it can follow them, and whether the solvers can.
+
+use masseter_controller::kinematics::ForwardTracker;
+use masseter_controller::trajectory::{Trajectory, TrajectoryReport};
+use masseter_shared::config::{
+    ChewingConfig, LateralConfig, MotionConfig, OpeningConfig, ProtrusionConfig, Scenario,
+};
+use masseter_shared::geometry::{LEGS, Mechanism};
+
+use super::contender::{Contender, SHOWN};
+use super::sample::distance_rad;
+use super::table::{Table, number};
+
+/// A cycle of the rig, s.
+const CYCLE_S: f64 = 1e-3;
+/// Leg angles closer than this to those of the inverse kinematics are the true ones, radians.
+const TRUE_WITHIN_RAD: f64 = 1e-6;
+
+/// A motion of the jaw on the platform.
+#[derive(Debug, Clone)]
+pub(super) struct Motion {
+    pub name: String,
+    pub trajectory: Trajectory,
+    /// What it asks of the axes, or why the mechanism cannot follow.
+    pub demands: Result<TrajectoryReport, String>,
+    /// How each of [`SHOWN`] followed it, 1 ms a step.
+    pub followed: [Followed; SHOWN.len()],
+}
+
+/// How a solver followed a motion, each step from its last solution.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(super) struct Followed {
+    pub steps: usize,
+    /// Steps at which it was not at the true leg angles.
+    pub lost: usize,
+    pub iterations_mean: f64,
+}
+
+/// The rig's generators with their defaults, the default scenario's first, and the motion of `own` if given.
+///
+/// # Errors
+/// When its recording cannot be used, or a value of it lies outside its range.
+pub(super) fn motions(mechanism: &Mechanism, own: Option<&Scenario>) -> anyhow::Result<Vec<Motion>> {
+    let generated = [
+        ("chewing", MotionConfig::Chewing(ChewingConfig::default())),
+        ("opening", MotionConfig::Opening(OpeningConfig::default())),
+        ("protrusion", MotionConfig::Protrusion(ProtrusionConfig::default())),
+        ("lateral excursion", MotionConfig::Lateral(LateralConfig::default())),
+    ];
+    let generated = generated.map(|(name, motion)| (name, Scenario { motion, ..Scenario::default() }));
+    let own = own.map(|own| {
+        let name = if matches!(own.motion, MotionConfig::File(_)) { "recording" } else { "scenario" };
+        (name, own.clone())
+    });
+    generated.into_iter().chain(own).map(|(name, scenario)| Motion::new(name, &scenario, mechanism)).collect()
+}
+
+impl Motion {
+    fn new(name: &str, scenario: &Scenario, mechanism: &Mechanism) -> anyhow::Result<Self> {
+        let Scenario { motion, jaw, duration_s, .. } = scenario;
+        let trajectory = Trajectory::new(motion, jaw, mechanism, *duration_s)?;
+        let demands =
+            masseter_plan::demands(scenario, &trajectory, mechanism).map_err(|error| error.to_string());
+        let followed = SHOWN.map(|contender| follow(contender, mechanism, &trajectory));
+        Ok(Self { name: name.to_owned(), trajectory, demands, followed })
+    }
+
+    /// The platform's poses, every 10 ms.
+    pub(super) fn poses(&self) -> impl Iterator<Item = masseter_shared::geometry::Pose> {
+        let steps = (self.trajectory.duration_s() / (10.0 * CYCLE_S)) as usize;
+        (0..=steps).map(|step| self.trajectory.pose(step as f64 * 10.0 * CYCLE_S))
+    }
+}
+
+fn follow(contender: Contender, mechanism: &Mechanism, trajectory: &Trajectory) -> Followed {
+    let mut last_rad: Option<[f64; LEGS]> = None;
+    let mut tracker = ForwardTracker::new(mechanism.clone());
+    let (mut followed, mut iterations) = (Followed::default(), 0);
+    let cycles = (trajectory.duration_s() / CYCLE_S) as usize;
+    for cycle in 0..=cycles {
+        let Ok(joints) = mechanism.inverse(&trajectory.pose(cycle as f64 * CYCLE_S)) else { continue };
+        let found = if contender == Contender::Controller {
+            tracker.update(&joints.actuators).ok().map(|solution| (solution.theta_rad, solution.iterations))
+        } else {
+            // The first pose is known, as the paper supposes.
+            let guess_rad = last_rad.unwrap_or(joints.theta_rad);
+            let attempt = contender.attempt(mechanism, &joints.actuators, &guess_rad);
+            attempt.found_rad.ok().map(|found_rad| (found_rad, attempt.iterations))
+        };
+        followed.steps += 1;
+        let is_true = |found: &[f64; LEGS]| distance_rad(found, &joints.theta_rad) < TRUE_WITHIN_RAD;
+        followed.lost += usize::from(!found.is_some_and(|(found, _)| is_true(&found)));
+        if let Some((found_rad, made)) = found {
+            last_rad = Some(found_rad);
+            iterations += made;
+        }
+    }
+    followed.iterations_mean = f64::from(iterations) / followed.steps as f64;
+    followed
+}
+
+/// A row for each motion and solver.
+pub(super) fn table(motions: &[Motion], mechanism: &Mechanism) -> Table {
+    let header = [
+        "motion",
+        "within_limits",
+        "least_slide_margin_m",
+        "least_leg_margin_m",
+        "greatest_condition",
+        "solver",
+        "steps_of_1ms",
+        "steps_lost",
+        "iterations_mean",
+    ];
+    let mut rows = Vec::new();
+    for motion in motions {
+        let margins = motion.demands.as_ref().map(|demands| {
+            let margin_m = demands.margin_m(mechanism.strokes());
+            let least_m = |axes: &[f64]| axes.iter().copied().fold(f64::INFINITY, f64::min);
+            [least_m(&margin_m[..LEGS]), least_m(&margin_m[LEGS..]), demands.condition]
+        });
+        for (contender, followed) in SHOWN.into_iter().zip(motion.followed) {
+            let mut row = vec![motion.name.clone(), u8::from(margins.is_ok()).to_string()];
+            row.extend(margins.as_ref().copied().unwrap_or([f64::NAN; 3]).map(number));
+            row.extend([
+                contender.short_name().to_owned(),
+                followed.steps.to_string(),
+                followed.lost.to_string(),
+                number(followed.iterations_mean),
+            ]);
+            rows.push(row);
+        }
+    }
+    Table::new("motions", &header, rows)
+}

@@ -1,0 +1,165 @@
+//! Figs. 6 and 8: the mechanism as it can be assembled, drawn.
+
+use std::f64::consts::TAU;
+
+use masseter_controller::kinematics::Solution;
+use masseter_shared::geometry::{Actuators, LEGS, Mechanism, Vec3};
+use plotters::coord::types::RangedCoordf64;
+use plotters::prelude::*;
+
+use super::axes::{Axes, Chart, curve, named, plain};
+use super::{Area, Figure, GREY, TEXT, TITLE};
+use crate::Study;
+use masseter_charts::palette::{BLUE, GREEN, PURPLE, VERMILION};
+
+/// From where the mechanism is seen, degrees around z and above the horizontal.
+const VIEW_DEG: [f64; 2] = [-62.0, 22.0];
+/// Straight pieces of a drawn circle, metres; shorter ones would show the pixels that they are rounded to.
+const PIECE_M: f64 = 0.004;
+/// What the plane of leg 1 is shown of, mm.
+const WINDOW_MM: [[f64; 2]; 2] = [[-90.0, 90.0], [205.0, 350.0]];
+
+type Space<'a, 'svg> = ChartContext<'a, SVGBackend<'svg>, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
+
+/// Fig. 6: true solution and folded corner, in space and in the plane of leg 1.
+pub(super) fn assemblies(study: &Study) -> anyhow::Result<Figure> {
+    let caption = "Fig. 6. Two assemblies of the neutral input (d = 0, all legs equal). Left: the true one and the one \
+                   with corner A₁ folded over. Right: in the plane of leg 1 the circle on which the triangle carries A₁ \
+                   about A₂A₃ (Cᴬ) and that of the leg about B₁ (Cᴮ) meet twice.";
+    Figure::draw("fig6_assemblies", caption.to_owned(), (1100, 560), |area| {
+        let (left, right) = area.split_horizontally(470);
+        let found = [study.set.true_one(), study.set.corner_folded()];
+        let mut space = space(&left, "Two assemblies of one input", TITLE)?;
+        draw_base(&mut space, &study.mechanism)?;
+        for (solution, colour) in found.into_iter().zip([BLUE, VERMILION]) {
+            if let Some(solution) = solution {
+                draw_assembly(&mut space, &study.mechanism, &study.set.actuators, solution, colour)?;
+            }
+        }
+        loci(&right, study, found)
+    })
+}
+
+/// The plane of leg 1 around A₁: x and z, mm.
+fn loci(area: &Area, study: &Study, found: [Option<&Solution>; 2]) -> anyhow::Result<()> {
+    let axes = Axes {
+        title: "Plane of leg 1",
+        x: ("x (anterior), mm", WINDOW_MM[0][0]..WINDOW_MM[0][1], plain),
+        y: ("z (up), mm", WINDOW_MM[1][0]..WINDOW_MM[1][1], plain),
+    };
+    let mut chart = axes.on(area)?;
+    let (mechanism, actuators) = (&study.mechanism, &study.set.actuators);
+    let [Some(truth), folded] = found else { return Ok(()) };
+    let [_, a2, a3] = mechanism.corners_from_angles(actuators, &truth.theta_rad);
+    let hinge = mechanism.hinge(0, actuators.slide_m[0]);
+    let (middle, half) = ((a2 + a3) / 2.0, (a2 - a3).norm() / 2.0);
+    let side_m = mechanism.platform_sides_m()[0];
+    let circles = [
+        ("Cᴬ: A₁ about A₂A₃", middle, (side_m * side_m - half * half).sqrt(), GREEN),
+        ("Cᴮ: A₁ about B₁", hinge, actuators.leg_m[0], PURPLE),
+    ];
+    for (name, centre, radius_m, colour) in circles {
+        let pieces = (TAU * radius_m / PIECE_M) as usize;
+        let point = |piece: usize| {
+            let (sin, cos) = (piece as f64 / pieces as f64 * TAU).sin_cos();
+            ((centre.x + radius_m * cos) * 1e3, (centre.z + radius_m * sin) * 1e3)
+        };
+        let seen = |(x, z): &(f64, f64)| {
+            let [[left, right], [low, high]] = WINDOW_MM;
+            (left..=right).contains(x) && (low..=high).contains(z)
+        };
+        let points: Vec<_> = (0..=pieces).map(point).filter(seen).collect();
+        curve(&mut chart, name, &points, colour, false)?;
+    }
+    for (solution, (name, colour)) in
+        [Some(truth), folded].into_iter().zip([("true solution", BLUE), ("A₁ folded over", VERMILION)])
+    {
+        let Some(solution) = solution else { continue };
+        let [a1, ..] = mechanism.corners_from_angles(actuators, &solution.theta_rad);
+        let triangle = [(a1.x * 1e3, a1.z * 1e3), (middle.x * 1e3, middle.z * 1e3)];
+        curve(&mut chart, name, &triangle, colour, true)?;
+    }
+    named(&mut chart, SeriesLabelPosition::UpperRight)
+}
+
+/// Fig. 8: every solution of the neutral input above the base.
+pub(super) fn solution_set(study: &Study) -> anyhow::Result<Figure> {
+    let above = study.set.above_base();
+    let caption = format!(
+        "Fig. 8. The {} solutions of the neutral input above the base (leg angles over each); as many mirrored ones lie \
+         below it. The true solution is the first.",
+        above.len()
+    );
+    Figure::draw("fig8_solutions", caption, (1100, 760), |area| {
+        for (panel, solution) in area.split_evenly((2, 4)).iter().zip(&above) {
+            let angles: Vec<_> =
+                solution.theta_rad.iter().map(|angle| format!("{:.1}°", angle.to_degrees())).collect();
+            let (colour, name) = if solution.assembly.is_true() { (BLUE, "true: ") } else { (VERMILION, "") };
+            let mut space = space(panel, &format!("{name}{}", angles.join(", ")), TEXT)?;
+            draw_base(&mut space, &study.mechanism)?;
+            draw_assembly(&mut space, &study.mechanism, &study.set.actuators, solution, colour)?;
+        }
+        Ok(())
+    })
+}
+
+/// A view without axes, equal scales across and up.
+fn space<'a, 'svg>(area: &'a Area<'svg>, title: &str, size: u32) -> anyhow::Result<Space<'a, 'svg>> {
+    let (width, height) = area.dim_in_pixel();
+    let half_height_m = 0.172;
+    let half_width_m = half_height_m * f64::from(width) / f64::from(height - 30);
+    let chart = ChartBuilder::on(area)
+        .margin(4)
+        .caption(title, ("sans-serif", size))
+        .build_cartesian_2d(-half_width_m..half_width_m, 0.125 - half_height_m..0.125 + half_height_m)?;
+    Ok(chart)
+}
+
+fn seen(point: &Vec3) -> (f64, f64) {
+    let [(sin_a, cos_a), (sin_e, cos_e)] = VIEW_DEG.map(|angle| angle.to_radians().sin_cos());
+    let across = -point.x * sin_a + point.y * cos_a;
+    let depth = point.x * cos_a + point.y * sin_a;
+    (across, point.z * cos_e - depth * sin_e)
+}
+
+fn line(space: &mut Chart<'_, '_>, points: &[Vec3], style: ShapeStyle) -> anyhow::Result<()> {
+    space.draw_series([PathElement::new(points.iter().map(seen).collect::<Vec<_>>(), style)])?;
+    Ok(())
+}
+
+/// The slides over their strokes, and the triangle of their middles.
+fn draw_base(space: &mut Chart<'_, '_>, mechanism: &Mechanism) -> anyhow::Result<()> {
+    let middles = [0, 1, 2, 0].map(|leg| mechanism.hinge(leg, 0.0));
+    line(space, &middles, GREY.stroke_width(1))?;
+    let [low_m, high_m] = mechanism.strokes().slide_m;
+    for leg in 0..LEGS {
+        let ends = [mechanism.hinge(leg, low_m), mechanism.hinge(leg, high_m)];
+        line(space, &ends, BLACK.mix(0.55).stroke_width(5))?;
+    }
+    Ok(())
+}
+
+fn draw_assembly(
+    space: &mut Chart<'_, '_>,
+    mechanism: &Mechanism,
+    actuators: &Actuators,
+    solution: &Solution,
+    colour: RGBColor,
+) -> anyhow::Result<()> {
+    let corners = mechanism.corners_from_angles(actuators, &solution.theta_rad);
+    space.draw_series([Polygon::new(corners.iter().map(seen).collect::<Vec<_>>(), colour.mix(0.35))])?;
+    line(space, &[corners[0], corners[1], corners[2], corners[0]], colour.stroke_width(2))?;
+    for (leg, corner) in corners.iter().enumerate() {
+        let hinge = mechanism.hinge(leg, actuators.slide_m[leg]);
+        line(space, &[hinge, *corner], colour.stroke_width(3))?;
+        space.draw_series([Circle::new(seen(&hinge), 4, BLACK.filled())])?;
+        space.draw_series([Circle::new(seen(corner), 4, colour.filled())])?;
+        let name = |letter: char| format!("{letter}{}", ['₁', '₂', '₃'][leg]);
+        for (at, letter) in [(&hinge, 'B'), (corner, 'A')] {
+            let (x, y) = seen(at);
+            let style = ("sans-serif", TEXT - 1);
+            space.draw_series([Text::new(name(letter), (x + 0.006, y + 0.004), style)])?;
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,121 @@
+//! Emergency messages (CiA 301, 7.2.7): a node tells once that an error occurred, or that all are gone.
+
+use std::fmt;
+
+use super::{Cob, LengthError, NodeId, exactly};
+use crate::frame::Frame;
+
+/// Emergency error code. Any number is one; the rig's own drives send those named here.
+#[derive(Clone, Copy, PartialEq, Eq, Hash)]
+pub struct EmergencyCode(pub u16);
+
+impl EmergencyCode {
+    /// No error any more.
+    pub const RESET: Self = Self(0x0000);
+    /// Communication, not told in more detail.
+    pub const COMMUNICATION: Self = Self(0x8100);
+    /// The CAN controller became error passive.
+    pub const ERROR_PASSIVE: Self = Self(0x8120);
+    /// The CAN controller was off the bus and is back.
+    pub const WAS_BUS_OFF: Self = Self(0x8140);
+    /// A heartbeat or node guarding is overdue.
+    pub const HEARTBEAT: Self = Self(0x8130);
+    /// A PDO was too short to be used.
+    pub const PDO_LENGTH: Self = Self(0x8210);
+    /// A PDO was longer than its mapping.
+    pub const PDO_LENGTH_EXCEEDED: Self = Self(0x8220);
+    /// SYNC had another length than object 1019 says.
+    pub const SYNC_LENGTH: Self = Self(0x8240);
+    /// An RPDO is overdue.
+    pub const RPDO_TIMEOUT: Self = Self(0x8250);
+    /// The following error exceeded its window (6065) for longer than allowed (6066).
+    pub const FOLLOWING_ERROR: Self = Self(0x8611);
+}
+
+impl fmt::Display for EmergencyCode {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{:04X}h", self.0)
+    }
+}
+
+impl fmt::Debug for EmergencyCode {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "EmergencyCode({self})")
+    }
+}
+
+/// An emergency message.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Emergency {
+    /// What happened.
+    pub code: EmergencyCode,
+    /// Object 1001, which kinds of errors persist.
+    pub register: u8,
+    /// Whatever the vendor adds.
+    pub vendor: [u8; 5],
+}
+
+impl Emergency {
+    /// Bytes of the message.
+    pub const LENGTH: usize = 8;
+
+    /// All errors are gone.
+    pub const RESET: Self = Self { code: EmergencyCode::RESET, register: 0, vendor: [0; 5] };
+
+    /// Whether it tells that an error is gone rather than come.
+    pub fn is_reset(&self) -> bool {
+        self.code == EmergencyCode::RESET
+    }
+
+    /// The frame in which that node sends it.
+    pub fn frame(self, node: NodeId) -> Frame {
+        Frame::fixed(Cob::Emergency(node).into(), self.encode())
+    }
+
+    /// The data bytes.
+    pub fn encode(self) -> [u8; Self::LENGTH] {
+        let [low, high] = self.code.0.to_le_bytes();
+        let [v0, v1, v2, v3, v4] = self.vendor;
+        [low, high, self.register, v0, v1, v2, v3, v4]
+    }
+
+    /// Reads the data bytes.
+    ///
+    /// # Errors
+    /// [`LengthError`] unless there are exactly 8.
+    pub fn decode(data: &[u8]) -> Result<Self, LengthError> {
+        let [low, high, register, vendor @ ..] = exactly::<{ Self::LENGTH }>("EMCY", data)?;
+        Ok(Self { code: EmergencyCode(u16::from_le_bytes([low, high])), register, vendor })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn the_code_is_little_endian() {
+        let emergency =
+            Emergency { code: EmergencyCode::FOLLOWING_ERROR, register: 0x21, vendor: [1, 2, 3, 4, 5] };
+        assert_eq!(emergency.frame(NodeId::new(2).unwrap()).to_string(), "082#1186210102030405");
+        assert!(!emergency.is_reset());
+        assert!(Emergency::RESET.is_reset());
+    }
+
+    proptest! {
+           #[test]
+           fn eight_bytes_are_an_emergency_and_nothing_else_is(data in prop::collection::vec(any::<u8>(), 0..=8)) {
+               match Emergency::decode(&data) {
+                   Ok(emergency) => {
+    let frame = emergency.frame(NodeId::new(1).unwrap());
+    prop_assert_eq!(frame.data(), &data);
+    }
+                   Err(error) => {
+                       prop_assert_ne!(data.len(), Emergency::LENGTH);
+                       prop_assert_eq!(error.actual, data.len());
+                   }
+               }
+           }
+       }
+}

@@ -1,0 +1,139 @@
+//! Network management commands (CiA 301, 7.2.8).
+
+use super::{Cob, LengthError, NodeId, NodeIdError, exactly};
+use crate::frame::Frame;
+
+/// What a node is told to do.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum NmtCommand {
+    /// Enter operational.
+    Start,
+    /// Enter stopped.
+    Stop,
+    /// Enter pre-operational.
+    EnterPreOperational,
+    /// Restart the application.
+    ResetNode,
+    /// Restart the communication.
+    ResetCommunication,
+}
+
+impl NmtCommand {
+    /// The command specifier on the wire.
+    pub const fn code(self) -> u8 {
+        match self {
+            Self::Start => 0x01,
+            Self::Stop => 0x02,
+            Self::EnterPreOperational => 0x80,
+            Self::ResetNode => 0x81,
+            Self::ResetCommunication => 0x82,
+        }
+    }
+
+    const fn from_code(code: u8) -> Option<Self> {
+        match code {
+            0x01 => Some(Self::Start),
+            0x02 => Some(Self::Stop),
+            0x80 => Some(Self::EnterPreOperational),
+            0x81 => Some(Self::ResetNode),
+            0x82 => Some(Self::ResetCommunication),
+            _ => None,
+        }
+    }
+}
+
+/// Whom a command concerns.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum NmtTarget {
+    /// Every node (node id 0 on the wire).
+    All,
+    /// One node.
+    Node(NodeId),
+}
+
+impl NmtTarget {
+    /// Whether that node has to obey.
+    pub fn includes(self, node: NodeId) -> bool {
+        self == Self::All || self == Self::Node(node)
+    }
+}
+
+/// A network management message.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Nmt {
+    /// What to do.
+    pub command: NmtCommand,
+    /// Who does it.
+    pub target: NmtTarget,
+}
+
+/// Data that is no network management message.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum NmtError {
+    /// Wrong length.
+    #[error(transparent)]
+    Length(#[from] LengthError),
+    /// A command specifier that CiA 301 does not define.
+    #[error("{code:02X}h is no NMT command")]
+    UnknownCommand {
+        /// The command specifier.
+        code: u8,
+    },
+    /// Neither all nodes nor a node.
+    #[error("NMT target: {0}")]
+    Target(#[from] NodeIdError),
+}
+
+impl Nmt {
+    /// The frame that carries it.
+    pub fn frame(self) -> Frame {
+        let target = match self.target {
+            NmtTarget::All => 0,
+            NmtTarget::Node(node) => node.get(),
+        };
+        Frame::fixed(Cob::Nmt.into(), [self.command.code(), target])
+    }
+
+    /// Reads the data bytes.
+    ///
+    /// # Errors
+    /// [`NmtError`] for another length than 2, an unknown command or a target above 127.
+    pub fn decode(data: &[u8]) -> Result<Self, NmtError> {
+        let [code, target] = exactly("NMT", data)?;
+        let command = NmtCommand::from_code(code).ok_or(NmtError::UnknownCommand { code })?;
+        let target = if target == 0 { NmtTarget::All } else { NmtTarget::Node(NodeId::new(target)?) };
+        Ok(Self { command, target })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn whatever_decodes_encodes_to_the_same_bytes() {
+        let mut decoded = 0;
+        for (code, target) in (0..=255).flat_map(|code| (0..=255).map(move |target| (code, target))) {
+            if let Ok(nmt) = Nmt::decode(&[code, target]) {
+                assert_eq!(nmt.frame().data(), [code, target]);
+                decoded += 1;
+            }
+        }
+        assert_eq!(decoded, 5 * 128, "five commands to all or one of 127 nodes");
+    }
+
+    #[test]
+    fn errors_carry_what_was_received() {
+        assert_eq!(Nmt::decode(&[3, 0]), Err(NmtError::UnknownCommand { code: 3 }));
+        assert_eq!(Nmt::decode(&[1, 128]), Err(NmtError::Target(NodeIdError { id: 128 })));
+        assert_eq!(Nmt::decode(&[1]).unwrap_err().to_string(), "NMT has 2 data bytes, received 1");
+    }
+
+    #[test]
+    fn a_target_includes_its_nodes_only() {
+        let [one, two] = [1, 2].map(|id| NodeId::new(id).unwrap());
+        assert!(NmtTarget::All.includes(one));
+        assert!(NmtTarget::Node(one).includes(one));
+        assert!(!NmtTarget::Node(one).includes(two));
+    }
+}

@@ -1,0 +1,31 @@
+#![doc = include_str!("../README.md")]
+
+mod bus;
+pub mod candump;
+pub mod canopen;
+pub mod cia402;
+pub mod conformance;
+mod error_frame;
+pub mod faults;
+mod frame;
+mod id;
+mod pdo;
+mod plan;
+mod port_faults;
+mod socket_can;
+pub mod socketcand;
+mod tap;
+mod virtual_bus;
+pub mod wire;
+
+pub use bus::{Bus, BusStatus, ErrorState, ReceiveError, Received, SendError};
+pub use error_frame::{ERROR_FLAG, ErrorKind, ErrorReport, ErrorReportError};
+pub use frame::{Frame, FrameError, FrameFormat};
+pub use id::{CanId, CanIdError};
+pub use pdo::{EVERY_SYNC, Rpdo1, Tpdo1};
+pub use plan::{BusPlan, NoReleaser, Overload, PeriodicMessage, PlannedMessage, Release};
+pub use port_faults::{Faulty, NotByPort, PortFaults};
+pub use socket_can::{OpenError, SocketCan};
+pub use tap::{Tapped, TappedFrame};
+pub use virtual_bus::{Port, Statistics, VirtualWire, WireConfig};
+pub use wire::{Bitrate, BitrateError, FrameBits, Rates};

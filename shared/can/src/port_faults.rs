@@ -1,0 +1,208 @@
+//! Seeded faults over a port: those that need no hand on the wire.
+//!
+//! Frames get lost on reception, are delayed or sent twice; the node babbles, is disconnected or off the bus. A
+//! node put off the bus stays off for the time it is told, as a controller with `restart-ms`; the 128 sequences of
+//! recessive bits that a real one then waits for are not waited for.
+
+use crate::bus::{Bus, BusStatus, ErrorState, ReceiveError, Received, SendError};
+use crate::faults::{Fault, FaultKind, FaultNote, Faults, NumberedFrame};
+use crate::frame::Frame;
+
+/// Frames that may be held back at one time.
+const HELD: usize = 64;
+/// Transmit error counter of a node put off the bus: the least above the limit.
+const OFF_TEC: u16 = 256;
+
+/// A fault that no port can carry out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("fault {number}: a frame is corrupted on the wire; inject that into a simulated one")]
+pub struct NotByPort {
+    /// Its number.
+    pub number: usize,
+}
+
+/// The faults of one port.
+#[derive(Debug)]
+pub struct PortFaults {
+    faults: Faults,
+    port: usize,
+    sent: u64,
+    received: u64,
+    held: Vec<Held>,
+    restart_after_ns: Option<u64>,
+    off_since_ns: Option<u64>,
+}
+
+/// A frame held back.
+#[derive(Debug, Clone, Copy)]
+struct Held {
+    due_ns: u64,
+    frame: Frame,
+}
+
+impl PortFaults {
+    /// Those of the faults that concern this port; the same seed makes the same choices. Nothing is allocated
+    /// after this.
+    ///
+    /// # Errors
+    /// [`NotByPort`] for a fault that corrupts frames.
+    pub fn new(faults: Vec<Fault>, port: usize, seed: u64) -> Result<Self, NotByPort> {
+        if let Some(fault) = faults.iter().find(|fault| fault.kind == FaultKind::Corrupt) {
+            return Err(NotByPort { number: fault.number });
+        }
+        let held = Vec::with_capacity(HELD);
+        let faults = Faults::new(faults, seed);
+        Ok(Self { faults, port, sent: 0, received: 0, held, restart_after_ns: None, off_since_ns: None })
+    }
+
+    /// With a node that is back so long after it was put off the bus; without this it stays off.
+    #[must_use]
+    pub fn restarting_after(self, restart_after_ns: Option<u64>) -> Self {
+        Self { restart_after_ns, ..self }
+    }
+
+    /// Lets the faults befall that port.
+    pub fn over<B: Bus>(&mut self, bus: B) -> Faulty<'_, B> {
+        Faulty { faults: self, bus }
+    }
+
+    /// What is to be told of the faults up to `now_ns`.
+    pub fn next_note(&mut self, now_ns: u64) -> Option<FaultNote> {
+        self.faults.next_note(now_ns)
+    }
+
+    fn numbered(&self, at_ns: u64, frame: &Frame, number: u64) -> NumberedFrame {
+        NumberedFrame { at_ns, port: self.port, id: frame.id(), number }
+    }
+
+    /// Whether a fault has a frame sent twice, which is recorded then.
+    fn duplicates(&mut self, now_ns: u64, frame: &Frame, number: u64) -> bool {
+        let strike = self.faults.duplicates(self.numbered(now_ns, frame, number));
+        strike.inspect(|&strike| self.faults.record(strike)).is_some()
+    }
+
+    /// Whether a fault makes the port lose a frame that has arrived, which is recorded then.
+    fn loses(&mut self, time_ns: u64, frame: &Frame) -> bool {
+        let number = self.received;
+        self.received += 1;
+        self.faults.loses(self.numbered(time_ns, frame, number))
+    }
+
+    /// Holds a frame back if a fault delays it; whether it did.
+    fn holds_back(&mut self, now_ns: u64, frame: Frame, number: u64) -> Result<bool, SendError> {
+        let delay = self.faults.delays(self.numbered(now_ns, &frame, number));
+        let Some((strike, by_ns)) = delay else { return Ok(false) };
+        if self.held.len() == HELD {
+            return Err(SendError::QueueFull { capacity: HELD });
+        }
+        self.faults.record(strike);
+        self.held.push(Held { due_ns: now_ns.saturating_add(by_ns), frame });
+        Ok(true)
+    }
+
+    /// Whether the node is off the bus or disconnected at that time.
+    fn is_cut_off(&mut self, now_ns: u64) -> bool {
+        self.restart_when_due(now_ns);
+        self.faults.begin_disconnections(now_ns);
+        if self.off_since_ns.is_none()
+            && let Some(strike) = self.faults.puts_off(now_ns, self.port)
+        {
+            self.faults.record(strike);
+            self.off_since_ns = Some(now_ns);
+            self.held.clear();
+        }
+        self.off_since_ns.is_some() || self.faults.is_disconnected(now_ns, self.port)
+    }
+
+    fn restart_when_due(&mut self, now_ns: u64) {
+        if let (Some(since_ns), Some(after_ns)) = (self.off_since_ns, self.restart_after_ns)
+            && now_ns >= since_ns.saturating_add(after_ns)
+        {
+            self.off_since_ns = None;
+        }
+    }
+
+    /// A frame that the node babbles at that time.
+    fn babbled(&mut self, now_ns: u64) -> Option<Frame> {
+        let (strike, frame) = self.faults.makes_babble(now_ns, self.port)?;
+        self.faults.record(strike);
+        Some(frame)
+    }
+
+    /// The next frame that was held back until then.
+    fn due(&mut self, now_ns: u64) -> Option<Frame> {
+        let due = self.held.iter().position(|held| held.due_ns <= now_ns)?;
+        Some(self.held.remove(due).frame)
+    }
+}
+
+/// A port with faults.
+#[derive(Debug)]
+pub struct Faulty<'a, B> {
+    faults: &'a mut PortFaults,
+    bus: B,
+}
+
+impl<B: Bus> Faulty<'_, B> {
+    /// Sends what the faults have sent by themselves. What the port refuses is lost.
+    fn send_own(&mut self, now_ns: u64) {
+        let babbled = self.faults.babbled(now_ns);
+        for frame in babbled.into_iter().chain(std::iter::from_fn(|| self.faults.due(now_ns))) {
+            let _ = self.bus.send(now_ns, frame);
+        }
+    }
+}
+
+impl<B: Bus> Bus for Faulty<'_, B> {
+    fn send(&mut self, now_ns: u64, frame: Frame) -> Result<(), SendError> {
+        if self.faults.is_cut_off(now_ns) {
+            // A disconnected controller keeps a frame until its queue is full; here it is full at once.
+            let refused = SendError::QueueFull { capacity: 0 };
+            return Err(if self.faults.off_since_ns.is_some() {
+                SendError::BusOff { tec: OFF_TEC }
+            } else {
+                refused
+            });
+        }
+        self.send_own(now_ns);
+        let number = self.faults.sent;
+        self.faults.sent += 1;
+        if self.faults.holds_back(now_ns, frame, number)? {
+            return Ok(());
+        }
+        self.bus.send(now_ns, frame)?;
+        if self.faults.duplicates(now_ns, &frame, number) {
+            // The frame itself is queued: that its copy finds no room is no failure of the sender.
+            let _ = self.bus.send(now_ns, frame);
+        }
+        Ok(())
+    }
+
+    fn receive(&mut self, now_ns: u64) -> Result<Option<Received>, ReceiveError> {
+        let is_cut_off = self.faults.is_cut_off(now_ns);
+        if !is_cut_off {
+            self.send_own(now_ns);
+        }
+        // Each turn takes a frame from the port, so that this ends with what has arrived.
+        loop {
+            let received = self.bus.receive(now_ns)?;
+            let Some(Received { frame, time_ns }) = received else { return Ok(None) };
+            let is_lost = self.faults.loses(time_ns, &frame);
+            if !is_cut_off && !is_lost {
+                return Ok(received);
+            }
+        }
+    }
+
+    fn status(&self) -> BusStatus {
+        let status = self.bus.status();
+        if self.faults.off_since_ns.is_some() {
+            BusStatus { state: ErrorState::BusOff, tec: OFF_TEC, ..status }
+        } else {
+            status
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

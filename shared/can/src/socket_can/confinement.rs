@@ -1,0 +1,136 @@
+//! Fault confinement as the driver's error frames tell it.
+//!
+//! Layout of an error frame: `linux/can/error.h`. Drivers differ in what they tell: most tell every change
+//! of state, newer ones with both counters.
+
+use socketcan::errors::{
+    CAN_ERR_ACK, CAN_ERR_BUSERROR, CAN_ERR_BUSOFF, CAN_ERR_CNT, CAN_ERR_CRTL, CAN_ERR_PROT,
+    CAN_ERR_RESTARTED, ControllerProblems,
+};
+
+use crate::bus::{BusStatus, ErrorState};
+use crate::error_frame::ErrorKind;
+
+/// What an error frame told.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Told {
+    /// A change of state before all else, then an error on the wire; none where it was neither.
+    pub(super) kind: Option<ErrorKind>,
+    /// Frames that the controller lost, as far as it tells.
+    pub(super) lost: u64,
+}
+
+/// Transmit error counter at which a controller is bus-off; error frames have no room for more than 255.
+const BUS_OFF_TEC: u16 = 256;
+
+/// What is known of one port.
+#[derive(Debug)]
+pub(super) struct Confinement(BusStatus);
+
+impl Default for Confinement {
+    fn default() -> Self {
+        Self(BusStatus { state: ErrorState::Active, tec: 0, rec: 0 })
+    }
+}
+
+impl Confinement {
+    pub(super) fn status(&self) -> BusStatus {
+        self.0
+    }
+
+    /// Takes an error frame.
+    pub(super) fn take(&mut self, classes: u32, data: &[u8]) -> Told {
+        let has = |class| classes & class != 0;
+        let before = self.0.state;
+        let [_, problems, _, _, _, _, tec, rec] = *data else { return Told { kind: None, lost: 0 } };
+        let problems = ControllerProblems::from_bits_truncate(problems);
+        if has(CAN_ERR_RESTARTED) {
+            *self = Self::default();
+        }
+        if has(CAN_ERR_CNT) {
+            (self.0.tec, self.0.rec) = (u16::from(tec), u16::from(rec));
+        }
+        if has(CAN_ERR_CRTL) {
+            self.0.state = state_after(self.0.state, problems);
+        }
+        if has(CAN_ERR_BUSOFF) {
+            (self.0.state, self.0.tec) = (ErrorState::BusOff, BUS_OFF_TEC);
+        }
+        let kind = match self.0.state {
+            state if state != before => Some(ErrorKind::State(state)),
+            _ if has(CAN_ERR_ACK) => Some(ErrorKind::Acknowledge),
+            _ if has(CAN_ERR_PROT | CAN_ERR_BUSERROR) => Some(ErrorKind::Bit),
+            _ => None,
+        };
+        let has_lost = has(CAN_ERR_CRTL) && problems.contains(ControllerProblems::RX_OVERFLOW);
+        Told { kind, lost: u64::from(has_lost) }
+    }
+}
+
+/// A warning is no state of ISO 11898-1: below passive a controller is active.
+fn state_after(before: ErrorState, problems: ControllerProblems) -> ErrorState {
+    let passive = ControllerProblems::RX_PASSIVE | ControllerProblems::TX_PASSIVE;
+    let active = ControllerProblems::ACTIVE | ControllerProblems::RX_WARNING | ControllerProblems::TX_WARNING;
+    if problems.intersects(passive) {
+        ErrorState::Passive
+    } else if problems.intersects(active) {
+        ErrorState::Active
+    } else {
+        before
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use socketcan::errors::CAN_ERR_LOSTARB;
+
+    use super::*;
+
+    const TX_PASSIVE: u8 = ControllerProblems::TX_PASSIVE.bits();
+    const TX_WARNING: u8 = ControllerProblems::TX_WARNING.bits();
+    const ACTIVE: u8 = ControllerProblems::ACTIVE.bits();
+
+    #[test]
+    fn a_port_goes_through_warning_passive_bus_off_and_restart_as_the_driver_tells() {
+        let mut confinement = Confinement::default();
+        let table = [
+            (CAN_ERR_CRTL | CAN_ERR_CNT, [0, TX_WARNING, 0, 0, 0, 0, 96, 0], ErrorState::Active, 96, 0),
+            (CAN_ERR_CRTL | CAN_ERR_CNT, [0, TX_PASSIVE, 0, 0, 0, 0, 128, 7], ErrorState::Passive, 128, 7),
+            (CAN_ERR_CNT, [0, 0, 0, 0, 0, 0, 248, 7], ErrorState::Passive, 248, 7),
+            (CAN_ERR_BUSOFF, [0; 8], ErrorState::BusOff, 256, 7),
+            (CAN_ERR_RESTARTED, [0; 8], ErrorState::Active, 0, 0),
+            (CAN_ERR_CRTL, [0, TX_PASSIVE, 0, 0, 0, 0, 0, 0], ErrorState::Passive, 0, 0),
+            (CAN_ERR_CRTL, [0, ACTIVE, 0, 0, 0, 0, 0, 0], ErrorState::Active, 0, 0),
+        ];
+        for (classes, data, state, tec, rec) in table {
+            let before = confinement.status().state;
+            let kind = (state != before).then_some(ErrorKind::State(state));
+            assert_eq!(confinement.take(classes, &data), Told { kind, lost: 0 });
+            assert_eq!(confinement.status(), BusStatus { state, tec, rec }, "{classes:x} {data:?}");
+        }
+    }
+
+    #[test]
+    fn a_controller_that_lost_frames_changes_no_state_and_tells_of_one() {
+        let mut confinement = Confinement::default();
+        let data = [0, ControllerProblems::RX_OVERFLOW.bits(), 0, 0, 0, 0, 0, 0];
+        assert_eq!(confinement.take(CAN_ERR_CRTL, &data), Told { kind: None, lost: 1 });
+        assert_eq!(confinement.status().state, ErrorState::Active);
+    }
+
+    #[test]
+    fn an_error_on_the_wire_is_told_unless_it_changes_the_state() {
+        let passive = [0, TX_PASSIVE, 0, 0, 0, 0, 128, 0];
+        let table = [
+            (CAN_ERR_PROT | CAN_ERR_BUSERROR, [0; 8], Some(ErrorKind::Bit)),
+            (CAN_ERR_ACK | CAN_ERR_BUSERROR, [0; 8], Some(ErrorKind::Acknowledge)),
+            (CAN_ERR_LOSTARB, [0; 8], None),
+            (CAN_ERR_ACK | CAN_ERR_CRTL, passive, Some(ErrorKind::State(ErrorState::Passive))),
+            (CAN_ERR_ACK | CAN_ERR_CRTL, passive, Some(ErrorKind::Acknowledge)),
+        ];
+        let mut confinement = Confinement::default();
+        for (classes, data, kind) in table {
+            assert_eq!(confinement.take(classes, &data).kind, kind, "{classes:x}");
+        }
+    }
+}

@@ -1,0 +1,133 @@
+//! A port's bounded queues. They allocate when made and never after.
+
+use std::collections::VecDeque;
+
+use super::WireConfig;
+use crate::bus::{ReceiveError, Received, SendError};
+use crate::frame::Frame;
+use crate::tap::Tapped;
+use crate::wire::{Rates, frame_bits};
+
+/// A frame waiting for the wire.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Queued {
+    pub(super) frame: Frame,
+    /// Its duration on the wire, interframe space included, found once: arbitration asks for it again and again.
+    pub(super) duration_ns: u64,
+    pub(super) since_ns: u64,
+}
+
+impl Queued {
+    pub(super) fn new(frame: Frame, rates: Rates, since_ns: u64) -> Self {
+        Self { frame, duration_ns: rates.duration_ns(frame_bits(&frame)), since_ns }
+    }
+
+    /// What a fault makes a node send; since when changes with each attempt.
+    pub(super) fn babbled(frame: Frame, config: &WireConfig) -> Self {
+        Self::new(frame.promoted(config.format), config.rates, 0)
+    }
+}
+
+/// Frames in the order of priority; those of one identifier in the order they were queued.
+#[derive(Debug)]
+pub(super) struct TransmitQueue {
+    frames: Vec<Queued>,
+    capacity: usize,
+}
+
+impl TransmitQueue {
+    pub(super) fn new(capacity: usize) -> Self {
+        Self { frames: Vec::with_capacity(capacity), capacity }
+    }
+
+    pub(super) fn push(&mut self, queued: Queued) -> Result<(), SendError> {
+        if self.frames.len() == self.capacity {
+            return Err(SendError::QueueFull { capacity: self.capacity });
+        }
+        let place = self.frames.partition_point(|other| other.frame.id() <= queued.frame.id());
+        self.frames.insert(place, queued);
+        Ok(())
+    }
+
+    pub(super) fn is_empty(&self) -> bool {
+        self.frames.is_empty()
+    }
+
+    /// When the frame that waits longest was queued.
+    pub(super) fn earliest_ns(&self) -> Option<u64> {
+        self.frames.iter().map(|queued| queued.since_ns).min()
+    }
+
+    /// The most urgent of the frames queued up to that time.
+    pub(super) fn most_urgent(&self, at_ns: u64) -> Option<&Queued> {
+        self.frames.iter().find(|queued| queued.since_ns <= at_ns)
+    }
+
+    /// Takes it out.
+    pub(super) fn remove_most_urgent(&mut self, at_ns: u64) {
+        if let Some(place) = self.frames.iter().position(|queued| queued.since_ns <= at_ns) {
+            self.frames.remove(place);
+        }
+    }
+
+    /// Forgets everything; how many frames that were.
+    pub(super) fn clear(&mut self) -> u64 {
+        let abandoned = self.frames.len() as u64;
+        self.frames.clear();
+        abandoned
+    }
+}
+
+/// Something with the time of its arrival.
+pub(super) trait Timed {
+    fn time_ns(&self) -> u64;
+}
+
+impl Timed for Received {
+    fn time_ns(&self) -> u64 {
+        self.time_ns
+    }
+}
+
+impl Timed for Tapped {
+    fn time_ns(&self) -> u64 {
+        self.time_ns()
+    }
+}
+
+/// What has arrived and was not fetched yet, oldest first. What does not fit is lost and counted.
+#[derive(Debug)]
+pub(super) struct ReceiveQueue<T> {
+    arrived: VecDeque<T>,
+    capacity: usize,
+    lost: u64,
+}
+
+impl<T: Timed> ReceiveQueue<T> {
+    pub(super) fn new(capacity: usize) -> Self {
+        Self { arrived: VecDeque::with_capacity(capacity), capacity, lost: 0 }
+    }
+
+    pub(super) fn push(&mut self, item: T) {
+        if self.arrived.is_empty() {
+            // Begins at its front again: what wanders through all of it finds every place cold.
+            self.arrived.clear();
+        }
+        if self.arrived.len() == self.capacity {
+            self.lost += 1;
+        } else {
+            self.arrived.push_back(item);
+        }
+    }
+
+    /// The oldest, if it had arrived by then; losses are reported first, once.
+    pub(super) fn pop(&mut self, now_ns: u64) -> Result<Option<T>, ReceiveError> {
+        match std::mem::take(&mut self.lost) {
+            0 if self.arrived.front().is_some_and(|oldest| oldest.time_ns() <= now_ns) => {
+                Ok(self.arrived.pop_front())
+            }
+            0 => Ok(None),
+            lost => Err(ReceiveError::Overrun { lost }),
+        }
+    }
+}

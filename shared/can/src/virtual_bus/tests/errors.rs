@@ -1,0 +1,144 @@
+//! Errors without injected faults: missing acknowledgement, one identifier sent twice, bus-off.
+
+use super::*;
+use crate::ErrorKind;
+
+fn with(change: impl FnOnce(&mut WireConfig)) -> VirtualWire {
+    let mut config = CONFIG;
+    change(&mut config);
+    VirtualWire::new(&config)
+}
+
+fn alone() -> VirtualWire {
+    with(|config| (config.ports, config.receive_capacity) = (1, 64))
+}
+
+#[test]
+fn a_lone_node_repeats_until_it_is_passive_and_stays_on_the_bus() {
+    let mut wire = alone();
+    wire.send(0, 0, sync::frame()).unwrap();
+    wire.advance(1_000_000_000);
+    assert_eq!(wire.status(0), BusStatus { state: ErrorState::Passive, tec: 128, rec: 0 });
+    assert_eq!(wire.statistics().frames, 0);
+    assert_eq!(wire.statistics().error_frames, wire.statistics().unacknowledged);
+    assert!(wire.statistics().unacknowledged > 10_000);
+}
+
+#[test]
+fn an_unacknowledged_frame_takes_its_bits_to_the_slot_an_error_frame_and_a_passive_pause() {
+    let mut wire = alone();
+    wire.send(0, 0, sync::frame()).unwrap();
+    wire.advance(3_000_000);
+    // 51 bits less intermission, end of frame and acknowledge delimiter; flag and delimiter.
+    let attempt_bits = 51 - 3 - 7 - 1 + 6 + 8;
+    let seen = errors(&mut wire);
+    let times: Vec<_> = seen
+        .iter()
+        .filter(|report| report.kind == ErrorKind::Acknowledge)
+        .map(|report| report.time_ns)
+        .collect();
+    assert_eq!(times[0], attempt_bits * BIT_NS);
+    assert_eq!(
+        times[1] - times[0],
+        (3 + attempt_bits) * BIT_NS,
+        "error active: next behind the intermission"
+    );
+    assert_eq!(times[20] - times[19], (3 + 8 + attempt_bits) * BIT_NS, "error passive: 8 bits later");
+    assert_eq!(times[16] - times[15], times[20] - times[19], "passive from the sixteenth error on");
+    assert_eq!(times[15] - times[14], times[1] - times[0]);
+}
+
+#[test]
+fn an_error_is_told_with_the_counter_behind_it_and_before_the_state_it_brings() {
+    let mut wire = alone();
+    wire.send(0, 0, sync::frame()).unwrap();
+    wire.advance(3_000_000);
+    let seen: Vec<_> = errors(&mut wire).iter().map(|report| (report.kind, report.tec)).collect();
+    assert_eq!(seen[..2], [(ErrorKind::Acknowledge, 8), (ErrorKind::Acknowledge, 16)]);
+    let passive = ErrorKind::State(ErrorState::Passive);
+    assert_eq!(seen[15..17], [(ErrorKind::Acknowledge, 128), (passive, 128)]);
+}
+
+#[test]
+fn who_joins_a_lone_node_hears_it_at_once() {
+    let mut wire = with(|config| config.ports = 2);
+    wire.stations[1].confinement.leave_bus(0, Some(5_000_000));
+    wire.send(0, 0, sync::frame()).unwrap();
+    wire.advance(100_000_000);
+    assert_eq!(fetch(&mut wire, 1).len(), 1);
+    assert_eq!(wire.status(0), BusStatus { state: ErrorState::Active, tec: 127, rec: 0 });
+    assert_eq!(wire.statistics().frames, 1);
+}
+
+#[test]
+fn equal_frames_of_two_ports_pass_as_one() {
+    let mut wire = wire();
+    wire.send(1, 0, frame(0x123, &[1])).unwrap();
+    wire.send(2, 0, frame(0x123, &[1])).unwrap();
+    wire.advance(FOREVER / 2);
+    assert_eq!(fetch(&mut wire, 0).len(), 1);
+    assert_eq!((wire.statistics().frames, wire.statistics().collisions), (1, 1));
+    assert_eq!(wire.statistics().error_frames, 0);
+}
+
+#[test]
+fn two_frames_of_one_identifier_destroy_each_other_until_their_senders_are_passive() {
+    let mut wire = wire();
+    wire.send(1, 0, frame(0x123, &[1])).unwrap();
+    wire.send(2, 0, frame(0x123, &[2])).unwrap();
+    wire.advance(FOREVER / 2);
+    let bytes: Vec<_> = fetch(&mut wire, 0).iter().map(|received| received.frame.data()[0]).collect();
+    assert_eq!(bytes, [1, 2], "the dominant one first: a passive error flag does not disturb it");
+    assert_eq!(fetch(&mut wire, 2), [], "who signalled an error heard no more of the frame");
+    let statistics = wire.statistics();
+    assert_eq!((statistics.error_frames, statistics.collisions), (16, 17));
+    assert_eq!(wire.status(1), BusStatus { state: ErrorState::Active, tec: 127, rec: 0 });
+    assert_eq!(wire.status(2), BusStatus { state: ErrorState::Passive, tec: 135, rec: 0 });
+    assert_eq!(wire.status(0), BusStatus { state: ErrorState::Active, tec: 0, rec: 14 });
+}
+
+#[test]
+fn off_the_bus_nothing_is_sent_or_heard_until_it_is_restarted_and_has_waited() {
+    let mut wire = wire();
+    wire.send(0, 0, frame(0x700, &[])).unwrap();
+    wire.stations[0]
+        .transmit
+        .push(Queued { frame: sync::frame(), duration_ns: 51_000, since_ns: 9_000_000 })
+        .unwrap();
+    wire.confine(0, 0, |node| node.leave_bus(0, None));
+    assert_eq!(wire.statistics().abandoned, 2);
+    assert_eq!(wire.send(0, 0, sync::frame()), Err(SendError::BusOff { tec: 256 }));
+    wire.send(1, 0, frame(0x181, &[])).unwrap();
+    wire.advance(10_000_000);
+    assert_eq!(fetch(&mut wire, 0), []);
+    assert_eq!(fetch(&mut wire, 2).len(), 1);
+    assert_eq!(wire.status(0).state, ErrorState::BusOff, "nobody restarted it");
+    wire.restart(0, 10_000_000);
+    wire.advance(10_000_000 + 128 * 11 * BIT_NS - 1);
+    assert_eq!(wire.status(0).state, ErrorState::BusOff);
+    wire.advance(10_000_000 + 128 * 11 * BIT_NS);
+    assert_eq!(wire.status(0), BusStatus { state: ErrorState::Active, tec: 0, rec: 0 });
+    wire.send(0, 12_000_000, sync::frame()).unwrap();
+    wire.advance(FOREVER / 2);
+    assert_eq!(fetch(&mut wire, 1).len(), 1);
+    let states: Vec<_> = errors(&mut wire).iter().map(|report| (report.port, report.kind)).collect();
+    assert_eq!(
+        states,
+        [(0, ErrorKind::State(ErrorState::BusOff)), (0, ErrorKind::State(ErrorState::Active))]
+    );
+}
+
+#[test]
+fn every_frame_that_passes_counts_as_a_recessive_sequence() {
+    let mut wire = wire();
+    wire.confine(0, 0, |node| node.leave_bus(0, Some(0)));
+    let mut sent = 0;
+    while wire.status(0).state == ErrorState::BusOff {
+        wire.send(1, wire.advanced_to_ns, sync::frame()).unwrap();
+        let arrival_ns = wire.next_event_ns().unwrap();
+        wire.advance(arrival_ns + 3 * BIT_NS);
+        sent += 1;
+        assert!(sent <= 128);
+    }
+    assert_eq!(sent, 128);
+}

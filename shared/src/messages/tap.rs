@@ -1,0 +1,167 @@
+//! Frames and error reports of a CAN tap as messages of the topic `frame`, and back.
+
+use masseter_can::{
+    CanId, ERROR_FLAG, ErrorReport, ErrorReportError, Frame, FrameError, FrameFormat, Tapped, TappedFrame,
+};
+
+use super::{CanData, FrameTap};
+
+/// Upper limit of buses in a link. Six drives need at most six.
+const MAX_BUSES: usize = 64;
+
+/// A message that holds neither frame nor error report.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum TapError {
+    /// A frame that cannot be.
+    #[error(transparent)]
+    Frame(#[from] FrameError),
+    /// An error report of no known class.
+    #[error(transparent)]
+    Error(#[from] ErrorReportError),
+    /// An index that no bus has.
+    #[error("a frame on bus {bus}, of {MAX_BUSES} that a link may have")]
+    Bus {
+        /// The index.
+        bus: u32,
+    },
+}
+
+/// The message for what was seen on the bus of that index; its header is stamped when it is published.
+pub fn encode(bus: u16, tapped: &Tapped) -> FrameTap {
+    match tapped {
+        Tapped::Frame(TappedFrame { frame, time_ns, queued_ns }) => FrameTap {
+            time_ns: *time_ns,
+            queued_ns: queued_ns.unwrap_or(0),
+            id: frame.id().flagged(),
+            bus: bus.into(),
+            flags: flags_of(frame.format()),
+            data: CanData::padded(*frame.padded(), frame.data().len()),
+            ..FrameTap::default()
+        },
+        Tapped::Error(report) => {
+            let (id, said) = report.encode();
+            let mut bytes = [0; Frame::MAX_DATA];
+            bytes[..said.len()].copy_from_slice(&said);
+            let data = CanData::padded(bytes, said.len());
+            FrameTap { time_ns: report.time_ns, id, bus: bus.into(), data, ..FrameTap::default() }
+        }
+    }
+}
+
+/// Index of the bus that a message is from: what is kept for each bus may be indexed by it.
+///
+/// # Errors
+/// [`TapError::Bus`] where no link has that many.
+pub fn bus_of(tap: &FrameTap) -> Result<usize, TapError> {
+    let bus = tap.bus as usize;
+    if bus < MAX_BUSES { Ok(bus) } else { Err(TapError::Bus { bus: tap.bus }) }
+}
+
+/// Whether a message holds an error report, not a frame.
+pub fn is_error(tap: &FrameTap) -> bool {
+    tap.id & ERROR_FLAG != 0 && tap.id >> 30 == 0
+}
+
+/// What a message holds.
+///
+/// # Errors
+/// [`TapError`] where it is neither a frame nor an error report.
+pub fn decode(tap: &FrameTap) -> Result<Tapped, TapError> {
+    if is_error(tap) {
+        let (said, _) = tap.data.bytes.split_first_chunk().expect("an error message has 8 bytes");
+        return Ok(Tapped::Error(ErrorReport::decode(tap.time_ns, tap.id, *said)?));
+    }
+    let format = format_of(tap.flags);
+    format.check(tap.data.length as usize)?;
+    let frame = Frame::with_format(CanId::from_flagged(tap.id)?, format, tap.data.as_slice())?;
+    let queued_ns = Some(tap.queued_ns).filter(|&queued_ns| queued_ns > 0);
+    Ok(Tapped::Frame(TappedFrame { frame, time_ns: tap.time_ns, queued_ns }))
+}
+
+/// Flags of `struct canfd_frame` (`linux/can.h`): bit-rate switch, and that the frame is FD.
+const BIT_RATE_SWITCH: u32 = 0x01;
+const FD: u32 = 0x04;
+
+const fn flags_of(format: FrameFormat) -> u32 {
+    match format {
+        FrameFormat::Classical => 0,
+        FrameFormat::Fd => FD,
+        FrameFormat::FdBitRateSwitch => FD | BIT_RATE_SWITCH,
+    }
+}
+
+const fn format_of(flags: u32) -> FrameFormat {
+    match (flags & FD, flags & BIT_RATE_SWITCH) {
+        (0, _) => FrameFormat::Classical,
+        (_, 0) => FrameFormat::Fd,
+        _ => FrameFormat::FdBitRateSwitch,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use masseter_can::{ErrorKind, ErrorState};
+    use proptest::prelude::*;
+
+    use super::*;
+
+    const FORMATS: [FrameFormat; 3] = [FrameFormat::Classical, FrameFormat::Fd, FrameFormat::FdBitRateSwitch];
+
+    /// Classical and FD frames with standard and extended identifiers.
+    fn any_frame() -> impl Strategy<Value = Frame> {
+        let id = prop_oneof![
+            (0..1_u32 << 11).prop_map(|id| CanId::standard(id as u16).unwrap()),
+            (0..1_u32 << 29).prop_map(|id| CanId::extended(id).unwrap()),
+        ];
+        let data = prop::collection::vec(any::<u8>(), 0..=8);
+        (id, prop::sample::select(&FORMATS[..]), data)
+            .prop_map(|(id, format, data)| Frame::with_format(id, format, &data).unwrap())
+    }
+
+    fn of_length(length: usize) -> CanData {
+        CanData::padded([0; Frame::MAX_DATA], length)
+    }
+
+    #[test]
+    fn what_is_no_frame_is_refused() {
+        let tap = FrameTap { data: of_length(9), ..Default::default() };
+        assert_eq!(decode(&tap), Err(FrameError::DataLength { length: 9 }.into()));
+        let tap = FrameTap { data: of_length(65), ..Default::default() };
+        assert_eq!(decode(&tap), Err(FrameError::DataLength { length: 65 }.into()));
+        let tap = FrameTap { data: of_length(65), flags: FD, ..Default::default() };
+        assert_eq!(decode(&tap), Err(FrameError::FdDataLength { length: 65 }.into()));
+        let tap = FrameTap { id: 0x800, ..Default::default() };
+        assert_eq!(decode(&tap), Err(FrameError::StandardId { id: 0x800 }.into()));
+        let tap = FrameTap { id: ERROR_FLAG, ..Default::default() };
+        assert_eq!(decode(&tap), Err(ErrorReportError { id: ERROR_FLAG }.into()));
+    }
+
+    #[test]
+    fn a_bus_that_no_link_has_is_refused() {
+        let of = |bus| bus_of(&FrameTap { bus, ..Default::default() });
+        assert_eq!((of(0), of(63)), (Ok(0), Ok(63)));
+        for bus in [64, u32::MAX] {
+            assert_eq!(of(bus), Err(TapError::Bus { bus }));
+        }
+    }
+
+    #[test]
+    fn an_error_report_survives() {
+        let kind = ErrorKind::State(ErrorState::BusOff);
+        let tapped = Tapped::Error(ErrorReport { time_ns: 5, port: 2, kind, tec: 255, rec: 3 });
+        assert_eq!(decode(&encode(1, &tapped)), Ok(tapped));
+    }
+
+    proptest! {
+        #[test]
+        fn every_frame_survives(
+            frame in any_frame(),
+            time_ns: u64,
+            queued_ns in prop::option::of(1..u64::MAX),
+            bus: u16,
+        ) {
+            let tapped = Tapped::Frame(TappedFrame { frame, time_ns, queued_ns });
+            prop_assert_eq!(decode(&encode(bus, &tapped)), Ok(tapped));
+        }
+    }
+}
