@@ -1,7 +1,7 @@
 //! The messages of the link as a DBC file: SYNC, NMT, and of every drive its PDOs as mapped after power-on,
 //! EMCY, SDO and heartbeat. Positions are in metres, forces in newtons.
 //!
-//! Both directions of SDO show their four parts; what is in segments is not taken apart.
+//! Both directions of SDO have their four parts as signals; segments are not decoded.
 
 use std::fmt::{self, Write};
 

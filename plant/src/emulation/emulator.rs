@@ -67,7 +67,7 @@ impl Emulator {
         Ok(Self { emulation, ports, waiting: [None; AXES], counters: EmulatorCounters::default() })
     }
 
-    /// Runs until it is asked to end.
+    /// Runs until `stop` is requested.
     pub fn run(mut self, stop: &StopRequest) -> Result<EmulatorCounters, PlantError> {
         while !stop.is_made() {
             // A frame that arrived during the last deliveries is fetched already: no socket would wake for it.

@@ -1,7 +1,7 @@
 //! The connection between master and drives, as the plant sees it: [`Buses`] for the master, [`Link`] for the core.
 //!
-//! [`sockets`] connects the master to real interfaces; the emulation brings simulated wires of its own. [`layout`] says
-//! which drive is on which bus, [`faults`] which faults a bus has.
+//! [`sockets`] connects the master to real interfaces; the emulation brings simulated wires of its own. [`layout`]
+//! assigns drives to buses, [`faults`] assigns faults to them.
 
 use masseter_can::faults::FaultNote;
 use masseter_can::{Bus, ReceiveError, Tapped};
@@ -20,12 +20,12 @@ pub trait Buses {
     fn port(&mut self, bus: usize) -> impl Bus;
 }
 
-/// The wires with what a plant needs of them beyond the master's ports.
+/// The wires of a plant: the master's ports, taps, and the truth of emulated drives.
 pub trait Link: Buses {
     /// Simulates everything up to `until_ns`; real wires need no such call.
     fn advance(&mut self, until_ns: u64) -> Result<(), DynamicsError>;
 
-    /// The next frame or error on a wire up to `now_ns`, whoever caused it.
+    /// The next frame or error on a wire up to `now_ns`, from any node.
     fn tap(&mut self, bus: usize, now_ns: u64) -> Result<Option<Tapped>, ReceiveError>;
 
     /// The next beginning or end of an injected fault up to `now_ns`.

@@ -1,4 +1,4 @@
-//! The link to real drives: SocketCAN interfaces. It knows no truth of the mechanism.
+//! The link to real drives: SocketCAN interfaces. It has no truth of the mechanism.
 
 use masseter_can::PortFaults;
 use masseter_can::canopen::NodeId;

@@ -5,20 +5,34 @@
 use masseter_can::canopen::{NmtCommand, NmtState, NodeId, SdoResponse};
 use masseter_can::cia402::{Controlword, DriveRequest, DriveState, next_controlword};
 use masseter_can::{Frame, Rpdo1, Tpdo1};
+use masseter_shared::clock::MILLISECOND_NS;
+use masseter_shared::config::{DriveConfig, Scenario};
 use masseter_shared::messages::codes::{BootPhase, Cause};
 
-use super::boot::{Boot, BootFault};
+use super::boot::{Boot, BootFault, DriveSetup};
 use super::incoming::Kind;
 use super::presence::Presence;
-use super::settings::{ExpectedDrive, Scale};
+
+/// A judgement that needs a reaction.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Finding {
+    /// The drive never came.
+    Absent(BootFault),
+    /// The drive was lost, with the value and the limit that explain it.
+    Lost { cause: Cause, value: f64, limit: f64 },
+}
 
 /// One drive.
 #[derive(Debug, Clone)]
 pub(super) struct RemoteDrive {
     id: NodeId,
     bus: usize,
-    scale: Scale,
+    config: DriveConfig,
+    heartbeat_timeout_ns: u64,
+    boot_timeout_ns: u64,
     boot: Boot,
+    /// The phase of the boot that was reported last.
+    reported_phase: BootPhase,
     presence: Presence,
     nmt: Option<NmtState>,
     /// Whether it was started as a verified drive: only then its process data are used.
@@ -33,13 +47,18 @@ pub(super) struct RemoteDrive {
 }
 
 impl RemoteDrive {
-    /// A drive of which nothing is known at `now_ns`.
-    pub(super) fn new(expected: &ExpectedDrive, now_ns: u64) -> Self {
+    /// The drive of an axis, of which nothing is known at `now_ns`.
+    pub(super) fn new(scenario: &Scenario, axis: usize, id: NodeId, bus: usize, now_ns: u64) -> Self {
+        let (can, config) = (&scenario.can, scenario.drives.of_axis(axis));
+        let boot = Boot::new(id, &DriveSetup::for_axis(scenario, axis), now_ns);
         Self {
-            id: expected.id,
-            bus: expected.bus,
-            scale: expected.scale,
-            boot: Boot::new(expected.id, &expected.setup, now_ns),
+            id,
+            bus,
+            config,
+            heartbeat_timeout_ns: u64::from(can.heartbeat_consumer_ms) * MILLISECOND_NS,
+            boot_timeout_ns: u64::from(can.boot_timeout_ms) * MILLISECOND_NS,
+            reported_phase: boot.phase(),
+            boot,
             presence: Presence::new(now_ns),
             nmt: None,
             is_started: false,
@@ -65,6 +84,13 @@ impl RemoteDrive {
     /// Phase of its boot.
     pub(super) fn boot_phase(&self) -> BootPhase {
         self.boot.phase()
+    }
+
+    /// The reported phase of its boot and the present one, once after a change.
+    pub(super) fn phase_change(&mut self) -> Option<[BootPhase; 2]> {
+        let now = self.boot.phase();
+        let before = std::mem::replace(&mut self.reported_phase, now);
+        (before != now).then_some([before, now])
     }
 
     /// Whether its identity and configuration are verified.
@@ -99,12 +125,12 @@ impl RemoteDrive {
 
     /// Position actual value, m.
     pub(super) fn position_m(&self) -> f64 {
-        f64::from(self.actual_increments) * self.scale.increment_m
+        f64::from(self.actual_increments) * self.config.encoder_resolution_m
     }
 
     /// Force actual value, N.
     pub(super) fn force_n(&self) -> f64 {
-        f64::from(self.torque_permille) / 1000.0 * self.scale.rated_force_n
+        f64::from(self.torque_permille) / 1000.0 * self.config.rated_force_n
     }
 
     /// Whether 607Ah can hold a target; NaN has no increments.
@@ -113,7 +139,7 @@ impl RemoteDrive {
     }
 
     fn increments(&self, position_m: f64) -> f64 {
-        (position_m / self.scale.increment_m).round()
+        (position_m / self.config.encoder_resolution_m).round()
     }
 
     /// SYNC demands new process data.
@@ -175,29 +201,31 @@ impl RemoteDrive {
         !std::mem::replace(&mut self.has_wrong_length[kind as usize], true)
     }
 
-    /// The fault of a drive that has never come within the time-out, once.
-    pub(super) fn absence(&mut self, now_ns: u64, timeout_ns: u64) -> Option<BootFault> {
-        let waited_ns = self.boot.waited_ns(now_ns);
-        if waited_ns <= timeout_ns || std::mem::replace(&mut self.is_absence_known, true) {
-            return None;
+    /// Judges a cycle of the drive; `is_fresh` says whether it has answered SYNC. A verified drive must be received, and an
+    /// operational one must answer every SYNC once.
+    pub(super) fn judge(&mut self, now_ns: u64, is_fresh: bool) -> Option<Finding> {
+        match self.boot.phase() {
+            BootPhase::Waiting => {
+                let (waited_ns, limit_ns) = (self.boot.waited_ns(now_ns), self.boot_timeout_ns);
+                let is_new = waited_ns > limit_ns && !std::mem::replace(&mut self.is_absence_known, true);
+                is_new.then(|| Finding::Absent(BootFault::late(waited_ns, limit_ns)))
+            }
+            BootPhase::Configured | BootPhase::Ready => {
+                if !is_fresh && self.is_operational() {
+                    self.presence.miss_cycle();
+                }
+                let loss = self.presence.judge(now_ns, self.heartbeat_timeout_ns);
+                let (cause, [value, limit]) = loss.or_else(|| self.stop_by_itself())?;
+                Some(Finding::Lost { cause, value, limit })
+            }
+            _ => None,
         }
-        Some(BootFault::late(waited_ns, timeout_ns))
     }
 
-    /// The reason why the drive counts as lost, with value and limit; `is_fresh` says whether it has answered SYNC.
-    pub(super) fn loss(
-        &mut self,
-        now_ns: u64,
-        is_fresh: bool,
-        heartbeat_timeout_ns: u64,
-    ) -> Option<(Cause, [f64; 2])> {
-        if !is_fresh && self.is_operational() {
-            self.presence.miss_cycle();
-        }
-        self.presence.judge(now_ns, heartbeat_timeout_ns).or_else(|| {
-            let state = self.nmt.filter(|&state| self.is_started && state != NmtState::Operational)?;
-            Some((Cause::NodeStopped, [state, NmtState::Operational].map(|state| f64::from(state.code()))))
-        })
+    /// The loss of a started drive that left operational by itself.
+    fn stop_by_itself(&self) -> Option<(Cause, [f64; 2])> {
+        let state = self.nmt.filter(|&state| self.is_started && state != NmtState::Operational)?;
+        Some((Cause::NodeStopped, [state, NmtState::Operational].map(|state| f64::from(state.code()))))
     }
 
     /// Discards everything found out about the drive; it has to boot again.

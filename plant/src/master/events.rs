@@ -6,7 +6,6 @@ use masseter_can::canopen::NodeId;
 use masseter_shared::geometry::AXES;
 use masseter_shared::messages::Event;
 
-use super::settings::ExpectedDrive;
 use crate::journal::{Journal, overflow};
 
 /// The subject of an event.
@@ -27,9 +26,8 @@ pub(super) struct EventLog {
 }
 
 impl EventLog {
-    /// An empty log for these drives.
-    pub(super) fn new(drives: &[ExpectedDrive; AXES]) -> Self {
-        let addresses = std::array::from_fn(|axis| (drives[axis].id, drives[axis].bus));
+    /// An empty log for drives with these node ids and buses.
+    pub(super) fn new(addresses: [(NodeId, usize); AXES]) -> Self {
         Self { journal: Journal::new(), cycle: 0, addresses }
     }
 

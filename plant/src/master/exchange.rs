@@ -2,12 +2,18 @@
 //!
 //! The exchange sends nothing; it says what is due and since when process data are an answer.
 
+use masseter_can::BitrateError;
+use masseter_can::canopen::sync;
+use masseter_can::wire::{INTERFRAME_BITS, frame_bits};
+use masseter_shared::clock::MILLISECOND_NS;
+use masseter_shared::config::CanConfig;
 use masseter_shared::messages::Reading;
 use masseter_shared::realtime::Wake;
 
 /// Times of the present cycle.
 #[derive(Debug, Clone)]
 pub(super) struct Exchange {
+    /// From the first to the last bit of SYNC, at which the drives sample.
     sync_frame_ns: u64,
     heartbeat_ns: u64,
     next_heartbeat_ns: u64,
@@ -19,17 +25,19 @@ pub(super) struct Exchange {
 }
 
 impl Exchange {
-    /// No cycle yet. SYNC takes `sync_frame_ns` on the wire; the first heartbeat is due at `now_ns`.
-    pub(super) fn new(buses: usize, sync_frame_ns: u64, heartbeat_ns: u64, now_ns: u64) -> Self {
-        Self {
-            sync_frame_ns,
-            heartbeat_ns,
+    /// No cycle yet; the first heartbeat is due at `now_ns`.
+    pub(super) fn new(can: &CanConfig, now_ns: u64) -> Result<Self, BitrateError> {
+        let rates = can.rates()?;
+        let sync_bits = frame_bits(&sync::frame().promoted(can.format()));
+        Ok(Self {
+            sync_frame_ns: rates.duration_ns(sync_bits) - rates.nominal().bits_to_ns(INTERFRAME_BITS),
+            heartbeat_ns: u64::from(can.heartbeat_producer_ms) * MILLISECOND_NS,
             next_heartbeat_ns: now_ns,
             wake: Wake::on_time(0, 0),
             sync_ns: 0,
-            seen_sync_ns: vec![0; buses],
+            seen_sync_ns: vec![0; can.buses.len()],
             complete_ns: 0,
-        }
+        })
     }
 
     /// Begins a cycle with SYNC; returns whether the heartbeat is due too.

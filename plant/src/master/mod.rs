@@ -2,8 +2,8 @@
 //! and stops them when commands cease.
 //!
 //! [`Master`] sequences its parts. [`boot`] verifies one drive, [`drive`] keeps what is known of it, [`exchange`] keeps
-//! the cycle's times, [`commands`] the controller's commands, [`supervision`] judges, and [`interlock`] remembers whether
-//! the drives may move. The parts return frames and judgements; only the master sends.
+//! the cycle's times, [`commands`] the controller's commands, [`supervision`] watches enabled drives, and [`interlock`]
+//! remembers whether drives may move. The parts return frames and judgements; only the master sends.
 //!
 //! The master is written against the bus trait alone ([`Buses`]), so that simulated and real wires are the same to it.
 //! SDO takes place only with drives that exchange no process data, with one request a bus and cycle, queued after the
@@ -18,7 +18,6 @@ mod exchange;
 mod incoming;
 mod interlock;
 mod presence;
-mod settings;
 mod supervision;
 
 #[cfg(test)]
@@ -38,16 +37,16 @@ use masseter_shared::realtime::Wake;
 
 use crate::error::PlantError;
 use crate::link::Buses;
+use crate::link::layout::{drive_ports, node_ids};
 use boot::BootFault;
 use bus_monitor::BusMonitor;
 use commands::Commands;
-use drive::RemoteDrive;
+use drive::{Finding, RemoteDrive};
 use events::{EventLog, Subject};
 use exchange::Exchange;
 use incoming::{Kind, Message};
 use interlock::{Failure, Interlock};
-use settings::MasterSettings;
-use supervision::{Finding, Supervision};
+use supervision::Supervision;
 
 pub(crate) use boot::shortest_boot;
 
@@ -71,20 +70,28 @@ pub(crate) struct Master {
 }
 
 impl Master {
-    /// The scenario's master, which begins at `now_ns` and knows nothing of its drives yet.
+    /// The scenario's master, which begins at `now_ns` without any knowledge of its drives.
+    ///
+    /// # Errors
+    /// [`PlantError`] for buses, node ids and bit rates that cannot be used.
     pub(crate) fn new(scenario: &Scenario, now_ns: u64) -> Result<Self, PlantError> {
-        let settings = MasterSettings::new(scenario)?;
-        let MasterSettings { id, buses, heartbeat_timeout_ns, boot_timeout_ns, .. } = settings;
+        let can = &scenario.can;
+        let (ports, ids) = (drive_ports(can)?, node_ids(can)?);
+        let addresses = std::array::from_fn(|axis| (ids[axis], ports[axis].bus));
+        let drive = |axis: usize| {
+            let (id, bus) = addresses[axis];
+            RemoteDrive::new(scenario, axis, id, bus, now_ns)
+        };
         Ok(Self {
-            id,
-            drives: std::array::from_fn(|axis| RemoteDrive::new(&settings.drives[axis], now_ns)),
-            buses: vec![BusMonitor::default(); buses],
-            last_served: vec![0; buses],
-            exchange: Exchange::new(buses, settings.sync_frame_ns, settings.heartbeat_ns, now_ns),
-            commands: Commands::new(settings.command_timeout_cycles),
-            supervision: Supervision::new(heartbeat_timeout_ns, boot_timeout_ns),
+            id: NodeId::MASTER,
+            drives: std::array::from_fn(drive),
+            buses: vec![BusMonitor::default(); can.buses.len()],
+            last_served: vec![0; can.buses.len()],
+            exchange: Exchange::new(can, now_ns)?,
+            commands: Commands::new(can.command_timeout_cycles),
+            supervision: Supervision::default(),
             interlock: Interlock::default(),
-            events: EventLog::new(&settings.drives),
+            events: EventLog::new(addresses),
             is_ending: false,
         })
     }
@@ -197,28 +204,26 @@ impl Master {
     }
 
     fn supervise(&mut self, now_ns: u64) {
-        let shall_be_enabled = self.request() == DriveRequest::Enable;
+        let is_enable = self.request() == DriveRequest::Enable;
         let mut all_are_enabled = true;
         for axis in 0..AXES {
             let is_fresh = self.is_fresh(axis);
-            match self.supervision.judge(now_ns, axis, &mut self.drives[axis], is_fresh) {
+            match self.drives[axis].judge(now_ns, is_fresh) {
                 Some(Finding::Absent(fault)) => self.fail_boot(now_ns, axis, &fault),
-                Some(Finding::Lost(failure)) => {
-                    self.fail(now_ns, failure);
-                    self.advance_boot(now_ns, axis, |drive| {
-                        drive.forget(now_ns);
-                        Ok(())
-                    });
+                Some(Finding::Lost { cause, value, limit }) => {
+                    self.fail(now_ns, Failure { cause, subject: Subject::Axis(axis), value, limit });
+                    self.drives[axis].forget(now_ns);
+                    self.report_boot(now_ns, axis, Ok(()));
                 }
                 None => {}
             }
             let state = self.drives[axis].drive_state();
             all_are_enabled &= state == Some(DriveState::OperationEnabled);
-            if let Some(failure) = self.supervision.judge_power(axis, state, shall_be_enabled) {
+            if let Some(failure) = self.supervision.judge(axis, state, is_enable) {
                 self.fail(now_ns, failure);
             }
         }
-        self.supervision.end_cycle(shall_be_enabled, all_are_enabled);
+        self.supervision.end_cycle(is_enable, all_are_enabled);
     }
 
     /// Reports a bus that goes off and one that returns; the drives of a bus in bus-off stop by themselves.
@@ -255,7 +260,7 @@ impl Master {
             && self.drives_are_off();
         if is_restored {
             self.interlock.release();
-            self.supervision.restart();
+            self.supervision = Supervision::default();
             self.events.add(now_ns, Subject::Rig, notice(Cause::Recovered));
         }
     }
@@ -282,13 +287,12 @@ impl Master {
     /// Advances the boot of all drives and sends its messages.
     fn boot(&mut self, now_ns: u64, buses: &mut impl Buses) {
         for axis in 0..AXES {
-            self.advance_boot(now_ns, axis, |drive| {
-                drive.complete_boot();
-                Ok(())
-            });
+            self.drives[axis].complete_boot();
+            self.report_boot(now_ns, axis, Ok(()));
         }
         for axis in 0..AXES {
-            self.advance_boot(now_ns, axis, |drive| drive.advance_boot(now_ns));
+            let result = self.drives[axis].advance_boot(now_ns);
+            self.report_boot(now_ns, axis, result);
         }
         if !self.may_boot() {
             return;
@@ -326,10 +330,8 @@ impl Master {
         for axis in 0..AXES {
             if self.drives[axis].boot_phase() == BootPhase::Configured {
                 self.send_nmt(now_ns, axis, NmtCommand::Start, buses);
-                self.advance_boot(now_ns, axis, |drive| {
-                    drive.start(now_ns);
-                    Ok(())
-                });
+                self.drives[axis].start(now_ns);
+                self.report_boot(now_ns, axis, Ok(()));
             }
         }
     }
@@ -369,7 +371,8 @@ impl Master {
             Ok(Message::ProcessData(tpdo)) => self.take_process_data(axis, tpdo, time_ns),
             Ok(Message::Emergency(emergency)) => self.note_emergency(axis, emergency, time_ns),
             Ok(Message::SdoAnswer(answer)) => {
-                self.advance_boot(time_ns, axis, |drive| drive.take_sdo_answer(time_ns, answer));
+                let result = self.drives[axis].take_sdo_answer(time_ns, answer);
+                self.report_boot(time_ns, axis, result);
             }
             Ok(Message::Foreign) => {}
             Err(error) => {
@@ -382,15 +385,14 @@ impl Master {
 
     fn take_heartbeat(&mut self, axis: usize, state: NmtState, time_ns: u64) {
         let may_boot = self.may_boot();
-        if state == NmtState::BootUp && self.drives[axis].is_started() {
+        let result = if state == NmtState::BootUp && self.drives[axis].is_started() {
             self.fail(time_ns, Failure::new(Cause::NodeRestarted, Subject::Axis(axis)));
-            self.advance_boot(time_ns, axis, |drive| {
-                drive.take_restart(time_ns);
-                Ok(())
-            });
+            self.drives[axis].take_restart(time_ns);
+            Ok(())
         } else {
-            self.advance_boot(time_ns, axis, |drive| drive.take_heartbeat(time_ns, state, may_boot));
-        }
+            self.drives[axis].take_heartbeat(time_ns, state, may_boot)
+        };
+        self.report_boot(time_ns, axis, result);
     }
 
     fn take_process_data(&mut self, axis: usize, tpdo: Tpdo1, time_ns: u64) {
@@ -425,20 +427,13 @@ impl Master {
         }
     }
 
-    /// Takes a step that may advance a drive's boot, and reports a change of phase or a failure.
-    fn advance_boot(
-        &mut self,
-        time_ns: u64,
-        axis: usize,
-        step: impl FnOnce(&mut RemoteDrive) -> Result<(), BootFault>,
-    ) {
-        let before = self.drives[axis].boot_phase();
-        if let Err(fault) = step(&mut self.drives[axis]) {
+    /// Reports a change of a drive's boot, or its failure.
+    fn report_boot(&mut self, time_ns: u64, axis: usize, result: Result<(), BootFault>) {
+        if let Err(fault) = result {
             self.drives[axis].give_up();
             self.fail_boot(time_ns, axis, &fault);
         }
-        let after = self.drives[axis].boot_phase();
-        if before != after {
+        if let Some([before, after]) = self.drives[axis].phase_change() {
             let event = transition(Source::Master, before.code(), after.code());
             self.events.add(time_ns, Subject::Axis(axis), event);
         }

@@ -1,7 +1,7 @@
 //! The drive's axis under CiA 402: power states, modes of operation, and the objects that show them.
 //!
 //! An axis knows no frames and works in SI units. [`Axis`] sequences its parts: [`Positioning`] and [`Homing`] return
-//! commands, [`Demand`] is what the servo follows, [`FollowingErrorMonitor`] supervises the servo. [`Parameters`] is
+//! commands, the servo follows the [`Demand`], [`FollowingErrorMonitor`] supervises the servo. [`Parameters`] is
 //! the configuration in the object dictionary.
 
 mod clamp;

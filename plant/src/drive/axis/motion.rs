@@ -1,4 +1,4 @@
-//! Values that the parts of an axis exchange: motion, what a mode of operation sees, and what it commands.
+//! Values that the parts of an axis exchange: motion, the view of a mode of operation, and its commands.
 
 /// Position and velocity of an axis at an instant.
 #[derive(Debug, Clone, Copy, PartialEq)]

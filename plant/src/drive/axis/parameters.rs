@@ -50,9 +50,9 @@ pub(super) struct HomingParameters {
 pub(super) struct Parameters {
     /// Time from one cyclic target to the next (60C2h), s.
     pub(super) period_s: f64,
-    /// Velocity limit of every mode (607Fh, and what the drive can), m/s.
+    /// Velocity limit of every mode (607Fh and the drive's own), m/s.
     pub(super) velocity_limit_m_s: f64,
-    /// Force limit of every mode (6072h, and what the drive can), N.
+    /// Force limit of every mode (6072h and the drive's own), N.
     pub(super) force_limit_n: f64,
     /// Software position limits as positions of the application: 607D counts from the home position, so that it is
     /// less the home offset (607Ch); increments.
@@ -150,7 +150,7 @@ pub(crate) fn configure(
     objects.set(names::MIN_POSITION_LIMIT, lowest);
     objects.set(names::MAX_POSITION_LIMIT, highest);
     objects.set(names::MAX_VELOCITY, velocity);
-    // A quarter of what the drive can: profiles are for setting up.
+    // A quarter of the drive's abilities: profiles are for setting up.
     objects.set(names::PROFILE_VELOCITY, (velocity / 4).max(1));
     objects.set(names::PROFILE_ACCELERATION, (ramp / 4).max(1));
     objects.set(names::PROFILE_DECELERATION, (ramp / 4).max(1));

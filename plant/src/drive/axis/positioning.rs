@@ -95,7 +95,7 @@ impl Positioning {
         (!word.halts()).then_some(MotionCommand::MoveTo { target })
     }
 
-    /// Starts the waiting set-point once the running one is over, which `is_at_rest` says of the demand.
+    /// Starts the waiting set-point once the running one is over, as `is_at_rest` reports of the demand.
     pub(super) fn step(&mut self, word: Controlword, is_at_rest: bool) -> Option<MotionCommand> {
         if word.halts() || !is_at_rest {
             return None;

@@ -172,7 +172,7 @@ mod tests {
         assert!(velocity_m_s.abs() < 1e-6);
     }
 
-    /// The force on an axis at rest that is far from where it shall be, and whether it was limited.
+    /// The force on an axis at rest far from its target, and whether it was limited.
     fn pull(limits: &ServoLimits) -> (f64, bool) {
         let mut servo = Servo::new(DrivesConfig::default().leg, STEP_S, 0.27);
         let force_n = servo.step(0.27, ServoCommand::Follow(Motion::at_rest(5.0)), limits);

@@ -1,6 +1,6 @@
 //! Heartbeats: the drive's own (1017h) and those it consumes (1016h).
 //!
-//! The module only says when a heartbeat is due or lost; the node sends and reacts.
+//! The module only decides when a heartbeat is due or lost; the node sends and reacts.
 
 use masseter_can::canopen::NodeId;
 use masseter_shared::clock::MILLISECOND_NS;

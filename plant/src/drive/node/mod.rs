@@ -1,8 +1,7 @@
 //! The drive as a CANopen node (CiA 301).
 //!
 //! [`DriveNode`] sequences its parts: network management, process data, heartbeats, errors and the SDO server each keep
-//! their own state and return what is to be done. It knows nothing of the profile beyond the controlword; that is the
-//! [axis](super::axis).
+//! their own state and return what is to be done. The profile (CiA 402) is the [axis](super::axis).
 
 mod access;
 mod errors;
