@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use anyhow::{Context, bail};
 use clap::Args;
-use masseter_plant::emulator::{Emulator, Figures};
+use masseter_plant::emulation::{Emulator, EmulatorCounters};
 use masseter_plant::process::{self, Reason};
 use masseter_shared::clock;
 use masseter_shared::config::Scenario;
@@ -88,12 +88,12 @@ fn resolve(args: &PlantArgs) -> anyhow::Result<Scenario> {
     Ok(scenario)
 }
 
-fn tell(figures: Figures) -> anyhow::Result<()> {
+fn tell(counters: EmulatorCounters) -> anyhow::Result<()> {
     result_line!(
         "received {} frames, sent {}, could not send {}; left out {:.1} ms that the machine was too slow for",
-        figures.received,
-        figures.sent,
-        figures.refused,
-        figures.skipped_ns as f64 / 1e6
+        counters.received,
+        counters.sent,
+        counters.refused,
+        counters.skipped_ns as f64 / 1e6
     )
 }

@@ -9,8 +9,9 @@ use masseter_shared::schedule::CycleSchedule;
 use masseter_shared::transport::{BatchOutlet, Inlet, Node, Outlet, Received};
 
 use crate::core::{PlantCore, PlantError};
-use crate::link::{Link, VirtualLink};
-use crate::socket_link::SocketLink;
+use crate::emulation::VirtualLink;
+use crate::link::Link;
+use crate::link::sockets::SocketLink;
 
 /// How long the drives may take to stop after the end has been asked for, ns.
 const STOP_WITHIN_NS: u64 = 500_000_000;

@@ -9,7 +9,7 @@ use std::net::TcpStream;
 
 use masseter_can::socketcand::{ECHO, GREETING, OK, Request, RequestError, Requests, write_frame};
 use masseter_can::{Bus, ReceiveError};
-use masseter_plant::open_link::{NodePort, OpenLink};
+use masseter_plant::emulation::{NodePort, OpenLink};
 
 /// Text that waits for a client to read it; a bus at full load makes about 0.5 MB a second.
 const BACKLOG: usize = 1 << 20;

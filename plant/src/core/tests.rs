@@ -294,5 +294,6 @@ fn drives_that_never_boot_are_named_each() {
     assert_eq!(named[..AXES], [0, 1, 2, 3, 4, 5]);
 }
 
+mod refusals;
 mod stops;
 mod wire_faults;

@@ -207,12 +207,12 @@ fn a_drive_off_the_bus_stops_by_itself_and_tells_when_it_is_back() {
     for (option, state) in LINK_REACTIONS {
         let (mut bench, _) = Bench::cycling();
         bench.write((0x6007, 0), &option.to_le_bytes()).unwrap();
-        bench.drive.watch_bus(bench.now_ns, ErrorState::BusOff);
+        bench.drive.set_error_state(bench.now_ns, ErrorState::BusOff);
         bench.run_ms(100);
         assert_eq!(bench.drive.power(), state, "6007 = {option}");
         assert_eq!(bench.heartbeats().pop(), Some(NmtState::PreOperational));
         bench.sent.clear();
-        bench.drive.watch_bus(bench.now_ns, ErrorState::Active);
+        bench.drive.set_error_state(bench.now_ns, ErrorState::Active);
         bench.run_ms(1);
         assert_eq!(bench.emergencies(), [EmergencyCode::WAS_BUS_OFF, EmergencyCode::RESET]);
     }
@@ -222,11 +222,11 @@ fn a_drive_off_the_bus_stops_by_itself_and_tells_when_it_is_back() {
 fn a_drive_that_is_error_passive_tells_so_once_and_goes_on() {
     let mut bench = Bench::enabled(1);
     for state in [ErrorState::Active, ErrorState::Passive, ErrorState::Passive] {
-        bench.drive.watch_bus(bench.now_ns, state);
+        bench.drive.set_error_state(bench.now_ns, state);
         bench.run_ms(1);
     }
     assert_eq!(bench.errors(), (0x11, 0x8120));
-    bench.drive.watch_bus(bench.now_ns, ErrorState::Active);
+    bench.drive.set_error_state(bench.now_ns, ErrorState::Active);
     bench.run_ms(1);
     assert_eq!(bench.emergencies(), [EmergencyCode::ERROR_PASSIVE, EmergencyCode::RESET]);
     assert_eq!(bench.errors(), (0, 0));

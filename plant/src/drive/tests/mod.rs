@@ -14,8 +14,7 @@ use masseter_can::cia402::{DriveState, StatusBit, Statusword};
 use masseter_can::{CanId, ErrorState, Frame};
 use masseter_shared::config::DrivesConfig;
 
-use super::{DriveNode, DriveSettings};
-use crate::encoder::Encoder;
+use super::{DriveNode, DriveSettings, Encoder};
 
 const STEP_NS: u64 = 125_000;
 const STEPS_PER_MS: u64 = 1_000_000 / STEP_NS;
@@ -52,10 +51,10 @@ fn settings() -> DriveSettings {
         master: id(127),
         drive: DrivesConfig::default().leg,
         heartbeat_ns: 50_000_000,
-        link_timeout_ns: 150_000_000,
+        heartbeat_timeout_ns: 150_000_000,
         period_ns: 1_000_000,
         step_s: STEP_NS as f64 * 1e-9,
-        position_limit_increments: LIMITS,
+        position_limits: LIMITS,
     }
 }
 
