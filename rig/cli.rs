@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{Args, Parser, Subcommand};
-use masseter_controller::process::Outcome;
+use masseter_shared::control::Outcome;
 use masseter_shared::lifecycle::Assignment;
 
 use crate::bench::BenchArgs;
@@ -15,7 +15,8 @@ use crate::csv_kinematics::{self, CsvArgs, FkArgs};
 use crate::log::{self, LogVerb};
 use crate::logger::Show;
 use crate::plant::{self, PlantArgs};
-use crate::run::{self, args::RunArgs};
+use crate::run;
+use crate::run::args::{ControllerKind, RunArgs};
 use crate::{bench, can, clean, doctor, logger};
 use masseter_study::KinematicsArgs;
 use masseter_study::uniqueness::UniquenessVerb;
@@ -63,7 +64,7 @@ enum Verb {
     #[command(hide = true)]
     BenchPeer(PeerArgs),
     #[command(hide = true)]
-    Controller(ProcessArgs),
+    Controller(ControllerArgs),
     #[command(hide = true)]
     Logger(LoggerArgs),
 }
@@ -117,6 +118,14 @@ impl ProcessArgs {
     fn assignment(self) -> Assignment {
         Assignment { scenario: self.scenario, domain: self.domain }
     }
+}
+
+#[derive(Debug, Clone, Args)]
+struct ControllerArgs {
+    #[command(flatten)]
+    process: ProcessArgs,
+    #[arg(long, value_enum, default_value_t)]
+    kind: ControllerKind,
 }
 
 #[derive(Debug, Clone, Args)]
@@ -183,8 +192,8 @@ fn carry_out(verb: Verb) -> Result<Exit, Failure> {
     }
 }
 
-fn control(args: ProcessArgs) -> anyhow::Result<Exit> {
-    Ok(match masseter_controller::process::run(&args.assignment())? {
+fn control(args: ControllerArgs) -> anyhow::Result<Exit> {
+    Ok(match masseter_controller::process::run(&args.process.assignment(), args.kind.into())? {
         Outcome::Finished => Exit::Passed,
         Outcome::SafeStop => Exit::SafeStop,
     })

@@ -16,6 +16,7 @@
 
 mod checks;
 pub mod core;
+pub mod cycle;
 pub mod description;
 mod drive;
 pub mod emulation;

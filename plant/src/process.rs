@@ -6,9 +6,10 @@ use masseter_shared::lifecycle::{Assignment, Post, ProcessError};
 use masseter_shared::messages::{Command, Event, FrameTap, Reading, Truth};
 use masseter_shared::realtime::{Cycle, Waiter, Wake};
 use masseter_shared::schedule::CycleSchedule;
-use masseter_shared::transport::{BatchOutlet, Inlet, Node, Outlet, Received};
+use masseter_shared::transport::{BatchOutlet, Inlet, Node, Outlet, Received, TransportError};
 
 use crate::core::{PlantCore, PlantError};
+use crate::cycle::{PlantPorts, run_cycle};
 use crate::emulation::VirtualLink;
 use crate::link::Link;
 use crate::link::sockets::SocketLink;
@@ -42,6 +43,12 @@ pub enum PlantProcessError {
     /// The plant itself.
     #[error(transparent)]
     Plant(#[from] PlantError),
+}
+
+impl From<TransportError> for PlantProcessError {
+    fn from(error: TransportError) -> Self {
+        Self::Process(error.into())
+    }
 }
 
 /// The plant's ports.
@@ -83,33 +90,14 @@ impl Ports {
         Ok(self.events.warm_up()?)
     }
 
-    /// The command of a cycle, or the newest one there is at `deadline_ns`.
-    fn command_of(
-        &self,
-        cycle: u64,
-        deadline_ns: u64,
-        waiter: &mut Waiter,
-    ) -> Result<Option<Received<Command>>, ProcessError> {
-        Ok(self.commands.latest_by(deadline_ns, waiter, |command| command.cycle >= cycle)?)
-    }
-
-    /// Publishes what a cycle gave: reading and truth first, since the controller waits.
-    fn publish(&mut self, plant: &mut PlantCore<impl Link>) -> Result<(), ProcessError> {
-        self.readings.publish(|reading| plant.fill_reading(reading))?;
-        if let Some(truth) = plant.truth() {
-            self.truths.publish(|message| *message = truth)?;
-        }
-        self.publish_frames_and_events(plant)
-    }
-
-    fn publish_frames_and_events(&mut self, plant: &mut PlantCore<impl Link>) -> Result<(), ProcessError> {
+    fn publish_frames_and_events(&mut self, plant: &mut PlantCore<impl Link>) -> Result<(), TransportError> {
         let mut result = self.frames.publish(plant.drain_frames());
         plant.drain_events(&mut |event| {
             if result.is_ok() {
                 result = self.events.publish(|message| *message = event);
             }
         });
-        Ok(result?)
+        result
     }
 }
 
@@ -142,6 +130,56 @@ impl RealTimeLink for SocketLink {
     }
 }
 
+/// Ports and deadlines of the plant's process.
+struct RealTime<'a> {
+    ports: Ports,
+    cycle: Cycle,
+    schedule: &'a CycleSchedule,
+    /// Whether commands are obeyed; at the end they no longer are.
+    obeys: bool,
+}
+
+impl<L: RealTimeLink> PlantPorts<L> for RealTime<'_> {
+    type Command = Received<Command>;
+    type Error = PlantProcessError;
+
+    fn now_ns(&self) -> u64 {
+        clock::now_ns()
+    }
+
+    fn wait_until(&mut self, due_ns: u64, latest_ns: u64) -> u64 {
+        self.cycle.waiter().until_between(due_ns, latest_ns)
+    }
+
+    fn wait_for_frames(&mut self, link: &mut L, latest_ns: u64) -> u64 {
+        link.wait(latest_ns, self.cycle.waiter())
+    }
+
+    fn publish_reading(&mut self, fill: impl FnOnce(&mut Reading)) -> Result<(), PlantProcessError> {
+        Ok(self.ports.readings.publish(fill)?)
+    }
+
+    fn publish_truth(&mut self, truth: &Truth) -> Result<(), PlantProcessError> {
+        Ok(self.ports.truths.publish(|message| *message = *truth)?)
+    }
+
+    fn command(&mut self, wake: &Wake) -> Result<Option<Received<Command>>, PlantProcessError> {
+        if !self.obeys {
+            return Ok(None);
+        }
+        // No command can arrive before the controller wakes.
+        let command_by_ns = wake.due_ns + self.schedule.command_by_ns;
+        let waiter = self.cycle.waiter();
+        waiter.until_between(wake.due_ns + self.schedule.controller_at_ns, command_by_ns);
+        let is_awaited = |command: &Command| command.cycle >= wake.cycle;
+        Ok(self.ports.commands.latest_by(command_by_ns, waiter, is_awaited)?)
+    }
+
+    fn publish_frames_and_events(&mut self, plant: &mut PlantCore<L>) -> Result<(), PlantProcessError> {
+        Ok(self.ports.publish_frames_and_events(plant)?)
+    }
+}
+
 fn serve<L: RealTimeLink>(
     post: &Post,
     build: impl Fn(&Scenario, u64) -> Result<PlantCore<L>, PlantError>,
@@ -151,31 +189,28 @@ fn serve<L: RealTimeLink>(
     let abandoned_cycles = timeout_cycles + ABANDONED_AFTER_NS / scenario.period_ns();
     // Built once before the start, so that a plant that cannot be built is never reported ready.
     build(scenario, 0)?;
-    let mut ports = Ports::open(&post.node)?;
+    let ports = Ports::open(&post.node)?;
     let start = post.ready_on(scenario.realtime.cores[1])?;
     ports.connect()?;
 
     let mut plant = build(scenario, start.epoch_ns)?;
-    let mut cycle = Cycle::new(start.epoch_ns, scenario.period_ns());
+    let cycle = Cycle::new(start.epoch_ns, scenario.period_ns());
+    let mut real_time = RealTime { ports, cycle, schedule, obeys: true };
     while !post.stop.is_made() && u64::from(plant.silent_cycles()) <= abandoned_cycles {
-        let wake = cycle.wait_warm(|| warm_up(&mut plant, &ports))?;
-        exchange(&mut plant, &mut ports, schedule, wake, cycle.waiter())?;
-        // No command can come before the controller wakes.
-        let command_by_ns = wake.due_ns + schedule.command_by_ns;
-        cycle.waiter().until_between(wake.due_ns + schedule.controller_at_ns, command_by_ns);
-        let command = ports.command_of(wake.cycle, command_by_ns, cycle.waiter())?;
-        plant.apply(clock::now_ns(), command.as_deref())?;
+        let RealTime { cycle, ports, .. } = &mut real_time;
+        let wake = cycle.wait_warm(|| warm_up(&mut plant, ports))?;
+        run_cycle(&mut plant, &mut real_time, schedule, &wake)?;
     }
     plant.stop();
+    real_time.obeys = false;
     let give_up_ns = clock::now_ns() + STOP_WITHIN_NS.max(STOP_WITHIN_CYCLES * scenario.period_ns());
     while !plant.drives_are_off() && clock::now_ns() < give_up_ns {
-        let wake = cycle.wait();
-        exchange(&mut plant, &mut ports, schedule, wake, cycle.waiter())?;
-        plant.apply(clock::now_ns(), None)?;
+        let wake = real_time.cycle.wait();
+        run_cycle(&mut plant, &mut real_time, schedule, &wake)?;
     }
     // The last cycle's process data are on the wire only by now.
-    plant.collect(cycle.wait().woke_ns)?;
-    ports.publish_frames_and_events(&mut plant)?;
+    plant.collect(real_time.cycle.wait().woke_ns)?;
+    real_time.ports.publish_frames_and_events(&mut plant)?;
     Ok(if post.stop.is_made() { Reason::Asked } else { Reason::Abandoned })
 }
 
@@ -183,23 +218,4 @@ fn serve<L: RealTimeLink>(
 fn warm_up(plant: &mut PlantCore<impl Link>, ports: &Ports) -> Result<(), PlantProcessError> {
     plant.advance(clock::now_ns())?;
     Ok(ports.warm_up()?)
-}
-
-/// SYNC, the drives' process data, and what the cycle publishes.
-fn exchange(
-    plant: &mut PlantCore<impl RealTimeLink>,
-    ports: &mut Ports,
-    schedule: &CycleSchedule,
-    wake: Wake,
-    waiter: &mut Waiter,
-) -> Result<(), PlantProcessError> {
-    plant.begin_cycle(wake)?;
-    // SYNC went out when the process woke; a late one shifts what follows, so that the reading is late
-    // but complete.
-    let reading_by_ns = wake.woke_ns + schedule.reading_by_ns;
-    let mut now_ns = waiter.until_between(wake.woke_ns + schedule.reading_from_ns, reading_by_ns);
-    while !plant.collect(now_ns)? && now_ns < reading_by_ns {
-        now_ns = plant.link().wait(reading_by_ns, waiter);
-    }
-    Ok(ports.publish(plant)?)
 }

@@ -8,6 +8,7 @@ use clap::{Args, ValueEnum};
 
 use crate::arguments::{Wires, parse_cores, parse_wires};
 use crate::live;
+use masseter_controller::process::Kind;
 use masseter_plan::Overrides;
 use masseter_terminal::Format;
 
@@ -28,6 +29,9 @@ pub struct RunArgs {
     /// Real time in three processes, or virtual time in one thread
     #[arg(long, value_enum, default_value_t)]
     pub clock: ClockKind,
+    /// Play the motion, or only hold the position found at the start
+    #[arg(long, value_enum, default_value_t)]
+    pub controller: ControllerKind,
     /// Simulated buses, or the real interface of each, such as can0,can1
     #[arg(long, value_name = "virtual|IF[,IF]", value_parser = parse_wires)]
     pub can: Option<Wires>,
@@ -73,6 +77,35 @@ impl RunArgs {
             interfaces: self.can.as_ref().map(|wires| wires.0.clone()),
             cores: self.cores,
             seed: self.seed,
+        }
+    }
+}
+
+/// A controller of the rig.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
+pub enum ControllerKind {
+    /// Plays the scenario's motion.
+    #[default]
+    Motion,
+    /// Holds the position found at the start, for as long as the motion takes.
+    Hold,
+}
+
+impl ControllerKind {
+    /// The name on the command line.
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::Motion => "motion",
+            Self::Hold => "hold",
+        }
+    }
+}
+
+impl From<ControllerKind> for Kind {
+    fn from(kind: ControllerKind) -> Self {
+        match kind {
+            ControllerKind::Motion => Self::Motion,
+            ControllerKind::Hold => Self::Hold,
         }
     }
 }

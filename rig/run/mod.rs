@@ -47,7 +47,7 @@ pub fn run(args: &RunArgs) -> Result<Exit, Failure> {
     // For a recording that nobody lives to judge.
     keep(&manifest)?;
     let ended = match claimed {
-        None => virtual_time::run(&plan, &folder).map(Ended::from).incomplete(),
+        None => virtual_time::run(&plan, &folder, args.controller.into()).map(Ended::from).incomplete(),
         Some(claimed) => supervisor::run(claimed, &plan, &folder, args),
     };
     let ended = ended.or_else(|failure| {

@@ -123,6 +123,7 @@ impl Rig {
         let mut for_logger = [&common[..], &["--recording", recording, &motion]].concat();
         for_logger.extend(args.quiet.then_some("--quiet"));
         for_logger.extend(live.as_deref());
+        let for_controller = [&common[..], &["--kind", args.controller.name()]].concat();
         let Scenario { controller, can, .. } = &plan.scenario;
         // The motion stops, is held, and the drives are switched off.
         let stop_s = controller.stop_ramp_s + controller.hold_s + controller.start_timeout_s;
@@ -131,7 +132,7 @@ impl Rig {
             plant_alone_ns: u64::from(can.command_timeout_cycles) * plan.scenario.period_ns() + SAFE_STOP_NS,
             logger: Process::spawn(Role::Logger, &for_logger)?,
             plant: Process::spawn(Role::Plant, &common)?,
-            controller: Process::spawn(Role::Controller, &common)?,
+            controller: Process::spawn(Role::Controller, &for_controller)?,
         })
     }
 

@@ -105,10 +105,10 @@ fn a_safe_stop_waits_for_a_lost_drive_until_its_time_is_over() {
     for _ in 1..waits {
         bench.cycle(lose);
         assert_eq!(bench.controller.state(), ControllerState::SafeStop);
-        assert!(!bench.controller.is_done());
+        assert!(!bench.controller.outcome().is_some());
     }
     bench.cycle(lose);
-    assert!(bench.controller.is_done());
+    assert!(bench.controller.outcome().is_some());
 }
 
 #[test]

@@ -26,7 +26,7 @@ fn trajectory(scenario: &Scenario) -> Trajectory {
 
 /// A plant that stands two cycles later where it was told to, and does what was requested at once.
 struct Bench {
-    controller: Controller,
+    controller: MotionController,
     cycle: u64,
     commands: [Command; 2],
     events: Vec<Event>,
@@ -47,7 +47,7 @@ impl Bench {
         let at_start = Actuators { slide_m: [0.0; LEGS], leg_m };
         let start = Command { target_m: at_start.to_axes(), ..Command::default() };
         Self {
-            controller: Controller::new(scenario, mechanism(), trajectory(scenario)),
+            controller: MotionController::new(scenario, mechanism(), trajectory(scenario)),
             cycle: 0,
             commands: [start; 2],
             events: Vec::new(),
@@ -111,12 +111,12 @@ impl Bench {
         }
     }
 
-    /// Plays the motion with something happening in its midst.
-    fn played(happening: impl FnOnce(&mut Self)) -> Self {
+    /// Plays the motion with something trigger in its midst.
+    fn played(trigger: impl FnOnce(&mut Self)) -> Self {
         let mut bench = Self::new();
         bench.run_until(ControllerState::Running);
         (0..730).for_each(|_| bench.cycle(Some));
-        happening(&mut bench);
+        trigger(&mut bench);
         bench.run_until(ControllerState::Finished);
         bench
     }
@@ -156,11 +156,14 @@ fn a_run_goes_through_its_states_in_order_and_ends_with_the_drives_off() {
         ]
     );
     assert!(bench.events.iter().all(|event| event.kind == EventKind::Transition.code()));
-    assert!(!bench.controller.is_done(), "the last command must be repeated before the process ends");
-    for _ in 0..FAREWELL_CYCLES {
+    assert!(
+        !bench.controller.outcome().is_some(),
+        "the last command must be repeated before the process ends"
+    );
+    for _ in 0..REPEATED_CYCLES {
         bench.cycle(Some);
     }
-    assert!(bench.controller.is_done());
+    assert!(bench.controller.outcome().is_some());
 }
 
 #[test]

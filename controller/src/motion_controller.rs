@@ -1,25 +1,24 @@
 //! One cycle of the controller: reading → FK → pose → control → IK → limited command.
 //!
-//! Pure: time and readings come in, what to send goes out, nothing is allocated. A cycle is
-//! [`Controller::observe`] then [`Controller::decide`], so that the process can stamp the time
-//! between them; [`Controller::fill_command`] and [`Controller::fill_state`] write the messages
-//! where they will be read (`telling`). It knows nothing of iceoryx2, of clocks or of CAN.
+//! A pure step function: time and readings come in, messages go out, and nothing is allocated. iceoryx2, clocks and CAN
+//! are not known here.
 
-mod telling;
+mod outputs;
 
 use std::hint::black_box;
 
 use masseter_shared::config::{ControllerConfig, Scenario};
+use masseter_shared::control::{Controller, Outcome, Tick};
 use masseter_shared::geometry::{AXES, Actuators, Mechanism, Pose};
 use masseter_shared::messages::codes::{Cause, ControllerState, DriveState, NO_DRIVE_STATE, drive_state};
-use masseter_shared::messages::{Event, Reading};
+use masseter_shared::messages::{Command, Event, Reading, State};
 
 use crate::delivery::Delivery;
 use crate::kinematics::{ForwardTracker, Solution};
 use crate::playback::Playback;
 use crate::pose_control::PoseControl;
 use crate::safety::{self, Fault};
-use crate::sequence::{Happening, next};
+use crate::sequence::{Trigger, next};
 use crate::trajectory::Trajectory;
 
 /// Bits of [`Reading::fresh_axes`] when all axes are fresh.
@@ -28,19 +27,10 @@ const ALL_AXES: u32 = (1 << AXES) - 1;
 /// Age of a reading that comes late but is used.
 const LATE_READING_CYCLES: u64 = 1;
 
-/// Cycles for which the last command is repeated at the end, so that it arrives.
-const FAREWELL_CYCLES: u64 = 5;
+/// Cycles for which the last command is repeated, so that the drives receive it.
+const REPEATED_CYCLES: u64 = 5;
 /// How long a safe stop waits for the drives to be off, s.
 const SAFE_STOP_S: f64 = 0.3;
-
-/// A cycle's place in time.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Tick {
-    /// Number of the cycle, from 1; skipped ones leave a gap.
-    pub cycle: u64,
-    /// The cycle's time, ns.
-    pub now_ns: u64,
-}
 
 /// What the last complete reading said of the mechanism.
 #[derive(Debug, Clone, Copy)]
@@ -53,7 +43,7 @@ struct Estimate {
 
 /// The controller's whole memory.
 #[derive(Debug)]
-pub struct Controller {
+pub struct MotionController {
     mechanism: Mechanism,
     config: ControllerConfig,
     period_s: f64,
@@ -81,8 +71,8 @@ pub struct Controller {
     target: Option<Actuators>,
 }
 
-impl Controller {
-    /// A controller that will play `trajectory` on `mechanism` once the rig is ready.
+impl MotionController {
+    /// A controller that plays `trajectory` on `mechanism` once the rig is ready.
     pub fn new(scenario: &Scenario, mechanism: Mechanism, trajectory: Trajectory) -> Self {
         let config = scenario.controller;
         let velocity_limit_m_s = std::array::from_fn(|axis| scenario.drives.of_axis(axis).max_velocity_m_s);
@@ -116,36 +106,10 @@ impl Controller {
         self.state
     }
 
-    /// Whether there is nothing left to do: the drives are off, or a safe stop cannot wait longer.
-    pub fn is_done(&self) -> bool {
-        let has_parted = self.cycles_in_state >= FAREWELL_CYCLES;
-        match self.state {
-            ControllerState::Finished => has_parted,
-            ControllerState::SafeStop => {
-                let waited_s = self.cycles_in_state as f64 * self.period_s;
-                (has_parted && self.drives_are_off()) || waited_s >= SAFE_STOP_S
-            }
-            _ => false,
-        }
-    }
-
     /// Whether all drives report that they are without voltage: a lost one reports nothing, and may not be.
     fn drives_are_off(&self) -> bool {
         let is_off = |&code: &u32| matches!(drive_state(code), Ok(Some(state)) if !state.is_powered());
         self.drive_state.iter().all(is_off)
-    }
-
-    /// Takes the newest reading, if one came, and solves the forward kinematics for it.
-    pub fn observe(&mut self, reading: Option<&Reading>) {
-        self.silent_cycles += 1;
-        let Some(reading) = reading else {
-            self.steady_readings = 0;
-            return;
-        };
-        if let Err(fault) = self.take(reading) {
-            self.steady_readings = 0;
-            self.fault.get_or_insert(fault);
-        }
     }
 
     fn take(&mut self, reading: &Reading) -> Result<(), Fault> {
@@ -169,36 +133,6 @@ impl Controller {
         self.silent_cycles = 0;
         self.steady_readings = self.steady_readings.saturating_add(1);
         Ok(())
-    }
-
-    /// Solves the kinematics of the last measurement once more, without effect: a core that slept has cold caches.
-    pub fn warm_up(&self) {
-        if let Some(estimate) = &self.estimate {
-            let solution = self.tracker.clone().update(&estimate.measured);
-            let ahead = self.playback.pose_ahead(self.lead_s());
-            let joints = self.mechanism.inverse(&self.control.correct(&ahead));
-            let _ = black_box((solution, joints));
-        }
-    }
-
-    /// Asks for an orderly stop.
-    pub fn request_stop(&mut self) {
-        self.stop_requested = true;
-    }
-
-    /// Moves the sequence on, decides what to ask of the drives, and reports a change of state.
-    pub fn decide(&mut self, tick: Tick) -> Option<Event> {
-        self.last_cycle = tick.cycle;
-        // A motion that waited goes on at full speed from the target that the drives held: a period's worth, as ever.
-        if self.delivery.takes_step(tick.cycle) {
-            self.playback.advance(self.period_s);
-        }
-        let fault = self.fault.take().or_else(|| self.overdue()).or_else(|| self.control().err());
-        let happening = self.happening(fault.is_some());
-        let event = happening.and_then(|happening| self.follow(happening, fault, tick));
-        self.cycles_in_state += 1;
-        self.cycles_at_rest = if self.playback.is_at_rest() { self.cycles_at_rest + 1 } else { 0 };
-        event
     }
 
     /// What has been waited for too long.
@@ -260,35 +194,35 @@ impl Controller {
     }
 
     /// The most urgent thing that happened.
-    fn happening(&self, faulty: bool) -> Option<Happening> {
+    fn trigger(&self, faulty: bool) -> Option<Trigger> {
         let enabled = DriveState::OperationEnabled.code();
         let held_s = self.cycles_at_rest as f64 * self.period_s;
         let progress = match self.state {
             ControllerState::WaitReadings => {
-                (self.steady_readings >= self.config.steady_readings).then_some(Happening::Steady)
+                (self.steady_readings >= self.config.steady_readings).then_some(Trigger::Steady)
             }
             ControllerState::Enabling => {
-                self.drive_state.iter().all(|&code| code == enabled).then_some(Happening::Enabled)
+                self.drive_state.iter().all(|&code| code == enabled).then_some(Trigger::Enabled)
             }
-            ControllerState::Easing => self.playback.is_over().then_some(Happening::Eased),
-            ControllerState::Running => self.playback.is_over().then_some(Happening::Played),
-            ControllerState::Holding => (held_s >= self.config.hold_s).then_some(Happening::Rested),
-            ControllerState::Disabling => self.drives_are_off().then_some(Happening::Released),
+            ControllerState::Easing => self.playback.is_over().then_some(Trigger::Eased),
+            ControllerState::Running => self.playback.is_over().then_some(Trigger::Played),
+            ControllerState::Holding => (held_s >= self.config.hold_s).then_some(Trigger::Rested),
+            ControllerState::Disabling => self.drives_are_off().then_some(Trigger::Released),
             ControllerState::Finished | ControllerState::SafeStop => None,
         };
-        let stop = self.stop_requested.then_some(Happening::StopRequested);
+        let stop = self.stop_requested.then_some(Trigger::StopRequested);
         let stop = stop.filter(|&stop| next(self.state, stop) != self.state);
-        faulty.then_some(Happening::Fault).or(stop).or(progress)
+        faulty.then_some(Trigger::Fault).or(stop).or(progress)
     }
 
     /// Enters the state that follows, and reports it.
-    fn follow(&mut self, happening: Happening, fault: Option<Fault>, tick: Tick) -> Option<Event> {
-        let (from, to) = (self.state, next(self.state, happening));
+    fn follow(&mut self, trigger: Trigger, fault: Option<Fault>, tick: Tick) -> Option<Event> {
+        let (from, to) = (self.state, next(self.state, trigger));
         if from == to {
             return None;
         }
         self.enter(to);
-        Some(self.event(from, happening, fault, tick))
+        Some(self.event(from, trigger, fault, tick))
     }
 
     fn enter(&mut self, state: ControllerState) {
@@ -306,6 +240,68 @@ impl Controller {
             _ => {}
         }
         (self.state, self.cycles_in_state, self.cycles_at_rest) = (state, 0, 0);
+    }
+}
+
+impl Controller for MotionController {
+    fn observe(&mut self, reading: Option<&Reading>) {
+        self.silent_cycles += 1;
+        let Some(reading) = reading else {
+            self.steady_readings = 0;
+            return;
+        };
+        if let Err(fault) = self.take(reading) {
+            self.steady_readings = 0;
+            self.fault.get_or_insert(fault);
+        }
+    }
+
+    fn decide(&mut self, tick: Tick) -> Option<Event> {
+        self.last_cycle = tick.cycle;
+        // A motion that waited goes on at full speed from the target that the drives held: a period's worth, as ever.
+        if self.delivery.takes_step(tick.cycle) {
+            self.playback.advance(self.period_s);
+        }
+        let fault = self.fault.take().or_else(|| self.overdue()).or_else(|| self.control().err());
+        let trigger = self.trigger(fault.is_some());
+        let event = trigger.and_then(|trigger| self.follow(trigger, fault, tick));
+        self.cycles_in_state += 1;
+        self.cycles_at_rest = if self.playback.is_at_rest() { self.cycles_at_rest + 1 } else { 0 };
+        event
+    }
+
+    fn fill_command(&self, command: &mut Command) {
+        *command = self.command();
+    }
+
+    fn fill_state(&self, state: &mut State) {
+        *state = self.state_message();
+    }
+
+    fn request_stop(&mut self) {
+        self.stop_requested = true;
+    }
+
+    fn outcome(&self) -> Option<Outcome> {
+        let is_repeated = self.cycles_in_state >= REPEATED_CYCLES;
+        match self.state {
+            ControllerState::Finished => is_repeated.then_some(Outcome::Finished),
+            ControllerState::SafeStop => {
+                let waited_s = self.cycles_in_state as f64 * self.period_s;
+                let is_over = (is_repeated && self.drives_are_off()) || waited_s >= SAFE_STOP_S;
+                is_over.then_some(Outcome::SafeStop)
+            }
+            _ => None,
+        }
+    }
+
+    fn warm_up(&self) {
+        if let Some(estimate) = &self.estimate {
+            let solution = self.tracker.clone().update(&estimate.measured);
+            let ahead = self.playback.pose_ahead(self.lead_s());
+            let joints = self.mechanism.inverse(&self.control.correct(&ahead));
+            let _ = black_box((solution, joints));
+        }
     }
 }
 

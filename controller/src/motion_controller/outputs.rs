@@ -1,20 +1,22 @@
-//! What the controller tells: its command, its state, and the events between states.
+//! The messages of the controller: command, state, and the events of its sequence.
 
 use masseter_shared::geometry::{AXES, Actuators, Joints};
 use masseter_shared::messages::codes::{Cause, ControllerState, DriveRequest, EventKind, Source};
 use masseter_shared::messages::{Command, Event, State, pose_fields};
 
-use super::{Controller, Estimate, Tick};
+use masseter_shared::control::Tick;
+
+use super::{Estimate, MotionController};
 use crate::kinematics::Solution;
 use crate::safety::Fault;
-use crate::sequence::Happening;
+use crate::sequence::Trigger;
 
-impl Controller {
-    /// What to tell of a change of state.
+impl MotionController {
+    /// The event of a change of state.
     pub(super) fn event(
         &self,
         from: ControllerState,
-        happening: Happening,
+        trigger: Trigger,
         fault: Option<Fault>,
         tick: Tick,
     ) -> Event {
@@ -25,7 +27,7 @@ impl Controller {
             to: self.state.code(),
             ..Event::new(Source::Controller, EventKind::Transition, Cause::Sequence)
         };
-        if happening == Happening::StopRequested {
+        if trigger == Trigger::StopRequested {
             event.cause = Cause::StopRequested.code();
         }
         if let Some(fault) = fault {
@@ -49,17 +51,17 @@ impl Controller {
         }
     }
 
-    /// Writes this cycle's command. Before the first reading the targets are zero and the request is
-    /// `Off`: nobody follows them.
-    pub fn fill_command(&self, command: &mut Command) {
-        *command = Command {
+    /// This cycle's command. Before the first reading the targets are zero and the request is `Off`, so that no drive
+    /// follows them.
+    pub(super) fn command(&self) -> Command {
+        Command {
             cycle: self.last_cycle,
             reading_cycle: self.estimate.map_or(0, |estimate| estimate.reading_cycle),
             target_m: self.target.map_or([0.0; AXES], Actuators::to_axes),
             request: self.request().code(),
             controller_state: self.state.code(),
-            ..Default::default()
-        };
+            ..Command::default()
+        }
     }
 
     /// Conditioning at a solution. Only reported, so it is computed after the command has gone out.
@@ -68,9 +70,9 @@ impl Controller {
         self.mechanism.condition(&solution.pose, &joints)
     }
 
-    /// Writes what this cycle made of the reading; the process adds its stamps.
-    pub fn fill_state(&self, state: &mut State) {
-        *state = State {
+    /// What this cycle made of the reading, without time stamps.
+    pub(super) fn state_message(&self) -> State {
+        let mut state = State {
             cycle: self.last_cycle,
             motion_time_s: self.playback.motion_time_ahead_s(-self.sample_age_s()),
             controller_state: self.state.code(),
@@ -87,5 +89,6 @@ impl Controller {
             (state.residual_m, state.iterations) = (solution.residual_m, solution.iterations);
             state.condition = self.condition(measured, solution);
         }
+        state
     }
 }
