@@ -3,8 +3,9 @@
 mod common;
 
 use std::fs;
+use std::path::Path;
 
-use common::{Workspace, cramped, jaw_recording, json, stderr, stdout, wait_until_it_records};
+use common::{Workspace, cramped, json, stderr, stdout, wait_until_it_records};
 use rustix::process::{Pid, Signal, kill_process};
 use serde_json::json;
 
@@ -108,12 +109,10 @@ fn every_generated_motion_plays() {
 
 #[test]
 fn recorded_patients_play() {
-    let markers = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/markers.toml");
-    let patient = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/patient.toml");
-    for (name, scenario) in [("patient_jaws3d.csv", patient), ("jma_markers.csv", markers)] {
-        let Some(path) = jaw_recording(name) else { continue };
-        let workspace = Workspace::new(&fs::read_to_string(scenario).unwrap());
-        let output = workspace.run_virtual(&["--trajectory", path.to_str().unwrap()]);
+    let examples = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples");
+    for (name, scenario) in [("patient.csv", "patient.toml"), ("tracker.csv", "markers.toml")] {
+        let workspace = Workspace::new(&fs::read_to_string(examples.join(scenario)).unwrap());
+        let output = workspace.run_virtual(&["--trajectory", examples.join(name).to_str().unwrap()]);
         assert_eq!(output.status.code(), Some(0), "{name}: {}{}", stdout(&output), stderr(&output));
         let tracking = &workspace.summary()["figures"]["tracking"];
         assert!(tracking["rms_mm"].as_f64().unwrap() < 0.1, "{name}: {tracking}");

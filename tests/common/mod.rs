@@ -192,16 +192,6 @@ pub(crate) fn skip(why: &str) {
     writeln!(io::stderr(), "SKIPPED: {why}").expect("standard error can be written");
 }
 
-/// The recordings handed to developers; they are not part of the project.
-pub(crate) fn jaw_recording(name: &str) -> Option<PathBuf> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data/jaw").join(name);
-    if path.is_file() {
-        return Some(path);
-    }
-    skip(&format!("{name} is absent"));
-    None
-}
-
 /// Files with the rig's prefix in shared memory whose names hold `id`.
 pub(crate) fn shared_memory_of(id: &str) -> Vec<String> {
     let entries = fs::read_dir("/dev/shm").expect("/dev/shm can be listed");

@@ -177,16 +177,24 @@ fn the_patients_recording_plays_with_all_defaults() {
     assert!(report.lowest_m[3] < 0.265, "{}", report.lowest_m[3]);
 }
 
-/// Its centroid swings so far back that the slides do not reach it, unless the closed pose is further forward.
+/// A closed pose so far back that the slides do not reach the opened jaw is refused with the line of the file.
 #[test]
-fn the_tracker_recording_plays_with_its_axes_and_a_closed_pose_further_forward() {
+fn the_tracker_recording_plays_with_its_axes_unless_the_closed_pose_lies_too_far_back() {
     let mut file = recording("tracker.csv");
     file.axes = ["+y", "-x", "+z"].map(String::from);
     let motion = MotionConfig::File(file);
-    let jaw = JawConfig { closed_offset_m: [0.005, 0.0, 0.0], ..Default::default() };
-    let trajectory = Trajectory::new(&motion, &jaw, &mechanism(), None).unwrap();
+    let displaced = |x_m| {
+        let jaw = JawConfig { closed_offset_m: [x_m, 0.0, 0.0], ..Default::default() };
+        Trajectory::new(&motion, &jaw, &mechanism(), None).unwrap()
+    };
+    let trajectory = displaced(0.005);
     judge(&trajectory).unwrap();
     let lowest_m = (0..16_000).map(|ms| trajectory.pose(f64::from(ms) / 1000.0).translation.z);
     let travel_m = closed_pose(&trajectory).translation.z - lowest_m.fold(f64::INFINITY, f64::min);
-    panic!("{travel_m} {:?}", judge(&build(&motion, None)));
+    assert!((travel_m - 0.0278).abs() < 0.001, "{travel_m}");
+
+    let refused = judge(&displaced(-0.026)).unwrap_err();
+    assert!(matches!(refused.problem, CheckProblem::Stroke(_)), "{refused}");
+    // The wide opening lasts from 0.4 to 3.0 s.
+    assert!((23..153).contains(&refused.source_line.unwrap().line));
 }
