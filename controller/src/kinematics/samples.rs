@@ -66,9 +66,10 @@ pub(super) fn nearly_singular() -> impl Strategy<Value = NearlySingular> {
         if (at(high)?.1 > target) == starts_above {
             return None;
         }
-        while low < (low + high) / 2.0 && (low + high) / 2.0 < high {
-            let middle = (low + high) / 2.0;
+        let mut middle = 0.5;
+        while low < middle && middle < high {
             *(if (at(middle)?.1 > target) == starts_above { &mut low } else { &mut high }) = middle;
+            middle = f64::midpoint(low, high);
         }
         let (joints, determinant) = at(low)?;
         Some(NearlySingular { mechanism: mechanism.clone(), joints, determinant })
