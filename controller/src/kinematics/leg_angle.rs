@@ -2,7 +2,7 @@
 
 use masseter_shared::geometry::LEGS;
 
-use super::closure::each;
+use super::legs::each;
 
 /// The most by which a square may differ from 1 for its root to be had from the series of
 /// 1/√(1 + e): the first term left out, 5e³/16, is then a tenth of a rounding.
@@ -14,14 +14,14 @@ const SERIES_REACHES: f64 = 0.03;
 
 /// (cos θ, sin θ) of one leg in its plane: cos inward, sin up. Unit length within 2 roundings.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Heading {
+pub(super) struct LegAngle {
     /// cos θ.
     pub cos: f64,
     /// sin θ.
     pub sin: f64,
 }
 
-impl Heading {
+impl LegAngle {
     /// From an angle in radians.
     pub(super) fn from_rad(theta_rad: f64) -> Self {
         let (sin, cos) = theta_rad.sin_cos();
@@ -54,12 +54,12 @@ impl Heading {
         Self { cos: self.cos, sin: -self.sin }
     }
 
-    /// The angle between two headings, in [0, π], radians.
+    /// The angle between two leg angles, in [0, π], radians.
     pub(super) fn angle_to(self, other: Self) -> f64 {
         self.sine_to(other).abs().atan2(self.cosine_to(other))
     }
 
-    /// The sine of the turn from this heading to another.
+    /// The sine of the turn from this leg angle to another.
     #[inline]
     fn sine_to(self, other: Self) -> f64 {
         self.cos * other.sin - self.sin * other.cos
@@ -72,29 +72,29 @@ impl Heading {
     }
 }
 
-/// Headings whose angles are known, from which the angles of others nearby follow to 3 roundings without
+/// Leg angles whose angles are known, from which the angles of others nearby follow to 3 roundings without
 /// an arc tangent.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Anchor {
-    headings: [Heading; LEGS],
+    leg_angles: [LegAngle; LEGS],
     theta_rad: [f64; LEGS],
 }
 
 impl Anchor {
     /// Near nothing.
     pub(super) fn nowhere() -> Self {
-        Self { headings: [Heading { cos: 0.0, sin: 0.0 }; LEGS], theta_rad: [0.0; LEGS] }
+        Self { leg_angles: [LegAngle { cos: 0.0, sin: 0.0 }; LEGS], theta_rad: [0.0; LEGS] }
     }
 
     /// The angles in radians; anchored anew where a leg is too far away.
     #[inline]
-    pub(super) fn angles_rad(&mut self, headings: &[Heading; LEGS]) -> [f64; LEGS] {
-        let sines = each(|leg| self.headings[leg].sine_to(headings[leg]));
+    pub(super) fn angles_rad(&mut self, leg_angles: &[LegAngle; LEGS]) -> [f64; LEGS] {
+        let sines = each(|leg| self.leg_angles[leg].sine_to(leg_angles[leg]));
         let are_near = each(|leg| {
-            sines[leg].abs() < SERIES_REACHES && self.headings[leg].cosine_to(headings[leg]) > 0.0
+            sines[leg].abs() < SERIES_REACHES && self.leg_angles[leg].cosine_to(leg_angles[leg]) > 0.0
         });
         if are_near != [true; LEGS] {
-            *self = Self { headings: *headings, theta_rad: headings.map(Heading::to_rad) };
+            *self = Self { leg_angles: *leg_angles, theta_rad: leg_angles.map(LegAngle::to_rad) };
             return self.theta_rad;
         }
         each(|leg| self.theta_rad[leg] + arc_sine(sines[leg]))
@@ -111,7 +111,7 @@ fn arc_sine(x: f64) -> f64 {
 
 /// Whether no leg's angle differs by more than a small angle, radians; compares chords, which needs
 /// no arc tangent.
-pub(super) fn coincide(a: &[Heading; LEGS], b: &[Heading; LEGS], within_rad: f64) -> bool {
+pub(super) fn coincide(a: &[LegAngle; LEGS], b: &[LegAngle; LEGS], within_rad: f64) -> bool {
     a.iter().zip(b).all(|(a, b)| {
         let (cos, sin) = (a.cos - b.cos, a.sin - b.sin);
         cos * cos + sin * sin <= within_rad * within_rad
@@ -119,7 +119,7 @@ pub(super) fn coincide(a: &[Heading; LEGS], b: &[Heading; LEGS], within_rad: f64
 }
 
 /// How far apart two sets of leg angles are: the largest difference of any leg, radians.
-pub(super) fn separation_rad(a: &[Heading; LEGS], b: &[Heading; LEGS]) -> f64 {
+pub(super) fn separation_rad(a: &[LegAngle; LEGS], b: &[LegAngle; LEGS]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a.angle_to(*b)).fold(0.0, f64::max)
 }
 
@@ -139,16 +139,16 @@ mod tests {
             let mut anchor = Anchor::nowhere();
             let nearby = std::array::from_fn(|leg| theta[leg] + near[leg]);
             for angles in [theta, nearby, far, theta.map(|angle| angle / 2.0 - 1.6)] {
-                let headings = angles.map(Heading::from_rad);
-                for (angle, heading) in anchor.angles_rad(&headings).into_iter().zip(headings) {
-                    prop_assert!((angle - heading.to_rad()).abs() <= 4.0 * f64::EPSILON);
+                let leg_angles = angles.map(LegAngle::from_rad);
+                for (angle, leg_angle) in anchor.angles_rad(&leg_angles).into_iter().zip(leg_angles) {
+                    prop_assert!((angle - leg_angle.to_rad()).abs() <= 4.0 * f64::EPSILON);
                 }
             }
         }
 
         #[test]
         fn a_step_turns_by_its_arc_tangent(theta in -3.1..3.1f64, step in -2.0..2.0f64) {
-            let start = Heading::from_rad(theta);
+            let start = LegAngle::from_rad(theta);
             let end = start.stepped(step);
             prop_assert!((start.angle_to(end) - step.abs().atan()).abs() < 1e-15);
             prop_assert!((end.cos.hypot(end.sin) - 1.0).abs() < 4.0 * f64::EPSILON);

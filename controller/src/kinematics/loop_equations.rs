@@ -1,5 +1,5 @@
-//! The three equations with the sides squared: the form in which they are bilinear in the legs'
-//! headings, and therefore the one to eliminate in, to iterate on fast and to certify.
+//! The three loop equations with the sides squared. In this form they are bilinear in the leg angles' cosines and sines:
+//! elimination, fast iteration and certificate use it.
 //!
 //! Side k joins leg i = k to leg j = k + 1. With c = Bᵢ − Bⱼ and v̂ the inward directions,
 //!
@@ -7,16 +7,17 @@
 //!
 //! κ = (|c|² + lᵢ² + lⱼ² − Lₖ²) / 2lᵢlⱼ, p = v̂ᵢ·c / lⱼ, q = −v̂ⱼ·c / lᵢ, ω = v̂ᵢ·v̂ⱼ.
 //!
-//! gₖ = 0 exactly where the paper's fₖ = 0 (eq. 1). Nothing here knows which solution is wanted; the
-//! paper's own form of the equations is [`Equations`](super::Equations).
+//! gₖ = 0 exactly where the paper's fₖ = 0 (eq. 1). The module does not choose a
+//! solution. The paper's own form of the equations is [`Equations`](super::Equations).
 
 use masseter_shared::geometry::{Actuators, LEGS, Mechanism, Vec3};
 
-use super::heading::Heading;
+use super::leg_angle::LegAngle;
+use super::legs::{each, next};
 
 /// What gₖ and its derivatives may be off by, in units of the machine epsilon times the `scale` of
 /// [`Side::new`]: at most 33 roundings of half an epsilon each, 20 of them on the way from the hinges
-/// to κ, 6 on the sum, 3 in a product, 4 for headings 2 roundings off the circle.
+/// to κ, 6 on the sum, 3 in a product, 4 for leg angles 2 roundings off the circle.
 const ROUNDINGS: f64 = 20.0;
 /// No Newton step is longer; a longer one says only that the Jacobian is nearly singular.
 const LONGEST_STEP_RAD: f64 = 1.0;
@@ -37,7 +38,7 @@ pub(super) struct Side {
 
 /// The equations for one input.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Closure<'a> {
+pub(super) struct LoopEquations<'a> {
     pub(super) mechanism: &'a Mechanism,
     pub(super) actuators: Actuators,
     /// Bᵢ, metres.
@@ -45,9 +46,9 @@ pub(super) struct Closure<'a> {
     pub(super) sides: [Side; LEGS],
 }
 
-/// Values and derivatives of the three gₖ at one set of headings.
+/// Values and derivatives of the three gₖ at one set of leg angles.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Closing {
+pub(super) struct Residuals {
     pub value: [f64; LEGS],
     /// ∂gₖ/∂θₖ.
     pub near: [f64; LEGS],
@@ -57,9 +58,9 @@ pub(super) struct Closing {
 
 /// Where an iteration ended with every gₖ zero but for rounding.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Closed {
-    pub headings: [Heading; LEGS],
-    pub closing: Closing,
+pub(super) struct LoopSolution {
+    pub leg_angles: [LegAngle; LEGS],
+    pub residuals: Residuals,
     pub iterations: u32,
 }
 
@@ -115,18 +116,18 @@ impl Side {
 
     /// gₖ.
     #[inline]
-    pub(super) fn value(&self, near: Heading, far: Heading) -> f64 {
+    pub(super) fn value(&self, near: LegAngle, far: LegAngle) -> f64 {
         let far_slope = self.far_cos - self.cos_cos * near.cos;
         self.constant + self.near_cos * near.cos + far_slope * far.cos - near.sin * far.sin
     }
 
     #[inline]
-    fn near_derivative(&self, near: Heading, far: Heading) -> f64 {
+    fn near_derivative(&self, near: LegAngle, far: LegAngle) -> f64 {
         near.sin * (self.cos_cos * far.cos - self.near_cos) - near.cos * far.sin
     }
 
     #[inline]
-    fn far_derivative(&self, near: Heading, far: Heading) -> f64 {
+    fn far_derivative(&self, near: LegAngle, far: LegAngle) -> f64 {
         far.sin * (self.cos_cos * near.cos - self.far_cos) - far.cos * near.sin
     }
 
@@ -138,7 +139,7 @@ impl Side {
     }
 }
 
-impl<'a> Closure<'a> {
+impl<'a> LoopEquations<'a> {
     /// The equations for an input in metres. No leg may have length zero.
     #[inline]
     pub(super) fn new(mechanism: &'a Mechanism, actuators: &Actuators) -> Self {
@@ -153,59 +154,59 @@ impl<'a> Closure<'a> {
     }
 
     #[inline]
-    pub(super) fn evaluate(&self, headings: &[Heading; LEGS]) -> Closing {
-        let at = |formula: fn(&Side, Heading, Heading) -> f64| {
-            each(|side| formula(&self.sides[side], headings[side], headings[next(side)]))
+    pub(super) fn evaluate(&self, leg_angles: &[LegAngle; LEGS]) -> Residuals {
+        let at = |formula: fn(&Side, LegAngle, LegAngle) -> f64| {
+            each(|side| formula(&self.sides[side], leg_angles[side], leg_angles[next(side)]))
         };
-        Closing { value: at(Side::value), near: at(Side::near_derivative), far: at(Side::far_derivative) }
+        Residuals { value: at(Side::value), near: at(Side::near_derivative), far: at(Side::far_derivative) }
     }
 
     /// The platform's corners Aᵢ in the base frame, metres.
     #[inline]
-    pub(super) fn corners(&self, headings: &[Heading; LEGS]) -> [Vec3; LEGS] {
+    pub(super) fn corners(&self, leg_angles: &[LegAngle; LEGS]) -> [Vec3; LEGS] {
         each(|leg| {
-            let (Heading { cos, sin }, leg_m) = (headings[leg], self.actuators.leg_m[leg]);
+            let (LegAngle { cos, sin }, leg_m) = (leg_angles[leg], self.actuators.leg_m[leg]);
             let mut corner = self.hinges[leg] + self.mechanism.inward_direction(leg) * (cos * leg_m);
             corner.z += sin * leg_m;
             corner
         })
     }
 
-    /// Newton's iteration from these headings; none when `max_iterations` do not close the platform.
+    /// Newton's iteration from these leg angles; none when `max_iterations` do not close the platform.
     #[inline]
-    pub(super) fn close(&self, start: &[Heading; LEGS], max_iterations: u32) -> Option<Closed> {
-        let mut headings = *start;
+    pub(super) fn close(&self, start: &[LegAngle; LEGS], max_iterations: u32) -> Option<LoopSolution> {
+        let mut leg_angles = *start;
         for iterations in 0..=max_iterations {
-            let closing = self.evaluate(&headings);
-            if self.is_closed(&closing) {
-                return Some(Closed { headings, closing, iterations });
+            let residuals = self.evaluate(&leg_angles);
+            if self.is_closed(&residuals) {
+                return Some(LoopSolution { leg_angles, residuals, iterations });
             }
-            let step_rad = closing.newton_step_rad();
-            headings = each(|leg| headings[leg].stepped(step_rad[leg]));
+            let step_rad = residuals.newton_step_rad();
+            leg_angles = each(|leg| leg_angles[leg].stepped(step_rad[leg]));
         }
         None
     }
 
     #[inline]
-    fn is_closed(&self, closing: &Closing) -> bool {
-        each(|side| closing.value[side].abs() <= self.sides[side].rounding) == [true; LEGS]
+    fn is_closed(&self, residuals: &Residuals) -> bool {
+        each(|side| residuals.value[side].abs() <= self.sides[side].rounding) == [true; LEGS]
     }
 
     /// The largest |fₖ|, metres.
-    pub(super) fn residual_m(&self, closing: &Closing) -> f64 {
-        let [f1, f2, f3] = each(|side| self.sides[side].excess_m(closing.value[side]).abs());
+    pub(super) fn residual_m(&self, residuals: &Residuals) -> f64 {
+        let [f1, f2, f3] = each(|side| self.sides[side].excess_m(residuals.value[side]).abs());
         f1.max(f2).max(f3)
     }
 
     /// [`Equations::determinant`](super::Equations::determinant) where the platform is closed.
-    pub(super) fn determinant(&self, closing: &Closing) -> f64 {
+    pub(super) fn determinant(&self, residuals: &Residuals) -> f64 {
         let product = |[a, b, c]: [f64; LEGS]| a * b * c;
         let sides_m = each(|side| self.sides[side].length_m);
-        closing.determinant() * product(self.actuators.leg_m) / product(sides_m)
+        residuals.determinant() * product(self.actuators.leg_m) / product(sides_m)
     }
 }
 
-impl Closing {
+impl Residuals {
     /// Determinant of ∂g/∂θ.
     #[inline]
     pub(super) fn determinant(&self) -> f64 {
@@ -213,7 +214,7 @@ impl Closing {
         a * b * c + d * e * f
     }
 
-    /// At the mirrored headings, −θ: gₖ is even.
+    /// At the mirrored leg angles, −θ: gₖ is even.
     pub(super) fn mirrored(&self) -> Self {
         Self { value: self.value, near: self.near.map(|slope| -slope), far: self.far.map(|slope| -slope) }
     }
@@ -228,6 +229,16 @@ impl Closing {
         each(|row| each(|column| cofactors[row][column] * scale))
     }
 
+    /// The direction in which the equations hold nearly to first order where the Jacobian is nearly singular: its
+    /// adjugate's longest column. The largest component has magnitude 1; all are zero if the rank is 1 or less.
+    pub(super) fn null_direction(&self) -> [f64; LEGS] {
+        let ([a, b, c], [d, e, f]) = (self.near, self.far);
+        let columns = [[b * c, e * f, -b * f], [-c * d, a * c, d * f], [d * e, -a * e, a * b]];
+        let length = |column: &[f64; LEGS]| column.iter().fold(0.0, |most: f64, entry| most.max(entry.abs()));
+        let longest = columns.into_iter().max_by(|a, b| length(a).total_cmp(&length(b))).unwrap_or_default();
+        longest.map(|entry| entry / length(&longest).max(f64::MIN_POSITIVE))
+    }
+
     /// −(∂g/∂θ)⁻¹ g, bounded; zero where the Jacobian has no inverse.
     #[inline]
     fn newton_step_rad(&self) -> [f64; LEGS] {
@@ -240,25 +251,12 @@ impl Closing {
     }
 }
 
-impl Closed {
+impl LoopSolution {
     /// The same platform below the base.
     pub(super) fn mirrored(&self) -> Self {
-        let headings = self.headings.map(Heading::mirrored);
-        Self { headings, closing: self.closing.mirrored(), iterations: self.iterations }
+        let leg_angles = self.leg_angles.map(LegAngle::mirrored);
+        Self { leg_angles, residuals: self.residuals.mirrored(), iterations: self.iterations }
     }
-}
-
-/// One value for each leg or side. `array::map` and `from_fn` do the same, but are not unrolled here, and
-/// then pass everything through memory: a quarter of a warm solve's time.
-#[inline]
-pub(super) fn each<T>(value: impl Fn(usize) -> T) -> [T; LEGS] {
-    [value(0), value(1), value(2)]
-}
-
-/// The leg at the far end of the side that starts at this one.
-#[inline]
-pub(super) fn next(leg: usize) -> usize {
-    (leg + 1) % LEGS
 }
 
 #[cfg(test)]
@@ -275,16 +273,16 @@ mod tests {
             mechanism in mechanisms(), pose in poses(25.0), off in -0.5..0.5f64,
         ) {
             let joints = mechanism.inverse(&pose).unwrap();
-            let closure = Closure::new(&mechanism, &joints.actuators);
+            let loops = LoopEquations::new(&mechanism, &joints.actuators);
             let equations = Equations::new(&mechanism, &joints.actuators);
-            let solved = closure.evaluate(&joints.theta_rad.map(Heading::from_rad));
-            prop_assert!(closure.is_closed(&solved));
+            let solved = loops.evaluate(&joints.theta_rad.map(LegAngle::from_rad));
+            prop_assert!(loops.is_closed(&solved));
             let determinant = equations.determinant(&equations.evaluate(joints.theta_rad.into()));
-            prop_assert!((closure.determinant(&solved) - determinant).abs() < 1e-12);
+            prop_assert!((loops.determinant(&solved) - determinant).abs() < 1e-12);
             let theta_rad = [joints.theta_rad[0] + off, joints.theta_rad[1], joints.theta_rad[2] - off];
-            let away = closure.evaluate(&theta_rad.map(Heading::from_rad));
+            let away = loops.evaluate(&theta_rad.map(LegAngle::from_rad));
             let expected = equations.evaluate(theta_rad.into());
-            prop_assert!((closure.residual_m(&away) - expected.residual_norm_m()).abs() < 1e-14);
+            prop_assert!((loops.residual_m(&away) - expected.residual_norm_m()).abs() < 1e-14);
         }
 
         #[test]
@@ -292,10 +290,10 @@ mod tests {
             mechanism in mechanisms(), pose in poses(25.0),
         ) {
             let joints = mechanism.inverse(&pose).unwrap();
-            let closure = Closure::new(&mechanism, &joints.actuators);
-            let at = |theta_rad: [f64; LEGS]| closure.evaluate(&theta_rad.map(Heading::from_rad));
+            let loops = LoopEquations::new(&mechanism, &joints.actuators);
+            let at = |theta_rad: [f64; LEGS]| loops.evaluate(&theta_rad.map(LegAngle::from_rad));
             let here = at(joints.theta_rad);
-            prop_assume!(closure.determinant(&here).abs() > 1e-3);
+            prop_assume!(loops.determinant(&here).abs() > 1e-3);
             let h = 1e-6;
             for leg in 0..LEGS {
                 let mut ahead = joints.theta_rad;
@@ -313,14 +311,14 @@ mod tests {
             mechanism in mechanisms(), pose in poses(20.0), off in [-0.01..0.01f64, -0.01..0.01f64, -0.01..0.01f64],
         ) {
             let joints = mechanism.inverse(&pose).unwrap();
-            let closure = Closure::new(&mechanism, &joints.actuators);
-            let at = closure.evaluate(&joints.theta_rad.map(Heading::from_rad));
-            prop_assume!(closure.determinant(&at).abs() > 0.3);
-            let start = std::array::from_fn(|leg| Heading::from_rad(joints.theta_rad[leg] + off[leg]));
-            let closed = closure.close(&start, 5).unwrap();
-            prop_assert!(closed.iterations <= 5 && closure.residual_m(&closed.closing) < 1e-13);
+            let loops = LoopEquations::new(&mechanism, &joints.actuators);
+            let at = loops.evaluate(&joints.theta_rad.map(LegAngle::from_rad));
+            prop_assume!(loops.determinant(&at).abs() > 0.3);
+            let start = std::array::from_fn(|leg| LegAngle::from_rad(joints.theta_rad[leg] + off[leg]));
+            let closed = loops.close(&start, 5).unwrap();
+            prop_assert!(closed.iterations <= 5 && loops.residual_m(&closed.residuals) < 1e-13);
             for leg in 0..LEGS {
-                prop_assert!((closed.headings[leg].to_rad() - joints.theta_rad[leg]).abs() < 1e-12);
+                prop_assert!((closed.leg_angles[leg].to_rad() - joints.theta_rad[leg]).abs() < 1e-12);
             }
         }
     }
