@@ -76,6 +76,27 @@ impl Bench {
     }
 }
 
+/// Who waits for the link's next event finds the process data complete at the instant at which the last of them arrive, in
+/// few looks.
+#[test]
+fn the_process_data_are_complete_at_one_of_the_links_events() {
+    const EVENTS: usize = 16;
+    let mut bench = Bench::new(&Scenario::default());
+    bench.enable();
+    let sync_ns = EPOCH_NS + bench.cycle * PERIOD_NS;
+    bench.plant.begin_cycle(Wake::on_time(bench.cycle + 1, sync_ns)).unwrap();
+    let mut now_ns = sync_ns;
+    let mut looks = 0;
+    while !bench.plant.collect(now_ns).unwrap() {
+        let next_ns = bench.plant.link().next_event_ns();
+        assert!(next_ns > now_ns, "an event that is over");
+        (now_ns, looks) = (next_ns, looks + 1);
+        assert!(looks <= EVENTS, "after {} ns", now_ns - sync_ns);
+    }
+    bench.plant.fill_reading(&mut bench.reading);
+    assert_eq!(bench.reading.complete_ns, now_ns);
+}
+
 /// Joint positions of a smooth motion about the pose the rig is switched on in: 15 mm up and down, some
 /// pitch, 1.4 times a second; at rest at its beginning.
 fn targets(mechanism: &Mechanism, start: &Pose, time_s: f64) -> [f64; AXES] {
