@@ -7,6 +7,8 @@
 
 mod telling;
 
+use std::hint::black_box;
+
 use masseter_shared::config::{ControllerConfig, Scenario};
 use masseter_shared::geometry::{AXES, Actuators, Mechanism, Pose};
 use masseter_shared::messages::codes::{Cause, ControllerState, DriveState, NO_DRIVE_STATE, drive_state};
@@ -49,8 +51,8 @@ struct Estimate {
     solution: Solution,
 }
 
-/// The controller's whole memory. A copy of it is made without allocation.
-#[derive(Debug, Clone)]
+/// The controller's whole memory.
+#[derive(Debug)]
 pub struct Controller {
     mechanism: Mechanism,
     config: ControllerConfig,
@@ -169,23 +171,14 @@ impl Controller {
         Ok(())
     }
 
-    /// Works out the poses that the next cycle will want if the motion goes on. Optional: it only saves that cycle time.
-    pub fn foresee(&mut self) {
-        self.playback.foresee(self.period_s, [0.0, self.lead_s()]);
-    }
-
-    /// What the controller would be after another cycle with the last measurement. To be thrown away: computing it
-    /// brings code and data of the cycle to come back into the processor's caches.
-    #[must_use]
-    pub fn rehearsal(&self) -> Self {
-        let mut copy = self.clone();
-        if let Some(estimate) = &mut copy.estimate
-            && let Ok(solution) = copy.tracker.update(&estimate.measured)
-        {
-            estimate.solution = solution;
+    /// Solves the kinematics of the last measurement once more, without effect: a core that slept has cold caches.
+    pub fn warm_up(&self) {
+        if let Some(estimate) = &self.estimate {
+            let solution = self.tracker.clone().update(&estimate.measured);
+            let ahead = self.playback.pose_ahead(self.lead_s());
+            let joints = self.mechanism.inverse(&self.control.correct(&ahead));
+            let _ = black_box((solution, joints));
         }
-        copy.decide(Tick { cycle: self.last_cycle + 1, now_ns: 0 });
-        copy
     }
 
     /// Asks for an orderly stop.
@@ -210,16 +203,16 @@ impl Controller {
 
     /// What has been waited for too long.
     fn overdue(&self) -> Option<Fault> {
-        let patience = self.config.start_timeout_s / self.period_s;
+        let timeout_cycles = self.config.start_timeout_s / self.period_s;
         let waited = self.cycles_in_state as f64;
         let silent = self.silent_cycles as f64;
         let stale_limit = f64::from(self.config.stale_cycles);
         match self.state {
-            ControllerState::WaitReadings if waited > patience => {
-                Some(Fault::new(Cause::StaleReading, waited, patience))
+            ControllerState::WaitReadings if waited > timeout_cycles => {
+                Some(Fault::new(Cause::StaleReading, waited, timeout_cycles))
             }
-            ControllerState::Enabling | ControllerState::Disabling if waited > patience => {
-                Some(Fault::new(Cause::EnableTimeout, waited, patience))
+            ControllerState::Enabling | ControllerState::Disabling if waited > timeout_cycles => {
+                Some(Fault::new(Cause::EnableTimeout, waited, timeout_cycles))
             }
             ControllerState::WaitReadings | ControllerState::Finished | ControllerState::SafeStop => None,
             _ if silent > stale_limit => Some(Fault::new(Cause::StaleReading, silent, stale_limit)),

@@ -77,13 +77,13 @@ pub fn run(assignment: &Assignment) -> Result<Outcome, ControllerError> {
     ports.connect()?;
 
     let mut cycle = Cycle::new(start.epoch_ns + schedule.controller_at_ns, scenario.period_ns());
-    let patience_ns = (schedule.command_by_ns - schedule.controller_at_ns) / 2;
+    let reading_timeout_ns = (schedule.command_by_ns - schedule.controller_at_ns) / 2;
     while !controller.is_done() {
         if post.stop.is_made() {
             controller.request_stop();
         }
-        let wake = cycle.wait_preparing(|| rehearse(&controller, &ports))?;
-        step(&mut controller, &mut ports, wake, patience_ns, cycle.waiter())?;
+        let wake = cycle.wait_warm(|| warm_up(&controller, &ports))?;
+        step(&mut controller, &mut ports, wake, reading_timeout_ns, cycle.waiter())?;
     }
     match controller.state() {
         ControllerState::SafeStop => Ok(Outcome::SafeStop),
@@ -91,12 +91,11 @@ pub fn run(assignment: &Assignment) -> Result<Outcome, ControllerError> {
     }
 }
 
-/// What the cycle to come will do, without effect: after a sleep its code and data are no longer in the caches.
-fn rehearse(controller: &Controller, ports: &Ports) -> Result<(), ProcessError> {
-    std::hint::black_box(controller.rehearsal());
+/// Solves the last cycle's kinematics and touches the memory of the next messages.
+fn warm_up(controller: &Controller, ports: &Ports) -> Result<(), ProcessError> {
+    controller.warm_up();
     ports.commands.warm_up()?;
-    ports.states.warm_up()?;
-    Ok(())
+    Ok(ports.states.warm_up()?)
 }
 
 /// One cycle.
@@ -104,10 +103,10 @@ fn step(
     controller: &mut Controller,
     ports: &mut Ports,
     wake: Wake,
-    patience_ns: u64,
+    reading_timeout_ns: u64,
     waiter: &mut Waiter,
 ) -> Result<(), ProcessError> {
-    let deadline_ns = wake.due_ns + patience_ns;
+    let deadline_ns = wake.due_ns + reading_timeout_ns;
     let reading = ports.readings.latest_by(deadline_ns, waiter, |reading| reading.cycle >= wake.cycle)?;
     let received_ns = clock::now_ns();
     controller.observe(reading.as_deref());
@@ -126,7 +125,5 @@ fn step(
     if let Some(event) = event {
         ports.events.publish(|message| *message = event)?;
     }
-    // Behind the command, where nobody waits.
-    controller.foresee();
     Ok(())
 }

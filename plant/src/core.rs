@@ -114,6 +114,11 @@ impl<L: Link> PlantCore<L> {
         Ok(self.link.advance(now_ns)?)
     }
 
+    /// The wires.
+    pub(crate) fn link(&mut self) -> &mut L {
+        &mut self.link
+    }
+
     /// Begins a cycle: SYNC.
     pub fn begin_cycle(&mut self, wake: Wake) -> Result<(), PlantError> {
         self.cycle = wake.cycle;

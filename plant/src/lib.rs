@@ -25,7 +25,6 @@ mod link;
 mod master;
 mod mechanism;
 pub mod process;
-mod rehearsal;
 
 pub use error::PlantError;
 pub use mechanism::DynamicsError;

@@ -9,14 +9,18 @@ use masseter_shared::schedule::CycleSchedule;
 use masseter_shared::transport::{BatchOutlet, Inlet, Node, Outlet, Received};
 
 use crate::core::{PlantCore, PlantError};
+use crate::emulation::VirtualLink;
 use crate::link::Link;
-use crate::rehearsal::Rehearsal;
+use crate::link::sockets::SocketLink;
 
 /// How long the drives may take to stop after the end has been asked for, ns.
 const STOP_WITHIN_NS: u64 = 500_000_000;
 /// Cycles that they may take at least: the word goes out in one, holds from the next, and is answered in the one after
 /// the ramp.
 const STOP_WITHIN_CYCLES: u64 = 10;
+/// How long a wait for a real frame may take at most, ns: a fault may hold frames back that are due before the next
+/// frame arrives.
+const LONGEST_BLOCK_NS: u64 = 100_000;
 /// Silence after which no command will come any more, beyond the one that stops the drives, ns.
 const ABANDONED_AFTER_NS: u64 = 5_000_000_000;
 
@@ -113,21 +117,38 @@ impl Ports {
 pub fn run(assignment: &Assignment) -> Result<Reason, PlantProcessError> {
     let post = assignment.take_up()?;
     if post.scenario.can.is_virtual() {
-        let rehearsal = Rehearsal::of(&post.scenario, post.schedule)?;
-        serve(&post, PlantCore::new, rehearsal)
+        serve(&post, PlantCore::new)
     } else {
-        serve(&post, PlantCore::on_interfaces, None)
+        serve(&post, PlantCore::on_interfaces)
     }
 }
 
-fn serve<L: Link>(
+/// A link whose events a process can wait for in real time.
+trait RealTimeLink: Link {
+    /// Waits until the link may have changed, but not beyond `latest_ns`; returns the time found at the end.
+    fn wait(&mut self, latest_ns: u64, waiter: &mut Waiter) -> u64;
+}
+
+impl RealTimeLink for VirtualLink {
+    fn wait(&mut self, latest_ns: u64, waiter: &mut Waiter) -> u64 {
+        waiter.until_between(self.next_event_ns().min(latest_ns), latest_ns)
+    }
+}
+
+impl RealTimeLink for SocketLink {
+    fn wait(&mut self, latest_ns: u64, waiter: &mut Waiter) -> u64 {
+        let until_ns = latest_ns.min(clock::now_ns() + LONGEST_BLOCK_NS);
+        waiter.until_woken(until_ns, latest_ns, |until_ns| self.wait_for_frame(until_ns))
+    }
+}
+
+fn serve<L: RealTimeLink>(
     post: &Post,
     build: impl Fn(&Scenario, u64) -> Result<PlantCore<L>, PlantError>,
-    mut rehearsal: Option<Rehearsal>,
 ) -> Result<Reason, PlantProcessError> {
     let (scenario, schedule) = (&post.scenario, &post.schedule);
     let timeout_cycles = u64::from(scenario.can.command_timeout_cycles);
-    let patience_cycles = timeout_cycles + ABANDONED_AFTER_NS / scenario.period_ns();
+    let abandoned_cycles = timeout_cycles + ABANDONED_AFTER_NS / scenario.period_ns();
     // Built once before the start, so that a plant that cannot be built is never reported ready.
     build(scenario, 0)?;
     let mut ports = Ports::open(&post.node)?;
@@ -136,22 +157,14 @@ fn serve<L: Link>(
 
     let mut plant = build(scenario, start.epoch_ns)?;
     let mut cycle = Cycle::new(start.epoch_ns, scenario.period_ns());
-    while !post.stop.is_made() && u64::from(plant.silent_cycles()) <= patience_cycles {
-        let wake = cycle.wait_preparing(|| {
-            prepare(&mut plant, &ports)?;
-            // One that fails is given up: all that is lost is warm caches.
-            rehearsal.take_if(|rehearsal| rehearsal.play().is_err());
-            Ok::<_, PlantProcessError>(())
-        })?;
+    while !post.stop.is_made() && u64::from(plant.silent_cycles()) <= abandoned_cycles {
+        let wake = cycle.wait_warm(|| warm_up(&mut plant, &ports))?;
         exchange(&mut plant, &mut ports, schedule, wake, cycle.waiter())?;
         // No command can come before the controller wakes.
-        cycle.waiter().until(wake.due_ns + schedule.controller_at_ns);
-        let deadline_ns = wake.due_ns + schedule.command_by_ns;
-        let command = ports.command_of(wake.cycle, deadline_ns, cycle.waiter())?;
+        let command_by_ns = wake.due_ns + schedule.command_by_ns;
+        cycle.waiter().until_between(wake.due_ns + schedule.controller_at_ns, command_by_ns);
+        let command = ports.command_of(wake.cycle, command_by_ns, cycle.waiter())?;
         plant.apply(clock::now_ns(), command.as_deref())?;
-        if let (Some(rehearsal), Some(command)) = (&mut rehearsal, command.as_deref()) {
-            rehearsal.hear(command);
-        }
     }
     plant.stop();
     let give_up_ns = clock::now_ns() + STOP_WITHIN_NS.max(STOP_WITHIN_CYCLES * scenario.period_ns());
@@ -166,15 +179,15 @@ fn serve<L: Link>(
     Ok(if post.stop.is_made() { Reason::Asked } else { Reason::Abandoned })
 }
 
-/// Works out what has happened by now, and brings the way out back into the caches.
-fn prepare(plant: &mut PlantCore<impl Link>, ports: &Ports) -> Result<(), PlantProcessError> {
+/// Works out what has happened on the wires by now, and touches the memory of the next messages.
+fn warm_up(plant: &mut PlantCore<impl Link>, ports: &Ports) -> Result<(), PlantProcessError> {
     plant.advance(clock::now_ns())?;
     Ok(ports.warm_up()?)
 }
 
 /// SYNC, the drives' process data, and what the cycle publishes.
 fn exchange(
-    plant: &mut PlantCore<impl Link>,
+    plant: &mut PlantCore<impl RealTimeLink>,
     ports: &mut Ports,
     schedule: &CycleSchedule,
     wake: Wake,
@@ -184,12 +197,9 @@ fn exchange(
     // SYNC went out when the process woke; a late one shifts what follows, so that the reading is late
     // but complete.
     let reading_by_ns = wake.woke_ns + schedule.reading_by_ns;
-    // What the first frames bring about is worked out while the last ones are on their way.
-    let mut now_ns =
-        waiter.until_working(wake.woke_ns + schedule.reading_from_ns, |now_ns| plant.advance(now_ns))?;
-    // Collecting moves the mechanism: each look is work, not a part of one long wait.
+    let mut now_ns = waiter.until_between(wake.woke_ns + schedule.reading_from_ns, reading_by_ns);
     while !plant.collect(now_ns)? && now_ns < reading_by_ns {
-        now_ns = waiter.spin().now_ns();
+        now_ns = plant.link().wait(reading_by_ns, waiter);
     }
     Ok(ports.publish(plant)?)
 }

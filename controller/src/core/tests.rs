@@ -247,23 +247,3 @@ fn the_drives_are_switched_on_only_after_complete_readings_in_a_row() {
         assert_eq!(bench.controller.state(), ControllerState::Enabling);
     }
 }
-
-/// All that a cycle computes is computed on the copy, the next targets among it.
-#[test]
-fn a_rehearsal_decides_the_cycle_to_come() {
-    let mut bench = Bench::new();
-    bench.run_until(ControllerState::Running);
-    (0..300).for_each(|_| bench.cycle(Some));
-    let rehearsed = bench.controller.rehearsal();
-    bench.cycle(Some);
-    let command = |controller: &Controller| {
-        let mut command = Command::default();
-        controller.fill_command(&mut command);
-        command
-    };
-    let (rehearsed, played) = (command(&rehearsed), command(&bench.controller));
-    assert_eq!((rehearsed.cycle, rehearsed.request), (played.cycle, played.request));
-    for (rehearsed_m, played_m) in rehearsed.target_m.iter().zip(played.target_m) {
-        assert!((rehearsed_m - played_m).abs() < 1e-6, "{rehearsed_m} {played_m}");
-    }
-}

@@ -72,7 +72,7 @@ impl Emulator {
         while !stop.is_made() {
             // A frame that arrived during the last deliveries is fetched already: no socket would wake for it.
             if self.earliest().is_none() {
-                SocketCan::wait(&self.ports, clock::now_ns() + LONGEST_WAIT_NS);
+                SocketCan::wait::<AXES>(&self.ports, clock::now_ns() + LONGEST_WAIT_NS);
             }
             self.advance(clock::now_ns())?;
         }

@@ -90,6 +90,13 @@ impl VirtualLink {
         self.wires[bus].port(port)
     }
 
+    /// When the next frame arrives or the drives make their next step: until then nothing changes unless a frame is
+    /// queued, ns.
+    pub(crate) fn next_event_ns(&mut self) -> u64 {
+        let step_ns = self.emulation.next_step_ns();
+        self.next_arrival().map_or(step_ns, |(time_ns, _)| time_ns.min(step_ns))
+    }
+
     /// The next frame to arrive on any wire.
     fn next_arrival(&mut self) -> Option<(u64, usize)> {
         let arrivals = self.wires.iter_mut().enumerate();

@@ -5,6 +5,7 @@ use masseter_can::canopen::NodeId;
 use masseter_can::faults::FaultNote;
 use masseter_can::{Bus, ReceiveError, SocketCan, Tapped};
 use masseter_shared::config::Scenario;
+use masseter_shared::geometry::AXES;
 use masseter_shared::messages::Truth;
 
 use super::faults::{fault_seed, faults_of_bus, restart_after_ns};
@@ -41,6 +42,11 @@ impl SocketLink {
         let lock = |interface: &String| InterfaceLock::take(interface);
         let locks = can.interfaces.iter().map(lock).collect::<Result<_, _>>()?;
         Ok(Self { ports, faults, taps, _locks: locks })
+    }
+
+    /// Blocks until a frame for the master arrives on a wire, at most until `until_ns`.
+    pub(crate) fn wait_for_frame(&self, until_ns: u64) {
+        SocketCan::wait::<AXES>(&self.ports, until_ns);
     }
 }
 
