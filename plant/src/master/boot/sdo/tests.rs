@@ -1,4 +1,4 @@
-//! The client against scripts of requests and answers as the standard has them.
+//! The client against scripts of requests and answers of the standard.
 
 use super::*;
 
@@ -59,7 +59,7 @@ fn a_refusal_names_object_and_reason() {
 }
 
 #[test]
-fn a_toggle_bit_that_stands_still_ends_the_transfer_on_both_sides() {
+fn a_toggle_bit_that_does_not_alternate_ends_the_transfer_on_both_sides() {
     let mut client = reading(NAME);
     let initiate = ([0x40, 0x08, 0x10, 0, 0, 0, 0, 0], [0x41, 0x08, 0x10, 0, 9, 0, 0, 0]);
     play(&mut client, &[initiate, ([0x60, 0, 0, 0, 0, 0, 0, 0], [0x10, 1, 2, 3, 4, 5, 6, 7])]);
@@ -96,7 +96,7 @@ fn silence_is_answered_by_asking_again_and_then_given_up() {
 }
 
 #[test]
-fn answers_nobody_asked_for_change_nothing() {
+fn answers_without_a_request_change_nothing() {
     let answer = SdoResponse::Download { object: HEARTBEAT };
     assert_eq!(SdoClient::default().take(answer), Taken::Unasked);
     let mut client = reading(NAME);
