@@ -202,13 +202,13 @@ impl Peer {
             address => self.objects.get(&address),
         };
         match value {
-            Some(value) => match Expedited::new(value) {
-                Ok(data) => SdoResponse::Upload { object, data },
-                Err(_) => {
-                    self.segment = value.clone();
-                    SdoResponse::InitiateUpload { object, size: Some(self.segment.len() as u32) }
-                }
-            },
+            Some(value) => {
+                self.segment = value.clone();
+                Expedited::new(value)
+                    .map_or(SdoResponse::InitiateUpload { object, size: Some(value.len() as u32) }, |data| {
+                        SdoResponse::Upload { object, data }
+                    })
+            }
             None => SdoResponse::Abort { object, code: AbortCode::NO_OBJECT },
         }
     }
