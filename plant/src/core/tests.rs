@@ -1,4 +1,4 @@
-//! Scenarios of the whole plant under virtual time, with a commander that knows inverse kinematics only.
+//! Scenarios of the whole plant under virtual time, with a commander that uses inverse kinematics only.
 
 use masseter_can::canopen::{Cob, NodeId};
 use masseter_shared::geometry::{AXES, Mechanism, MechanismConfig, Pose, Vec3};
@@ -55,7 +55,7 @@ impl Bench {
         self.plant.drain_events(&mut |event| self.events.push(event));
     }
 
-    /// Cycles in which the drives are asked to hold where they stand, until all are enabled.
+    /// Runs cycles with a request to hold the actual position, until all drives are enabled.
     fn enable(&mut self) {
         for _ in 0..500 {
             self.cycle(Some(&|reading| (reading.position_m, DriveRequest::Enable)));
@@ -192,7 +192,7 @@ fn without_the_master_the_drives_stop_by_themselves() {
 }
 
 #[test]
-fn a_bad_command_stops_the_rig_and_its_bad_value_is_told() {
+fn a_bad_command_stops_the_rig_and_its_bad_value_is_reported() {
     let standing = Bench::new(&Scenario::default()).truth.joint_m;
     let with = |axis: usize, target_m: f64| {
         let mut targets_m = standing;

@@ -20,7 +20,7 @@ const STEP_NS: u64 = 125_000;
 const STEPS_PER_MS: u64 = 1_000_000 / STEP_NS;
 const MASS_KG: f64 = 0.6;
 const LOAD_N: f64 = 5.0;
-/// Where the axis stands at first, between two reference marks.
+/// Initial position of the axis, between two reference marks.
 const START: i32 = 270_700;
 const LIMITS: [i32; 2] = [220_000, 360_000];
 
@@ -126,7 +126,7 @@ impl Bench {
         self.receive(Nmt { command, target: NmtTarget::All }.frame());
     }
 
-    /// SYNC; what the drive answered.
+    /// Sends SYNC; returns the drive's answer.
     fn sync(&mut self) -> Vec<Frame> {
         let before = self.sent.len();
         self.receive(sync::frame());

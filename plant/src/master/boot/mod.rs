@@ -7,7 +7,7 @@ mod plan;
 mod sdo;
 
 use masseter_can::canopen::{
-    AbortCode, CobId, NmtCommand, NmtState, NodeId, ObjectAddress, SdoRequest, SdoResponse,
+    AbortCode, CobId, Expedited, NmtCommand, NmtState, NodeId, ObjectAddress, SdoRequest, SdoResponse,
 };
 use masseter_can::cia402::{DriveState, Statusword};
 use masseter_shared::clock::MILLISECOND_NS;
@@ -73,7 +73,8 @@ pub(super) struct Boot {
     steps: Vec<Step>,
     next: usize,
     readings: u32,
-    kept: Data,
+    /// The value to be written back.
+    kept: Expedited,
     client: SdoClient,
     restarts: u32,
     has_repeated: bool,
@@ -90,7 +91,7 @@ impl Boot {
             steps: plan(node, setup),
             next: 0,
             readings: 0,
-            kept: Data::EMPTY,
+            kept: Expedited::of_unknown_size([0; Expedited::MAX]),
             client: SdoClient::default(),
             restarts: 0,
             has_repeated: false,
@@ -263,7 +264,7 @@ impl Boot {
                 self.client.read(STATUSWORD);
             }
             Step::Write { object, value, bytes } | Step::Offer { object, value, bytes } => {
-                let value = Data::new(&value.to_le_bytes()[..bytes]).expect("at most four bytes");
+                let value = Expedited::new(&value.to_le_bytes()[..bytes]).expect("one to four bytes");
                 self.client.write(object, value);
             }
             Step::WriteKept(object) => self.client.write(object, self.kept),
@@ -289,7 +290,7 @@ impl Boot {
             }
             Step::ExpectNoFault if in_fault(number) => {
                 self.readings += 1;
-                let code = self.kept.number().unwrap_or(0);
+                let code = self.kept.data().iter().rfold(0, |code, &byte| code << 8 | u32::from(byte));
                 let fault = BootFault::new(Cause::FaultAtStart).at(STATUSWORD, code, 0);
                 return if self.readings < READINGS { Ok(()) } else { Err(fault) };
             }
@@ -299,7 +300,10 @@ impl Boot {
                 return if self.readings < READINGS { Ok(()) } else { Err(fault) };
             }
             Step::If { condition, .. } => holds = self.holds(condition, number),
-            Step::Keep(_) => self.kept = read,
+            Step::Keep(object) => {
+                let wrong_length = BootFault::new(Cause::SdoAborted).at(object, AbortCode::LENGTH.0, 0);
+                self.kept = Expedited::new(read.bytes()).map_err(|_| wrong_length)?;
+            }
             _ => {}
         }
         self.end_step(holds);
@@ -312,7 +316,7 @@ impl Boot {
             Condition::InFault => in_fault(number),
             Condition::Exchanged(_) => {
                 let cob_id = CobId(number);
-                self.kept = Data::new(&cob_id.invalidated().0.to_le_bytes()).expect("four bytes");
+                self.kept = Expedited::new(&cob_id.invalidated().0.to_le_bytes()).expect("four bytes");
                 cob_id.is_valid()
             }
         }

@@ -1,5 +1,5 @@
 //! The SDO client (CiA 301, 7.2.4): one entry of one drive's object dictionary read or written at a
-//! time, expedited or in segments.
+//! time. Values are read expedited or in segments and written expedited.
 //!
 //! A pure state machine: [`SdoClient::poll`] returns the request to send, [`SdoClient::take`] takes the answer.
 //! It knows neither frames nor buses, and keeps values of at most [`Data::MAX`] bytes. Block transfer is not
@@ -14,7 +14,7 @@ pub(super) const TIMEOUT_NS: u64 = 1_000_000_000;
 pub(super) const ATTEMPTS: u32 = 3;
 
 /// An object's value as bytes.
-#[derive(Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Data {
     /// Bytes beyond `length` are zero.
     bytes: [u8; Self::MAX],
@@ -26,12 +26,6 @@ impl Data {
     pub(super) const MAX: usize = 64;
 
     pub(super) const EMPTY: Self = Self { bytes: [0; Self::MAX], length: 0 };
-
-    /// A value; `None` with more than [`Data::MAX`] bytes.
-    pub(super) fn new(bytes: &[u8]) -> Option<Self> {
-        let mut data = Self::EMPTY;
-        data.append(bytes).then_some(data)
-    }
 
     /// The bytes.
     pub(super) fn bytes(&self) -> &[u8] {
@@ -52,19 +46,6 @@ impl Data {
         place.copy_from_slice(bytes);
         self.length = end;
         true
-    }
-
-    /// The segment that begins at `offset`, and whether it is the last.
-    fn segment(&self, offset: usize) -> (Segment, bool) {
-        let rest = &self.bytes()[offset.min(self.length)..];
-        let length = rest.len().min(Segment::MAX);
-        (Segment::new(&rest[..length]).expect("no more than a segment holds"), length == rest.len())
-    }
-}
-
-impl std::fmt::Debug for Data {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "Data({:02X?})", self.bytes())
     }
 }
 
@@ -101,7 +82,7 @@ pub(super) enum Taken {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Direction {
     Read,
-    Write(Data),
+    Write(Expedited),
 }
 
 /// Step of a transfer.
@@ -111,8 +92,6 @@ enum Step {
     Initiate,
     /// Segments of a read, the toggle bit of the next.
     ReadSegment { toggle: bool },
-    /// Segments of a write: toggle bit and offset of the next.
-    WriteSegment { toggle: bool, offset: usize },
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -141,7 +120,7 @@ impl SdoClient {
     }
 
     /// Begins to write an object; a transfer under way is forgotten.
-    pub(super) fn write(&mut self, object: ObjectAddress, data: Data) {
+    pub(super) fn write(&mut self, object: ObjectAddress, data: Expedited) {
         self.begin(object, Direction::Write(data));
     }
 
@@ -243,31 +222,24 @@ impl Transfer {
         let object = self.object;
         match (self.step, self.direction) {
             (Step::Initiate, Direction::Read) => SdoRequest::InitiateUpload { object },
-            (Step::Initiate, Direction::Write(value)) => match Expedited::new(value.bytes()) {
-                Ok(data) => SdoRequest::Download { object, data },
-                Err(_) => SdoRequest::InitiateDownload { object, size: Some(value.length as u32) },
-            },
+            (Step::Initiate, Direction::Write(data)) => SdoRequest::Download { object, data },
             (Step::ReadSegment { toggle }, _) => SdoRequest::UploadSegment { toggle },
-            (Step::WriteSegment { toggle, offset }, Direction::Write(value)) => {
-                let (data, is_last) = value.segment(offset);
-                SdoRequest::DownloadSegment { toggle, data, is_last }
-            }
-            (Step::WriteSegment { .. }, Direction::Read) => unreachable!("only writes send segments"),
         }
     }
 
     fn advance(&mut self, response: SdoResponse) -> Progress {
+        let reads = self.direction == Direction::Read;
         match (response, self.step) {
             (SdoResponse::Abort { object, code }, _) if object == self.object => Progress::Refused(code),
-            (SdoResponse::Download { object }, Step::Initiate) if object == self.object => self.written(),
-            (SdoResponse::Upload { object, data }, Step::Initiate)
-                if object == self.object && self.direction == Direction::Read =>
-            {
+            (SdoResponse::Download { object }, Step::Initiate) if object == self.object && !reads => {
+                Progress::Done
+            }
+            (SdoResponse::Upload { object, data }, Step::Initiate) if object == self.object && reads => {
                 self.received.append(data.data());
                 Progress::Done
             }
             (SdoResponse::InitiateUpload { object, size }, Step::Initiate)
-                if object == self.object && self.direction == Direction::Read =>
+                if object == self.object && reads =>
             {
                 if size.is_some_and(|size| size as usize > Data::MAX) {
                     return Progress::Broken(AbortCode::OUT_OF_MEMORY);
@@ -279,22 +251,7 @@ impl Transfer {
                 SdoResponse::UploadSegment { toggle, data, is_last },
                 Step::ReadSegment { toggle: expected },
             ) => self.read_segment(toggle == expected, data, is_last, expected),
-            (SdoResponse::DownloadSegment { toggle }, Step::WriteSegment { toggle: expected, offset }) => {
-                self.wrote_segment(toggle == expected, offset, expected)
-            }
             _ => Progress::Foreign,
-        }
-    }
-
-    /// The first answer to a write.
-    fn written(&mut self) -> Progress {
-        match self.direction {
-            Direction::Read => Progress::Foreign,
-            Direction::Write(value) if Expedited::new(value.bytes()).is_ok() => Progress::Done,
-            Direction::Write(_) => {
-                self.step = Step::WriteSegment { toggle: false, offset: 0 };
-                Progress::Continue
-            }
         }
     }
 
@@ -307,18 +264,6 @@ impl Transfer {
         }
         self.step = Step::ReadSegment { toggle: !toggle };
         if is_last { Progress::Done } else { Progress::Continue }
-    }
-
-    fn wrote_segment(&mut self, alternates: bool, offset: usize, toggle: bool) -> Progress {
-        let Direction::Write(value) = self.direction else { return Progress::Foreign };
-        if !alternates {
-            return Progress::Broken(AbortCode::TOGGLE);
-        }
-        if value.segment(offset).1 {
-            return Progress::Done;
-        }
-        self.step = Step::WriteSegment { toggle: !toggle, offset: offset + Segment::MAX };
-        Progress::Continue
     }
 }
 

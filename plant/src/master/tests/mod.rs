@@ -1,4 +1,4 @@
-//! Scenarios of the master with drives that do what a test wants of them.
+//! Scenarios of the master with scripted drives.
 
 mod boot;
 mod peer;

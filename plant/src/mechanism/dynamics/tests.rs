@@ -24,7 +24,7 @@ fn step(dynamics: &mut Dynamics, force_n: &[f64; AXES], dt_s: f64) {
 }
 
 #[test]
-fn friction_ends_a_motion_in_steps_that_it_bears_and_feeds_it_in_longer_ones() {
+fn friction_ends_a_motion_in_stable_steps_and_feeds_it_in_longer_ones() {
     let slow = 1e-6;
     let speed_after = |share_of_longest: f64| {
         let mut dynamics = at_rest(DynamicsConfig { gravity_m_s2: 0.0, ..DynamicsConfig::default() });

@@ -1,4 +1,4 @@
-//! The server with a dictionary of two entries, and what breaks a transfer.
+//! The server with a dictionary of two entries, and reasons that end a transfer.
 
 use super::*;
 
@@ -120,7 +120,7 @@ fn block_transfer_is_unknown_and_a_short_frame_is_ignored() {
 }
 
 #[test]
-fn a_client_that_falls_silent_is_told_after_a_second() {
+fn a_client_that_falls_silent_gets_an_abort_after_a_second() {
     let mut client = Client::new();
     client.ask(SdoRequest::InitiateUpload { object: TEXT });
     assert_eq!(client.server.expire(TIMEOUT_NS), None);
