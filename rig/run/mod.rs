@@ -65,10 +65,7 @@ pub fn run(args: &RunArgs) -> Result<Exit, Failure> {
     if manifest.ending == Ending::Interrupted && is_in_processes && manifest.scheduling.is_empty() {
         return Ok(Exit::Interrupted);
     }
-    let figures = masseter_analysis::analyse(&folder, &plan.scenario)
-        .context("the run's recording cannot be analysed")
-        .incomplete()?;
-    masseter_report::write(&folder, &manifest, &figures, args.format)
+    masseter_report::report_run(&folder, &manifest, args.format)
 }
 
 /// Plans the run that the arguments ask for, and refuses what this machine does not have.

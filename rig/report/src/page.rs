@@ -4,14 +4,13 @@ use std::fmt::Write;
 
 use masseter_shared::config::MotionConfig;
 
-use super::junit::escape;
-use super::plot::Drawn;
-use super::table::{self, in_words, microseconds, or_dash};
-use super::{charts, events, film, usage};
 use crate::checks::CheckResult;
 use crate::outcome::Outcome;
+use crate::plot::Drawn;
+use crate::text::{escape, event_with_cycle, microseconds, or_dash};
 use crate::verdict::Verdict;
-use masseter_analysis::{BusResponse, Figures, Reference, Track};
+use crate::{animation, charts, table, time_line, usage};
+use masseter_analysis::{BusResponse, Figures, PoseSource, Track};
 use masseter_recording::Manifest;
 
 const STYLE: &str = include_str!("page/style.css");
@@ -21,7 +20,7 @@ const MECHANISM: &str = include_str!("page/mechanism.js");
 const BANDS: &str = "Each curve touches the lowest and the highest value of every stretch of time.";
 
 /// The page.
-pub(super) fn of_run(manifest: &Manifest, figures: &Figures, verdict: &Verdict) -> String {
+pub(crate) fn html(manifest: &Manifest, figures: &Figures, verdict: &Verdict) -> String {
     let mut page = String::new();
     write_page(&mut page, manifest, figures, verdict).expect("a string takes any text");
     page
@@ -49,7 +48,7 @@ fn write_page(
     latencies(page, manifest, figures)?;
     worst_cycles(page, figures)?;
     messages(page, figures)?;
-    happenings(page, figures)?;
+    events(page, figures)?;
     circumstances(page, manifest)
 }
 
@@ -66,8 +65,8 @@ fn checks(page: &mut String, verdict: &Verdict) -> std::fmt::Result {
 
 /// The 3-D view with its data and its program.
 fn mechanism(page: &mut String, manifest: &Manifest, figures: &Figures) -> std::fmt::Result {
-    let Some(film) = film::of_run(&manifest.scenario, figures) else { return Ok(()) };
-    let outlines = outlines(figures.tracking.reference);
+    let Some(animation) = animation::json(&manifest.scenario, figures) else { return Ok(()) };
+    let outlines = outlines(figures.tracking.actual_source);
     let extent = extent(&figures.track);
     // JSON of numbers and fixed names holds no `<` that could end the element.
     writeln!(
@@ -76,7 +75,7 @@ fn mechanism(page: &mut String, manifest: &Manifest, figures: &Figures) -> std::
          <p><button id=\"play\">pause</button> <input id=\"time\" type=\"range\" min=\"0\" max=\"1\" step=\"any\" value=\"0\"> \
          <span id=\"clock\"></span><br>Platform: {outlines}; \
          <span style=\"color:#b00020\">incisal point and condyles</span>. {extent}Drag to turn.</p>\n\
-         <script type=\"application/json\" id=\"film\">{film}</script>\n<script>\n{MECHANISM}</script>"
+         <script type=\"application/json\" id=\"film\">{animation}</script>\n<script>\n{MECHANISM}</script>"
     )
 }
 
@@ -94,11 +93,11 @@ fn extent(track: &Track) -> String {
 }
 
 /// What the platform's outlines stand for.
-fn outlines(reference: Reference) -> String {
-    let found = format!("<span style=\"color:#0072b2\">{}</span>", reference.adjective());
-    let estimated = match reference {
-        Reference::Truth => ", <span style=\"color:#d55e00\">estimated (dashed)</span>",
-        Reference::Estimate => "",
+fn outlines(source: PoseSource) -> String {
+    let found = format!("<span style=\"color:#0072b2\">{}</span>", source.adjective());
+    let estimated = match source {
+        PoseSource::Truth => ", <span style=\"color:#d55e00\">estimated (dashed)</span>",
+        PoseSource::Estimate => "",
     };
     format!("{found}{estimated}, <span style=\"color:#009e73\">wanted (dotted)</span>")
 }
@@ -233,11 +232,11 @@ fn responses(page: &mut String, response: &BusResponse) -> std::fmt::Result {
     Ok(())
 }
 
-fn happenings(page: &mut String, figures: &Figures) -> std::fmt::Result {
-    let time_line = events::time_line(figures).unwrap_or_else(|| "Nothing happened.".to_owned());
+fn events(page: &mut String, figures: &Figures) -> std::fmt::Result {
+    let time_line = time_line::svg(figures).unwrap_or_else(|| "Nothing happened.".to_owned());
     write!(page, "<h2>Events</h2>\n<div id=\"events\">{time_line}</div>\n<ul>\n")?;
     for event in &figures.events {
-        writeln!(page, "<li><code>{}</code>", escape(&in_words(event)))?;
+        writeln!(page, "<li><code>{}</code>", escape(&event_with_cycle(event)))?;
     }
     page.push_str("</ul>\n");
     Ok(())
@@ -275,7 +274,7 @@ fn circumstances(page: &mut String, manifest: &Manifest) -> std::fmt::Result {
             writeln!(page, "<p>{name}: {}</p>", escape(refusal))?;
         }
     }
-    usage::table(page, &manifest.usage)
+    usage::page_table(page, &manifest.usage)
 }
 
 #[cfg(test)]
@@ -284,7 +283,7 @@ mod tests {
 
     #[test]
     fn without_truth_nothing_is_called_true() {
-        assert!(outlines(Reference::Truth).contains("true"));
-        assert!(!outlines(Reference::Estimate).contains("true"));
+        assert!(outlines(PoseSource::Truth).contains("true"));
+        assert!(!outlines(PoseSource::Estimate).contains("true"));
     }
 }

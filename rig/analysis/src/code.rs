@@ -1,31 +1,31 @@
-//! Codes of messages, also those that a recording of another version may carry.
+//! Codes in messages. A recording of another version may hold codes that this program does not know.
 
 use std::fmt;
 
 use serde::{Serialize, Serializer};
 
-/// What a code means, or its number where this program knows no meaning.
+/// The meaning of a code, or its number where this program knows no meaning.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Coded<T> {
-    /// It means this.
+pub enum Code<T> {
+    /// The meaning.
     Known(T),
     /// The number.
     Unknown(u32),
 }
 
-impl<T: TryFrom<u32>> From<u32> for Coded<T> {
+impl<T: TryFrom<u32>> From<u32> for Code<T> {
     fn from(code: u32) -> Self {
         T::try_from(code).map_or(Self::Unknown(code), Self::Known)
     }
 }
 
-impl<T: PartialEq> PartialEq<T> for Coded<T> {
+impl<T: PartialEq> PartialEq<T> for Code<T> {
     fn eq(&self, other: &T) -> bool {
         matches!(self, Self::Known(known) if known == other)
     }
 }
 
-impl<T: fmt::Display> fmt::Display for Coded<T> {
+impl<T: fmt::Display> fmt::Display for Code<T> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Known(known) => known.fmt(f),
@@ -35,7 +35,7 @@ impl<T: fmt::Display> fmt::Display for Coded<T> {
 }
 
 /// As its name.
-impl<T: fmt::Display> Serialize for Coded<T> {
+impl<T: fmt::Display> Serialize for Code<T> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         serializer.collect_str(self)
     }
@@ -49,9 +49,9 @@ mod tests {
 
     #[test]
     fn a_code_is_told_by_its_name_and_one_without_a_meaning_by_its_number() {
-        let fault = Coded::<EventKind>::from(EventKind::Fault.code());
+        let fault = Code::<EventKind>::from(EventKind::Fault.code());
         assert!(fault == EventKind::Fault && fault != EventKind::Transition);
-        let unknown = Coded::<EventKind>::from(4000);
+        let unknown = Code::<EventKind>::from(4000);
         assert!(EventKind::ALL.iter().all(|kind| unknown != *kind));
         assert_eq!(serde_json::to_string(&[fault, unknown]).unwrap(), r#"["fault","code 4000"]"#);
     }

@@ -1,4 +1,4 @@
-//! HdrHistogram's interval logs: a line an interval, a second each, written in V2 and read as one histogram.
+//! HdrHistogram's interval logs (`*.hlog`): a line for each second, written in format V2 and read as one histogram.
 
 use std::borrow::Borrow;
 use std::fs::{self, File};
@@ -6,19 +6,45 @@ use std::io::{self, BufWriter, Write};
 use std::path::Path;
 use std::time::Duration;
 
-use base64::Engine;
-use base64::prelude::BASE64_STANDARD;
+use data_encoding::BASE64;
 use hdrhistogram::Histogram;
 use hdrhistogram::serialization::interval_log::{
     IntervalLogIterator, IntervalLogWriterBuilder, IntervalLogWriterError, LogEntry,
 };
 use hdrhistogram::serialization::{Deserializer, V2DeflateSerializer};
+use masseter_analysis::IntervalFigures;
 use masseter_shared::clock::SECOND_NS;
 
-/// What one line covers, ns.
+use crate::write_error::WriteError;
+
+/// Time that one line covers, ns.
 pub const INTERVAL_NS: u64 = SECOND_NS;
 
-/// Writes a log: intervals with the times of their beginnings, ns.
+/// Writes the samples of each interval of a run into `folder`, which is created if it does not exist.
+pub(crate) fn write_all(folder: &Path, intervals: &[IntervalFigures]) -> Result<(), WriteError> {
+    fs::create_dir_all(folder).map_err(WriteError::for_file(folder))?;
+    for interval in intervals {
+        let path = folder.join(format!("{}.hlog", interval.name.replace(' ', "-")));
+        write(&path, &format!("masseter: {}, ns", interval.name), interval.seconds.iter())
+            .map_err(WriteError::for_file(&path))?;
+    }
+    Ok(())
+}
+
+/// Writes a log: the beginning of each second, ns, and its histogram.
+///
+/// ```
+/// use hdrhistogram::Histogram;
+/// use masseter_report::histogram_log;
+///
+/// let folder = tempfile::tempdir()?;
+/// let path = folder.path().join("latency.hlog");
+/// let mut second = Histogram::new(3)?;
+/// second.record(1000)?;
+/// histogram_log::write(&path, "latency, ns", [(0, &second)])?;
+/// assert_eq!(histogram_log::read(&path)?, second);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn write<H: Borrow<Histogram<u64>>>(
     path: &Path,
     comment: &str,
@@ -37,18 +63,18 @@ pub fn write<H: Borrow<Histogram<u64>>>(
             },
         )?;
     }
-    // What a short log holds is nowhere but in memory until now.
+    // A short log fits into the buffer: until here it is in memory only.
     file.flush()
 }
 
-/// Reads all intervals of a log together.
+/// Reads all seconds of a log into one histogram.
 pub fn read(path: &Path) -> io::Result<Histogram<u64>> {
     let text = fs::read(path)?;
     let mut all = Histogram::new(3).expect("three digits are allowed");
     for entry in IntervalLogIterator::new(&text) {
-        let entry = entry.map_err(|error| invalid(format!("it holds what is no interval: {error:?}")))?;
+        let entry = entry.map_err(|error| invalid(format!("a line holds no interval: {error:?}")))?;
         let LogEntry::Interval(interval) = entry else { continue };
-        let bytes = BASE64_STANDARD.decode(interval.encoded_histogram()).map_err(invalid)?;
+        let bytes = BASE64.decode(interval.encoded_histogram().as_bytes()).map_err(invalid)?;
         let interval: Histogram<u64> =
             Deserializer::new().deserialize(&mut bytes.as_slice()).map_err(invalid)?;
         all.add(interval).map_err(invalid)?;

@@ -1,4 +1,4 @@
-//! One of two runs: its verdict and figures by its summary, its circumstances by its manifest.
+//! One of two runs: verdict and figures from its summary, circumstances from its manifest.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -8,16 +8,18 @@ use anyhow::{Context, bail, ensure};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
+use crate::summary::FORM;
+
 use super::changes::{flatten, leaves};
 
 use masseter_recording::RunFolder;
 
-/// What of a manifest makes two runs comparable, beside the scenario.
+/// Keys of the manifest that must agree for two runs to be comparable.
 const CIRCUMSTANCES: [&str; 4] = ["scenario", "clock", "machine", "masseter"];
 
 /// One run.
 #[derive(Debug, Serialize)]
-pub(super) struct Side {
+pub(super) struct ComparedRun {
     pub path: String,
     pub verdict: Verdict,
     #[serde(skip)]
@@ -26,7 +28,7 @@ pub(super) struct Side {
     pub circumstances: BTreeMap<String, String>,
 }
 
-/// How a run ended, by its summary.
+/// The verdict in a summary.
 #[derive(Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Verdict {
     pub word: String,
@@ -41,7 +43,7 @@ pub(super) struct Difference {
     pub b: Option<String>,
 }
 
-impl Side {
+impl ComparedRun {
     pub(super) fn read(path: &Path) -> anyhow::Result<Self> {
         let folder = RunFolder::open(path)?;
         let summary = folder.summary();
@@ -49,12 +51,12 @@ impl Side {
         let found = json(&summary).with_context(help)?;
         let manifest = folder.manifest();
         let circumstances = json(&manifest).with_context(|| manifest.display().to_string())?;
-        Self::of(&path.display().to_string(), &found, &circumstances).with_context(help)
+        Self::new(&path.display().to_string(), &found, &circumstances).with_context(help)
     }
 
-    pub(super) fn of(path: &str, summary: &Value, manifest: &Value) -> anyhow::Result<Self> {
+    pub(super) fn new(path: &str, summary: &Value, manifest: &Value) -> anyhow::Result<Self> {
         let form = &summary["form"];
-        ensure!(*form == crate::FORM, "it has form {form}, this program compares form {}", crate::FORM);
+        ensure!(*form == FORM, "it has form {form}, this program compares form {}", FORM);
         let Value::Object(_) = &summary["figures"] else { bail!("it has no figures") };
         let verdict = Verdict::deserialize(&summary["verdict"]).context("it has no verdict")?;
         let of_manifest = CIRCUMSTANCES.map(|key| (key.to_owned(), manifest[key].clone()));
@@ -97,7 +99,7 @@ mod tests {
             (json!({"form": 1, "figures": {}}), Some("it has no verdict")),
             (json!([]), Some("it has form null")),
         ] {
-            let refusal = Side::of("A", &summary, &json!({})).err().map(|error| error.to_string());
+            let refusal = ComparedRun::new("A", &summary, &json!({})).err().map(|error| error.to_string());
             match (&refusal, why) {
                 (Some(refusal), Some(why)) => assert!(refusal.contains(why), "{refusal}"),
                 _ => assert_eq!((refusal.as_deref(), why), (None, None)),

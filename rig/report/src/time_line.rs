@@ -1,26 +1,25 @@
-//! Events along the run's time, as SVG: a row a source, a mark an event.
+//! Events over time as SVG: a row for each source, a mark for each event.
 
 use std::fmt::Write;
 
 use masseter_shared::messages::codes::{EventKind, Source};
 
-use super::junit::escape;
-use super::table::in_words;
-use masseter_analysis::{Coded, EventRecord, Figures};
+use crate::text::{escape, event_with_cycle};
+use masseter_analysis::{Code, EventRecord, Figures};
 
 const WIDTH: f64 = 960.0;
 const LEFT: f64 = 90.0;
 const ROW: f64 = 26.0;
-/// Marks drawn at most; a list of thousands tells nothing more.
+/// Most marks that are drawn; more of them cannot be distinguished.
 const MOST: usize = 2000;
 
 /// The time line; none without events.
-pub(super) fn time_line(figures: &Figures) -> Option<String> {
+pub(crate) fn svg(figures: &Figures) -> Option<String> {
     let events = &figures.events[..figures.events.len().min(MOST)];
     let began_ns = figures.over_time.began_ns;
     let seconds = |event: &EventRecord| event.time_ns.saturating_sub(began_ns) as f64 / 1e9;
     let mut sources: Vec<_> = events.iter().map(|event| event.source).collect();
-    sources.sort_by_cached_key(Coded::to_string);
+    sources.sort_by_cached_key(Code::to_string);
     sources.dedup();
     let end_s = events.iter().map(seconds).fold(figures.duration_s, f64::max).max(1e-3);
     (!sources.is_empty()).then(|| {
@@ -33,7 +32,7 @@ pub(super) fn time_line(figures: &Figures) -> Option<String> {
 fn write_svg(
     svg: &mut String,
     events: &[EventRecord],
-    sources: &[Coded<Source>],
+    sources: &[Code<Source>],
     end_s: f64,
     seconds: &dyn Fn(&EventRecord) -> f64,
 ) -> std::fmt::Result {
@@ -58,7 +57,7 @@ fn write_svg(
             x(seconds(event)),
             ROW * (row as f64 + 0.5),
             seconds(event),
-            escape(&in_words(event))
+            escape(&event_with_cycle(event))
         )?;
     }
     for tick in 0..=5 {

@@ -1,49 +1,46 @@
-//! Whose fault it was that a stretch of work took too long.
+//! Rig or machine as the cause of overlong stretches of work.
 //!
-//! A stall of the hypervisor looks from within exactly like work that takes long: both use up CPU time.
-//! But the machine does not know whether a running core spins or works. If its stalls fall at random, the
-//! share of them that hits work is the share of the running time spent working. So the overlong stretches
-//! of work that cost deadlines are held against the stalls of at least that length that were seen while
-//! the rig waited: if chance alone puts that many of all of them into work with a probability of one
-//! percent or more, the machine may have done it, and nothing can be judged. A rig that is too slow is
-//! slow far more often than that.
+//! A process cannot distinguish a stall of the hypervisor from work that takes long: both use up CPU time. But a stall
+//! is as likely while a core spins as while it works. If stalls fall at random, the share of them that hits work is the
+//! share of work in the running time. So this module compares two counts: overlong stretches of work, from the
+//! shortest that cost a deadline, and stalls of that length while the rig waited. If chance puts so many of both into
+//! work with a probability of one percent or more, the machine may be the cause, and the run cannot be judged. A rig
+//! that is too slow is slow far more often.
 //!
-//! Late returns from sleep count among the stalls, sleep does not count as running time: a hypervisor
-//! rather takes away a core that runs than one that sleeps. Both readings favour the machine.
+//! Late returns from sleep count as stalls, and sleep does not count as running time. Both choices favour the machine.
 //!
-//! The price: a fault of the rig that costs a deadline once or twice a run is not told from a stall. Such
-//! a run is INVALID, never passed; a longer one tells.
+//! The price: a fault of the rig that costs one or two deadlines in a run looks like a stall. Such a run is INVALID,
+//! never passed; a longer run decides.
 
 use serde::Serialize;
 
 use super::skips::{SkipFigures, Skips};
 
-/// Below this probability it is no longer believed that the machine did it.
-const BELIEVED: f64 = 0.01;
+/// Least probability at which the machine may be the cause.
+const LEAST_CHANCE: f64 = 0.01;
 
-/// The overlong stretches of work of a run, and what is known of the machine.
+/// The overlong stretches of work of a run, beside the stalls of the machine.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Suspicion {
+pub struct OverrunAttribution {
     /// Stretches of work at least as long as the shortest that cost a deadline.
     pub while_working: u64,
     /// Stalls of that length while waiting.
     pub while_waiting: u64,
-    /// Share of working in the running time, what was lost left out.
+    /// Share of work in the running time, without the time lost.
     pub work_share: f64,
-    /// Probability that chance puts so many of all of them into work.
+    /// Probability that chance puts so many of both into work.
     pub chance: f64,
 }
 
-impl Suspicion {
-    /// Weighs the processes of a run together: they share the machine. None if no stretch of work cost a
-    /// deadline.
-    pub(super) fn of(processes: &[&Skips]) -> Option<Self> {
+impl OverrunAttribution {
+    /// Counts the processes of a run together, since they share the machine. None if no stretch of work cost a deadline.
+    pub(super) fn new(processes: &[&Skips]) -> Option<Self> {
         let least_ns = processes.iter().filter_map(|skips| skips.shortest_costly_ns()).min()?;
         let counts = processes.iter().map(|skips| skips.as_long_as(least_ns));
         let (while_waiting, while_working) =
             counts.fold((0, 0), |sum, count| (sum.0 + count.0, sum.1 + count.1));
         let sum_ns =
-            |of: fn(&SkipFigures) -> u64| -> u64 { processes.iter().map(|skips| of(&skips.figures())).sum() };
+            |part: fn(&SkipFigures) -> u64| -> u64 { processes.iter().map(|skips| part(&skips.figures())).sum() };
         let worked_ns = sum_ns(|figures| figures.worked_ns.saturating_sub(figures.overlong_ns));
         let spun_ns = sum_ns(|figures| figures.spun_ns);
         let work_share = worked_ns as f64 / (worked_ns + spun_ns).max(1) as f64;
@@ -51,10 +48,10 @@ impl Suspicion {
         Some(Self { while_working, while_waiting, work_share, chance })
     }
 
-    /// Whether the machine may have done it. A single stretch is no evidence against the rig, however
-    /// short its work: the same work was done in time in every other cycle.
+    /// Whether the machine may be the cause. A single stretch is no evidence against the rig: the same work took its
+    /// normal time in every other cycle.
     pub fn may_be_the_machine(&self) -> bool {
-        self.while_working <= 1 || self.chance >= BELIEVED
+        self.while_working <= 1 || self.chance >= LEAST_CHANCE
     }
 }
 
@@ -126,22 +123,22 @@ mod tests {
         for (name, stall_every, slow_every, expected) in cases {
             let stalls = |cycle: u64| stall_every > 0 && cycle % stall_every == 7;
             let slow = |cycle: u64| cycle % slow_every == slow_every - 1;
-            let suspicion = Suspicion::of(&[&process(stalls, slow)]).unwrap();
-            assert_eq!(suspicion.may_be_the_machine(), expected, "{name}: {suspicion:?}");
+            let attribution = OverrunAttribution::new(&[&process(stalls, slow)]).unwrap();
+            assert_eq!(attribution.may_be_the_machine(), expected, "{name}: {attribution:?}");
         }
     }
 
     #[test]
     fn stalls_seen_by_either_process_speak_for_the_machine() {
         let slow_thrice = process(|_| false, |cycle| cycle % 3_000 == 2_999);
-        assert!(!Suspicion::of(&[&slow_thrice]).unwrap().may_be_the_machine());
+        assert!(!OverrunAttribution::new(&[&slow_thrice]).unwrap().may_be_the_machine());
         let restless = process(|cycle| cycle % 500 == 7, |_| false);
-        assert!(Suspicion::of(&[&slow_thrice, &restless]).unwrap().may_be_the_machine());
+        assert!(OverrunAttribution::new(&[&slow_thrice, &restless]).unwrap().may_be_the_machine());
     }
 
     #[test]
-    fn without_a_costly_stretch_there_is_no_suspicion() {
-        assert_eq!(Suspicion::of(&[&process(|cycle| cycle % 100 == 3, |_| false)]), None);
+    fn without_a_costly_stretch_there_is_nothing_to_attribute() {
+        assert_eq!(OverrunAttribution::new(&[&process(|cycle| cycle % 100 == 3, |_| false)]), None);
     }
 
     #[test]
