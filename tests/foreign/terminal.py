@@ -19,19 +19,19 @@ import pyte
 # Narrower than the longest line of the picture, and longer than everything that is said.
 COLUMNS, LINES = 60, 300
 INTERRUPTED = 130
-UNHURRIED = Path(__file__).parents[1] / "unhurried.toml"
-# A starved logger loses messages: the terminal is judged here, not the rig.
-ACCEPTED = (0, 6)
+LENIENT = Path(__file__).parents[1] / "lenient.toml"
+# Passed, too disturbed to judge, or incomplete because the machine starved the logger: this judges the terminal.
+ACCEPTED = (0, 3, 6)
 PICTURE = "woke late, µs"
 # Lower than the picture, but not than the line that tells it.
 FEW_LINES = 8
-VERDICTS = ("PASS: ", "INCOMPLETE: ", "INTERRUPTED: ")
+VERDICTS = ("PASS: ", "INVALID: ", "INCOMPLETE: ", "INTERRUPTED: ")
 
 
 def run(masseter, arguments, term="xterm-256color", interrupt_after=None, lines=LINES):
     """Runs on a terminal of its own; returns exit code, output and what stands on the screen."""
     with tempfile.TemporaryDirectory() as folder:
-        command = [masseter, "run", str(UNHURRIED), "--out", str(Path(folder) / "run"), *arguments]
+        command = [masseter, "run", str(LENIENT), "--out", str(Path(folder) / "run"), *arguments]
         process, terminal = pty.fork()
         if process == 0:
             os.environ["TERM"] = term

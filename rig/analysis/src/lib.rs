@@ -83,7 +83,8 @@ pub enum AnalysisError {
     Write {
         /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// The system's error.
+        #[source]
         error: std::io::Error,
     },
 }

@@ -1,5 +1,7 @@
 //! Exit codes, the same for every verb.
 
+use std::error::Error;
+use std::io::{self, ErrorKind};
 use std::process::ExitCode;
 
 /// How a command ended.
@@ -17,7 +19,7 @@ pub enum Exit {
     Died = 4,
     /// An unexpected safe stop.
     SafeStop = 5,
-    /// The recording is incomplete, or the run folder took no more.
+    /// The recording is incomplete, or there was no room for a file or for standard output.
     Incomplete = 6,
     /// Interrupted by the user.
     Interrupted = 130,
@@ -46,7 +48,7 @@ pub struct Failure {
 
 /// Says at the place where an error arises which exit code it leads to.
 pub trait OrFailure<T> {
-    /// To [`Exit::Usage`]: it is for the user to mend what was given.
+    /// To [`Exit::Usage`], since the arguments or inputs are wrong; a full disk leads to [`Exit::Incomplete`].
     fn usage(self) -> Result<T, Failure>;
 
     /// To [`Exit::Incomplete`]: what a run leaves could not be written or read.
@@ -71,8 +73,27 @@ impl<T, E: Into<anyhow::Error>> OrFailure<T> for Result<T, E> {
 }
 
 impl Failure {
-    /// An error that leads to `exit`.
+    /// An error that leads to `exit`; where a full disk caused it, [`Exit::Usage`] becomes [`Exit::Incomplete`].
     pub fn with(exit: Exit, error: impl Into<anyhow::Error>) -> Self {
-        Self { exit, error: error.into() }
+        let error = error.into();
+        let exit = if exit == Exit::Usage && is_out_of_room(&error) { Exit::Incomplete } else { exit };
+        Self { exit, error }
     }
+}
+
+/// Whether the system refused a write because the disk, a quota or the largest size of a file is reached.
+fn is_out_of_room(error: &anyhow::Error) -> bool {
+    error.chain().filter_map(io_kind).any(|kind| {
+        matches!(kind, ErrorKind::StorageFull | ErrorKind::QuotaExceeded | ErrorKind::FileTooLarge)
+    })
+}
+
+fn io_kind(cause: &(dyn Error + 'static)) -> Option<ErrorKind> {
+    // An error of `csv` does not have its cause as a source.
+    let in_csv = |error: &csv::Error| match error.kind() {
+        csv::ErrorKind::Io(error) => Some(error.kind()),
+        _ => None,
+    };
+    let in_io = cause.downcast_ref().map(io::Error::kind);
+    in_io.or_else(|| cause.downcast_ref().and_then(in_csv))
 }

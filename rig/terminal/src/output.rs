@@ -16,7 +16,8 @@ pub enum OutputError {
     Create {
         /// The file or folder.
         path: PathBuf,
-        /// What the system said.
+        /// The system's error.
+        #[source]
         error: io::Error,
     },
 }

@@ -2,24 +2,24 @@
 
 mod common;
 
-use common::{Cores, UNHURRIED, Workspace, check, stderr, stdout, wait_until_it_records};
+use common::{
+    Cores, LENIENT, Workspace, assert_played, check, has_event, stderr, stdout, wait_until_it_records,
+};
 use rustix::process::{Pid, Signal, kill_process};
 
 #[test]
-fn two_rigs_on_one_machine_do_not_meet() {
+fn no_message_of_one_rig_reaches_another() {
     let cores = Cores::take();
-    let workspaces =
-        [1, 2].map(|seed| Workspace::new(&format!("seed = {seed}\nduration_s = 2.0\n{UNHURRIED}")));
+    // Both rigs share two cores: at this rate there is time for both.
+    let workspaces = [1, 2]
+        .map(|seed| Workspace::new(&format!("seed = {seed}\nrate_hz = 100\nduration_s = 2.0\n{LENIENT}")));
     let children: Vec<_> = workspaces.iter().map(|workspace| workspace.start(&cores, &[])).collect();
     for (child, workspace) in children.into_iter().zip(&workspaces) {
         let output = child.wait_with_output().unwrap();
-        // Both want the same two cores, so either may be starved into a safe stop; but no message may
-        // cross, which a foreign command or a gap in a sequence would show.
+        assert_played(&workspace.run_folder(), output.status, &(stdout(&output) + &stderr(&output)));
+        // A command of the other rig is a fault; any other message of that rig is a gap in a sequence.
         let summary = workspace.summary();
-        let code = output.status.code();
-        assert!(matches!(code, Some(0 | 3 | 5)), "{code:?} {}{}", stdout(&output), stderr(&output));
-        assert!(summary["figures"]["cycles"].as_u64().unwrap() > 0, "{summary}");
-        assert!(!stdout(&output).contains("foreign_command"), "{}", stdout(&output));
+        assert!(!has_event(&summary, "fault", "foreign_command"), "{summary}");
         assert_eq!(check(&summary, "dropped messages")["result"], "passed", "{summary}");
     }
 }
@@ -28,7 +28,7 @@ fn two_rigs_on_one_machine_do_not_meet() {
 fn a_second_rig_of_the_same_name_is_refused() {
     let cores = Cores::take();
     let name = format!("robot-{}", std::process::id());
-    let [first, second] = [1, 2].map(|_| Workspace::new(&format!("duration_s = 60.0\n{UNHURRIED}")));
+    let [first, second] = [1, 2].map(|_| Workspace::new(&format!("duration_s = 60.0\n{LENIENT}")));
     let running = first.start(&cores, &["--name", &name]);
     wait_until_it_records(&first);
     // The folder for temporary files does not make it another machine.

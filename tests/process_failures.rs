@@ -1,5 +1,5 @@
-//! Every process killed, and stopped for a while, at chosen cycles of the controller's sequence. Nothing here judges
-//! speed: `tests/realtime/kill.py` measures how soon a rig reacts, at random cycles.
+//! Every process is killed, or stopped for a while, at chosen cycles of the controller's sequence. No test here judges
+//! speed: `tests/realtime/kill.py` measures at random cycles how soon a rig reacts.
 
 mod common;
 
@@ -7,7 +7,7 @@ use std::process::{Child, Output};
 use std::time::Duration;
 
 use common::{
-    Cores, PASSED_OR_INVALID, UNHURRIED, Workspace, child_of, masseter, shared_memory_of, stderr, stdout,
+    Cores, LENIENT, SharedMemory, Workspace, assert_played, child_of, has_event, masseter, stderr, stdout,
 };
 use masseter_recording::{Reader, Recorded};
 use masseter_shared::clock::{self, SECOND_NS};
@@ -18,7 +18,6 @@ use masseter_shared::messages::codes::ControllerState::{
 use masseter_shared::messages::codes::DriveState::{FaultReactionActive, OperationEnabled, QuickStopActive};
 use masseter_shared::transport::{Domain, Inlet, Node};
 use rustix::process::{Pid, Signal, kill_process};
-use serde_json::Value;
 
 /// A cycle of the sequence, counted from 1 in its state.
 #[derive(Debug, Clone, Copy)]
@@ -42,16 +41,17 @@ const MOMENTS: [Moment; 7] = [
     Moment(Disabling, 1),
 ];
 const ROLES: [&str; 3] = ["controller", "plant", "logger"];
-/// Far less than what the unhurried rig bears with.
+/// Far less than the silence after which the lenient rig stops.
 const SHORT_STOP: Duration = Duration::from_millis(60);
 /// A machine that stands still may let the moment pass.
 const TRIES: usize = 10;
 /// No moment is as far off, ns.
 const GIVE_UP_NS: u64 = 30 * SECOND_NS;
 
-/// A rig that was hit, and the process that was.
+/// A rig of which one process, the victim, got a signal.
 struct Rig {
     name: String,
+    memory: SharedMemory,
     workspace: Workspace,
     supervisor: Child,
     victim: Pid,
@@ -62,10 +62,11 @@ impl Rig {
     fn hit(cores: &Cores, role: &str, signal: Signal, moment: Moment) -> Option<Self> {
         let name = format!("hit-{}", std::process::id());
         let workspace =
-            Workspace::new(&format!("rate_hz = {}\nduration_s = 0.5\n{UNHURRIED}", moment.rate_hz()));
+            Workspace::new(&format!("rate_hz = {}\nduration_s = 0.5\n{LENIENT}", moment.rate_hz()));
         let supervisor = workspace.start(cores, &["--name", &name]);
         let victim = child_of(&supervisor, role);
-        let rig = Self { name, workspace, supervisor, victim };
+        let memory = SharedMemory::of_running(&name);
+        let rig = Self { name, memory, workspace, supervisor, victim };
         let states = rig.states();
         let was_hit =
             reaches(&states, moment) && kill_process(victim, signal).is_ok() && stands_in(&states, moment.0);
@@ -73,7 +74,7 @@ impl Rig {
             return Some(rig);
         }
         let _ = kill_process(victim, Signal::CONT);
-        rig.end();
+        rig.wait();
         None
     }
 
@@ -82,8 +83,11 @@ impl Rig {
         Node::join(&Domain::named(&self.name).unwrap()).unwrap().inlet().unwrap()
     }
 
-    fn end(self) -> (Workspace, Output) {
-        (self.workspace, self.supervisor.wait_with_output().unwrap())
+    /// Waits for the rig's end; nothing of the rig stays in shared memory.
+    fn wait(self) -> (Workspace, Output) {
+        let output = self.supervisor.wait_with_output().unwrap();
+        assert_eq!(self.memory.files(), Vec::<String>::new(), "{}{}", stdout(&output), stderr(&output));
+        (self.workspace, output)
     }
 }
 
@@ -132,36 +136,29 @@ fn is_recovered(workspace: &Workspace) -> bool {
 }
 
 #[test]
-fn whoever_is_killed_and_when_the_rig_ends_in_order_and_another_can_start() {
+fn the_rig_ends_in_order_whichever_process_is_killed_in_whichever_state() {
     let cores = Cores::take();
     for (role, moment) in ROLES.into_iter().flat_map(|role| MOMENTS.map(|moment| (role, moment))) {
         let rig = hit(&cores, role, Signal::KILL, moment);
-        let name = rig.name.clone();
-        let (workspace, output) = rig.end();
+        let (workspace, output) = rig.wait();
         let context = format!("{role} {moment:?}: {}{}", stdout(&output), stderr(&output));
         assert_eq!(output.status.code(), Some(4), "{context}");
-        assert_eq!(shared_memory_of(&name), Vec::<String>::new(), "{context}");
         let summary = workspace.summary();
         assert_eq!(summary["verdict"]["reason"], format!("the {role} died: SIGKILL (9)"), "{context}");
         let is_moving = matches!(moment.0, Easing | Running | Holding);
         match role {
             "controller" => {
                 assert!(drives_are_off(&workspace), "{context}");
-                assert!(!is_moving || has_fault(&summary, "command_lost"), "{context}");
+                assert!(!is_moving || has_event(&summary, "fault", "command_lost"), "{context}");
             }
             "plant" => {
                 let last = summary["figures"]["final_state"].as_str().unwrap();
                 assert!(ends_without_plant(moment.0).contains(&last), "{last}: {context}");
-                assert!(!is_moving || has_fault(&summary, "stale_reading"), "{context}");
+                assert!(!is_moving || has_event(&summary, "fault", "stale_reading"), "{context}");
             }
             _ => assert!(is_recovered(&workspace), "{context}"),
         }
     }
-}
-
-fn has_fault(summary: &Value, cause: &str) -> bool {
-    let mut events = summary["figures"]["events"].as_array().unwrap().iter();
-    events.any(|event| event["kind"] == "fault" && event["cause"] == cause)
 }
 
 /// How a controller may end that has lost its plant.
@@ -190,15 +187,14 @@ fn drives_are_off(workspace: &Workspace) -> bool {
 }
 
 #[test]
-fn whoever_stands_still_for_a_moment_and_when_the_rig_goes_on() {
+fn the_rig_goes_on_whichever_process_is_stopped_for_a_moment_in_whichever_state() {
     let cores = Cores::take();
     for (role, moment) in ROLES.into_iter().flat_map(|role| MOMENTS.map(|moment| (role, moment))) {
         let rig = hit(&cores, role, Signal::STOP, moment);
         clock::sleep(SHORT_STOP);
         kill_process(rig.victim, Signal::CONT).unwrap();
-        let (workspace, output) = rig.end();
+        let (workspace, output) = rig.wait();
         let context = format!("{role} {moment:?}: {}{}", stdout(&output), stderr(&output));
-        assert_eq!(workspace.summary()["figures"]["final_state"], "finished", "{context}");
-        assert!(PASSED_OR_INVALID.contains(&output.status.code()), "{context}");
+        assert_played(&workspace.run_folder(), output.status, &context);
     }
 }
