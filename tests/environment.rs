@@ -162,8 +162,8 @@ fn a_full_disk_is_exit_6_of_every_verb_that_writes_files() {
     let run = workspace.run_folder();
     let run = run.to_str().unwrap();
     let verbs: [&[&str]; 4] = [
-        &["log", "export", run, "--out"],
-        &["log", "recover", run, "--out"],
+        &["recording", "export", run, "--out"],
+        &["recording", "recover", run, "--out"],
         &["uniqueness", "search", "--inputs", "10", "--out"],
         &["kinematics", "--samples", "10", "--cells", "2", "--out"],
     ];

@@ -25,7 +25,7 @@ fn an_interrupt_ends_the_motion_in_order() {
 fn a_closed_terminal_ends_the_motion_in_order() {
     let cores = Cores::take();
     let (workspace, mut child) = Workspace::running(&cores, LENIENT);
-    let roles = ["controller", "plant", "logger"].map(|role| child_of(&child, role));
+    let roles = ["controller", "plant", "recorder"].map(|role| child_of(&child, role));
     // Nobody reads any more what is said, and the whole group hears of it.
     drop((child.stdout.take(), child.stderr.take()));
     for id in roles.into_iter().chain([Pid::from_child(&child)]) {
@@ -63,7 +63,7 @@ fn an_interrupt_before_anything_is_recorded_ends_the_run_in_order() {
 #[test]
 fn a_process_that_dies_after_an_interrupt_is_reported_as_dead() {
     let cores = Cores::take();
-    for role in ["plant", "controller", "logger"] {
+    for role in ["plant", "controller", "recorder"] {
         let (workspace, child) = Workspace::running(&cores, LENIENT);
         let victim = child_of(&child, role);
         kill_process(Pid::from_child(&child), Signal::INT).unwrap();
@@ -79,7 +79,7 @@ fn a_process_that_dies_after_an_interrupt_is_reported_as_dead() {
 fn a_second_signal_ends_the_run_at_once_as_interrupted() {
     let cores = Cores::take();
     let (workspace, child) = Workspace::running(&cores, LENIENT);
-    kill_process(child_of(&child, "logger"), Signal::STOP).unwrap();
+    kill_process(child_of(&child, "recorder"), Signal::STOP).unwrap();
     let plant = child_of(&child, "plant");
     kill_process(Pid::from_child(&child), Signal::TERM).unwrap();
     wait_until("the plant has ended", || test_kill_process(plant).is_err());

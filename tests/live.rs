@@ -143,7 +143,7 @@ fn messages_for_a_watcher_that_does_not_read_are_counted_and_the_recording_is_co
     let (status, said) = shown.finish();
     assert_played(&workspace.run_folder(), status, &said);
     assert!(said.contains("messages were not shown live"), "{said}");
-    let proof = masseter(&["log", "verify", workspace.run_folder().to_str().unwrap()]);
+    let proof = masseter(&["recording", "verify", workspace.run_folder().to_str().unwrap()]);
     assert_eq!(proof.status.code(), Some(0), "{}", stdout(&proof));
 }
 
@@ -173,7 +173,7 @@ fn clients_that_misbehave_or_vanish_disturb_neither_the_recording_nor_other_watc
     assert!(chatter.watch()["state"].len() > 500);
     let (status, said) = shown.finish();
     assert_played(&workspace.run_folder(), status, &said);
-    let proof = masseter(&["log", "verify", workspace.run_folder().to_str().unwrap()]);
+    let proof = masseter(&["recording", "verify", workspace.run_folder().to_str().unwrap()]);
     assert_eq!(proof.status.code(), Some(0), "{}", stdout(&proof));
 }
 
@@ -189,7 +189,7 @@ fn a_client_that_sends_without_end_delays_neither_the_recording_nor_the_end() {
     let flooding = thread::spawn(move || while flooder.socket.get_mut().write_all(&flood).is_ok() {});
     let (status, said) = shown.finish();
     assert_played(&workspace.run_folder(), status, &said);
-    let proof = masseter(&["log", "verify", workspace.run_folder().to_str().unwrap()]);
+    let proof = masseter(&["recording", "verify", workspace.run_folder().to_str().unwrap()]);
     assert_eq!(proof.status.code(), Some(0), "{}", stdout(&proof));
     flooding.join().unwrap();
 }
@@ -213,7 +213,7 @@ fn a_paused_reader_of_the_progress_costs_no_message_and_delays_no_end() {
     drop(errors);
     assert!(filling.join().unwrap().is_err());
     assert_played(&workspace.run_folder(), output.status, &stdout(&output));
-    let proof = masseter(&["log", "verify", workspace.run_folder().to_str().unwrap()]);
+    let proof = masseter(&["recording", "verify", workspace.run_folder().to_str().unwrap()]);
     assert_eq!(proof.status.code(), Some(0), "{}", stdout(&proof));
 }
 
@@ -224,7 +224,7 @@ fn a_live_view_that_cannot_be_served_is_refused_before_the_run_starts() {
     let port = format!("--live={}", taken.local_addr().unwrap());
     let cases: [(&[&str], &str); 3] = [
         (&[&port], "choose another address with --live=ADDR:PORT"),
-        (&["--live", "--clock", "virtual"], "virtual time is over before it can be watched"),
+        (&["--live", "--clock", "virtual"], "--live needs --clock rt"),
         (&["--live=somewhere"], "invalid socket address"),
     ];
     for (arguments, words) in cases {

@@ -40,7 +40,7 @@ const MOMENTS: [Moment; 7] = [
     Moment(Holding, 1),
     Moment(Disabling, 1),
 ];
-const ROLES: [&str; 3] = ["controller", "plant", "logger"];
+const ROLES: [&str; 3] = ["controller", "plant", "recorder"];
 /// Far less than the silence after which the lenient rig stops.
 const SHORT_STOP: Duration = Duration::from_millis(60);
 /// A machine that stands still may let the moment pass.
@@ -122,14 +122,14 @@ fn stands_in(states: &Inlet<State>, wanted: ControllerState) -> bool {
     newest.is_none_or(|state| state.controller_state == wanted as u32)
 }
 
-/// The readable part of a recording whose logger was killed.
+/// The readable part of a recording whose recorder was killed.
 fn is_recovered(workspace: &Workspace) -> bool {
     let [recording, recovered] = ["run/recording.mcap", "recovered.mcap"].map(|name| workspace.file(name));
     let [recording, recovered] = [&recording, &recovered].map(|path| path.to_str().unwrap());
     let codes = [
-        masseter(&["log", "verify", recording]),
-        masseter(&["log", "recover", recording, "--out", recovered]),
-        masseter(&["log", "verify", recovered]),
+        masseter(&["recording", "verify", recording]),
+        masseter(&["recording", "recover", recording, "--out", recovered]),
+        masseter(&["recording", "verify", recovered]),
     ]
     .map(|output| output.status.code());
     codes == [Some(6), Some(0), Some(0)]

@@ -22,7 +22,7 @@ fn a_run_plays_through_three_processes_and_leaves_nothing_in_shared_memory() {
     let summary = workspace.summary();
     assert_eq!(check(&summary, "dropped messages")["result"], "passed", "{summary}");
     let scheduling = &workspace.manifest()["scheduling"];
-    for role in ["controller", "plant", "logger"] {
+    for role in ["controller", "plant", "recorder"] {
         assert!(scheduling[role]["wanted"].is_object(), "{scheduling}");
     }
     assert_eq!(memory.files(), Vec::<String>::new());
@@ -101,7 +101,7 @@ fn a_controller_that_hangs_ends_the_run() {
     let output = child.wait_with_output().unwrap();
     assert_eq!(output.status.code(), Some(4), "{}{}", stdout(&output), stderr(&output));
     let reason = &workspace.summary()["verdict"]["reason"];
-    assert_eq!(reason, "the controller died: it sent no command any more, and was killed");
+    assert_eq!(reason, "the controller died: it stopped sending commands, and was killed");
 }
 
 #[test]

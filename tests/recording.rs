@@ -26,7 +26,7 @@ fn virtual_run() -> Workspace {
 
 fn log(verb: &str, recording: &Path, more: &[&str]) -> Output {
     let recording = recording.to_str().unwrap();
-    masseter(&[&["log", verb, recording], more].concat())
+    masseter(&[&["recording", verb, recording], more].concat())
 }
 
 fn messages(recording: &Path) -> Vec<Recorded> {
@@ -183,7 +183,7 @@ fn topics_without_a_table_are_listed_and_refused_on_request() {
     let refused = export(&["--topic", "reading", "--topic", "/tf"]);
     assert_eq!(refused.status.code(), Some(2));
     let said = stderr(&refused);
-    assert!(said.contains("'/tf' makes no table: its messages are protobuf"), "{said}");
+    assert!(said.contains("'/tf' cannot become a table: its messages are protobuf"), "{said}");
     assert!(!out.exists());
 
     let said = stdout(&export(&[]));
@@ -198,7 +198,7 @@ fn a_recovery_that_fails_leaves_nothing_in_the_way_of_the_next() {
     let workspace = virtual_run();
     let recording = workspace.run_folder().join("recording.mcap");
     let out = workspace.file("recovered.mcap");
-    let arguments = ["log", "recover", recording.to_str().unwrap(), "--out", out.to_str().unwrap()];
+    let arguments = ["recording", "recover", recording.to_str().unwrap(), "--out", out.to_str().unwrap()];
     let failed = cramped(8, &arguments);
     assert_eq!(failed.status.code(), Some(6), "{}", stderr(&failed));
     assert!(!out.exists(), "{}", stderr(&failed));
@@ -233,20 +233,20 @@ fn a_recording_cut_at_any_byte_lacks_its_end_and_nothing_else() {
 
 /// How many times a recording is cut at random.
 const CUTS: usize = 300;
-/// When the logger is killed, from the beginning of the recording: before, between and right behind flushes.
+/// When the recorder is killed, from the beginning of the recording: before, between and right behind flushes.
 const KILLED_AT_MS: [u64; 10] = [0, 70, 180, 310, 440, 500, 730, 990, 1240, 1490];
-/// Tries at killing the logger before a starved machine makes the rig stop by itself.
+/// Tries at killing the recorder before a starved machine makes the rig stop by itself.
 const TRIES: usize = 5;
 
-/// Runs until the recording has begun, kills the logger some time later, and returns when that was; none if the
+/// Runs until the recording has begun, kills the recorder some time later, and returns when that was; none if the
 /// rig had come to a safe stop before.
-fn kill_the_logger(cores: &Cores, workspace: &Workspace, after: Duration) -> Option<u64> {
+fn kill_the_recorder(cores: &Cores, workspace: &Workspace, after: Duration) -> Option<u64> {
     let child = workspace.start(cores, &[]);
-    let logger = child_of(&child, "logger");
+    let recorder = child_of(&child, "recorder");
     wait_until("the rig records", || workspace.recorded_bytes() > 50_000);
     clock::sleep(after);
     let killed_ns = clock::now_ns();
-    kill_process(logger, Signal::KILL).unwrap();
+    kill_process(recorder, Signal::KILL).unwrap();
     let output = child.wait_with_output().unwrap();
     match output.status.code() {
         Some(4) => Some(killed_ns),
@@ -256,15 +256,15 @@ fn kill_the_logger(cores: &Cores, workspace: &Workspace, after: Duration) -> Opt
 }
 
 #[test]
-fn a_killed_logger_leaves_a_recording_that_lacks_at_most_its_last_second_and_is_recovered() {
+fn a_killed_recorder_leaves_a_recording_that_lacks_at_most_its_last_second_and_is_recovered() {
     let cores = Cores::take();
     for after_ms in KILLED_AT_MS {
         let killed = (0..TRIES).find_map(|_| {
             let workspace = Workspace::new(&format!("duration_s = 30.0\n{LENIENT}"));
-            kill_the_logger(&cores, &workspace, Duration::from_millis(after_ms))
+            kill_the_recorder(&cores, &workspace, Duration::from_millis(after_ms))
                 .map(|killed_ns| (workspace, killed_ns))
         });
-        let (workspace, killed_ns) = killed.expect("a rig that runs until its logger is killed");
+        let (workspace, killed_ns) = killed.expect("a rig that runs until its recorder is killed");
         let recording = workspace.run_folder().join("recording.mcap");
         let proof = log("verify", &recording, &[]);
         assert_eq!(proof.status.code(), Some(6), "{}", stdout(&proof));

@@ -45,7 +45,9 @@ fn panels(outcome: &Outcome) -> [Panel; 4] {
         Panel {
             quantity: "CPU time of a core",
             unit: "%",
-            curves: ["controller", "plant", "logger"].map(|name| share(&format!("{name} CPU"), name)).into(),
+            curves: ["controller", "plant", "recorder"]
+                .map(|name| share(&format!("{name} CPU"), name))
+                .into(),
         },
         Panel {
             quantity: "missed cycles",

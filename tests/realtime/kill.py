@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Kills or stops one process of a running rig at a random moment, again and again, and shows as a
-distribution how soon the survivor reacts, how soon the supervisor has swept up, and what a killed logger's recording
-lacks; then kills all of a rig at once, and shows how soon `masseter clean` has made room for another. A logger that is
+distribution how soon the survivor reacts, how soon the supervisor has swept up, and what a killed recorder's recording
+lacks; then kills all of a rig at once, and shows how soon `masseter clean` has made room for another. A recorder that is
 stopped for a second must not be noticed: the rig goes on, and the recording lacks nothing.
 
     tests/realtime/kill.py target/release/masseter --kills 200
@@ -10,8 +10,8 @@ stopped for a second must not be noticed: the rig goes on, and the recording lac
 A rig takes 20 silent cycles of 1 ms for a death. On a machine that stands still for longer than that by itself, let it
 wait for more (--silent-cycles).
 
-Fails when a survivor does not react within the bound, when a killed logger's recording lacks more than its last
-second or cannot be recovered, when a stopped logger stops the rig or loses a message, when `masseter clean` takes too
+Fails when a survivor does not react within the bound, when a killed recorder's recording lacks more than its last
+second or cannot be recovered, when a stopped recorder stops the rig or loses a message, when `masseter clean` takes too
 long, or when anything stays in shared memory. Only the Python standard library is used.
 """
 
@@ -32,11 +32,11 @@ REACTION_MARGIN_MS = 60.0
 # `masseter clean`, the start of its process included. The aim is 50 ms, which a busy machine stretches.
 CLEAN_BOUND_MS = 1000.0
 DISTURBED, INCOMPLETE, INTERRUPTED = 3, 6, 130
-# Half of what the logger's queues hold at 1 kHz.
-LOGGER_STOPPED_S = 1.0
+# Half of what the recorder's queues hold at 1 kHz.
+RECORDER_STOPPED_S = 1.0
 # Beyond the silent cycles, which may take as long.
 STOPPED_MARGIN_S = 0.28
-PROCESSES = ("controller", "plant", "logger")
+PROCESSES = ("controller", "plant", "recorder")
 ALL = "all"
 REACTS, OVER, LACKS, CLEAN = "survivor reacts", "over and swept up", "recording lacks", "made clean"
 REACTION = {"controller": "command_lost", "plant": "stale_reading"}
@@ -108,12 +108,12 @@ def log(masseter, verb, recording, expected, *more):
 
 
 def lost_ms(masseter, run, hit_ns):
-    """What the recording of a killed logger lacks at its end, ms; everything before that can be read."""
+    """What the recording of a killed recorder lacks at its end, ms; everything before that can be read."""
     recording, recovered, tables = run / "recording.mcap", run / "recovered.mcap", run / "tables"
     log(masseter, "verify", recording, INCOMPLETE)
     summary = json.loads((run / "summary.json").read_text())
     if any(topic["missing"] for topic in summary["figures"]["topics"]):
-        # The logger was starved before the hit, and counted that.
+        # The recorder was starved before the hit, and counted that.
         raise Disturbed
     log(masseter, "recover", recording, 0, "--out", recovered)
     log(masseter, "verify", recovered, 0)
@@ -123,11 +123,11 @@ def lost_ms(masseter, run, hit_ns):
     return max(0.0, (hit_ns - last_ns) / 1e6)
 
 
-def stop_logger(masseter, rig, run, logger):
-    """The rig goes on while its logger stands still, and the queues keep everything for it."""
-    os.kill(logger, signal.SIGSTOP)
-    time.sleep(LOGGER_STOPPED_S)
-    os.kill(logger, signal.SIGCONT)
+def stop_recorder(masseter, rig, run, recorder):
+    """The rig goes on while its recorder stands still, and the queues keep everything for it."""
+    os.kill(recorder, signal.SIGSTOP)
+    time.sleep(RECORDER_STOPPED_S)
+    os.kill(recorder, signal.SIGCONT)
     interrupted_ns = time.monotonic_ns()
     rig.send_signal(signal.SIGINT)
     code = rig.wait(timeout=60)
@@ -135,8 +135,8 @@ def stop_logger(masseter, rig, run, logger):
     if code == DISTURBED:
         raise Disturbed
     if code != INTERRUPTED:
-        raise SystemExit(f"the logger was stopped for {LOGGER_STOPPED_S} s and the rig ended with {code}")
-    assert_clean(rig, "logger")
+        raise SystemExit(f"the recorder was stopped for {RECORDER_STOPPED_S} s and the rig ended with {code}")
+    assert_clean(rig, "recorder")
     log(masseter, "verify", run / "recording.mcap", 0)
     return {OVER: over_ms}
 
@@ -164,8 +164,8 @@ def hit_once(masseter, role, how, silent_cycles, chance):
             raise SystemExit("a running rig has no files in shared memory, so their absence would prove nothing")
         if role == ALL:
             return {CLEAN: clean_ms(masseter, rig, victims)}
-        if role == "logger" and how == "STOP":
-            return stop_logger(masseter, rig, run, victims[0])
+        if role == "recorder" and how == "STOP":
+            return stop_recorder(masseter, rig, run, victims[0])
         hit_ns = time.monotonic_ns()
         try:
             os.kill(victims[0], signal.SIGKILL if how == "KILL" else signal.SIGSTOP)
@@ -180,7 +180,7 @@ def hit_once(masseter, role, how, silent_cycles, chance):
         rig.wait(timeout=60)
         measured = {OVER: (time.monotonic_ns() - hit_ns) / 1e6}
         assert_clean(rig, role)
-        if role == "logger":
+        if role == "recorder":
             measured[LACKS] = lost_ms(masseter, run, hit_ns)
         else:
             measured[REACTS] = reaction_ms(run, role, hit_ns)

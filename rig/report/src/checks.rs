@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use crate::text;
 use masseter_analysis::{
-    BusResponse, Code, EventRecord, Figures, ResponseFigures, OverrunAttribution, TrackingFigures,
+    BusResponse, Code, EventRecord, Figures, OverrunAttribution, ResponseFigures, TrackingFigures,
 };
 use masseter_recording::Ending;
 use masseter_recording::Manifest;

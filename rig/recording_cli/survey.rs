@@ -1,4 +1,4 @@
-//! One pass over a recording: what is in it, what is missing, and what cannot be read.
+//! One pass over a recording: its contents, its gaps, and its damage.
 
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -8,7 +8,7 @@ use masseter_analysis::{SequenceCheck, TopicFigures};
 use masseter_recording::{Chunks, Damage, Entry, ReadError, Reader};
 use masseter_terminal::Exit;
 
-/// What is known of one channel.
+/// Figures of one channel.
 #[derive(Debug, Clone, Default)]
 struct ChannelFigures {
     topic: String,
@@ -18,12 +18,12 @@ struct ChannelFigures {
     bytes: u64,
     first_ns: u64,
     last_ns: u64,
-    /// Messages of this topic that this program cannot read, and why the first one.
+    /// Messages that this program cannot decode, and the reason for the first.
     unreadable: u64,
     reason: Option<String>,
 }
 
-/// What is known of a recording.
+/// Contents, gaps and damage of a recording.
 #[derive(Debug)]
 pub(super) struct Survey {
     size: u64,
@@ -37,7 +37,7 @@ pub(super) struct Survey {
 
 impl Survey {
     /// Reads the recording to its end.
-    pub(super) fn of<R: Read + Seek>(reader: &mut Reader<R>) -> Result<Self, ReadError> {
+    pub(super) fn read<R: Read + Seek>(reader: &mut Reader<R>) -> Result<Self, ReadError> {
         let mut channels: BTreeMap<u16, ChannelFigures> = BTreeMap::new();
         let mut sequence = SequenceCheck::default();
         let mut undefined = 0;
@@ -46,7 +46,7 @@ impl Survey {
                 undefined += 1;
                 continue;
             };
-            channels.entry(channel.id).or_default().take(&entry);
+            channels.entry(channel.id).or_default().add(&entry);
             if let Some(Ok(message)) = entry.recorded() {
                 sequence.take(&message);
             }
@@ -76,8 +76,8 @@ impl Survey {
         self.sequences.iter().map(|topic| topic.missing).sum()
     }
 
-    /// Whether the only thing wrong with the bytes is that the last ones are not there.
-    fn is_sound_to_its_end(&self) -> bool {
+    /// Whether the file has no damage, except that its last bytes may be missing.
+    fn is_undamaged_to_its_end(&self) -> bool {
         match self.damage.as_slice() {
             [] => true,
             [tail] => self.was_cut_short && tail.to == self.size,
@@ -85,9 +85,9 @@ impl Survey {
         }
     }
 
-    /// How a verb that read this recording ends.
+    /// The exit code of a verb that read this recording.
     pub(super) fn exit(&self) -> Exit {
-        if self.unreadable() + self.undefined > 0 || !self.is_sound_to_its_end() {
+        if self.unreadable() + self.undefined > 0 || !self.is_undamaged_to_its_end() {
             Exit::Usage
         } else if self.was_cut_short || self.missing() > 0 {
             Exit::Incomplete
@@ -96,7 +96,7 @@ impl Survey {
         }
     }
 
-    /// What is in it.
+    /// A summary of the contents.
     pub(super) fn info(&self) -> String {
         let mut text = String::new();
         self.write_info(&mut text).expect("a string takes any text");
@@ -137,38 +137,38 @@ impl Survey {
     }
 
     fn times(&self) -> impl Iterator<Item = (u64, u64)> {
-        let heard = self.channels.values().filter(|channel| channel.messages > 0);
-        heard.map(|channel| (channel.first_ns, channel.last_ns))
+        let received = self.channels.values().filter(|channel| channel.messages > 0);
+        received.map(|channel| (channel.first_ns, channel.last_ns))
     }
 
-    /// Cycles recorded: the controller speaks once in each.
+    /// Recorded cycles: the controller publishes one state in each.
     fn cycles(&self) -> Option<u64> {
         let states = self.channels.values().find(|channel| channel.topic == "state")?;
         (states.messages > 0).then_some(states.messages)
     }
 
-    /// Whether it is whole, and why that is known.
-    pub(super) fn proof(&self) -> String {
+    /// The result of every check.
+    pub(super) fn verification(&self) -> String {
         let mut text = String::new();
-        self.write_proof(&mut text).expect("a string takes any text");
+        self.write_verification(&mut text).expect("a string takes any text");
         text + &self.loss()
     }
 
-    fn write_proof(&self, text: &mut String) -> std::fmt::Result {
+    fn write_verification(&self, text: &mut String) -> std::fmt::Result {
         for topic in &self.sequences {
             let TopicFigures { topic, messages, missing } = topic;
             let mark = mark(*missing);
             writeln!(text, "{mark} {topic:<8} {messages:>9} messages, {missing} missing between them")?;
         }
         let Chunks { count, damaged, .. } = self.chunks;
-        writeln!(text, "{} {count} chunks agree with their checksums, {damaged} do not", mark(damaged))?;
+        writeln!(text, "{} {count} chunks match their checksums, {damaged} do not", mark(damaged))?;
         let unreadable: u64 = self.damage.iter().map(|damage| damage.to - damage.from).sum();
         writeln!(text, "{} {unreadable} of {} bytes cannot be read", mark(unreadable), self.size)?;
         let end = if self.was_cut_short { "lacks" } else { "has" };
         writeln!(text, "{} the file {end} its end", mark(self.was_cut_short.into()))
     }
 
-    /// What is lost, and where.
+    /// What is missing or unreadable, and where; empty for a complete recording.
     pub(super) fn loss(&self) -> String {
         let mut text = String::new();
         self.write_loss(&mut text).expect("a string takes any text");
@@ -191,13 +191,13 @@ impl Survey {
             writeln!(text, "unreadable: {} messages whose channel is not defined", self.undefined)?;
         }
         if self.was_cut_short {
-            writeln!(text, "the file lacks its end: `masseter log recover` writes a whole one")?;
+            writeln!(text, "the file lacks its end: `masseter recording recover` writes a complete file")?;
         }
         Ok(())
     }
 }
 
-/// How a line begins, by the number of things that are wrong.
+/// The mark of a line with so many faults.
 fn mark(faults: u64) -> &'static str {
     if faults == 0 { "ok  " } else { "FAIL" }
 }
@@ -210,7 +210,7 @@ fn rate(messages: u64, seconds: f64) -> String {
 }
 
 impl ChannelFigures {
-    fn take(&mut self, entry: &Entry) {
+    fn add(&mut self, entry: &Entry) {
         if self.messages == 0 {
             self.first_ns = entry.header.log_time;
         }

@@ -1,4 +1,4 @@
-//! Recordings as CSV, a file a topic, and CAN frames as candump logs.
+//! Writes a recording as CSV, one file per topic, and its CAN frames as candump logs.
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -6,21 +6,21 @@ use std::io::{BufWriter, Read, Seek, Write};
 use std::path::Path;
 
 use anyhow::Context;
-
-use super::columns::Columns;
 use masseter_recording::{CDR_LITTLE_ENDIAN, Entry, Reader, Recorded};
 use masseter_report::CandumpLogs;
 use masseter_shared::messages::tap;
 
-/// A table being written.
-struct Csv {
+use super::columns::Columns;
+
+/// A CSV file that is being written.
+struct CsvFile {
     name: String,
     columns: Columns,
     file: BufWriter<File>,
-    lines: u64,
+    rows: u64,
 }
 
-/// Writes these topics, by the numbers of their channels, into `folder`. Returns the files with their lines.
+/// Writes topics, by channel id, into `folder`. Returns the names of the files with their numbers of rows.
 pub(super) fn write<R: Read + Seek>(
     reader: &mut Reader<R>,
     folder: &Path,
@@ -28,7 +28,7 @@ pub(super) fn write<R: Read + Seek>(
 ) -> anyhow::Result<Vec<(String, u64)>> {
     let mut files = BTreeMap::new();
     for (channel, (topic, columns)) in tables {
-        files.insert(channel, Csv::create(folder, &topic, columns)?);
+        files.insert(channel, CsvFile::create(folder, &topic, columns)?);
     }
     let mut candump = CandumpLogs::new(folder, &[]);
     let mut line = String::new();
@@ -49,7 +49,7 @@ pub(super) fn write<R: Read + Seek>(
     Ok(written)
 }
 
-impl Csv {
+impl CsvFile {
     fn create(folder: &Path, topic: &str, columns: Columns) -> anyhow::Result<Self> {
         let safe = |c: char| if c.is_ascii_alphanumeric() || c == '_' { c } else { '-' };
         let name = format!("{}.csv", topic.chars().map(safe).collect::<String>());
@@ -57,7 +57,7 @@ impl Csv {
         let file = File::create_new(&path).with_context(|| format!("cannot create {}", path.display()))?;
         let mut file = BufWriter::new(file);
         writeln!(file, "log_time_ns,{}", columns.header())?;
-        Ok(Self { name, columns, file, lines: 0 })
+        Ok(Self { name, columns, file, rows: 0 })
     }
 
     fn write(&mut self, line: &mut String, entry: &Entry) -> anyhow::Result<()> {
@@ -65,13 +65,13 @@ impl Csv {
         line.clear();
         if self.columns.write(line, body) {
             writeln!(self.file, "{},{line}", entry.header.log_time)?;
-            self.lines += 1;
+            self.rows += 1;
         }
         Ok(())
     }
 
     fn finish(mut self) -> anyhow::Result<(String, u64)> {
         self.file.flush().with_context(|| format!("cannot write {}", self.name))?;
-        Ok((self.name, self.lines))
+        Ok((self.name, self.rows))
     }
 }

@@ -1,7 +1,7 @@
-//! What recording costs: every topic at 10 kHz through the real logger, beside a raw write of the same
+//! What recording costs: every topic at 10 kHz through the real recorder, beside a raw write of the same
 //! bytes.
 //!
-//!     cargo bench --bench logger
+//!     cargo bench --bench recorder
 //!
 //! The messages are those of a run under virtual time, played again and again at the pace of the clock by a thread with
 //! the real time of a run.
@@ -36,7 +36,7 @@ fn main() -> anyhow::Result<()> {
     let recording = folder.path().join("recording.mcap");
     // On a thread of its own: the real time that it asks for ends with it.
     std::thread::scope(|scope| {
-        let publisher = scope.spawn(|| through_the_logger(&cycles, folder.path(), &recording));
+        let publisher = scope.spawn(|| through_the_recorder(&cycles, folder.path(), &recording));
         publisher.join().expect("measuring does not panic")
     })?;
     in_process(&cycles, &folder.path().join("again.mcap"))?;
@@ -117,7 +117,7 @@ impl Outlets {
             Recorded::Reading(message) => self.reading.publish(|place| *place = *message)?,
             Recorded::State(message) => self.state.publish(|place| *place = *message)?,
             Recorded::Truth(message) => self.truth.publish(|place| *place = *message)?,
-            // Those of a cycle travel together, and the logger has this topic from nobody.
+            // Those of a cycle travel together, and the recorder has this topic from nobody.
             Recorded::Frame(_) | Recorded::Machine(_) => {}
             Recorded::Event(message) => {
                 let is_of_controller = message.source == Source::Controller.code();
@@ -128,21 +128,21 @@ impl Outlets {
     }
 }
 
-fn through_the_logger(cycles: &[Vec<Recorded>], folder: &Path, recording: &Path) -> anyhow::Result<()> {
+fn through_the_recorder(cycles: &[Vec<Recorded>], folder: &Path, recording: &Path) -> anyhow::Result<()> {
     let scenario = folder.join("scenario.toml");
     fs::write(&scenario, Scenario::default().to_toml())?;
     let domain = ScratchDomain::claim("bench")?;
     {
         let node = Node::join(&domain)?;
         let mut outlets = Outlets::open(&node)?;
-        let mut logger = start_logger(&scenario, domain.id(), recording)?;
+        let mut recorder = start_recorder(&scenario, domain.id(), recording)?;
         let Played { sent, publishing, skipped, took_s } = play(cycles, &mut outlets)?;
         let machine = SystemRoot::of_this_machine();
-        let cpu_s = machine.cpu_time_ns(logger.id()) as f64 / SECOND_NS as f64;
-        let memory_kib = peak_memory_kib(&machine, &logger)?;
-        kill_process(Pid::from_child(&logger), Signal::TERM)?;
-        let status = logger.wait()?;
-        ensure!(status.success(), "the logger ended with {status}");
+        let cpu_s = machine.cpu_time_ns(recorder.id()) as f64 / SECOND_NS as f64;
+        let memory_kib = peak_memory_kib(&machine, &recorder)?;
+        kill_process(Pid::from_child(&recorder), Signal::TERM)?;
+        let status = recorder.wait()?;
+        ensure!(status.success(), "the recorder ended with {status}");
         let bytes = fs::metadata(recording)?.len();
         let played = RATE_HZ * SECONDS;
         println!(
@@ -150,19 +150,19 @@ fn through_the_logger(cycles: &[Vec<Recorded>], folder: &Path, recording: &Path)
         );
         let [median_ns, p99_ns] = [0.5, 0.99].map(|quantile| publishing.value_at_quantile(quantile));
         println!("  publishing       {median_ns:8} ns a message, median of the cycles (p99 {p99_ns})");
-        println!("  logger           {:8.1} % of a core", cpu_s / took_s * 100.0);
-        println!("  logger's memory  {:8.1} MB at its peak", memory_kib as f64 / 1024.0);
+        println!("  recorder           {:8.1} % of a core", cpu_s / took_s * 100.0);
+        println!("  recorder's memory  {:8.1} MB at its peak", memory_kib as f64 / 1024.0);
         println!("  recording        {:8.0} bytes a cycle", bytes as f64 / played as f64);
     }
-    let proof = Command::new(MASSETER).args(["log", "verify"]).arg(recording).output()?;
+    let proof = Command::new(MASSETER).args(["recording", "verify"]).arg(recording).output()?;
     print!("{}", String::from_utf8_lossy(&proof.stdout));
     ensure!(proof.status.success(), "the recording is not whole: {}", String::from_utf8_lossy(&proof.stderr));
     Ok(())
 }
 
-fn start_logger(scenario: &Path, domain: &str, recording: &Path) -> anyhow::Result<Child> {
-    let mut logger = Command::new(MASSETER)
-        .args(["logger", "--quiet", "--domain", domain, "--scenario"])
+fn start_recorder(scenario: &Path, domain: &str, recording: &Path) -> anyhow::Result<Child> {
+    let mut recorder = Command::new(MASSETER)
+        .args(["recorder", "--quiet", "--motion-s", "1", "--domain", domain, "--scenario"])
         .arg(scenario)
         .arg("--recording")
         .arg(recording)
@@ -170,14 +170,14 @@ fn start_logger(scenario: &Path, domain: &str, recording: &Path) -> anyhow::Resu
         .stdout(Stdio::piped())
         .spawn()?;
     let mut ready = String::new();
-    BufReader::new(logger.stdout.as_mut().context("its output is piped")?).read_line(&mut ready)?;
-    let input = logger.stdin.as_mut().context("its input is piped")?;
+    BufReader::new(recorder.stdout.as_mut().context("its output is piped")?).read_line(&mut ready)?;
+    let input = recorder.stdin.as_mut().context("its input is piped")?;
     writeln!(
         input,
         "{}",
         serde_json::to_string(&Start { epoch_ns: clock::now_ns(), loops: [std::process::id(); 2] })?
     )?;
-    Ok(logger)
+    Ok(recorder)
 }
 
 /// What was published.
@@ -221,7 +221,7 @@ fn play(cycles: &[Vec<Recorded>], outlets: &mut Outlets) -> anyhow::Result<Playe
 
 /// The most memory that a process had resident, KiB.
 fn peak_memory_kib(machine: &SystemRoot, process: &Child) -> anyhow::Result<u64> {
-    let status = machine.text(&format!("proc/{}/status", process.id())).context("the logger runs")?;
+    let status = machine.text(&format!("proc/{}/status", process.id())).context("the recorder runs")?;
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:")).context("VmHWM is told")?;
     Ok(line.trim().trim_end_matches(" kB").parse()?)
 }

@@ -1,9 +1,12 @@
-//! What the kernel tells of the machine in `/proc` and `/sys`, read below a root that tests can choose.
+//! The machine: facts from `/proc` and `/sys`, the user's signals, and `/dev/cpu_dma_latency`.
+//!
+//! Files are read below a root that tests can replace. `masseter doctor` judges the facts; this module does not.
 
 pub(crate) mod counters;
 pub(crate) mod dma_latency;
 mod hypervisor;
 pub(crate) mod interrupts;
+pub(crate) mod sampler;
 
 use std::fs;
 use std::ops::RangeInclusive;
@@ -12,7 +15,7 @@ use std::path::{Path, PathBuf};
 use masseter_recording::MachineInfo;
 use masseter_shared::realtime::scheduling::allowed_cores;
 
-/// What the manifest keeps of this machine.
+/// This machine, for the manifest.
 pub(crate) fn describe() -> MachineInfo {
     let uname = rustix::system::uname();
     let [name, release, version] =
@@ -42,7 +45,7 @@ impl SystemRoot {
         Self(path.to_owned())
     }
 
-    /// A file's text without surrounding white space; none when it is not there or not readable.
+    /// A file's text without surrounding white space; none if the file cannot be read.
     pub fn text(&self, path: &str) -> Option<String> {
         Some(fs::read_to_string(self.0.join(path)).ok()?.trim().to_owned())
     }
@@ -52,7 +55,7 @@ impl SystemRoot {
         self.text(path)?.parse().ok()
     }
 
-    /// The names in a folder, sorted; none of them when it is not there.
+    /// The names in a folder, sorted; empty if the folder does not exist.
     pub fn names(&self, folder: &str) -> Vec<String> {
         let entries = fs::read_dir(self.0.join(folder)).into_iter().flatten().flatten();
         let mut names: Vec<_> = entries.filter_map(|entry| entry.file_name().into_string().ok()).collect();
@@ -60,8 +63,8 @@ impl SystemRoot {
         names
     }
 
-    /// What all cores together have spent since boot, in ticks: user, nice, system, idle, iowait, irq, softirq and
-    /// steal. A guest's time is part of user time.
+    /// Ticks of all cores together since boot: user, nice, system, idle, iowait, irq, softirq and steal. User time
+    /// includes that of guests.
     pub fn core_ticks(&self) -> Option<[u64; 8]> {
         let stat = self.text("proc/stat")?;
         let counts = stat.lines().find_map(|line| line.strip_prefix("cpu "))?;
@@ -70,7 +73,7 @@ impl SystemRoot {
         ticks.try_into().ok()
     }
 
-    /// CPU time of all threads that a process has, ns. One that has ended takes its time along.
+    /// CPU time of all threads of a process, ns. Threads that have ended do not count.
     pub fn cpu_time_ns(&self, process: u32) -> u64 {
         let tasks = format!("proc/{process}/task");
         let of_thread = |task: String| -> Option<u64> {
@@ -79,7 +82,7 @@ impl SystemRoot {
         self.names(&tasks).into_iter().filter_map(of_thread).sum()
     }
 
-    /// The cores that are online; none where the kernel does not tell.
+    /// The cores that are online; none if the kernel does not list them.
     pub fn online_cores(&self) -> Vec<usize> {
         self.cores("sys/devices/system/cpu/online")
     }
@@ -104,7 +107,7 @@ pub(crate) mod fixture {
     }
 
     impl Fixture {
-        pub(crate) fn of(files: &[(&str, &str)]) -> Self {
+        pub(crate) fn with_files(files: &[(&str, &str)]) -> Self {
             let folder = tempfile::tempdir().unwrap();
             for (path, text) in files {
                 let path = folder.path().join(path);
@@ -126,10 +129,11 @@ mod tests {
 
     #[test]
     fn cores_that_are_offline_do_not_count() {
-        let online = |list| Fixture::of(&[("sys/devices/system/cpu/online", list)]).root().online_cores();
+        let online =
+            |list| Fixture::with_files(&[("sys/devices/system/cpu/online", list)]).root().online_cores();
         assert_eq!(online("0-3,6\n"), [0, 1, 2, 3, 6]);
         assert_eq!(online("0\n"), [0]);
-        let offline = Fixture::of(&[("sys/devices/system/cpu/cpu4/online", "0")]);
+        let offline = Fixture::with_files(&[("sys/devices/system/cpu/cpu4/online", "0")]);
         assert_eq!(offline.root().online_cores(), [0; 0]);
     }
 }

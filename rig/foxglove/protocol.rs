@@ -1,27 +1,27 @@
-//! The Foxglove WebSocket protocol, as far as a server needs it that only shows: what it says, and what
-//! its clients ask. Parameters, services, assets and publishing by clients are not offered.
+//! Messages of the Foxglove WebSocket protocol that a server without parameters, services, assets or publishing clients
+//! needs.
 //!
-//! Text messages are JSON objects with an `op`; messages of channels are binary: opcode, subscription,
-//! time, bytes, little-endian.
+//! Text messages are JSON objects with an `op`. Messages of channels are binary and little-endian: opcode, subscription
+//! id, time, bytes.
 
 use data_encoding::BASE64;
 use serde::{Deserialize, Serialize};
 
 use masseter_recording::{Channel, Definition, Encoded};
 
-/// Names of the protocol that clients ask for, the current one first. What is used here is alike in all.
+/// Supported subprotocols, the newest first. The messages used here are the same in both.
 const SUBPROTOCOLS: [&str; 2] = ["foxglove.sdk.v1", "foxglove.websocket.v1"];
 const MESSAGE_DATA: u8 = 1;
-/// Opcode, subscription and time, before the message itself.
+/// Bytes of opcode, subscription id and time.
 const MESSAGE_HEAD: usize = 1 + 4 + 8;
 
-/// Which protocol to speak with a client that offers these, separated by commas.
-pub(super) fn choose(offered: &str) -> Option<&'static str> {
+/// The newest supported subprotocol of a client's offer, a list separated by commas.
+pub(super) fn choose_subprotocol(offered: &str) -> Option<&'static str> {
     let offers = |name: &&str| offered.split(',').any(|offer| offer.trim() == *name);
     SUBPROTOCOLS.into_iter().find(offers)
 }
 
-/// How serious a status is, as the protocol counts.
+/// The level of a status message, by its number in the protocol.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Level {
     Warning = 1,
@@ -30,7 +30,7 @@ pub(super) enum Level {
 
 #[derive(Serialize)]
 #[serde(tag = "op", rename_all = "camelCase", rename_all_fields = "camelCase")]
-enum Said<'a> {
+enum ServerMessage<'a> {
     ServerInfo { name: &'a str, capabilities: [&'a str; 0], session_id: &'a str },
     Advertise { channels: Vec<Advertised<'a>> },
     Status { level: u8, message: &'a str },
@@ -47,20 +47,20 @@ struct Advertised<'a> {
     schema: String,
 }
 
-/// What a client asks.
+/// A request of a client.
 #[derive(Debug, PartialEq, Eq, Deserialize)]
 #[serde(tag = "op", rename_all = "camelCase", rename_all_fields = "camelCase")]
-pub(super) enum Asked {
-    /// To see channels.
+pub(super) enum ClientMessage {
+    /// Subscribes to channels.
     Subscribe { subscriptions: Vec<Subscription> },
-    /// To see them no more.
+    /// Ends subscriptions.
     Unsubscribe { subscription_ids: Vec<u32> },
-    /// Something that is not offered.
+    /// An operation that this server does not offer.
     #[serde(other)]
-    Other,
+    Unsupported,
 }
 
-/// A client's own number for a channel that it sees.
+/// A channel, and the client's id for its messages.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub(super) struct Subscription {
@@ -69,26 +69,26 @@ pub(super) struct Subscription {
 }
 
 impl Subscription {
-    /// Place of the channel in [`Definition::all`], if there is such a one.
-    pub(super) fn place(self) -> Option<usize> {
-        usize::try_from(self.channel_id).ok().filter(|place| *place < Channel::COUNT)
+    /// Index of the channel in [`Definition::all`], if it exists.
+    pub(super) fn channel_index(self) -> Option<usize> {
+        usize::try_from(self.channel_id).ok().filter(|index| *index < Channel::COUNT)
     }
 }
 
-/// What every client is told first. `session` differs between runs: clients forget what they had of another.
+/// The first message to a client. `session` differs between runs, so that clients discard data of an earlier run.
 pub(super) fn server_info(session: &str) -> String {
-    in_json(&Said::ServerInfo { name: "masseter", capabilities: [], session_id: session })
+    to_json(&ServerMessage::ServerInfo { name: "masseter", capabilities: [], session_id: session })
 }
 
-/// The channels, each under its place in the list.
+/// All channels, each with its index as id.
 pub(super) fn advertise(definitions: &[Definition]) -> String {
     let channels = definitions.iter().enumerate().map(|(id, definition)| channel(id, definition));
-    in_json(&Said::Advertise { channels: channels.collect() })
+    to_json(&ServerMessage::Advertise { channels: channels.collect() })
 }
 
 fn channel(id: usize, Definition { topic, schema, message_encoding }: &Definition) -> Advertised<'_> {
-    // JSON holds no bytes: schemas that are text go as they are, compiled ones in base 64.
-    let text = match schema.encoding.as_str() {
+    // JSON holds no bytes: text schemas are sent as they are, binary ones in base 64.
+    let schema_text = match schema.encoding.as_str() {
         "protobuf" => BASE64.encode(&schema.data),
         _ => String::from_utf8_lossy(&schema.data).into_owned(),
     };
@@ -98,16 +98,16 @@ fn channel(id: usize, Definition { topic, schema, message_encoding }: &Definitio
         encoding: message_encoding,
         schema_name: &schema.name,
         schema_encoding: &schema.encoding,
-        schema: text,
+        schema: schema_text,
     }
 }
 
-/// A word to the user of the client.
+/// A message for the client's user.
 pub(super) fn status(level: Level, message: &str) -> String {
-    in_json(&Said::Status { level: level as u8, message })
+    to_json(&ServerMessage::Status { level: level as u8, message })
 }
 
-/// A message for a subscription.
+/// A message of a subscribed channel.
 pub(super) fn message_data(subscription: u32, log_time_ns: u64, message: &Encoded) -> Vec<u8> {
     let mut data = Vec::with_capacity(MESSAGE_HEAD + message.bytes.len());
     data.push(MESSAGE_DATA);
@@ -117,8 +117,8 @@ pub(super) fn message_data(subscription: u32, log_time_ns: u64, message: &Encode
     data
 }
 
-fn in_json(said: &Said) -> String {
-    serde_json::to_string(said).expect("it holds nothing that JSON lacks")
+fn to_json(message: &ServerMessage) -> String {
+    serde_json::to_string(message).expect("the message holds only strings, numbers and lists")
 }
 
 #[cfg(test)]
@@ -129,18 +129,18 @@ mod tests {
     use masseter_recording::Topic;
 
     #[test]
-    fn the_newest_protocol_that_both_know_is_spoken() {
-        assert_eq!(choose("foxglove.websocket.v1, foxglove.sdk.v1"), Some("foxglove.sdk.v1"));
-        assert_eq!(choose("foxglove.websocket.v1"), Some("foxglove.websocket.v1"));
-        assert_eq!(choose("foxglove.sdk.v1.1,chat"), None);
+    fn the_newest_common_subprotocol_is_chosen() {
+        assert_eq!(choose_subprotocol("foxglove.websocket.v1, foxglove.sdk.v1"), Some("foxglove.sdk.v1"));
+        assert_eq!(choose_subprotocol("foxglove.websocket.v1"), Some("foxglove.websocket.v1"));
+        assert_eq!(choose_subprotocol("foxglove.sdk.v1.1,chat"), None);
     }
 
     #[test]
-    fn channels_are_told_as_they_stand_in_recordings() {
-        let said: Value = serde_json::from_str(&advertise(&Definition::all())).unwrap();
-        assert_eq!(said["op"], "advertise");
+    fn channels_are_advertised_as_recordings_define_them() {
+        let message: Value = serde_json::from_str(&advertise(&Definition::all())).unwrap();
+        assert_eq!(message["op"], "advertise");
         for (id, definition) in Definition::all().iter().enumerate() {
-            let channel = &said["channels"][id];
+            let channel = &message["channels"][id];
             assert_eq!(channel["id"], id);
             assert_eq!(channel["topic"], definition.topic);
             assert_eq!(channel["encoding"], *definition.message_encoding);
@@ -155,21 +155,24 @@ mod tests {
     }
 
     #[test]
-    fn clients_are_understood() {
-        let ask = |text: &str| serde_json::from_str::<Asked>(text);
+    fn requests_are_parsed() {
+        let parse = |text: &str| serde_json::from_str::<ClientMessage>(text);
         let subscribe = json!({"op": "subscribe", "subscriptions": [{"id": 7, "channelId": 2}]});
-        let Ok(Asked::Subscribe { subscriptions }) = ask(&subscribe.to_string()) else { panic!() };
-        assert_eq!((subscriptions[0].id, subscriptions[0].place()), (7, Some(2)));
+        let Ok(ClientMessage::Subscribe { subscriptions }) = parse(&subscribe.to_string()) else { panic!() };
+        assert_eq!((subscriptions[0].id, subscriptions[0].channel_index()), (7, Some(2)));
         let beyond = Subscription { id: 7, channel_id: Channel::COUNT as u64 };
-        assert_eq!(beyond.place(), None);
+        assert_eq!(beyond.channel_index(), None);
         let unsubscribe = r#"{"op": "unsubscribe", "subscriptionIds": [7]}"#;
-        assert_eq!(ask(unsubscribe).unwrap(), Asked::Unsubscribe { subscription_ids: vec![7] });
-        assert_eq!(ask(r#"{"op": "getParameters", "parameterNames": []}"#).unwrap(), Asked::Other);
-        assert!(ask("{}").is_err() && ask("chat").is_err());
+        assert_eq!(parse(unsubscribe).unwrap(), ClientMessage::Unsubscribe { subscription_ids: vec![7] });
+        assert_eq!(
+            parse(r#"{"op": "getParameters", "parameterNames": []}"#).unwrap(),
+            ClientMessage::Unsupported
+        );
+        assert!(parse("{}").is_err() && parse("chat").is_err());
     }
 
     #[test]
-    fn a_message_is_opcode_subscription_time_and_bytes() {
+    fn a_message_is_opcode_subscription_id_time_and_bytes() {
         let message = Encoded {
             channel: Channel::Topic(Topic::State),
             sequence: 1,

@@ -1,12 +1,11 @@
-//! Messages as lines of a table, by the ROS 2 definition that the recording itself carries: so messages of
-//! other versions become tables too.
+//! Messages as CSV rows, by the ROS 2 message definition in the recording; so recordings of other versions work too.
 //!
-//! Numbers, arrays of fixed length, and bytes of any number at the end only; a definition with anything else, or of a
-//! message longer than any of the rig's, makes no table.
+//! A definition may hold numbers, arrays of fixed length, and one byte sequence at its end. Other definitions, and those
+//! of messages longer than any of the rig's, are refused.
 
 use std::fmt::Write;
 
-/// A primitive of the definition language.
+/// A primitive type of the definition language.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Kind {
     Unsigned(usize),
@@ -52,41 +51,41 @@ impl Kind {
     }
 }
 
-/// Bytes of the longest message that becomes a line, and so the most columns. No message of the rig is longer.
-const MOST_BYTES: usize = u16::MAX as usize;
-/// Bytes of the longest name of a field.
-const LONGEST_NAME: usize = 255;
+/// Most bytes of a message, and so most columns. No message of the rig is longer.
+const MAX_MESSAGE_BYTES: usize = u16::MAX as usize;
+/// Most bytes of a field's name.
+const MAX_NAME_BYTES: usize = 255;
 
-/// What stands before bytes of any number, and says how many they are.
+/// The length before a byte sequence.
 const LENGTH: Kind = Kind::Unsigned(4);
 
-/// Whether the type of a field is bytes of any number, with or without a bound.
-fn is_bytes(kind: &str) -> bool {
+/// Whether the type of a field is a byte sequence, with or without a bound.
+fn is_byte_sequence(kind: &str) -> bool {
     kind.strip_prefix("uint8[").is_some_and(|bound| bound == "]" || bound.starts_with("<="))
 }
 
-/// One column: a field, or an element of one.
+/// A column: a field, or an element of an array.
 #[derive(Debug, Clone, PartialEq, Eq)]
 struct Column {
     name: String,
     kind: Kind,
-    /// Where it lies behind the CDR header.
-    at: usize,
+    /// Byte offset behind the CDR header.
+    offset: usize,
 }
 
 /// The table of a message definition.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Columns {
     fixed: Vec<Column>,
-    /// Bytes of all of them.
+    /// Bytes of the fixed columns.
     bytes: usize,
-    /// Name of the bytes at the end, whose number stands before them: a column in hexadecimal digits.
+    /// Name of the byte sequence at the end, a column in hexadecimal digits.
     tail: Option<String>,
 }
 
 impl Columns {
-    /// Reads a definition; none where it holds more than numbers.
-    pub(super) fn of(definition: &str) -> Option<Self> {
+    /// Parses a definition; none if it does not fit a table.
+    pub(super) fn from_definition(definition: &str) -> Option<Self> {
         let mut table = Self { fixed: Vec::new(), bytes: 0, tail: None };
         for line in definition.lines().map(|line| line.split('#').next().unwrap_or_default().trim()) {
             if !line.is_empty() {
@@ -99,10 +98,10 @@ impl Columns {
     fn add_field(&mut self, line: &str) -> Option<()> {
         let (kind, name) = line.split_once(char::is_whitespace)?;
         let name = name.trim();
-        if self.tail.is_some() || name.len() > LONGEST_NAME {
+        if self.tail.is_some() || name.len() > MAX_NAME_BYTES {
             return None;
         }
-        if is_bytes(kind) {
+        if is_byte_sequence(kind) {
             self.bytes = self.bytes.next_multiple_of(LENGTH.size()) + LENGTH.size();
             self.tail = Some(name.to_owned());
             return Some(());
@@ -114,38 +113,38 @@ impl Columns {
         let kind = Kind::named(kind)?;
         // CDR aligns each primitive to its own size.
         self.bytes = self.bytes.next_multiple_of(kind.size());
-        if elements.unwrap_or(1) > MOST_BYTES.saturating_sub(self.bytes) / kind.size() {
+        if elements.unwrap_or(1) > MAX_MESSAGE_BYTES.saturating_sub(self.bytes) / kind.size() {
             return None;
         }
         for element in 0..elements.unwrap_or(1) {
             let name = if elements.is_some() { format!("{name}_{element}") } else { name.to_owned() };
-            self.fixed.push(Column { name, kind, at: self.bytes });
+            self.fixed.push(Column { name, kind, offset: self.bytes });
             self.bytes += kind.size();
         }
         Some(())
     }
 
-    /// The names, separated by commas.
+    /// The names of the columns, separated by commas.
     pub(super) fn header(&self) -> String {
         let names = self.fixed.iter().map(|column| &column.name).chain(&self.tail);
         names.map(String::as_str).collect::<Vec<_>>().join(",")
     }
 
-    /// Appends the values of a message; false where its length is not the definition's.
+    /// Appends the values of a message; false if its length differs from the definition's.
     pub(super) fn write(&self, line: &mut String, body: &[u8]) -> bool {
         let Some((fixed, tail)) = body.split_at_checked(self.bytes) else { return false };
-        let is_whole = match self.tail {
+        let fits = match self.tail {
             Some(_) => fixed.ends_with(&(tail.len() as u32).to_le_bytes()),
             None => tail.is_empty(),
         };
-        if !is_whole {
+        if !fits {
             return false;
         }
         for (index, column) in self.fixed.iter().enumerate() {
             if index > 0 {
                 line.push(',');
             }
-            column.kind.write(line, &body[column.at..]);
+            column.kind.write(line, &body[column.offset..]);
         }
         if self.tail.is_some() {
             line.push(',');
@@ -162,8 +161,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_message_of_ours_becomes_a_line() {
-        let columns = Columns::of(&FrameTap::schema()).unwrap();
+    fn a_message_of_the_rig_becomes_a_row() {
+        let columns = Columns::from_definition(&FrameTap::schema()).unwrap();
         assert_eq!(columns.header(), "seq,published_ns,version,time_ns,queued_ns,id,bus,flags,data");
         let mut bytes = [0; 64];
         for length in 0..3 {
@@ -176,12 +175,13 @@ mod tests {
             assert!(!columns.write(&mut line, &[frame.body(), &[0]].concat()));
             bytes[length] = 0xAA;
         }
-        assert_eq!(Columns::of(&Reading::schema()).unwrap().bytes, size_of::<Reading>());
+        assert_eq!(Columns::from_definition(&Reading::schema()).unwrap().bytes, size_of::<Reading>());
     }
 
     #[test]
     fn signs_fractions_and_alignment_are_kept() {
-        let columns = Columns::of("int8 a # sign\n\nfloat32 b\nint16[2] c\nfloat64 d\n").unwrap();
+        let columns =
+            Columns::from_definition("int8 a # sign\n\nfloat32 b\nint16[2] c\nfloat64 d\n").unwrap();
         let mut body = vec![0xff, 0, 0, 0];
         body.extend(0.5f32.to_le_bytes());
         body.extend((-2i16).to_le_bytes());
@@ -194,7 +194,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_table_is_refused() {
+    fn definitions_that_fit_no_table_are_refused() {
         for definition in [
             "string name",
             "float64[] values",
@@ -207,9 +207,9 @@ mod tests {
             "uint8[40000] a\nuint8[40000] b",
             &format!("uint8[9] {}", "a".repeat(300)),
         ] {
-            assert_eq!(Columns::of(definition), None, "{definition}");
+            assert_eq!(Columns::from_definition(definition), None, "{definition}");
         }
         let mut line = String::new();
-        assert!(!Columns::of("uint64 a").unwrap().write(&mut line, &[0; 7]));
+        assert!(!Columns::from_definition("uint64 a").unwrap().write(&mut line, &[0; 7]));
     }
 }
