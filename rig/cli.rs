@@ -160,7 +160,9 @@ pub fn main() -> ExitCode {
 fn carry_out(verb: Verb) -> Result<Exit, Failure> {
     match verb {
         Verb::Run(args) => run::run(&args),
-        Verb::Report(ReportArgs { folder, against: None, format }) => masseter_report::report_past_run(&folder, format),
+        Verb::Report(ReportArgs { folder, against: None, format }) => {
+            masseter_report::report_past_run(&folder, format)
+        }
         Verb::Report(ReportArgs { folder, against: Some(against), format }) => {
             masseter_report::compare::runs(&folder, &against, format).usage()
         }

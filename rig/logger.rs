@@ -110,7 +110,7 @@ impl Takers {
 
     /// Shows how the run goes, if it is time to and somebody reads.
     fn show(&mut self, now_ns: u64) {
-        if let Some(error) = self.backlog.failed_just_now() {
+        if let Some(error) = self.backlog.new_failure() {
             let words = format!("masseter: {error}; the rig goes on, what follows is not recorded\n");
             self.screen.say(words);
             self.view.leave_picture();

@@ -171,7 +171,11 @@ impl Contender {
         let comment = format!("masseter bench {bench}: {}, ns, a line a round", self.name);
         let starts_ns = (0..).step_by(histogram_log::INTERVAL_NS as usize);
         let rounds = starts_ns.zip(&self.rounds);
-        histogram_log::write(&path, &comment, rounds.filter_map(|(start_ns, round)| Some((start_ns, round.as_ref()?))))
+        histogram_log::write(
+            &path,
+            &comment,
+            rounds.filter_map(|(start_ns, round)| Some((start_ns, round.as_ref()?))),
+        )
     }
 }
 

@@ -92,7 +92,8 @@ impl Server {
     /// Lets the logger know what is worth offering.
     fn publish_wants(&self) {
         let is_seen = |channel: Channel| self.clients.iter().any(|client| client.sees(channel));
-        let wanted = Topic::ALL.into_iter().filter(|topic| Channel::of(*topic).into_iter().any(is_seen));
+        let wanted =
+            Topic::ALL.into_iter().filter(|topic| Channel::for_topic(*topic).into_iter().any(is_seen));
         self.shared.wanted.store(wanted.fold(0, |bits, topic| bits | bit(topic)), Ordering::Relaxed);
         self.shared.clients.store(self.clients.len(), Ordering::Relaxed);
     }

@@ -39,8 +39,9 @@ impl OverrunAttribution {
         let counts = processes.iter().map(|skips| skips.as_long_as(least_ns));
         let (while_waiting, while_working) =
             counts.fold((0, 0), |sum, count| (sum.0 + count.0, sum.1 + count.1));
-        let sum_ns =
-            |part: fn(&SkipFigures) -> u64| -> u64 { processes.iter().map(|skips| part(&skips.figures())).sum() };
+        let sum_ns = |part: fn(&SkipFigures) -> u64| -> u64 {
+            processes.iter().map(|skips| part(&skips.figures())).sum()
+        };
         let worked_ns = sum_ns(|figures| figures.worked_ns.saturating_sub(figures.overlong_ns));
         let spun_ns = sum_ns(|figures| figures.spun_ns);
         let work_share = worked_ns as f64 / (worked_ns + spun_ns).max(1) as f64;

@@ -212,7 +212,8 @@ mod tests {
         measured.add(9_000, 3 * SECOND_NS);
         let figures = measured.finish();
         assert_eq!((figures.n, figures.p50_noise_ns), (31, Some(0.0)));
-        let seconds: Vec<_> = figures.seconds.iter().map(|(began_ns, second)| (began_ns, second.len())).collect();
+        let seconds: Vec<_> =
+            figures.seconds.iter().map(|(began_ns, second)| (began_ns, second.len())).collect();
         assert_eq!(seconds, [(0, 10), (SECOND_NS, 10), (2 * SECOND_NS, 10), (3 * SECOND_NS, 1)]);
     }
 

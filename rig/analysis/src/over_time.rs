@@ -121,8 +121,8 @@ where
 
 #[cfg(test)]
 mod tests {
-    use masseter_can::{Bitrate, CanId, Frame};
     use masseter_can::TappedFrame;
+    use masseter_can::{Bitrate, CanId, Frame};
 
     use super::*;
 

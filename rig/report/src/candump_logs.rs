@@ -92,10 +92,9 @@ mod tests {
         let mut logs = CandumpLogs::new(folder.path(), &[]);
         let frame = Frame::fixed(CanId::standard(0x080).unwrap(), []);
         let report = ErrorReport { time_ns: 2000, port: 1, kind: ErrorKind::Bit, tec: 8, rec: 0 };
-        for tapped in [
-            Tapped::Frame(TappedFrame { frame, time_ns: 1000, queued_ns: None }),
-            Tapped::Error(report),
-        ] {
+        for tapped in
+            [Tapped::Frame(TappedFrame { frame, time_ns: 1000, queued_ns: None }), Tapped::Error(report)]
+        {
             logs.write(1, &tapped).unwrap();
         }
         assert_eq!(logs.finish().unwrap(), [0, 2]);

@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use crate::text;
 use masseter_analysis::{
-    BusResponse, Code, EventRecord, Figures, ResponseFigures, OverrunAttribution, TrackingFigures,
+    BusResponse, Code, EventRecord, Figures, OverrunAttribution, ResponseFigures, TrackingFigures,
 };
 use masseter_recording::Ending;
 use masseter_recording::Manifest;
@@ -29,7 +29,11 @@ impl CheckResult {
         if passed { Self::Passed } else { Self::Failed }
     }
 
-    /// In a word.
+    pub(crate) fn is_failed(self) -> bool {
+        self == Self::Failed
+    }
+
+    /// The word in tables.
     pub fn mark(self) -> &'static str {
         match self {
             Self::Passed => "ok",

@@ -29,9 +29,8 @@ enum AnalysisError {
 /// # Errors
 /// With [`Exit::Incomplete`] when the recording cannot be read or a file cannot be written.
 pub fn report_run(folder: &RunFolder, manifest: &Manifest, format: Format) -> Result<Exit, Failure> {
-    let (figures, logged) = analyse(folder, &manifest.scenario)
-        .context("the run's recording cannot be analysed")
-        .incomplete()?;
+    let (figures, logged) =
+        analyse(folder, &manifest.scenario).context("the run's recording cannot be analysed").incomplete()?;
     logged.and_then(|()| write_data(folder, &figures)).incomplete()?;
     write_report(folder, manifest, &figures, format)
 }
@@ -48,7 +47,10 @@ pub fn report_past_run(path: &Path, format: Format) -> Result<Exit, Failure> {
     match logged.and_then(|()| write_data(&folder, &figures)) {
         Err(error) if error.is_read_only() => {
             let WriteError { path, error } = error;
-            status!("masseter: cannot write {}: {error}; the run is shown, and no file written", path.display());
+            status!(
+                "masseter: cannot write {}: {error}; the run is shown, and no file written",
+                path.display()
+            );
             Ok(judge_and_show(&folder, &manifest, &figures, format)?.0.outcome.exit())
         }
         written => {
@@ -92,10 +94,11 @@ fn write_report(
     format: Format,
 ) -> Result<Exit, Failure> {
     let (verdict, summary) = judge_and_show(folder, manifest, figures, format)?;
+    let page = page::html(manifest, figures, &verdict).context("cannot write the page").incomplete()?;
     for (path, text) in [
         (folder.summary(), summary),
         (folder.junit(), junit::xml(manifest, figures, &verdict)),
-        (folder.report(), page::html(manifest, figures, &verdict)),
+        (folder.report(), page),
     ] {
         fs::write(&path, text).map_err(WriteError::for_file(&path)).incomplete()?;
     }

@@ -9,8 +9,7 @@ use crate::text::{decimals, event_with_cycle, microseconds, or_dash};
 use crate::usage;
 use crate::verdict::Verdict;
 use masseter_analysis::{
-    BusResponse, Figures, IntervalFigures, ReadingFigures, ResponseFigures,
-    TrackingFigures,
+    BusResponse, Figures, IntervalFigures, ReadingFigures, ResponseFigures, TrackingFigures,
 };
 use masseter_recording::Manifest;
 

@@ -13,10 +13,10 @@ use serde::Serialize;
 
 use crate::text::or_dash;
 use changes::{Change, Judgement, changes};
+use compared_run::{ComparedRun, Difference, differences};
 use masseter_terminal::Exit;
 use masseter_terminal::Format;
 use masseter_terminal::result;
-use compared_run::{Difference, ComparedRun, differences};
 
 /// Version of the comparison's form.
 const FORM: u32 = 1;
