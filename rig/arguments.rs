@@ -2,7 +2,8 @@
 
 use std::path::PathBuf;
 
-use clap::Args;
+use clap::{Args, ValueEnum};
+use masseter_controller::process::Kind;
 use masseter_shared::lifecycle::Assignment;
 
 /// The arguments that the supervisor passes to every process of a run.
@@ -17,6 +18,35 @@ pub(crate) struct ProcessArgs {
 impl ProcessArgs {
     pub(crate) fn assignment(self) -> Assignment {
         Assignment { scenario: self.scenario, domain: self.domain }
+    }
+}
+
+/// A controller of the rig.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
+pub enum ControllerKind {
+    /// Plays the motion of the scenario
+    #[default]
+    Motion,
+    /// Holds the position found at the start, for as long as the motion takes
+    Hold,
+}
+
+impl ControllerKind {
+    /// The name on the command line.
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::Motion => "motion",
+            Self::Hold => "hold",
+        }
+    }
+}
+
+impl From<ControllerKind> for Kind {
+    fn from(kind: ControllerKind) -> Self {
+        match kind {
+            ControllerKind::Motion => Self::Motion,
+            ControllerKind::Hold => Self::Hold,
+        }
     }
 }
 

@@ -7,10 +7,11 @@ use masseter_study::KinematicsArgs;
 use masseter_study::uniqueness::UniquenessVerb;
 use masseter_terminal::{Exit, Failure, OrFailure, status};
 
-use crate::arguments::ProcessArgs;
 use crate::bench::ipc::PeerArgs;
 use crate::bench::{self, BenchArgs};
 use crate::can::{self, CanVerb};
+use crate::clean;
+use crate::controller::{self, ControllerArgs};
 use crate::csv_kinematics::{self, CsvArgs, FkArgs};
 use crate::doctor::{self, DoctorArgs};
 use crate::plant::{self, PlantArgs};
@@ -18,7 +19,6 @@ use crate::recorder::{self, RecorderArgs};
 use crate::recording_cli::{self, RecordingVerb};
 use crate::report_cli::{self, ReportArgs};
 use crate::run::{self, args::RunArgs};
-use crate::{clean, controller};
 
 /// A hardware-in-the-loop rig for a 6-DOF mastication robot
 ///
@@ -68,7 +68,7 @@ enum Verb {
     #[command(hide = true)]
     BenchPeer(PeerArgs),
     #[command(hide = true)]
-    Controller(ProcessArgs),
+    Controller(ControllerArgs),
     #[command(hide = true)]
     Recorder(RecorderArgs),
 }

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use anyhow::{Context, bail};
 use clap::Args;
-use masseter_plant::emulator::{Emulator, Figures};
+use masseter_plant::emulation::{Emulator, EmulatorCounters};
 use masseter_plant::process::{self, Reason};
 use masseter_shared::clock;
 use masseter_shared::config::Scenario;
@@ -66,7 +66,7 @@ fn emulate(args: &PlantArgs) -> anyhow::Result<()> {
     });
     obtained.refusals.iter().for_each(|refusal| status!("  plant: {refusal}"));
     status!("emulating six drives on {}; stop with Ctrl-C", scenario.can.interfaces.join(", "));
-    print_figures(emulator.run(&stop)?)
+    print_counters(emulator.run(&stop)?)
 }
 
 fn resolve(args: &PlantArgs) -> anyhow::Result<Scenario> {
@@ -88,12 +88,12 @@ fn resolve(args: &PlantArgs) -> anyhow::Result<Scenario> {
     Ok(scenario)
 }
 
-fn print_figures(figures: Figures) -> anyhow::Result<()> {
+fn print_counters(counters: EmulatorCounters) -> anyhow::Result<()> {
     result_line!(
         "received {} frames, sent {}, failed to send {}; skipped {:.1} ms of emulated time, since the machine was too slow",
-        figures.received,
-        figures.sent,
-        figures.refused,
-        figures.skipped_ns as f64 / 1e6
+        counters.received,
+        counters.sent,
+        counters.refused,
+        counters.skipped_ns as f64 / 1e6
     )
 }

@@ -24,7 +24,7 @@ pub(crate) struct ReportArgs {
 /// Judges a run again, or compares two runs.
 pub(crate) fn report(args: &ReportArgs) -> Result<Exit, Failure> {
     match &args.against {
-        None => masseter_report::again(&args.folder, args.format),
+        None => masseter_report::report_past_run(&args.folder, args.format),
         Some(against) => masseter_report::compare::runs(&args.folder, against, args.format).usage(),
     }
 }

@@ -32,6 +32,14 @@ fn a_run_plays_through_three_processes_and_leaves_nothing_in_shared_memory() {
     assert_logged_in_order(&fs::read(workspace.run_folder().join("recording.mcap")).unwrap());
 }
 
+#[test]
+fn another_controller_runs_through_three_processes() {
+    let cores = Cores::take();
+    let workspace = Workspace::new(&format!("duration_s = 1.0\n{LENIENT}"));
+    let output = workspace.start(&cores, &["--controller", "hold"]).wait_with_output().unwrap();
+    assert_played(&workspace.run_folder(), output.status, &(stdout(&output) + &stderr(&output)));
+}
+
 /// Nothing is logged before it was published, nor before what stands above it.
 fn assert_logged_in_order(recording: &[u8]) {
     let mut last_ns = 0;

@@ -5,7 +5,7 @@ mod common;
 use std::fs;
 use std::path::Path;
 
-use common::{Workspace, cramped, jaw_recording, json, stderr, stdout, wait_until_it_records};
+use common::{Workspace, cramped, json, stderr, stdout, wait_until_it_records};
 use rustix::process::{Pid, Signal, kill_process};
 use serde_json::json;
 
@@ -36,6 +36,16 @@ fn a_run_passes_tracks_within_a_tenth_of_a_millimetre_and_leaves_its_folder() {
     let table = stdout(&output);
     assert!(table.starts_with("PASS"), "{table}");
     assert!(table.contains("forward kinematics"), "{table}");
+}
+
+#[test]
+fn another_controller_runs_through_the_whole_rig() {
+    let workspace = Workspace::new("duration_s = 1.0");
+    let output = workspace.run_virtual(&["--controller", "hold"]);
+    assert_eq!(output.status.code(), Some(0), "{}{}", stdout(&output), stderr(&output));
+    let tracking = &workspace.summary()["figures"]["tracking"];
+    assert_eq!(tracking["samples"], 1000, "{tracking}");
+    assert!(tracking["max_mm"].as_f64().unwrap() < 0.01, "{tracking}");
 }
 
 #[test]
@@ -107,19 +117,17 @@ fn every_generated_motion_plays() {
     }
 }
 
-/// The project's own recordings always, those of patients where they are.
+/// Recordings as poses and as markers; each kind with one like a patient's.
 #[test]
 fn recordings_play_and_are_tracked() {
     let examples = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples");
-    for (scenario, own, patients) in [
-        ("patient.toml", "jaw.csv", "patient_jaws3d.csv"),
-        ("markers.toml", "markers.csv", "jma_markers.csv"),
-    ] {
+    for (scenario, recordings) in
+        [("patient.toml", ["jaw.csv", "patient.csv"]), ("markers.toml", ["markers.csv", "tracker.csv"])]
+    {
         let scenario = fs::read_to_string(examples.join(scenario)).unwrap();
-        for path in [Some(examples.join(own)), jaw_recording(patients)].into_iter().flatten() {
+        for name in recordings {
             let workspace = Workspace::new(&scenario);
-            let output = workspace.run_virtual(&["--trajectory", path.to_str().unwrap()]);
-            let name = path.display();
+            let output = workspace.run_virtual(&["--trajectory", examples.join(name).to_str().unwrap()]);
             assert_eq!(output.status.code(), Some(0), "{name}: {}{}", stdout(&output), stderr(&output));
             let tracking = &workspace.summary()["figures"]["tracking"];
             assert!(tracking["rms_mm"].as_f64().unwrap() < 0.1, "{name}: {tracking}");

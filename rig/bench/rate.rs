@@ -17,9 +17,9 @@ use super::contender::{Contender, Durations, Round, durations as empty};
 use super::contest::{Outcome, take_turns};
 use super::rate_summary::Summary;
 use crate::machine::interrupts::Interrupts;
-use masseter_analysis::hlog;
 use masseter_recording::Manifest;
 use masseter_recording::RunFolder;
+use masseter_report::histogram_log;
 
 /// As it is called in results.
 pub(super) const NAME: &str = "rate";
@@ -193,7 +193,7 @@ fn turn(folder: &RunFolder) -> anyhow::Result<Turn> {
     }
     let log = |(_, name): &(_, &str)| {
         let path = folder.histograms().join(format!("{name}.hlog"));
-        hlog::read(&path).with_context(|| format!("cannot read {}", path.display()))
+        histogram_log::read(&path).with_context(|| format!("cannot read {}", path.display()))
     };
     Ok(Turn::Played { durations: INTERVALS.iter().map(log).collect::<anyhow::Result<_>>()?, shares })
 }

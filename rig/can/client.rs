@@ -8,7 +8,7 @@ use std::net::TcpStream;
 
 use masseter_can::socketcand::{ECHO, GREETING, OK, Request, RequestError, Requests, write_frame};
 use masseter_can::{Bus, ReceiveError};
-use masseter_plant::open_link::{NodePort, OpenLink};
+use masseter_plant::emulation::{NodePort, OpenLink};
 use masseter_terminal::status;
 
 /// Most unsent bytes of a client; a bus at full load makes about 0.5 MB a second.

@@ -32,7 +32,7 @@ pub(crate) fn plan(args: &PlanArgs) -> anyhow::Result<Exit> {
         Ok(())
     })?;
     let plans = plans(&scenario.can, scenario.period_ns())?;
-    let room = Room::of(&scenario.can)?;
+    let room = Room::for_link(&scenario.can)?;
     let refusal = refusal(&scenario, &plans, &room);
     let text = match args.format {
         Format::Human => {
@@ -72,7 +72,7 @@ fn of_bus(plan: &BusPlan, can: &CanConfig) -> Result<Value, ScheduleError> {
         "fits": plan.check().is_ok(),
         "cycle_time_ns": plan.cycle_time_ns(),
         "utilisation": plan.utilisation(),
-        "max_rate_hz": Room::of(&alone)?.max_rate_hz,
+        "max_rate_hz": Room::for_link(&alone)?.max_rate_hz,
         "messages": plan.messages().iter().map(of_message).collect::<Vec<_>>(),
     }))
 }

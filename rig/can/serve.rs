@@ -10,7 +10,7 @@ use std::path::PathBuf;
 
 use anyhow::Context;
 use clap::Args;
-use masseter_plant::open_link::OpenLink;
+use masseter_plant::emulation::OpenLink;
 use masseter_shared::clock;
 use masseter_shared::config::Scenario;
 use masseter_shared::geometry::AXIS_NAMES;

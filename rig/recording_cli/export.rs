@@ -6,8 +6,9 @@ use std::io::{BufWriter, Read, Seek, Write};
 use std::path::Path;
 
 use anyhow::Context;
-use masseter_analysis::CandumpLogs;
 use masseter_recording::{CDR_LITTLE_ENDIAN, Entry, Reader, Recorded};
+use masseter_report::CandumpLogs;
+use masseter_shared::messages::tap;
 
 use super::columns::Columns;
 
@@ -29,21 +30,21 @@ pub(super) fn write<R: Read + Seek>(
     for (channel, (topic, columns)) in tables {
         files.insert(channel, CsvFile::create(folder, &topic, columns)?);
     }
-    let mut candump = CandumpLogs::new(Some(folder), &[]);
+    let mut candump = CandumpLogs::new(folder, &[]);
     let mut line = String::new();
     while let Some(entry) = reader.next_entry()? {
         let Some(csv) = files.get_mut(&entry.header.channel_id) else { continue };
         csv.write(&mut line, &entry)?;
         if let Some(Ok(Recorded::Frame(frame))) = entry.recorded() {
-            candump.write(&frame)?;
+            candump.write(tap::bus_of(&frame)?, &tap::decode(&frame)?)?;
         }
     }
     let mut written = Vec::new();
     for csv in files.into_values() {
         written.push(csv.finish()?);
     }
-    for (bus, logged) in candump.finish()?.into_iter().enumerate() {
-        written.push((format!("can{bus}.log"), logged.frames + logged.errors));
+    for (bus, lines) in candump.finish()?.into_iter().enumerate() {
+        written.push((format!("can{bus}.log"), lines));
     }
     Ok(written)
 }

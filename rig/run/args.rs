@@ -8,7 +8,7 @@ use clap::{Args, ValueEnum};
 use masseter_plan::Overrides;
 use masseter_terminal::Format;
 
-use crate::arguments::{Wires, parse_cores, parse_wires};
+use crate::arguments::{ControllerKind, Wires, parse_cores, parse_wires};
 use crate::foxglove;
 
 /// The arguments of `run`.
@@ -31,6 +31,9 @@ pub struct RunArgs {
     /// Clock of the run
     #[arg(long, value_enum, default_value_t)]
     pub clock: ClockKind,
+    /// Play the motion, or only hold the position found at the start
+    #[arg(long, value_enum, default_value_t)]
+    pub controller: ControllerKind,
     /// Simulated buses, or the CAN interface of each bus, such as can0,can1
     #[arg(long, value_name = "virtual|IF[,IF]", value_parser = parse_wires)]
     pub can: Option<Wires>,

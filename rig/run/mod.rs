@@ -45,7 +45,7 @@ pub fn run(args: &RunArgs) -> Result<Exit, Failure> {
     // This one remains if the supervisor is killed.
     write_manifest(&folder, &manifest)?;
     let outcome = match domain {
-        None => virtual_time::run(&plan, &folder).map(RunOutcome::from).incomplete(),
+        None => virtual_time::run(&plan, &folder, args.controller.into()).map(RunOutcome::from).incomplete(),
         Some(domain) => supervisor::run(domain, &plan, &folder, args),
     };
     let outcome = outcome.or_else(|failure| {
@@ -63,10 +63,7 @@ pub fn run(args: &RunArgs) -> Result<Exit, Failure> {
     if manifest.ending == Ending::Interrupted && is_unstarted {
         return Ok(Exit::Interrupted);
     }
-    let figures = masseter_analysis::analyse(&folder, &plan.scenario)
-        .context("the run's recording cannot be analysed")
-        .incomplete()?;
-    masseter_report::write(&folder, &manifest, &figures, args.format)
+    masseter_report::report_run(&folder, &manifest, args.format)
 }
 
 fn write_manifest(folder: &RunFolder, manifest: &Manifest) -> Result<(), Failure> {

@@ -125,6 +125,7 @@ impl Rig {
         let mut recorder_arguments = [&common[..], &["--recording", recording, &motion]].concat();
         recorder_arguments.extend(args.quiet.then_some("--quiet"));
         recorder_arguments.extend(live.as_deref());
+        let controller_arguments = [&common[..], &["--kind", args.controller.name()]].concat();
         let Scenario { controller, can, .. } = &plan.scenario;
         // It stops the motion, holds it, and switches the drives off.
         let stop_s = controller.stop_ramp_s + controller.hold_s + controller.start_timeout_s;
@@ -133,7 +134,7 @@ impl Rig {
             plant_alone_ns: u64::from(can.command_timeout_cycles) * plan.scenario.period_ns() + SAFE_STOP_NS,
             recorder: Process::spawn(Role::Recorder, &recorder_arguments)?,
             plant: Process::spawn(Role::Plant, &common)?,
-            controller: Process::spawn(Role::Controller, &common)?,
+            controller: Process::spawn(Role::Controller, &controller_arguments)?,
         })
     }
 

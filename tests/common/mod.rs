@@ -220,16 +220,6 @@ pub(crate) fn skip(why: &str) {
     writeln!(io::stderr(), "SKIPPED: {why}").expect("standard error can be written");
 }
 
-/// A recording of a patient. These recordings are not part of the project, so they may be absent.
-pub(crate) fn jaw_recording(name: &str) -> Option<PathBuf> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data/jaw").join(name);
-    if path.is_file() {
-        return Some(path);
-    }
-    skip(&format!("{name} is absent"));
-    None
-}
-
 /// A rig's files in shared memory.
 pub(crate) struct SharedMemory {
     id: String,

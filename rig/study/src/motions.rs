@@ -36,14 +36,22 @@ pub(super) struct Followed {
     pub iterations_mean: f64,
 }
 
-/// The rig's generators with their defaults, the default scenario's first, and the motion of `own` if given.
+/// Opening of adults at the incisal point, mean and 95th percentile of 259, mm (Kordass et al., Int J Comput Dent 17
+/// (2014) 9–20).
+const HUMAN_OPENINGS_MM: [f64; 2] = [44.3, 56.1];
+
+/// The rig's generators with their defaults, the default scenario's first, but opening over the human range; and the
+/// motion of `own` if given.
 ///
 /// # Errors
 /// When its recording cannot be used, or a value of it lies outside its range.
 pub(super) fn motions(mechanism: &Mechanism, own: Option<&Scenario>) -> anyhow::Result<Vec<Motion>> {
+    let opening =
+        |amplitude_mm| MotionConfig::Opening(OpeningConfig { amplitude_mm, ..OpeningConfig::default() });
     let generated = [
         ("chewing", MotionConfig::Chewing(ChewingConfig::default())),
-        ("opening", MotionConfig::Opening(OpeningConfig::default())),
+        ("opening 44 mm", opening(HUMAN_OPENINGS_MM[0])),
+        ("opening 56 mm", opening(HUMAN_OPENINGS_MM[1])),
         ("protrusion", MotionConfig::Protrusion(ProtrusionConfig::default())),
         ("lateral excursion", MotionConfig::Lateral(LateralConfig::default())),
     ];

@@ -49,6 +49,8 @@ pub(super) struct Parting {
     /// Its table and its figure.
     pub name: &'static str,
     pub title: &'static str,
+    /// What Newton–Raphson does.
+    pub newton: Course,
     /// The guess that shows it most clearly, if any shows it.
     pub clearest: Option<Pair>,
     /// How often it happens.
@@ -86,7 +88,7 @@ impl Pairs {
             let clearness = |pair: &Pair| clearness(&pair.newton_cm2);
             let clearest = matching().max_by(|a, b| clearness(a).total_cmp(&clearness(b)));
             let share = Share { hits: matching().count(), of: traced.len() };
-            Parting { name, title, clearest: clearest.cloned(), share }
+            Parting { name, title, newton: wanted[1], clearest: clearest.cloned(), share }
         };
         Self {
             diverging: parting(

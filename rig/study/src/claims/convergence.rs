@@ -107,39 +107,67 @@ pub(super) fn close_guess_converges(study: &Study) -> Claim {
     }
 }
 
+/// One criterion for claims 10 and 11: the solution is predictable from guesses if 99 % of the solutions reached are the
+/// closest ones.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Predictable {
+    /// From guesses above the base.
+    anywhere: bool,
+    /// From guesses within ±5°.
+    close: bool,
+}
+
+impl Predictable {
+    fn from_shares([anywhere, close]: [Share; 2]) -> Self {
+        let is_predictable = |closest: Share| closest.of > 0 && closest.value() >= 1.0 - RARELY;
+        Self { anywhere: is_predictable(anywhere), close: is_predictable(close) }
+    }
+
+    /// Claim 10, of the paper's solver.
+    fn reaches_the_closest(self) -> Verdict {
+        Verdict::of(self.anywhere, self.close)
+    }
+
+    /// Claim 11, of Newton–Raphson: the opposite.
+    fn cannot_be_predicted(self) -> Verdict {
+        Verdict::of(!self.close, !self.anywhere)
+    }
+}
+
+/// How often the solution reached is the closest: from guesses above the base, and within ±5°.
+fn closest(study: &Study, contender: Contender) -> [Share; 2] {
+    [ANY, CLOSE].map(|guesses| study.trials.closest(contender, guesses))
+}
+
+fn closest_measured(study: &Study) -> String {
+    let [[published, published_close], [newton, newton_close]] =
+        [PUBLISHED, NEWTON].map(|contender| closest(study, contender).map(Share::percent));
+    format!(
+        "of the solutions reached from above the base, the closest: the paper's solver {published}, Newton–Raphson \
+         {newton}; from within ±5° of the true one: {published_close} and {newton_close}"
+    )
+}
+
 pub(super) fn closest_solution(study: &Study) -> Claim {
-    let closest = |contender| study.trials.closest(contender, ANY);
-    let (published, newton) = (closest(PUBLISHED), closest(NEWTON));
     Claim {
         says: "It reaches the solution closest to the guess.",
         place: "Abstract and Results, third advantage",
-        measured: format!(
-            "of the solutions reached from above the base, the closest in {} (Newton–Raphson {}); from within \
-             ±20° of the true one {}",
-            published.percent(),
-            newton.percent(),
-            study.trials.closest(PUBLISHED, Guesses::Within(20.0)).percent()
-        ),
-        criterion: "holds if 99 % of the solutions reached are the closest (largest difference of any leg's angle); \
-                    partly if clearly more than Newton–Raphson's",
-        verdict: Verdict::of(published.value() >= 1.0 - RARELY, published.clearly_exceeds(newton)),
+        measured: closest_measured(study),
+        criterion: "holds if at least 99 % of the solutions that the paper's solver reaches from above the base are the \
+                    closest (largest difference of any leg's angle); partly if at least from within ±5°",
+        verdict: Predictable::from_shares(closest(study, PUBLISHED)).reaches_the_closest(),
         figure: Some("basins"),
     }
 }
 
 pub(super) fn unpredictable_newton(study: &Study) -> Claim {
-    let newton = study.trials.closest(NEWTON, ANY);
-    let near = study.trials.closest(NEWTON, CLOSE);
     Claim {
         says: "Which solution Newton–Raphson reaches cannot be predicted.",
         place: "Abstract and Results, third advantage",
-        measured: format!(
-            "it reached the closest in {} from above the base, in {} from within ±5° of the true one",
-            newton.percent(),
-            near.percent()
-        ),
-        criterion: "holds if it misses the closest even within ±5°; partly if only from further away",
-        verdict: Verdict::of(near.value() < 1.0 - RARELY, newton.value() < 1.0 - RARELY),
+        measured: closest_measured(study),
+        criterion: "the criterion of the claim before, turned round: holds if fewer than 99 % of the solutions that \
+                    Newton–Raphson reaches from within ±5° are the closest; partly if only from above the base",
+        verdict: Predictable::from_shares(closest(study, NEWTON)).cannot_be_predicted(),
         figure: Some("basins"),
     }
 }
@@ -196,6 +224,20 @@ fn best_variant(share: impl Fn(Contender) -> Share) -> (Contender, Share) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_same_figures_never_fulfil_both_claims_of_one_solver() {
+        let share = |hits| Share { hits, of: 1000 };
+        for (anywhere, close, reaches, unpredictable) in [
+            (995, 999, Verdict::Holds, Verdict::DoesNotHold),
+            (300, 999, Verdict::HoldsPartly, Verdict::HoldsPartly),
+            (300, 980, Verdict::DoesNotHold, Verdict::Holds),
+        ] {
+            let predictable = Predictable::from_shares([share(anywhere), share(close)]);
+            assert_eq!(predictable.reaches_the_closest(), reaches);
+            assert_eq!(predictable.cannot_be_predicted(), unpredictable);
+        }
+    }
 
     fn share(hits: usize) -> Share {
         Share { hits, of: 1000 }

@@ -95,7 +95,8 @@ fn movement_is_covered(study: &Study) -> Claim {
         says: "The dimensions given cover the range of the human jaw's movement.",
         place: "Method 1",
         measured: study.motions.iter().map(told).collect::<Vec<_>>().join("; "),
-        criterion: "holds if every motion stays within strokes, speeds and conditioning; partly if any does",
+        criterion: "holds if every motion stays within strokes, speeds and conditioning, with openings of 44 and 56 mm (mean \
+                    and 95th percentile of adults); partly if any does",
         verdict: Verdict::of(covered.is_all(), covered.hits > 0),
         figure: Some("workspace_translation"),
     }

@@ -9,11 +9,12 @@ use crate::share::quantile;
 use crate::workspace::{Coordinate, Map, Place};
 
 /// Of the motions: the default scenario's, the other generators', the one given.
-const MOTIONS: [RGBColor; 5] = [
+const MOTIONS: [RGBColor; 6] = [
     RGBColor(0xff, 0xff, 0xff),
     RGBColor(0xff, 0xb0, 0x00),
     RGBColor(0xff, 0x5f, 0x8f),
     RGBColor(0x9f, 0xff, 0xff),
+    RGBColor(0xc0, 0x90, 0xff),
     RGBColor(0xff, 0x30, 0x30),
 ];
 
@@ -90,7 +91,8 @@ fn draw_map(area: &Area, study: &Study, map: &Map, measure: &Measure, range: [f6
     };
     let mut chart = axes.on(area)?;
     fill(&mut chart, map, ranges, |place| colour(range, (measure.of)(place)))?;
-    for (motion, colour) in study.motions.iter().zip(MOTIONS) {
+    // The wider opening first: the other runs along it.
+    for (motion, colour) in study.motions.iter().zip(MOTIONS).rev() {
         let points: Vec<_> =
             motion.poses().map(|pose| (map.slice.across.of(&pose), map.slice.up.of(&pose))).collect();
         // A dark rim keeps the path visible on every colour of the map.
@@ -139,8 +141,14 @@ fn colour([low, high]: [f64; 2], value: f64) -> RGBColor {
     ViridisRGB.get_color((share * STEPS).round() / STEPS)
 }
 
+/// Decimals at which neighbouring labels of a colour bar differ: about ten labels share its range.
+fn decimals(range: f64) -> usize {
+    (1.0 - (range / 2.0).log10().floor()).max(0.0) as usize
+}
+
 fn colour_bar(area: &Area, measure: &Measure, range: [f64; 2]) -> anyhow::Result<()> {
     let [low, high] = range;
+    let decimals = decimals(high - low);
     let mut chart = ChartBuilder::on(area)
         .margin(10)
         .margin_left(2)
@@ -159,8 +167,22 @@ fn colour_bar(area: &Area, measure: &Measure, range: [f64; 2]) -> anyhow::Result
         .configure_secondary_axes()
         .label_style(("sans-serif", TEXT - 2))
         .axis_desc_style(("sans-serif", TEXT))
-        .y_label_formatter(&|value| format!("{value:.2}"))
-        .y_desc(format!("{} (yellow: {high:.2} and more)", measure.label))
+        .y_label_formatter(&|value| format!("{value:.decimals$}"))
+        .y_desc(format!("{} (yellow: {high:.decimals$} and more)", measure.label))
         .draw()?;
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn labels_of_a_colour_bar_differ() {
+        for (low, high) in [(2.0, 2.04), (0.0, 0.9), (1.0, 3.5), (0.0, 20.0), (5.0, 800.0)] {
+            let decimals = decimals(high - low);
+            let label = |step: u32| format!("{:.decimals$}", low + (high - low) * f64::from(step) / 20.0);
+            assert!((0..20).all(|step| label(step) != label(step + 1)), "{low} to {high}: {decimals}");
+        }
+    }
 }
