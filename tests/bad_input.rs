@@ -136,8 +136,8 @@ fn interfaces_that_cannot_be_used_are_refused_with_what_to_do() {
             &["plant", "--emulate", "--can", "no-such-a,no-such-b"],
             &["modprobe can-raw", "no CAN interface `no-such-a`"],
         ),
-        (&["plant", "--emulate"], &["no interface to put the drives on"]),
-        (&["plant", "--emulate", "--can", "virtual"], &["no interface to put the drives on"]),
+        (&["plant", "--emulate"], &["need an interface for each bus"]),
+        (&["plant", "--emulate", "--can", "virtual"], &["need an interface for each bus"]),
         (&["plant", "--can", "can0,can1"], &["masseter run --can can0,can1"]),
     ];
     for (arguments, remedies) in cases {

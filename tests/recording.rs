@@ -211,7 +211,7 @@ fn definitions() -> usize {
     let scene = Scene::new(&Mechanism::new(&scenario.mechanism).unwrap(), &scenario.jaw);
     let mut medium = Cursor::new(Vec::new());
     // As if it were killed: the end is not written.
-    std::mem::forget(Recorder::on(&mut medium, scene).unwrap());
+    std::mem::forget(Recorder::new(&mut medium, scene).unwrap());
     medium.into_inner().len()
 }
 

@@ -136,7 +136,7 @@ static WHOLE: LazyLock<Vec<u8>> = LazyLock::new(|| {
     let mechanism = Mechanism::new(&MechanismConfig::default()).expect("the default is a mechanism");
     let mut medium = Cursor::new(Vec::new());
     let mut recorder =
-        Recorder::on(&mut medium, Scene::new(&mechanism, &JawConfig::default())).expect("memory takes all");
+        Recorder::new(&mut medium, Scene::new(&mechanism, &JawConfig::default())).expect("memory takes all");
     for cycle in 1..=CYCLES {
         recorder.record(&Recorded::Reading(reading(cycle)), cycle).expect("memory takes all");
         if cycle == CYCLES / 2 {

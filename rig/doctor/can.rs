@@ -119,7 +119,7 @@ mod tests {
     use crate::machine::fixture::Fixture;
 
     #[test]
-    fn a_kernel_without_can_still_has_the_virtual_bus() {
+    fn a_kernel_without_can_is_a_warning_only() {
         let machine = Fixture::with_files(&[]);
         assert_eq!(support(&machine.root(), &Ok(())).level, Fine);
         assert_eq!(support(&machine.root(), &Err(io::Error::from_raw_os_error(97))).level, Warn);
@@ -132,7 +132,7 @@ mod tests {
     }
 
     #[test]
-    fn interfaces_are_told_by_their_hardware_type_flags_and_carrier() {
+    fn interfaces_are_judged_by_hardware_type_flags_and_carrier() {
         let of = |flags, carrier| {
             let fixture = Fixture::with_files(&[
                 ("sys/class/net/eth0/type", "1"),
@@ -150,7 +150,7 @@ mod tests {
         let (level, found, _) = of("0x400c0", "");
         assert_eq!((level, found.as_str()), (Warn, "can0; can0 down"));
         let (level, found, mend) = of("0x400c1", "0");
-        assert_eq!((level, found.as_str()), (Warn, "can0; can0 off the bus"));
+        assert_eq!((level, found.as_str()), (Warn, "can0; can0 bus-off"));
         assert_eq!(mend.as_deref(), Some("sudo ip link set can0 down && sudo ip link set can0 up"));
         assert_eq!(interfaces(&Fixture::with_files(&[]).root()).level, Fine);
     }

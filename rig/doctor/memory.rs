@@ -99,6 +99,6 @@ mod tests {
         assert_eq!(Shared::from_blocks(100, 0), Shared::Free(0));
         let machine = Fixture::with_files(&[]);
         let finding = room(&machine.root(), Shared::from_blocks(0, 0));
-        assert_eq!((finding.level, finding.found.as_str()), (Ok, "/dev/shm has no bound"));
+        assert_eq!((finding.level, finding.found.as_str()), (Ok, "/dev/shm has no limit"));
     }
 }

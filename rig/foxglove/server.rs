@@ -97,7 +97,7 @@ impl Server {
         let is_subscribed =
             |channel: Channel| self.clients.iter().any(|client| client.is_subscribed_to(channel));
         let topics =
-            Topic::ALL.into_iter().filter(|topic| Channel::of(*topic).into_iter().any(is_subscribed));
+            Topic::ALL.into_iter().filter(|topic| Channel::for_topic(*topic).into_iter().any(is_subscribed));
         self.counters.subscribed.store(topics.fold(0, |bits, topic| bits | bit(topic)), Ordering::Relaxed);
         self.counters.connected.store(self.clients.len(), Ordering::Relaxed);
     }

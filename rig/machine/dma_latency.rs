@@ -30,7 +30,7 @@ impl Hold {
             }
             Some(Err(_)) | None => (None, None, None),
         };
-        Self { obtained: DmaLatency { wanted, limit_us, refusal }, _device: device }
+        Self { obtained: DmaLatency { requested: wanted, limit_us, refusal }, _device: device }
     }
 
     /// The result, for the manifest.

@@ -39,7 +39,7 @@ impl Sinks {
     /// Shows the progress if it is due and the output before it is written.
     pub(super) fn show_progress(&mut self, now_ns: u64) {
         let losses = self.losses();
-        if let Some(error) = self.backlog.failed_just_now() {
+        if let Some(error) = self.backlog.new_failure() {
             self.stderr.write(format!("masseter: {error}; the run goes on without recording\n"));
             if let Some(progress) = &mut self.progress {
                 progress.start_new_panel();

@@ -34,7 +34,7 @@ impl Selection {
                     selection.tables.insert(channel.id, (channel.topic.clone(), columns));
                 }
                 Err(reason) if requested.is_empty() => {
-                    selection.skipped.push((channel.topic.clone(), reason))
+                    selection.skipped.push((channel.topic.clone(), reason));
                 }
                 Err(reason) => bail!("topic '{}' cannot become a table: {reason}", channel.topic),
             }

@@ -28,6 +28,11 @@ pub enum PoseSource {
 }
 
 impl PoseSource {
+    /// Whether it is the true pose.
+    pub fn is_truth(self) -> bool {
+        self == Self::Truth
+    }
+
     /// The word for a pose of this kind.
     pub fn adjective(self) -> &'static str {
         match self {

@@ -1,8 +1,8 @@
-//! Records without waiting for the disk: messages queue in memory of a fixed size, and a thread of its own
-//! compresses and writes them.
+//! Records without waiting for the disk: messages queue in memory of a fixed size, and a separate thread compresses and
+//! writes them.
 //!
-//! When the disk is too slow for the memory to suffice, the caller's [`Pace`] says whether messages are lost and
-//! counted or waited for; when it fails, the recording ends there and everything after it is lost and counted.
+//! When the memory is full, the caller's [`Pace`] decides: messages are dropped and counted, or the caller waits. When
+//! the disk fails, the recording ends there, and all later messages are lost and counted.
 
 #[cfg(test)]
 mod tests;
@@ -18,17 +18,17 @@ use bytemuck::{Pod, Zeroable, bytes_of, pod_read_unaligned};
 use masseter_shared::clock::{self, SECOND_NS};
 use masseter_shared::messages::Message;
 
-use super::CDR_LITTLE_ENDIAN;
+use super::schema::CDR_LITTLE_ENDIAN;
 use super::topic::Topic;
 use super::writer::{Medium, Recorder, WriteError};
 
-/// Whom the recording may hold up.
+/// Whether the caller may wait for the disk.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Pace {
-    /// Nobody: messages without room are dropped, and all others are soon on the disk for good.
+    /// Never: messages without room are dropped, and all others are synced to the disk twice a second.
     RealTime,
-    /// The caller, who waits for room. There are no flushes, whose times would decide where chunks end: the same
-    /// messages give the same bytes.
+    /// The caller waits for room. There are no flushes, whose times would decide where chunks end: the same messages give
+    /// the same bytes.
     Virtual,
 }
 
@@ -42,7 +42,7 @@ impl Pace {
         }
     }
 
-    /// How often everything goes to the disk for good, ns: what a power cut may take.
+    /// Time between two syncs to the disk, ns: the most that a power cut can take.
     const fn flush_every_ns(self) -> Option<u64> {
         match self {
             Self::RealTime => Some(SECOND_NS / 2),
@@ -51,14 +51,14 @@ impl Pace {
     }
 }
 
-/// What stands before each message's body in a batch.
+/// The head of each message in a batch.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 struct Head {
     log_time_ns: u64,
     topic: u16,
     body_bytes: u16,
-    /// With the body behind it, it makes the message CDR.
+    /// Encapsulation header of CDR, directly before the body.
     encapsulation: [u8; 4],
 }
 
@@ -110,20 +110,20 @@ pub struct Outcome {
 }
 
 impl Outcome {
-    /// What the recording lacks and why, if it lacks anything.
+    /// The messages that the recording lacks, and why, in words; none if it is complete.
     pub fn loss(&self) -> Option<String> {
         let lost = format!("{} messages did not reach the disk", self.lost);
         match &self.error {
             None if self.lost == 0 => None,
             None => Some(lost),
-            // What failed is its end.
+            // Only the end of the file failed.
             Some(error) if self.lost == 0 => Some(error.to_string()),
             Some(error) => Some(format!("{error}; {lost}")),
         }
     }
 }
 
-/// The offering end.
+/// The caller's end of the queue.
 pub struct Backlog {
     pace: Pace,
     pending: Batch,
@@ -151,18 +151,18 @@ impl Backlog {
         Self { pace, pending, to_disk, emptied, disk, failures, error: None, offered: 0, dropped: 0 }
     }
 
-    /// Takes a message that was received at `log_time_ns`, if there is room for it or time to wait.
+    /// Takes a message that was received at `log_time_ns`; without room it is dropped or waited for, by the pace.
     pub fn record<M: Message>(&mut self, message: &M, log_time_ns: u64) {
         let body = message.body();
         self.offered += 1;
         if !self.has_room_for(body) {
             match self.pace {
                 Pace::RealTime => self.hand_over(),
-                Pace::Virtual => self.hand_over_when_wanted(),
+                Pace::Virtual => self.hand_over_waiting(),
             }
         }
         if self.has_room_for(body) {
-            self.pending.push(Topic::of::<M>(), log_time_ns, body);
+            self.pending.push(Topic::for_message::<M>(), log_time_ns, body);
         } else {
             self.dropped += 1;
         }
@@ -172,7 +172,7 @@ impl Backlog {
         self.pending.bytes_with(body) <= self.pace.batch_bytes()
     }
 
-    /// Gives what is pending to the disk, if the disk is through with what it had. Never waits.
+    /// Passes the pending batch to the disk, if the disk has written the last one. Never waits.
     pub fn hand_over(&mut self) {
         if self.pending.messages == 0 {
             return;
@@ -184,8 +184,8 @@ impl Backlog {
         }
     }
 
-    /// Gives what is pending to the disk as soon as that is through with what it had.
-    fn hand_over_when_wanted(&mut self) {
+    /// Passes the pending batch to the disk as soon as the disk has written the last one.
+    fn hand_over_waiting(&mut self) {
         match self.emptied.recv() {
             Ok(empty) => self.send(empty),
             Err(_) => self.give_up(),
@@ -201,7 +201,7 @@ impl Backlog {
         }
     }
 
-    /// Nobody writes any more.
+    /// Drops the pending batch, since the disk's thread has ended.
     fn give_up(&mut self) {
         self.dropped += self.pending.messages;
         self.pending.clear();
@@ -212,8 +212,8 @@ impl Backlog {
         self.dropped
     }
 
-    /// Why nothing is written any more: once, when that has come to be so.
-    pub fn failed_just_now(&mut self) -> Option<&WriteError> {
+    /// The error that ended writing: once, after it occurred.
+    pub fn new_failure(&mut self) -> Option<&WriteError> {
         let error = self.failures.try_recv().ok()?;
         Some(self.error.insert(error))
     }
@@ -221,7 +221,7 @@ impl Backlog {
     /// Waits until everything is written and the recording has its index.
     pub fn finish(mut self) -> Outcome {
         if self.pending.messages > 0 {
-            self.hand_over_when_wanted();
+            self.hand_over_waiting();
         }
         drop(self.to_disk);
         let safe = self.disk.join().expect("the writing thread does not panic");
@@ -229,8 +229,8 @@ impl Backlog {
     }
 }
 
-/// The disk's thread: writes, flushes every now and then, and ends the file when no more can come. Returns
-/// how many messages are safe.
+/// The disk's thread: writes, flushes at intervals, and ends the file when the caller has finished. Returns how many
+/// messages are safe.
 fn write_batches<W: Medium>(
     mut recorder: Recorder<W>,
     batches: &Receiver<Batch>,
@@ -243,7 +243,7 @@ fn write_batches<W: Medium>(
     match written.and_then(|written| recorder.finish().map(|()| written)) {
         Ok(written) => written,
         Err(error) => {
-            // Who offers messages hears of it as long as there is anybody.
+            // The caller may have gone.
             let _ = failed.send(error);
             safe
         }
@@ -267,7 +267,7 @@ fn write_until_the_end<W: Medium>(
                 batch.write_to(recorder)?;
                 written += batch.messages;
                 batch.clear();
-                // Without a taker the recording is about to end.
+                // The caller may have finished.
                 let _ = give_back.try_send(batch);
             }
             Err(RecvTimeoutError::Timeout) => {}

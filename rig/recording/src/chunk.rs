@@ -43,7 +43,7 @@ impl Default for Chunk {
 }
 
 impl Chunk {
-    /// Takes up the chunk in this record's body, if it is whole.
+    /// Opens the chunk in this record's body, if it is whole.
     pub(super) fn open(&mut self, body: &[u8]) -> Result<ChunkHeader, ChunkError> {
         self.content.clear();
         self.at = 0;
@@ -72,7 +72,7 @@ impl Chunk {
         Ok(())
     }
 
-    /// Opcode and place of the next record; an error, once, where the rest is none.
+    /// Opcode and place of the next record; an error, once, where the rest is no record.
     pub(super) fn next_record(&mut self) -> Option<Result<(u8, Range<usize>), &'static str>> {
         let rest = &self.content[self.at..];
         if rest.is_empty() {
@@ -99,7 +99,7 @@ impl Chunk {
     }
 }
 
-/// Whether the content is what the header says. A checksum of 0 says nothing.
+/// Whether length and checksum of the content are those of the header. 0 stands for no checksum.
 fn check(header: &ChunkHeader, content: &[u8]) -> Result<(), ChunkError> {
     if content.len() as u64 != header.uncompressed_size {
         return Err(ChunkError::Length { found: content.len(), expected: header.uncompressed_size });

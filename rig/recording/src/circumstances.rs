@@ -1,12 +1,12 @@
-//! The circumstances of a run that the manifest keeps: the machine, what its processes used, and their wake-ups' settings.
+//! The circumstances of a run in the manifest: the machine, the processes' use of it, and the setting for wake-ups.
 
 use std::collections::BTreeMap;
 
 use masseter_shared::config::CpuDmaLatency;
 use serde::{Deserialize, Serialize};
 
-/// What a process used in its steady state: CPU time and page faults by all its threads, the rest by the main
-/// one, which is its loop.
+/// Resources that a process used in its steady state: CPU time and page faults of all threads, the rest of the main
+/// thread, which runs the loop.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct Usage {
     /// Duration covered, s.
@@ -23,27 +23,28 @@ pub struct Usage {
     pub major_faults: u64,
 }
 
-/// What all processes used, by name, and what was stolen from the machine.
+/// Resources that all processes used, by name, and time stolen from the machine.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct RunUsage {
     /// Each process.
     pub processes: BTreeMap<String, Usage>,
-    /// Time that the hypervisor ran something else while a core of this machine wanted to run, as far as
-    /// it tells, s.
+    /// Time that the hypervisor ran something else while a core of this machine was ready to run, as far as it reports
+    /// that, s.
     pub stolen_s: f64,
     /// The largest jump of the wall clock: it was set, or the machine was suspended, s.
     #[serde(default)]
     pub clock_jump_s: f64,
 }
 
-/// What was asked of `/dev/cpu_dma_latency` and what was obtained.
+/// Request to `/dev/cpu_dma_latency`, and its result.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct DmaLatency {
     /// The scenario's choice.
-    pub wanted: CpuDmaLatency,
+    #[serde(rename = "wanted")]
+    pub requested: CpuDmaLatency,
     /// The machine's limit as read back, µs; none when it was left alone.
     pub limit_us: Option<i32>,
-    /// Why an explicit wish was refused, with what helps.
+    /// Why an explicit request was refused, and the remedy.
     pub refusal: Option<String>,
 }
 

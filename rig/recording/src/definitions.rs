@@ -1,4 +1,4 @@
-//! What the channels of a recording are. Its beginning says so, and its index again.
+//! The definitions of a recording's channels, which its beginning holds, and its index again.
 
 use std::collections::BTreeMap;
 use std::io::{self, Read, Seek};
@@ -6,18 +6,8 @@ use std::io::{self, Read, Seek};
 use mcap::records::{Channel, Record, SchemaHeader, op};
 
 use super::encoding::Definition;
+use super::schema::Schema;
 use super::walk::{Step, Walk};
-
-/// A schema that channels refer to.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Schema {
-    /// Its type name.
-    pub name: String,
-    /// The language it is written in.
-    pub encoding: String,
-    /// The definition.
-    pub data: Vec<u8>,
-}
 
 /// Channels and schemas by their numbers.
 #[derive(Debug, Default)]
@@ -27,9 +17,9 @@ pub(super) struct Definitions {
 }
 
 impl Definitions {
-    /// Those in the index, from wherever the walk stands. Only the footer tells whether they are damaged, so they are
-    /// believed all together or not at all.
-    pub(super) fn of_index<R: Read + Seek>(walk: &mut Walk<R>) -> io::Result<Self> {
+    /// Those in the index, from the current place of `walk` on. Only the checksum in the footer covers them, so either all
+    /// or none are taken.
+    pub(super) fn from_index<R: Read + Seek>(walk: &mut Walk<R>) -> io::Result<Self> {
         let mut found = Self::default();
         loop {
             match walk.step()? {
@@ -43,7 +33,7 @@ impl Definitions {
     }
 
     /// Those of every recording that this version of the program writes.
-    pub(super) fn of_this_version() -> Self {
+    pub(super) fn for_this_version() -> Self {
         let mut known = Self::default();
         for (number, definition) in (1..).zip(Definition::all()) {
             known.schemas.insert(number, definition.schema);
@@ -59,7 +49,7 @@ impl Definitions {
         known
     }
 
-    /// Takes up a schema or a channel; a damaged one is as good as missing.
+    /// Takes a schema or a channel; a damaged one counts as missing.
     pub(super) fn take(&mut self, opcode: u8, body: &[u8]) {
         if !matches!(opcode, op::SCHEMA | op::CHANNEL) {
             return;
@@ -75,19 +65,19 @@ impl Definitions {
         }
     }
 
-    /// Takes up others.
+    /// Takes those of others.
     pub(super) fn add(&mut self, others: Self) {
         self.schemas.extend(others.schemas);
         self.channels.extend(others.channels);
     }
 
-    /// Whether no message can be told.
+    /// Whether no channel is defined.
     pub(super) fn is_empty(&self) -> bool {
         self.channels.is_empty()
     }
 
     /// The channel of this number and its schema.
-    pub(super) fn of(&self, channel: u16) -> Option<(&Channel, Option<&Schema>)> {
+    pub(super) fn channel(&self, channel: u16) -> Option<(&Channel, Option<&Schema>)> {
         self.channels.get(&channel).map(|channel| self.with_schema(channel))
     }
 

@@ -1,22 +1,20 @@
-//! What stands on each channel and how: the one source for recordings and for whoever watches live.
+//! The channels and the encoding of their messages, for recordings and for live viewers alike.
 
 use foxglove::Encode;
 use foxglove::messages::{FrameTransforms, SceneUpdate};
-use masseter_shared::messages::{Command, Event, FrameTap, Machine, Message, Reading, State, Truth};
 
-use super::definitions::Schema;
 use super::scene::Scene;
+use super::schema::{CDR_LITTLE_ENDIAN, MESSAGE_ENCODING, SCHEMA_ENCODING, Schema};
 use super::topic::{Stamps, Topic};
-use super::{CDR_LITTLE_ENDIAN, MESSAGE_ENCODING, SCHEMA_ENCODING};
 
-/// What messages stand on.
+/// A channel of messages.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Channel {
     /// The rig's own messages.
     Topic(Topic),
-    /// Where things are, for a 3-D view.
+    /// Poses of the frames of a 3-D view.
     Transforms,
-    /// What they look like.
+    /// Shapes in these frames.
     Entities,
 }
 
@@ -33,8 +31,8 @@ impl Channel {
         }
     }
 
-    /// The channels that a topic's messages come to stand on.
-    pub fn of(topic: Topic) -> Vec<Self> {
+    /// The channels that carry a topic's messages, or a view of them.
+    pub fn for_topic(topic: Topic) -> Vec<Self> {
         match topic {
             Topic::State => vec![Self::Topic(topic), Self::Transforms],
             Topic::Truth => vec![Self::Topic(topic), Self::Transforms, Self::Entities],
@@ -43,43 +41,34 @@ impl Channel {
     }
 }
 
-/// A channel as it is told to readers.
+/// The definition of a channel, for readers.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Definition {
     /// The topic.
     pub topic: &'static str,
-    /// What its messages look like.
+    /// The schema of its messages.
     pub schema: Schema,
-    /// How they are encoded.
+    /// The encoding of its messages.
     pub message_encoding: String,
 }
 
 impl Definition {
-    /// Every channel, always in this order.
-    pub fn all() -> [Self; Channel::COUNT] {
-        [
-            Self::of_topic::<Command>(),
-            Self::of_topic::<Reading>(),
-            Self::of_topic::<State>(),
-            Self::of_topic::<Truth>(),
-            Self::of_topic::<FrameTap>(),
-            Self::of_topic::<Event>(),
-            Self::of_topic::<Machine>(),
-            Self::of_foxglove::<FrameTransforms>(Scene::TRANSFORMS),
-            Self::of_foxglove::<SceneUpdate>(Scene::ENTITIES),
-        ]
+    /// Every channel, by its place.
+    pub fn all() -> Vec<Self> {
+        let topics = Topic::ALL.map(Self::for_topic);
+        let transforms = Self::for_foxglove::<FrameTransforms>(Scene::TRANSFORMS);
+        let entities = Self::for_foxglove::<SceneUpdate>(Scene::ENTITIES);
+        topics.into_iter().chain([transforms, entities]).collect()
     }
 
-    fn of_topic<M: Message>() -> Self {
-        let schema = Schema {
-            name: M::TYPE_NAME.to_owned(),
-            encoding: SCHEMA_ENCODING.to_owned(),
-            data: M::schema().into(),
-        };
-        Self { topic: M::TOPIC, schema, message_encoding: MESSAGE_ENCODING.to_owned() }
+    fn for_topic(topic: Topic) -> Self {
+        let (name, definition) = topic.definition();
+        let (name, encoding) = (name.to_owned(), SCHEMA_ENCODING.to_owned());
+        let schema = Schema { name, encoding, data: definition.into() };
+        Self { topic: topic.name(), schema, message_encoding: MESSAGE_ENCODING.to_owned() }
     }
 
-    fn of_foxglove<E: Encode>(topic: &'static str) -> Self {
+    fn for_foxglove<E: Encode>(topic: &'static str) -> Self {
         let foxglove::Schema { name, encoding, data } =
             E::get_schema().expect("Foxglove's own messages have schemas");
         let schema = Schema { name, encoding, data: data.into_owned() };
@@ -87,12 +76,12 @@ impl Definition {
     }
 }
 
-/// A message as it stands on its channel.
+/// A message as its channel carries it.
 #[derive(Debug, Clone, Copy)]
 pub struct Encoded<'a> {
     /// Its channel.
     pub channel: Channel,
-    /// Its number; 0 on channels that count nothing.
+    /// Its sequence number; 0 on the channels for 3-D views.
     pub sequence: u32,
     /// When it was published, ns.
     pub publish_time_ns: u64,
@@ -100,7 +89,7 @@ pub struct Encoded<'a> {
     pub bytes: &'a [u8],
 }
 
-/// Puts the rig's messages into the form in which they stand on the channels.
+/// Encodes the rig's messages for the channels.
 #[derive(Debug)]
 pub struct Encoder {
     scene: Scene,
@@ -114,7 +103,7 @@ impl Encoder {
         Self { scene, cdr: Vec::new(), protobuf: Vec::new() }
     }
 
-    /// Hands `put` the message of a topic that has this body, and what a 3-D view shows of it.
+    /// Passes to `put` the message of a topic with this body, and its view in 3-D.
     pub fn encode<E>(
         &mut self,
         topic: Topic,
@@ -148,7 +137,7 @@ impl Encoder {
         self.show(topic, body, put)
     }
 
-    /// Lets the scene follow the mechanism.
+    /// Passes to `put` the view of a message in 3-D, if one is due.
     fn show<E>(
         &mut self,
         topic: Topic,
@@ -187,7 +176,7 @@ mod tests {
         let mut found = Vec::new();
         for topic in Topic::ALL {
             assert_eq!(definitions[Channel::Topic(topic).place()].topic, topic.name());
-            found.extend(Channel::of(topic));
+            found.extend(Channel::for_topic(topic));
         }
         assert_eq!(definitions[Channel::Transforms.place()].topic, Scene::TRANSFORMS);
         assert_eq!(definitions[Channel::Entities.place()].topic, Scene::ENTITIES);

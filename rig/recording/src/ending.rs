@@ -1,8 +1,8 @@
-//! How a run came to its end, by how its processes ended. What that makes of the run, its verdict says.
+//! How a run ended, by how its processes ended. The verdict on the run is the report's.
 
 use serde::{Deserialize, Serialize};
 
-/// How a run came to its end.
+/// How a run ended.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 pub enum Ending {
@@ -21,7 +21,7 @@ pub enum Ending {
     Interrupted,
     /// Real time was required and refused.
     NotStarted,
-    /// The logger could not write everything.
+    /// The recorder could not write everything.
     RecordingFailed,
 }
 

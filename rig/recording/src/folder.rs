@@ -1,4 +1,4 @@
-//! The folder a run leaves, and the names of what lies in it.
+//! The folder of a run, and the names of its files.
 
 use std::fs::{self, File};
 use std::io::{self, Write};
@@ -13,7 +13,17 @@ use masseter_terminal::{OutputError, new_folder};
 /// Name of the recorded motion within the folder, as its scenario knows it.
 pub const MOTION: &str = "motion.csv";
 
-/// A run folder.
+/// The folder of a run.
+///
+/// ```
+/// use masseter_recording::RunFolder;
+///
+/// let parent = tempfile::tempdir()?;
+/// let folder = RunFolder::create(&parent.path().join("run"))?;
+/// folder.keep(&folder.scenario(), "seed = 1\n")?;
+/// assert!(RunFolder::open(folder.path()).is_err(), "there is no recording in it yet");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct RunFolder(PathBuf);
 
@@ -35,7 +45,7 @@ impl RunFolder {
         let file_name = format!("{}-{name}", time.replace([':', '-'], ""));
         let folder = Self::create(&parent.join(&file_name))?;
         let latest = parent.join("latest");
-        // A folder of the user's own under that name stays as it is; the run is named in the report.
+        // A folder of the user under that name stays; the report names the run.
         if latest.is_symlink() || !latest.exists() {
             let _ = fs::remove_file(&latest);
             let _ = symlink(&file_name, &latest);
@@ -57,8 +67,8 @@ impl RunFolder {
         if folder.recording().is_file() { Ok(folder) } else { Err(FolderError::NoRun(path.to_owned())) }
     }
 
-    /// Writes one of its files, wholly or not at all: a power cut that the recording outlives must not take what
-    /// explains it.
+    /// Writes one of its files completely or not at all, so that a power cut leaves the scenario and the manifest of a
+    /// recording.
     pub fn keep(&self, path: &Path, text: &str) -> io::Result<()> {
         let unfinished = path.with_extension("part");
         let mut file = File::create(&unfinished)?;
@@ -84,7 +94,7 @@ impl RunFolder {
         self.0.join(MOTION)
     }
 
-    /// What was run, on what, and with which scheduling.
+    /// Scenario, machine, scheduling and end of the run.
     pub fn manifest(&self) -> PathBuf {
         self.0.join("manifest.json")
     }
@@ -120,7 +130,7 @@ impl RunFolder {
     }
 }
 
-/// Makes the names in a folder outlive a power cut, on file systems that can.
+/// Makes the names in a folder survive a power cut, on file systems that support it.
 fn secure_names(folder: &Path) {
     let _ = File::open(folder).and_then(|folder| folder.sync_all());
 }

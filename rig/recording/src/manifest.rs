@@ -1,4 +1,4 @@
-//! `manifest.json`: what was run, on what machine, with which scheduling, and how it ended.
+//! `manifest.json`: scenario, machine, scheduling and end of a run.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -17,10 +17,23 @@ use crate::folder::RunFolder;
 /// Version of the manifest's form.
 const FORM: u32 = 1;
 
-/// How the supervisor ended as long as nothing else was written.
+/// The end of the supervisor, until the real end is written.
 const UNJUDGED: &str = "it did not live to judge the run, or could not write how it ended";
 
 /// The circumstances of a run.
+///
+/// ```
+/// use masseter_recording::{MachineInfo, Manifest, RunFolder};
+/// use masseter_shared::config::Scenario;
+///
+/// let machine = MachineInfo { cpu: "any".into(), cores: 2, kernel: "Linux".into(), is_virtual: false };
+/// let manifest = Manifest::new(Scenario::default(), 10.0, "virtual", machine);
+/// let parent = tempfile::tempdir()?;
+/// let folder = RunFolder::create(&parent.path().join("run"))?;
+/// manifest.write(&folder)?;
+/// assert_eq!(Manifest::read(&folder)?, manifest);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Manifest {
     /// Version of this form.
@@ -37,18 +50,18 @@ pub struct Manifest {
     pub motion_s: f64,
     /// The machine.
     pub machine: Machine,
-    /// What each process asked of the kernel and obtained; empty under virtual time.
+    /// The scheduling that each process requested and obtained; empty under virtual time.
     pub scheduling: BTreeMap<String, Obtained>,
-    /// What became of `/dev/cpu_dma_latency`; none under virtual time.
+    /// Request to `/dev/cpu_dma_latency` and its result; none under virtual time.
     pub cpu_dma_latency: Option<DmaLatency>,
-    /// What the processes used in their steady state; empty under virtual time.
+    /// Resources that the processes used in their steady state; empty under virtual time.
     pub usage: RunUsage,
     /// How the run ended.
     pub ending: Ending,
 }
 
 impl Manifest {
-    /// The circumstances as far as they are known before the start.
+    /// The circumstances that are known before the start.
     pub fn new(scenario: Scenario, motion_s: f64, clock: &str, machine: Machine) -> Self {
         let began = humantime::format_rfc3339_seconds(UNIX_EPOCH + clock::wall_time());
         Self {
@@ -66,7 +79,7 @@ impl Manifest {
         }
     }
 
-    /// The first thing that a process did not get of the scheduling it asked for, with what helps.
+    /// The first refused request for scheduling, with its remedy, and the process that made it.
     pub fn refusal(&self) -> Option<(&str, &str)> {
         let refusals = self.scheduling.iter().flat_map(|(process, obtained)| {
             obtained.refusals.iter().map(move |refusal| (process.as_str(), refusal.as_str()))
@@ -74,7 +87,7 @@ impl Manifest {
         refusals.into_iter().next()
     }
 
-    /// Writes the file, wholly or not at all.
+    /// Writes the file completely or not at all.
     pub fn write(&self, folder: &RunFolder) -> io::Result<()> {
         folder.keep(&folder.manifest(), &(serde_json::to_string_pretty(self)? + "\n"))
     }

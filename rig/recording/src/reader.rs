@@ -1,5 +1,5 @@
-//! Reads a recording from its beginning in constant memory, also one that was cut short or damaged:
-//! what can be read is read, and what cannot is named by its place.
+//! Reads a recording from its beginning in constant memory, also one that was cut short or damaged: every whole chunk is
+//! read, and every stretch that cannot be read is reported with its place.
 
 use std::borrow::Cow;
 use std::fs::File;
@@ -11,11 +11,11 @@ use masseter_shared::messages::LAYOUT_VERSION;
 use mcap::records::{Channel, MessageHeader, Record, op};
 
 use super::chunk::Chunk;
-use super::definitions::{Definitions, Schema};
-use super::topic::{Stamps, Topic};
+use super::definitions::Definitions;
+use super::schema::{CDR_LITTLE_ENDIAN, Schema};
+use super::topic::{Recorded, Stamps, Topic};
 use super::walk::{Damage, Step, Walk};
 use super::writer::LIBRARY;
-use super::{CDR_LITTLE_ENDIAN, Recorded};
 
 /// Channel, sequence number and two times, before the data.
 const MESSAGE_HEAD: usize = 2 + 4 + 8 + 8;
@@ -51,10 +51,10 @@ pub enum ReadError {
     },
 }
 
-/// A message with its circumstances.
+/// A message with its channel, number and times.
 #[derive(Debug)]
 pub struct Entry<'a> {
-    /// The channel it stands on; none when the recording no longer says what that channel is.
+    /// Its channel; none when the definition of that channel is lost.
     pub channel: Option<&'a Channel>,
     /// The channel's schema, if it has one.
     pub schema: Option<&'a Schema>,
@@ -79,7 +79,22 @@ pub struct Chunks {
     pub compression: String,
 }
 
-/// A recording being read.
+/// Reads a recording, message by message.
+///
+/// ```no_run
+/// use masseter_recording::{Reader, Recorded};
+///
+/// let mut reader = Reader::open("runs/latest/recording.mcap".as_ref())?;
+/// while let Some(message) = reader.next_message()? {
+///     if let Recorded::State(state) = message {
+///         println!("cycle {}: {:?} m", state.cycle, state.estimated_position_m);
+///     }
+/// }
+/// for damage in reader.damage() {
+///     eprintln!("{damage}");
+/// }
+/// # Ok::<(), masseter_recording::ReadError>(())
+/// ```
 pub struct Reader<R = BufReader<File>> {
     walk: Walk<R>,
     chunk: Chunk,
@@ -87,7 +102,7 @@ pub struct Reader<R = BufReader<File>> {
     chunks: Chunks,
     damage: Vec<Damage>,
     records: u64,
-    /// Whether the index has been asked for lost definitions.
+    /// Whether the index was searched for lost definitions.
     index_is_known: bool,
     /// Whether this version of the program recorded it.
     is_own: bool,
@@ -115,7 +130,7 @@ impl<R: Read + Seek> Reader<R> {
         })
     }
 
-    /// What could not be read so far.
+    /// The stretches that could not be read so far.
     pub fn damage(&self) -> &[Damage] {
         &self.damage
     }
@@ -135,12 +150,12 @@ impl<R: Read + Seek> Reader<R> {
         self.walk.size()
     }
 
-    /// At the end: whether the file lacks its own, as a killed logger leaves it.
+    /// After the last message: whether the file lacks its end, as a killed recorder leaves it.
     pub fn was_cut_short(&self) -> bool {
         !self.walk.is_closed()
     }
 
-    /// The next message of the rig's topics, or none at the end. Other topics are passed over.
+    /// The next message of the rig's topics, or none at the end. Other topics are skipped.
     pub fn next_message(&mut self) -> Result<Option<Recorded>, ReadError> {
         while let Some(entry) = self.next_entry()? {
             if let Some(message) = entry.recorded() {
@@ -150,7 +165,7 @@ impl<R: Read + Seek> Reader<R> {
         Ok(None)
     }
 
-    /// The next message of whatever topic, or none at the end.
+    /// The next message of any topic, or none at the end.
     pub fn next_entry(&mut self) -> Result<Option<Entry<'_>>, ReadError> {
         let Some(message) = self.next_message_bytes()? else { return Ok(None) };
         let Ok(Record::Message { header, data: Cow::Borrowed(data) }) =
@@ -158,11 +173,11 @@ impl<R: Read + Seek> Reader<R> {
         else {
             unreachable!("a message with a whole head can be parsed, and borrows");
         };
-        let (channel, schema) = self.definitions.of(header.channel_id).unzip();
+        let (channel, schema) = self.definitions.channel(header.channel_id).unzip();
         Ok(Some(Entry { channel, schema: schema.flatten(), header, data }))
     }
 
-    /// Where in the open chunk the next message lies. Definitions on the way are taken up.
+    /// The place of the next message in the open chunk. Definitions before it are taken.
     fn next_message_bytes(&mut self) -> Result<Option<Range<usize>>, ReadError> {
         loop {
             match self.chunk.next_record() {
@@ -194,15 +209,15 @@ impl<R: Read + Seek> Reader<R> {
         match self.walk.step()? {
             Step::End if self.records == 0 => return Err(self.no_mcap()),
             Step::End => return Ok(false),
-            Step::Damage(damage) => self.pass_over(damage)?,
+            Step::Damage(damage) => self.skip(damage)?,
             Step::Record(opcode) => {
                 self.records += 1;
                 match opcode {
                     op::HEADER => self.is_own = is_own(self.walk.body()),
                     op::CHUNK => self.open_chunk()?,
-                    // Damage turns other records into such, and no checksum of their own tells.
+                    // Damage can turn other records into messages, and no checksum covers a single record.
                     op::MESSAGE => self.note("messages outside of chunks (`mcap compress` packs them)"),
-                    // No message comes any more, and what is damaged here is told only by the footer.
+                    // No message follows, and only the footer's checksum reveals damage here.
                     _ if self.walk.is_in_index() => {}
                     _ => self.definitions.take(opcode, self.walk.body()),
                 }
@@ -211,7 +226,7 @@ impl<R: Read + Seek> Reader<R> {
         Ok(true)
     }
 
-    /// Unpacks a chunk and checks it as a whole; one that is damaged is passed over.
+    /// Unpacks a chunk and checks it as a whole; a damaged one is skipped.
     fn open_chunk(&mut self) -> Result<(), ReadError> {
         match self.chunk.open(self.walk.body()) {
             Ok(header) => {
@@ -224,21 +239,21 @@ impl<R: Read + Seek> Reader<R> {
             Err(error) => {
                 self.chunks.damaged += 1;
                 let damage = self.walk.damaged(error.to_string());
-                self.pass_over(damage)
+                self.skip(damage)
             }
         }
     }
 
-    /// Notes damage. Definitions that it hit are looked for elsewhere.
-    fn pass_over(&mut self, damage: Damage) -> Result<(), ReadError> {
+    /// Notes damage. Lost definitions are taken from the index, or from this version of the program.
+    fn skip(&mut self, damage: Damage) -> Result<(), ReadError> {
         self.add(damage);
         if self.definitions.is_empty() && !self.index_is_known {
             self.index_is_known = true;
             let place = self.walk.place();
-            let found = Definitions::of_index(&mut self.walk)?;
+            let found = Definitions::from_index(&mut self.walk)?;
             self.walk.go_to(place)?;
             let is_own = found.is_empty() && self.is_own;
-            self.definitions.add(if is_own { Definitions::of_this_version() } else { found });
+            self.definitions.add(if is_own { Definitions::for_this_version() } else { found });
         }
         Ok(())
     }
@@ -250,14 +265,14 @@ impl<R: Read + Seek> Reader<R> {
 }
 
 impl Entry<'_> {
-    /// The message itself, or why this program cannot read it; none on topics that are not the rig's.
+    /// The message, or why this program cannot read it; none on topics that are not the rig's.
     pub fn recorded(&self) -> Option<Result<Recorded, ReadError>> {
         let topic = Topic::named(&self.channel?.topic)?;
         Some(read(topic, self.data))
     }
 }
 
-/// Whether this is the header of a recording of this version.
+/// Whether this header names this version of the program.
 fn is_own(header: &[u8]) -> bool {
     matches!(mcap::parse_record(op::HEADER, header), Ok(Record::Header(header)) if header.library == LIBRARY)
 }
@@ -266,7 +281,7 @@ fn is_own(header: &[u8]) -> bool {
 fn read(topic: Topic, data: &[u8]) -> Result<Recorded, ReadError> {
     let body = data.strip_prefix(&CDR_LITTLE_ENDIAN);
     let version = body.and_then(Stamps::read).map_or(0, |stamps| stamps.version);
-    let message = body.filter(|_| version == LAYOUT_VERSION).and_then(|body| topic.read(body));
+    let message = body.filter(|_| version == LAYOUT_VERSION).and_then(|body| Recorded::read(topic, body));
     message.ok_or_else(|| {
         let expected = CDR_LITTLE_ENDIAN.len() + topic.body_bytes();
         ReadError::Foreign { topic: topic.name(), found: data.len(), expected, version }

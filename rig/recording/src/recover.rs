@@ -1,4 +1,4 @@
-//! Writes what can be read of a damaged recording into a new one that is whole.
+//! Writes the readable part of a damaged recording into a new, whole one.
 //!
 //! Messages and channels keep their bytes, numbers and times; schemas are numbered anew, since damage may have given
 //! two of them the same number. Attachments and metadata, which Masseter does not write, are not carried over.
@@ -9,8 +9,8 @@ use std::io::{Read, Seek, Write};
 use mcap::records::Channel;
 use mcap::{McapError, Writer};
 
-use super::definitions::Schema;
 use super::reader::{ReadError, Reader};
+use super::schema::Schema;
 use super::writer::{LIBRARY, options};
 
 /// Why a recording could not be recovered.
@@ -24,22 +24,21 @@ pub enum RecoverError {
     Write(#[from] McapError),
 }
 
-/// What was saved.
+/// Counts of saved and lost messages.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Recovered {
     /// Messages saved.
     pub messages: u64,
-    /// Messages of channels whose definition is lost: nobody can say what they are.
+    /// Messages whose channel has no definition any more; they are not saved.
     pub undefined: u64,
 }
 
-/// Copies everything readable from `reader` to `medium`. What was not is in the reader's
-/// [`damage`](Reader::damage).
+/// Copies everything readable from `reader` to `medium`. The rest is in the reader's [`damage`](Reader::damage).
 pub fn recover<R: Read + Seek, W: Write + Seek>(
     reader: &mut Reader<R>,
     medium: W,
 ) -> Result<Recovered, RecoverError> {
-    // Its channels need not be numbered as this version numbers those of its own recordings.
+    // The header names another library, since this version may number the channels of its own recordings differently.
     let mut writer = options().library(format!("{LIBRARY} recover")).create(medium)?;
     let mut defined = BTreeSet::new();
     let mut recovered = Recovered::default();
@@ -58,7 +57,7 @@ pub fn recover<R: Read + Seek, W: Write + Seek>(
     Ok(recovered)
 }
 
-/// A channel whose schema is lost goes without one; its messages are kept for whoever knows them.
+/// A channel whose schema is lost is defined without one, so that its messages are kept.
 fn define<W: Write + Seek>(
     writer: &mut Writer<W>,
     channel: &Channel,

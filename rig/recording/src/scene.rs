@@ -1,5 +1,4 @@
-//! The mechanism as 3-D views know it: Foxglove's frame transforms and scene entities, made from
-//! `truth` and `state` at a lower rate than theirs.
+//! The mechanism for 3-D views: Foxglove's frame transforms and scene entities, made from `truth` and `state` at 60 Hz.
 //!
 //! Frames: `base`; in it `platform` (true), `platform_estimated` (by forward kinematics) and
 //! `platform_wanted`. Entities: base triangle with its slides, the three legs, the three platforms, and the
@@ -15,14 +14,14 @@ use masseter_shared::config::JawConfig;
 use masseter_shared::geometry::{LEGS, Mechanism, Vec3};
 use masseter_shared::messages::{State, Truth};
 
-/// How often the scene is shown, ns: 60 Hz, what screens show.
+/// Time between two updates, ns: the 60 Hz of a screen.
 const EVERY_NS: u64 = SECOND_NS / 60;
-/// How often what does not move is shown again, for readers that begin in the middle, ns.
+/// Time between two updates of the parts at rest, for readers that begin in the middle, ns.
 const STILL_EVERY_NS: u64 = SECOND_NS;
 const BASE: &str = "base";
 const TRUE: &str = "platform";
 const ESTIMATED: &str = "platform_estimated";
-const WANTED: &str = "platform_wanted";
+const DESIRED: &str = "platform_wanted";
 const LINE_M: f64 = 0.003;
 const POINT_M: f64 = 0.006;
 
@@ -32,14 +31,14 @@ const ORANGE: [f64; 4] = [0.84, 0.37, 0.0, 0.5];
 const GREEN: [f64; 4] = [0.0, 0.62, 0.45, 0.5];
 const RED: [f64; 4] = [0.8, 0.2, 0.2, 1.0];
 
-/// What is shown at one instant.
+/// The scene at one instant.
 pub(super) struct Shown {
     pub time_ns: u64,
     pub transforms: FrameTransforms,
     pub entities: Option<SceneUpdate>,
 }
 
-/// Follows the mechanism.
+/// The scene of a mechanism, updated by its messages.
 #[derive(Debug, Clone)]
 pub struct Scene {
     mechanism: Mechanism,
@@ -64,7 +63,7 @@ impl Scene {
         }
     }
 
-    /// The true platform and the legs, if it is time to show them.
+    /// The true platform and the legs, if an update is due.
     pub(super) fn truth(&mut self, truth: &Truth) -> Option<Shown> {
         let time_ns = truth.sampled_ns;
         if !is_due(&mut self.next_truth_ns, time_ns, EVERY_NS) {
@@ -82,7 +81,7 @@ impl Scene {
         })
     }
 
-    /// The platform as estimated and as wanted, if it is time to show them.
+    /// The estimated and the desired platform, if an update is due.
     pub(super) fn state(&mut self, state: &State) -> Option<Shown> {
         let time_ns = state.sampled_ns;
         if state.reading_cycle == 0 || !is_due(&mut self.next_state_ns, time_ns, EVERY_NS) {
@@ -90,7 +89,7 @@ impl Scene {
         }
         let transforms = vec![
             transform(time_ns, ESTIMATED, state.estimated_position_m, state.estimated_quaternion_wxyz),
-            transform(time_ns, WANTED, state.desired_position_m, state.desired_quaternion_wxyz),
+            transform(time_ns, DESIRED, state.desired_position_m, state.desired_quaternion_wxyz),
         ];
         Some(Shown { time_ns, transforms: FrameTransforms { transforms }, entities: None })
     }
@@ -108,7 +107,7 @@ impl Scene {
         }
     }
 
-    /// What does not move in its frame.
+    /// The parts that do not move in their frames.
     fn still(&self, time_ns: u64) -> Vec<SceneEntity> {
         let [lowest, highest] = self.mechanism.strokes().slide_m;
         let slides = (0..LEGS).flat_map(|leg| [lowest, highest].map(|end| self.mechanism.hinge(leg, end)));
@@ -132,7 +131,7 @@ impl Scene {
             lines: vec![lines(LineType::LineLoop, self.jaw_points.iter().copied(), RED)],
             ..entity("jaw", TRUE, time_ns)
         };
-        vec![base, platform(TRUE, BLUE), platform(ESTIMATED, ORANGE), platform(WANTED, GREEN), jaw]
+        vec![base, platform(TRUE, BLUE), platform(ESTIMATED, ORANGE), platform(DESIRED, GREEN), jaw]
     }
 }
 

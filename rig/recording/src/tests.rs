@@ -60,7 +60,7 @@ struct Whole {
 
 static WHOLE: LazyLock<Whole> = LazyLock::new(|| {
     let mut medium = Cursor::new(Vec::new());
-    let mut recorder = Recorder::on(&mut medium, scene()).unwrap();
+    let mut recorder = Recorder::new(&mut medium, scene()).unwrap();
     let mut messages = Vec::new();
     for number in 1..=CYCLES {
         for message in cycle(number) {
@@ -81,7 +81,7 @@ static FLUSHED: LazyLock<Vec<(usize, usize)>> = LazyLock::new(|| {
     let mut flushed = Vec::new();
     for flushes in 0..=CYCLES / CYCLES_A_FLUSH {
         medium = Cursor::new(Vec::new());
-        let mut recorder = Recorder::on(&mut medium, scene()).unwrap();
+        let mut recorder = Recorder::new(&mut medium, scene()).unwrap();
         let mut messages = 0;
         for number in 1..=flushes * CYCLES_A_FLUSH {
             for message in cycle(number) {
@@ -138,7 +138,7 @@ fn a_stranger_is_refused_by_its_first_bytes() {
 #[test]
 fn a_newer_layout_is_named() {
     let mut medium = Cursor::new(Vec::new());
-    let mut recorder = Recorder::on(&mut medium, scene()).unwrap();
+    let mut recorder = Recorder::new(&mut medium, scene()).unwrap();
     let newer = Reading { seq: 1, version: 99, ..Default::default() };
     recorder.record(&Recorded::Reading(newer), 1).unwrap();
     recorder.finish().unwrap();
@@ -174,7 +174,7 @@ fn bytes_behind_the_end_are_damage_and_no_cut() {
 #[test]
 fn a_flipped_bit_is_damage_and_no_cut() {
     let mut medium = Cursor::new(Vec::new());
-    let mut recorder = Recorder::on(&mut medium, scene()).unwrap();
+    let mut recorder = Recorder::new(&mut medium, scene()).unwrap();
     for message in cycle(1) {
         recorder.record(&message, 0).unwrap();
     }

@@ -1,36 +1,93 @@
-//! The topics of a recording, and the layout of their messages.
+//! The topics of a recording and their messages: one table of both.
 
 use masseter_shared::messages::{Command, Event, FrameTap, Machine, Message, Reading, State, Truth};
 
-use super::Recorded;
+macro_rules! topics {
+    ($($(#[$doc:meta])* $name:ident: $message:ty),* $(,)?) => {
+        /// One of the rig's topics.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+        #[repr(u8)]
+        pub enum Topic {
+            $($(#[$doc])* $name),*
+        }
 
-/// One of the rig's topics.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-#[repr(u8)]
-pub enum Topic {
-    /// Controller to plant.
-    Command,
-    /// Plant to controller.
-    Reading,
-    /// What the controller made of a reading.
-    State,
-    /// What the mechanism really did.
-    Truth,
+        /// A message of any topic.
+        #[derive(Debug, Clone, Copy, PartialEq)]
+        pub enum Recorded {
+            $($(#[$doc])* $name($message)),*
+        }
+
+        impl Topic {
+            /// Every topic.
+            pub const ALL: [Self; [$(stringify!($name)),*].len()] = [$(Self::$name),*];
+
+            /// The name in recordings.
+            pub fn name(self) -> &'static str {
+                match self {
+                    $(Self::$name => <$message>::TOPIC),*
+                }
+            }
+
+            /// Most bytes of a message's body.
+            pub fn body_bytes(self) -> usize {
+                match self {
+                    $(Self::$name => size_of::<$message>()),*
+                }
+            }
+
+            /// Name and ROS 2 definition of the message type.
+            pub(super) fn definition(self) -> (&'static str, String) {
+                match self {
+                    $(Self::$name => (<$message>::TYPE_NAME, <$message>::schema())),*
+                }
+            }
+        }
+
+        impl Recorded {
+            /// The message of a topic with this body, if its length is one of this topic.
+            pub(super) fn read(topic: Topic, body: &[u8]) -> Option<Self> {
+                Some(match topic {
+                    $(Topic::$name => Self::$name(<$message>::of_body(body)?)),*
+                })
+            }
+
+            /// Its topic.
+            pub fn topic(&self) -> Topic {
+                match self {
+                    $(Self::$name(_) => Topic::$name),*
+                }
+            }
+
+            /// Its body, as it lay in shared memory.
+            pub fn body(&self) -> &[u8] {
+                match self {
+                    $(Self::$name(message) => message.body()),*
+                }
+            }
+        }
+    };
+}
+
+topics! {
+    /// Targets, from controller to plant.
+    Command: Command,
+    /// Samples, from plant to controller.
+    Reading: Reading,
+    /// The controller's result for a reading.
+    State: State,
+    /// The true motion of the emulated mechanism.
+    Truth: Truth,
     /// CAN frames.
-    Frame,
-    /// Occurrences.
-    Event,
-    /// What the kernel counted.
-    Machine,
+    Frame: FrameTap,
+    /// Events.
+    Event: Event,
+    /// The kernel's counters.
+    Machine: Machine,
 }
 
 impl Topic {
-    /// Every topic.
-    pub const ALL: [Self; 7] =
-        [Self::Command, Self::Reading, Self::State, Self::Truth, Self::Frame, Self::Event, Self::Machine];
-
-    /// The topic that messages of this type travel on.
-    pub fn of<M: Message>() -> Self {
+    /// The topic of this type of message.
+    pub fn for_message<M: Message>() -> Self {
         Self::named(M::TOPIC).expect("every message type has its topic here")
     }
 
@@ -38,48 +95,16 @@ impl Topic {
     pub fn named(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|topic| topic.name() == name)
     }
+}
 
-    /// Its name.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Command => Command::TOPIC,
-            Self::Reading => Reading::TOPIC,
-            Self::State => State::TOPIC,
-            Self::Truth => Truth::TOPIC,
-            Self::Frame => FrameTap::TOPIC,
-            Self::Event => Event::TOPIC,
-            Self::Machine => Machine::TOPIC,
-        }
-    }
-
-    /// Bytes of its messages' bodies, at most.
-    pub fn body_bytes(self) -> usize {
-        match self {
-            Self::Command => size_of::<Command>(),
-            Self::Reading => size_of::<Reading>(),
-            Self::State => size_of::<State>(),
-            Self::Truth => size_of::<Truth>(),
-            Self::Frame => size_of::<FrameTap>(),
-            Self::Event => size_of::<Event>(),
-            Self::Machine => size_of::<Machine>(),
-        }
-    }
-
-    /// The message with this body, if one can have it.
-    pub(super) fn read(self, body: &[u8]) -> Option<Recorded> {
-        Some(match self {
-            Self::Command => Recorded::Command(Command::of_body(body)?),
-            Self::Reading => Recorded::Reading(Reading::of_body(body)?),
-            Self::State => Recorded::State(State::of_body(body)?),
-            Self::Truth => Recorded::Truth(Truth::of_body(body)?),
-            Self::Frame => Recorded::Frame(FrameTap::of_body(body)?),
-            Self::Event => Recorded::Event(Event::of_body(body)?),
-            Self::Machine => Recorded::Machine(Machine::of_body(body)?),
-        })
+impl Recorded {
+    /// Its sequence number on its topic, counted by its publisher.
+    pub fn seq(&self) -> u64 {
+        Stamps::read(self.body()).expect("every message begins with its stamps").seq
     }
 }
 
-/// What every message begins with.
+/// The fields with which every message begins.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Stamps {
     pub seq: u64,

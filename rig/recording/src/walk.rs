@@ -1,8 +1,8 @@
-//! Walks an MCAP file record by record, and finds its feet again behind damage.
+//! Reads an MCAP file record by record, and finds the next chunk behind damage.
 //!
-//! MCAP's own reader stops at the first record that makes no sense. A recording that lost a few bytes in
-//! the middle is still good behind them: every chunk can be read on its own, and its header can be told
-//! from other bytes by the lengths in it, which must agree.
+//! The crate `mcap` stops at the first inconsistent record and does not look for the next chunk. But a recording that
+//! lost a few bytes in the middle is readable behind them: every chunk can be read alone, and the lengths in its header,
+//! which must agree, distinguish a chunk from other bytes.
 
 use std::io::{self, Read, Seek, SeekFrom};
 
@@ -17,9 +17,9 @@ pub(super) const LONGEST_RECORD: u64 = 64 << 20;
 const HEAD: usize = 9;
 /// Chunk header up to the compression's name: two times, size, checksum, length of the name.
 const CHUNK_FIXED: usize = 8 + 8 + 8 + 4 + 4;
-/// Longest name of a compression that is believed.
+/// Longest name of a compression that is accepted.
 const LONGEST_NAME: usize = 16;
-/// Bytes from which a chunk's beginning can be told.
+/// Bytes by which the beginning of a chunk is recognised.
 const CHUNK_HEAD: usize = HEAD + CHUNK_FIXED + LONGEST_NAME + 8;
 const SCAN_BYTES: usize = 1 << 16;
 
@@ -31,11 +31,11 @@ pub struct Damage {
     pub from: u64,
     /// The byte behind it.
     pub to: u64,
-    /// What is wrong with it.
+    /// The defect.
     pub reason: String,
 }
 
-/// What comes next in the file.
+/// The next part of the file.
 #[derive(Debug)]
 pub(super) enum Step {
     /// A record of this opcode, whole; see [`Walk::record`].
@@ -46,7 +46,7 @@ pub(super) enum Step {
     End,
 }
 
-/// A place between two records, and what is known there.
+/// A place between two records, and the state of the walk there.
 #[derive(Clone)]
 pub(super) struct Place {
     /// Where the next record begins.
@@ -55,7 +55,7 @@ pub(super) struct Place {
     is_in_index: bool,
     /// Whether the last record was a footer.
     is_end_due: bool,
-    /// Checksum of the current section of the file, as long as nothing in it was found damaged.
+    /// Checksum of the current section of the file; none once damage was found in it.
     section: Option<Hasher>,
 }
 
@@ -68,7 +68,7 @@ pub(super) struct Walk<R> {
     at: u64,
     /// The current record with opcode and length.
     record: Vec<u8>,
-    /// The byte behind the closing magic, once it was met.
+    /// The byte behind the closing magic, once it was read.
     end: Option<u64>,
 }
 
@@ -107,7 +107,7 @@ impl<R: Read + Seek> Walk<R> {
         self.place.is_in_index
     }
 
-    /// Where the walk stands.
+    /// The current place.
     pub(super) fn place(&self) -> Place {
         self.place.clone()
     }
@@ -143,27 +143,27 @@ impl<R: Read + Seek> Walk<R> {
             return self.close();
         }
         if left < HEAD as u64 {
-            return self.find_feet("the file ends in the middle of a record");
+            return self.resynchronise("the file ends in the middle of a record");
         }
         let length = u64::from_le_bytes(self.record[1..].try_into().expect("eight bytes"));
         if length > left - HEAD as u64 {
-            return self.find_feet("a record that is longer than the rest of the file");
+            return self.resynchronise("a record that is longer than the rest of the file");
         }
         if length > LONGEST_RECORD {
-            return self.find_feet("a record of impossible length");
+            return self.resynchronise("a record of impossible length");
         }
         self.record.resize(HEAD + length as usize, 0);
         self.source.read_exact(&mut self.record[HEAD..])?;
         if !is_consistent(self.record[0], self.body()) {
-            return self.find_feet("the lengths in a record contradict each other");
+            return self.resynchronise("the lengths in a record contradict each other");
         }
         self.place.next = self.at + self.record.len() as u64;
         self.place.is_end_due = self.record[0] == op::FOOTER;
         Ok(self.check_section().map_or(Step::Record(self.record[0]), Step::Damage))
     }
 
-    /// The data end with a checksum of everything before it, the footer with one of everything between.
-    /// They find what lies outside of the chunks; a checksum of 0 says nothing.
+    /// The data end with a checksum of everything before it, and the footer with a checksum of everything in between.
+    /// They cover the bytes outside of the chunks; 0 stands for no checksum.
     fn check_section(&mut self) -> Option<Damage> {
         let (covered, ended) = match self.record[0] {
             op::DATA_END => (0, Some("what lies between the chunks")),
@@ -175,7 +175,7 @@ impl<R: Read + Seek> Walk<R> {
         }
         let ended = ended?;
         self.place.is_in_index = self.record[0] == op::DATA_END;
-        // Damage to the data says nothing of the index.
+        // The index has a checksum of its own.
         let found = self.place.section.replace(Hasher::new())?.finalize();
         let expected =
             u32::from_le_bytes(*self.record.last_chunk().expect("both are longer than their checksum"));
@@ -186,7 +186,7 @@ impl<R: Read + Seek> Walk<R> {
     /// The eight bytes that begin every file.
     fn begin(&mut self) -> io::Result<Step> {
         if !self.record.starts_with(MAGIC) {
-            return self.find_feet("no MCAP file begins like this");
+            return self.resynchronise("no MCAP file begins like this");
         }
         if let Some(section) = &mut self.place.section {
             section.update(MAGIC);
@@ -211,13 +211,13 @@ impl<R: Read + Seek> Walk<R> {
     }
 
     /// Everything from here to the next landmark is damage; without one, to the end of the file.
-    fn find_feet(&mut self, reason: &str) -> io::Result<Step> {
+    fn resynchronise(&mut self, reason: &str) -> io::Result<Step> {
         let next = self.find_landmark(self.at + 1)?.unwrap_or(self.size);
         self.go_to(Place { next, is_in_index: false, is_end_due: false, section: None })?;
         Ok(Step::Damage(self.stretch(reason.to_owned())))
     }
 
-    /// What lies between the last place and this one.
+    /// The bytes from the last record to the next.
     fn stretch(&self, reason: String) -> Damage {
         Damage { from: self.at, to: self.place.next, reason }
     }
@@ -267,8 +267,8 @@ fn chunk_length(body: &[u8]) -> Option<u64> {
     data.checked_add(header as u64)
 }
 
-/// Whether the lengths inside a record agree with its own. Only the kinds that stand between chunks are
-/// looked at, and that before the footer: a wrong length there would swallow the chunks behind, or the end.
+/// Whether the lengths inside a record agree with its own. Only records between chunks and before the footer are
+/// checked: a wrong length there would hide the chunks behind, or the end.
 fn is_consistent(opcode: u8, body: &[u8]) -> bool {
     let length_at = |at: usize| {
         let bytes = body.get(at..at + 4)?;

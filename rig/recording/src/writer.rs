@@ -15,17 +15,16 @@ use std::thread::{self, JoinHandle};
 use mcap::records::MessageHeader;
 use mcap::{Compression, McapError, WriteOptions, Writer};
 
-use super::Recorded;
 use super::encoding::{Definition, Encoded, Encoder};
 use super::scene::Scene;
-use super::topic::Topic;
+use super::topic::{Recorded, Topic};
 
 /// Bytes of messages in a chunk: what is compressed together, and read together by a tool that seeks. Beyond 640 KiB
 /// zstd's buffer wraps at this level, which costs more than smaller chunks do.
 const CHUNK_BYTES: u64 = 600 << 10;
 /// zstd's fastest level: its ratio on these messages is within a tenth of the default level's.
 const COMPRESSION_LEVEL: u32 = 1;
-/// What a recording's header says of who recorded it.
+/// The name of this program in the header of a recording.
 pub(super) const LIBRARY: &str = concat!("masseter ", env!("CARGO_PKG_VERSION"));
 /// Bytes gathered before they go to the system.
 const BUFFER_BYTES: usize = 1 << 18;
@@ -46,9 +45,9 @@ fn root_of(error: &dyn Error) -> &dyn Error {
     error.source().map_or(error, root_of)
 }
 
-/// What a recording is written on.
+/// The medium of a recording: a file, or memory.
 pub trait Medium: Write + Seek {
-    /// Ends it: everything written is safe, or why it is not.
+    /// Waits until everything written is safe.
     fn close(self) -> io::Result<()>;
 }
 
@@ -71,7 +70,30 @@ pub(super) fn options() -> WriteOptions {
         .library(LIBRARY)
 }
 
-/// An open recording on `W`.
+/// Writes a recording on `W`.
+///
+/// ```
+/// use std::io::Cursor;
+///
+/// use masseter_recording::{Reader, Recorded, Recorder, Scene};
+/// use masseter_shared::config::Scenario;
+/// use masseter_shared::geometry::Mechanism;
+/// use masseter_shared::messages::{Command, Message};
+///
+/// let scenario = Scenario::default();
+/// let scene = Scene::new(&Mechanism::new(&scenario.mechanism)?, &scenario.jaw);
+/// let mut medium = Cursor::new(Vec::new());
+/// let mut recorder = Recorder::new(&mut medium, scene)?;
+/// let mut command = Command::default();
+/// command.stamp(1, 1_000_000);
+/// recorder.record(&Recorded::Command(command), 1_000_000)?;
+/// recorder.finish()?;
+///
+/// let mut reader = Reader::new(medium)?;
+/// assert_eq!(reader.next_message()?, Some(Recorded::Command(command)));
+/// assert_eq!(reader.next_message()?, None);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub struct Recorder<W: Medium = DurableFile> {
     channels: Channels<W>,
     encoder: Encoder,
@@ -98,14 +120,14 @@ impl<W: Medium> Channels<W> {
 impl Recorder {
     /// Creates the file, which must not exist.
     pub fn create(path: &Path, scene: Scene) -> Result<Self, WriteError> {
-        Self::on(DurableFile::create(path)?, scene)
+        Self::new(DurableFile::create(path)?, scene)
     }
 }
 
 impl<W: Medium> Recorder<W> {
-    /// Begins a recording, with a channel a topic. The definitions are flushed at once: without them no
-    /// message can be read.
-    pub fn on(medium: W, scene: Scene) -> Result<Self, WriteError> {
+    /// Begins a recording with the definitions of all channels, which are flushed at once: without them no message can be
+    /// read.
+    pub fn new(medium: W, scene: Scene) -> Result<Self, WriteError> {
         let mut writer = options().create(medium)?;
         let mut ids = Vec::new();
         for Definition { topic, schema, message_encoding } in Definition::all() {
@@ -116,13 +138,13 @@ impl<W: Medium> Recorder<W> {
         Ok(Self { channels: Channels { writer, ids }, encoder: Encoder::new(scene) })
     }
 
-    /// Appends a message that was received at `log_time_ns`, and what a 3-D view shows of it.
+    /// Appends a message that was received at `log_time_ns`, and its view in 3-D.
     pub fn record(&mut self, message: &Recorded, log_time_ns: u64) -> Result<(), WriteError> {
         let Self { channels, encoder } = self;
         encoder.encode(message.topic(), message.body(), |message| channels.write(&message, log_time_ns))
     }
 
-    /// Appends the message of a topic that is CDR already, and what a 3-D view shows of it.
+    /// Appends the message of a topic that is CDR already, and its view in 3-D.
     pub(super) fn record_cdr(
         &mut self,
         topic: Topic,
@@ -153,7 +175,7 @@ impl<W: Medium> Recorder<W> {
 #[derive(Debug)]
 pub struct DurableFile {
     file: BufWriter<File>,
-    wanted: Option<SyncSender<()>>,
+    requests: Option<SyncSender<()>>,
     done: Receiver<io::Result<()>>,
     disk: Option<JoinHandle<()>>,
 }
@@ -170,7 +192,7 @@ impl DurableFile {
 
     fn on(file: File) -> io::Result<Self> {
         // One request may wait while another is carried out: it covers all that came before it.
-        let (wanted, requests) = sync_channel(1);
+        let (request, requests) = sync_channel(1);
         let (report, done) = channel();
         let for_disk = file.try_clone()?;
         let disk = thread::spawn(move || {
@@ -179,14 +201,14 @@ impl DurableFile {
             }
         });
         let file = BufWriter::with_capacity(BUFFER_BYTES, file);
-        Ok(Self { file, wanted: Some(wanted), done, disk: Some(disk) })
+        Ok(Self { file, requests: Some(request), done, disk: Some(disk) })
     }
 }
 
 impl DurableFile {
     /// Waits until the disk has taken, or refused, everything that was flushed.
     fn settle(&mut self) -> io::Result<()> {
-        self.wanted = None;
+        self.requests = None;
         if let Some(disk) = self.disk.take() {
             disk.join().expect("the thread that waits for the disk does not panic");
         }
@@ -203,7 +225,7 @@ impl Medium for DurableFile {
 
 impl Drop for DurableFile {
     fn drop(&mut self) {
-        // Only a file that was not closed has anything to tell here, and the reason for that is known.
+        // The error of a file that was not closed is reported elsewhere.
         let _ = self.settle();
     }
 }
@@ -213,15 +235,15 @@ impl Write for DurableFile {
         self.file.write(bytes)
     }
 
-    /// Also tells of an earlier flush that the disk refused.
+    /// Also reports an earlier flush that the disk refused.
     fn flush(&mut self) -> io::Result<()> {
         self.file.flush()?;
         for earlier in self.done.try_iter() {
             earlier?;
         }
-        if let Some(wanted) = &self.wanted {
+        if let Some(request) = &self.requests {
             // A request that waits already covers this one too.
-            let _ = wanted.try_send(());
+            let _ = request.try_send(());
         }
         Ok(())
     }
@@ -242,8 +264,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_disk_that_refuses_the_last_of_it_is_told_of() {
-        // Takes everything and has nothing to bring it to.
+    fn a_disk_that_refuses_the_last_bytes_is_reported() {
+        // It accepts writes and refuses to sync.
         let null = File::options().write(true).open("/dev/null").unwrap();
         let error = DurableFile::on(null).unwrap().close().unwrap_err();
         assert_eq!(error.kind(), io::ErrorKind::InvalidInput);

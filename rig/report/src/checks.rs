@@ -29,7 +29,11 @@ impl CheckResult {
         if passed { Self::Passed } else { Self::Failed }
     }
 
-    /// In a word.
+    pub(crate) fn is_failed(self) -> bool {
+        self == Self::Failed
+    }
+
+    /// The word in tables.
     pub fn mark(self) -> &'static str {
         match self {
             Self::Passed => "ok",

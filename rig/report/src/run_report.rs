@@ -94,10 +94,11 @@ fn write_report(
     format: Format,
 ) -> Result<Exit, Failure> {
     let (verdict, summary) = judge_and_show(folder, manifest, figures, format)?;
+    let page = page::html(manifest, figures, &verdict).context("cannot write the page").incomplete()?;
     for (path, text) in [
         (folder.summary(), summary),
         (folder.junit(), junit::xml(manifest, figures, &verdict)),
-        (folder.report(), page::html(manifest, figures, &verdict)),
+        (folder.report(), page),
     ] {
         fs::write(&path, text).map_err(WriteError::for_file(&path)).incomplete()?;
     }

@@ -2,7 +2,6 @@
 
 use std::fmt::Write;
 
-use crate::text::escape;
 use masseter_recording::{RunUsage, Usage};
 
 /// A line for the terminal; nothing under virtual time, which has no processes.
@@ -18,29 +17,15 @@ pub(crate) fn line(text: &mut String, usage: &RunUsage) -> std::fmt::Result {
     writeln!(text, "usage: {}; stolen from the machine {:.2} s", processes.join("; "), usage.stolen_s)
 }
 
-/// A table for the page.
-pub(crate) fn page_table(page: &mut String, usage: &RunUsage) -> std::fmt::Result {
-    if usage.processes.is_empty() {
-        return Ok(());
-    }
-    page.push_str(
-        "<table id=\"usage\">\n<tr><th>process, in its steady state<th>CPU, % of a core\
-         <th>waits<th>times its core was taken<th>page faults, memory<th>page faults, disk\n",
-    );
-    for (name, usage) in &usage.processes {
+/// Rows of the page's table; none under virtual time.
+pub(crate) fn rows(usage: &RunUsage) -> Vec<[String; 6]> {
+    let row = |(name, usage): (&String, &Usage)| {
         let Usage { voluntary_switches, involuntary_switches, minor_faults, major_faults, .. } = usage;
-        let (name, share) = (escape(name), share(usage) * 100.0);
-        writeln!(
-            page,
-            "<tr><td>{name}<td>{share:.1}<td>{voluntary_switches}<td>{involuntary_switches}<td>{minor_faults}\
-             <td>{major_faults}"
-        )?;
-    }
-    writeln!(
-        page,
-        "</table>\n<p>Stolen from the machine by its hypervisor, as far as it tells: {:.2} s.</p>",
-        usage.stolen_s
-    )
+        let [waits, taken, memory, disk] =
+            [voluntary_switches, involuntary_switches, minor_faults, major_faults].map(u64::to_string);
+        [name.clone(), format!("{:.1}", share(usage) * 100.0), waits, taken, memory, disk]
+    };
+    usage.processes.iter().map(row).collect()
 }
 
 /// CPU time over the time observed; 0 when nothing was.

@@ -58,7 +58,7 @@ impl Medium for Stuck {
 /// Length of a recording that holds nothing but its definitions.
 fn definitions() -> u64 {
     let mut bytes = Cursor::new(Vec::new());
-    std::mem::forget(Recorder::on(&mut bytes, scene()).unwrap());
+    std::mem::forget(Recorder::new(&mut bytes, scene()).unwrap());
     bytes.position()
 }
 
@@ -66,7 +66,7 @@ fn definitions() -> u64 {
 fn record_on_a_stuck_disk(bytes: usize, then: io::ErrorKind) -> (u64, Outcome) {
     let (let_go, go_on) = channel();
     let disk = Stuck { definitions: definitions(), bytes: Cursor::default(), go_on, then };
-    let mut backlog = Backlog::start(Recorder::on(disk, scene()).unwrap(), Pace::RealTime);
+    let mut backlog = Backlog::start(Recorder::new(disk, scene()).unwrap(), Pace::RealTime);
     let offered = (bytes / size_of::<Reading>()) as u64;
     for seq in 1..=offered {
         backlog.record(&Reading { seq, ..Default::default() }, seq);
@@ -103,17 +103,17 @@ fn a_disk_that_fails_is_told_of_once_while_the_recording_goes_on_and_again_at_it
     let (let_go, go_on) = channel();
     let then = io::ErrorKind::StorageFull;
     let disk = Stuck { definitions: definitions(), bytes: Cursor::default(), go_on, then };
-    let mut backlog = Backlog::start(Recorder::on(disk, scene()).unwrap(), Pace::RealTime);
+    let mut backlog = Backlog::start(Recorder::new(disk, scene()).unwrap(), Pace::RealTime);
     for seq in 1..=(BATCH_BYTES / 2 / size_of::<Reading>()) as u64 {
         backlog.record(&Reading { seq, ..Default::default() }, seq);
     }
     backlog.hand_over();
-    assert!(backlog.failed_just_now().is_none());
+    assert!(backlog.new_failure().is_none());
     drop(let_go);
-    while backlog.failed_just_now().is_none() {
+    while backlog.new_failure().is_none() {
         clock::sleep(Duration::from_millis(1));
     }
-    assert!(backlog.failed_just_now().is_none());
+    assert!(backlog.new_failure().is_none());
     let loss = backlog.finish().loss().unwrap();
     assert!(loss.starts_with("cannot write the recording: "), "{loss}");
     assert!(loss.ends_with("messages did not reach the disk"), "{loss}");
@@ -138,7 +138,7 @@ fn what_a_recording_lacks_is_said_with_its_reason_and_never_as_nothing() {
 fn a_caller_who_may_wait_loses_nothing_however_slow_the_disk_is() {
     let (let_go, go_on) = channel();
     let disk = Stuck { definitions: definitions(), bytes: Cursor::default(), go_on, then: WELL };
-    let mut backlog = Backlog::start(Recorder::on(disk, scene()).unwrap(), Pace::Virtual);
+    let mut backlog = Backlog::start(Recorder::new(disk, scene()).unwrap(), Pace::Virtual);
     let offering = thread::spawn(move || {
         for seq in 1..=(4 * Pace::Virtual.batch_bytes() / size_of::<Reading>()) as u64 {
             backlog.record(&Reading { seq, ..Default::default() }, seq);

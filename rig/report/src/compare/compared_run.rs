@@ -56,7 +56,7 @@ impl ComparedRun {
 
     pub(super) fn new(path: &str, summary: &Value, manifest: &Value) -> anyhow::Result<Self> {
         let form = &summary["form"];
-        ensure!(*form == FORM, "it has form {form}, this program compares form {}", FORM);
+        ensure!(*form == FORM, "it has form {form}, this program compares form {FORM}");
         let Value::Object(_) = &summary["figures"] else { bail!("it has no figures") };
         let verdict = Verdict::deserialize(&summary["verdict"]).context("it has no verdict")?;
         let of_manifest = CIRCUMSTANCES.map(|key| (key.to_owned(), manifest[key].clone()));
