@@ -44,7 +44,7 @@ use workspace::{Map, SLICES};
 /// What `kinematics` takes.
 #[derive(Debug, Clone, Args)]
 pub struct KinematicsArgs {
-    /// Folder for figures (SVG and PNG), data (CSV) and claims.md; must not exist
+    /// Folder for figures (SVG), data (CSV) and claims.md; must not exist
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     /// Seed of every random number
@@ -159,6 +159,5 @@ impl Study {
 fn write_figure(folder: &Path, figure: &Figure) -> anyhow::Result<()> {
     let path = folder.join(figure.name);
     fs::write(path.with_extension("svg"), &figure.svg)?;
-    fs::write(path.with_extension("png"), figure.png()?)?;
     Ok(())
 }

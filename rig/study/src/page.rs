@@ -41,10 +41,7 @@ pub(super) fn of(study: &Study, args: &KinematicsArgs, claims: &[Claim], figures
     page += &workspace(study);
     page += "\nNot measured: what the paper says of the Stewart platform, genetic algorithms, friction and dynamics.\n";
     for Figure { name, caption, .. } in figures {
-        let _ = write!(
-            page,
-            "\n<a id=\"{name}\"></a>\n\n![{name}]({name}.svg)\n\n{caption} ([PNG]({name}.png))\n"
-        );
+        let _ = write!(page, "\n<a id=\"{name}\"></a>\n\n![{name}]({name}.svg)\n\n{caption}\n");
     }
     page
 }

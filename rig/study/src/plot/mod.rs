@@ -1,9 +1,8 @@
-//! The study's figures. Each is drawn once, as SVG; its PNG is a rendering of that.
+//! The study's figures, as SVG.
 
 mod axes;
 mod basins;
 mod mechanism;
-mod raster;
 mod rates;
 mod solutions;
 mod speed;
@@ -65,14 +64,6 @@ impl Figure {
             area.present()?;
         }
         Ok(Self { name, caption, svg })
-    }
-
-    /// The figure as PNG.
-    ///
-    /// # Errors
-    /// When it cannot be rendered.
-    pub(super) fn png(&self) -> anyhow::Result<Vec<u8>> {
-        raster::png(&self.svg)
     }
 }
 
