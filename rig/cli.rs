@@ -8,7 +8,7 @@ use clap::{Args, Parser, Subcommand};
 use masseter_controller::process::Outcome;
 use masseter_shared::lifecycle::Assignment;
 
-use crate::bench::BenchArgs;
+use crate::bench::args::BenchArgs;
 use crate::bench::ipc::PeerArgs;
 use crate::can::{EdsArgs, PlanArgs, ServeArgs};
 use crate::csv_kinematics::{self, CsvArgs, FkArgs};

@@ -5,13 +5,13 @@ use std::fmt::Write;
 use masseter_shared::config::MotionConfig;
 
 use super::junit::escape;
-use super::plot::Drawn;
 use super::table::{self, in_words, microseconds, or_dash};
 use super::{charts, events, film, usage};
 use crate::checks::CheckResult;
 use crate::outcome::Outcome;
 use crate::verdict::Verdict;
 use masseter_analysis::{BusResponse, Figures, Reference, Track};
+use masseter_charts::Drawn;
 use masseter_recording::Manifest;
 
 const STYLE: &str = include_str!("page/style.css");

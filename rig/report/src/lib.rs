@@ -10,7 +10,6 @@ mod film;
 mod html;
 mod junit;
 pub mod outcome;
-mod plot;
 mod table;
 mod usage;
 pub mod verdict;
