@@ -1,6 +1,56 @@
-//! Values of command-line arguments that several verbs take.
+//! Command-line arguments that several verbs share, and the parsers of their values.
 
-/// What the buses run on: real interfaces, or none for simulated buses.
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+use masseter_controller::process::Kind;
+use masseter_shared::lifecycle::Assignment;
+
+/// The arguments that the supervisor passes to every process of a run.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct ProcessArgs {
+    #[arg(long)]
+    scenario: PathBuf,
+    #[arg(long)]
+    domain: String,
+}
+
+impl ProcessArgs {
+    pub(crate) fn assignment(self) -> Assignment {
+        Assignment { scenario: self.scenario, domain: self.domain }
+    }
+}
+
+/// A controller of the rig.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
+pub enum ControllerKind {
+    /// Plays the motion of the scenario
+    #[default]
+    Motion,
+    /// Holds the position found at the start, for as long as the motion takes
+    Hold,
+}
+
+impl ControllerKind {
+    /// The name on the command line.
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::Motion => "motion",
+            Self::Hold => "hold",
+        }
+    }
+}
+
+impl From<ControllerKind> for Kind {
+    fn from(kind: ControllerKind) -> Self {
+        match kind {
+            ControllerKind::Motion => Self::Motion,
+            ControllerKind::Hold => Self::Hold,
+        }
+    }
+}
+
+/// The real CAN interface of each bus; none for simulated buses.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Wires(pub Vec<String>);
 
@@ -8,7 +58,7 @@ pub(crate) fn parse_cores(text: &str) -> Result<[usize; 2], String> {
     let cores: Result<Vec<usize>, _> = text.split(',').map(|core| core.trim().parse()).collect();
     match cores.as_deref() {
         Ok([controller, plant]) => Ok([*controller, *plant]),
-        _ => Err("give two cores, such as 0,1".to_owned()),
+        _ => Err("expected two cores, such as 0,1".to_owned()),
     }
 }
 
@@ -18,7 +68,7 @@ pub(crate) fn parse_wires(text: &str) -> Result<Wires, String> {
     }
     let names: Vec<_> = text.split(',').map(|name| name.trim().to_owned()).collect();
     if names.iter().any(String::is_empty) {
-        return Err("give `virtual`, or interfaces such as can0,can1".to_owned());
+        return Err("expected `virtual`, or interfaces such as can0,can1".to_owned());
     }
     Ok(Wires(names))
 }

@@ -1,23 +1,28 @@
-//! The `masseter` command: one module per verb, and what the verbs share.
+//! The `masseter` command. Modules of verbs: `bench`, `can`, `clean`, `csv_kinematics`, `doctor`, `plant`,
+//! `recording_cli`, `report_cli` and `run`; [`cli`] dispatches to them.
 //!
-//! `run` starts controller, plant and logger as processes of this same executable
-//! ([`run::supervisor`]), or steps their cores in one thread under virtual time
-//! ([`run::virtual_time`]). Whatever a run tells of itself comes from its recording
-//! and manifest (`masseter-analysis`), so it can be told again.
+//! `run` starts controller, plant and `recorder` as processes of this executable ([`run::supervisor`]), or steps their
+//! cores in one thread under virtual time ([`run::virtual_time`]). Figures of a run are computed from its recording and
+//! manifest only (crate `masseter_analysis`), so `report` can compute them again. This crate holds no control, physics,
+//! analysis or file formats.
 
-// A closed terminal must not end a run: see `masseter_terminal`.
+// `println!` panics on a closed terminal, which would end a run: see `masseter_terminal`.
 #![warn(clippy::print_stdout, clippy::print_stderr)]
 
 mod arguments;
 pub mod bench;
-pub mod can;
-pub mod clean;
+mod can;
+mod clean;
 pub mod cli;
+mod controller;
 pub mod csv_kinematics;
-pub mod doctor;
-pub mod live;
-pub mod log;
-pub mod logger;
+mod doctor;
+pub mod foxglove;
+mod kinematics;
 pub mod machine;
-pub mod plant;
+mod plant;
+mod recorder;
+mod recording_cli;
+mod report_cli;
 pub mod run;
+mod uniqueness;

@@ -1,30 +1,31 @@
-//! `masseter plant`: the emulated drives on real interfaces; or, for the supervisor, the plant's process.
+//! `masseter plant`: the emulated drives on real CAN interfaces; with the supervisor's hidden arguments, the plant's
+//! process.
 
 use std::path::PathBuf;
 
 use anyhow::{Context, bail};
 use clap::Args;
-use masseter_plant::emulator::{Emulator, Figures};
+use masseter_plant::emulation::{Emulator, EmulatorCounters};
 use masseter_plant::process::{self, Reason};
 use masseter_shared::clock;
 use masseter_shared::config::Scenario;
 use masseter_shared::lifecycle::{Assignment, StopRequest};
 use masseter_shared::realtime::scheduling::{Wanted, obtain};
+use masseter_terminal::{Exit, result_line, status};
 
 use crate::arguments::{Wires, parse_wires};
 
-use masseter_terminal::{Exit, result_line, status};
-
-/// What `plant` takes.
+/// The arguments of `plant`.
 #[derive(Debug, Clone, Args)]
+#[command(after_help = "Example:\n  masseter plant --emulate --can can0,can1")]
 pub(crate) struct PlantArgs {
-    /// Scenario file with the drives and the mechanism; without one, the published mechanism
+    /// Scenario file with drives and mechanism [default: the published rig]
     #[arg(value_name = "SCENARIO")]
     file: Option<PathBuf>,
-    /// The real interface of each bus, such as can0,can1
+    /// CAN interface of each bus, such as can0,can1
     #[arg(long, value_name = "IF[,IF]", value_parser = parse_wires)]
     can: Option<Wires>,
-    /// Put the emulated drives on the interfaces, until Ctrl-C
+    /// Connect the emulated drives to the interfaces, until Ctrl-C
     #[arg(long)]
     emulate: bool,
     #[arg(long, hide = true, requires = "domain")]
@@ -34,14 +35,14 @@ pub(crate) struct PlantArgs {
 }
 
 impl PlantArgs {
-    /// What the supervisor started the plant with, if it was the supervisor.
+    /// The supervisor's assignment; none for a plant that a user starts.
     fn assignment(&self) -> Option<Assignment> {
         Some(Assignment { scenario: self.scenario.clone()?, domain: self.domain.clone()? })
     }
 }
 
-/// Runs the plant until it is asked to end. As the supervisor's process, it also ends by a safe stop for want of a
-/// controller.
+/// Emulates until Ctrl-C, or runs as the supervisor's process until asked to end. That process also ends, by a safe stop,
+/// when commands stop arriving.
 pub(crate) fn plant(args: &PlantArgs) -> anyhow::Result<Exit> {
     let Some(assignment) = args.assignment() else {
         emulate(args)?;
@@ -64,8 +65,8 @@ fn emulate(args: &PlantArgs) -> anyhow::Result<()> {
         locked_memory: realtime.lock_memory,
     });
     obtained.refusals.iter().for_each(|refusal| status!("  plant: {refusal}"));
-    status!("six drives on {}, until Ctrl-C", scenario.can.interfaces.join(", "));
-    tell(emulator.run(&stop)?)
+    status!("emulating six drives on {}; stop with Ctrl-C", scenario.can.interfaces.join(", "));
+    print_counters(emulator.run(&stop)?)
 }
 
 fn resolve(args: &PlantArgs) -> anyhow::Result<Scenario> {
@@ -76,24 +77,23 @@ fn resolve(args: &PlantArgs) -> anyhow::Result<Scenario> {
         Ok(())
     })?;
     if scenario.can.is_virtual() {
-        bail!("no interface to put the drives on: name one for each bus, such as --can can0,can1");
+        bail!("the emulated drives need an interface for each bus, such as --can can0,can1");
     }
     if !args.emulate {
         bail!(
-            "a plant without controller only emulates: add --emulate, or drive the robot with `masseter run \
-             --can {}`",
+            "this verb only emulates drives: add --emulate; to drive a robot, use `masseter run --can {}`",
             scenario.can.interfaces.join(",")
         );
     }
     Ok(scenario)
 }
 
-fn tell(figures: Figures) -> anyhow::Result<()> {
+fn print_counters(counters: EmulatorCounters) -> anyhow::Result<()> {
     result_line!(
-        "received {} frames, sent {}, could not send {}; left out {:.1} ms that the machine was too slow for",
-        figures.received,
-        figures.sent,
-        figures.refused,
-        figures.skipped_ns as f64 / 1e6
+        "received {} frames, sent {}, failed to send {}; skipped {:.1} ms of emulated time, since the machine was too slow",
+        counters.received,
+        counters.sent,
+        counters.refused,
+        counters.skipped_ns as f64 / 1e6
     )
 }

@@ -7,7 +7,7 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
-use common::{MASSETER, child_of};
+use common::{Cores, MASSETER, child_of};
 use masseter_shared::clock;
 use rustix::process::{Pid, Signal, kill_process, test_kill_process};
 
@@ -27,7 +27,8 @@ fn wait_for_a_run(place: &Path) {
 }
 
 #[test]
-fn an_interrupted_bench_ends_behind_its_run_and_leaves_nothing() {
+fn an_interrupted_bench_ends_after_its_run_and_leaves_nothing() {
+    let _cores = Cores::take();
     for signal in [Signal::INT, Signal::TERM] {
         let place = tempfile::tempdir().unwrap();
         let mut bench = Command::new(MASSETER)

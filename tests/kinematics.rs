@@ -159,6 +159,29 @@ fn all_solutions_of_the_neutral_input_are_told_with_their_conditions() {
     assert!(values[16] > 0.5 && values[17] > 1.0);
 }
 
+/// A pose at which the determinant is 10⁻⁹, and a pair of solutions 1.5·10⁻⁴ rad apart.
+#[test]
+fn solutions_that_rounding_cannot_separate_are_both_told_as_singular() {
+    let singular = "0.014985880362082765,0.00826232132276009,0.035219106697652394,\
+                    0.3004420425771831,0.2662413895938286,0.2655512934340976";
+    let close = "-0.00902631714950948,-0.004133527909131813,0.013522157666649465,\
+                 0.29963087076144573,0.2960203695460343,0.2860935151311134";
+    let output = pipe(&["fk", "--all"], &format!("{ACTUATORS}{singular}\n{close}\n"));
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    let of_line = |number: &str| {
+        let all = stdout(&output);
+        let lines = all.lines().filter(|line| line.starts_with(&format!("{number},")));
+        lines.map(|line| (columns(line)[8], line.rsplit(',').next().unwrap().to_owned())).collect::<Vec<_>>()
+    };
+    let above: Vec<_> = of_line("2").into_iter().filter(|(theta_rad, _)| *theta_rad > 0.0).collect();
+    assert_eq!(above.len(), 2, "{above:?}");
+    for (theta_rad, status) in above {
+        assert!((theta_rad - 1.447_191_76).abs() < 1e-5 && status == "singular", "{theta_rad} {status}");
+    }
+    assert_eq!(of_line("3").len(), 16);
+    assert!(of_line("3").iter().all(|(_, status)| status != "singular"));
+}
+
 /// Least root of the error on a grid of all leg angles, 5° apart.
 fn nearest_on_a_grid_m(actuators: &Actuators) -> f64 {
     let mechanism = Mechanism::new(&MechanismConfig::default()).unwrap();

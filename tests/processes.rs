@@ -6,7 +6,7 @@ mod common;
 use std::fs;
 
 use common::{
-    Cores, PASSED_OR_INVALID, UNHURRIED, Workspace, check, child_of, masseter, shared_memory_of, stderr,
+    Cores, LENIENT, SharedMemory, Workspace, assert_played, check, child_of, has_event, masseter, stderr,
     stdout, wait_until,
 };
 use rustix::process::{Pid, Signal, kill_process};
@@ -14,23 +14,30 @@ use rustix::process::{Pid, Signal, kill_process};
 #[test]
 fn a_run_plays_through_three_processes_and_leaves_nothing_in_shared_memory() {
     let cores = Cores::take();
-    let workspace = Workspace::new(&format!("duration_s = 2.0\n{UNHURRIED}"));
+    let workspace = Workspace::new(&format!("duration_s = 2.0\n{LENIENT}"));
     let child = workspace.start(&cores, &[]);
-    let id = format!("{}-", child.id());
+    let memory = SharedMemory::of_running(&format!("{}-", child.id()));
     let output = child.wait_with_output().unwrap();
-    assert!(PASSED_OR_INVALID.contains(&output.status.code()), "{}{}", stdout(&output), stderr(&output));
+    assert_played(&workspace.run_folder(), output.status, &(stdout(&output) + &stderr(&output)));
     let summary = workspace.summary();
-    assert_eq!(summary["figures"]["final_state"], "finished");
     assert_eq!(check(&summary, "dropped messages")["result"], "passed", "{summary}");
     let scheduling = &workspace.manifest()["scheduling"];
-    for role in ["controller", "plant", "logger"] {
+    for role in ["controller", "plant", "recorder"] {
         assert!(scheduling[role]["wanted"].is_object(), "{scheduling}");
     }
-    assert_eq!(shared_memory_of(&id), Vec::<String>::new());
+    assert_eq!(memory.files(), Vec::<String>::new());
     let log = fs::read_to_string(workspace.run_folder().join("can0.log")).unwrap();
     let (_, last_cycle) = log.rsplit_once(" 080#").unwrap();
     assert!(last_cycle.contains(" 201#"), "what it ended with is recorded too: {last_cycle}");
     assert_logged_in_order(&fs::read(workspace.run_folder().join("recording.mcap")).unwrap());
+}
+
+#[test]
+fn another_controller_runs_through_three_processes() {
+    let cores = Cores::take();
+    let workspace = Workspace::new(&format!("duration_s = 1.0\n{LENIENT}"));
+    let output = workspace.start(&cores, &["--controller", "hold"]).wait_with_output().unwrap();
+    assert_played(&workspace.run_folder(), output.status, &(stdout(&output) + &stderr(&output)));
 }
 
 /// Nothing is logged before it was published, nor before what stands above it.
@@ -49,32 +56,36 @@ fn assert_logged_in_order(recording: &[u8]) {
 }
 
 #[test]
-fn a_run_goes_on_when_nobody_reads_what_it_says() {
+fn a_run_goes_on_when_nobody_reads_its_output() {
     let cores = Cores::take();
-    let workspace = Workspace::new(&format!("duration_s = 3.0\n{UNHURRIED}"));
+    let workspace = Workspace::new(&format!("duration_s = 3.0\n{LENIENT}"));
     let mut child = workspace.start(&cores, &[]);
     drop((child.stdout.take(), child.stderr.take()));
-    let code = child.wait().unwrap().code();
-    assert!(PASSED_OR_INVALID.contains(&code), "{code:?} {}", workspace.summary()["verdict"]);
+    let status = child.wait().unwrap();
+    assert_played(&workspace.run_folder(), status, "nobody read what it said");
 }
 
 #[test]
-fn a_motion_that_somebody_broke_off_does_not_pass() {
+fn a_motion_that_is_broken_off_does_not_pass() {
     let cores = Cores::take();
-    let (workspace, child) = Workspace::running(&cores, UNHURRIED);
+    let (workspace, child) = Workspace::running(&cores, LENIENT);
     kill_process(child_of(&child, "controller"), Signal::TERM).unwrap();
     let output = child.wait_with_output().unwrap();
-    let code = output.status.code();
-    assert!(code == Some(1) || code == Some(3), "{code:?} {}", stdout(&output));
+    let result = match output.status.code() {
+        Some(1) => "failed",
+        // The machine took too many cycles to judge anything.
+        Some(3) => "not_judged",
+        code => panic!("{code:?} {}", stdout(&output)),
+    };
     let summary = workspace.summary();
-    let sequence = check(&summary, "sequence");
-    assert!(sequence["finding"].as_str().unwrap().contains("asked to stop"), "{sequence}");
+    assert_eq!(check(&summary, "sequence")["result"], result, "{summary}");
+    assert!(has_event(&summary, "transition", "stop_requested"), "{summary}");
 }
 
 #[test]
 fn a_controller_that_does_not_end_when_asked_to_is_killed() {
     let cores = Cores::take();
-    let (_workspace, child) = Workspace::running(&cores, UNHURRIED);
+    let (_workspace, child) = Workspace::running(&cores, LENIENT);
     kill_process(child_of(&child, "controller"), Signal::STOP).unwrap();
     kill_process(Pid::from_child(&child), Signal::TERM).unwrap();
     let output = child.wait_with_output().unwrap();
@@ -83,26 +94,26 @@ fn a_controller_that_does_not_end_when_asked_to_is_killed() {
 }
 
 #[test]
-fn a_controller_that_hangs_stops_the_rig_though_nobody_asks() {
+fn a_controller_that_hangs_ends_the_run() {
     let cores = Cores::take();
-    let (workspace, child) = Workspace::running(&cores, UNHURRIED);
+    let (workspace, child) = Workspace::running(&cores, LENIENT);
     kill_process(child_of(&child, "controller"), Signal::STOP).unwrap();
     let output = child.wait_with_output().unwrap();
     assert_eq!(output.status.code(), Some(4), "{}{}", stdout(&output), stderr(&output));
     let reason = &workspace.summary()["verdict"]["reason"];
-    assert_eq!(reason, "the controller died: it sent no command any more, and was killed");
+    assert_eq!(reason, "the controller died: it stopped sending commands, and was killed");
 }
 
 #[test]
-fn a_killed_supervisor_takes_its_processes_along_and_clean_sweeps_what_is_left() {
+fn the_processes_of_a_killed_supervisor_end_and_clean_removes_their_files() {
     let cores = Cores::take();
-    let (workspace, mut child) = Workspace::running(&cores, UNHURRIED);
-    let id = format!("{}-", child.id());
+    let (workspace, mut child) = Workspace::running(&cores, LENIENT);
+    let memory = SharedMemory::of_running(&format!("{}-", child.id()));
     child.kill().unwrap();
     child.wait().unwrap();
     wait_until("all is swept", || {
         assert_eq!(masseter(&["clean"]).status.code(), Some(0));
-        shared_memory_of(&id).is_empty()
+        memory.files().is_empty()
     });
     let report = masseter(&["report", workspace.run_folder().to_str().unwrap()]);
     assert_eq!(report.status.code(), Some(4), "{}{}", stdout(&report), stderr(&report));

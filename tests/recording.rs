@@ -8,9 +8,9 @@ use std::path::Path;
 use std::process::Output;
 use std::time::Duration;
 
-use common::{Cores, UNHURRIED, Workspace, child_of, cramped, masseter, stderr, stdout, wait_until};
+use common::{Cores, LENIENT, Workspace, child_of, cramped, masseter, stderr, stdout, wait_until};
 use masseter_recording::{Reader, Recorded, Recorder, Scene};
-use masseter_shared::clock;
+use masseter_shared::clock::{self, SECOND_NS};
 use masseter_shared::config::Scenario;
 use masseter_shared::geometry::Mechanism;
 use rand::{RngExt, SeedableRng};
@@ -26,7 +26,7 @@ fn virtual_run() -> Workspace {
 
 fn log(verb: &str, recording: &Path, more: &[&str]) -> Output {
     let recording = recording.to_str().unwrap();
-    masseter(&[&["log", verb, recording], more].concat())
+    masseter(&[&["recording", verb, recording], more].concat())
 }
 
 fn messages(recording: &Path) -> Vec<Recorded> {
@@ -39,7 +39,7 @@ fn messages(recording: &Path) -> Vec<Recorded> {
 }
 
 #[test]
-fn a_whole_recording_is_told_and_proved() {
+fn a_whole_recording_passes_info_and_verify() {
     let workspace = virtual_run();
     for of in [workspace.run_folder(), workspace.run_folder().join("recording.mcap")] {
         let info = log("info", &of, &[]);
@@ -55,7 +55,7 @@ fn a_whole_recording_is_told_and_proved() {
 }
 
 #[test]
-fn bad_recordings_get_2_and_cut_ones_6_with_the_place() {
+fn damaged_recordings_are_exit_2_and_cut_ones_exit_6_with_the_place() {
     let workspace = virtual_run();
     let whole = fs::read(workspace.run_folder().join("recording.mcap")).unwrap();
     let cut = whole[..whole.len() * 2 / 3].to_vec();
@@ -83,7 +83,7 @@ fn bad_recordings_get_2_and_cut_ones_6_with_the_place() {
 }
 
 #[test]
-fn only_the_line_of_what_is_wrong_says_fail() {
+fn only_the_lines_of_failed_proofs_say_fail() {
     let workspace = virtual_run();
     let whole = fs::read(workspace.run_folder().join("recording.mcap")).unwrap();
     let mut flipped = whole.clone();
@@ -174,7 +174,7 @@ fn a_topic_that_the_recording_does_not_have_is_refused_with_those_it_has() {
 }
 
 #[test]
-fn topics_that_make_no_table_are_named_and_refused_where_they_are_asked_for() {
+fn topics_without_a_table_are_listed_and_refused_on_request() {
     let workspace = virtual_run();
     let out = workspace.file("tables");
     let export = |more: &[&str]| {
@@ -183,7 +183,7 @@ fn topics_that_make_no_table_are_named_and_refused_where_they_are_asked_for() {
     let refused = export(&["--topic", "reading", "--topic", "/tf"]);
     assert_eq!(refused.status.code(), Some(2));
     let said = stderr(&refused);
-    assert!(said.contains("'/tf' makes no table: its messages are protobuf"), "{said}");
+    assert!(said.contains("'/tf' cannot become a table: its messages are protobuf"), "{said}");
     assert!(!out.exists());
 
     let said = stdout(&export(&[]));
@@ -198,9 +198,9 @@ fn a_recovery_that_fails_leaves_nothing_in_the_way_of_the_next() {
     let workspace = virtual_run();
     let recording = workspace.run_folder().join("recording.mcap");
     let out = workspace.file("recovered.mcap");
-    let arguments = ["log", "recover", recording.to_str().unwrap(), "--out", out.to_str().unwrap()];
+    let arguments = ["recording", "recover", recording.to_str().unwrap(), "--out", out.to_str().unwrap()];
     let failed = cramped(8, &arguments);
-    assert_eq!(failed.status.code(), Some(2), "{}", stderr(&failed));
+    assert_eq!(failed.status.code(), Some(6), "{}", stderr(&failed));
     assert!(!out.exists(), "{}", stderr(&failed));
     assert_eq!(masseter(&arguments).status.code(), Some(0));
 }
@@ -233,20 +233,20 @@ fn a_recording_cut_at_any_byte_lacks_its_end_and_nothing_else() {
 
 /// How many times a recording is cut at random.
 const CUTS: usize = 300;
-/// When the logger is killed, from the beginning of the recording: before, between and right behind flushes.
+/// When the recorder is killed, from the beginning of the recording: before, between and right behind flushes.
 const KILLED_AT_MS: [u64; 10] = [0, 70, 180, 310, 440, 500, 730, 990, 1240, 1490];
-/// Tries at killing the logger before a starved machine makes the rig stop by itself.
+/// Tries at killing the recorder before a starved machine makes the rig stop by itself.
 const TRIES: usize = 5;
 
-/// Runs until the recording has begun, kills the logger some time later, and returns when that was; none if the
+/// Runs until the recording has begun, kills the recorder some time later, and returns when that was; none if the
 /// rig had come to a safe stop before.
-fn kill_the_logger(cores: &Cores, workspace: &Workspace, after: Duration) -> Option<u64> {
+fn kill_the_recorder(cores: &Cores, workspace: &Workspace, after: Duration) -> Option<u64> {
     let child = workspace.start(cores, &[]);
-    let logger = child_of(&child, "logger");
+    let recorder = child_of(&child, "recorder");
     wait_until("the rig records", || workspace.recorded_bytes() > 50_000);
     clock::sleep(after);
     let killed_ns = clock::now_ns();
-    kill_process(logger, Signal::KILL).unwrap();
+    kill_process(recorder, Signal::KILL).unwrap();
     let output = child.wait_with_output().unwrap();
     match output.status.code() {
         Some(4) => Some(killed_ns),
@@ -255,17 +255,16 @@ fn kill_the_logger(cores: &Cores, workspace: &Workspace, after: Duration) -> Opt
     }
 }
 
-/// How much of the end that is, `tests/realtime/kill.py` judges: here machines may starve the logger.
 #[test]
-fn a_killed_logger_leaves_a_recording_that_lacks_its_end_and_is_recovered() {
+fn a_killed_recorder_leaves_a_recording_that_lacks_at_most_its_last_second_and_is_recovered() {
     let cores = Cores::take();
     for after_ms in KILLED_AT_MS {
         let killed = (0..TRIES).find_map(|_| {
-            let workspace = Workspace::new(&format!("duration_s = 30.0\n{UNHURRIED}"));
-            kill_the_logger(&cores, &workspace, Duration::from_millis(after_ms))
+            let workspace = Workspace::new(&format!("duration_s = 30.0\n{LENIENT}"));
+            kill_the_recorder(&cores, &workspace, Duration::from_millis(after_ms))
                 .map(|killed_ns| (workspace, killed_ns))
         });
-        let (workspace, killed_ns) = killed.expect("a rig that runs until its logger is killed");
+        let (workspace, killed_ns) = killed.expect("a rig that runs until its recorder is killed");
         let recording = workspace.run_folder().join("recording.mcap");
         let proof = log("verify", &recording, &[]);
         assert_eq!(proof.status.code(), Some(6), "{}", stdout(&proof));
@@ -278,6 +277,7 @@ fn a_killed_logger_leaves_a_recording_that_lacks_its_end_and_is_recovered() {
         });
         let lost_ns = killed_ns.saturating_sub(readings.max().unwrap_or(0));
         eprintln!("killed {after_ms} ms after it began: the last {} ms are lost", lost_ns / 1_000_000);
+        assert!(lost_ns <= SECOND_NS, "killed {after_ms} ms after it began: {lost_ns} ns are lost");
 
         let recovered = workspace.file("recovered.mcap");
         let output = log("recover", &recording, &["--out", recovered.to_str().unwrap()]);

@@ -3,8 +3,9 @@
 mod common;
 
 use std::fs;
+use std::path::Path;
 
-use common::{Workspace, cramped, jaw_recording, json, stderr, stdout, wait_until_it_records};
+use common::{Workspace, cramped, json, stderr, stdout, wait_until_it_records};
 use rustix::process::{Pid, Signal, kill_process};
 use serde_json::json;
 
@@ -35,6 +36,16 @@ fn a_run_passes_tracks_within_a_tenth_of_a_millimetre_and_leaves_its_folder() {
     let table = stdout(&output);
     assert!(table.starts_with("PASS"), "{table}");
     assert!(table.contains("forward kinematics"), "{table}");
+}
+
+#[test]
+fn another_controller_runs_through_the_whole_rig() {
+    let workspace = Workspace::new("duration_s = 1.0");
+    let output = workspace.run_virtual(&["--controller", "hold"]);
+    assert_eq!(output.status.code(), Some(0), "{}{}", stdout(&output), stderr(&output));
+    let tracking = &workspace.summary()["figures"]["tracking"];
+    assert_eq!(tracking["samples"], 1000, "{tracking}");
+    assert!(tracking["max_mm"].as_f64().unwrap() < 0.01, "{tracking}");
 }
 
 #[test]
@@ -106,23 +117,28 @@ fn every_generated_motion_plays() {
     }
 }
 
+/// Recordings as poses and as markers; each kind with one like a patient's.
 #[test]
-fn recorded_patients_play() {
-    let markers = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/markers.toml");
-    let patient = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/patient.toml");
-    for (name, scenario) in [("patient_jaws3d.csv", patient), ("jma_markers.csv", markers)] {
-        let Some(path) = jaw_recording(name) else { continue };
-        let workspace = Workspace::new(&fs::read_to_string(scenario).unwrap());
-        let output = workspace.run_virtual(&["--trajectory", path.to_str().unwrap()]);
-        assert_eq!(output.status.code(), Some(0), "{name}: {}{}", stdout(&output), stderr(&output));
-        let tracking = &workspace.summary()["figures"]["tracking"];
-        assert!(tracking["rms_mm"].as_f64().unwrap() < 0.1, "{name}: {tracking}");
+fn recordings_play_and_are_tracked() {
+    let examples = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples");
+    for (scenario, recordings) in
+        [("patient.toml", ["jaw.csv", "patient.csv"]), ("markers.toml", ["markers.csv", "tracker.csv"])]
+    {
+        let scenario = fs::read_to_string(examples.join(scenario)).unwrap();
+        for name in recordings {
+            let workspace = Workspace::new(&scenario);
+            let output = workspace.run_virtual(&["--trajectory", examples.join(name).to_str().unwrap()]);
+            assert_eq!(output.status.code(), Some(0), "{name}: {}{}", stdout(&output), stderr(&output));
+            let tracking = &workspace.summary()["figures"]["tracking"];
+            assert!(tracking["rms_mm"].as_f64().unwrap() < 0.1, "{name}: {tracking}");
+            assert!(tracking["samples"].as_u64().unwrap() >= 2000, "{name}: {tracking}");
+        }
     }
 }
 
 /// Without turns, the platform is displaced as the jaw.
 #[test]
-fn what_is_wanted_at_a_time_of_the_motion_is_the_recordings_sample_of_that_time() {
+fn the_desired_pose_at_a_time_is_the_recordings_sample_of_that_time() {
     let lowered_m = |time_s: f64| -0.005 * (2.0 * time_s).sin().powi(2);
     let row = |i: u32| {
         let time_s = f64::from(i) / 100.0;
@@ -134,7 +150,7 @@ fn what_is_wanted_at_a_time_of_the_motion_is_the_recordings_sample_of_that_time(
     assert_eq!(workspace.run_virtual(&[]).status.code(), Some(0));
     let (run, out) = (workspace.run_folder(), workspace.file("csv"));
     let [run, out] = [&run, &out].map(|path| path.to_str().unwrap());
-    common::masseter(&["log", "export", run, "--topic", "state", "--out", out]);
+    common::masseter(&["recording", "export", run, "--topic", "state", "--out", out]);
 
     let table = fs::read_to_string(workspace.file("csv").join("state.csv")).unwrap();
     let (header, lines) = table.split_once('\n').unwrap();
@@ -158,7 +174,7 @@ fn what_is_wanted_at_a_time_of_the_motion_is_the_recordings_sample_of_that_time(
 }
 
 #[test]
-fn markers_whose_centroid_stands_for_the_incisal_point_are_told_of_once_the_jaw_turns() {
+fn a_warning_says_that_the_centroid_of_the_markers_is_used_where_the_jaw_turns() {
     // One marker in the axis of the turn, which is that of the condyles.
     let row = |i: u32, largest_deg: f64| {
         let time_s = f64::from(i) / 100.0;
@@ -181,7 +197,7 @@ fn markers_whose_centroid_stands_for_the_incisal_point_are_told_of_once_the_jaw_
 
 /// The example's piece of food yields at 35 N.
 #[test]
-fn food_resists_the_jaw_and_the_platform_still_goes_where_it_should() {
+fn food_resists_the_jaw_and_the_platform_still_follows() {
     let workspace = Workspace::new("duration_s = 3.0\n[food]");
     let output = workspace.run_virtual(&[]);
     assert_eq!(output.status.code(), Some(0), "{}", stdout(&output));
@@ -199,7 +215,7 @@ fn another_builders_mechanism_runs() {
 
 /// A velocity loop far too stiff for the step that it is integrated with.
 #[test]
-fn a_plant_that_fails_is_a_death_as_in_real_time_and_is_told_again() {
+fn a_plant_that_fails_is_reported_as_dead_by_the_run_and_by_report() {
     let workspace = Workspace::new(
         "[drives.leg]\nvelocity_gain_n_s_per_m = 6e7\nrated_force_n = 1e7\nmax_force_n = 1e8\nfollowing_error_m = 1.0",
     );
@@ -239,7 +255,7 @@ fn a_check_that_fails_fails_the_run() {
 }
 
 #[test]
-fn a_report_can_be_made_again_and_a_cut_recording_is_said_to_be_cut() {
+fn a_report_can_be_made_again_and_says_that_a_recording_is_cut() {
     let workspace = Workspace::new("duration_s = 2.0");
     assert_eq!(workspace.run_virtual(&[]).status.code(), Some(0));
     let folder = workspace.run_folder();

@@ -1,11 +1,12 @@
 //! The rig's controller: forward kinematics, jaw trajectories, pose control and safety.
 //!
-//! [`core`] is a pure step function; [`process`] binds it to iceoryx2 and to real time. It never
+//! [`motion_controller`] and [`hold_position`] are pure step functions; [`process`] runs one of them. It never
 //! sees the plant, only its messages.
 
-pub mod core;
 mod delivery;
+pub mod hold_position;
 pub mod kinematics;
+pub mod motion_controller;
 mod playback;
 mod pose_control;
 pub mod process;

@@ -1,29 +1,28 @@
-//! The controller's process: binds the pure core to iceoryx2 and to real time, and decides nothing.
+//! The controller's process: which controller runs, and how it is built from a scenario.
 
-use masseter_shared::clock;
+use masseter_shared::config::Scenario;
+use masseter_shared::control::{Outcome, process};
 use masseter_shared::geometry::{GeometryError, Mechanism};
 use masseter_shared::lifecycle::{Assignment, ProcessError};
-use masseter_shared::messages::codes::ControllerState;
-use masseter_shared::messages::{Command, Event, Reading, State};
-use masseter_shared::realtime::{Cycle, Waiter, Wake};
-use masseter_shared::transport::{Inlet, Node, Outlet};
 
-use crate::core::{Controller, Tick};
+use crate::hold_position::HoldPosition;
+use crate::motion_controller::MotionController;
 use crate::trajectory::{Trajectory, TrajectoryError};
 
-/// How the controller's part ended.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Outcome {
-    /// The motion was played, or stopped on request, and the drives are off.
-    Finished,
-    /// A fault ended it.
-    SafeStop,
+/// The controllers of this crate.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Kind {
+    /// Plays the scenario's motion.
+    #[default]
+    Motion,
+    /// Holds the position found at the start, for as long as the motion takes.
+    Hold,
 }
 
-/// Why the controller could not do its work.
+/// Why a controller could not be built or could not run.
 #[derive(Debug, thiserror::Error)]
 pub enum ControllerError {
-    /// What any process may meet.
+    /// The start of the process, or its messages.
     #[error(transparent)]
     Process(#[from] ProcessError),
     /// The mechanism's dimensions.
@@ -34,99 +33,25 @@ pub enum ControllerError {
     Trajectory(#[from] TrajectoryError),
 }
 
-/// The controller's ports.
-struct Ports {
-    readings: Inlet<Reading>,
-    commands: Outlet<Command>,
-    states: Outlet<State>,
-    events: Outlet<Event>,
-}
-
-impl Ports {
-    fn open(node: &Node) -> Result<Self, ProcessError> {
-        let ports = Self {
-            readings: node.newest_inlet()?,
-            commands: node.outlet()?,
-            states: node.outlet()?,
-            events: node.outlet()?,
-        };
-        ports.commands.warm_up()?;
-        ports.states.warm_up()?;
-        ports.events.warm_up()?;
-        Ok(ports)
-    }
-
-    /// Once everybody's ports are there, so that no cycle has to.
-    fn connect(&self) -> Result<(), ProcessError> {
-        self.readings.connect()?;
-        self.commands.connect()?;
-        self.states.connect()?;
-        Ok(self.events.connect()?)
+/// Runs a controller until it is done.
+///
+/// # Errors
+/// [`ControllerError`] when the scenario cannot be used, or the process cannot start or loses its messages.
+pub fn run(assignment: &Assignment, kind: Kind) -> Result<Outcome, ControllerError> {
+    match kind {
+        Kind::Motion => process::run(assignment, |scenario| {
+            let (mechanism, trajectory) = motion(scenario)?;
+            Ok(MotionController::new(scenario, mechanism, trajectory))
+        }),
+        Kind::Hold => process::run(assignment, |scenario| {
+            let (mechanism, trajectory) = motion(scenario)?;
+            Ok(HoldPosition::new(scenario, mechanism, trajectory.duration_s()))
+        }),
     }
 }
 
-/// Runs the controller until its part is done.
-pub fn run(assignment: &Assignment) -> Result<Outcome, ControllerError> {
-    let post = assignment.take_up()?;
-    let (scenario, schedule) = (&post.scenario, &post.schedule);
+fn motion(scenario: &Scenario) -> Result<(Mechanism, Trajectory), ControllerError> {
     let mechanism = Mechanism::new(&scenario.mechanism)?;
     let trajectory = Trajectory::new(&scenario.motion, &scenario.jaw, &mechanism, scenario.duration_s)?;
-    let mut controller = Controller::new(scenario, mechanism, trajectory);
-    let mut ports = Ports::open(&post.node)?;
-    let start = post.ready_on(scenario.realtime.cores[0])?;
-    ports.connect()?;
-
-    let mut cycle = Cycle::new(start.epoch_ns + schedule.controller_at_ns, scenario.period_ns());
-    let patience_ns = (schedule.command_by_ns - schedule.controller_at_ns) / 2;
-    while !controller.is_done() {
-        if post.stop.is_made() {
-            controller.request_stop();
-        }
-        let wake = cycle.wait_preparing(|| rehearse(&controller, &ports))?;
-        step(&mut controller, &mut ports, wake, patience_ns, cycle.waiter())?;
-    }
-    match controller.state() {
-        ControllerState::SafeStop => Ok(Outcome::SafeStop),
-        _ => Ok(Outcome::Finished),
-    }
-}
-
-/// What the cycle to come will do, without effect: after a sleep its code and data are no longer in the caches.
-fn rehearse(controller: &Controller, ports: &Ports) -> Result<(), ProcessError> {
-    std::hint::black_box(controller.rehearsal());
-    ports.commands.warm_up()?;
-    ports.states.warm_up()?;
-    Ok(())
-}
-
-/// One cycle.
-fn step(
-    controller: &mut Controller,
-    ports: &mut Ports,
-    wake: Wake,
-    patience_ns: u64,
-    waiter: &mut Waiter,
-) -> Result<(), ProcessError> {
-    let deadline_ns = wake.due_ns + patience_ns;
-    let reading = ports.readings.latest_by(deadline_ns, waiter, |reading| reading.cycle >= wake.cycle)?;
-    let received_ns = clock::now_ns();
-    controller.observe(reading.as_deref());
-    let solved_ns = clock::now_ns();
-    let event = controller.decide(Tick { cycle: wake.cycle, now_ns: solved_ns });
-    let commanded_ns = clock::now_ns();
-    ports.commands.publish(|command| controller.fill_command(command))?;
-    ports.states.publish(|state| {
-        controller.fill_state(state);
-        (state.due_ns, state.woke_ns) = (wake.due_ns, wake.woke_ns);
-        (state.skipped_cycles, state.stalled_ns) = (wake.skipped, wake.account.stalled_ns);
-        (state.spun_ns, state.worked_ns) = (wake.account.spun_ns, wake.account.worked_ns);
-        state.overlong_ns = wake.account.overlong_ns;
-        (state.received_ns, state.solved_ns, state.commanded_ns) = (received_ns, solved_ns, commanded_ns);
-    })?;
-    if let Some(event) = event {
-        ports.events.publish(|message| *message = event)?;
-    }
-    // Behind the command, where nobody waits.
-    controller.foresee();
-    Ok(())
+    Ok((mechanism, trajectory))
 }

@@ -1,12 +1,12 @@
 //! The controller's sequence as a table: which state follows when something happens.
 //!
-//! What makes something happen is judged elsewhere ([`core`](crate::core)); here is only what follows.
+//! What makes something happen is judged elsewhere ([`motion_controller`](crate::motion_controller)); here is only what follows.
 
 use masseter_shared::messages::codes::ControllerState as State;
 
 /// What can move the sequence on. In one cycle only the most urgent counts: the last in this order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Happening {
+pub enum Trigger {
     /// Enough complete readings in a row, and a pose found.
     Steady,
     /// All drives in operation enabled.
@@ -25,8 +25,8 @@ pub enum Happening {
     Fault,
 }
 
-impl Happening {
-    /// Every happening, in order of urgency.
+impl Trigger {
+    /// Every trigger, in order of urgency.
     pub const ALL: [Self; 8] = [
         Self::Steady,
         Self::Enabled,
@@ -41,7 +41,7 @@ impl Happening {
 
 use State::{Disabling, Easing, Enabling, Finished, Holding, Running, SafeStop, WaitReadings};
 
-/// One row a state in the order of the codes, one column a happening; a state that stands in its own
+/// One row a state in the order of the codes, one column a trigger; a state that stands in its own
 /// row stays.
 #[rustfmt::skip]
 const TABLE: [[State; 8]; 8] = [
@@ -56,9 +56,9 @@ const TABLE: [[State; 8]; 8] = [
     [SafeStop,     SafeStop,     SafeStop,     SafeStop,     SafeStop,     SafeStop,     SafeStop,     SafeStop],
 ];
 
-/// The state that follows `state` when `happening` happens.
-pub fn next(state: State, happening: Happening) -> State {
-    TABLE[state as usize][happening as usize]
+/// The state that follows `state` when `trigger` happens.
+pub fn next(state: State, trigger: Trigger) -> State {
+    TABLE[state as usize][trigger as usize]
 }
 
 #[cfg(test)]
@@ -66,43 +66,43 @@ mod tests {
     use super::*;
 
     /// Every pair that changes the state; all others must leave it.
-    const MOVES: [(State, Happening, State); 16] = [
-        (WaitReadings, Happening::Steady, Enabling),
-        (WaitReadings, Happening::StopRequested, Finished),
-        (WaitReadings, Happening::Fault, SafeStop),
-        (Enabling, Happening::Enabled, Easing),
-        (Enabling, Happening::StopRequested, Disabling),
-        (Enabling, Happening::Fault, SafeStop),
-        (Easing, Happening::Eased, Running),
-        (Easing, Happening::StopRequested, Holding),
-        (Easing, Happening::Fault, SafeStop),
-        (Running, Happening::Played, Holding),
-        (Running, Happening::StopRequested, Holding),
-        (Running, Happening::Fault, SafeStop),
-        (Holding, Happening::Rested, Disabling),
-        (Holding, Happening::Fault, SafeStop),
-        (Disabling, Happening::Released, Finished),
-        (Disabling, Happening::Fault, SafeStop),
+    const MOVES: [(State, Trigger, State); 16] = [
+        (WaitReadings, Trigger::Steady, Enabling),
+        (WaitReadings, Trigger::StopRequested, Finished),
+        (WaitReadings, Trigger::Fault, SafeStop),
+        (Enabling, Trigger::Enabled, Easing),
+        (Enabling, Trigger::StopRequested, Disabling),
+        (Enabling, Trigger::Fault, SafeStop),
+        (Easing, Trigger::Eased, Running),
+        (Easing, Trigger::StopRequested, Holding),
+        (Easing, Trigger::Fault, SafeStop),
+        (Running, Trigger::Played, Holding),
+        (Running, Trigger::StopRequested, Holding),
+        (Running, Trigger::Fault, SafeStop),
+        (Holding, Trigger::Rested, Disabling),
+        (Holding, Trigger::Fault, SafeStop),
+        (Disabling, Trigger::Released, Finished),
+        (Disabling, Trigger::Fault, SafeStop),
     ];
 
     #[test]
     fn every_pair_moves_as_specified_and_no_other_moves() {
         for &state in State::ALL {
-            for happening in Happening::ALL {
-                let specified = MOVES.iter().find(|(from, when, _)| (*from, *when) == (state, happening));
+            for trigger in Trigger::ALL {
+                let specified = MOVES.iter().find(|(from, when, _)| (*from, *when) == (state, trigger));
                 let expected = specified.map_or(state, |(_, _, to)| *to);
-                assert_eq!(next(state, happening), expected, "{state} on {happening:?}");
+                assert_eq!(next(state, trigger), expected, "{state} on {trigger:?}");
             }
         }
     }
 
     #[test]
     fn a_safe_stop_is_never_left_and_every_moving_state_reaches_it() {
-        for happening in Happening::ALL {
-            assert_eq!(next(SafeStop, happening), SafeStop);
+        for trigger in Trigger::ALL {
+            assert_eq!(next(SafeStop, trigger), SafeStop);
         }
         for state in [WaitReadings, Enabling, Easing, Running, Holding, Disabling] {
-            assert_eq!(next(state, Happening::Fault), SafeStop);
+            assert_eq!(next(state, Trigger::Fault), SafeStop);
         }
     }
 }

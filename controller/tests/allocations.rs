@@ -6,10 +6,11 @@ use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 use std::hint::black_box;
 
-use masseter_controller::core::{Controller, Tick};
 use masseter_controller::kinematics::{ForwardTracker, Options, Solutions, solve_newton, solve_published};
+use masseter_controller::motion_controller::MotionController;
 use masseter_controller::trajectory::Trajectory;
 use masseter_shared::config::Scenario;
+use masseter_shared::control::{Controller, Tick};
 use masseter_shared::geometry::{AXES, Actuators, LEGS, Mechanism, MechanismConfig};
 use masseter_shared::messages::codes::{ControllerState, DriveRequest, DriveState};
 use masseter_shared::messages::{Command, Reading, State};
@@ -46,17 +47,17 @@ fn allocations_of(work: impl FnOnce()) -> u64 {
 
 /// Drives that are where they were told to be, from the wait for readings until the motion is played.
 #[test]
-fn no_cycle_of_the_controller_allocates_nor_does_its_rehearsal() {
+fn no_cycle_of_the_controller_allocates() {
     let scenario = Scenario { duration_s: Some(0.5), ..Scenario::default() };
     let mechanism = Mechanism::new(&scenario.mechanism).unwrap();
     let trajectory =
         Trajectory::new(&scenario.motion, &scenario.jaw, &mechanism, scenario.duration_s).unwrap();
     let start = Actuators { slide_m: [0.0; LEGS], leg_m: [0.29; LEGS] }.to_axes();
-    let mut controller = Controller::new(&scenario, mechanism, trajectory);
+    let mut controller = MotionController::new(&scenario, mechanism, trajectory);
     let (mut reading, mut command, mut state) = (Reading::default(), Command::default(), State::default());
     let cycling = allocations_of(|| {
         for cycle in 1..=3000 {
-            black_box(controller.rehearsal());
+            controller.warm_up();
             let is_driven = command.request == DriveRequest::Enable.code();
             reading = Reading {
                 cycle,

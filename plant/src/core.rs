@@ -1,30 +1,51 @@
-//! The plant as one pure step function: master, wires, drives and mechanism, moved by the times that
-//! are passed in.
+//! The plant as a pure step function: master, wires, drives and mechanism.
 //!
-//! A cycle is [`PlantCore::begin_cycle`], [`PlantCore::collect`] until the process data are in,
-//! [`PlantCore::fill_reading`] and [`PlantCore::truth`], then [`PlantCore::apply`]. Called with irregular
-//! times, as real time has them, or with exact ones.
+//! Time is an argument of every call, exact or as irregular as real time. The core reads no clock and publishes nothing;
+//! the [process](crate::process) does.
+
+mod wire_events;
 
 use masseter_can::canopen::Cob;
 use masseter_can::{ReceiveError, Tapped};
 use masseter_shared::config::Scenario;
-use masseter_shared::messages::tap;
-use masseter_shared::messages::{Command, Event, FrameTap, Reading, Truth};
+use masseter_shared::messages::{Command, Event, FrameTap, Reading, Truth, tap};
 use masseter_shared::realtime::Wake;
 
-use crate::build::{build_master, build_sockets, build_virtual};
-use crate::checks::check_boot_time;
+use crate::emulation::VirtualLink;
 pub use crate::error::PlantError;
 use crate::journal::Journal;
-use crate::link::{Link, VirtualLink};
-use crate::master::Master;
-use crate::socket_link::SocketLink;
-use crate::wire_events;
+use crate::link::Link;
+use crate::link::sockets::SocketLink;
+use crate::master::{Master, shortest_boot};
 
-/// Tapped frames kept between two drains; a drain follows every cycle.
+/// Tapped frames kept between two drains, of which one follows every cycle.
 const TAPPED: usize = 4096;
 
-/// The plant's whole memory.
+/// The plant.
+///
+/// A cycle is [`begin_cycle`](Self::begin_cycle), [`collect`](Self::collect) until the process data are in,
+/// [`fill_reading`](Self::fill_reading) and [`truth`](Self::truth), then [`apply`](Self::apply). `L` is its link to the
+/// drives: simulated wires with emulated drives, or real interfaces.
+///
+/// ```
+/// use masseter_plant::core::PlantCore;
+/// use masseter_shared::config::Scenario;
+/// use masseter_shared::messages::Reading;
+/// use masseter_shared::realtime::Wake;
+///
+/// let mut plant = PlantCore::new(&Scenario::default(), 0)?;
+/// let mut reading = Reading::default();
+/// for cycle in 1..=100 {
+///     let sync_ns = (cycle - 1) * 1_000_000;
+///     plant.begin_cycle(Wake::on_time(cycle, sync_ns))?;
+///     plant.collect(sync_ns + 525_000)?;
+///     plant.fill_reading(&mut reading);
+///     plant.apply(sync_ns + 545_000, None)?;
+/// }
+/// let truth = plant.truth().expect("the mechanism is emulated");
+/// assert_eq!((reading.cycle, truth.cycle), (100, 100));
+/// # Ok::<_, masseter_plant::PlantError>(())
+/// ```
 #[derive(Debug)]
 pub struct PlantCore<L = VirtualLink> {
     master: Master,
@@ -40,21 +61,34 @@ pub struct PlantCore<L = VirtualLink> {
 impl PlantCore {
     /// The scenario's plant with emulated drives on simulated wires, switched on at `now_ns`.
     pub fn new(scenario: &Scenario, now_ns: u64) -> Result<Self, PlantError> {
-        Self::on(build_virtual(scenario, 0, now_ns)?, scenario, now_ns)
+        Self::with_link(VirtualLink::new(scenario, 0, now_ns)?, scenario, now_ns)
     }
 }
 
 impl PlantCore<SocketLink> {
-    /// The scenario's plant on the real interfaces that it names, with whatever drives are there.
+    /// The scenario's plant on the real interfaces that it names.
     pub fn on_interfaces(scenario: &Scenario, now_ns: u64) -> Result<Self, PlantError> {
-        Self::on(build_sockets(scenario, now_ns)?, scenario, now_ns)
+        Self::with_link(SocketLink::open(scenario, now_ns)?, scenario, now_ns)
     }
 }
 
-/// Refuses a scenario whose plant cannot be built or booted, whatever its wires are.
+/// Refuses a scenario whose plant cannot be built or booted, on simulated or real wires.
 pub fn check(scenario: &Scenario) -> Result<(), PlantError> {
     PlantCore::new(scenario, 0)?;
     check_boot_time(scenario)
+}
+
+/// The drives must be able to boot within the controller's time: every bus carries one SDO exchange a cycle, and then
+/// the readings must be steady for some cycles.
+fn check_boot_time(scenario: &Scenario) -> Result<(), PlantError> {
+    let Scenario { can, controller, rate_hz, .. } = scenario;
+    let fullest = can.buses.iter().map(Vec::len).max().unwrap_or(0);
+    let cycles = shortest_boot(scenario) * fullest + controller.steady_readings as usize;
+    let least_s = cycles as f64 * scenario.period_s();
+    if controller.start_timeout_s > least_s {
+        return Ok(());
+    }
+    Err(PlantError::BootTime { start_timeout_s: controller.start_timeout_s, rate_hz: *rate_hz, least_s })
 }
 
 /// Refuses interfaces that cannot be used.
@@ -63,9 +97,9 @@ pub fn check_interfaces(scenario: &Scenario) -> Result<(), PlantError> {
 }
 
 impl<L: Link> PlantCore<L> {
-    fn on(link: L, scenario: &Scenario, now_ns: u64) -> Result<Self, PlantError> {
+    fn with_link(link: L, scenario: &Scenario, now_ns: u64) -> Result<Self, PlantError> {
         Ok(Self {
-            master: build_master(scenario, now_ns)?,
+            master: Master::new(scenario, now_ns)?,
             link,
             buses: scenario.can.buses.len(),
             cycle: 0,
@@ -75,9 +109,14 @@ impl<L: Link> PlantCore<L> {
         })
     }
 
-    /// Lets time pass. What happens in it is worked out now, not when the next cycle begins.
+    /// Simulates everything up to `now_ns` now, instead of when the next cycle begins.
     pub fn advance(&mut self, now_ns: u64) -> Result<(), PlantError> {
         Ok(self.link.advance(now_ns)?)
+    }
+
+    /// The wires.
+    pub(crate) fn link(&mut self) -> &mut L {
+        &mut self.link
     }
 
     /// Begins a cycle: SYNC.
@@ -89,20 +128,21 @@ impl<L: Link> PlantCore<L> {
         Ok(())
     }
 
-    /// Lets time pass and takes what has arrived; whether the process data of all drives are in.
+    /// Simulates everything up to `now_ns` and takes the frames that have arrived; returns whether the process data of all
+    /// drives are in.
     pub fn collect(&mut self, now_ns: u64) -> Result<bool, PlantError> {
         self.link.advance(now_ns)?;
         self.collect_taps(now_ns);
         Ok(self.master.collect(now_ns, &mut self.link))
     }
 
-    /// The cycle's reading.
+    /// Writes the cycle's reading.
     pub fn fill_reading(&self, reading: &mut Reading) {
         self.master.fill_reading(reading);
         reading.command_sent_ns = self.command_sent_ns;
     }
 
-    /// What the mechanism really did at the cycle's SYNC, where it is emulated here.
+    /// The mechanism's true motion at the cycle's SYNC, where it is emulated here.
     pub fn truth(&self) -> Option<Truth> {
         self.link.truth().map(|truth| Truth { cycle: self.cycle, ..truth })
     }
@@ -124,17 +164,17 @@ impl<L: Link> PlantCore<L> {
         self.master.stop();
     }
 
-    /// Whether no drive reports voltage; a lost one reports nothing.
+    /// Whether no drive reports voltage; a lost drive reports nothing.
     pub fn drives_are_off(&self) -> bool {
         self.master.drives_are_off()
     }
 
-    /// Hands out what was seen on the wires since the last drain. The messages are made only now, behind the reading.
+    /// Hands out the frames and errors tapped since the last drain. They are encoded only now, after the reading.
     pub fn drain_frames(&mut self) -> impl ExactSizeIterator<Item = FrameTap> {
         self.tapped.drain(..).map(|(bus, tapped)| tap::encode(bus, &tapped))
     }
 
-    /// Hands out what happened since the last drain.
+    /// Hands out the events since the last drain.
     pub fn drain_events(&mut self, out: &mut impl FnMut(Event)) {
         self.wire_events.drain(out);
         self.master.drain_events(out);
@@ -151,7 +191,7 @@ impl<L: Link> PlantCore<L> {
             }
             while let Some(note) = self.link.next_note(bus, now_ns) {
                 let axis = note.port.and_then(|port| self.link.axis_at(bus, port));
-                self.wire_events.add(wire_events::of_note(&note, bus, axis, self.cycle));
+                self.wire_events.add(wire_events::from_note(&note, bus, axis, self.cycle));
             }
         }
     }
@@ -165,7 +205,7 @@ impl<L: Link> PlantCore<L> {
             },
             Tapped::Error(report) => {
                 let axis = self.link.axis_at(bus, usize::from(report.port));
-                if let Some(event) = wire_events::of_report(report, bus, axis, self.cycle) {
+                if let Some(event) = wire_events::from_report(report, bus, axis, self.cycle) {
                     self.wire_events.add(event);
                 }
             }

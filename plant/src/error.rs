@@ -1,13 +1,13 @@
-//! Why a plant cannot be built or cannot go on.
+//! Errors of the plant: every reason why it cannot be built or cannot continue.
 
 use masseter_can::NotByPort;
 use masseter_can::canopen::{NodeId, NodeIdError};
 use masseter_can::{BitrateError, OpenError};
-use masseter_shared::geometry::{AXIS_NAMES, GeometryError, LimitViolation};
+use masseter_shared::geometry::{AXIS_NAMES, GeometryError};
 
-use crate::dynamics::DynamicsError;
+use crate::mechanism::DynamicsError;
 
-/// A plant that cannot be built or cannot go on.
+/// A plant that cannot be built or cannot continue.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum PlantError {
     /// The mechanism's dimensions.
@@ -31,7 +31,7 @@ pub enum PlantError {
     /// A node id out of range.
     #[error("can.node_ids: {0}")]
     NodeId(#[from] NodeIdError),
-    /// Two nodes of one id.
+    /// Two nodes with one id.
     #[error(
         "can.node_ids: node {id} stands twice, or is the master's ({}); give every drive its own",
         NodeId::MASTER
@@ -40,12 +40,12 @@ pub enum PlantError {
         /// The id.
         id: u8,
     },
-    /// An axis on no bus, on two, or of no such number.
+    /// An axis on no bus or on two, or an unknown axis.
     #[error("can.buses: axis {axis} is named {times} times; name each of the axes 0 to 5 ({axes}) once", axes = AXIS_NAMES.join(" "))]
     Axis {
         /// The axis.
         axis: usize,
-        /// How often it is named.
+        /// The number of times it is named.
         times: usize,
     },
     /// A bus without a drive.
@@ -56,38 +56,28 @@ pub enum PlantError {
         /// The bus.
         bus: usize,
     },
-    /// A fault of a node that is not there.
+    /// A fault of a node that is not on its bus.
     #[error("faults.node = {node}: bus {bus} has the nodes {present}")]
     FaultNode {
         /// The node named.
         node: u8,
         /// The bus named.
         bus: usize,
-        /// Who is on it.
+        /// The nodes on it.
         present: String,
     },
     /// A fault that needs a simulated wire.
     #[error("faults: {0}")]
     NotByPort(#[from] NotByPort),
-    /// A quantity that does not go with the others.
+    /// A quantity that contradicts others.
     #[error("{key} = {value}: {need}")]
     Quantity {
         /// The key.
         key: &'static str,
-        /// What stands there.
+        /// Its value.
         value: f64,
-        /// What may stand there.
+        /// The values allowed, and the remedy.
         need: &'static str,
-    },
-    /// Legs on which the platform cannot stand level within the strokes.
-    #[error(
-        "dynamics.initial_leg_m = {initial_leg_m}: {violation}; the rig must be switched on level within its strokes"
-    )]
-    Start {
-        /// Length of the legs, m.
-        initial_leg_m: f64,
-        /// What is outside.
-        violation: LimitViolation,
     },
     /// Drives that cannot boot in time.
     #[error(
@@ -95,11 +85,11 @@ pub enum PlantError {
          carries one SDO request a cycle; use more, or a higher rate_hz"
     )]
     BootTime {
-        /// How long they may take, s.
+        /// The time they may take, s.
         start_timeout_s: f64,
         /// Cycles per second.
         rate_hz: u32,
-        /// How long they take at least, s.
+        /// The shortest time they take, s.
         least_s: f64,
     },
 }

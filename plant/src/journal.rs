@@ -1,9 +1,9 @@
-//! Events waiting to be published: a bounded list that counts what it has no room for.
+//! Events that wait to be published: a bounded list that counts the events it has no room for.
 
 use masseter_shared::messages::Event;
 use masseter_shared::messages::codes::{Cause, EventKind, Source};
 
-/// Events kept between two drains; a drain follows every cycle.
+/// Events kept between two drains, of which one follows every cycle.
 const CAPACITY: usize = 256;
 
 /// The list.
@@ -14,10 +14,12 @@ pub(crate) struct Journal {
 }
 
 impl Journal {
+    /// An empty list.
     pub(crate) fn new() -> Self {
         Self { events: Vec::with_capacity(CAPACITY), lost: 0 }
     }
 
+    /// Adds an event, or counts it.
     pub(crate) fn add(&mut self, event: Event) {
         if self.events.len() < CAPACITY {
             self.events.push(event);
@@ -26,7 +28,7 @@ impl Journal {
         }
     }
 
-    /// Hands out the events, and at the end how many had no room.
+    /// Hands out the events, and then the number of those without room.
     pub(crate) fn drain(&mut self, out: &mut impl FnMut(Event)) {
         let last = self.events.last().copied();
         self.events.drain(..).for_each(&mut *out);
@@ -37,7 +39,7 @@ impl Journal {
     }
 }
 
-/// So many items of a full buffer were lost.
+/// The event that a full buffer has lost items.
 pub(crate) fn overflow(time_ns: u64, cycle: u64, lost: u64) -> Event {
     let value = lost as f64;
     Event { time_ns, cycle, value, ..Event::new(Source::Master, EventKind::Notice, Cause::Overflow) }
@@ -48,7 +50,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_has_no_room_is_counted_and_told() {
+    fn events_without_room_are_counted_and_reported() {
         let mut journal = Journal::new();
         for cycle in 0..300 {
             journal.add(Event { cycle, ..Event::new(Source::Master, EventKind::Notice, Cause::Sequence) });

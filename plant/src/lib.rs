@@ -1,34 +1,31 @@
 //! The rig's plant: CAN master, emulated CiA 402 drives and the mechanism they move.
 //!
-//! [`core`] is a pure step function; [`process`] binds it to iceoryx2 and to real time; [`emulator`] puts the
-//! drives on real wires. It never sees
-//! the controller, and never solves the forward kinematics: its truth is the integrated mechanism.
+//! | module | holds | depends on |
+//! | --- | --- | --- |
+//! | `mechanism` | dynamics, friction, food, poses at rest | |
+//! | `link` | traits between master and wires, real interfaces, layout of the buses | `mechanism` (its errors) |
+//! | `drive` | an emulated drive: node (CiA 301), axis (CiA 402), object dictionary | `link` (layout) |
+//! | `master` | boot, exchange, supervision of the drives | `link` |
+//! | [`emulation`] | drives and mechanism on simulated wires or real interfaces | `drive`, `mechanism`, `link` |
+//! | [`description`] | EDS and DBC of the emulated drives | `drive` |
+//! | [`core`] | master and link as one pure step function | `master`, `emulation`, `link` |
+//! | [`process`] | the core bound to iceoryx2 and to real time | [`core`] |
+//!
+//! Between master and drives there are frames on a bus and nothing else. The plant never sees the controller and never
+//! solves the forward kinematics: its truth is the integrated mechanism.
 
-mod build;
 mod checks;
-mod claim;
 pub mod core;
+pub mod cycle;
 pub mod description;
 mod drive;
-mod dynamics;
-mod emulation;
-pub mod emulator;
-mod encoder;
+pub mod emulation;
 mod error;
-mod expectation;
-mod faults;
-mod food;
-mod friction;
 mod journal;
-mod layout;
 mod link;
 mod master;
-pub mod open_link;
+mod mechanism;
 pub mod process;
-mod rehearsal;
-mod resting;
-mod socket_link;
-mod wire_events;
 
-pub use dynamics::DynamicsError;
 pub use error::PlantError;
+pub use mechanism::DynamicsError;

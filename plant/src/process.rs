@@ -6,17 +6,22 @@ use masseter_shared::lifecycle::{Assignment, Post, ProcessError};
 use masseter_shared::messages::{Command, Event, FrameTap, Reading, Truth};
 use masseter_shared::realtime::{Cycle, Waiter, Wake};
 use masseter_shared::schedule::CycleSchedule;
-use masseter_shared::transport::{BatchOutlet, Inlet, Node, Outlet, Received};
+use masseter_shared::transport::{BatchOutlet, Inlet, Node, Outlet, Received, TransportError};
 
 use crate::core::{PlantCore, PlantError};
+use crate::cycle::{PlantPorts, run_cycle};
+use crate::emulation::VirtualLink;
 use crate::link::Link;
-use crate::rehearsal::Rehearsal;
+use crate::link::sockets::SocketLink;
 
 /// How long the drives may take to stop after the end has been asked for, ns.
 const STOP_WITHIN_NS: u64 = 500_000_000;
 /// Cycles that they may take at least: the word goes out in one, holds from the next, and is answered in the one after
 /// the ramp.
 const STOP_WITHIN_CYCLES: u64 = 10;
+/// How long a wait for a real frame may take at most, ns: a fault may hold frames back that are due before the next
+/// frame arrives.
+const LONGEST_BLOCK_NS: u64 = 100_000;
 /// Silence after which no command will come any more, beyond the one that stops the drives, ns.
 const ABANDONED_AFTER_NS: u64 = 5_000_000_000;
 
@@ -38,6 +43,12 @@ pub enum PlantProcessError {
     /// The plant itself.
     #[error(transparent)]
     Plant(#[from] PlantError),
+}
+
+impl From<TransportError> for PlantProcessError {
+    fn from(error: TransportError) -> Self {
+        Self::Process(error.into())
+    }
 }
 
 /// The plant's ports.
@@ -79,33 +90,14 @@ impl Ports {
         Ok(self.events.warm_up()?)
     }
 
-    /// The command of a cycle, or the newest one there is at `deadline_ns`.
-    fn command_of(
-        &self,
-        cycle: u64,
-        deadline_ns: u64,
-        waiter: &mut Waiter,
-    ) -> Result<Option<Received<Command>>, ProcessError> {
-        Ok(self.commands.latest_by(deadline_ns, waiter, |command| command.cycle >= cycle)?)
-    }
-
-    /// Publishes what a cycle gave: reading and truth first, since the controller waits.
-    fn publish(&mut self, plant: &mut PlantCore<impl Link>) -> Result<(), ProcessError> {
-        self.readings.publish(|reading| plant.fill_reading(reading))?;
-        if let Some(truth) = plant.truth() {
-            self.truths.publish(|message| *message = truth)?;
-        }
-        self.publish_frames_and_events(plant)
-    }
-
-    fn publish_frames_and_events(&mut self, plant: &mut PlantCore<impl Link>) -> Result<(), ProcessError> {
+    fn publish_frames_and_events(&mut self, plant: &mut PlantCore<impl Link>) -> Result<(), TransportError> {
         let mut result = self.frames.publish(plant.drain_frames());
         plant.drain_events(&mut |event| {
             if result.is_ok() {
                 result = self.events.publish(|message| *message = event);
             }
         });
-        Ok(result?)
+        result
     }
 }
 
@@ -113,83 +105,117 @@ impl Ports {
 pub fn run(assignment: &Assignment) -> Result<Reason, PlantProcessError> {
     let post = assignment.take_up()?;
     if post.scenario.can.is_virtual() {
-        let rehearsal = Rehearsal::of(&post.scenario, post.schedule)?;
-        serve(&post, PlantCore::new, rehearsal)
+        serve(&post, PlantCore::new)
     } else {
-        serve(&post, PlantCore::on_interfaces, None)
+        serve(&post, PlantCore::on_interfaces)
     }
 }
 
-fn serve<L: Link>(
+/// A link whose events a process can wait for in real time.
+trait RealTimeLink: Link {
+    /// Waits until the link may have changed, but not beyond `latest_ns`; returns the time found at the end.
+    fn wait(&mut self, latest_ns: u64, waiter: &mut Waiter) -> u64;
+}
+
+impl RealTimeLink for VirtualLink {
+    fn wait(&mut self, latest_ns: u64, waiter: &mut Waiter) -> u64 {
+        waiter.until_between(self.next_event_ns().min(latest_ns), latest_ns)
+    }
+}
+
+impl RealTimeLink for SocketLink {
+    fn wait(&mut self, latest_ns: u64, waiter: &mut Waiter) -> u64 {
+        let until_ns = latest_ns.min(clock::now_ns() + LONGEST_BLOCK_NS);
+        waiter.until_woken(until_ns, latest_ns, |until_ns| self.wait_for_frame(until_ns))
+    }
+}
+
+/// Ports and deadlines of the plant's process.
+struct RealTime<'a> {
+    ports: Ports,
+    cycle: Cycle,
+    schedule: &'a CycleSchedule,
+    /// Whether commands are obeyed; at the end they no longer are.
+    obeys: bool,
+}
+
+impl<L: RealTimeLink> PlantPorts<L> for RealTime<'_> {
+    type Command = Received<Command>;
+    type Error = PlantProcessError;
+
+    fn now_ns(&self) -> u64 {
+        clock::now_ns()
+    }
+
+    fn wait_until(&mut self, due_ns: u64, latest_ns: u64) -> u64 {
+        self.cycle.waiter().until_between(due_ns, latest_ns)
+    }
+
+    fn wait_for_frames(&mut self, link: &mut L, latest_ns: u64) -> u64 {
+        link.wait(latest_ns, self.cycle.waiter())
+    }
+
+    fn publish_reading(&mut self, fill: impl FnOnce(&mut Reading)) -> Result<(), PlantProcessError> {
+        Ok(self.ports.readings.publish(fill)?)
+    }
+
+    fn publish_truth(&mut self, truth: &Truth) -> Result<(), PlantProcessError> {
+        Ok(self.ports.truths.publish(|message| *message = *truth)?)
+    }
+
+    fn command(&mut self, wake: &Wake) -> Result<Option<Received<Command>>, PlantProcessError> {
+        if !self.obeys {
+            return Ok(None);
+        }
+        // No command can arrive before the controller wakes.
+        let command_by_ns = wake.due_ns + self.schedule.command_by_ns;
+        let waiter = self.cycle.waiter();
+        waiter.until_between(wake.due_ns + self.schedule.controller_at_ns, command_by_ns);
+        let is_awaited = |command: &Command| command.cycle >= wake.cycle;
+        Ok(self.ports.commands.latest_by(command_by_ns, waiter, is_awaited)?)
+    }
+
+    fn publish_frames_and_events(&mut self, plant: &mut PlantCore<L>) -> Result<(), PlantProcessError> {
+        Ok(self.ports.publish_frames_and_events(plant)?)
+    }
+}
+
+fn serve<L: RealTimeLink>(
     post: &Post,
     build: impl Fn(&Scenario, u64) -> Result<PlantCore<L>, PlantError>,
-    mut rehearsal: Option<Rehearsal>,
 ) -> Result<Reason, PlantProcessError> {
     let (scenario, schedule) = (&post.scenario, &post.schedule);
     let timeout_cycles = u64::from(scenario.can.command_timeout_cycles);
-    let patience_cycles = timeout_cycles + ABANDONED_AFTER_NS / scenario.period_ns();
+    let abandoned_cycles = timeout_cycles + ABANDONED_AFTER_NS / scenario.period_ns();
     // Built once before the start, so that a plant that cannot be built is never reported ready.
     build(scenario, 0)?;
-    let mut ports = Ports::open(&post.node)?;
+    let ports = Ports::open(&post.node)?;
     let start = post.ready_on(scenario.realtime.cores[1])?;
     ports.connect()?;
 
     let mut plant = build(scenario, start.epoch_ns)?;
-    let mut cycle = Cycle::new(start.epoch_ns, scenario.period_ns());
-    while !post.stop.is_made() && u64::from(plant.silent_cycles()) <= patience_cycles {
-        let wake = cycle.wait_preparing(|| {
-            prepare(&mut plant, &ports)?;
-            // One that fails is given up: all that is lost is warm caches.
-            rehearsal.take_if(|rehearsal| rehearsal.play().is_err());
-            Ok::<_, PlantProcessError>(())
-        })?;
-        exchange(&mut plant, &mut ports, schedule, wake, cycle.waiter())?;
-        // No command can come before the controller wakes.
-        cycle.waiter().until(wake.due_ns + schedule.controller_at_ns);
-        let deadline_ns = wake.due_ns + schedule.command_by_ns;
-        let command = ports.command_of(wake.cycle, deadline_ns, cycle.waiter())?;
-        plant.apply(clock::now_ns(), command.as_deref())?;
-        if let (Some(rehearsal), Some(command)) = (&mut rehearsal, command.as_deref()) {
-            rehearsal.hear(command);
-        }
+    let cycle = Cycle::new(start.epoch_ns, scenario.period_ns());
+    let mut real_time = RealTime { ports, cycle, schedule, obeys: true };
+    while !post.stop.is_made() && u64::from(plant.silent_cycles()) <= abandoned_cycles {
+        let RealTime { cycle, ports, .. } = &mut real_time;
+        let wake = cycle.wait_warm(|| warm_up(&mut plant, ports))?;
+        run_cycle(&mut plant, &mut real_time, schedule, &wake)?;
     }
     plant.stop();
+    real_time.obeys = false;
     let give_up_ns = clock::now_ns() + STOP_WITHIN_NS.max(STOP_WITHIN_CYCLES * scenario.period_ns());
     while !plant.drives_are_off() && clock::now_ns() < give_up_ns {
-        let wake = cycle.wait();
-        exchange(&mut plant, &mut ports, schedule, wake, cycle.waiter())?;
-        plant.apply(clock::now_ns(), None)?;
+        let wake = real_time.cycle.wait();
+        run_cycle(&mut plant, &mut real_time, schedule, &wake)?;
     }
     // The last cycle's process data are on the wire only by now.
-    plant.collect(cycle.wait().woke_ns)?;
-    ports.publish_frames_and_events(&mut plant)?;
+    plant.collect(real_time.cycle.wait().woke_ns)?;
+    real_time.ports.publish_frames_and_events(&mut plant)?;
     Ok(if post.stop.is_made() { Reason::Asked } else { Reason::Abandoned })
 }
 
-/// Works out what has happened by now, and brings the way out back into the caches.
-fn prepare(plant: &mut PlantCore<impl Link>, ports: &Ports) -> Result<(), PlantProcessError> {
+/// Works out what has happened on the wires by now, and touches the memory of the next messages.
+fn warm_up(plant: &mut PlantCore<impl Link>, ports: &Ports) -> Result<(), PlantProcessError> {
     plant.advance(clock::now_ns())?;
     Ok(ports.warm_up()?)
-}
-
-/// SYNC, the drives' process data, and what the cycle publishes.
-fn exchange(
-    plant: &mut PlantCore<impl Link>,
-    ports: &mut Ports,
-    schedule: &CycleSchedule,
-    wake: Wake,
-    waiter: &mut Waiter,
-) -> Result<(), PlantProcessError> {
-    plant.begin_cycle(wake)?;
-    // SYNC went out when the process woke; a late one shifts what follows, so that the reading is late
-    // but complete.
-    let reading_by_ns = wake.woke_ns + schedule.reading_by_ns;
-    // What the first frames bring about is worked out while the last ones are on their way.
-    let mut now_ns =
-        waiter.until_working(wake.woke_ns + schedule.reading_from_ns, |now_ns| plant.advance(now_ns))?;
-    // Collecting moves the mechanism: each look is work, not a part of one long wait.
-    while !plant.collect(now_ns)? && now_ns < reading_by_ns {
-        now_ns = waiter.spin().now_ns();
-    }
-    Ok(ports.publish(plant)?)
 }

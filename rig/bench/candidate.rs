@@ -8,7 +8,7 @@ use std::path::Path;
 use hdrhistogram::Histogram;
 use serde::Serialize;
 
-use masseter_analysis::hlog;
+use masseter_report::histogram_log;
 
 /// With fewer samples in a round, fewer than ten lie above its 99.9th percentile.
 const SAMPLES_FOR_P999: u64 = 10_000;
@@ -174,9 +174,13 @@ impl Candidate {
         let name = self.name.replace(|c: char| !c.is_ascii_alphanumeric(), "-");
         let path = folder.join(format!("{bench}-{name}.hlog"));
         let comment = format!("masseter bench {bench}: {}, ns, one line per round", self.name);
-        let starts_ns = (0..).step_by(hlog::INTERVAL_NS as usize);
+        let starts_ns = (0..).step_by(histogram_log::INTERVAL_NS as usize);
         let rounds = starts_ns.zip(&self.rounds);
-        hlog::write(&path, &comment, rounds.filter_map(|(start_ns, round)| Some((start_ns, round.as_ref()?))))
+        histogram_log::write(
+            &path,
+            &comment,
+            rounds.filter_map(|(start_ns, round)| Some((start_ns, round.as_ref()?))),
+        )
     }
 }
 

@@ -18,9 +18,9 @@ use super::candidate::{Candidate, Durations, Round, no_durations};
 use super::comparison::{Comparison, take_turns};
 use super::rate_summary::Summary;
 use crate::machine::interrupts::Interrupts;
-use masseter_analysis::hlog;
 use masseter_recording::Manifest;
 use masseter_recording::RunFolder;
+use masseter_report::histogram_log;
 
 /// The name in results.
 pub(super) const NAME: &str = "rate";
@@ -197,7 +197,7 @@ fn result(folder: &RunFolder) -> anyhow::Result<RunResult> {
     }
     let log = |(_, name): &(_, &str)| {
         let path = folder.histograms().join(format!("{name}.hlog"));
-        hlog::read(&path).with_context(|| format!("cannot read {}", path.display()))
+        histogram_log::read(&path).with_context(|| format!("cannot read {}", path.display()))
     };
     Ok(RunResult::Played { durations: INTERVALS.iter().map(log).collect::<anyhow::Result<_>>()?, shares })
 }

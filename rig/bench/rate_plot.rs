@@ -36,7 +36,7 @@ fn panels(comparison: &Comparison) -> [LineChart; 4] {
             Some(trip.shares.iter().find(|share| share.name == name)?.percent.median)
         })
     };
-    let cpu = ["controller", "plant", "logger"].map(|name| share(&format!("{name} CPU"), name));
+    let cpu = ["controller", "plant", "recorder"].map(|name| share(&format!("{name} CPU"), name));
     [
         panel(ROUND_TRIP, "µs", vec![percentile("p50"), percentile("p99")]),
         panel("CPU time of a core", "%", cpu.into()),

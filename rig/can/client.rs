@@ -1,20 +1,20 @@
 //! One client of the socketcand server: its connection, and its node on a bus.
 //!
-//! It blocks nobody: what cannot be written now is kept, up to a bound.
+//! The connection never blocks. Unsent text waits in a buffer of bounded size.
 
-use masseter_terminal::status;
 use std::fmt::Display;
 use std::io::{self, Read, Write};
 use std::net::TcpStream;
 
 use masseter_can::socketcand::{ECHO, GREETING, OK, Request, RequestError, Requests, write_frame};
 use masseter_can::{Bus, ReceiveError};
-use masseter_plant::open_link::{NodePort, OpenLink};
+use masseter_plant::emulation::{NodePort, OpenLink};
+use masseter_terminal::status;
 
-/// Text that waits for a client to read it; a bus at full load makes about 0.5 MB a second.
-const BACKLOG: usize = 1 << 20;
-/// Frames are held back so long after the mode was granted: clients read the answer as a packet of its own.
-const SETTLING_NS: u64 = 20_000_000;
+/// Most unsent bytes of a client; a bus at full load makes about 0.5 MB a second.
+const MAX_UNSENT: usize = 1 << 20;
+/// Delay of frames after the answer to a change of mode: clients expect that answer in a packet of its own, ns.
+const MODE_DELAY_NS: u64 = 20_000_000;
 
 /// A connected client.
 #[derive(Debug)]
@@ -26,48 +26,48 @@ pub(super) struct Client {
     frames_from_ns: Option<u64>,
 }
 
-/// Why a connection ends.
+/// Why a connection is closed.
 #[derive(Debug, thiserror::Error)]
-enum Farewell {
+enum CloseReason {
     #[error("closed")]
     Closed,
     #[error(transparent)]
     Io(#[from] io::Error),
     #[error(transparent)]
     Request(#[from] RequestError),
-    #[error("no bus `{name}`, or no place left on it; there are {buses} buses, from can0 on")]
+    #[error("no bus `{name}`, or no place left on it; the buses are can0 to can{}", .buses - 1)]
     NoPlace { name: String, buses: usize },
-    #[error("one bus a connection: open another connection for another bus")]
+    #[error("a connection opens one bus: use another connection for another bus")]
     OpenTwice,
-    #[error("{0} bytes wait to be read")]
+    #[error("it reads too slowly: {0} bytes are unread")]
     TooSlow(usize),
 }
 
 impl Client {
-    /// Takes a connection.
-    pub(super) fn greet(stream: TcpStream) -> io::Result<Self> {
+    /// Greets a new client.
+    pub(super) fn accept(stream: TcpStream) -> io::Result<Self> {
         stream.set_nonblocking(true)?;
         stream.set_nodelay(true)?;
         let unsent = GREETING.as_bytes().to_vec();
         Ok(Self { stream, requests: Requests::default(), unsent, node: None, frames_from_ns: None })
     }
 
-    /// The connection, to wait for.
+    /// The connection, for polling.
     pub(super) fn stream(&self) -> &TcpStream {
         &self.stream
     }
 
-    /// Does what it asks and hands it what it received; whether it stays.
+    /// Answers requests and sends received frames; false once the connection is closed.
     pub(super) fn serve(&mut self, link: &mut OpenLink, now_ns: u64) -> bool {
         let served = self.read_requests().and_then(|()| {
             self.answer(link, now_ns)?;
-            self.collect(link, now_ns);
+            self.queue_frames(link, now_ns);
             self.write_unsent()
         });
         let Err(reason) = served else { return true };
-        if !matches!(reason, Farewell::Closed) {
+        if !matches!(reason, CloseReason::Closed) {
             status!("a client is disconnected: {reason}");
-            // It may be gone already.
+            // The client may have closed its end already.
             self.refuse(&reason);
             let _ = self.write_unsent();
         }
@@ -77,10 +77,10 @@ impl Client {
         false
     }
 
-    fn read_requests(&mut self) -> Result<(), Farewell> {
+    fn read_requests(&mut self) -> Result<(), CloseReason> {
         let mut bytes = [0; 4096];
         match self.stream.read(&mut bytes) {
-            Ok(0) => Err(Farewell::Closed),
+            Ok(0) => Err(CloseReason::Closed),
             Ok(count) => {
                 self.requests.push(&bytes[..count]);
                 Ok(())
@@ -90,10 +90,10 @@ impl Client {
         }
     }
 
-    fn answer(&mut self, link: &mut OpenLink, now_ns: u64) -> Result<(), Farewell> {
+    fn answer(&mut self, link: &mut OpenLink, now_ns: u64) -> Result<(), CloseReason> {
         while let Some(request) = self.requests.take() {
             match request {
-                Ok(request) => self.obey(request, link, now_ns)?,
+                Ok(request) => self.handle(request, link, now_ns)?,
                 Err(stray @ RequestError::Stray) => return Err(stray.into()),
                 Err(error) => self.refuse(error),
             }
@@ -101,48 +101,48 @@ impl Client {
         Ok(())
     }
 
-    fn obey(&mut self, request: Request, link: &mut OpenLink, now_ns: u64) -> Result<(), Farewell> {
+    fn handle(&mut self, request: Request, link: &mut OpenLink, now_ns: u64) -> Result<(), CloseReason> {
         match request {
             Request::Open(name) => {
                 self.open(&name, link)?;
-                self.say(OK);
+                self.queue(OK);
             }
             Request::RawMode => {
-                self.frames_from_ns = Some(now_ns + SETTLING_NS);
-                self.say(OK);
+                self.frames_from_ns = Some(now_ns + MODE_DELAY_NS);
+                self.queue(OK);
             }
-            Request::Echo => self.say(ECHO),
+            Request::Echo => self.queue(ECHO),
             Request::Send(frame) => {
                 let Some(node) = &self.node else {
                     self.refuse("open a bus first");
                     return Ok(());
                 };
-                // A full queue loses the frame, as a controller's does; the client misses its answer.
+                // A full queue drops the frame, as that of a CAN controller does.
                 let _ = link.port(node).send(now_ns, frame);
             }
         }
         Ok(())
     }
 
-    /// Says why a request is not served; the next one may be.
+    /// Answers a request with an error.
     fn refuse(&mut self, reason: impl Display) {
-        self.say(&format!("< error {reason} >"));
+        self.queue(&format!("< error {reason} >"));
     }
 
-    fn open(&mut self, name: &str, link: &mut OpenLink) -> Result<(), Farewell> {
+    fn open(&mut self, name: &str, link: &mut OpenLink) -> Result<(), CloseReason> {
         if self.node.is_some() {
-            return Err(Farewell::OpenTwice);
+            return Err(CloseReason::OpenTwice);
         }
         let bus = name.strip_prefix("can").and_then(|bus| bus.parse().ok());
         self.node = bus.and_then(|bus| link.connect(bus));
         match self.node {
             Some(_) => Ok(()),
-            None => Err(Farewell::NoPlace { name: name.to_owned(), buses: link.buses() }),
+            None => Err(CloseReason::NoPlace { name: name.to_owned(), buses: link.buses() }),
         }
     }
 
-    /// Takes what its node has received.
-    fn collect(&mut self, link: &mut OpenLink, now_ns: u64) {
+    /// Queues the frames that the node has received.
+    fn queue_frames(&mut self, link: &mut OpenLink, now_ns: u64) {
         let (Some(node), Some(from_ns)) = (&self.node, self.frames_from_ns) else { return };
         if now_ns < from_ns {
             return;
@@ -153,18 +153,18 @@ impl Client {
                 Ok(Some(received)) => {
                     write_frame(&mut text, &received).expect("writing to a string does not fail");
                 }
-                Err(ReceiveError::Overrun { lost }) => status!("{lost} frames were lost to a client"),
+                Err(ReceiveError::Overrun { lost }) => status!("a client lost {lost} frames"),
                 Ok(None) | Err(_) => break,
             }
         }
-        self.say(&text);
+        self.queue(&text);
     }
 
-    fn say(&mut self, text: &str) {
+    fn queue(&mut self, text: &str) {
         self.unsent.extend_from_slice(text.as_bytes());
     }
 
-    fn write_unsent(&mut self) -> Result<(), Farewell> {
+    fn write_unsent(&mut self) -> Result<(), CloseReason> {
         while !self.unsent.is_empty() {
             match self.stream.write(&self.unsent) {
                 Ok(count) => drop(self.unsent.drain(..count)),
@@ -173,7 +173,7 @@ impl Client {
             }
         }
         match self.unsent.len() {
-            waiting if waiting > BACKLOG => Err(Farewell::TooSlow(waiting)),
+            waiting if waiting > MAX_UNSENT => Err(CloseReason::TooSlow(waiting)),
             _ => Ok(()),
         }
     }

@@ -1,35 +1,40 @@
-//! `masseter can eds` and `masseter can dbc`: the drives as other tools read them, to standard output.
+//! `masseter can eds` and `masseter can dbc`: descriptions of the drives and the link for other tools.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::Args;
+use masseter_plan::given;
 use masseter_plant::description;
 use masseter_shared::geometry::AXIS_NAMES;
+use masseter_terminal::{Exit, result};
 
-use masseter_plan::given;
-use masseter_terminal::Exit;
-use masseter_terminal::result;
-
-/// What `can eds` takes.
+/// The arguments of `can eds`.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct EdsArgs {
-    /// Scenario whose drives are meant [default: the published rig]
+    /// Scenario file with the drives [default: the published rig]
     scenario: Option<PathBuf>,
     /// Axis of the drive: d1, d2, d3, l1, l2 or l3
     #[arg(long, default_value = "d1", value_parser = parse_axis)]
     axis: usize,
 }
 
-/// The electronic data sheet of one drive.
+/// The arguments of `can dbc`.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct DbcArgs {
+    /// Scenario file with the drives [default: the published rig]
+    scenario: Option<PathBuf>,
+}
+
+/// Prints the electronic data sheet of one drive.
 pub(crate) fn eds(args: &EdsArgs) -> anyhow::Result<Exit> {
     let sheets = description::eds(&given(args.scenario.as_deref())?)?;
     result(&sheets[args.axis])?;
     Ok(Exit::Passed)
 }
 
-/// The messages of the whole link.
-pub(crate) fn dbc(path: Option<&Path>) -> anyhow::Result<Exit> {
-    result(&description::dbc(&given(path)?)?)?;
+/// Prints the messages of the whole link.
+pub(crate) fn dbc(args: &DbcArgs) -> anyhow::Result<Exit> {
+    result(&description::dbc(&given(args.scenario.as_deref())?)?)?;
     Ok(Exit::Passed)
 }
 

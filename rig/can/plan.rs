@@ -1,4 +1,4 @@
-//! `masseter can plan`: the plan of every bus, as a table or as JSON.
+//! `masseter can plan`: load and worst-case response times of every bus, as a table or as JSON.
 
 use std::path::PathBuf;
 
@@ -9,31 +9,30 @@ use masseter_shared::config::{CanConfig, Scenario};
 use masseter_shared::schedule::{CycleSchedule, Room, ScheduleError, plans};
 use serde_json::{Value, json};
 
-use masseter_terminal::Exit;
-use masseter_terminal::Format;
-use masseter_terminal::result;
+use masseter_terminal::{Exit, Format, result};
 
-/// What `can plan` takes.
+/// The arguments of `can plan`.
 #[derive(Debug, Clone, Args)]
+#[command(after_help = "Example:\n  masseter can plan --rate-hz 1500")]
 pub(crate) struct PlanArgs {
-    /// Scenario file; without one, the default rig
+    /// Scenario file with the buses [default: the published rig]
     scenario: Option<PathBuf>,
     /// Cycles per second
     #[arg(long)]
     rate_hz: Option<u32>,
-    /// How the plan is written to standard output
+    /// Format of standard output
     #[arg(long, value_enum, default_value_t)]
     format: Format,
 }
 
-/// Prints the plan; exit code 2 where the rig could not run by it.
+/// Prints the plan; exit code 2 if a run with it would be refused.
 pub(crate) fn plan(args: &PlanArgs) -> anyhow::Result<Exit> {
     let scenario = masseter_plan::changed(args.scenario.as_deref(), |scenario| {
         scenario.rate_hz = args.rate_hz.unwrap_or(scenario.rate_hz);
         Ok(())
     })?;
     let plans = plans(&scenario.can, scenario.period_ns())?;
-    let room = Room::of(&scenario.can)?;
+    let room = Room::for_link(&scenario.can)?;
     let refusal = refusal(&scenario, &plans, &room);
     let text = match args.format {
         Format::Human => {
@@ -56,7 +55,7 @@ pub(crate) fn plan(args: &PlanArgs) -> anyhow::Result<Exit> {
     Ok(if refusal.is_none() { Exit::Passed } else { Exit::Usage })
 }
 
-/// Why the rig could not run by the plan.
+/// Why a run with this plan would be refused.
 fn refusal(scenario: &Scenario, plans: &[BusPlan], room: &Room) -> Option<String> {
     if let Some(overload) = plans.iter().find_map(|plan| plan.check().err()) {
         return Some(format!("bus {} does not fit; {room}", overload.0.bus()));
@@ -73,7 +72,7 @@ fn of_bus(plan: &BusPlan, can: &CanConfig) -> Result<Value, ScheduleError> {
         "fits": plan.check().is_ok(),
         "cycle_time_ns": plan.cycle_time_ns(),
         "utilisation": plan.utilisation(),
-        "max_rate_hz": Room::of(&alone)?.max_rate_hz,
+        "max_rate_hz": Room::for_link(&alone)?.max_rate_hz,
         "messages": plan.messages().iter().map(of_message).collect::<Vec<_>>(),
     }))
 }

@@ -1,9 +1,8 @@
-//! `masseter can serve`: the emulated drives on simulated buses, for third-party tools, over socketcand's
-//! protocol.
+//! `masseter can serve`: the emulated drives on simulated buses, for other tools, over socketcand's protocol.
 //!
-//! Every client is a node of its own on the bus it opens: what it sends takes part in arbitration, reaches
-//! the drives and the other clients. There is no master here; the client is one, or listens. Who
-//! reads too slowly loses frames first and then the connection, and disturbs nobody.
+//! Every client is a node on the bus that it opens: its frames take part in arbitration and reach the drives and the
+//! other clients. No master runs here; a client can be one. A client that reads too slowly first loses frames, then the
+//! connection, and delays no other.
 
 use std::io;
 use std::net::{SocketAddr, TcpListener};
@@ -11,7 +10,7 @@ use std::path::PathBuf;
 
 use anyhow::Context;
 use clap::Args;
-use masseter_plant::open_link::OpenLink;
+use masseter_plant::emulation::OpenLink;
 use masseter_shared::clock;
 use masseter_shared::config::Scenario;
 use masseter_shared::geometry::AXIS_NAMES;
@@ -25,20 +24,23 @@ use masseter_terminal::{Exit, status};
 
 /// Clients on one bus at a time.
 const CLIENTS: usize = 8;
-/// How far the buses may lag behind the clock.
+/// Longest wait between two steps of the buses.
 const STEP: Timespec = Timespec { tv_sec: 0, tv_nsec: 500_000 };
 
-/// What `can serve` takes.
+/// The arguments of `can serve`.
 #[derive(Debug, Clone, Args)]
+#[command(
+    after_help = "Examples:\n  masseter can serve\n  python3 -c 'import can; can.Bus(interface=\"socketcand\", host=\"127.0.0.1\", port=29536, channel=\"can0\")'"
+)]
 pub(crate) struct ServeArgs {
-    /// Scenario whose buses and drives are meant
+    /// Scenario file with buses and drives [default: the published rig]
     scenario: Option<PathBuf>,
-    /// Address to listen on; whoever reaches it can move the drives
+    /// Address to listen on; every client that reaches it can move the emulated drives
     #[arg(long, default_value = "127.0.0.1:29536")]
     listen: SocketAddr,
 }
 
-/// Serves until it is interrupted.
+/// Serves until Ctrl-C.
 pub(crate) fn serve(args: &ServeArgs) -> anyhow::Result<Exit> {
     let scenario = masseter_plan::given(args.scenario.as_deref())?;
     let stop = StopRequest::listen_alone().context("cannot listen for signals")?;
@@ -63,7 +65,7 @@ fn listen(address: SocketAddr) -> anyhow::Result<TcpListener> {
     Ok(listener)
 }
 
-/// Says on standard error what is served where.
+/// Lists buses, drives and the address on standard error.
 fn announce(listener: &TcpListener, scenario: &Scenario) -> anyhow::Result<()> {
     let address = listener.local_addr().context("the server has no address")?;
     for (bus, axes) in scenario.can.buses.iter().enumerate() {
@@ -71,27 +73,27 @@ fn announce(listener: &TcpListener, scenario: &Scenario) -> anyhow::Result<()> {
         let nodes: Vec<String> = axes.iter().map(node).collect();
         status!("can{bus}: {}", nodes.join(", "));
     }
-    status!("socketcand protocol on {address}; end with Ctrl-C");
+    status!("socketcand protocol on {address}; stop with Ctrl-C");
     Ok(())
 }
 
-/// Waits for the next step, or until a client wants something.
+/// Waits for the next step, a new client, or a request.
 fn wait(listener: &TcpListener, clients: &[Client]) -> io::Result<()> {
-    let mut awaited = vec![PollFd::new(listener, PollFlags::IN)];
-    awaited.extend(clients.iter().map(|client| PollFd::new(client.stream(), PollFlags::IN)));
-    match poll(&mut awaited, Some(&STEP)) {
+    let mut events = vec![PollFd::new(listener, PollFlags::IN)];
+    events.extend(clients.iter().map(|client| PollFd::new(client.stream(), PollFlags::IN)));
+    match poll(&mut events, Some(&STEP)) {
         Ok(_) | Err(Errno::INTR) => Ok(()),
         Err(error) => Err(error.into()),
     }
 }
 
-/// Takes connections as long as there are places; the others are closed. One that cannot be taken concerns nobody else.
+/// Accepts connections while there are places and closes the others.
 fn accept(listener: &TcpListener, clients: &mut Vec<Client>, places: usize) {
     while let Ok((stream, address)) = listener.accept() {
         if clients.len() == places {
-            status!("no place is left for a client from {address}");
+            status!("refused a client from {address}: {places} clients are connected");
         } else {
-            clients.extend(Client::greet(stream));
+            clients.extend(Client::accept(stream));
         }
     }
 }

@@ -34,9 +34,9 @@ const COLUMNS_OUT: [&str; 20] = [
     "nearest_m",
 ];
 
-/// Status `true` of a solution in which the mechanism can stand, `other` of the rest; an input without
-/// any gives one line with the reason of [`ForwardError`], and `nearest_m` the least root of the error
-/// (the paper, eq. 2) that was found over all leg angles.
+/// The status of a solution is `true` if the mechanism can stand in it, `singular` if double precision does not separate
+/// it from another (both are written), and otherwise `other`. An input without a solution gives one line with the reason
+/// of [`ForwardError`]; `nearest_m` is then the least root of the error (the paper, eq. 2) over all leg angles.
 pub(super) fn every_solution(args: &CsvArgs, mechanism: &Mechanism) -> anyhow::Result<Exit> {
     let columns = Columns { read: COLUMNS_IN, written: &COLUMNS_OUT };
     convert(args, columns, |line, values, lines| {
@@ -44,21 +44,28 @@ pub(super) fn every_solution(args: &CsvArgs, mechanism: &Mechanism) -> anyhow::R
         match Solutions::new(mechanism, &actuators) {
             Ok(solutions) if solutions.count() > 0 => {
                 for solution in solutions.iter() {
-                    let status = if solution.assembly.is_true() { "true" } else { "other" };
-                    lines.row(&row(line, mechanism, &actuators, &solutions, solution), status);
+                    lines.row(&row(line, mechanism, &actuators, &solutions, solution), status(solution));
                 }
             }
             Ok(_) => {
                 let nearest_m = nearest_assembly_m(mechanism, &actuators);
-                tell_none(line, nearest_m, &ForwardError::Unassemblable, lines);
+                write_none(line, nearest_m, &ForwardError::Unassemblable, lines);
             }
-            Err(error) => tell_none(line, f64::NAN, &error, lines),
+            Err(error) => write_none(line, f64::NAN, &error, lines),
         }
         Ok(())
     })
 }
 
-fn tell_none(line: u64, nearest_m: f64, error: &ForwardError, lines: &mut Lines) {
+fn status(solution: &Solution) -> &'static str {
+    match (solution.certificate, solution.assembly.is_true()) {
+        (None, _) => "singular",
+        (Some(_), true) => "true",
+        (Some(_), false) => "other",
+    }
+}
+
+fn write_none(line: u64, nearest_m: f64, error: &ForwardError, lines: &mut Lines) {
     let mut values = [f64::NAN; COLUMNS_OUT.len()];
     (values[0], values[COLUMNS_OUT.len() - 1]) = (line as f64, nearest_m);
     lines.row(&values, error.reason());

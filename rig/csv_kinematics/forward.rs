@@ -24,7 +24,7 @@ const COLUMNS_OUT: [&str; 12] = [
     "iterations",
     "residual_m",
 ];
-/// Where the paper's and Newton's iteration start if nobody says: the paper's neutral pose.
+/// Where the paper's and Newton's iteration start without `--guess`: the paper's neutral pose.
 const NEUTRAL_RAD: [f64; LEGS] = [1.46; LEGS];
 
 /// What `fk` takes.
@@ -61,7 +61,7 @@ enum Solver {
 
 /// Status `ok`, `outside_stroke`, or the reason of [`ForwardError`]. The paper's and Newton's iteration
 /// may come to a solution at which the mechanism cannot stand; its status is then `wrong_assembly`,
-/// and the values stand all the same.
+/// and the values are written all the same.
 pub(crate) fn forward(args: &FkArgs) -> anyhow::Result<Exit> {
     let mechanism = mechanism(&args.csv)?;
     if args.all {
@@ -74,13 +74,13 @@ pub(crate) fn forward(args: &FkArgs) -> anyhow::Result<Exit> {
         let mut solver = fresh;
         return convert_in_turn(&args.csv, columns, |_, values, lines| {
             let actuators = Actuators::from_axes(values);
-            tell(&strokes, &actuators, solver.solve(&actuators), lines);
+            write(&strokes, &actuators, solver.solve(&actuators), lines);
             Ok(())
         });
     }
     convert(&args.csv, columns, |_, values, lines| {
         let actuators = Actuators::from_axes(values);
-        tell(&strokes, &actuators, fresh.clone().solve(&actuators), lines);
+        write(&strokes, &actuators, fresh.clone().solve(&actuators), lines);
         Ok(())
     })
 }
@@ -122,7 +122,7 @@ impl Chosen {
     }
 }
 
-fn tell(
+fn write(
     strokes: &StrokeLimits,
     actuators: &Actuators,
     solved: Result<Solution, ForwardError>,

@@ -1,4 +1,4 @@
-//! Lines of the input, numbered, whatever stands in them and however long they are.
+//! Numbered lines of the input, of any content and length.
 
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, Read};
@@ -28,13 +28,13 @@ pub(super) struct Input {
 impl Input {
     /// Opens a file, or standard input.
     pub(super) fn open(path: Option<&Path>) -> anyhow::Result<Self> {
-        let Some(path) = path else { return Ok(Self::of("standard input".to_owned(), io::stdin().lock())) };
+        let Some(path) = path else { return Ok(Self::new("standard input".to_owned(), io::stdin().lock())) };
         let name = path.display().to_string();
         let file = File::open(path).with_context(|| format!("cannot read {name}"))?;
-        Ok(Self::of(name, BufReader::new(file)))
+        Ok(Self::new(name, BufReader::new(file)))
     }
 
-    fn of(name: String, source: impl BufRead + 'static) -> Self {
+    fn new(name: String, source: impl BufRead + 'static) -> Self {
         Self { name, source: Box::new(source), lines: 0, is_over: false }
     }
 
@@ -102,7 +102,7 @@ mod tests {
     use super::*;
 
     fn lines(text: &[u8]) -> Vec<(u64, Result<String, String>)> {
-        let input = Input::of(String::new(), io::Cursor::new(text.to_vec()));
+        let input = Input::new(String::new(), io::Cursor::new(text.to_vec()));
         input.map(|line| (line.number, line.text)).collect()
     }
 

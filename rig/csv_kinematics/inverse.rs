@@ -14,8 +14,8 @@ const COLUMNS_IN: [&str; 7] = ["x_m", "y_m", "z_m", "qw", "qx", "qy", "qz"];
 const COLUMNS_OUT: [&str; 9] =
     ["d1_m", "d2_m", "d3_m", "l1_m", "l2_m", "l3_m", "theta1_rad", "theta2_rad", "theta3_rad"];
 
-/// Status `ok`; `outside_stroke`, or `wrong_assembly` where the mechanism cannot stand as it is built (the values stand
-/// all the same); or `singular` (a leg without length).
+/// Status `ok`; `outside_stroke`, or `wrong_assembly` where the mechanism cannot stand as it is built (the values are
+/// written all the same); or `singular` (a leg without length).
 pub(crate) fn inverse(args: &CsvArgs) -> anyhow::Result<Exit> {
     let mechanism = mechanism(args)?;
     let columns = Columns { read: COLUMNS_IN, written: &COLUMNS_OUT };

@@ -29,7 +29,7 @@ pub(crate) struct CsvArgs {
     /// CSV file to read [default: standard input]
     #[arg(long, value_name = "FILE.csv")]
     input: Option<PathBuf>,
-    /// Scenario whose mechanism is meant [default: the published one]
+    /// Scenario with the mechanism [default: the published one]
     #[arg(long, value_name = "SCENARIO.toml")]
     scenario: Option<PathBuf>,
 }

@@ -1,13 +1,13 @@
-//! What the kernel is told when it boots, and how a distribution adds to it.
+//! Options on the kernel's command line, and how each distribution adds them.
 
 use super::{container, distribution};
 use crate::machine::SystemRoot;
 
-/// The command that boots this machine with further `options` for its kernel, or what is to be done by hand.
+/// The command that adds kernel `options` and boots again, or an instruction where no command is known.
 pub(super) fn add(root: &SystemRoot, options: &str) -> String {
     let by_hand = format!("add `{options}` to the kernel's command line, then boot again");
     if container::is_container(root) {
-        // Which need not be of the same distribution.
+        // The host may run another distribution.
         return container::on_host(root, by_hand);
     }
     distribution::id(root).and_then(|id| command(root, &id, options)).unwrap_or(by_hand)
@@ -17,10 +17,10 @@ fn command(root: &SystemRoot, distribution: &str, options: &str) -> Option<Strin
     if let "fedora" | "rhel" | "centos" | "rocky" | "almalinux" = distribution {
         return Some(format!("sudo grubby --update-kernel=ALL --args=\"{options}\" && sudo reboot"));
     }
-    // It may boot in another way.
+    // Without this file the machine does not boot by GRUB.
     root.text("etc/default/grub")?;
     let (prepare, file, rebuild) = match distribution {
-        // Images for clouds bring files beside the first that would overrule it.
+        // Cloud images have files in this folder that override /etc/default/grub.
         "debian" | "ubuntu" => {
             ("sudo mkdir -p /etc/default/grub.d && ", "/etc/default/grub.d/masseter.cfg", "update-grub")
         }
@@ -30,8 +30,8 @@ fn command(root: &SystemRoot, distribution: &str, options: &str) -> Option<Strin
         }
         _ => return None,
     };
-    // GRUB's files are shell scripts: a line behind the others holds, however those are written. What is in this
-    // variable stands last on the command line.
+    // These files are shell scripts, so an appended line overrides the others. This variable comes last on the command
+    // line.
     let line = format!("GRUB_CMDLINE_LINUX_DEFAULT=\"$GRUB_CMDLINE_LINUX_DEFAULT {options}\"");
     Some(format!("{prepare}echo '{line}' | sudo tee -a {file} && sudo {rebuild} && sudo reboot"))
 }
@@ -46,7 +46,7 @@ mod tests {
     fn added(distribution: &str, more: &[(&str, &str)]) -> String {
         let os_release = format!("ID={distribution}\n");
         let files = [&[("etc/os-release", os_release.as_str())], more].concat();
-        add(&Fixture::of(&files).root(), "isolcpus=2,3")
+        add(&Fixture::with_files(&files).root(), "isolcpus=2,3")
     }
 
     #[test]

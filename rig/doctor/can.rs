@@ -1,4 +1,4 @@
-//! CAN: whether the kernel speaks it, and which interfaces there are. The virtual bus needs neither.
+//! CAN: kernel support and interfaces. Simulated buses need neither.
 
 use std::io;
 use std::num::NonZeroU32;
@@ -19,7 +19,7 @@ const RAW: Option<Protocol> = match NonZeroU32::new(1) {
 
 /// Flag of an interface that is up.
 const IFF_UP: u32 = 1;
-/// A folder an interface.
+/// Holds one folder per interface.
 const INTERFACES: &str = "sys/class/net";
 
 /// All findings of this family.
@@ -34,26 +34,24 @@ fn support(root: &SystemRoot, opened: &io::Result<()>) -> Finding {
     const CHECK: &str = "SocketCAN";
     match opened {
         Ok(()) => Finding::ok(CHECK, "supported by the kernel"),
-        Err(error) => Finding::warn(
-            CHECK,
-            format!("not supported ({error})"),
-            "only the virtual bus can be used, no CAN interface",
-        )
-        .mended_by(container::on_host(root, "sudo modprobe can-raw")),
+        Err(error) => {
+            Finding::warn(CHECK, format!("not supported ({error})"), "runs can only use simulated buses")
+                .mended_by(container::on_host(root, "sudo modprobe can-raw"))
+        }
     }
 }
 
-/// What keeps an interface from sending.
+/// Why an interface cannot send.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Obstacle {
     Down,
-    /// Up, but its controller has gone off the bus.
+    /// Up, but its controller is in the bus-off state.
     BusOff,
 }
 
 impl Obstacle {
-    /// By the flags and the carrier, which tell the moment: `operstate` follows up to a second later.
-    fn of(root: &SystemRoot, name: &str) -> Option<Self> {
+    /// From flags and carrier: `operstate` changes up to a second later.
+    fn read(root: &SystemRoot, name: &str) -> Option<Self> {
         let flags = root.text(&of_interface(name, "flags"))?;
         let flags = u32::from_str_radix(flags.trim_start_matches("0x"), 16).ok()?;
         if flags & IFF_UP == 0 {
@@ -62,17 +60,17 @@ impl Obstacle {
         (root.number(&of_interface(name, "carrier")) == Some(0)).then_some(Self::BusOff)
     }
 
-    fn in_words(self) -> &'static str {
+    fn text(self) -> &'static str {
         match self {
             Self::Down => "down",
-            Self::BusOff => "off the bus",
+            Self::BusOff => "bus-off",
         }
     }
 
     fn mend(self, root: &SystemRoot, name: &str) -> String {
         match self {
             Self::Down => bring_up(root, name),
-            // `type can restart` is refused where the interface restarts by itself after a while.
+            // The kernel refuses `type can restart` if the interface restarts by itself.
             Self::BusOff => format!("sudo ip link set {name} down && sudo ip link set {name} up"),
         }
     }
@@ -83,20 +81,20 @@ fn interfaces(root: &SystemRoot) -> Finding {
     let is_can = |name: &String| root.number(&of_interface(name, "type")) == Some(HARDWARE_TYPE);
     let names: Vec<_> = root.names(INTERFACES).into_iter().filter(is_can).collect();
     if names.is_empty() {
-        return Finding::ok(CHECK, "none; the virtual bus needs none");
+        return Finding::ok(CHECK, "none; simulated buses need none");
     }
     let obstructed: Vec<_> =
-        names.iter().filter_map(|name| Some((name, Obstacle::of(root, name)?))).collect();
+        names.iter().filter_map(|name| Some((name, Obstacle::read(root, name)?))).collect();
     if obstructed.is_empty() {
         return Finding::ok(CHECK, names.join(", "));
     }
-    let told: Vec<_> =
-        obstructed.iter().map(|(name, obstacle)| format!("{name} {}", obstacle.in_words())).collect();
+    let states: Vec<_> =
+        obstructed.iter().map(|(name, obstacle)| format!("{name} {}", obstacle.text())).collect();
     let mends: Vec<_> = obstructed.iter().map(|(name, obstacle)| obstacle.mend(root, name)).collect();
     Finding::warn(
         CHECK,
-        format!("{}; {}", names.join(", "), told.join(", ")),
-        "nothing can be sent on such an interface",
+        format!("{}; {}", names.join(", "), states.join(", ")),
+        "such an interface cannot send",
     )
     .mended_by(mends.join(" && "))
 }
@@ -105,7 +103,7 @@ fn of_interface(name: &str, property: &str) -> String {
     format!("{INTERFACES}/{name}/{property}")
 }
 
-/// Only an interface with a controller behind it has a bit rate.
+/// Only an interface of a hardware controller has a bit rate.
 fn bring_up(root: &SystemRoot, name: &str) -> String {
     let is_virtual = root.names(&of_interface(name, "device")).is_empty();
     let controller = if is_virtual { "" } else { " type can bitrate 1000000 restart-ms 100" };
@@ -122,7 +120,7 @@ mod tests {
 
     #[test]
     fn a_kernel_without_can_still_has_the_virtual_bus() {
-        let machine = Fixture::of(&[]);
+        let machine = Fixture::with_files(&[]);
         assert_eq!(support(&machine.root(), &Ok(())).level, Fine);
         assert_eq!(support(&machine.root(), &Err(io::Error::from_raw_os_error(97))).level, Warn);
     }
@@ -136,7 +134,7 @@ mod tests {
     #[test]
     fn interfaces_are_told_by_their_hardware_type_flags_and_carrier() {
         let of = |flags, carrier| {
-            let fixture = Fixture::of(&[
+            let fixture = Fixture::with_files(&[
                 ("sys/class/net/eth0/type", "1"),
                 ("sys/class/net/eth0/flags", "0x1002"),
                 ("sys/class/net/can0/type", "280"),
@@ -154,12 +152,12 @@ mod tests {
         let (level, found, mend) = of("0x400c1", "0");
         assert_eq!((level, found.as_str()), (Warn, "can0; can0 off the bus"));
         assert_eq!(mend.as_deref(), Some("sudo ip link set can0 down && sudo ip link set can0 up"));
-        assert_eq!(interfaces(&Fixture::of(&[]).root()).level, Fine);
+        assert_eq!(interfaces(&Fixture::with_files(&[]).root()).level, Fine);
     }
 
     #[test]
     fn a_bit_rate_is_set_where_a_controller_has_one() {
-        let down = Fixture::of(&[
+        let down = Fixture::with_files(&[
             ("sys/class/net/can0/type", "280"),
             ("sys/class/net/can0/flags", "0x400c0"),
             ("sys/class/net/can0/device/vendor", "0x10e8"),

@@ -1,8 +1,8 @@
-//! The two cores that are best kept for a rig.
+//! The choice of two cores to isolate for a rig.
 
 use crate::machine::SystemRoot;
 
-/// The last core, and the last one that does not share its arithmetic units.
+/// The last core, and the last other one on another physical core.
 pub(super) fn to_spare(root: &SystemRoot) -> Option<[usize; 2]> {
     let mut cores = root.online_cores();
     let last = cores.pop()?;
@@ -11,7 +11,7 @@ pub(super) fn to_spare(root: &SystemRoot) -> Option<[usize; 2]> {
     Some([other, last])
 }
 
-/// The cores that share a physical one with `core`.
+/// The logical cores on the same physical core.
 fn siblings(root: &SystemRoot, core: usize) -> Vec<usize> {
     root.cores(&format!("sys/devices/system/cpu/cpu{core}/topology/thread_siblings_list"))
 }
@@ -29,7 +29,7 @@ mod tests {
             let paths: Vec<_> = (0..siblings.len()).map(path).collect();
             let mut files: Vec<_> = paths.iter().map(String::as_str).zip(siblings.iter().copied()).collect();
             files.push(("sys/devices/system/cpu/online", &online));
-            to_spare(&Fixture::of(&files).root())
+            to_spare(&Fixture::with_files(&files).root())
         };
         assert_eq!(of(&["0-1", "0-1", "2-3", "2-3"]), Some([1, 3]));
         assert_eq!(of(&["0,2", "1,3", "0,2", "1,3"]), Some([2, 3]));
@@ -44,6 +44,6 @@ mod tests {
             ("sys/devices/system/cpu/cpu6/topology/thread_siblings_list", "6"),
             ("sys/devices/system/cpu/cpu7/online", "0"),
         ];
-        assert_eq!(to_spare(&Fixture::of(&smt_off).root()), Some([4, 6]));
+        assert_eq!(to_spare(&Fixture::with_files(&smt_off).root()), Some([4, 6]));
     }
 }

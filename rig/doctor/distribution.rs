@@ -1,8 +1,8 @@
-//! Which distribution this is: what is installed how, and where it keeps its settings.
+//! The Linux distribution, by its id in `/etc/os-release`.
 
 use crate::machine::SystemRoot;
 
-/// Its `ID`, in lower case as `os-release` has it; none where it is not told.
+/// The `ID`, in lower case; none if the file has none.
 pub(super) fn id(root: &SystemRoot) -> Option<String> {
     let os_release = root.text("etc/os-release")?;
     let id = os_release.lines().find_map(|line| line.strip_prefix("ID="))?;
@@ -16,11 +16,11 @@ mod tests {
 
     #[test]
     fn the_id_is_neither_the_versions_nor_that_of_similar_ones() {
-        let of = |os_release| id(&Fixture::of(&[("etc/os-release", os_release)]).root());
+        let of = |os_release| id(&Fixture::with_files(&[("etc/os-release", os_release)]).root());
         assert_eq!(of("PRETTY_NAME=\"Debian\"\nVERSION_ID=\"13\"\nID=debian\n").as_deref(), Some("debian"));
         assert_eq!(of("ID_LIKE=debian\nID=ubuntu\n").as_deref(), Some("ubuntu"));
         assert_eq!(of("ID=\"rocky\"\n").as_deref(), Some("rocky"));
         assert_eq!(of("NAME=Linux\n"), None);
-        assert_eq!(id(&Fixture::of(&[]).root()), None);
+        assert_eq!(id(&Fixture::with_files(&[]).root()), None);
     }
 }

@@ -1,53 +1,53 @@
-//! What a check found.
+//! The finding of a check.
 
 use serde::Serialize;
 
-/// How good or bad it is.
+/// How a finding affects real-time runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Level {
-    /// As it should be.
+pub(super) enum Level {
+    /// No effect.
     Ok,
-    /// Runs work; their tail or their comfort suffers.
+    /// Runs work with longer latencies or fewer features.
     Warn,
-    /// Runs cannot be trusted to keep real time.
+    /// Runs cannot be trusted to meet their deadlines.
     Bad,
 }
 
-/// One line of the doctor's report.
+/// An entry of the doctor's report.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct Finding {
-    /// What was looked at.
+pub(super) struct Finding {
+    /// The name of the check.
     pub check: &'static str,
-    /// How it is.
+    /// Its level.
     pub level: Level,
-    /// What was found.
+    /// The state of the machine.
     pub found: String,
-    /// What it costs; none when all is well.
+    /// The effect on runs; none at level `ok`.
     pub cost: Option<String>,
-    /// The command that mends it; none when all is well or nothing on this machine helps.
+    /// The command that improves it; none at level `ok`, or where no command helps.
     pub mend: Option<String>,
 }
 
 impl Finding {
-    /// All is well.
-    pub fn ok(check: &'static str, found: impl Into<String>) -> Self {
+    /// A finding without effect.
+    pub(super) fn ok(check: &'static str, found: impl Into<String>) -> Self {
         Self { check, level: Level::Ok, found: found.into(), cost: None, mend: None }
     }
 
-    /// Something that costs.
-    pub fn warn(check: &'static str, found: impl Into<String>, cost: impl Into<String>) -> Self {
+    /// A finding that degrades runs.
+    pub(super) fn warn(check: &'static str, found: impl Into<String>, cost: impl Into<String>) -> Self {
         Self { check, level: Level::Warn, found: found.into(), cost: Some(cost.into()), mend: None }
     }
 
-    /// Something that rules real time out.
-    pub fn bad(check: &'static str, found: impl Into<String>, cost: impl Into<String>) -> Self {
+    /// A finding that rules real time out.
+    pub(super) fn bad(check: &'static str, found: impl Into<String>, cost: impl Into<String>) -> Self {
         Self { level: Level::Bad, ..Self::warn(check, found, cost) }
     }
 
-    /// The command that mends it.
+    /// Adds the command that improves it.
     #[must_use]
-    pub fn mended_by(self, command: impl Into<String>) -> Self {
+    pub(super) fn mended_by(self, command: impl Into<String>) -> Self {
         Self { mend: Some(command.into()), ..self }
     }
 }

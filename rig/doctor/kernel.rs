@@ -1,4 +1,4 @@
-//! How the kernel schedules: preemption, real-time throttling, isolated cores.
+//! The kernel's scheduling: preemption, real-time throttling, isolated cores.
 
 use super::finding::Finding;
 use super::{boot_options, container, cores, realtime_kernel};
@@ -17,7 +17,7 @@ fn preemption(root: &SystemRoot) -> Finding {
     if root.number("sys/kernel/realtime") == Some(1) || has("PREEMPT_RT") {
         return Finding::ok(CHECK, format!("{release}: fully preemptible (PREEMPT_RT)"));
     }
-    let cost = "a system call of another task may hold a core for up to a millisecond";
+    let cost = "a system call of another task may occupy a core for up to a millisecond";
     let install = |finding: Finding| match realtime_kernel::installation(root) {
         Some(command) => finding.mended_by(command),
         None => finding,
@@ -27,7 +27,7 @@ fn preemption(root: &SystemRoot) -> Finding {
         return install(Finding::warn(CHECK, format!("{release}: {model}"), cost));
     }
     match root.text("sys/kernel/debug/sched/preempt") {
-        // The chosen mode stands in brackets: `none voluntary (full) lazy`.
+        // The current mode is in brackets: `none voluntary (full) lazy`.
         Some(modes) if modes.contains("(full)") => {
             install(Finding::warn(CHECK, format!("{release}: preemptible (PREEMPT_DYNAMIC, full)"), cost))
         }
@@ -49,17 +49,17 @@ fn throttling(root: &SystemRoot) -> Finding {
     let (Some(runtime_us), Some(period_us)) = (runtime_us, period_us) else {
         return Finding::ok(CHECK, "none in this kernel");
     };
-    // The kernel's default share, of the period as it is: a share of another is refused in the one order or the other.
+    // The kernel's default share of the current period. Setting both values fails in one order or the other.
     let restored_us = period_us - period_us / 20;
     let restore = container::on_host(root, format!("sudo sysctl kernel.sched_rt_runtime_us={restored_us}"));
     let found = format!("{runtime_us} of every {period_us} µs");
     match runtime_us {
-        ..0 => Finding::warn(CHECK, "off", "a real-time task that never waits takes its core for good")
+        ..0 => Finding::warn(CHECK, "off", "a real-time task that never waits blocks its core")
             .mended_by(restore),
-        // As the kernel leaves it by default, and as the loops keep it in mind when they spin.
+        // The kernel's default; the loops limit their spinning to stay below it.
         _ if runtime_us * 100 >= period_us * 95 => Finding::ok(CHECK, found),
-        0 => Finding::bad(CHECK, found, "real-time tasks get no time at all").mended_by(restore),
-        _ => Finding::warn(CHECK, found, "fast loops are put to sleep for the rest of the period")
+        0 => Finding::bad(CHECK, found, "real-time tasks get no CPU time").mended_by(restore),
+        _ => Finding::warn(CHECK, found, "the kernel stops fast loops for the rest of the period")
             .mended_by(restore),
     }
 }
@@ -77,10 +77,10 @@ fn isolation(root: &SystemRoot) -> Finding {
         (Some(isolated), None) => {
             Finding::ok(CHECK, format!("isolcpus={isolated}, ticking; choose them with --cores"))
         }
-        (None, _) if cores <= 2 => Finding::ok(CHECK, format!("none; {cores} cores leave none to spare")),
+        (None, _) if cores <= 2 => Finding::ok(CHECK, format!("none; with {cores} cores none can be spared")),
         (None, _) => {
             let finding =
-                Finding::warn(CHECK, "none", "other tasks and their interrupts come onto the rig's cores");
+                Finding::warn(CHECK, "none", "other tasks and interrupts also run on the rig's cores");
             match cores::to_spare(root) {
                 Some([one, other]) => finding.mended_by(isolate(root, &format!("{one},{other}"))),
                 None => finding,
@@ -115,7 +115,7 @@ mod tests {
             (&[(VERSION, "#1 SMP PREEMPT_DYNAMIC"), (MODES, "none voluntary (full)")], Warn, "full)"),
         ];
         for (files, level, found) in cases {
-            let finding = preemption(&Fixture::of(files).root());
+            let finding = preemption(&Fixture::with_files(files).root());
             assert_eq!(finding.level, level, "{finding:?}");
             assert!(finding.found.contains(found), "{finding:?}");
         }
@@ -131,7 +131,7 @@ mod tests {
             ("proc/sys/kernel/sched_rt_period_us", "1000000"),
             ("sys/devices/system/cpu/online", "0-7"),
         ];
-        for finding in examine(&Fixture::of(&files).root()) {
+        for finding in examine(&Fixture::with_files(&files).root()) {
             assert!(finding.mend.unwrap().starts_with("on the host: "), "{}", finding.check);
         }
     }
@@ -141,7 +141,7 @@ mod tests {
             ("proc/sys/kernel/sched_rt_runtime_us", runtime_us),
             ("proc/sys/kernel/sched_rt_period_us", period_us),
         ];
-        throttling(&Fixture::of(&files).root())
+        throttling(&Fixture::with_files(&files).root())
     }
 
     #[test]
@@ -150,7 +150,7 @@ mod tests {
         for (runtime_us, level) in cases {
             assert_eq!(throttled(runtime_us, "1000000").level, level, "{runtime_us}");
         }
-        assert_eq!(throttling(&Fixture::of(&[]).root()).level, Ok);
+        assert_eq!(throttling(&Fixture::with_files(&[]).root()).level, Ok);
     }
 
     #[test]
@@ -167,7 +167,7 @@ mod tests {
         let cores = |online: &str, isolated: &str| {
             let files =
                 [("sys/devices/system/cpu/online", online), ("sys/devices/system/cpu/isolated", isolated)];
-            isolation(&Fixture::of(&files).root())
+            isolation(&Fixture::with_files(&files).root())
         };
         assert_eq!(cores("0-1", "\n").level, Ok);
         assert_eq!(cores("0-7", "6-7\n").level, Ok);

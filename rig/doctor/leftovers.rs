@@ -1,4 +1,4 @@
-//! Rigs of this user: those that run, and what dead ones left in shared memory.
+//! Other rigs of this user: running ones, and files of killed ones in shared memory.
 
 use masseter_shared::transport::{Domain, DomainError};
 
@@ -6,10 +6,10 @@ use super::finding::Finding;
 
 /// All findings of this family.
 pub(super) fn examine() -> Vec<Finding> {
-    vec![leftovers(&alive_and_dead())]
+    vec![leftovers(&count_rigs())]
 }
 
-fn alive_and_dead() -> Result<(usize, usize), DomainError> {
+fn count_rigs() -> Result<(usize, usize), DomainError> {
     let alive = Domain::all()?.iter().map(Domain::is_alive).collect::<Result<Vec<_>, _>>()?;
     let count = |wanted: bool| alive.iter().filter(|&&is_alive| is_alive == wanted).count();
     Ok((count(true), count(false)))
@@ -18,18 +18,18 @@ fn alive_and_dead() -> Result<(usize, usize), DomainError> {
 fn leftovers(count: &Result<(usize, usize), DomainError>) -> Finding {
     const CHECK: &str = "other rigs";
     match count {
-        Ok((0, 0)) => Finding::ok(CHECK, "none runs, none left anything behind"),
+        Ok((0, 0)) => Finding::ok(CHECK, "none running, no files of killed ones"),
         Ok((alive, 0)) => {
             Finding::warn(CHECK, format!("{alive} running"), "rigs on the same cores delay each other")
                 .mended_by("masseter run --cores N,N")
         }
         Ok((alive, dead)) => Finding::warn(
             CHECK,
-            format!("{alive} running, {dead} dead ones left files behind"),
-            "their shared memory is not free until they are swept",
+            format!("{alive} running, files of {dead} killed ones"),
+            "these files occupy shared memory",
         )
         .mended_by("masseter clean"),
-        Err(error) => Finding::warn(CHECK, error.to_string(), "what killed runs left cannot be swept"),
+        Err(error) => Finding::warn(CHECK, error.to_string(), "files of killed runs cannot be removed"),
     }
 }
 

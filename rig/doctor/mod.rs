@@ -1,7 +1,7 @@
-//! `masseter doctor`: is this machine fit for real-time runs, and what would make it fitter?
+//! `masseter doctor`: whether this machine is fit for real-time runs, and which commands would improve it.
 //!
-//! Each family of checks has a file; [`Finding`] is a line of the report. Nothing is changed on the
-//! machine. The form of the JSON report is written down in `docs/doctor.md`.
+//! Each family of checks has a file; a [`Finding`] is a line of the report. The doctor changes nothing on the machine.
+//! `docs/doctor.md` describes the JSON report.
 
 mod boot_options;
 mod can;
@@ -19,14 +19,21 @@ mod timing;
 
 use std::fmt::Write;
 
+use clap::Args;
+use masseter_terminal::{Exit, Format, result};
 use serde::Serialize;
 
-pub use finding::{Finding, Level};
+use finding::{Finding, Level};
 
 use crate::machine::SystemRoot;
-use masseter_terminal::Exit;
-use masseter_terminal::Format;
-use masseter_terminal::result;
+
+/// The arguments of `doctor`.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct DoctorArgs {
+    /// Format of standard output
+    #[arg(long, value_enum, default_value_t)]
+    format: Format,
+}
 
 /// Version of the report's form.
 const FORM: u32 = 1;
@@ -41,11 +48,11 @@ struct Report {
     findings: Vec<Finding>,
 }
 
-/// Examines the machine; [`Exit::Invalid`] when something is bad.
-pub(crate) fn examine(format: Format) -> anyhow::Result<Exit> {
-    let report = Report::of(findings(&SystemRoot::of_this_machine()));
-    result(&match format {
-        Format::Human => report.in_words(),
+/// Examines the machine and prints the report; [`Exit::Invalid`] if a finding is bad.
+pub(crate) fn examine(args: &DoctorArgs) -> anyhow::Result<Exit> {
+    let report = Report::new(findings(&SystemRoot::of_this_machine()));
+    result(&match args.format {
+        Format::Human => report.to_text(),
         Format::Json => serde_json::to_string_pretty(&report)? + "\n",
     })?;
     Ok(if report.level == Level::Bad { Exit::Invalid } else { Exit::Passed })
@@ -65,12 +72,12 @@ fn findings(root: &SystemRoot) -> Vec<Finding> {
 }
 
 impl Report {
-    fn of(findings: Vec<Finding>) -> Self {
+    fn new(findings: Vec<Finding>) -> Self {
         let level = findings.iter().map(|finding| finding.level).max().unwrap_or(Level::Ok);
         Self { form: FORM, masseter: env!("CARGO_PKG_VERSION"), level, findings }
     }
 
-    fn in_words(&self) -> String {
+    fn to_text(&self) -> String {
         let mut text = String::new();
         for finding in &self.findings {
             let mark = match finding.level {
@@ -79,9 +86,9 @@ impl Report {
                 Level::Bad => "BAD",
             };
             let _ = writeln!(text, "{mark:<4} {:<21} {}", finding.check, finding.found);
-            for (label, said) in [("costs:", &finding.cost), ("mend: ", &finding.mend)] {
-                if let Some(said) = said {
-                    let _ = writeln!(text, "     {:<21} {label} {said}", "");
+            for (label, entry) in [("costs:", &finding.cost), ("mend: ", &finding.mend)] {
+                if let Some(entry) = entry {
+                    let _ = writeln!(text, "     {:<21} {label} {entry}", "");
                 }
             }
         }
@@ -109,13 +116,13 @@ mod tests {
             (vec![bad(), warned()], Level::Bad),
         ];
         for (findings, level) in cases {
-            assert_eq!(Report::of(findings).level, level);
+            assert_eq!(Report::new(findings).level, level);
         }
     }
 
     #[test]
     fn the_form_is_as_documented() {
-        let report = Report::of(vec![Finding::warn("b", "odd", "some").mended_by("do this")]);
+        let report = Report::new(vec![Finding::warn("b", "odd", "some").mended_by("do this")]);
         assert_eq!(
             serde_json::to_value(&report).unwrap(),
             serde_json::json!({

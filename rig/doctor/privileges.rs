@@ -1,4 +1,4 @@
-//! What the kernel grants this user: SCHED_FIFO and locked memory, really asked for.
+//! SCHED_FIFO and locked memory: requests both from the kernel, as a run does.
 
 use std::thread;
 
@@ -9,7 +9,7 @@ use super::container;
 use super::finding::Finding;
 use crate::machine::SystemRoot;
 
-/// Raises both limits for this user from the next log-in on.
+/// Raises both limits for this user, from the next login on.
 const RAISE_LIMITS: &str = "printf '%s - rtprio 95\\n%s - memlock unlimited\\n' \"$USER\" \"$USER\" \
                             | sudo tee /etc/security/limits.d/masseter.conf  # then log in again";
 
@@ -23,7 +23,7 @@ pub(super) fn examine(root: &SystemRoot) -> Vec<Finding> {
     ]
 }
 
-/// In a thread of its own, which takes the granted priority along when it ends.
+/// Requests scheduling in a thread of its own, so that this one keeps its priority.
 fn try_out(wanted: Wanted) -> Obtained {
     thread::spawn(move || obtain(wanted)).join().expect("asking the kernel does not panic")
 }
@@ -36,7 +36,7 @@ fn fifo(root: &SystemRoot, priority: u8, obtained: &Obtained) -> Finding {
     Finding::bad(
         CHECK,
         format!("priority {priority} refused"),
-        "any ordinary task may delay a cycle by milliseconds",
+        "every ordinary task can delay a cycle by milliseconds",
     )
     .mended_by(container::start_with(root, "--cap-add SYS_NICE --ulimit rtprio=95", RAISE_LIMITS))
 }
@@ -46,7 +46,7 @@ fn locked_memory(root: &SystemRoot, obtained: &Obtained) -> Finding {
     if obtained.locked_memory {
         return Finding::ok(CHECK, "granted");
     }
-    Finding::bad(CHECK, "refused", "a page fault within a cycle costs microseconds, from disk milliseconds")
+    Finding::bad(CHECK, "refused", "a page fault in a cycle takes microseconds, from disk milliseconds")
         .mended_by(container::start_with(root, "--ulimit memlock=-1", RAISE_LIMITS))
 }
 
@@ -66,7 +66,7 @@ mod tests {
             locked_memory,
             refusals: Vec::new(),
         };
-        let machine = Fixture::of(&[]);
+        let machine = Fixture::with_files(&[]);
         for (granted, level) in [(Some(80), Level::Ok), (Some(10), Level::Bad), (None, Level::Bad)] {
             assert_eq!(fifo(&machine.root(), 80, &obtained(granted, false)).level, level);
         }
@@ -76,7 +76,7 @@ mod tests {
                 .map(|finding| finding.mend.unwrap())
         };
         assert!(mends(&machine.root()).iter().all(|mend| mend.contains("limits.d")));
-        let container = Fixture::of(&[(".dockerenv", "")]);
+        let container = Fixture::with_files(&[(".dockerenv", "")]);
         assert_eq!(
             mends(&container.root()),
             ["docker run --cap-add SYS_NICE --ulimit rtprio=95 …", "docker run --ulimit memlock=-1 …"]

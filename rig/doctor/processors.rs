@@ -1,4 +1,4 @@
-//! The cores: how many may be used, how they idle, and whether they are real.
+//! The cores: number, frequency governor, idle states, virtualisation and steal time.
 
 use std::env;
 
@@ -8,9 +8,9 @@ use super::finding::Finding;
 use super::{container, timing};
 use crate::machine::SystemRoot;
 
-/// An idle state that takes longer to leave wakes the loops after their spin should have begun, µs.
+/// Longest exit latency of an idle state that the loops' spin covers, µs.
 const LATEST_EXIT_US: i64 = 200;
-/// Steal beyond this share of all time since boot is worth a word.
+/// Largest share of steal time since boot without a warning.
 const STEAL_SHARE: f64 = 0.001;
 
 /// All findings of this family.
@@ -27,7 +27,7 @@ pub(super) fn examine(root: &SystemRoot) -> Vec<Finding> {
 
 fn number(root: &SystemRoot, usable: usize, online: &[usize]) -> Finding {
     const CHECK: &str = "cores";
-    let found = format!("{usable} of {} may be used", online.len());
+    let found = format!("{usable} of {} usable", online.len());
     match (usable, online) {
         (2.., _) => Finding::ok(CHECK, found),
         (_, [one, other, ..]) => {
@@ -39,9 +39,9 @@ fn number(root: &SystemRoot, usable: usize, online: &[usize]) -> Finding {
     }
 }
 
-/// What a session may use is bounded by the cpuset of its control group, which a scope of the system is not part of.
+/// The command that runs outside the cpuset of the session's control group.
 fn leave_cpuset() -> String {
-    // By its path and as this user: sudo looks for commands elsewhere, and root's runs are root's.
+    // An absolute path and this user's id: sudo has another search path, and files of the run belong to its user.
     let masseter = env::current_exe().unwrap_or_else(|_| "masseter".into());
     format!("sudo systemd-run --scope --uid=\"$(id -u)\" '{}' run", masseter.display())
 }
@@ -55,9 +55,9 @@ fn governor(root: &SystemRoot) -> Finding {
     governors.dedup();
     let found = governors.join(", ");
     match governors.as_slice() {
-        [] => Finding::ok(CHECK, "none: the clock is not this system's to change"),
+        [] => Finding::ok(CHECK, "none: this system cannot change the frequency"),
         [only] if only == "performance" => Finding::ok(CHECK, found),
-        _ => Finding::warn(CHECK, found, "after a sleep the core computes slower, up to several times")
+        _ => Finding::warn(CHECK, found, "after a sleep the core computes up to several times slower")
             .mended_by(container::on_host(
                 root,
                 "echo performance | sudo tee /sys/devices/system/cpu/cpu*/cpufreq/scaling_governor",
@@ -65,7 +65,7 @@ fn governor(root: &SystemRoot) -> Finding {
     }
 }
 
-/// They only matter where a run does not hold the cores awake. The core that sleeps deepest may be one of the run's.
+/// Idle states matter only if a run cannot disable them. Any core may be one of the run's, so the deepest state counts.
 fn idle(root: &SystemRoot, may_hold: bool) -> Finding {
     const CHECK: &str = "idle states";
     let deepest = root.online_cores().into_iter().filter_map(|core| deepest_state(root, core)).max();
@@ -78,15 +78,14 @@ fn idle(root: &SystemRoot, may_hold: bool) -> Finding {
     }
     let cost = "a loop that slept wakes after its deadline";
     match (root.is_virtual(), may_hold) {
-        (false, true) => Finding::ok(CHECK, format!("{found}; a run keeps the cores from it")),
+        (false, true) => Finding::ok(CHECK, format!("{found}; a run disables it")),
         (false, false) => Finding::warn(CHECK, found, cost).mended_by(timing::grant_latency_device(root)),
-        (true, _) => Finding::warn(CHECK, found, cost).mended_by(
-            "masseter bench loop  # tells whether `realtime.cpu_dma_latency = \"hold\"` is better",
-        ),
+        (true, _) => Finding::warn(CHECK, found, cost)
+            .mended_by("masseter bench loop  # measures whether `realtime.cpu_dma_latency = \"hold\"` helps"),
     }
 }
 
-/// What it takes to leave a core's deepest state that is not disabled, µs, and its name.
+/// Exit latency, µs, and name of a core's deepest enabled idle state.
 fn deepest_state(root: &SystemRoot, core: usize) -> Option<(i64, String)> {
     let folder = format!("sys/devices/system/cpu/cpu{core}/cpuidle");
     let states = root.names(&folder);
@@ -118,7 +117,7 @@ fn steal(root: &SystemRoot) -> Finding {
     if share <= STEAL_SHARE {
         return Finding::ok(CHECK, found);
     }
-    Finding::warn(CHECK, found, "other guests of the host take the cores away; such runs are INVALID")
+    Finding::warn(CHECK, found, "other guests of the host take CPU time; such runs are INVALID")
 }
 
 #[cfg(test)]
@@ -129,14 +128,14 @@ mod tests {
 
     #[test]
     fn two_cores_are_needed_and_a_cpuset_that_hides_them_is_left() {
-        let machine = Fixture::of(&[]);
+        let machine = Fixture::with_files(&[]);
         let of = |usable, online: &[usize]| number(&machine.root(), usable, online);
         assert_eq!(of(2, &[0, 1]).level, Ok);
         let hidden = of(1, &[0, 1, 2, 3]);
-        assert_eq!((hidden.level, hidden.found.as_str()), (Bad, "1 of 4 may be used"));
+        assert_eq!((hidden.level, hidden.found.as_str()), (Bad, "1 of 4 usable"));
         assert!(hidden.mend.unwrap().contains("systemd-run --scope --uid=\"$(id -u)\" '/"));
         assert_eq!((of(1, &[0]).level, of(1, &[0]).mend), (Bad, None));
-        let container = Fixture::of(&[(".dockerenv", "")]);
+        let container = Fixture::with_files(&[(".dockerenv", "")]);
         assert_eq!(
             number(&container.root(), 1, &[0, 2, 3]).mend.as_deref(),
             Some("docker run --cpuset-cpus 0,2 …")
@@ -157,7 +156,7 @@ mod tests {
                 .collect();
             let mut files: Vec<_> = paths.iter().map(String::as_str).zip(governors.iter().copied()).collect();
             files.push(("sys/devices/system/cpu/online", "0-1"));
-            assert_eq!(governor(&Fixture::of(&files).root()).level, level, "{governors:?}");
+            assert_eq!(governor(&Fixture::with_files(&files).root()).level, level, "{governors:?}");
         }
     }
 
@@ -170,7 +169,7 @@ mod tests {
             let texts = ["1", "POLL", "890", "C6", disable];
             let mut files: Vec<_> = paths.iter().map(String::as_str).zip(texts).collect();
             files.extend([("proc/cpuinfo", hypervisor), ("sys/devices/system/cpu/online", "0")]);
-            idle(&Fixture::of(&files).root(), may_hold)
+            idle(&Fixture::with_files(&files).root(), may_hold)
         };
         let [real, guest] = ["flags : fpu", "flags : hypervisor"];
         assert_eq!(state("1", real, false).level, Ok);
@@ -192,7 +191,7 @@ mod tests {
             let states = [state(0, "1"), state(1, "0")].concat();
             let mut files: Vec<_> = states.iter().map(|(path, text)| (path.as_str(), *text)).collect();
             files.push(("sys/devices/system/cpu/online", online));
-            idle(&Fixture::of(&files).root(), false)
+            idle(&Fixture::with_files(&files).root(), false)
         };
         assert_eq!((of("0").level, of("0-1").level), (Ok, Warn));
         assert!(of("0-1").found.contains("C6, 890"));
@@ -200,7 +199,7 @@ mod tests {
 
     #[test]
     fn steal_is_a_share_of_all_time() {
-        let of = |line: &str| steal(&Fixture::of(&[("proc/stat", line)]).root());
+        let of = |line: &str| steal(&Fixture::with_files(&[("proc/stat", line)]).root());
         assert_eq!(of("cpu  500 0 100 9390 0 0 0 10 7 7\ncpu0 1 1 1 1").level, Ok);
         let stolen = of("cpu  500 0 100 9000 0 0 0 400 0 0\n");
         assert_eq!((stolen.level, stolen.found.as_str()), (Warn, "4.000 % since boot"));

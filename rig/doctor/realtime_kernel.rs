@@ -1,12 +1,12 @@
-//! Where a distribution keeps its fully preemptible kernel.
+//! How each distribution installs its PREEMPT_RT kernel.
 
 use super::{container, distribution};
 use crate::machine::SystemRoot;
 
-/// The command that installs it on this machine; none where no package is known. A container need not be of its host's
-/// distribution.
+/// The command that installs it; none if no package is known.
 pub(super) fn installation(root: &SystemRoot) -> Option<String> {
     if container::is_container(root) {
+        // The host may run another distribution.
         return Some("on the host: install its distribution's kernel with PREEMPT_RT".to_owned());
     }
     command(&distribution::id(root)?, std::env::consts::ARCH)
@@ -34,7 +34,7 @@ mod tests {
     #[test]
     fn a_containers_distribution_says_nothing_of_its_kernel() {
         let debian = ("etc/os-release", "ID=debian\n");
-        let command = installation(&Fixture::of(&[debian, (".dockerenv", "")]).root()).unwrap();
+        let command = installation(&Fixture::with_files(&[debian, (".dockerenv", "")]).root()).unwrap();
         assert!(command.starts_with("on the host: ") && !command.contains("apt"), "{command}");
     }
 

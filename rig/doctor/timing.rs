@@ -1,4 +1,4 @@
-//! Clocks and timers: what time is read from, how fine timers are, and who may keep cores awake.
+//! Clocks and timers: clock source, timer resolution, cost of a sleep, and access to `/dev/cpu_dma_latency`.
 
 use std::fs::OpenOptions;
 use std::io;
@@ -11,15 +11,15 @@ use super::{boot_options, container};
 use crate::machine::SystemRoot;
 use crate::machine::dma_latency;
 
-/// Clock sources that are read without a system call and in tens of nanoseconds.
+/// Clock sources that are read in tens of nanoseconds, without a system call.
 const FAST_SOURCES: [&str; 4] = ["tsc", "kvm-clock", "arch_sys_counter", "hyperv_clocksource_tsc_page"];
 
-/// Sleeps that are tried, each of that length, ns.
+/// Number and length, ns, of the measured sleeps.
 const SLEEPS: u64 = 200;
 const SLEEP_NS: u64 = 200_000;
-/// A sleep that takes more than this of a core leaves the loops of a fast rig little of theirs, ns.
+/// Largest CPU time of a sleep without a warning, ns.
 const CHEAP_SLEEP_NS: u64 = 10_000;
-/// The rate for which the share of sleeping is told, Hz.
+/// The rate for which a warning gives the share of sleeping, Hz.
 const FAST_RATE_HZ: u64 = 10_000;
 
 /// All findings of this family.
@@ -34,12 +34,12 @@ pub(super) fn examine(root: &SystemRoot) -> Vec<Finding> {
     ]
 }
 
-/// Whether runs may hold the cores awake.
+/// Whether runs may disable idle states.
 pub(super) fn open_latency_device() -> io::Result<()> {
     OpenOptions::new().write(true).open(dma_latency::DEVICE).map(drop)
 }
 
-/// What grants that.
+/// The command that grants this.
 pub(super) fn grant_latency_device(root: &SystemRoot) -> String {
     let device = dma_latency::DEVICE;
     container::start_with(
@@ -53,14 +53,14 @@ fn clock_source(root: &SystemRoot) -> Finding {
     const CHECK: &str = "clock source";
     let folder = "sys/devices/system/clocksource/clocksource0";
     let Some(current) = root.text(&format!("{folder}/current_clocksource")) else {
-        return Finding::ok(CHECK, "not told by this kernel");
+        return Finding::ok(CHECK, "unknown to this kernel");
     };
     if FAST_SOURCES.contains(&current.as_str()) {
         return Finding::ok(CHECK, current);
     }
     let available = root.text(&format!("{folder}/available_clocksource")).unwrap_or_default();
     let better = available.split_whitespace().find(|source| FAST_SOURCES.contains(source));
-    let finding = Finding::warn(CHECK, current, "each look at the clock costs a microsecond and more");
+    let finding = Finding::warn(CHECK, current, "reading the clock takes a microsecond or more");
     match better {
         Some(source) => finding.mended_by(container::on_host(
             root,
@@ -78,17 +78,17 @@ fn timers(root: &SystemRoot, resolution_ns: i64) -> Finding {
     let finding = Finding::bad(
         CHECK,
         format!("{resolution_ns} ns"),
-        "cycles can only begin at ticks; the kernel needs CONFIG_HIGH_RES_TIMERS and no `highres=off`",
+        "cycles begin at timer ticks only; the kernel needs CONFIG_HIGH_RES_TIMERS and no `highres=off`",
     );
     let options = root.text("proc/cmdline").unwrap_or_default();
     if options.split_whitespace().any(|option| option == "highres=off") {
-        // Of two the kernel takes the last.
+        // The kernel uses the last of two.
         return finding.mended_by(boot_options::add(root, "highres=on"));
     }
     finding
 }
 
-/// CPU time that going to sleep and waking takes, ns.
+/// CPU time of a sleep and its wake-up, ns.
 fn cost_of_a_sleep_ns() -> u64 {
     let before_ns = clock::thread_cpu_ns();
     for _ in 0..SLEEPS {
@@ -99,13 +99,13 @@ fn cost_of_a_sleep_ns() -> u64 {
 
 fn sleeping(cost_ns: u64) -> Finding {
     const CHECK: &str = "sleeping";
-    let found = format!("{} µs of the core a time", cost_ns.div_ceil(1000));
+    let found = format!("{} µs of CPU time each", cost_ns.div_ceil(1000));
     if cost_ns <= CHEAP_SLEEP_NS {
         return Finding::ok(CHECK, found);
     }
     let share_percent = 100 * cost_ns * FAST_RATE_HZ / clock::SECOND_NS;
     let cost = format!(
-        "at {} kHz, sleeping once a cycle takes {share_percent} % of each loop's core; setting a timer is dear, \
+        "at {} kHz, one sleep per cycle takes {share_percent} % of each loop's core; setting a timer is slow, \
          as in many virtual machines",
         FAST_RATE_HZ / 1000
     );
@@ -117,14 +117,14 @@ fn dma_latency_access(root: &SystemRoot, opened: &io::Result<()>) -> Finding {
     match (opened, root.is_virtual()) {
         (_, true) => Finding::ok(
             CHECK,
-            "left alone in a virtual machine; `masseter bench loop` tells whether holding it \
-             (`realtime.cpu_dma_latency = \"hold\"`) is better on this one",
+            "not used in virtual machines; `masseter bench loop` measures whether \
+             `realtime.cpu_dma_latency = \"hold\"` helps here",
         ),
-        (Ok(()), false) => Finding::ok(CHECK, "may be held"),
+        (Ok(()), false) => Finding::ok(CHECK, "usable"),
         (Err(error), false) => Finding::warn(
             CHECK,
-            format!("cannot be held ({error})"),
-            "cores fall into deep idle states between cycles",
+            format!("not usable ({error})"),
+            "cores enter deep idle states between cycles",
         )
         .mended_by(grant_latency_device(root)),
     }
@@ -142,7 +142,7 @@ mod tests {
             let folder = "sys/devices/system/clocksource/clocksource0";
             let (one, other) =
                 (format!("{folder}/current_clocksource"), format!("{folder}/available_clocksource"));
-            clock_source(&Fixture::of(&[(&one, current), (&other, available)]).root())
+            clock_source(&Fixture::with_files(&[(&one, current), (&other, available)]).root())
         };
         assert_eq!(of("tsc\n", "tsc hpet\n").level, Fine);
         assert!(of("hpet", "hpet tsc acpi_pm").mend.unwrap().starts_with("echo tsc |"));
@@ -151,23 +151,24 @@ mod tests {
 
     #[test]
     fn ticks_are_too_coarse_for_cycles() {
-        let machine = Fixture::of(&[]);
+        let machine = Fixture::with_files(&[]);
         assert_eq!([1, 4_000_000].map(|ns| timers(&machine.root(), ns).level), [Fine, Bad]);
     }
 
     #[test]
     fn fine_timers_are_asked_for_where_they_were_declined() {
-        let mend = |options| timers(&Fixture::of(&[("proc/cmdline", options)]).root(), 4_000_000).mend;
+        let mend =
+            |options| timers(&Fixture::with_files(&[("proc/cmdline", options)]).root(), 4_000_000).mend;
         assert!(mend("root=/dev/sda1 highres=off quiet").unwrap().contains("highres=on"));
         assert_eq!(mend("root=/dev/sda1 quiet"), None, "the kernel has none");
     }
 
     #[test]
-    fn a_dear_sleep_is_told_with_its_share_of_a_fast_loops_core() {
+    fn a_slow_sleep_is_reported_with_its_share_of_a_fast_loops_core() {
         assert_eq!(sleeping(10_000).level, Fine);
         let dear = sleeping(33_200);
-        assert_eq!((dear.level, dear.found.as_str()), (Warn, "34 µs of the core a time"));
-        assert!(dear.cost.unwrap().contains("at 10 kHz, sleeping once a cycle takes 33 %"));
+        assert_eq!((dear.level, dear.found.as_str()), (Warn, "34 µs of CPU time each"));
+        assert!(dear.cost.unwrap().contains("at 10 kHz, one sleep per cycle takes 33 %"));
     }
 
     #[test]
@@ -178,9 +179,9 @@ mod tests {
     #[test]
     fn the_latency_device_matters_on_real_machines_only() {
         let refused = || Err(io::Error::from(io::ErrorKind::PermissionDenied));
-        let guest = Fixture::of(&[("sys/hypervisor/type", "xen")]);
+        let guest = Fixture::with_files(&[("sys/hypervisor/type", "xen")]);
         assert_eq!(dma_latency_access(&guest.root(), &refused()).level, Fine);
-        let real = Fixture::of(&[]);
+        let real = Fixture::with_files(&[]);
         assert_eq!(dma_latency_access(&real.root(), &refused()).level, Warn);
         assert_eq!(dma_latency_access(&real.root(), &Ok(())).level, Fine);
     }

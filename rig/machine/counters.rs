@@ -1,27 +1,26 @@
-//! What the kernel counts of a process and of the machine, from outside.
+//! The kernel's counters of a process and of the machine, read from outside.
 
 use super::SystemRoot;
 
 /// `/proc/stat` counts in hundredths of a second (USER_HZ) on every platform of the rig.
 const TICK_NS: u64 = 10_000_000;
 
-/// The kernel's counters of a process at an instant.
-#[derive(Debug, Clone, Copy)]
+/// The kernel's counters of a process.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct ProcessCounters {
-    pub(crate) at_ns: u64,
-    /// CPU time of all its threads.
+    /// CPU time of all threads that run.
     pub(crate) cpu_ns: u64,
-    /// Times its main thread gave up its core, and had it taken.
+    /// Context switches of the main thread: those it asked for by waiting, and those it did not.
     pub(crate) voluntary_switches: u64,
     pub(crate) involuntary_switches: u64,
-    /// Page faults of all its threads, served from memory and from disk.
+    /// Page faults of all threads, served from memory and from disk.
     pub(crate) minor_faults: u64,
     pub(crate) major_faults: u64,
 }
 
 impl ProcessCounters {
-    /// Of a process; none when it is gone.
-    pub(crate) fn of(root: &SystemRoot, id: u32, at_ns: u64) -> Option<Self> {
+    /// The counters of a process; none if it has ended.
+    pub(crate) fn read(root: &SystemRoot, id: u32) -> Option<Self> {
         let status = root.text(&format!("proc/{id}/status"))?;
         let counter = |name: &str| -> Option<u64> {
             status.lines().find_map(|line| line.strip_prefix(name))?.trim().parse().ok()
@@ -31,7 +30,6 @@ impl ProcessCounters {
         let fields: Vec<&str> = stat.rsplit_once(')')?.1.split_whitespace().collect();
         let field = |number: usize| -> Option<u64> { fields.get(number - 3)?.parse().ok() };
         Some(Self {
-            at_ns,
             cpu_ns: root.cpu_time_ns(id),
             voluntary_switches: counter("voluntary_ctxt_switches:")?,
             involuntary_switches: counter("nonvoluntary_ctxt_switches:")?,

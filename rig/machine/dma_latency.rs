@@ -1,4 +1,4 @@
-//! `/dev/cpu_dma_latency`: keeps the cores from idle states as long as someone holds it open.
+//! `/dev/cpu_dma_latency`: an open file with the value 0 disables the idle states of all cores.
 
 use std::fs::{File, OpenOptions};
 use std::io::{self, Read, Seek, Write};
@@ -9,7 +9,7 @@ use masseter_shared::config::CpuDmaLatency;
 /// The kernel's device.
 pub(crate) const DEVICE: &str = "/dev/cpu_dma_latency";
 
-/// Holds the device until it is dropped.
+/// Keeps the device open, if configured, until dropped.
 #[derive(Debug)]
 pub(crate) struct Hold {
     obtained: DmaLatency,
@@ -17,7 +17,7 @@ pub(crate) struct Hold {
 }
 
 impl Hold {
-    /// Does what `wanted` says on a machine of this kind.
+    /// Opens the device if `wanted` says so for this kind of machine.
     pub(crate) fn new(wanted: CpuDmaLatency, is_virtual: bool) -> Self {
         let opened = is_to_be_held(wanted, is_virtual).then(open);
         let (device, limit_us, refusal) = match opened {
@@ -33,7 +33,7 @@ impl Hold {
         Self { obtained: DmaLatency { wanted, limit_us, refusal }, _device: device }
     }
 
-    /// For the manifest.
+    /// The result, for the manifest.
     pub(crate) fn obtained(&self) -> &DmaLatency {
         &self.obtained
     }
@@ -47,7 +47,7 @@ fn is_to_be_held(wanted: CpuDmaLatency, is_virtual: bool) -> bool {
     }
 }
 
-/// Asks for 0 µs, as a number in the machine's own bytes, and reads the limit back.
+/// Writes a latency of 0 µs, in native byte order, and reads the limit back.
 fn open() -> io::Result<(File, i32)> {
     let mut device = OpenOptions::new().read(true).write(true).open(DEVICE)?;
     device.write_all(&0_i32.to_ne_bytes())?;
@@ -62,7 +62,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_virtual_machine_is_left_alone_unless_asked() {
+    fn a_virtual_machine_uses_the_device_only_if_configured() {
         let cases = [
             (CpuDmaLatency::Auto, false, true),
             (CpuDmaLatency::Auto, true, false),
@@ -75,7 +75,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_left_alone_is_neither_opened_nor_refused() {
+    fn a_device_that_is_not_wanted_is_neither_opened_nor_refused() {
         let hold = Hold::new(CpuDmaLatency::Leave, false);
         assert_eq!((hold.obtained().limit_us, &hold.obtained().refusal), (None, &None));
     }

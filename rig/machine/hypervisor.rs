@@ -1,13 +1,13 @@
-//! Whether a hypervisor runs the machine: the processor says so on x86, elsewhere the firmware's description does.
+//! Whether this is a virtual machine: by a processor flag on x86, elsewhere by the firmware's description.
 
 use super::SystemRoot;
 
 const DEVICE_TREE: &str = "proc/device-tree";
-/// What the root of the device tree is compatible with where there is no board.
+/// Compatible strings of device trees of virtual machines.
 const NO_BOARD: [&str; 2] = ["linux,dummy-virt", "qemu,pseries"];
-/// Where the firmware names the machine and who made it.
+/// Files with the firmware's names of product and vendor.
 const NAMES: [&str; 3] = ["sys_vendor", "product_name", "chassis_vendor"];
-/// What such names begin with where nobody made it.
+/// Prefixes of such names on virtual machines.
 const GUESTS: [&str; 15] = [
     "QEMU",
     "KVM",
@@ -46,7 +46,7 @@ impl SystemRoot {
             || compatible.split('\0').any(|board| NO_BOARD.contains(&board))
     }
 
-    /// By the names of the firmware, which are a cloud's on its bare machines too: those are `m7g.metal` and the like.
+    /// By product and vendor. Clouds also name their bare machines so; those are called `m7g.metal` and the like.
     fn is_named_virtual(&self) -> bool {
         let name = |name: &str| self.text(&format!("sys/class/dmi/id/{name}")).unwrap_or_default();
         let is_guest = |name: String| GUESTS.iter().any(|guest| name.starts_with(guest));
@@ -93,7 +93,7 @@ mod tests {
             (&[ARM, (VENDOR, "Microsoft Corporation\n"), (PRODUCT, "Surface Pro X\n")], false),
         ];
         for (files, expected) in cases {
-            assert_eq!(Fixture::of(files).root().is_virtual(), expected, "{files:?}");
+            assert_eq!(Fixture::with_files(files).root().is_virtual(), expected, "{files:?}");
         }
     }
 }

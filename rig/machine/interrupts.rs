@@ -1,4 +1,4 @@
-//! The user's word to end a run: SIGINT, SIGTERM, and SIGHUP of a terminal that is gone.
+//! Requests to end a run: SIGINT, SIGTERM, and SIGHUP of a closed terminal.
 
 use std::fs;
 use std::io;
@@ -9,7 +9,7 @@ use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use signal_hook::iterator::Signals;
 use signal_hook::low_level::emulate_default_handler;
 
-/// The signals counted: the first asks for an orderly stop, the second ends at once.
+/// Counts the signals: the first requests an orderly stop, the second an immediate end.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Interrupts {
     count: Arc<AtomicUsize>,
@@ -17,7 +17,7 @@ pub(crate) struct Interrupts {
 }
 
 impl Interrupts {
-    /// Listens from now on. SIGHUP stays ignored where whoever started this wants that, as `nohup` does.
+    /// Handles the signals from now on. SIGHUP stays ignored if the parent ignores it, as `nohup` does.
     pub(crate) fn listen() -> io::Result<Self> {
         let interrupts = Self::default();
         let hang_up = (!is_ignored(SIGHUP)).then_some(SIGHUP);
@@ -36,17 +36,17 @@ impl Interrupts {
         Ok(interrupts)
     }
 
-    /// Whether an orderly stop has been asked for.
+    /// Whether an orderly stop is requested.
     pub(crate) fn is_stop_asked(&self) -> bool {
         self.count.load(Ordering::Relaxed) > 0
     }
 
-    /// Whether the end is to come at once.
+    /// Whether an immediate end is requested.
     pub(crate) fn is_end_insisted(&self) -> bool {
         self.count.load(Ordering::Relaxed) > 1
     }
 
-    /// The rig has ended: from now on the signals do what they do by default.
+    /// Restores the default action of the signals, for after the run.
     pub(crate) fn let_go(&self) {
         self.is_over.store(true, Ordering::Relaxed);
     }

@@ -5,30 +5,36 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use clap::{Args, ValueEnum};
-
-use crate::arguments::{Wires, parse_cores, parse_wires};
-use crate::live;
 use masseter_plan::Overrides;
 use masseter_terminal::Format;
 
-/// What `run` takes.
+use crate::arguments::{ControllerKind, Wires, parse_cores, parse_wires};
+use crate::foxglove;
+
+/// The arguments of `run`.
 #[derive(Debug, Clone, Default, Args)]
+#[command(
+    after_help = "Examples:\n  masseter run --duration 30s\n  masseter run scenario.toml --live\n  masseter run --clock virtual --seed 2 --out /tmp/run"
+)]
 pub struct RunArgs {
-    /// Scenario file; without one, ten seconds of chewing
+    /// Scenario file [default: ten seconds of chewing]
     pub scenario: Option<PathBuf>,
-    /// Recorded jaw motion (CSV) to play instead of the scenario's motion
+    /// Recorded jaw motion (CSV), instead of the scenario's motion
     #[arg(long, value_name = "FILE.csv")]
     pub trajectory: Option<PathBuf>,
-    /// How long the motion lasts, such as 10s or 2min
+    /// Duration of the motion, such as 10s or 2min
     #[arg(long, value_parser = humantime::parse_duration)]
     pub duration: Option<Duration>,
     /// Cycles per second
     #[arg(long)]
     pub rate_hz: Option<u32>,
-    /// Real time in three processes, or virtual time in one thread
+    /// Clock of the run
     #[arg(long, value_enum, default_value_t)]
     pub clock: ClockKind,
-    /// Simulated buses, or the real interface of each, such as can0,can1
+    /// Play the motion, or only hold the position found at the start
+    #[arg(long, value_enum, default_value_t)]
+    pub controller: ControllerKind,
+    /// Simulated buses, or the CAN interface of each bus, such as can0,can1
     #[arg(long, value_name = "virtual|IF[,IF]", value_parser = parse_wires)]
     pub can: Option<Wires>,
     /// Cores of controller and plant
@@ -37,25 +43,25 @@ pub struct RunArgs {
     /// Seed of every random number
     #[arg(long)]
     pub seed: Option<u64>,
-    /// The run folder; must not exist [default: runs/UTC_TIME-NAME]
+    /// Run folder; must not exist [default: runs/UTC_TIME-NAME]
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
-    /// Name of this rig, which no other running one may have [default: one that none has]
+    /// Name of this rig, unique among running rigs [default: a generated one]
     #[arg(long)]
     pub name: Option<String>,
-    /// How the result is written to standard output
+    /// Format of standard output
     #[arg(long, value_enum, default_value_t)]
     pub format: Format,
-    /// Exit with 3 unless core, SCHED_FIFO, locked memory and, where it is to be held, /dev/cpu_dma_latency are granted
+    /// Exit with 3 unless the kernel grants cores, SCHED_FIFO, locked memory and, if requested, /dev/cpu_dma_latency
     #[arg(long)]
     pub require_rt: bool,
-    /// Show the run live to Foxglove over a WebSocket, to this machine only unless an address is given
+    /// Show the run live in Foxglove (WebSocket) [default address: 127.0.0.1:8765]
     #[arg(
         long,
         value_name = "ADDR:PORT",
         num_args = 0..=1,
         require_equals = true,
-        default_missing_value = live::DEFAULT_ADDRESS
+        default_missing_value = foxglove::DEFAULT_ADDRESS
     )]
     pub live: Option<SocketAddr>,
     /// Show no progress
@@ -64,7 +70,7 @@ pub struct RunArgs {
 }
 
 impl RunArgs {
-    /// What the arguments change in the scenario.
+    /// The changes to the scenario.
     pub(super) fn overrides(&self) -> Overrides {
         Overrides {
             trajectory: self.trajectory.clone(),
@@ -77,18 +83,18 @@ impl RunArgs {
     }
 }
 
-/// Which time a run lives in.
+/// The clock of a run.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
 pub enum ClockKind {
-    /// Real time.
+    /// Real time, in three processes
     #[default]
     Rt,
-    /// Virtual time: as fast as it goes, the same bytes every time.
+    /// Virtual time, in one thread: as fast as possible, the same bytes every time
     Virtual,
 }
 
 impl ClockKind {
-    /// The name in the manifest.
+    /// Its name in the manifest.
     pub(super) fn name(self) -> &'static str {
         match self {
             Self::Rt => "rt",

@@ -1,4 +1,4 @@
-//! A process of the rig as its supervisor sees it.
+//! A child process of the supervisor: start, readiness, end. It does not decide what its end means for the run.
 
 use std::io::{self, BufRead, BufReader, Write};
 use std::os::unix::process::ExitStatusExt;
@@ -10,56 +10,56 @@ use std::time::Duration;
 use masseter_shared::lifecycle::{Ready, Start};
 use rustix::process::{Pid, Signal, kill_process};
 
-/// How long a process may take to open its ports and lock its memory.
-const READY_WITHIN: Duration = Duration::from_secs(20);
+/// Longest time for a process to open its ports and lock its memory.
+const READY_TIMEOUT: Duration = Duration::from_secs(20);
 
-/// How often a wait looks whether it is still wanted.
-const LOOK: Duration = Duration::from_millis(20);
+/// Polling interval while waiting for readiness.
+const POLL: Duration = Duration::from_millis(20);
 
-/// Which process it is.
+/// A process of the rig, by its task.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Role {
     /// The controller.
     Controller,
     /// The plant.
     Plant,
-    /// The logger.
-    Logger,
+    /// The recorder.
+    Recorder,
 }
 
 impl Role {
-    /// The hidden subcommand, which is also its name.
+    /// Its name, which is also its hidden subcommand.
     pub fn name(self) -> &'static str {
         match self {
             Self::Controller => "controller",
             Self::Plant => "plant",
-            Self::Logger => "logger",
+            Self::Recorder => "recorder",
         }
     }
 }
 
-/// Why a process did not come up.
+/// Why a process did not start.
 #[derive(Debug, thiserror::Error)]
 pub enum ChildError {
-    /// It could not be started, or its pipes failed.
+    /// The system could not start it.
     #[error("the {role} cannot be started: {error}")]
     Spawn {
-        /// Which.
+        /// Its name.
         role: &'static str,
-        /// What the system said.
+        /// The system's error.
         error: io::Error,
     },
-    /// It ended or kept silent instead of reporting ready.
+    /// It did not report that it is ready.
     #[error("the {role} did not get ready: {reason}")]
     NotReady {
-        /// Which.
+        /// Its name.
         role: &'static str,
-        /// What it did instead.
+        /// The reason.
         reason: String,
     },
 }
 
-/// A running process. Dropping it kills what still runs.
+/// A process; killed when dropped.
 pub struct Process {
     role: Role,
     child: Child,
@@ -90,7 +90,7 @@ impl Process {
         Ok(Self { role, child, lines, status: None })
     }
 
-    /// Which process it is.
+    /// Its role.
     pub fn role(&self) -> Role {
         self.role
     }
@@ -100,57 +100,57 @@ impl Process {
         self.child.id()
     }
 
-    /// Waits until it says that it is ready; none when `is_given_up` comes first.
-    pub fn wait_ready(&mut self, is_given_up: impl Fn() -> bool) -> Result<Option<Ready>, ChildError> {
+    /// Waits until it reports that it is ready; none if `is_cancelled` becomes true first.
+    pub fn wait_ready(&mut self, is_cancelled: impl Fn() -> bool) -> Result<Option<Ready>, ChildError> {
         let not_ready = |reason: String| ChildError::NotReady { role: self.role.name(), reason };
-        let mut looks = READY_WITHIN.as_millis() / LOOK.as_millis();
+        let mut polls = READY_TIMEOUT.as_millis() / POLL.as_millis();
         loop {
-            match self.lines.recv_timeout(LOOK) {
+            match self.lines.recv_timeout(POLL) {
                 Ok(line) => {
                     let ready = serde_json::from_str(&line);
                     return ready.map(Some).map_err(|error| not_ready(format!("{error} in '{line}'")));
                 }
-                // A key on the terminal reaches it as well, before it listens for signals.
-                Err(_) if is_given_up() => return Ok(None),
-                Err(RecvTimeoutError::Timeout) if looks > 0 => looks -= 1,
+                // Ctrl-C also reaches the process, and may end it before it handles signals.
+                Err(_) if is_cancelled() => return Ok(None),
+                Err(RecvTimeoutError::Timeout) if polls > 0 => polls -= 1,
                 Err(RecvTimeoutError::Timeout) => {
-                    return Err(not_ready(format!("silent for {} s", READY_WITHIN.as_secs())));
+                    return Err(not_ready(format!("no report within {} s", READY_TIMEOUT.as_secs())));
                 }
                 Err(RecvTimeoutError::Disconnected) => {
-                    return Err(not_ready("it ended; its message stands above".to_owned()));
+                    return Err(not_ready("it ended; see its message above".to_owned()));
                 }
             }
         }
     }
 
-    /// Gives the word to begin.
+    /// Starts its work.
     pub fn start(&mut self, start: Start) -> io::Result<()> {
         let input = self.child.stdin.as_mut().expect("standard input is piped");
         serde_json::to_writer(&mut *input, &start)?;
         writeln!(input)
     }
 
-    /// How it ended, if it did.
-    pub fn ended(&mut self) -> io::Result<Option<ExitStatus>> {
+    /// Its exit status, if it has ended.
+    pub fn exit_status(&mut self) -> io::Result<Option<ExitStatus>> {
         if self.status.is_none() {
             self.status = self.child.try_wait()?;
         }
         Ok(self.status)
     }
 
-    /// Asks it to end in order.
+    /// Asks it to end (SIGTERM).
     pub fn terminate(&mut self) {
         self.signal(Signal::TERM);
     }
 
-    /// Ends it at once.
+    /// Ends it at once (SIGKILL).
     pub fn kill(&mut self) {
         self.signal(Signal::KILL);
     }
 
     fn signal(&mut self, signal: Signal) {
-        if matches!(self.ended(), Ok(None)) {
-            // It may end between the two calls; then there is nobody left to signal.
+        if matches!(self.exit_status(), Ok(None)) {
+            // If it ends between the two calls, no signal is needed.
             let _ = kill_process(Pid::from_child(&self.child), signal);
         }
     }
@@ -163,7 +163,7 @@ impl Drop for Process {
     }
 }
 
-/// An exit status in words.
+/// An exit status as text.
 pub fn describe(status: ExitStatus) -> String {
     match (status.code(), status.signal()) {
         (Some(code), _) => format!("exit code {code}"),

@@ -1,4 +1,4 @@
-//! How a run came to its end, by how its processes ended.
+//! The ending of a run, from the endings of its processes.
 
 use std::process::ExitStatus;
 
@@ -7,26 +7,29 @@ use masseter_terminal::Exit;
 
 use super::child::{Role, describe};
 
-/// What a run's end is called: after the first process that died, or what the recording lacks; else after who broke it
-/// off; else as the controller ended.
-pub(super) fn of_all(broken_off: Option<Ending>, controller: Ending, others: Option<Ending>) -> Ending {
-    match (broken_off, controller, others) {
+/// The ending of the run: the first death of a process, else an incomplete recording, else the interruption, else the
+/// controller's ending.
+pub(super) fn of_run(interruption: Option<Ending>, controller: Ending, others: Option<Ending>) -> Ending {
+    match (interruption, controller, others) {
         (Some(died @ Ending::Died { .. }), ..) | (_, died @ Ending::Died { .. }, _) => died,
         (_, _, Some(others)) => others,
-        (Some(broken_off), _, None) => broken_off,
+        (Some(interruption), _, None) => interruption,
         (None, controller, None) => controller,
     }
 }
 
-/// What plant and logger make of a run whose controller ended as it should.
-pub(super) fn of_the_others(plant: Option<ExitStatus>, logger: Option<ExitStatus>) -> Option<Ending> {
+/// The ending that plant or recorder cause, if any. None as a status means that the process was killed.
+pub(super) fn of_plant_and_recorder(
+    plant: Option<ExitStatus>,
+    recorder: Option<ExitStatus>,
+) -> Option<Ending> {
     if !plant.is_some_and(|status| status.success()) {
         return Some(died(Role::Plant, plant));
     }
-    match logger.and_then(|status| status.code()) {
+    match recorder.and_then(|status| status.code()) {
         Some(code) if code == Exit::Passed as i32 => None,
         Some(code) if code == Exit::Incomplete as i32 => Some(Ending::RecordingFailed),
-        _ => Some(died(Role::Logger, logger)),
+        _ => Some(died(Role::Recorder, recorder)),
     }
 }
 
@@ -40,12 +43,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_death_outranks_a_gap_in_the_recording_that_the_users_word_and_that_a_safe_stop() {
+    fn a_death_outranks_an_incomplete_recording_then_an_interruption_then_a_safe_stop() {
         let died = |role: Role| Ending::died(role.name(), "SIGKILL (9)".to_owned());
-        let (logger, plant, controller) = (died(Role::Logger), died(Role::Plant), died(Role::Controller));
+        let (recorder, plant, controller) = (died(Role::Recorder), died(Role::Plant), died(Role::Controller));
         let (completed, interrupted, safe_stop) = (Ending::Completed, Ending::Interrupted, Ending::SafeStop);
         let gap = Ending::RecordingFailed;
-        for (broken_off, by_controller, others, expected) in [
+        for (interruption, by_controller, others, expected) in [
             (None, &completed, None, &completed),
             (None, &safe_stop, None, &safe_stop),
             (None, &safe_stop, Some(&gap), &gap),
@@ -55,10 +58,10 @@ mod tests {
             (Some(&interrupted), &completed, Some(&gap), &gap),
             (Some(&interrupted), &completed, Some(&plant), &plant),
             (Some(&interrupted), &controller, Some(&plant), &controller),
-            (Some(&logger), &controller, Some(&plant), &logger),
+            (Some(&recorder), &controller, Some(&plant), &recorder),
         ] {
-            let found = of_all(broken_off.cloned(), by_controller.clone(), others.cloned());
-            assert_eq!(&found, expected, "{broken_off:?}, {by_controller:?}, {others:?}");
+            let found = of_run(interruption.cloned(), by_controller.clone(), others.cloned());
+            assert_eq!(&found, expected, "{interruption:?}, {by_controller:?}, {others:?}");
         }
     }
 }

@@ -1,7 +1,7 @@
 //! `masseter run`: from arguments to a verdict.
 //!
-//! [`masseter_plan`] refuses whatever cannot run before anything starts; then [`supervisor`] runs the three
-//! processes, or [`virtual_time`] their cores; then the recording is analysed and the run judged.
+//! [`masseter_plan`] refuses a scenario that cannot run before anything starts. Then [`supervisor`] runs the three
+//! processes, or [`virtual_time`] steps their cores. Analysis and report judge the recording.
 
 pub mod args;
 pub mod child;
@@ -18,18 +18,18 @@ use masseter_plan::Plan;
 use masseter_plant::core as plant;
 use masseter_recording::{Ending, MOTION, Manifest, RunFolder};
 use masseter_shared::config::{MotionConfig, Scenario};
-
-use crate::{live, machine};
-use args::{ClockKind, RunArgs};
 use masseter_terminal::{Exit, Failure, OrFailure, status};
-use supervisor::Ended;
 
-/// Plays the motion, judges the run and leaves its folder.
+use crate::{foxglove, machine};
+use args::{ClockKind, RunArgs};
+use supervisor::RunOutcome;
+
+/// Plays the motion, judges the run, and writes its folder.
 pub fn run(args: &RunArgs) -> Result<Exit, Failure> {
     let plan = resolve(args).usage()?;
-    let claimed = match args.clock {
+    let domain = match args.clock {
         ClockKind::Virtual => None,
-        ClockKind::Rt => Some(supervisor::claim(args.name.as_deref()).usage()?),
+        ClockKind::Rt => Some(supervisor::reserve_domain(args.name.as_deref()).usage()?),
     };
     let folder = match &args.out {
         Some(path) => RunFolder::create(path).usage()?,
@@ -42,66 +42,63 @@ pub fn run(args: &RunArgs) -> Result<Exit, Failure> {
 
     let motion_s = plan.trajectory.duration_s();
     let mut manifest = Manifest::new(plan.scenario.clone(), motion_s, args.clock.name(), machine::describe());
-    let unwritten = || format!("cannot write {}", folder.manifest().display());
-    let keep = |manifest: &Manifest| manifest.write(&folder).with_context(unwritten).incomplete();
-    // For a recording that nobody lives to judge.
-    keep(&manifest)?;
-    let ended = match claimed {
-        None => virtual_time::run(&plan, &folder).map(Ended::from).incomplete(),
-        Some(claimed) => supervisor::run(claimed, &plan, &folder, args),
+    // This one remains if the supervisor is killed.
+    write_manifest(&folder, &manifest)?;
+    let outcome = match domain {
+        None => virtual_time::run(&plan, &folder, args.controller.into()).map(RunOutcome::from).incomplete(),
+        Some(domain) => supervisor::run(domain, &plan, &folder, args),
     };
-    let ended = ended.or_else(|failure| {
+    let outcome = outcome.or_else(|failure| {
         manifest.ending = Ending::died("rig", format!("{:#}", failure.error));
-        keep(&manifest)?;
+        write_manifest(&folder, &manifest)?;
         Err(failure)
     })?;
-    manifest.scheduling = ended.scheduling;
-    manifest.cpu_dma_latency = ended.cpu_dma_latency;
-    manifest.usage = ended.usage;
-    manifest.ending = ended.ending;
-    keep(&manifest)?;
-    // Before the processes were ready, and anything was recorded.
-    let is_in_processes = args.clock == ClockKind::Rt;
-    if manifest.ending == Ending::Interrupted && is_in_processes && manifest.scheduling.is_empty() {
+    manifest.scheduling = outcome.scheduling;
+    manifest.cpu_dma_latency = outcome.cpu_dma_latency;
+    manifest.usage = outcome.usage;
+    manifest.ending = outcome.ending;
+    write_manifest(&folder, &manifest)?;
+    // Interrupted before every process was ready: nothing is recorded.
+    let is_unstarted = args.clock == ClockKind::Rt && manifest.scheduling.is_empty();
+    if manifest.ending == Ending::Interrupted && is_unstarted {
         return Ok(Exit::Interrupted);
     }
-    let figures = masseter_analysis::analyse(&folder, &plan.scenario)
-        .context("the run's recording cannot be analysed")
-        .incomplete()?;
-    masseter_report::write(&folder, &manifest, &figures, args.format)
+    masseter_report::report_run(&folder, &manifest, args.format)
 }
 
-/// Plans the run that the arguments ask for, and refuses what this machine does not have.
+fn write_manifest(folder: &RunFolder, manifest: &Manifest) -> Result<(), Failure> {
+    let path = folder.manifest();
+    manifest.write(folder).with_context(|| format!("cannot write {}", path.display())).incomplete()
+}
+
+/// Plans the run, and refuses interfaces and addresses that this machine does not have.
 fn resolve(args: &RunArgs) -> anyhow::Result<Plan> {
     let scenario = masseter_plan::scenario(args.scenario.as_deref(), &args.overrides())?;
     check_clock(args, &scenario)?;
-    args.live.map_or(Ok(()), live::check)?;
+    args.live.map_or(Ok(()), foxglove::check)?;
     let plan = Plan::of(scenario)?;
     plant::check_interfaces(&plan.scenario).context("the plant cannot be built")?;
     Ok(plan)
 }
 
-/// Virtual time leaves no room for what only real time has.
+/// Refuses arguments that need real time under virtual time.
 fn check_clock(args: &RunArgs, scenario: &Scenario) -> anyhow::Result<()> {
     if args.clock == ClockKind::Rt {
         return Ok(());
     }
     if !scenario.can.is_virtual() {
-        bail!("virtual time has no real wires: use --can virtual, or --clock rt");
+        bail!("virtual time has no real CAN interfaces: use --can virtual, or --clock rt");
     }
     if args.require_rt || args.name.is_some() {
-        bail!(
-            "virtual time needs no real time and has no other rig beside it: leave out --require-rt and --name"
-        );
+        bail!("--require-rt and --name need --clock rt");
     }
     if args.live.is_some() {
-        bail!("virtual time is over before it can be watched: leave out --live, or use --clock rt");
+        bail!("--live needs --clock rt: virtual time is over before a client can connect");
     }
     Ok(())
 }
 
-/// Keeps the scenario and the recording it plays together: another one may lie where that was by the time it is run
-/// again.
+/// Copies the scenario, and the motion file that it plays, into the run folder: the original may change later.
 fn keep_scenario(folder: &RunFolder, scenario: &Scenario) -> anyhow::Result<()> {
     let mut kept = scenario.clone();
     if let MotionConfig::File(file) = &mut kept.motion {

@@ -4,15 +4,22 @@
 //! same bytes. Computing takes no time here, and readings and commands go out when the time table has them at the
 //! latest: what varies is the bus.
 
+use std::convert::Infallible;
+
 use anyhow::Context;
-use masseter_controller::core::{Controller, Tick};
+use masseter_controller::hold_position::HoldPosition;
+use masseter_controller::motion_controller::MotionController;
+use masseter_controller::process::Kind;
 use masseter_plan::Plan;
 use masseter_plant::core::{PlantCore, PlantError};
+use masseter_plant::cycle::PlantPorts;
+use masseter_plant::emulation::VirtualLink;
 use masseter_recording::{Backlog, Ending, Pace, Recorder, RunFolder, Scene};
 use masseter_shared::clock::SECOND_NS;
-use masseter_shared::messages::codes::ControllerState;
-use masseter_shared::messages::{Message, State};
+use masseter_shared::control::{Controller, ControllerPorts, Outcome};
+use masseter_shared::messages::{Command, Event, Message, Reading, State, Truth};
 use masseter_shared::realtime::Wake;
+use masseter_shared::schedule::CycleSchedule;
 use masseter_terminal::status;
 
 use super::child::Role;
@@ -22,74 +29,147 @@ use crate::machine::interrupts::Interrupts;
 const EPOCH_NS: u64 = SECOND_NS;
 
 /// Runs the rig under virtual time; it ends as the processes would, also when the user stops it.
-pub fn run(plan: &Plan, folder: &RunFolder) -> anyhow::Result<Ending> {
+pub fn run(plan: &Plan, folder: &RunFolder, kind: Kind) -> anyhow::Result<Ending> {
     let interrupts = Interrupts::listen().context("cannot listen for signals")?;
-    let ending = play(plan, folder, &interrupts);
+    let (scenario, mechanism, trajectory) = (&plan.scenario, plan.mechanism.clone(), &plan.trajectory);
+    let ending = match kind {
+        Kind::Motion => {
+            let controller = MotionController::new(scenario, mechanism, trajectory.clone());
+            play(controller, plan, folder, &interrupts)
+        }
+        Kind::Hold => {
+            let controller = HoldPosition::new(scenario, mechanism, trajectory.duration_s());
+            play(controller, plan, folder, &interrupts)
+        }
+    };
     interrupts.let_go();
     ending
 }
 
-fn play(plan: &Plan, folder: &RunFolder, interrupts: &Interrupts) -> anyhow::Result<Ending> {
+fn play<C: Controller>(
+    controller: C,
+    plan: &Plan,
+    folder: &RunFolder,
+    interrupts: &Interrupts,
+) -> anyhow::Result<Ending> {
     let scenario = &plan.scenario;
     let mut plant = PlantCore::new(scenario, EPOCH_NS)?;
-    let mut controller = Controller::new(scenario, plan.mechanism.clone(), plan.trajectory.clone());
     let scene = Scene::new(&plan.mechanism, &scenario.jaw);
-    let mut log = Log::new(Backlog::start(Recorder::create(&folder.recording(), scene)?, Pace::Virtual));
+    let log = Log::new(Backlog::start(Recorder::create(&folder.recording(), scene)?, Pace::Virtual));
+    let mut rig = VirtualRig { controller, schedule: &plan.schedule, log, now_ns: EPOCH_NS, reading: None };
 
     let (mut cycle, mut plant_error) = (0, None);
-    while plant_error.is_none() && !controller.is_done() && log.is_safe() && !interrupts.is_end_insisted() {
+    while plant_error.is_none()
+        && rig.controller.outcome().is_none()
+        && rig.log.is_safe()
+        && !interrupts.is_end_insisted()
+    {
         cycle += 1;
         if interrupts.is_stop_asked() {
-            controller.request_stop();
+            rig.controller.request_stop();
         }
-        let sync_ns = EPOCH_NS + (cycle - 1) * scenario.period_ns();
-        plant_error = step(cycle, sync_ns, plan, &mut plant, &mut controller, &mut log).err();
+        let sync = Wake::on_time(cycle, EPOCH_NS + (cycle - 1) * scenario.period_ns());
+        plant_error = masseter_plant::cycle::run_cycle(&mut plant, &mut rig, &plan.schedule, &sync).err();
     }
-    let loss = log.backlog.finish().loss();
+    let loss = rig.log.backlog.finish().loss();
     if let Some(loss) = &loss {
         status!("masseter: {loss}; the run ends here");
     }
-    Ok(match (plant_error, controller.state()) {
+    Ok(match (plant_error, rig.controller.outcome()) {
         (Some(error), _) => Ending::died(Role::Plant.name(), error.to_string()),
         _ if loss.is_some() => Ending::RecordingFailed,
         _ if interrupts.is_stop_asked() => Ending::Interrupted,
-        (None, ControllerState::SafeStop) => Ending::SafeStop,
+        (None, Some(Outcome::SafeStop)) => Ending::SafeStop,
         (None, _) => Ending::Completed,
     })
 }
 
-/// One cycle: SYNC, process data, reading, controller, command.
-fn step(
-    cycle: u64,
-    sync_ns: u64,
-    plan: &Plan,
-    plant: &mut PlantCore,
-    controller: &mut Controller,
-    log: &mut Log,
-) -> Result<(), PlantError> {
-    plant.begin_cycle(Wake::on_time(cycle, sync_ns))?;
-    let reading_ns = sync_ns + plan.schedule.reading_by_ns;
-    plant.collect(reading_ns)?;
-    let reading = log.readings.record(&mut log.backlog, reading_ns, |reading| plant.fill_reading(reading));
-    if let Some(truth) = plant.truth() {
-        log.truths.record(&mut log.backlog, reading_ns, |message| *message = truth);
+/// Both sides of the rig in one thread: the controller's cycle runs where the plant waits for its command.
+struct VirtualRig<'a, C> {
+    controller: C,
+    schedule: &'a CycleSchedule,
+    log: Log,
+    now_ns: u64,
+    /// The reading of this cycle, as published.
+    reading: Option<Reading>,
+}
+
+impl<C: Controller> PlantPorts<VirtualLink> for VirtualRig<'_, C> {
+    type Command = Command;
+    type Error = PlantError;
+
+    fn now_ns(&self) -> u64 {
+        self.now_ns
     }
 
-    let now_ns = sync_ns + plan.schedule.controller_at_ns;
-    controller.observe(Some(&reading));
-    let event = controller.decide(Tick { cycle, now_ns });
-    let command = log.commands.record(&mut log.backlog, now_ns, |command| controller.fill_command(command));
-    log.states.record(&mut log.backlog, now_ns, |state: &mut State| {
-        controller.fill_state(state);
-        (state.due_ns, state.woke_ns, state.received_ns) = (now_ns, now_ns, now_ns);
-        (state.solved_ns, state.commanded_ns) = (now_ns, now_ns);
-    });
-    if let Some(event) = event {
-        log.controller_events.record(&mut log.backlog, now_ns, |message| *message = event);
+    fn wait_until(&mut self, _: u64, latest_ns: u64) -> u64 {
+        self.now_ns = latest_ns;
+        latest_ns
     }
-    plant.apply(now_ns, Some(&command))?;
-    log.drain(plant, now_ns);
-    Ok(())
+
+    fn wait_for_frames(&mut self, _: &mut VirtualLink, latest_ns: u64) -> u64 {
+        latest_ns
+    }
+
+    fn publish_reading(&mut self, fill: impl FnOnce(&mut Reading)) -> Result<(), PlantError> {
+        self.reading = Some(self.log.readings.record(&mut self.log.backlog, self.now_ns, fill));
+        Ok(())
+    }
+
+    fn publish_truth(&mut self, truth: &Truth) -> Result<(), PlantError> {
+        self.log.truths.record(&mut self.log.backlog, self.now_ns, |message| *message = *truth);
+        Ok(())
+    }
+
+    fn command(&mut self, sync: &Wake) -> Result<Option<Command>, PlantError> {
+        self.now_ns = sync.due_ns + self.schedule.controller_at_ns;
+        let wake = Wake::on_time(sync.cycle, self.now_ns);
+        let (reading, now_ns) = (self.reading.take(), self.now_ns);
+        let mut ports = VirtualPorts { log: &mut self.log, now_ns, reading, command: None };
+        let Ok(()) = masseter_shared::control::run_cycle(&mut self.controller, &mut ports, &wake);
+        Ok(ports.command)
+    }
+
+    fn publish_frames_and_events(&mut self, plant: &mut PlantCore) -> Result<(), PlantError> {
+        self.log.drain(plant, self.now_ns);
+        Ok(())
+    }
+}
+
+/// The controller's side of a cycle.
+struct VirtualPorts<'a> {
+    log: &'a mut Log,
+    now_ns: u64,
+    reading: Option<Reading>,
+    command: Option<Command>,
+}
+
+impl ControllerPorts for VirtualPorts<'_> {
+    type Reading = Reading;
+    type Error = Infallible;
+
+    fn now_ns(&self) -> u64 {
+        self.now_ns
+    }
+
+    fn reading(&mut self, _: &Wake) -> Result<Option<Reading>, Infallible> {
+        Ok(self.reading.take())
+    }
+
+    fn publish_command(&mut self, fill: impl FnOnce(&mut Command)) -> Result<(), Infallible> {
+        self.command = Some(self.log.commands.record(&mut self.log.backlog, self.now_ns, fill));
+        Ok(())
+    }
+
+    fn publish_state(&mut self, fill: impl FnOnce(&mut State)) -> Result<(), Infallible> {
+        self.log.states.record(&mut self.log.backlog, self.now_ns, fill);
+        Ok(())
+    }
+
+    fn publish_event(&mut self, event: &Event) -> Result<(), Infallible> {
+        self.log.controller_events.record(&mut self.log.backlog, self.now_ns, |message| *message = *event);
+        Ok(())
+    }
 }
 
 /// Numbers and records the messages of one publisher on one topic, as its outlet would.

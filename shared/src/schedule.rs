@@ -1,9 +1,9 @@
-//! The time table of a cycle, from the worst-case frame lengths on the bus.
+//! The schedule of a cycle, from the worst-case frame lengths on the bus.
 //!
-//! SYNC and process data go first, at offset 0; then the controller computes; then its targets go out,
-//! to be on the wire before the next SYNC. Heartbeats use what is left; SDO takes the place of the process data of the
-//! drive it goes to. Emergencies go before process data and are not in the table: in a cycle with one the reading or
-//! the command may be late, as with a disturbed bus.
+//! SYNC and the drives' process data (TPDO1) go first, at offset 0. Then the controller computes. Then its targets (RPDO1)
+//! go out, to be on the wire before the next SYNC. Heartbeats use the rest of the cycle; an SDO exchange takes the place of
+//! its drive's process data. Emergencies (EMCY) are not in the schedule: in a cycle with one, reading or command may be
+//! late, as with a disturbed bus.
 
 mod room;
 
@@ -19,7 +19,7 @@ pub use room::Room;
 /// tick falls, ns.
 pub const OFF_TICK_NS: u64 = 230_000;
 
-/// From the reading's worst case to the controller's deadline: publishing takes some microseconds, ns.
+/// From the latest reading to the controller's deadline, ns: publishing takes some microseconds.
 const PUBLISH_NS: u64 = 15_000;
 /// Data bytes of every SDO message.
 const SDO_LENGTH: u32 = 8;
@@ -29,45 +29,45 @@ const COMPUTE_NS: u64 = 20_000;
 /// Offsets from SYNC within one cycle, ns.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct CycleSchedule {
-    /// Before this the process data of all drives cannot have arrived: the frames take as long without a stuff bit.
+    /// The earliest arrival of the last process data: frames without stuff bits take this long.
     pub reading_from_ns: u64,
-    /// When they have arrived in the worst case.
+    /// The latest arrival of the last process data.
     pub reading_by_ns: u64,
     /// When the controller wakes.
     pub controller_at_ns: u64,
-    /// When the command must be there, so that its process data are on the wire before the next SYNC.
+    /// The latest command whose process data are on the wire before the next SYNC.
     pub command_by_ns: u64,
 }
 
 /// A cycle that does not fit.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ScheduleError {
-    /// No such bit rate.
+    /// Unknown bit rate.
     #[error("can.bitrate_bps: {0}")]
     Bitrate(#[from] BitrateError),
-    /// No such node id.
+    /// Unknown node id.
     #[error("can.node_ids: {0}")]
     NodeId(#[from] NodeIdError),
-    /// A message that nothing releases.
+    /// A message without a releaser.
     #[error(transparent)]
     NoReleaser(#[from] NoReleaser),
     /// The cycle is too short.
     #[error("can.buses: {misfit}; {room}")]
     Misfit {
-        /// What does not fit.
+        /// The part that does not fit.
         misfit: Misfit,
-        /// What would.
+        /// The rate that fits.
         room: Room,
     },
 }
 
-/// What does not fit into a cycle.
+/// The part of a cycle that does not fit.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum Misfit {
     /// Messages that do not arrive in time.
     #[error("the messages of a bus do not fit\n{0}")]
     Overload(#[from] Overload),
-    /// The bits fit, but leave the controller no time between reading and command.
+    /// The frames fit, but leave the controller no time between reading and command.
     #[error(
         "the reading may take until {reading_by_ns} ns and the command must be there by {command_by_ns} ns of a cycle \
          of {period_ns} ns, which leaves the controller no time; use a lower rate_hz or more buses"
@@ -83,14 +83,14 @@ pub enum Misfit {
 }
 
 impl CycleSchedule {
-    /// The time table for cycles of `period_ns`, by the busiest bus.
+    /// The schedule for cycles of `period_ns`, by the busiest bus.
     ///
     /// # Errors
-    /// [`ScheduleError`] where they are too short, with the rate that would do.
+    /// [`ScheduleError`] for cycles that are too short, with the highest rate that fits.
     pub fn new(can: &CanConfig, period_ns: u64) -> Result<Self, ScheduleError> {
         match Self::fit(can, period_ns)? {
             Ok(schedule) => Ok(schedule),
-            Err(misfit) => Err(ScheduleError::Misfit { misfit, room: Room::of(can)? }),
+            Err(misfit) => Err(ScheduleError::Misfit { misfit, room: Room::for_link(can)? }),
         }
     }
 
@@ -107,7 +107,7 @@ impl CycleSchedule {
         let shortest = |length| rates.duration_ns(shortest_bits(length, false, can.format()));
         let axes = can.buses.iter().map(Vec::len).max().unwrap_or(0) as u64;
         let (sync, tpdo, rpdo) = (0, Tpdo1::LENGTH as u32, Rpdo1::LENGTH as u32);
-        // A frame has arrived before the pause behind it.
+        // A frame has arrived before the interframe space behind it.
         let pause_ns = rates.nominal().bits_to_ns(INTERFRAME_BITS);
         let reading_from_ns = shortest(sync) + axes * shortest(tpdo) - pause_ns;
         // A heartbeat may just have begun when SYNC wants the bus.
@@ -129,8 +129,7 @@ fn heartbeat_ns(can: &CanConfig, rates: Rates) -> u64 {
     rates.duration_ns(longest_bits(HEARTBEAT_LENGTH, false, can.format()))
 }
 
-/// By how much drives that do not answer SYNC at once delay the reading, ns: a heartbeat may begin while they leave the
-/// bus idle.
+/// The delay of the reading by drives that do not answer SYNC at once, ns: a heartbeat may begin while the bus is idle.
 fn answer_ns(can: &CanConfig, heartbeat_ns: u64) -> u64 {
     if can.answer_us > 0 { u64::from(can.answer_us) * 1000 + heartbeat_ns } else { 0 }
 }
@@ -138,26 +137,26 @@ fn answer_ns(can: &CanConfig, heartbeat_ns: u64) -> u64 {
 /// Data bytes of a heartbeat.
 const HEARTBEAT_LENGTH: u32 = 1;
 
-/// The plan of every bus: SYNC, process data and heartbeats. The drives' process data are released by SYNC;
-/// SYNC and the commands' process data once a cycle, as if without jitter of the master's own.
+/// The plan of every bus: SYNC, process data and heartbeats. SYNC releases the drives' process data. The master releases
+/// SYNC and its own process data once a cycle, here without jitter.
 ///
 /// # Errors
-/// [`ScheduleError`] for bit rates, node ids and releasers that there are not; whether the messages fit, the plans say.
+/// [`ScheduleError`] for unknown bit rates, node ids and releasers. [`BusPlan::check`] finds messages that do not fit.
 pub fn plans(can: &CanConfig, period_ns: u64) -> Result<Vec<BusPlan>, ScheduleError> {
     plans_of(can, period_ns, Exchange::ProcessData)
 }
 
-/// The plans while the first drive of every bus is booted beside others that run: request and answer of one SDO
-/// exchange take the place of its process data. With more drives in the same state there is still one
-/// request a cycle, and each answer is no longer than the process data that the drive does not send.
+/// The plans while the first drive of every bus boots and the others run: request and answer of one SDO exchange take the
+/// place of its process data. With more drives booting there is still one request in a cycle, and each answer is no longer
+/// than the process data that its drive does not send.
 ///
-/// The offsets hold as well: an SDO frame blocks the bus for longer than a heartbeat, but for no longer
-/// than a heartbeat and the process data that are missing.
+/// The offsets of the schedule hold as well: an SDO frame blocks the bus for longer than a heartbeat, but for no longer than
+/// a heartbeat and the missing process data.
 fn plans_while_booting(can: &CanConfig, period_ns: u64) -> Result<Vec<BusPlan>, ScheduleError> {
     plans_of(can, period_ns, Exchange::Sdo)
 }
 
-/// What the first drive of a bus exchanges with the master in a cycle.
+/// The exchange of a bus's first drive with the master in a cycle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Exchange {
     ProcessData,

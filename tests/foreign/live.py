@@ -1,6 +1,8 @@
 """Watches a run with Python's `websockets`, and decodes what it sees by the schemas it is told.
 
-A second watcher is killed on the way. Fails when a channel or a message is missing or makes no sense, or when
+    tests/foreign/live.py target/release/masseter RUN_FOLDER
+
+A second watcher is killed during the run. Fails when a channel or a message is missing or makes no sense, or when
 the recording of the watched run is not complete.
 """
 
@@ -9,7 +11,6 @@ import multiprocessing
 import struct
 import subprocess
 import sys
-import tempfile
 from base64 import b64decode
 from collections import Counter
 from contextlib import contextmanager
@@ -27,7 +28,9 @@ DECODED_ONE_IN = 20
 PROTOCOLS = ["foxglove.sdk.v1", "foxglove.websocket.v1"]
 # Opcode, subscription and time, before the message itself.
 MESSAGE_HEAD = struct.Struct("<BIQ")
-UNHURRIED = Path(__file__).parents[1] / "unhurried.toml"
+LENIENT = Path(__file__).parents[1] / "lenient.toml"
+# Passed, or the verdict names the machine as the cause of missed cycles.
+PASSED_OR_INVALID = (0, 3)
 
 
 @contextmanager
@@ -96,7 +99,7 @@ def watch(link, channels, on_thousandth):
 
 def watch_a_run(masseter, out):
     """Starts a run, and a second watcher that is killed on the way; returns what the first one saw."""
-    arguments = [masseter, "run", UNHURRIED, "--live=127.0.0.1:0", "--duration", "5s", "--out", out]
+    arguments = [masseter, "run", LENIENT, "--live=127.0.0.1:0", "--duration", "5s", "--out", out]
     rig = subprocess.Popen(arguments, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True)
     url = next(line.split()[2] for line in rig.stderr if line.startswith("live on "))
 
@@ -108,18 +111,16 @@ def watch_a_run(masseter, out):
     with open_and_subscribe(url) as (link, channels):
         seen = watch(link, channels, on_thousandth=deserter.kill)
     said = rig.stderr.read()
-    assert rig.wait() == 0, (rig.returncode, said)
+    assert rig.wait() in PASSED_OR_INVALID, (rig.returncode, said)
     deserter.join()
     assert deserter.exitcode == -9, deserter.exitcode
     return seen
 
 
 def main():
-    masseter = sys.argv[1]
-    with tempfile.TemporaryDirectory() as folder:
-        out = Path(folder) / "run"
-        counts, parts = watch_a_run(masseter, out)
-        subprocess.run([masseter, "log", "verify", out], check=True, stdout=subprocess.DEVNULL)
+    masseter, out = sys.argv[1:]
+    counts, parts = watch_a_run(masseter, out)
+    subprocess.run([masseter, "log", "verify", out], check=True, stdout=subprocess.DEVNULL)
     for topic in TOPICS:
         print(f"{topic:8} {counts[topic]:8}")
         assert counts[topic] > 0, f"no message on {topic}"

@@ -1,6 +1,6 @@
-"""Looks at a run on a terminal: `pyte` renders what a person would see.
+"""Looks at a run on a terminal: `pyte` renders what a user sees.
 
-Fails when the picture is not redrawn in its place, when the verdict does not stand readable below it, when a picture
+Fails when the panel is not redrawn in its place, when the verdict does not stand readable below it, when a panel
 that is higher than the terminal scrolls, or when the terminal is not left as it was: after a run, after Ctrl-C, with
 --quiet and on a terminal that only prints.
 """
@@ -16,22 +16,22 @@ from pathlib import Path
 
 import pyte
 
-# Narrower than the longest line of the picture, and longer than everything that is said.
+# Narrower than the longest line of the panel, and longer than everything that is said.
 COLUMNS, LINES = 60, 300
 INTERRUPTED = 130
-UNHURRIED = Path(__file__).parents[1] / "unhurried.toml"
-# A starved logger loses messages: the terminal is judged here, not the rig.
-ACCEPTED = (0, 6)
-PICTURE = "woke late, µs"
-# Lower than the picture, but not than the line that tells it.
-FEW_LINES = 8
-VERDICTS = ("PASS: ", "INCOMPLETE: ", "INTERRUPTED: ")
+LENIENT = Path(__file__).parents[1] / "lenient.toml"
+# Passed, too disturbed to judge, or incomplete because the machine starved the recorder: this judges the terminal.
+ACCEPTED = (0, 3, 6)
+PANEL = "wake-up latency, µs"
+# Fewer than the panel has, but more than stand above its heading.
+FEW_LINES = 6
+VERDICTS = ("PASS: ", "INVALID: ", "INCOMPLETE: ", "INTERRUPTED: ")
 
 
 def run(masseter, arguments, term="xterm-256color", interrupt_after=None, lines=LINES):
     """Runs on a terminal of its own; returns exit code, output and what stands on the screen."""
     with tempfile.TemporaryDirectory() as folder:
-        command = [masseter, "run", str(UNHURRIED), "--out", str(Path(folder) / "run"), *arguments]
+        command = [masseter, "run", str(LENIENT), "--out", str(Path(folder) / "run"), *arguments]
         process, terminal = pty.fork()
         if process == 0:
             os.environ["TERM"] = term
@@ -57,11 +57,11 @@ def run(masseter, arguments, term="xterm-256color", interrupt_after=None, lines=
     return code, output.decode(), [line.rstrip() for line in scrolled + screen.display]
 
 
-def assert_one_picture_above_a_verdict(shown):
-    pictures = [number for number, line in enumerate(shown) if PICTURE in line]
+def assert_one_panel_above_a_verdict(shown):
+    panels = [number for number, line in enumerate(shown) if PANEL in line]
     verdicts = [number for number, line in enumerate(shown) if line.startswith(VERDICTS)]
-    assert len(pictures) == 1, "\n".join(shown)
-    assert len(verdicts) == 1 and verdicts[0] > pictures[0], "\n".join(shown)
+    assert len(panels) == 1, "\n".join(shown)
+    assert len(verdicts) == 1 and verdicts[0] > panels[0], "\n".join(shown)
 
 
 signal.alarm(120)
@@ -69,20 +69,20 @@ masseter = os.path.abspath(sys.argv[1])
 
 code, output, shown = run(masseter, ["--duration", "3s"])
 assert code in ACCEPTED, (code, output)
-assert output.count(PICTURE) >= 2, "the picture was not redrawn"
-assert_one_picture_above_a_verdict(shown)
+assert output.count(PANEL) >= 2, "the panel was not redrawn"
+assert_one_panel_above_a_verdict(shown)
 print("\n".join(line for line in shown if line))
 
 code, output, shown = run(masseter, ["--duration", "3s"], lines=FEW_LINES)
 assert code in ACCEPTED, (code, output)
-assert_one_picture_above_a_verdict(shown)
+assert_one_panel_above_a_verdict(shown)
 
 code, output, shown = run(masseter, ["--duration", "60s"], interrupt_after="running")
 assert code == INTERRUPTED, (code, output)
-assert_one_picture_above_a_verdict(shown)
+assert_one_panel_above_a_verdict(shown)
 
 code, output, shown = run(masseter, ["--duration", "1s"], term="dumb")
-assert code in ACCEPTED and "\x1b" not in output and "off by" in output, (code, output)
+assert code in ACCEPTED and "\x1b" not in output and "tracking error" in output, (code, output)
 
 code, output, shown = run(masseter, ["--duration", "1s", "--quiet"])
-assert code in ACCEPTED and PICTURE not in output and "\x1b" not in output and "off by" not in output, output
+assert code in ACCEPTED and PANEL not in output and "\x1b" not in output and "tracking error" not in output, output

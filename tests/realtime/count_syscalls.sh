@@ -10,7 +10,7 @@ traced_s=4
 
 work=$(mktemp -d)
 # Being traced holds a process up for longer than its partners wait in earnest.
-cat >"$work/unhurried.toml" <<'END'
+cat >"$work/lenient.toml" <<'END'
 [controller]
 stale_cycles = 5000
 tracking_limit_m = 1.0
@@ -21,7 +21,7 @@ heartbeat_consumer_ms = 5000
 slide.following_error_m = 1.0
 leg.following_error_m = 1.0
 END
-"$masseter" run "$work/unhurried.toml" --duration 60s --rate-hz $rate_hz --out "$work/run" >"$work/said" 2>&1 &
+"$masseter" run "$work/lenient.toml" --duration 60s --rate-hz $rate_hz --out "$work/run" >"$work/said" 2>&1 &
 rig=$!
 trap 'kill -INT $rig 2>/dev/null; wait $rig 2>/dev/null || true; rm -rf "$work"' EXIT
 

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Kills or stops one process of a running rig at a random moment, again and again, and shows as a
-distribution how soon the survivor reacts, how soon the supervisor has swept up, and what a killed logger's recording
-lacks; then kills all of a rig at once, and shows how soon `masseter clean` has made room for another. A logger that is
+distribution how soon the survivor reacts, how soon the supervisor has swept up, and what a killed recorder's recording
+lacks; then kills all of a rig at once, and shows how soon `masseter clean` has made room for another. A recorder that is
 stopped for a second must not be noticed: the rig goes on, and the recording lacks nothing.
 
     tests/realtime/kill.py target/release/masseter --kills 200
@@ -10,16 +10,16 @@ stopped for a second must not be noticed: the rig goes on, and the recording lac
 A rig takes 20 silent cycles of 1 ms for a death. On a machine that stands still for longer than that by itself, let it
 wait for more (--silent-cycles).
 
-Fails when a survivor does not react within the bound, when a killed logger's recording lacks more than its last
-second or cannot be recovered, when a stopped logger stops the rig or loses a message, when `masseter clean` takes too
+Fails when a survivor does not react within the bound, when a killed recorder's recording lacks more than its last
+second or cannot be recovered, when a stopped recorder stops the rig or loses a message, when `masseter clean` takes too
 long, or when anything stays in shared memory. Only the Python standard library is used.
 """
 
 import argparse
+import csv
 import json
 import os
 import random
-import re
 import signal
 import subprocess
 import sys
@@ -32,11 +32,11 @@ REACTION_MARGIN_MS = 60.0
 # `masseter clean`, the start of its process included. The aim is 50 ms, which a busy machine stretches.
 CLEAN_BOUND_MS = 1000.0
 DISTURBED, INCOMPLETE, INTERRUPTED = 3, 6, 130
-# Half of what the logger's queues hold at 1 kHz.
-LOGGER_STOPPED_S = 1.0
+# Half of what the recorder's queues hold at 1 kHz.
+RECORDER_STOPPED_S = 1.0
 # Beyond the silent cycles, which may take as long.
 STOPPED_MARGIN_S = 0.28
-PROCESSES = ("controller", "plant", "logger")
+PROCESSES = ("controller", "plant", "recorder")
 ALL = "all"
 REACTS, OVER, LACKS, CLEAN = "survivor reacts", "over and swept up", "recording lacks", "made clean"
 REACTION = {"controller": "command_lost", "plant": "stale_reading"}
@@ -48,9 +48,6 @@ tracking_limit_m = 0.1
 [can]
 command_timeout_cycles = {silent_cycles}
 heartbeat_consumer_ms = {heartbeat_ms}
-[checks]
-missed_cycles = 1000000
-tracking_rms_mm = 1000.0
 [drives]
 slide.following_error_m = 1.0
 leg.following_error_m = 1.0
@@ -103,32 +100,34 @@ def reaction_ms(run, role, hit_ns):
 
 
 def log(masseter, verb, recording, expected, *more):
-    """What `masseter log` says of a recording."""
+    """Runs a verb of `masseter log`, which must end with the expected exit code."""
     words = [masseter, "log", verb, recording, *more]
     result = subprocess.run(words, capture_output=True, text=True)
     if result.returncode != expected:
         raise SystemExit(f"log {verb} ended with {result.returncode}: {result.stdout}{result.stderr}")
-    return result.stdout
 
 
 def lost_ms(masseter, run, hit_ns):
-    """What the recording of a killed logger lacks at its end, ms; everything before that can be read."""
-    recording, recovered = run / "recording.mcap", run / "recovered.mcap"
-    proof = log(masseter, "verify", recording, INCOMPLETE)
-    if "missing:" in proof:
-        # The logger was starved before the hit, and counted that.
+    """What the recording of a killed recorder lacks at its end, ms; everything before that can be read."""
+    recording, recovered, tables = run / "recording.mcap", run / "recovered.mcap", run / "tables"
+    log(masseter, "verify", recording, INCOMPLETE)
+    summary = json.loads((run / "summary.json").read_text())
+    if any(topic["missing"] for topic in summary["figures"]["topics"]):
+        # The recorder was starved before the hit, and counted that.
         raise Disturbed
     log(masseter, "recover", recording, 0, "--out", recovered)
     log(masseter, "verify", recovered, 0)
-    told = re.search(r"recorded from (\d+) to (\d+) ns", log(masseter, "info", recording, INCOMPLETE))
-    return max(0.0, (hit_ns - int(told[2])) / 1e6)
+    log(masseter, "export", recovered, 0, "--topic", "reading", "--out", tables)
+    with (tables / "reading.csv").open() as table:
+        last_ns = max(int(line["log_time_ns"]) for line in csv.DictReader(table))
+    return max(0.0, (hit_ns - last_ns) / 1e6)
 
 
-def stop_logger(masseter, rig, run, logger):
-    """The rig goes on while its logger stands still, and the queues keep everything for it."""
-    os.kill(logger, signal.SIGSTOP)
-    time.sleep(LOGGER_STOPPED_S)
-    os.kill(logger, signal.SIGCONT)
+def stop_recorder(masseter, rig, run, recorder):
+    """The rig goes on while its recorder stands still, and the queues keep everything for it."""
+    os.kill(recorder, signal.SIGSTOP)
+    time.sleep(RECORDER_STOPPED_S)
+    os.kill(recorder, signal.SIGCONT)
     interrupted_ns = time.monotonic_ns()
     rig.send_signal(signal.SIGINT)
     code = rig.wait(timeout=60)
@@ -136,13 +135,14 @@ def stop_logger(masseter, rig, run, logger):
     if code == DISTURBED:
         raise Disturbed
     if code != INTERRUPTED:
-        raise SystemExit(f"the logger was stopped for {LOGGER_STOPPED_S} s and the rig ended with {code}")
-    assert_clean(rig, "logger")
+        raise SystemExit(f"the recorder was stopped for {RECORDER_STOPPED_S} s and the rig ended with {code}")
+    assert_clean(rig, "recorder")
     log(masseter, "verify", run / "recording.mcap", 0)
     return {OVER: over_ms}
 
 
-def left_behind(supervisor):
+def shared_memory_of(supervisor):
+    """A rig's files in shared memory."""
     return [name for name in os.listdir("/dev/shm") if name.startswith(f"masseter_{os.getuid()}_{supervisor}-")]
 
 
@@ -157,12 +157,15 @@ def hit_once(masseter, role, how, silent_cycles, chance):
         victims = [child_of(rig, one) for one in (PROCESSES if role == ALL else [role])]
         wait_until_it_records(rig, run)
         time.sleep(chance.uniform(0.0, 1.0))
+        files = shared_memory_of(rig.pid)
         if rig.poll() is not None:
             raise Disturbed
+        if not files:
+            raise SystemExit("a running rig has no files in shared memory, so their absence would prove nothing")
         if role == ALL:
             return {CLEAN: clean_ms(masseter, rig, victims)}
-        if role == "logger" and how == "STOP":
-            return stop_logger(masseter, rig, run, victims[0])
+        if role == "recorder" and how == "STOP":
+            return stop_recorder(masseter, rig, run, victims[0])
         hit_ns = time.monotonic_ns()
         try:
             os.kill(victims[0], signal.SIGKILL if how == "KILL" else signal.SIGSTOP)
@@ -177,7 +180,7 @@ def hit_once(masseter, role, how, silent_cycles, chance):
         rig.wait(timeout=60)
         measured = {OVER: (time.monotonic_ns() - hit_ns) / 1e6}
         assert_clean(rig, role)
-        if role == "logger":
+        if role == "recorder":
             measured[LACKS] = lost_ms(masseter, run, hit_ns)
         else:
             measured[REACTS] = reaction_ms(run, role, hit_ns)
@@ -209,13 +212,13 @@ def lives(process):
 
 
 def assert_clean(rig, role):
-    left = left_behind(rig.pid)
+    left = shared_memory_of(rig.pid)
     if left:
         raise SystemExit(f"after the end of {role} these stayed in shared memory: {left}")
 
 
-def hits(masseter, role, how, silent_cycles, chance, count):
-    """As many hits of undisturbed rigs, and how many disturbed ones there were."""
+def disturb(masseter, role, how, silent_cycles, chance, count):
+    """Hits `count` undisturbed rigs; returns the results, and how many other rigs the machine had disturbed."""
     results, disturbed = [], 0
     while len(results) < count:
         try:
@@ -247,7 +250,7 @@ def main():
     bounds_ms = {REACTS: 2 * arguments.silent_cycles + REACTION_MARGIN_MS, LACKS: 1000.0, CLEAN: CLEAN_BOUND_MS}
     failed = []
     for role in roles:
-        results, disturbed = hits(
+        results, disturbed = disturb(
             arguments.masseter.resolve(), role, arguments.signal, arguments.silent_cycles, chance, arguments.kills
         )
         title = f"{role:<10} SIG{arguments.signal} × {len(results)}"

@@ -13,7 +13,7 @@ use masseter_shared::geometry::{Actuators, LEGS, Mechanism, Vec3};
 use nalgebra::Vector3;
 
 use super::Equations;
-use super::closure::each;
+use super::legs::each;
 
 /// What must hold for a true solution, in the order in which it is checked.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -66,11 +66,11 @@ impl Assembly {
         let equations = Equations::new(mechanism, actuators);
         let at = equations.evaluate(Vector3::from(*theta_rad));
         let hinges = std::array::from_fn(|leg| mechanism.hinge(leg, actuators.slide_m[leg]));
-        Self::of(mechanism, &hinges, &at.corners, equations.determinant(&at))
+        Self::from_corners(mechanism, &hinges, &at.corners, equations.determinant(&at))
     }
 
     #[inline]
-    pub(super) fn of(
+    pub(super) fn from_corners(
         mechanism: &Mechanism,
         hinges: &[Vec3; LEGS],
         corners: &[Vec3; LEGS],

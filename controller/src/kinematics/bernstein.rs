@@ -24,6 +24,8 @@ pub(super) const NODES: [f64; DEGREE + 1] = [
 /// Error of the coefficients relative to the largest value at a node. Interpolation was measured below to make
 /// 2·10⁻¹³ of values with 16 roundings relative to each; the rest is for what cancels within the values.
 const NOISE: f64 = 2e-12;
+/// Error of the coefficients relative to the largest rounding of a value that the caller states.
+const GROWTH: f64 = 20.0;
 /// The first and the last coefficient, one bit each.
 const ENDS: u32 = 1 | 1 << DEGREE;
 /// Halvings after which what is undecided is reported as it is.
@@ -61,13 +63,18 @@ enum Verdict {
     Unknown,
 }
 
-/// Calls `found` for every place in [0, 1] where the polynomial through these values at [`NODES`] has
-/// zeros.
-pub(super) fn locate(values: &[f64; DEGREE + 1], mut found: impl FnMut(Zeros)) -> Result<(), Vanishing> {
+/// Calls `found` for every place in [0, 1] where the polynomial through these values at [`NODES`] has zeros.
+/// `rounding` is the largest error of a value.
+pub(super) fn locate(
+    values: &[f64; DEGREE + 1],
+    rounding: f64,
+    mut found: impl FnMut(Zeros),
+) -> Result<(), Vanishing> {
     if !values.iter().all(|value| value.is_finite()) {
         return Err(Vanishing);
     }
-    let noise = NOISE * values.iter().fold(0.0, |most: f64, value| most.max(value.abs()));
+    let largest = values.iter().fold(0.0, |most: f64, value| most.max(value.abs()));
+    let noise = (NOISE * largest).max(GROWTH * rounding);
     let mut pending = [Piece::whole(values); DEEPEST as usize + 1];
     let mut waiting = 1;
     let mut undecided: Option<Interval> = None;
@@ -148,7 +155,7 @@ impl Piece {
         let mut row = self.coefficients;
         let (mut low, mut high) = (row, row);
         for level in 1..=DEGREE {
-            // What lies beyond DEGREE − level nobody reads; loops of one length are unrolled and faster.
+            // Entries beyond DEGREE − level are not used; loops of one length are unrolled and faster.
             for index in 0..DEGREE {
                 row[index] = 0.5 * (row[index] + row[index + 1]);
             }
@@ -225,7 +232,7 @@ mod tests {
 
     fn located(values: &[f64; DEGREE + 1]) -> Vec<Zeros> {
         let mut all = Vec::new();
-        locate(values, |zeros| all.push(zeros)).unwrap();
+        locate(values, 0.0, |zeros| all.push(zeros)).unwrap();
         all
     }
 
@@ -243,8 +250,8 @@ mod tests {
         let [Zeros::One(single), Zeros::Undecided(triple)] = zeros[..] else { panic!("{zeros:?}") };
         assert!(triple.low <= 0.3 && 0.3 <= triple.high && triple.width() < 2e-3);
         assert!(single.low <= 0.7 && 0.7 <= single.high);
-        assert_eq!(locate(&[0.0; DEGREE + 1], |_| ()), Err(Vanishing));
-        assert_eq!(locate(&[f64::NAN; DEGREE + 1], |_| ()), Err(Vanishing));
+        assert_eq!(locate(&[0.0; DEGREE + 1], 0.0, |_| ()), Err(Vanishing));
+        assert_eq!(locate(&[f64::NAN; DEGREE + 1], 0.0, |_| ()), Err(Vanishing));
     }
 
     proptest! {

@@ -22,7 +22,8 @@ use std::f64::consts::PI;
 
 use masseter_shared::geometry::LEGS;
 
-use super::closure::{Closing, Closure, Side, each};
+use super::legs::each;
+use super::loop_equations::{LoopEquations, Residuals, Side};
 
 /// z per unit of y.
 const INVERSE_ROUNDINGS: f64 = 4.0;
@@ -46,7 +47,7 @@ impl Certificate {
     /// The proof at evaluated leg angles; none where the inequality does not hold or a value is no
     /// number, as at a singularity.
     #[inline]
-    pub(super) fn new(closure: &Closure<'_>, at: &Closing) -> Option<Self> {
+    pub(super) fn new(loops: &LoopEquations<'_>, at: &Residuals) -> Option<Self> {
         let inverse = at.inverse();
         let most = |bounds: [f64; LEGS]| {
             largest(each(|row| {
@@ -54,9 +55,9 @@ impl Certificate {
                 a.abs() * bounds[0] + b.abs() * bounds[1] + c.abs() * bounds[2]
             }))
         };
-        let offset_rad = most(each(|side| at.value[side].abs() + closure.sides[side].rounding))?;
-        let curvature = most(each(|side| curvature_bound(&closure.sides[side])))?;
-        Self::from_bounds(offset_rad * OUTWARD, curvature * OUTWARD, &closure.actuators.leg_m)
+        let offset_rad = most(each(|side| at.value[side].abs() + loops.sides[side].rounding))?;
+        let curvature = most(each(|side| curvature_bound(&loops.sides[side])))?;
+        Self::from_bounds(offset_rad * OUTWARD, curvature * OUTWARD, &loops.actuators.leg_m)
     }
 
     #[inline]
@@ -97,21 +98,21 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::kinematics::heading::Heading;
+    use crate::kinematics::leg_angle::LegAngle;
     use crate::kinematics::samples::{mechanisms, poses, published_mechanism};
 
-    fn certify(closure: &Closure<'_>, theta_rad: [f64; LEGS]) -> Option<Certificate> {
-        Certificate::new(closure, &closure.evaluate(&theta_rad.map(Heading::from_rad)))
+    fn certify(loops: &LoopEquations<'_>, theta_rad: [f64; LEGS]) -> Option<Certificate> {
+        Certificate::new(loops, &loops.evaluate(&theta_rad.map(LegAngle::from_rad)))
     }
 
     #[test]
     fn the_neutral_pose_is_certain_within_degrees() {
         let neutral = Actuators { slide_m: [0.0; LEGS], leg_m: [0.27; LEGS] };
         let mechanism = published_mechanism();
-        let closure = Closure::new(&mechanism, &neutral);
-        let start = [83.862_391_93_f64.to_radians(); LEGS].map(Heading::from_rad);
-        let closed = closure.close(&start, 4).unwrap();
-        let certificate = Certificate::new(&closure, &closed.closing).unwrap();
+        let loops = LoopEquations::new(&mechanism, &neutral);
+        let start = [83.862_391_93_f64.to_radians(); LEGS].map(LegAngle::from_rad);
+        let closed = loops.close(&start, 4).unwrap();
+        let certificate = Certificate::new(&loops, &closed.residuals).unwrap();
         assert!(certificate.exists_within_rad < 1e-12);
         assert!(certificate.unique_within_rad.to_degrees() > 2.0, "{certificate:?}");
         // The next solution, with the platform turned over, is 12.57° away.
@@ -122,11 +123,11 @@ mod tests {
     fn what_is_no_solution_and_what_is_no_number_is_not_certified() {
         let neutral = Actuators { slide_m: [0.0; LEGS], leg_m: [0.27; LEGS] };
         let mechanism = published_mechanism();
-        let closure = Closure::new(&mechanism, &neutral);
-        assert_eq!(certify(&closure, [1.2, 1.5, 1.3]), None);
-        assert_eq!(certify(&closure, [f64::NAN; LEGS]), None);
+        let loops = LoopEquations::new(&mechanism, &neutral);
+        assert_eq!(certify(&loops, [1.2, 1.5, 1.3]), None);
+        assert_eq!(certify(&loops, [f64::NAN; LEGS]), None);
         // All legs level: no side changes at first order, the Jacobian vanishes.
-        assert_eq!(certify(&closure, [0.0; LEGS]), None);
+        assert_eq!(certify(&loops, [0.0; LEGS]), None);
     }
 
     proptest! {
@@ -137,9 +138,9 @@ mod tests {
             off in [-1e-3..1e-3f64, -1e-3..1e-3f64, -1e-3..1e-3f64],
         ) {
             let joints = mechanism.inverse(&pose).unwrap();
-            let closure = Closure::new(&mechanism, &joints.actuators);
+            let loops = LoopEquations::new(&mechanism, &joints.actuators);
             let theta_rad = std::array::from_fn(|leg| joints.theta_rad[leg] + off[leg]);
-            if let Some(certificate) = certify(&closure, theta_rad) {
+            if let Some(certificate) = certify(&loops, theta_rad) {
                 let distance = off.iter().fold(0.0, |worst: f64, off| worst.max(off.abs()));
                 prop_assert!(distance <= certificate.exists_within_rad + 1e-13);
                 prop_assert!(certificate.exists_within_rad < certificate.unique_within_rad);
@@ -153,13 +154,13 @@ mod tests {
             a in prop::array::uniform3(-3.1..3.1f64), b in prop::array::uniform3(-3.1..3.1f64),
         ) {
             let joints = mechanism.inverse(&pose).unwrap();
-            let closure = Closure::new(&mechanism, &joints.actuators);
-            let at = |theta_rad: [f64; LEGS]| closure.evaluate(&theta_rad.map(Heading::from_rad));
+            let loops = LoopEquations::new(&mechanism, &joints.actuators);
+            let at = |theta_rad: [f64; LEGS]| loops.evaluate(&theta_rad.map(LegAngle::from_rad));
             let (here, there) = (at(a), at(b));
             let distance = (0..LEGS).map(|leg| (a[leg] - b[leg]).abs()).fold(0.0, f64::max);
             for side in 0..LEGS {
                 let change = (here.near[side] - there.near[side]).abs() + (here.far[side] - there.far[side]).abs();
-                prop_assert!(change <= curvature_bound(&closure.sides[side]) * distance + 1e-12);
+                prop_assert!(change <= curvature_bound(&loops.sides[side]) * distance + 1e-12);
             }
         }
     }

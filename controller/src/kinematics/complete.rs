@@ -1,13 +1,25 @@
-//! The true solution among all: what is right when nothing is known but the input.
+//! The true solution among all, from the input alone.
 
 use masseter_shared::geometry::{Actuators, Mechanism};
 
-use super::closure::Closure;
-use super::elimination::Wanted;
-use super::platforms::{Platforms, assembly, check, nearest_other_rad};
+use super::elimination::SolutionFilter;
+use super::loop_equations::LoopEquations;
+use super::loop_solutions::{LoopSolutions, assembly, check, nearest_other_rad};
 use super::{Condition, ForwardError, Solution};
 
-/// The one solution of an input in which the mechanism stands as it was assembled, certified.
+/// The one solution of an input in which the mechanism stands as it was assembled, with its certificate.
+///
+/// ```
+/// use masseter_controller::kinematics::solve_completely;
+/// use masseter_shared::geometry::{Actuators, Mechanism, MechanismConfig};
+///
+/// let mechanism = Mechanism::new(&MechanismConfig::default())?;
+/// let neutral = Actuators { slide_m: [0.0; 3], leg_m: [0.27; 3] };
+/// let solution = solve_completely(&mechanism, &neutral)?;
+/// assert!((solution.theta_rad[0].to_degrees() - 83.862).abs() < 1e-3);
+/// assert!((solution.pose.translation.z - 0.268_452).abs() < 1e-6);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 ///
 /// # Errors
 /// [`ForwardError::NotFinite`] and [`ForwardError::NoLength`] for what is no input;
@@ -16,34 +28,38 @@ use super::{Condition, ForwardError, Solution};
 /// [`ForwardError::Undecided`] where solutions meet.
 pub fn solve_completely(mechanism: &Mechanism, actuators: &Actuators) -> Result<Solution, ForwardError> {
     check(actuators)?;
-    choose(&Closure::new(mechanism, actuators))
+    choose(&LoopEquations::new(mechanism, actuators))
 }
 
-pub(super) fn choose(closure: &Closure<'_>) -> Result<Solution, ForwardError> {
-    match only_true_one(closure) {
+pub(super) fn choose(loops: &LoopEquations<'_>) -> Result<Solution, ForwardError> {
+    match only_true_one(loops) {
         Some(solution) => Ok(solution),
-        None => judged(closure),
+        None => judged(loops),
     }
 }
 
-/// What nearly every input has. Only true ones are looked for, so it does not tell why there is none.
-fn only_true_one(closure: &Closure<'_>) -> Option<Solution> {
-    let platforms = Platforms::of(closure, Wanted::PositiveDeterminant).ok()?;
-    let mut true_ones = platforms.true_ones(closure);
-    let solution = Solution::new(closure, true_ones.next()?);
-    (true_ones.next().is_none() && solution.certificate.is_some()).then_some(solution)
+/// The only true solution, as nearly every input has it. Other solutions are not followed, so a failure has no reason.
+fn only_true_one(loops: &LoopEquations<'_>) -> Option<Solution> {
+    let solutions = LoopSolutions::find(loops, SolutionFilter::PositiveDeterminant).ok()?;
+    let mut true_ones = solutions.true_ones(loops);
+    let solution = Solution::new(loops, true_ones.next()?);
+    (true_ones.next().is_none() && solutions.singular_one(loops).is_none()).then_some(solution)
 }
 
-fn judged(closure: &Closure<'_>) -> Result<Solution, ForwardError> {
-    let platforms = Platforms::of(closure, Wanted::All)?;
-    let mut true_ones = platforms.true_ones(closure);
-    match (true_ones.next(), true_ones.count()) {
-        (Some(closed), 0) => certified(&Solution::new(closure, closed)),
-        (Some(_), others) => Err(ForwardError::Ambiguous {
+fn judged(loops: &LoopEquations<'_>) -> Result<Solution, ForwardError> {
+    let solutions = LoopSolutions::find(loops, SolutionFilter::All)?;
+    let mut true_ones = solutions.true_ones(loops);
+    match (true_ones.next(), true_ones.count(), solutions.singular_one(loops)) {
+        (Some(_), others @ 1.., _) => Err(ForwardError::Ambiguous {
             count: 1 + others,
-            separation_rad: separation_rad(closure, &platforms),
+            separation_rad: separation_rad(loops, &solutions),
         }),
-        (None, _) => Err(match nearly_true(closure, &platforms) {
+        (_, _, Some(closed)) => Err(ForwardError::Singular {
+            determinant: loops.determinant(&closed.residuals),
+            residual_m: loops.residual_m(&closed.residuals),
+        }),
+        (Some(closed), ..) => Ok(Solution::new(loops, closed)),
+        (None, ..) => Err(match nearly_true(loops, &solutions) {
             Some(violated) => ForwardError::WrongAssembly { violated },
             None => ForwardError::Unassemblable,
         }),
@@ -51,20 +67,15 @@ fn judged(closure: &Closure<'_>) -> Result<Solution, ForwardError> {
 }
 
 /// How far the nearest two of the true ones are apart, radians.
-fn separation_rad(closure: &Closure<'_>, platforms: &Platforms) -> f64 {
-    let true_ones = || platforms.true_ones(closure).map(|closed| &closed.headings);
-    let nearest = true_ones().filter_map(|headings| nearest_other_rad(headings, true_ones()));
+fn separation_rad(loops: &LoopEquations<'_>, solutions: &LoopSolutions) -> f64 {
+    let true_ones = || solutions.true_ones(loops).map(|closed| &closed.leg_angles);
+    let nearest = true_ones().filter_map(|leg_angles| nearest_other_rad(leg_angles, true_ones()));
     nearest.min_by(f64::total_cmp).unwrap_or(0.0)
 }
 
-fn certified(solution: &Solution) -> Result<Solution, ForwardError> {
-    let Solution { determinant, residual_m, .. } = *solution;
-    solution.certificate.map(|_| *solution).ok_or(ForwardError::Singular { determinant, residual_m })
-}
-
 /// The condition at which the last of the solutions failed.
-fn nearly_true(closure: &Closure<'_>, platforms: &Platforms) -> Option<Condition> {
-    platforms.iter().filter_map(|closed| assembly(closure, closed).violated()).max()
+fn nearly_true(loops: &LoopEquations<'_>, solutions: &LoopSolutions) -> Option<Condition> {
+    solutions.iter().filter_map(|closed| assembly(loops, closed).violated()).max()
 }
 
 #[cfg(test)]
@@ -73,11 +84,28 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::kinematics::samples::{AMBIGUOUS, angle_between, mechanisms, poses, published_mechanism};
+    use crate::kinematics::samples::{
+        AMBIGUOUS, NearlySingular, angle_between, mechanisms, nearly_singular, poses, published_mechanism,
+    };
     use crate::kinematics::{Options, Solutions, solve_newton};
 
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(1000))]
+
+        /// Up to the singularity, where the true solution and another can no longer be separated.
+        #[test]
+        fn no_true_solution_is_called_a_wrong_assembly(singular in nearly_singular()) {
+            let NearlySingular { mechanism, joints, determinant } = singular;
+            let standing = super::super::Assembly::new(&mechanism, &joints.actuators, &joints.theta_rad);
+            if !standing.is_true() {
+                return Ok(());
+            }
+            match solve_completely(&mechanism, &joints.actuators) {
+                Ok(solution) => prop_assert!(joints.theta_rad.iter().zip(solution.theta_rad).all(|(a, b)| (a - b).abs() < 1e-6)),
+                Err(ForwardError::Ambiguous { .. }) => {}
+                Err(error) => prop_assert!(error.reason() == "singular" && determinant < 1e-5, "{error}"),
+            }
+        }
 
         #[test]
         fn a_pose_comes_back_from_its_actuators_alone(mechanism in mechanisms(), pose in poses(30.0)) {
@@ -112,7 +140,7 @@ mod tests {
         }
     }
 
-    /// Wrong solutions stand nearer to each of the two.
+    /// Each of the two has a wrong solution nearer than the other true one.
     #[test]
     fn an_ambiguous_input_says_how_far_its_true_solutions_are_apart() {
         let all = Solutions::new(&published_mechanism(), &AMBIGUOUS).unwrap();
@@ -125,6 +153,20 @@ mod tests {
         let error = solve_completely(&published_mechanism(), &AMBIGUOUS).unwrap_err();
         let ForwardError::Ambiguous { count: 2, separation_rad } = error else { panic!("{error}") };
         assert!((separation_rad - apart_rad).abs() < 1e-9, "{separation_rad}, not {apart_rad}");
+    }
+
+    /// The true solution lies 1.3·10⁻⁵ rad from another.
+    #[test]
+    fn a_true_solution_next_to_a_singularity_is_no_wrong_assembly() {
+        let actuators = Actuators {
+            slide_m: [-0.024_960_023_256_180_783, -0.019_226_737_730_943_216, -0.027_995_734_854_166_104],
+            leg_m: [0.247_840_170_146_961_3, 0.241_913_748_868_673_84, 0.275_213_645_808_134_73],
+        };
+        let solution = solve_completely(&published_mechanism(), &actuators).unwrap();
+        for (found, known) in solution.theta_rad.into_iter().zip([1.289_906_3, 1.381_370_4, 1.374_701_5]) {
+            assert!((found - known).abs() < 1e-7);
+        }
+        assert!((solution.determinant - 3.0e-5).abs() < 0.1e-5);
     }
 
     #[test]

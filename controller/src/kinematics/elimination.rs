@@ -1,36 +1,35 @@
 //! Every set of leg angles that closes the platform, by eliminating two of the three.
 //!
-//! At a given θ₁ legs 2 and 3 have two headings each ([`FourBar`]); side 23 decides which of the four
+//! At a given θ₁ legs 2 and 3 have two possible angles each ([`FourBar`]); side 23 decides which of the four
 //! pairs close. With Nⱼ = Bⱼ² + Cⱼ² the product over the pairs,
 //!
 //! r(x) = (N₂ N₃)² ∏ g₂₃, x = cos θ₁,
 //!
-//! is symmetric in both pairs of headings, hence a polynomial in the coefficients of the two lines:
-//! by Poisson's formula the product over the two headings of one leg has the denominator Nⱼ and a
+//! is symmetric in both pairs of leg angles, hence a polynomial in the coefficients of the two lines:
+//! by Poisson's formula the product over the two leg angles of one leg has the denominator Nⱼ and a
 //! numerator quadratic in Aⱼ, Bⱼ, Cⱼ. So r has degree 8 in (cos θ₁, sin θ₁), and as mirroring all
 //! legs leaves it as it is, degree 8 in x: the known 16 solutions in 8 mirrored pairs.
 //!
-//! Completeness: at every real solution both chains close, so x lies in the one interval where both
-//! do, and r(x) = 0. r is known there from nine values, each a product of four g₂₃. A g₂₃ cancels where a
-//! solution is near, so a value is off by roundings of its terms, not of its own size.
-//! [`bernstein`](super::bernstein) reports every place where r can be zero as long as these are small against
-//! the largest of the nine values. That is not proven; tests against random starts and dense grids have found
-//! no exception. Where one zero is isolated and, as it must, exactly one pair's g₂₃ changes sign, that pair is
-//! followed to it: first by Newton's iteration, whose result is the one that belongs there if its x does.
-//! Where another number of pairs does, where several zeros meet, or where the polynomial drowns in rounding, as
-//! at the neutral input with its triple zeros, which belong to three different pairs of headings, every pair is
-//! tried from three points. Each result is polished on the three equations themselves, so nothing that is no
-//! solution is found.
+//! Completeness: at every real solution both chains close, so x lies in the one interval where both do, and r(x) = 0.
+//! Nine values determine r there. Each is a product of four g₂₃; a g₂₃ cancels near a solution, so its error is that of
+//! its terms. [`bernstein`](super::bernstein) gets the largest such error and reports every place where r can be zero.
+//! This is not proven. Tests against random starts, dense grids and walks towards singular poses find no exception.
 //!
-//! What rounding leaves open: two solutions closer than `MERGED_WITHIN_RAD` (of [`platforms`](super::platforms)) count
-//! as one, and solutions that meet (the input is on a singularity) may be found or missed as a pair.
+//! An isolated zero changes the sign of g₂₃ of exactly one pair. Newton's iteration follows that pair; the result counts
+//! if its x lies in the interval. Elsewhere every pair is tried from three points: where several zeros meet, and where r
+//! is smaller than its rounding, as at the neutral input, whose triple zeros belong to three pairs. If these starts reach
+//! nothing, or something nearly singular, more starts follow. Each result is polished on the three equations, so only
+//! solutions are reported.
+//!
+//! Next to a singularity two solutions lie close together. [`loop_solutions`](super::loop_solutions) looks for the second
+//! from the first. If rounding does not separate the two, both are reported without a certificate.
 
 use masseter_shared::geometry::LEGS;
 
 use super::bernstein::{NODES, Vanishing, Zeros, locate};
-use super::closure::{Closed, Closure};
 use super::four_bar::{Branches, FourBar, Interval};
-use super::heading::Heading;
+use super::leg_angle::LegAngle;
+use super::loop_equations::{LoopEquations, LoopSolution};
 
 /// Iterations that polish a solution: where two meet, each only halves the error.
 const MOST_ITERATIONS: u32 = 40;
@@ -40,48 +39,67 @@ const MOST_STEPS: u32 = 50;
 const FEW_ITERATIONS: u32 = 6;
 /// g₂₃ at which Newton's iteration takes over for good.
 const NARROW_ENOUGH: f64 = 1e-10;
-/// Pairs of headings of legs 2 and 3.
+/// Below this determinant ([`LoopEquations::determinant`]) another solution may be close.
+pub(super) const NEARLY_SINGULAR: f64 = 1e-2;
+/// An undecided interval wider than this share of the range is tried in pieces.
+const WIDE: f64 = 1.0 / 512.0;
+const PIECES: u32 = 16;
+/// Pairs of leg angles of legs 2 and 3.
 const PAIRS: usize = 4;
 
-/// Which solutions are worth following.
+/// Which solutions are followed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Wanted {
-    /// Each.
+pub(super) enum SolutionFilter {
+    /// Every solution.
     All,
     /// Those with a positive determinant, which a true one has; others may be found as well.
     PositiveDeterminant,
 }
 
+/// r at one x.
+struct Product {
+    value: f64,
+    rounding: f64,
+}
+
 /// Legs 2 and 3 as functions of x = cos θ₁, θ₁ in [0, π].
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Elimination<'a> {
-    closure: &'a Closure<'a>,
+    loops: &'a LoopEquations<'a>,
     second: FourBar,
     third: FourBar,
 }
 
 impl<'a> Elimination<'a> {
-    pub(super) fn new(closure: &'a Closure<'a>) -> Self {
+    pub(super) fn new(loops: &'a LoopEquations<'a>) -> Self {
         Self {
-            closure,
-            second: FourBar::driven_from_near(&closure.sides[0]),
-            third: FourBar::driven_from_far(&closure.sides[2]),
+            loops,
+            second: FourBar::driven_from_near(&loops.sides[0]),
+            third: FourBar::driven_from_far(&loops.sides[2]),
         }
     }
 
-    /// Calls `found` for every wanted solution with θ₁ in [0, π], for some more than once.
-    pub(super) fn solve(&self, wanted: Wanted, mut found: impl FnMut(Closed)) -> Result<(), Vanishing> {
+    /// Calls `found` for every solution of the filter with θ₁ in [0, π], for some more than once.
+    pub(super) fn solve(
+        &self,
+        filter: SolutionFilter,
+        mut found: impl FnMut(LoopSolution),
+    ) -> Result<(), Vanishing> {
         let range = self.range();
         if range.low > range.high {
             return Ok(());
         }
-        let mut values = NODES;
-        for value in &mut values {
-            *value = self.product(range.at(*value));
-        }
-        locate(&values, |zeros| match zeros {
-            Zeros::One(within) => self.follow(wanted, scaled(range, within), &mut found),
-            Zeros::Undecided(within) => self.try_all(scaled(range, within), &mut found),
+        let products = NODES.map(|node| self.product(range.at(node)));
+        let rounding =
+            products.iter().fold(0.0, |most: f64, product| most.max(product.rounding)) / range.width().sqrt();
+        locate(&products.map(|product| product.value), rounding, |zeros| match zeros {
+            Zeros::One(within) => self.follow(filter, scaled(range, within), &mut found),
+            Zeros::Undecided(within) => {
+                let is_settled = self.try_all(scaled(range, within), &mut found);
+                if !is_settled || within.width() > WIDE {
+                    self.try_pieces(scaled(range, within), &mut found);
+                }
+            }
         })
     }
 
@@ -90,80 +108,104 @@ impl<'a> Elimination<'a> {
         self.second.range().intersect(self.third.range())
     }
 
-    /// The four sets of headings at x, on which sides 12 and 31 fit, or come closest to it.
-    pub(super) fn headings(&self, x: f64) -> [[Heading; LEGS]; PAIRS] {
+    /// The four sets of leg angles at x, on which sides 12 and 31 fit, or come closest to it.
+    pub(super) fn leg_angles(&self, x: f64) -> [[LegAngle; LEGS]; PAIRS] {
         let (driving, second, third) = self.branches(x);
-        std::array::from_fn(|pair| [driving, second.headings[pair & 1], third.headings[pair >> 1]])
+        std::array::from_fn(|pair| [driving, second.leg_angles[pair & 1], third.leg_angles[pair >> 1]])
     }
 
-    fn branches(&self, x: f64) -> (Heading, Branches, Branches) {
-        let driving = Heading { cos: x, sin: ((1.0 - x) * (1.0 + x)).max(0.0).sqrt() };
+    fn branches(&self, x: f64) -> (LegAngle, Branches, Branches) {
+        let driving = LegAngle { cos: x, sin: ((1.0 - x) * (1.0 + x)).max(0.0).sqrt() };
         (driving, self.second.branches(driving), self.third.branches(driving))
     }
 
-    /// r(x).
-    fn product(&self, x: f64) -> f64 {
+    /// r(x), and its change if every g₂₃ changes by one rounding.
+    fn product(&self, x: f64) -> Product {
         let (_, second, third) = self.branches(x);
         let values = self.values(&second, &third);
         let norms = second.norm_squared * third.norm_squared;
-        norms * norms * (values[0] * values[1]) * (values[2] * values[3])
+        let [a, b, c, d] = values.map(f64::abs);
+        Product {
+            value: norms * norms * (values[0] * values[1]) * (values[2] * values[3]),
+            rounding: f64::EPSILON * norms * norms * (a * b * (c + d) + (a + b) * (c * d)),
+        }
     }
 
-    /// g₂₃ for each pair of headings.
-    fn closing_values(&self, x: f64) -> [f64; PAIRS] {
+    /// g₂₃ for each pair of leg angles.
+    fn residuals_23(&self, x: f64) -> [f64; PAIRS] {
         let (_, second, third) = self.branches(x);
         self.values(&second, &third)
     }
 
     fn values(&self, second: &Branches, third: &Branches) -> [f64; PAIRS] {
         let value =
-            |pair: usize| self.closure.sides[1].value(second.headings[pair & 1], third.headings[pair >> 1]);
+            |pair: usize| self.loops.sides[1].value(second.leg_angles[pair & 1], third.leg_angles[pair >> 1]);
         [value(0), value(1), value(2), value(3)]
     }
 
-    /// The solution in an interval that holds exactly one, if it is wanted.
-    fn follow(&self, wanted: Wanted, within: Interval, found: &mut impl FnMut(Closed)) {
-        let (low, high) = (self.closing_values(within.low), self.closing_values(within.high));
+    /// The solution in an interval that holds exactly one, if it passes the filter.
+    fn follow(&self, filter: SolutionFilter, within: Interval, found: &mut impl FnMut(LoopSolution)) {
+        let (low, high) = (self.residuals_23(within.low), self.residuals_23(within.high));
         let mut changing = (0..PAIRS).filter(|&pair| (low[pair] > 0.0) != (high[pair] > 0.0));
         let (Some(pair), None) = (changing.next(), changing.next()) else {
-            return self.try_all(within, found);
+            self.try_all(within, found);
+            return;
         };
-        if wanted == Wanted::PositiveDeterminant && !has_positive_determinant(pair, low[pair] < high[pair]) {
+        if filter == SolutionFilter::PositiveDeterminant
+            && !has_positive_determinant(pair, low[pair] < high[pair])
+        {
             return;
         }
         let first = crossing([within.low, within.high], [low[pair], high[pair]]);
-        if let Some(closed) = self.closure.close(&self.headings(first)[pair], FEW_ITERATIONS)
+        if let Some(closed) = self.loops.close(&self.leg_angles(first)[pair], FEW_ITERATIONS)
             && lies_within(within, &closed)
         {
             return found(closed);
         }
-        let x = narrowed(within, low[pair], high[pair], |x| self.closing_values(x)[pair]);
-        match self.closure.close(&self.headings(x)[pair], MOST_ITERATIONS) {
+        let x = narrowed(within, low[pair], high[pair], |x| self.residuals_23(x)[pair]);
+        match self.loops.close(&self.leg_angles(x)[pair], MOST_ITERATIONS) {
             Some(closed) => found(closed),
-            None => self.try_all(within, found),
+            None => {
+                self.try_all(within, found);
+            }
         }
     }
 
-    /// Every solution to which a pair leads from the ends or the middle of an interval.
-    fn try_all(&self, within: Interval, found: &mut impl FnMut(Closed)) {
+    /// Calls `found` for every solution that a pair reaches from the ends or the middle of an interval. True if there are
+    /// any and all of them are regular.
+    fn try_all(&self, within: Interval, found: &mut impl FnMut(LoopSolution)) -> bool {
+        let (mut some, mut all_regular) = (false, true);
         for x in [within.low, within.at(0.5), within.high] {
-            for start in self.headings(x) {
-                self.closure.close(&start, MOST_ITERATIONS).into_iter().for_each(&mut *found);
+            for start in self.leg_angles(x) {
+                if let Some(closed) = self.loops.close(&start, MOST_ITERATIONS) {
+                    some = true;
+                    all_regular &= self.loops.determinant(&closed.residuals).abs() > NEARLY_SINGULAR;
+                    found(closed);
+                }
             }
+        }
+        some && all_regular
+    }
+
+    /// [`try_all`](Self::try_all) in each of many pieces: only a start next to a double zero leads to its solutions.
+    fn try_pieces(&self, within: Interval, found: &mut impl FnMut(LoopSolution)) {
+        for piece in 0..PIECES {
+            let at = |end: u32| within.at(f64::from(piece + end) / f64::from(PIECES));
+            self.try_all(Interval { low: at(0), high: at(1) }, found);
         }
     }
 }
 
 /// The sign of the Jacobian's determinant where g₂₃ of a pair crosses zero, rising or falling with x: as
 /// both chains stay closed, it is that of ∂g₁₂/∂θ₂ · ∂g₃₁/∂θ₃ · dg₂₃/dx, and each of the first two is
-/// negative on a chain's first heading and positive on its second.
+/// negative on a chain's first leg angle and positive on its second.
 fn has_positive_determinant(pair: usize, rising: bool) -> bool {
     ((pair & 1) == (pair >> 1)) == rising
 }
 
 /// Whether a solution is the one that an interval holds: it is enough that its x lies there.
-fn lies_within(interval: Interval, closed: &Closed) -> bool {
-    let driving = closed.headings[0];
+fn lies_within(interval: Interval, closed: &LoopSolution) -> bool {
+    let driving = closed.leg_angles[0];
     driving.sin >= 0.0 && interval.low <= driving.cos && driving.cos <= interval.high
 }
 
@@ -214,15 +256,15 @@ mod tests {
             mechanism in mechanisms(),
             slide_m in prop::array::uniform3(-0.03..0.03f64), leg_m in prop::array::uniform3(0.24..0.3f64),
         ) {
-            let closure = Closure::new(&mechanism, &Actuators { slide_m, leg_m });
-            let solved = |wanted| {
+            let loops = LoopEquations::new(&mechanism, &Actuators { slide_m, leg_m });
+            let solved = |filter| {
                 let mut all = Vec::new();
-                Elimination::new(&closure).solve(wanted, |closed| all.push(closed)).unwrap();
+                Elimination::new(&loops).solve(filter, |closed| all.push(closed)).unwrap();
                 all
             };
-            let followed = solved(Wanted::PositiveDeterminant);
-            for closed in solved(Wanted::All) {
-                let determinant = closure.determinant(&closed.closing);
+            let followed = solved(SolutionFilter::PositiveDeterminant);
+            for closed in solved(SolutionFilter::All) {
+                let determinant = loops.determinant(&closed.residuals);
                 let is_followed = followed.contains(&closed);
                 prop_assert!(is_followed || determinant < 1e-3, "{determinant}");
             }

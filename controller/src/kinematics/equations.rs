@@ -6,7 +6,7 @@
 use masseter_shared::geometry::{Actuators, LEGS, Mechanism, Vec3};
 use nalgebra::{Matrix3, Vector3};
 
-use super::closure::next;
+use super::legs::next;
 
 /// The equations for one input: what stays the same while the leg angles vary.
 #[derive(Debug, Clone, Copy)]

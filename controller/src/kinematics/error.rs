@@ -1,4 +1,4 @@
-//! Why a forward kinematics came to no pose.
+//! Why the forward kinematics gives no pose.
 
 use masseter_shared::geometry::AXIS_NAMES;
 
@@ -32,7 +32,7 @@ pub enum ForwardError {
         /// Iterations made.
         iterations: u32,
     },
-    /// The Jacobian has no inverse where the iteration stands.
+    /// The Jacobian has no inverse at the iteration's end, or rounding does not separate the solution from another.
     #[error(
         "singular: the Jacobian's determinant is {determinant:e} with a side of the platform off by \
          {residual_m:e} m; start elsewhere or keep away from this input"
@@ -73,10 +73,10 @@ pub enum ForwardError {
         /// The distance of the nearest two, the largest difference of any leg, radians.
         separation_rad: f64,
     },
-    /// Solutions lie closer together than rounding can tell, or form a continuum.
-    #[error("undecided: solutions cannot be told apart, {solutions} were; keep away from this input")]
+    /// More solutions than the equations have: they form a continuum but for rounding.
+    #[error("undecided: the solutions cannot be separated, only {solutions} were; keep away from this input")]
     Undecided {
-        /// Solutions that were told apart.
+        /// Solutions that were separated.
         solutions: usize,
     },
 }

@@ -1,13 +1,13 @@
 //! The two four-bar chains that leg 1 drives: base, leg 1, side 12, leg 2, and base, leg 1, side 31,
-//! leg 3. At a given θ₁ each leaves its other leg two headings.
+//! leg 3. At a given θ₁ each leaves its other leg two leg angles.
 //!
 //! With x = cos θ₁ and y = sin θ₁ the side's equation reads A + B cos θ + C sin θ = 0, where A and B
 //! are affine in x and C = −y: a line that cuts the unit circle where D = B² + C² − A² ≥ 0. D is a
 //! quadratic in x whose leading coefficient ω² − 1 − p² is never positive, so the angles at which a
 //! chain closes are *one* interval of x. Nothing here knows of the third side.
 
-use super::closure::Side;
-use super::heading::Heading;
+use super::leg_angle::LegAngle;
+use super::loop_equations::Side;
 
 /// A closed interval; empty when its ends are not in order.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -16,7 +16,7 @@ pub(super) struct Interval {
     pub high: f64,
 }
 
-/// The side's equation as a line in the plane of the driven leg's heading.
+/// The side's equation as a line in the plane of the driven leg's leg angle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct FourBar {
     /// A at x = 0, and its slope.
@@ -25,12 +25,12 @@ pub(super) struct FourBar {
     along: [f64; 2],
 }
 
-/// The driven leg's headings at one θ₁.
+/// The driven leg's leg angles at one θ₁.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Branches {
-    /// The two headings; equal at the ends of the interval, where the chain is stretched or folded.
-    pub headings: [Heading; 2],
-    /// B² + C²: the denominator of the headings.
+    /// The two leg angles; equal at the ends of the interval, where the chain is stretched or folded.
+    pub leg_angles: [LegAngle; 2],
+    /// B² + C²: the denominator of the leg angles.
     pub norm_squared: f64,
 }
 
@@ -76,34 +76,34 @@ impl FourBar {
         Interval { low: one.min(other), high: one.max(other) }.intersect(Interval { low: -1.0, high: 1.0 })
     }
 
-    /// Both headings of the driven leg; outside the range the one that comes closest, twice.
+    /// Both leg angles of the driven leg; outside the range the one that comes closest, twice.
     #[inline]
-    pub(super) fn branches(&self, driving: Heading) -> Branches {
+    pub(super) fn branches(&self, driving: LegAngle) -> Branches {
         let offset = self.offset[0] + self.offset[1] * driving.cos;
         let (along, across) = (self.along[0] + self.along[1] * driving.cos, -driving.sin);
         let norm_squared = along * along + across * across;
         let discriminant = norm_squared - offset * offset;
         if discriminant <= 0.0 {
             return Branches {
-                headings: [closest(offset, along, across, norm_squared.sqrt()); 2],
+                leg_angles: [closest(offset, along, across, norm_squared.sqrt()); 2],
                 norm_squared,
             };
         }
         let (root, per_norm_squared) = (discriminant.sqrt(), 1.0 / norm_squared);
         let (foot, off) = (-offset * per_norm_squared, root * per_norm_squared);
         let (foot_cos, foot_sin, off_cos, off_sin) = (foot * along, foot * across, off * across, off * along);
-        let headings = [
-            Heading { cos: foot_cos - off_cos, sin: foot_sin + off_sin },
-            Heading { cos: foot_cos + off_cos, sin: foot_sin - off_sin },
+        let leg_angles = [
+            LegAngle { cos: foot_cos - off_cos, sin: foot_sin + off_sin },
+            LegAngle { cos: foot_cos + off_cos, sin: foot_sin - off_sin },
         ];
-        Branches { headings, norm_squared }
+        Branches { leg_angles, norm_squared }
     }
 }
 
 /// The point of the circle next to a line that misses or touches it.
-fn closest(offset: f64, along: f64, across: f64, norm: f64) -> Heading {
+fn closest(offset: f64, along: f64, across: f64, norm: f64) -> LegAngle {
     let to_unit = -1f64.copysign(offset) / norm.max(f64::MIN_POSITIVE);
-    Heading { cos: along * to_unit, sin: across * to_unit }
+    LegAngle { cos: along * to_unit, sin: across * to_unit }
 }
 
 #[cfg(test)]
@@ -112,7 +112,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::kinematics::closure::Closure;
+    use crate::kinematics::loop_equations::LoopEquations;
     use crate::kinematics::samples::mechanisms;
 
     proptest! {
@@ -122,18 +122,18 @@ mod tests {
             axes in [-0.03..0.03f64, -0.03..0.03f64, -0.03..0.03f64, 0.2..0.35f64, 0.2..0.35f64, 0.2..0.35f64],
             theta in -3.1..3.1f64,
         ) {
-            let closure = Closure::new(&mechanism, &Actuators::from_axes(axes));
-            let driving = Heading::from_rad(theta);
+            let loops = LoopEquations::new(&mechanism, &Actuators::from_axes(axes));
+            let driving = LegAngle::from_rad(theta);
             let chains = [
-                (FourBar::driven_from_near(&closure.sides[0]), 0),
-                (FourBar::driven_from_far(&closure.sides[2]), 2),
+                (FourBar::driven_from_near(&loops.sides[0]), 0),
+                (FourBar::driven_from_far(&loops.sides[2]), 2),
             ];
             for (chain, side) in chains {
                 let range = chain.range();
                 let inside = range.low < driving.cos && driving.cos < range.high;
-                for heading in chain.branches(driving).headings {
-                    let (near, far) = if side == 0 { (driving, heading) } else { (heading, driving) };
-                    let value = closure.sides[side].value(near, far);
+                for leg_angle in chain.branches(driving).leg_angles {
+                    let (near, far) = if side == 0 { (driving, leg_angle) } else { (leg_angle, driving) };
+                    let value = loops.sides[side].value(near, far);
                     prop_assert_eq!(inside, value.abs() < 1e-13, "{}", value);
                 }
             }

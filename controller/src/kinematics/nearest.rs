@@ -8,9 +8,9 @@ use masseter_shared::geometry::{Actuators, Mechanism};
 use nalgebra::{Matrix3, Vector3};
 
 use super::Equations;
-use super::closure::Closure;
 use super::elimination::Elimination;
-use super::heading::Heading;
+use super::leg_angle::LegAngle;
+use super::loop_equations::LoopEquations;
 
 /// Values of cos θ₁, each with four sets of angles to start from.
 const GRID: u32 = 32;
@@ -23,12 +23,12 @@ const HARDLY_TURNED_RAD: f64 = 1e-7;
 
 /// The least √(f₁² + f₂² + f₃²) found, metres. It takes many times as long as finding that there is no solution.
 pub fn nearest_assembly_m(mechanism: &Mechanism, actuators: &Actuators) -> f64 {
-    let closure = Closure::new(mechanism, actuators);
+    let loops = LoopEquations::new(mechanism, actuators);
     let equations = Equations::new(mechanism, actuators);
-    let elimination = Elimination::new(&closure);
+    let elimination = Elimination::new(&loops);
     let starts =
-        (0..=GRID).flat_map(|index| elimination.headings(2.0 * f64::from(index) / f64::from(GRID) - 1.0));
-    let ends_m2 = starts.map(|headings| descended_m2(&equations, headings.map(Heading::to_rad).into()));
+        (0..=GRID).flat_map(|index| elimination.leg_angles(2.0 * f64::from(index) / f64::from(GRID) - 1.0));
+    let ends_m2 = starts.map(|leg_angles| descended_m2(&equations, leg_angles.map(LegAngle::to_rad).into()));
     ends_m2.fold(f64::INFINITY, f64::min).sqrt()
 }
 

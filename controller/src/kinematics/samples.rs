@@ -1,8 +1,10 @@
 //! Random mechanisms and poses for the tests of this module.
 
-use masseter_shared::geometry::{Actuators, Mechanism, MechanismConfig, Pose, SlideConfig, Vec3};
+use masseter_shared::geometry::{Actuators, Joints, Mechanism, MechanismConfig, Pose, SlideConfig, Vec3};
 use nalgebra::{Translation3, UnitQuaternion};
 use proptest::prelude::*;
+
+use super::Equations;
 
 pub(super) fn published_mechanism() -> Mechanism {
     Mechanism::new(&MechanismConfig::default()).expect("the default is a mechanism")
@@ -33,6 +35,45 @@ pub(super) fn poses(turn_deg: f64) -> impl Strategy<Value = Pose> {
             Pose::from_parts(Translation3::new(x, y, z), rotation)
         },
     )
+}
+
+/// Joint coordinates made by inverse kinematics, near a singularity.
+#[derive(Debug)]
+pub(super) struct NearlySingular {
+    pub mechanism: Mechanism,
+    pub joints: Joints,
+    /// Of the Jacobian, with every leg's length taken as 1.
+    pub determinant: f64,
+}
+
+/// Somewhere on a random path between two poses whose determinants have opposite signs, as near to the singularity as
+/// the determinant drawn between 10⁻¹ and 10⁻¹² says.
+pub(super) fn nearly_singular() -> impl Strategy<Value = NearlySingular> {
+    let exponents = (-12.0..-1.0f64, prop::bool::ANY);
+    let mechanisms = prop_oneof![Just(published_mechanism()), mechanisms()];
+    let walks = (mechanisms, poses(80.0), poses(80.0), exponents);
+    walks.prop_filter_map("the path crosses no singularity", |(mechanism, from, to, (exponent, positive))| {
+        let target = 10f64.powf(exponent) * if positive { 1.0 } else { -1.0 };
+        let at = |share: f64| {
+            let position = from.translation.vector.lerp(&to.translation.vector, share);
+            let pose = Pose::from_parts(position.into(), from.rotation.nlerp(&to.rotation, share));
+            let joints = mechanism.inverse(&pose).ok()?;
+            let equations = Equations::new(&mechanism, &joints.actuators);
+            Some((joints, equations.determinant(&equations.evaluate(joints.theta_rad.into()))))
+        };
+        let (mut low, mut high) = (0.0, 1.0);
+        let starts_above = at(low)?.1 > target;
+        if (at(high)?.1 > target) == starts_above {
+            return None;
+        }
+        let mut middle = 0.5;
+        while low < middle && middle < high {
+            *(if (at(middle)?.1 > target) == starts_above { &mut low } else { &mut high }) = middle;
+            middle = f64::midpoint(low, high);
+        }
+        let (joints, determinant) = at(low)?;
+        Some(NearlySingular { mechanism: mechanism.clone(), joints, determinant })
+    })
 }
 
 /// Angle between two orientations, radians; unlike the arc cosine it is exact near zero.

@@ -2,8 +2,8 @@
 
 use masseter_shared::geometry::{LEGS, Pose};
 
-use super::closure::{Closed, Closure};
-use super::heading::Heading;
+use super::leg_angle::LegAngle;
+use super::loop_equations::{LoopEquations, LoopSolution};
 use super::{Assembly, Certificate};
 
 /// Leg angles that close the platform's triangle.
@@ -23,28 +23,32 @@ pub struct Solution {
     pub assembly: Assembly,
     /// What is proven; none too close to a singularity, or where the iteration stopped too early.
     pub certificate: Option<Certificate>,
-    pub(super) headings: [Heading; LEGS],
+    pub(super) leg_angles: [LegAngle; LEGS],
 }
 
 impl Solution {
-    pub(super) fn new(closure: &Closure<'_>, closed: &Closed) -> Self {
-        Self::with_angles(closure, closed, closed.headings.map(Heading::to_rad))
+    pub(super) fn new(loops: &LoopEquations<'_>, closed: &LoopSolution) -> Self {
+        Self::with_angles(loops, closed, closed.leg_angles.map(LegAngle::to_rad))
     }
 
-    /// The same with the headings' angles from elsewhere, radians.
+    /// The same with the leg angles' angles from elsewhere, radians.
     #[inline]
-    pub(super) fn with_angles(closure: &Closure<'_>, closed: &Closed, theta_rad: [f64; LEGS]) -> Self {
-        let corners = closure.corners(&closed.headings);
-        let determinant = closure.determinant(&closed.closing);
+    pub(super) fn with_angles(
+        loops: &LoopEquations<'_>,
+        closed: &LoopSolution,
+        theta_rad: [f64; LEGS],
+    ) -> Self {
+        let corners = loops.corners(&closed.leg_angles);
+        let determinant = loops.determinant(&closed.residuals);
         Self {
             theta_rad,
-            pose: closure.mechanism.pose_from_corners(&corners),
+            pose: loops.mechanism.pose_from_corners(&corners),
             iterations: closed.iterations,
-            residual_m: closure.residual_m(&closed.closing),
+            residual_m: loops.residual_m(&closed.residuals),
             determinant,
-            assembly: Assembly::of(closure.mechanism, &closure.hinges, &corners, determinant),
-            certificate: Certificate::new(closure, &closed.closing),
-            headings: closed.headings,
+            assembly: Assembly::from_corners(loops.mechanism, &loops.hinges, &corners, determinant),
+            certificate: Certificate::new(loops, &closed.residuals),
+            leg_angles: closed.leg_angles,
         }
     }
 }

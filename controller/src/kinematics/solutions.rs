@@ -2,9 +2,9 @@
 
 use masseter_shared::geometry::{Actuators, Mechanism};
 
-use super::closure::{Closed, Closure};
-use super::elimination::Wanted;
-use super::platforms::{Platforms, check, nearest_other_rad};
+use super::elimination::SolutionFilter;
+use super::loop_equations::{LoopEquations, LoopSolution};
+use super::loop_solutions::{LoopSolutions, check, nearest_other_rad};
 use super::{ForwardError, Solution};
 
 /// There are never more; they come in mirrored pairs.
@@ -18,21 +18,21 @@ pub struct Solutions {
 }
 
 impl Solutions {
-    /// Solves completely; the module `elimination` says why nothing is missed. No
-    /// solution at all is a result, not an error: the mechanism cannot be assembled.
+    /// Solves completely; the module `elimination` says why nothing is missed. No solution is a result, not an error: the
+    /// mechanism cannot be assembled. Two solutions that rounding does not separate are both there, without a certificate.
     ///
     /// # Errors
     /// [`ForwardError::NotFinite`], [`ForwardError::NoLength`], and [`ForwardError::Undecided`] where
     /// solutions form a continuum but for rounding.
     pub fn new(mechanism: &Mechanism, actuators: &Actuators) -> Result<Self, ForwardError> {
         check(actuators)?;
-        Self::of(&Closure::new(mechanism, actuators))
+        Self::from_equations(&LoopEquations::new(mechanism, actuators))
     }
 
-    fn of(closure: &Closure<'_>) -> Result<Self, ForwardError> {
-        let platforms = Platforms::of(closure, Wanted::All)?;
-        let solution = |closed: Closed| Solution::new(closure, &closed);
-        Ok(Self { solutions: platforms.closed.map(|closed| closed.map(solution)), count: platforms.count })
+    fn from_equations(loops: &LoopEquations<'_>) -> Result<Self, ForwardError> {
+        let found = LoopSolutions::find(loops, SolutionFilter::All)?;
+        let solution = |closed: LoopSolution| Solution::new(loops, &closed);
+        Ok(Self { solutions: found.all.map(|one| one.map(solution)), count: found.count })
     }
 
     /// How many there are.
@@ -45,7 +45,7 @@ impl Solutions {
         self.solutions.iter().flatten()
     }
 
-    /// Those in which the mechanism can stand.
+    /// The solutions in which the mechanism can stand.
     pub fn true_ones(&self) -> impl Iterator<Item = &Solution> {
         self.iter().filter(|solution| solution.assembly.is_true())
     }
@@ -53,8 +53,8 @@ impl Solutions {
     /// How far the nearest other solution is from one of these: the largest difference of any leg's
     /// angle, radians. None where there is no other.
     pub fn separation_rad(&self, solution: &Solution) -> Option<f64> {
-        let others = self.iter().map(|other| &other.headings);
-        nearest_other_rad(&solution.headings, others)
+        let others = self.iter().map(|other| &other.leg_angles);
+        nearest_other_rad(&solution.leg_angles, others)
     }
 }
 
@@ -65,8 +65,8 @@ mod tests {
 
     use super::*;
     use crate::kinematics::elimination::Elimination;
-    use crate::kinematics::heading::coincide;
-    use crate::kinematics::samples::{mechanisms, published_mechanism};
+    use crate::kinematics::leg_angle::{LegAngle, coincide, separation_rad};
+    use crate::kinematics::samples::{NearlySingular, mechanisms, nearly_singular, published_mechanism};
     use crate::kinematics::{Options, solve_newton};
 
     fn boxes() -> impl Strategy<Value = Actuators> {
@@ -90,6 +90,44 @@ mod tests {
         assert!((next_rad.to_degrees() - 12.571).abs() < 1e-2);
     }
 
+    /// Two pairs of them, each 1.5·10⁻⁴ rad apart.
+    #[test]
+    fn close_solutions_are_not_lost() {
+        let actuators = Actuators {
+            slide_m: [-0.009_026_317_149_509_48, -0.004_133_527_909_131_813, 0.013_522_157_666_649_465],
+            leg_m: [0.299_630_870_761_445_73, 0.296_020_369_546_034_3, 0.286_093_515_131_113_4],
+        };
+        let solutions = Solutions::new(&published_mechanism(), &actuators).unwrap();
+        assert_eq!(solutions.count(), MOST_SOLUTIONS);
+        let closest = solutions.iter().filter_map(|one| solutions.separation_rad(one)).fold(1.0, f64::min);
+        assert!((closest - 1.5e-4).abs() < 1e-5, "{closest}");
+        assert!(solutions.iter().all(|solution| solution.certificate.is_some()));
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(2000))]
+
+        /// The leg angles that an input was made from are among its solutions, up to the singularity. Where rounding
+        /// leaves open which of two solutions is which, there are two without a certificate.
+        #[test]
+        fn the_angles_an_input_came_from_are_found_near_singularities(singular in nearly_singular()) {
+            let NearlySingular { mechanism, joints, determinant } = singular;
+            let solutions = Solutions::new(&mechanism, &joints.actuators).unwrap();
+            let known = joints.theta_rad.map(LegAngle::from_rad);
+            let within = |limit_rad| {
+                let is_near = move |one: &&Solution| separation_rad(&one.leg_angles, &known) < limit_rad;
+                solutions.iter().filter(is_near)
+            };
+            let blurred_rad = 1e-12 / determinant.abs();
+            if within(blurred_rad.clamp(1e-9, 1e-6)).any(|solution| solution.certificate.is_some()) {
+                return Ok(());
+            }
+            let close = within(1e-4).count();
+            let singular = within(1e-4).filter(|solution| solution.certificate.is_none()).count();
+            prop_assert!(close >= 2 && singular >= 1, "{singular} of {close} at determinant {determinant:e}");
+        }
+    }
+
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(300))]
 
@@ -102,7 +140,7 @@ mod tests {
             let solutions = Solutions::new(&mechanism, &actuators).unwrap();
             for guess in guesses {
                 if let Ok(found) = solve_newton(&mechanism, &actuators, &guess, &Options::default()) {
-                    let is_same = |one: &Solution| coincide(&one.headings, &found.headings, 1e-6);
+                    let is_same = |one: &Solution| coincide(&one.leg_angles, &found.leg_angles, 1e-6);
                     prop_assert!(solutions.iter().any(is_same));
                 }
             }
@@ -111,18 +149,18 @@ mod tests {
             }
         }
 
-        /// The four pairs of headings, watched on a dense grid: as many changes of sign as solutions.
+        /// The four pairs of leg angles, watched on a dense grid: as many changes of sign as solutions.
         #[test]
         fn a_dense_grid_counts_no_more_and_no_fewer(mechanism in mechanisms(), actuators in boxes()) {
             const GRID: u32 = 20_000;
-            let closure = Closure::new(&mechanism, &actuators);
-            let elimination = Elimination::new(&closure);
+            let loops = LoopEquations::new(&mechanism, &actuators);
+            let elimination = Elimination::new(&loops);
             let range = elimination.range();
             prop_assume!(range.low < range.high);
             let signs = |index: u32| {
                 elimination
-                    .headings(range.at(f64::from(index) / f64::from(GRID)))
-                    .map(|[_, second, third]| closure.sides[1].value(second, third) > 0.0)
+                    .leg_angles(range.at(f64::from(index) / f64::from(GRID)))
+                    .map(|[_, second, third]| loops.sides[1].value(second, third) > 0.0)
             };
             let mut changes = 0;
             for index in 0..GRID {

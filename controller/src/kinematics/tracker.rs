@@ -8,16 +8,30 @@
 
 use masseter_shared::geometry::{Actuators, LEGS, Mechanism};
 
-use super::closure::{Closure, each};
 use super::complete::choose;
-use super::heading::{Anchor, Heading};
-use super::platforms::check;
+use super::leg_angle::{Anchor, LegAngle};
+use super::legs::each;
+use super::loop_equations::LoopEquations;
+use super::loop_solutions::check;
 use super::{ForwardError, Solution};
 
 /// Newton's iterations from the last solution; a chewing jaw takes 2 or 3 a millisecond.
 const WARM_ITERATIONS: u32 = 4;
 
 /// Solves a stream of inputs, each from the last accepted solution.
+///
+/// ```
+/// use masseter_controller::kinematics::ForwardTracker;
+/// use masseter_shared::geometry::{Actuators, Mechanism, MechanismConfig};
+///
+/// let mut tracker = ForwardTracker::new(Mechanism::new(&MechanismConfig::default())?);
+/// for step in 0..10 {
+///     let leg_m = 0.27 + 1e-4 * f64::from(step);
+///     let solution = tracker.update(&Actuators { slide_m: [0.0; 3], leg_m: [leg_m; 3] })?;
+///     assert!(solution.certificate.is_some_and(|proof| proof.exists_within_rad < 1e-11));
+/// }
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct ForwardTracker {
     mechanism: Mechanism,
@@ -28,7 +42,7 @@ pub struct ForwardTracker {
 /// The last accepted solution.
 #[derive(Debug, Clone, Copy)]
 struct Last {
-    headings: [Heading; LEGS],
+    leg_angles: [LegAngle; LEGS],
     theta_rad: [f64; LEGS],
     unique_within_rad: f64,
 }
@@ -51,11 +65,11 @@ impl ForwardTracker {
     /// Those of [`solve_completely`](super::solve_completely).
     pub fn update(&mut self, actuators: &Actuators) -> Result<Solution, ForwardError> {
         check(actuators)?;
-        let closure = Closure::new(&self.mechanism, actuators);
-        let continued = self.last.as_ref().and_then(|last| last.continued(&closure, &mut self.anchor));
+        let loops = LoopEquations::new(&self.mechanism, actuators);
+        let continued = self.last.as_ref().and_then(|last| last.continued(&loops, &mut self.anchor));
         let solution = match continued {
             Some(solution) => solution,
-            None => choose(&closure)?,
+            None => choose(&loops)?,
         };
         self.last = Some(Last::solved(&solution));
         Ok(solution)
@@ -64,21 +78,21 @@ impl ForwardTracker {
 
 impl Last {
     fn guessed(theta_rad: [f64; LEGS]) -> Self {
-        Self { headings: theta_rad.map(Heading::from_rad), theta_rad, unique_within_rad: f64::INFINITY }
+        Self { leg_angles: theta_rad.map(LegAngle::from_rad), theta_rad, unique_within_rad: f64::INFINITY }
     }
 
     #[inline]
     fn solved(solution: &Solution) -> Self {
         let unique_within_rad = solution.certificate.map_or(0.0, |proof| proof.unique_within_rad);
-        Self { headings: solution.headings, theta_rad: solution.theta_rad, unique_within_rad }
+        Self { leg_angles: solution.leg_angles, theta_rad: solution.theta_rad, unique_within_rad }
     }
 
     /// The true solution that continues this one, if the iteration finds and proves it.
     #[inline]
-    fn continued(&self, closure: &Closure<'_>, anchor: &mut Anchor) -> Option<Solution> {
-        let closed = closure.close(&self.headings, WARM_ITERATIONS)?;
-        let theta_rad = anchor.angles_rad(&closed.headings);
-        let solution = Solution::with_angles(closure, &closed, theta_rad);
+    fn continued(&self, loops: &LoopEquations<'_>, anchor: &mut Anchor) -> Option<Solution> {
+        let closed = loops.close(&self.leg_angles, WARM_ITERATIONS)?;
+        let theta_rad = anchor.angles_rad(&closed.leg_angles);
+        let solution = Solution::with_angles(loops, &closed, theta_rad);
         let reach_rad = solution.certificate?.unique_within_rad.min(self.unique_within_rad);
         (self.is_within(reach_rad, &solution) && solution.assembly.is_true()).then_some(solution)
     }

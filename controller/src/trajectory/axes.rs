@@ -3,7 +3,7 @@
 use masseter_shared::geometry::Vec3;
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion};
 
-use super::import::ImportProblem;
+use super::import_error::ImportProblem;
 
 /// A signed permutation of axes that keeps the hand.
 #[derive(Debug, Clone, Copy, PartialEq)]

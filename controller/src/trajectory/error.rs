@@ -12,7 +12,7 @@ pub enum TrajectoryError {
     OutOfRange {
         /// Configuration key.
         name: &'static str,
-        /// What stands there.
+        /// The value given.
         value: f64,
         /// The range.
         need: &'static str,
@@ -25,13 +25,13 @@ pub enum TrajectoryError {
     },
     /// The mandible cannot reach an amplitude with its condyles on their paths.
     #[error(
-        "{name} of {wanted_mm} mm is out of reach: the mandible gets to {reached_mm:.1} mm; ask for less"
+        "{name} of {desired_mm} mm is out of reach: the mandible gets to {reached_mm:.1} mm; ask for less"
     )]
     OutOfReach {
         /// Configuration key.
         name: &'static str,
         /// The amplitude asked for, mm.
-        wanted_mm: f64,
+        desired_mm: f64,
         /// The largest one possible, mm.
         reached_mm: f64,
     },
@@ -46,7 +46,7 @@ pub enum TrajectoryError {
     },
     /// The incisal path would push the condyles out of their sockets.
     #[error(
-        "at {phase:.2} of the chewing cycle the condyles would stand {advance_mm:.1} mm along their paths; \
+        "at {phase:.2} of the chewing cycle the condyles would be {advance_mm:.1} mm along their paths; \
          bring anterior_posterior_mm or lateral_mm closer to what vertical_mm allows (defaults 5, 4 and 18)"
     )]
     Dislocated {

@@ -46,7 +46,7 @@ pub(super) struct Mandible {
     working: f64,
 }
 
-/// Where the mandible stands on its paths.
+/// The mandible's position on its paths.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(super) struct Posture {
     /// Opening about the line between the condyles, radians.
@@ -177,7 +177,7 @@ pub(super) fn reach(
     }
     let reached_mm = 1000.0 * travel_m(below).unwrap_or_default();
     if amplitude_mm - reached_mm > REACHED_MM {
-        return Err(TrajectoryError::OutOfReach { name, wanted_mm: amplitude_mm, reached_mm });
+        return Err(TrajectoryError::OutOfReach { name, desired_mm: amplitude_mm, reached_mm });
     }
     Ok(below)
 }

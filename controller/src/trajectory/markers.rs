@@ -4,7 +4,8 @@ use masseter_shared::geometry::{Pose, Vec3};
 use nalgebra::{Matrix3, Rotation3, Translation3, UnitQuaternion};
 
 use super::axes::Axes;
-use super::import::{ImportProblem, Located, Samples};
+use super::import_error::{ImportProblem, Located};
+use super::recording::Samples;
 use super::table::{Row, Table};
 
 type Markers = [Vec3; 3];

@@ -3,7 +3,7 @@
 //! A trajectory is built once from a scenario (here files are read, motions solved and memory
 //! allocated) and then evaluated in the loop, without allocation and without iteration. It comes
 //! from a generator on a rigid mandible ([`MotionConfig`]'s kinds) or from a recording, starts and
-//! ends at rest, and moves nothing by itself: [`check`] tells beforehand whether the mechanism can
+//! ends at rest, and moves nothing by itself: [`check`] judges beforehand whether the mechanism can
 //! follow it. How the rig gets to its first pose is the controller's matter.
 
 mod axes;
@@ -14,6 +14,7 @@ mod cycle;
 mod error;
 mod excursion;
 mod import;
+mod import_error;
 mod jaw_frame;
 mod lowpass;
 mod mandible;
@@ -28,7 +29,7 @@ use masseter_shared::geometry::{Mechanism, Pose};
 
 pub use check::{CheckError, CheckProblem, TrajectoryReport, check};
 pub use error::TrajectoryError;
-pub use import::{ImportError, ImportProblem, SourceLine};
+pub use import_error::{ImportError, ImportProblem, SourceLine};
 
 pub(crate) use cycle::minimum_jerk;
 
@@ -38,10 +39,21 @@ use excursion::Excursion;
 use jaw_frame::JawFrame;
 use recording::Recording;
 
-/// How long a generated motion lasts if nobody says, s.
+/// Duration of a generated motion without `duration_s`, s.
 const GENERATED_DURATION_S: f64 = 10.0;
 
 /// The desired pose of the platform as a function of time.
+///
+/// ```
+/// use masseter_controller::trajectory::Trajectory;
+/// use masseter_shared::config::{JawConfig, MotionConfig};
+/// use masseter_shared::geometry::{Mechanism, MechanismConfig};
+///
+/// let mechanism = Mechanism::new(&MechanismConfig::default())?;
+/// let chewing = Trajectory::new(&MotionConfig::default(), &JawConfig::default(), &mechanism, Some(5.0))?;
+/// assert!(chewing.pose(0.3).translation.z < chewing.pose(0.0).translation.z);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct Trajectory {
     motion: Motion,
@@ -110,8 +122,8 @@ impl Trajectory {
         self.clock.cut_from_s()
     }
 
-    /// The largest turn of the jaw, degrees, where a recording's markers leave open where the incisal point is, their
-    /// centroid stands for it, and the turn makes that matter.
+    /// The largest turn of the jaw, degrees, if a recording of markers gives no incisal point and the turn makes their
+    /// centroid a bad substitute.
     pub fn centroid_turn_deg(&self) -> Option<f64> {
         match &self.motion {
             Motion::Recording(recording) => recording.centroid_turn_deg(),

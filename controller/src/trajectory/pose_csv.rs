@@ -4,7 +4,8 @@ use masseter_shared::geometry::{Pose, Vec3};
 use nalgebra::{Quaternion, UnitQuaternion};
 
 use super::axes::Axes;
-use super::import::{ImportProblem, Located, Samples};
+use super::import_error::{ImportProblem, Located};
+use super::recording::Samples;
 use super::table::{Row, Table};
 
 /// Within this of 1 a quaternion counts as rounded, beyond it as wrong.

@@ -8,7 +8,7 @@ use std::path::PathBuf;
 use masseter_shared::geometry::{Pose, Vec3};
 use nalgebra::{UnitQuaternion, Vector6};
 
-use super::import::{ImportProblem, Located, Samples, SourceLine};
+use super::import_error::{ImportProblem, Located, SourceLine};
 use super::lowpass::lowpass;
 use super::spline::Spline;
 
@@ -20,6 +20,16 @@ const LEAST_GRID_HZ: f64 = 200.0;
 const CENTROID_TURN_DEG: f64 = 2.0;
 /// Beyond this, rotation vectors are no longer a good measure of the way between two poses.
 const LARGEST_TURN_DEG: f64 = 90.0;
+
+/// Jaw displacements as recorded; jaw frame, metres.
+#[derive(Debug, Default)]
+pub(super) struct Samples {
+    pub time_s: Vec<f64>,
+    pub lines: Vec<u64>,
+    pub displacements: Vec<Pose>,
+    /// Whether they are displacements of the markers' centroid, because the incisal point is not given.
+    pub are_of_centroid: bool,
+}
 
 /// Jaw displacements over the recording's own time, from 0.
 #[derive(Debug, Clone)]
@@ -47,7 +57,7 @@ impl Recording {
         Ok(Self { path, time_s, lines: samples.lines, first_rotation, curve, centroid_turn_deg })
     }
 
-    /// The largest turn, degrees, where it matters that the markers' centroid stands for the incisal point.
+    /// The largest turn, degrees, if it makes the markers' centroid a bad substitute for the incisal point.
     pub(super) fn centroid_turn_deg(&self) -> Option<f64> {
         self.centroid_turn_deg
     }
@@ -128,9 +138,9 @@ mod tests {
             assert!((recording.length_s() - 2.0).abs() < 1e-12);
             for k in 0..=200 {
                 let t_s = f64::from(k) / 100.0;
-                let (got, wanted) = (recording.displacement(t_s), swaying(t_s));
-                assert!((got.translation.vector - wanted.translation.vector).norm() < 5e-5, "{t_s}");
-                assert!(got.rotation.angle_to(&wanted.rotation) < 5e-4, "{t_s}");
+                let (got, desired) = (recording.displacement(t_s), swaying(t_s));
+                assert!((got.translation.vector - desired.translation.vector).norm() < 5e-5, "{t_s}");
+                assert!(got.rotation.angle_to(&desired.rotation) < 5e-4, "{t_s}");
             }
         }
     }

@@ -1,9 +1,9 @@
 //! The recording as a table of finite numbers over increasing time.
 //!
-//! Plain CSV: no quotes, comments from `#`, blank lines ignored. What the columns mean is not known
-//! here beyond their names.
+//! Plain CSV: no quotes, comments from `#`, blank lines ignored. The module knows the columns'
+//! names, not their meaning.
 
-use super::import::{ImportProblem, Located};
+use super::import_error::{ImportProblem, Located};
 
 /// Fewer rows are no motion.
 const FEWEST_ROWS: usize = 4;
@@ -50,7 +50,7 @@ impl Format {
         }
     }
 
-    fn of_header(line: u64, header: &str) -> Result<Self, Located> {
+    fn from_header(line: u64, header: &str) -> Result<Self, Located> {
         let found: Vec<&str> = header.split(',').map(str::trim).collect();
         let format =
             if found.iter().any(|name| name.starts_with("m1")) { Self::Markers } else { Self::Poses };
@@ -79,7 +79,7 @@ impl Table {
         let mut content = lines.filter(|(_, line)| !line.is_empty() && !line.starts_with('#'));
         let too_few = |rows| Located::whole(ImportProblem::TooFewRows { rows, needed: FEWEST_ROWS });
         let (line, header) = content.next().ok_or_else(|| too_few(0))?;
-        let format = Format::of_header(line, header)?;
+        let format = Format::from_header(line, header)?;
         let mut rows: Vec<Row> = Vec::new();
         for (line, text) in content {
             let row = parse_row(line, text, format.columns())?;

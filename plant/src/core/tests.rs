@@ -1,4 +1,4 @@
-//! Scenarios of the whole plant under virtual time, with a commander that knows inverse kinematics only.
+//! Scenarios of the whole plant under virtual time, with a commander that uses inverse kinematics only.
 
 use masseter_can::canopen::{Cob, NodeId};
 use masseter_shared::geometry::{AXES, Mechanism, MechanismConfig, Pose, Vec3};
@@ -55,7 +55,7 @@ impl Bench {
         self.plant.drain_events(&mut |event| self.events.push(event));
     }
 
-    /// Cycles in which the drives are asked to hold where they stand, until all are enabled.
+    /// Runs cycles with a request to hold the actual position, until all drives are enabled.
     fn enable(&mut self) {
         for _ in 0..500 {
             self.cycle(Some(&|reading| (reading.position_m, DriveRequest::Enable)));
@@ -74,6 +74,27 @@ impl Bench {
     fn fastest_axis_m_s(&self) -> f64 {
         self.truth.joint_m_s.iter().fold(0.0, |fastest: f64, speed| fastest.max(speed.abs()))
     }
+}
+
+/// Who waits for the link's next event finds the process data complete at the instant at which the last of them arrive, in
+/// few looks.
+#[test]
+fn the_process_data_are_complete_at_one_of_the_links_events() {
+    const EVENTS: usize = 16;
+    let mut bench = Bench::new(&Scenario::default());
+    bench.enable();
+    let sync_ns = EPOCH_NS + bench.cycle * PERIOD_NS;
+    bench.plant.begin_cycle(Wake::on_time(bench.cycle + 1, sync_ns)).unwrap();
+    let mut now_ns = sync_ns;
+    let mut looks = 0;
+    while !bench.plant.collect(now_ns).unwrap() {
+        let next_ns = bench.plant.link().next_event_ns();
+        assert!(next_ns > now_ns, "an event that is over");
+        (now_ns, looks) = (next_ns, looks + 1);
+        assert!(looks <= EVENTS, "after {} ns", now_ns - sync_ns);
+    }
+    bench.plant.fill_reading(&mut bench.reading);
+    assert_eq!(bench.reading.complete_ns, now_ns);
 }
 
 /// Joint positions of a smooth motion about the pose the rig is switched on in: 15 mm up and down, some
@@ -171,7 +192,7 @@ fn without_the_master_the_drives_stop_by_themselves() {
 }
 
 #[test]
-fn a_bad_command_stops_the_rig_and_its_bad_value_is_told() {
+fn a_bad_command_stops_the_rig_and_its_bad_value_is_reported() {
     let standing = Bench::new(&Scenario::default()).truth.joint_m;
     let with = |axis: usize, target_m: f64| {
         let mut targets_m = standing;
@@ -294,5 +315,6 @@ fn drives_that_never_boot_are_named_each() {
     assert_eq!(named[..AXES], [0, 1, 2, 3, 4, 5]);
 }
 
+mod refusals;
 mod stops;
 mod wire_faults;

@@ -1,7 +1,7 @@
 //! The messages of the link as a DBC file: SYNC, NMT, and of every drive its PDOs as mapped after power-on,
 //! EMCY, SDO and heartbeat. Positions are in metres, forces in newtons.
 //!
-//! Both directions of SDO show their four parts; what is in segments is not taken apart.
+//! Both directions of SDO have their four parts as signals; segments are not decoded.
 
 use std::fmt::{self, Write};
 
@@ -11,11 +11,10 @@ use masseter_shared::config::DriveConfig;
 use masseter_shared::geometry::{AXES, AXIS_NAMES};
 
 use crate::drive::DriveSettings;
-use crate::drive::dictionary::{ENTRIES, Objects, PDOS, find};
-use crate::drive::pdo::MappingEntry;
+use crate::drive::dictionary::{ENTRIES, MappingEntry, Objects, PDOS, find};
 
 const MASTER: &str = "Master";
-/// Receiver of what everybody listens to.
+/// Receiver of messages to all nodes.
 const ANYBODY: &str = "Vector__XXX";
 
 const NMT_STATES: [(NmtState, &str); 4] = [
@@ -59,7 +58,9 @@ impl Signal<'_> {
 /// The file, lines ended by a line feed.
 pub(super) fn write(drives: &[DriveSettings; AXES]) -> String {
     let mut text = String::new();
-    messages(&mut text, drives).and_then(|()| meanings(&mut text, drives)).expect("a string takes any text");
+    messages(&mut text, drives)
+        .and_then(|()| value_names(&mut text, drives))
+        .expect("a string takes any text");
     text
 }
 
@@ -78,7 +79,7 @@ fn messages(text: &mut String, drives: &[DriveSettings; AXES]) -> fmt::Result {
     Ok(())
 }
 
-/// What every node has by the predefined connection set.
+/// The messages of a node in the predefined connection set.
 fn services(text: &mut String, node: NodeId, name: &str) -> fmt::Result {
     let emergency = [
         Signal::plain("Error_code", 0, 16),
@@ -120,7 +121,7 @@ fn mapped<'a>(objects: &Objects, index: u16, drive: &DriveConfig) -> Vec<Signal<
     let entries = (1..=objects.at(index, 0) as u8).map(|place| MappingEntry(objects.at(index, place)));
     let mut start_bit = 0;
     let signals = entries.map(|mapping| {
-        let entry = &ENTRIES[find(mapping.object()).expect("what is mapped exists")].entry;
+        let entry = &ENTRIES[find(mapping.object()).expect("only existing objects are mapped")].entry;
         let (factor, unit) = scale(mapping.object().index, drive);
         let name = entry.name.replace(' ', "_");
         let (bits, is_signed) = (mapping.bits(), entry.kind.is_signed());
@@ -131,7 +132,7 @@ fn mapped<'a>(objects: &Objects, index: u16, drive: &DriveConfig) -> Vec<Signal<
     signals.collect()
 }
 
-/// What one step of an object is worth that is mapped after power-on.
+/// Scale and unit of an object that is mapped after power-on.
 fn scale(index: u16, drive: &DriveConfig) -> (f64, &'static str) {
     match index {
         0x6064 | 0x607A => (drive.encoder_resolution_m, "m"),
@@ -155,8 +156,8 @@ fn message(
     writeln!(text)
 }
 
-/// What the numbers of states and commands are called.
-fn meanings(text: &mut String, drives: &[DriveSettings; AXES]) -> fmt::Result {
+/// Names of the numbers of states and commands.
+fn value_names(text: &mut String, drives: &[DriveSettings; AXES]) -> fmt::Result {
     let nmt = CanId::from(Cob::Nmt).number();
     let commands = NMT_COMMANDS.map(|(command, name)| (command.code(), name));
     values(text, nmt, "Command", &commands)?;

@@ -1,33 +1,43 @@
-//! The emulated drives for other people's tools: the electronic data sheet of a drive (EDS, CiA 306) and
-//! the messages of the whole link (DBC), both made from the drives' object dictionary.
+//! Descriptions of the emulated drives for other tools: the electronic data sheet of a drive (EDS, CiA 306) and
+//! the messages of all buses (DBC). Both follow from the drives' object dictionary.
 //!
-//! Written for the scenario's drives: what it configures stands in the files as default values, scales
-//! and identifiers.
+//! A description is that of one scenario: the scenario's values are its default values, scales and identifiers.
 
 mod dbc;
 mod eds;
 
 use masseter_shared::config::Scenario;
-
 use masseter_shared::geometry::AXES;
 
-use crate::build::all_drive_settings;
+use crate::drive::DriveSettings;
 use crate::error::PlantError;
 
 /// The electronic data sheets of the drives, in the order of the axes.
 ///
 /// # Errors
-/// [`PlantError`] where the scenario's drives cannot be.
+/// [`PlantError`] for drives that cannot be built.
+///
+/// ```
+/// let [d1, ..] = masseter_plant::description::eds(&masseter_shared::config::Scenario::default())?;
+/// assert!(d1.contains("ParameterName=Controlword"));
+/// # Ok::<_, masseter_plant::PlantError>(())
+/// ```
 pub fn eds(scenario: &Scenario) -> Result<[String; AXES], PlantError> {
-    Ok(all_drive_settings(scenario)?.map(|settings| eds::write(&settings)))
+    Ok(DriveSettings::for_axes(scenario)?.map(|settings| eds::write(&settings)))
 }
 
-/// The messages between the master and all drives.
+/// The messages between the master and all drives as a DBC file.
 ///
 /// # Errors
-/// [`PlantError`] where the scenario's drives cannot be.
+/// [`PlantError`] for drives that cannot be built.
+///
+/// ```
+/// let dbc = masseter_plant::description::dbc(&masseter_shared::config::Scenario::default())?;
+/// assert!(dbc.contains("BO_ 385 d1_TPDO1: 8 d1"));
+/// # Ok::<_, masseter_plant::PlantError>(())
+/// ```
 pub fn dbc(scenario: &Scenario) -> Result<String, PlantError> {
-    Ok(dbc::write(&all_drive_settings(scenario)?))
+    Ok(dbc::write(&DriveSettings::for_axes(scenario)?))
 }
 
 #[cfg(test)]

@@ -1,4 +1,4 @@
-//! What became of a command, as the readings tell that answer it.
+//! Reception and sending of a command, from the readings that answer it.
 
 use masseter_shared::messages::Reading;
 
@@ -12,7 +12,7 @@ pub(super) struct Answer {
     pub(super) sent_ns: Option<u64>,
 }
 
-/// Tells the readings that answer a command from those that answer the same once more.
+/// Finds the readings that answer a new command.
 #[derive(Debug, Default)]
 pub(super) struct Answers {
     last: u64,
@@ -26,7 +26,7 @@ impl Answers {
         }
         self.last = reading.answers_cycle;
         let (received_ns, sent_ns) = (reading.command_received_ns, reading.command_sent_ns);
-        // An older instant is that of an older command, which the plant still remembers.
+        // An older instant belongs to an older command, whose times the plant repeats.
         let is_of_this = sent_ns > 0 && sent_ns >= received_ns;
         Some(Answer { cycle: self.last, received_ns, sent_ns: is_of_this.then_some(sent_ns) })
     }

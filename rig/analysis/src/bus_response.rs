@@ -1,4 +1,4 @@
-//! The longest response times of the buses' messages, as they are told.
+//! The longest response times of the buses' messages.
 
 use serde::Serialize;
 
@@ -7,14 +7,14 @@ use serde::Serialize;
 pub struct ResponseFigures {
     /// Index of the bus.
     pub bus: usize,
-    /// What it is; `other` for all messages that are in no plan: SDO, NMT, emergencies.
+    /// Its name in the plan; `other` for all messages that are in no plan: SDO, NMT, emergencies.
     pub message: String,
     /// Frames whose time of queueing is known.
     pub frames: u64,
     /// Longest time from being queued to the end of the frame; none without such frames, ns.
     pub max_ns: Option<u64>,
-    /// The most it may be: by the plan, or if messages were queued closer together than planned, by that; none where there
-    /// is no bound, and in a run that has none, ns.
+    /// The bound by the plan, or by the closest queueing if messages were queued closer together than planned; none
+    /// where there is no bound, and in a run without bounds, ns.
     pub bound_ns: Option<u64>,
 }
 

@@ -1,10 +1,10 @@
-//! A cycle's path from the plant's deadline to the command on the wire, put together from the messages that tell of it.
+//! A cycle's path from the plant's deadline to the command on the wire, joined from messages of both processes.
 
 use masseter_shared::messages::{Reading, State};
 
 use super::hops::{Hop, HopTimes};
 
-/// What is known of a reading.
+/// Times of a reading.
 #[allow(clippy::struct_field_names, reason = "the unit")]
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Sampled {
@@ -17,13 +17,13 @@ pub(super) struct Sampled {
 }
 
 impl Sampled {
-    pub(super) fn of(reading: &Reading, stalled_when_due_ns: u64) -> Self {
+    pub(super) fn new(reading: &Reading, stalled_when_due_ns: u64) -> Self {
         let Reading { due_ns, woke_ns, sampled_ns, complete_ns, published_ns, .. } = *reading;
         Self { due_ns, woke_ns, sampled_ns, complete_ns, published_ns, stalled_when_due_ns }
     }
 }
 
-/// What is known of the controller's work.
+/// Times of the controller's work.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Computed {
     pub(super) reading_cycle: u64,
@@ -36,23 +36,23 @@ pub(super) struct Computed {
 }
 
 impl Computed {
-    pub(super) fn of(state: &State, stalled_when_due_ns: u64) -> Self {
+    pub(super) fn new(state: &State, stalled_when_due_ns: u64) -> Self {
         let State { reading_cycle, due_ns, woke_ns, received_ns, solved_ns, commanded_ns, .. } = *state;
         Self { reading_cycle, due_ns, woke_ns, received_ns, solved_ns, commanded_ns, stalled_when_due_ns }
     }
 }
 
-/// What became of the command.
+/// Times of the command in the plant.
 #[allow(clippy::struct_field_names, reason = "the unit")]
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Sent {
     pub(super) received_ns: u64,
     pub(super) sent_ns: u64,
-    /// The plant's counter at the deadline of the reading that tells so.
+    /// The plant's counter at the deadline of the reading that reports them.
     pub(super) stalled_when_next_due_ns: u64,
 }
 
-/// What is known of a controller's cycle so far.
+/// The parts of a controller's cycle that were found so far.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Parts {
     pub(super) computed: Option<Computed>,
@@ -75,7 +75,7 @@ pub(super) struct CyclePath {
 
 impl CyclePath {
     /// None while a part is missing.
-    pub(super) fn of(cycle: u64, sampled: &Sampled, parts: &Parts) -> Option<Self> {
+    pub(super) fn new(cycle: u64, sampled: &Sampled, parts: &Parts) -> Option<Self> {
         let (computed, sent) = (parts.computed?, parts.sent?);
         let plant_ns = passed_ns(sampled.stalled_when_due_ns, sent.stalled_when_next_due_ns);
         let controller_ns = passed_ns(computed.stalled_when_due_ns, parts.stalled_when_next_due_ns?);
@@ -106,7 +106,7 @@ fn hops_ns(sampled: &Sampled, computed: &Computed, published_ns: u64, sent: &Sen
     })
 }
 
-/// None where the two are in the wrong order, as in a damaged recording.
+/// 0 where the two are in the wrong order, as in a damaged recording.
 fn passed_ns(from_ns: u64, to_ns: u64) -> u64 {
     to_ns.saturating_sub(from_ns)
 }

@@ -1,8 +1,4 @@
-//! Events in words, as figures and as `events.jsonl`.
-
-use std::fs::File;
-use std::io::{BufWriter, Write};
-use std::path::PathBuf;
+//! Events with their codes resolved.
 
 use masseter_shared::geometry::AXIS_NAMES;
 use masseter_shared::messages::codes::{
@@ -11,8 +7,7 @@ use masseter_shared::messages::codes::{
 use masseter_shared::messages::{Event, explain};
 use serde::Serialize;
 
-use super::AnalysisError;
-use super::coded::Coded;
+use super::code::Code;
 
 /// An event with its codes resolved.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -22,11 +17,11 @@ pub struct EventRecord {
     /// Cycle of the process that reported it.
     pub cycle: u64,
     /// Who reported it.
-    pub source: Coded<Source>,
+    pub source: Code<Source>,
     /// What it is.
-    pub kind: Coded<EventKind>,
+    pub kind: Code<EventKind>,
     /// Why.
-    pub cause: Coded<Cause>,
+    pub cause: Code<Cause>,
     /// The axis concerned.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub axis: Option<&'static str>,
@@ -44,10 +39,10 @@ pub struct EventRecord {
 
 impl From<&Event> for EventRecord {
     fn from(event: &Event) -> Self {
-        let source = Coded::from(event.source);
+        let source = Code::from(event.source);
         let state = |code: u32| match source {
-            Coded::Known(Source::Controller) => Coded::<ControllerState>::from(code).to_string(),
-            Coded::Known(Source::Master) => Coded::<BootPhase>::from(code).to_string(),
+            Code::Known(Source::Controller) => Code::<ControllerState>::from(code).to_string(),
+            Code::Known(Source::Master) => Code::<BootPhase>::from(code).to_string(),
             _ => {
                 drive_state_name(code).map_or_else(|unknown| format!("code {}", unknown.code), str::to_owned)
             }
@@ -65,42 +60,5 @@ impl From<&Event> for EventRecord {
             value: event.value,
             limit: event.limit,
         }
-    }
-}
-
-/// Collects events and writes a line of JSON for each.
-pub(super) struct EventLog {
-    path: PathBuf,
-    file: BufWriter<File>,
-    records: Vec<EventRecord>,
-}
-
-impl EventLog {
-    pub(super) fn create(path: PathBuf) -> Result<Self, AnalysisError> {
-        match File::create(&path) {
-            Ok(file) => Ok(Self { path, file: BufWriter::new(file), records: Vec::new() }),
-            Err(error) => Err(AnalysisError::Write { path, error }),
-        }
-    }
-
-    pub(super) fn write(&mut self, event: &Event) {
-        self.records.push(EventRecord::from(event));
-    }
-
-    /// Events in the order of their times.
-    pub(super) fn finish(mut self) -> Result<Vec<EventRecord>, AnalysisError> {
-        self.records.sort_by_key(|record| record.time_ns);
-        match self.write_all() {
-            Ok(()) => Ok(self.records),
-            Err(error) => Err(AnalysisError::Write { path: self.path, error }),
-        }
-    }
-
-    fn write_all(&mut self) -> std::io::Result<()> {
-        for record in &self.records {
-            serde_json::to_writer(&mut self.file, record)?;
-            writeln!(self.file)?;
-        }
-        self.file.flush()
     }
 }

@@ -1,5 +1,5 @@
-//! Which reading each cycle of the controller used: forward kinematics and control have nothing new to work on without
-//! a fresh one.
+//! Which reading each cycle of the controller used. Without a fresh reading, forward kinematics and control have no new
+//! input.
 
 use masseter_shared::messages::State;
 use serde::Serialize;
@@ -17,7 +17,7 @@ pub struct ReadingFigures {
     pub before_first: u64,
 }
 
-/// Tells fresh readings from those used again.
+/// Separates fresh readings from those used again.
 #[derive(Debug, Default)]
 pub(super) struct Freshness {
     last: u64,

@@ -1,7 +1,6 @@
-//! The hops of a cycle from the plant's deadline to the command on the wire, and which of them is to blame for a long
-//! one: the one furthest above its own median.
+//! The hops of a cycle from the plant's deadline to the command on the wire, and the hop furthest above its own median.
 //!
-//! Between them lie SYNC on the wire and the waits of the time table, so that a delay counts in one of them alone.
+//! SYNC on the wire and the waits of the time table lie between the hops, so that a delay counts in one hop alone.
 
 use hdrhistogram::Histogram;
 use serde::{Serialize, Serializer};
@@ -48,7 +47,7 @@ impl Hop {
         Self::CommandToWire,
     ];
 
-    /// What tables and files call it.
+    /// The name in tables and files.
     pub fn name(self) -> &'static str {
         match self {
             Self::PlantWakeUp => "plant wake-up",
@@ -75,9 +74,9 @@ impl Serialize for Hop {
 /// How long each of [`Hop::ALL`] took in a cycle, ns.
 pub(super) type HopTimes = [u64; Hop::ALL.len()];
 
-/// A hop to blame.
+/// A hop of one cycle beside its median.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Blamed {
+pub(super) struct HopTime {
     pub(super) hop: Hop,
     pub(super) took_ns: u64,
     pub(super) p50_ns: u64,
@@ -100,9 +99,10 @@ impl TypicalHops {
         }
     }
 
-    pub(super) fn blame(&self, hops_ns: &HopTimes) -> Blamed {
+    /// The hop furthest above its median.
+    pub(super) fn furthest_above_median(&self, hops_ns: &HopTimes) -> HopTime {
         let hops = Hop::ALL.into_iter().zip(hops_ns).zip(&self.0).map(|((hop, &took_ns), histogram)| {
-            Blamed { hop, took_ns, p50_ns: histogram.value_at_quantile(0.5).min(histogram.max()) }
+            HopTime { hop, took_ns, p50_ns: histogram.value_at_quantile(0.5).min(histogram.max()) }
         });
         hops.max_by_key(|hop| hop.took_ns.saturating_sub(hop.p50_ns)).expect("there are hops")
     }
@@ -119,7 +119,7 @@ mod tests {
         (0..9).for_each(|_| typical.take(&typical_ns));
         let mut hops_ns = typical_ns;
         (hops_ns[1], hops_ns[5]) = (450, 100);
-        let expected = Blamed { hop: Hop::ForwardKinematics, took_ns: 100, p50_ns: 10 };
-        assert_eq!(typical.blame(&hops_ns), expected);
+        let expected = HopTime { hop: Hop::ForwardKinematics, took_ns: 100, p50_ns: 10 };
+        assert_eq!(typical.furthest_above_median(&hops_ns), expected);
     }
 }

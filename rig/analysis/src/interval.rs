@@ -1,4 +1,4 @@
-//! The intervals by name. What they lie between, [`Intervals`](super::intervals::Intervals) knows.
+//! The intervals by name. [`Intervals`](super::intervals::Intervals) defines their ends.
 
 /// An interval that a cycle passes through.
 #[derive(Debug, Clone, Copy)]
@@ -15,8 +15,8 @@ pub(super) enum Interval {
     CommandTransport,
     CommandToWire,
     SampleToWire,
-    /// From the plant's wake-up to the reading's publication and from its reception to the command's: what both processes and
-    /// the wires take, without the waits of the time table.
+    /// From the plant's wake-up to the reading's publication, and from the reading's reception to the command's: both
+    /// processes and the wires, without the waits of the time table.
     RoundTrip,
 }
 

@@ -3,12 +3,8 @@
 //! A skipped deadline has no cycle and so no samples. Only the wake-ups have a second series in which it counts, with
 //! the time until the wake-up that skipped it: corrected for coordinated omission once, by the skips as counted.
 
-use std::fs;
-use std::path::Path;
-
 use masseter_shared::messages::{Command, Reading, State};
 
-use super::AnalysisError;
 use super::answer::{Answer, Answers};
 use super::interval::Interval;
 use super::join::{ByCycle, Join};
@@ -34,7 +30,8 @@ struct Published {
     reading_cycle: u64,
 }
 
-/// All intervals of a run, and what is needed to join the messages they lie between.
+/// All intervals of a run, and the messages between which they lie, until they are joined.
+#[derive(Debug)]
 pub(super) struct Intervals {
     period_ns: u64,
     measured: Vec<Measured>,
@@ -54,15 +51,10 @@ pub(super) struct Intervals {
 }
 
 impl Intervals {
-    /// With logs in `folder`, if they are wanted.
-    pub(super) fn new(folder: Option<&Path>, period_ns: u64) -> Result<Self, AnalysisError> {
-        if let Some(path) = folder {
-            fs::create_dir_all(path)
-                .map_err(|error| AnalysisError::Write { path: path.to_owned(), error })?;
-        }
-        Ok(Self {
+    pub(super) fn new(period_ns: u64) -> Self {
+        Self {
             period_ns,
-            measured: Interval::ALL.iter().map(|interval| Measured::new(interval.name(), folder)).collect(),
+            measured: Interval::ALL.iter().map(|interval| Measured::new(interval.name())).collect(),
             plant_skipped: Skipped::default(),
             controller_skipped: Skipped::default(),
             answers: Answers::default(),
@@ -71,7 +63,7 @@ impl Intervals {
             controller_cycles: Join::default(),
             commands: Join::default(),
             round_trips: Join::default(),
-        })
+        }
     }
 
     fn add(&mut self, interval: Interval, from_ns: u64, to_ns: u64) {
@@ -161,7 +153,7 @@ impl Intervals {
         }
     }
 
-    pub(super) fn finish(self) -> Result<Vec<IntervalFigures>, AnalysisError> {
+    pub(super) fn finish(self) -> Vec<IntervalFigures> {
         self.measured.into_iter().map(Measured::finish).collect()
     }
 }
@@ -188,15 +180,13 @@ mod tests {
 
     const PERIOD_NS: u64 = 1_000_000;
 
-    fn intervals() -> (tempfile::TempDir, Intervals) {
-        let folder = tempfile::tempdir().unwrap();
-        let intervals = Intervals::new(Some(folder.path()), PERIOD_NS).unwrap();
-        (folder, intervals)
+    fn intervals() -> Intervals {
+        Intervals::new(PERIOD_NS)
     }
 
     /// Samples and largest value of each interval.
     fn found(intervals: Intervals) -> Vec<(&'static str, u64, Option<u64>)> {
-        let figures = intervals.finish().unwrap();
+        let figures = intervals.finish();
         figures.iter().map(|interval| (interval.name, interval.n, interval.max_ns)).collect()
     }
 
@@ -247,7 +237,7 @@ mod tests {
             _ => intervals.reading(&answer()),
         };
         for order in ["rsca", "rsac", "rcsa", "rcas", "rasc", "racs", "srca", "crsa", "scra", "csra"] {
-            let (_folder, mut intervals) = intervals();
+            let mut intervals = intervals();
             order.chars().for_each(|message| take(&mut intervals, message));
             let found = found(intervals);
             for expected in expected {
@@ -258,18 +248,18 @@ mod tests {
 
     #[test]
     fn the_longest_round_trip_was_when_the_plant_had_the_command() {
-        let (_folder, mut intervals) = intervals();
+        let mut intervals = intervals();
         intervals.reading(&reading());
         intervals.state(&state(), true);
         intervals.reading(&answer());
-        let figures = intervals.finish().unwrap();
+        let figures = intervals.finish();
         let trip = figures.iter().find(|interval| interval.name == "round trip").unwrap();
         assert_eq!((trip.max_ns, trip.max_at_ns), (Some(660), Some(1100)));
     }
 
     #[test]
     fn a_reading_used_again_gives_no_samples() {
-        let (_folder, mut intervals) = intervals();
+        let mut intervals = intervals();
         intervals.reading(&reading());
         intervals.state(&state(), true);
         intervals.state(&State { cycle: 6, ..state() }, false);
@@ -278,7 +268,7 @@ mod tests {
 
     #[test]
     fn a_command_that_never_reached_the_wire_has_no_way_there() {
-        let (_folder, mut intervals) = intervals();
+        let mut intervals = intervals();
         intervals.reading(&reading());
         intervals.command(&command());
         intervals.reading(&Reading { command_sent_ns: 400, ..answer() });
@@ -293,16 +283,16 @@ mod tests {
     #[test]
     fn a_skipped_deadline_counts_in_the_corrected_wake_up_only() {
         let states = |seq| {
-            let (folder, mut intervals) = intervals();
+            let mut intervals = intervals();
             intervals.state(&State { seq: 1, ..State::default() }, false);
             // Woken 200 µs after deadline 5; 2 to 4 were skipped.
             let late = State { due_ns: 5 * PERIOD_NS, woke_ns: 5_200_000, ..State::default() };
             intervals.state(&State { seq, skipped_cycles: 3, ..late }, false);
-            (folder, intervals)
+            intervals
         };
-        assert_eq!(only("controller wake-up", states(2).1), (2, Some(200_000)));
-        assert_eq!(only("controller wake-up corrected", states(2).1), (5, Some(3_200_000)));
+        assert_eq!(only("controller wake-up", states(2)), (2, Some(200_000)));
+        assert_eq!(only("controller wake-up corrected", states(2)), (5, Some(3_200_000)));
         // Who skipped them is not recorded.
-        assert_eq!(only("controller wake-up corrected", states(3).1), (2, Some(200_000)));
+        assert_eq!(only("controller wake-up corrected", states(3)), (2, Some(200_000)));
     }
 }

@@ -1,6 +1,6 @@
 //! Joins messages of different topics by their cycle, in constant memory.
 //!
-//! The logger drains topic after topic, so messages of one cycle lie some tens of cycles apart.
+//! The recorder drains topic after topic, so messages of one cycle lie some tens of cycles apart.
 
 /// Cycles kept; far more than lie between two drains at any rate.
 const KEPT: usize = 1 << 15;

@@ -1,16 +1,16 @@
-//! What the kernel counted around a cycle: what made it long is often not in the rig.
+//! The kernel's counters around a cycle: the cause of a long cycle is often outside the rig.
 
 use masseter_shared::messages::Machine;
 use serde::Serialize;
 
-/// What the kernel counted between the looks before and after a cycle.
+/// Growth of the kernel's counters between the samples before and after a cycle.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
 pub struct KernelCounts {
-    /// From one look to the other, ns.
+    /// From one sample to the other, ns.
     pub looked_over_ns: Option<u64>,
-    /// Time that the hypervisor took from all cores meanwhile, as far as it tells, ns.
+    /// Time that the hypervisor took from all cores meanwhile, as far as it reports that, ns.
     pub stolen_ns: Option<u64>,
-    /// Times that one of the loops had its core taken from it.
+    /// Times that one of the loops lost its core.
     pub involuntary_switches: Option<u64>,
     /// Page faults of both processes.
     pub page_faults: Option<u64>,
@@ -18,29 +18,29 @@ pub struct KernelCounts {
 
 impl KernelCounts {
     fn between(before: &Machine, after: &Machine) -> Self {
-        let more = |of: fn(&Machine) -> u64| Some(of(after).saturating_sub(of(before)));
+        let growth = |counter: fn(&Machine) -> u64| Some(counter(after).saturating_sub(counter(before)));
         Self {
-            looked_over_ns: more(|machine| machine.time_ns),
-            stolen_ns: more(|machine| machine.stolen_ns),
-            involuntary_switches: more(|machine| machine.involuntary_switches.iter().sum()),
-            page_faults: more(|machine| machine.page_faults.iter().sum()),
+            looked_over_ns: growth(|machine| machine.time_ns),
+            stolen_ns: growth(|machine| machine.stolen_ns),
+            involuntary_switches: growth(|machine| machine.involuntary_switches.iter().sum()),
+            page_faults: growth(|machine| machine.page_faults.iter().sum()),
         }
     }
 }
 
-/// All looks of a run.
+/// All samples of the counters.
 #[derive(Debug, Default)]
-pub(super) struct KernelLooks(Vec<Machine>);
+pub(super) struct KernelSamples(Vec<Machine>);
 
-impl KernelLooks {
-    pub(super) fn take(&mut self, look: &Machine) {
-        self.0.push(*look);
+impl KernelSamples {
+    pub(super) fn take(&mut self, sample: &Machine) {
+        self.0.push(*sample);
     }
 
-    /// What was counted between the last look before a stretch of time and the first behind it.
+    /// Growth between the last sample before a stretch of time and the first behind it.
     pub(super) fn around(&self, from_ns: u64, to_ns: u64) -> KernelCounts {
-        let before = self.0.partition_point(|look| look.time_ns <= from_ns);
-        let after = self.0.partition_point(|look| look.time_ns < to_ns);
+        let before = self.0.partition_point(|sample| sample.time_ns <= from_ns);
+        let after = self.0.partition_point(|sample| sample.time_ns < to_ns);
         match (before.checked_sub(1), self.0.get(after)) {
             (Some(before), Some(after)) => KernelCounts::between(&self.0[before], after),
             _ => KernelCounts::default(),
@@ -53,11 +53,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_was_counted_is_that_between_the_looks_before_and_behind() {
-        let mut looks = KernelLooks::default();
+    fn what_was_counted_is_that_between_the_samples_before_and_behind() {
+        let mut samples = KernelSamples::default();
         for (time_ns, stolen_ns, switches) in [(0, 0, 1), (50, 3_000, 3), (100, 3_000, 3)] {
             let involuntary_switches = [switches, 0];
-            looks.take(&Machine { time_ns, stolen_ns, involuntary_switches, ..Default::default() });
+            samples.take(&Machine { time_ns, stolen_ns, involuntary_switches, ..Default::default() });
         }
         let told = |stolen_ns, switches| KernelCounts {
             looked_over_ns: Some(50),
@@ -65,8 +65,8 @@ mod tests {
             involuntary_switches: Some(switches),
             page_faults: Some(0),
         };
-        assert_eq!(looks.around(40, 41), told(3_000, 2));
-        assert_eq!(looks.around(70, 71), told(0, 0));
-        assert_eq!(looks.around(100, 101), KernelCounts::default());
+        assert_eq!(samples.around(40, 41), told(3_000, 2));
+        assert_eq!(samples.around(70, 71), told(0, 0));
+        assert_eq!(samples.around(100, 101), KernelCounts::default());
     }
 }

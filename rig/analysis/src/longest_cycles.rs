@@ -1,8 +1,8 @@
-//! The cycles that took longest from the plant's deadline to the command on the wire, each with the hop
-//! to blame.
+//! The cycles that took longest from the plant's deadline to the command on the wire, each with the hop furthest above
+//! its median.
 //!
-//! A command that the plant never took, since a newer one overtook it, is followed to the first later one that went out:
-//! the cycles that are hit hardest end so. A cycle without a fresh reading has no path.
+//! Where a newer command overtook the cycle's own, the path ends with the first later command that went out: the
+//! longest cycles end so. A cycle without a fresh reading has no path.
 
 use masseter_shared::messages::{Command, Machine, Reading, State};
 use serde::Serialize;
@@ -11,10 +11,10 @@ use super::answer::{Answer, Answers};
 use super::cycle_path::{Computed, CyclePath, Parts, Sampled, Sent};
 use super::hops::{Hop, TypicalHops};
 use super::join::ByCycle;
-use super::kernel_counts::{KernelCounts, KernelLooks};
+use super::kernel_counts::{KernelCounts, KernelSamples};
 use super::stalls::Stalls;
 
-/// Cycles told of.
+/// Cycles kept.
 const WORST: usize = 10;
 /// Commands overtaken at once that are followed: more than a rig that still moves can have.
 const OVERTAKEN: u64 = 1 << 12;
@@ -29,7 +29,7 @@ pub struct WorstCycle {
     /// From there until the last process data of its command were on the wire, or of the first later one if it was
     /// overtaken, ns.
     pub total_ns: u64,
-    /// The hop to blame.
+    /// The hop furthest above its median.
     pub hop: Hop,
     /// How long that hop took, ns.
     pub hop_ns: u64,
@@ -38,7 +38,7 @@ pub struct WorstCycle {
     /// Time that the machine withheld from the plant from that deadline on until the one after the command, and from the
     /// controller from its deadline until the next, ns.
     pub stalled_ns: u64,
-    /// What the kernel counted around it; none where nobody looked.
+    /// The kernel's counters around it; none without samples.
     #[serde(flatten)]
     pub around: KernelCounts,
 }
@@ -50,7 +50,7 @@ pub(super) struct LongestCycles {
     parts: ByCycle<Parts>,
     typical: TypicalHops,
     longest: Vec<CyclePath>,
-    looks: KernelLooks,
+    kernel: KernelSamples,
     plant_stalls: Stalls,
     controller_stalls: Stalls,
     last_cycle: Option<u64>,
@@ -63,7 +63,7 @@ impl LongestCycles {
         let late_ns = reading.woke_ns.saturating_sub(reading.due_ns);
         let stalled_ns = self.plant_stalls.when_due_ns(reading.stalled_ns, late_ns);
         if reading.complete_ns > 0 {
-            self.samples.insert(reading.cycle, Sampled::of(reading, stalled_ns));
+            self.samples.insert(reading.cycle, Sampled::new(reading, stalled_ns));
         }
         if let Some(Answer { cycle, received_ns, sent_ns: Some(sent_ns) }) = self.answers.take(reading) {
             let sent = Sent { received_ns, sent_ns, stalled_when_next_due_ns: stalled_ns };
@@ -87,7 +87,7 @@ impl LongestCycles {
             self.add(last_cycle, |parts| parts.stalled_when_next_due_ns = Some(stalled_ns));
         }
         if is_fresh {
-            self.add(state.cycle, |parts| parts.computed = Some(Computed::of(state, stalled_ns)));
+            self.add(state.cycle, |parts| parts.computed = Some(Computed::new(state, stalled_ns)));
         }
     }
 
@@ -96,7 +96,7 @@ impl LongestCycles {
     }
 
     pub(super) fn machine(&mut self, machine: &Machine) {
-        self.looks.take(machine);
+        self.kernel.take(machine);
     }
 
     /// Adds a part; the last one completes the path.
@@ -111,7 +111,7 @@ impl LongestCycles {
 
     fn path(&self, cycle: u64, parts: &Parts) -> Option<CyclePath> {
         let sampled = self.samples.get(parts.computed?.reading_cycle)?;
-        CyclePath::of(cycle, &sampled, parts)
+        CyclePath::new(cycle, &sampled, parts)
     }
 
     fn keep(&mut self, path: CyclePath) {
@@ -130,16 +130,16 @@ impl LongestCycles {
 
     fn worst_cycle(&self, path: &CyclePath) -> WorstCycle {
         let CyclePath { cycle, due_ns, total_ns, stalled_ns, .. } = *path;
-        let blamed = self.typical.blame(&path.hops_ns);
+        let hop = self.typical.furthest_above_median(&path.hops_ns);
         WorstCycle {
             cycle,
             due_ns,
             total_ns,
-            hop: blamed.hop,
-            hop_ns: blamed.took_ns,
-            hop_p50_ns: blamed.p50_ns,
+            hop: hop.hop,
+            hop_ns: hop.took_ns,
+            hop_p50_ns: hop.p50_ns,
             stalled_ns,
-            around: self.looks.around(due_ns, due_ns.saturating_add(total_ns)),
+            around: self.kernel.around(due_ns, due_ns.saturating_add(total_ns)),
         }
     }
 }

@@ -1,14 +1,11 @@
-//! One measured interval: the whole run's histogram, and an interval log of it.
-
-use std::path::{Path, PathBuf};
+//! One measured interval: a histogram of the whole run, and one of each second.
 
 use hdrhistogram::Histogram;
 use hdrhistogram::serialization::{Deserializer, Serializer, V2Serializer};
+use masseter_shared::clock::SECOND_NS;
 use serde::Serialize;
 
 use super::noise::standard_error;
-use super::{AnalysisError, NOWHERE};
-use crate::hlog;
 
 /// Below this many samples the 99.9th percentile rests on fewer than ten of them and is not given.
 const SAMPLES_FOR_P999: u64 = 10_000;
@@ -39,19 +36,42 @@ pub struct IntervalFigures {
     /// The distribution, for plots: 1/(1 − quantile) and value in ns.
     #[serde(skip)]
     pub curve: Vec<(f64, u64)>,
+    /// The samples of each second, for histogram logs.
+    #[serde(skip)]
+    pub seconds: Seconds,
 }
 
-/// The whole run's histogram, and one for each second of it.
+/// One histogram for each second in which there were samples. Serialised, they take a hundredth of their memory.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Seconds(Vec<(u64, Vec<u8>)>);
+
+impl Seconds {
+    fn push(&mut self, began_ns: u64, second: &Histogram<u64>) {
+        let mut bytes = Vec::new();
+        V2Serializer::new().serialize(second, &mut bytes).expect("memory takes any histogram");
+        self.0.push((began_ns, bytes));
+    }
+
+    /// The beginning of each second, ns since the first sample, and the histogram of its samples, ns.
+    pub fn iter(&self) -> impl Iterator<Item = (u64, Histogram<u64>)> {
+        let first_ns = self.0.first().map_or(0, |(began_ns, _)| *began_ns);
+        self.0.iter().map(move |(began_ns, bytes)| {
+            let second = Deserializer::new().deserialize(&mut bytes.as_slice()).expect("serialised above");
+            (began_ns - first_ns, second)
+        })
+    }
+}
+
+/// Collects the samples of an interval.
+#[derive(Debug)]
 pub(super) struct Measured {
     name: &'static str,
-    path: PathBuf,
     total: Histogram<u64>,
     max_ns: u64,
     max_at_ns: u64,
     second: Histogram<u64>,
     second_began_ns: u64,
-    /// Past seconds, serialised: a hundredth of their size in memory.
-    seconds: Vec<(u64, Vec<u8>)>,
+    seconds: Seconds,
     medians_ns: Vec<f64>,
     p99s_ns: Vec<f64>,
 }
@@ -60,25 +80,22 @@ pub(super) fn histogram() -> Histogram<u64> {
     Histogram::new(DIGITS).expect("three digits are allowed")
 }
 
-/// How far from this value, ns, another one must be for a histogram to tell them apart.
+/// Width of the bucket that holds this value, ns: a histogram cannot separate closer values.
 pub fn resolution_ns(value_ns: u64) -> u64 {
     histogram().equivalent_range(value_ns)
 }
 
 impl Measured {
-    pub(super) fn new(name: &'static str, folder: Option<&Path>) -> Self {
-        let within = |folder: &Path| folder.join(format!("{}.hlog", name.replace(' ', "-")));
-        let path = folder.map_or_else(|| NOWHERE.into(), within);
+    pub(super) fn new(name: &'static str) -> Self {
         let (total, second) = (histogram(), histogram());
         Self {
             name,
-            path,
             total,
             max_ns: 0,
             max_at_ns: 0,
             second,
             second_began_ns: 0,
-            seconds: Vec::new(),
+            seconds: Seconds::default(),
             medians_ns: Vec::new(),
             p99s_ns: Vec::new(),
         }
@@ -88,20 +105,20 @@ impl Measured {
         self.add_steps(value_ns, 1, 0, at_ns);
     }
 
-    /// A value, and `more` of them, each a step above the one before.
+    /// Adds a value, and `more` of them, each a step above the one before.
     pub(super) fn add_steps(&mut self, value_ns: u64, step_ns: u64, more: u64, at_ns: u64) {
         let more = more.min((u64::MAX - value_ns) / step_ns);
         let largest_ns = value_ns + more * step_ns;
         if largest_ns > self.max_ns || self.total.is_empty() {
             (self.max_ns, self.max_at_ns) = (largest_ns, at_ns);
         }
-        if at_ns >= self.second_began_ns.saturating_add(hlog::INTERVAL_NS) {
+        if at_ns >= self.second_began_ns.saturating_add(SECOND_NS) {
             self.close_second();
             self.second_began_ns = at_ns;
         }
         let (mut value_ns, mut left) = (value_ns, more + 1);
         while left > 0 {
-            // Those that a histogram does not tell apart are recorded at once: damage may count any number of skips.
+            // Values of one bucket are recorded at once: a damaged message may count any number of skips.
             let alike = ((self.total.highest_equivalent(value_ns) - value_ns) / step_ns + 1).min(left);
             self.record(value_ns, alike);
             left -= alike;
@@ -115,31 +132,24 @@ impl Measured {
         }
     }
 
-    /// A whole second goes to the log, and tells of the noise.
+    /// Ends a whole second, whose quantiles show the noise.
     fn close_second(&mut self) {
         if self.second.is_empty() {
             return;
         }
         self.medians_ns.push(self.second.value_at_quantile(0.50) as f64);
         self.p99s_ns.push(self.second.value_at_quantile(0.99) as f64);
-        self.log_second();
-    }
-
-    fn log_second(&mut self) {
-        let mut bytes = Vec::new();
-        V2Serializer::new().serialize(&self.second, &mut bytes).expect("memory takes any histogram");
-        self.seconds.push((self.second_began_ns, bytes));
+        self.seconds.push(self.second_began_ns, &self.second);
         self.second.reset();
     }
 
-    pub(super) fn finish(mut self) -> Result<IntervalFigures, AnalysisError> {
+    pub(super) fn finish(mut self) -> IntervalFigures {
         if !self.second.is_empty() {
-            self.log_second();
+            self.seconds.push(self.second_began_ns, &self.second);
         }
-        self.write_log().map_err(|error| AnalysisError::Write { path: self.path.clone(), error })?;
         let n = self.total.len();
         let measured = |ns: u64| (n > 0).then_some(ns);
-        Ok(IntervalFigures {
+        IntervalFigures {
             name: self.name,
             n,
             p50_ns: measured(self.quantile_ns(0.50)),
@@ -150,15 +160,16 @@ impl Measured {
             max_ns: measured(self.max_ns),
             max_at_ns: measured(self.max_at_ns),
             curve: self.curve(),
-        })
+            seconds: self.seconds,
+        }
     }
 
-    /// A histogram knows a value by the end of its bucket, which may lie beyond the largest.
+    /// A histogram gives the end of a value's bucket, which may lie beyond the largest value.
     fn quantile_ns(&self, quantile: f64) -> u64 {
         self.total.value_at_quantile(quantile).min(self.max_ns)
     }
 
-    /// The distribution as HdrHistogram plots it; the largest value stands where its own share ends.
+    /// The distribution as HdrHistogram plots it; the largest value lies where its own share ends.
     fn curve(&self) -> Vec<(f64, u64)> {
         let samples = self.total.len() as f64;
         let steps = self.total.iter_quantiles(5);
@@ -167,66 +178,52 @@ impl Measured {
             .map(|(quantile, value)| ((1.0 / (1.0 - quantile)).min(samples), value.min(self.max_ns)))
             .collect()
     }
-
-    /// The seconds, times relative to the first sample.
-    fn write_log(&self) -> std::io::Result<()> {
-        let first_ns = self.seconds.first().map_or(0, |(start, _)| *start);
-        let seconds = self.seconds.iter().map(|(start_ns, bytes)| {
-            let second: Histogram<u64> =
-                Deserializer::new().deserialize(&mut bytes.as_slice()).expect("serialised above");
-            (start_ns - first_ns, second)
-        });
-        hlog::write(&self.path, &format!("masseter: {}, ns", self.name), seconds)
-    }
 }
 
 #[cfg(test)]
 mod tests {
-    use masseter_shared::clock::SECOND_NS;
-
     use super::*;
 
-    fn measured() -> (tempfile::TempDir, Measured) {
-        let folder = tempfile::tempdir().unwrap();
-        let measured = Measured::new("control", Some(folder.path()));
-        (folder, measured)
+    fn measured() -> Measured {
+        Measured::new("control")
     }
 
     #[test]
-    fn the_largest_value_is_told_as_it_was() {
-        let (_folder, mut measured) = measured();
+    fn the_largest_value_is_exact() {
+        let mut measured = measured();
         measured.add(410_123, 0);
-        let figures = measured.finish().unwrap();
+        let figures = measured.finish();
         assert_eq!([figures.p50_ns, figures.p99_ns, figures.max_ns], [Some(410_123); 3]);
         assert_eq!(figures.curve.last().unwrap().1, 410_123);
     }
 
     #[test]
     fn without_samples_there_are_no_figures() {
-        let (_folder, measured) = measured();
-        let figures = measured.finish().unwrap();
+        let measured = measured();
+        let figures = measured.finish();
         assert_eq!(figures.n, 0);
         assert_eq!([figures.p50_ns, figures.p99_ns, figures.max_ns, figures.max_at_ns], [None; 4]);
     }
 
     #[test]
     fn the_last_seconds_stub_says_nothing_of_the_noise() {
-        let (folder, mut measured) = measured();
+        let mut measured = measured();
         (0..30).for_each(|tenth| measured.add(1_000, tenth * SECOND_NS / 10));
         measured.add(9_000, 3 * SECOND_NS);
-        let figures = measured.finish().unwrap();
+        let figures = measured.finish();
         assert_eq!((figures.n, figures.p50_noise_ns), (31, Some(0.0)));
-        let log = std::fs::read_to_string(folder.path().join("control.hlog")).unwrap();
-        assert_eq!(log.lines().filter(|line| !line.starts_with(['#', '"'])).count(), 4);
+        let seconds: Vec<_> =
+            figures.seconds.iter().map(|(began_ns, second)| (began_ns, second.len())).collect();
+        assert_eq!(seconds, [(0, 10), (SECOND_NS, 10), (2 * SECOND_NS, 10), (3 * SECOND_NS, 1)]);
     }
 
     #[test]
     fn any_number_of_steps_is_recorded_in_bounded_time() {
-        let (_folder, mut measured) = measured();
+        let mut measured = measured();
         measured.add_steps(7, 1_000_000, 20_000, 0);
-        assert_eq!(measured.finish().unwrap().n, 20_001);
-        let (_folder, mut measured) = self::measured();
+        assert_eq!(measured.finish().n, 20_001);
+        let mut measured = self::measured();
         measured.add_steps(7, 1_000_000, u64::MAX, u64::MAX);
-        assert!(measured.finish().unwrap().max_ns > Some(u64::MAX - 1_100_000));
+        assert!(measured.finish().max_ns > Some(u64::MAX - 1_100_000));
     }
 }

@@ -1,6 +1,6 @@
 //! How far a figure would move if nothing had changed.
 
-/// Fewer seconds than these tell nothing of their spread.
+/// The spread of fewer seconds is unknown.
 const FEWEST: usize = 3;
 
 /// Standard error of the mean of one figure's values in each second of a run; none with too few seconds.

@@ -1,7 +1,7 @@
-//! Cycles missed just before a safe stop: a controller that is kept from running, or from its readings, stops the
-//! rig as it should, and that says nothing of the rig.
+//! Cycles missed just before a safe stop. A controller that cannot run, or gets no readings, stops the rig correctly, so
+//! such a stop is no fault of the rig.
 //!
-//! Whose fault the missed cycles are is not decided here; see [`blame`](super::blame).
+//! The cause of the missed cycles is not decided here; see [`OverrunAttribution`](crate::OverrunAttribution).
 
 use std::collections::VecDeque;
 
@@ -12,7 +12,7 @@ use serde::Serialize;
 /// How long before the stop a missed cycle may have led to it.
 const BEFORE_NS: u64 = 100_000_000;
 
-/// How far apart messages of the same time may lie in a recording: the logger drains topic after topic.
+/// How far apart messages of the same time may lie in a recording: the recorder drains topic after topic.
 const DISORDER_NS: u64 = 2_000_000_000;
 
 /// Share of the cycles before a stop whose loss may explain it.
@@ -28,13 +28,13 @@ pub struct Outage {
 }
 
 impl Outage {
-    /// Whether so many were missed that the stop may come of it.
+    /// Whether so many were missed that they may have caused the stop.
     pub fn explains_the_stop(self) -> bool {
         self.missed as f64 >= self.of as f64 * EXPLAINS
     }
 }
 
-/// Follows what both processes miss until the rig stops.
+/// Counts the deadlines that both processes miss until the rig stops.
 #[derive(Debug, Default)]
 pub(super) struct OutageWatch {
     stopped_ns: Option<u64>,

@@ -1,9 +1,9 @@
-//! How a run went, for plots: wake-ups, axes, buses and the platform's error along one time axis.
+//! Wake-ups, axes and buses of a run over time, for plots.
 
+use masseter_can::Tapped;
 use masseter_can::wire::{self, Rates};
 use masseter_shared::geometry::AXES;
-use masseter_shared::messages::tap;
-use masseter_shared::messages::{FrameTap, Reading, State, Truth};
+use masseter_shared::messages::{Reading, State, Truth};
 
 use super::series::{Extremes, Merge, Series, Sums};
 
@@ -13,7 +13,7 @@ pub type Curve = Vec<(f64, f64)>;
 /// Lowest and highest value of each stretch of time, as one curve that touches both.
 type Band = Curve;
 
-/// The run along its time.
+/// A run over time.
 #[derive(Debug, Clone, Default)]
 pub struct OverTime {
     /// The instant that curves count from, ns of the run's clock.
@@ -47,8 +47,8 @@ const CONTROLLER: usize = 0;
 const PLANT: usize = 1;
 
 impl Watch {
-    /// For buses of these rates; without them no load is told.
-    pub(super) fn on(rates: Option<Rates>) -> Self {
+    /// For buses of these rates; without rates there is no load.
+    pub(super) fn new(rates: Option<Rates>) -> Self {
         Self { rates, ..Self::default() }
     }
 
@@ -75,9 +75,8 @@ impl Watch {
         }
     }
 
-    pub(super) fn frame(&mut self, frame: &FrameTap) {
-        let since_ns = self.since(frame.time_ns);
-        let (Ok(tapped), Ok(bus)) = (tap::decode(frame), tap::bus_of(frame)) else { return };
+    pub(super) fn frame(&mut self, time_ns: u64, bus: usize, tapped: &Tapped) {
+        let since_ns = self.since(time_ns);
         if let Some((received, rates)) = tapped.frame().zip(self.rates) {
             let busy_ns = rates.duration_ns(wire::frame_bits(&received.frame));
             self.busy_ns.at(since_ns).add(bus, busy_ns);
@@ -85,7 +84,7 @@ impl Watch {
     }
 
     pub(super) fn finish(self) -> OverTime {
-        let bands = |of: usize| std::array::from_fn(|axis| band(&self.axes, of * AXES + axis));
+        let bands = |quantity: usize| std::array::from_fn(|axis| band(&self.axes, quantity * AXES + axis));
         let buses = self.busy_ns.iter().map(|(_, sums)| sums.0.len()).max().unwrap_or(0);
         let full_ns = self.busy_ns.width_s() * 1e9;
         let load = |bus: usize| {
@@ -122,8 +121,8 @@ where
 
 #[cfg(test)]
 mod tests {
+    use masseter_can::TappedFrame;
     use masseter_can::{Bitrate, CanId, Frame};
-    use masseter_shared::messages::CanData;
 
     use super::*;
 
@@ -131,13 +130,10 @@ mod tests {
     fn a_bus_that_is_half_full_is_said_to_be() {
         let frame = Frame::fixed(CanId::standard(0x123).unwrap(), [0x55; 8]);
         let bits = wire::frame_bits(&frame).total();
-        let mut bytes = [0; 64];
-        bytes[..8].fill(0x55);
-        let data = CanData::padded(bytes, 8);
-        let tap = FrameTap { id: 0x123, data, ..Default::default() };
-        let mut watch = Watch::on(Some(Rates::classical(Bitrate::new(2 * 1000 * bits).unwrap())));
+        let mut watch = Watch::new(Some(Rates::classical(Bitrate::new(2 * 1000 * bits).unwrap())));
         for millisecond in 0..1000 {
-            watch.frame(&FrameTap { time_ns: millisecond * 1_000_000, ..tap });
+            let time_ns = millisecond * 1_000_000;
+            watch.frame(time_ns, 0, &Tapped::Frame(TappedFrame { frame, time_ns, queued_ns: None }));
         }
         let over_time = watch.finish();
         assert_eq!(over_time.bus_load.len(), 1);

@@ -1,14 +1,11 @@
-//! How long the messages of the buses took from being queued to their arrival, beside the bounds of their
-//! plan.
+//! Time of the buses' messages from their queueing to their arrival, beside the bounds of the plan.
 //!
-//! A bound holds for undisturbed buses. Where messages were queued closer together than planned, as by a
-//! process that was held up, the plan is worked out again for the closest that they were. Real interfaces do not
-//! tell when a frame was queued.
+//! A bound holds for undisturbed buses. A late process may queue messages closer together than planned; then the plan
+//! is worked out again for the closest queueing. Real interfaces do not report when a frame was queued.
 
 use masseter_can::{BusPlan, FrameFormat, PeriodicMessage, PlannedMessage, Tapped};
 use masseter_shared::config::Scenario;
 use masseter_shared::messages::FrameTap;
-use masseter_shared::messages::tap::{self, TapError};
 use masseter_shared::schedule::plans;
 
 use super::bus_response::{BusResponse, ResponseFigures};
@@ -33,7 +30,7 @@ struct Followed {
     error_frames: u64,
 }
 
-/// What was seen of a message.
+/// Times of a message on the bus.
 #[derive(Debug, Clone, Copy, Default)]
 struct Seen {
     frames: u64,
@@ -60,8 +57,8 @@ impl Seen {
 }
 
 impl Responses {
-    /// On the buses of a rig that was accepted; without plans nothing is told.
-    pub(super) fn on(scenario: &Scenario) -> Self {
+    /// On the buses of a rig that was accepted; without plans there are no figures.
+    pub(super) fn for_scenario(scenario: &Scenario) -> Self {
         let plans = plans(&scenario.can, scenario.period_ns()).unwrap_or_default();
         Self::with(plans, scenario.can.format(), !scenario.faults.is_empty())
     }
@@ -77,14 +74,15 @@ impl Responses {
         Self { buses: plans.into_iter().map(followed).collect(), format, has_faults }
     }
 
-    pub(super) fn frame(&mut self, tap: &FrameTap) -> Result<(), TapError> {
-        let Some(bus) = self.buses.get_mut(tap::bus_of(tap)?) else { return Ok(()) };
+    /// `tapped`: what `tap` holds.
+    pub(super) fn frame(&mut self, tap: &FrameTap, bus: usize, tapped: &Tapped) {
+        let Some(bus) = self.buses.get_mut(bus) else { return };
         let planned = bus.plan.messages().iter().position(|planned| planned.message.id.flagged() == tap.id);
         let seen = match planned {
             Some(index) => &mut bus.messages[index],
-            None if matches!(tap::decode(tap)?, Tapped::Error(_)) => {
+            None if matches!(tapped, Tapped::Error(_)) => {
                 bus.error_frames += 1;
-                return Ok(());
+                return;
             }
             None => &mut bus.others,
         };
@@ -92,7 +90,6 @@ impl Responses {
         if tap.queued_ns > 0 {
             seen.take(tap.queued_ns, tap.time_ns);
         }
-        Ok(())
     }
 
     /// `missing`: frames that were not recorded.
@@ -172,6 +169,8 @@ mod tests {
     use masseter_can::canopen::Cob;
     use masseter_can::{Bitrate, CanId, ErrorKind, ErrorReport, Rates};
 
+    use masseter_shared::messages::tap;
+
     use super::*;
 
     const PERIOD_NS: u64 = 1_000_000;
@@ -199,18 +198,22 @@ mod tests {
         FrameTap { id, queued_ns, time_ns: queued_ns + took_us * 1000, ..FrameTap::default() }
     }
 
-    fn of(frames: impl IntoIterator<Item = FrameTap>) -> BusResponse {
+    fn followed_without_faults(frames: impl IntoIterator<Item = FrameTap>) -> BusResponse {
         followed(responses(false), frames)
     }
 
     fn followed(mut responses: Responses, frames: impl IntoIterator<Item = FrameTap>) -> BusResponse {
-        frames.into_iter().for_each(|frame| responses.frame(&frame).unwrap());
+        frames.into_iter().for_each(|frame| take(&mut responses, &frame));
         responses.finish(0)
+    }
+
+    fn take(responses: &mut Responses, frame: &FrameTap) {
+        responses.frame(frame, tap::bus_of(frame).unwrap(), &tap::decode(frame).unwrap());
     }
 
     #[test]
     fn the_longest_of_each_message_stands_beside_its_bound() {
-        let found = of([
+        let found = followed_without_faults([
             seen(0x080, 1000, 51),
             seen(0x080, 1_001_000, 120),
             seen(0x181, 1000, 190),
@@ -233,7 +236,7 @@ mod tests {
 
     #[test]
     fn a_message_beyond_its_bound_is_found() {
-        let found = of([seen(0x080, 1000, 191), seen(0x181, 1000, 190)]);
+        let found = followed_without_faults([seen(0x080, 1000, 191), seen(0x181, 1000, 190)]);
         assert_eq!(found.unbounded, None);
         assert!(found.exceeding().map(|message| message.message.as_str()).eq(["SYNC"]));
     }
@@ -250,7 +253,7 @@ mod tests {
             (vec![seen(0x080, 1000, 51), seen(0x080, 1000, 102)], "so close together"),
         ];
         for (frames, reason) in cases {
-            let found = of(frames.clone());
+            let found = followed_without_faults(frames.clone());
             let why = found.unbounded.as_ref();
             assert!(why.is_some_and(|why| why.contains(reason)), "{frames:?}: {found:?}");
             assert!(found.messages.iter().all(|message| message.bound_ns.is_none()), "{found:?}");
@@ -260,7 +263,7 @@ mod tests {
     #[test]
     fn of_a_part_of_the_frames_nothing_is_judged() {
         let mut responses = responses(false);
-        responses.frame(&seen(0x080, 1000, 191)).unwrap();
+        take(&mut responses, &seen(0x080, 1000, 191));
         let found = responses.finish(3);
         assert_eq!(found.unbounded.as_deref(), Some("3 frames are missing from the recording"));
         assert_eq!(found.exceeding().count(), 0);
@@ -278,7 +281,7 @@ mod tests {
         let sync = CanId::from(Cob::Sync).flagged();
         assert_eq!(sync, 0x080);
         let syncs = [0, 1].map(|bus| FrameTap { bus, ..seen(sync, 1000, 51) });
-        let found = followed(Responses::on(&Scenario::default()), syncs);
+        let found = followed(Responses::for_scenario(&Scenario::default()), syncs);
         assert!(
             found.messages.iter().all(|message| message.message == "other" || message.bound_ns.is_some())
         );

@@ -1,14 +1,13 @@
-//! What happened over time, in memory of a fixed size: the longer the run, the wider the stretches that
-//! are told as one.
+//! Values over time in memory of a fixed size: the longer the run, the wider the stretches of time that share one value.
 
 /// Stretches or samples kept at most.
 const MOST: usize = 1024;
 /// Width of the first stretches, ns.
 const FIRST_WIDTH_NS: u64 = 10_000_000;
 
-/// What happened within a stretch of time.
+/// Values within a stretch of time.
 pub(super) trait Merge: Clone + Default {
-    /// Joins it with what happened in the next stretch.
+    /// Joins it with the values of the next stretch.
     fn merge(&mut self, next: &Self);
 }
 
@@ -53,7 +52,7 @@ impl<T: Merge> Series<T> {
         self.width_ns as f64 / 1e9
     }
 
-    /// Middle of each stretch, s since the beginning, and what happened in it.
+    /// Middle of each stretch, s since the beginning, and its values.
     pub(super) fn iter(&self) -> impl Iterator<Item = (f64, &T)> {
         let width_s = self.width_s();
         self.stretches
@@ -92,7 +91,7 @@ impl<const N: usize> Merge for Extremes<N> {
     }
 }
 
-/// Sums, as many as were asked for so far.
+/// Sums by index.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Sums(pub Vec<u64>);
 
@@ -111,8 +110,7 @@ impl Merge for Sums {
     }
 }
 
-/// Every n-th sample from the first on, with n growing as the run does, but not beyond `coarsest`: then the first ones
-/// stay as they are, and no more are taken.
+/// Every n-th sample from the first on. n grows with the run up to `coarsest`; from then on no more samples are taken.
 #[derive(Debug, Clone)]
 pub(super) struct Thinned<T> {
     coarsest: usize,

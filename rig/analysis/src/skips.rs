@@ -1,18 +1,18 @@
 //! Skipped deadlines, and what the time before them went to.
 //!
-//! A skip that time withheld while waiting explains is the machine's. One that only a stretch of work
-//! explains which took too long is suspect: [`blame`](super::blame) weighs those of the whole run. Any
-//! other is the rig's own.
+//! The machine caused a skip that is explained by time withheld while the process waited. A skip that only an overlong
+//! stretch of work explains may have either cause: [`OverrunAttribution`](crate::OverrunAttribution) weighs those of the
+//! whole run. The rig caused all others.
 //!
 //! To skip n deadlines a process has to come back n + 1 periods after the last one that it kept, or later. One of
 //! them is its own: a cycle that keeps its time takes no longer, whatever it works and waits. The other n must have
 //! been lost, so lost time explains as many skips as it has whole periods, and a moment explains none.
 //!
-//! What counts is the time lost in the cycle before the skip, and what earlier cycles lost as far as it is still felt:
-//! a process that woke late had not made up for so much of it. Whoever wakes in time has made up for everything.
+//! Two losses count: the time lost in the cycle before the skip, and the part of earlier losses that is carried over.
+//! A process that wakes late carries over as much as it is late; one that wakes in time carries over nothing.
 //!
-//! Where messages are missing from the recording, what happened meanwhile is not known cycle by cycle: skips in between
-//! have no known cause, and what was lost is no single stall.
+//! Where messages are missing from the recording, single cycles are unknown: skips in between have no known cause, and
+//! the time lost is no single stall.
 
 use hdrhistogram::Histogram;
 use masseter_shared::messages::{Reading, State};
@@ -23,7 +23,7 @@ use serde::Serialize;
 pub struct SkipFigures {
     /// Deadlines skipped.
     pub skipped: u64,
-    /// Those before which the machine stood still while the process waited.
+    /// Those before which the machine withheld the core while the process waited.
     pub by_machine: u64,
     /// Those before which a stretch of work took too long.
     pub while_working: u64,
@@ -31,7 +31,7 @@ pub struct SkipFigures {
     pub unknown_cause: u64,
     /// Time that the machine withheld from the process while it waited, ns.
     pub stalled_ns: u64,
-    /// Time that the process spun, what was withheld left out, ns.
+    /// Time that the process spun, without the time withheld, ns.
     pub spun_ns: u64,
     /// Time that the process worked, ns.
     pub worked_ns: u64,
@@ -39,7 +39,7 @@ pub struct SkipFigures {
     pub overlong_ns: u64,
 }
 
-/// What a process counts since its start, and how late it woke, as its messages carry it.
+/// Counters of a process since its start, and the lateness of its wake-up, as its messages carry them.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Counters {
     /// Number of the message.
@@ -96,14 +96,15 @@ impl Loss {
         }
     }
 
-    /// What of it can have made a wake-up that late: which part nobody can tell, so time lost while waiting comes first.
-    fn still_felt(self, late_ns: u64) -> Self {
+    /// The part of it that can have made a wake-up so late. Time lost while waiting comes first, since the recording
+    /// does not show the share of either.
+    fn carried_over(self, late_ns: u64) -> Self {
         let waiting_ns = self.waiting_ns.min(late_ns);
         Self { waiting_ns, working_ns: self.working_ns.min(late_ns - waiting_ns) }
     }
 
     /// How many of the skipped deadlines it explains: while waiting, and while working. The greater loss explains
-    /// first, and what only both of them together explain counts as work.
+    /// first, and a skip that only both losses together explain counts as work.
     fn explains(self, skipped: u64, period_ns: u64) -> (u64, u64) {
         let periods = |lost_ns: u64| lost_ns / period_ns;
         let all = periods(self.waiting_ns.saturating_add(self.working_ns));
@@ -124,13 +125,13 @@ impl Loss {
 pub(super) struct Skips {
     figures: SkipFigures,
     last_seq: u64,
-    /// What the last wake-up was late by: its deadlines are skipped after, not before, the late cycle was run.
-    felt: Loss,
+    /// Loss that made the last wake-up late: its deadlines are skipped after the late cycle, not before.
+    carried_over: Loss,
     /// The stretch of work that is part of it, ns.
-    felt_stretch_ns: u64,
-    /// How long the machine stood still at a time, ns.
+    carried_over_stretch_ns: u64,
+    /// Length of each stall of the machine, ns.
     stalls: Histogram<u64>,
-    /// How long the overlong stretches of work were, ns.
+    /// Length of each overlong stretch of work, ns.
     overlong: Histogram<u64>,
     shortest_costly_ns: Option<u64>,
 }
@@ -141,8 +142,8 @@ impl Default for Skips {
         Self {
             figures: SkipFigures::default(),
             last_seq: 0,
-            felt: Loss::default(),
-            felt_stretch_ns: 0,
+            carried_over: Loss::default(),
+            carried_over_stretch_ns: 0,
             stalls: histogram(),
             overlong: histogram(),
             shortest_costly_ns: None,
@@ -157,11 +158,11 @@ impl Skips {
         let stall_ns = counters.stalled_ns.saturating_sub(past.stalled_ns);
         let overlong_ns = counters.overlong_ns.saturating_sub(past.overlong_ns);
         let skipped = counters.skipped.saturating_sub(past.skipped);
-        let lost = self.felt.and(Loss { waiting_ns: stall_ns, working_ns: overlong_ns });
+        let lost = self.carried_over.and(Loss { waiting_ns: stall_ns, working_ns: overlong_ns });
         let is_next = counters.seq == std::mem::replace(&mut self.last_seq, counters.seq).wrapping_add(1);
         let known = if is_next { skipped } else { 0 };
         let (by_machine, while_working) = lost.explains(known, period_ns);
-        let stretch_ns = overlong_ns.max(self.felt_stretch_ns);
+        let stretch_ns = overlong_ns.max(self.carried_over_stretch_ns);
         if while_working > 0 {
             self.shortest_costly_ns =
                 Some(self.shortest_costly_ns.map_or(stretch_ns, |shortest| shortest.min(stretch_ns)));
@@ -181,8 +182,8 @@ impl Skips {
                 histogram.record(lost_ns).expect("a histogram that resizes itself takes any value");
             }
         }
-        self.felt = lost.still_felt(counters.late_ns);
-        self.felt_stretch_ns = if self.felt.working_ns > 0 { stretch_ns } else { 0 };
+        self.carried_over = lost.carried_over(counters.late_ns);
+        self.carried_over_stretch_ns = if self.carried_over.working_ns > 0 { stretch_ns } else { 0 };
     }
 
     pub(super) fn figures(&self) -> SkipFigures {
@@ -245,7 +246,7 @@ mod tests {
             // One loss explains its skips once, also when more are skipped a cycle later.
             (&[[0, 0, 0, 0], [3, 3_000_000, 0, 900_000], [6, 3_000_000, 0, 0]], [3, 0, 6]),
             (&[[0, 0, 0, 0], [3, 0, 3_000_000, 900_000], [6, 0, 3_000_000, 0]], [0, 3, 6]),
-            // What is still felt still may, and what is lost meanwhile is kept for its own.
+            // A carried-over loss explains a later skip, and a new loss its own.
             (&[[0, STALL, 0, STALL], [8, MORE, 0, 3_000_000], [11, MORE, 0, 0]], [11, 0, 11]),
             // Time that a wake-up in time had made up for explains nothing.
             (&[[0, STALL, STALL, 0], [2, STALL, STALL, 0]], [0, 0, 2]),

@@ -1,6 +1,6 @@
-//! A process's counter of the time that the machine withheld from it, which is looked at in every wake-up.
+//! A process's counter of the time that the machine withheld, as its messages carry it in every wake-up.
 
-/// Tells what it was when the deadline came.
+/// Computes the counter at the deadline from the counter at the wake-up.
 #[derive(Debug, Default)]
 pub(super) struct Stalls {
     counted_ns: u64,

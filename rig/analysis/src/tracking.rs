@@ -1,5 +1,5 @@
-//! How far the platform was from where it should have been: in truth where the mechanism is emulated, by
-//! the forward kinematics' estimate on the robot, whose truth nobody knows.
+//! Distance of the platform from its desired pose. The actual pose is the true one where the mechanism is emulated,
+//! and forward kinematics' estimate on the robot, whose true pose is unknown.
 
 use masseter_shared::clock::SECOND_NS;
 use masseter_shared::geometry::Pose;
@@ -12,14 +12,14 @@ use super::noise::standard_error;
 use super::over_time::{Curve, band, highest};
 use super::series::{Extremes, Series, Thinned};
 
-/// States in which the platform is asked to be somewhere.
+/// States in which the platform has a desired pose.
 pub const MOVING: [ControllerState; 3] =
     [ControllerState::Easing, ControllerState::Running, ControllerState::Holding];
 
-/// What the wanted pose is compared with.
+/// Where the actual pose comes from, which the desired pose is compared with.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Reference {
+pub enum PoseSource {
     /// The emulated mechanism's pose.
     #[default]
     Truth,
@@ -27,7 +27,7 @@ pub enum Reference {
     Estimate,
 }
 
-impl Reference {
+impl PoseSource {
     /// The word for a pose of this kind.
     pub fn adjective(self) -> &'static str {
         match self {
@@ -40,18 +40,19 @@ impl Reference {
 /// Errors of the platform's pose while the motion played.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct TrackingFigures {
-    /// What the wanted pose was compared with.
-    pub reference: Reference,
+    /// Where the actual pose came from, which the desired pose was compared with.
+    #[serde(rename = "reference")]
+    pub actual_source: PoseSource,
     /// Cycles compared.
     pub samples: u64,
-    /// Root mean square distance of the platform's origin, reference against wanted, mm; none without samples, as the
+    /// Root mean square distance of the platform's origin, actual against desired, mm; none without samples, as the
     /// others.
     pub rms_mm: Option<f64>,
     /// Standard error of that figure, by its seconds, mm; none with less than three of them.
     pub rms_noise_mm: Option<f64>,
     /// Largest distance, mm.
     pub max_mm: Option<f64>,
-    /// Root mean square angle, reference against wanted, degrees.
+    /// Root mean square angle, actual against desired, degrees.
     pub rms_deg: Option<f64>,
     /// Largest angle, degrees.
     pub max_deg: Option<f64>,
@@ -64,12 +65,12 @@ pub struct TrackingFigures {
 pub struct TrackingSample {
     /// When, ns.
     pub sampled_ns: u64,
-    /// Pose wanted.
+    /// The desired pose.
     pub desired: Pose,
-    /// Pose found by forward kinematics.
+    /// The pose estimated by forward kinematics.
     pub estimated: Pose,
-    /// Pose by the reference.
-    pub found: Pose,
+    /// The actual pose.
+    pub actual: Pose,
 }
 
 /// The platform from the first easing to the last hold; times in seconds since the first sample.
@@ -79,11 +80,11 @@ pub struct Track {
     pub samples: Vec<TrackingSample>,
     /// How long it went on, s.
     pub duration_s: f64,
-    /// Wanted displacement along x, y and z, from the first pose wanted, m: lowest and highest of each stretch of time.
-    pub wanted_m: [Curve; 3],
-    /// The same by the reference.
-    pub found_m: [Curve; 3],
-    /// Largest distance from the wanted position in each stretch of time, m.
+    /// Desired displacement along x, y and z, from the first desired pose, m: lowest and highest of each stretch of time.
+    pub desired_m: [Curve; 3],
+    /// The same of the actual pose.
+    pub actual_m: [Curve; 3],
+    /// Largest distance from the desired position in each stretch of time, m.
     pub distance_m: Curve,
 }
 
@@ -94,33 +95,33 @@ struct Began {
     at: Pose,
 }
 
-/// Places of what moved: x, y and z wanted, found, and the distance.
-const WANTED: usize = 0;
-const FOUND: usize = 3;
+/// Indices of the displacements along x, y and z, desired and actual, and of the distance between the two.
+const DESIRED: usize = 0;
+const ACTUAL: usize = 3;
 const DISTANCE: usize = 6;
 
-/// No sample stands further from the next, ns: a chewing cycle takes 0.7 s.
+/// Longest time between two samples, ns: a chewing cycle takes 0.7 s.
 const CLOSE_NS: u64 = 20_000_000;
 
 #[derive(Debug, Clone, Copy)]
-struct Wanted {
+struct Solution {
     desired: Pose,
     estimated: Pose,
     state: u32,
 }
 
-/// Joins wanted, estimated and, where there are any, true poses of the same sample.
+/// Joins desired, estimated and, where there are any, true poses of the same sample.
 #[derive(Debug)]
 pub(super) struct Tracking {
-    reference: Reference,
-    poses: Join<Wanted, (u64, Pose)>,
+    source: PoseSource,
+    poses: Join<Solution, (u64, Pose)>,
     distances: Accumulator,
     angles: Accumulator,
     estimates: Accumulator,
     track: Thinned<TrackingSample>,
     began: Option<Began>,
     ended_ns: u64,
-    /// Wanted and found displacement along x, y and z, and the distance between the two.
+    /// Desired and actual displacement along x, y and z, and the distance between the two.
     moved_m: Series<Extremes<{ DISTANCE + 1 }>>,
     second: Accumulator,
     second_ends_ns: u64,
@@ -151,9 +152,9 @@ impl Accumulator {
 }
 
 impl Tracking {
-    pub(super) fn against(reference: Reference, period_ns: u64) -> Self {
+    pub(super) fn new(source: PoseSource, period_ns: u64) -> Self {
         Self {
-            reference,
+            source,
             poses: Join::default(),
             distances: Accumulator::default(),
             angles: Accumulator::default(),
@@ -170,45 +171,45 @@ impl Tracking {
 
     /// The state of a cycle with a fresh reading: one used again was compared when it was fresh.
     pub(super) fn solution(&mut self, state: &State) {
-        let wanted = Wanted {
+        let solution = Solution {
             desired: pose_of_fields(state.desired_position_m, state.desired_quaternion_wxyz),
             estimated: pose_of_fields(state.estimated_position_m, state.estimated_quaternion_wxyz),
             state: state.controller_state,
         };
-        if self.reference == Reference::Estimate {
-            return self.compare(&wanted, (state.sampled_ns, wanted.estimated));
+        if self.source == PoseSource::Estimate {
+            return self.compare(&solution, (state.sampled_ns, solution.estimated));
         }
-        if let Some((wanted, truth)) = self.poses.left(state.reading_cycle, wanted) {
-            self.compare(&wanted, truth);
+        if let Some((solution, truth)) = self.poses.left(state.reading_cycle, solution) {
+            self.compare(&solution, truth);
         }
     }
 
     pub(super) fn truth(&mut self, truth: &Truth) {
         let pose = pose_of_fields(truth.position_m, truth.quaternion_wxyz);
-        if let Some((wanted, truth)) = self.poses.right(truth.cycle, (truth.sampled_ns, pose)) {
-            self.compare(&wanted, truth);
+        if let Some((solution, truth)) = self.poses.right(truth.cycle, (truth.sampled_ns, pose)) {
+            self.compare(&solution, truth);
         }
     }
 
-    fn compare(&mut self, wanted: &Wanted, (sampled_ns, found): (u64, Pose)) {
-        let distance_m = (wanted.desired.translation.vector - found.translation.vector).norm();
-        if wanted.state == ControllerState::Running.code() {
+    fn compare(&mut self, solution: &Solution, (sampled_ns, actual): (u64, Pose)) {
+        let distance_m = (solution.desired.translation.vector - actual.translation.vector).norm();
+        if solution.state == ControllerState::Running.code() {
             self.distances.add(distance_m);
-            self.angles.add(wanted.desired.rotation.angle_to(&found.rotation));
-            self.estimates.add((wanted.estimated.translation.vector - found.translation.vector).norm());
+            self.angles.add(solution.desired.rotation.angle_to(&actual.rotation));
+            self.estimates.add((solution.estimated.translation.vector - actual.translation.vector).norm());
             self.add_to_second(distance_m, sampled_ns);
         }
-        if MOVING.iter().any(|state| state.code() == wanted.state) {
-            let Wanted { desired, estimated, .. } = *wanted;
+        if MOVING.iter().any(|state| state.code() == solution.state) {
+            let Solution { desired, estimated, .. } = *solution;
             let began = *self.began.get_or_insert(Began { at_ns: sampled_ns, at: desired });
             let stretch = self.moved_m.at(sampled_ns.saturating_sub(began.at_ns));
             stretch.take(DISTANCE, distance_m);
-            for (first, pose) in [(WANTED, &desired), (FOUND, &found)] {
+            for (first, pose) in [(DESIRED, &desired), (ACTUAL, &actual)] {
                 let moved_m = pose.translation.vector - began.at.translation.vector;
                 moved_m.iter().enumerate().for_each(|(axis, moved_m)| stretch.take(first + axis, *moved_m));
             }
             self.ended_ns = sampled_ns;
-            self.track.push(TrackingSample { sampled_ns, desired, estimated, found });
+            self.track.push(TrackingSample { sampled_ns, desired, estimated, actual });
         }
     }
 
@@ -227,9 +228,9 @@ impl Tracking {
     pub(super) fn finish(self) -> (TrackingFigures, Track) {
         let samples = self.distances.samples;
         let compared = |value: f64| (samples > 0).then_some(value);
-        let has_truth = self.reference == Reference::Truth;
+        let has_truth = self.source == PoseSource::Truth;
         let figures = TrackingFigures {
-            reference: self.reference,
+            actual_source: self.source,
             samples,
             rms_mm: compared(self.distances.rms() * 1e3),
             rms_noise_mm: standard_error(&self.seconds),
@@ -242,8 +243,8 @@ impl Tracking {
         let bands = |first: usize| std::array::from_fn(|axis| band(&self.moved_m, first + axis));
         let track = Track {
             duration_s: self.ended_ns.saturating_sub(began_ns) as f64 / 1e9,
-            wanted_m: bands(WANTED),
-            found_m: bands(FOUND),
+            desired_m: bands(DESIRED),
+            actual_m: bands(ACTUAL),
             distance_m: highest(&self.moved_m, DISTANCE),
             samples: self.track.into_samples(),
         };
@@ -280,17 +281,17 @@ mod tests {
 
     #[test]
     fn without_truth_the_estimate_takes_its_place() {
-        let mut tracking = Tracking::against(Reference::Estimate, PERIOD_NS);
+        let mut tracking = Tracking::new(PoseSource::Estimate, PERIOD_NS);
         tracking.solution(&State { estimated_position_m: [0.001, 0.0, 0.0], ..state(1, 0.003) });
         let (figures, track) = tracking.finish();
         assert_eq!((figures.samples, figures.estimate_rms_mm), (1, None));
         assert!((figures.rms_mm.unwrap() - 2.0).abs() < 1e-9);
-        assert!((track.samples[0].found.translation.x - 0.001).abs() < 1e-12);
+        assert!((track.samples[0].actual.translation.x - 0.001).abs() < 1e-12);
     }
 
     #[test]
-    fn a_platform_that_never_ran_was_nowhere_perfectly() {
-        let mut tracking = Tracking::against(Reference::Truth, PERIOD_NS);
+    fn a_platform_that_never_ran_has_no_tracking_error() {
+        let mut tracking = Tracking::new(PoseSource::Truth, PERIOD_NS);
         tracking.solution(&State { controller_state: ControllerState::Easing.code(), ..state(1, 0.0) });
         tracking.truth(&truth(1, 0.0));
         let (figures, _) = tracking.finish();
@@ -299,8 +300,8 @@ mod tests {
     }
 
     #[test]
-    fn a_long_run_keeps_every_turn_of_its_motion_and_a_close_film_of_its_beginning() {
-        let mut tracking = Tracking::against(Reference::Truth, PERIOD_NS);
+    fn a_long_run_keeps_every_turn_of_its_motion_and_close_samples_of_its_beginning() {
+        let mut tracking = Tracking::new(PoseSource::Truth, PERIOD_NS);
         for cycle in 0..100_000 {
             // To and fro in 0.7 s, as fast as chewing.
             let x = (cycle as f64 / 700.0 * std::f64::consts::TAU).sin();
@@ -308,7 +309,7 @@ mod tests {
             tracking.truth(&Truth { sampled_ns: cycle * PERIOD_NS, ..truth(cycle, x) });
         }
         let (_, track) = tracking.finish();
-        let reach = track.found_m[0].iter().map(|(_, x)| *x);
+        let reach = track.actual_m[0].iter().map(|(_, x)| *x);
         assert!(reach.clone().filter(|x| *x > 0.99).count() > 140 && reach.fold(0.0, f64::min) < -0.99);
         assert!((track.duration_s - 99.999).abs() < 1e-9);
         assert!(track.samples.windows(2).all(|pair| pair[1].sampled_ns - pair[0].sampled_ns <= CLOSE_NS));
@@ -317,7 +318,7 @@ mod tests {
 
     #[test]
     fn poses_are_compared_by_cycle_in_whatever_order_they_come() {
-        let mut tracking = Tracking::against(Reference::Truth, PERIOD_NS);
+        let mut tracking = Tracking::new(PoseSource::Truth, PERIOD_NS);
         tracking.solution(&state(1, 0.003));
         tracking.solution(&state(2, 0.000));
         tracking.truth(&truth(2, 0.004));

@@ -1,5 +1,16 @@
-//! What is to be run, resolved from scenario and arguments, and refused before anything starts if it
-//! cannot be run.
+//! The plan of a run: scenario and arguments resolved, and checked against mechanism, drives and buses.
+//!
+//! It refuses a run before anything starts. It does not examine the machine: real CAN interfaces, cores and privileges are
+//! checked by their users.
+//!
+//! ```
+//! use masseter_plan::{Overrides, Plan, scenario};
+//!
+//! let overrides = Overrides { rate_hz: Some(500), ..Overrides::default() };
+//! let plan = Plan::of(scenario(None, &overrides)?)?;
+//! assert_eq!(plan.scenario.period_ns(), 2_000_000);
+//! # Ok::<(), anyhow::Error>(())
+//! ```
 
 mod scenario;
 
@@ -15,25 +26,25 @@ use masseter_shared::schedule::CycleSchedule;
 
 pub use scenario::{changed, given};
 
-/// A run that can be made.
+/// A run that fits its mechanism, drives and buses.
 #[derive(Debug)]
 pub struct Plan {
-    /// The scenario with every argument applied.
+    /// The scenario with all overrides.
     pub scenario: Scenario,
     /// Its mechanism.
     pub mechanism: Mechanism,
-    /// Its motion, checked against strokes, velocities, accelerations and conditioning.
+    /// Its motion, within the limits of strokes, velocities, accelerations and conditioning.
     pub trajectory: Trajectory,
-    /// What the motion asks of the axes.
+    /// The largest demands of the motion on the axes.
     pub demands: TrajectoryReport,
     /// The cycle's time table on the bus.
     pub schedule: CycleSchedule,
 }
 
-/// What the arguments of a command change in a scenario.
+/// Changes of a command's arguments to a scenario.
 #[derive(Debug, Clone, Default)]
 pub struct Overrides {
-    /// A recorded motion instead of the scenario's.
+    /// File of a recorded motion that replaces the scenario's.
     pub trajectory: Option<PathBuf>,
     /// Duration of the motion.
     pub duration: Option<Duration>,
@@ -48,10 +59,10 @@ pub struct Overrides {
 }
 
 impl Plan {
-    /// Plans a scenario by what its mechanism, drives and buses can do, on whatever machine.
+    /// Plans a scenario.
     ///
     /// # Errors
-    /// When the cycle does not fit the buses, the plant cannot be built, or the motion asks too much.
+    /// When the cycle does not fit the buses, the plant cannot be built, or the motion exceeds a limit.
     pub fn of(scenario: Scenario) -> anyhow::Result<Self> {
         let mechanism = Mechanism::new(&scenario.mechanism)?;
         let schedule = CycleSchedule::new(&scenario.can, scenario.period_ns())?;
@@ -61,7 +72,7 @@ impl Plan {
         Ok(Self { scenario, mechanism, trajectory, demands, schedule })
     }
 
-    /// A line that says what is about to run, and one more where the recording does not say all that it should.
+    /// A line that describes the run, and a second one if the motion file lacks the marker's offset.
     pub fn announcement(&self) -> String {
         let scenario = &self.scenario;
         let wires = match &scenario.can.interfaces[..] {
@@ -69,8 +80,9 @@ impl Plan {
             interfaces => interfaces.join(", "),
         };
         let cut = self.trajectory.cut_from_s();
-        let cut = cut
-            .map_or_else(String::new, |whole_s| format!("; cut short: to its end it takes {whole_s:.1} s"));
+        let cut = cut.map_or_else(String::new, |whole_s| {
+            format!("; cut short: the whole motion takes {whole_s:.1} s")
+        });
         let centroid = self.trajectory.centroid_turn_deg().map_or_else(String::new, of_centroid);
         format!(
             "{}: {:.1} s at {} Hz on {wires}, seed {}{cut}{centroid}",
@@ -92,15 +104,15 @@ pub fn scenario(path: Option<&Path>, overrides: &Overrides) -> anyhow::Result<Sc
 
 fn of_centroid(turn_deg: f64) -> String {
     format!(
-        "\n  the jaw turns by up to {turn_deg:.1}°, and the markers' centroid stands for the incisal point; \
+        "\n  the jaw turns by up to {turn_deg:.1}°, so the markers' centroid does not follow the incisal point; \
          set motion.marker_origin_mm"
     )
 }
 
-/// What a motion asks of the axes of a scenario.
+/// The largest demands of a motion on the axes of a scenario.
 ///
 /// # Errors
-/// When that is more than its limits or its drives allow.
+/// When the motion exceeds the scenario's limits or those of its drives.
 pub fn demands(
     scenario: &Scenario,
     trajectory: &Trajectory,
@@ -129,7 +141,7 @@ fn apply(overrides: &Overrides, scenario: &mut Scenario) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Has a scenario play a recording; one that plays another keeps its axes and filter.
+/// Replaces the motion of a scenario by a file. A scenario that already plays a file keeps its axes and filter.
 pub fn play(path: &Path, scenario: &mut Scenario) {
     match &mut scenario.motion {
         MotionConfig::File(file) => path.clone_into(&mut file.path),
@@ -139,7 +151,7 @@ pub fn play(path: &Path, scenario: &mut Scenario) {
     scenario.name = stem.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '-' }).take(64).collect();
 }
 
-/// The manifest must name the file for readers anywhere.
+/// The absolute path, for readers of the manifest in other folders.
 fn absolute(path: &Path) -> anyhow::Result<PathBuf> {
     path.canonicalize().with_context(|| format!("cannot read {}", path.display()))
 }

@@ -1,17 +1,23 @@
-//! The scenario that a verb is given, or the default one. What makes a scenario valid is its own affair.
+//! Reads scenarios for verbs. `Scenario::validate` holds the rules.
 
 use std::path::Path;
 
 use masseter_shared::config::{Scenario, ScenarioError};
 
-/// The scenario of a file, or the default one, found valid.
+/// The valid scenario of a file, or the default one.
+///
+/// # Errors
+/// When the file cannot be read or a value is out of range.
 pub fn given(path: Option<&Path>) -> Result<Scenario, ScenarioError> {
     let scenario = unchecked(path)?;
     scenario.validate()?;
     Ok(scenario)
 }
 
-/// The same with what the arguments of the verb `change`, which alone may make it valid or not.
+/// The same after `change`, which applies the arguments of a verb. Only the result must be valid.
+///
+/// # Errors
+/// When the file cannot be read, `change` fails, or a value is out of range.
 pub fn changed(
     path: Option<&Path>,
     change: impl FnOnce(&mut Scenario) -> anyhow::Result<()>,

@@ -66,9 +66,9 @@ fn microseconds(ns: f64) -> f64 {
 /// The platform's displacement, wanted and true, and the distance between the two.
 pub(super) fn motion(figures: &Figures) -> [Option<Drawn>; 2] {
     let track = &figures.track;
-    let reference = figures.tracking.reference.adjective();
+    let actual = figures.tracking.actual_source.adjective();
     let pair = |(axis, name): (usize, &str)| {
-        [("wanted", &track.wanted_m), (reference, &track.found_m)]
+        [("wanted", &track.desired_m), (actual, &track.actual_m)]
             .map(|(kind, curves)| Line::new(&format!("{name} {kind}"), in_unit(&curves[axis], 1e3)))
     };
     let lines = ["x", "y", "z"].into_iter().enumerate().flat_map(pair).collect();

@@ -5,9 +5,9 @@
 use masseter_shared::messages::codes::{Cause, ControllerState};
 use serde::Serialize;
 
-use super::table;
+use crate::text;
 use masseter_analysis::{
-    BusResponse, Coded, EventRecord, Figures, ResponseFigures, Suspicion, TrackingFigures,
+    BusResponse, Code, EventRecord, Figures, OverrunAttribution, ResponseFigures, TrackingFigures,
 };
 use masseter_recording::Ending;
 use masseter_recording::Manifest;
@@ -25,7 +25,7 @@ pub enum CheckResult {
 }
 
 impl CheckResult {
-    fn of(passed: bool) -> Self {
+    fn from_passed(passed: bool) -> Self {
         if passed { Self::Passed } else { Self::Failed }
     }
 
@@ -52,7 +52,7 @@ pub struct Check {
 
 impl Check {
     fn judged(name: &'static str, finding: String, passed: bool) -> Self {
-        Self { name, finding, result: CheckResult::of(passed) }
+        Self { name, finding, result: CheckResult::from_passed(passed) }
     }
 
     /// A failure that `excused` explains is none.
@@ -69,7 +69,7 @@ impl Check {
 }
 
 /// `is_disturbed`: the machine kept the rig from too many cycles to hold its sequence or its tracking against it.
-pub(super) fn checks(manifest: &Manifest, figures: &Figures, is_disturbed: bool) -> Vec<Check> {
+pub(crate) fn checks(manifest: &Manifest, figures: &Figures, is_disturbed: bool) -> Vec<Check> {
     let limits = &manifest.scenario.checks;
     let (skipped, by_machine) = figures.skipped();
     let sequence = sequence(figures.final_state, &figures.events);
@@ -82,7 +82,7 @@ pub(super) fn checks(manifest: &Manifest, figures: &Figures, is_disturbed: bool)
             finding: format!(
                 "{skipped} ({by_machine} by the machine{}{}), limit {}",
                 of_unknown_cause(figures),
-                figures.suspicion.map(weighed).unwrap_or_default(),
+                figures.overrun_attribution.map(overruns_in_words).unwrap_or_default(),
                 limits.missed_cycles
             ),
             result: missed_cycles(manifest, figures),
@@ -95,7 +95,7 @@ pub(super) fn checks(manifest: &Manifest, figures: &Figures, is_disturbed: bool)
 }
 
 /// The motion must be played to its end, and not be broken off by somebody who asked the controller to stop.
-fn sequence(state: Option<Coded<ControllerState>>, events: &[EventRecord]) -> Check {
+fn sequence(state: Option<Code<ControllerState>>, events: &[EventRecord]) -> Check {
     let was_stopped = events.iter().any(|event| event.cause == Cause::StopRequested);
     let how = if was_stopped { ", asked to stop before the motion's end" } else { "" };
     let in_words = state.map_or_else(|| "none".to_owned(), |state| state.to_string());
@@ -134,7 +134,7 @@ fn tracking(tracking: &TrackingFigures, limit_mm: f64, is_played: bool) -> Check
     if rms_mm.is_none() && !is_played {
         return Check::not_judged(NAME, "the motion never began".to_owned());
     }
-    let in_words = table::or_dash(rms_mm, table::decimals);
+    let in_words = text::or_dash(rms_mm, text::decimals);
     let finding = format!("rms {in_words} mm over {samples} samples, limit {limit_mm} mm");
     Check::judged(NAME, finding, rms_mm.is_some_and(|rms_mm| rms_mm <= limit_mm))
 }
@@ -159,7 +159,7 @@ fn bus_response(response: &BusResponse) -> Check {
     }
     let in_words = |message: &ResponseFigures| {
         let [max_us, bound_us] =
-            [message.max_ns, message.bound_ns].map(|ns| table::or_dash(ns, table::microseconds));
+            [message.max_ns, message.bound_ns].map(|ns| text::or_dash(ns, text::microseconds));
         format!("{} on bus {} took {max_us} µs, bound {bound_us} µs", message.message, message.bus)
     };
     let exceeding: Vec<_> = response.exceeding().map(in_words).collect();
@@ -173,7 +173,7 @@ fn bus_response(response: &BusResponse) -> Check {
 
 /// Whether too many cycles were missed. When none of them is certainly the rig's doing, or it was not given the cores
 /// that it asked for, there is nothing to judge it by.
-pub(super) fn missed_cycles(manifest: &Manifest, figures: &Figures) -> CheckResult {
+pub(crate) fn missed_cycles(manifest: &Manifest, figures: &Figures) -> CheckResult {
     let (skipped, by_machine) = figures.skipped();
     if skipped <= manifest.scenario.checks.missed_cycles {
         CheckResult::Passed
@@ -193,14 +193,14 @@ fn of_unknown_cause(figures: &Figures) -> String {
 }
 
 /// What stretches of work that cost deadlines were held against.
-fn weighed(suspicion: Suspicion) -> String {
+fn overruns_in_words(overruns: OverrunAttribution) -> String {
     format!(
         "; {} stretches of work against {} stalls as long while waiting, {:.1} % of the time at work: chance does so \
          with probability {:.2}",
-        suspicion.while_working,
-        suspicion.while_waiting,
-        suspicion.work_share * 100.0,
-        suspicion.chance
+        overruns.while_working,
+        overruns.while_waiting,
+        overruns.work_share * 100.0,
+        overruns.chance
     )
 }
 
@@ -218,7 +218,7 @@ mod tests {
 
     #[test]
     fn a_declared_fault_that_never_struck_fails_a_run_that_was_played_to_its_end() {
-        let ended = EventRecord { cause: Coded::Known(Cause::FaultEnded), ..struck(2) };
+        let ended = EventRecord { cause: Code::Known(Cause::FaultEnded), ..struck(2) };
         let events = [struck(1), ended];
         let cases = [
             (0, true, None),

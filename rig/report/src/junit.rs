@@ -1,12 +1,13 @@
 //! `junit.xml`: each check of the run as a test case, as CI systems show it.
 
 use crate::checks::CheckResult;
+use crate::text::escape;
 use crate::verdict::Verdict;
 use masseter_analysis::Figures;
 use masseter_recording::Manifest;
 
 /// One suite; a run that ended wrongly or cannot be judged has an `error` case of its own.
-pub(super) fn of_run(manifest: &Manifest, figures: &Figures, verdict: &Verdict) -> String {
+pub(crate) fn xml(manifest: &Manifest, figures: &Figures, verdict: &Verdict) -> String {
     let count = |result| verdict.checks.iter().filter(|check| check.result == result).count();
     let (failures, skipped) = (count(CheckResult::Failed), count(CheckResult::NotJudged));
     let judged = verdict.outcome.is_judged();
@@ -40,9 +41,4 @@ fn case(name: &str, problem: Option<(&str, String)>) -> String {
             escape(&message)
         ),
     }
-}
-
-/// Text that may stand in XML and HTML.
-pub(super) fn escape(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }

@@ -1,4 +1,4 @@
-//! What a run came to, in a word and as an exit code. Why it did, its [verdict](super::verdict) says.
+//! The outcome of a run, in a word and as an exit code. The [verdict](crate::Verdict) gives the reason.
 
 use masseter_terminal::Exit;
 
@@ -49,7 +49,7 @@ impl Outcome {
     }
 
     /// Whether its checks say what it came to.
-    pub(super) fn is_judged(self) -> bool {
+    pub(crate) fn is_judged(self) -> bool {
         matches!(self, Self::Pass | Self::Fail)
     }
 }

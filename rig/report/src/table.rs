@@ -1,26 +1,26 @@
-//! The result of a run as text for a terminal.
+//! The report as text for a terminal.
 
 use std::fmt::Write;
 
 use masseter_shared::config::MotionConfig;
-use masseter_shared::messages::codes::{Cause, EventKind};
+use masseter_shared::messages::codes::EventKind;
 
-use super::usage;
+use crate::text::{decimals, event_with_cycle, microseconds, or_dash};
+use crate::usage;
 use crate::verdict::Verdict;
 use masseter_analysis::{
-    BusResponse, Coded, EventRecord, Figures, IntervalFigures, ReadingFigures, ResponseFigures,
-    TrackingFigures,
+    BusResponse, Figures, IntervalFigures, ReadingFigures, ResponseFigures, TrackingFigures,
 };
 use masseter_recording::Manifest;
 
-/// Verdict, checks, latencies, losses and noteworthy events.
-pub(super) fn of_run(manifest: &Manifest, figures: &Figures, verdict: &Verdict) -> String {
+/// Verdict, checks, latencies, losses and faults.
+pub(crate) fn text(manifest: &Manifest, figures: &Figures, verdict: &Verdict) -> String {
     let mut text = String::new();
-    write_all(&mut text, manifest, figures, verdict).expect("a string takes any text");
+    write_text(&mut text, manifest, figures, verdict).expect("a string takes any text");
     text
 }
 
-fn write_all(
+fn write_text(
     text: &mut String,
     manifest: &Manifest,
     figures: &Figures,
@@ -93,7 +93,7 @@ fn latencies(text: &mut String, intervals: &[IntervalFigures]) -> std::fmt::Resu
 }
 
 /// Which readings the controller's cycles used.
-pub(super) fn readings(readings: &ReadingFigures) -> String {
+pub(crate) fn readings(readings: &ReadingFigures) -> String {
     let ReadingFigures { in_time, late, none, before_first } = readings;
     format!(
         "cycles by their reading: {in_time} in time, {late} late, {none} without a fresh one, {before_first} before the first"
@@ -134,30 +134,15 @@ fn responses(text: &mut String, response: &BusResponse) -> std::fmt::Result {
     Ok(())
 }
 
-/// How far the platform was from where it was wanted.
-pub(super) fn distances(tracking: &TrackingFigures) -> String {
+/// Distances between actual and desired pose.
+pub(crate) fn distances(tracking: &TrackingFigures) -> String {
     let TrackingFigures { rms_mm, max_mm, rms_deg, max_deg, .. } = *tracking;
     let [rms_mm, max_mm, rms_deg, max_deg] =
         [rms_mm, max_mm, rms_deg, max_deg].map(|value| or_dash(value, decimals));
     format!(
         "{} against wanted: rms {rms_mm} mm, max {max_mm} mm; rms {rms_deg}°, max {max_deg}°",
-        tracking.reference.adjective()
+        tracking.actual_source.adjective()
     )
-}
-
-/// A dash where there is no such figure.
-pub(super) fn or_dash<T>(figure: Option<T>, in_words: impl Fn(T) -> String) -> String {
-    figure.map_or_else(|| "–".to_owned(), in_words)
-}
-
-/// Millimetres or degrees, with four decimals.
-pub(super) fn decimals(value: f64) -> String {
-    format!("{value:.4}")
-}
-
-/// Nanoseconds as microseconds with two decimals.
-pub(super) fn microseconds(ns: u64) -> String {
-    format!("{:.2}", ns as f64 / 1e3)
 }
 
 fn losses(text: &mut String, figures: &Figures) -> std::fmt::Result {
@@ -178,31 +163,7 @@ fn events(text: &mut String, figures: &Figures) -> std::fmt::Result {
     }
     writeln!(text, "\nfaults:")?;
     for event in faults {
-        writeln!(text, "  {}", in_words(event))?;
+        writeln!(text, "  {}", event_with_cycle(event))?;
     }
     Ok(())
-}
-
-/// An event in a line.
-pub(super) fn in_words(event: &EventRecord) -> String {
-    format!("cycle {:>6} {}", event.cycle, happening(event))
-}
-
-/// What an event tells, without its time.
-pub(super) fn happening(event: &EventRecord) -> String {
-    let axis = event.axis.map_or_else(String::new, |axis| format!(" {axis}"));
-    let moved = event.transition.as_ref().map(|[from, to]| format!("{from} → {to}"));
-    let values = match event.cause {
-        Coded::Known(Cause::StopRequested) => String::new(),
-        _ => format!(" (value {}, limit {})", event.value, event.limit),
-    };
-    let moved = moved.unwrap_or_default();
-    let source = event.source;
-    if let Some(text) = &event.text {
-        return format!("{source}: {} ({text})", event.cause);
-    }
-    match event.cause {
-        Coded::Known(Cause::Sequence) => format!("{source}{axis}: {moved}"),
-        cause => format!("{source}{axis}: {cause}{values} {moved}").trim_end().to_owned(),
-    }
 }

@@ -1,12 +1,12 @@
-//! What the processes used and what was stolen from them, in words.
+//! CPU time, page faults and stolen time, as a line of the table and as a table of the page.
 
 use std::fmt::Write;
 
-use super::junit::escape;
+use crate::text::escape;
 use masseter_recording::{RunUsage, Usage};
 
 /// A line for the terminal; nothing under virtual time, which has no processes.
-pub(super) fn line(text: &mut String, usage: &RunUsage) -> std::fmt::Result {
+pub(crate) fn line(text: &mut String, usage: &RunUsage) -> std::fmt::Result {
     if usage.processes.is_empty() {
         return Ok(());
     }
@@ -19,7 +19,7 @@ pub(super) fn line(text: &mut String, usage: &RunUsage) -> std::fmt::Result {
 }
 
 /// A table for the page.
-pub(super) fn table(page: &mut String, usage: &RunUsage) -> std::fmt::Result {
+pub(crate) fn page_table(page: &mut String, usage: &RunUsage) -> std::fmt::Result {
     if usage.processes.is_empty() {
         return Ok(());
     }

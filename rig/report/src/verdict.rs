@@ -4,9 +4,9 @@ use masseter_shared::config::CanConfig;
 use masseter_shared::messages::codes::EventKind;
 use serde::ser::{Serialize, SerializeStruct, Serializer};
 
-use super::checks::{Check, CheckResult, checks, missed_cycles};
-use super::outcome::Outcome;
-use super::table;
+use crate::checks::{Check, CheckResult, checks, missed_cycles};
+use crate::outcome::Outcome;
+use crate::text;
 use masseter_analysis::{EventRecord, Figures, Outage};
 use masseter_recording::DmaLatency;
 use masseter_recording::Ending;
@@ -38,7 +38,7 @@ impl Serialize for Verdict {
 
 impl Verdict {
     /// Judges a run.
-    pub fn of(manifest: &Manifest, figures: &Figures) -> Self {
+    pub fn new(manifest: &Manifest, figures: &Figures) -> Self {
         let disturbed = disturbed(manifest, figures);
         let checks = checks(manifest, figures, disturbed.is_some());
         let (outcome, mut reason) = ending(&manifest.ending, &figures.events)
@@ -93,7 +93,7 @@ fn ending(ending: &Ending, events: &[EventRecord]) -> Option<Judgement> {
 /// The controller's own event often tells no more than that the master gave up: what went wrong first says why.
 fn stopped(events: &[EventRecord]) -> String {
     let first = events.iter().find(|event| event.kind == EventKind::Fault);
-    let why = first.map_or_else(String::new, |fault| format!("; first fault: {}", table::happening(fault)));
+    let why = first.map_or_else(String::new, |fault| format!("; first fault: {}", text::event(fault)));
     format!("the controller stopped the rig{why}")
 }
 

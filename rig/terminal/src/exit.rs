@@ -1,23 +1,25 @@
 //! Exit codes, the same for every verb.
 
+use std::error::Error;
+use std::io::{self, ErrorKind};
 use std::process::ExitCode;
 
-/// How a command ended.
+/// The exit code of a command.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Exit {
-    /// All is well.
+    /// Success.
     Passed = 0,
-    /// A check of the run failed.
+    /// A check failed.
     Failed = 1,
     /// Wrong usage, scenario or input file.
     Usage = 2,
-    /// The environment is invalid: too disturbed to measure, or real time wanted and not granted.
+    /// The run cannot be judged: the machine was too disturbed, or did not grant the required real time.
     Invalid = 3,
     /// A process died.
     Died = 4,
     /// An unexpected safe stop.
     SafeStop = 5,
-    /// The recording is incomplete, or the run folder took no more.
+    /// The recording is incomplete, or a disk is full.
     Incomplete = 6,
     /// Interrupted by the user.
     Interrupted = 130,
@@ -35,24 +37,24 @@ impl From<Exit> for ExitCode {
     }
 }
 
-/// An error with the exit code it leads to.
+/// An error and its exit code.
 #[derive(Debug)]
 pub struct Failure {
     /// The code.
     pub exit: Exit,
-    /// What to tell the user.
+    /// The error.
     pub error: anyhow::Error,
 }
 
-/// Says at the place where an error arises which exit code it leads to.
+/// Gives errors an exit code where they arise.
 pub trait OrFailure<T> {
-    /// To [`Exit::Usage`]: it is for the user to mend what was given.
+    /// [`Exit::Usage`]: arguments or inputs are wrong. A full disk leads to [`Exit::Incomplete`].
     fn usage(self) -> Result<T, Failure>;
 
-    /// To [`Exit::Incomplete`]: what a run leaves could not be written or read.
+    /// [`Exit::Incomplete`]: a file of the run cannot be written or read.
     fn incomplete(self) -> Result<T, Failure>;
 
-    /// To [`Exit::Died`]: a process of the rig could not go on.
+    /// [`Exit::Died`]: a process of the rig failed.
     fn died(self) -> Result<T, Failure>;
 }
 
@@ -71,8 +73,27 @@ impl<T, E: Into<anyhow::Error>> OrFailure<T> for Result<T, E> {
 }
 
 impl Failure {
-    /// An error that leads to `exit`.
+    /// An error with this exit code; [`Exit::Usage`] becomes [`Exit::Incomplete`] if a full disk caused the error.
     pub fn with(exit: Exit, error: impl Into<anyhow::Error>) -> Self {
-        Self { exit, error: error.into() }
+        let error = error.into();
+        let exit = if exit == Exit::Usage && is_out_of_room(&error) { Exit::Incomplete } else { exit };
+        Self { exit, error }
     }
+}
+
+/// Whether a write failed because the disk is full, or a quota or the maximum file size is reached.
+fn is_out_of_room(error: &anyhow::Error) -> bool {
+    error.chain().filter_map(io_kind).any(|kind| {
+        matches!(kind, ErrorKind::StorageFull | ErrorKind::QuotaExceeded | ErrorKind::FileTooLarge)
+    })
+}
+
+fn io_kind(cause: &(dyn Error + 'static)) -> Option<ErrorKind> {
+    // An error of `csv` does not have its cause as a source.
+    let in_csv = |error: &csv::Error| match error.kind() {
+        csv::ErrorKind::Io(error) => Some(error.kind()),
+        _ => None,
+    };
+    let in_io = cause.downcast_ref().map(io::Error::kind);
+    in_io.or_else(|| cause.downcast_ref().and_then(in_csv))
 }

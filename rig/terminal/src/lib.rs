@@ -1,6 +1,15 @@
-//! What is said to whoever started the program. A reader that has had enough, a closed terminal or a full disk behind
-//! it is no fault of the run, and never ends one: unlike `println!` and `eprintln!`, nothing here panics, and only a
-//! result that stands nowhere else may fail.
+//! Output to the terminal, exit codes, and files that a command creates.
+//!
+//! Unlike `println!` and `eprintln!`, nothing here panics: a closed pipe, a closed terminal or a full disk must not end a
+//! run. Only [`result`] reports errors, because its text is in no file. This crate knows no verb and no file format.
+//!
+//! ```
+//! use masseter_terminal::{result_line, status};
+//!
+//! status!("measuring for {} s", 10);
+//! result_line!("{} cycles", 10_000)?;
+//! # Ok::<(), anyhow::Error>(())
+//! ```
 
 mod exit;
 mod output;
@@ -13,28 +22,34 @@ use clap::ValueEnum;
 pub use exit::{Exit, Failure, OrFailure};
 pub use output::{OutputError, new_file, new_folder};
 
-/// How results are written.
+/// The format of results.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
 pub enum Format {
-    /// For people.
+    /// Text for people
     #[default]
     Human,
-    /// For programs.
+    /// JSON for programs
     Json,
 }
 
-/// Writes to standard output what stands in a file as well.
+/// Writes text to standard output that is also in a file; ignores errors.
 pub fn show(text: &str) {
     let _ = io::stdout().write_all(text.as_bytes());
 }
 
-/// Writes a result to standard output, where alone it stands.
+/// Writes a result to standard output.
+///
+/// # Errors
+/// When the write fails, except for a closed pipe.
 pub fn result(text: &str) -> anyhow::Result<()> {
     let mut output = io::stdout().lock();
     taken(output.write_all(text.as_bytes()).and_then(|()| output.flush()))
 }
 
-/// What became of a result that was written to standard output: a reader that has had enough is no failure.
+/// The error of a write to standard output. A closed pipe is none: its reader needs no more.
+///
+/// # Errors
+/// When the write failed for another reason.
 pub fn taken(written: io::Result<()>) -> anyhow::Result<()> {
     match written {
         Err(error) if error.kind() != ErrorKind::BrokenPipe => {
@@ -44,18 +59,18 @@ pub fn taken(written: io::Result<()>) -> anyhow::Result<()> {
     }
 }
 
-/// Writes to standard error, in one piece: several processes share it.
+/// Writes to standard error in one call, because several processes share it; ignores errors.
 pub fn warn(text: &str) {
     let _ = io::stderr().write_all(text.as_bytes());
 }
 
-/// A line of a result; as `println!`, but for what [`result`] returns.
+/// Writes a line of a result, like `println!`; evaluates to what [`result`] returns.
 #[macro_export]
 macro_rules! result_line {
     ($($argument:tt)*) => { $crate::result(&(format!($($argument)*) + "\n")) };
 }
 
-/// A line about what goes on, to standard error; as `eprintln!`.
+/// Writes a status line to standard error, like `eprintln!`.
 #[macro_export]
 macro_rules! status {
     ($($argument:tt)*) => { $crate::warn(&(format!($($argument)*) + "\n")) };

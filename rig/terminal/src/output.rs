@@ -1,28 +1,29 @@
-//! Files and folders that a command was told to make: taken before the work for them begins, and never what somebody
-//! has already. What is written into them is not known here.
+//! New files and folders for the output of a command. Existing ones are never overwritten. Commands create them before
+//! they compute.
 
 use std::fs::{self, File};
 use std::io::{self, ErrorKind};
 use std::path::{Path, PathBuf};
 
-/// Why a file or folder could not be made.
+/// Why a file or folder cannot be created.
 #[derive(Debug, thiserror::Error)]
 pub enum OutputError {
-    /// It is there already.
+    /// It exists.
     #[error("{} exists and is not overwritten; choose another --out", .0.display())]
     Exists(PathBuf),
-    /// The system refused.
+    /// The system refused to create it.
     #[error("cannot create {}: {error}", path.display())]
     Create {
         /// The file or folder.
         path: PathBuf,
-        /// What the system said.
+        /// The system's error.
+        #[source]
         error: io::Error,
     },
 }
 
 impl OutputError {
-    /// What the system's answer about `path` means.
+    /// Converts the system's error for `path`.
     pub fn creating(path: &Path) -> impl Fn(io::Error) -> Self {
         move |error| match error.kind() {
             ErrorKind::AlreadyExists => Self::Exists(path.to_owned()),
@@ -31,7 +32,7 @@ impl OutputError {
     }
 }
 
-/// A file that was not there before, empty.
+/// Creates an empty file.
 ///
 /// # Errors
 /// When it exists, or the system refuses it.
@@ -39,7 +40,7 @@ pub fn new_file(path: &Path) -> Result<File, OutputError> {
     File::create_new(path).map_err(OutputError::creating(path))
 }
 
-/// Makes a folder that was not there before, and those above it that are missing.
+/// Creates a folder, and missing folders above it.
 ///
 /// # Errors
 /// When it exists, or the system refuses it.

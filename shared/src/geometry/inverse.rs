@@ -23,7 +23,20 @@ pub enum InverseError {
 }
 
 impl Mechanism {
-    /// Joint coordinates that hold the platform at `pose`; angles in (−π, π].
+    /// Joint coordinates that hold the platform at `pose` (platform in the base frame, metres): metres, and angles in
+    /// (−π, π].
+    ///
+    /// ```
+    /// use masseter_shared::geometry::{Mechanism, MechanismConfig, Pose};
+    ///
+    /// let mechanism = Mechanism::new(&MechanismConfig::default())?;
+    /// let joints = mechanism.inverse(&Pose::translation(0.0, 0.0, 0.268_452_355))?;
+    /// assert!((joints.actuators.leg_m[0] - 0.27).abs() < 1e-9);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`InverseError`] for a pose that is not finite, and where a corner lies on its slide's hinge.
     pub fn inverse(&self, pose: &Pose) -> Result<Joints, InverseError> {
         let mut joints = Joints {
             actuators: Actuators { slide_m: [0.0; LEGS], leg_m: [0.0; LEGS] },

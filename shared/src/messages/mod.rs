@@ -15,6 +15,8 @@ mod schema;
 pub mod tap;
 mod words;
 
+use std::mem::offset_of;
+
 use bytemuck::{Pod, Zeroable, bytes_of, bytes_of_mut};
 use iceoryx2::prelude::ZeroCopySend;
 
@@ -33,6 +35,12 @@ pub trait Message: Pod + ZeroCopySend + Default + std::fmt::Debug + PartialEq {
     const DEPTH: usize;
     /// Type name in recordings.
     const TYPE_NAME: &'static str;
+    /// Type name in shared memory, `masseter/Reading/<hash>`: a service of another layout is refused when it is opened.
+    const SHARED_MEMORY_NAME: &'static str;
+    /// Fields, types, offsets in bytes, size and version in words; the hash in the name is that of this text.
+    fn layout() -> String;
+    /// [`LAYOUT_VERSION`] of the sender.
+    fn version(&self) -> u64;
     /// The layout in the ROS 2 message definition language, as recordings carry it.
     fn schema() -> String;
     /// Its CDR body: all its bytes but the unused ones at its end.
@@ -47,12 +55,13 @@ pub trait Message: Pod + ZeroCopySend + Default + std::fmt::Debug + PartialEq {
 pub const LAYOUT_VERSION: u64 = 7;
 
 macro_rules! messages {
-    ($($(#[$doc:meta])* $name:ident on $topic:literal keeping $depth:literal {
+    ($($(#[$doc:meta])* $name:ident on $topic:literal keeping $depth:literal as $type_name:tt {
         $($(#[$field_doc:meta])* $field:ident: $type:ty,)*
     })*) => {$(
         $(#[$doc])*
         #[repr(C)]
         #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable, ZeroCopySend)]
+        #[type_name($type_name)]
         pub struct $name {
             /// Number of this message on its topic, from 1.
             pub seq: u64,
@@ -74,6 +83,22 @@ macro_rules! messages {
             const TOPIC: &'static str = $topic;
             const DEPTH: usize = $depth;
             const TYPE_NAME: &'static str = concat!("masseter/", stringify!($name));
+            const SHARED_MEMORY_NAME: &'static str = $type_name;
+
+            fn layout() -> String {
+                let fields = [
+                    ("seq", "u64", offset_of!(Self, seq)),
+                    ("published_ns", "u64", offset_of!(Self, published_ns)),
+                    ("version", "u64", offset_of!(Self, version)),
+                    $((stringify!($field), stringify!($type), offset_of!(Self, $field)),)*
+                ];
+                let fields = fields.map(|(name, of_type, offset)| format!("{name}:{of_type}@{offset}"));
+                format!("{} {} {} v{LAYOUT_VERSION}", Self::TYPE_NAME, fields.join(" "), size_of::<Self>())
+            }
+
+            fn version(&self) -> u64 {
+                self.version
+            }
 
             fn schema() -> String {
                 let header = [("seq", u64::ros_type()), ("published_ns", u64::ros_type()), ("version", u64::ros_type())];
@@ -101,7 +126,7 @@ macro_rules! messages {
 
 messages! {
     /// What the controller wants of the drives, once a cycle.
-    Command on "command" keeping 2048 {
+    Command on "command" keeping 2048 as "masseter/Command/691046831b7ae07d" {
         /// Cycle of the controller, from 1.
         cycle: u64,
         /// Cycle of the reading it was computed from; 0 when there was none.
@@ -115,7 +140,7 @@ messages! {
     }
 
     /// What the encoders and drives reported, once a cycle.
-    Reading on "reading" keeping 2048 {
+    Reading on "reading" keeping 2048 as "masseter/Reading/c16b013b50dfdf49" {
         /// Cycle of the plant, from 1.
         cycle: u64,
         /// Cycle of the last command received when the sample was taken; 0 before the first.
@@ -155,7 +180,7 @@ messages! {
     }
 
     /// What the controller made of a reading, once a cycle.
-    State on "state" keeping 2048 {
+    State on "state" keeping 2048 as "masseter/State/881240e4e5e5cf4a" {
         /// Cycle of the controller, from 1.
         cycle: u64,
         /// Cycle of the reading it was computed from; 0 when there was none.
@@ -207,7 +232,7 @@ messages! {
     }
 
     /// What the mechanism really did, once a cycle; the controller never reads it.
-    Truth on "truth" keeping 2048 {
+    Truth on "truth" keeping 2048 as "masseter/Truth/926a8753e566de8a" {
         /// Cycle of the plant, from 1.
         cycle: u64,
         /// The instant it describes: that of the reading's sample, ns.
@@ -227,7 +252,7 @@ messages! {
     }
 
     /// What a tap on a CAN wire saw: a frame, or an error message as `linux/can/error.h` codes it.
-    FrameTap on "frame" keeping 32768 {
+    FrameTap on "frame" keeping 32768 as "masseter/FrameTap/40ca94b43c999ccf" {
         /// When its last bit was on the wire, ns.
         time_ns: u64,
         /// When its transmitter had it queued, ns; 0 where the wire does not tell, as real ones do not.
@@ -244,7 +269,7 @@ messages! {
 
     /// What the kernel had counted of the machine and of both loops; the logger looks and records it, and it travels
     /// nowhere.
-    Machine on "machine" keeping 1 {
+    Machine on "machine" keeping 1 as "masseter/Machine/130c1be53085d979" {
         /// When it was looked at, ns.
         time_ns: u64,
         /// Time that the hypervisor had taken from all cores together, as far as it tells, ns.
@@ -256,7 +281,7 @@ messages! {
     }
 
     /// Something that happened once: a change of state, a fault, an alarm.
-    Event on "event" keeping 1024 {
+    Event on "event" keeping 1024 as "masseter/Event/299f7070e354d7de" {
         /// When, ns.
         time_ns: u64,
         /// Cycle of the process that reports it.
@@ -310,4 +335,38 @@ pub fn pose_fields(pose: &Pose) -> ([f64; 3], [f64; 4]) {
 pub fn pose_of_fields(position_m: [f64; 3], [w, x, y, z]: [f64; 4]) -> Pose {
     let rotation = nalgebra::UnitQuaternion::from_quaternion(nalgebra::Quaternion::new(w, x, y, z));
     Pose::from_parts(nalgebra::Translation3::from(position_m), rotation)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// FNV-1a, 64 bits.
+    fn hash(text: &str) -> u64 {
+        text.bytes()
+            .fold(0xCBF2_9CE4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01B3))
+    }
+
+    fn check<M: Message>() {
+        let expected = format!("{}/{:016x}", M::TYPE_NAME, hash(&M::layout()));
+        assert_eq!(M::SHARED_MEMORY_NAME, expected, "name the new layout so: {}", M::layout());
+    }
+
+    #[test]
+    fn names_in_shared_memory_carry_the_hash_of_the_layout() {
+        check::<Command>();
+        check::<Reading>();
+        check::<State>();
+        check::<Truth>();
+        check::<FrameTap>();
+        check::<Machine>();
+        check::<Event>();
+    }
+
+    #[test]
+    fn a_field_of_equal_size_and_another_name_makes_another_hash() {
+        let layout = Reading::layout();
+        let renamed = layout.replace("force_n", "torque_nm");
+        assert_ne!((hash(&layout), &layout), (hash(&renamed), &renamed));
+    }
 }

@@ -68,15 +68,15 @@ impl Cycle {
         self.wake(cycle, due_ns, woke_ns)
     }
 
-    /// As [`Self::wait`]; shortly before a deadline that is far, wakes to prepare for it: to do early what can be, and
-    /// to bring code and data back into caches that have gone cold meanwhile. May be prepared for more than once.
+    /// As [`Self::wait`], with one call of `warm_up` shortly before the deadline if there is time for it: it may do work of
+    /// the cycle early, and brings code and data back into the caches.
     ///
     /// # Errors
-    /// That of the preparation.
-    pub fn wait_preparing<E>(&mut self, prepare: impl FnMut() -> Result<(), E>) -> Result<Wake, E> {
+    /// Those of `warm_up`.
+    pub fn wait_warm<E>(&mut self, warm_up: impl FnOnce() -> Result<(), E>) -> Result<Wake, E> {
         let cycle = self.claim(clock::now_ns());
         let due_ns = self.due_ns(cycle);
-        let woke_ns = self.waiter.until_preparing(due_ns, prepare)?;
+        let woke_ns = self.waiter.until_warm(due_ns, warm_up)?;
         Ok(self.wake(cycle, due_ns, woke_ns))
     }
 

@@ -1,15 +1,12 @@
 //! The real-time loop: absolute deadlines, and the scheduling that keeps them.
 //!
-//! [`Cycle`] waits for deadlines and owns the overrun policy; [`Waiter`] waits and notices when the
-//! machine stood still; [`scheduling`] asks the system for a
-//! core, a real-time priority and locked memory, and reads back what was granted. What runs inside
-//! a cycle is not decided here.
+//! [`Cycle`] waits for deadlines and applies the overrun policy. [`Waiter`] waits and measures how long the machine
+//! stalled. [`scheduling`] asks the kernel for a core, a real-time priority and locked memory, and reports what the kernel
+//! granted. The work of a cycle is not part of this module.
 
 mod cycle;
-mod load;
-mod preparation;
-mod reserve;
 pub mod scheduling;
+mod spin_margin;
 mod waiter;
 
 pub use cycle::{Cycle, Wake};

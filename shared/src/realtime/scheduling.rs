@@ -1,6 +1,7 @@
-//! What a process asks of the kernel, and what it got, read back.
+//! Core, real-time priority and locked memory of a process: what it asks the kernel for, and what the kernel granted, read
+//! back.
 //!
-//! Nothing here fails a run: a refusal is a fact that screen, manifest and `--require-rt` judge.
+//! A refusal is reported and never ends a run: screen, manifest and `--require-rt` judge it.
 
 use std::{fs, thread};
 
@@ -10,10 +11,10 @@ use rustix::process::getpid;
 use rustix::thread::{CpuSet, sched_getaffinity, sched_setaffinity};
 use serde::{Deserialize, Serialize};
 
-/// What a process asks for.
+/// The scheduling that a process asks for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Wanted {
-    /// The core to stay on; none leaves the choice to the kernel.
+    /// The only core to run on; none leaves the choice to the kernel.
     pub core: Option<usize>,
     /// SCHED_FIFO priority, 1 to 99; none keeps the ordinary policy.
     pub fifo_priority: Option<u8>,
@@ -21,7 +22,7 @@ pub struct Wanted {
     pub locked_memory: bool,
 }
 
-/// What it has, as the kernel reports it, and why anything was refused.
+/// The scheduling that a process has, as the kernel reports it, and why a request was refused.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Obtained {
     /// The request.
@@ -32,13 +33,14 @@ pub struct Obtained {
     pub fifo_priority: Option<u8>,
     /// Whether its memory is locked.
     pub locked_memory: bool,
-    /// One line a refusal, with what helps.
+    /// One line for each refusal, with the remedy.
     pub refusals: Vec<String>,
 }
 
-/// Asks for `wanted` on behalf of the calling thread (memory: of the process), then reads back.
+/// Asks for `wanted`, then reads back what was granted. Memory is locked for the whole process, the rest holds for the calling
+/// thread.
 pub fn obtain(wanted: Wanted) -> Obtained {
-    // What the kernel says of each; where it agrees without effect, what is read back tells.
+    // The kernel may accept a request without effect: only what is read back counts.
     let core = wanted.core.map(|core| pin(core).map_err(|error| error.to_string()));
     let fifo = wanted.fifo_priority.map(|priority| fifo::set(priority).map_err(|error| error.to_string()));
     let locked = wanted
@@ -66,7 +68,7 @@ pub fn obtain(wanted: Wanted) -> Obtained {
     obtained
 }
 
-/// Why something asked for was not granted, if it was not.
+/// Why a request was not granted; none if it was, or if there was none.
 fn refusal(asked: Option<Result<(), String>>, is_granted: bool) -> Option<String> {
     match asked? {
         Err(error) => Some(error),
@@ -79,8 +81,8 @@ fn refused_core(core: usize, why: &str, choice: &[usize]) -> String {
     let choice: Vec<_> = choice.iter().map(usize::to_string).collect();
     let remedy = match &choice[..] {
         [only] => format!(
-            "only core {only} may be used, on which controller and plant keep each other waiting: `masseter doctor` \
-             tells how to allow two"
+            "only core {only} may be used, and controller and plant delay each other there: `masseter doctor` tells how \
+             to allow two"
         ),
         choice => format!("choose two among {} with --cores", choice.join(", ")),
     };
@@ -93,11 +95,11 @@ pub fn allowed_cores() -> Vec<usize> {
     (0..CpuSet::MAX_CPU).filter(|&core| set.is_set(core)).collect()
 }
 
-/// The cores on which a thread of this process can be made to stay. An affinity mask that was inherited is no bound, nor
-/// is `isolcpus=`, which takes cores out of every mask; a cpuset is.
+/// The cores to which a thread of this process can be pinned. A cpuset limits them; an inherited affinity mask does not,
+/// and neither does `isolcpus=`, which takes cores out of every mask.
 pub fn usable_cores() -> Vec<usize> {
     let stays_on = |core: &usize| pin(*core).is_ok() && pinned_core() == Some(*core);
-    // In a thread of its own, which takes the mask along when it ends.
+    // In a thread of its own, so that the caller keeps its mask.
     let tried = thread::spawn(move || (0..CpuSet::MAX_CPU).filter(stays_on).collect());
     tried.join().expect("asking the kernel does not panic")
 }
@@ -117,16 +119,16 @@ fn stay_on(cores: &[usize]) -> Result<(), Errno> {
     sched_setaffinity(None, &set)
 }
 
-/// Keeps the calling thread, and those that it starts, off the cores of real-time tasks: off all of them, or off the
-/// last ones where nothing else is left. On the only core it stays.
+/// Keeps the calling thread, and the threads that it starts, off the cores of real-time tasks: off all of them, or off
+/// as many of the last ones as leave a core to run on.
 pub fn keep_off(cores: &[usize]) {
     if let Some(left) = cores_beside(&allowed_cores(), cores) {
-        // They are some of those that it runs on; if they are refused all the same, it runs on as before.
+        // These cores are allowed already. If the kernel refuses all the same, the thread keeps its mask.
         let _ = stay_on(&left);
     }
 }
 
-/// Those of the allowed ones that are none of these, or of as many of the last of these as possible.
+/// The allowed cores without `cores`, or without as many of the last of `cores` as leave one.
 fn cores_beside(allowed: &[usize], cores: &[usize]) -> Option<Vec<usize>> {
     (0..cores.len()).find_map(|first| {
         let left: Vec<_> = allowed.iter().copied().filter(|core| !cores[first..].contains(core)).collect();
@@ -148,7 +150,7 @@ fn is_locked() -> bool {
     locked_kb.is_some_and(|kb| !kb.trim().starts_with("0 "))
 }
 
-/// The one file section with `unsafe`: no kept crate wraps the scheduling policy of a thread.
+/// The only `unsafe` outside of tests: no maintained crate wraps the scheduling policy of a thread.
 #[allow(unsafe_code)]
 mod fifo {
     use std::io;
@@ -178,7 +180,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_core_that_does_not_exist_is_refused_and_said() {
+    fn a_core_that_does_not_exist_is_refused_by_its_number() {
         let wanted = Wanted { core: Some(4096), fifo_priority: None, locked_memory: false };
         let obtained = std::thread::spawn(move || obtain(wanted)).join().unwrap();
         assert!(obtained.refusals[0].starts_with("core 4096 refused"), "{:?}", obtained.refusals);
@@ -193,7 +195,7 @@ mod tests {
     }
 
     #[test]
-    fn a_mask_that_was_inherited_is_no_bound() {
+    fn an_inherited_mask_does_not_limit_the_usable_cores() {
         let usable = usable_cores();
         let within = thread::spawn(move || {
             let before = allowed_cores();
@@ -206,7 +208,7 @@ mod tests {
     }
 
     #[test]
-    fn who_has_no_core_of_his_own_leaves_the_last_one_alone_longest() {
+    fn without_a_free_core_the_last_real_time_core_stays_free_longest() {
         let cases: [(&[usize], Option<&[usize]>); 5] = [
             (&[0, 1, 2, 3], Some(&[2, 3])),
             (&[0, 1], Some(&[0])),
@@ -220,7 +222,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_granted_without_effect_is_refused() {
+    fn a_grant_without_effect_counts_as_a_refusal() {
         let cases = [
             (None, false, None),
             (Some(Ok(())), true, None),
@@ -233,7 +235,7 @@ mod tests {
     }
 
     #[test]
-    fn a_refused_core_is_told_with_what_helps() {
+    fn a_refused_core_comes_with_its_remedy() {
         assert!(refused_core(4, "EINVAL", &[0, 2]).contains("choose two among 0, 2 with --cores"));
         assert!(refused_core(1, "EINVAL", &[0]).contains("`masseter doctor` tells how to allow two"));
     }

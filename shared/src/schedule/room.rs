@@ -1,4 +1,4 @@
-//! The highest rate that a link allows. Why a rate does not fit is not told here.
+//! The highest cycle rate that a CAN link allows. The reason why a rate does not fit is part of [`super::Misfit`].
 
 use std::fmt;
 
@@ -6,21 +6,21 @@ use super::{CycleSchedule, ScheduleError, answer_ns, heartbeat_ns};
 use crate::clock::SECOND_NS;
 use crate::config::{CanConfig, RATES_HZ};
 
-/// What the link has room for.
+/// The cycle rate that a link has room for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Room {
     /// The highest rate for which there is a time table, Hz; none where no rate is low enough.
     pub max_rate_hz: Option<u32>,
-    /// What the time that the drives take to answer costs of every cycle, ns.
+    /// The part of every cycle that the drives take to answer SYNC, ns.
     pub answer_ns: u64,
 }
 
 impl Room {
-    /// By bisection: a longer cycle holds whatever a shorter one does.
+    /// The room of a configured link, by bisection: whatever fits into a cycle fits into a longer one.
     ///
     /// # Errors
-    /// [`ScheduleError`] for bit rates and node ids that there are not.
-    pub fn of(can: &CanConfig) -> Result<Self, ScheduleError> {
+    /// [`ScheduleError`] for unknown bit rates and node ids.
+    pub fn for_link(can: &CanConfig) -> Result<Self, ScheduleError> {
         let fits = |rate_hz: u32| {
             CycleSchedule::fit(can, SECOND_NS / u64::from(rate_hz)).map(|fitted| fitted.is_ok())
         };
@@ -67,12 +67,12 @@ mod tests {
             CanConfig { buses: one_bus.clone(), ..Default::default() },
             CanConfig { buses: one_bus, fd: true, ..Default::default() },
         ] {
-            let highest_hz = Room::of(&can).unwrap().max_rate_hz.unwrap();
+            let highest_hz = Room::for_link(&can).unwrap().max_rate_hz.unwrap();
             let fits = |rate_hz: u32| CycleSchedule::new(&can, SECOND_NS / u64::from(rate_hz)).is_ok();
             assert!(fits(highest_hz) && !fits(highest_hz + 1), "{highest_hz} Hz: {can:?}");
         }
         let ideal = CanConfig { ideal: true, ..Default::default() };
-        assert_eq!(Room::of(&ideal).unwrap().max_rate_hz, Some(*RATES_HZ.end()));
+        assert_eq!(Room::for_link(&ideal).unwrap().max_rate_hz, Some(*RATES_HZ.end()));
     }
 
     #[test]

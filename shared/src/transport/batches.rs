@@ -11,7 +11,7 @@ use iceoryx2::prelude::{AllocationStrategy, ipc};
 use iceoryx2::sample::Sample;
 use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
 
-use super::ports::{Node, Refused, TransportError, failed};
+use super::ports::{Node, Refused, TransportError, check_version, failed};
 use crate::clock;
 use crate::messages::Message;
 
@@ -120,7 +120,9 @@ impl<M: Message> BatchInlet<M> {
     pub fn receive(&self) -> Result<Option<ReceivedBatch<M>>, TransportError> {
         let sample = self.subscriber.receive().map_err(failed("receiving", M::TOPIC))?;
         self.refused.check(M::TOPIC)?;
-        Ok(sample.map(ReceivedBatch))
+        let Some(sample) = sample else { return Ok(None) };
+        sample.iter().try_for_each(check_version)?;
+        Ok(Some(ReceivedBatch(sample)))
     }
 }
 

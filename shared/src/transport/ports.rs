@@ -1,5 +1,6 @@
 //! Typed ends of the topics: [`Outlet`] publishes, [`Inlet`] receives.
 
+use std::borrow::Borrow;
 use std::fmt::Debug;
 use std::ops::Deref;
 use std::sync::Arc;
@@ -19,7 +20,7 @@ use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
 
 use super::Domain;
 use crate::clock;
-use crate::messages::Message;
+use crate::messages::{LAYOUT_VERSION, Message};
 use crate::realtime::Waiter;
 
 /// Publishers a topic may have: every process may publish events.
@@ -89,6 +90,17 @@ impl Refused {
         match self.0.load(Ordering::Relaxed) {
             0 => Ok(()),
             count => Err(failed("connecting", topic)(format_args!("ConnectionsRefused({count})"))),
+        }
+    }
+}
+
+/// Refuses a message of another layout, which a sender of another version may have published.
+pub(super) fn check_version<M: Message>(message: &M) -> Result<(), TransportError> {
+    match message.version() {
+        LAYOUT_VERSION => Ok(()),
+        version => {
+            let reason = format_args!("IncompatibleVersion({version}, this program has {LAYOUT_VERSION})");
+            Err(failed("receiving", M::TOPIC)(reason))
         }
     }
 }
@@ -232,6 +244,12 @@ impl<M: Message> Deref for Received<M> {
     }
 }
 
+impl<M: Message> Borrow<M> for Received<M> {
+    fn borrow(&self) -> &M {
+        self
+    }
+}
+
 impl<M: Message> Inlet<M> {
     /// Connects to the publishers that are there by now; else the first look does, as in [`Outlet::connect`].
     pub fn connect(&self) -> Result<(), TransportError> {
@@ -243,7 +261,7 @@ impl<M: Message> Inlet<M> {
     pub fn receive(&self) -> Result<Option<Received<M>>, TransportError> {
         let sample = self.subscriber.receive().map_err(failed("receiving", M::TOPIC))?;
         self.refused.check(M::TOPIC)?;
-        Ok(sample.map(Received))
+        sample.map(|sample| check_version(&*sample).map(|()| Received(sample))).transpose()
     }
 
     /// The first message that `is_awaited`, or the newest there is when `deadline_ns` has passed. Polls without

@@ -2,7 +2,7 @@
 //!
 //! Both go in the Newton direction. The paper's reduces the increment until the error decreases; that
 //! stops oscillation and divergence but may stall in a local minimum. Either finds *a* solution near
-//! its guess; which one it is, [`Assembly`](super::Assembly) tells.
+//! its guess; [`Assembly`](super::Assembly) judges which one.
 //!
 //! The text leaves two things open, and both are options. *The residual*: eq. 1 prints distances, and
 //! [`Residual::Distance`] is that reading. *The step rule*: "the increment is reduced" names no
@@ -18,8 +18,8 @@ use masseter_shared::geometry::{Actuators, LEGS, Mechanism};
 pub use options::{Iteration, MAX_HALVINGS, MAX_ITERATIONS, Method, Options, Residual, StepRule};
 use search::{Search, Step};
 
-use super::closure::{Closed, Closure};
-use super::heading::Heading;
+use super::leg_angle::LegAngle;
+use super::loop_equations::{LoopEquations, LoopSolution};
 use super::{Equations, ForwardError, Solution};
 
 /// Solves from a guess of the leg angles (radians) by the method asked for.
@@ -36,7 +36,7 @@ pub fn solve(
     solve_traced(method, mechanism, actuators, guess_rad, options, |_| {})
 }
 
-/// [`solve`] with a witness: it sees the guess and every iteration, also of a failure.
+/// [`solve`] with a callback for the guess and for every iteration, also of a failure.
 ///
 /// # Errors
 /// Those of [`solve`].
@@ -46,7 +46,7 @@ pub fn solve_traced(
     actuators: &Actuators,
     guess_rad: &[f64; LEGS],
     options: &Options,
-    mut witness: impl FnMut(&Iteration),
+    mut observe: impl FnMut(&Iteration),
 ) -> Result<Solution, ForwardError> {
     if !actuators.is_finite() || !guess_rad.iter().all(|x| x.is_finite()) {
         return Err(ForwardError::NotFinite);
@@ -54,7 +54,7 @@ pub fn solve_traced(
     let search = Search { equations: Equations::new(mechanism, actuators), method, options };
     let mut at = Step::guess(&search.equations, guess_rad);
     let mut iterations = 0;
-    witness(&at.told(iterations));
+    observe(&at.iteration(iterations));
     while at.is_above(options.epsilon_cm2) {
         let residual_m = at.evaluation.residual_norm_m();
         if iterations == options.max_iterations.min(MAX_ITERATIONS) {
@@ -63,12 +63,12 @@ pub fn solve_traced(
         let increment = search.newton_increment(&at.evaluation)?;
         iterations += 1;
         at = search.advanced(&at, increment).ok_or(ForwardError::Stalled { residual_m, iterations })?;
-        witness(&at.told(iterations));
+        observe(&at.iteration(iterations));
     }
-    let closure = Closure::new(mechanism, actuators);
-    let headings = std::array::from_fn(|leg| Heading::from_rad(at.evaluation.theta_rad[leg]));
-    let closed = Closed { headings, closing: closure.evaluate(&headings), iterations };
-    Ok(Solution { residual_m: at.evaluation.residual_norm_m(), ..Solution::new(&closure, &closed) })
+    let loops = LoopEquations::new(mechanism, actuators);
+    let leg_angles = std::array::from_fn(|leg| LegAngle::from_rad(at.evaluation.theta_rad[leg]));
+    let closed = LoopSolution { leg_angles, residuals: loops.evaluate(&leg_angles), iterations };
+    Ok(Solution { residual_m: at.evaluation.residual_norm_m(), ..Solution::new(&loops, &closed) })
 }
 
 /// [`solve`] by the paper's algorithm.

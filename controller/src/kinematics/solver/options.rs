@@ -1,4 +1,4 @@
-//! What the paper's text leaves open, as options, and what an iteration tells of itself.
+//! What the paper's text leaves open, as options, and the record of an iteration.
 
 use masseter_shared::geometry::LEGS;
 

@@ -39,7 +39,7 @@ impl Step {
         self.evaluation.error_cm2().partial_cmp(&epsilon_cm2).is_none_or(std::cmp::Ordering::is_gt)
     }
 
-    pub(super) fn told(&self, number: u32) -> Iteration {
+    pub(super) fn iteration(&self, number: u32) -> Iteration {
         Iteration {
             number,
             theta_rad: self.evaluation.theta_rad.into(),

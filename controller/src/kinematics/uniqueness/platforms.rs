@@ -13,7 +13,7 @@
 
 use masseter_shared::geometry::{LEGS, Mechanism};
 
-use super::super::closure::next;
+use super::super::legs::next;
 use super::{Enclosure, InputBox};
 
 /// Horizontal vector.

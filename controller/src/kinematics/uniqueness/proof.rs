@@ -9,7 +9,7 @@ use nalgebra::Matrix3;
 
 use super::platforms::{Dimensions, Platforms, Slopes};
 use super::{Enclosure, InputBox};
-use crate::kinematics::closure::next;
+use crate::kinematics::legs::next;
 
 /// Parts of h-space that are looked at for one box of inputs; a bound on time only.
 const MOST_PARTS: usize = 20_000;

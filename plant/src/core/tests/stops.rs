@@ -119,7 +119,7 @@ fn a_commander_that_switched_the_drives_off_may_go() {
 }
 
 #[test]
-fn a_commander_that_had_the_drives_stopped_may_go_before_they_stand() {
+fn a_commander_that_stops_the_drives_may_end_before_they_are_at_rest() {
     let Moving { mut bench, .. } = Moving::new();
     bench.cycle(Some(&|reading| (reading.position_m, DriveRequest::QuickStop)));
     (0..100).for_each(|_| bench.cycle(None));

@@ -1,4 +1,4 @@
-//! Faults of the wires: what the rig bears, what stops it, and what it tells.
+//! Faults of the wires: those that the rig tolerates, those that stop it, and its reports.
 
 use masseter_can::canopen::EmergencyCode;
 use masseter_can::{ErrorKind, Tapped};
@@ -86,7 +86,7 @@ fn a_disconnected_node_is_detected_and_all_drives_stop() {
 }
 
 #[test]
-fn a_drive_off_the_bus_is_told_and_stops_the_rig() {
+fn a_drive_in_bus_off_is_reported_and_stops_the_rig() {
     let fault = FaultConfig { kind: FaultKindConfig::BusOff, node: Some(3), ..BASE };
     let mut bench = struck_by(fault);
     play_until(&mut bench, 1.0);
@@ -100,7 +100,7 @@ fn a_drive_off_the_bus_is_told_and_stops_the_rig() {
 }
 
 #[test]
-fn the_masters_own_controller_off_a_bus_is_told_with_the_bus() {
+fn the_masters_own_controller_in_bus_off_is_reported_with_the_bus() {
     let mut bench = struck_by(FaultConfig { kind: FaultKindConfig::BusOff, bus: 1, node: Some(127), ..BASE });
     play_until(&mut bench, 0.6);
     let told = bench.events.iter().find(|event| event.cause == Cause::BusOff.code()).unwrap();

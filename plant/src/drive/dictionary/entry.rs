@@ -1,4 +1,4 @@
-//! What the table says of an object and of its entries.
+//! Objects and entries of the table: type, access, mapping, initial value and limits.
 
 use masseter_can::canopen::ObjectAddress;
 
@@ -155,4 +155,20 @@ pub(crate) struct Object {
 pub(crate) struct Addressed {
     pub(crate) address: ObjectAddress,
     pub(crate) entry: Entry,
+}
+
+/// An entry of a mapping parameter: index, sub-index and length in bits.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct MappingEntry(pub(crate) u32);
+
+impl MappingEntry {
+    /// The mapped object.
+    pub(crate) const fn object(self) -> ObjectAddress {
+        ObjectAddress::new((self.0 >> 16) as u16, (self.0 >> 8) as u8)
+    }
+
+    /// Its length in bits.
+    pub(crate) const fn bits(self) -> usize {
+        (self.0 & 0xFF) as usize
+    }
 }

@@ -1,12 +1,12 @@
 //! The drive's object dictionary: one table, and the memory behind it.
 //!
-//! Nothing here knows what an object does; that is said where it is used.
+//! The dictionary knows type, limits and access of its objects, but not their effects.
 
 mod entry;
 pub(super) mod names;
 mod objects;
 mod table;
 
-pub(crate) use entry::{Access, DataType, Entry, Initial, Mapping, Object, Shape};
+pub(crate) use entry::{Access, DataType, Entry, Initial, Mapping, MappingEntry, Object, Shape};
 pub(crate) use objects::{ENTRIES, Objects, find, within_limits, writable};
-pub(crate) use table::{HISTORY, IDENTITY, MAPPED_MAX, OBJECTS, PDOS, WATCHED};
+pub(crate) use table::{CONSUMED, HISTORY, IDENTITY, MAPPED_MAX, OBJECTS, PDOS};

@@ -1,4 +1,4 @@
-//! The places of the entries that the drive itself reads and writes.
+//! The entries that the drive itself reads and writes, by name.
 
 use super::objects::{Slot, slot};
 
@@ -13,11 +13,11 @@ names! {
     ERROR_COUNT: u8 = 0x1003, 0;
     NEWEST_ERROR: u32 = 0x1003, 1;
     EMERGENCY_COB_ID: u32 = 0x1014, 0;
-    WATCHED_HEARTBEAT: u32 = 0x1016, 1;
-    HEARTBEAT_MS: u16 = 0x1017, 0;
+    CONSUMER_HEARTBEAT_TIME: u32 = 0x1016, 1;
+    PRODUCER_HEARTBEAT_TIME_MS: u16 = 0x1017, 0;
     SYNC_OVERFLOW: u8 = 0x1019, 0;
     COMMUNICATION_ERROR: u8 = 0x1029, 1;
-    LINK_OPTION: i16 = 0x6007, 0;
+    ABORT_CONNECTION_OPTION: i16 = 0x6007, 0;
     ERROR_CODE: u16 = 0x603F, 0;
     CONTROLWORD: u16 = 0x6040, 0;
     STATUSWORD: u16 = 0x6041, 0;
@@ -36,8 +36,8 @@ names! {
     TORQUE_ACTUAL: i16 = 0x6077, 0;
     TARGET_POSITION: i32 = 0x607A, 0;
     HOME_OFFSET: i32 = 0x607C, 0;
-    LOWEST_POSITION: i32 = 0x607D, 1;
-    HIGHEST_POSITION: i32 = 0x607D, 2;
+    MIN_POSITION_LIMIT: i32 = 0x607D, 1;
+    MAX_POSITION_LIMIT: i32 = 0x607D, 2;
     MAX_VELOCITY: u32 = 0x607F, 0;
     PROFILE_VELOCITY: u32 = 0x6081, 0;
     PROFILE_ACCELERATION: u32 = 0x6083, 0;

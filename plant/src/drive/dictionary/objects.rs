@@ -1,4 +1,4 @@
-//! The values of all entries: one word each, found by places that are known when compiling.
+//! The values of all entries: one word each, at places that are constants.
 
 use std::marker::PhantomData;
 
@@ -47,7 +47,7 @@ pub(crate) trait Number: Copy {
     /// The entry's data type.
     const KIND: DataType;
     /// The value in a memory word.
-    fn of_word(word: u32) -> Self;
+    fn from_word(word: u32) -> Self;
     /// The memory word of a value.
     fn word(self) -> u32;
 }
@@ -56,7 +56,7 @@ macro_rules! numbers {
     ($($type:ident is $kind:ident),*) => {$(
         impl Number for $type {
             const KIND: DataType = DataType::$kind;
-            fn of_word(word: u32) -> Self {
+            fn from_word(word: u32) -> Self {
                 word as Self
             }
             fn word(self) -> u32 {
@@ -90,7 +90,7 @@ impl<T> Slot<T> {
     }
 }
 
-/// The place of an entry of the table; what is not there does not compile.
+/// The place of an entry of the table; an entry that does not exist does not compile.
 pub(crate) const fn slot<T: Number>(index: u16, subindex: u8) -> Slot<T> {
     let mut place = 0;
     while FLAT[place].address.index != index || FLAT[place].address.subindex != subindex {
@@ -120,7 +120,7 @@ pub(crate) struct Objects {
 }
 
 impl Objects {
-    /// As after power-on; what the scenario configures is still 0.
+    /// The values after power-on; those that the scenario configures are still 0.
     pub(crate) fn new(node: NodeId) -> Self {
         let mut words = [0; COUNT];
         for (word, addressed) in words.iter_mut().zip(&ENTRIES) {
@@ -135,10 +135,10 @@ impl Objects {
 
     /// A value.
     pub(crate) fn get<T: Number>(&self, slot: Slot<T>) -> T {
-        T::of_word(self.words[slot.place])
+        T::from_word(self.words[slot.place])
     }
 
-    /// Changes a value, whoever may.
+    /// Sets a value, whatever its access.
     pub(crate) fn set<T: Number>(&mut self, slot: Slot<T>, value: T) {
         self.words[slot.place] = value.word();
     }
@@ -232,7 +232,7 @@ mod tests {
     }
 
     #[test]
-    fn sub_index_0_tells_the_highest_of_its_object() {
+    fn sub_index_0_is_the_highest_of_its_object() {
         for object in OBJECTS.iter().filter(|object| object.entries.len() > 1) {
             let last = object.entries[object.entries.len() - 1].subindex;
             let first = object.entries[0];

@@ -16,15 +16,15 @@ use super::entry::{Access, DataType, Entry, Initial, Object, Shape};
 
 /// PDOs of each direction.
 pub(crate) const PDOS: usize = 4;
-/// Objects that a PDO can hold.
+/// Objects that a PDO can carry.
 pub(crate) const MAPPED_MAX: usize = 8;
-/// Errors that object 1003 remembers.
+/// Errors in the history (1003h).
 pub(crate) const HISTORY: usize = 8;
-/// Nodes whose heartbeat can be watched (object 1016).
-pub(crate) const WATCHED: usize = 2;
-/// What device the drive says it is (objects 1000 and 1018).
+/// Heartbeats that can be consumed (1016h).
+pub(crate) const CONSUMED: usize = 2;
+/// Device type and identity of the drive (1000h, 1018h).
 pub(crate) const IDENTITY: IdentityConfig = IdentityConfig::EMULATED;
-/// Object 6502: profile position, homing, cyclic synchronous position and torque.
+/// 6502h: profile position, homing, cyclic synchronous position and torque.
 const SUPPORTED_MODES: i64 = 1 << 0 | 1 << 5 | 1 << 7 | 1 << 9;
 
 const fn object(index: u16, name: &'static str, shape: Shape, entries: &'static [Entry]) -> Object {
@@ -41,42 +41,42 @@ const fn positive(subindex: u8, name: &'static str) -> Entry {
     Entry::new(subindex, name, U32, ReadWrite, Configured).within(1, u32::MAX as i64)
 }
 
-/// The COB-ID of a PDO: of each direction only the first one exists at first.
-const fn first_exists(number: usize, word: u32) -> CobId {
-    if number == 0 { CobId(word) } else { CobId(word).invalidated() }
+/// The COB-ID of a PDO: initially only the first one of each direction exists.
+const fn first_exists(number: u32, word: u32) -> Initial {
+    OfNode(if number == 0 { word } else { CobId(word).invalidated().0 })
 }
 
-/// The receive PDO of that number, beginning with 0.
-struct Rpdo<const N: usize>;
-
-impl<const N: usize> Rpdo<N> {
-    const COB_ID: CobId = first_exists(N, 0x200 + 0x100 * N as u32);
-    const COMMUNICATION: &'static [Entry] = &[
+/// The communication parameter of a receive PDO, numbered from 0.
+const fn rpdo(number: u32) -> [Entry; 4] {
+    let cob_id = first_exists(number, 0x200 + 0x100 * number);
+    [
         Entry::highest(5),
-        Entry::new(1, "COB-ID used by RPDO", U32, ReadWrite, OfNode(Self::COB_ID.0)),
+        Entry::new(1, "COB-ID used by RPDO", U32, ReadWrite, cob_id),
         Entry::new(2, "Transmission type", U8, ReadWrite, Value(EVERY_SYNC as i64)),
         Entry::new(5, "Event timer", U16, ReadWrite, Value(0)),
-    ];
-    const MAPPING: &'static [Entry] = &mapping(if N == 0 { &Rpdo1::MAPPING } else { &[] });
+    ]
 }
 
-/// The transmit PDO of that number, beginning with 0.
-struct TpdoOf<const N: usize>;
-
-impl<const N: usize> TpdoOf<N> {
-    const COB_ID: CobId = first_exists(N, CobId::NO_REMOTE_REQUEST | (0x180 + 0x100 * N as u32));
-    const COMMUNICATION: &'static [Entry] = &[
+/// The communication parameter of a transmit PDO, numbered from 0.
+const fn tpdo(number: u32) -> [Entry; 6] {
+    let cob_id = first_exists(number, CobId::NO_REMOTE_REQUEST | (0x180 + 0x100 * number));
+    [
         Entry::highest(6),
-        Entry::new(1, "COB-ID used by TPDO", U32, ReadWrite, OfNode(Self::COB_ID.0)),
+        Entry::new(1, "COB-ID used by TPDO", U32, ReadWrite, cob_id),
         Entry::new(2, "Transmission type", U8, ReadWrite, Value(EVERY_SYNC as i64)),
         Entry::new(3, "Inhibit time", U16, ReadWrite, Value(0)),
         Entry::new(5, "Event timer", U16, ReadWrite, Value(0)),
         Entry::new(6, "SYNC start value", U8, ReadWrite, Value(0)).within(0, 240),
-    ];
-    const MAPPING: &'static [Entry] = &mapping(if N == 0 { &Tpdo1::MAPPING } else { &[] });
+    ]
 }
 
-/// The mapping parameter of a PDO that holds these objects at first.
+static RPDO: [[Entry; 4]; PDOS] = [rpdo(0), rpdo(1), rpdo(2), rpdo(3)];
+static TPDO: [[Entry; 6]; PDOS] = [tpdo(0), tpdo(1), tpdo(2), tpdo(3)];
+static RPDO1_MAPPING: [Entry; MAPPED_MAX + 1] = mapping(&Rpdo1::MAPPING);
+static TPDO1_MAPPING: [Entry; MAPPED_MAX + 1] = mapping(&Tpdo1::MAPPING);
+static NO_MAPPING: [Entry; MAPPED_MAX + 1] = mapping(&[]);
+
+/// The mapping parameter of a PDO that initially carries these objects.
 const fn mapping(objects: &[u32]) -> [Entry; MAPPED_MAX + 1] {
     const NAMES: [&str; MAPPED_MAX] = [
         "Mapped object 1",
@@ -102,7 +102,7 @@ const fn mapping(objects: &[u32]) -> [Entry; MAPPED_MAX + 1] {
 
 /// Every object, indices ascending.
 #[rustfmt::skip]
-pub(crate) const OBJECTS: &[Object] = &[
+pub(crate) static OBJECTS: &[Object] = &[
     object(0x1000, "Device type", Var, &[plain("Device type", U32, Constant, Value(IDENTITY.device_type as i64))]),
     object(0x1001, "Error register", Var, &[plain("Error register", U8, ReadOnly, Value(0)).mapped(Tpdo)]),
     object(0x1003, "Pre-defined error field", Array, &[
@@ -130,7 +130,7 @@ pub(crate) const OBJECTS: &[Object] = &[
     ]),
     object(0x1014, "COB-ID EMCY", Var, &[plain("COB-ID EMCY", U32, ReadWrite, OfNode(0x80))]),
     object(0x1016, "Consumer heartbeat time", Array, &[
-        Entry::highest(WATCHED as u8),
+        Entry::highest(CONSUMED as u8),
         Entry::new(1, "Consumer heartbeat time 1", U32, ReadWrite, Configured),
         Entry::new(2, "Consumer heartbeat time 2", U32, ReadWrite, Value(0)),
     ]),
@@ -152,22 +152,22 @@ pub(crate) const OBJECTS: &[Object] = &[
         Entry::new(1, "COB-ID client to server", U32, Constant, OfNode(0x600)),
         Entry::new(2, "COB-ID server to client", U32, Constant, OfNode(0x580)),
     ]),
-    object(0x1400, "RPDO 1 communication parameter", Record, Rpdo::<0>::COMMUNICATION),
-    object(0x1401, "RPDO 2 communication parameter", Record, Rpdo::<1>::COMMUNICATION),
-    object(0x1402, "RPDO 3 communication parameter", Record, Rpdo::<2>::COMMUNICATION),
-    object(0x1403, "RPDO 4 communication parameter", Record, Rpdo::<3>::COMMUNICATION),
-    object(0x1600, "RPDO 1 mapping parameter", Record, Rpdo::<0>::MAPPING),
-    object(0x1601, "RPDO 2 mapping parameter", Record, Rpdo::<1>::MAPPING),
-    object(0x1602, "RPDO 3 mapping parameter", Record, Rpdo::<2>::MAPPING),
-    object(0x1603, "RPDO 4 mapping parameter", Record, Rpdo::<3>::MAPPING),
-    object(0x1800, "TPDO 1 communication parameter", Record, TpdoOf::<0>::COMMUNICATION),
-    object(0x1801, "TPDO 2 communication parameter", Record, TpdoOf::<1>::COMMUNICATION),
-    object(0x1802, "TPDO 3 communication parameter", Record, TpdoOf::<2>::COMMUNICATION),
-    object(0x1803, "TPDO 4 communication parameter", Record, TpdoOf::<3>::COMMUNICATION),
-    object(0x1A00, "TPDO 1 mapping parameter", Record, TpdoOf::<0>::MAPPING),
-    object(0x1A01, "TPDO 2 mapping parameter", Record, TpdoOf::<1>::MAPPING),
-    object(0x1A02, "TPDO 3 mapping parameter", Record, TpdoOf::<2>::MAPPING),
-    object(0x1A03, "TPDO 4 mapping parameter", Record, TpdoOf::<3>::MAPPING),
+    object(0x1400, "RPDO 1 communication parameter", Record, &RPDO[0]),
+    object(0x1401, "RPDO 2 communication parameter", Record, &RPDO[1]),
+    object(0x1402, "RPDO 3 communication parameter", Record, &RPDO[2]),
+    object(0x1403, "RPDO 4 communication parameter", Record, &RPDO[3]),
+    object(0x1600, "RPDO 1 mapping parameter", Record, &RPDO1_MAPPING),
+    object(0x1601, "RPDO 2 mapping parameter", Record, &NO_MAPPING),
+    object(0x1602, "RPDO 3 mapping parameter", Record, &NO_MAPPING),
+    object(0x1603, "RPDO 4 mapping parameter", Record, &NO_MAPPING),
+    object(0x1800, "TPDO 1 communication parameter", Record, &TPDO[0]),
+    object(0x1801, "TPDO 2 communication parameter", Record, &TPDO[1]),
+    object(0x1802, "TPDO 3 communication parameter", Record, &TPDO[2]),
+    object(0x1803, "TPDO 4 communication parameter", Record, &TPDO[3]),
+    object(0x1A00, "TPDO 1 mapping parameter", Record, &TPDO1_MAPPING),
+    object(0x1A01, "TPDO 2 mapping parameter", Record, &NO_MAPPING),
+    object(0x1A02, "TPDO 3 mapping parameter", Record, &NO_MAPPING),
+    object(0x1A03, "TPDO 4 mapping parameter", Record, &NO_MAPPING),
     object(0x6007, "Abort connection option code", Var, &[plain("Abort connection option code", I16, ReadWrite, Value(3)).within(0, 3)]),
     object(0x603F, "Error code", Var, &[plain("Error code", U16, ReadOnly, Value(0)).mapped(Tpdo)]),
     object(0x6040, "Controlword", Var, &[plain("Controlword", U16, ReadWrite, Value(0)).mapped(Any)]),

@@ -2,7 +2,7 @@
 
 use super::*;
 
-/// Object 6007, and where it leaves an enabled drive that nobody guides any more.
+/// 6007h, and the state in which it leaves an enabled drive that nobody controls any more.
 const LINK_REACTIONS: [(u16, DriveState); 4] = [
     (0, DriveState::OperationEnabled),
     (1, DriveState::Fault),
@@ -11,7 +11,7 @@ const LINK_REACTIONS: [(u16, DriveState); 4] = [
 ];
 
 #[test]
-fn a_node_boots_up_once_and_then_tells_its_state() {
+fn a_node_boots_up_once_and_then_reports_its_state() {
     let mut bench = Bench::new();
     assert_eq!(bench.heartbeats(), [NmtState::BootUp]);
     bench.run_ms(100);
@@ -41,7 +41,7 @@ fn the_heartbeat_is_produced_as_object_1017_says() {
 
 /// As on real wires, when the machine held the drives up.
 #[test]
-fn heartbeats_missed_while_the_drive_stood_still_are_left_out() {
+fn heartbeats_missed_while_the_drive_was_stalled_are_skipped() {
     let mut bench = Bench::operational();
     bench.run_ms(100);
     bench.sent.clear();
@@ -77,7 +77,7 @@ fn a_reset_of_the_communication_leaves_the_profile_alone() {
     assert_eq!((bench.read((0x1017, 0)), bench.read((0x6065, 0))), (Ok(50), Ok(777)));
 }
 
-/// Guided over SDO, as by a tool; the heartbeat would be watched anew only once the master beats again.
+/// Controlled over SDO, as by a tool; supervision of the heartbeat begins again with the master's next heartbeat.
 #[test]
 fn a_reset_of_the_communication_stops_the_axis_in_pre_operational_too() {
     let mut bench = Bench::enabled(1);
@@ -102,7 +102,7 @@ fn a_reset_closes_the_brake_and_boots_anew() {
     assert_eq!(bench.read((0x6061, 0)), Ok(8));
 }
 
-/// Object 6007 and what becomes of an enabled drive whose master falls silent.
+/// 6007h and the reaction of an enabled drive whose master falls silent.
 #[test]
 fn a_lost_heartbeat_is_answered_as_object_6007_says() {
     for (option, state) in LINK_REACTIONS {
@@ -123,7 +123,7 @@ fn a_lost_heartbeat_is_answered_as_object_6007_says() {
 }
 
 #[test]
-fn a_lost_link_that_is_a_fault_is_told_and_lasts_until_it_is_reset() {
+fn an_aborted_connection_that_is_a_fault_is_reported_and_lasts_until_reset() {
     for command in [NmtCommand::Stop, NmtCommand::EnterPreOperational, NmtCommand::ResetCommunication] {
         let mut bench = Bench::enabled(1);
         bench.write((0x6007, 0), &1_u16.to_le_bytes()).unwrap();
@@ -141,7 +141,7 @@ fn a_lost_link_that_is_a_fault_is_told_and_lasts_until_it_is_reset() {
     }
 }
 
-/// Object 6007 and what becomes of a force whose process data stay away while the master's heartbeat goes on.
+/// 6007h and the reaction to missing process data of a force while the master's heartbeat continues.
 #[test]
 fn process_data_that_stay_away_are_answered_as_object_6007_says() {
     for (option, state) in LINK_REACTIONS {
@@ -165,7 +165,7 @@ fn process_data_that_stay_away_are_answered_as_object_6007_says() {
     }
 }
 
-/// Object 1029:1 and the state in which the loss of a heartbeat leaves a node.
+/// 1029h:1 and the state of a node after the loss of a heartbeat.
 #[test]
 fn a_lost_heartbeat_changes_the_state_as_object_1029_says() {
     let table = [(0, NmtState::PreOperational), (1, NmtState::Operational), (2, NmtState::Stopped)];
@@ -179,7 +179,7 @@ fn a_lost_heartbeat_changes_the_state_as_object_1029_says() {
 }
 
 #[test]
-fn a_lost_heartbeat_that_is_watched_no_longer_is_no_error_any_more() {
+fn a_lost_heartbeat_that_is_consumed_no_longer_is_no_error_any_more() {
     let mut bench = Bench::operational();
     bench.master_beats();
     bench.run_ms(250);
@@ -191,7 +191,7 @@ fn a_lost_heartbeat_that_is_watched_no_longer_is_no_error_any_more() {
 
 /// CiA 301: without a time, or with a number that no node has, an entry is not used; its highest byte is reserved.
 #[test]
-fn an_entry_for_watched_heartbeats_is_used_or_not_as_its_node_and_time_say() {
+fn an_entry_for_consumed_heartbeats_needs_a_valid_node_and_a_time() {
     for (word, is_used) in [(0x7F_0064, true), (0x017F_0064, true), (0x80_0064, false), (0x7F_0000, false)] {
         let mut bench = Bench::operational();
         bench.write((0x1016, 1), &u32::to_le_bytes(word)).unwrap();
@@ -201,32 +201,32 @@ fn an_entry_for_watched_heartbeats_is_used_or_not_as_its_node_and_time_say() {
     }
 }
 
-/// Objects 6007 and 1029:1, long before the master's heartbeat is overdue.
+/// 6007h and 1029h:1, long before the master's heartbeat is overdue.
 #[test]
-fn a_drive_off_the_bus_stops_by_itself_and_tells_when_it_is_back() {
+fn a_drive_in_bus_off_stops_by_itself_and_reports_it_once_back() {
     for (option, state) in LINK_REACTIONS {
         let (mut bench, _) = Bench::cycling();
         bench.write((0x6007, 0), &option.to_le_bytes()).unwrap();
-        bench.drive.watch_bus(bench.now_ns, ErrorState::BusOff);
+        bench.drive.set_error_state(bench.now_ns, ErrorState::BusOff);
         bench.run_ms(100);
         assert_eq!(bench.drive.power(), state, "6007 = {option}");
         assert_eq!(bench.heartbeats().pop(), Some(NmtState::PreOperational));
         bench.sent.clear();
-        bench.drive.watch_bus(bench.now_ns, ErrorState::Active);
+        bench.drive.set_error_state(bench.now_ns, ErrorState::Active);
         bench.run_ms(1);
         assert_eq!(bench.emergencies(), [EmergencyCode::WAS_BUS_OFF, EmergencyCode::RESET]);
     }
 }
 
 #[test]
-fn a_drive_that_is_error_passive_tells_so_once_and_goes_on() {
+fn an_error_passive_drive_reports_it_once_and_continues() {
     let mut bench = Bench::enabled(1);
     for state in [ErrorState::Active, ErrorState::Passive, ErrorState::Passive] {
-        bench.drive.watch_bus(bench.now_ns, state);
+        bench.drive.set_error_state(bench.now_ns, state);
         bench.run_ms(1);
     }
     assert_eq!(bench.errors(), (0x11, 0x8120));
-    bench.drive.watch_bus(bench.now_ns, ErrorState::Active);
+    bench.drive.set_error_state(bench.now_ns, ErrorState::Active);
     bench.run_ms(1);
     assert_eq!(bench.emergencies(), [EmergencyCode::ERROR_PASSIVE, EmergencyCode::RESET]);
     assert_eq!(bench.errors(), (0, 0));

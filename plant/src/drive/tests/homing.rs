@@ -1,9 +1,9 @@
-//! CiA 402: homing, and what becomes of an axis whose origin it has moved.
+//! CiA 402: homing, and the axis after homing has moved its origin.
 
 use super::*;
 
 #[test]
-fn homing_where_it_stands_only_renames_the_position() {
+fn homing_on_the_actual_position_only_renames_it() {
     for method in [35, 37] {
         let mut bench = Bench::enabled(HOMING);
         bench.write((0x6098, 0), &[method]).unwrap();
@@ -74,7 +74,7 @@ fn a_home_that_was_attained_stays_so_until_a_restart_or_another_homing() {
 }
 
 #[test]
-fn homing_fails_without_a_mark_before_the_limit_and_ends_when_it_is_told_to() {
+fn homing_fails_without_a_mark_before_the_limit_and_ends_on_command() {
     let mut bench = Bench::enabled(HOMING);
     bench.write((0x6098, 0), &[34]).unwrap();
     bench.write((0x607D, 2), &(START + 500).to_le_bytes()).unwrap();
@@ -110,7 +110,7 @@ fn homing_leaves_the_numbers_of_the_software_limits_which_count_from_home() {
 }
 
 #[test]
-fn an_axis_outside_its_software_limits_stays_where_it_is_told_to() {
+fn an_axis_outside_its_software_limits_stays_on_command() {
     let mut bench = Bench::homed_below_its_limits();
     bench.write(MODE, &[CYCLIC_POSITION as u8]).unwrap();
     bench.nmt(NmtCommand::Start);

@@ -14,14 +14,13 @@ use masseter_can::cia402::{DriveState, StatusBit, Statusword};
 use masseter_can::{CanId, ErrorState, Frame};
 use masseter_shared::config::DrivesConfig;
 
-use super::{DriveNode, DriveSettings};
-use crate::encoder::Encoder;
+use super::{DriveNode, DriveSettings, Encoder};
 
 const STEP_NS: u64 = 125_000;
 const STEPS_PER_MS: u64 = 1_000_000 / STEP_NS;
 const MASS_KG: f64 = 0.6;
 const LOAD_N: f64 = 5.0;
-/// Where the axis stands at first, between two reference marks.
+/// Initial position of the axis, between two reference marks.
 const START: i32 = 270_700;
 const LIMITS: [i32; 2] = [220_000, 360_000];
 
@@ -52,10 +51,10 @@ fn settings() -> DriveSettings {
         master: id(127),
         drive: DrivesConfig::default().leg,
         heartbeat_ns: 50_000_000,
-        link_timeout_ns: 150_000_000,
+        heartbeat_timeout_ns: 150_000_000,
         period_ns: 1_000_000,
         step_s: STEP_NS as f64 * 1e-9,
-        position_limit_increments: LIMITS,
+        position_limits: LIMITS,
     }
 }
 
@@ -127,7 +126,7 @@ impl Bench {
         self.receive(Nmt { command, target: NmtTarget::All }.frame());
     }
 
-    /// SYNC; what the drive answered.
+    /// Sends SYNC; returns the drive's answer.
     fn sync(&mut self) -> Vec<Frame> {
         let before = self.sent.len();
         self.receive(sync::frame());

@@ -36,7 +36,7 @@ fn a_target_written_long_before_moves_nothing_when_the_drive_is_enabled() {
 }
 
 #[test]
-fn targets_beyond_the_software_limits_end_there_and_are_told() {
+fn targets_beyond_the_software_limits_end_there_and_are_reported() {
     let mut bench = Bench::operational();
     bench.write((0x607D, 2), &(START + 1000).to_le_bytes()).unwrap();
     for word in [0x06, 0x07, 0x0F] {

@@ -69,9 +69,9 @@ fn what_may_not_be_written_is_aborted_with_the_reason() {
     ];
     for (what, object, data, code) in table {
         let mut bench = Bench::new();
-        let before = bench.drive.objects.clone();
+        let before = bench.drive.objects().clone();
         assert_eq!(bench.write(object, data), Err(code), "{what}");
-        assert!(bench.drive.objects == before, "{what}: nothing may have changed");
+        assert!(*bench.drive.objects() == before, "{what}: nothing may have changed");
     }
 }
 

@@ -1,8 +1,8 @@
-//! What happens from power-on to enabled drives, and what keeps them from it.
+//! From power-on to enabled drives, and the reasons that prevent it.
 
 use masseter_can::canopen::{AbortCode, NmtState, SdoRequest};
 
-use super::peer::STANDS_AT;
+use super::peer::POSITION;
 use super::*;
 
 const PHASES: [BootPhase; 6] = [
@@ -29,7 +29,7 @@ fn every_drive_is_identified_checked_configured_and_started_in_that_order() {
 }
 
 #[test]
-fn what_is_written_is_what_the_scenario_says() {
+fn a_drive_is_configured_as_the_scenario_declares() {
     let mut bench = Bench::enabled();
     let drive = bench.drive(4);
     let table = [
@@ -43,7 +43,7 @@ fn what_is_written_is_what_the_scenario_says() {
         ((0x60C2, 1), 1),
         ((0x60C2, 2), 0xFD),
         ((0x6060, 0), 8),
-        ((0x607A, 0), STANDS_AT as u32),
+        ((0x607A, 0), POSITION as u32),
     ];
     for ((index, subindex), value) in table {
         assert_eq!(drive.written(index, subindex), value, "{index:04X}:{subindex}");
@@ -54,14 +54,14 @@ fn what_is_written_is_what_the_scenario_says() {
 #[test]
 fn one_request_a_bus_and_cycle_and_none_beside_process_data() {
     let mut bench = Bench::enabled();
-    let before = bench.wires.peer(0).asked.len();
+    let before = bench.wires.peer(0).requests.len();
     bench.cycles(100, DriveRequest::Enable);
-    assert_eq!(bench.wires.peer(0).asked.len(), before);
+    assert_eq!(bench.wires.peer(0).requests.len(), before);
     for axes in [[0, 1, 2], [3, 4, 5]] {
         let mut times: Vec<_> = axes
             .into_iter()
             .flat_map(|axis| {
-                bench.wires.peer(axis).asked.iter().map(|(time_ns, _)| *time_ns).collect::<Vec<_>>()
+                bench.wires.peer(axis).requests.iter().map(|(time_ns, _)| *time_ns).collect::<Vec<_>>()
             })
             .collect();
         times.sort_unstable();
@@ -72,7 +72,8 @@ fn one_request_a_bus_and_cycle_and_none_beside_process_data() {
 #[test]
 fn a_drive_that_is_not_as_expected_is_named_and_nobody_is_enabled() {
     type Change = fn(&mut Peer);
-    let table: [(Change, Cause, u32); 11] = [
+    let table: [(Change, Cause, u32); 12] = [
+        (|drive| drop(drive.objects.insert((0x6064, 0), vec![0; 5])), Cause::SdoAborted, 0x60_6400),
         (|drive| drop(drive.objects.insert((0x1000, 0), vec![0; 4])), Cause::WrongIdentity, 0x10_0000),
         (|drive| drop(drive.objects.insert((0x1018, 2), vec![9, 9, 0, 0])), Cause::WrongIdentity, 0x10_1802),
         (
@@ -114,7 +115,7 @@ fn a_drive_that_is_not_as_expected_is_named_and_nobody_is_enabled() {
 fn answers_that_come_twice_now_and_then_are_no_second_drive() {
     let mut bench = Bench::new();
     for _ in 0..400 {
-        let is_repeated = bench.drive(3).asked.len() % 8 == 7;
+        let is_repeated = bench.drive(3).requests.len() % 8 == 7;
         bench.drive(3).servers = if is_repeated { 2 } else { 1 };
         bench.cycle(Some(DriveRequest::Enable));
     }
@@ -132,7 +133,7 @@ fn pdos_that_the_rig_does_not_exchange_are_switched_off_where_a_drive_has_them()
     assert!(bench.all_are(DriveState::OperationEnabled), "{:?}", bench.events);
     assert_eq!(bench.drive(1).written(0x1801, 1), 0xC000_0282);
     let wrote_1802 = |(_, request): &(u64, SdoRequest)| matches!(request, SdoRequest::Download { object, .. } if object.index == 0x1802);
-    assert!(!bench.drive(1).asked.iter().any(wrote_1802));
+    assert!(!bench.drive(1).requests.iter().any(wrote_1802));
 }
 
 #[test]
@@ -141,7 +142,7 @@ fn nothing_is_written_to_a_device_that_is_another() {
     bench.drive(0).objects.insert((0x1018, 1), vec![1, 2, 3, 4]);
     bench.cycles(300, DriveRequest::Enable);
     let wrote = |(_, request): &(u64, SdoRequest)| !matches!(request, SdoRequest::InitiateUpload { .. });
-    assert!(!bench.drive(0).asked.iter().any(wrote));
+    assert!(!bench.drive(0).requests.iter().any(wrote));
 }
 
 #[test]
@@ -198,7 +199,7 @@ fn a_drive_that_is_refused_for_its_quick_stop_is_stopped_all_the_same() {
 #[test]
 fn the_position_is_held_before_the_mode_is_chosen_and_again_at_the_end() {
     let mut bench = Bench::enabled();
-    let written = bench.drive(0).asked.iter().filter_map(|(_, request)| match request {
+    let written = bench.drive(0).requests.iter().filter_map(|(_, request)| match request {
         SdoRequest::Download { object, .. } => Some(object.index),
         _ => None,
     });
@@ -221,7 +222,7 @@ fn a_missing_drive_is_named_and_the_others_wait_for_it() {
 }
 
 #[test]
-fn a_drive_that_stops_answering_is_asked_again_and_then_named() {
+fn a_drive_that_stops_answering_gets_new_requests_and_is_then_named() {
     let mut bench = Bench::new();
     bench.cycles(10, DriveRequest::Enable);
     bench.drive(3).is_dead = true;

@@ -1,4 +1,4 @@
-//! Scenarios of the master with drives that do what a test wants of them.
+//! Scenarios of the master with scripted drives.
 
 mod boot;
 mod peer;
@@ -13,7 +13,6 @@ use masseter_shared::messages::{Command, Event, Reading};
 use masseter_shared::realtime::Wake;
 
 use super::Master;
-use crate::build::build_master;
 use peer::{Peer, Wires};
 
 const PERIOD_NS: u64 = 1_000_000;
@@ -35,7 +34,7 @@ impl Bench {
         let scenario = Scenario::default();
         let ids = scenario.can.node_ids.map(|id| NodeId::new(id).unwrap());
         Self {
-            master: build_master(&scenario, EPOCH_NS).unwrap(),
+            master: Master::new(&scenario, EPOCH_NS).unwrap(),
             wires: Wires::new(ids.map(|id| Peer::new(id, &scenario.can.identity))),
             reading: Reading::default(),
             events: Vec::new(),

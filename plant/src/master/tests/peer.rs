@@ -1,11 +1,11 @@
-//! A scripted drive, and wires on which frames arrive at once. It knows as much of CANopen as the master
-//! asks of it, from a table of objects that a test may change.
+//! A scripted drive, and wires on which frames arrive at once. The drive has the part of CANopen that the master uses,
+//! with a table of objects that a test may change.
 
 use std::collections::{BTreeMap, VecDeque};
 
 use masseter_can::canopen::{
     AbortCode, Cob, Expedited, Heartbeat, Nmt, NmtCommand, NmtState, NodeId, ObjectAddress, SdoRequest,
-    SdoResponse,
+    SdoResponse, Segment,
 };
 use masseter_can::cia402::{Controlword, DriveState, Statusword};
 use masseter_can::{Bus, BusStatus, ErrorState, Frame, ReceiveError, Received, Rpdo1, SendError, Tpdo1};
@@ -16,8 +16,8 @@ use super::PERIOD_NS;
 use crate::link::Buses;
 
 const HEARTBEAT_NS: u64 = 50 * PERIOD_NS;
-/// Where every drive stands, increments.
-pub(super) const STANDS_AT: i32 = 1234;
+/// Position of every drive, increments.
+pub(super) const POSITION: i32 = 1234;
 
 /// A drive.
 pub(super) struct Peer {
@@ -33,12 +33,14 @@ pub(super) struct Peer {
     pub(super) is_dead: bool,
     /// Servers that answer to its id.
     pub(super) servers: usize,
-    /// Where another drive of its id stands and tells so, increments.
-    pub(super) twin_stands_at: Option<i32>,
+    /// Position that another drive of its id reports, increments.
+    pub(super) twin_position: Option<i32>,
     /// An object that it refuses to have written.
     pub(super) refuses: Option<((u16, u8), AbortCode)>,
-    /// SDO requests that it got, each with the time.
-    pub(super) asked: Vec<(u64, SdoRequest)>,
+    /// SDO requests received, each with its time.
+    pub(super) requests: Vec<(u64, SdoRequest)>,
+    /// A value longer than expedited, to be read in one segment.
+    segment: Vec<u8>,
     controlword: Controlword,
     buffered: Option<Rpdo1>,
     pub(super) next_beat_ns: u64,
@@ -66,7 +68,7 @@ impl Peer {
             long((0x1A00, 3), 0x6077_0010),
             ((0x603F, 0), vec![0x20, 0x73]),
             ((0x6061, 0), vec![1]),
-            ((0x6064, 0), STANDS_AT.to_le_bytes().to_vec()),
+            ((0x6064, 0), POSITION.to_le_bytes().to_vec()),
         ]);
         Self {
             id,
@@ -77,9 +79,10 @@ impl Peer {
             is_reacting: false,
             is_dead: false,
             servers: 1,
-            twin_stands_at: None,
+            twin_position: None,
             refuses: None,
-            asked: Vec::new(),
+            requests: Vec::new(),
+            segment: Vec::new(),
             controlword: Controlword::DISABLE_VOLTAGE,
             buffered: None,
             next_beat_ns: 0,
@@ -131,7 +134,7 @@ impl Peer {
             Cob::Rpdo1(id) if id == self.id => self.buffered = Some(Rpdo1::decode(frame.data()).unwrap()),
             Cob::SdoRequest(id) if id == self.id => {
                 let request = SdoRequest::decode(frame.data()).unwrap();
-                self.asked.push((now_ns, request));
+                self.requests.push((now_ns, request));
                 let answer = self.serve(request);
                 out.extend(std::iter::repeat_n(answer.frame(self.id), self.servers));
             }
@@ -145,19 +148,19 @@ impl Peer {
                 NmtCommand::Start => self.nmt = Some(NmtState::Operational),
                 // What the drive does with its motor is another matter.
                 NmtCommand::ResetCommunication => (self.nmt, self.buffered) = (None, None),
-                other => panic!("{other:?} is not asked for"),
+                other => panic!("{other:?} is no expected command"),
             }
         }
     }
 
     fn synchronise(&mut self, out: &mut Vec<Frame>) {
         if let Some(rpdo) = self.buffered.take() {
-            assert_eq!(rpdo.target_increments, STANDS_AT, "nobody asks it to move");
+            assert_eq!(rpdo.target_increments, POSITION, "no request moves it");
             self.control(rpdo.controlword);
         }
         self.complete();
         let statusword = Statusword::of(self.power);
-        for actual_increments in self.twin_stands_at.into_iter().chain([STANDS_AT]) {
+        for actual_increments in self.twin_position.into_iter().chain([POSITION]) {
             let tpdo = Tpdo1 { statusword, actual_increments, torque_permille: 0 };
             out.push(tpdo.frame(self.id));
         }
@@ -183,8 +186,12 @@ impl Peer {
     fn serve(&mut self, request: SdoRequest) -> SdoResponse {
         match request {
             SdoRequest::InitiateUpload { object } => self.read(object),
+            SdoRequest::UploadSegment { toggle } => {
+                let data = Segment::new(&self.segment).unwrap();
+                SdoResponse::UploadSegment { toggle, data, is_last: true }
+            }
             SdoRequest::Download { object, data } => self.write(object, data.data()),
-            other => panic!("{other:?}: every value here is short"),
+            other => panic!("{other:?}: the master writes short values only"),
         }
     }
 
@@ -195,7 +202,13 @@ impl Peer {
             address => self.objects.get(&address),
         };
         match value {
-            Some(value) => SdoResponse::Upload { object, data: Expedited::new(value).unwrap() },
+            Some(value) => {
+                self.segment = value.clone();
+                Expedited::new(value)
+                    .map_or(SdoResponse::InitiateUpload { object, size: Some(value.len() as u32) }, |data| {
+                        SdoResponse::Upload { object, data }
+                    })
+            }
             None => SdoResponse::Abort { object, code: AbortCode::NO_OBJECT },
         }
     }
@@ -224,7 +237,7 @@ pub(super) struct Wire {
     arrived: VecDeque<Received>,
     /// Whether the master's controller is off the bus.
     pub(super) is_off: bool,
-    /// Frames lost for want of room, which is told once.
+    /// Frames lost for want of room, reported once.
     pub(super) lost: u64,
 }
 

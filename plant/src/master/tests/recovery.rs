@@ -3,7 +3,7 @@
 use masseter_can::Frame;
 use masseter_can::canopen::{Cob, Emergency, EmergencyCode, Heartbeat, NmtState, sync};
 
-use super::peer::STANDS_AT;
+use super::peer::POSITION;
 use super::*;
 
 /// Keeps asking for motion, which must not happen, then switches off, after which it may again.
@@ -46,7 +46,7 @@ fn a_drive_that_falls_silent_is_booted_again_when_it_comes_back() {
 }
 
 #[test]
-fn a_drive_that_tells_it_left_operational_stops_them_all_and_is_booted_again() {
+fn a_drive_that_reports_to_have_left_operational_stops_all_and_is_booted_again() {
     let mut bench = Bench::enabled();
     let drive = bench.drive(2);
     (drive.nmt, drive.next_beat_ns) = (Some(NmtState::PreOperational), 0);
@@ -63,7 +63,7 @@ fn a_drive_that_boots_again_during_a_stop_is_configured_from_the_first_object_on
         // The one that is missing keeps the other from being started.
         bench.drive(0).is_dead = phase == BootPhase::Configured;
         bench.drive(5).cycle_power();
-        while bench.master.nodes[5].boot.phase() != phase {
+        while bench.master.drives[5].boot_phase() != phase {
             bench.cycle(Some(DriveRequest::Off));
         }
         bench.cycles(10, DriveRequest::Off);
@@ -72,18 +72,18 @@ fn a_drive_that_boots_again_during_a_stop_is_configured_from_the_first_object_on
         bench.drive(5).cycle_power();
         bench.drive(5).objects.remove(&(0x1016, 1));
         bench.cycles(5, DriveRequest::Off);
-        assert_eq!(bench.master.nodes[5].boot.phase(), BootPhase::Waiting);
+        assert_eq!(bench.master.drives[5].boot_phase(), BootPhase::Waiting);
         (bench.drive(0).is_dead, bench.drive(2).is_reacting) = (false, false);
         bench.cycles(1500, DriveRequest::Off);
         assert_eq!(bench.drive(5).written(0x1016, 1), 0x007F_0096);
-        assert_eq!(bench.master.nodes[5].boot.phase(), BootPhase::Ready);
+        assert_eq!(bench.master.drives[5].boot_phase(), BootPhase::Ready);
     }
 }
 
 #[test]
 fn a_drive_that_became_operational_is_not_given_up_for_another_that_is_lost() {
     let mut bench = Bench::new();
-    while bench.master.nodes[3].boot.phase() != BootPhase::Starting {
+    while bench.master.drives[3].boot_phase() != BootPhase::Starting {
         bench.cycle(Some(DriveRequest::Off));
     }
     bench.drive(3).nmt = Some(NmtState::PreOperational);
@@ -98,17 +98,17 @@ fn a_drive_that_became_operational_is_not_given_up_for_another_that_is_lost() {
 }
 
 #[test]
-fn two_drives_of_one_id_are_told_from_a_frame_sent_twice() {
+fn two_drives_of_one_id_differ_from_a_frame_sent_twice() {
     let mut bench = Bench::enabled();
-    bench.drive(3).twin_stands_at = Some(STANDS_AT);
+    bench.drive(3).twin_position = Some(POSITION);
     bench.cycles(100, DriveRequest::Enable);
     assert_eq!(bench.causes(EventKind::Fault), []);
-    bench.drive(3).twin_stands_at = Some(STANDS_AT + 1);
+    bench.drive(3).twin_position = Some(POSITION + 1);
     bench.cycles(10, DriveRequest::Enable);
     let fault = *bench.events_of(EventKind::Fault).next().unwrap();
     assert_eq!((fault.cause, fault.axis, fault.node), (Cause::DuplicateNode.code(), 3, 4));
     assert!(bench.nobody_is_enabled());
-    bench.drive(3).twin_stands_at = None;
+    bench.drive(3).twin_position = None;
     restore(&mut bench, Cause::DuplicateNode);
 }
 
@@ -130,7 +130,7 @@ fn a_bus_that_went_off_stops_the_rig_and_works_again_when_it_returns() {
     bench.cycles(300, DriveRequest::Enable);
     assert_eq!(bench.causes(EventKind::Fault), [Cause::BusOff]);
     assert_eq!(bench.events_of(EventKind::Fault).next().unwrap().bus, 1);
-    // Drives of their own accord stop when the master falls silent; these are told.
+    // Real drives stop by themselves when the master falls silent; these scripted ones get a command.
     (3..AXES).for_each(|axis| bench.drive(axis).power = DriveState::SwitchOnDisabled);
     bench.wires.wire(1).is_off = false;
     restore(&mut bench, Cause::BusOff);
@@ -150,7 +150,7 @@ fn emergencies_come_with_code_and_register_and_go() {
     assert_eq!((told[1].kind, told[1].value, told[1].axis), (EventKind::Notice.code(), 0.0, 3));
 }
 
-/// A drive that missed the heartbeat of a rig before this one may tell so only now.
+/// A drive that missed the heartbeat of an earlier rig may report the loss only now.
 #[test]
 fn an_emergency_before_the_boot_up_is_no_fault_of_this_rig() {
     let mut bench = Bench::new();
@@ -165,7 +165,7 @@ fn an_emergency_before_the_boot_up_is_no_fault_of_this_rig() {
 }
 
 #[test]
-fn frames_of_wrong_length_are_told_once_and_so_are_unknown_nodes() {
+fn frames_of_wrong_length_are_reported_once_and_so_are_unknown_nodes() {
     let mut bench = Bench::enabled();
     let id = bench.drive(0).id;
     let stranger = NodeId::new(9).unwrap();
@@ -185,7 +185,7 @@ fn frames_of_wrong_length_are_told_once_and_so_are_unknown_nodes() {
 #[test]
 fn a_second_master_stops_the_drives() {
     let mut bench = Bench::enabled();
-    let (now_ns, id) = (bench.now_ns(), bench.master.settings.id);
+    let (now_ns, id) = (bench.now_ns(), bench.master.id);
     bench.wires.wire(1).arrive(now_ns, Heartbeat { state: NmtState::Operational }.frame(id));
     bench.cycles(3, DriveRequest::Enable);
     assert_eq!(bench.causes(EventKind::Fault), [Cause::SecondMaster]);
@@ -199,16 +199,16 @@ fn a_stop_that_could_be_restored_is_for_good_once_there_is_a_second_master() {
     let mut bench = Bench::enabled();
     bench.drive(4).cycle_power();
     bench.cycles(5, DriveRequest::Enable);
-    let (now_ns, id) = (bench.now_ns(), bench.master.settings.id);
+    let (now_ns, id) = (bench.now_ns(), bench.master.id);
     bench.wires.wire(0).arrive(now_ns, Heartbeat { state: NmtState::Operational }.frame(id));
     bench.cycles(600, DriveRequest::Off);
     assert_eq!(bench.causes(EventKind::Fault), [Cause::NodeRestarted, Cause::SecondMaster]);
     assert_eq!(bench.causes(EventKind::Notice), []);
 }
 
-/// The other one guides them, and is stopped by this one's SYNC already.
+/// The other master controls the drives, and this one's SYNC has stopped it already.
 #[test]
-fn drives_that_another_master_guides_are_neither_reset_nor_configured() {
+fn drives_of_another_master_are_neither_reset_nor_configured() {
     let mut bench = Bench::new();
     (0..AXES).for_each(|axis| bench.drive(axis).nmt = Some(NmtState::Operational));
     for bus in 0..2 {
@@ -218,7 +218,10 @@ fn drives_that_another_master_guides_are_neither_reset_nor_configured() {
     bench.cycles(3000, DriveRequest::Off);
     assert_eq!(bench.causes(EventKind::Fault)[0], Cause::SecondMaster);
     for axis in 0..AXES {
-        assert_eq!((bench.drive(axis).nmt, bench.drive(axis).asked.len()), (Some(NmtState::Operational), 0));
+        assert_eq!(
+            (bench.drive(axis).nmt, bench.drive(axis).requests.len()),
+            (Some(NmtState::Operational), 0)
+        );
     }
 }
 

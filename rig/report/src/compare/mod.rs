@@ -1,9 +1,9 @@
-//! Two runs side by side: how each ended, in what they were different runs, and the change of every figure.
+//! Two runs side by side: their verdicts, their different circumstances, and the change of every figure.
 //!
-//! What a change is worth is only estimated: runs of the same scenario differ by more than their own seconds do.
+//! The weight of a change is only an estimate: runs of the same scenario differ by more than their own seconds do.
 
 mod changes;
-mod side;
+mod compared_run;
 
 use std::fmt::Write;
 use std::path::Path;
@@ -11,17 +11,17 @@ use std::path::Path;
 use anyhow::Context;
 use serde::Serialize;
 
-use super::table::or_dash;
+use crate::text::or_dash;
 use changes::{Change, Judgement, changes};
+use compared_run::{ComparedRun, Difference, differences};
 use masseter_terminal::Exit;
 use masseter_terminal::Format;
 use masseter_terminal::result;
-use side::{Difference, Side, differences};
 
 /// Version of the comparison's form.
 const FORM: u32 = 1;
 
-/// What stands above the changes.
+/// The text above the changes.
 const LEGEND: &str = "\
 beyond spread: by more than three standard errors, as far as the seconds of each run tell.
 Runs differ by more than their seconds do: repeat both in turn to tell.
@@ -31,15 +31,15 @@ Runs differ by more than their seconds do: repeat both in turn to tell.
 #[derive(Debug, Serialize)]
 struct Comparison {
     form: u32,
-    a: Side,
-    b: Side,
+    a: ComparedRun,
+    b: ComparedRun,
     differs: Vec<Difference>,
     changes: Vec<Change>,
 }
 
 /// `masseter report A B`.
 pub fn runs(a: &Path, b: &Path, format: Format) -> anyhow::Result<Exit> {
-    let (a, b) = (Side::read(a)?, Side::read(b)?);
+    let (a, b) = (ComparedRun::read(a)?, ComparedRun::read(b)?);
     let differs = differences(&a.circumstances, &b.circumstances);
     let changes = changes(&a.figures, &b.figures);
     let comparison = Comparison { form: FORM, a, b, differs, changes };
@@ -96,7 +96,7 @@ mod tests {
 
     use super::*;
 
-    fn side(path: &str, p50_ns: f64, seed: u64) -> Side {
+    fn side(path: &str, p50_ns: f64, seed: u64) -> ComparedRun {
         let figures = json!({
             "cycles": 5,
             "intervals": [{"name": "control", "p50_ns": p50_ns, "p50_noise_ns": 1.0, "max_ns": p50_ns}],
@@ -104,7 +104,7 @@ mod tests {
         let summary = json!({
             "form": 1, "verdict": {"word": "PASS", "reason": "every check passed"}, "figures": figures,
         });
-        Side::of(path, &summary, &json!({"clock": "rt", "scenario": {"seed": seed}})).unwrap()
+        ComparedRun::new(path, &summary, &json!({"clock": "rt", "scenario": {"seed": seed}})).unwrap()
     }
 
     fn comparison() -> Comparison {

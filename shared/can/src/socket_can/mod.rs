@@ -98,12 +98,16 @@ impl SocketCan {
         clock::now_ns()
     }
 
-    /// Waits until one of the ports has something to fetch, or until `deadline_ns`; or less, when a signal
-    /// arrives.
-    pub fn wait<const N: usize>(ports: &[Self; N], deadline_ns: u64) {
+    /// Blocks until one of the first `N` ports has something to fetch, or until `deadline_ns`; a signal ends the wait
+    /// early.
+    pub fn wait<const N: usize>(ports: &[Self], deadline_ns: u64) {
+        let Some(last) = ports.last() else { return };
         let left = Duration::from_nanos(deadline_ns.saturating_sub(clock::now_ns()));
         let left = Timespec { tv_sec: left.as_secs() as i64, tv_nsec: left.subsec_nanos() as _ };
-        let mut watched = ports.each_ref().map(|port| PollFd::new(&port.socket, PollFlags::IN));
+        // Fewer ports than `N` are filled up with the last one, so that nothing is allocated.
+        let port = |index| ports.get(index).unwrap_or(last);
+        let mut watched: [_; N] =
+            std::array::from_fn(|index| PollFd::new(&port(index).socket, PollFlags::IN));
         // A wait that fails is one that ends at once: the caller looks at the ports either way.
         let _ = poll(&mut watched, Some(&left));
     }

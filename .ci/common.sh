@@ -1,0 +1,43 @@
+# What the steps share. Each step reads this first: it stops at errors, goes to the project's folder, and names the
+# folder for the tools that only CI uses. Sourced, never run.
+# shellcheck shell=bash
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+
+target=${CARGO_TARGET_DIR:-target}
+mkdir -p "$target/ci"
+tools=$(realpath "$target/ci")
+export PATH="$tools/bin:$PATH"
+
+as_root() { if [ "$(id -u)" -eq 0 ]; then "$@"; else sudo "$@"; fi; }
+
+install_packages() {
+    as_root apt-get update -qq
+    as_root env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "$@" >/dev/null
+}
+
+# Whether one of these commands exists.
+has_any() { local name; for name in "$@"; do command -v "$name" >/dev/null && return; done; return 1; }
+
+# A cargo tool in exactly this version. It goes into the project's target folder, so that a developer keeps his own.
+install_cargo_tool() { # name, version
+    has_any "$1" && [[ "$("$1" --version)" == *" $2"* ]] && return
+    cargo install --locked --quiet --root "$tools" "$1" --version "=$2"
+}
+
+# Sets $python to an interpreter that has the packages of .ci/requirements.txt.
+use_python() {
+    python3 -c 'import ensurepip, venv' 2>/dev/null || install_packages python3 python3-venv
+    python=$tools/python/bin/python
+    [ -x "$python" ] || python3 -m venv "$tools/python"
+    "$python" -m pip install --quiet --disable-pip-version-check --requirement .ci/requirements.txt
+}
+
+# Builds the release and sets $masseter to it.
+use_release() {
+    cargo build --release --locked
+    masseter=$target/release/masseter
+}
+
+# Repeats a line at the end of .ci/run.
+note() { printf '%s\n' "$*" >>"${CI_NOTES:-/dev/null}"; }

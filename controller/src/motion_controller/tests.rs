@@ -1,0 +1,252 @@
+//! Scenarios of the controller alone: a plant that does what it is told, and one thing that goes wrong.
+
+use masseter_shared::config::{ControllerConfig, JawConfig};
+use masseter_shared::geometry::{LEGS, MechanismConfig};
+use masseter_shared::messages::codes::{DriveRequest, EventKind, drive_request};
+use masseter_shared::messages::{Command, State};
+
+use super::*;
+
+mod faults;
+mod stalls;
+
+const PERIOD_NS: u64 = 1_000_000;
+
+fn short() -> Scenario {
+    Scenario { duration_s: Some(1.5), ..Scenario::default() }
+}
+
+fn mechanism() -> Mechanism {
+    Mechanism::new(&MechanismConfig::default()).unwrap()
+}
+
+fn trajectory(scenario: &Scenario) -> Trajectory {
+    Trajectory::new(&scenario.motion, &scenario.jaw, &mechanism(), scenario.duration_s).unwrap()
+}
+
+/// A plant that stands two cycles later where it was told to, and does what was requested at once.
+struct Bench {
+    controller: MotionController,
+    cycle: u64,
+    commands: [Command; 2],
+    events: Vec<Event>,
+    /// The largest step of any axis from one target that the drives took to the next, m.
+    largest_step_m: f64,
+}
+
+impl Bench {
+    fn new() -> Self {
+        Self::standing_at([0.29; LEGS])
+    }
+
+    fn standing_at(leg_m: [f64; LEGS]) -> Self {
+        Self::of(&short(), leg_m)
+    }
+
+    fn of(scenario: &Scenario, leg_m: [f64; LEGS]) -> Self {
+        let at_start = Actuators { slide_m: [0.0; LEGS], leg_m };
+        let start = Command { target_m: at_start.to_axes(), ..Command::default() };
+        Self {
+            controller: MotionController::new(scenario, mechanism(), trajectory(scenario)),
+            cycle: 0,
+            commands: [start; 2],
+            events: Vec::new(),
+            largest_step_m: 0.0,
+        }
+    }
+
+    fn reading(&self) -> Reading {
+        let [told, last] = self.commands;
+        let state = match drive_request(last.request).unwrap() {
+            DriveRequest::Enable => DriveState::OperationEnabled,
+            DriveRequest::Off | DriveRequest::QuickStop => DriveState::SwitchOnDisabled,
+        };
+        Reading {
+            cycle: self.cycle + 1,
+            answers_cycle: last.cycle,
+            position_m: told.target_m,
+            drive_state: [state.code(); AXES],
+            fresh_axes: ALL_AXES,
+            ..Reading::default()
+        }
+    }
+
+    /// A cycle with the reading that `disturb` makes of the good one.
+    fn cycle(&mut self, disturb: impl FnOnce(Reading) -> Option<Reading>) {
+        let reading = disturb(self.reading());
+        let command = self.controller_cycle(reading.as_ref());
+        self.take(command);
+    }
+
+    fn controller_cycle(&mut self, reading: Option<&Reading>) -> Command {
+        self.cycle += 1;
+        self.controller.observe(reading);
+        let tick = Tick { cycle: self.cycle, now_ns: self.cycle * PERIOD_NS };
+        self.events.extend(self.controller.decide(tick));
+        let mut command = Command::default();
+        self.controller.fill_command(&mut command);
+        command
+    }
+
+    fn take(&mut self, mut command: Command) {
+        let last = self.commands[1];
+        if command.request == DriveRequest::Off.code() {
+            command.target_m = last.target_m;
+        }
+        let steps_m = command.target_m.iter().zip(last.target_m).map(|(to_m, from_m)| (to_m - from_m).abs());
+        self.largest_step_m = steps_m.fold(self.largest_step_m, f64::max);
+        self.commands = [last, command];
+    }
+
+    /// Cycles that the controller misses: the drives reach their last target and hold it.
+    fn controller_stalls(&mut self, cycles: u64) {
+        self.cycle += cycles;
+        self.commands[0] = self.commands[1];
+    }
+
+    /// Cycles without SYNC: the controller gets no reading, and nobody takes its commands.
+    fn plant_stalls(&mut self, cycles: u64) {
+        for _ in 0..cycles {
+            self.controller_cycle(None);
+        }
+    }
+
+    /// Plays the motion with something trigger in its midst.
+    fn played(trigger: impl FnOnce(&mut Self)) -> Self {
+        let mut bench = Self::new();
+        bench.run_until(ControllerState::Running);
+        (0..730).for_each(|_| bench.cycle(Some));
+        trigger(&mut bench);
+        bench.run_until(ControllerState::Finished);
+        bench
+    }
+
+    fn run_until(&mut self, state: ControllerState) {
+        for _ in 0..20_000 {
+            if self.controller.state() == state {
+                return;
+            }
+            self.cycle(Some);
+        }
+        panic!("{state} was not reached, but {}", self.controller.state());
+    }
+
+    fn states(&self) -> Vec<ControllerState> {
+        self.events.iter().map(|event| ControllerState::try_from(event.to).unwrap()).collect()
+    }
+
+    fn last_cause(&self) -> Cause {
+        Cause::try_from(self.events.last().unwrap().cause).unwrap()
+    }
+}
+
+#[test]
+fn a_run_goes_through_its_states_in_order_and_ends_with_the_drives_off() {
+    let mut bench = Bench::new();
+    bench.run_until(ControllerState::Finished);
+    assert_eq!(
+        bench.states(),
+        [
+            ControllerState::Enabling,
+            ControllerState::Easing,
+            ControllerState::Running,
+            ControllerState::Holding,
+            ControllerState::Disabling,
+            ControllerState::Finished,
+        ]
+    );
+    assert!(bench.events.iter().all(|event| event.kind == EventKind::Transition.code()));
+    assert!(
+        !bench.controller.outcome().is_some(),
+        "the last command must be repeated before the process ends"
+    );
+    for _ in 0..REPEATED_CYCLES {
+        bench.cycle(Some);
+    }
+    assert!(bench.controller.outcome().is_some());
+}
+
+#[test]
+fn what_is_wanted_at_a_sample_is_found_there() {
+    let mut bench = Bench::new();
+    bench.run_until(ControllerState::Running);
+    let mut state = State::default();
+    let mut worst_m: f64 = 0.0;
+    for _ in 0..1000 {
+        bench.cycle(Some);
+        bench.controller.fill_state(&mut state);
+        let wanted = nalgebra::Vector3::from(state.desired_position_m);
+        worst_m = worst_m.max((wanted - nalgebra::Vector3::from(state.estimated_position_m)).norm());
+    }
+    // The plant is exact, so what is left is the trim's own doing.
+    assert!(worst_m < 2e-5, "{worst_m}");
+}
+
+/// As after its drives were off: the encoders may count the end of the stroke as outside, or it was pushed there.
+#[test]
+fn a_rig_that_stands_a_little_outside_its_strokes_is_eased_back_into_them() {
+    let lowest_m = MechanismConfig::default().strokes.leg_m[0];
+    let start_m = [lowest_m - 1e-6, lowest_m, lowest_m - 0.5e-3];
+    let mut bench = Bench::standing_at(start_m);
+    bench.run_until(ControllerState::Easing);
+    while bench.controller.state() == ControllerState::Easing {
+        bench.cycle(Some);
+        let target_m = &bench.commands[1].target_m[LEGS..];
+        assert!(target_m.iter().zip(start_m).all(|(to_m, from_m)| *to_m >= from_m.min(lowest_m)));
+    }
+    assert_eq!(bench.controller.state(), ControllerState::Running);
+    assert!(bench.largest_step_m < 1.2e-4, "{}", bench.largest_step_m);
+}
+
+/// The whole shift and the whole turn together, at the end of the legs' strokes.
+#[test]
+fn what_the_trim_carries_beyond_a_stroke_is_held_at_its_end() {
+    let [_, highest_m] = MechanismConfig::default().strokes.leg_m;
+    let jaw = JawConfig { closed_leg_m: highest_m, ..JawConfig::default() };
+    let mut bench = Bench::of(&Scenario { jaw, ..short() }, [0.29; LEGS]);
+    bench.run_until(ControllerState::Running);
+    while bench.controller.state() != ControllerState::Finished {
+        bench.cycle(|mut reading| {
+            let lacking_m = [2.5e-3, 0.5e-3, 0.5e-3];
+            reading.position_m[LEGS..].iter_mut().zip(lacking_m).for_each(|(leg_m, by_m)| *leg_m -= by_m);
+            Some(reading)
+        });
+        assert_ne!(bench.controller.state(), ControllerState::SafeStop, "{:?}", bench.events.last());
+        assert!(bench.commands[1].target_m[LEGS..].iter().all(|&leg_m| leg_m <= highest_m));
+    }
+}
+
+#[test]
+fn an_interrupted_motion_slows_down_on_its_path_and_ends_in_order() {
+    let mut bench = Bench::new();
+    bench.run_until(ControllerState::Running);
+    for _ in 0..700 {
+        bench.cycle(Some);
+    }
+    bench.controller.request_stop();
+    bench.run_until(ControllerState::Finished);
+    assert_eq!(bench.last_cause(), Cause::Sequence);
+    let entered =
+        |state: ControllerState| bench.events.iter().find(|event| event.to == state.code()).unwrap();
+    let (holding, disabling) = (entered(ControllerState::Holding), entered(ControllerState::Disabling));
+    assert_eq!(holding.cause, Cause::StopRequested.code());
+    let ControllerConfig { stop_ramp_s, hold_s, .. } = ControllerConfig::default();
+    let took_s = (disabling.time_ns - holding.time_ns) as f64 * 1e-9;
+    assert!(took_s >= stop_ramp_s + hold_s, "the last pose is held once it stands still: {took_s} s");
+}
+
+/// One missing among every ten is never ten in a row.
+#[test]
+fn the_drives_are_switched_on_only_after_complete_readings_in_a_row() {
+    type Disturbance = fn(Reading) -> Option<Reading>;
+    let gaps: [Disturbance; 2] = [|_| None, |reading| Some(Reading { fresh_axes: ALL_AXES - 1, ..reading })];
+    for gap in gaps {
+        let mut bench = Bench::new();
+        for cycle in 1..=100 {
+            bench.cycle(if cycle % 10 == 0 { gap } else { Some });
+        }
+        assert_eq!(bench.controller.state(), ControllerState::WaitReadings);
+        (0..10).for_each(|_| bench.cycle(Some));
+        assert_eq!(bench.controller.state(), ControllerState::Enabling);
+    }
+}

@@ -1,0 +1,77 @@
+//! The order of the plant's cycle, for every clock.
+
+use std::borrow::Borrow;
+
+use masseter_shared::messages::{Command, Reading, Truth};
+use masseter_shared::realtime::Wake;
+use masseter_shared::schedule::CycleSchedule;
+
+use crate::core::{PlantCore, PlantError};
+use crate::link::Link;
+
+/// Where the plant's messages come from and go to, and how the plant waits.
+pub trait PlantPorts<L: Link> {
+    /// A command, owned or in shared memory.
+    type Command: Borrow<Command>;
+    /// Why a cycle could not be completed.
+    type Error: From<PlantError>;
+
+    /// Now, ns.
+    fn now_ns(&self) -> u64;
+
+    /// Waits until `due_ns`, or longer where that saves spinning, but not beyond `latest_ns`; returns the time.
+    fn wait_until(&mut self, due_ns: u64, latest_ns: u64) -> u64;
+
+    /// Waits until frames may have arrived, but not beyond `latest_ns`; returns the time.
+    fn wait_for_frames(&mut self, link: &mut L, latest_ns: u64) -> u64;
+
+    /// Publishes the reading that `fill` writes.
+    ///
+    /// # Errors
+    /// When the message cannot be sent.
+    fn publish_reading(&mut self, fill: impl FnOnce(&mut Reading)) -> Result<(), Self::Error>;
+
+    /// Publishes what the mechanism did.
+    ///
+    /// # Errors
+    /// When the message cannot be sent.
+    fn publish_truth(&mut self, truth: &Truth) -> Result<(), Self::Error>;
+
+    /// The command of this cycle, or the newest there is once waiting any longer would cost the deadline.
+    ///
+    /// # Errors
+    /// When the messages cannot be received.
+    fn command(&mut self, wake: &Wake) -> Result<Option<Self::Command>, Self::Error>;
+
+    /// Publishes the frames and events since the last call.
+    ///
+    /// # Errors
+    /// When a message cannot be sent.
+    fn publish_frames_and_events(&mut self, plant: &mut PlantCore<L>) -> Result<(), Self::Error>;
+}
+
+/// Runs one cycle: SYNC, process data, reading, truth, command; then frames and events, for which nobody waits.
+///
+/// # Errors
+/// Those of the plant and of the ports.
+pub fn run_cycle<L: Link, P: PlantPorts<L>>(
+    plant: &mut PlantCore<L>,
+    ports: &mut P,
+    schedule: &CycleSchedule,
+    wake: &Wake,
+) -> Result<(), P::Error> {
+    plant.begin_cycle(*wake)?;
+    // Counted from the SYNC as sent, so that a late SYNC gives a late but complete reading.
+    let reading_by_ns = wake.woke_ns + schedule.reading_by_ns;
+    let mut now_ns = ports.wait_until(wake.woke_ns + schedule.reading_from_ns, reading_by_ns);
+    while !plant.collect(now_ns)? && now_ns < reading_by_ns {
+        now_ns = ports.wait_for_frames(plant.link(), reading_by_ns);
+    }
+    ports.publish_reading(|reading| plant.fill_reading(reading))?;
+    if let Some(truth) = plant.truth() {
+        ports.publish_truth(&truth)?;
+    }
+    let command = ports.command(wake)?;
+    plant.apply(ports.now_ns(), command.as_ref().map(Borrow::borrow))?;
+    ports.publish_frames_and_events(plant)
+}

@@ -1,0 +1,421 @@
+//! The drive's axis under CiA 402: power states, modes of operation, and the objects that show them.
+//!
+//! An axis knows no frames and works in SI units. [`Axis`] sequences its parts: [`Positioning`] and [`Homing`] return
+//! commands, the servo follows the [`Demand`], [`FollowingErrorMonitor`] supervises the servo. [`Parameters`] is
+//! the configuration in the object dictionary.
+
+mod clamp;
+mod demand;
+mod encoder;
+mod following;
+mod homing;
+mod mode;
+mod motion;
+mod parameters;
+mod positioning;
+mod profile;
+mod servo;
+
+use masseter_can::cia402::{Command, Controlword, DriveState, StatusBit, Statusword};
+use masseter_shared::config::DriveConfig;
+
+use crate::drive::dictionary::{Objects, names};
+use clamp::clamp_symmetric;
+use demand::{Approach, Demand};
+use following::FollowingErrorMonitor;
+use motion::{Motion, MotionCommand, PositionView};
+use parameters::{AbortConnectionReaction, MotionLimits, Parameters, StopMethod};
+use positioning::Positioning;
+use profile::Profile;
+use servo::{Servo, ServoCommand, ServoLimits};
+
+pub(crate) use encoder::Encoder;
+pub(super) use homing::Homing;
+pub(super) use mode::Mode;
+pub(super) use parameters::configure;
+
+/// The cyclic targets that are new at a SYNC.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(super) struct NewTargets {
+    /// Target position (607Ah).
+    pub(super) position: bool,
+    /// Target torque (6071h).
+    pub(super) torque: bool,
+}
+
+/// One axis.
+#[derive(Debug, Clone)]
+pub(super) struct Axis {
+    config: DriveConfig,
+    encoder: Encoder,
+    servo: Servo,
+    parameters: Parameters,
+    demand: Demand,
+    following: FollowingErrorMonitor,
+    positioning: Positioning,
+    homing: Homing,
+    mode: Mode,
+    power: DriveState,
+    controlword: Controlword,
+    /// The encoder's last count.
+    counts: i32,
+    /// Position of the encoder's zero in the dictionary.
+    origin_increments: i32,
+    /// Whether the newest cyclic target was limited.
+    is_target_limited: bool,
+    force_n: f64,
+    /// The motor's share of the force: without current the brake holds.
+    motor_n: f64,
+}
+
+impl Axis {
+    /// An axis that is switched on at a position.
+    pub(super) fn new(
+        config: DriveConfig,
+        encoder: Encoder,
+        step_s: f64,
+        position_m: f64,
+        objects: &Objects,
+    ) -> Self {
+        Self {
+            counts: encoder.nearest(position_m),
+            parameters: Parameters::from_objects(objects, &config),
+            servo: Servo::new(config, step_s, position_m),
+            config,
+            encoder,
+            demand: Demand::new(),
+            following: FollowingErrorMonitor::default(),
+            positioning: Positioning::default(),
+            homing: Homing::default(),
+            mode: Mode::CyclicPosition,
+            power: DriveState::NotReadyToSwitchOn,
+            controlword: Controlword::DISABLE_VOLTAGE,
+            origin_increments: 0,
+            is_target_limited: false,
+            force_n: 0.0,
+            motor_n: 0.0,
+        }
+    }
+
+    /// State of the power stage.
+    #[cfg(test)]
+    pub(super) fn power(&self) -> DriveState {
+        self.power
+    }
+
+    /// Whether the axis follows targets.
+    pub(super) fn is_enabled(&self) -> bool {
+        self.power == DriveState::OperationEnabled
+    }
+
+    /// Whether homing is under way.
+    pub(super) fn is_homing(&self) -> bool {
+        self.homing.is_running()
+    }
+
+    /// The force of the last step on the mechanism, N.
+    pub(super) fn force_n(&self) -> f64 {
+        self.force_n
+    }
+
+    fn is_in_fault(&self) -> bool {
+        matches!(self.power, DriveState::FaultReactionActive | DriveState::Fault)
+    }
+
+    /// The state after power-on: the brake closes, and positions count from the encoder's own zero.
+    pub(super) fn restart(&mut self, now_ns: u64, objects: &Objects) {
+        self.controlword = Controlword::DISABLE_VOLTAGE;
+        (self.homing, self.origin_increments) = (Homing::default(), 0);
+        self.enter(DriveState::NotReadyToSwitchOn, now_ns);
+        self.configure(now_ns, objects);
+    }
+
+    /// Applies the dictionary's configuration. A mode that changes in operation brings the axis to rest first.
+    pub(super) fn configure(&mut self, now_ns: u64, objects: &Objects) {
+        self.parameters = Parameters::from_objects(objects, &self.config);
+        let mode = Mode::from_number(objects.get(names::MODE)).unwrap_or(self.mode);
+        if mode != self.mode {
+            self.mode = mode;
+            self.interrupt_mode();
+            if self.is_enabled() {
+                self.slow_down(now_ns, self.parameters.profile.deceleration_m_s2);
+            }
+        }
+    }
+
+    /// Obeys a controlword (6040h); returns whether the controlword ended a fault.
+    pub(super) fn control(&mut self, now_ns: u64, word: Controlword, objects: &Objects) -> bool {
+        let before = std::mem::replace(&mut self.controlword, word);
+        let was_fault = self.power == DriveState::Fault;
+        self.obey(word.command(before, self.power), now_ns);
+        if self.is_enabled() {
+            match self.mode {
+                Mode::ProfilePosition => {
+                    let (target, view) = (objects.get(names::TARGET_POSITION), self.position_view(now_ns));
+                    let command = self.positioning.control([before, word], target, view);
+                    self.execute(command, now_ns, self.parameters.profile);
+                }
+                Mode::Homing => {
+                    let (parameters, view) = (self.parameters.homing, self.position_view(now_ns));
+                    let command = self.homing.control([before, word], parameters.method, self.counts, view);
+                    self.execute(command, now_ns, parameters.search);
+                }
+                Mode::CyclicPosition | Mode::CyclicTorque => {}
+            }
+        }
+        was_fault && self.power != DriveState::Fault
+    }
+
+    fn obey(&mut self, command: Command, now_ns: u64) {
+        let next = if self.parameters.holds_quick_stop {
+            self.power.after_in_held_quick_stop(command)
+        } else {
+            self.power.after(command)
+        };
+        self.enter(next, now_ns);
+    }
+
+    /// Reacts as 6007h says when nobody controls the drive any more; returns whether that put it into fault.
+    pub(super) fn abort_connection(&mut self, now_ns: u64) -> bool {
+        let was_in_fault = self.is_in_fault();
+        match self.parameters.abort_connection {
+            AbortConnectionReaction::Nothing => {}
+            AbortConnectionReaction::Fault => self.enter(self.power.after_fault(), now_ns),
+            AbortConnectionReaction::DisableVoltage => self.obey(Command::DisableVoltage, now_ns),
+            AbortConnectionReaction::QuickStop => self.obey(Command::QuickStop, now_ns),
+        }
+        self.is_in_fault() && !was_in_fault
+    }
+
+    /// The buffered cyclic targets take effect; a position beyond the velocity limit is approached further.
+    pub(super) fn synchronise(&mut self, now_ns: u64, new: NewTargets, objects: &Objects) {
+        if !self.is_enabled() {
+            return;
+        }
+        match self.mode {
+            Mode::CyclicPosition
+                if new.position || self.is_target_limited && self.demand.is_interpolated() =>
+            {
+                self.follow_target(now_ns, objects.get(names::TARGET_POSITION));
+            }
+            Mode::CyclicTorque if new.torque => self.apply_torque(objects.get(names::TARGET_TORQUE)),
+            _ => {}
+        }
+    }
+
+    /// Follows a position target within the software position limits and the velocity limit.
+    fn follow_target(&mut self, now_ns: u64, target: i32) {
+        let allowed = self.position_view(now_ns).clamp(target);
+        let Parameters { velocity_limit_m_s: limit_m_s, period_s, .. } = self.parameters;
+        let approach = Approach { target_m: self.metres(allowed), period_s, limit_m_s };
+        let is_too_fast = self.demand.interpolate(now_ns, self.measured_m(), approach);
+        self.is_target_limited = is_too_fast || allowed != target;
+    }
+
+    fn apply_torque(&mut self, torque_permille: i16) {
+        let target_n = f64::from(torque_permille) / 1000.0 * self.config.rated_force_n;
+        let (force_n, is_limited) = clamp_symmetric(target_n, self.parameters.force_limit_n);
+        self.is_target_limited = is_limited;
+        self.demand.push(force_n);
+    }
+
+    /// A step of the servo loops with the axis at `position_m`; returns whether the following error became a fault.
+    pub(super) fn step(&mut self, now_ns: u64, position_m: f64) -> bool {
+        self.complete_transition(now_ns);
+        let before = std::mem::replace(&mut self.counts, self.encoder.read(position_m));
+        if self.is_enabled() {
+            match self.mode {
+                Mode::ProfilePosition => {
+                    let command = self.positioning.step(self.controlword, self.demand.is_at_rest(now_ns));
+                    self.execute(command, now_ns, self.parameters.profile);
+                }
+                Mode::Homing => {
+                    let command = self.homing.step([before, self.counts], self.demand.is_at_rest(now_ns));
+                    self.execute(command, now_ns, self.parameters.homing.search);
+                }
+                Mode::CyclicPosition | Mode::CyclicTorque => {}
+            }
+        }
+        let limits = self.servo_limits();
+        let measured_m = self.encoder.metres(self.counts);
+        let command = self.demand.servo_command(now_ns);
+        self.force_n = self.servo.step(measured_m, command, &limits);
+        self.motor_n = if command == ServoCommand::Brake { 0.0 } else { self.force_n };
+        self.supervise_following(now_ns)
+    }
+
+    /// Reads the encoder with the axis at `position_m`, as SYNC demands.
+    pub(super) fn sample(&mut self, position_m: f64) {
+        self.counts = self.encoder.read(position_m);
+    }
+
+    /// Writes the state of the axis into the objects that show it.
+    pub(super) fn show(&self, now_ns: u64, objects: &mut Objects) {
+        let actual = self.actual_increments();
+        let demand = self.demand.position_m(now_ns).map_or(actual, |demand_m| self.increments(demand_m));
+        let torque = self.motor_n / self.config.rated_force_n * 1000.0;
+        objects.set(names::STATUSWORD, self.statusword(now_ns).0);
+        objects.set(names::MODE_DISPLAY, self.mode.number());
+        objects.set(names::POSITION_DEMAND, demand);
+        objects.set(names::POSITION_ACTUAL, actual);
+        objects.set(names::VELOCITY_ACTUAL, self.encoder.nearest(self.servo.motion().velocity_m_s));
+        objects.set(names::TORQUE_ACTUAL, torque.round() as i16);
+        objects.set(names::FOLLOWING_ERROR, demand.saturating_sub(actual));
+    }
+
+    fn statusword(&self, now_ns: u64) -> Statusword {
+        let is_enabled = self.is_enabled();
+        let is_limited = self.is_target_limited || self.positioning.is_limited() || self.servo.is_limited();
+        let word = Statusword::of(self.power)
+            .with(StatusBit::VoltageEnabled, true)
+            .with(StatusBit::Remote, true)
+            .with(StatusBit::InternalLimit, is_enabled && is_limited);
+        match self.mode {
+            Mode::CyclicPosition => word
+                .with(StatusBit::TargetFollowed, is_enabled)
+                .with(StatusBit::FollowingError, self.following.is_fault()),
+            Mode::CyclicTorque => word.with(StatusBit::TargetFollowed, is_enabled),
+            Mode::ProfilePosition => word
+                .with(StatusBit::TargetReached, is_enabled && self.has_reached_setpoint(now_ns))
+                .with(StatusBit::SETPOINT_ACKNOWLEDGED, is_enabled && self.positioning.is_acknowledged())
+                .with(StatusBit::FollowingError, self.following.is_fault()),
+            Mode::Homing => self.homing.show(word, self.demand.is_at_rest(now_ns)),
+        }
+    }
+
+    /// Statusword bit 10 of profile position: within the position window of the last set-point, or halted.
+    fn has_reached_setpoint(&self, now_ns: u64) -> bool {
+        if !self.demand.is_at_rest(now_ns) || self.positioning.has_next() {
+            return false;
+        }
+        let demand_m = self.demand.position_m(now_ns).unwrap_or(self.measured_m());
+        self.controlword.halts() || (demand_m - self.measured_m()).abs() <= self.parameters.position_window_m
+    }
+
+    fn enter(&mut self, state: DriveState, now_ns: u64) {
+        if state == self.power {
+            return;
+        }
+        self.power = state;
+        self.following.restart(self.is_in_fault());
+        self.interrupt_mode();
+        match state {
+            DriveState::OperationEnabled => self.enable(),
+            DriveState::QuickStopActive => self.stop(now_ns, self.parameters.quick_stop),
+            DriveState::FaultReactionActive => self.stop(now_ns, self.parameters.fault_stop),
+            _ => self.demand.release(),
+        }
+    }
+
+    fn interrupt_mode(&mut self) {
+        self.is_target_limited = false;
+        (self.positioning, self.homing) = (Positioning::default(), self.homing.interrupted());
+    }
+
+    /// The cyclic modes wait for their first target behind a closed brake; the other modes hold the position.
+    fn enable(&mut self) {
+        let waits = matches!(self.mode, Mode::CyclicPosition | Mode::CyclicTorque);
+        if !waits {
+            self.demand.follow(Profile::hold(self.measured_m()));
+        }
+    }
+
+    /// The drive's own transitions: initialised, quick stop ended, fault reaction ended.
+    fn complete_transition(&mut self, now_ns: u64) {
+        let is_complete = match self.power {
+            DriveState::QuickStopActive => {
+                !self.parameters.holds_quick_stop && self.demand.is_at_rest(now_ns)
+            }
+            DriveState::FaultReactionActive => self.demand.is_at_rest(now_ns),
+            _ => true,
+        };
+        if is_complete {
+            self.enter(self.power.after_completion(), now_ns);
+        }
+    }
+
+    fn supervise_following(&mut self, now_ns: u64) -> bool {
+        let Some(window_m) = self.parameters.following_window_m else { return false };
+        let demand_m = self.demand.position_m(now_ns);
+        let error_m = demand_m.map_or(0.0, |demand_m| demand_m - self.measured_m());
+        if !self.following.exceeds(now_ns, error_m, window_m, self.parameters.following_timeout_ns) {
+            return false;
+        }
+        self.enter(self.power.after_fault(), now_ns);
+        self.following.set_fault();
+        true
+    }
+
+    /// Executes a command of the mode of operation.
+    fn execute(&mut self, command: Option<MotionCommand>, now_ns: u64, limits: MotionLimits) {
+        match command {
+            None => {}
+            Some(MotionCommand::MoveTo { target }) => {
+                let start = self.demand.at(now_ns).unwrap_or(Motion::at_rest(self.measured_m()));
+                self.demand.follow(Profile::to(now_ns, start, self.metres(target), &limits));
+            }
+            Some(MotionCommand::SlowDown) => self.slow_down(now_ns, limits.deceleration_m_s2),
+            // Zero is the home offset (607Ch) beyond home, so that home has the position minus the offset (CiA 402).
+            Some(MotionCommand::SetHome { counts }) => {
+                self.origin_increments =
+                    0_i32.saturating_sub(counts).saturating_sub(self.parameters.homing.offset_increments);
+            }
+        }
+    }
+
+    fn stop(&mut self, now_ns: u64, method: StopMethod) {
+        match method {
+            StopMethod::Brake => self.demand.release(),
+            StopMethod::Ramp { deceleration_m_s2 } => self.slow_down(now_ns, deceleration_m_s2),
+        }
+    }
+
+    fn slow_down(&mut self, now_ns: u64, deceleration_m_s2: f64) {
+        self.demand.slow_down(now_ns, self.servo.motion(), deceleration_m_s2);
+    }
+
+    /// In force control the axis may be no faster than it can stop before the software position limits, at the
+    /// profile deceleration (6084h).
+    fn servo_limits(&self) -> ServoLimits {
+        let Parameters { velocity_limit_m_s, force_limit_n, position_limits, profile, .. } = self.parameters;
+        let mut free_velocity_m_s = [-velocity_limit_m_s, velocity_limit_m_s];
+        if self.mode == Mode::CyclicTorque {
+            let [lowest_m, highest_m] = position_limits.map(|end| self.metres(end));
+            let at_m = self.measured_m();
+            let braking_m_s = |way_m: f64| (2.0 * profile.deceleration_m_s2 * way_m.max(0.0)).sqrt();
+            free_velocity_m_s = [
+                -braking_m_s(at_m - lowest_m).min(velocity_limit_m_s),
+                braking_m_s(highest_m - at_m).min(velocity_limit_m_s),
+            ];
+        }
+        ServoLimits { force_n: force_limit_n, velocity_m_s: velocity_limit_m_s, free_velocity_m_s }
+    }
+
+    /// The positions that a mode of operation sees. Homing moves the software position limits and may leave the axis
+    /// outside of them: there it may stay or come nearer, but go no further.
+    fn position_view(&self, now_ns: u64) -> PositionView {
+        let [lowest, highest] = self.parameters.position_limits;
+        let here = self.increments(self.demand.position_m(now_ns).unwrap_or(self.measured_m()));
+        PositionView { actual: self.actual_increments(), allowed: [lowest.min(here), highest.max(here)] }
+    }
+
+    /// The measured position, m in the encoder's coordinates.
+    fn measured_m(&self) -> f64 {
+        self.servo.motion().position_m
+    }
+
+    /// Position actual value (6064h).
+    fn actual_increments(&self) -> i32 {
+        self.counts.saturating_add(self.origin_increments)
+    }
+
+    /// A position of the dictionary in the encoder's metres.
+    fn metres(&self, increments: i32) -> f64 {
+        self.encoder.metres(increments.saturating_sub(self.origin_increments))
+    }
+
+    /// A position in the encoder's metres as the dictionary has it.
+    fn increments(&self, position_m: f64) -> i32 {
+        self.encoder.nearest(position_m).saturating_add(self.origin_increments)
+    }
+}

@@ -1,0 +1,189 @@
+//! The configuration of an axis in the object dictionary, read in SI units and written at power-on.
+//!
+//! Nothing here is checked: the dictionary accepts only values that the axis can use.
+
+use masseter_can::cia402::interpolation_period;
+use masseter_shared::clock::MILLISECOND_NS;
+use masseter_shared::config::DriveConfig;
+
+use crate::drive::dictionary::{Objects, names};
+
+/// Value of 6065h that switches the supervision of the following error off.
+const NO_WINDOW: u32 = u32::MAX;
+
+/// Bounds of a profile.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct MotionLimits {
+    pub(super) velocity_m_s: f64,
+    pub(super) acceleration_m_s2: f64,
+    pub(super) deceleration_m_s2: f64,
+}
+
+/// The way in which an axis comes to rest.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum StopMethod {
+    /// The brake closes at once.
+    Brake,
+    /// Along a ramp.
+    Ramp { deceleration_m_s2: f64 },
+}
+
+/// Reaction of the drive when nobody controls it any more (abort connection option code, 6007h).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum AbortConnectionReaction {
+    Nothing,
+    Fault,
+    DisableVoltage,
+    QuickStop,
+}
+
+/// Parameters of homing (6098h, 6099h, 609Ah, 607Ch).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct HomingParameters {
+    pub(super) method: i8,
+    pub(super) search: MotionLimits,
+    pub(super) offset_increments: i32,
+}
+
+/// The configuration of an axis.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Parameters {
+    /// Time from one cyclic target to the next (60C2h), s.
+    pub(super) period_s: f64,
+    /// Velocity limit of every mode (607Fh and the drive's own), m/s.
+    pub(super) velocity_limit_m_s: f64,
+    /// Force limit of every mode (6072h and the drive's own), N.
+    pub(super) force_limit_n: f64,
+    /// Software position limits as positions of the application: 607D counts from the home position, so that it is
+    /// less the home offset (607Ch); increments.
+    pub(super) position_limits: [i32; 2],
+    /// Following error window (6065h), m; none without supervision.
+    pub(super) following_window_m: Option<f64>,
+    /// Following error time out (6066h), ns.
+    pub(super) following_timeout_ns: u64,
+    /// Position window of profile position (6067h), m.
+    pub(super) position_window_m: f64,
+    /// Profile position (6081h, 6083h, 6084h).
+    pub(super) profile: MotionLimits,
+    /// Quick stop (605Ah, 6084h, 6085h).
+    pub(super) quick_stop: StopMethod,
+    /// Whether the drive stays in quick stop active (605Ah from 5 on).
+    pub(super) holds_quick_stop: bool,
+    /// Fault reaction (605Eh).
+    pub(super) fault_stop: StopMethod,
+    /// Abort connection option code (6007h).
+    pub(super) abort_connection: AbortConnectionReaction,
+    /// Homing.
+    pub(super) homing: HomingParameters,
+}
+
+impl Parameters {
+    /// The dictionary's parameters, bounded by the abilities of the drive.
+    pub(super) fn from_objects(objects: &Objects, drive: &DriveConfig) -> Self {
+        let metres = |increments: u32| f64::from(increments) * drive.encoder_resolution_m;
+        let velocity_limit_m_s = metres(objects.get(names::MAX_VELOCITY)).min(drive.max_velocity_m_s);
+        let profile = MotionLimits {
+            velocity_m_s: metres(objects.get(names::PROFILE_VELOCITY)).min(velocity_limit_m_s),
+            acceleration_m_s2: metres(objects.get(names::PROFILE_ACCELERATION)),
+            deceleration_m_s2: metres(objects.get(names::PROFILE_DECELERATION)),
+        };
+        let quick_stop_m_s2 = metres(objects.get(names::QUICK_STOP_DECELERATION));
+        let stop = |option: i16| match option {
+            0 => StopMethod::Brake,
+            1 | 5 => StopMethod::Ramp { deceleration_m_s2: profile.deceleration_m_s2 },
+            _ => StopMethod::Ramp { deceleration_m_s2: quick_stop_m_s2 },
+        };
+        let window = Some(objects.get(names::FOLLOWING_WINDOW)).filter(|&window| window != NO_WINDOW);
+        let torque_limit_n = f64::from(objects.get(names::MAX_TORQUE)) / 1000.0 * drive.rated_force_n;
+        let exponent = i32::from(objects.get(names::PERIOD_INDEX));
+        let offset_increments = objects.get(names::HOME_OFFSET);
+        let homing_m_s2 = metres(objects.get(names::HOMING_ACCELERATION));
+        Self {
+            period_s: f64::from(objects.get(names::PERIOD_VALUE)) * 10.0_f64.powi(exponent),
+            velocity_limit_m_s,
+            force_limit_n: torque_limit_n.min(drive.max_force_n),
+            position_limits: [names::MIN_POSITION_LIMIT, names::MAX_POSITION_LIMIT]
+                .map(|end| objects.get(end).saturating_sub(offset_increments)),
+            following_window_m: window.map(metres),
+            following_timeout_ns: u64::from(objects.get(names::FOLLOWING_TIMEOUT_MS)) * MILLISECOND_NS,
+            position_window_m: metres(objects.get(names::POSITION_WINDOW)),
+            profile,
+            quick_stop: stop(objects.get(names::QUICK_STOP_OPTION)),
+            holds_quick_stop: objects.get(names::QUICK_STOP_OPTION) >= 5,
+            fault_stop: stop(objects.get(names::FAULT_OPTION)),
+            abort_connection: match objects.get(names::ABORT_CONNECTION_OPTION) {
+                0 => AbortConnectionReaction::Nothing,
+                1 => AbortConnectionReaction::Fault,
+                2 => AbortConnectionReaction::DisableVoltage,
+                _ => AbortConnectionReaction::QuickStop,
+            },
+            homing: HomingParameters {
+                method: objects.get(names::HOMING_METHOD),
+                search: MotionLimits {
+                    velocity_m_s: metres(objects.get(names::HOMING_SPEED_ZERO)).min(velocity_limit_m_s),
+                    acceleration_m_s2: homing_m_s2,
+                    deceleration_m_s2: homing_m_s2,
+                },
+                offset_increments,
+            },
+        }
+    }
+}
+
+/// Writes a drive's abilities and its limits in the rig into its dictionary.
+pub(crate) fn configure(
+    objects: &mut Objects,
+    drive: &DriveConfig,
+    period_ns: u64,
+    position_limits: [i32; 2],
+) {
+    let increments = |metres: f64| drive.increments(metres) as u32;
+    let velocity = increments(drive.max_velocity_m_s).max(1);
+    let ramp = increments(drive.quick_stop_deceleration_m_s2).max(1);
+    let [lowest, highest] = position_limits;
+    let (value, exponent) = interpolation_period(period_ns);
+    objects.set(names::FOLLOWING_WINDOW, increments(drive.following_error_m));
+    objects.set(names::FOLLOWING_TIMEOUT_MS, drive.following_error_timeout_ms);
+    // Ten times the encoder's noise, and no less than ten increments.
+    objects.set(names::POSITION_WINDOW, increments(10.0 * drive.encoder_noise_m).max(10));
+    objects.set(names::MAX_TORQUE, (drive.max_force_n / drive.rated_force_n * 1000.0).round() as u16);
+    objects.set(names::MIN_POSITION_LIMIT, lowest);
+    objects.set(names::MAX_POSITION_LIMIT, highest);
+    objects.set(names::MAX_VELOCITY, velocity);
+    // A quarter of the drive's abilities: profiles are for setting up.
+    objects.set(names::PROFILE_VELOCITY, (velocity / 4).max(1));
+    objects.set(names::PROFILE_ACCELERATION, (ramp / 4).max(1));
+    objects.set(names::PROFILE_DECELERATION, (ramp / 4).max(1));
+    objects.set(names::QUICK_STOP_DECELERATION, ramp);
+    objects.set(names::HOMING_SPEED_SWITCH, (velocity / 20).max(1));
+    objects.set(names::HOMING_SPEED_ZERO, (velocity / 100).max(1));
+    objects.set(names::HOMING_ACCELERATION, (ramp / 4).max(1));
+    objects.set(names::PERIOD_VALUE, value);
+    objects.set(names::PERIOD_INDEX, exponent);
+}
+
+#[cfg(test)]
+mod tests {
+    use masseter_can::canopen::NodeId;
+    use masseter_shared::config::DrivesConfig;
+
+    use super::*;
+
+    #[test]
+    fn what_the_scenario_says_comes_back_in_si() {
+        let drive = DrivesConfig::default().leg;
+        let mut objects = Objects::new(NodeId::new(1).unwrap());
+        configure(&mut objects, &drive, MILLISECOND_NS, [-5, 7]);
+        let parameters = Parameters::from_objects(&objects, &drive);
+        let near = |a: f64, b: f64| (a - b).abs() < 1e-9;
+        assert!(near(parameters.period_s, 1e-3));
+        assert!(near(parameters.velocity_limit_m_s, drive.max_velocity_m_s));
+        assert!(near(parameters.force_limit_n, drive.max_force_n));
+        assert!(near(parameters.following_window_m.unwrap(), drive.following_error_m));
+        assert_eq!(parameters.following_timeout_ns, 20 * MILLISECOND_NS);
+        assert_eq!(parameters.position_limits, [-5, 7]);
+        let StopMethod::Ramp { deceleration_m_s2 } = parameters.quick_stop else { panic!("no ramp") };
+        assert!(near(deceleration_m_s2, drive.quick_stop_deceleration_m_s2));
+        assert_eq!(parameters.abort_connection, AbortConnectionReaction::QuickStop);
+    }
+}

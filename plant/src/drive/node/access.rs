@@ -1,0 +1,65 @@
+//! SDO access to the object dictionary: reading, writing, and the checks of both.
+//!
+//! A write only changes the dictionary; its effect on the drive is the node's matter, which finds the written object in
+//! [`DictionaryAccess::written`].
+
+use masseter_can::canopen::{AbortCode, Expedited, ObjectAddress};
+
+use super::rules::{Situation, check};
+use super::sdo::{Dictionary, Value};
+use super::storage::Storage;
+use crate::drive::axis::Axis;
+use crate::drive::dictionary::{Access, ENTRIES, Initial, Objects, find, names, writable};
+
+/// A client's access at an instant.
+pub(super) struct DictionaryAccess<'a> {
+    pub(super) now_ns: u64,
+    pub(super) objects: &'a mut Objects,
+    pub(super) storage: &'a mut Storage,
+    pub(super) axis: &'a Axis,
+    pub(super) is_operational: bool,
+    /// The object written, whose effect is due.
+    pub(super) written: Option<ObjectAddress>,
+}
+
+impl Dictionary for DictionaryAccess<'_> {
+    fn read(&mut self, object: ObjectAddress) -> Result<Value, AbortCode> {
+        let place = find(object)?;
+        let entry = &ENTRIES[place].entry;
+        if let Initial::Text(text) = entry.initial {
+            return Ok(Value::Text(text));
+        }
+        if object.index == 0x1003 && object.subindex > self.objects.get(names::ERROR_COUNT) {
+            return Err(AbortCode::NO_DATA);
+        }
+        self.axis.show(self.now_ns, self.objects);
+        let word = self.objects.word(place).to_le_bytes();
+        let data = Expedited::new(&word[..entry.kind.bytes()]).map_err(|_| AbortCode::GENERAL)?;
+        Ok(Value::Number(data))
+    }
+
+    fn accepts(&self, object: ObjectAddress) -> Result<(), AbortCode> {
+        let entry = &ENTRIES[find(object)?].entry;
+        if entry.access == Access::ReadWrite { Ok(()) } else { Err(AbortCode::READ_ONLY) }
+    }
+
+    fn write(&mut self, object: ObjectAddress, data: &[u8], is_sized: bool) -> Result<(), AbortCode> {
+        let place = find(object)?;
+        let word = writable(place, data, is_sized)?;
+        let situation = Situation {
+            is_operational: self.is_operational,
+            is_enabled: self.axis.is_enabled(),
+            is_homing: self.axis.is_homing(),
+        };
+        check(object, word, self.objects, situation)?;
+        match object.index {
+            0x1010 => self.storage.store(self.objects),
+            0x1011 => self.storage.restore_factory(),
+            _ => {
+                self.objects.set_word(place, word);
+                self.written = Some(object);
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,386 @@
+//! The drive as a CANopen node (CiA 301).
+//!
+//! [`DriveNode`] sequences its parts: network management, process data, heartbeats, errors and the SDO server each keep
+//! their own state and return what is to be done. The profile (CiA 402) is the [axis](super::axis).
+
+mod access;
+mod errors;
+mod heartbeats;
+mod nmt;
+mod outbox;
+mod pdo;
+mod process_data;
+mod rules;
+mod sdo;
+mod storage;
+
+use masseter_can::canopen::{
+    Cob, CobId, Emergency, Heartbeat, Nmt as NmtMessage, NmtCommand, NmtState, NodeId, ObjectAddress,
+};
+use masseter_can::cia402::Controlword;
+use masseter_can::{ErrorState, Frame};
+
+use super::axis::{Axis, Encoder, NewTargets};
+use super::dictionary::{Objects, PDOS, names};
+use super::settings::DriveSettings;
+use access::DictionaryAccess;
+use errors::{DriveError, Errors, clear_history};
+use heartbeats::{Consumer, Producer};
+use nmt::{BOOT_NS, Nmt};
+use outbox::Outbox;
+use process_data::ProcessData;
+use sdo::SdoServer;
+use storage::Storage;
+
+/// One drive.
+#[derive(Debug, Clone)]
+pub(crate) struct DriveNode {
+    id: NodeId,
+    objects: Objects,
+    storage: Storage,
+    axis: Axis,
+    nmt: Nmt,
+    errors: Errors,
+    /// Last known error state of its CAN controller.
+    error_state: ErrorState,
+    producer: Producer,
+    consumer: Consumer,
+    process_data: ProcessData,
+    sdo: SdoServer,
+    outbox: Outbox,
+}
+
+impl DriveNode {
+    /// A drive that is switched on at `now_ns` with its axis at a position.
+    pub(crate) fn new(settings: &DriveSettings, encoder: Encoder, now_ns: u64, position_m: f64) -> Self {
+        let objects = settings.objects();
+        // Staggered, so that the heartbeats of several nodes do not coincide.
+        let stagger_ns = settings.heartbeat_ns / 8 * u64::from(settings.node.get() % 8);
+        Self {
+            id: settings.node,
+            storage: Storage::new(&objects),
+            axis: Axis::new(settings.drive, encoder, settings.step_s, position_m, &objects),
+            nmt: Nmt::booting(now_ns),
+            errors: Errors::default(),
+            error_state: ErrorState::Active,
+            producer: Producer::new(&objects, now_ns + BOOT_NS + stagger_ns),
+            consumer: Consumer::new(&objects),
+            process_data: ProcessData::new(&objects),
+            sdo: SdoServer::default(),
+            outbox: Outbox::default(),
+            objects,
+        }
+    }
+
+    /// State of the drive's power stage.
+    #[cfg(test)]
+    pub(crate) fn power(&self) -> masseter_can::cia402::DriveState {
+        self.axis.power()
+    }
+
+    /// Values of its object dictionary.
+    #[cfg(test)]
+    pub(super) fn objects(&self) -> &Objects {
+        &self.objects
+    }
+
+    /// The next frame that the drive transmits.
+    pub(crate) fn outgoing(&mut self) -> Option<Frame> {
+        self.outbox.take()
+    }
+
+    /// Takes a frame that arrived at `now_ns` with the axis at `position_m`. Frames for others and malformed frames have
+    /// no effect; process data of a wrong length are reported by EMCY.
+    pub(crate) fn receive(&mut self, now_ns: u64, frame: &Frame, position_m: f64) {
+        match Cob::try_from(frame.id()) {
+            Ok(Cob::Nmt) => {
+                if let Ok(message) = NmtMessage::decode(frame.data())
+                    && message.target.includes(self.id)
+                {
+                    self.obey_nmt(message.command, now_ns);
+                }
+            }
+            Ok(Cob::Sync) => self.take_sync(now_ns, frame.data(), position_m),
+            Ok(Cob::SdoRequest(node)) if node == self.id && self.nmt.is_served() => {
+                self.serve(now_ns, frame.data());
+            }
+            Ok(Cob::Heartbeat(node)) if self.nmt.state().is_some() => {
+                self.take_heartbeat(now_ns, node, frame.data());
+            }
+            _ => self.take_process_data(now_ns, frame),
+        }
+    }
+
+    /// A step of the servo loops with the axis at `position_m`: the force until the next one, N.
+    pub(crate) fn step(&mut self, now_ns: u64, position_m: f64) -> f64 {
+        if self.nmt.boot(now_ns) {
+            self.send(Heartbeat { state: NmtState::BootUp }.frame(self.id));
+        }
+        if let Some(state) = self.nmt.state()
+            && self.producer.is_due(now_ns)
+        {
+            self.send(Heartbeat { state }.frame(self.id));
+        }
+        self.supervise_connection(now_ns);
+        if let Some(abort) = self.sdo.expire(now_ns) {
+            self.send(abort.frame(self.id));
+        }
+        if self.axis.step(now_ns, position_m) {
+            self.raise(DriveError::FollowingError);
+        }
+        if self.nmt.is_operational() && self.process_data.is_event_driven() {
+            self.axis.show(now_ns, &mut self.objects);
+            self.process_data.send_events(now_ns, &self.objects, &mut self.outbox);
+        }
+        self.axis.force_n()
+    }
+
+    /// Takes the error state of the drive's CAN controller. In bus-off the communication has failed, which an emergency
+    /// reports once the bus is back.
+    pub(crate) fn set_error_state(&mut self, now_ns: u64, state: ErrorState) {
+        if state == self.error_state {
+            return;
+        }
+        let before = std::mem::replace(&mut self.error_state, state);
+        if before == ErrorState::BusOff {
+            self.raise(DriveError::WasBusOff);
+            self.clear(DriveError::WasBusOff);
+        }
+        match state {
+            ErrorState::Active => self.clear(DriveError::ErrorPassive),
+            ErrorState::Passive => self.raise(DriveError::ErrorPassive),
+            ErrorState::BusOff => {
+                self.clear(DriveError::ErrorPassive);
+                self.fail_communication(now_ns);
+            }
+        }
+    }
+
+    /// Obeys a command of network management, once the node has booted.
+    fn obey_nmt(&mut self, command: NmtCommand, now_ns: u64) {
+        if self.nmt.state().is_none() {
+            return;
+        }
+        match command {
+            NmtCommand::Start if !self.nmt.is_operational() => {
+                self.nmt.enter(NmtState::Operational);
+                self.process_data.restart_transmission();
+            }
+            NmtCommand::Start => {}
+            NmtCommand::Stop => self.leave_operational(NmtState::Stopped, now_ns),
+            NmtCommand::EnterPreOperational => self.leave_operational(NmtState::PreOperational, now_ns),
+            NmtCommand::ResetCommunication => {
+                // While the node boots it receives nothing, so that nobody controls the axis.
+                self.abort_connection(now_ns);
+                self.reset_communication(now_ns);
+            }
+            NmtCommand::ResetNode => self.reset_node(now_ns),
+        }
+    }
+
+    /// Leaves operational. Without process data nobody controls the axis.
+    fn leave_operational(&mut self, state: NmtState, now_ns: u64) {
+        if self.nmt.is_operational() || state == NmtState::Stopped {
+            self.abort_connection(now_ns);
+        }
+        self.nmt.enter(state);
+        self.process_data.discard_received();
+        self.sdo = SdoServer::default();
+    }
+
+    /// Restores the stored communication objects and boots. The history of errors (1003h) and the faults stay.
+    fn reset_communication(&mut self, now_ns: u64) {
+        self.objects.copy_range(self.storage.stored(), 0x1000..=0x1002);
+        self.objects.copy_range(self.storage.stored(), 0x1004..=0x1FFF);
+        self.errors.forget_communication(&mut self.objects);
+        self.producer.configure(&self.objects, now_ns + BOOT_NS);
+        self.consumer = Consumer::new(&self.objects);
+        self.process_data = ProcessData::new(&self.objects);
+        self.sdo = SdoServer::default();
+        self.nmt = Nmt::booting(now_ns);
+    }
+
+    /// The state after power-on: the brake closes, every object has its stored value, the node boots.
+    fn reset_node(&mut self, now_ns: u64) {
+        self.objects = self.storage.stored().clone();
+        self.errors = Errors::default();
+        self.axis.restart(now_ns, &self.objects);
+        self.reset_communication(now_ns);
+    }
+
+    /// SYNC: buffered process data take effect, actual values are sampled and sent.
+    fn take_sync(&mut self, now_ns: u64, data: &[u8], position_m: f64) {
+        if !self.nmt.is_served() {
+            return;
+        }
+        let counter = match (data, self.objects.get(names::SYNC_OVERFLOW)) {
+            ([], 0) => 0,
+            ([counter], 2..) => *counter,
+            _ => return self.raise(DriveError::SyncLength),
+        };
+        self.clear(DriveError::SyncLength);
+        let is_operational = self.nmt.is_operational();
+        if is_operational {
+            for number in 0..PDOS {
+                if self.process_data.waits_for_sync(number) {
+                    self.apply_process_data(number, now_ns);
+                }
+            }
+        }
+        self.axis.synchronise(now_ns, self.process_data.take_new_targets(), &self.objects);
+        if is_operational {
+            self.axis.sample(position_m);
+            self.axis.show(now_ns, &mut self.objects);
+            self.process_data.send_at_sync(now_ns, counter, &self.objects, &mut self.outbox);
+        }
+    }
+
+    /// Process data wait for the next SYNC, or take effect at once where their PDO is event-driven.
+    fn take_process_data(&mut self, now_ns: u64, frame: &Frame) {
+        if !self.nmt.is_operational() {
+            return;
+        }
+        let Some(number) = self.process_data.receive(now_ns, frame) else { return };
+        self.judge_process_data();
+        if !self.process_data.is_synchronous(number) {
+            self.apply_process_data(number, now_ns);
+        }
+    }
+
+    fn apply_process_data(&mut self, number: usize, now_ns: u64) {
+        let Some(effects) = self.process_data.apply(number, &mut self.objects) else { return };
+        if effects.configures {
+            self.axis.configure(now_ns, &self.objects);
+        }
+        if effects.commands {
+            self.control(now_ns);
+        }
+    }
+
+    /// Raises and clears the errors of process data; one is present as long as any RPDO has it.
+    fn judge_process_data(&mut self) {
+        for (error, is_present) in self.process_data.errors() {
+            if is_present { self.raise(error) } else { self.clear(error) }
+        }
+    }
+
+    /// Supervision begins with a heartbeat, not with a boot-up message.
+    fn take_heartbeat(&mut self, now_ns: u64, node: NodeId, data: &[u8]) {
+        if Heartbeat::decode(data).is_ok_and(|heartbeat| heartbeat.state != NmtState::BootUp) {
+            self.consumer.hear(now_ns, node);
+            if self.consumer.hears_all() {
+                self.clear(DriveError::Heartbeat);
+            }
+        }
+    }
+
+    /// A lost heartbeat is a failure of the communication. An RPDO whose event timer ran out leaves nobody to control
+    /// the axis either.
+    fn supervise_connection(&mut self, now_ns: u64) {
+        if self.consumer.loses(now_ns) {
+            self.raise(DriveError::Heartbeat);
+            self.fail_communication(now_ns);
+        }
+        if self.process_data.expires(now_ns) {
+            self.judge_process_data();
+            self.abort_connection(now_ns);
+        }
+    }
+
+    /// Reacts to a failure of the communication: abort connection option (6007h) and error behaviour (1029h).
+    fn fail_communication(&mut self, now_ns: u64) {
+        self.abort_connection(now_ns);
+        if self.nmt.is_operational() {
+            match self.objects.get(names::COMMUNICATION_ERROR) {
+                0 => self.leave_operational(NmtState::PreOperational, now_ns),
+                2 => self.leave_operational(NmtState::Stopped, now_ns),
+                _ => {}
+            }
+        }
+    }
+
+    /// Reacts as 6007h says when nobody controls the axis any more. A fault outlasts its cause.
+    fn abort_connection(&mut self, now_ns: u64) {
+        if self.axis.abort_connection(now_ns) {
+            self.raise(DriveError::ConnectionAborted);
+        }
+    }
+
+    /// Answers a request to the SDO server.
+    fn serve(&mut self, now_ns: u64, data: &[u8]) {
+        let mut access = DictionaryAccess {
+            now_ns,
+            objects: &mut self.objects,
+            storage: &mut self.storage,
+            axis: &self.axis,
+            is_operational: self.nmt.is_operational(),
+            written: None,
+        };
+        let answer = self.sdo.answer(now_ns, data, &mut access);
+        if let Some(object) = access.written {
+            self.apply_written(object, now_ns);
+        }
+        if let Some(response) = answer {
+            self.send(response.frame(self.id));
+        }
+    }
+
+    /// The effect of an object that was written by SDO.
+    fn apply_written(&mut self, object: ObjectAddress, now_ns: u64) {
+        let number = usize::from(object.index & 0xFF);
+        match object.index {
+            0x1003 => clear_history(&mut self.objects),
+            0x1016 => {
+                // Supervision begins anew, and no heartbeat counts as lost.
+                self.consumer = Consumer::new(&self.objects);
+                self.clear(DriveError::Heartbeat);
+            }
+            0x1017 => self.producer.configure(&self.objects, now_ns),
+            0x1400..0x1800 => {
+                self.process_data.configure_rpdo(number, &self.objects);
+                self.judge_process_data();
+            }
+            0x1800..0x1C00 => self.process_data.configure_tpdo(number, &self.objects),
+            0x6040 => self.control(now_ns),
+            0x607A => self.process_data.add_targets(NewTargets { position: true, torque: false }),
+            0x6071 => self.process_data.add_targets(NewTargets { position: false, torque: true }),
+            0x6000.. => self.axis.configure(now_ns, &self.objects),
+            _ => {}
+        }
+    }
+
+    /// The controlword in the dictionary takes effect.
+    fn control(&mut self, now_ns: u64) {
+        let word = Controlword(self.objects.get(names::CONTROLWORD));
+        if self.axis.control(now_ns, word, &self.objects) {
+            for error in DriveError::FAULTS {
+                self.clear(error);
+            }
+        }
+    }
+
+    fn raise(&mut self, error: DriveError) {
+        let emergency = self.errors.raise(error, &mut self.objects);
+        self.send_emergency(emergency);
+    }
+
+    fn clear(&mut self, error: DriveError) {
+        let emergency = self.errors.clear(error, &mut self.objects);
+        self.send_emergency(emergency);
+    }
+
+    /// Sends an emergency message, in the states in which nodes send them and unless 1014h forbids it.
+    fn send_emergency(&mut self, emergency: Option<Emergency>) {
+        let cob_id = CobId(self.objects.get(names::EMERGENCY_COB_ID));
+        if let Some(emergency) = emergency
+            && self.nmt.is_served()
+            && let Some(id) = cob_id.identifier()
+        {
+            self.send(Frame::fixed(id, emergency.encode()));
+        }
+    }
+
+    fn send(&mut self, frame: Frame) {
+        self.outbox.add(frame);
+    }
+}

@@ -1,0 +1,53 @@
+//! The NMT state of a drive (CiA 301) and its boot-up.
+//!
+//! What a change of state means for the rest of the drive is the node's matter.
+
+use masseter_can::canopen::NmtState;
+use masseter_shared::clock::MILLISECOND_NS;
+
+/// From power-on to the boot-up message, ns.
+pub(super) const BOOT_NS: u64 = 20 * MILLISECOND_NS;
+
+/// The state.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Nmt {
+    /// None while the node boots.
+    state: Option<NmtState>,
+    boot_at_ns: u64,
+}
+
+impl Nmt {
+    /// A node that begins to boot at `now_ns`.
+    pub(super) fn booting(now_ns: u64) -> Self {
+        Self { state: None, boot_at_ns: now_ns + BOOT_NS }
+    }
+
+    /// The state; none while the node boots.
+    pub(super) fn state(self) -> Option<NmtState> {
+        self.state
+    }
+
+    /// Whether process data are exchanged.
+    pub(super) fn is_operational(self) -> bool {
+        self.state == Some(NmtState::Operational)
+    }
+
+    /// Whether the node takes part in SDO, SYNC and EMCY.
+    pub(super) fn is_served(self) -> bool {
+        matches!(self.state, Some(NmtState::Operational | NmtState::PreOperational))
+    }
+
+    /// Enters a state.
+    pub(super) fn enter(&mut self, state: NmtState) {
+        self.state = Some(state);
+    }
+
+    /// Ends the boot when it is time; returns whether the boot-up message is due.
+    pub(super) fn boot(&mut self, now_ns: u64) -> bool {
+        let is_booted = self.state.is_none() && now_ns >= self.boot_at_ns;
+        if is_booted {
+            self.state = Some(NmtState::PreOperational);
+        }
+        is_booted
+    }
+}

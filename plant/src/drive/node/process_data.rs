@@ -1,0 +1,128 @@
+//! The drive's process data: its PDOs, and the cyclic targets that wait for SYNC.
+//!
+//! This module copies between frames and the object dictionary. It moves nothing and raises no emergency; it reports
+//! [`Effects`] and errors.
+
+use masseter_can::Frame;
+
+use super::errors::DriveError;
+use super::outbox::Outbox;
+use super::pdo::{Effects, Rpdo, RpdoFault, Tpdo};
+use crate::drive::axis::NewTargets;
+use crate::drive::dictionary::{Objects, PDOS};
+
+/// The PDOs of both directions.
+#[derive(Debug, Clone)]
+pub(super) struct ProcessData {
+    rpdos: [Rpdo; PDOS],
+    tpdos: [Tpdo; PDOS],
+    /// Cyclic targets written since the last SYNC.
+    new_targets: NewTargets,
+}
+
+impl ProcessData {
+    /// The PDOs that the dictionary configures.
+    pub(super) fn new(objects: &Objects) -> Self {
+        Self {
+            rpdos: std::array::from_fn(|number| Rpdo::new(objects, number as u16)),
+            tpdos: std::array::from_fn(|number| Tpdo::new(objects, number as u16)),
+            new_targets: NewTargets::default(),
+        }
+    }
+
+    /// Applies the parameters of an RPDO.
+    pub(super) fn configure_rpdo(&mut self, number: usize, objects: &Objects) {
+        self.rpdos[number] = Rpdo::new(objects, number as u16);
+    }
+
+    /// Applies the parameters of a TPDO.
+    pub(super) fn configure_tpdo(&mut self, number: usize, objects: &Objects) {
+        self.tpdos[number] = Tpdo::new(objects, number as u16);
+    }
+
+    /// Buffers the data of a frame; returns the number of its RPDO.
+    pub(super) fn receive(&mut self, now_ns: u64, frame: &Frame) -> Option<usize> {
+        let number = self.rpdos.iter().position(|rpdo| rpdo.id() == Some(frame.id()))?;
+        self.rpdos[number].take(now_ns, frame.data());
+        Some(number)
+    }
+
+    /// Whether the data of an RPDO wait for SYNC instead of taking effect at once.
+    pub(super) fn is_synchronous(&self, number: usize) -> bool {
+        self.rpdos[number].is_synchronous()
+    }
+
+    /// Whether the data of an RPDO wait for SYNC now.
+    pub(super) fn waits_for_sync(&self, number: usize) -> bool {
+        self.rpdos[number].waits_for_sync()
+    }
+
+    /// Writes the data of an RPDO into the dictionary; returns what else they act on, if there were any.
+    pub(super) fn apply(&mut self, number: usize, objects: &mut Objects) -> Option<Effects> {
+        let effects = self.rpdos[number].apply(objects)?;
+        self.add_targets(effects.targets);
+        Some(effects)
+    }
+
+    /// Cyclic targets were written, by process data or SDO.
+    pub(super) fn add_targets(&mut self, targets: NewTargets) {
+        self.new_targets.position |= targets.position;
+        self.new_targets.torque |= targets.torque;
+    }
+
+    /// The cyclic targets written since the last call.
+    pub(super) fn take_new_targets(&mut self) -> NewTargets {
+        std::mem::take(&mut self.new_targets)
+    }
+
+    /// Each error of process data, and whether any RPDO has it.
+    pub(super) fn errors(&self) -> [(DriveError, bool); RpdoFault::ALL.len()] {
+        RpdoFault::ALL.map(|fault| {
+            let error = match fault {
+                RpdoFault::Short => DriveError::PdoShort,
+                RpdoFault::Long => DriveError::PdoLong,
+                RpdoFault::Overdue => DriveError::RpdoTimeout,
+            };
+            (error, self.rpdos.iter().any(|rpdo| rpdo.has(fault)))
+        })
+    }
+
+    /// Whether the event timer of an RPDO has just run out. Outside of operational no timer runs.
+    pub(super) fn expires(&mut self, now_ns: u64) -> bool {
+        self.rpdos.iter_mut().fold(false, |any, rpdo| rpdo.expires(now_ns) | any)
+    }
+
+    /// Discards the received data.
+    pub(super) fn discard_received(&mut self) {
+        self.rpdos.iter_mut().for_each(Rpdo::clear);
+        self.new_targets = NewTargets::default();
+    }
+
+    /// Restarts transmission, as when the node becomes operational.
+    pub(super) fn restart_transmission(&mut self) {
+        self.tpdos.iter_mut().for_each(Tpdo::clear);
+    }
+
+    /// Whether a TPDO is sent at events instead of SYNC.
+    pub(super) fn is_event_driven(&self) -> bool {
+        self.tpdos.iter().any(Tpdo::is_event_driven)
+    }
+
+    /// Sends the TPDOs that are due at a SYNC of that counter.
+    pub(super) fn send_at_sync(&mut self, now_ns: u64, counter: u8, objects: &Objects, outbox: &mut Outbox) {
+        for tpdo in &mut self.tpdos {
+            if let Some(frame) = tpdo.at_sync(now_ns, counter, objects) {
+                outbox.add(frame);
+            }
+        }
+    }
+
+    /// Sends the TPDOs that are due because of an event.
+    pub(super) fn send_events(&mut self, now_ns: u64, objects: &Objects, outbox: &mut Outbox) {
+        for tpdo in &mut self.tpdos {
+            if let Some(frame) = tpdo.at_event(now_ns, objects) {
+                outbox.add(frame);
+            }
+        }
+    }
+}

@@ -1,0 +1,160 @@
+//! Rules for writing an object, beyond type and limits: values without a range, parameters in use, and
+//! the procedure of CiA 301 for changing a PDO.
+//!
+//! The rules only judge; they change nothing.
+
+use masseter_can::canopen::{AbortCode, CobId, ObjectAddress};
+
+use super::heartbeats::consumed_node;
+use crate::drive::axis::{Homing, Mode};
+use crate::drive::dictionary::{
+    CONSUMED, DataType, ENTRIES, MAPPED_MAX, Mapping, MappingEntry, Objects, PDOS, find, names,
+};
+
+/// Signature of 1010h, "save".
+const SAVE: u32 = u32::from_le_bytes(*b"save");
+/// Signature of 1011h, "load".
+const LOAD: u32 = u32::from_le_bytes(*b"load");
+/// Bits that a PDO carries at most.
+const PDO_BITS: usize = 64;
+const PDO_COUNT: u16 = PDOS as u16;
+
+/// State of the drive, as far as the rules depend on it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Situation {
+    pub(super) is_operational: bool,
+    pub(super) is_enabled: bool,
+    pub(super) is_homing: bool,
+}
+
+/// Whether that word may be written to an entry now.
+///
+/// # Errors
+/// The abort code with the reason.
+pub(super) fn check(
+    object: ObjectAddress,
+    word: u32,
+    objects: &Objects,
+    situation: Situation,
+) -> Result<(), AbortCode> {
+    let allow = |is_allowed: bool, code: AbortCode| if is_allowed { Ok(()) } else { Err(code) };
+    let ObjectAddress { index, subindex } = object;
+    match index {
+        0x1003 => allow(word == 0, AbortCode::INVALID_VALUE),
+        0x1010 => {
+            allow(word == SAVE, AbortCode::NOT_STORED)?;
+            allow(!situation.is_enabled, AbortCode::DEVICE_STATE)
+        }
+        0x1011 => allow(word == LOAD, AbortCode::NOT_STORED),
+        0x1014 => cob_id(CobId(objects.get(names::EMERGENCY_COB_ID)), CobId(word)),
+        0x1016 => allow(!is_consumed_elsewhere(subindex, word, objects), AbortCode::PARAMETER_INCOMPATIBLE),
+        0x1019 => {
+            allow(word != 1, AbortCode::INVALID_VALUE)?;
+            allow(!situation.is_operational, AbortCode::DEVICE_STATE)
+        }
+        0x1400..0x1600 | 0x1800..0x1A00 => communication(object, word, objects),
+        0x1600..0x1800 | 0x1A00..0x1C00 => mapping(object, word, objects),
+        0x605A => allow(!matches!(word, 3 | 4), AbortCode::INVALID_VALUE),
+        // 0 leaves the mode as it is.
+        0x6060 => allow(word as i8 == 0 || Mode::from_number(word as i8).is_some(), AbortCode::INVALID_VALUE),
+        0x607D => {
+            let (lowest, highest) = match subindex {
+                1 => (word as i32, objects.get(names::MAX_POSITION_LIMIT)),
+                _ => (objects.get(names::MIN_POSITION_LIMIT), word as i32),
+            };
+            allow(lowest <= highest, AbortCode::MAXIMUM_BELOW_MINIMUM)
+        }
+        0x6098 => {
+            allow(Homing::is_method(word as i8), AbortCode::INVALID_VALUE)?;
+            allow(!situation.is_homing, AbortCode::DEVICE_STATE)
+        }
+        0x60C2 => allow(!situation.is_enabled, AbortCode::DEVICE_STATE),
+        _ => Ok(()),
+    }
+}
+
+/// Whether another entry of 1016h consumes the same node's heartbeat.
+fn is_consumed_elsewhere(subindex: u8, word: u32, objects: &Objects) -> bool {
+    let Some(node) = consumed_node(word) else { return false };
+    (1..=CONSUMED as u8).filter(|&other| other != subindex).any(|other| {
+        let place = names::CONSUMER_HEARTBEAT_TIME.place() + usize::from(other) - 1;
+        consumed_node(objects.word(place)) == Some(node)
+    })
+}
+
+/// A new COB-ID in place of an old one: an identifier may change only while its object does not exist.
+fn cob_id(before: CobId, after: CobId) -> Result<(), AbortCode> {
+    let takes_restricted = after.is_valid() && is_restricted(after.number());
+    let is_changed = before.is_valid() && after.is_valid() && after.number() != before.number();
+    if !after.is_standard() || takes_restricted || is_changed {
+        return Err(AbortCode::INVALID_VALUE);
+    }
+    Ok(())
+}
+
+/// Identifiers that no configurable object may use (CiA 301, table 40).
+const fn is_restricted(identifier: u32) -> bool {
+    matches!(
+        identifier,
+        0x000..=0x080 | 0x101..=0x180 | 0x581..=0x5FF | 0x601..=0x67F | 0x6E0..=0x6FF | 0x701..
+    )
+}
+
+/// The COB-ID of the PDO that a communication or mapping parameter belongs to.
+fn pdo_cob_id(index: u16, objects: &Objects) -> CobId {
+    // 1600h + n belongs to 1400h + n, 1A00h + n to 1800h + n.
+    let communication = index & !0x0200 & 0xFC00 | index & 0x00FF;
+    objects.cob_id(communication, 1)
+}
+
+fn communication(object: ObjectAddress, word: u32, objects: &Objects) -> Result<(), AbortCode> {
+    let before = pdo_cob_id(object.index, objects);
+    match object.subindex {
+        1 => {
+            cob_id(before, CobId(word))?;
+            let carries_nothing = objects.at(object.index + 0x0200, 0) == 0;
+            if CobId(word).is_valid() && carries_nothing { Err(AbortCode::INVALID_VALUE) } else { Ok(()) }
+        }
+        // 241 to 251 are reserved, 252 and 253 answer remote requests.
+        2 if matches!(word, 241..=253) => Err(AbortCode::INVALID_VALUE),
+        3 | 6 if before.is_valid() => Err(AbortCode::INVALID_VALUE),
+        _ => Ok(()),
+    }
+}
+
+/// The mapping changes only while the PDO does not exist, its entries only while it holds none.
+fn mapping(object: ObjectAddress, word: u32, objects: &Objects) -> Result<(), AbortCode> {
+    let parameter = |subindex: u8| objects.at(object.index, subindex);
+    let exists = pdo_cob_id(object.index, objects).is_valid();
+    if exists || object.subindex > 0 && parameter(0) > 0 {
+        return Err(AbortCode::PARAMETER_INCOMPATIBLE);
+    }
+    if object.subindex > 0 {
+        return if word == 0 { Ok(()) } else { mappable(MappingEntry(word), is_transmitted(object.index)) };
+    }
+    let entries = || (1..=word as u8).map(|subindex| MappingEntry(parameter(subindex)));
+    if entries().any(|entry| entry.0 == 0) {
+        return Err(AbortCode::PARAMETER_INCOMPATIBLE);
+    }
+    let bits: usize = entries().map(MappingEntry::bits).sum();
+    if bits > PDO_BITS { Err(AbortCode::PDO_LENGTH) } else { Ok(()) }
+}
+
+/// Whether a mapping parameter is that of a TPDO.
+const fn is_transmitted(index: u16) -> bool {
+    index >= 0x1A00 && index < 0x1A00 + PDO_COUNT
+}
+
+/// Whether an object may be mapped with that length.
+fn mappable(entry: MappingEntry, is_transmitted: bool) -> Result<(), AbortCode> {
+    let table = &ENTRIES[find(entry.object())?].entry;
+    let is_allowed = match table.mapping {
+        Mapping::Never => false,
+        Mapping::Tpdo => is_transmitted,
+        Mapping::Any => true,
+    };
+    let has_length = table.kind != DataType::Text && table.kind.bytes() * 8 == entry.bits();
+    if is_allowed && has_length { Ok(()) } else { Err(AbortCode::NOT_MAPPABLE) }
+}
+
+const _: () = assert!(MAPPED_MAX * 8 == PDO_BITS, "eight bytes hold eight objects at most");

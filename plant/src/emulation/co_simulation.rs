@@ -1,0 +1,230 @@
+//! Drives and mechanism, co-simulated in the order of time.
+
+use masseter_can::canopen::Cob;
+use masseter_can::{CanId, ErrorState, Frame};
+use masseter_shared::config::Scenario;
+use masseter_shared::geometry::{AXES, Mechanism};
+use masseter_shared::messages::{Truth, pose_fields};
+
+use crate::checks::check_quantities;
+use crate::drive::{DriveNode, DriveSettings, Encoder};
+use crate::error::PlantError;
+use crate::mechanism::{Dynamics, DynamicsError, Food, State, closed_mouth, level};
+
+/// The six drives and the mechanism that they move.
+///
+/// Whoever carries the frames calls [`step`](Self::step) and [`deliver`](Self::deliver) in the order of time, and
+/// [`outgoing`](Self::outgoing) after each.
+///
+/// ```
+/// use masseter_plant::emulation::Emulation;
+/// use masseter_can::canopen::{Cob, NodeId};
+/// use masseter_shared::config::Scenario;
+///
+/// let mut emulation = Emulation::new(&Scenario::default(), 0)?;
+/// let boot_up = loop {
+///     emulation.step()?;
+///     if let Some(frame) = emulation.outgoing(0) {
+///         break frame;
+///     }
+/// };
+/// assert_eq!(Cob::try_from(boot_up.id())?, Cob::Heartbeat(NodeId::new(1)?));
+/// # Ok::<_, Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Debug)]
+pub struct Emulation {
+    drives: Vec<DriveNode>,
+    dynamics: Dynamics,
+    step_ns: u64,
+    next_step_ns: u64,
+    moved_to_ns: u64,
+    force_n: [f64; AXES],
+    sample: Sample,
+    /// Whether each drive has received the SYNC of the sample.
+    synchronised: [bool; AXES],
+}
+
+/// State of the mechanism at a SYNC. The truth is computed from it later, once the reading is on its way.
+#[derive(Debug, Clone, Copy)]
+struct Sample {
+    time_ns: u64,
+    state: State,
+    force_n: [f64; AXES],
+    bite_force_n: f64,
+}
+
+impl Sample {
+    fn new(dynamics: &Dynamics, force_n: [f64; AXES], time_ns: u64) -> Self {
+        Self { time_ns, state: *dynamics.state(), force_n, bite_force_n: dynamics.bite_force_n() }
+    }
+}
+
+impl Emulation {
+    /// The scenario's drives and mechanism, at rest and switched on at `now_ns`.
+    ///
+    /// # Errors
+    /// [`PlantError`] where the scenario describes no mechanism or no drives.
+    pub fn new(scenario: &Scenario, now_ns: u64) -> Result<Self, PlantError> {
+        check_quantities(scenario)?;
+        let settings = DriveSettings::for_axes(scenario)?;
+        let mechanism = Mechanism::new(&scenario.mechanism)?;
+        let food = scenario.food.map(|config| Food::new(config, &closed_mouth(&mechanism, &scenario.jaw)));
+        let start = level(&mechanism, scenario.dynamics.initial_leg_m);
+        let dynamics = Dynamics::new(mechanism, scenario.dynamics, start, food)?;
+        let positions_m = dynamics.state().positions_m();
+        let drive = |(axis, settings): (usize, &DriveSettings)| {
+            let config = &settings.drive;
+            let encoder =
+                Encoder::new(config.encoder_resolution_m, config.encoder_noise_m, scenario.seed, axis);
+            DriveNode::new(settings, encoder, now_ns, positions_m[axis])
+        };
+        let (force_n, step_ns) = ([0.0; AXES], scenario.dynamics.step_ns);
+        Ok(Self {
+            drives: settings.iter().enumerate().map(drive).collect(),
+            sample: Sample::new(&dynamics, force_n, now_ns),
+            dynamics,
+            step_ns,
+            // Half a step beside the SYNCs of a cycle that is a multiple of the step: SYNCs are work enough.
+            next_step_ns: now_ns + step_ns / 2,
+            moved_to_ns: now_ns,
+            force_n,
+            synchronised: [true; AXES],
+        })
+    }
+
+    /// The mechanism's motion at the last SYNC.
+    pub fn truth(&self) -> Truth {
+        let Sample { time_ns, state, force_n, bite_force_n } = self.sample;
+        let (position_m, quaternion_wxyz) = pose_fields(&state.pose);
+        Truth {
+            sampled_ns: time_ns,
+            position_m,
+            quaternion_wxyz,
+            joint_m: state.positions_m(),
+            joint_m_s: self.dynamics.velocities_m_s(&state),
+            force_n,
+            bite_force_n,
+            ..Truth::default()
+        }
+    }
+
+    /// The drives, in the order of the axes.
+    #[cfg(test)]
+    pub(crate) fn drives(&self) -> &[DriveNode] {
+        &self.drives
+    }
+
+    /// When the drives' servo loops are due next, ns.
+    pub fn next_step_ns(&self) -> u64 {
+        self.next_step_ns
+    }
+
+    /// The time up to which the mechanism has moved, ns.
+    pub fn moved_to_ns(&self) -> u64 {
+        self.moved_to_ns
+    }
+
+    /// Delivers a frame to a drive. Only a SYNC moves the mechanism to this very instant.
+    pub fn deliver(&mut self, axis: usize, frame: &Frame, now_ns: u64) -> Result<(), DynamicsError> {
+        if frame.id() == CanId::from(Cob::Sync) {
+            self.move_mechanism(now_ns)?;
+            self.synchronise(axis, now_ns);
+        }
+        self.drives[axis].receive(now_ns, frame, self.dynamics.state().positions_m()[axis]);
+        Ok(())
+    }
+
+    /// Reports the error state of a drive's CAN controller to the drive.
+    pub fn set_error_state(&mut self, axis: usize, state: ErrorState) {
+        self.drives[axis].set_error_state(self.next_step_ns, state);
+    }
+
+    /// One step of every drive's servo loops, at the instant when it is due.
+    pub fn step(&mut self) -> Result<(), DynamicsError> {
+        let now_ns = self.next_step_ns;
+        self.move_mechanism(now_ns)?;
+        let positions_m = self.dynamics.state().positions_m();
+        for (axis, position_m) in positions_m.into_iter().enumerate() {
+            self.force_n[axis] = self.drives[axis].step(now_ns, position_m);
+        }
+        self.dynamics.push(&self.force_n)?;
+        self.next_step_ns += self.step_ns;
+        Ok(())
+    }
+
+    /// Skips the steps due before `now_ns`: the mechanism rests meanwhile. Returns the skipped time, ns.
+    pub fn skip_to(&mut self, now_ns: u64) -> u64 {
+        let steps = now_ns.saturating_sub(self.next_step_ns) / self.step_ns;
+        let skipped_ns = steps * self.step_ns;
+        self.next_step_ns += skipped_ns;
+        self.moved_to_ns += skipped_ns;
+        skipped_ns
+    }
+
+    /// The next frame that a drive transmits.
+    pub fn outgoing(&mut self, axis: usize) -> Option<Frame> {
+        self.drives[axis].outgoing()
+    }
+
+    /// Moves the mechanism under the forces of the last step.
+    fn move_mechanism(&mut self, now_ns: u64) -> Result<(), DynamicsError> {
+        if now_ns > self.moved_to_ns {
+            self.dynamics.advance((now_ns - self.moved_to_ns) as f64 * 1e-9)?;
+            self.moved_to_ns = now_ns;
+        }
+        Ok(())
+    }
+
+    /// Takes the sample with the first SYNC of a cycle, on whichever wire it arrives. A SYNC that reaches a drive for
+    /// the second time begins a new cycle; one that arrives later on a busier wire does not.
+    fn synchronise(&mut self, axis: usize, now_ns: u64) {
+        if self.synchronised[axis] {
+            self.synchronised = [false; AXES];
+            self.sample = Sample::new(&self.dynamics, self.force_n, now_ns);
+        }
+        self.synchronised[axis] = true;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use masseter_can::canopen::sync;
+
+    use super::*;
+
+    #[test]
+    fn truth_is_sampled_with_the_first_sync_of_a_cycle_on_whichever_wire() {
+        let mut emulation = Emulation::new(&Scenario::default(), 0).unwrap();
+        let mut sampled_ns = |axes: [usize; 3], at_ns: u64| {
+            for axis in axes {
+                emulation.deliver(axis, &sync::frame(), at_ns).unwrap();
+            }
+            emulation.truth().sampled_ns
+        };
+        let (first, second) = ([0, 1, 2], [3, 4, 5]);
+        assert_eq!(sampled_ns(first, 1000), 1000);
+        assert_eq!(sampled_ns(second, 1000), 1000);
+        assert_eq!(sampled_ns(second, 2000), 2000, "the first wire is busy");
+        assert_eq!(sampled_ns(first, 2300), 2000);
+        assert_eq!(sampled_ns(second, 3000), 3000);
+        assert_eq!(sampled_ns(second, 4000), 4000, "and does not get through at all");
+        assert_eq!(sampled_ns(first, 4500), 4000);
+        assert_eq!(sampled_ns(first, 5000), 5000, "the second wire is dead");
+    }
+
+    #[test]
+    fn time_left_out_is_counted_in_whole_steps_and_moves_nothing() {
+        let scenario = Scenario::default();
+        let step_ns = scenario.dynamics.step_ns;
+        let mut emulation = Emulation::new(&scenario, 0).unwrap();
+        let first_ns = emulation.next_step_ns();
+        (0..10).for_each(|_| emulation.step().unwrap());
+        let (moved_to_ns, positions_m) = (emulation.moved_to_ns(), emulation.dynamics.state().positions_m());
+
+        assert_eq!(emulation.skip_to(emulation.next_step_ns() + 3 * step_ns + 1), 3 * step_ns);
+        assert_eq!(emulation.next_step_ns(), first_ns + 13 * step_ns);
+        assert_eq!(emulation.moved_to_ns(), moved_to_ns + 3 * step_ns);
+        assert!(emulation.dynamics.state().positions_m().iter().eq(&positions_m));
+        assert_eq!(emulation.skip_to(0), 0);
+    }
+}

@@ -1,0 +1,14 @@
+//! The emulated robot: six drives, the mechanism that they move, and the wires they are on.
+//!
+//! [`Emulation`] co-simulates drives and mechanism and knows no wires. Simulated wires step it with a master
+//! (the plant's default link) or without one ([`OpenLink`]); [`Emulator`] steps it on real interfaces.
+
+mod co_simulation;
+mod emulator;
+mod open_link;
+mod virtual_link;
+
+pub use co_simulation::Emulation;
+pub use emulator::{Emulator, EmulatorCounters};
+pub use open_link::{NodePort, OpenLink};
+pub use virtual_link::VirtualLink;

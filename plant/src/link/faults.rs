@@ -1,0 +1,78 @@
+//! The scenario's faults as faults of a wire: node ids become ports, seconds become the wire's time.
+//!
+//! This module injects nothing; the wires do.
+
+use masseter_can::canopen::NodeId;
+use masseter_can::faults::{Fault, FaultKind};
+use masseter_can::{CanId, Frame};
+use masseter_shared::clock::{MILLISECOND_NS, SECOND_NS};
+use masseter_shared::config::{CanConfig, FaultConfig, FaultKindConfig, Scenario};
+
+use crate::error::PlantError;
+
+/// Identifier and data of a babbling node, unless the scenario sets others: only NMT has a higher priority.
+const BABBLE_ID: u16 = 0x001;
+const BABBLE_DATA: [u8; 8] = [0x55; 8];
+
+/// Seed of a bus' faults: each bus makes choices of its own.
+pub(crate) fn fault_seed(scenario: &Scenario, bus: usize) -> u64 {
+    scenario.seed.wrapping_add(bus as u64)
+}
+
+/// Time after which a controller in bus-off is restarted; none where it is not, ns.
+pub(crate) fn restart_after_ns(can: &CanConfig) -> Option<u64> {
+    (can.restart_ms > 0).then(|| u64::from(can.restart_ms) * MILLISECOND_NS)
+}
+
+/// The faults of a bus whose ports have these nodes, switched on at `now_ns`. A fault's number is its index in the
+/// scenario's list.
+pub(crate) fn faults_of_bus(
+    list: &[FaultConfig],
+    bus: usize,
+    nodes: &[NodeId],
+    now_ns: u64,
+) -> Result<Vec<Fault>, PlantError> {
+    let of_bus = list.iter().enumerate().filter(|(_, config)| config.bus == bus);
+    of_bus.map(|(number, config)| Ok(fault(number, config, port_of(config, nodes)?, now_ns))).collect()
+}
+
+fn fault(number: usize, config: &FaultConfig, port: Option<usize>, now_ns: u64) -> Fault {
+    let at_ns = |time_s: f64| now_ns.saturating_add((time_s * SECOND_NS as f64) as u64);
+    Fault {
+        number,
+        kind: kind(config),
+        from_ns: at_ns(config.from_s),
+        until_ns: config.until_s.map_or(u64::MAX, at_ns),
+        id: config.id.filter(|_| config.kind != FaultKindConfig::Babble).map(standard),
+        port,
+        probability: config.probability,
+        count: config.count.unwrap_or(if config.kind == FaultKindConfig::BusOff { 1 } else { u64::MAX }),
+    }
+}
+
+fn kind(config: &FaultConfig) -> FaultKind {
+    match config.kind {
+        FaultKindConfig::Corrupt => FaultKind::Corrupt,
+        FaultKindConfig::Lose => FaultKind::Lose,
+        FaultKindConfig::Delay => {
+            FaultKind::Delay { by_ns: u64::from(config.delay_us.unwrap_or_default()) * 1000 }
+        }
+        FaultKindConfig::Duplicate => FaultKind::Duplicate,
+        FaultKindConfig::Babble => {
+            FaultKind::Babble { frame: Frame::fixed(standard(config.id.unwrap_or(BABBLE_ID)), BABBLE_DATA) }
+        }
+        FaultKindConfig::Disconnect => FaultKind::Disconnect,
+        FaultKindConfig::BusOff => FaultKind::BusOff,
+    }
+}
+
+fn standard(id: u16) -> CanId {
+    CanId::standard(id & 0x7FF).expect("11 bits")
+}
+
+fn port_of(config: &FaultConfig, nodes: &[NodeId]) -> Result<Option<usize>, PlantError> {
+    let Some(node) = config.node else { return Ok(None) };
+    let port = nodes.iter().position(|id| id.get() == node);
+    let present = || nodes.iter().map(|id| id.get().to_string()).collect::<Vec<_>>().join(", ");
+    port.map(Some).ok_or_else(|| PlantError::FaultNode { node, bus: config.bus, present: present() })
+}

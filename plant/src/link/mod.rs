@@ -1,0 +1,41 @@
+//! The connection between master and drives, as the plant sees it: [`Buses`] for the master, [`Link`] for the core.
+//!
+//! [`sockets`] connects the master to real interfaces; the emulation brings simulated wires of its own. [`layout`]
+//! assigns drives to buses, [`faults`] assigns faults to them.
+
+use masseter_can::faults::FaultNote;
+use masseter_can::{Bus, ReceiveError, Tapped};
+use masseter_shared::messages::Truth;
+
+use crate::mechanism::DynamicsError;
+
+pub(crate) mod faults;
+mod interface_lock;
+pub(crate) mod layout;
+pub(crate) mod sockets;
+
+/// The wires that a master serves.
+pub trait Buses {
+    /// The master's port on a wire.
+    fn port(&mut self, bus: usize) -> impl Bus;
+}
+
+/// The wires of a plant: the master's ports, taps, and the truth of emulated drives.
+pub trait Link: Buses {
+    /// Simulates everything up to `until_ns`; real wires need no such call.
+    fn advance(&mut self, until_ns: u64) -> Result<(), DynamicsError>;
+
+    /// The next frame or error on a wire up to `now_ns`, from any node.
+    fn tap(&mut self, bus: usize, now_ns: u64) -> Result<Option<Tapped>, ReceiveError>;
+
+    /// The next beginning or end of an injected fault up to `now_ns`.
+    fn next_note(&mut self, bus: usize, now_ns: u64) -> Option<FaultNote>;
+
+    /// The axis whose drive is at a port of a simulated wire; none at the master's.
+    fn axis_at(&self, _bus: usize, _port: usize) -> Option<usize> {
+        None
+    }
+
+    /// The mechanism's true motion at the last SYNC, where it is emulated here.
+    fn truth(&self) -> Option<Truth>;
+}

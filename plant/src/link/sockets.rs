@@ -1,0 +1,75 @@
+//! The link to real drives: SocketCAN interfaces. It has no truth of the mechanism.
+
+use masseter_can::PortFaults;
+use masseter_can::canopen::NodeId;
+use masseter_can::faults::FaultNote;
+use masseter_can::{Bus, ReceiveError, SocketCan, Tapped};
+use masseter_shared::config::Scenario;
+use masseter_shared::geometry::AXES;
+use masseter_shared::messages::Truth;
+
+use super::faults::{fault_seed, faults_of_bus, restart_after_ns};
+use super::interface_lock::InterfaceLock;
+use super::layout::MASTER_PORT;
+use super::{Buses, Link};
+use crate::checks::check_quantities;
+use crate::error::PlantError;
+use crate::mechanism::DynamicsError;
+
+/// The master's port, the faults laid over it, and a tap on every wire.
+#[derive(Debug)]
+pub struct SocketLink {
+    ports: Vec<SocketCan>,
+    faults: Vec<PortFaults>,
+    taps: Vec<SocketCan>,
+    _locks: Vec<InterfaceLock>,
+}
+
+impl SocketLink {
+    /// Opens the scenario's interfaces, one a bus, each with the faults of the master's port there from `now_ns` on.
+    pub(crate) fn open(scenario: &Scenario, now_ns: u64) -> Result<Self, PlantError> {
+        check_quantities(scenario)?;
+        let can = &scenario.can;
+        let faults_of_port = |bus: usize| {
+            let faults = faults_of_bus(&scenario.faults, bus, &[NodeId::MASTER], now_ns)?;
+            let faults = PortFaults::new(faults, MASTER_PORT, fault_seed(scenario, bus))?;
+            Ok(faults.restarting_after(restart_after_ns(can)))
+        };
+        let faults = (0..can.buses.len()).map(faults_of_port).collect::<Result<_, PlantError>>()?;
+        let port = |interface: &String| SocketCan::open(interface, can.format());
+        let open = || can.interfaces.iter().map(port).collect::<Result<_, _>>();
+        let (ports, taps) = (open()?, open()?);
+        let lock = |interface: &String| InterfaceLock::take(interface);
+        let locks = can.interfaces.iter().map(lock).collect::<Result<_, _>>()?;
+        Ok(Self { ports, faults, taps, _locks: locks })
+    }
+
+    /// Blocks until a frame for the master arrives on a wire, at most until `until_ns`.
+    pub(crate) fn wait_for_frame(&self, until_ns: u64) {
+        SocketCan::wait::<AXES>(&self.ports, until_ns);
+    }
+}
+
+impl Buses for SocketLink {
+    fn port(&mut self, bus: usize) -> impl Bus {
+        self.faults[bus].over(&mut self.ports[bus])
+    }
+}
+
+impl Link for SocketLink {
+    fn advance(&mut self, _: u64) -> Result<(), DynamicsError> {
+        Ok(())
+    }
+
+    fn tap(&mut self, bus: usize, _: u64) -> Result<Option<Tapped>, ReceiveError> {
+        self.taps[bus].tap()
+    }
+
+    fn next_note(&mut self, bus: usize, now_ns: u64) -> Option<FaultNote> {
+        self.faults[bus].next_note(now_ns)
+    }
+
+    fn truth(&self) -> Option<Truth> {
+        None
+    }
+}

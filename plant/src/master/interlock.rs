@@ -1,0 +1,80 @@
+//! The interlock: whether the master refuses to move the drives, and for how long.
+//!
+//! Other parts find the reasons; the interlock remembers only the consequence.
+
+use masseter_shared::messages::codes::Cause;
+
+use super::events::Subject;
+
+/// A reason to stop the drives, with the value and the limit that explain it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Failure {
+    pub(super) cause: Cause,
+    pub(super) subject: Subject,
+    pub(super) value: f64,
+    pub(super) limit: f64,
+}
+
+impl Failure {
+    /// A failure that needs no value to explain it.
+    pub(super) fn new(cause: Cause, subject: Subject) -> Self {
+        Self { cause, subject, value: 0.0, limit: 0.0 }
+    }
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Lock {
+    /// Until every drive is verified again and the controller has switched them off.
+    UntilRestored,
+    Permanent,
+}
+
+/// The interlock of the drives' motion.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Interlock {
+    lock: Option<Lock>,
+}
+
+impl Interlock {
+    /// Whether the drives must not move.
+    pub(super) fn is_locked(self) -> bool {
+        self.lock.is_some()
+    }
+
+    /// Whether only a restored rig is missing for its release.
+    pub(super) fn awaits_restoration(self) -> bool {
+        self.lock == Some(Lock::UntilRestored)
+    }
+
+    /// Whether drives may be booted. During a stop they may not: it needs every drive's attention. After a permanent
+    /// lock nobody moves the drives again, and another master may control them.
+    pub(super) fn may_boot(self, drives_are_off: bool) -> bool {
+        match self.lock {
+            None => true,
+            Some(Lock::UntilRestored) => drives_are_off,
+            Some(Lock::Permanent) => false,
+        }
+    }
+
+    /// Locks for a cause; returns whether this is the first cause. A later cause, which is mostly a consequence of the
+    /// first, changes nothing.
+    pub(super) fn lock(&mut self, cause: Cause) -> bool {
+        let lock = match cause {
+            Cause::CommandLost | Cause::BadMessage | Cause::DriveFault => Lock::Permanent,
+            _ => Lock::UntilRestored,
+        };
+        let is_first = self.lock.is_none();
+        self.lock.get_or_insert(lock);
+        is_first
+    }
+
+    /// Locks permanently, whatever locked before; returns whether the lock was not permanent yet.
+    pub(super) fn lock_permanently(&mut self) -> bool {
+        self.lock.replace(Lock::Permanent) != Some(Lock::Permanent)
+    }
+
+    /// Releases the drives.
+    pub(super) fn release(&mut self) {
+        self.lock = None;
+    }
+}

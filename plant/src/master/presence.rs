@@ -1,0 +1,133 @@
+//! The presence of one drive: whether it is received, and whether it answers every SYNC once.
+
+use masseter_shared::messages::codes::Cause;
+
+/// Cycles in which an operational drive's process data may be missing.
+const MISSING_CYCLES: u32 = 3;
+/// New process data beyond one a SYNC that a single node may send: all those that may be missing may come late, at once.
+const SURPLUS: u32 = MISSING_CYCLES + 2;
+
+/// Memory of the supervision.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Presence {
+    heard_ns: u64,
+    /// Time of the newest process data.
+    answered_ns: u64,
+    missing_cycles: u32,
+    /// Recent new process data beyond one a SYNC. A late drive makes up for a cycle without any, one that receives a
+    /// repeated SYNC answers twice, and two of one id send one more every cycle.
+    surplus: u32,
+    /// New process data since the last SYNC.
+    new_data: u32,
+}
+
+impl Presence {
+    /// A drive that is expected from `now_ns` on.
+    pub(super) fn new(now_ns: u64) -> Self {
+        Self { heard_ns: now_ns, answered_ns: 0, missing_cycles: 0, surplus: 0, new_data: 0 }
+    }
+
+    /// SYNC demands new process data.
+    pub(super) fn begin_cycle(&mut self) {
+        self.surplus = match std::mem::take(&mut self.new_data) {
+            0 | 1 => self.surplus.saturating_sub(1),
+            several => self.surplus + several - 1,
+        };
+    }
+
+    /// The drive sent something.
+    pub(super) fn hear(&mut self, time_ns: u64) {
+        self.heard_ns = time_ns;
+    }
+
+    /// The drive sent process data; a frame that its transmitter had to repeat is not new.
+    pub(super) fn answer(&mut self, time_ns: u64, is_new: bool) {
+        self.answered_ns = time_ns;
+        self.new_data += u32::from(is_new);
+    }
+
+    /// Whether process data came after that time.
+    pub(super) fn has_answered_since(&self, time_ns: u64) -> bool {
+        self.answered_ns > time_ns
+    }
+
+    /// A cycle ended without process data.
+    pub(super) fn miss_cycle(&mut self) {
+        self.missing_cycles += 1;
+    }
+
+    /// Process data are missing no longer, or are counted anew.
+    pub(super) fn end_missing(&mut self) {
+        self.missing_cycles = 0;
+    }
+
+    /// Process data up to now are no answer any more.
+    pub(super) fn forget_answer(&mut self) {
+        self.answered_ns = 0;
+    }
+
+    /// Counting begins anew.
+    pub(super) fn restart(&mut self) {
+        (self.missing_cycles, self.surplus) = (0, 0);
+    }
+
+    /// The reason why the drive counts as lost, with value and limit.
+    pub(super) fn judge(&self, now_ns: u64, heartbeat_timeout_ns: u64) -> Option<(Cause, [f64; 2])> {
+        let silent_ns = now_ns.saturating_sub(self.heard_ns);
+        if silent_ns > heartbeat_timeout_ns {
+            Some((Cause::HeartbeatLost, [silent_ns, heartbeat_timeout_ns].map(|ns| ns as f64 / 1e6)))
+        } else if self.surplus > SURPLUS {
+            Some((Cause::DuplicateNode, [self.surplus, SURPLUS].map(f64::from)))
+        } else if self.missing_cycles > MISSING_CYCLES {
+            Some((Cause::ProcessDataLost, [self.missing_cycles, MISSING_CYCLES].map(f64::from)))
+        } else {
+            None
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The surplus after a number of SYNCs, each answered by that many new process data.
+    fn surplus(syncs: u32, answers: impl Fn(u32) -> u32) -> u32 {
+        let mut presence = Presence::new(0);
+        for sync in 0..syncs {
+            presence.begin_cycle();
+            (0..answers(sync)).for_each(|_| presence.answer(0, true));
+        }
+        presence.begin_cycle();
+        presence.surplus
+    }
+
+    #[test]
+    fn a_drive_that_answers_late_is_still_one() {
+        assert!(surplus(100, |sync| if sync % 2 == 0 { 0 } else { 2 }) <= 1, "every other cycle");
+        assert!(surplus(100, |sync| if sync % 4 == 3 { 4 } else { 0 }) <= SURPLUS);
+    }
+
+    #[test]
+    fn a_drive_that_answers_a_repeated_sync_again_is_still_one() {
+        assert!(surplus(10_000, |sync| if sync % 3 == 0 { 2 } else { 1 }) <= 1);
+    }
+
+    #[test]
+    fn a_repeated_frame_is_no_second_answer() {
+        let mut presence = Presence::new(0);
+        for _ in 0..100 {
+            presence.begin_cycle();
+            presence.answer(0, true);
+            presence.answer(0, false);
+        }
+        presence.begin_cycle();
+        assert_eq!(presence.judge(0, 1), None);
+        assert_eq!(presence.surplus, 0);
+    }
+
+    #[test]
+    fn two_drives_of_one_id_answer_once_too_often_every_cycle() {
+        assert_eq!(surplus(10, |_| 1), 0);
+        assert_eq!(surplus(10, |_| 2), 10);
+    }
+}

@@ -1,0 +1,194 @@
+//! One pass over the messages of a run.
+
+use masseter_recording::{Damage, Recorded};
+use masseter_shared::config::Scenario;
+use masseter_shared::messages::codes::ControllerState;
+use masseter_shared::messages::tap::{self, TapError};
+use masseter_shared::messages::{Event, FrameTap, Message, Reading, State, Truth};
+
+use crate::attribution::OverrunAttribution;
+use crate::code::Code;
+use crate::events::EventRecord;
+use crate::figures::Figures;
+use crate::freshness::Freshness;
+use crate::intervals::Intervals;
+use crate::longest_cycles::LongestCycles;
+use crate::outage::OutageWatch;
+use crate::over_time::Watch;
+use crate::response::Responses;
+use crate::sequence::SequenceCheck;
+use crate::skips::{Counters, Skips};
+use crate::tracking::{PoseSource, Tracking};
+
+/// Computes the [`Figures`] of a run from its messages, in their order in the recording.
+///
+/// It holds no more than a fixed amount of memory, beside one histogram per second of the run and the run's events.
+///
+/// ```
+/// use masseter_analysis::Analysis;
+/// use masseter_recording::Recorded;
+/// use masseter_shared::config::Scenario;
+/// use masseter_shared::messages::State;
+///
+/// let mut analysis = Analysis::new(&Scenario::default());
+/// for cycle in 1..=3 {
+///     analysis.take(&Recorded::State(State { seq: cycle, cycle, ..State::default() }))?;
+/// }
+/// let figures = analysis.finish(false, &[]);
+/// assert_eq!((figures.cycles, figures.missing_messages()), (3, 0));
+/// # Ok::<(), masseter_shared::messages::tap::TapError>(())
+/// ```
+#[derive(Debug)]
+pub struct Analysis {
+    period_ns: u64,
+    intervals: Intervals,
+    longest_cycles: LongestCycles,
+    tracking: Tracking,
+    sequence: SequenceCheck,
+    frames: Vec<u64>,
+    events: Vec<EventRecord>,
+    watch: Watch,
+    responses: Responses,
+    cycles: u64,
+    freshness: Freshness,
+    first_sample_ns: Option<u64>,
+    last_sample_ns: u64,
+    controller_skips: Skips,
+    plant_skips: Skips,
+    outage: OutageWatch,
+    final_state: Option<Code<ControllerState>>,
+    bite_force_max_n: Option<f64>,
+}
+
+impl Analysis {
+    /// For a run of this scenario, which was accepted when the run began.
+    pub fn new(scenario: &Scenario) -> Self {
+        let is_emulated = scenario.can.is_virtual();
+        let period_ns = scenario.period_ns();
+        Self {
+            period_ns,
+            intervals: Intervals::new(period_ns),
+            longest_cycles: LongestCycles::default(),
+            tracking: Tracking::new(
+                if is_emulated { PoseSource::Truth } else { PoseSource::Estimate },
+                period_ns,
+            ),
+            sequence: SequenceCheck::default(),
+            frames: Vec::new(),
+            events: Vec::new(),
+            watch: Watch::new(scenario.can.rates().ok()),
+            responses: Responses::for_scenario(scenario),
+            cycles: 0,
+            freshness: Freshness::default(),
+            first_sample_ns: None,
+            last_sample_ns: 0,
+            controller_skips: Skips::default(),
+            plant_skips: Skips::default(),
+            outage: OutageWatch::default(),
+            final_state: None,
+            // The robot has no sensor for this force.
+            bite_force_max_n: scenario.food.filter(|_| is_emulated).map(|_| 0.0),
+        }
+    }
+
+    /// Takes the next message.
+    ///
+    /// # Errors
+    /// When a message on topic `frame` holds no CAN frame.
+    pub fn take(&mut self, message: &Recorded) -> Result<(), TapError> {
+        self.sequence.take(message);
+        match message {
+            Recorded::Command(command) => {
+                self.intervals.command(command);
+                self.longest_cycles.command(command);
+            }
+            Recorded::Reading(reading) => self.reading(reading),
+            Recorded::State(state) => self.state(state),
+            Recorded::Truth(truth) => self.truth(truth),
+            Recorded::Frame(frame) => self.frame(frame)?,
+            Recorded::Event(event) => self.event(event),
+            Recorded::Machine(machine) => self.longest_cycles.machine(machine),
+        }
+        Ok(())
+    }
+
+    fn reading(&mut self, reading: &Reading) {
+        self.intervals.reading(reading);
+        self.longest_cycles.reading(reading);
+        self.watch.reading(reading);
+        self.outage.reading(reading);
+        self.plant_skips.take(&Counters::from(reading), self.period_ns);
+        self.first_sample_ns.get_or_insert(reading.sampled_ns);
+        self.last_sample_ns = reading.sampled_ns;
+    }
+
+    fn state(&mut self, state: &State) {
+        let is_fresh = self.freshness.take(state);
+        self.intervals.state(state, is_fresh);
+        self.longest_cycles.state(state, is_fresh);
+        self.watch.state(state);
+        self.outage.state(state);
+        if is_fresh {
+            self.tracking.solution(state);
+        }
+        self.cycles = self.cycles.max(state.seq);
+        self.controller_skips.take(&Counters::from(state), self.period_ns);
+        self.final_state = Some(state.controller_state.into());
+    }
+
+    fn truth(&mut self, truth: &Truth) {
+        self.tracking.truth(truth);
+        self.bite_force_max_n = self.bite_force_max_n.map(|most_n| most_n.max(truth.bite_force_n));
+        self.watch.truth(truth);
+    }
+
+    fn frame(&mut self, tap: &FrameTap) -> Result<(), TapError> {
+        let bus = tap::bus_of(tap)?;
+        let tapped = tap::decode(tap)?;
+        if bus >= self.frames.len() {
+            self.frames.resize(bus + 1, 0);
+        }
+        self.frames[bus] += u64::from(tapped.frame().is_some());
+        self.watch.frame(tap.time_ns, bus, &tapped);
+        self.responses.frame(tap, bus, &tapped);
+        Ok(())
+    }
+
+    fn event(&mut self, event: &Event) {
+        self.events.push(event.into());
+    }
+
+    /// The figures of all messages so far. `cut_short` and `damage` are what the recording itself lacks, as its
+    /// [`Reader`](masseter_recording::Reader) found them.
+    pub fn finish(mut self, cut_short: bool, damage: &[Damage]) -> Figures {
+        let (tracking, track) = self.tracking.finish();
+        let duration_ns =
+            self.last_sample_ns.saturating_sub(self.first_sample_ns.unwrap_or(self.last_sample_ns));
+        let topics = self.sequence.finish();
+        let missing_frames =
+            topics.iter().find(|topic| topic.topic == FrameTap::TOPIC).map_or(0, |topic| topic.missing);
+        self.events.sort_by_key(|event| event.time_ns);
+        Figures {
+            cycles: self.cycles,
+            duration_s: duration_ns as f64 / 1e9,
+            overrun_attribution: OverrunAttribution::new(&[&self.controller_skips, &self.plant_skips]),
+            controller_skips: self.controller_skips.figures(),
+            plant_skips: self.plant_skips.figures(),
+            readings: self.freshness.figures(),
+            final_state: self.final_state,
+            outage: self.outage.finish(self.period_ns),
+            tracking,
+            bite_force_max_n: self.bite_force_max_n,
+            worst_cycles: self.longest_cycles.finish(),
+            intervals: self.intervals.finish(),
+            topics,
+            frames: self.frames,
+            bus_response: self.responses.finish(missing_frames),
+            events: self.events,
+            cut_short,
+            damage: damage.to_vec(),
+            track,
+            over_time: self.watch.finish(),
+        }
+    }
+}

@@ -1,0 +1,93 @@
+//! The figures of a run: everything that a run is reported and judged by.
+
+use masseter_recording::Damage;
+use masseter_shared::messages::codes::ControllerState;
+use serde::Serialize;
+
+use crate::attribution::OverrunAttribution;
+use crate::bus_response::BusResponse;
+use crate::code::Code;
+use crate::events::EventRecord;
+use crate::freshness::ReadingFigures;
+use crate::longest_cycles::WorstCycle;
+use crate::measured::IntervalFigures;
+use crate::outage::Outage;
+use crate::over_time::OverTime;
+use crate::sequence::TopicFigures;
+use crate::skips::SkipFigures;
+use crate::tracking::{Track, TrackingFigures};
+
+/// The figures of a run. As JSON: `figures` of `summary.json`.
+#[derive(Debug, Clone, Serialize)]
+pub struct Figures {
+    /// Cycles that the controller ran.
+    pub cycles: u64,
+    /// From the first to the last reading, s.
+    pub duration_s: f64,
+    /// Deadlines that the controller skipped after overruns.
+    pub controller_skips: SkipFigures,
+    /// Deadlines that the plant skipped after overruns.
+    pub plant_skips: SkipFigures,
+    /// Which readings the controller's cycles used.
+    pub readings: ReadingFigures,
+    /// Rig or machine as the cause of the overlong stretches of work; none where no such stretch cost a deadline.
+    #[serde(rename = "suspicion")]
+    pub overrun_attribution: Option<OverrunAttribution>,
+    /// The last state of the controller's sequence; none without a single state message.
+    pub final_state: Option<Code<ControllerState>>,
+    /// Deadlines missed just before a safe stop; none without one.
+    pub outage: Option<Outage>,
+    /// Distance of the platform from its desired pose, while the motion played.
+    pub tracking: TrackingFigures,
+    /// The greatest force with which the emulated jaw bit on food, N; none without food, and on the robot.
+    pub bite_force_max_n: Option<f64>,
+    /// Measured intervals.
+    pub intervals: Vec<IntervalFigures>,
+    /// The longest cycles, each with the hop furthest above its median.
+    pub worst_cycles: Vec<WorstCycle>,
+    /// Messages and losses of each topic.
+    pub topics: Vec<TopicFigures>,
+    /// Frames on each bus.
+    pub frames: Vec<u64>,
+    /// Response times of the buses' messages, beside their bounds.
+    pub bus_response: BusResponse,
+    /// Events in the order of their times.
+    pub events: Vec<EventRecord>,
+    /// Whether the recording lacks its end.
+    pub cut_short: bool,
+    /// Stretches of the recording that cannot be read.
+    pub damage: Vec<Damage>,
+    /// Tracking over time, for plots.
+    #[serde(skip)]
+    pub track: Track,
+    /// Wake-ups, axes and buses over time, for plots.
+    #[serde(skip)]
+    pub over_time: OverTime,
+}
+
+impl Figures {
+    /// Deadlines that the two processes skipped, and those of them that the machine caused: it withheld the core while
+    /// they waited, or may have done so while they worked.
+    pub fn skipped(&self) -> (u64, u64) {
+        let (controller, plant) = (&self.controller_skips, &self.plant_skips);
+        let is_machine = self.overrun_attribution.is_some_and(|overruns| overruns.may_be_the_machine());
+        let while_working = if is_machine { controller.while_working + plant.while_working } else { 0 };
+        (controller.skipped + plant.skipped, controller.by_machine + plant.by_machine + while_working)
+    }
+
+    /// Skipped deadlines whose cause is unknown, because messages before them are missing.
+    pub fn skipped_of_unknown_cause(&self) -> u64 {
+        self.controller_skips.unknown_cause + self.plant_skips.unknown_cause
+    }
+
+    /// Whether the machine caused every skipped deadline.
+    pub fn only_the_machine(&self) -> bool {
+        let (skipped, by_machine) = self.skipped();
+        by_machine == skipped
+    }
+
+    /// Messages that were published and not recorded.
+    pub fn missing_messages(&self) -> u64 {
+        self.topics.iter().map(|topic| topic.missing).sum()
+    }
+}

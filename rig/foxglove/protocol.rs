@@ -1,0 +1,185 @@
+//! Messages of the Foxglove WebSocket protocol that a server without parameters, services, assets or publishing clients
+//! needs.
+//!
+//! Text messages are JSON objects with an `op`. Messages of channels are binary and little-endian: opcode, subscription
+//! id, time, bytes.
+
+use data_encoding::BASE64;
+use serde::{Deserialize, Serialize};
+
+use masseter_recording::{Channel, Definition, Encoded};
+
+/// Supported subprotocols, the newest first. The messages used here are the same in both.
+const SUBPROTOCOLS: [&str; 2] = ["foxglove.sdk.v1", "foxglove.websocket.v1"];
+const MESSAGE_DATA: u8 = 1;
+/// Bytes of opcode, subscription id and time.
+const MESSAGE_HEAD: usize = 1 + 4 + 8;
+
+/// The newest supported subprotocol of a client's offer, a list separated by commas.
+pub(super) fn choose_subprotocol(offered: &str) -> Option<&'static str> {
+    let offers = |name: &&str| offered.split(',').any(|offer| offer.trim() == *name);
+    SUBPROTOCOLS.into_iter().find(offers)
+}
+
+/// The level of a status message, by its number in the protocol.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Level {
+    Warning = 1,
+    Error = 2,
+}
+
+#[derive(Serialize)]
+#[serde(tag = "op", rename_all = "camelCase", rename_all_fields = "camelCase")]
+enum ServerMessage<'a> {
+    ServerInfo { name: &'a str, capabilities: [&'a str; 0], session_id: &'a str },
+    Advertise { channels: Vec<Advertised<'a>> },
+    Status { level: u8, message: &'a str },
+}
+
+#[derive(Serialize)]
+#[serde(rename_all = "camelCase")]
+struct Advertised<'a> {
+    id: u64,
+    topic: &'a str,
+    encoding: &'a str,
+    schema_name: &'a str,
+    schema_encoding: &'a str,
+    schema: String,
+}
+
+/// A request of a client.
+#[derive(Debug, PartialEq, Eq, Deserialize)]
+#[serde(tag = "op", rename_all = "camelCase", rename_all_fields = "camelCase")]
+pub(super) enum ClientMessage {
+    /// Subscribes to channels.
+    Subscribe { subscriptions: Vec<Subscription> },
+    /// Ends subscriptions.
+    Unsubscribe { subscription_ids: Vec<u32> },
+    /// An operation that this server does not offer.
+    #[serde(other)]
+    Unsupported,
+}
+
+/// A channel, and the client's id for its messages.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct Subscription {
+    pub id: u32,
+    channel_id: u64,
+}
+
+impl Subscription {
+    /// Index of the channel in [`Definition::all`], if it exists.
+    pub(super) fn channel_index(self) -> Option<usize> {
+        usize::try_from(self.channel_id).ok().filter(|index| *index < Channel::COUNT)
+    }
+}
+
+/// The first message to a client. `session` differs between runs, so that clients discard data of an earlier run.
+pub(super) fn server_info(session: &str) -> String {
+    to_json(&ServerMessage::ServerInfo { name: "masseter", capabilities: [], session_id: session })
+}
+
+/// All channels, each with its index as id.
+pub(super) fn advertise(definitions: &[Definition]) -> String {
+    let channels = definitions.iter().enumerate().map(|(id, definition)| channel(id, definition));
+    to_json(&ServerMessage::Advertise { channels: channels.collect() })
+}
+
+fn channel(id: usize, Definition { topic, schema, message_encoding }: &Definition) -> Advertised<'_> {
+    // JSON holds no bytes: text schemas are sent as they are, binary ones in base 64.
+    let schema_text = match schema.encoding.as_str() {
+        "protobuf" => BASE64.encode(&schema.data),
+        _ => String::from_utf8_lossy(&schema.data).into_owned(),
+    };
+    Advertised {
+        id: id as u64,
+        topic,
+        encoding: message_encoding,
+        schema_name: &schema.name,
+        schema_encoding: &schema.encoding,
+        schema: schema_text,
+    }
+}
+
+/// A message for the client's user.
+pub(super) fn status(level: Level, message: &str) -> String {
+    to_json(&ServerMessage::Status { level: level as u8, message })
+}
+
+/// A message of a subscribed channel.
+pub(super) fn message_data(subscription: u32, log_time_ns: u64, message: &Encoded) -> Vec<u8> {
+    let mut data = Vec::with_capacity(MESSAGE_HEAD + message.bytes.len());
+    data.push(MESSAGE_DATA);
+    data.extend_from_slice(&subscription.to_le_bytes());
+    data.extend_from_slice(&log_time_ns.to_le_bytes());
+    data.extend_from_slice(message.bytes);
+    data
+}
+
+fn to_json(message: &ServerMessage) -> String {
+    serde_json::to_string(message).expect("the message holds only strings, numbers and lists")
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::{Value, json};
+
+    use super::*;
+    use masseter_recording::Topic;
+
+    #[test]
+    fn the_newest_common_subprotocol_is_chosen() {
+        assert_eq!(choose_subprotocol("foxglove.websocket.v1, foxglove.sdk.v1"), Some("foxglove.sdk.v1"));
+        assert_eq!(choose_subprotocol("foxglove.websocket.v1"), Some("foxglove.websocket.v1"));
+        assert_eq!(choose_subprotocol("foxglove.sdk.v1.1,chat"), None);
+    }
+
+    #[test]
+    fn channels_are_advertised_as_recordings_define_them() {
+        let message: Value = serde_json::from_str(&advertise(&Definition::all())).unwrap();
+        assert_eq!(message["op"], "advertise");
+        for (id, definition) in Definition::all().iter().enumerate() {
+            let channel = &message["channels"][id];
+            assert_eq!(channel["id"], id);
+            assert_eq!(channel["topic"], definition.topic);
+            assert_eq!(channel["encoding"], *definition.message_encoding);
+            assert_eq!(channel["schemaName"], *definition.schema.name);
+            let schema = channel["schema"].as_str().unwrap();
+            match channel["schemaEncoding"].as_str().unwrap() {
+                "ros2msg" => assert_eq!(schema.as_bytes(), definition.schema.data),
+                "protobuf" => assert_eq!(BASE64.decode(schema.as_bytes()).unwrap(), definition.schema.data),
+                other => panic!("{other}"),
+            }
+        }
+    }
+
+    #[test]
+    fn requests_are_parsed() {
+        let parse = |text: &str| serde_json::from_str::<ClientMessage>(text);
+        let subscribe = json!({"op": "subscribe", "subscriptions": [{"id": 7, "channelId": 2}]});
+        let Ok(ClientMessage::Subscribe { subscriptions }) = parse(&subscribe.to_string()) else { panic!() };
+        assert_eq!((subscriptions[0].id, subscriptions[0].channel_index()), (7, Some(2)));
+        let beyond = Subscription { id: 7, channel_id: Channel::COUNT as u64 };
+        assert_eq!(beyond.channel_index(), None);
+        let unsubscribe = r#"{"op": "unsubscribe", "subscriptionIds": [7]}"#;
+        assert_eq!(parse(unsubscribe).unwrap(), ClientMessage::Unsubscribe { subscription_ids: vec![7] });
+        assert_eq!(
+            parse(r#"{"op": "getParameters", "parameterNames": []}"#).unwrap(),
+            ClientMessage::Unsupported
+        );
+        assert!(parse("{}").is_err() && parse("chat").is_err());
+    }
+
+    #[test]
+    fn a_message_is_opcode_subscription_id_time_and_bytes() {
+        let message = Encoded {
+            channel: Channel::Topic(Topic::State),
+            sequence: 1,
+            publish_time_ns: 2,
+            bytes: &[0xaa, 0xbb],
+        };
+        let data = message_data(0x0102_0304, 5, &message);
+        assert_eq!(data, [1, 4, 3, 2, 1, 5, 0, 0, 0, 0, 0, 0, 0, 0xaa, 0xbb]);
+    }
+}

@@ -1,0 +1,81 @@
+//! The sinks of every received message: the recording, Foxglove clients, and the progress on standard error.
+
+use masseter_recording::{Backlog, Recorded};
+use masseter_shared::messages::Message;
+use masseter_terminal::Exit;
+
+use super::progress::{Losses, Progress};
+use super::stderr_writer::{StderrWriter, terminal_rows};
+use crate::foxglove::{ClientLosses, FoxgloveServer};
+
+pub(super) struct Sinks {
+    pub backlog: Backlog,
+    pub server: Option<FoxgloveServer>,
+    pub progress: Option<Progress>,
+    pub stderr: StderrWriter,
+}
+
+impl Sinks {
+    /// Hands a message that was received at `now_ns` to every sink.
+    pub(super) fn write<M: Message>(&mut self, message: &M, now_ns: u64, on_topic: impl Fn(M) -> Recorded) {
+        self.backlog.record(message, now_ns);
+        if self.server.is_none() && self.progress.is_none() {
+            return;
+        }
+        let message = on_topic(*message);
+        if let Some(progress) = &mut self.progress {
+            progress.add(&message);
+        }
+        if let Some(server) = &self.server {
+            server.offer(&message, now_ns);
+        }
+    }
+
+    fn losses(&self) -> Losses {
+        let clients = self.server.as_ref().map(FoxgloveServer::counts);
+        Losses { unrecorded: self.backlog.dropped(), clients }
+    }
+
+    /// Shows the progress if it is due and the output before it is written.
+    pub(super) fn show_progress(&mut self, now_ns: u64) {
+        let losses = self.losses();
+        if let Some(error) = self.backlog.failed_just_now() {
+            self.stderr.write(format!("masseter: {error}; the run goes on without recording\n"));
+            if let Some(progress) = &mut self.progress {
+                progress.start_new_panel();
+            }
+        }
+        if let Some(progress) = &mut self.progress
+            && progress.is_due(now_ns)
+            && self.stderr.is_idle()
+        {
+            self.stderr.write(progress.next(now_ns, losses, terminal_rows()));
+        }
+    }
+
+    /// Closes every sink and reports what each lacks. The recording comes first, because clients can delay the rest.
+    pub(super) fn finish(self, now_ns: u64) -> Exit {
+        let losses = self.losses();
+        if let Some(panel) = self.progress.and_then(|it| it.last_panel(now_ns, losses, terminal_rows())) {
+            self.stderr.write(panel);
+        }
+        let loss = self.backlog.finish().loss();
+        if let Some(loss) = &loss {
+            self.stderr.write(format!("masseter: {loss}\n"));
+        }
+        if let Some(losses) = self.server.and_then(|server| client_losses(server.finish())) {
+            self.stderr.write(format!("masseter: {losses}\n"));
+        }
+        self.stderr.finish();
+        if loss.is_some() { Exit::Incomplete } else { Exit::Passed }
+    }
+}
+
+/// A sentence on what Foxglove clients missed; none if they missed nothing.
+fn client_losses(ClientLosses { dropped, cut_off }: ClientLosses) -> Option<String> {
+    let dropped = (dropped > 0)
+        .then(|| format!("{dropped} messages were not shown live, because clients read too slowly"));
+    let cut_off = (cut_off > 0).then(|| format!("{cut_off} clients did not read to the end"));
+    let losses: Vec<_> = [dropped, cut_off].into_iter().flatten().collect();
+    (!losses.is_empty()).then(|| losses.join("; "))
+}

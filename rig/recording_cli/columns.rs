@@ -1,0 +1,215 @@
+//! Messages as CSV rows, by the ROS 2 message definition in the recording; so recordings of other versions work too.
+//!
+//! A definition may hold numbers, arrays of fixed length, and one byte sequence at its end. Other definitions, and those
+//! of messages longer than any of the rig's, are refused.
+
+use std::fmt::Write;
+
+/// A primitive type of the definition language.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    Unsigned(usize),
+    Signed(usize),
+    Float(usize),
+}
+
+impl Kind {
+    fn named(name: &str) -> Option<Self> {
+        Some(match name {
+            "bool" | "uint8" | "byte" | "char" => Self::Unsigned(1),
+            "uint16" => Self::Unsigned(2),
+            "uint32" => Self::Unsigned(4),
+            "uint64" => Self::Unsigned(8),
+            "int8" => Self::Signed(1),
+            "int16" => Self::Signed(2),
+            "int32" => Self::Signed(4),
+            "int64" => Self::Signed(8),
+            "float32" => Self::Float(4),
+            "float64" => Self::Float(8),
+            _ => return None,
+        })
+    }
+
+    fn size(self) -> usize {
+        let (Self::Unsigned(size) | Self::Signed(size) | Self::Float(size)) = self;
+        size
+    }
+
+    /// Writes the little-endian value at the beginning of `bytes`.
+    fn write(self, line: &mut String, bytes: &[u8]) {
+        let mut wide = [0; 8];
+        wide[..self.size()].copy_from_slice(&bytes[..self.size()]);
+        let unsigned = u64::from_le_bytes(wide);
+        let unused = 64 - 8 * self.size() as u32;
+        let written = match self {
+            Self::Unsigned(_) => write!(line, "{unsigned}"),
+            Self::Signed(_) => write!(line, "{}", (unsigned << unused).cast_signed() >> unused),
+            Self::Float(4) => write!(line, "{}", f32::from_bits(unsigned as u32)),
+            Self::Float(_) => write!(line, "{}", f64::from_bits(unsigned)),
+        };
+        written.expect("a string takes any text");
+    }
+}
+
+/// Most bytes of a message, and so most columns. No message of the rig is longer.
+const MAX_MESSAGE_BYTES: usize = u16::MAX as usize;
+/// Most bytes of a field's name.
+const MAX_NAME_BYTES: usize = 255;
+
+/// The length before a byte sequence.
+const LENGTH: Kind = Kind::Unsigned(4);
+
+/// Whether the type of a field is a byte sequence, with or without a bound.
+fn is_byte_sequence(kind: &str) -> bool {
+    kind.strip_prefix("uint8[").is_some_and(|bound| bound == "]" || bound.starts_with("<="))
+}
+
+/// A column: a field, or an element of an array.
+#[derive(Debug, Clone, PartialEq, Eq)]
+struct Column {
+    name: String,
+    kind: Kind,
+    /// Byte offset behind the CDR header.
+    offset: usize,
+}
+
+/// The table of a message definition.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Columns {
+    fixed: Vec<Column>,
+    /// Bytes of the fixed columns.
+    bytes: usize,
+    /// Name of the byte sequence at the end, a column in hexadecimal digits.
+    tail: Option<String>,
+}
+
+impl Columns {
+    /// Parses a definition; none if it does not fit a table.
+    pub(super) fn from_definition(definition: &str) -> Option<Self> {
+        let mut table = Self { fixed: Vec::new(), bytes: 0, tail: None };
+        for line in definition.lines().map(|line| line.split('#').next().unwrap_or_default().trim()) {
+            if !line.is_empty() {
+                table.add_field(line)?;
+            }
+        }
+        Some(table)
+    }
+
+    fn add_field(&mut self, line: &str) -> Option<()> {
+        let (kind, name) = line.split_once(char::is_whitespace)?;
+        let name = name.trim();
+        if self.tail.is_some() || name.len() > MAX_NAME_BYTES {
+            return None;
+        }
+        if is_byte_sequence(kind) {
+            self.bytes = self.bytes.next_multiple_of(LENGTH.size()) + LENGTH.size();
+            self.tail = Some(name.to_owned());
+            return Some(());
+        }
+        let (kind, elements) = match kind.split_once('[') {
+            Some((kind, length)) => (kind, Some(length.strip_suffix(']')?.parse::<usize>().ok()?)),
+            None => (kind, None),
+        };
+        let kind = Kind::named(kind)?;
+        // CDR aligns each primitive to its own size.
+        self.bytes = self.bytes.next_multiple_of(kind.size());
+        if elements.unwrap_or(1) > MAX_MESSAGE_BYTES.saturating_sub(self.bytes) / kind.size() {
+            return None;
+        }
+        for element in 0..elements.unwrap_or(1) {
+            let name = if elements.is_some() { format!("{name}_{element}") } else { name.to_owned() };
+            self.fixed.push(Column { name, kind, offset: self.bytes });
+            self.bytes += kind.size();
+        }
+        Some(())
+    }
+
+    /// The names of the columns, separated by commas.
+    pub(super) fn header(&self) -> String {
+        let names = self.fixed.iter().map(|column| &column.name).chain(&self.tail);
+        names.map(String::as_str).collect::<Vec<_>>().join(",")
+    }
+
+    /// Appends the values of a message; false if its length differs from the definition's.
+    pub(super) fn write(&self, line: &mut String, body: &[u8]) -> bool {
+        let Some((fixed, tail)) = body.split_at_checked(self.bytes) else { return false };
+        let fits = match self.tail {
+            Some(_) => fixed.ends_with(&(tail.len() as u32).to_le_bytes()),
+            None => tail.is_empty(),
+        };
+        if !fits {
+            return false;
+        }
+        for (index, column) in self.fixed.iter().enumerate() {
+            if index > 0 {
+                line.push(',');
+            }
+            column.kind.write(line, &body[column.offset..]);
+        }
+        if self.tail.is_some() {
+            line.push(',');
+            tail.iter().try_for_each(|byte| write!(line, "{byte:02X}")).expect("a string takes any text");
+        }
+        true
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use masseter_shared::messages::{CanData, FrameTap, Message, Reading};
+
+    use super::*;
+
+    #[test]
+    fn a_message_of_the_rig_becomes_a_row() {
+        let columns = Columns::from_definition(&FrameTap::schema()).unwrap();
+        assert_eq!(columns.header(), "seq,published_ns,version,time_ns,queued_ns,id,bus,flags,data");
+        let mut bytes = [0; 64];
+        for length in 0..3 {
+            let data = CanData::padded(bytes, length);
+            let frame = FrameTap { seq: 3, id: 0x181, bus: 1, data, ..Default::default() };
+            let mut line = String::new();
+            assert!(columns.write(&mut line, frame.body()));
+            assert_eq!(line, "3,0,0,0,0,385,1,0,".to_owned() + &"AA".repeat(length));
+            assert!(!columns.write(&mut line, &frame.body()[..frame.body().len() - 1]));
+            assert!(!columns.write(&mut line, &[frame.body(), &[0]].concat()));
+            bytes[length] = 0xAA;
+        }
+        assert_eq!(Columns::from_definition(&Reading::schema()).unwrap().bytes, size_of::<Reading>());
+    }
+
+    #[test]
+    fn signs_fractions_and_alignment_are_kept() {
+        let columns =
+            Columns::from_definition("int8 a # sign\n\nfloat32 b\nint16[2] c\nfloat64 d\n").unwrap();
+        let mut body = vec![0xff, 0, 0, 0];
+        body.extend(0.5f32.to_le_bytes());
+        body.extend((-2i16).to_le_bytes());
+        body.extend(300i16.to_le_bytes());
+        body.extend([0; 4]);
+        body.extend((-0.1f64).to_le_bytes());
+        let mut line = String::new();
+        assert!(columns.write(&mut line, &body));
+        assert_eq!((columns.header().as_str(), line.as_str()), ("a,b,c_0,c_1,d", "-1,0.5,-2,300,-0.1"));
+    }
+
+    #[test]
+    fn definitions_that_fit_no_table_are_refused() {
+        for definition in [
+            "string name",
+            "float64[] values",
+            "uint8[] data\nuint8 more",
+            "geometry_msgs/Pose pose",
+            "uint8",
+            // More than any message holds, alone or together.
+            "uint8[99999999999] a",
+            "float64[18446744073709551615] a",
+            "uint8[40000] a\nuint8[40000] b",
+            &format!("uint8[9] {}", "a".repeat(300)),
+        ] {
+            assert_eq!(Columns::from_definition(definition), None, "{definition}");
+        }
+        let mut line = String::new();
+        assert!(!Columns::from_definition("uint64 a").unwrap().write(&mut line, &[0; 7]));
+    }
+}

@@ -1,0 +1,141 @@
+//! `masseter recording` (alias `log`): inspects, verifies, recovers and exports recordings.
+//!
+//! `info`, `verify` and `export` end with 0 if the recording is complete, 6 if messages or its end are missing, and 2 if it
+//! holds bytes that Masseter did not write. `recover` ends with 0 once it has saved what is readable. No verb changes the
+//! recording it reads.
+
+mod columns;
+mod export;
+mod selection;
+mod survey;
+
+use std::fs::{self, File};
+use std::io::{BufReader, BufWriter};
+use std::path::{Path, PathBuf};
+
+use anyhow::Context;
+use clap::{Args, Subcommand};
+use masseter_recording::{Reader, Recovered, RunFolder, recover};
+use masseter_terminal::{Exit, result};
+
+use selection::Selection;
+use survey::Survey;
+
+/// Verbs of `recording`.
+#[derive(Debug, Clone, Subcommand)]
+pub(crate) enum RecordingVerb {
+    /// Print topics, schemas, message counts, times and sizes
+    Info(RecordingArgs),
+    /// Check checksums and the sequence numbers of every topic
+    Verify(RecordingArgs),
+    /// Save the readable messages of a damaged recording in a new one
+    Recover(RecoverArgs),
+    /// Write one CSV file per topic, and the CAN frames as candump logs
+    Export(ExportArgs),
+}
+
+/// The recording to read.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct RecordingArgs {
+    /// Recording, or run folder
+    #[arg(default_value = "runs/latest")]
+    recording: PathBuf,
+}
+
+/// The arguments of `recover`.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct RecoverArgs {
+    #[command(flatten)]
+    from: RecordingArgs,
+    /// New recording; must not exist [default: beside the old one, with `.recovered` in its name]
+    #[arg(long, value_name = "FILE.mcap")]
+    out: Option<PathBuf>,
+}
+
+/// The arguments of `export`.
+#[derive(Debug, Clone, Args)]
+#[command(after_help = "Example:\n  masseter recording export runs/latest --topic state --out /tmp/tables")]
+pub(crate) struct ExportArgs {
+    #[command(flatten)]
+    from: RecordingArgs,
+    /// Folder for the files; must not exist
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// Topic to export; may be repeated [default: all that fit a table]
+    #[arg(long = "topic", value_name = "TOPIC")]
+    topics: Vec<String>,
+}
+
+impl RecordingArgs {
+    fn path(&self) -> anyhow::Result<PathBuf> {
+        if self.recording.is_dir() {
+            Ok(RunFolder::open(&self.recording)?.recording())
+        } else {
+            Ok(self.recording.clone())
+        }
+    }
+}
+
+/// Executes a verb.
+pub(crate) fn execute(verb: &RecordingVerb) -> anyhow::Result<Exit> {
+    match verb {
+        RecordingVerb::Info(args) => inspect(args, Survey::info),
+        RecordingVerb::Verify(args) => inspect(args, Survey::verification),
+        RecordingVerb::Recover(args) => save_readable(args),
+        RecordingVerb::Export(args) => export(args),
+    }
+}
+
+fn open(path: &Path) -> anyhow::Result<Reader<BufReader<File>>> {
+    Reader::open(path).with_context(|| path.display().to_string())
+}
+
+/// Reads a recording to its end.
+fn survey(path: &Path, reader: &mut Reader<BufReader<File>>) -> anyhow::Result<Survey> {
+    Survey::read(reader).with_context(|| path.display().to_string())
+}
+
+fn inspect(args: &RecordingArgs, to_text: impl FnOnce(&Survey) -> String) -> anyhow::Result<Exit> {
+    let path = args.path()?;
+    let survey = survey(&path, &mut open(&path)?)?;
+    result(&format!("{}\n{}", path.display(), to_text(&survey)))?;
+    Ok(survey.exit())
+}
+
+fn save_readable(args: &RecoverArgs) -> anyhow::Result<Exit> {
+    let path = args.from.path()?;
+    let out = args.out.clone().unwrap_or_else(|| path.with_extension("recovered.mcap"));
+    // An unreadable recording must leave no new file behind.
+    let survey = survey(&path, &mut open(&path)?)?;
+    let file = File::create_new(&out).with_context(|| format!("cannot create {}", out.display()))?;
+    let recovered = recover(&mut open(&path)?, BufWriter::new(file)).inspect_err(|_| {
+        // The first error is the one to report.
+        let _ = fs::remove_file(&out);
+    })?;
+    result(&format!("{}\n{}{}", out.display(), recovered_text(recovered), survey.loss()))?;
+    Ok(Exit::Passed)
+}
+
+fn recovered_text(recovered: Recovered) -> String {
+    let saved = format!("{} messages saved\n", recovered.messages);
+    match recovered.undefined {
+        0 => saved,
+        undefined => saved + &format!("{undefined} not saved: the definition of their channel is lost\n"),
+    }
+}
+
+fn export(args: &ExportArgs) -> anyhow::Result<Exit> {
+    let path = args.from.path()?;
+    let mut reader = open(&path)?;
+    let survey = survey(&path, &mut reader)?;
+    let Selection { tables, skipped } = Selection::new(reader.channels(), &args.topics)?;
+    fs::create_dir(&args.out).with_context(|| format!("cannot create {}", args.out.display()))?;
+    for (name, rows) in export::write(&mut open(&path)?, &args.out, tables)? {
+        result(&format!("{rows:>10}  {}\n", args.out.join(name).display()))?;
+    }
+    for (topic, reason) in skipped {
+        result(&format!("{:>10}  {topic}: {reason}\n", "no table"))?;
+    }
+    result(&survey.loss())?;
+    Ok(survey.exit())
+}

@@ -1,0 +1,226 @@
+//! One pass over a recording: its contents, its gaps, and its damage.
+
+use std::collections::BTreeMap;
+use std::fmt::Write;
+use std::io::{Read, Seek};
+
+use masseter_analysis::{SequenceCheck, TopicFigures};
+use masseter_recording::{Chunks, Damage, Entry, ReadError, Reader};
+use masseter_terminal::Exit;
+
+/// Figures of one channel.
+#[derive(Debug, Clone, Default)]
+struct ChannelFigures {
+    topic: String,
+    schema: String,
+    encoding: String,
+    messages: u64,
+    bytes: u64,
+    first_ns: u64,
+    last_ns: u64,
+    /// Messages that this program cannot decode, and the reason for the first.
+    unreadable: u64,
+    reason: Option<String>,
+}
+
+/// Contents, gaps and damage of a recording.
+#[derive(Debug)]
+pub(super) struct Survey {
+    size: u64,
+    channels: BTreeMap<u16, ChannelFigures>,
+    sequences: Vec<TopicFigures>,
+    undefined: u64,
+    chunks: Chunks,
+    damage: Vec<Damage>,
+    was_cut_short: bool,
+}
+
+impl Survey {
+    /// Reads the recording to its end.
+    pub(super) fn read<R: Read + Seek>(reader: &mut Reader<R>) -> Result<Self, ReadError> {
+        let mut channels: BTreeMap<u16, ChannelFigures> = BTreeMap::new();
+        let mut sequence = SequenceCheck::default();
+        let mut undefined = 0;
+        while let Some(entry) = reader.next_entry()? {
+            let Some(channel) = entry.channel else {
+                undefined += 1;
+                continue;
+            };
+            channels.entry(channel.id).or_default().add(&entry);
+            if let Some(Ok(message)) = entry.recorded() {
+                sequence.take(&message);
+            }
+        }
+        for (channel, schema) in reader.channels() {
+            let figures = channels.entry(channel.id).or_default();
+            figures.topic.clone_from(&channel.topic);
+            figures.encoding.clone_from(&channel.message_encoding);
+            figures.schema = schema.map_or_else(|| "no schema".to_owned(), |schema| schema.name.clone());
+        }
+        Ok(Self {
+            size: reader.size(),
+            channels,
+            sequences: sequence.finish(),
+            undefined,
+            chunks: reader.chunks().clone(),
+            damage: reader.damage().to_vec(),
+            was_cut_short: reader.was_cut_short(),
+        })
+    }
+
+    fn unreadable(&self) -> u64 {
+        self.channels.values().map(|channel| channel.unreadable).sum()
+    }
+
+    fn missing(&self) -> u64 {
+        self.sequences.iter().map(|topic| topic.missing).sum()
+    }
+
+    /// Whether the file has no damage, except that its last bytes may be missing.
+    fn is_undamaged_to_its_end(&self) -> bool {
+        match self.damage.as_slice() {
+            [] => true,
+            [tail] => self.was_cut_short && tail.to == self.size,
+            _ => false,
+        }
+    }
+
+    /// The exit code of a verb that read this recording.
+    pub(super) fn exit(&self) -> Exit {
+        if self.unreadable() + self.undefined > 0 || !self.is_undamaged_to_its_end() {
+            Exit::Usage
+        } else if self.was_cut_short || self.missing() > 0 {
+            Exit::Incomplete
+        } else {
+            Exit::Passed
+        }
+    }
+
+    /// A summary of the contents.
+    pub(super) fn info(&self) -> String {
+        let mut text = String::new();
+        self.write_info(&mut text).expect("a string takes any text");
+        text + &self.loss()
+    }
+
+    fn write_info(&self, text: &mut String) -> std::fmt::Result {
+        let chunks = &self.chunks;
+        let compression = if chunks.compression.is_empty() { "no compression" } else { &chunks.compression };
+        writeln!(
+            text,
+            "{} bytes; {} chunks, {compression}, {:.2} of their {} bytes",
+            self.size,
+            chunks.count,
+            chunks.compressed_bytes as f64 / chunks.uncompressed_bytes.max(1) as f64,
+            chunks.uncompressed_bytes,
+        )?;
+        if let Some(cycles) = self.cycles() {
+            writeln!(text, "{cycles} cycles, {:.0} bytes a cycle", self.size as f64 / cycles as f64)?;
+        }
+        writeln!(text, "{:<8} {:>9} {:>10} {:>10}  schema", "topic", "messages", "Hz", "bytes each")?;
+        for channel in self.channels.values() {
+            let seconds = (channel.last_ns - channel.first_ns) as f64 / 1e9;
+            writeln!(
+                text,
+                "{:<8} {:>9} {:>10} {:>10.0}  {} ({})",
+                channel.topic,
+                channel.messages,
+                rate(channel.messages, seconds),
+                channel.bytes as f64 / channel.messages.max(1) as f64,
+                channel.schema,
+                channel.encoding,
+            )?;
+        }
+        let from_ns = self.times().map(|(first, _)| first).min().unwrap_or(0);
+        let to_ns = self.times().map(|(_, last)| last).max().unwrap_or(0);
+        writeln!(text, "recorded from {from_ns} to {to_ns} ns, {:.3} s", (to_ns - from_ns) as f64 / 1e9)
+    }
+
+    fn times(&self) -> impl Iterator<Item = (u64, u64)> {
+        let received = self.channels.values().filter(|channel| channel.messages > 0);
+        received.map(|channel| (channel.first_ns, channel.last_ns))
+    }
+
+    /// Recorded cycles: the controller publishes one state in each.
+    fn cycles(&self) -> Option<u64> {
+        let states = self.channels.values().find(|channel| channel.topic == "state")?;
+        (states.messages > 0).then_some(states.messages)
+    }
+
+    /// The result of every check.
+    pub(super) fn verification(&self) -> String {
+        let mut text = String::new();
+        self.write_verification(&mut text).expect("a string takes any text");
+        text + &self.loss()
+    }
+
+    fn write_verification(&self, text: &mut String) -> std::fmt::Result {
+        for topic in &self.sequences {
+            let TopicFigures { topic, messages, missing } = topic;
+            let mark = mark(*missing);
+            writeln!(text, "{mark} {topic:<8} {messages:>9} messages, {missing} missing between them")?;
+        }
+        let Chunks { count, damaged, .. } = self.chunks;
+        writeln!(text, "{} {count} chunks match their checksums, {damaged} do not", mark(damaged))?;
+        let unreadable: u64 = self.damage.iter().map(|damage| damage.to - damage.from).sum();
+        writeln!(text, "{} {unreadable} of {} bytes cannot be read", mark(unreadable), self.size)?;
+        let end = if self.was_cut_short { "lacks" } else { "has" };
+        writeln!(text, "{} the file {end} its end", mark(self.was_cut_short.into()))
+    }
+
+    /// What is missing or unreadable, and where; empty for a complete recording.
+    pub(super) fn loss(&self) -> String {
+        let mut text = String::new();
+        self.write_loss(&mut text).expect("a string takes any text");
+        text
+    }
+
+    fn write_loss(&self, text: &mut String) -> std::fmt::Result {
+        for damage in &self.damage {
+            writeln!(text, "unreadable: {damage}")?;
+        }
+        for topic in self.sequences.iter().filter(|topic| topic.missing > 0) {
+            writeln!(text, "missing: {} messages on '{}'", topic.missing, topic.topic)?;
+        }
+        for channel in self.channels.values() {
+            if let Some(reason) = &channel.reason {
+                writeln!(text, "unreadable: {} messages; {reason}", channel.unreadable)?;
+            }
+        }
+        if self.undefined > 0 {
+            writeln!(text, "unreadable: {} messages whose channel is not defined", self.undefined)?;
+        }
+        if self.was_cut_short {
+            writeln!(text, "the file lacks its end: `masseter recording recover` writes a complete file")?;
+        }
+        Ok(())
+    }
+}
+
+/// The mark of a line with so many faults.
+fn mark(faults: u64) -> &'static str {
+    if faults == 0 { "ok  " } else { "FAIL" }
+}
+
+fn rate(messages: u64, seconds: f64) -> String {
+    if messages < 2 || seconds <= 0.0 {
+        return "–".to_owned();
+    }
+    format!("{:.1}", (messages - 1) as f64 / seconds)
+}
+
+impl ChannelFigures {
+    fn add(&mut self, entry: &Entry) {
+        if self.messages == 0 {
+            self.first_ns = entry.header.log_time;
+        }
+        self.first_ns = self.first_ns.min(entry.header.log_time);
+        self.last_ns = self.last_ns.max(entry.header.log_time);
+        self.messages += 1;
+        self.bytes += entry.data.len() as u64;
+        if let Some(Err(error)) = entry.recorded() {
+            self.unreadable += 1;
+            self.reason.get_or_insert_with(|| error.to_string());
+        }
+    }
+}

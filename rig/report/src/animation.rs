@@ -1,0 +1,78 @@
+//! The recorded motion as data for the 3-D animation of the page.
+
+use masseter_shared::config::Scenario;
+use masseter_shared::geometry::{LEGS, Mechanism, Pose};
+use masseter_shared::messages::pose_fields;
+use serde::Serialize;
+
+use masseter_analysis::{Figures, PoseSource, TrackingSample};
+use masseter_recording::jaw_points;
+
+/// Positions to the micrometre and quaternions to a millionth are finer than any screen.
+const DIGITS: f64 = 1e6;
+
+/// Mechanism and motion; metres, base frame.
+#[derive(Serialize)]
+struct Animation {
+    /// Middle of each slide.
+    centres: [[f64; 3]; LEGS],
+    /// Direction of each slide.
+    along: [[f64; 3]; LEGS],
+    /// Ends of the slides' strokes.
+    slide_ends: [f64; 2],
+    /// Platform corners in the platform frame.
+    corners: [[f64; 3]; LEGS],
+    /// Incisal point and condyles in the platform frame.
+    jaw: [[f64; 3]; 3],
+    /// Time in s, then the actual and the desired pose of the platform and, where the actual pose is the true one, the
+    /// estimated one, each as x y z, w x y z.
+    frames: Vec<Vec<f64>>,
+}
+
+/// The animation as JSON; none without a motion or without a mechanism.
+pub(crate) fn json(scenario: &Scenario, figures: &Figures) -> Option<String> {
+    let mechanism = Mechanism::new(&scenario.mechanism).ok()?;
+    let samples = &figures.track.samples;
+    let first = samples.first()?;
+    let frame = |sample| frame(sample, first.sampled_ns, figures.tracking.actual_source);
+    let animation = Animation {
+        centres: std::array::from_fn(|leg| mechanism.hinge(leg, 0.0).into()),
+        along: std::array::from_fn(|leg| mechanism.slide_direction(leg).into()),
+        slide_ends: mechanism.strokes().slide_m,
+        corners: mechanism.platform_corners().map(Into::into),
+        jaw: jaw_points(&scenario.jaw).map(Into::into),
+        frames: samples.iter().map(frame).collect(),
+    };
+    serde_json::to_string(&animation).ok()
+}
+
+fn frame(sample: &TrackingSample, began_ns: u64, source: PoseSource) -> Vec<f64> {
+    let mut frame = vec![rounded(sample.sampled_ns.saturating_sub(began_ns) as f64 / 1e9)];
+    frame.extend(numbers(&sample.actual).chain(numbers(&sample.desired)));
+    if source == PoseSource::Truth {
+        frame.extend(numbers(&sample.estimated));
+    }
+    frame
+}
+
+fn numbers(pose: &Pose) -> impl Iterator<Item = f64> {
+    let (position_m, quaternion) = pose_fields(pose);
+    position_m.into_iter().chain(quaternion).map(rounded)
+}
+
+fn rounded(value: f64) -> f64 {
+    (value * DIGITS).round() / DIGITS
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn without_truth_there_is_one_outline_less() {
+        let still = Pose::identity();
+        let sample = TrackingSample { sampled_ns: 7, desired: still, estimated: still, actual: still };
+        let numbers = |reference| frame(&sample, 0, reference).len();
+        assert_eq!((numbers(PoseSource::Truth), numbers(PoseSource::Estimate)), (1 + 3 * 7, 1 + 2 * 7));
+    }
+}

@@ -1,0 +1,124 @@
+//! The report of a run folder: one pass over its recording, then every file of the report.
+
+use std::fs;
+use std::path::Path;
+
+use anyhow::Context;
+use masseter_analysis::{Analysis, Figures};
+use masseter_recording::{Manifest, ReadError, Reader, Recorded, RunFolder};
+use masseter_shared::config::Scenario;
+use masseter_shared::messages::tap::{self, TapError};
+use masseter_terminal::{Exit, Failure, Format, OrFailure, show, status};
+
+use crate::candump_logs::CandumpLogs;
+use crate::verdict::Verdict;
+use crate::write_error::WriteError;
+use crate::{event_log, histogram_log, junit, page, summary, table};
+
+/// Why the recording of a run could not be analysed.
+#[derive(Debug, thiserror::Error)]
+enum AnalysisError {
+    #[error(transparent)]
+    Read(#[from] ReadError),
+    #[error("a message on topic 'frame' holds no CAN frame: {0}")]
+    Frame(#[from] TapError),
+}
+
+/// Analyses and judges a run that has just ended, writes its report and prints it.
+///
+/// # Errors
+/// With [`Exit::Incomplete`] when the recording cannot be read or a file cannot be written.
+pub fn report_run(folder: &RunFolder, manifest: &Manifest, format: Format) -> Result<Exit, Failure> {
+    let (figures, logged) =
+        analyse(folder, &manifest.scenario).context("the run's recording cannot be analysed").incomplete()?;
+    logged.and_then(|()| write_data(folder, &figures)).incomplete()?;
+    write_report(folder, manifest, &figures, format)
+}
+
+/// `masseter report`: the same of a past run. Where its folder is read-only, the run is shown and no file is written.
+///
+/// # Errors
+/// With [`Exit::Usage`] when the folder holds no readable run, with [`Exit::Incomplete`] when a file cannot be written.
+pub fn report_past_run(path: &Path, format: Format) -> Result<Exit, Failure> {
+    let folder = RunFolder::open(path).usage()?;
+    let unread = || format!("cannot read {}", folder.manifest().display());
+    let manifest = Manifest::read(&folder).with_context(unread).usage()?;
+    let (figures, logged) = analyse(&folder, &manifest.scenario).usage()?;
+    match logged.and_then(|()| write_data(&folder, &figures)) {
+        Err(error) if error.is_read_only() => {
+            let WriteError { path, error } = error;
+            status!(
+                "masseter: cannot write {}: {error}; the run is shown, and no file written",
+                path.display()
+            );
+            Ok(judge_and_show(&folder, &manifest, &figures, format)?.0.outcome.exit())
+        }
+        written => {
+            written.incomplete()?;
+            write_report(&folder, &manifest, &figures, format)
+        }
+    }
+}
+
+/// Reads the recording once: its figures, and whether its CAN frames could be written as candump logs.
+fn analyse(
+    folder: &RunFolder,
+    scenario: &Scenario,
+) -> Result<(Figures, Result<(), WriteError>), AnalysisError> {
+    let mut reader = Reader::open(&folder.recording())?;
+    let mut analysis = Analysis::new(scenario);
+    let mut logs = Ok(CandumpLogs::new(folder.path(), &scenario.can.interfaces));
+    while let Some(message) = reader.next_message()? {
+        analysis.take(&message)?;
+        if let (Recorded::Frame(frame), Ok(open)) = (&message, &mut logs)
+            && let Err(error) = open.write(tap::bus_of(frame)?, &tap::decode(frame)?)
+        {
+            logs = Err(error);
+        }
+    }
+    let figures = analysis.finish(reader.was_cut_short(), reader.damage());
+    Ok((figures, logs.and_then(CandumpLogs::finish).map(drop)))
+}
+
+/// Writes histogram logs and events.
+fn write_data(folder: &RunFolder, figures: &Figures) -> Result<(), WriteError> {
+    histogram_log::write_all(&folder.histograms(), &figures.intervals)?;
+    event_log::write(&folder.events(), &figures.events)
+}
+
+/// Judges the run, prints the result and writes summary, JUnit XML and page.
+fn write_report(
+    folder: &RunFolder,
+    manifest: &Manifest,
+    figures: &Figures,
+    format: Format,
+) -> Result<Exit, Failure> {
+    let (verdict, summary) = judge_and_show(folder, manifest, figures, format)?;
+    for (path, text) in [
+        (folder.summary(), summary),
+        (folder.junit(), junit::xml(manifest, figures, &verdict)),
+        (folder.report(), page::html(manifest, figures, &verdict)),
+    ] {
+        fs::write(&path, text).map_err(WriteError::for_file(&path)).incomplete()?;
+    }
+    Ok(verdict.outcome.exit())
+}
+
+/// Judges the run and prints the result. Returns the verdict and the summary as JSON.
+fn judge_and_show(
+    folder: &RunFolder,
+    manifest: &Manifest,
+    figures: &Figures,
+    format: Format,
+) -> Result<(Verdict, String), Failure> {
+    let verdict = Verdict::new(manifest, figures);
+    let summary = summary::json(&verdict, figures).context("cannot write the summary").incomplete()?;
+    match format {
+        Format::Human => {
+            let table = table::text(manifest, figures, &verdict);
+            show(&format!("{table}\nfiles: {}\n", folder.path().display()));
+        }
+        Format::Json => show(&summary),
+    }
+    Ok((verdict, summary))
+}

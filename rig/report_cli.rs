@@ -1,0 +1,30 @@
+//! `masseter report`: the report of a run folder, or the comparison of two.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use masseter_terminal::{Exit, Failure, Format, OrFailure};
+
+/// The arguments of `report`.
+#[derive(Debug, Clone, Args)]
+#[command(
+    after_help = "Examples:\n  masseter report\n  masseter report runs/before runs/after --format json"
+)]
+pub(crate) struct ReportArgs {
+    /// Run folder
+    #[arg(default_value = "runs/latest")]
+    folder: PathBuf,
+    /// Second run folder, to compare with the first
+    against: Option<PathBuf>,
+    /// Format of standard output
+    #[arg(long, value_enum, default_value_t)]
+    format: Format,
+}
+
+/// Judges a run again, or compares two runs.
+pub(crate) fn report(args: &ReportArgs) -> Result<Exit, Failure> {
+    match &args.against {
+        None => masseter_report::report_past_run(&args.folder, args.format),
+        Some(against) => masseter_report::compare::runs(&args.folder, against, args.format).usage(),
+    }
+}

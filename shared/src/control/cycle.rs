@@ -1,0 +1,69 @@
+//! The order of a controller's cycle, for every clock.
+
+use std::borrow::Borrow;
+
+use super::{Controller, Tick};
+use crate::messages::{Command, Event, Reading, State};
+use crate::realtime::Wake;
+
+/// Where a controller's messages come from and go to, and the clock of its stamps.
+pub trait ControllerPorts {
+    /// A reading, owned or in shared memory.
+    type Reading: Borrow<Reading>;
+    /// Why a message could not be exchanged.
+    type Error;
+
+    /// Now, ns.
+    fn now_ns(&self) -> u64;
+
+    /// The reading of this cycle, or the newest there is once waiting any longer would cost the deadline.
+    ///
+    /// # Errors
+    /// When the messages cannot be received.
+    fn reading(&mut self, wake: &Wake) -> Result<Option<Self::Reading>, Self::Error>;
+
+    /// Publishes the command that `fill` writes.
+    ///
+    /// # Errors
+    /// When the message cannot be sent.
+    fn publish_command(&mut self, fill: impl FnOnce(&mut Command)) -> Result<(), Self::Error>;
+
+    /// Publishes the state that `fill` writes.
+    ///
+    /// # Errors
+    /// When the message cannot be sent.
+    fn publish_state(&mut self, fill: impl FnOnce(&mut State)) -> Result<(), Self::Error>;
+
+    /// Publishes an event.
+    ///
+    /// # Errors
+    /// When the message cannot be sent.
+    fn publish_event(&mut self, event: &Event) -> Result<(), Self::Error>;
+}
+
+/// Runs one cycle: reading, decision, command; then state and event, for which nobody waits.
+///
+/// # Errors
+/// Those of the ports.
+pub fn run_cycle<C: Controller, P: ControllerPorts>(
+    controller: &mut C,
+    ports: &mut P,
+    wake: &Wake,
+) -> Result<(), P::Error> {
+    let reading = ports.reading(wake)?;
+    let received_ns = ports.now_ns();
+    controller.observe(reading.as_ref().map(Borrow::borrow));
+    let solved_ns = ports.now_ns();
+    let event = controller.decide(Tick { cycle: wake.cycle, now_ns: solved_ns });
+    let commanded_ns = ports.now_ns();
+    ports.publish_command(|command| controller.fill_command(command))?;
+    ports.publish_state(|state| {
+        controller.fill_state(state);
+        (state.due_ns, state.woke_ns) = (wake.due_ns, wake.woke_ns);
+        (state.received_ns, state.solved_ns, state.commanded_ns) = (received_ns, solved_ns, commanded_ns);
+        (state.skipped_cycles, state.stalled_ns) = (wake.skipped, wake.account.stalled_ns);
+        (state.spun_ns, state.worked_ns) = (wake.account.spun_ns, wake.account.worked_ns);
+        state.overlong_ns = wake.account.overlong_ns;
+    })?;
+    event.map_or(Ok(()), |event| ports.publish_event(&event))
+}

@@ -1,0 +1,121 @@
+//! A controller as a process: binds it to iceoryx2 and to real time, and decides nothing.
+
+use super::{Controller, ControllerPorts, Outcome, run_cycle};
+use crate::clock;
+use crate::config::Scenario;
+use crate::lifecycle::{Assignment, ProcessError};
+use crate::messages::{Command, Event, Reading, State};
+use crate::realtime::{Cycle, Wake};
+use crate::transport::{Inlet, Node, Outlet, Received, TransportError};
+
+/// Runs the controller that `build` makes, until it is done.
+///
+/// # Errors
+/// Those of `build`, and [`ProcessError`] when the process cannot start or loses its messages.
+pub fn run<C: Controller, E: From<ProcessError>>(
+    assignment: &Assignment,
+    build: impl FnOnce(&Scenario) -> Result<C, E>,
+) -> Result<Outcome, E> {
+    let post = assignment.take_up()?;
+    let (scenario, schedule) = (&post.scenario, &post.schedule);
+    let mut controller = build(scenario)?;
+    let ports = Ports::open(&post.node)?;
+    let start = post.ready_on(scenario.realtime.cores[0])?;
+    ports.connect().map_err(ProcessError::from)?;
+
+    let mut real_time = RealTime {
+        ports,
+        cycle: Cycle::new(start.epoch_ns + schedule.controller_at_ns, scenario.period_ns()),
+        reading_timeout_ns: (schedule.command_by_ns - schedule.controller_at_ns) / 2,
+    };
+    loop {
+        if let Some(outcome) = controller.outcome() {
+            return Ok(outcome);
+        }
+        if post.stop.is_made() {
+            controller.request_stop();
+        }
+        let wake = real_time.wait(&controller).map_err(ProcessError::from)?;
+        run_cycle(&mut controller, &mut real_time, &wake).map_err(ProcessError::from)?;
+    }
+}
+
+/// The ports and the deadlines of the controller's cycles.
+struct RealTime {
+    ports: Ports,
+    cycle: Cycle,
+    /// From the deadline until the newest reading is used, whichever that is, ns.
+    reading_timeout_ns: u64,
+}
+
+impl RealTime {
+    /// Waits for the next deadline, and warms up before it.
+    fn wait(&mut self, controller: &impl Controller) -> Result<Wake, TransportError> {
+        self.cycle.wait_warm(|| self.ports.warm_up(controller))
+    }
+}
+
+/// The controller's ports on iceoryx2.
+struct Ports {
+    readings: Inlet<Reading>,
+    commands: Outlet<Command>,
+    states: Outlet<State>,
+    events: Outlet<Event>,
+}
+
+impl Ports {
+    fn open(node: &Node) -> Result<Self, ProcessError> {
+        let ports = Self {
+            readings: node.newest_inlet()?,
+            commands: node.outlet()?,
+            states: node.outlet()?,
+            events: node.outlet()?,
+        };
+        ports.commands.warm_up()?;
+        ports.states.warm_up()?;
+        ports.events.warm_up()?;
+        Ok(ports)
+    }
+
+    /// Connects to the ports of the other processes before the first cycle, since a connection makes and maps files.
+    fn connect(&self) -> Result<(), TransportError> {
+        self.readings.connect()?;
+        self.commands.connect()?;
+        self.states.connect()?;
+        self.events.connect()
+    }
+
+    /// Warms the controller up, and touches the memory of the next messages.
+    fn warm_up(&self, controller: &impl Controller) -> Result<(), TransportError> {
+        controller.warm_up();
+        self.commands.warm_up()?;
+        self.states.warm_up()
+    }
+}
+
+impl ControllerPorts for RealTime {
+    type Reading = Received<Reading>;
+    type Error = TransportError;
+
+    fn now_ns(&self) -> u64 {
+        clock::now_ns()
+    }
+
+    fn reading(&mut self, wake: &Wake) -> Result<Option<Received<Reading>>, TransportError> {
+        let deadline_ns = wake.due_ns + self.reading_timeout_ns;
+        let is_awaited = |reading: &Reading| reading.cycle >= wake.cycle;
+        self.ports.readings.latest_by(deadline_ns, self.cycle.waiter(), is_awaited)
+    }
+
+    fn publish_command(&mut self, fill: impl FnOnce(&mut Command)) -> Result<(), TransportError> {
+        self.ports.commands.publish(fill)
+    }
+
+    fn publish_state(&mut self, fill: impl FnOnce(&mut State)) -> Result<(), TransportError> {
+        self.ports.states.publish(fill)
+    }
+
+    fn publish_event(&mut self, event: &Event) -> Result<(), TransportError> {
+        self.ports.events.publish(|message| *message = *event)
+    }
+}
