@@ -21,7 +21,7 @@ pub enum Ending {
     Interrupted,
     /// Real time was required and refused.
     NotStarted,
-    /// The logger could not write everything.
+    /// The recorder could not write everything.
     RecordingFailed,
 }
 

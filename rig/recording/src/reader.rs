@@ -135,7 +135,7 @@ impl<R: Read + Seek> Reader<R> {
         self.walk.size()
     }
 
-    /// At the end: whether the file lacks its own, as a killed logger leaves it.
+    /// At the end: whether the file lacks its own, as a killed recorder leaves it.
     pub fn was_cut_short(&self) -> bool {
         !self.walk.is_closed()
     }

@@ -90,7 +90,7 @@ impl KinematicsArgs {
             return Ok(None);
         }
         let overrides = Overrides { trajectory: self.trajectory.clone(), ..Overrides::default() };
-        let scenario = masseter_plan::scenario(self.scenario.as_deref(), &overrides)?;
+        let scenario = masseter_plan::scenario_with_overrides(self.scenario.as_deref(), &overrides)?;
         if scenario.mechanism != MechanismConfig::default() {
             bail!("the study is about the published mechanism; leave [mechanism] out of the scenario");
         }

@@ -15,7 +15,7 @@ use clap::{Args, Subcommand, ValueEnum};
 use masseter_controller::kinematics::uniqueness::InputBox;
 use masseter_shared::geometry::{GeometryError, Mechanism, MechanismConfig};
 
-use masseter_plan::Plan;
+use masseter_plan::RunPlan;
 use masseter_terminal::{Exit, result_line};
 
 /// What `uniqueness` does.
@@ -117,9 +117,9 @@ fn to_prove(args: &ProveArgs) -> anyhow::Result<(Mechanism, Vec<InputBox>)> {
         let whole = args.region.inputs(&mechanism);
         return Ok((mechanism, vec![whole]));
     };
-    let plan = Plan::of(masseter_plan::changed(args.scenario.as_deref(), |scenario| {
+    let plan = RunPlan::new(masseter_plan::read_scenario_with(args.scenario.as_deref(), |scenario| {
         if let Some(path) = &args.trajectory {
-            masseter_plan::play(path, scenario);
+            masseter_plan::play_file(path, scenario);
         }
         Ok(())
     })?)?;
