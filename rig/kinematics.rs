@@ -51,7 +51,7 @@ impl KinematicsArgs {
             return Ok(None);
         }
         let overrides = Overrides { trajectory: self.trajectory.clone(), ..Overrides::default() };
-        Ok(Some(masseter_plan::scenario(self.scenario.as_deref(), &overrides)?))
+        Ok(Some(masseter_plan::scenario_with_overrides(self.scenario.as_deref(), &overrides)?))
     }
 
     /// The command line that repeats the study.

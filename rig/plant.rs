@@ -70,7 +70,7 @@ fn emulate(args: &PlantArgs) -> anyhow::Result<()> {
 }
 
 fn resolve(args: &PlantArgs) -> anyhow::Result<Scenario> {
-    let scenario = masseter_plan::changed(args.file.as_deref(), |scenario| {
+    let scenario = masseter_plan::read_scenario_with(args.file.as_deref(), |scenario| {
         if let Some(wires) = &args.can {
             scenario.can.interfaces.clone_from(&wires.0);
         }

@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use anyhow::Context;
 use clap::{Args, Subcommand, ValueEnum};
 use masseter_controller::kinematics::uniqueness::InputBox;
-use masseter_plan::Plan;
+use masseter_plan::RunPlan;
 use masseter_shared::geometry::{AXIS_NAMES, Mechanism, MechanismConfig};
 use masseter_study::uniqueness::{Ambiguous, boxes, prove, search};
 use masseter_terminal::{Exit, new_file, result_line, status};
@@ -149,9 +149,9 @@ fn inputs_to_prove(args: &ProveArgs) -> anyhow::Result<(Mechanism, Vec<InputBox>
         let inputs = args.region.inputs(&mechanism);
         return Ok((mechanism, vec![inputs]));
     };
-    let plan = Plan::of(masseter_plan::changed(args.scenario.as_deref(), |scenario| {
+    let plan = RunPlan::new(masseter_plan::read_scenario_with(args.scenario.as_deref(), |scenario| {
         if let Some(path) = &args.trajectory {
-            masseter_plan::play(path, scenario);
+            masseter_plan::play_file(path, scenario);
         }
         Ok(())
     })?)?;

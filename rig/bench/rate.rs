@@ -60,7 +60,7 @@ pub(super) fn measure(rounds: u32, cores: [usize; 2]) -> anyhow::Result<Comparis
     let interrupts = Interrupts::listen().context("cannot listen for signals")?;
     let play = |index: usize| run_at(RATES_HZ[index], cores, &interrupts);
     let played = take_turns(rounds, RATES_HZ.len(), &cores, play);
-    interrupts.let_go();
+    interrupts.restore_default_actions();
     let (runs, disturbance) = played?;
     let mut comparison = Comparison {
         bench: NAME,
@@ -174,14 +174,14 @@ fn run_at(rate_hz: u32, cores: [usize; 2], interrupts: &Interrupts) -> anyhow::R
 fn wait_for(run: &mut Child, interrupts: &Interrupts) -> anyhow::Result<()> {
     let mut passed_on = 0;
     while run.try_wait()?.is_none() {
-        if passed_on < u8::from(interrupts.is_stop_asked()) + u8::from(interrupts.is_end_insisted()) {
+        if passed_on < u8::from(interrupts.is_stop_requested()) + u8::from(interrupts.is_abort_requested()) {
             // The run may have ended meanwhile.
             let _ = kill_process(Pid::from_child(run), Signal::TERM);
             passed_on += 1;
         }
         clock::sleep(CHECK_EVERY);
     }
-    if interrupts.is_stop_asked() { Err(Interrupted.into()) } else { Ok(()) }
+    if interrupts.is_stop_requested() { Err(Interrupted.into()) } else { Ok(()) }
 }
 
 fn result(folder: &RunFolder) -> anyhow::Result<RunResult> {

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use masseter_plan::given;
+use masseter_plan::read_scenario;
 use masseter_plant::description;
 use masseter_shared::geometry::AXIS_NAMES;
 use masseter_terminal::{Exit, result};
@@ -27,14 +27,14 @@ pub(crate) struct DbcArgs {
 
 /// Prints the electronic data sheet of one drive.
 pub(crate) fn eds(args: &EdsArgs) -> anyhow::Result<Exit> {
-    let sheets = description::eds(&given(args.scenario.as_deref())?)?;
+    let sheets = description::eds(&read_scenario(args.scenario.as_deref())?)?;
     result(&sheets[args.axis])?;
     Ok(Exit::Passed)
 }
 
 /// Prints the messages of the whole link.
 pub(crate) fn dbc(args: &DbcArgs) -> anyhow::Result<Exit> {
-    result(&description::dbc(&given(args.scenario.as_deref())?)?)?;
+    result(&description::dbc(&read_scenario(args.scenario.as_deref())?)?)?;
     Ok(Exit::Passed)
 }
 

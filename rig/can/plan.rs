@@ -27,7 +27,7 @@ pub(crate) struct PlanArgs {
 
 /// Prints the plan; exit code 2 if a run with it would be refused.
 pub(crate) fn plan(args: &PlanArgs) -> anyhow::Result<Exit> {
-    let scenario = masseter_plan::changed(args.scenario.as_deref(), |scenario| {
+    let scenario = masseter_plan::read_scenario_with(args.scenario.as_deref(), |scenario| {
         scenario.rate_hz = args.rate_hz.unwrap_or(scenario.rate_hz);
         Ok(())
     })?;

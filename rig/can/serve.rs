@@ -42,7 +42,7 @@ pub(crate) struct ServeArgs {
 
 /// Serves until Ctrl-C.
 pub(crate) fn serve(args: &ServeArgs) -> anyhow::Result<Exit> {
-    let scenario = masseter_plan::given(args.scenario.as_deref())?;
+    let scenario = masseter_plan::read_scenario(args.scenario.as_deref())?;
     let stop = StopRequest::listen_alone().context("cannot listen for signals")?;
     let listener = listen(args.listen)?;
     let mut link = OpenLink::new(&scenario, CLIENTS, clock::now_ns())?;

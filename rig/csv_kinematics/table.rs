@@ -80,7 +80,7 @@ impl Lines {
 
 /// The mechanism that the arguments mean.
 pub(super) fn mechanism(args: &CsvArgs) -> anyhow::Result<Mechanism> {
-    let scenario = masseter_plan::given(args.scenario.as_deref())?;
+    let scenario = masseter_plan::read_scenario(args.scenario.as_deref())?;
     Ok(Mechanism::new(&scenario.mechanism)?)
 }
 

@@ -37,17 +37,17 @@ impl Interrupts {
     }
 
     /// Whether an orderly stop is requested.
-    pub(crate) fn is_stop_asked(&self) -> bool {
+    pub(crate) fn is_stop_requested(&self) -> bool {
         self.count.load(Ordering::Relaxed) > 0
     }
 
     /// Whether an immediate end is requested.
-    pub(crate) fn is_end_insisted(&self) -> bool {
+    pub(crate) fn is_abort_requested(&self) -> bool {
         self.count.load(Ordering::Relaxed) > 1
     }
 
     /// Restores the default action of the signals, for after the run.
-    pub(crate) fn let_go(&self) {
+    pub(crate) fn restore_default_actions(&self) {
         self.is_over.store(true, Ordering::Relaxed);
     }
 }

@@ -14,7 +14,7 @@ use std::fs;
 use std::path::Path;
 
 use anyhow::{Context, bail};
-use masseter_plan::Plan;
+use masseter_plan::RunPlan;
 use masseter_plant::core as plant;
 use masseter_recording::{Ending, MOTION, Manifest, RunFolder};
 use masseter_shared::config::{MotionConfig, Scenario};
@@ -72,11 +72,11 @@ fn write_manifest(folder: &RunFolder, manifest: &Manifest) -> Result<(), Failure
 }
 
 /// Plans the run, and refuses interfaces and addresses that this machine does not have.
-fn resolve(args: &RunArgs) -> anyhow::Result<Plan> {
-    let scenario = masseter_plan::scenario(args.scenario.as_deref(), &args.overrides())?;
+fn resolve(args: &RunArgs) -> anyhow::Result<RunPlan> {
+    let scenario = masseter_plan::scenario_with_overrides(args.scenario.as_deref(), &args.overrides())?;
     check_clock(args, &scenario)?;
     args.live.map_or(Ok(()), foxglove::check)?;
-    let plan = Plan::of(scenario)?;
+    let plan = RunPlan::new(scenario)?;
     plant::check_interfaces(&plan.scenario).context("the plant cannot be built")?;
     Ok(plan)
 }

@@ -11,7 +11,7 @@ use std::process::ExitStatus;
 use std::time::Duration;
 
 use anyhow::Context;
-use masseter_plan::Plan;
+use masseter_plan::RunPlan;
 use masseter_recording::{DmaLatency, Ending, RunFolder, RunUsage};
 use masseter_shared::clock::{self, SECOND_NS};
 use masseter_shared::config::Scenario;
@@ -86,14 +86,14 @@ pub fn reserve_domain(name: Option<&str>) -> Result<ReservedDomain, DomainError>
 /// Runs the rig in real time, then releases its domain.
 pub fn run(
     ReservedDomain { domain, claim }: ReservedDomain,
-    plan: &Plan,
+    plan: &RunPlan,
     folder: &RunFolder,
     args: &RunArgs,
 ) -> Result<RunOutcome, Failure> {
     let interrupts = Interrupts::listen().context("cannot listen for signals").died()?;
     let result = Rig::spawn(plan, folder, &domain, args).and_then(|mut rig| rig.run(plan, args, &interrupts));
     drop(claim);
-    interrupts.let_go();
+    interrupts.restore_default_actions();
     if let Err(error) = domain.sweep() {
         status!("masseter: {error}; `masseter clean` removes the rest of this run");
     }
@@ -113,7 +113,7 @@ struct Rig {
 }
 
 impl Rig {
-    fn spawn(plan: &Plan, folder: &RunFolder, domain: &Domain, args: &RunArgs) -> anyhow::Result<Self> {
+    fn spawn(plan: &RunPlan, folder: &RunFolder, domain: &Domain, args: &RunArgs) -> anyhow::Result<Self> {
         let scenario = folder.scenario();
         let scenario = scenario.to_str().context("the run folder's path is not UTF-8")?;
         let recording = folder.recording();
@@ -138,7 +138,7 @@ impl Rig {
         })
     }
 
-    fn run(&mut self, plan: &Plan, args: &RunArgs, interrupts: &Interrupts) -> anyhow::Result<RunOutcome> {
+    fn run(&mut self, plan: &RunPlan, args: &RunArgs, interrupts: &Interrupts) -> anyhow::Result<RunOutcome> {
         let Some(scheduling) = self.wait_ready(interrupts)? else {
             return Ok(Ending::Interrupted.into());
         };
@@ -167,13 +167,13 @@ impl Rig {
     ) -> Result<Option<BTreeMap<String, Obtained>>, ChildError> {
         let mut scheduling = BTreeMap::new();
         for process in [&mut self.recorder, &mut self.plant, &mut self.controller] {
-            match process.wait_ready(|| interrupts.is_stop_asked()) {
+            match process.wait_ready(|| interrupts.is_stop_requested()) {
                 Ok(Some(ready)) => scheduling.insert(process.role().name().to_owned(), ready.scheduling),
                 Ok(None) => return Ok(None),
                 Err(error) => {
                     // Ctrl-C also reaches the processes, and may have ended this one before the supervisor sees it.
                     clock::sleep(SIGNAL_DELAY);
-                    return if interrupts.is_stop_asked() { Ok(None) } else { Err(error) };
+                    return if interrupts.is_stop_requested() { Ok(None) } else { Err(error) };
                 }
             };
         }
@@ -197,7 +197,7 @@ impl Rig {
         let mut interruption = None;
         let mut give_up_ns = None;
         let status = loop {
-            if interrupts.is_end_insisted() {
+            if interrupts.is_abort_requested() {
                 return Ok(Ending::Interrupted);
             }
             if interruption.is_none() {
@@ -218,7 +218,7 @@ impl Rig {
         let controller = self.controller_ending(status, interrupts)?;
         let plant = end(&mut self.plant, END_TIMEOUT_NS, interrupts)?;
         let recorder = end(&mut self.recorder, RECORD_TIMEOUT_NS, interrupts)?;
-        if interrupts.is_end_insisted() {
+        if interrupts.is_abort_requested() {
             return Ok(Ending::Interrupted);
         }
         Ok(of_run(interruption, controller, of_plant_and_recorder(plant, recorder)))
@@ -226,7 +226,7 @@ impl Rig {
 
     /// Asks the controller to end if the user interrupts or another process has ended; returns that ending.
     fn interrupt_controller(&mut self, interrupts: &Interrupts) -> io::Result<Option<Ending>> {
-        let ending = if interrupts.is_stop_asked() {
+        let ending = if interrupts.is_stop_requested() {
             Ending::Interrupted
         } else if let Some(status) = self.recorder.exit_status()? {
             died(Role::Recorder, Some(status))
@@ -278,7 +278,7 @@ fn wait_for(
     let deadline_ns = clock::now_ns() + timeout_ns;
     loop {
         let status = process.exit_status()?;
-        if status.is_some() || interrupts.is_end_insisted() || clock::now_ns() >= deadline_ns {
+        if status.is_some() || interrupts.is_abort_requested() || clock::now_ns() >= deadline_ns {
             return Ok(status);
         }
         clock::sleep(POLL);

@@ -10,7 +10,7 @@ use anyhow::Context;
 use masseter_controller::hold_position::HoldPosition;
 use masseter_controller::motion_controller::MotionController;
 use masseter_controller::process::Kind;
-use masseter_plan::Plan;
+use masseter_plan::RunPlan;
 use masseter_plant::core::{PlantCore, PlantError};
 use masseter_plant::cycle::PlantPorts;
 use masseter_plant::emulation::VirtualLink;
@@ -29,7 +29,7 @@ use crate::machine::interrupts::Interrupts;
 const EPOCH_NS: u64 = SECOND_NS;
 
 /// Runs the rig under virtual time; it ends as the processes would, also when the user stops it.
-pub fn run(plan: &Plan, folder: &RunFolder, kind: Kind) -> anyhow::Result<Ending> {
+pub fn run(plan: &RunPlan, folder: &RunFolder, kind: Kind) -> anyhow::Result<Ending> {
     let interrupts = Interrupts::listen().context("cannot listen for signals")?;
     let (scenario, mechanism, trajectory) = (&plan.scenario, plan.mechanism.clone(), &plan.trajectory);
     let ending = match kind {
@@ -42,13 +42,13 @@ pub fn run(plan: &Plan, folder: &RunFolder, kind: Kind) -> anyhow::Result<Ending
             play(controller, plan, folder, &interrupts)
         }
     };
-    interrupts.let_go();
+    interrupts.restore_default_actions();
     ending
 }
 
 fn play<C: Controller>(
     controller: C,
-    plan: &Plan,
+    plan: &RunPlan,
     folder: &RunFolder,
     interrupts: &Interrupts,
 ) -> anyhow::Result<Ending> {
@@ -62,10 +62,10 @@ fn play<C: Controller>(
     while plant_error.is_none()
         && rig.controller.outcome().is_none()
         && rig.log.is_safe()
-        && !interrupts.is_end_insisted()
+        && !interrupts.is_abort_requested()
     {
         cycle += 1;
-        if interrupts.is_stop_asked() {
+        if interrupts.is_stop_requested() {
             rig.controller.request_stop();
         }
         let sync = Wake::on_time(cycle, EPOCH_NS + (cycle - 1) * scenario.period_ns());
@@ -78,7 +78,7 @@ fn play<C: Controller>(
     Ok(match (plant_error, rig.controller.outcome()) {
         (Some(error), _) => Ending::died(Role::Plant.name(), error.to_string()),
         _ if loss.is_some() => Ending::RecordingFailed,
-        _ if interrupts.is_stop_asked() => Ending::Interrupted,
+        _ if interrupts.is_stop_requested() => Ending::Interrupted,
         (None, Some(Outcome::SafeStop)) => Ending::SafeStop,
         (None, _) => Ending::Completed,
     })

@@ -120,7 +120,7 @@ def watch_a_run(masseter, out):
 def main():
     masseter, out = sys.argv[1:]
     counts, parts = watch_a_run(masseter, out)
-    subprocess.run([masseter, "log", "verify", out], check=True, stdout=subprocess.DEVNULL)
+    subprocess.run([masseter, "recording", "verify", out], check=True, stdout=subprocess.DEVNULL)
     for topic in TOPICS:
         print(f"{topic:8} {counts[topic]:8}")
         assert counts[topic] > 0, f"no message on {topic}"

@@ -100,8 +100,8 @@ def reaction_ms(run, role, hit_ns):
 
 
 def log(masseter, verb, recording, expected, *more):
-    """Runs a verb of `masseter log`, which must end with the expected exit code."""
-    words = [masseter, "log", verb, recording, *more]
+    """Runs a verb of `masseter recording`, which must end with the expected exit code."""
+    words = [masseter, "recording", verb, recording, *more]
     result = subprocess.run(words, capture_output=True, text=True)
     if result.returncode != expected:
         raise SystemExit(f"log {verb} ended with {result.returncode}: {result.stdout}{result.stderr}")

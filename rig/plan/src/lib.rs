@@ -4,10 +4,10 @@
 //! checked by their users.
 //!
 //! ```
-//! use masseter_plan::{Overrides, Plan, scenario};
+//! use masseter_plan::{Overrides, RunPlan, scenario_with_overrides};
 //!
 //! let overrides = Overrides { rate_hz: Some(500), ..Overrides::default() };
-//! let plan = Plan::of(scenario(None, &overrides)?)?;
+//! let plan = RunPlan::new(scenario_with_overrides(None, &overrides)?)?;
 //! assert_eq!(plan.scenario.period_ns(), 2_000_000);
 //! # Ok::<(), anyhow::Error>(())
 //! ```
@@ -24,11 +24,11 @@ use masseter_shared::config::{FileConfig, MotionConfig, Scenario};
 use masseter_shared::geometry::Mechanism;
 use masseter_shared::schedule::CycleSchedule;
 
-pub use scenario::{changed, given};
+pub use scenario::{read_scenario, read_scenario_with};
 
 /// A run that fits its mechanism, drives and buses.
 #[derive(Debug)]
-pub struct Plan {
+pub struct RunPlan {
     /// The scenario with all overrides.
     pub scenario: Scenario,
     /// Its mechanism.
@@ -58,12 +58,12 @@ pub struct Overrides {
     pub seed: Option<u64>,
 }
 
-impl Plan {
+impl RunPlan {
     /// Plans a scenario.
     ///
     /// # Errors
     /// When the cycle does not fit the buses, the plant cannot be built, or the motion exceeds a limit.
-    pub fn of(scenario: Scenario) -> anyhow::Result<Self> {
+    pub fn new(scenario: Scenario) -> anyhow::Result<Self> {
         let mechanism = Mechanism::new(&scenario.mechanism)?;
         let schedule = CycleSchedule::new(&scenario.can, scenario.period_ns())?;
         plant::check(&scenario).context("the plant cannot be built")?;
@@ -98,8 +98,8 @@ impl Plan {
 ///
 /// # Errors
 /// When the file or the motion cannot be read, or a value lies outside its range.
-pub fn scenario(path: Option<&Path>, overrides: &Overrides) -> anyhow::Result<Scenario> {
-    changed(path, |scenario| apply(overrides, scenario))
+pub fn scenario_with_overrides(path: Option<&Path>, overrides: &Overrides) -> anyhow::Result<Scenario> {
+    read_scenario_with(path, |scenario| apply(overrides, scenario))
 }
 
 fn of_centroid(turn_deg: f64) -> String {
@@ -124,7 +124,7 @@ pub fn demands(
 
 fn apply(overrides: &Overrides, scenario: &mut Scenario) -> anyhow::Result<()> {
     if let Some(path) = &overrides.trajectory {
-        play(path, scenario);
+        play_file(path, scenario);
     }
     if let MotionConfig::File(file) = &mut scenario.motion {
         file.path = absolute(&file.path)?;
@@ -142,7 +142,7 @@ fn apply(overrides: &Overrides, scenario: &mut Scenario) -> anyhow::Result<()> {
 }
 
 /// Replaces the motion of a scenario by a file. A scenario that already plays a file keeps its axes and filter.
-pub fn play(path: &Path, scenario: &mut Scenario) {
+pub fn play_file(path: &Path, scenario: &mut Scenario) {
     match &mut scenario.motion {
         MotionConfig::File(file) => path.clone_into(&mut file.path),
         motion => *motion = MotionConfig::File(FileConfig::new(path)),

@@ -8,7 +8,7 @@ use masseter_shared::config::{Scenario, ScenarioError};
 ///
 /// # Errors
 /// When the file cannot be read or a value is out of range.
-pub fn given(path: Option<&Path>) -> Result<Scenario, ScenarioError> {
+pub fn read_scenario(path: Option<&Path>) -> Result<Scenario, ScenarioError> {
     let scenario = unchecked(path)?;
     scenario.validate()?;
     Ok(scenario)
@@ -18,7 +18,7 @@ pub fn given(path: Option<&Path>) -> Result<Scenario, ScenarioError> {
 ///
 /// # Errors
 /// When the file cannot be read, `change` fails, or a value is out of range.
-pub fn changed(
+pub fn read_scenario_with(
     path: Option<&Path>,
     change: impl FnOnce(&mut Scenario) -> anyhow::Result<()>,
 ) -> anyhow::Result<Scenario> {

@@ -126,7 +126,7 @@ fn part_not_known(ending: &Ending, is_cut_short: bool, is_damaged: bool) -> Opti
     let reasons = [
         (is_cut_short, "the recording lacks its end"),
         (is_damaged, "the recording is damaged"),
-        (*ending == Ending::RecordingFailed, "the logger could not write everything"),
+        (*ending == Ending::RecordingFailed, "the recorder could not write everything"),
     ];
     reasons.into_iter().find_map(|(is_so, why)| is_so.then_some(why))
 }

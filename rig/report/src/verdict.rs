@@ -85,7 +85,7 @@ fn ending(ending: &Ending, events: &[EventRecord]) -> Option<Judgement> {
         Ending::Interrupted => Some((Outcome::Interrupted, "stopped by the user".to_owned())),
         Ending::NotStarted => Some((Outcome::Invalid, "real time was required and refused".to_owned())),
         Ending::RecordingFailed => {
-            Some((Outcome::Incomplete, "the logger could not write everything".to_owned()))
+            Some((Outcome::Incomplete, "the recorder could not write everything".to_owned()))
         }
     }
 }

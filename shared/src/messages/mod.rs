@@ -267,7 +267,7 @@ messages! {
         data: CanData,
     }
 
-    /// What the kernel had counted of the machine and of both loops; the logger looks and records it, and it travels
+    /// What the kernel had counted of the machine and of both loops; the recorder looks and records it, and it travels
     /// nowhere.
     Machine on "machine" keeping 1 as "masseter/Machine/130c1be53085d979" {
         /// When it was looked at, ns.

@@ -25,7 +25,7 @@ use crate::realtime::Waiter;
 
 /// Publishers a topic may have: every process may publish events.
 const MAX_PUBLISHERS: usize = 4;
-/// Subscribers a topic may have: the counterpart, the logger, and two observers. Shared memory is
+/// Subscribers a topic may have: the counterpart, the recorder, and two observers. Shared memory is
 /// reserved, and locked, for all of them.
 const MAX_SUBSCRIBERS: usize = 4;
 /// Messages that are kept for whoever wants the newest only.

@@ -6,13 +6,13 @@
 use masseter_controller::kinematics::uniqueness::{Enclosure, InputBox};
 use masseter_shared::geometry::Actuators;
 
-use masseter_plan::Plan;
+use masseter_plan::RunPlan;
 
 /// Boxes that together contain every input within `around_m` (metres) of the motion's path, in each axis.
 ///
 /// # Errors
 /// When inverse kinematics has no solution on the path.
-pub fn boxes(plan: &Plan, around_m: f64) -> anyhow::Result<Vec<InputBox>> {
+pub fn boxes(plan: &RunPlan, around_m: f64) -> anyhow::Result<Vec<InputBox>> {
     let period_s = plan.scenario.period_s();
     let cycles = (plan.trajectory.duration_s() / period_s).ceil() as usize;
     let path = (0..=cycles)
@@ -77,7 +77,7 @@ mod tests {
     #[test]
     fn the_boxes_of_a_motion_hold_its_path_and_what_is_around_it() {
         let around_m = 1e-3;
-        let plan = Plan::of(Scenario::default()).unwrap();
+        let plan = RunPlan::new(Scenario::default()).unwrap();
         let boxes = boxes(&plan, around_m).unwrap();
         let at = |cycle: u32| {
             let pose = plan.trajectory.pose(f64::from(cycle) * plan.scenario.period_s());
