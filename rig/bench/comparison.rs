@@ -111,7 +111,7 @@ mod tests {
     }
 
     #[test]
-    fn contenders_take_turns_and_are_compared_within_a_round() {
+    fn candidates_take_turns_and_are_compared_within_a_round() {
         let order = std::cell::RefCell::new(Vec::new());
         // The machine gets slower from round to round; the ratio stays.
         let turn = |name: &'static str, ns: u64| {
@@ -138,7 +138,7 @@ mod tests {
 
     #[test]
     #[should_panic(expected = "no candidate is called c")]
-    fn a_contender_that_is_none_cannot_be_compared() {
+    fn an_unknown_candidate_cannot_be_compared() {
         let turn: Turn = Box::new(|| Ok(round(1)));
         let comparison =
             Comparison::by_turns("x", String::new(), 1, &[0], vec![("a".to_owned(), turn)]).unwrap();

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use super::candidate::{Percentile, Share};
+use super::candidate::{Percentile, Ratio, Share};
 use super::comparison::Comparison;
 
 /// Candidates in µs, then their ratios: median (minimum to maximum) over the rounds.
@@ -12,21 +12,30 @@ pub(super) fn text(comparison: &Comparison) -> String {
         "\n{}: {}\nmedian (minimum–maximum) of {rounds} rounds, µs\n",
         comparison.bench, comparison.measures
     );
+    let ratio_name = |ratio: &Ratio| format!("{} / {}", ratio.of, ratio.to);
+    let names = comparison.candidates.iter().map(|candidate| candidate.name.chars().count());
+    let width = names.chain(comparison.ratios.iter().map(|ratio| ratio_name(ratio).chars().count()));
+    let width = width.max().unwrap_or(0);
     for candidate in &comparison.candidates {
         let of_rounds = counted(candidate.n, candidate.rounds.len());
-        let _ = writeln!(text, "  {:<34} {}{of_rounds}", candidate.name, line(&candidate.percentiles, 1e-3));
+        let _ =
+            writeln!(text, "  {:<width$} {}{of_rounds}", candidate.name, line(&candidate.percentiles, 1e-3));
         if !candidate.shares.is_empty() {
-            let _ = writeln!(text, "  {:<34} {}", "", shares(&candidate.shares));
+            let _ = writeln!(text, "  {:<width$} {}", "", shares(&candidate.shares));
         }
     }
     if !comparison.ratios.is_empty() {
         text.push_str("ratios within a round\n");
     }
     for ratio in &comparison.ratios {
-        let name = format!("{} / {}", ratio.of, ratio.to);
+        let name = ratio_name(ratio);
         if ratio.n > 0 {
-            let _ =
-                writeln!(text, "  {name:<34} {}{}", line(&ratio.percentiles, 1.0), counted(ratio.n, rounds));
+            let _ = writeln!(
+                text,
+                "  {name:<width$} {}{}",
+                line(&ratio.percentiles, 1.0),
+                counted(ratio.n, rounds)
+            );
         }
     }
     for note in &comparison.notes {

@@ -129,7 +129,7 @@ impl ValueFormatter<f64> for Axis {
         let position = self.scale.position(*value);
         match self.scale {
             Scale::Linear if self.has_names() => self.names.get(*value as usize).cloned().unwrap_or_default(),
-            Scale::Linear => ticks::plain(*value),
+            Scale::Linear => ticks::multiple(*value, ticks::step(self.ends()[1] - self.ends()[0])),
             Scale::Log => ticks::power(nearly_whole(position), self.ends()),
             Scale::Percentile => ticks::percentile(position),
         }

@@ -195,7 +195,7 @@ impl LineChart {
         for &value in self.limits.iter().flat_map(|limit| &limit.values) {
             chart.draw_series([PathElement::new(
                 [(across.start, value), (across.end, value)],
-                palette::RED,
+                palette::RED.stroke_width(2),
             )])?;
         }
         Ok(chart)

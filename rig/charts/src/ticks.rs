@@ -25,6 +25,16 @@ pub(crate) fn step(range: f64) -> f64 {
     factor.unwrap_or(10.0) * power
 }
 
+/// A multiple of a step, with as many decimals as the step needs.
+pub(crate) fn multiple(value: f64, step: f64) -> String {
+    let decimals = -(step.log10() + 1e-9).floor();
+    if !(-9.0..=9.0).contains(&decimals) {
+        return plain(value);
+    }
+    let rounded = (value / step).round() * step;
+    format!("{:.*}", decimals.max(0.0) as usize, if rounded == 0.0 { 0.0 } else { rounded })
+}
+
 /// Exponents of ten between two of them: whole ones where there are at least three, otherwise those of 1, 2 and 5 times
 /// the powers of ten, or those of round values.
 pub(crate) fn logarithmic(low: f64, high: f64) -> Vec<f64> {
@@ -85,20 +95,18 @@ pub(crate) fn percentile(nines: f64) -> String {
 mod tests {
     use super::*;
 
-    fn labels(ticks: &[f64]) -> Vec<String> {
-        ticks.iter().map(|tick| plain(*tick)).collect()
+    fn labels(low: f64, high: f64) -> Vec<String> {
+        linear(low, high).into_iter().map(|tick| multiple(tick, step(high - low))).collect()
     }
 
     #[test]
     fn ticks_are_round_few_and_their_labels_differ() {
-        assert_eq!(labels(&linear(-0.1, 1.05)), ["0", "0.2", "0.4", "0.6", "0.8", "1"]);
-        assert_eq!(
-            labels(&linear(2.0, 2.04)),
-            ["2", "2.005", "2.01", "2.015", "2.02", "2.025", "2.03", "2.035", "2.04"]
-        );
+        assert_eq!(labels(-0.1, 1.05), ["0.0", "0.2", "0.4", "0.6", "0.8", "1.0"]);
+        assert_eq!(labels(-40.0, 81.0), ["-40", "-20", "0", "20", "40", "60", "80"]);
+        assert_eq!(labels(2.0, 2.0301), ["2.000", "2.005", "2.010", "2.015", "2.020", "2.025", "2.030"]);
         for (low, high) in [(2.0, 2.04), (0.0, 0.9), (1.0, 3.5), (-7.0, 20.0), (5.0, 800.0), (1e6, 1e6 + 1.0)]
         {
-            let mut ticks = labels(&linear(low, high));
+            let mut ticks = labels(low, high);
             assert!((3..=9).contains(&ticks.len()), "{ticks:?}");
             ticks.dedup();
             assert_eq!(ticks.len(), linear(low, high).len(), "{ticks:?}");

@@ -11,7 +11,7 @@ use super::solution_set::SolutionSet;
 use super::solver::COMPARED;
 use super::table::{Table, number};
 
-/// Where a guess leads.
+/// The result of a guess.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Basin {
     /// To a class of solutions above the base; 0 is the true one.
@@ -22,7 +22,7 @@ pub(super) enum Basin {
     Nothing,
 }
 
-/// Where a guess leads, by solver in the order of [`COMPARED`].
+/// A guess with its result for each solver of [`COMPARED`].
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Cell {
     pub guess_rad: [f64; LEGS],
@@ -79,7 +79,7 @@ impl Basins {
         Table::new("basins", &header, self.cells.iter().map(row).collect())
     }
 
-    /// What a legend and the table call a basin.
+    /// The name of a basin in legend and table.
     pub(super) fn name(&self, basin: Basin) -> String {
         match basin {
             Basin::Class(class) => self.class_names[class].clone(),

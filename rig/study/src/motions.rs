@@ -21,7 +21,7 @@ const TRUE_WITHIN_RAD: f64 = 1e-6;
 pub(super) struct Motion {
     pub name: String,
     pub trajectory: Trajectory,
-    /// What it asks of the axes, or why the mechanism cannot follow.
+    /// The strokes, velocities and conditioning that it needs, or why the mechanism cannot follow.
     pub demands: Result<TrajectoryReport, String>,
     /// How each of [`COMPARED`] followed it, 1 ms a step.
     pub followed: [Followed; COMPARED.len()],

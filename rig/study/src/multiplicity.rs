@@ -1,4 +1,4 @@
-//! How many solutions random inputs have, and how many of them the paper's two conditions leave.
+//! How many solutions random inputs have, and how many of them meet the paper's two conditions.
 
 use masseter_controller::kinematics::{MOST_SOLUTIONS, Solution, Solutions};
 use masseter_shared::geometry::{LEGS, Mechanism};
@@ -8,21 +8,21 @@ use super::sample::{self, Stream};
 use super::share::Share;
 use super::table::Table;
 
-/// The readings of the paper's conditions.
+/// Interpretations of the paper's conditions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Conditions {
-    /// All hinges on one side of the platform's plane, whichever, and A₂ beyond A₃; legs above the base.
+    /// All hinges on the same side of the platform's plane, and A₂ beyond A₃; legs above the base.
     Unsigned,
     /// All hinges below the oriented plane.
     Oriented,
-    /// That, and a positive determinant of the Jacobian.
+    /// As oriented, and a positive determinant of the Jacobian.
     Determinant,
 }
 
 pub(super) const CONDITIONS: [Conditions; 3] =
     [Conditions::Unsigned, Conditions::Oriented, Conditions::Determinant];
 
-/// What one input has.
+/// The numbers of solutions of one input.
 #[derive(Debug, Clone, Copy)]
 struct Counts {
     solutions: usize,

@@ -1,4 +1,4 @@
-//! Figs. 3 and 4 of the paper: single guesses from which the two iterations go different ways.
+//! Figs. 3 and 4 of the paper: single guesses from which the two iterations behave differently.
 
 use masseter_shared::geometry::{Actuators, LEGS, Mechanism};
 use rayon::prelude::*;
@@ -15,20 +15,20 @@ const TAIL: usize = 40;
 const LONGEST_PERIOD: usize = 8;
 /// How well a cycle repeats, as a share of the error.
 const REPEATS_WITHIN: f64 = 1e-3;
-/// Iterations within which the error has to fall to look like convergence, and what is left of it.
+/// Iterations within which the error must fall to look like convergence, and the share that is left then.
 const AT_FIRST: usize = 3;
 const FALLEN_TO: f64 = 0.5;
-/// How far it has to rise again afterwards, over what it had fallen to.
+/// Factor by which the error must rise again.
 const RISEN_BY: f64 = 10.0;
 
-/// What one trace of errors does.
+/// How an iteration ends.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Course {
-    /// It arrives.
+    /// It reaches a solution.
     Converges,
     /// It repeats the same errors for ever.
     Oscillates,
-    /// It falls at first, then rises, and never arrives.
+    /// Its error falls at first, then rises, and it reaches no solution.
     Diverges,
     /// Neither.
     Fails,
@@ -43,13 +43,13 @@ pub(super) struct Pair {
     pub newton_cm2: Vec<f64>,
 }
 
-/// A way in which the two iterations part.
+/// A way in which the two iterations disagree.
 #[derive(Debug, Clone)]
 pub(super) struct Disagreement {
     /// Its table and its figure.
     pub name: &'static str,
     pub title: &'static str,
-    /// What Newton–Raphson does.
+    /// How Newton–Raphson ends.
     pub newton: Course,
     /// The guess that shows it most clearly, if any shows it.
     pub clearest: Option<Pair>,
@@ -175,7 +175,7 @@ fn course(errors: &[f64], solved: bool) -> Course {
     }
 }
 
-/// Whether the last errors repeat with some period; a standstill is no cycle.
+/// Whether the last errors repeat with a period of at least two iterations.
 fn is_cyclic(errors: &[f64]) -> bool {
     let Some(tail) = errors.len().checked_sub(TAIL).map(|from| &errors[from..]) else { return false };
     let same = |a: f64, b: f64| (a - b).abs() <= REPEATS_WITHIN * a.abs().max(b.abs());
@@ -213,7 +213,7 @@ mod tests {
     }
 
     #[test]
-    fn courses_are_told_apart() {
+    fn courses_are_distinguished() {
         let cycle = endless(|n| if n < 10 { 100.0 - n as f64 } else { [3.0, 5.0, 9.0][n % 3] });
         let away = endless(|n| if n < 3 { 10f64.powi(-(n as i32)) } else { 5.0 + (n as f64).sin() });
         let standing = endless(|_| 2.0);

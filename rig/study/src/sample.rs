@@ -59,7 +59,7 @@ pub(super) enum Guesses {
     AboveBase,
 }
 
-/// What the trials draw from, nearest first.
+/// The origins of the trials' guesses, nearest first.
 pub(super) const GUESSES: [Guesses; 8] = [
     Guesses::Within(2.0),
     Guesses::Within(5.0),
@@ -72,7 +72,7 @@ pub(super) const GUESSES: [Guesses; 8] = [
 ];
 
 impl Guesses {
-    /// As a table says it.
+    /// The name in tables.
     pub(super) fn name(self) -> String {
         match self {
             Self::Within(deg) => format!("±{deg}°"),
@@ -118,7 +118,7 @@ mod tests {
     }
 
     #[test]
-    fn guesses_stay_where_they_are_said_to_come_from() {
+    fn guesses_stay_within_their_range() {
         let mut random = generator(1, Stream::Trials, 0);
         let truth = [1.4, 1.5, 1.6];
         for guesses in GUESSES {

@@ -24,15 +24,14 @@ impl Share {
         self.of > 0 && self.hits == self.of
     }
 
-    /// Whether it exceeds another by three standard errors of their difference, so that another sample
-    /// would hardly tell otherwise.
+    /// Whether it exceeds another by three standard errors of their difference: another sample would hardly contradict.
     pub(super) fn clearly_exceeds(self, other: Self) -> bool {
         let variance = |share: Self| share.value() * (1.0 - share.value()) / share.of as f64;
         let difference = self.value() - other.value();
         difference > 0.0 && difference >= 3.0 * (variance(self) + variance(other)).sqrt()
     }
 
-    /// In per cent; a share that is nearly all or nearly nothing does not read as all or nothing.
+    /// In per cent; with more digits where rounding would give 0 or 100 %.
     pub(super) fn percent(self) -> String {
         let rounded = format!("{:.1} %", 100.0 * self.value());
         let pretends = (rounded == "100.0 %" && !self.is_all()) || (rounded == "0.0 %" && self.hits > 0);

@@ -39,7 +39,7 @@ impl SolutionSet {
         solutions
     }
 
-    /// Fig. 6: the solution in which only corner A₁ stands elsewhere than in the true one.
+    /// Fig. 6: the solution that differs from the true one in corner A₁ alone.
     pub(super) fn corner_folded(&self) -> Option<&Solution> {
         let truth = self.true_one()?.theta_rad;
         let others_stand = |one: &&Solution| {
@@ -66,7 +66,7 @@ impl SolutionSet {
         classes
     }
 
-    /// What a legend calls the classes.
+    /// The names of the classes in a legend.
     pub(super) fn class_names(&self) -> Vec<String> {
         let name = |(index, class): (usize, &[i64; LEGS])| {
             let angles = class.map(|angle| format!("{:.1}°", angle as f64 / 1e6)).join(", ");

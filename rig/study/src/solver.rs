@@ -1,4 +1,4 @@
-//! The solvers that are compared, and one attempt of one of them.
+//! The solvers that are compared, and single attempts.
 
 use masseter_controller::kinematics::{
     ForwardTracker, Iteration, MAX_HALVINGS, MAX_ITERATIONS, Method, Options, Residual, StepRule,
@@ -37,19 +37,19 @@ pub(super) const SOLVERS: [Solver; 9] = [
 /// The three that the figures show.
 pub(super) const COMPARED: [Solver; 3] = [PUBLISHED, NEWTON, Solver::Controller];
 
-/// What came of one guess.
+/// The result of one guess.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Attempt {
     /// The leg angles found, radians, or the reason why none were (of `ForwardError::reason`).
     pub found_rad: Result<[f64; LEGS], &'static str>,
     /// Iterations made up to the solution; 0 without one.
     pub iterations: u32,
-    /// How often the residuals were evaluated up to the solution; 0 where the solver does not tell.
+    /// How often the residuals were evaluated up to the solution; 0 where the solver does not count them.
     pub evaluations: u32,
 }
 
 impl Solver {
-    /// What people call it.
+    /// The full name.
     pub(super) fn name(self) -> String {
         let residual = |residual| match residual {
             Residual::Distance => "distances",
@@ -69,7 +69,7 @@ impl Solver {
         }
     }
 
-    /// The name in a legend, where only [`COMPARED`] stand.
+    /// The name in a legend of [`COMPARED`].
     pub(super) fn short_name(self) -> &'static str {
         match self {
             Self::Published(..) => "published",
@@ -92,8 +92,8 @@ impl Solver {
             return Attempt { found_rad, iterations, evaluations: 0 };
         };
         let mut evaluations = 0;
-        let witness = |step: &Iteration| evaluations += 1 + step.halvings;
-        match solve_traced(method, mechanism, actuators, guess_rad, &options, witness) {
+        let observe = |step: &Iteration| evaluations += 1 + step.halvings;
+        match solve_traced(method, mechanism, actuators, guess_rad, &options, observe) {
             Ok(solution) => {
                 Attempt { found_rad: Ok(solution.theta_rad), iterations: solution.iterations, evaluations }
             }
@@ -110,14 +110,14 @@ impl Solver {
     ) -> Vec<f64> {
         let mut errors_cm2 = Vec::new();
         if let Some((method, options)) = self.iteration() {
-            let witness = |step: &Iteration| errors_cm2.push(step.error_cm2);
-            // How it ended, the last error tells.
-            let _ = solve_traced(method, mechanism, actuators, guess_rad, &options, witness);
+            let observe = |step: &Iteration| errors_cm2.push(step.error_cm2);
+            // The last error shows how it ended.
+            let _ = solve_traced(method, mechanism, actuators, guess_rad, &options, observe);
         }
         errors_cm2
     }
 
-    /// With as many iterations and reductions as there may be: no bound of ours shall make it fail.
+    /// With the greatest possible numbers of iterations and reductions, so that it does not fail by a bound.
     pub(super) fn iteration(self) -> Option<(Method, Options)> {
         let most =
             Options { max_iterations: MAX_ITERATIONS, max_halvings: MAX_HALVINGS, ..Options::default() };

@@ -1,4 +1,4 @@
-//! Fig. 5 of the paper in time: what a solution costs each solver, all in the same run, in turns.
+//! Fig. 5 of the paper in time: the time that each solver takes for a solution. Solvers take turns in one run.
 
 use std::hint::black_box;
 
@@ -20,16 +20,16 @@ const CALLS: u32 = 8;
 /// A trajectory's cycle, s.
 const CYCLE_S: f64 = 1e-3;
 
-/// From where the iteration starts.
+/// The start of the iteration.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Situation {
-    /// From a random guess above the base from which all three arrive.
+    /// From a random guess above the base from which all three solvers reach a solution.
     Random,
     /// From the solution one millisecond of chewing before.
     Warm,
 }
 
-/// What one solver took in one situation.
+/// The time of one solver in one situation.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Timing {
     pub situation: Situation,
@@ -67,7 +67,7 @@ impl Speed {
         Self { timings: taken }
     }
 
-    /// What one of [`COMPARED`] took.
+    /// The time of one of [`COMPARED`].
     pub(super) fn timing(&self, situation: Situation, solver: Solver) -> Timing {
         let wanted = |taken: &&Timing| taken.situation == situation && taken.solver == solver;
         *self.timings.iter().find(wanted).expect("all of COMPARED are timed in every situation")
@@ -102,7 +102,7 @@ fn warm(mechanism: &Mechanism, motion: &Motion) -> Vec<(Actuators, [f64; LEGS])>
     steps.map(|(now, before)| (now.actuators, before.theta_rad)).collect()
 }
 
-/// Every case goes to every solver before the next one comes.
+/// Every case goes to every solver before the next case.
 fn in_turns(mechanism: &Mechanism, situation: Situation, cases: &[(Actuators, [f64; LEGS])]) -> Vec<Timing> {
     let mut taken_ns = [(); COMPARED.len()].map(|()| Vec::with_capacity(cases.len()));
     for (actuators, guess_rad) in cases {
@@ -125,7 +125,7 @@ fn in_turns(mechanism: &Mechanism, situation: Situation, cases: &[(Actuators, [f
     .collect()
 }
 
-/// Time of one solution, ns, without a witness.
+/// Time of one solution, ns, without an observer.
 fn time_ns(solver: Solver, mechanism: &Mechanism, actuators: &Actuators, guess_rad: &[f64; LEGS]) -> f64 {
     if let Some((method, options)) = solver.iteration() {
         return mean_ns(|| iterate(method, mechanism, actuators, guess_rad, &options));

@@ -1,4 +1,4 @@
-//! Random guesses for random feasible inputs: who arrives, where, and after how many iterations.
+//! Random guesses for random feasible inputs: which solver reaches which solution after how many iterations.
 
 use masseter_controller::kinematics::Assembly;
 use masseter_shared::geometry::{Actuators, LEGS, Mechanism};
@@ -17,7 +17,7 @@ const TIE_RAD: f64 = 1e-6;
 pub(super) enum Reached {
     /// The true solution.
     True,
-    /// A solution in which the mechanism cannot stand.
+    /// A solution that the mechanism cannot take.
     Other,
     /// None, for this reason.
     Nothing(&'static str),
@@ -48,7 +48,7 @@ pub(super) struct Trial {
 }
 
 impl Trial {
-    /// How one solver fared.
+    /// The attempt of one solver.
     pub(super) fn by(&self, solver: Solver) -> &Judged {
         let place = SOLVERS.iter().position(|&other| other == solver);
         &self.judged[place.expect("every solver takes part")]
@@ -77,16 +77,16 @@ impl Trials {
         Self { sets: GUESSES.into_iter().map(set).collect() }
     }
 
-    /// The trials with guesses from there.
+    /// The trials with guesses from this origin.
     ///
     /// # Panics
-    /// Where there are none from there: where [`GUESSES`] lacks it.
+    /// When [`GUESSES`] lacks the origin.
     pub(super) fn with(&self, guesses: Guesses) -> &[Trial] {
         let set = GUESSES.iter().position(|&set| set == guesses);
         &self.sets[set.expect("guesses are drawn from there")]
     }
 
-    /// How one solver fared with guesses from there.
+    /// The attempts of one solver with guesses from this origin.
     pub(super) fn attempts(&self, solver: Solver, guesses: Guesses) -> impl Iterator<Item = &Judged> {
         self.with(guesses).iter().map(move |trial| trial.by(solver))
     }
@@ -101,13 +101,13 @@ impl Trials {
         Share::count(self.attempts(solver, guesses).map(|judged| judged.reached == Reached::True))
     }
 
-    /// Of what was reached, how often it was the solution closest to the guess.
+    /// Share of the solutions reached that are the closest to the guess.
     pub(super) fn closest(&self, solver: Solver, guesses: Guesses) -> Share {
         let solved = self.attempts(solver, guesses).filter(|judged| judged.is_solved());
         Share::count(solved.map(|judged| judged.closest))
     }
 
-    /// A solver's iterations and Newton–Raphson's (same residual) where both arrive.
+    /// A solver's iterations and Newton–Raphson's (same residual) where both reach a solution.
     pub(super) fn against_newton(&self, solver: Solver, guesses: Guesses) -> Vec<[Attempt; 2]> {
         let rival = match solver {
             Solver::Published(residual, _) => Solver::Newton(residual),
@@ -178,7 +178,7 @@ impl Trials {
         counts
     }
 
-    /// What the paper's variants and Newton–Raphson cost where both arrive.
+    /// Iterations of the paper's variants and of Newton–Raphson where both reach a solution.
     pub(super) fn cost_table(&self) -> Table {
         let header = [
             "guesses",
@@ -210,7 +210,7 @@ impl Trials {
         Table::new("cost", &header, rows)
     }
 
-    /// Trials above the base in which one of the two arrives and the other does not:
+    /// Trials above the base in which only one of the two reaches a solution:
     /// the paper's solver alone, Newton–Raphson alone.
     pub(super) fn alone(&self) -> [Share; 2] {
         let both = || {

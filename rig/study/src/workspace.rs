@@ -38,7 +38,7 @@ pub(super) const SLICES: [Slice; 4] = [
     Slice { across: Coordinate::Yaw, up: Coordinate::Pitch },
 ];
 
-/// What is known of a pose within the strokes in which the mechanism stands.
+/// Quality of a pose that the mechanism can take within the strokes.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct PoseQuality {
     /// Condition number of the 6×6 Jacobian, turns taken at the platform's side.

@@ -1,4 +1,4 @@
-//! What the paper claims of where its solver arrives.
+//! The paper's claims about convergence.
 
 use super::{ANY, Judgement, PaperClaim, RARELY};
 use crate::sample::Guesses;
@@ -49,7 +49,7 @@ pub(super) fn wider_range(study: &Study) -> PaperClaim {
             best.0.name(),
             best.1.percent()
         ),
-        criterion: "holds if the paper's solver as printed arrives more often from above the base, by 3 standard \
+        criterion: "holds if the paper's solver as printed reaches a solution more often from above the base, by 3 standard \
                     errors; partly if only a variant of it does",
         judgement: wider(published, newton, best.1),
         figure: Some("success"),
@@ -62,8 +62,8 @@ pub(super) fn newton_diverges(study: &Study) -> PaperClaim {
         statement: "Typically both seem to converge at first, then Newton–Raphson diverges and the algorithm does not.",
         section: "Results, first advantage; Fig. 3",
         measured: format!(
-            "{} of guesses above the base show this; the opposite, Newton–Raphson arriving where the paper's \
-             solver stalls, {}",
+            "{} of guesses above the base show this; the opposite, Newton–Raphson reaching a solution where the \
+             paper's solver stalls, {}",
             share.percent(),
             study.pairs.stalling.share.percent()
         ),

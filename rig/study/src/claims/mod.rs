@@ -10,7 +10,7 @@ use super::sample::Guesses;
 use super::share::Share;
 use crate::study::Study;
 
-/// Any guess at all, as far as a leg can stand.
+/// Guesses anywhere above the base.
 const ANY: Guesses = Guesses::AboveBase;
 /// A rule that fails in a smaller share of cases nearly holds.
 const RARELY: f64 = 0.01;

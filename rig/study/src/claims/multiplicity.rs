@@ -1,4 +1,4 @@
-//! What the paper claims of the number of solutions.
+//! The paper's claims about the number of solutions.
 
 use super::{Judgement, PaperClaim, RARELY};
 use crate::multiplicity::{CONDITIONS, Conditions};
@@ -53,8 +53,8 @@ pub(super) fn conditions_leave_one(study: &Study) -> PaperClaim {
         statement: "Two conditions leave exactly one solution, if any.",
         section: "Abstract and Results, on multiplicity",
         measured: format!("several are left — {}", texts.collect::<Vec<_>>().join("; ")),
-        criterion: "holds if no random input keeps several under the oriented reading; partly if fewer than 1 % do. \
-                    No sample can prove it: see masseter uniqueness",
+        criterion: "holds if no random input keeps several with the plane oriented; partly if fewer than 1 % do. \
+                    A sample cannot prove it: see masseter uniqueness",
         judgement: unique(several[Conditions::Oriented as usize]),
         figure: None,
     }

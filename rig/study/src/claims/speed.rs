@@ -1,4 +1,4 @@
-//! What the paper claims of its solver's speed.
+//! The paper's claims about speed.
 
 use super::{ANY, Judgement, PaperClaim};
 use crate::share::median;
@@ -8,7 +8,7 @@ use crate::study::Study;
 
 /// The time the paper states for one computation, ns.
 const STATED_NS: f64 = 0.1;
-/// What a real-time cycle of 1 ms can spare for one solution, ns: a tenth.
+/// Share of a real-time cycle of 1 ms for one solution, ns: a tenth.
 const REAL_TIME_NS: f64 = 1e5;
 /// How many times more iterations are "much more".
 const MUCH_MORE: f64 = 2.0;
@@ -25,7 +25,7 @@ pub(super) fn fewer_iterations(study: &Study) -> PaperClaim {
         statement: "It converges much faster: Newton–Raphson needs many more iterations.",
         section: "Results, second advantage; Fig. 5",
         measured: format!(
-            "where both arrive from above the base, medians of the paper's solver and Newton–Raphson: {} and {} iterations, {} \
+            "where both reach a solution from above the base, medians of the paper's solver and Newton–Raphson: {} and {} iterations, {} \
              and {} evaluations of the residuals; time of the paper's solver {time:.2} of Newton–Raphson's",
             iterations[0], iterations[1], evaluations[0], evaluations[1]
         ),

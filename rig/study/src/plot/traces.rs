@@ -65,7 +65,7 @@ fn course(disagreement: &Disagreement) -> LineChart {
     });
     LineChart {
         title: disagreement.title.to_owned(),
-        x: Axis::fitted("iteration", Scale::Linear).including(0.0),
+        x: Axis::new("iteration", Scale::Linear, [0.0, ITERATIONS as f64]),
         y: Axis::fitted("error f₁² + f₂² + f₃², cm²", Scale::Log).including(1.0),
         lines,
         limits: Vec::new(),
