@@ -107,8 +107,7 @@ fn sequence(state: Option<Code<ControllerState>>, events: &[EventRecord]) -> Che
     Check::judged("sequence", format!("ended in state {in_words}{how}"), is_finished && !was_stopped)
 }
 
-/// Gaps tell of losses before the last message that was recorded. What came behind it, and what cannot be read, nobody
-/// counts.
+/// Gaps show losses before the last recorded message. Losses behind it, and in unreadable parts, are unknown.
 fn dropped_messages(manifest: &Manifest, figures: &Figures) -> Check {
     let missing = figures.missing_messages();
     dropped(missing, part_not_known(&manifest.ending, figures.cut_short, !figures.damage.is_empty()))
@@ -126,7 +125,7 @@ fn part_not_known(ending: &Ending, is_cut_short: bool, is_damaged: bool) -> Opti
     let reasons = [
         (is_cut_short, "the recording lacks its end"),
         (is_damaged, "the recording is damaged"),
-        (*ending == Ending::RecordingFailed, "the logger could not write everything"),
+        (*ending == Ending::RecordingFailed, "the recorder could not write everything"),
     ];
     reasons.into_iter().find_map(|(is_so, why)| is_so.then_some(why))
 }
