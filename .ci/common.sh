@@ -19,7 +19,7 @@ install_packages() {
 # Whether one of these commands exists.
 has_any() { local name; for name in "$@"; do command -v "$name" >/dev/null && return; done; return 1; }
 
-# A cargo tool in exactly this version. It goes into the project's target folder, so that a developer keeps his own.
+# A cargo tool in exactly this version. It goes into the project's target folder, beside a developer's own tools.
 install_cargo_tool() { # name, version
     has_any "$1" && [[ "$("$1" --version)" == *" $2"* ]] && return
     cargo install --locked --quiet --root "$tools" "$1" --version "=$2"
