@@ -135,8 +135,8 @@ impl<T> Thinned<T> {
     }
 
     fn make_room(&mut self) -> bool {
-        let is_wanted = 2 * self.every <= self.coarsest;
-        if is_wanted {
+        let has_room = 2 * self.every <= self.coarsest;
+        if has_room {
             let mut place = 0;
             self.samples.retain(|_| {
                 place += 1;
@@ -144,7 +144,7 @@ impl<T> Thinned<T> {
             });
             self.every *= 2;
         }
-        is_wanted
+        has_room
     }
 
     pub(super) fn into_samples(self) -> Vec<T> {

@@ -44,7 +44,7 @@ fn budgets(scenario: &Scenario) -> Vec<Limit> {
     budgets
 }
 
-/// The latest wake-ups over time; none under virtual time, where nobody is late.
+/// The latest wake-ups over time; none under virtual time, where no wake-up is late.
 pub(super) fn jitter(figures: &Figures) -> Option<Drawn> {
     let over_time = &figures.over_time;
     let late = |name: &str, curve: &Curve| {
@@ -63,19 +63,19 @@ fn microseconds(ns: f64) -> f64 {
     (ns / 1e3).max(LEAST_US)
 }
 
-/// The platform's displacement, wanted and true, and the distance between the two.
+/// The platform's displacement, desired and actual, and the distance between the two.
 pub(super) fn motion(figures: &Figures) -> [Option<Drawn>; 2] {
     let track = &figures.track;
     let actual = figures.tracking.actual_source.adjective();
     let pair = |(axis, name): (usize, &str)| {
-        [("wanted", &track.desired_m), (actual, &track.actual_m)]
+        [("desired", &track.desired_m), (actual, &track.actual_m)]
             .map(|(kind, curves)| Line::new(&format!("{name} {kind}"), in_unit(&curves[axis], 1e3)))
     };
     let lines = ["x", "y", "z"].into_iter().enumerate().flat_map(pair).collect();
     let distance = Line::new("distance", in_unit(&track.distance_m, 1e3));
     [
         chart_over_time(linear("displacement of the platform, mm"), lines, Vec::new()),
-        chart_over_time(linear("distance from wanted, mm"), vec![distance], Vec::new()),
+        chart_over_time(linear("distance from desired, mm"), vec![distance], Vec::new()),
     ]
 }
 

@@ -107,8 +107,7 @@ fn sequence(state: Option<Code<ControllerState>>, events: &[EventRecord]) -> Che
     Check::judged("sequence", format!("ended in state {in_words}{how}"), is_finished && !was_stopped)
 }
 
-/// Gaps tell of losses before the last message that was recorded. What came behind it, and what cannot be read, nobody
-/// counts.
+/// Gaps show losses before the last recorded message. Losses behind it, and in unreadable parts, are unknown.
 fn dropped_messages(manifest: &Manifest, figures: &Figures) -> Check {
     let missing = figures.missing_messages();
     dropped(missing, part_not_known(&manifest.ending, figures.cut_short, !figures.damage.is_empty()))

@@ -2,7 +2,7 @@
 
 use masseter_terminal::Exit;
 
-/// What a run came to.
+/// The outcome of a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Outcome {
     /// Every check passed.
@@ -22,7 +22,7 @@ pub enum Outcome {
 }
 
 impl Outcome {
-    /// The word for it.
+    /// Its word in reports.
     pub fn word(self) -> &'static str {
         match self {
             Self::Pass => "PASS",
@@ -35,7 +35,7 @@ impl Outcome {
         }
     }
 
-    /// How the program ends that tells of it.
+    /// The exit code of the program.
     pub fn exit(self) -> Exit {
         match self {
             Self::Pass => Exit::Passed,
@@ -48,7 +48,7 @@ impl Outcome {
         }
     }
 
-    /// Whether its checks say what it came to.
+    /// Whether the checks decided it.
     pub(crate) fn is_judged(self) -> bool {
         matches!(self, Self::Pass | Self::Fail)
     }

@@ -16,6 +16,8 @@ use crate::{animation, charts, table, time_line, usage};
 #[derive(Template)]
 #[template(path = "report.html")]
 struct Page<'a> {
+    style: &'static str,
+    mechanism_program: &'static str,
     manifest: &'a Manifest,
     figures: &'a Figures,
     verdict: &'a Verdict,
@@ -70,6 +72,8 @@ pub(crate) fn html(manifest: &Manifest, figures: &Figures, verdict: &Verdict) ->
         .map(|drawn| move |id| plot(id, drawn, "The recording holds no truth."));
     let stalled_ms = |ns: u64| format!("{:.2}", ns as f64 / 1e6);
     let page = Page {
+        style: include_str!("../templates/style.css"),
+        mechanism_program: include_str!("../templates/mechanism.js"),
         manifest,
         figures,
         verdict,
@@ -87,11 +91,11 @@ pub(crate) fn html(manifest: &Manifest, figures: &Figures, verdict: &Verdict) ->
         plant_stalled_ms: stalled_ms(figures.plant_skips.stalled_ns),
         readings: table::readings(&figures.readings),
         percentiles: plot("percentiles", charts::percentiles(scenario, figures), "No interval was measured."),
-        jitter: plot("jitter", charts::jitter(figures), "Under virtual time nobody is late."),
+        jitter: plot("jitter", charts::jitter(figures), "Under virtual time no wake-up is late."),
         worst_cycles: worst_cycles(figures),
         buses: plot("buses", charts::bus_load(figures), "No frame was recorded."),
         responses: responses(figures),
-        time_line: time_line::svg(figures).unwrap_or_else(|| "Nothing happened.".to_owned()),
+        time_line: time_line::svg(figures).unwrap_or_else(|| "There were no events.".to_owned()),
         events: figures.events.iter().map(event_with_cycle).collect(),
         began: manifest.began.trim_end_matches('Z'),
         recording_played: match &scenario.motion {
@@ -102,16 +106,6 @@ pub(crate) fn html(manifest: &Manifest, figures: &Figures, verdict: &Verdict) ->
         stolen_s: format!("{:.2}", manifest.usage.stolen_s),
     };
     page.render()
-}
-
-impl Page<'_> {
-    fn style(&self) -> &'static str {
-        include_str!("../templates/style.css")
-    }
-
-    fn mechanism_program(&self) -> &'static str {
-        include_str!("../templates/mechanism.js")
-    }
 }
 
 /// The part of the motion that the animation shows, if it does not show all.

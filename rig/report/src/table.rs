@@ -59,7 +59,7 @@ fn write_text(
     responses(text, &figures.bus_response)?;
     writeln!(
         text,
-        "\nskipped cycles: controller {}, plant {}; machine stood still: {:.2} ms of the controller's, {:.2} ms of the plant's waiting",
+        "\nskipped cycles: controller {}, plant {}; withheld by the machine while waiting: controller {:.2} ms, plant {:.2} ms",
         figures.controller_skips.skipped,
         figures.plant_skips.skipped,
         figures.controller_skips.stalled_ns as f64 / 1e6,
@@ -140,7 +140,7 @@ pub(crate) fn distances(tracking: &TrackingFigures) -> String {
     let [rms_mm, max_mm, rms_deg, max_deg] =
         [rms_mm, max_mm, rms_deg, max_deg].map(|value| or_dash(value, decimals));
     format!(
-        "{} against wanted: rms {rms_mm} mm, max {max_mm} mm; rms {rms_deg}°, max {max_deg}°",
+        "{} against desired: rms {rms_mm} mm, max {max_mm} mm; rms {rms_deg}°, max {max_deg}°",
         tracking.actual_source.adjective()
     )
 }

@@ -1,4 +1,4 @@
-//! How a run is judged: its end, then its recording, then the machine, then its [checks](super::checks).
+//! The verdict on a run: by its end, then its recording, then the machine, then its checks.
 
 use masseter_shared::config::CanConfig;
 use masseter_shared::messages::codes::EventKind;
@@ -16,7 +16,7 @@ use masseter_recording::RunUsage;
 /// The judgement of a run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Verdict {
-    /// What it came to.
+    /// The outcome.
     pub outcome: Outcome,
     /// The reason in a sentence.
     pub reason: String,
@@ -60,7 +60,7 @@ impl Verdict {
 /// Share of its core above which a real-time process is too busy: the kernel throttles at 95 %, by default.
 const TOO_BUSY: f64 = 0.9;
 
-/// What to do about a real-time process that hardly ever slept.
+/// The remedy for a real-time process that hardly ever slept.
 fn overload(usage: &RunUsage, rate_hz: u32) -> Option<String> {
     let busy = |name: &'static str| {
         let usage = usage.processes.get(name)?;
@@ -90,7 +90,7 @@ fn ending(ending: &Ending, events: &[EventRecord]) -> Option<Judgement> {
     }
 }
 
-/// The controller's own event often tells no more than that the master gave up: what went wrong first says why.
+/// The first fault explains the stop: the controller's own event often names only the master.
 fn stopped(events: &[EventRecord]) -> String {
     let first = events.iter().find(|event| event.kind == EventKind::Fault);
     let why = first.map_or_else(String::new, |fault| format!("; first fault: {}", text::event(fault)));
@@ -125,27 +125,27 @@ fn disturbed(manifest: &Manifest, figures: &Figures) -> Option<Judgement> {
     let reason = if let Some((process, refusal)) = refusal {
         format!("{skipped} cycles were missed without real time{stop}; {process}: {refusal}")
     } else {
-        format!("{}{stop}; {}", standstill(figures), remedy(manifest))
+        format!("{}{stop}; {}", withheld(figures), remedy(manifest))
     };
     Some((Outcome::Invalid, reason))
 }
 
-/// What the machine did to the rig.
-fn standstill(figures: &Figures) -> String {
+/// The time that the machine withheld, and the cycles missed.
+fn withheld(figures: &Figures) -> String {
     let (controller, plant) = (&figures.controller_skips, &figures.plant_skips);
     let stalled_ms = (controller.stalled_ns + plant.stalled_ns) as f64 / 1e6;
     let (skipped, _) = figures.skipped();
     let while_working = match controller.while_working + plant.while_working {
         0 => String::new(),
-        n => format!(", {n} of them while it worked, which the machine may as well have done"),
+        n => format!(", {n} of them while it worked, which the machine may have caused too"),
     };
     format!(
-        "the machine stood still for {stalled_ms:.1} ms while the rig waited, and {skipped} cycles were \
+        "the machine withheld the cores for {stalled_ms:.1} ms while the rig waited, and {skipped} cycles were \
          missed{while_working}"
     )
 }
 
-/// Stamps of the wall clock, which real interfaces give and simulated ones do not, tell nothing once it was set.
+/// Real interfaces stamp frames by the wall clock: once it was set, these times are useless. Simulated ones do not use it.
 fn clock_jump(usage: &RunUsage, can: &CanConfig) -> Option<Judgement> {
     let jump_s = usage.clock_jump_s;
     (jump_s != 0.0 && !can.is_virtual()).then(|| {
@@ -156,18 +156,17 @@ fn clock_jump(usage: &RunUsage, can: &CanConfig) -> Option<Judgement> {
     })
 }
 
-/// What may keep the machine from standing still.
+/// The remedy against time withheld by the machine.
 fn remedy(manifest: &Manifest) -> &'static str {
     match &manifest.cpu_dma_latency {
         Some(DmaLatency { limit_us: None, .. }) => {
-            "`realtime.cpu_dma_latency = \"hold\"` may help, which `masseter bench loop` tells"
+            "`realtime.cpu_dma_latency = \"hold\"` may help; `masseter bench loop` measures that"
         }
-        _ => "`masseter doctor` tells what helps",
+        _ => "`masseter doctor` shows the remedies",
     }
 }
 
-/// What excuses the way a disturbed run ended, in words; nothing to say when it ended as it should, none when there is
-/// no excuse.
+/// The excuse for the end of a disturbed run, in words: empty when it ended normally, none without an excuse.
 fn excuse(
     ending: &Ending,
     missed: CheckResult,

@@ -1,19 +1,19 @@
-//! The change of every figure, and whether it is more than the spread of the runs' own seconds.
+//! The change of every figure, and whether it exceeds the spread of the runs' own seconds.
 //!
-//! The spread is known of figures that each second of a run has a value of: their standard error stands in the
-//! summary beside them. Of extremes and counts it is not, and nothing is claimed.
+//! The spread is known where each second of a run has a value of the figure: its standard error is in the summary. The
+//! spread of extremes and counts is unknown, and nothing is claimed of them.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use serde::Serialize;
 use serde_json::Value;
 
-/// A change beyond this many standard errors of the difference is not their seconds' chance.
+/// A change beyond this many standard errors of the difference exceeds the spread.
 const BEYOND: f64 = 3.0;
-/// Figures that say when or where something was or what was known of it, and are no results.
+/// Parts of names of figures that are no results: times, places, errors of others.
 const NO_RESULTS: [&str; 6] = ["_noise_", "_at_ns", "events", "worst_cycles", "damage", ".bus"];
 
-/// What a change is worth.
+/// The weight of a change.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub(super) enum Judgement {
@@ -82,7 +82,7 @@ fn gather(path: String, value: &Value, found: &mut BTreeMap<String, Value>) {
     }
 }
 
-/// What tells an item of a list from the others, in whatever order they stand.
+/// The name of an item of a list, whose order may differ between runs.
 fn name_of(item: &Value) -> Option<String> {
     let text = |key: &str| item[key].as_str().map(str::to_owned);
     let message = || Some(format!("can{} {}", item["bus"].as_u64()?, text("message")?));
@@ -104,13 +104,13 @@ pub(super) fn changes(a: &BTreeMap<String, f64>, b: &BTreeMap<String, f64>) -> V
         .collect()
 }
 
-/// Where the noise of a figure stands: `p50_noise_ns` beside `p50_ns`.
+/// The key of a figure's standard error: `p50_noise_ns` beside `p50_ns`.
 fn noise_of(figure: &str) -> Option<String> {
     let (name, unit) = figure.rsplit_once('_')?;
     Some(format!("{name}_noise_{unit}"))
 }
 
-/// Seconds that agree to the nanosecond know no better than the histogram that their values come from.
+/// The least error of a figure: the resolution of its histogram, even where all seconds agree.
 fn resolution(figure: &str, value: f64) -> f64 {
     if figure.starts_with("intervals.") { masseter_analysis::resolution_ns(value as u64) as f64 } else { 0.0 }
 }
