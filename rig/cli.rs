@@ -3,22 +3,22 @@
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
-use masseter_study::KinematicsArgs;
-use masseter_study::uniqueness::UniquenessVerb;
 use masseter_terminal::{Exit, Failure, OrFailure, status};
 
 use crate::bench::ipc::PeerArgs;
-use crate::bench::{self, BenchArgs};
+use crate::bench::{self, args::BenchArgs};
 use crate::can::{self, CanVerb};
 use crate::clean;
 use crate::controller::{self, ControllerArgs};
 use crate::csv_kinematics::{self, CsvArgs, FkArgs};
 use crate::doctor::{self, DoctorArgs};
+use crate::kinematics::{self, KinematicsArgs};
 use crate::plant::{self, PlantArgs};
 use crate::recorder::{self, RecorderArgs};
 use crate::recording_cli::{self, RecordingVerb};
 use crate::report_cli::{self, ReportArgs};
 use crate::run::{self, args::RunArgs};
+use crate::uniqueness::{self, UniquenessVerb};
 
 /// A hardware-in-the-loop rig for a 6-DOF mastication robot
 ///
@@ -62,6 +62,7 @@ enum Verb {
     #[command(subcommand)]
     Uniqueness(UniquenessVerb),
     /// Reproduce the paper's study of the forward kinematics: figures, data, claims
+    #[command(visible_alias = "paper")]
     Kinematics(KinematicsArgs),
     /// Remove what killed runs left in shared memory
     Clean,
@@ -94,8 +95,8 @@ fn execute(verb: Verb) -> Result<Exit, Failure> {
         Verb::Fk(args) => csv_kinematics::forward(&args).usage(),
         Verb::Ik(args) => csv_kinematics::inverse(&args).usage(),
         Verb::Can(verb) => can::execute(&verb).usage(),
-        Verb::Uniqueness(verb) => masseter_study::uniqueness::uniqueness(&verb).usage(),
-        Verb::Kinematics(args) => masseter_study::kinematics(&args).usage(),
+        Verb::Uniqueness(verb) => uniqueness::uniqueness(&verb).usage(),
+        Verb::Kinematics(args) => kinematics::kinematics(&args).usage(),
         Verb::Doctor(args) => doctor::examine(&args).usage(),
         Verb::Recording(verb) => recording_cli::execute(&verb).usage(),
         Verb::Clean => clean::clean().usage(),

@@ -1,4 +1,4 @@
-//! On what a bench is made: the machine, its two cores, and the scheduling that the kernel grants there.
+//! The machine of a bench, its two cores, and the scheduling that the kernel grants there.
 
 use masseter_terminal::status;
 use std::collections::BTreeSet;
@@ -7,7 +7,8 @@ use anyhow::ensure;
 use masseter_shared::realtime::scheduling::{Obtained, usable_cores};
 use serde::Serialize;
 
-use super::{Kind, kind_name, realtime_on};
+use super::args::Kind;
+use super::thread::realtime_on;
 use masseter_recording::MachineInfo;
 
 /// Written with the results.
@@ -20,7 +21,7 @@ pub(super) struct Circumstances {
 }
 
 impl Circumstances {
-    /// Asks the kernel, as every turn will, and says what it refuses.
+    /// Asks the kernel as every round does, and prints its refusals.
     pub(super) fn on(cores: [usize; 2]) -> Self {
         let scheduling = cores.map(|core| {
             std::thread::spawn(move || realtime_on(core)).join().expect("asking the kernel does not panic")
@@ -33,19 +34,19 @@ impl Circumstances {
     }
 }
 
-/// Refuses cores on which a bench could not end: two threads that poll at real-time priority need one each.
+/// Refuses cores on which a bench could not end: two threads that poll at real-time priority need a core each.
 pub(super) fn check_cores(kinds: &[Kind], cores: [usize; 2]) -> anyhow::Result<()> {
     check(kinds, cores, &usable_cores())
 }
 
 fn check(kinds: &[Kind], [own, peer]: [usize; 2], allowed: &[usize]) -> anyhow::Result<()> {
     let Some(kind) = kinds.iter().find(|kind| matches!(kind, Kind::Ipc | Kind::Rate)) else { return Ok(()) };
-    let bench = format!("bench {}", kind_name(*kind));
+    let bench = format!("bench {}", kind.name());
     let named = allowed.iter().map(usize::to_string).collect::<Vec<_>>().join(", ");
     ensure!(
         allowed.len() >= 2,
         "{bench} needs two cores, and this process may use only core {named}: allow it another (`masseter \
-         doctor` tells how), or measure loop, fk and subscribers, which need one"
+         doctor` tells how), or measure loop and fk, which need one"
     );
     ensure!(own != peer, "{bench} needs two cores, and --cores names {own} twice: choose two among {named}");
     for core in [own, peer] {

@@ -1,4 +1,4 @@
-//! Whether the machine let a bench be: what its host stole, and how long it stood still before the rounds.
+//! How much time the machine took from a bench: stolen by its host, or standing still before a round.
 
 use std::time::Duration;
 
@@ -6,56 +6,60 @@ use masseter_shared::clock::{self, SECOND_NS};
 use masseter_shared::realtime::Waiter;
 use serde::Serialize;
 
-use super::on_core;
+use super::thread::on_core;
 use crate::machine::SystemRoot;
 use crate::machine::counters::stolen_ns;
 
-/// Above this share of time stolen or stood still, tails are the machine's, %.
+/// With a greater share of time stolen or standing still, high percentiles come from the machine, %.
 const BOUND_PERCENT: f64 = 1.0;
-/// The machine is looked at for so long before each turn.
-const LOOK: Duration = Duration::from_millis(50);
+/// Length of an observation, before each round of a candidate.
+const OBSERVED: Duration = Duration::from_millis(50);
 
-/// What became of the time, and whether too much of it was lost.
+/// The time lost, and whether it was too much.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct Disturbance {
     /// Of all cores' time, as the kernel counts it.
     pub(super) stolen_percent: f64,
-    /// Of the time that a thread of the rig's priority spun before the turns, on the core that lost most.
+    /// Of the time observed, on the core that lost most.
     pub(super) stalled_percent: f64,
     pub(super) disturbed: bool,
-    /// Why it is.
+    /// The figures in a sentence, if it is disturbed.
     pub(super) reason: Option<String>,
 }
 
 impl Disturbance {
-    fn of(stolen_percent: f64, stalled_percent: f64) -> Self {
+    fn from_percentages(stolen_percent: f64, stalled_percent: f64) -> Self {
         let disturbed = stolen_percent.max(stalled_percent) > BOUND_PERCENT;
         let reason = format!(
-            "the machine stood still for {stalled_percent:.1} % of the time that it was looked at, and its host stole \
-             {stolen_percent:.1} %; up to {BOUND_PERCENT} % of either can be judged"
+            "the machine stood still for {stalled_percent:.1} % of the time observed, and its host stole \
+             {stolen_percent:.1} %; a bench is judged with at most {BOUND_PERCENT} % of each"
         );
         Self { stolen_percent, stalled_percent, disturbed, reason: disturbed.then_some(reason) }
     }
 }
 
-/// Looks at the machine now and then.
+/// Observes whether the machine stands still.
 #[derive(Debug)]
-pub(super) struct Watch {
-    cores: Vec<Looks>,
+pub(super) struct Stillness {
+    cores: Vec<ObservedCore>,
     began_ns: u64,
     stolen_before_ns: Option<u64>,
 }
 
-impl Watch {
-    /// From the cores that are measured on.
+impl Stillness {
+    /// On the cores of the bench.
     pub(super) fn begin(cores: &[usize]) -> Self {
         let stolen_before_ns = stolen_ns(&SystemRoot::of_this_machine());
-        Self { cores: cores.iter().map(Looks::from).collect(), began_ns: clock::now_ns(), stolen_before_ns }
+        Self {
+            cores: cores.iter().map(ObservedCore::from).collect(),
+            began_ns: clock::now_ns(),
+            stolen_before_ns,
+        }
     }
 
-    /// On one core after the other.
-    pub(super) fn look(&mut self) {
-        self.cores.iter_mut().for_each(Looks::look);
+    /// Observes one core after the other.
+    pub(super) fn observe(&mut self) {
+        self.cores.iter_mut().for_each(ObservedCore::observe);
     }
 
     pub(super) fn end(self) -> Disturbance {
@@ -63,42 +67,42 @@ impl Watch {
         let passed_ns = (clock::now_ns() - self.began_ns) * root.online_cores().len().max(1) as u64;
         let stolen_ns =
             stolen_ns(&root).zip(self.stolen_before_ns).map_or(0, |(to, from)| to.saturating_sub(from));
-        Disturbance::of(percent(stolen_ns, passed_ns), worst_percent(&self.cores))
+        Disturbance::from_percentages(percent(stolen_ns, passed_ns), worst_percent(&self.cores))
     }
 }
 
-/// What was seen of a core, ns.
+/// A core and the time observed on it, ns.
 #[derive(Debug)]
-struct Looks {
+struct ObservedCore {
     core: usize,
-    looked_ns: u64,
+    observed_ns: u64,
     stalled_ns: u64,
 }
 
-impl From<&usize> for Looks {
+impl From<&usize> for ObservedCore {
     fn from(core: &usize) -> Self {
-        Self { core: *core, looked_ns: 0, stalled_ns: 0 }
+        Self { core: *core, observed_ns: 0, stalled_ns: 0 }
     }
 }
 
-impl Looks {
-    /// Spins on the core and counts the gaps.
-    fn look(&mut self) {
+impl ObservedCore {
+    /// Spins on the core, with the priority of the rig, and counts the gaps.
+    fn observe(&mut self) {
         let account = on_core(self.core, || {
             let mut waiter = Waiter::new(SECOND_NS);
-            let until_ns = clock::now_ns() + LOOK.as_nanos() as u64;
+            let until_ns = clock::now_ns() + OBSERVED.as_nanos() as u64;
             let mut spin = waiter.spin();
             while spin.now_ns() < until_ns {}
             waiter.account()
         });
-        self.looked_ns += account.spun_ns + account.stalled_ns;
+        self.observed_ns += account.spun_ns + account.stalled_ns;
         self.stalled_ns += account.stalled_ns;
     }
 }
 
 /// A bench on two cores waits for the slower one.
-fn worst_percent(cores: &[Looks]) -> f64 {
-    cores.iter().map(|looks| percent(looks.stalled_ns, looks.looked_ns)).fold(0.0, f64::max)
+fn worst_percent(cores: &[ObservedCore]) -> f64 {
+    cores.iter().map(|core| percent(core.stalled_ns, core.observed_ns)).fold(0.0, f64::max)
 }
 
 fn percent(part_ns: u64, of_ns: u64) -> f64 {
@@ -114,27 +118,27 @@ mod tests {
         for (stolen, stalled, disturbed) in
             [(0.0, 0.0, false), (1.0, 1.0, false), (1.1, 0.0, true), (0.0, 1.1, true)]
         {
-            let disturbance = Disturbance::of(stolen, stalled);
+            let disturbance = Disturbance::from_percentages(stolen, stalled);
             assert_eq!(disturbance.disturbed, disturbed, "{disturbance:?}");
             assert_eq!(disturbance.reason.is_some(), disturbed);
         }
     }
 
     #[test]
-    fn what_is_looked_at_is_what_was_spun_on_every_core_in_use() {
-        let mut watch = Watch::begin(&[0, 1]);
-        watch.look();
-        for looks in &watch.cores {
-            assert!(u128::from(looks.looked_ns) > LOOK.as_nanos() / 2, "{watch:?}");
-            assert!(looks.stalled_ns <= looks.looked_ns, "{watch:?}");
+    fn every_core_in_use_is_observed() {
+        let mut stillness = Stillness::begin(&[0, 1]);
+        stillness.observe();
+        for core in &stillness.cores {
+            assert!(u128::from(core.observed_ns) > OBSERVED.as_nanos() / 2, "{stillness:?}");
+            assert!(core.stalled_ns <= core.observed_ns, "{stillness:?}");
         }
-        assert_eq!(watch.cores.len(), 2);
+        assert_eq!(stillness.cores.len(), 2);
     }
 
     #[test]
-    fn of_two_cores_the_one_that_lost_most_tells() {
-        let looks = |core, stalled_ns| Looks { core, looked_ns: 1000, stalled_ns };
-        assert!((worst_percent(&[looks(0, 0), looks(1, 30)]) - 3.0).abs() < 1e-9);
-        assert!((worst_percent(&[looks(0, 30), looks(1, 0)]) - 3.0).abs() < 1e-9);
+    fn of_two_cores_the_one_that_lost_most_counts() {
+        let observed = |core, stalled_ns| ObservedCore { core, observed_ns: 1000, stalled_ns };
+        assert!((worst_percent(&[observed(0, 0), observed(1, 30)]) - 3.0).abs() < 1e-9);
+        assert!((worst_percent(&[observed(0, 30), observed(1, 0)]) - 3.0).abs() < 1e-9);
     }
 }

@@ -1,6 +1,6 @@
-//! `bench fk`: the forward kinematics as the loop calls it, against uncertified iterations.
+//! `bench fk`: the forward kinematics of the loop, against uncertified iterations.
 //!
-//! Inputs follow a chewing-like cycle at 1 kHz; every call is timed on its own.
+//! Inputs follow a chewing-like cycle at 1 kHz; every call is timed separately.
 
 use std::f64::consts::TAU;
 use std::hint::black_box;
@@ -12,25 +12,25 @@ use masseter_shared::clock;
 use masseter_shared::geometry::{Actuators, LEGS, Mechanism, MechanismConfig, Pose};
 use nalgebra::{Translation3, UnitQuaternion};
 
-use super::contender::{Durations, durations, record};
-use super::contest::{Outcome, Turn};
-use super::on_core;
+use super::candidate::{Durations, no_durations, record};
+use super::comparison::{Comparison, Turn};
+use super::thread::on_core;
 
 /// A chewing cycle of 0.46 s, one input a millisecond.
 const CYCLES: usize = 460;
-/// Calls a round.
+/// Calls per round.
 const CALLS: usize = 20_000;
-/// Where an iteration starts that knows nothing yet.
+/// Guess of an iteration without an earlier solution.
 const GUESS_RAD: [f64; LEGS] = [1.4; LEGS];
 
-// The contenders.
+// The candidates.
 const WARM: &str = "warm, certified";
 const WARM_NEWTON: &str = "warm, Newton";
 const WARM_PAPER: &str = "warm, the paper's iteration";
 const COLD: &str = "cold, all solutions";
 const COLD_NEWTON: &str = "cold, Newton from one guess";
 
-pub(super) fn measure(rounds: u32, core: usize) -> anyhow::Result<Outcome> {
+pub(super) fn measure(rounds: u32, core: usize) -> anyhow::Result<Comparison> {
     let mechanism = &Mechanism::new(&MechanismConfig::default())?;
     let inputs = &*chewing(mechanism)?;
     let options = &Options::default();
@@ -50,8 +50,8 @@ pub(super) fn measure(rounds: u32, core: usize) -> anyhow::Result<Outcome> {
         turn(COLD_NEWTON, core, || each(inputs, |input| newton(input, &GUESS_RAD))),
     ];
     let measures = "one forward solution, inputs of a chewing cycle at 1 kHz".to_owned();
-    let outcome = Outcome::of_turns("fk", measures, rounds, &[core], turns)?;
-    Ok(outcome.comparing([(WARM, WARM_NEWTON), (WARM, WARM_PAPER), (COLD, COLD_NEWTON)]))
+    let comparison = Comparison::by_turns("fk", measures, rounds, &[core], turns)?;
+    Ok(comparison.comparing([(WARM, WARM_NEWTON), (WARM, WARM_PAPER), (COLD, COLD_NEWTON)]))
 }
 
 fn turn<'a>(name: &str, core: usize, play: impl Fn() -> Durations + Sync + 'a) -> (String, Turn<'a>) {
@@ -69,7 +69,7 @@ fn chewing(mechanism: &Mechanism) -> anyhow::Result<Vec<Actuators>> {
     (0..CYCLES).map(|cycle| Ok(mechanism.inverse(&pose(cycle))?.actuators)).collect()
 }
 
-/// Times an iteration that starts from what it found last.
+/// Times an iteration that starts from its last solution.
 fn each_from_the_last(
     inputs: &[Actuators],
     solve: impl Fn(&Actuators, &[f64; LEGS]) -> Result<Solution, ForwardError>,
@@ -84,7 +84,7 @@ fn each_from_the_last(
 
 /// Times each call; the first cycle warms up.
 fn each<R>(inputs: &[Actuators], mut solve: impl FnMut(&Actuators) -> R) -> Durations {
-    let mut taken = durations();
+    let mut taken = no_durations();
     for (call, input) in inputs.iter().cycle().take(CYCLES + CALLS).enumerate() {
         let from_ns = clock::now_ns();
         black_box(solve(black_box(input)));

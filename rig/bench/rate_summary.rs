@@ -1,5 +1,5 @@
-//! What `bench rate` reads of a run's `summary.json`. A key that is not there is an error: a share of nothing would
-//! read as a perfect one.
+//! The part of a run's `summary.json` that `bench rate` reads. A missing key is an error: a missing count would look like
+//! a count of zero.
 
 use serde::{Deserialize, Deserializer};
 
@@ -40,7 +40,7 @@ struct Topic {
     missing: u64,
 }
 
-/// An option that is there: serde takes an absent one for null.
+/// A key that must exist, with a value or null: serde takes a missing key for null.
 fn null_or<'de, D: Deserializer<'de>, T: Deserialize<'de>>(value: D) -> Result<Option<T>, D::Error> {
     Option::deserialize(value)
 }
@@ -71,7 +71,7 @@ impl Summary {
         self.figures.topics.iter().all(|topic| topic.missing == 0)
     }
 
-    /// What the rig lost of its messages, and if nothing, what it missed of its deadlines: shares from 0 to 1.
+    /// The share of messages lost, and if none was lost, the share of deadlines missed; from 0 to 1.
     pub(super) fn shares(&self) -> Vec<(&'static str, f64)> {
         let dropped = self.dropped();
         if self.is_whole() { [self.missed().as_slice(), &[dropped]].concat() } else { vec![dropped] }
@@ -87,7 +87,7 @@ impl Summary {
         let Figures { controller_skips, plant_skips, topics, .. } = &self.figures;
         let skipped = controller_skips.skipped + plant_skips.skipped;
         let by_machine = controller_skips.by_machine + plant_skips.by_machine;
-        // Each process publishes one of these a cycle, and none where it skips one.
+        // Each process publishes one of these per cycle, and none in a cycle that it skips.
         let cycles = topics.iter().filter(|topic| ["state", "reading"].contains(&topic.name.as_str()));
         let deadlines = cycles.map(Topic::published).sum::<u64>() + skipped;
         [("missed", share(skipped, deadlines)), ("missed by the machine", share(by_machine, deadlines))]
@@ -121,7 +121,7 @@ mod tests {
     }
 
     #[test]
-    fn of_a_run_with_missing_messages_only_their_share_is_told() {
+    fn a_run_with_missing_messages_gives_only_their_share() {
         let incomplete =
             WRITTEN.replace("\"messages\": 110, \"missing\": 0", "\"messages\": 60, \"missing\": 50");
         let summary: Summary = serde_json::from_str(&incomplete).unwrap();
@@ -130,7 +130,7 @@ mod tests {
     }
 
     #[test]
-    fn a_key_that_is_not_there_is_an_error_and_no_zero() {
+    fn a_missing_key_is_an_error_and_not_zero() {
         for key in ["exit_code", "plant_skips", "by_machine", "final_state", "topics", "missing"] {
             let renamed = WRITTEN.replace(&format!("\"{key}\""), "\"renamed\"");
             let error = serde_json::from_str::<Summary>(&renamed).unwrap_err().to_string();

@@ -1,52 +1,53 @@
-//! A bench's outcome as text for a terminal.
+//! A comparison as text for a terminal.
 
 use std::fmt::Write;
 
-use super::contender::{Figure, Share};
-use super::contest::Outcome;
+use super::candidate::{Percentile, Share};
+use super::comparison::Comparison;
 
-/// Contenders in µs, then their ratios: median (minimum to maximum) over the rounds.
-pub(super) fn of(outcome: &Outcome) -> String {
-    let rounds = outcome.contenders.first().map_or(0, |contender| contender.rounds.len());
+/// Candidates in µs, then their ratios: median (minimum to maximum) over the rounds.
+pub(super) fn text(comparison: &Comparison) -> String {
+    let rounds = comparison.candidates.first().map_or(0, |candidate| candidate.rounds.len());
     let mut text = format!(
         "\n{}: {}\nmedian (minimum–maximum) of {rounds} rounds, µs\n",
-        outcome.bench, outcome.measures
+        comparison.bench, comparison.measures
     );
-    for contender in &outcome.contenders {
-        let of_rounds = counted(contender.n, contender.rounds.len());
-        let _ = writeln!(text, "  {:<34} {}{of_rounds}", contender.name, line(&contender.figures, 1e-3));
-        if !contender.shares.is_empty() {
-            let _ = writeln!(text, "  {:<34} {}", "", shares(&contender.shares));
+    for candidate in &comparison.candidates {
+        let of_rounds = counted(candidate.n, candidate.rounds.len());
+        let _ = writeln!(text, "  {:<34} {}{of_rounds}", candidate.name, line(&candidate.percentiles, 1e-3));
+        if !candidate.shares.is_empty() {
+            let _ = writeln!(text, "  {:<34} {}", "", shares(&candidate.shares));
         }
     }
-    if !outcome.ratios.is_empty() {
+    if !comparison.ratios.is_empty() {
         text.push_str("ratios within a round\n");
     }
-    for ratio in &outcome.ratios {
+    for ratio in &comparison.ratios {
         let name = format!("{} / {}", ratio.of, ratio.to);
         if ratio.n > 0 {
-            let _ = writeln!(text, "  {name:<34} {}{}", line(&ratio.figures, 1.0), counted(ratio.n, rounds));
+            let _ =
+                writeln!(text, "  {name:<34} {}{}", line(&ratio.percentiles, 1.0), counted(ratio.n, rounds));
         }
     }
-    for note in &outcome.notes {
+    for note in &comparison.notes {
         let _ = writeln!(text, "  {note}");
     }
-    if let Some(reason) = &outcome.disturbance.reason {
+    if let Some(reason) = &comparison.disturbance.reason {
         let _ = writeln!(text, "INVALID: {reason}");
     }
     text
 }
 
-/// Said of what not all rounds count for.
+/// A remark where some rounds do not count.
 fn counted(n: usize, rounds: usize) -> String {
     if n == rounds { String::new() } else { format!("  ({n} of {rounds} rounds count)") }
 }
 
-fn line(figures: &[Figure], scale: f64) -> String {
-    let cells = figures.iter().map(|figure| {
-        let [median, min, max] =
-            [figure.spread.median, figure.spread.min, figure.spread.max].map(|value| short(value * scale));
-        format!("{:<5} {:<20}", figure.name, format!("{median} ({min}–{max})"))
+fn line(percentiles: &[Percentile], scale: f64) -> String {
+    let cells = percentiles.iter().map(|percentile| {
+        let [median, min, max] = [percentile.spread.median, percentile.spread.min, percentile.spread.max]
+            .map(|value| short(value * scale));
+        format!("{:<5} {:<20}", percentile.name, format!("{median} ({min}–{max})"))
     });
     cells.collect::<Vec<_>>().join("  ").trim_end().to_owned()
 }

@@ -1,8 +1,8 @@
-//! `bench loop`: how late the real-time loop wakes at 1 kHz, against cyclictest.
+//! `bench loop`: wake-up latency of the real-time loop at 1 kHz, against cyclictest.
 //!
-//! Both run holding `/dev/cpu_dma_latency`, as cyclictest's authors set it up, and with idle states allowed: which is
-//! better depends on the machine, and on a virtual one on its host. Its histogram has steps of a microsecond. Where it
-//! does not run, a plain absolute sleep on the same thread settings takes its place.
+//! Both run twice: with `/dev/cpu_dma_latency` held, as cyclictest does by default, and with idle states allowed. Which of
+//! the two is better depends on the machine, and on a virtual machine on its host. cyclictest's histogram has a resolution
+//! of 1 µs. Where cyclictest does not run, a loop of absolute sleeps with the same thread settings replaces it.
 
 use std::cell::RefCell;
 use std::process::Command;
@@ -12,21 +12,21 @@ use masseter_shared::clock::{self, SECOND_NS};
 use masseter_shared::config::{CpuDmaLatency, RealtimeConfig};
 use masseter_shared::realtime::{Cycle, Wake};
 
-use super::contender::{Durations, Round, durations, record};
-use super::contest::{Outcome, Turn};
-use super::on_core;
+use super::candidate::{Durations, Round, no_durations, record};
+use super::comparison::{Comparison, Turn};
+use super::thread::on_core;
 use crate::machine::dma_latency::Hold;
 use masseter_shared::schedule::OFF_TICK_NS;
 
 const PERIOD_NS: u64 = SECOND_NS / 1000;
-/// Wake-ups a round.
+/// Wake-ups per round.
 const WAKE_UPS: u64 = 10_000;
 /// A wake-up later than this is an outlier, ns.
 const OUTLIER_NS: u64 = 50_000;
 /// Highest lateness in cyclictest's histogram, µs.
 const CYCLICTEST_UP_TO_US: u64 = 20_000;
 
-pub(super) fn measure(rounds: u32, core: usize) -> anyhow::Result<Outcome> {
+pub(super) fn measure(rounds: u32, core: usize) -> anyhow::Result<Comparison> {
     let outliers = RefCell::new(Outliers::default());
     let mut notes = Vec::new();
     let own = |wanted: CpuDmaLatency| -> Turn {
@@ -45,14 +45,14 @@ pub(super) fn measure(rounds: u32, core: usize) -> anyhow::Result<Outcome> {
     let mut others: Vec<(String, Turn)> = Vec::new();
     let refused = try_cyclictest(core).err();
     if let Some(why) = &refused {
-        notes.push(format!("{why:#}: a plain sleep stands in for cyclictest"));
+        notes.push(format!("{why:#}: a plain sleep replaces cyclictest"));
         others.push(("plain sleep".to_owned(), Box::new(move || Ok(on_core(core, plain_sleep)))));
     } else {
-        notes.push("cyclictest does not tell the deadlines that it skips".to_owned());
+        notes.push("cyclictest does not count the deadlines that it skips".to_owned());
         others.push(("cyclictest --laptop".to_owned(), cyclictest(&["--laptop"])));
     }
     if let Some(refusal) = &Hold::new(CpuDmaLatency::Hold, false).obtained().refusal {
-        notes.push(format!("nobody holds the latency device: {refusal}"));
+        notes.push(format!("/dev/cpu_dma_latency is not held: {refusal}"));
     } else {
         own_turns.push(("masseter, latency held".to_owned(), own(CpuDmaLatency::Hold)));
         if refused.is_none() {
@@ -62,14 +62,14 @@ pub(super) fn measure(rounds: u32, core: usize) -> anyhow::Result<Outcome> {
     let names = |turns: &[(String, Turn)]| turns.iter().map(|(name, _)| name.clone()).collect::<Vec<_>>();
     let (own_names, other_names) = (names(&own_turns), names(&others));
     let pairs = own_names.iter().flat_map(|own| other_names.iter().map(move |other| (own, other)));
-    let measures = "wake-up lateness at 1 kHz, one SCHED_FIFO thread on one core".to_owned();
+    let measures = "wake-up latency at 1 kHz, one SCHED_FIFO thread on one core".to_owned();
     let turns = own_turns.into_iter().chain(others).collect();
-    let outcome = Outcome::of_turns("loop", measures, rounds, &[core], turns)?.comparing(pairs);
-    notes.push(outliers.borrow().in_words());
-    Ok(notes.into_iter().fold(outcome, Outcome::noting))
+    let comparison = Comparison::by_turns("loop", measures, rounds, &[core], turns)?.comparing(pairs);
+    notes.push(outliers.borrow().note());
+    Ok(notes.into_iter().fold(comparison, Comparison::with_note))
 }
 
-/// Late wake-ups of the own loop, and those of them before which it saw the machine stand still.
+/// Late wake-ups of the rig's loop, and how many of them follow an observed standstill of the machine.
 #[derive(Debug, Default)]
 struct Outliers {
     late: u64,
@@ -77,7 +77,7 @@ struct Outliers {
     last: LastWake,
 }
 
-/// The last wake-up, as far as the next one may be late for its sake.
+/// What the last wake-up explains of the next one.
 #[derive(Debug, Default)]
 struct LastWake {
     woke_ns: u64,
@@ -86,8 +86,8 @@ struct LastWake {
 }
 
 impl Outliers {
-    /// A stall is before a wake-up if it was noticed since the last one, or made that so late that this one's deadline
-    /// had passed by then. The work here takes a microsecond: what takes long in it is a stall as well.
+    /// A stall explains a wake-up if it was observed since the last wake-up. It also explains the next one if the last
+    /// wake-up was so late that the next deadline had passed. The work here takes 1 µs, so long work is a stall as well.
     fn take(&mut self, wake: Wake) {
         let stalled_ns = wake.account.stalled_ns + wake.account.overlong_ns;
         let follows = wake.due_ns < self.last.woke_ns && self.last.was_seen;
@@ -99,9 +99,9 @@ impl Outliers {
         self.last = LastWake { woke_ns: wake.woke_ns, stalled_ns, was_seen };
     }
 
-    fn in_words(&self) -> String {
+    fn note(&self) -> String {
         format!(
-            "masseter woke more than {} µs late {} times; the machine was seen to stand still before {} of them",
+            "masseter woke more than {} µs late {} times; before {} of them the machine stood still",
             OUTLIER_NS / 1000,
             self.late,
             self.seen
@@ -113,14 +113,14 @@ fn first_deadline_ns() -> u64 {
     clock::now_ns().next_multiple_of(PERIOD_NS) + PERIOD_NS + OFF_TICK_NS
 }
 
-/// A round with the share of its deadlines that passed before anybody could wait for them.
+/// A round with the share of its deadlines that passed before the loop could wait for them.
 fn round(durations: Durations, skipped: u64) -> Round {
     let percent = 100.0 * skipped as f64 / (skipped + WAKE_UPS) as f64;
     Round { durations, shares: vec![("skipped deadlines".to_owned(), percent)] }
 }
 
 fn own_loop(outliers: &mut Outliers) -> Round {
-    let mut late = durations();
+    let mut late = no_durations();
     let mut skipped = 0;
     let mut cycle = Cycle::new(first_deadline_ns(), PERIOD_NS);
     outliers.last = LastWake::default();
@@ -134,7 +134,7 @@ fn own_loop(outliers: &mut Outliers) -> Round {
 }
 
 fn plain_sleep() -> Round {
-    let mut late = durations();
+    let mut late = no_durations();
     let mut skipped = 0;
     let mut due_ns = first_deadline_ns();
     for _ in 0..WAKE_UPS {
@@ -148,12 +148,12 @@ fn plain_sleep() -> Round {
     round(late, skipped)
 }
 
-/// Deadlines, from the next one on, that are skipped as the rig's loop skips them: all that passed but the last.
+/// Deadlines, from the next one on, that the rig's loop skips: all that passed but the last.
 fn missed_by(next_due_ns: u64, now_ns: u64) -> u64 {
     now_ns.saturating_sub(next_due_ns) / PERIOD_NS
 }
 
-/// Whether cyclictest runs here, with the rights that it has.
+/// Whether cyclictest runs here with the rights of this process.
 fn try_cyclictest(core: usize) -> anyhow::Result<()> {
     cyclictest(core, 10, &["--laptop"]).map(drop)
 }
@@ -178,9 +178,9 @@ fn cyclictest(core: usize, loops: u64, more: &[&str]) -> anyhow::Result<Duration
     histogram_of(&String::from_utf8_lossy(&output.stdout))
 }
 
-/// Lines `µs count`; what lies beyond the last of them stands as a count in a comment.
+/// Reads lines `µs count`; a comment counts the samples beyond the last line.
 fn histogram_of(output: &str) -> anyhow::Result<Durations> {
-    let mut late = durations();
+    let mut late = no_durations();
     for line in output.lines() {
         if let Some(beyond) = line.strip_prefix("# Histogram Overflows:") {
             record(&mut late, CYCLICTEST_UP_TO_US * 1000, beyond.trim().parse()?);
@@ -203,7 +203,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_outlier_is_seen_if_its_stall_was_noticed_before_it_or_before_the_one_that_it_follows() {
+    fn an_outlier_is_explained_by_a_stall_before_it_or_before_the_outlier_that_it_follows() {
         let mut outliers = Outliers::default();
         let mut take = |due_us: u64, late_us: u64, stalled_us: u64| {
             let (due_ns, woke_ns) = (due_us * 1000, (due_us + late_us) * 1000);
@@ -215,7 +215,7 @@ mod tests {
         assert_eq!(take(2000, 3400, 3400), (1, 1));
         assert_eq!(take(5000, 400, 3400), (2, 2), "its deadline passed in the same stall");
         assert_eq!(take(6000, 0, 3400), (2, 2));
-        assert_eq!(take(7000, 60, 3400), (3, 2), "late for no reason that was noticed");
+        assert_eq!(take(7000, 60, 3400), (3, 2), "late without an observed stall");
         assert_eq!(take(8000, 50, 3500), (3, 2), "in time");
     }
 
@@ -228,7 +228,7 @@ mod tests {
     }
 
     #[test]
-    fn a_histogram_of_cyclictest_is_read_with_its_overflows() {
+    fn a_histogram_of_cyclictest_includes_its_overflows() {
         let output = "# /dev/cpu_dma_latency set to 0us\n# Histogram\n000000 000000\n000013 000002\n\
                       000044 000001\n# Total: 000000003\n# Max Latencies: 25000\n\
                       # Histogram Overflows: 00001\n# Histogram Overflow at cycle number:\n# Thread 0:\n";
@@ -240,7 +240,7 @@ mod tests {
     }
 
     #[test]
-    fn of_cyclictests_empty_bins_none_is_the_maximum() {
+    fn empty_bins_of_cyclictest_do_not_raise_the_maximum() {
         let output = "000013 000002\n000044 000001\n019999 000000\n# Histogram Overflows: 00000\n";
         let late = histogram_of(output).unwrap();
         assert_eq!((late.len(), late.max() / 100), (3, 440));

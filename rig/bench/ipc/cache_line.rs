@@ -1,12 +1,12 @@
-//! The limit of any exchange between two cores: one cache line, bounced by two polling threads.
+//! The lower bound of any exchange between two cores: one cache line that two polling threads write in turn.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use super::{ROUND_TRIPS, WARM_UP, poll, time};
-use crate::bench::contender::Durations;
-use crate::bench::{on_core, realtime_on};
+use super::round_trips::{ROUND_TRIPS, WARM_UP, poll, time};
+use crate::bench::candidate::Durations;
+use crate::bench::thread::{on_core, realtime_on};
 
-/// Alone on its line, and on the one that is fetched along with it.
+/// Alone on its cache line and on the line that the processor fetches with it.
 #[repr(align(128))]
 struct Line(AtomicU64);
 
@@ -18,7 +18,7 @@ pub(super) fn round_trips([own_core, peer_core]: [usize; 2]) -> anyhow::Result<D
         scope.spawn(|| {
             realtime_on(peer_core);
             for number in 1..=WARM_UP + ROUND_TRIPS {
-                // What keeps this side from its turn keeps the other one, too, and that one says so.
+                // The other side fails for the same reason and returns the error.
                 if wait_for(2 * number - 1).is_err() {
                     break;
                 }

@@ -1,58 +1,47 @@
-//! `bench ipc`: one command there, one reading back, between two processes that poll.
+//! `bench ipc`: a command to another process and a reading back; both processes poll.
 //!
-//! The rig's transport stands against bare iceoryx2 with the same messages, a Unix socket and a pipe with
-//! 128 bytes, and the limit: one cache line bounced between two threads on the same two cores. Sockets and
-//! pipe are polled too; waiting for them in the kernel takes some fifty times as long.
+//! The rig's transport is compared with bare iceoryx2 and the same messages, with a Unix socket and a pipe (128 bytes, also
+//! polled), and with the lower bound: one cache line that two threads on the same cores write in turn. Waiting for a
+//! socket or pipe in the kernel is not measured; it takes about fifty times as long.
 
 mod cache_line;
+mod channel;
 mod peer;
+mod round_trips;
 mod streams;
 mod topics;
 
-use anyhow::bail;
-use masseter_shared::clock::{self, SECOND_NS};
+use std::io;
 
-pub use peer::{Channel, PeerArgs, answer};
+use clap::Args;
+use masseter_shared::transport::Domain;
+use rustix::process::{Signal, set_parent_process_death_signal};
 
-use super::contender::{Durations, durations, record};
-use super::contest::{Outcome, Turn};
+pub use channel::Channel;
 
-/// Round trips a round; short enough that real-time throttling never strikes the polling threads.
-const ROUND_TRIPS: u64 = 20_000;
-/// Round trips before the measurement.
-const WARM_UP: u64 = 1_000;
-/// How long an answer may take before the bench gives up, ns.
-const PATIENCE_NS: u64 = 10 * SECOND_NS;
-/// Bytes of a message on socket and pipe.
-const BYTES: usize = 128;
-/// The limit, as it is called in results.
+use super::candidate::Durations;
+use super::comparison::{Comparison, Turn};
+use super::thread::realtime_on;
+
+/// The name of the lower bound in tables.
 const CACHE_LINE: &str = "cache line (threads)";
 
-pub(super) fn measure(rounds: u32, [own_core, peer_core]: [usize; 2]) -> anyhow::Result<Outcome> {
+pub(super) fn measure(rounds: u32, cores: [usize; 2]) -> anyhow::Result<Comparison> {
     let turn = |channel: Channel| -> (String, Turn) {
-        let turn = move || Ok(round_trips(channel, [own_core, peer_core])?.into());
-        (channel.in_words().to_owned(), Box::new(turn))
+        (channel.name().to_owned(), Box::new(move || Ok(round_trips(channel, cores)?.into())))
     };
     let mut turns: Vec<_> =
         [Channel::Rig, Channel::Iceoryx2, Channel::Socket, Channel::Pipe].map(turn).into();
-    turns.push((
-        CACHE_LINE.to_owned(),
-        Box::new(move || Ok(cache_line::round_trips([own_core, peer_core])?.into())),
-    ));
+    turns.push((CACHE_LINE.to_owned(), Box::new(move || Ok(cache_line::round_trips(cores)?.into()))));
     let measures = "round trip between two polling processes on two cores".to_owned();
     let [rig, bare, socket, pipe] =
-        [Channel::Rig, Channel::Iceoryx2, Channel::Socket, Channel::Pipe].map(Channel::in_words);
-    Ok(Outcome::of_turns("ipc", measures, rounds, &[own_core, peer_core], turns)?.comparing([
-        (rig, bare),
-        (rig, CACHE_LINE),
-        (rig, socket),
-        (rig, pipe),
-        (bare, CACHE_LINE),
-    ]))
+        [Channel::Rig, Channel::Iceoryx2, Channel::Socket, Channel::Pipe].map(Channel::name);
+    let pairs = [(rig, bare), (rig, CACHE_LINE), (rig, socket), (rig, pipe), (bare, CACHE_LINE)];
+    Ok(Comparison::by_turns("ipc", measures, rounds, &cores, turns)?.comparing(pairs))
 }
 
-/// The other side starts first and from an ordinary thread: it would inherit a real-time thread's core and
-/// priority, and starve behind its polling.
+/// The other process starts first and from an ordinary thread: from a real-time thread it would inherit core and priority,
+/// and get no time while that thread polls.
 fn round_trips(channel: Channel, cores: [usize; 2]) -> anyhow::Result<Durations> {
     match channel {
         Channel::Rig => topics::round_trips::<topics::Ports>(channel, cores),
@@ -62,33 +51,30 @@ fn round_trips(channel: Channel, cores: [usize; 2]) -> anyhow::Result<Durations>
     }
 }
 
-/// Times round trips, numbered from 1.
-fn time(mut round_trip: impl FnMut(u64) -> anyhow::Result<()>) -> anyhow::Result<Durations> {
-    let mut taken = durations();
-    for number in 1..=WARM_UP + ROUND_TRIPS {
-        let from_ns = clock::now_ns();
-        round_trip(number)?;
-        let taken_ns = clock::now_ns() - from_ns;
-        if number > WARM_UP {
-            record(&mut taken, taken_ns, 1);
-        }
-    }
-    Ok(taken)
+/// The arguments of the other process.
+#[derive(Debug, Clone, Args)]
+pub struct PeerArgs {
+    /// The channel to answer on.
+    #[arg(long, value_enum)]
+    channel: Channel,
+    /// The core to stay on.
+    #[arg(long)]
+    core: usize,
+    /// The domain of the topics.
+    #[arg(long)]
+    domain: Option<String>,
 }
 
-/// Polls until `attempt` gives something; looks at the clock now and then only.
-fn poll<T>(mut attempt: impl FnMut() -> anyhow::Result<Option<T>>) -> anyhow::Result<T> {
-    let mut give_up_ns = None;
-    loop {
-        for _ in 0..10_000 {
-            if let Some(got) = attempt()? {
-                return Ok(got);
-            }
-            std::hint::spin_loop();
-        }
-        let now_ns = clock::now_ns();
-        if now_ns > *give_up_ns.get_or_insert(now_ns + PATIENCE_NS) {
-            bail!("the other side of the channel does not answer");
-        }
+/// Answers every message until the process is killed or the channel closes.
+pub fn answer(args: &PeerArgs) -> anyhow::Result<()> {
+    set_parent_process_death_signal(Some(Signal::KILL))?;
+    let domain = args.domain.as_deref().map(Domain::named).transpose()?;
+    realtime_on(args.core);
+    match (args.channel, domain) {
+        (Channel::Rig, Some(domain)) => topics::answer::<topics::Ports>(&domain),
+        (Channel::Iceoryx2, Some(domain)) => topics::answer::<topics::Bare>(&domain),
+        (Channel::Rig | Channel::Iceoryx2, None) => anyhow::bail!("topics need a domain"),
+        (Channel::Socket, _) => streams::answer(&io::stdin(), &io::stdin()),
+        (Channel::Pipe, _) => streams::answer(&io::stdin(), &io::stdout()),
     }
 }

@@ -1,4 +1,4 @@
-//! A Unix socket and a pair of pipes, never blocking, polled.
+//! A Unix socket and a pair of pipes, polled without blocking.
 
 use std::os::fd::{AsFd, OwnedFd};
 use std::os::unix::net::UnixStream;
@@ -7,14 +7,18 @@ use std::process::Stdio;
 use anyhow::Context;
 use rustix::io::{Errno, ioctl_fionbio, read, write};
 
-use super::peer::{Channel, Peer};
-use super::{BYTES, poll, time};
-use crate::bench::contender::Durations;
-use crate::bench::on_core;
+use super::channel::Channel;
+use super::peer::Peer;
+use super::round_trips::{poll, time};
+use crate::bench::candidate::Durations;
+use crate::bench::thread::on_core;
+
+/// Bytes of a message.
+const BYTES: usize = 128;
 
 pub(super) fn socket_round_trips([own_core, peer_core]: [usize; 2]) -> anyhow::Result<Durations> {
-    let (own, its) = UnixStream::pair()?;
-    let _peer = Peer::start(Channel::Socket, peer_core, None, [OwnedFd::from(its).into(), Stdio::null()])?;
+    let (own, peer) = UnixStream::pair()?;
+    let _peer = Peer::start(Channel::Socket, peer_core, None, [OwnedFd::from(peer).into(), Stdio::null()])?;
     round_trips(own_core, &own, &own)
 }
 
@@ -34,7 +38,7 @@ fn round_trips(
         send(output, &message)?;
         receive(input, &mut message)
     };
-    // The first one blocks until the other side is there.
+    // The first round trip blocks until the other process has started.
     round_trip(0)?;
     unblock(input, output)?;
     on_core(core, || time(round_trip))
@@ -55,9 +59,9 @@ fn unblock(input: &impl AsFd, output: &impl AsFd) -> anyhow::Result<()> {
     Ok(ioctl_fionbio(output, true)?)
 }
 
-/// At most one message is under way, so there is always room for it.
+/// At most one message is under way, so the channel always has room for it.
 fn send(output: &impl AsFd, message: &[u8; BYTES]) -> anyhow::Result<()> {
-    anyhow::ensure!(write(output, message)? == BYTES, "the channel took a part of a message only");
+    anyhow::ensure!(write(output, message)? == BYTES, "the channel took only part of a message");
     Ok(())
 }
 

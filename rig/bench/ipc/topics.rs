@@ -1,4 +1,4 @@
-//! The rig's two topics, through its own transport and through bare iceoryx2.
+//! Commands and readings through the rig's transport and through bare iceoryx2.
 
 use std::process::Stdio;
 use std::time::Duration;
@@ -11,14 +11,15 @@ use masseter_shared::clock;
 use masseter_shared::messages::{Command, Message, Reading};
 use masseter_shared::transport::{Domain, Inlet, Node, Outlet, ScratchDomain};
 
-use super::peer::{Channel, Peer};
-use super::{poll, time};
-use crate::bench::contender::Durations;
-use crate::bench::on_core;
+use super::channel::Channel;
+use super::peer::Peer;
+use super::round_trips::{poll, time};
+use crate::bench::candidate::Durations;
+use crate::bench::thread::on_core;
 
-/// Between two attempts to reach a peer that may not have opened its ports yet.
+/// Time between two attempts to reach a peer that may not have opened its ports yet.
 const AGAIN_AFTER: Duration = Duration::from_millis(2);
-/// As many.
+/// Attempts before the bench gives up.
 const ATTEMPTS: u32 = 5000;
 
 /// One side of the two topics.
@@ -31,9 +32,9 @@ pub(super) trait Ends: Sized {
     type Out<M: Message + Numbered>;
     /// Its receiving end.
     type In<M: Message + Numbered>;
-    /// Opens a sending end.
+    /// Opens the sending end.
     fn outlet<M: Message + Numbered>(node: &Node) -> anyhow::Result<Self::Out<M>>;
-    /// Opens a receiving end.
+    /// Opens the receiving end.
     fn inlet<M: Message + Numbered>(node: &Node) -> anyhow::Result<Self::In<M>>;
     /// Sends a message with this number.
     fn send<M: Message + Numbered>(out: &mut Self::Out<M>, number: u64) -> anyhow::Result<()>;
@@ -89,11 +90,11 @@ impl Ends for Ports {
     }
 }
 
-/// iceoryx2 as it comes.
+/// iceoryx2 without the rig's transport.
 pub(super) struct Bare;
 
 impl Bare {
-    /// A topic as iceoryx2 sets it up by default, but for never blocking the sender.
+    /// A topic with iceoryx2's defaults, except that it never blocks the sender.
     fn topic<M: Message>(
         node: &Node,
     ) -> anyhow::Result<iceoryx2::service::port_factory::publish_subscribe::PortFactory<ipc::Service, M, ()>>
@@ -143,7 +144,7 @@ fn exchange<E: Ends>(node: &Node) -> anyhow::Result<Durations> {
     greet::<E>(&mut commands, &readings)?;
     time(|number| {
         E::send(&mut commands, number)?;
-        // Answers to greetings may still lie there.
+        // Answers to greetings may still be in the queue.
         poll(|| Ok(E::receive(&readings)?.filter(|&answered| answered == number)))?;
         Ok(())
     })

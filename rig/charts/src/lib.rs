@@ -1,3 +1,34 @@
-//! Colours of all charts of the rig.
+//! Charts as SVG: lines, bars, grids of colours, with axes, ticks, legends and one palette.
+//!
+//! Drawing itself is done by `plotters`; this crate fixes what all charts of the rig have in common. Which data a chart
+//! shows is decided by its users: the report, the benches and the paper study.
+//!
+//! ```
+//! use masseter_charts::{Axis, Legend, Line, LineChart, Scale};
+//!
+//! let chart = LineChart {
+//!     title: "Step response".to_owned(),
+//!     x: Axis::fitted("time, s", Scale::Linear).including(0.0),
+//!     y: Axis::fitted("stroke, mm", Scale::Linear),
+//!     lines: vec![Line::new("slide 1", vec![(0.0, 0.0), (0.1, 4.0), (0.2, 5.0)])],
+//!     limits: Vec::new(),
+//!     legend: Legend::Beside,
+//! };
+//! let drawn = chart.draw(260).expect("three points make a chart");
+//! assert!(drawn.svg.starts_with("<svg") && drawn.svg.contains("time, s"));
+//! ```
 
+mod axis;
+mod canvas;
+mod colour_scale;
+mod line_chart;
 pub mod palette;
+mod ticks;
+
+pub use axis::{Axis, Scale};
+pub use canvas::{
+    Area, Bar, Chart, Error, Key, LegendEntry, TEXT, TITLE, bars, cells, chart, legend, marks, svg, write,
+};
+pub use colour_scale::ColourScale;
+pub use line_chart::{Drawn, Legend, Limit, Line, LineChart};
+pub use plotters::chart::SeriesLabelPosition;

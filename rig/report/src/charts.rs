@@ -1,11 +1,16 @@
-//! Which curves the report shows, and the limits they are held against.
+//! The report's charts: which values they show, and beside which limits.
 
 use masseter_shared::config::Scenario;
 use masseter_shared::geometry::{AXIS_NAMES, LEGS};
 use masseter_shared::schedule::CycleSchedule;
 
-use super::plot::{Chart, Drawn, HIGH, Limit, Line, Scale};
 use masseter_analysis::{Curve, Figures, IntervalFigures};
+use masseter_charts::{Axis, Drawn, Legend, Limit, Line, LineChart, Scale};
+
+/// Height of a chart over time, px.
+const LOW: u32 = 260;
+/// Height of a chart of many lines, px.
+const HIGH: u32 = 420;
 
 /// The least latency that a logarithmic axis shows, µs.
 const LEAST_US: f64 = 0.01;
@@ -13,20 +18,19 @@ const LEAST_US: f64 = 0.01;
 /// Percentiles of every interval, with the cycle's budgets.
 pub(super) fn percentiles(scenario: &Scenario, figures: &Figures) -> Option<Drawn> {
     let measured = figures.intervals.iter().filter(|interval| interval.max_ns > Some(0));
-    let line = |interval: &IntervalFigures| Line {
-        name: interval.name.to_owned(),
-        points: interval.curve.iter().map(|&(x, value)| (x, microseconds(value as f64))).collect(),
+    let line = |interval: &IntervalFigures| {
+        let points = interval.curve.iter().map(|&(x, value)| (x, microseconds(value as f64)));
+        Line::new(interval.name, points.collect())
     };
-    Chart {
-        height: HIGH,
-        x_label: "percentile",
-        x: Scale::Percentile,
-        y_label: "µs",
-        y: Scale::Log,
+    LineChart {
+        title: String::new(),
+        x: Axis::fitted("percentile", Scale::Percentile),
+        y: Axis::fitted("µs", Scale::Log),
         lines: measured.map(line).collect(),
         limits: budgets(scenario),
+        legend: Legend::Beside,
     }
-    .draw()
+    .draw(HIGH)
 }
 
 /// What the time table leaves: the period, and from the controller's deadline to the latest command.
@@ -43,9 +47,8 @@ fn budgets(scenario: &Scenario) -> Vec<Limit> {
 /// The latest wake-ups over time; none under virtual time, where nobody is late.
 pub(super) fn jitter(figures: &Figures) -> Option<Drawn> {
     let over_time = &figures.over_time;
-    let late = |name: &str, curve: &Curve| Line {
-        name: name.to_owned(),
-        points: curve.iter().map(|&(at_s, late_ns)| (at_s, microseconds(late_ns))).collect(),
+    let late = |name: &str, curve: &Curve| {
+        Line::new(name, curve.iter().map(|&(at_s, late_ns)| (at_s, microseconds(late_ns))).collect())
     };
     let is_late = |curve: &Curve| curve.iter().any(|(_, late_ns)| *late_ns > 0.0);
     if !is_late(&over_time.controller_late_ns) && !is_late(&over_time.plant_late_ns) {
@@ -53,7 +56,7 @@ pub(super) fn jitter(figures: &Figures) -> Option<Drawn> {
     }
     let lines =
         vec![late("controller", &over_time.controller_late_ns), late("plant", &over_time.plant_late_ns)];
-    Chart { y: Scale::Log, ..Chart::over_time("latest wake-up, µs", lines, Vec::new()) }.draw()
+    chart_over_time(Axis::fitted("latest wake-up, µs", Scale::Log), lines, Vec::new())
 }
 
 fn microseconds(ns: f64) -> f64 {
@@ -65,16 +68,14 @@ pub(super) fn motion(figures: &Figures) -> [Option<Drawn>; 2] {
     let track = &figures.track;
     let actual = figures.tracking.actual_source.adjective();
     let pair = |(axis, name): (usize, &str)| {
-        [("wanted", &track.desired_m), (actual, &track.actual_m)].map(|(kind, curves)| Line {
-            name: format!("{name} {kind}"),
-            points: in_unit(&curves[axis], 1e3),
-        })
+        [("wanted", &track.desired_m), (actual, &track.actual_m)]
+            .map(|(kind, curves)| Line::new(&format!("{name} {kind}"), in_unit(&curves[axis], 1e3)))
     };
     let lines = ["x", "y", "z"].into_iter().enumerate().flat_map(pair).collect();
-    let distance = Line { name: "distance".to_owned(), points: in_unit(&track.distance_m, 1e3) };
+    let distance = Line::new("distance", in_unit(&track.distance_m, 1e3));
     [
-        Chart::over_time("displacement of the platform, mm", lines, Vec::new()).draw(),
-        Chart::over_time("distance from wanted, mm", vec![distance], Vec::new()).draw(),
+        chart_over_time(linear("displacement of the platform, mm"), lines, Vec::new()),
+        chart_over_time(linear("distance from wanted, mm"), vec![distance], Vec::new()),
     ]
 }
 
@@ -113,22 +114,30 @@ pub(super) fn actuators(scenario: &Scenario, figures: &Figures) -> [Option<Drawn
 }
 
 fn axes(
-    label: &'static str,
+    label: &str,
     bands: &[Curve],
     of: std::ops::Range<usize>,
     unit: f64,
     limits: Vec<Limit>,
 ) -> Option<Drawn> {
-    let line = |axis: usize| Line { name: AXIS_NAMES[axis].to_owned(), points: in_unit(&bands[axis], unit) };
-    Chart::over_time(label, of.map(line).collect(), limits).draw()
+    let line = |axis: usize| Line::new(AXIS_NAMES[axis], in_unit(&bands[axis], unit));
+    chart_over_time(linear(label), of.map(line).collect(), limits)
 }
 
 /// Share of each bus in use.
 pub(super) fn bus_load(figures: &Figures) -> Option<Drawn> {
     let loads = figures.over_time.bus_load.iter().enumerate();
-    let line =
-        |(bus, load): (usize, &Curve)| Line { name: format!("can{bus}"), points: in_unit(load, 100.0) };
-    Chart::over_time("bus load, %", loads.map(line).collect(), vec![limit("full", &[100.0])]).draw()
+    let line = |(bus, load): (usize, &Curve)| Line::new(&format!("can{bus}"), in_unit(load, 100.0));
+    chart_over_time(linear("bus load, %"), loads.map(line).collect(), vec![limit("full", &[100.0])])
+}
+
+fn chart_over_time(y: Axis, lines: Vec<Line>, limits: Vec<Limit>) -> Option<Drawn> {
+    let x = Axis::fitted("time, s", Scale::Linear).including(0.0);
+    LineChart { title: String::new(), x, y, lines, limits, legend: Legend::Beside }.draw(LOW)
+}
+
+fn linear(label: &str) -> Axis {
+    Axis::fitted(label, Scale::Linear)
 }
 
 fn limit(name: &str, values: &[f64]) -> Limit {

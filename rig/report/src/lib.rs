@@ -14,7 +14,6 @@ pub mod histogram_log;
 mod junit;
 mod outcome;
 mod page;
-mod plot;
 mod run_report;
 mod summary;
 mod table;

@@ -4,11 +4,11 @@
 
 use askama::Template;
 use masseter_analysis::{Figures, IntervalFigures, PoseSource, ResponseFigures, Track, WorstCycle};
+use masseter_charts::Drawn;
 use masseter_recording::Manifest;
 use masseter_shared::config::MotionConfig;
 
 use crate::outcome::Outcome;
-use crate::plot::Drawn;
 use crate::text::{event_with_cycle, microseconds, or_dash};
 use crate::verdict::Verdict;
 use crate::{animation, charts, table, time_line, usage};

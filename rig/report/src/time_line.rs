@@ -1,74 +1,41 @@
-//! Events over time as SVG: a row for each source, a mark for each event.
+//! Events along the run's time: a row for each source, a mark for each event.
 
-use std::fmt::Write;
-
-use masseter_shared::messages::codes::{EventKind, Source};
-
-use crate::text::{escape, event_with_cycle};
 use masseter_analysis::{Code, EventRecord, Figures};
+use masseter_charts::palette::{BLUE, RED};
+use masseter_charts::{Axis, Error, Scale, chart, marks};
+use masseter_shared::messages::codes::EventKind;
 
-const WIDTH: f64 = 960.0;
-const LEFT: f64 = 90.0;
-const ROW: f64 = 26.0;
-/// Most marks that are drawn; more of them cannot be distinguished.
+const WIDTH: u32 = 960;
+const ROW: u32 = 30;
+/// Room for the time axis, px.
+const BELOW: u32 = 70;
+const RADIUS: u32 = 5;
+/// Most marks; more of them cover each other.
 const MOST: usize = 2000;
 
-/// The time line; none without events.
+/// The time line as SVG; none without events.
 pub(crate) fn svg(figures: &Figures) -> Option<String> {
     let events = &figures.events[..figures.events.len().min(MOST)];
-    let began_ns = figures.over_time.began_ns;
-    let seconds = |event: &EventRecord| event.time_ns.saturating_sub(began_ns) as f64 / 1e9;
+    draw(events, figures.over_time.began_ns, figures.duration_s).ok().filter(|_| !events.is_empty())
+}
+
+fn draw(events: &[EventRecord], began_ns: u64, duration_s: f64) -> Result<String, Error> {
     let mut sources: Vec<_> = events.iter().map(|event| event.source).collect();
     sources.sort_by_cached_key(Code::to_string);
     sources.dedup();
-    let end_s = events.iter().map(seconds).fold(figures.duration_s, f64::max).max(1e-3);
-    (!sources.is_empty()).then(|| {
-        let mut svg = String::new();
-        write_svg(&mut svg, events, &sources, end_s, &seconds).expect("a string takes any text");
-        svg
+    let row = |event: &EventRecord| sources.iter().position(|source| *source == event.source).unwrap_or(0);
+    let point =
+        |event: &EventRecord| (event.time_ns.saturating_sub(began_ns) as f64 / 1e9, row(event) as f64);
+    let end_s = events.iter().map(|event| point(event).0).fold(duration_s, f64::max);
+    masseter_charts::svg((WIDTH, ROW * sources.len() as u32 + BELOW), |area| {
+        let x = Axis::new("time, s", Scale::Linear, [0.0, end_s]);
+        let y = Axis::of_names("", sources.iter().map(ToString::to_string).collect());
+        let mut chart = chart(area, "", x, y)?;
+        let (faults, others): (Vec<&EventRecord>, Vec<_>) =
+            events.iter().partition(|event| event.kind == EventKind::Fault);
+        for (events, colour) in [(others, BLUE), (faults, RED)] {
+            marks(&mut chart, events.into_iter().map(point), RADIUS, colour)?;
+        }
+        Ok(())
     })
-}
-
-fn write_svg(
-    svg: &mut String,
-    events: &[EventRecord],
-    sources: &[Code<Source>],
-    end_s: f64,
-    seconds: &dyn Fn(&EventRecord) -> f64,
-) -> std::fmt::Result {
-    let height = ROW * (sources.len() as f64 + 1.0);
-    let x = |at_s: f64| LEFT + at_s / end_s * (WIDTH - LEFT - 20.0);
-    write!(svg, "<svg viewBox=\"0 0 {WIDTH} {height}\" font-size=\"13\">")?;
-    for (row, source) in sources.iter().enumerate() {
-        let y = ROW * (row as f64 + 0.5);
-        write!(
-            svg,
-            "<text x=\"0\" y=\"{}\">{}</text><path d=\"M{LEFT} {y}H{WIDTH}\" stroke=\"#ddd\"/>",
-            y + 4.0,
-            escape(&source.to_string())
-        )?;
-    }
-    for event in events {
-        let row = sources.iter().position(|source| *source == event.source).unwrap_or(0);
-        let colour = if event.kind == EventKind::Fault { "#b00020" } else { "#0072b2" };
-        write!(
-            svg,
-            "<circle cx=\"{:.1}\" cy=\"{}\" r=\"5\" fill=\"{colour}\" fill-opacity=\".6\"><title>{:.3} s: {}</title></circle>",
-            x(seconds(event)),
-            ROW * (row as f64 + 0.5),
-            seconds(event),
-            escape(&event_with_cycle(event))
-        )?;
-    }
-    for tick in 0..=5 {
-        let at_s = end_s * f64::from(tick) / 5.0;
-        write!(
-            svg,
-            "<text x=\"{:.1}\" y=\"{}\" text-anchor=\"middle\">{at_s:.1} s</text>",
-            x(at_s),
-            height - 6.0
-        )?;
-    }
-    svg.push_str("</svg>\n");
-    Ok(())
 }

@@ -7,8 +7,8 @@ use std::f64::consts::PI;
 use masseter_shared::geometry::{LEGS, Mechanism};
 use rayon::prelude::*;
 
-use super::contender::SHOWN;
 use super::solution_set::SolutionSet;
+use super::solver::COMPARED;
 use super::table::{Table, number};
 
 /// Where a guess leads.
@@ -22,12 +22,12 @@ pub(super) enum Basin {
     Nothing,
 }
 
-/// Where a guess leads, by contender in the order of [`SHOWN`].
+/// Where a guess leads, by solver in the order of [`COMPARED`].
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Cell {
     pub guess_rad: [f64; LEGS],
-    pub basins: [Basin; SHOWN.len()],
-    pub iterations: [u32; SHOWN.len()],
+    pub basins: [Basin; COMPARED.len()],
+    pub iterations: [u32; COMPARED.len()],
 }
 
 /// A square grid of guesses.
@@ -46,7 +46,7 @@ impl Basins {
         let middle = |index: usize| (index as f64 + 0.5) / side as f64 * PI;
         let cell = |index: usize| {
             let guess_rad = [middle(index % side), middle(index / side), third_rad];
-            let attempts = SHOWN.map(|contender| contender.attempt(mechanism, &set.actuators, &guess_rad));
+            let attempts = COMPARED.map(|solver| solver.attempt(mechanism, &set.actuators, &guess_rad));
             let basins = attempts.map(|attempt| match attempt.found_rad {
                 Ok(found_rad) => set.class_of(&found_rad).map_or(Basin::BelowBase, Basin::Class),
                 Err(_) => Basin::Nothing,

@@ -7,8 +7,8 @@ use masseter_shared::config::{
 };
 use masseter_shared::geometry::{LEGS, Mechanism};
 
-use super::contender::{Contender, SHOWN};
 use super::sample::distance_rad;
+use super::solver::{COMPARED, Solver};
 use super::table::{Table, number};
 
 /// A cycle of the rig, s.
@@ -23,8 +23,8 @@ pub(super) struct Motion {
     pub trajectory: Trajectory,
     /// What it asks of the axes, or why the mechanism cannot follow.
     pub demands: Result<TrajectoryReport, String>,
-    /// How each of [`SHOWN`] followed it, 1 ms a step.
-    pub followed: [Followed; SHOWN.len()],
+    /// How each of [`COMPARED`] followed it, 1 ms a step.
+    pub followed: [Followed; COMPARED.len()],
 }
 
 /// How a solver followed a motion, each step from its last solution.
@@ -69,7 +69,7 @@ impl Motion {
         let trajectory = Trajectory::new(motion, jaw, mechanism, *duration_s)?;
         let demands =
             masseter_plan::demands(scenario, &trajectory, mechanism).map_err(|error| error.to_string());
-        let followed = SHOWN.map(|contender| follow(contender, mechanism, &trajectory));
+        let followed = COMPARED.map(|solver| follow(solver, mechanism, &trajectory));
         Ok(Self { name: name.to_owned(), trajectory, demands, followed })
     }
 
@@ -80,19 +80,19 @@ impl Motion {
     }
 }
 
-fn follow(contender: Contender, mechanism: &Mechanism, trajectory: &Trajectory) -> Followed {
+fn follow(solver: Solver, mechanism: &Mechanism, trajectory: &Trajectory) -> Followed {
     let mut last_rad: Option<[f64; LEGS]> = None;
     let mut tracker = ForwardTracker::new(mechanism.clone());
     let (mut followed, mut iterations) = (Followed::default(), 0);
     let cycles = (trajectory.duration_s() / CYCLE_S) as usize;
     for cycle in 0..=cycles {
         let Ok(joints) = mechanism.inverse(&trajectory.pose(cycle as f64 * CYCLE_S)) else { continue };
-        let found = if contender == Contender::Controller {
+        let found = if solver == Solver::Controller {
             tracker.update(&joints.actuators).ok().map(|solution| (solution.theta_rad, solution.iterations))
         } else {
             // The first pose is known, as the paper supposes.
             let guess_rad = last_rad.unwrap_or(joints.theta_rad);
-            let attempt = contender.attempt(mechanism, &joints.actuators, &guess_rad);
+            let attempt = solver.attempt(mechanism, &joints.actuators, &guess_rad);
             attempt.found_rad.ok().map(|found_rad| (found_rad, attempt.iterations))
         };
         followed.steps += 1;
@@ -127,11 +127,11 @@ pub(super) fn table(motions: &[Motion], mechanism: &Mechanism) -> Table {
             let least_m = |axes: &[f64]| axes.iter().copied().fold(f64::INFINITY, f64::min);
             [least_m(&margin_m[..LEGS]), least_m(&margin_m[LEGS..]), demands.condition]
         });
-        for (contender, followed) in SHOWN.into_iter().zip(motion.followed) {
+        for (solver, followed) in COMPARED.into_iter().zip(motion.followed) {
             let mut row = vec![motion.name.clone(), u8::from(margins.is_ok()).to_string()];
             row.extend(margins.as_ref().copied().unwrap_or([f64::NAN; 3]).map(number));
             row.extend([
-                contender.short_name().to_owned(),
+                solver.short_name().to_owned(),
                 followed.steps.to_string(),
                 followed.lost.to_string(),
                 number(followed.iterations_mean),

@@ -10,7 +10,7 @@ use super::table::Table;
 
 /// The readings of the paper's conditions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Reading {
+pub(super) enum Conditions {
     /// All hinges on one side of the platform's plane, whichever, and A₂ beyond A₃; legs above the base.
     Unsigned,
     /// All hinges below the oriented plane.
@@ -19,14 +19,15 @@ pub(super) enum Reading {
     Determinant,
 }
 
-pub(super) const READINGS: [Reading; 3] = [Reading::Unsigned, Reading::Oriented, Reading::Determinant];
+pub(super) const CONDITIONS: [Conditions; 3] =
+    [Conditions::Unsigned, Conditions::Oriented, Conditions::Determinant];
 
 /// What one input has.
 #[derive(Debug, Clone, Copy)]
 struct Counts {
     solutions: usize,
-    /// In the order of [`READINGS`].
-    left: [usize; READINGS.len()],
+    /// In the order of [`CONDITIONS`].
+    left: [usize; CONDITIONS.len()],
 }
 
 /// Counts over random inputs anywhere in the strokes.
@@ -35,7 +36,7 @@ pub(super) struct Multiplicity {
     inputs: Vec<Counts>,
 }
 
-impl Reading {
+impl Conditions {
     pub(super) fn name(self) -> &'static str {
         match self {
             Self::Unsigned => "conditions 1 and 2, either side of the plane",
@@ -63,7 +64,8 @@ impl Multiplicity {
         let counts = |case| {
             let actuators = sample::input(mechanism, &mut sample::generator(seed, Stream::Inputs, case));
             let solutions = Solutions::new(mechanism, &actuators).ok()?;
-            let left = READINGS.map(|reading| solutions.iter().filter(|one| reading.admits(one)).count());
+            let left =
+                CONDITIONS.map(|conditions| solutions.iter().filter(|one| conditions.admits(one)).count());
             Some(Counts { solutions: solutions.count(), left })
         };
         Self { inputs: (0..inputs).into_par_iter().filter_map(counts).collect() }
@@ -71,19 +73,19 @@ impl Multiplicity {
 
     /// How many inputs have so many solutions.
     pub(super) fn with_solutions(&self, solutions: usize) -> Share {
-        Share::of(self.inputs.iter().map(|input| input.solutions == solutions))
+        Share::count(self.inputs.iter().map(|input| input.solutions == solutions))
     }
 
     /// Of the inputs that can be assembled: how many have more than one mirrored pair.
     pub(super) fn multiple(&self) -> Share {
         let assemblable = self.inputs.iter().filter(|input| input.solutions > 0);
-        Share::of(assemblable.map(|input| input.solutions > 2))
+        Share::count(assemblable.map(|input| input.solutions > 2))
     }
 
-    /// Of the inputs to which a reading leaves any solution: to how many it leaves several.
-    pub(super) fn several_left(&self, reading: Reading) -> Share {
-        let left = self.inputs.iter().map(|input| input.left[reading as usize]);
-        Share::of(left.filter(|&left| left > 0).map(|left| left > 1))
+    /// Of the inputs to which a conditions leaves any solution: to how many it leaves several.
+    pub(super) fn several_left(&self, conditions: Conditions) -> Share {
+        let left = self.inputs.iter().map(|input| input.left[conditions as usize]);
+        Share::count(left.filter(|&left| left > 0).map(|left| left > 1))
     }
 
     /// `left` is `all` for the number of solutions itself.
@@ -96,8 +98,8 @@ impl Multiplicity {
             }
         };
         add("all", &|input| input.solutions);
-        for reading in READINGS {
-            add(reading.name(), &|input| input.left[reading as usize]);
+        for conditions in CONDITIONS {
+            add(conditions.name(), &|input| input.left[conditions as usize]);
         }
         Table::new("multiplicity", &["counted", "solutions", "inputs"], rows)
     }

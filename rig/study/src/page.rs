@@ -1,41 +1,36 @@
 //! The page that sets each claim of the paper beside what was measured, in Markdown.
 
 use std::fmt::Write;
-use std::path::Path;
 
-use super::claims::Claim;
-use super::plot::Figure;
-use super::{KinematicsArgs, Study};
+use crate::claims::PaperClaim;
+use crate::figure::Figure;
+use crate::study::Study;
 
-/// The whole page. Every figure is shown with the caption of its drawing.
-pub(super) fn of(study: &Study, args: &KinematicsArgs, claims: &[Claim], figures: &[Figure]) -> String {
+/// The whole page. Every figure has the caption of its drawing; `command` repeats the study.
+pub(super) fn text(study: &Study, command: &str, claims: &[PaperClaim], figures: &[Figure]) -> String {
     let mut page = format!(
         "# The paper's claims beside what was measured\n\n\
-         The paper is that of the 6-DOF mastication mechanism and its forward kinematics; `published` below is its \
+         The paper describes the 6-DOF mastication mechanism and its forward kinematics; `published` below is its \
          solver as printed (residuals are distances, the increment is halved until the error decreases), with at \
          most 100 iterations and 40 halvings. *From above the base*: {samples} random inputs with one true \
          solution, each with a random guess of leg angles between 0° and 180°. Verdicts follow from the figures of \
          this run by the criterion beside them.\n\n\
-         Masseter {version}, random numbers from seed {seed}; again with\n\n    \
-         masseter kinematics --out DIR --seed {seed} --samples {samples} --cells {cells}{motion}\n\n\
+         Masseter {version}, random numbers from seed {seed}. To repeat it:\n\n    {command}\n\n\
          Only times differ from run to run.\n\n\
          | # | The paper's claim | Where | Measured | Criterion | Verdict |\n\
          | --- | --- | --- | --- | --- | --- |\n",
-        samples = args.samples,
-        cells = args.cells,
-        seed = args.seed,
+        samples = study.settings.samples,
+        seed = study.settings.seed,
         version = env!("CARGO_PKG_VERSION"),
-        motion =
-            option("trajectory", args.trajectory.as_deref()) + &option("scenario", args.scenario.as_deref()),
     );
     for (index, claim) in claims.iter().enumerate() {
         let figure = claim.figure.map_or(String::new(), |name| format!(" ([figure](#{name}))"));
-        let Claim { says, place, measured, criterion, verdict, .. } = claim;
+        let PaperClaim { statement, section, measured, criterion, judgement, .. } = claim;
         let number = index + 1;
         let _ = writeln!(
             page,
-            "| {number} | {says} | {place} | {measured}{figure} | {criterion} | **{}** |",
-            verdict.name()
+            "| {number} | {statement} | {section} | {measured}{figure} | {criterion} | **{}** |",
+            judgement.name()
         );
     }
     page += &workspace(study);
@@ -44,10 +39,6 @@ pub(super) fn of(study: &Study, args: &KinematicsArgs, claims: &[Claim], figures
         let _ = write!(page, "\n<a id=\"{name}\"></a>\n\n![{name}]({name}.svg)\n\n{caption}\n");
     }
     page
-}
-
-fn option(name: &str, path: Option<&Path>) -> String {
-    path.map_or_else(String::new, |path| format!(" --{name} {}", path.display()))
 }
 
 /// How far the platform reaches in each map.

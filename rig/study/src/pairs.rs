@@ -3,9 +3,9 @@
 use masseter_shared::geometry::{Actuators, LEGS, Mechanism};
 use rayon::prelude::*;
 
-use super::contender::{Contender, NEWTON, PUBLISHED};
 use super::sample::Guesses;
 use super::share::Share;
+use super::solver::{NEWTON, PUBLISHED, Solver};
 use super::table::{Table, degrees, number};
 use super::trials::{Trial, Trials};
 
@@ -45,7 +45,7 @@ pub(super) struct Pair {
 
 /// A way in which the two iterations part.
 #[derive(Debug, Clone)]
-pub(super) struct Parting {
+pub(super) struct Disagreement {
     /// Its table and its figure.
     pub name: &'static str,
     pub title: &'static str,
@@ -61,11 +61,11 @@ pub(super) struct Parting {
 #[derive(Debug, Clone)]
 pub(super) struct Pairs {
     /// Fig. 3: the paper's converges, Newton–Raphson falls at first and then diverges.
-    pub diverging: Parting,
+    pub diverging: Disagreement,
     /// Fig. 4: the paper's converges, Newton–Raphson oscillates.
-    pub oscillating: Parting,
+    pub oscillating: Disagreement,
     /// Not in the paper: Newton–Raphson converges, the paper's stalls.
-    pub stalling: Parting,
+    pub stalling: Disagreement,
 }
 
 impl Pairs {
@@ -74,8 +74,8 @@ impl Pairs {
             .with(Guesses::AboveBase)
             .par_iter()
             .map(|trial| {
-                let pair = Pair::of(mechanism, trial);
-                let solved = |contender| trial.of(contender).is_solved();
+                let pair = Pair::trace(mechanism, trial);
+                let solved = |solver| trial.by(solver).is_solved();
                 let courses = [
                     course(&pair.published_cm2, solved(PUBLISHED)),
                     course(&pair.newton_cm2, solved(NEWTON)),
@@ -83,27 +83,27 @@ impl Pairs {
                 (courses, pair)
             })
             .collect();
-        let parting = |name, title, wanted: [Course; 2], clearness: fn(&[f64]) -> f64| {
+        let disagreement = |name, title, wanted: [Course; 2], clearness: fn(&[f64]) -> f64| {
             let matching = || traced.iter().filter(|(courses, _)| *courses == wanted).map(|(_, pair)| pair);
             let clearness = |pair: &Pair| clearness(&pair.newton_cm2);
             let clearest = matching().max_by(|a, b| clearness(a).total_cmp(&clearness(b)));
             let share = Share { hits: matching().count(), of: traced.len() };
-            Parting { name, title, newton: wanted[1], clearest: clearest.cloned(), share }
+            Disagreement { name, title, newton: wanted[1], clearest: clearest.cloned(), share }
         };
         Self {
-            diverging: parting(
+            diverging: disagreement(
                 "fig3_diverging",
                 "Fig. 3: Newton–Raphson diverges",
                 [Course::Converges, Course::Diverges],
                 fall,
             ),
-            oscillating: parting(
+            oscillating: disagreement(
                 "fig4_oscillating",
                 "Fig. 4: Newton–Raphson oscillates",
                 [Course::Converges, Course::Oscillates],
                 swing,
             ),
-            stalling: parting(
+            stalling: disagreement(
                 "fig3b_stalling",
                 "Beside Fig. 3: the paper's solver stalls",
                 [Course::Fails, Course::Converges],
@@ -113,7 +113,7 @@ impl Pairs {
     }
 
     /// In the order of their figures.
-    pub(super) fn all(&self) -> [&Parting; 3] {
+    pub(super) fn all(&self) -> [&Disagreement; 3] {
         [&self.diverging, &self.oscillating, &self.stalling]
     }
 
@@ -133,26 +133,26 @@ impl Pairs {
             "guess2_deg",
             "guess3_deg",
         ];
-        let table = |parting: &Parting| {
-            let rows = parting.clearest.as_ref().map(Pair::rows).unwrap_or_default();
-            Table::new(parting.name, &header, rows)
+        let table = |disagreement: &Disagreement| {
+            let rows = disagreement.clearest.as_ref().map(Pair::rows).unwrap_or_default();
+            Table::new(disagreement.name, &header, rows)
         };
         self.all().map(table).into()
     }
 }
 
 impl Pair {
-    fn of(mechanism: &Mechanism, trial: &Trial) -> Self {
+    fn trace(mechanism: &Mechanism, trial: &Trial) -> Self {
         let Trial { actuators, guess_rad, .. } = *trial;
-        let errors = |contender: Contender| contender.errors_cm2(mechanism, &actuators, &guess_rad);
+        let errors = |solver: Solver| solver.errors_cm2(mechanism, &actuators, &guess_rad);
         Self { actuators, guess_rad, published_cm2: errors(PUBLISHED), newton_cm2: errors(NEWTON) }
     }
 
     fn rows(&self) -> Vec<Vec<String>> {
         let mut rows = Vec::new();
-        for (contender, errors) in [(PUBLISHED, &self.published_cm2), (NEWTON, &self.newton_cm2)] {
+        for (solver, errors) in [(PUBLISHED, &self.published_cm2), (NEWTON, &self.newton_cm2)] {
             for (iteration, &error) in errors.iter().enumerate() {
-                let mut row = vec![contender.short_name().to_owned(), iteration.to_string(), number(error)];
+                let mut row = vec![solver.short_name().to_owned(), iteration.to_string(), number(error)];
                 row.extend(self.actuators.to_axes().map(number));
                 row.extend(degrees(&self.guess_rad));
                 rows.push(row);

@@ -8,7 +8,7 @@ pub(super) struct Share {
 }
 
 impl Share {
-    pub(super) fn of(holds: impl IntoIterator<Item = bool>) -> Self {
+    pub(super) fn count(holds: impl IntoIterator<Item = bool>) -> Self {
         holds.into_iter().fold(Self::default(), |share, holds| Self {
             hits: share.hits + usize::from(holds),
             of: share.of + 1,

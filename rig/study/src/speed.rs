@@ -1,4 +1,4 @@
-//! Fig. 5 of the paper in time: what a solution costs each contender, all in the same run, in turns.
+//! Fig. 5 of the paper in time: what a solution costs each solver, all in the same run, in turns.
 
 use std::hint::black_box;
 
@@ -6,10 +6,10 @@ use masseter_controller::kinematics::{ForwardTracker, Method, Options, solve};
 use masseter_shared::clock;
 use masseter_shared::geometry::{Actuators, LEGS, Mechanism};
 
-use super::contender::{Contender, NEWTON, SHOWN};
 use super::motions::Motion;
 use super::sample::Guesses;
 use super::share::{median, quantile};
+use super::solver::{COMPARED, NEWTON, Solver};
 use super::table::{Table, number};
 use super::trials::{Trial, Trials};
 
@@ -29,11 +29,11 @@ pub(super) enum Situation {
     Warm,
 }
 
-/// What one contender took in one situation.
+/// What one solver took in one situation.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Taken {
+pub(super) struct Timing {
     pub situation: Situation,
-    pub contender: Contender,
+    pub solver: Solver,
     pub cases: usize,
     pub median_ns: f64,
     pub p99_ns: f64,
@@ -44,7 +44,7 @@ pub(super) struct Taken {
 /// All times of a run.
 #[derive(Debug, Clone)]
 pub(super) struct Speed {
-    pub taken: Vec<Taken>,
+    pub timings: Vec<Timing>,
 }
 
 impl Situation {
@@ -64,36 +64,35 @@ impl Speed {
         let random: Vec<_> = random.map(|trial| (trial.actuators, trial.guess_rad)).collect();
         let mut taken = in_turns(mechanism, Situation::Random, &random);
         taken.extend(in_turns(mechanism, Situation::Warm, &warm(mechanism, chewing)));
-        Self { taken }
+        Self { timings: taken }
     }
 
-    /// What one of [`SHOWN`] took.
-    pub(super) fn of(&self, situation: Situation, contender: Contender) -> Taken {
-        let wanted = |taken: &&Taken| taken.situation == situation && taken.contender == contender;
-        *self.taken.iter().find(wanted).expect("all of SHOWN are timed in every situation")
+    /// What one of [`COMPARED`] took.
+    pub(super) fn timing(&self, situation: Situation, solver: Solver) -> Timing {
+        let wanted = |taken: &&Timing| taken.situation == situation && taken.solver == solver;
+        *self.timings.iter().find(wanted).expect("all of COMPARED are timed in every situation")
     }
 
     pub(super) fn table(&self) -> Table {
         let header = ["start", "solver", "cases", "median_ns", "p99_ns", "ratio_of_medians_to_newton"];
-        let row = |taken: &Taken| {
+        let row = |taken: &Timing| {
             vec![
                 taken.situation.name().to_owned(),
-                taken.contender.name(),
+                taken.solver.name(),
                 taken.cases.to_string(),
                 number(taken.median_ns),
                 number(taken.p99_ns),
                 number(taken.to_newton),
             ]
         };
-        Table::new("speed", &header, self.taken.iter().map(row).collect())
+        Table::new("speed", &header, self.timings.iter().map(row).collect())
     }
 }
 
 fn all_arrive(mechanism: &Mechanism, trial: &Trial) -> bool {
-    let arrives = |contender: Contender| {
-        contender.attempt(mechanism, &trial.actuators, &trial.guess_rad).found_rad.is_ok()
-    };
-    SHOWN.into_iter().all(arrives)
+    let arrives =
+        |solver: Solver| solver.attempt(mechanism, &trial.actuators, &trial.guess_rad).found_rad.is_ok();
+    COMPARED.into_iter().all(arrives)
 }
 
 /// Inputs of a motion, each with the leg angles of the cycle before.
@@ -103,20 +102,21 @@ fn warm(mechanism: &Mechanism, motion: &Motion) -> Vec<(Actuators, [f64; LEGS])>
     steps.map(|(now, before)| (now.actuators, before.theta_rad)).collect()
 }
 
-/// Every case goes to every contender before the next one comes.
-fn in_turns(mechanism: &Mechanism, situation: Situation, cases: &[(Actuators, [f64; LEGS])]) -> Vec<Taken> {
-    let mut taken_ns = [(); SHOWN.len()].map(|()| Vec::with_capacity(cases.len()));
+/// Every case goes to every solver before the next one comes.
+fn in_turns(mechanism: &Mechanism, situation: Situation, cases: &[(Actuators, [f64; LEGS])]) -> Vec<Timing> {
+    let mut taken_ns = [(); COMPARED.len()].map(|()| Vec::with_capacity(cases.len()));
     for (actuators, guess_rad) in cases {
-        for (contender, taken_ns) in SHOWN.into_iter().zip(&mut taken_ns) {
-            taken_ns.push(time_ns(contender, mechanism, actuators, guess_rad));
+        for (solver, taken_ns) in COMPARED.into_iter().zip(&mut taken_ns) {
+            taken_ns.push(time_ns(solver, mechanism, actuators, guess_rad));
         }
     }
     let medians = taken_ns.clone().map(median);
-    let newton_ns = SHOWN.into_iter().zip(medians).find(|one| one.0 == NEWTON).map_or(f64::NAN, |one| one.1);
-    let each = SHOWN.into_iter().zip(taken_ns).zip(medians);
-    each.map(|((contender, sample), median_ns)| Taken {
+    let newton_ns =
+        COMPARED.into_iter().zip(medians).find(|one| one.0 == NEWTON).map_or(f64::NAN, |one| one.1);
+    let each = COMPARED.into_iter().zip(taken_ns).zip(medians);
+    each.map(|((solver, sample), median_ns)| Timing {
         situation,
-        contender,
+        solver,
         cases: cases.len(),
         median_ns,
         p99_ns: quantile(sample, 0.99),
@@ -126,13 +126,8 @@ fn in_turns(mechanism: &Mechanism, situation: Situation, cases: &[(Actuators, [f
 }
 
 /// Time of one solution, ns, without a witness.
-fn time_ns(
-    contender: Contender,
-    mechanism: &Mechanism,
-    actuators: &Actuators,
-    guess_rad: &[f64; LEGS],
-) -> f64 {
-    if let Some((method, options)) = contender.iteration() {
+fn time_ns(solver: Solver, mechanism: &Mechanism, actuators: &Actuators, guess_rad: &[f64; LEGS]) -> f64 {
+    if let Some((method, options)) = solver.iteration() {
         return mean_ns(|| iterate(method, mechanism, actuators, guess_rad, &options));
     }
     let tracker = ForwardTracker::with_guess(mechanism.clone(), *guess_rad);

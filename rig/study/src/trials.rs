@@ -4,9 +4,9 @@ use masseter_controller::kinematics::Assembly;
 use masseter_shared::geometry::{Actuators, LEGS, Mechanism};
 use rayon::prelude::*;
 
-use super::contender::{Attempt, CONTENDERS, Contender, NEWTON, PUBLISHED};
 use super::sample::{self, GUESSES, Guesses, Stream, distance_rad};
 use super::share::{Share, median, quantile};
+use super::solver::{Attempt, NEWTON, PUBLISHED, SOLVERS, Solver};
 use super::table::{Table, number};
 
 /// A root counts as the closest when no other is closer by more than this, radians.
@@ -38,20 +38,20 @@ impl Judged {
     }
 }
 
-/// One guess for one input, given to every contender.
+/// One guess for one input, given to every solver.
 #[derive(Debug, Clone)]
 pub(super) struct Trial {
     pub actuators: Actuators,
     pub guess_rad: [f64; LEGS],
-    /// In the order of [`CONTENDERS`].
-    pub judged: [Judged; CONTENDERS.len()],
+    /// In the order of [`SOLVERS`].
+    pub judged: [Judged; SOLVERS.len()],
 }
 
 impl Trial {
-    /// How one contender fared.
-    pub(super) fn of(&self, contender: Contender) -> &Judged {
-        let place = CONTENDERS.iter().position(|&other| other == contender);
-        &self.judged[place.expect("every contender takes part")]
+    /// How one solver fared.
+    pub(super) fn by(&self, solver: Solver) -> &Judged {
+        let place = SOLVERS.iter().position(|&other| other == solver);
+        &self.judged[place.expect("every solver takes part")]
     }
 }
 
@@ -67,8 +67,8 @@ impl Trials {
             let mut random = sample::generator(seed, Stream::Trials, case);
             let input = sample::feasible(mechanism, &mut random);
             let guess_rad = guesses.draw(&input.true_one.theta_rad, &mut random);
-            let judged = CONTENDERS.map(|contender| {
-                let attempt = contender.attempt(mechanism, &input.actuators, &guess_rad);
+            let judged = SOLVERS.map(|solver| {
+                let attempt = solver.attempt(mechanism, &input.actuators, &guess_rad);
                 judge(mechanism, &input, &guess_rad, attempt)
             });
             Trial { actuators: input.actuators, guess_rad, judged }
@@ -86,38 +86,38 @@ impl Trials {
         &self.sets[set.expect("guesses are drawn from there")]
     }
 
-    /// How one contender fared with guesses from there.
-    pub(super) fn of(&self, contender: Contender, guesses: Guesses) -> impl Iterator<Item = &Judged> {
-        self.with(guesses).iter().map(move |trial| trial.of(contender))
+    /// How one solver fared with guesses from there.
+    pub(super) fn attempts(&self, solver: Solver, guesses: Guesses) -> impl Iterator<Item = &Judged> {
+        self.with(guesses).iter().map(move |trial| trial.by(solver))
     }
 
     /// How often any solution was reached.
-    pub(super) fn solved(&self, contender: Contender, guesses: Guesses) -> Share {
-        Share::of(self.of(contender, guesses).map(Judged::is_solved))
+    pub(super) fn solved(&self, solver: Solver, guesses: Guesses) -> Share {
+        Share::count(self.attempts(solver, guesses).map(Judged::is_solved))
     }
 
     /// How often the true solution was reached.
-    pub(super) fn true_ones(&self, contender: Contender, guesses: Guesses) -> Share {
-        Share::of(self.of(contender, guesses).map(|judged| judged.reached == Reached::True))
+    pub(super) fn true_ones(&self, solver: Solver, guesses: Guesses) -> Share {
+        Share::count(self.attempts(solver, guesses).map(|judged| judged.reached == Reached::True))
     }
 
     /// Of what was reached, how often it was the solution closest to the guess.
-    pub(super) fn closest(&self, contender: Contender, guesses: Guesses) -> Share {
-        let solved = self.of(contender, guesses).filter(|judged| judged.is_solved());
-        Share::of(solved.map(|judged| judged.closest))
+    pub(super) fn closest(&self, solver: Solver, guesses: Guesses) -> Share {
+        let solved = self.attempts(solver, guesses).filter(|judged| judged.is_solved());
+        Share::count(solved.map(|judged| judged.closest))
     }
 
-    /// A contender's iterations and Newton–Raphson's (same residual) where both arrive.
-    pub(super) fn against_newton(&self, contender: Contender, guesses: Guesses) -> Vec<[Attempt; 2]> {
-        let rival = match contender {
-            Contender::Published(residual, _) => Contender::Newton(residual),
-            Contender::Newton(_) | Contender::Controller => NEWTON,
+    /// A solver's iterations and Newton–Raphson's (same residual) where both arrive.
+    pub(super) fn against_newton(&self, solver: Solver, guesses: Guesses) -> Vec<[Attempt; 2]> {
+        let rival = match solver {
+            Solver::Published(residual, _) => Solver::Newton(residual),
+            Solver::Newton(_) | Solver::Controller => NEWTON,
         };
-        let both = self.of(contender, guesses).zip(self.of(rival, guesses));
+        let both = self.attempts(solver, guesses).zip(self.attempts(rival, guesses));
         both.filter(|(a, b)| a.is_solved() && b.is_solved()).map(|(a, b)| [a.attempt, b.attempt]).collect()
     }
 
-    /// Success rates, one row for each contender and origin of guesses.
+    /// Success rates, one row for each solver and origin of guesses.
     pub(super) fn success_table(&self) -> Table {
         let header = [
             "guesses",
@@ -133,9 +133,9 @@ impl Trials {
         ];
         let mut rows = Vec::new();
         for guesses in GUESSES {
-            for contender in CONTENDERS {
+            for solver in SOLVERS {
                 let count = |wanted: &dyn Fn(&Judged) -> bool| {
-                    self.of(contender, guesses).filter(|judged| wanted(judged)).count()
+                    self.attempts(solver, guesses).filter(|judged| wanted(judged)).count()
                 };
                 let failed = |reason| count(&|judged| judged.reached == Reached::Nothing(reason));
                 let [reached_true, other] =
@@ -146,7 +146,7 @@ impl Trials {
                 let [stalled, singular, unconverged] = known;
                 let closest = count(&|judged| judged.is_solved() && judged.closest);
                 let counts = [trials, reached_true, other, stalled, singular, unconverged, refused, closest];
-                let names = [guesses.name(), contender.name()];
+                let names = [guesses.name(), solver.name()];
                 rows.push(names.into_iter().chain(counts.map(|count| count.to_string())).collect());
             }
         }
@@ -157,18 +157,18 @@ impl Trials {
     pub(super) fn iterations_table(&self) -> Table {
         let header = ["solver", "iterations", "trials"];
         let mut rows = Vec::new();
-        for contender in CONTENDERS {
-            for (iterations, count) in self.histogram(contender).into_iter().enumerate() {
-                rows.push(vec![contender.name(), iterations.to_string(), count.to_string()]);
+        for solver in SOLVERS {
+            for (iterations, count) in self.histogram(solver).into_iter().enumerate() {
+                rows.push(vec![solver.name(), iterations.to_string(), count.to_string()]);
             }
         }
         Table::new("iterations", &header, rows)
     }
 
     /// How many solved trials took 0, 1, 2 … iterations, from guesses anywhere above the base.
-    pub(super) fn histogram(&self, contender: Contender) -> Vec<usize> {
+    pub(super) fn histogram(&self, solver: Solver) -> Vec<usize> {
         let mut counts = Vec::new();
-        for judged in self.of(contender, Guesses::AboveBase).filter(|judged| judged.is_solved()) {
+        for judged in self.attempts(solver, Guesses::AboveBase).filter(|judged| judged.is_solved()) {
             let iterations = judged.attempt.iterations as usize;
             if counts.len() <= iterations {
                 counts.resize(iterations + 1, 0);
@@ -193,12 +193,12 @@ impl Trials {
         ];
         let mut rows = Vec::new();
         for guesses in GUESSES {
-            for contender in CONTENDERS.into_iter().filter(|one| matches!(one, Contender::Published(..))) {
-                let both = self.against_newton(contender, guesses);
+            for solver in SOLVERS.into_iter().filter(|one| matches!(one, Solver::Published(..))) {
+                let both = self.against_newton(solver, guesses);
                 let iterations = |side: usize| both.iter().map(move |pair| f64::from(pair[side].iterations));
                 let evaluations =
                     |side: usize| both.iter().map(move |pair| f64::from(pair[side].evaluations));
-                let mut row = vec![guesses.name(), contender.name(), both.len().to_string()];
+                let mut row = vec![guesses.name(), solver.name(), both.len().to_string()];
                 for side in 0..2 {
                     row.push(number(median(iterations(side).collect())));
                     row.push(number(quantile(iterations(side).collect(), 0.9)));
@@ -214,12 +214,14 @@ impl Trials {
     /// the paper's solver alone, Newton–Raphson alone.
     pub(super) fn alone(&self) -> [Share; 2] {
         let both = || {
-            let newton = self.of(NEWTON, Guesses::AboveBase);
-            self.of(PUBLISHED, Guesses::AboveBase).zip(newton).map(|(a, b)| (a.is_solved(), b.is_solved()))
+            let newton = self.attempts(NEWTON, Guesses::AboveBase);
+            self.attempts(PUBLISHED, Guesses::AboveBase)
+                .zip(newton)
+                .map(|(a, b)| (a.is_solved(), b.is_solved()))
         };
         [
-            Share::of(both().map(|(published, newton)| published && !newton)),
-            Share::of(both().map(|(a, b)| b && !a)),
+            Share::count(both().map(|(published, newton)| published && !newton)),
+            Share::count(both().map(|(a, b)| b && !a)),
         ]
     }
 }

@@ -40,7 +40,7 @@ pub(super) const SLICES: [Slice; 4] = [
 
 /// What is known of a pose within the strokes in which the mechanism stands.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Place {
+pub(super) struct PoseQuality {
     /// Condition number of the 6×6 Jacobian, turns taken at the platform's side.
     pub condition: f64,
     /// Determinant of the forward kinematics' Jacobian, legs taken as 1.
@@ -58,7 +58,7 @@ pub(super) struct Map {
     /// Cells along a side.
     pub side: usize,
     /// Row by row, [`Slice::across`] varies fastest; none where the mechanism cannot be.
-    pub places: Vec<Option<Place>>,
+    pub poses: Vec<Option<PoseQuality>>,
 }
 
 impl Coordinate {
@@ -94,7 +94,7 @@ impl Coordinate {
     }
 
     /// Its value at a pose, mm or degrees.
-    pub(super) fn of(self, pose: &Pose) -> f64 {
+    pub(super) fn at(self, pose: &Pose) -> f64 {
         let (roll, pitch, yaw) = pose.rotation.euler_angles();
         match self {
             Self::X => pose.translation.x * 1e3,
@@ -136,19 +136,19 @@ impl Slice {
 
 impl Map {
     /// The slice through a position (metres) with no turn.
-    pub(super) fn of(mechanism: &Mechanism, slice: Slice, middle: &Vec3, side: usize) -> Self {
-        let places = (0..side * side).into_par_iter().map(|index| {
+    pub(super) fn compute(mechanism: &Mechanism, slice: Slice, middle: &Vec3, side: usize) -> Self {
+        let poses = (0..side * side).into_par_iter().map(|index| {
             let [across, up] = values(slice, side, index);
-            place(mechanism, &slice.pose(middle, across, up))
+            quality(mechanism, &slice.pose(middle, across, up))
         });
-        Self { slice, side, places: places.collect() }
+        Self { slice, side, poses: poses.collect() }
     }
 
     /// Lowest and highest value of a coordinate of the slice at which the mechanism can be; none when
     /// it can be nowhere.
     pub(super) fn reach(&self, coordinate: Coordinate) -> Option<[f64; 2]> {
         let which = usize::from(coordinate == self.slice.up);
-        let reached = self.places.iter().enumerate().filter(|(_, place)| place.is_some());
+        let reached = self.poses.iter().enumerate().filter(|(_, quality)| quality.is_some());
         reached.map(|(index, _)| values(self.slice, self.side, index)[which]).fold(None, |range, value| {
             let [low, high]: [f64; 2] = range.unwrap_or([value; 2]);
             Some([low.min(value), high.max(value)])
@@ -168,15 +168,15 @@ impl Map {
             "regular_within_deg",
             "separation_deg",
         ];
-        let row = |(index, place): (usize, &Option<Place>)| {
+        let row = |(index, quality): (usize, &Option<PoseQuality>)| {
             let mut row: Vec<_> = values(self.slice, self.side, index).map(number).into();
-            let known = place.map(|place| {
-                [place.condition, place.determinant, place.regular_within_deg, place.separation_deg]
+            let known = quality.map(|quality| {
+                [quality.condition, quality.determinant, quality.regular_within_deg, quality.separation_deg]
             });
             row.extend(known.unwrap_or([f64::NAN; 4]).map(number));
             row
         };
-        Table::new(self.table_name(), &header, self.places.iter().enumerate().map(row).collect())
+        Table::new(self.table_name(), &header, self.poses.iter().enumerate().map(row).collect())
     }
 }
 
@@ -189,7 +189,7 @@ fn values(slice: Slice, side: usize, index: usize) -> [f64; 2] {
     [value(slice.across, index % side), value(slice.up, index / side)]
 }
 
-fn place(mechanism: &Mechanism, pose: &Pose) -> Option<Place> {
+fn quality(mechanism: &Mechanism, pose: &Pose) -> Option<PoseQuality> {
     let joints = mechanism.inverse(pose).ok()?;
     mechanism.strokes().check(&joints.actuators).ok()?;
     if !Assembly::new(mechanism, &joints.actuators, &joints.theta_rad).is_true() {
@@ -199,7 +199,7 @@ fn place(mechanism: &Mechanism, pose: &Pose) -> Option<Place> {
     let distance = |theta_rad: &[f64; LEGS]| distance_rad(theta_rad, &joints.theta_rad);
     let here = solutions.iter().min_by(|a, b| distance(&a.theta_rad).total_cmp(&distance(&b.theta_rad)))?;
     let regular_rad = here.certificate.map_or(0.0, |proof| proof.regular_within_rad);
-    Some(Place {
+    Some(PoseQuality {
         condition: mechanism.condition(pose, &joints),
         determinant: here.determinant,
         regular_within_deg: regular_rad.to_degrees(),

@@ -1,45 +1,52 @@
-//! The paper's claims, judged by what this run measured. The criteria stand here and nowhere else;
-//! each is a function of figures, so that other figures give another verdict.
+//! The paper's claims, judged by the measurements of a study. The criteria are defined here alone; each is a function of
+//! measured values, so that other values give another judgement.
 
 mod convergence;
 mod multiplicity;
 mod speed;
 
-use super::Study;
 use super::motions::Motion;
 use super::sample::Guesses;
 use super::share::Share;
+use crate::study::Study;
 
 /// Any guess at all, as far as a leg can stand.
 const ANY: Guesses = Guesses::AboveBase;
-/// A rule that fails so rarely nearly holds.
+/// A rule that fails in a smaller share of cases nearly holds.
 const RARELY: f64 = 0.01;
 
-/// What became of a claim.
+/// Whether a claim holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Verdict {
+pub enum Judgement {
+    /// By its criterion.
     Holds,
+    /// By the weaker criterion.
     HoldsPartly,
+    /// By neither.
     DoesNotHold,
 }
 
-/// A claim with its judgement.
+/// A claim of the paper with its judgement.
 #[derive(Debug, Clone)]
-pub(super) struct Claim {
-    /// What the paper says, in other words.
-    pub says: &'static str,
-    /// Where it says so.
-    pub place: &'static str,
+pub struct PaperClaim {
+    /// The claim, paraphrased.
+    pub statement: &'static str,
+    /// Where the paper makes it.
+    pub section: &'static str,
+    /// The measurements that decide.
     pub measured: String,
-    /// When it holds, and when partly.
+    /// When it holds, and when it holds partly.
     pub criterion: &'static str,
-    pub verdict: Verdict,
-    /// The figure to look at.
+    /// Whether it holds.
+    pub judgement: Judgement,
+    /// The figure that shows it.
     pub figure: Option<&'static str>,
 }
 
-impl Verdict {
-    pub(super) fn name(self) -> &'static str {
+impl Judgement {
+    /// As the page and the terminal show it.
+    #[must_use]
+    pub fn name(self) -> &'static str {
         match self {
             Self::Holds => "holds",
             Self::HoldsPartly => "holds partly",
@@ -47,7 +54,7 @@ impl Verdict {
         }
     }
 
-    fn of(holds: bool, partly: bool) -> Self {
+    fn new(holds: bool, partly: bool) -> Self {
         match (holds, partly) {
             (true, _) => Self::Holds,
             (false, true) => Self::HoldsPartly,
@@ -57,7 +64,7 @@ impl Verdict {
 }
 
 /// All claims that can be measured, in the paper's order.
-pub(super) fn judge(study: &Study) -> Vec<Claim> {
+pub(super) fn judge(study: &Study) -> Vec<PaperClaim> {
     vec![
         movement_is_covered(study),
         convergence::any_guess_converges(study),
@@ -78,9 +85,9 @@ pub(super) fn judge(study: &Study) -> Vec<Claim> {
     ]
 }
 
-fn movement_is_covered(study: &Study) -> Claim {
-    let covered = Share::of(study.motions.iter().map(|motion| motion.demands.is_ok()));
-    let told = |motion: &Motion| match &motion.demands {
+fn movement_is_covered(study: &Study) -> PaperClaim {
+    let covered = Share::count(study.motions.iter().map(|motion| motion.demands.is_ok()));
+    let texts = |motion: &Motion| match &motion.demands {
         Ok(demands) => {
             let margin_m = demands.margin_m(study.mechanism.strokes());
             let least_mm = margin_m.iter().copied().fold(f64::INFINITY, f64::min) * 1e3;
@@ -91,13 +98,13 @@ fn movement_is_covered(study: &Study) -> Claim {
         }
         Err(reason) => format!("{}: {reason}", motion.name),
     };
-    Claim {
-        says: "The dimensions given cover the range of the human jaw's movement.",
-        place: "Method 1",
-        measured: study.motions.iter().map(told).collect::<Vec<_>>().join("; "),
+    PaperClaim {
+        statement: "The dimensions given cover the range of the human jaw's movement.",
+        section: "Method 1",
+        measured: study.motions.iter().map(texts).collect::<Vec<_>>().join("; "),
         criterion: "holds if every motion stays within strokes, speeds and conditioning, with openings of 44 and 56 mm (mean \
                     and 95th percentile of adults); partly if any does",
-        verdict: Verdict::of(covered.is_all(), covered.hits > 0),
+        judgement: Judgement::new(covered.is_all(), covered.hits > 0),
         figure: Some("workspace_translation"),
     }
 }

@@ -1,10 +1,10 @@
 //! What the paper claims of its solver's speed.
 
-use super::super::Study;
-use super::super::contender::{Attempt, NEWTON, PUBLISHED};
-use super::super::share::median;
-use super::super::speed::Situation;
-use super::{ANY, Claim, Verdict};
+use super::{ANY, Judgement, PaperClaim};
+use crate::share::median;
+use crate::solver::{Attempt, NEWTON, PUBLISHED};
+use crate::speed::Situation;
+use crate::study::Study;
 
 /// The time the paper states for one computation, ns.
 const STATED_NS: f64 = 0.1;
@@ -13,56 +13,57 @@ const REAL_TIME_NS: f64 = 1e5;
 /// How many times more iterations are "much more".
 const MUCH_MORE: f64 = 2.0;
 
-pub(super) fn fewer_iterations(study: &Study) -> Claim {
+pub(super) fn fewer_iterations(study: &Study) -> PaperClaim {
     let both = study.trials.against_newton(PUBLISHED, ANY);
     let of = |side: usize, what: fn(&Attempt) -> u32| {
         median(both.iter().map(|pair| f64::from(what(&pair[side]))).collect())
     };
     let iterations = [0, 1].map(|side| of(side, |attempt| attempt.iterations));
     let evaluations = [0, 1].map(|side| of(side, |attempt| attempt.evaluations));
-    let time = study.speed.of(Situation::Random, PUBLISHED).to_newton;
-    Claim {
-        says: "It converges much faster: Newton–Raphson needs many more iterations.",
-        place: "Results, second advantage; Fig. 5",
+    let time = study.speed.timing(Situation::Random, PUBLISHED).to_newton;
+    PaperClaim {
+        statement: "It converges much faster: Newton–Raphson needs many more iterations.",
+        section: "Results, second advantage; Fig. 5",
         measured: format!(
             "where both arrive from above the base, medians of the paper's solver and Newton–Raphson: {} and {} iterations, {} \
              and {} evaluations of the residuals; time of the paper's solver {time:.2} of Newton–Raphson's",
             iterations[0], iterations[1], evaluations[0], evaluations[1]
         ),
         criterion: "holds if Newton–Raphson's median is at least twice the paper's; partly if it is greater",
-        verdict: faster(iterations),
+        judgement: faster(iterations),
         figure: Some("fig5_speed"),
     }
 }
 
-pub(super) fn stated_time(study: &Study) -> Claim {
+pub(super) fn stated_time(study: &Study) -> PaperClaim {
     let [published_ns, newton_ns] =
-        [PUBLISHED, NEWTON].map(|contender| study.speed.of(Situation::Random, contender).median_ns);
-    Claim {
-        says: "The computation takes not more than 10⁻¹⁰ s on a Pentium.",
-        place: "Results, second advantage",
+        [PUBLISHED, NEWTON].map(|solver| study.speed.timing(Situation::Random, solver).median_ns);
+    PaperClaim {
+        statement: "The computation takes not more than 10⁻¹⁰ s on a Pentium.",
+        section: "Results, second advantage",
         measured: format!(
             "median from a random guess: the paper's solver {published_ns:.0} ns, Newton–Raphson {newton_ns:.0} ns on this machine; \
              10⁻¹⁰ s is less than one cycle of any Pentium's clock"
         ),
         criterion: "holds if the median here is not above 10⁻¹⁰ s",
-        verdict: Verdict::of(published_ns <= STATED_NS, false),
+        judgement: Judgement::new(published_ns <= STATED_NS, false),
         figure: Some("fig5_speed"),
     }
 }
 
-pub(super) fn real_time(study: &Study) -> Claim {
-    let [warm, random] = [Situation::Warm, Situation::Random].map(|start| study.speed.of(start, PUBLISHED));
-    Claim {
-        says: "It is fast enough for real-time control.",
-        place: "Abstract and Results, second advantage",
+pub(super) fn real_time(study: &Study) -> PaperClaim {
+    let [warm, random] =
+        [Situation::Warm, Situation::Random].map(|start| study.speed.timing(start, PUBLISHED));
+    PaperClaim {
+        statement: "It is fast enough for real-time control.",
+        section: "Abstract and Results, second advantage",
         measured: format!(
             "median (99th percentile, which includes what else the machine does): from the solution 1 ms before \
              {:.0} ns ({:.0} ns), from a random guess {:.0} ns ({:.0} ns)",
             warm.median_ns, warm.p99_ns, random.median_ns, random.p99_ns
         ),
         criterion: "holds if both medians are below a tenth of a 1 ms cycle; partly if the warm one is",
-        verdict: Verdict::of(
+        judgement: Judgement::new(
             warm.median_ns.max(random.median_ns) <= REAL_TIME_NS,
             warm.median_ns <= REAL_TIME_NS,
         ),
@@ -70,8 +71,8 @@ pub(super) fn real_time(study: &Study) -> Claim {
     }
 }
 
-fn faster([published, newton]: [f64; 2]) -> Verdict {
-    Verdict::of(newton >= MUCH_MORE * published, newton > published)
+fn faster([published, newton]: [f64; 2]) -> Judgement {
+    Judgement::new(newton >= MUCH_MORE * published, newton > published)
 }
 
 #[cfg(test)]
@@ -80,9 +81,9 @@ mod tests {
 
     #[test]
     fn many_more_iterations_are_twice_as_many() {
-        assert_eq!(faster([7.0, 14.0]), Verdict::Holds);
-        assert_eq!(faster([7.0, 13.0]), Verdict::HoldsPartly);
-        assert_eq!(faster([7.0, 7.0]), Verdict::DoesNotHold);
-        assert_eq!(faster([f64::NAN, f64::NAN]), Verdict::DoesNotHold);
+        assert_eq!(faster([7.0, 14.0]), Judgement::Holds);
+        assert_eq!(faster([7.0, 13.0]), Judgement::HoldsPartly);
+        assert_eq!(faster([7.0, 7.0]), Judgement::DoesNotHold);
+        assert_eq!(faster([f64::NAN, f64::NAN]), Judgement::DoesNotHold);
     }
 }

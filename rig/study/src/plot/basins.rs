@@ -1,44 +1,33 @@
 //! Maps of the basins of convergence.
 
-use plotters::prelude::*;
+use masseter_charts::palette::{BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILION};
+use masseter_charts::{Axis, Error, Key, LegendEntry, Scale, cells, chart, legend};
+use plotters::style::{BLACK, RGBColor};
 
-use super::axes::{Axes, plain};
-use super::{Figure, GREY, legend};
+use super::draw;
 use crate::basins::{Basin, Basins};
-use crate::contender::SHOWN;
-use masseter_charts::palette::{BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION};
+use crate::figure::Figure;
+use crate::solver::COMPARED;
 
-/// Of the classes of solutions; the true one's first.
+/// Of the classes of solutions; the true solution's first.
 const CLASSES: [RGBColor; 6] = [BLUE, ORANGE, GREEN, PURPLE, SKY, VERMILION];
 
-pub(super) fn figure(basins: &Basins) -> anyhow::Result<Figure> {
+pub(super) fn figure(basins: &Basins) -> Result<Figure, Error> {
     let caption = "Basins of convergence of the neutral input: which solution (leg angles in order of size) each \
-                   guess leads to, with the guess's θ₃ that of the true solution.";
-    Figure::draw("basins", caption.to_owned(), (1140, 500), |area| {
+                   guess leads to. The guess's θ₃ is that of the true solution.";
+    draw("basins", caption.to_owned(), (1140, 500), |area| {
         let (maps, names) = area.split_vertically(424);
-        for ((index, contender), panel) in SHOWN.iter().enumerate().zip(maps.split_evenly((1, 3))) {
-            let axes = Axes {
-                title: contender.short_name(),
-                x: ("θ₁ of the guess, °", 0.0..180.0, plain),
-                y: ("θ₂ of the guess, °", 0.0..180.0, plain),
-            };
-            let mut chart = axes.on(&panel)?;
-            let step = 180.0 / basins.side as f64;
-            for (row, cells) in basins.cells.chunks(basins.side).enumerate() {
-                let y = row as f64 * step;
-                let mut from = 0;
-                for run in cells.chunk_by(|a, b| a.basins[index] == b.basins[index]) {
-                    let (left, right) = (from as f64 * step, (from + run.len()) as f64 * step);
-                    let fill = colour(run[0].basins[index]).filled();
-                    chart.draw_series([Rectangle::new([(left, y), (right, y + step)], fill)])?;
-                    from += run.len();
-                }
-            }
+        for ((index, solver), panel) in COMPARED.iter().enumerate().zip(maps.split_evenly((1, 3))) {
+            let axis = |label| Axis::new(label, Scale::Linear, [0.0, 180.0]);
+            let axes = [axis("θ₁ of the guess, °"), axis("θ₂ of the guess, °")];
+            let [x, y] = axes;
+            let mut chart = chart(&panel, solver.short_name(), x, y)?;
+            cells(&mut chart, basins.side, |cell| Some(colour(basins.cells[cell].basins[index])))?;
         }
         let classes = (0..basins.class_names.len()).map(Basin::Class);
         let shown = classes.chain([Basin::BelowBase, Basin::Nothing]);
-        let entries: Vec<_> = shown.map(|basin| (basins.name(basin), colour(basin))).collect();
-        legend(&names, &entries, 3)
+        let entry = |basin| LegendEntry { name: basins.name(basin), colour: colour(basin), key: Key::Box };
+        legend(&names, &shown.map(entry).collect::<Vec<_>>(), 3)
     })
 }
 

@@ -2,15 +2,17 @@
 
 use std::f64::consts::TAU;
 
+use masseter_charts::palette::{BLUE, GREEN, GREY, PURPLE, VERMILION};
+use masseter_charts::{
+    Area, Axis, Chart, Error, Legend, Line, LineChart, Scale, SeriesLabelPosition, TEXT, TITLE, marks,
+};
 use masseter_controller::kinematics::Solution;
 use masseter_shared::geometry::{Actuators, LEGS, Mechanism, Vec3};
-use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
 
-use super::axes::{Axes, Chart, curve, named, plain};
-use super::{Area, Figure, GREY, TEXT, TITLE};
-use crate::Study;
-use masseter_charts::palette::{BLUE, GREEN, PURPLE, VERMILION};
+use super::draw;
+use crate::figure::Figure;
+use crate::study::Study;
 
 /// From where the mechanism is seen, degrees around z and above the horizontal.
 const VIEW_DEG: [f64; 2] = [-62.0, 22.0];
@@ -19,14 +21,12 @@ const PIECE_M: f64 = 0.004;
 /// What the plane of leg 1 is shown of, mm.
 const WINDOW_MM: [[f64; 2]; 2] = [[-90.0, 90.0], [205.0, 350.0]];
 
-type Space<'a, 'svg> = ChartContext<'a, SVGBackend<'svg>, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
-
 /// Fig. 6: true solution and folded corner, in space and in the plane of leg 1.
-pub(super) fn assemblies(study: &Study) -> anyhow::Result<Figure> {
+pub(super) fn assemblies(study: &Study) -> Result<Figure, Error> {
     let caption = "Fig. 6. Two assemblies of the neutral input (d = 0, all legs equal). Left: the true one and the one \
                    with corner A₁ folded over. Right: in the plane of leg 1 the circle on which the triangle carries A₁ \
                    about A₂A₃ (Cᴬ) and that of the leg about B₁ (Cᴮ) meet twice.";
-    Figure::draw("fig6_assemblies", caption.to_owned(), (1100, 560), |area| {
+    draw("fig6_assemblies", caption.to_owned(), (1100, 560), |area| {
         let (left, right) = area.split_horizontally(470);
         let found = [study.set.true_one(), study.set.corner_folded()];
         let mut space = space(&left, "Two assemblies of one input", TITLE)?;
@@ -36,20 +36,22 @@ pub(super) fn assemblies(study: &Study) -> anyhow::Result<Figure> {
                 draw_assembly(&mut space, &study.mechanism, &study.set.actuators, solution, colour)?;
             }
         }
-        loci(&right, study, found)
+        loci(study, found).draw_on(&right)
     })
 }
 
 /// The plane of leg 1 around A₁: x and z, mm.
-fn loci(area: &Area, study: &Study, found: [Option<&Solution>; 2]) -> anyhow::Result<()> {
-    let axes = Axes {
-        title: "Plane of leg 1",
-        x: ("x (anterior), mm", WINDOW_MM[0][0]..WINDOW_MM[0][1], plain),
-        y: ("z (up), mm", WINDOW_MM[1][0]..WINDOW_MM[1][1], plain),
+fn loci(study: &Study, found: [Option<&Solution>; 2]) -> LineChart {
+    let mut plane = LineChart {
+        title: "Plane of leg 1".to_owned(),
+        x: Axis::new("x (anterior), mm", Scale::Linear, WINDOW_MM[0]),
+        y: Axis::new("z (up), mm", Scale::Linear, WINDOW_MM[1]),
+        lines: Vec::new(),
+        limits: Vec::new(),
+        legend: Legend::Inside(SeriesLabelPosition::UpperRight),
     };
-    let mut chart = axes.on(area)?;
     let (mechanism, actuators) = (&study.mechanism, &study.set.actuators);
-    let [Some(truth), folded] = found else { return Ok(()) };
+    let [Some(truth), folded] = found else { return plane };
     let [_, a2, a3] = mechanism.corners_from_angles(actuators, &truth.theta_rad);
     let hinge = mechanism.hinge(0, actuators.slide_m[0]);
     let (middle, half) = ((a2 + a3) / 2.0, (a2 - a3).norm() / 2.0);
@@ -68,29 +70,29 @@ fn loci(area: &Area, study: &Study, found: [Option<&Solution>; 2]) -> anyhow::Re
             let [[left, right], [low, high]] = WINDOW_MM;
             (left..=right).contains(x) && (low..=high).contains(z)
         };
-        let points: Vec<_> = (0..=pieces).map(point).filter(seen).collect();
-        curve(&mut chart, name, &points, colour, false)?;
+        let points = (0..=pieces).map(point).filter(seen).collect();
+        plane.lines.push(Line::new(name, points).coloured(colour));
     }
     for (solution, (name, colour)) in
         [Some(truth), folded].into_iter().zip([("true solution", BLUE), ("A₁ folded over", VERMILION)])
     {
         let Some(solution) = solution else { continue };
         let [a1, ..] = mechanism.corners_from_angles(actuators, &solution.theta_rad);
-        let triangle = [(a1.x * 1e3, a1.z * 1e3), (middle.x * 1e3, middle.z * 1e3)];
-        curve(&mut chart, name, &triangle, colour, true)?;
+        let triangle = vec![(a1.x * 1e3, a1.z * 1e3), (middle.x * 1e3, middle.z * 1e3)];
+        plane.lines.push(Line::new(name, triangle).coloured(colour).marked());
     }
-    named(&mut chart, SeriesLabelPosition::UpperRight)
+    plane
 }
 
 /// Fig. 8: every solution of the neutral input above the base.
-pub(super) fn solution_set(study: &Study) -> anyhow::Result<Figure> {
+pub(super) fn solution_set(study: &Study) -> Result<Figure, Error> {
     let above = study.set.above_base();
     let caption = format!(
         "Fig. 8. The {} solutions of the neutral input above the base (leg angles over each); as many mirrored ones lie \
          below it. The true solution is the first.",
         above.len()
     );
-    Figure::draw("fig8_solutions", caption, (1100, 760), |area| {
+    draw("fig8_solutions", caption, (1100, 760), |area| {
         for (panel, solution) in area.split_evenly((2, 4)).iter().zip(&above) {
             let angles: Vec<_> =
                 solution.theta_rad.iter().map(|angle| format!("{:.1}°", angle.to_degrees())).collect();
@@ -104,14 +106,14 @@ pub(super) fn solution_set(study: &Study) -> anyhow::Result<Figure> {
 }
 
 /// A view without axes, equal scales across and up.
-fn space<'a, 'svg>(area: &'a Area<'svg>, title: &str, size: u32) -> anyhow::Result<Space<'a, 'svg>> {
+fn space<'a, 'svg>(area: &'a Area<'svg>, title: &str, size: u32) -> Result<Chart<'a, 'svg>, Error> {
     let (width, height) = area.dim_in_pixel();
     let half_height_m = 0.172;
     let half_width_m = half_height_m * f64::from(width) / f64::from(height - 30);
-    let chart = ChartBuilder::on(area)
-        .margin(4)
-        .caption(title, ("sans-serif", size))
-        .build_cartesian_2d(-half_width_m..half_width_m, 0.125 - half_height_m..0.125 + half_height_m)?;
+    let chart = ChartBuilder::on(area).margin(4).caption(title, ("sans-serif", size)).build_cartesian_2d(
+        Axis::new("", Scale::Linear, [-half_width_m, half_width_m]),
+        Axis::new("", Scale::Linear, [0.125 - half_height_m, 0.125 + half_height_m]),
+    )?;
     Ok(chart)
 }
 
@@ -122,13 +124,13 @@ fn seen(point: &Vec3) -> (f64, f64) {
     (across, point.z * cos_e - depth * sin_e)
 }
 
-fn line(space: &mut Chart<'_, '_>, points: &[Vec3], style: ShapeStyle) -> anyhow::Result<()> {
+fn line(space: &mut Chart<'_, '_>, points: &[Vec3], style: ShapeStyle) -> Result<(), Error> {
     space.draw_series([PathElement::new(points.iter().map(seen).collect::<Vec<_>>(), style)])?;
     Ok(())
 }
 
 /// The slides over their strokes, and the triangle of their middles.
-fn draw_base(space: &mut Chart<'_, '_>, mechanism: &Mechanism) -> anyhow::Result<()> {
+fn draw_base(space: &mut Chart<'_, '_>, mechanism: &Mechanism) -> Result<(), Error> {
     let middles = [0, 1, 2, 0].map(|leg| mechanism.hinge(leg, 0.0));
     line(space, &middles, GREY.stroke_width(1))?;
     let [low_m, high_m] = mechanism.strokes().slide_m;
@@ -145,15 +147,15 @@ fn draw_assembly(
     actuators: &Actuators,
     solution: &Solution,
     colour: RGBColor,
-) -> anyhow::Result<()> {
+) -> Result<(), Error> {
     let corners = mechanism.corners_from_angles(actuators, &solution.theta_rad);
     space.draw_series([Polygon::new(corners.iter().map(seen).collect::<Vec<_>>(), colour.mix(0.35))])?;
     line(space, &[corners[0], corners[1], corners[2], corners[0]], colour.stroke_width(2))?;
     for (leg, corner) in corners.iter().enumerate() {
         let hinge = mechanism.hinge(leg, actuators.slide_m[leg]);
         line(space, &[hinge, *corner], colour.stroke_width(3))?;
-        space.draw_series([Circle::new(seen(&hinge), 4, BLACK.filled())])?;
-        space.draw_series([Circle::new(seen(corner), 4, colour.filled())])?;
+        marks(space, [seen(&hinge)], 4, BLACK)?;
+        marks(space, [seen(corner)], 4, colour)?;
         let name = |letter: char| format!("{letter}{}", ['₁', '₂', '₃'][leg]);
         for (at, letter) in [(&hinge, 'B'), (corner, 'A')] {
             let (x, y) = seen(at);

@@ -1,45 +1,45 @@
-//! How often random guesses lead to the true solution, by how far away they are.
+//! How often random guesses lead to the true solution, by their distance from it.
 
-use plotters::prelude::*;
+use masseter_charts::{Axis, Error, Legend, Line, LineChart, Scale, SeriesLabelPosition};
 
-use super::axes::{Axes, curve, named, percent, plain};
-use super::{Area, Figure, SOLVERS};
-use crate::contender::{Contender, SHOWN};
+use super::{SOLVER_COLOURS, draw};
+use crate::figure::Figure;
 use crate::sample::{GUESSES, Guesses};
 use crate::share::Share;
+use crate::solver::{COMPARED, Solver};
 use crate::trials::Trials;
 
 /// Where guesses anywhere above the base are drawn, °: each leg is within 90° of the vertical.
 const ABOVE_BASE_DEG: f64 = 90.0;
 
-pub(super) fn figure(trials: &Trials) -> anyhow::Result<Figure> {
-    let caption = "Success of random guesses over how far from the true leg angles they are drawn (every leg within \
+pub(super) fn figure(trials: &Trials) -> Result<Figure, Error> {
+    let caption = "Success of random guesses over their greatest distance from the true leg angles (every leg within \
                    ± this; the points at 90° are guesses anywhere above the base). Left: any solution reached. Right: \
                    the true one.";
-    Figure::draw("success", caption.to_owned(), (1100, 440), |area| {
+    draw("success", caption.to_owned(), (1100, 440), |area| {
         let panels = area.split_evenly((1, 2));
-        panel(&panels[0], "Any solution", |contender, guesses| trials.solved(contender, guesses))?;
-        panel(&panels[1], "The true solution", |contender, guesses| trials.true_ones(contender, guesses))
+        panel("Any solution", |solver, guesses| trials.solved(solver, guesses)).draw_on(&panels[0])?;
+        panel("The true solution", |solver, guesses| trials.true_ones(solver, guesses)).draw_on(&panels[1])
     })
 }
 
-fn panel(area: &Area, title: &str, share: impl Fn(Contender, Guesses) -> Share) -> anyhow::Result<()> {
-    let axes = Axes {
-        title,
-        x: ("guesses within ±, °", 0.0..95.0, plain),
-        y: ("share of guesses", 0.0..1.02, percent),
-    };
-    let mut chart = axes.on(area)?;
-    for (contender, colour) in SHOWN.into_iter().zip(SOLVERS) {
+fn panel(title: &str, share: impl Fn(Solver, Guesses) -> Share) -> LineChart {
+    let line = |(solver, colour): (Solver, _)| {
         let point = |guesses| {
             let x = match guesses {
                 Guesses::Within(deg) => deg,
                 Guesses::AboveBase => ABOVE_BASE_DEG,
             };
-            (x, share(contender, guesses).value())
+            (x, 100.0 * share(solver, guesses).value())
         };
-        let points: Vec<_> = GUESSES.into_iter().map(point).collect();
-        curve(&mut chart, contender.short_name(), &points, colour, true)?;
+        Line::new(solver.short_name(), GUESSES.into_iter().map(point).collect()).coloured(colour).marked()
+    };
+    LineChart {
+        title: title.to_owned(),
+        x: Axis::new("guesses within ±, °", Scale::Linear, [0.0, 95.0]),
+        y: Axis::new("share of guesses, %", Scale::Linear, [0.0, 102.0]),
+        lines: COMPARED.into_iter().zip(SOLVER_COLOURS).map(line).collect(),
+        limits: Vec::new(),
+        legend: Legend::Inside(SeriesLabelPosition::LowerLeft),
     }
-    named(&mut chart, SeriesLabelPosition::LowerLeft)
 }

@@ -1,36 +1,27 @@
 //! How many solutions random inputs have.
 
-use masseter_controller::kinematics::MOST_SOLUTIONS;
-use plotters::prelude::*;
-
-use super::axes::{Axes, percent, plain};
-use super::{Figure, TEXT};
-use crate::multiplicity::Multiplicity;
 use masseter_charts::palette::BLUE;
+use masseter_charts::{Axis, Bar, Error, Scale, bars, chart};
+use masseter_controller::kinematics::MOST_SOLUTIONS;
 
-pub(super) fn figure(multiplicity: &Multiplicity) -> anyhow::Result<Figure> {
-    let caption = "Number of real solutions of random inputs over the whole strokes; without any the mechanism cannot \
-                   be assembled.";
-    Figure::draw("multiplicity", caption.to_owned(), (760, 420), |area| {
-        let numbers = || (0..=MOST_SOLUTIONS).step_by(2);
-        let most = numbers().map(|number| multiplicity.with_solutions(number).value()).fold(0.1, f64::max);
-        let axes = Axes {
-            title: "Solutions of random inputs",
-            x: ("real solutions (mirrored ones counted)", -1.0..17.0, plain),
-            y: ("share of inputs", 0.0..most * 1.15, percent),
+use super::draw;
+use crate::figure::Figure;
+use crate::multiplicity::Multiplicity;
+
+pub(super) fn figure(multiplicity: &Multiplicity) -> Result<Figure, Error> {
+    let caption = "Number of real solutions of random inputs over the whole strokes; an input without any cannot be \
+                   assembled.";
+    draw("multiplicity", caption.to_owned(), (760, 420), |area| {
+        let bar = |solutions: usize| {
+            let (share, x) = (multiplicity.with_solutions(solutions), solutions as f64);
+            let text = vec![format!("{solutions}: {}", share.percent())];
+            Bar { sides: [x - 0.7, x + 0.7], height: 100.0 * share.value(), colour: BLUE, text }
         };
-        let mut chart = axes.on(area)?;
-        for number in numbers() {
-            let share = multiplicity.with_solutions(number);
-            if share.hits == 0 {
-                continue;
-            }
-            let x = number as f64;
-            chart.draw_series([Rectangle::new([(x - 0.7, 0.0), (x + 0.7, share.value())], BLUE.filled())])?;
-            let place = (x - 0.65, share.value() + most * 0.055);
-            let label = format!("{number}: {}", share.percent());
-            chart.draw_series([Text::new(label, place, ("sans-serif", TEXT - 2))])?;
-        }
-        Ok(())
+        let shown = (0..=MOST_SOLUTIONS).step_by(2).map(bar).filter(|bar| bar.height > 0.0);
+        let shown: Vec<_> = shown.collect();
+        let most = shown.iter().map(|bar| bar.height).fold(10.0, f64::max);
+        let x = Axis::new("real solutions (mirrored ones counted)", Scale::Linear, [-1.0, 17.0]);
+        let y = Axis::new("share of inputs, %", Scale::Linear, [0.0, most * 1.15]);
+        bars(&mut chart(area, "Solutions of random inputs", x, y)?, &shown)
     })
 }

@@ -1,23 +1,23 @@
 //! Figs. 3 and 4: the error against the iteration for single guesses.
 
-use plotters::prelude::SeriesLabelPosition;
+use masseter_charts::{Axis, Error, Legend, Line, LineChart, Scale, SeriesLabelPosition};
 
-use super::axes::{Axes, curve, named, plain, power_of_ten};
-use super::{Area, Figure, SOLVERS};
-use crate::pairs::{Course, Pair, Pairs, Parting};
+use super::{SOLVER_COLOURS, draw};
+use crate::figure::Figure;
+use crate::pairs::{Course, Disagreement, Pair, Pairs};
 
 /// Iterations shown.
-const SHOWN: usize = 40;
+const ITERATIONS: usize = 40;
 /// Iterations shown of a cycle.
 const LAST: usize = 20;
 /// Errors below this are drawn there: they are zero but for rounding, cm².
 const LEAST_CM2: f64 = 1e-30;
 
-pub(super) fn figures(pairs: &Pairs) -> anyhow::Result<Vec<Figure>> {
+pub(super) fn figures(pairs: &Pairs) -> Result<Vec<Figure>, Error> {
     pairs.all().into_iter().map(figure).collect()
 }
 
-fn caption(Parting { title, clearest, share, .. }: &Parting) -> String {
+fn caption(Disagreement { title, clearest, share, .. }: &Disagreement) -> String {
     match clearest {
         Some(pair) => {
             format!("{title}. {}; {} of guesses above the base do so.", guess(pair), share.percent())
@@ -39,52 +39,51 @@ fn guess(pair: &Pair) -> String {
 }
 
 /// The error over the iterations. Beside an oscillation, which is nearly a flat line there, a panel shows its last cycles.
-fn figure(parting: &Parting) -> anyhow::Result<Figure> {
-    let oscillation = parting.clearest.as_ref().filter(|_| parting.newton == Course::Oscillates);
+fn figure(disagreement: &Disagreement) -> Result<Figure, Error> {
+    let oscillation = disagreement.clearest.as_ref().filter(|_| disagreement.newton == Course::Oscillates);
     let width = if oscillation.is_some() { 1140 } else { 760 };
-    Figure::draw(parting.name, caption(parting), (width, 440), |area| {
-        let Some(pair) = oscillation else { return course(area, parting) };
+    draw(disagreement.name, caption(disagreement), (width, 440), |area| {
+        let Some(pair) = oscillation else { return course(disagreement).draw_on(area) };
         let (left, right) = area.split_horizontally(690);
-        course(&left, parting)?;
-        last_cycles(&right, &pair.newton_cm2)
+        course(disagreement).draw_on(&left)?;
+        last_cycles(&pair.newton_cm2).draw_on(&right)
     })
 }
 
-fn course(area: &Area, parting: &Parting) -> anyhow::Result<()> {
-    let points = |errors: &[f64]| -> Vec<(f64, f64)> {
-        let shown = errors.iter().take(SHOWN + 1).enumerate();
-        shown.map(|(at, error)| (at as f64, error.max(LEAST_CM2).log10())).collect()
+fn course(disagreement: &Disagreement) -> LineChart {
+    let line = |name, errors: &[f64], colour| {
+        let shown = errors.iter().take(ITERATIONS + 1).enumerate();
+        let points = shown.map(|(at, error)| (at as f64, error.max(LEAST_CM2)));
+        Line::new(name, points.collect()).coloured(colour).marked()
     };
-    let pair = parting.clearest.as_ref();
-    let traces = pair.map(|pair| [points(&pair.published_cm2), points(&pair.newton_cm2)]).unwrap_or_default();
-    let all = || traces.iter().flatten();
-    let last = all().map(|point| point.0).fold(1.0, f64::max);
-    let low = all().map(|point| point.1).fold(0.0, f64::min).floor();
-    let high = all().map(|point| point.1).fold(1.0, f64::max).ceil();
-    let axes = Axes {
-        title: parting.title,
-        x: ("iteration", 0.0..last, plain),
-        y: ("error f₁² + f₂² + f₃², cm²", low..high, power_of_ten),
-    };
-    let mut chart = axes.on(area)?;
-    for ((points, solver), colour) in traces.iter().zip(["paper's solver", "Newton–Raphson"]).zip(SOLVERS) {
-        curve(&mut chart, solver, points, colour, true)?;
+    let [published, newton, _] = SOLVER_COLOURS;
+    let lines = disagreement.clearest.as_ref().map_or_else(Vec::new, |pair| {
+        vec![
+            line("paper's solver", &pair.published_cm2, published),
+            line("Newton–Raphson", &pair.newton_cm2, newton),
+        ]
+    });
+    LineChart {
+        title: disagreement.title.to_owned(),
+        x: Axis::fitted("iteration", Scale::Linear).including(0.0),
+        y: Axis::fitted("error f₁² + f₂² + f₃², cm²", Scale::Log).including(1.0),
+        lines,
+        limits: Vec::new(),
+        legend: Legend::Inside(SeriesLabelPosition::MiddleRight),
     }
-    named(&mut chart, SeriesLabelPosition::MiddleRight)
 }
 
 /// Newton–Raphson's last errors on a linear axis that they fill.
-fn last_cycles(area: &Area, errors_cm2: &[f64]) -> anyhow::Result<()> {
+fn last_cycles(errors_cm2: &[f64]) -> LineChart {
     let from = errors_cm2.len().saturating_sub(LAST);
-    let points: Vec<_> = (from..).map(|at| at as f64).zip(errors_cm2[from..].iter().copied()).collect();
-    let extreme = |pick: fn(f64, f64) -> f64| points.iter().map(|point| point.1).reduce(pick).unwrap_or(1.0);
-    let (low, high) = (extreme(f64::min), extreme(f64::max));
-    let margin = 0.15 * (high - low);
-    let axes = Axes {
-        title: "Newton–Raphson: last cycles",
-        x: ("iteration", from as f64..(errors_cm2.len() - 1) as f64, plain),
-        y: ("", low - margin..high + margin, plain),
-    };
-    let [_, colour, _] = SOLVERS;
-    curve(&mut axes.on(area)?, "", &points, colour, true)
+    let points = (from..).map(|at| at as f64).zip(errors_cm2[from..].iter().copied());
+    let [_, colour, _] = SOLVER_COLOURS;
+    LineChart {
+        title: "Newton–Raphson: last cycles".to_owned(),
+        x: Axis::fitted("iteration", Scale::Linear),
+        y: Axis::fitted("", Scale::Linear),
+        lines: vec![Line::new("", points.collect()).coloured(colour).marked()],
+        limits: Vec::new(),
+        legend: Legend::Inside(SeriesLabelPosition::UpperRight),
+    }
 }

@@ -1,15 +1,18 @@
 //! The inputs of a motion as boxes: the path that the actuators are asked to go, widened to all sides.
 //!
-//! Between two cycles an actuator is taken to go straight from target to target, as the drives interpolate. The path
-//! is the wanted one; how far the platform strays from it is for the width to cover.
+//! Between two cycles an actuator goes straight from target to target, as the drives interpolate. The path
+//! is the desired one; the width must cover the tracking error.
 
 use masseter_controller::kinematics::uniqueness::{Enclosure, InputBox};
 use masseter_shared::geometry::Actuators;
 
 use masseter_plan::Plan;
 
-/// Boxes that together hold every input within `around_m` of the motion's path, in each axis.
-pub(super) fn boxes(plan: &Plan, around_m: f64) -> anyhow::Result<Vec<InputBox>> {
+/// Boxes that together contain every input within `around_m` (metres) of the motion's path, in each axis.
+///
+/// # Errors
+/// When inverse kinematics has no solution on the path.
+pub fn boxes(plan: &Plan, around_m: f64) -> anyhow::Result<Vec<InputBox>> {
     let period_s = plan.scenario.period_s();
     let cycles = (plan.trajectory.duration_s() / period_s).ceil() as usize;
     let path = (0..=cycles)

@@ -8,7 +8,7 @@ use masseter_shared::geometry::{Actuators, LEGS, Mechanism};
 
 /// A solver with its choices.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Contender {
+pub(super) enum Solver {
     /// The paper's algorithm (Fig. 2), with the two choices that its text leaves open.
     Published(Residual, StepRule),
     /// Newton–Raphson with the full increment.
@@ -18,24 +18,24 @@ pub(super) enum Contender {
 }
 
 /// The paper's algorithm as printed: distances (eq. 1), the increment halved until the error decreases.
-pub(super) const PUBLISHED: Contender = Contender::Published(Residual::Distance, StepRule::Halving);
+pub(super) const PUBLISHED: Solver = Solver::Published(Residual::Distance, StepRule::Halving);
 /// Newton–Raphson on the equations as printed.
-pub(super) const NEWTON: Contender = Contender::Newton(Residual::Distance);
+pub(super) const NEWTON: Solver = Solver::Newton(Residual::Distance);
 
 /// All of them; where only three are compared, they are [`PUBLISHED`], [`NEWTON`] and the controller's.
-pub(super) const CONTENDERS: [Contender; 9] = [
+pub(super) const SOLVERS: [Solver; 9] = [
     PUBLISHED,
-    Contender::Published(Residual::Distance, StepRule::CautiousHalving),
-    Contender::Published(Residual::Distance, StepRule::QuadraticBacktracking),
-    Contender::Published(Residual::SquaredDistance, StepRule::Halving),
-    Contender::Published(Residual::SquaredDistance, StepRule::CautiousHalving),
-    Contender::Published(Residual::SquaredDistance, StepRule::QuadraticBacktracking),
+    Solver::Published(Residual::Distance, StepRule::CautiousHalving),
+    Solver::Published(Residual::Distance, StepRule::QuadraticBacktracking),
+    Solver::Published(Residual::SquaredDistance, StepRule::Halving),
+    Solver::Published(Residual::SquaredDistance, StepRule::CautiousHalving),
+    Solver::Published(Residual::SquaredDistance, StepRule::QuadraticBacktracking),
     NEWTON,
-    Contender::Newton(Residual::SquaredDistance),
-    Contender::Controller,
+    Solver::Newton(Residual::SquaredDistance),
+    Solver::Controller,
 ];
 /// The three that the figures show.
-pub(super) const SHOWN: [Contender; 3] = [PUBLISHED, NEWTON, Contender::Controller];
+pub(super) const COMPARED: [Solver; 3] = [PUBLISHED, NEWTON, Solver::Controller];
 
 /// What came of one guess.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -48,7 +48,7 @@ pub(super) struct Attempt {
     pub evaluations: u32,
 }
 
-impl Contender {
+impl Solver {
     /// What people call it.
     pub(super) fn name(self) -> String {
         let residual = |residual| match residual {
@@ -69,7 +69,7 @@ impl Contender {
         }
     }
 
-    /// The name in a legend, where only [`SHOWN`] stand.
+    /// The name in a legend, where only [`COMPARED`] stand.
     pub(super) fn short_name(self) -> &'static str {
         match self {
             Self::Published(..) => "published",

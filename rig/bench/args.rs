@@ -1,0 +1,51 @@
+//! The arguments of `bench`.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+use masseter_terminal::Format;
+
+/// The benches.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Kind {
+    /// Wake-ups of the real-time loop, against cyclictest or a plain sleep loop
+    Loop,
+    /// Command and reading between two processes, against bare iceoryx2, a cache line, a socket, a pipe
+    Ipc,
+    /// Forward kinematics, warm and cold, against Newton's iteration
+    Fk,
+    /// The whole rig at 1 to 20 kHz without bus delays
+    Rate,
+}
+
+impl Kind {
+    /// The name on the command line.
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Self::Loop => "loop",
+            Self::Ipc => "ipc",
+            Self::Fk => "fk",
+            Self::Rate => "rate",
+        }
+    }
+}
+
+/// The arguments.
+#[derive(Debug, Clone, Args)]
+pub struct BenchArgs {
+    /// What to measure
+    #[arg(required = true, value_enum)]
+    pub(super) kinds: Vec<Kind>,
+    /// Rounds in which the candidates take turns
+    #[arg(long, default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    pub(super) rounds: u32,
+    /// Cores of the two sides
+    #[arg(long, value_name = "N,N", value_parser = crate::arguments::parse_cores, default_value = "0,1")]
+    pub(super) cores: [usize; 2],
+    /// Writes results, HdrHistogram logs and charts there
+    #[arg(long, value_name = "DIR")]
+    pub(super) out: Option<PathBuf>,
+    /// How the result is written to standard output
+    #[arg(long, value_enum, default_value_t)]
+    pub(super) format: Format,
+}

@@ -1,0 +1,147 @@
+//! A comparison: candidates take turns, and the machine is observed between them.
+//!
+//! Statistics of the rounds are computed by [`candidate`](super::candidate).
+
+use std::path::Path;
+
+use serde::Serialize;
+
+use super::candidate::{Candidate, Ratio, Round};
+use super::disturbance::{Disturbance, Stillness};
+
+/// Measures one round of a candidate.
+pub(super) type Turn<'a> = Box<dyn FnMut() -> anyhow::Result<Round> + 'a>;
+
+/// The results of a bench.
+#[derive(Debug, Serialize)]
+pub(super) struct Comparison {
+    pub(super) bench: &'static str,
+    /// What the durations measure.
+    pub(super) measures: String,
+    pub(super) candidates: Vec<Candidate>,
+    pub(super) ratios: Vec<Ratio>,
+    pub(super) notes: Vec<String>,
+    #[serde(flatten)]
+    pub(super) disturbance: Disturbance,
+}
+
+/// Measures all rounds of so many candidates and observes the machine on the cores in use. Each round begins with another
+/// candidate. Returns the results of each candidate.
+pub(super) fn take_turns<T>(
+    rounds: u32,
+    candidates: usize,
+    cores: &[usize],
+    mut measure: impl FnMut(usize) -> anyhow::Result<T>,
+) -> anyhow::Result<(Vec<Vec<T>>, Disturbance)> {
+    let mut results: Vec<Vec<T>> = (0..candidates).map(|_| Vec::new()).collect();
+    let mut stillness = Stillness::begin(cores);
+    for round in 0..rounds as usize {
+        for turn in 0..candidates {
+            let index = (round + turn) % candidates;
+            stillness.observe();
+            results[index].push(measure(index)?);
+        }
+    }
+    Ok((results, stillness.end()))
+}
+
+impl Comparison {
+    /// Measures candidates that take turns.
+    pub(super) fn by_turns(
+        bench: &'static str,
+        measures: String,
+        rounds: u32,
+        cores: &[usize],
+        mut turns: Vec<(String, Turn)>,
+    ) -> anyhow::Result<Self> {
+        let (results, disturbance) = take_turns(rounds, turns.len(), cores, |index| turns[index].1())?;
+        let names = turns.into_iter().map(|(name, _)| name);
+        let candidates = names
+            .zip(results)
+            .map(|(name, rounds)| Candidate::from_rounds(name, rounds.into_iter().map(Some).collect()))
+            .collect();
+        Ok(Self { bench, measures, candidates, ratios: Vec::new(), notes: Vec::new(), disturbance })
+    }
+
+    /// Compares the first candidate of each pair with the second.
+    ///
+    /// # Panics
+    /// When no candidate has one of the names.
+    #[must_use]
+    pub(super) fn comparing<Name: AsRef<str>>(
+        mut self,
+        pairs: impl IntoIterator<Item = (Name, Name)>,
+    ) -> Self {
+        let ratio =
+            |(of, to): (Name, Name)| self.candidate(of.as_ref()).ratio_to(self.candidate(to.as_ref()));
+        self.ratios = pairs.into_iter().map(ratio).collect();
+        self
+    }
+
+    /// The candidate of this name.
+    ///
+    /// # Panics
+    /// When there is none.
+    pub(super) fn candidate(&self, name: &str) -> &Candidate {
+        let found = self.candidates.iter().find(|candidate| candidate.name == name);
+        found.unwrap_or_else(|| panic!("no candidate is called {name}"))
+    }
+
+    #[must_use]
+    pub(super) fn with_note(mut self, note: impl Into<String>) -> Self {
+        self.notes.push(note.into());
+        self
+    }
+
+    /// HdrHistogram V2 interval logs, one line per round.
+    pub(super) fn write_logs(&self, folder: &Path) -> std::io::Result<()> {
+        self.candidates.iter().try_for_each(|candidate| candidate.write_log(self.bench, folder))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::candidate::{Spread, no_durations};
+    use super::*;
+
+    fn round(value_ns: u64) -> Round {
+        let mut round = no_durations();
+        round.record(value_ns).unwrap();
+        round.into()
+    }
+
+    #[test]
+    fn contenders_take_turns_and_are_compared_within_a_round() {
+        let order = std::cell::RefCell::new(Vec::new());
+        // The machine gets slower from round to round; the ratio stays.
+        let turn = |name: &'static str, ns: u64| {
+            let (order, mut pace) = (&order, 0);
+            let turn: Turn = Box::new(move || {
+                order.borrow_mut().push(name);
+                pace += 1;
+                Ok(round(ns * pace))
+            });
+            (name.to_owned(), turn)
+        };
+        let turns = vec![turn("a", 100), turn("b", 400)];
+        let comparison =
+            Comparison::by_turns("x", String::new(), 3, &[0], turns).unwrap().comparing([("a", "b")]);
+        assert_eq!(*order.borrow(), ["a", "b", "b", "a", "a", "b"]);
+        let [p50, p99] = &comparison.ratios[0].percentiles[..] else { panic!("{:?}", comparison.ratios) };
+        assert_eq!(p50.spread, Spread { median: 0.25, min: 0.25, max: 0.25 });
+        assert_eq!(p99.name, "p99");
+        assert_eq!(
+            comparison.candidates[0].percentiles[0].spread,
+            Spread { median: 200.0, min: 100.0, max: 300.0 }
+        );
+    }
+
+    #[test]
+    #[should_panic(expected = "no candidate is called c")]
+    fn a_contender_that_is_none_cannot_be_compared() {
+        let turn: Turn = Box::new(|| Ok(round(1)));
+        let comparison =
+            Comparison::by_turns("x", String::new(), 1, &[0], vec![("a".to_owned(), turn)]).unwrap();
+        let _ = comparison.comparing([("a", "c")]);
+    }
+}

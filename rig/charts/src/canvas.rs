@@ -1,0 +1,207 @@
+//! What charts are made of: axes, bars, cells, marks, legends and text.
+
+use plotters::coord::Shift;
+use plotters::prelude::*;
+use plotters::style::text_anchor::{HPos, Pos, VPos};
+
+use crate::axis::Axis;
+
+/// Pixels of labels and legends.
+pub const TEXT: u32 = 13;
+/// Pixels of titles.
+pub const TITLE: u32 = 16;
+/// Room for labels below and left of a plot, px; names of places need more than numbers.
+const LABELS: [u32; 3] = [42, 64, 90];
+const MARGIN: u32 = 10;
+const MESH: RGBColor = RGBColor(0xe4, 0xe4, 0xe4);
+/// From one row of a legend to the next, px.
+pub(crate) const ROW: u32 = 20;
+/// Length of a dash and of the gap after it, px.
+pub(crate) const DASH: [u32; 2] = [6, 4];
+
+/// Why a drawing failed.
+pub type Error = plotters::drawing::DrawingAreaErrorKind<std::io::Error>;
+/// A part of a drawing.
+pub type Area<'svg> = DrawingArea<SVGBackend<'svg>, Shift>;
+/// A pair of axes to draw into.
+pub type Chart<'a, 'svg> = ChartContext<'a, SVGBackend<'svg>, Cartesian2d<Axis, Axis>>;
+
+/// A bar from the bottom of a chart up to `height`.
+#[derive(Debug, Clone)]
+pub struct Bar {
+    /// Its left and its right side.
+    pub sides: [f64; 2],
+    /// In values of the y axis.
+    pub height: f64,
+    /// Of its face.
+    pub colour: RGBColor,
+    /// Lines of text above it.
+    pub text: Vec<String>,
+}
+
+/// What stands before a name in a legend.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Key {
+    /// A stroke.
+    Line,
+    /// A dashed stroke.
+    Dashes,
+    /// A filled box.
+    Box,
+}
+
+/// A name in a legend.
+#[derive(Debug, Clone)]
+pub struct LegendEntry {
+    /// The name.
+    pub name: String,
+    /// Of its key.
+    pub colour: RGBColor,
+    /// What stands before the name.
+    pub key: Key,
+}
+
+/// A drawing of so many pixels on white.
+///
+/// # Errors
+/// When `draw` fails.
+pub fn svg(size: (u32, u32), draw: impl FnOnce(&Area) -> Result<(), Error>) -> Result<String, Error> {
+    let mut svg = String::new();
+    {
+        let area = SVGBackend::with_string(&mut svg, size).into_drawing_area();
+        area.fill(&WHITE)?;
+        draw(&area)?;
+        area.present()?;
+    }
+    Ok(svg)
+}
+
+/// Axes over a whole area, with their ticks; a title where it is not empty.
+///
+/// # Errors
+/// When the area cannot be drawn on.
+pub fn chart<'a, 'svg>(
+    area: &'a Area<'svg>,
+    title: &str,
+    x: Axis,
+    y: Axis,
+) -> Result<Chart<'a, 'svg>, Error> {
+    let labels = [x.label.clone(), y.label.clone()];
+    let [below, numbers, names] = LABELS;
+    let mut builder = ChartBuilder::on(area);
+    builder.margin(MARGIN).margin_right(2 * MARGIN).x_label_area_size(below);
+    builder.y_label_area_size(if y.has_names() { names } else { numbers });
+    if !title.is_empty() {
+        builder.caption(title, ("sans-serif", TITLE));
+    }
+    let mut chart = builder.build_cartesian_2d(x, y)?;
+    chart
+        .configure_mesh()
+        .bold_line_style(MESH)
+        .label_style(("sans-serif", TEXT - 1))
+        .axis_desc_style(("sans-serif", TEXT))
+        .x_desc(&labels[0])
+        .y_desc(&labels[1])
+        .draw()?;
+    Ok(chart)
+}
+
+/// Dots.
+///
+/// # Errors
+/// When the chart cannot be drawn on.
+pub fn marks(
+    chart: &mut Chart<'_, '_>,
+    points: impl IntoIterator<Item = (f64, f64)>,
+    radius: u32,
+    colour: impl Into<ShapeStyle>,
+) -> Result<(), Error> {
+    let style = colour.into().filled();
+    chart.draw_series(points.into_iter().map(|point| Circle::new(point, radius, style)))?;
+    Ok(())
+}
+
+/// Bars with their text.
+///
+/// # Errors
+/// When the chart cannot be drawn on.
+pub fn bars(chart: &mut Chart<'_, '_>, bars: &[Bar]) -> Result<(), Error> {
+    let bottom = chart.y_range().start;
+    for Bar { sides: [left, right], height, colour, text } in bars {
+        chart.draw_series([Rectangle::new([(*left, bottom), (*right, *height)], colour.filled())])?;
+        for (line, text) in text.iter().rev().enumerate() {
+            let lift = -((TEXT + 3) as i32) * (line as i32 + 1);
+            let text = Text::new(text.clone(), (0, lift), ("sans-serif", TEXT));
+            chart.draw_series([EmptyElement::at((*left, *height)) + text])?;
+        }
+    }
+    Ok(())
+}
+
+/// Fills a square grid over the whole chart, row by row from the lower left; `colour` gives that of each cell, or none.
+///
+/// # Errors
+/// When the chart cannot be drawn on.
+pub fn cells(
+    chart: &mut Chart<'_, '_>,
+    side: usize,
+    colour: impl Fn(usize) -> Option<RGBColor>,
+) -> Result<(), Error> {
+    let (across, up) = (chart.x_range(), chart.y_range());
+    let x = |column: usize| across.start + (across.end - across.start) * column as f64 / side as f64;
+    let y = |row: usize| up.start + (up.end - up.start) * row as f64 / side as f64;
+    for row in 0..side {
+        let colours: Vec<_> = (0..side).map(|column| colour(row * side + column)).collect();
+        let mut from = 0;
+        // One rectangle for neighbours of one colour.
+        for run in colours.chunk_by(|a, b| a == b) {
+            let to = from + run.len();
+            if let Some(colour) = run[0] {
+                chart.draw_series([Rectangle::new(
+                    [(x(from), y(row)), (x(to), y(row + 1))],
+                    colour.filled(),
+                )])?;
+            }
+            from = to;
+        }
+    }
+    Ok(())
+}
+
+/// Keys with names, in rows of so many columns.
+///
+/// # Errors
+/// When the area cannot be drawn on.
+pub fn legend(area: &Area, entries: &[LegendEntry], columns: usize) -> Result<(), Error> {
+    let (width, _) = area.dim_in_pixel();
+    let column = width as i32 / columns as i32;
+    for (index, LegendEntry { name, colour, key }) in entries.iter().enumerate() {
+        let x = MARGIN as i32 + column * (index % columns) as i32;
+        let y = (MARGIN / 2 + ROW / 2) as i32 + ROW as i32 * (index / columns) as i32;
+        let [dash, gap] = DASH.map(u32::cast_signed);
+        match key {
+            Key::Box => {
+                let corners = [(x, y - 6), (x + 16, y + 6)];
+                area.draw(&Rectangle::new(corners, colour.filled()))?;
+                area.draw(&Rectangle::new(corners, BLACK))?;
+            }
+            Key::Line => area.draw(&PathElement::new([(x, y), (x + 3 * dash, y)], colour.stroke_width(2)))?,
+            Key::Dashes => {
+                for from in [x, x + dash + gap] {
+                    area.draw(&PathElement::new([(from, y), (from + dash, y)], colour.stroke_width(2)))?;
+                }
+            }
+        }
+        write(area, name, (x + 24, y), TEXT)?;
+    }
+    Ok(())
+}
+
+/// Text of so many pixels, anchored at its left and middle.
+///
+/// # Errors
+/// When the area cannot be drawn on.
+pub fn write(area: &Area, text: &str, at: (i32, i32), size: u32) -> Result<(), Error> {
+    let style = ("sans-serif", size).into_text_style(area).pos(Pos::new(HPos::Left, VPos::Center));
+    area.draw_text(text, &style, at)
+}

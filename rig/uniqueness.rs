@@ -1,0 +1,198 @@
+//! `masseter uniqueness`: whether the six inputs determine one pose. `prove` and `search` print the results of
+//! [`masseter_study::uniqueness`] and write them as CSV.
+//!
+//! Both are about the published mechanism; a proof around a motion is about its scenario's mechanism.
+
+use std::fs::File;
+use std::io::{self, BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+use anyhow::Context;
+use clap::{Args, Subcommand, ValueEnum};
+use masseter_controller::kinematics::uniqueness::InputBox;
+use masseter_plan::Plan;
+use masseter_shared::geometry::{AXIS_NAMES, Mechanism, MechanismConfig};
+use masseter_study::uniqueness::{Ambiguous, boxes, prove, search};
+use masseter_terminal::{Exit, new_file, result_line, status};
+
+/// The verbs of `uniqueness`.
+#[derive(Debug, Clone, Subcommand)]
+pub(crate) enum UniquenessVerb {
+    /// Prove by interval arithmetic that no input of a region has two solutions that meet the paper's conditions
+    Prove(ProveArgs),
+    /// Look for inputs with two solutions that meet the paper's conditions, at random and then uphill
+    Search(SearchArgs),
+}
+
+/// The arguments of `prove`.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct ProveArgs {
+    /// Which inputs
+    #[arg(long, value_enum, default_value_t)]
+    region: Region,
+    /// Instead of a region: all inputs within this distance, in each axis, of the inputs of a motion
+    #[arg(long, value_name = "MM", conflicts_with = "region", value_parser = parse_distance)]
+    around_mm: Option<f64>,
+    /// Scenario with the motion [default: ten seconds of chewing]
+    #[arg(long, value_name = "FILE.toml", requires = "around_mm")]
+    scenario: Option<PathBuf>,
+    /// Recorded jaw motion (CSV) instead of the scenario's motion
+    #[arg(long, value_name = "FILE.csv", requires = "around_mm")]
+    trajectory: Option<PathBuf>,
+    /// Boxes to examine at most
+    #[arg(long, value_name = "N", default_value_t = 100_000)]
+    boxes: usize,
+    /// Count only solutions whose determinant is at least this [default: the paper's conditions alone]
+    #[arg(long, value_name = "DETERMINANT", value_parser = parse_margin)]
+    margin: Option<f64>,
+    /// CSV file for the boxes that stay undecided; must not exist
+    #[arg(long, value_name = "FILE.csv")]
+    out: Option<PathBuf>,
+}
+
+/// The arguments of `search`.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct SearchArgs {
+    /// Which inputs
+    #[arg(long, value_enum, default_value = "box")]
+    region: Region,
+    /// Random inputs
+    #[arg(long, value_name = "N", default_value_t = 400_000)]
+    inputs: usize,
+    /// Seed of the random numbers
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// CSV file for the inputs found; must not exist
+    #[arg(long, value_name = "FILE.csv")]
+    out: Option<PathBuf>,
+}
+
+/// Boxes of inputs.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
+enum Region {
+    /// Slides within ±5 mm, legs from 260 to 280 mm
+    #[default]
+    Neutral,
+    /// Slides within ±13 mm, legs from 243.6 to 300 mm: contains every jaw motion
+    Jaw,
+    /// The whole strokes
+    Box,
+}
+
+/// Proves or searches. Exits with 1 where uniqueness is not proven, or an input with two solutions was found.
+pub(crate) fn uniqueness(verb: &UniquenessVerb) -> anyhow::Result<Exit> {
+    let is_unique = match verb {
+        UniquenessVerb::Prove(args) => {
+            let (mechanism, inputs) = inputs_to_prove(args)?;
+            with_output(args.out.as_deref(), || prove_and_print(args, &mechanism, inputs))?
+        }
+        UniquenessVerb::Search(args) => with_output(args.out.as_deref(), || search_and_print(args))?,
+    };
+    Ok(if is_unique { Exit::Passed } else { Exit::Failed })
+}
+
+/// Whether all boxes are proven, and the undecided ones as CSV.
+fn prove_and_print(
+    args: &ProveArgs,
+    mechanism: &Mechanism,
+    inputs: Vec<InputBox>,
+) -> anyhow::Result<(bool, Vec<String>)> {
+    let proven = prove(mechanism, inputs, args.margin, args.boxes, |examined, decided| {
+        status!("{examined} boxes examined, {:.2} % of the volume decided", 100.0 * decided);
+    });
+    result_line!("boxes examined       {}", proven.examined)?;
+    result_line!("no solution          {:.4} % of the volume", 100.0 * proven.unsolvable_share)?;
+    result_line!("at most one solution {:.4} % of the volume", 100.0 * proven.unique_share)?;
+    result_line!("undecided            {} boxes", proven.undecided.len())?;
+    let header = AXIS_NAMES.map(|axis| format!("{axis}_low_m,{axis}_high_m")).join(",");
+    let row =
+        |inputs: &InputBox| inputs.axes().map(|axis| format!("{},{}", axis.low(), axis.high())).join(",");
+    let rows = std::iter::once(header).chain(proven.undecided.iter().map(row)).collect();
+    Ok((proven.undecided.is_empty(), rows))
+}
+
+/// Whether no input with two solutions of positive determinants was found, and the best inputs found as CSV.
+fn search_and_print(args: &SearchArgs) -> anyhow::Result<(bool, Vec<String>)> {
+    let mechanism = Mechanism::new(&MechanismConfig::default())?;
+    let found = search(&mechanism, &args.region.inputs(&mechanism), args.inputs, args.seed);
+    result_line!("random inputs                                     {}", args.inputs)?;
+    result_line!("with a solution that meets the paper's conditions {}", found.with_one)?;
+    result_line!("with two of them                                  {}", found.with_two)?;
+    result_line!("with two whose determinants are positive          {}", found.both_positive)?;
+    if let Some(Ambiguous { lesser, axes_m }) = found.climbed.first() {
+        result_line!("greatest lesser determinant, after climbing       {lesser:.4} at {axes_m:?}")?;
+    }
+    let header = AXIS_NAMES.map(|axis| format!("{axis}_m")).join(",") + ",lesser_determinant";
+    let row =
+        |one: &Ambiguous| one.axes_m.map(|value| value.to_string()).join(",") + &format!(",{}", one.lesser);
+    let is_unique = found.climbed.iter().all(|one| one.lesser <= 0.0);
+    Ok((is_unique, std::iter::once(header).chain(found.climbed.iter().map(row)).collect()))
+}
+
+/// Does the work and writes its rows to a new file, if one is named. Returns the work's answer.
+fn with_output(
+    out: Option<&Path>,
+    work: impl FnOnce() -> anyhow::Result<(bool, Vec<String>)>,
+) -> anyhow::Result<bool> {
+    let file = out.map(new_file).transpose()?;
+    let (is_unique, rows) = work()?;
+    if let (Some(path), Some(file)) = (out, file) {
+        write_rows(file, &rows).with_context(|| format!("cannot write {}", path.display()))?;
+    }
+    Ok(is_unique)
+}
+
+/// The mechanism and the boxes of the proof.
+fn inputs_to_prove(args: &ProveArgs) -> anyhow::Result<(Mechanism, Vec<InputBox>)> {
+    let Some(around_mm) = args.around_mm else {
+        let mechanism = Mechanism::new(&MechanismConfig::default())?;
+        let inputs = args.region.inputs(&mechanism);
+        return Ok((mechanism, vec![inputs]));
+    };
+    let plan = Plan::of(masseter_plan::changed(args.scenario.as_deref(), |scenario| {
+        if let Some(path) = &args.trajectory {
+            masseter_plan::play(path, scenario);
+        }
+        Ok(())
+    })?)?;
+    let inputs = boxes(&plan, around_mm * 1e-3)?;
+    result_line!("{}: {} boxes around its inputs", plan.scenario.name, inputs.len())?;
+    Ok((plan.mechanism, inputs))
+}
+
+fn parse_distance(text: &str) -> Result<f64, String> {
+    let distance_mm: f64 = text.parse().map_err(|_| format!("{text} is no number"))?;
+    if distance_mm > 0.0 && distance_mm < 100.0 {
+        Ok(distance_mm)
+    } else {
+        Err("use a distance above 0 and below 100 mm".to_owned())
+    }
+}
+
+/// Above every determinant, or beside them as no number, there is nothing to count, and anything is proven.
+fn parse_margin(text: &str) -> Result<f64, String> {
+    let margin: f64 = text.parse().map_err(|_| format!("{text} is no number"))?;
+    if margin.is_finite() && margin >= 0.0 {
+        Ok(margin)
+    } else {
+        Err("use a finite determinant, 0 or above".to_owned())
+    }
+}
+
+fn write_rows(file: File, rows: &[String]) -> io::Result<()> {
+    let mut file = BufWriter::new(file);
+    for row in rows {
+        writeln!(file, "{row}")?;
+    }
+    file.flush()
+}
+
+impl Region {
+    fn inputs(self, mechanism: &Mechanism) -> InputBox {
+        match self {
+            Self::Neutral => InputBox::uniform([-0.005, 0.005], [0.26, 0.28]),
+            Self::Jaw => InputBox::uniform([-0.013, 0.013], [0.2436, 0.30]),
+            Self::Box => InputBox::uniform(mechanism.strokes().slide_m, mechanism.strokes().leg_m),
+        }
+    }
+}
