@@ -49,8 +49,7 @@ impl CanId {
         Ok(Self { arbitration: base << (EXTENSION_BITS + 1) | IDE | id & EXTENSION_MASK })
     }
 
-    /// From the form in which `SocketCAN` and [`FrameTap`](crate::messages::FrameTap) keep it: bit 31 set
-    /// for a 29-bit identifier.
+    /// From the form of `SocketCAN`: bit 31 is set for a 29-bit identifier.
     ///
     /// # Errors
     /// [`FrameError`] where the number is too large; also the flags of remote and error frames
