@@ -94,9 +94,10 @@ impl HoldPosition {
         };
         let is_over = self.stop_requested || self.cycles_in_state >= self.hold_cycles;
         match self.state {
-            ControllerState::WaitReadings if self.stop_requested => Some(Trigger::StopRequested),
+            ControllerState::WaitReadings | ControllerState::Enabling if self.stop_requested => {
+                Some(Trigger::StopRequested)
+            }
             ControllerState::WaitReadings => self.solution.map(|_| Trigger::Steady),
-            ControllerState::Enabling if self.stop_requested => Some(Trigger::StopRequested),
             ControllerState::Enabling => {
                 all(|state| state == DriveState::OperationEnabled).then_some(Trigger::Enabled)
             }
@@ -245,7 +246,7 @@ mod tests {
             // Encoder noise moves no target.
             bench.reading.position_m[3] = found[3] + 1e-6;
             if bench.command.request == DriveRequest::Enable.code() {
-                assert_eq!(bench.command.target_m, found);
+                assert_eq!(bench.command.target_m.map(f64::to_bits), found.map(f64::to_bits));
             }
             running += u32::from(bench.controller.state == ControllerState::Running);
         }
