@@ -175,8 +175,8 @@ fn what_is_wanted_at_a_sample_is_found_there() {
     for _ in 0..1000 {
         bench.cycle(Some);
         bench.controller.fill_state(&mut state);
-        let wanted = nalgebra::Vector3::from(state.desired_position_m);
-        worst_m = worst_m.max((wanted - nalgebra::Vector3::from(state.estimated_position_m)).norm());
+        let desired = nalgebra::Vector3::from(state.desired_position_m);
+        worst_m = worst_m.max((desired - nalgebra::Vector3::from(state.estimated_position_m)).norm());
     }
     // The plant is exact, so what is left is the trim's own doing.
     assert!(worst_m < 2e-5, "{worst_m}");

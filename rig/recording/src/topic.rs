@@ -68,13 +68,13 @@ impl Topic {
     /// The message with this body, if one can have it.
     pub(super) fn read(self, body: &[u8]) -> Option<Recorded> {
         Some(match self {
-            Self::Command => Recorded::Command(Command::of_body(body)?),
-            Self::Reading => Recorded::Reading(Reading::of_body(body)?),
-            Self::State => Recorded::State(State::of_body(body)?),
-            Self::Truth => Recorded::Truth(Truth::of_body(body)?),
-            Self::Frame => Recorded::Frame(FrameTap::of_body(body)?),
-            Self::Event => Recorded::Event(Event::of_body(body)?),
-            Self::Machine => Recorded::Machine(Machine::of_body(body)?),
+            Self::Command => Recorded::Command(Command::from_body(body)?),
+            Self::Reading => Recorded::Reading(Reading::from_body(body)?),
+            Self::State => Recorded::State(State::from_body(body)?),
+            Self::Truth => Recorded::Truth(Truth::from_body(body)?),
+            Self::Frame => Recorded::Frame(FrameTap::from_body(body)?),
+            Self::Event => Recorded::Event(Event::from_body(body)?),
+            Self::Machine => Recorded::Machine(Machine::from_body(body)?),
         })
     }
 }

@@ -4,11 +4,11 @@ use serde::de::Error;
 use serde::{Deserialize, Deserializer, Serialize};
 use toml::Table;
 
-use super::ScenarioError;
+use super::error::ScenarioError;
 use super::need::{require_positive, require_within};
 use crate::geometry::LEGS;
 
-/// More is no encoder's, m.
+/// Most noise of an encoder, m.
 const NOISIEST_M: f64 = 1e-3;
 
 /// A servo drive with its encoder. Scales and limits hold for real ones too, gains and noise for emulated ones.
@@ -41,13 +41,13 @@ pub struct DriveConfig {
 }
 
 impl DriveConfig {
-    /// The encoder's increments nearest to so many metres; also of m/s and m/s².
+    /// The increments of the encoder nearest to a length in m; also for m/s and m/s².
     pub fn increments(&self, metres: f64) -> f64 {
         (metres / self.encoder_resolution_m).round()
     }
 }
 
-/// The drives of slides and of legs; what a table does not give stays as it is by default.
+/// The drives of slides and of legs; a key that a table does not have keeps its default.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct DrivesConfig {

@@ -74,7 +74,7 @@ macro_rules! codes {
 }
 
 codes! {
-    /// Where the controller stands in its sequence.
+    /// State of the controller's sequence.
     ControllerState {
         /// No steady readings yet; drives off.
         WaitReadings = 0 "wait_readings",
@@ -94,7 +94,7 @@ codes! {
         SafeStop = 7 "safe_stop",
     }
 
-    /// How far the CAN master is with a node.
+    /// Progress of the CAN master with the boot of a node.
     BootPhase {
         /// Waiting for its boot-up message.
         Waiting = 0 "waiting",
@@ -120,7 +120,7 @@ codes! {
         Controller = 1 "controller",
         /// The plant: CAN master.
         Master = 2 "master",
-        /// The plant: what a drive told its master.
+        /// The plant: a message of a drive to the master.
         Drive = 3 "drive",
         /// A simulated wire, or the faults of a real one.
         Wire = 5 "wire",
@@ -132,11 +132,11 @@ codes! {
         Transition = 0 "transition",
         /// Something is wrong; `cause`, `value` and `limit` explain it.
         Fault = 1 "fault",
-        /// Something is worth knowing and was not reacted to.
+        /// An observation without a reaction.
         Notice = 2 "notice",
     }
 
-    /// Why kinematics gave nothing, as an event of the controller tells it in its `object`.
+    /// Why kinematics gave no pose, in the `object` of an event of the controller.
     NoPose {
         /// A coordinate is no finite number.
         NotFinite = 1 "not_finite",
@@ -154,7 +154,7 @@ codes! {
         NotFound = 7 "not_found",
     }
 
-    /// Why something happened. The unit of an event's `value` and `limit` stands in brackets.
+    /// Cause of an event. The unit of the event's `value` and `limit` is given in brackets.
     Cause {
         /// In the course of the sequence.
         Sequence = 0 "sequence",

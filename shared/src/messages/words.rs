@@ -1,12 +1,11 @@
-//! Events in words: what is wrong, where, and what to do.
+//! Sentences for events: place, fault and remedy.
 
 use super::Event;
 use super::codes::{Cause, EventKind, NoPose, Source};
 use crate::geometry::AXIS_NAMES;
 use masseter_can::canopen::{AbortCode, EmergencyCode, ObjectAddress};
 
-/// The sentence for an event that names a node, a bus, an object, or why there is no pose; `None` where the figures
-/// alone say what there is to say.
+/// The sentence for an event that names a node, a bus, an object, or why there is no pose; `None` for other events.
 pub fn explain(event: &Event) -> Option<String> {
     let cause = Cause::try_from(event.cause).ok().filter(|_| event.kind != EventKind::Transition.code())?;
     let what = complaint(cause, event)?;

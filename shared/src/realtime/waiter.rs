@@ -11,7 +11,7 @@ const GAP_NS: u64 = 50_000;
 /// machines (`masseter doctor` measures it).
 const SHORTEST_SLEEP_NS: u64 = 50_000;
 
-/// Where a task's time went since its first wait, ns.
+/// The use of a task's time since its first wait, ns.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Account {
     /// Lost to the machine while waiting: late ends of sleeps, and gaps while spinning.

@@ -4,7 +4,7 @@ use std::fmt;
 
 use super::DriveState;
 
-/// The bits of the statusword that tell the state, and their value in each state.
+/// The bits of the statusword that encode the state, and their value in each state.
 const PATTERNS: [(u16, u16, DriveState); 8] = [
     (0x4F, 0x00, DriveState::NotReadyToSwitchOn),
     (0x4F, 0x40, DriveState::SwitchOnDisabled),
@@ -16,7 +16,7 @@ const PATTERNS: [(u16, u16, DriveState); 8] = [
     (0x4F, 0x08, DriveState::Fault),
 ];
 
-/// A bit of the statusword that does not tell the state.
+/// A bit of the statusword that is not part of the state.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u8)]
 pub enum StatusBit {
@@ -49,9 +49,9 @@ impl StatusBit {
 #[derive(Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Statusword(pub u16);
 
-/// A statusword whose bits tell no state.
+/// A statusword whose bits encode no state.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("statusword {bits:04X}h tells no state of CiA 402")]
+#[error("statusword {bits:04X}h encodes no state of CiA 402")]
 pub struct StatuswordError {
     /// The statusword.
     pub bits: u16,
@@ -59,7 +59,7 @@ pub struct StatuswordError {
 
 impl Statusword {
     /// The statusword of a state, all other bits 0.
-    pub fn of(state: DriveState) -> Self {
+    pub fn for_state(state: DriveState) -> Self {
         let mut patterns = PATTERNS.into_iter();
         let pattern = patterns.find(|pattern| pattern.2 == state);
         let (_, bits, _) = pattern.expect("every state has a pattern");
@@ -78,7 +78,7 @@ impl Statusword {
         self.0 >> bit as u8 & 1 == 1
     }
 
-    /// The state it tells.
+    /// The state of the drive.
     ///
     /// # Errors
     /// [`StatuswordError`] where the bits are those of no state.
@@ -110,10 +110,10 @@ mod tests {
     ];
 
     #[test]
-    fn every_statusword_tells_at_most_one_state() {
+    fn every_statusword_encodes_at_most_one_state() {
         for bits in 0..=u16::MAX {
             let matching: Vec<_> = PATTERNS.iter().filter(|pattern| bits & pattern.0 == pattern.1).collect();
-            assert!(matching.len() <= 1, "{bits:04X}h tells {matching:?}");
+            assert!(matching.len() <= 1, "{bits:04X}h matches {matching:?}");
             assert_eq!(Statusword(bits).state().ok(), matching.first().map(|pattern| pattern.2));
         }
     }
@@ -121,7 +121,7 @@ mod tests {
     #[test]
     fn a_state_survives_any_flags() {
         for state in DriveState::ALL {
-            let all = FLAGS.into_iter().fold(Statusword::of(state), |word, bit| word.with(bit, true));
+            let all = FLAGS.into_iter().fold(Statusword::for_state(state), |word, bit| word.with(bit, true));
             assert_eq!(all.state(), Ok(state));
             assert!(FLAGS.into_iter().all(|bit| all.has(bit) && !all.with(bit, false).has(bit)));
         }
@@ -130,7 +130,10 @@ mod tests {
     #[test]
     fn bits_of_no_state_are_refused() {
         assert_eq!(Statusword(0x0001).state(), Err(StatuswordError { bits: 0x0001 }));
-        assert_eq!(StatuswordError { bits: 0x61 }.to_string(), "statusword 0061h tells no state of CiA 402");
+        assert_eq!(
+            StatuswordError { bits: 0x61 }.to_string(),
+            "statusword 0061h encodes no state of CiA 402"
+        );
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! Which frames faults strike, and what is told of them.
+//! Which frames faults activation, and what is told of them.
 
 use super::*;
 
@@ -58,7 +58,7 @@ fn a_fault_chooses_and_is_told_of_by_its_number_whatever_else_befalls_the_bus() 
     assert_ne!(struck(vec![first]), struck(vec![second]));
 
     let mut faults = Faults::new(vec![second], 1);
-    faults.record(Strike { place: 0, at_ns: 1200 });
+    faults.record(FaultActivation { place: 0, at_ns: 1200 });
     assert_eq!(faults.next_note(1500).map(|note| note.fault), Some(8));
 }
 
@@ -66,12 +66,12 @@ fn a_fault_chooses_and_is_told_of_by_its_number_whatever_else_befalls_the_bus() 
 fn a_fault_tells_once_that_it_acts_and_once_that_it_is_over() {
     let mut faults = Faults::new(vec![Fault { count: 2, ..corrupt(1.0) }], 1);
     assert_eq!(faults.next_note(1500), None);
-    let strike = |at_ns| Strike { place: 0, at_ns };
-    faults.record(strike(1200));
+    let activation = |at_ns| FaultActivation { place: 0, at_ns };
+    faults.record(activation(1200));
     let note = FaultNote { time_ns: 1200, fault: 0, port: None, strikes: 0, has_ended: false };
     assert_eq!(faults.next_note(1500), Some(note));
     assert_eq!(faults.next_note(1500), None);
-    faults.record(strike(1300));
+    faults.record(activation(1300));
     let note = FaultNote { time_ns: 1500, strikes: 2, has_ended: true, ..note };
     assert_eq!(faults.next_note(1500), Some(note));
     assert_eq!(faults.next_note(3000), None);

@@ -1,8 +1,8 @@
 //! Fault confinement of one port: error counters, error states and the way back from bus-off
 //! (ISO 11898-1, 12.1.4; counting rules as in the Bosch specification 2.0, chapter 8).
 //!
-//! Not counted: the receiver's +8 for a dominant bit behind its own error flag, which would tell the
-//! node that disturbs from those it disturbs; a simulated receiver never disturbs by itself.
+//! Not counted: the receiver's +8 for a dominant bit behind its own error flag, which
+//! distinguishes the disturbing node from the others; a simulated receiver never disturbs by itself.
 
 use crate::bus::{BusStatus, ErrorState};
 
@@ -29,7 +29,7 @@ pub(super) struct Confinement {
 /// Off the bus.
 #[derive(Debug, Clone, Copy)]
 struct Off {
-    /// When the host restarts, or did restart, the controller; `None` until somebody says so.
+    /// When the host restarts, or did restart, the controller; `None` without a restart.
     restart_ns: Option<u64>,
     /// Recessive sequences still to be seen after that.
     sequences: u64,

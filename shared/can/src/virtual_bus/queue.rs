@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use super::WireConfig;
+use super::config::WireConfig;
 use crate::bus::{ReceiveError, Received, SendError};
 use crate::frame::Frame;
 use crate::tap::Tapped;
@@ -12,7 +12,7 @@ use crate::wire::{Rates, frame_bits};
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Queued {
     pub(super) frame: Frame,
-    /// Its duration on the wire, interframe space included, found once: arbitration asks for it again and again.
+    /// Its duration on the wire, interframe space included, computed once, since arbitration needs it many times.
     pub(super) duration_ns: u64,
     pub(super) since_ns: u64,
 }
@@ -22,7 +22,7 @@ impl Queued {
         Self { frame, duration_ns: rates.duration_ns(frame_bits(&frame)), since_ns }
     }
 
-    /// What a fault makes a node send; since when changes with each attempt.
+    /// A frame that a fault makes a node babble.
     pub(super) fn babbled(frame: Frame, config: &WireConfig) -> Self {
         Self::new(frame.promoted(config.format), config.rates, 0)
     }
@@ -63,14 +63,14 @@ impl TransmitQueue {
         self.frames.iter().find(|queued| queued.since_ns <= at_ns)
     }
 
-    /// Takes it out.
+    /// Removes that frame.
     pub(super) fn remove_most_urgent(&mut self, at_ns: u64) {
         if let Some(place) = self.frames.iter().position(|queued| queued.since_ns <= at_ns) {
             self.frames.remove(place);
         }
     }
 
-    /// Forgets everything; how many frames that were.
+    /// Discards all frames; returns their number.
     pub(super) fn clear(&mut self) -> u64 {
         let abandoned = self.frames.len() as u64;
         self.frames.clear();
@@ -78,7 +78,7 @@ impl TransmitQueue {
     }
 }
 
-/// Something with the time of its arrival.
+/// An item with an arrival time.
 pub(super) trait Timed {
     fn time_ns(&self) -> u64;
 }
@@ -95,7 +95,7 @@ impl Timed for Tapped {
     }
 }
 
-/// What has arrived and was not fetched yet, oldest first. What does not fit is lost and counted.
+/// Received items that are not fetched yet, oldest first. An item that does not fit is lost and counted.
 #[derive(Debug)]
 pub(super) struct ReceiveQueue<T> {
     arrived: VecDeque<T>,
@@ -110,7 +110,7 @@ impl<T: Timed> ReceiveQueue<T> {
 
     pub(super) fn push(&mut self, item: T) {
         if self.arrived.is_empty() {
-            // Begins at its front again: what wanders through all of it finds every place cold.
+            // An empty queue starts at its front again: entries of a long queue would not be in the cache.
             self.arrived.clear();
         }
         if self.arrived.len() == self.capacity {
@@ -120,7 +120,7 @@ impl<T: Timed> ReceiveQueue<T> {
         }
     }
 
-    /// The oldest, if it had arrived by then; losses are reported first, once.
+    /// The oldest item, if it had arrived by then. Losses are reported first, once.
     pub(super) fn pop(&mut self, now_ns: u64) -> Result<Option<T>, ReceiveError> {
         match std::mem::take(&mut self.lost) {
             0 if self.arrived.front().is_some_and(|oldest| oldest.time_ns() <= now_ns) => {

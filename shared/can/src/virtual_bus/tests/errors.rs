@@ -1,7 +1,9 @@
 //! Errors without injected faults: missing acknowledgement, one identifier sent twice, bus-off.
 
+use super::super::queue::Queued;
 use super::*;
 use crate::ErrorKind;
+use crate::bus::{BusStatus, ErrorState};
 
 fn with(change: impl FnOnce(&mut WireConfig)) -> VirtualWire {
     let mut config = CONFIG;
@@ -62,7 +64,7 @@ fn an_error_is_told_with_the_counter_behind_it_and_before_the_state_it_brings() 
 #[test]
 fn who_joins_a_lone_node_hears_it_at_once() {
     let mut wire = with(|config| config.ports = 2);
-    wire.stations[1].confinement.leave_bus(0, Some(5_000_000));
+    wire.nodes.stations[1].confinement.leave_bus(0, Some(5_000_000));
     wire.send(0, 0, sync::frame()).unwrap();
     wire.advance(100_000_000);
     assert_eq!(fetch(&mut wire, 1).len(), 1);
@@ -101,7 +103,7 @@ fn two_frames_of_one_identifier_destroy_each_other_until_their_senders_are_passi
 fn off_the_bus_nothing_is_sent_or_heard_until_it_is_restarted_and_has_waited() {
     let mut wire = wire();
     wire.send(0, 0, frame(0x700, &[])).unwrap();
-    wire.stations[0]
+    wire.nodes.stations[0]
         .transmit
         .push(Queued { frame: sync::frame(), duration_ns: 51_000, since_ns: 9_000_000 })
         .unwrap();

@@ -2,7 +2,8 @@
 
 use super::*;
 use crate::ErrorKind;
-use crate::faults::{Fault, FaultKind};
+use crate::bus::ErrorState;
+use crate::faults::{Fault, FaultKind, Faults};
 
 const ANY: Fault = Fault {
     number: 0,
