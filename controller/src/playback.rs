@@ -35,12 +35,12 @@ impl Playback {
         Self { trajectory, ease_s, stop_ramp_s, part, elapsed_s: 0.0, rate: 1.0, stopping: false }
     }
 
-    /// Stands at `pose`.
+    /// Holds `pose`.
     pub(crate) fn hold(&mut self, pose: Pose) {
         self.begin(Part::Hold(pose));
     }
 
-    /// Begins the move from where it stands to the first pose of the motion.
+    /// Begins the move from the present pose to the first pose of the motion.
     pub(crate) fn ease(&mut self) {
         self.begin(Part::Ease(self.pose_ahead(0.0)));
     }
@@ -99,7 +99,7 @@ impl Playback {
         self.is_over() || self.rate == 0.0
     }
 
-    /// How far the motion has come `ahead_s` from now, as [`Trajectory::motion_time_s`] tells; negative before it
+    /// How far the motion has come `ahead_s` from now, in the sense of [`Trajectory::motion_time_s`]; negative before it
     /// begins.
     pub(crate) fn motion_time_ahead_s(&self, ahead_s: f64) -> f64 {
         if self.part == Part::Motion {

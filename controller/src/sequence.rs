@@ -41,8 +41,8 @@ impl Trigger {
 
 use State::{Disabling, Easing, Enabling, Finished, Holding, Running, SafeStop, WaitReadings};
 
-/// One row a state in the order of the codes, one column a trigger; a state that stands in its own
-/// row stays.
+/// One row a state in the order of the codes, one column a trigger; a state in its own
+/// row does not change.
 #[rustfmt::skip]
 const TABLE: [[State; 8]; 8] = [
     // Steady      Enabled       Eased         Played        Rested        Released      StopRequested Fault

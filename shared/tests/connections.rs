@@ -21,7 +21,7 @@ fn assert_tells(told: &str, topic: &str) {
 }
 
 #[test]
-fn a_connection_that_is_refused_is_told_of() {
+fn a_refused_connection_is_reported() {
     let domain = ScratchDomain::claim("test-connections").unwrap();
     {
         let node = Node::join(&domain).unwrap();

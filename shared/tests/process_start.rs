@@ -1,9 +1,9 @@
-//! A process started by hand. Alone in its file: taking up a context listens for the whole process's signals.
+//! A process started by hand. Alone in its file, since `init` installs signal handlers for the whole process.
 
 use masseter_shared::lifecycle::{ProcessArguments, ProcessError};
 
 #[test]
-fn a_scenario_that_nobody_has_checked_yet_is() {
+fn a_process_checks_its_scenario() {
     let scenario = std::env::temp_dir().join(format!("masseter-standstill-{}.toml", std::process::id()));
     std::fs::write(&scenario, "rate_hz = 0").unwrap();
     let process_arguments = ProcessArguments { scenario: scenario.clone(), domain: "nowhere".to_owned() };

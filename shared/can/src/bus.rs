@@ -55,7 +55,7 @@ pub struct Received {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum SendError {
     /// The transmit queue is full (`ENOBUFS`).
-    #[error("transmit queue full ({capacity} frames): the bus is overloaded, or nobody acknowledges")]
+    #[error("transmit queue full ({capacity} frames): the bus is overloaded, or no node acknowledges")]
     QueueFull {
         /// Frames the queue holds.
         capacity: usize,

@@ -132,7 +132,7 @@ mod tests {
     }
 
     #[test]
-    fn what_does_not_fit_is_refused_with_its_value() {
+    fn an_identifier_that_is_too_large_is_refused_with_its_value() {
         assert_eq!(CanId::standard(0x800), Err(FrameError::StandardId { id: 0x800 }));
         assert_eq!(CanId::extended(0x2000_0000), Err(FrameError::ExtendedId { id: 0x2000_0000 }));
     }

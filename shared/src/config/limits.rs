@@ -64,7 +64,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn no_axis_may_be_asked_for_more_than_its_drive_can() {
+    fn targets_faster_than_a_drive_are_refused() {
         let (limits, mut drives) = (TrajectoryLimitsConfig::default(), DrivesConfig::default());
         assert_eq!(limits.within(&drives), limits);
         drives.leg.max_velocity_m_s = 0.1;

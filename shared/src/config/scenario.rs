@@ -184,7 +184,7 @@ mod tests {
     }
 
     #[test]
-    fn a_drive_keeps_by_default_what_its_table_does_not_give() {
+    fn a_key_missing_in_a_drives_table_keeps_its_default() {
         let default = Scenario::default().drives;
         let drives = parse("[drives.slide]\nfollowing_error_m = 1").unwrap().drives;
         assert_eq!(drives.slide, DriveConfig { following_error_m: 1.0, ..default.slide });
@@ -192,13 +192,13 @@ mod tests {
     }
 
     #[test]
-    fn what_is_written_back_reads_as_the_same() {
+    fn a_resolved_scenario_reads_as_the_same_scenario() {
         let scenario = parse("name = 'x'\nduration_s = 3.0\n[motion]\nkind = 'opening'").unwrap();
         assert_eq!(parse(&scenario.to_toml()).unwrap(), scenario);
     }
 
     #[test]
-    fn a_recording_whose_path_is_no_text_is_refused() {
+    fn a_recording_whose_path_is_not_utf_8_is_refused() {
         use std::os::unix::ffi::OsStrExt;
         let path = Path::new(std::ffi::OsStr::from_bytes(b"/jaw\xFF/m.csv"));
         let scenario = Scenario { motion: MotionConfig::File(FileConfig::new(path)), ..Scenario::default() };
@@ -214,7 +214,7 @@ mod tests {
     }
 
     #[test]
-    fn faults_are_refused_with_place_and_remedy() {
+    fn wrong_scenarios_are_refused_with_place_and_remedy() {
         let cases = [
             ("seed = 1\nrate_hzz = 5", "s.toml:2: unknown field `rate_hzz`"),
             ("seed = 1\nrate_hzz = 5", "did you mean `rate_hz`?"),

@@ -167,7 +167,7 @@ mod tests {
     }
 
     #[test]
-    fn an_axis_that_stood_outside_may_come_back_but_go_no_further() {
+    fn an_axis_outside_its_stroke_may_come_back_but_go_no_further() {
         let asked = |l1_m: f64| Actuators { slide_m: [0.0; LEGS], leg_m: [l1_m, 0.27, 0.27] };
         let moves = [(0.2395, 0.2396, 0.2396), (0.2395, 0.2394, 0.2395), (0.241, 0.2394, 0.24)];
         for (from_m, to_m, held_m) in moves {

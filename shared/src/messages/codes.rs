@@ -144,11 +144,11 @@ codes! {
         NoLength = 2 "no_length",
         /// No pose fits the positions.
         Unassemblable = 3 "unassemblable",
-        /// Only poses fit them in which the mechanism is folded over.
+        /// Only poses with a folded mechanism fit the positions.
         WrongAssembly = 4 "wrong_assembly",
-        /// Several poses fit them, and the last one does not settle which.
+        /// Several poses fit the positions, and the last pose does not decide between them.
         Ambiguous = 5 "ambiguous",
-        /// Poses fit them that cannot be told apart.
+        /// Several poses fit the positions, and rounding hides their difference.
         Undecided = 6 "undecided",
         /// The pose is singular, or an iteration came to none.
         NotFound = 7 "not_found",
@@ -170,7 +170,7 @@ codes! {
         StrokeLimit = 5 "stroke_limit",
         /// An axis asked to go faster than its drive may (m/s).
         VelocityLimit = 6 "velocity_limit",
-        /// The pose wanted has no joint coordinates.
+        /// The desired pose has no joint coordinates.
         InverseKinematics = 7 "inverse_kinematics",
         /// A reading answers a command that this controller never sent (cycle).
         ForeignCommand = 8 "foreign_command",
@@ -208,11 +208,11 @@ codes! {
         SdoTimeout = 29 "sdo_timeout",
         /// Two nodes have one id: they answer SDO requests or SYNCs more than once, again and again.
         DuplicateNode = 30 "duplicate_node",
-        /// A node booted although nobody asked it to.
+        /// A node booted without a request.
         NodeRestarted = 31 "node_restarted",
         /// A drive is in fault and a fault reset does not help (EMCY code, object 603F).
         FaultAtStart = 32 "fault_at_start",
-        /// A node left the NMT state operational by itself (NMT state that it told; the limit is operational's code).
+        /// A node left the NMT state operational by itself (reported NMT state; the limit is the code of operational).
         NodeStopped = 33 "node_stopped",
         /// A bus or a node works again after a fault.
         Recovered = 34 "recovered",
@@ -222,7 +222,7 @@ codes! {
         UnknownNode = 36 "unknown_node",
         /// Another node sends SYNC or has the master's id: its heartbeats would keep the drives going without this one.
         SecondMaster = 37 "second_master",
-        /// A drive has voltage although it was told to quick stop (statusword, object 6041).
+        /// A drive has voltage in spite of a quick stop (statusword, object 6041).
         StillPowered = 38 "still_powered",
         /// A drive counts its software limits from elsewhere than its positions (home offset, object 607C).
         HomeOffset = 39 "home_offset",

@@ -48,7 +48,7 @@ mod tests {
     }
 
     #[test]
-    fn a_body_is_what_is_used_and_makes_the_message_again() {
+    fn a_body_holds_the_used_bytes_and_restores_the_message() {
         for length in [0, 1, 8, 64] {
             let bytes = std::array::from_fn(|index| if index < length { 0xA5 } else { 0 });
             let frame = FrameTap { seq: 7, data: CanData::padded(bytes, length), ..Default::default() };

@@ -132,7 +132,7 @@ mod tests {
     }
 
     #[test]
-    fn faults_say_what_where_and_what_to_do() {
+    fn sentences_for_faults_name_place_fault_and_remedy() {
         let (value, limit) = (f64::from(0x6041_0010), f64::from(0x6040_0010));
         let pdo = Event { object: 0x16_0001, value, limit, ..event(Cause::WrongPdo) };
         assert_eq!(

@@ -44,7 +44,7 @@ pub struct Wake {
 }
 
 impl Wake {
-    /// A deadline of virtual time, in which nobody is late.
+    /// A deadline in virtual time, which is always met in time.
     pub fn on_time(cycle: u64, due_ns: u64) -> Self {
         Self { cycle, due_ns, woke_ns: due_ns, skipped: 0, account: Account::default() }
     }

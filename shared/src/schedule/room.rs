@@ -49,7 +49,7 @@ mod tests {
     }
 
     #[test]
-    fn a_refusal_names_the_rate_that_fits_and_what_slow_drives_take_of_it() {
+    fn a_refusal_names_the_highest_rate_and_the_answer_time_of_slow_drives() {
         let slow = CanConfig { answer_us: 10, ..Default::default() };
         let refusal = |can, period_ns| CycleSchedule::new(can, period_ns).unwrap_err().to_string();
         let said = refusal(&slow, 1_000_000);

@@ -3,7 +3,7 @@
 use super::*;
 
 #[test]
-fn a_late_reading_is_compared_with_the_pose_wanted_at_its_own_sample() {
+fn a_late_reading_is_compared_with_the_desired_pose_at_its_own_sample() {
     let mut bench = Bench::new();
     bench.run_until(ControllerState::Running);
     let mut delayed = bench.reading();
@@ -22,7 +22,7 @@ fn a_late_reading_is_compared_with_the_pose_wanted_at_its_own_sample() {
 
 /// Each for 15 cycles, and what the run is longer by.
 #[test]
-fn after_a_stall_the_motion_goes_on_where_the_drives_stand_and_never_catches_up_in_a_burst() {
+fn after_a_stall_the_motion_continues_from_the_position_of_the_drives_without_a_burst() {
     type Stall = fn(&mut Bench);
     let undisturbed = Bench::played(|_| ());
     let stalls: [(&str, Stall); 3] = [

@@ -134,7 +134,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_cob_id_names_an_identifier_of_11_bits_as_long_as_its_object_exists() {
+    fn a_cob_id_has_an_identifier_of_11_bits_if_its_object_exists() {
         let of = |word: u32| CobId(word).identifier().map(CanId::number);
         assert_eq!(of(0x0000_0185), Some(0x185));
         assert_eq!(of(CobId::NO_REMOTE_REQUEST | 0x185), Some(0x185));

@@ -6,7 +6,7 @@ use super::{Cob, LengthError, NodeId, exactly};
 use crate::frame::Frame;
 
 /// Emergency error code. Every number is a valid code; the constants are the codes of the emulated drives.
-#[derive(Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct EmergencyCode(pub u16);
 
 impl EmergencyCode {
@@ -35,12 +35,6 @@ impl EmergencyCode {
 impl fmt::Display for EmergencyCode {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{:04X}h", self.0)
-    }
-}
-
-impl fmt::Debug for EmergencyCode {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "EmergencyCode({self})")
     }
 }
 

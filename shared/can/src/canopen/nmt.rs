@@ -88,7 +88,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn whatever_decodes_encodes_to_the_same_bytes() {
+    fn decoded_bytes_encode_to_the_same_bytes() {
         let mut decoded = 0;
         for (code, target) in (0..=255).flat_map(|code| (0..=255).map(move |target| (code, target))) {
             if let Ok(nmt) = Nmt::decode(&[code, target]) {
@@ -100,7 +100,7 @@ mod tests {
     }
 
     #[test]
-    fn errors_carry_what_was_received() {
+    fn errors_contain_the_received_bytes() {
         assert_eq!(Nmt::decode(&[3, 0]), Err(NmtError::UnknownCommand { code: 3 }));
         assert_eq!(Nmt::decode(&[1, 128]), Err(NmtError::Target(NodeIdError { id: 128 })));
         assert_eq!(Nmt::decode(&[1]).unwrap_err().to_string(), "NMT has 2 data bytes, received 1");

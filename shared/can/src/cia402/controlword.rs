@@ -2,8 +2,6 @@
 //!
 //! The bits of the modes of operation (4 to 6) and halt (8) can be read; their effect is not part of this module.
 
-use std::fmt;
-
 use super::DriveState;
 
 const SWITCH_ON: u16 = 1 << 0;
@@ -35,7 +33,7 @@ pub enum Command {
 }
 
 /// Object 6040 as it is on the wire.
-#[derive(Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Controlword(pub u16);
 
 impl Controlword {
@@ -93,19 +91,13 @@ impl Controlword {
         self.has(RELATIVE)
     }
 
-    /// Bit 8: the axis shall stand still.
+    /// Bit 8: the axis stops.
     pub const fn halts(self) -> bool {
         self.has(HALT)
     }
 
     const fn has(self, bit: u16) -> bool {
         self.0 & bit != 0
-    }
-}
-
-impl fmt::Debug for Controlword {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "Controlword({:04X}h)", self.0)
     }
 }
 

@@ -1,7 +1,5 @@
 //! The statusword, object 6041: a drive's state and a few flags beside it.
 
-use std::fmt;
-
 use super::DriveState;
 
 /// The bits of the statusword that encode the state, and their value in each state.
@@ -46,7 +44,7 @@ impl StatusBit {
 }
 
 /// Object 6041 as it is on the wire.
-#[derive(Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Statusword(pub u16);
 
 /// A statusword whose bits encode no state.
@@ -86,12 +84,6 @@ impl Statusword {
         let mut patterns = PATTERNS.into_iter();
         let pattern = patterns.find(|&(mask, bits, _)| self.0 & mask == bits);
         pattern.map(|(_, _, state)| state).ok_or(StatuswordError { bits: self.0 })
-    }
-}
-
-impl fmt::Debug for Statusword {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "Statusword({:04X}h)", self.0)
     }
 }
 

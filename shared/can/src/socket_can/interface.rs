@@ -140,7 +140,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_refusal_says_what_to_do() {
+    fn every_refusal_gives_a_remedy() {
         let of = |errno| OpenError::from_errno("can7", errno).to_string();
         let table = [
             (libc::EAFNOSUPPORT, "modprobe can-raw"),
@@ -155,7 +155,7 @@ mod tests {
     }
 
     #[test]
-    fn the_interfaces_there_are_are_named() {
+    fn existing_interfaces_are_listed() {
         let there = |names: &[&str]| {
             let there = names.iter().map(|&name| name.to_owned()).collect();
             OpenError::NoInterface { interface: "can7".to_owned(), there }.to_string()

@@ -176,11 +176,11 @@ mod tests {
     }
 
     #[test]
-    fn off_the_bus_it_waits_for_its_restart_and_then_for_128_sequences() {
+    fn a_node_in_bus_off_waits_for_its_restart_and_then_for_128_sequences() {
         const SEQUENCE_NS: u64 = 11_000;
         let mut node = Confinement::new();
         node.leave_bus(1000, None);
-        assert_eq!(node.back_at_ns(SEQUENCE_NS), None, "nobody restarted it");
+        assert_eq!(node.back_at_ns(SEQUENCE_NS), None, "without a restart");
         let mut node = Confinement::new();
         node.leave_bus(1000, Some(2000));
         assert_eq!(node.back_at_ns(SEQUENCE_NS), Some(3000 + 128 * SEQUENCE_NS));

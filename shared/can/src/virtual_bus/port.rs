@@ -6,7 +6,7 @@ use crate::frame::Frame;
 
 /// A port, borrowed from its wire for as long as it is used.
 ///
-/// It does not move time: somebody has to [`advance`](VirtualWire::advance) the wire for frames to arrive.
+/// A port does not move time: frames arrive when the caller [advances](VirtualWire::advance) the wire.
 #[derive(Debug)]
 pub struct Port<'a> {
     wire: &'a mut VirtualWire,

@@ -124,7 +124,7 @@ mod tests {
     }
 
     #[test]
-    fn fields_lie_where_the_standard_draws_them() {
+    fn fields_are_at_the_positions_of_the_standard() {
         let drawn = |fields: [&str; 6]| {
             let bits = fields.concat();
             (u128::from_str_radix(&bits, 2).unwrap(), bits.len() as u32)

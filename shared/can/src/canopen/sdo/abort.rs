@@ -3,7 +3,7 @@
 use std::fmt;
 
 /// Abort code. Every number is a valid code; the codes of the standard have names and meanings.
-#[derive(Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct AbortCode(pub u32);
 
 macro_rules! abort_codes {
@@ -57,11 +57,5 @@ impl fmt::Display for AbortCode {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{:08X}h", self.0)?;
         self.meaning().map_or(Ok(()), |meaning| write!(f, " ({meaning})"))
-    }
-}
-
-impl fmt::Debug for AbortCode {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "AbortCode({self})")
     }
 }

@@ -51,7 +51,7 @@ fn an_unacknowledged_frame_takes_its_bits_to_the_slot_an_error_frame_and_a_passi
 }
 
 #[test]
-fn an_error_is_told_with_the_counter_behind_it_and_before_the_state_it_brings() {
+fn an_error_is_reported_with_the_counter_after_it_and_before_the_change_of_state() {
     let mut wire = alone();
     wire.send(0, 0, sync::frame()).unwrap();
     wire.advance(3_000_000);
@@ -100,7 +100,7 @@ fn two_frames_of_one_identifier_destroy_each_other_until_their_senders_are_passi
 }
 
 #[test]
-fn off_the_bus_nothing_is_sent_or_heard_until_it_is_restarted_and_has_waited() {
+fn a_node_in_bus_off_sends_and_receives_nothing_until_its_restart_and_the_wait_after_it() {
     let mut wire = wire();
     wire.send(0, 0, frame(0x700, &[])).unwrap();
     wire.nodes.stations[0]
@@ -114,7 +114,7 @@ fn off_the_bus_nothing_is_sent_or_heard_until_it_is_restarted_and_has_waited() {
     wire.advance(10_000_000);
     assert_eq!(fetch(&mut wire, 0), []);
     assert_eq!(fetch(&mut wire, 2).len(), 1);
-    assert_eq!(wire.status(0).state, ErrorState::BusOff, "nobody restarted it");
+    assert_eq!(wire.status(0).state, ErrorState::BusOff, "without a restart");
     wire.restart(0, 10_000_000);
     wire.advance(10_000_000 + 128 * 11 * BIT_NS - 1);
     assert_eq!(wire.status(0).state, ErrorState::BusOff);
