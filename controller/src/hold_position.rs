@@ -228,7 +228,7 @@ mod tests {
             // Encoder noise moves no target.
             bench.reading.position_m[3] = found[3] + 1e-6;
             if bench.command.request == DriveRequest::Enable.code() {
-                assert_eq!(bench.command.target_m, found);
+                assert_eq!(bench.command.target_m.map(f64::to_bits), found.map(f64::to_bits));
             }
             running += u32::from(bench.controller.state == ControllerState::Running);
         }

@@ -157,7 +157,7 @@ fn a_run_goes_through_its_states_in_order_and_ends_with_the_drives_off() {
     );
     assert!(bench.events.iter().all(|event| event.kind == EventKind::Transition.code()));
     assert!(
-        !bench.controller.outcome().is_some(),
+        bench.controller.outcome().is_none(),
         "the last command must be repeated before the process ends"
     );
     for _ in 0..REPEATED_CYCLES {

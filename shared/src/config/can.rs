@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::error::ScenarioError;
-use super::need::require_positive;
+use super::need::{keyed, require_positive};
 use crate::geometry::AXES;
 use masseter_can::{Bitrate, BitrateError, FrameFormat, Rates};
 
@@ -69,11 +69,9 @@ impl CanConfig {
             let need = "use at least 1 ms: a heartbeat shows that a node works";
             return Err(ScenarioError::bad("can.heartbeat_producer_ms", &0, need));
         }
-        require_positive(&[
-            ("can.heartbeat_consumer_ms", f64::from(self.heartbeat_consumer_ms)),
-            ("can.boot_timeout_ms", f64::from(self.boot_timeout_ms)),
-            ("can.command_timeout_cycles", f64::from(self.command_timeout_cycles)),
-        ])?;
+        require_positive(&keyed!("can", self,
+            heartbeat_consumer_ms boot_timeout_ms command_timeout_cycles
+        ))?;
         if self.ideal && (self.fd || !self.is_virtual()) {
             let need = "leave it away with can.fd and can.interfaces: it replaces their bit rates";
             return Err(ScenarioError::bad("can.ideal", &true, need));

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::error::ScenarioError;
-use super::need::{require_duration, require_positive};
+use super::need::{keyed, require_duration, require_positive};
 
 /// SYNC takes one cycle and the drives' interpolation one; drives that smooth their targets take some more. The
 /// controller extrapolates the motion by this time.
@@ -83,21 +83,13 @@ section! {
 
 impl ControllerConfig {
     pub(super) fn validate(&self, rate_hz: u32) -> Result<(), ScenarioError> {
-        require_duration(&[
-            ("controller.start_timeout_s", self.start_timeout_s),
-            ("controller.ease_s", self.ease_s),
-            ("controller.hold_s", self.hold_s),
-            ("controller.stop_ramp_s", self.stop_ramp_s),
-        ])?;
-        require_positive(&[
-            ("controller.steady_readings", f64::from(self.steady_readings)),
-            ("controller.lead_cycles", self.lead_cycles),
-            ("controller.integral_gain_per_s", self.integral_gain_per_s),
-            ("controller.trim_limit_m", self.trim_limit_m),
-            ("controller.trim_limit_rad", self.trim_limit_rad),
-            ("controller.stale_cycles", f64::from(self.stale_cycles)),
-            ("controller.tracking_limit_m", self.tracking_limit_m),
-        ])?;
+        require_duration(&keyed!("controller", self,
+            start_timeout_s ease_s hold_s stop_ramp_s
+        ))?;
+        require_positive(&keyed!("controller", self,
+            steady_readings lead_cycles integral_gain_per_s trim_limit_m trim_limit_rad stale_cycles
+            tracking_limit_m
+        ))?;
         self.validate_loop(f64::from(rate_hz))
     }
 
@@ -139,7 +131,7 @@ impl RealtimeConfig {
 
 impl ChecksConfig {
     pub(super) fn validate(&self) -> Result<(), ScenarioError> {
-        require_positive(&[("checks.tracking_rms_mm", self.tracking_rms_mm)])
+        require_positive(&keyed!("checks", self, tracking_rms_mm))
     }
 }
 

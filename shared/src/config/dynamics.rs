@@ -3,7 +3,7 @@
 use std::ops::RangeInclusive;
 
 use super::error::ScenarioError;
-use super::need::{require_not_negative, require_positive};
+use super::need::{keyed, require_not_negative, require_positive};
 
 section! {
     /// The moving masses and their friction.
@@ -37,18 +37,12 @@ impl DynamicsConfig {
     pub const STEPS_NS: RangeInclusive<u64> = 10_000..=250_000;
 
     pub(super) fn validate(&self) -> Result<(), ScenarioError> {
-        require_positive(&[
-            ("dynamics.carriage_mass_kg", self.carriage_mass_kg),
-            ("dynamics.rod_mass_kg", self.rod_mass_kg),
-            ("dynamics.platform_mass_kg", self.platform_mass_kg),
-            ("dynamics.initial_leg_m", self.initial_leg_m),
-        ])?;
-        require_not_negative(&[
-            ("dynamics.leg_inertia_kg_m2", self.leg_inertia_kg_m2),
-            ("dynamics.slide_friction_n", self.slide_friction_n),
-            ("dynamics.viscous_friction_n_s_per_m", self.viscous_friction_n_s_per_m),
-            ("dynamics.gravity_m_s2", self.gravity_m_s2),
-        ])?;
+        require_positive(&keyed!("dynamics", self,
+            carriage_mass_kg rod_mass_kg platform_mass_kg initial_leg_m
+        ))?;
+        require_not_negative(&keyed!("dynamics", self,
+            leg_inertia_kg_m2 slide_friction_n viscous_friction_n_s_per_m gravity_m_s2
+        ))?;
         let inertia = self.platform_inertia_kg_m2;
         require_not_negative(&inertia.map(|kg_m2| ("dynamics.platform_inertia_kg_m2", kg_m2)))?;
         if !Self::STEPS_NS.contains(&self.step_ns) {

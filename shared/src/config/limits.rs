@@ -2,7 +2,7 @@
 
 use super::DrivesConfig;
 use super::error::ScenarioError;
-use super::need::require_positive;
+use super::need::{keyed, require_positive};
 use crate::geometry::LEGS;
 
 section! {
@@ -49,13 +49,9 @@ impl TrajectoryLimitsConfig {
     }
 
     pub(super) fn validate(&self) -> Result<(), ScenarioError> {
-        require_positive(&[
-            ("limits.slide_velocity_m_s", self.slide_velocity_m_s),
-            ("limits.leg_velocity_m_s", self.leg_velocity_m_s),
-            ("limits.slide_acceleration_m_s2", self.slide_acceleration_m_s2),
-            ("limits.leg_acceleration_m_s2", self.leg_acceleration_m_s2),
-            ("limits.max_condition", self.max_condition),
-        ])
+        require_positive(&keyed!("limits", self,
+            slide_velocity_m_s leg_velocity_m_s slide_acceleration_m_s2 leg_acceleration_m_s2 max_condition
+        ))
     }
 }
 

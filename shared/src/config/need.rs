@@ -2,6 +2,14 @@
 
 use super::error::ScenarioError;
 
+/// The values of a table, each with its whole key.
+macro_rules! keyed {
+    ($table:literal, $config:expr, $($field:ident)+) => {
+        [$((concat!($table, ".", stringify!($field)), f64::from($config.$field))),+]
+    };
+}
+pub(super) use keyed;
+
 /// Longest run, s.
 const LONGEST_S: f64 = 86_400.0;
 

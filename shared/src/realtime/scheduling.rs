@@ -37,7 +37,7 @@ pub struct Obtained {
     pub refusals: Vec<String>,
 }
 
-/// Asks for `wanted`, then reads back what was granted. Memory is locked for the whole process, the rest holds for the calling
+/// Requests `wanted`, then reads back the granted scheduling. Memory is locked for the whole process, the rest holds for the calling
 /// thread.
 pub fn obtain(wanted: Wanted) -> Obtained {
     // The kernel may accept a request without effect: only what is read back counts.

@@ -21,7 +21,7 @@ pub struct Account {
     /// Between waits.
     pub worked_ns: u64,
     /// The part of `worked_ns` in stretches longer than a gap: either the machine stalled or the work took too long. The
-    /// task itself cannot tell which.
+    /// task itself cannot distinguish the two.
     pub overlong_ns: u64,
 }
 

@@ -105,7 +105,7 @@ fn a_safe_stop_waits_for_a_lost_drive_until_its_time_is_over() {
     for _ in 1..waits {
         bench.cycle(lose);
         assert_eq!(bench.controller.state(), ControllerState::SafeStop);
-        assert!(!bench.controller.outcome().is_some());
+        assert!(bench.controller.outcome().is_none());
     }
     bench.cycle(lose);
     assert!(bench.controller.outcome().is_some());

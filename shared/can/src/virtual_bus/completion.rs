@@ -59,14 +59,14 @@ impl VirtualWire {
         let frame = self.nodes.frame_of(transmission);
         let received = Received { frame, time_ns };
         let queued_ns = Some(transmission.queued_ns);
-        self.tap.push(Tapped::Frame(TappedFrame { frame, time_ns, queued_ns }));
+        self.tap.push(time_ns, Tapped::Frame(TappedFrame { frame, time_ns, queued_ns }));
         for port in 0..self.nodes.stations.len() {
             if transmission.is_from(port) || !self.nodes.is_on_bus(port, transmission.start_ns) {
                 continue;
             }
             self.confine(port, time_ns, Confinement::received);
             if !self.loses(port, transmission, frame.id()) {
-                self.nodes.stations[port].receive.push(received);
+                self.nodes.stations[port].receive.push(time_ns, received);
             }
         }
     }
@@ -104,7 +104,8 @@ impl VirtualWire {
         if !(0..port).any(|other| transmission.is_from(other)) {
             let mut counted = self.nodes.stations[port].confinement;
             count(&mut counted);
-            self.tap.push(Tapped::Error(ErrorReport::new(now_ns, port as u8, kind, counted.status())));
+            self.tap
+                .push(now_ns, Tapped::Error(ErrorReport::new(now_ns, port as u8, kind, counted.status())));
         }
         self.confine(port, now_ns, count);
     }

@@ -11,10 +11,10 @@
 //! nodes echo it), 8 bits of delimiter, 3 of intermission; then the transmitter takes part in the next
 //! arbitration with the same frame. A missing acknowledgement is such a disturbance. Two ports that send different
 //! frames of one identifier disturb each other where the frames first differ; equal frames pass as one. Each
-//! port counts errors as ISO 11898-1 has it, becomes error passive and goes off the bus; a passive
+//! port counts errors by the rules of ISO 11898-1, becomes error passive and leaves the bus; a passive
 //! transmitter pauses for 8 bits. A port off the bus discards its queue. After a restart it comes back with 128
-//! times 11 recessive bits. A restart comes by [`restart`](VirtualWire::restart), or after
-//! [`restart_after_ns`](WireConfig::restart_after_ns), as `ip link … restart-ms` has it.
+//! times 11 recessive bits. The restart is a call of [`restart`](VirtualWire::restart), or follows after
+//! [`restart_after_ns`](WireConfig::restart_after_ns), as `ip link … restart-ms` does.
 //!
 //! # Time
 //! The wire moves in [`advance`](VirtualWire::advance) only. All frames queued at or before an instant take
@@ -23,7 +23,7 @@
 //! advanced to counts as queued at that time. Faults of nodes take effect between frames.
 //!
 //! # What is not modelled
-//! Errors seen by some nodes only, overload frames, what a disconnected node does on its end of the wire, and the
+//! Errors seen by some nodes only, overload frames, the traffic of a disconnected node on its end of the wire, and the
 //! recessive ESI bit of an error passive node's FD frames, which may change their stuffing.
 
 mod completion;

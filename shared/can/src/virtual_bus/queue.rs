@@ -3,9 +3,8 @@
 use std::collections::VecDeque;
 
 use super::config::WireConfig;
-use crate::bus::{ReceiveError, Received, SendError};
+use crate::bus::{ReceiveError, SendError};
 use crate::frame::Frame;
-use crate::tap::Tapped;
 use crate::wire::{Rates, frame_bits};
 
 /// A frame waiting for the wire.
@@ -78,37 +77,21 @@ impl TransmitQueue {
     }
 }
 
-/// An item with an arrival time.
-pub(super) trait Timed {
-    fn time_ns(&self) -> u64;
-}
-
-impl Timed for Received {
-    fn time_ns(&self) -> u64 {
-        self.time_ns
-    }
-}
-
-impl Timed for Tapped {
-    fn time_ns(&self) -> u64 {
-        self.time_ns()
-    }
-}
-
 /// Received items that are not fetched yet, oldest first. An item that does not fit is lost and counted.
 #[derive(Debug)]
 pub(super) struct ReceiveQueue<T> {
-    arrived: VecDeque<T>,
+    /// Items with their times of arrival, ns.
+    arrived: VecDeque<(u64, T)>,
     capacity: usize,
     lost: u64,
 }
 
-impl<T: Timed> ReceiveQueue<T> {
+impl<T> ReceiveQueue<T> {
     pub(super) fn new(capacity: usize) -> Self {
         Self { arrived: VecDeque::with_capacity(capacity), capacity, lost: 0 }
     }
 
-    pub(super) fn push(&mut self, item: T) {
+    pub(super) fn push(&mut self, time_ns: u64, item: T) {
         if self.arrived.is_empty() {
             // An empty queue starts at its front again: entries of a long queue would not be in the cache.
             self.arrived.clear();
@@ -116,15 +99,15 @@ impl<T: Timed> ReceiveQueue<T> {
         if self.arrived.len() == self.capacity {
             self.lost += 1;
         } else {
-            self.arrived.push_back(item);
+            self.arrived.push_back((time_ns, item));
         }
     }
 
     /// The oldest item, if it had arrived by then. Losses are reported first, once.
     pub(super) fn pop(&mut self, now_ns: u64) -> Result<Option<T>, ReceiveError> {
         match std::mem::take(&mut self.lost) {
-            0 if self.arrived.front().is_some_and(|oldest| oldest.time_ns() <= now_ns) => {
-                Ok(self.arrived.pop_front())
+            0 if self.arrived.front().is_some_and(|(time_ns, _)| *time_ns <= now_ns) => {
+                Ok(self.arrived.pop_front().map(|(_, item)| item))
             }
             0 => Ok(None),
             lost => Err(ReceiveError::Overrun { lost }),

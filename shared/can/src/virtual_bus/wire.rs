@@ -263,7 +263,7 @@ impl VirtualWire {
             return;
         }
         let kind = ErrorKind::State(status.state);
-        self.tap.push(Tapped::Error(ErrorReport::new(now_ns, port as u8, kind, status)));
+        self.tap.push(now_ns, Tapped::Error(ErrorReport::new(now_ns, port as u8, kind, status)));
         if status.state == ErrorState::BusOff {
             self.statistics.bus_offs += 1;
             self.statistics.abandoned += station.transmit.clear();
