@@ -23,7 +23,7 @@ use masseter_shared::messages::codes::Source;
 use masseter_shared::messages::{Command as CommandMessage, Event, FrameTap, Reading, State, Truth};
 use masseter_shared::realtime::Cycle;
 use masseter_shared::realtime::scheduling::{Wanted, obtain};
-use masseter_shared::transport::{BatchOutlet, Node, Outlet, ScratchDomain};
+use masseter_shared::transport::{BatchPublisher, Node, Publisher, ScratchDomain};
 use rustix::process::{Pid, Signal, kill_process};
 
 const MASSETER: &str = env!("CARGO_BIN_EXE_masseter");
@@ -85,24 +85,24 @@ impl AtHand {
 }
 
 struct Outlets {
-    command: Outlet<CommandMessage>,
-    reading: Outlet<Reading>,
-    state: Outlet<State>,
-    truth: Outlet<Truth>,
-    frame: BatchOutlet<FrameTap>,
+    command: Publisher<CommandMessage>,
+    reading: Publisher<Reading>,
+    state: Publisher<State>,
+    truth: Publisher<Truth>,
+    frame: BatchPublisher<FrameTap>,
     /// The controller's, and the plant's.
-    events: [Outlet<Event>; 2],
+    events: [Publisher<Event>; 2],
 }
 
 impl Outlets {
     fn open(node: &Node) -> anyhow::Result<Self> {
         Ok(Self {
-            command: node.outlet()?,
-            reading: node.outlet()?,
-            state: node.outlet()?,
-            truth: node.outlet()?,
-            frame: node.batch_outlet()?,
-            events: [node.outlet()?, node.outlet()?],
+            command: node.publisher()?,
+            reading: node.publisher()?,
+            state: node.publisher()?,
+            truth: node.publisher()?,
+            frame: node.batch_publisher()?,
+            events: [node.publisher()?, node.publisher()?],
         })
     }
 

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 use masseter_controller::process::Kind;
-use masseter_shared::lifecycle::Assignment;
+use masseter_shared::lifecycle::ProcessArguments;
 
 /// The arguments that the supervisor passes to every process of a run.
 #[derive(Debug, Clone, Args)]
@@ -16,8 +16,8 @@ pub(crate) struct ProcessArgs {
 }
 
 impl ProcessArgs {
-    pub(crate) fn assignment(self) -> Assignment {
-        Assignment { scenario: self.scenario, domain: self.domain }
+    pub(crate) fn process_arguments(self) -> ProcessArguments {
+        ProcessArguments { scenario: self.scenario, domain: self.domain }
     }
 }
 

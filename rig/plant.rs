@@ -9,7 +9,7 @@ use masseter_plant::emulation::{Emulator, EmulatorCounters};
 use masseter_plant::process::{self, Reason};
 use masseter_shared::clock;
 use masseter_shared::config::Scenario;
-use masseter_shared::lifecycle::{Assignment, StopRequest};
+use masseter_shared::lifecycle::{ProcessArguments, StopRequest};
 use masseter_shared::realtime::scheduling::{Wanted, obtain};
 use masseter_terminal::{Exit, result_line, status};
 
@@ -35,20 +35,20 @@ pub(crate) struct PlantArgs {
 }
 
 impl PlantArgs {
-    /// The supervisor's assignment; none for a plant that a user starts.
-    fn assignment(&self) -> Option<Assignment> {
-        Some(Assignment { scenario: self.scenario.clone()?, domain: self.domain.clone()? })
+    /// The supervisor's process_arguments; none for a plant that a user starts.
+    fn process_arguments(&self) -> Option<ProcessArguments> {
+        Some(ProcessArguments { scenario: self.scenario.clone()?, domain: self.domain.clone()? })
     }
 }
 
 /// Emulates until Ctrl-C, or runs as the supervisor's process until asked to end. That process also ends, by a safe stop,
 /// when commands stop arriving.
 pub(crate) fn plant(args: &PlantArgs) -> anyhow::Result<Exit> {
-    let Some(assignment) = args.assignment() else {
+    let Some(process_arguments) = args.process_arguments() else {
         emulate(args)?;
         return Ok(Exit::Passed);
     };
-    Ok(match process::run(&assignment)? {
+    Ok(match process::run(&process_arguments)? {
         Reason::Asked => Exit::Passed,
         Reason::Abandoned => Exit::SafeStop,
     })

@@ -12,7 +12,7 @@ use common::{Cores, LENIENT, Workspace, assert_played, child_of, cramped, masset
 use masseter_shared::clock::{self, SECOND_NS};
 use masseter_shared::messages::State;
 use masseter_shared::messages::codes::ControllerState::Finished;
-use masseter_shared::transport::{Domain, Inlet, Node};
+use masseter_shared::transport::{Domain, Node, Subscriber};
 use serde_json::Value;
 
 #[test]
@@ -111,13 +111,13 @@ fn run_on_a_small_disk(run: impl FnOnce(&Workspace) -> Output) -> Option<Output>
 
 /// Follows a rig's states until the controller has finished; how far the motion came, s.
 fn played_s(rig: &str) -> f64 {
-    let mut states: Option<Inlet<State>> = None;
+    let mut states: Option<Subscriber<State>> = None;
     let mut motion_s = 0.0_f64;
     let give_up_ns = clock::now_ns() + 30 * SECOND_NS;
     while clock::now_ns() < give_up_ns {
         // The rig's processes make its domain.
         let domain = Domain::named(rig).unwrap();
-        states = states.or_else(|| Node::join(&domain).ok()?.inlet().ok());
+        states = states.or_else(|| Node::join(&domain).ok()?.subscriber().ok());
         while let Some(state) = states.as_ref().and_then(|states| states.receive().unwrap()) {
             motion_s = motion_s.max(state.motion_time_s);
             if state.controller_state == Finished as u32 {

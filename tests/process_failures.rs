@@ -16,7 +16,7 @@ use masseter_shared::messages::codes::ControllerState::{
     self, Disabling, Easing, Enabling, Holding, Running, WaitReadings,
 };
 use masseter_shared::messages::codes::DriveState::{FaultReactionActive, OperationEnabled, QuickStopActive};
-use masseter_shared::transport::{Domain, Inlet, Node};
+use masseter_shared::transport::{Domain, Node, Subscriber};
 use rustix::process::{Pid, Signal, kill_process};
 
 /// A cycle of the sequence, counted from 1 in its state.
@@ -79,8 +79,8 @@ impl Rig {
     }
 
     /// What the controller publishes, as a scope would see it. The rig has claimed its name, as one of its processes runs.
-    fn states(&self) -> Inlet<State> {
-        Node::join(&Domain::named(&self.name).unwrap()).unwrap().inlet().unwrap()
+    fn states(&self) -> Subscriber<State> {
+        Node::join(&Domain::named(&self.name).unwrap()).unwrap().subscriber().unwrap()
     }
 
     /// Waits for the rig's end; nothing of the rig stays in shared memory.
@@ -98,7 +98,7 @@ fn hit(cores: &Cores, role: &str, signal: Signal, moment: Moment) -> Rig {
 }
 
 /// Follows the sequence to the moment; whether it came.
-fn reaches(states: &Inlet<State>, Moment(wanted, cycle): Moment) -> bool {
+fn reaches(states: &Subscriber<State>, Moment(wanted, cycle): Moment) -> bool {
     let mut entered = None;
     let give_up_ns = clock::now_ns() + GIVE_UP_NS;
     while clock::now_ns() < give_up_ns {
@@ -117,7 +117,7 @@ fn reaches(states: &Inlet<State>, Moment(wanted, cycle): Moment) -> bool {
 }
 
 /// Whether no later state has been published meanwhile.
-fn stands_in(states: &Inlet<State>, wanted: ControllerState) -> bool {
+fn stands_in(states: &Subscriber<State>, wanted: ControllerState) -> bool {
     let newest = std::iter::from_fn(|| states.receive().unwrap()).last();
     newest.is_none_or(|state| state.controller_state == wanted as u32)
 }

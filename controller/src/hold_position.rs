@@ -1,19 +1,18 @@
 //! The smallest controller: switches the drives on, holds the position found at the start, and switches them off.
 //!
-//! No trajectory, no feedback in pose space, no inverse kinematics: the second implementation of [`Controller`], which
-//! shows what the seam asks of one.
+//! No trajectory, no feedback in pose space, no inverse kinematics: a second, minimal
+//! implementation of [`Controller`].
 
 use masseter_shared::config::Scenario;
 use masseter_shared::control::{Controller, Outcome, Tick};
 use masseter_shared::geometry::{AXES, Actuators, Mechanism, Pose};
-use masseter_shared::messages::codes::{
-    Cause, ControllerState, DriveRequest, DriveState, EventKind, Source, drive_state,
-};
+use masseter_shared::messages::codes::{Cause, ControllerState, DriveState, drive_state};
 use masseter_shared::messages::{Command, Event, Reading, State, pose_fields};
 
 use crate::kinematics::{ForwardTracker, Solution};
 use crate::safety::{self, Fault};
-use crate::sequence::{Trigger, next};
+use crate::sequence::{Trigger, next, request};
+use crate::transition;
 
 /// Bits of [`Reading::fresh_axes`] when all axes are fresh.
 const ALL_AXES: u32 = (1 << AXES) - 1;
@@ -123,8 +122,8 @@ impl Controller for HoldPosition {
         self.cycle = tick.cycle;
         self.cycles_in_state += 1;
         let fault = self.fault.take().or_else(|| self.timeout());
-        let trigger = if fault.is_some() { Some(Trigger::Fault) } else { self.trigger() };
-        let (from, to) = (self.state, next(self.state, trigger?));
+        let trigger = if fault.is_some() { Trigger::Fault } else { self.trigger()? };
+        let (from, to) = (self.state, next(self.state, trigger));
         if from == to {
             return None;
         }
@@ -133,33 +132,15 @@ impl Controller for HoldPosition {
             let measured = Actuators::from_axes(self.reading.position_m);
             self.held = self.solution.map(|solution| (measured, solution.pose));
         }
-        let mut event = Event {
-            time_ns: tick.now_ns,
-            cycle: tick.cycle,
-            from: from.code(),
-            to: to.code(),
-            ..Event::new(Source::Controller, EventKind::Transition, Cause::Sequence)
-        };
-        if let Some(fault) = fault {
-            event.kind = EventKind::Fault.code();
-            fault.explain(&mut event);
-        }
-        Some(event)
+        Some(transition::event([from, to], trigger, fault, tick))
     }
 
     fn fill_command(&self, command: &mut Command) {
-        let request = match self.state {
-            ControllerState::WaitReadings | ControllerState::Disabling | ControllerState::Finished => {
-                DriveRequest::Off
-            }
-            ControllerState::SafeStop => DriveRequest::QuickStop,
-            _ => DriveRequest::Enable,
-        };
         *command = Command {
             cycle: self.cycle,
             reading_cycle: self.reading.cycle,
             target_m: self.held.map_or([0.0; AXES], |(targets, _)| targets.to_axes()),
-            request: request.code(),
+            request: request(self.state).code(),
             controller_state: self.state.code(),
             ..Command::default()
         };
@@ -202,6 +183,7 @@ impl Controller for HoldPosition {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use masseter_shared::messages::codes::DriveRequest;
 
     /// Drives that do at once what they are asked to, at a fixed position.
     struct Bench {

@@ -1,9 +1,9 @@
 //! The rig's controller: forward kinematics, jaw trajectories, pose control and safety.
 //!
-//! [`motion_controller`] and [`hold_position`] are pure step functions; [`process`] runs one of them. It never
-//! sees the plant, only its messages.
+//! [`motion_controller`] and [`hold_position`] are pure step functions; [`process`] runs one of them. The crate
+//! does not depend on the plant; it uses the plant's messages only.
 
-mod delivery;
+mod command_acknowledgement;
 pub mod hold_position;
 pub mod kinematics;
 pub mod motion_controller;
@@ -13,5 +13,6 @@ pub mod process;
 mod safety;
 pub mod sequence;
 pub mod trajectory;
+mod transition;
 
 pub use safety::Fault;

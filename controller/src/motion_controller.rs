@@ -1,7 +1,7 @@
 //! One cycle of the controller: reading → FK → pose → control → IK → limited command.
 //!
-//! A pure step function: time and readings come in, messages go out, and nothing is allocated. iceoryx2, clocks and CAN
-//! are not known here.
+//! A pure step function: time and readings come in, messages go out, and nothing is allocated. This module
+//! uses no transport, no clock and no CAN.
 
 mod outputs;
 
@@ -13,13 +13,14 @@ use masseter_shared::geometry::{AXES, Actuators, Mechanism, Pose};
 use masseter_shared::messages::codes::{Cause, ControllerState, DriveState, NO_DRIVE_STATE, drive_state};
 use masseter_shared::messages::{Command, Event, Reading, State};
 
-use crate::delivery::Delivery;
+use crate::command_acknowledgement::CommandAcknowledgement;
 use crate::kinematics::{ForwardTracker, Solution};
 use crate::playback::Playback;
 use crate::pose_control::PoseControl;
 use crate::safety::{self, Fault};
 use crate::sequence::{Trigger, next};
 use crate::trajectory::Trajectory;
+use crate::transition;
 
 /// Bits of [`Reading::fresh_axes`] when all axes are fresh.
 const ALL_AXES: u32 = (1 << AXES) - 1;
@@ -32,7 +33,7 @@ const REPEATED_CYCLES: u64 = 5;
 /// How long a safe stop waits for the drives to be off, s.
 const SAFE_STOP_S: f64 = 0.3;
 
-/// What the last complete reading said of the mechanism.
+/// The estimate of the mechanism from the last complete reading.
 #[derive(Debug, Clone, Copy)]
 struct Estimate {
     reading_cycle: u64,
@@ -48,16 +49,16 @@ pub struct MotionController {
     config: ControllerConfig,
     period_s: f64,
     velocity_limit_m_s: [f64; AXES],
-    /// How far the whole trim may carry an axis.
+    /// The most that the trim may move an axis.
     trim_reach_m: f64,
     tracker: ForwardTracker,
     playback: Playback,
-    delivery: Delivery,
+    acknowledgement: CommandAcknowledgement,
     control: PoseControl,
 
     state: ControllerState,
     cycles_in_state: u64,
-    /// Of those, the cycles since the pose wanted no longer changes.
+    /// Cycles in this state since the desired pose no longer changes.
     cycles_at_rest: u64,
     last_cycle: u64,
     steady_readings: u32,
@@ -65,9 +66,9 @@ pub struct MotionController {
     stop_requested: bool,
     estimate: Option<Estimate>,
     drive_state: [u32; AXES],
-    /// What went wrong since the last decision.
+    /// The first fault since the last decision.
     fault: Option<Fault>,
-    wanted: Option<Pose>,
+    desired: Option<Pose>,
     target: Option<Actuators>,
 }
 
@@ -79,7 +80,7 @@ impl MotionController {
         Self {
             tracker: ForwardTracker::new(mechanism.clone()),
             playback: Playback::new(trajectory, config.ease_s, config.stop_ramp_s),
-            delivery: Delivery::default(),
+            acknowledgement: CommandAcknowledgement::default(),
             control: PoseControl::new(&config),
             trim_reach_m: config.trim_limit_m + config.trim_limit_rad * mechanism.platform_arm_m(),
             mechanism,
@@ -96,12 +97,12 @@ impl MotionController {
             estimate: None,
             drive_state: [NO_DRIVE_STATE; AXES],
             fault: None,
-            wanted: None,
+            desired: None,
             target: None,
         }
     }
 
-    /// Where the sequence stands.
+    /// The state of the sequence.
     pub fn state(&self) -> ControllerState {
         self.state
     }
@@ -129,13 +130,13 @@ impl MotionController {
             measured,
             solution,
         });
-        self.delivery.answer(reading.answers_cycle);
+        self.acknowledgement.answer(reading.answers_cycle);
         self.silent_cycles = 0;
         self.steady_readings = self.steady_readings.saturating_add(1);
         Ok(())
     }
 
-    /// What has been waited for too long.
+    /// The fault of a wait that took too long.
     fn overdue(&self) -> Option<Fault> {
         let timeout_cycles = self.config.start_timeout_s / self.period_s;
         let waited = self.cycles_in_state as f64;
@@ -156,29 +157,29 @@ impl MotionController {
 
     /// Pose control, inverse kinematics and limits: the targets of this cycle.
     fn control(&mut self) -> Result<(), Fault> {
-        let wanted = self.playback.pose_ahead(-self.sample_age_s());
-        self.wanted = Some(wanted);
+        let desired = self.playback.pose_ahead(-self.sample_age_s());
+        self.desired = Some(desired);
         if !self.is_moving() {
             return Ok(());
         }
         if let Some(estimate) = &self.estimate
             && self.silent_cycles == 0
         {
-            safety::check_tracking(&wanted, &estimate.solution.pose, self.config.tracking_limit_m)?;
-            self.control.observe(&wanted, &estimate.solution.pose, self.period_s);
+            safety::check_tracking(&desired, &estimate.solution.pose, self.config.tracking_limit_m)?;
+            self.control.observe(&desired, &estimate.solution.pose, self.period_s);
         }
         let ahead = self.playback.pose_ahead(self.lead_s());
         let joints = self.mechanism.inverse(&self.control.correct(&ahead))?;
         // A motion that uses its strokes to the end leaves no room for the trim.
         let before = self.target.unwrap_or(joints.actuators);
-        let target = self.mechanism.strokes().hold(&joints.actuators, &before, self.trim_reach_m)?;
+        let target = self.mechanism.strokes().clamp(&joints.actuators, &before, self.trim_reach_m)?;
         safety::check_velocity(&target, &before, &self.velocity_limit_m_s, self.period_s)?;
         self.target = Some(target);
         Ok(())
     }
 
-    /// How far the motion has gone on since the estimate's sample, against a reading in time, s. What comes later than
-    /// a late reading does, it waits for.
+    /// How far the motion has gone on since the estimate's sample, against a reading in time, s. The motion waits for readings that are later
+    /// than that.
     fn sample_age_s(&self) -> f64 {
         let reading_cycle = self.estimate.map_or(self.last_cycle, |estimate| estimate.reading_cycle);
         self.last_cycle.saturating_sub(reading_cycle).min(LATE_READING_CYCLES) as f64 * self.period_s
@@ -193,7 +194,7 @@ impl MotionController {
         matches!(self.state, ControllerState::Easing | ControllerState::Running | ControllerState::Holding)
     }
 
-    /// The most urgent thing that happened.
+    /// The most urgent trigger.
     fn trigger(&self, faulty: bool) -> Option<Trigger> {
         let enabled = DriveState::OperationEnabled.code();
         let held_s = self.cycles_at_rest as f64 * self.period_s;
@@ -222,7 +223,7 @@ impl MotionController {
             return None;
         }
         self.enter(to);
-        Some(self.event(from, trigger, fault, tick))
+        Some(transition::event([from, to], trigger, fault, tick))
     }
 
     fn enter(&mut self, state: ControllerState) {
@@ -259,7 +260,7 @@ impl Controller for MotionController {
     fn decide(&mut self, tick: Tick) -> Option<Event> {
         self.last_cycle = tick.cycle;
         // A motion that waited goes on at full speed from the target that the drives held: a period's worth, as ever.
-        if self.delivery.takes_step(tick.cycle) {
+        if self.acknowledgement.takes_step(tick.cycle) {
             self.playback.advance(self.period_s);
         }
         let fault = self.fault.take().or_else(|| self.overdue()).or_else(|| self.control().err());

@@ -1,14 +1,14 @@
 //! Progress of the motion: the move to its first pose, the motion itself, and the ramp to rest when
-//! it is stopped halfway. Time comes in as the steps that the motion makes, so that it waits while the drives cannot follow.
+//! it is stopped halfway. Time comes in as the steps of the motion, so that the motion waits while the drives cannot follow.
 
 use masseter_shared::geometry::Pose;
 
 use crate::trajectory::{Trajectory, minimum_jerk};
 
-/// Which part is being played.
+/// The part that is playing.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Part {
-    /// Standing at a pose.
+    /// Holds a pose.
     Hold(Pose),
     /// From a pose to the first one of the motion.
     Ease(Pose),
@@ -16,7 +16,7 @@ enum Part {
     Motion,
 }
 
-/// The pose wanted, as a function of the time since playing began.
+/// The desired pose, as a function of the time since playing began.
 #[derive(Debug)]
 pub(crate) struct Playback {
     trajectory: Trajectory,
@@ -35,12 +35,12 @@ impl Playback {
         Self { trajectory, ease_s, stop_ramp_s, part, elapsed_s: 0.0, rate: 1.0, stopping: false }
     }
 
-    /// Stands at `pose`.
+    /// Holds `pose`.
     pub(crate) fn hold(&mut self, pose: Pose) {
         self.begin(Part::Hold(pose));
     }
 
-    /// Begins the move from where it stands to the first pose of the motion.
+    /// Begins the move from the present pose to the first pose of the motion.
     pub(crate) fn ease(&mut self) {
         self.begin(Part::Ease(self.pose_ahead(0.0)));
     }
@@ -73,7 +73,7 @@ impl Playback {
         self.elapsed_s + self.rate * ahead_s
     }
 
-    /// The pose wanted `ahead_s` from now.
+    /// The desired pose `ahead_s` from now.
     pub(crate) fn pose_ahead(&self, ahead_s: f64) -> Pose {
         let time_s = self.time_ahead_s(ahead_s);
         match self.part {
@@ -94,12 +94,12 @@ impl Playback {
         }
     }
 
-    /// Whether the pose wanted no longer changes.
+    /// Whether the desired pose no longer changes.
     pub(crate) fn is_at_rest(&self) -> bool {
         self.is_over() || self.rate == 0.0
     }
 
-    /// How far the motion has come `ahead_s` from now, as [`Trajectory::motion_time_s`] tells; negative before it
+    /// How far the motion has come `ahead_s` from now, in the sense of [`Trajectory::motion_time_s`]; negative before it
     /// begins.
     pub(crate) fn motion_time_ahead_s(&self, ahead_s: f64) -> f64 {
         if self.part == Part::Motion {

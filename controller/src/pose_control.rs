@@ -1,13 +1,13 @@
 //! Pose control: a slow integral trim on top of the drives' own position loops.
 //!
 //! The drives follow fast motion by feed-forward; what remains on average (friction, gravity,
-//! calibration) is taken out here. It neither damps nor speeds up: that is the drives' affair.
+//! calibration) is corrected here. The trim adds no damping and no feed-forward.
 
 use masseter_shared::config::ControllerConfig;
 use masseter_shared::geometry::{Pose, Vec3};
 use nalgebra::UnitQuaternion;
 
-/// The correction found so far.
+/// The present correction.
 #[derive(Debug, Clone)]
 pub(crate) struct PoseControl {
     gain_per_s: f64,
@@ -28,20 +28,20 @@ impl PoseControl {
         }
     }
 
-    /// Takes the difference between the pose wanted and the pose found, at the same instant.
-    pub(crate) fn observe(&mut self, wanted: &Pose, found: &Pose, dt_s: f64) {
+    /// Takes the difference between the desired pose and the estimated pose, at the same instant.
+    pub(crate) fn observe(&mut self, desired: &Pose, estimated: &Pose, dt_s: f64) {
         let share = self.gain_per_s * dt_s;
-        let offset = wanted.translation.vector - found.translation.vector;
-        let turn = (wanted.rotation * found.rotation.inverse()).scaled_axis();
+        let offset = desired.translation.vector - estimated.translation.vector;
+        let turn = (desired.rotation * estimated.rotation.inverse()).scaled_axis();
         self.position_m = (self.position_m + offset * share).cap_magnitude(self.limit_m);
         self.rotation_rad = (self.rotation_rad + turn * share).cap_magnitude(self.limit_rad);
     }
 
-    /// The pose to ask for so that the pose wanted comes about.
-    pub(crate) fn correct(&self, wanted: &Pose) -> Pose {
+    /// The pose to ask for so that the desired pose comes about.
+    pub(crate) fn correct(&self, desired: &Pose) -> Pose {
         Pose::from_parts(
-            (wanted.translation.vector + self.position_m).into(),
-            UnitQuaternion::from_scaled_axis(self.rotation_rad) * wanted.rotation,
+            (desired.translation.vector + self.position_m).into(),
+            UnitQuaternion::from_scaled_axis(self.rotation_rad) * desired.rotation,
         )
     }
 }
@@ -55,31 +55,31 @@ mod tests {
     fn a_constant_offset_is_taken_out() {
         let mut control = PoseControl::new(&ControllerConfig::default());
         let offset = Pose::new(Vec3::new(2e-4, -1e-4, 5e-5), Vec3::new(1e-3, 0.0, -2e-3));
-        let wanted = Pose::translation(0.0, 0.0, 0.27);
-        let found = |asked: &Pose| {
+        let desired = Pose::translation(0.0, 0.0, 0.27);
+        let estimated = |asked: &Pose| {
             Pose::from_parts(
                 (asked.translation.vector + offset.translation.vector).into(),
                 offset.rotation * asked.rotation,
             )
         };
         for _ in 0..3000 {
-            let found = found(&control.correct(&wanted));
-            control.observe(&wanted, &found, 1e-3);
+            let estimated = estimated(&control.correct(&desired));
+            control.observe(&desired, &estimated, 1e-3);
         }
-        let left = found(&control.correct(&wanted));
-        assert!((left.translation.vector - wanted.translation.vector).norm() < 1e-9);
-        assert!(left.rotation.angle_to(&wanted.rotation) < 1e-8);
+        let left = estimated(&control.correct(&desired));
+        assert!((left.translation.vector - desired.translation.vector).norm() < 1e-9);
+        assert!(left.rotation.angle_to(&desired.rotation) < 1e-8);
     }
 
     #[test]
     fn the_correction_is_bounded() {
         let config = ControllerConfig::default();
         let mut control = PoseControl::new(&config);
-        let (wanted, found) = (Pose::identity(), Pose::new(Vec3::repeat(1.0), Vec3::repeat(0.5)));
+        let (desired, estimated) = (Pose::identity(), Pose::new(Vec3::repeat(1.0), Vec3::repeat(0.5)));
         for _ in 0..10_000 {
-            control.observe(&wanted, &found, 1e-3);
+            control.observe(&desired, &estimated, 1e-3);
         }
-        let asked = control.correct(&wanted);
+        let asked = control.correct(&desired);
         assert!((asked.translation.vector.norm() / config.trim_limit_m - 1.0).abs() < 1e-6);
         assert!((asked.rotation.angle() / config.trim_limit_rad - 1.0).abs() < 1e-6);
     }

@@ -3,7 +3,7 @@
 use masseter_shared::config::Scenario;
 use masseter_shared::control::{Outcome, process};
 use masseter_shared::geometry::{GeometryError, Mechanism};
-use masseter_shared::lifecycle::{Assignment, ProcessError};
+use masseter_shared::lifecycle::{ProcessArguments, ProcessError};
 
 use crate::hold_position::HoldPosition;
 use crate::motion_controller::MotionController;
@@ -37,13 +37,13 @@ pub enum ControllerError {
 ///
 /// # Errors
 /// [`ControllerError`] when the scenario cannot be used, or the process cannot start or loses its messages.
-pub fn run(assignment: &Assignment, kind: Kind) -> Result<Outcome, ControllerError> {
+pub fn run(process_arguments: &ProcessArguments, kind: Kind) -> Result<Outcome, ControllerError> {
     match kind {
-        Kind::Motion => process::run(assignment, |scenario| {
+        Kind::Motion => process::run(process_arguments, |scenario| {
             let (mechanism, trajectory) = motion(scenario)?;
             Ok(MotionController::new(scenario, mechanism, trajectory))
         }),
-        Kind::Hold => process::run(assignment, |scenario| {
+        Kind::Hold => process::run(process_arguments, |scenario| {
             let (mechanism, trajectory) = motion(scenario)?;
             Ok(HoldPosition::new(scenario, mechanism, trajectory.duration_s()))
         }),

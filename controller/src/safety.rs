@@ -1,4 +1,4 @@
-//! What makes the controller stop: each check names the cause, the value and the limit it broke.
+//! Checks that stop the controller: each fault has a cause, a value and a limit.
 
 use masseter_shared::geometry::{AXES, Actuators, InverseError, LEGS, LimitViolation, Pose};
 use masseter_shared::messages::codes::{Cause, DriveState, NO_AXIS, NoPose, drive_state};
@@ -6,10 +6,10 @@ use masseter_shared::messages::{Event, Reading};
 
 use crate::kinematics::ForwardError;
 
-/// Something wrong, as an event reports it.
+/// A fault, in the form of an event.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Fault {
-    /// What it is.
+    /// The cause.
     pub cause: Cause,
     /// The axis concerned, if one is.
     pub axis: Option<usize>,
@@ -17,7 +17,7 @@ pub struct Fault {
     pub value: f64,
     /// The limit.
     pub limit: f64,
-    /// Why there is no pose, where that is what is wrong.
+    /// Why there is no pose, for faults of kinematics.
     pub no_pose: Option<NoPose>,
 }
 
@@ -27,12 +27,12 @@ impl Fault {
         Self { cause, axis: None, value, limit, no_pose: None }
     }
 
-    fn of_axis(cause: Cause, axis: usize, value: f64, limit: f64) -> Self {
+    fn for_axis(cause: Cause, axis: usize, value: f64, limit: f64) -> Self {
         Self { axis: Some(axis), ..Self::new(cause, value, limit) }
     }
 
-    /// Kinematics that gave nothing, by the fault of a leg or of all together.
-    fn of_kinematics(cause: Cause, reason: NoPose, leg: Option<usize>, value: f64) -> Self {
+    /// A fault of kinematics, of one leg or of the whole mechanism.
+    fn for_kinematics(cause: Cause, reason: NoPose, leg: Option<usize>, value: f64) -> Self {
         Self { axis: leg.map(|leg| LEGS + leg), no_pose: Some(reason), ..Self::new(cause, value, 0.0) }
     }
 
@@ -47,7 +47,7 @@ impl Fault {
 
 impl From<LimitViolation> for Fault {
     fn from(violation: LimitViolation) -> Self {
-        Self::of_axis(Cause::StrokeLimit, violation.axis, violation.value_m, violation.limit_m())
+        Self::for_axis(Cause::StrokeLimit, violation.axis, violation.value_m, violation.limit_m())
     }
 }
 
@@ -65,7 +65,7 @@ impl From<&ForwardError> for Fault {
             | ForwardError::Singular { .. } => (NoPose::NotFound, None),
         };
         let residual_m = error.residual_m().unwrap_or(f64::NAN);
-        Self::of_kinematics(Cause::ForwardKinematics, reason, leg, residual_m)
+        Self::for_kinematics(Cause::ForwardKinematics, reason, leg, residual_m)
     }
 }
 
@@ -75,7 +75,7 @@ impl From<InverseError> for Fault {
             InverseError::NotFinite => (NoPose::NotFinite, None),
             InverseError::NoLength { leg, .. } => (NoPose::NoLength, Some(leg)),
         };
-        Self::of_kinematics(Cause::InverseKinematics, reason, leg, f64::NAN)
+        Self::for_kinematics(Cause::InverseKinematics, reason, leg, f64::NAN)
     }
 }
 
@@ -89,7 +89,7 @@ pub(crate) fn check_reading(reading: &Reading) -> Result<(), Fault> {
             (f64::from(code), drive_state(code).is_ok()),
         ];
         if let Some((value, _)) = values.into_iter().find(|(_, is_good)| !is_good) {
-            return Err(Fault::of_axis(Cause::BadMessage, axis, value, 0.0));
+            return Err(Fault::for_axis(Cause::BadMessage, axis, value, 0.0));
         }
     }
     Ok(())
@@ -113,15 +113,15 @@ pub(crate) fn check_drives(reading: &Reading, moving: bool) -> Result<(), Fault>
         let faulty = matches!(state, Some(DriveState::Fault | DriveState::FaultReactionActive));
         if faulty || (moving && state != Some(DriveState::OperationEnabled)) {
             let enabled = f64::from(DriveState::OperationEnabled.code());
-            return Err(Fault::of_axis(Cause::DriveFault, axis, f64::from(code), enabled));
+            return Err(Fault::for_axis(Cause::DriveFault, axis, f64::from(code), enabled));
         }
     }
     Ok(())
 }
 
 /// Whether the platform is where it should be, within `limit_m`.
-pub(crate) fn check_tracking(wanted: &Pose, found: &Pose, limit_m: f64) -> Result<(), Fault> {
-    let distance_m = (wanted.translation.vector - found.translation.vector).norm();
+pub(crate) fn check_tracking(desired: &Pose, estimated: &Pose, limit_m: f64) -> Result<(), Fault> {
+    let distance_m = (desired.translation.vector - estimated.translation.vector).norm();
     if distance_m > limit_m {
         return Err(Fault::new(Cause::TrackingLost, distance_m, limit_m));
     }
@@ -139,7 +139,7 @@ pub(crate) fn check_velocity(
     for (axis, (step_m, limit_m_s)) in steps.zip(velocity_limit_m_s).enumerate() {
         let velocity_m_s = step_m / period_s;
         if velocity_m_s > *limit_m_s {
-            return Err(Fault::of_axis(Cause::VelocityLimit, axis, velocity_m_s, *limit_m_s));
+            return Err(Fault::for_axis(Cause::VelocityLimit, axis, velocity_m_s, *limit_m_s));
         }
     }
     Ok(())

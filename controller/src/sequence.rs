@@ -1,10 +1,10 @@
-//! The controller's sequence as a table: which state follows when something happens.
+//! The controller's sequence as a table: the state that follows a trigger.
 //!
-//! What makes something happen is judged elsewhere ([`motion_controller`](crate::motion_controller)); here is only what follows.
+//! The controllers find the trigger of a cycle. This module only holds the resulting state and request.
 
-use masseter_shared::messages::codes::ControllerState as State;
+use masseter_shared::messages::codes::{ControllerState as State, DriveRequest};
 
-/// What can move the sequence on. In one cycle only the most urgent counts: the last in this order.
+/// A trigger of the sequence. In one cycle only the most urgent trigger counts: the last in this order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Trigger {
     /// Enough complete readings in a row, and a pose found.
@@ -19,9 +19,9 @@ pub enum Trigger {
     Rested,
     /// All drives are off.
     Released,
-    /// Somebody wants the rig to stop.
+    /// A stop is requested.
     StopRequested,
-    /// Something is wrong.
+    /// A fault.
     Fault,
 }
 
@@ -41,8 +41,8 @@ impl Trigger {
 
 use State::{Disabling, Easing, Enabling, Finished, Holding, Running, SafeStop, WaitReadings};
 
-/// One row a state in the order of the codes, one column a trigger; a state that stands in its own
-/// row stays.
+/// One row a state in the order of the codes, one column a trigger; a state in its own
+/// row does not change.
 #[rustfmt::skip]
 const TABLE: [[State; 8]; 8] = [
     // Steady      Enabled       Eased         Played        Rested        Released      StopRequested Fault
@@ -59,6 +59,15 @@ const TABLE: [[State; 8]; 8] = [
 /// The state that follows `state` when `trigger` happens.
 pub fn next(state: State, trigger: Trigger) -> State {
     TABLE[state as usize][trigger as usize]
+}
+
+/// The request to all drives in that state.
+pub fn request(state: State) -> DriveRequest {
+    match state {
+        WaitReadings | Disabling | Finished => DriveRequest::Off,
+        Enabling | Easing | Running | Holding => DriveRequest::Enable,
+        SafeStop => DriveRequest::QuickStop,
+    }
 }
 
 #[cfg(test)]

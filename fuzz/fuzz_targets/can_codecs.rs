@@ -76,7 +76,7 @@ fn tapped(data: &[u8]) {
     let data = CanData { length: length.into(), bytes };
     let (bus_index, flags) = (bus.into(), flags.into());
     let message = FrameTap { time_ns, id, bus: bus_index, flags, data, ..FrameTap::default() };
-    let read = FrameTap::of_body(message.body()).expect("a body makes a message");
+    let read = FrameTap::from_body(message.body()).expect("a body makes a message");
     assert_eq!(read.body(), message.body());
     let Ok(tapped) = tap::decode(&message) else { return };
     assert_eq!(tap::decode(&tap::encode(bus, &tapped)), Ok(tapped));

@@ -2,11 +2,11 @@
 
 use masseter_shared::clock;
 use masseter_shared::config::Scenario;
-use masseter_shared::lifecycle::{Assignment, Post, ProcessError};
+use masseter_shared::lifecycle::{ProcessArguments, ProcessContext, ProcessError};
 use masseter_shared::messages::{Command, Event, FrameTap, Reading, Truth};
 use masseter_shared::realtime::{Cycle, Waiter, Wake};
 use masseter_shared::schedule::CycleSchedule;
-use masseter_shared::transport::{BatchOutlet, Inlet, Node, Outlet, Received, TransportError};
+use masseter_shared::transport::{BatchPublisher, Node, Publisher, Received, Subscriber, TransportError};
 
 use crate::core::{PlantCore, PlantError};
 use crate::cycle::{PlantPorts, run_cycle};
@@ -53,21 +53,21 @@ impl From<TransportError> for PlantProcessError {
 
 /// The plant's ports.
 struct Ports {
-    commands: Inlet<Command>,
-    readings: Outlet<Reading>,
-    truths: Outlet<Truth>,
-    frames: BatchOutlet<FrameTap>,
-    events: Outlet<Event>,
+    commands: Subscriber<Command>,
+    readings: Publisher<Reading>,
+    truths: Publisher<Truth>,
+    frames: BatchPublisher<FrameTap>,
+    events: Publisher<Event>,
 }
 
 impl Ports {
     fn open(node: &Node) -> Result<Self, ProcessError> {
         let ports = Self {
-            commands: node.newest_inlet()?,
-            readings: node.outlet()?,
-            truths: node.outlet()?,
-            frames: node.batch_outlet()?,
-            events: node.outlet()?,
+            commands: node.newest_subscriber()?,
+            readings: node.publisher()?,
+            truths: node.publisher()?,
+            frames: node.batch_publisher()?,
+            events: node.publisher()?,
         };
         ports.warm_up()?;
         Ok(ports)
@@ -102,12 +102,12 @@ impl Ports {
 }
 
 /// Runs the plant until it is asked to end or its controller hangs, then until its drives are off.
-pub fn run(assignment: &Assignment) -> Result<Reason, PlantProcessError> {
-    let post = assignment.take_up()?;
-    if post.scenario.can.is_virtual() {
-        serve(&post, PlantCore::new)
+pub fn run(process_arguments: &ProcessArguments) -> Result<Reason, PlantProcessError> {
+    let context = process_arguments.init()?;
+    if context.scenario.can.is_virtual() {
+        serve(&context, PlantCore::new)
     } else {
-        serve(&post, PlantCore::on_interfaces)
+        serve(&context, PlantCore::on_interfaces)
     }
 }
 
@@ -181,22 +181,22 @@ impl<L: RealTimeLink> PlantPorts<L> for RealTime<'_> {
 }
 
 fn serve<L: RealTimeLink>(
-    post: &Post,
+    context: &ProcessContext,
     build: impl Fn(&Scenario, u64) -> Result<PlantCore<L>, PlantError>,
 ) -> Result<Reason, PlantProcessError> {
-    let (scenario, schedule) = (&post.scenario, &post.schedule);
+    let (scenario, schedule) = (&context.scenario, &context.schedule);
     let timeout_cycles = u64::from(scenario.can.command_timeout_cycles);
     let abandoned_cycles = timeout_cycles + ABANDONED_AFTER_NS / scenario.period_ns();
     // Built once before the start, so that a plant that cannot be built is never reported ready.
     build(scenario, 0)?;
-    let ports = Ports::open(&post.node)?;
-    let start = post.ready_on(scenario.realtime.cores[1])?;
+    let ports = Ports::open(&context.node)?;
+    let start = context.ready_on(scenario.realtime.cores[1])?;
     ports.connect()?;
 
     let mut plant = build(scenario, start.epoch_ns)?;
     let cycle = Cycle::new(start.epoch_ns, scenario.period_ns());
     let mut real_time = RealTime { ports, cycle, schedule, obeys: true };
-    while !post.stop.is_made() && u64::from(plant.silent_cycles()) <= abandoned_cycles {
+    while !context.stop.is_made() && u64::from(plant.silent_cycles()) <= abandoned_cycles {
         let RealTime { cycle, ports, .. } = &mut real_time;
         let wake = cycle.wait_warm(|| warm_up(&mut plant, ports))?;
         run_cycle(&mut plant, &mut real_time, schedule, &wake)?;
@@ -211,7 +211,7 @@ fn serve<L: RealTimeLink>(
     // The last cycle's process data are on the wire only by now.
     plant.collect(real_time.cycle.wait().woke_ns)?;
     real_time.ports.publish_frames_and_events(&mut plant)?;
-    Ok(if post.stop.is_made() { Reason::Asked } else { Reason::Abandoned })
+    Ok(if context.stop.is_made() { Reason::Asked } else { Reason::Abandoned })
 }
 
 /// Works out what has happened on the wires by now, and touches the memory of the next messages.

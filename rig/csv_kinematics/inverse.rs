@@ -2,7 +2,7 @@
 
 use masseter_controller::kinematics::Assembly;
 use masseter_shared::geometry::{InverseError, Joints, Mechanism, Pose};
-use masseter_shared::messages::pose_of_fields;
+use masseter_shared::messages::pose_from_fields;
 
 use super::table::{Columns, CsvArgs, Lines, convert, mechanism};
 use masseter_terminal::Exit;
@@ -30,7 +30,7 @@ fn pose([x, y, z, qw, qx, qy, qz]: [f64; 7]) -> Result<Pose, String> {
     if (norm - 1.0).abs() > UNIT_TOLERANCE {
         return Err(format!("the quaternion has norm {norm}, not 1"));
     }
-    Ok(pose_of_fields([x, y, z], [qw, qx, qy, qz]))
+    Ok(pose_from_fields([x, y, z], [qw, qx, qy, qz]))
 }
 
 fn status(mechanism: &Mechanism, joints: &Joints) -> &'static str {

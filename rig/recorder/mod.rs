@@ -53,15 +53,15 @@ pub(crate) struct RecorderArgs {
 /// Records until it is asked to stop, then drains what is left. [`Exit::Incomplete`] if a received message is not in the
 /// recording.
 pub(crate) fn record(args: RecorderArgs) -> anyhow::Result<Exit> {
-    let assignment = args.process.assignment();
-    let process = assignment.take_up()?;
+    let process_arguments = args.process.process_arguments();
+    let process = process_arguments.init()?;
     let scenario = &process.scenario;
     // The threads started below inherit the cores.
     keep_off(&scenario.realtime.cores);
     let subscribers = Subscribers::open(&process.node)?;
     let scene = Scene::new(&Mechanism::new(&scenario.mechanism)?, &scenario.jaw);
     let server = match args.live {
-        Some(address) => Some(FoxgloveServer::start(address, scene.clone(), &assignment.domain)?),
+        Some(address) => Some(FoxgloveServer::start(address, scene.clone(), &process_arguments.domain)?),
         None => None,
     };
     let backlog = Backlog::start(Recorder::create(&args.recording, scene)?, Pace::RealTime);

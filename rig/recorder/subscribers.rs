@@ -3,28 +3,28 @@
 use masseter_recording::Recorded;
 use masseter_shared::clock;
 use masseter_shared::messages::{Command, Event, FrameTap, Message, Reading, State, Truth};
-use masseter_shared::transport::{BatchInlet, Inlet, Node, TransportError};
+use masseter_shared::transport::{BatchSubscriber, Node, Subscriber, TransportError};
 
 use super::sinks::Sinks;
 
 pub(super) struct Subscribers {
-    commands: Inlet<Command>,
-    readings: Inlet<Reading>,
-    states: Inlet<State>,
-    truths: Inlet<Truth>,
-    frames: BatchInlet<FrameTap>,
-    events: Inlet<Event>,
+    commands: Subscriber<Command>,
+    readings: Subscriber<Reading>,
+    states: Subscriber<State>,
+    truths: Subscriber<Truth>,
+    frames: BatchSubscriber<FrameTap>,
+    events: Subscriber<Event>,
 }
 
 impl Subscribers {
     pub(super) fn open(node: &Node) -> Result<Self, TransportError> {
         Ok(Self {
-            commands: node.inlet()?,
-            readings: node.inlet()?,
-            states: node.inlet()?,
-            truths: node.inlet()?,
-            frames: node.batch_inlet()?,
-            events: node.inlet()?,
+            commands: node.subscriber()?,
+            readings: node.subscriber()?,
+            states: node.subscriber()?,
+            truths: node.subscriber()?,
+            frames: node.batch_subscriber()?,
+            events: node.subscriber()?,
         })
     }
 
@@ -42,12 +42,12 @@ impl Subscribers {
 /// Drains one topic, at most its queue's length, so that a flood cannot delay the other topics. Each message gets its own
 /// log time, because some are published during the drain.
 fn drain<M: Message>(
-    inlet: &Inlet<M>,
+    subscriber: &Subscriber<M>,
     sinks: &mut Sinks,
     on_topic: impl Fn(M) -> Recorded,
 ) -> Result<(), TransportError> {
     for _ in 0..M::DEPTH {
-        let Some(message) = inlet.receive()? else { break };
+        let Some(message) = subscriber.receive()? else { break };
         sinks.write(&*message, clock::now_ns(), &on_topic);
     }
     Ok(())
@@ -55,12 +55,12 @@ fn drain<M: Message>(
 
 /// The same for a topic that travels in batches.
 fn drain_batches<M: Message>(
-    inlet: &BatchInlet<M>,
+    subscriber: &BatchSubscriber<M>,
     sinks: &mut Sinks,
     on_topic: impl Fn(M) -> Recorded,
 ) -> Result<(), TransportError> {
     for _ in 0..M::DEPTH {
-        let Some(batch) = inlet.receive()? else { break };
+        let Some(batch) = subscriber.receive()? else { break };
         let now_ns = clock::now_ns();
         batch.iter().for_each(|message| sinks.write(message, now_ns, &on_topic));
     }

@@ -172,11 +172,11 @@ impl ControllerPorts for VirtualPorts<'_> {
     }
 }
 
-/// Numbers and records the messages of one publisher on one topic, as its outlet would.
+/// Numbers and records the messages of one publisher on one topic, as its publisher would.
 #[derive(Default)]
-struct Outlet(u64);
+struct Publisher(u64);
 
-impl Outlet {
+impl Publisher {
     fn record<M: Message>(&mut self, backlog: &mut Backlog, now_ns: u64, fill: impl FnOnce(&mut M)) -> M {
         let mut message = M::default();
         fill(&mut message);
@@ -190,26 +190,26 @@ impl Outlet {
 /// The recording and the publishers it hears.
 struct Log {
     backlog: Backlog,
-    commands: Outlet,
-    readings: Outlet,
-    states: Outlet,
-    truths: Outlet,
-    frames: Outlet,
-    controller_events: Outlet,
-    plant_events: Outlet,
+    commands: Publisher,
+    readings: Publisher,
+    states: Publisher,
+    truths: Publisher,
+    frames: Publisher,
+    controller_events: Publisher,
+    plant_events: Publisher,
 }
 
 impl Log {
     fn new(backlog: Backlog) -> Self {
         Self {
             backlog,
-            commands: Outlet::default(),
-            readings: Outlet::default(),
-            states: Outlet::default(),
-            truths: Outlet::default(),
-            frames: Outlet::default(),
-            controller_events: Outlet::default(),
-            plant_events: Outlet::default(),
+            commands: Publisher::default(),
+            readings: Publisher::default(),
+            states: Publisher::default(),
+            truths: Publisher::default(),
+            frames: Publisher::default(),
+            controller_events: Publisher::default(),
+            plant_events: Publisher::default(),
         }
     }
 

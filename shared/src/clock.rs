@@ -1,7 +1,7 @@
-//! The one place that asks the machine for time. Cores never ask: they get time as an argument.
+//! The rig's only access to the machine's clocks. Cores get time as an argument.
 //!
 //! All times are nanoseconds of `CLOCK_MONOTONIC`, the same for every process of a machine. Wall-clock
-//! time names and dates runs, and dates what the kernel stamps.
+//! time is for the names and dates of runs.
 
 #![allow(clippy::disallowed_methods)]
 
@@ -44,13 +44,13 @@ pub fn sleep_until(deadline_ns: u64) {
     }
 }
 
-/// Sleeps for about `duration`; for the rig's unhurried processes.
+/// Sleeps for about `duration`; for processes without deadlines.
 pub fn sleep(duration: Duration) {
     sleep_until(now_ns() + duration.as_nanos() as u64);
 }
 
-/// By how much the wall clock is ahead of `CLOCK_MONOTONIC`, ns; none when something came between the two readings. It
-/// jumps when the clock is set, and when the machine was suspended.
+/// By how much the wall clock is ahead of `CLOCK_MONOTONIC`, ns; none when the two readings were interrupted. The
+/// value jumps when the clock is set, and when the machine was suspended.
 pub fn wall_ahead_ns() -> Option<i64> {
     let (before_ns, wall_ns, after_ns) = (now_ns(), read_ns(ClockId::Realtime), now_ns());
     (after_ns - before_ns < UNDISTURBED_NS).then(|| wall_ns as i64 - before_ns as i64)
@@ -66,7 +66,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_wall_clock_keeps_its_distance() {
+    fn the_difference_of_the_clocks_is_constant() {
         let look = || (0..1000).find_map(|_| wall_ahead_ns()).expect("one of many looks is undisturbed");
         assert!((look() - look()).abs() < 1_000_000);
     }

@@ -1,8 +1,7 @@
 //! What both sides of the rig agree on: the mechanism's geometry, the messages, the CAN link, the
 //! real-time loop and the configuration.
 //!
-//! Neither the controller's forward kinematics nor the plant's dynamics are here, and nothing here
-//! knows which process it runs in.
+//! Forward kinematics belongs to the controller and dynamics to the plant. This crate is the same in every process.
 
 pub mod clock;
 pub mod config;

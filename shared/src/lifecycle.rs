@@ -1,9 +1,8 @@
-//! How a process of the rig begins and ends: what it tells its supervisor, and what it is told.
+//! Start and end of a process of the rig.
 //!
-//! Over standard output it says once, as a line of JSON, that it is ready and what scheduling it
-//! obtained; over standard input it is told the epoch at which to begin, and the process ids of both
-//! loops. SIGTERM asks it to end in order, and comes too when the supervisor dies. Everything else
-//! travels over iceoryx2.
+//! The process writes one line of JSON to standard output: that it is ready, and the scheduling that the kernel granted. It
+//! reads the epoch of the first cycle and the process ids of both loops from standard input. SIGTERM requests an orderly
+//! end; the kernel also sends SIGTERM when the supervisor dies. All data travel over iceoryx2.
 
 use std::io::{self, BufRead, Write};
 use std::path::PathBuf;
@@ -19,29 +18,29 @@ use crate::realtime::scheduling::{Obtained, Wanted, obtain};
 use crate::schedule::{CycleSchedule, ScheduleError};
 use crate::transport::{Domain, DomainError, Node, TransportError};
 
-/// What a process is started with.
+/// The arguments of a process.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Assignment {
+pub struct ProcessArguments {
     /// The resolved scenario.
     pub scenario: PathBuf,
     /// The id of the run's domain.
     pub domain: String,
 }
 
-/// What every process of the rig has once it has taken up its assignment.
+/// The context of an initialised process.
 #[derive(Debug)]
-pub struct Post {
+pub struct ProcessContext {
     /// The resolved scenario.
     pub scenario: Scenario,
     /// The cycle's time table.
     pub schedule: CycleSchedule,
-    /// Its place in the run's domain.
+    /// The node in the run's domain.
     pub node: Node,
     /// The request to end.
     pub stop: StopRequest,
 }
 
-/// Why a process could not do its work.
+/// Why a process could not start or run.
 #[derive(Debug, thiserror::Error)]
 pub enum ProcessError {
     /// The scenario cannot be used.
@@ -62,25 +61,25 @@ pub enum ProcessError {
     /// The pipes to the supervisor failed.
     #[error("talking to the supervisor failed: {0}")]
     Pipe(io::Error),
-    /// The supervisor went away before it gave the word, or wants no start.
+    /// The supervisor ended before the start, or cancelled the start.
     #[error("the supervisor gave no start")]
     NoStart,
 }
 
-impl Assignment {
+impl ProcessArguments {
     /// Reads the scenario, joins the domain and listens for the request to end.
-    pub fn take_up(&self) -> Result<Post, ProcessError> {
+    pub fn init(&self) -> Result<ProcessContext, ProcessError> {
         let stop = StopRequest::listen().map_err(ProcessError::Signals)?;
         let scenario = Scenario::read(&self.scenario)?;
         scenario.validate()?;
         let schedule = CycleSchedule::new(&scenario.can, scenario.period_ns())?;
         let node = Node::join(&Domain::named(&self.domain)?)?;
-        Ok(Post { scenario, schedule, node, stop })
+        Ok(ProcessContext { scenario, schedule, node, stop })
     }
 }
 
-impl Post {
-    /// Asks for real time on a core, says that the process is ready, and waits for the word to begin.
+impl ProcessContext {
+    /// Requests real-time scheduling on a core, reports that the process is ready, and waits for the start.
     pub fn ready_on(&self, core: usize) -> Result<Start, ProcessError> {
         let realtime = &self.scenario.realtime;
         ready_and_wait(obtain(Wanted {
@@ -90,35 +89,35 @@ impl Post {
         }))
     }
 
-    /// The same without real time.
+    /// As [`Self::ready_on`], without real-time scheduling.
     pub fn ready(&self) -> Result<Start, ProcessError> {
         ready_and_wait(obtain(Wanted { core: None, fifo_priority: None, locked_memory: false }))
     }
 }
 
-/// A process's word that it is ready.
+/// The report that a process is ready.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Ready {
-    /// What it asked of the kernel and what it got.
+    /// The requested and the granted scheduling.
     pub scheduling: Obtained,
 }
 
-/// The supervisor's word to begin.
+/// The start of the first cycle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Start {
     /// Time of the first SYNC, ns of `CLOCK_MONOTONIC`.
     pub epoch_ns: u64,
-    /// Process ids of controller and plant, for who watches them.
+    /// Process ids of controller and plant, for the recorder.
     pub loops: [u32; 2],
 }
 
-/// A request to end, as signals make it.
+/// A request to end, made by a signal.
 #[derive(Debug, Clone)]
 pub struct StopRequest(Arc<AtomicBool>);
 
 impl StopRequest {
-    /// Listens for SIGTERM, also on the supervisor's death. SIGINT and SIGHUP reach the whole process group
-    /// from a terminal and are the supervisor's affair: here they do nothing.
+    /// Listens for SIGTERM, also on the supervisor's death. A terminal sends SIGINT and SIGHUP to the whole
+    /// process group; the supervisor reacts to them, and this process ignores them.
     fn listen() -> io::Result<Self> {
         let requested = Arc::new(AtomicBool::new(false));
         signal_hook::flag::register(SIGTERM, Arc::clone(&requested))?;
@@ -129,7 +128,7 @@ impl StopRequest {
         Ok(Self(requested))
     }
 
-    /// Listens for SIGTERM and SIGINT, for a process without supervisor.
+    /// Listens for SIGTERM and SIGINT, in a process without a supervisor.
     pub fn listen_alone() -> io::Result<Self> {
         let requested = Arc::new(AtomicBool::new(false));
         for signal in [SIGTERM, SIGINT] {
@@ -138,13 +137,13 @@ impl StopRequest {
         Ok(Self(requested))
     }
 
-    /// Whether the end has been asked for.
+    /// Whether a signal has requested the end.
     pub fn is_made(&self) -> bool {
         self.0.load(Ordering::Relaxed)
     }
 }
 
-/// Says that this process is ready, and waits for the word to begin.
+/// Reports that this process is ready, and waits for the start.
 fn ready_and_wait(scheduling: Obtained) -> Result<Start, ProcessError> {
     say(&Ready { scheduling }).map_err(ProcessError::Pipe)?;
     let mut line = String::new();

@@ -7,8 +7,8 @@
 
 mod room;
 
-use crate::clock::MILLISECOND_NS;
-use crate::config::CanConfig;
+use crate::clock::{MILLISECOND_NS, SECOND_NS};
+use crate::config::{CanConfig, RATES_HZ};
 use masseter_can::canopen::{Cob, NodeId, NodeIdError};
 use masseter_can::wire::{INTERFRAME_BITS, Rates, longest_bits, shortest_bits};
 use masseter_can::{BitrateError, BusPlan, NoReleaser, Overload, PeriodicMessage, Release, Rpdo1, Tpdo1};
@@ -27,6 +27,19 @@ const SDO_LENGTH: u32 = 8;
 const COMPUTE_NS: u64 = 20_000;
 
 /// Offsets from SYNC within one cycle, ns.
+///
+/// # Examples
+/// ```
+/// use masseter_shared::config::CanConfig;
+/// use masseter_shared::schedule::CycleSchedule;
+///
+/// let schedule = CycleSchedule::new(&CanConfig::default(), 1_000_000)?;
+/// assert!(schedule.reading_by_ns < schedule.controller_at_ns);
+/// assert!(schedule.controller_at_ns < schedule.command_by_ns);
+/// let refused = CycleSchedule::new(&CanConfig::default(), 500_000).unwrap_err();
+/// assert!(refused.to_string().contains("the highest rate_hz that fits"));
+/// # Ok::<(), masseter_shared::schedule::ScheduleError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct CycleSchedule {
     /// The earliest arrival of the last process data: frames without stuff bits take this long.
@@ -39,7 +52,7 @@ pub struct CycleSchedule {
     pub command_by_ns: u64,
 }
 
-/// A cycle that does not fit.
+/// Why there is no schedule.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ScheduleError {
     /// Unknown bit rate.
@@ -110,7 +123,7 @@ impl CycleSchedule {
         // A frame has arrived before the interframe space behind it.
         let pause_ns = rates.nominal().bits_to_ns(INTERFRAME_BITS);
         let reading_from_ns = shortest(sync) + axes * shortest(tpdo) - pause_ns;
-        // A heartbeat may just have begun when SYNC wants the bus.
+        // A heartbeat may have begun just before SYNC is queued.
         let heartbeat_ns = heartbeat_ns(can, rates);
         let up_ns = longest(sync) + axes * longest(tpdo);
         let down_ns = axes * longest(rpdo);
@@ -121,6 +134,32 @@ impl CycleSchedule {
             return Err(Misfit::NoTime { reading_by_ns, command_by_ns, period_ns });
         }
         Ok(Self { reading_from_ns, reading_by_ns, controller_at_ns, command_by_ns })
+    }
+}
+
+impl Room {
+    /// The room of a configured link, by bisection: whatever fits into a cycle fits into a longer one.
+    ///
+    /// # Errors
+    /// [`ScheduleError`] for unknown bit rates and node ids.
+    pub fn for_link(can: &CanConfig) -> Result<Self, ScheduleError> {
+        let fits = |rate_hz: u32| {
+            CycleSchedule::fit(can, SECOND_NS / u64::from(rate_hz)).map(|fitted| fitted.is_ok())
+        };
+        let answer_ns = answer_ns(can, heartbeat_ns(can, can.rates()?));
+        let (mut max_rate_hz, mut too_high_hz) = (*RATES_HZ.start(), *RATES_HZ.end() + 1);
+        if !fits(max_rate_hz)? {
+            return Ok(Self { max_rate_hz: None, answer_ns });
+        }
+        while too_high_hz - max_rate_hz > 1 {
+            let between_hz = u32::midpoint(max_rate_hz, too_high_hz);
+            if fits(between_hz)? {
+                max_rate_hz = between_hz;
+            } else {
+                too_high_hz = between_hz;
+            }
+        }
+        Ok(Self { max_rate_hz: Some(max_rate_hz), answer_ns })
     }
 }
 

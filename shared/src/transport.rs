@@ -1,14 +1,28 @@
-//! How messages travel: iceoryx2 publish–subscribe, one service a topic, one domain a run.
+//! Transport of messages: iceoryx2 publish–subscribe, one service for each topic, one domain for each run.
 //!
-//! Readings, commands and states are built in the loaned sample. What was sampled earlier is copied there once: the truth,
-//! events, and the frames of a cycle in batches.
-//! Nothing here ever waits for a subscriber: one that falls behind loses its oldest messages, and sees the gap in the
-//! sequence numbers. Two rigs never meet, because each [`Domain`] has names of its own.
+//! Readings, commands and states are written directly into the loaned sample. Truth, events and the frames of a cycle are
+//! copied there once. No publisher waits for a subscriber: a slow subscriber loses its oldest messages and sees the gap in
+//! the sequence numbers. Two rigs share no topic, because each [`Domain`] has names of its own.
+//!
+//! # Examples
+//! ```
+//! use masseter_shared::messages::Event;
+//! use masseter_shared::transport::{Node, ScratchDomain};
+//!
+//! let domain = ScratchDomain::claim("doc-transport")?;
+//! let node = Node::join(&domain)?;
+//! let subscriber = node.subscriber::<Event>()?;
+//! let mut publisher = node.publisher::<Event>()?;
+//! publisher.publish(|event| event.cycle = 7)?;
+//! let event = subscriber.receive()?.expect("the event has arrived");
+//! assert_eq!((event.seq, event.cycle), (1, 7));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod batches;
 mod domain;
 mod ports;
 
-pub use batches::{BatchInlet, BatchOutlet, ReceivedBatch};
+pub use batches::{BatchPublisher, BatchSubscriber, ReceivedBatch};
 pub use domain::{Claim, Domain, DomainError, ScratchDomain};
-pub use ports::{Inlet, Node, Outlet, Received, TransportError};
+pub use ports::{Node, Publisher, Received, Subscriber, TransportError};

@@ -49,47 +49,47 @@ const LOAN_BYTES: u64 = 48;
 const PERIOD_NS: u64 = 200_000;
 
 fn check_topic<M: Message>(node: &Node) {
-    let inlet = node.inlet::<M>().unwrap();
-    let mut outlet = node.outlet::<M>().unwrap();
-    outlet.warm_up().unwrap();
-    outlet.connect().unwrap();
-    inlet.connect().unwrap();
+    let subscriber = node.subscriber::<M>().unwrap();
+    let mut publisher = node.publisher::<M>().unwrap();
+    publisher.warm_up().unwrap();
+    publisher.connect().unwrap();
+    subscriber.connect().unwrap();
 
     let (count, largest_bytes) = allocations_of(|| {
         for _ in 0..MESSAGES {
-            outlet.publish(|_| {}).unwrap();
+            publisher.publish(|_| {}).unwrap();
         }
     });
     assert!(count <= MESSAGES && largest_bytes <= LOAN_BYTES, "{}: {count} of {largest_bytes}", M::TOPIC);
 
     let mut received = 0;
     let receiving = allocations_of(|| {
-        while let Some(message) = black_box(inlet.receive().unwrap()) {
+        while let Some(message) = black_box(subscriber.receive().unwrap()) {
             received += u64::from(!message.body().is_empty());
         }
-        assert!(inlet.receive().unwrap().is_none());
+        assert!(subscriber.receive().unwrap().is_none());
     });
     assert_eq!((receiving, received), ((0, 0), MESSAGES), "{}", M::TOPIC);
 }
 
 fn check_batches(node: &Node) {
-    let inlet = node.batch_inlet::<FrameTap>().unwrap();
-    let mut outlet = node.batch_outlet::<FrameTap>().unwrap();
+    let subscriber = node.batch_subscriber::<FrameTap>().unwrap();
+    let mut publisher = node.batch_publisher::<FrameTap>().unwrap();
     let frames = [FrameTap::default(); 14];
-    outlet.warm_up().unwrap();
-    outlet.connect().unwrap();
-    assert!(inlet.receive().unwrap().is_none());
+    publisher.warm_up().unwrap();
+    publisher.connect().unwrap();
+    assert!(subscriber.receive().unwrap().is_none());
 
     let (count, largest_bytes) = allocations_of(|| {
         for _ in 0..MESSAGES {
-            outlet.publish(frames).unwrap();
+            publisher.publish(frames).unwrap();
         }
     });
     assert!(count <= MESSAGES && largest_bytes <= LOAN_BYTES, "{count} of {largest_bytes}");
 
     let mut received = 0;
     let receiving = allocations_of(|| {
-        while let Some(batch) = black_box(inlet.receive().unwrap()) {
+        while let Some(batch) = black_box(subscriber.receive().unwrap()) {
             received += batch.len();
         }
     });
@@ -107,13 +107,13 @@ fn waiting_and_receiving_allocate_nothing_and_sending_one_small_counter() {
     check_batches(&node);
     check_topic::<Event>(&node);
 
-    let inlet = node.inlet::<Command>().unwrap();
+    let subscriber = node.subscriber::<Command>().unwrap();
     let mut cycle = Cycle::new(clock::now_ns() + PERIOD_NS, PERIOD_NS);
     let waiting = allocations_of(|| {
         for _ in 0..20 {
             let wake = cycle.wait();
             let deadline_ns = wake.woke_ns + PERIOD_NS / 10;
-            assert!(inlet.latest_by(deadline_ns, cycle.waiter(), |_| true).unwrap().is_none());
+            assert!(subscriber.latest_by(deadline_ns, cycle.waiter(), |_| true).unwrap().is_none());
         }
     });
     assert_eq!(waiting, (0, 0));

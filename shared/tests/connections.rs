@@ -21,26 +21,26 @@ fn assert_tells(told: &str, topic: &str) {
 }
 
 #[test]
-fn a_connection_that_is_refused_is_told_of() {
+fn a_refused_connection_is_reported() {
     let domain = ScratchDomain::claim("test-connections").unwrap();
     {
         let node = Node::join(&domain).unwrap();
-        let outlet = node.outlet::<Event>().unwrap();
-        let _inlet = node.inlet::<Event>().unwrap();
-        assert_tells(&refused(|| outlet.connect()), "event");
+        let publisher = node.publisher::<Event>().unwrap();
+        let _inlet = node.subscriber::<Event>().unwrap();
+        assert_tells(&refused(|| publisher.connect()), "event");
     }
     {
         let node = Node::join(&domain).unwrap();
-        let inlet = node.inlet::<Event>().unwrap();
-        let mut outlet = node.outlet::<Event>().unwrap();
-        assert_tells(&refused(|| inlet.receive()), "event");
-        outlet.publish(|_| {}).unwrap();
-        assert_tells(&inlet.receive().unwrap_err().to_string(), "event");
+        let subscriber = node.subscriber::<Event>().unwrap();
+        let mut publisher = node.publisher::<Event>().unwrap();
+        assert_tells(&refused(|| subscriber.receive()), "event");
+        publisher.publish(|_| {}).unwrap();
+        assert_tells(&subscriber.receive().unwrap_err().to_string(), "event");
     }
     {
         let node = Node::join(&domain).unwrap();
-        let inlet = node.batch_inlet::<FrameTap>().unwrap();
-        let _outlet = node.batch_outlet::<FrameTap>().unwrap();
-        assert_tells(&refused(|| inlet.receive()), "frame");
+        let subscriber = node.batch_subscriber::<FrameTap>().unwrap();
+        let _outlet = node.batch_publisher::<FrameTap>().unwrap();
+        assert_tells(&refused(|| subscriber.receive()), "frame");
     }
 }

@@ -9,7 +9,10 @@ use super::elimination::{Elimination, NEARLY_SINGULAR, SolutionFilter};
 use super::leg_angle::{LegAngle, coincide, separation_rad};
 use super::legs::each;
 use super::loop_equations::{LoopEquations, LoopSolution};
-use super::{Assembly, Certificate, Condition, ForwardError, MOST_SOLUTIONS};
+use super::{Assembly, Certificate, Condition, ForwardError};
+
+/// The most solutions of one input; they come in mirrored pairs.
+pub const MOST_SOLUTIONS: usize = 16;
 
 /// Estimates closer than this are one solution if one of them has a certificate, radians on every leg.
 const MERGED_WITHIN_RAD: f64 = 1e-6;

@@ -34,9 +34,10 @@ pub use certificate::Certificate;
 pub use complete::solve_completely;
 pub use equations::{Equations, Evaluation};
 pub use error::ForwardError;
+pub use loop_solutions::MOST_SOLUTIONS;
 pub use nearest::nearest_assembly_m;
 pub use solution::Solution;
-pub use solutions::{MOST_SOLUTIONS, Solutions};
+pub use solutions::Solutions;
 pub use solver::{
     Iteration, MAX_HALVINGS, MAX_ITERATIONS, Method, Options, Residual, StepRule, solve, solve_newton,
     solve_published, solve_traced,

@@ -4,11 +4,8 @@ use masseter_shared::geometry::{Actuators, Mechanism};
 
 use super::elimination::SolutionFilter;
 use super::loop_equations::{LoopEquations, LoopSolution};
-use super::loop_solutions::{LoopSolutions, check, nearest_other_rad};
+use super::loop_solutions::{LoopSolutions, MOST_SOLUTIONS, check, nearest_other_rad};
 use super::{ForwardError, Solution};
-
-/// There are never more; they come in mirrored pairs.
-pub const MOST_SOLUTIONS: usize = 16;
 
 /// Every real solution of the equations (the paper, eq. 1) for one input, mirrored ones next to each other.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -175,8 +175,8 @@ fn what_is_wanted_at_a_sample_is_found_there() {
     for _ in 0..1000 {
         bench.cycle(Some);
         bench.controller.fill_state(&mut state);
-        let wanted = nalgebra::Vector3::from(state.desired_position_m);
-        worst_m = worst_m.max((wanted - nalgebra::Vector3::from(state.estimated_position_m)).norm());
+        let desired = nalgebra::Vector3::from(state.desired_position_m);
+        worst_m = worst_m.max((desired - nalgebra::Vector3::from(state.estimated_position_m)).norm());
     }
     // The plant is exact, so what is left is the trim's own doing.
     assert!(worst_m < 2e-5, "{worst_m}");
@@ -184,7 +184,7 @@ fn what_is_wanted_at_a_sample_is_found_there() {
 
 /// As after its drives were off: the encoders may count the end of the stroke as outside, or it was pushed there.
 #[test]
-fn a_rig_that_stands_a_little_outside_its_strokes_is_eased_back_into_them() {
+fn axes_slightly_outside_their_strokes_are_eased_back() {
     let lowest_m = MechanismConfig::default().strokes.leg_m[0];
     let start_m = [lowest_m - 1e-6, lowest_m, lowest_m - 0.5e-3];
     let mut bench = Bench::standing_at(start_m);

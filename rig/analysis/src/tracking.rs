@@ -4,7 +4,7 @@
 use masseter_shared::clock::SECOND_NS;
 use masseter_shared::geometry::Pose;
 use masseter_shared::messages::codes::ControllerState;
-use masseter_shared::messages::{State, Truth, pose_of_fields};
+use masseter_shared::messages::{State, Truth, pose_from_fields};
 use serde::Serialize;
 
 use super::join::Join;
@@ -177,8 +177,8 @@ impl Tracking {
     /// The state of a cycle with a fresh reading: one used again was compared when it was fresh.
     pub(super) fn solution(&mut self, state: &State) {
         let solution = Solution {
-            desired: pose_of_fields(state.desired_position_m, state.desired_quaternion_wxyz),
-            estimated: pose_of_fields(state.estimated_position_m, state.estimated_quaternion_wxyz),
+            desired: pose_from_fields(state.desired_position_m, state.desired_quaternion_wxyz),
+            estimated: pose_from_fields(state.estimated_position_m, state.estimated_quaternion_wxyz),
             state: state.controller_state,
         };
         if self.source == PoseSource::Estimate {
@@ -190,7 +190,7 @@ impl Tracking {
     }
 
     pub(super) fn truth(&mut self, truth: &Truth) {
-        let pose = pose_of_fields(truth.position_m, truth.quaternion_wxyz);
+        let pose = pose_from_fields(truth.position_m, truth.quaternion_wxyz);
         if let Some((solution, truth)) = self.poses.right(truth.cycle, (truth.sampled_ns, pose)) {
             self.compare(&solution, truth);
         }

@@ -4,12 +4,12 @@ use std::process::Stdio;
 use std::time::Duration;
 
 use iceoryx2::port::backpressure_strategy::BackpressureStrategy;
-use iceoryx2::port::publisher::Publisher;
-use iceoryx2::port::subscriber::Subscriber;
+use iceoryx2::port::publisher::Publisher as IceoryxPublisher;
+use iceoryx2::port::subscriber::Subscriber as IceoryxSubscriber;
 use iceoryx2::prelude::ipc;
 use masseter_shared::clock;
 use masseter_shared::messages::{Command, Message, Reading};
-use masseter_shared::transport::{Domain, Inlet, Node, Outlet, ScratchDomain};
+use masseter_shared::transport::{Domain, Node, Publisher, ScratchDomain, Subscriber};
 
 use super::channel::Channel;
 use super::peer::Peer;
@@ -26,20 +26,20 @@ const ATTEMPTS: u32 = 5000;
 pub(super) trait Ends: Sized {
     /// The commanding side.
     fn commander(node: &Node) -> anyhow::Result<(Self::Out<Command>, Self::In<Reading>)> {
-        Ok((Self::outlet(node)?, Self::inlet(node)?))
+        Ok((Self::publisher(node)?, Self::subscriber(node)?))
     }
     /// Its sending end.
     type Out<M: Message + Numbered>;
     /// Its receiving end.
     type In<M: Message + Numbered>;
-    /// Opens the sending end.
-    fn outlet<M: Message + Numbered>(node: &Node) -> anyhow::Result<Self::Out<M>>;
-    /// Opens the receiving end.
-    fn inlet<M: Message + Numbered>(node: &Node) -> anyhow::Result<Self::In<M>>;
+    /// Opens a sending end.
+    fn publisher<M: Message + Numbered>(node: &Node) -> anyhow::Result<Self::Out<M>>;
+    /// Opens a receiving end.
+    fn subscriber<M: Message + Numbered>(node: &Node) -> anyhow::Result<Self::In<M>>;
     /// Sends a message with this number.
     fn send<M: Message + Numbered>(out: &mut Self::Out<M>, number: u64) -> anyhow::Result<()>;
     /// The number of the next message, if one is there.
-    fn receive<M: Message + Numbered>(inlet: &Self::In<M>) -> anyhow::Result<Option<u64>>;
+    fn receive<M: Message + Numbered>(subscriber: &Self::In<M>) -> anyhow::Result<Option<u64>>;
 }
 
 /// A message that can carry the number of a round trip.
@@ -70,23 +70,23 @@ impl Numbered for Reading {
 pub(super) struct Ports;
 
 impl Ends for Ports {
-    type Out<M: Message + Numbered> = Outlet<M>;
-    type In<M: Message + Numbered> = Inlet<M>;
+    type Out<M: Message + Numbered> = Publisher<M>;
+    type In<M: Message + Numbered> = Subscriber<M>;
 
-    fn outlet<M: Message + Numbered>(node: &Node) -> anyhow::Result<Outlet<M>> {
-        Ok(node.outlet()?)
+    fn publisher<M: Message + Numbered>(node: &Node) -> anyhow::Result<Publisher<M>> {
+        Ok(node.publisher()?)
     }
 
-    fn inlet<M: Message + Numbered>(node: &Node) -> anyhow::Result<Inlet<M>> {
-        Ok(node.newest_inlet()?)
+    fn subscriber<M: Message + Numbered>(node: &Node) -> anyhow::Result<Subscriber<M>> {
+        Ok(node.newest_subscriber()?)
     }
 
-    fn send<M: Message + Numbered>(out: &mut Outlet<M>, number: u64) -> anyhow::Result<()> {
+    fn send<M: Message + Numbered>(out: &mut Publisher<M>, number: u64) -> anyhow::Result<()> {
         Ok(out.publish(|message| message.set_number(number))?)
     }
 
-    fn receive<M: Message + Numbered>(inlet: &Inlet<M>) -> anyhow::Result<Option<u64>> {
-        Ok(inlet.receive()?.map(|message| message.number()))
+    fn receive<M: Message + Numbered>(subscriber: &Subscriber<M>) -> anyhow::Result<Option<u64>> {
+        Ok(subscriber.receive()?.map(|message| message.number()))
     }
 }
 
@@ -105,15 +105,15 @@ impl Bare {
 }
 
 impl Ends for Bare {
-    type Out<M: Message + Numbered> = Publisher<ipc::Service, M, ()>;
-    type In<M: Message + Numbered> = Subscriber<ipc::Service, M, ()>;
+    type Out<M: Message + Numbered> = IceoryxPublisher<ipc::Service, M, ()>;
+    type In<M: Message + Numbered> = IceoryxSubscriber<ipc::Service, M, ()>;
 
-    fn outlet<M: Message + Numbered>(node: &Node) -> anyhow::Result<Self::Out<M>> {
+    fn publisher<M: Message + Numbered>(node: &Node) -> anyhow::Result<Self::Out<M>> {
         let topic = Self::topic::<M>(node)?;
         Ok(topic.publisher_builder().backpressure_strategy(BackpressureStrategy::DiscardData).create()?)
     }
 
-    fn inlet<M: Message + Numbered>(node: &Node) -> anyhow::Result<Self::In<M>> {
+    fn subscriber<M: Message + Numbered>(node: &Node) -> anyhow::Result<Self::In<M>> {
         Ok(Self::topic::<M>(node)?.subscriber_builder().create()?)
     }
 
@@ -124,8 +124,8 @@ impl Ends for Bare {
         Ok(())
     }
 
-    fn receive<M: Message + Numbered>(inlet: &Self::In<M>) -> anyhow::Result<Option<u64>> {
-        Ok(inlet.receive()?.map(|sample| sample.payload().number()))
+    fn receive<M: Message + Numbered>(subscriber: &Self::In<M>) -> anyhow::Result<Option<u64>> {
+        Ok(subscriber.receive()?.map(|sample| sample.payload().number()))
     }
 }
 
@@ -165,8 +165,8 @@ fn greet<E: Ends>(commands: &mut E::Out<Command>, readings: &E::In<Reading>) -> 
 /// Answers every command with a reading of the same number, until the process is killed.
 pub(super) fn answer<E: Ends>(domain: &Domain) -> anyhow::Result<()> {
     let node = Node::join(domain)?;
-    let commands: E::In<Command> = E::inlet(&node)?;
-    let mut readings: E::Out<Reading> = E::outlet(&node)?;
+    let commands: E::In<Command> = E::subscriber(&node)?;
+    let mut readings: E::Out<Reading> = E::publisher(&node)?;
     loop {
         let number = poll(|| E::receive(&commands))?;
         E::send(&mut readings, number)?;

@@ -96,7 +96,7 @@ impl Scene {
 
     /// Legs from hinge to platform corner, with the hinges as points.
     fn legs(&self, truth: &Truth) -> SceneEntity {
-        let pose = masseter_shared::messages::pose_of_fields(truth.position_m, truth.quaternion_wxyz);
+        let pose = masseter_shared::messages::pose_from_fields(truth.position_m, truth.quaternion_wxyz);
         let hinges: [Vec3; LEGS] = std::array::from_fn(|leg| self.mechanism.hinge(leg, truth.joint_m[leg]));
         let ends =
             hinges.iter().zip(self.mechanism.corners_at(&pose)).flat_map(|(hinge, corner)| [*hinge, corner]);

@@ -1,8 +1,8 @@
 //! The bus trait: one node's port onto a wire, as one `SocketCAN` socket is.
 //!
-//! Time is an argument: a simulated wire lives by it, a real one ignores it in favour of the kernel's
-//! time stamps, both in ns of `CLOCK_MONOTONIC`. No call blocks or allocates. Opening, configuring
-//! and restarting an interface are not part of it.
+//! Time is an argument, in ns of `CLOCK_MONOTONIC`. A simulated wire takes its time from this argument; a real wire uses
+//! the kernel's time stamps instead. No call blocks or allocates. Opening, configuring and restarting an interface are
+//! not part of the trait.
 
 use std::io;
 
@@ -10,15 +10,14 @@ use super::frame::Frame;
 
 /// One node's port onto a wire.
 pub trait Bus {
-    /// Queues a frame for transmission at `now_ns`; it goes out as the wire gets free, by priority on a simulated wire,
-    /// in the order of sending on a real interface.
+    /// Queues a frame for transmission at `now_ns`. The frame goes out when the wire is free: by priority on a simulated
+    /// wire, in the order of sending on a real interface.
     ///
     /// # Errors
-    /// [`SendError`]; a refused frame is not queued, and sending it again is up to the caller.
+    /// [`SendError`]; a refused frame is not queued. The caller decides whether to send the frame again.
     fn send(&mut self, now_ns: u64, frame: Frame) -> Result<(), SendError>;
 
-    /// The next frame of another node that had arrived at `now_ns`, oldest first; `None` when there is
-    /// none. A port never receives its own frames.
+    /// The oldest frame of another node that had arrived at `now_ns` and was not fetched yet; `None` when there is none. A port never receives its own frames.
     ///
     /// # Errors
     /// [`ReceiveError`]; frames received before and after the failure are still delivered by later
@@ -56,7 +55,7 @@ pub struct Received {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum SendError {
     /// The transmit queue is full (`ENOBUFS`).
-    #[error("transmit queue full ({capacity} frames): the bus is overloaded, or nobody acknowledges")]
+    #[error("transmit queue full ({capacity} frames): the bus is overloaded, or no node acknowledges")]
     QueueFull {
         /// Frames the queue holds.
         capacity: usize,
@@ -113,11 +112,11 @@ pub enum ReceiveError {
 /// State of fault confinement (ISO 11898-1).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ErrorState {
-    /// Takes full part and signals errors actively.
+    /// The node sends, receives, and signals errors with dominant flags.
     Active,
-    /// An error counter reached 128: signals errors passively.
+    /// An error counter reached 128: the node signals errors with recessive flags.
     Passive,
-    /// The transmit error counter passed 255: neither sends nor receives.
+    /// The transmit error counter passed 255: the node neither sends nor receives.
     BusOff,
 }
 

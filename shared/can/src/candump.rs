@@ -1,6 +1,6 @@
 //! candump log lines: `(1436509052.249713) vcan0 123#11223344`.
 //!
-//! Time stamps keep whole microseconds, as the format does. Logs are written, not read.
+//! Time stamps have whole microseconds, as in the format. This module writes logs and does not read them.
 
 use std::fmt::{self, Write};
 

@@ -1,8 +1,8 @@
-//! What a tap reports besides frames: errors on the wire and controllers that change their error state.
+//! Errors on the wire and changes of a controller's error state, as a tap reports them.
 //!
-//! Recorded and logged as `SocketCAN`'s error messages are (`linux/can/error.h`): identifier flag
-//! 2000_0000h with the class, details in the data bytes, error counters in bytes 6 and 7. Byte 5, left to
-//! the driver there, holds the port. Overload frames, lost arbitration and line faults are not represented.
+//! The coding is that of `SocketCAN`'s error messages (`linux/can/error.h`): identifier flag 2000_0000h with the class,
+//! details in the data bytes, error counters in bytes 6 and 7. Byte 5, which the kernel leaves to the driver, holds the
+//! port. Overload frames, lost arbitration and line faults are not represented.
 
 use super::bus::{BusStatus, ErrorState};
 
@@ -21,12 +21,12 @@ const TRANSMIT_PASSIVE: u8 = 0x20;
 const ACTIVE: u8 = 0x40;
 const BIT_ERROR_IN_TRANSMISSION: u8 = 0x81;
 
-/// What happened.
+/// The kind of an error.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ErrorKind {
     /// A frame was destroyed by an error frame.
     Bit,
-    /// A frame was acknowledged by nobody, and ended in an error frame.
+    /// No node acknowledged a frame, which ended in an error frame.
     Acknowledge,
     /// A controller changed its error state.
     State(ErrorState),
@@ -35,19 +35,19 @@ pub enum ErrorKind {
 /// An error as a tap reports it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ErrorReport {
-    /// When: the end of an error frame's delimiter, or the change of state, ns.
+    /// Time of the error: the end of an error frame's delimiter, or the change of state, ns.
     pub time_ns: u64,
-    /// The port concerned: the transmitter, or who changed its state.
+    /// The port: of the transmitter, or of the controller whose state changed.
     pub port: u8,
-    /// What.
+    /// The kind of the error.
     pub kind: ErrorKind,
-    /// Transmit error counter behind it, at most 255 as the byte holds.
+    /// Transmit error counter after the error, at most 255.
     pub tec: u8,
-    /// Receive error counter behind it.
+    /// Receive error counter after the error.
     pub rec: u8,
 }
 
-/// A message that is no error report of this kind.
+/// An error message of a class that is not represented.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("error message {id:X}h is of no class that the rig's buses report")]
 pub struct ErrorReportError {

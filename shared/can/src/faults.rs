@@ -1,8 +1,8 @@
-//! Faults of a CAN link: which frames and nodes they strike, when, and by which chance.
+//! Faults of a CAN link: the frames and nodes they act on, their times and their probabilities.
 //!
-//! Purely declarative, and deterministic: whether a fault strikes a frame is a function of the seed, the
-//! fault and the frame's number, not of how often anybody asks. Who carries faults out is the
-//! [`VirtualWire`](super::VirtualWire), or on any other bus [`PortFaults`](super::wrapped::PortFaults).
+//! The faults are declarative and deterministic: seed, fault and number of a frame decide whether the fault acts on the
+//! frame, however often a caller asks. [`VirtualWire`](super::VirtualWire) carries the faults out, and on any other bus
+//! [`PortFaults`](super::PortFaults).
 
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg32;
@@ -15,7 +15,7 @@ use super::id::CanId;
 pub enum FaultKind {
     /// Destroys a frame on the wire: an error frame follows, then the transmitter repeats.
     Corrupt,
-    /// Makes a receiver lose a frame without anybody noticing.
+    /// Makes a receiver lose a frame without an error on the wire.
     Lose,
     /// Holds a frame back before it is queued for transmission.
     Delay {
@@ -30,9 +30,9 @@ pub enum FaultKind {
         /// The frame.
         frame: Frame,
     },
-    /// Takes a node off the wire: it neither sends nor hears nor acknowledges, and its queue fills.
+    /// Takes a node off the wire: the node neither sends nor receives nor acknowledges, and its queue fills.
     Disconnect,
-    /// Sends a node's controller into bus-off.
+    /// Puts a node's controller into bus-off.
     BusOff,
 }
 
@@ -51,34 +51,34 @@ impl FaultKind {
         }
     }
 
-    /// For faults of which nothing but their kind matters.
-    fn is(wanted: Self) -> impl Fn(Self) -> Option<()> {
-        move |kind| (kind == wanted).then_some(())
+    /// A selector of faults of one kind.
+    fn is(selected: Self) -> impl Fn(Self) -> Option<()> {
+        move |kind| (kind == selected).then_some(())
     }
 }
 
 /// One fault.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Fault {
-    /// By which it is told of and makes its choices; its own in the whole link.
+    /// Number of the fault in reports and for its random choices; unique in the link.
     pub number: usize,
     /// What it does.
     pub kind: FaultKind,
-    /// From when on, ns.
+    /// Begin, ns.
     pub from_ns: u64,
-    /// Until when, ns.
+    /// End, ns.
     pub until_ns: u64,
     /// Frames of this identifier only.
     pub id: Option<CanId>,
     /// The port concerned: of frames their sender, of lost frames the receiver, else the node itself.
     pub port: Option<usize>,
-    /// Chance that it strikes a frame, 0 to 1.
+    /// Probability that the fault acts on a frame, 0 to 1.
     pub probability: f64,
-    /// Strikes after which it ends.
+    /// Activations after which the fault ends.
     pub count: u64,
 }
 
-/// A fault began or ended to do something.
+/// A fault has begun to act, or has ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct FaultNote {
     /// When, ns.
@@ -87,25 +87,25 @@ pub struct FaultNote {
     pub fault: usize,
     /// The node concerned, if the fault names one.
     pub port: Option<usize>,
-    /// How often it has struck; 0 at its beginning.
+    /// Number of activations; 0 at the beginning.
     pub strikes: u64,
-    /// Whether it is over.
+    /// Whether the fault has ended.
     pub has_ended: bool,
 }
 
-/// A frame as faults choose it.
+/// A frame with the number by which faults select frames.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct NumberedFrame {
-    /// When it would be struck, ns.
+    /// Time at which a fault would act on the frame, ns.
     pub(super) at_ns: u64,
     /// The port concerned.
     pub(super) port: usize,
     pub(super) id: CanId,
-    /// No other frame of which the same is asked has it.
+    /// Unique among the frames of the same query.
     pub(super) number: u64,
 }
 
-/// The faults of one bus, and what they did.
+/// The faults of one bus, and their activations so far.
 #[derive(Debug, Clone, Default)]
 pub struct Faults {
     list: Vec<Listed>,
@@ -117,8 +117,8 @@ struct Listed {
     fault: Fault,
     strikes: u64,
     began_ns: Option<u64>,
-    is_begin_told: bool,
-    is_end_told: bool,
+    is_begin_reported: bool,
+    is_end_reported: bool,
 }
 
 impl Listed {
@@ -134,8 +134,13 @@ impl Listed {
 impl Faults {
     /// These faults; the same seed makes the same choices.
     pub fn new(faults: Vec<Fault>, seed: u64) -> Self {
-        let listed =
-            |fault| Listed { fault, strikes: 0, began_ns: None, is_begin_told: false, is_end_told: false };
+        let listed = |fault| Listed {
+            fault,
+            strikes: 0,
+            began_ns: None,
+            is_begin_reported: false,
+            is_end_reported: false,
+        };
         Self { list: faults.into_iter().map(listed).collect(), seed }
     }
 
@@ -144,52 +149,52 @@ impl Faults {
         self.list.is_empty()
     }
 
-    /// What each of them makes a node say, in their order.
+    /// The frame that each fault makes a node babble, in the order of the faults.
     pub(super) fn babbled(&self) -> impl Iterator<Item = Option<Frame>> {
         self.list.iter().map(|listed| listed.fault.kind.babbled())
     }
 
     /// The fault that destroys a frame.
-    pub(super) fn corrupts(&self, frame: NumberedFrame) -> Option<Strike> {
-        self.strikes(frame, FaultKind::is(FaultKind::Corrupt)).map(|(strike, ())| strike)
+    pub(super) fn corrupts(&self, frame: NumberedFrame) -> Option<FaultActivation> {
+        self.activation(frame, FaultKind::is(FaultKind::Corrupt)).map(|(activation, ())| activation)
     }
 
-    /// The fault that has a frame sent twice.
-    pub(super) fn duplicates(&self, frame: NumberedFrame) -> Option<Strike> {
-        self.strikes(frame, FaultKind::is(FaultKind::Duplicate)).map(|(strike, ())| strike)
+    /// The fault that makes a transmitter send the frame twice.
+    pub(super) fn duplicates(&self, frame: NumberedFrame) -> Option<FaultActivation> {
+        self.activation(frame, FaultKind::is(FaultKind::Duplicate)).map(|(activation, ())| activation)
     }
 
     /// The fault that holds a frame back, and for how long, ns.
-    pub(super) fn delays(&self, frame: NumberedFrame) -> Option<(Strike, u64)> {
-        self.strikes(frame, FaultKind::delay_ns)
+    pub(super) fn delays(&self, frame: NumberedFrame) -> Option<(FaultActivation, u64)> {
+        self.activation(frame, FaultKind::delay_ns)
     }
 
-    /// Whether a fault makes the frame's port, which receives it, lose it; that is recorded.
+    /// Whether a fault makes the receiving port lose the frame. The activation is recorded.
     pub(super) fn loses(&mut self, frame: NumberedFrame) -> bool {
-        let strike = self.strikes(frame, FaultKind::is(FaultKind::Lose));
-        strike.inspect(|&(strike, ())| self.record(strike)).is_some()
+        let activation = self.activation(frame, FaultKind::is(FaultKind::Lose));
+        activation.inspect(|&(activation, ())| self.record(activation)).is_some()
     }
 
-    /// The first fault of those that `part` selects that strikes the frame, with what `part` takes from it.
+    /// The first of the faults selected by `part` that acts on the frame, with the value of `part`.
     #[inline]
-    fn strikes<T>(
+    fn activation<T>(
         &self,
         NumberedFrame { at_ns, port, id, number }: NumberedFrame,
         part: impl Fn(FaultKind) -> Option<T>,
-    ) -> Option<(Strike, T)> {
+    ) -> Option<(FaultActivation, T)> {
         self.unless_empty(|list| {
             list.iter().enumerate().find_map(|(place, listed)| {
                 let part = part(listed.fault.kind)?;
                 let may = listed.is_live(at_ns) && listed.concerns(port, id);
-                let strikes = may && self.chance(place, number).random_bool(listed.fault.probability);
-                strikes.then_some((Strike { place, at_ns }, part))
+                let is_hit = may && self.chance(place, number).random_bool(listed.fault.probability);
+                is_hit.then_some((FaultActivation { place, at_ns }, part))
             })
         })
     }
 
     /// A number from 0 to `below` − 1 for a fault and a frame.
-    pub(super) fn pick(&self, strike: Strike, number: u64, below: u32) -> u32 {
-        let mut chance = self.chance(strike.place, number);
+    pub(super) fn pick(&self, activation: FaultActivation, number: u64, below: u32) -> u32 {
+        let mut chance = self.chance(activation.place, number);
         let _: f64 = chance.random();
         chance.random_range(0..below.max(1))
     }
@@ -199,13 +204,13 @@ impl Faults {
         self.of_node(now_ns, port, FaultKind::is(FaultKind::Disconnect)).is_some()
     }
 
-    /// The fault that puts a node off the bus at that time.
-    pub(super) fn puts_off(&self, now_ns: u64, port: usize) -> Option<Strike> {
-        self.of_node(now_ns, port, FaultKind::is(FaultKind::BusOff)).map(|(strike, ())| strike)
+    /// The fault that puts a node into bus-off at that time.
+    pub(super) fn puts_off(&self, now_ns: u64, port: usize) -> Option<FaultActivation> {
+        self.of_node(now_ns, port, FaultKind::is(FaultKind::BusOff)).map(|(activation, ())| activation)
     }
 
-    /// The fault that makes a node babble at that time, and what it says.
-    pub(super) fn makes_babble(&self, now_ns: u64, port: usize) -> Option<(Strike, Frame)> {
+    /// The fault that makes a node babble at that time, and the babbled frame.
+    pub(super) fn makes_babble(&self, now_ns: u64, port: usize) -> Option<(FaultActivation, Frame)> {
         self.of_node(now_ns, port, FaultKind::babbled)
     }
 
@@ -215,14 +220,15 @@ impl Faults {
         now_ns: u64,
         port: usize,
         part: impl Fn(FaultKind) -> Option<T>,
-    ) -> Option<(Strike, T)> {
+    ) -> Option<(FaultActivation, T)> {
         self.unless_empty(|list| {
             let mut live = of_port(list, port, part).filter(|(_, listed, _)| listed.is_live(now_ns));
-            live.next().map(|(place, listed, part)| (Strike { place, at_ns: listed.fault.from_ns }, part))
+            live.next()
+                .map(|(place, listed, part)| (FaultActivation { place, at_ns: listed.fault.from_ns }, part))
         })
     }
 
-    /// When a node is connected, from `from_ns` on.
+    /// The first time from `from_ns` on at which the node is connected.
     #[inline]
     pub(super) fn connected_from_ns(&self, from_ns: u64, port: usize) -> u64 {
         let mut connected_ns = from_ns;
@@ -233,7 +239,7 @@ impl Faults {
         connected_ns
     }
 
-    /// When a fault next makes a node babble that can do so from `able_ns` on.
+    /// The next time at which a fault makes a node babble; the node can send from `able_ns` on.
     #[inline]
     pub(super) fn babbles_from_ns(&self, able_ns: u64, port: usize) -> Option<u64> {
         self.unless_empty(|list| {
@@ -246,24 +252,24 @@ impl Faults {
         })
     }
 
-    /// A fault has struck.
-    pub(super) fn record(&mut self, strike: Strike) {
-        let listed = &mut self.list[strike.place];
-        listed.began_ns.get_or_insert(strike.at_ns);
+    /// Records an activation.
+    pub(super) fn record(&mut self, activation: FaultActivation) {
+        let listed = &mut self.list[activation.place];
+        listed.began_ns.get_or_insert(activation.at_ns);
         listed.strikes += 1;
     }
 
     /// The next forced bus-off of a node that is on the bus from `from_ns` on.
-    pub(super) fn next_bus_off(&self, from_ns: u64, port: usize) -> Option<Strike> {
+    pub(super) fn next_bus_off(&self, from_ns: u64, port: usize) -> Option<FaultActivation> {
         let bus_offs = of_port(&self.list, port, FaultKind::is(FaultKind::BusOff));
         let strikes = bus_offs.filter_map(|(place, listed, ())| {
             let at_ns = listed.fault.from_ns.max(from_ns);
-            listed.is_live(at_ns).then_some(Strike { place, at_ns })
+            listed.is_live(at_ns).then_some(FaultActivation { place, at_ns })
         });
-        strikes.min_by_key(|strike| strike.at_ns)
+        strikes.min_by_key(|activation| activation.at_ns)
     }
 
-    /// Disconnections act by themselves; what they strike is not counted.
+    /// Marks disconnections as begun. The frames they suppress are not counted.
     pub(super) fn begin_disconnections(&mut self, now_ns: u64) {
         let off = self.list.iter_mut().filter(|listed| listed.fault.kind == FaultKind::Disconnect);
         for listed in off.filter(|listed| listed.fault.from_ns <= now_ns && listed.fault.count > 0) {
@@ -271,18 +277,17 @@ impl Faults {
         }
     }
 
-    /// What is to be told of the faults up to `now_ns`: each tells once that it acts, and once that it
-    /// is over.
+    /// The next note on the faults up to `now_ns`: each fault is reported once when it acts, and once when it has ended.
     pub fn next_note(&mut self, now_ns: u64) -> Option<FaultNote> {
         self.list.iter_mut().find_map(|listed| {
             let began_ns = listed.began_ns?;
             let Fault { number: fault, port, .. } = listed.fault;
-            if !listed.is_begin_told {
-                listed.is_begin_told = true;
+            if !listed.is_begin_reported {
+                listed.is_begin_reported = true;
                 return Some(FaultNote { time_ns: began_ns, fault, port, strikes: 0, has_ended: false });
             }
-            if !listed.is_end_told && !listed.is_live(now_ns) {
-                listed.is_end_told = true;
+            if !listed.is_end_reported && !listed.is_live(now_ns) {
+                listed.is_end_reported = true;
                 let strikes = listed.strikes;
                 return Some(FaultNote { time_ns: now_ns, fault, port, strikes, has_ended: true });
             }
@@ -290,7 +295,7 @@ impl Faults {
         })
     }
 
-    /// Most wires have none, and ask several times a frame: to see that is all that is done there.
+    /// Most wires have no faults and ask several times a frame, so this case costs one comparison.
     #[inline(always)]
     fn unless_empty<T>(&self, ask: impl FnOnce(&[Listed]) -> Option<T>) -> Option<T> {
         #[cold]
@@ -300,7 +305,7 @@ impl Faults {
         if self.is_empty() { None } else { ask_some(&self.list, ask) }
     }
 
-    /// Random numbers for a fault and a frame, the same however often they are asked for.
+    /// Random numbers that depend on fault and frame only.
     fn chance(&self, place: usize, number: u64) -> Pcg32 {
         const ODD: u64 = 0x9E37_79B9_7F4A_7C15;
         let fault = self.list[place].fault.number as u64;
@@ -309,7 +314,7 @@ impl Faults {
     }
 }
 
-/// Those at a port, with their places and what `part` takes from them.
+/// The faults at a port, with their places in the list and the value of `part`.
 fn of_port<T>(
     list: &[Listed],
     port: usize,
@@ -320,10 +325,10 @@ fn of_port<T>(
     of_port.filter_map(move |(place, listed)| Some((place, listed, part(listed.fault.kind)?)))
 }
 
-/// A fault that strikes.
+/// A fault that acts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Strike {
-    /// Of the fault in the list.
+pub(super) struct FaultActivation {
+    /// Place of the fault in the list.
     pub(super) place: usize,
     pub(super) at_ns: u64,
 }

@@ -1,45 +1,16 @@
 //! Data frames, valid by construction: classical ones of up to 8 bytes and FD ones of up to 64.
 //!
-//! Remote frames are not represented: the rig neither sends nor accepts them. What stands for an error frame is
-//! [`ErrorReport`](super::ErrorReport).
+//! Remote frames are not represented. [`ErrorReport`](super::ErrorReport) represents an error frame.
 
 use std::fmt;
 
+use super::frame_error::FrameError;
 use super::id::CanId;
 
 /// Lengths that an FD frame may have; their index is the data length code.
 const FD_LENGTHS: [u8; 16] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64];
 
-/// An identifier or a frame that CAN cannot carry.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-pub enum FrameError {
-    /// More than 11 bits in a standard identifier.
-    #[error("identifier {id:X}h does not fit into 11 bits (at most 7FFh)")]
-    StandardId {
-        /// The identifier asked for.
-        id: u32,
-    },
-    /// More than 29 bits in an extended identifier.
-    #[error("identifier {id:X}h does not fit into 29 bits (at most 1FFFFFFFh)")]
-    ExtendedId {
-        /// The identifier asked for.
-        id: u32,
-    },
-    /// More data than a classical frame carries.
-    #[error("{length} data bytes: a classical frame carries at most 8")]
-    DataLength {
-        /// Bytes asked for.
-        length: usize,
-    },
-    /// A length that no FD frame has.
-    #[error("{length} data bytes: an FD frame carries 0 to 8, 12, 16, 20, 24, 32, 48 or 64")]
-    FdDataLength {
-        /// Bytes asked for.
-        length: usize,
-    },
-}
-
-/// In which form a frame goes over the wire.
+/// The format of a frame on the wire.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
 pub enum FrameFormat {
     /// Classical CAN.
@@ -52,12 +23,12 @@ pub enum FrameFormat {
 }
 
 impl FrameFormat {
-    /// Whether it is one of the FD formats.
+    /// Whether the format is one of the FD formats.
     pub const fn is_fd(self) -> bool {
         !matches!(self, Self::Classical)
     }
 
-    /// Refuses lengths that it does not have.
+    /// Refuses data lengths that the format does not have.
     pub fn check(self, length: usize) -> Result<(), FrameError> {
         let has_code = FD_LENGTHS.iter().any(|&allowed| usize::from(allowed) == length);
         match self.is_fd() {
@@ -69,6 +40,19 @@ impl FrameFormat {
 }
 
 /// A data frame.
+///
+/// # Examples
+/// ```
+/// use masseter_can::{CanId, Frame, FrameFormat};
+///
+/// let id = CanId::standard(0x181)?;
+/// let classical = Frame::new(id, &[0x37, 0x02])?;
+/// assert_eq!(classical.to_string(), "181#3702");
+/// let fd = Frame::with_format(id, FrameFormat::FdBitRateSwitch, &[0; 64])?;
+/// assert_eq!(fd.data().len(), 64);
+/// assert!(Frame::new(id, &[0; 9]).is_err(), "a classical frame carries at most 8 bytes");
+/// # Ok::<(), masseter_can::FrameError>(())
+/// ```
 #[derive(Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Frame {
     id: CanId,
@@ -92,10 +76,10 @@ impl Frame {
         Self::with_format(id, FrameFormat::Classical, data)
     }
 
-    /// A classical frame whose length is known when compiling, which then cannot be wrong.
+    /// A classical frame whose length the compiler checks.
     pub fn fixed<const N: usize>(id: CanId, data: [u8; N]) -> Self {
         const { assert!(N <= Self::MAX_CLASSICAL_DATA, "a classical frame carries at most 8 bytes") };
-        Self::of_valid_length(id, FrameFormat::Classical, &data)
+        Self::with_valid_length(id, FrameFormat::Classical, &data)
     }
 
     /// A frame of that identifier, format and data.
@@ -104,10 +88,10 @@ impl Frame {
     /// [`FrameError::DataLength`] and [`FrameError::FdDataLength`] for lengths that the format does not have.
     pub fn with_format(id: CanId, format: FrameFormat, data: &[u8]) -> Result<Self, FrameError> {
         format.check(data.len())?;
-        Ok(Self::of_valid_length(id, format, data))
+        Ok(Self::with_valid_length(id, format, data))
     }
 
-    fn of_valid_length(id: CanId, format: FrameFormat, data: &[u8]) -> Self {
+    fn with_valid_length(id: CanId, format: FrameFormat, data: &[u8]) -> Self {
         let mut bytes = [0; Self::MAX_DATA];
         bytes[..data.len()].copy_from_slice(data);
         Self { id, length: data.len() as u8, format, bytes }
@@ -128,26 +112,26 @@ impl Frame {
         self.format
     }
 
-    /// A classical frame in that format, as whose wire speaks FD sends it; an FD frame as it is.
+    /// A classical frame in that format, as a port in FD format sends it; an FD frame unchanged.
     #[must_use]
     pub const fn promoted(self, format: FrameFormat) -> Self {
         if self.format.is_fd() { self } else { Self { format, ..self } }
     }
 
-    /// What stands for its length on the wire.
+    /// The data length code.
     pub(super) fn length_code(&self) -> u8 {
         let code = FD_LENGTHS.iter().position(|&length| length == self.length);
         code.expect("a valid length") as u8
     }
 
-    /// All bytes that any frame may have, zero beyond the data.
+    /// The bytes of the longest frame; bytes beyond the data are zero.
     pub const fn padded(&self) -> &[u8; Self::MAX_DATA] {
         &self.bytes
     }
 }
 
 impl fmt::Display for Frame {
-    /// As candump logs it: `123#11223344`, or in FD format `123##111223344`, the first digit being the flags (1
+    /// The form of candump logs: `123#11223344`, or in FD format `123##111223344`, the first digit being the flags (1
     /// for BRS).
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let mark = match self.format {

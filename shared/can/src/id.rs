@@ -1,9 +1,8 @@
 //! Frame identifiers, valid by construction and ordered as the bus arbitrates.
 
 use std::fmt;
-use std::str::FromStr;
 
-use super::frame::FrameError;
+use super::frame_error::FrameError;
 
 const STANDARD_MAX: u32 = 0x7FF;
 const EXTENDED_MAX: u32 = 0x1FFF_FFFF;
@@ -11,8 +10,6 @@ const EXTENSION_BITS: u32 = 18;
 const EXTENSION_MASK: u32 = (1 << EXTENSION_BITS) - 1;
 const IDE: u32 = 1 << EXTENSION_BITS;
 const EXTENDED_FLAG: u32 = 1 << 31;
-const STANDARD_DIGITS: usize = 3;
-const EXTENDED_DIGITS: usize = 8;
 
 /// A frame identifier: 11 bits (standard) or 29 bits (extended).
 ///
@@ -52,8 +49,8 @@ impl CanId {
     /// From the form of `SocketCAN`: bit 31 is set for a 29-bit identifier.
     ///
     /// # Errors
-    /// [`FrameError`] where the number is too large; also the flags of remote and error frames
-    /// (bits 30 and 29) make it so.
+    /// [`FrameError`] where the number is too large. The flags of remote and error frames (bits 30 and 29) are
+    /// refused in this way too.
     pub const fn from_flagged(flagged: u32) -> Result<Self, FrameError> {
         if flagged & EXTENDED_FLAG != 0 {
             return Self::extended(flagged & !EXTENDED_FLAG);
@@ -91,7 +88,7 @@ impl CanId {
 }
 
 impl fmt::Display for CanId {
-    /// As candump writes it: 3 hexadecimal digits, or 8 for a 29-bit identifier.
+    /// The form of candump: 3 hexadecimal digits, or 8 for a 29-bit identifier.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if self.is_extended() {
             write!(f, "{:08X}", self.number())
@@ -99,41 +96,6 @@ impl fmt::Display for CanId {
             write!(f, "{:03X}", self.number())
         }
     }
-}
-
-/// Why a text is no identifier.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum CanIdError {
-    /// Not 3 or 8 hexadecimal digits.
-    #[error("`{text}` is no identifier of 3 or 8 hexadecimal digits")]
-    Digits {
-        /// The text.
-        text: String,
-    },
-    /// The number is too large.
-    #[error(transparent)]
-    TooLarge(#[from] FrameError),
-}
-
-impl FromStr for CanId {
-    type Err = CanIdError;
-
-    /// Reads what [`Display`](fmt::Display) writes.
-    fn from_str(text: &str) -> Result<Self, CanIdError> {
-        let wrong = || CanIdError::Digits { text: text.to_owned() };
-        let number = digits(text, 16).ok_or_else(wrong)?;
-        match text.len() {
-            STANDARD_DIGITS => Ok(Self::standard(number as u16)?),
-            EXTENDED_DIGITS => Ok(Self::extended(number as u32)?),
-            _ => Err(wrong()),
-        }
-    }
-}
-
-/// A number of digits only: `from_str_radix` alone would take a sign.
-pub(super) fn digits(text: &str, radix: u32) -> Option<u64> {
-    let all_digits = text.chars().all(|digit| digit.is_digit(radix));
-    if all_digits { u64::from_str_radix(text, radix).ok() } else { None }
 }
 
 impl fmt::Debug for CanId {
@@ -170,7 +132,7 @@ mod tests {
     }
 
     #[test]
-    fn what_does_not_fit_is_refused_with_its_value() {
+    fn an_identifier_that_is_too_large_is_refused_with_its_value() {
         assert_eq!(CanId::standard(0x800), Err(FrameError::StandardId { id: 0x800 }));
         assert_eq!(CanId::extended(0x2000_0000), Err(FrameError::ExtendedId { id: 0x2000_0000 }));
     }

@@ -1,5 +1,8 @@
 #![doc = include_str!("../README.md")]
 
+#[macro_use]
+mod codes;
+
 mod bus;
 pub mod candump;
 pub mod canopen;
@@ -8,6 +11,7 @@ pub mod conformance;
 mod error_frame;
 pub mod faults;
 mod frame;
+mod frame_error;
 mod id;
 mod pdo;
 mod plan;
@@ -20,8 +24,9 @@ pub mod wire;
 
 pub use bus::{Bus, BusStatus, ErrorState, ReceiveError, Received, SendError};
 pub use error_frame::{ERROR_FLAG, ErrorKind, ErrorReport, ErrorReportError};
-pub use frame::{Frame, FrameError, FrameFormat};
-pub use id::{CanId, CanIdError};
+pub use frame::{Frame, FrameFormat};
+pub use frame_error::FrameError;
+pub use id::CanId;
 pub use pdo::{EVERY_SYNC, Rpdo1, Tpdo1};
 pub use plan::{BusPlan, NoReleaser, Overload, PeriodicMessage, PlannedMessage, Release};
 pub use port_faults::{Faulty, NotByPort, PortFaults};

@@ -1,13 +1,13 @@
-//! The rig's PDO mapping (CiA 301 objects 1600h and 1A00h): one PDO each way, both synchronous (type 1).
+//! PDOs of a drive in cyclic synchronous position mode (CiA 301 objects 1600h and 1A00h): one PDO in each direction, both
+//! synchronous (type 1).
 //!
 //! | PDO | mapped objects | bytes |
 //! | --- | --- | --- |
 //! | RPDO1 (200h + node) | 6040 controlword u16, 607A target position i32 | 6 |
 //! | TPDO1 (180h + node) | 6041 statusword u16, 6064 position actual i32, 6077 torque actual i16 | 8 |
 //!
-//! All little endian. Positions are encoder increments, torque is per mille of the rated torque; what
-//! an increment is worth in metres is not known here. When a synchronous PDO takes effect is up to
-//! master and drive.
+//! All values are little endian. Positions are encoder increments, torque is per mille of the rated torque. The length of
+//! an increment and the time at which a PDO takes effect are not part of this module.
 
 use super::canopen::{Cob, LengthError, NodeId, exactly};
 use super::cia402::{Controlword, Statusword};
@@ -47,7 +47,7 @@ impl Rpdo1 {
     /// Reads the data bytes.
     ///
     /// # Errors
-    /// [`LengthError`] unless there are exactly 6: the mapping of the sender is another one.
+    /// [`LengthError`] unless there are exactly 6: the sender has another mapping.
     pub fn decode(data: &[u8]) -> Result<Self, LengthError> {
         let [c0, c1, p0, p1, p2, p3] = exactly("RPDO1", data)?;
         Ok(Self {
@@ -91,7 +91,7 @@ impl Tpdo1 {
     /// Reads the data bytes.
     ///
     /// # Errors
-    /// [`LengthError`] unless there are exactly 8: the mapping of the sender is another one.
+    /// [`LengthError`] unless there are exactly 8: the sender has another mapping.
     pub fn decode(data: &[u8]) -> Result<Self, LengthError> {
         let [s0, s1, p0, p1, p2, p3, t0, t1] = exactly("TPDO1", data)?;
         Ok(Self {

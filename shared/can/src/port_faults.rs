@@ -1,8 +1,8 @@
-//! Seeded faults over a port: those that need no hand on the wire.
+//! Seeded faults over any port: all faults except corrupted frames.
 //!
-//! Frames get lost on reception, are delayed or sent twice; the node babbles, is disconnected or off the bus. A
-//! node put off the bus stays off for the time it is told, as a controller with `restart-ms`; the 128 sequences of
-//! recessive bits that a real one then waits for are not waited for.
+//! Frames are lost on reception, delayed or sent twice; the node babbles, is disconnected or off the bus. A node in
+//! bus-off returns after the restart time, like a controller with `restart-ms`, but does not wait for 128 sequences of
+//! recessive bits.
 
 use crate::bus::{Bus, BusStatus, ErrorState, ReceiveError, Received, SendError};
 use crate::faults::{Fault, FaultKind, FaultNote, Faults, NumberedFrame};
@@ -41,7 +41,7 @@ struct Held {
 }
 
 impl PortFaults {
-    /// Those of the faults that concern this port; the same seed makes the same choices. Nothing is allocated
+    /// The faults that apply to this port; the same seed makes the same choices. Nothing is allocated
     /// after this.
     ///
     /// # Errors
@@ -55,18 +55,18 @@ impl PortFaults {
         Ok(Self { faults, port, sent: 0, received: 0, held, restart_after_ns: None, off_since_ns: None })
     }
 
-    /// With a node that is back so long after it was put off the bus; without this it stays off.
+    /// Sets the time from bus-off to the restart of the node; without a restart time the node stays off.
     #[must_use]
     pub fn restarting_after(self, restart_after_ns: Option<u64>) -> Self {
         Self { restart_after_ns, ..self }
     }
 
-    /// Lets the faults befall that port.
+    /// The port with these faults.
     pub fn over<B: Bus>(&mut self, bus: B) -> Faulty<'_, B> {
         Faulty { faults: self, bus }
     }
 
-    /// What is to be told of the faults up to `now_ns`.
+    /// The next note on the faults up to `now_ns`.
     pub fn next_note(&mut self, now_ns: u64) -> Option<FaultNote> {
         self.faults.next_note(now_ns)
     }
@@ -75,13 +75,13 @@ impl PortFaults {
         NumberedFrame { at_ns, port: self.port, id: frame.id(), number }
     }
 
-    /// Whether a fault has a frame sent twice, which is recorded then.
+    /// Whether a fault duplicates a frame. The activation is recorded.
     fn duplicates(&mut self, now_ns: u64, frame: &Frame, number: u64) -> bool {
-        let strike = self.faults.duplicates(self.numbered(now_ns, frame, number));
-        strike.inspect(|&strike| self.faults.record(strike)).is_some()
+        let activation = self.faults.duplicates(self.numbered(now_ns, frame, number));
+        activation.inspect(|&activation| self.faults.record(activation)).is_some()
     }
 
-    /// Whether a fault makes the port lose a frame that has arrived, which is recorded then.
+    /// Whether a fault makes the port lose a received frame. The activation is recorded.
     fn loses(&mut self, time_ns: u64, frame: &Frame) -> bool {
         let number = self.received;
         self.received += 1;
@@ -91,11 +91,11 @@ impl PortFaults {
     /// Holds a frame back if a fault delays it; whether it did.
     fn holds_back(&mut self, now_ns: u64, frame: Frame, number: u64) -> Result<bool, SendError> {
         let delay = self.faults.delays(self.numbered(now_ns, &frame, number));
-        let Some((strike, by_ns)) = delay else { return Ok(false) };
+        let Some((activation, by_ns)) = delay else { return Ok(false) };
         if self.held.len() == HELD {
             return Err(SendError::QueueFull { capacity: HELD });
         }
-        self.faults.record(strike);
+        self.faults.record(activation);
         self.held.push(Held { due_ns: now_ns.saturating_add(by_ns), frame });
         Ok(true)
     }
@@ -105,9 +105,9 @@ impl PortFaults {
         self.restart_when_due(now_ns);
         self.faults.begin_disconnections(now_ns);
         if self.off_since_ns.is_none()
-            && let Some(strike) = self.faults.puts_off(now_ns, self.port)
+            && let Some(activation) = self.faults.puts_off(now_ns, self.port)
         {
-            self.faults.record(strike);
+            self.faults.record(activation);
             self.off_since_ns = Some(now_ns);
             self.held.clear();
         }
@@ -124,8 +124,8 @@ impl PortFaults {
 
     /// A frame that the node babbles at that time.
     fn babbled(&mut self, now_ns: u64) -> Option<Frame> {
-        let (strike, frame) = self.faults.makes_babble(now_ns, self.port)?;
-        self.faults.record(strike);
+        let (activation, frame) = self.faults.makes_babble(now_ns, self.port)?;
+        self.faults.record(activation);
         Some(frame)
     }
 
@@ -144,7 +144,7 @@ pub struct Faulty<'a, B> {
 }
 
 impl<B: Bus> Faulty<'_, B> {
-    /// Sends what the faults have sent by themselves. What the port refuses is lost.
+    /// Sends babbled and delayed frames. A frame that the port refuses is lost.
     fn send_own(&mut self, now_ns: u64) {
         let babbled = self.faults.babbled(now_ns);
         for frame in babbled.into_iter().chain(std::iter::from_fn(|| self.faults.due(now_ns))) {

@@ -1,23 +1,24 @@
-//! socketcand's text protocol in raw mode, server's side: how tools reach a bus over TCP.
+//! The text protocol of socketcand in raw mode, on the side of the server: access to a bus over TCP.
 //!
-//! After `< hi >` a client says `< open can0 >` and `< rawmode >`, gets `< ok >` for each, and from then on
-//! `< frame … >` for every frame on the bus; with `< send … >` it sends one. The modes for broadcast
-//! management, statistics and ISO-TP are not served, nor are remote frames; a frame in FD format is told like a
-//! classical one. No sockets here.
+//! After `< hi >` a client sends `< open can0 >` and `< rawmode >` and gets `< ok >` for each. From then on the client gets
+//! `< frame … >` for every frame on the bus, and sends a frame with `< send … >`. The modes for broadcast management,
+//! statistics and ISO-TP are not supported, nor are remote frames. A frame in FD format looks like a classical one. This
+//! module opens no sockets.
 //!
 //! Source: linux-can/socketcand, `doc/protocol.md`.
 
 use std::fmt::{self, Write};
 
 use super::bus::Received;
-use super::frame::{Frame, FrameError};
-use super::id::{CanId, digits};
+use super::frame::Frame;
+use super::frame_error::FrameError;
+use super::id::CanId;
 
-/// What the server says first.
+/// The first message of the server.
 pub const GREETING: &str = "< hi >";
-/// What a granted request is answered with.
+/// The answer to a granted request.
 pub const OK: &str = "< ok >";
-/// What `< echo >` is answered with.
+/// The answer to `< echo >`.
 pub const ECHO: &str = "< echo >";
 
 /// Hexadecimal digits that mean a 29-bit identifier; fewer mean one of 11 bits.
@@ -25,29 +26,29 @@ const EXTENDED_DIGITS: usize = 8;
 /// The bit by which some clients mark a 29-bit identifier.
 const EXTENDED_FLAG: u32 = 1 << 31;
 
-/// A request is never longer; what is, is none.
+/// Longest request, bytes.
 const LONGEST_REQUEST: usize = 256;
 
-/// What a client asks for.
+/// A request of a client.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Request {
-    /// To be let onto a bus.
+    /// Open a bus.
     Open(String),
-    /// To get every frame from now on.
+    /// Receive every frame from now on.
     RawMode,
-    /// To send a frame.
+    /// Send a frame.
     Send(Frame),
-    /// To be told that the connection lives.
+    /// Check the connection.
     Echo,
 }
 
-/// Why a request cannot be understood.
+/// Why a request is refused.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum RequestError {
     /// No request of raw mode.
     #[error("unknown command `{text}`: expected open, rawmode, send or echo")]
     Unknown {
-        /// What stands between the brackets.
+        /// The text between the brackets.
         text: String,
     },
     /// The bytes sent are not as many as announced.
@@ -58,7 +59,7 @@ pub enum RequestError {
         /// Data bytes that follow.
         sent: usize,
     },
-    /// An identifier or a data byte is none.
+    /// An identifier or a data byte is not a number.
     #[error("`{text}` is no number in hexadecimal digits")]
     Number {
         /// The word.
@@ -72,7 +73,7 @@ pub enum RequestError {
     Stray,
 }
 
-/// Requests as they come in pieces over a stream.
+/// Requests that arrive in pieces over a stream.
 #[derive(Debug, Default)]
 pub struct Requests {
     pending: Vec<u8>,
@@ -81,7 +82,7 @@ pub struct Requests {
 }
 
 impl Requests {
-    /// Takes what has arrived.
+    /// Adds received bytes.
     pub fn push(&mut self, bytes: &[u8]) {
         self.pending.extend_from_slice(bytes);
     }
@@ -89,7 +90,7 @@ impl Requests {
     /// The next whole request, if it has arrived.
     ///
     /// # Errors
-    /// [`RequestError`]; the bytes in question are gone then, and later ones are still read.
+    /// [`RequestError`]; the refused bytes are dropped, and later requests are still read.
     pub fn take(&mut self) -> Option<Result<Request, RequestError>> {
         loop {
             let end = self.pending.iter().position(|byte| *byte == b'>');
@@ -149,14 +150,17 @@ fn parse_id(text: &str) -> Result<CanId, RequestError> {
     }
 }
 
+/// A number in hexadecimal digits. `from_str_radix` alone would take a sign.
 fn parse_number(text: &str) -> Result<u64, RequestError> {
-    digits(text, 16).ok_or_else(|| RequestError::Number { text: text.to_owned() })
+    let is_number = text.chars().all(|digit| digit.is_ascii_hexdigit());
+    let number = is_number.then(|| u64::from_str_radix(text, 16).ok()).flatten();
+    number.ok_or_else(|| RequestError::Number { text: text.to_owned() })
 }
 
 /// Writes a received frame. Its time keeps whole microseconds, as the format does.
 ///
 /// # Errors
-/// What `out` fails with.
+/// Errors of `out`.
 pub fn write_frame(out: &mut impl Write, received: &Received) -> fmt::Result {
     let micros = received.time_ns / 1000;
     write!(out, "< frame {} {}.{:06} ", received.frame.id(), micros / 1_000_000, micros % 1_000_000)?;

@@ -1,10 +1,10 @@
-//! What a tap on a bus sees: frames and error reports, each with its time.
+//! Frames and error reports of a tap on a bus, each with its time.
 
 use super::bus::Received;
 use super::error_frame::ErrorReport;
 use super::frame::Frame;
 
-/// What a tap saw.
+/// An observation of a tap.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Tapped {
     /// A frame.
@@ -13,14 +13,14 @@ pub enum Tapped {
     Error(ErrorReport),
 }
 
-/// A frame as a tap saw it.
+/// A frame with its times.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct TappedFrame {
     /// The frame.
     pub frame: Frame,
     /// When its last end-of-frame bit was on the wire, ns.
     pub time_ns: u64,
-    /// When its transmitter had it queued, ns; `None` where the wire does not tell, as real ones do not.
+    /// When its transmitter queued it, ns; `None` on real wires.
     pub queued_ns: Option<u64>,
 }
 
@@ -31,7 +31,7 @@ impl From<Received> for TappedFrame {
 }
 
 impl Tapped {
-    /// When it was seen, ns.
+    /// Time of the observation, ns.
     pub fn time_ns(&self) -> u64 {
         match self {
             Self::Frame(tapped) => tapped.time_ns,

@@ -1,67 +1,46 @@
-//! The CAN link, as a scenario declares it: `[can]`.
+//! The CAN link: `[can]`.
 
 use serde::{Deserialize, Serialize};
 
-use super::ScenarioError;
-use super::need::require_positive;
+use super::error::ScenarioError;
+use super::need::{keyed, require_positive};
 use crate::geometry::AXES;
 use masseter_can::{Bitrate, BitrateError, FrameFormat, Rates};
 
-/// The CAN link between the master and the six drives.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct CanConfig {
-    /// Real interfaces, one a bus, such as `["can0", "can1"]`; none for simulated buses.
-    pub interfaces: Vec<String>,
-    /// Bit rate of every bus, bit/s.
-    pub bitrate_bps: u32,
-    /// Whether a bit takes a nanosecond, whatever `bitrate_bps` says (simulated buses only): for cycles that no CAN
-    /// holds.
-    pub ideal: bool,
-    /// Whether frames go in FD format with bit-rate switch. Real interfaces must have been set up for it.
-    pub fd: bool,
-    /// Bit rate of the data phase of FD frames, bit/s.
-    pub data_bitrate_bps: u32,
-    /// How long after bus-off a controller restarts by itself, ms; 0 for never (as `ip link … restart-ms`).
-    /// On real interfaces only for faults of the scenario; their own setting holds otherwise.
-    pub restart_ms: u32,
-    /// Which axes (0 to 5: d₁ d₂ d₃ l₁ l₂ l₃) hang on which bus.
-    pub buses: Vec<Vec<usize>>,
-    /// Node id of each axis, in the axis order.
-    pub node_ids: [u8; AXES],
-    /// Heartbeat of the master and of every drive (object 1017), ms.
-    pub heartbeat_producer_ms: u16,
-    /// Silence after which a heartbeat counts as lost (object 1016), ms.
-    pub heartbeat_consumer_ms: u16,
-    /// From SYNC to the moment a drive has its process data ready to be sent, at most, µs; none for the
-    /// emulated drives on simulated buses.
-    pub answer_us: u32,
-    /// What device every drive must be.
-    pub identity: IdentityConfig,
-    /// How long the drives may take to boot, ms.
-    pub boot_timeout_ms: u32,
-    /// Cycles without a fresh command after which the master quick-stops the drives.
-    pub command_timeout_cycles: u32,
-}
-
-impl Default for CanConfig {
-    fn default() -> Self {
-        Self {
-            interfaces: Vec::new(),
-            bitrate_bps: 1_000_000,
-            ideal: false,
-            fd: false,
-            data_bitrate_bps: 5_000_000,
-            restart_ms: 100,
-            buses: vec![vec![0, 1, 2], vec![3, 4, 5]],
-            node_ids: [1, 2, 3, 4, 5, 6],
-            heartbeat_producer_ms: 50,
-            heartbeat_consumer_ms: 150,
-            answer_us: 0,
-            identity: IdentityConfig::default(),
-            boot_timeout_ms: 2000,
-            command_timeout_cycles: 20,
-        }
+section! {
+    /// The CAN link between the master and the six drives.
+    pub struct CanConfig {
+        /// Real interfaces, one a bus, such as `["can0", "can1"]`; none for simulated buses.
+        pub interfaces: Vec<String> = Vec::new(),
+        /// Bit rate of every bus, bit/s.
+        pub bitrate_bps: u32 = 1_000_000,
+        /// Whether a bit takes a nanosecond, whatever `bitrate_bps` says (simulated buses only): for cycles that no CAN
+        /// holds.
+        pub ideal: bool = false,
+        /// Whether frames go in FD format with bit-rate switch. Real interfaces must have been set up for it.
+        pub fd: bool = false,
+        /// Bit rate of the data phase of FD frames, bit/s.
+        pub data_bitrate_bps: u32 = 5_000_000,
+        /// How long after bus-off a controller restarts by itself, ms; 0 for never (as `ip link … restart-ms`).
+        /// On real interfaces only for faults of the scenario; their own setting holds otherwise.
+        pub restart_ms: u32 = 100,
+        /// The axes (0 to 5: d₁ d₂ d₃ l₁ l₂ l₃) on each bus.
+        pub buses: Vec<Vec<usize>> = vec![vec![0, 1, 2], vec![3, 4, 5]],
+        /// Node id of each axis, in the axis order.
+        pub node_ids: [u8; AXES] = [1, 2, 3, 4, 5, 6],
+        /// Heartbeat of the master and of every drive (object 1017), ms.
+        pub heartbeat_producer_ms: u16 = 50,
+        /// Silence after which a heartbeat counts as lost (object 1016), ms.
+        pub heartbeat_consumer_ms: u16 = 150,
+        /// From SYNC to the moment a drive has its process data ready to be sent, at most, µs; none for the
+        /// emulated drives on simulated buses.
+        pub answer_us: u32 = 0,
+        /// The identity that every drive must report.
+        pub identity: IdentityConfig = IdentityConfig::default(),
+        /// How long the drives may take to boot, ms.
+        pub boot_timeout_ms: u32 = 2000,
+        /// Cycles without a fresh command after which the master quick-stops the drives.
+        pub command_timeout_cycles: u32 = 20,
     }
 }
 
@@ -87,14 +66,12 @@ impl CanConfig {
 
     pub(super) fn validate(&self) -> Result<(), ScenarioError> {
         if self.heartbeat_producer_ms == 0 {
-            let need = "use at least 1 ms: nodes are known to be alive by their heartbeats";
+            let need = "use at least 1 ms: a heartbeat shows that a node works";
             return Err(ScenarioError::bad("can.heartbeat_producer_ms", &0, need));
         }
-        require_positive(&[
-            ("can.heartbeat_consumer_ms", f64::from(self.heartbeat_consumer_ms)),
-            ("can.boot_timeout_ms", f64::from(self.boot_timeout_ms)),
-            ("can.command_timeout_cycles", f64::from(self.command_timeout_cycles)),
-        ])?;
+        require_positive(&keyed!("can", self,
+            heartbeat_consumer_ms boot_timeout_ms command_timeout_cycles
+        ))?;
         if self.ideal && (self.fd || !self.is_virtual()) {
             let need = "leave it away with can.fd and can.interfaces: it replaces their bit rates";
             return Err(ScenarioError::bad("can.ideal", &true, need));
@@ -116,7 +93,7 @@ impl CanConfig {
     }
 }
 
-/// What a drive must say it is, before anything is written to it.
+/// The identity that the master checks before it writes to a drive.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct IdentityConfig {
@@ -131,8 +108,8 @@ pub struct IdentityConfig {
 }
 
 impl IdentityConfig {
-    /// The emulated drives: servo drives of CiA 402. The rig's makers have no vendor number of CiA's; this one is not
-    /// registered.
+    /// The emulated drives: servo drives of CiA 402. The vendor number is not registered with
+    /// CiA.
     pub const EMULATED: Self = Self {
         device_type: 0x0002_0192,
         vendor_id: 0x004D_5354,

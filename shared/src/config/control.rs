@@ -1,78 +1,62 @@
-//! The controller's gains and limits, the real-time request, and what a run is judged by.
+//! The controller's gains and limits, the real-time request, and the checks of a run.
 
 use serde::{Deserialize, Serialize};
 
-use super::ScenarioError;
-use super::need::{require_duration, require_positive};
+use super::error::ScenarioError;
+use super::need::{keyed, require_duration, require_positive};
 
-/// SYNC takes one cycle and the drives' interpolation one; drives that smooth their targets take some more. The motion
-/// is looked ahead by as much, at the speed that it has.
+/// SYNC takes one cycle and the drives' interpolation one; drives that smooth their targets take some more. The
+/// controller extrapolates the motion by this time.
 const MOST_LEAD_CYCLES: f64 = 10.0;
 
-/// Sequence, pose control and safety of the controller.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct ControllerConfig {
-    /// Complete readings in a row before the drives are switched on.
-    pub steady_readings: u32,
-    /// How long the first readings, the enabling of the drives, and at the end their switching off may take each, s.
-    pub start_timeout_s: f64,
-    /// Duration of the move from the measured pose to the first pose of the motion, s.
-    pub ease_s: f64,
-    /// How long the last pose is held before the drives are switched off, s.
-    pub hold_s: f64,
-    /// How long a motion takes to come to rest when it is stopped halfway, s.
-    pub stop_ramp_s: f64,
-    /// Time from a command's reading to the moment its targets are reached, in cycles: one until SYNC
-    /// makes the drives take the targets, one for their interpolation. At most 10: the motion is looked ahead by as
-    /// much.
-    pub lead_cycles: f64,
-    /// Integral gain of the pose control, 1/s. At most `rate_hz` / `lead_cycles`: with more, an error would be corrected
-    /// more than once before the first correction shows.
-    pub integral_gain_per_s: f64,
-    /// The most that pose control may add to the wanted position, m.
-    pub trim_limit_m: f64,
-    /// The most that pose control may add to the wanted orientation, rad.
-    pub trim_limit_rad: f64,
-    /// Cycles without a fresh, complete reading after which the controller stops safely.
-    pub stale_cycles: u32,
-    /// Distance of the platform from where it should be at which the controller stops safely, m.
-    pub tracking_limit_m: f64,
-}
-
-impl Default for ControllerConfig {
-    fn default() -> Self {
-        Self {
-            steady_readings: 10,
-            start_timeout_s: 5.0,
-            ease_s: 1.0,
-            hold_s: 0.2,
-            stop_ramp_s: 0.3,
-            lead_cycles: 2.0,
-            integral_gain_per_s: 5.0,
-            trim_limit_m: 1e-3,
-            trim_limit_rad: 0.02,
-            stale_cycles: 20,
-            tracking_limit_m: 3e-3,
-        }
+section! {
+    /// Sequence, pose control and safety of the controller.
+    #[derive(Copy)]
+    pub struct ControllerConfig {
+        /// Complete readings in a row before the drives are switched on.
+        pub steady_readings: u32 = 10,
+        /// How long the first readings, the enabling of the drives, and at the end their switching off may take each, s.
+        pub start_timeout_s: f64 = 5.0,
+        /// Duration of the move from the measured pose to the first pose of the motion, s.
+        pub ease_s: f64 = 1.0,
+        /// How long the last pose is held before the drives are switched off, s.
+        pub hold_s: f64 = 0.2,
+        /// How long a motion takes to come to rest when it is stopped halfway, s.
+        pub stop_ramp_s: f64 = 0.3,
+        /// Time from a command's reading to the moment its targets are reached, in cycles: one until SYNC
+        /// makes the drives take the targets, one for their interpolation. At most 10: the motion is looked ahead by as
+        /// much.
+        pub lead_cycles: f64 = 2.0,
+        /// Integral gain of the pose control, 1/s. At most `rate_hz` / `lead_cycles`: with more, an error would be corrected
+        /// more than once before the first correction shows.
+        pub integral_gain_per_s: f64 = 5.0,
+        /// The most that pose control may add to the desired position, m.
+        pub trim_limit_m: f64 = 1e-3,
+        /// The most that pose control may add to the desired orientation, rad.
+        pub trim_limit_rad: f64 = 0.02,
+        /// Cycles without a fresh, complete reading after which the controller stops safely.
+        pub stale_cycles: u32 = 20,
+        /// Distance of the platform from where it should be at which the controller stops safely, m.
+        pub tracking_limit_m: f64 = 3e-3,
     }
 }
 
-/// What the real-time processes ask of the system.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct RealtimeConfig {
-    /// Cores of the controller and of the plant.
-    pub cores: [usize; 2],
-    /// SCHED_FIFO priority of both.
-    pub priority: u8,
-    /// Whether their memory is locked.
-    pub lock_memory: bool,
-    /// Whether the cores are kept from idle states for the duration of the run.
-    pub cpu_dma_latency: CpuDmaLatency,
+section! {
+    /// The scheduling that the real-time processes request.
+    #[derive(Copy, Eq)]
+    pub struct RealtimeConfig {
+        /// Cores of the controller and of the plant.
+        pub cores: [usize; 2] = [0, 1],
+        /// SCHED_FIFO priority of both.
+        pub priority: u8 = 80,
+        /// Whether their memory is locked.
+        pub lock_memory: bool = true,
+        /// Whether the cores are kept from idle states for the duration of the run.
+        pub cpu_dma_latency: CpuDmaLatency = CpuDmaLatency::default(),
+    }
 }
 
-/// What becomes of `/dev/cpu_dma_latency` during a run.
+/// The use of `/dev/cpu_dma_latency` during a run.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum CpuDmaLatency {
@@ -86,49 +70,30 @@ pub enum CpuDmaLatency {
     Leave,
 }
 
-impl Default for RealtimeConfig {
-    fn default() -> Self {
-        Self { cores: [0, 1], priority: 80, lock_memory: true, cpu_dma_latency: CpuDmaLatency::default() }
-    }
-}
-
-/// What makes a run fail.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct ChecksConfig {
-    /// Largest rms distance of the platform's origin from the wanted one while the motion plays, mm.
-    pub tracking_rms_mm: f64,
-    /// Most deadlines that the controller and the plant together may skip.
-    pub missed_cycles: u64,
-}
-
-impl Default for ChecksConfig {
-    fn default() -> Self {
-        Self { tracking_rms_mm: 0.1, missed_cycles: 0 }
+section! {
+    /// The limits beyond which a run fails.
+    #[derive(Copy)]
+    pub struct ChecksConfig {
+        /// Largest rms distance of the platform's origin from its desired position while the motion plays, mm.
+        pub tracking_rms_mm: f64 = 0.1,
+        /// Most deadlines that the controller and the plant together may skip.
+        pub missed_cycles: u64 = 0,
     }
 }
 
 impl ControllerConfig {
     pub(super) fn validate(&self, rate_hz: u32) -> Result<(), ScenarioError> {
-        require_duration(&[
-            ("controller.start_timeout_s", self.start_timeout_s),
-            ("controller.ease_s", self.ease_s),
-            ("controller.hold_s", self.hold_s),
-            ("controller.stop_ramp_s", self.stop_ramp_s),
-        ])?;
-        require_positive(&[
-            ("controller.steady_readings", f64::from(self.steady_readings)),
-            ("controller.lead_cycles", self.lead_cycles),
-            ("controller.integral_gain_per_s", self.integral_gain_per_s),
-            ("controller.trim_limit_m", self.trim_limit_m),
-            ("controller.trim_limit_rad", self.trim_limit_rad),
-            ("controller.stale_cycles", f64::from(self.stale_cycles)),
-            ("controller.tracking_limit_m", self.tracking_limit_m),
-        ])?;
+        require_duration(&keyed!("controller", self,
+            start_timeout_s ease_s hold_s stop_ramp_s
+        ))?;
+        require_positive(&keyed!("controller", self,
+            steady_readings lead_cycles integral_gain_per_s trim_limit_m trim_limit_rad stale_cycles
+            tracking_limit_m
+        ))?;
         self.validate_loop(f64::from(rate_hz))
     }
 
-    /// What takes `lead_cycles` to show is neither looked ahead for longer than a drive needs, nor corrected twice.
+    /// The lead is no longer than a drive needs, and an error is corrected only once within the lead.
     fn validate_loop(&self, rate_hz: f64) -> Result<(), ScenarioError> {
         let bad =
             |key, value: f64, need| Err(ScenarioError::BadValue { key, value: value.to_string(), need });
@@ -166,7 +131,7 @@ impl RealtimeConfig {
 
 impl ChecksConfig {
     pub(super) fn validate(&self) -> Result<(), ScenarioError> {
-        require_positive(&[("checks.tracking_rms_mm", self.tracking_rms_mm)])
+        require_positive(&keyed!("checks", self, tracking_rms_mm))
     }
 }
 

@@ -4,11 +4,11 @@ use serde::de::Error;
 use serde::{Deserialize, Deserializer, Serialize};
 use toml::Table;
 
-use super::ScenarioError;
-use super::need::{require_positive, require_within};
+use super::error::ScenarioError;
+use super::need::{keyed, require_positive, require_within};
 use crate::geometry::LEGS;
 
-/// More is no encoder's, m.
+/// Most noise of an encoder, m.
 const NOISIEST_M: f64 = 1e-3;
 
 /// A servo drive with its encoder. Scales and limits hold for real ones too, gains and noise for emulated ones.
@@ -41,13 +41,13 @@ pub struct DriveConfig {
 }
 
 impl DriveConfig {
-    /// The encoder's increments nearest to so many metres; also of m/s and m/s².
+    /// The increments of the encoder nearest to a length in m; also for m/s and m/s².
     pub fn increments(&self, metres: f64) -> f64 {
         (metres / self.encoder_resolution_m).round()
     }
 }
 
-/// The drives of slides and of legs; what a table does not give stays as it is by default.
+/// The drives of slides and of legs; a key that a table does not have keeps its default.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct DrivesConfig {
@@ -99,16 +99,6 @@ impl Default for DrivesConfig {
     }
 }
 
-/// Each quantity of both kinds of drives, with its key.
-macro_rules! of_both {
-    ($drives:expr, $($field:ident),+) => {
-        [$(
-            (concat!("drives.slide.", stringify!($field)), $drives.slide.$field),
-            (concat!("drives.leg.", stringify!($field)), $drives.leg.$field),
-        )+]
-    };
-}
-
 impl DrivesConfig {
     /// The drive of an axis.
     pub const fn of_axis(&self, axis: usize) -> DriveConfig {
@@ -116,19 +106,17 @@ impl DrivesConfig {
     }
 
     pub(super) fn validate(&self) -> Result<(), ScenarioError> {
-        require_positive(&of_both!(
-            self,
-            rated_force_n,
-            max_force_n,
-            max_velocity_m_s,
-            quick_stop_deceleration_m_s2,
-            following_error_m,
-            position_gain_per_s,
-            velocity_gain_n_s_per_m,
-            velocity_integral_time_s,
-            encoder_resolution_m
-        ))?;
-        let noise = of_both!(self, encoder_noise_m);
-        require_within(&noise.map(|(key, value_m)| (key, value_m, 0.0, NOISIEST_M)))
+        macro_rules! of_both {
+            ($($field:ident)+) => {
+                [keyed!("drives.slide", self.slide, $($field)+), keyed!("drives.leg", self.leg, $($field)+)]
+            };
+        }
+        let positive = of_both!(
+            rated_force_n max_force_n max_velocity_m_s quick_stop_deceleration_m_s2 following_error_m
+            position_gain_per_s velocity_gain_n_s_per_m velocity_integral_time_s encoder_resolution_m
+        );
+        require_positive(positive.as_flattened())?;
+        let noise = of_both!(encoder_noise_m).map(|[(key, value_m)]| (key, value_m, 0.0, NOISIEST_M));
+        require_within(&noise)
     }
 }

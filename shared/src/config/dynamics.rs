@@ -2,71 +2,47 @@
 
 use std::ops::RangeInclusive;
 
-use serde::{Deserialize, Serialize};
+use super::error::ScenarioError;
+use super::need::{keyed, require_not_negative, require_positive};
 
-use super::ScenarioError;
-use super::need::{require_not_negative, require_positive};
-
-/// The moving masses and their friction.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct DynamicsConfig {
-    /// Integration step of the mechanism and of the drives' inner loops, ns; the more friction, the shorter.
-    pub step_ns: u64,
-    /// Carriage with the fixed part of its leg, moved by a slide, kg.
-    pub carriage_mass_kg: f64,
-    /// Telescoping part of a leg, kg.
-    pub rod_mass_kg: f64,
-    /// Inertia of a leg about its hinge, kg m².
-    pub leg_inertia_kg_m2: f64,
-    /// Platform with the lower jaw, kg.
-    pub platform_mass_kg: f64,
-    /// Principal inertia of the platform about its origin, platform axes, kg m².
-    pub platform_inertia_kg_m2: [f64; 3],
-    /// Coulomb friction of a slide, N; of a leg a quarter of it.
-    pub slide_friction_n: f64,
-    /// Viscous friction of every axis, N per m/s.
-    pub viscous_friction_n_s_per_m: f64,
-    /// Gravity along −z, m/s².
-    pub gravity_m_s2: f64,
-    /// Length of the legs when the rig is switched on, m.
-    pub initial_leg_m: f64,
-}
-
-impl Default for DynamicsConfig {
-    fn default() -> Self {
-        Self {
-            step_ns: 125_000,
-            carriage_mass_kg: 1.2,
-            rod_mass_kg: 0.4,
-            leg_inertia_kg_m2: 0.03,
-            platform_mass_kg: 0.5,
-            platform_inertia_kg_m2: [2.0e-4, 2.0e-4, 3.5e-4],
-            slide_friction_n: 8.0,
-            viscous_friction_n_s_per_m: 20.0,
-            gravity_m_s2: 9.81,
-            initial_leg_m: 0.29,
-        }
+section! {
+    /// The moving masses and their friction.
+    #[derive(Copy)]
+    pub struct DynamicsConfig {
+        /// Integration step of the mechanism and of the drives' inner loops, ns; the more friction, the shorter.
+        pub step_ns: u64 = 125_000,
+        /// Carriage with the fixed part of its leg, moved by a slide, kg.
+        pub carriage_mass_kg: f64 = 1.2,
+        /// Telescoping part of a leg, kg.
+        pub rod_mass_kg: f64 = 0.4,
+        /// Inertia of a leg about its hinge, kg m².
+        pub leg_inertia_kg_m2: f64 = 0.03,
+        /// Platform with the lower jaw, kg.
+        pub platform_mass_kg: f64 = 0.5,
+        /// Principal inertia of the platform about its origin, platform axes, kg m².
+        pub platform_inertia_kg_m2: [f64; 3] = [2.0e-4, 2.0e-4, 3.5e-4],
+        /// Coulomb friction of a slide, N; of a leg a quarter of it.
+        pub slide_friction_n: f64 = 8.0,
+        /// Viscous friction of every axis, N per m/s.
+        pub viscous_friction_n_s_per_m: f64 = 20.0,
+        /// Gravity along −z, m/s².
+        pub gravity_m_s2: f64 = 9.81,
+        /// Length of the legs when the rig is switched on, m.
+        pub initial_leg_m: f64 = 0.29,
     }
 }
 
 impl DynamicsConfig {
-    /// Integration steps that resolve the stiffest parts and cost a bearable time, ns.
+    /// Valid integration steps: short enough for the stiffest parts, long enough for the computing time, ns.
     pub const STEPS_NS: RangeInclusive<u64> = 10_000..=250_000;
 
     pub(super) fn validate(&self) -> Result<(), ScenarioError> {
-        require_positive(&[
-            ("dynamics.carriage_mass_kg", self.carriage_mass_kg),
-            ("dynamics.rod_mass_kg", self.rod_mass_kg),
-            ("dynamics.platform_mass_kg", self.platform_mass_kg),
-            ("dynamics.initial_leg_m", self.initial_leg_m),
-        ])?;
-        require_not_negative(&[
-            ("dynamics.leg_inertia_kg_m2", self.leg_inertia_kg_m2),
-            ("dynamics.slide_friction_n", self.slide_friction_n),
-            ("dynamics.viscous_friction_n_s_per_m", self.viscous_friction_n_s_per_m),
-            ("dynamics.gravity_m_s2", self.gravity_m_s2),
-        ])?;
+        require_positive(&keyed!("dynamics", self,
+            carriage_mass_kg rod_mass_kg platform_mass_kg initial_leg_m
+        ))?;
+        require_not_negative(&keyed!("dynamics", self,
+            leg_inertia_kg_m2 slide_friction_n viscous_friction_n_s_per_m gravity_m_s2
+        ))?;
         let inertia = self.platform_inertia_kg_m2;
         require_not_negative(&inertia.map(|kg_m2| ("dynamics.platform_inertia_kg_m2", kg_m2)))?;
         if !Self::STEPS_NS.contains(&self.step_ns) {

@@ -1,29 +1,28 @@
-//! Faults that a scenario asks for on its buses: `[[faults]]`. On a simulated bus they strike any node; on a real one,
-//! only what the master's port can do to itself.
+//! Faults on the buses: `[[faults]]`. On a simulated bus they act on any node, on a real bus only on the master's port.
 
 use std::fmt::Display;
 
 use serde::{Deserialize, Serialize};
 
-use super::ScenarioError;
+use super::error::ScenarioError;
 use super::need::{require_not_negative, require_within};
 use masseter_can::canopen::NodeId;
 
-/// What goes wrong.
+/// The kind of the fault.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum FaultKindConfig {
     /// Frames are destroyed on the wire and repeated by their transmitter.
     Corrupt,
-    /// A receiver loses frames without anybody noticing.
+    /// A receiver loses frames without an error on the wire.
     Lose,
     /// Frames are held back by `delay_us` before they are queued for transmission.
     Delay,
-    /// Frames arrive, and are repeated by their transmitter all the same.
+    /// Frames arrive, and their transmitter repeats them.
     Duplicate,
     /// A node sends 8 bytes of 55h with identifier `id` (001h unless given) whenever the bus is idle.
     Babble,
-    /// A node is cut off the wire.
+    /// A node is disconnected.
     Disconnect,
     /// A node's controller goes off the bus.
     BusOff,
@@ -33,7 +32,7 @@ pub enum FaultKindConfig {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FaultConfig {
-    /// What goes wrong.
+    /// The kind of the fault.
     pub kind: FaultKindConfig,
     /// Bus, from 0.
     pub bus: usize,
@@ -49,10 +48,11 @@ pub struct FaultConfig {
     /// COB-ID of the frames concerned, or of those that are babbled (11 bits); all when absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub id: Option<u16>,
-    /// Chance that a frame is struck, 0 to 1; only of kinds that strike single frames.
+    /// Probability that the fault acts on a frame, 0 to 1; only for kinds that act on single frames.
     #[serde(default = "always")]
     pub probability: f64,
-    /// Strikes after which it is over; when absent one for going off the bus, any number for the others. A disconnection is over by `until_s` alone.
+    /// Activations after which the fault ends; when absent one for bus-off, any number for the others. A disconnection ends by
+    /// `until_s` alone.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub count: Option<u64>,
     /// How long a frame is delayed, µs.
@@ -77,7 +77,7 @@ impl FaultConfig {
         self.check_kind()
     }
 
-    /// What no port of a real interface can do.
+    /// Refuses faults that the port of a real interface cannot carry out.
     fn check_port(&self) -> Result<(), ScenarioError> {
         if self.kind == FaultKindConfig::Corrupt {
             let need = "leave it away with can.interfaces: only on a simulated bus can frames be destroyed on the wire";
@@ -104,7 +104,7 @@ impl FaultConfig {
         }
     }
 
-    /// What has an effect on this kind only, or on others.
+    /// Refuses keys that have no effect on this kind, and requires those that it needs.
     fn check_kind(&self) -> Result<(), ScenarioError> {
         use FaultKindConfig as Kind;
         let is_of_node = matches!(self.kind, Kind::Babble | Kind::Disconnect | Kind::BusOff);

@@ -1,44 +1,31 @@
 //! Food between the teeth of the emulated jaw: `[food]`.
 
-use serde::{Deserialize, Serialize};
-
-use super::ScenarioError;
+use super::error::ScenarioError;
 use super::need::require_within;
 
-/// A piece of food, as a body that resists being bitten. The defaults are a soft round piece of 10 mm between the
-/// first molars on the left side.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct FoodConfig {
-    /// Where the lower jaw bites on it, in the platform frame, m.
-    pub point_m: [f64; 3],
-    /// Thickness of a fresh piece, m.
-    pub thickness_m: f64,
-    /// Force against compression, N/m.
-    pub stiffness_n_per_m: f64,
-    /// Force against the speed of compression, N per m/s.
-    pub damping_n_s_per_m: f64,
-    /// Elastic force at which it yields, N; what yields stays flat until the mouth opens wider than a fresh piece is
-    /// thick.
-    pub yield_n: f64,
-}
-
-impl Default for FoodConfig {
-    fn default() -> Self {
-        Self {
-            point_m: [0.0024, 0.0248, 0.0],
-            thickness_m: 0.010,
-            stiffness_n_per_m: 3500.0,
-            damping_n_s_per_m: 10.0,
-            yield_n: 35.0,
-        }
+section! {
+    /// A piece of food that resists the bite. The defaults are a soft round piece of 10 mm between the
+    /// first molars on the left side.
+    #[derive(Copy)]
+    pub struct FoodConfig {
+        /// Where the lower jaw bites on it, in the platform frame, m.
+        pub point_m: [f64; 3] = [0.0024, 0.0248, 0.0],
+        /// Thickness of a fresh piece, m.
+        pub thickness_m: f64 = 0.010,
+        /// Force against compression, N/m.
+        pub stiffness_n_per_m: f64 = 3500.0,
+        /// Force against the speed of compression, N per m/s.
+        pub damping_n_s_per_m: f64 = 10.0,
+        /// Elastic force at which it yields, N; what yields stays flat until the mouth opens wider than a fresh piece is
+        /// thick.
+        pub yield_n: f64 = 35.0,
     }
 }
 
 impl FoodConfig {
     pub(super) fn validate(&self) -> Result<(), ScenarioError> {
         let [x_m, y_m, z_m] = self.point_m;
-        // Far from what the integration of the mechanism could not resolve.
+        // The integration of the mechanism resolves these ranges with a wide margin.
         require_within(&[
             ("food.point_m", x_m, -0.5, 0.5),
             ("food.point_m", y_m, -0.5, 0.5),

@@ -1,40 +1,29 @@
-//! How fast the axes may move: `[limits]`.
+//! Limits of trajectories: `[limits]`.
 
-use serde::{Deserialize, Serialize};
-
-use super::need::require_positive;
-use super::{DrivesConfig, ScenarioError};
+use super::DrivesConfig;
+use super::error::ScenarioError;
+use super::need::{keyed, require_positive};
 use crate::geometry::LEGS;
 
-/// What the axes may be asked for by a trajectory, where their drives do not allow less. Strokes are the mechanism's
-/// own.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct TrajectoryLimitsConfig {
-    /// Speed of a slide, m/s.
-    pub slide_velocity_m_s: f64,
-    /// Speed of a leg, m/s.
-    pub leg_velocity_m_s: f64,
-    /// Acceleration of a slide, m/s².
-    pub slide_acceleration_m_s2: f64,
-    /// Acceleration of a leg, m/s².
-    pub leg_acceleration_m_s2: f64,
-    /// Condition number of the 6×6 Jacobian, angular velocities scaled by the platform's side A₁A₂.
-    pub max_condition: f64,
-}
-
-impl Default for TrajectoryLimitsConfig {
+section! {
+    /// What the axes may be asked for by a trajectory, where their drives do not allow less. Strokes are the mechanism's
+    /// own.
+    ///
     /// Velocities stay a quarter below the drives' own limits. Fast human chewing (0.46 s a cycle)
     /// takes 3.5 m/s² of a leg, and a jaw tracker's own jumps, low-passed at 12 Hz, up to 5.8 m/s² of
     /// a slide: 8 m/s² lets both pass and stops what is no jaw motion.
-    fn default() -> Self {
-        Self {
-            slide_velocity_m_s: 0.15,
-            leg_velocity_m_s: 0.30,
-            slide_acceleration_m_s2: 8.0,
-            leg_acceleration_m_s2: 8.0,
-            max_condition: 10.0,
-        }
+    #[derive(Copy)]
+    pub struct TrajectoryLimitsConfig {
+        /// Speed of a slide, m/s.
+        pub slide_velocity_m_s: f64 = 0.15,
+        /// Speed of a leg, m/s.
+        pub leg_velocity_m_s: f64 = 0.30,
+        /// Acceleration of a slide, m/s².
+        pub slide_acceleration_m_s2: f64 = 8.0,
+        /// Acceleration of a leg, m/s².
+        pub leg_acceleration_m_s2: f64 = 8.0,
+        /// Condition number of the 6×6 Jacobian, angular velocities scaled by the platform's side A₁A₂.
+        pub max_condition: f64 = 10.0,
     }
 }
 
@@ -49,7 +38,7 @@ impl TrajectoryLimitsConfig {
         if axis < LEGS { self.slide_acceleration_m_s2 } else { self.leg_acceleration_m_s2 }
     }
 
-    /// The same, where the drives do not allow less.
+    /// The lower of these limits and the limits of the drives.
     #[must_use]
     pub fn within(self, drives: &DrivesConfig) -> Self {
         Self {
@@ -60,13 +49,9 @@ impl TrajectoryLimitsConfig {
     }
 
     pub(super) fn validate(&self) -> Result<(), ScenarioError> {
-        require_positive(&[
-            ("limits.slide_velocity_m_s", self.slide_velocity_m_s),
-            ("limits.leg_velocity_m_s", self.leg_velocity_m_s),
-            ("limits.slide_acceleration_m_s2", self.slide_acceleration_m_s2),
-            ("limits.leg_acceleration_m_s2", self.leg_acceleration_m_s2),
-            ("limits.max_condition", self.max_condition),
-        ])
+        require_positive(&keyed!("limits", self,
+            slide_velocity_m_s leg_velocity_m_s slide_acceleration_m_s2 leg_acceleration_m_s2 max_condition
+        ))
     }
 }
 
@@ -75,7 +60,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn no_axis_may_be_asked_for_more_than_its_drive_can() {
+    fn targets_faster_than_a_drive_are_refused() {
         let (limits, mut drives) = (TrajectoryLimitsConfig::default(), DrivesConfig::default());
         assert_eq!(limits.within(&drives), limits);
         drives.leg.max_velocity_m_s = 0.1;

@@ -1,13 +1,16 @@
-//! Scenario files: what a run is made of, resolved and validated before anything starts.
+//! Scenario files: the configuration of a run, resolved and validated before the run starts.
 //!
-//! A scenario is TOML; every table left out has a default, so an empty file is the default run. Each part
-//! stands beside what it configures; checks that need more than the values themselves (does a
-//! trajectory fit the strokes?) are made by those who own the subject.
+//! A scenario is TOML. Every key has a default, so an empty file is the default run. This module checks values on their own;
+//! checks against other parts, such as a trajectory against the strokes, are made where these parts are built.
+
+#[macro_use]
+mod section;
 
 mod can;
 mod control;
 mod drives;
 mod dynamics;
+mod error;
 mod faults;
 mod food;
 mod jaw;
@@ -20,10 +23,11 @@ pub use can::{CanConfig, IdentityConfig};
 pub use control::{ChecksConfig, ControllerConfig, CpuDmaLatency, RealtimeConfig};
 pub use drives::{DriveConfig, DrivesConfig};
 pub use dynamics::DynamicsConfig;
+pub use error::ScenarioError;
 pub use faults::{FaultConfig, FaultKindConfig};
 pub use food::FoodConfig;
 pub use jaw::JawConfig;
 pub use limits::TrajectoryLimitsConfig;
 pub use motion::*;
 pub(crate) use scenario::RATES_HZ;
-pub use scenario::{Scenario, ScenarioError};
+pub use scenario::Scenario;

@@ -1,14 +1,14 @@
-//! What the jaw shall do: `[motion]`.
+//! The motion of the jaw: `[motion]`.
 //!
 //! Jaw frame: origin at the incisal point, x anterior, y left, z up, upper jaw fixed; every motion
-//! is a displacement from the closed (intercuspal) pose. Values are checked by whoever builds the
-//! trajectory, not here. Defaults are figures of published studies; the generators name them.
+//! is a displacement from the closed (intercuspal) pose. The
+//! trajectory checks the values. Defaults are figures of published studies; the generators name them.
 
 use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
 
-/// A side of the jaw, seen by its owner.
+/// A side of the jaw, from the patient's view.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Side {
@@ -50,139 +50,88 @@ impl Default for MotionConfig {
     }
 }
 
-/// Chewing: a tear-drop loop of the incisal point, once a cycle.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct ChewingConfig {
-    /// Chewing cycles per second, Hz.
-    pub cycle_rate_hz: f64,
-    /// Shares of a cycle; together 1.
-    pub phases: PhaseShares,
-    /// How far the incisal point goes down, mm.
-    pub vertical_mm: f64,
-    /// How far the incisal point swings to the working side, mm.
-    pub lateral_mm: f64,
-    /// How far the incisal point goes back while it goes down, mm.
-    pub anterior_posterior_mm: f64,
-    /// The working side.
-    pub side: Side,
-    /// Inclination of the condylar path below the horizontal, degrees.
-    pub condylar_inclination_deg: f64,
-    /// Inward turn of the balancing condyle's path, degrees.
-    pub bennett_angle_deg: f64,
-}
-
-impl Default for ChewingConfig {
-    fn default() -> Self {
-        Self {
-            cycle_rate_hz: 1.43,
-            phases: PhaseShares::default(),
-            vertical_mm: 18.0,
-            lateral_mm: 4.0,
-            anterior_posterior_mm: 5.0,
-            side: Side::Left,
-            condylar_inclination_deg: 40.0,
-            bennett_angle_deg: 8.0,
-        }
+section! {
+    /// Chewing: a tear-drop loop of the incisal point, once a cycle.
+    #[derive(Copy)]
+    pub struct ChewingConfig {
+        /// Chewing cycles per second, Hz.
+        pub cycle_rate_hz: f64 = 1.43,
+        /// Shares of a cycle; together 1.
+        pub phases: PhaseShares = PhaseShares::default(),
+        /// How far the incisal point goes down, mm.
+        pub vertical_mm: f64 = 18.0,
+        /// How far the incisal point swings to the working side, mm.
+        pub lateral_mm: f64 = 4.0,
+        /// How far the incisal point goes back while it goes down, mm.
+        pub anterior_posterior_mm: f64 = 5.0,
+        /// The working side.
+        pub side: Side = Side::Left,
+        /// Inclination of the condylar path below the horizontal, degrees.
+        pub condylar_inclination_deg: f64 = 40.0,
+        /// Inward turn of the balancing condyle's path, degrees.
+        pub bennett_angle_deg: f64 = 8.0,
     }
 }
 
-/// How a motion's cycle divides into going out, coming back and resting at the closed pose.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct PhaseShares {
-    /// Share of the cycle in which the jaw leaves the closed pose.
-    pub opening: f64,
-    /// Share of the cycle in which it returns.
-    pub closing: f64,
-    /// Share of the cycle in which it stays closed.
-    pub occlusion: f64,
-}
-
-impl Default for PhaseShares {
-    fn default() -> Self {
-        Self { opening: 0.43, closing: 0.40, occlusion: 0.17 }
+section! {
+    /// How a motion's cycle divides into going out, coming back and resting at the closed pose.
+    #[derive(Copy)]
+    pub struct PhaseShares {
+        /// Share of the cycle in which the jaw leaves the closed pose.
+        pub opening: f64 = 0.43,
+        /// Share of the cycle in which it returns.
+        pub closing: f64 = 0.40,
+        /// Share of the cycle in which it stays closed.
+        pub occlusion: f64 = 0.17,
     }
 }
 
-/// Symmetric opening: the condyles glide forward in proportion to the opening angle.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct OpeningConfig {
-    /// Distance of the incisal point from its closed place at the widest, mm.
-    pub amplitude_mm: f64,
-    /// Openings per second, Hz.
-    pub cycle_rate_hz: f64,
-    /// Shares of a cycle; together 1.
-    pub phases: PhaseShares,
-    /// Inclination of the condylar path below the horizontal, degrees.
-    pub condylar_inclination_deg: f64,
-}
-
-impl Default for OpeningConfig {
-    fn default() -> Self {
-        Self {
-            amplitude_mm: 35.0,
-            cycle_rate_hz: 0.5,
-            phases: PhaseShares::default(),
-            condylar_inclination_deg: 40.0,
-        }
+section! {
+    /// Symmetric opening: the condyles glide forward in proportion to the opening angle.
+    #[derive(Copy)]
+    pub struct OpeningConfig {
+        /// Distance of the incisal point from its closed place at the widest, mm.
+        pub amplitude_mm: f64 = 35.0,
+        /// Openings per second, Hz.
+        pub cycle_rate_hz: f64 = 0.5,
+        /// Shares of a cycle; together 1.
+        pub phases: PhaseShares = PhaseShares::default(),
+        /// Inclination of the condylar path below the horizontal, degrees.
+        pub condylar_inclination_deg: f64 = 40.0,
     }
 }
 
-/// Protrusion: the jaw glides along the condylar path without turning.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct ProtrusionConfig {
-    /// Length of the glide, mm.
-    pub amplitude_mm: f64,
-    /// Protrusions per second, Hz.
-    pub cycle_rate_hz: f64,
-    /// Shares of a cycle; together 1.
-    pub phases: PhaseShares,
-    /// Inclination of the condylar path below the horizontal, degrees.
-    pub condylar_inclination_deg: f64,
-}
-
-impl Default for ProtrusionConfig {
-    fn default() -> Self {
-        Self {
-            amplitude_mm: 9.0,
-            cycle_rate_hz: 0.5,
-            phases: PhaseShares::default(),
-            condylar_inclination_deg: 40.0,
-        }
+section! {
+    /// Protrusion: the jaw glides along the condylar path without turning.
+    #[derive(Copy)]
+    pub struct ProtrusionConfig {
+        /// Length of the glide, mm.
+        pub amplitude_mm: f64 = 9.0,
+        /// Protrusions per second, Hz.
+        pub cycle_rate_hz: f64 = 0.5,
+        /// Shares of a cycle; together 1.
+        pub phases: PhaseShares = PhaseShares::default(),
+        /// Inclination of the condylar path below the horizontal, degrees.
+        pub condylar_inclination_deg: f64 = 40.0,
     }
 }
 
-/// Lateral excursion: the balancing condyle advances, the working condyle only shifts sideways.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct LateralConfig {
-    /// How far the incisal point goes to the side, mm.
-    pub amplitude_mm: f64,
-    /// The working side, to which the jaw goes.
-    pub side: Side,
-    /// Excursions per second, Hz.
-    pub cycle_rate_hz: f64,
-    /// Shares of a cycle; together 1.
-    pub phases: PhaseShares,
-    /// Inclination of the condylar path below the horizontal, degrees.
-    pub condylar_inclination_deg: f64,
-    /// Inward turn of the balancing condyle's path, degrees.
-    pub bennett_angle_deg: f64,
-}
-
-impl Default for LateralConfig {
-    fn default() -> Self {
-        Self {
-            amplitude_mm: 8.0,
-            side: Side::Left,
-            cycle_rate_hz: 0.5,
-            phases: PhaseShares::default(),
-            condylar_inclination_deg: 40.0,
-            bennett_angle_deg: 8.0,
-        }
+section! {
+    /// Lateral excursion: the balancing condyle advances, the working condyle only shifts sideways.
+    #[derive(Copy)]
+    pub struct LateralConfig {
+        /// How far the incisal point goes to the side, mm.
+        pub amplitude_mm: f64 = 8.0,
+        /// The working side, to which the jaw goes.
+        pub side: Side = Side::Left,
+        /// Excursions per second, Hz.
+        pub cycle_rate_hz: f64 = 0.5,
+        /// Shares of a cycle; together 1.
+        pub phases: PhaseShares = PhaseShares::default(),
+        /// Inclination of the condylar path below the horizontal, degrees.
+        pub condylar_inclination_deg: f64 = 40.0,
+        /// Inward turn of the balancing condyle's path, degrees.
+        pub bennett_angle_deg: f64 = 8.0,
     }
 }
 

@@ -1,6 +1,14 @@
-//! What many values of a scenario need alike.
+//! Checks that many values of a scenario share.
 
-use super::ScenarioError;
+use super::error::ScenarioError;
+
+/// The values of a table, each with its whole key.
+macro_rules! keyed {
+    ($table:literal, $config:expr, $($field:ident)+) => {
+        [$((concat!($table, ".", stringify!($field)), f64::from($config.$field))),+]
+    };
+}
+pub(super) use keyed;
 
 /// Longest run, s.
 const LONGEST_S: f64 = 86_400.0;
@@ -21,7 +29,7 @@ pub(super) fn require_duration(durations: &[(&'static str, f64)]) -> Result<(), 
     require(durations, |duration_s| duration_s > 0.0 && duration_s <= LONGEST_S, &need)
 }
 
-/// Refuses the first of `values` outside of its two bounds, which belong to it, or not a number.
+/// Refuses the first of `values` outside of its two bounds, or not a number. Each value comes with its bounds.
 pub(super) fn require_within(values: &[(&'static str, f64, f64, f64)]) -> Result<(), ScenarioError> {
     values.iter().try_for_each(|&(key, value, least, most)| {
         let need = format!("use {least} to {most}");

@@ -1,10 +1,9 @@
 //! A scenario as a whole: read from TOML, checked, and written back as resolved.
 
-use std::path::{Path, PathBuf};
-use std::{fmt, fs};
+use std::fs;
+use std::path::Path;
 
-use serde::{Deserialize, Serialize};
-
+use super::error::ScenarioError;
 use super::need::require_duration;
 use super::{
     CanConfig, ChecksConfig, ControllerConfig, DrivesConfig, DynamicsConfig, FaultConfig, FoodConfig,
@@ -16,120 +15,85 @@ use crate::geometry::MechanismConfig;
 /// Rates at which the rig can be asked to run, Hz.
 pub(crate) const RATES_HZ: std::ops::RangeInclusive<u32> = 10..=20_000;
 
-/// Everything a run is made of.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct Scenario {
-    /// Name of the run, with which the name of its folder ends.
-    pub name: String,
-    /// Seed of every random number.
-    pub seed: u64,
-    /// Cycles per second, Hz.
-    pub rate_hz: u32,
-    /// Duration of the motion, s; when absent a recording's own length, or ten seconds. A generated motion ends closed
-    /// if this holds a cycle and half a second, otherwise on its way.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub duration_s: Option<f64>,
-    /// What the jaw does.
-    pub motion: MotionConfig,
-    /// Where the jaw sits on the platform.
-    pub jaw: JawConfig,
-    /// What a motion may ask of the axes.
-    pub limits: TrajectoryLimitsConfig,
-    /// The mechanism's dimensions.
-    pub mechanism: MechanismConfig,
-    /// The controller.
-    pub controller: ControllerConfig,
-    /// The CAN link.
-    pub can: CanConfig,
-    /// The drives.
-    pub drives: DrivesConfig,
-    /// The emulated mechanism.
-    pub dynamics: DynamicsConfig,
-    /// Food between the teeth of the emulated jaw; none when absent.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub food: Option<FoodConfig>,
-    /// What the real-time processes ask of the system.
-    pub realtime: RealtimeConfig,
-    /// What the run is judged by.
-    pub checks: ChecksConfig,
-    /// What goes wrong on the buses.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub faults: Vec<FaultConfig>,
-}
-
-impl Default for Scenario {
-    fn default() -> Self {
-        Self {
-            name: "chewing".to_owned(),
-            seed: 1,
-            rate_hz: 1000,
-            duration_s: None,
-            motion: MotionConfig::default(),
-            jaw: JawConfig::default(),
-            limits: TrajectoryLimitsConfig::default(),
-            mechanism: MechanismConfig::default(),
-            controller: ControllerConfig::default(),
-            can: CanConfig::default(),
-            drives: DrivesConfig::default(),
-            dynamics: DynamicsConfig::default(),
-            food: None,
-            realtime: RealtimeConfig::default(),
-            checks: ChecksConfig::default(),
-            faults: Vec::new(),
-        }
-    }
-}
-
-/// Why a scenario was refused.
-#[derive(Debug, thiserror::Error)]
-pub enum ScenarioError {
-    /// The file cannot be read.
-    #[error("{}: {error}", path.display())]
-    Unreadable {
-        /// The file.
-        path: PathBuf,
-        /// What the system said.
-        error: std::io::Error,
-    },
-    /// It is no TOML, has an unknown key, or a value of the wrong type.
-    #[error("{}:{line}: {reason}", path.display())]
-    Malformed {
-        /// The file.
-        path: PathBuf,
-        /// Line of the fault, from 1.
-        line: usize,
-        /// What is wrong, with the nearest key that exists.
-        reason: String,
-    },
-    /// A value that no run can have.
-    #[error("{key} = {value}: {need}")]
-    BadValue {
-        /// The key, with its table.
-        key: &'static str,
-        /// What stands there.
-        value: String,
-        /// What may stand there.
-        need: String,
-    },
-}
-
-impl ScenarioError {
-    pub(super) fn bad(key: &'static str, value: &dyn fmt::Display, need: impl Into<String>) -> Self {
-        Self::BadValue { key, value: value.to_string(), need: need.into() }
+section! {
+    /// The whole configuration of a run.
+    pub struct Scenario {
+        /// Name of the run, with which the name of its folder ends.
+        pub name: String = "chewing".to_owned(),
+        /// Seed of every random number.
+        pub seed: u64 = 1,
+        /// Cycles per second, Hz.
+        pub rate_hz: u32 = 1000,
+        /// Duration of the motion, s; when absent a recording's own length, or ten seconds. A generated motion ends closed
+        /// if this holds a cycle and half a second, otherwise on its way.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        pub duration_s: Option<f64> = None,
+        /// The motion of the jaw.
+        pub motion: MotionConfig = MotionConfig::default(),
+        /// The place of the jaw on the platform.
+        pub jaw: JawConfig = JawConfig::default(),
+        /// Limits of the motion.
+        pub limits: TrajectoryLimitsConfig = TrajectoryLimitsConfig::default(),
+        /// The mechanism's dimensions.
+        pub mechanism: MechanismConfig = MechanismConfig::default(),
+        /// The controller.
+        pub controller: ControllerConfig = ControllerConfig::default(),
+        /// The CAN link.
+        pub can: CanConfig = CanConfig::default(),
+        /// The drives.
+        pub drives: DrivesConfig = DrivesConfig::default(),
+        /// The emulated mechanism.
+        pub dynamics: DynamicsConfig = DynamicsConfig::default(),
+        /// Food between the teeth of the emulated jaw; none when absent.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        pub food: Option<FoodConfig> = None,
+        /// The scheduling of the real-time processes.
+        pub realtime: RealtimeConfig = RealtimeConfig::default(),
+        /// The limits beyond which the run fails.
+        pub checks: ChecksConfig = ChecksConfig::default(),
+        /// Faults on the buses.
+        #[serde(skip_serializing_if = "Vec::is_empty")]
+        pub faults: Vec<FaultConfig> = Vec::new(),
     }
 }
 
 impl Scenario {
-    /// Reads a scenario; a recording's path is taken relative to the scenario's folder.
+    /// Reads a scenario file. The path of a recording is relative to the folder of the scenario. The values are not checked
+    /// yet: see [`Self::validate`].
+    ///
+    /// # Errors
+    /// [`ScenarioError`] for a file that cannot be read, and those of [`Self::parse`].
     pub fn read(path: &Path) -> Result<Self, ScenarioError> {
         let text = fs::read_to_string(path)
             .map_err(|error| ScenarioError::Unreadable { path: path.to_owned(), error })?;
-        let mut scenario: Self = toml::from_str(&text).map_err(|error| malformed(path, &text, &error))?;
+        let mut scenario = Self::parse(path, &text)?;
         if let (MotionConfig::File(file), Some(folder)) = (&mut scenario.motion, path.parent()) {
             file.path = folder.join(&file.path);
         }
         Ok(scenario)
+    }
+
+    /// Parses the text of a scenario; `path` is for messages only.
+    ///
+    /// # Examples
+    /// ```
+    /// use std::path::Path;
+    ///
+    /// use masseter_shared::config::Scenario;
+    ///
+    /// let path = Path::new("slow.toml");
+    /// let scenario = Scenario::parse(path, "rate_hz = 500")?;
+    /// scenario.validate()?;
+    /// assert_eq!(scenario.period_ns(), 2_000_000);
+    /// let error = Scenario::parse(path, "rate_hzz = 500").unwrap_err().to_string();
+    /// assert!(error.starts_with("slow.toml:1: unknown field") && error.ends_with("did you mean `rate_hz`?"));
+    /// # Ok::<(), masseter_shared::config::ScenarioError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`ScenarioError::Malformed`] with the line, and with the most similar key for an unknown one.
+    pub fn parse(path: &Path, text: &str) -> Result<Self, ScenarioError> {
+        toml::from_str(text).map_err(|error| malformed(path, text, &error))
     }
 
     /// The scenario with every default filled in, as TOML.
@@ -137,7 +101,10 @@ impl Scenario {
         toml::to_string_pretty(self).expect("every part of a scenario has a TOML form")
     }
 
-    /// Checks the values that stand for themselves.
+    /// Checks every value on its own.
+    ///
+    /// # Errors
+    /// [`ScenarioError::BadValue`] with key, value and valid values.
     pub fn validate(&self) -> Result<(), ScenarioError> {
         let named = self.name.bytes().all(|b| b.is_ascii_alphanumeric() || b == b'-' || b == b'_');
         if !named || !(1..=64).contains(&self.name.len()) {
@@ -206,8 +173,7 @@ mod tests {
     use crate::config::{DriveConfig, FileConfig};
 
     fn parse(text: &str) -> Result<Scenario, String> {
-        let scenario = toml::from_str::<Scenario>(text)
-            .map_err(|error| malformed(Path::new("s.toml"), text, &error).to_string())?;
+        let scenario = Scenario::parse(Path::new("s.toml"), text).map_err(|error| error.to_string())?;
         scenario.validate().map_err(|error| error.to_string())?;
         Ok(scenario)
     }
@@ -218,7 +184,7 @@ mod tests {
     }
 
     #[test]
-    fn a_drive_keeps_by_default_what_its_table_does_not_give() {
+    fn a_key_missing_in_a_drives_table_keeps_its_default() {
         let default = Scenario::default().drives;
         let drives = parse("[drives.slide]\nfollowing_error_m = 1").unwrap().drives;
         assert_eq!(drives.slide, DriveConfig { following_error_m: 1.0, ..default.slide });
@@ -226,13 +192,13 @@ mod tests {
     }
 
     #[test]
-    fn what_is_written_back_reads_as_the_same() {
+    fn a_resolved_scenario_reads_as_the_same_scenario() {
         let scenario = parse("name = 'x'\nduration_s = 3.0\n[motion]\nkind = 'opening'").unwrap();
         assert_eq!(parse(&scenario.to_toml()).unwrap(), scenario);
     }
 
     #[test]
-    fn a_recording_whose_path_is_no_text_is_refused() {
+    fn a_recording_whose_path_is_not_utf_8_is_refused() {
         use std::os::unix::ffi::OsStrExt;
         let path = Path::new(std::ffi::OsStr::from_bytes(b"/jaw\xFF/m.csv"));
         let scenario = Scenario { motion: MotionConfig::File(FileConfig::new(path)), ..Scenario::default() };
@@ -248,7 +214,7 @@ mod tests {
     }
 
     #[test]
-    fn faults_are_refused_with_place_and_remedy() {
+    fn wrong_scenarios_are_refused_with_place_and_remedy() {
         let cases = [
             ("seed = 1\nrate_hzz = 5", "s.toml:2: unknown field `rate_hzz`"),
             ("seed = 1\nrate_hzz = 5", "did you mean `rate_hz`?"),

@@ -6,7 +6,7 @@ use super::{Controller, Tick};
 use crate::messages::{Command, Event, Reading, State};
 use crate::realtime::Wake;
 
-/// Where a controller's messages come from and go to, and the clock of its stamps.
+/// The source and the destinations of a controller's messages, and the clock of its stamps.
 pub trait ControllerPorts {
     /// A reading, owned or in shared memory.
     type Reading: Borrow<Reading>;
@@ -16,7 +16,7 @@ pub trait ControllerPorts {
     /// Now, ns.
     fn now_ns(&self) -> u64;
 
-    /// The reading of this cycle, or the newest there is once waiting any longer would cost the deadline.
+    /// The reading of this cycle, or the newest reading when a longer wait would miss the deadline.
     ///
     /// # Errors
     /// When the messages cannot be received.
@@ -41,7 +41,7 @@ pub trait ControllerPorts {
     fn publish_event(&mut self, event: &Event) -> Result<(), Self::Error>;
 }
 
-/// Runs one cycle: reading, decision, command; then state and event, for which nobody waits.
+/// Runs one cycle: reading, decision, command; then state and event, which no other loop waits for.
 ///
 /// # Errors
 /// Those of the ports.

@@ -1,7 +1,7 @@
-//! The seam between the rig and a controller: what a controller is, the order of its cycle, and its process.
+//! The seam between the rig and a controller: the trait, the order of a cycle, and the process.
 //!
-//! A [`Controller`] is a pure step function. [`run_cycle`] is the one place that orders a cycle; [`process::run`] drives
-//! it in real time, and the runner under virtual time drives it in one thread. Kinematics, trajectories and safety of a
+//! A [`Controller`] is a pure step function. Only [`run_cycle`] orders a cycle. [`process::run`] calls it in
+//! real time; the runner of virtual time calls it in one thread. Kinematics, trajectories and safety of a
 //! particular controller are not here.
 
 mod cycle;

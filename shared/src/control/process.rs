@@ -3,24 +3,24 @@
 use super::{Controller, ControllerPorts, Outcome, run_cycle};
 use crate::clock;
 use crate::config::Scenario;
-use crate::lifecycle::{Assignment, ProcessError};
+use crate::lifecycle::{ProcessArguments, ProcessError};
 use crate::messages::{Command, Event, Reading, State};
 use crate::realtime::{Cycle, Wake};
-use crate::transport::{Inlet, Node, Outlet, Received, TransportError};
+use crate::transport::{Node, Publisher, Received, Subscriber, TransportError};
 
 /// Runs the controller that `build` makes, until it is done.
 ///
 /// # Errors
 /// Those of `build`, and [`ProcessError`] when the process cannot start or loses its messages.
 pub fn run<C: Controller, E: From<ProcessError>>(
-    assignment: &Assignment,
+    process_arguments: &ProcessArguments,
     build: impl FnOnce(&Scenario) -> Result<C, E>,
 ) -> Result<Outcome, E> {
-    let post = assignment.take_up()?;
-    let (scenario, schedule) = (&post.scenario, &post.schedule);
+    let context = process_arguments.init()?;
+    let (scenario, schedule) = (&context.scenario, &context.schedule);
     let mut controller = build(scenario)?;
-    let ports = Ports::open(&post.node)?;
-    let start = post.ready_on(scenario.realtime.cores[0])?;
+    let ports = Ports::open(&context.node)?;
+    let start = context.ready_on(scenario.realtime.cores[0])?;
     ports.connect().map_err(ProcessError::from)?;
 
     let mut real_time = RealTime {
@@ -32,7 +32,7 @@ pub fn run<C: Controller, E: From<ProcessError>>(
         if let Some(outcome) = controller.outcome() {
             return Ok(outcome);
         }
-        if post.stop.is_made() {
+        if context.stop.is_made() {
             controller.request_stop();
         }
         let wake = real_time.wait(&controller).map_err(ProcessError::from)?;
@@ -57,19 +57,19 @@ impl RealTime {
 
 /// The controller's ports on iceoryx2.
 struct Ports {
-    readings: Inlet<Reading>,
-    commands: Outlet<Command>,
-    states: Outlet<State>,
-    events: Outlet<Event>,
+    readings: Subscriber<Reading>,
+    commands: Publisher<Command>,
+    states: Publisher<State>,
+    events: Publisher<Event>,
 }
 
 impl Ports {
     fn open(node: &Node) -> Result<Self, ProcessError> {
         let ports = Self {
-            readings: node.newest_inlet()?,
-            commands: node.outlet()?,
-            states: node.outlet()?,
-            events: node.outlet()?,
+            readings: node.newest_subscriber()?,
+            commands: node.publisher()?,
+            states: node.publisher()?,
+            events: node.publisher()?,
         };
         ports.commands.warm_up()?;
         ports.states.warm_up()?;

@@ -1,5 +1,5 @@
 //! Inverse kinematics in closed form: dᵢ = (Aᵢ − Bᵢ⁰)·ûᵢ, lᵢ and θᵢ from the part of Aᵢ − Bᵢ
-//! perpendicular to ûᵢ. It does not judge strokes: see [`StrokeLimits`](super::StrokeLimits).
+//! perpendicular to ûᵢ. Strokes are not checked here: see [`StrokeLimits`](super::StrokeLimits).
 
 use super::{Actuators, Joints, LEGS, Mechanism, Pose};
 
@@ -129,7 +129,7 @@ mod tests {
     }
 
     #[test]
-    fn a_pose_that_is_no_number_is_refused() {
+    fn a_pose_that_is_not_finite_is_refused() {
         let mechanism = Mechanism::new(&MechanismConfig::default()).unwrap();
         let pose = Pose::translation(f64::NAN, 0.0, 0.27);
         assert_eq!(mechanism.inverse(&pose), Err(InverseError::NotFinite));

@@ -1,4 +1,4 @@
-//! How joint rates follow from the platform's twist, and how well conditioned that is.
+//! The Jacobian from the platform's twist to joint rates, and its condition number.
 
 use nalgebra::{Matrix3x6, Matrix6, Vector6};
 
@@ -17,7 +17,21 @@ pub struct Jacobian {
 }
 
 impl Mechanism {
-    /// The Jacobian at a pose and the joint coordinates that hold it (of [`Mechanism::inverse`]).
+    /// The Jacobian at a pose and its joint coordinates (of [`Mechanism::inverse`]).
+    ///
+    /// # Examples
+    /// ```
+    /// use masseter_shared::geometry::{Mechanism, MechanismConfig, Pose, Twist};
+    ///
+    /// let mechanism = Mechanism::new(&MechanismConfig::default())?;
+    /// let pose = Pose::translation(0.0, 0.0, 0.268_452_355);
+    /// let jacobian = mechanism.jacobian(&pose, &mechanism.inverse(&pose)?);
+    /// let upwards = Twist::new(0.0, 0.0, 0.01, 0.0, 0.0, 0.0);
+    /// let rates_m_s = jacobian.actuators * upwards;
+    /// assert!(rates_m_s[0].abs() < 1e-12, "the slides stand still");
+    /// assert!((rates_m_s[3] - 0.00994).abs() < 1e-5, "the legs extend");
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn jacobian(&self, pose: &Pose, joints: &Joints) -> Jacobian {
         let mut jacobian = Jacobian { actuators: Matrix6::zeros(), hinges: Matrix3x6::zeros() };
         for leg in 0..LEGS {
@@ -37,7 +51,7 @@ impl Mechanism {
         jacobian
     }
 
-    /// Condition number of the actuators' rates at a pose and the joint coordinates that hold it, angular velocities
+    /// Condition number of the actuators' rates at a pose and its joint coordinates, with angular velocities
     /// scaled by the platform's side A₁A₂. Infinite when singular.
     pub fn condition(&self, pose: &Pose, joints: &Joints) -> f64 {
         self.jacobian(pose, joints).condition(self.platform_sides_m()[0])
@@ -49,7 +63,7 @@ impl Jacobian {
     /// velocities scaled by `length_m` so that all columns are velocities. Infinite when singular, or no number.
     fn condition(&self, length_m: f64) -> f64 {
         let mut scaled = self.actuators;
-        // The iteration for the eigenvalues ends for finite numbers only.
+        // The eigenvalue iteration terminates for finite numbers only.
         if !scaled.iter().all(|rate| rate.is_finite()) {
             return f64::INFINITY;
         }
@@ -110,9 +124,9 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_number_is_badly_conditioned() {
-        let no_number = Jacobian { actuators: Matrix6::repeat(f64::NAN), hinges: Matrix3x6::zeros() };
-        assert!(no_number.condition(0.05).is_infinite());
+    fn a_jacobian_that_is_not_finite_has_an_infinite_condition() {
+        let not_finite = Jacobian { actuators: Matrix6::repeat(f64::NAN), hinges: Matrix3x6::zeros() };
+        assert!(not_finite.condition(0.05).is_infinite());
     }
 
     #[test]

@@ -38,10 +38,10 @@ impl Actuators {
     }
 }
 
-/// What rounding may carry a position beyond the end of its stroke, and no encoder sees, m.
+/// Tolerance at the ends of a stroke for rounding; far below the resolution of an encoder, m.
 const ROUNDING_M: f64 = 1e-9;
 
-/// A full joint state: what the drives hold and what the passive hinges follow.
+/// A full joint state: the actuated coordinates and the passive hinge angles.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Joints {
     /// Slides and legs.
@@ -50,7 +50,7 @@ pub struct Joints {
     pub theta_rad: [f64; LEGS],
 }
 
-/// How far slides and legs may go, both ends included.
+/// The strokes of slides and legs, both ends included.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct StrokeLimits {
@@ -69,7 +69,7 @@ pub struct StrokeLimits {
 pub struct LimitViolation {
     /// Axis index in the order d₁ d₂ d₃ l₁ l₂ l₃.
     pub axis: usize,
-    /// Where the axis is or was asked to go.
+    /// Actual or requested position of the axis, m.
     pub value_m: f64,
     /// The lower end of the stroke.
     pub lowest_m: f64,
@@ -91,26 +91,29 @@ impl StrokeLimits {
         if axis < LEGS { self.slide_m } else { self.leg_m }
     }
 
-    /// The first axis outside its stroke, if any; a value that is no number is outside.
+    /// The first axis outside its stroke, if any; a value that is not a number is outside.
     #[inline]
     pub fn check(&self, actuators: &Actuators) -> Result<(), LimitViolation> {
         self.check_within(ROUNDING_M, actuators)
     }
 
-    /// The actuators with every axis held within its stroke, unless one is further outside than `excess_m` or no
-    /// number. An axis that stood outside before may come back from there, but go no further.
+    /// The actuators with every axis clamped to its stroke. An axis that was outside before may come back, but go no
+    /// further.
+    ///
+    /// # Errors
+    /// [`LimitViolation`] for an axis that is not a number, or outside by more than `excess_m`.
     #[inline]
-    pub fn hold(
+    pub fn clamp(
         &self,
         actuators: &Actuators,
         before: &Actuators,
         excess_m: f64,
     ) -> Result<Actuators, LimitViolation> {
         self.check_within(excess_m, actuators)?;
-        let (wanted_m, before_m) = (actuators.to_axes(), before.to_axes());
+        let (desired_m, before_m) = (actuators.to_axes(), before.to_axes());
         Ok(Actuators::from_axes(std::array::from_fn(|axis| {
             let [lowest_m, highest_m] = self.of_axis(axis);
-            wanted_m[axis].clamp(lowest_m.min(before_m[axis]), highest_m.max(before_m[axis]))
+            desired_m[axis].clamp(lowest_m.min(before_m[axis]), highest_m.max(before_m[axis]))
         })))
     }
 
@@ -134,7 +137,7 @@ mod tests {
 
     /// Inverse of forward kinematics at the end of a stroke ends up to a few units of the last place beyond it.
     #[test]
-    fn what_rounding_carries_beyond_a_stroke_is_inside_it() {
+    fn rounding_at_the_end_of_a_stroke_is_tolerated() {
         let legs = |leg_m: f64| Actuators { slide_m: [0.0; LEGS], leg_m: [leg_m; LEGS] };
         for leg_m in [0.30_f64.next_up(), 0.24_f64.next_down(), 0.30 + 0.9e-9] {
             assert_eq!(STROKES.check(&legs(leg_m)), Ok(()), "{leg_m}");
@@ -145,30 +148,30 @@ mod tests {
     }
 
     #[test]
-    fn an_axis_is_held_at_the_end_of_its_stroke_unless_it_is_too_far_outside() {
+    fn an_axis_is_clamped_to_its_stroke_unless_it_is_too_far_outside() {
         let asked = |d1_m: f64, l3_m: f64| Actuators { slide_m: [d1_m, 0.0, 0.0], leg_m: [0.27, 0.27, l3_m] };
-        let holds = [
+        let clamps = [
             (asked(0.01, 0.25), asked(0.01, 0.25)),
             (asked(-0.0305, 0.27), asked(-0.03, 0.27)),
             (asked(0.0, 0.3009), asked(0.0, 0.30)),
         ];
         let before = asked(0.0, 0.27);
-        for (actuators, held) in holds {
-            assert_eq!(STROKES.hold(&actuators, &before, 1e-3), Ok(held));
+        for (actuators, held) in clamps {
+            assert_eq!(STROKES.clamp(&actuators, &before, 1e-3), Ok(held));
         }
         for (actuators, axis) in [(asked(0.0302, 0.238), 5), (asked(f64::NAN, 0.27), 0)] {
-            assert_eq!(STROKES.hold(&actuators, &before, 1e-3).unwrap_err().axis, axis);
+            assert_eq!(STROKES.clamp(&actuators, &before, 1e-3).unwrap_err().axis, axis);
         }
         assert!(STROKES.check(&asked(0.03, 0.24)).is_ok());
         assert!(STROKES.check(&asked(0.03, 0.239_999)).is_err());
     }
 
     #[test]
-    fn an_axis_that_stood_outside_may_come_back_but_go_no_further() {
+    fn an_axis_outside_its_stroke_may_come_back_but_go_no_further() {
         let asked = |l1_m: f64| Actuators { slide_m: [0.0; LEGS], leg_m: [l1_m, 0.27, 0.27] };
         let moves = [(0.2395, 0.2396, 0.2396), (0.2395, 0.2394, 0.2395), (0.241, 0.2394, 0.24)];
         for (from_m, to_m, held_m) in moves {
-            assert_eq!(STROKES.hold(&asked(to_m), &asked(from_m), 1e-3), Ok(asked(held_m)));
+            assert_eq!(STROKES.clamp(&asked(to_m), &asked(from_m), 1e-3), Ok(asked(held_m)));
         }
     }
 }

@@ -1,4 +1,4 @@
-//! The mechanism's dimensions, validated once, and what follows from them at any pose.
+//! The mechanism's dimensions, validated once, and the positions of its points at any pose.
 
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion};
 use serde::{Deserialize, Serialize};
@@ -16,7 +16,7 @@ pub struct SlideConfig {
     pub azimuth_deg: f64,
 }
 
-/// The dimensions a builder declares. The default is the paper's mechanism.
+/// The dimensions in a scenario. The default is the paper's mechanism.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct MechanismConfig {
@@ -61,16 +61,16 @@ pub enum GeometryError {
         /// Azimuth as given.
         azimuth_deg: f64,
     },
-    /// A length that is no number, or one that no machine has and whose square double precision may not hold.
+    /// A length that is not a number, or far outside the dimensions of a machine.
     #[error("mechanism.{name}: {value_m:e} m; use {least_m} to {most_m} m")]
     OutOfRange {
         /// Configuration key.
         name: &'static str,
-        /// What stands there.
+        /// The given value.
         value_m: f64,
-        /// The least that may.
+        /// The least valid value.
         least_m: f64,
-        /// The most that may.
+        /// The greatest valid value.
         most_m: f64,
     },
     /// The sides do not close to a triangle with an area.
@@ -89,7 +89,7 @@ pub enum GeometryError {
         /// Area of the triangle of the centres.
         area_m2: f64,
     },
-    /// Slides in the order in which every leg would have to stand crossed.
+    /// Slides in clockwise order, in which the legs would cross.
     #[error(
         "mechanism.slides: the three centres go round clockwise; number the slides counter-clockwise seen from above"
     )]
@@ -111,7 +111,7 @@ pub enum GeometryError {
         lowest_m: f64,
         /// Upper end as given.
         highest_m: f64,
-        /// What a stroke needs.
+        /// The condition on a stroke.
         need: &'static str,
     },
 }
@@ -137,6 +137,20 @@ pub struct Mechanism {
 
 impl Mechanism {
     /// Checks the dimensions and resolves directions and corners.
+    ///
+    /// # Examples
+    /// ```
+    /// use masseter_shared::geometry::{Mechanism, MechanismConfig};
+    ///
+    /// let mechanism = Mechanism::new(&MechanismConfig::default())?;
+    /// assert_eq!(mechanism.platform_sides_m(), [0.05; 3]);
+    /// let flat = MechanismConfig { platform_sides_m: [0.05, 0.05, 0.1], ..MechanismConfig::default() };
+    /// assert!(Mechanism::new(&flat).is_err());
+    /// # Ok::<(), masseter_shared::geometry::GeometryError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`GeometryError`] with the key, the value and the remedy.
     pub fn new(config: &MechanismConfig) -> Result<Self, GeometryError> {
         check_sizes(config)?;
         check_strokes(&config.strokes)?;
@@ -276,7 +290,7 @@ fn resolve_slides(configs: &[SlideConfig; LEGS]) -> Result<[Slide; LEGS], Geomet
     if area_m2.abs() <= LEAST_BASE_M2 {
         return Err(GeometryError::NoBase { area_m2: area_m2.abs() });
     }
-    // The platform's corners are numbered counter-clockwise: it would hang turned over.
+    // The platform's corners are numbered counter-clockwise; with clockwise slides the platform would be upside down.
     if area_m2 < 0.0 {
         return Err(GeometryError::Clockwise);
     }

@@ -1,13 +1,12 @@
-//! The mechanism: three slides, three telescopic legs, the platform they carry.
+//! The mechanism: three slides, three telescopic legs and one platform.
 //!
 //! Frames, as reconstructed from the paper (Fig. 1 and its two conditions):
 //! *base* has its origin at the centre of the base, x anterior, y left, z up;
 //! *platform* has its origin at the centroid of A₁A₂A₃, x towards A₁, z along the
 //! normal (A₂−A₁)×(A₃−A₁). A pose is the platform frame in the base frame.
 //!
-//! Here stand the geometry, the closed-form inverse kinematics and the Jacobian, which both sides
-//! of the rig share. Forward kinematics is *not* here: it belongs to the controller alone, so that
-//! the plant stays an independent oracle.
+//! This module holds the geometry, the closed-form inverse kinematics and the Jacobian, which controller and plant
+//! share. It does not hold forward kinematics: only the controller has it, so that the plant stays an independent oracle.
 
 mod inverse;
 mod jacobian;

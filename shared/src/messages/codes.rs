@@ -74,7 +74,7 @@ macro_rules! codes {
 }
 
 codes! {
-    /// Where the controller stands in its sequence.
+    /// State of the controller's sequence.
     ControllerState {
         /// No steady readings yet; drives off.
         WaitReadings = 0 "wait_readings",
@@ -94,7 +94,7 @@ codes! {
         SafeStop = 7 "safe_stop",
     }
 
-    /// How far the CAN master is with a node.
+    /// Progress of the CAN master with the boot of a node.
     BootPhase {
         /// Waiting for its boot-up message.
         Waiting = 0 "waiting",
@@ -120,7 +120,7 @@ codes! {
         Controller = 1 "controller",
         /// The plant: CAN master.
         Master = 2 "master",
-        /// The plant: what a drive told its master.
+        /// The plant: a message of a drive to the master.
         Drive = 3 "drive",
         /// A simulated wire, or the faults of a real one.
         Wire = 5 "wire",
@@ -132,11 +132,11 @@ codes! {
         Transition = 0 "transition",
         /// Something is wrong; `cause`, `value` and `limit` explain it.
         Fault = 1 "fault",
-        /// Something is worth knowing and was not reacted to.
+        /// An observation without a reaction.
         Notice = 2 "notice",
     }
 
-    /// Why kinematics gave nothing, as an event of the controller tells it in its `object`.
+    /// Why kinematics gave no pose, in the `object` of an event of the controller.
     NoPose {
         /// A coordinate is no finite number.
         NotFinite = 1 "not_finite",
@@ -144,17 +144,17 @@ codes! {
         NoLength = 2 "no_length",
         /// No pose fits the positions.
         Unassemblable = 3 "unassemblable",
-        /// Only poses fit them in which the mechanism is folded over.
+        /// Only poses with a folded mechanism fit the positions.
         WrongAssembly = 4 "wrong_assembly",
-        /// Several poses fit them, and the last one does not settle which.
+        /// Several poses fit the positions, and the last pose does not decide between them.
         Ambiguous = 5 "ambiguous",
-        /// Poses fit them that cannot be told apart.
+        /// Several poses fit the positions, and rounding hides their difference.
         Undecided = 6 "undecided",
         /// The pose is singular, or an iteration came to none.
         NotFound = 7 "not_found",
     }
 
-    /// Why something happened. The unit of an event's `value` and `limit` stands in brackets.
+    /// Cause of an event. The unit of the event's `value` and `limit` is given in brackets.
     Cause {
         /// In the course of the sequence.
         Sequence = 0 "sequence",
@@ -170,7 +170,7 @@ codes! {
         StrokeLimit = 5 "stroke_limit",
         /// An axis asked to go faster than its drive may (m/s).
         VelocityLimit = 6 "velocity_limit",
-        /// The pose wanted has no joint coordinates.
+        /// The desired pose has no joint coordinates.
         InverseKinematics = 7 "inverse_kinematics",
         /// A reading answers a command that this controller never sent (cycle).
         ForeignCommand = 8 "foreign_command",
@@ -208,11 +208,11 @@ codes! {
         SdoTimeout = 29 "sdo_timeout",
         /// Two nodes have one id: they answer SDO requests or SYNCs more than once, again and again.
         DuplicateNode = 30 "duplicate_node",
-        /// A node booted although nobody asked it to.
+        /// A node booted without a request.
         NodeRestarted = 31 "node_restarted",
         /// A drive is in fault and a fault reset does not help (EMCY code, object 603F).
         FaultAtStart = 32 "fault_at_start",
-        /// A node left the NMT state operational by itself (NMT state that it told; the limit is operational's code).
+        /// A node left the NMT state operational by itself (reported NMT state; the limit is the code of operational).
         NodeStopped = 33 "node_stopped",
         /// A bus or a node works again after a fault.
         Recovered = 34 "recovered",
@@ -222,7 +222,7 @@ codes! {
         UnknownNode = 36 "unknown_node",
         /// Another node sends SYNC or has the master's id: its heartbeats would keep the drives going without this one.
         SecondMaster = 37 "second_master",
-        /// A drive has voltage although it was told to quick stop (statusword, object 6041).
+        /// A drive has voltage in spite of a quick stop (statusword, object 6041).
         StillPowered = 38 "still_powered",
         /// A drive counts its software limits from elsewhere than its positions (home offset, object 607C).
         HomeOffset = 39 "home_offset",

@@ -12,9 +12,9 @@ const MOST: usize = Frame::MAX_DATA;
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable, ZeroCopySend)]
 pub struct CanData {
-    /// How many are in use.
+    /// Number of bytes in use.
     pub length: u32,
-    /// They, and what is left of the room.
+    /// The bytes in use, then zeros.
     pub bytes: [u8; MOST],
 }
 
@@ -24,7 +24,7 @@ impl CanData {
         Self { length: length as u32, bytes }
     }
 
-    /// Those in use, never more than there are.
+    /// The bytes in use.
     pub fn as_slice(&self) -> &[u8] {
         &self.bytes[..MOST - self.unused_bytes()]
     }

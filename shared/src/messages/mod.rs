@@ -1,13 +1,12 @@
-//! What the processes tell each other: one fixed-size message type per topic.
+//! Messages between the processes: one fixed-size type for each topic.
 //!
 //! Every message begins with its sequence number, the time it was published and the version of its
 //! layout. All times are nanoseconds of `CLOCK_MONOTONIC`, 0 where nothing happened yet. Fields lie
-//! on their natural alignment without padding, so that the bytes in shared memory are at the same
-//! time a valid CDR body, but for what a field of variable length leaves unused at the end: the recording
-//! writes [`Message::body`] as it is, under the schema that [`Message::schema`] derives from the same table.
+//! on their natural alignment without padding, so that the bytes in shared memory are also a valid
+//! CDR body, except for unused bytes at the end of a field of variable length. The recording writes [`Message::body`]
+//! unchanged, with the schema that [`Message::schema`] derives from the same table.
 //!
-//! Codes of enumerations stand in [`codes`]; how messages travel is not here but in
-//! [`transport`](crate::transport).
+//! The codes of enumerations are in [`codes`]. The transport is in [`transport`](crate::transport).
 
 pub mod codes;
 mod data;
@@ -27,11 +26,11 @@ use schema::FieldType;
 pub use data::CanData;
 pub use words::explain;
 
-/// A message type: what every topic's payload has in common.
+/// The type of the messages of a topic.
 pub trait Message: Pod + ZeroCopySend + Default + std::fmt::Debug + PartialEq {
     /// The topic the message travels on.
     const TOPIC: &'static str;
-    /// Messages a subscriber may fall behind before it loses the oldest.
+    /// Messages that a subscriber keeps; a slower subscriber loses the oldest ones.
     const DEPTH: usize;
     /// Type name in recordings.
     const TYPE_NAME: &'static str;
@@ -43,10 +42,10 @@ pub trait Message: Pod + ZeroCopySend + Default + std::fmt::Debug + PartialEq {
     fn version(&self) -> u64;
     /// The layout in the ROS 2 message definition language, as recordings carry it.
     fn schema() -> String;
-    /// Its CDR body: all its bytes but the unused ones at its end.
+    /// The CDR body: all bytes except the unused ones at the end.
     fn body(&self) -> &[u8];
-    /// The message with this body; none when a message of this type cannot have it.
-    fn of_body(body: &[u8]) -> Option<Self>;
+    /// The message with this body; none when no message of this type has such a body.
+    fn from_body(body: &[u8]) -> Option<Self>;
     /// Stamps sequence number, time and version just before it is sent.
     fn stamp(&mut self, seq: u64, published_ns: u64);
 }
@@ -111,7 +110,7 @@ macro_rules! messages {
                 &bytes_of(self)[..size_of::<Self>() - unused]
             }
 
-            fn of_body(body: &[u8]) -> Option<Self> {
+            fn from_body(body: &[u8]) -> Option<Self> {
                 let mut message = Self::default();
                 bytes_of_mut(&mut message).get_mut(..body.len())?.copy_from_slice(body);
                 (message.body().len() == body.len()).then_some(message)
@@ -125,21 +124,21 @@ macro_rules! messages {
 }
 
 messages! {
-    /// What the controller wants of the drives, once a cycle.
+    /// Targets and request for the drives, once a cycle.
     Command on "command" keeping 2048 as "masseter/Command/691046831b7ae07d" {
         /// Cycle of the controller, from 1.
         cycle: u64,
         /// Cycle of the reading it was computed from; 0 when there was none.
         reading_cycle: u64,
-        /// Wanted positions d₁ d₂ d₃ l₁ l₂ l₃, m.
+        /// Desired positions d₁ d₂ d₃ l₁ l₂ l₃, m.
         target_m: [f64; AXES],
-        /// Wanted drive state, a [`codes::DriveRequest`].
+        /// Requested drive state, a [`codes::DriveRequest`].
         request: u32,
         /// State of the controller, a [`codes::ControllerState`].
         controller_state: u32,
     }
 
-    /// What the encoders and drives reported, once a cycle.
+    /// Positions, forces and states of the drives, once a cycle.
     Reading on "reading" keeping 2048 as "masseter/Reading/c16b013b50dfdf49" {
         /// Cycle of the plant, from 1.
         cycle: u64,
@@ -159,9 +158,9 @@ messages! {
         woke_ns: u64,
         /// Deadlines skipped since start because an earlier cycle overran.
         skipped_cycles: u64,
-        /// Time that the machine withheld from the process while it waited, since start, ns.
+        /// Time lost to the machine while the process waited, since start, ns.
         stalled_ns: u64,
-        /// Time that the process spun, what was withheld left out, since start, ns.
+        /// Time that the process spun, without the lost time, since start, ns.
         spun_ns: u64,
         /// Time that the process worked, since start, ns.
         worked_ns: u64,
@@ -179,7 +178,7 @@ messages! {
         master_fault: u32,
     }
 
-    /// What the controller made of a reading, once a cycle.
+    /// The controller's state and its estimate, once a cycle.
     State on "state" keeping 2048 as "masseter/State/881240e4e5e5cf4a" {
         /// Cycle of the controller, from 1.
         cycle: u64,
@@ -199,9 +198,9 @@ messages! {
         commanded_ns: u64,
         /// Deadlines skipped since start because an earlier cycle overran.
         skipped_cycles: u64,
-        /// Time that the machine withheld from the process while it waited, since start, ns.
+        /// Time lost to the machine while the process waited, since start, ns.
         stalled_ns: u64,
-        /// Time that the process spun, what was withheld left out, since start, ns.
+        /// Time that the process spun, without the lost time, since start, ns.
         spun_ns: u64,
         /// Time that the process worked, since start, ns.
         worked_ns: u64,
@@ -211,13 +210,13 @@ messages! {
         /// passes more slowly while the motion gathers speed and while it comes to rest. Negative before the motion
         /// begins.
         motion_time_s: f64,
-        /// Pose wanted at the sample: position in the base frame, m.
+        /// Desired pose at the sample: position in the base frame, m.
         desired_position_m: [f64; 3],
-        /// Pose wanted at the sample: unit quaternion w x y z.
+        /// Desired pose at the sample: unit quaternion w x y z.
         desired_quaternion_wxyz: [f64; 4],
-        /// Pose found by forward kinematics: position in the base frame, m.
+        /// Estimated pose by forward kinematics: position in the base frame, m.
         estimated_position_m: [f64; 3],
-        /// Pose found by forward kinematics: unit quaternion w x y z.
+        /// Estimated pose by forward kinematics: unit quaternion w x y z.
         estimated_quaternion_wxyz: [f64; 4],
         /// θ₁ θ₂ θ₃, rad.
         leg_angle_rad: [f64; LEGS],
@@ -231,7 +230,7 @@ messages! {
         controller_state: u32,
     }
 
-    /// What the mechanism really did, once a cycle; the controller never reads it.
+    /// The true state of the mechanism, once a cycle; the controller never reads it.
     Truth on "truth" keeping 2048 as "masseter/Truth/926a8753e566de8a" {
         /// Cycle of the plant, from 1.
         cycle: u64,
@@ -251,11 +250,11 @@ messages! {
         bite_force_n: f64,
     }
 
-    /// What a tap on a CAN wire saw: a frame, or an error message as `linux/can/error.h` codes it.
+    /// An observation of a tap on a CAN wire: a frame, or an error message in the coding of `linux/can/error.h`.
     FrameTap on "frame" keeping 32768 as "masseter/FrameTap/40ca94b43c999ccf" {
         /// When its last bit was on the wire, ns.
         time_ns: u64,
-        /// When its transmitter had it queued, ns; 0 where the wire does not tell, as real ones do not.
+        /// When its transmitter had it queued, ns; 0 on real wires.
         queued_ns: u64,
         /// Identifier; bit 31 set for a 29-bit one, bit 29 for an error message.
         id: u32,
@@ -267,30 +266,30 @@ messages! {
         data: CanData,
     }
 
-    /// What the kernel had counted of the machine and of both loops; the recorder looks and records it, and it travels
-    /// nowhere.
+    /// Counters of the kernel for the machine and both loops. The recorder reads and records them; the message is not
+    /// published.
     Machine on "machine" keeping 1 as "masseter/Machine/130c1be53085d979" {
-        /// When it was looked at, ns.
+        /// Time of the sample, ns.
         time_ns: u64,
-        /// Time that the hypervisor had taken from all cores together, as far as it tells, ns.
+        /// Time that the hypervisor had taken from all cores together, as far as the hypervisor reports it, ns.
         stolen_ns: u64,
-        /// Times that the controller's and the plant's loop had had its core taken from it.
+        /// Involuntary context switches of the controller's and the plant's loop.
         involuntary_switches: [u64; 2],
         /// Page faults of the controller and of the plant.
         page_faults: [u64; 2],
     }
 
-    /// Something that happened once: a change of state, a fault, an alarm.
+    /// A single occurrence: a change of state, a fault, an alarm.
     Event on "event" keeping 1024 as "masseter/Event/299f7070e354d7de" {
         /// When, ns.
         time_ns: u64,
         /// Cycle of the process that reports it.
         cycle: u64,
-        /// Who reports it, a [`codes::Source`].
+        /// Reporter, a [`codes::Source`].
         source: u32,
-        /// What it is, a [`codes::EventKind`].
+        /// Kind, a [`codes::EventKind`].
         kind: u32,
-        /// Why, a [`codes::Cause`].
+        /// Cause, a [`codes::Cause`].
         cause: u32,
         /// Axis concerned, from 0; [`codes::NO_AXIS`] when none is.
         axis: u32,
@@ -332,7 +331,7 @@ pub fn pose_fields(pose: &Pose) -> ([f64; 3], [f64; 4]) {
 }
 
 /// The pose that [`pose_fields`] took apart.
-pub fn pose_of_fields(position_m: [f64; 3], [w, x, y, z]: [f64; 4]) -> Pose {
+pub fn pose_from_fields(position_m: [f64; 3], [w, x, y, z]: [f64; 4]) -> Pose {
     let rotation = nalgebra::UnitQuaternion::from_quaternion(nalgebra::Quaternion::new(w, x, y, z));
     Pose::from_parts(nalgebra::Translation3::from(position_m), rotation)
 }

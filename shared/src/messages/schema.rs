@@ -4,7 +4,7 @@
 pub(super) trait FieldType {
     fn ros_type() -> String;
 
-    /// Bytes at the end of it that say nothing. Only a message's last field may have any.
+    /// Unused bytes at the end of the field. Only a message's last field may have any.
     fn unused_bytes(&self) -> usize {
         0
     }
@@ -48,16 +48,16 @@ mod tests {
     }
 
     #[test]
-    fn a_body_is_what_is_used_and_makes_the_message_again() {
+    fn a_body_holds_the_used_bytes_and_restores_the_message() {
         for length in [0, 1, 8, 64] {
             let bytes = std::array::from_fn(|index| if index < length { 0xA5 } else { 0 });
             let frame = FrameTap { seq: 7, data: CanData::padded(bytes, length), ..Default::default() };
             assert_eq!(frame.body().len(), size_of::<FrameTap>() - 64 + length);
-            assert_eq!(FrameTap::of_body(frame.body()), Some(frame));
+            assert_eq!(FrameTap::from_body(frame.body()), Some(frame));
         }
         let command = Command { cycle: 3, ..Default::default() };
         assert_eq!(command.body().len(), size_of::<Command>());
-        assert_eq!(Command::of_body(command.body()), Some(command));
+        assert_eq!(Command::from_body(command.body()), Some(command));
     }
 
     #[test]
@@ -65,10 +65,10 @@ mod tests {
         let frame = FrameTap { data: CanData::padded([0; 64], 8), ..Default::default() };
         let bytes = bytemuck::bytes_of(&frame);
         for cut in (0..frame.body().len()).chain(frame.body().len() + 1..=bytes.len()) {
-            assert_eq!(FrameTap::of_body(&bytes[..cut]), None, "{cut} bytes");
+            assert_eq!(FrameTap::from_body(&bytes[..cut]), None, "{cut} bytes");
         }
-        assert_eq!(Command::of_body(&[0; size_of::<Command>() + 1]), None);
-        assert_eq!(Command::of_body(&[0; size_of::<Command>() - 1]), None);
+        assert_eq!(Command::from_body(&[0; size_of::<Command>() + 1]), None);
+        assert_eq!(Command::from_body(&[0; size_of::<Command>() - 1]), None);
     }
 
     #[test]

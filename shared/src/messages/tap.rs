@@ -12,7 +12,7 @@ const MAX_BUSES: usize = 64;
 /// A message that holds neither frame nor error report.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum TapError {
-    /// A frame that cannot be.
+    /// A frame that CAN does not have.
     #[error(transparent)]
     Frame(#[from] FrameError),
     /// An error report of no known class.
@@ -26,7 +26,7 @@ pub enum TapError {
     },
 }
 
-/// The message for what was seen on the bus of that index; its header is stamped when it is published.
+/// The message for an observation on the bus with that index. The header is stamped at publication.
 pub fn encode(bus: u16, tapped: &Tapped) -> FrameTap {
     match tapped {
         Tapped::Frame(TappedFrame { frame, time_ns, queued_ns }) => FrameTap {
@@ -48,7 +48,7 @@ pub fn encode(bus: u16, tapped: &Tapped) -> FrameTap {
     }
 }
 
-/// Index of the bus that a message is from: what is kept for each bus may be indexed by it.
+/// Index of the bus of a message, which is safe as an index of arrays with one entry for each bus.
 ///
 /// # Errors
 /// [`TapError::Bus`] where no link has that many.
@@ -62,7 +62,7 @@ pub fn is_error(tap: &FrameTap) -> bool {
     tap.id & ERROR_FLAG != 0 && tap.id >> 30 == 0
 }
 
-/// What a message holds.
+/// The frame or error report of a message.
 ///
 /// # Errors
 /// [`TapError`] where it is neither a frame nor an error report.

@@ -1,12 +1,11 @@
-//! Events in words: what is wrong, where, and what to do.
+//! Sentences for events: place, fault and remedy.
 
 use super::Event;
 use super::codes::{Cause, EventKind, NoPose, Source};
 use crate::geometry::AXIS_NAMES;
 use masseter_can::canopen::{AbortCode, EmergencyCode, ObjectAddress};
 
-/// The sentence for an event that names a node, a bus, an object, or why there is no pose; `None` where the figures
-/// alone say what there is to say.
+/// The sentence for an event that names a node, a bus, an object, or why there is no pose; `None` for other events.
 pub fn explain(event: &Event) -> Option<String> {
     let cause = Cause::try_from(event.cause).ok().filter(|_| event.kind != EventKind::Transition.code())?;
     let what = complaint(cause, event)?;
@@ -133,7 +132,7 @@ mod tests {
     }
 
     #[test]
-    fn faults_say_what_where_and_what_to_do() {
+    fn sentences_for_faults_name_place_fault_and_remedy() {
         let (value, limit) = (f64::from(0x6041_0010), f64::from(0x6040_0010));
         let pdo = Event { object: 0x16_0001, value, limit, ..event(Cause::WrongPdo) };
         assert_eq!(

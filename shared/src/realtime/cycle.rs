@@ -5,6 +5,17 @@ use crate::clock;
 
 /// Waits for the deadlines of a periodic task.
 ///
+/// # Examples
+/// ```
+/// use masseter_shared::clock;
+/// use masseter_shared::realtime::Cycle;
+///
+/// let mut cycle = Cycle::new(clock::now_ns() + 1_000_000, 1_000_000);
+/// let (first, second) = (cycle.wait(), cycle.wait());
+/// assert!(second.woke_ns >= second.due_ns);
+/// assert_eq!(second.due_ns - first.due_ns, (second.cycle - first.cycle) * 1_000_000);
+/// ```
+///
 /// Overrun policy: a deadline that the task is late for by less than a period is kept, late; those that passed before
 /// are skipped and counted, never caught up in a burst. Cycle numbers keep counting deadlines, so a skipped one leaves a
 /// gap.
@@ -17,7 +28,7 @@ pub struct Cycle {
     skipped: u64,
 }
 
-/// A deadline that came.
+/// A reached deadline.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Wake {
     /// Number of the deadline, from 1.
@@ -28,12 +39,12 @@ pub struct Wake {
     pub woke_ns: u64,
     /// Deadlines skipped since the start.
     pub skipped: u64,
-    /// What the task's time went to since the start.
+    /// The use of the task's time since the start.
     pub account: Account,
 }
 
 impl Wake {
-    /// A deadline of virtual time, in which nobody is late.
+    /// A deadline in virtual time, which is always met in time.
     pub fn on_time(cycle: u64, due_ns: u64) -> Self {
         Self { cycle, due_ns, woke_ns: due_ns, skipped: 0, account: Account::default() }
     }

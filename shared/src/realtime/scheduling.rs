@@ -37,7 +37,7 @@ pub struct Obtained {
     pub refusals: Vec<String>,
 }
 
-/// Asks for `wanted`, then reads back what was granted. Memory is locked for the whole process, the rest holds for the calling
+/// Requests `wanted`, then reads back the granted scheduling. Memory is locked for the whole process, the rest holds for the calling
 /// thread.
 pub fn obtain(wanted: Wanted) -> Obtained {
     // The kernel may accept a request without effect: only what is read back counts.
@@ -60,10 +60,10 @@ pub fn obtain(wanted: Wanted) -> Obtained {
         .refusals
         .extend(pinned.zip(wanted.core).map(|(why, core)| refused_core(core, &why, &usable_cores())));
     obtained.refusals.extend(fifo.zip(wanted.fifo_priority).map(|(why, priority)| {
-        format!("SCHED_FIFO {priority} refused ({why}): `masseter doctor` tells how to allow it")
+        format!("SCHED_FIFO {priority} refused ({why}): `masseter doctor` shows how to allow it")
     }));
     obtained.refusals.extend(
-        locked.map(|why| format!("locked memory refused ({why}): `masseter doctor` tells how to allow it")),
+        locked.map(|why| format!("locked memory refused ({why}): `masseter doctor` shows how to allow it")),
     );
     obtained
 }
@@ -81,7 +81,7 @@ fn refused_core(core: usize, why: &str, choice: &[usize]) -> String {
     let choice: Vec<_> = choice.iter().map(usize::to_string).collect();
     let remedy = match &choice[..] {
         [only] => format!(
-            "only core {only} may be used, and controller and plant delay each other there: `masseter doctor` tells how \
+            "only core {only} may be used, and controller and plant delay each other there: `masseter doctor` shows how \
              to allow two"
         ),
         choice => format!("choose two among {} with --cores", choice.join(", ")),
@@ -237,6 +237,6 @@ mod tests {
     #[test]
     fn a_refused_core_comes_with_its_remedy() {
         assert!(refused_core(4, "EINVAL", &[0, 2]).contains("choose two among 0, 2 with --cores"));
-        assert!(refused_core(1, "EINVAL", &[0]).contains("`masseter doctor` tells how to allow two"));
+        assert!(refused_core(1, "EINVAL", &[0]).contains("`masseter doctor` shows how to allow two"));
     }
 }

@@ -11,7 +11,7 @@ const GAP_NS: u64 = 50_000;
 /// machines (`masseter doctor` measures it).
 const SHORTEST_SLEEP_NS: u64 = 50_000;
 
-/// Where a task's time went since its first wait, ns.
+/// The use of a task's time since its first wait, ns.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Account {
     /// Lost to the machine while waiting: late ends of sleeps, and gaps while spinning.
@@ -21,7 +21,7 @@ pub struct Account {
     /// Between waits.
     pub worked_ns: u64,
     /// The part of `worked_ns` in stretches longer than a gap: either the machine stalled or the work took too long. The
-    /// task itself cannot tell which.
+    /// task itself cannot distinguish the two.
     pub overlong_ns: u64,
 }
 
@@ -229,7 +229,7 @@ mod tests {
     }
 
     #[test]
-    fn a_blocking_wait_ends_with_what_it_waits_for_and_is_not_work() {
+    fn a_blocking_wait_ends_with_its_event_and_does_not_count_as_work() {
         let mut waiter = Waiter::new(1_000_000);
         let begun_ns = clock::now_ns();
         let woken_ns = waiter.until_woken(begun_ns + SECOND_NS, begun_ns + SECOND_NS, |until_ns| {
@@ -262,7 +262,7 @@ mod tests {
     }
 
     #[test]
-    fn a_wait_whose_end_has_come_before_it_spins_belongs_to_the_work_around_it() {
+    fn a_wait_that_ends_before_it_spins_counts_as_work() {
         let mut waiter = Waiter::new(1_000_000);
         waiter.spin();
         clock::sleep(STALL);

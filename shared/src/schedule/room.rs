@@ -2,10 +2,6 @@
 
 use std::fmt;
 
-use super::{CycleSchedule, ScheduleError, answer_ns, heartbeat_ns};
-use crate::clock::SECOND_NS;
-use crate::config::{CanConfig, RATES_HZ};
-
 /// The cycle rate that a link has room for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Room {
@@ -13,32 +9,6 @@ pub struct Room {
     pub max_rate_hz: Option<u32>,
     /// The part of every cycle that the drives take to answer SYNC, ns.
     pub answer_ns: u64,
-}
-
-impl Room {
-    /// The room of a configured link, by bisection: whatever fits into a cycle fits into a longer one.
-    ///
-    /// # Errors
-    /// [`ScheduleError`] for unknown bit rates and node ids.
-    pub fn for_link(can: &CanConfig) -> Result<Self, ScheduleError> {
-        let fits = |rate_hz: u32| {
-            CycleSchedule::fit(can, SECOND_NS / u64::from(rate_hz)).map(|fitted| fitted.is_ok())
-        };
-        let answer_ns = answer_ns(can, heartbeat_ns(can, can.rates()?));
-        let (mut max_rate_hz, mut too_high_hz) = (*RATES_HZ.start(), *RATES_HZ.end() + 1);
-        if !fits(max_rate_hz)? {
-            return Ok(Self { max_rate_hz: None, answer_ns });
-        }
-        while too_high_hz - max_rate_hz > 1 {
-            let between_hz = u32::midpoint(max_rate_hz, too_high_hz);
-            if fits(between_hz)? {
-                max_rate_hz = between_hz;
-            } else {
-                too_high_hz = between_hz;
-            }
-        }
-        Ok(Self { max_rate_hz: Some(max_rate_hz), answer_ns })
-    }
 }
 
 impl fmt::Display for Room {
@@ -57,6 +27,9 @@ impl fmt::Display for Room {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::clock::SECOND_NS;
+    use crate::config::{CanConfig, RATES_HZ};
+    use crate::schedule::CycleSchedule;
 
     #[test]
     fn the_highest_rate_is_one_that_fits_and_the_next_does_not() {
@@ -76,7 +49,7 @@ mod tests {
     }
 
     #[test]
-    fn a_refusal_names_the_rate_that_fits_and_what_slow_drives_take_of_it() {
+    fn a_refusal_names_the_highest_rate_and_the_answer_time_of_slow_drives() {
         let slow = CanConfig { answer_us: 10, ..Default::default() };
         let refusal = |can, period_ns| CycleSchedule::new(can, period_ns).unwrap_err().to_string();
         let said = refusal(&slow, 1_000_000);

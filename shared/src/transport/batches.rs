@@ -1,12 +1,12 @@
-//! Topics of many small messages a cycle: several travel in one sample, each still a message of its own.
+//! Topics with many small messages a cycle: several messages travel in one sample.
 //!
-//! What a sample costs, to send and to receive, is shared by the messages in it.
+//! The messages of a sample share the cost of sending and receiving it. Each message keeps a number of its own.
 
 use std::ops::Deref;
 
 use iceoryx2::port::backpressure_strategy::BackpressureStrategy;
-use iceoryx2::port::publisher::Publisher;
-use iceoryx2::port::subscriber::Subscriber;
+use iceoryx2::port::publisher::Publisher as IceoryxPublisher;
+use iceoryx2::port::subscriber::Subscriber as IceoryxSubscriber;
 use iceoryx2::prelude::{AllocationStrategy, ipc};
 use iceoryx2::sample::Sample;
 use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
@@ -15,7 +15,7 @@ use super::ports::{Node, Refused, TransportError, check_version, failed};
 use crate::clock;
 use crate::messages::Message;
 
-/// Messages that a sample holds at most: those that a cycle of six drives gives.
+/// Most messages in a sample: those of a cycle of six drives.
 const BATCH: usize = 16;
 
 impl Node {
@@ -24,8 +24,8 @@ impl Node {
         builder.open_or_create().map_err(failed("opening topic", M::TOPIC))
     }
 
-    /// The publishing end of a topic that travels in batches.
-    pub fn batch_outlet<M: Message>(&self) -> Result<BatchOutlet<M>, TransportError> {
+    /// A publisher of batches.
+    pub fn batch_publisher<M: Message>(&self) -> Result<BatchPublisher<M>, TransportError> {
         let refused = Refused::default();
         let publisher = self
             .batch_service::<M>()?
@@ -36,12 +36,12 @@ impl Node {
             .set_degradation_handler(refused.counter())
             .create()
             .map_err(failed("publishing", M::TOPIC))?;
-        Ok(BatchOutlet { publisher, refused, sent: 0 })
+        Ok(BatchPublisher { publisher, refused, sent: 0 })
     }
 
-    /// The receiving end of a topic that travels in batches; it keeps up to [`Message::DEPTH`] messages, less
+    /// A subscriber of batches; it keeps up to [`Message::DEPTH`] messages, less
     /// where batches are not full.
-    pub fn batch_inlet<M: Message>(&self) -> Result<BatchInlet<M>, TransportError> {
+    pub fn batch_subscriber<M: Message>(&self) -> Result<BatchSubscriber<M>, TransportError> {
         let refused = Refused::default();
         let subscriber = self
             .batch_service::<M>()?
@@ -49,20 +49,20 @@ impl Node {
             .set_degradation_handler(refused.counter())
             .create()
             .map_err(failed("subscribing to", M::TOPIC))?;
-        Ok(BatchInlet { subscriber, refused })
+        Ok(BatchSubscriber { subscriber, refused })
     }
 }
 
 /// Publishes one message type in batches and numbers its messages.
 #[derive(Debug)]
-pub struct BatchOutlet<M: Message> {
-    publisher: Publisher<ipc::Service, [M], ()>,
+pub struct BatchPublisher<M: Message> {
+    publisher: IceoryxPublisher<ipc::Service, [M], ()>,
     refused: Refused,
     sent: u64,
 }
 
-impl<M: Message> BatchOutlet<M> {
-    /// Makes the messages where subscribers will read them, stamps and publishes them, in their order.
+impl<M: Message> BatchPublisher<M> {
+    /// Writes the messages into shared memory, stamps and publishes them in their order.
     pub fn publish(
         &mut self,
         messages: impl IntoIterator<Item = M, IntoIter: ExactSizeIterator>,
@@ -82,13 +82,12 @@ impl<M: Message> BatchOutlet<M> {
         Ok(())
     }
 
-    /// Connects to the subscribers that are there by now, as [`Outlet::connect`](super::Outlet::connect).
+    /// Connects to the subscribers that are there by now, as [`Publisher::connect`](super::Publisher::connect).
     pub fn connect(&self) -> Result<(), TransportError> {
         self.refused.connect(&self.publisher, M::TOPIC)
     }
 
-    /// Touches the memory of the next batch: so the first one of the loop costs no page fault, and a later one finds it
-    /// in the caches.
+    /// Touches the memory of the next batch, as [`Publisher::warm_up`](super::Publisher::warm_up).
     pub fn warm_up(&self) -> Result<(), TransportError> {
         let sample = self.publisher.loan_slice_uninit(BATCH).map_err(failed("loaning", M::TOPIC))?;
         drop(sample.write_from_fn(|_| M::default()));
@@ -98,12 +97,12 @@ impl<M: Message> BatchOutlet<M> {
 
 /// Receives one message type in batches, oldest first.
 #[derive(Debug)]
-pub struct BatchInlet<M: Message> {
-    subscriber: Subscriber<ipc::Service, [M], ()>,
+pub struct BatchSubscriber<M: Message> {
+    subscriber: IceoryxSubscriber<ipc::Service, [M], ()>,
     refused: Refused,
 }
 
-/// Messages still lying in shared memory.
+/// Messages in shared memory.
 #[derive(Debug)]
 pub struct ReceivedBatch<M: Message>(Sample<ipc::Service, [M], ()>);
 
@@ -115,8 +114,8 @@ impl<M: Message> Deref for ReceivedBatch<M> {
     }
 }
 
-impl<M: Message> BatchInlet<M> {
-    /// The oldest batch not yet received, as [`Inlet::receive`](super::Inlet::receive).
+impl<M: Message> BatchSubscriber<M> {
+    /// The oldest batch not yet received, as [`Subscriber::receive`](super::Subscriber::receive).
     pub fn receive(&self) -> Result<Option<ReceivedBatch<M>>, TransportError> {
         let sample = self.subscriber.receive().map_err(failed("receiving", M::TOPIC))?;
         self.refused.check(M::TOPIC)?;
@@ -136,15 +135,15 @@ mod tests {
     fn messages_arrive_in_order_however_many_come_at_once() {
         let domain = ScratchDomain::claim("test-batches").unwrap();
         let node = Node::join(&domain).unwrap();
-        let inlet = node.batch_inlet::<FrameTap>().unwrap();
-        let mut outlet = node.batch_outlet::<FrameTap>().unwrap();
+        let subscriber = node.batch_subscriber::<FrameTap>().unwrap();
+        let mut publisher = node.batch_publisher::<FrameTap>().unwrap();
         let mut sent = 0;
         for count in [0, 1, BATCH, BATCH + 1, 5 * BATCH, 3] {
             let frames: Vec<_> =
                 (0..count).map(|id| FrameTap { id: id as u32, ..FrameTap::default() }).collect();
-            outlet.publish(frames).unwrap();
+            publisher.publish(frames).unwrap();
             let mut received = Vec::new();
-            while let Some(batch) = inlet.receive().unwrap() {
+            while let Some(batch) = subscriber.receive().unwrap() {
                 received.extend(batch.iter().map(|frame| (frame.seq, frame.id)));
             }
             let expected: Vec<_> = (0..count as u32).map(|id| (sent + 1 + u64::from(id), id)).collect();
@@ -157,13 +156,13 @@ mod tests {
     fn who_falls_behind_loses_the_oldest_and_sees_the_gap() {
         let domain = ScratchDomain::claim("test-behind").unwrap();
         let node = Node::join(&domain).unwrap();
-        let inlet = node.batch_inlet::<FrameTap>().unwrap();
-        let mut outlet = node.batch_outlet::<FrameTap>().unwrap();
+        let subscriber = node.batch_subscriber::<FrameTap>().unwrap();
+        let mut publisher = node.batch_publisher::<FrameTap>().unwrap();
         let frames = [FrameTap::default(); BATCH];
         for _ in 0..FrameTap::DEPTH / BATCH + 2 {
-            outlet.publish(frames).unwrap();
+            publisher.publish(frames).unwrap();
         }
-        let oldest = inlet.receive().unwrap().unwrap();
+        let oldest = subscriber.receive().unwrap().unwrap();
         assert_eq!(oldest[0].seq, 2 * BATCH as u64 + 1);
     }
 }

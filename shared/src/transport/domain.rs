@@ -1,4 +1,4 @@
-//! The names a run uses in the file system, who still lives under them, and their removal.
+//! The file names of a run, the check for living processes of the run, and the removal of the files.
 //!
 //! iceoryx2 leaves files in two places, both in `/dev/shm`: below a root folder, and beside it with a prefix. Every
 //! process of a run holds an inherited lock on `<root>/lock`; while anyone holds it, the run is alive.
@@ -49,13 +49,13 @@ pub enum DomainError {
     },
 }
 
-/// Proof that the domain is ours; children started while it lives share it.
+/// Exclusive use of a domain; children started meanwhile share it.
 #[derive(Debug)]
 pub struct Claim {
     _lock: File,
 }
 
-/// A domain that is swept when it goes, for tests and measurements.
+/// A domain whose files are removed on drop, for tests and measurements.
 #[derive(Debug)]
 pub struct ScratchDomain {
     domain: Domain,
@@ -103,12 +103,12 @@ impl Domain {
         &self.id
     }
 
-    /// Where the domain's root folder lies: one folder a user, so that users never share files.
+    /// The domain's root folder: one folder for each user, so that users never share files.
     pub fn root(&self) -> PathBuf {
         domains_of_this_user().join(&self.id)
     }
 
-    /// What the names of its shared-memory files begin with, and those of no other domain: no id holds the dot.
+    /// The prefix of its shared-memory files. No id contains a dot, so no other domain has this prefix.
     pub fn prefix(&self) -> String {
         format!("masseter_{}_{}.", getuid().as_raw(), self.id)
     }
@@ -172,8 +172,8 @@ impl Domain {
     }
 }
 
-/// Beside the files that are named after the domains, so that whoever sees these sees who lives: temporary folders may
-/// differ from process to process.
+/// The folder of the locks, in shared memory beside the files of the domains: temporary folders may differ between
+/// processes.
 fn domains_of_this_user() -> PathBuf {
     Path::new(SHARED_MEMORY).join(format!("masseter-{}", getuid().as_raw()))
 }

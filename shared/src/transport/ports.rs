@@ -1,4 +1,4 @@
-//! Typed ends of the topics: [`Outlet`] publishes, [`Inlet`] receives.
+//! Typed ports of the topics.
 
 use std::borrow::Borrow;
 use std::fmt::Debug;
@@ -9,8 +9,8 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use iceoryx2::config::Config;
 use iceoryx2::node::{Node as IceoryxNode, NodeBuilder};
 use iceoryx2::port::backpressure_strategy::BackpressureStrategy;
-use iceoryx2::port::publisher::Publisher;
-use iceoryx2::port::subscriber::Subscriber;
+use iceoryx2::port::publisher::Publisher as IceoryxPublisher;
+use iceoryx2::port::subscriber::Subscriber as IceoryxSubscriber;
 use iceoryx2::port::update_connections::UpdateConnections;
 use iceoryx2::port::{DegradationAction, DegradationFn};
 use iceoryx2::prelude::{IceoryxSend, LogLevel, SemanticString, SignalHandlingMode, ipc, set_log_level};
@@ -28,7 +28,7 @@ const MAX_PUBLISHERS: usize = 4;
 /// Subscribers a topic may have: the counterpart, the recorder, and two observers. Shared memory is
 /// reserved, and locked, for all of them.
 const MAX_SUBSCRIBERS: usize = 4;
-/// Messages that are kept for whoever wants the newest only.
+/// Messages that a subscriber of the newest message keeps.
 const KEPT_FOR_THE_NEWEST: usize = 4;
 /// Messages a subscriber may hold at once: while it looks for a newer one than it has, it holds the one
 /// it has, the newest found so far, and the next.
@@ -49,23 +49,23 @@ fn help(reason: &str) -> &'static str {
     } else if reason.contains("Incompatible") {
         "a process of another version uses this topic; stop it"
     } else if reason.contains("ConnectionsRefused") {
-        "/dev/shm is full, or too little memory may be locked or too few files opened; `masseter doctor` tells which"
+        "/dev/shm is full, or too little memory may be locked or too few files opened; `masseter doctor` shows which"
     } else {
         "`masseter clean` removes what killed runs left behind"
     }
 }
 
-/// Builds its text only when something failed, so that a port's way costs no allocation, and out of that way: composed
-/// on it, the text made a round trip a tenth slower (ARCHITECTURE.md).
+/// Formats the error only after a failure and outside of the hot path: the formatting code within the hot path made a
+/// round trip a tenth slower.
 pub(super) fn failed<E: Debug>(verb: &'static str, what: &str) -> impl FnOnce(E) -> TransportError {
     #[cold]
-    fn told(verb: &str, what: &str, error: &dyn Debug) -> TransportError {
-        TransportError { action: format!("{verb} '{what}'"), reason: format!("{error:?}") }
+    fn error(verb: &str, what: &str, cause: &dyn Debug) -> TransportError {
+        TransportError { action: format!("{verb} '{what}'"), reason: format!("{cause:?}") }
     }
-    move |error| told(verb, what, &error)
+    move |cause| error(verb, what, &cause)
 }
 
-/// Connections that a port could not make: iceoryx2 goes on without them, and says so in its log only.
+/// Connections that a port could not make: iceoryx2 continues without them, and reports them in its log only.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Refused(Arc<AtomicU32>);
 
@@ -85,7 +85,7 @@ impl Refused {
         self.check(topic)
     }
 
-    /// What a port could not connect to leaves no gap in any sequence: whoever receives must ask.
+    /// Refuses a port with missing connections: they leave no gap in any sequence, so a receiver must check.
     pub(super) fn check(&self, topic: &str) -> Result<(), TransportError> {
         match self.0.load(Ordering::Relaxed) {
             0 => Ok(()),
@@ -105,14 +105,14 @@ pub(super) fn check_version<M: Message>(message: &M) -> Result<(), TransportErro
     }
 }
 
-/// A process's place in a domain.
+/// A process's access to a domain.
 #[derive(Debug)]
 pub struct Node {
     node: IceoryxNode<ipc::Service>,
 }
 
 impl Node {
-    /// Joins the domain. Signals stay the process's own affair.
+    /// Joins the domain. iceoryx2 installs no signal handlers.
     pub fn join(domain: &Domain) -> Result<Self, TransportError> {
         set_log_level(LogLevel::Fatal);
         let root = domain.root();
@@ -154,8 +154,8 @@ impl Node {
         self.topic::<M, M>(M::DEPTH)?.open_or_create().map_err(failed("opening topic", M::TOPIC))
     }
 
-    /// The publishing end of a topic.
-    pub fn outlet<M: Message>(&self) -> Result<Outlet<M>, TransportError> {
+    /// A publisher of a topic.
+    pub fn publisher<M: Message>(&self) -> Result<Publisher<M>, TransportError> {
         let refused = Refused::default();
         let publisher = self
             .service::<M>()?
@@ -164,21 +164,21 @@ impl Node {
             .set_degradation_handler(refused.counter())
             .create()
             .map_err(failed("publishing", M::TOPIC))?;
-        Ok(Outlet { publisher, refused, sent: 0 })
+        Ok(Publisher { port: publisher, refused, sent: 0 })
     }
 
-    /// The receiving end of a topic, which keeps up to [`Message::DEPTH`] messages.
-    pub fn inlet<M: Message>(&self) -> Result<Inlet<M>, TransportError> {
+    /// A subscriber of a topic that keeps up to [`Message::DEPTH`] messages.
+    pub fn subscriber<M: Message>(&self) -> Result<Subscriber<M>, TransportError> {
         self.inlet_keeping(M::DEPTH)
     }
 
-    /// The receiving end of a topic for who wants the newest message only. It keeps few: what wanders through a long queue
-    /// finds it cold (ARCHITECTURE.md), and behind a stall nobody looks through what is old.
-    pub fn newest_inlet<M: Message>(&self) -> Result<Inlet<M>, TransportError> {
+    /// A subscriber for the newest message only. Its queue is short: entries of a long queue are not in the cache, and old
+    /// messages are of no use after a stall.
+    pub fn newest_subscriber<M: Message>(&self) -> Result<Subscriber<M>, TransportError> {
         self.inlet_keeping(KEPT_FOR_THE_NEWEST)
     }
 
-    fn inlet_keeping<M: Message>(&self, messages: usize) -> Result<Inlet<M>, TransportError> {
+    fn inlet_keeping<M: Message>(&self, messages: usize) -> Result<Subscriber<M>, TransportError> {
         let refused = Refused::default();
         let subscriber = self
             .service::<M>()?
@@ -187,22 +187,22 @@ impl Node {
             .set_degradation_handler(refused.counter())
             .create()
             .map_err(failed("subscribing to", M::TOPIC))?;
-        Ok(Inlet { subscriber, refused })
+        Ok(Subscriber { port: subscriber, refused })
     }
 }
 
 /// Publishes one message type and numbers its messages.
 #[derive(Debug)]
-pub struct Outlet<M: Message> {
-    publisher: Publisher<ipc::Service, M, ()>,
+pub struct Publisher<M: Message> {
+    port: IceoryxPublisher<ipc::Service, M, ()>,
     refused: Refused,
     sent: u64,
 }
 
-impl<M: Message> Outlet<M> {
-    /// Lets `fill` write the message where subscribers will read it, stamps and publishes it.
+impl<M: Message> Publisher<M> {
+    /// Lets `fill` write the message into shared memory, then stamps and publishes the message.
     pub fn publish(&mut self, fill: impl FnOnce(&mut M)) -> Result<(), TransportError> {
-        let mut sample = self.publisher.loan().map_err(failed("loaning", M::TOPIC))?;
+        let mut sample = self.port.loan().map_err(failed("loaning", M::TOPIC))?;
         let message = sample.payload_mut();
         fill(message);
         self.sent += 1;
@@ -211,28 +211,28 @@ impl<M: Message> Outlet<M> {
         Ok(())
     }
 
-    /// Connects to the subscribers that are there by now. Whoever does not call this connects with its first message: files
-    /// are made and mapped then.
+    /// Connects to the subscribers that are there by now. Otherwise the first message makes the connections, which create
+    /// and map files.
     pub fn connect(&self) -> Result<(), TransportError> {
-        self.refused.connect(&self.publisher, M::TOPIC)
+        self.refused.connect(&self.port, M::TOPIC)
     }
 
-    /// Touches the memory of the next message: so the first one of the loop costs no page fault, and a later one finds it
-    /// in the caches.
+    /// Touches the memory of the next message: the first message of the loop then costs no page fault, and later ones find
+    /// the memory in the caches.
     pub fn warm_up(&self) -> Result<(), TransportError> {
-        drop(self.publisher.loan().map_err(failed("loaning", M::TOPIC))?);
+        drop(self.port.loan().map_err(failed("loaning", M::TOPIC))?);
         Ok(())
     }
 }
 
 /// Receives one message type, oldest first.
 #[derive(Debug)]
-pub struct Inlet<M: Message> {
-    subscriber: Subscriber<ipc::Service, M, ()>,
+pub struct Subscriber<M: Message> {
+    port: IceoryxSubscriber<ipc::Service, M, ()>,
     refused: Refused,
 }
 
-/// A message still lying in shared memory.
+/// A message in shared memory.
 #[derive(Debug)]
 pub struct Received<M: Message>(Sample<ipc::Service, M, ()>);
 
@@ -250,16 +250,16 @@ impl<M: Message> Borrow<M> for Received<M> {
     }
 }
 
-impl<M: Message> Inlet<M> {
-    /// Connects to the publishers that are there by now; else the first look does, as in [`Outlet::connect`].
+impl<M: Message> Subscriber<M> {
+    /// Connects to the publishers that are there by now; otherwise the first call of [`Self::receive`] does, as in [`Publisher::connect`].
     pub fn connect(&self) -> Result<(), TransportError> {
-        self.refused.connect(&self.subscriber, M::TOPIC)
+        self.refused.connect(&self.port, M::TOPIC)
     }
 
-    /// The oldest message not yet received; never waits. Refused once a publisher could not be connected to, whose
-    /// messages would be missing.
+    /// The oldest message not yet received; never waits. Refused when a connection to a publisher failed, since its messages
+    /// would be missing.
     pub fn receive(&self) -> Result<Option<Received<M>>, TransportError> {
-        let sample = self.subscriber.receive().map_err(failed("receiving", M::TOPIC))?;
+        let sample = self.port.receive().map_err(failed("receiving", M::TOPIC))?;
         self.refused.check(M::TOPIC)?;
         sample.map(|sample| check_version(&*sample).map(|()| Received(sample))).transpose()
     }
@@ -275,7 +275,7 @@ impl<M: Message> Inlet<M> {
         let mut newest = None;
         let mut spin = waiter.spin();
         loop {
-            for _ in 0..=self.subscriber.buffer_size() {
+            for _ in 0..=self.port.buffer_size() {
                 let Some(message) = self.receive()? else { break };
                 let is_here = is_awaited(&message);
                 newest = Some(message);
@@ -300,45 +300,46 @@ mod tests {
     fn the_newest_message_is_found_among_many_and_while_one_is_held() {
         let domain = ScratchDomain::claim("test-ports").unwrap();
         let node = Node::join(&domain).unwrap();
-        let inlet = node.inlet::<Event>().unwrap();
-        let mut outlet = node.outlet::<Event>().unwrap();
+        let subscriber = node.subscriber::<Event>().unwrap();
+        let mut publisher = node.publisher::<Event>().unwrap();
         let mut waiter = Waiter::new(1_000_000);
         for round in 1..=3 {
             for cycle in 0..5 {
-                outlet.publish(|event| event.cycle = round * 10 + cycle).unwrap();
+                publisher.publish(|event| event.cycle = round * 10 + cycle).unwrap();
             }
-            let held = inlet.receive().unwrap().unwrap();
+            let held = subscriber.receive().unwrap().unwrap();
             assert_eq!(held.cycle, round * 10);
-            let newest = inlet.latest_by(0, &mut waiter, |event| event.cycle > 1000).unwrap().unwrap();
+            let newest = subscriber.latest_by(0, &mut waiter, |event| event.cycle > 1000).unwrap().unwrap();
             assert_eq!((newest.cycle, newest.seq), (round * 10 + 4, round * 5));
-            assert!(inlet.receive().unwrap().is_none());
+            assert!(subscriber.receive().unwrap().is_none());
         }
     }
 
     #[test]
-    fn who_wants_the_newest_only_finds_few_old_ones_and_it_among_them() {
+    fn a_subscriber_of_the_newest_message_keeps_few_old_ones() {
         let domain = ScratchDomain::claim("test-newest").unwrap();
         let node = Node::join(&domain).unwrap();
-        let inlet = node.newest_inlet::<Event>().unwrap();
-        let mut outlet = node.outlet::<Event>().unwrap();
-        (1..=100).for_each(|cycle| outlet.publish(|event| event.cycle = cycle).unwrap());
-        let received = std::iter::from_fn(|| inlet.receive().unwrap()).map(|event| (event.cycle, event.seq));
+        let subscriber = node.newest_subscriber::<Event>().unwrap();
+        let mut publisher = node.publisher::<Event>().unwrap();
+        (1..=100).for_each(|cycle| publisher.publish(|event| event.cycle = cycle).unwrap());
+        let received =
+            std::iter::from_fn(|| subscriber.receive().unwrap()).map(|event| (event.cycle, event.seq));
         assert!(received.eq((97..=100).map(|cycle| (cycle, cycle))));
     }
 
     #[test]
-    fn what_follows_the_awaited_message_is_left_for_the_next_wait() {
+    fn messages_after_the_awaited_one_are_kept_for_the_next_wait() {
         let domain = ScratchDomain::claim("test-awaited").unwrap();
         let node = Node::join(&domain).unwrap();
-        let inlet = node.inlet::<Event>().unwrap();
-        let mut outlet = node.outlet::<Event>().unwrap();
+        let subscriber = node.subscriber::<Event>().unwrap();
+        let mut publisher = node.publisher::<Event>().unwrap();
         for cycle in 1..=5 {
-            outlet.publish(|event| event.cycle = cycle).unwrap();
+            publisher.publish(|event| event.cycle = cycle).unwrap();
         }
         let mut waiter = Waiter::new(1_000_000);
         let deadline_ns = clock::now_ns() + 1_000_000_000;
         let mut wait = |cycle| {
-            let found = inlet.latest_by(deadline_ns, &mut waiter, |event| event.cycle >= cycle).unwrap();
+            let found = subscriber.latest_by(deadline_ns, &mut waiter, |event| event.cycle >= cycle).unwrap();
             found.map(|event| event.cycle)
         };
         assert_eq!([3, 4, 2].map(&mut wait), [Some(3), Some(4), Some(5)]);
@@ -349,16 +350,16 @@ mod tests {
     fn a_wait_that_keeps_finding_messages_never_holds_too_many() {
         let domain = ScratchDomain::claim("test-wait").unwrap();
         let node = Node::join(&domain).unwrap();
-        let inlet = node.inlet::<Event>().unwrap();
-        let mut outlet = node.outlet::<Event>().unwrap();
+        let subscriber = node.subscriber::<Event>().unwrap();
+        let mut publisher = node.publisher::<Event>().unwrap();
         let deadline_ns = clock::now_ns() + 1_000_000_000;
         let mut waiter = Waiter::new(1_000_000);
-        outlet.publish(|event| event.cycle = 1).unwrap();
-        let outlet = std::cell::RefCell::new(outlet);
-        let newest = inlet.latest_by(deadline_ns, &mut waiter, |event| {
+        publisher.publish(|event| event.cycle = 1).unwrap();
+        let publisher = std::cell::RefCell::new(publisher);
+        let newest = subscriber.latest_by(deadline_ns, &mut waiter, |event| {
             let next = event.cycle + 1;
-            outlet.borrow_mut().publish(|event| event.cycle = next).unwrap();
-            outlet.borrow_mut().publish(|event| event.cycle = next + 1).unwrap();
+            publisher.borrow_mut().publish(|event| event.cycle = next).unwrap();
+            publisher.borrow_mut().publish(|event| event.cycle = next + 1).unwrap();
             event.cycle >= 9
         });
         assert_eq!(newest.unwrap().unwrap().cycle, 9);

@@ -1,9 +1,8 @@
-//! Outward-rounded interval arithmetic: every result holds every value that exact arithmetic could
-//! give for operands anywhere within the given ones.
+//! Outward-rounded interval arithmetic: every result contains all values of exact arithmetic for operands within the given
+//! intervals.
 //!
-//! IEEE 754 rounds + − × ÷ √ to the nearest number, so the neighbour of the computed bound lies on
-//! its far side. Nothing here is transcendental, and nothing is: bounds must be finite, which the
-//! metres of a mechanism are.
+//! IEEE 754 rounds + − × ÷ √ to the nearest number, so the neighbour of the computed bound is an
+//! outward bound. Transcendental functions are not provided. Bounds must be finite, as all lengths of a mechanism are.
 
 use std::ops::{Add, Mul, Neg, Sub};
 
@@ -15,7 +14,7 @@ pub struct Enclosure {
 }
 
 impl Enclosure {
-    /// From its ends, which must be finite and in order.
+    /// The interval between two ends, which must be finite and in order.
     pub fn new(low: f64, high: f64) -> Self {
         debug_assert!(low <= high && low.is_finite() && high.is_finite(), "[{low}, {high}]");
         Self { low, high }
@@ -61,13 +60,13 @@ impl Enclosure {
         self.low <= value && value <= self.high
     }
 
-    /// The smallest that holds both.
+    /// The smallest interval that contains both.
     #[must_use]
     pub fn hull(self, other: Self) -> Self {
         Self::new(self.low.min(other.low), self.high.max(other.high))
     }
 
-    /// What both hold.
+    /// The intersection.
     pub fn intersection(self, other: Self) -> Option<Self> {
         let (low, high) = (self.low.max(other.low), self.high.min(other.high));
         (low <= high).then(|| Self::new(low, high))
@@ -87,13 +86,13 @@ impl Enclosure {
         Self::new(low, a.max(b).next_up())
     }
 
-    /// √x of what is not negative; none where all is.
+    /// √x of the part that is not negative; none when all of the interval is negative.
     pub fn square_root(self) -> Option<Self> {
         let low = self.low.max(0.0).sqrt().next_down().max(0.0);
         (self.high >= 0.0).then(|| Self::new(low, self.high.sqrt().next_up()))
     }
 
-    /// 1/x of positive numbers only.
+    /// 1/x; the interval must be positive.
     pub fn reciprocal(self) -> Option<Self> {
         (self.low > 0.0).then(|| Self::new((1.0 / self.high).next_down(), (1.0 / self.low).next_up()))
     }
@@ -156,7 +155,7 @@ mod tests {
     }
 
     proptest! {
-        /// What is computed from members is a member of what is computed from the enclosures.
+        /// A result from members lies in the result from the enclosures.
         #[test]
         fn operations_enclose((a, x) in enclosures(), (b, y) in enclosures(), factor in -2.0..2.0f64) {
             prop_assert!((a + b).contains(x + y));

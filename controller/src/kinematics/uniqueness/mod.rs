@@ -3,10 +3,11 @@
 //! [`Proof::examine`] takes a box of inputs and encloses every solution in it that meets the
 //! conditions ([`Claim`]). If the slopes of the three equations over that enclosure form a regular
 //! matrix, then no input in the box has two: with solutions h ≠ h′, the slopes S between them would
-//! give S (h − h′) = 0. Otherwise the box stays undecided, and [`InputBox::halves`] is the way on.
+//! give S (h − h′) = 0. Otherwise the box stays undecided, and the caller examines its
+//! [halves](InputBox::halves).
 //!
-//! Offline work: nothing here is used by the control loop, and nothing here shows that a solution
-//! exists. The mechanism is taken as its numbers stand in memory.
+//! The control loop does not use this module, and the proof does not show that a solution exists. The dimensions of the
+//! mechanism count as exact numbers.
 
 mod enclosure;
 mod input_box;

@@ -1,4 +1,4 @@
-//! All positions of the platform's corners that a box of inputs and of reaches allows, enclosed.
+//! Enclosures of all positions of the platform's corners for a box of inputs and of reaches.
 //!
 //! A leg's *reach* is the horizontal part of the leg, h = l cos θ, and its height z = l sin θ, so
 //! Aᵢ = Bᵢ + hᵢ v̂ᵢ + zᵢ ẑ with z = √(l² − h²) above the base: no sine, no cosine. Side k from leg
@@ -19,7 +19,7 @@ use super::{Enclosure, InputBox};
 /// Horizontal vector.
 type Flat = [f64; 2];
 
-/// The mechanism's numbers as they stand in memory, taken as exact.
+/// The mechanism's dimensions, taken as exact.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Dimensions {
     centre_m: [Flat; LEGS],
@@ -69,7 +69,7 @@ fn dot(a: [Enclosure; 2], b: Flat) -> Enclosure {
 }
 
 impl Platforms {
-    /// None where a leg is shorter than its reach for every input: no such platform.
+    /// None when a leg is shorter than its reach for every input: no such platform exists.
     pub(super) fn new(
         dimensions: &Dimensions,
         inputs: &InputBox,
@@ -102,7 +102,7 @@ impl Platforms {
         })
     }
 
-    /// None where a leg may lie level: there z is no smooth function of h.
+    /// None when a leg may be horizontal: there z is not a smooth function of h.
     pub(super) fn slopes(&self, dimensions: &Dimensions) -> Option<Slopes> {
         let mut lean = self.reach_m;
         for (lean, height_m) in lean.iter_mut().zip(self.height_m) {
@@ -117,8 +117,8 @@ impl Platforms {
         })
     }
 
-    /// Whether a platform in here may fulfil the paper's conditions 1 and 2, oriented; heights are
-    /// never negative here.
+    /// Whether a platform in this enclosure may fulfil the paper's conditions 1 and 2, oriented; heights are
+    /// not negative.
     pub(super) fn may_stand_as_assembled(&self, dimensions: &Dimensions) -> bool {
         let [[x12, y12], [x23, y23], [x31, y31]] = self.across_m;
         let [z12, _, z31] = self.rise_m;
@@ -132,7 +132,7 @@ impl Platforms {
         (0..LEGS).all(below) && dot([x23, y23], dimensions.along[0]).high() > 0.0
     }
 
-    /// The [determinant](crate::kinematics::Solution::determinant) of each platform in here.
+    /// The [determinant](crate::kinematics::Solution::determinant) of every platform in this enclosure.
     pub(super) fn determinant(&self, dimensions: &Dimensions, slopes: &Slopes) -> Option<Enclosure> {
         let [n1, n2, n3] = slopes.near_m;
         let [f1, f2, f3] = slopes.far_m;
@@ -157,8 +157,8 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(200))]
 
-        /// Every solution lies in what is computed for boxes around it, and the slopes between any
-        /// two solutions carry one equation to the other.
+        /// Every solution lies in the enclosure of a box around it, and the slopes between two solutions give the
+        /// difference of their equations.
         #[test]
         fn enclosures_hold_what_the_solver_finds(
             mechanism in mechanisms(), slide_m in prop::array::uniform3(-0.03..0.03f64),

@@ -1,6 +1,6 @@
-//! One step of the proof: what can be said of a box of inputs as it is.
+//! One step of the proof: the verdict on one box of inputs.
 //!
-//! The reaches h of all its solutions are enclosed by halving and pruning: a part of h-space goes
+//! The reaches h of all its solutions are enclosed by halving and pruning: a part of h-space is removed
 //! when a side cannot close in it or a condition cannot hold, and shrinks by Krawczyk's operator
 //! −Y E(m) + (1 − Y S)(h − m), which holds every solution because the slopes S hold every difference.
 
@@ -11,19 +11,19 @@ use super::platforms::{Dimensions, Platforms, Slopes};
 use super::{Enclosure, InputBox};
 use crate::kinematics::legs::next;
 
-/// Parts of h-space that are looked at for one box of inputs; a bound on time only.
+/// Most parts of h-space examined for one box of inputs; the limit bounds the time only.
 const MOST_PARTS: usize = 20_000;
 /// Parts narrower than this share of the inputs' own width are not halved again.
 const FINE_ENOUGH: f64 = 0.5;
-/// Nor are parts narrower than this, metres: what is left of them is for the slopes to decide.
+/// Nor are parts narrower than this, metres: the slopes decide on the remaining parts.
 const FINEST_M: f64 = 5e-4;
 /// A shrinking step that leaves more than this share of the width is not repeated.
 const WORTH_REPEATING: f64 = 0.8;
 
-/// Which solutions there shall be at most one of. All stand above the base.
+/// The kind of solution that must be unique. All solutions are above the base.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Claim {
-    /// Those that meet the paper's two conditions, with the platform's plane oriented.
+    /// Solutions that meet the paper's two conditions, with the platform's plane oriented.
     PaperConditions,
     /// Of these, those whose [determinant](crate::kinematics::Solution::determinant) is at least this.
     DeterminantAtLeast(f64),
@@ -32,18 +32,18 @@ pub enum Claim {
 /// Reaches hᵢ = lᵢ cos θᵢ, metres.
 pub type Reaches = [Enclosure; LEGS];
 
-/// What is known of a box of inputs.
+/// The verdict on a box of inputs.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Finding {
-    /// No input in it has a solution that counts.
+    /// No input in the box has a solution of this kind.
     NoSolution,
-    /// No input in it has more than one.
+    /// No input in the box has more than one solution of this kind.
     AtMostOne,
-    /// Neither is proven. All solutions that count have their reaches in here.
+    /// Neither is proven. The reaches of all solutions of this kind lie in this box.
     Undecided(Reaches),
 }
 
-/// A mechanism and what is to be proven of it.
+/// A mechanism and the claim about it.
 #[derive(Debug, Clone)]
 pub struct Proof {
     dimensions: Dimensions,
@@ -51,17 +51,17 @@ pub struct Proof {
 }
 
 impl Proof {
-    /// Of a claim about a mechanism.
+    /// The proof of a claim about a mechanism.
     pub fn new(mechanism: &Mechanism, claim: Claim) -> Self {
         Self { dimensions: Dimensions::new(mechanism), claim }
     }
 
-    /// All reaches that legs of these lengths can have: where the search starts.
+    /// All reaches of legs of these lengths: the start of the search.
     pub fn any_reaches(inputs: &InputBox) -> Reaches {
         inputs.leg_m.map(|leg_m| Enclosure::around_zero(leg_m.high()))
     }
 
-    /// Decides a box of inputs, if it can; `within` must hold the reaches of all its solutions.
+    /// Examines a box of inputs; `within` must contain the reaches of all its solutions.
     pub fn examine(&self, inputs: &InputBox, within: &Reaches) -> Finding {
         let Some(parts) = self.parts(inputs, within) else { return Finding::Undecided(*within) };
         let hull = |a: Reaches, b: &Reaches| std::array::from_fn(|leg| a[leg].hull(b[leg]));
@@ -74,7 +74,7 @@ impl Proof {
         }
     }
 
-    /// Parts of h-space that together hold all solutions; none when they would be too many.
+    /// Parts of h-space that together contain all solutions; none when there are too many parts.
     fn parts(&self, inputs: &InputBox, within: &Reaches) -> Option<Vec<Reaches>> {
         let widest_m = inputs.axes().iter().fold(0.0, |widest, axis| f64::max(widest, axis.width()));
         let finest_m = FINEST_M.max(FINE_ENOUGH * widest_m);
@@ -100,7 +100,7 @@ impl Proof {
         Some(kept)
     }
 
-    /// What of a part may hold solutions; none when nothing does.
+    /// The portion of a part that may contain solutions; none when no portion does.
     fn shrunk(&self, inputs: &InputBox, part: Reaches) -> Option<Reaches> {
         let mut part = part;
         loop {
@@ -119,7 +119,7 @@ impl Proof {
         }
     }
 
-    /// Whether a platform in here may be a solution that counts.
+    /// Whether a platform in this enclosure may be a solution of this kind.
     fn may_count(&self, platforms: &Platforms) -> bool {
         let closes = platforms.excess_m2(&self.dimensions).iter().all(|excess| excess.contains(0.0));
         closes && platforms.may_stand_as_assembled(&self.dimensions) && self.may_be_conditioned(platforms)
@@ -132,7 +132,7 @@ impl Proof {
         determinant.is_none_or(|determinant| determinant.high() >= margin)
     }
 
-    /// Krawczyk's operator; the part as it is where the operator says nothing, none where nothing is left.
+    /// Krawczyk's operator: the unchanged part when the operator does not apply, none when no solution is left.
     fn contracted(&self, inputs: &InputBox, platforms: &Platforms, part: &Reaches) -> Option<Reaches> {
         let middle = part.map(|reach_m| Enclosure::point(reach_m.middle()));
         let at_middle = Platforms::new(&self.dimensions, inputs, &middle);
@@ -152,7 +152,7 @@ impl Proof {
         Some(smaller)
     }
 
-    /// Whether the slopes form a regular matrix whatever they are.
+    /// Whether all matrices within the slopes are regular.
     fn is_regular(&self, inputs: &InputBox, all: &Reaches) -> bool {
         let platforms = Platforms::new(&self.dimensions, inputs, all);
         let slopes = platforms.and_then(|platforms| platforms.slopes(&self.dimensions));

@@ -3,7 +3,7 @@
 use super::*;
 
 #[test]
-fn a_late_reading_is_compared_with_the_pose_wanted_at_its_own_sample() {
+fn a_late_reading_is_compared_with_the_desired_pose_at_its_own_sample() {
     let mut bench = Bench::new();
     bench.run_until(ControllerState::Running);
     let mut delayed = bench.reading();
@@ -14,15 +14,15 @@ fn a_late_reading_is_compared_with_the_pose_wanted_at_its_own_sample() {
     let mut state = State::default();
     bench.controller.fill_state(&mut state);
     assert_eq!(state.reading_cycle + 1, state.cycle);
-    let wanted = nalgebra::Vector3::from(state.desired_position_m);
-    assert!((wanted - nalgebra::Vector3::from(state.estimated_position_m)).norm() < 5e-5);
+    let desired = nalgebra::Vector3::from(state.desired_position_m);
+    assert!((desired - nalgebra::Vector3::from(state.estimated_position_m)).norm() < 5e-5);
     let at_its_time = trajectory(&short()).pose_in_motion(state.motion_time_s).translation.vector;
-    assert!((wanted - at_its_time).norm() < 1e-12);
+    assert!((desired - at_its_time).norm() < 1e-12);
 }
 
 /// Each for 15 cycles, and what the run is longer by.
 #[test]
-fn after_a_stall_the_motion_goes_on_where_the_drives_stand_and_never_catches_up_in_a_burst() {
+fn after_a_stall_the_motion_continues_from_the_position_of_the_drives_without_a_burst() {
     type Stall = fn(&mut Bench);
     let undisturbed = Bench::played(|_| ());
     let stalls: [(&str, Stall); 3] = [
@@ -50,8 +50,8 @@ fn a_stall_is_not_taken_for_lost_tracking() {
                 bench.cycle(Some);
                 let mut state = State::default();
                 bench.controller.fill_state(&mut state);
-                let wanted = nalgebra::Vector3::from(state.desired_position_m);
-                let error_m = (wanted - nalgebra::Vector3::from(state.estimated_position_m)).norm();
+                let desired = nalgebra::Vector3::from(state.desired_position_m);
+                let error_m = (desired - nalgebra::Vector3::from(state.estimated_position_m)).norm();
                 assert!(error_m < 1.5 * usual_m, "{error_m}");
             }
         });

@@ -266,7 +266,7 @@ impl Axis {
     fn statusword(&self, now_ns: u64) -> Statusword {
         let is_enabled = self.is_enabled();
         let is_limited = self.is_target_limited || self.positioning.is_limited() || self.servo.is_limited();
-        let word = Statusword::of(self.power)
+        let word = Statusword::for_state(self.power)
             .with(StatusBit::VoltageEnabled, true)
             .with(StatusBit::Remote, true)
             .with(StatusBit::InternalLimit, is_enabled && is_limited);

@@ -159,7 +159,7 @@ impl Peer {
             self.control(rpdo.controlword);
         }
         self.complete();
-        let statusword = Statusword::of(self.power);
+        let statusword = Statusword::for_state(self.power);
         for actual_increments in self.twin_position.into_iter().chain([POSITION]) {
             let tpdo = Tpdo1 { statusword, actual_increments, torque_permille: 0 };
             out.push(tpdo.frame(self.id));
@@ -196,7 +196,7 @@ impl Peer {
     }
 
     fn read(&mut self, object: ObjectAddress) -> SdoResponse {
-        let statusword = Statusword::of(self.power).0.to_le_bytes().to_vec();
+        let statusword = Statusword::for_state(self.power).0.to_le_bytes().to_vec();
         let value = match (object.index, object.subindex) {
             (0x6041, 0) => Some(&statusword),
             address => self.objects.get(&address),

@@ -1,29 +1,28 @@
-//! The predefined connection set (CiA 301, 7.3.3): what an identifier means.
+//! The predefined connection set (CiA 301, 7.3.3): the communication object of an identifier.
 //!
-//! Of the PDOs only the first of each direction is known, as the rig maps no other.
+//! Only the first PDO of each direction is represented.
 
 use super::node::NodeId;
 use crate::id::CanId;
 
-/// A COB-ID as an object dictionary holds it (CiA 301, 7.5.2): an identifier, and whether the object that it identifies
-/// exists.
+/// A COB-ID in an object dictionary (CiA 301, 7.5.2): an identifier, and whether its communication object exists.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct CobId(pub u32);
 
 impl CobId {
-    /// Bit 30 of a TPDO's: it answers no remote request.
+    /// Bit 30 of the COB-ID of a TPDO: the TPDO answers no remote request.
     pub const NO_REMOTE_REQUEST: u32 = 1 << 30;
 
     const NOT_VALID: u32 = 1 << 31;
     const IS_EXTENDED: u32 = 1 << 29;
     const NUMBER: u32 = 0x1FFF_FFFF;
 
-    /// Whether its object exists.
+    /// Whether the communication object exists.
     pub const fn is_valid(self) -> bool {
         self.0 & Self::NOT_VALID == 0
     }
 
-    /// The same of an object that does not exist.
+    /// The same identifier, of an object that does not exist.
     #[must_use]
     pub const fn invalidated(self) -> Self {
         Self(self.0 | Self::NOT_VALID)
@@ -34,19 +33,19 @@ impl CobId {
         self.0 & Self::NUMBER
     }
 
-    /// Whether its identifier has 11 bits; the rig uses no other.
+    /// Whether the identifier has 11 bits.
     pub const fn is_standard(self) -> bool {
         self.0 & Self::IS_EXTENDED == 0 && self.number() <= 0x7FF
     }
 
-    /// The identifier, if it has 11 bits and its object exists.
+    /// The identifier, if it has 11 bits and the object exists.
     pub fn identifier(self) -> Option<CanId> {
         let id = CanId::standard(self.number() as u16).ok();
         id.filter(|_| self.is_valid() && self.is_standard())
     }
 }
 
-/// A communication object, with the node it belongs to.
+/// A communication object and its node.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Cob {
     /// Network management, 000h.
@@ -88,16 +87,16 @@ const NODE_MASK: u16 = 0x7F;
 
 impl From<Cob> for CanId {
     fn from(cob: Cob) -> Self {
-        let of = |function: u16, node: NodeId| function + u16::from(node.get());
+        let with_node = |function: u16, node: NodeId| function + u16::from(node.get());
         let number = match cob {
             Cob::Nmt => NMT,
             Cob::Sync => SYNC,
-            Cob::Emergency(node) => of(EMERGENCY, node),
-            Cob::Tpdo1(node) => of(TPDO1, node),
-            Cob::Rpdo1(node) => of(RPDO1, node),
-            Cob::SdoResponse(node) => of(SDO_RESPONSE, node),
-            Cob::SdoRequest(node) => of(SDO_REQUEST, node),
-            Cob::Heartbeat(node) => of(HEARTBEAT, node),
+            Cob::Emergency(node) => with_node(EMERGENCY, node),
+            Cob::Tpdo1(node) => with_node(TPDO1, node),
+            Cob::Rpdo1(node) => with_node(RPDO1, node),
+            Cob::SdoResponse(node) => with_node(SDO_RESPONSE, node),
+            Cob::SdoRequest(node) => with_node(SDO_REQUEST, node),
+            Cob::Heartbeat(node) => with_node(HEARTBEAT, node),
         };
         CanId::standard(number).expect("function codes and node ids stay below 780h")
     }
@@ -135,7 +134,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_cob_id_names_an_identifier_of_11_bits_as_long_as_its_object_exists() {
+    fn a_cob_id_has_an_identifier_of_11_bits_if_its_object_exists() {
         let of = |word: u32| CobId(word).identifier().map(CanId::number);
         assert_eq!(of(0x0000_0185), Some(0x185));
         assert_eq!(of(CobId::NO_REMOTE_REQUEST | 0x185), Some(0x185));

@@ -1,18 +1,18 @@
-//! Emergency messages (CiA 301, 7.2.7): a node tells once that an error occurred, or that all are gone.
+//! Emergency messages (CiA 301, 7.2.7): a node reports once that an error occurred, or that no error is left.
 
 use std::fmt;
 
 use super::{Cob, LengthError, NodeId, exactly};
 use crate::frame::Frame;
 
-/// Emergency error code. Any number is one; the rig's own drives send those named here.
-#[derive(Clone, Copy, PartialEq, Eq, Hash)]
+/// Emergency error code. Every number is a valid code; the constants are the codes of the emulated drives.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct EmergencyCode(pub u16);
 
 impl EmergencyCode {
     /// No error any more.
     pub const RESET: Self = Self(0x0000);
-    /// Communication, not told in more detail.
+    /// Communication error without further detail.
     pub const COMMUNICATION: Self = Self(0x8100);
     /// The CAN controller became error passive.
     pub const ERROR_PASSIVE: Self = Self(0x8120);
@@ -24,7 +24,7 @@ impl EmergencyCode {
     pub const PDO_LENGTH: Self = Self(0x8210);
     /// A PDO was longer than its mapping.
     pub const PDO_LENGTH_EXCEEDED: Self = Self(0x8220);
-    /// SYNC had another length than object 1019 says.
+    /// The length of SYNC does not follow object 1019.
     pub const SYNC_LENGTH: Self = Self(0x8240);
     /// An RPDO is overdue.
     pub const RPDO_TIMEOUT: Self = Self(0x8250);
@@ -38,20 +38,25 @@ impl fmt::Display for EmergencyCode {
     }
 }
 
-impl fmt::Debug for EmergencyCode {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "EmergencyCode({self})")
-    }
-}
-
 /// An emergency message.
+///
+/// # Examples
+/// ```
+/// use masseter_can::canopen::{Emergency, EmergencyCode, NodeId};
+///
+/// let emergency = Emergency { code: EmergencyCode::FOLLOWING_ERROR, register: 0x21, vendor: [0; 5] };
+/// let frame = emergency.frame(NodeId::new(2)?);
+/// assert_eq!(frame.to_string(), "082#1186210000000000");
+/// assert_eq!(Emergency::decode(frame.data())?, emergency);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Emergency {
     /// What happened.
     pub code: EmergencyCode,
-    /// Object 1001, which kinds of errors persist.
+    /// Error register, object 1001: the kinds of errors that persist.
     pub register: u8,
-    /// Whatever the vendor adds.
+    /// Additional bytes of the vendor.
     pub vendor: [u8; 5],
 }
 
@@ -62,12 +67,12 @@ impl Emergency {
     /// All errors are gone.
     pub const RESET: Self = Self { code: EmergencyCode::RESET, register: 0, vendor: [0; 5] };
 
-    /// Whether it tells that an error is gone rather than come.
+    /// Whether the message reports the end of an error.
     pub fn is_reset(&self) -> bool {
         self.code == EmergencyCode::RESET
     }
 
-    /// The frame in which that node sends it.
+    /// The frame in which that node sends the message.
     pub fn frame(self, node: NodeId) -> Frame {
         Frame::fixed(Cob::Emergency(node).into(), self.encode())
     }

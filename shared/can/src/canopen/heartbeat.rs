@@ -1,40 +1,19 @@
-//! Heartbeat and boot-up (CiA 301, 7.2.8.3): a node's NMT state, told by itself.
+//! Heartbeat and boot-up (CiA 301, 7.2.8.3): a node's NMT state, sent by the node itself.
 
 use super::{Cob, LengthError, NodeId, exactly};
 use crate::frame::Frame;
 
-/// State of a node's network management.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum NmtState {
-    /// Just booted: the one boot-up message before pre-operational.
-    BootUp,
-    /// NMT and heartbeat only.
-    Stopped,
-    /// Everything, PDOs included.
-    Operational,
-    /// Everything but PDOs.
-    PreOperational,
-}
-
-impl NmtState {
-    /// The number on the wire.
-    pub const fn code(self) -> u8 {
-        match self {
-            Self::BootUp => 0x00,
-            Self::Stopped => 0x04,
-            Self::Operational => 0x05,
-            Self::PreOperational => 0x7F,
-        }
-    }
-
-    const fn from_code(code: u8) -> Option<Self> {
-        match code {
-            0x00 => Some(Self::BootUp),
-            0x04 => Some(Self::Stopped),
-            0x05 => Some(Self::Operational),
-            0x7F => Some(Self::PreOperational),
-            _ => None,
-        }
+codes! {
+    /// State of a node's network management.
+    NmtState as u8 {
+        /// Just booted: the one boot-up message before pre-operational.
+        BootUp = 0x00 "boot_up",
+        /// NMT and heartbeat only.
+        Stopped = 0x04 "stopped",
+        /// Everything, PDOs included.
+        Operational = 0x05 "operational",
+        /// Everything but PDOs.
+        PreOperational = 0x7F "pre_operational",
     }
 }
 

@@ -1,8 +1,7 @@
-//! What the rig uses of CANopen (CiA 301): node ids, the predefined connection set, NMT, heartbeat,
-//! SYNC, EMCY and SDO.
+//! CANopen messages (CiA 301): node ids, the predefined connection set, NMT, heartbeat, SYNC, EMCY and SDO.
 //!
-//! Codecs only: supervision, boot-up and the reaction to any of it are the master's and the drives'.
-//! The PDOs stand in [`can`](super).
+//! This module encodes and decodes messages. Supervision, boot-up and reactions are not part of the crate. The PDOs are
+//! in the [crate root](crate).
 
 mod cob;
 mod emcy;

@@ -3,46 +3,23 @@
 use super::{Cob, LengthError, NodeId, NodeIdError, exactly};
 use crate::frame::Frame;
 
-/// What a node is told to do.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum NmtCommand {
-    /// Enter operational.
-    Start,
-    /// Enter stopped.
-    Stop,
-    /// Enter pre-operational.
-    EnterPreOperational,
-    /// Restart the application.
-    ResetNode,
-    /// Restart the communication.
-    ResetCommunication,
-}
-
-impl NmtCommand {
-    /// The command specifier on the wire.
-    pub const fn code(self) -> u8 {
-        match self {
-            Self::Start => 0x01,
-            Self::Stop => 0x02,
-            Self::EnterPreOperational => 0x80,
-            Self::ResetNode => 0x81,
-            Self::ResetCommunication => 0x82,
-        }
-    }
-
-    const fn from_code(code: u8) -> Option<Self> {
-        match code {
-            0x01 => Some(Self::Start),
-            0x02 => Some(Self::Stop),
-            0x80 => Some(Self::EnterPreOperational),
-            0x81 => Some(Self::ResetNode),
-            0x82 => Some(Self::ResetCommunication),
-            _ => None,
-        }
+codes! {
+    /// A command to a node.
+    NmtCommand as u8 {
+        /// Enter operational.
+        Start = 0x01 "start",
+        /// Enter stopped.
+        Stop = 0x02 "stop",
+        /// Enter pre-operational.
+        EnterPreOperational = 0x80 "enter_pre_operational",
+        /// Restart the application.
+        ResetNode = 0x81 "reset_node",
+        /// Restart the communication.
+        ResetCommunication = 0x82 "reset_communication",
     }
 }
 
-/// Whom a command concerns.
+/// The nodes that a command is for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum NmtTarget {
     /// Every node (node id 0 on the wire).
@@ -52,7 +29,7 @@ pub enum NmtTarget {
 }
 
 impl NmtTarget {
-    /// Whether that node has to obey.
+    /// Whether the command is for that node.
     pub fn includes(self, node: NodeId) -> bool {
         self == Self::All || self == Self::Node(node)
     }
@@ -61,9 +38,9 @@ impl NmtTarget {
 /// A network management message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Nmt {
-    /// What to do.
+    /// The command.
     pub command: NmtCommand,
-    /// Who does it.
+    /// The nodes that execute the command.
     pub target: NmtTarget,
 }
 
@@ -85,7 +62,7 @@ pub enum NmtError {
 }
 
 impl Nmt {
-    /// The frame that carries it.
+    /// The frame that carries the command.
     pub fn frame(self) -> Frame {
         let target = match self.target {
             NmtTarget::All => 0,
@@ -111,7 +88,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn whatever_decodes_encodes_to_the_same_bytes() {
+    fn decoded_bytes_encode_to_the_same_bytes() {
         let mut decoded = 0;
         for (code, target) in (0..=255).flat_map(|code| (0..=255).map(move |target| (code, target))) {
             if let Ok(nmt) = Nmt::decode(&[code, target]) {
@@ -123,7 +100,7 @@ mod tests {
     }
 
     #[test]
-    fn errors_carry_what_was_received() {
+    fn errors_contain_the_received_bytes() {
         assert_eq!(Nmt::decode(&[3, 0]), Err(NmtError::UnknownCommand { code: 3 }));
         assert_eq!(Nmt::decode(&[1, 128]), Err(NmtError::Target(NodeIdError { id: 128 })));
         assert_eq!(Nmt::decode(&[1]).unwrap_err().to_string(), "NMT has 2 data bytes, received 1");

@@ -1,4 +1,4 @@
-//! The length of a CANopen object's data, checked once for all codecs.
+//! The check of the data length, for all codecs.
 
 /// An object of a length that its definition does not allow.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
@@ -6,7 +6,7 @@
 pub struct LengthError {
     /// The communication object.
     pub object: &'static str,
-    /// Bytes it has by definition.
+    /// Bytes that the definition requires.
     pub expected: usize,
     /// Bytes received.
     pub actual: usize,

@@ -11,8 +11,7 @@ pub fn frame() -> Frame {
 /// Checks the data of a SYNC frame.
 ///
 /// # Errors
-/// [`LengthError`] unless it is empty: somebody sends SYNC with a counter, or another object under its
-/// identifier.
+/// [`LengthError`] unless the frame is empty: a node sends SYNC with a counter, or another object with this identifier.
 pub fn check(data: &[u8]) -> Result<(), LengthError> {
     exactly::<0>("SYNC", data).map(|_| ())
 }

@@ -1,9 +1,6 @@
-//! The controlword, object 6040, and the command its bits mean.
+//! The controlword, object 6040, and the command in its bits.
 //!
-//! Bits of the modes of operation (4 to 6) and halt (8) have their readers; what they lead to is the
-//! drive's.
-
-use std::fmt;
+//! The bits of the modes of operation (4 to 6) and halt (8) can be read; their effect is not part of this module.
 
 use super::DriveState;
 
@@ -18,7 +15,7 @@ const RELATIVE: u16 = 1 << 6;
 const FAULT_RESET: u16 = 1 << 7;
 const HALT: u16 = 1 << 8;
 
-/// What a controlword asks of a drive.
+/// The command in a controlword.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Command {
     /// To ready to switch on.
@@ -36,7 +33,7 @@ pub enum Command {
 }
 
 /// Object 6040 as it is on the wire.
-#[derive(Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Controlword(pub u16);
 
 impl Controlword {
@@ -53,10 +50,10 @@ impl Controlword {
     /// Fault reset; it takes a controlword without this bit before it.
     pub const FAULT_RESET: Self = Self(FAULT_RESET);
 
-    /// What a drive in that state is asked to do, given the controlword it had before.
+    /// The command to a drive in that state, given the controlword before.
     ///
-    /// Fault reset is the rising edge of bit 7 in the state fault. Any other bit 7 is ignored rather than taken to
-    /// void the other bits, so that it can never mask a quick stop.
+    /// Fault reset is the rising edge of bit 7 in the state fault. Any other bit 7 is ignored and leaves the other
+    /// bits valid, so that bit 7 can never mask a quick stop.
     pub const fn command(self, previous: Self, state: DriveState) -> Command {
         let is_edge = self.has(FAULT_RESET) && !previous.has(FAULT_RESET);
         if is_edge && matches!(state, DriveState::Fault) {
@@ -84,7 +81,7 @@ impl Controlword {
         self.has(MODE_START)
     }
 
-    /// Bit 5 in profile position: the new set-point does not wait for the end of the present motion.
+    /// Bit 5 in profile position: the new set-point takes effect before the present motion ends.
     pub const fn changes_immediately(self) -> bool {
         self.has(CHANGE_IMMEDIATELY)
     }
@@ -94,19 +91,13 @@ impl Controlword {
         self.has(RELATIVE)
     }
 
-    /// Bit 8: the axis shall stand still.
+    /// Bit 8: the axis stops.
     pub const fn halts(self) -> bool {
         self.has(HALT)
     }
 
     const fn has(self, bit: u16) -> bool {
         self.0 & bit != 0
-    }
-}
-
-impl fmt::Debug for Controlword {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "Controlword({:04X}h)", self.0)
     }
 }
 

@@ -1,10 +1,10 @@
-//! The interpolation time period, object 60C2: how long the way from one cyclic target to the next takes.
+//! The interpolation time period, object 60C2: the duration of the move from one cyclic target to the next.
 
 /// Longest value of 60C2:1.
 const LONGEST: u64 = u8::MAX as u64;
 
-/// A period as object 60C2 has it: value and power of ten of seconds, as near as 255 steps allow, no finer than
-/// 1 µs, with the fewest digits (1 · 10⁻³ rather than 100 · 10⁻⁵; some drives take whole ms only).
+/// A period in the form of object 60C2: value and power of ten, in seconds. The value has at most 255 steps, no finer than
+/// 1 µs, and the fewest digits (1 · 10⁻³ rather than 100 · 10⁻⁵): some drives accept whole ms only.
 pub const fn interpolation_period(period_ns: u64) -> (u8, i8) {
     let (mut unit_ns, mut exponent) = (1000, -6);
     while in_units(period_ns, unit_ns) > LONGEST && exponent < 0 {

@@ -1,4 +1,4 @@
-//! The drive's state machine: what commands, faults and its own progress do to the state.
+//! The drive's state machine: transitions by commands, by faults, and by the drive's own progress.
 //!
 //! T-numbers are the transitions of CiA 402. T0 (power-on) creates the drive. T16 (operation enabled
 //! again out of quick stop) exists only where the quick-stop option code 605A says that the drive stays
@@ -37,8 +37,8 @@ impl DriveState {
         next
     }
 
-    /// The state after a command to a drive that stays in quick stop until it is told to leave (605A = 5 or
-    /// 6): as [`after`](Self::after), and T16.
+    /// The state after a command to a drive that stays in quick stop until the next command (605A = 5 or 6): as
+    /// [`after`](Self::after), and T16.
     #[must_use]
     pub const fn after_in_held_quick_stop(self, command: Command) -> Self {
         match (self, command) {
@@ -56,8 +56,8 @@ impl DriveState {
         }
     }
 
-    /// The state after the drive finished what it does on its own in this state: initialising (T1), the
-    /// quick-stop ramp (T12), the reaction to a fault (T14). Other states have nothing to finish.
+    /// The state after the drive completed its own task in this state: initialising (T1), the
+    /// quick-stop ramp (T12), the reaction to a fault (T14). Other states have no such task.
     #[must_use]
     pub const fn after_completion(self) -> Self {
         match self {

@@ -1,60 +1,45 @@
 //! The master's side of the state machine: which controlword leads a drive to a requested state.
 
-use std::fmt;
-
 use super::{Controlword, DriveState};
 
-/// What a master asks of a drive.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[repr(u32)]
-pub enum DriveRequest {
-    /// No voltage: the drive is free.
-    Off = 0,
-    /// Operation enabled, following the targets.
-    Enable,
-    /// Stop along the quick-stop ramp, then switch on disabled.
-    QuickStop,
-}
-
-impl DriveRequest {
-    /// Every request.
-    pub const ALL: [Self; 3] = [Self::Off, Self::Enable, Self::QuickStop];
-
-    /// The number in messages.
-    pub const fn code(self) -> u32 {
-        self as u32
-    }
-
-    /// The request with that number.
-    pub fn from_code(code: u32) -> Option<Self> {
-        Self::ALL.into_iter().find(|request| request.code() == code)
-    }
-
-    /// The name in files and reports.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Off => "off",
-            Self::Enable => "enable",
-            Self::QuickStop => "quick_stop",
-        }
+codes! {
+    /// What a master asks of a drive.
+    DriveRequest as u32 {
+        /// No voltage: the drive is free.
+        Off = 0 "off",
+        /// Operation enabled, following the targets.
+        Enable = 1 "enable",
+        /// Stop along the quick-stop ramp, then switch on disabled.
+        QuickStop = 2 "quick_stop",
     }
 }
 
-impl fmt::Display for DriveRequest {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(self.name())
-    }
-}
-
-/// The next controlword (6040h) on the way from `state` to what `request` asks for. `previous` is the last
-/// controlword sent to the drive.
+/// The next controlword (6040h) on the way from `state` to the requested state. `previous` is the last controlword
+/// sent to the drive.
 ///
 /// - [`DriveRequest::Enable`] climbs one transition a call, resets a fault by an edge of bit 7 and lets a
-///   running quick stop end. It restarts a drive that failed: who must not do so stops asking for it.
+///   running quick stop end. It restarts a drive in fault: a caller that must not restart drives requests something else.
 /// - [`DriveRequest::QuickStop`] brakes a drive that moves and switches off one that does not.
 /// - [`DriveRequest::Off`] takes the voltage away at once; a moving drive coasts.
 ///
 /// The function does not wait: without an answer of the drive it repeats the word, and the edge of a fault reset.
+///
+/// # Examples
+/// From "switch on disabled" to "operation enabled":
+///
+/// ```
+/// use masseter_can::cia402::{Controlword, DriveRequest, DriveState, next_controlword};
+///
+/// let (mut state, mut word) = (DriveState::SwitchOnDisabled, Controlword::DISABLE_VOLTAGE);
+/// let mut words = Vec::new();
+/// while state != DriveState::OperationEnabled {
+///     let next = next_controlword(state, DriveRequest::Enable, word);
+///     state = state.after(next.command(word, state));
+///     word = next;
+///     words.push(word.0);
+/// }
+/// assert_eq!(words, [0x06, 0x07, 0x0F], "shutdown, switch on, enable operation");
+/// ```
 pub const fn next_controlword(
     state: DriveState,
     request: DriveRequest,

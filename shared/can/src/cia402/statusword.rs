@@ -1,10 +1,8 @@
 //! The statusword, object 6041: a drive's state and a few flags beside it.
 
-use std::fmt;
-
 use super::DriveState;
 
-/// The bits of the statusword that tell the state, and their value in each state.
+/// The bits of the statusword that encode the state, and their value in each state.
 const PATTERNS: [(u16, u16, DriveState); 8] = [
     (0x4F, 0x00, DriveState::NotReadyToSwitchOn),
     (0x4F, 0x40, DriveState::SwitchOnDisabled),
@@ -16,7 +14,7 @@ const PATTERNS: [(u16, u16, DriveState); 8] = [
     (0x4F, 0x08, DriveState::Fault),
 ];
 
-/// A bit of the statusword that does not tell the state.
+/// A bit of the statusword that is not part of the state.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u8)]
 pub enum StatusBit {
@@ -46,12 +44,12 @@ impl StatusBit {
 }
 
 /// Object 6041 as it is on the wire.
-#[derive(Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Statusword(pub u16);
 
-/// A statusword whose bits tell no state.
+/// A statusword whose bits encode no state.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("statusword {bits:04X}h tells no state of CiA 402")]
+#[error("statusword {bits:04X}h encodes no state of CiA 402")]
 pub struct StatuswordError {
     /// The statusword.
     pub bits: u16,
@@ -59,7 +57,7 @@ pub struct StatuswordError {
 
 impl Statusword {
     /// The statusword of a state, all other bits 0.
-    pub fn of(state: DriveState) -> Self {
+    pub fn for_state(state: DriveState) -> Self {
         let mut patterns = PATTERNS.into_iter();
         let pattern = patterns.find(|pattern| pattern.2 == state);
         let (_, bits, _) = pattern.expect("every state has a pattern");
@@ -78,7 +76,7 @@ impl Statusword {
         self.0 >> bit as u8 & 1 == 1
     }
 
-    /// The state it tells.
+    /// The state of the drive.
     ///
     /// # Errors
     /// [`StatuswordError`] where the bits are those of no state.
@@ -86,12 +84,6 @@ impl Statusword {
         let mut patterns = PATTERNS.into_iter();
         let pattern = patterns.find(|&(mask, bits, _)| self.0 & mask == bits);
         pattern.map(|(_, _, state)| state).ok_or(StatuswordError { bits: self.0 })
-    }
-}
-
-impl fmt::Debug for Statusword {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "Statusword({:04X}h)", self.0)
     }
 }
 
@@ -110,10 +102,10 @@ mod tests {
     ];
 
     #[test]
-    fn every_statusword_tells_at_most_one_state() {
+    fn every_statusword_encodes_at_most_one_state() {
         for bits in 0..=u16::MAX {
             let matching: Vec<_> = PATTERNS.iter().filter(|pattern| bits & pattern.0 == pattern.1).collect();
-            assert!(matching.len() <= 1, "{bits:04X}h tells {matching:?}");
+            assert!(matching.len() <= 1, "{bits:04X}h matches {matching:?}");
             assert_eq!(Statusword(bits).state().ok(), matching.first().map(|pattern| pattern.2));
         }
     }
@@ -121,7 +113,7 @@ mod tests {
     #[test]
     fn a_state_survives_any_flags() {
         for state in DriveState::ALL {
-            let all = FLAGS.into_iter().fold(Statusword::of(state), |word, bit| word.with(bit, true));
+            let all = FLAGS.into_iter().fold(Statusword::for_state(state), |word, bit| word.with(bit, true));
             assert_eq!(all.state(), Ok(state));
             assert!(FLAGS.into_iter().all(|bit| all.has(bit) && !all.with(bit, false).has(bit)));
         }
@@ -130,7 +122,10 @@ mod tests {
     #[test]
     fn bits_of_no_state_are_refused() {
         assert_eq!(Statusword(0x0001).state(), Err(StatuswordError { bits: 0x0001 }));
-        assert_eq!(StatuswordError { bits: 0x61 }.to_string(), "statusword 0061h tells no state of CiA 402");
+        assert_eq!(
+            StatuswordError { bits: 0x61 }.to_string(),
+            "statusword 0061h encodes no state of CiA 402"
+        );
     }
 
     #[test]

@@ -1,7 +1,7 @@
-//! The laws every [`Bus`] keeps, as checks for whoever implements one.
+//! The laws of every [`Bus`], as checks of an implementation.
 //!
-//! An implementation provides a [`Pair`]: two ports of one wire and a way to let time pass. The checks
-//! fetch with [`Bus::receive`] only after [`Pair::settle`]; timing and fault confinement are not checked.
+//! An implementation provides a [`Pair`]: two ports of one wire and a way to let time pass. The checks fetch with
+//! [`Bus::receive`] only after [`Pair::settle`]. Timing and fault confinement are not checked.
 
 #[cfg(test)]
 mod tests;
@@ -15,23 +15,23 @@ use super::id::CanId;
 /// Frames sent at once by the check for losses: more than any sensible queue holds.
 const BURST: u32 = 20_000;
 
-/// What a bus keeps to.
+/// A property of every bus.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Law {
-    /// What is sent arrives once, unchanged and in order.
+    /// Every frame arrives once, unchanged and in order.
     Delivery,
-    /// Nobody hears himself.
+    /// A port does not receive its own frames.
     NoEcho,
-    /// Nothing is lost silently.
+    /// Every lost frame is reported.
     Losses,
-    /// Frames in FD format arrive as they are, or are refused.
+    /// Frames in FD format arrive unchanged, or are refused.
     Fd,
-    /// Of buses that send by priority: the smaller identifier goes first.
+    /// On buses that send by priority, the smaller identifier goes first.
     Arbitration,
 }
 
 impl Law {
-    /// Those of every bus, in the order in which they are checked.
+    /// The laws of every bus, in the order of the checks.
     pub const OF_EVERY_BUS: [Self; 4] = [Self::Delivery, Self::NoEcho, Self::Losses, Self::Fd];
 
     fn broken(self, observed: &impl fmt::Debug) -> Violation {
@@ -64,10 +64,10 @@ pub enum End {
     B,
 }
 
-/// Two fresh ports of one wire that nobody else uses.
+/// Two new ports of one wire without other nodes.
 pub trait Pair {
-    /// Whether every frame lost is counted. A real controller whose memory overflowed tells that it lost
-    /// frames, but not how many.
+    /// Whether the ports count every lost frame. A real controller whose memory overflowed reports a loss, but
+    /// not the number of frames.
     const COUNTS_LOSSES: bool = true;
 
     /// A port.
@@ -80,28 +80,71 @@ pub trait Pair {
     fn settle(&mut self);
 }
 
-/// A law that an implementation broke.
+/// A broken law.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{law}: {observed}")]
 pub struct Violation {
     /// The law.
     pub law: Law,
-    /// What happened instead.
+    /// The observation that breaks the law.
     pub observed: String,
 }
 
 /// Checks the laws of every bus, each on a pair of its own.
 ///
+/// # Examples
+/// ```
+/// use masseter_can::conformance::{End, Pair, check};
+/// use masseter_can::{Bitrate, Bus, FrameFormat, Rates, VirtualWire, WireConfig};
+///
+/// struct TwoPorts {
+///     wire: VirtualWire,
+///     now_ns: u64,
+/// }
+///
+/// impl Pair for TwoPorts {
+///     fn end(&mut self, end: End) -> impl Bus {
+///         self.wire.port(end as usize)
+///     }
+///
+///     fn format(&self) -> FrameFormat {
+///         FrameFormat::Classical
+///     }
+///
+///     fn now_ns(&self) -> u64 {
+///         self.now_ns
+///     }
+///
+///     fn settle(&mut self) {
+///         while let Some(event_ns) = self.wire.next_event_ns() {
+///             self.wire.advance(event_ns);
+///             self.now_ns = event_ns;
+///         }
+///     }
+/// }
+///
+/// let config = WireConfig {
+///     rates: Rates::classical(Bitrate::MAX),
+///     format: FrameFormat::Classical,
+///     ports: 2,
+///     transmit_capacity: 8,
+///     receive_capacity: 8,
+///     restart_after_ns: None,
+/// };
+/// check(|| TwoPorts { wire: VirtualWire::new(&config), now_ns: 0 })?;
+/// # Ok::<(), masseter_can::conformance::Violation>(())
+/// ```
+///
 /// # Errors
 /// The first [`Violation`].
 pub fn check<P: Pair>(mut pair: impl FnMut() -> P) -> Result<(), Violation> {
     frames_arrive_once_unchanged_and_in_order(&mut pair())?;
-    senders_do_not_hear_themselves(&mut pair())?;
+    ports_do_not_receive_their_own_frames(&mut pair())?;
     nothing_is_lost_silently(&mut pair())?;
     fd_frames_arrive_or_are_refused(&mut pair())
 }
 
-/// Checks the law of buses that send by priority; a virtual CAN interface of the kernel does not.
+/// Checks the law of buses that send by priority. A virtual CAN interface of the kernel sends in order instead.
 ///
 /// # Errors
 /// The [`Violation`].
@@ -137,7 +180,7 @@ fn frames_arrive_once_unchanged_and_in_order(pair: &mut impl Pair) -> Result<(),
     Ok(())
 }
 
-fn senders_do_not_hear_themselves(pair: &mut impl Pair) -> Result<(), Violation> {
+fn ports_do_not_receive_their_own_frames(pair: &mut impl Pair) -> Result<(), Violation> {
     send(pair, frame(0x123, 0)).map_err(|error| Law::NoEcho.broken(&error))?;
     pair.settle();
     match drain(pair, End::A) {

@@ -1,4 +1,4 @@
-//! Which frames faults strike, and what is told of them.
+//! The frames that faults act on, and the reports on faults.
 
 use super::*;
 
@@ -24,7 +24,7 @@ fn strikes(faults: &Faults, now_ns: u64, port: usize, number: u64) -> bool {
 }
 
 #[test]
-fn a_fault_strikes_within_its_time_its_port_and_its_identifier() {
+fn a_fault_acts_within_its_time_on_its_port_and_its_identifier() {
     let fault = Fault { port: Some(2), id: Some(id(0x181)), ..corrupt(1.0) };
     let faults = Faults::new(vec![fault], 1);
     assert!(strikes(&faults, 1000, 2, 0));
@@ -47,7 +47,7 @@ fn the_share_of_frames_struck_is_the_probability_and_the_seed_chooses_them() {
 }
 
 #[test]
-fn a_fault_chooses_and_is_told_of_by_its_number_whatever_else_befalls_the_bus() {
+fn a_fault_selects_frames_by_its_own_number_independent_of_other_faults() {
     let (first, second) = (Fault { number: 3, ..corrupt(0.1) }, Fault { number: 8, ..corrupt(0.1) });
     let struck = |faults: Vec<Fault>| {
         let faults = Faults::new(faults, 1);
@@ -58,20 +58,20 @@ fn a_fault_chooses_and_is_told_of_by_its_number_whatever_else_befalls_the_bus() 
     assert_ne!(struck(vec![first]), struck(vec![second]));
 
     let mut faults = Faults::new(vec![second], 1);
-    faults.record(Strike { place: 0, at_ns: 1200 });
+    faults.record(FaultActivation { place: 0, at_ns: 1200 });
     assert_eq!(faults.next_note(1500).map(|note| note.fault), Some(8));
 }
 
 #[test]
-fn a_fault_tells_once_that_it_acts_and_once_that_it_is_over() {
+fn a_fault_is_reported_once_at_its_begin_and_once_at_its_end() {
     let mut faults = Faults::new(vec![Fault { count: 2, ..corrupt(1.0) }], 1);
     assert_eq!(faults.next_note(1500), None);
-    let strike = |at_ns| Strike { place: 0, at_ns };
-    faults.record(strike(1200));
+    let activation = |at_ns| FaultActivation { place: 0, at_ns };
+    faults.record(activation(1200));
     let note = FaultNote { time_ns: 1200, fault: 0, port: None, strikes: 0, has_ended: false };
     assert_eq!(faults.next_note(1500), Some(note));
     assert_eq!(faults.next_note(1500), None);
-    faults.record(strike(1300));
+    faults.record(activation(1300));
     let note = FaultNote { time_ns: 1500, strikes: 2, has_ended: true, ..note };
     assert_eq!(faults.next_note(1500), Some(note));
     assert_eq!(faults.next_note(3000), None);

@@ -1,14 +1,13 @@
-//! How long a message takes at worst: response times of non-preemptive transmission by fixed priority.
+//! Worst-case response times of non-preemptive transmission by fixed priority.
 //!
 //! R. Davis, A. Burns, R. Bril, J. Lukkien, *Controller Area Network (CAN) schedulability analysis: refuted, revisited
-//! and revised*, Real-Time Systems 35 (2007), equations 7 to 12: every instance within the longest busy period is
-//! looked at, behind the longest frame of lower priority. Transmit queues by priority are assumed, an undisturbed bus,
-//! and no offsets between messages.
+//! and revised*, Real-Time Systems 35 (2007), equations 7 to 12: the analysis covers every instance within the longest busy
+//! period, behind the longest frame of lower priority. It assumes transmit queues by priority, an undisturbed bus, and
+//! no offsets between messages.
 
-use super::{PlannedMessage, utilisation};
+use super::message::{PlannedMessage, utilisation};
 
-/// A bus that is not idle for so long has no bound worth the name: near a load of 1 the exact one is found in ever more
-/// steps, and at 1 there is none.
+/// Longest busy period of the analysis. Near a load of 1 the iteration takes ever more steps, and at 1 there is no bound.
 const LONGEST_BUSY_NS: u64 = 1_000_000_000;
 
 /// Worst-case response time of the message of that index (Davis et al. 2007, equations 7 to 12), without its
@@ -34,8 +33,8 @@ pub(super) fn response_ns(messages: &[PlannedMessage], index: usize, bit_ns: u64
     })
 }
 
-/// The longest that those messages take together of a window of that length; `None` where one of them may be released
-/// at any time.
+/// The most time that those messages take in a window of that length; `None` when the release of one of them has no
+/// bound.
 fn interference_ns(window_ns: u64, of: &[PlannedMessage]) -> Option<u64> {
     let taken_ns = |other: &PlannedMessage| {
         let instances = (window_ns + other.jitter_ns?).div_ceil(other.message.period_ns);
@@ -44,7 +43,7 @@ fn interference_ns(window_ns: u64, of: &[PlannedMessage]) -> Option<u64> {
     of.iter().map(taken_ns).sum()
 }
 
-/// The least fixed point from `start_ns` on of a function that grows, as far as the longest busy time.
+/// The least fixed point of a growing function from `start_ns` on; `None` beyond the longest busy period.
 fn settle(start_ns: u64, grow: impl Fn(u64) -> Option<u64>) -> Option<u64> {
     let mut at_ns = start_ns;
     while at_ns <= LONGEST_BUSY_NS {

@@ -1,8 +1,9 @@
-//! A plan as people read it.
+//! A plan as a table for the terminal.
 
 use std::fmt;
 
-use super::{BusPlan, PlannedMessage};
+use super::bus_plan::BusPlan;
+use super::message::PlannedMessage;
 
 impl fmt::Display for BusPlan {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

@@ -119,7 +119,7 @@ fn a_delayed_frame_leaves_when_it_is_due() {
 }
 
 #[test]
-fn a_babbling_node_speaks_whenever_its_port_is_used() {
+fn a_babbling_node_sends_whenever_its_port_is_used() {
     let kind = FaultKind::Babble { frame: frame(0xBB) };
     let mut pair = Faulted::new(vec![Fault { kind, count: 2, ..FAULT }], Vec::new());
     pair.send(1).unwrap();

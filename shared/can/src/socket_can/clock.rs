@@ -18,7 +18,7 @@ pub(super) fn now_ns() -> u64 {
 
 /// The instant of `CLOCK_MONOTONIC` at which the wall clock showed `stamp`, ns. A stamp in the future or more than a
 /// minute old gives the present: the wall clock was set in between. The result never lies before the true instant,
-/// as long as nobody sets the wall clock.
+/// unless the wall clock is set.
 pub(super) fn monotonic_ns(stamp: SystemTime) -> u64 {
     // In this order, time between the two readings makes the result later, but never later than now.
     let wall = SystemTime::now();
@@ -45,14 +45,14 @@ mod tests {
     }
 
     #[test]
-    fn an_old_stamp_lies_where_its_age_says() {
+    fn an_old_stamp_is_converted_by_its_age() {
         let stamp = SystemTime::now() - Duration::from_secs(30);
         let found_ns = monotonic_ns(stamp);
         assert!(found_ns + 20_000_000_000 < now_ns(), "{found_ns}");
     }
 
     #[test]
-    fn a_stamp_of_a_clock_set_meanwhile_counts_as_now() {
+    fn a_stamp_of_a_clock_that_was_set_meanwhile_counts_as_now() {
         for stamp in [UNIX_EPOCH, SystemTime::now() + Duration::from_secs(3600)] {
             let before_ns = now_ns();
             assert!(monotonic_ns(stamp) >= before_ns);

@@ -1,7 +1,7 @@
-//! Fault confinement as the driver's error frames tell it.
+//! Fault confinement from the driver's error frames.
 //!
-//! Layout of an error frame: `linux/can/error.h`. Drivers differ in what they tell: most tell every change
-//! of state, newer ones with both counters.
+//! Layout of an error frame: `linux/can/error.h`. Most drivers report every change of state; newer ones also report both
+//! counters.
 
 use socketcan::errors::{
     CAN_ERR_ACK, CAN_ERR_BUSERROR, CAN_ERR_BUSOFF, CAN_ERR_CNT, CAN_ERR_CRTL, CAN_ERR_PROT,
@@ -11,19 +11,19 @@ use socketcan::errors::{
 use crate::bus::{BusStatus, ErrorState};
 use crate::error_frame::ErrorKind;
 
-/// What an error frame told.
+/// The content of an error frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Told {
-    /// A change of state before all else, then an error on the wire; none where it was neither.
+pub(super) struct ErrorReportParts {
+    /// A change of state, otherwise an error on the wire; `None` for anything else.
     pub(super) kind: Option<ErrorKind>,
-    /// Frames that the controller lost, as far as it tells.
+    /// Frames that the controller lost: 1 for each report of a loss.
     pub(super) lost: u64,
 }
 
 /// Transmit error counter at which a controller is bus-off; error frames have no room for more than 255.
 const BUS_OFF_TEC: u16 = 256;
 
-/// What is known of one port.
+/// The last known state of one port.
 #[derive(Debug)]
 pub(super) struct Confinement(BusStatus);
 
@@ -39,10 +39,12 @@ impl Confinement {
     }
 
     /// Takes an error frame.
-    pub(super) fn take(&mut self, classes: u32, data: &[u8]) -> Told {
+    pub(super) fn take(&mut self, classes: u32, data: &[u8]) -> ErrorReportParts {
         let has = |class| classes & class != 0;
         let before = self.0.state;
-        let [_, problems, _, _, _, _, tec, rec] = *data else { return Told { kind: None, lost: 0 } };
+        let [_, problems, _, _, _, _, tec, rec] = *data else {
+            return ErrorReportParts { kind: None, lost: 0 };
+        };
         let problems = ControllerProblems::from_bits_truncate(problems);
         if has(CAN_ERR_RESTARTED) {
             *self = Self::default();
@@ -63,7 +65,7 @@ impl Confinement {
             _ => None,
         };
         let has_lost = has(CAN_ERR_CRTL) && problems.contains(ControllerProblems::RX_OVERFLOW);
-        Told { kind, lost: u64::from(has_lost) }
+        ErrorReportParts { kind, lost: u64::from(has_lost) }
     }
 }
 
@@ -91,7 +93,7 @@ mod tests {
     const ACTIVE: u8 = ControllerProblems::ACTIVE.bits();
 
     #[test]
-    fn a_port_goes_through_warning_passive_bus_off_and_restart_as_the_driver_tells() {
+    fn a_port_goes_through_warning_passive_bus_off_and_restart_as_the_driver_reports() {
         let mut confinement = Confinement::default();
         let table = [
             (CAN_ERR_CRTL | CAN_ERR_CNT, [0, TX_WARNING, 0, 0, 0, 0, 96, 0], ErrorState::Active, 96, 0),
@@ -105,21 +107,21 @@ mod tests {
         for (classes, data, state, tec, rec) in table {
             let before = confinement.status().state;
             let kind = (state != before).then_some(ErrorKind::State(state));
-            assert_eq!(confinement.take(classes, &data), Told { kind, lost: 0 });
+            assert_eq!(confinement.take(classes, &data), ErrorReportParts { kind, lost: 0 });
             assert_eq!(confinement.status(), BusStatus { state, tec, rec }, "{classes:x} {data:?}");
         }
     }
 
     #[test]
-    fn a_controller_that_lost_frames_changes_no_state_and_tells_of_one() {
+    fn a_controller_that_lost_frames_changes_no_state_and_reports_one() {
         let mut confinement = Confinement::default();
         let data = [0, ControllerProblems::RX_OVERFLOW.bits(), 0, 0, 0, 0, 0, 0];
-        assert_eq!(confinement.take(CAN_ERR_CRTL, &data), Told { kind: None, lost: 1 });
+        assert_eq!(confinement.take(CAN_ERR_CRTL, &data), ErrorReportParts { kind: None, lost: 1 });
         assert_eq!(confinement.status().state, ErrorState::Active);
     }
 
     #[test]
-    fn an_error_on_the_wire_is_told_unless_it_changes_the_state() {
+    fn an_error_on_the_wire_is_reported_unless_it_changes_the_state() {
         let passive = [0, TX_PASSIVE, 0, 0, 0, 0, 128, 0];
         let table = [
             (CAN_ERR_PROT | CAN_ERR_BUSERROR, [0; 8], Some(ErrorKind::Bit)),

@@ -1,4 +1,4 @@
-//! Frames in the form of the kernel, and back.
+//! Conversion of frames to and from the kernel's form.
 
 use socketcan::id::FdFlags;
 use socketcan::{
@@ -32,13 +32,13 @@ fn to_kernel_id(id: CanId) -> Id {
     id.expect("an identifier of 11 or 29 bits")
 }
 
-/// The frame that the kernel handed out as classical data; what it should not hand out is none.
-pub(super) fn of_data(frame: &CanDataFrame) -> Option<Frame> {
+/// The frame of the kernel's classical form; `None` for a frame that CAN does not have.
+pub(super) fn from_data(frame: &CanDataFrame) -> Option<Frame> {
     Frame::new(CanId::from_flagged(frame.id_word()).ok()?, frame.data()).ok()
 }
 
-/// The frame that the kernel handed out in FD format; what it should not hand out is none.
-pub(super) fn of_fd(frame: &CanFdFrame) -> Option<Frame> {
+/// The frame of the kernel's FD form; `None` for a frame that CAN does not have.
+pub(super) fn from_fd(frame: &CanFdFrame) -> Option<Frame> {
     let format = if frame.is_brs() { FrameFormat::FdBitRateSwitch } else { FrameFormat::Fd };
     Frame::with_format(CanId::from_flagged(frame.id_word()).ok()?, format, frame.data()).ok()
 }
@@ -53,8 +53,8 @@ mod tests {
         #[test]
         fn every_frame_survives_the_form_of_the_kernel(frame in any_frame()) {
             let back = match to_kernel(&frame) {
-                CanAnyFrame::Normal(data) => of_data(&data),
-                CanAnyFrame::Fd(fd) => of_fd(&fd),
+                CanAnyFrame::Normal(data) => from_data(&data),
+                CanAnyFrame::Fd(fd) => from_fd(&fd),
                 CanAnyFrame::Remote(_) | CanAnyFrame::Error(_) => None,
             };
             prop_assert_eq!(back, Some(frame));

@@ -1,4 +1,4 @@
-//! Whether an interface can be used, and if not, what to do.
+//! The check of an interface, with the remedy for every refusal.
 
 use std::fs;
 use std::io;
@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use socketcan::{CanSocket, Socket};
 
-use super::errno;
+use super::errno::errno;
 use crate::frame::FrameFormat;
 
 /// Hardware type of CAN interfaces (`ARPHRD_CAN`).
@@ -74,8 +74,8 @@ pub enum OpenError {
 }
 
 impl OpenError {
-    /// What an error of the system means.
-    pub(super) fn of(interface: &str, errno: i32) -> Self {
+    /// The meaning of an error of the operating system.
+    pub(super) fn from_errno(interface: &str, errno: i32) -> Self {
         let interface = interface.to_owned();
         match errno {
             libc::EAFNOSUPPORT | libc::EPROTONOSUPPORT => Self::NoCan { interface },
@@ -87,13 +87,13 @@ impl OpenError {
     }
 }
 
-/// Refuses an interface that is none, is no CAN interface, is down, or does not have the format; otherwise the length
-/// of its transmit queue, frames.
+/// The length of the interface's transmit queue, frames. Refuses an interface that does not exist, is not a CAN
+/// interface, is down, or does not have the format.
 pub(super) fn check(interface: &str, format: FrameFormat) -> Result<usize, OpenError> {
     // A socket on all interfaces exists wherever the kernel knows CAN.
-    CanSocket::open_iface(0).map_err(|error| OpenError::of(interface, errno(&error)))?;
+    CanSocket::open_iface(0).map_err(|error| OpenError::from_errno(interface, errno(&error)))?;
     if !can_interfaces().iter().any(|there| there == interface) {
-        return Err(OpenError::of(interface, libc::ENODEV));
+        return Err(OpenError::from_errno(interface, libc::ENODEV));
     }
     let folder = Path::new(INTERFACES).join(interface);
     if flags(&folder).is_some_and(|flags| flags & UP == 0) {
@@ -108,7 +108,7 @@ pub(super) fn check(interface: &str, format: FrameFormat) -> Result<usize, OpenE
 /// Where the kernel lists its network interfaces.
 const INTERFACES: &str = "/sys/class/net";
 
-/// The CAN interfaces there are, by name.
+/// The names of the existing CAN interfaces.
 fn can_interfaces() -> Vec<String> {
     let folders = fs::read_dir(INTERFACES).into_iter().flatten().flatten();
     let is_can = |folder: &PathBuf| number(&folder.join("type")) == Some(CAN_TYPE);
@@ -140,8 +140,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_refusal_says_what_to_do() {
-        let of = |errno| OpenError::of("can7", errno).to_string();
+    fn every_refusal_gives_a_remedy() {
+        let of = |errno| OpenError::from_errno("can7", errno).to_string();
         let table = [
             (libc::EAFNOSUPPORT, "modprobe can-raw"),
             (libc::ENODEV, "no CAN interface `can7`"),
@@ -155,7 +155,7 @@ mod tests {
     }
 
     #[test]
-    fn the_interfaces_there_are_are_named() {
+    fn existing_interfaces_are_listed() {
         let there = |names: &[&str]| {
             let there = names.iter().map(|&name| name.to_owned()).collect();
             OpenError::NoInterface { interface: "can7".to_owned(), there }.to_string()

@@ -1,26 +1,26 @@
-//! A node's port on a real wire: a raw `SocketCAN` socket that never waits.
+//! A node's port on a real wire: a raw `SocketCAN` socket that never blocks.
 //!
-//! Frames leave in the order they were sent, through the queue of the interface (`txqueuelen`): who needs
-//! urgent frames to go first sends them first. Frames of other sockets on the same interface are received
+//! Frames leave through the queue of the interface (`txqueuelen`) in the order of sending: a caller sends urgent frames
+//! first. Frames of other sockets on the same interface are received
 //! like those of other nodes, and in the order in which they were on the wire; so a second port on the
 //! interface is a tap.
 //!
 //! # Time stamps
 //! The kernel stamps a frame when the driver hands it over, in wall-clock time; the stamp is converted to
-//! `CLOCK_MONOTONIC` when the frame is fetched . Stamps of a port never run
-//! backwards. Hardware stamps are not used: they count in the adapter's own clock, which shares no origin
-//! with ours.
+//! `CLOCK_MONOTONIC` when the frame is fetched. Stamps of a port never run
+//! backwards. Hardware stamps are not used: they count in the adapter's own clock, which has another
+//! origin.
 //!
 //! # Fault confinement
 //! The driver reports it by error frames, which change [`status`](Bus::status) and are handed on to a
-//! [tap](SocketCan::tap) alone: changes of state and, where the driver tells them (`berr-reporting on`), errors on the
+//! [tap](SocketCan::tap) alone: changes of state and, where the driver reports them (`berr-reporting on`), errors on the
 //! wire. Warnings, lost arbitration and faults of the line are passed over. A port
-//! is taken for error active until the first of them. A port that is bus-off refuses to send until the
+//! counts as error active until the first error frame. A port that is bus-off refuses to send until the
 //! driver reports a restart (`ip link set … type can restart-ms 100`) or the interface was taken down.
 //!
 //! # Losses
-//! Frames lost because the socket was not emptied in time are counted by the kernel; what the controller
-//! itself lost it does not count, so that each such report stands for one frame at least.
+//! Frames lost because the socket was not emptied in time are counted by the kernel. The kernel does
+//! not count the frames that the controller itself lost, so each such report means at least one frame.
 //!
 //! # Formats
 //! A port opened for an FD format sends all its frames in it, and its interface must have been set up for FD.
@@ -33,221 +33,9 @@
 mod clock;
 mod confinement;
 mod conversion;
+mod errno;
 mod interface;
+mod port;
 
-use std::io;
-use std::time::{Duration, SystemTime};
-
-use rustix::event::{PollFd, PollFlags, Timespec, poll};
-use socketcan::{CanAnyFrame, CanFdSocket, EmbeddedFrame as _, Socket, SocketOptions};
-
-use self::confinement::{Confinement, Told};
-pub use self::interface::OpenError;
-use super::bus::{Bus, BusStatus, ErrorState, ReceiveError, Received, SendError};
-use super::error_frame::ErrorReport;
-use super::frame::{Frame, FrameFormat};
-use super::tap::{Tapped, TappedFrame};
-
-/// Frames looked at in one call of [`Bus::receive`]: error and remote frames must not hold a cycle up.
-const FRAMES_AT_ONCE: usize = 64;
-/// Receive buffer asked for, bytes; the kernel grants at most `net.core.rmem_max`.
-const RECEIVE_BUFFER: i32 = 1 << 20;
-/// The port that errors are told of: the controller of this machine, which all sockets of an interface share.
-const OWN_PORT: u8 = 0;
-/// Fields of `SO_MEMINFO` (`linux/sock_diag.h`), 32 bits each, and which of them counts dropped frames.
-const MEMINFO_FIELDS: usize = 9;
-const MEMINFO_DROPS: usize = 8;
-
-/// A port on a real wire.
-#[derive(Debug)]
-pub struct SocketCan {
-    socket: CanFdSocket,
-    format: FrameFormat,
-    transmit_capacity: usize,
-    confinement: Confinement,
-    last_ns: u64,
-    /// Frames were fetched since the drop counter was looked at.
-    drained: bool,
-    /// The kernel's drop counter as last reported.
-    dropped: u32,
-}
-
-impl SocketCan {
-    /// Opens a port that sends in that format, on an interface that is there and up and has it.
-    ///
-    /// # Errors
-    /// [`OpenError`], which says what to do.
-    pub fn open(interface: &str, format: FrameFormat) -> Result<Self, OpenError> {
-        let transmit_capacity = interface::check(interface, format)?;
-        let failed = |error| OpenError::of(interface, errno(&error));
-        let socket = CanFdSocket::open(interface).map_err(failed)?;
-        configure(&socket).map_err(failed)?;
-        Ok(Self {
-            socket,
-            format,
-            transmit_capacity,
-            confinement: Confinement::default(),
-            last_ns: 0,
-            drained: false,
-            dropped: 0,
-        })
-    }
-
-    /// Now on the clock of the time stamps, ns of `CLOCK_MONOTONIC`.
-    pub fn now_ns() -> u64 {
-        clock::now_ns()
-    }
-
-    /// Blocks until one of the first `N` ports has something to fetch, or until `deadline_ns`; a signal ends the wait
-    /// early.
-    pub fn wait<const N: usize>(ports: &[Self], deadline_ns: u64) {
-        let Some(last) = ports.last() else { return };
-        let left = Duration::from_nanos(deadline_ns.saturating_sub(clock::now_ns()));
-        let left = Timespec { tv_sec: left.as_secs() as i64, tv_nsec: left.subsec_nanos() as _ };
-        // Fewer ports than `N` are filled up with the last one, so that nothing is allocated.
-        let port = |index| ports.get(index).unwrap_or(last);
-        let mut watched: [_; N] =
-            std::array::from_fn(|index| PollFd::new(&port(index).socket, PollFlags::IN));
-        // A wait that fails is one that ends at once: the caller looks at the ports either way.
-        let _ = poll(&mut watched, Some(&left));
-    }
-
-    /// The next frame or error on the wire, for who only looks on; `None` when there is none.
-    ///
-    /// # Errors
-    /// As those of [`Bus::receive`].
-    pub fn tap(&mut self) -> Result<Option<Tapped>, ReceiveError> {
-        self.next(Some)
-    }
-
-    /// The next of what is on the wire that is wanted.
-    fn next<T>(&mut self, wanted: impl Fn(Tapped) -> Option<T>) -> Result<Option<T>, ReceiveError> {
-        for _ in 0..FRAMES_AT_ONCE {
-            match self.socket.read_frame_with_timestamps() {
-                Ok((frame, stamps)) => {
-                    let tapped = self.take(&frame, stamps.socket)?;
-                    if let Some(found) = tapped.and_then(&wanted) {
-                        return Ok(Some(found));
-                    }
-                }
-                Err(error) => return self.receive_failed(&error).map(|()| None),
-            }
-        }
-        Ok(None)
-    }
-
-    /// What a frame just fetched means: a frame or an error on the wire, a loss, or nothing.
-    fn take(
-        &mut self,
-        frame: &CanAnyFrame,
-        stamp: Option<SystemTime>,
-    ) -> Result<Option<Tapped>, ReceiveError> {
-        self.drained = true;
-        let time_ns = stamp.map_or_else(clock::now_ns, clock::monotonic_ns).max(self.last_ns);
-        self.last_ns = time_ns;
-        let tapped = |frame| Tapped::Frame(Received { frame, time_ns }.into());
-        match frame {
-            CanAnyFrame::Normal(data) => Ok(conversion::of_data(data).map(tapped)),
-            CanAnyFrame::Fd(fd) => Ok(conversion::of_fd(fd).map(tapped)),
-            CanAnyFrame::Error(error) => {
-                let Told { kind, lost } = self.confinement.take(error.error_bits(), error.data());
-                if lost > 0 {
-                    return Err(ReceiveError::Overrun { lost });
-                }
-                let report = |kind| ErrorReport::new(time_ns, OWN_PORT, kind, self.confinement.status());
-                Ok(kind.map(report).map(Tapped::Error))
-            }
-            CanAnyFrame::Remote(_) => Ok(None),
-        }
-    }
-
-    /// Nothing is left to fetch: tells of frames dropped meanwhile.
-    fn empty(&mut self) -> Result<(), ReceiveError> {
-        if !std::mem::take(&mut self.drained) {
-            return Ok(());
-        }
-        let dropped = self.count_dropped().map_err(|error| ReceiveError::Os { errno: errno(&error) })?;
-        match dropped.wrapping_sub(std::mem::replace(&mut self.dropped, dropped)) {
-            0 => Ok(()),
-            lost => Err(ReceiveError::Overrun { lost: u64::from(lost) }),
-        }
-    }
-
-    /// Frames that the kernel dropped since the socket was opened.
-    fn count_dropped(&self) -> io::Result<u32> {
-        let mut fields = [0; MEMINFO_FIELDS * size_of::<u32>()];
-        self.socket.get_socket_option_bytes(libc::SOL_SOCKET, libc::SO_MEMINFO, &mut fields)?;
-        let (fields, _) = fields.as_chunks();
-        Ok(u32::from_ne_bytes(fields[MEMINFO_DROPS]))
-    }
-
-    fn receive_failed(&mut self, error: &io::Error) -> Result<(), ReceiveError> {
-        match error.kind() {
-            io::ErrorKind::WouldBlock => self.empty(),
-            io::ErrorKind::Interrupted => Ok(()),
-            _ if is_down(error) => {
-                self.confinement = Confinement::default();
-                Err(ReceiveError::InterfaceDown { errno: errno(error) })
-            }
-            _ => Err(ReceiveError::Os { errno: errno(error) }),
-        }
-    }
-}
-
-impl Bus for SocketCan {
-    fn send(&mut self, _: u64, frame: Frame) -> Result<(), SendError> {
-        let BusStatus { state, tec, .. } = self.confinement.status();
-        if state == ErrorState::BusOff {
-            return Err(SendError::BusOff { tec });
-        }
-        let frame = frame.promoted(self.format);
-        if frame.format().is_fd() && !self.format.is_fd() {
-            return Err(SendError::NotFd { length: frame.data().len() });
-        }
-        self.socket.write_frame(&conversion::to_kernel(&frame)).map_err(|error| match errno(&error) {
-            // ENOBUFS: the interface's queue; EAGAIN: the socket's own share of it.
-            libc::ENOBUFS | libc::EAGAIN => SendError::QueueFull { capacity: self.transmit_capacity },
-            errno if is_down(&error) => SendError::InterfaceDown { errno },
-            errno => SendError::Os { errno },
-        })
-    }
-
-    fn receive(&mut self, _: u64) -> Result<Option<Received>, ReceiveError> {
-        self.next(|tapped| {
-            tapped.frame().map(|&TappedFrame { frame, time_ns, .. }| Received { frame, time_ns })
-        })
-    }
-
-    fn status(&self) -> BusStatus {
-        self.confinement.status()
-    }
-}
-
-fn configure(socket: &CanFdSocket) -> io::Result<()> {
-    socket.set_nonblocking(true)?;
-    socket.set_recv_own_msgs(false)?;
-    socket.set_error_filter_accept_all()?;
-    socket.set_recv_timestamp(true)?;
-    socket.set_socket_option_int(libc::SOL_SOCKET, libc::SO_RCVBUF, RECEIVE_BUFFER)
-}
-
-fn is_down(error: &io::Error) -> bool {
-    matches!(errno(error), libc::ENETDOWN | libc::ENODEV | libc::ENXIO)
-}
-
-fn errno(error: &io::Error) -> i32 {
-    // Only a frame of an unexpected size has no number of the system's.
-    error.raw_os_error().unwrap_or(libc::EPROTO)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn what_cannot_be_opened_is_refused_with_what_to_do() {
-        let error = SocketCan::open("no-such-can", FrameFormat::Classical).unwrap_err().to_string();
-        let remedies = ["modprobe can-raw", "no CAN interface `no-such-can`"];
-        assert!(remedies.iter().any(|remedy| error.contains(remedy)), "{error}");
-    }
-}
+pub use interface::OpenError;
+pub use port::SocketCan;

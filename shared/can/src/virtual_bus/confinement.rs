@@ -1,8 +1,8 @@
 //! Fault confinement of one port: error counters, error states and the way back from bus-off
 //! (ISO 11898-1, 12.1.4; counting rules as in the Bosch specification 2.0, chapter 8).
 //!
-//! Not counted: the receiver's +8 for a dominant bit behind its own error flag, which would tell the
-//! node that disturbs from those it disturbs; a simulated receiver never disturbs by itself.
+//! Not counted: the receiver's +8 for a dominant bit behind its own error flag, which
+//! distinguishes the disturbing node from the others; a simulated receiver never disturbs by itself.
 
 use crate::bus::{BusStatus, ErrorState};
 
@@ -29,7 +29,7 @@ pub(super) struct Confinement {
 /// Off the bus.
 #[derive(Debug, Clone, Copy)]
 struct Off {
-    /// When the host restarts, or did restart, the controller; `None` until somebody says so.
+    /// When the host restarts, or did restart, the controller; `None` without a restart.
     restart_ns: Option<u64>,
     /// Recessive sequences still to be seen after that.
     sequences: u64,
@@ -176,11 +176,11 @@ mod tests {
     }
 
     #[test]
-    fn off_the_bus_it_waits_for_its_restart_and_then_for_128_sequences() {
+    fn a_node_in_bus_off_waits_for_its_restart_and_then_for_128_sequences() {
         const SEQUENCE_NS: u64 = 11_000;
         let mut node = Confinement::new();
         node.leave_bus(1000, None);
-        assert_eq!(node.back_at_ns(SEQUENCE_NS), None, "nobody restarted it");
+        assert_eq!(node.back_at_ns(SEQUENCE_NS), None, "without a restart");
         let mut node = Confinement::new();
         node.leave_bus(1000, Some(2000));
         assert_eq!(node.back_at_ns(SEQUENCE_NS), Some(3000 + 128 * SEQUENCE_NS));

@@ -1,22 +1,27 @@
 //! One port of a virtual wire as a [`Bus`].
 
-use super::VirtualWire;
+use super::wire::VirtualWire;
 use crate::bus::{Bus, BusStatus, ReceiveError, Received, SendError};
 use crate::frame::Frame;
 
 /// A port, borrowed from its wire for as long as it is used.
 ///
-/// It does not move time: somebody has to [`advance`](VirtualWire::advance) the wire for frames to arrive.
+/// A port does not move time: frames arrive when the caller [advances](VirtualWire::advance) the wire.
 #[derive(Debug)]
 pub struct Port<'a> {
     wire: &'a mut VirtualWire,
     port: usize,
 }
 
-impl<'a> Port<'a> {
-    pub(super) fn new(wire: &'a mut VirtualWire, port: usize) -> Self {
-        assert!(port < wire.stations.len(), "port {port} of a wire with {}", wire.stations.len());
-        Self { wire, port }
+impl VirtualWire {
+    /// One port, to be used as a [`Bus`].
+    ///
+    /// # Panics
+    /// As all methods that take a port: if no port has that index.
+    pub fn port(&mut self, port: usize) -> Port<'_> {
+        let ports = self.nodes.stations.len();
+        assert!(port < ports, "port {port} of a wire with {ports}");
+        Port { wire: self, port }
     }
 }
 

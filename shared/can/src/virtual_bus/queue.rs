@@ -2,17 +2,16 @@
 
 use std::collections::VecDeque;
 
-use super::WireConfig;
-use crate::bus::{ReceiveError, Received, SendError};
+use super::config::WireConfig;
+use crate::bus::{ReceiveError, SendError};
 use crate::frame::Frame;
-use crate::tap::Tapped;
 use crate::wire::{Rates, frame_bits};
 
 /// A frame waiting for the wire.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Queued {
     pub(super) frame: Frame,
-    /// Its duration on the wire, interframe space included, found once: arbitration asks for it again and again.
+    /// Its duration on the wire, interframe space included, computed once, since arbitration needs it many times.
     pub(super) duration_ns: u64,
     pub(super) since_ns: u64,
 }
@@ -22,7 +21,7 @@ impl Queued {
         Self { frame, duration_ns: rates.duration_ns(frame_bits(&frame)), since_ns }
     }
 
-    /// What a fault makes a node send; since when changes with each attempt.
+    /// A frame that a fault makes a node babble.
     pub(super) fn babbled(frame: Frame, config: &WireConfig) -> Self {
         Self::new(frame.promoted(config.format), config.rates, 0)
     }
@@ -63,14 +62,14 @@ impl TransmitQueue {
         self.frames.iter().find(|queued| queued.since_ns <= at_ns)
     }
 
-    /// Takes it out.
+    /// Removes that frame.
     pub(super) fn remove_most_urgent(&mut self, at_ns: u64) {
         if let Some(place) = self.frames.iter().position(|queued| queued.since_ns <= at_ns) {
             self.frames.remove(place);
         }
     }
 
-    /// Forgets everything; how many frames that were.
+    /// Discards all frames; returns their number.
     pub(super) fn clear(&mut self) -> u64 {
         let abandoned = self.frames.len() as u64;
         self.frames.clear();
@@ -78,53 +77,37 @@ impl TransmitQueue {
     }
 }
 
-/// Something with the time of its arrival.
-pub(super) trait Timed {
-    fn time_ns(&self) -> u64;
-}
-
-impl Timed for Received {
-    fn time_ns(&self) -> u64 {
-        self.time_ns
-    }
-}
-
-impl Timed for Tapped {
-    fn time_ns(&self) -> u64 {
-        self.time_ns()
-    }
-}
-
-/// What has arrived and was not fetched yet, oldest first. What does not fit is lost and counted.
+/// Received items that are not fetched yet, oldest first. An item that does not fit is lost and counted.
 #[derive(Debug)]
 pub(super) struct ReceiveQueue<T> {
-    arrived: VecDeque<T>,
+    /// Items with their times of arrival, ns.
+    arrived: VecDeque<(u64, T)>,
     capacity: usize,
     lost: u64,
 }
 
-impl<T: Timed> ReceiveQueue<T> {
+impl<T> ReceiveQueue<T> {
     pub(super) fn new(capacity: usize) -> Self {
         Self { arrived: VecDeque::with_capacity(capacity), capacity, lost: 0 }
     }
 
-    pub(super) fn push(&mut self, item: T) {
+    pub(super) fn push(&mut self, time_ns: u64, item: T) {
         if self.arrived.is_empty() {
-            // Begins at its front again: what wanders through all of it finds every place cold.
+            // An empty queue starts at its front again: entries of a long queue would not be in the cache.
             self.arrived.clear();
         }
         if self.arrived.len() == self.capacity {
             self.lost += 1;
         } else {
-            self.arrived.push_back(item);
+            self.arrived.push_back((time_ns, item));
         }
     }
 
-    /// The oldest, if it had arrived by then; losses are reported first, once.
+    /// The oldest item, if it had arrived by then. Losses are reported first, once.
     pub(super) fn pop(&mut self, now_ns: u64) -> Result<Option<T>, ReceiveError> {
         match std::mem::take(&mut self.lost) {
-            0 if self.arrived.front().is_some_and(|oldest| oldest.time_ns() <= now_ns) => {
-                Ok(self.arrived.pop_front())
+            0 if self.arrived.front().is_some_and(|(time_ns, _)| *time_ns <= now_ns) => {
+                Ok(self.arrived.pop_front().map(|(_, item)| item))
             }
             0 => Ok(None),
             lost => Err(ReceiveError::Overrun { lost }),

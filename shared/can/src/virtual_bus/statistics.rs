@@ -1,4 +1,4 @@
-//! What a wire counted.
+//! Counters of a wire.
 
 /// Traffic and errors of a wire since it was made.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -17,13 +17,13 @@ pub struct Statistics {
     pub collisions: u64,
     /// Error frames.
     pub error_frames: u64,
-    /// Those of them that nobody's acknowledgement caused.
+    /// Error frames for want of an acknowledgement.
     pub unacknowledged: u64,
-    /// Frames that their transmitters had to repeat, each as often as it was repeated.
+    /// Repetitions of frames by their transmitters.
     pub retransmissions: u64,
     /// Controllers that went off the bus.
     pub bus_offs: u64,
-    /// Frames they forgot by that.
+    /// Frames that these controllers discarded.
     pub abandoned: u64,
 }
 

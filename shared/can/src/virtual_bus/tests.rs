@@ -3,8 +3,12 @@
 use proptest::prelude::*;
 
 use super::*;
+use crate::bus::{ReceiveError, Received, SendError};
 use crate::conformance::{self, End, Pair};
-use crate::wire::{Bitrate, INTERFRAME_BITS, frame_bits};
+use crate::error_frame::ErrorReport;
+use crate::frame::{Frame, FrameFormat};
+use crate::tap::Tapped;
+use crate::wire::{Bitrate, INTERFRAME_BITS, Rates, frame_bits};
 use crate::{Bus, CanId, canopen::sync};
 
 mod errors;
@@ -183,7 +187,7 @@ impl Pair for TwoPorts {
     }
 
     fn format(&self) -> FrameFormat {
-        self.wire.config.format
+        self.wire.nodes.config.format
     }
 
     fn now_ns(&self) -> u64 {

@@ -1,15 +1,15 @@
-//! Bit rates, and how long bits take.
+//! Bit rates and durations of bits.
 
 /// A bit rate that CAN does not have.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum BitrateError {
-    /// Of classical frames, and of the arbitration of FD frames.
+    /// The bit rate of classical frames and of the arbitration of FD frames.
     #[error("bit rate {bps} bit/s is outside classical CAN (1 to 1000000 bit/s)")]
     Nominal {
         /// Bit rate asked for, bit/s.
         bps: u32,
     },
-    /// Of the data phase of FD frames.
+    /// The bit rate of the data phase of FD frames.
     #[error(
         "data bit rate {bps} bit/s: use at least the nominal bit rate ({nominal_bps} bit/s) and at most \
          8000000 bit/s"
@@ -31,8 +31,7 @@ pub struct Bitrate {
 impl Bitrate {
     /// The fastest of classical CAN, 1 Mbit/s.
     pub const MAX: Self = Self { bps: 1_000_000 };
-    /// Of no CAN: a bit a nanosecond. A frame takes a seventh of a microsecond, so that what a run takes is the
-    /// rig's own time.
+    /// One bit a nanosecond, which no CAN has. A frame takes about 0.14 µs, so the time of a run is that of the software.
     pub const IDEAL: Self = Self { bps: 1_000_000_000 };
     /// The fastest data phase that transceivers are made for (CiA 601-4), 8 Mbit/s.
     pub const MAX_DATA: Self = Self { bps: 8_000_000 };
@@ -64,12 +63,12 @@ pub struct Rates {
 }
 
 impl Rates {
-    /// Of a bus without bit-rate switch.
+    /// Rates of a bus without bit-rate switch.
     pub const fn classical(nominal: Bitrate) -> Self {
         Self { nominal, data: nominal }
     }
 
-    /// Of a bus whose data phases run at `data_bps`.
+    /// Rates of a bus whose data phases run at `data_bps`.
     ///
     /// # Errors
     /// [`BitrateError::Data`] below the nominal bit rate and above 8 Mbit/s.

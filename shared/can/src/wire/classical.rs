@@ -1,6 +1,6 @@
 //! Lengths of classical frames (ISO 11898-1).
 
-use super::INTERFRAME_BITS;
+use super::intervals::INTERFRAME_BITS;
 use super::stuffing::{bits_of, stuff_bits};
 use crate::frame::Frame;
 use crate::id::CanId;
@@ -10,9 +10,7 @@ const TRAILER_BITS: u32 = 1 + 2 + 7;
 const CRC_BITS: u32 = 15;
 const CRC_POLYNOMIAL: u16 = 0x4599;
 const CRC_MASK: u16 = (1 << CRC_BITS) - 1;
-/// As many as the longest content takes.
-const CONTENT_NIBBLES: usize = 26;
-static CRC_OF_NIBBLE: [[u16; 16]; CONTENT_NIBBLES] = crc_of_nibbles();
+static CRC_OF_BYTE: [u16; 256] = crc_of_bytes();
 const STANDARD_HEADER_BITS: u32 = 19;
 const EXTENDED_HEADER_BITS: u32 = 39;
 
@@ -70,38 +68,28 @@ fn header(id: CanId, length: u32) -> u64 {
     arbitration << 7 | u64::from(length)
 }
 
-/// CRC of a content. As it starts from zero, it is the sum of what each four bits alone would give, and zeros above
-/// the content do not matter.
+/// CRC of a content. The CRC starts from zero, so the zeros above the content do not change it.
 fn crc15(content: u128) -> u16 {
-    let nibbles = CRC_OF_NIBBLE.iter().enumerate();
-    nibbles.fold(0, |crc, (place, crc_of)| crc ^ crc_of[(content >> (4 * place)) as usize & 0xF])
+    content.to_be_bytes().into_iter().fold(0, |crc, byte| {
+        let index = (crc >> (CRC_BITS - 8)) as u8 ^ byte;
+        (crc << 8 & CRC_MASK) ^ CRC_OF_BYTE[usize::from(index)]
+    })
 }
 
-/// CRC of every value of four bits at every place, the lowest first.
-const fn crc_of_nibbles() -> [[u16; 16]; CONTENT_NIBBLES] {
-    let mut table = [[0; 16]; CONTENT_NIBBLES];
-    let mut value = 0;
-    while value < 16 {
-        let mut crc = (value as u16) << (CRC_BITS - 4);
-        let mut place = 0;
-        while place < CONTENT_NIBBLES {
-            crc = behind_four_zeros(crc);
-            table[place][value] = crc;
-            place += 1;
+const fn crc_of_bytes() -> [u16; 256] {
+    let mut table = [0; 256];
+    let mut byte = 0;
+    while byte < 256 {
+        let (mut crc, mut bit) = ((byte as u16) << (CRC_BITS - 8), 0);
+        while bit < 8 {
+            let carry = crc >> (CRC_BITS - 1) & 1;
+            crc = (crc << 1 & CRC_MASK) ^ (carry * CRC_POLYNOMIAL);
+            bit += 1;
         }
-        value += 1;
+        table[byte] = crc;
+        byte += 1;
     }
     table
-}
-
-const fn behind_four_zeros(mut crc: u16) -> u16 {
-    let mut bit = 0;
-    while bit < 4 {
-        let carry = crc >> (CRC_BITS - 1) & 1;
-        crc = (crc << 1 & CRC_MASK) ^ (carry * CRC_POLYNOMIAL);
-        bit += 1;
-    }
-    crc
 }
 
 #[cfg(test)]
@@ -136,7 +124,7 @@ mod tests {
     }
 
     #[test]
-    fn fields_lie_where_the_standard_draws_them() {
+    fn fields_are_at_the_positions_of_the_standard() {
         let drawn = |fields: [&str; 6]| {
             let bits = fields.concat();
             (u128::from_str_radix(&bits, 2).unwrap(), bits.len() as u32)

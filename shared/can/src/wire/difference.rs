@@ -1,6 +1,6 @@
-//! Where two frames of one identifier part on the wire, so that one of their transmitters notices.
+//! The first different bit of two frames with one identifier, where one of the transmitters detects an error.
 //!
-//! Frames whose data are equal have equal CRCs, so that content alone decides.
+//! Frames with equal data have equal CRCs, so the content alone decides.
 
 use super::stuffing::Stuffer;
 use super::{classical, fd};

@@ -5,8 +5,9 @@
 //! rate, which is how they are counted here. The CRC field has fixed stuff bits, so that its length
 //! depends on the data length alone, not on the CRC: the values of CRC-17 and CRC-21 are not computed.
 
+use super::bitrate::FrameBits;
+use super::intervals::{BEHIND_ACKNOWLEDGE_BITS, INTERFRAME_BITS};
 use super::stuffing::{Stuffer, bits_of};
-use super::{BEHIND_ACKNOWLEDGE_BITS, FrameBits, INTERFRAME_BITS};
 use crate::frame::{Frame, FrameFormat};
 use crate::id::CanId;
 

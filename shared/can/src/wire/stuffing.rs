@@ -12,26 +12,27 @@ pub(super) fn stuff_bits(sequence: u128, length: u32) -> u32 {
     let alternating = if begins_recessive { u128::MAX / 3 * 2 } else { u128::MAX / 3 };
     let content = sequence & u128::MAX >> (u128::BITS - length);
     let filled = alternating.unbounded_shl(length) | content;
-    let mut behind = Behind::of(Run::of_one(filled.leading_zeros() > 0), 0);
+    let mut run = Run::of_one_bit(filled.leading_zeros() > 0);
     let mut stuffed = 0;
     for byte in filled.to_be_bytes() {
-        behind = STEPS[usize::from(byte)].from(behind);
-        stuffed += behind.stuffed();
+        let (next, inserted) = STEPS[usize::from(run.0)][usize::from(byte)];
+        run = next;
+        stuffed += u32::from(inserted);
     }
     stuffed
 }
 
-/// Equal bits that the sequence ends with so far: one to four, as the fifth brings its stuff bit at once. Number
-/// of bits − 1, and 4 for recessive ones.
+/// The equal bits at the end of the sequence: one to four, since the fifth brings its stuff bit at once. The value is the
+/// number of bits − 1, plus 4 for recessive bits.
 #[derive(Debug, Clone, Copy)]
 struct Run(u8);
 
 impl Run {
-    const COUNT: u8 = 8;
+    const COUNT: usize = 8;
     const RECESSIVE: u8 = 4;
     const LONGEST: u8 = 3;
 
-    const fn of_one(recessive: bool) -> Self {
+    const fn of_one_bit(recessive: bool) -> Self {
         Self(if recessive { Self::RECESSIVE } else { 0 })
     }
 
@@ -39,18 +40,18 @@ impl Run {
         self.0 & Self::RECESSIVE != 0
     }
 
-    /// The run behind one more bit, and the stuff bits that it brings.
+    /// The run after one more bit, and the stuff bits inserted.
     const fn push(self, recessive: bool) -> (Self, u8) {
         if recessive != self.is_recessive() {
-            (Self::of_one(recessive), 0)
+            (Self::of_one_bit(recessive), 0)
         } else if self.0 & Self::LONGEST == Self::LONGEST {
-            (Self::of_one(!recessive), 1)
+            (Self::of_one_bit(!recessive), 1)
         } else {
             (Self(self.0 + 1), 0)
         }
     }
 
-    /// The same of eight bits.
+    /// The run after eight more bits, and the stuff bits inserted.
     const fn push_byte(self, byte: u8) -> (Self, u8) {
         let (mut run, mut total, mut bit) = (self, 0, 8);
         while bit > 0 {
@@ -63,49 +64,17 @@ impl Run {
     }
 }
 
-/// The run behind a byte, times 8, and from bit 6 on the stuff bits that the byte brought, at most two. What stands above
-/// bit 7 means nothing.
-#[derive(Debug, Clone, Copy)]
-struct Behind(u64);
-
-impl Behind {
-    const fn of(run: Run, stuffed: u8) -> Self {
-        Self((run.0 << 3 | stuffed << 6) as u64)
-    }
-
-    const fn stuffed(self) -> u32 {
-        (self.0 >> 6 & 0b11) as u32
-    }
-}
-
-/// What a byte leads to: from run `n`, what stands from bit 8 `n` on. So a step waits only for a shift by what the step
-/// before gave, not for memory.
-#[derive(Debug, Clone, Copy)]
-struct Step(u64);
-
-impl Step {
-    const fn from(self, before: Behind) -> Behind {
-        Behind(self.0.wrapping_shr(before.0 as u32))
-    }
-
-    const fn of(byte: u8) -> Self {
-        let mut step = 0;
-        let mut run = 0;
-        while run < Run::COUNT {
-            let (next, stuffed) = Run(run).push_byte(byte);
-            step |= Behind::of(next, stuffed).0 << (8 * run);
-            run += 1;
+/// For every run and every byte that follows it: the run at the end of the byte, and the stuff bits inserted.
+static STEPS: [[(Run, u8); 256]; Run::COUNT] = {
+    let mut steps = [[(Run(0), 0); 256]; Run::COUNT];
+    let mut run = 0;
+    while run < Run::COUNT {
+        let mut byte = 0;
+        while byte < 256 {
+            steps[run][byte] = Run(run as u8).push_byte(byte as u8);
+            byte += 1;
         }
-        Self(step)
-    }
-}
-
-static STEPS: [Step; 256] = {
-    let mut steps = [Step(0); 256];
-    let mut byte = 0;
-    while byte < 256 {
-        steps[byte] = Step::of(byte as u8);
-        byte += 1;
+        run += 1;
     }
     steps
 };

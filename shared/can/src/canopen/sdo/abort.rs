@@ -1,9 +1,9 @@
-//! Why a transfer was aborted (CiA 301, table 22).
+//! Abort codes of SDO transfers (CiA 301, table 22).
 
 use std::fmt;
 
-/// Abort code. Any number is one; those that the standard defines have names and meanings.
-#[derive(Clone, Copy, PartialEq, Eq, Hash)]
+/// Abort code. Every number is a valid code; the codes of the standard have names and meanings.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct AbortCode(pub u32);
 
 macro_rules! abort_codes {
@@ -11,7 +11,7 @@ macro_rules! abort_codes {
         impl AbortCode {
             $(#[doc = concat!("The ", $meaning, ".")] pub const $name: Self = Self($code);)*
 
-            /// What the standard says it means; `None` for a code of a manufacturer.
+            /// The meaning in the standard; `None` for a code of a manufacturer.
             pub const fn meaning(self) -> Option<&'static str> {
                 match self.0 {
                     $($code => Some($meaning),)*
@@ -57,11 +57,5 @@ impl fmt::Display for AbortCode {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{:08X}h", self.0)?;
         self.meaning().map_or(Ok(()), |meaning| write!(f, " ({meaning})"))
-    }
-}
-
-impl fmt::Debug for AbortCode {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "AbortCode({self})")
     }
 }

@@ -1,6 +1,11 @@
-//! What a single SDO message can carry of an object's value.
+//! The part of an object's value that a single SDO message carries.
 
-use super::{EXPEDITED, SIZED};
+/// Bytes of every SDO message.
+pub(super) const LENGTH: usize = 8;
+/// "Size indicated", in initiate messages.
+pub(super) const SIZED: u8 = 1 << 0;
+/// "Expedited transfer", in initiate messages.
+pub(super) const EXPEDITED: u8 = 1 << 1;
 
 /// Data that one SDO message cannot carry.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
@@ -8,15 +13,16 @@ use super::{EXPEDITED, SIZED};
 pub struct SdoPayloadError {
     /// Kind of message.
     pub message: &'static str,
-    /// Bytes asked for.
+    /// Bytes given.
     pub length: usize,
-    /// Bytes it carries at least.
+    /// The fewest bytes the message carries.
     pub least: usize,
-    /// Bytes it carries at most.
+    /// The most bytes the message carries.
     pub most: usize,
 }
 
-/// The value in an expedited message: 1 to 4 bytes, or 4 of which the receiver must know how many count.
+/// The value in an expedited message: 1 to 4 bytes. Without a size in the message there are 4 bytes, and the receiver
+/// must know how many of them are the value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Expedited {
     /// Bytes beyond `length` are zero.
@@ -26,7 +32,7 @@ pub struct Expedited {
 }
 
 impl Expedited {
-    /// Bytes it carries at most.
+    /// The most bytes the message carries.
     pub const MAX: usize = 4;
 
     /// A value of that many bytes.
@@ -44,22 +50,22 @@ impl Expedited {
         Ok(Self { bytes, length: data.len() as u8, is_sized: true })
     }
 
-    /// Four bytes without saying how many of them are the value.
+    /// Four bytes without a size.
     pub const fn of_unknown_size(bytes: [u8; Self::MAX]) -> Self {
         Self { bytes, length: Self::MAX as u8, is_sized: false }
     }
 
-    /// The bytes; all four where the message does not tell the size.
+    /// The bytes; all four when the message has no size.
     pub fn data(&self) -> &[u8] {
         &self.bytes[..usize::from(self.length)]
     }
 
-    /// Whether the message tells the size.
+    /// Whether the message has a size.
     pub const fn is_sized(&self) -> bool {
         self.is_sized
     }
 
-    pub(super) fn of_flags(flags: u8, bytes: [u8; Self::MAX]) -> Self {
+    pub(super) fn from_flags(flags: u8, bytes: [u8; Self::MAX]) -> Self {
         if flags & SIZED == 0 {
             return Self::of_unknown_size(bytes);
         }
@@ -86,7 +92,7 @@ pub struct Segment {
 }
 
 impl Segment {
-    /// Bytes it carries at most.
+    /// The most bytes the message carries.
     pub const MAX: usize = 7;
 
     /// A segment of that data.
@@ -105,7 +111,7 @@ impl Segment {
         &self.bytes[..usize::from(self.length)]
     }
 
-    pub(super) fn of_message([command, bytes @ ..]: [u8; super::LENGTH]) -> Self {
+    pub(super) fn from_message([command, bytes @ ..]: [u8; LENGTH]) -> Self {
         let unused = usize::from(command >> 1 & 0b111);
         Self::new(&bytes[..Self::MAX - unused]).expect("three bits leave 0 to 7 bytes")
     }

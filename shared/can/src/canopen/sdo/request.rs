@@ -1,9 +1,9 @@
-//! What an SDO client sends.
+//! Requests of an SDO client.
 
-use super::{
-    ABORT, AbortCode, Expedited, Initiate, LAST, LENGTH, ObjectAddress, SdoError, Segment, TOGGLE, initiate,
-    segment, size_field, specifier,
-};
+use super::abort::AbortCode;
+use super::message::{ABORT, Initiate, LAST, SdoError, TOGGLE, initiate, segment, size_field, specifier};
+use super::object::ObjectAddress;
+use super::payload::{Expedited, LENGTH, Segment};
 use crate::canopen::{Cob, NodeId, exactly};
 use crate::frame::Frame;
 
@@ -13,6 +13,20 @@ const INITIATE_UPLOAD: u8 = 2;
 const UPLOAD_SEGMENT: u8 = 3;
 
 /// A request to the SDO server of a node.
+///
+/// # Examples
+/// Writes 1 to object 1400h:02h of node 5:
+///
+/// ```
+/// use masseter_can::canopen::{Expedited, NodeId, ObjectAddress, SdoRequest};
+///
+/// let object = ObjectAddress::new(0x1400, 2);
+/// let request = SdoRequest::Download { object, data: Expedited::new(&[1])? };
+/// let frame = request.frame(NodeId::new(5)?);
+/// assert_eq!(frame.to_string(), "605#2F00140201000000");
+/// assert_eq!(SdoRequest::decode(frame.data())?, request);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SdoRequest {
     /// Write an object of at most 4 bytes (2Xh).
@@ -26,7 +40,7 @@ pub enum SdoRequest {
     InitiateDownload {
         /// The object.
         object: ObjectAddress,
-        /// How many bytes will follow, if told.
+        /// Number of bytes that follow, if known.
         size: Option<u32>,
     },
     /// The next bytes to write (0Xh, 1Xh).
@@ -35,7 +49,7 @@ pub enum SdoRequest {
         toggle: bool,
         /// The bytes.
         data: Segment,
-        /// Whether none follow.
+        /// Whether this segment is the last.
         is_last: bool,
     },
     /// Read an object (40h).
@@ -48,17 +62,17 @@ pub enum SdoRequest {
         /// Alternates, beginning with `false`.
         toggle: bool,
     },
-    /// Give the transfer up (80h).
+    /// End the transfer with an error (80h).
     Abort {
         /// The transfer's object.
         object: ObjectAddress,
-        /// Why.
+        /// The reason.
         code: AbortCode,
     },
 }
 
 impl SdoRequest {
-    /// The frame that carries it to that node's server.
+    /// The frame that carries the request to that node's server.
     pub fn frame(self, node: NodeId) -> Frame {
         Frame::fixed(Cob::SdoRequest(node).into(), self.encode())
     }
@@ -88,12 +102,12 @@ impl SdoRequest {
     /// [`SdoError`] for another length than 8 or an unknown command specifier.
     pub fn decode(data: &[u8]) -> Result<Self, SdoError> {
         let bytes = exactly("SDO request", data)?;
-        let message = Initiate::of(bytes);
+        let message = Initiate::parse(bytes);
         let (object, toggle) = (message.object, message.command & TOGGLE != 0);
         match specifier(message.command) {
             DOWNLOAD_SEGMENT => {
                 let is_last = message.command & LAST != 0;
-                Ok(Self::DownloadSegment { toggle, data: Segment::of_message(bytes), is_last })
+                Ok(Self::DownloadSegment { toggle, data: Segment::from_message(bytes), is_last })
             }
             INITIATE_DOWNLOAD if message.is_expedited() => {
                 Ok(Self::Download { object, data: message.expedited() })

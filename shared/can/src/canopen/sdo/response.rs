@@ -1,9 +1,9 @@
-//! What an SDO server answers.
+//! Responses of an SDO server.
 
-use super::{
-    ABORT, AbortCode, Expedited, Initiate, LAST, LENGTH, ObjectAddress, SdoError, Segment, TOGGLE, initiate,
-    segment, size_field, specifier,
-};
+use super::abort::AbortCode;
+use super::message::{ABORT, Initiate, LAST, SdoError, TOGGLE, initiate, segment, size_field, specifier};
+use super::object::ObjectAddress;
+use super::payload::{Expedited, LENGTH, Segment};
 use crate::canopen::{Cob, NodeId, exactly};
 use crate::frame::Frame;
 
@@ -36,7 +36,7 @@ pub enum SdoResponse {
     InitiateUpload {
         /// The object.
         object: ObjectAddress,
-        /// How many bytes it has, if told.
+        /// Number of bytes that follow, if known.
         size: Option<u32>,
     },
     /// The next bytes (0Xh, 1Xh).
@@ -45,20 +45,20 @@ pub enum SdoResponse {
         toggle: bool,
         /// The bytes.
         data: Segment,
-        /// Whether none follow.
+        /// Whether this segment is the last.
         is_last: bool,
     },
     /// The transfer failed (80h).
     Abort {
         /// The transfer's object.
         object: ObjectAddress,
-        /// Why.
+        /// The reason.
         code: AbortCode,
     },
 }
 
 impl SdoResponse {
-    /// The frame in which that node's server sends it.
+    /// The frame in which that node's server sends the response.
     pub fn frame(self, node: NodeId) -> Frame {
         Frame::fixed(Cob::SdoResponse(node).into(), self.encode())
     }
@@ -86,12 +86,12 @@ impl SdoResponse {
     /// [`SdoError`] for another length than 8 or an unknown command specifier.
     pub fn decode(data: &[u8]) -> Result<Self, SdoError> {
         let bytes = exactly("SDO response", data)?;
-        let message = Initiate::of(bytes);
+        let message = Initiate::parse(bytes);
         let (object, toggle) = (message.object, message.command & TOGGLE != 0);
         match specifier(message.command) {
             UPLOAD_SEGMENT => {
                 let is_last = message.command & LAST != 0;
-                Ok(Self::UploadSegment { toggle, data: Segment::of_message(bytes), is_last })
+                Ok(Self::UploadSegment { toggle, data: Segment::from_message(bytes), is_last })
             }
             DOWNLOAD_SEGMENT => Ok(Self::DownloadSegment { toggle }),
             INITIATE_UPLOAD if message.is_expedited() => {

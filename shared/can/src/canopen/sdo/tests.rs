@@ -3,6 +3,7 @@
 use proptest::prelude::*;
 
 use super::super::NodeId;
+use super::payload::LENGTH;
 use super::*;
 
 const HEARTBEAT: ObjectAddress = ObjectAddress::new(0x1017, 0);
@@ -89,7 +90,7 @@ fn block_transfer_is_refused_with_its_object() {
 }
 
 #[test]
-fn abort_codes_say_what_they_mean() {
+fn abort_codes_display_their_meaning() {
     assert_eq!(AbortCode::NO_SUBINDEX.to_string(), "06090011h (sub-index does not exist)");
     assert_eq!(AbortCode(0x0F00_FFC0).to_string(), "0F00FFC0h");
 }

@@ -1,7 +1,9 @@
 //! Errors without injected faults: missing acknowledgement, one identifier sent twice, bus-off.
 
+use super::super::queue::Queued;
 use super::*;
 use crate::ErrorKind;
+use crate::bus::{BusStatus, ErrorState};
 
 fn with(change: impl FnOnce(&mut WireConfig)) -> VirtualWire {
     let mut config = CONFIG;
@@ -49,7 +51,7 @@ fn an_unacknowledged_frame_takes_its_bits_to_the_slot_an_error_frame_and_a_passi
 }
 
 #[test]
-fn an_error_is_told_with_the_counter_behind_it_and_before_the_state_it_brings() {
+fn an_error_is_reported_with_the_counter_after_it_and_before_the_change_of_state() {
     let mut wire = alone();
     wire.send(0, 0, sync::frame()).unwrap();
     wire.advance(3_000_000);
@@ -62,7 +64,7 @@ fn an_error_is_told_with_the_counter_behind_it_and_before_the_state_it_brings() 
 #[test]
 fn who_joins_a_lone_node_hears_it_at_once() {
     let mut wire = with(|config| config.ports = 2);
-    wire.stations[1].confinement.leave_bus(0, Some(5_000_000));
+    wire.nodes.stations[1].confinement.leave_bus(0, Some(5_000_000));
     wire.send(0, 0, sync::frame()).unwrap();
     wire.advance(100_000_000);
     assert_eq!(fetch(&mut wire, 1).len(), 1);
@@ -98,10 +100,10 @@ fn two_frames_of_one_identifier_destroy_each_other_until_their_senders_are_passi
 }
 
 #[test]
-fn off_the_bus_nothing_is_sent_or_heard_until_it_is_restarted_and_has_waited() {
+fn a_node_in_bus_off_sends_and_receives_nothing_until_its_restart_and_the_wait_after_it() {
     let mut wire = wire();
     wire.send(0, 0, frame(0x700, &[])).unwrap();
-    wire.stations[0]
+    wire.nodes.stations[0]
         .transmit
         .push(Queued { frame: sync::frame(), duration_ns: 51_000, since_ns: 9_000_000 })
         .unwrap();
@@ -112,7 +114,7 @@ fn off_the_bus_nothing_is_sent_or_heard_until_it_is_restarted_and_has_waited() {
     wire.advance(10_000_000);
     assert_eq!(fetch(&mut wire, 0), []);
     assert_eq!(fetch(&mut wire, 2).len(), 1);
-    assert_eq!(wire.status(0).state, ErrorState::BusOff, "nobody restarted it");
+    assert_eq!(wire.status(0).state, ErrorState::BusOff, "without a restart");
     wire.restart(0, 10_000_000);
     wire.advance(10_000_000 + 128 * 11 * BIT_NS - 1);
     assert_eq!(wire.status(0).state, ErrorState::BusOff);

@@ -2,7 +2,8 @@
 
 use super::*;
 use crate::ErrorKind;
-use crate::faults::{Fault, FaultKind};
+use crate::bus::ErrorState;
+use crate::faults::{Fault, FaultKind, Faults};
 
 const ANY: Fault = Fault {
     number: 0,
@@ -60,7 +61,7 @@ fn a_frame_that_is_always_corrupted_takes_its_sender_off_the_bus_alone() {
 }
 
 #[test]
-fn one_receiver_loses_a_frame_and_nobody_notices() {
+fn one_receiver_loses_a_frame_without_an_error_on_the_wire() {
     let mut wire = struck_by(Fault { kind: FaultKind::Lose, port: Some(2), ..ANY });
     wire.send(1, 0, sync::frame()).unwrap();
     wire.advance(FOREVER / 2);

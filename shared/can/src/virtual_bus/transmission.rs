@@ -1,15 +1,15 @@
-//! Who gets the wire next, and how the attempt will end.
+//! Arbitration: the next transmission and its outcome.
 //!
-//! Everything here is a function of the wire's present state, so that the next event can be foretold
-//! without changing anything.
+//! Everything here is a function of the present state of the nodes, so a caller can ask for the next event without
+//! changing the state.
 
 use std::cmp::Ordering;
 
+use super::nodes::Nodes;
 use super::queue::Queued;
-use super::{Traffic, VirtualWire};
 use crate::bus::ErrorState;
 use crate::error_frame::ErrorKind;
-use crate::faults::{NumberedFrame, Strike};
+use crate::faults::{FaultActivation, NumberedFrame};
 use crate::frame::Frame;
 use crate::id::CanId;
 use crate::wire::{BEHIND_ACKNOWLEDGE_BITS, INTERFRAME_BITS, first_difference, frame_bits};
@@ -49,69 +49,67 @@ impl PortSet {
     }
 }
 
-/// A frame on the wire. It stays where it is until the attempt has ended: to look ahead is not to copy it.
+/// A transmission of a frame. The frame itself stays in its queue until the transmission has ended, so looking ahead
+/// copies no frame.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Attempt {
-    /// The port whose frame it is: its most urgent one, or what a fault makes it babble.
+pub(super) struct Transmission {
+    /// The port of the frame, which is its most urgent frame or a babbled one.
     port: usize,
-    /// That fault.
+    /// The fault that babbles the frame.
     babble: Option<usize>,
     pub(super) queued_ns: u64,
     pub(super) start_ns: u64,
     /// When the last end-of-frame bit is, or would have been, over.
     pub(super) received_ns: u64,
-    /// When that is over, or the delimiter of the error frame.
+    /// End of the frame, or of the delimiter of the error frame, ns.
     pub(super) end_ns: u64,
     /// When the next frame may start.
     pub(super) idle_from_ns: u64,
-    /// Who sends it: all that have the same frame to send.
+    /// The senders: all ports with the same frame.
     pub(super) senders: PortSet,
-    /// Those of them that babble.
+    /// The senders that babble.
     pub(super) babbling: PortSet,
-    /// Who sent another frame of its identifier, and noticed.
+    /// Ports that sent another frame with the same identifier and detected the difference.
     pub(super) losers: PortSet,
-    pub(super) ending: Ending,
-    pub(super) strike: Option<Strike>,
+    pub(super) outcome: Outcome,
+    pub(super) activation: Option<FaultActivation>,
 }
 
-/// How an attempt ends.
+/// How a transmission ends.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Ending {
-    /// All receive the frame.
+pub(super) enum Outcome {
+    /// All nodes receive the frame.
     Received,
-    /// All receive it, and its transmitter repeats it.
+    /// All nodes receive the frame, and the transmitter repeats it.
     ReceivedAndRepeated,
-    /// An error frame ends it.
+    /// An error frame ends the transmission.
     Destroyed(ErrorKind),
 }
 
-/// What a port would send.
+/// The frame that a port would send.
 #[derive(Clone, Copy)]
-struct Offer<'a> {
+struct Candidate<'a> {
     port: usize,
     queued: &'a Queued,
-    babbles: Option<Strike>,
+    babbles: Option<FaultActivation>,
 }
 
-impl Offer<'_> {
+impl Candidate<'_> {
     fn id(&self) -> CanId {
         self.queued.frame.id()
     }
 }
 
-impl VirtualWire {
-    /// What comes next if nothing else is queued until then.
-    pub(super) fn foretell(&self) -> Traffic {
+impl Nodes {
+    /// The next transmission if no other frame is queued until then.
+    pub(super) fn next_transmission(&self) -> Option<Transmission> {
         let contenders = self.contenders();
-        // As soon as the bus is idle and somebody has something to send.
-        let start_ns = contenders.ports().filter_map(|port| self.ready_ns(port)).min();
-        match start_ns.and_then(|start_ns| self.attempt(contenders, start_ns)) {
-            Some(attempt) => Traffic::Coming { attempt, is_on_wire: false },
-            None => Traffic::Nothing,
-        }
+        // As soon as the bus is idle and a node has something to send.
+        let start_ns = contenders.ports().filter_map(|port| self.ready_ns(port)).min()?;
+        self.transmission(contenders, start_ns)
     }
 
-    /// Who may have something to send, now or later.
+    /// The ports that may have a frame to send, now or later.
     fn contenders(&self) -> PortSet {
         let mut contenders = PortSet::default();
         for (port, station) in self.stations.iter().enumerate() {
@@ -137,20 +135,24 @@ impl VirtualWire {
         (at_ns < u64::MAX).then_some(at_ns)
     }
 
-    /// The attempt that an arbitration at that time leads to; `None` where nobody can send then.
-    fn attempt(&self, contenders: PortSet, start_ns: u64) -> Option<Attempt> {
+    /// The transmission after an arbitration at that time; `None` when no node can send then.
+    fn transmission(&self, contenders: PortSet, start_ns: u64) -> Option<Transmission> {
         let (winner, is_contested) = self.arbitrate(contenders, start_ns)?;
         let (contest, strongest) = if is_contested {
             self.contest(contenders, start_ns, winner)
         } else {
-            (Contest::of(winner), winner)
+            (Contest::won_by(winner), winner)
         };
         let Queued { ref frame, duration_ns, since_ns } = *strongest.queued;
-        let numbered =
-            NumberedFrame { at_ns: start_ns, port: strongest.port, id: frame.id(), number: self.attempts };
-        let mut attempt = Attempt {
+        let numbered = NumberedFrame {
+            at_ns: start_ns,
             port: strongest.port,
-            babble: strongest.babbles.map(|strike| strike.place),
+            id: frame.id(),
+            number: self.transmissions,
+        };
+        let mut transmission = Transmission {
+            port: strongest.port,
+            babble: strongest.babbles.map(|activation| activation.place),
             queued_ns: if strongest.babbles.is_some() { start_ns } else { since_ns },
             start_ns,
             received_ns: start_ns + duration_ns - self.interframe_ns,
@@ -159,85 +161,94 @@ impl VirtualWire {
             senders: contest.senders,
             babbling: contest.babbling,
             losers: contest.losers,
-            ending: Ending::Received,
-            strike: strongest.babbles,
+            outcome: Outcome::Received,
+            activation: strongest.babbles,
         };
         if let Some(bit) = contest.destroyed_at {
-            attempt.destroy(self, frame, bit, ErrorKind::Bit);
-        } else if let Some(strike) = self.faults.corrupts(numbered) {
+            transmission.destroy(self, frame, bit, ErrorKind::Bit);
+        } else if let Some(activation) = self.faults.corrupts(numbered) {
             let last = frame_bits(frame).total() - INTERFRAME_BITS;
-            attempt.strike = Some(strike);
-            attempt.destroy(self, frame, 1 + self.faults.pick(strike, self.attempts, last), ErrorKind::Bit);
-        } else if !self.is_acknowledged(&attempt) {
+            transmission.activation = Some(activation);
+            transmission.destroy(
+                self,
+                frame,
+                1 + self.faults.pick(activation, self.transmissions, last),
+                ErrorKind::Bit,
+            );
+        } else if !self.is_acknowledged(&transmission) {
             let slot = frame_bits(frame).total() - INTERFRAME_BITS - BEHIND_ACKNOWLEDGE_BITS;
-            attempt.destroy(self, frame, slot, ErrorKind::Acknowledge);
-        } else if let Some(strike) = self.faults.duplicates(numbered) {
-            attempt.strike = Some(strike);
-            attempt.repeat(self);
+            transmission.destroy(self, frame, slot, ErrorKind::Acknowledge);
+        } else if let Some(activation) = self.faults.duplicates(numbered) {
+            transmission.activation = Some(activation);
+            transmission.repeat(self);
         }
-        Some(attempt)
+        Some(transmission)
     }
 
-    /// The frame of an attempt that has not ended.
-    pub(super) fn frame_of(&self, attempt: &Attempt) -> Frame {
-        let queued = match attempt.babble {
+    /// The frame of a transmission that has not ended.
+    pub(super) fn frame_of(&self, transmission: &Transmission) -> Frame {
+        let queued = match transmission.babble {
             Some(fault) => self.babble[fault].as_ref(),
-            None => self.stations[attempt.port].transmit.most_urgent(attempt.start_ns),
+            None => self.stations[transmission.port].transmit.most_urgent(transmission.start_ns),
         };
         queued.expect("a frame stays queued until it was sent").frame
     }
 
-    /// Whether a port takes part in what happens on the wire.
-    pub(super) fn is_on_bus(&self, port: usize, now_ns: u64) -> bool {
-        !self.stations[port].confinement.is_off() && !self.faults.is_disconnected(now_ns, port)
-    }
-
-    /// What each of those ports would send at that time.
-    fn offers(&self, contenders: PortSet, start_ns: u64) -> impl Iterator<Item = Offer<'_>> {
+    /// The frame that each of those ports would send at that time.
+    fn candidates(&self, contenders: PortSet, start_ns: u64) -> impl Iterator<Item = Candidate<'_>> {
         contenders.ports().filter_map(move |port| {
-            let offer = self.offer(port, start_ns)?;
+            let candidate = self.candidate(port, start_ns)?;
             let may = self.stations[port].suspended_until_ns <= start_ns && self.is_on_bus(port, start_ns);
-            may.then_some(offer)
+            may.then_some(candidate)
         })
     }
 
-    fn offer(&self, port: usize, start_ns: u64) -> Option<Offer<'_>> {
+    fn candidate(&self, port: usize, start_ns: u64) -> Option<Candidate<'_>> {
         let queued = self.stations[port].transmit.most_urgent(start_ns);
-        let queued = queued.map(|queued| Offer { port, queued, babbles: None });
+        let queued = queued.map(|queued| Candidate { port, queued, babbles: None });
         match self.babbled(port, start_ns) {
             Some(babbled) if queued.is_none_or(|queued| babbled.id() < queued.id()) => Some(babbled),
             _ => queued,
         }
     }
 
-    fn babbled(&self, port: usize, start_ns: u64) -> Option<Offer<'_>> {
-        let (strike, _) = self.faults.makes_babble(start_ns, port)?;
-        let queued = self.babble[strike.place].as_ref()?;
-        Some(Offer { port, queued, babbles: Some(strike) })
+    fn babbled(&self, port: usize, start_ns: u64) -> Option<Candidate<'_>> {
+        let (activation, _) = self.faults.makes_babble(start_ns, port)?;
+        let queued = self.babble[activation.place].as_ref()?;
+        Some(Candidate { port, queued, babbles: Some(activation) })
     }
 
-    /// Whether some port that does not send the frame hears it.
-    fn is_acknowledged(&self, attempt: &Attempt) -> bool {
-        (0..self.stations.len()).any(|port| !attempt.is_from(port) && self.is_on_bus(port, attempt.start_ns))
+    /// Whether a port that does not send the frame receives it.
+    fn is_acknowledged(&self, transmission: &Transmission) -> bool {
+        (0..self.stations.len())
+            .any(|port| !transmission.is_from(port) && self.is_on_bus(port, transmission.start_ns))
     }
 
-    /// The lowest port with the most urgent identifier of all, and whether another port offers that too.
-    fn arbitrate(&self, contenders: PortSet, start_ns: u64) -> Option<(Offer<'_>, bool)> {
-        let mut offers = self.offers(contenders, start_ns);
-        let first = (offers.next()?, false);
-        Some(offers.fold(first, |(winner, is_contested), offer| match offer.id().cmp(&winner.id()) {
-            Ordering::Less => (offer, false),
-            Ordering::Equal => (winner, true),
-            Ordering::Greater => (winner, is_contested),
-        }))
+    /// The lowest port with the most urgent identifier of all, and whether another port candidates that too.
+    fn arbitrate(&self, contenders: PortSet, start_ns: u64) -> Option<(Candidate<'_>, bool)> {
+        let mut candidates = self.candidates(contenders, start_ns);
+        let first = (candidates.next()?, false);
+        Some(candidates.fold(
+            first,
+            |(winner, is_contested), candidate| match candidate.id().cmp(&winner.id()) {
+                Ordering::Less => (candidate, false),
+                Ordering::Equal => (winner, true),
+                Ordering::Greater => (winner, is_contested),
+            },
+        ))
     }
 
-    /// Sorts out who sends the winning identifier too.
-    fn contest<'a>(&'a self, contenders: PortSet, start_ns: u64, winner: Offer<'a>) -> (Contest, Offer<'a>) {
-        let mut contest = Contest::of(winner);
+    /// Compares the frames of all ports that send the winning identifier.
+    fn contest<'a>(
+        &'a self,
+        contenders: PortSet,
+        start_ns: u64,
+        winner: Candidate<'a>,
+    ) -> (Contest, Candidate<'a>) {
+        let mut contest = Contest::won_by(winner);
         let mut strongest = winner;
-        let is_rival = |offer: &Offer| offer.port > winner.port && offer.id() == winner.id();
-        for rival in self.offers(contenders, start_ns).filter(is_rival) {
+        let is_rival = |candidate: &Candidate| candidate.port > winner.port && candidate.id() == winner.id();
+        for rival in self.candidates(contenders, start_ns).filter(is_rival) {
             let difference = first_difference(&strongest.queued.frame, &rival.queued.frame);
             let Some(difference) = difference else {
                 contest.admit(rival);
@@ -272,22 +283,22 @@ struct Contest {
 }
 
 impl Contest {
-    fn of(offer: Offer<'_>) -> Self {
+    fn won_by(candidate: Candidate<'_>) -> Self {
         let mut contest = Self::default();
-        contest.admit(offer);
+        contest.admit(candidate);
         contest
     }
 
-    fn admit(&mut self, offer: Offer<'_>) {
-        self.senders.add(offer.port);
-        if offer.babbles.is_some() {
-            self.babbling.add(offer.port);
+    fn admit(&mut self, candidate: Candidate<'_>) {
+        self.senders.add(candidate.port);
+        if candidate.babbles.is_some() {
+            self.babbling.add(candidate.port);
         }
     }
 }
 
-impl Attempt {
-    /// Whether the port sent that identifier: who lost has signalled an error and hears no more of the frame.
+impl Transmission {
+    /// Whether the port sent that identifier. A loser has signalled an error and does not receive the frame.
     pub(super) fn is_from(&self, port: usize) -> bool {
         self.senders.contains(port) || self.losers.contains(port)
     }
@@ -298,27 +309,27 @@ impl Attempt {
     }
 
     /// An error flag begins behind bit number `bit` of the frame.
-    fn destroy(&mut self, wire: &VirtualWire, frame: &Frame, bit: u32, kind: ErrorKind) {
-        let is_echoed = (0..wire.stations.len()).any(|port| {
+    fn destroy(&mut self, nodes: &Nodes, frame: &Frame, bit: u32, kind: ErrorKind) {
+        let is_echoed = (0..nodes.stations.len()).any(|port| {
             !self.senders.contains(port)
-                && wire.is_on_bus(port, self.start_ns)
-                && wire.stations[port].confinement.state() == ErrorState::Active
+                && nodes.is_on_bus(port, self.start_ns)
+                && nodes.stations[port].confinement.state() == ErrorState::Active
         });
         let flag_bits = if is_echoed { 2 * ERROR_FLAG_BITS } else { ERROR_FLAG_BITS };
-        let rates = wire.config.rates;
+        let rates = nodes.config.rates;
         let error_ns = self.start_ns + rates.time_to_bit_ns(frame_bits(frame), bit);
-        self.end_in_error_frame(wire, error_ns, flag_bits);
-        self.ending = Ending::Destroyed(kind);
+        self.end_in_error_frame(nodes, error_ns, flag_bits);
+        self.outcome = Outcome::Destroyed(kind);
     }
 
     /// The transmitter alone signals an error in the last bit of the frame.
-    fn repeat(&mut self, wire: &VirtualWire) {
-        self.end_in_error_frame(wire, self.received_ns, LATE_FLAG_BITS);
-        self.ending = Ending::ReceivedAndRepeated;
+    fn repeat(&mut self, nodes: &Nodes) {
+        self.end_in_error_frame(nodes, self.received_ns, LATE_FLAG_BITS);
+        self.outcome = Outcome::ReceivedAndRepeated;
     }
 
-    fn end_in_error_frame(&mut self, wire: &VirtualWire, error_ns: u64, flag_bits: u32) {
-        let nominal = wire.config.rates.nominal();
+    fn end_in_error_frame(&mut self, nodes: &Nodes, error_ns: u64, flag_bits: u32) {
+        let nominal = nodes.config.rates.nominal();
         self.end_ns = error_ns + nominal.bits_to_ns(flag_bits + ERROR_DELIMITER_BITS);
         self.idle_from_ns = error_ns + nominal.bits_to_ns(flag_bits + ERROR_DELIMITER_BITS + INTERFRAME_BITS);
     }

@@ -1,26 +1,26 @@
-//! Whether the motion may go on: its next step is asked for once the drives have got the last one.
+//! Acknowledgement of commands: the motion makes its next step after the drives have received the last one.
 //!
-//! While either process stands still, the drives hold their last target. A motion that ran on meanwhile would ask for
-//! all it missed in one cycle.
+//! While either process stalls, the drives hold their last target. If the motion continued meanwhile, it would have to
+//! catch up in one cycle.
 
 /// Cycles until the reading that answers a command: the next one's, and either may be a cycle late.
 const LATEST_ANSWER_CYCLES: u64 = 2;
 
-/// The last step of the motion, and the last command known to have reached the drives; both by their cycle.
+/// The cycles of the last step of the motion and of the last acknowledged command.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Delivery {
+pub(crate) struct CommandAcknowledgement {
     step_cycle: u64,
     answered_cycle: u64,
 }
 
-impl Delivery {
-    /// A fresh reading answers this command.
+impl CommandAcknowledgement {
+    /// A fresh reading acknowledges this command.
     pub(crate) fn answer(&mut self, command_cycle: u64) {
         self.answered_cycle = command_cycle;
     }
 
-    /// Whether the motion makes a step in this cycle. One without an answer is waited for, not for ever: a motion that
-    /// waits repeats its last target, which will be answered.
+    /// Whether the motion makes a step in this cycle. Without an acknowledgement the motion waits and repeats its last
+    /// target until the drives acknowledge a later command.
     pub(crate) fn takes_step(&mut self, cycle: u64) -> bool {
         let is_answered = self.answered_cycle >= self.step_cycle;
         let is_under_way = cycle.saturating_sub(self.answered_cycle) <= LATEST_ANSWER_CYCLES;
@@ -38,12 +38,12 @@ mod tests {
 
     /// Cycles, each with the command answered in it, if any, and whether the motion makes a step.
     fn plays(cycles: &[(u64, Option<u64>, bool)]) {
-        let mut delivery = Delivery::default();
+        let mut acknowledgement = CommandAcknowledgement::default();
         for &(cycle, answered, steps) in cycles {
             if let Some(command_cycle) = answered {
-                delivery.answer(command_cycle);
+                acknowledgement.answer(command_cycle);
             }
-            assert_eq!(delivery.takes_step(cycle), steps, "cycle {cycle}");
+            assert_eq!(acknowledgement.takes_step(cycle), steps, "cycle {cycle}");
         }
     }
 

@@ -1,0 +1,272 @@
+//! The wire in virtual time: its public methods, and the order of its events.
+
+use super::config::WireConfig;
+use super::confinement::{Confinement, SEQUENCE_BITS};
+use super::nodes::{Nodes, Station};
+use super::queue::{Queued, ReceiveQueue};
+use super::statistics::Statistics;
+use super::transmission::{PortSet, Transmission};
+use crate::bus::{BusStatus, ErrorState, ReceiveError, Received, SendError};
+use crate::error_frame::{ErrorKind, ErrorReport};
+use crate::faults::{FaultActivation, FaultNote, Faults, NumberedFrame};
+use crate::frame::Frame;
+use crate::tap::Tapped;
+
+/// A simulated wire and the ports on it.
+#[derive(Debug)]
+pub struct VirtualWire {
+    pub(super) nodes: Nodes,
+    pub(super) tap: ReceiveQueue<Tapped>,
+    traffic: Traffic,
+    pub(super) advanced_to_ns: u64,
+    pub(super) statistics: Statistics,
+}
+
+/// The present or next transmission.
+#[derive(Debug)]
+enum Traffic {
+    /// The wire is idle, and the next transmission is not computed yet.
+    Unknown,
+    /// The wire is idle, and no node has a frame to send.
+    Nothing,
+    /// The transmission is on the wire, or will be; until then the wire is idle.
+    Coming { transmission: Transmission, is_on_wire: bool },
+}
+
+/// A node leaves the bus by a fault, or comes back.
+#[derive(Debug, Clone, Copy)]
+struct NodeChange {
+    at_ns: u64,
+    port: usize,
+    bus_off: Option<FaultActivation>,
+}
+
+impl VirtualWire {
+    /// An idle wire at time 0. Nothing is allocated after this.
+    pub fn new(config: &WireConfig) -> Self {
+        Self::with_faults(config, Faults::default())
+    }
+
+    /// An idle wire with these faults.
+    ///
+    /// # Panics
+    /// With more than 64 ports.
+    pub fn with_faults(config: &WireConfig, faults: Faults) -> Self {
+        assert!(config.ports <= PortSet::CAPACITY, "{} ports", config.ports);
+        Self {
+            nodes: Nodes::new(config, faults),
+            tap: ReceiveQueue::new(config.receive_capacity * config.ports),
+            traffic: Traffic::Unknown,
+            advanced_to_ns: 0,
+            statistics: Statistics::default(),
+        }
+    }
+
+    /// Queues a frame at a port.
+    ///
+    /// # Errors
+    /// [`SendError::QueueFull`], [`SendError::BusOff`] and [`SendError::NotFd`]; no other.
+    pub fn send(&mut self, port: usize, now_ns: u64, frame: Frame) -> Result<(), SendError> {
+        let status = self.nodes.stations[port].confinement.status();
+        if status.state == ErrorState::BusOff {
+            return Err(SendError::BusOff { tec: status.tec });
+        }
+        let frame = frame.promoted(self.nodes.config.format);
+        if frame.format().is_fd() && !self.nodes.config.format.is_fd() {
+            return Err(SendError::NotFd { length: frame.data().len() });
+        }
+        let number = self.statistics.queued;
+        let delay = self.nodes.faults.delays(NumberedFrame { at_ns: now_ns, port, id: frame.id(), number });
+        let queued_ns = now_ns.max(self.advanced_to_ns) + delay.map_or(0, |(_, by_ns)| by_ns);
+        self.nodes.stations[port].transmit.push(Queued::new(frame, self.nodes.config.rates, queued_ns))?;
+        if let Some((activation, _)) = delay {
+            self.nodes.faults.record(activation);
+        }
+        self.invalidate_traffic();
+        self.statistics.queued += 1;
+        Ok(())
+    }
+
+    /// The next frame that a port had received at `now_ns`.
+    ///
+    /// # Errors
+    /// [`ReceiveError::Overrun`] where frames were lost because the port's queue was full; no other.
+    pub fn receive(&mut self, port: usize, now_ns: u64) -> Result<Option<Received>, ReceiveError> {
+        self.nodes.stations[port].receive.pop(now_ns)
+    }
+
+    /// The next frame or error that was on the wire up to `now_ns`, of any port.
+    ///
+    /// # Errors
+    /// [`ReceiveError::Overrun`] where the tap missed frames because its queue was full; no other.
+    pub fn tap(&mut self, now_ns: u64) -> Result<Option<Tapped>, ReceiveError> {
+        self.tap.pop(now_ns)
+    }
+
+    /// The next note on the wire's faults up to `now_ns`.
+    pub fn next_note(&mut self, now_ns: u64) -> Option<FaultNote> {
+        self.nodes.faults.next_note(now_ns)
+    }
+
+    /// Fault confinement of a port.
+    pub fn status(&self, port: usize) -> BusStatus {
+        self.nodes.stations[port].confinement.status()
+    }
+
+    /// Restarts the controller of a port that is off the bus, as its host does; no effect on others.
+    pub fn restart(&mut self, port: usize, now_ns: u64) {
+        self.nodes.stations[port].confinement.restart(now_ns.max(self.advanced_to_ns));
+        self.invalidate_traffic();
+    }
+
+    /// When the frame on the wire, or the next one, will have ended if nothing else is queued until then,
+    /// ns; `None` when nothing is on the way.
+    pub fn next_event_ns(&mut self) -> Option<u64> {
+        self.update_traffic();
+        match &self.traffic {
+            Traffic::Coming { transmission, .. } => Some(transmission.end_ns),
+            Traffic::Nothing | Traffic::Unknown => None,
+        }
+    }
+
+    /// Lets time pass: all arbitrations before `until_ns` and all endings up to and including it, in the
+    /// order of time. A time already passed changes nothing.
+    pub fn advance(&mut self, until_ns: u64) {
+        while self.start_before(until_ns) && self.end_until(until_ns) {}
+        self.advanced_to_ns = self.advanced_to_ns.max(until_ns);
+    }
+
+    /// The counters up to the last frame that ended.
+    pub fn statistics(&self) -> &Statistics {
+        &self.statistics
+    }
+
+    /// Puts the next frame on the wire if it starts before `until_ns`; whether one is on it now. Until then
+    /// nodes come back from bus-off, or are sent there.
+    fn start_before(&mut self, until_ns: u64) -> bool {
+        if self.is_busy() {
+            return true;
+        }
+        // Behind a frame nothing can start yet, and what its receivers answer would have to be looked at again.
+        if self.nodes.idle_from_ns > until_ns {
+            return false;
+        }
+        loop {
+            self.update_traffic();
+            let idle_until_ns = match &self.traffic {
+                Traffic::Coming { transmission, .. } => transmission.start_ns.min(until_ns),
+                _ => until_ns,
+            };
+            if self.has_node_changes() {
+                let sequence_ns = self.nodes.config.rates.nominal().bits_to_ns(SEQUENCE_BITS);
+                let change = self.next_node_change(sequence_ns);
+                if let Some(change) = change.filter(|change| change.at_ns <= idle_until_ns) {
+                    self.apply(change);
+                    continue;
+                }
+                self.stay_idle_until(idle_until_ns, sequence_ns);
+            }
+            return match &mut self.traffic {
+                Traffic::Coming { transmission, is_on_wire } if transmission.start_ns < until_ns => {
+                    self.nodes.transmissions += 1;
+                    *is_on_wire = true;
+                    true
+                }
+                _ => false,
+            };
+        }
+    }
+
+    /// Computes the next transmission, unless it is known: callers ask far more often than the state changes.
+    #[inline]
+    fn update_traffic(&mut self) {
+        if let Traffic::Unknown = self.traffic {
+            let transmission = self.nodes.next_transmission();
+            self.traffic = transmission
+                .map_or(Traffic::Nothing, |transmission| Traffic::Coming { transmission, is_on_wire: false });
+        }
+    }
+
+    /// Discards the computed next transmission after a change. A transmission on the wire stays.
+    fn invalidate_traffic(&mut self) {
+        if !self.is_busy() {
+            self.traffic = Traffic::Unknown;
+        }
+    }
+
+    /// Ends the frame on the wire if its end is not after `until_ns`; whether it did.
+    fn end_until(&mut self, until_ns: u64) -> bool {
+        match self.traffic {
+            Traffic::Coming { transmission, is_on_wire: true } if transmission.end_ns <= until_ns => {
+                self.traffic = Traffic::Unknown;
+                self.end(&transmission);
+                true
+            }
+            _ => false,
+        }
+    }
+
+    fn is_busy(&self) -> bool {
+        matches!(self.traffic, Traffic::Coming { is_on_wire: true, .. })
+    }
+
+    /// Whether a node may leave the bus or come back while the wire is idle.
+    fn has_node_changes(&self) -> bool {
+        let is_off = |station: &Station| station.confinement.state() == ErrorState::BusOff;
+        !self.nodes.faults.is_empty() || self.nodes.stations.iter().any(is_off)
+    }
+
+    fn stay_idle_until(&mut self, until_ns: u64, sequence_ns: u64) {
+        for station in &mut self.nodes.stations {
+            station.confinement.saw_idle(until_ns, sequence_ns);
+        }
+        self.nodes.faults.begin_disconnections(until_ns);
+    }
+
+    /// The next change of a node while the wire stays idle.
+    fn next_node_change(&self, sequence_ns: u64) -> Option<NodeChange> {
+        let change = |port: usize, station: &Station| {
+            if let Some(at_ns) = station.confinement.back_at_ns(sequence_ns) {
+                return Some(NodeChange { at_ns: at_ns.max(self.nodes.idle_from_ns), port, bus_off: None });
+            }
+            if station.confinement.state() == ErrorState::BusOff {
+                return None;
+            }
+            let activation =
+                self.nodes.faults.next_bus_off(station.on_bus_from_ns.max(self.nodes.idle_from_ns), port)?;
+            Some(NodeChange { at_ns: activation.at_ns, port, bus_off: Some(activation) })
+        };
+        let changes =
+            self.nodes.stations.iter().enumerate().filter_map(|(port, station)| change(port, station));
+        changes.min_by_key(|change| change.at_ns)
+    }
+
+    fn apply(&mut self, NodeChange { at_ns, port, bus_off }: NodeChange) {
+        if let Some(activation) = bus_off {
+            self.nodes.faults.record(activation);
+            let restart_after_ns = self.nodes.config.restart_after_ns;
+            self.confine(port, at_ns, |node| node.leave_bus(at_ns, restart_after_ns));
+        } else {
+            self.nodes.stations[port].on_bus_from_ns = at_ns;
+            self.confine(port, at_ns, Confinement::come_back);
+        }
+        self.invalidate_traffic();
+    }
+
+    /// Changes a port's fault confinement. The tap gets a change of state, and a port that leaves the bus discards its queue.
+    pub(super) fn confine(&mut self, port: usize, now_ns: u64, change: impl FnOnce(&mut Confinement)) {
+        let station = &mut self.nodes.stations[port];
+        let before = station.confinement.state();
+        change(&mut station.confinement);
+        let status = station.confinement.status();
+        if status.state == before {
+            return;
+        }
+        let kind = ErrorKind::State(status.state);
+        self.tap.push(now_ns, Tapped::Error(ErrorReport::new(now_ns, port as u8, kind, status)));
+        if status.state == ErrorState::BusOff {
+            self.statistics.bus_offs += 1;
+            self.statistics.abandoned += station.transmit.clear();
+        }
+    }
+}
