@@ -6,7 +6,7 @@ use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 use std::hint::black_box;
 
-use masseter_controller::kinematics::{ForwardTracker, Options, Solutions, solve_newton, solve_published};
+use masseter_controller::kinematics::{ForwardTracker, Method, Options, Solutions, solve};
 use masseter_controller::motion_controller::MotionController;
 use masseter_controller::trajectory::Trajectory;
 use masseter_shared::config::Scenario;
@@ -93,8 +93,8 @@ fn no_path_of_the_forward_kinematics_allocates() {
         assert!(black_box(guessing.update(&nearby)).is_ok());
         assert!(black_box(tracker.update(&unassemblable)).is_err());
         assert_eq!(Solutions::new(&mechanism, &neutral).map(|all| all.count()), Ok(16));
-        assert!(black_box(solve_published(&mechanism, &nearby, &[1.4; LEGS], &options)).is_ok());
-        assert!(black_box(solve_newton(&mechanism, &nearby, &[1.4; LEGS], &options)).is_ok());
+        assert!(black_box(solve(Method::Published, &mechanism, &nearby, &[1.4; LEGS], &options)).is_ok());
+        assert!(black_box(solve(Method::Newton, &mechanism, &nearby, &[1.4; LEGS], &options)).is_ok());
     });
     assert_eq!(solving, 0);
     assert!(allocations_of(|| drop(black_box(vec![1u8]))) > 0, "the counter counts");

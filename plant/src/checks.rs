@@ -26,7 +26,7 @@ fn check_counts(scenario: &Scenario) -> Result<(), PlantError> {
     match too_fine.into_iter().find(|(_, increment_m, end_m)| end_m / increment_m > f64::from(i32::MAX)) {
         Some((key, value, _)) => {
             let need = "use more: the end of the stroke does not fit into 32 bits";
-            Err(PlantError::Quantity { key, value, need })
+            Err(PlantError::Scenario(format!("{key} = {value}: {need}")))
         }
         None => Ok(()),
     }
@@ -39,7 +39,7 @@ fn check_heartbeats(scenario: &Scenario) -> Result<(), PlantError> {
         return Ok(());
     }
     let need = "use more than can.heartbeat_producer_ms and a cycle (1000 / rate_hz) together";
-    Err(PlantError::Quantity { key: "can.heartbeat_consumer_ms", value: f64::from(timeout_ms), need })
+    Err(PlantError::Scenario(format!("can.heartbeat_consumer_ms = {timeout_ms}: {need}")))
 }
 
 /// The master sends its heartbeat with the first SYNC after the interval, whose end jitter may delay by a cycle.

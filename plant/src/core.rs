@@ -88,7 +88,11 @@ fn check_boot_time(scenario: &Scenario) -> Result<(), PlantError> {
     if controller.start_timeout_s > least_s {
         return Ok(());
     }
-    Err(PlantError::BootTime { start_timeout_s: controller.start_timeout_s, rate_hz: *rate_hz, least_s })
+    Err(PlantError::Scenario(format!(
+        "controller.start_timeout_s = {}: at {rate_hz} Hz the drives take {least_s:.1} s to boot, since a bus \
+         carries one SDO request a cycle; use more, or a higher rate_hz",
+        controller.start_timeout_s
+    )))
 }
 
 /// Refuses interfaces that cannot be used.

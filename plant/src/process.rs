@@ -4,24 +4,19 @@ use masseter_shared::clock;
 use masseter_shared::config::Scenario;
 use masseter_shared::lifecycle::{ProcessArguments, ProcessContext, ProcessError};
 use masseter_shared::messages::{Command, Event, FrameTap, Reading, Truth};
-use masseter_shared::realtime::{Cycle, Waiter, Wake};
+use masseter_shared::realtime::{Cycle, Wake};
 use masseter_shared::schedule::CycleSchedule;
 use masseter_shared::transport::{BatchPublisher, Node, Publisher, Received, Subscriber, TransportError};
 
 use crate::core::{PlantCore, PlantError};
 use crate::cycle::{PlantPorts, run_cycle};
-use crate::emulation::VirtualLink;
 use crate::link::Link;
-use crate::link::sockets::SocketLink;
 
 /// How long the drives may take to stop after the end has been asked for, ns.
 const STOP_WITHIN_NS: u64 = 500_000_000;
 /// Cycles that they may take at least: the word goes out in one, holds from the next, and is answered in the one after
 /// the ramp.
 const STOP_WITHIN_CYCLES: u64 = 10;
-/// How long a wait for a real frame may take at most, ns: a fault may hold frames back that are due before the next
-/// frame arrives.
-const LONGEST_BLOCK_NS: u64 = 100_000;
 /// Silence after which no command will come any more, beyond the one that stops the drives, ns.
 const ABANDONED_AFTER_NS: u64 = 5_000_000_000;
 
@@ -111,25 +106,6 @@ pub fn run(process_arguments: &ProcessArguments) -> Result<Reason, PlantProcessE
     }
 }
 
-/// A link whose events a process can wait for in real time.
-trait RealTimeLink: Link {
-    /// Waits until the link may have changed, but not beyond `latest_ns`; returns the time found at the end.
-    fn wait(&mut self, latest_ns: u64, waiter: &mut Waiter) -> u64;
-}
-
-impl RealTimeLink for VirtualLink {
-    fn wait(&mut self, latest_ns: u64, waiter: &mut Waiter) -> u64 {
-        waiter.until_between(self.next_event_ns().min(latest_ns), latest_ns)
-    }
-}
-
-impl RealTimeLink for SocketLink {
-    fn wait(&mut self, latest_ns: u64, waiter: &mut Waiter) -> u64 {
-        let until_ns = latest_ns.min(clock::now_ns() + LONGEST_BLOCK_NS);
-        waiter.until_woken(until_ns, latest_ns, |until_ns| self.wait_for_frame(until_ns))
-    }
-}
-
 /// Ports and deadlines of the plant's process.
 struct RealTime<'a> {
     ports: Ports,
@@ -139,7 +115,7 @@ struct RealTime<'a> {
     obeys: bool,
 }
 
-impl<L: RealTimeLink> PlantPorts<L> for RealTime<'_> {
+impl<L: Link> PlantPorts<L> for RealTime<'_> {
     type Command = Received<Command>;
     type Error = PlantProcessError;
 
@@ -180,7 +156,7 @@ impl<L: RealTimeLink> PlantPorts<L> for RealTime<'_> {
     }
 }
 
-fn serve<L: RealTimeLink>(
+fn serve<L: Link>(
     context: &ProcessContext,
     build: impl Fn(&Scenario, u64) -> Result<PlantCore<L>, PlantError>,
 ) -> Result<Reason, PlantProcessError> {

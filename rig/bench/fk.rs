@@ -6,7 +6,7 @@ use std::f64::consts::TAU;
 use std::hint::black_box;
 
 use masseter_controller::kinematics::{
-    ForwardError, ForwardTracker, Options, Solution, solve_completely, solve_newton, solve_published,
+    ForwardError, ForwardTracker, Method, Options, Solution, solve, solve_completely,
 };
 use masseter_shared::clock;
 use masseter_shared::geometry::{Actuators, LEGS, Mechanism, MechanismConfig, Pose};
@@ -34,10 +34,10 @@ pub(super) fn measure(rounds: u32, core: usize) -> anyhow::Result<Comparison> {
     let mechanism = &Mechanism::new(&MechanismConfig::default())?;
     let inputs = &*chewing(mechanism)?;
     let options = &Options::default();
-    let newton =
-        |input: &Actuators, guess_rad: &[f64; LEGS]| solve_newton(mechanism, input, guess_rad, options);
-    let published =
-        |input: &Actuators, guess_rad: &[f64; LEGS]| solve_published(mechanism, input, guess_rad, options);
+    let by = |method| {
+        move |input: &Actuators, guess_rad: &[f64; LEGS]| solve(method, mechanism, input, guess_rad, options)
+    };
+    let (newton, published) = (by(Method::Newton), by(Method::Published));
     let tracked = || {
         let mut tracker = ForwardTracker::new(mechanism.clone());
         each(inputs, |input| tracker.update(input))

@@ -9,21 +9,10 @@ use super::every;
 use super::table::{Columns, CsvArgs, Lines, convert, convert_in_turn, mechanism};
 use masseter_terminal::Exit;
 
-pub(super) const COLUMNS_IN: [&str; 6] = ["d1_m", "d2_m", "d3_m", "l1_m", "l2_m", "l3_m"];
-const COLUMNS_OUT: [&str; 12] = [
-    "x_m",
-    "y_m",
-    "z_m",
-    "qw",
-    "qx",
-    "qy",
-    "qz",
-    "theta1_rad",
-    "theta2_rad",
-    "theta3_rad",
-    "iterations",
-    "residual_m",
-];
+pub(super) const COLUMNS: Columns = Columns {
+    read: "d1_m,d2_m,d3_m,l1_m,l2_m,l3_m",
+    written: "x_m,y_m,z_m,qw,qx,qy,qz,theta1_rad,theta2_rad,theta3_rad,iterations,residual_m",
+};
 /// Where the paper's and Newton's iteration start without `--guess`: the paper's neutral pose.
 const NEUTRAL_RAD: [f64; LEGS] = [1.46; LEGS];
 
@@ -68,17 +57,16 @@ pub(crate) fn forward(args: &FkArgs) -> anyhow::Result<Exit> {
         return every::every_solution(&args.csv, &mechanism);
     }
     let strokes = *mechanism.strokes();
-    let columns = Columns { read: COLUMNS_IN, written: &COLUMNS_OUT };
     let fresh = Chosen::new(args, mechanism);
     if args.continuous {
         let mut solver = fresh;
-        return convert_in_turn(&args.csv, columns, |_, values, lines| {
+        return convert_in_turn(&args.csv, COLUMNS, |_, values, lines| {
             let actuators = Actuators::from_axes(values);
             write(&strokes, &actuators, solver.solve(&actuators), lines);
             Ok(())
         });
     }
-    convert(&args.csv, columns, |_, values, lines| {
+    convert(&args.csv, COLUMNS, |_, values, lines| {
         let actuators = Actuators::from_axes(values);
         write(&strokes, &actuators, fresh.clone().solve(&actuators), lines);
         Ok(())
@@ -128,18 +116,18 @@ fn write(
     solved: Result<Solution, ForwardError>,
     lines: &mut Lines,
 ) {
-    match (strokes.check(actuators), solved) {
-        (_, Err(error)) => lines.empty(COLUMNS_OUT.len(), error.reason()),
-        (_, Ok(solution)) if !solution.assembly.is_true() => lines.row(&row(&solution), "wrong_assembly"),
-        (Ok(()), Ok(solution)) => lines.row(&row(&solution), "ok"),
-        (Err(_), Ok(solution)) => lines.row(&row(&solution), "outside_stroke"),
-    }
-}
-
-fn row(solution: &Solution) -> [f64; 12] {
-    let ([x, y, z], [qw, qx, qy, qz]) = pose_fields(&solution.pose);
-    let [t1, t2, t3] = solution.theta_rad;
-    [x, y, z, qw, qx, qy, qz, t1, t2, t3, f64::from(solution.iterations), solution.residual_m]
+    let solution = match solved {
+        Ok(solution) => solution,
+        Err(error) => return lines.empty(COLUMNS, error.reason()),
+    };
+    let status = match strokes.check(actuators) {
+        _ if !solution.assembly.is_true() => "wrong_assembly",
+        Ok(()) => "ok",
+        Err(_) => "outside_stroke",
+    };
+    let (position_m, quaternion) = pose_fields(&solution.pose);
+    let values = position_m.into_iter().chain(quaternion).chain(solution.theta_rad);
+    lines.row(values.chain([f64::from(solution.iterations), solution.residual_m]), status);
 }
 
 fn parse_guess(text: &str) -> Result<[f64; 3], String> {

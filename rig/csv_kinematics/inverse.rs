@@ -10,16 +10,16 @@ use masseter_terminal::Exit;
 /// How far a quaternion's norm may be from 1.
 const UNIT_TOLERANCE: f64 = 1e-3;
 
-const COLUMNS_IN: [&str; 7] = ["x_m", "y_m", "z_m", "qw", "qx", "qy", "qz"];
-const COLUMNS_OUT: [&str; 9] =
-    ["d1_m", "d2_m", "d3_m", "l1_m", "l2_m", "l3_m", "theta1_rad", "theta2_rad", "theta3_rad"];
+const COLUMNS: Columns = Columns {
+    read: "x_m,y_m,z_m,qw,qx,qy,qz",
+    written: "d1_m,d2_m,d3_m,l1_m,l2_m,l3_m,theta1_rad,theta2_rad,theta3_rad",
+};
 
 /// Status `ok`; `outside_stroke`, or `wrong_assembly` where the mechanism cannot stand as it is built (the values are
 /// written all the same); or `singular` (a leg without length).
 pub(crate) fn inverse(args: &CsvArgs) -> anyhow::Result<Exit> {
     let mechanism = mechanism(args)?;
-    let columns = Columns { read: COLUMNS_IN, written: &COLUMNS_OUT };
-    convert(args, columns, |_, values, lines| {
+    convert(args, COLUMNS, |_, values, lines| {
         solve(&mechanism, &pose(values)?, lines);
         Ok(())
     })
@@ -46,12 +46,11 @@ fn status(mechanism: &Mechanism, joints: &Joints) -> &'static str {
 fn solve(mechanism: &Mechanism, pose: &Pose, lines: &mut Lines) {
     match mechanism.inverse(pose) {
         Ok(joints) => {
-            let [d1, d2, d3, l1, l2, l3] = joints.actuators.to_axes();
-            let [t1, t2, t3] = joints.theta_rad;
-            lines.row(&[d1, d2, d3, l1, l2, l3, t1, t2, t3], status(mechanism, &joints));
+            let values = joints.actuators.to_axes().into_iter().chain(joints.theta_rad);
+            lines.row(values, status(mechanism, &joints));
         }
         Err(InverseError::NoLength { .. } | InverseError::NotFinite) => {
-            lines.empty(COLUMNS_OUT.len(), "singular");
+            lines.empty(COLUMNS, "singular");
         }
     }
 }

@@ -12,9 +12,7 @@ use masseter_shared::geometry::Mechanism;
 use rayon::prelude::*;
 
 use super::input::{Input, Line};
-
-use masseter_terminal::taken;
-use masseter_terminal::{Exit, status};
+use masseter_terminal::{Exit, status, taken};
 
 /// Status of a line that could not be read.
 const BAD_LINE: &str = "bad_line";
@@ -34,11 +32,11 @@ pub(crate) struct CsvArgs {
     scenario: Option<PathBuf>,
 }
 
-/// The columns of a command, without the status that ends every output line.
+/// The header lines of a command, without the status that ends every output line.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Columns<'a, const IN: usize> {
-    pub read: [&'a str; IN],
-    pub written: &'a [&'a str],
+pub(super) struct Columns {
+    pub read: &'static str,
+    pub written: &'static str,
 }
 
 /// Solves one line's values and writes the output lines they lead to. Its error says what is wrong
@@ -55,7 +53,7 @@ pub(super) struct Lines {
 
 impl Lines {
     /// One line: its values, nothing for those that are no number, then its status.
-    pub(super) fn row(&mut self, values: &[f64], status: &str) {
+    pub(super) fn row(&mut self, values: impl IntoIterator<Item = f64>, status: &str) {
         for value in values {
             if !value.is_nan() {
                 // A vector takes all that is written to it.
@@ -63,18 +61,13 @@ impl Lines {
             }
             self.text.push(b',');
         }
-        self.end(status);
+        self.text.extend_from_slice(status.as_bytes());
+        self.text.push(b'\n');
     }
 
     /// A line without values.
-    pub(super) fn empty(&mut self, columns: usize, status: &str) {
-        self.text.resize(self.text.len() + columns, b',');
-        self.end(status);
-    }
-
-    fn end(&mut self, status: &str) {
-        self.text.extend_from_slice(status.as_bytes());
-        self.text.push(b'\n');
+    pub(super) fn empty(&mut self, columns: Columns, status: &str) {
+        self.row(columns.written.split(',').map(|_| f64::NAN), status);
     }
 }
 
@@ -87,62 +80,52 @@ pub(super) fn mechanism(args: &CsvArgs) -> anyhow::Result<Mechanism> {
 /// Passes every line through `solve`, on all cores. `solve` gets the line's number as well.
 pub(super) fn convert<const IN: usize>(
     args: &CsvArgs,
-    columns: Columns<'_, IN>,
+    columns: Columns,
     solve: impl Fn(u64, [f64; IN], &mut Lines) -> Solved + Sync,
 ) -> anyhow::Result<Exit> {
     stream(args, columns, |batch| {
-        let chunks = batch.par_chunks(CHUNK_LINES).map(|chunk| {
-            let mut lines = Lines::default();
-            for line in chunk {
-                solve_line(line, &columns, &mut lines, &solve);
-            }
-            lines
-        });
-        chunks.collect()
+        batch.par_chunks(CHUNK_LINES).map(|chunk| solve_lines(chunk, columns, &solve)).collect()
     })
 }
 
 /// Passes every line through `solve`, one after the other.
 pub(super) fn convert_in_turn<const IN: usize>(
     args: &CsvArgs,
-    columns: Columns<'_, IN>,
+    columns: Columns,
     mut solve: impl FnMut(u64, [f64; IN], &mut Lines) -> Solved,
 ) -> anyhow::Result<Exit> {
-    stream(args, columns, |batch| {
-        let mut lines = Lines::default();
-        for line in batch {
-            solve_line(line, &columns, &mut lines, &mut solve);
-        }
-        vec![lines]
-    })
+    stream(args, columns, |batch| vec![solve_lines(batch, columns, &mut solve)])
 }
 
-fn solve_line<const IN: usize>(
-    line: &Line,
-    columns: &Columns<'_, IN>,
-    lines: &mut Lines,
+fn solve_lines<const IN: usize>(
+    batch: &[Line],
+    columns: Columns,
     mut solve: impl FnMut(u64, [f64; IN], &mut Lines) -> Solved,
-) {
-    let values = line.text.as_deref().map_err(Clone::clone);
-    let values = values.and_then(|text| numbers(text, &columns.read));
-    if let Err(reason) = values.and_then(|values| solve(line.number, values, lines)) {
-        lines.empty(columns.written.len(), BAD_LINE);
-        lines.refusals.push((line.number, reason));
+) -> Lines {
+    let mut lines = Lines::default();
+    for line in batch {
+        let text = line.text.as_deref().map_err(Clone::clone);
+        let values = text.and_then(|text| numbers(text, columns.read));
+        if let Err(reason) = values.and_then(|values| solve(line.number, values, &mut lines)) {
+            lines.empty(columns, BAD_LINE);
+            lines.refusals.push((line.number, reason));
+        }
     }
+    lines
 }
 
-fn stream<const IN: usize>(
+fn stream(
     args: &CsvArgs,
-    columns: Columns<'_, IN>,
+    columns: Columns,
     mut solve: impl FnMut(&[Line]) -> Vec<Lines>,
 ) -> anyhow::Result<Exit> {
     let mut input = Input::open(args.input.as_deref())?;
-    check_columns(&mut input, &columns.read)?;
+    check_columns(&mut input, columns.read)?;
 
     let mut exit = Exit::Passed;
     let mut output = io::stdout().lock();
     let written = (|| -> io::Result<()> {
-        writeln!(output, "{},status", columns.written.join(","))?;
+        writeln!(output, "{},status", columns.written)?;
         loop {
             let batch: Vec<_> = input.by_ref().take(BATCH_LINES).collect();
             if batch.is_empty() {
@@ -161,18 +144,18 @@ fn stream<const IN: usize>(
     Ok(exit)
 }
 
-fn check_columns(input: &mut Input, expected: &[&str]) -> anyhow::Result<()> {
+fn check_columns(input: &mut Input, expected: &str) -> anyhow::Result<()> {
     let header = input.next().unwrap_or(Line { number: 1, text: Ok(String::new()) });
     let place = format!("{}:{}", input.name(), header.number);
     let text = header.text.map_err(|reason| anyhow!("{place}: {reason}"))?;
-    if fields(&text).eq(expected.iter().copied()) {
+    if fields(&text).eq(expected.split(',')) {
         return Ok(());
     }
     let found: Vec<_> = fields(&text).collect();
-    bail!("{place}: the columns are '{}', expected '{}'", found.join(","), expected.join(","))
+    bail!("{place}: the columns are '{}', expected '{expected}'", found.join(","))
 }
 
-fn numbers<const IN: usize>(line: &str, columns: &[&str; IN]) -> Result<[f64; IN], String> {
+fn numbers<const IN: usize>(line: &str, columns: &str) -> Result<[f64; IN], String> {
     if line.is_empty() {
         return Err("an empty line".to_owned());
     }
@@ -181,7 +164,7 @@ fn numbers<const IN: usize>(line: &str, columns: &[&str; IN]) -> Result<[f64; IN
         return Err(format!("{found} values, expected {IN}"));
     }
     let mut values = [0.0_f64; IN];
-    for ((value, text), column) in values.iter_mut().zip(fields(line)).zip(columns) {
+    for ((value, text), column) in values.iter_mut().zip(fields(line)).zip(columns.split(',')) {
         *value = text.parse().map_err(|_| format!("{column} is '{text}', not a number"))?;
         if !value.is_finite() {
             return Err(format!("{column} is {value}, not a finite number"));

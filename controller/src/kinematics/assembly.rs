@@ -7,8 +7,6 @@
 //! edge of the strokes about one standing input in 23,000 has two (see
 //! [`uniqueness`](super::uniqueness)), and nothing here relies on there being one.
 
-use std::fmt;
-
 use masseter_shared::geometry::{Actuators, LEGS, Mechanism, Vec3};
 use nalgebra::Vector3;
 
@@ -16,35 +14,26 @@ use super::Equations;
 use super::legs::each;
 
 /// What must hold for a true solution, in the order in which it is checked.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, thiserror::Error)]
 pub enum Condition {
     /// Corner Aᵢ lies above the base.
+    #[error("leg {} does not stand above the base", leg + 1)]
     LegAboveBase {
         /// Index of the leg, from 0.
         leg: usize,
     },
     /// The paper, condition 1: hinge Bᵢ lies on the negative side of the platform's plane.
+    #[error("hinge B{} is not below the plane of the platform (condition 1)", leg + 1)]
     HingeBelowPlatform {
         /// Index of the leg, from 0.
         leg: usize,
     },
     /// The paper, condition 2: A₂ lies beyond A₃ in the direction of slide 1.
+    #[error("A2 is not beyond A3 along slide 1 (condition 2)")]
     CornersInOrder,
     /// The determinant of the Jacobian is positive, as at the neutral pose.
+    #[error("the determinant of the Jacobian is not positive")]
     PositiveDeterminant,
-}
-
-impl fmt::Display for Condition {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::LegAboveBase { leg } => write!(f, "leg {} does not stand above the base", leg + 1),
-            Self::HingeBelowPlatform { leg } => {
-                write!(f, "hinge B{} is not below the plane of the platform (condition 1)", leg + 1)
-            }
-            Self::CornersInOrder => write!(f, "A2 is not beyond A3 along slide 1 (condition 2)"),
-            Self::PositiveDeterminant => write!(f, "the determinant of the Jacobian is not positive"),
-        }
-    }
 }
 
 /// Which conditions hold at a set of leg angles; NaN fulfils none.
@@ -112,7 +101,7 @@ impl Assembly {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::kinematics::samples::published_mechanism;
+    use crate::kinematics::tests::published_mechanism;
 
     /// The eight solutions above the base at the neutral input, by their angles in degrees.
     #[test]

@@ -99,7 +99,7 @@ mod tests {
 
     use super::*;
     use crate::kinematics::leg_angle::LegAngle;
-    use crate::kinematics::samples::{mechanisms, poses, published_mechanism};
+    use crate::kinematics::tests::{mechanisms, poses, published_mechanism};
 
     fn certify(loops: &LoopEquations<'_>, theta_rad: [f64; LEGS]) -> Option<Certificate> {
         Certificate::new(loops, &loops.evaluate(&theta_rad.map(LegAngle::from_rad)))

@@ -84,10 +84,10 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::kinematics::samples::{
+    use crate::kinematics::tests::{
         AMBIGUOUS, NearlySingular, angle_between, mechanisms, nearly_singular, poses, published_mechanism,
     };
-    use crate::kinematics::{Options, Solutions, solve_newton};
+    use crate::kinematics::{Method, Options, Solutions, solve};
 
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(1000))]
@@ -131,7 +131,7 @@ mod tests {
         ) {
             let (mechanism, actuators) = (published_mechanism(), Actuators { slide_m, leg_m });
             let Err(error) = solve_completely(&mechanism, &actuators) else { return Ok(()) };
-            let from = |guess| solve_newton(&mechanism, &actuators, guess, &Options::default());
+            let from = |guess| solve(Method::Newton, &mechanism, &actuators, guess, &Options::default());
             for found in guesses.iter().filter_map(|guess| from(guess).ok()) {
                 prop_assert!(error != ForwardError::Unassemblable);
                 let none_is_true = matches!(error, ForwardError::WrongAssembly { .. });

@@ -244,7 +244,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::kinematics::samples::mechanisms;
+    use crate::kinematics::tests::mechanisms;
 
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(1000))]

@@ -105,7 +105,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::kinematics::samples::{mechanisms, poses, published_mechanism};
+    use crate::kinematics::tests::{mechanisms, poses, published_mechanism};
 
     #[test]
     fn neutral_input_of_the_paper_has_the_known_solution_and_a_positive_determinant() {

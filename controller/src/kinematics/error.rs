@@ -104,12 +104,7 @@ impl ForwardError {
             Self::NoConvergence { residual_m, .. }
             | Self::Stalled { residual_m, .. }
             | Self::Singular { residual_m, .. } => Some(residual_m),
-            Self::NotFinite
-            | Self::Unassemblable
-            | Self::WrongAssembly { .. }
-            | Self::NoLength { .. }
-            | Self::Ambiguous { .. }
-            | Self::Undecided { .. } => None,
+            _ => None,
         }
     }
 }

@@ -113,7 +113,7 @@ mod tests {
 
     use super::*;
     use crate::kinematics::loop_equations::LoopEquations;
-    use crate::kinematics::samples::mechanisms;
+    use crate::kinematics::tests::mechanisms;
 
     proptest! {
         #[test]

@@ -265,7 +265,7 @@ mod tests {
 
     use super::*;
     use crate::kinematics::Equations;
-    use crate::kinematics::samples::{mechanisms, poses};
+    use crate::kinematics::tests::{mechanisms, poses};
 
     proptest! {
         #[test]

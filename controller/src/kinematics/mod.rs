@@ -39,10 +39,9 @@ pub use nearest::nearest_assembly_m;
 pub use solution::Solution;
 pub use solutions::Solutions;
 pub use solver::{
-    Iteration, MAX_HALVINGS, MAX_ITERATIONS, Method, Options, Residual, StepRule, solve, solve_newton,
-    solve_published, solve_traced,
+    Iteration, MAX_HALVINGS, MAX_ITERATIONS, Method, Options, Residual, StepRule, solve, solve_traced,
 };
 pub use tracker::ForwardTracker;
 
 #[cfg(test)]
-mod samples;
+mod tests;

@@ -62,7 +62,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::kinematics::samples::{mechanisms, poses, published_mechanism};
+    use crate::kinematics::tests::{mechanisms, poses, published_mechanism};
 
     /// Least error over a grid of all three angles above the base, m.
     fn on_a_grid_m(equations: &Equations<'_>) -> f64 {

@@ -63,8 +63,8 @@ mod tests {
     use super::*;
     use crate::kinematics::elimination::Elimination;
     use crate::kinematics::leg_angle::{LegAngle, coincide, separation_rad};
-    use crate::kinematics::samples::{NearlySingular, mechanisms, nearly_singular, published_mechanism};
-    use crate::kinematics::{Options, solve_newton};
+    use crate::kinematics::tests::{NearlySingular, mechanisms, nearly_singular, published_mechanism};
+    use crate::kinematics::{Method, Options, solve};
 
     fn boxes() -> impl Strategy<Value = Actuators> {
         let strokes = (prop::array::uniform3(-0.03..0.03f64), prop::array::uniform3(0.24..0.3f64));
@@ -136,7 +136,7 @@ mod tests {
         ) {
             let solutions = Solutions::new(&mechanism, &actuators).unwrap();
             for guess in guesses {
-                if let Ok(found) = solve_newton(&mechanism, &actuators, &guess, &Options::default()) {
+                if let Ok(found) = solve(Method::Newton, &mechanism, &actuators, &guess, &Options::default()) {
                     let is_same = |one: &Solution| coincide(&one.leg_angles, &found.leg_angles, 1e-6);
                     prop_assert!(solutions.iter().any(is_same));
                 }

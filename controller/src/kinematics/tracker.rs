@@ -111,8 +111,8 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::kinematics::samples::{angle_between, published_mechanism};
     use crate::kinematics::solve_completely;
+    use crate::kinematics::tests::{angle_between, published_mechanism};
 
     /// A loop through the workspace like a fast chewing cycle, 1 kHz.
     fn on_the_loop(cycle: u32) -> Pose {

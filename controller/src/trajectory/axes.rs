@@ -3,16 +3,19 @@
 use masseter_shared::geometry::Vec3;
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion};
 
-use super::import_error::ImportProblem;
-
 /// A signed permutation of axes that keeps the hand.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Axes(UnitQuaternion<f64>);
 
 impl Axes {
     /// From names such as "+y": which file axis points anterior, left and up.
-    pub(super) fn parse(names: &[String; 3]) -> Result<Self, ImportProblem> {
-        let refuse = |reason| ImportProblem::Axes { axes: names.clone(), reason };
+    pub(super) fn parse(names: &[String; 3]) -> Result<Self, String> {
+        let refuse = |reason: &str| {
+            format!(
+                "axes {names:?}: {reason}; name the file's axes that point anterior, left and up, \
+                 such as [\"+x\", \"+y\", \"+z\"]"
+            )
+        };
         let mut rows = Matrix3::zeros();
         for (row, name) in names.iter().enumerate() {
             let axis = direction(name).ok_or_else(|| refuse("an axis is one of +x -x +y -y +z -z"))?;
@@ -59,7 +62,7 @@ fn direction(name: &str) -> Option<Vec3> {
 mod tests {
     use super::*;
 
-    fn parse(names: [&str; 3]) -> Result<Axes, ImportProblem> {
+    fn parse(names: [&str; 3]) -> Result<Axes, String> {
         Axes::parse(&names.map(String::from))
     }
 
@@ -80,7 +83,7 @@ mod tests {
             (["+y", "+x", "+z"], "left-handed"),
         ];
         for (names, reason) in table {
-            assert!(parse(names).unwrap_err().to_string().contains(reason));
+            assert!(parse(names).unwrap_err().contains(reason));
         }
     }
 }

@@ -52,7 +52,7 @@ pub struct CheckError {
 }
 
 /// What the mechanism cannot do.
-#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum CheckProblem {
     /// No joint coordinates hold the pose.
     #[error("{0}")]
@@ -65,43 +65,9 @@ pub enum CheckProblem {
     /// The mechanism would have to be folded over.
     #[error("{0}; make the motion smaller")]
     Assembly(Condition),
-    /// An axis is too fast.
-    #[error(
-        "axis {} would move at {velocity_m_s:.3} m/s, limit {limit_m_s} m/s; slow the motion or lower the low-pass",
-        AXIS_NAMES[*axis]
-    )]
-    Velocity {
-        /// Axis index in the order d₁ d₂ d₃ l₁ l₂ l₃.
-        axis: usize,
-        /// Its speed.
-        velocity_m_s: f64,
-        /// The limit.
-        limit_m_s: f64,
-    },
-    /// An axis accelerates too fast.
-    #[error(
-        "axis {} would accelerate at {acceleration_m_s2:.2} m/s², limit {limit_m_s2} m/s²; \
-         slow the motion or lower the low-pass",
-        AXIS_NAMES[*axis]
-    )]
-    Acceleration {
-        /// Axis index in the order d₁ d₂ d₃ l₁ l₂ l₃.
-        axis: usize,
-        /// Its acceleration.
-        acceleration_m_s2: f64,
-        /// The limit.
-        limit_m_s2: f64,
-    },
-    /// The pose is close to singular.
-    #[error(
-        "condition number {condition:.1}, limit {limit}: too close to a singularity; make the motion smaller"
-    )]
-    Condition {
-        /// Of the 6×6 Jacobian, angular velocities scaled by the platform's side A₁A₂.
-        condition: f64,
-        /// The limit.
-        limit: f64,
-    },
+    /// An axis moves or accelerates too fast, or the pose is close to singular: the value, its limit and the remedy.
+    #[error("{0}")]
+    Limit(String),
 }
 
 /// Samples the whole trajectory every `period_s` (above 0) and judges it.
@@ -155,11 +121,22 @@ impl<'a> Survey<'a> {
         self.report.samples += 1;
         let Some(last_m) = self.last_m.replace(axes_m) else { return Ok(()) };
         let velocity_m_s = std::array::from_fn(|axis| (axes_m[axis] - last_m[axis]) / self.period_s);
-        self.visit_velocity(&velocity_m_s)?;
+        let limit = |axis| self.limits.velocity_m_s(axis);
+        if let Some((axis, value, limit)) = excess(&velocity_m_s, &mut self.report.velocity_m_s, limit) {
+            return Err(CheckProblem::Limit(format!(
+                "axis {axis} would move at {value:.3} m/s, limit {limit} m/s; slow the motion or lower the low-pass"
+            )));
+        }
         let Some(last) = self.last_velocity_m_s.replace(velocity_m_s) else { return Ok(()) };
-        self.visit_acceleration(&std::array::from_fn(|axis| {
-            (velocity_m_s[axis] - last[axis]) / self.period_s
-        }))
+        let change = std::array::from_fn(|axis| (velocity_m_s[axis] - last[axis]) / self.period_s);
+        let limit = |axis| self.limits.acceleration_m_s2(axis);
+        match excess(&change, &mut self.report.acceleration_m_s2, limit) {
+            None => Ok(()),
+            Some((axis, value, limit)) => Err(CheckProblem::Limit(format!(
+                "axis {axis} would accelerate at {value:.2} m/s², limit {limit} m/s²; slow the motion or lower the \
+                 low-pass"
+            ))),
+        }
     }
 
     fn visit_pose(&mut self, trajectory: &Trajectory, time_s: f64) -> Result<[f64; AXES], CheckProblem> {
@@ -178,28 +155,27 @@ impl<'a> Survey<'a> {
         let condition = self.mechanism.condition(&pose, &joints);
         self.report.condition = self.report.condition.max(condition);
         let limit = self.limits.max_condition;
-        if condition > limit { Err(CheckProblem::Condition { condition, limit }) } else { Ok(axes_m) }
-    }
-
-    fn visit_velocity(&mut self, velocity_m_s: &[f64; AXES]) -> Result<(), CheckProblem> {
-        for (axis, velocity_m_s) in velocity_m_s.iter().map(|v| v.abs()).enumerate() {
-            let limit_m_s = self.limits.velocity_m_s(axis);
-            self.report.velocity_m_s[axis] = self.report.velocity_m_s[axis].max(velocity_m_s);
-            if velocity_m_s > limit_m_s {
-                return Err(CheckProblem::Velocity { axis, velocity_m_s, limit_m_s });
-            }
+        if condition > limit {
+            let remedy = "too close to a singularity; make the motion smaller";
+            return Err(CheckProblem::Limit(format!(
+                "condition number {condition:.1}, limit {limit}: {remedy}"
+            )));
         }
-        Ok(())
+        Ok(axes_m)
     }
+}
 
-    fn visit_acceleration(&mut self, acceleration_m_s2: &[f64; AXES]) -> Result<(), CheckProblem> {
-        for (axis, acceleration_m_s2) in acceleration_m_s2.iter().map(|a| a.abs()).enumerate() {
-            let limit_m_s2 = self.limits.acceleration_m_s2(axis);
-            self.report.acceleration_m_s2[axis] = self.report.acceleration_m_s2[axis].max(acceleration_m_s2);
-            if acceleration_m_s2 > limit_m_s2 {
-                return Err(CheckProblem::Acceleration { axis, acceleration_m_s2, limit_m_s2 });
-            }
+/// Keeps the largest magnitude of each axis; returns the first axis beyond its limit, with value and limit.
+fn excess(
+    values: &[f64; AXES],
+    largest: &mut [f64; AXES],
+    limit: impl Fn(usize) -> f64,
+) -> Option<(&'static str, f64, f64)> {
+    for (axis, value) in values.iter().map(|value| value.abs()).enumerate() {
+        largest[axis] = largest[axis].max(value);
+        if value > limit(axis) {
+            return Some((AXIS_NAMES[axis], value, limit(axis)));
         }
-        Ok(())
     }
+    None
 }

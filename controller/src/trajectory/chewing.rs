@@ -89,9 +89,18 @@ impl Chewing {
     fn prove(&self) -> Result<(), TrajectoryError> {
         for point in 0..PROOF_POINTS {
             let phase = f64::from(point) / f64::from(PROOF_POINTS);
-            let Posture { advance_m, .. } = self.posture(phase).ok_or(TrajectoryError::TooWide { phase })?;
+            let Some(Posture { advance_m, .. }) = self.posture(phase) else {
+                return Err(TrajectoryError::Motion(format!(
+                    "at {phase:.2} of the chewing cycle the incisal point would be out of the mandible's reach; \
+                     bring vertical_mm or anterior_posterior_mm closer to the defaults (18 and 5), or condylar_inclination_deg (40)"
+                )));
+            };
             if advance_m < -LARGEST_RETRUSION_M {
-                return Err(TrajectoryError::Dislocated { phase, advance_mm: 1000.0 * advance_m });
+                let advance_mm = 1000.0 * advance_m;
+                return Err(TrajectoryError::Motion(format!(
+                    "at {phase:.2} of the chewing cycle the condyles would be {advance_mm:.1} mm along their paths; \
+                     bring anterior_posterior_mm or lateral_mm closer to what vertical_mm allows (defaults 5, 4 and 18)"
+                )));
             }
         }
         Ok(())

@@ -28,7 +28,8 @@ impl Cycle {
         require("phases.occlusion", occlusion, occlusion >= 0.0, "0 or above")?;
         let sum = opening + closing + occlusion;
         if (sum - 1.0).abs() > 1e-6 {
-            return Err(TrajectoryError::PhaseShares { sum });
+            let problem = "opening, closing and occlusion must add up to 1";
+            return Err(TrajectoryError::Motion(format!("phases add up to {sum}; {problem}")));
         }
         Ok(Self { rate_hz, opening, closing })
     }
@@ -98,7 +99,7 @@ mod tests {
     #[test]
     fn shares_that_do_not_fill_the_cycle_are_refused() {
         let phases = PhaseShares { opening: 0.5, ..Default::default() };
-        assert!(matches!(Cycle::new(1.0, &phases), Err(TrajectoryError::PhaseShares { .. })));
+        assert!(Cycle::new(1.0, &phases).unwrap_err().to_string().starts_with("phases add up to "));
         for rate_hz in [0.0, -1.0, f64::NAN, 11.0] {
             assert!(Cycle::new(rate_hz, &PhaseShares::default()).is_err());
         }

@@ -9,7 +9,7 @@ use masseter_shared::geometry::Vec3;
 use super::TrajectoryError;
 use super::axes::Axes;
 use super::error::require;
-use super::import_error::{ImportError, ImportProblem, Located};
+use super::import_error::{ImportError, Located};
 use super::mandible::condylar_middle;
 use super::markers;
 use super::pose_csv;
@@ -37,7 +37,8 @@ pub(super) fn import(config: &FileConfig, jaw: &JawConfig) -> Result<Recording, 
 
 fn samples(config: &FileConfig, reference: &Vec3) -> Result<Samples, Located> {
     let axes = Axes::parse(&config.axes).map_err(Located::whole)?;
-    let text = std::fs::read_to_string(&config.path).map_err(Located::whole)?;
+    let unreadable = |error| format!("cannot be read ({error}); check the path and that it is UTF-8 text");
+    let text = std::fs::read_to_string(&config.path).map_err(|error| Located::whole(unreadable(error)))?;
     let table = Table::parse(&text)?;
     check_points(config, table.format).map_err(Located::whole)?;
     match table.format {
@@ -49,15 +50,11 @@ fn samples(config: &FileConfig, reference: &Vec3) -> Result<Samples, Located> {
 }
 
 /// Refuses a key that the file's format does not use: ignoring it would hide a mistake.
-fn check_points(config: &FileConfig, format: Format) -> Result<(), ImportProblem> {
-    let (poses, markers) = ("poses", "markers");
-    match format {
-        Format::Poses if config.marker_origin_mm.is_some() => {
-            Err(ImportProblem::Superfluous { key: "marker_origin_mm", of: markers, holds: poses })
-        }
-        Format::Markers if config.reference_point_mm.is_some() => {
-            Err(ImportProblem::Superfluous { key: "reference_point_mm", of: poses, holds: markers })
-        }
-        _ => Ok(()),
-    }
+fn check_points(config: &FileConfig, format: Format) -> Result<(), String> {
+    let (key, of, holds) = match format {
+        Format::Poses if config.marker_origin_mm.is_some() => ("marker_origin_mm", "markers", "poses"),
+        Format::Markers if config.reference_point_mm.is_some() => ("reference_point_mm", "poses", "markers"),
+        _ => return Ok(()),
+    };
+    Err(format!("motion.{key} is for files of {of}, and this one holds {holds}; leave it away"))
 }

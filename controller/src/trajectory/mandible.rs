@@ -164,7 +164,7 @@ fn turn_of_y_to(direction: &Vec3) -> UnitQuaternion<f64> {
 /// The coordinate in 0..=`highest` at which the incisal point's travel (metres, rising from 0) is an amplitude; where
 /// there is no travel, the coordinate is too high. Sixty halvings exhaust double precision.
 pub(super) fn reach(
-    name: &'static str,
+    name: &str,
     amplitude_mm: f64,
     highest: f64,
     travel_m: impl Fn(f64) -> Option<f64>,
@@ -177,7 +177,9 @@ pub(super) fn reach(
     }
     let reached_mm = 1000.0 * travel_m(below).unwrap_or_default();
     if amplitude_mm - reached_mm > REACHED_MM {
-        return Err(TrajectoryError::OutOfReach { name, desired_mm: amplitude_mm, reached_mm });
+        return Err(TrajectoryError::Motion(format!(
+            "{name} of {amplitude_mm} mm is out of reach: the mandible gets to {reached_mm:.1} mm; ask for less"
+        )));
     }
     Ok(below)
 }

@@ -4,7 +4,7 @@ use masseter_shared::geometry::{Pose, Vec3};
 use nalgebra::{Matrix3, Rotation3, Translation3, UnitQuaternion};
 
 use super::axes::Axes;
-use super::import_error::{ImportProblem, Located};
+use super::import_error::Located;
 use super::recording::Samples;
 use super::table::{Row, Table};
 
@@ -61,27 +61,32 @@ fn centroid(markers: &Markers) -> Vec3 {
     markers.iter().sum::<Vec3>() / 3.0
 }
 
-fn check_spread(markers: &Markers) -> Result<(), ImportProblem> {
+fn check_spread(markers: &Markers) -> Result<(), String> {
     let [a, b, c] = markers;
     let longest_m = SIDES.map(|(i, j)| (markers[i] - markers[j]).norm()).into_iter().fold(0.0, f64::max);
     let height_m = (b - a).cross(&(c - a)).norm() / longest_m.max(f64::MIN_POSITIVE);
     if height_m <= FLATTEST * longest_m {
         let (height_mm, longest_mm) = (1000.0 * height_m, 1000.0 * longest_m);
-        return Err(ImportProblem::Collinear { height_mm, longest_mm });
+        return Err(format!(
+            "the markers lie on a line (triangle of height {height_mm:.3} mm over {longest_mm:.3} mm); \
+             three points off one line are needed"
+        ));
     }
     Ok(())
 }
 
-fn check_rigid(closed: &Markers, now: &Markers) -> Result<(), ImportProblem> {
+fn check_rigid(closed: &Markers, now: &Markers) -> Result<(), String> {
     for (i, j) in SIDES {
         let change_m = (now[i] - now[j]).norm() - (closed[i] - closed[j]).norm();
         if change_m.abs() > LARGEST_CHANGE_M {
-            return Err(ImportProblem::NotRigid {
-                first: i + 1,
-                second: j + 1,
-                change_mm: 1000.0 * change_m,
-                limit_mm: 1000.0 * LARGEST_CHANGE_M,
-            });
+            return Err(format!(
+                "markers {} and {} are {:+.2} mm farther apart than in the first row, limit {} mm: \
+                 one is loose or swapped; cut or correct the recording",
+                i + 1,
+                j + 1,
+                1000.0 * change_m,
+                1000.0 * LARGEST_CHANGE_M
+            ));
         }
     }
     Ok(())
@@ -140,13 +145,13 @@ mod tests {
     fn markers_that_tell_no_pose_are_refused() {
         let line = [0.0, 0.0, 0.0, 40.0, 0.0, 0.0, 80.0, 1.0, 0.0];
         let error = read(vec![row(3, line)], None).err().unwrap();
-        assert!(matches!(error.problem, ImportProblem::Collinear { .. }) && error.line == Some(3));
+        assert!(error.problem.contains("lie on a line") && error.line == Some(3));
         let point = read(vec![row(3, [5.0; 9])], None).err().unwrap();
-        assert!(matches!(point.problem, ImportProblem::Collinear { .. }));
+        assert!(point.problem.contains("lie on a line"));
         let mut loose = CLOSED;
         loose[3] = 43.0;
         let error = read(vec![row(3, CLOSED), row(4, loose)], None).err().unwrap();
-        assert!(matches!(error.problem, ImportProblem::NotRigid { first: 1, second: 2, .. }));
+        assert!(error.problem.starts_with("markers 1 and 2 are +3.00 mm farther apart"));
         assert_eq!(error.line, Some(4));
     }
 }

@@ -29,7 +29,7 @@ use masseter_shared::geometry::{Mechanism, Pose};
 
 pub use check::{CheckError, CheckProblem, TrajectoryReport, check};
 pub use error::TrajectoryError;
-pub use import_error::{ImportError, ImportProblem, SourceLine};
+pub use import_error::{ImportError, SourceLine};
 
 pub(crate) use cycle::minimum_jerk;
 

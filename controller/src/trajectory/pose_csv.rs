@@ -4,7 +4,7 @@ use masseter_shared::geometry::{Pose, Vec3};
 use nalgebra::{Quaternion, UnitQuaternion};
 
 use super::axes::Axes;
-use super::import_error::{ImportProblem, Located};
+use super::import_error::Located;
 use super::recording::Samples;
 use super::table::{Row, Table};
 
@@ -29,7 +29,8 @@ fn displacement(row: &Row, axes: &Axes, reference: &Vec3) -> Result<Pose, Locate
     let quaternion = Quaternion::new(q[0], q[1], q[2], q[3]);
     let norm = quaternion.norm();
     if (norm - 1.0).abs() > NORM_TOLERANCE {
-        return Err(Located::at(row.line, ImportProblem::NotUnitQuaternion { norm }));
+        let remedy = "write unit quaternions in the order qw,qx,qy,qz";
+        return Err(Located::at(row.line, format!("the quaternion's norm is {norm:.6}, not 1; {remedy}")));
     }
     let rotation = axes.rotation(&UnitQuaternion::from_quaternion(quaternion));
     let incisal = reference + moved - rotation * reference;
@@ -68,7 +69,7 @@ mod tests {
         for qw in [0.99, 0.0] {
             let error = read(qw).err().unwrap();
             assert_eq!(error.line, Some(7));
-            assert!(matches!(error.problem, ImportProblem::NotUnitQuaternion { .. }));
+            assert!(error.problem.contains("the quaternion's norm is 0."));
         }
     }
 }

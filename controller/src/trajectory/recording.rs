@@ -8,7 +8,7 @@ use std::path::PathBuf;
 use masseter_shared::geometry::{Pose, Vec3};
 use nalgebra::{UnitQuaternion, Vector6};
 
-use super::import_error::{ImportProblem, Located, SourceLine};
+use super::import_error::{Located, SourceLine};
 use super::lowpass::lowpass;
 use super::spline::Spline;
 
@@ -92,7 +92,8 @@ fn coordinates(samples: &Samples, first: &UnitQuaternion<f64>) -> Result<Vec<Vec
         let turn = (first.inverse() * pose.rotation).scaled_axis();
         let angle_deg = turn.norm().to_degrees();
         if angle_deg > LARGEST_TURN_DEG {
-            return Err(Located::at(line, ImportProblem::Turned { angle_deg, limit_deg: LARGEST_TURN_DEG }));
+            let limit = format!("limit {LARGEST_TURN_DEG}°; is the orientation right?");
+            return Err(Located::at(line, format!("turned by {angle_deg:.1}° from the first row, {limit}")));
         }
         let at = pose.translation.vector;
         Ok(Vector6::new(at.x, at.y, at.z, turn.x, turn.y, turn.z))
@@ -169,6 +170,6 @@ mod tests {
     fn a_turn_beyond_what_a_jaw_does_is_refused() {
         let spinning = |t_s: f64| Pose::rotation(Vec3::y() * t_s);
         let error = Recording::new("a.csv".into(), samples(spinning), 12.0).err().unwrap();
-        assert!(matches!(error.problem, ImportProblem::Turned { .. }) && error.line.is_some());
+        assert!(error.problem.starts_with("turned by") && error.line.is_some());
     }
 }

@@ -3,7 +3,7 @@
 //! Plain CSV: no quotes, comments from `#`, blank lines ignored. The module knows the columns'
 //! names, not their meaning.
 
-use super::import_error::{ImportProblem, Located};
+use super::import_error::Located;
 
 /// Fewer rows are no motion.
 const FEWEST_ROWS: usize = 4;
@@ -55,19 +55,16 @@ impl Format {
         let format =
             if found.iter().any(|name| name.starts_with("m1")) { Self::Markers } else { Self::Poses };
         let columns = format.columns();
-        let name = |names: &[&'static str], position: usize| names.get(position).copied().unwrap_or_default();
         let differs = |&position: &usize| found.get(position) != columns.get(position);
         match (0..found.len().max(columns.len())).find(differs) {
             None => Ok(format),
-            Some(position) => Err(Located::at(
-                line,
-                ImportProblem::Column {
-                    position: position + 1,
-                    found: found.get(position).copied().unwrap_or_default().to_owned(),
-                    expected: name(columns, position),
-                    header: columns.join(","),
-                },
-            )),
+            Some(position) => {
+                let [found, expected] =
+                    [&found, columns].map(|names| names.get(position).copied().unwrap_or_default());
+                let (position, header) = (position + 1, columns.join(","));
+                let problem = format!("column {position} is `{found}`, expected `{expected}`");
+                Err(Located::at(line, format!("{problem}; the header must be `{header}`")))
+            }
         }
     }
 }
@@ -77,7 +74,8 @@ impl Table {
         let text = text.trim_start_matches('\u{feff}');
         let lines = (1..).zip(text.lines().map(str::trim));
         let mut content = lines.filter(|(_, line)| !line.is_empty() && !line.starts_with('#'));
-        let too_few = |rows| Located::whole(ImportProblem::TooFewRows { rows, needed: FEWEST_ROWS });
+        let too_few =
+            |rows| Located::whole(format!("{rows} rows of data, at least {FEWEST_ROWS} are needed"));
         let (line, header) = content.next().ok_or_else(|| too_few(0))?;
         let format = Format::from_header(line, header)?;
         let mut rows: Vec<Row> = Vec::new();
@@ -98,7 +96,9 @@ impl Table {
 fn parse_row(line: u64, text: &str, columns: &[&'static str]) -> Result<Row, Located> {
     let fields: Vec<&str> = text.split(',').map(str::trim).collect();
     if fields.len() != columns.len() {
-        let problem = ImportProblem::Fields { found: fields.len(), expected: columns.len() };
+        let (found, expected) = (fields.len(), columns.len());
+        let problem =
+            format!("{found} fields, but the header names {expected}; complete the row or delete it");
         return Err(Located::at(line, problem));
     }
     let number = |(text, column): (&&str, &&'static str)| {
@@ -109,11 +109,14 @@ fn parse_row(line: u64, text: &str, columns: &[&'static str]) -> Result<Row, Loc
     Ok(Row { line, time_s, values })
 }
 
-fn parse_number(text: &str, column: &'static str) -> Result<f64, ImportProblem> {
+fn parse_number(text: &str, column: &str) -> Result<f64, String> {
     let finite = text.parse().ok().filter(|value: &f64| value.is_finite());
-    let value = finite.ok_or_else(|| ImportProblem::NotANumber { column, text: text.to_owned() })?;
+    let value = finite.ok_or_else(|| {
+        format!("`{text}` in column `{column}` is not a finite number; write it with a decimal point")
+    })?;
     if column.ends_with("_mm") && value.abs() > LARGEST_MM {
-        return Err(ImportProblem::TooFar { column, value_mm: value, largest_mm: LARGEST_MM });
+        let problem = format!("{value:e} in column `{column}` lies beyond ±{LARGEST_MM} mm");
+        return Err(problem + "; is the unit millimetres?");
     }
     Ok(value)
 }
@@ -121,10 +124,16 @@ fn parse_number(text: &str, column: &'static str) -> Result<f64, ImportProblem> 
 fn check_time(row: &Row, previous_s: f64) -> Result<(), Located> {
     let gap_s = row.time_s - previous_s;
     if gap_s < SHORTEST_STEP_S {
-        return Err(Located::at(row.line, ImportProblem::TimeOrder { time_s: row.time_s, previous_s }));
+        let problem = format!(
+            "time {} s does not come after {previous_s} s of the row before by 1 µs or more; sort the rows, \
+             drop repeats",
+            row.time_s
+        );
+        return Err(Located::at(row.line, problem));
     }
     if gap_s > LARGEST_GAP_S {
-        return Err(Located::at(row.line, ImportProblem::Gap { gap_s, largest_s: LARGEST_GAP_S }));
+        let problem = format!("{gap_s:.3} s without a sample, at most {LARGEST_GAP_S} s can be bridged");
+        return Err(Located::at(row.line, problem + "; cut the recording here"));
     }
     Ok(())
 }
@@ -168,7 +177,7 @@ mod tests {
         for (text, line, reason) in table {
             let error = Table::parse(&text).err().unwrap();
             assert_eq!(error.line, line, "{text}");
-            assert!(error.problem.to_string().contains(reason), "{}", error.problem);
+            assert!(error.problem.contains(reason), "{}", error.problem);
         }
     }
 }

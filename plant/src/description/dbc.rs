@@ -3,10 +3,8 @@
 //!
 //! Both directions of SDO have their four parts as signals; segments are not decoded.
 
-use std::fmt::{self, Write};
-
+use masseter_can::CanId;
 use masseter_can::canopen::{Cob, NmtCommand, NmtState, NodeId};
-use masseter_can::{CanId, Frame};
 use masseter_shared::config::DriveConfig;
 use masseter_shared::geometry::{AXES, AXIS_NAMES};
 
@@ -32,102 +30,78 @@ const NMT_COMMANDS: [(NmtCommand, &str); 5] = [
     (NmtCommand::ResetCommunication, "Reset communication"),
 ];
 
-/// A signal of a message, little endian.
+/// A signal of a message, little endian, that begins where the signal before ends.
 struct Signal<'a> {
     name: String,
-    start_bit: usize,
     bits: usize,
     is_signed: bool,
     factor: f64,
     unit: &'a str,
 }
 
-impl Signal<'_> {
-    /// A number without a unit.
-    fn plain(name: &str, start_bit: usize, bits: usize) -> Self {
-        Self { name: name.to_owned(), start_bit, bits, is_signed: false, factor: 1.0, unit: "" }
-    }
-
-    fn write(&self, text: &mut String, receiver: &str) -> fmt::Result {
-        let Self { name, start_bit, bits, is_signed, factor, unit } = self;
-        let sign = if *is_signed { '-' } else { '+' };
-        writeln!(text, r#" SG_ {name} : {start_bit}|{bits}@1{sign} ({factor},0) [0|0] "{unit}" {receiver}"#)
-    }
+/// Numbers without a unit.
+fn numbers(signals: &[(&str, usize)]) -> Vec<Signal<'static>> {
+    let number = |&(name, bits): &(&str, usize)| {
+        let name = name.to_owned();
+        Signal { name, bits, is_signed: false, factor: 1.0, unit: "" }
+    };
+    signals.iter().map(number).collect()
 }
 
 /// The file, lines ended by a line feed.
 pub(super) fn write(drives: &[DriveSettings; AXES]) -> String {
-    let mut text = String::new();
-    messages(&mut text, drives)
-        .and_then(|()| value_names(&mut text, drives))
-        .expect("a string takes any text");
-    text
-}
-
-fn messages(text: &mut String, drives: &[DriveSettings; AXES]) -> fmt::Result {
-    writeln!(text, "VERSION \"\"\n\nNS_ :\n\nBS_:\n\nBU_: {MASTER} {}\n", AXIS_NAMES.join(" "))?;
-    let nmt = [Signal::plain("Command", 0, 8), Signal::plain("Node", 8, 8)];
-    message(text, Cob::Nmt.into(), "NMT", 2, MASTER, &nmt, ANYBODY)?;
-    message(text, Cob::Sync.into(), "SYNC", 0, MASTER, &[], ANYBODY)?;
-    let state = [Signal::plain("State", 0, 8)];
-    let master = drives[0].master;
-    message(text, Cob::Heartbeat(master).into(), "Master_heartbeat", 1, MASTER, &state, ANYBODY)?;
+    let head = format!("VERSION \"\"\n\nNS_ :\n\nBS_:\n\nBU_: {MASTER} {}\n\n", AXIS_NAMES.join(" "));
+    let state = numbers(&[("State", 8)]);
+    let mut parts = vec![
+        head,
+        message(Cob::Nmt.into(), "NMT", [MASTER, ANYBODY], &numbers(&[("Command", 8), ("Node", 8)])),
+        message(Cob::Sync.into(), "SYNC", [MASTER, ANYBODY], &[]),
+        message(Cob::Heartbeat(NodeId::MASTER).into(), "Master_heartbeat", [MASTER, ANYBODY], &state),
+    ];
     for (settings, name) in drives.iter().zip(AXIS_NAMES) {
-        services(text, settings.node, name)?;
-        process_data(text, settings, name)?;
+        parts.extend(services(settings.node, name));
+        parts.extend(process_data(settings, name));
     }
-    Ok(())
+    parts.extend(value_names(drives));
+    parts.concat()
 }
 
 /// The messages of a node in the predefined connection set.
-fn services(text: &mut String, node: NodeId, name: &str) -> fmt::Result {
-    let emergency = [
-        Signal::plain("Error_code", 0, 16),
-        Signal::plain("Error_register", 16, 8),
-        Signal::plain("Vendor", 24, 40),
-    ];
-    let state = [Signal::plain("State", 0, 8)];
-    let sdo = || {
-        [
-            Signal::plain("Command", 0, 8),
-            Signal::plain("Index", 8, 16),
-            Signal::plain("Subindex", 24, 8),
-            Signal::plain("Data", 32, 32),
-        ]
-    };
-    message(text, Cob::Emergency(node).into(), &format!("{name}_EMCY"), 8, name, &emergency, MASTER)?;
-    message(text, Cob::SdoResponse(node).into(), &format!("{name}_SDO_response"), 8, name, &sdo(), MASTER)?;
-    message(text, Cob::SdoRequest(node).into(), &format!("{name}_SDO_request"), 8, MASTER, &sdo(), name)?;
-    message(text, Cob::Heartbeat(node).into(), &format!("{name}_heartbeat"), 1, name, &state, MASTER)
+fn services(node: NodeId, name: &str) -> [String; 4] {
+    let (to_master, from_master) = ([name, MASTER], [MASTER, name]);
+    let emergency = numbers(&[("Error_code", 16), ("Error_register", 8), ("Vendor", 40)]);
+    let sdo = numbers(&[("Command", 8), ("Index", 16), ("Subindex", 8), ("Data", 32)]);
+    let state = numbers(&[("State", 8)]);
+    [
+        message(Cob::Emergency(node).into(), &format!("{name}_EMCY"), to_master, &emergency),
+        message(Cob::SdoResponse(node).into(), &format!("{name}_SDO_response"), to_master, &sdo),
+        message(Cob::SdoRequest(node).into(), &format!("{name}_SDO_request"), from_master, &sdo),
+        message(Cob::Heartbeat(node).into(), &format!("{name}_heartbeat"), to_master, &state),
+    ]
 }
 
 /// The PDOs that exist after power-on.
-fn process_data(text: &mut String, settings: &DriveSettings, name: &str) -> fmt::Result {
+fn process_data(settings: &DriveSettings, name: &str) -> Vec<String> {
     let objects = settings.objects();
+    let mut messages = Vec::new();
     for number in 0..PDOS as u16 {
-        for (direction, communication, mapping) in [("RPDO", 0x1400, 0x1600), ("TPDO", 0x1800, 0x1A00)] {
+        let rpdo = ("RPDO", 0x1400, [MASTER, name]);
+        for (direction, communication, nodes) in [rpdo, ("TPDO", 0x1800, [name, MASTER])] {
             let Some(id) = objects.cob_id(communication + number, 1).identifier() else { continue };
-            let signals = mapped(&objects, mapping + number, &settings.drive);
-            let length = signals.iter().map(|signal| signal.bits).sum::<usize>() / 8;
-            let (sender, receiver) = if direction == "RPDO" { (MASTER, name) } else { (name, MASTER) };
-            let title = format!("{name}_{direction}{}", number + 1);
-            message(text, id, &title, length, sender, &signals, receiver)?;
+            let signals = mapped(&objects, communication + 0x0200 + number, &settings.drive);
+            messages.push(message(id, &format!("{name}_{direction}{}", number + 1), nodes, &signals));
         }
     }
-    Ok(())
+    messages
 }
 
 fn mapped<'a>(objects: &Objects, index: u16, drive: &DriveConfig) -> Vec<Signal<'a>> {
     let entries = (1..=objects.at(index, 0) as u8).map(|place| MappingEntry(objects.at(index, place)));
-    let mut start_bit = 0;
     let signals = entries.map(|mapping| {
         let entry = &ENTRIES[find(mapping.object()).expect("only existing objects are mapped")].entry;
         let (factor, unit) = scale(mapping.object().index, drive);
-        let name = entry.name.replace(' ', "_");
-        let (bits, is_signed) = (mapping.bits(), entry.kind.is_signed());
-        let signal = Signal { name, start_bit, bits, is_signed, factor, unit };
-        start_bit += bits;
-        signal
+        let (name, is_signed) = (entry.name.replace(' ', "_"), entry.kind.is_signed());
+        Signal { name, bits: mapping.bits(), is_signed, factor, unit }
     });
     signals.collect()
 }
@@ -141,36 +115,27 @@ fn scale(index: u16, drive: &DriveConfig) -> (f64, &'static str) {
     }
 }
 
-fn message(
-    text: &mut String,
-    id: CanId,
-    name: &str,
-    length: usize,
-    sender: &str,
-    signals: &[Signal<'_>],
-    receiver: &str,
-) -> fmt::Result {
-    debug_assert!(length <= Frame::MAX_CLASSICAL_DATA, "a classical frame");
-    writeln!(text, "BO_ {} {name}: {length} {sender}", id.number())?;
-    signals.iter().try_for_each(|signal| signal.write(text, receiver))?;
-    writeln!(text)
+fn message(id: CanId, name: &str, [sender, receiver]: [&str; 2], signals: &[Signal<'_>]) -> String {
+    let (mut lines, mut start) = (Vec::new(), 0);
+    for Signal { name, bits, is_signed, factor, unit } in signals {
+        let sign = if *is_signed { '-' } else { '+' };
+        let place = format!("{start}|{bits}@1{sign}");
+        lines.push(format!(" SG_ {name} : {place} ({factor},0) [0|0] \"{unit}\" {receiver}\n"));
+        start += bits;
+    }
+    format!("BO_ {} {name}: {} {sender}\n{}\n", id.number(), start / 8, lines.concat())
 }
 
 /// Names of the numbers of states and commands.
-fn value_names(text: &mut String, drives: &[DriveSettings; AXES]) -> fmt::Result {
-    let nmt = CanId::from(Cob::Nmt).number();
+fn value_names(drives: &[DriveSettings; AXES]) -> Vec<String> {
     let commands = NMT_COMMANDS.map(|(command, name)| (command.code(), name));
-    values(text, nmt, "Command", &commands)?;
     let states = NMT_STATES.map(|(state, name)| (state.code(), name));
-    let nodes = drives.iter().map(|settings| settings.node);
-    for node in [drives[0].master].into_iter().chain(nodes) {
-        values(text, CanId::from(Cob::Heartbeat(node)).number(), "State", &states)?;
-    }
-    Ok(())
+    let nodes = [NodeId::MASTER].into_iter().chain(drives.iter().map(|settings| settings.node));
+    let states = nodes.map(|node| values(Cob::Heartbeat(node), "State", &states));
+    [values(Cob::Nmt, "Command", &commands)].into_iter().chain(states).collect()
 }
 
-fn values(text: &mut String, id: u32, signal: &str, names: &[(u8, &str)]) -> fmt::Result {
-    write!(text, "VAL_ {id} {signal}")?;
-    names.iter().try_for_each(|(value, name)| write!(text, " {value} \"{name}\""))?;
-    writeln!(text, " ;")
+fn values(cob: Cob, signal: &str, names: &[(u8, &str)]) -> String {
+    let names: Vec<_> = names.iter().map(|(value, name)| format!("{value} \"{name}\"")).collect();
+    format!("VAL_ {} {signal} {} ;\n", CanId::from(cob).number(), names.join(" "))
 }

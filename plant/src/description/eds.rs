@@ -1,7 +1,5 @@
 //! An electronic data sheet as CiA 306 lays it out.
 
-use std::fmt::{self, Write};
-
 use masseter_can::canopen::NodeId;
 use masseter_shared::config::IdentityConfig;
 
@@ -15,90 +13,72 @@ const MANDATORY: [u16; 3] = [0x1000, 0x1001, 0x1018];
 
 /// The file, lines ended by a line feed.
 pub(super) fn write(settings: &DriveSettings) -> String {
-    let mut text = String::new();
-    let written = sections(&mut text, &settings.objects(), settings.node);
-    written.expect("text can be added to a string");
-    text
+    let objects = settings.objects();
+    let (mandatory, optional): (Vec<_>, Vec<_>) =
+        OBJECTS.iter().partition(|object| MANDATORY.contains(&object.index));
+    let mut parts = vec![file_info(settings.node), device_info()];
+    parts.push(list("MandatoryObjects", &mandatory));
+    parts.push(list("OptionalObjects", &optional));
+    parts.push(list("ManufacturerObjects", &[]));
+    parts.extend(OBJECTS.iter().map(|object| section(object, &objects)));
+    parts.concat()
 }
 
-fn sections(text: &mut String, objects: &Objects, node: NodeId) -> fmt::Result {
-    file_info(text, node)?;
-    device_info(text)?;
-    let is_mandatory = |object: &&Object| MANDATORY.contains(&object.index);
-    list(text, "MandatoryObjects", OBJECTS.iter().filter(is_mandatory))?;
-    list(text, "OptionalObjects", OBJECTS.iter().filter(|object| !is_mandatory(object)))?;
-    list(text, "ManufacturerObjects", [].iter())?;
-    OBJECTS.iter().try_for_each(|object| write_object(text, object, objects))
-}
-
-fn file_info(text: &mut String, node: NodeId) -> fmt::Result {
-    writeln!(
-        text,
+fn file_info(node: NodeId) -> String {
+    format!(
         "[FileInfo]\nFileName=drive{node}.eds\nFileVersion=1\nFileRevision=0\nEDSVersion=4.0\n\
-         Description=Emulated CiA 402 servo drive\nCreatedBy=Masseter {}\n",
+         Description=Emulated CiA 402 servo drive\nCreatedBy=Masseter {}\n\n",
         env!("CARGO_PKG_VERSION")
     )
 }
 
-fn device_info(text: &mut String) -> fmt::Result {
+fn device_info() -> String {
     let IdentityConfig { vendor_id, product_code, revision, .. } = IDENTITY;
-    writeln!(
-        text,
+    format!(
         "[DeviceInfo]\nVendorName=Masseter\nVendorNumber=0x{vendor_id:08X}\n\
          ProductName=Masseter emulated drive\nProductNumber=0x{product_code:08X}\nRevisionNumber=0x{revision:08X}\n\
          BaudRate_10=1\nBaudRate_20=1\nBaudRate_50=1\nBaudRate_125=1\nBaudRate_250=1\nBaudRate_500=1\n\
          BaudRate_800=1\nBaudRate_1000=1\nSimpleBootUpMaster=0\nSimpleBootUpSlave=1\nGranularity=8\n\
-         DynamicChannelsSupported=0\nGroupMessaging=0\nNrOfRXPDO={PDOS}\nNrOfTXPDO={PDOS}\nLSS_Supported=0\n"
-    )?;
-    text.write_str("[DummyUsage]\n")?;
-    (1..8).try_for_each(|kind| writeln!(text, "Dummy{kind:04X}=0"))?;
-    text.write_str("\n[Comments]\nLines=0\n\n")
+         DynamicChannelsSupported=0\nGroupMessaging=0\nNrOfRXPDO={PDOS}\nNrOfTXPDO={PDOS}\nLSS_Supported=0\n\n\
+         [DummyUsage]\nDummy0001=0\nDummy0002=0\nDummy0003=0\nDummy0004=0\nDummy0005=0\nDummy0006=0\nDummy0007=0\n\n\
+         [Comments]\nLines=0\n\n"
+    )
 }
 
-fn list<'a>(
-    text: &mut String,
-    section: &str,
-    objects: impl Iterator<Item = &'a Object> + Clone,
-) -> fmt::Result {
-    writeln!(text, "[{section}]\nSupportedObjects={}", objects.clone().count())?;
-    for (number, object) in (1..).zip(objects) {
-        writeln!(text, "{number}=0x{:04X}", object.index)?;
-    }
-    writeln!(text)
+fn list(section: &str, objects: &[&Object]) -> String {
+    let line = |(number, object): (usize, &&Object)| format!("{number}=0x{:04X}\n", object.index);
+    let lines: Vec<_> = (1..).zip(objects).map(line).collect();
+    format!("[{section}]\nSupportedObjects={}\n{}\n", objects.len(), lines.concat())
 }
 
-fn write_object(text: &mut String, object: &Object, objects: &Objects) -> fmt::Result {
+fn section(object: &Object, objects: &Objects) -> String {
     let Object { index, name, shape, entries } = object;
-    if *shape == Shape::Var {
-        writeln!(text, "[{index:04X}]")?;
-        return write_entry(text, *index, &entries[0], objects);
-    }
-    let kind = if *shape == Shape::Array { 0x8 } else { 0x9 };
-    writeln!(
-        text,
-        "[{index:04X}]\nParameterName={name}\nObjectType=0x{kind:X}\nSubNumber={}\n",
-        entries.len()
-    )?;
-    entries.iter().try_for_each(|entry| {
-        writeln!(text, "[{index:04X}sub{:X}]", entry.subindex)?;
-        write_entry(text, *index, entry, objects)
-    })
+    let kind = match shape {
+        Shape::Var => return format!("[{index:04X}]\n{}", describe(*index, &entries[0], objects)),
+        Shape::Array => 0x8,
+        Shape::Record => 0x9,
+    };
+    let sub =
+        |entry: &Entry| format!("[{index:04X}sub{:X}]\n{}", entry.subindex, describe(*index, entry, objects));
+    let (count, subs) = (entries.len(), entries.iter().map(sub).collect::<Vec<_>>().concat());
+    format!("[{index:04X}]\nParameterName={name}\nObjectType=0x{kind:X}\nSubNumber={count}\n\n{subs}")
 }
 
-fn write_entry(text: &mut String, index: u16, entry: &Entry, objects: &Objects) -> fmt::Result {
+fn describe(index: u16, entry: &Entry, objects: &Objects) -> String {
     let access = match entry.access {
         Access::Constant => "const",
         Access::ReadOnly => "ro",
         Access::ReadWrite => "rw",
     };
-    let mapping = u8::from(entry.mapping != Mapping::Never);
-    writeln!(text, "ParameterName={}\nObjectType=0x7\nDataType=0x{:04X}", entry.name, entry.kind.code())?;
-    writeln!(text, "AccessType={access}\nDefaultValue={}", default_value(index, entry, objects))?;
-    writeln!(text, "PDOMapping={mapping}")?;
-    if let Some((lowest, highest)) = entry.limits {
-        writeln!(text, "LowLimit={lowest}\nHighLimit={highest}")?;
-    }
-    writeln!(text)
+    let (name, kind, mapping) = (entry.name, entry.kind as u16, u8::from(entry.mapping != Mapping::Never));
+    let value = default_value(index, entry, objects);
+    let limits = entry
+        .limits
+        .map_or_else(String::new, |(lowest, highest)| format!("LowLimit={lowest}\nHighLimit={highest}\n"));
+    format!(
+        "ParameterName={name}\nObjectType=0x7\nDataType=0x{kind:04X}\nAccessType={access}\nDefaultValue={value}\n\
+         PDOMapping={mapping}\n{limits}\n"
+    )
 }
 
 fn default_value(index: u16, entry: &Entry, objects: &Objects) -> String {

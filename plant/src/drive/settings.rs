@@ -1,7 +1,6 @@
 //! The settings of an emulated drive, from the scenario, and the object dictionary that follows from them.
 
 use masseter_can::canopen::NodeId;
-use masseter_shared::clock::MILLISECOND_NS;
 use masseter_shared::config::{DriveConfig, Scenario};
 use masseter_shared::geometry::AXES;
 
@@ -16,14 +15,12 @@ use crate::link::layout::node_ids;
 pub(crate) struct DriveSettings {
     /// Its node id.
     pub(crate) node: NodeId,
-    /// The master, whose heartbeat the drive consumes (1016h).
-    pub(crate) master: NodeId,
     /// The drive.
     pub(crate) drive: DriveConfig,
-    /// Producer heartbeat time (1017h), ns.
-    pub(crate) heartbeat_ns: u64,
-    /// Consumer heartbeat time of the master (1016h), ns.
-    pub(crate) heartbeat_timeout_ns: u64,
+    /// Producer heartbeat time (1017h), ms.
+    pub(crate) heartbeat_ms: u16,
+    /// Consumer heartbeat time of the master (1016h), ms.
+    pub(crate) heartbeat_timeout_ms: u16,
     /// Communication cycle (60C2h), ns.
     pub(crate) period_ns: u64,
     /// Step of the servo loops, s.
@@ -45,10 +42,9 @@ impl DriveSettings {
             let stroke_m = scenario.mechanism.strokes.of_axis(axis);
             Self {
                 node: ids[axis],
-                master: NodeId::MASTER,
                 drive,
-                heartbeat_ns: u64::from(scenario.can.heartbeat_producer_ms) * MILLISECOND_NS,
-                heartbeat_timeout_ns: u64::from(scenario.can.heartbeat_consumer_ms) * MILLISECOND_NS,
+                heartbeat_ms: scenario.can.heartbeat_producer_ms,
+                heartbeat_timeout_ms: scenario.can.heartbeat_consumer_ms,
                 period_ns: scenario.period_ns(),
                 step_s: scenario.dynamics.step_ns as f64 * 1e-9,
                 position_limits: stroke_m.map(|end_m| drive.increments(end_m) as i32),
@@ -59,10 +55,9 @@ impl DriveSettings {
     /// The object dictionary after power-on.
     pub(crate) fn objects(&self) -> Objects {
         let mut objects = Objects::new(self.node);
-        let in_ms = |ns: u64| (ns / MILLISECOND_NS).min(u64::from(u16::MAX)) as u16;
-        let consumed = u32::from(self.master.get()) << 16 | u32::from(in_ms(self.heartbeat_timeout_ns));
+        let consumed = u32::from(NodeId::MASTER.get()) << 16 | u32::from(self.heartbeat_timeout_ms);
         objects.set(names::CONSUMER_HEARTBEAT_TIME, consumed);
-        objects.set(names::PRODUCER_HEARTBEAT_TIME_MS, in_ms(self.heartbeat_ns));
+        objects.set(names::PRODUCER_HEARTBEAT_TIME_MS, self.heartbeat_ms);
         configure(&mut objects, &self.drive, self.period_ns, self.position_limits);
         objects
     }

@@ -6,6 +6,7 @@ use masseter_can::{Bus, ReceiveError, Tapped, VirtualWire, WireConfig};
 use masseter_shared::config::Scenario;
 use masseter_shared::geometry::AXES;
 use masseter_shared::messages::Truth;
+use masseter_shared::realtime::Waiter;
 
 use super::co_simulation::Emulation;
 use crate::error::PlantError;
@@ -62,6 +63,10 @@ impl Link for VirtualLink {
 
     fn axis_at(&self, bus: usize, port: usize) -> Option<usize> {
         self.ports.iter().position(|at| *at == DrivePort { bus, port })
+    }
+
+    fn wait(&mut self, latest_ns: u64, waiter: &mut Waiter) -> u64 {
+        waiter.until_between(self.next_event_ns().min(latest_ns), latest_ns)
     }
 
     fn truth(&self) -> Option<Truth> {

@@ -72,7 +72,10 @@ fn standard(id: u16) -> CanId {
 
 fn port_of(config: &FaultConfig, nodes: &[NodeId]) -> Result<Option<usize>, PlantError> {
     let Some(node) = config.node else { return Ok(None) };
-    let port = nodes.iter().position(|id| id.get() == node);
-    let present = || nodes.iter().map(|id| id.get().to_string()).collect::<Vec<_>>().join(", ");
-    port.map(Some).ok_or_else(|| PlantError::FaultNode { node, bus: config.bus, present: present() })
+    if let Some(port) = nodes.iter().position(|id| id.get() == node) {
+        return Ok(Some(port));
+    }
+    let present = nodes.iter().map(|id| id.get().to_string()).collect::<Vec<_>>().join(", ");
+    let bus = config.bus;
+    Err(PlantError::Scenario(format!("faults.node = {node}: bus {bus} has the nodes {present}")))
 }

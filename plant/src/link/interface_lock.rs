@@ -27,7 +27,7 @@ impl InterfaceLock {
             Err(error) => {
                 let (interface, errno) = (interface.to_owned(), error.raw_os_error().unwrap_or_default());
                 Err(match error.kind() {
-                    ErrorKind::AddrInUse => PlantError::MasterHere { interface },
+                    ErrorKind::AddrInUse => PlantError::MasterHere(interface),
                     _ => OpenError::Os { interface, errno }.into(),
                 })
             }
@@ -44,7 +44,7 @@ mod tests {
         let interface = format!("test{}", std::process::id());
         let first = InterfaceLock::take(&interface).unwrap();
         let refused = InterfaceLock::take(&interface).unwrap_err();
-        assert_eq!(refused, PlantError::MasterHere { interface: interface.clone() });
+        assert_eq!(refused, PlantError::MasterHere(interface.clone()));
         assert!(InterfaceLock::take(&format!("{interface}b")).is_ok());
         drop(first);
         assert!(InterfaceLock::take(&interface).is_ok());

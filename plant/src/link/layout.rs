@@ -2,7 +2,7 @@
 
 use masseter_can::canopen::NodeId;
 use masseter_shared::config::CanConfig;
-use masseter_shared::geometry::AXES;
+use masseter_shared::geometry::{AXES, AXIS_NAMES};
 
 use crate::error::PlantError;
 
@@ -18,23 +18,24 @@ pub(crate) struct DrivePort {
 
 /// The port of each axis' drive; those of a bus follow [`MASTER_PORT`].
 pub(crate) fn drive_ports(can: &CanConfig) -> Result<[DrivePort; AXES], PlantError> {
-    let named = || can.buses.iter().flatten().copied();
-    if let Some(axis) = named().find(|&axis| axis >= AXES) {
-        return Err(PlantError::Axis { axis, times: named().filter(|&other| other == axis).count() });
-    }
     if let Some(bus) = can.buses.iter().position(Vec::is_empty) {
-        return Err(PlantError::EmptyBus { bus });
+        return Err(PlantError::Scenario(format!(
+            "can.buses: bus {bus} has no drive, and nobody would acknowledge what the master sends; leave it away"
+        )));
+    }
+    let named = || can.buses.iter().flatten().copied();
+    let times = |axis: usize| named().filter(|&other| other == axis).count();
+    let unknown = named().find(|&axis| axis >= AXES);
+    if let Some(axis) = unknown.or_else(|| (0..AXES).find(|&axis| times(axis) != 1)) {
+        let (times, names) = (times(axis), AXIS_NAMES.join(" "));
+        return Err(PlantError::Scenario(format!(
+            "can.buses: axis {axis} is named {times} times; name each of the axes 0 to 5 ({names}) once"
+        )));
     }
     let mut ports = [DrivePort { bus: 0, port: MASTER_PORT }; AXES];
-    for (axis, drive_port) in ports.iter_mut().enumerate() {
-        let times = named().filter(|&other| other == axis).count();
-        if times != 1 {
-            return Err(PlantError::Axis { axis, times });
-        }
-        for (bus, axes) in can.buses.iter().enumerate() {
-            if let Some(index) = axes.iter().position(|&other| other == axis) {
-                *drive_port = DrivePort { bus, port: MASTER_PORT + 1 + index };
-            }
+    for (bus, axes) in can.buses.iter().enumerate() {
+        for (index, &axis) in axes.iter().enumerate() {
+            ports[axis] = DrivePort { bus, port: MASTER_PORT + 1 + index };
         }
     }
     Ok(ports)
@@ -46,7 +47,8 @@ pub(crate) fn node_ids(can: &CanConfig) -> Result<[NodeId; AXES], PlantError> {
     for (axis, &id) in can.node_ids.iter().enumerate() {
         let is_taken = id == NodeId::MASTER.get() || can.node_ids[..axis].contains(&id);
         if is_taken {
-            return Err(PlantError::SharedNodeId { id });
+            let reason = format!("node {id} stands twice, or is the master's ({})", NodeId::MASTER);
+            return Err(PlantError::Scenario(format!("can.node_ids: {reason}; give every drive its own")));
         }
         ids[axis] = NodeId::new(id)?;
     }

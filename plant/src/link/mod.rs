@@ -6,6 +6,7 @@
 use masseter_can::faults::FaultNote;
 use masseter_can::{Bus, ReceiveError, Tapped};
 use masseter_shared::messages::Truth;
+use masseter_shared::realtime::Waiter;
 
 use crate::mechanism::DynamicsError;
 
@@ -35,6 +36,9 @@ pub trait Link: Buses {
     fn axis_at(&self, _bus: usize, _port: usize) -> Option<usize> {
         None
     }
+
+    /// Waits in real time until frames may have arrived, but not beyond `latest_ns`; returns the time.
+    fn wait(&mut self, latest_ns: u64, waiter: &mut Waiter) -> u64;
 
     /// The mechanism's true motion at the last SYNC, where it is emulated here.
     fn truth(&self) -> Option<Truth>;

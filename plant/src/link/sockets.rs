@@ -4,9 +4,11 @@ use masseter_can::PortFaults;
 use masseter_can::canopen::NodeId;
 use masseter_can::faults::FaultNote;
 use masseter_can::{Bus, ReceiveError, SocketCan, Tapped};
+use masseter_shared::clock;
 use masseter_shared::config::Scenario;
 use masseter_shared::geometry::AXES;
 use masseter_shared::messages::Truth;
+use masseter_shared::realtime::Waiter;
 
 use super::faults::{fault_seed, faults_of_bus, restart_after_ns};
 use super::interface_lock::InterfaceLock;
@@ -15,6 +17,10 @@ use super::{Buses, Link};
 use crate::checks::check_quantities;
 use crate::error::PlantError;
 use crate::mechanism::DynamicsError;
+
+/// How long a wait for a real frame may take at most, ns: a fault may hold frames back that are due before the next
+/// frame arrives.
+const LONGEST_BLOCK_NS: u64 = 100_000;
 
 /// The master's port, the faults laid over it, and a tap on every wire.
 #[derive(Debug)]
@@ -43,11 +49,6 @@ impl SocketLink {
         let locks = can.interfaces.iter().map(lock).collect::<Result<_, _>>()?;
         Ok(Self { ports, faults, taps, _locks: locks })
     }
-
-    /// Blocks until a frame for the master arrives on a wire, at most until `until_ns`.
-    pub(crate) fn wait_for_frame(&self, until_ns: u64) {
-        SocketCan::wait::<AXES>(&self.ports, until_ns);
-    }
 }
 
 impl Buses for SocketLink {
@@ -67,6 +68,11 @@ impl Link for SocketLink {
 
     fn next_note(&mut self, bus: usize, now_ns: u64) -> Option<FaultNote> {
         self.faults[bus].next_note(now_ns)
+    }
+
+    fn wait(&mut self, latest_ns: u64, waiter: &mut Waiter) -> u64 {
+        let until_ns = latest_ns.min(clock::now_ns() + LONGEST_BLOCK_NS);
+        waiter.until_woken(until_ns, latest_ns, |until_ns| SocketCan::wait::<AXES>(&self.ports, until_ns))
     }
 
     fn truth(&self) -> Option<Truth> {

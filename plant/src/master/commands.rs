@@ -52,17 +52,17 @@ impl Commands {
         command: Option<&Command>,
         needs_command: bool,
         can_go_to: impl Fn(usize, f64) -> bool,
-    ) -> Result<(), Failure> {
+    ) -> Result<(), (Subject, Failure)> {
         let Some(command) = command else {
             self.silent_cycles = self.silent_cycles.saturating_add(1);
             if !needs_command || self.silent_cycles <= self.timeout_cycles {
                 return Ok(());
             }
-            let [value, limit] = [self.silent_cycles, self.timeout_cycles].map(f64::from);
-            return Err(Failure { cause: Cause::CommandLost, subject: Subject::Rig, value, limit });
+            let cycles = [self.silent_cycles, self.timeout_cycles].map(f64::from);
+            return Err((Subject::Rig, Failure::with(Cause::CommandLost, cycles)));
         };
         self.silent_cycles = 0;
-        let bad = |subject, value| Failure { value, ..Failure::new(Cause::BadMessage, subject) };
+        let bad = |subject, value| (subject, Failure::with(Cause::BadMessage, [value, 0.0]));
         if let Some(axis) = (0..AXES).find(|&axis| !can_go_to(axis, command.target_m[axis])) {
             return Err(bad(Subject::Axis(axis), command.target_m[axis]));
         }

@@ -9,24 +9,25 @@ use masseter_shared::clock::MILLISECOND_NS;
 use masseter_shared::config::{DriveConfig, Scenario};
 use masseter_shared::messages::codes::{BootPhase, Cause};
 
-use super::boot::{Boot, BootFault, DriveSetup};
+use super::boot::{Boot, late};
 use super::incoming::Kind;
+use super::interlock::Failure;
 use super::presence::Presence;
 
 /// A judgement that needs a reaction.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Finding {
     /// The drive never came.
-    Absent(BootFault),
+    Absent(Failure),
     /// The drive was lost, with the value and the limit that explain it.
-    Lost { cause: Cause, value: f64, limit: f64 },
+    Lost(Failure),
 }
 
 /// One drive.
 #[derive(Debug, Clone)]
 pub(super) struct RemoteDrive {
-    id: NodeId,
-    bus: usize,
+    pub(super) id: NodeId,
+    pub(super) bus: usize,
     config: DriveConfig,
     heartbeat_timeout_ns: u64,
     boot_timeout_ns: u64,
@@ -50,7 +51,7 @@ impl RemoteDrive {
     /// The drive of an axis, of which nothing is known at `now_ns`.
     pub(super) fn new(scenario: &Scenario, axis: usize, id: NodeId, bus: usize, now_ns: u64) -> Self {
         let (can, config) = (&scenario.can, scenario.drives.of_axis(axis));
-        let boot = Boot::new(id, &DriveSetup::for_axis(scenario, axis), now_ns);
+        let boot = Boot::new(id, scenario, axis, now_ns);
         Self {
             id,
             bus,
@@ -69,16 +70,6 @@ impl RemoteDrive {
             torque_permille: 0,
             controlword: Controlword::DISABLE_VOLTAGE,
         }
-    }
-
-    /// Its node id.
-    pub(super) fn id(&self) -> NodeId {
-        self.id
-    }
-
-    /// Its bus.
-    pub(super) fn bus(&self) -> usize {
-        self.bus
     }
 
     /// Phase of its boot.
@@ -153,7 +144,7 @@ impl RemoteDrive {
         time_ns: u64,
         state: NmtState,
         may_boot: bool,
-    ) -> Result<(), BootFault> {
+    ) -> Result<(), Failure> {
         self.hear_state(time_ns, state);
         if may_boot {
             return self.boot.hear(time_ns, state);
@@ -191,7 +182,7 @@ impl RemoteDrive {
     }
 
     /// Takes an answer of its SDO server.
-    pub(super) fn take_sdo_answer(&mut self, time_ns: u64, answer: SdoResponse) -> Result<(), BootFault> {
+    pub(super) fn take_sdo_answer(&mut self, time_ns: u64, answer: SdoResponse) -> Result<(), Failure> {
         self.presence.hear(time_ns);
         self.boot.take(time_ns, answer)
     }
@@ -208,24 +199,24 @@ impl RemoteDrive {
             BootPhase::Waiting => {
                 let (waited_ns, limit_ns) = (self.boot.waited_ns(now_ns), self.boot_timeout_ns);
                 let is_new = waited_ns > limit_ns && !std::mem::replace(&mut self.is_absence_known, true);
-                is_new.then(|| Finding::Absent(BootFault::late(waited_ns, limit_ns)))
+                is_new.then(|| Finding::Absent(late(waited_ns, limit_ns)))
             }
             BootPhase::Configured | BootPhase::Ready => {
                 if !is_fresh && self.is_operational() {
                     self.presence.miss_cycle();
                 }
                 let loss = self.presence.judge(now_ns, self.heartbeat_timeout_ns);
-                let (cause, [value, limit]) = loss.or_else(|| self.stop_by_itself())?;
-                Some(Finding::Lost { cause, value, limit })
+                loss.or_else(|| self.stop_by_itself()).map(Finding::Lost)
             }
             _ => None,
         }
     }
 
     /// The loss of a started drive that left operational by itself.
-    fn stop_by_itself(&self) -> Option<(Cause, [f64; 2])> {
+    fn stop_by_itself(&self) -> Option<Failure> {
         let state = self.nmt.filter(|&state| self.is_started && state != NmtState::Operational)?;
-        Some((Cause::NodeStopped, [state, NmtState::Operational].map(|state| f64::from(state.code()))))
+        let states = [state, NmtState::Operational].map(|state| f64::from(state.code()));
+        Some(Failure::with(Cause::NodeStopped, states))
     }
 
     /// Discards everything found out about the drive; it has to boot again.
@@ -243,7 +234,7 @@ impl RemoteDrive {
     }
 
     /// Continues its boot after some time.
-    pub(super) fn advance_boot(&mut self, now_ns: u64) -> Result<(), BootFault> {
+    pub(super) fn advance_boot(&mut self, now_ns: u64) -> Result<(), Failure> {
         self.boot.expire(now_ns)
     }
 

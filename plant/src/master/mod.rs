@@ -38,7 +38,6 @@ use masseter_shared::realtime::Wake;
 use crate::error::PlantError;
 use crate::link::Buses;
 use crate::link::layout::{drive_ports, node_ids};
-use boot::BootFault;
 use bus_monitor::BusMonitor;
 use commands::Commands;
 use drive::{Finding, RemoteDrive};
@@ -154,7 +153,7 @@ impl Master {
         let (request, targets_m) = (self.request(), self.commands.targets_m());
         for (axis, target_m) in targets_m.into_iter().enumerate() {
             if let Some(frame) = self.drives[axis].process_data(request, target_m) {
-                self.send(now_ns, self.drives[axis].bus(), frame, buses);
+                self.send(now_ns, self.drives[axis].bus, frame, buses);
             }
         }
         self.boot(now_ns, buses);
@@ -188,7 +187,7 @@ impl Master {
     /// Whether a drive has answered this cycle's SYNC.
     fn is_fresh(&self, axis: usize) -> bool {
         let drive = &self.drives[axis];
-        drive.has_answered_since(self.exchange.answered_after_ns(drive.bus()))
+        drive.has_answered_since(self.exchange.answered_after_ns(drive.bus))
     }
 
     /// The request to the drives: that of the last valid command, unless there is a fault or the end is asked for, and
@@ -209,9 +208,9 @@ impl Master {
         for axis in 0..AXES {
             let is_fresh = self.is_fresh(axis);
             match self.drives[axis].judge(now_ns, is_fresh) {
-                Some(Finding::Absent(fault)) => self.fail_boot(now_ns, axis, &fault),
-                Some(Finding::Lost { cause, value, limit }) => {
-                    self.fail(now_ns, Failure { cause, subject: Subject::Axis(axis), value, limit });
+                Some(Finding::Absent(failure)) => self.fail_boot(now_ns, axis, &failure),
+                Some(Finding::Lost(failure)) => {
+                    self.fail(now_ns, Subject::Axis(axis), &failure);
                     self.drives[axis].forget(now_ns);
                     self.report_boot(now_ns, axis, Ok(()));
                 }
@@ -219,8 +218,8 @@ impl Master {
             }
             let state = self.drives[axis].drive_state();
             all_are_enabled &= state == Some(DriveState::OperationEnabled);
-            if let Some(failure) = self.supervision.judge(axis, state, is_enable) {
-                self.fail(now_ns, failure);
+            if let Some(failure) = self.supervision.judge(state, is_enable) {
+                self.fail(now_ns, Subject::Axis(axis), &failure);
             }
         }
         self.supervision.end_cycle(is_enable, all_are_enabled);
@@ -233,7 +232,7 @@ impl Master {
             let (subject, value) = (Subject::Bus(bus), f64::from(status.tec));
             match self.buses[bus].set_error_state(status.state) {
                 None => {}
-                Some(true) => self.fail(now_ns, Failure { value, ..Failure::new(Cause::BusOff, subject) }),
+                Some(true) => self.fail(now_ns, subject, &Failure::with(Cause::BusOff, [value, 0.0])),
                 Some(false) => {
                     self.events.add(now_ns, subject, Event { value, ..notice(Cause::Recovered) });
                 }
@@ -245,8 +244,8 @@ impl Master {
         // A controller whose drives are off or stopping may be silent: they need no command.
         let needs_command = self.request() == DriveRequest::Enable;
         let can_go_to = |axis: usize, target_m| self.drives[axis].can_go_to(target_m);
-        if let Err(failure) = self.commands.take(now_ns, command, needs_command, can_go_to) {
-            self.fail(now_ns, failure);
+        if let Err((subject, failure)) = self.commands.take(now_ns, command, needs_command, can_go_to) {
+            self.fail(now_ns, subject, &failure);
         }
     }
 
@@ -266,17 +265,16 @@ impl Master {
     }
 
     /// Stops the drives. The first cause is reported, its consequences are not.
-    fn fail(&mut self, now_ns: u64, failure: Failure) {
-        let Failure { cause, subject, value, limit } = failure;
-        if self.interlock.lock(cause) {
-            self.events.add(now_ns, subject, Event { value, limit, ..fault(cause) });
+    fn fail(&mut self, now_ns: u64, subject: Subject, failure: &Failure) {
+        if self.interlock.lock(failure.cause) {
+            self.events.add(now_ns, subject, failure.event());
         }
     }
 
     /// Leaves the drives to another master, permanently.
     fn yield_to_other_master(&mut self, now_ns: u64, bus: usize) {
         if self.interlock.lock_permanently() {
-            self.events.add(now_ns, Subject::Bus(bus), fault(Cause::SecondMaster));
+            self.events.add(now_ns, Subject::Bus(bus), Failure::new(Cause::SecondMaster).event());
         }
     }
 
@@ -313,7 +311,7 @@ impl Master {
         let last = self.last_served[bus];
         for axis in (1..=AXES).map(|step| (last + step) % AXES) {
             let drive = &mut self.drives[axis];
-            if drive.bus() == bus
+            if drive.bus == bus
                 && let Some(frame) = drive.sdo_request(now_ns)
             {
                 self.last_served[bus] = axis;
@@ -338,15 +336,15 @@ impl Master {
 
     fn send_nmt(&mut self, now_ns: u64, axis: usize, command: NmtCommand, buses: &mut impl Buses) {
         let drive = &self.drives[axis];
-        let frame = Nmt { command, target: NmtTarget::Node(drive.id()) }.frame();
-        self.send(now_ns, drive.bus(), frame, buses);
+        let frame = Nmt { command, target: NmtTarget::Node(drive.id) }.frame();
+        self.send(now_ns, drive.bus, frame, buses);
     }
 
     fn send(&mut self, now_ns: u64, bus: usize, frame: Frame, buses: &mut impl Buses) {
         if let Err(refusal) = buses.port(bus).send(now_ns, frame)
             && self.buses[bus].is_unexplained(&refusal)
         {
-            self.fail(self.exchange.begun_ns(), Failure::new(Cause::BusRefused, Subject::Bus(bus)));
+            self.fail(self.exchange.begun_ns(), Subject::Bus(bus), &Failure::new(Cause::BusRefused));
         }
     }
 
@@ -362,7 +360,7 @@ impl Master {
         if id == self.id {
             return self.yield_to_other_master(time_ns, bus);
         }
-        let Some(axis) = self.drives.iter().position(|drive| drive.id() == id && drive.bus() == bus) else {
+        let Some(axis) = self.drives.iter().position(|drive| drive.id == id && drive.bus == bus) else {
             return self.note_unknown(time_ns, id, bus);
         };
         self.buses[bus].note_drive();
@@ -386,7 +384,7 @@ impl Master {
     fn take_heartbeat(&mut self, axis: usize, state: NmtState, time_ns: u64) {
         let may_boot = self.may_boot();
         let result = if state == NmtState::BootUp && self.drives[axis].is_started() {
-            self.fail(time_ns, Failure::new(Cause::NodeRestarted, Subject::Axis(axis)));
+            self.fail(time_ns, Subject::Axis(axis), &Failure::new(Cause::NodeRestarted));
             self.drives[axis].take_restart(time_ns);
             Ok(())
         } else {
@@ -428,10 +426,10 @@ impl Master {
     }
 
     /// Reports a change of a drive's boot, or its failure.
-    fn report_boot(&mut self, time_ns: u64, axis: usize, result: Result<(), BootFault>) {
-        if let Err(fault) = result {
+    fn report_boot(&mut self, time_ns: u64, axis: usize, result: Result<(), Failure>) {
+        if let Err(failure) = result {
             self.drives[axis].give_up();
-            self.fail_boot(time_ns, axis, &fault);
+            self.fail_boot(time_ns, axis, &failure);
         }
         if let Some([before, after]) = self.drives[axis].phase_change() {
             let event = transition(Source::Master, before.code(), after.code());
@@ -441,20 +439,14 @@ impl Master {
 
     /// Reports why a drive was given up. The failure of one drive to boot is no consequence of another's, so that each is
     /// reported.
-    fn fail_boot(&mut self, now_ns: u64, axis: usize, boot_fault: &BootFault) {
-        let BootFault { cause, object, value, limit } = *boot_fault;
-        self.interlock.lock(cause);
-        let object = object.map_or(0, |object| u32::from(object.index) << 8 | u32::from(object.subindex));
-        self.events.add(now_ns, Subject::Axis(axis), Event { object, value, limit, ..fault(cause) });
+    fn fail_boot(&mut self, now_ns: u64, axis: usize, failure: &Failure) {
+        self.interlock.lock(failure.cause);
+        self.events.add(now_ns, Subject::Axis(axis), failure.event());
     }
 }
 
 fn notice(cause: Cause) -> Event {
     Event::new(Source::Master, EventKind::Notice, cause)
-}
-
-fn fault(cause: Cause) -> Event {
-    Event::new(Source::Master, EventKind::Fault, cause)
 }
 
 fn transition(source: Source, from: u32, to: u32) -> Event {

@@ -2,6 +2,8 @@
 
 use masseter_shared::messages::codes::Cause;
 
+use super::interlock::Failure;
+
 /// Cycles in which an operational drive's process data may be missing.
 const MISSING_CYCLES: u32 = 3;
 /// New process data beyond one a SYNC that a single node may send: all those that may be missing may come late, at once.
@@ -71,15 +73,16 @@ impl Presence {
         (self.missing_cycles, self.surplus) = (0, 0);
     }
 
-    /// The reason why the drive counts as lost, with value and limit.
-    pub(super) fn judge(&self, now_ns: u64, heartbeat_timeout_ns: u64) -> Option<(Cause, [f64; 2])> {
+    /// The reason why the drive counts as lost, if it does.
+    pub(super) fn judge(&self, now_ns: u64, heartbeat_timeout_ns: u64) -> Option<Failure> {
         let silent_ns = now_ns.saturating_sub(self.heard_ns);
         if silent_ns > heartbeat_timeout_ns {
-            Some((Cause::HeartbeatLost, [silent_ns, heartbeat_timeout_ns].map(|ns| ns as f64 / 1e6)))
+            let times_ms = [silent_ns, heartbeat_timeout_ns].map(|ns| ns as f64 / 1e6);
+            Some(Failure::with(Cause::HeartbeatLost, times_ms))
         } else if self.surplus > SURPLUS {
-            Some((Cause::DuplicateNode, [self.surplus, SURPLUS].map(f64::from)))
+            Some(Failure::with(Cause::DuplicateNode, [self.surplus, SURPLUS].map(f64::from)))
         } else if self.missing_cycles > MISSING_CYCLES {
-            Some((Cause::ProcessDataLost, [self.missing_cycles, MISSING_CYCLES].map(f64::from)))
+            Some(Failure::with(Cause::ProcessDataLost, [self.missing_cycles, MISSING_CYCLES].map(f64::from)))
         } else {
             None
         }

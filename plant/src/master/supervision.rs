@@ -4,7 +4,6 @@
 
 use masseter_shared::messages::codes::{Cause, DriveState, drive_state_code};
 
-use super::events::Subject;
 use super::interlock::Failure;
 
 /// Memory of the supervision.
@@ -16,10 +15,9 @@ pub(super) struct Supervision {
 
 impl Supervision {
     /// Judges a drive in a cycle in which the drives are to be enabled, or not.
-    pub(super) fn judge(self, axis: usize, state: Option<DriveState>, is_enable: bool) -> Option<Failure> {
+    pub(super) fn judge(self, state: Option<DriveState>, is_enable: bool) -> Option<Failure> {
         let has_left = is_enable && self.were_enabled && state != Some(DriveState::OperationEnabled);
-        let value = f64::from(drive_state_code(state));
-        has_left.then(|| Failure { value, ..Failure::new(Cause::DriveFault, Subject::Axis(axis)) })
+        has_left.then(|| Failure::with(Cause::DriveFault, [f64::from(drive_state_code(state)), 0.0]))
     }
 
     /// Ends the judgement of a cycle.

@@ -47,7 +47,7 @@ macro_rules! topics {
             /// The message of a topic with this body, if its length is one of this topic.
             pub(super) fn read(topic: Topic, body: &[u8]) -> Option<Self> {
                 Some(match topic {
-                    $(Topic::$name => Self::$name(<$message>::of_body(body)?)),*
+                    $(Topic::$name => Self::$name(<$message>::from_body(body)?)),*
                 })
             }
 

@@ -71,38 +71,12 @@ pub fn solve_traced(
     Ok(Solution { residual_m: at.evaluation.residual_norm_m(), ..Solution::new(&loops, &closed) })
 }
 
-/// [`solve`] by the paper's algorithm.
-///
-/// # Errors
-/// Those of [`solve`].
-pub fn solve_published(
-    mechanism: &Mechanism,
-    actuators: &Actuators,
-    guess_rad: &[f64; LEGS],
-    options: &Options,
-) -> Result<Solution, ForwardError> {
-    solve(Method::Published, mechanism, actuators, guess_rad, options)
-}
-
-/// [`solve`] by Newton–Raphson.
-///
-/// # Errors
-/// Those of [`solve`], never [`ForwardError::Stalled`].
-pub fn solve_newton(
-    mechanism: &Mechanism,
-    actuators: &Actuators,
-    guess_rad: &[f64; LEGS],
-    options: &Options,
-) -> Result<Solution, ForwardError> {
-    solve(Method::Newton, mechanism, actuators, guess_rad, options)
-}
-
 #[cfg(test)]
 mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::kinematics::samples::{angle_between, mechanisms, poses, published_mechanism};
+    use crate::kinematics::tests::{angle_between, mechanisms, poses, published_mechanism};
 
     fn default() -> Options {
         Options::default()
@@ -137,11 +111,14 @@ mod tests {
         actuators.leg_m[2] = f64::NAN;
         let mechanism = published_mechanism();
         assert_eq!(
-            solve_published(&mechanism, &actuators, &[1.4; LEGS], &default()),
+            solve(Method::Published, &mechanism, &actuators, &[1.4; LEGS], &default()),
             Err(ForwardError::NotFinite)
         );
         let guess = [1.4, f64::INFINITY, 1.4];
-        assert_eq!(solve_newton(&mechanism, &neutral(), &guess, &default()), Err(ForwardError::NotFinite));
+        assert_eq!(
+            solve(Method::Newton, &mechanism, &neutral(), &guess, &default()),
+            Err(ForwardError::NotFinite)
+        );
     }
 
     /// With leg 1 shorter than its hinge's distance from everything leg 2 reaches, nothing closes.
@@ -216,7 +193,7 @@ mod tests {
             let guess = std::array::from_fn(|leg| joints.theta_rad[leg] + off[leg]);
             for residual in [Residual::Distance, Residual::SquaredDistance] {
                 let options = Options { residual, step, ..default() };
-                let solution = solve_published(&mechanism, &joints.actuators, &guess, &options).unwrap();
+                let solution = solve(Method::Published, &mechanism, &joints.actuators, &guess, &options).unwrap();
                 prop_assert!((solution.pose.translation.vector - pose.translation.vector).norm() < 1e-10);
             }
         }

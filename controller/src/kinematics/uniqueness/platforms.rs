@@ -152,7 +152,7 @@ mod tests {
 
     use super::*;
     use crate::kinematics::Solutions;
-    use crate::kinematics::samples::mechanisms;
+    use crate::kinematics::tests::mechanisms;
 
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(200))]

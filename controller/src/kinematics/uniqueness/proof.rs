@@ -202,7 +202,7 @@ mod tests {
 
     use super::*;
     use crate::kinematics::Solutions;
-    use crate::kinematics::samples::{AMBIGUOUS, published_mechanism};
+    use crate::kinematics::tests::{AMBIGUOUS, published_mechanism};
 
     fn around(actuators: &Actuators, radius_m: f64) -> InputBox {
         let around = |value_m: f64| Enclosure::new(value_m - radius_m, value_m + radius_m);

@@ -24,7 +24,7 @@ use clamp::clamp_symmetric;
 use demand::{Approach, Demand};
 use following::FollowingErrorMonitor;
 use motion::{Motion, MotionCommand, PositionView};
-use parameters::{AbortConnectionReaction, MotionLimits, Parameters, StopMethod};
+use parameters::{MotionLimits, Parameters};
 use positioning::Positioning;
 use profile::Profile;
 use servo::{Servo, ServoCommand, ServoLimits};
@@ -178,11 +178,11 @@ impl Axis {
     /// Reacts as 6007h says when nobody controls the drive any more; returns whether that put it into fault.
     pub(super) fn abort_connection(&mut self, now_ns: u64) -> bool {
         let was_in_fault = self.is_in_fault();
-        match self.parameters.abort_connection {
-            AbortConnectionReaction::Nothing => {}
-            AbortConnectionReaction::Fault => self.enter(self.power.after_fault(), now_ns),
-            AbortConnectionReaction::DisableVoltage => self.obey(Command::DisableVoltage, now_ns),
-            AbortConnectionReaction::QuickStop => self.obey(Command::QuickStop, now_ns),
+        match self.parameters.abort_connection_option {
+            0 => {}
+            1 => self.enter(self.power.after_fault(), now_ns),
+            2 => self.obey(Command::DisableVoltage, now_ns),
+            _ => self.obey(Command::QuickStop, now_ns),
         }
         self.is_in_fault() && !was_in_fault
     }
@@ -301,8 +301,8 @@ impl Axis {
         self.interrupt_mode();
         match state {
             DriveState::OperationEnabled => self.enable(),
-            DriveState::QuickStopActive => self.stop(now_ns, self.parameters.quick_stop),
-            DriveState::FaultReactionActive => self.stop(now_ns, self.parameters.fault_stop),
+            DriveState::QuickStopActive => self.stop(now_ns, self.parameters.quick_stop_m_s2),
+            DriveState::FaultReactionActive => self.stop(now_ns, self.parameters.fault_stop_m_s2),
             _ => self.demand.release(),
         }
     }
@@ -363,10 +363,10 @@ impl Axis {
         }
     }
 
-    fn stop(&mut self, now_ns: u64, method: StopMethod) {
-        match method {
-            StopMethod::Brake => self.demand.release(),
-            StopMethod::Ramp { deceleration_m_s2 } => self.slow_down(now_ns, deceleration_m_s2),
+    fn stop(&mut self, now_ns: u64, deceleration_m_s2: Option<f64>) {
+        match deceleration_m_s2 {
+            Some(deceleration_m_s2) => self.slow_down(now_ns, deceleration_m_s2),
+            None => self.demand.release(),
         }
     }
 

@@ -3,31 +3,21 @@
 /// Mode of operation (6060h).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Mode {
-    ProfilePosition,
-    Homing,
-    CyclicPosition,
-    CyclicTorque,
+    ProfilePosition = 1,
+    Homing = 6,
+    CyclicPosition = 8,
+    CyclicTorque = 10,
 }
 
 impl Mode {
     /// The mode of that number; `None` where the drive has no such mode.
-    pub(crate) const fn from_number(number: i8) -> Option<Self> {
-        match number {
-            1 => Some(Self::ProfilePosition),
-            6 => Some(Self::Homing),
-            8 => Some(Self::CyclicPosition),
-            10 => Some(Self::CyclicTorque),
-            _ => None,
-        }
+    pub(crate) fn from_number(number: i8) -> Option<Self> {
+        let modes = [Self::ProfilePosition, Self::Homing, Self::CyclicPosition, Self::CyclicTorque];
+        modes.into_iter().find(|mode| mode.number() == number)
     }
 
     /// The mode's number.
     pub(crate) const fn number(self) -> i8 {
-        match self {
-            Self::ProfilePosition => 1,
-            Self::Homing => 6,
-            Self::CyclicPosition => 8,
-            Self::CyclicTorque => 10,
-        }
+        self as i8
     }
 }

@@ -19,24 +19,6 @@ pub(super) struct MotionLimits {
     pub(super) deceleration_m_s2: f64,
 }
 
-/// The way in which an axis comes to rest.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum StopMethod {
-    /// The brake closes at once.
-    Brake,
-    /// Along a ramp.
-    Ramp { deceleration_m_s2: f64 },
-}
-
-/// Reaction of the drive when nobody controls it any more (abort connection option code, 6007h).
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum AbortConnectionReaction {
-    Nothing,
-    Fault,
-    DisableVoltage,
-    QuickStop,
-}
-
 /// Parameters of homing (6098h, 6099h, 609Ah, 607Ch).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct HomingParameters {
@@ -65,14 +47,14 @@ pub(super) struct Parameters {
     pub(super) position_window_m: f64,
     /// Profile position (6081h, 6083h, 6084h).
     pub(super) profile: MotionLimits,
-    /// Quick stop (605Ah, 6084h, 6085h).
-    pub(super) quick_stop: StopMethod,
+    /// Deceleration of a quick stop (605Ah, 6084h, 6085h), m/s²; none where the brake closes at once.
+    pub(super) quick_stop_m_s2: Option<f64>,
     /// Whether the drive stays in quick stop active (605Ah from 5 on).
     pub(super) holds_quick_stop: bool,
-    /// Fault reaction (605Eh).
-    pub(super) fault_stop: StopMethod,
+    /// Deceleration of the fault reaction (605Eh), m/s²; none where the brake closes at once.
+    pub(super) fault_stop_m_s2: Option<f64>,
     /// Abort connection option code (6007h).
-    pub(super) abort_connection: AbortConnectionReaction,
+    pub(super) abort_connection_option: i16,
     /// Homing.
     pub(super) homing: HomingParameters,
 }
@@ -89,9 +71,9 @@ impl Parameters {
         };
         let quick_stop_m_s2 = metres(objects.get(names::QUICK_STOP_DECELERATION));
         let stop = |option: i16| match option {
-            0 => StopMethod::Brake,
-            1 | 5 => StopMethod::Ramp { deceleration_m_s2: profile.deceleration_m_s2 },
-            _ => StopMethod::Ramp { deceleration_m_s2: quick_stop_m_s2 },
+            0 => None,
+            1 | 5 => Some(profile.deceleration_m_s2),
+            _ => Some(quick_stop_m_s2),
         };
         let window = Some(objects.get(names::FOLLOWING_WINDOW)).filter(|&window| window != NO_WINDOW);
         let torque_limit_n = f64::from(objects.get(names::MAX_TORQUE)) / 1000.0 * drive.rated_force_n;
@@ -108,15 +90,10 @@ impl Parameters {
             following_timeout_ns: u64::from(objects.get(names::FOLLOWING_TIMEOUT_MS)) * MILLISECOND_NS,
             position_window_m: metres(objects.get(names::POSITION_WINDOW)),
             profile,
-            quick_stop: stop(objects.get(names::QUICK_STOP_OPTION)),
+            quick_stop_m_s2: stop(objects.get(names::QUICK_STOP_OPTION)),
             holds_quick_stop: objects.get(names::QUICK_STOP_OPTION) >= 5,
-            fault_stop: stop(objects.get(names::FAULT_OPTION)),
-            abort_connection: match objects.get(names::ABORT_CONNECTION_OPTION) {
-                0 => AbortConnectionReaction::Nothing,
-                1 => AbortConnectionReaction::Fault,
-                2 => AbortConnectionReaction::DisableVoltage,
-                _ => AbortConnectionReaction::QuickStop,
-            },
+            fault_stop_m_s2: stop(objects.get(names::FAULT_OPTION)),
+            abort_connection_option: objects.get(names::ABORT_CONNECTION_OPTION),
             homing: HomingParameters {
                 method: objects.get(names::HOMING_METHOD),
                 search: MotionLimits {
@@ -182,8 +159,7 @@ mod tests {
         assert!(near(parameters.following_window_m.unwrap(), drive.following_error_m));
         assert_eq!(parameters.following_timeout_ns, 20 * MILLISECOND_NS);
         assert_eq!(parameters.position_limits, [-5, 7]);
-        let StopMethod::Ramp { deceleration_m_s2 } = parameters.quick_stop else { panic!("no ramp") };
-        assert!(near(deceleration_m_s2, drive.quick_stop_deceleration_m_s2));
-        assert_eq!(parameters.abort_connection, AbortConnectionReaction::QuickStop);
+        assert!(near(parameters.quick_stop_m_s2.unwrap(), drive.quick_stop_deceleration_m_s2));
+        assert_eq!(parameters.abort_connection_option, 3, "quick stop");
     }
 }

@@ -2,17 +2,17 @@
 
 use masseter_can::canopen::ObjectAddress;
 
-/// Data type of an entry (CiA 301, table 44).
+/// Data type of an entry, with its index in the object dictionary (CiA 301, table 44).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum DataType {
-    I8,
-    I16,
-    I32,
-    U8,
-    U16,
-    U32,
+    I8 = 0x02,
+    I16 = 0x03,
+    I32 = 0x04,
+    U8 = 0x05,
+    U16 = 0x06,
+    U32 = 0x07,
     /// A constant text (VISIBLE_STRING).
-    Text,
+    Text = 0x09,
 }
 
 impl DataType {
@@ -23,19 +23,6 @@ impl DataType {
             Self::I16 | Self::U16 => 2,
             Self::I32 | Self::U32 => 4,
             Self::Text => 0,
-        }
-    }
-
-    /// The type's index in the object dictionary.
-    pub(crate) const fn code(self) -> u16 {
-        match self {
-            Self::I8 => 0x02,
-            Self::I16 => 0x03,
-            Self::I32 => 0x04,
-            Self::U8 => 0x05,
-            Self::U16 => 0x06,
-            Self::U32 => 0x07,
-            Self::Text => 0x09,
         }
     }
 

@@ -5,7 +5,7 @@
 
 use masseter_can::canopen::{AbortCode, Expedited, ObjectAddress};
 
-use super::rules::{Situation, check};
+use super::rules::check;
 use super::sdo::{Dictionary, Value};
 use super::storage::Storage;
 use crate::drive::axis::Axis;
@@ -46,12 +46,7 @@ impl Dictionary for DictionaryAccess<'_> {
     fn write(&mut self, object: ObjectAddress, data: &[u8], is_sized: bool) -> Result<(), AbortCode> {
         let place = find(object)?;
         let word = writable(place, data, is_sized)?;
-        let situation = Situation {
-            is_operational: self.is_operational,
-            is_enabled: self.axis.is_enabled(),
-            is_homing: self.axis.is_homing(),
-        };
-        check(object, word, self.objects, situation)?;
+        check(object, word, self.objects, self.axis, self.is_operational)?;
         match object.index {
             0x1010 => self.storage.store(self.objects),
             0x1011 => self.storage.restore_factory(),

@@ -12,79 +12,34 @@ const GENERIC: u8 = 1 << 0;
 const COMMUNICATION: u8 = 1 << 4;
 const PROFILE: u8 = 1 << 5;
 
-/// An error of the drive.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum DriveError {
-    /// A consumed heartbeat is overdue.
-    Heartbeat,
-    /// A PDO was too short.
-    PdoShort,
-    /// A PDO was too long.
-    PdoLong,
-    /// The length of SYNC contradicts 1019h.
-    SyncLength,
-    /// The event timer of an RPDO ran out.
-    RpdoTimeout,
-    /// The following error was outside its window for longer than its time out.
-    FollowingError,
-    /// Its CAN controller is error passive.
-    ErrorPassive,
-    /// Its CAN controller was off the bus.
-    WasBusOff,
-    /// Nobody controlled the drive any more, which 6007h makes a fault.
-    ConnectionAborted,
-}
-
-/// How many there are.
+/// The number of errors that the drive knows.
 const COUNT: usize = 9;
 
-impl DriveError {
-    /// The errors that put the drive into fault and last until it is reset.
-    pub(super) const FAULTS: [Self; 2] = [Self::FollowingError, Self::ConnectionAborted];
-
-    const fn code(self) -> EmergencyCode {
-        match self {
-            Self::Heartbeat => EmergencyCode::HEARTBEAT,
-            Self::PdoShort => EmergencyCode::PDO_LENGTH,
-            Self::PdoLong => EmergencyCode::PDO_LENGTH_EXCEEDED,
-            Self::SyncLength => EmergencyCode::SYNC_LENGTH,
-            Self::RpdoTimeout => EmergencyCode::RPDO_TIMEOUT,
-            Self::FollowingError => EmergencyCode::FOLLOWING_ERROR,
-            Self::ErrorPassive => EmergencyCode::ERROR_PASSIVE,
-            Self::WasBusOff => EmergencyCode::WAS_BUS_OFF,
-            Self::ConnectionAborted => EmergencyCode::COMMUNICATION,
-        }
-    }
-
-    const fn register(self) -> u8 {
-        match self {
-            Self::FollowingError => GENERIC | PROFILE,
-            _ => GENERIC | COMMUNICATION,
-        }
-    }
-}
+/// The errors that put the drive into fault and last until it is reset: a following error outside its window for longer
+/// than its time out, and a drive that nobody controls any more where 6007h makes that a fault.
+pub(super) const FAULTS: [EmergencyCode; 2] = [EmergencyCode::FOLLOWING_ERROR, EmergencyCode::COMMUNICATION];
 
 /// The present errors, the newest first.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Errors {
-    present: [Option<DriveError>; COUNT],
+    present: [Option<EmergencyCode>; COUNT],
 }
 
 impl Errors {
     /// An error appears; returns its emergency message, unless the error was present already.
-    pub(super) fn raise(&mut self, error: DriveError, objects: &mut Objects) -> Option<Emergency> {
+    pub(super) fn raise(&mut self, error: EmergencyCode, objects: &mut Objects) -> Option<Emergency> {
         if self.present.contains(&Some(error)) {
             return None;
         }
         // There is room for every error once, so that the last place is free.
         self.present.rotate_right(1);
         self.present[0] = Some(error);
-        remember(error.code(), objects);
-        Some(self.emergency(error.code(), objects))
+        remember(error, objects);
+        Some(self.emergency(error, objects))
     }
 
     /// An error disappears; returns the emergency message, if the error was present.
-    pub(super) fn clear(&mut self, error: DriveError, objects: &mut Objects) -> Option<Emergency> {
+    pub(super) fn clear(&mut self, error: EmergencyCode, objects: &mut Objects) -> Option<Emergency> {
         let place = self.present.iter().position(|present| *present == Some(error))?;
         self.present[place] = None;
         self.present[place..].rotate_left(1);
@@ -94,7 +49,7 @@ impl Errors {
     /// Clears the errors of the communication without a message, as its reset does; faults stay.
     pub(super) fn forget_communication(&mut self, objects: &mut Objects) {
         let before = std::mem::take(&mut self.present);
-        let faults = before.into_iter().flatten().filter(|error| DriveError::FAULTS.contains(error));
+        let faults = before.into_iter().flatten().filter(|error| FAULTS.contains(error));
         for (place, fault) in self.present.iter_mut().zip(faults) {
             *place = Some(fault);
         }
@@ -108,11 +63,16 @@ impl Errors {
     /// Updates the error register and the error code (603Fh), which is that of the newest present error.
     fn show(self, objects: &mut Objects) -> u8 {
         let present = self.present.into_iter().flatten();
-        let register = present.fold(0, |register, error| register | error.register());
+        let register = present.fold(0, |register, error| register | register_bits(error));
         objects.set(ERROR_REGISTER, register);
-        objects.set(ERROR_CODE, self.present[0].map_or(0, |error| error.code().0));
+        objects.set(ERROR_CODE, self.present[0].map_or(0, |error| error.0));
         register
     }
+}
+
+/// The bits of an error in the error register.
+fn register_bits(error: EmergencyCode) -> u8 {
+    GENERIC | if error == EmergencyCode::FOLLOWING_ERROR { PROFILE } else { COMMUNICATION }
 }
 
 /// Adds an error at the beginning of the history; the oldest one drops out.
@@ -142,16 +102,16 @@ mod tests {
     fn errors_are_reported_when_they_appear_and_disappear_and_not_in_between() {
         let mut objects = Objects::new(NodeId::new(3).unwrap());
         let mut errors = Errors::default();
-        let emergency = errors.raise(DriveError::FollowingError, &mut objects).unwrap();
+        let emergency = errors.raise(EmergencyCode::FOLLOWING_ERROR, &mut objects).unwrap();
         assert_eq!((emergency.code, emergency.register), (EmergencyCode::FOLLOWING_ERROR, 0x21));
-        assert_eq!(errors.raise(DriveError::FollowingError, &mut objects), None);
-        let emergency = errors.raise(DriveError::Heartbeat, &mut objects).unwrap();
+        assert_eq!(errors.raise(EmergencyCode::FOLLOWING_ERROR, &mut objects), None);
+        let emergency = errors.raise(EmergencyCode::HEARTBEAT, &mut objects).unwrap();
         assert_eq!((emergency.code, emergency.register), (EmergencyCode::HEARTBEAT, 0x31));
-        let emergency = errors.clear(DriveError::FollowingError, &mut objects).unwrap();
+        let emergency = errors.clear(EmergencyCode::FOLLOWING_ERROR, &mut objects).unwrap();
         assert_eq!((emergency.code, emergency.register), (EmergencyCode::RESET, 0x11), "one is left");
-        let emergency = errors.clear(DriveError::Heartbeat, &mut objects).unwrap();
+        let emergency = errors.clear(EmergencyCode::HEARTBEAT, &mut objects).unwrap();
         assert_eq!(emergency, Emergency::RESET);
-        assert_eq!(errors.clear(DriveError::Heartbeat, &mut objects), None);
+        assert_eq!(errors.clear(EmergencyCode::HEARTBEAT, &mut objects), None);
         assert_eq!((objects.get(ERROR_REGISTER), objects.get(ERROR_CODE)), (0, 0));
     }
 
@@ -160,7 +120,7 @@ mod tests {
         let mut objects = Objects::new(NodeId::new(3).unwrap());
         let mut errors = Errors::default();
         let [following, heartbeat, short] =
-            [DriveError::FollowingError, DriveError::Heartbeat, DriveError::PdoShort];
+            [EmergencyCode::FOLLOWING_ERROR, EmergencyCode::HEARTBEAT, EmergencyCode::PDO_LENGTH];
         for error in [following, heartbeat, short] {
             errors.raise(error, &mut objects);
         }
@@ -179,10 +139,10 @@ mod tests {
         let mut objects = Objects::new(NodeId::new(3).unwrap());
         let mut errors = Errors::default();
         for _ in 0..5 {
-            errors.raise(DriveError::PdoShort, &mut objects);
-            errors.raise(DriveError::PdoLong, &mut objects);
-            errors.clear(DriveError::PdoShort, &mut objects);
-            errors.clear(DriveError::PdoLong, &mut objects);
+            errors.raise(EmergencyCode::PDO_LENGTH, &mut objects);
+            errors.raise(EmergencyCode::PDO_LENGTH_EXCEEDED, &mut objects);
+            errors.clear(EmergencyCode::PDO_LENGTH, &mut objects);
+            errors.clear(EmergencyCode::PDO_LENGTH_EXCEEDED, &mut objects);
         }
         assert_eq!(objects.get(ERROR_COUNT), 8);
         let history = |place: usize| objects.word(NEWEST_ERROR.place() + place);

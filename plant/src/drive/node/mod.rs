@@ -15,16 +15,18 @@ mod sdo;
 mod storage;
 
 use masseter_can::canopen::{
-    Cob, CobId, Emergency, Heartbeat, Nmt as NmtMessage, NmtCommand, NmtState, NodeId, ObjectAddress,
+    Cob, CobId, Emergency, EmergencyCode, Heartbeat, Nmt as NmtMessage, NmtCommand, NmtState, NodeId,
+    ObjectAddress,
 };
 use masseter_can::cia402::Controlword;
 use masseter_can::{ErrorState, Frame};
+use masseter_shared::clock::MILLISECOND_NS;
 
 use super::axis::{Axis, Encoder, NewTargets};
 use super::dictionary::{Objects, PDOS, names};
 use super::settings::DriveSettings;
 use access::DictionaryAccess;
-use errors::{DriveError, Errors, clear_history};
+use errors::{Errors, FAULTS, clear_history};
 use heartbeats::{Consumer, Producer};
 use nmt::{BOOT_NS, Nmt};
 use outbox::Outbox;
@@ -55,7 +57,8 @@ impl DriveNode {
     pub(crate) fn new(settings: &DriveSettings, encoder: Encoder, now_ns: u64, position_m: f64) -> Self {
         let objects = settings.objects();
         // Staggered, so that the heartbeats of several nodes do not coincide.
-        let stagger_ns = settings.heartbeat_ns / 8 * u64::from(settings.node.get() % 8);
+        let heartbeat_ns = u64::from(settings.heartbeat_ms) * MILLISECOND_NS;
+        let stagger_ns = heartbeat_ns / 8 * u64::from(settings.node.get() % 8);
         Self {
             id: settings.node,
             storage: Storage::new(&objects),
@@ -67,7 +70,7 @@ impl DriveNode {
             consumer: Consumer::new(&objects),
             process_data: ProcessData::new(&objects),
             sdo: SdoServer::default(),
-            outbox: Outbox::default(),
+            outbox: Outbox::new(),
             objects,
         }
     }
@@ -114,23 +117,23 @@ impl DriveNode {
     /// A step of the servo loops with the axis at `position_m`: the force until the next one, N.
     pub(crate) fn step(&mut self, now_ns: u64, position_m: f64) -> f64 {
         if self.nmt.boot(now_ns) {
-            self.send(Heartbeat { state: NmtState::BootUp }.frame(self.id));
+            self.outbox.add(Heartbeat { state: NmtState::BootUp }.frame(self.id));
         }
         if let Some(state) = self.nmt.state()
             && self.producer.is_due(now_ns)
         {
-            self.send(Heartbeat { state }.frame(self.id));
+            self.outbox.add(Heartbeat { state }.frame(self.id));
         }
         self.supervise_connection(now_ns);
         if let Some(abort) = self.sdo.expire(now_ns) {
-            self.send(abort.frame(self.id));
+            self.outbox.add(abort.frame(self.id));
         }
         if self.axis.step(now_ns, position_m) {
-            self.raise(DriveError::FollowingError);
+            self.raise(EmergencyCode::FOLLOWING_ERROR);
         }
         if self.nmt.is_operational() && self.process_data.is_event_driven() {
             self.axis.show(now_ns, &mut self.objects);
-            self.process_data.send_events(now_ns, &self.objects, &mut self.outbox);
+            self.process_data.send(&mut self.outbox, |tpdo| tpdo.at_event(now_ns, &self.objects));
         }
         self.axis.force_n()
     }
@@ -143,14 +146,14 @@ impl DriveNode {
         }
         let before = std::mem::replace(&mut self.error_state, state);
         if before == ErrorState::BusOff {
-            self.raise(DriveError::WasBusOff);
-            self.clear(DriveError::WasBusOff);
+            self.raise(EmergencyCode::WAS_BUS_OFF);
+            self.clear(EmergencyCode::WAS_BUS_OFF);
         }
         match state {
-            ErrorState::Active => self.clear(DriveError::ErrorPassive),
-            ErrorState::Passive => self.raise(DriveError::ErrorPassive),
+            ErrorState::Active => self.clear(EmergencyCode::ERROR_PASSIVE),
+            ErrorState::Passive => self.raise(EmergencyCode::ERROR_PASSIVE),
             ErrorState::BusOff => {
-                self.clear(DriveError::ErrorPassive);
+                self.clear(EmergencyCode::ERROR_PASSIVE);
                 self.fail_communication(now_ns);
             }
         }
@@ -216,22 +219,20 @@ impl DriveNode {
         let counter = match (data, self.objects.get(names::SYNC_OVERFLOW)) {
             ([], 0) => 0,
             ([counter], 2..) => *counter,
-            _ => return self.raise(DriveError::SyncLength),
+            _ => return self.raise(EmergencyCode::SYNC_LENGTH),
         };
-        self.clear(DriveError::SyncLength);
+        self.clear(EmergencyCode::SYNC_LENGTH);
         let is_operational = self.nmt.is_operational();
         if is_operational {
             for number in 0..PDOS {
-                if self.process_data.waits_for_sync(number) {
-                    self.apply_process_data(number, now_ns);
-                }
+                self.apply_process_data(number, now_ns);
             }
         }
         self.axis.synchronise(now_ns, self.process_data.take_new_targets(), &self.objects);
         if is_operational {
             self.axis.sample(position_m);
             self.axis.show(now_ns, &mut self.objects);
-            self.process_data.send_at_sync(now_ns, counter, &self.objects, &mut self.outbox);
+            self.process_data.send(&mut self.outbox, |tpdo| tpdo.at_sync(now_ns, counter, &self.objects));
         }
     }
 
@@ -269,7 +270,7 @@ impl DriveNode {
         if Heartbeat::decode(data).is_ok_and(|heartbeat| heartbeat.state != NmtState::BootUp) {
             self.consumer.hear(now_ns, node);
             if self.consumer.hears_all() {
-                self.clear(DriveError::Heartbeat);
+                self.clear(EmergencyCode::HEARTBEAT);
             }
         }
     }
@@ -278,7 +279,7 @@ impl DriveNode {
     /// the axis either.
     fn supervise_connection(&mut self, now_ns: u64) {
         if self.consumer.loses(now_ns) {
-            self.raise(DriveError::Heartbeat);
+            self.raise(EmergencyCode::HEARTBEAT);
             self.fail_communication(now_ns);
         }
         if self.process_data.expires(now_ns) {
@@ -302,7 +303,7 @@ impl DriveNode {
     /// Reacts as 6007h says when nobody controls the axis any more. A fault outlasts its cause.
     fn abort_connection(&mut self, now_ns: u64) {
         if self.axis.abort_connection(now_ns) {
-            self.raise(DriveError::ConnectionAborted);
+            self.raise(EmergencyCode::COMMUNICATION);
         }
     }
 
@@ -321,7 +322,7 @@ impl DriveNode {
             self.apply_written(object, now_ns);
         }
         if let Some(response) = answer {
-            self.send(response.frame(self.id));
+            self.outbox.add(response.frame(self.id));
         }
     }
 
@@ -333,7 +334,7 @@ impl DriveNode {
             0x1016 => {
                 // Supervision begins anew, and no heartbeat counts as lost.
                 self.consumer = Consumer::new(&self.objects);
-                self.clear(DriveError::Heartbeat);
+                self.clear(EmergencyCode::HEARTBEAT);
             }
             0x1017 => self.producer.configure(&self.objects, now_ns),
             0x1400..0x1800 => {
@@ -353,18 +354,18 @@ impl DriveNode {
     fn control(&mut self, now_ns: u64) {
         let word = Controlword(self.objects.get(names::CONTROLWORD));
         if self.axis.control(now_ns, word, &self.objects) {
-            for error in DriveError::FAULTS {
+            for error in FAULTS {
                 self.clear(error);
             }
         }
     }
 
-    fn raise(&mut self, error: DriveError) {
+    fn raise(&mut self, error: EmergencyCode) {
         let emergency = self.errors.raise(error, &mut self.objects);
         self.send_emergency(emergency);
     }
 
-    fn clear(&mut self, error: DriveError) {
+    fn clear(&mut self, error: EmergencyCode) {
         let emergency = self.errors.clear(error, &mut self.objects);
         self.send_emergency(emergency);
     }
@@ -376,11 +377,7 @@ impl DriveNode {
             && self.nmt.is_served()
             && let Some(id) = cob_id.identifier()
         {
-            self.send(Frame::fixed(id, emergency.encode()));
+            self.outbox.add(Frame::fixed(id, emergency.encode()));
         }
-    }
-
-    fn send(&mut self, frame: Frame) {
-        self.outbox.add(frame);
     }
 }

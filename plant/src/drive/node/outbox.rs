@@ -1,39 +1,32 @@
 //! Frames that a node transmits at one instant, in their order.
 
+use std::collections::VecDeque;
+
 use masseter_can::Frame;
 
 /// Boot-up or heartbeat, four TPDOs, an SDO answer and emergencies.
 const CAPACITY: usize = 12;
 
 /// The frames.
-#[derive(Debug, Clone, Default)]
-pub(super) struct Outbox {
-    frames: [Option<Frame>; CAPACITY],
-    first: usize,
-    count: usize,
-}
+#[derive(Debug, Clone)]
+pub(super) struct Outbox(VecDeque<Frame>);
 
 impl Outbox {
+    /// No frames, with room for the most.
+    pub(super) fn new() -> Self {
+        Self(VecDeque::with_capacity(CAPACITY))
+    }
+
     /// Adds a frame. Without room the frame is lost, as in a node whose transmit queue is full.
     pub(super) fn add(&mut self, frame: Frame) {
-        if self.count == 0 {
-            self.first = 0;
-        }
-        if self.count < CAPACITY {
-            self.frames[(self.first + self.count) % CAPACITY] = Some(frame);
-            self.count += 1;
+        if self.0.len() < CAPACITY {
+            self.0.push_back(frame);
         }
     }
 
     /// Takes the oldest frame.
     pub(super) fn take(&mut self) -> Option<Frame> {
-        // Most calls find no frame: they write nothing.
-        if self.count == 0 {
-            return None;
-        }
-        let frame = self.frames[self.first].take()?;
-        (self.first, self.count) = ((self.first + 1) % CAPACITY, self.count - 1);
-        Some(frame)
+        self.0.pop_front()
     }
 }
 
@@ -46,7 +39,7 @@ mod tests {
     #[test]
     fn frames_leave_in_their_order_and_the_last_ones_have_no_room() {
         let frame = |number: u8| Frame::fixed(CanId::standard(1).unwrap(), [number]);
-        let mut outbox = Outbox::default();
+        let mut outbox = Outbox::new();
         for round in 0..3 {
             (0..20).for_each(|number| outbox.add(frame(number)));
             let left: Vec<_> = std::iter::from_fn(|| outbox.take()).collect();

@@ -4,10 +4,10 @@
 //! [`Effects`] and errors.
 
 use masseter_can::Frame;
+use masseter_can::canopen::EmergencyCode;
 
-use super::errors::DriveError;
 use super::outbox::Outbox;
-use super::pdo::{Effects, Rpdo, RpdoFault, Tpdo};
+use super::pdo::{ERRORS, Effects, Rpdo, Tpdo};
 use crate::drive::axis::NewTargets;
 use crate::drive::dictionary::{Objects, PDOS};
 
@@ -52,11 +52,6 @@ impl ProcessData {
         self.rpdos[number].is_synchronous()
     }
 
-    /// Whether the data of an RPDO wait for SYNC now.
-    pub(super) fn waits_for_sync(&self, number: usize) -> bool {
-        self.rpdos[number].waits_for_sync()
-    }
-
     /// Writes the data of an RPDO into the dictionary; returns what else they act on, if there were any.
     pub(super) fn apply(&mut self, number: usize, objects: &mut Objects) -> Option<Effects> {
         let effects = self.rpdos[number].apply(objects)?;
@@ -76,15 +71,8 @@ impl ProcessData {
     }
 
     /// Each error of process data, and whether any RPDO has it.
-    pub(super) fn errors(&self) -> [(DriveError, bool); RpdoFault::ALL.len()] {
-        RpdoFault::ALL.map(|fault| {
-            let error = match fault {
-                RpdoFault::Short => DriveError::PdoShort,
-                RpdoFault::Long => DriveError::PdoLong,
-                RpdoFault::Overdue => DriveError::RpdoTimeout,
-            };
-            (error, self.rpdos.iter().any(|rpdo| rpdo.has(fault)))
-        })
+    pub(super) fn errors(&self) -> [(EmergencyCode, bool); ERRORS.len()] {
+        std::array::from_fn(|error| (ERRORS[error], self.rpdos.iter().any(|rpdo| rpdo.has[error])))
     }
 
     /// Whether the event timer of an RPDO has just run out. Outside of operational no timer runs.
@@ -108,21 +96,8 @@ impl ProcessData {
         self.tpdos.iter().any(Tpdo::is_event_driven)
     }
 
-    /// Sends the TPDOs that are due at a SYNC of that counter.
-    pub(super) fn send_at_sync(&mut self, now_ns: u64, counter: u8, objects: &Objects, outbox: &mut Outbox) {
-        for tpdo in &mut self.tpdos {
-            if let Some(frame) = tpdo.at_sync(now_ns, counter, objects) {
-                outbox.add(frame);
-            }
-        }
-    }
-
-    /// Sends the TPDOs that are due because of an event.
-    pub(super) fn send_events(&mut self, now_ns: u64, objects: &Objects, outbox: &mut Outbox) {
-        for tpdo in &mut self.tpdos {
-            if let Some(frame) = tpdo.at_event(now_ns, objects) {
-                outbox.add(frame);
-            }
-        }
+    /// Sends the TPDOs that are due.
+    pub(super) fn send(&mut self, outbox: &mut Outbox, due: impl FnMut(&mut Tpdo) -> Option<Frame>) {
+        self.tpdos.iter_mut().filter_map(due).for_each(|frame| outbox.add(frame));
     }
 }

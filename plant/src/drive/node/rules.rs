@@ -6,7 +6,7 @@
 use masseter_can::canopen::{AbortCode, CobId, ObjectAddress};
 
 use super::heartbeats::consumed_node;
-use crate::drive::axis::{Homing, Mode};
+use crate::drive::axis::{Axis, Homing, Mode};
 use crate::drive::dictionary::{
     CONSUMED, DataType, ENTRIES, MAPPED_MAX, Mapping, MappingEntry, Objects, PDOS, find, names,
 };
@@ -19,14 +19,6 @@ const LOAD: u32 = u32::from_le_bytes(*b"load");
 const PDO_BITS: usize = 64;
 const PDO_COUNT: u16 = PDOS as u16;
 
-/// State of the drive, as far as the rules depend on it.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Situation {
-    pub(super) is_operational: bool,
-    pub(super) is_enabled: bool,
-    pub(super) is_homing: bool,
-}
-
 /// Whether that word may be written to an entry now.
 ///
 /// # Errors
@@ -35,7 +27,8 @@ pub(super) fn check(
     object: ObjectAddress,
     word: u32,
     objects: &Objects,
-    situation: Situation,
+    axis: &Axis,
+    is_operational: bool,
 ) -> Result<(), AbortCode> {
     let allow = |is_allowed: bool, code: AbortCode| if is_allowed { Ok(()) } else { Err(code) };
     let ObjectAddress { index, subindex } = object;
@@ -43,14 +36,14 @@ pub(super) fn check(
         0x1003 => allow(word == 0, AbortCode::INVALID_VALUE),
         0x1010 => {
             allow(word == SAVE, AbortCode::NOT_STORED)?;
-            allow(!situation.is_enabled, AbortCode::DEVICE_STATE)
+            allow(!axis.is_enabled(), AbortCode::DEVICE_STATE)
         }
         0x1011 => allow(word == LOAD, AbortCode::NOT_STORED),
         0x1014 => cob_id(CobId(objects.get(names::EMERGENCY_COB_ID)), CobId(word)),
         0x1016 => allow(!is_consumed_elsewhere(subindex, word, objects), AbortCode::PARAMETER_INCOMPATIBLE),
         0x1019 => {
             allow(word != 1, AbortCode::INVALID_VALUE)?;
-            allow(!situation.is_operational, AbortCode::DEVICE_STATE)
+            allow(!is_operational, AbortCode::DEVICE_STATE)
         }
         0x1400..0x1600 | 0x1800..0x1A00 => communication(object, word, objects),
         0x1600..0x1800 | 0x1A00..0x1C00 => mapping(object, word, objects),
@@ -66,9 +59,9 @@ pub(super) fn check(
         }
         0x6098 => {
             allow(Homing::is_method(word as i8), AbortCode::INVALID_VALUE)?;
-            allow(!situation.is_homing, AbortCode::DEVICE_STATE)
+            allow(!axis.is_homing(), AbortCode::DEVICE_STATE)
         }
-        0x60C2 => allow(!situation.is_enabled, AbortCode::DEVICE_STATE),
+        0x60C2 => allow(!axis.is_enabled(), AbortCode::DEVICE_STATE),
         _ => Ok(()),
     }
 }

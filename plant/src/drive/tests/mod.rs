@@ -48,10 +48,9 @@ fn id(number: u8) -> NodeId {
 fn settings() -> DriveSettings {
     DriveSettings {
         node: id(4),
-        master: id(127),
         drive: DrivesConfig::default().leg,
-        heartbeat_ns: 50_000_000,
-        heartbeat_timeout_ns: 150_000_000,
+        heartbeat_ms: 50,
+        heartbeat_timeout_ms: 150,
         period_ns: 1_000_000,
         step_s: STEP_NS as f64 * 1e-9,
         position_limits: LIMITS,

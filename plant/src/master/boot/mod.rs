@@ -11,12 +11,14 @@ use masseter_can::canopen::{
 };
 use masseter_can::cia402::{DriveState, Statusword};
 use masseter_shared::clock::MILLISECOND_NS;
+use masseter_shared::config::Scenario;
 use masseter_shared::messages::codes::{BootPhase, Cause};
 
+use super::interlock::Failure;
 use plan::{Condition, STATUSWORD, Step, plan};
-use sdo::{ATTEMPTS, Data, SdoClient, SdoFailure, TIMEOUT_NS, Taken};
+use sdo::{ATTEMPTS, Data, SdoClient, SdoFailure, TIMEOUT_NS};
 
-pub(crate) use plan::{DriveSetup, shortest_boot};
+pub(crate) use plan::shortest_boot;
 
 /// Silence after which the communication of a drive is reset: it may be alive without a heartbeat, ns.
 const RESET_EVERY_NS: u64 = 500_000_000;
@@ -29,38 +31,23 @@ const UNASKED: u32 = 5;
 /// Boot-up messages during a boot before the drive is given up.
 const RESTARTS: u32 = 3;
 
-/// The reason why a drive may not be started, with the value and the limit that explain it.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct BootFault {
-    pub(super) cause: Cause,
-    pub(super) object: Option<ObjectAddress>,
-    pub(super) value: f64,
-    pub(super) limit: f64,
+/// A drive that took longer than it may.
+pub(super) fn late(waited_ns: u64, limit_ns: u64) -> Failure {
+    Failure::with(Cause::BootTimeout, [waited_ns, limit_ns].map(|ns| ns as f64 / 1e6))
 }
 
-impl BootFault {
-    const fn new(cause: Cause) -> Self {
-        Self { cause, object: None, value: 0.0, limit: 0.0 }
-    }
-
-    /// A drive that took longer than it may, ns.
-    pub(super) fn late(waited_ns: u64, limit_ns: u64) -> Self {
-        let [value, limit] = [waited_ns, limit_ns].map(|ns| ns as f64 / 1e6);
-        Self { value, limit, ..Self::new(Cause::BootTimeout) }
-    }
-
-    fn at(self, object: ObjectAddress, value: u32, limit: u32) -> Self {
-        Self { object: Some(object), value: f64::from(value), limit: f64::from(limit), ..self }
-    }
+/// A failure at an object.
+fn at(cause: Cause, object: ObjectAddress, value: u32, limit: u32) -> Failure {
+    Failure { object: Some(object), ..Failure::with(cause, [value, limit].map(f64::from)) }
 }
 
-impl From<SdoFailure> for BootFault {
+impl From<SdoFailure> for Failure {
     fn from(failure: SdoFailure) -> Self {
         match failure {
-            SdoFailure::Aborted { object, code } => Self::new(Cause::SdoAborted).at(object, code.0, 0),
+            SdoFailure::Aborted { object, code } => at(Cause::SdoAborted, object, code.0, 0),
             SdoFailure::Silent { object } => {
                 let timeout_ms = (TIMEOUT_NS / MILLISECOND_NS) as u32;
-                Self::new(Cause::SdoTimeout).at(object, timeout_ms * ATTEMPTS, timeout_ms)
+                at(Cause::SdoTimeout, object, timeout_ms * ATTEMPTS, timeout_ms)
             }
         }
     }
@@ -85,10 +72,10 @@ pub(super) struct Boot {
 
 impl Boot {
     /// The boot of a drive of which nothing is known at `now_ns`.
-    pub(super) fn new(node: NodeId, setup: &DriveSetup, now_ns: u64) -> Self {
+    pub(super) fn new(node: NodeId, scenario: &Scenario, axis: usize, now_ns: u64) -> Self {
         Self {
             phase: BootPhase::Waiting,
-            steps: plan(node, setup),
+            steps: plan(node, scenario, axis),
             next: 0,
             readings: 0,
             kept: Expedited::of_unknown_size([0; Expedited::MAX]),
@@ -131,7 +118,7 @@ impl Boot {
     }
 
     /// Takes a heartbeat or a boot-up message.
-    pub(super) fn hear(&mut self, now_ns: u64, state: NmtState) -> Result<(), BootFault> {
+    pub(super) fn hear(&mut self, now_ns: u64, state: NmtState) -> Result<(), Failure> {
         if state != NmtState::BootUp {
             if self.phase == BootPhase::Waiting {
                 // A drive that was alive before this master may have any configuration: it is reset at once.
@@ -142,7 +129,7 @@ impl Boot {
         if self.is_under_way() {
             self.restarts += 1;
             if self.restarts > RESTARTS {
-                return Err(BootFault::new(Cause::NodeRestarted));
+                return Err(Failure::new(Cause::NodeRestarted));
             }
         }
         self.start_over();
@@ -184,24 +171,20 @@ impl Boot {
     }
 
     /// Takes an answer of the drive's SDO server.
-    pub(super) fn take(&mut self, now_ns: u64, response: SdoResponse) -> Result<(), BootFault> {
+    pub(super) fn take(&mut self, now_ns: u64, response: SdoResponse) -> Result<(), Failure> {
         if !self.is_under_way() && self.phase != BootPhase::Configured {
             return Ok(());
         }
         self.has_repeated |= self.client.is_repeating();
-        match self.client.take(response) {
-            Taken::Expected => self.carry_on(now_ns),
-            Taken::Unasked if self.has_repeated => Ok(()),
-            Taken::Unasked => {
-                self.unasked += 1;
-                let are_two = self.unasked > UNASKED;
-                if are_two { Err(BootFault::new(Cause::DuplicateNode)) } else { Ok(()) }
-            }
+        if self.client.take(response) {
+            return self.carry_on(now_ns);
         }
+        self.unasked += u32::from(!self.has_repeated);
+        if self.unasked > UNASKED { Err(Failure::new(Cause::DuplicateNode)) } else { Ok(()) }
     }
 
     /// Checks the time-outs.
-    pub(super) fn expire(&mut self, now_ns: u64) -> Result<(), BootFault> {
+    pub(super) fn expire(&mut self, now_ns: u64) -> Result<(), Failure> {
         if self.is_under_way() {
             self.client.expire(now_ns);
             self.has_repeated |= self.client.is_repeating();
@@ -209,13 +192,13 @@ impl Boot {
         }
         let is_late = self.phase == BootPhase::Starting && self.waited_ns(now_ns) > START_WITHIN_NS;
         if is_late {
-            return Err(BootFault::late(self.waited_ns(now_ns), START_WITHIN_NS));
+            return Err(late(self.waited_ns(now_ns), START_WITHIN_NS));
         }
         Ok(())
     }
 
     /// Ends the step whose answer is there, and begins the next.
-    fn carry_on(&mut self, now_ns: u64) -> Result<(), BootFault> {
+    fn carry_on(&mut self, now_ns: u64) -> Result<(), Failure> {
         match self.client.outcome() {
             Some(Err(SdoFailure::Aborted { code, .. })) if self.may_be_refused(code) => self.end_step(false),
             Some(outcome) => self.conclude(outcome?)?,
@@ -272,42 +255,40 @@ impl Boot {
     }
 
     /// Judges the value that the step under way has read.
-    fn conclude(&mut self, read: Data) -> Result<(), BootFault> {
+    fn conclude(&mut self, read: Data) -> Result<(), Failure> {
         let number = read.number().unwrap_or(0);
         let mut holds = true;
         match self.steps[self.next] {
             Step::Expect { object, mask, value, otherwise } if number & mask != value & mask => {
-                self.readings += 1;
-                let may_change = otherwise == Cause::NotAccepted && self.readings < READINGS;
-                return if may_change {
-                    Ok(())
-                } else {
-                    Err(BootFault::new(otherwise).at(object, number, value))
-                };
+                let failure = at(otherwise, object, number, value);
+                let may_change = otherwise == Cause::NotAccepted;
+                return if may_change { self.read_again(failure) } else { Err(failure) };
             }
             Step::ExpectUnset { object, otherwise } if number != 0 => {
-                return Err(BootFault::new(otherwise).at(object, number, 0));
+                return Err(at(otherwise, object, number, 0));
             }
             Step::ExpectNoFault if in_fault(number) => {
-                self.readings += 1;
                 let code = self.kept.data().iter().rfold(0, |code, &byte| code << 8 | u32::from(byte));
-                let fault = BootFault::new(Cause::FaultAtStart).at(STATUSWORD, code, 0);
-                return if self.readings < READINGS { Ok(()) } else { Err(fault) };
+                return self.read_again(at(Cause::FaultAtStart, STATUSWORD, code, 0));
             }
             Step::ExpectOff if may_be_powered(number) => {
-                self.readings += 1;
-                let fault = BootFault::new(Cause::StillPowered).at(STATUSWORD, number, 0);
-                return if self.readings < READINGS { Ok(()) } else { Err(fault) };
+                return self.read_again(at(Cause::StillPowered, STATUSWORD, number, 0));
             }
             Step::If { condition, .. } => holds = self.holds(condition, number),
             Step::Keep(object) => {
-                let wrong_length = BootFault::new(Cause::SdoAborted).at(object, AbortCode::LENGTH.0, 0);
+                let wrong_length = at(Cause::SdoAborted, object, AbortCode::LENGTH.0, 0);
                 self.kept = Expedited::new(read.bytes()).map_err(|_| wrong_length)?;
             }
             _ => {}
         }
         self.end_step(holds);
         Ok(())
+    }
+
+    /// A value that may still change is read again, but not for ever.
+    fn read_again(&mut self, failure: Failure) -> Result<(), Failure> {
+        self.readings += 1;
+        if self.readings < READINGS { Ok(()) } else { Err(failure) }
     }
 
     /// Whether a condition holds, given the value read for it.

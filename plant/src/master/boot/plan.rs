@@ -31,46 +31,6 @@ const NO_HOME_OFFSET: Step =
 /// plan of the bus does not include them.
 const OTHER_PDOS: [u16; 6] = [0x1401, 0x1402, 0x1403, 0x1801, 0x1802, 0x1803];
 
-/// Expected identity and configuration of a drive.
-#[derive(Debug, Clone)]
-pub(crate) struct DriveSetup {
-    /// Its identity.
-    pub(crate) identity: IdentityConfig,
-    /// Producer heartbeat time (1017h), ms.
-    pub(crate) heartbeat_ms: u16,
-    /// Consumer heartbeat time (1016h): node and time, ms.
-    pub(crate) consumer_heartbeat: (NodeId, u16),
-    /// Communication cycle (60C2h): value and power of ten of seconds.
-    pub(crate) period: (u8, i8),
-    /// Following error window (6065h), increments.
-    pub(crate) following_error: u32,
-    /// Following error time out (6066h), ms.
-    pub(crate) following_error_timeout_ms: u16,
-    /// Quick stop deceleration (6085h), increments/s², which is taken to be the drive's unit of acceleration (6097h,
-    /// 60AAh).
-    pub(crate) quick_stop_deceleration: u32,
-    /// Min and max software position limit (607Dh), increments.
-    pub(crate) position_limits: [i32; 2],
-}
-
-impl DriveSetup {
-    /// The setup of the drive of an axis.
-    pub(crate) fn for_axis(scenario: &Scenario, axis: usize) -> Self {
-        let (can, drive) = (&scenario.can, scenario.drives.of_axis(axis));
-        let stroke_m = scenario.mechanism.strokes.of_axis(axis);
-        Self {
-            identity: can.identity,
-            heartbeat_ms: can.heartbeat_producer_ms,
-            consumer_heartbeat: (NodeId::MASTER, can.heartbeat_consumer_ms),
-            period: interpolation_period(scenario.period_ns()),
-            following_error: drive.increments(drive.following_error_m) as u32,
-            following_error_timeout_ms: drive.following_error_timeout_ms,
-            quick_stop_deceleration: drive.increments(drive.quick_stop_deceleration_m_s2) as u32,
-            position_limits: stroke_m.map(|end_m| drive.increments(end_m) as i32),
-        }
-    }
-}
-
 /// A condition for further steps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Condition {
@@ -106,9 +66,9 @@ pub(super) enum Step {
 }
 
 /// The steps for a drive, in their order.
-pub(super) fn plan(node: NodeId, setup: &DriveSetup) -> Vec<Step> {
+pub(super) fn plan(node: NodeId, scenario: &Scenario, axis: usize) -> Vec<Step> {
     let mut steps = vec![Step::Enter(BootPhase::Identifying)];
-    steps.extend(identify(&setup.identity));
+    steps.extend(identify(&scenario.can.identity));
     steps.push(Step::Enter(BootPhase::CheckingPdos));
     steps.extend(check_pdo(0x1400, Cob::Rpdo1(node), &Rpdo1::MAPPING));
     steps.extend(check_pdo(0x1800, Cob::Tpdo1(node), &Tpdo1::MAPPING));
@@ -116,7 +76,7 @@ pub(super) fn plan(node: NodeId, setup: &DriveSetup) -> Vec<Step> {
     steps.extend(switch_off());
     steps.extend(OTHER_PDOS.into_iter().flat_map(switch_off_pdo));
     steps.push(NO_HOME_OFFSET);
-    steps.extend(configure(setup));
+    steps.extend(configure(scenario, axis));
     // A drive may begin to follow its target with the mode, and may have moved before the last step.
     steps.extend(hold_position());
     steps.extend(choose_mode());
@@ -129,7 +89,7 @@ pub(super) fn plan(node: NodeId, setup: &DriveSetup) -> Vec<Step> {
 /// The least number of SDO exchanges that the boot of a drive takes: of a drive without a fault and without other PDOs
 /// that gives the expected answers at once.
 pub(crate) fn shortest_boot(scenario: &Scenario) -> usize {
-    let steps = plan(NodeId::MASTER, &DriveSetup::for_axis(scenario, 0));
+    let steps = plan(NodeId::MASTER, scenario, 0);
     let without_exchange = |step: &Step| match step {
         Step::Enter(_) => 1,
         Step::If { otherwise_skip, .. } => *otherwise_skip,
@@ -190,28 +150,33 @@ fn switch_off_pdo(communication: u16) -> impl Iterator<Item = Step> {
     only_if(Condition::Exchanged(cob_id), [Step::WriteKept(cob_id)])
 }
 
-fn configure(setup: &DriveSetup) -> [Step; 12] {
-    let (node, time_ms) = setup.consumer_heartbeat;
-    let (value, exponent) = setup.period;
-    let [lowest, highest] = setup.position_limits;
+fn configure(scenario: &Scenario, axis: usize) -> [Step; 12] {
+    let (can, drive) = (&scenario.can, scenario.drives.of_axis(axis));
+    let consumed = u32::from(NodeId::MASTER.get()) << 16 | u32::from(can.heartbeat_consumer_ms);
+    // Increments/s² are taken to be the drive's unit of acceleration (6097h, 60AAh).
+    let quick_stop = drive.increments(drive.quick_stop_deceleration_m_s2) as u32;
+    let window = drive.increments(drive.following_error_m) as u32;
+    let stroke_m = scenario.mechanism.strokes.of_axis(axis);
+    let [lowest, highest] = stroke_m.map(|end_m| drive.increments(end_m) as i32);
+    let (period, exponent) = interpolation_period(scenario.period_ns());
     let write = |(index, subindex, value, bytes)| Step::Write {
         object: ObjectAddress::new(index, subindex),
         value,
         bytes,
     };
     [
-        (0x1017, 0, u32::from(setup.heartbeat_ms), 2),
-        (0x1016, 1, u32::from(node.get()) << 16 | u32::from(time_ms), 4),
+        (0x1017, 0, u32::from(can.heartbeat_producer_ms), 2),
+        (0x1016, 1, consumed, 4),
         (0x6007, 0, QUICK_STOP_AT_ABORT, 2),
         (0x605A, 0, RAMP_THEN_OFF, 2),
-        (0x6085, 0, setup.quick_stop_deceleration, 4),
-        (0x6065, 0, setup.following_error, 4),
-        (0x6066, 0, u32::from(setup.following_error_timeout_ms), 2),
+        (0x6085, 0, quick_stop, 4),
+        (0x6065, 0, window, 4),
+        (0x6066, 0, u32::from(drive.following_error_timeout_ms), 2),
         // Wide at first: drives refuse limits that cross, and the old ones are unknown.
         (0x607D, 1, i32::MIN as u32, 4),
         (0x607D, 2, highest as u32, 4),
         (0x607D, 1, lowest as u32, 4),
-        (0x60C2, 1, u32::from(value), 1),
+        (0x60C2, 1, u32::from(period), 1),
         (0x60C2, 2, u32::from(exponent as u8), 1),
     ]
     .map(write)
@@ -253,10 +218,11 @@ mod tests {
     #[test]
     fn software_limits_never_cross_while_they_are_written_whatever_they_were() {
         let id = NodeId::new(1).unwrap();
-        let setup =
-            DriveSetup { position_limits: [-10, 20], ..DriveSetup::for_axis(&Scenario::default(), 0) };
+        let mut scenario = Scenario::default();
+        let increment_m = scenario.drives.of_axis(0).encoder_resolution_m;
+        scenario.mechanism.strokes.slide_m = [-10.0, 20.0].map(|increments| increments * increment_m);
         for mut limits in [[-500, -400], [-10, 20], [400, 500], [i32::MIN, i32::MAX], [0, 0]] {
-            for step in plan(id, &setup) {
+            for step in plan(id, &scenario, 0) {
                 if let Step::Write { object, value, .. } = step
                     && object.index == 0x607D
                 {
@@ -264,7 +230,7 @@ mod tests {
                     assert!(limits[0] <= limits[1], "{limits:?}");
                 }
             }
-            assert_eq!(limits, setup.position_limits);
+            assert_eq!(limits, [-10, 20]);
         }
     }
 }

@@ -50,55 +50,21 @@ impl Data {
 }
 
 /// Why a transfer failed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum SdoFailure {
     /// One side gave it up.
-    #[error("object {object}: {code}")]
-    Aborted {
-        /// The object.
-        object: ObjectAddress,
-        /// Why.
-        code: AbortCode,
-    },
+    Aborted { object: ObjectAddress, code: AbortCode },
     /// Nothing came.
-    #[error("object {object}: no answer within {} ms, asked {ATTEMPTS} times", TIMEOUT_NS / 1_000_000)]
-    Silent {
-        /// The object.
-        object: ObjectAddress,
-    },
-}
-
-/// Meaning of an answer.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Taken {
-    /// The expected answer.
-    Expected,
-    /// An answer without a request: to a transfer begun twice, of a frame that came twice, or of a second server with the
-    /// same node id.
-    Unasked,
-}
-
-/// Direction of a transfer.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Direction {
-    Read,
-    Write(Expedited),
-}
-
-/// Step of a transfer.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Step {
-    /// The first request, whose answer decides the next step.
-    Initiate,
-    /// Segments of a read, the toggle bit of the next.
-    ReadSegment { toggle: bool },
+    Silent { object: ObjectAddress },
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Transfer {
     object: ObjectAddress,
-    direction: Direction,
-    step: Step,
+    /// The value to be written; none in a read.
+    written: Option<Expedited>,
+    /// Toggle bit of the next segment of a read; none while the first answer decides whether there are segments.
+    segment: Option<bool>,
     received: Data,
     /// Time of the last request; none while one is due.
     sent_ns: Option<u64>,
@@ -116,20 +82,20 @@ pub(super) struct SdoClient {
 impl SdoClient {
     /// Begins to read an object; a transfer under way is forgotten.
     pub(super) fn read(&mut self, object: ObjectAddress) {
-        self.begin(object, Direction::Read);
+        self.begin(object, None);
     }
 
     /// Begins to write an object; a transfer under way is forgotten.
     pub(super) fn write(&mut self, object: ObjectAddress, data: Expedited) {
-        self.begin(object, Direction::Write(data));
+        self.begin(object, Some(data));
     }
 
-    fn begin(&mut self, object: ObjectAddress, direction: Direction) {
+    fn begin(&mut self, object: ObjectAddress, written: Option<Expedited>) {
         self.outcome = None;
         self.transfer = Some(Transfer {
             object,
-            direction,
-            step: Step::Initiate,
+            written,
+            segment: None,
             received: Data::EMPTY,
             sent_ns: None,
             attempt: 1,
@@ -159,7 +125,7 @@ impl SdoClient {
         }
         if transfer.attempt < ATTEMPTS {
             transfer.attempt += 1;
-            (transfer.step, transfer.received, transfer.sent_ns) = (Step::Initiate, Data::EMPTY, None);
+            (transfer.segment, transfer.received, transfer.sent_ns) = (None, Data::EMPTY, None);
         } else {
             let object = transfer.object;
             self.abort = Some((object, AbortCode::TIMED_OUT));
@@ -177,14 +143,15 @@ impl SdoClient {
         Some(transfer.request())
     }
 
-    /// Takes an answer of the server.
-    pub(super) fn take(&mut self, response: SdoResponse) -> Taken {
+    /// Takes an answer of the server; returns whether it was expected. An answer is unasked after a transfer begun twice,
+    /// in a frame that came twice, and from a second server with the same node id.
+    pub(super) fn take(&mut self, response: SdoResponse) -> bool {
         let Some(mut transfer) = self.transfer.filter(|transfer| transfer.sent_ns.is_some()) else {
-            return Taken::Unasked;
+            return false;
         };
         let object = transfer.object;
         match transfer.advance(response) {
-            Progress::Foreign => return Taken::Unasked,
+            Progress::Foreign => return false,
             Progress::Continue => {
                 transfer.sent_ns = None;
                 self.transfer = Some(transfer);
@@ -196,7 +163,7 @@ impl SdoClient {
                 self.finish(Err(SdoFailure::Aborted { object, code }));
             }
         }
-        Taken::Expected
+        true
     }
 
     fn finish(&mut self, outcome: Result<Data, SdoFailure>) {
@@ -220,37 +187,32 @@ enum Progress {
 impl Transfer {
     fn request(&self) -> SdoRequest {
         let object = self.object;
-        match (self.step, self.direction) {
-            (Step::Initiate, Direction::Read) => SdoRequest::InitiateUpload { object },
-            (Step::Initiate, Direction::Write(data)) => SdoRequest::Download { object, data },
-            (Step::ReadSegment { toggle }, _) => SdoRequest::UploadSegment { toggle },
+        match (self.segment, self.written) {
+            (None, None) => SdoRequest::InitiateUpload { object },
+            (None, Some(data)) => SdoRequest::Download { object, data },
+            (Some(toggle), _) => SdoRequest::UploadSegment { toggle },
         }
     }
 
     fn advance(&mut self, response: SdoResponse) -> Progress {
-        let reads = self.direction == Direction::Read;
-        match (response, self.step) {
+        let reads = self.written.is_none();
+        match (response, self.segment) {
             (SdoResponse::Abort { object, code }, _) if object == self.object => Progress::Refused(code),
-            (SdoResponse::Download { object }, Step::Initiate) if object == self.object && !reads => {
-                Progress::Done
-            }
-            (SdoResponse::Upload { object, data }, Step::Initiate) if object == self.object && reads => {
+            (SdoResponse::Download { object }, None) if object == self.object && !reads => Progress::Done,
+            (SdoResponse::Upload { object, data }, None) if object == self.object && reads => {
                 self.received.append(data.data());
                 Progress::Done
             }
-            (SdoResponse::InitiateUpload { object, size }, Step::Initiate)
-                if object == self.object && reads =>
-            {
+            (SdoResponse::InitiateUpload { object, size }, None) if object == self.object && reads => {
                 if size.is_some_and(|size| size as usize > Data::MAX) {
                     return Progress::Broken(AbortCode::OUT_OF_MEMORY);
                 }
-                self.step = Step::ReadSegment { toggle: false };
+                self.segment = Some(false);
                 Progress::Continue
             }
-            (
-                SdoResponse::UploadSegment { toggle, data, is_last },
-                Step::ReadSegment { toggle: expected },
-            ) => self.read_segment(toggle == expected, data, is_last, expected),
+            (SdoResponse::UploadSegment { toggle, data, is_last }, Some(expected)) => {
+                self.read_segment(toggle == expected, data, is_last, expected)
+            }
             _ => Progress::Foreign,
         }
     }
@@ -262,7 +224,7 @@ impl Transfer {
         if !self.received.append(data.data()) {
             return Progress::Broken(AbortCode::OUT_OF_MEMORY);
         }
-        self.step = Step::ReadSegment { toggle: !toggle };
+        self.segment = Some(!toggle);
         if is_last { Progress::Done } else { Progress::Continue }
     }
 }

@@ -7,5 +7,5 @@ mod mapping;
 mod receive;
 mod transmit;
 
-pub(super) use receive::{Effects, Rpdo, RpdoFault};
+pub(super) use receive::{ERRORS, Effects, Rpdo};
 pub(super) use transmit::Tpdo;

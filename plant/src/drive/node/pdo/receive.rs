@@ -1,29 +1,22 @@
-//! A receive PDO: its buffer, its event timer and its faults.
+//! A receive PDO: its buffer, its event timer and its errors.
 
 use std::cmp::Ordering;
 
 use masseter_can::CanId;
-use masseter_can::canopen::ObjectAddress;
+use masseter_can::canopen::{EmergencyCode, ObjectAddress};
 use masseter_shared::clock::MILLISECOND_NS;
 
 use super::mapping::{EVENT_DRIVEN, MAX_BYTES, Mapped};
 use crate::drive::axis::NewTargets;
 use crate::drive::dictionary::Objects;
 
-/// A fault of a receive PDO.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum RpdoFault {
-    /// Shorter than its mapping: its data are discarded.
-    Short,
-    /// Longer than its mapping: the bytes beyond are discarded.
-    Long,
-    /// Its event timer ran out.
-    Overdue,
-}
-
-impl RpdoFault {
-    pub(crate) const ALL: [Self; 3] = [Self::Short, Self::Long, Self::Overdue];
-}
+/// The errors of a receive PDO: shorter than its mapping, so that its data are discarded; longer than its mapping, so that
+/// the bytes beyond are discarded; its event timer ran out.
+pub(crate) const ERRORS: [EmergencyCode; 3] =
+    [EmergencyCode::PDO_LENGTH, EmergencyCode::PDO_LENGTH_EXCEEDED, EmergencyCode::RPDO_TIMEOUT];
+const SHORT: usize = 0;
+const LONG: usize = 1;
+const OVERDUE: usize = 2;
 
 /// A receive PDO.
 #[derive(Debug, Clone)]
@@ -34,8 +27,8 @@ pub(crate) struct Rpdo {
     mapped: Mapped,
     heard_ns: Option<u64>,
     buffered: Option<[u8; MAX_BYTES]>,
-    /// Which of [`RpdoFault::ALL`] it has.
-    faults: [bool; RpdoFault::ALL.len()],
+    /// Which of [`ERRORS`] it has.
+    pub(crate) has: [bool; ERRORS.len()],
     effects: Effects,
 }
 
@@ -63,7 +56,7 @@ impl Rpdo {
             mapped,
             heard_ns: None,
             buffered: None,
-            faults: [false; RpdoFault::ALL.len()],
+            has: [false; ERRORS.len()],
             effects: Effects {
                 targets: NewTargets { position: holds(0x607A), torque: holds(0x6071) },
                 commands: holds(0x6040),
@@ -82,27 +75,17 @@ impl Rpdo {
         self.is_synchronous
     }
 
-    /// Whether received data wait for a SYNC.
-    pub(crate) fn waits_for_sync(&self) -> bool {
-        self.is_synchronous && self.buffered.is_some()
-    }
-
-    /// Whether it has that fault.
-    pub(crate) fn has(&self, fault: RpdoFault) -> bool {
-        self.faults[fault as usize]
-    }
-
     /// Buffers a frame's data; only the newest are kept.
     pub(crate) fn take(&mut self, now_ns: u64, data: &[u8]) {
         match data.len().cmp(&self.mapped.length) {
             Ordering::Less => {
-                self.faults[RpdoFault::Short as usize] = true;
+                self.has[SHORT] = true;
                 return;
             }
-            Ordering::Equal => self.faults = Default::default(),
+            Ordering::Equal => self.has = Default::default(),
             Ordering::Greater => {
-                self.faults[RpdoFault::Long as usize] = true;
-                self.faults[RpdoFault::Overdue as usize] = false;
+                self.has[LONG] = true;
+                self.has[OVERDUE] = false;
             }
         }
         let used = &data[..self.mapped.length];
@@ -127,7 +110,7 @@ impl Rpdo {
     pub(crate) fn expires(&mut self, now_ns: u64) -> bool {
         let is_late = |heard_ns: &mut u64| now_ns.saturating_sub(*heard_ns) > self.deadline_ns;
         let expires = self.deadline_ns > 0 && self.heard_ns.take_if(is_late).is_some();
-        self.faults[RpdoFault::Overdue as usize] |= expires;
+        self.has[OVERDUE] |= expires;
         expires
     }
 }
