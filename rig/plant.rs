@@ -35,7 +35,7 @@ pub(crate) struct PlantArgs {
 }
 
 impl PlantArgs {
-    /// The supervisor's process_arguments; none for a plant that a user starts.
+    /// The arguments from the supervisor; none for a plant that a user starts.
     fn process_arguments(&self) -> Option<ProcessArguments> {
         Some(ProcessArguments { scenario: self.scenario.clone()?, domain: self.domain.clone()? })
     }

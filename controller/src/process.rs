@@ -37,13 +37,13 @@ pub enum ControllerError {
 ///
 /// # Errors
 /// [`ControllerError`] when the scenario cannot be used, or the process cannot start or loses its messages.
-pub fn run(process_arguments: &ProcessArguments, kind: Kind) -> Result<Outcome, ControllerError> {
+pub fn run(arguments: &ProcessArguments, kind: Kind) -> Result<Outcome, ControllerError> {
     match kind {
-        Kind::Motion => process::run(process_arguments, |scenario| {
+        Kind::Motion => process::run(arguments, |scenario| {
             let (mechanism, trajectory) = motion(scenario)?;
             Ok(MotionController::new(scenario, mechanism, trajectory))
         }),
-        Kind::Hold => process::run(process_arguments, |scenario| {
+        Kind::Hold => process::run(arguments, |scenario| {
             let (mechanism, trajectory) = motion(scenario)?;
             Ok(HoldPosition::new(scenario, mechanism, trajectory.duration_s()))
         }),

@@ -97,8 +97,8 @@ impl Ports {
 }
 
 /// Runs the plant until it is asked to end or its controller hangs, then until its drives are off.
-pub fn run(process_arguments: &ProcessArguments) -> Result<Reason, PlantProcessError> {
-    let context = process_arguments.init()?;
+pub fn run(arguments: &ProcessArguments) -> Result<Reason, PlantProcessError> {
+    let context = arguments.init()?;
     if context.scenario.can.is_virtual() {
         serve(&context, PlantCore::new)
     } else {

@@ -4,12 +4,12 @@ use masseter_terminal::status;
 use std::collections::BTreeSet;
 
 use anyhow::ensure;
+use masseter_recording::MachineInfo;
 use masseter_shared::realtime::scheduling::{Obtained, usable_cores};
 use serde::Serialize;
 
 use super::args::Kind;
 use super::thread::realtime_on;
-use masseter_recording::MachineInfo;
 
 /// Written with the results.
 #[derive(Debug, Serialize)]

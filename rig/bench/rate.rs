@@ -10,6 +10,9 @@ use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
 use anyhow::{Context, bail};
+use masseter_recording::Manifest;
+use masseter_recording::RunFolder;
+use masseter_report::histogram_log;
 use masseter_shared::clock;
 use masseter_shared::config::Scenario;
 use rustix::process::{Pid, Signal, kill_process};
@@ -18,9 +21,6 @@ use super::candidate::{Candidate, Durations, Round, no_durations};
 use super::comparison::{Comparison, take_turns};
 use super::rate_summary::Summary;
 use crate::machine::interrupts::Interrupts;
-use masseter_recording::Manifest;
-use masseter_recording::RunFolder;
-use masseter_report::histogram_log;
 
 /// The name in results.
 pub(super) const NAME: &str = "rate";

@@ -11,12 +11,12 @@ use anyhow::{Context, bail};
 use masseter_shared::clock::{self, SECOND_NS};
 use masseter_shared::config::{CpuDmaLatency, RealtimeConfig};
 use masseter_shared::realtime::{Cycle, Wake};
+use masseter_shared::schedule::OFF_TICK_NS;
 
 use super::candidate::{Durations, Round, no_durations, record};
 use super::comparison::{Comparison, Turn};
 use super::thread::on_core;
 use crate::machine::dma_latency::Hold;
-use masseter_shared::schedule::OFF_TICK_NS;
 
 const PERIOD_NS: u64 = SECOND_NS / 1000;
 /// Wake-ups per round.

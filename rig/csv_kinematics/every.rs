@@ -5,15 +5,15 @@ use std::iter;
 use masseter_controller::kinematics::{Assembly, ForwardError, Solution, Solutions, nearest_assembly_m};
 use masseter_shared::geometry::{Actuators, Joints, LEGS, Mechanism};
 use masseter_shared::messages::pose_fields;
-
-use super::table::{Columns, CsvArgs, Lines, convert};
 use masseter_terminal::Exit;
+
+use super::table::{ACTUATOR_COLUMNS, Columns, CsvArgs, Lines, convert};
 
 /// `line` is the input's line. Conditions are 1 where they hold and 0 where not; `separation_rad` is
 /// the largest difference of a leg's angle to the nearest other solution; `condition` is that of the
 /// whole mechanism, with turns taken at the platform's first side.
 const COLUMNS: Columns = Columns {
-    read: super::forward::COLUMNS.read,
+    read: ACTUATOR_COLUMNS,
     written: "line,x_m,y_m,z_m,qw,qx,qy,qz,theta1_rad,theta2_rad,theta3_rad,legs_above_base,hinges_below_platform,\
               corners_in_order,positive_determinant,separation_rad,determinant,condition,residual_m,nearest_m",
 };

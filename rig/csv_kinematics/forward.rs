@@ -4,13 +4,13 @@ use clap::{Args, ValueEnum};
 use masseter_controller::kinematics::{ForwardError, ForwardTracker, Method, Options, Solution, solve};
 use masseter_shared::geometry::{Actuators, LEGS, Mechanism, StrokeLimits};
 use masseter_shared::messages::pose_fields;
-
-use super::every;
-use super::table::{Columns, CsvArgs, Lines, convert, convert_in_turn, mechanism};
 use masseter_terminal::Exit;
 
-pub(super) const COLUMNS: Columns = Columns {
-    read: "d1_m,d2_m,d3_m,l1_m,l2_m,l3_m",
+use super::every;
+use super::table::{ACTUATOR_COLUMNS, Columns, CsvArgs, Lines, convert, convert_in_turn, mechanism};
+
+const COLUMNS: Columns = Columns {
+    read: ACTUATOR_COLUMNS,
     written: "x_m,y_m,z_m,qw,qx,qy,qz,theta1_rad,theta2_rad,theta3_rad,iterations,residual_m",
 };
 /// Where the paper's and Newton's iteration start without `--guess`: the paper's neutral pose.

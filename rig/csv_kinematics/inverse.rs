@@ -3,9 +3,9 @@
 use masseter_controller::kinematics::Assembly;
 use masseter_shared::geometry::{InverseError, Joints, Mechanism, Pose};
 use masseter_shared::messages::pose_from_fields;
+use masseter_terminal::Exit;
 
 use super::table::{Columns, CsvArgs, Lines, convert, mechanism};
-use masseter_terminal::Exit;
 
 /// How far a quaternion's norm may be from 1.
 const UNIT_TOLERANCE: f64 = 1e-3;

@@ -9,10 +9,13 @@ use std::path::PathBuf;
 use anyhow::{anyhow, bail};
 use clap::Args;
 use masseter_shared::geometry::Mechanism;
+use masseter_terminal::{Exit, status, taken};
 use rayon::prelude::*;
 
 use super::input::{Input, Line};
-use masseter_terminal::{Exit, status, taken};
+
+/// Columns of actuator positions, as `fk` reads and `ik` writes them.
+pub(super) const ACTUATOR_COLUMNS: &str = "d1_m,d2_m,d3_m,l1_m,l2_m,l3_m";
 
 /// Status of a line that could not be read.
 const BAD_LINE: &str = "bad_line";

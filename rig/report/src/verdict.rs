@@ -1,5 +1,10 @@
 //! The verdict on a run: by its end, then its recording, then the machine, then its checks.
 
+use masseter_analysis::{EventRecord, Figures, Outage};
+use masseter_recording::DmaLatency;
+use masseter_recording::Ending;
+use masseter_recording::Manifest;
+use masseter_recording::RunUsage;
 use masseter_shared::config::CanConfig;
 use masseter_shared::messages::codes::EventKind;
 use serde::ser::{Serialize, SerializeStruct, Serializer};
@@ -7,11 +12,6 @@ use serde::ser::{Serialize, SerializeStruct, Serializer};
 use crate::checks::{Check, CheckResult, checks, missed_cycles};
 use crate::outcome::Outcome;
 use crate::text;
-use masseter_analysis::{EventRecord, Figures, Outage};
-use masseter_recording::DmaLatency;
-use masseter_recording::Ending;
-use masseter_recording::Manifest;
-use masseter_recording::RunUsage;
 
 /// The judgement of a run.
 #[derive(Debug, Clone, PartialEq)]

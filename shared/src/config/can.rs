@@ -1,11 +1,11 @@
 //! The CAN link: `[can]`.
 
+use masseter_can::{Bitrate, BitrateError, FrameFormat, Rates};
 use serde::{Deserialize, Serialize};
 
 use super::error::ScenarioError;
 use super::need::{keyed, require_positive};
 use crate::geometry::AXES;
-use masseter_can::{Bitrate, BitrateError, FrameFormat, Rates};
 
 section! {
     /// The CAN link between the master and the six drives.

@@ -2,11 +2,11 @@
 
 use std::fmt::Display;
 
+use masseter_can::canopen::NodeId;
 use serde::{Deserialize, Serialize};
 
 use super::error::ScenarioError;
 use super::need::{require_not_negative, require_within};
-use masseter_can::canopen::NodeId;
 
 /// The kind of the fault.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]

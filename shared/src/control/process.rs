@@ -13,10 +13,10 @@ use crate::transport::{Node, Publisher, Received, Subscriber, TransportError};
 /// # Errors
 /// Those of `build`, and [`ProcessError`] when the process cannot start or loses its messages.
 pub fn run<C: Controller, E: From<ProcessError>>(
-    process_arguments: &ProcessArguments,
+    arguments: &ProcessArguments,
     build: impl FnOnce(&Scenario) -> Result<C, E>,
 ) -> Result<Outcome, E> {
-    let context = process_arguments.init()?;
+    let context = arguments.init()?;
     let (scenario, schedule) = (&context.scenario, &context.schedule);
     let mut controller = build(scenario)?;
     let ports = Ports::open(&context.node)?;

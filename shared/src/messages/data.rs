@@ -2,9 +2,9 @@
 
 use bytemuck::{Pod, Zeroable};
 use iceoryx2::prelude::ZeroCopySend;
+use masseter_can::Frame;
 
 use super::schema::FieldType;
-use masseter_can::Frame;
 
 const MOST: usize = Frame::MAX_DATA;
 

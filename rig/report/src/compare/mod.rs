@@ -9,14 +9,14 @@ use std::fmt::Write;
 use std::path::Path;
 
 use anyhow::Context;
+use masseter_terminal::Exit;
+use masseter_terminal::Format;
+use masseter_terminal::result;
 use serde::Serialize;
 
 use crate::text::or_dash;
 use changes::{Change, Judgement, changes};
 use compared_run::{ComparedRun, Difference, differences};
-use masseter_terminal::Exit;
-use masseter_terminal::Format;
-use masseter_terminal::result;
 
 /// Version of the comparison's form.
 const FORM: u32 = 1;
