@@ -3,108 +3,116 @@
 //! No trajectory, no feedback in pose space, no inverse kinematics: a second, minimal
 //! implementation of [`Controller`].
 
-use masseter_shared::config::Scenario;
+use masseter_shared::config::{ControllerConfig, Scenario};
 use masseter_shared::control::{Controller, Outcome, Tick};
-use masseter_shared::geometry::{AXES, Actuators, Mechanism, Pose};
-use masseter_shared::messages::codes::{Cause, ControllerState, DriveState, drive_state};
+use masseter_shared::geometry::{AXES, Actuators, Mechanism};
+use masseter_shared::messages::codes::{ControllerState, DriveState, NO_DRIVE_STATE};
 use masseter_shared::messages::{Command, Event, Reading, State, pose_fields};
 
 use crate::kinematics::{ForwardTracker, Solution};
+use crate::progress::Progress;
 use crate::safety::{self, Fault};
 use crate::sequence::{Trigger, next, request};
 use crate::transition;
 
 /// Bits of [`Reading::fresh_axes`] when all axes are fresh.
 const ALL_AXES: u32 = (1 << AXES) - 1;
-/// Cycles for which the last command is repeated, so that the drives receive it.
-const REPEATED_CYCLES: u64 = 5;
+/// A complete reading and the pose of its positions.
+#[derive(Debug, Clone, Copy)]
+struct Estimate {
+    reading_cycle: u64,
+    sampled_ns: u64,
+    measured: Actuators,
+    solution: Solution,
+}
 
 /// Holds the position found at the start.
 #[derive(Debug, Clone)]
 pub struct HoldPosition {
     tracker: ForwardTracker,
+    config: ControllerConfig,
+    period_s: f64,
     hold_cycles: u64,
-    timeout_cycles: u64,
-    stale_cycles: u64,
     state: ControllerState,
     cycles_in_state: u64,
     cycle: u64,
     silent_cycles: u64,
     stop_requested: bool,
     fault: Option<Fault>,
-    reading: Reading,
-    solution: Option<Solution>,
-    /// Targets and their pose, from the last reading before the drives are switched on.
-    held: Option<(Actuators, Pose)>,
+    steady_readings: u32,
+    drive_state: [u32; AXES],
+    /// The last complete reading and its solution.
+    estimate: Option<Estimate>,
+    /// The estimate when the drives are switched on.
+    held: Option<Estimate>,
 }
 
 impl HoldPosition {
     /// A controller that holds the position for `hold_s` seconds.
     pub fn new(scenario: &Scenario, mechanism: Mechanism, hold_s: f64) -> Self {
-        let cycles = |duration_s: f64| (duration_s / scenario.period_s()).ceil() as u64;
+        let period_s = scenario.period_s();
         Self {
             tracker: ForwardTracker::new(mechanism),
-            hold_cycles: cycles(hold_s),
-            timeout_cycles: cycles(scenario.controller.start_timeout_s),
-            stale_cycles: scenario.controller.stale_cycles.into(),
+            config: scenario.controller,
+            period_s,
+            hold_cycles: (hold_s / period_s).ceil() as u64,
             state: ControllerState::WaitReadings,
             cycles_in_state: 0,
             cycle: 0,
             silent_cycles: 0,
             stop_requested: false,
             fault: None,
-            reading: Reading::default(),
-            solution: None,
+            steady_readings: 0,
+            drive_state: [NO_DRIVE_STATE; AXES],
+            estimate: None,
             held: None,
         }
     }
 
-    fn take(&mut self, reading: &Reading) -> Result<(), Fault> {
+    /// Whether the reading is complete, and so gives an estimate.
+    fn take(&mut self, reading: &Reading) -> Result<bool, Fault> {
         safety::check_reading(reading)?;
         safety::check_commander(reading, self.cycle)?;
+        self.drive_state = reading.drive_state;
         safety::check_drives(reading, self.state == ControllerState::Running)?;
-        self.reading = *reading;
-        if reading.fresh_axes == ALL_AXES {
-            let measured = Actuators::from_axes(reading.position_m);
-            let solution = self.tracker.update(&measured).map_err(|error| Fault::from(&error))?;
-            self.solution = Some(solution);
-            self.silent_cycles = 0;
+        if reading.fresh_axes != ALL_AXES {
+            return Ok(false);
         }
-        Ok(())
+        let Reading { cycle: reading_cycle, sampled_ns, .. } = *reading;
+        let measured = Actuators::from_axes(reading.position_m);
+        let solution = self.tracker.update(&measured).map_err(|error| Fault::from(&error))?;
+        self.estimate = Some(Estimate { reading_cycle, sampled_ns, measured, solution });
+        Ok(true)
     }
 
-    fn timeout(&self) -> Option<Fault> {
-        let over = |cause, cycles: u64, limit: u64| {
-            (cycles > limit).then(|| Fault::new(cause, cycles as f64, limit as f64))
-        };
-        match self.state {
-            ControllerState::Finished | ControllerState::SafeStop => None,
-            ControllerState::Running => over(Cause::StaleReading, self.silent_cycles, self.stale_cycles),
-            _ => over(Cause::EnableTimeout, self.cycles_in_state, self.timeout_cycles),
+    fn progress(&self) -> Progress {
+        Progress {
+            state: self.state,
+            cycles_in_state: self.cycles_in_state,
+            silent_cycles: self.silent_cycles,
+            drive_state: self.drive_state,
+            period_s: self.period_s,
         }
     }
 
     fn trigger(&self) -> Option<Trigger> {
-        let all = |holds: fn(DriveState) -> bool| {
-            self.reading
-                .drive_state
-                .iter()
-                .all(|&code| matches!(drive_state(code), Ok(Some(state)) if holds(state)))
-        };
         let is_over = self.stop_requested || self.cycles_in_state >= self.hold_cycles;
         match self.state {
             ControllerState::WaitReadings | ControllerState::Enabling if self.stop_requested => {
                 Some(Trigger::StopRequested)
             }
-            ControllerState::WaitReadings => self.solution.map(|_| Trigger::Steady),
+            ControllerState::WaitReadings => {
+                (self.steady_readings >= self.config.steady_readings).then_some(Trigger::Steady)
+            }
             ControllerState::Enabling => {
-                all(|state| state == DriveState::OperationEnabled).then_some(Trigger::Enabled)
+                let enabled = DriveState::OperationEnabled.code();
+                self.drive_state.iter().all(|&code| code == enabled).then_some(Trigger::Enabled)
             }
             // Nothing has to be eased to, and a motion at rest need not be held any longer.
             ControllerState::Easing => Some(Trigger::Eased),
             ControllerState::Running => is_over.then_some(Trigger::Played),
             ControllerState::Holding => Some(Trigger::Rested),
-            ControllerState::Disabling => all(|state| !state.is_powered()).then_some(Trigger::Released),
+            ControllerState::Disabling => self.progress().drives_are_off().then_some(Trigger::Released),
             ControllerState::Finished | ControllerState::SafeStop => None,
         }
     }
@@ -112,8 +120,15 @@ impl HoldPosition {
 
 impl Controller for HoldPosition {
     fn observe(&mut self, reading: Option<&Reading>) {
-        self.silent_cycles += 1;
-        if let Some(Err(fault)) = reading.map(|reading| self.take(reading)) {
+        let taken = reading.map_or(Ok(false), |reading| self.take(reading));
+        if taken == Ok(true) {
+            self.silent_cycles = 0;
+            self.steady_readings = self.steady_readings.saturating_add(1);
+        } else {
+            self.silent_cycles += 1;
+            self.steady_readings = 0;
+        }
+        if let Err(fault) = taken {
             self.fault.get_or_insert(fault);
         }
     }
@@ -121,7 +136,7 @@ impl Controller for HoldPosition {
     fn decide(&mut self, tick: Tick) -> Option<Event> {
         self.cycle = tick.cycle;
         self.cycles_in_state += 1;
-        let fault = self.fault.take().or_else(|| self.timeout());
+        let fault = self.fault.take().or_else(|| self.progress().overdue(&self.config));
         let trigger = if fault.is_some() { Trigger::Fault } else { self.trigger()? };
         let (from, to) = (self.state, next(self.state, trigger));
         if from == to {
@@ -129,8 +144,7 @@ impl Controller for HoldPosition {
         }
         (self.state, self.cycles_in_state) = (to, 0);
         if to == ControllerState::Enabling {
-            let measured = Actuators::from_axes(self.reading.position_m);
-            self.held = self.solution.map(|solution| (measured, solution.pose));
+            self.held = self.estimate;
         }
         Some(transition::event([from, to], trigger, fault, tick))
     }
@@ -138,8 +152,8 @@ impl Controller for HoldPosition {
     fn fill_command(&self, command: &mut Command) {
         *command = Command {
             cycle: self.cycle,
-            reading_cycle: self.reading.cycle,
-            target_m: self.held.map_or([0.0; AXES], |(targets, _)| targets.to_axes()),
+            reading_cycle: self.estimate.map_or(0, |estimate| estimate.reading_cycle),
+            target_m: self.held.map_or([0.0; AXES], |held| held.measured.to_axes()),
             request: request(self.state).code(),
             controller_state: self.state.code(),
             ..Command::default()
@@ -147,17 +161,12 @@ impl Controller for HoldPosition {
     }
 
     fn fill_state(&self, state: &mut State) {
-        *state = State {
-            cycle: self.cycle,
-            reading_cycle: self.reading.cycle,
-            sampled_ns: self.reading.sampled_ns,
-            controller_state: self.state.code(),
-            ..State::default()
-        };
-        if let Some((_, pose)) = &self.held {
-            (state.desired_position_m, state.desired_quaternion_wxyz) = pose_fields(pose);
+        *state = State { cycle: self.cycle, controller_state: self.state.code(), ..State::default() };
+        if let Some(held) = &self.held {
+            (state.desired_position_m, state.desired_quaternion_wxyz) = pose_fields(&held.solution.pose);
         }
-        if let Some(solution) = &self.solution {
+        if let Some(Estimate { reading_cycle, sampled_ns, solution, .. }) = &self.estimate {
+            (state.reading_cycle, state.sampled_ns) = (*reading_cycle, *sampled_ns);
             (state.estimated_position_m, state.estimated_quaternion_wxyz) = pose_fields(&solution.pose);
             state.leg_angle_rad = solution.theta_rad;
             (state.residual_m, state.iterations) = (solution.residual_m, solution.iterations);
@@ -169,14 +178,7 @@ impl Controller for HoldPosition {
     }
 
     fn outcome(&self) -> Option<Outcome> {
-        let is_repeated = self.cycles_in_state >= REPEATED_CYCLES;
-        match self.state {
-            ControllerState::Finished => is_repeated.then_some(Outcome::Finished),
-            ControllerState::SafeStop => {
-                (self.cycles_in_state >= self.timeout_cycles.min(300)).then_some(Outcome::SafeStop)
-            }
-            _ => None,
-        }
+        self.progress().outcome()
     }
 }
 
@@ -248,9 +250,51 @@ mod tests {
             while bench.controller.state != ControllerState::Running {
                 bench.cycle(true);
             }
-            (0..=bench.controller.stale_cycles).for_each(|_| disturb(&mut bench));
+            (0..=bench.controller.config.stale_cycles).for_each(|_| disturb(&mut bench));
             assert_eq!(bench.controller.state, ControllerState::SafeStop);
             assert_eq!(bench.command.request, DriveRequest::QuickStop.code());
         }
+    }
+
+    #[test]
+    fn silence_stops_safely_in_every_state_with_voltage() {
+        for state in [ControllerState::Enabling, ControllerState::Running] {
+            let mut bench = Bench::new();
+            while bench.controller.state != state {
+                bench.cycle(true);
+            }
+            (0..=bench.controller.config.stale_cycles).for_each(|_| bench.cycle(false));
+            assert_eq!(bench.controller.state, ControllerState::SafeStop, "in {state}");
+        }
+    }
+
+    #[test]
+    fn incomplete_readings_are_no_start_and_give_no_target() {
+        let mut bench = Bench::new();
+        let complete = bench.reading.position_m;
+        (0..10).for_each(|_| bench.cycle(true));
+        bench.reading.fresh_axes = 0b01_1111;
+        bench.reading.position_m[5] += 1e-3;
+        (0..10).for_each(|_| bench.cycle(true));
+        assert_eq!(bench.controller.state, ControllerState::WaitReadings);
+        bench.reading.fresh_axes = ALL_AXES;
+        bench.reading.position_m = complete;
+        while bench.command.request != DriveRequest::Enable.code() {
+            bench.cycle(true);
+        }
+        assert_eq!(bench.command.target_m.map(f64::to_bits), complete.map(f64::to_bits));
+    }
+
+    #[test]
+    fn a_stop_while_the_drives_are_switched_on_switches_them_off() {
+        let mut bench = Bench::new();
+        while bench.controller.state != ControllerState::Enabling {
+            bench.cycle(true);
+        }
+        bench.controller.request_stop();
+        while bench.controller.outcome().is_none() {
+            bench.cycle(true);
+        }
+        assert_eq!(bench.controller.outcome(), Some(Outcome::Finished));
     }
 }

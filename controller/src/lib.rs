@@ -10,6 +10,7 @@ pub mod motion_controller;
 mod playback;
 mod pose_control;
 pub mod process;
+mod progress;
 mod safety;
 pub mod sequence;
 pub mod trajectory;

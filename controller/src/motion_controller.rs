@@ -10,13 +10,14 @@ use std::hint::black_box;
 use masseter_shared::config::{ControllerConfig, Scenario};
 use masseter_shared::control::{Controller, Outcome, Tick};
 use masseter_shared::geometry::{AXES, Actuators, Mechanism, Pose};
-use masseter_shared::messages::codes::{Cause, ControllerState, DriveState, NO_DRIVE_STATE, drive_state};
+use masseter_shared::messages::codes::{ControllerState, DriveState, NO_DRIVE_STATE};
 use masseter_shared::messages::{Command, Event, Reading, State};
 
 use crate::command_acknowledgement::CommandAcknowledgement;
 use crate::kinematics::{ForwardTracker, Solution};
 use crate::playback::Playback;
 use crate::pose_control::PoseControl;
+use crate::progress::Progress;
 use crate::safety::{self, Fault};
 use crate::sequence::{Trigger, next};
 use crate::trajectory::Trajectory;
@@ -27,11 +28,6 @@ const ALL_AXES: u32 = (1 << AXES) - 1;
 
 /// Age of a reading that comes late but is used.
 const LATE_READING_CYCLES: u64 = 1;
-
-/// Cycles for which the last command is repeated, so that the drives receive it.
-const REPEATED_CYCLES: u64 = 5;
-/// How long a safe stop waits for the drives to be off, s.
-const SAFE_STOP_S: f64 = 0.3;
 
 /// The estimate of the mechanism from the last complete reading.
 #[derive(Debug, Clone, Copy)]
@@ -107,12 +103,6 @@ impl MotionController {
         self.state
     }
 
-    /// Whether all drives report that they are without voltage: a lost one reports nothing, and may not be.
-    fn drives_are_off(&self) -> bool {
-        let is_off = |&code: &u32| matches!(drive_state(code), Ok(Some(state)) if !state.is_powered());
-        self.drive_state.iter().all(is_off)
-    }
-
     fn take(&mut self, reading: &Reading) -> Result<(), Fault> {
         safety::check_reading(reading)?;
         safety::check_commander(reading, self.last_cycle)?;
@@ -136,22 +126,13 @@ impl MotionController {
         Ok(())
     }
 
-    /// The fault of a wait that took too long.
-    fn overdue(&self) -> Option<Fault> {
-        let timeout_cycles = self.config.start_timeout_s / self.period_s;
-        let waited = self.cycles_in_state as f64;
-        let silent = self.silent_cycles as f64;
-        let stale_limit = f64::from(self.config.stale_cycles);
-        match self.state {
-            ControllerState::WaitReadings if waited > timeout_cycles => {
-                Some(Fault::new(Cause::StaleReading, waited, timeout_cycles))
-            }
-            ControllerState::Enabling | ControllerState::Disabling if waited > timeout_cycles => {
-                Some(Fault::new(Cause::EnableTimeout, waited, timeout_cycles))
-            }
-            ControllerState::WaitReadings | ControllerState::Finished | ControllerState::SafeStop => None,
-            _ if silent > stale_limit => Some(Fault::new(Cause::StaleReading, silent, stale_limit)),
-            _ => None,
+    fn progress(&self) -> Progress {
+        Progress {
+            state: self.state,
+            cycles_in_state: self.cycles_in_state,
+            silent_cycles: self.silent_cycles,
+            drive_state: self.drive_state,
+            period_s: self.period_s,
         }
     }
 
@@ -178,8 +159,7 @@ impl MotionController {
         Ok(())
     }
 
-    /// How far the motion has gone on since the estimate's sample, against a reading in time, s. The motion waits for readings that are later
-    /// than that.
+    /// Age of the estimate's sample beyond that of a reading in time, s. The motion waits for readings that are later.
     fn sample_age_s(&self) -> f64 {
         let reading_cycle = self.estimate.map_or(self.last_cycle, |estimate| estimate.reading_cycle);
         self.last_cycle.saturating_sub(reading_cycle).min(LATE_READING_CYCLES) as f64 * self.period_s
@@ -208,7 +188,7 @@ impl MotionController {
             ControllerState::Easing => self.playback.is_over().then_some(Trigger::Eased),
             ControllerState::Running => self.playback.is_over().then_some(Trigger::Played),
             ControllerState::Holding => (held_s >= self.config.hold_s).then_some(Trigger::Rested),
-            ControllerState::Disabling => self.drives_are_off().then_some(Trigger::Released),
+            ControllerState::Disabling => self.progress().drives_are_off().then_some(Trigger::Released),
             ControllerState::Finished | ControllerState::SafeStop => None,
         };
         let stop = self.stop_requested.then_some(Trigger::StopRequested);
@@ -263,7 +243,11 @@ impl Controller for MotionController {
         if self.acknowledgement.takes_step(tick.cycle) {
             self.playback.advance(self.period_s);
         }
-        let fault = self.fault.take().or_else(|| self.overdue()).or_else(|| self.control().err());
+        let fault = self
+            .fault
+            .take()
+            .or_else(|| self.progress().overdue(&self.config))
+            .or_else(|| self.control().err());
         let trigger = self.trigger(fault.is_some());
         let event = trigger.and_then(|trigger| self.follow(trigger, fault, tick));
         self.cycles_in_state += 1;
@@ -284,16 +268,7 @@ impl Controller for MotionController {
     }
 
     fn outcome(&self) -> Option<Outcome> {
-        let is_repeated = self.cycles_in_state >= REPEATED_CYCLES;
-        match self.state {
-            ControllerState::Finished => is_repeated.then_some(Outcome::Finished),
-            ControllerState::SafeStop => {
-                let waited_s = self.cycles_in_state as f64 * self.period_s;
-                let is_over = (is_repeated && self.drives_are_off()) || waited_s >= SAFE_STOP_S;
-                is_over.then_some(Outcome::SafeStop)
-            }
-            _ => None,
-        }
+        self.progress().outcome()
     }
 
     fn warm_up(&self) {

@@ -6,7 +6,7 @@ use libfuzzer_sys::arbitrary::Unstructured;
 use libfuzzer_sys::fuzz_target;
 use masseter_can::canopen::{Cob, Emergency, Heartbeat, Nmt, NodeId, SdoRequest, SdoResponse};
 use masseter_can::socketcand::Requests;
-use masseter_can::{CanId, ErrorReport, Rpdo1, Tapped, TappedFrame, Tpdo1};
+use masseter_can::{CanId, ErrorReport, Rpdo1, Tpdo1, candump};
 use masseter_shared::messages::tap;
 use masseter_shared::messages::{CanData, FrameTap, Message};
 

@@ -71,7 +71,9 @@ pub fn run_cycle<L: Link, P: PlantPorts<L>>(
     if let Some(truth) = plant.truth() {
         ports.publish_truth(&truth)?;
     }
-    let command = ports.command(wake)?;
-    plant.apply(ports.now_ns(), command.as_ref().map(Borrow::borrow))?;
-    ports.publish_frames_and_events(plant)
+    let applied = ports
+        .command(wake)
+        .and_then(|command| Ok(plant.apply(ports.now_ns(), command.as_ref().map(Borrow::borrow))?));
+    // Also after an error: these frames and events explain it.
+    ports.publish_frames_and_events(plant).and(applied)
 }

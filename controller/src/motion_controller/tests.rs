@@ -2,7 +2,7 @@
 
 use masseter_shared::config::{ControllerConfig, JawConfig};
 use masseter_shared::geometry::{LEGS, MechanismConfig};
-use masseter_shared::messages::codes::{DriveRequest, EventKind, drive_request};
+use masseter_shared::messages::codes::{Cause, DriveRequest, EventKind, drive_request};
 use masseter_shared::messages::{Command, State};
 
 use super::*;
@@ -160,7 +160,7 @@ fn a_run_goes_through_its_states_in_order_and_ends_with_the_drives_off() {
         bench.controller.outcome().is_none(),
         "the last command must be repeated before the process ends"
     );
-    for _ in 0..REPEATED_CYCLES {
+    for _ in 0..crate::progress::REPEATED_CYCLES {
         bench.cycle(Some);
     }
     assert!(bench.controller.outcome().is_some());

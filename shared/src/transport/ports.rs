@@ -292,6 +292,8 @@ impl<M: Message> Subscriber<M> {
 
 #[cfg(test)]
 mod tests {
+    use iceoryx2::prelude::ZeroCopySend;
+
     use super::*;
     use crate::messages::Event;
     use crate::transport::ScratchDomain;
@@ -363,5 +365,36 @@ mod tests {
             event.cycle >= 9
         });
         assert_eq!(newest.unwrap().unwrap().cycle, 9);
+    }
+
+    /// A sender of another version with the same layout.
+    #[test]
+    fn a_message_of_another_version_is_refused() {
+        let domain = ScratchDomain::claim("test-version").unwrap();
+        let node = Node::join(&domain).unwrap();
+        let subscriber = node.subscriber::<Event>().unwrap();
+        let publisher = node.publisher::<Event>().unwrap();
+        let mut sample = publisher.port.loan().unwrap();
+        sample.payload_mut().stamp(1, 1);
+        sample.payload_mut().version += 1;
+        sample.send().unwrap();
+        let error = subscriber.receive().unwrap_err().to_string();
+        assert!(error.contains("IncompatibleVersion(8") && error.contains("another version"), "{error}");
+    }
+
+    /// Reads like an event, but for the name of its layout.
+    #[repr(C)]
+    #[derive(Debug, Clone, Copy, ZeroCopySend)]
+    #[type_name("masseter/Event/0000000000000000")]
+    struct OtherLayout([u64; size_of::<Event>() / 8]);
+
+    #[test]
+    fn a_topic_of_another_layout_is_not_opened() {
+        let domain = ScratchDomain::claim("test-layout").unwrap();
+        let node = Node::join(&domain).unwrap();
+        let _publisher = node.publisher::<Event>().unwrap();
+        let other = node.topic::<Event, OtherLayout>(Event::DEPTH).unwrap().open_or_create();
+        let error = format!("{:?}", other.unwrap_err());
+        assert!(error.contains("Incompatible"), "{error}");
     }
 }
