@@ -178,8 +178,8 @@ impl MotionController {
         Ok(())
     }
 
-    /// How far the motion has gone on since the estimate's sample, against a reading in time, s. The motion waits for readings that are later
-    /// than that.
+    /// How far the motion has gone on since the estimate's sample, against a reading in time, s. The motion waits for
+    /// readings that are later than that.
     fn sample_age_s(&self) -> f64 {
         let reading_cycle = self.estimate.map_or(self.last_cycle, |estimate| estimate.reading_cycle);
         self.last_cycle.saturating_sub(reading_cycle).min(LATE_READING_CYCLES) as f64 * self.period_s
