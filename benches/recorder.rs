@@ -84,7 +84,7 @@ impl AtHand {
     }
 }
 
-struct Outlets {
+struct Publishers {
     command: Publisher<CommandMessage>,
     reading: Publisher<Reading>,
     state: Publisher<State>,
@@ -94,7 +94,7 @@ struct Outlets {
     events: [Publisher<Event>; 2],
 }
 
-impl Outlets {
+impl Publishers {
     fn open(node: &Node) -> anyhow::Result<Self> {
         Ok(Self {
             command: node.publisher()?,
@@ -134,9 +134,9 @@ fn through_the_recorder(cycles: &[Vec<Recorded>], folder: &Path, recording: &Pat
     let domain = ScratchDomain::claim("bench")?;
     {
         let node = Node::join(&domain)?;
-        let mut outlets = Outlets::open(&node)?;
+        let mut publishers = Publishers::open(&node)?;
         let mut recorder = start_recorder(&scenario, domain.id(), recording)?;
-        let Played { sent, publishing, skipped, took_s } = play(cycles, &mut outlets)?;
+        let Played { sent, publishing, skipped, took_s } = play(cycles, &mut publishers)?;
         let machine = SystemRoot::of_this_machine();
         let cpu_s = machine.cpu_time_ns(recorder.id()) as f64 / SECOND_NS as f64;
         let memory_kib = peak_memory_kib(&machine, &recorder)?;
@@ -192,7 +192,7 @@ struct Played {
 }
 
 /// Publishes a cycle at a time by the clock.
-fn play(cycles: &[Vec<Recorded>], outlets: &mut Outlets) -> anyhow::Result<Played> {
+fn play(cycles: &[Vec<Recorded>], publishers: &mut Publishers) -> anyhow::Result<Played> {
     let realtime = Scenario::default().realtime;
     let wanted = Wanted {
         core: Some(realtime.cores[0]),
@@ -210,7 +210,7 @@ fn play(cycles: &[Vec<Recorded>], outlets: &mut Outlets) -> anyhow::Result<Playe
     for cycle in cycles.iter().cycle().take((RATE_HZ * SECONDS) as usize) {
         at_hand.take(cycle);
         let wake = pace.wait();
-        outlets.publish_cycle(&at_hand)?;
+        publishers.publish_cycle(&at_hand)?;
         let messages = cycle.len().max(1) as u64;
         publishing.record((clock::now_ns() - wake.woke_ns) / messages)?;
         sent += cycle.len() as u64;

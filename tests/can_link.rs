@@ -170,7 +170,7 @@ fn expect(stream: &mut TcpStream, text: &str) -> String {
 }
 
 #[test]
-fn more_clients_than_there_are_places_disturb_nobody() {
+fn clients_beyond_the_limit_do_not_disturb_the_others() {
     let server = Server::start(&Workspace::new(""));
     let connect = || {
         let stream = TcpStream::connect(&server.address).unwrap();
@@ -191,7 +191,7 @@ fn more_clients_than_there_are_places_disturb_nobody() {
 }
 
 #[test]
-fn a_request_that_cannot_be_served_is_told_and_costs_no_client_its_connection() {
+fn a_request_that_cannot_be_served_is_an_error_and_keeps_the_connection() {
     let server = Server::start(&Workspace::new(""));
     let mut stream = TcpStream::connect(&server.address).unwrap();
     stream.set_read_timeout(Some(Duration::from_secs(20))).unwrap();

@@ -144,7 +144,7 @@ fn wrong_columns_are_refused_with_the_right_ones() {
 const ACTUATORS: &str = "d1_m,d2_m,d3_m,l1_m,l2_m,l3_m\n";
 
 #[test]
-fn all_solutions_of_the_neutral_input_are_told_with_their_conditions() {
+fn all_solutions_of_the_neutral_input_are_listed_with_their_conditions() {
     let output = pipe(&["fk", "--all"], &format!("{ACTUATORS}0,0,0,0.27,0.27,0.27\n"));
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
     let output = stdout(&output);
@@ -161,7 +161,7 @@ fn all_solutions_of_the_neutral_input_are_told_with_their_conditions() {
 
 /// A pose at which the determinant is 10⁻⁹, and a pair of solutions 1.5·10⁻⁴ rad apart.
 #[test]
-fn solutions_that_rounding_cannot_separate_are_both_told_as_singular() {
+fn solutions_that_rounding_cannot_separate_are_both_marked_singular() {
     let singular = "0.014985880362082765,0.00826232132276009,0.035219106697652394,\
                     0.3004420425771831,0.2662413895938286,0.2655512934340976";
     let close = "-0.00902631714950948,-0.004133527909131813,0.013522157666649465,\

@@ -56,7 +56,7 @@ fn assert_logged_in_order(recording: &[u8]) {
 }
 
 #[test]
-fn a_run_goes_on_when_nobody_reads_its_output() {
+fn a_run_continues_when_its_output_is_not_read() {
     let cores = Cores::take();
     let workspace = Workspace::new(&format!("duration_s = 3.0\n{LENIENT}"));
     let mut child = workspace.start(&cores, &[]);

@@ -60,7 +60,7 @@ fn the_page_works_in_a_browser() {
     for id in ELEMENTS {
         assert!(document.contains(&format!("id=\"{id}\"")), "{id} is missing: {}", stderr(&output));
     }
-    // The film plays: its clock has left the beginning.
+    // The animation plays: its clock has left the beginning.
     let clock = document.split("id=\"clock\">").nth(1).and_then(|rest| rest.split(' ').next()).unwrap();
     assert!(clock.parse::<f64>().unwrap() > 0.0, "{clock}");
     assert!(!stderr(&output).contains("CONSOLE"), "{}", stderr(&output));

@@ -31,7 +31,7 @@ impl Disturbance {
     fn from_percentages(stolen_percent: f64, stalled_percent: f64) -> Self {
         let disturbed = stolen_percent.max(stalled_percent) > BOUND_PERCENT;
         let reason = format!(
-            "the machine stood still for {stalled_percent:.1} % of the time observed, and its host stole \
+            "the machine stalled for {stalled_percent:.1} % of the time observed, and its host stole \
              {stolen_percent:.1} %; a bench is judged with at most {BOUND_PERCENT} % of each"
         );
         Self { stolen_percent, stalled_percent, disturbed, reason: disturbed.then_some(reason) }

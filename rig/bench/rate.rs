@@ -2,7 +2,7 @@
 //! the durations are the rig's own.
 //!
 //! Each round of a rate is a run with three processes; the durations come from its recording. The run's verdict is not used,
-//! except to find out whether the machine stood still.
+//! except to find out whether the machine stalled.
 
 use std::fs::{self, File};
 use std::os::unix::process::CommandExt;
@@ -51,7 +51,7 @@ enum RunResult {
     Incomplete { shares: Vec<(String, f64)> },
     /// The motion was not played to its end.
     Stopped {
-        /// Whether the machine stood still for too many cycles.
+        /// Whether the machine stalled for too many cycles.
         is_disturbed: bool,
     },
 }
@@ -94,7 +94,7 @@ pub(super) fn candidate_name(rate_hz: u32, interval: &str) -> String {
 fn uncounted(rate_hz: u32, runs: &[RunResult]) -> Vec<String> {
     const REASONS: [&str; 3] = [
         "did not play to their end: the cores are too slow for this rate",
-        "did not play to their end: the machine stood still for too long",
+        "did not play to their end: the machine stalled for too long",
         "are not judged: messages are missing from their recordings",
     ];
     let reason = |run: &RunResult| match run {

@@ -101,7 +101,7 @@ impl Outliers {
 
     fn note(&self) -> String {
         format!(
-            "masseter woke more than {} µs late {} times; before {} of them the machine stood still",
+            "masseter woke more than {} µs late {} times; before {} of them the machine stalled",
             OUTLIER_NS / 1000,
             self.late,
             self.seen

@@ -122,7 +122,7 @@ mod tests {
     }
 
     #[test]
-    fn a_container_is_told_to_change_its_host() {
+    fn in_a_container_the_remedy_is_on_the_host() {
         let files = [
             (".dockerenv", ""),
             ("etc/os-release", "ID=debian"),
@@ -163,7 +163,7 @@ mod tests {
     }
 
     #[test]
-    fn isolation_is_wanted_only_where_there_are_cores_to_spare() {
+    fn isolation_is_recommended_only_with_cores_to_spare() {
         let cores = |online: &str, isolated: &str| {
             let files =
                 [("sys/devices/system/cpu/online", online), ("sys/devices/system/cpu/isolated", isolated)];

@@ -75,7 +75,7 @@ mod tests {
     }
 
     #[test]
-    fn a_device_that_is_not_wanted_is_neither_opened_nor_refused() {
+    fn a_device_that_is_not_requested_is_neither_opened_nor_refused() {
         let hold = Hold::new(CpuDmaLatency::Leave, false);
         assert_eq!((hold.obtained().limit_us, &hold.obtained().refusal), (None, &None));
     }

@@ -187,7 +187,7 @@ impl Publisher {
     }
 }
 
-/// The recording and the publishers it hears.
+/// The recording and the publishers whose messages it contains.
 struct Log {
     backlog: Backlog,
     commands: Publisher,

@@ -26,6 +26,7 @@ use super::{Condition, ForwardError, Solution};
 /// [`ForwardError::Unassemblable`] without any solution, [`ForwardError::WrongAssembly`] without a
 /// true one, [`ForwardError::Ambiguous`] with more than one; [`ForwardError::Singular`] and
 /// [`ForwardError::Undecided`] where solutions meet.
+#[doc(alias("direct kinematics", "forward kinematics", "FK"))]
 pub fn solve_completely(mechanism: &Mechanism, actuators: &Actuators) -> Result<Solution, ForwardError> {
     check(actuators)?;
     choose(&LoopEquations::new(mechanism, actuators))
@@ -170,7 +171,7 @@ mod tests {
     }
 
     #[test]
-    fn each_kind_of_failure_is_told_apart() {
+    fn each_kind_of_failure_has_its_own_error() {
         let failure = |leg_m| {
             let actuators = Actuators { slide_m: [0.0; LEGS], leg_m };
             solve_completely(&published_mechanism(), &actuators).unwrap_err()

@@ -5,6 +5,7 @@ use masseter_shared::geometry::AXIS_NAMES;
 use super::Condition;
 
 /// An input without a true solution, as far as the solver could find.
+#[doc(alias = "direct kinematics")]
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum ForwardError {
     /// An actuator or the guess is no finite number.

@@ -13,6 +13,7 @@ const SERIES_SUFFICES: f64 = 4e-6;
 const SERIES_REACHES: f64 = 0.03;
 
 /// (cos θ, sin θ) of one leg in its plane: cos inward, sin up. Unit length within 2 roundings.
+#[doc(alias("passive joint angle", "hinge angle"))]
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct LegAngle {
     /// cos θ.

@@ -8,6 +8,7 @@ use super::loop_solutions::{LoopSolutions, MOST_SOLUTIONS, check, nearest_other_
 use super::{ForwardError, Solution};
 
 /// Every real solution of the equations (the paper, eq. 1) for one input, mirrored ones next to each other.
+#[doc(alias("direct kinematics", "assembly modes"))]
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Solutions {
     solutions: [Option<Solution>; MOST_SOLUTIONS],

@@ -32,6 +32,7 @@ const WARM_ITERATIONS: u32 = 4;
 /// }
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
+#[doc(alias("direct kinematics", "FK"))]
 #[derive(Debug, Clone)]
 pub struct ForwardTracker {
     mechanism: Mechanism,

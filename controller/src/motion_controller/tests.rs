@@ -167,7 +167,7 @@ fn a_run_goes_through_its_states_in_order_and_ends_with_the_drives_off() {
 }
 
 #[test]
-fn what_is_wanted_at_a_sample_is_found_there() {
+fn the_estimated_pose_at_a_sample_is_the_desired_pose() {
     let mut bench = Bench::new();
     bench.run_until(ControllerState::Running);
     let mut state = State::default();
@@ -178,7 +178,7 @@ fn what_is_wanted_at_a_sample_is_found_there() {
         let desired = nalgebra::Vector3::from(state.desired_position_m);
         worst_m = worst_m.max((desired - nalgebra::Vector3::from(state.estimated_position_m)).norm());
     }
-    // The plant is exact, so what is left is the trim's own doing.
+    // The plant is exact, so only the trim's correction remains.
     assert!(worst_m < 2e-5, "{worst_m}");
 }
 

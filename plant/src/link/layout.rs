@@ -47,7 +47,7 @@ pub(crate) fn node_ids(can: &CanConfig) -> Result<[NodeId; AXES], PlantError> {
     for (axis, &id) in can.node_ids.iter().enumerate() {
         let is_taken = id == NodeId::MASTER.get() || can.node_ids[..axis].contains(&id);
         if is_taken {
-            let reason = format!("node {id} stands twice, or is the master's ({})", NodeId::MASTER);
+            let reason = format!("node {id} is listed twice, or is the master's ({})", NodeId::MASTER);
             return Err(PlantError::Scenario(format!("can.node_ids: {reason}; give every drive its own")));
         }
         ids[axis] = NodeId::new(id)?;

@@ -109,7 +109,7 @@ mod tests {
     }
 
     #[test]
-    fn a_rig_that_is_too_slow_is_told_from_a_machine_that_stands_still() {
+    fn a_rig_that_is_too_slow_is_distinguished_from_a_machine_that_stalls() {
         // Every how many cycles the machine stalls while waiting, and work takes too long; whether the
         // machine may have done the latter.
         let cases = [

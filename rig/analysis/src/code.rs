@@ -48,7 +48,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_code_is_told_by_its_name_and_one_without_a_meaning_by_its_number() {
+    fn a_code_is_written_as_its_name_and_an_unknown_code_as_its_number() {
         let fault = Code::<EventKind>::from(EventKind::Fault.code());
         assert!(fault == EventKind::Fault && fault != EventKind::Transition);
         let unknown = Code::<EventKind>::from(4000);

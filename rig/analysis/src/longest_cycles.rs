@@ -232,7 +232,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_process_lost_before_its_next_wake_up_is_told_of_the_cycle_that_it_made_long() {
+    fn time_lost_before_the_next_wake_up_is_attributed_to_the_long_cycle() {
         let mut rig = Rig::default();
         for cycle in 1..20 {
             let mut hops_ns = TYPICAL_NS;

@@ -139,7 +139,7 @@ impl Followed {
             return Some(format!("no frame of bus {bus} was recorded"));
         }
         if self.messages.iter().all(|seen| seen.frames == 0) {
-            return Some(format!("bus {bus} does not tell when its frames were queued"));
+            return Some(format!("bus {bus}: its recording lacks the queuing times of the frames"));
         }
         if self.error_frames > 0 {
             return Some(format!("bus {bus} had {} errors", self.error_frames));
@@ -247,7 +247,7 @@ mod tests {
         let error = tap::encode(0, &Tapped::Error(report));
         let cases = [
             (vec![], "no frame of bus 0 was recorded"),
-            (vec![seen(0x080, 0, 0)], "does not tell when its frames were queued"),
+            (vec![seen(0x080, 0, 0)], "lacks the queuing times of the frames"),
             (vec![seen(0x080, 1000, 51), error], "bus 0 had 1 errors"),
             (vec![seen(0x080, 1000, 51), seen(0x080, 61_000, 51)], "so close together"),
             (vec![seen(0x080, 1000, 51), seen(0x080, 1000, 102)], "so close together"),

@@ -94,6 +94,7 @@ pub(super) fn options() -> WriteOptions {
 /// assert_eq!(reader.next_message()?, None);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
+#[doc(alias("logger", "data logger"))]
 pub struct Recorder<W: Medium = DurableFile> {
     channels: Channels<W>,
     encoder: Encoder,

@@ -110,7 +110,7 @@ mod tests {
     }
 
     #[test]
-    fn a_case_is_the_same_whoever_draws_it() {
+    fn a_case_depends_only_on_its_number() {
         let mechanism = Mechanism::new(&MechanismConfig::default()).unwrap();
         let draw = |case| feasible(&mechanism, &mut generator(7, Stream::Trials, case)).actuators;
         assert_eq!(draw(3), draw(3));

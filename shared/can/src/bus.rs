@@ -17,11 +17,11 @@ pub trait Bus {
     /// [`SendError`]; a refused frame is not queued. The caller decides whether to send the frame again.
     fn send(&mut self, now_ns: u64, frame: Frame) -> Result<(), SendError>;
 
-    /// The oldest frame of another node that had arrived at `now_ns` and was not fetched yet; `None` when there is none. A port never receives its own frames.
+    /// The oldest frame of another node that had arrived at `now_ns` and was not fetched yet; `None` when there is none.
+    /// A port never receives its own frames.
     ///
     /// # Errors
-    /// [`ReceiveError`]; frames received before and after the failure are still delivered by later
-    /// calls.
+    /// [`ReceiveError`]; frames received before and after the failure are still delivered by later calls.
     fn receive(&mut self, now_ns: u64) -> Result<Option<Received>, ReceiveError>;
 
     /// The port's fault confinement, as last known.

@@ -207,7 +207,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_request_is_told_and_what_follows_is_read() {
+    fn an_invalid_request_is_an_error_and_the_next_request_is_read() {
         let table = [
             ("< bcmmode >", "unknown command"),
             ("< open >", "unknown command"),
@@ -248,7 +248,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_too_long_is_told_once_up_to_its_end_however_it_comes() {
+    fn a_request_that_is_too_long_is_one_error_in_one_piece_or_many() {
         let text = format!("< echo >< {} >< echo >", "x".repeat(2 * LONGEST_REQUEST));
         let expected = [Ok(Request::Echo), Err(RequestError::Stray), Ok(Request::Echo)];
         assert_eq!(requests(&text), expected);

@@ -31,6 +31,7 @@ section! {
         /// Heartbeat of the master and of every drive (object 1017), ms.
         pub heartbeat_producer_ms: u16 = 50,
         /// Silence after which a heartbeat counts as lost (object 1016), ms.
+        #[doc(alias = "consumer heartbeat time")]
         pub heartbeat_consumer_ms: u16 = 150,
         /// From SYNC to the moment a drive has its process data ready to be sent, at most, µs; none for the
         /// emulated drives on simulated buses.

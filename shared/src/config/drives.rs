@@ -25,8 +25,10 @@ pub struct DriveConfig {
     /// its position a second squared.
     pub quick_stop_deceleration_m_s2: f64,
     /// Following error window (6065), m.
+    #[doc(alias("position deviation", "contouring error", "lag error"))]
     pub following_error_m: f64,
     /// How long the window may be exceeded (6066), ms.
+    #[doc(alias = "following error time out")]
     pub following_error_timeout_ms: u16,
     /// Gain of the position loop, 1/s.
     pub position_gain_per_s: f64,

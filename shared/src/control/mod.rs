@@ -75,6 +75,7 @@ pub enum Outcome {
 ///     }
 /// }
 /// ```
+#[doc(alias("control law", "regulator"))]
 pub trait Controller {
     /// Takes the newest reading; none where no reading arrived in time.
     fn observe(&mut self, reading: Option<&Reading>);

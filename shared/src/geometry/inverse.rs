@@ -7,6 +7,7 @@ use super::{Actuators, Joints, LEGS, Mechanism, Pose};
 const SHORTEST_LEG_M: f64 = 1e-9;
 
 /// A pose without joint coordinates.
+#[doc(alias = "IK")]
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum InverseError {
     /// The pose holds a value that is no finite number.
@@ -37,6 +38,7 @@ impl Mechanism {
     ///
     /// # Errors
     /// [`InverseError`] for a pose that is not finite, and where a corner lies on its slide's hinge.
+    #[doc(alias("inverse kinematics", "IK"))]
     pub fn inverse(&self, pose: &Pose) -> Result<Joints, InverseError> {
         let mut joints = Joints {
             actuators: Actuators { slide_m: [0.0; LEGS], leg_m: [0.0; LEGS] },

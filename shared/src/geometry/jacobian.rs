@@ -5,9 +5,11 @@ use nalgebra::{Matrix3x6, Matrix6, Vector6};
 use super::{Joints, LEGS, Mechanism, Pose, Vec3};
 
 /// Twist of the platform in the base frame: velocity of its origin (m/s), then angular velocity (rad/s).
+#[doc(alias("spatial velocity", "velocity screw"))]
 pub type Twist = Vector6<f64>;
 
 /// Joint rates as linear functions of the platform's [`Twist`], at one pose.
+#[doc(alias("velocity Jacobian", "inverse Jacobian"))]
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Jacobian {
     /// Rows d₁ d₂ d₃ l₁ l₂ l₃: q̇ = `actuators` · twist; m/s per m/s, m/s per rad/s.

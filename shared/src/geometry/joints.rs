@@ -102,6 +102,7 @@ impl StrokeLimits {
     ///
     /// # Errors
     /// [`LimitViolation`] for an axis that is not a number, or outside by more than `excess_m`.
+    #[doc(alias = "saturate")]
     #[inline]
     pub fn clamp(
         &self,

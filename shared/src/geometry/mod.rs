@@ -19,6 +19,7 @@ pub use joints::{AXES, AXIS_NAMES, Actuators, Joints, LEGS, LimitViolation, Stro
 pub use mechanism::{GeometryError, Mechanism, MechanismConfig, SlideConfig};
 
 /// Platform frame in the base frame; metres.
+#[doc(alias("transform", "rigid transformation"))]
 pub type Pose = nalgebra::Isometry3<f64>;
 /// A point or direction; metres or unitless.
 pub type Vec3 = nalgebra::Vector3<f64>;

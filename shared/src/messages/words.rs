@@ -37,7 +37,7 @@ fn complaint(cause: Cause, event: &Event) -> Option<String> {
         }
         Cause::DuplicateNode if value == 0 => "more answers than SDO requests, again and again".to_owned(),
         Cause::DuplicateNode => "different process data after one SYNC, again and again".to_owned(),
-        Cause::NodeRestarted => "booted although nobody asked it to".to_owned(),
+        Cause::NodeRestarted => "booted although the master did not reset it".to_owned(),
         Cause::FaultAtStart => format!(
             "in fault, and a fault reset does not help; error code {}",
             EmergencyCode(event.value as u16)
@@ -51,7 +51,9 @@ fn complaint(cause: Cause, event: &Event) -> Option<String> {
         Cause::BootTimeout => format!("not operational after {value} ms"),
         Cause::HeartbeatLost => format!("silent for {value} ms"),
         Cause::ProcessDataLost => format!("process data missing for {value} cycles"),
-        Cause::NodeStopped => format!("left the NMT state operational by itself; it tells state {value}"),
+        Cause::NodeStopped => {
+            format!("left the NMT state operational without a command of the master; now in state {value}")
+        }
         Cause::Emergency if value == 0 => "all errors gone (EMCY 0000h)".to_owned(),
         Cause::Emergency => {
             format!("EMCY {}, error register {limit:02X}h", EmergencyCode(event.value as u16))
@@ -75,11 +77,11 @@ const fn no_pose(reason: NoPose) -> &'static str {
         NoPose::NotFinite => "a coordinate is no finite number",
         NoPose::NoLength => "the leg has no length",
         NoPose::Unassemblable => "cannot be assembled with the positions that were read",
-        NoPose::WrongAssembly => "could only stand folded over with the positions that were read",
+        NoPose::WrongAssembly => "can only be assembled folded over with the positions that were read",
         NoPose::Ambiguous => {
             "the positions that were read fit several poses, and the last pose does not settle which"
         }
-        NoPose::Undecided => "the positions that were read fit poses that cannot be told apart",
+        NoPose::Undecided => "the positions that were read fit poses that cannot be distinguished",
         NoPose::NotFound => "is singular with the positions that were read",
     }
 }

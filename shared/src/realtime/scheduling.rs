@@ -37,8 +37,8 @@ pub struct Obtained {
     pub refusals: Vec<String>,
 }
 
-/// Requests `wanted`, then reads back the granted scheduling. Memory is locked for the whole process, the rest holds for the calling
-/// thread.
+/// Requests `wanted`, then reads back the granted scheduling. Memory is locked for the whole process, the rest holds for
+/// the calling thread.
 pub fn obtain(wanted: Wanted) -> Obtained {
     // The kernel may accept a request without effect: only what is read back counts.
     let core = wanted.core.map(|core| pin(core).map_err(|error| error.to_string()));

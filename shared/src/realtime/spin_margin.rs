@@ -17,6 +17,7 @@ const SAFETY_FACTOR: u64 = 2;
 const DECAY: u32 = 12;
 
 /// The stretch before a deadline that a task spins, ns.
+#[doc(alias("busy wait", "spin time"))]
 #[derive(Debug)]
 pub(super) struct SpinMargin {
     longest_ns: u64,

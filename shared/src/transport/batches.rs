@@ -54,6 +54,7 @@ impl Node {
 }
 
 /// Publishes one message type in batches and numbers its messages.
+#[doc(alias = "writer")]
 #[derive(Debug)]
 pub struct BatchPublisher<M: Message> {
     publisher: IceoryxPublisher<ipc::Service, [M], ()>,
@@ -96,6 +97,7 @@ impl<M: Message> BatchPublisher<M> {
 }
 
 /// Receives one message type in batches, oldest first.
+#[doc(alias = "reader")]
 #[derive(Debug)]
 pub struct BatchSubscriber<M: Message> {
     subscriber: IceoryxSubscriber<ipc::Service, [M], ()>,
@@ -153,7 +155,7 @@ mod tests {
     }
 
     #[test]
-    fn who_falls_behind_loses_the_oldest_and_sees_the_gap() {
+    fn a_slow_subscriber_loses_the_oldest_and_sees_the_gap() {
         let domain = ScratchDomain::claim("test-behind").unwrap();
         let node = Node::join(&domain).unwrap();
         let subscriber = node.batch_subscriber::<FrameTap>().unwrap();

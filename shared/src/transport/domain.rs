@@ -258,7 +258,7 @@ mod tests {
     }
 
     #[test]
-    fn who_sweeps_all_the_time_never_takes_a_domain_that_is_being_claimed() {
+    fn a_permanent_sweep_never_removes_a_domain_that_is_being_claimed() {
         let domain = unique("race");
         let is_over = AtomicBool::new(false);
         std::thread::scope(|scope| {

@@ -169,16 +169,16 @@ impl Node {
 
     /// A subscriber of a topic that keeps up to [`Message::DEPTH`] messages.
     pub fn subscriber<M: Message>(&self) -> Result<Subscriber<M>, TransportError> {
-        self.inlet_keeping(M::DEPTH)
+        self.subscriber_with_depth(M::DEPTH)
     }
 
     /// A subscriber for the newest message only. Its queue is short: entries of a long queue are not in the cache, and old
     /// messages are of no use after a stall.
     pub fn newest_subscriber<M: Message>(&self) -> Result<Subscriber<M>, TransportError> {
-        self.inlet_keeping(KEPT_FOR_THE_NEWEST)
+        self.subscriber_with_depth(KEPT_FOR_THE_NEWEST)
     }
 
-    fn inlet_keeping<M: Message>(&self, messages: usize) -> Result<Subscriber<M>, TransportError> {
+    fn subscriber_with_depth<M: Message>(&self, messages: usize) -> Result<Subscriber<M>, TransportError> {
         let refused = Refused::default();
         let subscriber = self
             .service::<M>()?
@@ -192,6 +192,7 @@ impl Node {
 }
 
 /// Publishes one message type and numbers its messages.
+#[doc(alias("writer", "data writer"))]
 #[derive(Debug)]
 pub struct Publisher<M: Message> {
     port: IceoryxPublisher<ipc::Service, M, ()>,
@@ -226,6 +227,7 @@ impl<M: Message> Publisher<M> {
 }
 
 /// Receives one message type, oldest first.
+#[doc(alias("reader", "data reader"))]
 #[derive(Debug)]
 pub struct Subscriber<M: Message> {
     port: IceoryxSubscriber<ipc::Service, M, ()>,
@@ -251,7 +253,8 @@ impl<M: Message> Borrow<M> for Received<M> {
 }
 
 impl<M: Message> Subscriber<M> {
-    /// Connects to the publishers that are there by now; otherwise the first call of [`Self::receive`] does, as in [`Publisher::connect`].
+    /// Connects to the publishers that exist by now; otherwise the first call of [`Self::receive`] does, as in
+    /// [`Publisher::connect`].
     pub fn connect(&self) -> Result<(), TransportError> {
         self.refused.connect(&self.port, M::TOPIC)
     }

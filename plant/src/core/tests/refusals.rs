@@ -16,7 +16,7 @@ fn what_cannot_work_is_refused_with_its_key() {
         (with(|s| s.can.heartbeat_consumer_ms = 50), "can.heartbeat_consumer_ms = 50: use more"),
         (with(|s| s.can.heartbeat_consumer_ms = 51), "can.heartbeat_consumer_ms = 51: use more"),
         (with(|s| (s.rate_hz, s.can.heartbeat_consumer_ms) = (10, 90)), slow),
-        (with(|s| s.can.node_ids[3] = 1), "node 1 stands twice"),
+        (with(|s| s.can.node_ids[3] = 1), "node 1 is listed twice"),
         (with(|s| s.can.node_ids[3] = 0), "node id"),
         (with(|s| s.can.node_ids[3] = 127), "master"),
         (with(|s| s.can.buses = vec![vec![0, 1, 2], vec![3, 4]]), "axis 5 is named 0 times"),

@@ -70,7 +70,7 @@ fn one_request_a_bus_and_cycle_and_none_beside_process_data() {
 }
 
 #[test]
-fn a_drive_that_is_not_as_expected_is_named_and_nobody_is_enabled() {
+fn a_drive_that_is_not_as_expected_is_named_and_no_drive_is_enabled() {
     type Change = fn(&mut Peer);
     let table: [(Change, Cause, u32); 12] = [
         (|drive| drop(drive.objects.insert((0x6064, 0), vec![0; 5])), Cause::SdoAborted, 0x60_6400),

@@ -99,7 +99,7 @@ fn a_disk_that_is_gone_loses_everything_behind_the_last_flush() {
 }
 
 #[test]
-fn a_disk_that_fails_is_told_of_once_while_the_recording_goes_on_and_again_at_its_end() {
+fn a_disk_failure_is_reported_once_during_the_recording_and_again_at_its_end() {
     let (let_go, go_on) = channel();
     let then = io::ErrorKind::StorageFull;
     let disk = Stuck { definitions: definitions(), bytes: Cursor::default(), go_on, then };
@@ -135,7 +135,7 @@ fn what_a_recording_lacks_is_said_with_its_reason_and_never_as_nothing() {
 }
 
 #[test]
-fn a_caller_who_may_wait_loses_nothing_however_slow_the_disk_is() {
+fn a_caller_that_may_wait_loses_nothing_on_a_slow_disk() {
     let (let_go, go_on) = channel();
     let disk = Stuck { definitions: definitions(), bytes: Cursor::default(), go_on, then: WELL };
     let mut backlog = Backlog::start(Recorder::new(disk, scene()).unwrap(), Pace::Virtual);

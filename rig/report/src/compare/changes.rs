@@ -158,7 +158,7 @@ mod tests {
     }
 
     #[test]
-    fn messages_are_compared_by_bus_and_name_and_what_one_run_lacks_is_told() {
+    fn messages_are_compared_by_bus_and_name_and_missing_ones_are_listed() {
         let message =
             |bus: u64, message: &str, max_ns: u64| json!({"bus": bus, "message": message, "max_ns": max_ns});
         let run = |messages: [Value; 3], cycle: u64| {

@@ -23,8 +23,8 @@ const FORM: u32 = 1;
 
 /// The text above the changes.
 const LEGEND: &str = "\
-beyond spread: by more than three standard errors, as far as the seconds of each run tell.
-Runs differ by more than their seconds do: repeat both in turn to tell.
+beyond spread: by more than three standard errors, estimated from the seconds of each run.
+Runs differ by more than their seconds do: repeat both in turn to be certain.
 ";
 
 /// As JSON it is what `report A B --format json` writes.

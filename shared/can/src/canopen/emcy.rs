@@ -29,6 +29,7 @@ impl EmergencyCode {
     /// An RPDO is overdue.
     pub const RPDO_TIMEOUT: Self = Self(0x8250);
     /// The following error exceeded its window (6065) for longer than allowed (6066).
+    #[doc(alias("position deviation", "contouring error", "lag error"))]
     pub const FOLLOWING_ERROR: Self = Self(0x8611);
 }
 

@@ -25,6 +25,7 @@ use crate::wire::{Rates, longest_bits};
 /// assert_eq!(sync_ns, Some(190_000), "135 bits of the longer frame, 55 bits of its own");
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
+#[doc(alias("schedulability", "response-time analysis"))]
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct BusPlan {
     pub(super) bus: usize,
@@ -200,7 +201,7 @@ mod tests {
     }
 
     #[test]
-    fn who_takes_time_to_answer_has_that_for_jitter_too_and_delays_the_others() {
+    fn a_nodes_answer_time_adds_to_its_jitter_and_delays_the_others() {
         let answering = |within_ns: u64| {
             let by = CanId::standard(1).unwrap();
             let answer = PeriodicMessage { release: Some(Release { by, within_ns }), ..message(2, 8, 1000) };

@@ -130,7 +130,7 @@ fn a_babbling_node_sends_whenever_its_port_is_used() {
 }
 
 #[test]
-fn who_is_disconnected_neither_sends_nor_hears_until_it_is_over() {
+fn a_disconnected_node_neither_sends_nor_receives_until_the_fault_ends() {
     let fault = Fault { kind: FaultKind::Disconnect, until_ns: 1_000_000, ..FAULT };
     let mut pair = Faulted::new(Vec::new(), vec![fault]);
     pair.send(1).unwrap();
@@ -142,7 +142,7 @@ fn who_is_disconnected_neither_sends_nor_hears_until_it_is_over() {
 }
 
 #[test]
-fn who_is_off_the_bus_says_so_until_it_restarts() {
+fn a_node_in_bus_off_reports_bus_off_until_it_restarts() {
     let off = Fault { kind: FaultKind::BusOff, count: 1, ..FAULT };
     let mut pair = Faulted::new(vec![off], Vec::new());
     assert_eq!(pair.send(1), Err(SendError::BusOff { tec: 256 }));

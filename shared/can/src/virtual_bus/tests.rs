@@ -83,7 +83,7 @@ fn everyone_but_the_sender_receives_a_frame_once_at_its_end() {
 }
 
 #[test]
-fn the_lowest_identifier_wins_whoever_queued_first() {
+fn the_lowest_identifier_wins_in_any_order_of_queuing() {
     let mut wire = wire();
     for (port, id) in [(2, 0x183), (1, 0x182), (0, 0x201), (0, 0x080), (1, 0x081)] {
         wire.send(port, 0, frame(id, &[])).unwrap();

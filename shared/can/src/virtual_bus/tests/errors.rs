@@ -62,7 +62,7 @@ fn an_error_is_reported_with_the_counter_after_it_and_before_the_change_of_state
 }
 
 #[test]
-fn who_joins_a_lone_node_hears_it_at_once() {
+fn a_node_that_joins_a_lone_node_receives_its_frame_at_once() {
     let mut wire = with(|config| config.ports = 2);
     wire.nodes.stations[1].confinement.leave_bus(0, Some(5_000_000));
     wire.send(0, 0, sync::frame()).unwrap();
