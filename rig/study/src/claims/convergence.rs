@@ -1,6 +1,6 @@
 //! The paper's claims about convergence.
 
-use super::{ANY, Judgement, PaperClaim, RARELY};
+use super::claim::{ANY, Judgement, PaperClaim, RARELY};
 use crate::sample::Guesses;
 use crate::share::Share;
 use crate::solver::{COMPARED, NEWTON, PUBLISHED, SOLVERS, Solver};

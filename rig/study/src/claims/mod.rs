@@ -1,67 +1,16 @@
 //! The paper's claims, judged by the measurements of a study. The criteria are defined here alone; each is a function of
 //! measured values, so that other values give another judgement.
 
+mod claim;
 mod convergence;
 mod multiplicity;
 mod speed;
 
 use super::motions::Motion;
-use super::sample::Guesses;
 use super::share::Share;
 use crate::study::Study;
 
-/// Guesses anywhere above the base.
-const ANY: Guesses = Guesses::AboveBase;
-/// A rule that fails in a smaller share of cases nearly holds.
-const RARELY: f64 = 0.01;
-
-/// Whether a claim holds.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Judgement {
-    /// By its criterion.
-    Holds,
-    /// By the weaker criterion.
-    HoldsPartly,
-    /// By neither.
-    DoesNotHold,
-}
-
-/// A claim of the paper with its judgement.
-#[derive(Debug, Clone)]
-pub struct PaperClaim {
-    /// The claim, paraphrased.
-    pub statement: &'static str,
-    /// Where the paper makes it.
-    pub section: &'static str,
-    /// The measurements that decide.
-    pub measured: String,
-    /// When it holds, and when it holds partly.
-    pub criterion: &'static str,
-    /// Whether it holds.
-    pub judgement: Judgement,
-    /// The figure that shows it.
-    pub figure: Option<&'static str>,
-}
-
-impl Judgement {
-    /// As the page and the terminal show it.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Holds => "holds",
-            Self::HoldsPartly => "holds partly",
-            Self::DoesNotHold => "does not hold",
-        }
-    }
-
-    fn new(holds: bool, partly: bool) -> Self {
-        match (holds, partly) {
-            (true, _) => Self::Holds,
-            (false, true) => Self::HoldsPartly,
-            (false, false) => Self::DoesNotHold,
-        }
-    }
-}
+pub use claim::{Judgement, PaperClaim};
 
 /// All claims that can be measured, in the paper's order.
 pub(super) fn judge(study: &Study) -> Vec<PaperClaim> {

@@ -1,6 +1,6 @@
 //! The paper's claims about the number of solutions.
 
-use super::{Judgement, PaperClaim, RARELY};
+use super::claim::{Judgement, PaperClaim, RARELY};
 use crate::multiplicity::{CONDITIONS, Conditions};
 use crate::share::Share;
 use crate::study::Study;

@@ -1,6 +1,6 @@
 //! The paper's claims about speed.
 
-use super::{ANY, Judgement, PaperClaim};
+use super::claim::{ANY, Judgement, PaperClaim};
 use crate::share::median;
 use crate::solver::{Attempt, NEWTON, PUBLISHED};
 use crate::speed::Situation;

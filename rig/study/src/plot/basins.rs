@@ -4,7 +4,7 @@ use masseter_charts::palette::{BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILION
 use masseter_charts::{Axis, Error, Key, LegendEntry, Scale, cells, chart, legend};
 use plotters::style::{BLACK, RGBColor};
 
-use super::draw;
+use super::draw::draw;
 use crate::basins::{Basin, Basins};
 use crate::figure::Figure;
 use crate::solver::COMPARED;

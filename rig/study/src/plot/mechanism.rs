@@ -10,7 +10,7 @@ use masseter_controller::kinematics::Solution;
 use masseter_shared::geometry::{Actuators, LEGS, Mechanism, Vec3};
 use plotters::prelude::*;
 
-use super::draw;
+use super::draw::draw;
 use crate::figure::Figure;
 use crate::study::Study;
 

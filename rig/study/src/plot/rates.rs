@@ -2,7 +2,7 @@
 
 use masseter_charts::{Axis, Error, Legend, Line, LineChart, Scale, SeriesLabelPosition};
 
-use super::{SOLVER_COLOURS, draw};
+use super::draw::{SOLVER_COLOURS, draw};
 use crate::figure::Figure;
 use crate::sample::{GUESSES, Guesses};
 use crate::share::Share;

@@ -4,7 +4,7 @@ use masseter_charts::palette::BLUE;
 use masseter_charts::{Axis, Bar, Error, Scale, bars, chart};
 use masseter_controller::kinematics::MOST_SOLUTIONS;
 
-use super::draw;
+use super::draw::draw;
 use crate::figure::Figure;
 use crate::multiplicity::Multiplicity;
 

@@ -4,7 +4,7 @@ use masseter_charts::{
     Area, Axis, Bar, Error, Legend, Line, LineChart, Scale, SeriesLabelPosition, bars, chart,
 };
 
-use super::{SOLVER_COLOURS, draw};
+use super::draw::{SOLVER_COLOURS, draw};
 use crate::figure::Figure;
 use crate::sample::Guesses;
 use crate::solver::{COMPARED, Solver};

@@ -3,7 +3,7 @@
 use masseter_charts::{Area, Axis, ColourScale, Error, Key, LegendEntry, Scale, cells, chart, legend};
 use plotters::prelude::*;
 
-use super::draw;
+use super::draw::draw;
 use crate::figure::Figure;
 use crate::motions::Motion;
 use crate::share::quantile;
