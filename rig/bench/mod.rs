@@ -1,7 +1,7 @@
 //! `masseter bench`: the cost of the rig's parts, each beside a baseline in the same run.
 //!
 //! Candidates take turns, round by round, because a machine changes its speed from second to second; the ratio within a
-//! round counts ([`comparison`]). No bench judges the rig; the machine is judged by [`disturbance`].
+//! round counts (`comparison`). No bench judges the rig; the machine is judged by `disturbance`.
 
 pub mod args;
 mod candidate;

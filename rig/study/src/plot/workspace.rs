@@ -98,7 +98,9 @@ fn draw_map(
     cells(&mut chart, map.side, |cell| {
         map.poses[cell].as_ref().map(|quality| colours.colour((measure.value)(quality)))
     })?;
-    for (motion, colour) in study.motions.iter().zip(MOTIONS) {
+    // The last first: a wide opening covers no smaller one on the same path.
+    let motions: Vec<_> = study.motions.iter().zip(MOTIONS).collect();
+    for (motion, colour) in motions.into_iter().rev() {
         let points: Vec<_> =
             motion.poses().map(|pose| (map.slice.across.at(&pose), map.slice.up.at(&pose))).collect();
         // A dark rim keeps the path visible on every colour of the map.
