@@ -23,8 +23,9 @@
 //! advanced to counts as queued at that time. Faults of nodes take effect between frames.
 //!
 //! # What is not modelled
-//! Errors seen by some nodes only, overload frames, the traffic of a disconnected node on its end of the wire, and the
-//! recessive ESI bit of an error passive node's FD frames, which may change their stuffing.
+//! - Errors that only some nodes see, and overload frames.
+//! - The traffic of a disconnected node on its end of the wire.
+//! - The recessive ESI bit in FD frames of an error passive node. That bit may change their stuffing.
 
 mod completion;
 mod config;
