@@ -3,7 +3,9 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use masseter_controller::process::Kind;
+use masseter_controller::hold_position::HoldPosition;
+use masseter_controller::motion_controller::MotionController;
+use masseter_controller::process::BuildController;
 use masseter_shared::lifecycle::ProcessArguments;
 
 /// The arguments that the supervisor passes to every process of a run.
@@ -39,13 +41,16 @@ impl ControllerKind {
             Self::Hold => "hold",
         }
     }
-}
 
-impl From<ControllerKind> for Kind {
-    fn from(kind: ControllerKind) -> Self {
-        match kind {
-            ControllerKind::Motion => Self::Motion,
-            ControllerKind::Hold => Self::Hold,
+    /// How the controller is built.
+    pub(crate) fn builder(self) -> BuildController {
+        match self {
+            Self::Motion => {
+                |scenario, mechanism, motion| Box::new(MotionController::new(scenario, mechanism, motion))
+            }
+            Self::Hold => |scenario, mechanism, motion| {
+                Box::new(HoldPosition::new(scenario, mechanism, motion.duration_s()))
+            },
         }
     }
 }

@@ -18,7 +18,7 @@ pub(crate) struct ControllerArgs {
 
 /// Runs the controller to the end of its motion or a safe stop.
 pub(crate) fn control(args: ControllerArgs) -> anyhow::Result<Exit> {
-    Ok(match process::run(&args.process.process_arguments(), args.kind.into())? {
+    Ok(match process::run(&args.process.process_arguments(), args.kind.builder())? {
         Outcome::Finished => Exit::Passed,
         Outcome::SafeStop => Exit::SafeStop,
     })

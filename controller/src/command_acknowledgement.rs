@@ -6,24 +6,19 @@
 /// Cycles until the reading that answers a command: the next one's, and either may be a cycle late.
 const LATEST_ANSWER_CYCLES: u64 = 2;
 
-/// The cycles of the last step of the motion and of the last acknowledged command.
+/// The cycle of the last step of the motion.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct CommandAcknowledgement {
     step_cycle: u64,
-    answered_cycle: u64,
 }
 
 impl CommandAcknowledgement {
-    /// A fresh reading acknowledges this command.
-    pub(crate) fn answer(&mut self, command_cycle: u64) {
-        self.answered_cycle = command_cycle;
-    }
-
-    /// Whether the motion makes a step in this cycle. Without an acknowledgement the motion waits and repeats its last
-    /// target until the drives acknowledge a later command.
-    pub(crate) fn takes_step(&mut self, cycle: u64) -> bool {
-        let is_answered = self.answered_cycle >= self.step_cycle;
-        let is_under_way = cycle.saturating_sub(self.answered_cycle) <= LATEST_ANSWER_CYCLES;
+    /// Whether the motion makes a step in this cycle, when a fresh reading last acknowledged the command of
+    /// `answered_cycle`. Without an acknowledgement the motion waits and repeats its last target until the drives
+    /// acknowledge a later command.
+    pub(crate) fn takes_step(&mut self, cycle: u64, answered_cycle: u64) -> bool {
+        let is_answered = answered_cycle >= self.step_cycle;
+        let is_under_way = cycle.saturating_sub(answered_cycle) <= LATEST_ANSWER_CYCLES;
         let steps = is_answered || is_under_way;
         if steps {
             self.step_cycle = cycle;
@@ -38,12 +33,10 @@ mod tests {
 
     /// Cycles, each with the command answered in it, if any, and whether the motion makes a step.
     fn plays(cycles: &[(u64, Option<u64>, bool)]) {
-        let mut acknowledgement = CommandAcknowledgement::default();
+        let (mut acknowledgement, mut answered_cycle) = (CommandAcknowledgement::default(), 0);
         for &(cycle, answered, steps) in cycles {
-            if let Some(command_cycle) = answered {
-                acknowledgement.answer(command_cycle);
-            }
-            assert_eq!(acknowledgement.takes_step(cycle), steps, "cycle {cycle}");
+            answered_cycle = answered.unwrap_or(answered_cycle);
+            assert_eq!(acknowledgement.takes_step(cycle, answered_cycle), steps, "cycle {cycle}");
         }
     }
 

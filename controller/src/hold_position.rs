@@ -3,46 +3,19 @@
 //! No trajectory, no feedback in pose space, no inverse kinematics: a second, minimal
 //! implementation of [`Controller`].
 
-use masseter_shared::config::{ControllerConfig, Scenario};
+use masseter_shared::config::Scenario;
 use masseter_shared::control::{Controller, Outcome, Tick};
-use masseter_shared::geometry::{AXES, Actuators, Mechanism};
-use masseter_shared::messages::codes::{ControllerState, DriveState, NO_DRIVE_STATE};
-use masseter_shared::messages::{Command, Event, Reading, State, pose_fields};
+use masseter_shared::geometry::Mechanism;
+use masseter_shared::messages::codes::ControllerState;
+use masseter_shared::messages::{Command, Event, Reading, State};
 
-use crate::kinematics::{ForwardTracker, Solution};
-use crate::progress::Progress;
-use crate::safety::{self, Fault};
-use crate::sequence::{Trigger, next, request};
-use crate::transition;
-
-/// Bits of [`Reading::fresh_axes`] when all axes are fresh.
-const ALL_AXES: u32 = (1 << AXES) - 1;
-/// A complete reading and the pose of its positions.
-#[derive(Debug, Clone, Copy)]
-struct Estimate {
-    reading_cycle: u64,
-    sampled_ns: u64,
-    measured: Actuators,
-    solution: Solution,
-}
+use crate::sequencer::{Estimate, Sequencer};
 
 /// Holds the position found at the start.
 #[derive(Debug, Clone)]
 pub struct HoldPosition {
-    tracker: ForwardTracker,
-    config: ControllerConfig,
-    period_s: f64,
+    sequencer: Sequencer,
     hold_cycles: u64,
-    state: ControllerState,
-    cycles_in_state: u64,
-    cycle: u64,
-    silent_cycles: u64,
-    stop_requested: bool,
-    fault: Option<Fault>,
-    steady_readings: u32,
-    drive_state: [u32; AXES],
-    /// The last complete reading and its solution.
-    estimate: Option<Estimate>,
     /// The estimate when the drives are switched on.
     held: Option<Estimate>,
 }
@@ -50,142 +23,51 @@ pub struct HoldPosition {
 impl HoldPosition {
     /// A controller that holds the position for `hold_s` seconds.
     pub fn new(scenario: &Scenario, mechanism: Mechanism, hold_s: f64) -> Self {
-        let period_s = scenario.period_s();
-        Self {
-            tracker: ForwardTracker::new(mechanism),
-            config: scenario.controller,
-            period_s,
-            hold_cycles: (hold_s / period_s).ceil() as u64,
-            state: ControllerState::WaitReadings,
-            cycles_in_state: 0,
-            cycle: 0,
-            silent_cycles: 0,
-            stop_requested: false,
-            fault: None,
-            steady_readings: 0,
-            drive_state: [NO_DRIVE_STATE; AXES],
-            estimate: None,
-            held: None,
-        }
-    }
-
-    /// Whether the reading is complete, and so gives an estimate.
-    fn take(&mut self, reading: &Reading) -> Result<bool, Fault> {
-        safety::check_reading(reading)?;
-        safety::check_commander(reading, self.cycle)?;
-        self.drive_state = reading.drive_state;
-        safety::check_drives(reading, self.state == ControllerState::Running)?;
-        if reading.fresh_axes != ALL_AXES {
-            return Ok(false);
-        }
-        let Reading { cycle: reading_cycle, sampled_ns, .. } = *reading;
-        let measured = Actuators::from_axes(reading.position_m);
-        let solution = self.tracker.update(&measured).map_err(|error| Fault::from(&error))?;
-        self.estimate = Some(Estimate { reading_cycle, sampled_ns, measured, solution });
-        Ok(true)
-    }
-
-    fn progress(&self) -> Progress {
-        Progress {
-            state: self.state,
-            cycles_in_state: self.cycles_in_state,
-            silent_cycles: self.silent_cycles,
-            drive_state: self.drive_state,
-            period_s: self.period_s,
-        }
-    }
-
-    fn trigger(&self) -> Option<Trigger> {
-        let is_over = self.stop_requested || self.cycles_in_state >= self.hold_cycles;
-        match self.state {
-            ControllerState::WaitReadings | ControllerState::Enabling if self.stop_requested => {
-                Some(Trigger::StopRequested)
-            }
-            ControllerState::WaitReadings => {
-                (self.steady_readings >= self.config.steady_readings).then_some(Trigger::Steady)
-            }
-            ControllerState::Enabling => {
-                let enabled = DriveState::OperationEnabled.code();
-                self.drive_state.iter().all(|&code| code == enabled).then_some(Trigger::Enabled)
-            }
-            // Nothing has to be eased to, and a motion at rest need not be held any longer.
-            ControllerState::Easing => Some(Trigger::Eased),
-            ControllerState::Running => is_over.then_some(Trigger::Played),
-            ControllerState::Holding => Some(Trigger::Rested),
-            ControllerState::Disabling => self.progress().drives_are_off().then_some(Trigger::Released),
-            ControllerState::Finished | ControllerState::SafeStop => None,
-        }
+        let hold_cycles = (hold_s / scenario.period_s()).ceil() as u64;
+        Self { sequencer: Sequencer::new(scenario, mechanism), hold_cycles, held: None }
     }
 }
 
 impl Controller for HoldPosition {
     fn observe(&mut self, reading: Option<&Reading>) {
-        let taken = reading.map_or(Ok(false), |reading| self.take(reading));
-        if taken == Ok(true) {
-            self.silent_cycles = 0;
-            self.steady_readings = self.steady_readings.saturating_add(1);
-        } else {
-            self.silent_cycles += 1;
-            self.steady_readings = 0;
-        }
-        if let Err(fault) = taken {
-            self.fault.get_or_insert(fault);
-        }
+        self.sequencer.observe(reading);
     }
 
     fn decide(&mut self, tick: Tick) -> Option<Event> {
-        self.cycle = tick.cycle;
-        self.cycles_in_state += 1;
-        let fault = self.fault.take().or_else(|| self.progress().overdue(&self.config));
-        let trigger = if fault.is_some() { Trigger::Fault } else { self.trigger()? };
-        let (from, to) = (self.state, next(self.state, trigger));
-        if from == to {
-            return None;
+        let fault = self.sequencer.begin_cycle(tick);
+        // Nothing has to be eased to, and a motion at rest need not be held any longer.
+        let is_running = self.sequencer.state == ControllerState::Running;
+        let is_over = !is_running || self.sequencer.cycles_in_state >= self.hold_cycles;
+        let event = self.sequencer.follow(fault, is_over, tick)?;
+        if self.sequencer.state == ControllerState::Enabling {
+            self.held = self.sequencer.estimate;
         }
-        (self.state, self.cycles_in_state) = (to, 0);
-        if to == ControllerState::Enabling {
-            self.held = self.estimate;
-        }
-        Some(transition::event([from, to], trigger, fault, tick))
+        Some(event)
     }
 
     fn fill_command(&self, command: &mut Command) {
-        *command = Command {
-            cycle: self.cycle,
-            reading_cycle: self.estimate.map_or(0, |estimate| estimate.reading_cycle),
-            target_m: self.held.map_or([0.0; AXES], |held| held.measured.to_axes()),
-            request: request(self.state).code(),
-            controller_state: self.state.code(),
-            ..Command::default()
-        };
+        *command = self.sequencer.command(self.held.map(|held| held.measured));
     }
 
     fn fill_state(&self, state: &mut State) {
-        *state = State { cycle: self.cycle, controller_state: self.state.code(), ..State::default() };
-        if let Some(held) = &self.held {
-            (state.desired_position_m, state.desired_quaternion_wxyz) = pose_fields(&held.solution.pose);
-        }
-        if let Some(Estimate { reading_cycle, sampled_ns, solution, .. }) = &self.estimate {
-            (state.reading_cycle, state.sampled_ns) = (*reading_cycle, *sampled_ns);
-            (state.estimated_position_m, state.estimated_quaternion_wxyz) = pose_fields(&solution.pose);
-            state.leg_angle_rad = solution.theta_rad;
-            (state.residual_m, state.iterations) = (solution.residual_m, solution.iterations);
-        }
+        *state = self.sequencer.state_message(self.held.as_ref().map(|held| &held.solution.pose));
     }
 
     fn request_stop(&mut self) {
-        self.stop_requested = true;
+        self.sequencer.request_stop();
     }
 
     fn outcome(&self) -> Option<Outcome> {
-        self.progress().outcome()
+        self.sequencer.outcome()
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use masseter_shared::messages::codes::DriveRequest;
+    use crate::sequencer::ALL_AXES;
+    use masseter_shared::geometry::AXES;
+    use masseter_shared::messages::codes::{DriveRequest, DriveState};
 
     /// Drives that do at once what they are asked to, at a fixed position.
     struct Bench {
@@ -232,7 +114,7 @@ mod tests {
                 bench.reading.position_m[3] = found[3] + 1e-6;
                 assert_eq!(bench.command.target_m.map(f64::to_bits), found.map(f64::to_bits));
             }
-            running += u32::from(bench.controller.state == ControllerState::Running);
+            running += u32::from(bench.controller.sequencer.state == ControllerState::Running);
         }
         assert_eq!((bench.controller.outcome(), running), (Some(Outcome::Finished), 100));
         assert_eq!(bench.command.request, DriveRequest::Off.code());
@@ -247,11 +129,11 @@ mod tests {
         };
         for disturb in [silent, faulty] {
             let mut bench = Bench::new();
-            while bench.controller.state != ControllerState::Running {
+            while bench.controller.sequencer.state != ControllerState::Running {
                 bench.cycle(true);
             }
-            (0..=bench.controller.config.stale_cycles).for_each(|_| disturb(&mut bench));
-            assert_eq!(bench.controller.state, ControllerState::SafeStop);
+            (0..=bench.controller.sequencer.config.stale_cycles).for_each(|_| disturb(&mut bench));
+            assert_eq!(bench.controller.sequencer.state, ControllerState::SafeStop);
             assert_eq!(bench.command.request, DriveRequest::QuickStop.code());
         }
     }
@@ -260,11 +142,11 @@ mod tests {
     fn silence_stops_safely_in_every_state_with_voltage() {
         for state in [ControllerState::Enabling, ControllerState::Running] {
             let mut bench = Bench::new();
-            while bench.controller.state != state {
+            while bench.controller.sequencer.state != state {
                 bench.cycle(true);
             }
-            (0..=bench.controller.config.stale_cycles).for_each(|_| bench.cycle(false));
-            assert_eq!(bench.controller.state, ControllerState::SafeStop, "in {state}");
+            (0..=bench.controller.sequencer.config.stale_cycles).for_each(|_| bench.cycle(false));
+            assert_eq!(bench.controller.sequencer.state, ControllerState::SafeStop, "in {state}");
         }
     }
 
@@ -276,7 +158,7 @@ mod tests {
         bench.reading.fresh_axes = 0b01_1111;
         bench.reading.position_m[5] += 1e-3;
         (0..10).for_each(|_| bench.cycle(true));
-        assert_eq!(bench.controller.state, ControllerState::WaitReadings);
+        assert_eq!(bench.controller.sequencer.state, ControllerState::WaitReadings);
         bench.reading.fresh_axes = ALL_AXES;
         bench.reading.position_m = complete;
         while bench.command.request != DriveRequest::Enable.code() {
@@ -288,7 +170,7 @@ mod tests {
     #[test]
     fn a_stop_while_the_drives_are_switched_on_switches_them_off() {
         let mut bench = Bench::new();
-        while bench.controller.state != ControllerState::Enabling {
+        while bench.controller.sequencer.state != ControllerState::Enabling {
             bench.cycle(true);
         }
         bench.controller.request_stop();

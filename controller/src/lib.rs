@@ -10,10 +10,9 @@ pub mod motion_controller;
 mod playback;
 mod pose_control;
 pub mod process;
-mod progress;
 mod safety;
-pub mod sequence;
+mod sequence;
+mod sequencer;
 pub mod trajectory;
-mod transition;
 
 pub use safety::Fault;

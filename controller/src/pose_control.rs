@@ -10,31 +10,23 @@ use nalgebra::UnitQuaternion;
 /// The present correction.
 #[derive(Debug, Clone)]
 pub(crate) struct PoseControl {
-    gain_per_s: f64,
-    limit_m: f64,
-    limit_rad: f64,
+    config: ControllerConfig,
     position_m: Vec3,
     rotation_rad: Vec3,
 }
 
 impl PoseControl {
-    pub(crate) fn new(config: &ControllerConfig) -> Self {
-        Self {
-            gain_per_s: config.integral_gain_per_s,
-            limit_m: config.trim_limit_m,
-            limit_rad: config.trim_limit_rad,
-            position_m: Vec3::zeros(),
-            rotation_rad: Vec3::zeros(),
-        }
+    pub(crate) fn new(config: ControllerConfig) -> Self {
+        Self { config, position_m: Vec3::zeros(), rotation_rad: Vec3::zeros() }
     }
 
     /// Takes the difference between the desired pose and the estimated pose, at the same instant.
     pub(crate) fn observe(&mut self, desired: &Pose, estimated: &Pose, dt_s: f64) {
-        let share = self.gain_per_s * dt_s;
+        let share = self.config.integral_gain_per_s * dt_s;
         let offset = desired.translation.vector - estimated.translation.vector;
         let turn = (desired.rotation * estimated.rotation.inverse()).scaled_axis();
-        self.position_m = (self.position_m + offset * share).cap_magnitude(self.limit_m);
-        self.rotation_rad = (self.rotation_rad + turn * share).cap_magnitude(self.limit_rad);
+        self.position_m = (self.position_m + offset * share).cap_magnitude(self.config.trim_limit_m);
+        self.rotation_rad = (self.rotation_rad + turn * share).cap_magnitude(self.config.trim_limit_rad);
     }
 
     /// The pose to ask for so that the desired pose comes about.
@@ -53,7 +45,7 @@ mod tests {
     /// A platform that always stands a fixed step beside what was asked for.
     #[test]
     fn a_constant_offset_is_taken_out() {
-        let mut control = PoseControl::new(&ControllerConfig::default());
+        let mut control = PoseControl::new(ControllerConfig::default());
         let offset = Pose::new(Vec3::new(2e-4, -1e-4, 5e-5), Vec3::new(1e-3, 0.0, -2e-3));
         let desired = Pose::translation(0.0, 0.0, 0.27);
         let estimated = |asked: &Pose| {
@@ -74,7 +66,7 @@ mod tests {
     #[test]
     fn the_correction_is_bounded() {
         let config = ControllerConfig::default();
-        let mut control = PoseControl::new(&config);
+        let mut control = PoseControl::new(config);
         let (desired, estimated) = (Pose::identity(), Pose::new(Vec3::repeat(1.0), Vec3::repeat(0.5)));
         for _ in 0..10_000 {
             control.observe(&desired, &estimated, 1e-3);

@@ -58,7 +58,8 @@ fn certificate(solution: &Solution) -> Certificate {
 /// Each end of a side is at most as far from its true place as the certificate says.
 fn check_closure(mechanism: &Mechanism, actuators: &Actuators, solution: &Solution) {
     let at = Equations::new(mechanism, actuators).evaluate(Vector3::from(solution.theta_rad));
-    let most_m = 2.0 * certificate(solution).exists_within_m;
+    let longest_m = actuators.leg_m.into_iter().fold(0.0, f64::max);
+    let most_m = 2.0 * certificate(solution).exists_within_rad * longest_m;
     for side in 0..LEGS {
         let extent_m = [side, (side + 1) % LEGS].map(|leg| at.corners[leg].norm() + actuators.leg_m[leg]);
         let rounding_m = ROUNDINGS * (extent_m[0] + extent_m[1] + mechanism.platform_sides_m()[side]);

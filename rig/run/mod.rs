@@ -45,7 +45,9 @@ pub fn run(args: &RunArgs) -> Result<Exit, Failure> {
     // This one remains if the supervisor is killed.
     write_manifest(&folder, &manifest)?;
     let outcome = match domain {
-        None => virtual_time::run(&plan, &folder, args.controller.into()).map(RunOutcome::from).incomplete(),
+        None => {
+            virtual_time::run(&plan, &folder, args.controller.builder()).map(RunOutcome::from).incomplete()
+        }
         Some(domain) => supervisor::run(domain, &plan, &folder, args),
     };
     let outcome = outcome.or_else(|failure| {

@@ -7,9 +7,7 @@
 use std::convert::Infallible;
 
 use anyhow::Context;
-use masseter_controller::hold_position::HoldPosition;
-use masseter_controller::motion_controller::MotionController;
-use masseter_controller::process::Kind;
+use masseter_controller::process::BuildController;
 use masseter_plan::RunPlan;
 use masseter_plant::core::{PlantCore, PlantError};
 use masseter_plant::cycle::PlantPorts;
@@ -29,25 +27,16 @@ use crate::machine::interrupts::Interrupts;
 const EPOCH_NS: u64 = SECOND_NS;
 
 /// Runs the rig under virtual time; it ends as the processes would, also when the user stops it.
-pub fn run(plan: &RunPlan, folder: &RunFolder, kind: Kind) -> anyhow::Result<Ending> {
+pub fn run(plan: &RunPlan, folder: &RunFolder, build: BuildController) -> anyhow::Result<Ending> {
     let interrupts = Interrupts::listen().context("cannot listen for signals")?;
-    let (scenario, mechanism, trajectory) = (&plan.scenario, plan.mechanism.clone(), &plan.trajectory);
-    let ending = match kind {
-        Kind::Motion => {
-            let controller = MotionController::new(scenario, mechanism, trajectory.clone());
-            play(controller, plan, folder, &interrupts)
-        }
-        Kind::Hold => {
-            let controller = HoldPosition::new(scenario, mechanism, trajectory.duration_s());
-            play(controller, plan, folder, &interrupts)
-        }
-    };
+    let controller = build(&plan.scenario, plan.mechanism.clone(), plan.trajectory.clone());
+    let ending = play(controller, plan, folder, &interrupts);
     interrupts.restore_default_actions();
     ending
 }
 
-fn play<C: Controller>(
-    controller: C,
+fn play(
+    controller: Box<dyn Controller>,
     plan: &RunPlan,
     folder: &RunFolder,
     interrupts: &Interrupts,
@@ -85,8 +74,8 @@ fn play<C: Controller>(
 }
 
 /// Both sides of the rig in one thread: the controller's cycle runs where the plant waits for its command.
-struct VirtualRig<'a, C> {
-    controller: C,
+struct VirtualRig<'a> {
+    controller: Box<dyn Controller>,
     schedule: &'a CycleSchedule,
     log: Log,
     now_ns: u64,
@@ -94,7 +83,7 @@ struct VirtualRig<'a, C> {
     reading: Option<Reading>,
 }
 
-impl<C: Controller> PlantPorts<VirtualLink> for VirtualRig<'_, C> {
+impl PlantPorts<VirtualLink> for VirtualRig<'_> {
     type Command = Command;
     type Error = PlantError;
 
@@ -126,7 +115,7 @@ impl<C: Controller> PlantPorts<VirtualLink> for VirtualRig<'_, C> {
         let wake = Wake::on_time(sync.cycle, self.now_ns);
         let (reading, now_ns) = (self.reading.take(), self.now_ns);
         let mut ports = VirtualPorts { log: &mut self.log, now_ns, reading, command: None };
-        let Ok(()) = masseter_shared::control::run_cycle(&mut self.controller, &mut ports, &wake);
+        let Ok(()) = masseter_shared::control::run_cycle(&mut *self.controller, &mut ports, &wake);
         Ok(ports.command)
     }
 

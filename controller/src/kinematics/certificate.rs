@@ -35,8 +35,6 @@ const OUTWARD: f64 = 1.0 + 64.0 * f64::EPSILON;
 pub struct Certificate {
     /// r: an exact solution lies at most this far from the computed angles, radians.
     pub exists_within_rad: f64,
-    /// The same for the platform's corners, metres: r times the longest leg.
-    pub exists_within_m: f64,
     /// R: no other solution is closer to the computed angles, radians.
     pub unique_within_rad: f64,
     /// Within this distance the Jacobian is not singular, radians.
@@ -57,24 +55,21 @@ impl Certificate {
         };
         let offset_rad = most(each(|side| at.value[side].abs() + loops.sides[side].rounding))?;
         let curvature = most(each(|side| curvature_bound(&loops.sides[side])))?;
-        Self::from_bounds(offset_rad * OUTWARD, curvature * OUTWARD, &loops.actuators.leg_m)
+        Self::from_bounds(offset_rad * OUTWARD, curvature * OUTWARD)
     }
 
     #[inline]
-    fn from_bounds(offset_rad: f64, curvature: f64, leg_m: &[f64; LEGS]) -> Option<Self> {
+    fn from_bounds(offset_rad: f64, curvature: f64) -> Option<Self> {
         let margin = 1.0 - INVERSE_ROUNDINGS * offset_rad;
         let discriminant = margin * margin - 2.0 * curvature * offset_rad;
         if margin <= 0.0 || discriminant <= 0.0 {
             return None;
         }
         let reach = margin + discriminant.sqrt();
-        let exists_within_rad = 2.0 * offset_rad / reach * OUTWARD;
-        // Beyond half a turn the ball would overlap itself on the torus.
-        let unique_within_rad = (reach / curvature / OUTWARD).min(PI);
         Some(Self {
-            exists_within_rad,
-            exists_within_m: exists_within_rad * leg_m[0].max(leg_m[1]).max(leg_m[2]),
-            unique_within_rad,
+            exists_within_rad: 2.0 * offset_rad / reach * OUTWARD,
+            // Beyond half a turn the ball would overlap itself on the torus.
+            unique_within_rad: (reach / curvature / OUTWARD).min(PI),
             regular_within_rad: margin / curvature / OUTWARD,
         })
     }

@@ -121,9 +121,7 @@ impl<'a> Elimination<'a> {
 
     /// r(x), and its change if every g₂₃ changes by one rounding.
     fn product(&self, x: f64) -> Product {
-        let (_, second, third) = self.branches(x);
-        let values = self.values(&second, &third);
-        let norms = second.norm_squared * third.norm_squared;
+        let (values, norms) = self.residuals_23(x);
         let [a, b, c, d] = values.map(f64::abs);
         Product {
             value: norms * norms * (values[0] * values[1]) * (values[2] * values[3]),
@@ -131,21 +129,17 @@ impl<'a> Elimination<'a> {
         }
     }
 
-    /// g₂₃ for each pair of leg angles.
-    fn residuals_23(&self, x: f64) -> [f64; PAIRS] {
+    /// g₂₃ for each pair of leg angles, and N₂ N₃.
+    fn residuals_23(&self, x: f64) -> ([f64; PAIRS], f64) {
         let (_, second, third) = self.branches(x);
-        self.values(&second, &third)
-    }
-
-    fn values(&self, second: &Branches, third: &Branches) -> [f64; PAIRS] {
         let value =
             |pair: usize| self.loops.sides[1].value(second.leg_angles[pair & 1], third.leg_angles[pair >> 1]);
-        [value(0), value(1), value(2), value(3)]
+        ([value(0), value(1), value(2), value(3)], second.norm_squared * third.norm_squared)
     }
 
     /// The solution in an interval that holds exactly one, if it passes the filter.
     fn follow(&self, filter: SolutionFilter, within: Interval, found: &mut impl FnMut(LoopSolution)) {
-        let (low, high) = (self.residuals_23(within.low), self.residuals_23(within.high));
+        let [(low, _), (high, _)] = [within.low, within.high].map(|x| self.residuals_23(x));
         let mut changing = (0..PAIRS).filter(|&pair| (low[pair] > 0.0) != (high[pair] > 0.0));
         let (Some(pair), None) = (changing.next(), changing.next()) else {
             self.try_all(within, found);
@@ -162,7 +156,7 @@ impl<'a> Elimination<'a> {
         {
             return found(closed);
         }
-        let x = narrowed(within, low[pair], high[pair], |x| self.residuals_23(x)[pair]);
+        let x = narrowed(within, low[pair], high[pair], |x| self.residuals_23(x).0[pair]);
         match self.loops.close(&self.leg_angles(x)[pair], MOST_ITERATIONS) {
             Some(closed) => found(closed),
             None => {

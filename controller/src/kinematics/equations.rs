@@ -13,7 +13,6 @@ use super::legs::next;
 pub struct Equations<'a> {
     mechanism: &'a Mechanism,
     actuators: Actuators,
-    sides_m: [f64; LEGS],
 }
 
 /// The equations' values at one set of leg angles.
@@ -30,14 +29,15 @@ pub struct Evaluation {
 impl<'a> Equations<'a> {
     /// The equations for an input in metres.
     pub fn new(mechanism: &'a Mechanism, actuators: &Actuators) -> Self {
-        Self { mechanism, actuators: *actuators, sides_m: mechanism.platform_sides_m() }
+        Self { mechanism, actuators: *actuators }
     }
 
     /// Corners and residuals at leg angles in radians.
     pub fn evaluate(&self, theta_rad: Vector3<f64>) -> Evaluation {
         let corners = self.mechanism.corners_from_angles(&self.actuators, &theta_rad.into());
+        let sides_m = self.mechanism.platform_sides_m();
         let residual_m =
-            Vector3::from_fn(|side, _| (corners[side] - corners[next(side)]).norm() - self.sides_m[side]);
+            Vector3::from_fn(|side, _| (corners[side] - corners[next(side)]).norm() - sides_m[side]);
         Evaluation { theta_rad, corners, residual_m }
     }
 
@@ -52,12 +52,12 @@ impl<'a> Equations<'a> {
 
     /// |A₁A₂|, |A₂A₃|, |A₃A₁|, metres.
     pub(super) fn distances_m(&self, at: &Evaluation) -> Vector3<f64> {
-        at.residual_m + Vector3::from(self.sides_m)
+        at.residual_m + Vector3::from(self.mechanism.platform_sides_m())
     }
 
     /// |AᵢAⱼ|² − Lᵢⱼ² for the three sides, m²: (|AᵢAⱼ| − Lᵢⱼ)(|AᵢAⱼ| + Lᵢⱼ), so that nothing cancels twice.
     pub(super) fn squared_residual_m2(&self, at: &Evaluation) -> Vector3<f64> {
-        at.residual_m.component_mul(&(at.residual_m + Vector3::from(self.sides_m) * 2.0))
+        at.residual_m.component_mul(&(at.residual_m + Vector3::from(self.mechanism.platform_sides_m()) * 2.0))
     }
 
     /// Determinant of the Jacobian with every leg's length taken as 1: unitless, at most 2, positive

@@ -1,6 +1,6 @@
 //! What a solver hands back: leg angles that close the platform's triangle, and what is known of them.
 
-use masseter_shared::geometry::{LEGS, Pose};
+use masseter_shared::geometry::{LEGS, Pose, frame_of_corners};
 
 use super::leg_angle::LegAngle;
 use super::loop_equations::{LoopEquations, LoopSolution};
@@ -42,7 +42,7 @@ impl Solution {
         let determinant = loops.determinant(&closed.residuals);
         Self {
             theta_rad,
-            pose: loops.mechanism.pose_from_corners(&corners),
+            pose: frame_of_corners(&corners),
             iterations: closed.iterations,
             residual_m: loops.residual_m(&closed.residuals),
             determinant,

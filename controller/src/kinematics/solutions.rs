@@ -24,12 +24,9 @@ impl Solutions {
     /// solutions form a continuum but for rounding.
     pub fn new(mechanism: &Mechanism, actuators: &Actuators) -> Result<Self, ForwardError> {
         check(actuators)?;
-        Self::from_equations(&LoopEquations::new(mechanism, actuators))
-    }
-
-    fn from_equations(loops: &LoopEquations<'_>) -> Result<Self, ForwardError> {
-        let found = LoopSolutions::find(loops, SolutionFilter::All)?;
-        let solution = |closed: LoopSolution| Solution::new(loops, &closed);
+        let loops = LoopEquations::new(mechanism, actuators);
+        let found = LoopSolutions::find(&loops, SolutionFilter::All)?;
+        let solution = |closed: LoopSolution| Solution::new(&loops, &closed);
         Ok(Self { solutions: found.all.map(|one| one.map(solution)), count: found.count })
     }
 

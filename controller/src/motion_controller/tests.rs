@@ -2,10 +2,13 @@
 
 use masseter_shared::config::{ControllerConfig, JawConfig};
 use masseter_shared::geometry::{LEGS, MechanismConfig};
-use masseter_shared::messages::codes::{Cause, DriveRequest, EventKind, drive_request};
+use masseter_shared::messages::codes::{
+    Cause, DriveRequest, DriveState, EventKind, NO_DRIVE_STATE, drive_request,
+};
 use masseter_shared::messages::{Command, State};
 
 use super::*;
+use crate::sequencer::{ALL_AXES, REPEATED_CYCLES, SAFE_STOP_S};
 
 mod faults;
 mod stalls;
@@ -160,7 +163,7 @@ fn a_run_goes_through_its_states_in_order_and_ends_with_the_drives_off() {
         bench.controller.outcome().is_none(),
         "the last command must be repeated before the process ends"
     );
-    for _ in 0..crate::progress::REPEATED_CYCLES {
+    for _ in 0..REPEATED_CYCLES {
         bench.cycle(Some);
     }
     assert!(bench.controller.outcome().is_some());

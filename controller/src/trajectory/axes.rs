@@ -44,18 +44,8 @@ impl Axes {
 }
 
 fn direction(name: &str) -> Option<Vec3> {
-    let (sign, axis) = match name.as_bytes() {
-        [b'+', axis] => (1.0, axis),
-        [b'-', axis] => (-1.0, axis),
-        _ => return None,
-    };
-    let unit = match axis {
-        b'x' => Vec3::x(),
-        b'y' => Vec3::y(),
-        b'z' => Vec3::z(),
-        _ => return None,
-    };
-    Some(unit * sign)
+    let index = ["+x", "-x", "+y", "-y", "+z", "-z"].iter().position(|known| *known == name)?;
+    Some(Vec3::ith(index / 2, if index % 2 == 0 { 1.0 } else { -1.0 }))
 }
 
 #[cfg(test)]

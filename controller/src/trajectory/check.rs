@@ -6,11 +6,11 @@
 //! carries beyond a stroke is held at its end.
 
 use masseter_shared::config::TrajectoryLimitsConfig;
-use masseter_shared::geometry::{AXES, AXIS_NAMES, InverseError, LimitViolation, Mechanism, StrokeLimits};
+use masseter_shared::geometry::{AXES, AXIS_NAMES, Mechanism, Pose, StrokeLimits};
 
-use crate::kinematics::{Assembly, Condition};
+use crate::kinematics::Assembly;
 
-use super::{SourceLine, Trajectory};
+use super::{Trajectory, TrajectoryError};
 
 /// What a trajectory asks of the axes, in the order d₁ d₂ d₃ l₁ l₂ l₃.
 #[derive(Debug, Clone, PartialEq)]
@@ -39,55 +39,23 @@ impl TrajectoryReport {
     }
 }
 
-/// A trajectory the mechanism cannot follow: when, where in the file, and why.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[error("the trajectory at {time_s:.3} s{}: {problem}", source_line.as_ref().map_or_else(String::new, |at| format!(" ({at})")))]
-pub struct CheckError {
-    /// Time of the trajectory, s.
-    pub time_s: f64,
-    /// The nearest line of the recording, if it is one.
-    pub source_line: Option<SourceLine>,
-    /// What is wrong there.
-    pub problem: CheckProblem,
-}
-
-/// What the mechanism cannot do.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum CheckProblem {
-    /// No joint coordinates hold the pose.
-    #[error("{0}")]
-    Inverse(InverseError),
-    /// An axis leaves its stroke.
-    #[error(
-        "{0}; make the motion smaller, turn the axes of its file, or move the closed pose (jaw.closed_offset_m, jaw.closed_leg_m)"
-    )]
-    Stroke(LimitViolation),
-    /// The mechanism would have to be folded over.
-    #[error("{0}; make the motion smaller")]
-    Assembly(Condition),
-    /// An axis moves or accelerates too fast, or the pose is close to singular: the value, its limit and the remedy.
-    #[error("{0}")]
-    Limit(String),
-}
-
 /// Samples the whole trajectory every `period_s` (above 0) and judges it.
 ///
 /// # Errors
-/// The first sample that the mechanism or the limits do not allow.
+/// The first sample that the mechanism or the limits do not allow: when, where in the file, and why.
 pub fn check(
     trajectory: &Trajectory,
     mechanism: &Mechanism,
     limits: &TrajectoryLimitsConfig,
     period_s: f64,
-) -> Result<TrajectoryReport, CheckError> {
+) -> Result<TrajectoryReport, TrajectoryError> {
     let samples = (trajectory.duration_s() / period_s).ceil() as usize + 1;
     let mut survey = Survey::new(mechanism, limits, period_s);
     for sample in 0..samples {
         let time_s = sample as f64 * period_s;
-        survey.visit(trajectory, time_s).map_err(|problem| CheckError {
-            time_s,
-            source_line: trajectory.source_line(time_s),
-            problem,
+        survey.visit(&trajectory.pose(time_s)).map_err(|problem| {
+            let line = trajectory.source_line(time_s).map_or_else(String::new, |line| format!(" ({line})"));
+            TrajectoryError(format!("the trajectory at {time_s:.3} s{line}: {problem}"))
         })?;
     }
     Ok(survey.report)
@@ -116,66 +84,67 @@ impl<'a> Survey<'a> {
         Self { mechanism, limits, period_s, last_m: None, last_velocity_m_s: None, report }
     }
 
-    fn visit(&mut self, trajectory: &Trajectory, time_s: f64) -> Result<(), CheckProblem> {
-        let axes_m = self.visit_pose(trajectory, time_s)?;
+    fn visit(&mut self, pose: &Pose) -> Result<(), String> {
+        let axes_m = self.visit_pose(pose)?;
         self.report.samples += 1;
         let Some(last_m) = self.last_m.replace(axes_m) else { return Ok(()) };
-        let velocity_m_s = std::array::from_fn(|axis| (axes_m[axis] - last_m[axis]) / self.period_s);
+        let velocity_m_s = self.rates(&last_m, &axes_m);
         let limit = |axis| self.limits.velocity_m_s(axis);
-        if let Some((axis, value, limit)) = excess(&velocity_m_s, &mut self.report.velocity_m_s, limit) {
-            return Err(CheckProblem::Limit(format!(
-                "axis {axis} would move at {value:.3} m/s, limit {limit} m/s; slow the motion or lower the low-pass"
-            )));
-        }
-        let Some(last) = self.last_velocity_m_s.replace(velocity_m_s) else { return Ok(()) };
-        let change = std::array::from_fn(|axis| (velocity_m_s[axis] - last[axis]) / self.period_s);
+        keep_largest(&velocity_m_s, &mut self.report.velocity_m_s, limit, ["move", "m/s"])?;
+        let Some(last_m_s) = self.last_velocity_m_s.replace(velocity_m_s) else { return Ok(()) };
+        let acceleration_m_s2 = self.rates(&last_m_s, &velocity_m_s);
         let limit = |axis| self.limits.acceleration_m_s2(axis);
-        match excess(&change, &mut self.report.acceleration_m_s2, limit) {
-            None => Ok(()),
-            Some((axis, value, limit)) => Err(CheckProblem::Limit(format!(
-                "axis {axis} would accelerate at {value:.2} m/s², limit {limit} m/s²; slow the motion or lower the \
-                 low-pass"
-            ))),
-        }
+        keep_largest(&acceleration_m_s2, &mut self.report.acceleration_m_s2, limit, ["accelerate", "m/s²"])
     }
 
-    fn visit_pose(&mut self, trajectory: &Trajectory, time_s: f64) -> Result<[f64; AXES], CheckProblem> {
-        let pose = trajectory.pose(time_s);
-        let joints = self.mechanism.inverse(&pose).map_err(CheckProblem::Inverse)?;
+    fn visit_pose(&mut self, pose: &Pose) -> Result<[f64; AXES], String> {
+        let joints = self.mechanism.inverse(pose).map_err(|error| error.to_string())?;
         let axes_m = joints.actuators.to_axes();
         for (axis, value_m) in axes_m.into_iter().enumerate() {
             self.report.lowest_m[axis] = self.report.lowest_m[axis].min(value_m);
             self.report.highest_m[axis] = self.report.highest_m[axis].max(value_m);
         }
-        self.mechanism.strokes().check(&joints.actuators).map_err(CheckProblem::Stroke)?;
+        self.mechanism.strokes().check(&joints.actuators).map_err(|violation| {
+            format!(
+                "{violation}; make the motion smaller, turn the axes of its file, or move the closed pose \
+                 (jaw.closed_offset_m, jaw.closed_leg_m)"
+            )
+        })?;
         if let Some(violated) = Assembly::new(self.mechanism, &joints.actuators, &joints.theta_rad).violated()
         {
-            return Err(CheckProblem::Assembly(violated));
+            return Err(format!("{violated}; make the motion smaller"));
         }
-        let condition = self.mechanism.condition(&pose, &joints);
+        let condition = self.mechanism.condition(pose, &joints);
         self.report.condition = self.report.condition.max(condition);
         let limit = self.limits.max_condition;
         if condition > limit {
             let remedy = "too close to a singularity; make the motion smaller";
-            return Err(CheckProblem::Limit(format!(
-                "condition number {condition:.1}, limit {limit}: {remedy}"
-            )));
+            return Err(format!("condition number {condition:.1}, limit {limit}: {remedy}"));
         }
         Ok(axes_m)
     }
+
+    fn rates(&self, before: &[f64; AXES], after: &[f64; AXES]) -> [f64; AXES] {
+        std::array::from_fn(|axis| (after[axis] - before[axis]) / self.period_s)
+    }
 }
 
-/// Keeps the largest magnitude of each axis; returns the first axis beyond its limit, with value and limit.
-fn excess(
+/// Keeps the largest magnitude of each axis; refuses the first axis beyond its limit.
+fn keep_largest(
     values: &[f64; AXES],
     largest: &mut [f64; AXES],
     limit: impl Fn(usize) -> f64,
-) -> Option<(&'static str, f64, f64)> {
+    [does, unit]: [&str; 2],
+) -> Result<(), String> {
     for (axis, value) in values.iter().map(|value| value.abs()).enumerate() {
         largest[axis] = largest[axis].max(value);
         if value > limit(axis) {
-            return Some((AXIS_NAMES[axis], value, limit(axis)));
+            let (name, limit) = (AXIS_NAMES[axis], limit(axis));
+            return Err(format!(
+                "axis {name} would {does} at {value:.3} {unit}, limit {limit} {unit}; slow the motion or lower the \
+                 low-pass"
+            ));
         }
     }
-    None
+    Ok(())
 }

@@ -14,7 +14,7 @@ use masseter_shared::geometry::Pose;
 use super::TrajectoryError;
 use super::cycle::Cycle;
 use super::error::require;
-use super::mandible::{Guidance, Mandible, Posture, reach};
+use super::mandible::{Mandible, Posture, reach};
 
 /// Advance of the balancing condyle beyond which no jaw goes, metres.
 const LARGEST_BALANCING_M: f64 = 0.02;
@@ -27,7 +27,7 @@ const PROOF_POINTS: u32 = 256;
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Chewing {
     mandible: Mandible,
-    cycle: Cycle,
+    pub cycle: Cycle,
     down_m: f64,
     back_m: f64,
     balancing_m: f64,
@@ -41,13 +41,10 @@ impl Chewing {
         let range = -15.0..=40.0;
         let holds = range.contains(&anterior_posterior_mm);
         require("anterior_posterior_mm", anterior_posterior_mm, holds, "-15 to 40 mm")?;
-        let guidance = Guidance {
-            inclination_deg: config.condylar_inclination_deg,
-            bennett_angle_deg: config.bennett_angle_deg,
-            working: config.side,
-        };
+        let (inclination_deg, bennett_angle_deg) =
+            (config.condylar_inclination_deg, config.bennett_angle_deg);
         let mut chewing = Self {
-            mandible: Mandible::new(jaw, &guidance)?,
+            mandible: Mandible::new(jaw, inclination_deg, bennett_angle_deg, config.side)?,
             cycle: Cycle::new(config.cycle_rate_hz, &config.phases)?,
             down_m: vertical_mm / 1000.0,
             back_m: anterior_posterior_mm / 1000.0,
@@ -58,10 +55,6 @@ impl Chewing {
         chewing.balancing_m = chewing.balancing_for(lateral_mm, config.side.sign())?;
         chewing.prove()?;
         Ok(chewing)
-    }
-
-    pub(super) fn cycle(&self) -> &Cycle {
-        &self.cycle
     }
 
     /// Displacement of the jaw from the closed pose, jaw frame.
@@ -80,7 +73,7 @@ impl Chewing {
     /// The balancing condyle's advance that swings the widest open jaw this far to the side.
     fn balancing_for(&self, lateral_mm: f64, sign: f64) -> Result<f64, TrajectoryError> {
         let swing_m = |balancing_m| {
-            let widest = Self { balancing_m, ..*self }.posture(self.cycle.widest())?;
+            let widest = Self { balancing_m, ..*self }.posture(self.cycle.opening)?;
             Some(sign * self.mandible.displacement(&widest).translation.y)
         };
         reach("lateral_mm", lateral_mm, LARGEST_BALANCING_M, swing_m)
@@ -90,14 +83,14 @@ impl Chewing {
         for point in 0..PROOF_POINTS {
             let phase = f64::from(point) / f64::from(PROOF_POINTS);
             let Some(Posture { advance_m, .. }) = self.posture(phase) else {
-                return Err(TrajectoryError::Motion(format!(
+                return Err(TrajectoryError(format!(
                     "at {phase:.2} of the chewing cycle the incisal point would be out of the mandible's reach; \
                      bring vertical_mm or anterior_posterior_mm closer to the defaults (18 and 5), or condylar_inclination_deg (40)"
                 )));
             };
             if advance_m < -LARGEST_RETRUSION_M {
                 let advance_mm = 1000.0 * advance_m;
-                return Err(TrajectoryError::Motion(format!(
+                return Err(TrajectoryError(format!(
                     "at {phase:.2} of the chewing cycle the condyles would be {advance_mm:.1} mm along their paths; \
                      bring anterior_posterior_mm or lateral_mm closer to what vertical_mm allows (defaults 5, 4 and 18)"
                 )));

@@ -15,7 +15,7 @@ const SHORTEST_CUT_S: f64 = 1e-6;
 pub(super) struct MotionClock {
     ramp_s: f64,
     stopped_s: f64,
-    duration_s: f64,
+    pub duration_s: f64,
     /// What the motion takes to its end.
     whole_s: f64,
 }
@@ -34,10 +34,6 @@ impl MotionClock {
     /// What the motion would take to its end, s, where the duration cuts it by more than rounding.
     pub(super) fn cut_from_s(&self) -> Option<f64> {
         (self.duration_s < self.whole_s - SHORTEST_CUT_S).then_some(self.whole_s)
-    }
-
-    pub(super) fn duration_s(&self) -> f64 {
-        self.duration_s
     }
 
     /// The motion's time, s.

@@ -15,7 +15,8 @@ const SWING_BEGINS: f64 = 0.3;
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Cycle {
     rate_hz: f64,
-    opening: f64,
+    /// The phase at which the jaw is widest open.
+    pub opening: f64,
     closing: f64,
 }
 
@@ -29,7 +30,7 @@ impl Cycle {
         let sum = opening + closing + occlusion;
         if (sum - 1.0).abs() > 1e-6 {
             let problem = "opening, closing and occlusion must add up to 1";
-            return Err(TrajectoryError::Motion(format!("phases add up to {sum}; {problem}")));
+            return Err(TrajectoryError(format!("phases add up to {sum}; {problem}")));
         }
         Ok(Self { rate_hz, opening, closing })
     }
@@ -37,11 +38,6 @@ impl Cycle {
     /// Where in its cycle the motion is, 0 to 1.
     pub(super) fn phase(&self, motion_s: f64) -> f64 {
         (motion_s * self.rate_hz).rem_euclid(1.0)
-    }
-
-    /// The phase at which the jaw is widest open.
-    pub(super) fn widest(&self) -> f64 {
-        self.opening
     }
 
     /// How far out of the closed pose, 0 to 1.

@@ -12,7 +12,7 @@ use masseter_shared::geometry::Pose;
 use super::TrajectoryError;
 use super::cycle::Cycle;
 use super::error::require;
-use super::mandible::{Guidance, Mandible, Posture, reach};
+use super::mandible::{Mandible, Posture, reach};
 
 /// Condylar advance a radian of opening, m/rad.
 const ADVANCE_PER_PITCH_M: f64 = 0.0148 / (32.2 * std::f64::consts::PI / 180.0);
@@ -25,13 +25,13 @@ const LARGEST_BALANCING_M: f64 = 0.025;
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Excursion {
     mandible: Mandible,
-    cycle: Cycle,
+    pub cycle: Cycle,
     farthest: Posture,
 }
 
 impl Excursion {
     pub(super) fn opening(config: &OpeningConfig, jaw: &JawConfig) -> Result<Self, TrajectoryError> {
-        let mandible = Mandible::new(jaw, &Guidance::symmetric(config.condylar_inclination_deg))?;
+        let mandible = Mandible::symmetric(jaw, config.condylar_inclination_deg)?;
         let cycle = Cycle::new(config.cycle_rate_hz, &config.phases)?;
         let posture = |pitch_rad| Posture {
             pitch_rad,
@@ -46,7 +46,7 @@ impl Excursion {
     }
 
     pub(super) fn protrusion(config: &ProtrusionConfig, jaw: &JawConfig) -> Result<Self, TrajectoryError> {
-        let mandible = Mandible::new(jaw, &Guidance::symmetric(config.condylar_inclination_deg))?;
+        let mandible = Mandible::symmetric(jaw, config.condylar_inclination_deg)?;
         let cycle = Cycle::new(config.cycle_rate_hz, &config.phases)?;
         let amplitude_mm = config.amplitude_mm;
         require("amplitude_mm", amplitude_mm, (0.0..=15.0).contains(&amplitude_mm), "0 to 15 mm")?;
@@ -55,22 +55,14 @@ impl Excursion {
     }
 
     pub(super) fn lateral(config: &LateralConfig, jaw: &JawConfig) -> Result<Self, TrajectoryError> {
-        let guidance = Guidance {
-            inclination_deg: config.condylar_inclination_deg,
-            bennett_angle_deg: config.bennett_angle_deg,
-            working: config.side,
-        };
-        let mandible = Mandible::new(jaw, &guidance)?;
+        let LateralConfig { condylar_inclination_deg, bennett_angle_deg, side, .. } = *config;
+        let mandible = Mandible::new(jaw, condylar_inclination_deg, bennett_angle_deg, side)?;
         let cycle = Cycle::new(config.cycle_rate_hz, &config.phases)?;
         let posture = |balancing_m| Posture { balancing_m, ..Default::default() };
         let balancing_m = farthest(config.amplitude_mm, LARGEST_BALANCING_M, |balancing_m| {
-            config.side.sign() * mandible.displacement(&posture(balancing_m)).translation.y
+            side.sign() * mandible.displacement(&posture(balancing_m)).translation.y
         })?;
         Ok(Self { mandible, cycle, farthest: posture(balancing_m) })
-    }
-
-    pub(super) fn cycle(&self) -> &Cycle {
-        &self.cycle
     }
 
     /// Displacement of the jaw from the closed pose, jaw frame.

@@ -8,13 +8,11 @@ use masseter_shared::geometry::Vec3;
 
 use super::TrajectoryError;
 use super::axes::Axes;
-use super::error::require;
-use super::import_error::{ImportError, Located};
+use super::error::{Located, require};
 use super::mandible::condylar_middle;
-use super::markers;
-use super::pose_csv;
-use super::recording::{Recording, Samples};
-use super::table::{Format, LARGEST_MM, Table};
+use super::recording::{Recording, Sample};
+use super::table::{Format, LARGEST_MM, Row, Table};
+use super::{markers, pose_csv};
 
 /// Reads, converts to the jaw frame and smooths.
 pub(super) fn import(config: &FileConfig, jaw: &JawConfig) -> Result<Recording, TrajectoryError> {
@@ -29,24 +27,27 @@ pub(super) fn import(config: &FileConfig, jaw: &JawConfig) -> Result<Recording, 
         Some(point_mm) => Vec3::from(point_mm) / 1000.0,
         None => condylar_middle(jaw)?,
     };
-    let recording = samples(config, &reference)
-        .and_then(|samples| Recording::new(config.path.clone(), samples, lowpass_hz))
-        .map_err(|Located { line, problem }| ImportError { path: config.path.clone(), line, problem })?;
-    Ok(recording)
+    recording(config, &reference).map_err(|problem| problem.in_file(&config.path))
 }
 
-fn samples(config: &FileConfig, reference: &Vec3) -> Result<Samples, Located> {
+fn recording(config: &FileConfig, reference: &Vec3) -> Result<Recording, Located> {
     let axes = Axes::parse(&config.axes).map_err(Located::whole)?;
     let unreadable = |error| format!("cannot be read ({error}); check the path and that it is UTF-8 text");
     let text = std::fs::read_to_string(&config.path).map_err(|error| Located::whole(unreadable(error)))?;
     let table = Table::parse(&text)?;
     check_points(config, table.format).map_err(Located::whole)?;
-    match table.format {
-        Format::Poses => pose_csv::samples(&table, &axes, reference),
-        Format::Markers => {
-            markers::samples(&table, &axes, config.marker_origin_mm.map(|mm| Vec3::from(mm) / 1000.0))
-        }
-    }
+    let origin = config.marker_origin_mm.map(|mm| Vec3::from(mm) / 1000.0);
+    let displacement = |values: &[f64]| match table.format {
+        Format::Poses => pose_csv::displacement(values, &axes, reference),
+        Format::Markers => markers::displacement(&table.rows[0].values, values, &axes, origin),
+    };
+    let sample = |row: &Row| match displacement(&row.values) {
+        Ok(displacement) => Ok(Sample { line: row.line, time_s: row.time_s, displacement }),
+        Err(problem) => Err(Located::at(row.line, problem)),
+    };
+    let samples = table.rows.iter().map(sample).collect::<Result<Vec<_>, _>>()?;
+    let is_of_centroid = table.format == Format::Markers && origin.is_none();
+    Recording::new(config.path.clone(), &samples, is_of_centroid, config.lowpass_hz)
 }
 
 /// Refuses a key that the file's format does not use: ignoring it would hide a mistake.

@@ -34,7 +34,7 @@ impl JawFrame {
         let actuators = Actuators { slide_m: [0.0; LEGS], leg_m: [closed_leg_m; LEGS] };
         let no_pose = |error| {
             let problem = format!("jaw.closed_leg_m = {closed_leg_m} m gives no closed pose: {error}");
-            TrajectoryError::Motion(problem)
+            TrajectoryError(problem)
         };
         let closed = solve_completely(mechanism, &actuators).map_err(no_pose)?.pose;
         let closed = Translation3::from(jaw.closed_offset_m) * closed;

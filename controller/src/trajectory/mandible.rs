@@ -19,21 +19,6 @@ use super::error::require;
 /// An amplitude that is missed by no more is reached, mm.
 const REACHED_MM: f64 = 1e-6;
 
-/// Along which paths the condyles glide.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Guidance {
-    pub inclination_deg: f64,
-    pub bennett_angle_deg: f64,
-    pub working: Side,
-}
-
-impl Guidance {
-    /// Paths for motions in which both sides do the same.
-    pub(super) fn symmetric(inclination_deg: f64) -> Self {
-        Self { inclination_deg, bennett_angle_deg: 0.0, working: Side::Left }
-    }
-}
-
 /// A rigid mandible; jaw frame at the closed pose.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Mandible {
@@ -87,8 +72,13 @@ pub(super) fn condylar_middle(jaw: &JawConfig) -> Result<Vec3, TrajectoryError> 
 }
 
 impl Mandible {
-    pub(super) fn new(jaw: &JawConfig, guidance: &Guidance) -> Result<Self, TrajectoryError> {
-        let Guidance { inclination_deg, bennett_angle_deg, working } = *guidance;
+    /// The inclination and the Bennett angle set the paths along which the condyles glide.
+    pub(super) fn new(
+        jaw: &JawConfig,
+        inclination_deg: f64,
+        bennett_angle_deg: f64,
+        working: Side,
+    ) -> Result<Self, TrajectoryError> {
         let range = 0.0..=80.0;
         require("condylar_inclination_deg", inclination_deg, range.contains(&inclination_deg), "0 to 80")?;
         let range = 0.0..=45.0;
@@ -103,6 +93,11 @@ impl Mandible {
             balancing_path: Vec3::new(forward * straight, working * forward * inward, -down),
             working,
         })
+    }
+
+    /// For motions in which both sides do the same.
+    pub(super) fn symmetric(jaw: &JawConfig, inclination_deg: f64) -> Result<Self, TrajectoryError> {
+        Self::new(jaw, inclination_deg, 0.0, Side::Left)
     }
 
     /// Displacement of the jaw from the closed pose: where the incisal point went, and the turn.
@@ -177,7 +172,7 @@ pub(super) fn reach(
     }
     let reached_mm = 1000.0 * travel_m(below).unwrap_or_default();
     if amplitude_mm - reached_mm > REACHED_MM {
-        return Err(TrajectoryError::Motion(format!(
+        return Err(TrajectoryError(format!(
             "{name} of {amplitude_mm} mm is out of reach: the mandible gets to {reached_mm:.1} mm; ask for less"
         )));
     }
@@ -191,8 +186,7 @@ mod tests {
     use super::*;
 
     fn mandible(working: Side) -> Mandible {
-        let guidance = Guidance { inclination_deg: 40.0, bennett_angle_deg: 8.0, working };
-        Mandible::new(&JawConfig::default(), &guidance).unwrap()
+        Mandible::new(&JawConfig::default(), 40.0, 8.0, working).unwrap()
     }
 
     /// Where the condyles have gone, working and balancing, metres.

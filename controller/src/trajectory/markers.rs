@@ -4,9 +4,6 @@ use masseter_shared::geometry::{Pose, Vec3};
 use nalgebra::{Matrix3, Rotation3, Translation3, UnitQuaternion};
 
 use super::axes::Axes;
-use super::import_error::Located;
-use super::recording::Samples;
-use super::table::{Row, Table};
 
 type Markers = [Vec3; 3];
 
@@ -16,25 +13,21 @@ const FLATTEST: f64 = 0.05;
 const LARGEST_CHANGE_M: f64 = 0.002;
 const SIDES: [(usize, usize); 3] = [(0, 1), (1, 2), (2, 0)];
 
-/// Displacements of the jaw; `origin` is the incisal point at the closed pose in file coordinates,
+/// Displacement of the jaw since the first row; `origin` is the incisal point at the closed pose in file coordinates,
 /// metres, by default the markers' centroid.
-pub(super) fn samples(table: &Table, axes: &Axes, origin: Option<Vec3>) -> Result<Samples, Located> {
-    let mut samples = Samples { are_of_centroid: origin.is_none(), ..Samples::default() };
-    let Some(first) = table.rows.first() else { return Ok(samples) };
-    let closed = markers(first);
-    check_spread(&closed).map_err(|problem| Located::at(first.line, problem))?;
+pub(super) fn displacement(
+    first: &[f64],
+    values: &[f64],
+    axes: &Axes,
+    origin: Option<Vec3>,
+) -> Result<Pose, String> {
+    let (closed, now) = (markers(first), markers(values));
+    check_spread(&closed)?;
+    check_rigid(&closed, &now)?;
     let origin = origin.unwrap_or_else(|| centroid(&closed));
-    for row in &table.rows {
-        let now = markers(row);
-        check_rigid(&closed, &now).map_err(|problem| Located::at(row.line, problem))?;
-        let motion = rigid_motion(&closed, &now);
-        let moved = motion.rotation * origin + motion.translation.vector - origin;
-        samples.time_s.push(row.time_s);
-        samples.lines.push(row.line);
-        let rotation = axes.rotation(&motion.rotation);
-        samples.displacements.push(Pose::from_parts(axes.vector(&moved).into(), rotation));
-    }
-    Ok(samples)
+    let motion = rigid_motion(&closed, &now);
+    let moved = motion.rotation * origin + motion.translation.vector - origin;
+    Ok(Pose::from_parts(axes.vector(&moved).into(), axes.rotation(&motion.rotation)))
 }
 
 /// The rigid motion that carries one set of points to the other with the least squared error, by
@@ -53,8 +46,8 @@ fn rigid_motion(from: &Markers, to: &Markers) -> Pose {
     Pose::from_parts(Translation3::from(to_centre - rotation * from_centre), rotation)
 }
 
-fn markers(row: &Row) -> Markers {
-    std::array::from_fn(|marker| Vec3::from_column_slice(&row.values[3 * marker..][..3]) / 1000.0)
+fn markers(values_mm: &[f64]) -> Markers {
+    std::array::from_fn(|marker| Vec3::from_column_slice(&values_mm[3 * marker..][..3]) / 1000.0)
 }
 
 fn centroid(markers: &Markers) -> Vec3 {
@@ -97,7 +90,6 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::trajectory::table::Format;
 
     fn coordinates() -> impl Strategy<Value = Vec3> {
         [-0.1..0.1f64, -0.1..0.1f64, -0.1..0.1f64].prop_map(Vec3::from)
@@ -121,13 +113,8 @@ mod tests {
         }
     }
 
-    fn row(line: u64, markers_mm: [f64; 9]) -> Row {
-        Row { line, time_s: line as f64 * 0.01, values: markers_mm.to_vec() }
-    }
-
-    fn read(rows: Vec<Row>, origin: Option<Vec3>) -> Result<Samples, Located> {
-        let axes = Axes::parse(&["+y", "-x", "+z"].map(String::from)).unwrap();
-        samples(&Table { format: Format::Markers, rows }, &axes, origin)
+    fn read(values_mm: [f64; 9]) -> Result<Pose, String> {
+        displacement(&CLOSED, &values_mm, &Axes::parse(&["+y", "-x", "+z"].map(String::from)).unwrap(), None)
     }
 
     const CLOSED: [f64; 9] = [0.0, 0.0, 0.0, 40.0, 0.0, 0.0, 0.0, 40.0, 0.0];
@@ -135,23 +122,20 @@ mod tests {
     #[test]
     fn a_shift_of_all_markers_is_a_shift_of_the_jaw_in_its_own_axes() {
         let moved = [1.0, 2.0, 3.0, 41.0, 2.0, 3.0, 1.0, 42.0, 3.0];
-        let samples = read(vec![row(1, CLOSED), row(2, moved)], None).ok().unwrap();
-        let pose = samples.displacements[1];
+        let pose = read(moved).unwrap();
         assert!((pose.translation.vector - Vec3::new(0.002, -0.001, 0.003)).norm() < 1e-12);
         assert!(pose.rotation.angle() < 1e-7);
     }
 
     #[test]
     fn markers_that_tell_no_pose_are_refused() {
-        let line = [0.0, 0.0, 0.0, 40.0, 0.0, 0.0, 80.0, 1.0, 0.0];
-        let error = read(vec![row(3, line)], None).err().unwrap();
-        assert!(error.problem.contains("lie on a line") && error.line == Some(3));
-        let point = read(vec![row(3, [5.0; 9])], None).err().unwrap();
-        assert!(point.problem.contains("lie on a line"));
+        let axes = Axes::parse(&["+x", "+y", "+z"].map(String::from)).unwrap();
+        for flat in [[0.0, 0.0, 0.0, 40.0, 0.0, 0.0, 80.0, 1.0, 0.0], [5.0; 9]] {
+            let error = displacement(&flat, &flat, &axes, None).unwrap_err();
+            assert!(error.contains("lie on a line"), "{error}");
+        }
         let mut loose = CLOSED;
         loose[3] = 43.0;
-        let error = read(vec![row(3, CLOSED), row(4, loose)], None).err().unwrap();
-        assert!(error.problem.starts_with("markers 1 and 2 are +3.00 mm farther apart"));
-        assert_eq!(error.line, Some(4));
+        assert!(read(loose).unwrap_err().starts_with("markers 1 and 2 are +3.00 mm farther apart"));
     }
 }

@@ -14,7 +14,6 @@ mod cycle;
 mod error;
 mod excursion;
 mod import;
-mod import_error;
 mod jaw_frame;
 mod lowpass;
 mod mandible;
@@ -27,9 +26,8 @@ mod table;
 use masseter_shared::config::{JawConfig, MotionConfig};
 use masseter_shared::geometry::{Mechanism, Pose};
 
-pub use check::{CheckError, CheckProblem, TrajectoryReport, check};
+pub use check::{TrajectoryReport, check};
 pub use error::TrajectoryError;
-pub use import_error::{ImportError, SourceLine};
 
 pub(crate) use cycle::minimum_jerk;
 
@@ -114,7 +112,7 @@ impl Trajectory {
 
     /// How long the trajectory lasts, s.
     pub fn duration_s(&self) -> f64 {
-        self.clock.duration_s()
+        self.clock.duration_s
     }
 
     /// How long the whole motion would take, s, where the duration cuts it: it then ends somewhere on its way.
@@ -125,18 +123,14 @@ impl Trajectory {
     /// The largest turn of the jaw, degrees, if a recording of markers gives no incisal point and the turn makes their
     /// centroid a bad substitute.
     pub fn centroid_turn_deg(&self) -> Option<f64> {
-        match &self.motion {
-            Motion::Recording(recording) => recording.centroid_turn_deg(),
-            Motion::Chewing(_) | Motion::Excursion(_) => None,
-        }
+        let Motion::Recording(recording) = &self.motion else { return None };
+        recording.centroid_turn_deg
     }
 
-    /// The line of the recording nearest to a time of the trajectory; none for a generator.
-    pub fn source_line(&self, t_s: f64) -> Option<SourceLine> {
-        match &self.motion {
-            Motion::Recording(recording) => Some(recording.source_line(self.motion_time_s(t_s))),
-            Motion::Chewing(_) | Motion::Excursion(_) => None,
-        }
+    /// File and line of the recording nearest to a time of the trajectory; none for a generator.
+    fn source_line(&self, t_s: f64) -> Option<String> {
+        let Motion::Recording(recording) = &self.motion else { return None };
+        Some(recording.source_line(self.motion_time_s(t_s)))
     }
 }
 
@@ -144,8 +138,8 @@ impl Motion {
     /// Generators play whole cycles only, so that they end closed, but for a duration in which not even one fits.
     fn clock(&self, duration_s: Option<f64>) -> MotionClock {
         let cycle = match self {
-            Self::Chewing(chewing) => chewing.cycle(),
-            Self::Excursion(excursion) => excursion.cycle(),
+            Self::Chewing(chewing) => &chewing.cycle,
+            Self::Excursion(excursion) => &excursion.cycle,
             Self::Recording(recording) => {
                 let length_s = recording.length_s();
                 return MotionClock::new(length_s, duration_s.unwrap_or(length_s + RAMP_S));

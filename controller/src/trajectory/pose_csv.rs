@@ -4,33 +4,20 @@ use masseter_shared::geometry::{Pose, Vec3};
 use nalgebra::{Quaternion, UnitQuaternion};
 
 use super::axes::Axes;
-use super::import_error::Located;
-use super::recording::Samples;
-use super::table::{Row, Table};
 
 /// Within this of 1 a quaternion counts as rounded, beyond it as wrong.
 const NORM_TOLERANCE: f64 = 1e-3;
 
-/// Displacements of the incisal point and the jaw from those of a reference point fixed to the jaw,
-/// given in the jaw frame at the closed pose, metres.
-pub(super) fn samples(table: &Table, axes: &Axes, reference: &Vec3) -> Result<Samples, Located> {
-    let mut samples = Samples::default();
-    for row in &table.rows {
-        samples.time_s.push(row.time_s);
-        samples.lines.push(row.line);
-        samples.displacements.push(displacement(row, axes, reference)?);
-    }
-    Ok(samples)
-}
-
-fn displacement(row: &Row, axes: &Axes, reference: &Vec3) -> Result<Pose, Located> {
-    let moved = axes.vector(&(Vec3::from_column_slice(&row.values[..3]) / 1000.0));
-    let q = &row.values[3..];
+/// Displacement of the incisal point and the jaw from that of a reference point fixed to the jaw, given in the jaw frame
+/// at the closed pose, metres.
+pub(super) fn displacement(values: &[f64], axes: &Axes, reference: &Vec3) -> Result<Pose, String> {
+    let moved = axes.vector(&(Vec3::from_column_slice(&values[..3]) / 1000.0));
+    let q = &values[3..];
     let quaternion = Quaternion::new(q[0], q[1], q[2], q[3]);
     let norm = quaternion.norm();
     if (norm - 1.0).abs() > NORM_TOLERANCE {
         let remedy = "write unit quaternions in the order qw,qx,qy,qz";
-        return Err(Located::at(row.line, format!("the quaternion's norm is {norm:.6}, not 1; {remedy}")));
+        return Err(format!("the quaternion's norm is {norm:.6}, not 1; {remedy}"));
     }
     let rotation = axes.rotation(&UnitQuaternion::from_quaternion(quaternion));
     let incisal = reference + moved - rotation * reference;
@@ -40,12 +27,6 @@ fn displacement(row: &Row, axes: &Axes, reference: &Vec3) -> Result<Pose, Locate
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::trajectory::table::Format;
-
-    fn table(values: &[f64]) -> Table {
-        Table { format: Format::Poses, rows: vec![Row { line: 7, time_s: 0.0, values: values.to_vec() }] }
-    }
-
     fn axes() -> Axes {
         Axes::parse(&["+x", "+y", "+z"].map(String::from)).unwrap()
     }
@@ -54,9 +35,7 @@ mod tests {
     fn turning_about_the_reference_point_lowers_the_incisal_point() {
         let (sin, cos) = 0.1_f64.sin_cos();
         let reference = Vec3::new(-0.08, 0.0, 0.03);
-        let samples =
-            samples(&table(&[1.0, 0.0, 0.0, cos, 0.0, sin, 0.0]), &axes(), &reference).ok().unwrap();
-        let pose = samples.displacements[0];
+        let pose = displacement(&[1.0, 0.0, 0.0, cos, 0.0, sin, 0.0], &axes(), &reference).unwrap();
         let at_reference = pose.rotation * reference + pose.translation.vector - reference;
         assert!((at_reference - Vec3::new(0.001, 0.0, 0.0)).norm() < 1e-12);
         assert!(pose.translation.z < -0.015);
@@ -64,12 +43,10 @@ mod tests {
 
     #[test]
     fn quaternions_are_renormalised_within_rounding_and_refused_beyond() {
-        let read = |qw: f64| samples(&table(&[0.0, 0.0, 0.0, qw, 0.0, 0.0, 0.0]), &axes(), &Vec3::zeros());
-        assert!((read(1.0005).ok().unwrap().displacements[0].rotation.norm() - 1.0).abs() < 1e-15);
+        let read = |qw: f64| displacement(&[0.0, 0.0, 0.0, qw, 0.0, 0.0, 0.0], &axes(), &Vec3::zeros());
+        assert!((read(1.0005).unwrap().rotation.norm() - 1.0).abs() < 1e-15);
         for qw in [0.99, 0.0] {
-            let error = read(qw).err().unwrap();
-            assert_eq!(error.line, Some(7));
-            assert!(error.problem.contains("the quaternion's norm is 0."));
+            assert!(read(qw).unwrap_err().contains("the quaternion's norm is 0."));
         }
     }
 }

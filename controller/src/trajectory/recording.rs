@@ -8,7 +8,7 @@ use std::path::PathBuf;
 use masseter_shared::geometry::{Pose, Vec3};
 use nalgebra::{UnitQuaternion, Vector6};
 
-use super::import_error::{Located, SourceLine};
+use super::error::Located;
 use super::lowpass::lowpass;
 use super::spline::Spline;
 
@@ -21,14 +21,12 @@ const CENTROID_TURN_DEG: f64 = 2.0;
 /// Beyond this, rotation vectors are no longer a good measure of the way between two poses.
 const LARGEST_TURN_DEG: f64 = 90.0;
 
-/// Jaw displacements as recorded; jaw frame, metres.
-#[derive(Debug, Default)]
-pub(super) struct Samples {
-    pub time_s: Vec<f64>,
-    pub lines: Vec<u64>,
-    pub displacements: Vec<Pose>,
-    /// Whether they are displacements of the markers' centroid, because the incisal point is not given.
-    pub are_of_centroid: bool,
+/// A row of the file: jaw displacement in the jaw frame, metres.
+#[derive(Debug)]
+pub(super) struct Sample {
+    pub line: u64,
+    pub time_s: f64,
+    pub displacement: Pose,
 }
 
 /// Jaw displacements over the recording's own time, from 0.
@@ -39,31 +37,40 @@ pub(super) struct Recording {
     lines: Vec<u64>,
     first_rotation: UnitQuaternion<f64>,
     curve: Spline<6>,
-    centroid_turn_deg: Option<f64>,
+    /// The largest turn, degrees, if it makes the markers' centroid a bad substitute for the incisal point.
+    pub centroid_turn_deg: Option<f64>,
 }
 
 impl Recording {
-    /// From samples at strictly increasing times; a corner of 0 leaves them unfiltered.
-    pub(super) fn new(path: PathBuf, samples: Samples, lowpass_hz: f64) -> Result<Self, Located> {
-        let first_rotation = samples.displacements[0].rotation;
-        let coordinates = coordinates(&samples, &first_rotation)?;
-        let turns = coordinates.iter().map(|at| at.fixed_rows::<3>(3).norm().to_degrees());
-        let largest_turn_deg = turns.fold(0.0, f64::max);
-        let time_s: Vec<f64> = samples.time_s.iter().map(|t_s| t_s - samples.time_s[0]).collect();
+    /// From samples at strictly increasing times; a corner of 0 leaves them unfiltered. `are_of_centroid` says that they are
+    /// displacements of the markers' centroid, because the incisal point is not given.
+    pub(super) fn new(
+        path: PathBuf,
+        samples: &[Sample],
+        are_of_centroid: bool,
+        lowpass_hz: f64,
+    ) -> Result<Self, Located> {
+        let first = &samples[0];
+        let first_rotation = first.displacement.rotation;
+        let coordinates = samples.iter().map(|sample| coordinates(sample, &first_rotation));
+        let coordinates = coordinates.collect::<Result<Vec<_>, _>>()?;
+        let turns_deg = coordinates.iter().map(|at| at.fixed_rows::<3>(3).norm().to_degrees());
+        let largest_turn_deg = turns_deg.fold(0.0, f64::max);
+        let is_bad = are_of_centroid && largest_turn_deg > CENTROID_TURN_DEG;
+        let time_s: Vec<f64> = samples.iter().map(|sample| sample.time_s - first.time_s).collect();
         let raw = Spline::through(time_s.clone(), coordinates);
-        let curve = if lowpass_hz == 0.0 { raw } else { smoothed(&raw, &time_s, lowpass_hz) };
-        let centroid_turn_deg = samples.are_of_centroid.then_some(largest_turn_deg);
-        let centroid_turn_deg = centroid_turn_deg.filter(|&turn_deg| turn_deg > CENTROID_TURN_DEG);
-        Ok(Self { path, time_s, lines: samples.lines, first_rotation, curve, centroid_turn_deg })
-    }
-
-    /// The largest turn, degrees, if it makes the markers' centroid a bad substitute for the incisal point.
-    pub(super) fn centroid_turn_deg(&self) -> Option<f64> {
-        self.centroid_turn_deg
+        Ok(Self {
+            path,
+            lines: samples.iter().map(|sample| sample.line).collect(),
+            first_rotation,
+            curve: if lowpass_hz == 0.0 { raw } else { smoothed(&raw, &time_s, lowpass_hz) },
+            centroid_turn_deg: is_bad.then_some(largest_turn_deg),
+            time_s,
+        })
     }
 
     pub(super) fn length_s(&self) -> f64 {
-        length(&self.time_s)
+        self.time_s[self.time_s.len() - 1]
     }
 
     /// Displacement of the jaw from the closed pose, jaw frame.
@@ -73,37 +80,32 @@ impl Recording {
         Pose::from_parts(Vec3::new(at[0], at[1], at[2]).into(), self.first_rotation * turn)
     }
 
-    /// The line whose time is nearest.
-    pub(super) fn source_line(&self, motion_s: f64) -> SourceLine {
+    /// File and line whose time is nearest.
+    pub(super) fn source_line(&self, motion_s: f64) -> String {
         let right = self.time_s.partition_point(|&t_s| t_s < motion_s).min(self.time_s.len() - 1);
         let left = right.saturating_sub(1);
         let nearest = if motion_s - self.time_s[left] < self.time_s[right] - motion_s { left } else { right };
-        SourceLine { path: self.path.clone(), line: self.lines[nearest] }
+        format!("{}:{}", self.path.display(), self.lines[nearest])
     }
 }
 
-fn length(time_s: &[f64]) -> f64 {
-    time_s.last().copied().unwrap_or_default()
-}
-
-/// Translation (m) and rotation vector from the first orientation (rad) of each sample.
-fn coordinates(samples: &Samples, first: &UnitQuaternion<f64>) -> Result<Vec<Vector6<f64>>, Located> {
-    let coordinates = |(pose, &line): (&Pose, &u64)| {
-        let turn = (first.inverse() * pose.rotation).scaled_axis();
-        let angle_deg = turn.norm().to_degrees();
-        if angle_deg > LARGEST_TURN_DEG {
-            let limit = format!("limit {LARGEST_TURN_DEG}°; is the orientation right?");
-            return Err(Located::at(line, format!("turned by {angle_deg:.1}° from the first row, {limit}")));
-        }
-        let at = pose.translation.vector;
-        Ok(Vector6::new(at.x, at.y, at.z, turn.x, turn.y, turn.z))
-    };
-    samples.displacements.iter().zip(&samples.lines).map(coordinates).collect()
+/// Translation (m) and rotation vector from the first orientation (rad).
+fn coordinates(sample: &Sample, first: &UnitQuaternion<f64>) -> Result<Vector6<f64>, Located> {
+    let turn = (first.inverse() * sample.displacement.rotation).scaled_axis();
+    let angle_deg = turn.norm().to_degrees();
+    if angle_deg > LARGEST_TURN_DEG {
+        let limit = format!("limit {LARGEST_TURN_DEG}°; is the orientation right?");
+        let problem = format!("turned by {angle_deg:.1}° from the first row, {limit}");
+        return Err(Located::at(sample.line, problem));
+    }
+    let at = sample.displacement.translation.vector;
+    Ok(Vector6::new(at.x, at.y, at.z, turn.x, turn.y, turn.z))
 }
 
 fn smoothed(raw: &Spline<6>, time_s: &[f64], lowpass_hz: f64) -> Spline<6> {
-    let length_s = length(time_s);
-    let steps = (length_s * LEAST_GRID_HZ).ceil().max((time_s.len() - 1) as f64) as u32;
+    let last = time_s.len() - 1;
+    let length_s = time_s[last];
+    let steps = (length_s * LEAST_GRID_HZ).ceil().max(last as f64) as u32;
     let grid_s: Vec<f64> = (0..=steps).map(|k| length_s * f64::from(k) / f64::from(steps)).collect();
     let even: Vec<_> = grid_s.iter().map(|&t_s| raw.at(t_s)).collect();
     let filtered = lowpass(&even, f64::from(steps) / length_s, lowpass_hz);
@@ -114,16 +116,18 @@ fn smoothed(raw: &Spline<6>, time_s: &[f64], lowpass_hz: f64) -> Spline<6> {
 mod tests {
     use super::*;
 
-    fn samples(poses: impl Fn(f64) -> Pose) -> Samples {
-        samples_at(50.0, poses)
+    fn recorded(poses: impl Fn(f64) -> Pose, lowpass_hz: f64) -> Result<Recording, Located> {
+        recorded_at(50.0, poses, lowpass_hz)
     }
 
     /// Two seconds.
-    fn samples_at(rate_hz: f64, poses: impl Fn(f64) -> Pose) -> Samples {
-        let time_s: Vec<f64> = (0..=(2.0 * rate_hz) as u32).map(|k| 5.0 + f64::from(k) / rate_hz).collect();
-        let displacements = time_s.iter().map(|t_s| poses(t_s - 5.0)).collect();
-        let lines = (3..).take(time_s.len()).collect();
-        Samples { lines, time_s, displacements, are_of_centroid: false }
+    fn recorded_at(rate_hz: f64, poses: impl Fn(f64) -> Pose, lowpass_hz: f64) -> Result<Recording, Located> {
+        let sample = |k: u32| {
+            let t_s = f64::from(k) / rate_hz;
+            Sample { line: u64::from(k) + 3, time_s: 5.0 + t_s, displacement: poses(t_s) }
+        };
+        let samples: Vec<Sample> = (0..=(2.0 * rate_hz) as u32).map(sample).collect();
+        Recording::new("a.csv".into(), &samples, false, lowpass_hz)
     }
 
     fn swaying(t_s: f64) -> Pose {
@@ -135,7 +139,7 @@ mod tests {
     #[test]
     fn a_smooth_motion_is_kept_with_and_without_the_filter() {
         for lowpass_hz in [0.0, 12.0] {
-            let recording = Recording::new("a.csv".into(), samples(swaying), lowpass_hz).ok().unwrap();
+            let recording = recorded(swaying, lowpass_hz).ok().unwrap();
             assert!((recording.length_s() - 2.0).abs() < 1e-12);
             for k in 0..=200 {
                 let t_s = f64::from(k) / 100.0;
@@ -151,7 +155,7 @@ mod tests {
     fn fast_noise_of_a_fast_recording_does_not_become_slow_motion() {
         let trembling =
             |t_s: f64| Pose::translation(0.0, 0.0, 0.001 * (std::f64::consts::TAU * 195.0 * t_s).sin());
-        let recording = Recording::new("a.csv".into(), samples_at(1000.0, trembling), 12.0).ok().unwrap();
+        let recording = recorded_at(1000.0, trembling, 12.0).ok().unwrap();
         for k in 20..=180 {
             let height_m = recording.displacement(f64::from(k) / 100.0).translation.z;
             assert!(height_m.abs() < 2e-5, "{height_m}");
@@ -160,16 +164,16 @@ mod tests {
 
     #[test]
     fn the_nearest_line_is_named() {
-        let recording = Recording::new("a.csv".into(), samples(swaying), 12.0).ok().unwrap();
+        let recording = recorded(swaying, 12.0).ok().unwrap();
         for (t_s, line) in [(0.0, 3), (0.009, 3), (0.011, 4), (2.0, 103), (9.0, 103)] {
-            assert_eq!(recording.source_line(t_s).line, line);
+            assert_eq!(recording.source_line(t_s), format!("a.csv:{line}"));
         }
     }
 
     #[test]
     fn a_turn_beyond_what_a_jaw_does_is_refused() {
         let spinning = |t_s: f64| Pose::rotation(Vec3::y() * t_s);
-        let error = Recording::new("a.csv".into(), samples(spinning), 12.0).err().unwrap();
+        let error = recorded(spinning, 12.0).err().unwrap();
         assert!(error.problem.starts_with("turned by") && error.line.is_some());
     }
 }

@@ -3,7 +3,7 @@
 //! Plain CSV: no quotes, comments from `#`, blank lines ignored. The module knows the columns'
 //! names, not their meaning.
 
-use super::import_error::Located;
+use super::error::Located;
 
 /// Fewer rows are no motion.
 const FEWEST_ROWS: usize = 4;
@@ -50,22 +50,17 @@ impl Format {
         }
     }
 
-    fn from_header(line: u64, header: &str) -> Result<Self, Located> {
+    fn of_header(header: &str) -> Result<Self, String> {
         let found: Vec<&str> = header.split(',').map(str::trim).collect();
-        let format =
-            if found.iter().any(|name| name.starts_with("m1")) { Self::Markers } else { Self::Poses };
+        let is_of_markers = found.iter().any(|name| name.starts_with("m1"));
+        let format = if is_of_markers { Self::Markers } else { Self::Poses };
         let columns = format.columns();
         let differs = |&position: &usize| found.get(position) != columns.get(position);
-        match (0..found.len().max(columns.len())).find(differs) {
-            None => Ok(format),
-            Some(position) => {
-                let [found, expected] =
-                    [&found, columns].map(|names| names.get(position).copied().unwrap_or_default());
-                let (position, header) = (position + 1, columns.join(","));
-                let problem = format!("column {position} is `{found}`, expected `{expected}`");
-                Err(Located::at(line, format!("{problem}; the header must be `{header}`")))
-            }
-        }
+        let Some(position) = (0..found.len().max(columns.len())).find(differs) else { return Ok(format) };
+        let [found, expected] =
+            [&found, columns].map(|names| names.get(position).copied().unwrap_or_default());
+        let (position, header) = (position + 1, columns.join(","));
+        Err(format!("column {position} is `{found}`, expected `{expected}`; the header must be `{header}`"))
     }
 }
 
@@ -77,14 +72,11 @@ impl Table {
         let too_few =
             |rows| Located::whole(format!("{rows} rows of data, at least {FEWEST_ROWS} are needed"));
         let (line, header) = content.next().ok_or_else(|| too_few(0))?;
-        let format = Format::from_header(line, header)?;
+        let format = Format::of_header(header).map_err(|problem| Located::at(line, problem))?;
         let mut rows: Vec<Row> = Vec::new();
         for (line, text) in content {
-            let row = parse_row(line, text, format.columns())?;
-            if let Some(previous) = rows.last() {
-                check_time(&row, previous.time_s)?;
-            }
-            rows.push(row);
+            let row = parse_row(line, text, format.columns(), rows.last());
+            rows.push(row.map_err(|problem| Located::at(line, problem))?);
         }
         if rows.len() < FEWEST_ROWS {
             return Err(too_few(rows.len()));
@@ -93,19 +85,17 @@ impl Table {
     }
 }
 
-fn parse_row(line: u64, text: &str, columns: &[&'static str]) -> Result<Row, Located> {
+fn parse_row(line: u64, text: &str, columns: &[&str], previous: Option<&Row>) -> Result<Row, String> {
     let fields: Vec<&str> = text.split(',').map(str::trim).collect();
-    if fields.len() != columns.len() {
-        let (found, expected) = (fields.len(), columns.len());
-        let problem =
-            format!("{found} fields, but the header names {expected}; complete the row or delete it");
-        return Err(Located::at(line, problem));
+    let (found, expected) = (fields.len(), columns.len());
+    if found != expected {
+        let remedy = "complete the row or delete it";
+        return Err(format!("{found} fields, but the header names {expected}; {remedy}"));
     }
-    let number = |(text, column): (&&str, &&'static str)| {
-        parse_number(text, column).map_err(|problem| Located::at(line, problem))
-    };
-    let mut values = fields.iter().zip(columns).map(number).collect::<Result<Vec<f64>, _>>()?;
+    let numbers = fields.iter().zip(columns).map(|(text, column)| parse_number(text, column));
+    let mut values = numbers.collect::<Result<Vec<f64>, _>>()?;
     let time_s = values.remove(0);
+    previous.map_or(Ok(()), |previous| check_time(time_s, previous.time_s))?;
     Ok(Row { line, time_s, values })
 }
 
@@ -121,19 +111,17 @@ fn parse_number(text: &str, column: &str) -> Result<f64, String> {
     Ok(value)
 }
 
-fn check_time(row: &Row, previous_s: f64) -> Result<(), Located> {
-    let gap_s = row.time_s - previous_s;
+fn check_time(time_s: f64, previous_s: f64) -> Result<(), String> {
+    let gap_s = time_s - previous_s;
     if gap_s < SHORTEST_STEP_S {
-        let problem = format!(
-            "time {} s does not come after {previous_s} s of the row before by 1 µs or more; sort the rows, \
-             drop repeats",
-            row.time_s
-        );
-        return Err(Located::at(row.line, problem));
+        return Err(format!(
+            "time {time_s} s does not come after {previous_s} s of the row before by 1 µs or more; sort the rows, \
+             drop repeats"
+        ));
     }
     if gap_s > LARGEST_GAP_S {
-        let problem = format!("{gap_s:.3} s without a sample, at most {LARGEST_GAP_S} s can be bridged");
-        return Err(Located::at(row.line, problem + "; cut the recording here"));
+        let limit = format!("at most {LARGEST_GAP_S} s can be bridged; cut the recording here");
+        return Err(format!("{gap_s:.3} s without a sample, {limit}"));
     }
     Ok(())
 }

@@ -3,7 +3,7 @@
 //! Inverse kinematics alone finds these poses, by bisection.
 
 use masseter_shared::config::JawConfig;
-use masseter_shared::geometry::{LEGS, Mechanism, Pose};
+use masseter_shared::geometry::{LEGS, Mechanism, Pose, frame_of_corners};
 use nalgebra::Translation3;
 
 /// The platform with the mouth closed. The pose is taken as level, which is an approximation for a mechanism of unequal
@@ -14,7 +14,7 @@ pub(crate) fn closed_mouth(mechanism: &Mechanism, jaw: &JawConfig) -> Pose {
 
 /// The platform level on three legs of that mean length, turned as the hinges are and above their middle.
 pub(crate) fn level(mechanism: &Mechanism, leg_m: f64) -> Pose {
-    let hinges = mechanism.pose_from_corners(&std::array::from_fn(|leg| mechanism.hinge(leg, 0.0)));
+    let hinges = frame_of_corners(&std::array::from_fn(|leg| mechanism.hinge(leg, 0.0)));
     let at_height = |height_m: f64| Pose::translation(0.0, 0.0, height_m) * hinges;
     let mean_leg_m = |height_m: f64| {
         let joints = mechanism.inverse(&at_height(height_m));

@@ -18,7 +18,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use anyhow::Context;
-use masseter_controller::trajectory::{self, CheckError, Trajectory, TrajectoryReport};
+use masseter_controller::trajectory::{self, Trajectory, TrajectoryError, TrajectoryReport};
 use masseter_plant::core as plant;
 use masseter_shared::config::{FileConfig, MotionConfig, Scenario};
 use masseter_shared::geometry::Mechanism;
@@ -117,7 +117,7 @@ pub fn demands(
     scenario: &Scenario,
     trajectory: &Trajectory,
     mechanism: &Mechanism,
-) -> Result<TrajectoryReport, CheckError> {
+) -> Result<TrajectoryReport, TrajectoryError> {
     let limits = scenario.limits.within(&scenario.drives);
     trajectory::check(trajectory, mechanism, &limits, scenario.period_s())
 }

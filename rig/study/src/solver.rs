@@ -110,7 +110,7 @@ impl Solver {
     ) -> Vec<f64> {
         let mut errors_cm2 = Vec::new();
         if let Some((method, options)) = self.iteration() {
-            let observe = |step: &Iteration| errors_cm2.push(step.error_cm2);
+            let observe = |step: &Iteration| errors_cm2.push(step.evaluation.error_cm2());
             // The last error shows how it ended.
             let _ = solve_traced(method, mechanism, actuators, guess_rad, &options, observe);
         }

@@ -45,8 +45,8 @@ pub trait ControllerPorts {
 ///
 /// # Errors
 /// Those of the ports.
-pub fn run_cycle<C: Controller, P: ControllerPorts>(
-    controller: &mut C,
+pub fn run_cycle<P: ControllerPorts>(
+    controller: &mut dyn Controller,
     ports: &mut P,
     wake: &Wake,
 ) -> Result<(), P::Error> {

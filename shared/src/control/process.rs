@@ -3,31 +3,26 @@
 use super::{Controller, ControllerPorts, Outcome, run_cycle};
 use crate::clock;
 use crate::config::Scenario;
-use crate::lifecycle::{ProcessArguments, ProcessError};
+use crate::lifecycle::{ProcessArguments, ProcessContext, ProcessError};
 use crate::messages::{Command, Event, Reading, State};
 use crate::realtime::{Cycle, Wake};
-use crate::transport::{Node, Publisher, Received, Subscriber, TransportError};
+use crate::transport::{Publisher, Received, Subscriber, TransportError};
 
 /// Runs the controller that `build` makes, until it is done.
 ///
 /// # Errors
 /// Those of `build`, and [`ProcessError`] when the process cannot start or loses its messages.
-pub fn run<C: Controller, E: From<ProcessError>>(
+pub fn run<E: From<ProcessError>>(
     arguments: &ProcessArguments,
-    build: impl FnOnce(&Scenario) -> Result<C, E>,
+    build: impl FnOnce(&Scenario) -> Result<Box<dyn Controller>, E>,
 ) -> Result<Outcome, E> {
     let context = arguments.init()?;
-    let (scenario, schedule) = (&context.scenario, &context.schedule);
-    let mut controller = build(scenario)?;
-    let ports = Ports::open(&context.node)?;
-    let start = context.ready_on(scenario.realtime.cores[0])?;
-    ports.connect().map_err(ProcessError::from)?;
+    let mut controller = build(&context.scenario)?;
+    Ok(run_to_end(&context, &mut *controller)?)
+}
 
-    let mut real_time = RealTime {
-        ports,
-        cycle: Cycle::new(start.epoch_ns + schedule.controller_at_ns, scenario.period_ns()),
-        reading_timeout_ns: (schedule.command_by_ns - schedule.controller_at_ns) / 2,
-    };
+fn run_to_end(context: &ProcessContext, controller: &mut dyn Controller) -> Result<Outcome, ProcessError> {
+    let mut ports = Ports::open(context)?;
     loop {
         if let Some(outcome) = controller.outcome() {
             return Ok(outcome);
@@ -35,65 +30,58 @@ pub fn run<C: Controller, E: From<ProcessError>>(
         if context.stop.is_made() {
             controller.request_stop();
         }
-        let wake = real_time.wait(&controller).map_err(ProcessError::from)?;
-        run_cycle(&mut controller, &mut real_time, &wake).map_err(ProcessError::from)?;
+        let wake = ports.wait(controller)?;
+        run_cycle(controller, &mut ports, &wake)?;
     }
 }
 
-/// The ports and the deadlines of the controller's cycles.
-struct RealTime {
-    ports: Ports,
-    cycle: Cycle,
-    /// From the deadline until the newest reading is used, whichever that is, ns.
-    reading_timeout_ns: u64,
-}
-
-impl RealTime {
-    /// Waits for the next deadline, and warms up before it.
-    fn wait(&mut self, controller: &impl Controller) -> Result<Wake, TransportError> {
-        self.cycle.wait_warm(|| self.ports.warm_up(controller))
-    }
-}
-
-/// The controller's ports on iceoryx2.
+/// The controller's ports on iceoryx2, and the deadlines of its cycles.
 struct Ports {
     readings: Subscriber<Reading>,
     commands: Publisher<Command>,
     states: Publisher<State>,
     events: Publisher<Event>,
+    cycle: Cycle,
+    /// From the deadline until the newest reading is used, whichever that is, ns.
+    reading_timeout_ns: u64,
 }
 
 impl Ports {
-    fn open(node: &Node) -> Result<Self, ProcessError> {
-        let ports = Self {
-            readings: node.newest_subscriber()?,
-            commands: node.publisher()?,
-            states: node.publisher()?,
-            events: node.publisher()?,
-        };
-        ports.commands.warm_up()?;
-        ports.states.warm_up()?;
-        ports.events.warm_up()?;
-        Ok(ports)
+    /// Opens the ports, reports ready, and connects to the ports of the other processes before the first cycle, since a
+    /// connection makes and maps files.
+    fn open(context: &ProcessContext) -> Result<Self, ProcessError> {
+        let (node, scenario, schedule) = (&context.node, &context.scenario, &context.schedule);
+        let readings = node.newest_subscriber()?;
+        let (commands, states, events) = (node.publisher()?, node.publisher()?, node.publisher()?);
+        commands.warm_up()?;
+        states.warm_up()?;
+        events.warm_up()?;
+        let start = context.ready_on(scenario.realtime.cores[0])?;
+        readings.connect()?;
+        commands.connect()?;
+        states.connect()?;
+        events.connect()?;
+        Ok(Self {
+            readings,
+            commands,
+            states,
+            events,
+            cycle: Cycle::new(start.epoch_ns + schedule.controller_at_ns, scenario.period_ns()),
+            reading_timeout_ns: (schedule.command_by_ns - schedule.controller_at_ns) / 2,
+        })
     }
 
-    /// Connects to the ports of the other processes before the first cycle, since a connection makes and maps files.
-    fn connect(&self) -> Result<(), TransportError> {
-        self.readings.connect()?;
-        self.commands.connect()?;
-        self.states.connect()?;
-        self.events.connect()
-    }
-
-    /// Warms the controller up, and touches the memory of the next messages.
-    fn warm_up(&self, controller: &impl Controller) -> Result<(), TransportError> {
-        controller.warm_up();
-        self.commands.warm_up()?;
-        self.states.warm_up()
+    /// Waits for the next deadline. Before it, warms the controller up and touches the memory of the next messages.
+    fn wait(&mut self, controller: &dyn Controller) -> Result<Wake, TransportError> {
+        self.cycle.wait_warm(|| {
+            controller.warm_up();
+            self.commands.warm_up()?;
+            self.states.warm_up()
+        })
     }
 }
 
-impl ControllerPorts for RealTime {
+impl ControllerPorts for Ports {
     type Reading = Received<Reading>;
     type Error = TransportError;
 
@@ -104,18 +92,18 @@ impl ControllerPorts for RealTime {
     fn reading(&mut self, wake: &Wake) -> Result<Option<Received<Reading>>, TransportError> {
         let deadline_ns = wake.due_ns + self.reading_timeout_ns;
         let is_awaited = |reading: &Reading| reading.cycle >= wake.cycle;
-        self.ports.readings.latest_by(deadline_ns, self.cycle.waiter(), is_awaited)
+        self.readings.latest_by(deadline_ns, self.cycle.waiter(), is_awaited)
     }
 
     fn publish_command(&mut self, fill: impl FnOnce(&mut Command)) -> Result<(), TransportError> {
-        self.ports.commands.publish(fill)
+        self.commands.publish(fill)
     }
 
     fn publish_state(&mut self, fill: impl FnOnce(&mut State)) -> Result<(), TransportError> {
-        self.ports.states.publish(fill)
+        self.states.publish(fill)
     }
 
     fn publish_event(&mut self, event: &Event) -> Result<(), TransportError> {
-        self.ports.events.publish(|message| *message = *event)
+        self.events.publish(|message| *message = *event)
     }
 }

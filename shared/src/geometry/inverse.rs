@@ -69,7 +69,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::geometry::{MechanismConfig, SlideConfig, Vec3};
+    use crate::geometry::{MechanismConfig, SlideConfig, Vec3, frame_of_corners};
 
     /// Any mechanism a builder could declare, not only the paper's.
     fn mechanisms() -> impl Strategy<Value = Mechanism> {
@@ -112,7 +112,7 @@ mod tests {
         /// The corners that the joint coordinates place give back the pose they came from.
         #[test]
         fn pose_survives_the_way_through_the_corners(mechanism in mechanisms(), pose in poses()) {
-            let again = mechanism.pose_from_corners(&mechanism.corners_at(&pose));
+            let again = frame_of_corners(&mechanism.corners_at(&pose));
             prop_assert!((again.translation.vector - pose.translation.vector).norm() < 1e-12);
             prop_assert!(again.rotation.angle_to(&pose.rotation) < 1e-7);
         }

@@ -50,71 +50,10 @@ const SHORTEST_SIDE_M: f64 = 1e-3;
 /// Least area of the triangle of the slides' centres, m².
 const LEAST_BASE_M2: f64 = 1e-6;
 
-/// Dimensions that describe no mechanism.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum GeometryError {
-    /// A direction that is not a finite number.
-    #[error("mechanism.slides[{leg}]: the azimuth is {azimuth_deg}; give a finite number")]
-    NoDirection {
-        /// Index of the slide, from 0.
-        leg: usize,
-        /// Azimuth as given.
-        azimuth_deg: f64,
-    },
-    /// A length that is not a number, or far outside the dimensions of a machine.
-    #[error("mechanism.{name}: {value_m:e} m; use {least_m} to {most_m} m")]
-    OutOfRange {
-        /// Configuration key.
-        name: &'static str,
-        /// The given value.
-        value_m: f64,
-        /// The least valid value.
-        least_m: f64,
-        /// The greatest valid value.
-        most_m: f64,
-    },
-    /// The sides do not close to a triangle with an area.
-    #[error(
-        "mechanism.platform_sides_m: {sides_m:?} close to no triangle; each side must be shorter than the other two together"
-    )]
-    NoPlatform {
-        /// The sides as given.
-        sides_m: [f64; LEGS],
-    },
-    /// The three slides' centres lie on one line.
-    #[error(
-        "mechanism.slides: the three centres lie on one line (area {area_m2:e} m²); spread them around the base"
-    )]
-    NoBase {
-        /// Area of the triangle of the centres.
-        area_m2: f64,
-    },
-    /// Slides in clockwise order, in which the legs would cross.
-    #[error(
-        "mechanism.slides: the three centres go round clockwise; number the slides counter-clockwise seen from above"
-    )]
-    Clockwise,
-    /// A slide's inward direction points away from the middle of the base.
-    #[error("mechanism.slides[{leg}]: with azimuth {azimuth_deg}° the leg leans outward; add 180°")]
-    LeansOutward {
-        /// Index of the slide, from 0.
-        leg: usize,
-        /// Azimuth as given.
-        azimuth_deg: f64,
-    },
-    /// A stroke without length, or a leg that may vanish.
-    #[error("mechanism.strokes.{name}: {lowest_m} to {highest_m} m is no stroke; {need}")]
-    NoStroke {
-        /// `slide_m` or `leg_m`.
-        name: &'static str,
-        /// Lower end as given.
-        lowest_m: f64,
-        /// Upper end as given.
-        highest_m: f64,
-        /// The condition on a stroke.
-        need: &'static str,
-    },
-}
+/// Dimensions that describe no mechanism: the key, the value and the remedy.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("mechanism.{0}")]
+pub struct GeometryError(String);
 
 /// A slide with its directions resolved; base frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -201,20 +140,14 @@ impl Mechanism {
         self.slides[leg].inward
     }
 
-    /// The direction of leg i from Bᵢ to Aᵢ at angle θᵢ, base frame.
-    #[inline]
-    fn leg_direction(&self, leg: usize, theta_rad: f64) -> Vec3 {
-        let (sin, cos) = theta_rad.sin_cos();
-        self.slides[leg].inward * cos + Vec3::z() * sin
-    }
-
     /// Corners A₁, A₂, A₃ in the base frame from actuators and leg angles:
     /// Aᵢ = Bᵢ + lᵢ (−cos θᵢ r̂ᵢ + sin θᵢ ẑ).
     #[inline]
     pub fn corners_from_angles(&self, actuators: &Actuators, theta_rad: &[f64; LEGS]) -> [Vec3; LEGS] {
         std::array::from_fn(|leg| {
-            self.hinge(leg, actuators.slide_m[leg])
-                + self.leg_direction(leg, theta_rad[leg]) * actuators.leg_m[leg]
+            let (sin, cos) = theta_rad[leg].sin_cos();
+            let direction = self.slides[leg].inward * cos + Vec3::z() * sin;
+            self.hinge(leg, actuators.slide_m[leg]) + direction * actuators.leg_m[leg]
         })
     }
 
@@ -227,8 +160,7 @@ impl Mechanism {
 /// The pose of the frame fixed by three corners: origin at their centroid, x towards A₁, z along
 /// the normal (A₂−A₁)×(A₃−A₁). The corners must span an area.
 #[inline]
-pub(super) fn frame_of_corners(corners: &[Vec3; LEGS]) -> Pose {
-    let [a1, a2, a3] = corners;
+pub fn frame_of_corners([a1, a2, a3]: &[Vec3; LEGS]) -> Pose {
     let centroid = (a1 + a2 + a3) / 3.0;
     let z = (a2 - a1).cross(&(a3 - a1)).normalize();
     let x = (a1 - centroid).normalize();
@@ -236,45 +168,38 @@ pub(super) fn frame_of_corners(corners: &[Vec3; LEGS]) -> Pose {
     Isometry3::from_parts(Translation3::from(centroid), UnitQuaternion::from_rotation_matrix(&rotation))
 }
 
-impl Mechanism {
-    /// The pose that carries the platform's corners to these points of the base frame.
-    #[inline]
-    pub fn pose_from_corners(&self, corners: &[Vec3; LEGS]) -> Pose {
-        frame_of_corners(corners)
-    }
-}
-
 fn check_sizes(config: &MechanismConfig) -> Result<(), GeometryError> {
     let MechanismConfig { slides, platform_sides_m, strokes } = config;
     let centres = slides.iter().flat_map(|slide| slide.centre_m.map(|m| ("slides.centre_m", m, -LONGEST_M)));
     let ends = strokes.slide_m.into_iter().chain(strokes.leg_m).map(|end_m| ("strokes", end_m, -LONGEST_M));
     let sides = platform_sides_m.map(|side_m| ("platform_sides_m", side_m, SHORTEST_SIDE_M));
-    let mut lengths = centres.chain(ends).chain(sides);
-    match lengths.find(|(_, value_m, least_m)| !(*least_m..=LONGEST_M).contains(value_m)) {
-        Some((name, value_m, least_m)) => {
-            Err(GeometryError::OutOfRange { name, value_m, least_m, most_m: LONGEST_M })
+    for (name, value_m, least_m) in centres.chain(ends).chain(sides) {
+        if !(least_m..=LONGEST_M).contains(&value_m) {
+            let range = format!("use {least_m} to {LONGEST_M} m");
+            return Err(GeometryError(format!("{name}: {value_m:e} m; {range}")));
         }
-        None => Ok(()),
     }
+    Ok(())
 }
 
 fn check_strokes(strokes: &StrokeLimits) -> Result<(), GeometryError> {
-    let fault = |name, [lowest_m, highest_m]: [f64; 2], need| {
-        Err(GeometryError::NoStroke { name, lowest_m, highest_m, need })
+    let refuse = |name, [lowest_m, highest_m]: [f64; 2], need| {
+        Err(GeometryError(format!("strokes.{name}: {lowest_m} to {highest_m} m is no stroke; {need}")))
     };
     if strokes.slide_m[0] >= strokes.slide_m[1] {
-        return fault("slide_m", strokes.slide_m, "the first must be below the second");
+        return refuse("slide_m", strokes.slide_m, "the first must be below the second");
     }
     if strokes.leg_m[0] >= strokes.leg_m[1] || strokes.leg_m[0] <= 0.0 {
-        return fault("leg_m", strokes.leg_m, "the first must be above 0 and below the second");
+        return refuse("leg_m", strokes.leg_m, "the first must be above 0 and below the second");
     }
     Ok(())
 }
 
 fn resolve_slides(configs: &[SlideConfig; LEGS]) -> Result<[Slide; LEGS], GeometryError> {
-    for (leg, &SlideConfig { azimuth_deg, .. }) in configs.iter().enumerate() {
+    let refuse = |problem: String| Err(GeometryError(format!("slides{problem}")));
+    for (leg, SlideConfig { azimuth_deg, .. }) in configs.iter().enumerate() {
         if !azimuth_deg.is_finite() {
-            return Err(GeometryError::NoDirection { leg, azimuth_deg });
+            return refuse(format!("[{leg}]: the azimuth is {azimuth_deg}; give a finite number"));
         }
     }
     let slides = configs.map(|config| {
@@ -288,16 +213,19 @@ fn resolve_slides(configs: &[SlideConfig; LEGS]) -> Result<[Slide; LEGS], Geomet
     let [b1, b2, b3] = slides.map(|slide| slide.centre);
     let area_m2 = (b2 - b1).cross(&(b3 - b1)).z / 2.0;
     if area_m2.abs() <= LEAST_BASE_M2 {
-        return Err(GeometryError::NoBase { area_m2: area_m2.abs() });
+        let area = format!("(area {:e} m²)", area_m2.abs());
+        return refuse(format!(": the three centres lie on one line {area}; spread them around the base"));
     }
     // The platform's corners are numbered counter-clockwise; with clockwise slides the platform would be upside down.
     if area_m2 < 0.0 {
-        return Err(GeometryError::Clockwise);
+        let remedy = "number the slides counter-clockwise seen from above";
+        return refuse(format!(": the three centres go round clockwise; {remedy}"));
     }
     let middle = (b1 + b2 + b3) / 3.0;
     for (leg, slide) in slides.iter().enumerate() {
         if slide.inward.dot(&(middle - slide.centre)) <= 0.0 {
-            return Err(GeometryError::LeansOutward { leg, azimuth_deg: configs[leg].azimuth_deg });
+            let azimuth_deg = configs[leg].azimuth_deg;
+            return refuse(format!("[{leg}]: with azimuth {azimuth_deg}° the leg leans outward; add 180°"));
         }
     }
     Ok(slides)
@@ -309,7 +237,8 @@ fn platform_corners(sides_m: [f64; LEGS]) -> Result<[Vec3; LEGS], GeometryError>
     let x3 = (a12 * a12 + a31 * a31 - a23 * a23) / (2.0 * a12);
     let height_squared = a31 * a31 - x3 * x3;
     if height_squared <= 1e-6 * a31 * a31 {
-        return Err(GeometryError::NoPlatform { sides_m });
+        let need = "each side must be shorter than the other two together";
+        return Err(GeometryError(format!("platform_sides_m: {sides_m:?} close to no triangle; {need}")));
     }
     let flat = [Vec3::zeros(), Vec3::new(a12, 0.0, 0.0), Vec3::new(x3, height_squared.sqrt(), 0.0)];
     let to_platform = frame_of_corners(&flat).inverse();

@@ -16,7 +16,7 @@ mod mechanism;
 pub use inverse::InverseError;
 pub use jacobian::{Jacobian, Twist};
 pub use joints::{AXES, AXIS_NAMES, Actuators, Joints, LEGS, LimitViolation, StrokeLimits};
-pub use mechanism::{GeometryError, Mechanism, MechanismConfig, SlideConfig};
+pub use mechanism::{GeometryError, Mechanism, MechanismConfig, SlideConfig, frame_of_corners};
 
 /// Platform frame in the base frame; metres.
 #[doc(alias("transform", "rigid transformation"))]

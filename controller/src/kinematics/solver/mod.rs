@@ -15,8 +15,9 @@ mod options;
 mod search;
 
 use masseter_shared::geometry::{Actuators, LEGS, Mechanism};
-pub use options::{Iteration, MAX_HALVINGS, MAX_ITERATIONS, Method, Options, Residual, StepRule};
-use search::{Search, Step};
+pub use options::{MAX_HALVINGS, MAX_ITERATIONS, Method, Options, Residual, StepRule};
+pub use search::Iteration;
+use search::Search;
 
 use super::leg_angle::LegAngle;
 use super::loop_equations::{LoopEquations, LoopSolution};
@@ -52,22 +53,21 @@ pub fn solve_traced(
         return Err(ForwardError::NotFinite);
     }
     let search = Search { equations: Equations::new(mechanism, actuators), method, options };
-    let mut at = Step::guess(&search.equations, guess_rad);
-    let mut iterations = 0;
-    observe(&at.iteration(iterations));
+    let mut at = Iteration::guess(&search.equations, guess_rad);
+    observe(&at);
     while at.is_above(options.epsilon_cm2) {
-        let residual_m = at.evaluation.residual_norm_m();
+        let (iterations, residual_m) = (at.number, at.evaluation.residual_norm_m());
         if iterations == options.max_iterations.min(MAX_ITERATIONS) {
             return Err(ForwardError::NoConvergence { residual_m, iterations });
         }
         let increment = search.newton_increment(&at.evaluation)?;
-        iterations += 1;
-        at = search.advanced(&at, increment).ok_or(ForwardError::Stalled { residual_m, iterations })?;
-        observe(&at.iteration(iterations));
+        let stalled = ForwardError::Stalled { residual_m, iterations: iterations + 1 };
+        at = search.advanced(&at, increment).ok_or(stalled)?;
+        observe(&at);
     }
     let loops = LoopEquations::new(mechanism, actuators);
     let leg_angles = std::array::from_fn(|leg| LegAngle::from_rad(at.evaluation.theta_rad[leg]));
-    let closed = LoopSolution { leg_angles, residuals: loops.evaluate(&leg_angles), iterations };
+    let closed = LoopSolution { leg_angles, residuals: loops.evaluate(&leg_angles), iterations: at.number };
     Ok(Solution { residual_m: at.evaluation.residual_norm_m(), ..Solution::new(&loops, &closed) })
 }
 
@@ -174,8 +174,9 @@ mod tests {
             let actuators = Actuators::from_axes(actuators);
             let _ = solve_traced(Method::Published, &published_mechanism(), &actuators, &guess, &options, |iteration| {
                 // Conversion to cm² may round two neighbouring errors to one.
-                increased |= iteration.error_cm2 > last_cm2;
-                last_cm2 = iteration.error_cm2;
+                let error_cm2 = iteration.evaluation.error_cm2();
+                increased |= error_cm2 > last_cm2;
+                last_cm2 = error_cm2;
             });
             prop_assert!(!increased);
         }
@@ -211,17 +212,17 @@ mod tests {
                 solve_traced(Method::Published, &mechanism, &joints.actuators, &guess, &default(), |iteration| {
                     trace.push(*iteration);
                 });
-            prop_assert!(trace[0].theta_rad.iter().zip(&guess).all(|(told, given)| (told - given).abs() < f64::EPSILON));
+            prop_assert!(trace[0].evaluation.theta_rad.iter().zip(&guess).all(|(told, given)| (told - given).abs() < f64::EPSILON));
             for (number, pair) in trace.windows(2).enumerate() {
                 prop_assert_eq!(pair[1].number as usize, number + 1);
                 for leg in 0..LEGS {
-                    let arrived = pair[0].theta_rad[leg] + pair[1].increment_rad[leg];
-                    prop_assert!((arrived - pair[1].theta_rad[leg]).abs() < f64::EPSILON);
+                    let arrived = pair[0].evaluation.theta_rad[leg] + pair[1].increment_rad[leg];
+                    prop_assert!((arrived - pair[1].evaluation.theta_rad[leg]).abs() < f64::EPSILON);
                 }
             }
             if let Ok(solution) = solved {
                 prop_assert_eq!(solution.iterations as usize, trace.len() - 1);
-                prop_assert!(trace[trace.len() - 1].error_cm2 <= default().epsilon_cm2);
+                prop_assert!(trace[trace.len() - 1].evaluation.error_cm2() <= default().epsilon_cm2);
             }
         }
 

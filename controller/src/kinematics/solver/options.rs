@@ -1,6 +1,4 @@
-//! What the paper's text leaves open, as options, and the record of an iteration.
-
-use masseter_shared::geometry::LEGS;
+//! What the paper's text leaves open, as options.
 
 /// No options allow more iterations than this.
 pub const MAX_ITERATIONS: u32 = 100;
@@ -68,19 +66,4 @@ pub enum StepRule {
     /// The line search of Numerical Recipes: a sufficient decrease, found through the parabola of
     /// value, slope and last attempt, cut to between a tenth and a half.
     QuadraticBacktracking,
-}
-
-/// One iteration as it went: the guess is number 0.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Iteration {
-    /// From 0.
-    pub number: u32,
-    /// θ₁ θ₂ θ₃ it arrived at, not wrapped, radians.
-    pub theta_rad: [f64; LEGS],
-    /// The increment that was made, radians.
-    pub increment_rad: [f64; LEGS],
-    /// How often the increment was reduced before.
-    pub halvings: u32,
-    /// The error there (eq. 2), cm².
-    pub error_cm2: f64,
 }

@@ -3,7 +3,7 @@
 use masseter_shared::geometry::LEGS;
 use nalgebra::{Matrix3, Vector3};
 
-use super::{Iteration, MAX_HALVINGS, Method, Options, Residual, StepRule};
+use super::{MAX_HALVINGS, Method, Options, Residual, StepRule};
 use crate::kinematics::{Equations, Evaluation, ForwardError};
 
 /// Below this the Newton direction is noise; unitless, see [`Equations::determinant`].
@@ -18,57 +18,44 @@ pub(super) struct Search<'a> {
     pub options: &'a Options,
 }
 
-/// Where an iteration arrived, and how.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Step {
+/// One iteration as it went: the guess is number 0.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Iteration {
+    /// From 0.
+    pub number: u32,
+    /// The leg angles it arrived at, not wrapped, and the equations there.
     pub evaluation: Evaluation,
-    increment: Vector3<f64>,
-    halvings: u32,
+    /// The increment that was made, radians.
+    pub increment_rad: Vector3<f64>,
+    /// How often the increment was reduced before.
+    pub halvings: u32,
     /// The share of the Newton increment that was made.
     share: f64,
 }
 
-impl Step {
+impl Iteration {
     pub(super) fn guess(equations: &Equations<'_>, guess_rad: &[f64; LEGS]) -> Self {
         let evaluation = equations.evaluate(Vector3::from(*guess_rad));
-        Self { evaluation, increment: Vector3::zeros(), halvings: 0, share: 1.0 }
+        Self { number: 0, evaluation, increment_rad: Vector3::zeros(), halvings: 0, share: 1.0 }
     }
 
     /// Also where the error is no number.
     pub(super) fn is_above(&self, epsilon_cm2: f64) -> bool {
         self.evaluation.error_cm2().partial_cmp(&epsilon_cm2).is_none_or(std::cmp::Ordering::is_gt)
     }
-
-    pub(super) fn iteration(&self, number: u32) -> Iteration {
-        Iteration {
-            number,
-            theta_rad: self.evaluation.theta_rad.into(),
-            increment_rad: self.increment.into(),
-            halvings: self.halvings,
-            error_cm2: self.evaluation.error_cm2(),
-        }
-    }
 }
 
 impl Search<'_> {
-    /// Residual and Jacobian of the form asked for.
-    fn linearised(&self, at: &Evaluation) -> (Vector3<f64>, Matrix3<f64>) {
-        let jacobian = self.equations.jacobian(at);
+    /// What must vanish, in the form asked for; the sum of its squares must decrease.
+    fn residual(&self, at: &Evaluation) -> Vector3<f64> {
         match self.options.residual {
-            Residual::Distance => (at.residual_m, jacobian),
-            Residual::SquaredDistance => {
-                let by_side = Matrix3::from_diagonal(&(self.equations.distances_m(at) * 2.0));
-                (self.equations.squared_residual_m2(at), by_side * jacobian)
-            }
+            Residual::Distance => at.residual_m,
+            Residual::SquaredDistance => self.equations.squared_residual_m2(at),
         }
     }
 
-    /// What must decrease: the sum of squares of the residual asked for.
     fn error(&self, at: &Evaluation) -> f64 {
-        match self.options.residual {
-            Residual::Distance => at.error_m2(),
-            Residual::SquaredDistance => self.equations.squared_residual_m2(at).norm_squared(),
-        }
+        self.residual(at).norm_squared()
     }
 
     /// −J⁻¹ f, radians.
@@ -78,17 +65,23 @@ impl Search<'_> {
         if determinant.is_nan() || determinant.abs() < SMALLEST_DETERMINANT {
             return Err(singular);
         }
-        let (residual, jacobian) = self.linearised(at);
+        let of_distances = self.equations.jacobian(at);
+        let jacobian = match self.options.residual {
+            Residual::Distance => of_distances,
+            Residual::SquaredDistance => {
+                Matrix3::from_diagonal(&(self.equations.distances_m(at) * 2.0)) * of_distances
+            }
+        };
         let inverse = jacobian.try_inverse().ok_or(singular)?;
-        Ok(-(inverse * residual))
+        Ok(-(inverse * self.residual(at)))
     }
 
     /// The inner loop of Fig. 2; none when no allowed reduction decreases the error.
-    pub(super) fn advanced(&self, from: &Step, newton: Vector3<f64>) -> Option<Step> {
+    pub(super) fn advanced(&self, from: &Iteration, newton: Vector3<f64>) -> Option<Iteration> {
         let evaluate = |share: f64, halvings| {
-            let increment = newton * share;
-            let evaluation = self.equations.evaluate(from.evaluation.theta_rad + increment);
-            Step { evaluation, increment, halvings, share }
+            let increment_rad = newton * share;
+            let evaluation = self.equations.evaluate(from.evaluation.theta_rad + increment_rad);
+            Iteration { number: from.number + 1, evaluation, increment_rad, halvings, share }
         };
         if self.method == Method::Newton {
             return Some(evaluate(1.0, 0));
@@ -99,10 +92,10 @@ impl Search<'_> {
             StepRule::Halving | StepRule::QuadraticBacktracking => 1.0,
         };
         for halvings in 0..=self.options.max_halvings.min(MAX_HALVINGS) {
-            let step = evaluate(share, halvings);
-            let after = self.error(&step.evaluation);
+            let iteration = evaluate(share, halvings);
+            let after = self.error(&iteration.evaluation);
             if after < self.enough(before, share) {
-                return Some(step);
+                return Some(iteration);
             }
             share = self.reduced(share, before, after);
         }

@@ -7,7 +7,7 @@
 use masseter_shared::geometry::{LEGS, Mechanism};
 use nalgebra::Matrix3;
 
-use super::platforms::{Dimensions, Platforms, Slopes};
+use super::platforms::{Platforms, Slopes};
 use super::{Enclosure, InputBox};
 use crate::kinematics::legs::next;
 
@@ -46,14 +46,14 @@ pub enum Finding {
 /// A mechanism and the claim about it.
 #[derive(Debug, Clone)]
 pub struct Proof {
-    dimensions: Dimensions,
+    mechanism: Mechanism,
     claim: Claim,
 }
 
 impl Proof {
     /// The proof of a claim about a mechanism.
     pub fn new(mechanism: &Mechanism, claim: Claim) -> Self {
-        Self { dimensions: Dimensions::new(mechanism), claim }
+        Self { mechanism: mechanism.clone(), claim }
     }
 
     /// All reaches of legs of these lengths: the start of the search.
@@ -104,7 +104,7 @@ impl Proof {
     fn shrunk(&self, inputs: &InputBox, part: Reaches) -> Option<Reaches> {
         let mut part = part;
         loop {
-            let platforms = Platforms::new(&self.dimensions, inputs, &part)?;
+            let platforms = Platforms::new(&self.mechanism, inputs, &part)?;
             if !self.may_count(&platforms) {
                 return None;
             }
@@ -121,25 +121,25 @@ impl Proof {
 
     /// Whether a platform in this enclosure may be a solution of this kind.
     fn may_count(&self, platforms: &Platforms) -> bool {
-        let closes = platforms.excess_m2(&self.dimensions).iter().all(|excess| excess.contains(0.0));
-        closes && platforms.may_stand_as_assembled(&self.dimensions) && self.may_be_conditioned(platforms)
+        let closes = platforms.excess_m2(&self.mechanism).iter().all(|excess| excess.contains(0.0));
+        closes && platforms.may_stand_as_assembled(&self.mechanism) && self.may_be_conditioned(platforms)
     }
 
     fn may_be_conditioned(&self, platforms: &Platforms) -> bool {
         let Claim::DeterminantAtLeast(margin) = self.claim else { return true };
-        let slopes = platforms.slopes(&self.dimensions);
-        let determinant = slopes.and_then(|slopes| platforms.determinant(&self.dimensions, &slopes));
+        let slopes = platforms.slopes(&self.mechanism);
+        let determinant = slopes.and_then(|slopes| platforms.determinant(&self.mechanism, &slopes));
         determinant.is_none_or(|determinant| determinant.high() >= margin)
     }
 
     /// Krawczyk's operator: the unchanged part when the operator does not apply, none when no solution is left.
     fn contracted(&self, inputs: &InputBox, platforms: &Platforms, part: &Reaches) -> Option<Reaches> {
         let middle = part.map(|reach_m| Enclosure::point(reach_m.middle()));
-        let at_middle = Platforms::new(&self.dimensions, inputs, &middle);
+        let at_middle = Platforms::new(&self.mechanism, inputs, &middle);
         let preconditioned =
-            platforms.slopes(&self.dimensions).and_then(|slopes| Preconditioned::new(&slopes));
+            platforms.slopes(&self.mechanism).and_then(|slopes| Preconditioned::new(&slopes));
         let (Some(at_middle), Some(preconditioned)) = (at_middle, preconditioned) else { return Some(*part) };
-        let excess_m2 = at_middle.excess_m2(&self.dimensions);
+        let excess_m2 = at_middle.excess_m2(&self.mechanism);
         let mut smaller = *part;
         for leg in 0..LEGS {
             let mut reach_m = middle[leg];
@@ -154,8 +154,8 @@ impl Proof {
 
     /// Whether all matrices within the slopes are regular.
     fn is_regular(&self, inputs: &InputBox, all: &Reaches) -> bool {
-        let platforms = Platforms::new(&self.dimensions, inputs, all);
-        let slopes = platforms.and_then(|platforms| platforms.slopes(&self.dimensions));
+        let platforms = Platforms::new(&self.mechanism, inputs, all);
+        let slopes = platforms.and_then(|platforms| platforms.slopes(&self.mechanism));
         slopes.and_then(|slopes| Preconditioned::new(&slopes)).is_some_and(|matrix| matrix.is_regular())
     }
 }

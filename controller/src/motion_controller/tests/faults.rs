@@ -101,7 +101,7 @@ fn a_safe_stop_waits_for_a_lost_drive_until_its_time_is_over() {
         reading.drive_state[3] = NO_DRIVE_STATE;
         Some(reading)
     };
-    let waits = (crate::progress::SAFE_STOP_S / bench.controller.period_s) as u64;
+    let waits = (SAFE_STOP_S / bench.controller.sequencer.period_s) as u64;
     for _ in 1..waits {
         bench.cycle(lose);
         assert_eq!(bench.controller.state(), ControllerState::SafeStop);

@@ -1,0 +1,222 @@
+//! What the controllers have in common: they take readings, follow the sequence of states, stop when a wait takes too
+//! long, and write command and state.
+
+use masseter_shared::config::{ControllerConfig, Scenario};
+use masseter_shared::control::{Outcome, Tick};
+use masseter_shared::geometry::{AXES, Actuators, Mechanism, Pose};
+use masseter_shared::messages::codes::{
+    Cause, ControllerState, DriveState, EventKind, NO_DRIVE_STATE, Source, drive_state,
+};
+use masseter_shared::messages::{Command, Event, Reading, State, pose_fields};
+
+use crate::kinematics::{ForwardTracker, Solution};
+use crate::safety::{self, Fault};
+use crate::sequence::{Trigger, next, request};
+
+/// Bits of [`Reading::fresh_axes`] when all axes are fresh.
+pub(crate) const ALL_AXES: u32 = (1 << AXES) - 1;
+/// Cycles for which the last command is repeated, so that the drives receive it.
+pub(crate) const REPEATED_CYCLES: u64 = 5;
+/// Longest wait of a safe stop for drives without voltage, s.
+pub(crate) const SAFE_STOP_S: f64 = 0.3;
+
+/// A complete reading and the pose of its positions.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Estimate {
+    pub(crate) reading_cycle: u64,
+    pub(crate) answers_cycle: u64,
+    pub(crate) sampled_ns: u64,
+    pub(crate) measured: Actuators,
+    pub(crate) solution: Solution,
+}
+
+/// The state of a controller's sequence, and what decides on the next one.
+#[derive(Debug, Clone)]
+pub(crate) struct Sequencer {
+    pub(crate) config: ControllerConfig,
+    pub(crate) period_s: f64,
+    pub(crate) tracker: ForwardTracker,
+    pub(crate) state: ControllerState,
+    pub(crate) cycles_in_state: u64,
+    /// The number of the last cycle.
+    pub(crate) cycle: u64,
+    /// Cycles since the last complete reading.
+    pub(crate) silent_cycles: u64,
+    /// From the last complete reading.
+    pub(crate) estimate: Option<Estimate>,
+    steady_readings: u32,
+    drive_state: [u32; AXES],
+    stop_requested: bool,
+    /// The first fault since the last decision.
+    fault: Option<Fault>,
+}
+
+impl Sequencer {
+    pub(crate) fn new(scenario: &Scenario, mechanism: Mechanism) -> Self {
+        Self {
+            config: scenario.controller,
+            period_s: scenario.period_s(),
+            tracker: ForwardTracker::new(mechanism),
+            state: ControllerState::WaitReadings,
+            cycles_in_state: 0,
+            cycle: 0,
+            silent_cycles: 0,
+            estimate: None,
+            steady_readings: 0,
+            drive_state: [NO_DRIVE_STATE; AXES],
+            stop_requested: false,
+            fault: None,
+        }
+    }
+
+    /// Takes the reading of a cycle, if there is one.
+    pub(crate) fn observe(&mut self, reading: Option<&Reading>) {
+        let taken = reading.map_or(Ok(false), |reading| self.take(reading));
+        if taken == Ok(true) {
+            self.silent_cycles = 0;
+            self.steady_readings = self.steady_readings.saturating_add(1);
+        } else {
+            self.silent_cycles += 1;
+            self.steady_readings = 0;
+        }
+        if let Err(fault) = taken {
+            self.fault.get_or_insert(fault);
+        }
+    }
+
+    /// Whether the reading is complete, and so gives an estimate.
+    fn take(&mut self, reading: &Reading) -> Result<bool, Fault> {
+        safety::check_reading(reading)?;
+        safety::check_commander(reading, self.cycle)?;
+        self.drive_state = reading.drive_state;
+        safety::check_drives(reading, self.is_moving())?;
+        if reading.fresh_axes != ALL_AXES {
+            return Ok(false);
+        }
+        let Reading { cycle: reading_cycle, answers_cycle, sampled_ns, .. } = *reading;
+        let measured = Actuators::from_axes(reading.position_m);
+        let solution = self.tracker.update(&measured).map_err(|error| Fault::from(&error))?;
+        self.estimate = Some(Estimate { reading_cycle, answers_cycle, sampled_ns, measured, solution });
+        Ok(true)
+    }
+
+    pub(crate) fn request_stop(&mut self) {
+        self.stop_requested = true;
+    }
+
+    pub(crate) fn is_moving(&self) -> bool {
+        matches!(self.state, ControllerState::Easing | ControllerState::Running | ControllerState::Holding)
+    }
+
+    /// Begins the decision of a cycle: the fault of its reading, or of a wait that took too long.
+    pub(crate) fn begin_cycle(&mut self, tick: Tick) -> Option<Fault> {
+        self.cycle = tick.cycle;
+        self.fault.take().or_else(|| self.overdue())
+    }
+
+    fn overdue(&self) -> Option<Fault> {
+        let over = |cause, cycles: u64, limit: f64| {
+            (cycles as f64 > limit).then(|| Fault::new(cause, cycles as f64, limit))
+        };
+        let timeout_cycles = self.config.start_timeout_s / self.period_s;
+        let silence = || over(Cause::StaleReading, self.silent_cycles, self.config.stale_cycles.into());
+        match self.state {
+            ControllerState::WaitReadings => over(Cause::StaleReading, self.cycles_in_state, timeout_cycles),
+            ControllerState::Enabling | ControllerState::Disabling => {
+                over(Cause::EnableTimeout, self.cycles_in_state, timeout_cycles).or_else(silence)
+            }
+            ControllerState::Finished | ControllerState::SafeStop => None,
+            ControllerState::Easing | ControllerState::Running | ControllerState::Holding => silence(),
+        }
+    }
+
+    /// Follows the most urgent trigger to the next state, and reports it. `is_over` says whether the controller has moved
+    /// and held for as long as this state asks for; a state without motion does not need it.
+    pub(crate) fn follow(&mut self, fault: Option<Fault>, is_over: bool, tick: Tick) -> Option<Event> {
+        let triggers = [
+            (Trigger::Fault, fault.is_some()),
+            (Trigger::StopRequested, self.stop_requested),
+            (Trigger::Done, self.is_done(is_over)),
+        ];
+        let moves = triggers.into_iter().filter(|(_, is_active)| *is_active);
+        let mut moves = moves.map(|(trigger, _)| (trigger, next(self.state, trigger)));
+        let followed = moves.find(|(_, to)| *to != self.state);
+        self.cycles_in_state += 1;
+        let (trigger, to) = followed?;
+        let from = std::mem::replace(&mut self.state, to);
+        self.cycles_in_state = 1;
+        let is_stop = trigger == Trigger::StopRequested;
+        let cause = if is_stop { Cause::StopRequested } else { Cause::Sequence };
+        let mut event = Event {
+            time_ns: tick.now_ns,
+            cycle: tick.cycle,
+            from: from.code(),
+            to: to.code(),
+            ..Event::new(Source::Controller, EventKind::Transition, cause)
+        };
+        if let Some(fault) = fault {
+            event.kind = EventKind::Fault.code();
+            fault.explain(&mut event);
+        }
+        Some(event)
+    }
+
+    /// Whether what the state waits for has come about.
+    fn is_done(&self, is_over: bool) -> bool {
+        let enabled = DriveState::OperationEnabled.code();
+        match self.state {
+            ControllerState::WaitReadings => self.steady_readings >= self.config.steady_readings,
+            ControllerState::Enabling => self.drive_state.iter().all(|&code| code == enabled),
+            ControllerState::Easing | ControllerState::Running | ControllerState::Holding => is_over,
+            ControllerState::Disabling => self.drives_are_off(),
+            ControllerState::Finished | ControllerState::SafeStop => false,
+        }
+    }
+
+    /// Whether every drive reports that it is without voltage. A lost drive reports nothing, and may have voltage.
+    fn drives_are_off(&self) -> bool {
+        let is_off = |&code: &u32| matches!(drive_state(code), Ok(Some(state)) if !state.is_powered());
+        self.drive_state.iter().all(is_off)
+    }
+
+    /// How the controller ended; none while it has something to do. A safe stop waits for the drives to be off.
+    pub(crate) fn outcome(&self) -> Option<Outcome> {
+        let is_repeated = self.cycles_in_state >= REPEATED_CYCLES;
+        match self.state {
+            ControllerState::Finished => is_repeated.then_some(Outcome::Finished),
+            ControllerState::SafeStop => {
+                let waited_s = self.cycles_in_state as f64 * self.period_s;
+                let is_over = (is_repeated && self.drives_are_off()) || waited_s >= SAFE_STOP_S;
+                is_over.then_some(Outcome::SafeStop)
+            }
+            _ => None,
+        }
+    }
+
+    /// This cycle's command. Before the first target the drives are asked to be off, so that none follows the zeros.
+    pub(crate) fn command(&self, target: Option<Actuators>) -> Command {
+        Command {
+            cycle: self.cycle,
+            reading_cycle: self.estimate.map_or(0, |estimate| estimate.reading_cycle),
+            target_m: target.map_or([0.0; AXES], Actuators::to_axes),
+            request: request(self.state).code(),
+            controller_state: self.state.code(),
+            ..Command::default()
+        }
+    }
+
+    /// What this cycle made of the reading.
+    pub(crate) fn state_message(&self, desired: Option<&Pose>) -> State {
+        let mut state = State { cycle: self.cycle, controller_state: self.state.code(), ..State::default() };
+        if let Some(desired) = desired {
+            (state.desired_position_m, state.desired_quaternion_wxyz) = pose_fields(desired);
+        }
+        if let Some(Estimate { reading_cycle, sampled_ns, solution, .. }) = &self.estimate {
+            (state.reading_cycle, state.sampled_ns) = (*reading_cycle, *sampled_ns);
+            (state.estimated_position_m, state.estimated_quaternion_wxyz) = pose_fields(&solution.pose);
+            state.leg_angle_rad = solution.theta_rad;
+            (state.residual_m, state.iterations) = (solution.residual_m, solution.iterations);
+        }
+        state
+    }
+}
