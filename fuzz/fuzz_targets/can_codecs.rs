@@ -30,7 +30,7 @@ fn canopen(data: &[u8]) {
     if let Ok(emergency) = Emergency::decode(data) {
         assert_eq!(emergency.encode(), data);
     }
-    if let Ok(nmt) = Nmt::decode(data) {
+    if let Some(nmt) = Nmt::decode(data) {
         assert_eq!(nmt.frame().data(), data);
     }
     if let Ok(heartbeat) = Heartbeat::decode(data) {

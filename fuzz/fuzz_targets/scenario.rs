@@ -39,7 +39,7 @@ fn read(path: &Path) {
 
 fn play(scenario: &Scenario) {
     assert!(scenario.period_ns() > 0 && scenario.period_s() > 0.0);
-    scenario.can.rates().expect("a valid scenario has bit rates");
+    scenario.can.bitrate().expect("a valid scenario has a bit rate");
     if matches!(scenario.motion, MotionConfig::File(_)) {
         return;
     }

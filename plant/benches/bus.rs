@@ -5,7 +5,7 @@
 use divan::{Bencher, black_box};
 use masseter_can::canopen::{NodeId, sync};
 use masseter_can::cia402::{Controlword, Statusword};
-use masseter_can::{Bitrate, Bus, FrameFormat, Rates, Rpdo1, Tpdo1, VirtualWire, WireConfig};
+use masseter_can::{Bitrate, Bus, Rpdo1, Tpdo1, VirtualWire, WireConfig};
 use masseter_plant::core::PlantCore;
 use masseter_shared::config::Scenario;
 use masseter_shared::messages::codes::DriveRequest;
@@ -37,8 +37,7 @@ fn each_cycle(bencher: Bencher<'_, '_>, mut run: impl FnMut(u64)) {
 
 fn wire() -> VirtualWire {
     VirtualWire::new(&WireConfig {
-        rates: Rates::classical(Bitrate::MAX),
-        format: FrameFormat::Classical,
+        bitrate: Bitrate::MAX,
         ports: 1 + usize::from(DRIVES),
         transmit_capacity: 64,
         receive_capacity: 256,
@@ -51,7 +50,7 @@ fn settle(wire: &mut VirtualWire) {
     while let Some(event_ns) = wire.next_event_ns() {
         wire.advance(event_ns);
         for port in 0..=usize::from(DRIVES) {
-            while let Ok(Some(received)) = wire.receive(port, event_ns) {
+            while let Ok(Some(received)) = wire.port(port).receive(event_ns) {
                 black_box(received);
             }
         }

@@ -190,7 +190,7 @@ impl<L: Link> PlantCore<L> {
                 match self.link.tap(bus, now_ns) {
                     Ok(Some(tapped)) => self.take_tapped(bus, tapped),
                     Err(ReceiveError::Overrun { lost }) => self.master.note_lost(now_ns, lost),
-                    Ok(None) | Err(ReceiveError::InterfaceDown { .. } | ReceiveError::Os { .. }) => break,
+                    Ok(None) | Err(ReceiveError::Os { .. }) => break,
                 }
             }
             while let Some(note) = self.link.next_note(bus, now_ns) {

@@ -71,8 +71,8 @@ pub(crate) fn record(args: RecorderArgs) -> anyhow::Result<Exit> {
     if let Some(server) = server.as_ref().filter(|_| !args.quiet) {
         stderr.write(format!("live on {} for Foxglove\n", server.url()));
     }
-    let rates = scenario.can.rates()?;
-    let progress = (!args.quiet).then(|| Progress::new(rates, args.motion_s, start.epoch_ns));
+    let bitrate = scenario.can.bitrate()?;
+    let progress = (!args.quiet).then(|| Progress::new(bitrate, args.motion_s, start.epoch_ns));
     let mut sinks = Sinks { backlog, server, progress, stderr };
     let loops = start.loops.to_vec();
     let root = SystemRoot::of_this_machine();

@@ -164,16 +164,14 @@ mod tests {
     fn a_message_of_the_rig_becomes_a_row() {
         let columns = Columns::from_definition(&FrameTap::schema()).unwrap();
         assert_eq!(columns.header(), "seq,published_ns,version,time_ns,queued_ns,id,bus,flags,data");
-        let mut bytes = [0; 64];
         for length in 0..3 {
-            let data = CanData::padded(bytes, length);
+            let data = CanData::new(&[0xAA; 3][..length]);
             let frame = FrameTap { seq: 3, id: 0x181, bus: 1, data, ..Default::default() };
             let mut line = String::new();
             assert!(columns.write(&mut line, frame.body()));
             assert_eq!(line, "3,0,0,0,0,385,1,0,".to_owned() + &"AA".repeat(length));
             assert!(!columns.write(&mut line, &frame.body()[..frame.body().len() - 1]));
             assert!(!columns.write(&mut line, &[frame.body(), &[0]].concat()));
-            bytes[length] = 0xAA;
         }
         assert_eq!(Columns::from_definition(&Reading::schema()).unwrap().bytes, size_of::<Reading>());
     }

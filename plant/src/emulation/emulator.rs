@@ -59,9 +59,8 @@ impl Emulator {
     /// The scenario's drives, switched on at `now_ns` on the interfaces that it names.
     pub fn open(scenario: &Scenario, now_ns: u64) -> Result<Self, PlantError> {
         let emulation = Emulation::new(scenario, now_ns)?;
-        let format = scenario.can.format();
         let interfaces = drive_ports(&scenario.can)?.map(|at| &scenario.can.interfaces[at.bus]);
-        let ports = interfaces.map(|interface| SocketCan::open(interface, format));
+        let ports = interfaces.map(|interface| SocketCan::open(interface));
         let ports: Vec<_> = ports.into_iter().collect::<Result<_, OpenError>>()?;
         let ports = ports.try_into().expect("a port for every axis");
         Ok(Self { emulation, ports, waiting: [None; AXES], counters: EmulatorCounters::default() })

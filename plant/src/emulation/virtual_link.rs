@@ -115,7 +115,7 @@ impl VirtualLink {
         let at_bus = self.ports.iter().enumerate().filter(|(_, at)| at.bus == bus);
         for (axis, &DrivePort { port, .. }) in at_bus {
             // An overrun loses the drive's newest frames, as in a real node; the older ones follow.
-            while let Ok(Some(received)) = wire.receive(port, now_ns) {
+            while let Ok(Some(received)) = wire.port(port).receive(now_ns) {
                 self.emulation.deliver(axis, &received.frame, now_ns)?;
             }
             send_outgoing(&mut self.emulation, axis, wire, port, now_ns);
@@ -125,7 +125,7 @@ impl VirtualLink {
 
     fn step_drives(&mut self, now_ns: u64) -> Result<(), DynamicsError> {
         for (axis, &DrivePort { bus, port }) in self.ports.iter().enumerate() {
-            self.emulation.set_error_state(axis, self.wires[bus].status(port).state);
+            self.emulation.set_error_state(axis, self.wires[bus].port(port).status().state);
         }
         self.emulation.step()?;
         for (axis, &DrivePort { bus, port }) in self.ports.iter().enumerate() {
@@ -139,7 +139,7 @@ fn send_outgoing(emulation: &mut Emulation, axis: usize, wire: &mut VirtualWire,
     while let Some(frame) = emulation.outgoing(axis) {
         // A full transmit queue or a controller in bus-off loses the frame, as in a real node; the master detects the
         // loss.
-        let _ = wire.send(port, now_ns, frame);
+        let _ = wire.port(port).send(now_ns, frame);
     }
 }
 
@@ -149,8 +149,7 @@ fn wire(scenario: &Scenario, bus: usize, free_ports: usize, now_ns: u64) -> Resu
     let drives = can.buses[bus].iter().map(|&axis| ids[axis]);
     let nodes: Vec<_> = std::iter::once(NodeId::MASTER).chain(drives).collect();
     let config = WireConfig {
-        rates: can.rates()?,
-        format: can.format(),
+        bitrate: can.bitrate()?,
         ports: nodes.len() + free_ports,
         transmit_capacity: TRANSMIT_CAPACITY,
         receive_capacity: RECEIVE_CAPACITY,

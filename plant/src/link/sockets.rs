@@ -38,11 +38,11 @@ impl SocketLink {
         let can = &scenario.can;
         let faults_of_port = |bus: usize| {
             let faults = faults_of_bus(&scenario.faults, bus, &[NodeId::MASTER], now_ns)?;
-            let faults = PortFaults::new(faults, MASTER_PORT, fault_seed(scenario, bus))?;
-            Ok(faults.restarting_after(restart_after_ns(can)))
+            let (seed, restart_after_ns) = (fault_seed(scenario, bus), restart_after_ns(can));
+            Ok(PortFaults::new(faults, MASTER_PORT, seed, restart_after_ns)?)
         };
         let faults = (0..can.buses.len()).map(faults_of_port).collect::<Result<_, PlantError>>()?;
-        let port = |interface: &String| SocketCan::open(interface, can.format());
+        let port = |interface: &String| SocketCan::open(interface);
         let open = || can.interfaces.iter().map(port).collect::<Result<_, _>>();
         let (ports, taps) = (open()?, open()?);
         let lock = |interface: &String| InterfaceLock::take(interface);

@@ -27,10 +27,10 @@ pub(super) struct Exchange {
 impl Exchange {
     /// No cycle yet; the first heartbeat is due at `now_ns`.
     pub(super) fn new(can: &CanConfig, now_ns: u64) -> Result<Self, BitrateError> {
-        let rates = can.rates()?;
-        let sync_bits = frame_bits(&sync::frame().promoted(can.format()));
+        let bitrate = can.bitrate()?;
         Ok(Self {
-            sync_frame_ns: rates.duration_ns(sync_bits) - rates.nominal().bits_to_ns(INTERFRAME_BITS),
+            sync_frame_ns: bitrate.bits_to_ns(frame_bits(&sync::frame()))
+                - bitrate.bits_to_ns(INTERFRAME_BITS),
             heartbeat_ns: u64::from(can.heartbeat_producer_ms) * MILLISECOND_NS,
             next_heartbeat_ns: now_ns,
             wake: Wake::on_time(0, 0),

@@ -119,7 +119,7 @@ impl Master {
                     Ok(Some(received)) => self.take(bus, &received),
                     // Lost frames show as missing process data; the others are still there.
                     Err(ReceiveError::Overrun { .. }) => {}
-                    Ok(None) | Err(ReceiveError::InterfaceDown { .. } | ReceiveError::Os { .. }) => break,
+                    Ok(None) | Err(ReceiveError::Os { .. }) => break,
                 }
             }
         }

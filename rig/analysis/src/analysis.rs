@@ -76,7 +76,7 @@ impl Analysis {
             sequence: SequenceCheck::default(),
             frames: Vec::new(),
             events: Vec::new(),
-            watch: Watch::new(scenario.can.rates().ok()),
+            watch: Watch::new(scenario.can.bitrate().ok()),
             responses: Responses::for_scenario(scenario),
             cycles: 0,
             freshness: Freshness::default(),

@@ -1,7 +1,7 @@
 //! Wake-ups, axes and buses of a run over time, for plots.
 
 use masseter_can::Tapped;
-use masseter_can::wire::{self, Rates};
+use masseter_can::{Bitrate, wire};
 use masseter_shared::geometry::AXES;
 use masseter_shared::messages::{Reading, State, Truth};
 
@@ -40,16 +40,16 @@ pub(super) struct Watch {
     axes: Series<Extremes<{ 3 * AXES }>>,
     /// Time that frames took on each bus.
     busy_ns: Series<Sums>,
-    rates: Option<Rates>,
+    bitrate: Option<Bitrate>,
 }
 
 const CONTROLLER: usize = 0;
 const PLANT: usize = 1;
 
 impl Watch {
-    /// For buses of these rates; without rates there is no load.
-    pub(super) fn new(rates: Option<Rates>) -> Self {
-        Self { rates, ..Self::default() }
+    /// For buses of this bit rate; without one there is no load.
+    pub(super) fn new(bitrate: Option<Bitrate>) -> Self {
+        Self { bitrate, ..Self::default() }
     }
 
     fn since(&mut self, time_ns: u64) -> u64 {
@@ -77,8 +77,8 @@ impl Watch {
 
     pub(super) fn frame(&mut self, time_ns: u64, bus: usize, tapped: &Tapped) {
         let since_ns = self.since(time_ns);
-        if let Some((received, rates)) = tapped.frame().zip(self.rates) {
-            let busy_ns = rates.duration_ns(wire::frame_bits(&received.frame));
+        if let Some((received, bitrate)) = tapped.frame().zip(self.bitrate) {
+            let busy_ns = bitrate.bits_to_ns(wire::frame_bits(&received.frame));
             self.busy_ns.at(since_ns).add(bus, busy_ns);
         }
     }
@@ -129,8 +129,8 @@ mod tests {
     #[test]
     fn a_bus_that_is_half_full_is_said_to_be() {
         let frame = Frame::fixed(CanId::standard(0x123).unwrap(), [0x55; 8]);
-        let bits = wire::frame_bits(&frame).total();
-        let mut watch = Watch::new(Some(Rates::classical(Bitrate::new(2 * 1000 * bits).unwrap())));
+        let bits = wire::frame_bits(&frame);
+        let mut watch = Watch::new(Some(Bitrate::new(2 * 1000 * bits).unwrap()));
         for millisecond in 0..1000 {
             let time_ns = millisecond * 1_000_000;
             watch.frame(time_ns, 0, &Tapped::Frame(TappedFrame { frame, time_ns, queued_ns: None }));

@@ -3,7 +3,7 @@
 //! A bound holds for undisturbed buses. A late process may queue messages closer together than planned; then the plan
 //! is worked out again for the closest queueing. Real interfaces do not report when a frame was queued.
 
-use masseter_can::{BusPlan, FrameFormat, PeriodicMessage, PlannedMessage, Tapped};
+use masseter_can::{BusPlan, PeriodicMessage, PlannedMessage, Tapped};
 use masseter_shared::config::Scenario;
 use masseter_shared::messages::FrameTap;
 use masseter_shared::schedule::plans;
@@ -14,7 +14,6 @@ use super::bus_response::{BusResponse, ResponseFigures};
 #[derive(Debug)]
 pub(super) struct Responses {
     buses: Vec<Followed>,
-    format: FrameFormat,
     has_faults: bool,
 }
 
@@ -60,10 +59,10 @@ impl Responses {
     /// On the buses of a rig that was accepted; without plans there are no figures.
     pub(super) fn for_scenario(scenario: &Scenario) -> Self {
         let plans = plans(&scenario.can, scenario.period_ns()).unwrap_or_default();
-        Self::with(plans, scenario.can.format(), !scenario.faults.is_empty())
+        Self::with(plans, !scenario.faults.is_empty())
     }
 
-    fn with(plans: Vec<BusPlan>, format: FrameFormat, has_faults: bool) -> Self {
+    fn with(plans: Vec<BusPlan>, has_faults: bool) -> Self {
         let followed = |plan: BusPlan| Followed {
             messages: vec![Seen::default(); plan.messages().len()],
             plan,
@@ -71,7 +70,7 @@ impl Responses {
             frames: 0,
             error_frames: 0,
         };
-        Self { buses: plans.into_iter().map(followed).collect(), format, has_faults }
+        Self { buses: plans.into_iter().map(followed).collect(), has_faults }
     }
 
     /// `tapped`: what `tap` holds.
@@ -95,7 +94,7 @@ impl Responses {
     /// `missing`: frames that were not recorded.
     pub(super) fn finish(self, missing: u64) -> BusResponse {
         let unbounded = self.unbounded(missing);
-        let figures = |bus: &Followed| bus.figures(&bus.bounds_ns(self.format, unbounded.is_none()));
+        let figures = |bus: &Followed| bus.figures(&bus.bounds_ns(unbounded.is_none()));
         let messages = self.buses.iter().flat_map(figures).collect();
         BusResponse { messages, unbounded }
     }
@@ -108,7 +107,7 @@ impl Responses {
         if missing > 0 {
             return Some(format!("{missing} frames are missing from the recording"));
         }
-        self.buses.iter().find_map(|bus| bus.unbounded(self.format))
+        self.buses.iter().find_map(Followed::unbounded)
     }
 }
 
@@ -122,8 +121,8 @@ impl Followed {
     }
 
     /// For the plan's messages, both as planned and as they were queued.
-    fn bounds_ns(&self, format: FrameFormat, are_bounded: bool) -> Vec<Option<u64>> {
-        let as_queued = self.plan_as_queued(format);
+    fn bounds_ns(&self, are_bounded: bool) -> Vec<Option<u64>> {
+        let as_queued = self.plan_as_queued();
         let both = self.plan.messages().iter().zip(as_queued.messages());
         let bound_ns = |(planned, queued): (&PlannedMessage, &PlannedMessage)| {
             let (planned_ns, queued_ns) = planned.response_ns.zip(queued.response_ns)?;
@@ -133,7 +132,7 @@ impl Followed {
     }
 
     /// Why there are no bounds here.
-    fn unbounded(&self, format: FrameFormat) -> Option<String> {
+    fn unbounded(&self) -> Option<String> {
         let bus = self.plan.bus();
         if self.frames == 0 {
             return Some(format!("no frame of bus {bus} was recorded"));
@@ -144,14 +143,14 @@ impl Followed {
         if self.error_frames > 0 {
             return Some(format!("bus {bus} had {} errors", self.error_frames));
         }
-        let as_queued = self.plan_as_queued(format);
+        let as_queued = self.plan_as_queued();
         let unbounded = as_queued.messages().iter().find(|queued| queued.response_ns.is_none())?;
         let name = &unbounded.message.name;
         Some(format!("messages of bus {bus} were queued so close together that {name} has no bound"))
     }
 
     /// The plan for messages as close to each other as they were queued, whoever released them.
-    fn plan_as_queued(&self, format: FrameFormat) -> BusPlan {
+    fn plan_as_queued(&self) -> BusPlan {
         let as_queued = |(planned, seen): (&PlannedMessage, &Seen)| {
             let message = planned.message.clone();
             let period_ns =
@@ -159,7 +158,7 @@ impl Followed {
             PeriodicMessage { period_ns, release: None, ..message }
         };
         let messages = self.plan.messages().iter().zip(&self.messages).map(as_queued).collect();
-        BusPlan::new(self.plan.bus(), self.plan.rates(), format, self.plan.cycle_ns(), messages)
+        BusPlan::new(self.plan.bus(), self.plan.bitrate(), self.plan.cycle_ns(), messages)
             .expect("no message has a releaser")
     }
 }
@@ -167,7 +166,7 @@ impl Followed {
 #[cfg(test)]
 mod tests {
     use masseter_can::canopen::Cob;
-    use masseter_can::{Bitrate, CanId, ErrorKind, ErrorReport, Rates};
+    use masseter_can::{Bitrate, CanId, ErrorKind, ErrorReport};
 
     use masseter_shared::messages::tap;
 
@@ -189,9 +188,8 @@ mod tests {
     /// SYNC and one message of 8 bytes: bounds of 55 + 135 µs for both.
     fn responses(has_faults: bool) -> Responses {
         let messages = vec![message("SYNC", 0x080, 0), message("TPDO1 1", 0x181, 8)];
-        let rates = Rates::classical(Bitrate::MAX);
-        let plan = BusPlan::new(0, rates, FrameFormat::Classical, PERIOD_NS, messages).unwrap();
-        Responses::with(vec![plan], FrameFormat::Classical, has_faults)
+        let plan = BusPlan::new(0, Bitrate::MAX, PERIOD_NS, messages).unwrap();
+        Responses::with(vec![plan], has_faults)
     }
 
     fn seen(id: u32, queued_ns: u64, took_us: u64) -> FrameTap {

@@ -2,8 +2,7 @@
 
 use hdrhistogram::Histogram;
 use masseter_analysis::{Accumulator, MOVING};
-use masseter_can::Tapped;
-use masseter_can::wire::{self, Rates};
+use masseter_can::{Bitrate, Tapped, wire};
 use masseter_recording::{Recorded, Topic};
 use masseter_shared::clock::SECOND_NS;
 use masseter_shared::messages::codes::ControllerState;
@@ -18,7 +17,7 @@ const DIGITS: u8 = 2;
 
 #[derive(Debug)]
 pub(super) struct ProgressFigures {
-    rates: Rates,
+    bitrate: Bitrate,
     /// The newest state and reading.
     pub state: State,
     pub reading: Reading,
@@ -36,10 +35,10 @@ pub(super) struct ProgressFigures {
 }
 
 impl ProgressFigures {
-    pub(super) fn new(rates: Rates) -> Self {
+    pub(super) fn new(bitrate: Bitrate) -> Self {
         let histogram = || Histogram::new_with_max(MAX_LATE_NS, DIGITS).expect("the digits are in range");
         Self {
-            rates,
+            bitrate,
             state: State::default(),
             reading: Reading::default(),
             controller_late_ns: histogram(),
@@ -79,7 +78,7 @@ impl ProgressFigures {
     fn add_frame(&mut self, frame: &FrameTap) {
         if let (Ok(Tapped::Frame(received)), Ok(bus)) = (tap::decode(frame), tap::bus_of(frame)) {
             self.busy_ns.resize(self.busy_ns.len().max(bus + 1), 0);
-            self.busy_ns[bus] += self.rates.duration_ns(wire::frame_bits(&received.frame));
+            self.busy_ns[bus] += self.bitrate.bits_to_ns(wire::frame_bits(&received.frame));
         }
     }
 

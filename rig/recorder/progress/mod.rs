@@ -10,7 +10,7 @@ use std::fmt::Write as _;
 use std::io::{self, IsTerminal};
 
 use hdrhistogram::Histogram;
-use masseter_can::wire::Rates;
+use masseter_can::Bitrate;
 use masseter_recording::Recorded;
 use masseter_shared::clock::SECOND_NS;
 use masseter_shared::geometry::AXIS_NAMES;
@@ -55,13 +55,13 @@ pub(super) struct Progress {
 
 impl Progress {
     /// In the form that suits standard error.
-    pub(super) fn new(rates: Rates, motion_s: f64, now_ns: u64) -> Self {
+    pub(super) fn new(bitrate: Bitrate, motion_s: f64, now_ns: u64) -> Self {
         let is_dumb = std::env::var_os("TERM").is_none_or(|term| term == "dumb");
-        Self::with_form(io::stderr().is_terminal() && !is_dumb, rates, motion_s, now_ns)
+        Self::with_form(io::stderr().is_terminal() && !is_dumb, bitrate, motion_s, now_ns)
     }
 
-    fn with_form(is_panel: bool, rates: Rates, motion_s: f64, now_ns: u64) -> Self {
-        Self { is_panel, figures: ProgressFigures::new(rates), motion_s, shown_ns: now_ns, panel_lines: 0 }
+    fn with_form(is_panel: bool, bitrate: Bitrate, motion_s: f64, now_ns: u64) -> Self {
+        Self { is_panel, figures: ProgressFigures::new(bitrate), motion_s, shown_ns: now_ns, panel_lines: 0 }
     }
 
     pub(super) fn add(&mut self, message: &Recorded) {

@@ -6,7 +6,7 @@ use masseter_shared::messages::{CanData, FrameTap, Reading, State};
 use super::*;
 
 fn progress(is_panel: bool) -> Progress {
-    Progress::with_form(is_panel, Rates::classical(Bitrate::MAX), 4.0, 0)
+    Progress::with_form(is_panel, Bitrate::MAX, 4.0, 0)
 }
 
 fn after_ten_cycles() -> Progress {
@@ -32,7 +32,7 @@ fn after_ten_cycles() -> Progress {
     progress.add(&Recorded::Frame(FrameTap {
         seq: 1,
         bus: 1,
-        data: CanData::padded([0; 64], 8),
+        data: CanData::new(&[0; 8]),
         ..Default::default()
     }));
     progress

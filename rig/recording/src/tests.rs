@@ -37,7 +37,7 @@ fn cycle(cycle: u64) -> Vec<Recorded> {
         ..Default::default()
     };
     let mut frame =
-        FrameTap { time_ns: now_ns, id: 0x181, data: CanData::padded([0; 64], 8), ..Default::default() };
+        FrameTap { time_ns: now_ns, id: 0x181, data: CanData::new(&[0; 8]), ..Default::default() };
     command.stamp(cycle, now_ns);
     reading.stamp(cycle, now_ns);
     state.stamp(cycle, now_ns);

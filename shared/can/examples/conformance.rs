@@ -2,15 +2,14 @@
 //! node and its port.
 //!
 //! `cargo run --release --example conformance -p masseter-can -- can0 can1`. No other program may use the wire at the
-//! same time. Two ports of one virtual interface of the kernel work too: `-- vcan0 vcan0`. For interfaces set up for
-//! CAN FD, put `--fd` before them.
+//! same time. Two ports of one virtual interface of the kernel work too: `-- vcan0 vcan0`.
 
 use std::error::Error;
 use std::time::Duration;
 
 use masseter_can::conformance::{self, End, Pair};
 use masseter_can::{
-    Bus, BusStatus, Frame, FrameFormat, OpenError, PortFaults, ReceiveError, Received, SendError, SocketCan,
+    Bus, BusStatus, Frame, OpenError, PortFaults, ReceiveError, Received, SendError, SocketCan,
 };
 
 /// How often is looked whether all frames have arrived.
@@ -20,7 +19,6 @@ const PATIENCE: u32 = 500;
 
 /// Two ports under all wrappers, and two more to know when everything sent has left the one side and reached the other.
 struct SocketPair {
-    format: FrameFormat,
     ends: [WrappedEnd; 2],
     watches: [Watch; 2],
 }
@@ -59,21 +57,20 @@ struct Watch {
 }
 
 impl SocketPair {
-    fn open([a, b]: [&str; 2], format: FrameFormat) -> Result<Self, OpenError> {
+    fn open([a, b]: [&str; 2]) -> Result<Self, OpenError> {
         Ok(Self {
-            format,
-            ends: [WrappedEnd::open(a, format)?, WrappedEnd::open(b, format)?],
+            ends: [WrappedEnd::open(a)?, WrappedEnd::open(b)?],
             watches: [Watch::open(a)?, Watch::open(b)?],
         })
     }
 }
 
 impl WrappedEnd {
-    fn open(interface: &str, format: FrameFormat) -> Result<Self, OpenError> {
+    fn open(interface: &str) -> Result<Self, OpenError> {
         Ok(Self {
-            port: SocketCan::open(interface, format)?,
+            port: SocketCan::open(interface)?,
             sent: 0,
-            faults: PortFaults::new(Vec::new(), 0, 1).expect("no fault needs a simulated wire"),
+            faults: PortFaults::new(Vec::new(), 0, 1, None).expect("no fault needs a simulated wire"),
         })
     }
 
@@ -84,7 +81,7 @@ impl WrappedEnd {
 
 impl Watch {
     fn open(interface: &str) -> Result<Self, OpenError> {
-        Ok(Self { port: SocketCan::open(interface, FrameFormat::Classical)?, seen: 0 })
+        Ok(Self { port: SocketCan::open(interface)?, seen: 0 })
     }
 
     fn look(&mut self) -> u64 {
@@ -103,10 +100,6 @@ impl Pair for SocketPair {
 
     fn end(&mut self, end: End) -> impl Bus {
         self.ends[end as usize].wrapped()
-    }
-
-    fn format(&self) -> FrameFormat {
-        self.format
     }
 
     fn now_ns(&self) -> u64 {
@@ -128,13 +121,9 @@ impl Pair for SocketPair {
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<_> = std::env::args().skip(1).collect();
     let arguments: Vec<_> = arguments.iter().map(String::as_str).collect();
-    let (format, [a, b]) = match arguments[..] {
-        [a, b] => (FrameFormat::Classical, [a, b]),
-        ["--fd", a, b] => (FrameFormat::FdBitRateSwitch, [a, b]),
-        _ => return Err("usage: conformance [--fd] INTERFACE INTERFACE".into()),
-    };
-    let pair = || SocketPair::open([a, b], format).expect("interfaces that could be opened before");
-    SocketPair::open([a, b], format)?;
+    let [a, b] = arguments[..] else { return Err("usage: conformance INTERFACE INTERFACE".into()) };
+    let pair = || SocketPair::open([a, b]).expect("interfaces that could be opened before");
+    SocketPair::open([a, b])?;
     conformance::check(pair)?;
     println!("{a} and {b} keep the laws of the bus:");
     for law in conformance::Law::OF_EVERY_BUS {

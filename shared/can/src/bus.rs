@@ -66,19 +66,7 @@ pub enum SendError {
         /// Transmit error counter.
         tec: u16,
     },
-    /// A frame in FD format for a port that speaks classical CAN only.
-    #[error("an FD frame of {length} bytes on classical CAN: set `can.fd`, and let all nodes speak FD")]
-    NotFd {
-        /// Its data bytes.
-        length: usize,
-    },
-    /// The interface is down or gone.
-    #[error("interface down: {}", io::Error::from_raw_os_error(*.errno))]
-    InterfaceDown {
-        /// Error number of the operating system.
-        errno: i32,
-    },
-    /// Any other failure of the operating system.
+    /// A failure of the operating system: above all an interface that is down or gone.
     #[error("sending failed: {}", io::Error::from_raw_os_error(*.errno))]
     Os {
         /// Error number of the operating system.
@@ -95,13 +83,7 @@ pub enum ReceiveError {
         /// Frames lost since the last report.
         lost: u64,
     },
-    /// The interface is down or gone.
-    #[error("interface down: {}", io::Error::from_raw_os_error(*.errno))]
-    InterfaceDown {
-        /// Error number of the operating system.
-        errno: i32,
-    },
-    /// Any other failure of the operating system.
+    /// A failure of the operating system: above all an interface that is down or gone.
     #[error("receiving failed: {}", io::Error::from_raw_os_error(*.errno))]
     Os {
         /// Error number of the operating system.

@@ -149,11 +149,6 @@ impl Faults {
         self.list.is_empty()
     }
 
-    /// The frame that each fault makes a node babble, in the order of the faults.
-    pub(super) fn babbled(&self) -> impl Iterator<Item = Option<Frame>> {
-        self.list.iter().map(|listed| listed.fault.kind.babbled())
-    }
-
     /// The fault that destroys a frame.
     pub(super) fn corrupts(&self, frame: NumberedFrame) -> Option<FaultActivation> {
         self.activation(frame, FaultKind::is(FaultKind::Corrupt)).map(|(activation, ())| activation)

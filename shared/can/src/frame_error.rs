@@ -21,10 +21,4 @@ pub enum FrameError {
         /// Bytes asked for.
         length: usize,
     },
-    /// A length that no FD frame has.
-    #[error("{length} data bytes: an FD frame carries 0 to 8, 12, 16, 20, 24, 32, 48 or 64")]
-    FdDataLength {
-        /// Bytes asked for.
-        length: usize,
-    },
 }

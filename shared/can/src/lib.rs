@@ -24,7 +24,7 @@ pub mod wire;
 
 pub use bus::{Bus, BusStatus, ErrorState, ReceiveError, Received, SendError};
 pub use error_frame::{ERROR_FLAG, ErrorKind, ErrorReport, ErrorReportError};
-pub use frame::{Frame, FrameFormat};
+pub use frame::Frame;
 pub use frame_error::FrameError;
 pub use id::CanId;
 pub use pdo::{EVERY_SYNC, Rpdo1, Tpdo1};
@@ -32,5 +32,5 @@ pub use plan::{BusPlan, NoReleaser, Overload, PeriodicMessage, PlannedMessage, R
 pub use port_faults::{Faulty, NotByPort, PortFaults};
 pub use socket_can::{OpenError, SocketCan};
 pub use tap::{Tapped, TappedFrame};
-pub use virtual_bus::{Port, Statistics, VirtualWire, WireConfig};
-pub use wire::{Bitrate, BitrateError, FrameBits, Rates};
+pub use virtual_bus::{Port, VirtualWire, WireConfig};
+pub use wire::{Bitrate, BitrateError};

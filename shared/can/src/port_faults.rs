@@ -41,24 +41,23 @@ struct Held {
 }
 
 impl PortFaults {
-    /// The faults that apply to this port; the same seed makes the same choices. Nothing is allocated
-    /// after this.
+    /// The faults that apply to this port; the same seed makes the same choices. After bus-off the port stays off where
+    /// it has no time to its restart. Nothing is allocated after this.
     ///
     /// # Errors
     /// [`NotByPort`] for a fault that corrupts frames.
-    pub fn new(faults: Vec<Fault>, port: usize, seed: u64) -> Result<Self, NotByPort> {
+    pub fn new(
+        faults: Vec<Fault>,
+        port: usize,
+        seed: u64,
+        restart_after_ns: Option<u64>,
+    ) -> Result<Self, NotByPort> {
         if let Some(fault) = faults.iter().find(|fault| fault.kind == FaultKind::Corrupt) {
             return Err(NotByPort { number: fault.number });
         }
         let held = Vec::with_capacity(HELD);
         let faults = Faults::new(faults, seed);
-        Ok(Self { faults, port, sent: 0, received: 0, held, restart_after_ns: None, off_since_ns: None })
-    }
-
-    /// Sets the time from bus-off to the restart of the node; without a restart time the node stays off.
-    #[must_use]
-    pub fn restarting_after(self, restart_after_ns: Option<u64>) -> Self {
-        Self { restart_after_ns, ..self }
+        Ok(Self { faults, port, sent: 0, received: 0, held, restart_after_ns, off_since_ns: None })
     }
 
     /// The port with these faults.

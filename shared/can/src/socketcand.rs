@@ -2,8 +2,7 @@
 //!
 //! After `< hi >` a client sends `< open can0 >` and `< rawmode >` and gets `< ok >` for each. From then on the client gets
 //! `< frame … >` for every frame on the bus, and sends a frame with `< send … >`. The modes for broadcast management,
-//! statistics and ISO-TP are not supported, nor are remote frames. A frame in FD format looks like a classical one. This
-//! module opens no sockets.
+//! statistics and ISO-TP are not supported, nor are remote frames. This module opens no sockets.
 //!
 //! Source: linux-can/socketcand, `doc/protocol.md`.
 
@@ -171,7 +170,7 @@ pub fn write_frame(out: &mut impl Write, received: &Received) -> fmt::Result {
 
 #[cfg(test)]
 mod tests {
-    use super::super::frame::strategies::any_classical_frame;
+    use super::super::frame::strategies::any_frame;
     use super::*;
     use proptest::prelude::*;
 
@@ -264,7 +263,7 @@ mod tests {
     proptest! {
         /// However the stream is cut, the frame arrives.
         #[test]
-        fn a_frame_survives_any_cut(frame in any_classical_frame(), cut in 0..40_usize) {
+        fn a_frame_survives_any_cut(frame in any_frame(), cut in 0..40_usize) {
             let mut text = format!("< send {} {}", frame.id(), frame.data().len());
             frame.data().iter().for_each(|byte| write!(text, " {byte:x}").unwrap());
             text.push_str(" >");

@@ -1,7 +1,8 @@
 //! The CAN link: `[can]`.
 
-use masseter_can::{Bitrate, BitrateError, FrameFormat, Rates};
-use serde::{Deserialize, Serialize};
+use std::collections::BTreeSet;
+
+use masseter_can::{Bitrate, BitrateError};
 
 use super::error::ScenarioError;
 use super::need::{keyed, require_positive};
@@ -17,10 +18,6 @@ section! {
         /// Whether a bit takes a nanosecond, whatever `bitrate_bps` says (simulated buses only): for cycles that no CAN
         /// holds.
         pub ideal: bool = false,
-        /// Whether frames go in FD format with bit-rate switch. Real interfaces must have been set up for it.
-        pub fd: bool = false,
-        /// Bit rate of the data phase of FD frames, bit/s.
-        pub data_bitrate_bps: u32 = 5_000_000,
         /// How long after bus-off a controller restarts by itself, ms; 0 for never (as `ip link … restart-ms`).
         /// On real interfaces only for faults of the scenario; their own setting holds otherwise.
         pub restart_ms: u32 = 100,
@@ -51,18 +48,10 @@ impl CanConfig {
         self.interfaces.is_empty()
     }
 
-    /// Bit rates of every bus.
-    pub fn rates(&self) -> Result<Rates, BitrateError> {
-        let nominal = Bitrate::new(self.bitrate_bps)?;
-        if self.ideal {
-            return Ok(Rates::classical(Bitrate::IDEAL));
-        }
-        if self.fd { Rates::switching(nominal, self.data_bitrate_bps) } else { Ok(Rates::classical(nominal)) }
-    }
-
-    /// The format of every frame.
-    pub fn format(&self) -> FrameFormat {
-        if self.fd { FrameFormat::FdBitRateSwitch } else { FrameFormat::Classical }
+    /// Bit rate of every bus.
+    pub fn bitrate(&self) -> Result<Bitrate, BitrateError> {
+        let bitrate = Bitrate::new(self.bitrate_bps)?;
+        Ok(if self.ideal { Bitrate::IDEAL } else { bitrate })
     }
 
     pub(super) fn validate(&self) -> Result<(), ScenarioError> {
@@ -73,39 +62,35 @@ impl CanConfig {
         require_positive(&keyed!("can", self,
             heartbeat_consumer_ms boot_timeout_ms command_timeout_cycles
         ))?;
-        if self.ideal && (self.fd || !self.is_virtual()) {
-            let need = "leave it away with can.fd and can.interfaces: it replaces their bit rates";
+        if self.ideal && !self.is_virtual() {
+            let need = "leave it away with can.interfaces: it replaces their bit rate";
             return Err(ScenarioError::bad("can.ideal", &true, need));
         }
-        if let Err(error) = self.rates() {
-            let (key, bps) = match error {
-                BitrateError::Nominal { bps } => ("can.bitrate_bps", bps),
-                BitrateError::Data { bps, .. } => ("can.data_bitrate_bps", bps),
-            };
-            return Err(ScenarioError::bad(key, &bps, error.to_string()));
+        if let Err(error) = self.bitrate() {
+            return Err(ScenarioError::bad("can.bitrate_bps", &self.bitrate_bps, error.to_string()));
         }
-        let names = &self.interfaces;
-        let has_twice = (1..names.len()).any(|index| names[..index].contains(&names[index]));
-        if self.is_virtual() || names.len() == self.buses.len() && !has_twice {
+        let distinct = self.interfaces.iter().collect::<BTreeSet<_>>().len();
+        if self.is_virtual() || [self.interfaces.len(), distinct] == [self.buses.len(); 2] {
             return Ok(());
         }
         let need = format!("name {} interfaces, one for each of can.buses", self.buses.len());
-        Err(ScenarioError::bad("can.interfaces", &names.join(","), need))
+        Err(ScenarioError::bad("can.interfaces", &self.interfaces.join(","), need))
     }
 }
 
-/// The identity that the master checks before it writes to a drive.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct IdentityConfig {
-    /// Device type (object 1000).
-    pub device_type: u32,
-    /// Vendor (object 1018:01).
-    pub vendor_id: u32,
-    /// Product (object 1018:02).
-    pub product_code: u32,
-    /// Revision (object 1018:03).
-    pub revision: u32,
+section! {
+    /// The identity that the master checks before it writes to a drive.
+    #[derive(Copy, Eq)]
+    pub struct IdentityConfig {
+        /// Device type (object 1000).
+        pub device_type: u32 = Self::EMULATED.device_type,
+        /// Vendor (object 1018:01).
+        pub vendor_id: u32 = Self::EMULATED.vendor_id,
+        /// Product (object 1018:02).
+        pub product_code: u32 = Self::EMULATED.product_code,
+        /// Revision (object 1018:03).
+        pub revision: u32 = Self::EMULATED.revision,
+    }
 }
 
 impl IdentityConfig {
@@ -117,10 +102,4 @@ impl IdentityConfig {
         product_code: 0x0000_0402,
         revision: 0x0001_0000,
     };
-}
-
-impl Default for IdentityConfig {
-    fn default() -> Self {
-        Self::EMULATED
-    }
 }

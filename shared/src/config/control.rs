@@ -90,26 +90,20 @@ impl ControllerConfig {
             steady_readings lead_cycles integral_gain_per_s trim_limit_m trim_limit_rad stale_cycles
             tracking_limit_m
         ))?;
-        self.validate_loop(f64::from(rate_hz))
-    }
-
-    /// The lead is no longer than a drive needs, and an error is corrected only once within the lead.
-    fn validate_loop(&self, rate_hz: f64) -> Result<(), ScenarioError> {
-        let bad =
-            |key, value: f64, need| Err(ScenarioError::BadValue { key, value: value.to_string(), need });
+        // The lead is no longer than a drive needs, and an error is corrected only once within the lead.
         if self.lead_cycles > MOST_LEAD_CYCLES {
             let need = format!(
                 "use at most {MOST_LEAD_CYCLES}: one until SYNC, and what the drives interpolate over"
             );
-            return bad("controller.lead_cycles", self.lead_cycles, need);
+            return Err(ScenarioError::bad("controller.lead_cycles", &self.lead_cycles, need));
         }
-        let most_per_s = rate_hz / self.lead_cycles;
-        if self.integral_gain_per_s > most_per_s {
+        let (gain_per_s, most_per_s) = (self.integral_gain_per_s, f64::from(rate_hz) / self.lead_cycles);
+        if gain_per_s > most_per_s {
             let need = format!(
                 "use at most {most_per_s} (rate_hz / lead_cycles): with more, an error is corrected more than once before \
                  the first correction shows"
             );
-            return bad("controller.integral_gain_per_s", self.integral_gain_per_s, need);
+            return Err(ScenarioError::bad("controller.integral_gain_per_s", &gain_per_s, need));
         }
         Ok(())
     }

@@ -39,24 +39,19 @@ pub struct FaultConfig {
     /// From when on, s since the rig was switched on.
     pub from_s: f64,
     /// Until when, s; to the end when absent.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub until_s: Option<f64>,
     /// Node id concerned: the sender of a frame, the receiver that loses it, or the node itself. All when
     /// absent; never absent where a node babbles, is cut off or goes off the bus.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub node: Option<u8>,
     /// COB-ID of the frames concerned, or of those that are babbled (11 bits); all when absent.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub id: Option<u16>,
     /// Probability that the fault acts on a frame, 0 to 1; only for kinds that act on single frames.
     #[serde(default = "always")]
     pub probability: f64,
     /// Activations after which the fault ends; when absent one for bus-off, any number for the others. A disconnection ends by
     /// `until_s` alone.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub count: Option<u64>,
     /// How long a frame is delayed, µs.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub delay_us: Option<u32>,
 }
 

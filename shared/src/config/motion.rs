@@ -149,11 +149,9 @@ pub struct FileConfig {
     pub axes: [String; 3],
     /// Pose files: where the recorded reference point lies in the jaw frame at the closed pose, mm.
     /// By default the middle between the condyles, about which trackers of the hinge axis report.
-    #[serde(default)]
     pub reference_point_mm: Option<[f64; 3]>,
     /// Marker files: where the incisal point lies in file coordinates at the closed pose, mm.
     /// By default the markers' centroid.
-    #[serde(default)]
     pub marker_origin_mm: Option<[f64; 3]>,
     /// Corner of the zero-phase low-pass, Hz; 0 for none.
     #[serde(default = "FileConfig::default_lowpass_hz")]

@@ -26,7 +26,6 @@ section! {
         pub rate_hz: u32 = 1000,
         /// Duration of the motion, s; when absent a recording's own length, or ten seconds. A generated motion ends closed
         /// if this holds a cycle and half a second, otherwise on its way.
-        #[serde(skip_serializing_if = "Option::is_none")]
         pub duration_s: Option<f64> = None,
         /// The motion of the jaw.
         pub motion: MotionConfig = MotionConfig::default(),
@@ -45,7 +44,6 @@ section! {
         /// The emulated mechanism.
         pub dynamics: DynamicsConfig = DynamicsConfig::default(),
         /// Food between the teeth of the emulated jaw; none when absent.
-        #[serde(skip_serializing_if = "Option::is_none")]
         pub food: Option<FoodConfig> = None,
         /// The scheduling of the real-time processes.
         pub realtime: RealtimeConfig = RealtimeConfig::default(),
@@ -248,9 +246,7 @@ mod tests {
             ("[checks]\ntracking_rms_mm = inf", "checks.tracking_rms_mm"),
             ("[drives.leg]\nmax_force = 1.0", "did you mean `max_force_n`?"),
             ("name = ", "s.toml:1"),
-            ("[can]\nideal = true\nfd = true", "can.ideal = true: leave it away"),
             ("[can]\nideal = true\ninterfaces = ['a', 'b']", "can.ideal = true: leave it away"),
-            ("[can]\nfd = true\ndata_bitrate_bps = 9000000", "data_bitrate_bps"),
             ("[[faults]]\nkind = 'corrupt'\nbus = 2\nfrom_s = 0.0", "faults.bus = 2: name a bus"),
             ("[[faults]]\nkind = 'babble'\nbus = 0\nfrom_s = 0.0", "faults.node = none"),
             ("[[faults]]\nkind = 'delay'\nbus = 0\nfrom_s = 0.0", "faults.delay_us"),
@@ -268,7 +264,7 @@ mod tests {
                 "[[faults]]\nkind = 'disconnect'\nbus = 0\nnode = 1\nfrom_s = 1.0\ncount = 2",
                 "faults.count = 2: leave it away",
             ),
-            ("[can]\nfd = true\nbitrate_bps = 2000000", "can.bitrate_bps = 2000000: bit rate 2000000"),
+            ("[can]\nbitrate_bps = 2000000", "can.bitrate_bps = 2000000: bit rate 2000000"),
             ("[can]\nheartbeat_producer_ms = 0", "can.heartbeat_producer_ms = 0: use at least 1 ms"),
             (
                 "[controller]\nhold_s = 1e9",

@@ -2,11 +2,11 @@
 
 use bytemuck::{Pod, Zeroable};
 use iceoryx2::prelude::ZeroCopySend;
-use masseter_can::Frame;
 
 use super::schema::FieldType;
 
-const MOST: usize = Frame::MAX_DATA;
+/// Room for the frames of other formats too.
+const MOST: usize = 64;
 
 /// Data bytes, as CDR writes a sequence: how many, then they themselves. Unused ones are zero.
 #[repr(C)]
@@ -19,9 +19,14 @@ pub struct CanData {
 }
 
 impl CanData {
-    /// The first `length` of these bytes; those behind must be zero.
-    pub fn padded(bytes: [u8; MOST], length: usize) -> Self {
-        Self { length: length as u32, bytes }
+    /// The data of a frame.
+    ///
+    /// # Panics
+    /// With more bytes than there is room for.
+    pub fn new(data: &[u8]) -> Self {
+        let mut bytes = [0; MOST];
+        bytes[..data.len()].copy_from_slice(data);
+        Self { length: data.len() as u32, bytes }
     }
 
     /// The bytes in use.

@@ -260,7 +260,7 @@ messages! {
         id: u32,
         /// Index of the bus, from 0.
         bus: u32,
-        /// As in `struct canfd_frame`: 4 for an FD frame, 1 for one with bit-rate switch.
+        /// 0: the frame has no flags of `struct canfd_frame`.
         flags: u32,
         /// Data bytes.
         data: CanData,

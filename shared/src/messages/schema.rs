@@ -50,8 +50,8 @@ mod tests {
     #[test]
     fn a_body_holds_the_used_bytes_and_restores_the_message() {
         for length in [0, 1, 8, 64] {
-            let bytes = std::array::from_fn(|index| if index < length { 0xA5 } else { 0 });
-            let frame = FrameTap { seq: 7, data: CanData::padded(bytes, length), ..Default::default() };
+            let data = CanData::new(&[0xA5; 64][..length]);
+            let frame = FrameTap { seq: 7, data, ..Default::default() };
             assert_eq!(frame.body().len(), size_of::<FrameTap>() - 64 + length);
             assert_eq!(FrameTap::from_body(frame.body()), Some(frame));
         }
@@ -62,7 +62,7 @@ mod tests {
 
     #[test]
     fn a_body_that_no_message_has_makes_none() {
-        let frame = FrameTap { data: CanData::padded([0; 64], 8), ..Default::default() };
+        let frame = FrameTap { data: CanData::new(&[0; 8]), ..Default::default() };
         let bytes = bytemuck::bytes_of(&frame);
         for cut in (0..frame.body().len()).chain(frame.body().len() + 1..=bytes.len()) {
             assert_eq!(FrameTap::from_body(&bytes[..cut]), None, "{cut} bytes");

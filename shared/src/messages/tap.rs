@@ -1,7 +1,7 @@
 //! Frames and error reports of a CAN tap as messages of the topic `frame`, and back.
 
 use masseter_can::{
-    CanId, ERROR_FLAG, ErrorReport, ErrorReportError, Frame, FrameError, FrameFormat, Tapped, TappedFrame,
+    CanId, ERROR_FLAG, ErrorReport, ErrorReportError, Frame, FrameError, Tapped, TappedFrame,
 };
 
 use super::{CanData, FrameTap};
@@ -34,15 +34,12 @@ pub fn encode(bus: u16, tapped: &Tapped) -> FrameTap {
             queued_ns: queued_ns.unwrap_or(0),
             id: frame.id().flagged(),
             bus: bus.into(),
-            flags: flags_of(frame.format()),
-            data: CanData::padded(*frame.padded(), frame.data().len()),
+            data: CanData::new(frame.data()),
             ..FrameTap::default()
         },
         Tapped::Error(report) => {
             let (id, said) = report.encode();
-            let mut bytes = [0; Frame::MAX_DATA];
-            bytes[..said.len()].copy_from_slice(&said);
-            let data = CanData::padded(bytes, said.len());
+            let data = CanData::new(&said);
             FrameTap { time_ns: report.time_ns, id, bus: bus.into(), data, ..FrameTap::default() }
         }
     }
@@ -71,31 +68,12 @@ pub fn decode(tap: &FrameTap) -> Result<Tapped, TapError> {
         let (said, _) = tap.data.bytes.split_first_chunk().expect("an error message has 8 bytes");
         return Ok(Tapped::Error(ErrorReport::decode(tap.time_ns, tap.id, *said)?));
     }
-    let format = format_of(tap.flags);
-    format.check(tap.data.length as usize)?;
-    let frame = Frame::with_format(CanId::from_flagged(tap.id)?, format, tap.data.as_slice())?;
+    if tap.data.length as usize > Frame::MAX_DATA {
+        return Err(FrameError::DataLength { length: tap.data.length as usize }.into());
+    }
+    let frame = Frame::new(CanId::from_flagged(tap.id)?, tap.data.as_slice())?;
     let queued_ns = Some(tap.queued_ns).filter(|&queued_ns| queued_ns > 0);
     Ok(Tapped::Frame(TappedFrame { frame, time_ns: tap.time_ns, queued_ns }))
-}
-
-/// Flags of `struct canfd_frame` (`linux/can.h`): bit-rate switch, and that the frame is FD.
-const BIT_RATE_SWITCH: u32 = 0x01;
-const FD: u32 = 0x04;
-
-const fn flags_of(format: FrameFormat) -> u32 {
-    match format {
-        FrameFormat::Classical => 0,
-        FrameFormat::Fd => FD,
-        FrameFormat::FdBitRateSwitch => FD | BIT_RATE_SWITCH,
-    }
-}
-
-const fn format_of(flags: u32) -> FrameFormat {
-    match (flags & FD, flags & BIT_RATE_SWITCH) {
-        (0, _) => FrameFormat::Classical,
-        (_, 0) => FrameFormat::Fd,
-        _ => FrameFormat::FdBitRateSwitch,
-    }
 }
 
 #[cfg(test)]
@@ -105,21 +83,18 @@ mod tests {
 
     use super::*;
 
-    const FORMATS: [FrameFormat; 3] = [FrameFormat::Classical, FrameFormat::Fd, FrameFormat::FdBitRateSwitch];
-
-    /// Classical and FD frames with standard and extended identifiers.
+    /// Frames with standard and extended identifiers.
     fn any_frame() -> impl Strategy<Value = Frame> {
         let id = prop_oneof![
             (0..1_u32 << 11).prop_map(|id| CanId::standard(id as u16).unwrap()),
             (0..1_u32 << 29).prop_map(|id| CanId::extended(id).unwrap()),
         ];
         let data = prop::collection::vec(any::<u8>(), 0..=8);
-        (id, prop::sample::select(&FORMATS[..]), data)
-            .prop_map(|(id, format, data)| Frame::with_format(id, format, &data).unwrap())
+        (id, data).prop_map(|(id, data)| Frame::new(id, &data).unwrap())
     }
 
     fn of_length(length: usize) -> CanData {
-        CanData::padded([0; Frame::MAX_DATA], length)
+        CanData { length: length as u32, ..CanData::new(&[]) }
     }
 
     #[test]
@@ -128,8 +103,6 @@ mod tests {
         assert_eq!(decode(&tap), Err(FrameError::DataLength { length: 9 }.into()));
         let tap = FrameTap { data: of_length(65), ..Default::default() };
         assert_eq!(decode(&tap), Err(FrameError::DataLength { length: 65 }.into()));
-        let tap = FrameTap { data: of_length(65), flags: FD, ..Default::default() };
-        assert_eq!(decode(&tap), Err(FrameError::FdDataLength { length: 65 }.into()));
         let tap = FrameTap { id: 0x800, ..Default::default() };
         assert_eq!(decode(&tap), Err(FrameError::StandardId { id: 0x800 }.into()));
         let tap = FrameTap { id: ERROR_FLAG, ..Default::default() };

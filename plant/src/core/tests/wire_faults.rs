@@ -175,14 +175,3 @@ fn a_fault_of_an_absent_node_is_refused() {
     let error = PlantCore::new(&scenario, 0).unwrap_err().to_string();
     assert_eq!(error, "faults.node = 5: bus 0 has the nodes 127, 1, 2, 3");
 }
-
-#[test]
-fn with_fd_one_bus_carries_all_six_axes_at_a_kilohertz() {
-    let mut scenario = Scenario::default();
-    scenario.can.buses = vec![vec![0, 1, 2, 3, 4, 5]];
-    scenario.can.fd = true;
-    let mut bench = Bench::new(&scenario);
-    let worst_m = play_until(&mut bench, 1.0);
-    assert!(worst_m < 1e-4, "{worst_m}");
-    assert_eq!(bench.causes(EventKind::Fault), []);
-}

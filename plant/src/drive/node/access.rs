@@ -34,7 +34,7 @@ impl Dictionary for DictionaryAccess<'_> {
         }
         self.axis.show(self.now_ns, self.objects);
         let word = self.objects.word(place).to_le_bytes();
-        let data = Expedited::new(&word[..entry.kind.bytes()]).map_err(|_| AbortCode::GENERAL)?;
+        let data = Expedited::new(&word[..entry.kind.bytes()]).ok_or(AbortCode::GENERAL)?;
         Ok(Value::Number(data))
     }
 

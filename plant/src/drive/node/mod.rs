@@ -97,7 +97,7 @@ impl DriveNode {
     pub(crate) fn receive(&mut self, now_ns: u64, frame: &Frame, position_m: f64) {
         match Cob::try_from(frame.id()) {
             Ok(Cob::Nmt) => {
-                if let Ok(message) = NmtMessage::decode(frame.data())
+                if let Some(message) = NmtMessage::decode(frame.data())
                     && message.target.includes(self.id)
                 {
                     self.obey_nmt(message.command, now_ns);

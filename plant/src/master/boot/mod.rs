@@ -277,7 +277,7 @@ impl Boot {
             Step::If { condition, .. } => holds = self.holds(condition, number),
             Step::Keep(object) => {
                 let wrong_length = at(Cause::SdoAborted, object, AbortCode::LENGTH.0, 0);
-                self.kept = Expedited::new(read.bytes()).map_err(|_| wrong_length)?;
+                self.kept = Expedited::new(read.bytes()).ok_or(wrong_length)?;
             }
             _ => {}
         }

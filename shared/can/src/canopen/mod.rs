@@ -15,10 +15,8 @@ pub mod sync;
 pub use cob::{Cob, CobError, CobId};
 pub use emcy::{Emergency, EmergencyCode};
 pub use heartbeat::{Heartbeat, HeartbeatError, NmtState};
-pub use nmt::{Nmt, NmtCommand, NmtError, NmtTarget};
+pub use nmt::{Nmt, NmtCommand, NmtTarget};
 pub use node::{NodeId, NodeIdError};
 pub use payload::LengthError;
 pub(super) use payload::exactly;
-pub use sdo::{
-    AbortCode, Expedited, ObjectAddress, SdoError, SdoPayloadError, SdoRequest, SdoResponse, Segment,
-};
+pub use sdo::{AbortCode, Expedited, ObjectAddress, SdoError, SdoRequest, SdoResponse, Segment};

@@ -1,6 +1,6 @@
 //! Network management commands (CiA 301, 7.2.8).
 
-use super::{Cob, LengthError, NodeId, NodeIdError, exactly};
+use super::{Cob, NodeId};
 use crate::frame::Frame;
 
 codes! {
@@ -44,23 +44,6 @@ pub struct Nmt {
     pub target: NmtTarget,
 }
 
-/// Data that is no network management message.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-pub enum NmtError {
-    /// Wrong length.
-    #[error(transparent)]
-    Length(#[from] LengthError),
-    /// A command specifier that CiA 301 does not define.
-    #[error("{code:02X}h is no NMT command")]
-    UnknownCommand {
-        /// The command specifier.
-        code: u8,
-    },
-    /// Neither all nodes nor a node.
-    #[error("NMT target: {0}")]
-    Target(#[from] NodeIdError),
-}
-
 impl Nmt {
     /// The frame that carries the command.
     pub fn frame(self) -> Frame {
@@ -71,15 +54,12 @@ impl Nmt {
         Frame::fixed(Cob::Nmt.into(), [self.command.code(), target])
     }
 
-    /// Reads the data bytes.
-    ///
-    /// # Errors
-    /// [`NmtError`] for another length than 2, an unknown command or a target above 127.
-    pub fn decode(data: &[u8]) -> Result<Self, NmtError> {
-        let [code, target] = exactly("NMT", data)?;
-        let command = NmtCommand::from_code(code).ok_or(NmtError::UnknownCommand { code })?;
-        let target = if target == 0 { NmtTarget::All } else { NmtTarget::Node(NodeId::new(target)?) };
-        Ok(Self { command, target })
+    /// Reads the data bytes; `None` for another length than 2, an unknown command or a target above 127.
+    pub fn decode(data: &[u8]) -> Option<Self> {
+        let &[code, target] = data else { return None };
+        let command = NmtCommand::from_code(code)?;
+        let target = if target == 0 { NmtTarget::All } else { NmtTarget::Node(NodeId::new(target).ok()?) };
+        Some(Self { command, target })
     }
 }
 
@@ -91,7 +71,7 @@ mod tests {
     fn decoded_bytes_encode_to_the_same_bytes() {
         let mut decoded = 0;
         for (code, target) in (0..=255).flat_map(|code| (0..=255).map(move |target| (code, target))) {
-            if let Ok(nmt) = Nmt::decode(&[code, target]) {
+            if let Some(nmt) = Nmt::decode(&[code, target]) {
                 assert_eq!(nmt.frame().data(), [code, target]);
                 decoded += 1;
             }
@@ -100,10 +80,9 @@ mod tests {
     }
 
     #[test]
-    fn errors_contain_the_received_bytes() {
-        assert_eq!(Nmt::decode(&[3, 0]), Err(NmtError::UnknownCommand { code: 3 }));
-        assert_eq!(Nmt::decode(&[1, 128]), Err(NmtError::Target(NodeIdError { id: 128 })));
-        assert_eq!(Nmt::decode(&[1]).unwrap_err().to_string(), "NMT has 2 data bytes, received 1");
+    fn another_length_command_or_target_is_refused() {
+        let refused: [&[u8]; 5] = [&[], &[1], &[1, 0, 0], &[3, 0], &[1, 128]];
+        assert_eq!(refused.map(Nmt::decode), [None; 5]);
     }
 
     #[test]

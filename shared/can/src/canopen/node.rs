@@ -32,14 +32,6 @@ impl NodeId {
     }
 }
 
-impl TryFrom<u8> for NodeId {
-    type Error = NodeIdError;
-
-    fn try_from(id: u8) -> Result<Self, NodeIdError> {
-        Self::new(id)
-    }
-}
-
 impl fmt::Display for NodeId {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         self.0.fmt(f)

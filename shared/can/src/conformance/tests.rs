@@ -17,8 +17,6 @@ enum Flaw {
     TurnsTimeBack,
     DropsSilently,
     SendsInOrderOfQueueing,
-    CutsFdFrames,
-    TakesFdClassically,
 }
 
 /// Two ports that hand frames over at once; only end A sends.
@@ -41,11 +39,9 @@ impl FlawedPair {
     fn hand_over(&mut self, frame: Frame) {
         let data = match self.flaw {
             Flaw::AltersData => &[0xFF],
-            Flaw::CutsFdFrames => frame.data().get(..8).unwrap_or(frame.data()),
             _ => frame.data(),
         };
-        let format = frame.promoted(self.format()).format();
-        let frame = Frame::with_format(frame.id(), format, data).unwrap();
+        let frame = Frame::new(frame.id(), data).unwrap();
         let time_ns = if self.flaw == Flaw::TurnsTimeBack { u64::MAX - self.now_ns } else { self.now_ns };
         let [own, other] = &mut self.arrived;
         other.push_back(Received { frame, time_ns });
@@ -64,10 +60,6 @@ impl FlawedPair {
 impl Pair for FlawedPair {
     fn end(&mut self, end: End) -> impl Bus {
         FlawedPort { pair: self, end }
-    }
-
-    fn format(&self) -> FrameFormat {
-        if self.flaw == Flaw::TakesFdClassically { FrameFormat::Classical } else { FrameFormat::Fd }
     }
 
     fn now_ns(&self) -> u64 {
@@ -129,8 +121,6 @@ fn every_flaw_is_caught_by_the_law_it_breaks() {
         (Flaw::AltersData, Law::Delivery),
         (Flaw::TurnsTimeBack, Law::Delivery),
         (Flaw::DropsSilently, Law::Losses),
-        (Flaw::CutsFdFrames, Law::Fd),
-        (Flaw::TakesFdClassically, Law::Fd),
     ];
     for (flaw, law) in table {
         assert_eq!(check(|| FlawedPair::new(flaw)).unwrap_err().law, law);

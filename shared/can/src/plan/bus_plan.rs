@@ -2,15 +2,14 @@
 
 use super::message::{PeriodicMessage, PlannedMessage, Release, utilisation};
 use super::response_time::response_ns;
-use crate::frame::FrameFormat;
 use crate::id::CanId;
-use crate::wire::{Rates, longest_bits};
+use crate::wire::{Bitrate, worst_case_bits};
 
 /// The plan of one bus.
 ///
 /// # Examples
 /// ```
-/// use masseter_can::{Bitrate, BusPlan, CanId, FrameFormat, PeriodicMessage, Rates};
+/// use masseter_can::{Bitrate, BusPlan, CanId, PeriodicMessage};
 ///
 /// let message = |id: u16, data_length| -> Result<_, masseter_can::FrameError> {
 ///     let (name, id) = (format!("{id:03X}"), CanId::standard(id)?);
@@ -18,8 +17,7 @@ use crate::wire::{Rates, longest_bits};
 ///     Ok(PeriodicMessage { name, id, data_length, period_ns, deadline_ns, release: None })
 /// };
 /// let messages = vec![message(0x080, 0)?, message(0x181, 8)?];
-/// let rates = Rates::classical(Bitrate::MAX);
-/// let plan = BusPlan::new(0, rates, FrameFormat::Classical, 1_000_000, messages)?;
+/// let plan = BusPlan::new(0, Bitrate::MAX, 1_000_000, messages)?;
 /// plan.check()?;
 /// let sync_ns = plan.response_ns(CanId::standard(0x080)?);
 /// assert_eq!(sync_ns, Some(190_000), "135 bits of the longer frame, 55 bits of its own");
@@ -29,14 +27,14 @@ use crate::wire::{Rates, longest_bits};
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct BusPlan {
     pub(super) bus: usize,
-    pub(super) rates: Rates,
+    pub(super) bitrate: Bitrate,
     pub(super) cycle_ns: u64,
     pub(super) messages: Vec<PlannedMessage>,
 }
 
 /// A bus whose messages do not arrive in time.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("{0}\nuse a longer period, a faster bit rate, CAN FD or more buses")]
+#[error("{0}\nuse a longer period, a faster bit rate or more buses")]
 pub struct Overload(pub Box<BusPlan>);
 
 /// A message whose release is not by a more urgent message of its bus.
@@ -56,27 +54,26 @@ impl BusPlan {
     /// [`NoReleaser`] for a message whose release names no more urgent message.
     pub fn new(
         bus: usize,
-        rates: Rates,
-        format: FrameFormat,
+        bitrate: Bitrate,
         cycle_ns: u64,
         messages: Vec<PeriodicMessage>,
     ) -> Result<Self, NoReleaser> {
         let mut planned: Vec<_> = messages
             .into_iter()
             .map(|message| {
-                let bits = longest_bits(message.data_length, message.id.is_extended(), format);
-                let transmission_ns = rates.duration_ns(bits);
+                let bits = worst_case_bits(message.data_length, message.id.is_extended());
+                let transmission_ns = bitrate.bits_to_ns(bits);
                 PlannedMessage { message, transmission_ns, jitter_ns: None, response_ns: None }
             })
             .collect();
         planned.sort_by_key(|planned| planned.message.id);
-        let bit_ns = rates.nominal().bits_to_ns(1);
+        let bit_ns = bitrate.bits_to_ns(1);
         for index in 0..planned.len() {
             // The message that releases this one is analysed already.
             planned[index].jitter_ns = jitter_ns(&planned[index].message, &planned[..index])?;
             planned[index].response_ns = response_ns(&planned, index, bit_ns);
         }
-        Ok(Self { bus, rates, cycle_ns, messages: planned })
+        Ok(Self { bus, bitrate, cycle_ns, messages: planned })
     }
 
     /// Index of the bus.
@@ -85,8 +82,8 @@ impl BusPlan {
     }
 
     /// Bit rates.
-    pub fn rates(&self) -> Rates {
-        self.rates
+    pub fn bitrate(&self) -> Bitrate {
+        self.bitrate
     }
 
     /// Length of a cycle, ns.
@@ -108,12 +105,6 @@ impl BusPlan {
     /// Share of the bus time that all messages take at worst; more than 1 does not fit.
     pub fn utilisation(&self) -> f64 {
         utilisation(&self.messages)
-    }
-
-    /// The longest time from release to arrival of a message; `None` for one that is not in the plan, or
-    /// has no bound.
-    pub fn response_ns(&self, id: CanId) -> Option<u64> {
-        self.messages.iter().find(|planned| planned.message.id == id)?.response_ns
     }
 
     /// Whether every message arrives in time.
@@ -157,8 +148,7 @@ mod tests {
     }
 
     fn plan(bps: u32, messages: Vec<PeriodicMessage>) -> BusPlan {
-        let rates = Rates::classical(Bitrate::new(bps).unwrap());
-        BusPlan::new(0, rates, FrameFormat::Classical, 1_000_000, messages).unwrap()
+        BusPlan::new(0, Bitrate::new(bps).unwrap(), 1_000_000, messages).unwrap()
     }
 
     fn responses_us(plan: &BusPlan) -> Vec<Option<u64>> {
@@ -225,8 +215,7 @@ mod tests {
     fn a_message_whose_releaser_is_not_there_or_less_urgent_is_refused() {
         for other in [3, 5] {
             let messages = vec![released(other, message(4, 8, 1000)), message(5, 8, 1000)];
-            let rates = Rates::classical(Bitrate::MAX);
-            let error = BusPlan::new(0, rates, FrameFormat::Classical, 1_000_000, messages).unwrap_err();
+            let error = BusPlan::new(0, Bitrate::MAX, 1_000_000, messages).unwrap_err();
             assert_eq!(error.releaser, CanId::standard(other).unwrap());
             assert_eq!(error.name, "m004");
         }

@@ -51,14 +51,9 @@ impl PlannedMessage {
     pub fn arrival_ns(&self) -> Option<u64> {
         Some(self.jitter_ns? + self.response_ns?)
     }
-
-    /// Share of the bus time that the message takes at worst.
-    fn share(&self) -> f64 {
-        self.transmission_ns as f64 / self.message.period_ns as f64
-    }
 }
 
 /// Share of the time that the messages take at worst.
 pub(super) fn utilisation(messages: &[PlannedMessage]) -> f64 {
-    messages.iter().map(PlannedMessage::share).sum()
+    messages.iter().map(|planned| planned.transmission_ns as f64 / planned.message.period_ns as f64).sum()
 }

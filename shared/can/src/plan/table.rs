@@ -8,13 +8,11 @@ use super::message::PlannedMessage;
 impl fmt::Display for BusPlan {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let us = |ns: u64| format!("{:.1}", ns as f64 / 1e3);
-        write!(f, "bus {}: {} bit/s", self.bus, self.rates.nominal().bps())?;
-        if self.rates.data() != self.rates.nominal() {
-            write!(f, ", data phase {} bit/s", self.rates.data().bps())?;
-        }
         writeln!(
             f,
-            "; a cycle of {} µs takes {} µs at worst; load {:.1} %",
+            "bus {}: {} bit/s; a cycle of {} µs takes {} µs at worst; load {:.1} %",
+            self.bus,
+            self.bitrate.bps(),
             us(self.cycle_ns),
             us(self.cycle_time_ns()),
             self.utilisation() * 100.0

@@ -3,8 +3,7 @@
 use super::*;
 use crate::conformance::{self, End, Pair};
 use crate::faults::{Fault, FaultKind};
-use crate::wire::Rates;
-use crate::{Bitrate, Bus, CanId, ErrorState, Frame, FrameFormat, SendError, VirtualWire, WireConfig};
+use crate::{Bitrate, Bus, CanId, ErrorState, Frame, SendError, VirtualWire, WireConfig};
 
 const FAULT: Fault = Fault {
     number: 0,
@@ -17,10 +16,9 @@ const FAULT: Fault = Fault {
     count: u64::MAX,
 };
 
-fn wire(format: FrameFormat) -> VirtualWire {
+fn wire() -> VirtualWire {
     VirtualWire::new(&WireConfig {
-        rates: Rates::classical(Bitrate::MAX),
-        format,
+        bitrate: Bitrate::MAX,
         ports: 2,
         transmit_capacity: 8,
         receive_capacity: 4,
@@ -31,7 +29,6 @@ fn wire(format: FrameFormat) -> VirtualWire {
 /// Two ports of a simulated wire, each with faults of its own.
 struct Faulted {
     wire: VirtualWire,
-    format: FrameFormat,
     now_ns: u64,
     faults: [PortFaults; 2],
 }
@@ -39,10 +36,10 @@ struct Faulted {
 impl Faulted {
     fn new(of_a: Vec<Fault>, of_b: Vec<Fault>) -> Self {
         Self {
-            wire: wire(FrameFormat::Classical),
-            format: FrameFormat::Classical,
+            wire: wire(),
             now_ns: 0,
-            faults: [(of_a, 0), (of_b, 1)].map(|(faults, port)| PortFaults::new(faults, port, 1).unwrap()),
+            faults: [(of_a, 0), (of_b, 1)]
+                .map(|(faults, port)| PortFaults::new(faults, port, 1, None).unwrap()),
         }
     }
 
@@ -68,10 +65,6 @@ impl Pair for Faulted {
         self.faults[index].over(self.wire.port(index))
     }
 
-    fn format(&self) -> FrameFormat {
-        self.format
-    }
-
     fn now_ns(&self) -> u64 {
         self.now_ns
     }
@@ -90,11 +83,9 @@ fn frame(byte: u8) -> Frame {
 
 #[test]
 fn ports_under_faults_conform() {
-    for format in [FrameFormat::Classical, FrameFormat::FdBitRateSwitch] {
-        let new = || Faulted { wire: wire(format), format, ..Faulted::new(Vec::new(), Vec::new()) };
-        assert_eq!(conformance::check(new), Ok(()));
-        assert_eq!(conformance::check_arbitration(new), Ok(()));
-    }
+    let new = || Faulted::new(Vec::new(), Vec::new());
+    assert_eq!(conformance::check(new), Ok(()));
+    assert_eq!(conformance::check_arbitration(new), Ok(()));
 }
 
 #[test]
@@ -149,8 +140,8 @@ fn a_node_in_bus_off_reports_bus_off_until_it_restarts() {
     assert_eq!(pair.end(End::A).status().state, ErrorState::BusOff);
     pair.now_ns = 10_000_000_000;
     assert_eq!(pair.send(2), Err(SendError::BusOff { tec: 256 }), "it was not told to restart");
-    let restarting = PortFaults::new(vec![off], 0, 1).unwrap().restarting_after(Some(1_000_000));
-    let mut pair = Faulted { faults: [restarting, PortFaults::new(Vec::new(), 1, 1).unwrap()], ..pair };
+    let restarting = PortFaults::new(vec![off], 0, 1, Some(1_000_000)).unwrap();
+    let mut pair = Faulted { faults: [restarting, PortFaults::new(Vec::new(), 1, 1, None).unwrap()], ..pair };
     assert_eq!(pair.send(3), Err(SendError::BusOff { tec: 256 }));
     pair.now_ns += 999_999;
     assert_eq!(pair.send(4), Err(SendError::BusOff { tec: 256 }));
@@ -164,7 +155,7 @@ fn a_node_in_bus_off_reports_bus_off_until_it_restarts() {
 fn a_node_is_put_off_the_bus_as_often_as_asked_for() {
     let off = Fault { kind: FaultKind::BusOff, count: 2, ..FAULT };
     let mut pair = Faulted::new(Vec::new(), Vec::new());
-    pair.faults[0] = PortFaults::new(vec![off], 0, 1).unwrap().restarting_after(Some(1_000_000));
+    pair.faults[0] = PortFaults::new(vec![off], 0, 1, Some(1_000_000)).unwrap();
     for _ in 0..2 {
         for byte in 0..5 {
             assert_eq!(pair.send(byte), Err(SendError::BusOff { tec: 256 }));
@@ -190,5 +181,5 @@ fn a_copy_without_room_does_not_fail_the_frame() {
 #[test]
 fn corruption_needs_a_wire() {
     let corrupt = Fault { kind: FaultKind::Corrupt, number: 5, ..FAULT };
-    assert_eq!(PortFaults::new(vec![FAULT, corrupt], 0, 1).unwrap_err(), NotByPort { number: 5 });
+    assert_eq!(PortFaults::new(vec![FAULT, corrupt], 0, 1, None).unwrap_err(), NotByPort { number: 5 });
 }

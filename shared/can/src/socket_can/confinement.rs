@@ -8,17 +8,8 @@ use socketcan::errors::{
     CAN_ERR_RESTARTED, ControllerProblems,
 };
 
-use crate::bus::{BusStatus, ErrorState};
+use crate::bus::{BusStatus, ErrorState, ReceiveError};
 use crate::error_frame::ErrorKind;
-
-/// The content of an error frame.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct ErrorReportParts {
-    /// A change of state, otherwise an error on the wire; `None` for anything else.
-    pub(super) kind: Option<ErrorKind>,
-    /// Frames that the controller lost: 1 for each report of a loss.
-    pub(super) lost: u64,
-}
 
 /// Transmit error counter at which a controller is bus-off; error frames have no room for more than 255.
 const BUS_OFF_TEC: u16 = 256;
@@ -38,13 +29,14 @@ impl Confinement {
         self.0
     }
 
-    /// Takes an error frame.
-    pub(super) fn take(&mut self, classes: u32, data: &[u8]) -> ErrorReportParts {
+    /// Takes an error frame: a change of state, otherwise an error on the wire; `None` for anything else.
+    ///
+    /// # Errors
+    /// [`ReceiveError::Overrun`] where the controller lost frames; it does not count them.
+    pub(super) fn take(&mut self, classes: u32, data: &[u8]) -> Result<Option<ErrorKind>, ReceiveError> {
         let has = |class| classes & class != 0;
         let before = self.0.state;
-        let [_, problems, _, _, _, _, tec, rec] = *data else {
-            return ErrorReportParts { kind: None, lost: 0 };
-        };
+        let [_, problems, _, _, _, _, tec, rec] = *data else { return Ok(None) };
         let problems = ControllerProblems::from_bits_truncate(problems);
         if has(CAN_ERR_RESTARTED) {
             *self = Self::default();
@@ -58,14 +50,15 @@ impl Confinement {
         if has(CAN_ERR_BUSOFF) {
             (self.0.state, self.0.tec) = (ErrorState::BusOff, BUS_OFF_TEC);
         }
-        let kind = match self.0.state {
+        if has(CAN_ERR_CRTL) && problems.contains(ControllerProblems::RX_OVERFLOW) {
+            return Err(ReceiveError::Overrun { lost: 1 });
+        }
+        Ok(match self.0.state {
             state if state != before => Some(ErrorKind::State(state)),
             _ if has(CAN_ERR_ACK) => Some(ErrorKind::Acknowledge),
             _ if has(CAN_ERR_PROT | CAN_ERR_BUSERROR) => Some(ErrorKind::Bit),
             _ => None,
-        };
-        let has_lost = has(CAN_ERR_CRTL) && problems.contains(ControllerProblems::RX_OVERFLOW);
-        ErrorReportParts { kind, lost: u64::from(has_lost) }
+        })
     }
 }
 
@@ -107,7 +100,7 @@ mod tests {
         for (classes, data, state, tec, rec) in table {
             let before = confinement.status().state;
             let kind = (state != before).then_some(ErrorKind::State(state));
-            assert_eq!(confinement.take(classes, &data), ErrorReportParts { kind, lost: 0 });
+            assert_eq!(confinement.take(classes, &data), Ok(kind));
             assert_eq!(confinement.status(), BusStatus { state, tec, rec }, "{classes:x} {data:?}");
         }
     }
@@ -116,7 +109,7 @@ mod tests {
     fn a_controller_that_lost_frames_changes_no_state_and_reports_one() {
         let mut confinement = Confinement::default();
         let data = [0, ControllerProblems::RX_OVERFLOW.bits(), 0, 0, 0, 0, 0, 0];
-        assert_eq!(confinement.take(CAN_ERR_CRTL, &data), ErrorReportParts { kind: None, lost: 1 });
+        assert_eq!(confinement.take(CAN_ERR_CRTL, &data), Err(ReceiveError::Overrun { lost: 1 }));
         assert_eq!(confinement.status().state, ErrorState::Active);
     }
 
@@ -132,7 +125,7 @@ mod tests {
         ];
         let mut confinement = Confinement::default();
         for (classes, data, kind) in table {
-            assert_eq!(confinement.take(classes, &data).kind, kind, "{classes:x}");
+            assert_eq!(confinement.take(classes, &data), Ok(kind), "{classes:x}");
         }
     }
 }

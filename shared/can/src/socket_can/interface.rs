@@ -7,12 +7,9 @@ use std::path::{Path, PathBuf};
 use socketcan::{CanSocket, Socket};
 
 use super::errno::errno;
-use crate::frame::FrameFormat;
 
 /// Hardware type of CAN interfaces (`ARPHRD_CAN`).
 const CAN_TYPE: u32 = 280;
-/// Transfer unit of an interface set up for FD (`CANFD_MTU`).
-const FD_MTU: u32 = 72;
 /// Flag of an interface that is up (`IFF_UP`).
 const UP: u32 = 1;
 
@@ -39,15 +36,6 @@ pub enum OpenError {
     /// The interface is down.
     #[error("{interface} is down; `ip link set {interface} up type can bitrate …` brings it up")]
     Down {
-        /// The interface.
-        interface: String,
-    },
-    /// The interface speaks classical CAN only.
-    #[error(
-        "{interface} is not set up for CAN FD; `ip link set {interface} type can bitrate … dbitrate … fd on` sets it \
-         up where its controller can (a virtual one: `ip link set {interface} mtu 72`), or leave `can.fd` away"
-    )]
-    NotFd {
         /// The interface.
         interface: String,
     },
@@ -88,8 +76,8 @@ impl OpenError {
 }
 
 /// The length of the interface's transmit queue, frames. Refuses an interface that does not exist, is not a CAN
-/// interface, is down, or does not have the format.
-pub(super) fn check(interface: &str, format: FrameFormat) -> Result<usize, OpenError> {
+/// interface, or is down.
+pub(super) fn check(interface: &str) -> Result<usize, OpenError> {
     // A socket on all interfaces exists wherever the kernel knows CAN.
     CanSocket::open_iface(0).map_err(|error| OpenError::from_errno(interface, errno(&error)))?;
     if !can_interfaces().iter().any(|there| there == interface) {
@@ -98,9 +86,6 @@ pub(super) fn check(interface: &str, format: FrameFormat) -> Result<usize, OpenE
     let folder = Path::new(INTERFACES).join(interface);
     if flags(&folder).is_some_and(|flags| flags & UP == 0) {
         return Err(OpenError::Down { interface: interface.to_owned() });
-    }
-    if format.is_fd() && number(&folder.join("mtu")) != Some(FD_MTU) {
-        return Err(OpenError::NotFd { interface: interface.to_owned() });
     }
     Ok(number(&folder.join("tx_queue_len")).unwrap_or(0) as usize)
 }

@@ -22,13 +22,11 @@
 //! Frames lost because the socket was not emptied in time are counted by the kernel. The kernel does
 //! not count the frames that the controller itself lost, so each such report means at least one frame.
 //!
-//! # Formats
-//! A port opened for an FD format sends all its frames in it, and its interface must have been set up for FD.
-//! Whatever a port was opened for, it receives frames of every format; remote frames are passed over.
+//! # Frames
+//! Remote frames and frames in FD format are passed over.
 //!
-//! An adapter that is unplugged is gone for good: its port reports
-//! [`InterfaceDown`](ReceiveError::InterfaceDown) until it is opened anew; one that was only taken down works
-//! again when it is up.
+//! An adapter that is unplugged is gone for good: its port reports [`ReceiveError::Os`](crate::ReceiveError::Os) until it
+//! is opened anew; one that was only taken down works again when it is up.
 
 mod clock;
 mod confinement;

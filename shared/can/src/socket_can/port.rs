@@ -4,15 +4,15 @@ use std::io;
 use std::time::{Duration, SystemTime};
 
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
-use socketcan::{CanAnyFrame, CanFdSocket, EmbeddedFrame as _, Socket, SocketOptions};
+use socketcan::{CanFrame, CanSocket, EmbeddedFrame as _, Socket, SocketOptions};
 
-use super::confinement::{Confinement, ErrorReportParts};
+use super::confinement::Confinement;
 use super::errno::errno;
 use super::interface::{self, OpenError};
 use super::{clock, conversion};
 use crate::bus::{Bus, BusStatus, ErrorState, ReceiveError, Received, SendError};
 use crate::error_frame::ErrorReport;
-use crate::frame::{Frame, FrameFormat};
+use crate::frame::Frame;
 use crate::tap::{Tapped, TappedFrame};
 
 /// Frames looked at in one call of [`Bus::receive`]: error and remote frames must not hold a cycle up.
@@ -29,9 +29,9 @@ const MEMINFO_DROPS: usize = 8;
 ///
 /// # Examples
 /// ```no_run
-/// use masseter_can::{Bus, CanId, Frame, FrameFormat, SocketCan};
+/// use masseter_can::{Bus, CanId, Frame, SocketCan};
 ///
-/// let mut port = SocketCan::open("can0", FrameFormat::Classical)?;
+/// let mut port = SocketCan::open("can0")?;
 /// port.send(SocketCan::now_ns(), Frame::new(CanId::standard(0x123)?, &[1, 2])?)?;
 /// while let Some(received) = port.receive(SocketCan::now_ns())? {
 ///     println!("{} at {} ns", received.frame, received.time_ns);
@@ -40,8 +40,7 @@ const MEMINFO_DROPS: usize = 8;
 /// ```
 #[derive(Debug)]
 pub struct SocketCan {
-    socket: CanFdSocket,
-    format: FrameFormat,
+    socket: CanSocket,
     transmit_capacity: usize,
     confinement: Confinement,
     last_ns: u64,
@@ -52,18 +51,17 @@ pub struct SocketCan {
 }
 
 impl SocketCan {
-    /// Opens a port that sends in that format, on an interface that is there and up and has it.
+    /// Opens a port on an interface that is there and up.
     ///
     /// # Errors
     /// [`OpenError`], which says what to do.
-    pub fn open(interface: &str, format: FrameFormat) -> Result<Self, OpenError> {
-        let transmit_capacity = interface::check(interface, format)?;
+    pub fn open(interface: &str) -> Result<Self, OpenError> {
+        let transmit_capacity = interface::check(interface)?;
         let failed = |error| OpenError::from_errno(interface, errno(&error));
-        let socket = CanFdSocket::open(interface).map_err(failed)?;
+        let socket = CanSocket::open(interface).map_err(failed)?;
         configure(&socket).map_err(failed)?;
         Ok(Self {
             socket,
-            format,
             transmit_capacity,
             confinement: Confinement::default(),
             last_ns: 0,
@@ -116,27 +114,19 @@ impl SocketCan {
     }
 
     /// Converts a fetched frame: a frame or an error on the wire, a loss, or nothing.
-    fn take(
-        &mut self,
-        frame: &CanAnyFrame,
-        stamp: Option<SystemTime>,
-    ) -> Result<Option<Tapped>, ReceiveError> {
+    fn take(&mut self, frame: &CanFrame, stamp: Option<SystemTime>) -> Result<Option<Tapped>, ReceiveError> {
         self.drained = true;
         let time_ns = stamp.map_or_else(clock::now_ns, clock::monotonic_ns).max(self.last_ns);
         self.last_ns = time_ns;
         let tapped = |frame| Tapped::Frame(Received { frame, time_ns }.into());
         match frame {
-            CanAnyFrame::Normal(data) => Ok(conversion::from_data(data).map(tapped)),
-            CanAnyFrame::Fd(fd) => Ok(conversion::from_fd(fd).map(tapped)),
-            CanAnyFrame::Error(error) => {
-                let ErrorReportParts { kind, lost } = self.confinement.take(error.error_bits(), error.data());
-                if lost > 0 {
-                    return Err(ReceiveError::Overrun { lost });
-                }
+            CanFrame::Data(data) => Ok(conversion::from_kernel(data).map(tapped)),
+            CanFrame::Error(error) => {
+                let kind = self.confinement.take(error.error_bits(), error.data())?;
                 let report = |kind| ErrorReport::new(time_ns, OWN_PORT, kind, self.confinement.status());
                 Ok(kind.map(report).map(Tapped::Error))
             }
-            CanAnyFrame::Remote(_) => Ok(None),
+            CanFrame::Remote(_) => Ok(None),
         }
     }
 
@@ -164,11 +154,13 @@ impl SocketCan {
         match error.kind() {
             io::ErrorKind::WouldBlock => self.empty(),
             io::ErrorKind::Interrupted => Ok(()),
-            _ if is_down(error) => {
-                self.confinement = Confinement::default();
-                Err(ReceiveError::InterfaceDown { errno: errno(error) })
+            _ => {
+                let errno = errno(error);
+                if matches!(errno, libc::ENETDOWN | libc::ENODEV | libc::ENXIO) {
+                    self.confinement = Confinement::default();
+                }
+                Err(ReceiveError::Os { errno })
             }
-            _ => Err(ReceiveError::Os { errno: errno(error) }),
         }
     }
 }
@@ -179,14 +171,9 @@ impl Bus for SocketCan {
         if state == ErrorState::BusOff {
             return Err(SendError::BusOff { tec });
         }
-        let frame = frame.promoted(self.format);
-        if frame.format().is_fd() && !self.format.is_fd() {
-            return Err(SendError::NotFd { length: frame.data().len() });
-        }
         self.socket.write_frame(&conversion::to_kernel(&frame)).map_err(|error| match errno(&error) {
             // ENOBUFS: the interface's queue; EAGAIN: the socket's own share of it.
             libc::ENOBUFS | libc::EAGAIN => SendError::QueueFull { capacity: self.transmit_capacity },
-            errno if is_down(&error) => SendError::InterfaceDown { errno },
             errno => SendError::Os { errno },
         })
     }
@@ -202,14 +189,10 @@ impl Bus for SocketCan {
     }
 }
 
-fn configure(socket: &CanFdSocket) -> io::Result<()> {
+fn configure(socket: &CanSocket) -> io::Result<()> {
     socket.set_nonblocking(true)?;
     socket.set_recv_own_msgs(false)?;
     socket.set_error_filter_accept_all()?;
     socket.set_recv_timestamp(true)?;
     socket.set_socket_option_int(libc::SOL_SOCKET, libc::SO_RCVBUF, RECEIVE_BUFFER)
-}
-
-fn is_down(error: &io::Error) -> bool {
-    matches!(errno(error), libc::ENETDOWN | libc::ENODEV | libc::ENXIO)
 }

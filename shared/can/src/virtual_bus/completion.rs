@@ -1,4 +1,4 @@
-//! The end of a transmission: changes of the ports, the tap and the statistics.
+//! The end of a transmission: changes of the ports and the tap.
 
 use super::confinement::Confinement;
 use super::transmission::{Outcome, Transmission};
@@ -16,8 +16,6 @@ impl VirtualWire {
     /// Ends a transmission.
     pub(super) fn end(&mut self, transmission: &Transmission) {
         self.nodes.idle_from_ns = transmission.idle_from_ns;
-        self.statistics.busy_ns += transmission.idle_from_ns - transmission.start_ns;
-        self.statistics.collisions += u64::from(transmission.is_collision());
         if let Some(activation) = transmission.activation {
             self.nodes.faults.record(activation);
         }
@@ -40,13 +38,12 @@ impl VirtualWire {
         let end_ns = transmission.end_ns;
         self.deliver(transmission);
         for port in 0..self.nodes.stations.len() {
-            if transmission.senders.contains(port) {
+            if transmission.contest.senders.contains(port) {
                 self.confine(port, end_ns, Confinement::transmitted);
-                if !transmission.babbling.contains(port) {
+                if !transmission.contest.babbling.contains(port) {
                     self.nodes.stations[port].transmit.remove_most_urgent(transmission.start_ns);
                 }
-            } else if transmission.losers.contains(port) {
-                self.statistics.retransmissions += 1;
+            } else if transmission.contest.losers.contains(port) {
                 self.transmit_error(port, end_ns);
             }
         }
@@ -55,10 +52,8 @@ impl VirtualWire {
     /// Delivers the frame to all receivers.
     fn deliver(&mut self, transmission: &Transmission) {
         let time_ns = transmission.received_ns;
-        self.statistics.count_frame(time_ns - transmission.queued_ns);
-        let frame = self.nodes.frame_of(transmission);
-        let received = Received { frame, time_ns };
-        let queued_ns = Some(transmission.queued_ns);
+        let &Transmission { frame, queued_ns, .. } = transmission;
+        let (received, queued_ns) = (Received { frame, time_ns }, Some(queued_ns));
         self.tap.push(time_ns, Tapped::Frame(TappedFrame { frame, time_ns, queued_ns }));
         for port in 0..self.nodes.stations.len() {
             if transmission.is_from(port) || !self.nodes.is_on_bus(port, transmission.start_ns) {
@@ -81,11 +76,8 @@ impl VirtualWire {
     /// An error frame has ended the transmission; the frame stays queued, to be sent again.
     fn fail(&mut self, transmission: &Transmission, kind: ErrorKind) {
         let is_received = transmission.outcome == Outcome::ReceivedAndRepeated;
-        self.statistics.error_frames += 1;
-        self.statistics.unacknowledged += u64::from(kind == ErrorKind::Acknowledge);
         for port in 0..self.nodes.stations.len() {
             if transmission.is_from(port) {
-                self.statistics.retransmissions += 1;
                 self.fail_to_send(port, transmission, kind);
             } else if !is_received && self.nodes.is_on_bus(port, transmission.start_ns) {
                 self.confine(port, transmission.end_ns, Confinement::receive_error);
@@ -119,7 +111,7 @@ impl VirtualWire {
     fn suspend_passive(&mut self, transmission: &Transmission) {
         for (port, station) in self.nodes.stations.iter_mut().enumerate() {
             if transmission.is_from(port) && station.confinement.state() == ErrorState::Passive {
-                let pause_ns = self.nodes.config.rates.nominal().bits_to_ns(SUSPEND_BITS);
+                let pause_ns = self.nodes.config.bitrate.bits_to_ns(SUSPEND_BITS);
                 station.suspended_until_ns = transmission.idle_from_ns + pause_ns;
             }
         }

@@ -97,13 +97,6 @@ impl Confinement {
         self.off = Some(Off { restart_ns, sequences: RECOVERY_SEQUENCES, seen_to_ns: now_ns });
     }
 
-    /// The host restarts the controller; nothing unless it is off the bus and waits for that.
-    pub(super) fn restart(&mut self, now_ns: u64) {
-        if let Some(off) = &mut self.off {
-            off.restart_ns = Some(off.restart_ns.map_or(now_ns, |restart_ns| restart_ns.min(now_ns)));
-        }
-    }
-
     /// When the node is back on the bus if the wire stays idle and 11 bits take `sequence_ns`; `None` on the
     /// bus, or without a restart.
     pub(super) fn back_at_ns(&self, sequence_ns: u64) -> Option<u64> {

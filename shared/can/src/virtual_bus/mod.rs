@@ -13,8 +13,8 @@
 //! frames of one identifier disturb each other where the frames first differ; equal frames pass as one. Each
 //! port counts errors by the rules of ISO 11898-1, becomes error passive and leaves the bus; a passive
 //! transmitter pauses for 8 bits. A port off the bus discards its queue. After a restart it comes back with 128
-//! times 11 recessive bits. The restart is a call of [`restart`](VirtualWire::restart), or follows after
-//! [`restart_after_ns`](WireConfig::restart_after_ns), as `ip link … restart-ms` does.
+//! times 11 recessive bits. The restart follows after [`restart_after_ns`](WireConfig::restart_after_ns), as with
+//! `ip link … restart-ms`.
 //!
 //! # Time
 //! The wire moves in [`advance`](VirtualWire::advance) only. All frames queued at or before an instant take
@@ -25,22 +25,17 @@
 //! # What is not modelled
 //! - Errors that only some nodes see, and overload frames.
 //! - The traffic of a disconnected node on its end of the wire.
-//! - The recessive ESI bit in FD frames of an error passive node. That bit may change their stuffing.
 
 mod completion;
-mod config;
 mod confinement;
 mod nodes;
 mod port;
 mod queue;
-mod statistics;
 mod transmission;
 mod wire;
 
 #[cfg(test)]
 mod tests;
 
-pub use config::WireConfig;
 pub use port::Port;
-pub use statistics::Statistics;
-pub use wire::VirtualWire;
+pub use wire::{VirtualWire, WireConfig};

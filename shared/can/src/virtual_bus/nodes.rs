@@ -1,8 +1,8 @@
 //! The nodes of a simulated wire, and everything else that decides about the next transmission.
 
-use super::config::WireConfig;
 use super::confinement::Confinement;
-use super::queue::{Queued, ReceiveQueue, TransmitQueue};
+use super::queue::{ReceiveQueue, TransmitQueue};
+use super::wire::WireConfig;
 use crate::bus::Received;
 use crate::faults::Faults;
 use crate::wire::INTERFRAME_BITS;
@@ -25,8 +25,6 @@ pub(super) struct Nodes {
     pub(super) config: WireConfig,
     pub(super) stations: Vec<Station>,
     pub(super) faults: Faults,
-    /// The frame that each fault makes a node babble.
-    pub(super) babble: Vec<Option<Queued>>,
     /// Transmissions so far. Faults select transmissions by this number.
     pub(super) transmissions: u64,
     pub(super) idle_from_ns: u64,
@@ -46,11 +44,10 @@ impl Nodes {
         Self {
             config: *config,
             stations: (0..config.ports).map(|_| station()).collect(),
-            babble: faults.babbled().map(|frame| Some(Queued::babbled(frame?, config))).collect(),
             faults,
             transmissions: 0,
             idle_from_ns: 0,
-            interframe_ns: config.rates.nominal().bits_to_ns(INTERFRAME_BITS),
+            interframe_ns: config.bitrate.bits_to_ns(INTERFRAME_BITS),
         }
     }
 

@@ -2,10 +2,9 @@
 
 use std::collections::VecDeque;
 
-use super::config::WireConfig;
 use crate::bus::{ReceiveError, SendError};
 use crate::frame::Frame;
-use crate::wire::{Rates, frame_bits};
+use crate::wire::{Bitrate, frame_bits};
 
 /// A frame waiting for the wire.
 #[derive(Debug, Clone, Copy)]
@@ -17,13 +16,8 @@ pub(super) struct Queued {
 }
 
 impl Queued {
-    pub(super) fn new(frame: Frame, rates: Rates, since_ns: u64) -> Self {
-        Self { frame, duration_ns: rates.duration_ns(frame_bits(&frame)), since_ns }
-    }
-
-    /// A frame that a fault makes a node babble.
-    pub(super) fn babbled(frame: Frame, config: &WireConfig) -> Self {
-        Self::new(frame.promoted(config.format), config.rates, 0)
+    pub(super) fn new(frame: Frame, bitrate: Bitrate, since_ns: u64) -> Self {
+        Self { frame, duration_ns: bitrate.bits_to_ns(frame_bits(&frame)), since_ns }
     }
 }
 
@@ -70,10 +64,8 @@ impl TransmitQueue {
     }
 
     /// Discards all frames; returns their number.
-    pub(super) fn clear(&mut self) -> u64 {
-        let abandoned = self.frames.len() as u64;
+    pub(super) fn clear(&mut self) {
         self.frames.clear();
-        abandoned
     }
 }
 

@@ -3,12 +3,12 @@
 use proptest::prelude::*;
 
 use super::*;
-use crate::bus::{ReceiveError, Received, SendError};
+use crate::bus::{BusStatus, ReceiveError, Received, SendError};
 use crate::conformance::{self, End, Pair};
-use crate::error_frame::ErrorReport;
-use crate::frame::{Frame, FrameFormat};
+use crate::error_frame::{ErrorKind, ErrorReport};
+use crate::frame::Frame;
 use crate::tap::Tapped;
-use crate::wire::{Bitrate, INTERFRAME_BITS, Rates, frame_bits};
+use crate::wire::{Bitrate, INTERFRAME_BITS, frame_bits};
 use crate::{Bus, CanId, canopen::sync};
 
 mod errors;
@@ -19,8 +19,7 @@ const BIT_NS: u64 = 1000;
 const FOREVER: u64 = u64::MAX;
 
 const CONFIG: WireConfig = WireConfig {
-    rates: Rates::classical(Bitrate::MAX),
-    format: FrameFormat::Classical,
+    bitrate: Bitrate::MAX,
     ports: PORTS,
     transmit_capacity: 8,
     receive_capacity: 16,
@@ -36,11 +35,11 @@ fn frame(id: u16, data: &[u8]) -> Frame {
 }
 
 fn duration_ns(frame: &Frame) -> u64 {
-    u64::from(frame_bits(frame).total() - INTERFRAME_BITS) * BIT_NS
+    u64::from(frame_bits(frame) - INTERFRAME_BITS) * BIT_NS
 }
 
 fn fetch(wire: &mut VirtualWire, port: usize) -> Vec<Received> {
-    std::iter::from_fn(|| wire.receive(port, FOREVER).unwrap()).collect()
+    std::iter::from_fn(|| wire.port(port).receive(FOREVER).unwrap()).collect()
 }
 
 fn tapped(wire: &mut VirtualWire) -> Vec<Tapped> {
@@ -52,6 +51,16 @@ fn arrivals(wire: &mut VirtualWire) -> Vec<(u32, u64)> {
     frames.iter().map(|received| (received.frame.id().number(), received.time_ns)).collect()
 }
 
+fn status(wire: &mut VirtualWire, port: usize) -> BusStatus {
+    wire.port(port).status()
+}
+
+/// The error frames among these.
+fn error_frames(tapped: &[Tapped]) -> usize {
+    let is_error_frame = |tapped: &&Tapped| matches!(tapped, Tapped::Error(report) if !matches!(report.kind, ErrorKind::State(_)));
+    tapped.iter().filter(is_error_frame).count()
+}
+
 /// The errors that the tap saw.
 fn errors(wire: &mut VirtualWire) -> Vec<ErrorReport> {
     let tapped = tapped(wire).into_iter();
@@ -61,8 +70,8 @@ fn errors(wire: &mut VirtualWire) -> Vec<ErrorReport> {
 #[test]
 fn sync_takes_48_bits_to_arrive_and_51_until_the_next_may_start() {
     let mut wire = wire();
-    wire.send(0, 5000, sync::frame()).unwrap();
-    wire.send(0, 5000, sync::frame()).unwrap();
+    wire.port(0).send(5000, sync::frame()).unwrap();
+    wire.port(0).send(5000, sync::frame()).unwrap();
     wire.advance(1_000_000);
     assert_eq!(arrivals(&mut wire), [(0x080, 5000 + 48_000), (0x080, 5000 + 51_000 + 48_000)]);
 }
@@ -71,11 +80,15 @@ fn sync_takes_48_bits_to_arrive_and_51_until_the_next_may_start() {
 fn everyone_but_the_sender_receives_a_frame_once_at_its_end() {
     let mut wire = wire();
     let frame = frame(0x181, &[1, 2, 3]);
-    wire.send(1, 0, frame).unwrap();
+    wire.port(1).send(0, frame).unwrap();
     wire.advance(duration_ns(&frame) - 1);
-    assert_eq!(wire.receive(0, FOREVER), Ok(None), "not before the end of the frame");
+    assert_eq!(wire.port(0).receive(FOREVER), Ok(None), "not before the end of the frame");
     wire.advance(duration_ns(&frame));
-    assert_eq!(wire.receive(0, duration_ns(&frame) - 1), Ok(None), "nor to who asks for an earlier time");
+    assert_eq!(
+        wire.port(0).receive(duration_ns(&frame) - 1),
+        Ok(None),
+        "nor to who asks for an earlier time"
+    );
     let expected = [Received { frame, time_ns: duration_ns(&frame) }];
     assert_eq!(fetch(&mut wire, 0), expected);
     assert_eq!(fetch(&mut wire, 1), []);
@@ -86,7 +99,7 @@ fn everyone_but_the_sender_receives_a_frame_once_at_its_end() {
 fn the_lowest_identifier_wins_in_any_order_of_queuing() {
     let mut wire = wire();
     for (port, id) in [(2, 0x183), (1, 0x182), (0, 0x201), (0, 0x080), (1, 0x081)] {
-        wire.send(port, 0, frame(id, &[])).unwrap();
+        wire.port(port).send(0, frame(id, &[])).unwrap();
     }
     wire.advance(FOREVER / 2);
     let order: Vec<_> = arrivals(&mut wire).into_iter().map(|(id, _)| id).collect();
@@ -96,8 +109,8 @@ fn the_lowest_identifier_wins_in_any_order_of_queuing() {
 #[test]
 fn a_frame_on_the_wire_is_not_interrupted() {
     let mut wire = wire();
-    wire.send(0, 0, frame(0x700, &[])).unwrap();
-    wire.send(1, 1, frame(0x080, &[])).unwrap();
+    wire.port(0).send(0, frame(0x700, &[])).unwrap();
+    wire.port(1).send(1, frame(0x080, &[])).unwrap();
     wire.advance(FOREVER / 2);
     assert_eq!(arrivals(&mut wire)[0].0, 0x700, "nothing else was queued when it started");
 }
@@ -105,9 +118,9 @@ fn a_frame_on_the_wire_is_not_interrupted() {
 #[test]
 fn frames_of_one_instant_arbitrate_even_if_time_was_advanced_to_it_between() {
     let mut wire = wire();
-    wire.send(0, 1000, frame(0x700, &[])).unwrap();
+    wire.port(0).send(1000, frame(0x700, &[])).unwrap();
     wire.advance(1000);
-    wire.send(1, 1000, frame(0x080, &[])).unwrap();
+    wire.port(1).send(1000, frame(0x080, &[])).unwrap();
     wire.advance(FOREVER / 2);
     assert_eq!(arrivals(&mut wire)[0].0, 0x080);
 }
@@ -116,7 +129,7 @@ fn frames_of_one_instant_arbitrate_even_if_time_was_advanced_to_it_between() {
 fn a_frame_queued_for_the_past_is_queued_now() {
     let mut wire = wire();
     wire.advance(1_000_000);
-    wire.send(0, 10, sync::frame()).unwrap();
+    wire.port(0).send(10, sync::frame()).unwrap();
     assert_eq!(wire.next_event_ns(), Some(1_048_000));
 }
 
@@ -124,12 +137,12 @@ fn a_frame_queued_for_the_past_is_queued_now() {
 fn equal_identifiers_of_a_port_stay_in_order() {
     let mut wire = wire();
     for byte in 0..4 {
-        wire.send(0, 0, frame(0x123, &[byte])).unwrap();
+        wire.port(0).send(0, frame(0x123, &[byte])).unwrap();
     }
     wire.advance(FOREVER / 2);
     let bytes: Vec<_> = fetch(&mut wire, 1).iter().map(|received| received.frame.data()[0]).collect();
     assert_eq!(bytes, [0, 1, 2, 3]);
-    assert_eq!(wire.statistics().collisions, 0);
+    assert_eq!(errors(&mut wire), []);
 }
 
 #[test]
@@ -137,13 +150,13 @@ fn a_full_transmit_queue_refuses_and_a_full_receive_queue_counts() {
     let mut wire = wire();
     for round in 0..3 {
         for _ in 0..8 {
-            wire.send(0, round * 1_000_000, sync::frame()).unwrap();
+            wire.port(0).send(round * 1_000_000, sync::frame()).unwrap();
         }
-        let refused = wire.send(0, round * 1_000_000, sync::frame());
+        let refused = wire.port(0).send(round * 1_000_000, sync::frame());
         assert_eq!(refused, Err(SendError::QueueFull { capacity: 8 }));
         wire.advance((round + 1) * 1_000_000);
     }
-    assert_eq!(wire.receive(1, FOREVER), Err(ReceiveError::Overrun { lost: 8 }));
+    assert_eq!(wire.port(1).receive(FOREVER), Err(ReceiveError::Overrun { lost: 8 }));
     assert_eq!(fetch(&mut wire, 1).len(), 16);
     assert_eq!(arrivals(&mut wire).len(), 24, "the tap has room for the traffic of all ports");
 }
@@ -152,8 +165,8 @@ fn a_full_transmit_queue_refuses_and_a_full_receive_queue_counts() {
 fn events_lead_from_arrival_to_arrival() {
     let mut wire = wire();
     assert_eq!(wire.next_event_ns(), None);
-    wire.send(0, 100, sync::frame()).unwrap();
-    wire.send(1, 200, frame(0x181, &[])).unwrap();
+    wire.port(0).send(100, sync::frame()).unwrap();
+    wire.port(1).send(200, frame(0x181, &[])).unwrap();
     let mut events = Vec::new();
     while let Some(event_ns) = wire.next_event_ns() {
         wire.advance(event_ns);
@@ -165,15 +178,13 @@ fn events_lead_from_arrival_to_arrival() {
 }
 
 #[test]
-fn statistics_add_up() {
+fn the_tap_knows_when_a_frame_was_queued() {
     let mut wire = wire();
-    wire.send(0, 0, sync::frame()).unwrap();
-    wire.send(0, 0, sync::frame()).unwrap();
-    wire.advance(204_000);
-    let statistics = *wire.statistics();
-    assert_eq!((statistics.frames, statistics.busy_ns), (2, 102_000));
-    assert_eq!((statistics.response_max_ns, statistics.response_total_ns), (99_000, 48_000 + 99_000));
-    assert!((statistics.load(204_000) - 0.5).abs() < 1e-12);
+    wire.port(0).send(1000, sync::frame()).unwrap();
+    wire.port(0).send(2000, sync::frame()).unwrap();
+    wire.advance(FOREVER / 2);
+    let queued: Vec<_> = tapped(&mut wire).iter().map(|tapped| tapped.frame().unwrap().queued_ns).collect();
+    assert_eq!(queued, [Some(1000), Some(2000)]);
 }
 
 struct TwoPorts {
@@ -184,10 +195,6 @@ struct TwoPorts {
 impl Pair for TwoPorts {
     fn end(&mut self, end: End) -> impl Bus {
         self.wire.port(end as usize)
-    }
-
-    fn format(&self) -> FrameFormat {
-        self.wire.nodes.config.format
     }
 
     fn now_ns(&self) -> u64 {
@@ -204,12 +211,9 @@ impl Pair for TwoPorts {
 
 #[test]
 fn the_wire_conforms() {
-    for format in [FrameFormat::Classical, FrameFormat::Fd, FrameFormat::FdBitRateSwitch] {
-        let wire = || VirtualWire::new(&WireConfig { format, ..CONFIG });
-        let new = || TwoPorts { wire: wire(), now_ns: 0 };
-        assert_eq!(conformance::check(new), Ok(()));
-        assert_eq!(conformance::check_arbitration(new), Ok(()));
-    }
+    let new = || TwoPorts { wire: wire(), now_ns: 0 };
+    assert_eq!(conformance::check(new), Ok(()));
+    assert_eq!(conformance::check_arbitration(new), Ok(()));
 }
 
 proptest! {
@@ -221,7 +225,7 @@ proptest! {
         let run = |cuts: &[u64]| {
             let mut wire = wire();
             for &(port, at_ns, id, length) in &sends {
-                wire.send(port, at_ns, frame(id, &[0x55; 8][..length])).unwrap();
+                wire.port(port).send(at_ns, frame(id, &[0x55; 8][..length])).unwrap();
             }
             for &cut_ns in cuts {
                 wire.advance(cut_ns);

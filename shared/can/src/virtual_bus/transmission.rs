@@ -3,8 +3,6 @@
 //! Everything here is a function of the present state of the nodes, so a caller can ask for the next event without
 //! changing the state.
 
-use std::cmp::Ordering;
-
 use super::nodes::Nodes;
 use super::queue::Queued;
 use crate::bus::ErrorState;
@@ -35,8 +33,9 @@ impl PortSet {
         self.0 |= 1 << port;
     }
 
-    fn is_several(self) -> bool {
-        self.0.count_ones() > 1
+    /// The ports behind that one.
+    fn above(self, port: usize) -> Self {
+        Self(self.0 & (u64::MAX - 1) << port)
     }
 
     fn ports(self) -> impl Iterator<Item = usize> {
@@ -49,14 +48,10 @@ impl PortSet {
     }
 }
 
-/// A transmission of a frame. The frame itself stays in its queue until the transmission has ended, so looking ahead
-/// copies no frame.
+/// A transmission of a frame, which stays queued until the transmission has ended.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Transmission {
-    /// The port of the frame, which is its most urgent frame or a babbled one.
-    port: usize,
-    /// The fault that babbles the frame.
-    babble: Option<usize>,
+    pub(super) frame: Frame,
     pub(super) queued_ns: u64,
     pub(super) start_ns: u64,
     /// When the last end-of-frame bit is, or would have been, over.
@@ -65,12 +60,7 @@ pub(super) struct Transmission {
     pub(super) end_ns: u64,
     /// When the next frame may start.
     pub(super) idle_from_ns: u64,
-    /// The senders: all ports with the same frame.
-    pub(super) senders: PortSet,
-    /// The senders that babble.
-    pub(super) babbling: PortSet,
-    /// Ports that sent another frame with the same identifier and detected the difference.
-    pub(super) losers: PortSet,
+    pub(super) contest: Contest,
     pub(super) outcome: Outcome,
     pub(super) activation: Option<FaultActivation>,
 }
@@ -88,13 +78,13 @@ pub(super) enum Outcome {
 
 /// The frame that a port would send.
 #[derive(Clone, Copy)]
-struct Candidate<'a> {
+struct Candidate {
     port: usize,
-    queued: &'a Queued,
+    queued: Queued,
     babbles: Option<FaultActivation>,
 }
 
-impl Candidate<'_> {
+impl Candidate {
     fn id(&self) -> CanId {
         self.queued.frame.id()
     }
@@ -106,7 +96,40 @@ impl Nodes {
         let contenders = self.contenders();
         // As soon as the bus is idle and a node has something to send.
         let start_ns = contenders.ports().filter_map(|port| self.ready_ns(port)).min()?;
-        self.transmission(contenders, start_ns)
+        let (contest, strongest) = self.arbitrate(contenders, start_ns)?;
+        let Queued { frame, duration_ns, since_ns: queued_ns } = strongest.queued;
+        let numbered = NumberedFrame {
+            at_ns: start_ns,
+            port: strongest.port,
+            id: frame.id(),
+            number: self.transmissions,
+        };
+        let mut transmission = Transmission {
+            frame,
+            queued_ns,
+            start_ns,
+            received_ns: start_ns + duration_ns - self.interframe_ns,
+            end_ns: start_ns + duration_ns - self.interframe_ns,
+            idle_from_ns: start_ns + duration_ns,
+            contest,
+            outcome: Outcome::Received,
+            activation: strongest.babbles,
+        };
+        if let Some(bit) = contest.destroyed_at {
+            transmission.destroy(self, bit, ErrorKind::Bit);
+        } else if let Some(activation) = self.faults.corrupts(numbered) {
+            let last = frame_bits(&frame) - INTERFRAME_BITS;
+            let bit = 1 + self.faults.pick(activation, self.transmissions, last);
+            transmission.activation = Some(activation);
+            transmission.destroy(self, bit, ErrorKind::Bit);
+        } else if !self.is_acknowledged(&transmission) {
+            let slot = frame_bits(&frame) - INTERFRAME_BITS - BEHIND_ACKNOWLEDGE_BITS;
+            transmission.destroy(self, slot, ErrorKind::Acknowledge);
+        } else if let Some(activation) = self.faults.duplicates(numbered) {
+            transmission.activation = Some(activation);
+            transmission.repeat(self);
+        }
+        Some(transmission)
     }
 
     /// The ports that may have a frame to send, now or later.
@@ -135,67 +158,8 @@ impl Nodes {
         (at_ns < u64::MAX).then_some(at_ns)
     }
 
-    /// The transmission after an arbitration at that time; `None` when no node can send then.
-    fn transmission(&self, contenders: PortSet, start_ns: u64) -> Option<Transmission> {
-        let (winner, is_contested) = self.arbitrate(contenders, start_ns)?;
-        let (contest, strongest) = if is_contested {
-            self.contest(contenders, start_ns, winner)
-        } else {
-            (Contest::won_by(winner), winner)
-        };
-        let Queued { ref frame, duration_ns, since_ns } = *strongest.queued;
-        let numbered = NumberedFrame {
-            at_ns: start_ns,
-            port: strongest.port,
-            id: frame.id(),
-            number: self.transmissions,
-        };
-        let mut transmission = Transmission {
-            port: strongest.port,
-            babble: strongest.babbles.map(|activation| activation.place),
-            queued_ns: if strongest.babbles.is_some() { start_ns } else { since_ns },
-            start_ns,
-            received_ns: start_ns + duration_ns - self.interframe_ns,
-            end_ns: start_ns + duration_ns - self.interframe_ns,
-            idle_from_ns: start_ns + duration_ns,
-            senders: contest.senders,
-            babbling: contest.babbling,
-            losers: contest.losers,
-            outcome: Outcome::Received,
-            activation: strongest.babbles,
-        };
-        if let Some(bit) = contest.destroyed_at {
-            transmission.destroy(self, frame, bit, ErrorKind::Bit);
-        } else if let Some(activation) = self.faults.corrupts(numbered) {
-            let last = frame_bits(frame).total() - INTERFRAME_BITS;
-            transmission.activation = Some(activation);
-            transmission.destroy(
-                self,
-                frame,
-                1 + self.faults.pick(activation, self.transmissions, last),
-                ErrorKind::Bit,
-            );
-        } else if !self.is_acknowledged(&transmission) {
-            let slot = frame_bits(frame).total() - INTERFRAME_BITS - BEHIND_ACKNOWLEDGE_BITS;
-            transmission.destroy(self, frame, slot, ErrorKind::Acknowledge);
-        } else if let Some(activation) = self.faults.duplicates(numbered) {
-            transmission.activation = Some(activation);
-            transmission.repeat(self);
-        }
-        Some(transmission)
-    }
-
-    /// The frame of a transmission that has not ended.
-    pub(super) fn frame_of(&self, transmission: &Transmission) -> Frame {
-        let queued = match transmission.babble {
-            Some(fault) => self.babble[fault].as_ref(),
-            None => self.stations[transmission.port].transmit.most_urgent(transmission.start_ns),
-        };
-        queued.expect("a frame stays queued until it was sent").frame
-    }
-
     /// The frame that each of those ports would send at that time.
-    fn candidates(&self, contenders: PortSet, start_ns: u64) -> impl Iterator<Item = Candidate<'_>> {
+    fn candidates(&self, contenders: PortSet, start_ns: u64) -> impl Iterator<Item = Candidate> {
         contenders.ports().filter_map(move |port| {
             let candidate = self.candidate(port, start_ns)?;
             let may = self.stations[port].suspended_until_ns <= start_ns && self.is_on_bus(port, start_ns);
@@ -203,18 +167,18 @@ impl Nodes {
         })
     }
 
-    fn candidate(&self, port: usize, start_ns: u64) -> Option<Candidate<'_>> {
+    fn candidate(&self, port: usize, start_ns: u64) -> Option<Candidate> {
         let queued = self.stations[port].transmit.most_urgent(start_ns);
-        let queued = queued.map(|queued| Candidate { port, queued, babbles: None });
+        let queued = queued.map(|&queued| Candidate { port, queued, babbles: None });
         match self.babbled(port, start_ns) {
             Some(babbled) if queued.is_none_or(|queued| babbled.id() < queued.id()) => Some(babbled),
             _ => queued,
         }
     }
 
-    fn babbled(&self, port: usize, start_ns: u64) -> Option<Candidate<'_>> {
-        let (activation, _) = self.faults.makes_babble(start_ns, port)?;
-        let queued = self.babble[activation.place].as_ref()?;
+    fn babbled(&self, port: usize, start_ns: u64) -> Option<Candidate> {
+        let (activation, frame) = self.faults.makes_babble(start_ns, port)?;
+        let queued = Queued::new(frame, self.config.bitrate, start_ns);
         Some(Candidate { port, queued, babbles: Some(activation) })
     }
 
@@ -224,31 +188,14 @@ impl Nodes {
             .any(|port| !transmission.is_from(port) && self.is_on_bus(port, transmission.start_ns))
     }
 
-    /// The lowest port with the most urgent identifier of all, and whether another port candidates that too.
-    fn arbitrate(&self, contenders: PortSet, start_ns: u64) -> Option<(Candidate<'_>, bool)> {
-        let mut candidates = self.candidates(contenders, start_ns);
-        let first = (candidates.next()?, false);
-        Some(candidates.fold(
-            first,
-            |(winner, is_contested), candidate| match candidate.id().cmp(&winner.id()) {
-                Ordering::Less => (candidate, false),
-                Ordering::Equal => (winner, true),
-                Ordering::Greater => (winner, is_contested),
-            },
-        ))
-    }
-
-    /// Compares the frames of all ports that send the winning identifier.
-    fn contest<'a>(
-        &'a self,
-        contenders: PortSet,
-        start_ns: u64,
-        winner: Candidate<'a>,
-    ) -> (Contest, Candidate<'a>) {
-        let mut contest = Contest::won_by(winner);
-        let mut strongest = winner;
-        let is_rival = |candidate: &Candidate| candidate.port > winner.port && candidate.id() == winner.id();
-        for rival in self.candidates(contenders, start_ns).filter(is_rival) {
+    /// The lowest port with the most urgent identifier of all wins. The frames of later ports that send the same
+    /// identifier are compared with its frame; the result has the one that stays on the bus.
+    fn arbitrate(&self, contenders: PortSet, start_ns: u64) -> Option<(Contest, Candidate)> {
+        let winner = self.candidates(contenders, start_ns).min_by_key(Candidate::id)?;
+        let (mut contest, mut strongest) = (Contest::default(), winner);
+        contest.admit(winner);
+        let rivals = self.candidates(contenders.above(winner.port), start_ns);
+        for rival in rivals.filter(|rival| rival.id() == winner.id()) {
             let difference = first_difference(&strongest.queued.frame, &rival.queued.frame);
             let Some(difference) = difference else {
                 contest.admit(rival);
@@ -269,27 +216,25 @@ impl Nodes {
                 strongest = rival;
             }
         }
-        (contest, strongest)
+        Some((contest, strongest))
     }
 }
 
 /// Ports that send one identifier at once.
-#[derive(Default)]
-struct Contest {
-    senders: PortSet,
-    babbling: PortSet,
-    losers: PortSet,
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Contest {
+    /// All ports with the same frame.
+    pub(super) senders: PortSet,
+    /// The senders that babble.
+    pub(super) babbling: PortSet,
+    /// Ports that sent another frame and detected the difference.
+    pub(super) losers: PortSet,
+    /// The bit at which a difference destroys the frame.
     destroyed_at: Option<u32>,
 }
 
 impl Contest {
-    fn won_by(candidate: Candidate<'_>) -> Self {
-        let mut contest = Self::default();
-        contest.admit(candidate);
-        contest
-    }
-
-    fn admit(&mut self, candidate: Candidate<'_>) {
+    fn admit(&mut self, candidate: Candidate) {
         self.senders.add(candidate.port);
         if candidate.babbles.is_some() {
             self.babbling.add(candidate.port);
@@ -300,24 +245,18 @@ impl Contest {
 impl Transmission {
     /// Whether the port sent that identifier. A loser has signalled an error and does not receive the frame.
     pub(super) fn is_from(&self, port: usize) -> bool {
-        self.senders.contains(port) || self.losers.contains(port)
-    }
-
-    /// Several ports sent the same identifier.
-    pub(super) fn is_collision(&self) -> bool {
-        self.senders.is_several() || self.losers != PortSet::default()
+        self.contest.senders.contains(port) || self.contest.losers.contains(port)
     }
 
     /// An error flag begins behind bit number `bit` of the frame.
-    fn destroy(&mut self, nodes: &Nodes, frame: &Frame, bit: u32, kind: ErrorKind) {
+    fn destroy(&mut self, nodes: &Nodes, bit: u32, kind: ErrorKind) {
         let is_echoed = (0..nodes.stations.len()).any(|port| {
-            !self.senders.contains(port)
+            !self.contest.senders.contains(port)
                 && nodes.is_on_bus(port, self.start_ns)
                 && nodes.stations[port].confinement.state() == ErrorState::Active
         });
         let flag_bits = if is_echoed { 2 * ERROR_FLAG_BITS } else { ERROR_FLAG_BITS };
-        let rates = nodes.config.rates;
-        let error_ns = self.start_ns + rates.time_to_bit_ns(frame_bits(frame), bit);
+        let error_ns = self.start_ns + nodes.config.bitrate.bits_to_ns(bit);
         self.end_in_error_frame(nodes, error_ns, flag_bits);
         self.outcome = Outcome::Destroyed(kind);
     }
@@ -329,8 +268,8 @@ impl Transmission {
     }
 
     fn end_in_error_frame(&mut self, nodes: &Nodes, error_ns: u64, flag_bits: u32) {
-        let nominal = nodes.config.rates.nominal();
-        self.end_ns = error_ns + nominal.bits_to_ns(flag_bits + ERROR_DELIMITER_BITS);
-        self.idle_from_ns = error_ns + nominal.bits_to_ns(flag_bits + ERROR_DELIMITER_BITS + INTERFRAME_BITS);
+        let (bitrate, bits) = (nodes.config.bitrate, flag_bits + ERROR_DELIMITER_BITS);
+        self.end_ns = error_ns + bitrate.bits_to_ns(bits);
+        self.idle_from_ns = error_ns + bitrate.bits_to_ns(bits + INTERFRAME_BITS);
     }
 }

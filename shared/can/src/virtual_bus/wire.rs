@@ -1,16 +1,29 @@
 //! The wire in virtual time: its public methods, and the order of its events.
 
-use super::config::WireConfig;
 use super::confinement::{Confinement, SEQUENCE_BITS};
 use super::nodes::{Nodes, Station};
-use super::queue::{Queued, ReceiveQueue};
-use super::statistics::Statistics;
+use super::queue::ReceiveQueue;
 use super::transmission::{PortSet, Transmission};
-use crate::bus::{BusStatus, ErrorState, ReceiveError, Received, SendError};
+use crate::bus::{ErrorState, ReceiveError};
 use crate::error_frame::{ErrorKind, ErrorReport};
-use crate::faults::{FaultActivation, FaultNote, Faults, NumberedFrame};
-use crate::frame::Frame;
+use crate::faults::{FaultActivation, FaultNote, Faults};
 use crate::tap::Tapped;
+use crate::wire::Bitrate;
+
+/// What a wire is made of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct WireConfig {
+    /// Bit rate.
+    pub bitrate: Bitrate,
+    /// Ports, one a node.
+    pub ports: usize,
+    /// Frames a port may have waiting for transmission.
+    pub transmit_capacity: usize,
+    /// Frames a port may have received and not fetched; the tap's queue is as long for each port.
+    pub receive_capacity: usize,
+    /// How long after bus-off a port restarts by itself, ns; `None` for never.
+    pub restart_after_ns: Option<u64>,
+}
 
 /// A simulated wire and the ports on it.
 #[derive(Debug)]
@@ -19,7 +32,8 @@ pub struct VirtualWire {
     pub(super) tap: ReceiveQueue<Tapped>,
     traffic: Traffic,
     pub(super) advanced_to_ns: u64,
-    pub(super) statistics: Statistics,
+    /// Frames that ports took for transmission. Faults select the frames to delay by this number.
+    pub(super) queued: u64,
 }
 
 /// The present or next transmission.
@@ -58,41 +72,8 @@ impl VirtualWire {
             tap: ReceiveQueue::new(config.receive_capacity * config.ports),
             traffic: Traffic::Unknown,
             advanced_to_ns: 0,
-            statistics: Statistics::default(),
+            queued: 0,
         }
-    }
-
-    /// Queues a frame at a port.
-    ///
-    /// # Errors
-    /// [`SendError::QueueFull`], [`SendError::BusOff`] and [`SendError::NotFd`]; no other.
-    pub fn send(&mut self, port: usize, now_ns: u64, frame: Frame) -> Result<(), SendError> {
-        let status = self.nodes.stations[port].confinement.status();
-        if status.state == ErrorState::BusOff {
-            return Err(SendError::BusOff { tec: status.tec });
-        }
-        let frame = frame.promoted(self.nodes.config.format);
-        if frame.format().is_fd() && !self.nodes.config.format.is_fd() {
-            return Err(SendError::NotFd { length: frame.data().len() });
-        }
-        let number = self.statistics.queued;
-        let delay = self.nodes.faults.delays(NumberedFrame { at_ns: now_ns, port, id: frame.id(), number });
-        let queued_ns = now_ns.max(self.advanced_to_ns) + delay.map_or(0, |(_, by_ns)| by_ns);
-        self.nodes.stations[port].transmit.push(Queued::new(frame, self.nodes.config.rates, queued_ns))?;
-        if let Some((activation, _)) = delay {
-            self.nodes.faults.record(activation);
-        }
-        self.invalidate_traffic();
-        self.statistics.queued += 1;
-        Ok(())
-    }
-
-    /// The next frame that a port had received at `now_ns`.
-    ///
-    /// # Errors
-    /// [`ReceiveError::Overrun`] where frames were lost because the port's queue was full; no other.
-    pub fn receive(&mut self, port: usize, now_ns: u64) -> Result<Option<Received>, ReceiveError> {
-        self.nodes.stations[port].receive.pop(now_ns)
     }
 
     /// The next frame or error that was on the wire up to `now_ns`, of any port.
@@ -106,17 +87,6 @@ impl VirtualWire {
     /// The next note on the wire's faults up to `now_ns`.
     pub fn next_note(&mut self, now_ns: u64) -> Option<FaultNote> {
         self.nodes.faults.next_note(now_ns)
-    }
-
-    /// Fault confinement of a port.
-    pub fn status(&self, port: usize) -> BusStatus {
-        self.nodes.stations[port].confinement.status()
-    }
-
-    /// Restarts the controller of a port that is off the bus, as its host does; no effect on others.
-    pub fn restart(&mut self, port: usize, now_ns: u64) {
-        self.nodes.stations[port].confinement.restart(now_ns.max(self.advanced_to_ns));
-        self.invalidate_traffic();
     }
 
     /// When the frame on the wire, or the next one, will have ended if nothing else is queued until then,
@@ -136,11 +106,6 @@ impl VirtualWire {
         self.advanced_to_ns = self.advanced_to_ns.max(until_ns);
     }
 
-    /// The counters up to the last frame that ended.
-    pub fn statistics(&self) -> &Statistics {
-        &self.statistics
-    }
-
     /// Puts the next frame on the wire if it starts before `until_ns`; whether one is on it now. Until then
     /// nodes come back from bus-off, or are sent there.
     fn start_before(&mut self, until_ns: u64) -> bool {
@@ -158,7 +123,7 @@ impl VirtualWire {
                 _ => until_ns,
             };
             if self.has_node_changes() {
-                let sequence_ns = self.nodes.config.rates.nominal().bits_to_ns(SEQUENCE_BITS);
+                let sequence_ns = self.nodes.config.bitrate.bits_to_ns(SEQUENCE_BITS);
                 let change = self.next_node_change(sequence_ns);
                 if let Some(change) = change.filter(|change| change.at_ns <= idle_until_ns) {
                     self.apply(change);
@@ -188,7 +153,7 @@ impl VirtualWire {
     }
 
     /// Discards the computed next transmission after a change. A transmission on the wire stays.
-    fn invalidate_traffic(&mut self) {
+    pub(super) fn invalidate_traffic(&mut self) {
         if !self.is_busy() {
             self.traffic = Traffic::Unknown;
         }
@@ -265,8 +230,7 @@ impl VirtualWire {
         let kind = ErrorKind::State(status.state);
         self.tap.push(now_ns, Tapped::Error(ErrorReport::new(now_ns, port as u8, kind, status)));
         if status.state == ErrorState::BusOff {
-            self.statistics.bus_offs += 1;
-            self.statistics.abandoned += station.transmit.clear();
+            station.transmit.clear();
         }
     }
 }

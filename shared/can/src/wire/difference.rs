@@ -2,8 +2,8 @@
 //!
 //! Frames with equal data have equal CRCs, so the content alone decides.
 
-use super::stuffing::Stuffer;
-use super::{classical, fd};
+use super::length::content;
+use super::stuffing::stuff_bits;
 use crate::frame::Frame;
 
 /// Where two frames of one identifier first differ on the wire, and which of them is dominant there.
@@ -17,29 +17,23 @@ pub(crate) struct Difference {
 
 /// Where two frames of one identifier first differ; `None` where they are the same.
 pub(crate) fn first_difference(first: &Frame, second: &Frame) -> Option<Difference> {
-    let mut stuffer = Stuffer::default();
-    for (index, (one, other)) in (0..).zip(content(first).zip(content(second))) {
-        stuffer.push(one);
-        if one != other {
-            return Some(Difference { bit: index + 1 + stuffer.stuffed, first_is_dominant: !one });
-        }
-    }
+    let [first, second] = [first, second].map(|frame| {
+        let (content, length) = content(frame);
+        content << (u128::BITS - length)
+    });
     // Frames of different length differ in their length codes, which lie before the data.
-    None
-}
-
-/// The bits from the start bit to the last data bit, in the order of the wire.
-fn content(frame: &Frame) -> impl Iterator<Item = bool> {
-    let is_fd = frame.format().is_fd();
-    let classical = (!is_fd).then(|| classical::content_bits(frame));
-    let fd = is_fd.then(|| fd::content_bits(frame));
-    classical.into_iter().flatten().chain(fd.into_iter().flatten())
+    let index = (first != second).then_some((first ^ second).leading_zeros())?;
+    let stuffed = stuff_bits(first.unbounded_shr(u128::BITS - index), index);
+    Some(Difference { bit: index + 1 + stuffed, first_is_dominant: first < second })
 }
 
 #[cfg(test)]
 mod tests {
+    use proptest::prelude::*;
+
+    use super::super::stuffing::reference::{Stuffer, bits_of};
     use super::*;
-    use crate::frame::FrameFormat;
+    use crate::frame::strategies::any_frame;
     use crate::id::CanId;
 
     fn frame(id: u16, data: &[u8]) -> Frame {
@@ -66,28 +60,18 @@ mod tests {
         );
     }
 
-    #[test]
-    fn formats_differ_in_fdf() {
-        let classical = frame(0x555, &[1]);
-        let fd = classical.promoted(FrameFormat::Fd);
-        // Start bit, identifier, RTR or RRS, IDE; FDF is recessive.
-        let bit = 1 + 11 + 2 + 1;
-        assert_eq!(first_difference(&classical, &fd), Some(Difference { bit, first_is_dominant: true }));
-        let switched = classical.promoted(FrameFormat::FdBitRateSwitch);
-        let bit = bit + 2;
-        assert_eq!(first_difference(&switched, &fd), Some(Difference { bit, first_is_dominant: false }));
-    }
-
-    #[test]
-    fn long_frames_may_differ_in_their_last_bit() {
-        let fd = |last| {
-            let mut data = [0x55; Frame::MAX_DATA];
-            data[Frame::MAX_DATA - 1] = last;
-            Frame::with_format(frame(0x555, &[]).id(), FrameFormat::Fd, &data).unwrap()
-        };
-        let unstuffed = 17 + 5 + 8 * 64;
-        let difference = Difference { bit: unstuffed, first_is_dominant: true };
-        assert_eq!(first_difference(&fd(0x54), &fd(0x55)), Some(difference));
-        assert_eq!(first_difference(&fd(0x55), &fd(0x55)), None);
+    proptest! {
+        #[test]
+        fn the_difference_is_where_the_transmitters_bits_differ(frame in any_frame(), other: [u8; 8]) {
+            let other = Frame::new(frame.id(), &other[..frame.data().len()]).unwrap();
+            let mut stuffer = Stuffer::default();
+            let bits = |frame: &Frame| bits_of(content(frame).0, content(frame).1);
+            let expected = (1..).zip(bits(&frame).zip(bits(&other))).find_map(|(number, (one, another))| {
+                stuffer.push(one);
+                let bit = number + stuffer.stuffed;
+                (one != another).then_some(Difference { bit, first_is_dominant: !one })
+            });
+            prop_assert_eq!(first_difference(&frame, &other), expected);
+        }
     }
 }

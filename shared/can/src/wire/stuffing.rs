@@ -79,41 +79,43 @@ static STEPS: [[(Run, u8); 256]; Run::COUNT] = {
     steps
 };
 
-/// The lowest `length` bits of a field in the order of the wire, first the highest of them.
-pub(super) fn bits_of(field: u128, length: u32) -> impl Iterator<Item = bool> {
-    (0..length).rev().map(move |bit| field >> bit & 1 == 1)
-}
-
-/// Stuffing as a transmitter does it, bit by bit: for sequences of any length.
-#[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Stuffer {
-    last: Option<bool>,
-    run: u32,
-    /// Stuff bits inserted so far.
-    pub(super) stuffed: u32,
-}
-
-impl Stuffer {
-    /// The next bit of the sequence. A stuff bit that is due is inserted before it, so that none
-    /// follows the last bit of a sequence.
-    pub(super) fn push(&mut self, bit: bool) {
-        if self.run == 5 {
-            (self.last, self.run) = (self.last.map(|last| !last), 1);
-            self.stuffed += 1;
-        }
-        self.run = if self.last == Some(bit) { self.run + 1 } else { 1 };
-        self.last = Some(bit);
+#[cfg(test)]
+pub(super) mod reference {
+    /// The lowest `length` bits of a field in the order of the wire, first the highest of them.
+    pub(in crate::wire) fn bits_of(field: u128, length: u32) -> impl Iterator<Item = bool> {
+        (0..length).rev().map(move |bit| field >> bit & 1 == 1)
     }
 
-    /// The stuff bits with the one that is due behind the last bit.
-    #[cfg(test)]
-    pub(super) fn with_last(&self) -> u32 {
-        self.stuffed + u32::from(self.run == 5)
+    /// Stuffing as a transmitter does it, bit by bit: the reference for the table.
+    #[derive(Debug, Clone, Copy, Default)]
+    pub(in crate::wire) struct Stuffer {
+        last: Option<bool>,
+        run: u32,
+        pub(in crate::wire) stuffed: u32,
+    }
+
+    impl Stuffer {
+        /// The next bit of the sequence. A stuff bit that is due is inserted before it, so that none
+        /// follows the last bit of a sequence.
+        pub(in crate::wire) fn push(&mut self, bit: bool) {
+            if self.run == 5 {
+                (self.last, self.run) = (self.last.map(|last| !last), 1);
+                self.stuffed += 1;
+            }
+            self.run = if self.last == Some(bit) { self.run + 1 } else { 1 };
+            self.last = Some(bit);
+        }
+
+        /// The stuff bits with the one that is due behind the last bit.
+        pub(in crate::wire) fn with_last(&self) -> u32 {
+            self.stuffed + u32::from(self.run == 5)
+        }
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use super::reference::{Stuffer, bits_of};
     use super::*;
     use proptest::prelude::*;
 

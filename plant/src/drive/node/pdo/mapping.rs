@@ -8,7 +8,7 @@ use crate::drive::dictionary::{ENTRIES, MAPPED_MAX, MappingEntry, Objects, find,
 /// The lowest transmission type that SYNC does not trigger.
 pub(super) const EVENT_DRIVEN: u8 = 254;
 /// Bytes that a PDO of the drive carries at most, whatever the format of its frames.
-pub(super) const MAX_BYTES: usize = Frame::MAX_CLASSICAL_DATA;
+pub(super) const MAX_BYTES: usize = Frame::MAX_DATA;
 
 /// A mapped object: place of its word, and number of its bytes.
 #[derive(Debug, Clone, Copy, Default)]

@@ -47,7 +47,7 @@ pub(super) fn segment(specifier: u8, toggle: bool, data: Option<(&Segment, bool)
     bytes[0] = specifier << 5 | if toggle { TOGGLE } else { 0 };
     if let Some((segment, is_last)) = data {
         bytes[0] |= segment.flags() | if is_last { LAST } else { 0 };
-        bytes[1..].copy_from_slice(&segment.padded());
+        bytes[1..].copy_from_slice(&segment.bytes);
     }
     bytes
 }

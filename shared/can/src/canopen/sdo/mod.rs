@@ -17,6 +17,6 @@ mod tests;
 pub use abort::AbortCode;
 pub use message::SdoError;
 pub use object::ObjectAddress;
-pub use payload::{Expedited, SdoPayloadError, Segment};
+pub use payload::{Expedited, Segment};
 pub use request::SdoRequest;
 pub use response::SdoResponse;

@@ -7,26 +7,12 @@ pub(super) const SIZED: u8 = 1 << 0;
 /// "Expedited transfer", in initiate messages.
 pub(super) const EXPEDITED: u8 = 1 << 1;
 
-/// Data that one SDO message cannot carry.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("{length} bytes: {message} SDO message carries {least} to {most}")]
-pub struct SdoPayloadError {
-    /// Kind of message.
-    pub message: &'static str,
-    /// Bytes given.
-    pub length: usize,
-    /// The fewest bytes the message carries.
-    pub least: usize,
-    /// The most bytes the message carries.
-    pub most: usize,
-}
-
 /// The value in an expedited message: 1 to 4 bytes. Without a size in the message there are 4 bytes, and the receiver
 /// must know how many of them are the value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Expedited {
     /// Bytes beyond `length` are zero.
-    bytes: [u8; Self::MAX],
+    pub(super) bytes: [u8; Self::MAX],
     length: u8,
     is_sized: bool,
 }
@@ -35,19 +21,11 @@ impl Expedited {
     /// The most bytes the message carries.
     pub const MAX: usize = 4;
 
-    /// A value of that many bytes.
-    ///
-    /// # Errors
-    /// [`SdoPayloadError`] with none or more than 4.
-    pub fn new(data: &[u8]) -> Result<Self, SdoPayloadError> {
-        let error =
-            SdoPayloadError { message: "an expedited", length: data.len(), least: 1, most: Self::MAX };
-        if data.is_empty() {
-            return Err(error);
-        }
+    /// A value of that many bytes; `None` with none or more than 4.
+    pub fn new(data: &[u8]) -> Option<Self> {
         let mut bytes = [0; Self::MAX];
-        bytes.get_mut(..data.len()).ok_or(error)?.copy_from_slice(data);
-        Ok(Self { bytes, length: data.len() as u8, is_sized: true })
+        bytes.get_mut(..data.len()).filter(|_| !data.is_empty())?.copy_from_slice(data);
+        Some(Self { bytes, length: data.len() as u8, is_sized: true })
     }
 
     /// Four bytes without a size.
@@ -77,17 +55,13 @@ impl Expedited {
         let unused = Self::MAX as u8 - self.length;
         EXPEDITED | if self.is_sized { SIZED | unused << 2 } else { 0 }
     }
-
-    pub(super) const fn padded(self) -> [u8; Self::MAX] {
-        self.bytes
-    }
 }
 
 /// The data in a segment: 0 to 7 bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Segment {
     /// Bytes beyond `length` are zero.
-    bytes: [u8; Self::MAX],
+    pub(super) bytes: [u8; Self::MAX],
     length: u8,
 }
 
@@ -95,15 +69,11 @@ impl Segment {
     /// The most bytes the message carries.
     pub const MAX: usize = 7;
 
-    /// A segment of that data.
-    ///
-    /// # Errors
-    /// [`SdoPayloadError`] with more than 7 bytes.
-    pub fn new(data: &[u8]) -> Result<Self, SdoPayloadError> {
-        let error = SdoPayloadError { message: "a segment", length: data.len(), least: 0, most: Self::MAX };
+    /// A segment of that data; `None` with more than 7 bytes.
+    pub fn new(data: &[u8]) -> Option<Self> {
         let mut bytes = [0; Self::MAX];
-        bytes.get_mut(..data.len()).ok_or(error)?.copy_from_slice(data);
-        Ok(Self { bytes, length: data.len() as u8 })
+        bytes.get_mut(..data.len())?.copy_from_slice(data);
+        Some(Self { bytes, length: data.len() as u8 })
     }
 
     /// The data.
@@ -118,9 +88,5 @@ impl Segment {
 
     pub(super) const fn flags(self) -> u8 {
         (Self::MAX as u8 - self.length) << 1
-    }
-
-    pub(super) const fn padded(self) -> [u8; Self::MAX] {
-        self.bytes
     }
 }

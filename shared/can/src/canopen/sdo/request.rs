@@ -21,7 +21,7 @@ const UPLOAD_SEGMENT: u8 = 3;
 /// use masseter_can::canopen::{Expedited, NodeId, ObjectAddress, SdoRequest};
 ///
 /// let object = ObjectAddress::new(0x1400, 2);
-/// let request = SdoRequest::Download { object, data: Expedited::new(&[1])? };
+/// let request = SdoRequest::Download { object, data: Expedited::new(&[1]).expect("1 to 4 bytes") };
 /// let frame = request.frame(NodeId::new(5)?);
 /// assert_eq!(frame.to_string(), "605#2F00140201000000");
 /// assert_eq!(SdoRequest::decode(frame.data())?, request);
@@ -80,9 +80,7 @@ impl SdoRequest {
     /// The data bytes.
     pub fn encode(self) -> [u8; LENGTH] {
         match self {
-            Self::Download { object, data } => {
-                initiate(INITIATE_DOWNLOAD, data.flags(), object, data.padded())
-            }
+            Self::Download { object, data } => initiate(INITIATE_DOWNLOAD, data.flags(), object, data.bytes),
             Self::InitiateDownload { object, size } => {
                 let (flags, size) = size_field(size);
                 initiate(INITIATE_DOWNLOAD, flags, object, size)

@@ -68,7 +68,7 @@ impl SdoResponse {
         match self {
             Self::Download { object } => initiate(INITIATE_DOWNLOAD, 0, object, [0; 4]),
             Self::DownloadSegment { toggle } => segment(DOWNLOAD_SEGMENT, toggle, None),
-            Self::Upload { object, data } => initiate(INITIATE_UPLOAD, data.flags(), object, data.padded()),
+            Self::Upload { object, data } => initiate(INITIATE_UPLOAD, data.flags(), object, data.bytes),
             Self::InitiateUpload { object, size } => {
                 let (flags, size) = size_field(size);
                 initiate(INITIATE_UPLOAD, flags, object, size)

@@ -2,8 +2,7 @@
 
 use super::super::queue::Queued;
 use super::*;
-use crate::ErrorKind;
-use crate::bus::{BusStatus, ErrorState};
+use crate::bus::ErrorState;
 
 fn with(change: impl FnOnce(&mut WireConfig)) -> VirtualWire {
     let mut config = CONFIG;
@@ -12,24 +11,28 @@ fn with(change: impl FnOnce(&mut WireConfig)) -> VirtualWire {
 }
 
 fn alone() -> VirtualWire {
-    with(|config| (config.ports, config.receive_capacity) = (1, 64))
+    with(|config| (config.ports, config.receive_capacity) = (1, 16_384))
 }
 
 #[test]
 fn a_lone_node_repeats_until_it_is_passive_and_stays_on_the_bus() {
     let mut wire = alone();
-    wire.send(0, 0, sync::frame()).unwrap();
+    wire.port(0).send(0, sync::frame()).unwrap();
     wire.advance(1_000_000_000);
-    assert_eq!(wire.status(0), BusStatus { state: ErrorState::Passive, tec: 128, rec: 0 });
-    assert_eq!(wire.statistics().frames, 0);
-    assert_eq!(wire.statistics().error_frames, wire.statistics().unacknowledged);
-    assert!(wire.statistics().unacknowledged > 10_000);
+    assert_eq!(status(&mut wire, 0), BusStatus { state: ErrorState::Passive, tec: 128, rec: 0 });
+    let seen = tapped(&mut wire);
+    let is_expected = |tapped: &Tapped| {
+        let Tapped::Error(report) = tapped else { return false };
+        matches!(report.kind, ErrorKind::Acknowledge | ErrorKind::State(ErrorState::Passive))
+    };
+    assert!(seen.iter().all(is_expected));
+    assert!(error_frames(&seen) > 10_000);
 }
 
 #[test]
 fn an_unacknowledged_frame_takes_its_bits_to_the_slot_an_error_frame_and_a_passive_pause() {
     let mut wire = alone();
-    wire.send(0, 0, sync::frame()).unwrap();
+    wire.port(0).send(0, sync::frame()).unwrap();
     wire.advance(3_000_000);
     // 51 bits less intermission, end of frame and acknowledge delimiter; flag and delimiter.
     let attempt_bits = 51 - 3 - 7 - 1 + 6 + 8;
@@ -53,7 +56,7 @@ fn an_unacknowledged_frame_takes_its_bits_to_the_slot_an_error_frame_and_a_passi
 #[test]
 fn an_error_is_reported_with_the_counter_after_it_and_before_the_change_of_state() {
     let mut wire = alone();
-    wire.send(0, 0, sync::frame()).unwrap();
+    wire.port(0).send(0, sync::frame()).unwrap();
     wire.advance(3_000_000);
     let seen: Vec<_> = errors(&mut wire).iter().map(|report| (report.kind, report.tec)).collect();
     assert_eq!(seen[..2], [(ErrorKind::Acknowledge, 8), (ErrorKind::Acknowledge, 16)]);
@@ -63,64 +66,62 @@ fn an_error_is_reported_with_the_counter_after_it_and_before_the_change_of_state
 
 #[test]
 fn a_node_that_joins_a_lone_node_receives_its_frame_at_once() {
-    let mut wire = with(|config| config.ports = 2);
+    let mut wire = with(|config| (config.ports, config.receive_capacity) = (2, 1024));
     wire.nodes.stations[1].confinement.leave_bus(0, Some(5_000_000));
-    wire.send(0, 0, sync::frame()).unwrap();
+    wire.port(0).send(0, sync::frame()).unwrap();
     wire.advance(100_000_000);
     assert_eq!(fetch(&mut wire, 1).len(), 1);
-    assert_eq!(wire.status(0), BusStatus { state: ErrorState::Active, tec: 127, rec: 0 });
-    assert_eq!(wire.statistics().frames, 1);
+    assert_eq!(status(&mut wire, 0), BusStatus { state: ErrorState::Active, tec: 127, rec: 0 });
+    assert_eq!(arrivals(&mut wire).len(), 1);
 }
 
 #[test]
 fn equal_frames_of_two_ports_pass_as_one() {
     let mut wire = wire();
-    wire.send(1, 0, frame(0x123, &[1])).unwrap();
-    wire.send(2, 0, frame(0x123, &[1])).unwrap();
+    wire.port(1).send(0, frame(0x123, &[1])).unwrap();
+    wire.port(2).send(0, frame(0x123, &[1])).unwrap();
     wire.advance(FOREVER / 2);
     assert_eq!(fetch(&mut wire, 0).len(), 1);
-    assert_eq!((wire.statistics().frames, wire.statistics().collisions), (1, 1));
-    assert_eq!(wire.statistics().error_frames, 0);
+    let seen = tapped(&mut wire);
+    assert_eq!((seen.len(), error_frames(&seen)), (1, 0));
 }
 
 #[test]
 fn two_frames_of_one_identifier_destroy_each_other_until_their_senders_are_passive() {
     let mut wire = wire();
-    wire.send(1, 0, frame(0x123, &[1])).unwrap();
-    wire.send(2, 0, frame(0x123, &[2])).unwrap();
+    wire.port(1).send(0, frame(0x123, &[1])).unwrap();
+    wire.port(2).send(0, frame(0x123, &[2])).unwrap();
     wire.advance(FOREVER / 2);
     let bytes: Vec<_> = fetch(&mut wire, 0).iter().map(|received| received.frame.data()[0]).collect();
     assert_eq!(bytes, [1, 2], "the dominant one first: a passive error flag does not disturb it");
     assert_eq!(fetch(&mut wire, 2), [], "who signalled an error heard no more of the frame");
-    let statistics = wire.statistics();
-    assert_eq!((statistics.error_frames, statistics.collisions), (16, 17));
-    assert_eq!(wire.status(1), BusStatus { state: ErrorState::Active, tec: 127, rec: 0 });
-    assert_eq!(wire.status(2), BusStatus { state: ErrorState::Passive, tec: 135, rec: 0 });
-    assert_eq!(wire.status(0), BusStatus { state: ErrorState::Active, tec: 0, rec: 14 });
+    assert_eq!(error_frames(&tapped(&mut wire)), 16);
+    assert_eq!(status(&mut wire, 1), BusStatus { state: ErrorState::Active, tec: 127, rec: 0 });
+    assert_eq!(status(&mut wire, 2), BusStatus { state: ErrorState::Passive, tec: 135, rec: 0 });
+    assert_eq!(status(&mut wire, 0), BusStatus { state: ErrorState::Active, tec: 0, rec: 14 });
 }
 
 #[test]
 fn a_node_in_bus_off_sends_and_receives_nothing_until_its_restart_and_the_wait_after_it() {
     let mut wire = wire();
-    wire.send(0, 0, frame(0x700, &[])).unwrap();
+    wire.port(0).send(0, frame(0x700, &[])).unwrap();
     wire.nodes.stations[0]
         .transmit
         .push(Queued { frame: sync::frame(), duration_ns: 51_000, since_ns: 9_000_000 })
         .unwrap();
-    wire.confine(0, 0, |node| node.leave_bus(0, None));
-    assert_eq!(wire.statistics().abandoned, 2);
-    assert_eq!(wire.send(0, 0, sync::frame()), Err(SendError::BusOff { tec: 256 }));
-    wire.send(1, 0, frame(0x181, &[])).unwrap();
+    wire.confine(0, 0, |node| node.leave_bus(0, Some(10_000_000)));
+    assert!(wire.nodes.stations[0].transmit.is_empty(), "both frames are discarded");
+    assert_eq!(wire.port(0).send(0, sync::frame()), Err(SendError::BusOff { tec: 256 }));
+    wire.port(1).send(0, frame(0x181, &[])).unwrap();
     wire.advance(10_000_000);
     assert_eq!(fetch(&mut wire, 0), []);
     assert_eq!(fetch(&mut wire, 2).len(), 1);
-    assert_eq!(wire.status(0).state, ErrorState::BusOff, "without a restart");
-    wire.restart(0, 10_000_000);
+    assert_eq!(status(&mut wire, 0).state, ErrorState::BusOff, "before its restart");
     wire.advance(10_000_000 + 128 * 11 * BIT_NS - 1);
-    assert_eq!(wire.status(0).state, ErrorState::BusOff);
+    assert_eq!(status(&mut wire, 0).state, ErrorState::BusOff);
     wire.advance(10_000_000 + 128 * 11 * BIT_NS);
-    assert_eq!(wire.status(0), BusStatus { state: ErrorState::Active, tec: 0, rec: 0 });
-    wire.send(0, 12_000_000, sync::frame()).unwrap();
+    assert_eq!(status(&mut wire, 0), BusStatus { state: ErrorState::Active, tec: 0, rec: 0 });
+    wire.port(0).send(12_000_000, sync::frame()).unwrap();
     wire.advance(FOREVER / 2);
     assert_eq!(fetch(&mut wire, 1).len(), 1);
     let states: Vec<_> = errors(&mut wire).iter().map(|report| (report.port, report.kind)).collect();
@@ -135,8 +136,9 @@ fn every_frame_that_passes_counts_as_a_recessive_sequence() {
     let mut wire = wire();
     wire.confine(0, 0, |node| node.leave_bus(0, Some(0)));
     let mut sent = 0;
-    while wire.status(0).state == ErrorState::BusOff {
-        wire.send(1, wire.advanced_to_ns, sync::frame()).unwrap();
+    while status(&mut wire, 0).state == ErrorState::BusOff {
+        let now_ns = wire.advanced_to_ns;
+        wire.port(1).send(now_ns, sync::frame()).unwrap();
         let arrival_ns = wire.next_event_ns().unwrap();
         wire.advance(arrival_ns + 3 * BIT_NS);
         sent += 1;
