@@ -31,16 +31,6 @@ pub enum ControllerKind {
     Hold,
 }
 
-impl ControllerKind {
-    /// The name on the command line.
-    pub(crate) fn name(self) -> &'static str {
-        match self {
-            Self::Motion => "motion",
-            Self::Hold => "hold",
-        }
-    }
-}
-
 impl From<ControllerKind> for Kind {
     fn from(kind: ControllerKind) -> Self {
         match kind {
@@ -48,6 +38,11 @@ impl From<ControllerKind> for Kind {
             ControllerKind::Hold => Self::Hold,
         }
     }
+}
+
+/// The name of a value on the command line.
+pub(crate) fn name_of(value: &impl ValueEnum) -> String {
+    value.to_possible_value().expect("no value is skipped").get_name().to_owned()
 }
 
 /// The real CAN interface of each bus; none for simulated buses.
