@@ -34,14 +34,6 @@ pub enum ControllerKind {
 }
 
 impl ControllerKind {
-    /// The name on the command line.
-    pub(crate) fn name(self) -> &'static str {
-        match self {
-            Self::Motion => "motion",
-            Self::Hold => "hold",
-        }
-    }
-
     /// How the controller is built.
     pub(crate) fn builder(self) -> BuildController {
         match self {
@@ -53,6 +45,11 @@ impl ControllerKind {
             },
         }
     }
+}
+
+/// The name of a value on the command line.
+pub(crate) fn name_of(value: &impl ValueEnum) -> String {
+    value.to_possible_value().expect("no value is skipped").get_name().to_owned()
 }
 
 /// The real CAN interface of each bus; none for simulated buses.

@@ -24,7 +24,7 @@ fn a_full_disk_behind_standard_output_is_exit_6_and_a_closed_pipe_is_no_failure(
         &["recording", "verify", folder],
         &["report", folder, folder],
         &["uniqueness", "search", "--inputs", "10"],
-        &["bench", "fk", "--rounds", "1", "--format", "json"],
+        &["bench", "ipc", "--rounds", "1", "--format", "json"],
     ];
     for verb in verbs {
         let into = |output: Stdio| {

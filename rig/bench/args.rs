@@ -8,26 +8,12 @@ use masseter_terminal::Format;
 /// The benches.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Kind {
-    /// Wake-ups of the real-time loop, against cyclictest or a plain sleep loop
+    /// Wake-ups of the real-time loop, against cyclictest
     Loop,
-    /// Command and reading between two processes, against bare iceoryx2, a cache line, a socket, a pipe
+    /// Command and reading between two processes, against bare iceoryx2, a cache line, a socket
     Ipc,
-    /// Forward kinematics, warm and cold, against Newton's iteration
-    Fk,
     /// The whole rig at 1 to 20 kHz without bus delays
     Rate,
-}
-
-impl Kind {
-    /// The name on the command line.
-    pub(super) fn name(self) -> &'static str {
-        match self {
-            Self::Loop => "loop",
-            Self::Ipc => "ipc",
-            Self::Fk => "fk",
-            Self::Rate => "rate",
-        }
-    }
 }
 
 /// The arguments.
@@ -42,7 +28,7 @@ pub struct BenchArgs {
     /// Cores of the two sides
     #[arg(long, value_name = "N,N", value_parser = crate::arguments::parse_cores, default_value = "0,1")]
     pub(super) cores: [usize; 2],
-    /// Writes results, HdrHistogram logs and charts there
+    /// Writes results and HdrHistogram logs there
     #[arg(long, value_name = "DIR")]
     pub(super) out: Option<PathBuf>,
     /// How the result is written to standard output

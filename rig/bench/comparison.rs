@@ -2,8 +2,6 @@
 //!
 //! Statistics of the rounds are computed by [`candidate`](super::candidate).
 
-use std::path::Path;
-
 use serde::Serialize;
 
 use super::candidate::{Candidate, Ratio, Round};
@@ -17,7 +15,7 @@ pub(super) type Turn<'a> = Box<dyn FnMut() -> anyhow::Result<Round> + 'a>;
 pub(super) struct Comparison {
     pub(super) bench: &'static str,
     /// What the durations measure.
-    pub(super) measures: String,
+    pub(super) measures: &'static str,
     pub(super) candidates: Vec<Candidate>,
     pub(super) ratios: Vec<Ratio>,
     pub(super) notes: Vec<String>,
@@ -49,21 +47,18 @@ impl Comparison {
     /// Measures candidates that take turns.
     pub(super) fn by_turns(
         bench: &'static str,
-        measures: String,
+        measures: &'static str,
         rounds: u32,
         cores: &[usize],
-        mut turns: Vec<(String, Turn)>,
+        mut turns: Vec<(&str, Turn)>,
     ) -> anyhow::Result<Self> {
         let (results, disturbance) = take_turns(rounds, turns.len(), cores, |index| turns[index].1())?;
-        let names = turns.into_iter().map(|(name, _)| name);
-        let candidates = names
-            .zip(results)
-            .map(|(name, rounds)| Candidate::from_rounds(name, rounds.into_iter().map(Some).collect()))
-            .collect();
+        let named = turns.iter().zip(results);
+        let candidates = named.map(|((name, _), rounds)| Candidate::from_rounds(name, rounds)).collect();
         Ok(Self { bench, measures, candidates, ratios: Vec::new(), notes: Vec::new(), disturbance })
     }
 
-    /// Compares the first candidate of each pair with the second.
+    /// Compares the first candidate of each pair, by its name, with the second.
     ///
     /// # Panics
     /// When no candidate has one of the names.
@@ -72,36 +67,19 @@ impl Comparison {
         mut self,
         pairs: impl IntoIterator<Item = (Name, Name)>,
     ) -> Self {
-        let ratio =
-            |(of, to): (Name, Name)| self.candidate(of.as_ref()).ratio_to(self.candidate(to.as_ref()));
+        let candidate = |name: &str| {
+            let found = self.candidates.iter().find(|candidate| candidate.name == name);
+            found.unwrap_or_else(|| panic!("no candidate is called {name}"))
+        };
+        let ratio = |(of, to): (Name, Name)| candidate(of.as_ref()).ratio_to(candidate(to.as_ref()));
         self.ratios = pairs.into_iter().map(ratio).collect();
         self
-    }
-
-    /// The candidate of this name.
-    ///
-    /// # Panics
-    /// When there is none.
-    pub(super) fn candidate(&self, name: &str) -> &Candidate {
-        let found = self.candidates.iter().find(|candidate| candidate.name == name);
-        found.unwrap_or_else(|| panic!("no candidate is called {name}"))
-    }
-
-    #[must_use]
-    pub(super) fn with_note(mut self, note: impl Into<String>) -> Self {
-        self.notes.push(note.into());
-        self
-    }
-
-    /// HdrHistogram V2 interval logs, one line per round.
-    pub(super) fn write_logs(&self, folder: &Path) -> std::io::Result<()> {
-        self.candidates.iter().try_for_each(|candidate| candidate.write_log(self.bench, folder))
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::candidate::{Spread, no_durations};
+    use super::super::candidate::{Figure, no_durations};
     use super::*;
 
     fn round(value_ns: u64) -> Round {
@@ -121,18 +99,17 @@ mod tests {
                 pace += 1;
                 Ok(round(ns * pace))
             });
-            (name.to_owned(), turn)
+            (name, turn)
         };
         let turns = vec![turn("a", 100), turn("b", 400)];
-        let comparison =
-            Comparison::by_turns("x", String::new(), 3, &[0], turns).unwrap().comparing([("a", "b")]);
+        let comparison = Comparison::by_turns("x", "", 3, &[0], turns).unwrap().comparing([("a", "b")]);
         assert_eq!(*order.borrow(), ["a", "b", "b", "a", "a", "b"]);
         let [p50, p99] = &comparison.ratios[0].percentiles[..] else { panic!("{:?}", comparison.ratios) };
-        assert_eq!(p50.spread, Spread { median: 0.25, min: 0.25, max: 0.25 });
+        assert_eq!(*p50, Figure { name: "p50".to_owned(), median: 0.25, min: 0.25, max: 0.25 });
         assert_eq!(p99.name, "p99");
         assert_eq!(
-            comparison.candidates[0].percentiles[0].spread,
-            Spread { median: 200.0, min: 100.0, max: 300.0 }
+            comparison.candidates[0].percentiles[0],
+            Figure { name: "p50".to_owned(), median: 200.0, min: 100.0, max: 300.0 }
         );
     }
 
@@ -140,8 +117,7 @@ mod tests {
     #[should_panic(expected = "no candidate is called c")]
     fn an_unknown_candidate_cannot_be_compared() {
         let turn: Turn = Box::new(|| Ok(round(1)));
-        let comparison =
-            Comparison::by_turns("x", String::new(), 1, &[0], vec![("a".to_owned(), turn)]).unwrap();
+        let comparison = Comparison::by_turns("x", "", 1, &[0], vec![("a", turn)]).unwrap();
         let _ = comparison.comparing([("a", "c")]);
     }
 }

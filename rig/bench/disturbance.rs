@@ -43,32 +43,7 @@ impl Disturbance {
 pub(super) struct Stillness {
     cores: Vec<ObservedCore>,
     began_ns: u64,
-    stolen_before_ns: Option<u64>,
-}
-
-impl Stillness {
-    /// On the cores of the bench.
-    pub(super) fn begin(cores: &[usize]) -> Self {
-        let stolen_before_ns = stolen_ns(&SystemRoot::of_this_machine());
-        Self {
-            cores: cores.iter().map(ObservedCore::from).collect(),
-            began_ns: clock::now_ns(),
-            stolen_before_ns,
-        }
-    }
-
-    /// Observes one core after the other.
-    pub(super) fn observe(&mut self) {
-        self.cores.iter_mut().for_each(ObservedCore::observe);
-    }
-
-    pub(super) fn end(self) -> Disturbance {
-        let root = SystemRoot::of_this_machine();
-        let passed_ns = (clock::now_ns() - self.began_ns) * root.online_cores().len().max(1) as u64;
-        let stolen_ns =
-            stolen_ns(&root).zip(self.stolen_before_ns).map_or(0, |(to, from)| to.saturating_sub(from));
-        Disturbance::from_percentages(percent(stolen_ns, passed_ns), worst_percent(&self.cores))
-    }
+    stolen_before_ns: u64,
 }
 
 /// A core and the time observed on it, ns.
@@ -79,24 +54,37 @@ struct ObservedCore {
     stalled_ns: u64,
 }
 
-impl From<&usize> for ObservedCore {
-    fn from(core: &usize) -> Self {
-        Self { core: *core, observed_ns: 0, stalled_ns: 0 }
+impl Stillness {
+    /// On the cores of the bench.
+    pub(super) fn begin(cores: &[usize]) -> Self {
+        let observed = |&core: &usize| ObservedCore { core, observed_ns: 0, stalled_ns: 0 };
+        Self {
+            cores: cores.iter().map(observed).collect(),
+            began_ns: clock::now_ns(),
+            stolen_before_ns: stolen_ns(&SystemRoot::of_this_machine()).unwrap_or(0),
+        }
     }
-}
 
-impl ObservedCore {
-    /// Spins on the core, with the priority of the rig, and counts the gaps.
-    fn observe(&mut self) {
-        let account = on_core(self.core, || {
-            let mut waiter = Waiter::new(SECOND_NS);
-            let until_ns = clock::now_ns() + OBSERVED.as_nanos() as u64;
-            let mut spin = waiter.spin();
-            while spin.now_ns() < until_ns {}
-            waiter.account()
-        });
-        self.observed_ns += account.spun_ns + account.stalled_ns;
-        self.stalled_ns += account.stalled_ns;
+    /// Spins on one core after the other, with the priority of the rig, and counts the gaps.
+    pub(super) fn observe(&mut self) {
+        for core in &mut self.cores {
+            let account = on_core(core.core, || {
+                let mut waiter = Waiter::new(SECOND_NS);
+                let until_ns = clock::now_ns() + OBSERVED.as_nanos() as u64;
+                let mut spin = waiter.spin();
+                while spin.now_ns() < until_ns {}
+                waiter.account()
+            });
+            core.observed_ns += account.spun_ns + account.stalled_ns;
+            core.stalled_ns += account.stalled_ns;
+        }
+    }
+
+    pub(super) fn end(self) -> Disturbance {
+        let root = SystemRoot::of_this_machine();
+        let passed_ns = (clock::now_ns() - self.began_ns) * root.online_cores().len().max(1) as u64;
+        let stolen_ns = stolen_ns(&root).unwrap_or(0).saturating_sub(self.stolen_before_ns);
+        Disturbance::from_percentages(percent(stolen_ns, passed_ns), worst_percent(&self.cores))
     }
 }
 

@@ -8,12 +8,8 @@ mod candidate;
 mod circumstances;
 mod comparison;
 mod disturbance;
-mod fk;
 pub mod ipc;
-mod plot;
 mod rate;
-mod rate_plot;
-mod rate_summary;
 mod table;
 mod thread;
 mod wake;
@@ -24,6 +20,7 @@ use std::path::Path;
 use anyhow::Context;
 use serde::Serialize;
 
+use crate::arguments::name_of;
 use args::{BenchArgs, Kind};
 use circumstances::Circumstances;
 use comparison::Comparison;
@@ -66,28 +63,22 @@ pub(crate) fn run(args: &BenchArgs) -> Result<Exit, Failure> {
 
 fn measure_each(args: &BenchArgs, results: &mut Results) -> anyhow::Result<()> {
     for kind in &args.kinds {
-        let name = kind.name();
+        let name = name_of(kind);
         status!("bench {name}: {} rounds …", args.rounds);
-        let comparison = measure(*kind, args).with_context(|| format!("bench {name}"))?;
-        let table = table::text(&comparison);
-        results.comparisons.push(comparison);
+        let comparison = match kind {
+            Kind::Loop => wake::measure(args.rounds, args.cores[0]),
+            Kind::Ipc => ipc::measure(args.rounds, args.cores),
+            Kind::Rate => rate::measure(args.rounds, args.cores),
+        };
+        results.comparisons.push(comparison.with_context(|| format!("bench {name}"))?);
         if let Some(folder) = &args.out {
             results.write(folder).with_context(|| format!("cannot write to {}", folder.display()))?;
         }
         if args.format == Format::Human {
-            result(&table)?;
+            results.comparisons.last().map_or(Ok(()), |last| result(&table::text(last)))?;
         }
     }
     Ok(())
-}
-
-fn measure(kind: Kind, args: &BenchArgs) -> anyhow::Result<Comparison> {
-    match kind {
-        Kind::Loop => wake::measure(args.rounds, args.cores[0]),
-        Kind::Ipc => ipc::measure(args.rounds, args.cores),
-        Kind::Fk => fk::measure(args.rounds, args.cores[0]),
-        Kind::Rate => rate::measure(args.rounds, args.cores),
-    }
 }
 
 impl Results {
@@ -95,15 +86,11 @@ impl Results {
         Ok(serde_json::to_string_pretty(self).context("cannot write the results")? + "\n")
     }
 
-    /// `results.json`, and of the last bench one log per candidate and a chart.
+    /// `results.json`, and a HdrHistogram V2 interval log for each candidate, with one line per round.
     fn write(&self, folder: &Path) -> anyhow::Result<()> {
         fs::write(folder.join("results.json"), self.to_json()?)?;
-        let Some(comparison) = self.comparisons.last() else { return Ok(()) };
-        comparison.write_logs(folder)?;
-        let is_rate = comparison.bench == rate::NAME;
-        let chart = if is_rate { rate_plot::of_rates(comparison) } else { plot::percentiles(comparison) };
-        if let Some(svg) = chart {
-            fs::write(folder.join(format!("{}.svg", comparison.bench)), svg)?;
+        for Comparison { bench, candidates, .. } in &self.comparisons {
+            candidates.iter().try_for_each(|candidate| candidate.write_log(bench, folder))?;
         }
         Ok(())
     }

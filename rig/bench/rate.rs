@@ -1,59 +1,60 @@
 //! `bench rate`: the whole rig at 1 to 20 kHz, and the CPU time that each rate takes. A bit on the wire takes 1 ns, so that
 //! the durations are the rig's own.
 //!
-//! Each round of a rate is a run with three processes; the durations come from its recording. The run's verdict is not used,
+//! Each round of a rate is a run with three processes; the figures come from its recording. The run's verdict is not used,
 //! except to find out whether the machine stalled.
 
 use std::fs::{self, File};
 use std::os::unix::process::CommandExt;
-use std::process::{Child, Command, Stdio};
+use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::Duration;
 
 use anyhow::{Context, bail};
-use masseter_recording::Manifest;
-use masseter_recording::RunFolder;
-use masseter_report::histogram_log;
+use masseter_analysis::{Analysis, Code, Figures};
+use masseter_recording::{Manifest, Reader, RunFolder};
 use masseter_shared::clock;
 use masseter_shared::config::Scenario;
+use masseter_shared::messages::codes::ControllerState;
+use masseter_terminal::Exit;
 use rustix::process::{Pid, Signal, kill_process};
 
 use super::candidate::{Candidate, Durations, Round, no_durations};
 use super::comparison::{Comparison, take_turns};
-use super::rate_summary::Summary;
 use crate::machine::interrupts::Interrupts;
 
-/// The name in results.
-pub(super) const NAME: &str = "rate";
 /// Rates, Hz; the others are compared with the first.
-pub(super) const RATES_HZ: [u32; 5] = [1000, 2000, 5000, 10_000, 20_000];
+const RATES_HZ: [u32; 5] = [1000, 2000, 5000, 10_000, 20_000];
 /// Motion of a run, s; start, easing in and stop add more than a second.
 const MOTION_S: f64 = 2.0;
 /// Silence after which the rig stops, ms: at every rate that of a run at 1 kHz.
 const TIMEOUT_MS: u32 = 20;
 /// Time between two checks whether a run has ended; long, since the checks disturb the run.
 const CHECK_EVERY: Duration = Duration::from_millis(50);
-/// The last of the intervals.
-pub(super) const ROUND_TRIP: &str = "round trip";
-/// The intervals that are compared, with the names of their logs.
-const INTERVALS: [(&str, &str); 3] =
-    [("wake-up", "controller-wake-up"), ("controller cycle", "controller-cycle"), (ROUND_TRIP, "round-trip")];
+/// The intervals that are compared, with their names in the figures of a run. The last carries the shares.
+const INTERVALS: [(&str, &str); 3] = [
+    ("wake-up", "controller wake-up"),
+    ("controller cycle", "controller cycle"),
+    ("round trip", "round trip"),
+];
+/// Why a run does not count.
+const UNCOUNTED: [&str; 3] = [TOO_SLOW, STALLED, INCOMPLETE];
+const TOO_SLOW: &str = "did not play to their end: the cores are too slow for this rate";
+const STALLED: &str = "did not play to their end: the machine stalled for too long";
+const INCOMPLETE: &str = "are not judged: messages are missing from their recordings";
 
 /// The user stopped the bench.
 #[derive(Debug, thiserror::Error)]
 #[error("interrupted")]
 pub(super) struct Interrupted;
 
-/// The result of a run.
-enum RunResult {
-    /// The motion was played: durations of each interval, and shares.
-    Played { durations: Vec<Durations>, shares: Vec<(String, f64)> },
-    /// The motion was played, but messages are missing: the worst durations may be among them.
-    Incomplete { shares: Vec<(String, f64)> },
-    /// The motion was not played to its end.
-    Stopped {
-        /// Whether the machine stalled for too many cycles.
-        is_disturbed: bool,
-    },
+/// The figures of a run.
+#[derive(Debug)]
+struct Run {
+    /// Why it does not count, if it does not.
+    uncounted: Option<&'static str>,
+    /// Of each interval; empty if the run does not count.
+    durations: [Durations; INTERVALS.len()],
+    shares: Vec<(String, f64)>,
 }
 
 pub(super) fn measure(rounds: u32, cores: [usize; 2]) -> anyhow::Result<Comparison> {
@@ -62,77 +63,46 @@ pub(super) fn measure(rounds: u32, cores: [usize; 2]) -> anyhow::Result<Comparis
     let played = take_turns(rounds, RATES_HZ.len(), &cores, play);
     interrupts.restore_default_actions();
     let (runs, disturbance) = played?;
-    let mut comparison = Comparison {
-        bench: NAME,
+    let runs_of_rates = || RATES_HZ.into_iter().zip(&runs);
+    let comparison = Comparison {
+        bench: "rate",
         measures: "the whole rig without bus delays: wake-up of the controller after its deadline, controller cycle \
                    (reading received to command published), round trip (SYNC to reading published, reading received \
-                   to command received)"
-            .to_owned(),
-        candidates: Vec::new(),
+                   to command received)",
+        candidates: runs_of_rates().flat_map(|(rate_hz, runs)| candidates(rate_hz, runs)).collect(),
         ratios: Vec::new(),
-        notes: Vec::new(),
+        notes: runs_of_rates().flat_map(|(rate_hz, runs)| notes(rate_hz, runs)).collect(),
         disturbance,
     };
-    for (rate_hz, runs) in RATES_HZ.into_iter().zip(runs) {
-        comparison.notes.extend(uncounted(rate_hz, &runs));
-        comparison.candidates.extend(candidates(rate_hz, runs));
-    }
     let [slowest_hz, faster_hz @ ..] = RATES_HZ;
-    let against_slowest = |rate_hz| {
-        INTERVALS
-            .map(|(interval, _)| (candidate_name(rate_hz, interval), candidate_name(slowest_hz, interval)))
-    };
+    let against_slowest =
+        |rate_hz| INTERVALS.map(|(name, _)| [rate_hz, slowest_hz].map(|hz| named(hz, name)).into());
     Ok(comparison.comparing(faster_hz.into_iter().flat_map(against_slowest)))
 }
 
 /// The name of an interval at a rate in results.
-pub(super) fn candidate_name(rate_hz: u32, interval: &str) -> String {
+fn named(rate_hz: u32, interval: &str) -> String {
     format!("{rate_hz} Hz, {interval}")
 }
 
 /// Notes about runs of a rate that do not count.
-fn uncounted(rate_hz: u32, runs: &[RunResult]) -> Vec<String> {
-    const REASONS: [&str; 3] = [
-        "did not play to their end: the cores are too slow for this rate",
-        "did not play to their end: the machine stalled for too long",
-        "are not judged: messages are missing from their recordings",
-    ];
-    let reason = |run: &RunResult| match run {
-        RunResult::Played { .. } => None,
-        RunResult::Stopped { is_disturbed } => Some(REASONS[usize::from(*is_disturbed)]),
-        RunResult::Incomplete { .. } => Some(REASONS[2]),
-    };
-    let count = |why| runs.iter().filter(|run| reason(run) == Some(why)).count();
-    let notes = REASONS.into_iter().map(|why| (count(why), why)).filter(|(count, _)| *count > 0);
-    notes
-        .map(|(count, why)| format!("{rate_hz} Hz: {count} of {} runs do not count: they {why}", runs.len()))
-        .collect()
+fn notes(rate_hz: u32, runs: &[Run]) -> impl Iterator<Item = String> {
+    let counts = UNCOUNTED.map(|why| (why, runs.iter().filter(|run| run.uncounted == Some(why)).count()));
+    let of = runs.len();
+    let counts = counts.into_iter().filter(|(_, count)| *count > 0);
+    counts.map(move |(why, count)| format!("{rate_hz} Hz: {count} of {of} runs do not count: they {why}"))
 }
 
-/// One candidate for each interval; the last carries the shares.
-fn candidates(rate_hz: u32, runs: Vec<RunResult>) -> Vec<Candidate> {
-    let mut by_interval: Vec<Vec<Option<Round>>> = INTERVALS.iter().map(|_| Vec::new()).collect();
-    for run in runs {
-        let rounds: Vec<_> = match run {
-            RunResult::Stopped { .. } => INTERVALS.iter().map(|_| None).collect(),
-            RunResult::Played { durations, shares } => rounds_of(durations, shares),
-            RunResult::Incomplete { shares } => rounds_of(INTERVALS.map(|_| no_durations()).into(), shares),
+/// One candidate for each interval.
+fn candidates(rate_hz: u32, runs: &[Run]) -> impl Iterator<Item = Candidate> {
+    INTERVALS.iter().enumerate().map(move |(index, (name, _))| {
+        let is_last = index + 1 == INTERVALS.len();
+        let round = |run: &Run| Round {
+            durations: run.durations[index].clone(),
+            shares: if is_last { run.shares.clone() } else { Vec::new() },
         };
-        rounds.into_iter().zip(&mut by_interval).for_each(|(round, rounds)| rounds.push(round));
-    }
-    let named = INTERVALS.iter().zip(by_interval);
-    named
-        .map(|((interval, _), rounds)| Candidate::from_rounds(candidate_name(rate_hz, interval), rounds))
-        .collect()
-}
-
-/// One round for each interval; the last carries the shares.
-fn rounds_of(durations: Vec<Durations>, shares: Vec<(String, f64)>) -> Vec<Option<Round>> {
-    let mut rounds: Vec<_> = durations.into_iter().map(Round::from).collect();
-    if let Some(last) = rounds.last_mut() {
-        last.shares = shares;
-    }
-    rounds.into_iter().map(Some).collect()
+        Candidate::from_rounds(&named(rate_hz, name), runs.iter().map(round).collect())
+    })
 }
 
 fn scenario(rate_hz: u32, cores: [usize; 2]) -> Scenario {
@@ -147,7 +117,7 @@ fn scenario(rate_hz: u32, cores: [usize; 2]) -> Scenario {
 }
 
 /// Makes a run at that rate.
-fn run_at(rate_hz: u32, cores: [usize; 2], interrupts: &Interrupts) -> anyhow::Result<RunResult> {
+fn run_at(rate_hz: u32, cores: [usize; 2], interrupts: &Interrupts) -> anyhow::Result<Run> {
     let scratch = tempfile::tempdir().context("cannot create a folder for the runs")?;
     let file = scratch.path().join("scenario.toml");
     fs::write(&file, scenario(rate_hz, cores).to_toml()).context("cannot write the scenario")?;
@@ -163,17 +133,26 @@ fn run_at(rate_hz: u32, cores: [usize; 2], interrupts: &Interrupts) -> anyhow::R
         .process_group(0)
         .spawn()
         .context("cannot start a run")?;
-    wait_for(&mut run, interrupts)?;
+    let status = wait_for(&mut run, interrupts)?;
     if !folder.join("summary.json").exists() {
         bail!("a run at {rate_hz} Hz left no summary: {}", fs::read_to_string(errors)?.trim());
     }
-    result(&RunFolder::open(&folder)?)
+    let folder = RunFolder::open(&folder)?;
+    let manifest = Manifest::read(&folder)?;
+    Ok(Run::new(
+        &figures(&folder, &manifest.scenario)?,
+        &manifest,
+        status.code() == Some(Exit::Invalid as i32),
+    ))
 }
 
 /// Waits for a run. Each interrupt is passed on to the run; the bench ends after it.
-fn wait_for(run: &mut Child, interrupts: &Interrupts) -> anyhow::Result<()> {
+fn wait_for(run: &mut Child, interrupts: &Interrupts) -> anyhow::Result<ExitStatus> {
     let mut passed_on = 0;
-    while run.try_wait()?.is_none() {
+    loop {
+        if let Some(status) = run.try_wait()? {
+            return if interrupts.is_stop_requested() { Err(Interrupted.into()) } else { Ok(status) };
+        }
         if passed_on < u8::from(interrupts.is_stop_requested()) + u8::from(interrupts.is_abort_requested()) {
             // The run may have ended meanwhile.
             let _ = kill_process(Pid::from_child(run), Signal::TERM);
@@ -181,70 +160,137 @@ fn wait_for(run: &mut Child, interrupts: &Interrupts) -> anyhow::Result<()> {
         }
         clock::sleep(CHECK_EVERY);
     }
-    if interrupts.is_stop_requested() { Err(Interrupted.into()) } else { Ok(()) }
 }
 
-fn result(folder: &RunFolder) -> anyhow::Result<RunResult> {
-    let path = folder.summary();
-    let summary: Summary = serde_json::from_reader(File::open(&path)?)
-        .with_context(|| format!("cannot read {}", path.display()))?;
-    if !summary.is_finished() {
-        return Ok(RunResult::Stopped { is_disturbed: summary.is_disturbed() });
+fn figures(folder: &RunFolder, scenario: &Scenario) -> anyhow::Result<Figures> {
+    let mut reader = Reader::open(&folder.recording())?;
+    let mut analysis = Analysis::new(scenario);
+    while let Some(message) = reader.next_message()? {
+        analysis.take(&message)?;
     }
-    let shares = shares(folder, &summary)?;
-    if !summary.is_whole() {
-        return Ok(RunResult::Incomplete { shares });
+    Ok(analysis.finish(reader.was_cut_short(), reader.damage()))
+}
+
+impl Run {
+    fn new(figures: &Figures, manifest: &Manifest, is_disturbed: bool) -> Self {
+        let uncounted = match figures.final_state {
+            Some(Code::Known(ControllerState::Finished)) if figures.missing_messages() == 0 => None,
+            Some(Code::Known(ControllerState::Finished)) => Some(INCOMPLETE),
+            _ if is_disturbed => Some(STALLED),
+            _ => Some(TOO_SLOW),
+        };
+        let durations = INTERVALS.map(|(_, name)| {
+            let mut all = no_durations();
+            let measured = figures.intervals.iter().filter(|found| found.name == name && uncounted.is_none());
+            for (_, second) in measured.flat_map(|interval| interval.seconds.iter()) {
+                all.add(second).expect("a histogram that resizes itself takes any other");
+            }
+            all
+        });
+        let is_played = matches!(uncounted, None | Some(INCOMPLETE));
+        let shares = if is_played { shares(figures, manifest) } else { Vec::new() };
+        Self { uncounted, durations, shares }
     }
-    let log = |(_, name): &(_, &str)| {
-        let path = folder.histograms().join(format!("{name}.hlog"));
-        histogram_log::read(&path).with_context(|| format!("cannot read {}", path.display()))
+}
+
+/// Messages lost, or if none was lost, deadlines missed; and CPU time used, %.
+fn shares(figures: &Figures, manifest: &Manifest) -> Vec<(String, f64)> {
+    let published = |of: &[&str]| -> u64 {
+        let topics = figures.topics.iter().filter(|topic| of.is_empty() || of.contains(&topic.topic));
+        topics.map(|topic| topic.messages + topic.missing).sum()
     };
-    Ok(RunResult::Played { durations: INTERVALS.iter().map(log).collect::<anyhow::Result<_>>()?, shares })
-}
-
-/// Deadlines missed, messages lost and CPU time used, %.
-fn shares(folder: &RunFolder, summary: &Summary) -> anyhow::Result<Vec<(String, f64)>> {
-    let usage = Manifest::read(folder)?.usage.processes;
-    // A process that was sampled only once has no usage.
-    let observed = usage.into_iter().filter(|(_, usage)| usage.observed_s > 0.0);
-    let cpu = observed.map(|(process, usage)| (format!("{process} CPU"), usage.cpu_s / usage.observed_s));
-    let lost = summary.shares().into_iter().map(|(name, share)| (name.to_owned(), share));
-    Ok(lost.chain(cpu).map(|(name, share)| (name, share * 100.0)).collect())
+    let missing = figures.missing_messages();
+    let mut shares = vec![("dropped".to_owned(), missing as f64 / published(&[]) as f64)];
+    if missing == 0 {
+        let (skipped, by_machine) = figures.skipped();
+        // Each process publishes one of these per cycle, and none in a cycle that it skips.
+        let deadlines = (published(&["state", "reading"]) + skipped) as f64;
+        shares.push(("missed".to_owned(), skipped as f64 / deadlines));
+        shares.push(("missed by the machine".to_owned(), by_machine as f64 / deadlines));
+    }
+    for (process, usage) in &manifest.usage.processes {
+        shares.push((format!("{process} CPU"), usage.cpu_s / usage.observed_s));
+    }
+    shares.into_iter().map(|(name, share)| (name, share * 100.0)).collect()
 }
 
 #[cfg(test)]
 mod tests {
+    use masseter_recording::{MachineInfo, Recorded};
+    use masseter_shared::messages::{Reading, State};
+
     use super::*;
     use crate::bench::candidate::record;
 
     #[test]
     fn runs_that_stopped_or_lost_messages_are_noted_but_not_measured() {
-        let mut slow = no_durations();
-        record(&mut slow, 9000, 1);
-        let played = RunResult::Played {
-            durations: vec![slow.clone(), slow.clone(), slow],
-            shares: vec![("missed".to_owned(), 2.0)],
+        let run = |uncounted: Option<&'static str>, shares: &[(&str, f64)]| {
+            let mut durations = INTERVALS.map(|_| no_durations());
+            if uncounted.is_none() {
+                for of in &mut durations {
+                    record(of, 9000, 1);
+                }
+            }
+            let shares = shares.iter().map(|(name, percent)| ((*name).to_owned(), *percent)).collect();
+            Run { uncounted, durations, shares }
         };
-        let dropped = |percent| ("dropped".to_owned(), percent);
-        let runs = vec![
-            RunResult::Stopped { is_disturbed: true },
-            played,
-            RunResult::Stopped { is_disturbed: false },
-            RunResult::Incomplete { shares: vec![dropped(40.0)] },
-            RunResult::Incomplete { shares: vec![dropped(60.0)] },
+        let runs = [
+            run(Some(STALLED), &[]),
+            run(None, &[("missed", 2.0)]),
+            run(Some(TOO_SLOW), &[]),
+            run(Some(INCOMPLETE), &[("dropped", 40.0)]),
+            run(Some(INCOMPLETE), &[("dropped", 60.0)]),
         ];
-        let notes = uncounted(5000, &runs);
+        let notes: Vec<_> = notes(5000, &runs).collect();
         assert_eq!(notes.len(), 3);
         assert!(
             notes[2].starts_with("5000 Hz: 2 of 5 runs do not count") && notes[2].contains("missing"),
             "{notes:?}"
         );
-        let candidates = candidates(5000, runs);
-        let trip = candidates.last().unwrap();
+        let trip = candidates(5000, &runs).last().unwrap();
         assert_eq!((trip.name.as_str(), trip.n, trip.rounds.len()), ("5000 Hz, round trip", 1, 5));
-        assert!((trip.median("max").unwrap() - 9000.0).abs() < 10.0);
-        let shares: Vec<_> =
-            trip.shares.iter().map(|share| (share.name.as_str(), share.percent.median)).collect();
+        assert!((trip.percentiles.last().unwrap().median - 9000.0).abs() < 10.0);
+        let shares: Vec<_> = trip.shares.iter().map(|share| (share.name.as_str(), share.median)).collect();
         assert_eq!(shares, [("dropped", 50.0), ("missed", 2.0)]);
+    }
+
+    /// A run of ten cycles whose last state has this sequence number.
+    fn run(last_seq: u64, state: ControllerState, is_disturbed: bool) -> Run {
+        let mut analysis = Analysis::new(&Scenario::default());
+        for cycle in 1..=10 {
+            let seq = if cycle == 10 { last_seq } else { cycle };
+            let (due_ns, skipped_cycles) = (cycle * 1_000_000, if cycle > 5 { 5 } else { 0 });
+            let timed = State { seq, cycle, due_ns, woke_ns: due_ns + 700, ..State::default() };
+            let state = State { skipped_cycles, controller_state: state.code(), ..timed };
+            analysis.take(&Recorded::State(state)).unwrap();
+            analysis.take(&Recorded::Reading(Reading { seq: cycle, cycle, ..Reading::default() })).unwrap();
+        }
+        let machine = MachineInfo { cpu: String::new(), cores: 2, kernel: String::new(), is_virtual: false };
+        let manifest = Manifest::new(Scenario::default(), 1.0, "rt", machine);
+        Run::new(&analysis.finish(false, &[]), &manifest, is_disturbed)
+    }
+
+    #[test]
+    fn misses_are_shares_of_the_deadlines_of_both_processes() {
+        let played = run(10, ControllerState::Finished, false);
+        assert_eq!((played.uncounted, played.durations[0].max()), (None, 700));
+        let shares: Vec<_> = played.shares.iter().map(|(name, percent)| (name.as_str(), *percent)).collect();
+        assert_eq!(shares, [("dropped", 0.0), ("missed", 20.0), ("missed by the machine", 0.0)]);
+    }
+
+    #[test]
+    fn a_run_with_missing_messages_gives_only_their_share() {
+        let incomplete = run(15, ControllerState::Finished, false);
+        assert_eq!(incomplete.uncounted, Some(INCOMPLETE));
+        assert!(incomplete.durations.iter().all(Durations::is_empty));
+        assert_eq!(incomplete.shares, [("dropped".to_owned(), 20.0)]);
+    }
+
+    #[test]
+    fn a_run_that_did_not_finish_is_blamed_on_the_machine_only_if_it_stalled() {
+        for (is_disturbed, why) in [(false, TOO_SLOW), (true, STALLED)] {
+            let stopped = run(10, ControllerState::Running, is_disturbed);
+            assert_eq!((stopped.uncounted, stopped.shares), (Some(why), Vec::new()));
+        }
     }
 }

@@ -1,70 +1,48 @@
 //! A comparison as text for a terminal.
 
-use std::fmt::Write;
-
-use super::candidate::{Percentile, Ratio, Share};
+use super::candidate::{Figure, Ratio};
 use super::comparison::Comparison;
 
 /// Candidates in µs, then their ratios: median (minimum to maximum) over the rounds.
 pub(super) fn text(comparison: &Comparison) -> String {
-    let rounds = comparison.candidates.first().map_or(0, |candidate| candidate.rounds.len());
-    let mut text = format!(
-        "\n{}: {}\nmedian (minimum–maximum) of {rounds} rounds, µs\n",
-        comparison.bench, comparison.measures
-    );
+    let Comparison { bench, measures, candidates, ratios, notes, disturbance } = comparison;
+    let rounds = candidates.first().map_or(0, |candidate| candidate.rounds.len());
+    let of_rounds = |n| if n == rounds { String::new() } else { format!("  ({n} of {rounds} rounds count)") };
     let ratio_name = |ratio: &Ratio| format!("{} / {}", ratio.of, ratio.to);
-    let names = comparison.candidates.iter().map(|candidate| candidate.name.chars().count());
-    let width = names.chain(comparison.ratios.iter().map(|ratio| ratio_name(ratio).chars().count()));
-    let width = width.max().unwrap_or(0);
-    for candidate in &comparison.candidates {
-        let of_rounds = counted(candidate.n, candidate.rounds.len());
-        let _ =
-            writeln!(text, "  {:<width$} {}{of_rounds}", candidate.name, line(&candidate.percentiles, 1e-3));
+    let names =
+        candidates.iter().map(|candidate| candidate.name.clone()).chain(ratios.iter().map(ratio_name));
+    let width = names.map(|name| name.chars().count()).max().unwrap_or(0);
+    let row = |name: &str, figures: String| format!("  {name:<width$} {figures}\n");
+    let mut text = format!("\n{bench}: {measures}\nmedian (minimum–maximum) of {rounds} rounds, µs\n");
+    for candidate in candidates {
+        text += &row(&candidate.name, percentiles(&candidate.percentiles, 1e-3) + &of_rounds(candidate.n));
         if !candidate.shares.is_empty() {
-            let _ = writeln!(text, "  {:<width$} {}", "", shares(&candidate.shares));
+            text += &row("", shares(&candidate.shares));
         }
     }
-    if !comparison.ratios.is_empty() {
-        text.push_str("ratios within a round\n");
+    if !ratios.is_empty() {
+        text += "ratios within a round\n";
     }
-    for ratio in &comparison.ratios {
-        let name = ratio_name(ratio);
-        if ratio.n > 0 {
-            let _ = writeln!(
-                text,
-                "  {name:<width$} {}{}",
-                line(&ratio.percentiles, 1.0),
-                counted(ratio.n, rounds)
-            );
-        }
+    for ratio in ratios.iter().filter(|ratio| ratio.n > 0) {
+        text += &row(&ratio_name(ratio), percentiles(&ratio.percentiles, 1.0) + &of_rounds(ratio.n));
     }
-    for note in &comparison.notes {
-        let _ = writeln!(text, "  {note}");
-    }
-    if let Some(reason) = &comparison.disturbance.reason {
-        let _ = writeln!(text, "INVALID: {reason}");
-    }
+    text.extend(notes.iter().map(|note| format!("  {note}\n")));
+    text.extend(disturbance.reason.iter().map(|reason| format!("INVALID: {reason}\n")));
     text
 }
 
-/// A remark where some rounds do not count.
-fn counted(n: usize, rounds: usize) -> String {
-    if n == rounds { String::new() } else { format!("  ({n} of {rounds} rounds count)") }
-}
-
-fn line(percentiles: &[Percentile], scale: f64) -> String {
-    let cells = percentiles.iter().map(|percentile| {
-        let [median, min, max] = [percentile.spread.median, percentile.spread.min, percentile.spread.max]
-            .map(|value| short(value * scale));
-        format!("{:<5} {:<20}", percentile.name, format!("{median} ({min}–{max})"))
+fn percentiles(figures: &[Figure], scale: f64) -> String {
+    let cells = figures.iter().map(|figure| {
+        let [median, min, max] = [figure.median, figure.min, figure.max].map(|value| short(value * scale));
+        format!("{:<5} {:<20}", figure.name, format!("{median} ({min}–{max})"))
     });
     cells.collect::<Vec<_>>().join("  ").trim_end().to_owned()
 }
 
-fn shares(shares: &[Share]) -> String {
-    let cells = shares.iter().map(|share| {
-        let [median, min, max] = [share.percent.median, share.percent.min, share.percent.max].map(short);
-        format!("{} {median} % ({min}–{max})", share.name)
+fn shares(figures: &[Figure]) -> String {
+    let cells = figures.iter().map(|figure| {
+        let [median, min, max] = [figure.median, figure.min, figure.max].map(short);
+        format!("{} {median} % ({min}–{max})", figure.name)
     });
     cells.collect::<Vec<_>>().join(", ")
 }

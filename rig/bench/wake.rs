@@ -2,15 +2,14 @@
 //!
 //! Both run twice: with `/dev/cpu_dma_latency` held, as cyclictest does by default, and with idle states allowed. Which of
 //! the two is better depends on the machine, and on a virtual machine on its host. cyclictest's histogram has a resolution
-//! of 1 µs. Where cyclictest does not run, a loop of absolute sleeps with the same thread settings replaces it.
+//! of 1 µs. Where cyclictest does not run, the loop is measured alone.
 
-use std::cell::RefCell;
 use std::process::Command;
 
 use anyhow::{Context, bail};
 use masseter_shared::clock::{self, SECOND_NS};
 use masseter_shared::config::{CpuDmaLatency, RealtimeConfig};
-use masseter_shared::realtime::{Cycle, Wake};
+use masseter_shared::realtime::Cycle;
 use masseter_shared::schedule::OFF_TICK_NS;
 
 use super::candidate::{Durations, Round, no_durations, record};
@@ -21,136 +20,55 @@ use crate::machine::dma_latency::Hold;
 const PERIOD_NS: u64 = SECOND_NS / 1000;
 /// Wake-ups per round.
 const WAKE_UPS: u64 = 10_000;
-/// A wake-up later than this is an outlier, ns.
-const OUTLIER_NS: u64 = 50_000;
 /// Highest lateness in cyclictest's histogram, µs.
 const CYCLICTEST_UP_TO_US: u64 = 20_000;
 
 pub(super) fn measure(rounds: u32, core: usize) -> anyhow::Result<Comparison> {
-    let outliers = RefCell::new(Outliers::default());
-    let mut notes = Vec::new();
+    const MEASURES: &str = "wake-up latency at 1 kHz, one SCHED_FIFO thread on one core";
     let own = |wanted: CpuDmaLatency| -> Turn {
-        let outliers = &outliers;
         Box::new(move || {
             let _hold = Hold::new(wanted, false);
-            let mut outliers = outliers.borrow_mut();
-            let outliers = &mut *outliers;
-            Ok(on_core(core, move || own_loop(outliers)))
+            Ok(on_core(core, own_loop))
         })
     };
     let cyclictest = |more: &'static [&'static str]| -> Turn {
         Box::new(move || Ok(cyclictest(core, WAKE_UPS, more)?.into()))
     };
-    let mut own_turns = vec![("masseter".to_owned(), own(CpuDmaLatency::Leave))];
-    let mut others: Vec<(String, Turn)> = Vec::new();
-    let refused = try_cyclictest(core).err();
-    if let Some(why) = &refused {
-        notes.push(format!("{why:#}: a plain sleep replaces cyclictest"));
-        others.push(("plain sleep".to_owned(), Box::new(move || Ok(on_core(core, plain_sleep)))));
-    } else {
-        notes.push("cyclictest does not count the deadlines that it skips".to_owned());
-        others.push(("cyclictest --laptop".to_owned(), cyclictest(&["--laptop"])));
-    }
-    if let Some(refusal) = &Hold::new(CpuDmaLatency::Hold, false).obtained().refusal {
+    let mut notes = Vec::new();
+    let mut own_turns = vec![("masseter", own(CpuDmaLatency::Leave))];
+    let mut others = vec![("cyclictest --laptop", cyclictest(&["--laptop"]))];
+    if let Some(refusal) = &Hold::new(CpuDmaLatency::Hold, false).obtained.refusal {
         notes.push(format!("/dev/cpu_dma_latency is not held: {refusal}"));
     } else {
-        own_turns.push(("masseter, latency held".to_owned(), own(CpuDmaLatency::Hold)));
-        if refused.is_none() {
-            others.push(("cyclictest".to_owned(), cyclictest(&[])));
-        }
+        own_turns.push(("masseter, latency held", own(CpuDmaLatency::Hold)));
+        others.push(("cyclictest", cyclictest(&[])));
     }
-    let names = |turns: &[(String, Turn)]| turns.iter().map(|(name, _)| name.clone()).collect::<Vec<_>>();
-    let (own_names, other_names) = (names(&own_turns), names(&others));
-    let pairs = own_names.iter().flat_map(|own| other_names.iter().map(move |other| (own, other)));
-    let measures = "wake-up latency at 1 kHz, one SCHED_FIFO thread on one core".to_owned();
+    if let Err(why) = try_cyclictest(core) {
+        notes.push(format!("{why:#}: nothing to compare with"));
+        others.clear();
+    } else {
+        notes.push("cyclictest does not count the deadlines that it skips".to_owned());
+    }
+    let pairs: Vec<_> =
+        own_turns.iter().flat_map(|(own, _)| others.iter().map(|(other, _)| (*own, *other))).collect();
     let turns = own_turns.into_iter().chain(others).collect();
-    let comparison = Comparison::by_turns("loop", measures, rounds, &[core], turns)?.comparing(pairs);
-    notes.push(outliers.borrow().note());
-    Ok(notes.into_iter().fold(comparison, Comparison::with_note))
-}
-
-/// Late wake-ups of the rig's loop, and how many of them follow an observed standstill of the machine.
-#[derive(Debug, Default)]
-struct Outliers {
-    late: u64,
-    seen: u64,
-    last: LastWake,
-}
-
-/// What the last wake-up explains of the next one.
-#[derive(Debug, Default)]
-struct LastWake {
-    woke_ns: u64,
-    stalled_ns: u64,
-    was_seen: bool,
-}
-
-impl Outliers {
-    /// A stall explains a wake-up if it was observed since the last wake-up. It also explains the next one if the last
-    /// wake-up was so late that the next deadline had passed. The work here takes 1 µs, so long work is a stall as well.
-    fn take(&mut self, wake: Wake) {
-        let stalled_ns = wake.account.stalled_ns + wake.account.overlong_ns;
-        let follows = wake.due_ns < self.last.woke_ns && self.last.was_seen;
-        let was_seen = stalled_ns > self.last.stalled_ns || follows;
-        if wake.woke_ns - wake.due_ns > OUTLIER_NS {
-            self.late += 1;
-            self.seen += u64::from(was_seen);
-        }
-        self.last = LastWake { woke_ns: wake.woke_ns, stalled_ns, was_seen };
-    }
-
-    fn note(&self) -> String {
-        format!(
-            "masseter woke more than {} µs late {} times; before {} of them the machine stalled",
-            OUTLIER_NS / 1000,
-            self.late,
-            self.seen
-        )
-    }
-}
-
-fn first_deadline_ns() -> u64 {
-    clock::now_ns().next_multiple_of(PERIOD_NS) + PERIOD_NS + OFF_TICK_NS
+    let comparison = Comparison::by_turns("loop", MEASURES, rounds, &[core], turns)?;
+    Ok(Comparison { notes, ..comparison.comparing(pairs) })
 }
 
 /// A round with the share of its deadlines that passed before the loop could wait for them.
-fn round(durations: Durations, skipped: u64) -> Round {
-    let percent = 100.0 * skipped as f64 / (skipped + WAKE_UPS) as f64;
-    Round { durations, shares: vec![("skipped deadlines".to_owned(), percent)] }
-}
-
-fn own_loop(outliers: &mut Outliers) -> Round {
-    let mut late = no_durations();
+fn own_loop() -> Round {
+    let mut durations = no_durations();
     let mut skipped = 0;
-    let mut cycle = Cycle::new(first_deadline_ns(), PERIOD_NS);
-    outliers.last = LastWake::default();
+    let first_ns = clock::now_ns().next_multiple_of(PERIOD_NS) + PERIOD_NS + OFF_TICK_NS;
+    let mut cycle = Cycle::new(first_ns, PERIOD_NS);
     for _ in 0..WAKE_UPS {
         let wake = cycle.wait();
-        record(&mut late, wake.woke_ns - wake.due_ns, 1);
+        record(&mut durations, wake.woke_ns - wake.due_ns, 1);
         skipped = wake.skipped;
-        outliers.take(wake);
     }
-    round(late, skipped)
-}
-
-fn plain_sleep() -> Round {
-    let mut late = no_durations();
-    let mut skipped = 0;
-    let mut due_ns = first_deadline_ns();
-    for _ in 0..WAKE_UPS {
-        clock::sleep_until(due_ns);
-        let woke_ns = clock::now_ns();
-        record(&mut late, woke_ns.saturating_sub(due_ns), 1);
-        let missed = missed_by(due_ns + PERIOD_NS, woke_ns);
-        skipped += missed;
-        due_ns += PERIOD_NS * (1 + missed);
-    }
-    round(late, skipped)
-}
-
-/// Deadlines, from the next one on, that the rig's loop skips: all that passed but the last.
-fn missed_by(next_due_ns: u64, now_ns: u64) -> u64 {
-    now_ns.saturating_sub(next_due_ns) / PERIOD_NS
+    let percent = 100.0 * skipped as f64 / (skipped + WAKE_UPS) as f64;
+    Round { durations, shares: vec![("skipped deadlines".to_owned(), percent)] }
 }
 
 /// Whether cyclictest runs here with the rights of this process.
@@ -198,34 +116,7 @@ fn histogram_of(output: &str) -> anyhow::Result<Durations> {
 
 #[cfg(test)]
 mod tests {
-    use masseter_shared::realtime::Account;
-
     use super::*;
-
-    #[test]
-    fn an_outlier_is_explained_by_a_stall_before_it_or_before_the_outlier_that_it_follows() {
-        let mut outliers = Outliers::default();
-        let mut take = |due_us: u64, late_us: u64, stalled_us: u64| {
-            let (due_ns, woke_ns) = (due_us * 1000, (due_us + late_us) * 1000);
-            let account = Account { stalled_ns: stalled_us * 1000, ..Account::default() };
-            outliers.take(Wake { woke_ns, account, ..Wake::on_time(0, due_ns) });
-            (outliers.late, outliers.seen)
-        };
-        assert_eq!(take(1000, 0, 0), (0, 0));
-        assert_eq!(take(2000, 3400, 3400), (1, 1));
-        assert_eq!(take(5000, 400, 3400), (2, 2), "its deadline passed in the same stall");
-        assert_eq!(take(6000, 0, 3400), (2, 2));
-        assert_eq!(take(7000, 60, 3400), (3, 2), "late without an observed stall");
-        assert_eq!(take(8000, 50, 3500), (3, 2), "in time");
-    }
-
-    #[test]
-    fn a_plain_sleep_skips_what_the_rigs_loop_skips() {
-        let due_ns = 5 * PERIOD_NS;
-        assert_eq!(missed_by(due_ns, 0), 0);
-        assert_eq!(missed_by(due_ns, due_ns + PERIOD_NS - 1), 0, "late within its period");
-        assert_eq!(missed_by(due_ns, due_ns + 4 * PERIOD_NS + 7), 4);
-    }
 
     #[test]
     fn a_histogram_of_cyclictest_includes_its_overflows() {

@@ -4,21 +4,13 @@ use crate::machine::SystemRoot;
 
 /// The command that starts a container with `options`, or `otherwise` outside of containers.
 pub(super) fn start_with(root: &SystemRoot, options: &str, otherwise: impl Into<String>) -> String {
-    match engine(root) {
-        Some(engine) => format!("{engine} run {options} …"),
-        None => otherwise.into(),
-    }
+    engine(root).map_or_else(|| otherwise.into(), |engine| format!("{engine} run {options} …"))
 }
 
 /// A command on the kernel or the hardware, which a container's user must run on the host.
 pub(super) fn on_host(root: &SystemRoot, command: impl Into<String>) -> String {
     let command = command.into();
-    if is_container(root) { format!("on the host: {command}") } else { command }
-}
-
-/// Whether this is a container, whose system files differ from the host's.
-pub(super) fn is_container(root: &SystemRoot) -> bool {
-    engine(root).is_some()
+    if engine(root).is_some() { format!("on the host: {command}") } else { command }
 }
 
 /// The command of the container's engine; none outside of containers.

@@ -1,12 +1,15 @@
-//! The kernel's scheduling: preemption, real-time throttling, isolated cores.
+//! The kernel: preemption, real-time throttling, isolated cores, clock source.
 
+use super::container::on_host;
 use super::finding::Finding;
-use super::{boot_options, container, cores, realtime_kernel};
 use crate::machine::SystemRoot;
+
+/// Clock sources that are read in tens of nanoseconds, without a system call.
+const FAST_SOURCES: [&str; 4] = ["tsc", "kvm-clock", "arch_sys_counter", "hyperv_clocksource_tsc_page"];
 
 /// All findings of this family.
 pub(super) fn examine(root: &SystemRoot) -> Vec<Finding> {
-    vec![preemption(root), throttling(root), isolation(root)]
+    vec![preemption(root), throttling(root), isolation(root), clock_source(root)]
 }
 
 fn preemption(root: &SystemRoot) -> Finding {
@@ -17,29 +20,20 @@ fn preemption(root: &SystemRoot) -> Finding {
     if root.number("sys/kernel/realtime") == Some(1) || has("PREEMPT_RT") {
         return Finding::ok(CHECK, format!("{release}: fully preemptible (PREEMPT_RT)"));
     }
-    let cost = "a system call of another task may occupy a core for up to a millisecond";
-    let install = |finding: Finding| match realtime_kernel::installation(root) {
-        Some(command) => finding.mended_by(command),
-        None => finding,
+    // The current mode is in brackets: `none voluntary (full) lazy`.
+    let modes = root.text("sys/kernel/debug/sched/preempt").unwrap_or_else(|| "not readable".to_owned());
+    let (found, mend) = if has("PREEMPT_DYNAMIC") && !modes.contains("(full)") {
+        let mend = "sudo mount -t debugfs debugfs /sys/kernel/debug; \
+                    echo full | sudo tee /sys/kernel/debug/sched/preempt";
+        (format!("PREEMPT_DYNAMIC, modes {modes}"), mend)
+    } else {
+        let is_preemptible = has("PREEMPT") || has("PREEMPT_DYNAMIC");
+        let mend = "install a kernel with PREEMPT_RT: on Debian `sudo apt install linux-image-rt-amd64`, on Ubuntu \
+                    `sudo pro enable realtime-kernel`; then boot again";
+        (if is_preemptible { "preemptible (full)" } else { "not preemptible in the kernel" }.to_owned(), mend)
     };
-    if !has("PREEMPT_DYNAMIC") {
-        let model = if has("PREEMPT") { "preemptible (PREEMPT)" } else { "not preemptible in the kernel" };
-        return install(Finding::warn(CHECK, format!("{release}: {model}"), cost));
-    }
-    match root.text("sys/kernel/debug/sched/preempt") {
-        // The current mode is in brackets: `none voluntary (full) lazy`.
-        Some(modes) if modes.contains("(full)") => {
-            install(Finding::warn(CHECK, format!("{release}: preemptible (PREEMPT_DYNAMIC, full)"), cost))
-        }
-        Some(modes) => Finding::warn(CHECK, format!("{release}: PREEMPT_DYNAMIC, modes {modes}"), cost)
-            .mended_by(container::on_host(root, "echo full | sudo tee /sys/kernel/debug/sched/preempt")),
-        None => Finding::warn(CHECK, format!("{release}: PREEMPT_DYNAMIC, mode not readable"), cost)
-            .mended_by(container::on_host(
-                root,
-                "sudo mount -t debugfs debugfs /sys/kernel/debug; \
-                 echo full | sudo tee /sys/kernel/debug/sched/preempt",
-            )),
-    }
+    let cost = "a system call of another task may occupy a core for up to a millisecond";
+    Finding::warn(CHECK, format!("{release}: {found}"), cost).mended_by(on_host(root, mend))
 }
 
 fn throttling(root: &SystemRoot) -> Finding {
@@ -49,49 +43,65 @@ fn throttling(root: &SystemRoot) -> Finding {
     let (Some(runtime_us), Some(period_us)) = (runtime_us, period_us) else {
         return Finding::ok(CHECK, "none in this kernel");
     };
-    // The kernel's default share of the current period. Setting both values fails in one order or the other.
-    let restored_us = period_us - period_us / 20;
-    let restore = container::on_host(root, format!("sudo sysctl kernel.sched_rt_runtime_us={restored_us}"));
     let found = format!("{runtime_us} of every {period_us} µs");
-    match runtime_us {
-        ..0 => Finding::warn(CHECK, "off", "a real-time task that never waits blocks its core")
-            .mended_by(restore),
+    let finding = match runtime_us {
+        ..0 => Finding::warn(CHECK, "off", "a real-time task that never waits blocks its core"),
+        0 => Finding::bad(CHECK, found, "real-time tasks get no CPU time"),
         // The kernel's default; the loops limit their spinning to stay below it.
-        _ if runtime_us * 100 >= period_us * 95 => Finding::ok(CHECK, found),
-        0 => Finding::bad(CHECK, found, "real-time tasks get no CPU time").mended_by(restore),
-        _ => Finding::warn(CHECK, found, "the kernel stops fast loops for the rest of the period")
-            .mended_by(restore),
-    }
+        _ if runtime_us * 100 >= period_us * 95 => return Finding::ok(CHECK, found),
+        _ => Finding::warn(CHECK, found, "the kernel stops fast loops for the rest of the period"),
+    };
+    // The kernel's default share of the current period. Setting both values fails in one order or the other.
+    let default_us = period_us - period_us / 20;
+    finding.mended_by(on_host(root, format!("sudo sysctl kernel.sched_rt_runtime_us={default_us}")))
 }
 
 fn isolation(root: &SystemRoot) -> Finding {
     const CHECK: &str = "isolated cores";
     let list = |path: &str| root.text(path).filter(|list| !list.is_empty() && list != "(null)");
-    let isolated = list("sys/devices/system/cpu/isolated");
-    let tickless = list("sys/devices/system/cpu/nohz_full");
-    let cores = root.online_cores().len();
-    match (isolated, tickless) {
-        (Some(isolated), Some(tickless)) => {
-            Finding::ok(CHECK, format!("isolcpus={isolated}, nohz_full={tickless}; choose them with --cores"))
-        }
-        (Some(isolated), None) => {
-            Finding::ok(CHECK, format!("isolcpus={isolated}, ticking; choose them with --cores"))
-        }
-        (None, _) if cores <= 2 => Finding::ok(CHECK, format!("none; with {cores} cores none can be spared")),
-        (None, _) => {
-            let finding =
-                Finding::warn(CHECK, "none", "other tasks and interrupts also run on the rig's cores");
-            match cores::to_spare(root) {
-                Some([one, other]) => finding.mended_by(isolate(root, &format!("{one},{other}"))),
-                None => finding,
-            }
-        }
+    if let Some(isolated) = list("sys/devices/system/cpu/isolated") {
+        let tickless = list("sys/devices/system/cpu/nohz_full");
+        let tickless = tickless.map_or_else(|| "ticking".to_owned(), |list| format!("nohz_full={list}"));
+        return Finding::ok(CHECK, format!("isolcpus={isolated}, {tickless}; choose them with --cores"));
     }
+    let cores = root.online_cores().len();
+    let Some([one, other]) = cores_to_spare(root).filter(|_| cores > 2) else {
+        return Finding::ok(CHECK, format!("none; with {cores} cores none can be spared"));
+    };
+    let mend = format!(
+        "add `isolcpus={one},{other} nohz_full={one},{other}` to the kernel's command line (on Debian and Ubuntu: \
+         GRUB_CMDLINE_LINUX_DEFAULT in /etc/default/grub, then `sudo update-grub`), and boot again; then: masseter run \
+         --cores {one},{other}"
+    );
+    Finding::warn(CHECK, "none", "other tasks and interrupts also run on the rig's cores")
+        .mended_by(on_host(root, mend))
 }
 
-fn isolate(root: &SystemRoot, list: &str) -> String {
-    let options = format!("isolcpus={list} nohz_full={list}");
-    format!("{}  # then: masseter run --cores {list}", boot_options::add(root, &options))
+/// The last core, and the last other one on another physical core.
+fn cores_to_spare(root: &SystemRoot) -> Option<[usize; 2]> {
+    let mut cores = root.online_cores();
+    let last = cores.pop()?;
+    let siblings = root.cores(&format!("sys/devices/system/cpu/cpu{last}/topology/thread_siblings_list"));
+    let other = cores.into_iter().rfind(|core| !siblings.contains(core))?;
+    Some([other, last])
+}
+
+fn clock_source(root: &SystemRoot) -> Finding {
+    const CHECK: &str = "clock source";
+    let folder = "sys/devices/system/clocksource/clocksource0";
+    let Some(current) = root.text(&format!("{folder}/current_clocksource")) else {
+        return Finding::ok(CHECK, "unknown to this kernel");
+    };
+    if FAST_SOURCES.contains(&current.as_str()) {
+        return Finding::ok(CHECK, current);
+    }
+    let available = root.text(&format!("{folder}/available_clocksource")).unwrap_or_default();
+    let finding = Finding::warn(CHECK, current, "reading the clock takes a microsecond or more");
+    match available.split_whitespace().find(|source| FAST_SOURCES.contains(source)) {
+        Some(better) => finding
+            .mended_by(on_host(root, format!("echo {better} | sudo tee /{folder}/current_clocksource"))),
+        None => finding,
+    }
 }
 
 #[cfg(test)]
@@ -125,13 +135,13 @@ mod tests {
     fn in_a_container_the_remedy_is_on_the_host() {
         let files = [
             (".dockerenv", ""),
-            ("etc/os-release", "ID=debian"),
             ("proc/sys/kernel/version", "#1 SMP PREEMPT_DYNAMIC"),
             ("proc/sys/kernel/sched_rt_runtime_us", "0"),
             ("proc/sys/kernel/sched_rt_period_us", "1000000"),
             ("sys/devices/system/cpu/online", "0-7"),
         ];
-        for finding in examine(&Fixture::with_files(&files).root()) {
+        let findings = examine(&Fixture::with_files(&files).root());
+        for finding in findings.into_iter().filter(|finding| finding.level != Ok) {
             assert!(finding.mend.unwrap().starts_with("on the host: "), "{}", finding.check);
         }
     }
@@ -174,5 +184,44 @@ mod tests {
         let shared = cores("0-7", "\n");
         assert_eq!(shared.level, Warn);
         assert!(shared.mend.unwrap().contains("isolcpus=6,7 nohz_full=6,7"));
+    }
+
+    #[test]
+    fn cores_of_one_physical_core_are_not_taken_for_two() {
+        let of = |siblings: &[&str]| {
+            let online = format!("0-{}", siblings.len() - 1);
+            let path = |core| format!("sys/devices/system/cpu/cpu{core}/topology/thread_siblings_list");
+            let paths: Vec<_> = (0..siblings.len()).map(path).collect();
+            let mut files: Vec<_> = paths.iter().map(String::as_str).zip(siblings.iter().copied()).collect();
+            files.push(("sys/devices/system/cpu/online", &online));
+            cores_to_spare(&Fixture::with_files(&files).root())
+        };
+        assert_eq!(of(&["0-1", "0-1", "2-3", "2-3"]), Some([1, 3]));
+        assert_eq!(of(&["0,2", "1,3", "0,2", "1,3"]), Some([2, 3]));
+        assert_eq!(of(&["", "", "", ""]), Some([2, 3]), "siblings not told");
+        assert_eq!(of(&["0-1", "0-1"]), None);
+    }
+
+    #[test]
+    fn cores_that_are_offline_are_not_spared() {
+        let smt_off = [
+            ("sys/devices/system/cpu/online", "0,2,4,6"),
+            ("sys/devices/system/cpu/cpu6/topology/thread_siblings_list", "6"),
+            ("sys/devices/system/cpu/cpu7/online", "0"),
+        ];
+        assert_eq!(cores_to_spare(&Fixture::with_files(&smt_off).root()), Some([4, 6]));
+    }
+
+    #[test]
+    fn a_slow_clock_source_is_named_with_a_better_one_if_there_is_one() {
+        let of = |current, available| {
+            let folder = "sys/devices/system/clocksource/clocksource0";
+            let (one, other) =
+                (format!("{folder}/current_clocksource"), format!("{folder}/available_clocksource"));
+            clock_source(&Fixture::with_files(&[(&one, current), (&other, available)]).root())
+        };
+        assert_eq!(of("tsc\n", "tsc hpet\n").level, Ok);
+        assert!(of("hpet", "hpet tsc acpi_pm").mend.unwrap().starts_with("echo tsc |"));
+        assert_eq!((of("hpet", "hpet acpi_pm").level, of("hpet", "hpet acpi_pm").mend), (Warn, None));
     }
 }

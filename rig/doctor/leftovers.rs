@@ -9,21 +9,21 @@ pub(super) fn examine() -> Vec<Finding> {
     vec![leftovers(&count_rigs())]
 }
 
-fn count_rigs() -> Result<(usize, usize), DomainError> {
+/// Running and killed ones.
+fn count_rigs() -> Result<[usize; 2], DomainError> {
     let alive = Domain::all()?.iter().map(Domain::is_alive).collect::<Result<Vec<_>, _>>()?;
-    let count = |wanted: bool| alive.iter().filter(|&&is_alive| is_alive == wanted).count();
-    Ok((count(true), count(false)))
+    Ok([true, false].map(|wanted| alive.iter().filter(|&&is_alive| is_alive == wanted).count()))
 }
 
-fn leftovers(count: &Result<(usize, usize), DomainError>) -> Finding {
+fn leftovers(count: &Result<[usize; 2], DomainError>) -> Finding {
     const CHECK: &str = "other rigs";
     match count {
-        Ok((0, 0)) => Finding::ok(CHECK, "none running, no files of killed ones"),
-        Ok((alive, 0)) => {
+        Ok([0, 0]) => Finding::ok(CHECK, "none running, no files of killed ones"),
+        Ok([alive, 0]) => {
             Finding::warn(CHECK, format!("{alive} running"), "rigs on the same cores delay each other")
                 .mended_by("masseter run --cores N,N")
         }
-        Ok((alive, dead)) => Finding::warn(
+        Ok([alive, dead]) => Finding::warn(
             CHECK,
             format!("{alive} running, files of {dead} killed ones"),
             "these files occupy shared memory",
@@ -39,7 +39,7 @@ mod tests {
 
     #[test]
     fn dead_rigs_are_swept_and_living_ones_avoided() {
-        let mend = |alive, dead| leftovers(&Ok((alive, dead))).mend;
+        let mend = |alive, dead| leftovers(&Ok([alive, dead])).mend;
         assert_eq!(mend(0, 0), None);
         assert!(mend(1, 0).unwrap().contains("--cores"));
         assert_eq!(mend(1, 2).as_deref(), Some("masseter clean"));

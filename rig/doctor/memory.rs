@@ -2,7 +2,7 @@
 
 use rustix::fs::statvfs;
 
-use super::container;
+use super::container::{on_host, start_with};
 use super::finding::Finding;
 use crate::machine::SystemRoot;
 
@@ -12,59 +12,40 @@ const ENOUGH_BYTES: u64 = 64 << 20;
 
 /// All findings of this family.
 pub(super) fn examine(root: &SystemRoot) -> Vec<Finding> {
-    let shared = statvfs(SHARED_MEMORY)
-        .map_or(Shared::Absent, |of| Shared::from_blocks(of.f_blocks, of.f_bavail * of.f_frsize));
-    vec![huge_pages(root), room(root, shared)]
-}
-
-/// Free shared memory.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Shared {
-    Absent,
-    Free(u64),
-    /// Limited by the machine's memory only.
-    Unbounded,
-}
-
-impl Shared {
-    /// A tmpfs without limit reports zero blocks.
-    fn from_blocks(blocks: u64, free_bytes: u64) -> Self {
-        if blocks == 0 { Self::Unbounded } else { Self::Free(free_bytes) }
-    }
+    let shared = statvfs(SHARED_MEMORY).map(|of| (of.f_blocks, of.f_bavail * of.f_frsize));
+    vec![huge_pages(root), room(root, shared.ok())]
 }
 
 fn huge_pages(root: &SystemRoot) -> Finding {
     const CHECK: &str = "huge pages";
-    let reserved = root.number("proc/sys/vm/nr_hugepages").unwrap_or(0);
-    let Some(modes) = root.text("sys/kernel/mm/transparent_hugepage/enabled") else {
-        return Finding::ok(CHECK, format!("{reserved} reserved, no transparent ones"));
-    };
-    let found = format!("{reserved} reserved, transparent: {modes}");
-    if modes.contains("[always]") {
-        return Finding::warn(CHECK, found, "a cycle waits when it touches a page that the kernel is moving")
-            .mended_by(container::on_host(
-                root,
-                "echo madvise | sudo tee /sys/kernel/mm/transparent_hugepage/enabled",
-            ));
+    const MODES: &str = "sys/kernel/mm/transparent_hugepage/enabled";
+    let modes = root.text(MODES).unwrap_or_else(|| "none".to_owned());
+    if !modes.contains("[always]") {
+        return Finding::ok(CHECK, format!("transparent: {modes}"));
     }
-    Finding::ok(CHECK, found)
+    let cost = "a cycle waits when it touches a page that the kernel is moving";
+    Finding::warn(CHECK, format!("transparent: {modes}"), cost)
+        .mended_by(on_host(root, format!("echo madvise | sudo tee /{MODES}")))
 }
 
-fn room(root: &SystemRoot, shared: Shared) -> Finding {
+/// Judges blocks and free bytes of the file system of shared memory; none if there is none.
+fn room(root: &SystemRoot, shared: Option<(u64, u64)>) -> Finding {
     const CHECK: &str = "shared memory";
-    let enlarge = |mount: String| container::start_with(root, "--shm-size 1g", mount);
+    let enlarge =
+        |mount: &str| start_with(root, "--shm-size 1g", format!("sudo mount {mount} {SHARED_MEMORY}"));
     match shared {
-        Shared::Absent => {
-            Finding::bad(CHECK, format!("no {SHARED_MEMORY}"), "the processes cannot exchange messages")
-                .mended_by(enlarge(format!("sudo mount -t tmpfs tmpfs {SHARED_MEMORY}")))
-        }
-        Shared::Free(free) if free < ENOUGH_BYTES => {
+        None => Finding::bad(CHECK, format!("no {SHARED_MEMORY}"), "the processes cannot exchange messages")
+            .mended_by(enlarge("-t tmpfs tmpfs")),
+        // A tmpfs without limit.
+        Some((0, _)) => Finding::ok(CHECK, format!("{SHARED_MEMORY} has no limit")),
+        Some((_, free)) => {
             let found = format!("{} MiB free in {SHARED_MEMORY}", free >> 20);
+            if free >= ENOUGH_BYTES {
+                return Finding::ok(CHECK, found);
+            }
             Finding::bad(CHECK, found, "a run may have no room for its topics")
-                .mended_by(enlarge(format!("sudo mount -o remount,size=1g {SHARED_MEMORY}")))
+                .mended_by(enlarge("-o remount,size=1g"))
         }
-        Shared::Free(free) => Finding::ok(CHECK, format!("{} MiB free in {SHARED_MEMORY}", free >> 20)),
-        Shared::Unbounded => Finding::ok(CHECK, format!("{SHARED_MEMORY} has no limit")),
     }
 }
 
@@ -89,16 +70,16 @@ mod tests {
     fn a_container_with_little_shared_memory_is_bad() {
         let container = Fixture::with_files(&[(".dockerenv", "")]);
         let of = |shared| room(&container.root(), shared);
-        let levels = [Shared::Absent, Shared::Free(60 << 20), Shared::Free(1 << 30)].map(|it| of(it).level);
+        let levels = [None, Some((100, 60 << 20)), Some((100, 1 << 30))].map(|shared| of(shared).level);
         assert_eq!(levels, [Bad, Bad, Ok]);
-        assert_eq!(of(Shared::Free(60 << 20)).mend.as_deref(), Some("docker run --shm-size 1g …"));
+        assert_eq!(of(Some((100, 60 << 20))).mend.as_deref(), Some("docker run --shm-size 1g …"));
     }
 
     #[test]
     fn shared_memory_without_a_bound_is_not_full() {
-        assert_eq!(Shared::from_blocks(100, 0), Shared::Free(0));
         let machine = Fixture::with_files(&[]);
-        let finding = room(&machine.root(), Shared::from_blocks(0, 0));
+        assert_eq!(room(&machine.root(), Some((100, 0))).level, Bad);
+        let finding = room(&machine.root(), Some((0, 0)));
         assert_eq!((finding.level, finding.found.as_str()), (Ok, "/dev/shm has no limit"));
     }
 }

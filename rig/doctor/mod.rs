@@ -3,19 +3,14 @@
 //! Each family of checks has a file; a [`Finding`] is a line of the report. The doctor changes nothing on the machine.
 //! `docs/doctor.md` describes the JSON report.
 
-mod boot_options;
 mod can;
 mod container;
-mod cores;
-mod distribution;
 mod finding;
 mod kernel;
 mod leftovers;
 mod memory;
 mod privileges;
 mod processors;
-mod realtime_kernel;
-mod timing;
 
 use std::fmt::Write;
 
@@ -63,7 +58,6 @@ fn findings(root: &SystemRoot) -> Vec<Finding> {
         privileges::examine(root),
         processors::examine(root),
         kernel::examine(root),
-        timing::examine(root),
         memory::examine(root),
         can::examine(root),
         leftovers::examine(),

@@ -12,7 +12,8 @@ pub(crate) const DEVICE: &str = "/dev/cpu_dma_latency";
 /// Keeps the device open, if configured, until dropped.
 #[derive(Debug)]
 pub(crate) struct Hold {
-    obtained: DmaLatency,
+    /// The result, for the manifest.
+    pub(crate) obtained: DmaLatency,
     _device: Option<File>,
 }
 
@@ -31,11 +32,6 @@ impl Hold {
             Some(Err(_)) | None => (None, None, None),
         };
         Self { obtained: DmaLatency { requested: wanted, limit_us, refusal }, _device: device }
-    }
-
-    /// The result, for the manifest.
-    pub(crate) fn obtained(&self) -> &DmaLatency {
-        &self.obtained
     }
 }
 
@@ -77,6 +73,6 @@ mod tests {
     #[test]
     fn a_device_that_is_not_requested_is_neither_opened_nor_refused() {
         let hold = Hold::new(CpuDmaLatency::Leave, false);
-        assert_eq!((hold.obtained().limit_us, &hold.obtained().refusal), (None, &None));
+        assert_eq!((hold.obtained.limit_us, &hold.obtained.refusal), (None, &None));
     }
 }

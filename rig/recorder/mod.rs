@@ -71,8 +71,7 @@ pub(crate) fn record(args: RecorderArgs) -> anyhow::Result<Exit> {
     if let Some(server) = server.as_ref().filter(|_| !args.quiet) {
         stderr.write(format!("live on {} for Foxglove\n", server.url()));
     }
-    let bitrate = scenario.can.bitrate()?;
-    let progress = (!args.quiet).then(|| Progress::new(bitrate, args.motion_s, start.epoch_ns));
+    let progress = (!args.quiet).then(|| Progress::new(args.motion_s, start.epoch_ns));
     let mut sinks = Sinks { backlog, server, progress, stderr };
     let loops = start.loops.to_vec();
     let root = SystemRoot::of_this_machine();
@@ -89,7 +88,7 @@ pub(crate) fn record(args: RecorderArgs) -> anyhow::Result<Exit> {
             sinks.write(&machine, clock::now_ns(), Recorded::Machine);
         }
         if is_last {
-            return Ok(sinks.finish(now_ns));
+            return Ok(sinks.finish());
         }
         sinks.backlog.hand_over();
         sinks.show_progress(now_ns);

@@ -5,7 +5,7 @@ use masseter_shared::messages::Message;
 use masseter_terminal::Exit;
 
 use super::progress::{Losses, Progress};
-use super::stderr_writer::{StderrWriter, terminal_rows};
+use super::stderr_writer::StderrWriter;
 use crate::foxglove::{ClientLosses, FoxgloveServer};
 
 pub(super) struct Sinks {
@@ -39,26 +39,29 @@ impl Sinks {
     /// Shows the progress if it is due and the output before it is written.
     pub(super) fn show_progress(&mut self, now_ns: u64) {
         let losses = self.losses();
-        if let Some(error) = self.backlog.new_failure() {
-            self.stderr.write(format!("masseter: {error}; the run goes on without recording\n"));
-            if let Some(progress) = &mut self.progress {
-                progress.start_new_panel();
-            }
+        let failure = self.backlog.new_failure().map(ToString::to_string);
+        if let Some(failure) = failure {
+            self.end_line(losses);
+            self.stderr.write(format!("masseter: {failure}; the run goes on without recording\n"));
         }
         if let Some(progress) = &mut self.progress
             && progress.is_due(now_ns)
             && self.stderr.is_idle()
         {
-            self.stderr.write(progress.next(now_ns, losses, terminal_rows()));
+            self.stderr.write(progress.next(now_ns, losses));
+        }
+    }
+
+    /// Ends the line that shows the progress, since other text follows.
+    fn end_line(&self, losses: Losses) {
+        if let Some(line) = self.progress.as_ref().and_then(|progress| progress.end_line(losses)) {
+            self.stderr.write(line);
         }
     }
 
     /// Closes every sink and reports what each lacks. The recording comes first, because clients can delay the rest.
-    pub(super) fn finish(self, now_ns: u64) -> Exit {
-        let losses = self.losses();
-        if let Some(panel) = self.progress.and_then(|it| it.last_panel(now_ns, losses, terminal_rows())) {
-            self.stderr.write(panel);
-        }
+    pub(super) fn finish(self) -> Exit {
+        self.end_line(self.losses());
         let loss = self.backlog.finish().loss();
         if let Some(loss) = &loss {
             self.stderr.write(format!("masseter: {loss}\n"));

@@ -2,7 +2,6 @@
 //!
 //! A stopped terminal or a paused reader blocks whoever writes; the recorder must not wait, since it would lose messages.
 
-use std::io;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc::{Sender, channel};
@@ -11,7 +10,6 @@ use std::time::Duration;
 
 use masseter_shared::clock;
 use masseter_terminal::warn;
-use rustix::termios::tcgetwinsize;
 
 /// How long [`StderrWriter::finish`] waits, in polls.
 const POLL: Duration = Duration::from_millis(10);
@@ -63,12 +61,6 @@ impl StderrWriter {
             clock::sleep(POLL);
         }
     }
-}
-
-/// Rows of the terminal on standard error, if it is one and reports them.
-pub(super) fn terminal_rows() -> Option<usize> {
-    let size = tcgetwinsize(io::stderr()).ok()?;
-    (size.ws_row > 0).then_some(usize::from(size.ws_row))
 }
 
 #[cfg(test)]

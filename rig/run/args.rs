@@ -92,13 +92,3 @@ pub enum ClockKind {
     /// Virtual time, in one thread: as fast as possible, the same bytes every time
     Virtual,
 }
-
-impl ClockKind {
-    /// Its name in the manifest.
-    pub(super) fn name(self) -> &'static str {
-        match self {
-            Self::Rt => "rt",
-            Self::Virtual => "virtual",
-        }
-    }
-}

@@ -7,6 +7,7 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::thread;
 use std::time::Duration;
 
+use anyhow::{Context, bail};
 use masseter_shared::lifecycle::{Ready, Start};
 use rustix::process::{Pid, Signal, kill_process};
 
@@ -16,52 +17,15 @@ const READY_TIMEOUT: Duration = Duration::from_secs(20);
 /// Polling interval while waiting for readiness.
 const POLL: Duration = Duration::from_millis(20);
 
-/// A process of the rig, by its task.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Role {
-    /// The controller.
-    Controller,
-    /// The plant.
-    Plant,
-    /// The recorder.
-    Recorder,
-}
-
-impl Role {
-    /// Its name, which is also its hidden subcommand.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Controller => "controller",
-            Self::Plant => "plant",
-            Self::Recorder => "recorder",
-        }
-    }
-}
-
-/// Why a process did not start.
-#[derive(Debug, thiserror::Error)]
-pub enum ChildError {
-    /// The system could not start it.
-    #[error("the {role} cannot be started: {error}")]
-    Spawn {
-        /// Its name.
-        role: &'static str,
-        /// The system's error.
-        error: io::Error,
-    },
-    /// It did not report that it is ready.
-    #[error("the {role} did not get ready: {reason}")]
-    NotReady {
-        /// Its name.
-        role: &'static str,
-        /// The reason.
-        reason: String,
-    },
-}
+// The names of the processes, which are also their subcommands.
+pub(super) const CONTROLLER: &str = "controller";
+pub(super) const PLANT: &str = "plant";
+pub(super) const RECORDER: &str = "recorder";
 
 /// A process; killed when dropped.
-pub struct Process {
-    role: Role,
+pub(super) struct Process {
+    /// Its name.
+    pub(super) role: &'static str,
     child: Child,
     lines: Receiver<String>,
     status: Option<ExitStatus>,
@@ -69,15 +33,17 @@ pub struct Process {
 
 impl Process {
     /// Starts this executable as `role`.
-    pub fn spawn(role: Role, arguments: &[&str]) -> Result<Self, ChildError> {
-        let failed = |error| ChildError::Spawn { role: role.name(), error };
-        let mut child = Command::new(std::env::current_exe().map_err(failed)?)
-            .arg(role.name())
-            .args(arguments)
-            .stdin(Stdio::piped())
-            .stdout(Stdio::piped())
-            .spawn()
-            .map_err(failed)?;
+    pub(super) fn spawn(role: &'static str, arguments: &[&str]) -> anyhow::Result<Self> {
+        let mut child = std::env::current_exe()
+            .and_then(|executable| {
+                Command::new(executable)
+                    .arg(role)
+                    .args(arguments)
+                    .stdin(Stdio::piped())
+                    .stdout(Stdio::piped())
+                    .spawn()
+            })
+            .with_context(|| format!("the {role} cannot be started"))?;
         let output = child.stdout.take().expect("standard output is piped");
         let (sender, lines) = channel();
         thread::spawn(move || {
@@ -90,48 +56,44 @@ impl Process {
         Ok(Self { role, child, lines, status: None })
     }
 
-    /// Its role.
-    pub fn role(&self) -> Role {
-        self.role
-    }
-
     /// Its process id.
-    pub fn id(&self) -> u32 {
+    pub(super) fn id(&self) -> u32 {
         self.child.id()
     }
 
     /// Waits until it reports that it is ready; none if `is_cancelled` becomes true first.
-    pub fn wait_ready(&mut self, is_cancelled: impl Fn() -> bool) -> Result<Option<Ready>, ChildError> {
-        let not_ready = |reason: String| ChildError::NotReady { role: self.role.name(), reason };
+    pub(super) fn wait_ready(&mut self, is_cancelled: impl Fn() -> bool) -> anyhow::Result<Option<Ready>> {
+        let not_ready = || format!("the {} did not get ready", self.role);
         let mut polls = READY_TIMEOUT.as_millis() / POLL.as_millis();
         loop {
             match self.lines.recv_timeout(POLL) {
                 Ok(line) => {
-                    let ready = serde_json::from_str(&line);
-                    return ready.map(Some).map_err(|error| not_ready(format!("{error} in '{line}'")));
+                    let ready =
+                        serde_json::from_str(&line).with_context(|| format!("its report is '{line}'"));
+                    return ready.map(Some).with_context(not_ready);
                 }
                 // Ctrl-C also reaches the process, and may end it before it handles signals.
                 Err(_) if is_cancelled() => return Ok(None),
                 Err(RecvTimeoutError::Timeout) if polls > 0 => polls -= 1,
                 Err(RecvTimeoutError::Timeout) => {
-                    return Err(not_ready(format!("no report within {} s", READY_TIMEOUT.as_secs())));
+                    bail!("{}: no report within {} s", not_ready(), READY_TIMEOUT.as_secs())
                 }
                 Err(RecvTimeoutError::Disconnected) => {
-                    return Err(not_ready("it ended; see its message above".to_owned()));
+                    bail!("{}: it ended; see its message above", not_ready())
                 }
             }
         }
     }
 
     /// Starts its work.
-    pub fn start(&mut self, start: Start) -> io::Result<()> {
+    pub(super) fn start(&mut self, start: Start) -> io::Result<()> {
         let input = self.child.stdin.as_mut().expect("standard input is piped");
         serde_json::to_writer(&mut *input, &start)?;
         writeln!(input)
     }
 
     /// Its exit status, if it has ended.
-    pub fn exit_status(&mut self) -> io::Result<Option<ExitStatus>> {
+    pub(super) fn exit_status(&mut self) -> io::Result<Option<ExitStatus>> {
         if self.status.is_none() {
             self.status = self.child.try_wait()?;
         }
@@ -139,12 +101,12 @@ impl Process {
     }
 
     /// Asks it to end (SIGTERM).
-    pub fn terminate(&mut self) {
+    pub(super) fn terminate(&mut self) {
         self.signal(Signal::TERM);
     }
 
     /// Ends it at once (SIGKILL).
-    pub fn kill(&mut self) {
+    pub(super) fn kill(&mut self) {
         self.signal(Signal::KILL);
     }
 
@@ -164,7 +126,7 @@ impl Drop for Process {
 }
 
 /// An exit status as text.
-pub fn describe(status: ExitStatus) -> String {
+pub(super) fn describe(status: ExitStatus) -> String {
     match (status.code(), status.signal()) {
         (Some(code), _) => format!("exit code {code}"),
         (None, Some(signal)) => {

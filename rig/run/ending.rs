@@ -5,7 +5,7 @@ use std::process::ExitStatus;
 use masseter_recording::Ending;
 use masseter_terminal::Exit;
 
-use super::child::{Role, describe};
+use super::child::{PLANT, RECORDER, describe};
 
 /// The ending of the run: the first death of a process, else an incomplete recording, else the interruption, else the
 /// controller's ending.
@@ -24,18 +24,18 @@ pub(super) fn of_plant_and_recorder(
     recorder: Option<ExitStatus>,
 ) -> Option<Ending> {
     if !plant.is_some_and(|status| status.success()) {
-        return Some(died(Role::Plant, plant));
+        return Some(died(PLANT, plant));
     }
     match recorder.and_then(|status| status.code()) {
         Some(code) if code == Exit::Passed as i32 => None,
         Some(code) if code == Exit::Incomplete as i32 => Some(Ending::RecordingFailed),
-        _ => Some(died(Role::Recorder, recorder)),
+        _ => Some(died(RECORDER, recorder)),
     }
 }
 
-pub(super) fn died(role: Role, status: Option<ExitStatus>) -> Ending {
+pub(super) fn died(role: &str, status: Option<ExitStatus>) -> Ending {
     let how = status.map_or_else(|| "it did not end when asked to, and was killed".to_owned(), describe);
-    Ending::died(role.name(), how)
+    Ending::died(role, how)
 }
 
 #[cfg(test)]
@@ -44,8 +44,8 @@ mod tests {
 
     #[test]
     fn a_death_outranks_an_incomplete_recording_then_an_interruption_then_a_safe_stop() {
-        let died = |role: Role| Ending::died(role.name(), "SIGKILL (9)".to_owned());
-        let (recorder, plant, controller) = (died(Role::Recorder), died(Role::Plant), died(Role::Controller));
+        let died = |role| Ending::died(role, "SIGKILL (9)".to_owned());
+        let (recorder, plant, controller) = (died(RECORDER), died(PLANT), died("controller"));
         let (completed, interrupted, safe_stop) = (Ending::Completed, Ending::Interrupted, Ending::SafeStop);
         let gap = Ending::RecordingFailed;
         for (interruption, by_controller, others, expected) in [

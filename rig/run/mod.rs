@@ -20,9 +20,9 @@ use masseter_recording::{Ending, MOTION, Manifest, RunFolder};
 use masseter_shared::config::{MotionConfig, Scenario};
 use masseter_terminal::{Exit, Failure, OrFailure, status};
 
+use crate::arguments::name_of;
 use crate::{foxglove, machine};
 use args::{ClockKind, RunArgs};
-use supervisor::RunOutcome;
 
 /// Plays the motion, judges the run, and writes its folder.
 pub fn run(args: &RunArgs) -> Result<Exit, Failure> {
@@ -41,25 +41,21 @@ pub fn run(args: &RunArgs) -> Result<Exit, Failure> {
     }
 
     let motion_s = plan.trajectory.duration_s();
-    let mut manifest = Manifest::new(plan.scenario.clone(), motion_s, args.clock.name(), machine::describe());
+    let clock = name_of(&args.clock);
+    let mut manifest = Manifest::new(plan.scenario.clone(), motion_s, &clock, machine::describe());
     // This one remains if the supervisor is killed.
     write_manifest(&folder, &manifest)?;
-    let outcome = match domain {
-        None => {
-            virtual_time::run(&plan, &folder, args.controller.builder()).map(RunOutcome::from).incomplete()
-        }
-        Some(domain) => supervisor::run(domain, &plan, &folder, args),
+    let ran = match domain {
+        None => virtual_time::run(&plan, &folder, args.controller.builder())
+            .map(|ending| manifest.ending = ending)
+            .incomplete(),
+        Some(domain) => supervisor::run(domain, &plan, &folder, args, &mut manifest),
     };
-    let outcome = outcome.or_else(|failure| {
+    if let Err(failure) = &ran {
         manifest.ending = Ending::died("rig", format!("{:#}", failure.error));
-        write_manifest(&folder, &manifest)?;
-        Err(failure)
-    })?;
-    manifest.scheduling = outcome.scheduling;
-    manifest.cpu_dma_latency = outcome.cpu_dma_latency;
-    manifest.usage = outcome.usage;
-    manifest.ending = outcome.ending;
+    }
     write_manifest(&folder, &manifest)?;
+    ran?;
     // Interrupted before every process was ready: nothing is recorded.
     let is_unstarted = args.clock == ClockKind::Rt && manifest.scheduling.is_empty();
     if manifest.ending == Ending::Interrupted && is_unstarted {

@@ -12,7 +12,7 @@ use std::time::Duration;
 
 use anyhow::Context;
 use masseter_plan::RunPlan;
-use masseter_recording::{DmaLatency, Ending, RunFolder, RunUsage};
+use masseter_recording::{DmaLatency, Ending, Manifest, RunFolder};
 use masseter_shared::clock::{self, SECOND_NS};
 use masseter_shared::config::Scenario;
 use masseter_shared::lifecycle::Start;
@@ -22,9 +22,10 @@ use masseter_shared::transport::{Claim, Domain, DomainError};
 use masseter_terminal::{Exit, Failure, OrFailure, status};
 
 use super::args::RunArgs;
-use super::child::{ChildError, Process, Role};
+use super::child::{CONTROLLER, PLANT, Process, RECORDER};
 use super::ending::{died, of_plant_and_recorder, of_run};
 use super::usage::UsageMeter;
+use crate::arguments::name_of;
 use crate::machine::interrupts::Interrupts;
 use crate::machine::{SystemRoot, dma_latency};
 
@@ -43,62 +44,37 @@ const SILENT: &str = "it stopped sending commands, and was killed";
 /// Time for the plant to stop the drives once its master has detected the controller's death, ns.
 const SAFE_STOP_NS: u64 = SECOND_NS / 2;
 
-/// The outcome of a run, for its manifest.
-#[derive(Debug)]
-pub struct RunOutcome {
-    /// How the run ended.
-    pub ending: Ending,
-    /// The scheduling that each process obtained.
-    pub scheduling: BTreeMap<String, Obtained>,
-    /// The state of `/dev/cpu_dma_latency`; none if the processes were not ready.
-    pub cpu_dma_latency: Option<DmaLatency>,
-    /// CPU time, switches and faults of the processes.
-    pub usage: RunUsage,
-}
-
-/// The outcome of a run without processes.
-impl From<Ending> for RunOutcome {
-    fn from(ending: Ending) -> Self {
-        let (scheduling, usage) = (BTreeMap::new(), RunUsage::default());
-        Self { ending, scheduling, cpu_dma_latency: None, usage }
-    }
-}
-
-/// A domain that belongs to this rig alone.
-#[derive(Debug)]
-pub struct ReservedDomain {
-    domain: Domain,
-    claim: Claim,
-}
-
 /// Sweeps the domains of killed runs, and reserves the domain `name`, or one with a unique name.
 ///
 /// # Errors
 /// When a running rig has the name, or shared memory cannot be used.
-pub fn reserve_domain(name: Option<&str>) -> Result<ReservedDomain, DomainError> {
+pub(super) fn reserve_domain(name: Option<&str>) -> Result<(Domain, Claim), DomainError> {
     Domain::all()?.iter().try_for_each(|domain| domain.sweep().map(drop))?;
     let unique = || format!("{}-{:x}", std::process::id(), clock::now_ns());
     let domain = Domain::named(&name.map_or_else(unique, str::to_owned))?;
     let claim = domain.claim()?;
-    Ok(ReservedDomain { domain, claim })
+    Ok((domain, claim))
 }
 
-/// Runs the rig in real time, then releases its domain.
-pub fn run(
-    ReservedDomain { domain, claim }: ReservedDomain,
+/// Runs the rig in real time, then releases its domain. Enters the circumstances and the ending into the manifest.
+pub(super) fn run(
+    (domain, claim): (Domain, Claim),
     plan: &RunPlan,
     folder: &RunFolder,
     args: &RunArgs,
-) -> Result<RunOutcome, Failure> {
+    manifest: &mut Manifest,
+) -> Result<(), Failure> {
     let interrupts = Interrupts::listen().context("cannot listen for signals").died()?;
-    let result = Rig::spawn(plan, folder, &domain, args).and_then(|mut rig| rig.run(plan, args, &interrupts));
+    let result = Rig::spawn(plan, folder, &domain, args)
+        .and_then(|mut rig| rig.run(plan, args.require_rt, &interrupts, manifest));
     drop(claim);
     interrupts.restore_default_actions();
     if let Err(error) = domain.sweep() {
         status!("masseter: {error}; `masseter clean` removes the rest of this run");
     }
     // Input errors were found before.
-    result.died()
+    manifest.ending = result.died()?;
+    Ok(())
 }
 
 /// The three processes, in the order of their start.
@@ -125,50 +101,56 @@ impl Rig {
         let mut recorder_arguments = [&common[..], &["--recording", recording, &motion]].concat();
         recorder_arguments.extend(args.quiet.then_some("--quiet"));
         recorder_arguments.extend(live.as_deref());
-        let controller_arguments = [&common[..], &["--kind", args.controller.name()]].concat();
+        let kind = name_of(&args.controller);
+        let controller_arguments = [&common[..], &["--kind", &kind]].concat();
         let Scenario { controller, can, .. } = &plan.scenario;
         // It stops the motion, holds it, and switches the drives off.
         let stop_s = controller.stop_ramp_s + controller.hold_s + controller.start_timeout_s;
         Ok(Self {
             stop_timeout_ns: ((stop_s * 1e9) as u64).saturating_add(END_TIMEOUT_NS),
             plant_alone_ns: u64::from(can.command_timeout_cycles) * plan.scenario.period_ns() + SAFE_STOP_NS,
-            recorder: Process::spawn(Role::Recorder, &recorder_arguments)?,
-            plant: Process::spawn(Role::Plant, &common)?,
-            controller: Process::spawn(Role::Controller, &controller_arguments)?,
+            recorder: Process::spawn(RECORDER, &recorder_arguments)?,
+            plant: Process::spawn(PLANT, &common)?,
+            controller: Process::spawn(CONTROLLER, &controller_arguments)?,
         })
     }
 
-    fn run(&mut self, plan: &RunPlan, args: &RunArgs, interrupts: &Interrupts) -> anyhow::Result<RunOutcome> {
+    fn run(
+        &mut self,
+        plan: &RunPlan,
+        require_rt: bool,
+        interrupts: &Interrupts,
+        manifest: &mut Manifest,
+    ) -> anyhow::Result<Ending> {
         let Some(scheduling) = self.wait_ready(interrupts)? else {
-            return Ok(Ending::Interrupted.into());
+            return Ok(Ending::Interrupted);
         };
+        manifest.scheduling = scheduling;
         let is_virtual = SystemRoot::of_this_machine().is_virtual();
         let hold = dma_latency::Hold::new(plan.scenario.realtime.cpu_dma_latency, is_virtual);
-        let cpu_dma_latency = Some(hold.obtained().clone());
-        let refusals = print_refusals(&scheduling, hold.obtained());
-        if args.require_rt && refusals > 0 {
+        manifest.cpu_dma_latency = Some(hold.obtained.clone());
+        let refusals = print_refusals(&manifest.scheduling, &hold.obtained);
+        if require_rt && refusals > 0 {
             status!(
                 "masseter: --require-rt: the kernel did not grant real time, so the motion was not started"
             );
-            return Ok(RunOutcome { scheduling, cpu_dma_latency, ..Ending::NotStarted.into() });
+            return Ok(Ending::NotStarted);
         }
         let epoch_ns = self.start(plan.scenario.period_ns())?;
         let processes = [&self.recorder, &self.plant, &self.controller];
-        let names_and_ids = processes.map(|process| (process.role().name(), process.id()));
+        let names_and_ids = processes.map(|process| (process.role, process.id()));
         let mut meter = UsageMeter::new(epoch_ns, &names_and_ids);
         let ending = self.monitor(interrupts, &mut meter)?;
-        Ok(RunOutcome { ending, scheduling, cpu_dma_latency, usage: meter.finish() })
+        manifest.usage = meter.finish();
+        Ok(ending)
     }
 
     /// The scheduling of each process once all are ready; none if the user interrupts before.
-    fn wait_ready(
-        &mut self,
-        interrupts: &Interrupts,
-    ) -> Result<Option<BTreeMap<String, Obtained>>, ChildError> {
+    fn wait_ready(&mut self, interrupts: &Interrupts) -> anyhow::Result<Option<BTreeMap<String, Obtained>>> {
         let mut scheduling = BTreeMap::new();
         for process in [&mut self.recorder, &mut self.plant, &mut self.controller] {
             match process.wait_ready(|| interrupts.is_stop_requested()) {
-                Ok(Some(ready)) => scheduling.insert(process.role().name().to_owned(), ready.scheduling),
+                Ok(Some(ready)) => scheduling.insert(process.role.to_owned(), ready.scheduling),
                 Ok(None) => return Ok(None),
                 Err(error) => {
                     // Ctrl-C also reaches the processes, and may have ended this one before the supervisor sees it.
@@ -229,13 +211,13 @@ impl Rig {
         let ending = if interrupts.is_stop_requested() {
             Ending::Interrupted
         } else if let Some(status) = self.recorder.exit_status()? {
-            died(Role::Recorder, Some(status))
+            died(RECORDER, Some(status))
         } else if let Some(status) = self.plant.exit_status()? {
             if status.code() == Some(Exit::SafeStop as i32) {
                 self.controller.kill();
-                return Ok(Some(Ending::died(Role::Controller.name(), SILENT.to_owned())));
+                return Ok(Some(Ending::died(CONTROLLER, SILENT.to_owned())));
             }
-            died(Role::Plant, Some(status))
+            died(PLANT, Some(status))
         } else {
             return Ok(None);
         };
@@ -254,7 +236,7 @@ impl Rig {
             Some(code) if code == Exit::SafeStop as i32 => Ok(Ending::SafeStop),
             _ => {
                 wait_for(&mut self.plant, self.plant_alone_ns, interrupts)?;
-                Ok(died(Role::Controller, status))
+                Ok(died(CONTROLLER, status))
             }
         }
     }

@@ -20,7 +20,7 @@ use masseter_shared::realtime::Wake;
 use masseter_shared::schedule::CycleSchedule;
 use masseter_terminal::status;
 
-use super::child::Role;
+use super::child::PLANT;
 use crate::machine::interrupts::Interrupts;
 
 /// Virtual time of the first SYNC, ns.
@@ -44,13 +44,15 @@ fn play(
     let scenario = &plan.scenario;
     let mut plant = PlantCore::new(scenario, EPOCH_NS)?;
     let scene = Scene::new(&plan.mechanism, &scenario.jaw);
-    let log = Log::new(Backlog::start(Recorder::create(&folder.recording(), scene)?, Pace::Virtual));
+    let backlog = Backlog::start(Recorder::create(&folder.recording(), scene)?, Pace::Virtual);
+    let log = Log { backlog, published: Default::default() };
     let mut rig = VirtualRig { controller, schedule: &plan.schedule, log, now_ns: EPOCH_NS, reading: None };
 
     let (mut cycle, mut plant_error) = (0, None);
     while plant_error.is_none()
         && rig.controller.outcome().is_none()
-        && rig.log.is_safe()
+        // Everything so far is or will be recorded.
+        && rig.log.backlog.dropped() == 0
         && !interrupts.is_abort_requested()
     {
         cycle += 1;
@@ -65,7 +67,7 @@ fn play(
         status!("masseter: {loss}; the run ends here");
     }
     Ok(match (plant_error, rig.controller.outcome()) {
-        (Some(error), _) => Ending::died(Role::Plant.name(), error.to_string()),
+        (Some(error), _) => Ending::died(PLANT, error.to_string()),
         _ if loss.is_some() => Ending::RecordingFailed,
         _ if interrupts.is_stop_requested() => Ending::Interrupted,
         (None, Some(Outcome::SafeStop)) => Ending::SafeStop,
@@ -101,12 +103,12 @@ impl PlantPorts<VirtualLink> for VirtualRig<'_> {
     }
 
     fn publish_reading(&mut self, fill: impl FnOnce(&mut Reading)) -> Result<(), PlantError> {
-        self.reading = Some(self.log.readings.record(&mut self.log.backlog, self.now_ns, fill));
+        self.reading = Some(self.log.record(Publisher::Reading, self.now_ns, fill));
         Ok(())
     }
 
     fn publish_truth(&mut self, truth: &Truth) -> Result<(), PlantError> {
-        self.log.truths.record(&mut self.log.backlog, self.now_ns, |message| *message = *truth);
+        self.log.record(Publisher::Truth, self.now_ns, |message| *message = *truth);
         Ok(())
     }
 
@@ -146,74 +148,58 @@ impl ControllerPorts for VirtualPorts<'_> {
     }
 
     fn publish_command(&mut self, fill: impl FnOnce(&mut Command)) -> Result<(), Infallible> {
-        self.command = Some(self.log.commands.record(&mut self.log.backlog, self.now_ns, fill));
+        self.command = Some(self.log.record(Publisher::Command, self.now_ns, fill));
         Ok(())
     }
 
     fn publish_state(&mut self, fill: impl FnOnce(&mut State)) -> Result<(), Infallible> {
-        self.log.states.record(&mut self.log.backlog, self.now_ns, fill);
+        self.log.record(Publisher::State, self.now_ns, fill);
         Ok(())
     }
 
     fn publish_event(&mut self, event: &Event) -> Result<(), Infallible> {
-        self.log.controller_events.record(&mut self.log.backlog, self.now_ns, |message| *message = *event);
+        self.log.record(Publisher::ControllerEvent, self.now_ns, |message| *message = *event);
         Ok(())
     }
 }
 
-/// Numbers and records the messages of one publisher on one topic, as its publisher would.
-#[derive(Default)]
-struct Publisher(u64);
-
-impl Publisher {
-    fn record<M: Message>(&mut self, backlog: &mut Backlog, now_ns: u64, fill: impl FnOnce(&mut M)) -> M {
-        let mut message = M::default();
-        fill(&mut message);
-        self.0 += 1;
-        message.stamp(self.0, now_ns);
-        backlog.record(&message, now_ns);
-        message
-    }
+/// The publishers of a run. Each numbers its own messages.
+#[derive(Clone, Copy)]
+enum Publisher {
+    Command,
+    Reading,
+    State,
+    Truth,
+    Frame,
+    ControllerEvent,
+    PlantEvent,
 }
 
-/// The recording and the publishers whose messages it contains.
+/// The recording, and how many messages of each publisher it contains.
 struct Log {
     backlog: Backlog,
-    commands: Publisher,
-    readings: Publisher,
-    states: Publisher,
-    truths: Publisher,
-    frames: Publisher,
-    controller_events: Publisher,
-    plant_events: Publisher,
+    published: [u64; Publisher::PlantEvent as usize + 1],
 }
 
 impl Log {
-    fn new(backlog: Backlog) -> Self {
-        Self {
-            backlog,
-            commands: Publisher::default(),
-            readings: Publisher::default(),
-            states: Publisher::default(),
-            truths: Publisher::default(),
-            frames: Publisher::default(),
-            controller_events: Publisher::default(),
-            plant_events: Publisher::default(),
-        }
-    }
-
-    /// Whether everything so far is or will be recorded, as far as is known.
-    fn is_safe(&self) -> bool {
-        self.backlog.dropped() == 0
+    /// Numbers and records a message, as its publisher would.
+    fn record<M: Message>(&mut self, publisher: Publisher, now_ns: u64, fill: impl FnOnce(&mut M)) -> M {
+        let mut message = M::default();
+        fill(&mut message);
+        let number = &mut self.published[publisher as usize];
+        *number += 1;
+        message.stamp(*number, now_ns);
+        self.backlog.record(&message, now_ns);
+        message
     }
 
     /// Records the frames and events of a cycle.
     fn drain(&mut self, plant: &mut PlantCore, now_ns: u64) {
         for frame in plant.drain_frames() {
-            self.frames.record(&mut self.backlog, now_ns, |message| *message = frame);
+            self.record(Publisher::Frame, now_ns, |message| *message = frame);
         }
         plant.drain_events(&mut |event| {
-            self.plant_events.record(&mut self.backlog, now_ns, |message| *message = event);
+            self.record(Publisher::PlantEvent, now_ns, |message| *message = event);
         });
     }
 }

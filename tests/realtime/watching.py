@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""What being watched costs the loops: runs alone, with the progress panel on a terminal, and with a WebSocket client that
+"""What being watched costs the loops: runs alone, with the progress on a terminal, and with a WebSocket client that
 takes every message, in turn, again and again.
 
     tests/realtime/watching.py target/release/masseter --rounds 5 --seconds 12

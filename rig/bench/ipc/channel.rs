@@ -1,28 +1,32 @@
-//! The channels that are compared.
+//! The channels between two processes that are compared.
+
+use std::os::unix::net::UnixStream;
 
 use clap::ValueEnum;
+use masseter_shared::transport::{Domain, Node};
 
-/// A channel between two processes.
+use super::exchange::Ends;
+use super::topics::Numbered;
+use super::{socket, topics};
+
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum Channel {
-    /// The rig's transport.
+pub(super) enum Channel {
     Rig,
-    /// Bare iceoryx2.
     Iceoryx2,
-    /// A Unix stream socket.
     Socket,
-    /// Two pipes.
-    Pipe,
 }
 
 impl Channel {
-    /// The name in tables.
-    pub(super) fn name(self) -> &'static str {
+    /// Opens the ends of one side: in the domain, or on its half of the socket.
+    pub(super) fn open<Sent: Numbered, Got: Numbered>(
+        self,
+        domain: &Domain,
+        socket: UnixStream,
+    ) -> anyhow::Result<Ends> {
         match self {
-            Self::Rig => "masseter transport",
-            Self::Iceoryx2 => "bare iceoryx2",
-            Self::Socket => "Unix socket",
-            Self::Pipe => "pipe",
+            Self::Rig => topics::of_the_rig::<Sent, Got>(&Node::join(domain)?),
+            Self::Iceoryx2 => topics::bare::<Sent, Got>(&Node::join(domain)?),
+            Self::Socket => socket::ends(socket),
         }
     }
 }

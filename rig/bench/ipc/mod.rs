@@ -1,54 +1,58 @@
 //! `bench ipc`: a command to another process and a reading back; both processes poll.
 //!
-//! The rig's transport is compared with bare iceoryx2 and the same messages, with a Unix socket and a pipe (128 bytes, also
-//! polled), and with the lower bound: one cache line that two threads on the same cores write in turn. Waiting for a
-//! socket or pipe in the kernel is not measured; it takes about fifty times as long.
+//! The rig's transport is compared with bare iceoryx2 and the same messages, with a Unix socket (128 bytes, also polled),
+//! and with the lower bound: one cache line that two threads on the same cores write in turn. Waiting for a socket in the
+//! kernel is not measured; it takes about fifty times as long.
 
-mod cache_line;
 mod channel;
+mod exchange;
 mod peer;
-mod round_trips;
-mod streams;
+mod socket;
 mod topics;
 
 use std::io;
+use std::os::fd::{AsFd, OwnedFd};
+use std::os::unix::net::UnixStream;
 
 use clap::Args;
-use masseter_shared::transport::Domain;
+use masseter_shared::messages::{Command, Reading};
+use masseter_shared::transport::{Domain, ScratchDomain};
 use rustix::process::{Signal, set_parent_process_death_signal};
-
-pub use channel::Channel;
 
 use super::candidate::Durations;
 use super::comparison::{Comparison, Turn};
-use super::thread::realtime_on;
-
-/// The name of the lower bound in tables.
-const CACHE_LINE: &str = "cache line (threads)";
+use super::thread::{on_core, realtime_on};
+use channel::Channel;
+use exchange::Ends;
+use peer::{Peer, report_open};
 
 pub(super) fn measure(rounds: u32, cores: [usize; 2]) -> anyhow::Result<Comparison> {
-    let turn = |channel: Channel| -> (String, Turn) {
-        (channel.name().to_owned(), Box::new(move || Ok(round_trips(channel, cores)?.into())))
-    };
-    let mut turns: Vec<_> =
-        [Channel::Rig, Channel::Iceoryx2, Channel::Socket, Channel::Pipe].map(turn).into();
-    turns.push((CACHE_LINE.to_owned(), Box::new(move || Ok(cache_line::round_trips(cores)?.into()))));
-    let measures = "round trip between two polling processes on two cores".to_owned();
-    let [rig, bare, socket, pipe] =
-        [Channel::Rig, Channel::Iceoryx2, Channel::Socket, Channel::Pipe].map(Channel::name);
-    let pairs = [(rig, bare), (rig, CACHE_LINE), (rig, socket), (rig, pipe), (bare, CACHE_LINE)];
+    const RIG: &str = "masseter transport";
+    const BARE: &str = "bare iceoryx2";
+    const SOCKET: &str = "Unix socket";
+    const CACHE_LINE: &str = "cache line (threads)";
+    let turn = |channel| -> Turn { Box::new(move || Ok(round_trips(channel, cores)?.into())) };
+    let turns = vec![
+        (RIG, turn(Channel::Rig)),
+        (BARE, turn(Channel::Iceoryx2)),
+        (SOCKET, turn(Channel::Socket)),
+        (CACHE_LINE, Box::new(move || Ok(exchange::on_a_cache_line(cores)?.into()))),
+    ];
+    let measures = "round trip between two polling processes on two cores";
+    let pairs = [(RIG, BARE), (RIG, CACHE_LINE), (RIG, SOCKET), (BARE, CACHE_LINE)];
     Ok(Comparison::by_turns("ipc", measures, rounds, &cores, turns)?.comparing(pairs))
 }
 
 /// The other process starts first and from an ordinary thread: from a real-time thread it would inherit core and priority,
 /// and get no time while that thread polls.
-fn round_trips(channel: Channel, cores: [usize; 2]) -> anyhow::Result<Durations> {
-    match channel {
-        Channel::Rig => topics::round_trips::<topics::Ports>(channel, cores),
-        Channel::Iceoryx2 => topics::round_trips::<topics::Bare>(channel, cores),
-        Channel::Socket => streams::socket_round_trips(cores),
-        Channel::Pipe => streams::pipe_round_trips(cores),
-    }
+fn round_trips(channel: Channel, [own_core, peer_core]: [usize; 2]) -> anyhow::Result<Durations> {
+    let domain = ScratchDomain::claim("bench")?;
+    let (own, peer) = UnixStream::pair()?;
+    let _peer = Peer::start(channel, peer_core, domain.id(), OwnedFd::from(peer).into())?;
+    on_core(own_core, || {
+        let Ends { send, receive } = channel.open::<Command, Reading>(&domain, own)?;
+        exchange::round_trips(send, receive)
+    })
 }
 
 /// The arguments of the other process.
@@ -62,19 +66,15 @@ pub struct PeerArgs {
     core: usize,
     /// The domain of the topics.
     #[arg(long)]
-    domain: Option<String>,
+    domain: String,
 }
 
-/// Answers every message until the process is killed or the channel closes.
+/// Answers every message until the process is killed or the channel closes. The socket is standard input.
 pub fn answer(args: &PeerArgs) -> anyhow::Result<()> {
     set_parent_process_death_signal(Some(Signal::KILL))?;
-    let domain = args.domain.as_deref().map(Domain::named).transpose()?;
     realtime_on(args.core);
-    match (args.channel, domain) {
-        (Channel::Rig, Some(domain)) => topics::answer::<topics::Ports>(&domain),
-        (Channel::Iceoryx2, Some(domain)) => topics::answer::<topics::Bare>(&domain),
-        (Channel::Rig | Channel::Iceoryx2, None) => anyhow::bail!("topics need a domain"),
-        (Channel::Socket, _) => streams::answer(&io::stdin(), &io::stdin()),
-        (Channel::Pipe, _) => streams::answer(&io::stdin(), &io::stdout()),
-    }
+    let socket = UnixStream::from(io::stdin().as_fd().try_clone_to_owned()?);
+    let ends = args.channel.open::<Reading, Command>(&Domain::named(&args.domain)?, socket)?;
+    report_open()?;
+    exchange::answer(ends)
 }

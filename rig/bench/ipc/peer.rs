@@ -1,38 +1,36 @@
 //! The process on the other side of a channel.
 
-use std::io;
-use std::os::fd::OwnedFd;
+use std::io::{self, Read};
 use std::process::{Child, Command, Stdio};
 
-use clap::ValueEnum;
-use masseter_shared::transport::Domain;
+use anyhow::Context;
 
 use super::channel::Channel;
+use crate::arguments::name_of;
 
 /// A running peer; killed when dropped.
-pub(super) struct Peer(pub(super) Child);
+pub(super) struct Peer(Child);
 
 impl Peer {
-    /// Starts this executable as the other side.
-    pub(super) fn start(
-        channel: Channel,
-        core: usize,
-        domain: Option<&Domain>,
-        [input, output]: [Stdio; 2],
-    ) -> io::Result<Self> {
-        let mut command = Command::new(std::env::current_exe()?);
-        let value = channel.to_possible_value().expect("no channel is skipped");
-        command.args(["bench-peer", "--channel", value.get_name(), "--core", &core.to_string()]);
-        if let Some(domain) = domain {
-            command.args(["--domain", domain.id()]);
-        }
-        Ok(Self(command.stdin(input).stdout(output).spawn()?))
+    /// Starts this executable as the other side, and waits until its end of the channel is open.
+    pub(super) fn start(channel: Channel, core: usize, domain: &str, input: Stdio) -> anyhow::Result<Self> {
+        let mut peer = Self(
+            Command::new(std::env::current_exe()?)
+                .args(["bench-peer", "--channel", &name_of(&channel), "--core", &core.to_string()])
+                .args(["--domain", domain])
+                .stdin(input)
+                .stdout(Stdio::piped())
+                .spawn()?,
+        );
+        let output = peer.0.stdout.as_mut().expect("standard output is piped");
+        output.read_exact(&mut [0]).context("the other side did not open its end")?;
+        Ok(peer)
     }
+}
 
-    /// Takes the pipes to and from the peer.
-    pub(super) fn pipes(&mut self) -> Option<[OwnedFd; 2]> {
-        Some([self.0.stdin.take()?.into(), self.0.stdout.take()?.into()])
-    }
+/// Reports that this process has opened its end.
+pub(super) fn report_open() -> anyhow::Result<()> {
+    Ok(rustix::io::write(io::stdout(), b"\n").map(drop)?)
 }
 
 impl Drop for Peer {

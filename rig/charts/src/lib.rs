@@ -1,7 +1,7 @@
 //! Charts as SVG: lines, bars, grids of colours, with axes, ticks, legends and one palette.
 //!
 //! Drawing itself is done by `plotters`; this crate fixes what all charts of the rig have in common. Which data a chart
-//! shows is decided by its users: the report, the benches and the paper study.
+//! shows is decided by its users: the report and the paper study.
 //!
 //! ```
 //! use masseter_charts::{Axis, Legend, Line, LineChart, Scale};

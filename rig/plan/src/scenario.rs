@@ -2,16 +2,14 @@
 
 use std::path::Path;
 
-use masseter_shared::config::{Scenario, ScenarioError};
+use masseter_shared::config::Scenario;
 
 /// The valid scenario of a file, or the default one.
 ///
 /// # Errors
 /// When the file cannot be read or a value is out of range.
-pub fn read_scenario(path: Option<&Path>) -> Result<Scenario, ScenarioError> {
-    let scenario = unchecked(path)?;
-    scenario.validate()?;
-    Ok(scenario)
+pub fn read_scenario(path: Option<&Path>) -> anyhow::Result<Scenario> {
+    read_scenario_with(path, |_| Ok(()))
 }
 
 /// The same after `change`, which applies the arguments of a verb. Only the result must be valid.
@@ -22,12 +20,8 @@ pub fn read_scenario_with(
     path: Option<&Path>,
     change: impl FnOnce(&mut Scenario) -> anyhow::Result<()>,
 ) -> anyhow::Result<Scenario> {
-    let mut scenario = unchecked(path)?;
+    let mut scenario = path.map_or_else(|| Ok(Scenario::default()), Scenario::read)?;
     change(&mut scenario)?;
     scenario.validate()?;
     Ok(scenario)
-}
-
-fn unchecked(path: Option<&Path>) -> Result<Scenario, ScenarioError> {
-    path.map_or_else(|| Ok(Scenario::default()), Scenario::read)
 }
