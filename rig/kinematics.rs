@@ -36,7 +36,7 @@ pub(crate) fn kinematics(args: &KinematicsArgs) -> anyhow::Result<Exit> {
     let prepared = Study::prepare(args.own_scenario()?.as_ref())?;
     new_folder(&args.out)?;
     let settings = Settings { seed: args.seed, samples: args.samples as usize, cells: args.cells as usize };
-    let study = prepared.run(&settings, |stage| status!("{stage}"))?;
+    let study = prepared.run(settings, |stage| status!("{stage}"))?;
     for claim in study.write(&args.out, &args.command())? {
         result_line!("{:<13}  {}", claim.judgement.name(), claim.statement)?;
     }

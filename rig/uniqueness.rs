@@ -3,14 +3,13 @@
 //!
 //! Both are about the published mechanism; a proof around a motion is about its scenario's mechanism.
 
-use std::fs::File;
-use std::io::{self, BufWriter, Write};
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use clap::{Args, Subcommand, ValueEnum};
 use masseter_controller::kinematics::uniqueness::InputBox;
-use masseter_plan::RunPlan;
+use masseter_plan::{Overrides, RunPlan};
 use masseter_shared::geometry::{AXIS_NAMES, Mechanism, MechanismConfig};
 use masseter_study::uniqueness::{Ambiguous, boxes, prove, search};
 use masseter_terminal::{Exit, new_file, result_line, status};
@@ -136,8 +135,9 @@ fn with_output(
 ) -> anyhow::Result<bool> {
     let file = out.map(new_file).transpose()?;
     let (is_unique, rows) = work()?;
-    if let (Some(path), Some(file)) = (out, file) {
-        write_rows(file, &rows).with_context(|| format!("cannot write {}", path.display()))?;
+    if let (Some(path), Some(mut file)) = (out, file) {
+        let written = file.write_all((rows.join("\n") + "\n").as_bytes());
+        written.with_context(|| format!("cannot write {}", path.display()))?;
     }
     Ok(is_unique)
 }
@@ -149,42 +149,22 @@ fn inputs_to_prove(args: &ProveArgs) -> anyhow::Result<(Mechanism, Vec<InputBox>
         let inputs = args.region.inputs(&mechanism);
         return Ok((mechanism, vec![inputs]));
     };
-    let plan = RunPlan::new(masseter_plan::read_scenario_with(args.scenario.as_deref(), |scenario| {
-        if let Some(path) = &args.trajectory {
-            masseter_plan::play_file(path, scenario);
-        }
-        Ok(())
-    })?)?;
+    let overrides = Overrides { trajectory: args.trajectory.clone(), ..Overrides::default() };
+    let plan = RunPlan::new(masseter_plan::scenario_with_overrides(args.scenario.as_deref(), &overrides)?)?;
     let inputs = boxes(&plan, around_mm * 1e-3)?;
     result_line!("{}: {} boxes around its inputs", plan.scenario.name, inputs.len())?;
     Ok((plan.mechanism, inputs))
 }
 
-fn parse_distance(text: &str) -> Result<f64, String> {
-    let distance_mm: f64 = text.parse().map_err(|_| format!("{text} is no number"))?;
-    if distance_mm > 0.0 && distance_mm < 100.0 {
-        Ok(distance_mm)
-    } else {
-        Err("use a distance above 0 and below 100 mm".to_owned())
-    }
+fn parse_distance(text: &str) -> Result<f64, &'static str> {
+    let distance_mm = text.parse().ok().filter(|mm| *mm > 0.0 && *mm < 100.0);
+    distance_mm.ok_or("use a distance above 0 and below 100 mm")
 }
 
 /// Above every determinant, or beside them as no number, there is nothing to count, and anything is proven.
-fn parse_margin(text: &str) -> Result<f64, String> {
-    let margin: f64 = text.parse().map_err(|_| format!("{text} is no number"))?;
-    if margin.is_finite() && margin >= 0.0 {
-        Ok(margin)
-    } else {
-        Err("use a finite determinant, 0 or above".to_owned())
-    }
-}
-
-fn write_rows(file: File, rows: &[String]) -> io::Result<()> {
-    let mut file = BufWriter::new(file);
-    for row in rows {
-        writeln!(file, "{row}")?;
-    }
-    file.flush()
+fn parse_margin(text: &str) -> Result<f64, &'static str> {
+    let margin = text.parse().ok().filter(|margin: &f64| margin.is_finite() && *margin >= 0.0);
+    margin.ok_or("use a finite determinant, 0 or above")
 }
 
 impl Region {

@@ -82,18 +82,17 @@ enum Chosen {
 
 impl Chosen {
     fn new(args: &FkArgs, mechanism: Mechanism) -> Self {
-        let iteration = |method, mechanism| Self::Iteration {
-            method,
-            mechanism,
-            start_rad: args.guess.unwrap_or(NEUTRAL_RAD),
+        let method = match args.solver {
+            Solver::Controller => None,
+            Solver::Published => Some(Method::Published),
+            Solver::Newton => Some(Method::Newton),
         };
-        match (args.solver, args.guess) {
-            (Solver::Controller, None) => Self::Controller(ForwardTracker::new(mechanism)),
-            (Solver::Controller, Some(guess)) => {
-                Self::Controller(ForwardTracker::with_guess(mechanism, guess))
+        match (method, args.guess) {
+            (None, None) => Self::Controller(ForwardTracker::new(mechanism)),
+            (None, Some(guess)) => Self::Controller(ForwardTracker::with_guess(mechanism, guess)),
+            (Some(method), guess) => {
+                Self::Iteration { method, mechanism, start_rad: guess.unwrap_or(NEUTRAL_RAD) }
             }
-            (Solver::Published, _) => iteration(Method::Published, mechanism),
-            (Solver::Newton, _) => iteration(Method::Newton, mechanism),
         }
     }
 

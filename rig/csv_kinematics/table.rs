@@ -130,14 +130,14 @@ fn stream(
     let written = (|| -> io::Result<()> {
         writeln!(output, "{},status", columns.written)?;
         loop {
-            let batch: Vec<_> = input.by_ref().take(BATCH_LINES).collect();
+            let batch: Vec<_> = input.lines.by_ref().take(BATCH_LINES).collect();
             if batch.is_empty() {
                 return output.flush();
             }
             for lines in solve(&batch) {
                 output.write_all(&lines.text)?;
                 for (line, reason) in lines.refusals {
-                    status!("{}:{line}: {reason}", input.name());
+                    status!("{}:{line}: {reason}", input.name);
                     exit = Exit::Usage;
                 }
             }
@@ -148,8 +148,8 @@ fn stream(
 }
 
 fn check_columns(input: &mut Input, expected: &str) -> anyhow::Result<()> {
-    let header = input.next().unwrap_or(Line { number: 1, text: Ok(String::new()) });
-    let place = format!("{}:{}", input.name(), header.number);
+    let header = input.lines.next().unwrap_or(Line { number: 1, text: Ok(String::new()) });
+    let place = format!("{}:{}", input.name, header.number);
     let text = header.text.map_err(|reason| anyhow!("{place}: {reason}"))?;
     if fields(&text).eq(expected.split(',')) {
         return Ok(());

@@ -9,24 +9,14 @@ use rayon::prelude::*;
 
 use super::solution_set::SolutionSet;
 use super::solver::COMPARED;
-use super::table::{Table, number};
-
-/// The result of a guess.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Basin {
-    /// To a class of solutions above the base; 0 is the true one.
-    Class(usize),
-    /// To a solution with a leg below the base.
-    BelowBase,
-    /// Nowhere.
-    Nothing,
-}
+use super::table::{csv, degrees};
 
 /// A guess with its result for each solver of [`COMPARED`].
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Cell {
     pub guess_rad: [f64; LEGS],
-    pub basins: [Basin; COMPARED.len()],
+    /// Places in [`Basins::names`].
+    pub basins: [usize; COMPARED.len()],
     pub iterations: [u32; COMPARED.len()],
 }
 
@@ -37,54 +27,38 @@ pub(super) struct Basins {
     pub side: usize,
     /// Row by row: θ₁ varies fastest.
     pub cells: Vec<Cell>,
-    pub class_names: Vec<String>,
+    /// Of the basins: a class of solutions above the base each, the true one's first; then guesses that lead to a
+    /// solution with a leg below the base, and those that lead nowhere.
+    pub names: Vec<String>,
 }
 
 impl Basins {
     pub(super) fn map(mechanism: &Mechanism, set: &SolutionSet, side: usize) -> Self {
-        let third_rad = set.true_one().map_or(PI / 2.0, |truth| truth.theta_rad[2]);
+        let mut names = set.class_names();
+        let [below_base, nowhere] = [names.len(), names.len() + 1];
+        names.extend(["a leg below the base", "no solution reached"].map(str::to_owned));
         let middle = |index: usize| (index as f64 + 0.5) / side as f64 * PI;
         let cell = |index: usize| {
-            let guess_rad = [middle(index % side), middle(index / side), third_rad];
-            let attempts = COMPARED.map(|solver| solver.attempt(mechanism, &set.actuators, &guess_rad));
-            let basins = attempts.map(|attempt| match attempt.found_rad {
-                Ok(found_rad) => set.class_of(&found_rad).map_or(Basin::BelowBase, Basin::Class),
-                Err(_) => Basin::Nothing,
+            let guess_rad = [middle(index % side), middle(index / side), set.true_one.theta_rad[2]];
+            let found = COMPARED.map(|solver| solver.attempt(mechanism, &set.actuators, &guess_rad));
+            let basins = found.map(|found| match found {
+                Ok(found) => set.class_of(&found.theta_rad).unwrap_or(below_base),
+                Err(_) => nowhere,
             });
-            Cell { guess_rad, basins, iterations: attempts.map(|attempt| attempt.iterations) }
+            Cell { guess_rad, basins, iterations: found.map(|found| found.map_or(0, |one| one.iterations)) }
         };
-        let cells = (0..side * side).into_par_iter().map(cell).collect();
-        Self { side, cells, class_names: set.class_names() }
+        Self { side, cells: (0..side * side).into_par_iter().map(cell).collect(), names }
     }
 
-    pub(super) fn table(&self) -> Table {
-        let header = [
-            "guess1_deg",
-            "guess2_deg",
-            "guess3_deg",
-            "published_reaches",
-            "published_iterations",
-            "newton_reaches",
-            "newton_iterations",
-            "controller_reaches",
-            "controller_iterations",
-        ];
+    pub(super) fn table(&self) -> String {
         let row = |cell: &Cell| {
-            let mut row: Vec<_> = cell.guess_rad.iter().map(|angle| number(angle.to_degrees())).collect();
-            for (basin, iterations) in cell.basins.iter().zip(cell.iterations) {
-                row.extend([self.name(*basin), iterations.to_string()]);
-            }
-            row
+            let results = [0, 1, 2].map(|solver| (&self.names[cell.basins[solver]], cell.iterations[solver]));
+            (cell.guess_rad.map(degrees), results)
         };
-        Table::new("basins", &header, self.cells.iter().map(row).collect())
-    }
-
-    /// The name of a basin in legend and table.
-    pub(super) fn name(&self, basin: Basin) -> String {
-        match basin {
-            Basin::Class(class) => self.class_names[class].clone(),
-            Basin::BelowBase => "a leg below the base".to_owned(),
-            Basin::Nothing => "no solution reached".to_owned(),
-        }
+        csv(
+            "guess1_deg,guess2_deg,guess3_deg,published_reaches,published_iterations,newton_reaches,\
+             newton_iterations,controller_reaches,controller_iterations",
+            self.cells.iter().map(row),
+        )
     }
 }

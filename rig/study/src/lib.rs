@@ -9,7 +9,7 @@
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! let settings = Settings { seed: 1, samples: 2000, cells: 60 };
-//! let study = Study::prepare(None)?.run(&settings, |stage| eprintln!("{stage}"))?;
+//! let study = Study::prepare(None)?.run(settings, |stage| eprintln!("{stage}"))?;
 //! for claim in study.write("study".as_ref(), "masseter kinematics --out DIR")? {
 //!     println!("{}: {}", claim.judgement.name(), claim.statement);
 //! }
@@ -19,7 +19,6 @@
 
 mod basins;
 mod claims;
-mod figure;
 mod motions;
 mod multiplicity;
 mod page;

@@ -8,8 +8,8 @@ use masseter_shared::config::{
 use masseter_shared::geometry::{LEGS, Mechanism};
 
 use super::sample::distance_rad;
-use super::solver::{COMPARED, Solver};
-use super::table::{Table, number};
+use super::solver::{COMPARED, CONTROLLER, Solver};
+use super::table::{csv, number};
 
 /// A cycle of the rig, s.
 const CYCLE_S: f64 = 1e-3;
@@ -87,17 +87,17 @@ fn follow(solver: Solver, mechanism: &Mechanism, trajectory: &Trajectory) -> Fol
     let cycles = (trajectory.duration_s() / CYCLE_S) as usize;
     for cycle in 0..=cycles {
         let Ok(joints) = mechanism.inverse(&trajectory.pose(cycle as f64 * CYCLE_S)) else { continue };
-        let found = if solver == Solver::Controller {
+        let found = if solver == CONTROLLER {
             tracker.update(&joints.actuators).ok().map(|solution| (solution.theta_rad, solution.iterations))
         } else {
             // The first pose is known, as the paper supposes.
-            let guess_rad = last_rad.unwrap_or(joints.theta_rad);
-            let attempt = solver.attempt(mechanism, &joints.actuators, &guess_rad);
-            attempt.found_rad.ok().map(|found_rad| (found_rad, attempt.iterations))
+            let found =
+                solver.attempt(mechanism, &joints.actuators, &last_rad.unwrap_or(joints.theta_rad)).ok();
+            found.map(|found| (found.theta_rad, found.iterations))
         };
         followed.steps += 1;
-        let is_true = |found: &[f64; LEGS]| distance_rad(found, &joints.theta_rad) < TRUE_WITHIN_RAD;
-        followed.lost += usize::from(!found.is_some_and(|(found, _)| is_true(&found)));
+        let is_true = |(found_rad, _)| distance_rad(&found_rad, &joints.theta_rad) < TRUE_WITHIN_RAD;
+        followed.lost += usize::from(!found.is_some_and(is_true));
         if let Some((found_rad, made)) = found {
             last_rad = Some(found_rad);
             iterations += made;
@@ -108,36 +108,23 @@ fn follow(solver: Solver, mechanism: &Mechanism, trajectory: &Trajectory) -> Fol
 }
 
 /// A row for each motion and solver.
-pub(super) fn table(motions: &[Motion], mechanism: &Mechanism) -> Table {
-    let header = [
-        "motion",
-        "within_limits",
-        "least_slide_margin_m",
-        "least_leg_margin_m",
-        "greatest_condition",
-        "solver",
-        "steps_of_1ms",
-        "steps_lost",
-        "iterations_mean",
-    ];
-    let mut rows = Vec::new();
-    for motion in motions {
-        let margins = motion.demands.as_ref().map(|demands| {
-            let margin_m = demands.margin_m(mechanism.strokes());
+pub(super) fn table(motions: &[Motion], mechanism: &Mechanism) -> String {
+    let rows = motions.iter().flat_map(|motion| {
+        let needs = motion.demands.as_ref().map_or([f64::NAN; 3], |demands| {
+            let margins_m = demands.margin_m(mechanism.strokes());
             let least_m = |axes: &[f64]| axes.iter().copied().fold(f64::INFINITY, f64::min);
-            [least_m(&margin_m[..LEGS]), least_m(&margin_m[LEGS..]), demands.condition]
+            [least_m(&margins_m[..LEGS]), least_m(&margins_m[LEGS..]), demands.condition]
         });
-        for (solver, followed) in COMPARED.into_iter().zip(motion.followed) {
-            let mut row = vec![motion.name.clone(), u8::from(margins.is_ok()).to_string()];
-            row.extend(margins.as_ref().copied().unwrap_or([f64::NAN; 3]).map(number));
-            row.extend([
-                solver.short_name().to_owned(),
-                followed.steps.to_string(),
-                followed.lost.to_string(),
-                number(followed.iterations_mean),
-            ]);
-            rows.push(row);
-        }
-    }
-    Table::new("motions", &header, rows)
+        COMPARED.into_iter().zip(motion.followed).map(move |(solver, followed)| {
+            let Followed { steps, lost, iterations_mean } = followed;
+            let is_within = u8::from(motion.demands.is_ok());
+            let name = solver.short_name;
+            (&motion.name, is_within, needs.map(number), name, steps, lost, number(iterations_mean))
+        })
+    });
+    csv(
+        "motion,within_limits,least_slide_margin_m,least_leg_margin_m,greatest_condition,solver,steps_of_1ms,\
+         steps_lost,iterations_mean",
+        rows,
+    )
 }

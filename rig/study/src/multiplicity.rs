@@ -1,61 +1,49 @@
 //! How many solutions random inputs have, and how many of them meet the paper's two conditions.
 
-use masseter_controller::kinematics::{MOST_SOLUTIONS, Solution, Solutions};
+use masseter_controller::kinematics::{Assembly, MOST_SOLUTIONS, Solutions};
 use masseter_shared::geometry::{LEGS, Mechanism};
 use rayon::prelude::*;
 
 use super::sample::{self, Stream};
 use super::share::Share;
-use super::table::Table;
+use super::table::csv;
 
-/// Interpretations of the paper's conditions.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Conditions {
-    /// All hinges on the same side of the platform's plane, and A₂ beyond A₃; legs above the base.
-    Unsigned,
-    /// All hinges below the oriented plane.
-    Oriented,
-    /// As oriented, and a positive determinant of the Jacobian.
-    Determinant,
+/// Which solutions count.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Conditions {
+    pub name: &'static str,
+    pub admit: fn(&Assembly) -> bool,
 }
 
-pub(super) const CONDITIONS: [Conditions; 3] =
-    [Conditions::Unsigned, Conditions::Oriented, Conditions::Determinant];
+/// Every solution, then interpretations of the paper's conditions.
+pub(super) const CONDITIONS: [Conditions; 4] = [
+    Conditions { name: "all", admit: |_| true },
+    Conditions {
+        name: "conditions 1 and 2, either side of the plane",
+        admit: |one| {
+            let [first, others @ ..] = one.hinges_below_platform;
+            stands(*one) && others == [first; LEGS - 1]
+        },
+    },
+    Conditions {
+        name: "conditions 1 and 2, plane oriented",
+        admit: |one| stands(*one) && one.hinges_below_platform == [true; LEGS],
+    },
+    Conditions { name: "these and a positive determinant", admit: Assembly::is_true },
+];
+/// The place of conditions 1 and 2 with the plane oriented.
+pub(super) const ORIENTED: usize = 2;
 
-/// The numbers of solutions of one input.
-#[derive(Debug, Clone, Copy)]
-struct Counts {
-    solutions: usize,
-    /// In the order of [`CONDITIONS`].
-    left: [usize; CONDITIONS.len()],
+/// Legs above the base, and A₂ beyond A₃.
+fn stands(assembly: Assembly) -> bool {
+    assembly.legs_above_base == [true; LEGS] && assembly.corners_in_order
 }
 
 /// Counts over random inputs anywhere in the strokes.
 #[derive(Debug, Clone)]
 pub(super) struct Multiplicity {
-    inputs: Vec<Counts>,
-}
-
-impl Conditions {
-    pub(super) fn name(self) -> &'static str {
-        match self {
-            Self::Unsigned => "conditions 1 and 2, either side of the plane",
-            Self::Oriented => "conditions 1 and 2, plane oriented",
-            Self::Determinant => "these and a positive determinant",
-        }
-    }
-
-    fn admits(self, solution: &Solution) -> bool {
-        let assembly = &solution.assembly;
-        let below = assembly.hinges_below_platform;
-        let stands = assembly.legs_above_base == [true; LEGS] && assembly.corners_in_order;
-        stands
-            && match self {
-                Self::Unsigned => below == [true; LEGS] || below == [false; LEGS],
-                Self::Oriented => below == [true; LEGS],
-                Self::Determinant => below == [true; LEGS] && assembly.positive_determinant,
-            }
-    }
+    /// The solutions of each input, in the order of [`CONDITIONS`].
+    counts: Vec<[usize; CONDITIONS.len()]>,
 }
 
 impl Multiplicity {
@@ -64,43 +52,32 @@ impl Multiplicity {
         let counts = |case| {
             let actuators = sample::input(mechanism, &mut sample::generator(seed, Stream::Inputs, case));
             let solutions = Solutions::new(mechanism, &actuators).ok()?;
-            let left =
-                CONDITIONS.map(|conditions| solutions.iter().filter(|one| conditions.admits(one)).count());
-            Some(Counts { solutions: solutions.count(), left })
+            let admitted = |admit: fn(&Assembly) -> bool| {
+                solutions.iter().filter(|solution| admit(&solution.assembly)).count()
+            };
+            Some(CONDITIONS.map(|conditions| admitted(conditions.admit)))
         };
-        Self { inputs: (0..inputs).into_par_iter().filter_map(counts).collect() }
+        Self { counts: (0..inputs).into_par_iter().filter_map(counts).collect() }
     }
 
     /// How many inputs have so many solutions.
     pub(super) fn with_solutions(&self, solutions: usize) -> Share {
-        Share::count(self.inputs.iter().map(|input| input.solutions == solutions))
+        Share::count(self.counts.iter().map(|[all, ..]| *all == solutions))
     }
 
-    /// Of the inputs that can be assembled: how many have more than one mirrored pair.
-    pub(super) fn multiple(&self) -> Share {
-        let assemblable = self.inputs.iter().filter(|input| input.solutions > 0);
-        Share::count(assemblable.map(|input| input.solutions > 2))
+    /// Of the inputs to which conditions leave any solution: to how many they leave more than so many.
+    pub(super) fn with_more_than(&self, solutions: usize, conditions: usize) -> Share {
+        let left = self.counts.iter().map(|counts| counts[conditions]).filter(|&left| left > 0);
+        Share::count(left.map(|left| left > solutions))
     }
 
-    /// Of the inputs to which a conditions leaves any solution: to how many it leaves several.
-    pub(super) fn several_left(&self, conditions: Conditions) -> Share {
-        let left = self.inputs.iter().map(|input| input.left[conditions as usize]);
-        Share::count(left.filter(|&left| left > 0).map(|left| left > 1))
-    }
-
-    /// `left` is `all` for the number of solutions itself.
-    pub(super) fn table(&self) -> Table {
-        let mut rows = Vec::new();
-        let mut add = |name: &str, of: &dyn Fn(&Counts) -> usize| {
-            for number in 0..=MOST_SOLUTIONS {
-                let inputs = self.inputs.iter().filter(|input| of(input) == number).count();
-                rows.push(vec![name.to_owned(), number.to_string(), inputs.to_string()]);
-            }
-        };
-        add("all", &|input| input.solutions);
-        for conditions in CONDITIONS {
-            add(conditions.name(), &|input| input.left[conditions as usize]);
-        }
-        Table::new("multiplicity", &["counted", "solutions", "inputs"], rows)
+    pub(super) fn table(&self) -> String {
+        let rows = CONDITIONS.iter().enumerate().flat_map(|(place, conditions)| {
+            (0..=MOST_SOLUTIONS).map(move |solutions| {
+                let inputs = self.counts.iter().filter(|counts| counts[place] == solutions).count();
+                (conditions.name, solutions, inputs)
+            })
+        });
+        csv("counted,solutions,inputs", rows)
     }
 }

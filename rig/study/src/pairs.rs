@@ -3,10 +3,11 @@
 use masseter_shared::geometry::{Actuators, LEGS, Mechanism};
 use rayon::prelude::*;
 
+use self::Course::{Converges, Diverges, Fails, Oscillates};
 use super::sample::Guesses;
 use super::share::Share;
-use super::solver::{NEWTON, PUBLISHED, Solver};
-use super::table::{Table, degrees, number};
+use super::solver::{NEWTON, PUBLISHED};
+use super::table::{csv, degrees, number};
 use super::trials::{Trial, Trials};
 
 /// Errors in which a cycle is looked for, the last ones of a trace.
@@ -34,13 +35,19 @@ pub(super) enum Course {
     Fails,
 }
 
-/// A guess with both traces.
+/// The errors (eq. 2) of the guess and after every iteration.
+#[derive(Debug, Clone)]
+pub(super) struct Trace {
+    pub errors_cm2: Vec<f64>,
+    course: Course,
+}
+
+/// A guess with the traces of the paper's solver and of Newton–Raphson.
 #[derive(Debug, Clone)]
 pub(super) struct Pair {
     pub actuators: Actuators,
     pub guess_rad: [f64; LEGS],
-    pub published_cm2: Vec<f64>,
-    pub newton_cm2: Vec<f64>,
+    pub traces: [Trace; 2],
 }
 
 /// A way in which the two iterations disagree.
@@ -49,129 +56,86 @@ pub(super) struct Disagreement {
     /// Its table and its figure.
     pub name: &'static str,
     pub title: &'static str,
-    /// How Newton–Raphson ends.
-    pub newton: Course,
+    /// How the paper's solver and Newton–Raphson end.
+    pub courses: [Course; 2],
     /// The guess that shows it most clearly, if any shows it.
     pub clearest: Option<Pair>,
     /// How often it happens.
     pub share: Share,
 }
 
-/// What was found among the guesses above the base.
-#[derive(Debug, Clone)]
-pub(super) struct Pairs {
-    /// Fig. 3: the paper's converges, Newton–Raphson falls at first and then diverges.
-    pub diverging: Disagreement,
-    /// Fig. 4: the paper's converges, Newton–Raphson oscillates.
-    pub oscillating: Disagreement,
-    /// Not in the paper: Newton–Raphson converges, the paper's stalls.
-    pub stalling: Disagreement,
+/// Fig. 3: the paper's converges, Newton–Raphson falls at first and then diverges. Fig. 4: the paper's converges,
+/// Newton–Raphson oscillates. Not in the paper: Newton–Raphson converges, the paper's stalls.
+pub(super) fn disagreements(mechanism: &Mechanism, trials: &Trials) -> [Disagreement; 3] {
+    let trials = trials.with(Guesses::AboveBase).par_iter();
+    let pairs: Vec<_> = trials.map(|trial| Pair::trace(mechanism, trial)).collect();
+    let disagreement = |name, title, courses: [Course; 2], clearness: fn(&[f64]) -> f64| {
+        let matching = || pairs.iter().filter(|pair| pair.courses() == courses);
+        let clearness = |pair: &Pair| clearness(&pair.traces[1].errors_cm2);
+        let clearest = matching().max_by(|a, b| clearness(a).total_cmp(&clearness(b))).cloned();
+        let share = Share { hits: matching().count(), of: pairs.len() };
+        Disagreement { name, title, courses, clearest, share }
+    };
+    [
+        disagreement("fig3_diverging", "Fig. 3: Newton–Raphson diverges", [Converges, Diverges], fall),
+        disagreement("fig4_oscillating", "Fig. 4: Newton–Raphson oscillates", [Converges, Oscillates], swing),
+        disagreement("fig3b_stalling", "Beside Fig. 3: the paper's solver stalls", [Fails, Converges], fall),
+    ]
 }
 
-impl Pairs {
-    pub(super) fn find(mechanism: &Mechanism, trials: &Trials) -> Self {
-        let traced: Vec<_> = trials
-            .with(Guesses::AboveBase)
-            .par_iter()
-            .map(|trial| {
-                let pair = Pair::trace(mechanism, trial);
-                let solved = |solver| trial.by(solver).is_solved();
-                let courses = [
-                    course(&pair.published_cm2, solved(PUBLISHED)),
-                    course(&pair.newton_cm2, solved(NEWTON)),
-                ];
-                (courses, pair)
-            })
-            .collect();
-        let disagreement = |name, title, wanted: [Course; 2], clearness: fn(&[f64]) -> f64| {
-            let matching = || traced.iter().filter(|(courses, _)| *courses == wanted).map(|(_, pair)| pair);
-            let clearness = |pair: &Pair| clearness(&pair.newton_cm2);
-            let clearest = matching().max_by(|a, b| clearness(a).total_cmp(&clearness(b)));
-            let share = Share { hits: matching().count(), of: traced.len() };
-            Disagreement { name, title, newton: wanted[1], clearest: clearest.cloned(), share }
-        };
-        Self {
-            diverging: disagreement(
-                "fig3_diverging",
-                "Fig. 3: Newton–Raphson diverges",
-                [Course::Converges, Course::Diverges],
-                fall,
-            ),
-            oscillating: disagreement(
-                "fig4_oscillating",
-                "Fig. 4: Newton–Raphson oscillates",
-                [Course::Converges, Course::Oscillates],
-                swing,
-            ),
-            stalling: disagreement(
-                "fig3b_stalling",
-                "Beside Fig. 3: the paper's solver stalls",
-                [Course::Fails, Course::Converges],
-                fall,
-            ),
+impl Disagreement {
+    /// Without rows where no such pair was found.
+    pub(super) fn table(&self) -> String {
+        let mut rows = Vec::new();
+        if let Some(Pair { actuators, guess_rad, traces }) = &self.clearest {
+            for (solver, trace) in [PUBLISHED, NEWTON].iter().zip(traces) {
+                for (iteration, error) in trace.errors_cm2.iter().enumerate() {
+                    let guess = (actuators.to_axes().map(number), guess_rad.map(degrees));
+                    rows.push((solver.short_name, iteration, number(*error), guess));
+                }
+            }
         }
-    }
-
-    /// In the order of their figures.
-    pub(super) fn all(&self) -> [&Disagreement; 3] {
-        [&self.diverging, &self.oscillating, &self.stalling]
-    }
-
-    /// One table a figure; without rows where no such pair was found.
-    pub(super) fn tables(&self) -> Vec<Table> {
-        let header = [
-            "solver",
-            "iteration",
-            "error_cm2",
-            "d1_m",
-            "d2_m",
-            "d3_m",
-            "l1_m",
-            "l2_m",
-            "l3_m",
-            "guess1_deg",
-            "guess2_deg",
-            "guess3_deg",
-        ];
-        let table = |disagreement: &Disagreement| {
-            let rows = disagreement.clearest.as_ref().map(Pair::rows).unwrap_or_default();
-            Table::new(disagreement.name, &header, rows)
-        };
-        self.all().map(table).into()
+        csv("solver,iteration,error_cm2,d1_m,d2_m,d3_m,l1_m,l2_m,l3_m,guess1_deg,guess2_deg,guess3_deg", rows)
     }
 }
 
 impl Pair {
     fn trace(mechanism: &Mechanism, trial: &Trial) -> Self {
         let Trial { actuators, guess_rad, .. } = *trial;
-        let errors = |solver: Solver| solver.errors_cm2(mechanism, &actuators, &guess_rad);
-        Self { actuators, guess_rad, published_cm2: errors(PUBLISHED), newton_cm2: errors(NEWTON) }
+        let traces = [PUBLISHED, NEWTON].map(|solver| {
+            let errors_cm2 = solver.errors_cm2(mechanism, &actuators, &guess_rad);
+            Trace { course: course(&errors_cm2, trial.by(solver).is_ok()), errors_cm2 }
+        });
+        Self { actuators, guess_rad, traces }
     }
 
-    fn rows(&self) -> Vec<Vec<String>> {
-        let mut rows = Vec::new();
-        for (solver, errors) in [(PUBLISHED, &self.published_cm2), (NEWTON, &self.newton_cm2)] {
-            for (iteration, &error) in errors.iter().enumerate() {
-                let mut row = vec![solver.short_name().to_owned(), iteration.to_string(), number(error)];
-                row.extend(self.actuators.to_axes().map(number));
-                row.extend(degrees(&self.guess_rad));
-                rows.push(row);
-            }
-        }
-        rows
+    /// The guess and its input, for the page.
+    pub(super) fn described(&self) -> String {
+        let list =
+            |values: [f64; LEGS], scale: f64| values.map(|value| format!("{:.1}", value * scale)).join(", ");
+        format!(
+            "d = ({}) mm, l = ({}) mm, guess θ = ({})°",
+            list(self.actuators.slide_m, 1e3),
+            list(self.actuators.leg_m, 1e3),
+            list(self.guess_rad, 1f64.to_degrees())
+        )
+    }
+
+    fn courses(&self) -> [Course; 2] {
+        self.traces.each_ref().map(|trace| trace.course)
     }
 }
 
 /// Judges a trace of errors, the guess's first.
 fn course(errors: &[f64], solved: bool) -> Course {
     if solved {
-        Course::Converges
+        Converges
     } else if is_cyclic(errors) {
-        Course::Oscillates
+        Oscillates
     } else if rises_after_falling(errors) {
-        Course::Diverges
+        Diverges
     } else {
-        Course::Fails
+        Fails
     }
 }
 

@@ -1,5 +1,7 @@
 //! Shares of a sample and medians.
 
+use std::fmt;
+
 /// So many of so many.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) struct Share {
@@ -30,24 +32,27 @@ impl Share {
         let difference = self.value() - other.value();
         difference > 0.0 && difference >= 3.0 * (variance(self) + variance(other)).sqrt()
     }
+}
 
-    /// In per cent; with more digits where rounding would give 0 or 100 %.
-    pub(super) fn percent(self) -> String {
-        let rounded = format!("{:.1} %", 100.0 * self.value());
-        let pretends = (rounded == "100.0 %" && !self.is_all()) || (rounded == "0.0 %" && self.hits > 0);
-        if pretends { format!("{:.3} %", 100.0 * self.value()) } else { rounded }
+/// In per cent; with more digits where rounding would give 0 or 100 %.
+impl fmt::Display for Share {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let rounded = format!("{:.1}", 100.0 * self.value());
+        let pretends = (rounded == "100.0" && !self.is_all()) || (rounded == "0.0" && self.hits > 0);
+        write!(f, "{:.*} %", if pretends { 3 } else { 1 }, 100.0 * self.value())
     }
 }
 
 /// The value at a quantile between 0 and 1, of the sample itself; no number for an empty sample.
-pub(super) fn quantile(mut sample: Vec<f64>, quantile: f64) -> f64 {
+pub(super) fn quantile(sample: impl IntoIterator<Item = f64>, quantile: f64) -> f64 {
+    let mut sample: Vec<_> = sample.into_iter().collect();
     sample.sort_by(f64::total_cmp);
     let index = (quantile * sample.len().saturating_sub(1) as f64).round() as usize;
     sample.get(index).copied().unwrap_or(f64::NAN)
 }
 
 /// The middle of a sample.
-pub(super) fn median(sample: Vec<f64>) -> f64 {
+pub(super) fn median(sample: impl IntoIterator<Item = f64>) -> f64 {
     quantile(sample, 0.5)
 }
 
@@ -66,15 +71,15 @@ mod tests {
 
     #[test]
     fn nearly_all_does_not_read_as_all() {
-        assert_eq!(Share { hits: 9999, of: 10_000 }.percent(), "99.990 %");
-        assert_eq!(Share { hits: 10, of: 10 }.percent(), "100.0 %");
-        assert_eq!(Share { hits: 1, of: 10_000 }.percent(), "0.010 %");
+        assert_eq!(Share { hits: 9999, of: 10_000 }.to_string(), "99.990 %");
+        assert_eq!(Share { hits: 10, of: 10 }.to_string(), "100.0 %");
+        assert_eq!(Share { hits: 1, of: 10_000 }.to_string(), "0.010 %");
     }
 
     #[test]
     fn quantiles_are_members_of_the_sample() {
-        assert!((median(vec![3.0, 1.0, 2.0]) - 2.0).abs() < f64::EPSILON);
-        assert!((quantile(vec![1.0, 2.0, 3.0, 4.0], 1.0) - 4.0).abs() < f64::EPSILON);
-        assert!(median(Vec::new()).is_nan());
+        assert!((median([3.0, 1.0, 2.0]) - 2.0).abs() < f64::EPSILON);
+        assert!((quantile([1.0, 2.0, 3.0, 4.0], 1.0) - 4.0).abs() < f64::EPSILON);
+        assert!(median([]).is_nan());
     }
 }

@@ -1,10 +1,11 @@
 //! Figs. 6 and 8 of the paper: all ways to assemble the neutral input.
 
+use anyhow::Context;
 use masseter_controller::kinematics::{Solution, Solutions};
 use masseter_shared::geometry::{Actuators, LEGS, Mechanism};
 
 use super::sample::distance_rad;
-use super::table::{Table, degrees, flag, number};
+use super::table::{csv, degrees, number};
 
 /// Angles closer than this are one, radians: two legs' as much as two solutions'.
 const SAME_RAD: f64 = 1e-6;
@@ -14,6 +15,7 @@ const SAME_RAD: f64 = 1e-6;
 pub(super) struct SolutionSet {
     pub actuators: Actuators,
     pub solutions: Solutions,
+    pub true_one: Solution,
 }
 
 impl SolutionSet {
@@ -23,12 +25,9 @@ impl SolutionSet {
         let strokes = mechanism.strokes();
         let actuators =
             Actuators { slide_m: [middle_m(strokes.slide_m); LEGS], leg_m: [middle_m(strokes.leg_m); LEGS] };
-        Ok(Self { actuators, solutions: Solutions::new(mechanism, &actuators)? })
-    }
-
-    /// The true solution.
-    pub(super) fn true_one(&self) -> Option<&Solution> {
-        self.solutions.true_ones().next()
+        let solutions = Solutions::new(mechanism, &actuators)?;
+        let true_one = *solutions.true_ones().next().context("the neutral input has no true solution")?;
+        Ok(Self { actuators, solutions, true_one })
     }
 
     /// Those above the base: the true one first, then by their angles.
@@ -41,7 +40,7 @@ impl SolutionSet {
 
     /// Fig. 6: the solution that differs from the true one in corner A₁ alone.
     pub(super) fn corner_folded(&self) -> Option<&Solution> {
-        let truth = self.true_one()?.theta_rad;
+        let truth = self.true_one.theta_rad;
         let others_stand = |one: &&Solution| {
             let same = |leg: usize| (one.theta_rad[leg] - truth[leg]).abs() < SAME_RAD;
             same(1) && same(2) && !same(0)
@@ -75,33 +74,25 @@ impl SolutionSet {
         self.classes().iter().enumerate().map(name).collect()
     }
 
-    pub(super) fn table(&self) -> Table {
-        let header = [
-            "theta1_deg",
-            "theta2_deg",
-            "theta3_deg",
-            "above_base",
-            "hinges_below_platform",
-            "corners_in_order",
-            "positive_determinant",
-            "true",
-            "determinant",
-            "residual_m",
-            "separation_deg",
-        ];
+    pub(super) fn table(&self) -> String {
         let row = |one: &Solution| {
             let assembly = &one.assembly;
-            let mut row: Vec<_> = degrees(&one.theta_rad).collect();
-            row.push(flag(assembly.legs_above_base == [true; LEGS]));
-            row.push(flag(assembly.hinges_below_platform == [true; LEGS]));
-            row.extend(
-                [assembly.corners_in_order, assembly.positive_determinant, assembly.is_true()].map(flag),
-            );
-            let separation_rad = self.solutions.separation_rad(one).unwrap_or(f64::NAN);
-            row.extend([one.determinant, one.residual_m, separation_rad.to_degrees()].map(number));
-            row
+            let conditions = [
+                assembly.legs_above_base == [true; LEGS],
+                assembly.hinges_below_platform == [true; LEGS],
+                assembly.corners_in_order,
+                assembly.positive_determinant,
+                assembly.is_true(),
+            ];
+            let separation = self.solutions.separation_rad(one).map(degrees);
+            let measures = [one.determinant, one.residual_m].map(number);
+            (one.theta_rad.map(degrees), conditions.map(u8::from), measures, separation)
         };
-        Table::new("fig8_solutions", &header, self.solutions.iter().map(row).collect())
+        csv(
+            "theta1_deg,theta2_deg,theta3_deg,above_base,hinges_below_platform,corners_in_order,positive_determinant,\
+             true,determinant,residual_m,separation_deg",
+            self.solutions.iter().map(row),
+        )
     }
 }
 
@@ -126,7 +117,7 @@ mod tests {
         let set = set();
         assert_eq!((set.solutions.count(), set.above_base().len()), (16, 8));
         assert_eq!(set.classes().len(), 4);
-        assert_eq!(set.class_of(&set.true_one().unwrap().theta_rad), Some(0));
+        assert_eq!(set.class_of(&set.true_one.theta_rad), Some(0));
         assert_eq!(set.class_of(&[-1.0; LEGS]), None);
     }
 

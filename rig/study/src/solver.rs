@@ -1,5 +1,7 @@
 //! The solvers that are compared, and single attempts.
 
+use masseter_controller::kinematics::Residual::{Distance, SquaredDistance};
+use masseter_controller::kinematics::StepRule::{CautiousHalving, Halving, QuadraticBacktracking};
 use masseter_controller::kinematics::{
     ForwardTracker, Iteration, MAX_HALVINGS, MAX_ITERATIONS, Method, Options, Residual, StepRule,
     solve_traced,
@@ -8,97 +10,90 @@ use masseter_shared::geometry::{Actuators, LEGS, Mechanism};
 
 /// A solver with its choices.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Solver {
-    /// The paper's algorithm (Fig. 2), with the two choices that its text leaves open.
-    Published(Residual, StepRule),
-    /// Newton–Raphson with the full increment.
-    Newton(Residual),
-    /// The controller's certified solver, with the guess as its last solution.
-    Controller,
+pub(super) struct Solver {
+    /// The full name.
+    pub name: &'static str,
+    /// The name in a legend of [`COMPARED`].
+    pub short_name: &'static str,
+    /// None for the controller's certified solver, which takes the guess as its last solution.
+    iteration: Option<(Method, Residual, StepRule)>,
+}
+
+/// The paper's algorithm (Fig. 2), with the two choices that its text leaves open.
+const fn published(name: &'static str, residual: Residual, step: StepRule) -> Solver {
+    Solver { name, short_name: "published", iteration: Some((Method::Published, residual, step)) }
+}
+
+/// Newton–Raphson with the full increment.
+const fn newton(name: &'static str, residual: Residual) -> Solver {
+    let iteration = Some((Method::Newton, residual, Halving));
+    Solver { name, short_name: "Newton–Raphson", iteration }
 }
 
 /// The paper's algorithm as printed: distances (eq. 1), the increment halved until the error decreases.
-pub(super) const PUBLISHED: Solver = Solver::Published(Residual::Distance, StepRule::Halving);
+pub(super) const PUBLISHED: Solver = published("published, distances, halving", Distance, Halving);
 /// Newton–Raphson on the equations as printed.
-pub(super) const NEWTON: Solver = Solver::Newton(Residual::Distance);
+pub(super) const NEWTON: Solver = newton("Newton–Raphson, distances", Distance);
+const NEWTON_SQUARED: Solver = newton("Newton–Raphson, squared distances", SquaredDistance);
+/// The controller's certified solver.
+pub(super) const CONTROLLER: Solver =
+    Solver { name: "controller", short_name: "controller", iteration: None };
 
-/// All of them; where only three are compared, they are [`PUBLISHED`], [`NEWTON`] and the controller's.
+/// All of them.
 pub(super) const SOLVERS: [Solver; 9] = [
     PUBLISHED,
-    Solver::Published(Residual::Distance, StepRule::CautiousHalving),
-    Solver::Published(Residual::Distance, StepRule::QuadraticBacktracking),
-    Solver::Published(Residual::SquaredDistance, StepRule::Halving),
-    Solver::Published(Residual::SquaredDistance, StepRule::CautiousHalving),
-    Solver::Published(Residual::SquaredDistance, StepRule::QuadraticBacktracking),
+    published("published, distances, cautious halving", Distance, CautiousHalving),
+    published("published, distances, quadratic backtracking", Distance, QuadraticBacktracking),
+    published("published, squared distances, halving", SquaredDistance, Halving),
+    published("published, squared distances, cautious halving", SquaredDistance, CautiousHalving),
+    published("published, squared distances, quadratic backtracking", SquaredDistance, QuadraticBacktracking),
     NEWTON,
-    Solver::Newton(Residual::SquaredDistance),
-    Solver::Controller,
+    NEWTON_SQUARED,
+    CONTROLLER,
 ];
 /// The three that the figures show.
-pub(super) const COMPARED: [Solver; 3] = [PUBLISHED, NEWTON, Solver::Controller];
+pub(super) const COMPARED: [Solver; 3] = [PUBLISHED, NEWTON, CONTROLLER];
 
-/// The result of one guess.
+/// What a solver found from one guess.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Attempt {
-    /// The leg angles found, radians, or the reason why none were (of `ForwardError::reason`).
-    pub found_rad: Result<[f64; LEGS], &'static str>,
-    /// Iterations made up to the solution; 0 without one.
+pub(super) struct Found {
+    pub theta_rad: [f64; LEGS],
     pub iterations: u32,
-    /// How often the residuals were evaluated up to the solution; 0 where the solver does not count them.
+    /// How often the residuals were evaluated; 0 where the solver does not count them.
     pub evaluations: u32,
 }
 
 impl Solver {
-    /// The full name.
-    pub(super) fn name(self) -> String {
-        let residual = |residual| match residual {
-            Residual::Distance => "distances",
-            Residual::SquaredDistance => "squared distances",
-        };
-        match self {
-            Self::Published(form, step) => {
-                let step = match step {
-                    StepRule::Halving => "halving",
-                    StepRule::CautiousHalving => "cautious halving",
-                    StepRule::QuadraticBacktracking => "quadratic backtracking",
-                };
-                format!("published, {}, {step}", residual(form))
-            }
-            Self::Newton(form) => format!("Newton–Raphson, {}", residual(form)),
-            Self::Controller => "controller".to_owned(),
+    /// Whether it is the paper's, with any choices.
+    pub(super) fn is_published(self) -> bool {
+        matches!(self.iteration, Some((Method::Published, ..)))
+    }
+
+    /// Newton–Raphson with the same residual.
+    pub(super) fn rival(self) -> Self {
+        match self.iteration {
+            Some((_, SquaredDistance, _)) => NEWTON_SQUARED,
+            _ => NEWTON,
         }
     }
 
-    /// The name in a legend of [`COMPARED`].
-    pub(super) fn short_name(self) -> &'static str {
-        match self {
-            Self::Published(..) => "published",
-            Self::Newton(_) => "Newton–Raphson",
-            Self::Controller => "controller",
-        }
-    }
-
-    /// Solves from a guess (radians).
+    /// Solves from a guess (radians). The error is that of `ForwardError::reason`.
     pub(super) fn attempt(
         self,
         mechanism: &Mechanism,
         actuators: &Actuators,
         guess_rad: &[f64; LEGS],
-    ) -> Attempt {
-        let Some((method, options)) = self.iteration() else {
-            let solved = ForwardTracker::with_guess(mechanism.clone(), *guess_rad).update(actuators);
-            let iterations = solved.map_or(0, |solution| solution.iterations);
-            let found_rad = solved.map(|solution| solution.theta_rad).map_err(|error| error.reason());
-            return Attempt { found_rad, iterations, evaluations: 0 };
-        };
+    ) -> Result<Found, &'static str> {
         let mut evaluations = 0;
         let observe = |step: &Iteration| evaluations += 1 + step.halvings;
-        match solve_traced(method, mechanism, actuators, guess_rad, &options, observe) {
-            Ok(solution) => {
-                Attempt { found_rad: Ok(solution.theta_rad), iterations: solution.iterations, evaluations }
+        let solved = match self.iteration() {
+            Some((method, options)) => {
+                solve_traced(method, mechanism, actuators, guess_rad, &options, observe)
             }
-            Err(error) => Attempt { found_rad: Err(error.reason()), iterations: 0, evaluations: 0 },
-        }
+            None => ForwardTracker::with_guess(mechanism.clone(), *guess_rad).update(actuators),
+        };
+        let solution = solved.map_err(|error| error.reason())?;
+        Ok(Found { theta_rad: solution.theta_rad, iterations: solution.iterations, evaluations })
     }
 
     /// The error (eq. 2, cm²) of the guess and after every iteration; nothing for the controller.
@@ -119,12 +114,9 @@ impl Solver {
 
     /// With the greatest possible numbers of iterations and reductions, so that it does not fail by a bound.
     pub(super) fn iteration(self) -> Option<(Method, Options)> {
-        let most =
+        let (method, residual, step) = self.iteration?;
+        let bounds =
             Options { max_iterations: MAX_ITERATIONS, max_halvings: MAX_HALVINGS, ..Options::default() };
-        match self {
-            Self::Published(residual, step) => Some((Method::Published, Options { residual, step, ..most })),
-            Self::Newton(residual) => Some((Method::Newton, Options { residual, ..most })),
-            Self::Controller => None,
-        }
+        Some((method, Options { residual, step, ..bounds }))
     }
 }

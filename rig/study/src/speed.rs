@@ -2,7 +2,7 @@
 
 use std::hint::black_box;
 
-use masseter_controller::kinematics::{ForwardTracker, Method, Options, solve};
+use masseter_controller::kinematics::{ForwardTracker, solve};
 use masseter_shared::clock;
 use masseter_shared::geometry::{Actuators, LEGS, Mechanism};
 
@@ -10,7 +10,7 @@ use super::motions::Motion;
 use super::sample::Guesses;
 use super::share::{median, quantile};
 use super::solver::{COMPARED, NEWTON, Solver};
-use super::table::{Table, number};
+use super::table::{csv, number};
 use super::trials::{Trial, Trials};
 
 /// Cases timed in each situation.
@@ -60,7 +60,8 @@ impl Speed {
     /// Takes one core; nothing else of the study runs meanwhile.
     pub(super) fn measure(mechanism: &Mechanism, trials: &Trials, chewing: &Motion) -> Self {
         let random = trials.with(Guesses::AboveBase).iter();
-        let random = random.filter(|trial| all_arrive(mechanism, trial)).take(CASES);
+        let all_arrive = |trial: &&Trial| COMPARED.into_iter().all(|solver| trial.by(solver).is_ok());
+        let random = random.filter(all_arrive).take(CASES);
         let random: Vec<_> = random.map(|trial| (trial.actuators, trial.guess_rad)).collect();
         let mut taken = in_turns(mechanism, Situation::Random, &random);
         taken.extend(in_turns(mechanism, Situation::Warm, &warm(mechanism, chewing)));
@@ -73,26 +74,13 @@ impl Speed {
         *self.timings.iter().find(wanted).expect("all of COMPARED are timed in every situation")
     }
 
-    pub(super) fn table(&self) -> Table {
-        let header = ["start", "solver", "cases", "median_ns", "p99_ns", "ratio_of_medians_to_newton"];
+    pub(super) fn table(&self) -> String {
         let row = |taken: &Timing| {
-            vec![
-                taken.situation.name().to_owned(),
-                taken.solver.name(),
-                taken.cases.to_string(),
-                number(taken.median_ns),
-                number(taken.p99_ns),
-                number(taken.to_newton),
-            ]
+            let times = [taken.median_ns, taken.p99_ns, taken.to_newton].map(number);
+            (taken.situation.name(), taken.solver.name, taken.cases, times)
         };
-        Table::new("speed", &header, self.timings.iter().map(row).collect())
+        csv("start,solver,cases,median_ns,p99_ns,ratio_of_medians_to_newton", self.timings.iter().map(row))
     }
-}
-
-fn all_arrive(mechanism: &Mechanism, trial: &Trial) -> bool {
-    let arrives =
-        |solver: Solver| solver.attempt(mechanism, &trial.actuators, &trial.guess_rad).found_rad.is_ok();
-    COMPARED.into_iter().all(arrives)
 }
 
 /// Inputs of a motion, each with the leg angles of the cycle before.
@@ -110,40 +98,26 @@ fn in_turns(mechanism: &Mechanism, situation: Situation, cases: &[(Actuators, [f
             taken_ns.push(time_ns(solver, mechanism, actuators, guess_rad));
         }
     }
-    let medians = taken_ns.clone().map(median);
-    let newton_ns =
-        COMPARED.into_iter().zip(medians).find(|one| one.0 == NEWTON).map_or(f64::NAN, |one| one.1);
-    let each = COMPARED.into_iter().zip(taken_ns).zip(medians);
-    each.map(|((solver, sample), median_ns)| Timing {
-        situation,
-        solver,
-        cases: cases.len(),
-        median_ns,
-        p99_ns: quantile(sample, 0.99),
-        to_newton: median_ns / newton_ns,
-    })
-    .collect()
+    let place = COMPARED.iter().position(|&solver| solver == NEWTON).expect("Newton–Raphson is compared");
+    let newton_ns = median(taken_ns[place].iter().copied());
+    let timing = |(solver, sample): (_, Vec<f64>)| {
+        let [median_ns, p99_ns] = [0.5, 0.99].map(|share| quantile(sample.iter().copied(), share));
+        Timing { situation, solver, cases: cases.len(), median_ns, p99_ns, to_newton: median_ns / newton_ns }
+    };
+    COMPARED.into_iter().zip(taken_ns).map(timing).collect()
 }
 
 /// Time of one solution, ns, without an observer.
 fn time_ns(solver: Solver, mechanism: &Mechanism, actuators: &Actuators, guess_rad: &[f64; LEGS]) -> f64 {
     if let Some((method, options)) = solver.iteration() {
-        return mean_ns(|| iterate(method, mechanism, actuators, guess_rad, &options));
+        return mean_ns(|| {
+            solve(method, mechanism, black_box(actuators), black_box(guess_rad), &options).is_ok()
+        });
     }
     let tracker = ForwardTracker::with_guess(mechanism.clone(), *guess_rad);
     let mut trackers: Vec<_> = (0..CALLS).map(|_| tracker.clone()).collect();
     let mut fresh = trackers.iter_mut();
     mean_ns(|| fresh.next().map(|tracker| tracker.update(black_box(actuators))))
-}
-
-fn iterate(
-    method: Method,
-    mechanism: &Mechanism,
-    actuators: &Actuators,
-    guess_rad: &[f64; LEGS],
-    options: &Options,
-) -> bool {
-    black_box(solve(method, mechanism, black_box(actuators), black_box(guess_rad), options)).is_ok()
 }
 
 /// The mean over [`CALLS`] calls.

@@ -2,12 +2,12 @@
 
 use anyhow::ensure;
 use masseter_shared::config::Scenario;
-use masseter_shared::geometry::{Mechanism, MechanismConfig, Vec3};
+use masseter_shared::geometry::{Mechanism, MechanismConfig};
 
 use crate::basins::Basins;
 use crate::motions::{self, Motion};
 use crate::multiplicity::Multiplicity;
-use crate::pairs::Pairs;
+use crate::pairs::{self, Disagreement};
 use crate::solution_set::SolutionSet;
 use crate::speed::Speed;
 use crate::trials::Trials;
@@ -37,13 +37,13 @@ pub struct Study {
     pub(crate) settings: Settings,
     pub(crate) mechanism: Mechanism,
     pub(crate) trials: Trials,
-    pub(crate) pairs: Pairs,
+    pub(crate) pairs: [Disagreement; 3],
     pub(crate) speed: Speed,
     pub(crate) set: SolutionSet,
     pub(crate) multiplicity: Multiplicity,
     pub(crate) basins: Basins,
     pub(crate) motions: Vec<Motion>,
-    pub(crate) maps: Vec<Map>,
+    pub(crate) maps: [Map; 4],
 }
 
 impl Study {
@@ -69,31 +69,20 @@ impl PreparedStudy {
     ///
     /// # Errors
     /// When the neutral input has no finite set of solutions.
-    pub fn run(self, settings: &Settings, progress: impl Fn(&str)) -> anyhow::Result<Study> {
+    pub fn run(self, settings: Settings, progress: impl Fn(&str)) -> anyhow::Result<Study> {
         let Self { mechanism, motions } = self;
-        let Settings { seed, samples, cells } = *settings;
+        let Settings { seed, samples, cells } = settings;
         progress(&format!("{samples} random guesses of each kind"));
         let trials = Trials::run(&mechanism, samples, seed);
-        let pairs = Pairs::find(&mechanism, &trials);
+        let pairs = pairs::disagreements(&mechanism, &trials);
         let set = SolutionSet::neutral(&mechanism)?;
         let multiplicity = Multiplicity::count(&mechanism, samples, seed);
         progress(&format!("maps of {cells} by {cells} cells"));
         let basins = Basins::map(&mechanism, &set, cells);
-        let middle = set.true_one().map_or_else(Vec3::zeros, |truth| truth.pose.translation.vector);
-        let maps = SLICES.map(|slice| Map::compute(&mechanism, slice, &middle, cells)).into();
+        let middle = set.true_one.pose.translation.vector;
+        let maps = SLICES.map(|slice| Map::compute(&mechanism, slice, &middle, cells));
         progress("times");
         let speed = Speed::measure(&mechanism, &trials, &motions[0]);
-        Ok(Study {
-            settings: *settings,
-            mechanism,
-            trials,
-            pairs,
-            speed,
-            set,
-            multiplicity,
-            basins,
-            motions,
-            maps,
-        })
+        Ok(Study { settings, mechanism, trials, pairs, speed, set, multiplicity, basins, motions, maps })
     }
 }

@@ -1,32 +1,17 @@
-//! The data behind a figure, as CSV.
+//! Data of a figure as CSV.
 
-use std::path::Path;
+use serde::Serialize;
 
-/// Columns with their units in their names, and rows.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct Table {
-    /// File name without its extension.
-    pub name: &'static str,
-    pub header: Vec<String>,
-    pub rows: Vec<Vec<String>>,
-}
-
-impl Table {
-    pub(super) fn new(name: &'static str, header: &[&str], rows: Vec<Vec<String>>) -> Self {
-        let header: Vec<_> = header.iter().map(|&column| column.to_owned()).collect();
-        debug_assert!(rows.iter().all(|row| row.len() == header.len()), "{name}: a row has other columns");
-        Self { name, header, rows }
-    }
-
-    /// Writes `<folder>/<name>.csv`.
-    pub(super) fn write(&self, folder: &Path) -> csv::Result<()> {
-        let mut writer = csv::Writer::from_path(folder.join(self.name).with_extension("csv"))?;
-        writer.write_record(&self.header)?;
-        for row in &self.rows {
-            writer.write_record(row)?;
-        }
-        Ok(writer.flush()?)
-    }
+/// A header and rows. A row may nest tuples and arrays: each of their values is a column.
+///
+/// # Panics
+/// When a row has not as many columns as the header.
+pub(super) fn csv(header: &str, rows: impl IntoIterator<Item = impl Serialize>) -> String {
+    let mut writer = csv::WriterBuilder::new().has_headers(false).from_writer(Vec::new());
+    let mut written = writer.write_record(header.split(','));
+    written = written.and_then(|()| rows.into_iter().try_for_each(|row| writer.serialize(row)));
+    written.expect("rows have the columns of their header");
+    String::from_utf8(writer.into_inner().expect("a vector takes all bytes")).expect("all columns are text")
 }
 
 /// A number as short as it reads back the same; an empty cell where there is none.
@@ -34,12 +19,7 @@ pub(super) fn number(value: f64) -> String {
     if value.is_finite() { value.to_string() } else { String::new() }
 }
 
-/// Angles in degrees.
-pub(super) fn degrees(angles_rad: &[f64]) -> impl Iterator<Item = String> {
-    angles_rad.iter().map(|angle| number(angle.to_degrees()))
-}
-
-/// Yes or no as the other verbs write it.
-pub(super) fn flag(holds: bool) -> String {
-    u8::from(holds).to_string()
+/// An angle in degrees.
+pub(super) fn degrees(angle_rad: f64) -> String {
+    number(angle_rad.to_degrees())
 }

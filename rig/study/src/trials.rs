@@ -6,37 +6,24 @@ use rayon::prelude::*;
 
 use super::sample::{self, GUESSES, Guesses, Stream, distance_rad};
 use super::share::{Share, median, quantile};
-use super::solver::{Attempt, NEWTON, PUBLISHED, SOLVERS, Solver};
-use super::table::{Table, number};
+use super::solver::{Found, NEWTON, PUBLISHED, SOLVERS, Solver};
+use super::table::{csv, number};
 
 /// A root counts as the closest when no other is closer by more than this, radians.
 const TIE_RAD: f64 = 1e-6;
 
-/// Where an attempt ended.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Reached {
-    /// The true solution.
-    True,
-    /// A solution that the mechanism cannot take.
-    Other,
-    /// None, for this reason.
-    Nothing(&'static str),
-}
-
-/// An attempt, judged against all solutions of its input.
+/// A solution that a solver reached, judged against all solutions of its input.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Judged {
-    pub attempt: Attempt,
-    pub reached: Reached,
+pub(super) struct Reached {
+    pub found: Found,
+    /// Whether the mechanism can take it.
+    pub is_true: bool,
     /// Whether no other solution is closer to the guess.
-    pub closest: bool,
+    pub is_closest: bool,
 }
 
-impl Judged {
-    pub(super) fn is_solved(&self) -> bool {
-        !matches!(self.reached, Reached::Nothing(_))
-    }
-}
+/// The end of an attempt: a solution, or why none was reached.
+type Outcome = Result<Reached, &'static str>;
 
 /// One guess for one input, given to every solver.
 #[derive(Debug, Clone)]
@@ -44,14 +31,14 @@ pub(super) struct Trial {
     pub actuators: Actuators,
     pub guess_rad: [f64; LEGS],
     /// In the order of [`SOLVERS`].
-    pub judged: [Judged; SOLVERS.len()],
+    outcomes: [Outcome; SOLVERS.len()],
 }
 
 impl Trial {
-    /// The attempt of one solver.
-    pub(super) fn by(&self, solver: Solver) -> &Judged {
+    /// The outcome of one solver.
+    pub(super) fn by(&self, solver: Solver) -> Outcome {
         let place = SOLVERS.iter().position(|&other| other == solver);
-        &self.judged[place.expect("every solver takes part")]
+        self.outcomes[place.expect("every solver takes part")]
     }
 }
 
@@ -67,11 +54,11 @@ impl Trials {
             let mut random = sample::generator(seed, Stream::Trials, case);
             let input = sample::feasible(mechanism, &mut random);
             let guess_rad = guesses.draw(&input.true_one.theta_rad, &mut random);
-            let judged = SOLVERS.map(|solver| {
-                let attempt = solver.attempt(mechanism, &input.actuators, &guess_rad);
-                judge(mechanism, &input, &guess_rad, attempt)
+            let outcomes = SOLVERS.map(|solver| {
+                let found = solver.attempt(mechanism, &input.actuators, &guess_rad)?;
+                Ok(judge(mechanism, &input, &guess_rad, found))
             });
-            Trial { actuators: input.actuators, guess_rad, judged }
+            Trial { actuators: input.actuators, guess_rad, outcomes }
         };
         let set = |guesses| (0..samples).into_par_iter().map(|case| trial(guesses, case)).collect();
         Self { sets: GUESSES.into_iter().map(set).collect() }
@@ -86,90 +73,65 @@ impl Trials {
         &self.sets[set.expect("guesses are drawn from there")]
     }
 
-    /// The attempts of one solver with guesses from this origin.
-    pub(super) fn attempts(&self, solver: Solver, guesses: Guesses) -> impl Iterator<Item = &Judged> {
+    /// The outcomes of one solver with guesses from this origin.
+    fn outcomes(&self, solver: Solver, guesses: Guesses) -> impl Iterator<Item = Outcome> {
         self.with(guesses).iter().map(move |trial| trial.by(solver))
     }
 
     /// How often any solution was reached.
     pub(super) fn solved(&self, solver: Solver, guesses: Guesses) -> Share {
-        Share::count(self.attempts(solver, guesses).map(Judged::is_solved))
+        Share::count(self.outcomes(solver, guesses).map(|outcome| outcome.is_ok()))
     }
 
     /// How often the true solution was reached.
     pub(super) fn true_ones(&self, solver: Solver, guesses: Guesses) -> Share {
-        Share::count(self.attempts(solver, guesses).map(|judged| judged.reached == Reached::True))
+        Share::count(self.outcomes(solver, guesses).map(|outcome| outcome.is_ok_and(|one| one.is_true)))
     }
 
     /// Share of the solutions reached that are the closest to the guess.
     pub(super) fn closest(&self, solver: Solver, guesses: Guesses) -> Share {
-        let solved = self.attempts(solver, guesses).filter(|judged| judged.is_solved());
-        Share::count(solved.map(|judged| judged.closest))
+        Share::count(self.outcomes(solver, guesses).flatten().map(|reached| reached.is_closest))
     }
 
-    /// A solver's iterations and Newton–Raphson's (same residual) where both reach a solution.
-    pub(super) fn against_newton(&self, solver: Solver, guesses: Guesses) -> Vec<[Attempt; 2]> {
-        let rival = match solver {
-            Solver::Published(residual, _) => Solver::Newton(residual),
-            Solver::Newton(_) | Solver::Controller => NEWTON,
-        };
-        let both = self.attempts(solver, guesses).zip(self.attempts(rival, guesses));
-        both.filter(|(a, b)| a.is_solved() && b.is_solved()).map(|(a, b)| [a.attempt, b.attempt]).collect()
+    /// What a solver and Newton–Raphson (same residual) find where both reach a solution.
+    pub(super) fn against_newton(&self, solver: Solver, guesses: Guesses) -> Vec<[Found; 2]> {
+        let both = self.outcomes(solver, guesses).zip(self.outcomes(solver.rival(), guesses));
+        both.filter_map(|(a, b)| Some([a.ok()?.found, b.ok()?.found])).collect()
     }
 
     /// Success rates, one row for each solver and origin of guesses.
-    pub(super) fn success_table(&self) -> Table {
-        let header = [
-            "guesses",
-            "solver",
-            "trials",
-            "reached_true",
-            "reached_other",
-            "stalled",
-            "singular",
-            "no_convergence",
-            "refused",
-            "reached_closest",
-        ];
-        let mut rows = Vec::new();
-        for guesses in GUESSES {
-            for solver in SOLVERS {
-                let count = |wanted: &dyn Fn(&Judged) -> bool| {
-                    self.attempts(solver, guesses).filter(|judged| wanted(judged)).count()
-                };
-                let failed = |reason| count(&|judged| judged.reached == Reached::Nothing(reason));
-                let [reached_true, other] =
-                    [Reached::True, Reached::Other].map(|reached| count(&|judged| judged.reached == reached));
-                let known = ["stalled", "singular", "no_convergence"].map(failed);
-                let trials = self.with(guesses).len();
-                let refused = trials - reached_true - other - known.iter().sum::<usize>();
-                let [stalled, singular, unconverged] = known;
-                let closest = count(&|judged| judged.is_solved() && judged.closest);
-                let counts = [trials, reached_true, other, stalled, singular, unconverged, refused, closest];
-                let names = [guesses.name(), solver.name()];
-                rows.push(names.into_iter().chain(counts.map(|count| count.to_string())).collect());
-            }
-        }
-        Table::new("success", &header, rows)
+    pub(super) fn success_table(&self) -> String {
+        let row = |(guesses, solver): (Guesses, Solver)| {
+            let count = |end: &str| {
+                self.outcomes(solver, guesses).filter(|outcome| outcome.is_err_and(|why| why == end)).count()
+            };
+            let [Share { hits: solved, of: trials }, true_ones, closest] =
+                [Self::solved, Self::true_ones, Self::closest].map(|share| share(self, solver, guesses));
+            let known = ["stalled", "singular", "no_convergence"].map(count);
+            let refused = trials - solved - known.iter().sum::<usize>();
+            let reached = [true_ones.hits, solved - true_ones.hits];
+            (guesses.name(), solver.name, trials, reached, known, refused, closest.hits)
+        };
+        csv(
+            "guesses,solver,trials,reached_true,reached_other,stalled,singular,no_convergence,refused,reached_closest",
+            every_combination().map(row),
+        )
     }
 
     /// Distribution of iterations from guesses anywhere above the base.
-    pub(super) fn iterations_table(&self) -> Table {
-        let header = ["solver", "iterations", "trials"];
-        let mut rows = Vec::new();
-        for solver in SOLVERS {
-            for (iterations, count) in self.histogram(solver).into_iter().enumerate() {
-                rows.push(vec![solver.name(), iterations.to_string(), count.to_string()]);
-            }
-        }
-        Table::new("iterations", &header, rows)
+    pub(super) fn iterations_table(&self) -> String {
+        let rows = SOLVERS.into_iter().flat_map(|solver| {
+            let counts = self.histogram(solver).into_iter().enumerate();
+            counts.map(move |(iterations, count)| (solver.name, iterations, count))
+        });
+        csv("solver,iterations,trials", rows)
     }
 
     /// How many solved trials took 0, 1, 2 … iterations, from guesses anywhere above the base.
     pub(super) fn histogram(&self, solver: Solver) -> Vec<usize> {
         let mut counts = Vec::new();
-        for judged in self.attempts(solver, Guesses::AboveBase).filter(|judged| judged.is_solved()) {
-            let iterations = judged.attempt.iterations as usize;
+        for reached in self.outcomes(solver, Guesses::AboveBase).flatten() {
+            let iterations = reached.found.iterations as usize;
             if counts.len() <= iterations {
                 counts.resize(iterations + 1, 0);
             }
@@ -179,69 +141,45 @@ impl Trials {
     }
 
     /// Iterations of the paper's variants and of Newton–Raphson where both reach a solution.
-    pub(super) fn cost_table(&self) -> Table {
-        let header = [
-            "guesses",
-            "solver",
-            "solved_by_both",
-            "iterations_median",
-            "iterations_p90",
-            "evaluations_median",
-            "newton_iterations_median",
-            "newton_iterations_p90",
-            "newton_evaluations_median",
-        ];
-        let mut rows = Vec::new();
-        for guesses in GUESSES {
-            for solver in SOLVERS.into_iter().filter(|one| matches!(one, Solver::Published(..))) {
-                let both = self.against_newton(solver, guesses);
-                let iterations = |side: usize| both.iter().map(move |pair| f64::from(pair[side].iterations));
-                let evaluations =
-                    |side: usize| both.iter().map(move |pair| f64::from(pair[side].evaluations));
-                let mut row = vec![guesses.name(), solver.name(), both.len().to_string()];
-                for side in 0..2 {
-                    row.push(number(median(iterations(side).collect())));
-                    row.push(number(quantile(iterations(side).collect(), 0.9)));
-                    row.push(number(median(evaluations(side).collect())));
-                }
-                rows.push(row);
-            }
-        }
-        Table::new("cost", &header, rows)
+    pub(super) fn cost_table(&self) -> String {
+        let row = |(guesses, solver): (Guesses, Solver)| {
+            let both = self.against_newton(solver, guesses);
+            let costs = [0, 1].map(|side| {
+                let iterations = || both.iter().map(|pair| f64::from(pair[side].iterations));
+                let evaluations = both.iter().map(|pair| f64::from(pair[side].evaluations));
+                [median(iterations()), quantile(iterations(), 0.9), median(evaluations)].map(number)
+            });
+            (guesses.name(), solver.name, both.len(), costs)
+        };
+        csv(
+            "guesses,solver,solved_by_both,iterations_median,iterations_p90,evaluations_median,\
+             newton_iterations_median,newton_iterations_p90,newton_evaluations_median",
+            every_combination().filter(|(_, solver)| solver.is_published()).map(row),
+        )
     }
 
     /// Trials above the base in which only one of the two reaches a solution:
     /// the paper's solver alone, Newton–Raphson alone.
     pub(super) fn alone(&self) -> [Share; 2] {
-        let both = || {
-            let newton = self.attempts(NEWTON, Guesses::AboveBase);
-            self.attempts(PUBLISHED, Guesses::AboveBase)
-                .zip(newton)
-                .map(|(a, b)| (a.is_solved(), b.is_solved()))
-        };
-        [
-            Share::count(both().map(|(published, newton)| published && !newton)),
-            Share::count(both().map(|(a, b)| b && !a)),
-        ]
+        [[true, false], [false, true]].map(|wanted| {
+            let trials = self.with(Guesses::AboveBase).iter();
+            Share::count(
+                trials.map(|trial| [PUBLISHED, NEWTON].map(|solver| trial.by(solver).is_ok()) == wanted),
+            )
+        })
     }
 }
 
-fn judge(
-    mechanism: &Mechanism,
-    input: &sample::Feasible,
-    guess_rad: &[f64; LEGS],
-    attempt: Attempt,
-) -> Judged {
-    let found_rad = match attempt.found_rad {
-        Ok(found_rad) => found_rad,
-        Err(reason) => return Judged { attempt, reached: Reached::Nothing(reason), closest: false },
-    };
-    let is_true = Assembly::new(mechanism, &input.actuators, &found_rad).is_true();
+fn every_combination() -> impl Iterator<Item = (Guesses, Solver)> {
+    GUESSES.into_iter().flat_map(|guesses| SOLVERS.map(|solver| (guesses, solver)))
+}
+
+fn judge(mechanism: &Mechanism, input: &sample::Feasible, guess_rad: &[f64; LEGS], found: Found) -> Reached {
     let from_guess = |theta_rad: &[f64; LEGS]| distance_rad(theta_rad, guess_rad);
     let least = input.solutions.iter().map(|one| from_guess(&one.theta_rad)).fold(f64::INFINITY, f64::min);
-    Judged {
-        attempt,
-        reached: if is_true { Reached::True } else { Reached::Other },
-        closest: from_guess(&found_rad) <= least + TIE_RAD,
+    Reached {
+        found,
+        is_true: Assembly::new(mechanism, &input.actuators, &found.theta_rad).is_true(),
+        is_closest: from_guess(&found.theta_rad) <= least + TIE_RAD,
     }
 }

@@ -10,32 +10,53 @@ use nalgebra::{Translation3, UnitQuaternion};
 use rayon::prelude::*;
 
 use super::sample::distance_rad;
-use super::table::{Table, number};
+use super::table::{csv, number};
+
+const MM: f64 = 1e-3;
+const DEGREE: f64 = std::f64::consts::PI / 180.0;
 
 /// A coordinate that varies in a map.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Coordinate {
-    X,
-    Y,
-    Z,
-    Roll,
-    Pitch,
-    Yaw,
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Coordinate {
+    pub label: &'static str,
+    column: &'static str,
+    /// Lowest and highest, in its unit.
+    pub range: [f64; 2],
+    /// Metres or radians.
+    unit: f64,
+    /// Its place among x, y, z, roll, pitch, yaw.
+    place: usize,
+}
+
+const X: Coordinate =
+    Coordinate { label: "x (anterior), mm", column: "x_mm", range: [-40.0, 40.0], unit: MM, place: 0 };
+const Y: Coordinate =
+    Coordinate { label: "y (left), mm", column: "y_mm", range: [-40.0, 40.0], unit: MM, place: 1 };
+const Z: Coordinate =
+    Coordinate { label: "z (up), mm", column: "z_mm", range: [230.0, 322.0], unit: MM, place: 2 };
+const ROLL: Coordinate = turn("roll (about x), °", "roll_deg", 3);
+const PITCH: Coordinate = turn("pitch (about y), °", "pitch_deg", 4);
+const YAW: Coordinate = turn("yaw (about z), °", "yaw_deg", 5);
+
+const fn turn(label: &'static str, column: &'static str, place: usize) -> Coordinate {
+    Coordinate { label, column, range: [-80.0, 80.0], unit: DEGREE, place }
 }
 
 /// A slice.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Slice {
-    pub across: Coordinate,
-    pub up: Coordinate,
+    /// Of its table.
+    pub name: &'static str,
+    /// The coordinate across and the one upwards.
+    pub axes: [Coordinate; 2],
 }
 
 /// The slices that are drawn.
 pub(super) const SLICES: [Slice; 4] = [
-    Slice { across: Coordinate::X, up: Coordinate::Z },
-    Slice { across: Coordinate::Y, up: Coordinate::Z },
-    Slice { across: Coordinate::Roll, up: Coordinate::Pitch },
-    Slice { across: Coordinate::Yaw, up: Coordinate::Pitch },
+    Slice { name: "workspace_x_z", axes: [X, Z] },
+    Slice { name: "workspace_y_z", axes: [Y, Z] },
+    Slice { name: "workspace_roll_pitch", axes: [ROLL, PITCH] },
+    Slice { name: "workspace_yaw_pitch", axes: [YAW, PITCH] },
 ];
 
 /// Quality of a pose that the mechanism can take within the strokes.
@@ -57,136 +78,69 @@ pub(super) struct Map {
     pub slice: Slice,
     /// Cells along a side.
     pub side: usize,
-    /// Row by row, [`Slice::across`] varies fastest; none where the mechanism cannot be.
+    /// Row by row, the first axis varies fastest; none where the mechanism cannot be.
     pub poses: Vec<Option<PoseQuality>>,
 }
 
 impl Coordinate {
-    /// Lowest and highest, mm or degrees.
-    pub(super) fn range(self) -> [f64; 2] {
-        match self {
-            Self::X | Self::Y => [-40.0, 40.0],
-            Self::Z => [230.0, 322.0],
-            Self::Roll | Self::Pitch | Self::Yaw => [-80.0, 80.0],
-        }
-    }
-
-    pub(super) fn label(self) -> &'static str {
-        match self {
-            Self::X => "x (anterior), mm",
-            Self::Y => "y (left), mm",
-            Self::Z => "z (up), mm",
-            Self::Roll => "roll (about x), °",
-            Self::Pitch => "pitch (about y), °",
-            Self::Yaw => "yaw (about z), °",
-        }
-    }
-
-    fn column(self) -> &'static str {
-        match self {
-            Self::X => "x_mm",
-            Self::Y => "y_mm",
-            Self::Z => "z_mm",
-            Self::Roll => "roll_deg",
-            Self::Pitch => "pitch_deg",
-            Self::Yaw => "yaw_deg",
-        }
-    }
-
-    /// Its value at a pose, mm or degrees.
-    pub(super) fn at(self, pose: &Pose) -> f64 {
+    /// Its value at a pose, in its unit.
+    pub(super) fn at(&self, pose: &Pose) -> f64 {
+        let position_m = pose.translation.vector;
         let (roll, pitch, yaw) = pose.rotation.euler_angles();
-        match self {
-            Self::X => pose.translation.x * 1e3,
-            Self::Y => pose.translation.y * 1e3,
-            Self::Z => pose.translation.z * 1e3,
-            Self::Roll => roll.to_degrees(),
-            Self::Pitch => pitch.to_degrees(),
-            Self::Yaw => yaw.to_degrees(),
-        }
+        [position_m.x, position_m.y, position_m.z, roll, pitch, yaw][self.place] / self.unit
     }
 }
 
 impl Slice {
-    fn pose(self, middle: &Vec3, across: f64, up: f64) -> Pose {
-        let (mut position_m, mut euler_rad) = (*middle, [0.0; 3]);
-        for (coordinate, value) in [(self.across, across), (self.up, up)] {
-            match coordinate {
-                Coordinate::X => position_m.x = value * 1e-3,
-                Coordinate::Y => position_m.y = value * 1e-3,
-                Coordinate::Z => position_m.z = value * 1e-3,
-                Coordinate::Roll => euler_rad[0] = value.to_radians(),
-                Coordinate::Pitch => euler_rad[1] = value.to_radians(),
-                Coordinate::Yaw => euler_rad[2] = value.to_radians(),
-            }
-        }
-        let [roll, pitch, yaw] = euler_rad;
-        Pose::from_parts(Translation3::from(position_m), UnitQuaternion::from_euler_angles(roll, pitch, yaw))
+    /// The values of the axes in the middle of a cell.
+    fn values(&self, side: usize, index: usize) -> [f64; 2] {
+        [(0, index % side), (1, index / side)].map(|(axis, cell)| {
+            let [low, high] = self.axes[axis].range;
+            low + (high - low) * (cell as f64 + 0.5) / side as f64
+        })
     }
 
-    fn name(self) -> &'static str {
-        match (self.across, self.up) {
-            (Coordinate::X, _) => "workspace_x_z",
-            (Coordinate::Y, _) => "workspace_y_z",
-            (Coordinate::Roll, _) => "workspace_roll_pitch",
-            _ => "workspace_yaw_pitch",
+    fn pose(&self, middle: &Vec3, values: [f64; 2]) -> Pose {
+        let mut coordinates = [middle.x, middle.y, middle.z, 0.0, 0.0, 0.0];
+        for (axis, value) in self.axes.iter().zip(values) {
+            coordinates[axis.place] = value * axis.unit;
         }
+        let [x, y, z, roll, pitch, yaw] = coordinates;
+        Pose::from_parts(Translation3::new(x, y, z), UnitQuaternion::from_euler_angles(roll, pitch, yaw))
     }
 }
 
 impl Map {
     /// The slice through a position (metres) with no turn.
     pub(super) fn compute(mechanism: &Mechanism, slice: Slice, middle: &Vec3, side: usize) -> Self {
-        let poses = (0..side * side).into_par_iter().map(|index| {
-            let [across, up] = values(slice, side, index);
-            quality(mechanism, &slice.pose(middle, across, up))
-        });
+        let poses = (0..side * side)
+            .into_par_iter()
+            .map(|index| quality(mechanism, &slice.pose(middle, slice.values(side, index))));
         Self { slice, side, poses: poses.collect() }
     }
 
-    /// Lowest and highest value of a coordinate of the slice at which the mechanism can be; none when
-    /// it can be nowhere.
-    pub(super) fn reach(&self, coordinate: Coordinate) -> Option<[f64; 2]> {
-        let which = usize::from(coordinate == self.slice.up);
-        let reached = self.poses.iter().enumerate().filter(|(_, quality)| quality.is_some());
-        reached.map(|(index, _)| values(self.slice, self.side, index)[which]).fold(None, |range, value| {
-            let [low, high]: [f64; 2] = range.unwrap_or([value; 2]);
-            Some([low.min(value), high.max(value)])
+    /// Lowest and highest value of each axis at which the mechanism can be; none when it can be nowhere.
+    pub(super) fn reach(&self) -> [Option<[f64; 2]>; 2] {
+        [0, 1].map(|axis| {
+            let cells = self.poses.iter().enumerate().filter(|(_, quality)| quality.is_some());
+            let reached = cells.map(|(index, _)| self.slice.values(self.side, index)[axis]);
+            reached
+                .map(|value| [value; 2])
+                .reduce(|[low, high], [value, _]| [low.min(value), high.max(value)])
         })
     }
 
-    pub(super) fn table_name(&self) -> &'static str {
-        self.slice.name()
-    }
-
-    pub(super) fn table(&self) -> Table {
-        let header = [
-            self.slice.across.column(),
-            self.slice.up.column(),
-            "condition",
-            "determinant",
-            "regular_within_deg",
-            "separation_deg",
-        ];
+    pub(super) fn table(&self) -> String {
         let row = |(index, quality): (usize, &Option<PoseQuality>)| {
-            let mut row: Vec<_> = values(self.slice, self.side, index).map(number).into();
-            let known = quality.map(|quality| {
+            let known = quality.map_or([f64::NAN; 4], |quality| {
                 [quality.condition, quality.determinant, quality.regular_within_deg, quality.separation_deg]
             });
-            row.extend(known.unwrap_or([f64::NAN; 4]).map(number));
-            row
+            (self.slice.values(self.side, index).map(number), known.map(number))
         };
-        Table::new(self.table_name(), &header, self.poses.iter().enumerate().map(row).collect())
+        let [across, up] = self.slice.axes.map(|axis| axis.column);
+        let header = format!("{across},{up},condition,determinant,regular_within_deg,separation_deg");
+        csv(&header, self.poses.iter().enumerate().map(row))
     }
-}
-
-/// The middle of a cell, mm or degrees.
-fn values(slice: Slice, side: usize, index: usize) -> [f64; 2] {
-    let value = |coordinate: Coordinate, cell: usize| {
-        let [low, high] = coordinate.range();
-        low + (high - low) * (cell as f64 + 0.5) / side as f64
-    };
-    [value(slice.across, index % side), value(slice.up, index / side)]
 }
 
 fn quality(mechanism: &Mechanism, pose: &Pose) -> Option<PoseQuality> {

@@ -4,12 +4,12 @@ use std::fs;
 use std::path::Path;
 
 use anyhow::Context;
+use askama::Template;
 
 use crate::claims::{self, PaperClaim};
+use crate::page::Page;
 use crate::study::Study;
-use crate::table::Table;
-use crate::workspace::Map;
-use crate::{motions, page, plot};
+use crate::{motions, plot};
 
 impl Study {
     /// Writes tables, figures and `claims.md` into an existing folder, and returns the claims in the paper's order.
@@ -18,36 +18,36 @@ impl Study {
     /// # Errors
     /// When a file cannot be written.
     pub fn write(&self, folder: &Path, command: &str) -> anyhow::Result<Vec<PaperClaim>> {
-        let write = |name: &str, text: &str| {
-            fs::write(folder.join(name), text)
-                .with_context(|| format!("cannot write {}", folder.join(name).display()))
+        let write = |name: &str, extension: &str, text: &str| {
+            let path = folder.join(name).with_extension(extension);
+            fs::write(&path, text).with_context(|| format!("cannot write {}", path.display()))
         };
         let figures = plot::figures(self).context("cannot draw the figures")?;
-        for table in self.tables() {
-            let failed = || format!("cannot write {}", folder.join(table.name).display());
-            table.write(folder).with_context(failed)?;
+        for (name, table) in self.tables() {
+            write(name, "csv", &table)?;
         }
-        for figure in &figures {
-            write(&format!("{}.svg", figure.name), &figure.svg)?;
+        for (name, svg) in &figures {
+            write(name, "svg", svg)?;
         }
         let claims = claims::judge(self);
-        write("claims.md", &page::text(self, command, &claims, &figures))?;
+        let version = env!("CARGO_PKG_VERSION");
+        write("claims", "md", &Page { study: self, command, claims: &claims, version }.render()?)?;
         Ok(claims)
     }
 
-    fn tables(&self) -> Vec<Table> {
-        let mut tables = self.pairs.tables();
-        tables.extend([
-            self.trials.success_table(),
-            self.trials.iterations_table(),
-            self.trials.cost_table(),
-            self.speed.table(),
-            self.set.table(),
-            self.multiplicity.table(),
-            self.basins.table(),
-            motions::table(&self.motions, &self.mechanism),
-        ]);
-        tables.extend(self.maps.iter().map(Map::table));
+    fn tables(&self) -> Vec<(&'static str, String)> {
+        let mut tables = vec![
+            ("success", self.trials.success_table()),
+            ("iterations", self.trials.iterations_table()),
+            ("cost", self.trials.cost_table()),
+            ("speed", self.speed.table()),
+            ("fig8_solutions", self.set.table()),
+            ("multiplicity", self.multiplicity.table()),
+            ("basins", self.basins.table()),
+            ("motions", motions::table(&self.motions, &self.mechanism)),
+        ];
+        tables.extend(self.pairs.iter().map(|one| (one.name, one.table())));
+        tables.extend(self.maps.iter().map(|map| (map.slice.name, map.table())));
         tables
     }
 }

@@ -3,7 +3,7 @@
 use super::claim::{ANY, Judgement, PaperClaim, RARELY};
 use crate::sample::Guesses;
 use crate::share::Share;
-use crate::solver::{COMPARED, NEWTON, PUBLISHED, SOLVERS, Solver};
+use crate::solver::{COMPARED, CONTROLLER, NEWTON, PUBLISHED, SOLVERS, Solver};
 use crate::study::Study;
 
 /// Guesses "close to the solution".
@@ -11,74 +11,61 @@ const CLOSE: Guesses = Guesses::Within(5.0);
 
 pub(super) fn any_guess_converges(study: &Study) -> PaperClaim {
     let solved = study.trials.solved(PUBLISHED, ANY);
-    let best = best_variant(|solver| study.trials.solved(solver, ANY));
-    let close = study.trials.solved(PUBLISHED, CLOSE);
+    let (variant, best) = best_variant(study);
     PaperClaim {
         statement: "The algorithm converges whatever the initial guess.",
         section: "Korean summary, first advantage (the results section says otherwise)",
         measured: format!(
-            "from guesses above the base the paper's solver reached a solution in {}; its best variant ({}) in {}",
-            solved.percent(),
-            best.0.name(),
-            best.1.percent()
+            "from guesses above the base the paper's solver reached a solution in {solved}; its best variant \
+             ({variant}) in {best}"
         ),
         criterion: "holds if all guesses above the base converge; partly if at least all within ±5° do",
-        judgement: Judgement::new(solved.is_all(), close.is_all()),
+        judgement: Judgement::new(solved.is_all(), study.trials.solved(PUBLISHED, CLOSE).is_all()),
         figure: Some("success"),
     }
 }
 
 pub(super) fn wider_range(study: &Study) -> PaperClaim {
-    let solved = |solver| study.trials.solved(solver, ANY);
-    let (published, newton) = (solved(PUBLISHED), solved(NEWTON));
-    let best = best_variant(solved);
-    let true_ones = [PUBLISHED, NEWTON].map(|solver| study.trials.true_ones(solver, ANY).percent());
-    let [alone, newton_alone] = study.trials.alone();
+    let [published, newton] = [PUBLISHED, NEWTON].map(|solver| study.trials.solved(solver, ANY));
+    let [published_true, newton_true] = [PUBLISHED, NEWTON].map(|solver| study.trials.true_ones(solver, ANY));
+    let [published_alone, newton_alone] = study.trials.alone();
+    let (variant, best) = best_variant(study);
     PaperClaim {
         statement: "It converges for a wider range of guesses than Newton–Raphson.",
         section: "Abstract and Results, first advantage",
         measured: format!(
-            "any solution: published {}, Newton–Raphson {}; the true one: {} and {}; published alone {}, Newton–Raphson \
-             alone {}; best variant of the paper ({}) {}",
-            published.percent(),
-            newton.percent(),
-            true_ones[0],
-            true_ones[1],
-            alone.percent(),
-            newton_alone.percent(),
-            best.0.name(),
-            best.1.percent()
+            "any solution: published {published}, Newton–Raphson {newton}; the true one: {published_true} and \
+             {newton_true}; published alone {published_alone}, Newton–Raphson alone {newton_alone}; best variant of \
+             the paper ({variant}) {best}"
         ),
         criterion: "holds if the paper's solver as printed reaches a solution more often from above the base, by 3 standard \
                     errors; partly if only a variant of it does",
-        judgement: wider(published, newton, best.1),
+        judgement: wider(published, newton, best),
         figure: Some("success"),
     }
 }
 
 pub(super) fn newton_diverges(study: &Study) -> PaperClaim {
-    let share = study.pairs.diverging.share;
+    let [diverging, _, stalling] = study.pairs.each_ref().map(|disagreement| disagreement.share);
     PaperClaim {
         statement: "Typically both seem to converge at first, then Newton–Raphson diverges and the algorithm does not.",
         section: "Results, first advantage; Fig. 3",
         measured: format!(
-            "{} of guesses above the base show this; the opposite, Newton–Raphson reaching a solution where the \
-             paper's solver stalls, {}",
-            share.percent(),
-            study.pairs.stalling.share.percent()
+            "{diverging} of guesses above the base show this; the opposite, Newton–Raphson reaching a solution where \
+             the paper's solver stalls, {stalling}"
         ),
         criterion: "holds if at least half of the guesses show it; partly if any does",
-        judgement: Judgement::new(share.value() >= 0.5, share.hits > 0),
+        judgement: Judgement::new(diverging.value() >= 0.5, diverging.hits > 0),
         figure: Some("fig3_diverging"),
     }
 }
 
 pub(super) fn newton_oscillates(study: &Study) -> PaperClaim {
-    let share = study.pairs.oscillating.share;
+    let share = study.pairs[1].share;
     PaperClaim {
         statement: "There are guesses from which the algorithm converges while Newton–Raphson oscillates for ever.",
         section: "Results, first advantage; Fig. 4",
-        measured: format!("{} of guesses above the base ({} of {})", share.percent(), share.hits, share.of),
+        measured: format!("{share} of guesses above the base ({} of {})", share.hits, share.of),
         criterion: "holds if any guess shows it: the last 40 errors repeat with a period of 2 to 8 iterations",
         judgement: Judgement::new(share.hits > 0, false),
         figure: Some("fig4_oscillating"),
@@ -87,50 +74,19 @@ pub(super) fn newton_oscillates(study: &Study) -> PaperClaim {
 
 pub(super) fn close_guess_converges(study: &Study) -> PaperClaim {
     let solved = study.trials.solved(PUBLISHED, CLOSE);
-    let true_ones = |solver, guesses| study.trials.true_ones(solver, guesses).percent();
+    let [true_ones, newton] = [PUBLISHED, NEWTON].map(|solver| study.trials.true_ones(solver, CLOSE));
+    let closer = study.trials.true_ones(PUBLISHED, Guesses::Within(2.0));
     PaperClaim {
         statement: "A guess close to the solution always makes it converge.",
         section: "Results, first advantage",
         measured: format!(
-            "within ±5° of the true angles it reached a solution in {} ({} of {}), the true one in {} \
-             (Newton–Raphson {}); within ±2° the true one in {}",
-            solved.percent(),
-            solved.hits,
-            solved.of,
-            true_ones(PUBLISHED, CLOSE),
-            true_ones(NEWTON, CLOSE),
-            true_ones(PUBLISHED, Guesses::Within(2.0))
+            "within ±5° of the true angles it reached a solution in {solved} ({} of {}), the true one in {true_ones} \
+             (Newton–Raphson {newton}); within ±2° the true one in {closer}",
+            solved.hits, solved.of
         ),
         criterion: "holds if all guesses within ±5° converge; partly if 99 % do",
         judgement: Judgement::new(solved.is_all(), solved.value() >= 1.0 - RARELY),
         figure: Some("success"),
-    }
-}
-
-/// One criterion for claims 10 and 11: the solution is predictable from guesses if 99 % of the solutions reached are the
-/// closest ones.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct Predictable {
-    /// From guesses above the base.
-    anywhere: bool,
-    /// From guesses within ±5°.
-    close: bool,
-}
-
-impl Predictable {
-    fn from_shares([anywhere, close]: [Share; 2]) -> Self {
-        let is_predictable = |closest: Share| closest.of > 0 && closest.value() >= 1.0 - RARELY;
-        Self { anywhere: is_predictable(anywhere), close: is_predictable(close) }
-    }
-
-    /// PaperClaim 10, of the paper's solver.
-    fn reaches_the_closest(self) -> Judgement {
-        Judgement::new(self.anywhere, self.close)
-    }
-
-    /// PaperClaim 11, of Newton–Raphson: the opposite.
-    fn cannot_be_predicted(self) -> Judgement {
-        Judgement::new(!self.close, !self.anywhere)
     }
 }
 
@@ -141,11 +97,24 @@ fn closest(study: &Study, solver: Solver) -> [Share; 2] {
 
 fn closest_measured(study: &Study) -> String {
     let [[published, published_close], [newton, newton_close]] =
-        [PUBLISHED, NEWTON].map(|solver| closest(study, solver).map(Share::percent));
+        [PUBLISHED, NEWTON].map(|solver| closest(study, solver));
     format!(
         "of the solutions reached from above the base, the closest: the paper's solver {published}, Newton–Raphson \
          {newton}; from within ±5° of the true one: {published_close} and {newton_close}"
     )
+}
+
+/// One criterion for the two claims that follow: 99 % of the solutions reached are the closest ones.
+fn is_predictable(closest: Share) -> bool {
+    closest.of > 0 && closest.value() >= 1.0 - RARELY
+}
+
+fn reaches_the_closest([anywhere, close]: [Share; 2]) -> Judgement {
+    Judgement::new(is_predictable(anywhere), is_predictable(close))
+}
+
+fn cannot_be_predicted([anywhere, close]: [Share; 2]) -> Judgement {
+    Judgement::new(!is_predictable(close), !is_predictable(anywhere))
 }
 
 pub(super) fn closest_solution(study: &Study) -> PaperClaim {
@@ -155,7 +124,7 @@ pub(super) fn closest_solution(study: &Study) -> PaperClaim {
         measured: closest_measured(study),
         criterion: "holds if at least 99 % of the solutions that the paper's solver reaches from above the base are the \
                     closest (largest difference of any leg's angle); partly if at least from within ±5°",
-        judgement: Predictable::from_shares(closest(study, PUBLISHED)).reaches_the_closest(),
+        judgement: reaches_the_closest(closest(study, PUBLISHED)),
         figure: Some("basins"),
     }
 }
@@ -167,23 +136,20 @@ pub(super) fn unpredictable_newton(study: &Study) -> PaperClaim {
         measured: closest_measured(study),
         criterion: "the criterion of the claim before, turned round: holds if fewer than 99 % of the solutions that \
                     Newton–Raphson reaches from within ±5° are the closest; partly if only from above the base",
-        judgement: Predictable::from_shares(closest(study, NEWTON)).cannot_be_predicted(),
+        judgement: cannot_be_predicted(closest(study, NEWTON)),
         figure: Some("basins"),
     }
 }
 
 pub(super) fn always_the_true_one(study: &Study) -> PaperClaim {
-    let [anywhere, close] = [ANY, CLOSE].map(|guesses| study.trials.true_ones(PUBLISHED, guesses));
-    let controller = study.trials.true_ones(Solver::Controller, ANY);
+    let [[anywhere, close], [controller, controller_close]] = [PUBLISHED, CONTROLLER]
+        .map(|solver| [ANY, CLOSE].map(|guesses| study.trials.true_ones(solver, guesses)));
     PaperClaim {
         statement: "In simulation the algorithm always reached the true solution, without exception.",
         section: "Results, on multiplicity; Korean summary",
         measured: format!(
-            "the paper's solver {} from above the base, {} from within ±5°; the controller's solver {} and {}",
-            anywhere.percent(),
-            close.percent(),
-            controller.percent(),
-            study.trials.true_ones(Solver::Controller, CLOSE).percent()
+            "the paper's solver {anywhere} from above the base, {close} from within ±5°; the controller's solver \
+             {controller} and {controller_close}"
         ),
         criterion: "holds if every guess above the base leads to the true solution; partly if every one within ±5° does",
         judgement: Judgement::new(anywhere.is_all(), close.is_all()),
@@ -192,17 +158,18 @@ pub(super) fn always_the_true_one(study: &Study) -> PaperClaim {
 }
 
 pub(super) fn successive_poses(study: &Study) -> PaperClaim {
-    let published =
-        COMPARED.iter().position(|&solver| solver == PUBLISHED).expect("the paper's solver is shown");
-    let lost: usize = study.motions.iter().map(|motion| motion.followed[published].lost).sum();
-    let steps: usize = study.motions.iter().map(|motion| motion.followed[published].steps).sum();
-    let chewing = study.motions.first().map_or(f64::NAN, |motion| motion.followed[published].iterations_mean);
+    let place =
+        COMPARED.iter().position(|&solver| solver == PUBLISHED).expect("the paper's solver is compared");
+    let followed: Vec<_> = study.motions.iter().map(|motion| motion.followed[place]).collect();
+    let lost: usize = followed.iter().map(|followed| followed.lost).sum();
+    let steps: usize = followed.iter().map(|followed| followed.steps).sum();
     PaperClaim {
         statement: "Starting each step from the pose before, the true pose is found all along a movement.",
         section: "Results, last paragraph",
         measured: format!(
-            "{lost} of {steps} steps of 1 ms lost over {} motions; {chewing:.1} iterations a step while chewing",
-            study.motions.len()
+            "{lost} of {steps} steps of 1 ms lost over {} motions; {:.1} iterations a step while chewing",
+            followed.len(),
+            followed[0].iterations_mean
         ),
         criterion: "holds if no step is lost; partly if fewer than 1 % are",
         judgement: Judgement::new(steps > 0 && lost == 0, (lost as f64) < RARELY * steps as f64),
@@ -214,11 +181,11 @@ fn wider(published: Share, newton: Share, best_variant: Share) -> Judgement {
     Judgement::new(published.clearly_exceeds(newton), best_variant.clearly_exceeds(newton))
 }
 
-/// The paper's variant with the greatest share.
-fn best_variant(share: impl Fn(Solver) -> Share) -> (Solver, Share) {
-    let variants = SOLVERS.into_iter().filter(|one| matches!(one, Solver::Published(..)));
-    let shares = variants.map(|solver| (solver, share(solver)));
-    shares.max_by(|a, b| a.1.value().total_cmp(&b.1.value())).unwrap_or((PUBLISHED, Share::default()))
+/// The paper's variant that most often reaches a solution from above the base, and how often it does.
+fn best_variant(study: &Study) -> (&'static str, Share) {
+    let variants = SOLVERS.into_iter().filter(|solver| solver.is_published());
+    let shares = variants.map(|solver| (solver.name, study.trials.solved(solver, ANY)));
+    shares.max_by(|a, b| a.1.value().total_cmp(&b.1.value())).expect("the paper has variants")
 }
 
 #[cfg(test)]
@@ -227,15 +194,14 @@ mod tests {
 
     #[test]
     fn the_same_figures_never_fulfil_both_claims_of_one_solver() {
-        let share = |hits| Share { hits, of: 1000 };
         for (anywhere, close, reaches, unpredictable) in [
             (995, 999, Judgement::Holds, Judgement::DoesNotHold),
             (300, 999, Judgement::HoldsPartly, Judgement::HoldsPartly),
             (300, 980, Judgement::DoesNotHold, Judgement::Holds),
         ] {
-            let predictable = Predictable::from_shares([share(anywhere), share(close)]);
-            assert_eq!(predictable.reaches_the_closest(), reaches);
-            assert_eq!(predictable.cannot_be_predicted(), unpredictable);
+            let closest = [anywhere, close].map(share);
+            assert_eq!(reaches_the_closest(closest), reaches);
+            assert_eq!(cannot_be_predicted(closest), unpredictable);
         }
     }
 

@@ -1,21 +1,17 @@
 //! The paper's claims about the number of solutions.
 
 use super::claim::{Judgement, PaperClaim, RARELY};
-use crate::multiplicity::{CONDITIONS, Conditions};
+use crate::multiplicity::{CONDITIONS, ORIENTED};
 use crate::share::Share;
 use crate::study::Study;
 
 pub(super) fn two_positions(study: &Study) -> PaperClaim {
     let folded = study.set.corner_folded();
-    let measured = match (study.set.true_one(), folded) {
-        (Some(truth), Some(folded)) => format!(
-            "θ₁ = {:.2}° and {:.2}° with θ₂ = θ₃ = {:.2}° in both",
-            truth.theta_rad[0].to_degrees(),
-            folded.theta_rad[0].to_degrees(),
-            truth.theta_rad[1].to_degrees()
-        ),
-        _ => "no second solution with the same θ₂ and θ₃".to_owned(),
-    };
+    let [theta1, theta2, _] = study.set.true_one.theta_rad.map(f64::to_degrees);
+    let measured = folded.map_or("no second solution with the same θ₂ and θ₃".to_owned(), |folded| {
+        let folded1 = folded.theta_rad[0].to_degrees();
+        format!("θ₁ = {theta1:.2}° and {folded1:.2}° with θ₂ = θ₃ = {theta2:.2}° in both")
+    });
     PaperClaim {
         statement: "With the slides in the middle, A₁ has two positions for the same A₂ and A₃.",
         section: "Results, on multiplicity; Fig. 6",
@@ -27,27 +23,26 @@ pub(super) fn two_positions(study: &Study) -> PaperClaim {
 }
 
 pub(super) fn several_solutions(study: &Study) -> PaperClaim {
-    let multiple = study.multiplicity.multiple();
+    let solutions = study.set.solutions.count();
+    let [none, multiple] = [study.multiplicity.with_solutions(0), study.multiplicity.with_more_than(2, 0)];
     PaperClaim {
         statement: "One input has several sets of leg angles.",
         section: "Results, on multiplicity; Fig. 8",
         measured: format!(
-            "the neutral input has {}; of random inputs {} have none, and of the others {} have more than one \
-             mirrored pair",
-            study.set.solutions.count(),
-            study.multiplicity.with_solutions(0).percent(),
-            multiple.percent()
+            "the neutral input has {solutions}; of random inputs {none} have none, and of the others {multiple} have \
+             more than one mirrored pair"
         ),
         criterion: "holds if the neutral input has more than one mirrored pair",
-        judgement: Judgement::new(study.set.solutions.count() > 2, false),
+        judgement: Judgement::new(solutions > 2, false),
         figure: Some("fig8_solutions"),
     }
 }
 
 pub(super) fn conditions_leave_one(study: &Study) -> PaperClaim {
-    let several = CONDITIONS.map(|conditions| study.multiplicity.several_left(conditions));
-    let texts = CONDITIONS.iter().zip(several).map(|(conditions, share)| {
-        format!("{}: {} ({} of {})", conditions.name(), share.percent(), share.hits, share.of)
+    let several = |conditions| study.multiplicity.with_more_than(1, conditions);
+    let texts = (1..CONDITIONS.len()).map(|conditions| {
+        let share = several(conditions);
+        format!("{}: {share} ({} of {})", CONDITIONS[conditions].name, share.hits, share.of)
     });
     PaperClaim {
         statement: "Two conditions leave exactly one solution, if any.",
@@ -55,7 +50,7 @@ pub(super) fn conditions_leave_one(study: &Study) -> PaperClaim {
         measured: format!("several are left — {}", texts.collect::<Vec<_>>().join("; ")),
         criterion: "holds if no random input keeps several with the plane oriented; partly if fewer than 1 % do. \
                     A sample cannot prove it: see masseter uniqueness",
-        judgement: unique(several[Conditions::Oriented as usize]),
+        judgement: unique(several(ORIENTED)),
         figure: None,
     }
 }

@@ -2,7 +2,7 @@
 
 use super::claim::{ANY, Judgement, PaperClaim};
 use crate::share::median;
-use crate::solver::{Attempt, NEWTON, PUBLISHED};
+use crate::solver::{Found, NEWTON, PUBLISHED};
 use crate::speed::Situation;
 use crate::study::Study;
 
@@ -15,11 +15,11 @@ const MUCH_MORE: f64 = 2.0;
 
 pub(super) fn fewer_iterations(study: &Study) -> PaperClaim {
     let both = study.trials.against_newton(PUBLISHED, ANY);
-    let of = |side: usize, what: fn(&Attempt) -> u32| {
-        median(both.iter().map(|pair| f64::from(what(&pair[side]))).collect())
+    let medians = |what: fn(&Found) -> u32| {
+        [0, 1].map(|side| median(both.iter().map(|pair| f64::from(what(&pair[side])))))
     };
-    let iterations = [0, 1].map(|side| of(side, |attempt| attempt.iterations));
-    let evaluations = [0, 1].map(|side| of(side, |attempt| attempt.evaluations));
+    let iterations = medians(|found| found.iterations);
+    let evaluations = medians(|found| found.evaluations);
     let time = study.speed.timing(Situation::Random, PUBLISHED).to_newton;
     PaperClaim {
         statement: "It converges much faster: Newton–Raphson needs many more iterations.",

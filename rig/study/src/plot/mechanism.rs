@@ -4,14 +4,12 @@ use std::f64::consts::TAU;
 
 use masseter_charts::palette::{BLUE, GREEN, GREY, PURPLE, VERMILION};
 use masseter_charts::{
-    Area, Axis, Chart, Error, Legend, Line, LineChart, Scale, SeriesLabelPosition, TEXT, TITLE, marks,
+    Area, Axis, Chart, Error, Legend, Line, LineChart, Scale, SeriesLabelPosition, TEXT, TITLE, marks, svg,
 };
 use masseter_controller::kinematics::Solution;
-use masseter_shared::geometry::{Actuators, LEGS, Mechanism, Vec3};
+use masseter_shared::geometry::{LEGS, Vec3};
 use plotters::prelude::*;
 
-use super::draw::draw;
-use crate::figure::Figure;
 use crate::study::Study;
 
 /// From where the mechanism is seen, degrees around z and above the horizontal.
@@ -22,37 +20,22 @@ const PIECE_M: f64 = 0.004;
 const WINDOW_MM: [[f64; 2]; 2] = [[-90.0, 90.0], [205.0, 350.0]];
 
 /// Fig. 6: true solution and folded corner, in space and in the plane of leg 1.
-pub(super) fn assemblies(study: &Study) -> Result<Figure, Error> {
-    let caption = "Fig. 6. Two assemblies of the neutral input (d = 0, all legs equal). Left: the true one and the one \
-                   with corner A₁ folded over. Right: in the plane of leg 1 the circle on which the triangle carries A₁ \
-                   about A₂A₃ (Cᴬ) and that of the leg about B₁ (Cᴮ) meet twice.";
-    draw("fig6_assemblies", caption.to_owned(), (1100, 560), |area| {
+pub(super) fn assemblies(study: &Study) -> Result<String, Error> {
+    svg((1100, 560), |area| {
         let (left, right) = area.split_horizontally(470);
-        let found = [study.set.true_one(), study.set.corner_folded()];
-        let mut space = space(&left, "Two assemblies of one input", TITLE)?;
-        draw_base(&mut space, &study.mechanism)?;
-        for (solution, colour) in found.into_iter().zip([BLUE, VERMILION]) {
-            if let Some(solution) = solution {
-                draw_assembly(&mut space, &study.mechanism, &study.set.actuators, solution, colour)?;
-            }
+        let found = || [Some(&study.set.true_one), study.set.corner_folded()].into_iter().flatten();
+        let mut space = space(&left, study, "Two assemblies of one input", TITLE)?;
+        for (solution, colour) in found().zip([BLUE, VERMILION]) {
+            draw_assembly(&mut space, study, solution, colour)?;
         }
-        loci(study, found).draw_on(&right)
+        loci(study, found()).draw_on(&right)
     })
 }
 
 /// The plane of leg 1 around A₁: x and z, mm.
-fn loci(study: &Study, found: [Option<&Solution>; 2]) -> LineChart {
-    let mut plane = LineChart {
-        title: "Plane of leg 1".to_owned(),
-        x: Axis::new("x (anterior), mm", Scale::Linear, WINDOW_MM[0]),
-        y: Axis::new("z (up), mm", Scale::Linear, WINDOW_MM[1]),
-        lines: Vec::new(),
-        limits: Vec::new(),
-        legend: Legend::Inside(SeriesLabelPosition::UpperRight),
-    };
+fn loci<'a>(study: &Study, found: impl Iterator<Item = &'a Solution>) -> LineChart {
     let (mechanism, actuators) = (&study.mechanism, &study.set.actuators);
-    let [Some(truth), folded] = found else { return plane };
-    let [_, a2, a3] = mechanism.corners_from_angles(actuators, &truth.theta_rad);
+    let [_, a2, a3] = mechanism.corners_from_angles(actuators, &study.set.true_one.theta_rad);
     let hinge = mechanism.hinge(0, actuators.slide_m[0]);
     let (middle, half) = ((a2 + a3) / 2.0, (a2 - a3).norm() / 2.0);
     let side_m = mechanism.platform_sides_m()[0];
@@ -60,7 +43,7 @@ fn loci(study: &Study, found: [Option<&Solution>; 2]) -> LineChart {
         ("Cᴬ: A₁ about A₂A₃", middle, (side_m * side_m - half * half).sqrt(), GREEN),
         ("Cᴮ: A₁ about B₁", hinge, actuators.leg_m[0], PURPLE),
     ];
-    for (name, centre, radius_m, colour) in circles {
+    let circle = |(name, centre, radius_m, colour): (_, Vec3, f64, _)| {
         let pieces = (TAU * radius_m / PIECE_M) as usize;
         let point = |piece: usize| {
             let (sin, cos) = (piece as f64 / pieces as f64 * TAU).sin_cos();
@@ -70,51 +53,60 @@ fn loci(study: &Study, found: [Option<&Solution>; 2]) -> LineChart {
             let [[left, right], [low, high]] = WINDOW_MM;
             (left..=right).contains(x) && (low..=high).contains(z)
         };
-        let points = (0..=pieces).map(point).filter(seen).collect();
-        plane.lines.push(Line::new(name, points).coloured(colour));
-    }
-    for (solution, (name, colour)) in
-        [Some(truth), folded].into_iter().zip([("true solution", BLUE), ("A₁ folded over", VERMILION)])
-    {
-        let Some(solution) = solution else { continue };
+        Line::new(name, (0..=pieces).map(point).filter(seen).collect()).coloured(colour)
+    };
+    let triangle = |(solution, (name, colour)): (&Solution, (_, _))| {
         let [a1, ..] = mechanism.corners_from_angles(actuators, &solution.theta_rad);
-        let triangle = vec![(a1.x * 1e3, a1.z * 1e3), (middle.x * 1e3, middle.z * 1e3)];
-        plane.lines.push(Line::new(name, triangle).coloured(colour).marked());
+        let ends = [a1, middle].map(|end| (end.x * 1e3, end.z * 1e3));
+        Line::new(name, ends.into()).coloured(colour).marked()
+    };
+    let triangles = found.zip([("true solution", BLUE), ("A₁ folded over", VERMILION)]).map(triangle);
+    LineChart {
+        title: "Plane of leg 1".to_owned(),
+        x: Axis::new("x (anterior), mm", Scale::Linear, WINDOW_MM[0]),
+        y: Axis::new("z (up), mm", Scale::Linear, WINDOW_MM[1]),
+        lines: circles.into_iter().map(circle).chain(triangles).collect(),
+        limits: Vec::new(),
+        legend: Legend::Inside(SeriesLabelPosition::UpperRight),
     }
-    plane
 }
 
 /// Fig. 8: every solution of the neutral input above the base.
-pub(super) fn solution_set(study: &Study) -> Result<Figure, Error> {
+pub(super) fn solution_set(study: &Study) -> Result<String, Error> {
     let above = study.set.above_base();
-    let caption = format!(
-        "Fig. 8. The {} solutions of the neutral input above the base (leg angles over each); as many mirrored ones lie \
-         below it. The true solution is the first.",
-        above.len()
-    );
-    draw("fig8_solutions", caption, (1100, 760), |area| {
+    svg((1100, 760), |area| {
         for (panel, solution) in area.split_evenly((2, 4)).iter().zip(&above) {
-            let angles: Vec<_> =
-                solution.theta_rad.iter().map(|angle| format!("{:.1}°", angle.to_degrees())).collect();
+            let angles = solution.theta_rad.map(|angle| format!("{:.1}°", angle.to_degrees())).join(", ");
             let (colour, name) = if solution.assembly.is_true() { (BLUE, "true: ") } else { (VERMILION, "") };
-            let mut space = space(panel, &format!("{name}{}", angles.join(", ")), TEXT)?;
-            draw_base(&mut space, &study.mechanism)?;
-            draw_assembly(&mut space, &study.mechanism, &study.set.actuators, solution, colour)?;
+            let mut space = space(panel, study, &format!("{name}{angles}"), TEXT)?;
+            draw_assembly(&mut space, study, solution, colour)?;
         }
         Ok(())
     })
 }
 
-/// A view without axes, equal scales across and up.
-fn space<'a, 'svg>(area: &'a Area<'svg>, title: &str, size: u32) -> Result<Chart<'a, 'svg>, Error> {
+/// A view without axes, equal scales across and up: the slides over their strokes, and the triangle of their middles.
+fn space<'a, 'svg>(
+    area: &'a Area<'svg>,
+    study: &Study,
+    title: &str,
+    size: u32,
+) -> Result<Chart<'a, 'svg>, Error> {
     let (width, height) = area.dim_in_pixel();
     let half_height_m = 0.172;
     let half_width_m = half_height_m * f64::from(width) / f64::from(height - 30);
-    let chart = ChartBuilder::on(area).margin(4).caption(title, ("sans-serif", size)).build_cartesian_2d(
-        Axis::new("", Scale::Linear, [-half_width_m, half_width_m]),
-        Axis::new("", Scale::Linear, [0.125 - half_height_m, 0.125 + half_height_m]),
-    )?;
-    Ok(chart)
+    let mut space =
+        ChartBuilder::on(area).margin(4).caption(title, ("sans-serif", size)).build_cartesian_2d(
+            Axis::new("", Scale::Linear, [-half_width_m, half_width_m]),
+            Axis::new("", Scale::Linear, [0.125 - half_height_m, 0.125 + half_height_m]),
+        )?;
+    let mechanism = &study.mechanism;
+    line(&mut space, &[0, 1, 2, 0].map(|leg| mechanism.hinge(leg, 0.0)), GREY.stroke_width(1))?;
+    for leg in 0..LEGS {
+        let ends = mechanism.strokes().slide_m.map(|end_m| mechanism.hinge(leg, end_m));
+        line(&mut space, &ends, BLACK.mix(0.55).stroke_width(5))?;
+    }
+    Ok(space)
 }
 
 fn seen(point: &Vec3) -> (f64, f64) {
@@ -129,38 +121,25 @@ fn line(space: &mut Chart<'_, '_>, points: &[Vec3], style: ShapeStyle) -> Result
     Ok(())
 }
 
-/// The slides over their strokes, and the triangle of their middles.
-fn draw_base(space: &mut Chart<'_, '_>, mechanism: &Mechanism) -> Result<(), Error> {
-    let middles = [0, 1, 2, 0].map(|leg| mechanism.hinge(leg, 0.0));
-    line(space, &middles, GREY.stroke_width(1))?;
-    let [low_m, high_m] = mechanism.strokes().slide_m;
-    for leg in 0..LEGS {
-        let ends = [mechanism.hinge(leg, low_m), mechanism.hinge(leg, high_m)];
-        line(space, &ends, BLACK.mix(0.55).stroke_width(5))?;
-    }
-    Ok(())
-}
-
 fn draw_assembly(
     space: &mut Chart<'_, '_>,
-    mechanism: &Mechanism,
-    actuators: &Actuators,
+    study: &Study,
     solution: &Solution,
     colour: RGBColor,
 ) -> Result<(), Error> {
+    let (mechanism, actuators) = (&study.mechanism, &study.set.actuators);
     let corners = mechanism.corners_from_angles(actuators, &solution.theta_rad);
-    space.draw_series([Polygon::new(corners.iter().map(seen).collect::<Vec<_>>(), colour.mix(0.35))])?;
+    space.draw_series([Polygon::new(corners.each_ref().map(seen), colour.mix(0.35))])?;
     line(space, &[corners[0], corners[1], corners[2], corners[0]], colour.stroke_width(2))?;
     for (leg, corner) in corners.iter().enumerate() {
         let hinge = mechanism.hinge(leg, actuators.slide_m[leg]);
         line(space, &[hinge, *corner], colour.stroke_width(3))?;
         marks(space, [seen(&hinge)], 4, BLACK)?;
         marks(space, [seen(corner)], 4, colour)?;
-        let name = |letter: char| format!("{letter}{}", ['₁', '₂', '₃'][leg]);
         for (at, letter) in [(&hinge, 'B'), (corner, 'A')] {
             let (x, y) = seen(at);
-            let style = ("sans-serif", TEXT - 1);
-            space.draw_series([Text::new(name(letter), (x + 0.006, y + 0.004), style)])?;
+            let name = format!("{letter}{}", ['₁', '₂', '₃'][leg]);
+            space.draw_series([Text::new(name, (x + 0.006, y + 0.004), ("sans-serif", TEXT - 1))])?;
         }
     }
     Ok(())

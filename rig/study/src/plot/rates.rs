@@ -2,8 +2,7 @@
 
 use masseter_charts::{Axis, Error, Legend, Line, LineChart, Scale, SeriesLabelPosition};
 
-use super::draw::{SOLVER_COLOURS, draw};
-use crate::figure::Figure;
+use super::colours::SOLVER_COLOURS;
 use crate::sample::{GUESSES, Guesses};
 use crate::share::Share;
 use crate::solver::{COMPARED, Solver};
@@ -12,11 +11,8 @@ use crate::trials::Trials;
 /// Where guesses anywhere above the base are drawn, °: each leg is within 90° of the vertical.
 const ABOVE_BASE_DEG: f64 = 90.0;
 
-pub(super) fn figure(trials: &Trials) -> Result<Figure, Error> {
-    let caption = "Success of random guesses over their greatest distance from the true leg angles (every leg within \
-                   ± this; the points at 90° are guesses anywhere above the base). Left: any solution reached. Right: \
-                   the true one.";
-    draw("success", caption.to_owned(), (1100, 440), |area| {
+pub(super) fn svg(trials: &Trials) -> Result<String, Error> {
+    masseter_charts::svg((1100, 440), |area| {
         let panels = area.split_evenly((1, 2));
         panel("Any solution", |solver, guesses| trials.solved(solver, guesses)).draw_on(&panels[0])?;
         panel("The true solution", |solver, guesses| trials.true_ones(solver, guesses)).draw_on(&panels[1])
@@ -32,7 +28,7 @@ fn panel(title: &str, share: impl Fn(Solver, Guesses) -> Share) -> LineChart {
             };
             (x, 100.0 * share(solver, guesses).value())
         };
-        Line::new(solver.short_name(), GUESSES.into_iter().map(point).collect()).coloured(colour).marked()
+        Line::new(solver.short_name, GUESSES.into_iter().map(point).collect()).coloured(colour).marked()
     };
     LineChart {
         title: title.to_owned(),

@@ -4,17 +4,13 @@ use masseter_charts::palette::BLUE;
 use masseter_charts::{Axis, Bar, Error, Scale, bars, chart};
 use masseter_controller::kinematics::MOST_SOLUTIONS;
 
-use super::draw::draw;
-use crate::figure::Figure;
 use crate::multiplicity::Multiplicity;
 
-pub(super) fn figure(multiplicity: &Multiplicity) -> Result<Figure, Error> {
-    let caption = "Number of real solutions of random inputs over the whole strokes; an input without any cannot be \
-                   assembled.";
-    draw("multiplicity", caption.to_owned(), (760, 420), |area| {
+pub(super) fn svg(multiplicity: &Multiplicity) -> Result<String, Error> {
+    masseter_charts::svg((760, 420), |area| {
         let bar = |solutions: usize| {
             let (share, x) = (multiplicity.with_solutions(solutions), solutions as f64);
-            let text = vec![format!("{solutions}: {}", share.percent())];
+            let text = vec![format!("{solutions}: {share}")];
             Bar { sides: [x - 0.7, x + 0.7], height: 100.0 * share.value(), colour: BLUE, text }
         };
         let shown = (0..=MOST_SOLUTIONS).step_by(2).map(bar).filter(|bar| bar.height > 0.0);

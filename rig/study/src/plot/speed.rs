@@ -4,8 +4,7 @@ use masseter_charts::{
     Area, Axis, Bar, Error, Legend, Line, LineChart, Scale, SeriesLabelPosition, bars, chart,
 };
 
-use super::draw::{SOLVER_COLOURS, draw};
-use crate::figure::Figure;
+use super::colours::SOLVER_COLOURS;
 use crate::sample::Guesses;
 use crate::solver::{COMPARED, Solver};
 use crate::speed::Situation;
@@ -15,12 +14,8 @@ use crate::study::Study;
 const MOST: usize = 40;
 const SITUATIONS: [Situation; 2] = [Situation::Random, Situation::Warm];
 
-pub(super) fn figure(study: &Study) -> Result<Figure, Error> {
-    let caption = "Fig. 5. Left: share of guesses above the base that have led to any solution after so many \
-                   iterations (of the controller those of its last start; a cold start eliminates first). Right: median \
-                   time of a solution, with the ratio to Newton–Raphson's; from random guesses only where all three \
-                   reach a solution.";
-    draw("fig5_speed", caption.to_owned(), (1100, 460), |area| {
+pub(super) fn svg(study: &Study) -> Result<String, Error> {
+    masseter_charts::svg((1100, 460), |area| {
         let (left, right) = area.split_horizontally(580);
         iterations(study).draw_on(&left)?;
         times(&right, study)
@@ -36,7 +31,7 @@ fn iterations(study: &Study) -> LineChart {
             solved += counts.get(iterations).copied().unwrap_or(0);
             (iterations as f64, 100.0 * solved as f64 / trials)
         });
-        Line::new(solver.short_name(), points.collect()).coloured(colour)
+        Line::new(solver.short_name, points.collect()).coloured(colour)
     };
     LineChart {
         title: "Solved within so many iterations".to_owned(),

@@ -2,9 +2,8 @@
 
 use masseter_charts::{Axis, Error, Legend, Line, LineChart, Scale, SeriesLabelPosition};
 
-use super::draw::{SOLVER_COLOURS, draw};
-use crate::figure::Figure;
-use crate::pairs::{Course, Disagreement, Pair, Pairs};
+use super::colours::SOLVER_COLOURS;
+use crate::pairs::{Course, Disagreement, Trace};
 
 /// Iterations shown.
 const ITERATIONS: usize = 40;
@@ -13,61 +12,32 @@ const LAST: usize = 20;
 /// Errors below this are drawn there: they are zero but for rounding, cm².
 const LEAST_CM2: f64 = 1e-30;
 
-pub(super) fn figures(pairs: &Pairs) -> Result<Vec<Figure>, Error> {
-    pairs.all().into_iter().map(figure).collect()
-}
-
-fn caption(Disagreement { title, clearest, share, .. }: &Disagreement) -> String {
-    match clearest {
-        Some(pair) => {
-            format!("{title}. {}; {} of guesses above the base do so.", guess(pair), share.percent())
-        }
-        None => format!("{title}: no guess of this run does so."),
-    }
-}
-
-fn guess(pair: &Pair) -> String {
-    let list = |values: &[f64], scale: f64| {
-        values.iter().map(|value| format!("{:.1}", value * scale)).collect::<Vec<_>>().join(", ")
-    };
-    format!(
-        "d = ({}) mm, l = ({}) mm, guess θ = ({})°",
-        list(&pair.actuators.slide_m, 1e3),
-        list(&pair.actuators.leg_m, 1e3),
-        list(&pair.guess_rad, 1f64.to_degrees())
-    )
-}
-
 /// The error over the iterations. Beside an oscillation, which is nearly a flat line there, a panel shows its last cycles.
-fn figure(disagreement: &Disagreement) -> Result<Figure, Error> {
-    let oscillation = disagreement.clearest.as_ref().filter(|_| disagreement.newton == Course::Oscillates);
+pub(super) fn svg(disagreement: &Disagreement) -> Result<String, Error> {
+    let oscillation =
+        disagreement.clearest.as_ref().filter(|_| disagreement.courses[1] == Course::Oscillates);
     let width = if oscillation.is_some() { 1140 } else { 760 };
-    draw(disagreement.name, caption(disagreement), (width, 440), |area| {
+    masseter_charts::svg((width, 440), |area| {
         let Some(pair) = oscillation else { return course(disagreement).draw_on(area) };
         let (left, right) = area.split_horizontally(690);
         course(disagreement).draw_on(&left)?;
-        last_cycles(&pair.newton_cm2).draw_on(&right)
+        last_cycles(&pair.traces[1].errors_cm2).draw_on(&right)
     })
 }
 
 fn course(disagreement: &Disagreement) -> LineChart {
-    let line = |name, errors: &[f64], colour| {
-        let shown = errors.iter().take(ITERATIONS + 1).enumerate();
+    let line = |((name, trace), colour): ((_, &Trace), _)| {
+        let shown = trace.errors_cm2.iter().take(ITERATIONS + 1).enumerate();
         let points = shown.map(|(at, error)| (at as f64, error.max(LEAST_CM2)));
         Line::new(name, points.collect()).coloured(colour).marked()
     };
-    let [published, newton, _] = SOLVER_COLOURS;
-    let lines = disagreement.clearest.as_ref().map_or_else(Vec::new, |pair| {
-        vec![
-            line("paper's solver", &pair.published_cm2, published),
-            line("Newton–Raphson", &pair.newton_cm2, newton),
-        ]
-    });
+    let traces = disagreement.clearest.iter().flat_map(|pair| &pair.traces);
+    let named = ["paper's solver", "Newton–Raphson"].into_iter().zip(traces);
     LineChart {
         title: disagreement.title.to_owned(),
         x: Axis::new("iteration", Scale::Linear, [0.0, ITERATIONS as f64]),
         y: Axis::fitted("error f₁² + f₂² + f₃², cm²", Scale::Log).including(1.0),
-        lines,
+        lines: named.zip(SOLVER_COLOURS).map(line).collect(),
         limits: Vec::new(),
         legend: Legend::Inside(SeriesLabelPosition::MiddleRight),
     }

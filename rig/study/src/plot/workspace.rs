@@ -3,12 +3,10 @@
 use masseter_charts::{Area, Axis, ColourScale, Error, Key, LegendEntry, Scale, cells, chart, legend};
 use plotters::prelude::*;
 
-use super::draw::draw;
-use crate::figure::Figure;
 use crate::motions::Motion;
 use crate::share::quantile;
 use crate::study::Study;
-use crate::workspace::{Coordinate, Map, PoseQuality};
+use crate::workspace::{Map, PoseQuality};
 
 /// Of the motions: the default scenario's, the other generators', the one given.
 const MOTIONS: [RGBColor; 6] = [
@@ -21,66 +19,33 @@ const MOTIONS: [RGBColor; 6] = [
 ];
 
 /// What a map's colours mean.
-struct Measure {
-    caption: &'static str,
-    label: &'static str,
-    value: fn(&PoseQuality) -> f64,
+type Measure = (&'static str, fn(&PoseQuality) -> f64);
+const CONDITION: Measure = ("condition number", |quality| quality.condition);
+const SINGULARITY: Measure = ("regular within, °", |quality| quality.regular_within_deg);
+const SEPARATION: Measure = ("next solution, °", |quality| quality.separation_deg);
+
+pub(super) fn figures(study: &Study) -> Result<Vec<(&'static str, String)>, Error> {
+    let [xz, yz, roll_pitch, yaw_pitch] = &study.maps;
+    let figures = [
+        ("workspace_translation", CONDITION, [xz, yz]),
+        ("workspace_orientation", CONDITION, [roll_pitch, yaw_pitch]),
+        ("workspace_singularity", SINGULARITY, [xz, yz]),
+        ("workspace_separation", SEPARATION, [xz, yz]),
+    ];
+    figures.into_iter().map(|(name, measure, maps)| Ok((name, svg(study, measure, maps)?))).collect()
 }
 
-const CONDITION: Measure = Measure {
-    caption: "conditioning (condition number of the 6×6 Jacobian, turns taken at the platform's side)",
-    label: "condition number",
-    value: |quality| quality.condition,
-};
-const SINGULARITY: Measure = Measure {
-    caption: "distance to a singularity (change of the leg angles within which the Jacobian is proven regular)",
-    label: "regular within, °",
-    value: |quality| quality.regular_within_deg,
-};
-const SEPARATION: Measure = Measure {
-    caption: "distance to the next other solution of the same input (largest difference of any leg's angle)",
-    label: "next solution, °",
-    value: |quality| quality.separation_deg,
-};
-
-pub(super) fn figures(study: &Study) -> Result<Vec<Figure>, Error> {
-    let [xz, yz, roll_pitch, yaw_pitch] = &study.maps[..] else { return Ok(Vec::new()) };
-    Ok(vec![
-        figure(study, "workspace_translation", "Where the platform can go", &CONDITION, [xz, yz])?,
-        figure(
-            study,
-            "workspace_orientation",
-            "How the platform can turn",
-            &CONDITION,
-            [roll_pitch, yaw_pitch],
-        )?,
-        figure(study, "workspace_singularity", "Where the platform can go", &SINGULARITY, [xz, yz])?,
-        figure(study, "workspace_separation", "Where the platform can go", &SEPARATION, [xz, yz])?,
-    ])
-}
-
-fn figure(
-    study: &Study,
-    name: &'static str,
-    what: &str,
-    measure: &Measure,
-    maps: [&Map; 2],
-) -> Result<Figure, Error> {
-    let caption = format!(
-        "{what} within the strokes, with {}. White: out of reach. The other coordinates are those of the neutral \
-         pose; the jaw's motions are projections, which leave the slice in the other coordinates.",
-        measure.caption
-    );
-    draw(name, caption, (1140, 554), |area| {
+fn svg(study: &Study, (label, value): Measure, maps: [&Map; 2]) -> Result<String, Error> {
+    masseter_charts::svg((1140, 554), |area| {
         let (names, content) = area.split_vertically(34);
         let entry =
             |(motion, colour): (&Motion, _)| LegendEntry { name: motion.name.clone(), colour, key: Key::Box };
         let motions: Vec<_> = study.motions.iter().zip(MOTIONS).map(entry).collect();
         legend(&names, &motions, MOTIONS.len())?;
         let (maps_area, bar) = content.split_horizontally(1030);
-        let colours = ColourScale::new(measure.label, range(maps, measure));
+        let colours = ColourScale::new(label, range(maps, value));
         for (panel, map) in maps_area.split_evenly((1, 2)).iter().zip(maps) {
-            draw_map(panel, study, map, measure, &colours)?;
+            draw_map(panel, study, map, |quality| colours.colour(value(quality)))?;
         }
         colours.draw(&bar)
     })
@@ -90,19 +55,16 @@ fn draw_map(
     area: &Area,
     study: &Study,
     map: &Map,
-    measure: &Measure,
-    colours: &ColourScale,
+    colour: impl Fn(&PoseQuality) -> RGBColor,
 ) -> Result<(), Error> {
-    let axis = |coordinate: Coordinate| Axis::new(coordinate.label(), Scale::Linear, coordinate.range());
-    let mut chart = chart(area, "", axis(map.slice.across), axis(map.slice.up))?;
-    cells(&mut chart, map.side, |cell| {
-        map.poses[cell].as_ref().map(|quality| colours.colour((measure.value)(quality)))
-    })?;
+    let [across, up] = map.slice.axes;
+    let [x, y] = [across, up].map(|axis| Axis::new(axis.label, Scale::Linear, axis.range));
+    let mut chart = chart(area, "", x, y)?;
+    cells(&mut chart, map.side, |cell| map.poses[cell].as_ref().map(&colour))?;
     // The last first: a wide opening covers no smaller one on the same path.
     let motions: Vec<_> = study.motions.iter().zip(MOTIONS).collect();
     for (motion, colour) in motions.into_iter().rev() {
-        let points: Vec<_> =
-            motion.poses().map(|pose| (map.slice.across.at(&pose), map.slice.up.at(&pose))).collect();
+        let points: Vec<_> = motion.poses().map(|pose| (across.at(&pose), up.at(&pose))).collect();
         // A dark rim keeps the path visible on every colour of the map.
         for style in [BLACK.stroke_width(4), colour.stroke_width(2)] {
             chart.draw_series(LineSeries::new(points.iter().copied(), style))?;
@@ -112,10 +74,8 @@ fn draw_map(
 }
 
 /// From the least value to the 90th percentile: the highest values would leave the others without contrast.
-fn range(maps: [&Map; 2], measure: &Measure) -> [f64; 2] {
-    let poses = maps.into_iter().flat_map(|map| map.poses.iter().flatten());
-    let values: Vec<f64> =
-        poses.map(|quality| (measure.value)(quality)).filter(|value| value.is_finite()).collect();
-    let [low, high] = [0.0, 0.9].map(|share| quantile(values.clone(), share));
+fn range(maps: [&Map; 2], value: fn(&PoseQuality) -> f64) -> [f64; 2] {
+    let values = || maps.into_iter().flat_map(|map| map.poses.iter().flatten()).map(value);
+    let [low, high] = [0.0, 0.9].map(|share| quantile(values().filter(|value| value.is_finite()), share));
     if low < high { [low, high] } else { [0.0, 1.0] }
 }

@@ -3,9 +3,11 @@
 
 use masseter_controller::kinematics::uniqueness::InputBox;
 use masseter_controller::kinematics::{Solution, Solutions};
-use masseter_shared::geometry::{AXES, Actuators, LEGS, Mechanism};
+use masseter_shared::geometry::{AXES, Actuators, Mechanism};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
+
+use crate::multiplicity::{CONDITIONS, ORIENTED};
 
 /// Inputs from which the search goes uphill.
 const CLIMBS: usize = 40;
@@ -63,12 +65,7 @@ pub fn search(mechanism: &Mechanism, region: &InputBox, inputs: usize, seed: u64
 /// The determinants of an input's solutions that meet the paper's conditions, greatest first.
 fn determinants(mechanism: &Mechanism, axes_m: [f64; AXES]) -> Vec<f64> {
     let Ok(solutions) = Solutions::new(mechanism, &Actuators::from_axes(axes_m)) else { return Vec::new() };
-    let meets_conditions = |solution: &&Solution| {
-        let assembly = &solution.assembly;
-        assembly.legs_above_base == [true; LEGS]
-            && assembly.hinges_below_platform == [true; LEGS]
-            && assembly.corners_in_order
-    };
+    let meets_conditions = |solution: &&Solution| (CONDITIONS[ORIENTED].admit)(&solution.assembly);
     let mut determinants: Vec<f64> =
         solutions.iter().filter(meets_conditions).map(|one| one.determinant).collect();
     determinants.sort_by(|a, b| b.total_cmp(a));
