@@ -13,7 +13,7 @@ const ELEMENTS: [&str; 15] = [
     "verdict",
     "checks",
     "mechanism",
-    "film",
+    "animation",
     "motion",
     "error",
     "slides",

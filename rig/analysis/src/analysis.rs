@@ -4,7 +4,7 @@ use masseter_recording::{Damage, Recorded};
 use masseter_shared::config::Scenario;
 use masseter_shared::messages::codes::ControllerState;
 use masseter_shared::messages::tap::{self, TapError};
-use masseter_shared::messages::{Event, FrameTap, Message, Reading, State, Truth};
+use masseter_shared::messages::{FrameTap, Message, Reading, State, Truth};
 
 use crate::attribution::OverrunAttribution;
 use crate::code::Code;
@@ -14,7 +14,7 @@ use crate::freshness::Freshness;
 use crate::intervals::Intervals;
 use crate::longest_cycles::LongestCycles;
 use crate::outage::OutageWatch;
-use crate::over_time::Watch;
+use crate::over_time::{CONTROLLER, PLANT, Watch};
 use crate::response::Responses;
 use crate::sequence::SequenceCheck;
 use crate::skips::{Counters, Skips};
@@ -69,10 +69,7 @@ impl Analysis {
             period_ns,
             intervals: Intervals::new(period_ns),
             longest_cycles: LongestCycles::default(),
-            tracking: Tracking::new(
-                if is_emulated { PoseSource::Truth } else { PoseSource::Estimate },
-                period_ns,
-            ),
+            tracking: Tracking::new(if is_emulated { PoseSource::Truth } else { PoseSource::Estimate }),
             sequence: SequenceCheck::default(),
             frames: Vec::new(),
             events: Vec::new(),
@@ -106,7 +103,7 @@ impl Analysis {
             Recorded::State(state) => self.state(state),
             Recorded::Truth(truth) => self.truth(truth),
             Recorded::Frame(frame) => self.frame(frame)?,
-            Recorded::Event(event) => self.event(event),
+            Recorded::Event(event) => self.events.push(event.into()),
             Recorded::Machine(machine) => self.longest_cycles.machine(machine),
         }
         Ok(())
@@ -115,7 +112,7 @@ impl Analysis {
     fn reading(&mut self, reading: &Reading) {
         self.intervals.reading(reading);
         self.longest_cycles.reading(reading);
-        self.watch.reading(reading);
+        self.watch.wake_up(PLANT, reading.due_ns, reading.woke_ns);
         self.outage.reading(reading);
         self.plant_skips.take(&Counters::from(reading), self.period_ns);
         self.first_sample_ns.get_or_insert(reading.sampled_ns);
@@ -126,7 +123,7 @@ impl Analysis {
         let is_fresh = self.freshness.take(state);
         self.intervals.state(state, is_fresh);
         self.longest_cycles.state(state, is_fresh);
-        self.watch.state(state);
+        self.watch.wake_up(CONTROLLER, state.due_ns, state.woke_ns);
         self.outage.state(state);
         if is_fresh {
             self.tracking.solution(state);
@@ -154,10 +151,6 @@ impl Analysis {
         Ok(())
     }
 
-    fn event(&mut self, event: &Event) {
-        self.events.push(event.into());
-    }
-
     /// The figures of all messages so far. `cut_short` and `damage` are what the recording itself lacks, as its
     /// [`Reader`](masseter_recording::Reader) found them.
     pub fn finish(mut self, cut_short: bool, damage: &[Damage]) -> Figures {
@@ -172,9 +165,9 @@ impl Analysis {
             cycles: self.cycles,
             duration_s: duration_ns as f64 / 1e9,
             overrun_attribution: OverrunAttribution::new(&[&self.controller_skips, &self.plant_skips]),
-            controller_skips: self.controller_skips.figures(),
-            plant_skips: self.plant_skips.figures(),
-            readings: self.freshness.figures(),
+            controller_skips: self.controller_skips.figures,
+            plant_skips: self.plant_skips.figures,
+            readings: self.freshness.figures,
             final_state: self.final_state,
             outage: self.outage.finish(self.period_ns),
             tracking,

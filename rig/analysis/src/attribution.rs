@@ -35,12 +35,12 @@ pub struct OverrunAttribution {
 impl OverrunAttribution {
     /// Counts the processes of a run together, since they share the machine. None if no stretch of work cost a deadline.
     pub(super) fn new(processes: &[&Skips]) -> Option<Self> {
-        let least_ns = processes.iter().filter_map(|skips| skips.shortest_costly_ns()).min()?;
+        let least_ns = processes.iter().filter_map(|skips| skips.shortest_costly_ns).min()?;
         let counts = processes.iter().map(|skips| skips.as_long_as(least_ns));
         let (while_waiting, while_working) =
             counts.fold((0, 0), |sum, count| (sum.0 + count.0, sum.1 + count.1));
         let sum_ns = |part: fn(&SkipFigures) -> u64| -> u64 {
-            processes.iter().map(|skips| part(&skips.figures())).sum()
+            processes.iter().map(|skips| part(&skips.figures)).sum()
         };
         let worked_ns = sum_ns(|figures| figures.worked_ns.saturating_sub(figures.overlong_ns));
         let spun_ns = sum_ns(|figures| figures.spun_ns);

@@ -21,7 +21,7 @@ pub struct ReadingFigures {
 #[derive(Debug, Default)]
 pub(super) struct Freshness {
     last: u64,
-    figures: ReadingFigures,
+    pub(super) figures: ReadingFigures,
 }
 
 impl Freshness {
@@ -38,10 +38,6 @@ impl Freshness {
         *count += 1;
         self.last = self.last.max(state.reading_cycle);
         is_fresh
-    }
-
-    pub(super) fn figures(&self) -> ReadingFigures {
-        self.figures
     }
 }
 
@@ -69,6 +65,6 @@ mod tests {
             assert_eq!(freshness.take(&state), is_fresh, "cycle {cycle}");
         }
         let expected = ReadingFigures { in_time: 3, late: 1, none: 2, before_first: 2 };
-        assert_eq!(freshness.figures(), expected);
+        assert_eq!(freshness.figures, expected);
     }
 }

@@ -6,31 +6,48 @@
 use masseter_shared::messages::{Command, Reading, State};
 
 use super::answer::{Answer, Answers};
-use super::interval::Interval;
-use super::join::{ByCycle, Join};
+use super::by_cycle::ByCycle;
 use super::measured::{IntervalFigures, Measured};
 
-/// What is known of a reading's cycle when a command answers it.
+/// An interval that a cycle passes through.
 #[derive(Debug, Clone, Copy)]
-struct Sampled {
-    sampled_ns: u64,
-    /// From the plant's wake-up to the publication of the reading, ns.
-    exchange_ns: u64,
+enum Interval {
+    PlantWakeUp,
+    PlantWakeUpCorrected,
+    ProcessData,
+    ControllerWakeUp,
+    ControllerWakeUpCorrected,
+    ReadingTransport,
+    ForwardKinematics,
+    Control,
+    ControllerCycle,
+    CommandTransport,
+    CommandToWire,
+    SampleToWire,
+    /// From the plant's wake-up to the reading's publication, and from the reading's reception to the command's: both
+    /// processes and the wires, without the waits of the time table.
+    RoundTrip,
 }
 
-#[derive(Debug, Clone, Copy)]
-struct Received {
-    received_ns: u64,
-    reading_cycle: u64,
-}
+/// The names of the intervals, each at the place that is its number.
+const NAMES: [&str; Interval::RoundTrip as usize + 1] = [
+    "plant wake-up",
+    "plant wake-up corrected",
+    "process data",
+    "controller wake-up",
+    "controller wake-up corrected",
+    "reading transport",
+    "forward kinematics",
+    "control",
+    "controller cycle",
+    "command transport",
+    "command to wire",
+    "sample to wire",
+    "round trip",
+];
 
-#[derive(Debug, Clone, Copy)]
-struct Published {
-    published_ns: u64,
-    reading_cycle: u64,
-}
-
-/// All intervals of a run, and the messages between which they lie, until they are joined.
+/// All intervals of a run, and the latest messages, between which they lie. The later message completes an interval,
+/// whichever that is.
 #[derive(Debug)]
 pub(super) struct Intervals {
     period_ns: u64,
@@ -38,42 +55,34 @@ pub(super) struct Intervals {
     plant_skipped: Skipped,
     controller_skipped: Skipped,
     answers: Answers,
-    /// By the plant's cycle. A reading is recorded before the one that answers it: no join is needed.
-    samples: ByCycle<Sampled>,
-    /// Publication and reception of a reading, by the plant's cycle.
-    transports: Join<u64, u64>,
-    /// Reception of the reading and publication of the command, by the controller's cycle.
-    controller_cycles: Join<u64, u64>,
-    /// By the controller's cycle.
-    commands: Join<Published, Answer>,
-    /// By the controller's cycle.
-    round_trips: Join<Received, Answer>,
+    /// By the plant's cycle.
+    readings: ByCycle<Reading>,
+    /// Reception of a reading, by the plant's cycle.
+    received_ns: ByCycle<u64>,
+    /// States with a fresh reading, commands, and their answers, by the controller's cycle.
+    states: ByCycle<State>,
+    commands: ByCycle<Command>,
+    answered: ByCycle<Answer>,
 }
 
 impl Intervals {
     pub(super) fn new(period_ns: u64) -> Self {
         Self {
             period_ns,
-            measured: Interval::ALL.iter().map(|interval| Measured::new(interval.name())).collect(),
+            measured: NAMES.map(Measured::new).into(),
             plant_skipped: Skipped::default(),
             controller_skipped: Skipped::default(),
             answers: Answers::default(),
-            samples: ByCycle::default(),
-            transports: Join::default(),
-            controller_cycles: Join::default(),
-            commands: Join::default(),
-            round_trips: Join::default(),
+            readings: ByCycle::default(),
+            received_ns: ByCycle::default(),
+            states: ByCycle::default(),
+            commands: ByCycle::default(),
+            answered: ByCycle::default(),
         }
     }
 
     fn add(&mut self, interval: Interval, from_ns: u64, to_ns: u64) {
         self.measured[interval as usize].add(to_ns.saturating_sub(from_ns), to_ns);
-    }
-
-    fn add_joined(&mut self, interval: Interval, ends: Option<(u64, u64)>) {
-        if let Some((from_ns, to_ns)) = ends {
-            self.add(interval, from_ns, to_ns);
-        }
     }
 
     /// A wake-up, and the deadlines skipped before it: each was due a period earlier than the next.
@@ -90,10 +99,10 @@ impl Intervals {
         if reading.complete_ns > 0 {
             self.add(Interval::ProcessData, reading.sampled_ns, reading.complete_ns);
         }
-        let exchange_ns = reading.published_ns.saturating_sub(reading.woke_ns);
-        self.samples.insert(reading.cycle, Sampled { sampled_ns: reading.sampled_ns, exchange_ns });
-        let transport = self.transports.left(reading.cycle, reading.published_ns);
-        self.add_joined(Interval::ReadingTransport, transport);
+        if let Some(received_ns) = self.received_ns.get(reading.cycle) {
+            self.add(Interval::ReadingTransport, reading.published_ns, received_ns);
+        }
+        self.readings.insert(reading.cycle, *reading);
         if let Some(answer) = self.answers.take(reading) {
             self.answer(answer);
         }
@@ -103,10 +112,13 @@ impl Intervals {
         if let Some(sent_ns) = answer.sent_ns {
             self.add(Interval::CommandToWire, answer.received_ns, sent_ns);
         }
-        let answered = self.commands.right(answer.cycle, answer);
-        self.answered(answered);
-        let round_trip = self.round_trips.right(answer.cycle, answer);
-        self.round_trip(round_trip);
+        if let Some(command) = self.commands.get(answer.cycle) {
+            self.command_and_answer(&command, &answer);
+        }
+        if let Some(state) = self.states.get(answer.cycle) {
+            self.round_trip(&state, &answer);
+        }
+        self.answered.insert(answer.cycle, answer);
     }
 
     /// `is_fresh`: the state's reading is used for the first time.
@@ -117,38 +129,44 @@ impl Intervals {
         if !is_fresh {
             return;
         }
-        let State { cycle, reading_cycle, received_ns, .. } = *state;
-        self.add(Interval::ForwardKinematics, received_ns, state.solved_ns);
+        self.add(Interval::ForwardKinematics, state.received_ns, state.solved_ns);
         self.add(Interval::Control, state.solved_ns, state.commanded_ns);
-        let transport = self.transports.right(reading_cycle, received_ns);
-        self.add_joined(Interval::ReadingTransport, transport);
-        let controller_cycle = self.controller_cycles.left(cycle, received_ns);
-        self.add_joined(Interval::ControllerCycle, controller_cycle);
-        let round_trip = self.round_trips.left(cycle, Received { received_ns, reading_cycle });
-        self.round_trip(round_trip);
+        if let Some(reading) = self.readings.get(state.reading_cycle) {
+            self.add(Interval::ReadingTransport, reading.published_ns, state.received_ns);
+        }
+        if let Some(command) = self.commands.get(state.cycle) {
+            self.add(Interval::ControllerCycle, state.received_ns, command.published_ns);
+        }
+        if let Some(answer) = self.answered.get(state.cycle) {
+            self.round_trip(state, &answer);
+        }
+        self.received_ns.insert(state.reading_cycle, state.received_ns);
+        self.states.insert(state.cycle, *state);
     }
 
     pub(super) fn command(&mut self, command: &Command) {
-        let Command { cycle, published_ns, reading_cycle, .. } = *command;
-        let controller_cycle = self.controller_cycles.right(cycle, published_ns);
-        self.add_joined(Interval::ControllerCycle, controller_cycle);
-        let answered = self.commands.left(cycle, Published { published_ns, reading_cycle });
-        self.answered(answered);
+        if let Some(state) = self.states.get(command.cycle) {
+            self.add(Interval::ControllerCycle, state.received_ns, command.published_ns);
+        }
+        if let Some(answer) = self.answered.get(command.cycle) {
+            self.command_and_answer(command, &answer);
+        }
+        self.commands.insert(command.cycle, *command);
     }
 
-    fn answered(&mut self, joined: Option<(Published, Answer)>) {
-        let Some((published, answer)) = joined else { return };
-        self.add(Interval::CommandTransport, published.published_ns, answer.received_ns);
-        if let (Some(sample), Some(sent_ns)) = (self.samples.get(published.reading_cycle), answer.sent_ns) {
-            self.add(Interval::SampleToWire, sample.sampled_ns, sent_ns);
+    fn command_and_answer(&mut self, command: &Command, answer: &Answer) {
+        self.add(Interval::CommandTransport, command.published_ns, answer.received_ns);
+        if let (Some(reading), Some(sent_ns)) = (self.readings.get(command.reading_cycle), answer.sent_ns) {
+            self.add(Interval::SampleToWire, reading.sampled_ns, sent_ns);
         }
     }
 
-    fn round_trip(&mut self, joined: Option<(Received, Answer)>) {
-        let Some((received, answer)) = joined else { return };
-        if let Some(sample) = self.samples.get(received.reading_cycle) {
-            let answered_ns = answer.received_ns.saturating_sub(received.received_ns);
-            let both_ns = answered_ns.saturating_add(sample.exchange_ns);
+    /// A reading is recorded before the one that answers it.
+    fn round_trip(&mut self, state: &State, answer: &Answer) {
+        if let Some(reading) = self.readings.get(state.reading_cycle) {
+            let exchange_ns = reading.published_ns.saturating_sub(reading.woke_ns);
+            let answered_ns = answer.received_ns.saturating_sub(state.received_ns);
+            let both_ns = answered_ns.saturating_add(exchange_ns);
             self.measured[Interval::RoundTrip as usize].add(both_ns, answer.received_ns);
         }
     }

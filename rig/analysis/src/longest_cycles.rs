@@ -8,11 +8,9 @@ use masseter_shared::messages::{Command, Machine, Reading, State};
 use serde::Serialize;
 
 use super::answer::{Answer, Answers};
-use super::cycle_path::{Computed, CyclePath, Parts, Sampled, Sent};
-use super::hops::{Hop, TypicalHops};
-use super::join::ByCycle;
+use super::by_cycle::ByCycle;
+use super::hops::{CyclePath, TypicalHops, passed_ns};
 use super::kernel_counts::{KernelCounts, KernelSamples};
-use super::stalls::Stalls;
 
 /// Cycles kept.
 const WORST: usize = 10;
@@ -30,7 +28,7 @@ pub struct WorstCycle {
     /// overtaken, ns.
     pub total_ns: u64,
     /// The hop furthest above its median.
-    pub hop: Hop,
+    pub hop: &'static str,
     /// How long that hop took, ns.
     pub hop_ns: u64,
     /// How long it takes in half of all cycles, ns.
@@ -43,10 +41,24 @@ pub struct WorstCycle {
     pub around: KernelCounts,
 }
 
+/// A message, and its process's counter of stalls at the deadline of its cycle.
+type Counted<M> = (M, u64);
+
+/// The parts of a controller's cycle that were found so far.
+#[derive(Debug, Clone, Copy, Default)]
+struct Parts {
+    state: Option<Counted<State>>,
+    published_ns: Option<u64>,
+    /// Reception of a command and its end on the wire, with the counter at the deadline of the reading that reports them.
+    sent_ns: Option<Counted<[u64; 2]>>,
+    /// The controller's counter at its next deadline.
+    stalled_when_next_due_ns: Option<u64>,
+}
+
 /// Follows every cycle and keeps the longest.
 #[derive(Debug, Default)]
 pub(super) struct LongestCycles {
-    samples: ByCycle<Sampled>,
+    readings: ByCycle<Counted<Reading>>,
     parts: ByCycle<Parts>,
     typical: TypicalHops,
     longest: Vec<CyclePath>,
@@ -63,19 +75,15 @@ impl LongestCycles {
         let late_ns = reading.woke_ns.saturating_sub(reading.due_ns);
         let stalled_ns = self.plant_stalls.when_due_ns(reading.stalled_ns, late_ns);
         if reading.complete_ns > 0 {
-            self.samples.insert(reading.cycle, Sampled::new(reading, stalled_ns));
+            self.readings.insert(reading.cycle, (*reading, stalled_ns));
         }
-        if let Some(Answer { cycle, received_ns, sent_ns: Some(sent_ns) }) = self.answers.take(reading) {
-            let sent = Sent { received_ns, sent_ns, stalled_when_next_due_ns: stalled_ns };
-            self.sent(cycle, sent);
-        }
-    }
-
-    /// The command of this cycle went out, and ends the wait for those that it overtook.
-    fn sent(&mut self, cycle: u64, sent: Sent) {
+        let Some(Answer { cycle, received_ns, sent_ns: Some(sent_ns) }) = self.answers.take(reading) else {
+            return;
+        };
+        // The command also ends the wait for those that it overtook.
         let first = self.last_sent.replace(cycle).map_or(cycle, |last| last + 1);
         for ended in first.max(cycle.saturating_sub(OVERTAKEN))..=cycle {
-            self.add(ended, |parts| parts.sent = Some(sent));
+            self.add(ended, |parts| parts.sent_ns = Some(([received_ns, sent_ns], stalled_ns)));
         }
     }
 
@@ -87,7 +95,7 @@ impl LongestCycles {
             self.add(last_cycle, |parts| parts.stalled_when_next_due_ns = Some(stalled_ns));
         }
         if is_fresh {
-            self.add(state.cycle, |parts| parts.computed = Some(Computed::new(state, stalled_ns)));
+            self.add(state.cycle, |parts| parts.state = Some((*state, stalled_ns)));
         }
     }
 
@@ -103,51 +111,73 @@ impl LongestCycles {
     fn add(&mut self, cycle: u64, put: impl FnOnce(&mut Parts)) {
         let mut parts = self.parts.take(cycle).unwrap_or_default();
         put(&mut parts);
-        match self.path(cycle, &parts) {
-            Some(path) => self.keep(path),
+        match self.path(&parts) {
+            Some(path) => self.keep(&path),
             None => self.parts.insert(cycle, parts),
         }
     }
 
-    fn path(&self, cycle: u64, parts: &Parts) -> Option<CyclePath> {
-        let sampled = self.samples.get(parts.computed?.reading_cycle)?;
-        CyclePath::new(cycle, &sampled, parts)
+    /// None while a part is missing.
+    fn path(&self, parts: &Parts) -> Option<CyclePath> {
+        let (state, controller_stalled_ns) = parts.state?;
+        let (reading, plant_stalled_ns) = self.readings.get(state.reading_cycle)?;
+        let ([received_ns, sent_ns], plant_stalled_next_ns) = parts.sent_ns?;
+        let plant_ns = passed_ns(plant_stalled_ns, plant_stalled_next_ns);
+        let controller_ns = passed_ns(controller_stalled_ns, parts.stalled_when_next_due_ns?);
+        let (published_ns, stalled_ns) = (parts.published_ns?, plant_ns.saturating_add(controller_ns));
+        Some(CyclePath { reading, state, published_ns, received_ns, sent_ns, stalled_ns })
     }
 
-    fn keep(&mut self, path: CyclePath) {
-        self.typical.take(&path.hops_ns);
-        let place = self.longest.partition_point(|worse| worse.total_ns >= path.total_ns);
+    fn keep(&mut self, path: &CyclePath) {
+        self.typical.take(path);
+        let place = self.longest.partition_point(|worse| worse.total_ns() >= path.total_ns());
         if place < WORST {
-            self.longest.insert(place, path);
+            self.longest.insert(place, *path);
             self.longest.truncate(WORST);
         }
     }
 
     /// The worst cycles, longest first.
     pub(super) fn finish(self) -> Vec<WorstCycle> {
-        self.longest.iter().map(|path| self.worst_cycle(path)).collect()
+        let worst_cycle = |path: &CyclePath| {
+            let hop = self.typical.furthest_above_median(path);
+            let (due_ns, total_ns) = (path.reading.due_ns, path.total_ns());
+            WorstCycle {
+                cycle: path.state.cycle,
+                due_ns,
+                total_ns,
+                hop: hop.name,
+                hop_ns: hop.took_ns,
+                hop_p50_ns: hop.p50_ns,
+                stalled_ns: path.stalled_ns,
+                around: self.kernel.around(due_ns, due_ns.saturating_add(total_ns)),
+            }
+        };
+        self.longest.iter().map(worst_cycle).collect()
     }
+}
 
-    fn worst_cycle(&self, path: &CyclePath) -> WorstCycle {
-        let CyclePath { cycle, due_ns, total_ns, stalled_ns, .. } = *path;
-        let hop = self.typical.furthest_above_median(&path.hops_ns);
-        WorstCycle {
-            cycle,
-            due_ns,
-            total_ns,
-            hop: hop.hop,
-            hop_ns: hop.took_ns,
-            hop_p50_ns: hop.p50_ns,
-            stalled_ns,
-            around: self.kernel.around(due_ns, due_ns.saturating_add(total_ns)),
-        }
+/// Computes a process's counter of stalls at a deadline from the counter in its message, which is that at the wake-up.
+#[derive(Debug, Default)]
+struct Stalls {
+    counted_ns: u64,
+}
+
+impl Stalls {
+    /// A wake-up that was late was so because of the last stall before it: as much of the growth belongs to the cycle
+    /// that begins, the rest to the one before.
+    fn when_due_ns(&mut self, counted_ns: u64, late_ns: u64) -> u64 {
+        let growth_ns = counted_ns.saturating_sub(std::mem::replace(&mut self.counted_ns, counted_ns));
+        counted_ns - growth_ns.min(late_ns)
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::hops::HopTimes;
+    use super::super::hops::hop_names;
     use super::*;
+
+    type HopTimes = [u64; 10];
 
     const PERIOD_NS: u64 = 1_000_000;
     const SYNC_NS: u64 = 48_000;
@@ -215,7 +245,7 @@ mod tests {
         for cycle in 1..100 {
             let mut hops_ns = TYPICAL_NS;
             // Every ninth cycle, one hop after the other; the later ones a little longer.
-            if cycle % 9 == 0 && cycle / 9 <= Hop::ALL.len() as u64 {
+            if cycle % 9 == 0 && cycle / 9 <= TYPICAL_NS.len() as u64 {
                 hops_ns[cycle as usize / 9 - 1] += 200_000 + cycle * 1000;
             }
             rig.cycle(cycle, hops_ns);
@@ -225,7 +255,7 @@ mod tests {
         assert!(worst.windows(2).all(|pair| pair[0].total_ns >= pair[1].total_ns));
         for told in worst {
             let hop = told.cycle as usize / 9 - 1;
-            let expected = (Hop::ALL[hop], TYPICAL_NS[hop] + 200_000 + told.cycle * 1000);
+            let expected = (hop_names().nth(hop).unwrap(), TYPICAL_NS[hop] + 200_000 + told.cycle * 1000);
             assert_eq!((told.hop, told.hop_ns), expected, "cycle {}", told.cycle);
             assert!(told.hop_p50_ns.abs_diff(TYPICAL_NS[hop]) <= TYPICAL_NS[hop] / 500, "{told:?}");
         }
@@ -270,7 +300,7 @@ mod tests {
         let reading = Reading { cycle: 10, command_received_ns, command_sent_ns, ..Default::default() };
         rig.longest.reading(&Reading { answers_cycle: 9, ..reading });
         let worst = rig.longest.finish();
-        assert_eq!((worst[0].cycle, worst[0].total_ns, worst[0].hop), (7, 3_500_000, Hop::CommandTransport));
+        assert_eq!((worst[0].cycle, worst[0].total_ns, worst[0].hop), (7, 3_500_000, "command transport"));
         assert_eq!(worst.len(), 7);
     }
 
@@ -286,5 +316,16 @@ mod tests {
         longest.state(&State { cycle: 9, reading_cycle: 7, ..Default::default() }, false);
         let worst = longest.finish();
         assert_eq!((worst[0].cycle, worst[0].due_ns, worst[0].total_ns), (8, 7_000_000, 1_900_000));
+    }
+
+    #[test]
+    fn a_stall_counts_before_a_deadline_but_for_what_made_the_wake_up_late() {
+        let mut stalls = Stalls::default();
+        // What was counted in a wake-up, how late that was, and what was counted at its deadline.
+        for (counted_ns, late_ns, when_due_ns) in
+            [(0, 20, 0), (300, 0, 300), (1000, 700, 300), (1000, 20, 1000), (1500, 400, 1100)]
+        {
+            assert_eq!(stalls.when_due_ns(counted_ns, late_ns), when_due_ns, "{counted_ns} ns");
+        }
     }
 }

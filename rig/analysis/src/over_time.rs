@@ -3,17 +3,11 @@
 use masseter_can::Tapped;
 use masseter_can::{Bitrate, wire};
 use masseter_shared::geometry::AXES;
-use masseter_shared::messages::{Reading, State, Truth};
+use masseter_shared::messages::Truth;
 
-use super::series::{Extremes, Merge, Series, Sums};
+use super::series::{Curve, Extremes, Series, Sums};
 
-/// A curve: seconds since the run's first SYNC, and values.
-pub type Curve = Vec<(f64, f64)>;
-
-/// Lowest and highest value of each stretch of time, as one curve that touches both.
-type Band = Curve;
-
-/// A run over time.
+/// A run over time: seconds since its first SYNC, and the lowest and the highest value of each stretch of time.
 #[derive(Debug, Clone, Default)]
 pub struct OverTime {
     /// The instant that curves count from, ns of the run's clock.
@@ -23,11 +17,11 @@ pub struct OverTime {
     /// Latest wake-up of the plant in each stretch, ns late.
     pub plant_late_ns: Curve,
     /// Position of each axis, m.
-    pub position_m: [Band; AXES],
+    pub position_m: [Curve; AXES],
     /// Velocity of each axis, m/s.
-    pub velocity_m_s: [Band; AXES],
+    pub velocity_m_s: [Curve; AXES],
     /// Force of each actuator, N.
-    pub force_n: [Band; AXES],
+    pub force_n: [Curve; AXES],
     /// Share of each bus in use, 0 to 1.
     pub bus_load: Vec<Curve>,
 }
@@ -43,8 +37,9 @@ pub(super) struct Watch {
     bitrate: Option<Bitrate>,
 }
 
-const CONTROLLER: usize = 0;
-const PLANT: usize = 1;
+/// Indices of the two processes.
+pub(super) const CONTROLLER: usize = 0;
+pub(super) const PLANT: usize = 1;
 
 impl Watch {
     /// For buses of this bit rate; without one there is no load.
@@ -56,14 +51,9 @@ impl Watch {
         time_ns.saturating_sub(*self.began_ns.get_or_insert(time_ns))
     }
 
-    pub(super) fn reading(&mut self, reading: &Reading) {
-        let since_ns = self.since(reading.due_ns);
-        self.late.at(since_ns).take(PLANT, reading.woke_ns.saturating_sub(reading.due_ns) as f64);
-    }
-
-    pub(super) fn state(&mut self, state: &State) {
-        let since_ns = self.since(state.due_ns);
-        self.late.at(since_ns).take(CONTROLLER, state.woke_ns.saturating_sub(state.due_ns) as f64);
+    pub(super) fn wake_up(&mut self, process: usize, due_ns: u64, woke_ns: u64) {
+        let since_ns = self.since(due_ns);
+        self.late.at(since_ns).take(process, woke_ns.saturating_sub(due_ns) as f64);
     }
 
     pub(super) fn truth(&mut self, truth: &Truth) {
@@ -84,7 +74,7 @@ impl Watch {
     }
 
     pub(super) fn finish(self) -> OverTime {
-        let bands = |quantity: usize| std::array::from_fn(|axis| band(&self.axes, quantity * AXES + axis));
+        let bands = |quantity: usize| std::array::from_fn(|axis| self.axes.band(quantity * AXES + axis));
         let buses = self.busy_ns.iter().map(|(_, sums)| sums.0.len()).max().unwrap_or(0);
         let full_ns = self.busy_ns.width_s() * 1e9;
         let load = |bus: usize| {
@@ -93,30 +83,14 @@ impl Watch {
         };
         OverTime {
             began_ns: self.began_ns.unwrap_or(0),
-            controller_late_ns: highest(&self.late, CONTROLLER),
-            plant_late_ns: highest(&self.late, PLANT),
+            controller_late_ns: self.late.highest(CONTROLLER),
+            plant_late_ns: self.late.highest(PLANT),
             position_m: bands(0),
             velocity_m_s: bands(1),
             force_n: bands(2),
             bus_load: (0..buses).map(load).collect(),
         }
     }
-}
-
-/// Highest value of each stretch of time.
-pub(super) fn highest<const N: usize>(series: &Series<Extremes<N>>, index: usize) -> Curve {
-    let points = series.iter().map(|(at_s, stretch)| (at_s, stretch.highest[index]));
-    points.filter(|(_, value)| value.is_finite()).collect()
-}
-
-pub(super) fn band<const N: usize>(series: &Series<Extremes<N>>, index: usize) -> Band
-where
-    Extremes<N>: Merge,
-{
-    let ends = series
-        .iter()
-        .flat_map(|(at_s, stretch)| [(at_s, stretch.lowest[index]), (at_s, stretch.highest[index])]);
-    ends.filter(|(_, value)| value.is_finite()).collect()
 }
 
 #[cfg(test)]

@@ -1,6 +1,9 @@
 //! Values over time in memory of a fixed size: the longer the run, the wider the stretches of time that share one value.
 
-/// Stretches or samples kept at most.
+/// A curve: seconds since the beginning, and values.
+pub type Curve = Vec<(f64, f64)>;
+
+/// Stretches kept at most.
 const MOST: usize = 1024;
 /// Width of the first stretches, ns.
 const FIRST_WIDTH_NS: u64 = 10_000_000;
@@ -62,6 +65,22 @@ impl<T: Merge> Series<T> {
     }
 }
 
+impl<const N: usize> Series<Extremes<N>> {
+    /// Highest value of each stretch.
+    pub(super) fn highest(&self, index: usize) -> Curve {
+        let points = self.iter().map(|(at_s, stretch)| (at_s, stretch.highest[index]));
+        points.filter(|(_, value)| value.is_finite()).collect()
+    }
+
+    /// Lowest and highest value of each stretch, as one curve that touches both.
+    pub(super) fn band(&self, index: usize) -> Curve {
+        let ends = |(at_s, stretch): (f64, &Extremes<N>)| {
+            [(at_s, stretch.lowest[index]), (at_s, stretch.highest[index])]
+        };
+        self.iter().flat_map(ends).filter(|(_, value)| value.is_finite()).collect()
+    }
+}
+
 /// Smallest and largest of `N` values.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Extremes<const N: usize> {
@@ -110,48 +129,6 @@ impl Merge for Sums {
     }
 }
 
-/// Every n-th sample from the first on. n grows with the run up to `coarsest`; from then on no more samples are taken.
-#[derive(Debug, Clone)]
-pub(super) struct Thinned<T> {
-    coarsest: usize,
-    every: usize,
-    seen: usize,
-    samples: Vec<T>,
-}
-
-impl<T> Thinned<T> {
-    pub(super) fn no_coarser_than(coarsest: usize) -> Self {
-        Self { coarsest, every: 1, seen: 0, samples: Vec::new() }
-    }
-
-    pub(super) fn push(&mut self, sample: T) {
-        if self.samples.len() == 2 * MOST && !self.make_room() {
-            return;
-        }
-        if self.seen.is_multiple_of(self.every) {
-            self.samples.push(sample);
-        }
-        self.seen += 1;
-    }
-
-    fn make_room(&mut self) -> bool {
-        let has_room = 2 * self.every <= self.coarsest;
-        if has_room {
-            let mut place = 0;
-            self.samples.retain(|_| {
-                place += 1;
-                place % 2 == 1
-            });
-            self.every *= 2;
-        }
-        has_room
-    }
-
-    pub(super) fn into_samples(self) -> Vec<T> {
-        self.samples
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -174,17 +151,5 @@ mod tests {
         let mut series = Series::<Sums>::default();
         (0..50_000u64).for_each(|millisecond| series.at(millisecond * 1_000_000).add(1, 3));
         assert_eq!(series.iter().map(|(_, sums)| sums.0[1]).sum::<u64>(), 150_000);
-    }
-
-    #[test]
-    fn thinning_keeps_samples_evenly_from_the_first_and_stops_before_it_gets_too_coarse() {
-        for (coarsest, every, last) in [(1000, 8, 9992), (7, 4, 8188), (1, 1, 2047)] {
-            let mut thinned = Thinned::no_coarser_than(coarsest);
-            (0..10_000).for_each(|sample| thinned.push(sample));
-            let samples = thinned.into_samples();
-            assert!(samples.len() <= 2 * MOST && samples.len() >= MOST / 2);
-            assert!(samples.windows(2).all(|pair| pair[1] - pair[0] == every), "{coarsest}");
-            assert_eq!(samples.last(), Some(&last), "{coarsest}");
-        }
     }
 }

@@ -18,6 +18,8 @@ use hdrhistogram::Histogram;
 use masseter_shared::messages::{Reading, State};
 use serde::Serialize;
 
+use super::measured::histogram;
+
 /// Skipped deadlines of one process, and the account of its time.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
 pub struct SkipFigures {
@@ -123,7 +125,7 @@ impl Loss {
 /// Follows the counters of one process.
 #[derive(Debug)]
 pub(super) struct Skips {
-    figures: SkipFigures,
+    pub(super) figures: SkipFigures,
     last_seq: u64,
     /// Loss that made the last wake-up late: its deadlines are skipped after the late cycle, not before.
     carried_over: Loss,
@@ -133,12 +135,12 @@ pub(super) struct Skips {
     stalls: Histogram<u64>,
     /// Length of each overlong stretch of work, ns.
     overlong: Histogram<u64>,
-    shortest_costly_ns: Option<u64>,
+    /// The shortest overlong stretch of work that cost a deadline, ns.
+    pub(super) shortest_costly_ns: Option<u64>,
 }
 
 impl Default for Skips {
     fn default() -> Self {
-        let histogram = || Histogram::new(3).expect("three digits are allowed");
         Self {
             figures: SkipFigures::default(),
             last_seq: 0,
@@ -184,15 +186,6 @@ impl Skips {
         }
         self.carried_over = lost.carried_over(counters.late_ns);
         self.carried_over_stretch_ns = if self.carried_over.working_ns > 0 { stretch_ns } else { 0 };
-    }
-
-    pub(super) fn figures(&self) -> SkipFigures {
-        self.figures
-    }
-
-    /// The shortest overlong stretch of work that cost a deadline, ns.
-    pub(super) fn shortest_costly_ns(&self) -> Option<u64> {
-        self.shortest_costly_ns
     }
 
     /// Stalls while waiting, and overlong stretches of work, of at least this length.
@@ -252,7 +245,7 @@ mod tests {
             (&[[0, STALL, STALL, 0], [2, STALL, STALL, 0]], [0, 0, 2]),
         ];
         for (messages, expected) in cases {
-            let figures = skips_of(messages).figures();
+            let figures = skips_of(messages).figures;
             let found = [figures.by_machine, figures.while_working, figures.skipped];
             assert_eq!(found, expected, "{messages:?}");
         }
@@ -295,7 +288,7 @@ mod tests {
             let own_ns = if cycle % 50 == 0 { 22 * PERIOD_NS / 10 } else { 9 * PERIOD_NS / 10 };
             process.cycle(own_ns, 1000, 1000);
         }
-        let figures = process.skips.figures();
+        let figures = process.skips.figures;
         assert_eq!((figures.by_machine, figures.while_working, figures.skipped), (0, 0, 20));
     }
 
@@ -308,7 +301,7 @@ mod tests {
                 process.cycle(own_ns, held_up * PERIOD_NS, waiting * PERIOD_NS);
                 process.cycle(PERIOD_NS, 0, 0);
                 process.cycle(PERIOD_NS, 0, 0);
-                let figures = process.skips.figures();
+                let figures = process.skips.figures;
                 assert_eq!((figures.by_machine, figures.skipped), (periods, periods), "{held_up} {waiting}");
             }
         }
@@ -323,7 +316,7 @@ mod tests {
             for (own_ns, held_up_ns, waiting_ns) in cycles {
                 process.cycle(own_ns, held_up_ns, waiting_ns);
             }
-            let figures = process.skips.figures();
+            let figures = process.skips.figures;
             prop_assert_eq!(figures.by_machine, figures.skipped);
         }
     }
@@ -336,7 +329,7 @@ mod tests {
         process.cycle(0, 5 * PERIOD_NS, 0);
         assert_eq!(process.skips.as_long_as(1), (0, 0));
         process.cycle(0, 5 * PERIOD_NS, 0);
-        let figures = process.skips.figures();
+        let figures = process.skips.figures;
         assert_eq!((figures.skipped, figures.by_machine, figures.unknown_cause), (8, 4, 4));
         assert_eq!(process.skips.as_long_as(1), (1, 0));
     }
@@ -345,11 +338,11 @@ mod tests {
     fn stretches_are_counted_from_the_shortest_that_cost_a_deadline() {
         let skips =
             skips_of(&[[0, 60_000, 70_000, 0], [1, 60_000, 2_070_000, 0], [5, 4_060_000, 7_070_000, 0]]);
-        assert_eq!(skips.shortest_costly_ns(), Some(2_000_000));
+        assert_eq!(skips.shortest_costly_ns, Some(2_000_000));
         assert_eq!(skips.as_long_as(2_000_000), (1, 2));
         assert_eq!(skips.as_long_as(1), (2, 3));
         // What is left of a stretch is not a shorter one.
         let skips = skips_of(&[[0, 0, 5_000_000, 2_000_000], [2, 0, 5_000_000, 0]]);
-        assert_eq!(skips.shortest_costly_ns(), Some(5_000_000));
+        assert_eq!(skips.shortest_costly_ns, Some(5_000_000));
     }
 }

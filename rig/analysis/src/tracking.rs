@@ -7,10 +7,9 @@ use masseter_shared::messages::codes::ControllerState;
 use masseter_shared::messages::{State, Truth, pose_from_fields};
 use serde::Serialize;
 
-use super::join::Join;
+use super::by_cycle::ByCycle;
 use super::noise::standard_error;
-use super::over_time::{Curve, band, highest};
-use super::series::{Extremes, Series, Thinned};
+use super::series::{Curve, Extremes, Series};
 
 /// States in which the platform has a desired pose.
 pub const MOVING: [ControllerState; 3] =
@@ -81,7 +80,7 @@ pub struct TrackingSample {
 /// The platform from the first easing to the last hold; times in seconds since the first sample.
 #[derive(Debug, Clone, Default)]
 pub struct Track {
-    /// Every n-th cycle from the first on, closely enough to see every movement; of a long run not to its end.
+    /// Cycles from the first on, as many as a screen shows; of a long run not to its end.
     pub samples: Vec<TrackingSample>,
     /// How long it went on, s.
     pub duration_s: f64,
@@ -93,38 +92,30 @@ pub struct Track {
     pub distance_m: Curve,
 }
 
-/// Where and when the motion began.
-#[derive(Debug, Clone, Copy)]
-struct Began {
-    at_ns: u64,
-    at: Pose,
-}
-
 /// Indices of the displacements along x, y and z, desired and actual, and of the distance between the two.
 const DESIRED: usize = 0;
 const ACTUAL: usize = 3;
 const DISTANCE: usize = 6;
 
-/// Longest time between two samples, ns: a chewing cycle takes 0.7 s.
-const CLOSE_NS: u64 = 20_000_000;
-
-#[derive(Debug, Clone, Copy)]
-struct Solution {
-    desired: Pose,
-    estimated: Pose,
-    state: u32,
-}
+/// Time between two samples of the track, ns: the 60 Hz of a screen.
+const SAMPLE_NS: u64 = SECOND_NS / 60;
+/// Samples of the track: half a minute.
+const MOST_SAMPLES: usize = 2048;
 
 /// Joins desired, estimated and, where there are any, true poses of the same sample.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(super) struct Tracking {
     source: PoseSource,
-    poses: Join<Solution, (u64, Pose)>,
+    /// By the plant's cycle, until the other of the two comes.
+    states: ByCycle<State>,
+    truths: ByCycle<Truth>,
     distances: Accumulator,
     angles: Accumulator,
     estimates: Accumulator,
-    track: Thinned<TrackingSample>,
-    began: Option<Began>,
+    track: Vec<TrackingSample>,
+    next_sample_ns: u64,
+    /// When and where the motion began.
+    began: Option<(u64, Pose)>,
     ended_ns: u64,
     /// Desired and actual displacement along x, y and z, and the distance between the two.
     moved_m: Series<Extremes<{ DISTANCE + 1 }>>,
@@ -157,64 +148,57 @@ impl Accumulator {
 }
 
 impl Tracking {
-    pub(super) fn new(source: PoseSource, period_ns: u64) -> Self {
-        Self {
-            source,
-            poses: Join::default(),
-            distances: Accumulator::default(),
-            angles: Accumulator::default(),
-            estimates: Accumulator::default(),
-            track: Thinned::no_coarser_than((CLOSE_NS / period_ns) as usize),
-            began: None,
-            ended_ns: 0,
-            moved_m: Series::default(),
-            second: Accumulator::default(),
-            second_ends_ns: 0,
-            seconds: Vec::new(),
-        }
+    pub(super) fn new(source: PoseSource) -> Self {
+        Self { source, ..Self::default() }
     }
 
     /// The state of a cycle with a fresh reading: one used again was compared when it was fresh.
     pub(super) fn solution(&mut self, state: &State) {
-        let solution = Solution {
-            desired: pose_from_fields(state.desired_position_m, state.desired_quaternion_wxyz),
-            estimated: pose_from_fields(state.estimated_position_m, state.estimated_quaternion_wxyz),
-            state: state.controller_state,
-        };
         if self.source == PoseSource::Estimate {
-            return self.compare(&solution, (state.sampled_ns, solution.estimated));
+            let estimated = pose_from_fields(state.estimated_position_m, state.estimated_quaternion_wxyz);
+            return self.compare(state, state.sampled_ns, estimated);
         }
-        if let Some((solution, truth)) = self.poses.left(state.reading_cycle, solution) {
-            self.compare(&solution, truth);
+        match self.truths.take(state.reading_cycle) {
+            Some(truth) => self.compare_with_truth(state, &truth),
+            None => self.states.insert(state.reading_cycle, *state),
         }
     }
 
     pub(super) fn truth(&mut self, truth: &Truth) {
-        let pose = pose_from_fields(truth.position_m, truth.quaternion_wxyz);
-        if let Some((solution, truth)) = self.poses.right(truth.cycle, (truth.sampled_ns, pose)) {
-            self.compare(&solution, truth);
+        match self.states.take(truth.cycle) {
+            Some(state) => self.compare_with_truth(&state, truth),
+            None => self.truths.insert(truth.cycle, *truth),
         }
     }
 
-    fn compare(&mut self, solution: &Solution, (sampled_ns, actual): (u64, Pose)) {
-        let distance_m = (solution.desired.translation.vector - actual.translation.vector).norm();
-        if solution.state == ControllerState::Running.code() {
+    fn compare_with_truth(&mut self, state: &State, truth: &Truth) {
+        let actual = pose_from_fields(truth.position_m, truth.quaternion_wxyz);
+        self.compare(state, truth.sampled_ns, actual);
+    }
+
+    fn compare(&mut self, state: &State, sampled_ns: u64, actual: Pose) {
+        let desired = pose_from_fields(state.desired_position_m, state.desired_quaternion_wxyz);
+        let estimated = pose_from_fields(state.estimated_position_m, state.estimated_quaternion_wxyz);
+        let distance_m = (desired.translation.vector - actual.translation.vector).norm();
+        if state.controller_state == ControllerState::Running.code() {
             self.distances.add(distance_m);
-            self.angles.add(solution.desired.rotation.angle_to(&actual.rotation));
-            self.estimates.add((solution.estimated.translation.vector - actual.translation.vector).norm());
+            self.angles.add(desired.rotation.angle_to(&actual.rotation));
+            self.estimates.add((estimated.translation.vector - actual.translation.vector).norm());
             self.add_to_second(distance_m, sampled_ns);
         }
-        if MOVING.iter().any(|state| state.code() == solution.state) {
-            let Solution { desired, estimated, .. } = *solution;
-            let began = *self.began.get_or_insert(Began { at_ns: sampled_ns, at: desired });
-            let stretch = self.moved_m.at(sampled_ns.saturating_sub(began.at_ns));
+        if MOVING.iter().any(|moving| moving.code() == state.controller_state) {
+            let (began_ns, began_at) = *self.began.get_or_insert((sampled_ns, desired));
+            let stretch = self.moved_m.at(sampled_ns.saturating_sub(began_ns));
             stretch.take(DISTANCE, distance_m);
             for (first, pose) in [(DESIRED, &desired), (ACTUAL, &actual)] {
-                let moved_m = pose.translation.vector - began.at.translation.vector;
+                let moved_m = pose.translation.vector - began_at.translation.vector;
                 moved_m.iter().enumerate().for_each(|(axis, moved_m)| stretch.take(first + axis, *moved_m));
             }
             self.ended_ns = sampled_ns;
-            self.track.push(TrackingSample { sampled_ns, desired, estimated, actual });
+            if sampled_ns >= self.next_sample_ns && self.track.len() < MOST_SAMPLES {
+                self.track.push(TrackingSample { sampled_ns, desired, estimated, actual });
+                self.next_sample_ns = sampled_ns + SAMPLE_NS;
+            }
         }
     }
 
@@ -244,14 +228,14 @@ impl Tracking {
             max_deg: compared(self.angles.largest.to_degrees()),
             estimate_rms_mm: compared(self.estimates.rms() * 1e3).filter(|_| has_truth),
         };
-        let began_ns = self.began.map_or(self.ended_ns, |began| began.at_ns);
-        let bands = |first: usize| std::array::from_fn(|axis| band(&self.moved_m, first + axis));
+        let began_ns = self.began.map_or(self.ended_ns, |(began_ns, _)| began_ns);
+        let bands = |first: usize| std::array::from_fn(|axis| self.moved_m.band(first + axis));
         let track = Track {
             duration_s: self.ended_ns.saturating_sub(began_ns) as f64 / 1e9,
             desired_m: bands(DESIRED),
             actual_m: bands(ACTUAL),
-            distance_m: highest(&self.moved_m, DISTANCE),
-            samples: self.track.into_samples(),
+            distance_m: self.moved_m.highest(DISTANCE),
+            samples: self.track,
         };
         (figures, track)
     }
@@ -286,7 +270,7 @@ mod tests {
 
     #[test]
     fn without_truth_the_estimate_takes_its_place() {
-        let mut tracking = Tracking::new(PoseSource::Estimate, PERIOD_NS);
+        let mut tracking = Tracking::new(PoseSource::Estimate);
         tracking.solution(&State { estimated_position_m: [0.001, 0.0, 0.0], ..state(1, 0.003) });
         let (figures, track) = tracking.finish();
         assert_eq!((figures.samples, figures.estimate_rms_mm), (1, None));
@@ -296,7 +280,7 @@ mod tests {
 
     #[test]
     fn a_platform_that_never_ran_has_no_tracking_error() {
-        let mut tracking = Tracking::new(PoseSource::Truth, PERIOD_NS);
+        let mut tracking = Tracking::new(PoseSource::Truth);
         tracking.solution(&State { controller_state: ControllerState::Easing.code(), ..state(1, 0.0) });
         tracking.truth(&truth(1, 0.0));
         let (figures, _) = tracking.finish();
@@ -306,7 +290,7 @@ mod tests {
 
     #[test]
     fn a_long_run_keeps_every_turn_of_its_motion_and_close_samples_of_its_beginning() {
-        let mut tracking = Tracking::new(PoseSource::Truth, PERIOD_NS);
+        let mut tracking = Tracking::new(PoseSource::Truth);
         for cycle in 0..100_000 {
             // To and fro in 0.7 s, as fast as chewing.
             let x = (cycle as f64 / 700.0 * std::f64::consts::TAU).sin();
@@ -317,20 +301,25 @@ mod tests {
         let reach = track.actual_m[0].iter().map(|(_, x)| *x);
         assert!(reach.clone().filter(|x| *x > 0.99).count() > 140 && reach.fold(0.0, f64::min) < -0.99);
         assert!((track.duration_s - 99.999).abs() < 1e-9);
-        assert!(track.samples.windows(2).all(|pair| pair[1].sampled_ns - pair[0].sampled_ns <= CLOSE_NS));
+        assert!(
+            track
+                .samples
+                .windows(2)
+                .all(|pair| pair[1].sampled_ns - pair[0].sampled_ns <= SAMPLE_NS + PERIOD_NS)
+        );
         assert_eq!(track.samples[0].sampled_ns, 0);
     }
 
     #[test]
     fn poses_are_compared_by_cycle_in_whatever_order_they_come() {
-        let mut tracking = Tracking::new(PoseSource::Truth, PERIOD_NS);
+        let mut tracking = Tracking::new(PoseSource::Truth);
         tracking.solution(&state(1, 0.003));
         tracking.solution(&state(2, 0.000));
         tracking.truth(&truth(2, 0.004));
         tracking.truth(&truth(1, 0.000));
         tracking.truth(&truth(3, 9.000));
-        let (figures, track) = tracking.finish();
-        assert_eq!((figures.samples, track.samples.len()), (2, 2));
+        let (figures, _) = tracking.finish();
+        assert_eq!(figures.samples, 2);
         assert!((figures.max_mm.unwrap() - 4.0).abs() < 1e-9);
         assert!((figures.rms_mm.unwrap() - (12.5f64).sqrt()).abs() < 1e-9);
     }

@@ -23,6 +23,13 @@ pub struct Usage {
     pub major_faults: u64,
 }
 
+impl Usage {
+    /// Share of a core: CPU time over the time observed, 0 when nothing was.
+    pub fn share(&self) -> f64 {
+        if self.observed_s > 0.0 { self.cpu_s / self.observed_s } else { 0.0 }
+    }
+}
+
 /// Resources that all processes used, by name, and time stolen from the machine.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct RunUsage {

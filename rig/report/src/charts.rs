@@ -63,8 +63,11 @@ fn microseconds(ns: f64) -> f64 {
     (ns / 1e3).max(LEAST_US)
 }
 
+/// Plots, each with its id in the page.
+type Plots<const N: usize> = [(&'static str, Option<Drawn>); N];
+
 /// The platform's displacement, desired and actual, and the distance between the two.
-pub(super) fn motion(figures: &Figures) -> [Option<Drawn>; 2] {
+pub(super) fn motion(figures: &Figures) -> Plots<2> {
     let track = &figures.track;
     let actual = figures.tracking.actual_source.adjective();
     let pair = |(axis, name): (usize, &str)| {
@@ -74,54 +77,35 @@ pub(super) fn motion(figures: &Figures) -> [Option<Drawn>; 2] {
     let lines = ["x", "y", "z"].into_iter().enumerate().flat_map(pair).collect();
     let distance = Line::new("distance", in_unit(&track.distance_m, 1e3));
     [
-        chart_over_time(linear("displacement of the platform, mm"), lines, Vec::new()),
-        chart_over_time(linear("distance from desired, mm"), vec![distance], Vec::new()),
+        ("motion", chart_over_time(linear("displacement of the platform, mm"), lines, Vec::new())),
+        ("error", chart_over_time(linear("distance from desired, mm"), vec![distance], Vec::new())),
     ]
 }
 
 /// Positions of slides and legs, velocities and forces, against their limits.
-pub(super) fn actuators(scenario: &Scenario, figures: &Figures) -> [Option<Drawn>; 4] {
+pub(super) fn actuators(scenario: &Scenario, figures: &Figures) -> Plots<4> {
     let over_time = &figures.over_time;
     let strokes = &scenario.mechanism.strokes;
-    let drives = &scenario.drives;
-    let slides = 0..LEGS;
-    let legs = LEGS..2 * LEGS;
+    let (slide, leg) = (&scenario.drives.slide, &scenario.drives.leg);
+    let axes = |label: &str, bands: &[Curve], first: usize, unit: f64, limits: Vec<Limit>| {
+        let line = |(axis, band)| Line::new(AXIS_NAMES[first + axis], in_unit(band, unit));
+        chart_over_time(linear(label), bands.iter().enumerate().map(line).collect(), limits)
+    };
     let stroke = |[lowest, highest]: [f64; 2]| {
         vec![limit("lower end", &[lowest * 1e3]), limit("upper end", &[highest * 1e3])]
     };
-    let both = |unit: f64, slide: f64, leg: f64| {
-        let ways = |value: f64| [value * unit, -value * unit];
-        vec![limit("limit of slides", &ways(slide)), limit("limit of legs", &ways(leg))]
+    let both = |slide: f64, leg: f64| {
+        vec![limit("limit of slides", &[slide, -slide]), limit("limit of legs", &[leg, -leg])]
     };
+    let (slides_m, legs_m) = over_time.position_m.split_at(LEGS);
+    let velocities = both(slide.max_velocity_m_s * 1e3, leg.max_velocity_m_s * 1e3);
+    let forces = both(slide.max_force_n, leg.max_force_n);
     [
-        axes("slides, mm", &over_time.position_m, slides, 1e3, stroke(strokes.slide_m)),
-        axes("legs, mm", &over_time.position_m, legs, 1e3, stroke(strokes.leg_m)),
-        axes(
-            "velocity, mm/s",
-            &over_time.velocity_m_s,
-            0..2 * LEGS,
-            1e3,
-            both(1e3, drives.slide.max_velocity_m_s, drives.leg.max_velocity_m_s),
-        ),
-        axes(
-            "force, N",
-            &over_time.force_n,
-            0..2 * LEGS,
-            1.0,
-            both(1.0, drives.slide.max_force_n, drives.leg.max_force_n),
-        ),
+        ("slides", axes("slides, mm", slides_m, 0, 1e3, stroke(strokes.slide_m))),
+        ("legs", axes("legs, mm", legs_m, LEGS, 1e3, stroke(strokes.leg_m))),
+        ("velocities", axes("velocity, mm/s", &over_time.velocity_m_s, 0, 1e3, velocities)),
+        ("forces", axes("force, N", &over_time.force_n, 0, 1.0, forces)),
     ]
-}
-
-fn axes(
-    label: &str,
-    bands: &[Curve],
-    of: std::ops::Range<usize>,
-    unit: f64,
-    limits: Vec<Limit>,
-) -> Option<Drawn> {
-    let line = |axis: usize| Line::new(AXIS_NAMES[axis], in_unit(&bands[axis], unit));
-    chart_over_time(linear(label), of.map(line).collect(), limits)
 }
 
 /// Share of each bus in use.

@@ -10,7 +10,7 @@ use masseter_recording::Manifest;
 pub(crate) fn xml(manifest: &Manifest, figures: &Figures, verdict: &Verdict) -> String {
     let count = |result| verdict.checks.iter().filter(|check| check.result == result).count();
     let (failures, skipped) = (count(CheckResult::Failed), count(CheckResult::NotJudged));
-    let judged = verdict.outcome.is_judged();
+    let judged = verdict.is_judged();
     let tests = verdict.checks.len() + 1;
     let mut xml = format!(
         "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n\
@@ -20,7 +20,7 @@ pub(crate) fn xml(manifest: &Manifest, figures: &Figures, verdict: &Verdict) -> 
         figures.duration_s,
         escape(manifest.began.trim_end_matches('Z')),
     );
-    let problem = (!judged).then(|| ("error", format!("{}: {}", verdict.outcome.word(), verdict.reason)));
+    let problem = (!judged).then(|| ("error", format!("{}: {}", verdict.word, verdict.reason)));
     xml += &case("run", problem);
     for check in &verdict.checks {
         let problem = match check.result {

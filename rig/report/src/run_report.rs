@@ -51,7 +51,7 @@ pub fn report_past_run(path: &Path, format: Format) -> Result<Exit, Failure> {
                 "masseter: cannot write {}: {error}; the run is shown, and no file written",
                 path.display()
             );
-            Ok(judge_and_show(&folder, &manifest, &figures, format)?.0.outcome.exit())
+            Ok(judge_and_show(&folder, &manifest, &figures, format)?.0.exit_code)
         }
         written => {
             written.incomplete()?;
@@ -102,7 +102,7 @@ fn write_report(
     ] {
         fs::write(&path, text).map_err(WriteError::for_file(&path)).incomplete()?;
     }
-    Ok(verdict.outcome.exit())
+    Ok(verdict.exit_code)
 }
 
 /// Judges the run and prints the result. Returns the verdict and the summary as JSON.

@@ -6,12 +6,11 @@ use masseter_shared::config::MotionConfig;
 use masseter_shared::messages::codes::EventKind;
 
 use crate::text::{decimals, event_with_cycle, microseconds, or_dash};
-use crate::usage;
 use crate::verdict::Verdict;
 use masseter_analysis::{
     BusResponse, Figures, IntervalFigures, ReadingFigures, ResponseFigures, TrackingFigures,
 };
-use masseter_recording::Manifest;
+use masseter_recording::{Manifest, RunUsage, Usage};
 
 /// Verdict, checks, latencies, losses and faults.
 pub(crate) fn text(manifest: &Manifest, figures: &Figures, verdict: &Verdict) -> String {
@@ -27,7 +26,7 @@ fn write_text(
     verdict: &Verdict,
 ) -> std::fmt::Result {
     let scenario = &manifest.scenario;
-    writeln!(text, "{}: {}", verdict.outcome.word(), verdict.reason)?;
+    writeln!(text, "{}: {}", verdict.word, verdict.reason)?;
     writeln!(
         text,
         "{}: {:.1} s of motion at {} Hz ({} clock), {} cycles in {:.1} s, seed {}",
@@ -66,7 +65,7 @@ fn write_text(
         figures.plant_skips.stalled_ns as f64 / 1e6
     )?;
     writeln!(text, "{}", readings(&figures.readings))?;
-    usage::line(text, &manifest.usage)?;
+    usage(text, &manifest.usage)?;
     losses(text, figures)?;
     events(text, figures)
 }
@@ -143,6 +142,19 @@ pub(crate) fn distances(tracking: &TrackingFigures) -> String {
         "{} against desired: rms {rms_mm} mm, max {max_mm} mm; rms {rms_deg}°, max {max_deg}°",
         tracking.actual_source.adjective()
     )
+}
+
+/// CPU time, page faults and stolen time; nothing under virtual time, which has no processes.
+fn usage(text: &mut String, usage: &RunUsage) -> std::fmt::Result {
+    if usage.processes.is_empty() {
+        return Ok(());
+    }
+    let process = |(name, usage): (&String, &Usage)| {
+        let faults = usage.minor_faults + usage.major_faults;
+        format!("{name} {:.0} % of a core, {faults} page faults", usage.share() * 100.0)
+    };
+    let processes: Vec<_> = usage.processes.iter().map(process).collect();
+    writeln!(text, "usage: {}; stolen from the machine {:.2} s", processes.join("; "), usage.stolen_s)
 }
 
 fn losses(text: &mut String, figures: &Figures) -> std::fmt::Result {

@@ -1,39 +1,26 @@
 //! The verdict on a run: by its end, then its recording, then the machine, then its checks.
 
 use masseter_analysis::{EventRecord, Figures, Outage};
-use masseter_recording::DmaLatency;
-use masseter_recording::Ending;
-use masseter_recording::Manifest;
-use masseter_recording::RunUsage;
+use masseter_recording::{DmaLatency, Ending, Manifest, RunUsage};
 use masseter_shared::config::CanConfig;
 use masseter_shared::messages::codes::EventKind;
-use serde::ser::{Serialize, SerializeStruct, Serializer};
+use masseter_terminal::Exit;
+use serde::Serialize;
 
 use crate::checks::{Check, CheckResult, checks, missed_cycles};
-use crate::outcome::Outcome;
 use crate::text;
 
 /// The judgement of a run.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Verdict {
-    /// The outcome.
-    pub outcome: Outcome,
+    /// The outcome in a word.
+    pub word: &'static str,
     /// The reason in a sentence.
     pub reason: String,
+    /// The outcome as the exit code of the program.
+    pub exit_code: Exit,
     /// Every check, also those that passed.
     pub checks: Vec<Check>,
-}
-
-/// With the word and the exit code of its outcome.
-impl Serialize for Verdict {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let mut fields = serializer.serialize_struct("Verdict", 4)?;
-        fields.serialize_field("word", self.outcome.word())?;
-        fields.serialize_field("reason", &self.reason)?;
-        fields.serialize_field("exit_code", &self.outcome.exit())?;
-        fields.serialize_field("checks", &self.checks)?;
-        fields.end()
-    }
 }
 
 impl Verdict {
@@ -41,19 +28,42 @@ impl Verdict {
     pub fn new(manifest: &Manifest, figures: &Figures) -> Self {
         let disturbed = disturbed(manifest, figures);
         let checks = checks(manifest, figures, disturbed.is_some());
-        let (outcome, mut reason) = ending(&manifest.ending, &figures.events)
-            .filter(|(outcome, _)| !(*outcome == Outcome::SafeStop && disturbed.is_some()))
+        let (exit_code, mut reason) = ending(&manifest.ending, &figures.events)
+            .filter(|(exit, _)| !(*exit == Exit::SafeStop && disturbed.is_some()))
             .or_else(|| incomplete(figures))
             .or(disturbed)
             .or_else(|| {
                 failed(&checks)
                     .map(|failure| clock_jump(&manifest.usage, &manifest.scenario.can).unwrap_or(failure))
             })
-            .unwrap_or_else(|| (Outcome::Pass, "every check passed".to_owned()));
-        if outcome != Outcome::Pass {
+            .unwrap_or_else(|| (Exit::Passed, "every check passed".to_owned()));
+        if exit_code != Exit::Passed {
             reason += &overload(&manifest.usage, manifest.scenario.rate_hz).unwrap_or_default();
         }
-        Self { outcome, reason, checks }
+        Self { word: word(exit_code), reason, exit_code, checks }
+    }
+
+    pub(crate) fn is_passed(&self) -> bool {
+        self.exit_code == Exit::Passed
+    }
+
+    /// Whether the checks decided it.
+    pub(crate) fn is_judged(&self) -> bool {
+        matches!(self.exit_code, Exit::Passed | Exit::Failed)
+    }
+}
+
+/// The word for an outcome in reports.
+fn word(outcome: Exit) -> &'static str {
+    match outcome {
+        Exit::Passed => "PASS",
+        Exit::Failed => "FAIL",
+        Exit::Usage => "NOT RUN",
+        Exit::Invalid => "INVALID",
+        Exit::Died => "DIED",
+        Exit::SafeStop => "SAFE STOP",
+        Exit::Incomplete => "INCOMPLETE",
+        Exit::Interrupted => "INTERRUPTED",
     }
 }
 
@@ -63,8 +73,7 @@ const TOO_BUSY: f64 = 0.9;
 /// The remedy for a real-time process that hardly ever slept.
 fn overload(usage: &RunUsage, rate_hz: u32) -> Option<String> {
     let busy = |name: &'static str| {
-        let usage = usage.processes.get(name)?;
-        let share = usage.cpu_s / usage.observed_s;
+        let share = usage.processes.get(name)?.share();
         (share > TOO_BUSY).then_some((name, share))
     };
     let (name, share) = ["controller", "plant"].into_iter().find_map(busy)?;
@@ -75,17 +84,17 @@ fn overload(usage: &RunUsage, rate_hz: u32) -> Option<String> {
     ))
 }
 
-type Judgement = (Outcome, String);
+type Judgement = (Exit, String);
 
 fn ending(ending: &Ending, events: &[EventRecord]) -> Option<Judgement> {
     match ending {
         Ending::Completed => None,
-        Ending::SafeStop => Some((Outcome::SafeStop, stopped(events))),
-        Ending::Died { process, how } => Some((Outcome::Died, format!("the {process} died: {how}"))),
-        Ending::Interrupted => Some((Outcome::Interrupted, "stopped by the user".to_owned())),
-        Ending::NotStarted => Some((Outcome::Invalid, "real time was required and refused".to_owned())),
+        Ending::SafeStop => Some((Exit::SafeStop, stopped(events))),
+        Ending::Died { process, how } => Some((Exit::Died, format!("the {process} died: {how}"))),
+        Ending::Interrupted => Some((Exit::Interrupted, "stopped by the user".to_owned())),
+        Ending::NotStarted => Some((Exit::Invalid, "real time was required and refused".to_owned())),
         Ending::RecordingFailed => {
-            Some((Outcome::Incomplete, "the recorder could not write everything".to_owned()))
+            Some((Exit::Incomplete, "the recorder could not write everything".to_owned()))
         }
     }
 }
@@ -108,7 +117,7 @@ fn incomplete(figures: &Figures) -> Option<Judgement> {
     } else {
         return None;
     };
-    Some((Outcome::Incomplete, reason))
+    Some((Exit::Incomplete, reason))
 }
 
 /// Whether the machine kept the rig from too many cycles to judge it, or never granted it real time. A safe stop is
@@ -127,7 +136,7 @@ fn disturbed(manifest: &Manifest, figures: &Figures) -> Option<Judgement> {
     } else {
         format!("{}{stop}; {}", withheld(figures), remedy(manifest))
     };
-    Some((Outcome::Invalid, reason))
+    Some((Exit::Invalid, reason))
 }
 
 /// The time that the machine withheld, and the cycles missed.
@@ -152,7 +161,7 @@ fn clock_jump(usage: &RunUsage, can: &CanConfig) -> Option<Judgement> {
         let reason = format!(
             "the wall clock jumped by {jump_s:.3} s, as it does when it is set or the machine was suspended; repeat the run"
         );
-        (Outcome::Invalid, reason)
+        (Exit::Invalid, reason)
     })
 }
 
@@ -185,7 +194,7 @@ fn excuse(
 fn failed(checks: &[Check]) -> Option<Judgement> {
     let failed: Vec<_> =
         checks.iter().filter(|check| check.result == CheckResult::Failed).map(|check| check.name).collect();
-    (!failed.is_empty()).then(|| (Outcome::Fail, format!("failed: {}", failed.join(", "))))
+    (!failed.is_empty()).then(|| (Exit::Failed, format!("failed: {}", failed.join(", "))))
 }
 
 #[cfg(test)]
@@ -206,7 +215,7 @@ mod tests {
             event(Source::Controller, EventKind::Fault, Cause::MasterFault),
         ];
         let (outcome, reason) = ending(&Ending::SafeStop, &events.map(|event| (&event).into())).unwrap();
-        assert_eq!(outcome, Outcome::SafeStop);
+        assert_eq!(outcome, Exit::SafeStop);
         assert_eq!(
             reason,
             "the controller stopped the rig; first fault: master: process_data_lost \
@@ -234,7 +243,7 @@ mod tests {
         assert_eq!(jump(0.0, &real), None);
         assert_eq!(jump(-3.5, &simulated), None);
         let (outcome, reason) = jump(-3.5, &real).unwrap();
-        assert_eq!(outcome, Outcome::Invalid);
+        assert_eq!(outcome, Exit::Invalid);
         assert!(reason.contains("jumped by -3.500 s"), "{reason}");
     }
 

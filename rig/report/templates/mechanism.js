@@ -1,15 +1,15 @@
 // Plays the recorded motion of the mechanism: a wire model, projected in parallel, turned by dragging.
 'use strict';
 {
-  const film = JSON.parse(document.getElementById('film').textContent);
+  const animation = JSON.parse(document.getElementById('animation').textContent);
   const canvas = document.getElementById('mechanism');
   const pen = canvas.getContext('2d');
   const play = document.getElementById('play');
   const time = document.getElementById('time');
   const clock = document.getElementById('clock');
-  const COLOURS = { still: '#888', leg: '#444', reference: '#0072b2', estimated: '#d55e00', wanted: '#009e73', jaw: '#b00020' };
-  const REFERENCE = 1, WANTED = 8, ESTIMATED = 15;
-  const end = film.frames[film.frames.length - 1][0];
+  const COLOURS = { still: '#888', leg: '#444', actual: '#0072b2', estimated: '#d55e00', desired: '#009e73', jaw: '#b00020' };
+  const ACTUAL = 1, DESIRED = 8, ESTIMATED = 15;
+  const end = animation.frames[animation.frames.length - 1][0];
   let turn = -2.2, tilt = 0.35, at = 0, playing = true, before = null, drag = null;
 
   const add = (a, b) => a.map((x, i) => x + b[i]);
@@ -17,7 +17,7 @@
   const dot = (a, b) => a.reduce((sum, x, i) => sum + x * b[i], 0);
   const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
 
-  // A point of the platform frame in the base frame, by the pose at `offset` of a frame of the film.
+  // A point of the platform frame in the base frame, by the pose at `offset` of a frame of the animation.
   function placed(point, frame, offset) {
     const w = frame[offset + 3], v = frame.slice(offset + 4, offset + 7);
     const t = scale(cross(v, point), 2);
@@ -25,12 +25,12 @@
   }
 
   function frameAt(seconds) {
-    let low = 0, high = film.frames.length - 1;
+    let low = 0, high = animation.frames.length - 1;
     while (low < high) {
       const middle = (low + high + 1) >> 1;
-      if (film.frames[middle][0] <= seconds) low = middle; else high = middle - 1;
+      if (animation.frames[middle][0] <= seconds) low = middle; else high = middle - 1;
     }
-    return film.frames[low];
+    return animation.frames[low];
   }
 
   // The line of sight: turned about the vertical, then tilted.
@@ -61,27 +61,27 @@
   }
 
   function platform(frame, offset, colour, width, dash) {
-    path(film.corners.map((corner) => placed(corner, frame, offset)), colour, width, true, dash);
+    path(animation.corners.map((corner) => placed(corner, frame, offset)), colour, width, true, dash);
   }
 
   function draw() {
     const frame = frameAt(at);
     pen.clearRect(0, 0, canvas.width, canvas.height);
-    path(film.centres, COLOURS.still, 1, true);
-    film.corners.forEach((corner, leg) => {
-      const [centre, along] = [film.centres[leg], film.along[leg]];
-      path(film.slide_ends.map((end) => add(centre, scale(along, end))), COLOURS.still, 4);
-      const top = placed(corner, frame, REFERENCE);
+    path(animation.centres, COLOURS.still, 1, true);
+    animation.corners.forEach((corner, leg) => {
+      const [centre, along] = [animation.centres[leg], animation.along[leg]];
+      path(animation.slide_ends.map((end) => add(centre, scale(along, end))), COLOURS.still, 4);
+      const top = placed(corner, frame, ACTUAL);
       const hinge = add(centre, scale(along, dot(add(top, scale(centre, -1)), along)));
       path([hinge, top], COLOURS.leg, 5);
       dot2d(hinge, COLOURS.leg, 5);
     });
-    const jaw = film.jaw.map((point) => placed(point, frame, REFERENCE));
+    const jaw = animation.jaw.map((point) => placed(point, frame, ACTUAL));
     path(jaw, COLOURS.jaw, 1, true);
     jaw.forEach((point) => dot2d(point, COLOURS.jaw, 4));
-    platform(frame, WANTED, COLOURS.wanted, 2, [2, 6]);
-    platform(frame, REFERENCE, COLOURS.reference, 3);
-    // Without truth the estimate is the reference.
+    platform(frame, DESIRED, COLOURS.desired, 2, [2, 6]);
+    platform(frame, ACTUAL, COLOURS.actual, 3);
+    // Without truth the estimate is the actual pose.
     if (frame.length > ESTIMATED) platform(frame, ESTIMATED, COLOURS.estimated, 2, [8, 8]);
     clock.textContent = at.toFixed(2) + ' s';
     time.value = end > 0 ? at / end : 0;

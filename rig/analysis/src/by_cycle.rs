@@ -1,0 +1,50 @@
+//! Messages by their cycle, in constant memory.
+//!
+//! The recorder drains topic after topic, so messages of one cycle lie some tens of cycles apart.
+
+/// Cycles kept; more than a subscriber's queue holds of any topic.
+const KEPT: usize = 1 << 13;
+
+/// The latest values by cycle.
+#[derive(Debug)]
+pub(super) struct ByCycle<T> {
+    slots: Vec<Option<(u64, T)>>,
+}
+
+impl<T: Copy> Default for ByCycle<T> {
+    fn default() -> Self {
+        Self { slots: vec![None; KEPT] }
+    }
+}
+
+impl<T: Copy> ByCycle<T> {
+    pub(super) fn insert(&mut self, cycle: u64, value: T) {
+        self.slots[cycle as usize % KEPT] = Some((cycle, value));
+    }
+
+    pub(super) fn get(&self, cycle: u64) -> Option<T> {
+        self.slots[cycle as usize % KEPT].filter(|(held, _)| *held == cycle).map(|(_, value)| value)
+    }
+
+    /// Takes the value out.
+    pub(super) fn take(&mut self, cycle: u64) -> Option<T> {
+        let value = self.get(cycle)?;
+        self.slots[cycle as usize % KEPT] = None;
+        Some(value)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_are_found_by_their_own_cycle_only() {
+        let mut values = ByCycle::default();
+        values.insert(5, 'a');
+        assert_eq!(values.get(5), Some('a'));
+        assert_eq!(values.get(5 + KEPT as u64), None);
+        assert_eq!(values.take(5), Some('a'));
+        assert_eq!(values.get(5), None);
+    }
+}
