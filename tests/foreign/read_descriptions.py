@@ -51,7 +51,7 @@ def check_messages(text):
     assert values["Statusword"] == 0x1237
     assert abs(values["Position_actual_value"] - 0.270128) < 1e-9, values
     assert abs(values["Torque_actual_value"] + 6.0) < 1e-9, values
-    assert str(database.get_message_by_name("l1_heartbeat").decode(b"\x05")["State"]) == "Operational"
+    assert str(database.get_message_by_name("l1_heartbeat").decode(b"\x05")["State"]) == "operational"
     return database
 
 

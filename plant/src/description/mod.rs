@@ -49,7 +49,7 @@ mod tests {
     fn a_sheet_has_every_object_and_every_entry_once() {
         let [first, ..] = eds(&Scenario::default()).unwrap();
         for object in OBJECTS {
-            let heading = format!("[{:04X}]\n", object.index);
+            let heading = format!("[{:04X}]\n", object.index());
             assert_eq!(first.matches(&heading).count(), 1, "{heading}");
         }
         let headings = first.matches("AccessType=").count();

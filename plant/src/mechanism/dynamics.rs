@@ -17,7 +17,7 @@ use masseter_shared::geometry::{
 };
 use nalgebra::{Matrix3, Matrix6, UnitQuaternion, Vector3, Vector6};
 
-use super::food::Food;
+use super::food::{Food, vertical};
 use super::friction::Friction;
 
 /// Pose, twist and joint coordinates of the mechanism.
@@ -127,7 +127,7 @@ impl Dynamics {
 
     /// The force with which the food pushes the jaw open, N.
     pub(crate) fn bite_force_n(&self) -> f64 {
-        self.food.as_ref().map_or(0.0, Food::force_n)
+        self.food.as_ref().map_or(0.0, |food| food.force_n)
     }
 
     /// The present state.
@@ -235,17 +235,11 @@ impl Dynamics {
 
     /// Weight of platform and rods as a wrench on the platform; a rod's centre is taken at its joint.
     fn gravity(&self) -> Vector6<f64> {
-        let mut wrench = Vector6::zeros();
-        wrench[2] = -self.config.platform_mass_kg * self.config.gravity_m_s2;
-        let rod_n = self.config.rod_mass_kg * self.config.gravity_m_s2;
-        for corner in self.mechanism.platform_corners() {
-            let arm = self.state.pose.rotation * corner;
-            wrench[2] -= rod_n;
-            // r × (0, 0, −w)
-            wrench[3] -= arm.y * rod_n;
-            wrench[4] += arm.x * rod_n;
-        }
-        wrench
+        let DynamicsConfig { platform_mass_kg, rod_mass_kg, gravity_m_s2, .. } = self.config;
+        let platform = vertical(-platform_mass_kg * gravity_m_s2, &Vec3::zeros());
+        self.mechanism.platform_corners().iter().fold(platform, |wrench, corner| {
+            wrench + vertical(-rod_mass_kg * gravity_m_s2, &(self.state.pose.rotation * corner))
+        })
     }
 
     /// ω × Iω of the platform.

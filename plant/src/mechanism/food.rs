@@ -8,6 +8,11 @@ use masseter_shared::config::FoodConfig;
 use masseter_shared::geometry::{Pose, Twist, Vec3};
 use nalgebra::{Point3, Vector6};
 
+/// The wrench of a vertical force (N) at an arm (m) about the platform's origin.
+pub(super) fn vertical(force_n: f64, arm: &Vec3) -> Vector6<f64> {
+    Vector6::new(0.0, 0.0, force_n, arm.y * force_n, -arm.x * force_n, 0.0)
+}
+
 /// A piece of food with its remaining thickness.
 #[derive(Debug, Clone)]
 pub(crate) struct Food {
@@ -15,7 +20,8 @@ pub(crate) struct Food {
     /// Height of the upper tooth in the base frame, m.
     upper_m: f64,
     thickness_m: f64,
-    force_n: f64,
+    /// Force on the lower tooth at the last bite, downwards, N.
+    pub(super) force_n: f64,
 }
 
 impl Food {
@@ -23,11 +29,6 @@ impl Food {
     pub(crate) fn new(config: FoodConfig, closed: &Pose) -> Self {
         let upper_m = (closed * Point3::from(config.point_m)).z;
         Self { config, upper_m, thickness_m: config.thickness_m, force_n: 0.0 }
-    }
-
-    /// Force on the lower tooth at the last bite, downwards, N.
-    pub(crate) fn force_n(&self) -> f64 {
-        self.force_n
     }
 
     /// Bites at a pose and twist of the platform. Returns the food's wrench on the platform: force (N), then moment
@@ -38,9 +39,7 @@ impl Food {
             (twist.fixed_rows::<3>(0).into(), twist.fixed_rows::<3>(3).into());
         let gap_m = self.upper_m - (pose.translation.z + arm.z);
         self.press(gap_m, (linear + angular.cross(&arm)).z);
-        let force = Vec3::new(0.0, 0.0, -self.force_n);
-        let moment = arm.cross(&force);
-        Vector6::new(force.x, force.y, force.z, moment.x, moment.y, moment.z)
+        vertical(-self.force_n, &arm)
     }
 
     fn press(&mut self, gap_m: f64, closing_m_s: f64) {
@@ -82,7 +81,7 @@ mod tests {
             .iter()
             .map(|&opening_mm| {
                 food.bite(&at(opening_mm), &Twist::zeros());
-                food.force_n()
+                food.force_n
             })
             .collect()
     }
@@ -101,10 +100,10 @@ mod tests {
         let mut food = Food { config: FoodConfig { damping_n_s_per_m: 100.0, ..CONFIG }, ..food() };
         let pose = Pose::translation(0.0, 0.0, 0.268);
         let closing = food.bite(&pose, &Twist::new(0.0, 0.0, 0.05, 0.0, 0.0, 0.0));
-        assert!((food.force_n() - 25.0).abs() < 1e-9, "{}", food.force_n());
+        assert!((food.force_n - 25.0).abs() < 1e-9, "{}", food.force_n);
         // (0, 20 mm, 0) × (0, 0, −25 N)
         assert!((closing - Vector6::new(0.0, 0.0, -25.0, -0.5, 0.0, 0.0)).amax() < 1e-9, "{closing}");
         let opening = food.bite(&pose, &Twist::new(0.0, 0.0, -0.5, 0.0, 0.0, 0.0));
-        assert_eq!((food.force_n(), opening.amax()), (0.0, 0.0));
+        assert_eq!((food.force_n, opening.amax()), (0.0, 0.0));
     }
 }

@@ -1,24 +1,12 @@
 //! The demand of an axis over time: none, a line to the next cyclic target, a profile, or a constant force.
 
-use super::clamp::clamp_symmetric;
-use super::motion::Motion;
+use super::motion::{Motion, clamp};
 use super::profile::Profile;
 use super::servo::ServoCommand;
 
-/// A cyclic target with its time and velocity limit.
+/// The demand of an axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Approach {
-    /// The target, m.
-    pub(super) target_m: f64,
-    /// Time to the target, s.
-    pub(super) period_s: f64,
-    /// Velocity limit, m/s.
-    pub(super) limit_m_s: f64,
-}
-
-/// The shape of the demand.
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum Shape {
+pub(super) enum Demand {
     /// No demand: the brake is closed.
     Brake,
     /// A straight line from one target to the next within a period, then rest.
@@ -29,36 +17,25 @@ enum Shape {
     Force { force_n: f64 },
 }
 
-/// The demand of an axis.
-#[derive(Debug, Clone)]
-pub(super) struct Demand {
-    shape: Shape,
-}
-
 impl Demand {
-    /// No demand.
-    pub(super) fn new() -> Self {
-        Self { shape: Shape::Brake }
-    }
-
     /// The demanded motion; none while the brake is closed or a force is demanded.
     pub(super) fn at(&self, now_ns: u64) -> Option<Motion> {
-        match &self.shape {
-            Shape::Brake | Shape::Force { .. } => None,
-            Shape::Interpolate { from_m, to_m, from_ns, period_s } => {
+        match self {
+            Self::Brake | Self::Force { .. } => None,
+            Self::Interpolate { from_m, to_m, from_ns, period_s } => {
                 let share = now_ns.saturating_sub(*from_ns) as f64 * 1e-9 / period_s;
                 let way_m = to_m - from_m;
                 let moving = Motion { position_m: from_m + way_m * share, velocity_m_s: way_m / period_s };
                 Some(if share < 1.0 { moving } else { Motion::at_rest(*to_m) })
             }
-            Shape::Profile(profile) => Some(profile.at(now_ns)),
+            Self::Profile(profile) => Some(profile.at(now_ns)),
         }
     }
 
     /// The servo's command at that time.
     pub(super) fn servo_command(&self, now_ns: u64) -> ServoCommand {
-        match (&self.shape, self.at(now_ns)) {
-            (Shape::Force { force_n }, _) => ServoCommand::Force { force_n: *force_n },
+        match (self, self.at(now_ns)) {
+            (Self::Force { force_n }, _) => ServoCommand::Force { force_n: *force_n },
             (_, Some(motion)) => ServoCommand::Follow(motion),
             (_, None) => ServoCommand::Brake,
         }
@@ -71,58 +48,44 @@ impl Demand {
 
     /// Interpolates to a target over the coming period, from the end of the present demand or from `actual_m`.
     /// The way is limited by the velocity limit; returns whether it was.
-    pub(super) fn interpolate(&mut self, now_ns: u64, actual_m: f64, approach: Approach) -> bool {
-        let Approach { target_m, period_s, limit_m_s } = approach;
-        let from_m = match &self.shape {
-            Shape::Brake | Shape::Force { .. } => actual_m,
-            Shape::Interpolate { to_m, .. } => *to_m,
-            Shape::Profile(profile) => profile.at(now_ns).position_m,
+    pub(super) fn interpolate(
+        &mut self,
+        now_ns: u64,
+        actual_m: f64,
+        target_m: f64,
+        period_s: f64,
+        limit_m_s: f64,
+    ) -> bool {
+        let from_m = match self {
+            Self::Brake | Self::Force { .. } => actual_m,
+            Self::Interpolate { to_m, .. } => *to_m,
+            Self::Profile(profile) => profile.at(now_ns).position_m,
         };
-        let (step_m, is_limited) = clamp_symmetric(target_m - from_m, limit_m_s * period_s);
-        self.shape = Shape::Interpolate { from_m, to_m: from_m + step_m, from_ns: now_ns, period_s };
+        let limit_m = limit_m_s * period_s;
+        let (step_m, is_limited) = clamp(target_m - from_m, [-limit_m, limit_m]);
+        *self = Self::Interpolate { from_m, to_m: from_m + step_m, from_ns: now_ns, period_s };
         is_limited
-    }
-
-    /// Whether the demand interpolates between cyclic targets.
-    pub(super) fn is_interpolated(&self) -> bool {
-        matches!(self.shape, Shape::Interpolate { .. })
-    }
-
-    /// Follows a profile.
-    pub(super) fn follow(&mut self, profile: Profile) {
-        self.shape = Shape::Profile(profile);
-    }
-
-    /// Demands a force.
-    pub(super) fn push(&mut self, force_n: f64) {
-        self.shape = Shape::Force { force_n };
     }
 
     /// Slows down from the demanded position (the actual one under a force) and the actual velocity. The demanded
     /// velocity is no guide: it is zero at the end of a line, which is when SYNC brings the command. A closed
     /// brake stays closed.
     pub(super) fn slow_down(&mut self, now_ns: u64, actual: Motion, deceleration_m_s2: f64) {
-        if self.shape != Shape::Brake {
+        if *self != Self::Brake {
             let position_m = self.position_m(now_ns).unwrap_or(actual.position_m);
-            self.follow(Profile::stop(now_ns, Motion { position_m, ..actual }, deceleration_m_s2));
+            let start = Motion { position_m, ..actual };
+            *self = Self::Profile(Profile::stop(now_ns, start, deceleration_m_s2));
         }
     }
 
     /// Whether the demand is no motion.
     pub(super) fn is_at_rest(&self, now_ns: u64) -> bool {
-        match &self.shape {
-            Shape::Brake => true,
-            Shape::Force { .. } => false,
-            Shape::Profile(profile) => profile.is_over(now_ns),
-            Shape::Interpolate { .. } => {
-                self.at(now_ns).is_none_or(|motion| motion.velocity_m_s.abs() < 1e-9)
-            }
+        match self {
+            Self::Brake => true,
+            Self::Force { .. } => false,
+            Self::Profile(profile) => profile.is_over(now_ns),
+            Self::Interpolate { .. } => self.at(now_ns).is_none_or(|motion| motion.velocity_m_s.abs() < 1e-9),
         }
-    }
-
-    /// Closes the brake.
-    pub(super) fn release(&mut self) {
-        self.shape = Shape::Brake;
     }
 }
 
@@ -133,18 +96,18 @@ mod tests {
     const MS: u64 = 1_000_000;
 
     /// At no more than 0.4 m/s, in cycles of a millisecond.
-    const fn towards(target_m: f64) -> Approach {
-        Approach { target_m, period_s: 1e-3, limit_m_s: 0.4 }
+    fn approach(demand: &mut Demand, now_ns: u64, target_m: f64) -> bool {
+        demand.interpolate(now_ns, 0.27, target_m, 1e-3, 0.4)
     }
 
     #[test]
     fn targets_are_reached_on_straight_lines_one_period_later() {
-        let mut demand = Demand::new();
+        let mut demand = Demand::Brake;
         assert_eq!(demand.position_m(0), None);
-        assert!(!demand.interpolate(0, 0.27, towards(0.2701)));
+        assert!(!approach(&mut demand, 0, 0.2701));
         let position = |demand: &Demand, ns| demand.position_m(ns).unwrap();
         assert!((position(&demand, MS / 2) - 0.27005).abs() < 1e-12);
-        demand.interpolate(MS, 0.0, towards(0.2703));
+        approach(&mut demand, MS, 0.2703);
         assert!((position(&demand, MS) - 0.2701).abs() < 1e-12);
         assert!((position(&demand, 5 * MS) - 0.2703).abs() < 1e-12);
         assert!(demand.is_at_rest(5 * MS));
@@ -152,15 +115,15 @@ mod tests {
 
     #[test]
     fn a_jump_is_limited_to_what_the_velocity_limit_allows() {
-        let mut demand = Demand::new();
-        assert!(demand.interpolate(0, 0.27, towards(0.30)));
+        let mut demand = Demand::Brake;
+        assert!(approach(&mut demand, 0, 0.30));
         assert!((demand.position_m(MS).unwrap() - 0.2704).abs() < 1e-12);
     }
 
     #[test]
     fn it_slows_down_evenly_and_stays() {
-        let mut demand = Demand::new();
-        demand.interpolate(0, 0.27, towards(0.2702));
+        let mut demand = Demand::Brake;
+        approach(&mut demand, 0, 0.2702);
         demand.slow_down(MS, Motion { position_m: 0.27, velocity_m_s: 0.2 }, 10.0);
         // 0.2 m/s at 10 m/s²: 20 ms and 2 mm.
         assert!(!demand.is_at_rest(MS + 19 * MS));
@@ -170,8 +133,7 @@ mod tests {
 
     #[test]
     fn from_a_force_it_slows_down_where_the_axis_is() {
-        let mut demand = Demand::new();
-        demand.push(20.0);
+        let mut demand = Demand::Force { force_n: 20.0 };
         assert_eq!(demand.servo_command(0), ServoCommand::Force { force_n: 20.0 });
         demand.slow_down(0, Motion { position_m: 0.28, velocity_m_s: 0.1 }, 10.0);
         assert!((demand.position_m(100 * MS).unwrap() - 0.2805).abs() < 1e-9);

@@ -7,16 +7,11 @@
 pub(super) struct FollowingErrorMonitor {
     /// Since when the error has been outside its window, ns.
     outside_since_ns: Option<u64>,
-    /// Whether the drive is in fault because of it.
-    is_fault: bool,
+    /// Whether the drive is in fault because of it: statusword bit 13 of the position modes.
+    pub(super) is_fault: bool,
 }
 
 impl FollowingErrorMonitor {
-    /// Statusword bit 13 of the position modes.
-    pub(super) fn is_fault(self) -> bool {
-        self.is_fault
-    }
-
     /// Judges an error (m); whether it has been outside the window for longer than the time out.
     pub(super) fn exceeds(&mut self, now_ns: u64, error_m: f64, window_m: f64, timeout_ns: u64) -> bool {
         if error_m.abs() <= window_m {
@@ -24,11 +19,6 @@ impl FollowingErrorMonitor {
             return false;
         }
         now_ns - *self.outside_since_ns.get_or_insert(now_ns) > timeout_ns
-    }
-
-    /// The drive went into fault because of the error.
-    pub(super) fn set_fault(&mut self) {
-        self.is_fault = true;
     }
 
     /// Supervision begins anew in another power state; the fault lasts as long as the drive is in fault.

@@ -32,7 +32,7 @@ impl Homing {
     }
 
     /// Whether homing is under way.
-    pub(super) const fn is_running(self) -> bool {
+    pub(crate) const fn is_running(self) -> bool {
         matches!(self, Self::Searching | Self::Settling { .. })
     }
 

@@ -4,12 +4,10 @@
 //! commands, the servo follows the [`Demand`], [`FollowingErrorMonitor`] supervises the servo. [`Parameters`] is
 //! the configuration in the object dictionary.
 
-mod clamp;
 mod demand;
 mod encoder;
 mod following;
 mod homing;
-mod mode;
 mod motion;
 mod parameters;
 mod positioning;
@@ -20,10 +18,9 @@ use masseter_can::cia402::{Command, Controlword, DriveState, StatusBit, Statuswo
 use masseter_shared::config::DriveConfig;
 
 use crate::drive::dictionary::{Objects, names};
-use clamp::clamp_symmetric;
-use demand::{Approach, Demand};
+use demand::Demand;
 use following::FollowingErrorMonitor;
-use motion::{Motion, MotionCommand, PositionView};
+use motion::{Motion, MotionCommand, PositionView, clamp};
 use parameters::{MotionLimits, Parameters};
 use positioning::Positioning;
 use profile::Profile;
@@ -31,7 +28,7 @@ use servo::{Servo, ServoCommand, ServoLimits};
 
 pub(crate) use encoder::Encoder;
 pub(super) use homing::Homing;
-pub(super) use mode::Mode;
+pub(super) use motion::Mode;
 pub(super) use parameters::configure;
 
 /// The cyclic targets that are new at a SYNC.
@@ -53,9 +50,10 @@ pub(super) struct Axis {
     demand: Demand,
     following: FollowingErrorMonitor,
     positioning: Positioning,
-    homing: Homing,
+    pub(super) homing: Homing,
     mode: Mode,
-    power: DriveState,
+    /// State of the power stage.
+    pub(super) power: DriveState,
     controlword: Controlword,
     /// The encoder's last count.
     counts: i32,
@@ -63,7 +61,8 @@ pub(super) struct Axis {
     origin_increments: i32,
     /// Whether the newest cyclic target was limited.
     is_target_limited: bool,
-    force_n: f64,
+    /// The force of the last step on the mechanism, N.
+    pub(super) force_n: f64,
     /// The motor's share of the force: without current the brake holds.
     motor_n: f64,
 }
@@ -83,7 +82,7 @@ impl Axis {
             servo: Servo::new(config, step_s, position_m),
             config,
             encoder,
-            demand: Demand::new(),
+            demand: Demand::Brake,
             following: FollowingErrorMonitor::default(),
             positioning: Positioning::default(),
             homing: Homing::default(),
@@ -97,25 +96,9 @@ impl Axis {
         }
     }
 
-    /// State of the power stage.
-    #[cfg(test)]
-    pub(super) fn power(&self) -> DriveState {
-        self.power
-    }
-
     /// Whether the axis follows targets.
     pub(super) fn is_enabled(&self) -> bool {
         self.power == DriveState::OperationEnabled
-    }
-
-    /// Whether homing is under way.
-    pub(super) fn is_homing(&self) -> bool {
-        self.homing.is_running()
-    }
-
-    /// The force of the last step on the mechanism, N.
-    pub(super) fn force_n(&self) -> f64 {
-        self.force_n
     }
 
     fn is_in_fault(&self) -> bool {
@@ -156,9 +139,9 @@ impl Axis {
                     self.execute(command, now_ns, self.parameters.profile);
                 }
                 Mode::Homing => {
-                    let (parameters, view) = (self.parameters.homing, self.position_view(now_ns));
-                    let command = self.homing.control([before, word], parameters.method, self.counts, view);
-                    self.execute(command, now_ns, parameters.search);
+                    let (method, view) = (self.parameters.homing_method, self.position_view(now_ns));
+                    let command = self.homing.control([before, word], method, self.counts, view);
+                    self.execute(command, now_ns, self.parameters.homing);
                 }
                 Mode::CyclicPosition | Mode::CyclicTorque => {}
             }
@@ -194,7 +177,8 @@ impl Axis {
         }
         match self.mode {
             Mode::CyclicPosition
-                if new.position || self.is_target_limited && self.demand.is_interpolated() =>
+                if new.position
+                    || self.is_target_limited && matches!(self.demand, Demand::Interpolate { .. }) =>
             {
                 self.follow_target(now_ns, objects.get(names::TARGET_POSITION));
             }
@@ -207,16 +191,17 @@ impl Axis {
     fn follow_target(&mut self, now_ns: u64, target: i32) {
         let allowed = self.position_view(now_ns).clamp(target);
         let Parameters { velocity_limit_m_s: limit_m_s, period_s, .. } = self.parameters;
-        let approach = Approach { target_m: self.metres(allowed), period_s, limit_m_s };
-        let is_too_fast = self.demand.interpolate(now_ns, self.measured_m(), approach);
+        let (actual_m, target_m) = (self.measured_m(), self.metres(allowed));
+        let is_too_fast = self.demand.interpolate(now_ns, actual_m, target_m, period_s, limit_m_s);
         self.is_target_limited = is_too_fast || allowed != target;
     }
 
     fn apply_torque(&mut self, torque_permille: i16) {
         let target_n = f64::from(torque_permille) / 1000.0 * self.config.rated_force_n;
-        let (force_n, is_limited) = clamp_symmetric(target_n, self.parameters.force_limit_n);
+        let limit_n = self.parameters.force_limit_n;
+        let (force_n, is_limited) = clamp(target_n, [-limit_n, limit_n]);
         self.is_target_limited = is_limited;
-        self.demand.push(force_n);
+        self.demand = Demand::Force { force_n };
     }
 
     /// A step of the servo loops with the axis at `position_m`; returns whether the following error became a fault.
@@ -231,7 +216,7 @@ impl Axis {
                 }
                 Mode::Homing => {
                     let command = self.homing.step([before, self.counts], self.demand.is_at_rest(now_ns));
-                    self.execute(command, now_ns, self.parameters.homing.search);
+                    self.execute(command, now_ns, self.parameters.homing);
                 }
                 Mode::CyclicPosition | Mode::CyclicTorque => {}
             }
@@ -258,14 +243,14 @@ impl Axis {
         objects.set(names::MODE_DISPLAY, self.mode.number());
         objects.set(names::POSITION_DEMAND, demand);
         objects.set(names::POSITION_ACTUAL, actual);
-        objects.set(names::VELOCITY_ACTUAL, self.encoder.nearest(self.servo.motion().velocity_m_s));
+        objects.set(names::VELOCITY_ACTUAL, self.encoder.nearest(self.servo.motion.velocity_m_s));
         objects.set(names::TORQUE_ACTUAL, torque.round() as i16);
         objects.set(names::FOLLOWING_ERROR, demand.saturating_sub(actual));
     }
 
     fn statusword(&self, now_ns: u64) -> Statusword {
         let is_enabled = self.is_enabled();
-        let is_limited = self.is_target_limited || self.positioning.is_limited() || self.servo.is_limited();
+        let is_limited = self.is_target_limited || self.positioning.is_limited || self.servo.is_limited;
         let word = Statusword::for_state(self.power)
             .with(StatusBit::VoltageEnabled, true)
             .with(StatusBit::Remote, true)
@@ -273,19 +258,19 @@ impl Axis {
         match self.mode {
             Mode::CyclicPosition => word
                 .with(StatusBit::TargetFollowed, is_enabled)
-                .with(StatusBit::FollowingError, self.following.is_fault()),
+                .with(StatusBit::FollowingError, self.following.is_fault),
             Mode::CyclicTorque => word.with(StatusBit::TargetFollowed, is_enabled),
             Mode::ProfilePosition => word
                 .with(StatusBit::TargetReached, is_enabled && self.has_reached_setpoint(now_ns))
-                .with(StatusBit::SETPOINT_ACKNOWLEDGED, is_enabled && self.positioning.is_acknowledged())
-                .with(StatusBit::FollowingError, self.following.is_fault()),
+                .with(StatusBit::SETPOINT_ACKNOWLEDGED, is_enabled && self.positioning.is_acknowledged)
+                .with(StatusBit::FollowingError, self.following.is_fault),
             Mode::Homing => self.homing.show(word, self.demand.is_at_rest(now_ns)),
         }
     }
 
     /// Statusword bit 10 of profile position: within the position window of the last set-point, or halted.
     fn has_reached_setpoint(&self, now_ns: u64) -> bool {
-        if !self.demand.is_at_rest(now_ns) || self.positioning.has_next() {
+        if !self.demand.is_at_rest(now_ns) || self.positioning.waiting.is_some() {
             return false;
         }
         let demand_m = self.demand.position_m(now_ns).unwrap_or(self.measured_m());
@@ -300,10 +285,10 @@ impl Axis {
         self.following.restart(self.is_in_fault());
         self.interrupt_mode();
         match state {
-            DriveState::OperationEnabled => self.enable(),
+            DriveState::OperationEnabled => self.enable(now_ns),
             DriveState::QuickStopActive => self.stop(now_ns, self.parameters.quick_stop_m_s2),
             DriveState::FaultReactionActive => self.stop(now_ns, self.parameters.fault_stop_m_s2),
-            _ => self.demand.release(),
+            _ => self.demand = Demand::Brake,
         }
     }
 
@@ -313,10 +298,11 @@ impl Axis {
     }
 
     /// The cyclic modes wait for their first target behind a closed brake; the other modes hold the position.
-    fn enable(&mut self) {
-        let waits = matches!(self.mode, Mode::CyclicPosition | Mode::CyclicTorque);
-        if !waits {
-            self.demand.follow(Profile::hold(self.measured_m()));
+    fn enable(&mut self, now_ns: u64) {
+        if matches!(self.mode, Mode::ProfilePosition | Mode::Homing) {
+            let here = Motion::at_rest(self.measured_m());
+            self.demand =
+                Demand::Profile(Profile::stop(now_ns, here, self.parameters.profile.deceleration_m_s2));
         }
     }
 
@@ -342,7 +328,7 @@ impl Axis {
             return false;
         }
         self.enter(self.power.after_fault(), now_ns);
-        self.following.set_fault();
+        self.following.is_fault = true;
         true
     }
 
@@ -352,13 +338,13 @@ impl Axis {
             None => {}
             Some(MotionCommand::MoveTo { target }) => {
                 let start = self.demand.at(now_ns).unwrap_or(Motion::at_rest(self.measured_m()));
-                self.demand.follow(Profile::to(now_ns, start, self.metres(target), &limits));
+                self.demand = Demand::Profile(Profile::to(now_ns, start, self.metres(target), &limits));
             }
             Some(MotionCommand::SlowDown) => self.slow_down(now_ns, limits.deceleration_m_s2),
             // Zero is the home offset (607Ch) beyond home, so that home has the position minus the offset (CiA 402).
             Some(MotionCommand::SetHome { counts }) => {
                 self.origin_increments =
-                    0_i32.saturating_sub(counts).saturating_sub(self.parameters.homing.offset_increments);
+                    0_i32.saturating_sub(counts).saturating_sub(self.parameters.home_offset);
             }
         }
     }
@@ -366,12 +352,12 @@ impl Axis {
     fn stop(&mut self, now_ns: u64, deceleration_m_s2: Option<f64>) {
         match deceleration_m_s2 {
             Some(deceleration_m_s2) => self.slow_down(now_ns, deceleration_m_s2),
-            None => self.demand.release(),
+            None => self.demand = Demand::Brake,
         }
     }
 
     fn slow_down(&mut self, now_ns: u64, deceleration_m_s2: f64) {
-        self.demand.slow_down(now_ns, self.servo.motion(), deceleration_m_s2);
+        self.demand.slow_down(now_ns, self.servo.motion, deceleration_m_s2);
     }
 
     /// In force control the axis may be no faster than it can stop before the software position limits, at the
@@ -401,7 +387,7 @@ impl Axis {
 
     /// The measured position, m in the encoder's coordinates.
     fn measured_m(&self) -> f64 {
-        self.servo.motion().position_m
+        self.servo.motion.position_m
     }
 
     /// Position actual value (6064h).

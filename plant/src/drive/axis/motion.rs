@@ -1,4 +1,4 @@
-//! Values that the parts of an axis exchange: motion, the view of a mode of operation, and its commands.
+//! Values that the parts of an axis exchange: modes of operation, their view and their commands, motion.
 
 /// Position and velocity of an axis at an instant.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -13,6 +13,34 @@ impl Motion {
     /// At rest at a position.
     pub(crate) const fn at_rest(position_m: f64) -> Self {
         Self { position_m, velocity_m_s: 0.0 }
+    }
+}
+
+/// The value clamped to `[low, high]`, and whether it was outside.
+pub(super) fn clamp(asked: f64, [low, high]: [f64; 2]) -> (f64, bool) {
+    let kept = asked.max(low).min(high);
+    (kept, kept.to_bits() != asked.to_bits())
+}
+
+/// Mode of operation (6060h).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Mode {
+    ProfilePosition = 1,
+    Homing = 6,
+    CyclicPosition = 8,
+    CyclicTorque = 10,
+}
+
+impl Mode {
+    /// The mode of that number; `None` where the drive has no such mode.
+    pub(crate) fn from_number(number: i8) -> Option<Self> {
+        let modes = [Self::ProfilePosition, Self::Homing, Self::CyclicPosition, Self::CyclicTorque];
+        modes.into_iter().find(|mode| mode.number() == number)
+    }
+
+    /// The mode's number.
+    pub(crate) const fn number(self) -> i8 {
+        self as i8
     }
 }
 
@@ -42,4 +70,17 @@ pub(super) enum MotionCommand {
     SlowDown,
     /// Make that count of the encoder the home position.
     SetHome { counts: i32 },
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_value_outside_becomes_the_nearer_limit_and_is_reported() {
+        let table = [(3.0, (2.0, true)), (2.0, (2.0, false)), (-0.0, (-0.0, false)), (-5.0, (-1.0, true))];
+        for (asked, kept) in table {
+            assert_eq!(clamp(asked, [-1.0, 2.0]), kept);
+        }
+    }
 }

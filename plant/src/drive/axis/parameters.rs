@@ -19,14 +19,6 @@ pub(super) struct MotionLimits {
     pub(super) deceleration_m_s2: f64,
 }
 
-/// Parameters of homing (6098h, 6099h, 609Ah, 607Ch).
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct HomingParameters {
-    pub(super) method: i8,
-    pub(super) search: MotionLimits,
-    pub(super) offset_increments: i32,
-}
-
 /// The configuration of an axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Parameters {
@@ -55,8 +47,12 @@ pub(super) struct Parameters {
     pub(super) fault_stop_m_s2: Option<f64>,
     /// Abort connection option code (6007h).
     pub(super) abort_connection_option: i16,
-    /// Homing.
-    pub(super) homing: HomingParameters,
+    /// Homing method (6098h).
+    pub(super) homing_method: i8,
+    /// Search for a reference mark (6099h, 609Ah).
+    pub(super) homing: MotionLimits,
+    /// Home offset (607Ch), increments.
+    pub(super) home_offset: i32,
 }
 
 impl Parameters {
@@ -78,14 +74,14 @@ impl Parameters {
         let window = Some(objects.get(names::FOLLOWING_WINDOW)).filter(|&window| window != NO_WINDOW);
         let torque_limit_n = f64::from(objects.get(names::MAX_TORQUE)) / 1000.0 * drive.rated_force_n;
         let exponent = i32::from(objects.get(names::PERIOD_INDEX));
-        let offset_increments = objects.get(names::HOME_OFFSET);
+        let home_offset = objects.get(names::HOME_OFFSET);
         let homing_m_s2 = metres(objects.get(names::HOMING_ACCELERATION));
         Self {
             period_s: f64::from(objects.get(names::PERIOD_VALUE)) * 10.0_f64.powi(exponent),
             velocity_limit_m_s,
             force_limit_n: torque_limit_n.min(drive.max_force_n),
             position_limits: [names::MIN_POSITION_LIMIT, names::MAX_POSITION_LIMIT]
-                .map(|end| objects.get(end).saturating_sub(offset_increments)),
+                .map(|end| objects.get(end).saturating_sub(home_offset)),
             following_window_m: window.map(metres),
             following_timeout_ns: u64::from(objects.get(names::FOLLOWING_TIMEOUT_MS)) * MILLISECOND_NS,
             position_window_m: metres(objects.get(names::POSITION_WINDOW)),
@@ -94,15 +90,13 @@ impl Parameters {
             holds_quick_stop: objects.get(names::QUICK_STOP_OPTION) >= 5,
             fault_stop_m_s2: stop(objects.get(names::FAULT_OPTION)),
             abort_connection_option: objects.get(names::ABORT_CONNECTION_OPTION),
-            homing: HomingParameters {
-                method: objects.get(names::HOMING_METHOD),
-                search: MotionLimits {
-                    velocity_m_s: metres(objects.get(names::HOMING_SPEED_ZERO)).min(velocity_limit_m_s),
-                    acceleration_m_s2: homing_m_s2,
-                    deceleration_m_s2: homing_m_s2,
-                },
-                offset_increments,
+            homing_method: objects.get(names::HOMING_METHOD),
+            homing: MotionLimits {
+                velocity_m_s: metres(objects.get(names::HOMING_SPEED_ZERO)).min(velocity_limit_m_s),
+                acceleration_m_s2: homing_m_s2,
+                deceleration_m_s2: homing_m_s2,
             },
+            home_offset,
         }
     }
 }

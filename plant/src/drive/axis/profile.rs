@@ -24,12 +24,6 @@ pub(super) struct Profile {
 }
 
 impl Profile {
-    /// At rest.
-    pub(super) fn hold(position_m: f64) -> Self {
-        let start = Motion::at_rest(position_m);
-        Self { from_ns: 0, start, phases: [Phase::default(); 4], end_m: position_m }
-    }
-
     /// To rest at that deceleration.
     pub(super) fn stop(from_ns: u64, start: Motion, deceleration_m_s2: f64) -> Self {
         let Motion { position_m, velocity_m_s } = start;

@@ -5,8 +5,7 @@
 
 use masseter_shared::config::DriveConfig;
 
-use super::clamp::{clamp, clamp_symmetric};
-use super::motion::Motion;
+use super::motion::{Motion, clamp};
 
 /// Time constant of the filter on the measured velocity, s.
 const VELOCITY_FILTER_S: f64 = 5e-4;
@@ -44,10 +43,12 @@ pub(super) struct ServoLimits {
 pub(super) struct Servo {
     config: DriveConfig,
     step_s: f64,
-    motion: Motion,
+    /// The last measured position with the filtered velocity.
+    pub(super) motion: Motion,
     integral_n: f64,
     brake_at_m: Option<f64>,
-    is_limited: bool,
+    /// Whether the last step limited force or velocity.
+    pub(super) is_limited: bool,
 }
 
 impl Servo {
@@ -61,16 +62,6 @@ impl Servo {
             brake_at_m: Some(position_m),
             is_limited: false,
         }
-    }
-
-    /// The last measured position with the filtered velocity.
-    pub(super) fn motion(&self) -> Motion {
-        self.motion
-    }
-
-    /// Whether the last step limited force or velocity.
-    pub(super) fn is_limited(&self) -> bool {
-        self.is_limited
     }
 
     /// One step of the loops: the force for the next `step_s`, N.
@@ -100,9 +91,11 @@ impl Servo {
         self.brake_at_m = None;
         let unlimited_m_s =
             desired.velocity_m_s + config.position_gain_per_s * (desired.position_m - actual.position_m);
-        let (speed_m_s, is_velocity_limited) = clamp_symmetric(unlimited_m_s, limits.velocity_m_s);
+        let (speed_m_s, is_velocity_limited) =
+            clamp(unlimited_m_s, [-limits.velocity_m_s, limits.velocity_m_s]);
         let proportional_n = config.velocity_gain_n_s_per_m * (speed_m_s - actual.velocity_m_s);
-        let (force_n, is_force_limited) = clamp_symmetric(proportional_n + self.integral_n, limits.force_n);
+        let (force_n, is_force_limited) =
+            clamp(proportional_n + self.integral_n, [-limits.force_n, limits.force_n]);
         self.is_limited = is_velocity_limited || is_force_limited;
         if !self.is_limited {
             self.integral_n += proportional_n * self.step_s / config.velocity_integral_time_s;
@@ -117,7 +110,7 @@ impl Servo {
         let range_n =
             limits.free_velocity_m_s.map(|end| self.config.velocity_gain_n_s_per_m * (end - velocity_m_s));
         let (allowed_n, is_velocity_limited) = clamp(asked_n, range_n);
-        let (force_n, is_force_limited) = clamp_symmetric(allowed_n, limits.force_n);
+        let (force_n, is_force_limited) = clamp(allowed_n, [-limits.force_n, limits.force_n]);
         self.is_limited = is_velocity_limited || is_force_limited;
         // When the position loop takes over it begins with this force.
         self.integral_n = force_n;
@@ -176,7 +169,7 @@ mod tests {
     fn pull(limits: &ServoLimits) -> (f64, bool) {
         let mut servo = Servo::new(DrivesConfig::default().leg, STEP_S, 0.27);
         let force_n = servo.step(0.27, ServoCommand::Follow(Motion::at_rest(5.0)), limits);
-        (force_n, servo.is_limited())
+        (force_n, servo.is_limited)
     }
 
     #[test]
@@ -194,9 +187,9 @@ mod tests {
     fn a_force_is_given_as_it_is_asked_for() {
         let mut servo = Servo::new(DrivesConfig::default().leg, STEP_S, 0.27);
         let force_n = servo.step(0.27, ServoCommand::Force { force_n: -33.0 }, &LIMITS);
-        assert!((force_n + 33.0).abs() < 1e-12 && !servo.is_limited());
+        assert!((force_n + 33.0).abs() < 1e-12 && !servo.is_limited);
         let force_n = servo.step(0.27, ServoCommand::Force { force_n: 5000.0 }, &LIMITS);
-        assert!((force_n - 240.0).abs() < 1e-9 && servo.is_limited(), "0.4 m/s times the velocity gain");
+        assert!((force_n - 240.0).abs() < 1e-9 && servo.is_limited, "0.4 m/s times the velocity gain");
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! Objects and entries of the table: type, access, mapping, initial value and limits.
 
-use masseter_can::canopen::ObjectAddress;
+use masseter_can::canopen::{AbortCode, ObjectAddress};
 
 /// Data type of an entry, with its index in the object dictionary (CiA 301, table 44).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -81,7 +81,7 @@ pub(crate) enum Initial {
 /// An entry of an object.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Entry {
-    pub(crate) subindex: u8,
+    pub(crate) address: ObjectAddress,
     pub(crate) name: &'static str,
     pub(crate) kind: DataType,
     pub(crate) access: Access,
@@ -94,19 +94,14 @@ pub(crate) struct Entry {
 impl Entry {
     /// An entry that is neither mapped nor limited.
     pub(super) const fn new(
-        subindex: u8,
+        (index, subindex): (u16, u8),
         name: &'static str,
         kind: DataType,
         access: Access,
         initial: Initial,
     ) -> Self {
-        Self { subindex, name, kind, access, mapping: Mapping::Never, initial, limits: None }
-    }
-
-    /// Sub-index 0 of an object that has others.
-    pub(super) const fn highest(subindex: u8) -> Self {
-        let initial = Initial::Value(subindex as i64);
-        Self::new(0, "Highest sub-index supported", DataType::U8, Access::Constant, initial)
+        let address = ObjectAddress::new(index, subindex);
+        Self { address, name, kind, access, mapping: Mapping::Never, initial, limits: None }
     }
 
     pub(super) const fn mapped(mut self, mapping: Mapping) -> Self {
@@ -117,6 +112,44 @@ impl Entry {
     pub(super) const fn within(mut self, lowest: i64, highest: i64) -> Self {
         self.limits = Some((lowest, highest));
         self
+    }
+
+    /// Whether a client may write the entry.
+    ///
+    /// # Errors
+    /// [`AbortCode::READ_ONLY`].
+    pub(crate) fn check_access(&self) -> Result<(), AbortCode> {
+        if self.access == Access::ReadWrite { Ok(()) } else { Err(AbortCode::READ_ONLY) }
+    }
+
+    /// The word that a client may write.
+    ///
+    /// # Errors
+    /// The abort code for a wrong length, a value out of range, or an entry that clients may not write.
+    pub(crate) fn writable(&self, data: &[u8], is_sized: bool) -> Result<u32, AbortCode> {
+        self.check_access()?;
+        let bytes = self.kind.bytes();
+        if is_sized && data.len() > bytes {
+            return Err(AbortCode::TOO_LONG);
+        }
+        let mut word = [0; 4];
+        word[..bytes].copy_from_slice(data.get(..bytes).ok_or(AbortCode::TOO_SHORT)?);
+        let word = u32::from_le_bytes(word);
+        self.check_limits(word)?;
+        Ok(word)
+    }
+
+    /// Whether a value keeps to the limits.
+    ///
+    /// # Errors
+    /// [`AbortCode::TOO_HIGH`], [`AbortCode::TOO_LOW`].
+    pub(crate) fn check_limits(&self, word: u32) -> Result<(), AbortCode> {
+        let value = self.kind.number(word);
+        match self.limits {
+            Some((_, highest)) if value > highest => Err(AbortCode::TOO_HIGH),
+            Some((lowest, _)) if value < lowest => Err(AbortCode::TOO_LOW),
+            _ => Ok(()),
+        }
     }
 }
 
@@ -131,17 +164,16 @@ pub(crate) enum Shape {
 /// An object with its entries, sub-indices ascending.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Object {
-    pub(crate) index: u16,
     pub(crate) name: &'static str,
     pub(crate) shape: Shape,
     pub(crate) entries: &'static [Entry],
 }
 
-/// An entry with its address.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Addressed {
-    pub(crate) address: ObjectAddress,
-    pub(crate) entry: Entry,
+impl Object {
+    /// Its index.
+    pub(crate) const fn index(&self) -> u16 {
+        self.entries[0].address.index
+    }
 }
 
 /// An entry of a mapping parameter: index, sub-index and length in bits.

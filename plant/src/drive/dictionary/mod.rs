@@ -8,5 +8,5 @@ mod objects;
 mod table;
 
 pub(crate) use entry::{Access, DataType, Entry, Initial, Mapping, MappingEntry, Object, Shape};
-pub(crate) use objects::{ENTRIES, Objects, find, within_limits, writable};
+pub(crate) use objects::{ENTRIES, Objects, find};
 pub(crate) use table::{CONSUMED, HISTORY, IDENTITY, MAPPED_MAX, OBJECTS, PDOS};

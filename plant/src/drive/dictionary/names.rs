@@ -2,52 +2,44 @@
 
 use super::objects::{Slot, slot};
 
-macro_rules! names {
-    ($($name:ident: $type:ident = $index:literal, $subindex:literal;)*) => {
-        $(pub(in crate::drive) const $name: Slot<$type> = slot($index, $subindex);)*
-    };
-}
-
-names! {
-    ERROR_REGISTER: u8 = 0x1001, 0;
-    ERROR_COUNT: u8 = 0x1003, 0;
-    NEWEST_ERROR: u32 = 0x1003, 1;
-    EMERGENCY_COB_ID: u32 = 0x1014, 0;
-    CONSUMER_HEARTBEAT_TIME: u32 = 0x1016, 1;
-    PRODUCER_HEARTBEAT_TIME_MS: u16 = 0x1017, 0;
-    SYNC_OVERFLOW: u8 = 0x1019, 0;
-    COMMUNICATION_ERROR: u8 = 0x1029, 1;
-    ABORT_CONNECTION_OPTION: i16 = 0x6007, 0;
-    ERROR_CODE: u16 = 0x603F, 0;
-    CONTROLWORD: u16 = 0x6040, 0;
-    STATUSWORD: u16 = 0x6041, 0;
-    QUICK_STOP_OPTION: i16 = 0x605A, 0;
-    FAULT_OPTION: i16 = 0x605E, 0;
-    MODE: i8 = 0x6060, 0;
-    MODE_DISPLAY: i8 = 0x6061, 0;
-    POSITION_DEMAND: i32 = 0x6062, 0;
-    POSITION_ACTUAL: i32 = 0x6064, 0;
-    FOLLOWING_WINDOW: u32 = 0x6065, 0;
-    FOLLOWING_TIMEOUT_MS: u16 = 0x6066, 0;
-    POSITION_WINDOW: u32 = 0x6067, 0;
-    VELOCITY_ACTUAL: i32 = 0x606C, 0;
-    TARGET_TORQUE: i16 = 0x6071, 0;
-    MAX_TORQUE: u16 = 0x6072, 0;
-    TORQUE_ACTUAL: i16 = 0x6077, 0;
-    TARGET_POSITION: i32 = 0x607A, 0;
-    HOME_OFFSET: i32 = 0x607C, 0;
-    MIN_POSITION_LIMIT: i32 = 0x607D, 1;
-    MAX_POSITION_LIMIT: i32 = 0x607D, 2;
-    MAX_VELOCITY: u32 = 0x607F, 0;
-    PROFILE_VELOCITY: u32 = 0x6081, 0;
-    PROFILE_ACCELERATION: u32 = 0x6083, 0;
-    PROFILE_DECELERATION: u32 = 0x6084, 0;
-    QUICK_STOP_DECELERATION: u32 = 0x6085, 0;
-    HOMING_METHOD: i8 = 0x6098, 0;
-    HOMING_SPEED_SWITCH: u32 = 0x6099, 1;
-    HOMING_SPEED_ZERO: u32 = 0x6099, 2;
-    HOMING_ACCELERATION: u32 = 0x609A, 0;
-    PERIOD_VALUE: u8 = 0x60C2, 1;
-    PERIOD_INDEX: i8 = 0x60C2, 2;
-    FOLLOWING_ERROR: i32 = 0x60F4, 0;
-}
+pub(crate) const ERROR_REGISTER: Slot<u8> = slot(0x1001, 0);
+pub(crate) const ERROR_COUNT: Slot<u8> = slot(0x1003, 0);
+pub(crate) const NEWEST_ERROR: Slot<u32> = slot(0x1003, 1);
+pub(crate) const EMERGENCY_COB_ID: Slot<u32> = slot(0x1014, 0);
+pub(crate) const CONSUMER_HEARTBEAT_TIME: Slot<u32> = slot(0x1016, 1);
+pub(crate) const PRODUCER_HEARTBEAT_TIME_MS: Slot<u16> = slot(0x1017, 0);
+pub(crate) const SYNC_OVERFLOW: Slot<u8> = slot(0x1019, 0);
+pub(crate) const COMMUNICATION_ERROR: Slot<u8> = slot(0x1029, 1);
+pub(crate) const ABORT_CONNECTION_OPTION: Slot<i16> = slot(0x6007, 0);
+pub(crate) const ERROR_CODE: Slot<u16> = slot(0x603F, 0);
+pub(crate) const CONTROLWORD: Slot<u16> = slot(0x6040, 0);
+pub(crate) const STATUSWORD: Slot<u16> = slot(0x6041, 0);
+pub(crate) const QUICK_STOP_OPTION: Slot<i16> = slot(0x605A, 0);
+pub(crate) const FAULT_OPTION: Slot<i16> = slot(0x605E, 0);
+pub(crate) const MODE: Slot<i8> = slot(0x6060, 0);
+pub(crate) const MODE_DISPLAY: Slot<i8> = slot(0x6061, 0);
+pub(crate) const POSITION_DEMAND: Slot<i32> = slot(0x6062, 0);
+pub(crate) const POSITION_ACTUAL: Slot<i32> = slot(0x6064, 0);
+pub(crate) const FOLLOWING_WINDOW: Slot<u32> = slot(0x6065, 0);
+pub(crate) const FOLLOWING_TIMEOUT_MS: Slot<u16> = slot(0x6066, 0);
+pub(crate) const POSITION_WINDOW: Slot<u32> = slot(0x6067, 0);
+pub(crate) const VELOCITY_ACTUAL: Slot<i32> = slot(0x606C, 0);
+pub(crate) const TARGET_TORQUE: Slot<i16> = slot(0x6071, 0);
+pub(crate) const MAX_TORQUE: Slot<u16> = slot(0x6072, 0);
+pub(crate) const TORQUE_ACTUAL: Slot<i16> = slot(0x6077, 0);
+pub(crate) const TARGET_POSITION: Slot<i32> = slot(0x607A, 0);
+pub(crate) const HOME_OFFSET: Slot<i32> = slot(0x607C, 0);
+pub(crate) const MIN_POSITION_LIMIT: Slot<i32> = slot(0x607D, 1);
+pub(crate) const MAX_POSITION_LIMIT: Slot<i32> = slot(0x607D, 2);
+pub(crate) const MAX_VELOCITY: Slot<u32> = slot(0x607F, 0);
+pub(crate) const PROFILE_VELOCITY: Slot<u32> = slot(0x6081, 0);
+pub(crate) const PROFILE_ACCELERATION: Slot<u32> = slot(0x6083, 0);
+pub(crate) const PROFILE_DECELERATION: Slot<u32> = slot(0x6084, 0);
+pub(crate) const QUICK_STOP_DECELERATION: Slot<u32> = slot(0x6085, 0);
+pub(crate) const HOMING_METHOD: Slot<i8> = slot(0x6098, 0);
+pub(crate) const HOMING_SPEED_SWITCH: Slot<u32> = slot(0x6099, 1);
+pub(crate) const HOMING_SPEED_ZERO: Slot<u32> = slot(0x6099, 2);
+pub(crate) const HOMING_ACCELERATION: Slot<u32> = slot(0x609A, 0);
+pub(crate) const PERIOD_VALUE: Slot<u8> = slot(0x60C2, 1);
+pub(crate) const PERIOD_INDEX: Slot<i8> = slot(0x60C2, 2);
+pub(crate) const FOLLOWING_ERROR: Slot<i32> = slot(0x60F4, 0);

@@ -2,9 +2,9 @@
 
 use std::marker::PhantomData;
 
-use masseter_can::canopen::{AbortCode, CobId, NodeId, ObjectAddress};
+use masseter_can::canopen::{AbortCode, NodeId, ObjectAddress};
 
-use super::entry::{Access, Addressed, DataType, Initial};
+use super::entry::{DataType, Entry, Initial, MappingEntry};
 use super::table::OBJECTS;
 
 /// Entries of the table.
@@ -17,30 +17,21 @@ pub(crate) const COUNT: usize = {
     count
 };
 
-/// The table's entries with their addresses, ascending.
-pub(crate) static ENTRIES: [Addressed; COUNT] = FLAT;
+/// The table's entries, addresses ascending.
+pub(crate) static ENTRIES: [Entry; COUNT] = FLAT;
 
-const FLAT: [Addressed; COUNT] = {
-    let first = Addressed { address: ObjectAddress::new(OBJECTS[0].index, 0), entry: OBJECTS[0].entries[0] };
-    let mut flat = [first; COUNT];
+const FLAT: [Entry; COUNT] = {
+    let mut flat = [OBJECTS[0].entries[0]; COUNT];
     let (mut place, mut object) = (0, 0);
     while object < OBJECTS.len() {
-        let mut entry = 0;
-        while entry < OBJECTS[object].entries.len() {
-            let address = ObjectAddress::new(OBJECTS[object].index, OBJECTS[object].entries[entry].subindex);
-            flat[place] = Addressed { address, entry: OBJECTS[object].entries[entry] };
-            assert!(place == 0 || precedes(flat[place - 1].address, address), "addresses must ascend");
-            place += 1;
-            entry += 1;
-        }
+        let entries = OBJECTS[object].entries;
+        let (_, free) = flat.split_at_mut(place);
+        free.split_at_mut(entries.len()).0.copy_from_slice(entries);
+        place += entries.len();
         object += 1;
     }
     flat
 };
-
-const fn precedes(a: ObjectAddress, b: ObjectAddress) -> bool {
-    a.index < b.index || a.index == b.index && a.subindex < b.subindex
-}
 
 /// A type that an entry can have.
 pub(crate) trait Number: Copy {
@@ -69,25 +60,11 @@ macro_rules! numbers {
 numbers!(i8 is I8, i16 is I16, i32 is I32, u8 is U8, u16 is U16, u32 is U32);
 
 /// Place of an entry of that type.
-#[derive(Debug)]
+#[derive(Debug, Clone, Copy)]
 pub(crate) struct Slot<T> {
-    place: usize,
-    kind: PhantomData<T>,
-}
-
-impl<T> Clone for Slot<T> {
-    fn clone(&self) -> Self {
-        *self
-    }
-}
-
-impl<T> Copy for Slot<T> {}
-
-impl<T> Slot<T> {
     /// Where it is among [`ENTRIES`].
-    pub(crate) const fn place(self) -> usize {
-        self.place
-    }
+    pub(crate) place: usize,
+    kind: PhantomData<T>,
 }
 
 /// The place of an entry of the table; an entry that does not exist does not compile.
@@ -96,7 +73,7 @@ pub(crate) const fn slot<T: Number>(index: u16, subindex: u8) -> Slot<T> {
     while FLAT[place].address.index != index || FLAT[place].address.subindex != subindex {
         place += 1;
     }
-    assert!(FLAT[place].entry.kind as u8 == T::KIND as u8, "the entry is of another type");
+    assert!(FLAT[place].kind as u8 == T::KIND as u8, "the entry is of another type");
     Slot { place, kind: PhantomData }
 }
 
@@ -116,20 +93,18 @@ pub(crate) fn find(address: ObjectAddress) -> Result<usize, AbortCode> {
 /// The values of a drive's object dictionary.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Objects {
-    words: [u32; COUNT],
+    /// One word for each of [`ENTRIES`], whatever its access.
+    pub(crate) words: [u32; COUNT],
 }
 
 impl Objects {
     /// The values after power-on; those that the scenario configures are still 0.
     pub(crate) fn new(node: NodeId) -> Self {
-        let mut words = [0; COUNT];
-        for (word, addressed) in words.iter_mut().zip(&ENTRIES) {
-            *word = match addressed.entry.initial {
-                Initial::Value(value) => value as u32,
-                Initial::OfNode(base) => base + u32::from(node.get()),
-                Initial::Configured | Initial::Text(_) => 0,
-            };
-        }
+        let words = ENTRIES.each_ref().map(|entry| match entry.initial {
+            Initial::Value(value) => value as u32,
+            Initial::OfNode(base) => base + u32::from(node.get()),
+            Initial::Configured | Initial::Text(_) => 0,
+        });
         Self { words }
     }
 
@@ -143,86 +118,46 @@ impl Objects {
         self.words[slot.place] = value.word();
     }
 
-    /// The word at a place of [`ENTRIES`].
-    pub(crate) fn word(&self, place: usize) -> u32 {
-        self.words[place]
-    }
-
-    /// Changes the word at a place of [`ENTRIES`].
-    pub(crate) fn set_word(&mut self, place: usize, word: u32) {
-        self.words[place] = word;
-    }
-
     /// The word of an entry that the table is known to have.
     ///
     /// # Panics
     /// Where it has no such entry.
     pub(crate) fn at(&self, index: u16, subindex: u8) -> u32 {
         let address = ObjectAddress::new(index, subindex);
-        self.word(find(address).unwrap_or_else(|_| panic!("the table has no entry {address}")))
+        self.words[find(address).unwrap_or_else(|_| panic!("the table has no entry {address}"))]
     }
 
-    /// The COB-ID of such an entry.
-    pub(crate) fn cob_id(&self, index: u16, subindex: u8) -> CobId {
-        CobId(self.at(index, subindex))
+    /// The first `count` entries of a mapping parameter.
+    pub(crate) fn mapping(&self, index: u16, count: u32) -> impl Iterator<Item = MappingEntry> {
+        (1..=count as u8).map(move |subindex| MappingEntry(self.at(index, subindex)))
+    }
+
+    /// The places of the objects that a mapping parameter maps.
+    pub(crate) fn mapped(&self, index: u16) -> impl Iterator<Item = usize> {
+        let entries = self.mapping(index, self.at(index, 0));
+        entries.map(|entry| find(entry.object()).expect("only what exists can be mapped"))
     }
 
     /// Takes all values in that range of indices from another dictionary.
     pub(crate) fn copy_range(&mut self, from: &Self, indices: std::ops::RangeInclusive<u16>) {
-        for (place, addressed) in ENTRIES.iter().enumerate() {
-            if indices.contains(&addressed.address.index) {
+        for (place, entry) in ENTRIES.iter().enumerate() {
+            if indices.contains(&entry.address.index) {
                 self.words[place] = from.words[place];
             }
         }
     }
 }
 
-/// The memory word that a client may write to an entry.
-///
-/// # Errors
-/// The abort code for a wrong length, a value out of range, or an entry that clients may not write.
-pub(crate) fn writable(place: usize, data: &[u8], is_sized: bool) -> Result<u32, AbortCode> {
-    let entry = &ENTRIES[place].entry;
-    if entry.access != Access::ReadWrite {
-        return Err(AbortCode::READ_ONLY);
-    }
-    let bytes = entry.kind.bytes();
-    if is_sized && data.len() > bytes {
-        return Err(AbortCode::TOO_LONG);
-    }
-    let data = data.get(..bytes).ok_or(AbortCode::TOO_SHORT)?;
-    let mut word = [0; 4];
-    word[..bytes].copy_from_slice(data);
-    let word = u32::from_le_bytes(word);
-    within_limits(place, word)?;
-    Ok(word)
-}
-
-/// Whether a value keeps to the entry's limits.
-///
-/// # Errors
-/// [`AbortCode::TOO_HIGH`], [`AbortCode::TOO_LOW`].
-pub(crate) fn within_limits(place: usize, word: u32) -> Result<(), AbortCode> {
-    let entry = &ENTRIES[place].entry;
-    let Some((lowest, highest)) = entry.limits else { return Ok(()) };
-    let value = entry.kind.number(word);
-    if value > highest {
-        return Err(AbortCode::TOO_HIGH);
-    }
-    if value < lowest {
-        return Err(AbortCode::TOO_LOW);
-    }
-    Ok(())
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::drive::dictionary::Access;
 
     #[test]
     fn every_entry_is_found_at_its_address() {
-        for (place, addressed) in ENTRIES.iter().enumerate() {
-            assert_eq!(find(addressed.address), Ok(place));
+        for (place, entry) in ENTRIES.iter().enumerate() {
+            assert_eq!(find(entry.address), Ok(place));
+            assert!(place == 0 || ENTRIES[place - 1].address < entry.address, "addresses must ascend");
         }
         assert_eq!(find(ObjectAddress::new(0x1018, 5)), Err(AbortCode::NO_SUBINDEX));
         assert_eq!(find(ObjectAddress::new(0x1800, 4)), Err(AbortCode::NO_SUBINDEX));
@@ -234,10 +169,10 @@ mod tests {
     #[test]
     fn sub_index_0_is_the_highest_of_its_object() {
         for object in OBJECTS.iter().filter(|object| object.entries.len() > 1) {
-            let last = object.entries[object.entries.len() - 1].subindex;
+            let last = object.entries[object.entries.len() - 1].address.subindex;
             let first = object.entries[0];
             if first.access == Access::Constant {
-                assert_eq!(first.initial, Initial::Value(i64::from(last)), "{:04X}h", object.index);
+                assert_eq!(first.initial, Initial::Value(i64::from(last)), "{}", object.name);
             }
         }
     }
@@ -245,9 +180,9 @@ mod tests {
     #[test]
     fn initial_values_keep_to_their_limits() {
         let objects = Objects::new(NodeId::new(5).unwrap());
-        for (place, addressed) in ENTRIES.iter().enumerate() {
-            if addressed.entry.initial != Initial::Configured {
-                assert_eq!(within_limits(place, objects.word(place)), Ok(()), "{}", addressed.address);
+        for (entry, word) in ENTRIES.iter().zip(objects.words) {
+            if entry.initial != Initial::Configured {
+                assert_eq!(entry.check_limits(word), Ok(()), "{}", entry.address);
             }
         }
     }

@@ -6,10 +6,15 @@
 use masseter_can::canopen::{AbortCode, Expedited, ObjectAddress};
 
 use super::rules::check;
-use super::sdo::{Dictionary, Value};
 use super::storage::Storage;
 use crate::drive::axis::Axis;
-use crate::drive::dictionary::{Access, ENTRIES, Initial, Objects, find, names, writable};
+use crate::drive::dictionary::{ENTRIES, Initial, Objects, find, names};
+
+/// A value that was read.
+pub(super) enum Value {
+    Number(Expedited),
+    Text(&'static str),
+}
 
 /// A client's access at an instant.
 pub(super) struct DictionaryAccess<'a> {
@@ -22,10 +27,11 @@ pub(super) struct DictionaryAccess<'a> {
     pub(super) written: Option<ObjectAddress>,
 }
 
-impl Dictionary for DictionaryAccess<'_> {
-    fn read(&mut self, object: ObjectAddress) -> Result<Value, AbortCode> {
+impl DictionaryAccess<'_> {
+    /// The value of an entry.
+    pub(super) fn read(&mut self, object: ObjectAddress) -> Result<Value, AbortCode> {
         let place = find(object)?;
-        let entry = &ENTRIES[place].entry;
+        let entry = &ENTRIES[place];
         if let Initial::Text(text) = entry.initial {
             return Ok(Value::Text(text));
         }
@@ -33,25 +39,26 @@ impl Dictionary for DictionaryAccess<'_> {
             return Err(AbortCode::NO_DATA);
         }
         self.axis.show(self.now_ns, self.objects);
-        let word = self.objects.word(place).to_le_bytes();
+        let word = self.objects.words[place].to_le_bytes();
         let data = Expedited::new(&word[..entry.kind.bytes()]).ok_or(AbortCode::GENERAL)?;
         Ok(Value::Number(data))
     }
 
-    fn accepts(&self, object: ObjectAddress) -> Result<(), AbortCode> {
-        let entry = &ENTRIES[find(object)?].entry;
-        if entry.access == Access::ReadWrite { Ok(()) } else { Err(AbortCode::READ_ONLY) }
-    }
-
-    fn write(&mut self, object: ObjectAddress, data: &[u8], is_sized: bool) -> Result<(), AbortCode> {
+    /// Writes an entry; where `is_sized` is false, `data` may be longer than the value.
+    pub(super) fn write(
+        &mut self,
+        object: ObjectAddress,
+        data: &[u8],
+        is_sized: bool,
+    ) -> Result<(), AbortCode> {
         let place = find(object)?;
-        let word = writable(place, data, is_sized)?;
+        let word = ENTRIES[place].writable(data, is_sized)?;
         check(object, word, self.objects, self.axis, self.is_operational)?;
         match object.index {
             0x1010 => self.storage.store(self.objects),
-            0x1011 => self.storage.restore_factory(),
+            0x1011 => self.storage.stored = self.storage.factory.clone(),
             _ => {
-                self.objects.set_word(place, word);
+                self.objects.words[place] = word;
                 self.written = Some(object);
             }
         }

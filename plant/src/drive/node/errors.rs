@@ -2,6 +2,7 @@
 //!
 //! The module sends nothing; its caller does.
 
+use arrayvec::ArrayVec;
 use masseter_can::canopen::{Emergency, EmergencyCode};
 
 use crate::drive::dictionary::names::{ERROR_CODE, ERROR_COUNT, ERROR_REGISTER, NEWEST_ERROR};
@@ -12,7 +13,7 @@ const GENERIC: u8 = 1 << 0;
 const COMMUNICATION: u8 = 1 << 4;
 const PROFILE: u8 = 1 << 5;
 
-/// The number of errors that the drive knows.
+/// The number of errors that the drive knows: room for every error once.
 const COUNT: usize = 9;
 
 /// The errors that put the drive into fault and last until it is reset: a following error outside its window for longer
@@ -20,52 +21,44 @@ const COUNT: usize = 9;
 pub(super) const FAULTS: [EmergencyCode; 2] = [EmergencyCode::FOLLOWING_ERROR, EmergencyCode::COMMUNICATION];
 
 /// The present errors, the newest first.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Default)]
 pub(super) struct Errors {
-    present: [Option<EmergencyCode>; COUNT],
+    present: ArrayVec<EmergencyCode, COUNT>,
 }
 
 impl Errors {
     /// An error appears; returns its emergency message, unless the error was present already.
     pub(super) fn raise(&mut self, error: EmergencyCode, objects: &mut Objects) -> Option<Emergency> {
-        if self.present.contains(&Some(error)) {
+        if self.present.contains(&error) {
             return None;
         }
-        // There is room for every error once, so that the last place is free.
-        self.present.rotate_right(1);
-        self.present[0] = Some(error);
+        self.present.insert(0, error);
         remember(error, objects);
         Some(self.emergency(error, objects))
     }
 
     /// An error disappears; returns the emergency message, if the error was present.
     pub(super) fn clear(&mut self, error: EmergencyCode, objects: &mut Objects) -> Option<Emergency> {
-        let place = self.present.iter().position(|present| *present == Some(error))?;
-        self.present[place] = None;
-        self.present[place..].rotate_left(1);
+        let place = self.present.iter().position(|present| *present == error)?;
+        self.present.remove(place);
         Some(self.emergency(EmergencyCode::RESET, objects))
     }
 
     /// Clears the errors of the communication without a message, as its reset does; faults stay.
     pub(super) fn forget_communication(&mut self, objects: &mut Objects) {
-        let before = std::mem::take(&mut self.present);
-        let faults = before.into_iter().flatten().filter(|error| FAULTS.contains(error));
-        for (place, fault) in self.present.iter_mut().zip(faults) {
-            *place = Some(fault);
-        }
+        self.present.retain(|error| FAULTS.contains(error));
         self.show(objects);
     }
 
-    fn emergency(self, code: EmergencyCode, objects: &mut Objects) -> Emergency {
+    fn emergency(&self, code: EmergencyCode, objects: &mut Objects) -> Emergency {
         Emergency { code, register: self.show(objects), vendor: [0; 5] }
     }
 
     /// Updates the error register and the error code (603Fh), which is that of the newest present error.
-    fn show(self, objects: &mut Objects) -> u8 {
-        let present = self.present.into_iter().flatten();
-        let register = present.fold(0, |register, error| register | register_bits(error));
+    fn show(&self, objects: &mut Objects) -> u8 {
+        let register = self.present.iter().fold(0, |register, error| register | register_bits(*error));
         objects.set(ERROR_REGISTER, register);
-        objects.set(ERROR_CODE, self.present[0].map_or(0, |error| error.0));
+        objects.set(ERROR_CODE, self.present.first().map_or(0, |error| error.0));
         register
     }
 }
@@ -77,19 +70,14 @@ fn register_bits(error: EmergencyCode) -> u8 {
 
 /// Adds an error at the beginning of the history; the oldest one drops out.
 fn remember(code: EmergencyCode, objects: &mut Objects) {
-    for place in (1..HISTORY).rev() {
-        let word = objects.word(NEWEST_ERROR.place() + place - 1);
-        objects.set_word(NEWEST_ERROR.place() + place, word);
-    }
+    objects.words[NEWEST_ERROR.place..][..HISTORY].rotate_right(1);
     objects.set(NEWEST_ERROR, u32::from(code.0));
     objects.set(ERROR_COUNT, objects.get(ERROR_COUNT).saturating_add(1).min(HISTORY as u8));
 }
 
 /// Empties the history.
 pub(super) fn clear_history(objects: &mut Objects) {
-    for place in ERROR_COUNT.place()..=ERROR_COUNT.place() + HISTORY {
-        objects.set_word(place, 0);
-    }
+    objects.words[ERROR_COUNT.place..][..=HISTORY].fill(0);
 }
 
 #[cfg(test)]
@@ -145,7 +133,7 @@ mod tests {
             errors.clear(EmergencyCode::PDO_LENGTH_EXCEEDED, &mut objects);
         }
         assert_eq!(objects.get(ERROR_COUNT), 8);
-        let history = |place: usize| objects.word(NEWEST_ERROR.place() + place);
+        let history = |place: usize| objects.words[NEWEST_ERROR.place + place];
         assert_eq!([history(0), history(1), history(7)], [0x8220, 0x8210, 0x8210]);
         clear_history(&mut objects);
         assert_eq!((objects.get(ERROR_COUNT), objects.get(NEWEST_ERROR)), (0, 0));

@@ -68,7 +68,7 @@ impl Consumer {
     /// The configured heartbeats, none received yet.
     pub(super) fn new(objects: &Objects) -> Self {
         let entries = std::array::from_fn(|place| {
-            let word = objects.word(names::CONSUMER_HEARTBEAT_TIME.place() + place);
+            let word = objects.words[names::CONSUMER_HEARTBEAT_TIME.place + place];
             let timeout_ns = u64::from(word & TIME_BITS) * MILLISECOND_NS;
             ConsumedHeartbeat { node: consumed_node(word), timeout_ns, heard_ns: None, is_lost: false }
         });

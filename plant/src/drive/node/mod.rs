@@ -9,7 +9,6 @@ mod heartbeats;
 mod nmt;
 mod outbox;
 mod pdo;
-mod process_data;
 mod rules;
 mod sdo;
 mod storage;
@@ -22,7 +21,7 @@ use masseter_can::cia402::Controlword;
 use masseter_can::{ErrorState, Frame};
 use masseter_shared::clock::MILLISECOND_NS;
 
-use super::axis::{Axis, Encoder, NewTargets};
+use super::axis::{Axis, Encoder};
 use super::dictionary::{Objects, PDOS, names};
 use super::settings::DriveSettings;
 use access::DictionaryAccess;
@@ -30,7 +29,7 @@ use errors::{Errors, FAULTS, clear_history};
 use heartbeats::{Consumer, Producer};
 use nmt::{BOOT_NS, Nmt};
 use outbox::Outbox;
-use process_data::ProcessData;
+use pdo::{Effects, ProcessData, Rpdo, Tpdo};
 use sdo::SdoServer;
 use storage::Storage;
 
@@ -55,13 +54,13 @@ pub(crate) struct DriveNode {
 impl DriveNode {
     /// A drive that is switched on at `now_ns` with its axis at a position.
     pub(crate) fn new(settings: &DriveSettings, encoder: Encoder, now_ns: u64, position_m: f64) -> Self {
-        let objects = settings.objects();
+        let objects = settings.objects.clone();
         // Staggered, so that the heartbeats of several nodes do not coincide.
-        let heartbeat_ns = u64::from(settings.heartbeat_ms) * MILLISECOND_NS;
+        let heartbeat_ns = u64::from(objects.get(names::PRODUCER_HEARTBEAT_TIME_MS)) * MILLISECOND_NS;
         let stagger_ns = heartbeat_ns / 8 * u64::from(settings.node.get() % 8);
         Self {
             id: settings.node,
-            storage: Storage::new(&objects),
+            storage: Storage { stored: objects.clone(), factory: objects.clone() },
             axis: Axis::new(settings.drive, encoder, settings.step_s, position_m, &objects),
             nmt: Nmt::booting(now_ns),
             errors: Errors::default(),
@@ -78,7 +77,7 @@ impl DriveNode {
     /// State of the drive's power stage.
     #[cfg(test)]
     pub(crate) fn power(&self) -> masseter_can::cia402::DriveState {
-        self.axis.power()
+        self.axis.power
     }
 
     /// Values of its object dictionary.
@@ -107,7 +106,7 @@ impl DriveNode {
             Ok(Cob::SdoRequest(node)) if node == self.id && self.nmt.is_served() => {
                 self.serve(now_ns, frame.data());
             }
-            Ok(Cob::Heartbeat(node)) if self.nmt.state().is_some() => {
+            Ok(Cob::Heartbeat(node)) if self.nmt.state.is_some() => {
                 self.take_heartbeat(now_ns, node, frame.data());
             }
             _ => self.take_process_data(now_ns, frame),
@@ -119,7 +118,7 @@ impl DriveNode {
         if self.nmt.boot(now_ns) {
             self.outbox.add(Heartbeat { state: NmtState::BootUp }.frame(self.id));
         }
-        if let Some(state) = self.nmt.state()
+        if let Some(state) = self.nmt.state
             && self.producer.is_due(now_ns)
         {
             self.outbox.add(Heartbeat { state }.frame(self.id));
@@ -131,11 +130,11 @@ impl DriveNode {
         if self.axis.step(now_ns, position_m) {
             self.raise(EmergencyCode::FOLLOWING_ERROR);
         }
-        if self.nmt.is_operational() && self.process_data.is_event_driven() {
+        if self.nmt.is_operational() && self.process_data.tpdos.iter().any(Tpdo::is_event_driven) {
             self.axis.show(now_ns, &mut self.objects);
             self.process_data.send(&mut self.outbox, |tpdo| tpdo.at_event(now_ns, &self.objects));
         }
-        self.axis.force_n()
+        self.axis.force_n
     }
 
     /// Takes the error state of the drive's CAN controller. In bus-off the communication has failed, which an emergency
@@ -161,13 +160,13 @@ impl DriveNode {
 
     /// Obeys a command of network management, once the node has booted.
     fn obey_nmt(&mut self, command: NmtCommand, now_ns: u64) {
-        if self.nmt.state().is_none() {
+        if self.nmt.state.is_none() {
             return;
         }
         match command {
             NmtCommand::Start if !self.nmt.is_operational() => {
-                self.nmt.enter(NmtState::Operational);
-                self.process_data.restart_transmission();
+                self.nmt.state = Some(NmtState::Operational);
+                self.process_data.tpdos.iter_mut().for_each(Tpdo::clear);
             }
             NmtCommand::Start => {}
             NmtCommand::Stop => self.leave_operational(NmtState::Stopped, now_ns),
@@ -186,15 +185,15 @@ impl DriveNode {
         if self.nmt.is_operational() || state == NmtState::Stopped {
             self.abort_connection(now_ns);
         }
-        self.nmt.enter(state);
+        self.nmt.state = Some(state);
         self.process_data.discard_received();
         self.sdo = SdoServer::default();
     }
 
     /// Restores the stored communication objects and boots. The history of errors (1003h) and the faults stay.
     fn reset_communication(&mut self, now_ns: u64) {
-        self.objects.copy_range(self.storage.stored(), 0x1000..=0x1002);
-        self.objects.copy_range(self.storage.stored(), 0x1004..=0x1FFF);
+        self.objects.copy_range(&self.storage.stored, 0x1000..=0x1002);
+        self.objects.copy_range(&self.storage.stored, 0x1004..=0x1FFF);
         self.errors.forget_communication(&mut self.objects);
         self.producer.configure(&self.objects, now_ns + BOOT_NS);
         self.consumer = Consumer::new(&self.objects);
@@ -205,7 +204,7 @@ impl DriveNode {
 
     /// The state after power-on: the brake closes, every object has its stored value, the node boots.
     fn reset_node(&mut self, now_ns: u64) {
-        self.objects = self.storage.stored().clone();
+        self.objects = self.storage.stored.clone();
         self.errors = Errors::default();
         self.axis.restart(now_ns, &self.objects);
         self.reset_communication(now_ns);
@@ -228,7 +227,7 @@ impl DriveNode {
                 self.apply_process_data(number, now_ns);
             }
         }
-        self.axis.synchronise(now_ns, self.process_data.take_new_targets(), &self.objects);
+        self.axis.synchronise(now_ns, std::mem::take(&mut self.process_data.new_targets), &self.objects);
         if is_operational {
             self.axis.sample(position_m);
             self.axis.show(now_ns, &mut self.objects);
@@ -243,18 +242,14 @@ impl DriveNode {
         }
         let Some(number) = self.process_data.receive(now_ns, frame) else { return };
         self.judge_process_data();
-        if !self.process_data.is_synchronous(number) {
+        if !self.process_data.rpdos[number].is_synchronous {
             self.apply_process_data(number, now_ns);
         }
     }
 
     fn apply_process_data(&mut self, number: usize, now_ns: u64) {
-        let Some(effects) = self.process_data.apply(number, &mut self.objects) else { return };
-        if effects.configures {
-            self.axis.configure(now_ns, &self.objects);
-        }
-        if effects.commands {
-            self.control(now_ns);
+        if let Some(effects) = self.process_data.rpdos[number].apply(&mut self.objects) {
+            self.act(effects, now_ns);
         }
     }
 
@@ -317,7 +312,7 @@ impl DriveNode {
             is_operational: self.nmt.is_operational(),
             written: None,
         };
-        let answer = self.sdo.answer(now_ns, data, &mut access);
+        let answer = self.sdo.answer(data, &mut access);
         if let Some(object) = access.written {
             self.apply_written(object, now_ns);
         }
@@ -338,22 +333,23 @@ impl DriveNode {
             }
             0x1017 => self.producer.configure(&self.objects, now_ns),
             0x1400..0x1800 => {
-                self.process_data.configure_rpdo(number, &self.objects);
+                self.process_data.rpdos[number] = Rpdo::new(&self.objects, number);
                 self.judge_process_data();
             }
-            0x1800..0x1C00 => self.process_data.configure_tpdo(number, &self.objects),
-            0x6040 => self.control(now_ns),
-            0x607A => self.process_data.add_targets(NewTargets { position: true, torque: false }),
-            0x6071 => self.process_data.add_targets(NewTargets { position: false, torque: true }),
-            0x6000.. => self.axis.configure(now_ns, &self.objects),
-            _ => {}
+            0x1800..0x1C00 => self.process_data.tpdos[number] = Tpdo::new(&self.objects, number),
+            index => self.act(Effects::of([index]), now_ns),
         }
     }
 
-    /// The controlword in the dictionary takes effect.
-    fn control(&mut self, now_ns: u64) {
+    /// Objects of the profile take effect: targets wait for SYNC, a new configuration comes before the controlword.
+    fn act(&mut self, Effects { targets, configures, commands }: Effects, now_ns: u64) {
+        self.process_data.new_targets.position |= targets.position;
+        self.process_data.new_targets.torque |= targets.torque;
+        if configures {
+            self.axis.configure(now_ns, &self.objects);
+        }
         let word = Controlword(self.objects.get(names::CONTROLWORD));
-        if self.axis.control(now_ns, word, &self.objects) {
+        if commands && self.axis.control(now_ns, word, &self.objects) {
             for error in FAULTS {
                 self.clear(error);
             }

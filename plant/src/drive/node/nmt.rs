@@ -12,7 +12,7 @@ pub(super) const BOOT_NS: u64 = 20 * MILLISECOND_NS;
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Nmt {
     /// None while the node boots.
-    state: Option<NmtState>,
+    pub(super) state: Option<NmtState>,
     boot_at_ns: u64,
 }
 
@@ -20,11 +20,6 @@ impl Nmt {
     /// A node that begins to boot at `now_ns`.
     pub(super) fn booting(now_ns: u64) -> Self {
         Self { state: None, boot_at_ns: now_ns + BOOT_NS }
-    }
-
-    /// The state; none while the node boots.
-    pub(super) fn state(self) -> Option<NmtState> {
-        self.state
     }
 
     /// Whether process data are exchanged.
@@ -35,11 +30,6 @@ impl Nmt {
     /// Whether the node takes part in SDO, SYNC and EMCY.
     pub(super) fn is_served(self) -> bool {
         matches!(self.state, Some(NmtState::Operational | NmtState::PreOperational))
-    }
-
-    /// Enters a state.
-    pub(super) fn enter(&mut self, state: NmtState) {
-        self.state = Some(state);
     }
 
     /// Ends the boot when it is time; returns whether the boot-up message is due.

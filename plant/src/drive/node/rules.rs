@@ -8,7 +8,7 @@ use masseter_can::canopen::{AbortCode, CobId, ObjectAddress};
 use super::heartbeats::consumed_node;
 use crate::drive::axis::{Axis, Homing, Mode};
 use crate::drive::dictionary::{
-    CONSUMED, DataType, ENTRIES, MAPPED_MAX, Mapping, MappingEntry, Objects, PDOS, find, names,
+    CONSUMED, DataType, ENTRIES, MAPPED_MAX, Mapping, MappingEntry, Objects, find, names,
 };
 
 /// Signature of 1010h, "save".
@@ -17,7 +17,11 @@ const SAVE: u32 = u32::from_le_bytes(*b"save");
 const LOAD: u32 = u32::from_le_bytes(*b"load");
 /// Bits that a PDO carries at most.
 const PDO_BITS: usize = 64;
-const PDO_COUNT: u16 = PDOS as u16;
+
+/// An error unless something is allowed.
+fn allow(is_allowed: bool, code: AbortCode) -> Result<(), AbortCode> {
+    if is_allowed { Ok(()) } else { Err(code) }
+}
 
 /// Whether that word may be written to an entry now.
 ///
@@ -30,7 +34,6 @@ pub(super) fn check(
     axis: &Axis,
     is_operational: bool,
 ) -> Result<(), AbortCode> {
-    let allow = |is_allowed: bool, code: AbortCode| if is_allowed { Ok(()) } else { Err(code) };
     let ObjectAddress { index, subindex } = object;
     match index {
         0x1003 => allow(word == 0, AbortCode::INVALID_VALUE),
@@ -59,7 +62,7 @@ pub(super) fn check(
         }
         0x6098 => {
             allow(Homing::is_method(word as i8), AbortCode::INVALID_VALUE)?;
-            allow(!axis.is_homing(), AbortCode::DEVICE_STATE)
+            allow(!axis.homing.is_running(), AbortCode::DEVICE_STATE)
         }
         0x60C2 => allow(!axis.is_enabled(), AbortCode::DEVICE_STATE),
         _ => Ok(()),
@@ -69,20 +72,15 @@ pub(super) fn check(
 /// Whether another entry of 1016h consumes the same node's heartbeat.
 fn is_consumed_elsewhere(subindex: u8, word: u32, objects: &Objects) -> bool {
     let Some(node) = consumed_node(word) else { return false };
-    (1..=CONSUMED as u8).filter(|&other| other != subindex).any(|other| {
-        let place = names::CONSUMER_HEARTBEAT_TIME.place() + usize::from(other) - 1;
-        consumed_node(objects.word(place)) == Some(node)
-    })
+    let mut others = (1..=CONSUMED as u8).filter(|&other| other != subindex);
+    others.any(|other| consumed_node(objects.at(0x1016, other)) == Some(node))
 }
 
 /// A new COB-ID in place of an old one: an identifier may change only while its object does not exist.
 fn cob_id(before: CobId, after: CobId) -> Result<(), AbortCode> {
     let takes_restricted = after.is_valid() && is_restricted(after.number());
     let is_changed = before.is_valid() && after.is_valid() && after.number() != before.number();
-    if !after.is_standard() || takes_restricted || is_changed {
-        return Err(AbortCode::INVALID_VALUE);
-    }
-    Ok(())
+    allow(after.is_standard() && !takes_restricted && !is_changed, AbortCode::INVALID_VALUE)
 }
 
 /// Identifiers that no configurable object may use (CiA 301, table 40).
@@ -97,57 +95,51 @@ const fn is_restricted(identifier: u32) -> bool {
 fn pdo_cob_id(index: u16, objects: &Objects) -> CobId {
     // 1600h + n belongs to 1400h + n, 1A00h + n to 1800h + n.
     let communication = index & !0x0200 & 0xFC00 | index & 0x00FF;
-    objects.cob_id(communication, 1)
+    CobId(objects.at(communication, 1))
 }
 
 fn communication(object: ObjectAddress, word: u32, objects: &Objects) -> Result<(), AbortCode> {
     let before = pdo_cob_id(object.index, objects);
-    match object.subindex {
+    let is_allowed = match object.subindex {
         1 => {
             cob_id(before, CobId(word))?;
             let carries_nothing = objects.at(object.index + 0x0200, 0) == 0;
-            if CobId(word).is_valid() && carries_nothing { Err(AbortCode::INVALID_VALUE) } else { Ok(()) }
+            !(CobId(word).is_valid() && carries_nothing)
         }
         // 241 to 251 are reserved, 252 and 253 answer remote requests.
-        2 if matches!(word, 241..=253) => Err(AbortCode::INVALID_VALUE),
-        3 | 6 if before.is_valid() => Err(AbortCode::INVALID_VALUE),
-        _ => Ok(()),
-    }
+        2 => !matches!(word, 241..=253),
+        3 | 6 => !before.is_valid(),
+        _ => true,
+    };
+    allow(is_allowed, AbortCode::INVALID_VALUE)
 }
 
 /// The mapping changes only while the PDO does not exist, its entries only while it holds none.
 fn mapping(object: ObjectAddress, word: u32, objects: &Objects) -> Result<(), AbortCode> {
-    let parameter = |subindex: u8| objects.at(object.index, subindex);
-    let exists = pdo_cob_id(object.index, objects).is_valid();
-    if exists || object.subindex > 0 && parameter(0) > 0 {
-        return Err(AbortCode::PARAMETER_INCOMPATIBLE);
+    let ObjectAddress { index, subindex } = object;
+    let exists = pdo_cob_id(index, objects).is_valid();
+    let is_open = !exists && (subindex == 0 || objects.at(index, 0) == 0);
+    allow(is_open, AbortCode::PARAMETER_INCOMPATIBLE)?;
+    if subindex > 0 {
+        let is_transmitted = index >= 0x1A00;
+        return if word == 0 { Ok(()) } else { mappable(MappingEntry(word), is_transmitted) };
     }
-    if object.subindex > 0 {
-        return if word == 0 { Ok(()) } else { mappable(MappingEntry(word), is_transmitted(object.index)) };
-    }
-    let entries = || (1..=word as u8).map(|subindex| MappingEntry(parameter(subindex)));
-    if entries().any(|entry| entry.0 == 0) {
-        return Err(AbortCode::PARAMETER_INCOMPATIBLE);
-    }
-    let bits: usize = entries().map(MappingEntry::bits).sum();
-    if bits > PDO_BITS { Err(AbortCode::PDO_LENGTH) } else { Ok(()) }
-}
-
-/// Whether a mapping parameter is that of a TPDO.
-const fn is_transmitted(index: u16) -> bool {
-    index >= 0x1A00 && index < 0x1A00 + PDO_COUNT
+    let has_gap = objects.mapping(index, word).any(|entry| entry.0 == 0);
+    allow(!has_gap, AbortCode::PARAMETER_INCOMPATIBLE)?;
+    let bits: usize = objects.mapping(index, word).map(MappingEntry::bits).sum();
+    allow(bits <= PDO_BITS, AbortCode::PDO_LENGTH)
 }
 
 /// Whether an object may be mapped with that length.
 fn mappable(entry: MappingEntry, is_transmitted: bool) -> Result<(), AbortCode> {
-    let table = &ENTRIES[find(entry.object())?].entry;
-    let is_allowed = match table.mapping {
+    let object = &ENTRIES[find(entry.object())?];
+    let is_allowed = match object.mapping {
         Mapping::Never => false,
         Mapping::Tpdo => is_transmitted,
         Mapping::Any => true,
     };
-    let has_length = table.kind != DataType::Text && table.kind.bytes() * 8 == entry.bits();
-    if is_allowed && has_length { Ok(()) } else { Err(AbortCode::NOT_MAPPABLE) }
+    let has_length = object.kind != DataType::Text && object.kind.bytes() * 8 == entry.bits();
+    allow(is_allowed && has_length, AbortCode::NOT_MAPPABLE)
 }
 
 const _: () = assert!(MAPPED_MAX * 8 == PDO_BITS, "eight bytes hold eight objects at most");

@@ -5,6 +5,7 @@ mod homing;
 mod modes;
 mod objects;
 mod process_data;
+mod sdo;
 
 use masseter_can::canopen::{
     AbortCode, Cob, Emergency, EmergencyCode, Expedited, Heartbeat, Nmt, NmtCommand, NmtState, NmtTarget,
@@ -12,8 +13,9 @@ use masseter_can::canopen::{
 };
 use masseter_can::cia402::{DriveState, StatusBit, Statusword};
 use masseter_can::{CanId, ErrorState, Frame};
-use masseter_shared::config::DrivesConfig;
+use masseter_shared::config::Scenario;
 
+use super::dictionary::names;
 use super::{DriveNode, DriveSettings, Encoder};
 
 const STEP_NS: u64 = 125_000;
@@ -45,16 +47,14 @@ fn id(number: u8) -> NodeId {
     NodeId::new(number).unwrap()
 }
 
+/// A leg's drive, with limits that leave it more room than the default.
 fn settings() -> DriveSettings {
-    DriveSettings {
-        node: id(4),
-        drive: DrivesConfig::default().leg,
-        heartbeat_ms: 50,
-        heartbeat_timeout_ms: 150,
-        period_ns: 1_000_000,
-        step_s: STEP_NS as f64 * 1e-9,
-        position_limits: LIMITS,
-    }
+    let mut scenario = Scenario::default();
+    scenario.dynamics.step_ns = STEP_NS;
+    scenario.mechanism.strokes.leg_m = LIMITS.map(|end| f64::from(end) * 1e-6);
+    let [_, _, _, leg, ..] = DriveSettings::for_axes(&scenario).unwrap();
+    assert_eq!(leg.node, id(4));
+    leg
 }
 
 impl Bench {

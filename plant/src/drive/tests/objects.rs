@@ -102,10 +102,10 @@ fn mapped_objects_must_fit_into_eight_bytes() {
 #[test]
 fn every_entry_can_be_read_and_has_the_length_of_its_type() {
     let mut bench = Bench::new();
-    for addressed in &ENTRIES {
-        let object = addressed.address;
+    for entry in &ENTRIES {
+        let object = entry.address;
         let answer = bench.ask(SdoRequest::InitiateUpload { object }).expect("an answer");
-        match (addressed.entry.kind, answer) {
+        match (entry.kind, answer) {
             (DataType::Text, SdoResponse::InitiateUpload { size: Some(1..), .. }) => {}
             (kind, SdoResponse::Upload { data, .. }) => {
                 assert_eq!(data.data().len(), kind.bytes(), "{object}");
@@ -121,20 +121,15 @@ fn every_entry_can_be_read_and_has_the_length_of_its_type() {
 #[test]
 fn what_may_be_written_can_be_written_as_it_was_read() {
     let by_signature_or_unmapped = [0x1010, 0x1011];
-    for addressed in ENTRIES.iter().filter(|addressed| addressed.entry.access == Access::ReadWrite) {
-        let object = (addressed.address.index, addressed.address.subindex);
+    for entry in ENTRIES.iter().filter(|entry| entry.access == Access::ReadWrite) {
+        let object = (entry.address.index, entry.address.subindex);
         let is_live_pdo = matches!(object, (0x1600 | 0x1A00, _) | (0x1800, 3 | 6));
         if by_signature_or_unmapped.contains(&object.0) || is_live_pdo {
             continue;
         }
         let mut bench = Bench::new();
         let word = bench.read(object).unwrap().to_le_bytes();
-        assert_eq!(
-            bench.write(object, &word[..addressed.entry.kind.bytes()]),
-            Ok(()),
-            "{}",
-            addressed.address
-        );
+        assert_eq!(bench.write(object, &word[..entry.kind.bytes()]), Ok(()), "{}", entry.address);
     }
 }
 

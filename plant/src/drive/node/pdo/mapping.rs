@@ -1,86 +1,65 @@
 //! A PDO's mapping, compiled into copies of bytes.
 
+use arrayvec::ArrayVec;
 use masseter_can::Frame;
-use masseter_can::canopen::ObjectAddress;
 
-use crate::drive::dictionary::{ENTRIES, MAPPED_MAX, MappingEntry, Objects, find, within_limits};
+use crate::drive::dictionary::{ENTRIES, MAPPED_MAX, Objects};
 
 /// The lowest transmission type that SYNC does not trigger.
 pub(super) const EVENT_DRIVEN: u8 = 254;
 /// Bytes that a PDO of the drive carries at most, whatever the format of its frames.
 pub(super) const MAX_BYTES: usize = Frame::MAX_DATA;
 
-/// A mapped object: place of its word, and number of its bytes.
-#[derive(Debug, Clone, Copy, Default)]
+/// A mapped object: its place in the dictionary and its length.
+#[derive(Debug, Clone, Copy)]
 struct Part {
-    place: u16,
-    bytes: u8,
+    place: usize,
+    bits: u32,
 }
 
 impl Part {
-    fn address(self) -> ObjectAddress {
-        ENTRIES[usize::from(self.place)].address
-    }
-
-    fn bits(self) -> u32 {
-        8 * u32::from(self.bytes)
+    fn index(self) -> u16 {
+        ENTRIES[self.place].address.index
     }
 
     /// The bits of a word that are mapped.
     fn mask(self) -> u32 {
-        u32::MAX >> (u32::BITS - self.bits())
+        u32::MAX >> (u32::BITS - self.bits)
     }
 }
 
 /// A compiled mapping.
-#[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Mapped {
-    parts: [Part; MAPPED_MAX],
-    count: usize,
-    pub(super) length: usize,
-}
+#[derive(Debug, Clone)]
+pub(super) struct Mapped(ArrayVec<Part, MAPPED_MAX>);
 
 impl Mapped {
     /// Compiles the mapping parameter of that index.
     pub(super) fn compile(objects: &Objects, index: u16) -> Self {
-        let mut mapped = Self { count: objects.at(index, 0) as usize, ..Self::default() };
-        for place in 0..mapped.count {
-            let entry = MappingEntry(objects.at(index, place as u8 + 1));
-            let object = find(entry.object()).expect("only what exists can be mapped");
-            let bytes = ENTRIES[object].entry.kind.bytes();
-            mapped.parts[place] = Part { place: object as u16, bytes: bytes as u8 };
-            mapped.length += bytes;
-        }
-        mapped
+        let part = |place: usize| Part { place, bits: 8 * ENTRIES[place].kind.bytes() as u32 };
+        Self(objects.mapped(index).map(part).collect())
     }
 
-    /// The mapping of those objects that fulfil a condition.
-    pub(super) fn only(&self, holds: impl Fn(ObjectAddress) -> bool) -> Self {
-        let mut only = Self::default();
-        for part in self.parts().iter().filter(|part| holds(part.address())) {
-            only.parts[only.count] = *part;
-            only.count += 1;
-            only.length += usize::from(part.bytes);
-        }
-        only
+    /// Keeps the objects of those indices only.
+    pub(super) fn retain(&mut self, keeps: impl Fn(u16) -> bool) {
+        self.0.retain(|part| keeps(part.index()));
     }
 
-    fn parts(&self) -> &[Part] {
-        &self.parts[..self.count]
+    /// Bytes of the data.
+    pub(super) fn length(&self) -> usize {
+        self.0.iter().map(|part| part.bits as usize / 8).sum()
     }
 
-    /// Whether an object is mapped.
-    pub(super) fn holds(&self, object: ObjectAddress) -> bool {
-        self.parts().iter().any(|part| part.address() == object)
+    /// The indices of the mapped objects.
+    pub(super) fn indices(&self) -> impl Iterator<Item = u16> {
+        self.0.iter().map(|part| part.index())
     }
 
     /// The data of the objects, followed by zeros.
     pub(super) fn pack(&self, objects: &Objects) -> [u8; MAX_BYTES] {
         let (mut data, mut at) = (0, 0);
-        for part in self.parts() {
-            let word = objects.word(usize::from(part.place)) & part.mask();
-            data |= u64::from(word) << at;
-            at += part.bits();
+        for part in &self.0 {
+            data |= u64::from(objects.words[part.place] & part.mask()) << at;
+            at += part.bits;
         }
         data.to_le_bytes()
     }
@@ -88,12 +67,12 @@ impl Mapped {
     /// Writes the data into the objects; a value beyond its limits leaves its object as it is.
     pub(super) fn unpack(&self, data: [u8; MAX_BYTES], objects: &mut Objects) {
         let mut data = u64::from_le_bytes(data);
-        for part in self.parts() {
-            let (place, word) = (usize::from(part.place), data as u32 & part.mask());
-            if within_limits(place, word).is_ok() {
-                objects.set_word(place, word);
+        for part in &self.0 {
+            let word = data as u32 & part.mask();
+            if ENTRIES[part.place].check_limits(word).is_ok() {
+                objects.words[part.place] = word;
             }
-            data >>= part.bits();
+            data >>= part.bits;
         }
     }
 }

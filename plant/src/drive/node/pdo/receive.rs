@@ -3,7 +3,7 @@
 use std::cmp::Ordering;
 
 use masseter_can::CanId;
-use masseter_can::canopen::{EmergencyCode, ObjectAddress};
+use masseter_can::canopen::{CobId, EmergencyCode};
 use masseter_shared::clock::MILLISECOND_NS;
 
 use super::mapping::{EVENT_DRIVEN, MAX_BYTES, Mapped};
@@ -21,8 +21,10 @@ const OVERDUE: usize = 2;
 /// A receive PDO.
 #[derive(Debug, Clone)]
 pub(crate) struct Rpdo {
-    id: Option<CanId>,
-    is_synchronous: bool,
+    /// Its identifier; none where the PDO does not exist.
+    pub(crate) id: Option<CanId>,
+    /// Whether its data take effect at the next SYNC instead of at once.
+    pub(crate) is_synchronous: bool,
     deadline_ns: u64,
     mapped: Mapped,
     heard_ns: Option<u64>,
@@ -32,52 +34,55 @@ pub(crate) struct Rpdo {
     effects: Effects,
 }
 
-/// Effects of an RPDO's objects beyond the dictionary.
-#[derive(Debug, Clone, Copy)]
+/// Effects of written objects beyond the dictionary.
+#[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Effects {
     /// Cyclic targets (607Ah, 6071h).
     pub(crate) targets: NewTargets,
     /// Power states (6040h).
     pub(crate) commands: bool,
-    /// Configuration of the axis (6060h, 6081h, 6083h, 6084h).
+    /// Configuration of the axis (the other objects of the profile).
     pub(crate) configures: bool,
+}
+
+impl Effects {
+    /// The effects of the objects with those indices.
+    pub(crate) fn of(indices: impl IntoIterator<Item = u16>) -> Self {
+        let mut effects = Self::default();
+        for index in indices {
+            match index {
+                0x6040 => effects.commands = true,
+                0x6071 => effects.targets.torque = true,
+                0x607A => effects.targets.position = true,
+                0x6000.. => effects.configures = true,
+                _ => {}
+            }
+        }
+        effects
+    }
 }
 
 impl Rpdo {
     /// The configured PDO, nothing received yet.
-    pub(crate) fn new(objects: &Objects, number: u16) -> Self {
-        let (communication, mapping) = (0x1400 + number, 0x1600 + number);
+    pub(crate) fn new(objects: &Objects, number: usize) -> Self {
+        let (communication, mapping) = (0x1400 + number as u16, 0x1600 + number as u16);
         let mapped = Mapped::compile(objects, mapping);
-        let holds = |index| mapped.holds(ObjectAddress::new(index, 0));
         Self {
-            id: objects.cob_id(communication, 1).identifier(),
+            id: CobId(objects.at(communication, 1)).identifier(),
             is_synchronous: objects.at(communication, 2) < u32::from(EVENT_DRIVEN),
             deadline_ns: u64::from(objects.at(communication, 5)) * MILLISECOND_NS,
+            effects: Effects::of(mapped.indices()),
             mapped,
             heard_ns: None,
             buffered: None,
             has: [false; ERRORS.len()],
-            effects: Effects {
-                targets: NewTargets { position: holds(0x607A), torque: holds(0x6071) },
-                commands: holds(0x6040),
-                configures: [0x6060, 0x6081, 0x6083, 0x6084].into_iter().any(holds),
-            },
         }
-    }
-
-    /// Its identifier; none where the PDO does not exist.
-    pub(crate) fn id(&self) -> Option<CanId> {
-        self.id
-    }
-
-    /// Whether its data take effect at the next SYNC instead of at once.
-    pub(crate) fn is_synchronous(&self) -> bool {
-        self.is_synchronous
     }
 
     /// Buffers a frame's data; only the newest are kept.
     pub(crate) fn take(&mut self, now_ns: u64, data: &[u8]) {
-        match data.len().cmp(&self.mapped.length) {
+        let length = self.mapped.length();
+        match data.len().cmp(&length) {
             Ordering::Less => {
                 self.has[SHORT] = true;
                 return;
@@ -88,9 +93,8 @@ impl Rpdo {
                 self.has[OVERDUE] = false;
             }
         }
-        let used = &data[..self.mapped.length];
         let mut buffer = [0; MAX_BYTES];
-        buffer[..used.len()].copy_from_slice(used);
+        buffer[..length].copy_from_slice(&data[..length]);
         (self.buffered, self.heard_ns) = (Some(buffer), Some(now_ns));
     }
 

@@ -1,6 +1,6 @@
 //! A transmit PDO and its trigger.
 
-use masseter_can::canopen::ObjectAddress;
+use masseter_can::canopen::CobId;
 use masseter_can::{CanId, Frame};
 use masseter_shared::clock::MILLISECOND_NS;
 
@@ -42,23 +42,26 @@ pub(crate) struct Tpdo {
 
 impl Tpdo {
     /// The configured PDO, nothing sent yet.
-    pub(crate) fn new(objects: &Objects, number: u16) -> Self {
-        let (communication, mapping) = (0x1800 + number, 0x1A00 + number);
+    pub(crate) fn new(objects: &Objects, number: usize) -> Self {
+        let (communication, mapping) = (0x1800 + number as u16, 0x1A00 + number as u16);
         let start = objects.at(communication, 6) as u8;
         let mapped = Mapped::compile(objects, mapping);
-        let is_event = |object: ObjectAddress| !SAMPLED.contains(&object.index);
         let trigger = match objects.at(communication, 2) as u8 {
             0 => Trigger::ChangeThenSync,
             every if every < EVENT_DRIVEN => Trigger::EverySync { every, start },
             _ => Trigger::Event,
         };
+        let mut watched = mapped.clone();
+        if trigger == Trigger::Event {
+            watched.retain(|index| !SAMPLED.contains(&index));
+        }
         Self {
-            id: objects.cob_id(communication, 1).identifier(),
+            id: CobId(objects.at(communication, 1)).identifier(),
             trigger,
             inhibit_ns: u64::from(objects.at(communication, 3)) * INHIBIT_UNIT_NS,
             timer_ns: u64::from(objects.at(communication, 5)) * MILLISECOND_NS,
-            watched: if trigger == Trigger::Event { mapped.only(is_event) } else { mapped },
             mapped,
+            watched,
             syncs: None,
             sent: None,
         }
@@ -118,6 +121,6 @@ impl Tpdo {
 
     fn frame(&self, id: CanId, objects: &Objects) -> Option<Frame> {
         let data = self.mapped.pack(objects);
-        Frame::new(id, &data[..self.mapped.length]).ok()
+        Frame::new(id, &data[..self.mapped.length()]).ok()
     }
 }
