@@ -2,7 +2,7 @@
 
 use masseter_shared::config::{ControllerConfig, JawConfig};
 use masseter_shared::geometry::{LEGS, MechanismConfig};
-use masseter_shared::messages::codes::{Cause, DriveRequest, EventKind, drive_request};
+use masseter_shared::messages::codes::{Cause, DriveRequest, EventKind};
 use masseter_shared::messages::{Command, State};
 
 use super::*;
@@ -57,7 +57,7 @@ impl Bench {
 
     fn reading(&self) -> Reading {
         let [told, last] = self.commands;
-        let state = match drive_request(last.request).unwrap() {
+        let state = match DriveRequest::try_from(last.request).unwrap() {
             DriveRequest::Enable => DriveState::OperationEnabled,
             DriveRequest::Off | DriveRequest::QuickStop => DriveState::SwitchOnDisabled,
         };

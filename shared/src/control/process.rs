@@ -19,8 +19,9 @@ pub fn run<C: Controller, E: From<ProcessError>>(
     let context = arguments.init()?;
     let (scenario, schedule) = (&context.scenario, &context.schedule);
     let mut controller = build(scenario)?;
-    let ports = Ports::open(&context.node)?;
-    let start = context.ready_on(scenario.realtime.cores[0])?;
+    let ports = Ports::open(&context.node).map_err(ProcessError::from)?;
+    ports.warm_up(&controller).map_err(ProcessError::from)?;
+    let start = context.ready(Some(scenario.realtime.cores[0]))?;
     ports.connect().map_err(ProcessError::from)?;
 
     let mut real_time = RealTime {
@@ -35,7 +36,8 @@ pub fn run<C: Controller, E: From<ProcessError>>(
         if context.stop.is_made() {
             controller.request_stop();
         }
-        let wake = real_time.wait(&controller).map_err(ProcessError::from)?;
+        let RealTime { ports, cycle, .. } = &mut real_time;
+        let wake = cycle.wait_warm(|| ports.warm_up(&controller)).map_err(ProcessError::from)?;
         run_cycle(&mut controller, &mut real_time, &wake).map_err(ProcessError::from)?;
     }
 }
@@ -48,13 +50,6 @@ struct RealTime {
     reading_timeout_ns: u64,
 }
 
-impl RealTime {
-    /// Waits for the next deadline, and warms up before it.
-    fn wait(&mut self, controller: &impl Controller) -> Result<Wake, TransportError> {
-        self.cycle.wait_warm(|| self.ports.warm_up(controller))
-    }
-}
-
 /// The controller's ports on iceoryx2.
 struct Ports {
     readings: Subscriber<Reading>,
@@ -64,17 +59,13 @@ struct Ports {
 }
 
 impl Ports {
-    fn open(node: &Node) -> Result<Self, ProcessError> {
-        let ports = Self {
+    fn open(node: &Node) -> Result<Self, TransportError> {
+        Ok(Self {
             readings: node.newest_subscriber()?,
             commands: node.publisher()?,
             states: node.publisher()?,
             events: node.publisher()?,
-        };
-        ports.commands.warm_up()?;
-        ports.states.warm_up()?;
-        ports.events.warm_up()?;
-        Ok(ports)
+        })
     }
 
     /// Connects to the ports of the other processes before the first cycle, since a connection makes and maps files.
@@ -89,7 +80,8 @@ impl Ports {
     fn warm_up(&self, controller: &impl Controller) -> Result<(), TransportError> {
         controller.warm_up();
         self.commands.warm_up()?;
-        self.states.warm_up()
+        self.states.warm_up()?;
+        self.events.warm_up()
     }
 }
 
