@@ -72,7 +72,7 @@ mod tests {
 
     #[test]
     fn every_pair_moves_as_specified_and_no_other_moves() {
-        for &state in State::ALL {
+        for state in State::ALL {
             for trigger in TRIGGERS {
                 let specified = MOVES.iter().find(|(from, when, _)| (*from, *when) == (state, trigger));
                 let expected = specified.map_or(state, |(_, _, to)| *to);

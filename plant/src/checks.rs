@@ -15,21 +15,15 @@ pub(crate) fn check_quantities(scenario: &Scenario) -> Result<(), PlantError> {
 /// A drive counts increments in 32 bits (objects 6064h and 607Ah).
 fn check_counts(scenario: &Scenario) -> Result<(), PlantError> {
     let Scenario { drives, mechanism, .. } = scenario;
-    let [slide_m, leg_m] = [0, LEGS].map(|axis| {
+    for (key, axis) in [("drives.slide", 0), ("drives.leg", LEGS)] {
+        let increment_m = drives.of_axis(axis).encoder_resolution_m;
         let [low_m, high_m] = mechanism.strokes.of_axis(axis);
-        low_m.abs().max(high_m.abs())
-    });
-    let too_fine = [
-        ("drives.slide.encoder_resolution_m", drives.slide.encoder_resolution_m, slide_m),
-        ("drives.leg.encoder_resolution_m", drives.leg.encoder_resolution_m, leg_m),
-    ];
-    match too_fine.into_iter().find(|(_, increment_m, end_m)| end_m / increment_m > f64::from(i32::MAX)) {
-        Some((key, value, _)) => {
+        if low_m.abs().max(high_m.abs()) / increment_m > f64::from(i32::MAX) {
             let need = "use more: the end of the stroke does not fit into 32 bits";
-            Err(PlantError::Scenario(format!("{key} = {value}: {need}")))
+            return Err(PlantError::Scenario(format!("{key}.encoder_resolution_m = {increment_m}: {need}")));
         }
-        None => Ok(()),
     }
+    Ok(())
 }
 
 /// The time-out of a heartbeat must be longer than its longest interval.

@@ -13,7 +13,7 @@ use masseter_shared::realtime::Wake;
 
 use crate::emulation::VirtualLink;
 pub use crate::error::PlantError;
-use crate::journal::Journal;
+use crate::journal::{Journal, overflow};
 use crate::link::Link;
 use crate::link::sockets::SocketLink;
 use crate::master::{Master, shortest_boot};
@@ -48,8 +48,8 @@ const TAPPED: usize = 4096;
 /// ```
 #[derive(Debug)]
 pub struct PlantCore<L = VirtualLink> {
-    master: Master,
-    link: L,
+    pub(crate) master: Master,
+    pub(crate) link: L,
     buses: usize,
     cycle: u64,
     /// With the index of its bus.
@@ -118,11 +118,6 @@ impl<L: Link> PlantCore<L> {
         Ok(self.link.advance(now_ns)?)
     }
 
-    /// The wires.
-    pub(crate) fn link(&mut self) -> &mut L {
-        &mut self.link
-    }
-
     /// Begins a cycle: SYNC.
     pub fn begin_cycle(&mut self, wake: Wake) -> Result<(), PlantError> {
         self.cycle = wake.cycle;
@@ -158,21 +153,6 @@ impl<L: Link> PlantCore<L> {
         Ok(())
     }
 
-    /// Cycles since the last command.
-    pub fn silent_cycles(&self) -> u32 {
-        self.master.silent_cycles()
-    }
-
-    /// Stops the drives with the next process data, for the end.
-    pub fn stop(&mut self) {
-        self.master.stop();
-    }
-
-    /// Whether no drive reports voltage; a lost drive reports nothing.
-    pub fn drives_are_off(&self) -> bool {
-        self.master.drives_are_off()
-    }
-
     /// Hands out the frames and errors tapped since the last drain. They are encoded only now, after the reading.
     pub fn drain_frames(&mut self) -> impl ExactSizeIterator<Item = FrameTap> {
         self.tapped.drain(..).map(|(bus, tapped)| tap::encode(bus, &tapped))
@@ -189,7 +169,9 @@ impl<L: Link> PlantCore<L> {
             while self.tapped.len() < TAPPED {
                 match self.link.tap(bus, now_ns) {
                     Ok(Some(tapped)) => self.take_tapped(bus, tapped),
-                    Err(ReceiveError::Overrun { lost }) => self.master.note_lost(now_ns, lost),
+                    Err(ReceiveError::Overrun { lost }) => {
+                        self.wire_events.add(overflow(now_ns, self.cycle, lost));
+                    }
                     Ok(None) | Err(ReceiveError::Os { .. }) => break,
                 }
             }

@@ -6,7 +6,7 @@ use masseter_shared::lifecycle::{ProcessArguments, ProcessContext, ProcessError}
 use masseter_shared::messages::{Command, Event, FrameTap, Reading, Truth};
 use masseter_shared::realtime::{Cycle, Wake};
 use masseter_shared::schedule::CycleSchedule;
-use masseter_shared::transport::{BatchPublisher, Node, Publisher, Received, Subscriber, TransportError};
+use masseter_shared::transport::{Node, Publisher, Received, Subscriber, TransportError};
 
 use crate::core::{PlantCore, PlantError};
 use crate::cycle::{PlantPorts, run_cycle};
@@ -38,12 +38,9 @@ pub enum PlantProcessError {
     /// The plant itself.
     #[error(transparent)]
     Plant(#[from] PlantError),
-}
-
-impl From<TransportError> for PlantProcessError {
-    fn from(error: TransportError) -> Self {
-        Self::Process(error.into())
-    }
+    /// iceoryx2.
+    #[error(transparent)]
+    Transport(#[from] TransportError),
 }
 
 /// The plant's ports.
@@ -51,48 +48,36 @@ struct Ports {
     commands: Subscriber<Command>,
     readings: Publisher<Reading>,
     truths: Publisher<Truth>,
-    frames: BatchPublisher<FrameTap>,
+    frames: Publisher<[FrameTap]>,
     events: Publisher<Event>,
 }
 
 impl Ports {
-    fn open(node: &Node) -> Result<Self, ProcessError> {
-        let ports = Self {
+    fn open(node: &Node) -> Result<Self, TransportError> {
+        Ok(Self {
             commands: node.newest_subscriber()?,
             readings: node.publisher()?,
             truths: node.publisher()?,
             frames: node.batch_publisher()?,
             events: node.publisher()?,
-        };
-        ports.warm_up()?;
-        Ok(ports)
+        })
     }
 
-    /// Once everybody's ports are there, so that no cycle has to.
-    fn connect(&self) -> Result<(), ProcessError> {
+    /// Connects to the ports of the other processes before the first cycle, since a connection makes and maps files.
+    fn connect(&self) -> Result<(), TransportError> {
         self.commands.connect()?;
         self.readings.connect()?;
         self.truths.connect()?;
         self.frames.connect()?;
-        Ok(self.events.connect()?)
+        self.events.connect()
     }
 
-    /// Touches what the next messages will be written to.
-    fn warm_up(&self) -> Result<(), ProcessError> {
+    /// Touches the memory of the next messages.
+    fn warm_up(&self) -> Result<(), TransportError> {
         self.readings.warm_up()?;
         self.truths.warm_up()?;
         self.frames.warm_up()?;
-        Ok(self.events.warm_up()?)
-    }
-
-    fn publish_frames_and_events(&mut self, plant: &mut PlantCore<impl Link>) -> Result<(), TransportError> {
-        let mut result = self.frames.publish(plant.drain_frames());
-        plant.drain_events(&mut |event| {
-            if result.is_ok() {
-                result = self.events.publish(|message| *message = event);
-            }
-        });
-        result
+        self.events.warm_up()
     }
 }
 
@@ -152,7 +137,14 @@ impl<L: Link> PlantPorts<L> for RealTime<'_> {
     }
 
     fn publish_frames_and_events(&mut self, plant: &mut PlantCore<L>) -> Result<(), PlantProcessError> {
-        Ok(self.ports.publish_frames_and_events(plant)?)
+        let Ports { frames, events, .. } = &mut self.ports;
+        let mut result = frames.publish(plant.drain_frames());
+        plant.drain_events(&mut |event| {
+            if result.is_ok() {
+                result = events.publish(|message| *message = event);
+            }
+        });
+        Ok(result?)
     }
 }
 
@@ -166,32 +158,31 @@ fn serve<L: Link>(
     // Built once before the start, so that a plant that cannot be built is never reported ready.
     build(scenario, 0)?;
     let ports = Ports::open(&context.node)?;
-    let start = context.ready_on(scenario.realtime.cores[1])?;
+    ports.warm_up()?;
+    let start = context.ready(Some(scenario.realtime.cores[1]))?;
     ports.connect()?;
 
     let mut plant = build(scenario, start.epoch_ns)?;
     let cycle = Cycle::new(start.epoch_ns, scenario.period_ns());
     let mut real_time = RealTime { ports, cycle, schedule, obeys: true };
-    while !context.stop.is_made() && u64::from(plant.silent_cycles()) <= abandoned_cycles {
+    while !context.stop.is_made() && u64::from(plant.master.commands.silent_cycles) <= abandoned_cycles {
         let RealTime { cycle, ports, .. } = &mut real_time;
-        let wake = cycle.wait_warm(|| warm_up(&mut plant, ports))?;
+        let wake = cycle.wait_warm(|| -> Result<(), PlantProcessError> {
+            // Works out what has happened on the wires by now.
+            plant.advance(clock::now_ns())?;
+            Ok(ports.warm_up()?)
+        })?;
         run_cycle(&mut plant, &mut real_time, schedule, &wake)?;
     }
-    plant.stop();
+    plant.master.is_ending = true;
     real_time.obeys = false;
     let give_up_ns = clock::now_ns() + STOP_WITHIN_NS.max(STOP_WITHIN_CYCLES * scenario.period_ns());
-    while !plant.drives_are_off() && clock::now_ns() < give_up_ns {
+    while !plant.master.drives_are_off() && clock::now_ns() < give_up_ns {
         let wake = real_time.cycle.wait();
         run_cycle(&mut plant, &mut real_time, schedule, &wake)?;
     }
     // The last cycle's process data are on the wire only by now.
     plant.collect(real_time.cycle.wait().woke_ns)?;
-    real_time.ports.publish_frames_and_events(&mut plant)?;
+    real_time.publish_frames_and_events(&mut plant)?;
     Ok(if context.stop.is_made() { Reason::Asked } else { Reason::Abandoned })
-}
-
-/// Works out what has happened on the wires by now, and touches the memory of the next messages.
-fn warm_up(plant: &mut PlantCore<impl Link>, ports: &Ports) -> Result<(), PlantProcessError> {
-    plant.advance(clock::now_ns())?;
-    Ok(ports.warm_up()?)
 }

@@ -65,7 +65,7 @@ pub(crate) fn record(args: RecorderArgs) -> anyhow::Result<Exit> {
         None => None,
     };
     let backlog = Backlog::start(Recorder::create(&args.recording, scene)?, Pace::RealTime);
-    let start = process.ready()?;
+    let start = process.ready(None)?;
 
     let stderr = StderrWriter::start();
     if let Some(server) = server.as_ref().filter(|_| !args.quiet) {

@@ -3,7 +3,7 @@
 use masseter_recording::Recorded;
 use masseter_shared::clock;
 use masseter_shared::messages::{Command, Event, FrameTap, Message, Reading, State, Truth};
-use masseter_shared::transport::{BatchSubscriber, Node, Subscriber, TransportError};
+use masseter_shared::transport::{Node, Subscriber, TransportError};
 
 use super::sinks::Sinks;
 
@@ -12,7 +12,7 @@ pub(super) struct Subscribers {
     readings: Subscriber<Reading>,
     states: Subscriber<State>,
     truths: Subscriber<Truth>,
-    frames: BatchSubscriber<FrameTap>,
+    frames: Subscriber<[FrameTap]>,
     events: Subscriber<Event>,
 }
 
@@ -55,7 +55,7 @@ fn drain<M: Message>(
 
 /// The same for a topic that travels in batches.
 fn drain_batches<M: Message>(
-    subscriber: &BatchSubscriber<M>,
+    subscriber: &Subscriber<[M]>,
     sinks: &mut Sinks,
     on_topic: impl Fn(M) -> Recorded,
 ) -> Result<(), TransportError> {

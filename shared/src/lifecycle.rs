@@ -4,7 +4,7 @@
 //! reads the epoch of the first cycle and the process ids of both loops from standard input. SIGTERM requests an orderly
 //! end; the kernel also sends SIGTERM when the supervisor dies. All data travel over iceoryx2.
 
-use std::io::{self, BufRead, Write};
+use std::io::{self, Write};
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -79,19 +79,20 @@ impl ProcessArguments {
 }
 
 impl ProcessContext {
-    /// Requests real-time scheduling on a core, reports that the process is ready, and waits for the start.
-    pub fn ready_on(&self, core: usize) -> Result<Start, ProcessError> {
+    /// Reports that the process is ready, and waits for the start; before, requests real-time scheduling on `core`, or none
+    /// without a core.
+    pub fn ready(&self, core: Option<usize>) -> Result<Start, ProcessError> {
         let realtime = &self.scenario.realtime;
-        ready_and_wait(obtain(Wanted {
-            core: Some(core),
-            fifo_priority: Some(realtime.priority),
-            locked_memory: realtime.lock_memory,
-        }))
-    }
-
-    /// As [`Self::ready_on`], without real-time scheduling.
-    pub fn ready(&self) -> Result<Start, ProcessError> {
-        ready_and_wait(obtain(Wanted { core: None, fifo_priority: None, locked_memory: false }))
+        let scheduling = obtain(Wanted {
+            core,
+            fifo_priority: core.map(|_| realtime.priority),
+            locked_memory: core.is_some() && realtime.lock_memory,
+        });
+        let report = serde_json::to_string(&Ready { scheduling }).expect("plain data");
+        writeln!(io::stdout(), "{report}").map_err(ProcessError::Pipe)?;
+        let mut line = String::new();
+        io::stdin().read_line(&mut line).map_err(ProcessError::Pipe)?;
+        serde_json::from_str(&line).map_err(|_| ProcessError::NoStart)
     }
 }
 
@@ -119,19 +120,20 @@ impl StopRequest {
     /// Listens for SIGTERM, also on the supervisor's death. A terminal sends SIGINT and SIGHUP to the whole
     /// process group; the supervisor reacts to them, and this process ignores them.
     fn listen() -> io::Result<Self> {
-        let requested = Arc::new(AtomicBool::new(false));
-        signal_hook::flag::register(SIGTERM, Arc::clone(&requested))?;
-        for signal in [SIGINT, SIGHUP] {
-            signal_hook::flag::register(signal, Arc::new(AtomicBool::new(false)))?;
-        }
+        Self::by(&[SIGINT, SIGHUP])?;
+        let requested = Self::by(&[SIGTERM])?;
         set_parent_process_death_signal(Some(Signal::TERM))?;
-        Ok(Self(requested))
+        Ok(requested)
     }
 
     /// Listens for SIGTERM and SIGINT, in a process without a supervisor.
     pub fn listen_alone() -> io::Result<Self> {
-        let requested = Arc::new(AtomicBool::new(false));
-        for signal in [SIGTERM, SIGINT] {
+        Self::by(&[SIGTERM, SIGINT])
+    }
+
+    fn by(signals: &[i32]) -> io::Result<Self> {
+        let requested = Arc::default();
+        for &signal in signals {
             signal_hook::flag::register(signal, Arc::clone(&requested))?;
         }
         Ok(Self(requested))
@@ -141,19 +143,4 @@ impl StopRequest {
     pub fn is_made(&self) -> bool {
         self.0.load(Ordering::Relaxed)
     }
-}
-
-/// Reports that this process is ready, and waits for the start.
-fn ready_and_wait(scheduling: Obtained) -> Result<Start, ProcessError> {
-    say(&Ready { scheduling }).map_err(ProcessError::Pipe)?;
-    let mut line = String::new();
-    io::stdin().lock().read_line(&mut line).map_err(ProcessError::Pipe)?;
-    serde_json::from_str(&line).map_err(|_| ProcessError::NoStart)
-}
-
-fn say(ready: &Ready) -> io::Result<()> {
-    let mut output = io::stdout().lock();
-    serde_json::to_writer(&mut output, ready)?;
-    writeln!(output)?;
-    output.flush()
 }

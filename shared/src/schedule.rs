@@ -5,7 +5,7 @@
 //! its drive's process data. Emergencies (EMCY) are not in the schedule: in a cycle with one, reading or command may be
 //! late, as with a disturbed bus.
 
-mod room;
+use std::fmt;
 
 use crate::clock::{MILLISECOND_NS, SECOND_NS};
 use crate::config::{CanConfig, RATES_HZ};
@@ -14,8 +14,6 @@ use masseter_can::wire::{INTERFRAME_BITS, unstuffed_bits, worst_case_bits};
 use masseter_can::{
     Bitrate, BitrateError, BusPlan, NoReleaser, Overload, PeriodicMessage, Release, Rpdo1, Tpdo1,
 };
-
-pub use room::Room;
 
 /// SYNC and the controller's deadline keep this clear of whole milliseconds, where the kernel's timer
 /// tick falls, ns.
@@ -110,7 +108,7 @@ impl CycleSchedule {
     }
 
     fn fit(can: &CanConfig, period_ns: u64) -> Result<Result<Self, Misfit>, ScheduleError> {
-        let mut plans = plans(can, period_ns)?.into_iter().chain(plans_while_booting(can, period_ns)?);
+        let mut plans = plans(can, period_ns)?.into_iter().chain(plans_of(can, period_ns, true)?);
         if let Some(overload) = plans.find_map(|plan| plan.check().err()) {
             return Ok(Err(overload.into()));
         }
@@ -136,6 +134,28 @@ impl CycleSchedule {
             return Err(Misfit::NoTime { reading_by_ns, command_by_ns, period_ns });
         }
         Ok(Self { reading_from_ns, reading_by_ns, controller_at_ns, command_by_ns })
+    }
+}
+
+/// The cycle rate that a link has room for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Room {
+    /// The highest rate for which there is a time table, Hz; none where no rate is low enough.
+    pub max_rate_hz: Option<u32>,
+    /// The part of every cycle that the drives take to answer SYNC, ns.
+    pub answer_ns: u64,
+}
+
+impl fmt::Display for Room {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.max_rate_hz {
+            Some(rate_hz) => write!(f, "the highest rate_hz that fits is {rate_hz}")?,
+            None => write!(f, "no rate_hz fits")?,
+        }
+        match self.answer_ns {
+            0 => Ok(()),
+            _ => write!(f, ", since can.answer_us takes {} µs of every cycle", self.answer_ns / 1000),
+        }
     }
 }
 
@@ -184,36 +204,25 @@ const HEARTBEAT_LENGTH: u32 = 1;
 /// # Errors
 /// [`ScheduleError`] for unknown bit rates, node ids and releasers. [`BusPlan::check`] finds messages that do not fit.
 pub fn plans(can: &CanConfig, period_ns: u64) -> Result<Vec<BusPlan>, ScheduleError> {
-    plans_of(can, period_ns, Exchange::ProcessData)
+    plans_of(can, period_ns, false)
 }
 
-/// The plans while the first drive of every bus boots and the others run: request and answer of one SDO exchange take the
-/// place of its process data. With more drives booting there is still one request in a cycle, and each answer is no longer
-/// than the process data that its drive does not send.
+/// The plans while all drives run, or while the first one of every bus `boots` and the others run: then request and answer
+/// of one SDO exchange take the place of its process data. With more drives booting there is still one request in a cycle,
+/// and each answer is no longer than the process data that its drive does not send.
 ///
 /// The offsets of the schedule hold as well: an SDO frame blocks the bus for longer than a heartbeat, but for no longer than
 /// a heartbeat and the missing process data.
-fn plans_while_booting(can: &CanConfig, period_ns: u64) -> Result<Vec<BusPlan>, ScheduleError> {
-    plans_of(can, period_ns, Exchange::Sdo)
-}
-
-/// The exchange of a bus's first drive with the master in a cycle.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Exchange {
-    ProcessData,
-    Sdo,
-}
-
-fn plans_of(can: &CanConfig, period_ns: u64, first: Exchange) -> Result<Vec<BusPlan>, ScheduleError> {
+fn plans_of(can: &CanConfig, period_ns: u64, boots: bool) -> Result<Vec<BusPlan>, ScheduleError> {
     let plan = |(bus, axes): (usize, &Vec<usize>)| {
         let ids = axes.iter().filter_map(|&axis| can.node_ids.get(axis)).map(|&id| NodeId::new(id));
-        let messages = messages(&ids.collect::<Result<Vec<_>, _>>()?, can, period_ns, first);
+        let messages = messages(&ids.collect::<Result<Vec<_>, _>>()?, can, period_ns, boots);
         Ok(BusPlan::new(bus, can.bitrate()?, period_ns, messages)?)
     };
     can.buses.iter().enumerate().map(plan).collect()
 }
 
-fn messages(drives: &[NodeId], can: &CanConfig, period_ns: u64, first: Exchange) -> Vec<PeriodicMessage> {
+fn messages(drives: &[NodeId], can: &CanConfig, period_ns: u64, boots: bool) -> Vec<PeriodicMessage> {
     let heartbeat_ns = u64::from(can.heartbeat_producer_ms) * MILLISECOND_NS;
     let message = |name: String, cob: Cob, data_length: u32, period_ns: u64| PeriodicMessage {
         name,
@@ -225,7 +234,7 @@ fn messages(drives: &[NodeId], can: &CanConfig, period_ns: u64, first: Exchange)
     };
     let mut messages = vec![message("SYNC".to_owned(), Cob::Sync, 0, period_ns)];
     for (index, &node) in drives.iter().enumerate() {
-        if index == 0 && first == Exchange::Sdo {
+        if index == 0 && boots {
             // The answer may take until the end of the next cycle.
             let sdo = |name: &str, cob| PeriodicMessage {
                 deadline_ns: 2 * period_ns,
@@ -279,7 +288,7 @@ mod tests {
             assert!(sdo + (axes - 1) * tpdo <= heartbeat + axes * tpdo);
             assert!(sdo + (axes - 1) * rpdo <= heartbeat + axes * rpdo);
         }
-        for plan in plans_while_booting(&CanConfig::default(), 1_000_000).unwrap() {
+        for plan in plans_of(&CanConfig::default(), 1_000_000, true).unwrap() {
             assert_eq!(plan.check(), Ok(()));
         }
     }
@@ -311,5 +320,36 @@ mod tests {
     fn a_cycle_without_time_for_the_controller_is_refused() {
         let error = CycleSchedule::new(&CanConfig::default(), 960_000).unwrap_err();
         assert!(matches!(error, ScheduleError::Misfit { misfit: Misfit::NoTime { .. }, .. }), "{error}");
+    }
+
+    #[test]
+    fn the_highest_rate_is_one_that_fits_and_the_next_does_not() {
+        let one_bus = vec![vec![0, 1, 2, 3, 4, 5]];
+        for can in [
+            CanConfig::default(),
+            CanConfig { answer_us: 10, ..Default::default() },
+            CanConfig { buses: one_bus, ..Default::default() },
+        ] {
+            let highest_hz = Room::for_link(&can).unwrap().max_rate_hz.unwrap();
+            let fits = |rate_hz: u32| CycleSchedule::new(&can, SECOND_NS / u64::from(rate_hz)).is_ok();
+            assert!(fits(highest_hz) && !fits(highest_hz + 1), "{highest_hz} Hz: {can:?}");
+        }
+        let ideal = CanConfig { ideal: true, ..Default::default() };
+        assert_eq!(Room::for_link(&ideal).unwrap().max_rate_hz, Some(*RATES_HZ.end()));
+    }
+
+    #[test]
+    fn a_refusal_names_the_highest_rate_and_the_answer_time_of_slow_drives() {
+        let slow = CanConfig { answer_us: 10, ..Default::default() };
+        let refusal = |can, period_ns| CycleSchedule::new(can, period_ns).unwrap_err().to_string();
+        let said = refusal(&slow, 1_000_000);
+        assert!(
+            said.ends_with(
+                "the highest rate_hz that fits is 956, since can.answer_us takes 75 µs of every cycle"
+            ),
+            "{said}"
+        );
+        let said = refusal(&CanConfig::default(), 800_000);
+        assert!(said.ends_with("the highest rate_hz that fits is 1030"), "{said}");
     }
 }

@@ -21,8 +21,9 @@
 
 mod batches;
 mod domain;
+mod error;
 mod ports;
 
-pub use batches::{BatchPublisher, BatchSubscriber, ReceivedBatch};
 pub use domain::{Claim, Domain, DomainError, ScratchDomain};
-pub use ports::{Node, Publisher, Received, Subscriber, TransportError};
+pub use error::TransportError;
+pub use ports::{Node, Payload, Publisher, Received, Subscriber};

@@ -3,7 +3,7 @@
 use masseter_shared::config::{ControllerConfig, JawConfig};
 use masseter_shared::geometry::{LEGS, MechanismConfig};
 use masseter_shared::messages::codes::{
-    Cause, DriveRequest, DriveState, EventKind, NO_DRIVE_STATE, drive_request,
+    Cause, DriveRequest, DriveState, EventKind, NO_DRIVE_STATE,
 };
 use masseter_shared::messages::{Command, State};
 
@@ -60,7 +60,7 @@ impl Bench {
 
     fn reading(&self) -> Reading {
         let [told, last] = self.commands;
-        let state = match drive_request(last.request).unwrap() {
+        let state = match DriveRequest::try_from(last.request).unwrap() {
             DriveRequest::Enable => DriveState::OperationEnabled,
             DriveRequest::Off | DriveRequest::QuickStop => DriveState::SwitchOnDisabled,
         };

@@ -88,7 +88,7 @@ fn the_process_data_are_complete_at_one_of_the_links_events() {
     let mut now_ns = sync_ns;
     let mut looks = 0;
     while !bench.plant.collect(now_ns).unwrap() {
-        let next_ns = bench.plant.link().next_event_ns();
+        let next_ns = bench.plant.link.next_event_ns();
         assert!(next_ns > now_ns, "an event that is over");
         (now_ns, looks) = (next_ns, looks + 1);
         assert!(looks <= EVENTS, "after {} ns", now_ns - sync_ns);
@@ -141,7 +141,7 @@ fn drives_boot_enable_and_follow_within_a_tenth_of_a_millimetre() {
     for _ in 0..50 {
         bench.cycle(Some(&|reading| (reading.position_m, DriveRequest::Off)));
     }
-    assert!(bench.plant.drives_are_off());
+    assert!(bench.plant.master.drives_are_off());
 }
 
 #[test]
@@ -167,14 +167,14 @@ fn without_commands_the_master_stops_the_drives_and_stays_stopped() {
     for _ in 0..60 {
         bench.cycle(None);
     }
-    assert!(bench.plant.drives_are_off());
+    assert!(bench.plant.master.drives_are_off());
     assert!(bench.fastest_axis_m_s() < 1e-3);
     assert_eq!(bench.causes(EventKind::Fault), [Cause::CommandLost]);
     assert_eq!(bench.reading.master_fault, 1);
     for _ in 0..50 {
         bench.cycle(Some(&|reading| (reading.position_m, DriveRequest::Enable)));
     }
-    assert!(bench.plant.drives_are_off(), "a late commander moved the rig again");
+    assert!(bench.plant.master.drives_are_off(), "a late commander moved the rig again");
 }
 
 #[test]
@@ -186,7 +186,7 @@ fn without_the_master_the_drives_stop_by_themselves() {
     let silent_from_ns = EPOCH_NS + bench.cycle * PERIOD_NS;
     let bound_ns = u64::from(scenario.can.heartbeat_consumer_ms) * PERIOD_NS + 60 * PERIOD_NS;
     bench.plant.link.advance(silent_from_ns + bound_ns).unwrap();
-    for drive in bench.plant.link.emulation().drives() {
+    for drive in &bench.plant.link.emulation.drives {
         assert_eq!(drive.power(), DriveState::SwitchOnDisabled);
     }
 }
@@ -214,7 +214,7 @@ fn a_bad_command_stops_the_rig_and_its_bad_value_is_reported() {
         for _ in 0..60 {
             bench.cycle(Some(&|reading| (reading.position_m, DriveRequest::Enable)));
         }
-        assert!(bench.plant.drives_are_off());
+        assert!(bench.plant.master.drives_are_off());
         assert_eq!(bench.causes(EventKind::Fault), [Cause::BadMessage]);
         let told = bench.events.iter().find(|event| event.kind == EventKind::Fault.code()).unwrap();
         assert_eq!((told.axis, told.value.to_bits()), (axis, value.to_bits()), "{}", told.value);

@@ -33,7 +33,8 @@ use crate::mechanism::{Dynamics, DynamicsError, Food, State, closed_mouth, level
 /// ```
 #[derive(Debug)]
 pub struct Emulation {
-    drives: Vec<DriveNode>,
+    /// In the order of the axes.
+    pub(crate) drives: Vec<DriveNode>,
     dynamics: Dynamics,
     step_ns: u64,
     next_step_ns: u64,
@@ -106,12 +107,6 @@ impl Emulation {
             bite_force_n,
             ..Truth::default()
         }
-    }
-
-    /// The drives, in the order of the axes.
-    #[cfg(test)]
-    pub(crate) fn drives(&self) -> &[DriveNode] {
-        &self.drives
     }
 
     /// When the drives' servo loops are due next, ns.

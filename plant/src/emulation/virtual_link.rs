@@ -24,7 +24,7 @@ const RECEIVE_CAPACITY: usize = 256;
 pub struct VirtualLink {
     wires: Vec<VirtualWire>,
     ports: [DrivePort; AXES],
-    emulation: Emulation,
+    pub(crate) emulation: Emulation,
 }
 
 impl Buses for VirtualLink {
@@ -84,12 +84,6 @@ impl VirtualLink {
         Ok(Self { wires, ports, emulation })
     }
 
-    /// The drives and the mechanism.
-    #[cfg(test)]
-    pub(crate) fn emulation(&self) -> &Emulation {
-        &self.emulation
-    }
-
     /// A port on a wire: the master's is followed by those of the drives, then by the free ones.
     pub(crate) fn port_at(&mut self, bus: usize, port: usize) -> impl Bus {
         self.wires[bus].port(port)
@@ -110,15 +104,13 @@ impl VirtualLink {
 
     /// Delivers the frames that arrive on a wire at this instant to its drives.
     fn arrive(&mut self, bus: usize, now_ns: u64) -> Result<(), DynamicsError> {
-        let wire = &mut self.wires[bus];
-        wire.advance(now_ns);
-        let at_bus = self.ports.iter().enumerate().filter(|(_, at)| at.bus == bus);
-        for (axis, &DrivePort { port, .. }) in at_bus {
+        self.wires[bus].advance(now_ns);
+        for (axis, at) in self.ports.into_iter().enumerate().filter(|(_, at)| at.bus == bus) {
             // An overrun loses the drive's newest frames, as in a real node; the older ones follow.
-            while let Ok(Some(received)) = wire.port(port).receive(now_ns) {
+            while let Ok(Some(received)) = self.wires[bus].port(at.port).receive(now_ns) {
                 self.emulation.deliver(axis, &received.frame, now_ns)?;
             }
-            send_outgoing(&mut self.emulation, axis, wire, port, now_ns);
+            self.send_outgoing(axis, now_ns);
         }
         Ok(())
     }
@@ -128,18 +120,17 @@ impl VirtualLink {
             self.emulation.set_error_state(axis, self.wires[bus].port(port).status().state);
         }
         self.emulation.step()?;
-        for (axis, &DrivePort { bus, port }) in self.ports.iter().enumerate() {
-            send_outgoing(&mut self.emulation, axis, &mut self.wires[bus], port, now_ns);
-        }
+        (0..AXES).for_each(|axis| self.send_outgoing(axis, now_ns));
         Ok(())
     }
-}
 
-fn send_outgoing(emulation: &mut Emulation, axis: usize, wire: &mut VirtualWire, port: usize, now_ns: u64) {
-    while let Some(frame) = emulation.outgoing(axis) {
-        // A full transmit queue or a controller in bus-off loses the frame, as in a real node; the master detects the
-        // loss.
-        let _ = wire.port(port).send(now_ns, frame);
+    fn send_outgoing(&mut self, axis: usize, now_ns: u64) {
+        let DrivePort { bus, port } = self.ports[axis];
+        while let Some(frame) = self.emulation.outgoing(axis) {
+            // A full transmit queue or a controller in bus-off loses the frame, as in a real node; the master detects the
+            // loss.
+            let _ = self.wires[bus].port(port).send(now_ns, frame);
+        }
     }
 }
 

@@ -12,27 +12,16 @@ use masseter_can::OpenError;
 
 use crate::error::PlantError;
 
-/// The right to be master on an interface, until it is dropped.
-#[derive(Debug)]
-pub(super) struct InterfaceLock {
-    _name: UnixDatagram,
-}
-
-impl InterfaceLock {
-    /// Locks an interface.
-    pub(super) fn take(interface: &str) -> Result<Self, PlantError> {
-        let name = SocketAddr::from_abstract_name(format!("masseter-master-{interface}"));
-        match name.and_then(|name| UnixDatagram::bind_addr(&name)) {
-            Ok(name) => Ok(Self { _name: name }),
-            Err(error) => {
-                let (interface, errno) = (interface.to_owned(), error.raw_os_error().unwrap_or_default());
-                Err(match error.kind() {
-                    ErrorKind::AddrInUse => PlantError::MasterHere(interface),
-                    _ => OpenError::Os { interface, errno }.into(),
-                })
-            }
+/// Locks an interface: the right to be its master, until the socket is dropped.
+pub(super) fn lock(interface: &str) -> Result<UnixDatagram, PlantError> {
+    let name = SocketAddr::from_abstract_name(format!("masseter-master-{interface}"));
+    name.and_then(|name| UnixDatagram::bind_addr(&name)).map_err(|error| {
+        let interface = interface.to_owned();
+        match error.kind() {
+            ErrorKind::AddrInUse => PlantError::MasterHere(interface),
+            _ => OpenError::Os { interface, errno: error.raw_os_error().unwrap_or_default() }.into(),
         }
-    }
+    })
 }
 
 #[cfg(test)]
@@ -42,11 +31,11 @@ mod tests {
     #[test]
     fn an_interface_has_one_master_until_it_is_gone() {
         let interface = format!("test{}", std::process::id());
-        let first = InterfaceLock::take(&interface).unwrap();
-        let refused = InterfaceLock::take(&interface).unwrap_err();
+        let first = lock(&interface).unwrap();
+        let refused = lock(&interface).unwrap_err();
         assert_eq!(refused, PlantError::MasterHere(interface.clone()));
-        assert!(InterfaceLock::take(&format!("{interface}b")).is_ok());
+        assert!(lock(&format!("{interface}b")).is_ok());
         drop(first);
-        assert!(InterfaceLock::take(&interface).is_ok());
+        assert!(lock(&interface).is_ok());
     }
 }

@@ -24,7 +24,9 @@ pub trait Buses {
 /// The wires of a plant: the master's ports, taps, and the truth of emulated drives.
 pub trait Link: Buses {
     /// Simulates everything up to `until_ns`; real wires need no such call.
-    fn advance(&mut self, until_ns: u64) -> Result<(), DynamicsError>;
+    fn advance(&mut self, _until_ns: u64) -> Result<(), DynamicsError> {
+        Ok(())
+    }
 
     /// The next frame or error on a wire up to `now_ns`, from any node.
     fn tap(&mut self, bus: usize, now_ns: u64) -> Result<Option<Tapped>, ReceiveError>;
@@ -41,5 +43,7 @@ pub trait Link: Buses {
     fn wait(&mut self, latest_ns: u64, waiter: &mut Waiter) -> u64;
 
     /// The mechanism's true motion at the last SYNC, where it is emulated here.
-    fn truth(&self) -> Option<Truth>;
+    fn truth(&self) -> Option<Truth> {
+        None
+    }
 }

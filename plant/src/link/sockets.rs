@@ -1,5 +1,7 @@
 //! The link to real drives: SocketCAN interfaces. It has no truth of the mechanism.
 
+use std::os::unix::net::UnixDatagram;
+
 use masseter_can::PortFaults;
 use masseter_can::canopen::NodeId;
 use masseter_can::faults::FaultNote;
@@ -7,16 +9,14 @@ use masseter_can::{Bus, ReceiveError, SocketCan, Tapped};
 use masseter_shared::clock;
 use masseter_shared::config::Scenario;
 use masseter_shared::geometry::AXES;
-use masseter_shared::messages::Truth;
 use masseter_shared::realtime::Waiter;
 
 use super::faults::{fault_seed, faults_of_bus, restart_after_ns};
-use super::interface_lock::InterfaceLock;
+use super::interface_lock::lock;
 use super::layout::MASTER_PORT;
 use super::{Buses, Link};
 use crate::checks::check_quantities;
 use crate::error::PlantError;
-use crate::mechanism::DynamicsError;
 
 /// How long a wait for a real frame may take at most, ns: a fault may hold frames back that are due before the next
 /// frame arrives.
@@ -28,7 +28,7 @@ pub struct SocketLink {
     ports: Vec<SocketCan>,
     faults: Vec<PortFaults>,
     taps: Vec<SocketCan>,
-    _locks: Vec<InterfaceLock>,
+    _locks: Vec<UnixDatagram>,
 }
 
 impl SocketLink {
@@ -45,8 +45,7 @@ impl SocketLink {
         let port = |interface: &String| SocketCan::open(interface);
         let open = || can.interfaces.iter().map(port).collect::<Result<_, _>>();
         let (ports, taps) = (open()?, open()?);
-        let lock = |interface: &String| InterfaceLock::take(interface);
-        let locks = can.interfaces.iter().map(lock).collect::<Result<_, _>>()?;
+        let locks = can.interfaces.iter().map(|interface| lock(interface)).collect::<Result<_, _>>()?;
         Ok(Self { ports, faults, taps, _locks: locks })
     }
 }
@@ -58,10 +57,6 @@ impl Buses for SocketLink {
 }
 
 impl Link for SocketLink {
-    fn advance(&mut self, _: u64) -> Result<(), DynamicsError> {
-        Ok(())
-    }
-
     fn tap(&mut self, bus: usize, _: u64) -> Result<Option<Tapped>, ReceiveError> {
         self.taps[bus].tap()
     }
@@ -73,9 +68,5 @@ impl Link for SocketLink {
     fn wait(&mut self, latest_ns: u64, waiter: &mut Waiter) -> u64 {
         let until_ns = latest_ns.min(clock::now_ns() + LONGEST_BLOCK_NS);
         waiter.until_woken(until_ns, latest_ns, |until_ns| SocketCan::wait::<AXES>(&self.ports, until_ns))
-    }
-
-    fn truth(&self) -> Option<Truth> {
-        None
     }
 }

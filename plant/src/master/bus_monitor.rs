@@ -1,37 +1,22 @@
 //! The state of a bus as the master sees it: bus-off, and nodes that nobody configured.
 
+use masseter_can::SendError;
 use masseter_can::canopen::NodeId;
-use masseter_can::{ErrorState, SendError};
 
 /// Memory of a bus.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct BusMonitor {
-    is_off: bool,
+    /// Whether the master's controller is in bus-off.
+    pub(super) is_off: bool,
     /// Whether any drive was ever received.
-    has_drives: bool,
+    pub(super) has_drives: bool,
+    /// The axis whose SDO request was sent last.
+    pub(super) last_served: usize,
     /// Nodes reported as unknown, bit i for node i.
     unknown_nodes: u128,
 }
 
 impl BusMonitor {
-    /// Whether the master's controller is in bus-off.
-    pub(super) fn is_off(self) -> bool {
-        self.is_off
-    }
-
-    /// Takes the error state of the master's controller; returns whether it is in bus-off now, if that changed.
-    pub(super) fn set_error_state(&mut self, state: ErrorState) -> Option<bool> {
-        let is_off = state == ErrorState::BusOff;
-        let is_changed = is_off != self.is_off;
-        self.is_off = is_off;
-        is_changed.then_some(is_off)
-    }
-
-    /// A drive was received.
-    pub(super) fn note_drive(&mut self) {
-        self.has_drives = true;
-    }
-
     /// Whether an unknown node is received for the first time.
     pub(super) fn is_new_unknown(&mut self, id: NodeId) -> bool {
         let bit = 1 << id.get();

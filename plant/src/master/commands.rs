@@ -1,7 +1,7 @@
 //! The controller's commands: the newest valid one, and the silence since the last.
 
 use masseter_shared::geometry::AXES;
-use masseter_shared::messages::codes::{Cause, DriveRequest, drive_request};
+use masseter_shared::messages::codes::{Cause, DriveRequest};
 use masseter_shared::messages::{Command, Reading};
 
 use super::events::Subject;
@@ -9,11 +9,12 @@ use super::interlock::Failure;
 
 /// The received commands.
 #[derive(Debug, Clone)]
-pub(super) struct Commands {
+pub(crate) struct Commands {
     timeout_cycles: u32,
     newest: Option<Command>,
     received_ns: u64,
-    silent_cycles: u32,
+    /// Cycles since the last command.
+    pub(crate) silent_cycles: u32,
 }
 
 impl Commands {
@@ -22,15 +23,10 @@ impl Commands {
         Self { timeout_cycles, newest: None, received_ns: 0, silent_cycles: 0 }
     }
 
-    /// Cycles since the last command.
-    pub(super) fn silent_cycles(&self) -> u32 {
-        self.silent_cycles
-    }
-
     /// The request of the newest valid command.
     pub(super) fn request(&self) -> DriveRequest {
-        let request = self.newest.map(|command| drive_request(command.request));
-        request.and_then(Result::ok).unwrap_or(DriveRequest::Off)
+        let request = self.newest.and_then(|command| DriveRequest::from_code(command.request));
+        request.unwrap_or(DriveRequest::Off)
     }
 
     /// The targets of the newest valid command, m.
@@ -66,7 +62,7 @@ impl Commands {
         if let Some(axis) = (0..AXES).find(|&axis| !can_go_to(axis, command.target_m[axis])) {
             return Err(bad(Subject::Axis(axis), command.target_m[axis]));
         }
-        if drive_request(command.request).is_err() {
+        if DriveRequest::from_code(command.request).is_none() {
             return Err(bad(Subject::Rig, f64::from(command.request)));
         }
         (self.newest, self.received_ns) = (Some(*command), now_ns);

@@ -2,26 +2,17 @@
 //!
 //! A [`RemoteDrive`] sends nothing; it returns frames and judgements.
 
-use masseter_can::canopen::{NmtCommand, NmtState, NodeId, SdoResponse};
+use masseter_can::canopen::{Cob, NmtCommand, NmtState, NodeId, SdoResponse};
 use masseter_can::cia402::{Controlword, DriveRequest, DriveState, next_controlword};
-use masseter_can::{Frame, Rpdo1, Tpdo1};
+use masseter_can::{CanId, Frame, Rpdo1, Tpdo1};
 use masseter_shared::clock::MILLISECOND_NS;
 use masseter_shared::config::{DriveConfig, Scenario};
-use masseter_shared::messages::codes::{BootPhase, Cause};
+use masseter_shared::messages::Reading;
+use masseter_shared::messages::codes::{BootPhase, Cause, drive_state_code};
 
 use super::boot::{Boot, late};
-use super::incoming::Kind;
 use super::interlock::Failure;
 use super::presence::Presence;
-
-/// A judgement that needs a reaction.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Finding {
-    /// The drive never came.
-    Absent(Failure),
-    /// The drive was lost, with the value and the limit that explain it.
-    Lost(Failure),
-}
 
 /// One drive.
 #[derive(Debug, Clone)]
@@ -31,16 +22,17 @@ pub(super) struct RemoteDrive {
     config: DriveConfig,
     heartbeat_timeout_ns: u64,
     boot_timeout_ns: u64,
-    boot: Boot,
+    pub(super) boot: Boot,
     /// The phase of the boot that was reported last.
     reported_phase: BootPhase,
-    presence: Presence,
+    pub(super) presence: Presence,
     nmt: Option<NmtState>,
     /// Whether it was started as a verified drive: only then its process data are used.
-    is_started: bool,
+    pub(super) is_started: bool,
     /// Whether its absence was reported, or it was lost.
     is_absence_known: bool,
-    has_wrong_length: [bool; Kind::COUNT],
+    /// The function codes of its objects that had a wrong length, bit i for function code i.
+    wrong_lengths: u16,
     power: Option<DriveState>,
     actual_increments: i32,
     torque_permille: i16,
@@ -58,13 +50,13 @@ impl RemoteDrive {
             config,
             heartbeat_timeout_ns: u64::from(can.heartbeat_consumer_ms) * MILLISECOND_NS,
             boot_timeout_ns: u64::from(can.boot_timeout_ms) * MILLISECOND_NS,
-            reported_phase: boot.phase(),
+            reported_phase: boot.phase,
             boot,
             presence: Presence::new(now_ns),
             nmt: None,
             is_started: false,
             is_absence_known: false,
-            has_wrong_length: [false; Kind::COUNT],
+            wrong_lengths: 0,
             power: None,
             actual_increments: 0,
             torque_permille: 0,
@@ -72,26 +64,11 @@ impl RemoteDrive {
         }
     }
 
-    /// Phase of its boot.
-    pub(super) fn boot_phase(&self) -> BootPhase {
-        self.boot.phase()
-    }
-
     /// The reported phase of its boot and the present one, once after a change.
     pub(super) fn phase_change(&mut self) -> Option<[BootPhase; 2]> {
-        let now = self.boot.phase();
+        let now = self.boot.phase;
         let before = std::mem::replace(&mut self.reported_phase, now);
         (before != now).then_some([before, now])
-    }
-
-    /// Whether its identity and configuration are verified.
-    pub(super) fn is_verified(&self) -> bool {
-        self.boot.is_verified()
-    }
-
-    /// Whether it was told to exchange process data.
-    pub(super) fn is_started(&self) -> bool {
-        self.is_started
     }
 
     /// Whether it exchanges process data.
@@ -101,12 +78,7 @@ impl RemoteDrive {
 
     /// Whether it is verified and exchanges process data.
     pub(super) fn is_ready(&self) -> bool {
-        self.is_operational() && self.boot.phase() == BootPhase::Ready
-    }
-
-    /// Whether its newest process data came after that time.
-    pub(super) fn has_answered_since(&self, time_ns: u64) -> bool {
-        self.presence.has_answered_since(time_ns)
+        self.is_operational() && self.boot.phase == BootPhase::Ready
     }
 
     /// State of its power stage, as far as it is known.
@@ -114,14 +86,11 @@ impl RemoteDrive {
         self.power.filter(|_| self.is_operational())
     }
 
-    /// Position actual value, m.
-    pub(super) fn position_m(&self) -> f64 {
-        f64::from(self.actual_increments) * self.config.encoder_resolution_m
-    }
-
-    /// Force actual value, N.
-    pub(super) fn force_n(&self) -> f64 {
-        f64::from(self.torque_permille) / 1000.0 * self.config.rated_force_n
+    /// Writes its actual values and its state.
+    pub(super) fn fill_reading(&self, axis: usize, reading: &mut Reading) {
+        reading.position_m[axis] = f64::from(self.actual_increments) * self.config.encoder_resolution_m;
+        reading.force_n[axis] = f64::from(self.torque_permille) / 1000.0 * self.config.rated_force_n;
+        reading.drive_state[axis] = drive_state_code(self.drive_state());
     }
 
     /// Whether 607Ah can hold a target; NaN has no increments.
@@ -133,11 +102,6 @@ impl RemoteDrive {
         (position_m / self.config.encoder_resolution_m).round()
     }
 
-    /// SYNC demands new process data.
-    pub(super) fn begin_cycle(&mut self) {
-        self.presence.begin_cycle();
-    }
-
     /// Takes a heartbeat; `may_boot` says whether drives may be booted now.
     pub(super) fn take_heartbeat(
         &mut self,
@@ -146,28 +110,23 @@ impl RemoteDrive {
         may_boot: bool,
     ) -> Result<(), Failure> {
         self.hear_state(time_ns, state);
-        if may_boot {
+        if state == NmtState::BootUp && self.is_started {
+            self.stop_exchange();
+            self.forget(time_ns);
+        } else if may_boot {
             return self.boot.hear(time_ns, state);
-        }
-        if state == NmtState::BootUp {
+        } else if state == NmtState::BootUp {
             // Its configuration is lost. The drive is reset once more when the stop is over.
             self.boot.forget(time_ns);
         }
         Ok(())
     }
 
-    /// A started drive has restarted by itself.
-    pub(super) fn take_restart(&mut self, time_ns: u64) {
-        self.hear_state(time_ns, NmtState::BootUp);
-        self.stop_exchange();
-        self.forget(time_ns);
-    }
-
     /// Takes process data, which only an operational drive sends; a statusword without a meaning keeps the last state.
     /// Returns its state before and after; none while its process data are not used.
     pub(super) fn take_process_data(&mut self, time_ns: u64, tpdo: Tpdo1) -> Option<[Option<DriveState>; 2]> {
         self.hear_state(time_ns, NmtState::Operational);
-        self.presence.end_missing();
+        self.presence.missing_cycles = 0;
         if !self.is_started {
             return None;
         }
@@ -183,33 +142,36 @@ impl RemoteDrive {
 
     /// Takes an answer of its SDO server.
     pub(super) fn take_sdo_answer(&mut self, time_ns: u64, answer: SdoResponse) -> Result<(), Failure> {
-        self.presence.hear(time_ns);
+        self.presence.heard_ns = time_ns;
         self.boot.take(time_ns, answer)
     }
 
-    /// Whether this is its first object of that kind with a wrong length.
-    pub(super) fn is_first_wrong_length(&mut self, kind: Kind) -> bool {
-        !std::mem::replace(&mut self.has_wrong_length[kind as usize], true)
+    /// Whether this object has a wrong length for the first time.
+    pub(super) fn is_first_wrong_length(&mut self, cob: Cob) -> bool {
+        let function_code = CanId::from(cob).number() >> 7;
+        let known = self.wrong_lengths;
+        self.wrong_lengths |= 1 << function_code;
+        known != self.wrong_lengths
     }
 
-    /// Judges a cycle of the drive; `is_fresh` says whether it has answered SYNC. A verified drive must be received, and an
-    /// operational one must answer every SYNC once.
-    pub(super) fn judge(&mut self, now_ns: u64, is_fresh: bool) -> Option<Finding> {
-        match self.boot.phase() {
-            BootPhase::Waiting => {
-                let (waited_ns, limit_ns) = (self.boot.waited_ns(now_ns), self.boot_timeout_ns);
-                let is_new = waited_ns > limit_ns && !std::mem::replace(&mut self.is_absence_known, true);
-                is_new.then(|| Finding::Absent(late(waited_ns, limit_ns)))
-            }
-            BootPhase::Configured | BootPhase::Ready => {
-                if !is_fresh && self.is_operational() {
-                    self.presence.miss_cycle();
-                }
-                let loss = self.presence.judge(now_ns, self.heartbeat_timeout_ns);
-                loss.or_else(|| self.stop_by_itself()).map(Finding::Lost)
-            }
-            _ => None,
+    /// Why the drive counts as absent, once it does: it never came.
+    pub(super) fn absence(&mut self, now_ns: u64) -> Option<Failure> {
+        let (waited_ns, limit_ns) = (self.boot.waited_ns(now_ns), self.boot_timeout_ns);
+        let is_absent = self.boot.phase == BootPhase::Waiting && waited_ns > limit_ns;
+        let is_new = is_absent && !std::mem::replace(&mut self.is_absence_known, true);
+        is_new.then(|| late(waited_ns, limit_ns))
+    }
+
+    /// Why the drive counts as lost, if it does; `is_fresh` says whether it has answered SYNC. A verified drive must be
+    /// received, and an operational one must answer every SYNC once.
+    pub(super) fn loss(&mut self, now_ns: u64, is_fresh: bool) -> Option<Failure> {
+        if !matches!(self.boot.phase, BootPhase::Configured | BootPhase::Ready) {
+            return None;
         }
+        if !is_fresh && self.is_operational() {
+            self.presence.missing_cycles += 1;
+        }
+        self.presence.judge(now_ns, self.heartbeat_timeout_ns).or_else(|| self.stop_by_itself())
     }
 
     /// The loss of a started drive that left operational by itself.
@@ -222,32 +184,23 @@ impl RemoteDrive {
     /// Discards everything found out about the drive; it has to boot again.
     pub(super) fn forget(&mut self, now_ns: u64) {
         self.boot.forget(now_ns);
-        self.presence.restart();
+        (self.presence.missing_cycles, self.presence.surplus) = (0, 0);
         (self.is_absence_known, self.power) = (true, None);
     }
 
     /// Discards process data until the drive is started anew.
     fn stop_exchange(&mut self) {
-        self.presence.forget_answer();
+        self.presence.answered_ns = 0;
         (self.is_started, self.power) = (false, None);
         self.controlword = Controlword::DISABLE_VOLTAGE;
     }
 
-    /// Continues its boot after some time.
+    /// Completes its boot if it was started and has become operational; otherwise continues it after some time.
     pub(super) fn advance_boot(&mut self, now_ns: u64) -> Result<(), Failure> {
-        self.boot.expire(now_ns)
-    }
-
-    /// Completes its boot, if it was started and has become operational.
-    pub(super) fn complete_boot(&mut self) {
-        if self.boot.phase() == BootPhase::Starting && self.is_operational() {
-            self.boot.complete();
+        if self.boot.phase == BootPhase::Starting && self.is_operational() {
+            self.boot.phase = BootPhase::Ready;
         }
-    }
-
-    /// Gives it up until it boots again.
-    pub(super) fn give_up(&mut self) {
-        self.boot.give_up();
+        self.boot.expire(now_ns)
     }
 
     /// The command of network management that its boot needs, if any.
@@ -257,16 +210,10 @@ impl RemoteDrive {
         Some(command)
     }
 
-    /// The SDO request that its boot needs, if any.
-    pub(super) fn sdo_request(&mut self, now_ns: u64) -> Option<Frame> {
-        let request = self.boot.request(now_ns)?;
-        Some(request.frame(self.id))
-    }
-
     /// The drive is told to become operational.
     pub(super) fn start(&mut self, now_ns: u64) {
         self.boot.start(now_ns);
-        self.presence.end_missing();
+        self.presence.missing_cycles = 0;
         self.is_started = true;
     }
 
@@ -285,7 +232,7 @@ impl RemoteDrive {
     }
 
     fn hear_state(&mut self, time_ns: u64, state: NmtState) {
-        self.presence.hear(time_ns);
+        self.presence.heard_ns = time_ns;
         self.nmt = Some(state);
     }
 }

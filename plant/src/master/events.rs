@@ -2,11 +2,13 @@
 //!
 //! The log decides nothing; it only completes events and keeps them until they are drained.
 
-use masseter_can::canopen::NodeId;
+use masseter_can::CanId;
+use masseter_can::canopen::{Cob, Emergency, LengthError, NodeId};
 use masseter_shared::geometry::AXES;
 use masseter_shared::messages::Event;
+use masseter_shared::messages::codes::{Cause, EventKind, Source};
 
-use crate::journal::{Journal, overflow};
+use crate::journal::Journal;
 
 /// The subject of an event.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -19,8 +21,9 @@ pub(super) enum Subject {
 /// The log.
 #[derive(Debug)]
 pub(super) struct EventLog {
-    journal: Journal,
-    cycle: u64,
+    pub(super) journal: Journal,
+    /// The cycle of new events.
+    pub(super) cycle: u64,
     /// Node id and bus of each axis.
     addresses: [(NodeId, usize); AXES],
 }
@@ -29,11 +32,6 @@ impl EventLog {
     /// An empty log for drives with these node ids and buses.
     pub(super) fn new(addresses: [(NodeId, usize); AXES]) -> Self {
         Self { journal: Journal::new(), cycle: 0, addresses }
-    }
-
-    /// Events belong to this cycle from now on.
-    pub(super) fn begin_cycle(&mut self, cycle: u64) {
-        self.cycle = cycle;
     }
 
     /// Adds an event.
@@ -49,14 +47,27 @@ impl EventLog {
         }
         self.journal.add(event);
     }
+}
 
-    /// Adds that tapped frames had no room.
-    pub(super) fn add_lost(&mut self, time_ns: u64, lost: u64) {
-        self.journal.add(overflow(time_ns, self.cycle, lost));
-    }
+/// An observation without a reaction.
+pub(super) fn notice(cause: Cause) -> Event {
+    Event::new(Source::Master, EventKind::Notice, cause)
+}
 
-    /// Hands out the events since the last drain.
-    pub(super) fn drain(&mut self, out: &mut impl FnMut(Event)) {
-        self.journal.drain(out);
-    }
+/// A change of state.
+pub(super) fn transition(source: Source, from: u32, to: u32) -> Event {
+    Event { from, to, ..Event::new(source, EventKind::Transition, Cause::Sequence) }
+}
+
+/// An emergency message; one of the past needs no reaction.
+pub(super) fn emergency(message: Emergency, is_past: bool) -> Event {
+    let kind = if is_past { EventKind::Notice } else { EventKind::Fault };
+    let (value, limit) = (f64::from(message.code.0), f64::from(message.register));
+    Event { value, limit, ..Event::new(Source::Drive, kind, Cause::Emergency) }
+}
+
+/// An object with data of a wrong length.
+pub(super) fn wrong_length(cob: Cob, error: &LengthError) -> Event {
+    let (value, limit) = (error.actual as f64, error.expected as f64);
+    Event { object: CanId::from(cob).number(), value, limit, ..notice(Cause::WrongLength) }
 }

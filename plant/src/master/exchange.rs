@@ -17,11 +17,11 @@ pub(super) struct Exchange {
     sync_frame_ns: u64,
     heartbeat_ns: u64,
     next_heartbeat_ns: u64,
-    wake: Wake,
-    sync_ns: u64,
+    pub(super) wake: Wake,
     /// When the tap saw the last SYNC of each bus.
     seen_sync_ns: Vec<u64>,
-    complete_ns: u64,
+    /// When the last process data of the cycle arrived.
+    pub(super) complete_ns: u64,
 }
 
 impl Exchange {
@@ -34,7 +34,6 @@ impl Exchange {
             heartbeat_ns: u64::from(can.heartbeat_producer_ms) * MILLISECOND_NS,
             next_heartbeat_ns: now_ns,
             wake: Wake::on_time(0, 0),
-            sync_ns: 0,
             seen_sync_ns: vec![0; can.buses.len()],
             complete_ns: 0,
         })
@@ -42,7 +41,7 @@ impl Exchange {
 
     /// Begins a cycle with SYNC; returns whether the heartbeat is due too.
     pub(super) fn begin_cycle(&mut self, wake: Wake) -> bool {
-        (self.wake, self.sync_ns, self.complete_ns) = (wake, wake.woke_ns, 0);
+        (self.wake, self.complete_ns) = (wake, 0);
         let is_due = wake.woke_ns >= self.next_heartbeat_ns;
         if is_due {
             self.next_heartbeat_ns = wake.woke_ns + self.heartbeat_ns;
@@ -50,15 +49,10 @@ impl Exchange {
         is_due
     }
 
-    /// When the cycle began, ns.
-    pub(super) fn begun_ns(&self) -> u64 {
-        self.wake.woke_ns
-    }
-
     /// A SYNC was seen on a wire. Only the first one of a cycle counts: a repeated one has its answers already.
     pub(super) fn note_sync(&mut self, bus: usize, time_ns: u64) {
         let seen_ns = &mut self.seen_sync_ns[bus];
-        if *seen_ns < self.sync_ns {
+        if *seen_ns < self.wake.woke_ns {
             *seen_ns = time_ns;
         }
     }
@@ -66,19 +60,14 @@ impl Exchange {
     /// The time after which process data of a bus answer this cycle's SYNC. Process data of an earlier cycle may come
     /// late, even between the queueing of this SYNC and its transmission.
     pub(super) fn answered_after_ns(&self, bus: usize) -> u64 {
-        self.sync_ns.max(self.seen_sync_ns[bus])
-    }
-
-    /// Process data arrived.
-    pub(super) fn note_answer(&mut self, time_ns: u64) {
-        self.complete_ns = self.complete_ns.max(time_ns);
+        self.wake.woke_ns.max(self.seen_sync_ns[bus])
     }
 
     /// Writes the cycle and its times.
     pub(super) fn fill_reading(&self, reading: &mut Reading) {
         let Wake { cycle, due_ns, woke_ns, skipped, account, .. } = self.wake;
         (reading.cycle, reading.due_ns, reading.woke_ns) = (cycle, due_ns, woke_ns);
-        reading.sampled_ns = self.sync_ns + self.sync_frame_ns;
+        reading.sampled_ns = woke_ns + self.sync_frame_ns;
         reading.complete_ns = self.complete_ns;
         reading.skipped_cycles = skipped;
         reading.stalled_ns = account.stalled_ns;

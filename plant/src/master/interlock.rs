@@ -34,59 +34,37 @@ impl Failure {
     }
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Lock {
-    /// Until every drive is verified again and the controller has switched them off.
+/// The interlock of the drives' motion.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(super) enum Interlock {
+    #[default]
+    Released,
+    /// Locked until every drive is verified again and the controller has switched them off.
     UntilRestored,
     Permanent,
 }
 
-/// The interlock of the drives' motion.
-#[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Interlock {
-    lock: Option<Lock>,
-}
-
 impl Interlock {
-    /// Whether the drives must not move.
-    pub(super) fn is_locked(self) -> bool {
-        self.lock.is_some()
-    }
-
-    /// Whether only a restored rig is missing for its release.
-    pub(super) fn awaits_restoration(self) -> bool {
-        self.lock == Some(Lock::UntilRestored)
-    }
-
     /// Whether drives may be booted. During a stop they may not: it needs every drive's attention. After a permanent
     /// lock nobody moves the drives again, and another master may control them.
     pub(super) fn may_boot(self, drives_are_off: bool) -> bool {
-        match self.lock {
-            None => true,
-            Some(Lock::UntilRestored) => drives_are_off,
-            Some(Lock::Permanent) => false,
+        match self {
+            Self::Released => true,
+            Self::UntilRestored => drives_are_off,
+            Self::Permanent => false,
         }
     }
 
     /// Locks for a cause; returns whether this is the first cause. A later cause, which is mostly a consequence of the
     /// first, changes nothing.
     pub(super) fn lock(&mut self, cause: Cause) -> bool {
-        let lock = match cause {
-            Cause::CommandLost | Cause::BadMessage | Cause::DriveFault => Lock::Permanent,
-            _ => Lock::UntilRestored,
-        };
-        let is_first = self.lock.is_none();
-        self.lock.get_or_insert(lock);
+        let is_first = *self == Self::Released;
+        if is_first {
+            *self = match cause {
+                Cause::CommandLost | Cause::BadMessage | Cause::DriveFault => Self::Permanent,
+                _ => Self::UntilRestored,
+            };
+        }
         is_first
-    }
-
-    /// Locks permanently, whatever locked before; returns whether the lock was not permanent yet.
-    pub(super) fn lock_permanently(&mut self) -> bool {
-        self.lock.replace(Lock::Permanent) != Some(Lock::Permanent)
-    }
-
-    /// Releases the drives.
-    pub(super) fn release(&mut self) {
-        self.lock = None;
     }
 }

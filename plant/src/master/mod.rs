@@ -2,8 +2,8 @@
 //! and stops them when commands cease.
 //!
 //! [`Master`] sequences its parts. [`boot`] verifies one drive, [`drive`] keeps what is known of it, [`exchange`] keeps
-//! the cycle's times, [`commands`] the controller's commands, [`supervision`] watches enabled drives, and [`interlock`]
-//! remembers whether drives may move. The parts return frames and judgements; only the master sends.
+//! the cycle's times, [`commands`] the controller's commands, and [`interlock`] remembers whether drives may move. The
+//! parts return frames and judgements; only the master sends.
 //!
 //! The master is written against the bus trait alone ([`Buses`]), so that simulated and real wires are the same to it.
 //! SDO takes place only with drives that exchange no process data, with one request a bus and cycle, queued after the
@@ -18,19 +18,16 @@ mod exchange;
 mod incoming;
 mod interlock;
 mod presence;
-mod supervision;
 
 #[cfg(test)]
 mod tests;
 
-use masseter_can::canopen::{
-    Cob, Emergency, Heartbeat, LengthError, Nmt, NmtCommand, NmtState, NmtTarget, NodeId, sync,
-};
-use masseter_can::{Bus, CanId, Frame, ReceiveError, Received, Tpdo1};
+use masseter_can::canopen::{Cob, Heartbeat, Nmt, NmtCommand, NmtState, NmtTarget, NodeId, sync};
+use masseter_can::{Bus, ErrorState, Frame, ReceiveError, Received};
 use masseter_shared::config::Scenario;
 use masseter_shared::geometry::AXES;
 use masseter_shared::messages::codes::{
-    BootPhase, Cause, DriveRequest, DriveState, EventKind, Source, drive_state_code,
+    BootPhase, Cause, DriveRequest, DriveState, Source, drive_state_code,
 };
 use masseter_shared::messages::{Command, Event, Reading};
 use masseter_shared::realtime::Wake;
@@ -40,12 +37,11 @@ use crate::link::Buses;
 use crate::link::layout::{drive_ports, node_ids};
 use bus_monitor::BusMonitor;
 use commands::Commands;
-use drive::{Finding, RemoteDrive};
-use events::{EventLog, Subject};
+use drive::RemoteDrive;
+use events::{EventLog, Subject, notice, transition};
 use exchange::Exchange;
-use incoming::{Kind, Message};
+use incoming::Message;
 use interlock::{Failure, Interlock};
-use supervision::Supervision;
 
 pub(crate) use boot::shortest_boot;
 
@@ -55,17 +51,16 @@ const FRAMES_AT_ONCE: usize = 512;
 /// The master.
 #[derive(Debug)]
 pub(crate) struct Master {
-    id: NodeId,
     drives: [RemoteDrive; AXES],
     buses: Vec<BusMonitor>,
-    /// The axis whose SDO request was sent last on each bus.
-    last_served: Vec<usize>,
     exchange: Exchange,
-    commands: Commands,
-    supervision: Supervision,
+    pub(crate) commands: Commands,
+    /// Whether all drives have been enabled since they were to be: none may leave operation by itself.
+    were_enabled: bool,
     interlock: Interlock,
     events: EventLog,
-    is_ending: bool,
+    /// Whether the drives are to stop from the next process data on, for the end: then commands are not needed any more.
+    pub(crate) is_ending: bool,
 }
 
 impl Master {
@@ -82,14 +77,12 @@ impl Master {
             RemoteDrive::new(scenario, axis, id, bus, now_ns)
         };
         Ok(Self {
-            id: NodeId::MASTER,
             drives: std::array::from_fn(drive),
             buses: vec![BusMonitor::default(); can.buses.len()],
-            last_served: vec![0; can.buses.len()],
             exchange: Exchange::new(can, now_ns)?,
             commands: Commands::new(can.command_timeout_cycles),
-            supervision: Supervision::default(),
-            interlock: Interlock::default(),
+            were_enabled: false,
+            interlock: Interlock::Released,
             events: EventLog::new(addresses),
             is_ending: false,
         })
@@ -98,14 +91,14 @@ impl Master {
     /// Begins a cycle: SYNC on every bus, and the heartbeat when it is due.
     pub(crate) fn begin_cycle(&mut self, wake: Wake, buses: &mut impl Buses) {
         let now_ns = wake.woke_ns;
-        self.events.begin_cycle(wake.cycle);
+        self.events.cycle = wake.cycle;
         let is_heartbeat_due = self.exchange.begin_cycle(wake);
-        self.drives.iter_mut().for_each(RemoteDrive::begin_cycle);
+        self.drives.iter_mut().for_each(|drive| drive.presence.begin_cycle());
         self.watch_buses(now_ns, buses);
         for bus in 0..self.buses.len() {
             self.send(now_ns, bus, sync::frame(), buses);
             if is_heartbeat_due {
-                let heartbeat = Heartbeat { state: NmtState::Operational }.frame(self.id);
+                let heartbeat = Heartbeat { state: NmtState::Operational }.frame(NodeId::MASTER);
                 self.send(now_ns, bus, heartbeat, buses);
             }
         }
@@ -133,13 +126,12 @@ impl Master {
 
     /// Writes this cycle's reading, without the times that only the link knows.
     pub(crate) fn fill_reading(&self, reading: &mut Reading) {
-        *reading = Reading { master_fault: u32::from(self.interlock.is_locked()), ..Reading::default() };
+        *reading =
+            Reading { master_fault: u32::from(self.interlock != Interlock::Released), ..Reading::default() };
         self.exchange.fill_reading(reading);
         self.commands.fill_reading(reading);
         for (axis, drive) in self.drives.iter().enumerate() {
-            reading.position_m[axis] = drive.position_m();
-            reading.force_n[axis] = drive.force_n();
-            reading.drive_state[axis] = drive_state_code(drive.drive_state());
+            drive.fill_reading(axis, reading);
             reading.fresh_axes |= u32::from(self.is_fresh(axis)) << axis;
         }
     }
@@ -159,41 +151,26 @@ impl Master {
         self.boot(now_ns, buses);
     }
 
-    /// Stops the drives from the next process data on, for the end: commands are not needed any more.
-    pub(crate) fn stop(&mut self) {
-        self.is_ending = true;
-    }
-
-    /// Cycles since the last command.
-    pub(crate) fn silent_cycles(&self) -> u32 {
-        self.commands.silent_cycles()
-    }
-
     /// Whether no drive reports voltage. A lost drive reports nothing and is not waited for: it stops by itself.
     pub(crate) fn drives_are_off(&self) -> bool {
         !self.drives.iter().filter_map(RemoteDrive::drive_state).any(DriveState::is_powered)
     }
 
-    /// Reports that tapped frames had no room.
-    pub(crate) fn note_lost(&mut self, time_ns: u64, lost: u64) {
-        self.events.add_lost(time_ns, lost);
-    }
-
     /// Hands out the events since the last drain.
     pub(crate) fn drain_events(&mut self, out: &mut impl FnMut(Event)) {
-        self.events.drain(out);
+        self.events.journal.drain(out);
     }
 
     /// Whether a drive has answered this cycle's SYNC.
     fn is_fresh(&self, axis: usize) -> bool {
         let drive = &self.drives[axis];
-        drive.has_answered_since(self.exchange.answered_after_ns(drive.bus))
+        drive.presence.answered_ns > self.exchange.answered_after_ns(drive.bus)
     }
 
     /// The request to the drives: that of the last valid command, unless there is a fault or the end is asked for, and
     /// none that moves before every drive is verified.
     fn request(&self) -> DriveRequest {
-        if self.interlock.is_locked() || self.is_ending {
+        if self.interlock != Interlock::Released || self.is_ending {
             DriveRequest::QuickStop
         } else if self.drives.iter().all(RemoteDrive::is_ready) {
             self.commands.request()
@@ -207,22 +184,22 @@ impl Master {
         let mut all_are_enabled = true;
         for axis in 0..AXES {
             let is_fresh = self.is_fresh(axis);
-            match self.drives[axis].judge(now_ns, is_fresh) {
-                Some(Finding::Absent(failure)) => self.fail_boot(now_ns, axis, &failure),
-                Some(Finding::Lost(failure)) => {
-                    self.fail(now_ns, Subject::Axis(axis), &failure);
-                    self.drives[axis].forget(now_ns);
-                    self.report_boot(now_ns, axis, Ok(()));
-                }
-                None => {}
+            if let Some(failure) = self.drives[axis].absence(now_ns) {
+                self.fail_boot(now_ns, axis, &failure);
+            }
+            if let Some(failure) = self.drives[axis].loss(now_ns, is_fresh) {
+                self.fail(now_ns, Subject::Axis(axis), &failure);
+                self.drives[axis].forget(now_ns);
+                self.report_boot(now_ns, axis, Ok(()));
             }
             let state = self.drives[axis].drive_state();
             all_are_enabled &= state == Some(DriveState::OperationEnabled);
-            if let Some(failure) = self.supervision.judge(state, is_enable) {
+            if is_enable && self.were_enabled && state != Some(DriveState::OperationEnabled) {
+                let failure = Failure::with(Cause::DriveFault, [f64::from(drive_state_code(state)), 0.0]);
                 self.fail(now_ns, Subject::Axis(axis), &failure);
             }
         }
-        self.supervision.end_cycle(is_enable, all_are_enabled);
+        self.were_enabled = is_enable && (self.were_enabled || all_are_enabled);
     }
 
     /// Reports a bus that goes off and one that returns; the drives of a bus in bus-off stop by themselves.
@@ -230,12 +207,12 @@ impl Master {
         for bus in 0..self.buses.len() {
             let status = buses.port(bus).status();
             let (subject, value) = (Subject::Bus(bus), f64::from(status.tec));
-            match self.buses[bus].set_error_state(status.state) {
-                None => {}
-                Some(true) => self.fail(now_ns, subject, &Failure::with(Cause::BusOff, [value, 0.0])),
-                Some(false) => {
-                    self.events.add(now_ns, subject, Event { value, ..notice(Cause::Recovered) });
-                }
+            let is_off = status.state == ErrorState::BusOff;
+            let was_off = std::mem::replace(&mut self.buses[bus].is_off, is_off);
+            if is_off && !was_off {
+                self.fail(now_ns, subject, &Failure::with(Cause::BusOff, [value, 0.0]));
+            } else if was_off && !is_off {
+                self.events.add(now_ns, subject, Event { value, ..notice(Cause::Recovered) });
             }
         }
     }
@@ -252,14 +229,13 @@ impl Master {
     /// Ends a stop once every drive is verified again, none has voltage, and the controller has switched them off: a
     /// controller that still demands motion does not know of the stop.
     fn restore(&mut self, now_ns: u64) {
-        let is_restored = self.interlock.awaits_restoration()
+        let is_restored = self.interlock == Interlock::UntilRestored
             && self.commands.switch_off()
-            && !self.buses.iter().any(|bus| bus.is_off())
+            && !self.buses.iter().any(|bus| bus.is_off)
             && self.drives.iter().all(RemoteDrive::is_ready)
             && self.drives_are_off();
         if is_restored {
-            self.interlock.release();
-            self.supervision = Supervision::default();
+            (self.interlock, self.were_enabled) = (Interlock::Released, false);
             self.events.add(now_ns, Subject::Rig, notice(Cause::Recovered));
         }
     }
@@ -273,7 +249,7 @@ impl Master {
 
     /// Leaves the drives to another master, permanently.
     fn yield_to_other_master(&mut self, now_ns: u64, bus: usize) {
-        if self.interlock.lock_permanently() {
+        if std::mem::replace(&mut self.interlock, Interlock::Permanent) != Interlock::Permanent {
             self.events.add(now_ns, Subject::Bus(bus), Failure::new(Cause::SecondMaster).event());
         }
     }
@@ -284,10 +260,6 @@ impl Master {
 
     /// Advances the boot of all drives and sends its messages.
     fn boot(&mut self, now_ns: u64, buses: &mut impl Buses) {
-        for axis in 0..AXES {
-            self.drives[axis].complete_boot();
-            self.report_boot(now_ns, axis, Ok(()));
-        }
         for axis in 0..AXES {
             let result = self.drives[axis].advance_boot(now_ns);
             self.report_boot(now_ns, axis, result);
@@ -308,13 +280,14 @@ impl Master {
 
     /// Sends one SDO request at most; the drives of a bus take turns.
     fn send_sdo(&mut self, now_ns: u64, bus: usize, buses: &mut impl Buses) {
-        let last = self.last_served[bus];
+        let last = self.buses[bus].last_served;
         for axis in (1..=AXES).map(|step| (last + step) % AXES) {
             let drive = &mut self.drives[axis];
             if drive.bus == bus
-                && let Some(frame) = drive.sdo_request(now_ns)
+                && let Some(request) = drive.boot.request(now_ns)
             {
-                self.last_served[bus] = axis;
+                let frame = request.frame(drive.id);
+                self.buses[bus].last_served = axis;
                 return self.send(now_ns, bus, frame, buses);
             }
         }
@@ -322,11 +295,11 @@ impl Master {
 
     /// Starts the drives once all are verified: none moves beside one that is not.
     fn start_drives(&mut self, now_ns: u64, buses: &mut impl Buses) {
-        if !self.drives.iter().all(RemoteDrive::is_verified) {
+        if !self.drives.iter().all(|drive| drive.boot.is_verified()) {
             return;
         }
         for axis in 0..AXES {
-            if self.drives[axis].boot_phase() == BootPhase::Configured {
+            if self.drives[axis].boot.phase == BootPhase::Configured {
                 self.send_nmt(now_ns, axis, NmtCommand::Start, buses);
                 self.drives[axis].start(now_ns);
                 self.report_boot(now_ns, axis, Ok(()));
@@ -344,7 +317,7 @@ impl Master {
         if let Err(refusal) = buses.port(bus).send(now_ns, frame)
             && self.buses[bus].is_unexplained(&refusal)
         {
-            self.fail(self.exchange.begun_ns(), Subject::Bus(bus), &Failure::new(Cause::BusRefused));
+            self.fail(self.exchange.wake.woke_ns, Subject::Bus(bus), &Failure::new(Cause::BusRefused));
         }
     }
 
@@ -352,83 +325,60 @@ impl Master {
     fn take(&mut self, bus: usize, received: &Received) {
         let Ok(cob) = Cob::try_from(received.frame.id()) else { return };
         let time_ns = received.time_ns;
+        let sender = Message::sender(cob);
         // Only a master sends SYNC, and this master does not receive its own frames.
-        if cob == Cob::Sync {
+        if cob == Cob::Sync || sender == Some(NodeId::MASTER) {
             return self.yield_to_other_master(time_ns, bus);
         }
-        let Some((kind, id)) = Kind::from_cob(cob) else { return };
-        if id == self.id {
-            return self.yield_to_other_master(time_ns, bus);
-        }
+        let Some(id) = sender else { return };
         let Some(axis) = self.drives.iter().position(|drive| drive.id == id && drive.bus == bus) else {
-            return self.note_unknown(time_ns, id, bus);
-        };
-        self.buses[bus].note_drive();
-        match Message::decode(kind, received.frame.data()) {
-            Ok(Message::Heartbeat(state)) => self.take_heartbeat(axis, state, time_ns),
-            Ok(Message::ProcessData(tpdo)) => self.take_process_data(axis, tpdo, time_ns),
-            Ok(Message::Emergency(emergency)) => self.note_emergency(axis, emergency, time_ns),
-            Ok(Message::SdoAnswer(answer)) => {
-                let result = self.drives[axis].take_sdo_answer(time_ns, answer);
-                self.report_boot(time_ns, axis, result);
+            if self.buses[bus].is_new_unknown(id) {
+                let event = Event { node: u16::from(id.get()), ..notice(Cause::UnknownNode) };
+                self.events.add(time_ns, Subject::Bus(bus), event);
             }
-            Ok(Message::Foreign) => {}
-            Err(error) => {
-                if self.drives[axis].is_first_wrong_length(kind) {
-                    self.note_wrong_length(axis, cob, &error, time_ns);
+            return;
+        };
+        self.buses[bus].has_drives = true;
+        let drive = &mut self.drives[axis];
+        match Message::decode(cob, received.frame.data()) {
+            Ok(Message::Heartbeat(state)) => self.take_heartbeat(axis, state, time_ns),
+            Ok(Message::ProcessData(tpdo)) => {
+                let Some([before, after]) = drive.take_process_data(time_ns, tpdo) else { return };
+                self.exchange.complete_ns = self.exchange.complete_ns.max(time_ns);
+                if before != after {
+                    let event = transition(Source::Drive, drive_state_code(before), drive_state_code(after));
+                    self.events.add(time_ns, Subject::Axis(axis), event);
                 }
             }
+            Ok(Message::Emergency(emergency)) => {
+                // Before its boot-up, a drive reports emergencies of a time before this master, which resets it.
+                let is_past = emergency.is_reset() || drive.boot.phase == BootPhase::Waiting;
+                self.events.add(time_ns, Subject::Axis(axis), events::emergency(emergency, is_past));
+            }
+            Ok(Message::SdoAnswer(answer)) => {
+                let result = drive.take_sdo_answer(time_ns, answer);
+                self.report_boot(time_ns, axis, result);
+            }
+            Err(error) if drive.is_first_wrong_length(cob) => {
+                self.events.add(time_ns, Subject::Axis(axis), events::wrong_length(cob, &error));
+            }
+            Ok(Message::Foreign) | Err(_) => {}
         }
     }
 
     fn take_heartbeat(&mut self, axis: usize, state: NmtState, time_ns: u64) {
         let may_boot = self.may_boot();
-        let result = if state == NmtState::BootUp && self.drives[axis].is_started() {
+        if state == NmtState::BootUp && self.drives[axis].is_started {
             self.fail(time_ns, Subject::Axis(axis), &Failure::new(Cause::NodeRestarted));
-            self.drives[axis].take_restart(time_ns);
-            Ok(())
-        } else {
-            self.drives[axis].take_heartbeat(time_ns, state, may_boot)
-        };
+        }
+        let result = self.drives[axis].take_heartbeat(time_ns, state, may_boot);
         self.report_boot(time_ns, axis, result);
-    }
-
-    fn take_process_data(&mut self, axis: usize, tpdo: Tpdo1, time_ns: u64) {
-        let Some([before, after]) = self.drives[axis].take_process_data(time_ns, tpdo) else { return };
-        self.exchange.note_answer(time_ns);
-        if before != after {
-            let event = transition(Source::Drive, drive_state_code(before), drive_state_code(after));
-            self.events.add(time_ns, Subject::Axis(axis), event);
-        }
-    }
-
-    /// Before its boot-up, a drive reports emergencies of a time before this master, which resets it.
-    fn note_emergency(&mut self, axis: usize, emergency: Emergency, time_ns: u64) {
-        let is_past = emergency.is_reset() || self.drives[axis].boot_phase() == BootPhase::Waiting;
-        let kind = if is_past { EventKind::Notice } else { EventKind::Fault };
-        let (value, limit) = (f64::from(emergency.code.0), f64::from(emergency.register));
-        let event = Event { value, limit, ..Event::new(Source::Drive, kind, Cause::Emergency) };
-        self.events.add(time_ns, Subject::Axis(axis), event);
-    }
-
-    fn note_wrong_length(&mut self, axis: usize, cob: Cob, error: &LengthError, time_ns: u64) {
-        let (value, limit) = (error.actual as f64, error.expected as f64);
-        let event = Event { object: CanId::from(cob).number(), value, limit, ..notice(Cause::WrongLength) };
-        self.events.add(time_ns, Subject::Axis(axis), event);
-    }
-
-    /// Reports a node that nobody configured, once.
-    fn note_unknown(&mut self, time_ns: u64, id: NodeId, bus: usize) {
-        if self.buses[bus].is_new_unknown(id) {
-            let event = Event { node: u16::from(id.get()), ..notice(Cause::UnknownNode) };
-            self.events.add(time_ns, Subject::Bus(bus), event);
-        }
     }
 
     /// Reports a change of a drive's boot, or its failure.
     fn report_boot(&mut self, time_ns: u64, axis: usize, result: Result<(), Failure>) {
         if let Err(failure) = result {
-            self.drives[axis].give_up();
+            self.drives[axis].boot.phase = BootPhase::Failed;
             self.fail_boot(time_ns, axis, &failure);
         }
         if let Some([before, after]) = self.drives[axis].phase_change() {
@@ -443,12 +393,4 @@ impl Master {
         self.interlock.lock(failure.cause);
         self.events.add(now_ns, Subject::Axis(axis), failure.event());
     }
-}
-
-fn notice(cause: Cause) -> Event {
-    Event::new(Source::Master, EventKind::Notice, cause)
-}
-
-fn transition(source: Source, from: u32, to: u32) -> Event {
-    Event { from, to, ..Event::new(source, EventKind::Transition, Cause::Sequence) }
 }

@@ -1,10 +1,11 @@
 //! Enumerations with fixed numbers and names.
 
-/// Declares an enumeration with the number and the name of every value.
+/// Declares enumerations with the number and the name of every value.
+#[macro_export]
 macro_rules! codes {
-    ($(#[$doc:meta])* $name:ident as $number:ident {
+    ($($(#[$doc:meta])* $name:ident as $number:ident {
         $($(#[$variant_doc:meta])* $variant:ident = $code:literal $text:literal,)*
-    }) => {
+    })*) => {$(
         $(#[$doc])*
         #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
         #[repr($number)]
@@ -34,10 +35,19 @@ macro_rules! codes {
             }
         }
 
+        /// An unknown number is handed back.
+        impl TryFrom<$number> for $name {
+            type Error = $number;
+
+            fn try_from(code: $number) -> Result<Self, $number> {
+                Self::from_code(code).ok_or(code)
+            }
+        }
+
         impl std::fmt::Display for $name {
             fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
                 f.pad(self.name())
             }
         }
-    };
+    )*};
 }

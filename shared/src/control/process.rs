@@ -52,11 +52,12 @@ impl Ports {
     fn open(context: &ProcessContext) -> Result<Self, ProcessError> {
         let (node, scenario, schedule) = (&context.node, &context.scenario, &context.schedule);
         let readings = node.newest_subscriber()?;
-        let (commands, states, events) = (node.publisher()?, node.publisher()?, node.publisher()?);
+        let (commands, states) = (node.publisher::<Command>()?, node.publisher::<State>()?);
+        let events = node.publisher::<Event>()?;
         commands.warm_up()?;
         states.warm_up()?;
         events.warm_up()?;
-        let start = context.ready_on(scenario.realtime.cores[0])?;
+        let start = context.ready(Some(scenario.realtime.cores[0]))?;
         readings.connect()?;
         commands.connect()?;
         states.connect()?;

@@ -1,16 +1,8 @@
 //! The enumerations that messages carry as numbers. A number without a meaning is refused, never guessed.
 
-pub use masseter_can::cia402::{DriveRequest, DriveState};
+use masseter_can::codes;
 
-/// A code that names nothing in its enumeration.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("{code} is no {enumeration}; sender and receiver may be of different versions")]
-pub struct UnknownCode {
-    /// Name of the enumeration.
-    pub enumeration: &'static str,
-    /// The number.
-    pub code: u32,
-}
+pub use masseter_can::cia402::{DriveRequest, DriveState};
 
 /// [`Event::axis`](super::Event::axis) when no axis is concerned.
 pub const NO_AXIS: u32 = u32::MAX;
@@ -18,64 +10,9 @@ pub const NO_AXIS: u32 = u32::MAX;
 /// [`Reading::drive_state`](super::Reading::drive_state) of a drive not heard of yet, or lost.
 pub const NO_DRIVE_STATE: u32 = 0;
 
-macro_rules! codes {
-    ($($(#[$doc:meta])* $name:ident { $($(#[$variant_doc:meta])* $variant:ident = $code:literal $text:literal,)* })*) => {$(
-        $(#[$doc])*
-        #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-        #[repr(u32)]
-        pub enum $name {
-            $($(#[$variant_doc])* $variant = $code,)*
-        }
-
-        impl $name {
-            /// Every value, in the order of the codes.
-            pub const ALL: &'static [Self] = &[$(Self::$variant),*];
-
-            /// The number that messages carry.
-            pub const fn code(self) -> u32 {
-                self as u32
-            }
-
-            /// The word that files and reports show.
-            pub const fn name(self) -> &'static str {
-                match self {
-                    $(Self::$variant => $text,)*
-                }
-            }
-        }
-
-        impl TryFrom<u32> for $name {
-            type Error = UnknownCode;
-
-            fn try_from(code: u32) -> Result<Self, UnknownCode> {
-                match code {
-                    $($code => Ok(Self::$variant),)*
-                    _ => Err(UnknownCode { enumeration: stringify!($name), code }),
-                }
-            }
-        }
-
-        impl std::fmt::Display for $name {
-            fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-                f.pad(self.name())
-            }
-        }
-    )*
-    /// Made with the enumerations, so that none is left out.
-    #[cfg(test)]
-    #[test]
-    fn every_code_means_itself_and_others_are_refused() {
-        $(for code in 0..256 {
-            let meant = $name::ALL.iter().copied().find(|value| value.code() == code);
-            let refused = UnknownCode { enumeration: stringify!($name), code };
-            assert_eq!($name::try_from(code), meant.ok_or(refused));
-        })*
-    }};
-}
-
 codes! {
     /// State of the controller's sequence.
-    ControllerState {
+    ControllerState as u32 {
         /// No steady readings yet; drives off.
         WaitReadings = 0 "wait_readings",
         /// Bringing all drives to operation enabled, holding where they are.
@@ -95,7 +32,7 @@ codes! {
     }
 
     /// Progress of the CAN master with the boot of a node.
-    BootPhase {
+    BootPhase as u32 {
         /// Waiting for its boot-up message.
         Waiting = 0 "waiting",
         /// Reading what device it is.
@@ -115,7 +52,7 @@ codes! {
     }
 
     /// Who reports an event.
-    Source {
+    Source as u32 {
         /// The controller.
         Controller = 1 "controller",
         /// The plant: CAN master.
@@ -127,7 +64,7 @@ codes! {
     }
 
     /// What kind of event it is.
-    EventKind {
+    EventKind as u32 {
         /// A state machine moved; `from` and `to` name the states.
         Transition = 0 "transition",
         /// Something is wrong; `cause`, `value` and `limit` explain it.
@@ -137,7 +74,7 @@ codes! {
     }
 
     /// Why kinematics gave no pose, in the `object` of an event of the controller.
-    NoPose {
+    NoPose as u32 {
         /// A coordinate is no finite number.
         NotFinite = 1 "not_finite",
         /// A leg has no length; the event names its axis.
@@ -155,7 +92,7 @@ codes! {
     }
 
     /// Cause of an event. The unit of the event's `value` and `limit` is given in brackets.
-    Cause {
+    Cause as u32 {
         /// In the course of the sequence.
         Sequence = 0 "sequence",
         /// Asked for from outside (signal).
@@ -239,35 +176,24 @@ codes! {
     }
 }
 
-/// The request that a message carries.
-///
-/// # Errors
-/// [`UnknownCode`] where no request has that number.
-pub fn drive_request(code: u32) -> Result<DriveRequest, UnknownCode> {
-    DriveRequest::from_code(code).ok_or(UnknownCode { enumeration: "DriveRequest", code })
-}
-
 /// What a message carries for the state of a drive; [`NO_DRIVE_STATE`] for none.
 pub fn drive_state_code(state: Option<DriveState>) -> u32 {
     state.map_or(NO_DRIVE_STATE, DriveState::code)
 }
 
-/// The state of a drive that a message carries; none for 0, a drive not heard of yet, or lost.
+/// The state of a drive that a message carries; none for [`NO_DRIVE_STATE`].
 ///
 /// # Errors
-/// [`UnknownCode`] where no state has that number.
-pub fn drive_state(code: u32) -> Result<Option<DriveState>, UnknownCode> {
-    if code == NO_DRIVE_STATE {
-        return Ok(None);
-    }
-    DriveState::from_code(code).map(Some).ok_or(UnknownCode { enumeration: "DriveState", code })
+/// A code that no state has.
+pub fn drive_state(code: u32) -> Result<Option<DriveState>, u32> {
+    if code == NO_DRIVE_STATE { Ok(None) } else { DriveState::try_from(code).map(Some) }
 }
 
 /// The name of the state of a drive that a message carries.
 ///
 /// # Errors
-/// [`UnknownCode`] where no state has that number.
-pub fn drive_state_name(code: u32) -> Result<&'static str, UnknownCode> {
+/// A code that no state has.
+pub fn drive_state_name(code: u32) -> Result<&'static str, u32> {
     Ok(drive_state(code)?.map_or("unknown", DriveState::name))
 }
 
@@ -276,9 +202,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn requests_and_drive_states_survive_their_codes_and_others_are_refused() {
+    fn codes_mean_themselves_and_others_are_refused() {
         for code in 0..256 {
-            assert!(drive_request(code).map_or(code > 2, |request| request.code() == code), "{code}");
+            assert_eq!(DriveRequest::try_from(code).is_ok(), code <= 2, "{code}");
+            assert_eq!(Source::try_from(code).is_ok(), matches!(code, 1..=3 | 5), "{code}");
+            assert!(Cause::try_from(code).map_or_else(|unknown| unknown, Cause::code) == code, "{code}");
             let state_code = drive_state(code).map(drive_state_code);
             assert!(state_code.map_or(code > 8, |found| found == code), "{code}");
         }

@@ -14,8 +14,6 @@ mod schema;
 pub mod tap;
 mod words;
 
-use std::mem::offset_of;
-
 use bytemuck::{Pod, Zeroable, bytes_of, bytes_of_mut};
 use iceoryx2::prelude::ZeroCopySend;
 
@@ -34,12 +32,9 @@ pub trait Message: Pod + ZeroCopySend + Default + std::fmt::Debug + PartialEq {
     const DEPTH: usize;
     /// Type name in recordings.
     const TYPE_NAME: &'static str;
-    /// Type name in shared memory, `masseter/Reading/<hash>`: a service of another layout is refused when it is opened.
+    /// Type name in shared memory, `masseter/Reading/<hash>`: a service of another layout is refused when it is opened. The
+    /// hash covers the schema, the version, and the number and name of every code that messages carry.
     const SHARED_MEMORY_NAME: &'static str;
-    /// Fields, types, offsets in bytes, size and version in words; the hash in the name is that of this text.
-    fn layout() -> String;
-    /// [`LAYOUT_VERSION`] of the sender.
-    fn version(&self) -> u64;
     /// The layout in the ROS 2 message definition language, as recordings carry it.
     fn schema() -> String;
     /// The CDR body: all bytes except the unused ones at the end.
@@ -84,23 +79,8 @@ macro_rules! messages {
             const TYPE_NAME: &'static str = concat!("masseter/", stringify!($name));
             const SHARED_MEMORY_NAME: &'static str = $type_name;
 
-            fn layout() -> String {
-                let fields = [
-                    ("seq", "u64", offset_of!(Self, seq)),
-                    ("published_ns", "u64", offset_of!(Self, published_ns)),
-                    ("version", "u64", offset_of!(Self, version)),
-                    $((stringify!($field), stringify!($type), offset_of!(Self, $field)),)*
-                ];
-                let fields = fields.map(|(name, of_type, offset)| format!("{name}:{of_type}@{offset}"));
-                format!("{} {} {} v{LAYOUT_VERSION}", Self::TYPE_NAME, fields.join(" "), size_of::<Self>())
-            }
-
-            fn version(&self) -> u64 {
-                self.version
-            }
-
             fn schema() -> String {
-                let header = [("seq", u64::ros_type()), ("published_ns", u64::ros_type()), ("version", u64::ros_type())];
+                let header = ["seq", "published_ns", "version"].map(|name| (name, u64::ros_type()));
                 let fields = [$((stringify!($field), <$type>::ros_type()),)*];
                 schema::definition(header.into_iter().chain(fields))
             }
@@ -125,7 +105,7 @@ macro_rules! messages {
 
 messages! {
     /// Targets and request for the drives, once a cycle.
-    Command on "command" keeping 2048 as "masseter/Command/691046831b7ae07d" {
+    Command on "command" keeping 2048 as "masseter/Command/c023a3b20d68a651" {
         /// Cycle of the controller, from 1.
         cycle: u64,
         /// Cycle of the reading it was computed from; 0 when there was none.
@@ -139,7 +119,7 @@ messages! {
     }
 
     /// Positions, forces and states of the drives, once a cycle.
-    Reading on "reading" keeping 2048 as "masseter/Reading/c16b013b50dfdf49" {
+    Reading on "reading" keeping 2048 as "masseter/Reading/66b12ac3e4f2b2b9" {
         /// Cycle of the plant, from 1.
         cycle: u64,
         /// Cycle of the last command received when the sample was taken; 0 before the first.
@@ -179,7 +159,7 @@ messages! {
     }
 
     /// The controller's state and its estimate, once a cycle.
-    State on "state" keeping 2048 as "masseter/State/881240e4e5e5cf4a" {
+    State on "state" keeping 2048 as "masseter/State/771acc0e84997397" {
         /// Cycle of the controller, from 1.
         cycle: u64,
         /// Cycle of the reading it was computed from; 0 when there was none.
@@ -231,7 +211,7 @@ messages! {
     }
 
     /// The true state of the mechanism, once a cycle; the controller never reads it.
-    Truth on "truth" keeping 2048 as "masseter/Truth/926a8753e566de8a" {
+    Truth on "truth" keeping 2048 as "masseter/Truth/07a8a31fea5af454" {
         /// Cycle of the plant, from 1.
         cycle: u64,
         /// The instant it describes: that of the reading's sample, ns.
@@ -251,7 +231,7 @@ messages! {
     }
 
     /// An observation of a tap on a CAN wire: a frame, or an error message in the coding of `linux/can/error.h`.
-    FrameTap on "frame" keeping 32768 as "masseter/FrameTap/40ca94b43c999ccf" {
+    FrameTap on "frame" keeping 32768 as "masseter/FrameTap/bc4d1792091bd667" {
         /// When its last bit was on the wire, ns.
         time_ns: u64,
         /// When its transmitter had it queued, ns; 0 on real wires.
@@ -268,7 +248,7 @@ messages! {
 
     /// Counters of the kernel for the machine and both loops. The recorder reads and records them; the message is not
     /// published.
-    Machine on "machine" keeping 1 as "masseter/Machine/130c1be53085d979" {
+    Machine on "machine" keeping 1 as "masseter/Machine/b486849065fde2ff" {
         /// Time of the sample, ns.
         time_ns: u64,
         /// Time that the hypervisor had taken from all cores together, as far as the hypervisor reports it, ns.
@@ -280,7 +260,7 @@ messages! {
     }
 
     /// A single occurrence: a change of state, a fault, an alarm.
-    Event on "event" keeping 1024 as "masseter/Event/299f7070e354d7de" {
+    Event on "event" keeping 1024 as "masseter/Event/59933b5d7db65044" {
         /// When, ns.
         time_ns: u64,
         /// Cycle of the process that reports it.
@@ -338,6 +318,7 @@ pub fn pose_from_fields(position_m: [f64; 3], [w, x, y, z]: [f64; 4]) -> Pose {
 
 #[cfg(test)]
 mod tests {
+    use super::codes::{BootPhase, ControllerState, DriveRequest, DriveState, NoPose};
     use super::*;
 
     /// FNV-1a, 64 bits.
@@ -346,9 +327,21 @@ mod tests {
             .fold(0xCBF2_9CE4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01B3))
     }
 
+    /// Schema, version and codes; [`Pod`] excludes padding, so the schema fixes every offset.
+    fn layout<M: Message>() -> String {
+        macro_rules! codes {
+            ($($name:ident),*) => {
+                [$($name::ALL.map(|value| format!("{value}={}", value.code())).join(" ")),*].join("\n")
+            };
+        }
+        let codes =
+            codes!(DriveState, DriveRequest, ControllerState, BootPhase, Source, EventKind, NoPose, Cause);
+        format!("{} v{LAYOUT_VERSION}\n{}{codes}", M::TYPE_NAME, M::schema())
+    }
+
     fn check<M: Message>() {
-        let expected = format!("{}/{:016x}", M::TYPE_NAME, hash(&M::layout()));
-        assert_eq!(M::SHARED_MEMORY_NAME, expected, "name the new layout so: {}", M::layout());
+        let expected = format!("{}/{:016x}", M::TYPE_NAME, hash(&layout::<M>()));
+        assert_eq!(M::SHARED_MEMORY_NAME, expected, "name the new layout so: {}", layout::<M>());
     }
 
     #[test]
@@ -363,9 +356,13 @@ mod tests {
     }
 
     #[test]
-    fn a_field_of_equal_size_and_another_name_makes_another_hash() {
-        let layout = Reading::layout();
-        let renamed = layout.replace("force_n", "torque_nm");
-        assert_ne!((hash(&layout), &layout), (hash(&renamed), &renamed));
+    fn the_hash_covers_version_fields_data_bytes_and_codes() {
+        let layout = layout::<FrameTap>();
+        for (found, other) in
+            [("v7", "v8"), ("queued_ns", "waiting_ns"), ("[<=64]", "[<=8]"), ("fault=8", "fault=9")]
+        {
+            let changed = layout.replace(found, other);
+            assert_ne!((hash(&layout), &layout), (hash(&changed), &changed));
+        }
     }
 }

@@ -1,5 +1,7 @@
 //! Deadlines on a fixed grid: the n-th at `epoch + phase + n · period`.
 
+use std::convert::Infallible;
+
 use super::{Account, Waiter};
 use crate::clock;
 
@@ -73,10 +75,8 @@ impl Cycle {
 
     /// Waits for the next deadline: sleeps, then spins the last stretch.
     pub fn wait(&mut self) -> Wake {
-        let cycle = self.claim(clock::now_ns());
-        let due_ns = self.due_ns(cycle);
-        let woke_ns = self.waiter.until(due_ns);
-        self.wake(cycle, due_ns, woke_ns)
+        let Ok(wake) = self.wait_warm(|| Ok::<_, Infallible>(()));
+        wake
     }
 
     /// As [`Self::wait`], with one call of `warm_up` shortly before the deadline if there is time for it: it may do work of
@@ -88,11 +88,7 @@ impl Cycle {
         let cycle = self.claim(clock::now_ns());
         let due_ns = self.due_ns(cycle);
         let woke_ns = self.waiter.until_warm(due_ns, warm_up)?;
-        Ok(self.wake(cycle, due_ns, woke_ns))
-    }
-
-    fn wake(&self, cycle: u64, due_ns: u64, woke_ns: u64) -> Wake {
-        Wake { cycle, due_ns, woke_ns, skipped: self.skipped, account: self.waiter.account() }
+        Ok(Wake { cycle, due_ns, woke_ns, skipped: self.skipped, account: self.waiter.account() })
     }
 
     /// For the waits within a cycle.

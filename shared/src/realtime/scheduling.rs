@@ -3,11 +3,10 @@
 //!
 //! A refusal is reported and never ends a run: screen, manifest and `--require-rt` judge it.
 
-use std::{fs, thread};
+use std::{fs, io, thread};
 
 use rustix::io::Errno;
 use rustix::mm::{MlockAllFlags, mlockall};
-use rustix::process::getpid;
 use rustix::thread::{CpuSet, sched_getaffinity, sched_setaffinity};
 use serde::{Deserialize, Serialize};
 
@@ -40,40 +39,39 @@ pub struct Obtained {
 /// Requests `wanted`, then reads back the granted scheduling. Memory is locked for the whole process, the rest holds for
 /// the calling thread.
 pub fn obtain(wanted: Wanted) -> Obtained {
-    // The kernel may accept a request without effect: only what is read back counts.
-    let core = wanted.core.map(|core| pin(core).map_err(|error| error.to_string()));
-    let fifo = wanted.fifo_priority.map(|priority| fifo::set(priority).map_err(|error| error.to_string()));
-    let locked = wanted
-        .locked_memory
-        .then(|| mlockall(MlockAllFlags::CURRENT | MlockAllFlags::FUTURE).map_err(|error| error.to_string()));
-    let mut obtained = Obtained {
-        wanted,
-        core: pinned_core(),
-        fifo_priority: fifo::get(),
-        locked_memory: is_locked(),
-        refusals: Vec::new(),
+    let pinned = wanted.core.map_or(Ok(()), |core| stay_on(&[core]));
+    let fifo = wanted.fifo_priority.map_or(Ok(()), fifo::set);
+    let locked = if wanted.locked_memory {
+        mlockall(MlockAllFlags::CURRENT | MlockAllFlags::FUTURE).map_err(io::Error::from)
+    } else {
+        Ok(())
     };
-    let pinned = refusal(core, obtained.core == wanted.core);
-    let fifo = refusal(fifo, obtained.fifo_priority == wanted.fifo_priority);
-    let locked = refusal(locked, obtained.locked_memory);
-    obtained
-        .refusals
-        .extend(pinned.zip(wanted.core).map(|(why, core)| refused_core(core, &why, &usable_cores())));
-    obtained.refusals.extend(fifo.zip(wanted.fifo_priority).map(|(why, priority)| {
-        format!("SCHED_FIFO {priority} refused ({why}): `masseter doctor` shows how to allow it")
-    }));
-    obtained.refusals.extend(
-        locked.map(|why| format!("locked memory refused ({why}): `masseter doctor` shows how to allow it")),
-    );
-    obtained
+    let (core, fifo_priority, locked_memory) = (pinned_core(), fifo::get(), is_locked());
+    let mut refusals = Vec::new();
+    if let Some(wanted) = wanted.core
+        && let Some(why) = refusal(pinned, core == Some(wanted))
+    {
+        refusals.push(refused_core(wanted, &why, &usable_cores()));
+    }
+    let mut refuse = |what: String, why: String| {
+        refusals.push(format!("{what} refused ({why}): `masseter doctor` shows how to allow it"));
+    };
+    if let Some(wanted) = wanted.fifo_priority
+        && let Some(why) = refusal(fifo, fifo_priority == Some(wanted))
+    {
+        refuse(format!("SCHED_FIFO {wanted}"), why);
+    }
+    if let Some(why) = refusal(locked, locked_memory || !wanted.locked_memory) {
+        refuse("locked memory".to_owned(), why);
+    }
+    Obtained { wanted, core, fifo_priority, locked_memory, refusals }
 }
 
-/// Why a request was not granted; none if it was, or if there was none.
-fn refusal(asked: Option<Result<(), String>>, is_granted: bool) -> Option<String> {
-    match asked? {
-        Err(error) => Some(error),
-        Ok(()) if !is_granted => Some("without effect".to_owned()),
-        Ok(()) => None,
+/// Why a request was not granted, if it was not. The kernel may accept a request without effect: what is read back counts.
+fn refusal(asked: io::Result<()>, is_granted: bool) -> Option<String> {
+    match asked {
+        Err(error) => Some(error.to_string()),
+        Ok(()) => (!is_granted).then(|| "without effect".to_owned()),
     }
 }
 
@@ -98,25 +96,21 @@ pub fn allowed_cores() -> Vec<usize> {
 /// The cores to which a thread of this process can be pinned. A cpuset limits them; an inherited affinity mask does not,
 /// and neither does `isolcpus=`, which takes cores out of every mask.
 pub fn usable_cores() -> Vec<usize> {
-    let stays_on = |core: &usize| pin(*core).is_ok() && pinned_core() == Some(*core);
+    let stays_on = |core: &usize| stay_on(&[*core]).is_ok() && pinned_core() == Some(*core);
     // In a thread of its own, so that the caller keeps its mask.
     let tried = thread::spawn(move || (0..CpuSet::MAX_CPU).filter(stays_on).collect());
     tried.join().expect("asking the kernel does not panic")
 }
 
-fn pin(core: usize) -> Result<(), Errno> {
-    if core >= CpuSet::MAX_CPU {
-        return Err(Errno::INVAL);
-    }
-    stay_on(&[core])
-}
-
-fn stay_on(cores: &[usize]) -> Result<(), Errno> {
+fn stay_on(cores: &[usize]) -> io::Result<()> {
     let mut set = CpuSet::new();
     for &core in cores {
+        if core >= CpuSet::MAX_CPU {
+            return Err(Errno::INVAL.into());
+        }
         set.set(core);
     }
-    sched_setaffinity(None, &set)
+    Ok(sched_setaffinity(None, &set)?)
 }
 
 /// Keeps the calling thread, and the threads that it starts, off the cores of real-time tasks: off all of them, or off
@@ -144,8 +138,7 @@ fn pinned_core() -> Option<usize> {
 }
 
 fn is_locked() -> bool {
-    let status =
-        fs::read_to_string(format!("/proc/{}/status", getpid().as_raw_nonzero())).unwrap_or_default();
+    let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
     let locked_kb = status.lines().find_map(|line| line.strip_prefix("VmLck:"));
     locked_kb.is_some_and(|kb| !kb.trim().starts_with("0 "))
 }
@@ -223,11 +216,12 @@ mod tests {
 
     #[test]
     fn a_grant_without_effect_counts_as_a_refusal() {
+        let no = || Err(io::Error::other("no"));
         let cases = [
-            (None, false, None),
-            (Some(Ok(())), true, None),
-            (Some(Ok(())), false, Some("without effect")),
-            (Some(Err("no".to_owned())), false, Some("no")),
+            (Ok(()), true, None),
+            (Ok(()), false, Some("without effect")),
+            (no(), false, Some("no")),
+            (no(), true, Some("no")),
         ];
         for (asked, is_granted, expected) in cases {
             assert_eq!(refusal(asked, is_granted).as_deref(), expected);

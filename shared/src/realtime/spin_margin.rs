@@ -31,11 +31,6 @@ impl SpinMargin {
         Self { longest_ns, current_ns: longest_ns }
     }
 
-    /// The margin, ns.
-    pub(super) fn ns(&self) -> u64 {
-        self.current_ns
-    }
-
     /// The margin, but at least `least_ns` as far as the period allows, ns.
     pub(super) fn at_least(&self, least_ns: u64) -> u64 {
         self.current_ns.max(least_ns.min(self.longest_ns))
@@ -73,22 +68,25 @@ mod tests {
     fn after(latencies: impl IntoIterator<Item = u64>) -> u64 {
         let mut margin = SpinMargin::new(PERIOD_NS);
         latencies.into_iter().for_each(|latency_ns| margin.learn(latency_ns));
-        margin.ns()
+        margin.current_ns
     }
 
     #[test]
     fn the_first_margin_is_the_longest() {
-        assert_eq!(SpinMargin::new(PERIOD_NS).ns(), LONGEST_NS);
-        assert_eq!(SpinMargin::new(60_000).ns(), 20_000);
+        assert_eq!(SpinMargin::new(PERIOD_NS).current_ns, LONGEST_NS);
+        assert_eq!(SpinMargin::new(60_000).current_ns, 20_000);
     }
 
     #[test]
     fn the_margin_can_be_lengthened_as_far_as_the_period_allows_and_halved_where_a_wait_may_end_late() {
         let mut margin = SpinMargin::new(90_000);
-        assert_eq!((margin.ns(), margin.at_least(50_000), margin.latency_ns()), (30_000, 30_000, 15_000));
+        assert_eq!(
+            (margin.current_ns, margin.at_least(50_000), margin.latency_ns()),
+            (30_000, 30_000, 15_000)
+        );
         repeat_n(1_000, 100_000).for_each(|latency_ns| margin.learn(latency_ns));
-        assert_eq!(margin.at_least(10_000), margin.ns().max(10_000));
-        assert!(margin.ns() < 20_000);
+        assert_eq!(margin.at_least(10_000), margin.current_ns.max(10_000));
+        assert!(margin.current_ns < 20_000);
     }
 
     #[test]
@@ -122,7 +120,7 @@ mod tests {
             let mut margin = SpinMargin::new(period_ns);
             for latency_ns in latencies {
                 margin.learn(latency_ns);
-                prop_assert!((SHORTEST_NS..=LONGEST_NS.min(period_ns / PARTS_OF_PERIOD)).contains(&margin.ns()));
+                prop_assert!((SHORTEST_NS..=LONGEST_NS.min(period_ns / PARTS_OF_PERIOD)).contains(&margin.current_ns));
             }
         }
     }

@@ -45,21 +45,13 @@ impl Waiter {
         Self { margin: SpinMargin::new(period_ns), account: Account::default(), working_since_ns: None }
     }
 
-    /// The account: of work up to the begin of the last wait, of waiting up to the last look at the clock.
+    /// The account. It covers work up to the beginning of the last wait, and waiting up to the last reading of the clock.
     pub fn account(&self) -> Account {
         self.account
     }
 
-    /// Sleeps, then spins until `due_ns`; returns the time found at the end.
-    pub fn until(&mut self, due_ns: u64) -> u64 {
-        let now_ns = self.end_work();
-        let wake_ns = due_ns.saturating_sub(self.margin.ns());
-        let now_ns = if now_ns < wake_ns { self.sleep(wake_ns, due_ns) } else { now_ns };
-        self.spin_until(due_ns, now_ns)
-    }
-
-    /// As [`Self::until`], with one call of `warm_up` after the sleep if there is time for it, which counts as work. A core
-    /// that slept has cold caches.
+    /// Sleeps, calls `warm_up` once if there is time for it, and spins until `due_ns`; returns the time at the end. The
+    /// warm-up counts as work. It is needed because a core that slept has cold caches.
     ///
     /// # Errors
     /// Those of `warm_up`.
@@ -71,7 +63,7 @@ impl Waiter {
         let mut now_ns = self.end_work();
         let wake_ns = due_ns.saturating_sub(self.margin.at_least(2 * WARM_UP_NS));
         if now_ns < wake_ns {
-            now_ns = self.sleep(wake_ns, due_ns);
+            now_ns = self.sleep(wake_ns, due_ns, clock::sleep_until);
             if now_ns + WARM_UP_NS < due_ns {
                 warm_up()?;
                 now_ns = self.end_work();
@@ -80,25 +72,25 @@ impl Waiter {
         Ok(self.spin_until(due_ns, now_ns))
     }
 
-    /// Waits until `due_ns`, or for up to `latest_ns` where the core wakes up late: spins only as far as the usual
-    /// wake-up latency would miss `latest_ns`. Returns the time found at the end.
+    /// Waits until `due_ns`, and at most until `latest_ns` if the core wakes up late: spins only for the time in which a
+    /// sleep of the usual wake-up latency would end after `latest_ns`. Returns the time at the end.
     pub fn until_between(&mut self, due_ns: u64, latest_ns: u64) -> u64 {
         let now_ns = self.end_work();
         let wake_ns = latest_ns.saturating_sub(self.margin.latency_ns()).min(due_ns);
-        let pays = now_ns.saturating_add(SHORTEST_SLEEP_NS) < wake_ns;
-        let now_ns = if pays { self.sleep(wake_ns, latest_ns) } else { now_ns };
+        let is_worth_it = now_ns.saturating_add(SHORTEST_SLEEP_NS) < wake_ns;
+        let now_ns = if is_worth_it { self.sleep(wake_ns, latest_ns, clock::sleep_until) } else { now_ns };
         self.spin_until(due_ns, now_ns)
     }
 
-    /// Waits in `block`, which sleeps in the kernel until something happens, at most until about `until_ns`. Spins
-    /// instead where the usual wake-up latency would miss `latest_ns`. Returns the time found at the end.
+    /// Calls `block`, which sleeps in the kernel until an event, or until about `until_ns`. Spins instead if a sleep of the
+    /// usual wake-up latency would end after `latest_ns`. Returns the time at the end.
     pub fn until_woken(&mut self, until_ns: u64, latest_ns: u64, block: impl FnOnce(u64)) -> u64 {
         let now_ns = self.end_work();
         let until_ns = latest_ns.saturating_sub(self.margin.latency_ns()).min(until_ns);
-        if now_ns < until_ns { self.sleep_in(until_ns, latest_ns, block) } else { self.spin().now_ns() }
+        if now_ns < until_ns { self.sleep(until_ns, latest_ns, block) } else { self.spin().now_ns() }
     }
 
-    /// Returns the time found at its end, or `from_ns`, found just now, where there is nothing to wait for.
+    /// Spins from `from_ns`, which is now, until `due_ns`; returns the time at the end.
     fn spin_until(&mut self, due_ns: u64, from_ns: u64) -> u64 {
         if from_ns >= due_ns {
             self.working_since_ns = Some(from_ns);
@@ -113,12 +105,8 @@ impl Waiter {
         }
     }
 
-    fn sleep(&mut self, until_ns: u64, latest_ns: u64) -> u64 {
-        self.sleep_in(until_ns, latest_ns, clock::sleep_until)
-    }
-
-    /// Returns the time found at its end; what exceeds `latest_ns` is a stall.
-    fn sleep_in(&mut self, until_ns: u64, latest_ns: u64, sleep: impl FnOnce(u64)) -> u64 {
+    /// Sleeps; returns the time at the end. The time after `latest_ns` is a stall.
+    fn sleep(&mut self, until_ns: u64, latest_ns: u64, sleep: impl FnOnce(u64)) -> u64 {
         sleep(until_ns);
         let woke_ns = clock::now_ns();
         if let Some(latency_ns) = woke_ns.checked_sub(until_ns) {
@@ -134,7 +122,7 @@ impl Waiter {
         Spin { last_ns: self.end_work(), waiter: self }
     }
 
-    /// Ends a stretch of work; returns the time. Until a wait really spins, the next stretch runs.
+    /// Ends a stretch of work; returns the time. The next stretch begins at once, because a wait may end without a spin.
     fn end_work(&mut self) -> u64 {
         let now_ns = clock::now_ns();
         if let Some(since_ns) = self.working_since_ns.replace(now_ns) {
@@ -148,7 +136,7 @@ impl Waiter {
     }
 }
 
-/// A spin in progress: reads the clock again and again.
+/// A loop that reads the clock until its caller ends it.
 #[derive(Debug)]
 pub struct Spin<'a> {
     last_ns: u64,
@@ -156,8 +144,8 @@ pub struct Spin<'a> {
 }
 
 impl Spin<'_> {
-    /// Now, ns; adds the time since the last call to the account, as stalled if it is a gap. Time after the last call is
-    /// work.
+    /// Now, ns. The time since the last call counts as spun, or as stalled if it is a gap; the time after the last call
+    /// counts as work.
     pub fn now_ns(&mut self) -> u64 {
         std::hint::spin_loop();
         let now_ns = clock::now_ns();
@@ -187,7 +175,7 @@ mod tests {
         let mut waiter = Waiter::new(1_000_000);
         for ahead_ns in [0, 50_000, 2_000_000] {
             let due_ns = clock::now_ns() + ahead_ns;
-            assert!(waiter.until(due_ns) >= due_ns);
+            assert!(waiter.until_warm(due_ns, || Ok::<_, ()>(())).unwrap() >= due_ns);
         }
     }
 
@@ -245,7 +233,7 @@ mod tests {
     #[test]
     fn a_gap_while_waiting_is_the_machines_and_a_long_stretch_of_work_is_kept_apart() {
         let mut waiter = Waiter::new(1_000_000);
-        waiter.until(0);
+        waiter.spin();
         let before = waiter.account();
         let mut spin = waiter.spin();
         clock::sleep(STALL);

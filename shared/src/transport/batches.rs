@@ -2,16 +2,12 @@
 //!
 //! The messages of a sample share the cost of sending and receiving it. Each message keeps a number of its own.
 
-use std::ops::Deref;
-
-use iceoryx2::port::backpressure_strategy::BackpressureStrategy;
-use iceoryx2::port::publisher::Publisher as IceoryxPublisher;
-use iceoryx2::port::subscriber::Subscriber as IceoryxSubscriber;
 use iceoryx2::prelude::{AllocationStrategy, ipc};
 use iceoryx2::sample::Sample;
 use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
 
-use super::ports::{Node, Refused, TransportError, check_version, failed};
+use super::error::{TransportError, failed};
+use super::ports::{Node, Publisher, Subscriber};
 use crate::clock;
 use crate::messages::Message;
 
@@ -25,44 +21,20 @@ impl Node {
     }
 
     /// A publisher of batches.
-    pub fn batch_publisher<M: Message>(&self) -> Result<BatchPublisher<M>, TransportError> {
-        let refused = Refused::default();
-        let publisher = self
-            .batch_service::<M>()?
-            .publisher_builder()
-            .initial_max_slice_len(BATCH)
-            .allocation_strategy(AllocationStrategy::Static)
-            .backpressure_strategy(BackpressureStrategy::DiscardData)
-            .set_degradation_handler(refused.counter())
-            .create()
-            .map_err(failed("publishing", M::TOPIC))?;
-        Ok(BatchPublisher { publisher, refused, sent: 0 })
+    pub fn batch_publisher<M: Message>(&self) -> Result<Publisher<[M]>, TransportError> {
+        let service = self.batch_service()?;
+        let builder = service.publisher_builder().initial_max_slice_len(BATCH);
+        Publisher::create(builder.allocation_strategy(AllocationStrategy::Static))
     }
 
     /// A subscriber of batches; it keeps up to [`Message::DEPTH`] messages, less
     /// where batches are not full.
-    pub fn batch_subscriber<M: Message>(&self) -> Result<BatchSubscriber<M>, TransportError> {
-        let refused = Refused::default();
-        let subscriber = self
-            .batch_service::<M>()?
-            .subscriber_builder()
-            .set_degradation_handler(refused.counter())
-            .create()
-            .map_err(failed("subscribing to", M::TOPIC))?;
-        Ok(BatchSubscriber { subscriber, refused })
+    pub fn batch_subscriber<M: Message>(&self) -> Result<Subscriber<[M]>, TransportError> {
+        Subscriber::create(self.batch_service()?.subscriber_builder())
     }
 }
 
-/// Publishes one message type in batches and numbers its messages.
-#[doc(alias = "writer")]
-#[derive(Debug)]
-pub struct BatchPublisher<M: Message> {
-    publisher: IceoryxPublisher<ipc::Service, [M], ()>,
-    refused: Refused,
-    sent: u64,
-}
-
-impl<M: Message> BatchPublisher<M> {
+impl<M: Message> Publisher<[M]> {
     /// Writes the messages into shared memory, stamps and publishes them in their order.
     pub fn publish(
         &mut self,
@@ -71,7 +43,7 @@ impl<M: Message> BatchPublisher<M> {
         let mut messages = messages.into_iter();
         while messages.len() > 0 {
             let count = messages.len().min(BATCH);
-            let sample = self.publisher.loan_slice_uninit(count).map_err(failed("loaning", M::TOPIC))?;
+            let sample = self.port.loan_slice_uninit(count).map_err(failed("loaning", M::TOPIC))?;
             let mut sample = sample.write_from_fn(|_| messages.next().expect("as many as it says"));
             let published_ns = clock::now_ns();
             for message in sample.payload_mut() {
@@ -83,47 +55,21 @@ impl<M: Message> BatchPublisher<M> {
         Ok(())
     }
 
-    /// Connects to the subscribers that are there by now, as [`Publisher::connect`](super::Publisher::connect).
-    pub fn connect(&self) -> Result<(), TransportError> {
-        self.refused.connect(&self.publisher, M::TOPIC)
-    }
-
-    /// Touches the memory of the next batch, as [`Publisher::warm_up`](super::Publisher::warm_up).
+    /// Touches the memory of the next batch, as the `warm_up` of a publisher of single messages.
     pub fn warm_up(&self) -> Result<(), TransportError> {
-        let sample = self.publisher.loan_slice_uninit(BATCH).map_err(failed("loaning", M::TOPIC))?;
+        let sample = self.port.loan_slice_uninit(BATCH).map_err(failed("loaning", M::TOPIC))?;
         drop(sample.write_from_fn(|_| M::default()));
         Ok(())
     }
 }
 
-/// Receives one message type in batches, oldest first.
-#[doc(alias = "reader")]
-#[derive(Debug)]
-pub struct BatchSubscriber<M: Message> {
-    subscriber: IceoryxSubscriber<ipc::Service, [M], ()>,
-    refused: Refused,
-}
-
-/// Messages in shared memory.
-#[derive(Debug)]
-pub struct ReceivedBatch<M: Message>(Sample<ipc::Service, [M], ()>);
-
-impl<M: Message> Deref for ReceivedBatch<M> {
-    type Target = [M];
-
-    fn deref(&self) -> &[M] {
-        &self.0
-    }
-}
-
-impl<M: Message> BatchSubscriber<M> {
-    /// The oldest batch not yet received, as [`Subscriber::receive`](super::Subscriber::receive).
-    pub fn receive(&self) -> Result<Option<ReceivedBatch<M>>, TransportError> {
-        let sample = self.subscriber.receive().map_err(failed("receiving", M::TOPIC))?;
+impl<M: Message> Subscriber<[M]> {
+    /// The oldest batch not yet received; never waits. Refused when a connection to a publisher failed, since its messages
+    /// would be missing.
+    pub fn receive(&self) -> Result<Option<Sample<ipc::Service, [M], ()>>, TransportError> {
+        let sample = self.port.receive().map_err(failed("receiving", M::TOPIC))?;
         self.refused.check(M::TOPIC)?;
-        let Some(sample) = sample else { return Ok(None) };
-        sample.iter().try_for_each(check_version)?;
-        Ok(Some(ReceivedBatch(sample)))
+        Ok(sample)
     }
 }
 

@@ -116,17 +116,15 @@ impl Domain {
     /// Makes the domain ours until the claim and every process started meanwhile are gone.
     pub fn claim(&self) -> Result<Claim, DomainError> {
         let _turn = take_turn()?;
-        let root = self.root();
-        fs::create_dir_all(&root).map_err(|error| file_error("create", &root, error))?;
-        let path = root.join(LOCK);
-        let lock = File::create(&path).map_err(|error| file_error("create", &path, error))?;
+        let path = self.root().join(LOCK);
+        let lock = create(&path)?;
         match lock.try_lock() {
             Ok(()) => {}
             Err(TryLockError::WouldBlock) => return Err(DomainError::InUse { id: self.id.clone() }),
-            Err(TryLockError::Error(error)) => return Err(file_error("lock", &path, error)),
+            Err(TryLockError::Error(error)) => return Err(file_error("lock", &path)(error)),
         }
         // Children inherit the lock, so the domain counts as alive until the last of them ended.
-        fcntl_setfd(&lock, FdFlags::empty()).map_err(|error| file_error("share", &path, error.into()))?;
+        fcntl_setfd(&lock, FdFlags::empty()).map_err(io::Error::from).map_err(file_error("share", &path))?;
         Ok(Claim { _lock: lock })
     }
 
@@ -181,16 +179,20 @@ fn domains_of_this_user() -> PathBuf {
 /// Waits until no other process of this user claims or sweeps a domain: a lock not yet taken must not look like one
 /// that was let go. The turn ends with the file.
 fn take_turn() -> Result<File, DomainError> {
-    let folder = domains_of_this_user();
-    fs::create_dir_all(&folder).map_err(|error| file_error("create", &folder, error))?;
-    let path = folder.join(TURN);
-    let turn = File::create(&path).map_err(|error| file_error("create", &path, error))?;
-    turn.lock().map_err(|error| file_error("lock", &path, error))?;
+    let path = domains_of_this_user().join(TURN);
+    let turn = create(&path)?;
+    turn.lock().map_err(file_error("lock", &path))?;
     Ok(turn)
 }
 
+/// Creates a file and the folders above it.
+fn create(path: &Path) -> Result<File, DomainError> {
+    let folder = path.parent().expect("the file is in a folder");
+    fs::create_dir_all(folder).and_then(|()| File::create(path)).map_err(file_error("create", path))
+}
+
 fn entries(folder: &Path) -> Result<Vec<PathBuf>, DomainError> {
-    let list = fs::read_dir(folder).map_err(|error| file_error("list", folder, error))?;
+    let list = fs::read_dir(folder).map_err(file_error("list", folder))?;
     Ok(list.filter_map(|entry| Some(entry.ok()?.path())).collect())
 }
 
@@ -199,14 +201,14 @@ fn file_name(path: &Path) -> &str {
 }
 
 fn remove(path: &Path, result: io::Result<()>) -> Result<(), DomainError> {
-    match result {
-        Err(error) if error.kind() != io::ErrorKind::NotFound => Err(file_error("remove", path, error)),
-        _ => Ok(()),
-    }
+    result.or_else(|error| match error.kind() {
+        io::ErrorKind::NotFound => Ok(()),
+        _ => Err(file_error("remove", path)(error)),
+    })
 }
 
-fn file_error(action: &'static str, path: &Path, error: io::Error) -> DomainError {
-    DomainError::File { action, path: path.to_owned(), error }
+fn file_error(action: &'static str, path: &Path) -> impl FnOnce(io::Error) -> DomainError {
+    move |error| DomainError::File { action, path: path.to_owned(), error }
 }
 
 #[cfg(test)]

@@ -3,24 +3,23 @@
 use std::borrow::Borrow;
 use std::fmt::Debug;
 use std::ops::Deref;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicU32, Ordering};
 
 use iceoryx2::config::Config;
 use iceoryx2::node::{Node as IceoryxNode, NodeBuilder};
 use iceoryx2::port::backpressure_strategy::BackpressureStrategy;
 use iceoryx2::port::publisher::Publisher as IceoryxPublisher;
 use iceoryx2::port::subscriber::Subscriber as IceoryxSubscriber;
-use iceoryx2::port::update_connections::UpdateConnections;
-use iceoryx2::port::{DegradationAction, DegradationFn};
 use iceoryx2::prelude::{IceoryxSend, LogLevel, SemanticString, SignalHandlingMode, ipc, set_log_level};
 use iceoryx2::sample::Sample;
 use iceoryx2::service::builder::publish_subscribe::Builder;
 use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
+use iceoryx2::service::port_factory::publisher::PortFactoryPublisher;
+use iceoryx2::service::port_factory::subscriber::PortFactorySubscriber;
 
 use super::Domain;
+use super::error::{Refused, TransportError, failed};
 use crate::clock;
-use crate::messages::{LAYOUT_VERSION, Message};
+use crate::messages::Message;
 use crate::realtime::Waiter;
 
 /// Publishers a topic may have: every process may publish events.
@@ -34,77 +33,6 @@ const KEPT_FOR_THE_NEWEST: usize = 4;
 /// it has, the newest found so far, and the next.
 const MAX_HELD: usize = 3;
 
-/// Why a port could not be made or used.
-#[derive(Debug, thiserror::Error)]
-#[error("iceoryx2: {action} failed ({reason}); {help}", help = help(reason))]
-pub struct TransportError {
-    action: String,
-    reason: String,
-}
-
-/// What helps against the refusals users meet.
-fn help(reason: &str) -> &'static str {
-    if reason.contains("Permission") {
-        "another user owns files of this name in /dev/shm"
-    } else if reason.contains("Incompatible") {
-        "a process of another version uses this topic; stop it"
-    } else if reason.contains("ConnectionsRefused") {
-        "/dev/shm is full, or too little memory may be locked or too few files opened; `masseter doctor` shows which"
-    } else {
-        "`masseter clean` removes what killed runs left behind"
-    }
-}
-
-/// Formats the error only after a failure and outside of the hot path: the formatting code within the hot path made a
-/// round trip a tenth slower.
-pub(super) fn failed<E: Debug>(verb: &'static str, what: &str) -> impl FnOnce(E) -> TransportError {
-    #[cold]
-    fn error(verb: &str, what: &str, cause: &dyn Debug) -> TransportError {
-        TransportError { action: format!("{verb} '{what}'"), reason: format!("{cause:?}") }
-    }
-    move |cause| error(verb, what, &cause)
-}
-
-/// Connections that a port could not make: iceoryx2 continues without them, and reports them in its log only.
-#[derive(Debug, Clone, Default)]
-pub(super) struct Refused(Arc<AtomicU32>);
-
-impl Refused {
-    /// For the port's builder.
-    pub(super) fn counter(&self) -> impl DegradationFn + use<> {
-        let Self(count) = self.clone();
-        move |_, _| {
-            count.fetch_add(1, Ordering::Relaxed);
-            DegradationAction::Warn
-        }
-    }
-
-    /// Makes a port's connections to the ports that are there by now.
-    pub(super) fn connect(&self, port: &impl UpdateConnections, topic: &str) -> Result<(), TransportError> {
-        port.update_connections().map_err(failed("connecting", topic))?;
-        self.check(topic)
-    }
-
-    /// Refuses a port with missing connections: they leave no gap in any sequence, so a receiver must check.
-    pub(super) fn check(&self, topic: &str) -> Result<(), TransportError> {
-        match self.0.load(Ordering::Relaxed) {
-            0 => Ok(()),
-            count => Err(failed("connecting", topic)(format_args!("ConnectionsRefused({count})"))),
-        }
-    }
-}
-
-/// Refuses a message of another layout, which a sender of another version may have published.
-pub(super) fn check_version<M: Message>(message: &M) -> Result<(), TransportError> {
-    match message.version() {
-        LAYOUT_VERSION => Ok(()),
-        version => {
-            let reason = format_args!("IncompatibleVersion({version}, this program has {LAYOUT_VERSION})");
-            Err(failed("receiving", M::TOPIC)(reason))
-        }
-    }
-}
-
 /// A process's access to a domain.
 #[derive(Debug)]
 pub struct Node {
@@ -115,19 +43,13 @@ impl Node {
     /// Joins the domain. iceoryx2 installs no signal handlers.
     pub fn join(domain: &Domain) -> Result<Self, TransportError> {
         set_log_level(LogLevel::Fatal);
-        let root = domain.root();
+        let id = domain.id();
         let mut config = Config::default();
-        config.global.prefix =
-            domain.prefix().as_str().try_into().map_err(failed("joining domain", domain.id()))?;
-        let root = iceoryx2::prelude::Path::new(root.as_os_str().as_encoded_bytes())
-            .map_err(failed("joining domain", domain.id()))?;
-        config.global.set_root_path(&root);
-        let node = NodeBuilder::new()
-            .config(&config)
-            .signal_handling_mode(SignalHandlingMode::Disabled)
-            .create()
-            .map_err(failed("joining domain", domain.id()))?;
-        Ok(Self { node })
+        config.global.prefix = domain.prefix().as_str().try_into().map_err(failed("joining domain", id))?;
+        let root = iceoryx2::prelude::Path::new(domain.root().as_os_str().as_encoded_bytes());
+        config.global.set_root_path(&root.map_err(failed("joining domain", id))?);
+        let builder = NodeBuilder::new().config(&config).signal_handling_mode(SignalHandlingMode::Disabled);
+        Ok(Self { node: builder.create().map_err(failed("joining domain", id))? })
     }
 
     /// The iceoryx2 node beneath, for measurements against bare iceoryx2.
@@ -156,48 +78,62 @@ impl Node {
 
     /// A publisher of a topic.
     pub fn publisher<M: Message>(&self) -> Result<Publisher<M>, TransportError> {
-        let refused = Refused::default();
-        let publisher = self
-            .service::<M>()?
-            .publisher_builder()
-            .backpressure_strategy(BackpressureStrategy::DiscardData)
-            .set_degradation_handler(refused.counter())
-            .create()
-            .map_err(failed("publishing", M::TOPIC))?;
-        Ok(Publisher { port: publisher, refused, sent: 0 })
+        Publisher::create(self.service::<M>()?.publisher_builder())
     }
 
     /// A subscriber of a topic that keeps up to [`Message::DEPTH`] messages.
     pub fn subscriber<M: Message>(&self) -> Result<Subscriber<M>, TransportError> {
-        self.subscriber_with_depth(M::DEPTH)
+        Subscriber::create(self.service::<M>()?.subscriber_builder())
     }
 
     /// A subscriber for the newest message only. Its queue is short: entries of a long queue are not in the cache, and old
     /// messages are of no use after a stall.
     pub fn newest_subscriber<M: Message>(&self) -> Result<Subscriber<M>, TransportError> {
-        self.subscriber_with_depth(KEPT_FOR_THE_NEWEST)
+        Subscriber::create(self.service::<M>()?.subscriber_builder().buffer_size(KEPT_FOR_THE_NEWEST))
     }
+}
 
-    fn subscriber_with_depth<M: Message>(&self, messages: usize) -> Result<Subscriber<M>, TransportError> {
-        let refused = Refused::default();
-        let subscriber = self
-            .service::<M>()?
-            .subscriber_builder()
-            .buffer_size(messages)
-            .set_degradation_handler(refused.counter())
-            .create()
-            .map_err(failed("subscribing to", M::TOPIC))?;
-        Ok(Subscriber { port: subscriber, refused })
-    }
+/// The contents of a sample: one message, or a slice of several.
+pub trait Payload: IceoryxSend + Debug + 'static {
+    /// The topic of the messages.
+    const TOPIC: &'static str;
+}
+
+impl<M: Message> Payload for M {
+    const TOPIC: &'static str = M::TOPIC;
+}
+
+impl<M: Message> Payload for [M] {
+    const TOPIC: &'static str = M::TOPIC;
 }
 
 /// Publishes one message type and numbers its messages.
 #[doc(alias("writer", "data writer"))]
 #[derive(Debug)]
-pub struct Publisher<M: Message> {
-    port: IceoryxPublisher<ipc::Service, M, ()>,
+pub struct Publisher<P: Payload + ?Sized> {
+    pub(super) port: IceoryxPublisher<ipc::Service, P, ()>,
     refused: Refused,
-    sent: u64,
+    pub(super) sent: u64,
+}
+
+impl<P: Payload + ?Sized> Publisher<P> {
+    pub(super) fn create(
+        builder: PortFactoryPublisher<'_, ipc::Service, P, ()>,
+    ) -> Result<Self, TransportError> {
+        let refused = Refused::default();
+        let port = builder
+            .backpressure_strategy(BackpressureStrategy::DiscardData)
+            .set_degradation_handler(refused.counter())
+            .create()
+            .map_err(failed("publishing", P::TOPIC))?;
+        Ok(Self { port, refused, sent: 0 })
+    }
+
+    /// Connects to the subscribers that are there by now. Otherwise the first message makes the connections, which create
+    /// and map files.
+    pub fn connect(&self) -> Result<(), TransportError> {
+        self.refused.connect(&self.port, P::TOPIC)
+    }
 }
 
 impl<M: Message> Publisher<M> {
@@ -212,12 +148,6 @@ impl<M: Message> Publisher<M> {
         Ok(())
     }
 
-    /// Connects to the subscribers that are there by now. Otherwise the first message makes the connections, which create
-    /// and map files.
-    pub fn connect(&self) -> Result<(), TransportError> {
-        self.refused.connect(&self.port, M::TOPIC)
-    }
-
     /// Touches the memory of the next message: the first message of the loop then costs no page fault, and later ones find
     /// the memory in the caches.
     pub fn warm_up(&self) -> Result<(), TransportError> {
@@ -229,9 +159,9 @@ impl<M: Message> Publisher<M> {
 /// Receives one message type, oldest first.
 #[doc(alias("reader", "data reader"))]
 #[derive(Debug)]
-pub struct Subscriber<M: Message> {
-    port: IceoryxSubscriber<ipc::Service, M, ()>,
-    refused: Refused,
+pub struct Subscriber<P: Payload + ?Sized> {
+    pub(super) port: IceoryxSubscriber<ipc::Service, P, ()>,
+    pub(super) refused: Refused,
 }
 
 /// A message in shared memory.
@@ -252,19 +182,30 @@ impl<M: Message> Borrow<M> for Received<M> {
     }
 }
 
-impl<M: Message> Subscriber<M> {
-    /// Connects to the publishers that exist by now; otherwise the first call of [`Self::receive`] does, as in
-    /// [`Publisher::connect`].
-    pub fn connect(&self) -> Result<(), TransportError> {
-        self.refused.connect(&self.port, M::TOPIC)
+impl<P: Payload + ?Sized> Subscriber<P> {
+    pub(super) fn create(
+        builder: PortFactorySubscriber<'_, ipc::Service, P, ()>,
+    ) -> Result<Self, TransportError> {
+        let refused = Refused::default();
+        let builder = builder.set_degradation_handler(refused.counter());
+        let port = builder.create().map_err(failed("subscribing to", P::TOPIC))?;
+        Ok(Self { port, refused })
     }
 
+    /// Connects to the publishers that exist by now; otherwise the first call of `receive` does, as in
+    /// [`Publisher::connect`].
+    pub fn connect(&self) -> Result<(), TransportError> {
+        self.refused.connect(&self.port, P::TOPIC)
+    }
+}
+
+impl<M: Message> Subscriber<M> {
     /// The oldest message not yet received; never waits. Refused when a connection to a publisher failed, since its messages
     /// would be missing.
     pub fn receive(&self) -> Result<Option<Received<M>>, TransportError> {
         let sample = self.port.receive().map_err(failed("receiving", M::TOPIC))?;
         self.refused.check(M::TOPIC)?;
-        sample.map(|sample| check_version(&*sample).map(|()| Received(sample))).transpose()
+        Ok(sample.map(Received))
     }
 
     /// The first message that `is_awaited`, or the newest there is when `deadline_ns` has passed. Polls without
@@ -368,21 +309,6 @@ mod tests {
             event.cycle >= 9
         });
         assert_eq!(newest.unwrap().unwrap().cycle, 9);
-    }
-
-    /// A sender of another version with the same layout.
-    #[test]
-    fn a_message_of_another_version_is_refused() {
-        let domain = ScratchDomain::claim("test-version").unwrap();
-        let node = Node::join(&domain).unwrap();
-        let subscriber = node.subscriber::<Event>().unwrap();
-        let publisher = node.publisher::<Event>().unwrap();
-        let mut sample = publisher.port.loan().unwrap();
-        sample.payload_mut().stamp(1, 1);
-        sample.payload_mut().version += 1;
-        sample.send().unwrap();
-        let error = subscriber.receive().unwrap_err().to_string();
-        assert!(error.contains("IncompatibleVersion(8") && error.contains("another version"), "{error}");
     }
 
     /// Reads like an event, but for the name of its layout.

@@ -65,7 +65,7 @@ fn a_babbling_node_makes_a_safe_stop() {
     play_until(&mut bench, 1.0);
     assert_eq!(bench.reading.master_fault, 1);
     assert_eq!(bench.causes(EventKind::Fault)[0], Cause::ProcessDataLost);
-    for drive in bench.plant.link.emulation().drives() {
+    for drive in &bench.plant.link.emulation.drives {
         assert_eq!(
             drive.power(),
             DriveState::SwitchOnDisabled,

@@ -15,8 +15,8 @@ use masseter_shared::config::Scenario;
 use masseter_shared::messages::codes::{BootPhase, Cause};
 
 use super::interlock::Failure;
-use plan::{Condition, STATUSWORD, Step, plan};
-use sdo::{ATTEMPTS, Data, SdoClient, SdoFailure, TIMEOUT_NS};
+use plan::{Check, Step, plan};
+use sdo::{ATTEMPTS, SdoClient, SdoFailure, TIMEOUT_NS};
 
 pub(crate) use plan::shortest_boot;
 
@@ -56,7 +56,7 @@ impl From<SdoFailure> for Failure {
 /// Progress of a boot.
 #[derive(Debug, Clone)]
 pub(super) struct Boot {
-    phase: BootPhase,
+    pub(super) phase: BootPhase,
     steps: Vec<Step>,
     next: usize,
     readings: u32,
@@ -86,11 +86,6 @@ impl Boot {
             reset_at_ns: now_ns + RESET_EVERY_NS,
             since_ns: now_ns,
         }
-    }
-
-    /// The phase.
-    pub(super) fn phase(&self) -> BootPhase {
-        self.phase
     }
 
     /// Whether SDO transfers take place.
@@ -133,7 +128,8 @@ impl Boot {
             }
         }
         self.start_over();
-        self.carry_on(now_ns)
+        self.begin_next(now_ns);
+        Ok(())
     }
 
     /// The command of network management that is due, if any.
@@ -148,16 +144,6 @@ impl Boot {
     /// The drive is told to become operational.
     pub(super) fn start(&mut self, now_ns: u64) {
         (self.phase, self.since_ns) = (BootPhase::Starting, now_ns);
-    }
-
-    /// The drive is operational.
-    pub(super) fn complete(&mut self) {
-        self.phase = BootPhase::Ready;
-    }
-
-    /// The drive is given up until it boots again.
-    pub(super) fn give_up(&mut self) {
-        self.phase = BootPhase::Failed;
     }
 
     /// The time spent waiting for the drive, ns.
@@ -176,8 +162,10 @@ impl Boot {
             return Ok(());
         }
         self.has_repeated |= self.client.is_repeating();
-        if self.client.take(response) {
-            return self.carry_on(now_ns);
+        if let Some(outcome) = self.client.take(response) {
+            self.end_transfer(outcome)?;
+            self.begin_next(now_ns);
+            return Ok(());
         }
         self.unasked += u32::from(!self.has_repeated);
         if self.unasked > UNASKED { Err(Failure::new(Cause::DuplicateNode)) } else { Ok(()) }
@@ -186,9 +174,9 @@ impl Boot {
     /// Checks the time-outs.
     pub(super) fn expire(&mut self, now_ns: u64) -> Result<(), Failure> {
         if self.is_under_way() {
-            self.client.expire(now_ns);
+            self.client.expire(now_ns)?;
             self.has_repeated |= self.client.is_repeating();
-            return self.carry_on(now_ns);
+            return Ok(());
         }
         let is_late = self.phase == BootPhase::Starting && self.waited_ns(now_ns) > START_WITHIN_NS;
         if is_late {
@@ -197,39 +185,31 @@ impl Boot {
         Ok(())
     }
 
-    /// Ends the step whose answer is there, and begins the next.
-    fn carry_on(&mut self, now_ns: u64) -> Result<(), Failure> {
-        match self.client.outcome() {
-            Some(Err(SdoFailure::Aborted { code, .. })) if self.may_be_refused(code) => self.end_step(false),
-            Some(outcome) => self.conclude(outcome?)?,
-            None => {}
-        }
+    /// Begins the next step that takes a transfer, and those before it.
+    fn begin_next(&mut self, now_ns: u64) {
         while self.client.is_idle() && self.next < self.steps.len() {
             self.begin(self.steps[self.next]);
         }
         if self.phase == BootPhase::Configured {
             self.since_ns = now_ns;
         }
-        Ok(())
     }
 
-    /// Whether the step under way may fail with that code: it is an offer, or the drive lacks an optional object.
-    fn may_be_refused(&self, code: AbortCode) -> bool {
+    /// The number of steps to skip after the refusal of the step under way: the value was optional, or the drive lacks an
+    /// optional object. None where the refusal is a failure.
+    fn skipped_if_refused(&self, failure: SdoFailure) -> Option<usize> {
+        let SdoFailure::Aborted { code, .. } = failure else { return None };
+        let is_missing = matches!(code, AbortCode::NO_OBJECT | AbortCode::NO_SUBINDEX);
         match self.steps[self.next] {
-            Step::Offer { .. } => true,
-            Step::ExpectUnset { .. } | Step::If { condition: Condition::Exchanged(_), .. } => {
-                matches!(code, AbortCode::NO_OBJECT | AbortCode::NO_SUBINDEX)
-            }
-            _ => false,
+            Step::Write { is_optional: true, .. } => Some(0),
+            Step::Read(_, Check::Unset { .. }) if is_missing => Some(0),
+            Step::Read(_, Check::PdoElseSkip(skipped)) if is_missing => Some(skipped),
+            _ => None,
         }
     }
 
-    /// Ends the step under way, and skips the steps of a condition that does not hold.
-    fn end_step(&mut self, holds: bool) {
-        let skipped = match self.steps[self.next] {
-            Step::If { otherwise_skip, .. } if !holds => otherwise_skip,
-            _ => 0,
-        };
+    /// Ends the step under way, and skips the next ones.
+    fn end_step(&mut self, skipped: usize) {
         (self.next, self.readings) = (self.next + 1 + skipped, 0);
     }
 
@@ -237,70 +217,66 @@ impl Boot {
         match step {
             Step::Enter(phase) => {
                 self.phase = phase;
-                self.end_step(true);
+                self.end_step(0);
             }
-            Step::Expect { object, .. }
-            | Step::ExpectUnset { object, .. }
-            | Step::Keep(object)
-            | Step::If { condition: Condition::Exchanged(object), .. } => self.client.read(object),
-            Step::If { condition: Condition::InFault, .. } | Step::ExpectNoFault | Step::ExpectOff => {
-                self.client.read(STATUSWORD);
-            }
-            Step::Write { object, value, bytes } | Step::Offer { object, value, bytes } => {
+            Step::Read(object, _) => self.client.begin(object, None),
+            Step::Write { object, value, bytes, .. } => {
                 let value = Expedited::new(&value.to_le_bytes()[..bytes]).expect("one to four bytes");
-                self.client.write(object, value);
+                self.client.begin(object, Some(value));
             }
-            Step::WriteKept(object) => self.client.write(object, self.kept),
+            Step::WriteKept(object) => self.client.begin(object, Some(self.kept)),
         }
     }
 
-    /// Judges the value that the step under way has read.
-    fn conclude(&mut self, read: Data) -> Result<(), Failure> {
-        let number = read.number().unwrap_or(0);
-        let mut holds = true;
-        match self.steps[self.next] {
-            Step::Expect { object, mask, value, otherwise } if number & mask != value & mask => {
-                let failure = at(otherwise, object, number, value);
-                let may_change = otherwise == Cause::NotAccepted;
-                return if may_change { self.read_again(failure) } else { Err(failure) };
-            }
-            Step::ExpectUnset { object, otherwise } if number != 0 => {
-                return Err(at(otherwise, object, number, 0));
-            }
-            Step::ExpectNoFault if in_fault(number) => {
-                let code = self.kept.data().iter().rfold(0, |code, &byte| code << 8 | u32::from(byte));
-                return self.read_again(at(Cause::FaultAtStart, STATUSWORD, code, 0));
-            }
-            Step::ExpectOff if may_be_powered(number) => {
-                return self.read_again(at(Cause::StillPowered, STATUSWORD, number, 0));
-            }
-            Step::If { condition, .. } => holds = self.holds(condition, number),
-            Step::Keep(object) => {
-                let wrong_length = at(Cause::SdoAborted, object, AbortCode::LENGTH.0, 0);
-                self.kept = Expedited::new(read.bytes()).ok_or(wrong_length)?;
-            }
-            _ => {}
+    /// Ends the step under way with the outcome of its transfer, unless a value is to be read again.
+    fn end_transfer(&mut self, outcome: Result<Expedited, SdoFailure>) -> Result<(), Failure> {
+        let skipped = match (outcome, self.steps[self.next]) {
+            (Ok(value), Step::Read(object, check)) => self.judge(object, check, value)?,
+            (Ok(_), _) => Some(0),
+            (Err(failure), _) => Some(self.skipped_if_refused(failure).ok_or(failure)?),
+        };
+        if let Some(skipped) = skipped {
+            self.end_step(skipped);
         }
-        self.end_step(holds);
         Ok(())
     }
 
-    /// A value that may still change is read again, but not for ever.
-    fn read_again(&mut self, failure: Failure) -> Result<(), Failure> {
-        self.readings += 1;
-        if self.readings < READINGS { Ok(()) } else { Err(failure) }
+    /// Judges a value; returns the number of steps to skip, or none if the value is to be read again.
+    fn judge(
+        &mut self,
+        object: ObjectAddress,
+        check: Check,
+        read: Expedited,
+    ) -> Result<Option<usize>, Failure> {
+        let found = number(read);
+        match check {
+            Check::Equals { mask, value, otherwise } if found & mask != value & mask => {
+                let failure = at(otherwise, object, found, value);
+                return if otherwise == Cause::NotAccepted { self.read_again(failure) } else { Err(failure) };
+            }
+            Check::Unset { otherwise } if found != 0 => return Err(at(otherwise, object, found, 0)),
+            Check::NoFault if in_fault(found) => {
+                return self.read_again(at(Cause::FaultAtStart, object, number(self.kept), 0));
+            }
+            Check::NoVoltage if may_be_powered(found) => {
+                return self.read_again(at(Cause::StillPowered, object, found, 0));
+            }
+            Check::Keep => self.kept = Expedited::new(read.data()).expect("one to four bytes"),
+            Check::FaultElseSkip(skipped) if !in_fault(found) => return Ok(Some(skipped)),
+            Check::PdoElseSkip(skipped) => {
+                let cob_id = CobId(found);
+                self.kept = Expedited::new(&cob_id.invalidated().0.to_le_bytes()).expect("four bytes");
+                return Ok(Some(if cob_id.is_valid() { 0 } else { skipped }));
+            }
+            _ => {}
+        }
+        Ok(Some(0))
     }
 
-    /// Whether a condition holds, given the value read for it.
-    fn holds(&mut self, condition: Condition, number: u32) -> bool {
-        match condition {
-            Condition::InFault => in_fault(number),
-            Condition::Exchanged(_) => {
-                let cob_id = CobId(number);
-                self.kept = Expedited::new(&cob_id.invalidated().0.to_le_bytes()).expect("four bytes");
-                cob_id.is_valid()
-            }
-        }
+    /// A value that may still change is read again, but not for ever.
+    fn read_again(&mut self, failure: Failure) -> Result<Option<usize>, Failure> {
+        self.readings += 1;
+        if self.readings < READINGS { Ok(None) } else { Err(failure) }
     }
 }
 
@@ -313,4 +289,9 @@ fn may_be_powered(statusword: u32) -> bool {
 fn in_fault(statusword: u32) -> bool {
     let state = Statusword(statusword as u16).state();
     matches!(state, Ok(DriveState::Fault | DriveState::FaultReactionActive))
+}
+
+/// A value as an unsigned little-endian number.
+fn number(value: Expedited) -> u32 {
+    value.data().iter().rfold(0, |number, &byte| number << 8 | u32::from(byte))
 }

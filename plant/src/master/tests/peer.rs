@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, VecDeque};
 
 use masseter_can::canopen::{
     AbortCode, Cob, Expedited, Heartbeat, Nmt, NmtCommand, NmtState, NodeId, ObjectAddress, SdoRequest,
-    SdoResponse, Segment,
+    SdoResponse,
 };
 use masseter_can::cia402::{Controlword, DriveState, Statusword};
 use masseter_can::{Bus, BusStatus, ErrorState, Frame, ReceiveError, Received, Rpdo1, SendError, Tpdo1};
@@ -39,8 +39,6 @@ pub(super) struct Peer {
     pub(super) refuses: Option<((u16, u8), AbortCode)>,
     /// SDO requests received, each with its time.
     pub(super) requests: Vec<(u64, SdoRequest)>,
-    /// A value longer than expedited, to be read in one segment.
-    segment: Vec<u8>,
     controlword: Controlword,
     buffered: Option<Rpdo1>,
     pub(super) next_beat_ns: u64,
@@ -82,7 +80,6 @@ impl Peer {
             twin_position: None,
             refuses: None,
             requests: Vec::new(),
-            segment: Vec::new(),
             controlword: Controlword::DISABLE_VOLTAGE,
             buffered: None,
             next_beat_ns: 0,
@@ -135,8 +132,10 @@ impl Peer {
             Cob::SdoRequest(id) if id == self.id => {
                 let request = SdoRequest::decode(frame.data()).unwrap();
                 self.requests.push((now_ns, request));
-                let answer = self.serve(request);
-                out.extend(std::iter::repeat_n(answer.frame(self.id), self.servers));
+                if !matches!(request, SdoRequest::Abort { .. }) {
+                    let answer = self.serve(request);
+                    out.extend(std::iter::repeat_n(answer.frame(self.id), self.servers));
+                }
             }
             _ => {}
         }
@@ -186,12 +185,8 @@ impl Peer {
     fn serve(&mut self, request: SdoRequest) -> SdoResponse {
         match request {
             SdoRequest::InitiateUpload { object } => self.read(object),
-            SdoRequest::UploadSegment { toggle } => {
-                let data = Segment::new(&self.segment).unwrap();
-                SdoResponse::UploadSegment { toggle, data, is_last: true }
-            }
             SdoRequest::Download { object, data } => self.write(object, data.data()),
-            other => panic!("{other:?}: the master writes short values only"),
+            other => panic!("{other:?}: the master uses short values only"),
         }
     }
 
@@ -203,11 +198,10 @@ impl Peer {
         };
         match value {
             Some(value) => {
-                self.segment = value.clone();
-                Expedited::new(value)
-                    .map_or(SdoResponse::InitiateUpload { object, size: Some(value.len() as u32) }, |data| {
-                        SdoResponse::Upload { object, data }
-                    })
+                let size = Some(value.len() as u32);
+                Expedited::new(value).map_or(SdoResponse::InitiateUpload { object, size }, |data| {
+                    SdoResponse::Upload { object, data }
+                })
             }
             None => SdoResponse::Abort { object, code: AbortCode::NO_OBJECT },
         }
