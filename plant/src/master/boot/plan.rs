@@ -63,17 +63,15 @@ pub(super) enum Check {
 /// The steps for a drive, in their order.
 pub(super) fn plan(node: NodeId, scenario: &Scenario, axis: usize) -> Vec<Step> {
     let identity = &scenario.can.identity;
-    let identify = |(index, subindex, value)| expect(index, subindex, value, Cause::WrongIdentity);
     let mut steps = vec![Step::Enter(BootPhase::Identifying)];
-    steps.extend(
-        [
-            (0x1000, 0, identity.device_type),
-            (0x1018, 1, identity.vendor_id),
-            (0x1018, 2, identity.product_code),
-            (0x1018, 3, identity.revision),
-        ]
-        .map(identify),
-    );
+    for (index, subindex, value) in [
+        (0x1000, 0, identity.device_type),
+        (0x1018, 1, identity.vendor_id),
+        (0x1018, 2, identity.product_code),
+        (0x1018, 3, identity.revision),
+    ] {
+        steps.push(expect(index, subindex, value, Cause::WrongIdentity));
+    }
     steps.push(Step::Enter(BootPhase::CheckingPdos));
     steps.extend(check_pdo(0x1400, Cob::Rpdo1(node), &Rpdo1::MAPPING));
     steps.extend(check_pdo(0x1800, Cob::Tpdo1(node), &Tpdo1::MAPPING));
