@@ -2,12 +2,12 @@
 
 use clap::{Args, ValueEnum};
 use masseter_controller::kinematics::{ForwardError, ForwardTracker, Method, Options, Solution, solve};
-use masseter_shared::geometry::{Actuators, LEGS, Mechanism, StrokeLimits};
+use masseter_shared::geometry::{AXES, Actuators, LEGS, Mechanism, StrokeLimits};
 use masseter_shared::messages::pose_fields;
 use masseter_terminal::Exit;
 
 use super::every;
-use super::table::{ACTUATOR_COLUMNS, Columns, CsvArgs, Lines, convert, convert_in_turn, mechanism};
+use super::table::{ACTUATOR_COLUMNS, Columns, CsvArgs, Lines, convert, mechanism, solve_lines, stream};
 
 const COLUMNS: Columns = Columns {
     read: ACTUATOR_COLUMNS,
@@ -57,18 +57,16 @@ pub(crate) fn forward(args: &FkArgs) -> anyhow::Result<Exit> {
         return every::every_solution(&args.csv, &mechanism);
     }
     let strokes = *mechanism.strokes();
-    let fresh = Chosen::new(args, mechanism);
+    let mut solver = Chosen::new(args, mechanism);
     if args.continuous {
-        let mut solver = fresh;
-        return convert_in_turn(&args.csv, COLUMNS, |_, values, lines| {
-            let actuators = Actuators::from_axes(values);
-            write(&strokes, &actuators, solver.solve(&actuators), lines);
+        let mut in_turn = |_, values, lines: &mut Lines| {
+            write(&strokes, &mut solver, values, lines);
             Ok(())
-        });
+        };
+        return stream(&args.csv, COLUMNS, |batch| vec![solve_lines(batch, COLUMNS, &mut in_turn)]);
     }
     convert(&args.csv, COLUMNS, |_, values, lines| {
-        let actuators = Actuators::from_axes(values);
-        write(&strokes, &actuators, fresh.clone().solve(&actuators), lines);
+        write(&strokes, &mut solver.clone(), values, lines);
         Ok(())
     })
 }
@@ -109,17 +107,13 @@ impl Chosen {
     }
 }
 
-fn write(
-    strokes: &StrokeLimits,
-    actuators: &Actuators,
-    solved: Result<Solution, ForwardError>,
-    lines: &mut Lines,
-) {
-    let solution = match solved {
+fn write(strokes: &StrokeLimits, solver: &mut Chosen, values: [f64; AXES], lines: &mut Lines) {
+    let actuators = Actuators::from_axes(values);
+    let solution = match solver.solve(&actuators) {
         Ok(solution) => solution,
-        Err(error) => return lines.empty(COLUMNS, error.reason()),
+        Err(error) => return lines.row([], error.reason()),
     };
-    let status = match strokes.check(actuators) {
+    let status = match strokes.check(&actuators) {
         _ if !solution.assembly.is_true() => "wrong_assembly",
         Ok(()) => "ok",
         Err(_) => "outside_stroke",
