@@ -80,17 +80,14 @@ enum Chosen {
 
 impl Chosen {
     fn new(args: &FkArgs, mechanism: Mechanism) -> Self {
-        let method = match args.solver {
-            Solver::Controller => None,
-            Solver::Published => Some(Method::Published),
-            Solver::Newton => Some(Method::Newton),
-        };
-        match (method, args.guess) {
-            (None, None) => Self::Controller(ForwardTracker::new(mechanism)),
-            (None, Some(guess)) => Self::Controller(ForwardTracker::with_guess(mechanism, guess)),
-            (Some(method), guess) => {
-                Self::Iteration { method, mechanism, start_rad: guess.unwrap_or(NEUTRAL_RAD) }
+        let start_rad = args.guess.unwrap_or(NEUTRAL_RAD);
+        match (args.solver, args.guess) {
+            (Solver::Controller, None) => Self::Controller(ForwardTracker::new(mechanism)),
+            (Solver::Controller, Some(guess)) => {
+                Self::Controller(ForwardTracker::with_guess(mechanism, guess))
             }
+            (Solver::Published, _) => Self::Iteration { method: Method::Published, mechanism, start_rad },
+            (Solver::Newton, _) => Self::Iteration { method: Method::Newton, mechanism, start_rad },
         }
     }
 
@@ -123,10 +120,9 @@ fn write(strokes: &StrokeLimits, solver: &mut Chosen, values: [f64; AXES], lines
     lines.row(values.chain([f64::from(solution.iterations), solution.residual_m]), status);
 }
 
-fn parse_guess(text: &str) -> Result<[f64; 3], String> {
-    let angles: Result<Vec<f64>, _> = text.split(',').map(|angle| angle.trim().parse()).collect();
-    match angles.as_deref() {
-        Ok(&[t1, t2, t3]) if t1.is_finite() && t2.is_finite() && t3.is_finite() => Ok([t1, t2, t3]),
-        _ => Err("give three leg angles in radians, such as 1.4,1.5,1.4".to_owned()),
-    }
+fn parse_guess(text: &str) -> Result<[f64; 3], &'static str> {
+    let angle = |text: &str| text.trim().parse().ok().filter(|angle: &f64| angle.is_finite());
+    let angles: Option<Vec<_>> = text.split(',').map(angle).collect();
+    let three = angles.and_then(|angles| angles.try_into().ok());
+    three.ok_or("give three leg angles in radians, such as 1.4,1.5,1.4")
 }
