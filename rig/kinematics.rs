@@ -1,6 +1,6 @@
 //! `masseter kinematics`: the paper study as a folder of figures, data and a page of claims.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::Args;
 use masseter_plan::Overrides;
@@ -56,12 +56,11 @@ impl KinematicsArgs {
 
     /// The command line that repeats the study.
     fn command(&self) -> String {
-        let Self { seed, samples, cells, .. } = self;
-        let option = |name: &str, path: Option<&Path>| {
-            path.map_or_else(String::new, |path| format!(" --{name} {}", path.display()))
-        };
+        let Self { seed, samples, cells, trajectory, scenario, .. } = self;
+        let options = [("trajectory", trajectory), ("scenario", scenario)].into_iter();
+        let option =
+            |(name, path): (_, &Option<PathBuf>)| Some(format!(" --{name} {}", path.as_ref()?.display()));
         format!("masseter kinematics --out DIR --seed {seed} --samples {samples} --cells {cells}")
-            + &option("trajectory", self.trajectory.as_deref())
-            + &option("scenario", self.scenario.as_deref())
+            + &options.filter_map(option).collect::<String>()
     }
 }

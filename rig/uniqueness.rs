@@ -3,7 +3,9 @@
 //!
 //! Both are about the published mechanism; a proof around a motion is about its scenario's mechanism.
 
+use std::fs::File;
 use std::io::Write;
+use std::iter;
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
@@ -81,22 +83,17 @@ enum Region {
 /// Proves or searches. Exits with 1 where uniqueness is not proven, or an input with two solutions was found.
 pub(crate) fn uniqueness(verb: &UniquenessVerb) -> anyhow::Result<Exit> {
     let is_unique = match verb {
-        UniquenessVerb::Prove(args) => {
-            let (mechanism, inputs) = inputs_to_prove(args)?;
-            with_output(args.out.as_deref(), || prove_and_print(args, &mechanism, inputs))?
-        }
-        UniquenessVerb::Search(args) => with_output(args.out.as_deref(), || search_and_print(args))?,
+        UniquenessVerb::Prove(args) => prove_and_print(args)?,
+        UniquenessVerb::Search(args) => search_and_print(args)?,
     };
     Ok(if is_unique { Exit::Passed } else { Exit::Failed })
 }
 
-/// Whether all boxes are proven, and the undecided ones as CSV.
-fn prove_and_print(
-    args: &ProveArgs,
-    mechanism: &Mechanism,
-    inputs: Vec<InputBox>,
-) -> anyhow::Result<(bool, Vec<String>)> {
-    let proven = prove(mechanism, inputs, args.margin, args.boxes, |examined, decided| {
+/// Whether all boxes are proven. Writes the undecided ones.
+fn prove_and_print(args: &ProveArgs) -> anyhow::Result<bool> {
+    let (mechanism, inputs) = inputs_to_prove(args)?;
+    let file = args.out.as_deref().map(new_file).transpose()?;
+    let proven = prove(&mechanism, inputs, args.margin, args.boxes, |examined, decided| {
         status!("{examined} boxes examined, {:.2} % of the volume decided", 100.0 * decided);
     });
     result_line!("boxes examined       {}", proven.examined)?;
@@ -106,13 +103,14 @@ fn prove_and_print(
     let header = AXIS_NAMES.map(|axis| format!("{axis}_low_m,{axis}_high_m")).join(",");
     let row =
         |inputs: &InputBox| inputs.axes().map(|axis| format!("{},{}", axis.low(), axis.high())).join(",");
-    let rows = std::iter::once(header).chain(proven.undecided.iter().map(row)).collect();
-    Ok((proven.undecided.is_empty(), rows))
+    write_rows(args.out.as_deref(), file, header, proven.undecided.iter().map(row))?;
+    Ok(proven.undecided.is_empty())
 }
 
-/// Whether no input with two solutions of positive determinants was found, and the best inputs found as CSV.
-fn search_and_print(args: &SearchArgs) -> anyhow::Result<(bool, Vec<String>)> {
+/// Whether no input with two solutions of positive determinants was found. Writes the best inputs found.
+fn search_and_print(args: &SearchArgs) -> anyhow::Result<bool> {
     let mechanism = Mechanism::new(&MechanismConfig::default())?;
+    let file = args.out.as_deref().map(new_file).transpose()?;
     let found = search(&mechanism, &args.region.inputs(&mechanism), args.inputs, args.seed);
     result_line!("random inputs                                     {}", args.inputs)?;
     result_line!("with a solution that meets the paper's conditions {}", found.with_one)?;
@@ -124,22 +122,20 @@ fn search_and_print(args: &SearchArgs) -> anyhow::Result<(bool, Vec<String>)> {
     let header = AXIS_NAMES.map(|axis| format!("{axis}_m")).join(",") + ",lesser_determinant";
     let row =
         |one: &Ambiguous| one.axes_m.map(|value| value.to_string()).join(",") + &format!(",{}", one.lesser);
-    let is_unique = found.climbed.iter().all(|one| one.lesser <= 0.0);
-    Ok((is_unique, std::iter::once(header).chain(found.climbed.iter().map(row)).collect()))
+    write_rows(args.out.as_deref(), file, header, found.climbed.iter().map(row))?;
+    Ok(found.climbed.iter().all(|one| one.lesser <= 0.0))
 }
 
-/// Does the work and writes its rows to a new file, if one is named. Returns the work's answer.
-fn with_output(
+/// Writes CSV, if a file is named.
+fn write_rows(
     out: Option<&Path>,
-    work: impl FnOnce() -> anyhow::Result<(bool, Vec<String>)>,
-) -> anyhow::Result<bool> {
-    let file = out.map(new_file).transpose()?;
-    let (is_unique, rows) = work()?;
-    if let (Some(path), Some(mut file)) = (out, file) {
-        let written = file.write_all((rows.join("\n") + "\n").as_bytes());
-        written.with_context(|| format!("cannot write {}", path.display()))?;
-    }
-    Ok(is_unique)
+    file: Option<File>,
+    header: String,
+    rows: impl Iterator<Item = String>,
+) -> anyhow::Result<()> {
+    let (Some(path), Some(mut file)) = (out, file) else { return Ok(()) };
+    let text: String = iter::once(header).chain(rows).map(|row| row + "\n").collect();
+    file.write_all(text.as_bytes()).with_context(|| format!("cannot write {}", path.display()))
 }
 
 /// The mechanism and the boxes of the proof.

@@ -2,12 +2,12 @@
 
 use clap::{Args, ValueEnum};
 use masseter_controller::kinematics::{ForwardError, ForwardTracker, Method, Options, Solution, solve};
-use masseter_shared::geometry::{Actuators, LEGS, Mechanism, StrokeLimits};
+use masseter_shared::geometry::{AXES, Actuators, LEGS, Mechanism, StrokeLimits};
 use masseter_shared::messages::pose_fields;
 use masseter_terminal::Exit;
 
 use super::every;
-use super::table::{ACTUATOR_COLUMNS, Columns, CsvArgs, Lines, convert, convert_in_turn, mechanism};
+use super::table::{ACTUATOR_COLUMNS, Columns, CsvArgs, Lines, convert, mechanism, solve_lines, stream};
 
 const COLUMNS: Columns = Columns {
     read: ACTUATOR_COLUMNS,
@@ -57,18 +57,16 @@ pub(crate) fn forward(args: &FkArgs) -> anyhow::Result<Exit> {
         return every::every_solution(&args.csv, &mechanism);
     }
     let strokes = *mechanism.strokes();
-    let fresh = Chosen::new(args, mechanism);
+    let mut solver = Chosen::new(args, mechanism);
     if args.continuous {
-        let mut solver = fresh;
-        return convert_in_turn(&args.csv, COLUMNS, |_, values, lines| {
-            let actuators = Actuators::from_axes(values);
-            write(&strokes, &actuators, solver.solve(&actuators), lines);
+        let mut in_turn = |_, values, lines: &mut Lines| {
+            write(&strokes, &mut solver, values, lines);
             Ok(())
-        });
+        };
+        return stream(&args.csv, COLUMNS, |batch| vec![solve_lines(batch, COLUMNS, &mut in_turn)]);
     }
     convert(&args.csv, COLUMNS, |_, values, lines| {
-        let actuators = Actuators::from_axes(values);
-        write(&strokes, &actuators, fresh.clone().solve(&actuators), lines);
+        write(&strokes, &mut solver.clone(), values, lines);
         Ok(())
     })
 }
@@ -82,17 +80,14 @@ enum Chosen {
 
 impl Chosen {
     fn new(args: &FkArgs, mechanism: Mechanism) -> Self {
-        let method = match args.solver {
-            Solver::Controller => None,
-            Solver::Published => Some(Method::Published),
-            Solver::Newton => Some(Method::Newton),
-        };
-        match (method, args.guess) {
-            (None, None) => Self::Controller(ForwardTracker::new(mechanism)),
-            (None, Some(guess)) => Self::Controller(ForwardTracker::with_guess(mechanism, guess)),
-            (Some(method), guess) => {
-                Self::Iteration { method, mechanism, start_rad: guess.unwrap_or(NEUTRAL_RAD) }
+        let start_rad = args.guess.unwrap_or(NEUTRAL_RAD);
+        match (args.solver, args.guess) {
+            (Solver::Controller, None) => Self::Controller(ForwardTracker::new(mechanism)),
+            (Solver::Controller, Some(guess)) => {
+                Self::Controller(ForwardTracker::with_guess(mechanism, guess))
             }
+            (Solver::Published, _) => Self::Iteration { method: Method::Published, mechanism, start_rad },
+            (Solver::Newton, _) => Self::Iteration { method: Method::Newton, mechanism, start_rad },
         }
     }
 
@@ -109,17 +104,13 @@ impl Chosen {
     }
 }
 
-fn write(
-    strokes: &StrokeLimits,
-    actuators: &Actuators,
-    solved: Result<Solution, ForwardError>,
-    lines: &mut Lines,
-) {
-    let solution = match solved {
+fn write(strokes: &StrokeLimits, solver: &mut Chosen, values: [f64; AXES], lines: &mut Lines) {
+    let actuators = Actuators::from_axes(values);
+    let solution = match solver.solve(&actuators) {
         Ok(solution) => solution,
-        Err(error) => return lines.empty(COLUMNS, error.reason()),
+        Err(error) => return lines.row([], error.reason()),
     };
-    let status = match strokes.check(actuators) {
+    let status = match strokes.check(&actuators) {
         _ if !solution.assembly.is_true() => "wrong_assembly",
         Ok(()) => "ok",
         Err(_) => "outside_stroke",
@@ -129,10 +120,9 @@ fn write(
     lines.row(values.chain([f64::from(solution.iterations), solution.residual_m]), status);
 }
 
-fn parse_guess(text: &str) -> Result<[f64; 3], String> {
-    let angles: Result<Vec<f64>, _> = text.split(',').map(|angle| angle.trim().parse()).collect();
-    match angles.as_deref() {
-        Ok(&[t1, t2, t3]) if t1.is_finite() && t2.is_finite() && t3.is_finite() => Ok([t1, t2, t3]),
-        _ => Err("give three leg angles in radians, such as 1.4,1.5,1.4".to_owned()),
-    }
+fn parse_guess(text: &str) -> Result<[f64; 3], &'static str> {
+    let angle = |text: &str| text.trim().parse().ok().filter(|angle: &f64| angle.is_finite());
+    let angles: Option<Vec<_>> = text.split(',').map(angle).collect();
+    let three = angles.and_then(|angles| angles.try_into().ok());
+    three.ok_or("give three leg angles in radians, such as 1.4,1.5,1.4")
 }

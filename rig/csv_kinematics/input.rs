@@ -72,7 +72,7 @@ mod tests {
     fn comments_are_passed_over_in_any_encoding_and_of_any_length() {
         let latin_1 = b"# Gr\xf6\xdfe\n \t# \xff\n1\n";
         assert_eq!(read(latin_1), [(3, Ok("1".to_owned()))]);
-        let long = [b"\xef\xbb\xbf#", &[b'x'; 100_000][..], b"\n2\n"].concat();
+        let long = [b"\xef\xbb\xbf#", &[b'x'; 10_000][..], b"\n2\n"].concat();
         assert_eq!(read(&long), [(2, Ok("2".to_owned()))]);
     }
 }

@@ -5,7 +5,7 @@ use masseter_shared::geometry::{InverseError, Joints, Mechanism, Pose};
 use masseter_shared::messages::pose_from_fields;
 use masseter_terminal::Exit;
 
-use super::table::{Columns, CsvArgs, Lines, convert, mechanism};
+use super::table::{Columns, CsvArgs, convert, mechanism};
 
 /// How far a quaternion's norm may be from 1.
 const UNIT_TOLERANCE: f64 = 1e-3;
@@ -20,7 +20,13 @@ const COLUMNS: Columns = Columns {
 pub(crate) fn inverse(args: &CsvArgs) -> anyhow::Result<Exit> {
     let mechanism = mechanism(args)?;
     convert(args, COLUMNS, |_, values, lines| {
-        solve(&mechanism, &pose(values)?, lines);
+        match mechanism.inverse(&pose(values)?) {
+            Ok(joints) => {
+                let values = joints.actuators.to_axes().into_iter().chain(joints.theta_rad);
+                lines.row(values, status(&mechanism, &joints));
+            }
+            Err(InverseError::NoLength { .. } | InverseError::NotFinite) => lines.row([], "singular"),
+        }
         Ok(())
     })
 }
@@ -40,17 +46,5 @@ fn status(mechanism: &Mechanism, joints: &Joints) -> &'static str {
         "outside_stroke"
     } else {
         "ok"
-    }
-}
-
-fn solve(mechanism: &Mechanism, pose: &Pose, lines: &mut Lines) {
-    match mechanism.inverse(pose) {
-        Ok(joints) => {
-            let values = joints.actuators.to_axes().into_iter().chain(joints.theta_rad);
-            lines.row(values, status(mechanism, &joints));
-        }
-        Err(InverseError::NoLength { .. } | InverseError::NotFinite) => {
-            lines.empty(COLUMNS, "singular");
-        }
     }
 }

@@ -4,9 +4,10 @@
 //! however long the input is. What is computed from a line is not known here.
 
 use std::io::{self, Write};
+use std::iter;
 use std::path::PathBuf;
 
-use anyhow::{anyhow, bail};
+use anyhow::{anyhow, ensure};
 use clap::Args;
 use masseter_shared::geometry::Mechanism;
 use masseter_terminal::{Exit, status, taken};
@@ -50,14 +51,16 @@ pub(super) type Solved = Result<(), String>;
 #[derive(Debug, Default)]
 pub(super) struct Lines {
     text: Vec<u8>,
+    /// Values of a line.
+    width: usize,
     /// Where and why lines could not be read.
     refusals: Vec<(u64, String)>,
 }
 
 impl Lines {
-    /// One line: its values, nothing for those that are no number, then its status.
+    /// One line: its values, nothing for those that are no number or absent, then its status.
     pub(super) fn row(&mut self, values: impl IntoIterator<Item = f64>, status: &str) {
-        for value in values {
+        for value in values.into_iter().chain(iter::repeat(f64::NAN)).take(self.width) {
             if !value.is_nan() {
                 // A vector takes all that is written to it.
                 let _ = write!(self.text, "{value}");
@@ -66,11 +69,6 @@ impl Lines {
         }
         self.text.extend_from_slice(status.as_bytes());
         self.text.push(b'\n');
-    }
-
-    /// A line without values.
-    pub(super) fn empty(&mut self, columns: Columns, status: &str) {
-        self.row(columns.written.split(',').map(|_| f64::NAN), status);
     }
 }
 
@@ -91,33 +89,26 @@ pub(super) fn convert<const IN: usize>(
     })
 }
 
-/// Passes every line through `solve`, one after the other.
-pub(super) fn convert_in_turn<const IN: usize>(
-    args: &CsvArgs,
-    columns: Columns,
-    mut solve: impl FnMut(u64, [f64; IN], &mut Lines) -> Solved,
-) -> anyhow::Result<Exit> {
-    stream(args, columns, |batch| vec![solve_lines(batch, columns, &mut solve)])
-}
-
-fn solve_lines<const IN: usize>(
+/// Passes lines through `solve`, one after the other.
+pub(super) fn solve_lines<const IN: usize>(
     batch: &[Line],
     columns: Columns,
     mut solve: impl FnMut(u64, [f64; IN], &mut Lines) -> Solved,
 ) -> Lines {
-    let mut lines = Lines::default();
+    let mut lines = Lines { width: columns.written.split(',').count(), ..Lines::default() };
     for line in batch {
         let text = line.text.as_deref().map_err(Clone::clone);
         let values = text.and_then(|text| numbers(text, columns.read));
         if let Err(reason) = values.and_then(|values| solve(line.number, values, &mut lines)) {
-            lines.empty(columns, BAD_LINE);
+            lines.row([], BAD_LINE);
             lines.refusals.push((line.number, reason));
         }
     }
     lines
 }
 
-fn stream(
+/// Reads lines in batches and writes what `solve` makes of each.
+pub(super) fn stream(
     args: &CsvArgs,
     columns: Columns,
     mut solve: impl FnMut(&[Line]) -> Vec<Lines>,
@@ -151,11 +142,10 @@ fn check_columns(input: &mut Input, expected: &str) -> anyhow::Result<()> {
     let header = input.lines.next().unwrap_or(Line { number: 1, text: Ok(String::new()) });
     let place = format!("{}:{}", input.name, header.number);
     let text = header.text.map_err(|reason| anyhow!("{place}: {reason}"))?;
-    if fields(&text).eq(expected.split(',')) {
-        return Ok(());
-    }
     let found: Vec<_> = fields(&text).collect();
-    bail!("{place}: the columns are '{}', expected '{expected}'", found.join(","))
+    let found = found.join(",");
+    ensure!(found == expected, "{place}: the columns are '{found}', expected '{expected}'");
+    Ok(())
 }
 
 fn numbers<const IN: usize>(line: &str, columns: &str) -> Result<[f64; IN], String> {

@@ -46,7 +46,7 @@ pub struct Axis {
     pub(crate) scale: Scale,
     pub(crate) included: Option<f64>,
     /// Its ends in positions of the scale; none until it is fitted to the data of a chart.
-    pub(crate) ends: Option<[f64; 2]>,
+    ends: Option<[f64; 2]>,
     names: Vec<String>,
 }
 
@@ -54,7 +54,9 @@ impl Axis {
     /// From one value to another.
     #[must_use]
     pub fn new(label: &str, scale: Scale, ends: [f64; 2]) -> Self {
-        Self::fitted(label, scale).with_ends(ends.map(|end| scale.position(end)))
+        let mut axis = Self::fitted(label, scale);
+        axis.fit(ends.map(|end| scale.position(end)));
+        axis
     }
 
     /// Of the length that the data of a [`LineChart`](crate::LineChart) need.
@@ -77,10 +79,10 @@ impl Axis {
         self
     }
 
-    pub(crate) fn with_ends(mut self, [low, high]: [f64; 2]) -> Self {
+    /// Sets its ends, in positions of the scale, where it has none.
+    pub(crate) fn fit(&mut self, [low, high]: [f64; 2]) {
         let least = LEAST.max(LEAST_SHARE * low.abs().max(high.abs()));
-        self.ends = Some([low, high.max(low + least)]);
-        self
+        self.ends.get_or_insert([low, high.max(low + least)]);
     }
 
     pub(crate) fn has_names(&self) -> bool {

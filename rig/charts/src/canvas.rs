@@ -151,18 +151,13 @@ pub fn cells(
     let x = |column: usize| across.start + (across.end - across.start) * column as f64 / side as f64;
     let y = |row: usize| up.start + (up.end - up.start) * row as f64 / side as f64;
     for row in 0..side {
-        let colours: Vec<_> = (0..side).map(|column| colour(row * side + column)).collect();
-        let mut from = 0;
+        let cells: Vec<_> = (0..side).map(|column| (column, colour(row * side + column))).collect();
         // One rectangle for neighbours of one colour.
-        for run in colours.chunk_by(|a, b| a == b) {
-            let to = from + run.len();
-            if let Some(colour) = run[0] {
-                chart.draw_series([Rectangle::new(
-                    [(x(from), y(row)), (x(to), y(row + 1))],
-                    colour.filled(),
-                )])?;
-            }
-            from = to;
+        for run in cells.chunk_by(|a, b| a.1 == b.1) {
+            let (from, to) = (run[0].0, run[0].0 + run.len());
+            let rectangle =
+                |colour: RGBColor| Rectangle::new([(x(from), y(row)), (x(to), y(row + 1))], colour.filled());
+            chart.draw_series(run[0].1.map(rectangle))?;
         }
     }
     Ok(())
@@ -175,33 +170,24 @@ pub fn cells(
 pub fn legend(area: &Area, entries: &[LegendEntry], columns: usize) -> Result<(), Error> {
     let (width, _) = area.dim_in_pixel();
     let column = width as i32 / columns as i32;
+    let text = ("sans-serif", TEXT).into_text_style(area).pos(Pos::new(HPos::Left, VPos::Center));
+    let [dash, gap] = DASH.map(u32::cast_signed);
     for (index, LegendEntry { name, colour, key }) in entries.iter().enumerate() {
         let x = MARGIN as i32 + column * (index % columns) as i32;
         let y = (MARGIN / 2 + ROW / 2) as i32 + ROW as i32 * (index / columns) as i32;
-        let [dash, gap] = DASH.map(u32::cast_signed);
+        let stroke = |from: i32, length: i32| {
+            area.draw(&PathElement::new([(from, y), (from + length, y)], colour.stroke_width(2)))
+        };
         match key {
             Key::Box => {
                 let corners = [(x, y - 6), (x + 16, y + 6)];
                 area.draw(&Rectangle::new(corners, colour.filled()))?;
                 area.draw(&Rectangle::new(corners, BLACK))?;
             }
-            Key::Line => area.draw(&PathElement::new([(x, y), (x + 3 * dash, y)], colour.stroke_width(2)))?,
-            Key::Dashes => {
-                for from in [x, x + dash + gap] {
-                    area.draw(&PathElement::new([(from, y), (from + dash, y)], colour.stroke_width(2)))?;
-                }
-            }
+            Key::Line => stroke(x, 3 * dash)?,
+            Key::Dashes => stroke(x, dash).and_then(|()| stroke(x + dash + gap, dash))?,
         }
-        write(area, name, (x + 24, y), TEXT)?;
+        area.draw_text(name, &text, (x + 24, y))?;
     }
     Ok(())
-}
-
-/// Text of so many pixels, anchored at its left and middle.
-///
-/// # Errors
-/// When the area cannot be drawn on.
-pub fn write(area: &Area, text: &str, at: (i32, i32), size: u32) -> Result<(), Error> {
-    let style = ("sans-serif", size).into_text_style(area).pos(Pos::new(HPos::Left, VPos::Center));
-    area.draw_text(text, &style, at)
 }

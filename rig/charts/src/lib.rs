@@ -27,7 +27,7 @@ mod ticks;
 
 pub use axis::{Axis, Scale};
 pub use canvas::{
-    Area, Bar, Chart, Error, Key, LegendEntry, TEXT, TITLE, bars, cells, chart, legend, marks, svg, write,
+    Area, Bar, Chart, Error, Key, LegendEntry, TEXT, TITLE, bars, cells, chart, legend, marks, svg,
 };
 pub use colour_scale::ColourScale;
 pub use line_chart::{Drawn, Legend, Limit, Line, LineChart};

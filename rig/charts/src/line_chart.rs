@@ -138,12 +138,8 @@ impl LineChart {
         up = limits.fold(up, |[low, high], limit| [low.min(limit), high.max(limit)]);
         let margin = MARGIN * (up[1] - up[0]);
         let up = [up[0] - margin.max(1e-6), up[1] + margin.max(1e-6)];
-        if self.x.ends.is_none() {
-            self.x = self.x.clone().with_ends(across);
-        }
-        if self.y.ends.is_none() {
-            self.y = self.y.clone().with_ends(up);
-        }
+        self.x.fit(across);
+        self.y.fit(up);
         let is_finite = |[low, high]: [f64; 2]| (high - low).is_finite();
         (is_finite(across) && is_finite(up)).then_some(beyond)
     }
@@ -192,26 +188,20 @@ impl LineChart {
             }
         }
         let across = chart.x_range();
-        for &value in self.limits.iter().flat_map(|limit| &limit.values) {
-            chart.draw_series([PathElement::new(
-                [(across.start, value), (across.end, value)],
-                palette::RED.stroke_width(2),
-            )])?;
-        }
+        let level = |&value: &f64| {
+            PathElement::new([(across.start, value), (across.end, value)], palette::RED.stroke_width(2))
+        };
+        chart.draw_series(self.limits.iter().flat_map(|limit| &limit.values).map(level))?;
         Ok(chart)
     }
 
     fn entries(&self) -> Vec<LegendEntry> {
-        let lines = self.lines.iter().enumerate().map(|(index, line)| LegendEntry {
-            name: line.name.clone(),
-            colour: line.colour.unwrap_or(palette::series(index)),
-            key: if palette::is_dashed(index) { Key::Dashes } else { Key::Line },
+        let entry = |name: &String, colour, key| LegendEntry { name: name.clone(), colour, key };
+        let lines = self.lines.iter().enumerate().map(|(index, line)| {
+            let key = if palette::is_dashed(index) { Key::Dashes } else { Key::Line };
+            entry(&line.name, line.colour.unwrap_or(palette::series(index)), key)
         });
-        let limits = self.limits.iter().map(|limit| LegendEntry {
-            name: limit.name.clone(),
-            colour: palette::RED,
-            key: Key::Line,
-        });
+        let limits = self.limits.iter().map(|limit| entry(&limit.name, palette::RED, Key::Line));
         lines.chain(limits).collect()
     }
 }

@@ -8,7 +8,7 @@ use masseter_shared::geometry::{LEGS, Mechanism};
 use rayon::prelude::*;
 
 use super::solution_set::SolutionSet;
-use super::solver::COMPARED;
+use super::solver::{COMPARED, Start};
 use super::table::{csv, degrees};
 
 /// A guess with its result for each solver of [`COMPARED`].
@@ -40,7 +40,8 @@ impl Basins {
         let middle = |index: usize| (index as f64 + 0.5) / side as f64 * PI;
         let cell = |index: usize| {
             let guess_rad = [middle(index % side), middle(index / side), set.true_one.theta_rad[2]];
-            let found = COMPARED.map(|solver| solver.attempt(mechanism, &set.actuators, &guess_rad));
+            let start = Start { actuators: set.actuators, guess_rad };
+            let found = COMPARED.map(|solver| solver.attempt(mechanism, &start));
             let basins = found.map(|found| match found {
                 Ok(found) => set.class_of(&found.theta_rad).unwrap_or(below_base),
                 Err(_) => nowhere,

@@ -21,7 +21,6 @@ mod basins;
 mod claims;
 mod motions;
 mod multiplicity;
-mod page;
 mod pairs;
 mod plot;
 mod sample;

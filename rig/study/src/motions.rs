@@ -8,7 +8,7 @@ use masseter_shared::config::{
 use masseter_shared::geometry::{LEGS, Mechanism};
 
 use super::sample::distance_rad;
-use super::solver::{COMPARED, CONTROLLER, Solver};
+use super::solver::{COMPARED, CONTROLLER, Solver, Start};
 use super::table::{csv, number};
 
 /// A cycle of the rig, s.
@@ -91,8 +91,8 @@ fn follow(solver: Solver, mechanism: &Mechanism, trajectory: &Trajectory) -> Fol
             tracker.update(&joints.actuators).ok().map(|solution| (solution.theta_rad, solution.iterations))
         } else {
             // The first pose is known, as the paper supposes.
-            let found =
-                solver.attempt(mechanism, &joints.actuators, &last_rad.unwrap_or(joints.theta_rad)).ok();
+            let guess_rad = last_rad.unwrap_or(joints.theta_rad);
+            let found = solver.attempt(mechanism, &Start { actuators: joints.actuators, guess_rad }).ok();
             found.map(|found| (found.theta_rad, found.iterations))
         };
         followed.steps += 1;

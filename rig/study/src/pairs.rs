@@ -1,12 +1,12 @@
 //! Figs. 3 and 4 of the paper: single guesses from which the two iterations behave differently.
 
-use masseter_shared::geometry::{Actuators, LEGS, Mechanism};
+use masseter_shared::geometry::{LEGS, Mechanism};
 use rayon::prelude::*;
 
 use self::Course::{Converges, Diverges, Fails, Oscillates};
 use super::sample::Guesses;
 use super::share::Share;
-use super::solver::{NEWTON, PUBLISHED};
+use super::solver::{NEWTON, PUBLISHED, Start};
 use super::table::{csv, degrees, number};
 use super::trials::{Trial, Trials};
 
@@ -45,8 +45,7 @@ pub(super) struct Trace {
 /// A guess with the traces of the paper's solver and of Newton–Raphson.
 #[derive(Debug, Clone)]
 pub(super) struct Pair {
-    pub actuators: Actuators,
-    pub guess_rad: [f64; LEGS],
+    start: Start,
     pub traces: [Trace; 2],
 }
 
@@ -70,7 +69,8 @@ pub(super) fn disagreements(mechanism: &Mechanism, trials: &Trials) -> [Disagree
     let trials = trials.with(Guesses::AboveBase).par_iter();
     let pairs: Vec<_> = trials.map(|trial| Pair::trace(mechanism, trial)).collect();
     let disagreement = |name, title, courses: [Course; 2], clearness: fn(&[f64]) -> f64| {
-        let matching = || pairs.iter().filter(|pair| pair.courses() == courses);
+        let matching =
+            || pairs.iter().filter(|pair| pair.traces.each_ref().map(|trace| trace.course) == courses);
         let clearness = |pair: &Pair| clearness(&pair.traces[1].errors_cm2);
         let clearest = matching().max_by(|a, b| clearness(a).total_cmp(&clearness(b))).cloned();
         let share = Share { hits: matching().count(), of: pairs.len() };
@@ -87,10 +87,10 @@ impl Disagreement {
     /// Without rows where no such pair was found.
     pub(super) fn table(&self) -> String {
         let mut rows = Vec::new();
-        if let Some(Pair { actuators, guess_rad, traces }) = &self.clearest {
+        if let Some(Pair { start, traces }) = &self.clearest {
             for (solver, trace) in [PUBLISHED, NEWTON].iter().zip(traces) {
                 for (iteration, error) in trace.errors_cm2.iter().enumerate() {
-                    let guess = (actuators.to_axes().map(number), guess_rad.map(degrees));
+                    let guess = (start.actuators.to_axes().map(number), start.guess_rad.map(degrees));
                     rows.push((solver.short_name, iteration, number(*error), guess));
                 }
             }
@@ -101,12 +101,11 @@ impl Disagreement {
 
 impl Pair {
     fn trace(mechanism: &Mechanism, trial: &Trial) -> Self {
-        let Trial { actuators, guess_rad, .. } = *trial;
         let traces = [PUBLISHED, NEWTON].map(|solver| {
-            let errors_cm2 = solver.errors_cm2(mechanism, &actuators, &guess_rad);
+            let errors_cm2 = solver.errors_cm2(mechanism, &trial.start);
             Trace { course: course(&errors_cm2, trial.by(solver).is_ok()), errors_cm2 }
         });
-        Self { actuators, guess_rad, traces }
+        Self { start: trial.start, traces }
     }
 
     /// The guess and its input, for the page.
@@ -115,14 +114,10 @@ impl Pair {
             |values: [f64; LEGS], scale: f64| values.map(|value| format!("{:.1}", value * scale)).join(", ");
         format!(
             "d = ({}) mm, l = ({}) mm, guess θ = ({})°",
-            list(self.actuators.slide_m, 1e3),
-            list(self.actuators.leg_m, 1e3),
-            list(self.guess_rad, 1f64.to_degrees())
+            list(self.start.actuators.slide_m, 1e3),
+            list(self.start.actuators.leg_m, 1e3),
+            list(self.start.guess_rad, 1f64.to_degrees())
         )
-    }
-
-    fn courses(&self) -> [Course; 2] {
-        self.traces.each_ref().map(|trace| trace.course)
     }
 }
 

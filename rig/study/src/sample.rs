@@ -8,6 +8,8 @@ use masseter_shared::geometry::{AXES, Actuators, LEGS, Mechanism};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
+use self::Guesses::{AboveBase, Within};
+
 /// The experiments that draw; each has streams of its own.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Stream {
@@ -61,33 +63,33 @@ pub(super) enum Guesses {
 
 /// The origins of the trials' guesses, nearest first.
 pub(super) const GUESSES: [Guesses; 8] = [
-    Guesses::Within(2.0),
-    Guesses::Within(5.0),
-    Guesses::Within(10.0),
-    Guesses::Within(15.0),
-    Guesses::Within(20.0),
-    Guesses::Within(30.0),
-    Guesses::Within(60.0),
-    Guesses::AboveBase,
+    Within(2.0),
+    Within(5.0),
+    Within(10.0),
+    Within(15.0),
+    Within(20.0),
+    Within(30.0),
+    Within(60.0),
+    AboveBase,
 ];
 
 impl Guesses {
     /// The name in tables.
     pub(super) fn name(self) -> String {
         match self {
-            Self::Within(deg) => format!("±{deg}°"),
-            Self::AboveBase => "above base".to_owned(),
+            Within(deg) => format!("±{deg}°"),
+            AboveBase => "above base".to_owned(),
         }
     }
 
     /// Leg angles, radians.
     pub(super) fn draw(self, true_rad: &[f64; LEGS], random: &mut Pcg64Mcg) -> [f64; LEGS] {
         match self {
-            Self::Within(deg) => true_rad.map(|angle| {
+            Within(deg) => true_rad.map(|angle| {
                 let off: f64 = random.random_range(-1.0..=1.0);
                 angle + off * deg.to_radians()
             }),
-            Self::AboveBase => std::array::from_fn(|_| random.random_range(0.0..PI)),
+            AboveBase => std::array::from_fn(|_| random.random_range(0.0..PI)),
         }
     }
 }
@@ -125,8 +127,8 @@ mod tests {
             for _ in 0..100 {
                 let guess = guesses.draw(&truth, &mut random);
                 match guesses {
-                    Guesses::Within(deg) => assert!(distance_rad(&guess, &truth) <= deg.to_radians() + 1e-12),
-                    Guesses::AboveBase => assert!(guess.iter().all(|angle| angle.sin() >= 0.0)),
+                    Within(deg) => assert!(distance_rad(&guess, &truth) <= deg.to_radians() + 1e-12),
+                    AboveBase => assert!(guess.iter().all(|angle| angle.sin() >= 0.0)),
                 }
             }
         }

@@ -51,8 +51,16 @@ pub(super) const SOLVERS: [Solver; 9] = [
     NEWTON_SQUARED,
     CONTROLLER,
 ];
-/// The three that the figures show.
+/// The three that the figures show, in this order.
 pub(super) const COMPARED: [Solver; 3] = [PUBLISHED, NEWTON, CONTROLLER];
+
+/// What a solver starts with.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Start {
+    pub actuators: Actuators,
+    /// Leg angles.
+    pub guess_rad: [f64; LEGS],
+}
 
 /// What a solver found from one guess.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -77,13 +85,9 @@ impl Solver {
         }
     }
 
-    /// Solves from a guess (radians). The error is that of `ForwardError::reason`.
-    pub(super) fn attempt(
-        self,
-        mechanism: &Mechanism,
-        actuators: &Actuators,
-        guess_rad: &[f64; LEGS],
-    ) -> Result<Found, &'static str> {
+    /// Solves. The error is that of `ForwardError::reason`.
+    pub(super) fn attempt(self, mechanism: &Mechanism, start: &Start) -> Result<Found, &'static str> {
+        let Start { actuators, guess_rad } = start;
         let mut evaluations = 0;
         let observe = |step: &Iteration| evaluations += 1 + step.halvings;
         let solved = match self.iteration() {
@@ -97,17 +101,12 @@ impl Solver {
     }
 
     /// The error (eq. 2, cm²) of the guess and after every iteration; nothing for the controller.
-    pub(super) fn errors_cm2(
-        self,
-        mechanism: &Mechanism,
-        actuators: &Actuators,
-        guess_rad: &[f64; LEGS],
-    ) -> Vec<f64> {
+    pub(super) fn errors_cm2(self, mechanism: &Mechanism, start: &Start) -> Vec<f64> {
         let mut errors_cm2 = Vec::new();
         if let Some((method, options)) = self.iteration() {
             let observe = |step: &Iteration| errors_cm2.push(step.evaluation.error_cm2());
             // The last error shows how it ended.
-            let _ = solve_traced(method, mechanism, actuators, guess_rad, &options, observe);
+            let _ = solve_traced(method, mechanism, &start.actuators, &start.guess_rad, &options, observe);
         }
         errors_cm2
     }

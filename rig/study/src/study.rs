@@ -9,7 +9,7 @@ use crate::motions::{self, Motion};
 use crate::multiplicity::Multiplicity;
 use crate::pairs::{self, Disagreement};
 use crate::solution_set::SolutionSet;
-use crate::speed::Speed;
+use crate::speed::{self, Situation};
 use crate::trials::Trials;
 use crate::workspace::{Map, SLICES};
 
@@ -38,7 +38,7 @@ pub struct Study {
     pub(crate) mechanism: Mechanism,
     pub(crate) trials: Trials,
     pub(crate) pairs: [Disagreement; 3],
-    pub(crate) speed: Speed,
+    pub(crate) speed: [Situation; 2],
     pub(crate) set: SolutionSet,
     pub(crate) multiplicity: Multiplicity,
     pub(crate) basins: Basins,
@@ -82,7 +82,7 @@ impl PreparedStudy {
         let middle = set.true_one.pose.translation.vector;
         let maps = SLICES.map(|slice| Map::compute(&mechanism, slice, &middle, cells));
         progress("times");
-        let speed = Speed::measure(&mechanism, &trials, &motions[0]);
+        let speed = speed::measure(&mechanism, &trials, &motions[0]);
         Ok(Study { settings, mechanism, trials, pairs, speed, set, multiplicity, basins, motions, maps })
     }
 }

@@ -1,12 +1,12 @@
 //! Random guesses for random feasible inputs: which solver reaches which solution after how many iterations.
 
 use masseter_controller::kinematics::Assembly;
-use masseter_shared::geometry::{Actuators, LEGS, Mechanism};
+use masseter_shared::geometry::{LEGS, Mechanism};
 use rayon::prelude::*;
 
 use super::sample::{self, GUESSES, Guesses, Stream, distance_rad};
 use super::share::{Share, median, quantile};
-use super::solver::{Found, NEWTON, PUBLISHED, SOLVERS, Solver};
+use super::solver::{Found, NEWTON, PUBLISHED, SOLVERS, Solver, Start};
 use super::table::{csv, number};
 
 /// A root counts as the closest when no other is closer by more than this, radians.
@@ -28,8 +28,7 @@ type Outcome = Result<Reached, &'static str>;
 /// One guess for one input, given to every solver.
 #[derive(Debug, Clone)]
 pub(super) struct Trial {
-    pub actuators: Actuators,
-    pub guess_rad: [f64; LEGS],
+    pub start: Start,
     /// In the order of [`SOLVERS`].
     outcomes: [Outcome; SOLVERS.len()],
 }
@@ -54,11 +53,12 @@ impl Trials {
             let mut random = sample::generator(seed, Stream::Trials, case);
             let input = sample::feasible(mechanism, &mut random);
             let guess_rad = guesses.draw(&input.true_one.theta_rad, &mut random);
+            let start = Start { actuators: input.actuators, guess_rad };
             let outcomes = SOLVERS.map(|solver| {
-                let found = solver.attempt(mechanism, &input.actuators, &guess_rad)?;
+                let found = solver.attempt(mechanism, &start)?;
                 Ok(judge(mechanism, &input, &guess_rad, found))
             });
-            Trial { actuators: input.actuators, guess_rad, outcomes }
+            Trial { start, outcomes }
         };
         let set = |guesses| (0..samples).into_par_iter().map(|case| trial(guesses, case)).collect();
         Self { sets: GUESSES.into_iter().map(set).collect() }
@@ -129,15 +129,10 @@ impl Trials {
 
     /// How many solved trials took 0, 1, 2 … iterations, from guesses anywhere above the base.
     pub(super) fn histogram(&self, solver: Solver) -> Vec<usize> {
-        let mut counts = Vec::new();
-        for reached in self.outcomes(solver, Guesses::AboveBase).flatten() {
-            let iterations = reached.found.iterations as usize;
-            if counts.len() <= iterations {
-                counts.resize(iterations + 1, 0);
-            }
-            counts[iterations] += 1;
-        }
-        counts
+        let reached = self.outcomes(solver, Guesses::AboveBase).flatten();
+        let taken: Vec<_> = reached.map(|reached| reached.found.iterations).collect();
+        let end = taken.iter().max().map_or(0, |most| most + 1);
+        (0..end).map(|iterations| taken.iter().filter(|&&one| one == iterations).count()).collect()
     }
 
     /// Iterations of the paper's variants and of Newton–Raphson where both reach a solution.

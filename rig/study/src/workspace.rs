@@ -120,13 +120,11 @@ impl Map {
     }
 
     /// Lowest and highest value of each axis at which the mechanism can be; none when it can be nowhere.
-    pub(super) fn reach(&self) -> [Option<[f64; 2]>; 2] {
+    pub(super) fn reach(&self) -> [Option<(f64, f64)>; 2] {
         [0, 1].map(|axis| {
             let cells = self.poses.iter().enumerate().filter(|(_, quality)| quality.is_some());
             let reached = cells.map(|(index, _)| self.slice.values(self.side, index)[axis]);
-            reached
-                .map(|value| [value; 2])
-                .reduce(|[low, high], [value, _]| [low.min(value), high.max(value)])
+            reached.clone().min_by(f64::total_cmp).zip(reached.max_by(f64::total_cmp))
         })
     }
 

@@ -7,9 +7,19 @@ use anyhow::Context;
 use askama::Template;
 
 use crate::claims::{self, PaperClaim};
-use crate::page::Page;
 use crate::study::Study;
-use crate::{motions, plot};
+use crate::{motions, plot, speed};
+
+/// The page that sets each claim of the paper beside what was measured, with the captions of the figures.
+#[derive(Template)]
+#[template(path = "claims.md", escape = "none")]
+struct Page<'a> {
+    study: &'a Study,
+    /// Repeats the study.
+    command: &'a str,
+    claims: &'a [PaperClaim],
+    version: &'static str,
+}
 
 impl Study {
     /// Writes tables, figures and `claims.md` into an existing folder, and returns the claims in the paper's order.
@@ -40,7 +50,7 @@ impl Study {
             ("success", self.trials.success_table()),
             ("iterations", self.trials.iterations_table()),
             ("cost", self.trials.cost_table()),
-            ("speed", self.speed.table()),
+            ("speed", speed::table(&self.speed)),
             ("fig8_solutions", self.set.table()),
             ("multiplicity", self.multiplicity.table()),
             ("basins", self.basins.table()),

@@ -3,7 +3,7 @@
 use super::claim::{ANY, Judgement, PaperClaim, RARELY};
 use crate::sample::Guesses;
 use crate::share::Share;
-use crate::solver::{COMPARED, CONTROLLER, NEWTON, PUBLISHED, SOLVERS, Solver};
+use crate::solver::{CONTROLLER, NEWTON, PUBLISHED, SOLVERS, Solver};
 use crate::study::Study;
 
 /// Guesses "close to the solution".
@@ -158,9 +158,7 @@ pub(super) fn always_the_true_one(study: &Study) -> PaperClaim {
 }
 
 pub(super) fn successive_poses(study: &Study) -> PaperClaim {
-    let place =
-        COMPARED.iter().position(|&solver| solver == PUBLISHED).expect("the paper's solver is compared");
-    let followed: Vec<_> = study.motions.iter().map(|motion| motion.followed[place]).collect();
+    let followed: Vec<_> = study.motions.iter().map(|motion| motion.followed[0]).collect();
     let lost: usize = followed.iter().map(|followed| followed.lost).sum();
     let steps: usize = followed.iter().map(|followed| followed.steps).sum();
     PaperClaim {

@@ -2,8 +2,7 @@
 
 use super::claim::{ANY, Judgement, PaperClaim};
 use crate::share::median;
-use crate::solver::{Found, NEWTON, PUBLISHED};
-use crate::speed::Situation;
+use crate::solver::{Found, PUBLISHED};
 use crate::study::Study;
 
 /// The time the paper states for one computation, ns.
@@ -20,14 +19,14 @@ pub(super) fn fewer_iterations(study: &Study) -> PaperClaim {
     };
     let iterations = medians(|found| found.iterations);
     let evaluations = medians(|found| found.evaluations);
-    let time = study.speed.timing(Situation::Random, PUBLISHED).to_newton;
+    let [published, ..] = study.speed[0].timings;
     PaperClaim {
         statement: "It converges much faster: Newton–Raphson needs many more iterations.",
         section: "Results, second advantage; Fig. 5",
         measured: format!(
             "where both reach a solution from above the base, medians of the paper's solver and Newton–Raphson: {} and {} iterations, {} \
-             and {} evaluations of the residuals; time of the paper's solver {time:.2} of Newton–Raphson's",
-            iterations[0], iterations[1], evaluations[0], evaluations[1]
+             and {} evaluations of the residuals; time of the paper's solver {:.2} of Newton–Raphson's",
+            iterations[0], iterations[1], evaluations[0], evaluations[1], published.to_newton
         ),
         criterion: "holds if Newton–Raphson's median is at least twice the paper's; partly if it is greater",
         judgement: faster(iterations),
@@ -36,8 +35,7 @@ pub(super) fn fewer_iterations(study: &Study) -> PaperClaim {
 }
 
 pub(super) fn stated_time(study: &Study) -> PaperClaim {
-    let [published_ns, newton_ns] =
-        [PUBLISHED, NEWTON].map(|solver| study.speed.timing(Situation::Random, solver).median_ns);
+    let [published_ns, newton_ns, _] = study.speed[0].timings.map(|timing| timing.median_ns);
     PaperClaim {
         statement: "The computation takes not more than 10⁻¹⁰ s on a Pentium.",
         section: "Results, second advantage",
@@ -52,8 +50,7 @@ pub(super) fn stated_time(study: &Study) -> PaperClaim {
 }
 
 pub(super) fn real_time(study: &Study) -> PaperClaim {
-    let [warm, random] =
-        [Situation::Warm, Situation::Random].map(|start| study.speed.timing(start, PUBLISHED));
+    let [random, warm] = study.speed.each_ref().map(|situation| situation.timings[0]);
     PaperClaim {
         statement: "It is fast enough for real-time control.",
         section: "Abstract and Results, second advantage",

@@ -7,12 +7,11 @@ use masseter_charts::{
 use super::colours::SOLVER_COLOURS;
 use crate::sample::Guesses;
 use crate::solver::{COMPARED, Solver};
-use crate::speed::Situation;
+use crate::speed::Timing;
 use crate::study::Study;
 
 /// Iterations shown.
 const MOST: usize = 40;
-const SITUATIONS: [Situation; 2] = [Situation::Random, Situation::Warm];
 
 pub(super) fn svg(study: &Study) -> Result<String, Error> {
     masseter_charts::svg((1100, 460), |area| {
@@ -45,18 +44,18 @@ fn iterations(study: &Study) -> LineChart {
 
 /// Bars from 10 ns upwards, by decades.
 fn times(area: &Area, study: &Study) -> Result<(), Error> {
-    let most_ns = study.speed.timings.iter().map(|timing| timing.median_ns).fold(1e3, f64::max);
-    let names = SITUATIONS.map(|situation| situation.name().to_owned());
-    let y = Axis::new("median, ns", Scale::Log, [10.0, most_ns * 4.0]);
-    let mut chart = chart(area, "Time of a solution", Axis::of_names("", names.into()), y)?;
-    for (group, situation) in SITUATIONS.into_iter().enumerate() {
-        let bar = |(index, (solver, colour)): (usize, (Solver, _))| {
-            let timing = study.speed.timing(situation, solver);
+    let medians_ns =
+        study.speed.iter().flat_map(|situation| situation.timings).map(|timing| timing.median_ns);
+    let names = study.speed.iter().map(|situation| situation.name.to_owned()).collect();
+    let y = Axis::new("median, ns", Scale::Log, [10.0, medians_ns.fold(1e3, f64::max) * 4.0]);
+    let mut chart = chart(area, "Time of a solution", Axis::of_names("", names), y)?;
+    for (group, situation) in study.speed.iter().enumerate() {
+        let bar = |(index, (timing, colour)): (usize, (Timing, _))| {
             let left = group as f64 - 0.42 + 0.29 * index as f64;
             let text = vec![format!("{:.0} ns", timing.median_ns), format!("×{:.2}", timing.to_newton)];
             Bar { sides: [left, left + 0.26], height: timing.median_ns, colour, text }
         };
-        let shown = COMPARED.into_iter().zip(SOLVER_COLOURS).enumerate().map(bar);
+        let shown = situation.timings.into_iter().zip(SOLVER_COLOURS).enumerate().map(bar);
         bars(&mut chart, &shown.filter(|bar| bar.height.is_finite()).collect::<Vec<_>>())?;
     }
     Ok(())
