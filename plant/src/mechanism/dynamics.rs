@@ -18,7 +18,7 @@ use masseter_shared::geometry::{
 use nalgebra::{Matrix3, Matrix6, UnitQuaternion, Vector3, Vector6};
 
 use super::food::{Food, vertical};
-use super::friction::Friction;
+use super::friction;
 
 /// Pose, twist and joint coordinates of the mechanism.
 #[derive(Debug, Clone, Copy)]
@@ -44,7 +44,6 @@ pub(crate) struct Dynamics {
     state: State,
     /// V̇ under the forces that act.
     acceleration: Twist,
-    friction: Friction,
     food: Option<Food>,
 }
 
@@ -94,18 +93,16 @@ impl Dynamics {
         if let Err(violation) = mechanism.strokes().check(&joints.actuators) {
             return Err(DynamicsError::Start { initial_leg_m: config.initial_leg_m, violation });
         }
-        let friction = Friction::new(&config);
         let (twist, acceleration) = (Twist::zeros(), Twist::zeros());
         let state = State { pose, twist, joints };
-        let dynamics = Self { mechanism, config, state, acceleration, friction, food };
-        let longest_step_ns = dynamics.longest_step_ns()?;
-        if longest_step_ns < *DynamicsConfig::STEPS_NS.start() {
-            return Err(DynamicsError::Stiff);
+        let dynamics = Self { mechanism, config, state, acceleration, food };
+        match dynamics.longest_step_ns()? {
+            longest_ns if longest_ns < *DynamicsConfig::STEPS_NS.start() => Err(DynamicsError::Stiff),
+            longest_step_ns if config.step_ns > longest_step_ns => {
+                Err(DynamicsError::Friction { longest_step_ns })
+            }
+            _ => Ok(dynamics),
         }
-        if config.step_ns > longest_step_ns {
-            return Err(DynamicsError::Friction { longest_step_ns });
-        }
-        Ok(dynamics)
     }
 
     /// The longest step in which friction does not turn a motion into a faster one back: 2 by the greatest
@@ -114,7 +111,7 @@ impl Dynamics {
     fn longest_step_ns(&self) -> Result<u64, DynamicsError> {
         let jacobian = self.jacobian_at(&self.state);
         let mass = self.mass(&jacobian, &self.platform_inertia()).cholesky().ok_or(DynamicsError::Mass)?;
-        let root = Matrix6::from_diagonal(&self.friction.damping_n_s_per_m().map(f64::sqrt));
+        let root = Matrix6::from_diagonal(&friction::damping_n_s_per_m(&self.config).map(f64::sqrt));
         let braked = jacobian.actuators.transpose() * root;
         let braked = mass.l().solve_lower_triangular(&braked).ok_or(DynamicsError::Mass)?;
         let rates_per_s = braked * braked.transpose();
@@ -147,7 +144,7 @@ impl Dynamics {
         let (axes, hinges) = self.bias(&jacobian);
         let inertia = self.platform_inertia();
         let axes_n = Vector6::from(*force_n)
-            - self.friction.force_n(&(jacobian.actuators * self.state.twist))
+            - friction::force_n(&self.config, &(jacobian.actuators * self.state.twist))
             - self.axis_mass_kg().component_mul(&axes);
         let food = self
             .food

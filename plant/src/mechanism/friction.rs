@@ -9,32 +9,20 @@ const STICTION_SPEED_M_S: f64 = 1e-3;
 /// Coulomb friction of a leg as a share of a slide's.
 const LEG_SHARE: f64 = 0.25;
 
-/// Friction of the axes d₁ d₂ d₃ l₁ l₂ l₃.
-#[derive(Debug, Clone)]
-pub(crate) struct Friction {
-    coulomb_n: Vector6<f64>,
-    viscous_n_s_per_m: f64,
+/// Coulomb friction of the axes d₁ d₂ d₃ l₁ l₂ l₃.
+fn coulomb_n(config: &DynamicsConfig) -> Vector6<f64> {
+    let share = |axis: usize| if axis < LEGS { 1.0 } else { LEG_SHARE };
+    Vector6::from_fn(|axis, _| config.slide_friction_n * share(axis))
 }
 
-impl Friction {
-    /// The friction of a scenario's mechanism.
-    pub(crate) fn new(config: &DynamicsConfig) -> Self {
-        let share = |axis: usize| if axis < LEGS { 1.0 } else { LEG_SHARE };
-        Self {
-            coulomb_n: Vector6::from_fn(|axis, _| config.slide_friction_n * share(axis)),
-            viscous_n_s_per_m: config.viscous_friction_n_s_per_m,
-        }
-    }
+/// Force against a motion of the axes at these speeds (m/s), N.
+pub(super) fn force_n(config: &DynamicsConfig, speeds_m_s: &Vector6<f64>) -> Vector6<f64> {
+    coulomb_n(config).zip_map(speeds_m_s, |coulomb_n, speed| {
+        coulomb_n * speed / speed.hypot(STICTION_SPEED_M_S) + config.viscous_friction_n_s_per_m * speed
+    })
+}
 
-    /// Force against a motion at these speeds (m/s), N.
-    pub(crate) fn force_n(&self, speeds_m_s: &Vector6<f64>) -> Vector6<f64> {
-        self.coulomb_n.zip_map(speeds_m_s, |coulomb_n, speed| {
-            coulomb_n * speed / speed.hypot(STICTION_SPEED_M_S) + self.viscous_n_s_per_m * speed
-        })
-    }
-
-    /// The steepest slope of the force over speed, which is that at rest, N per m/s.
-    pub(crate) fn damping_n_s_per_m(&self) -> Vector6<f64> {
-        self.coulomb_n.map(|coulomb_n| coulomb_n / STICTION_SPEED_M_S + self.viscous_n_s_per_m)
-    }
+/// The steepest slope of the force over speed, which is that at rest, N per m/s.
+pub(super) fn damping_n_s_per_m(config: &DynamicsConfig) -> Vector6<f64> {
+    coulomb_n(config).map(|coulomb_n| coulomb_n / STICTION_SPEED_M_S + config.viscous_friction_n_s_per_m)
 }

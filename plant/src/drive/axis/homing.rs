@@ -43,10 +43,8 @@ impl Homing {
 
     /// The statusword with the bits of homing.
     pub(super) const fn show(self, word: Statusword, is_at_rest: bool) -> Statusword {
-        let is_attained = matches!(self, Self::Attained);
-        let is_running = self.is_running();
-        word.with(StatusBit::TargetReached, !is_running && is_at_rest)
-            .with(StatusBit::HOMING_ATTAINED, is_attained)
+        word.with(StatusBit::TargetReached, !self.is_running() && is_at_rest)
+            .with(StatusBit::HOMING_ATTAINED, matches!(self, Self::Attained))
             .with(StatusBit::HOMING_ERROR, matches!(self, Self::Failed))
     }
 

@@ -21,7 +21,7 @@ use crate::drive::dictionary::{Objects, names};
 use demand::Demand;
 use following::FollowingErrorMonitor;
 use motion::{Motion, MotionCommand, PositionView, clamp};
-use parameters::{MotionLimits, Parameters};
+use parameters::Parameters;
 use positioning::Positioning;
 use profile::Profile;
 use servo::{Servo, ServoCommand, ServoLimits};
@@ -132,19 +132,14 @@ impl Axis {
         let was_fault = self.power == DriveState::Fault;
         self.obey(word.command(before, self.power), now_ns);
         if self.is_enabled() {
-            match self.mode {
-                Mode::ProfilePosition => {
-                    let (target, view) = (objects.get(names::TARGET_POSITION), self.position_view(now_ns));
-                    let command = self.positioning.control([before, word], target, view);
-                    self.execute(command, now_ns, self.parameters.profile);
-                }
-                Mode::Homing => {
-                    let (method, view) = (self.parameters.homing_method, self.position_view(now_ns));
-                    let command = self.homing.control([before, word], method, self.counts, view);
-                    self.execute(command, now_ns, self.parameters.homing);
-                }
-                Mode::CyclicPosition | Mode::CyclicTorque => {}
-            }
+            let (words, view) = ([before, word], self.position_view(now_ns));
+            let (target, method) = (objects.get(names::TARGET_POSITION), self.parameters.homing_method);
+            let command = match self.mode {
+                Mode::ProfilePosition => self.positioning.control(words, target, view),
+                Mode::Homing => self.homing.control(words, method, self.counts, view),
+                Mode::CyclicPosition | Mode::CyclicTorque => None,
+            };
+            self.execute(command, now_ns);
         }
         was_fault && self.power != DriveState::Fault
     }
@@ -209,17 +204,13 @@ impl Axis {
         self.complete_transition(now_ns);
         let before = std::mem::replace(&mut self.counts, self.encoder.read(position_m));
         if self.is_enabled() {
-            match self.mode {
-                Mode::ProfilePosition => {
-                    let command = self.positioning.step(self.controlword, self.demand.is_at_rest(now_ns));
-                    self.execute(command, now_ns, self.parameters.profile);
-                }
-                Mode::Homing => {
-                    let command = self.homing.step([before, self.counts], self.demand.is_at_rest(now_ns));
-                    self.execute(command, now_ns, self.parameters.homing);
-                }
-                Mode::CyclicPosition | Mode::CyclicTorque => {}
-            }
+            let is_at_rest = self.demand.is_at_rest(now_ns);
+            let command = match self.mode {
+                Mode::ProfilePosition => self.positioning.step(self.controlword, is_at_rest),
+                Mode::Homing => self.homing.step([before, self.counts], is_at_rest),
+                Mode::CyclicPosition | Mode::CyclicTorque => None,
+            };
+            self.execute(command, now_ns);
         }
         let limits = self.servo_limits();
         let measured_m = self.encoder.metres(self.counts);
@@ -322,8 +313,7 @@ impl Axis {
 
     fn supervise_following(&mut self, now_ns: u64) -> bool {
         let Some(window_m) = self.parameters.following_window_m else { return false };
-        let demand_m = self.demand.position_m(now_ns);
-        let error_m = demand_m.map_or(0.0, |demand_m| demand_m - self.measured_m());
+        let error_m = self.demand.position_m(now_ns).map_or(0.0, |demand_m| demand_m - self.measured_m());
         if !self.following.exceeds(now_ns, error_m, window_m, self.parameters.following_timeout_ns) {
             return false;
         }
@@ -333,7 +323,9 @@ impl Axis {
     }
 
     /// Executes a command of the mode of operation.
-    fn execute(&mut self, command: Option<MotionCommand>, now_ns: u64, limits: MotionLimits) {
+    fn execute(&mut self, command: Option<MotionCommand>, now_ns: u64) {
+        let Parameters { profile, homing, .. } = self.parameters;
+        let limits = if self.mode == Mode::Homing { homing } else { profile };
         match command {
             None => {}
             Some(MotionCommand::MoveTo { target }) => {
@@ -364,16 +356,10 @@ impl Axis {
     /// profile deceleration (6084h).
     fn servo_limits(&self) -> ServoLimits {
         let Parameters { velocity_limit_m_s, force_limit_n, position_limits, profile, .. } = self.parameters;
-        let mut free_velocity_m_s = [-velocity_limit_m_s, velocity_limit_m_s];
-        if self.mode == Mode::CyclicTorque {
-            let [lowest_m, highest_m] = position_limits.map(|end| self.metres(end));
-            let at_m = self.measured_m();
-            let braking_m_s = |way_m: f64| (2.0 * profile.deceleration_m_s2 * way_m.max(0.0)).sqrt();
-            free_velocity_m_s = [
-                -braking_m_s(at_m - lowest_m).min(velocity_limit_m_s),
-                braking_m_s(highest_m - at_m).min(velocity_limit_m_s),
-            ];
-        }
+        let ([lowest_m, highest_m], at_m) = (position_limits.map(|end| self.metres(end)), self.measured_m());
+        let braking_m_s =
+            |way_m: f64| (2.0 * profile.deceleration_m_s2 * way_m.max(0.0)).sqrt().min(velocity_limit_m_s);
+        let free_velocity_m_s = [-braking_m_s(at_m - lowest_m), braking_m_s(highest_m - at_m)];
         ServoLimits { force_n: force_limit_n, velocity_m_s: velocity_limit_m_s, free_velocity_m_s }
     }
 

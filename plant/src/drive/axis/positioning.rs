@@ -31,13 +31,11 @@ impl Positioning {
         target_position: i32,
         view: PositionView,
     ) -> Option<MotionCommand> {
-        let mut command = None;
-        if word.halts() && !before.halts() {
-            command = Some(MotionCommand::SlowDown);
-        }
-        if before.halts() && !word.halts() {
-            command = self.running.map(|target| MotionCommand::MoveTo { target });
-        }
+        let mut command = match (before.halts(), word.halts()) {
+            (false, true) => Some(MotionCommand::SlowDown),
+            (true, false) => self.running.map(|target| MotionCommand::MoveTo { target }),
+            _ => None,
+        };
         if word.starts() && !before.starts() {
             command = self.take_setpoint(word, target_position, view).or(command);
         }
@@ -52,11 +50,10 @@ impl Positioning {
         target_position: i32,
         view: PositionView,
     ) -> Option<MotionCommand> {
-        let requested = if word.is_relative() {
-            self.base_of_relative(view).saturating_add(target_position)
-        } else {
-            target_position
-        };
+        // A relative target is added to the set-point before, or to the actual position.
+        let base = self.waiting.or(self.running).or(self.reached).unwrap_or(view.actual);
+        let requested =
+            if word.is_relative() { base.saturating_add(target_position) } else { target_position };
         let target = view.clamp(requested);
         let is_free = self.running.is_none() && self.waiting.is_none();
         let mut command = None;
@@ -71,11 +68,6 @@ impl Positioning {
         self.is_acknowledged = true;
         self.is_limited = target != requested;
         command
-    }
-
-    /// The position that a relative target is added to: the set-point before, or the actual position.
-    fn base_of_relative(&self, view: PositionView) -> i32 {
-        self.waiting.or(self.running).or(self.reached).unwrap_or(view.actual)
     }
 
     fn start(&mut self, word: Controlword, target: i32) -> Option<MotionCommand> {

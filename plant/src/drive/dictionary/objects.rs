@@ -82,10 +82,8 @@ pub(crate) const fn slot<T: Number>(index: u16, subindex: u8) -> Slot<T> {
 /// # Errors
 /// [`AbortCode::NO_OBJECT`], [`AbortCode::NO_SUBINDEX`].
 pub(crate) fn find(address: ObjectAddress) -> Result<usize, AbortCode> {
-    ENTRIES.binary_search_by_key(&address, |entry| entry.address).map_err(|near| {
-        let is_neighbour =
-            |place: usize| ENTRIES.get(place).is_some_and(|entry| entry.address.index == address.index);
-        let exists = is_neighbour(near) || is_neighbour(near.wrapping_sub(1));
+    ENTRIES.binary_search_by_key(&address, |entry| entry.address).map_err(|_| {
+        let exists = OBJECTS.iter().any(|object| object.index() == address.index);
         if exists { AbortCode::NO_SUBINDEX } else { AbortCode::NO_OBJECT }
     })
 }

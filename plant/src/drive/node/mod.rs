@@ -164,11 +164,12 @@ impl DriveNode {
             return;
         }
         match command {
-            NmtCommand::Start if !self.nmt.is_operational() => {
+            NmtCommand::Start => {
+                if !self.nmt.is_operational() {
+                    self.process_data.tpdos.iter_mut().for_each(Tpdo::clear);
+                }
                 self.nmt.state = Some(NmtState::Operational);
-                self.process_data.tpdos.iter_mut().for_each(Tpdo::clear);
             }
-            NmtCommand::Start => {}
             NmtCommand::Stop => self.leave_operational(NmtState::Stopped, now_ns),
             NmtCommand::EnterPreOperational => self.leave_operational(NmtState::PreOperational, now_ns),
             NmtCommand::ResetCommunication => {
