@@ -196,7 +196,7 @@ fn result(folder: &RunFolder) -> anyhow::Result<RunResult> {
         return Ok(RunResult::Incomplete { shares });
     }
     let log = |(_, name): &(_, &str)| {
-        let path = folder.histograms().join(format!("{name}.hlog"));
+        let path = folder.file("hist").join(format!("{name}.hlog"));
         histogram_log::read(&path).with_context(|| format!("cannot read {}", path.display()))
     };
     Ok(RunResult::Played { durations: INTERVALS.iter().map(log).collect::<anyhow::Result<_>>()?, shares })

@@ -14,7 +14,7 @@ use masseter_plan::RunPlan;
 use masseter_plant::core::{PlantCore, PlantError};
 use masseter_plant::cycle::PlantPorts;
 use masseter_plant::emulation::VirtualLink;
-use masseter_recording::{Backlog, Ending, Pace, Recorder, RunFolder, Scene};
+use masseter_recording::{Backlog, Ending, Pace, Recorded, Recorder, RunFolder, Scene};
 use masseter_shared::clock::SECOND_NS;
 use masseter_shared::control::{Controller, ControllerPorts, Outcome};
 use masseter_shared::messages::{Command, Event, Message, Reading, State, Truth};
@@ -177,12 +177,17 @@ impl ControllerPorts for VirtualPorts<'_> {
 struct Publisher(u64);
 
 impl Publisher {
-    fn record<M: Message>(&mut self, backlog: &mut Backlog, now_ns: u64, fill: impl FnOnce(&mut M)) -> M {
+    fn record<M: Message + Into<Recorded>>(
+        &mut self,
+        backlog: &mut Backlog,
+        now_ns: u64,
+        fill: impl FnOnce(&mut M),
+    ) -> M {
         let mut message = M::default();
         fill(&mut message);
         self.0 += 1;
         message.stamp(self.0, now_ns);
-        backlog.record(&message, now_ns);
+        backlog.record(&message.into(), now_ns);
         message
     }
 }
