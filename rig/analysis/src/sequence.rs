@@ -78,7 +78,9 @@ mod tests {
         let mut event = |source: Source, seq| {
             check.take(&Recorded::Event(Event { seq, source: source.code(), ..Event::default() }));
         };
-        [3, 4, 7].into_iter().for_each(|seq| event(Source::Controller, seq));
+        for seq in [3, 4, 7] {
+            event(Source::Controller, seq);
+        }
         // One process.
         event(Source::Master, 1);
         event(Source::Drive, 2);
