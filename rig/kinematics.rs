@@ -5,8 +5,9 @@ use std::path::PathBuf;
 use clap::Args;
 use masseter_plan::Overrides;
 use masseter_shared::config::Scenario;
+use masseter_shared::output::new_folder;
 use masseter_study::{Settings, Study};
-use masseter_terminal::{Exit, new_folder, result_line, status};
+use masseter_terminal::{Exit, result_line, status};
 
 /// The arguments of `kinematics`.
 #[derive(Debug, Clone, Args)]

@@ -13,8 +13,9 @@ use clap::{Args, Subcommand, ValueEnum};
 use masseter_controller::kinematics::uniqueness::InputBox;
 use masseter_plan::{Overrides, RunPlan};
 use masseter_shared::geometry::{AXIS_NAMES, Mechanism, MechanismConfig};
+use masseter_shared::output::new_file;
 use masseter_study::uniqueness::{Ambiguous, boxes, prove, search};
-use masseter_terminal::{Exit, new_file, result_line, status};
+use masseter_terminal::{Exit, result_line, status};
 
 /// The verbs of `uniqueness`.
 #[derive(Debug, Clone, Subcommand)]

@@ -23,7 +23,7 @@ fn a_run_plays_through_three_processes_and_leaves_nothing_in_shared_memory() {
     assert_eq!(check(&summary, "dropped messages")["result"], "passed", "{summary}");
     let scheduling = &workspace.manifest()["scheduling"];
     for role in ["controller", "plant", "recorder"] {
-        assert!(scheduling[role]["wanted"].is_object(), "{scheduling}");
+        assert!(scheduling[role]["requested"].is_object(), "{scheduling}");
     }
     assert_eq!(memory.files(), Vec::<String>::new());
     let log = fs::read_to_string(workspace.run_folder().join("can0.log")).unwrap();

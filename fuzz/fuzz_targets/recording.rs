@@ -7,7 +7,7 @@ use std::sync::LazyLock;
 
 use libfuzzer_sys::arbitrary::{Result, Unstructured};
 use libfuzzer_sys::fuzz_target;
-use masseter_recording::{ReadError, Reader, Recorded, Recorder, Scene, Schema, recover};
+use masseter_recording::{ReadError, Reader, Recorded, Recorder, Scene, recover};
 use masseter_shared::config::JawConfig;
 use masseter_shared::geometry::{Mechanism, MechanismConfig};
 use masseter_shared::messages::{Message, Reading};
@@ -59,7 +59,8 @@ fn try_out(bytes: &mut Unstructured<'_>) -> Result<()> {
 #[derive(Debug, PartialEq)]
 struct Found {
     topic: Option<String>,
-    schema: Option<Schema>,
+    /// Name, encoding and data.
+    schema: Option<(String, String, Vec<u8>)>,
     channel: u16,
     sequence: u32,
     times_ns: [u64; 2],
@@ -73,12 +74,14 @@ fn read(reader: &mut Reader<Cursor<&[u8]>>) -> Option<Vec<Found>> {
         match reader.next_entry() {
             Ok(None) => break,
             Ok(Some(entry)) => all.push(Found {
+                schema: entry.channel.as_ref().and_then(|channel| channel.schema.as_ref()).map(|schema| {
+                    (schema.name.clone(), schema.encoding.clone(), schema.data.to_vec())
+                }),
                 topic: entry.channel.map(|channel| channel.topic.clone()),
-                schema: entry.schema.cloned(),
                 channel: entry.header.channel_id,
                 sequence: entry.header.sequence,
                 times_ns: [entry.header.log_time, entry.header.publish_time],
-                data: entry.data.to_vec(),
+                data: entry.data,
             }),
             Err(ReadError::NoMcap { .. }) => return None,
             Err(error) => panic!("memory can be read: {error}"),

@@ -1,185 +1,212 @@
-//! One client: its handshake, its subscriptions, and the messages sent to it.
+//! One client: its queue, and the thread that serves it.
 //!
-//! The socket never blocks. Unread bytes stay in a buffer of fixed size; once it is full, messages for this client are
-//! dropped and counted.
+//! The thread may wait for its client, since only this client's messages wait with it: once its queue is full, further
+//! ones are dropped and counted.
 
 use std::io::ErrorKind;
-use std::net::TcpStream;
+use std::net::{Shutdown, TcpStream};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU8, Ordering};
+use std::sync::mpsc::{Receiver, SyncSender, TryRecvError, TrySendError, sync_channel};
+use std::thread::{self, JoinHandle};
+use std::time::Duration;
 
-use masseter_recording::{Channel, Encoded};
-use tungstenite::handshake::server::{ErrorResponse, Request, Response, ServerHandshake};
-use tungstenite::handshake::{HandshakeError, MidHandshake};
+use masseter_recording::{Channel, Encoded, Encoder, Recorded, Scene, Topic};
+use tungstenite::handshake::server::{ErrorResponse, Request, Response};
 use tungstenite::http::{HeaderValue, StatusCode, header::SEC_WEBSOCKET_PROTOCOL};
 use tungstenite::protocol::frame::{CloseFrame, coding::CloseCode};
 use tungstenite::protocol::{Message, WebSocket, WebSocketConfig};
 use tungstenite::{Error, accept_hdr_with_config};
 
-use super::protocol::{self, ClientMessage, Level, Subscription};
-use super::socket::Socket;
+use super::protocol::{self, ClientMessage, Level};
 
-/// Most bytes that wait for a client: half a second of every topic at 1 kHz.
-const UNREAD_BYTES: usize = 1 << 20;
-/// Bytes gathered per write to the system.
-const WRITE_BYTES: usize = 1 << 16;
+/// Length of a client's queue: almost half a second of every topic at 1 kHz.
+const QUEUE: usize = 8192;
 /// The longest message from a client, bytes; clients only subscribe.
 const MAX_REQUEST_BYTES: usize = 1 << 16;
-/// Polls that a handshake may take: 5 s, so that an idle connection does not keep a client's place.
-const HANDSHAKE_POLLS: u32 = 500;
-/// Most requests of a client per poll, so that none delays the others.
-const REQUESTS_PER_POLL: usize = 16;
+/// Time that a client may take over its handshake, so that an idle connection does not keep a client's place.
+const HANDSHAKE: Duration = Duration::from_secs(5);
+/// Time that the thread waits for a request before it sends what is queued.
+const INTERVAL: Duration = Duration::from_millis(10);
 
-type Callback = fn(&Request, Response) -> Result<Response, ErrorResponse>;
-type Handshake = MidHandshake<ServerHandshake<Socket, Callback>>;
-type HandshakeResult = Result<WebSocket<Socket>, HandshakeError<ServerHandshake<Socket, Callback>>>;
+/// A message, and when it was received, ns.
+type Queued = (u64, Recorded);
 
+/// The recorder's end of a client's queue.
+#[derive(Debug)]
 pub(super) struct Client {
-    link: Link,
-    /// Polls left for the handshake.
-    polls: u32,
-    /// The client's subscription id of each channel.
-    subscriptions: [Option<u32>; Channel::COUNT],
+    stream: TcpStream,
+    /// None once the server closes.
+    queue: Option<SyncSender<Queued>>,
+    /// One bit per [`Topic`] that it subscribes to.
+    subscribed: Arc<AtomicU8>,
+    serving: JoinHandle<()>,
 }
 
-enum Link {
-    /// Taken out while the handshake continues.
-    Handshake(Option<Handshake>),
-    Open(WebSocket<Socket>),
+const _: () = assert!(Topic::ALL.len() <= u8::BITS as usize, "every topic has a bit in `Client::subscribed`");
+
+impl Client {
+    /// Starts the thread, which makes the handshake and then sends `greeting`.
+    pub(super) fn start(stream: TcpStream, scene: Scene, greeting: [String; 2]) -> std::io::Result<Self> {
+        stream.set_nodelay(true)?;
+        stream.set_read_timeout(Some(HANDSHAKE))?;
+        let served = stream.try_clone()?;
+        let (queue, queued) = sync_channel(QUEUE);
+        let subscribed = Arc::new(AtomicU8::new(0));
+        let published = Arc::clone(&subscribed);
+        let serving = thread::spawn(move || {
+            // A client may leave at any time.
+            let _ =
+                Session::open(served, scene, published).and_then(|session| session.serve(greeting, &queued));
+        });
+        Ok(Self { stream, queue: Some(queue), subscribed, serving })
+    }
+
+    /// Queues a message if the client subscribes to its topic. False if the message is dropped for want of room.
+    pub(super) fn offer(&self, message: &Recorded, log_time_ns: u64) -> bool {
+        let is_subscribed = self.subscribed.load(Ordering::Relaxed) & bit(message.topic()) != 0;
+        let Some(queue) = self.queue.as_ref().filter(|_| is_subscribed) else { return true };
+        !matches!(queue.try_send((log_time_ns, *message)), Err(TrySendError::Full(_)))
+    }
+
+    pub(super) fn is_subscribed(&self) -> bool {
+        self.subscribed.load(Ordering::Relaxed) != 0
+    }
+
+    pub(super) fn is_gone(&self) -> bool {
+        self.serving.is_finished()
+    }
+
+    /// Ends the queue: the thread sends the rest and closes the connection.
+    pub(super) fn close(&mut self) {
+        self.queue = None;
+    }
+
+    /// Disconnects the client.
+    pub(super) fn cut_off(&self) {
+        // It fails where the client has just left.
+        let _ = self.stream.shutdown(Shutdown::Both);
+    }
+}
+
+/// The bit of a topic in [`Client::subscribed`].
+fn bit(topic: Topic) -> u8 {
+    1 << topic as u8
 }
 
 /// The client is disconnected.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Disconnected;
+struct Disconnected;
 
-impl Client {
-    /// Begins the handshake; `greeting` is sent once it is complete.
-    pub(super) fn accept(stream: TcpStream, greeting: &[String]) -> Result<Self, Disconnected> {
-        let socket = Socket::new(stream).map_err(|_| Disconnected)?;
+impl From<Error> for Disconnected {
+    fn from(_: Error) -> Self {
+        Self
+    }
+}
+
+struct Session {
+    socket: WebSocket<TcpStream>,
+    encoder: Encoder,
+    /// The client's subscription id of each channel.
+    subscriptions: [Option<u32>; Channel::COUNT],
+    subscribed: Arc<AtomicU8>,
+}
+
+impl Session {
+    fn open(stream: TcpStream, scene: Scene, subscribed: Arc<AtomicU8>) -> Result<Self, Disconnected> {
         let config = WebSocketConfig::default()
-            .read_buffer_size(MAX_REQUEST_BYTES)
-            .write_buffer_size(WRITE_BYTES)
-            .max_write_buffer_size(UNREAD_BYTES)
             .max_message_size(Some(MAX_REQUEST_BYTES))
             .max_frame_size(Some(MAX_REQUEST_BYTES));
+        let socket =
+            accept_hdr_with_config(stream, choose_subprotocol, Some(config)).map_err(|_| Disconnected)?;
+        socket.get_ref().set_read_timeout(Some(INTERVAL)).map_err(Error::Io)?;
         let subscriptions = [None; Channel::COUNT];
-        let mut client = Self { link: Link::Handshake(None), polls: HANDSHAKE_POLLS, subscriptions };
-        let callback: Callback = choose_subprotocol;
-        client.open(accept_hdr_with_config(socket, callback, Some(config)), greeting)?;
-        Ok(client)
+        Ok(Self { socket, encoder: Encoder::new(scene), subscriptions, subscribed })
     }
 
-    fn open(&mut self, result: HandshakeResult, greeting: &[String]) -> Result<(), Disconnected> {
-        match result {
-            Ok(socket) => {
-                self.link = Link::Open(socket);
-                greeting.iter().try_for_each(|text| self.send_text(text.clone()))
+    /// Serves the client until the queue has ended and the client has read everything.
+    fn serve(mut self, greeting: [String; 2], queue: &Receiver<Queued>) -> Result<(), Disconnected> {
+        for text in greeting {
+            self.socket.send(Message::Text(text.into()))?;
+        }
+        loop {
+            self.receive()?;
+            for _ in 0..QUEUE {
+                match queue.try_recv() {
+                    Ok((log_time_ns, message)) => self.send(log_time_ns, &message)?,
+                    Err(TryRecvError::Empty) => break,
+                    Err(TryRecvError::Disconnected) => return self.close(),
+                }
             }
-            Err(HandshakeError::Interrupted(handshake)) => {
-                self.link = Link::Handshake(Some(handshake));
-                Ok(())
-            }
-            Err(HandshakeError::Failure(_)) => Err(Disconnected),
+            self.socket.flush()?;
         }
     }
 
-    pub(super) fn is_subscribed_to(&self, channel: Channel) -> bool {
-        self.subscriptions[channel.place()].is_some()
+    /// Sends a close frame behind everything else. A client that answers it has read everything.
+    fn close(mut self) -> Result<(), Disconnected> {
+        let frame = CloseFrame { code: CloseCode::Away, reason: "the run is over".into() };
+        self.socket.close(Some(frame))?;
+        loop {
+            self.receive()?;
+        }
     }
 
-    /// Continues the handshake, or answers the client's requests.
-    pub(super) fn receive(&mut self, greeting: &[String]) -> Result<(), Disconnected> {
-        if let Link::Handshake(handshake) = &mut self.link {
-            self.polls = self.polls.checked_sub(1).ok_or(Disconnected)?;
-            let handshake = handshake.take().ok_or(Disconnected)?;
-            self.open(handshake.handshake(), greeting)?;
+    /// Waits a moment for a request, and answers it.
+    fn receive(&mut self) -> Result<(), Disconnected> {
+        match self.socket.read() {
+            Ok(Message::Text(text)) => self.answer(&text),
+            Err(Error::Io(error)) if error.kind() != ErrorKind::WouldBlock => Err(Disconnected),
+            Ok(_) | Err(Error::Io(_)) => Ok(()),
+            Err(_) => Err(Disconnected),
         }
-        if let Link::Open(socket) = &mut self.link {
-            socket.get_mut().begin_poll();
-        }
-        for _ in 0..REQUESTS_PER_POLL {
-            let Link::Open(socket) = &mut self.link else { break };
-            match socket.read() {
-                Ok(Message::Text(text)) => self.answer(&text)?,
-                Ok(_) => {}
-                Err(error) => return if would_block(&error) { Ok(()) } else { Err(Disconnected) },
-            }
-        }
-        Ok(())
     }
 
     fn answer(&mut self, text: &str) -> Result<(), Disconnected> {
-        match serde_json::from_str(text) {
+        let refused = match serde_json::from_str(text) {
             Ok(ClientMessage::Subscribe { subscriptions }) => {
-                subscriptions.into_iter().try_for_each(|subscription| self.subscribe(subscription))
+                let mut are_known = true;
+                for subscription in subscriptions {
+                    match subscription.channel_index() {
+                        Some(index) => self.subscriptions[index] = Some(subscription.id),
+                        None => are_known = false,
+                    }
+                }
+                (!are_known).then(|| (Level::Error, "the channel does not exist".to_owned()))
             }
             Ok(ClientMessage::Unsubscribe { subscription_ids }) => {
                 for id in &mut self.subscriptions {
                     *id = id.filter(|id| !subscription_ids.contains(id));
                 }
-                Ok(())
+                None
             }
             Ok(ClientMessage::Unsupported) => {
-                self.send_status(Level::Warning, "the server offers subscriptions only")
+                Some((Level::Warning, "the server offers subscriptions only".to_owned()))
             }
-            Err(error) => self.send_status(Level::Error, &format!("the request is not valid: {error}")),
-        }
-    }
-
-    fn subscribe(&mut self, subscription: Subscription) -> Result<(), Disconnected> {
-        let Some(index) = subscription.channel_index() else {
-            return self.send_status(Level::Error, "the channel does not exist");
+            Err(error) => Some((Level::Error, format!("the request is not valid: {error}"))),
         };
-        if self.subscriptions[index].is_some() {
-            return self.send_status(Level::Warning, "the channel is subscribed already");
+        self.publish_subscriptions();
+        if let Some((level, text)) = refused {
+            self.socket.send(Message::Text(protocol::status(level, &text).into()))?;
         }
-        self.subscriptions[index] = Some(subscription.id);
         Ok(())
     }
 
-    /// Sends a message if the client subscribes to its channel. False if the message is dropped for want of room.
-    pub(super) fn send_message(&mut self, log_time_ns: u64, message: &Encoded) -> Result<bool, Disconnected> {
-        match self.subscriptions[message.channel.place()] {
-            Some(id) => self.send(Message::Binary(protocol::message_data(id, log_time_ns, message).into())),
-            None => Ok(true),
-        }
+    /// Publishes which topics the recorder should queue.
+    fn publish_subscriptions(&self) {
+        let is_subscribed = |channel: Channel| self.subscriptions[channel.place()].is_some();
+        let topics =
+            Topic::ALL.into_iter().filter(|topic| Channel::for_topic(*topic).into_iter().any(is_subscribed));
+        self.subscribed.store(topics.fold(0, |bits, topic| bits | bit(topic)), Ordering::Relaxed);
     }
 
-    fn send_status(&mut self, level: Level, text: &str) -> Result<(), Disconnected> {
-        self.send_text(protocol::status(level, text))
-    }
-
-    /// Sends a text that the client must not miss: without room for it, the client is disconnected.
-    fn send_text(&mut self, text: String) -> Result<(), Disconnected> {
-        if self.send(Message::Text(text.into()))? { Ok(()) } else { Err(Disconnected) }
-    }
-
-    fn send(&mut self, message: Message) -> Result<bool, Disconnected> {
-        let Link::Open(socket) = &mut self.link else { return Ok(true) };
-        match socket.write(message) {
-            Ok(()) => Ok(true),
-            Err(Error::WriteBufferFull(_)) => Ok(false),
-            // The message waits in the buffer.
-            Err(error) if would_block(&error) => Ok(true),
-            Err(_) => Err(Disconnected),
-        }
-    }
-
-    /// Writes buffered bytes, as many as the system accepts.
-    pub(super) fn flush(&mut self) -> Result<(), Disconnected> {
-        let Link::Open(socket) = &mut self.link else { return Ok(()) };
-        match socket.flush() {
-            Err(error) if !would_block(&error) => Err(Disconnected),
-            _ => Ok(()),
-        }
-    }
-
-    /// Sends a close frame behind everything else. A client that answers it has read everything, and is disconnected.
-    pub(super) fn close(&mut self) -> Result<(), Disconnected> {
-        let Link::Open(socket) = &mut self.link else { return Err(Disconnected) };
-        let frame = CloseFrame { code: CloseCode::Away, reason: "the run is over".into() };
-        match socket.flush().and_then(|()| socket.close(Some(frame))) {
-            Err(error) if !would_block(&error) => Err(Disconnected),
-            _ => Ok(()),
-        }
+    /// Sends a message on those of its channels that the client subscribes to.
+    fn send(&mut self, log_time_ns: u64, message: &Recorded) -> Result<(), Disconnected> {
+        let Self { socket, encoder, subscriptions, .. } = self;
+        encoder.encode(message, |message: Encoded| match subscriptions[message.channel.place()] {
+            Some(id) => {
+                Ok(socket.write(Message::Binary(protocol::message_data(id, log_time_ns, &message).into()))?)
+            }
+            None => Ok(()),
+        })
     }
 }
 
@@ -195,8 +222,4 @@ fn choose_subprotocol(request: &Request, mut response: Response) -> Result<Respo
     };
     response.headers_mut().insert(SEC_WEBSOCKET_PROTOCOL, HeaderValue::from_static(chosen));
     Ok(response)
-}
-
-fn would_block(error: &Error) -> bool {
-    matches!(error, Error::Io(error) if error.kind() == ErrorKind::WouldBlock)
 }

@@ -1,30 +1,26 @@
 //! A WebSocket server for Foxglove: shows a run while it goes on, with the channels, schemas and bytes of the recording.
 //!
-//! A thread of its own serves the clients. The recorder puts subscribed messages into a queue of fixed length and never
-//! waits; no other process is involved. A message without room, in the queue or with a client that reads too slowly, is
-//! dropped and counted. The server of the `foxglove` crate counts no drops and brings an asynchronous runtime, so it is
-//! not used. There are no parameters, services, assets or publishing clients, and no authentication.
+//! Each client has a thread and a queue of fixed length of its own. The recorder puts messages into the queues and never
+//! waits for a client; no other process is involved. A message without room is dropped and counted. The server of the
+//! `foxglove` crate counts no drops and brings an asynchronous runtime, so it is not used. There are no parameters,
+//! services, assets or publishing clients, and no authentication.
 
 mod client;
-mod error;
 mod protocol;
-mod queue;
-mod server;
-mod socket;
 #[cfg(test)]
 mod tests;
 
+use std::io;
 use std::net::{SocketAddr, TcpListener};
-use std::sync::Arc;
-use std::sync::atomic::Ordering;
-use std::sync::mpsc::{SyncSender, sync_channel};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard};
 use std::thread::{self, JoinHandle};
+use std::time::Duration;
 
 use masseter_recording::{Recorded, Scene};
+use masseter_shared::clock;
 
-pub use error::ListenError;
-use queue::{Counters, QueuedMessage, bit};
-use server::Server;
+use client::Client;
 
 /// The default address: this machine only, on Foxglove's usual port.
 pub const DEFAULT_ADDRESS: &str = "127.0.0.1:8765";
@@ -47,13 +43,60 @@ pub struct ClientLosses {
     pub cut_off: usize,
 }
 
+/// The server cannot listen on its address.
+#[derive(Debug, thiserror::Error)]
+#[error(
+    "cannot listen for Foxglove on {address}: {error}; choose another address with --live=ADDR:PORT (port 0 takes a free one)"
+)]
+pub struct ListenError {
+    /// The requested address.
+    pub address: SocketAddr,
+    /// The system's error.
+    pub error: io::Error,
+}
+
+/// Most clients at a time; each has a thread and a queue of its own.
+const MAX_CLIENTS: usize = 8;
+/// Time between two looks for new clients.
+const INTERVAL: Duration = Duration::from_millis(50);
+/// Time between two looks whether all clients have read the rest, and how many there are: 0.5 s.
+const CLOSING_POLL: Duration = Duration::from_millis(10);
+const CLOSING_POLLS: u32 = 50;
+
 /// A running server.
 #[derive(Debug)]
 pub struct FoxgloveServer {
     address: SocketAddr,
-    queue: SyncSender<QueuedMessage>,
-    counters: Arc<Counters>,
-    serving: JoinHandle<()>,
+    clients: Arc<Clients>,
+    dropped: AtomicU64,
+    accepting: JoinHandle<()>,
+}
+
+#[derive(Debug, Default)]
+struct Clients {
+    connected: Mutex<Vec<Client>>,
+    is_closing: AtomicBool,
+}
+
+impl Clients {
+    fn connected(&self) -> MutexGuard<'_, Vec<Client>> {
+        self.connected.lock().expect("no thread panics with it")
+    }
+
+    /// Accepts clients while there is room and disconnects the others, until the server closes.
+    fn accept(&self, listener: &TcpListener, scene: &Scene, greeting: &[String; 2]) {
+        while !self.is_closing.load(Ordering::Relaxed) {
+            let Ok((stream, _)) = listener.accept() else {
+                clock::sleep(INTERVAL);
+                continue;
+            };
+            let mut connected = self.connected();
+            connected.retain(|client| !client.is_gone());
+            if connected.len() < MAX_CLIENTS {
+                connected.extend(Client::start(stream, scene.clone(), greeting.clone()));
+            }
+        }
+    }
 }
 
 /// Whether a server can listen on `address`.
@@ -80,11 +123,11 @@ impl FoxgloveServer {
     pub fn start(address: SocketAddr, scene: Scene, session: &str) -> Result<Self, ListenError> {
         let listener = bind(address)?;
         let address = listener.local_addr().map_err(|error| ListenError { address, error })?;
-        let counters = Arc::new(Counters::default());
-        let (queue, queued) = sync_channel(queue::LENGTH);
-        let server = Server::new(listener, scene, session, Arc::clone(&counters));
-        let serving = thread::spawn(move || server.serve(&queued));
-        Ok(Self { address, queue, counters, serving })
+        let clients = Arc::new(Clients::default());
+        let accepted = Arc::clone(&clients);
+        let greeting = [protocol::server_info(session), protocol::advertise()];
+        let accepting = thread::spawn(move || accepted.accept(&listener, &scene, &greeting));
+        Ok(Self { address, clients, dropped: AtomicU64::new(0), accepting })
     }
 
     /// The URL for clients.
@@ -92,32 +135,36 @@ impl FoxgloveServer {
         format!("ws://{}", self.address)
     }
 
-    /// Queues a message that was received at `log_time_ns`, if a client subscribes to its topic. Never waits.
+    /// Queues a message that was received at `log_time_ns` for the clients that subscribe to its topic. Never waits for
+    /// one.
     pub fn offer(&self, message: &Recorded, log_time_ns: u64) {
-        if self.counters.subscribed.load(Ordering::Relaxed) & bit(message.topic()) == 0 {
-            return;
-        }
-        if self.queue.try_send(QueuedMessage { log_time_ns, message: *message }).is_err() {
-            self.counters.dropped.fetch_add(1, Ordering::Relaxed);
-        }
+        let clients = self.clients.connected();
+        let dropped = clients.iter().filter(|client| !client.offer(message, log_time_ns)).count();
+        self.dropped.fetch_add(dropped as u64, Ordering::Relaxed);
     }
 
     /// The clients at this moment.
     pub fn counts(&self) -> ClientCounts {
-        ClientCounts {
-            connected: self.counters.connected.load(Ordering::Relaxed),
-            dropped: self.counters.dropped.load(Ordering::Relaxed),
-        }
+        let connected = self.clients.connected().iter().filter(|client| !client.is_gone()).count();
+        ClientCounts { connected, dropped: self.dropped.load(Ordering::Relaxed) }
     }
 
     /// Sends what is queued, gives clients half a second to read it, and closes; returns what they missed.
     pub fn finish(self) -> ClientLosses {
-        drop(self.queue);
-        // A panic of the serving thread is on standard error already, and does not concern the recording.
-        let _ = self.serving.join();
-        ClientLosses {
-            dropped: self.counters.dropped.load(Ordering::Relaxed),
-            cut_off: self.counters.cut_off.load(Ordering::Relaxed),
+        self.clients.is_closing.store(true, Ordering::Relaxed);
+        // A panic of this thread is on standard error already, and does not concern the recording.
+        let _ = self.accepting.join();
+        let mut clients = self.clients.connected();
+        clients.iter_mut().for_each(Client::close);
+        for _ in 0..CLOSING_POLLS {
+            clients.retain(|client| !client.is_gone());
+            if clients.is_empty() {
+                break;
+            }
+            clock::sleep(CLOSING_POLL);
         }
+        clients.iter().for_each(Client::cut_off);
+        let cut_off = clients.iter().filter(|client| client.is_subscribed()).count();
+        ClientLosses { dropped: self.dropped.load(Ordering::Relaxed), cut_off }
     }
 }

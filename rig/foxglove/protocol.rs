@@ -7,7 +7,7 @@
 use data_encoding::BASE64;
 use serde::{Deserialize, Serialize};
 
-use masseter_recording::{Channel, Definition, Encoded};
+use masseter_recording::{Channel, Encoded, definitions};
 
 /// Supported subprotocols, the newest first. The messages used here are the same in both.
 const SUBPROTOCOLS: [&str; 2] = ["foxglove.sdk.v1", "foxglove.websocket.v1"];
@@ -32,18 +32,18 @@ pub(super) enum Level {
 #[serde(tag = "op", rename_all = "camelCase", rename_all_fields = "camelCase")]
 enum ServerMessage<'a> {
     ServerInfo { name: &'a str, capabilities: [&'a str; 0], session_id: &'a str },
-    Advertise { channels: Vec<Advertised<'a>> },
+    Advertise { channels: Vec<Advertised> },
     Status { level: u8, message: &'a str },
 }
 
 #[derive(Serialize)]
 #[serde(rename_all = "camelCase")]
-struct Advertised<'a> {
+struct Advertised {
     id: u64,
-    topic: &'a str,
-    encoding: &'a str,
-    schema_name: &'a str,
-    schema_encoding: &'a str,
+    topic: String,
+    encoding: String,
+    schema_name: String,
+    schema_encoding: String,
     schema: String,
 }
 
@@ -69,7 +69,7 @@ pub(super) struct Subscription {
 }
 
 impl Subscription {
-    /// Index of the channel in [`Definition::all`], if it exists.
+    /// Index of the channel in [`definitions`], if it exists.
     pub(super) fn channel_index(self) -> Option<usize> {
         usize::try_from(self.channel_id).ok().filter(|index| *index < Channel::COUNT)
     }
@@ -81,25 +81,24 @@ pub(super) fn server_info(session: &str) -> String {
 }
 
 /// All channels, each with its index as id.
-pub(super) fn advertise(definitions: &[Definition]) -> String {
-    let channels = definitions.iter().enumerate().map(|(id, definition)| channel(id, definition));
-    to_json(&ServerMessage::Advertise { channels: channels.collect() })
-}
-
-fn channel(id: usize, Definition { topic, schema, message_encoding }: &Definition) -> Advertised<'_> {
-    // JSON holds no bytes: text schemas are sent as they are, binary ones in base 64.
-    let schema_text = match schema.encoding.as_str() {
-        "protobuf" => BASE64.encode(&schema.data),
-        _ => String::from_utf8_lossy(&schema.data).into_owned(),
+pub(super) fn advertise() -> String {
+    let channels = definitions();
+    let advertised = |(id, channel): (u64, &'_ mcap::Channel<'static>)| {
+        let schema = channel.schema.as_ref().expect("every channel of the rig has a schema");
+        Advertised {
+            id,
+            topic: channel.topic.clone(),
+            encoding: channel.message_encoding.clone(),
+            schema_name: schema.name.clone(),
+            schema_encoding: schema.encoding.clone(),
+            // JSON holds no bytes: text schemas are sent as they are, binary ones in base 64.
+            schema: match schema.encoding.as_str() {
+                "protobuf" => BASE64.encode(&schema.data),
+                _ => String::from_utf8_lossy(&schema.data).into_owned(),
+            },
+        }
     };
-    Advertised {
-        id: id as u64,
-        topic,
-        encoding: message_encoding,
-        schema_name: &schema.name,
-        schema_encoding: &schema.encoding,
-        schema: schema_text,
-    }
+    to_json(&ServerMessage::Advertise { channels: (0..).zip(&channels).map(advertised).collect() })
 }
 
 /// A message for the client's user.
@@ -137,18 +136,18 @@ mod tests {
 
     #[test]
     fn channels_are_advertised_as_recordings_define_them() {
-        let message: Value = serde_json::from_str(&advertise(&Definition::all())).unwrap();
+        let message: Value = serde_json::from_str(&advertise()).unwrap();
         assert_eq!(message["op"], "advertise");
-        for (id, definition) in Definition::all().iter().enumerate() {
-            let channel = &message["channels"][id];
+        for (id, definition) in definitions().iter().enumerate() {
+            let (channel, defined) = (&message["channels"][id], definition.schema.as_ref().unwrap());
             assert_eq!(channel["id"], id);
             assert_eq!(channel["topic"], definition.topic);
             assert_eq!(channel["encoding"], *definition.message_encoding);
-            assert_eq!(channel["schemaName"], *definition.schema.name);
+            assert_eq!(channel["schemaName"], *defined.name);
             let schema = channel["schema"].as_str().unwrap();
             match channel["schemaEncoding"].as_str().unwrap() {
-                "ros2msg" => assert_eq!(schema.as_bytes(), definition.schema.data),
-                "protobuf" => assert_eq!(BASE64.decode(schema.as_bytes()).unwrap(), definition.schema.data),
+                "ros2msg" => assert_eq!(schema.as_bytes(), &*defined.data),
+                "protobuf" => assert_eq!(BASE64.decode(schema.as_bytes()).unwrap(), *defined.data),
                 other => panic!("{other}"),
             }
         }

@@ -25,7 +25,7 @@ fn client_of(server: &FoxgloveServer) -> WebSocket<TcpStream> {
     let channel = Channel::Topic(Topic::State).place();
     let request = format!(r#"{{"op": "subscribe", "subscriptions": [{{"id": 1, "channelId": {channel}}}]}}"#);
     socket.send(Message::Text(request.into())).unwrap();
-    let is_subscribed = || server.counters.subscribed.load(Ordering::Relaxed) > 0;
+    let is_subscribed = || server.clients.connected().iter().any(Client::is_subscribed);
     assert!(comes_true(is_subscribed), "the subscription did not arrive");
     socket
 }

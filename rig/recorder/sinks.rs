@@ -18,11 +18,8 @@ pub(super) struct Sinks {
 impl Sinks {
     /// Hands a message that was received at `now_ns` to every sink.
     pub(super) fn write<M: Message>(&mut self, message: &M, now_ns: u64, on_topic: impl Fn(M) -> Recorded) {
-        self.backlog.record(message, now_ns);
-        if self.server.is_none() && self.progress.is_none() {
-            return;
-        }
         let message = on_topic(*message);
+        self.backlog.record(&message, now_ns);
         if let Some(progress) = &mut self.progress {
             progress.add(&message);
         }

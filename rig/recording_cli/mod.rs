@@ -9,6 +9,7 @@ mod export;
 mod selection;
 mod survey;
 
+use std::fmt;
 use std::fs::{self, File};
 use std::io::{BufReader, BufWriter};
 use std::path::{Path, PathBuf};
@@ -95,10 +96,13 @@ fn survey(path: &Path, reader: &mut Reader<BufReader<File>>) -> anyhow::Result<S
     Survey::read(reader).with_context(|| path.display().to_string())
 }
 
-fn inspect(args: &RecordingArgs, to_text: impl FnOnce(&Survey) -> String) -> anyhow::Result<Exit> {
+fn inspect(
+    args: &RecordingArgs,
+    to_text: impl FnOnce(&Survey) -> Result<String, fmt::Error>,
+) -> anyhow::Result<Exit> {
     let path = args.path()?;
     let survey = survey(&path, &mut open(&path)?)?;
-    result(&format!("{}\n{}", path.display(), to_text(&survey)))?;
+    result(&format!("{}\n{}", path.display(), to_text(&survey)?))?;
     Ok(survey.exit())
 }
 
@@ -112,7 +116,7 @@ fn save_readable(args: &RecoverArgs) -> anyhow::Result<Exit> {
         // The first error is the one to report.
         let _ = fs::remove_file(&out);
     })?;
-    result(&format!("{}\n{}{}", out.display(), recovered_text(recovered), survey.loss()))?;
+    result(&format!("{}\n{}{}", out.display(), recovered_text(recovered), survey.loss()?))?;
     Ok(Exit::Passed)
 }
 
@@ -136,6 +140,6 @@ fn export(args: &ExportArgs) -> anyhow::Result<Exit> {
     for (topic, reason) in skipped {
         result(&format!("{:>10}  {topic}: {reason}\n", "no table"))?;
     }
-    result(&survey.loss())?;
+    result(&survey.loss()?)?;
     Ok(survey.exit())
 }

@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 
 use anyhow::bail;
-use masseter_recording::{SCHEMA_ENCODING, Schema};
-use mcap::records::Channel;
+use masseter_recording::SCHEMA_ENCODING;
+use mcap::{Channel, Schema};
 
 use super::columns::Columns;
 
@@ -20,16 +20,16 @@ pub(super) struct Selection {
 impl Selection {
     /// The `requested` topics, each of which must fit a table; without any, all topics that fit one.
     pub(super) fn new<'a>(
-        channels: impl Iterator<Item = (&'a Channel, Option<&'a Schema>)>,
+        channels: impl Iterator<Item = &'a Channel<'static>>,
         requested: &[String],
     ) -> anyhow::Result<Self> {
         let (mut selection, mut topics) = (Self::default(), Vec::new());
-        for (channel, schema) in channels {
+        for channel in channels {
             topics.push(channel.topic.as_str());
             if !requested.is_empty() && !requested.contains(&channel.topic) {
                 continue;
             }
-            match columns(schema) {
+            match columns(channel.schema.as_deref()) {
                 Ok(columns) => {
                     selection.tables.insert(channel.id, (channel.topic.clone(), columns));
                 }

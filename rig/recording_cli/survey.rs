@@ -1,7 +1,7 @@
 //! One pass over a recording: its contents, its gaps, and its damage.
 
 use std::collections::BTreeMap;
-use std::fmt::Write;
+use std::fmt::{Error, Write};
 use std::io::{Read, Seek};
 
 use masseter_analysis::{SequenceCheck, TopicFigures};
@@ -11,9 +11,6 @@ use masseter_terminal::Exit;
 /// Figures of one channel.
 #[derive(Debug, Clone, Default)]
 struct ChannelFigures {
-    topic: String,
-    schema: String,
-    encoding: String,
     messages: u64,
     bytes: u64,
     first_ns: u64,
@@ -27,7 +24,7 @@ struct ChannelFigures {
 #[derive(Debug)]
 pub(super) struct Survey {
     size: u64,
-    channels: BTreeMap<u16, ChannelFigures>,
+    channels: Vec<(mcap::Channel<'static>, ChannelFigures)>,
     sequences: Vec<TopicFigures>,
     undefined: u64,
     chunks: Chunks,
@@ -42,7 +39,7 @@ impl Survey {
         let mut sequence = SequenceCheck::default();
         let mut undefined = 0;
         while let Some(entry) = reader.next_entry()? {
-            let Some(channel) = entry.channel else {
+            let Some(channel) = &entry.channel else {
                 undefined += 1;
                 continue;
             };
@@ -51,12 +48,11 @@ impl Survey {
                 sequence.take(&message);
             }
         }
-        for (channel, schema) in reader.channels() {
-            let figures = channels.entry(channel.id).or_default();
-            figures.topic.clone_from(&channel.topic);
-            figures.encoding.clone_from(&channel.message_encoding);
-            figures.schema = schema.map_or_else(|| "no schema".to_owned(), |schema| schema.name.clone());
-        }
+        let channels = reader.channels().map(|channel| {
+            let figures = channels.remove(&channel.id).unwrap_or_default();
+            (channel.clone(), figures)
+        });
+        let channels = channels.collect();
         Ok(Self {
             size: reader.size(),
             channels,
@@ -69,7 +65,7 @@ impl Survey {
     }
 
     fn unreadable(&self) -> u64 {
-        self.channels.values().map(|channel| channel.unreadable).sum()
+        self.channels.iter().map(|(_, figures)| figures.unreadable).sum()
     }
 
     fn missing(&self) -> u64 {
@@ -97,13 +93,8 @@ impl Survey {
     }
 
     /// A summary of the contents.
-    pub(super) fn info(&self) -> String {
+    pub(super) fn info(&self) -> Result<String, Error> {
         let mut text = String::new();
-        self.write_info(&mut text).expect("a string takes any text");
-        text + &self.loss()
-    }
-
-    fn write_info(&self, text: &mut String) -> std::fmt::Result {
         let chunks = &self.chunks;
         let compression = if chunks.compression.is_empty() { "no compression" } else { &chunks.compression };
         writeln!(
@@ -118,43 +109,39 @@ impl Survey {
             writeln!(text, "{cycles} cycles, {:.0} bytes a cycle", self.size as f64 / cycles as f64)?;
         }
         writeln!(text, "{:<8} {:>9} {:>10} {:>10}  schema", "topic", "messages", "Hz", "bytes each")?;
-        for channel in self.channels.values() {
-            let seconds = (channel.last_ns - channel.first_ns) as f64 / 1e9;
+        for (channel, figures) in &self.channels {
+            let seconds = (figures.last_ns - figures.first_ns) as f64 / 1e9;
             writeln!(
                 text,
                 "{:<8} {:>9} {:>10} {:>10.0}  {} ({})",
                 channel.topic,
-                channel.messages,
-                rate(channel.messages, seconds),
-                channel.bytes as f64 / channel.messages.max(1) as f64,
-                channel.schema,
-                channel.encoding,
+                figures.messages,
+                rate(figures.messages, seconds),
+                figures.bytes as f64 / figures.messages.max(1) as f64,
+                channel.schema.as_ref().map_or("no schema", |schema| &schema.name),
+                channel.message_encoding,
             )?;
         }
         let from_ns = self.times().map(|(first, _)| first).min().unwrap_or(0);
         let to_ns = self.times().map(|(_, last)| last).max().unwrap_or(0);
-        writeln!(text, "recorded from {from_ns} to {to_ns} ns, {:.3} s", (to_ns - from_ns) as f64 / 1e9)
+        writeln!(text, "recorded from {from_ns} to {to_ns} ns, {:.3} s", (to_ns - from_ns) as f64 / 1e9)?;
+        Ok(text + &self.loss()?)
     }
 
     fn times(&self) -> impl Iterator<Item = (u64, u64)> {
-        let received = self.channels.values().filter(|channel| channel.messages > 0);
-        received.map(|channel| (channel.first_ns, channel.last_ns))
+        let received = self.channels.iter().filter(|(_, figures)| figures.messages > 0);
+        received.map(|(_, figures)| (figures.first_ns, figures.last_ns))
     }
 
     /// Recorded cycles: the controller publishes one state in each.
     fn cycles(&self) -> Option<u64> {
-        let states = self.channels.values().find(|channel| channel.topic == "state")?;
+        let (_, states) = self.channels.iter().find(|(channel, _)| channel.topic == "state")?;
         (states.messages > 0).then_some(states.messages)
     }
 
     /// The result of every check.
-    pub(super) fn verification(&self) -> String {
+    pub(super) fn verification(&self) -> Result<String, Error> {
         let mut text = String::new();
-        self.write_verification(&mut text).expect("a string takes any text");
-        text + &self.loss()
-    }
-
-    fn write_verification(&self, text: &mut String) -> std::fmt::Result {
         for topic in &self.sequences {
             let TopicFigures { topic, messages, missing } = topic;
             let mark = mark(*missing);
@@ -165,26 +152,22 @@ impl Survey {
         let unreadable: u64 = self.damage.iter().map(|damage| damage.to - damage.from).sum();
         writeln!(text, "{} {unreadable} of {} bytes cannot be read", mark(unreadable), self.size)?;
         let end = if self.was_cut_short { "lacks" } else { "has" };
-        writeln!(text, "{} the file {end} its end", mark(self.was_cut_short.into()))
+        writeln!(text, "{} the file {end} its end", mark(self.was_cut_short.into()))?;
+        Ok(text + &self.loss()?)
     }
 
     /// What is missing or unreadable, and where; empty for a complete recording.
-    pub(super) fn loss(&self) -> String {
+    pub(super) fn loss(&self) -> Result<String, Error> {
         let mut text = String::new();
-        self.write_loss(&mut text).expect("a string takes any text");
-        text
-    }
-
-    fn write_loss(&self, text: &mut String) -> std::fmt::Result {
         for damage in &self.damage {
             writeln!(text, "unreadable: {damage}")?;
         }
         for topic in self.sequences.iter().filter(|topic| topic.missing > 0) {
             writeln!(text, "missing: {} messages on '{}'", topic.missing, topic.topic)?;
         }
-        for channel in self.channels.values() {
-            if let Some(reason) = &channel.reason {
-                writeln!(text, "unreadable: {} messages; {reason}", channel.unreadable)?;
+        for (_, figures) in &self.channels {
+            if let Some(reason) = &figures.reason {
+                writeln!(text, "unreadable: {} messages; {reason}", figures.unreadable)?;
             }
         }
         if self.undefined > 0 {
@@ -193,7 +176,7 @@ impl Survey {
         if self.was_cut_short {
             writeln!(text, "the file lacks its end: `masseter recording recover` writes a complete file")?;
         }
-        Ok(())
+        Ok(text)
     }
 }
 

@@ -12,7 +12,7 @@ use masseter_plan::RunPlan;
 use masseter_plant::core::{PlantCore, PlantError};
 use masseter_plant::cycle::PlantPorts;
 use masseter_plant::emulation::VirtualLink;
-use masseter_recording::{Backlog, Ending, Pace, Recorder, RunFolder, Scene};
+use masseter_recording::{Backlog, Ending, Pace, Recorded, Recorder, RunFolder, Scene};
 use masseter_shared::clock::SECOND_NS;
 use masseter_shared::control::{Controller, ControllerPorts, Outcome};
 use masseter_shared::messages::{Command, Event, Message, Reading, State, Truth};
@@ -183,13 +183,18 @@ struct Log {
 
 impl Log {
     /// Numbers and records a message, as its publisher would.
-    fn record<M: Message>(&mut self, publisher: Publisher, now_ns: u64, fill: impl FnOnce(&mut M)) -> M {
+    fn record<M: Message + Into<Recorded>>(
+        &mut self,
+        publisher: Publisher,
+        now_ns: u64,
+        fill: impl FnOnce(&mut M),
+    ) -> M {
         let mut message = M::default();
         fill(&mut message);
         let number = &mut self.published[publisher as usize];
         *number += 1;
         message.stamp(*number, now_ns);
-        self.backlog.record(&message, now_ns);
+        self.backlog.record(&message.into(), now_ns);
         message
     }
 

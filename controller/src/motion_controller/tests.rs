@@ -2,9 +2,7 @@
 
 use masseter_shared::config::{ControllerConfig, JawConfig};
 use masseter_shared::geometry::{LEGS, MechanismConfig};
-use masseter_shared::messages::codes::{
-    Cause, DriveRequest, DriveState, EventKind, NO_DRIVE_STATE,
-};
+use masseter_shared::messages::codes::{Cause, DriveRequest, DriveState, EventKind, NO_DRIVE_STATE};
 use masseter_shared::messages::{Command, State};
 
 use super::*;

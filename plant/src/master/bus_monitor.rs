@@ -31,7 +31,7 @@ impl BusMonitor {
         match refusal {
             SendError::BusOff { .. } => false,
             SendError::QueueFull { .. } => self.has_drives,
-            _ => true,
+            SendError::Os { .. } => true,
         }
     }
 }

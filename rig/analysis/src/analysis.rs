@@ -110,18 +110,19 @@ impl Analysis {
     }
 
     fn reading(&mut self, reading: &Reading) {
-        self.intervals.reading(reading);
+        let skipped = self.plant_skips.take(&Counters::from(reading), self.period_ns);
+        self.intervals.reading(reading, skipped);
         self.longest_cycles.reading(reading);
         self.watch.wake_up(PLANT, reading.due_ns, reading.woke_ns);
         self.outage.reading(reading);
-        self.plant_skips.take(&Counters::from(reading), self.period_ns);
         self.first_sample_ns.get_or_insert(reading.sampled_ns);
         self.last_sample_ns = reading.sampled_ns;
     }
 
     fn state(&mut self, state: &State) {
         let is_fresh = self.freshness.take(state);
-        self.intervals.state(state, is_fresh);
+        let skipped = self.controller_skips.take(&Counters::from(state), self.period_ns);
+        self.intervals.state(state, is_fresh, skipped);
         self.longest_cycles.state(state, is_fresh);
         self.watch.wake_up(CONTROLLER, state.due_ns, state.woke_ns);
         self.outage.state(state);
@@ -129,7 +130,6 @@ impl Analysis {
             self.tracking.solution(state);
         }
         self.cycles = self.cycles.max(state.seq);
-        self.controller_skips.take(&Counters::from(state), self.period_ns);
         self.final_state = Some(state.controller_state.into());
     }
 

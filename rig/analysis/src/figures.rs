@@ -80,12 +80,6 @@ impl Figures {
         self.controller_skips.unknown_cause + self.plant_skips.unknown_cause
     }
 
-    /// Whether the machine caused every skipped deadline.
-    pub fn only_the_machine(&self) -> bool {
-        let (skipped, by_machine) = self.skipped();
-        by_machine == skipped
-    }
-
     /// Messages that were published and not recorded.
     pub fn missing_messages(&self) -> u64 {
         self.topics.iter().map(|topic| topic.missing).sum()

@@ -52,8 +52,6 @@ const NAMES: [&str; Interval::RoundTrip as usize + 1] = [
 pub(super) struct Intervals {
     period_ns: u64,
     measured: Vec<Measured>,
-    plant_skipped: Skipped,
-    controller_skipped: Skipped,
     answers: Answers,
     /// By the plant's cycle.
     readings: ByCycle<Reading>,
@@ -70,8 +68,6 @@ impl Intervals {
         Self {
             period_ns,
             measured: NAMES.map(Measured::new).into(),
-            plant_skipped: Skipped::default(),
-            controller_skipped: Skipped::default(),
             answers: Answers::default(),
             readings: ByCycle::default(),
             received_ns: ByCycle::default(),
@@ -92,8 +88,8 @@ impl Intervals {
         self.measured[corrected as usize].add_steps(late_ns, self.period_ns, skipped, woke_ns);
     }
 
-    pub(super) fn reading(&mut self, reading: &Reading) {
-        let skipped = self.plant_skipped.before(reading.seq, reading.skipped_cycles);
+    /// `skipped`: deadlines skipped just before it.
+    pub(super) fn reading(&mut self, reading: &Reading, skipped: u64) {
         let wake_up = [Interval::PlantWakeUp, Interval::PlantWakeUpCorrected];
         self.add_wake_up(wake_up, [reading.due_ns, reading.woke_ns], skipped);
         if reading.complete_ns > 0 {
@@ -103,12 +99,7 @@ impl Intervals {
             self.add(Interval::ReadingTransport, reading.published_ns, received_ns);
         }
         self.readings.insert(reading.cycle, *reading);
-        if let Some(answer) = self.answers.take(reading) {
-            self.answer(answer);
-        }
-    }
-
-    fn answer(&mut self, answer: Answer) {
+        let Some(answer) = self.answers.take(reading) else { return };
         if let Some(sent_ns) = answer.sent_ns {
             self.add(Interval::CommandToWire, answer.received_ns, sent_ns);
         }
@@ -121,9 +112,8 @@ impl Intervals {
         self.answered.insert(answer.cycle, answer);
     }
 
-    /// `is_fresh`: the state's reading is used for the first time.
-    pub(super) fn state(&mut self, state: &State, is_fresh: bool) {
-        let skipped = self.controller_skipped.before(state.seq, state.skipped_cycles);
+    /// `is_fresh`: the state's reading is used for the first time. `skipped`: deadlines skipped just before it.
+    pub(super) fn state(&mut self, state: &State, is_fresh: bool, skipped: u64) {
         let wake_up = [Interval::ControllerWakeUp, Interval::ControllerWakeUpCorrected];
         self.add_wake_up(wake_up, [state.due_ns, state.woke_ns], skipped);
         if !is_fresh {
@@ -173,22 +163,6 @@ impl Intervals {
 
     pub(super) fn finish(self) -> Vec<IntervalFigures> {
         self.measured.into_iter().map(Measured::finish).collect()
-    }
-}
-
-/// A process's counter of skipped deadlines, by its messages.
-#[derive(Debug, Default)]
-struct Skipped {
-    seq: u64,
-    counted: u64,
-}
-
-impl Skipped {
-    /// How many were skipped just before this message's wake-up; none where messages before it are missing, since which
-    /// wake-up skipped them is not known.
-    fn before(&mut self, seq: u64, counted: u64) -> u64 {
-        let last = std::mem::replace(self, Self { seq, counted });
-        if seq == last.seq.wrapping_add(1) { counted.saturating_sub(last.counted) } else { 0 }
     }
 }
 
@@ -249,10 +223,10 @@ mod tests {
             ("round trip", 1, Some(660)),
         ];
         let take = |intervals: &mut Intervals, message: char| match message {
-            'r' => intervals.reading(&reading()),
-            's' => intervals.state(&state(), true),
+            'r' => intervals.reading(&reading(), 0),
+            's' => intervals.state(&state(), true, 0),
             'c' => intervals.command(&command()),
-            _ => intervals.reading(&answer()),
+            _ => intervals.reading(&answer(), 0),
         };
         for order in ["rsca", "rsac", "rcsa", "rcas", "rasc", "racs", "srca", "crsa", "scra", "csra"] {
             let mut intervals = intervals();
@@ -267,9 +241,9 @@ mod tests {
     #[test]
     fn the_longest_round_trip_was_when_the_plant_had_the_command() {
         let mut intervals = intervals();
-        intervals.reading(&reading());
-        intervals.state(&state(), true);
-        intervals.reading(&answer());
+        intervals.reading(&reading(), 0);
+        intervals.state(&state(), true, 0);
+        intervals.reading(&answer(), 0);
         let figures = intervals.finish();
         let trip = figures.iter().find(|interval| interval.name == "round trip").unwrap();
         assert_eq!((trip.max_ns, trip.max_at_ns), (Some(660), Some(1100)));
@@ -278,18 +252,18 @@ mod tests {
     #[test]
     fn a_reading_used_again_gives_no_samples() {
         let mut intervals = intervals();
-        intervals.reading(&reading());
-        intervals.state(&state(), true);
-        intervals.state(&State { cycle: 6, ..state() }, false);
+        intervals.reading(&reading(), 0);
+        intervals.state(&state(), true, 0);
+        intervals.state(&State { cycle: 6, ..state() }, false, 0);
         assert_eq!(only("forward kinematics", intervals), (1, Some(10)));
     }
 
     #[test]
     fn a_command_that_never_reached_the_wire_has_no_way_there() {
         let mut intervals = intervals();
-        intervals.reading(&reading());
+        intervals.reading(&reading(), 0);
         intervals.command(&command());
-        intervals.reading(&Reading { command_sent_ns: 400, ..answer() });
+        intervals.reading(&Reading { command_sent_ns: 400, ..answer() }, 0);
         let found = found(intervals);
         for expected in
             [("command transport", 1, Some(40)), ("command to wire", 0, None), ("sample to wire", 0, None)]
@@ -300,17 +274,15 @@ mod tests {
 
     #[test]
     fn a_skipped_deadline_counts_in_the_corrected_wake_up_only() {
-        let states = |seq| {
+        let states = || {
             let mut intervals = intervals();
-            intervals.state(&State { seq: 1, ..State::default() }, false);
+            intervals.state(&State::default(), false, 0);
             // Woken 200 µs after deadline 5; 2 to 4 were skipped.
             let late = State { due_ns: 5 * PERIOD_NS, woke_ns: 5_200_000, ..State::default() };
-            intervals.state(&State { seq, skipped_cycles: 3, ..late }, false);
+            intervals.state(&late, false, 3);
             intervals
         };
-        assert_eq!(only("controller wake-up", states(2)), (2, Some(200_000)));
-        assert_eq!(only("controller wake-up corrected", states(2)), (5, Some(3_200_000)));
-        // Who skipped them is not recorded.
-        assert_eq!(only("controller wake-up corrected", states(3)), (2, Some(200_000)));
+        assert_eq!(only("controller wake-up", states()), (2, Some(200_000)));
+        assert_eq!(only("controller wake-up corrected", states()), (5, Some(3_200_000)));
     }
 }

@@ -17,6 +17,16 @@ pub struct KernelCounts {
 }
 
 impl KernelCounts {
+    /// Growth between the last of all samples before a stretch of time and the first behind it.
+    pub(super) fn around(samples: &[Machine], from_ns: u64, to_ns: u64) -> Self {
+        let before = samples.partition_point(|sample| sample.time_ns <= from_ns);
+        let after = samples.partition_point(|sample| sample.time_ns < to_ns);
+        match (before.checked_sub(1), samples.get(after)) {
+            (Some(before), Some(after)) => Self::between(&samples[before], after),
+            _ => Self::default(),
+        }
+    }
+
     fn between(before: &Machine, after: &Machine) -> Self {
         let growth = |counter: fn(&Machine) -> u64| Some(counter(after).saturating_sub(counter(before)));
         Self {
@@ -28,45 +38,24 @@ impl KernelCounts {
     }
 }
 
-/// All samples of the counters.
-#[derive(Debug, Default)]
-pub(super) struct KernelSamples(Vec<Machine>);
-
-impl KernelSamples {
-    pub(super) fn take(&mut self, sample: &Machine) {
-        self.0.push(*sample);
-    }
-
-    /// Growth between the last sample before a stretch of time and the first behind it.
-    pub(super) fn around(&self, from_ns: u64, to_ns: u64) -> KernelCounts {
-        let before = self.0.partition_point(|sample| sample.time_ns <= from_ns);
-        let after = self.0.partition_point(|sample| sample.time_ns < to_ns);
-        match (before.checked_sub(1), self.0.get(after)) {
-            (Some(before), Some(after)) => KernelCounts::between(&self.0[before], after),
-            _ => KernelCounts::default(),
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
     fn what_was_counted_is_that_between_the_samples_before_and_behind() {
-        let mut samples = KernelSamples::default();
-        for (time_ns, stolen_ns, switches) in [(0, 0, 1), (50, 3_000, 3), (100, 3_000, 3)] {
+        let samples = [(0, 0, 1), (50, 3_000, 3), (100, 3_000, 3)].map(|(time_ns, stolen_ns, switches)| {
             let involuntary_switches = [switches, 0];
-            samples.take(&Machine { time_ns, stolen_ns, involuntary_switches, ..Default::default() });
-        }
+            Machine { time_ns, stolen_ns, involuntary_switches, ..Default::default() }
+        });
         let told = |stolen_ns, switches| KernelCounts {
             looked_over_ns: Some(50),
             stolen_ns: Some(stolen_ns),
             involuntary_switches: Some(switches),
             page_faults: Some(0),
         };
-        assert_eq!(samples.around(40, 41), told(3_000, 2));
-        assert_eq!(samples.around(70, 71), told(0, 0));
-        assert_eq!(samples.around(100, 101), KernelCounts::default());
+        assert_eq!(KernelCounts::around(&samples, 40, 41), told(3_000, 2));
+        assert_eq!(KernelCounts::around(&samples, 70, 71), told(0, 0));
+        assert_eq!(KernelCounts::around(&samples, 100, 101), KernelCounts::default());
     }
 }

@@ -10,7 +10,7 @@ use serde::Serialize;
 use super::answer::{Answer, Answers};
 use super::by_cycle::ByCycle;
 use super::hops::{CyclePath, TypicalHops, passed_ns};
-use super::kernel_counts::{KernelCounts, KernelSamples};
+use super::kernel_counts::KernelCounts;
 
 /// Cycles kept.
 const WORST: usize = 10;
@@ -62,7 +62,7 @@ pub(super) struct LongestCycles {
     parts: ByCycle<Parts>,
     typical: TypicalHops,
     longest: Vec<CyclePath>,
-    kernel: KernelSamples,
+    kernel: Vec<Machine>,
     plant_stalls: Stalls,
     controller_stalls: Stalls,
     last_cycle: Option<u64>,
@@ -104,7 +104,7 @@ impl LongestCycles {
     }
 
     pub(super) fn machine(&mut self, machine: &Machine) {
-        self.kernel.take(machine);
+        self.kernel.push(*machine);
     }
 
     /// Adds a part; the last one completes the path.
@@ -150,7 +150,7 @@ impl LongestCycles {
                 hop_ns: hop.took_ns,
                 hop_p50_ns: hop.p50_ns,
                 stalled_ns: path.stalled_ns,
-                around: self.kernel.around(due_ns, due_ns.saturating_add(total_ns)),
+                around: KernelCounts::around(&self.kernel, due_ns, due_ns.saturating_add(total_ns)),
             }
         };
         self.longest.iter().map(worst_cycle).collect()

@@ -5,7 +5,7 @@ use masseter_can::{Bitrate, wire};
 use masseter_shared::geometry::AXES;
 use masseter_shared::messages::Truth;
 
-use super::series::{Curve, Extremes, Series, Sums};
+use super::series::{Curve, Extremes, Series};
 
 /// A run over time: seconds since its first SYNC, and the lowest and the highest value of each stretch of time.
 #[derive(Debug, Clone, Default)]
@@ -33,7 +33,7 @@ pub(super) struct Watch {
     late: Series<Extremes<2>>,
     axes: Series<Extremes<{ 3 * AXES }>>,
     /// Time that frames took on each bus.
-    busy_ns: Series<Sums>,
+    busy_ns: Vec<Series<u64>>,
     bitrate: Option<Bitrate>,
 }
 
@@ -69,17 +69,16 @@ impl Watch {
         let since_ns = self.since(time_ns);
         if let Some((received, bitrate)) = tapped.frame().zip(self.bitrate) {
             let busy_ns = bitrate.bits_to_ns(wire::frame_bits(&received.frame));
-            self.busy_ns.at(since_ns).add(bus, busy_ns);
+            self.busy_ns.resize_with(self.busy_ns.len().max(bus + 1), Series::default);
+            *self.busy_ns[bus].at(since_ns) += busy_ns;
         }
     }
 
     pub(super) fn finish(self) -> OverTime {
         let bands = |quantity: usize| std::array::from_fn(|axis| self.axes.band(quantity * AXES + axis));
-        let buses = self.busy_ns.iter().map(|(_, sums)| sums.0.len()).max().unwrap_or(0);
-        let full_ns = self.busy_ns.width_s() * 1e9;
-        let load = |bus: usize| {
-            let share = |sums: &Sums| sums.0.get(bus).map_or(0.0, |busy_ns| *busy_ns as f64 / full_ns);
-            self.busy_ns.iter().map(|(at_s, sums)| (at_s, share(sums))).collect()
+        let load = |bus: &Series<u64>| {
+            let full_ns = bus.width_s() * 1e9;
+            bus.iter().map(|(at_s, busy_ns)| (at_s, *busy_ns as f64 / full_ns)).collect()
         };
         OverTime {
             began_ns: self.began_ns.unwrap_or(0),
@@ -88,7 +87,7 @@ impl Watch {
             position_m: bands(0),
             velocity_m_s: bands(1),
             force_n: bands(2),
-            bus_load: (0..buses).map(load).collect(),
+            bus_load: self.busy_ns.iter().map(load).collect(),
         }
     }
 }

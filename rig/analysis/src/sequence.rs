@@ -44,13 +44,9 @@ impl SequenceCheck {
             Recorded::Event(event) => publisher_of(event),
             _ => 0,
         };
-        self.check(message.topic().name(), publisher, message.seq());
-    }
-
-    fn check(&mut self, topic: &'static str, publisher: u32, seq: u64) {
-        let stream = self.streams.entry((topic, publisher)).or_default();
+        let stream = self.streams.entry((message.topic().name(), publisher)).or_default();
         stream.messages += 1;
-        stream.highest = stream.highest.max(seq);
+        stream.highest = stream.highest.max(message.seq());
     }
 
     /// The counts of every topic.
@@ -72,18 +68,23 @@ impl SequenceCheck {
 
 #[cfg(test)]
 mod tests {
+    use masseter_shared::messages::Reading;
+
     use super::*;
 
     #[test]
     fn gaps_are_counted_at_the_beginning_and_between_for_each_publisher() {
         let mut check = SequenceCheck::default();
+        let mut event = |source: Source, seq| {
+            check.take(&Recorded::Event(Event { seq, source: source.code(), ..Event::default() }));
+        };
         for seq in [3, 4, 7] {
-            check.check("event", 0, seq);
+            event(Source::Controller, seq);
         }
-        for seq in [1, 2] {
-            check.check("event", 1, seq);
-        }
-        check.check("reading", 0, 1);
+        // One process.
+        event(Source::Master, 1);
+        event(Source::Drive, 2);
+        check.take(&Recorded::Reading(Reading { seq: 1, ..Reading::default() }));
         assert_eq!(
             check.finish(),
             [

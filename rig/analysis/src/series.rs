@@ -110,22 +110,10 @@ impl<const N: usize> Merge for Extremes<N> {
     }
 }
 
-/// Sums by index.
-#[derive(Debug, Clone, Default)]
-pub(super) struct Sums(pub Vec<u64>);
-
-impl Sums {
-    pub(super) fn add(&mut self, index: usize, value: u64) {
-        if index >= self.0.len() {
-            self.0.resize(index + 1, 0);
-        }
-        self.0[index] += value;
-    }
-}
-
-impl Merge for Sums {
+/// A sum.
+impl Merge for u64 {
     fn merge(&mut self, next: &Self) {
-        next.0.iter().enumerate().for_each(|(index, value)| self.add(index, *value));
+        *self += next;
     }
 }
 
@@ -148,8 +136,8 @@ mod tests {
 
     #[test]
     fn nothing_is_lost_from_a_sum() {
-        let mut series = Series::<Sums>::default();
-        (0..50_000u64).for_each(|millisecond| series.at(millisecond * 1_000_000).add(1, 3));
-        assert_eq!(series.iter().map(|(_, sums)| sums.0[1]).sum::<u64>(), 150_000);
+        let mut series = Series::<u64>::default();
+        (0..50_000u64).for_each(|millisecond| *series.at(millisecond * 1_000_000) += 3);
+        assert_eq!(series.iter().map(|(_, sum)| sum).sum::<u64>(), 150_000);
     }
 }

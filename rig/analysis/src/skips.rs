@@ -154,8 +154,9 @@ impl Default for Skips {
 }
 
 impl Skips {
-    /// The process' counters in its next message.
-    pub(super) fn take(&mut self, counters: &Counters, period_ns: u64) {
+    /// The process' counters in its next message. Returns how many deadlines were skipped just before its wake-up; none
+    /// where messages before it are missing, since which wake-up skipped them is not known.
+    pub(super) fn take(&mut self, counters: &Counters, period_ns: u64) -> u64 {
         let past = self.figures;
         let stall_ns = counters.stalled_ns.saturating_sub(past.stalled_ns);
         let overlong_ns = counters.overlong_ns.saturating_sub(past.overlong_ns);
@@ -186,6 +187,7 @@ impl Skips {
         }
         self.carried_over = lost.carried_over(counters.late_ns);
         self.carried_over_stretch_ns = if self.carried_over.working_ns > 0 { stretch_ns } else { 0 };
+        known
     }
 
     /// Stalls while waiting, and overlong stretches of work, of at least this length.
@@ -319,6 +321,16 @@ mod tests {
             let figures = process.skips.figures;
             prop_assert_eq!(figures.by_machine, figures.skipped);
         }
+    }
+
+    #[test]
+    fn skips_belong_to_a_wake_up_only_if_the_message_before_it_is_known() {
+        let skipped_before = |seq| {
+            let mut skips = Skips::default();
+            skips.take(&Counters { seq: 1, ..Counters::default() }, PERIOD_NS);
+            skips.take(&Counters { seq, skipped: 3, ..Counters::default() }, PERIOD_NS)
+        };
+        assert_eq!((skipped_before(2), skipped_before(3)), (3, 0));
     }
 
     #[test]

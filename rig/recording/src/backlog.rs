@@ -7,19 +7,15 @@
 #[cfg(test)]
 mod tests;
 
-use std::mem::offset_of;
 use std::sync::mpsc::{
     Receiver, RecvTimeoutError, Sender, SyncSender, TryRecvError, TrySendError, channel, sync_channel,
 };
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
-use bytemuck::{Pod, Zeroable, bytes_of, pod_read_unaligned};
 use masseter_shared::clock::{self, SECOND_NS};
-use masseter_shared::messages::Message;
 
-use super::schema::CDR_LITTLE_ENDIAN;
-use super::topic::Topic;
+use super::topic::Recorded;
 use super::writer::{Medium, Recorder, WriteError};
 
 /// Whether the caller may wait for the disk.
@@ -33,12 +29,12 @@ pub enum Pace {
 }
 
 impl Pace {
-    /// Memory of one batch, bytes. There are two. In real time, 0.8 s of every topic at 10 kHz; else no more than
-    /// both ends need to work at the same time.
-    const fn batch_bytes(self) -> usize {
+    /// Most messages of a batch. There are two. In real time, 0.8 s of every topic at 10 kHz; else no more than both
+    /// ends need to work at the same time.
+    const fn batch_messages(self) -> usize {
         match self {
-            Self::RealTime => 16 << 20,
-            Self::Virtual => 1 << 20,
+            Self::RealTime => 150_000,
+            Self::Virtual => 4_000,
         }
     }
 
@@ -51,54 +47,8 @@ impl Pace {
     }
 }
 
-/// The head of each message in a batch.
-#[repr(C)]
-#[derive(Debug, Clone, Copy, Pod, Zeroable)]
-struct Head {
-    log_time_ns: u64,
-    topic: u16,
-    body_bytes: u16,
-    /// Encapsulation header of CDR, directly before the body.
-    encapsulation: [u8; 4],
-}
-
-/// Messages on their way to the disk, one behind the other.
-#[derive(Debug, Default)]
-struct Batch {
-    bytes: Vec<u8>,
-    messages: u64,
-}
-
-impl Batch {
-    fn push(&mut self, topic: Topic, log_time_ns: u64, body: &[u8]) {
-        let (topic, body_bytes) = (topic as u16, body.len() as u16);
-        let head = Head { log_time_ns, topic, body_bytes, encapsulation: CDR_LITTLE_ENDIAN };
-        self.bytes.extend_from_slice(bytes_of(&head));
-        self.bytes.extend_from_slice(body);
-        self.messages += 1;
-    }
-
-    fn bytes_with(&self, body: &[u8]) -> usize {
-        self.bytes.len() + size_of::<Head>() + body.len()
-    }
-
-    fn clear(&mut self) {
-        self.bytes.clear();
-        self.messages = 0;
-    }
-
-    fn write_to<W: Medium>(&self, recorder: &mut Recorder<W>) -> Result<(), WriteError> {
-        let mut rest = self.bytes.as_slice();
-        while let Some(head) = rest.get(..size_of::<Head>()) {
-            let head: Head = pod_read_unaligned(head);
-            let (message, behind) = rest.split_at(size_of::<Head>() + usize::from(head.body_bytes));
-            let cdr = &message[offset_of!(Head, encapsulation)..];
-            recorder.record_cdr(Topic::ALL[usize::from(head.topic)], cdr, head.log_time_ns)?;
-            rest = behind;
-        }
-        Ok(())
-    }
-}
+/// Messages on their way to the disk, each with the time of its reception, ns.
+type Batch = Vec<(u64, Recorded)>;
 
 /// How a recording ended.
 #[derive(Debug)]
@@ -152,29 +102,28 @@ impl Backlog {
     }
 
     /// Takes a message that was received at `log_time_ns`; without room it is dropped or waited for, by the pace.
-    pub fn record<M: Message>(&mut self, message: &M, log_time_ns: u64) {
-        let body = message.body();
+    pub fn record(&mut self, message: &Recorded, log_time_ns: u64) {
         self.offered += 1;
-        if !self.has_room_for(body) {
+        if self.is_full() {
             match self.pace {
                 Pace::RealTime => self.hand_over(),
                 Pace::Virtual => self.hand_over_waiting(),
             }
         }
-        if self.has_room_for(body) {
-            self.pending.push(Topic::for_message::<M>(), log_time_ns, body);
-        } else {
+        if self.is_full() {
             self.dropped += 1;
+        } else {
+            self.pending.push((log_time_ns, *message));
         }
     }
 
-    fn has_room_for(&self, body: &[u8]) -> bool {
-        self.pending.bytes_with(body) <= self.pace.batch_bytes()
+    fn is_full(&self) -> bool {
+        self.pending.len() >= self.pace.batch_messages()
     }
 
     /// Passes the pending batch to the disk, if the disk has written the last one. Never waits.
     pub fn hand_over(&mut self) {
-        if self.pending.messages == 0 {
+        if self.pending.is_empty() {
             return;
         }
         match self.emptied.try_recv() {
@@ -197,13 +146,13 @@ impl Backlog {
         if let Err(TrySendError::Full(batch) | TrySendError::Disconnected(batch)) =
             self.to_disk.try_send(full)
         {
-            self.dropped += batch.messages;
+            self.dropped += batch.len() as u64;
         }
     }
 
     /// Drops the pending batch, since the disk's thread has ended.
     fn give_up(&mut self) {
-        self.dropped += self.pending.messages;
+        self.dropped += self.pending.len() as u64;
         self.pending.clear();
     }
 
@@ -220,7 +169,7 @@ impl Backlog {
 
     /// Waits until everything is written and the recording has its index.
     pub fn finish(mut self) -> Outcome {
-        if self.pending.messages > 0 {
+        if !self.pending.is_empty() {
             self.hand_over_waiting();
         }
         drop(self.to_disk);
@@ -229,34 +178,30 @@ impl Backlog {
     }
 }
 
-/// The disk's thread: writes, flushes at intervals, and ends the file when the caller has finished. Returns how many
-/// messages are safe.
+/// The disk's thread. Returns how many messages are safe.
 fn write_batches<W: Medium>(
-    mut recorder: Recorder<W>,
+    recorder: Recorder<W>,
     batches: &Receiver<Batch>,
     give_back: &SyncSender<Batch>,
     failed: &Sender<WriteError>,
     pace: Pace,
 ) -> u64 {
     let mut safe = 0;
-    let written = write_until_the_end(&mut recorder, batches, give_back, pace, &mut safe);
-    match written.and_then(|written| recorder.finish().map(|()| written)) {
-        Ok(written) => written,
-        Err(error) => {
-            // The caller may have gone.
-            let _ = failed.send(error);
-            safe
-        }
+    if let Err(error) = write_all(recorder, batches, give_back, pace, &mut safe) {
+        // The caller may have gone.
+        let _ = failed.send(error);
     }
+    safe
 }
 
-fn write_until_the_end<W: Medium>(
-    recorder: &mut Recorder<W>,
+/// Writes, flushes at intervals, and ends the file when the caller has finished. Counts the messages that are `safe`.
+fn write_all<W: Medium>(
+    mut recorder: Recorder<W>,
     batches: &Receiver<Batch>,
     give_back: &SyncSender<Batch>,
     pace: Pace,
     safe: &mut u64,
-) -> Result<u64, WriteError> {
+) -> Result<(), WriteError> {
     let mut written = 0;
     let next_flush_ns = || pace.flush_every_ns().map_or(u64::MAX, |every_ns| clock::now_ns() + every_ns);
     let mut flush_ns = next_flush_ns();
@@ -264,14 +209,14 @@ fn write_until_the_end<W: Medium>(
         let wait = Duration::from_nanos(flush_ns.saturating_sub(clock::now_ns()));
         match batches.recv_timeout(wait) {
             Ok(mut batch) => {
-                batch.write_to(recorder)?;
-                written += batch.messages;
+                batch.iter().try_for_each(|(log_time_ns, message)| recorder.record(message, *log_time_ns))?;
+                written += batch.len() as u64;
                 batch.clear();
                 // The caller may have finished.
                 let _ = give_back.try_send(batch);
             }
             Err(RecvTimeoutError::Timeout) => {}
-            Err(RecvTimeoutError::Disconnected) => return Ok(written),
+            Err(RecvTimeoutError::Disconnected) => break,
         }
         if clock::now_ns() >= flush_ns {
             if written > *safe {
@@ -281,4 +226,7 @@ fn write_until_the_end<W: Medium>(
             flush_ns = next_flush_ns();
         }
     }
+    recorder.finish()?;
+    *safe = written;
+    Ok(())
 }

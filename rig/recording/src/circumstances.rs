@@ -1,4 +1,5 @@
-//! The circumstances of a run in the manifest: the machine, the processes' use of it, and the setting for wake-ups.
+//! The circumstances of a run in the manifest: the machine, the processes' use of it, the setting for wake-ups, and how the
+//! processes ended. The verdict on the run is the report's.
 
 use std::collections::BTreeMap;
 
@@ -47,7 +48,7 @@ pub struct RunUsage {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct DmaLatency {
     /// The scenario's choice.
-    #[serde(rename = "wanted")]
+    #[serde(alias = "wanted")]
     pub requested: CpuDmaLatency,
     /// The machine's limit as read back, µs; none when it was left alone.
     pub limit_us: Option<i32>,
@@ -67,4 +68,34 @@ pub struct Machine {
     /// Whether a hypervisor runs it.
     #[serde(rename = "virtual")]
     pub is_virtual: bool,
+}
+
+/// How a run ended.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum Ending {
+    /// The motion was played to its end.
+    Completed,
+    /// The controller stopped safely because of a fault.
+    SafeStop,
+    /// A process died.
+    Died {
+        /// Which.
+        process: String,
+        /// Exit code or signal.
+        how: String,
+    },
+    /// The user interrupted it.
+    Interrupted,
+    /// Real time was required and refused.
+    NotStarted,
+    /// The recorder could not write everything.
+    RecordingFailed,
+}
+
+impl Ending {
+    /// The death of a process.
+    pub fn died(process: &str, how: String) -> Self {
+        Self::Died { process: process.to_owned(), how }
+    }
 }

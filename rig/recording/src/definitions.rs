@@ -1,30 +1,31 @@
 //! The definitions of a recording's channels, which its beginning holds, and its index again.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::io::{self, Read, Seek};
+use std::sync::Arc;
 
-use mcap::records::{Channel, Record, SchemaHeader, op};
+use mcap::records::{Record, SchemaHeader, op};
+use mcap::{Channel, Schema};
 
-use super::encoding::Definition;
-use super::schema::Schema;
 use super::walk::{Step, Walk};
 
-/// Channels and schemas by their numbers.
+/// Channels by their numbers, with their schemas.
 #[derive(Debug, Default)]
 pub(super) struct Definitions {
-    schemas: BTreeMap<u16, Schema>,
-    channels: BTreeMap<u16, Channel>,
+    schemas: BTreeMap<u16, Arc<Schema<'static>>>,
+    pub(super) channels: BTreeMap<u16, Arc<Channel<'static>>>,
 }
 
 impl Definitions {
-    /// Those in the index, from the current place of `walk` on. Only the checksum in the footer covers them, so either all
-    /// or none are taken.
-    pub(super) fn from_index<R: Read + Seek>(walk: &mut Walk<R>) -> io::Result<Self> {
+    /// Those in the index behind the place of `walk`. Only the checksum in the footer covers them, so either all or none
+    /// are taken.
+    pub(super) fn from_index<R: Read + Seek>(mut walk: Walk<R>) -> io::Result<Self> {
         let mut found = Self::default();
         loop {
             match walk.step()? {
                 Step::Record(op::FOOTER) => return Ok(found),
-                Step::Record(opcode) if walk.is_in_index() => found.take(opcode, walk.body()),
+                Step::Record(opcode) if walk.is_in_index => found.parse(opcode, walk.body()),
                 Step::Record(_) => {}
                 Step::Damage(_) => found = Self::default(),
                 Step::End => return Ok(Self::default()),
@@ -32,61 +33,26 @@ impl Definitions {
         }
     }
 
-    /// Those of every recording that this version of the program writes.
-    pub(super) fn for_this_version() -> Self {
-        let mut known = Self::default();
-        for (number, definition) in (1..).zip(Definition::all()) {
-            known.schemas.insert(number, definition.schema);
-            let channel = Channel {
-                id: number,
-                schema_id: number,
-                topic: definition.topic.to_owned(),
-                message_encoding: definition.message_encoding,
-                metadata: BTreeMap::new(),
-            };
-            known.channels.insert(number, channel);
+    /// Takes a schema or a channel; a damaged one counts as missing.
+    pub(super) fn parse(&mut self, opcode: u8, body: &[u8]) {
+        if let (op::SCHEMA | op::CHANNEL, Ok(record)) = (opcode, mcap::parse_record(opcode, body)) {
+            self.take(record.into_owned());
         }
-        known
     }
 
-    /// Takes a schema or a channel; a damaged one counts as missing.
-    pub(super) fn take(&mut self, opcode: u8, body: &[u8]) {
-        if !matches!(opcode, op::SCHEMA | op::CHANNEL) {
-            return;
-        }
-        match mcap::parse_record(opcode, body) {
-            Ok(Record::Schema { header: SchemaHeader { id, name, encoding }, data }) => {
-                self.schemas.insert(id, Schema { name, encoding, data: data.into_owned() });
+    /// Takes a record, if it is a schema or a channel.
+    pub(super) fn take(&mut self, record: Record<'static>) {
+        match record {
+            Record::Schema { header: SchemaHeader { id, name, encoding }, data } => {
+                let data = Cow::Owned(data.into_owned());
+                self.schemas.insert(id, Arc::new(Schema { id, name, encoding, data }));
             }
-            Ok(Record::Channel(channel)) => {
-                self.channels.insert(channel.id, channel);
+            Record::Channel(mcap::records::Channel { id, schema_id, topic, message_encoding, metadata }) => {
+                let schema = self.schemas.get(&schema_id).cloned();
+                let channel = Channel { id, topic, schema, message_encoding, metadata };
+                self.channels.insert(id, Arc::new(channel));
             }
             _ => {}
         }
-    }
-
-    /// Takes those of others.
-    pub(super) fn add(&mut self, others: Self) {
-        self.schemas.extend(others.schemas);
-        self.channels.extend(others.channels);
-    }
-
-    /// Whether no channel is defined.
-    pub(super) fn is_empty(&self) -> bool {
-        self.channels.is_empty()
-    }
-
-    /// The channel of this number and its schema.
-    pub(super) fn channel(&self, channel: u16) -> Option<(&Channel, Option<&Schema>)> {
-        self.channels.get(&channel).map(|channel| self.with_schema(channel))
-    }
-
-    /// All of them, by their numbers.
-    pub(super) fn channels(&self) -> impl Iterator<Item = (&Channel, Option<&Schema>)> {
-        self.channels.values().map(|channel| self.with_schema(channel))
-    }
-
-    fn with_schema<'a>(&'a self, channel: &'a Channel) -> (&'a Channel, Option<&'a Schema>) {
-        (channel, self.schemas.get(&channel.schema_id))
     }
 }

@@ -1,11 +1,20 @@
 //! The channels and the encoding of their messages, for recordings and for live viewers alike.
 
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
 use foxglove::Encode;
 use foxglove::messages::{FrameTransforms, SceneUpdate};
 
 use super::scene::Scene;
-use super::schema::{CDR_LITTLE_ENDIAN, MESSAGE_ENCODING, SCHEMA_ENCODING, Schema};
-use super::topic::{Stamps, Topic};
+use super::topic::{Recorded, Stamps, Topic};
+
+/// Encapsulation header of plain little-endian CDR (version 1, OMG CDR).
+pub const CDR_LITTLE_ENDIAN: [u8; 4] = [0x00, 0x01, 0x00, 0x00];
+/// Encoding of the rig's own messages.
+const MESSAGE_ENCODING: &str = "cdr";
+/// Encoding of the schemas of the rig's own topics.
+pub const SCHEMA_ENCODING: &str = "ros2msg";
 
 /// A channel of messages.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -22,7 +31,7 @@ impl Channel {
     /// How many there are.
     pub const COUNT: usize = Topic::ALL.len() + 2;
 
-    /// Its place in [`Definition::all`].
+    /// Its place in [`definitions`].
     pub fn place(self) -> usize {
         match self {
             Self::Topic(topic) => topic as usize,
@@ -41,39 +50,29 @@ impl Channel {
     }
 }
 
-/// The definition of a channel, for readers.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Definition {
-    /// The topic.
-    pub topic: &'static str,
-    /// The schema of its messages.
-    pub schema: Schema,
-    /// The encoding of its messages.
-    pub message_encoding: String,
+/// The definition of every channel, by its place; numbered from 1.
+pub fn definitions() -> Vec<mcap::Channel<'static>> {
+    let topics = Topic::ALL.map(|topic| {
+        let (name, definition) = topic.definition();
+        let schema = foxglove::Schema::new(name, SCHEMA_ENCODING, definition.into_bytes());
+        (topic.name(), schema, MESSAGE_ENCODING.to_owned())
+    });
+    let views = [view::<FrameTransforms>(Scene::TRANSFORMS), view::<SceneUpdate>(Scene::ENTITIES)];
+    let channel = |(id, (topic, schema, message_encoding)): (u16, (&str, foxglove::Schema, String))| {
+        let foxglove::Schema { name, encoding, data } = schema;
+        mcap::Channel {
+            id,
+            topic: topic.to_owned(),
+            schema: Some(Arc::new(mcap::Schema { id, name, encoding, data })),
+            message_encoding,
+            metadata: BTreeMap::new(),
+        }
+    };
+    (1..).zip(topics.into_iter().chain(views)).map(channel).collect()
 }
 
-impl Definition {
-    /// Every channel, by its place.
-    pub fn all() -> Vec<Self> {
-        let topics = Topic::ALL.map(Self::for_topic);
-        let transforms = Self::for_foxglove::<FrameTransforms>(Scene::TRANSFORMS);
-        let entities = Self::for_foxglove::<SceneUpdate>(Scene::ENTITIES);
-        topics.into_iter().chain([transforms, entities]).collect()
-    }
-
-    fn for_topic(topic: Topic) -> Self {
-        let (name, definition) = topic.definition();
-        let (name, encoding) = (name.to_owned(), SCHEMA_ENCODING.to_owned());
-        let schema = Schema { name, encoding, data: definition.into() };
-        Self { topic: topic.name(), schema, message_encoding: MESSAGE_ENCODING.to_owned() }
-    }
-
-    fn for_foxglove<E: Encode>(topic: &'static str) -> Self {
-        let foxglove::Schema { name, encoding, data } =
-            E::get_schema().expect("Foxglove's own messages have schemas");
-        let schema = Schema { name, encoding, data: data.into_owned() };
-        Self { topic, schema, message_encoding: E::get_message_encoding() }
-    }
+fn view<E: Encode>(topic: &'static str) -> (&'static str, foxglove::Schema, String) {
+    (topic, E::get_schema().expect("Foxglove's own messages have schemas"), E::get_message_encoding())
 }
 
 /// A message as its channel carries it.
@@ -93,61 +92,36 @@ pub struct Encoded<'a> {
 #[derive(Debug)]
 pub struct Encoder {
     scene: Scene,
-    cdr: Vec<u8>,
-    protobuf: Vec<u8>,
+    bytes: Vec<u8>,
 }
 
 impl Encoder {
     /// An encoder that also draws the mechanism of `scene`.
     pub fn new(scene: Scene) -> Self {
-        Self { scene, cdr: Vec::new(), protobuf: Vec::new() }
+        Self { scene, bytes: Vec::new() }
     }
 
-    /// Passes to `put` the message of a topic with this body, and its view in 3-D.
+    /// Passes to `put` a message, and its view in 3-D if one is due.
     pub fn encode<E>(
         &mut self,
-        topic: Topic,
-        body: &[u8],
-        put: impl FnMut(Encoded) -> Result<(), E>,
-    ) -> Result<(), E> {
-        let mut cdr = std::mem::take(&mut self.cdr);
-        cdr.clear();
-        cdr.extend_from_slice(&CDR_LITTLE_ENDIAN);
-        cdr.extend_from_slice(body);
-        let result = self.encode_cdr(topic, &cdr, put);
-        self.cdr = cdr;
-        result
-    }
-
-    /// The same for a message that is CDR already.
-    pub(super) fn encode_cdr<E>(
-        &mut self,
-        topic: Topic,
-        cdr: &[u8],
+        message: &Recorded,
         mut put: impl FnMut(Encoded) -> Result<(), E>,
     ) -> Result<(), E> {
-        let body = &cdr[CDR_LITTLE_ENDIAN.len()..];
+        let body = message.body();
         let stamps = Stamps::read(body).expect("every message begins with its stamps");
+        self.bytes.clear();
+        self.bytes.extend_from_slice(&CDR_LITTLE_ENDIAN);
+        self.bytes.extend_from_slice(body);
         put(Encoded {
-            channel: Channel::Topic(topic),
+            channel: Channel::Topic(message.topic()),
             sequence: stamps.seq as u32,
             publish_time_ns: stamps.published_ns,
-            bytes: cdr,
+            bytes: &self.bytes,
         })?;
-        self.show(topic, body, put)
-    }
-
-    /// Passes to `put` the view of a message in 3-D, if one is due.
-    fn show<E>(
-        &mut self,
-        topic: Topic,
-        body: &[u8],
-        mut put: impl FnMut(Encoded) -> Result<(), E>,
-    ) -> Result<(), E> {
-        let shown = match topic {
-            Topic::State => self.scene.state(&bytemuck::pod_read_unaligned(body)),
-            Topic::Truth => self.scene.truth(&bytemuck::pod_read_unaligned(body)),
-            _ => return Ok(()),
+        let shown = match message {
+            Recorded::State(state) => self.scene.state(state),
+            Recorded::Truth(truth) => self.scene.truth(truth),
+            _ => None,
         };
         let Some(shown) = shown else { return Ok(()) };
         put(self.foxglove(Channel::Transforms, &shown.transforms, shown.time_ns))?;
@@ -158,11 +132,11 @@ impl Encoder {
     }
 
     fn foxglove(&mut self, channel: Channel, message: &impl Encode, publish_time_ns: u64) -> Encoded<'_> {
-        self.protobuf.clear();
-        if message.encode(&mut self.protobuf).is_err() {
+        self.bytes.clear();
+        if message.encode(&mut self.bytes).is_err() {
             unreachable!("protobuf refuses only buffers that cannot grow");
         }
-        Encoded { channel, sequence: 0, publish_time_ns, bytes: &self.protobuf }
+        Encoded { channel, sequence: 0, publish_time_ns, bytes: &self.bytes }
     }
 }
 
@@ -172,7 +146,7 @@ mod tests {
 
     #[test]
     fn every_channel_stands_at_its_place() {
-        let definitions = Definition::all();
+        let definitions = definitions();
         let mut found = Vec::new();
         for topic in Topic::ALL {
             assert_eq!(definitions[Channel::Topic(topic).place()].topic, topic.name());

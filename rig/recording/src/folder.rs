@@ -7,8 +7,7 @@ use std::path::{Path, PathBuf};
 use std::time::UNIX_EPOCH;
 
 use masseter_shared::clock;
-
-use masseter_terminal::{OutputError, new_folder};
+use masseter_shared::output::{OutputError, new_folder};
 
 /// Name of the recorded motion within the folder, as its scenario knows it.
 pub const MOTION: &str = "motion.csv";
@@ -104,29 +103,14 @@ impl RunFolder {
         self.0.join("recording.mcap")
     }
 
-    /// HdrHistogram interval logs.
-    pub fn histograms(&self) -> PathBuf {
-        self.0.join("hist")
-    }
-
-    /// Events, a line of JSON each.
-    pub fn events(&self) -> PathBuf {
-        self.0.join("events.jsonl")
-    }
-
     /// Verdict and figures.
     pub fn summary(&self) -> PathBuf {
         self.0.join("summary.json")
     }
 
-    /// The checks for CI systems.
-    pub fn junit(&self) -> PathBuf {
-        self.0.join("junit.xml")
-    }
-
-    /// The report for people.
-    pub fn report(&self) -> PathBuf {
-        self.0.join("report.html")
+    /// Another file of this name.
+    pub fn file(&self, name: &str) -> PathBuf {
+        self.0.join(name)
     }
 }
 

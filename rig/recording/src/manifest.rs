@@ -10,8 +10,7 @@ use masseter_shared::config::Scenario;
 use masseter_shared::realtime::scheduling::Obtained;
 use serde::{Deserialize, Serialize};
 
-use crate::circumstances::{DmaLatency, Machine, RunUsage};
-use crate::ending::Ending;
+use crate::circumstances::{DmaLatency, Ending, Machine, RunUsage};
 use crate::folder::RunFolder;
 
 /// Version of the manifest's form.

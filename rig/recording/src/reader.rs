@@ -1,24 +1,20 @@
 //! Reads a recording from its beginning in constant memory, also one that was cut short or damaged: every whole chunk is
 //! read, and every stretch that cannot be read is reported with its place.
 
-use std::borrow::Cow;
 use std::fs::File;
 use std::io::{self, BufReader, Read, Seek};
-use std::ops::Range;
 use std::path::Path;
+use std::sync::Arc;
+use std::vec;
 
 use masseter_shared::messages::LAYOUT_VERSION;
-use mcap::records::{Channel, MessageHeader, Record, op};
+use mcap::records::{MessageHeader, Record, op};
 
-use super::chunk::Chunk;
+use super::chunk;
 use super::definitions::Definitions;
-use super::schema::{CDR_LITTLE_ENDIAN, Schema};
+use super::encoding::CDR_LITTLE_ENDIAN;
 use super::topic::{Recorded, Stamps, Topic};
 use super::walk::{Damage, Step, Walk};
-use super::writer::LIBRARY;
-
-/// Channel, sequence number and two times, before the data.
-const MESSAGE_HEAD: usize = 2 + 4 + 8 + 8;
 
 /// Why a recording cannot be read.
 #[derive(Debug, thiserror::Error)]
@@ -37,15 +33,13 @@ pub enum ReadError {
     /// A topic's message does not have this version's layout.
     #[error(
         "topic '{topic}' holds a message of {found} bytes, layout version {version}; \
-         this program reads up to {expected} bytes, version {LAYOUT_VERSION}"
+         this program reads whole messages of version {LAYOUT_VERSION}"
     )]
     Foreign {
         /// The topic.
         topic: &'static str,
         /// Bytes found.
         found: usize,
-        /// Bytes of the longest that is read.
-        expected: usize,
         /// Layout version found.
         version: u64,
     },
@@ -53,15 +47,13 @@ pub enum ReadError {
 
 /// A message with its channel, number and times.
 #[derive(Debug)]
-pub struct Entry<'a> {
+pub struct Entry {
     /// Its channel; none when the definition of that channel is lost.
-    pub channel: Option<&'a Channel>,
-    /// The channel's schema, if it has one.
-    pub schema: Option<&'a Schema>,
+    pub channel: Option<Arc<mcap::Channel<'static>>>,
     /// Its number and times.
     pub header: MessageHeader,
     /// Its bytes as recorded.
-    pub data: &'a [u8],
+    pub data: Vec<u8>,
 }
 
 /// How the messages are packed.
@@ -97,15 +89,14 @@ pub struct Chunks {
 /// ```
 pub struct Reader<R = BufReader<File>> {
     walk: Walk<R>,
-    chunk: Chunk,
+    /// The rest of the current chunk.
+    unpacked: vec::IntoIter<Record<'static>>,
     definitions: Definitions,
     chunks: Chunks,
     damage: Vec<Damage>,
     records: u64,
     /// Whether the index was searched for lost definitions.
     index_is_known: bool,
-    /// Whether this version of the program recorded it.
-    is_own: bool,
 }
 
 impl Reader {
@@ -120,13 +111,12 @@ impl<R: Read + Seek> Reader<R> {
     pub fn new(source: R) -> Result<Self, ReadError> {
         Ok(Self {
             walk: Walk::new(source)?,
-            chunk: Chunk::default(),
+            unpacked: Vec::new().into_iter(),
             definitions: Definitions::default(),
             chunks: Chunks::default(),
             damage: Vec::new(),
             records: 0,
             index_is_known: false,
-            is_own: false,
         })
     }
 
@@ -140,19 +130,19 @@ impl<R: Read + Seek> Reader<R> {
         &self.chunks
     }
 
-    /// The channels defined so far, by their id, each with its schema.
-    pub fn channels(&self) -> impl Iterator<Item = (&Channel, Option<&Schema>)> {
-        self.definitions.channels()
+    /// The channels defined so far, by their id.
+    pub fn channels(&self) -> impl Iterator<Item = &mcap::Channel<'static>> {
+        self.definitions.channels.values().map(Arc::as_ref)
     }
 
     /// Bytes of the file.
     pub fn size(&self) -> u64 {
-        self.walk.size()
+        self.walk.size
     }
 
     /// After the last message: whether the file lacks its end, as a killed recorder leaves it.
     pub fn was_cut_short(&self) -> bool {
-        !self.walk.is_closed()
+        self.walk.end.is_none()
     }
 
     /// The next message of the rig's topics, or none at the end. Other topics are skipped.
@@ -166,34 +156,18 @@ impl<R: Read + Seek> Reader<R> {
     }
 
     /// The next message of any topic, or none at the end.
-    pub fn next_entry(&mut self) -> Result<Option<Entry<'_>>, ReadError> {
-        let Some(message) = self.next_message_bytes()? else { return Ok(None) };
-        let Ok(Record::Message { header, data: Cow::Borrowed(data) }) =
-            mcap::parse_record(op::MESSAGE, self.chunk.bytes(message))
-        else {
-            unreachable!("a message with a whole head can be parsed, and borrows");
-        };
-        let (channel, schema) = self.definitions.channel(header.channel_id).unzip();
-        Ok(Some(Entry { channel, schema: schema.flatten(), header, data }))
-    }
-
-    /// The place of the next message in the open chunk. Definitions before it are taken.
-    fn next_message_bytes(&mut self) -> Result<Option<Range<usize>>, ReadError> {
+    pub fn next_entry(&mut self) -> Result<Option<Entry>, ReadError> {
         loop {
-            match self.chunk.next_record() {
-                Some(Ok((op::MESSAGE, bytes))) if bytes.len() >= MESSAGE_HEAD => return Ok(Some(bytes)),
-                Some(Ok((op::MESSAGE, _))) => self.note("a message without a head"),
-                Some(Ok((opcode, bytes))) => self.definitions.take(opcode, self.chunk.bytes(bytes)),
-                Some(Err(reason)) => self.note(reason),
+            match self.unpacked.next() {
+                Some(Record::Message { header, data }) => {
+                    let channel = self.definitions.channels.get(&header.channel_id).cloned();
+                    return Ok(Some(Entry { channel, header, data: data.into_owned() }));
+                }
+                Some(record) => self.definitions.take(record),
                 None if self.step()? => {}
                 None => return Ok(None),
             }
         }
-    }
-
-    fn note(&mut self, reason: &str) {
-        let damage = self.walk.damaged(reason.to_owned());
-        self.add(damage);
     }
 
     /// Damage that follows right behind other damage is part of it.
@@ -213,13 +187,16 @@ impl<R: Read + Seek> Reader<R> {
             Step::Record(opcode) => {
                 self.records += 1;
                 match opcode {
-                    op::HEADER => self.is_own = is_own(self.walk.body()),
                     op::CHUNK => self.open_chunk()?,
                     // Damage can turn other records into messages, and no checksum covers a single record.
-                    op::MESSAGE => self.note("messages outside of chunks (`mcap compress` packs them)"),
+                    op::MESSAGE => {
+                        let reason = "messages outside of chunks (`mcap compress` packs them)";
+                        let damage = self.walk.damaged(reason.to_owned());
+                        self.add(damage);
+                    }
                     // No message follows, and only the footer's checksum reveals damage here.
-                    _ if self.walk.is_in_index() => {}
-                    _ => self.definitions.take(opcode, self.walk.body()),
+                    _ if self.walk.is_in_index => {}
+                    _ => self.definitions.parse(opcode, self.walk.body()),
                 }
             }
         }
@@ -228,53 +205,48 @@ impl<R: Read + Seek> Reader<R> {
 
     /// Unpacks a chunk and checks it as a whole; a damaged one is skipped.
     fn open_chunk(&mut self) -> Result<(), ReadError> {
-        match self.chunk.open(self.walk.body()) {
-            Ok(header) => {
+        let header = mcap::parse_record(op::CHUNK, self.walk.body());
+        match header.and_then(|header| Ok((header, chunk::unpack(&self.walk.record)?))) {
+            Ok((Record::Chunk { header, .. }, (records, bytes))) => {
                 self.chunks.count += 1;
-                self.chunks.uncompressed_bytes += header.uncompressed_size;
+                self.chunks.uncompressed_bytes += bytes;
                 self.chunks.compressed_bytes += header.compressed_size;
                 self.chunks.compression = header.compression;
+                self.unpacked = records.into_iter();
                 Ok(())
             }
+            Ok(_) => unreachable!("the opcode is a chunk's"),
             Err(error) => {
                 self.chunks.damaged += 1;
-                let damage = self.walk.damaged(error.to_string());
+                let damage = self.walk.damaged(format!("a chunk that cannot be unpacked ({error})"));
                 self.skip(damage)
             }
         }
     }
 
-    /// Notes damage. Lost definitions are taken from the index, or from this version of the program.
+    /// Notes damage. Lost definitions are taken from the index.
     fn skip(&mut self, damage: Damage) -> Result<(), ReadError> {
         self.add(damage);
-        if self.definitions.is_empty() && !self.index_is_known {
+        if self.definitions.channels.is_empty() && !self.index_is_known {
             self.index_is_known = true;
-            let place = self.walk.place();
-            let found = Definitions::from_index(&mut self.walk)?;
-            self.walk.go_to(place)?;
-            let is_own = found.is_empty() && self.is_own;
-            self.definitions.add(if is_own { Definitions::for_this_version() } else { found });
+            self.definitions = Definitions::from_index(self.walk.ahead())?;
+            self.walk.go_on()?;
         }
         Ok(())
     }
 
     fn no_mcap(&self) -> ReadError {
         let first = self.damage.first().map_or_else(|| "it is empty".to_owned(), ToString::to_string);
-        ReadError::NoMcap { size: self.walk.size(), first }
+        ReadError::NoMcap { size: self.walk.size, first }
     }
 }
 
-impl Entry<'_> {
+impl Entry {
     /// The message, or why this program cannot read it; none on topics that are not the rig's.
     pub fn recorded(&self) -> Option<Result<Recorded, ReadError>> {
-        let topic = Topic::named(&self.channel?.topic)?;
-        Some(read(topic, self.data))
+        let topic = Topic::named(&self.channel.as_ref()?.topic)?;
+        Some(read(topic, &self.data))
     }
-}
-
-/// Whether this header names this version of the program.
-fn is_own(header: &[u8]) -> bool {
-    matches!(mcap::parse_record(op::HEADER, header), Ok(Record::Header(header)) if header.library == LIBRARY)
 }
 
 /// The message of a topic behind the CDR header, if it has this version's layout.
@@ -282,8 +254,5 @@ fn read(topic: Topic, data: &[u8]) -> Result<Recorded, ReadError> {
     let body = data.strip_prefix(&CDR_LITTLE_ENDIAN);
     let version = body.and_then(Stamps::read).map_or(0, |stamps| stamps.version);
     let message = body.filter(|_| version == LAYOUT_VERSION).and_then(|body| Recorded::read(topic, body));
-    message.ok_or_else(|| {
-        let expected = CDR_LITTLE_ENDIAN.len() + topic.body_bytes();
-        ReadError::Foreign { topic: topic.name(), found: data.len(), expected, version }
-    })
+    message.ok_or_else(|| ReadError::Foreign { topic: topic.name(), found: data.len(), version })
 }

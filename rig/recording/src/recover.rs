@@ -6,12 +6,10 @@
 use std::collections::BTreeSet;
 use std::io::{Read, Seek, Write};
 
-use mcap::records::Channel;
-use mcap::{McapError, Writer};
+use mcap::McapError;
 
-use super::reader::{ReadError, Reader};
-use super::schema::Schema;
-use super::writer::{LIBRARY, options};
+use super::reader::{Entry, ReadError, Reader};
+use super::writer::{add_schema, options};
 
 /// Why a recording could not be recovered.
 #[derive(Debug, thiserror::Error)]
@@ -34,45 +32,28 @@ pub struct Recovered {
 }
 
 /// Copies everything readable from `reader` to `medium`. The rest is in the reader's [`damage`](Reader::damage).
+///
+/// A channel whose schema is lost is defined without one, so that its messages are kept.
 pub fn recover<R: Read + Seek, W: Write + Seek>(
     reader: &mut Reader<R>,
     medium: W,
 ) -> Result<Recovered, RecoverError> {
-    // The header names another library, since this version may number the channels of its own recordings differently.
-    let mut writer = options().library(format!("{LIBRARY} recover")).create(medium)?;
+    let mut writer = options().create(medium)?;
     let mut defined = BTreeSet::new();
     let mut recovered = Recovered::default();
-    while let Some(entry) = reader.next_entry()? {
-        let Some(channel) = entry.channel else {
+    while let Some(Entry { channel, header, data }) = reader.next_entry()? {
+        let Some(channel) = channel else {
             recovered.undefined += 1;
             continue;
         };
-        if defined.insert(channel.id) {
-            define(&mut writer, channel, entry.schema)?;
+        let mcap::Channel { id, topic, message_encoding, metadata, .. } = &*channel;
+        if defined.insert(*id) {
+            let schema = add_schema(&mut writer, &channel)?;
+            writer.add_channel_with_id(*id, schema, topic, message_encoding, metadata)?;
         }
-        writer.write_to_known_channel(&entry.header, entry.data)?;
+        writer.write_to_known_channel(&header, &data)?;
         recovered.messages += 1;
     }
     writer.finish()?;
     Ok(recovered)
-}
-
-/// A channel whose schema is lost is defined without one, so that its messages are kept.
-fn define<W: Write + Seek>(
-    writer: &mut Writer<W>,
-    channel: &Channel,
-    schema: Option<&Schema>,
-) -> Result<(), McapError> {
-    let schema_id = match schema {
-        Some(schema) => writer.add_schema(&schema.name, &schema.encoding, &schema.data)?,
-        None => 0,
-    };
-    writer.add_channel_with_id(
-        channel.id,
-        schema_id,
-        &channel.topic,
-        &channel.message_encoding,
-        &channel.metadata,
-    )?;
-    Ok(())
 }

@@ -28,13 +28,6 @@ macro_rules! topics {
                 }
             }
 
-            /// Most bytes of a message's body.
-            pub fn body_bytes(self) -> usize {
-                match self {
-                    $(Self::$name => size_of::<$message>()),*
-                }
-            }
-
             /// Name and ROS 2 definition of the message type.
             pub(super) fn definition(self) -> (&'static str, String) {
                 match self {
@@ -65,6 +58,12 @@ macro_rules! topics {
                 }
             }
         }
+
+        $(impl From<$message> for Recorded {
+            fn from(message: $message) -> Self {
+                Self::$name(message)
+            }
+        })*
     };
 }
 
@@ -86,11 +85,6 @@ topics! {
 }
 
 impl Topic {
-    /// The topic of this type of message.
-    pub fn for_message<M: Message>() -> Self {
-        Self::named(M::TOPIC).expect("every message type has its topic here")
-    }
-
     /// The topic of this name.
     pub fn named(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|topic| topic.name() == name)

@@ -14,7 +14,7 @@ use serde::Serialize;
 /// A record longer than this is taken for damage, bytes; chunks stay far below.
 pub(super) const LONGEST_RECORD: u64 = 64 << 20;
 /// Opcode and length.
-const HEAD: usize = 9;
+pub(super) const HEAD: usize = 9;
 /// Chunk header up to the compression's name: two times, size, checksum, length of the name.
 const CHUNK_FIXED: usize = 8 + 8 + 8 + 4 + 4;
 /// Longest name of a compression that is accepted.
@@ -38,7 +38,7 @@ pub struct Damage {
 /// The next part of the file.
 #[derive(Debug)]
 pub(super) enum Step {
-    /// A record of this opcode, whole; see [`Walk::record`].
+    /// A record of this opcode, whole; see [`Walk::body`].
     Record(u8),
     /// Bytes that are no record.
     Damage(Damage),
@@ -46,44 +46,46 @@ pub(super) enum Step {
     End,
 }
 
-/// A place between two records, and the state of the walk there.
-#[derive(Clone)]
-pub(super) struct Place {
+/// A walk through a file.
+pub(super) struct Walk<R> {
+    source: R,
+    /// Bytes of the file.
+    pub(super) size: u64,
+    /// Where the current record began.
+    at: u64,
     /// Where the next record begins.
     next: u64,
     /// Whether it is between the end of the data and the footer.
-    is_in_index: bool,
+    pub(super) is_in_index: bool,
     /// Whether the last record was a footer.
     is_end_due: bool,
     /// Checksum of the current section of the file; none once damage was found in it.
     section: Option<Hasher>,
-}
-
-/// A walk through a file.
-pub(super) struct Walk<R> {
-    source: R,
-    size: u64,
-    place: Place,
-    /// Where the current record began.
-    at: u64,
     /// The current record with opcode and length.
-    record: Vec<u8>,
+    pub(super) record: Vec<u8>,
     /// The byte behind the closing magic, once it was read.
-    end: Option<u64>,
+    pub(super) end: Option<u64>,
 }
 
 impl<R: Read + Seek> Walk<R> {
     pub(super) fn new(mut source: R) -> io::Result<Self> {
         let size = source.seek(SeekFrom::End(0))?;
         source.rewind()?;
-        Ok(Self {
-            source,
-            size,
-            place: Place { next: 0, is_in_index: false, is_end_due: false, section: Some(Hasher::new()) },
-            at: 0,
-            record: Vec::new(),
-            end: None,
-        })
+        Ok(Self::from(source, size, 0, Some(Hasher::new())))
+    }
+
+    fn from(source: R, size: u64, next: u64, section: Option<Hasher>) -> Self {
+        let (is_in_index, is_end_due) = (false, false);
+        Self { source, size, at: next, next, is_in_index, is_end_due, section, record: Vec::new(), end: None }
+    }
+
+    /// Another walk from here on; [`Self::go_on`] continues this one.
+    pub(super) fn ahead(&mut self) -> Walk<&mut R> {
+        Walk::from(&mut self.source, self.size, self.next, None)
+    }
+
+    pub(super) fn go_on(&mut self) -> io::Result<()> {
+        self.source.seek(SeekFrom::Start(self.next)).map(|_| ())
     }
 
     /// The current record's content.
@@ -93,45 +95,19 @@ impl<R: Read + Seek> Walk<R> {
 
     /// The current record as a stretch of the file that is damaged.
     pub(super) fn damaged(&mut self, reason: String) -> Damage {
-        self.place.section = None;
+        self.section = None;
         self.stretch(reason)
-    }
-
-    /// Whether the file ended as MCAP files end.
-    pub(super) fn is_closed(&self) -> bool {
-        self.end.is_some()
-    }
-
-    /// Whether the walk is between the end of the data and the footer.
-    pub(super) fn is_in_index(&self) -> bool {
-        self.place.is_in_index
-    }
-
-    /// The current place.
-    pub(super) fn place(&self) -> Place {
-        self.place.clone()
-    }
-
-    /// Goes on from a place.
-    pub(super) fn go_to(&mut self, place: Place) -> io::Result<()> {
-        self.place = place;
-        self.source.seek(SeekFrom::Start(self.place.next)).map(|_| ())
-    }
-
-    /// Bytes of the file.
-    pub(super) fn size(&self) -> u64 {
-        self.size
     }
 
     /// The next record, or the next stretch that is none.
     pub(super) fn step(&mut self) -> io::Result<Step> {
-        self.at = self.place.next;
+        self.at = self.next;
         let left = self.size - self.at;
         if left == 0 {
             return Ok(Step::End);
         }
         if self.end == Some(self.at) {
-            self.place.next = self.size;
+            self.next = self.size;
             return Ok(Step::Damage(self.stretch("bytes behind the end of the recording".to_owned())));
         }
         self.record.resize(left.min(HEAD as u64) as usize, 0);
@@ -139,7 +115,7 @@ impl<R: Read + Seek> Walk<R> {
         if self.at == 0 {
             return self.begin();
         }
-        if self.record.starts_with(MAGIC) || self.place.is_end_due && left >= MAGIC.len() as u64 {
+        if self.record.starts_with(MAGIC) || self.is_end_due && left >= MAGIC.len() as u64 {
             return self.close();
         }
         if left < HEAD as u64 {
@@ -157,8 +133,8 @@ impl<R: Read + Seek> Walk<R> {
         if !is_consistent(self.record[0], self.body()) {
             return self.resynchronise("the lengths in a record contradict each other");
         }
-        self.place.next = self.at + self.record.len() as u64;
-        self.place.is_end_due = self.record[0] == op::FOOTER;
+        self.next = self.at + self.record.len() as u64;
+        self.is_end_due = self.record[0] == op::FOOTER;
         Ok(self.check_section().map_or(Step::Record(self.record[0]), Step::Damage))
     }
 
@@ -170,13 +146,13 @@ impl<R: Read + Seek> Walk<R> {
             op::FOOTER => (HEAD + 16, Some("the index")),
             _ => (self.record.len(), None),
         };
-        if let Some(section) = &mut self.place.section {
+        if let Some(section) = &mut self.section {
             section.update(&self.record[..covered]);
         }
         let ended = ended?;
-        self.place.is_in_index = self.record[0] == op::DATA_END;
+        self.is_in_index = self.record[0] == op::DATA_END;
         // The index has a checksum of its own.
-        let found = self.place.section.replace(Hasher::new())?.finalize();
+        let found = self.section.replace(Hasher::new())?.finalize();
         let expected =
             u32::from_le_bytes(*self.record.last_chunk().expect("both are longer than their checksum"));
         (expected != 0 && found != expected)
@@ -188,7 +164,7 @@ impl<R: Read + Seek> Walk<R> {
         if !self.record.starts_with(MAGIC) {
             return self.resynchronise("no MCAP file begins like this");
         }
-        if let Some(section) = &mut self.place.section {
+        if let Some(section) = &mut self.section {
             section.update(MAGIC);
         }
         self.pass_magic()?;
@@ -198,28 +174,29 @@ impl<R: Read + Seek> Walk<R> {
     /// The eight bytes that end every file behind its footer; one of both may be damaged.
     fn close(&mut self) -> io::Result<Step> {
         self.pass_magic()?;
-        self.end = Some(self.place.next);
-        if !self.place.is_end_due || !self.record.starts_with(MAGIC) {
+        self.end = Some(self.next);
+        if !self.is_end_due || !self.record.starts_with(MAGIC) {
             return Ok(Step::Damage(self.stretch("no MCAP file ends like this".to_owned())));
         }
         self.step()
     }
 
     fn pass_magic(&mut self) -> io::Result<()> {
-        self.place.next = self.at + MAGIC.len() as u64;
-        self.source.seek(SeekFrom::Start(self.place.next)).map(|_| ())
+        self.next = self.at + MAGIC.len() as u64;
+        self.go_on()
     }
 
     /// Everything from here to the next landmark is damage; without one, to the end of the file.
     fn resynchronise(&mut self, reason: &str) -> io::Result<Step> {
-        let next = self.find_landmark(self.at + 1)?.unwrap_or(self.size);
-        self.go_to(Place { next, is_in_index: false, is_end_due: false, section: None })?;
+        self.next = self.find_landmark(self.at + 1)?.unwrap_or(self.size);
+        (self.is_in_index, self.is_end_due, self.section) = (false, false, None);
+        self.go_on()?;
         Ok(Step::Damage(self.stretch(reason.to_owned())))
     }
 
     /// The bytes from the last record to the next.
     fn stretch(&self, reason: String) -> Damage {
-        Damage { from: self.at, to: self.place.next, reason }
+        Damage { from: self.at, to: self.next, reason }
     }
 
     /// The first place at or behind `from` where a chunk begins, or the magic that ends the file.

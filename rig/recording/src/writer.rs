@@ -4,7 +4,6 @@
 //! It waits for its medium; a process that must not wait records through a
 //! [`Backlog`](super::Backlog).
 
-use std::collections::BTreeMap;
 use std::error::Error;
 use std::fs::File;
 use std::io::{self, BufWriter, Cursor, Seek, SeekFrom, Write};
@@ -15,9 +14,9 @@ use std::thread::{self, JoinHandle};
 use mcap::records::MessageHeader;
 use mcap::{Compression, McapError, WriteOptions, Writer};
 
-use super::encoding::{Definition, Encoded, Encoder};
+use super::encoding::{Encoded, Encoder, definitions};
 use super::scene::Scene;
-use super::topic::{Recorded, Topic};
+use super::topic::Recorded;
 
 /// Bytes of messages in a chunk: what is compressed together, and read together by a tool that seeks. Beyond 640 KiB
 /// zstd's buffer wraps at this level, which costs more than smaller chunks do.
@@ -25,7 +24,7 @@ const CHUNK_BYTES: u64 = 600 << 10;
 /// zstd's fastest level: its ratio on these messages is within a tenth of the default level's.
 const COMPRESSION_LEVEL: u32 = 1;
 /// The name of this program in the header of a recording.
-pub(super) const LIBRARY: &str = concat!("masseter ", env!("CARGO_PKG_VERSION"));
+const LIBRARY: &str = concat!("masseter ", env!("CARGO_PKG_VERSION"));
 /// Bytes gathered before they go to the system.
 const BUFFER_BYTES: usize = 1 << 18;
 
@@ -68,6 +67,17 @@ pub(super) fn options() -> WriteOptions {
         .chunk_size(Some(CHUNK_BYTES))
         .disable_seeking(true)
         .library(LIBRARY)
+}
+
+/// Adds the schema of a channel to a file. Returns its number; 0 stands for no schema.
+pub(super) fn add_schema<W: Write + Seek>(
+    writer: &mut Writer<W>,
+    channel: &mcap::Channel,
+) -> Result<u16, McapError> {
+    match &channel.schema {
+        Some(schema) => writer.add_schema(&schema.name, &schema.encoding, &schema.data),
+        None => Ok(0),
+    }
 }
 
 /// Writes a recording on `W`.
@@ -131,9 +141,14 @@ impl<W: Medium> Recorder<W> {
     pub fn new(medium: W, scene: Scene) -> Result<Self, WriteError> {
         let mut writer = options().create(medium)?;
         let mut ids = Vec::new();
-        for Definition { topic, schema, message_encoding } in Definition::all() {
-            let schema = writer.add_schema(&schema.name, &schema.encoding, &schema.data)?;
-            ids.push(writer.add_channel(schema, topic, &message_encoding, &BTreeMap::new())?);
+        for channel in definitions() {
+            let schema = add_schema(&mut writer, &channel)?;
+            ids.push(writer.add_channel(
+                schema,
+                &channel.topic,
+                &channel.message_encoding,
+                &channel.metadata,
+            )?);
         }
         writer.flush()?;
         Ok(Self { channels: Channels { writer, ids }, encoder: Encoder::new(scene) })
@@ -142,18 +157,7 @@ impl<W: Medium> Recorder<W> {
     /// Appends a message that was received at `log_time_ns`, and its view in 3-D.
     pub fn record(&mut self, message: &Recorded, log_time_ns: u64) -> Result<(), WriteError> {
         let Self { channels, encoder } = self;
-        encoder.encode(message.topic(), message.body(), |message| channels.write(&message, log_time_ns))
-    }
-
-    /// Appends the message of a topic that is CDR already, and its view in 3-D.
-    pub(super) fn record_cdr(
-        &mut self,
-        topic: Topic,
-        cdr: &[u8],
-        log_time_ns: u64,
-    ) -> Result<(), WriteError> {
-        let Self { channels, encoder } = self;
-        encoder.encode_cdr(topic, cdr, |message| channels.write(&message, log_time_ns))
+        encoder.encode(message, |message| channels.write(&message, log_time_ns))
     }
 
     /// Ends the chunk and hands everything recorded so far to the medium.
@@ -204,9 +208,7 @@ impl DurableFile {
         let file = BufWriter::with_capacity(BUFFER_BYTES, file);
         Ok(Self { file, requests: Some(request), done, disk: Some(disk) })
     }
-}
 
-impl DurableFile {
     /// Waits until the disk has taken, or refused, everything that was flushed.
     fn settle(&mut self) -> io::Result<()> {
         self.requests = None;

@@ -38,13 +38,6 @@ struct Log {
     lines: u64,
 }
 
-impl Log {
-    fn create(path: PathBuf, interface: String) -> Result<Self, WriteError> {
-        let file = File::create(&path).map_err(WriteError::for_file(&path))?;
-        Ok(Self { path, interface, file: BufWriter::new(file), lines: 0 })
-    }
-}
-
 impl CandumpLogs {
     /// Logs in `folder`. They name the real interface of each bus, or `can0`, `can1` and so on where it has none.
     pub fn new(folder: &Path, interfaces: &[String]) -> Self {
@@ -61,7 +54,9 @@ impl CandumpLogs {
         while self.buses.len() <= bus {
             let next = self.buses.len();
             let interface = self.interfaces.get(next).cloned().unwrap_or_else(|| format!("can{next}"));
-            self.buses.push(Log::create(self.folder.join(format!("can{next}.log")), interface)?);
+            let path = self.folder.join(format!("can{next}.log"));
+            let file = BufWriter::new(File::create(&path).map_err(WriteError::for_file(&path))?);
+            self.buses.push(Log { path, interface, file, lines: 0 });
         }
         let log = &mut self.buses[bus];
         self.line.clear();

@@ -9,8 +9,7 @@ use crate::text;
 use masseter_analysis::{
     BusResponse, Code, EventRecord, Figures, OverrunAttribution, ResponseFigures, TrackingFigures,
 };
-use masseter_recording::Ending;
-use masseter_recording::Manifest;
+use masseter_recording::{Ending, Manifest};
 
 /// Whether what was checked is as it should be.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -25,10 +24,6 @@ pub enum CheckResult {
 }
 
 impl CheckResult {
-    fn from_passed(passed: bool) -> Self {
-        if passed { Self::Passed } else { Self::Failed }
-    }
-
     pub(crate) fn is_failed(self) -> bool {
         self == Self::Failed
     }
@@ -56,7 +51,8 @@ pub struct Check {
 
 impl Check {
     fn judged(name: &'static str, finding: String, passed: bool) -> Self {
-        Self { name, finding, result: CheckResult::from_passed(passed) }
+        let result = if passed { CheckResult::Passed } else { CheckResult::Failed };
+        Self { name, finding, result }
     }
 
     /// A failure that `excused` explains is none.
@@ -91,7 +87,12 @@ pub(crate) fn checks(manifest: &Manifest, figures: &Figures, is_disturbed: bool)
             ),
             result: missed_cycles(manifest, figures),
         },
-        dropped_messages(manifest, figures),
+        dropped_messages(
+            figures.missing_messages(),
+            &manifest.ending,
+            figures.cut_short,
+            !figures.damage.is_empty(),
+        ),
         bus_response(&figures.bus_response),
     ];
     checks.extend(faults(manifest.scenario.faults.len(), &figures.events, is_played));
@@ -108,26 +109,17 @@ fn sequence(state: Option<Code<ControllerState>>, events: &[EventRecord]) -> Che
 }
 
 /// Gaps show losses before the last recorded message. Losses behind it, and in unreadable parts, are unknown.
-fn dropped_messages(manifest: &Manifest, figures: &Figures) -> Check {
-    let missing = figures.missing_messages();
-    dropped(missing, part_not_known(&manifest.ending, figures.cut_short, !figures.damage.is_empty()))
-}
-
-fn dropped(missing: u64, not_known: Option<&str>) -> Check {
+fn dropped_messages(missing: u64, ending: &Ending, is_cut_short: bool, is_damaged: bool) -> Check {
     const NAME: &str = "dropped messages";
-    match not_known {
-        Some(why) if missing == 0 => Check::not_judged(NAME, format!("no gap, but {why}")),
-        _ => Check::judged(NAME, missing.to_string(), missing == 0),
-    }
-}
-
-fn part_not_known(ending: &Ending, is_cut_short: bool, is_damaged: bool) -> Option<&'static str> {
     let reasons = [
         (is_cut_short, "the recording lacks its end"),
         (is_damaged, "the recording is damaged"),
         (*ending == Ending::RecordingFailed, "the recorder could not write everything"),
     ];
-    reasons.into_iter().find_map(|(is_so, why)| is_so.then_some(why))
+    match reasons.into_iter().find(|(is_so, _)| *is_so) {
+        Some((_, why)) if missing == 0 => Check::not_judged(NAME, format!("no gap, but {why}")),
+        _ => Check::judged(NAME, missing.to_string(), missing == 0),
+    }
 }
 
 /// A motion that was played and left nothing to compare is no less a failure than one that was followed badly.
@@ -272,7 +264,7 @@ mod tests {
             (Ending::RecordingFailed, true, true, 1, "FAIL"),
         ];
         for (ending, is_cut_short, is_damaged, missing, mark) in cases {
-            let check = dropped(missing, part_not_known(&ending, is_cut_short, is_damaged));
+            let check = dropped_messages(missing, &ending, is_cut_short, is_damaged);
             assert_eq!(check.result.mark(), mark, "{ending:?} {check:?}");
         }
     }

@@ -1,6 +1,7 @@
 //! The report of a run folder: one pass over its recording, then every file of the report.
 
 use std::fs;
+use std::io::{self, ErrorKind};
 use std::path::Path;
 
 use anyhow::Context;
@@ -31,8 +32,9 @@ enum AnalysisError {
 pub fn report_run(folder: &RunFolder, manifest: &Manifest, format: Format) -> Result<Exit, Failure> {
     let (figures, logged) =
         analyse(folder, &manifest.scenario).context("the run's recording cannot be analysed").incomplete()?;
-    logged.and_then(|()| write_data(folder, &figures)).incomplete()?;
-    write_report(folder, manifest, &figures, format)
+    let (exit, written) = show_and_write(folder, manifest, &figures, logged, format)?;
+    written.incomplete()?;
+    Ok(exit)
 }
 
 /// `masseter report`: the same of a past run. Where its folder is read-only, the run is shown and no file is written.
@@ -44,20 +46,20 @@ pub fn report_past_run(path: &Path, format: Format) -> Result<Exit, Failure> {
     let unread = || format!("cannot read {}", folder.manifest().display());
     let manifest = Manifest::read(&folder).with_context(unread).usage()?;
     let (figures, logged) = analyse(&folder, &manifest.scenario).usage()?;
-    match logged.and_then(|()| write_data(&folder, &figures)) {
-        Err(error) if error.is_read_only() => {
-            let WriteError { path, error } = error;
-            status!(
-                "masseter: cannot write {}: {error}; the run is shown, and no file written",
-                path.display()
-            );
-            Ok(judge_and_show(&folder, &manifest, &figures, format)?.0.exit_code)
-        }
-        written => {
-            written.incomplete()?;
-            write_report(&folder, &manifest, &figures, format)
-        }
+    let (exit, written) = show_and_write(&folder, &manifest, &figures, logged, format)?;
+    match written {
+        Err(WriteError { path, error }) if is_read_only(&error) => status!(
+            "masseter: cannot write {}: {error}; the run is shown, and no file written",
+            path.display()
+        ),
+        written => written.incomplete()?,
     }
+    Ok(exit)
+}
+
+/// Whether the folder takes no files, as an archive does.
+fn is_read_only(error: &io::Error) -> bool {
+    matches!(error.kind(), ErrorKind::PermissionDenied | ErrorKind::ReadOnlyFilesystem)
 }
 
 /// Reads the recording once: its figures, and whether its CAN frames could be written as candump logs.
@@ -80,40 +82,17 @@ fn analyse(
     Ok((figures, logs.and_then(CandumpLogs::finish).map(drop)))
 }
 
-/// Writes histogram logs and events.
-fn write_data(folder: &RunFolder, figures: &Figures) -> Result<(), WriteError> {
-    histogram_log::write_all(&folder.histograms(), &figures.intervals)?;
-    event_log::write(&folder.events(), &figures.events)
-}
-
-/// Judges the run, prints the result and writes summary, JUnit XML and page.
-fn write_report(
+/// Judges the run and prints the result, then writes every file of the report, if the logs could be written.
+fn show_and_write(
     folder: &RunFolder,
     manifest: &Manifest,
     figures: &Figures,
+    logged: Result<(), WriteError>,
     format: Format,
-) -> Result<Exit, Failure> {
-    let (verdict, summary) = judge_and_show(folder, manifest, figures, format)?;
-    let page = page::html(manifest, figures, &verdict).context("cannot write the page").incomplete()?;
-    for (path, text) in [
-        (folder.summary(), summary),
-        (folder.junit(), junit::xml(manifest, figures, &verdict)),
-        (folder.report(), page),
-    ] {
-        fs::write(&path, text).map_err(WriteError::for_file(&path)).incomplete()?;
-    }
-    Ok(verdict.exit_code)
-}
-
-/// Judges the run and prints the result. Returns the verdict and the summary as JSON.
-fn judge_and_show(
-    folder: &RunFolder,
-    manifest: &Manifest,
-    figures: &Figures,
-    format: Format,
-) -> Result<(Verdict, String), Failure> {
+) -> Result<(Exit, Result<(), WriteError>), Failure> {
     let verdict = Verdict::new(manifest, figures);
     let summary = summary::json(&verdict, figures).context("cannot write the summary").incomplete()?;
+    let page = page::html(manifest, figures, &verdict).context("cannot write the page").incomplete()?;
     match format {
         Format::Human => {
             let table = table::text(manifest, figures, &verdict);
@@ -121,5 +100,13 @@ fn judge_and_show(
         }
         Format::Json => show(&summary),
     }
-    Ok((verdict, summary))
+    let write = || {
+        histogram_log::write_all(&folder.file("hist"), &figures.intervals)?;
+        event_log::write(&folder.file("events.jsonl"), &figures.events)?;
+        let junit = junit::xml(manifest, figures, &verdict);
+        [(folder.summary(), summary), (folder.file("junit.xml"), junit), (folder.file("report.html"), page)]
+            .into_iter()
+            .try_for_each(|(path, text)| fs::write(&path, text).map_err(WriteError::for_file(&path)))
+    };
+    Ok((verdict.exit_code, logged.and_then(|()| write())))
 }

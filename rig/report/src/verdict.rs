@@ -124,13 +124,13 @@ fn incomplete(figures: &Figures) -> Option<Judgement> {
 /// excused only when many of them were missed just before it, and is so however many may be missed.
 fn disturbed(manifest: &Manifest, figures: &Figures) -> Option<Judgement> {
     let refusal = manifest.refusal();
+    let (skipped, by_machine) = figures.skipped();
     let stop = excuse(
         &manifest.ending,
         missed_cycles(manifest, figures),
         figures.outage,
-        figures.only_the_machine() || refusal.is_some(),
+        by_machine == skipped || refusal.is_some(),
     )?;
-    let (skipped, _) = figures.skipped();
     let reason = if let Some((process, refusal)) = refusal {
         format!("{skipped} cycles were missed without real time{stop}; {process}: {refusal}")
     } else {

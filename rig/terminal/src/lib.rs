@@ -1,4 +1,4 @@
-//! Output to the terminal, exit codes, and files that a command creates.
+//! Output to the terminal, and exit codes.
 //!
 //! Unlike `println!` and `eprintln!`, nothing here panics: a closed pipe, a closed terminal or a full disk must not end a
 //! run. Only [`result`] reports errors, because its text is in no file. This crate knows no verb and no file format.
@@ -12,7 +12,6 @@
 //! ```
 
 mod exit;
-mod output;
 
 use std::io::{self, ErrorKind, Write};
 
@@ -20,7 +19,6 @@ use anyhow::Context;
 use clap::ValueEnum;
 
 pub use exit::{Exit, Failure, OrFailure};
-pub use output::{OutputError, new_file, new_folder};
 
 /// The format of results.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]

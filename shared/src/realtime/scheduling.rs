@@ -25,6 +25,7 @@ pub struct Wanted {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Obtained {
     /// The request.
+    #[serde(rename = "requested", alias = "wanted")]
     pub wanted: Wanted,
     /// The only core the process may run on, if there is only one.
     pub core: Option<usize>,

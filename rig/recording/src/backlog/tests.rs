@@ -20,8 +20,8 @@ struct Stuck {
     then: io::ErrorKind,
 }
 
-/// What fits into a batch in real time, bytes.
-const BATCH_BYTES: usize = Pace::RealTime.batch_bytes();
+/// What fits into a batch in real time.
+const BATCH: u64 = Pace::RealTime.batch_messages() as u64;
 
 /// What a disk that is well again says.
 const WELL: io::ErrorKind = io::ErrorKind::Other;
@@ -62,14 +62,17 @@ fn definitions() -> u64 {
     bytes.position()
 }
 
-/// Offers readings until `bytes` of them have come to a disk that is stuck meanwhile.
-fn record_on_a_stuck_disk(bytes: usize, then: io::ErrorKind) -> (u64, Outcome) {
+fn reading(seq: u64) -> Recorded {
+    Recorded::Reading(Reading { seq, ..Default::default() })
+}
+
+/// Offers so many readings to a disk that is stuck meanwhile.
+fn record_on_a_stuck_disk(offered: u64, then: io::ErrorKind) -> (u64, Outcome) {
     let (let_go, go_on) = channel();
     let disk = Stuck { definitions: definitions(), bytes: Cursor::default(), go_on, then };
     let mut backlog = Backlog::start(Recorder::new(disk, scene()).unwrap(), Pace::RealTime);
-    let offered = (bytes / size_of::<Reading>()) as u64;
     for seq in 1..=offered {
-        backlog.record(&Reading { seq, ..Default::default() }, seq);
+        backlog.record(&reading(seq), seq);
     }
     let dropped = backlog.dropped();
     drop(let_go);
@@ -78,14 +81,14 @@ fn record_on_a_stuck_disk(bytes: usize, then: io::ErrorKind) -> (u64, Outcome) {
 
 #[test]
 fn a_disk_that_hangs_for_a_while_loses_nothing() {
-    let (dropped, recorded) = record_on_a_stuck_disk(BATCH_BYTES / 2, WELL);
+    let (dropped, recorded) = record_on_a_stuck_disk(BATCH / 2, WELL);
     assert_eq!((dropped, recorded.lost), (0, 0));
     assert!(recorded.error.is_none());
 }
 
 #[test]
 fn a_disk_that_hangs_too_long_loses_what_memory_cannot_hold_and_no_more() {
-    let (dropped, recorded) = record_on_a_stuck_disk(BATCH_BYTES * 4, WELL);
+    let (dropped, recorded) = record_on_a_stuck_disk(BATCH * 4, WELL);
     assert!(dropped > 0);
     assert_eq!(recorded.lost, dropped);
     assert!(recorded.error.is_none());
@@ -93,8 +96,8 @@ fn a_disk_that_hangs_too_long_loses_what_memory_cannot_hold_and_no_more() {
 
 #[test]
 fn a_disk_that_is_gone_loses_everything_behind_the_last_flush() {
-    let (_, recorded) = record_on_a_stuck_disk(BATCH_BYTES / 2, io::ErrorKind::StorageFull);
-    assert_eq!(recorded.lost, (BATCH_BYTES / 2 / size_of::<Reading>()) as u64);
+    let (_, recorded) = record_on_a_stuck_disk(BATCH / 2, io::ErrorKind::StorageFull);
+    assert_eq!(recorded.lost, BATCH / 2);
     assert!(recorded.error.is_some());
 }
 
@@ -104,8 +107,8 @@ fn a_disk_failure_is_reported_once_during_the_recording_and_again_at_its_end() {
     let then = io::ErrorKind::StorageFull;
     let disk = Stuck { definitions: definitions(), bytes: Cursor::default(), go_on, then };
     let mut backlog = Backlog::start(Recorder::new(disk, scene()).unwrap(), Pace::RealTime);
-    for seq in 1..=(BATCH_BYTES / 2 / size_of::<Reading>()) as u64 {
-        backlog.record(&Reading { seq, ..Default::default() }, seq);
+    for seq in 1..=BATCH / 2 {
+        backlog.record(&reading(seq), seq);
     }
     backlog.hand_over();
     assert!(backlog.new_failure().is_none());
@@ -140,8 +143,8 @@ fn a_caller_that_may_wait_loses_nothing_on_a_slow_disk() {
     let disk = Stuck { definitions: definitions(), bytes: Cursor::default(), go_on, then: WELL };
     let mut backlog = Backlog::start(Recorder::new(disk, scene()).unwrap(), Pace::Virtual);
     let offering = thread::spawn(move || {
-        for seq in 1..=(4 * Pace::Virtual.batch_bytes() / size_of::<Reading>()) as u64 {
-            backlog.record(&Reading { seq, ..Default::default() }, seq);
+        for seq in 1..=4 * Pace::Virtual.batch_messages() as u64 {
+            backlog.record(&reading(seq), seq);
         }
         (backlog.dropped(), backlog.finish())
     });

@@ -125,8 +125,9 @@ fn messages_are_recovered_however_their_schemas_are_numbered() {
         assert_eq!(recovered, Recovered { messages: 2, undefined: 0 });
         let mut reader = Reader::new(Cursor::new(bytes)).unwrap();
         let mut kept = Vec::new();
-        while let Some(Entry { channel, schema, data, .. }) = reader.next_entry().unwrap() {
-            kept.push((channel.unwrap().topic.clone(), schema.unwrap().name.clone(), data.to_vec()));
+        while let Some(Entry { channel, data, .. }) = reader.next_entry().unwrap() {
+            let channel = channel.unwrap();
+            kept.push((channel.topic.clone(), channel.schema.as_ref().unwrap().name.clone(), data));
         }
         let expected =
             [1_u8, 2].map(|number| (format!("topic {number}"), format!("type {number}"), vec![number, 0]));

@@ -9,9 +9,7 @@ use std::fmt::Write;
 use std::path::Path;
 
 use anyhow::Context;
-use masseter_terminal::Exit;
-use masseter_terminal::Format;
-use masseter_terminal::result;
+use masseter_terminal::{Exit, Format, result};
 use serde::Serialize;
 
 use crate::text::or_dash;
@@ -44,7 +42,7 @@ pub fn runs(a: &Path, b: &Path, format: Format) -> anyhow::Result<Exit> {
     let changes = changes(&a.figures, &b.figures);
     let comparison = Comparison { form: FORM, a, b, differs, changes };
     result(&match format {
-        Format::Human => comparison.in_words(),
+        Format::Human => comparison.in_words()?,
         Format::Json => {
             serde_json::to_string_pretty(&comparison).context("cannot write the comparison")? + "\n"
         }
@@ -53,13 +51,8 @@ pub fn runs(a: &Path, b: &Path, format: Format) -> anyhow::Result<Exit> {
 }
 
 impl Comparison {
-    fn in_words(&self) -> String {
+    fn in_words(&self) -> Result<String, std::fmt::Error> {
         let mut text = String::new();
-        self.write(&mut text).expect("a string takes any text");
-        text
-    }
-
-    fn write(&self, text: &mut String) -> std::fmt::Result {
         for (name, side) in [("A", &self.a), ("B", &self.b)] {
             writeln!(text, "{name}: {}\n   {}: {}", side.path, side.verdict.word, side.verdict.reason)?;
         }
@@ -73,8 +66,9 @@ impl Comparison {
         write!(text, "\n{LEGEND}\n{:<50} {:>14} {:>14} {:>9}\n", "figure", "A", "B", "change")?;
         let of = |judgement| self.changes.iter().filter(move |change| change.judgement == judgement);
         let changed = Judgement::CHANGED.into_iter().flat_map(of);
-        changed.into_iter().try_for_each(|change| row(text, change))?;
-        writeln!(text, "{} figures are the same", of(Judgement::Same).count())
+        changed.into_iter().try_for_each(|change| row(&mut text, change))?;
+        writeln!(text, "{} figures are the same", of(Judgement::Same).count())?;
+        Ok(text)
     }
 }
 
@@ -116,7 +110,7 @@ mod tests {
 
     #[test]
     fn verdicts_come_first_then_what_differs_then_what_changed_most_surely() {
-        let text = comparison().in_words();
+        let text = comparison().in_words().unwrap();
         let places = [
             "A: A\n   PASS: every check passed\nB: B\n",
             "warning: these were not runs of the same",
