@@ -106,7 +106,7 @@ fn recorded(workspace: &Workspace) -> BTreeMap<String, HashSet<Vec<u8>>> {
     let mut recorded: BTreeMap<String, HashSet<Vec<u8>>> = BTreeMap::new();
     while let Some(entry) = reader.next_entry().unwrap() {
         let topic = entry.channel.unwrap().topic.clone();
-        recorded.entry(topic).or_default().insert(entry.data.to_vec());
+        recorded.entry(topic).or_default().insert(entry.data.clone());
     }
     recorded
 }

@@ -35,6 +35,8 @@ pub trait Message: Pod + ZeroCopySend + Default + std::fmt::Debug + PartialEq {
     /// Type name in shared memory, `masseter/Reading/<hash>`: a service of another layout is refused when it is opened. The
     /// hash covers the schema, the version, and the number and name of every code that messages carry.
     const SHARED_MEMORY_NAME: &'static str;
+    /// [`LAYOUT_VERSION`] of the sender.
+    fn version(&self) -> u64;
     /// The layout in the ROS 2 message definition language, as recordings carry it.
     fn schema() -> String;
     /// The CDR body: all bytes except the unused ones at the end.
@@ -78,6 +80,10 @@ macro_rules! messages {
             const DEPTH: usize = $depth;
             const TYPE_NAME: &'static str = concat!("masseter/", stringify!($name));
             const SHARED_MEMORY_NAME: &'static str = $type_name;
+
+            fn version(&self) -> u64 {
+                self.version
+            }
 
             fn schema() -> String {
                 let header = ["seq", "published_ns", "version"].map(|name| (name, u64::ros_type()));

@@ -6,7 +6,7 @@ use iceoryx2::prelude::{AllocationStrategy, ipc};
 use iceoryx2::sample::Sample;
 use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
 
-use super::error::{TransportError, failed};
+use super::error::{TransportError, check_version, failed};
 use super::ports::{Node, Publisher, Subscriber};
 use crate::clock;
 use crate::messages::Message;
@@ -69,6 +69,7 @@ impl<M: Message> Subscriber<[M]> {
     pub fn receive(&self) -> Result<Option<Sample<ipc::Service, [M], ()>>, TransportError> {
         let sample = self.port.receive().map_err(failed("receiving", M::TOPIC))?;
         self.refused.check(M::TOPIC)?;
+        sample.iter().flat_map(|sample| sample.iter()).try_for_each(check_version)?;
         Ok(sample)
     }
 }

@@ -7,6 +7,8 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use iceoryx2::port::update_connections::UpdateConnections;
 use iceoryx2::port::{DegradationAction, DegradationFn};
 
+use crate::messages::{LAYOUT_VERSION, Message};
+
 /// Why a port could not be made or used.
 #[derive(Debug, thiserror::Error)]
 #[error("iceoryx2: {action} failed ({reason}); {help}", help = help(reason))]
@@ -36,6 +38,17 @@ pub(super) fn failed<E: Debug>(verb: &'static str, what: &str) -> impl FnOnce(E)
         TransportError { action: format!("{verb} '{what}'"), reason: format!("{cause:?}") }
     }
     move |cause| error(verb, what, &cause)
+}
+
+/// Refuses a message that does not carry this program's version: a sender need not be this program.
+pub(super) fn check_version<M: Message>(message: &M) -> Result<(), TransportError> {
+    match message.version() {
+        LAYOUT_VERSION => Ok(()),
+        version => {
+            let reason = format_args!("IncompatibleVersion({version}, this program has {LAYOUT_VERSION})");
+            Err(failed("receiving", M::TOPIC)(reason))
+        }
+    }
 }
 
 /// Connections that a port could not make: iceoryx2 continues without them, and reports them in its log only.

@@ -17,7 +17,7 @@ use iceoryx2::service::port_factory::publisher::PortFactoryPublisher;
 use iceoryx2::service::port_factory::subscriber::PortFactorySubscriber;
 
 use super::Domain;
-use super::error::{Refused, TransportError, failed};
+use super::error::{Refused, TransportError, check_version, failed};
 use crate::clock;
 use crate::messages::Message;
 use crate::realtime::Waiter;
@@ -205,7 +205,7 @@ impl<M: Message> Subscriber<M> {
     pub fn receive(&self) -> Result<Option<Received<M>>, TransportError> {
         let sample = self.port.receive().map_err(failed("receiving", M::TOPIC))?;
         self.refused.check(M::TOPIC)?;
-        Ok(sample.map(Received))
+        sample.map(|sample| check_version(&*sample).map(|()| Received(sample))).transpose()
     }
 
     /// The first message that `is_awaited`, or the newest there is when `deadline_ns` has passed. Polls without
@@ -309,6 +309,21 @@ mod tests {
             event.cycle >= 9
         });
         assert_eq!(newest.unwrap().unwrap().cycle, 9);
+    }
+
+    /// A sender of another version with the same layout.
+    #[test]
+    fn a_message_of_another_version_is_refused() {
+        let domain = ScratchDomain::claim("test-version").unwrap();
+        let node = Node::join(&domain).unwrap();
+        let subscriber = node.subscriber::<Event>().unwrap();
+        let publisher = node.publisher::<Event>().unwrap();
+        let mut sample = publisher.port.loan().unwrap();
+        sample.payload_mut().stamp(1, 1);
+        sample.payload_mut().version += 1;
+        sample.send().unwrap();
+        let error = subscriber.receive().unwrap_err().to_string();
+        assert!(error.contains("IncompatibleVersion(8") && error.contains("another version"), "{error}");
     }
 
     /// Reads like an event, but for the name of its layout.
