@@ -74,6 +74,22 @@ impl Outcome {
 }
 
 /// The caller's end of the queue.
+///
+/// ```
+/// use masseter_recording::{Backlog, Pace, Reader, Recorded, Recorder, Scene};
+/// use masseter_shared::config::Scenario;
+/// use masseter_shared::geometry::Mechanism;
+/// use masseter_shared::messages::State;
+///
+/// let folder = tempfile::tempdir()?;
+/// let path = folder.path().join("recording.mcap");
+/// let scene = Scene::new(&Mechanism::default(), &Scenario::default().jaw);
+/// let mut backlog = Backlog::start(Recorder::create(&path, scene)?, Pace::Virtual);
+/// backlog.record(&Recorded::State(State { seq: 1, cycle: 1, ..State::default() }), 1_000_000);
+/// assert_eq!(backlog.finish().loss(), None);
+/// assert!(Reader::open(&path)?.next_message()?.is_some());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub struct Backlog {
     pace: Pace,
     pending: Batch,
