@@ -127,8 +127,8 @@ impl Trajectory {
         recording.centroid_turn_deg
     }
 
-    /// File and line of the recording nearest to a time of the trajectory; none for a generator.
-    fn source_line(&self, t_s: f64) -> Option<String> {
+    /// File and line, `motion.csv:7`, of the recording nearest to a time of the trajectory; none for a generator.
+    pub fn source_line(&self, t_s: f64) -> Option<String> {
         let Motion::Recording(recording) = &self.motion else { return None };
         Some(recording.source_line(self.motion_time_s(t_s)))
     }
