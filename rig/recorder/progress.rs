@@ -122,16 +122,15 @@ impl Progress {
             format!("   live {connected} watching, {dropped} dropped")
         });
         format!(
-            "  {:<13} motion {:>7.2} of {:.2} s   tracking error {:.3} mm, max {:.3}   wake-up latency max {:.0} µs   \
-             missed {}   dropped {}{live}",
+            "{:<13}{:>6.2} of {:.2} s   missed {}   dropped {}   tracking error {:.3} mm, max {:.3}   latest {:.0} µs{live}",
             self.controller_state().map_or("?", ControllerState::name),
             self.state.motion_time_s.max(0.0),
             self.motion_s,
+            self.state.skipped_cycles + self.reading.skipped_cycles,
+            self.missing + unrecorded,
             self.error_mm(),
             self.max_error_mm,
             self.max_late_ns as f64 / 1e3,
-            self.state.skipped_cycles + self.reading.skipped_cycles,
-            self.missing + unrecorded,
         )
     }
 
@@ -175,8 +174,8 @@ mod tests {
         let line = after_ten_cycles(false).next(SECOND_NS, Losses { unrecorded: 2, clients });
         assert_eq!(
             line,
-            "  running       motion    1.00 of 4.00 s   tracking error 2.000 mm, max 4.000   \
-             wake-up latency max 50 µs   missed 6   dropped 5   live 1 watching, 7 dropped\n"
+            "running        1.00 of 4.00 s   missed 6   dropped 5   tracking error 2.000 mm, max 4.000   latest 50 µs   \
+             live 1 watching, 7 dropped\n"
         );
     }
 

@@ -9,7 +9,6 @@ pub mod control;
 pub mod geometry;
 pub mod lifecycle;
 pub mod messages;
-pub mod output;
 pub mod realtime;
 pub mod schedule;
 pub mod transport;

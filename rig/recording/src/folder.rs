@@ -6,8 +6,8 @@ use std::os::unix::fs::symlink;
 use std::path::{Path, PathBuf};
 use std::time::UNIX_EPOCH;
 
+use crate::output::{OutputError, new_folder};
 use masseter_shared::clock;
-use masseter_shared::output::{OutputError, new_folder};
 
 /// Name of the recorded motion within the folder, as its scenario knows it.
 pub const MOTION: &str = "motion.csv";
