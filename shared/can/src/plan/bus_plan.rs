@@ -19,7 +19,7 @@ use crate::wire::{Bitrate, worst_case_bits};
 /// let messages = vec![message(0x080, 0)?, message(0x181, 8)?];
 /// let plan = BusPlan::new(0, Bitrate::MAX, 1_000_000, messages)?;
 /// plan.check()?;
-/// let sync_ns = plan.response_ns(CanId::standard(0x080)?);
+/// let sync_ns = plan.messages()[0].response_ns;
 /// assert_eq!(sync_ns, Some(190_000), "135 bits of the longer frame, 55 bits of its own");
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
