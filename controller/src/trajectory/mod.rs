@@ -18,6 +18,7 @@ mod jaw_frame;
 mod lowpass;
 mod mandible;
 mod markers;
+mod plausibility;
 mod pose_csv;
 mod recording;
 mod spline;
@@ -125,6 +126,12 @@ impl Trajectory {
     pub fn centroid_turn_deg(&self) -> Option<f64> {
         let Motion::Recording(recording) = &self.motion else { return None };
         recording.centroid_turn_deg
+    }
+
+    /// What is doubtful in a recording, each with its line; nothing for a generator.
+    pub fn doubts(&self) -> &[String] {
+        let Motion::Recording(recording) = &self.motion else { return &[] };
+        &recording.doubts
     }
 
     /// File and line, `motion.csv:7`, of the recording nearest to a time of the trajectory; none for a generator.

@@ -70,10 +70,15 @@ impl RunFolder {
     /// recording.
     pub fn keep(&self, path: &Path, text: &str) -> io::Result<()> {
         let unfinished = path.with_extension("part");
-        let mut file = File::create(&unfinished)?;
-        file.write_all(text.as_bytes())?;
-        file.sync_all()?;
-        fs::rename(unfinished, path)?;
+        let write = || {
+            let mut file = File::create(&unfinished)?;
+            file.write_all(text.as_bytes())?;
+            file.sync_all()?;
+            fs::rename(&unfinished, path)
+        };
+        write().inspect_err(|_| {
+            let _ = fs::remove_file(&unfinished);
+        })?;
         secure_names(&self.0);
         Ok(())
     }
