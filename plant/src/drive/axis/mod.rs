@@ -419,3 +419,6 @@ impl Axis {
         self.encoder.nearest(position_m).saturating_add(self.origin_increments)
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -1,14 +1,20 @@
 //! Scenarios of the master with scripted drives.
 
 mod boot;
+mod lost;
+mod parts;
 mod peer;
 mod recovery;
+mod stops;
+mod targets;
 
 use masseter_can::canopen::NodeId;
 use masseter_can::cia402::DriveState;
 use masseter_shared::config::Scenario;
 use masseter_shared::geometry::AXES;
-use masseter_shared::messages::codes::{BootPhase, Cause, DriveRequest, EventKind, Source};
+use masseter_shared::messages::codes::{
+    BootPhase, Cause, DriveRequest, EventKind, NO_AXIS, NO_DRIVE_STATE, Source,
+};
 use masseter_shared::messages::{Command, Event, Reading};
 use masseter_shared::realtime::Wake;
 
@@ -26,6 +32,8 @@ struct Bench {
     reading: Reading,
     events: Vec<Event>,
     cycle: u64,
+    /// How far the targets of its commands lie beyond the measured positions, m.
+    offset_m: f64,
 }
 
 impl Bench {
@@ -39,6 +47,7 @@ impl Bench {
             reading: Reading::default(),
             events: Vec::new(),
             cycle: 0,
+            offset_m: 0.0,
         }
     }
 
@@ -53,6 +62,11 @@ impl Bench {
 
     /// A cycle with that request, or without any command.
     fn cycle(&mut self, request: Option<DriveRequest>) {
+        self.cycle_with(|command| Some(Command { request: request?.code(), ..command }));
+    }
+
+    /// A cycle with what `make` makes of a command without a request.
+    fn cycle_with(&mut self, make: impl FnOnce(Command) -> Option<Command>) {
         self.cycle += 1;
         let sync_ns = self.now_ns();
         let wake = Wake::on_time(self.cycle, sync_ns);
@@ -60,18 +74,25 @@ impl Bench {
         self.master.begin_cycle(wake, &mut self.wires);
         self.master.collect(sync_ns + 500_000, &mut self.wires);
         self.master.fill_reading(&mut self.reading);
-        let command = request.map(|request| Command {
-            cycle: self.cycle,
-            target_m: self.reading.position_m,
-            request: request.code(),
-            ..Command::default()
-        });
+        let target_m = self.reading.position_m.map(|position_m| position_m + self.offset_m);
+        let command = make(Command { cycle: self.cycle, target_m, ..Command::default() });
         self.master.apply(sync_ns + 550_000, command.as_ref(), &mut self.wires);
         self.master.drain_events(&mut |event| self.events.push(event));
     }
 
     fn cycles(&mut self, count: u64, request: DriveRequest) {
         (0..count).for_each(|_| self.cycle(Some(request)));
+    }
+
+    /// Cycles without motion, until the boot of an axis is in that phase.
+    fn cycles_until(&mut self, axis: usize, phase: BootPhase) {
+        for _ in 0..5000 {
+            if self.master.drives[axis].boot_phase() == phase {
+                return;
+            }
+            self.cycle(Some(DriveRequest::Off));
+        }
+        panic!("{phase} was not reached, but {}", self.master.drives[axis].boot_phase());
     }
 
     /// Boots and enables all drives.
