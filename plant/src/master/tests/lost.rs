@@ -71,3 +71,16 @@ fn a_running_drive_may_owe_its_process_data_for_three_cycles() {
     assert_eq!((fault.cause, fault.axis), (Cause::ProcessDataLost.code(), 1));
     assert_eq!((fault.value, fault.limit), (4.0, 3.0));
 }
+
+/// From its boot-up message on: nothing of before counts for it.
+#[test]
+fn a_drive_that_has_restarted_is_unknown_at_once() {
+    let mut bench = Bench::enabled();
+    bench.drive(4).cycle_power();
+    bench.drive(4).targets.clear();
+    bench.cycle(Some(DriveRequest::Enable));
+    assert_eq!(bench.reading.drive_state[4], NO_DRIVE_STATE);
+    assert_eq!(bench.reading.fresh_axes, 0b10_1111);
+    assert_eq!(bench.master.drives[4].boot_phase(), BootPhase::Waiting);
+    assert_eq!(bench.drive(4).targets, []);
+}

@@ -4,6 +4,7 @@ use masseter_can::canopen::ObjectAddress;
 use masseter_can::{ErrorState, SendError};
 
 use super::super::bus_monitor::BusMonitor;
+use super::super::drive::{Finding, RemoteDrive};
 use super::super::exchange::Exchange;
 use super::super::interlock::{Failure, Interlock};
 use super::super::presence::Presence;
@@ -190,4 +191,23 @@ fn a_reading_has_the_times_of_its_cycle() {
     exchange.begin_cycle(Wake::on_time(8, 6000));
     exchange.fill_reading(&mut reading);
     assert_eq!(reading.complete_ns, 0);
+}
+
+#[test]
+fn a_drive_is_absent_once_beyond_its_time() {
+    let scenario = Scenario::default();
+    let mut drive = RemoteDrive::new(&scenario, 0, NodeId::new(1).unwrap(), 0, 500);
+    let limit_ns = 500 + u64::from(scenario.can.boot_timeout_ms) * 1_000_000;
+    assert_eq!(drive.judge(limit_ns, false), None);
+    assert!(matches!(drive.judge(limit_ns + 1, false), Some(Finding::Absent(_))));
+    assert_eq!(drive.judge(limit_ns + 2, false), None);
+}
+
+#[test]
+fn an_event_has_the_cycle_in_which_it_happened() {
+    let mut bench = Bench::enabled();
+    bench.drive(2).power = DriveState::Fault;
+    bench.cycle(Some(DriveRequest::Enable));
+    let fault = *bench.events_of(EventKind::Fault).next().unwrap();
+    assert_eq!((fault.cycle, fault.axis, fault.node, fault.bus), (bench.cycle, 2, 3, 0));
 }

@@ -123,3 +123,16 @@ fn frames_that_the_tap_had_no_room_for_are_reported() {
     let told: Vec<_> = bench.events[before..].iter().map(|event| (event.cause, event.value)).collect();
     assert_eq!(told, [(Cause::Overflow.code(), 7.0)]);
 }
+
+#[test]
+fn a_reading_names_the_command_that_it_answers() {
+    let mut bench = Bench::new();
+    bench.cycle(None);
+    assert_eq!((bench.reading.answers_cycle, bench.reading.command_received_ns), (0, 0));
+    bench.cycle(Some(DriveRequest::Off));
+    let received_ns = bench.now_ns() + 550_000;
+    for _ in 0..3 {
+        bench.cycle(None);
+        assert_eq!((bench.reading.answers_cycle, bench.reading.command_received_ns), (2, received_ns));
+    }
+}
