@@ -212,6 +212,8 @@ fn failed(checks: &[Check]) -> Option<Judgement> {
 
 #[cfg(test)]
 mod tests {
+    mod figures;
+
     use masseter_shared::messages::Event;
     use masseter_shared::messages::codes::{Cause, Source};
 
