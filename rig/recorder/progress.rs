@@ -122,7 +122,7 @@ impl Progress {
             format!("   live {connected} watching, {dropped} dropped")
         });
         format!(
-            "{:<13}{:>6.2} of {:.2} s   missed {}   dropped {}   tracking error {:.3} mm, max {:.3}   latest {:.0} µs{live}",
+            "{:<13} motion {:>5.2} of {:.2} s   missed {}   dropped {}   tracking error {:.3} mm, max {:.3}   latest {:.0} µs{live}",
             self.controller_state().map_or("?", ControllerState::name),
             self.state.motion_time_s.max(0.0),
             self.motion_s,
@@ -174,7 +174,7 @@ mod tests {
         let line = after_ten_cycles(false).next(SECOND_NS, Losses { unrecorded: 2, clients });
         assert_eq!(
             line,
-            "running        1.00 of 4.00 s   missed 6   dropped 5   tracking error 2.000 mm, max 4.000   latest 50 µs   \
+            "running       motion  1.00 of 4.00 s   missed 6   dropped 5   tracking error 2.000 mm, max 4.000   latest 50 µs   \
              live 1 watching, 7 dropped\n"
         );
     }
