@@ -49,7 +49,7 @@ pub(crate) fn plant(args: &PlantArgs) -> anyhow::Result<Exit> {
         return Ok(Exit::Passed);
     };
     Ok(match process::run(&process_arguments)? {
-        Reason::Asked => Exit::Passed,
+        Reason::Requested => Exit::Passed,
         Reason::Abandoned => Exit::SafeStop,
     })
 }

@@ -5,16 +5,15 @@ use masseter_shared::messages::codes::{Cause, DriveRequest};
 use masseter_shared::messages::{Command, Reading};
 
 use super::events::Subject;
-use super::interlock::Failure;
+use super::failure::Failure;
 
 /// The received commands.
 #[derive(Debug, Clone)]
-pub(crate) struct Commands {
+pub(super) struct Commands {
     timeout_cycles: u32,
     newest: Option<Command>,
     received_ns: u64,
-    /// Cycles since the last command.
-    pub(crate) silent_cycles: u32,
+    silent_cycles: u32,
 }
 
 impl Commands {
@@ -23,9 +22,14 @@ impl Commands {
         Self { timeout_cycles, newest: None, received_ns: 0, silent_cycles: 0 }
     }
 
+    /// Cycles since the last command.
+    pub(super) fn silent_cycles(&self) -> u32 {
+        self.silent_cycles
+    }
+
     /// The request of the newest valid command.
     pub(super) fn request(&self) -> DriveRequest {
-        let request = self.newest.and_then(|command| DriveRequest::from_code(command.request));
+        let request = self.newest.and_then(|command| DriveRequest::try_from(command.request).ok());
         request.unwrap_or(DriveRequest::Off)
     }
 
@@ -62,7 +66,7 @@ impl Commands {
         if let Some(axis) = (0..AXES).find(|&axis| !can_go_to(axis, command.target_m[axis])) {
             return Err(bad(Subject::Axis(axis), command.target_m[axis]));
         }
-        if DriveRequest::from_code(command.request).is_none() {
+        if DriveRequest::try_from(command.request).is_err() {
             return Err(bad(Subject::Rig, f64::from(command.request)));
         }
         (self.newest, self.received_ns) = (Some(*command), now_ns);
