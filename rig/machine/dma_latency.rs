@@ -18,7 +18,7 @@ pub(crate) struct Hold {
 }
 
 impl Hold {
-    /// Opens the device if `requested` says so for this kind of machine.
+    /// Opens the device if `requested` demands that for this kind of machine.
     pub(crate) fn new(requested: CpuDmaLatency, is_virtual: bool) -> Self {
         let opened = is_to_be_held(requested, is_virtual).then(open);
         let (device, limit_us, refusal) = match opened {

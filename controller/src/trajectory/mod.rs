@@ -4,7 +4,7 @@
 //! allocated) and then evaluated in the loop, without allocation and without iteration. It comes
 //! from a generator on a rigid mandible ([`MotionConfig`]'s kinds) or from a recording, starts and
 //! ends at rest, and moves nothing by itself: [`check`] judges beforehand whether the mechanism can
-//! follow it. How the rig gets to its first pose is the controller's matter.
+//! follow it. The way of the rig to the first pose is not part of it.
 
 mod axes;
 mod check;

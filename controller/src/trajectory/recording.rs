@@ -45,8 +45,8 @@ pub(super) struct Recording {
 }
 
 impl Recording {
-    /// From samples at strictly increasing times; a corner of 0 leaves them unfiltered. `are_of_centroid` says that they are
-    /// displacements of the markers' centroid, because the incisal point is not given.
+    /// From samples at strictly increasing times; a corner of 0 leaves them unfiltered. `are_of_centroid`: whether the samples
+    /// are displacements of the markers' centroid, because the incisal point is not given.
     pub(super) fn new(
         path: PathBuf,
         samples: &[Sample],

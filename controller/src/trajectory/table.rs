@@ -1,7 +1,7 @@
 //! The recording as a table of finite numbers over increasing time.
 //!
-//! Plain CSV: no quotes, comments from `#`, blank lines ignored. The module knows the columns'
-//! names, not their meaning.
+//! Plain CSV: no quotes, comments from `#`, blank lines ignored. The module reads the columns'
+//! names; their meaning is not part of it.
 
 use masseter_shared::input::excerpt;
 

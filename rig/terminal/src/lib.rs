@@ -1,7 +1,7 @@
 //! Output to the terminal, and exit codes.
 //!
 //! Unlike `println!` and `eprintln!`, nothing here panics: a closed pipe, a closed terminal or a full disk must not end a
-//! run. Only [`result`] reports errors. This crate knows no verb and no file format.
+//! run. Only [`result`] reports errors. This crate depends on no verb and no file format.
 //!
 //! ```
 //! use masseter_terminal::{result_line, status};

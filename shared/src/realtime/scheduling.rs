@@ -1,4 +1,4 @@
-//! Core, real-time priority and locked memory of a process: what it asks the kernel for, and what the kernel granted, read
+//! Core, real-time priority and locked memory of a process: what it requests, and what the kernel granted, read
 //! back.
 //!
 //! A refusal is reported and never ends a run: screen, manifest and `--require-rt` judge it.
@@ -10,7 +10,7 @@ use rustix::mm::{MlockAllFlags, mlockall};
 use rustix::thread::{CpuSet, sched_getaffinity, sched_setaffinity};
 use serde::{Deserialize, Serialize};
 
-/// The scheduling that a process asks for.
+/// The scheduling that a process requests.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SchedulingRequest {
     /// The only core to run on; none leaves the choice to the kernel.

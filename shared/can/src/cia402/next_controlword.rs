@@ -3,7 +3,7 @@
 use super::{Controlword, DriveState};
 
 codes! {
-    /// What a master asks of a drive.
+    /// The request of a master to a drive.
     DriveRequest as u32 {
         /// No voltage: the drive is free.
         Off = 0 "off",
