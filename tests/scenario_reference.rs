@@ -1,6 +1,6 @@
 //! docs/scenario.md names every key that a scenario can have, with its default, and no others.
 //!
-//! The keys are those that a table says it expects when it meets one that it does not know.
+//! The keys come from the error for an unknown key.
 
 mod common;
 
