@@ -121,7 +121,7 @@ fn statuses_name_what_the_mechanism_cannot_do() {
     assert!(!line.ends_with(",ok") && line.starts_with(",,,"), "{line}");
 }
 
-/// Upside down, and below the base: the strokes would do, and `fk` tells another pose of them.
+/// Upside down, and below the base: the strokes would do, and `fk` gives another pose for them.
 #[test]
 fn a_pose_in_which_the_mechanism_cannot_stand_is_a_wrong_assembly() {
     let output = pipe(

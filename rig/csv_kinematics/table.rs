@@ -1,7 +1,7 @@
 //! The CSV frame around both commands: columns checked, lines counted, bad ones reported.
 //!
 //! Lines are read in batches, solved on all cores and written in order, so memory stays the same
-//! however long the input is. What is computed from a line is not known here.
+//! however long the input is. The computation is an argument.
 
 use std::io::{self, Write};
 use std::iter;

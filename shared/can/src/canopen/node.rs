@@ -15,7 +15,7 @@ pub struct NodeIdError {
 pub struct NodeId(u8);
 
 impl NodeId {
-    /// The rig's master.
+    /// The usual id of a master.
     pub const MASTER: Self = Self(127);
 
     /// The node of that number.
