@@ -80,8 +80,8 @@ fn a_bad_line_is_named_and_the_rest_is_done() {
     assert_eq!(statuses(&output), expected);
     let reasons = [
         (3, "d3_m is 'zero'"),
-        (4, "l1_m is NaN"),
-        (5, "2 values, expected 6"),
+        (4, "l1_m is 'NaN'"),
+        (5, "2 fields, expected 6"),
         (6, "an empty line"),
         (7, "d1_m is '\"0'"),
     ];

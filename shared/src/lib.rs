@@ -11,5 +11,6 @@ pub mod input;
 pub mod lifecycle;
 pub mod messages;
 pub mod realtime;
+pub mod rows;
 pub mod schedule;
 pub mod transport;

@@ -29,11 +29,12 @@ mod solution_set;
 mod solver;
 mod speed;
 mod study;
-mod table;
+pub mod table;
 mod trials;
 pub mod uniqueness;
 mod workspace;
 mod write;
 
 pub use claims::{Judgement, PaperClaim};
+pub use share::median;
 pub use study::{PreparedStudy, Settings, Study};
