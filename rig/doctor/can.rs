@@ -52,9 +52,9 @@ fn obstacle(Interface { name, is_up, is_bus_off, is_virtual, .. }: &Interface) -
 
 #[cfg(test)]
 mod tests {
-    use super::super::finding::Level::{Ok as Fine, Warn};
     use rustix::io::Errno;
 
+    use super::super::finding::Level::{Ok as Fine, Warn};
     use super::*;
     use crate::machine::fixture::Fixture;
 

@@ -27,3 +27,25 @@ pub(crate) fn xml(manifest: &Manifest, figures: &Figures, verdict: &Verdict) -> 
     let is_no_xml = |c: char| c.is_control() && c != '\n' || ('\u{fffe}'..='\u{ffff}').contains(&c);
     Ok(Suite { manifest, figures, verdict }.render()?.replace(is_no_xml, "\u{fffd}"))
 }
+
+#[cfg(test)]
+mod tests {
+    use masseter_analysis::Analysis;
+    use masseter_recording::MachineInfo;
+    use masseter_shared::config::Scenario;
+
+    use super::*;
+
+    #[test]
+    fn a_reason_of_any_characters_leaves_the_document_xml() {
+        let machine = MachineInfo { cpu: String::new(), cores: 2, kernel: String::new(), is_virtual: false };
+        let manifest = Manifest::new(Scenario::default(), 10.0, "virtual", machine);
+        let figures = Analysis::new(&manifest.scenario).finish(false, &[]);
+        let verdict =
+            Verdict { reason: "<&\u{1b}\u{ffff}\">".to_owned(), ..Verdict::new(&manifest, &figures) };
+        let xml = xml(&manifest, &figures, &verdict).unwrap();
+        let case = "  <testcase classname=\"masseter.run\" name=\"run\">\
+                    <error message=\"DIED: &#60;&#38;\u{fffd}\u{fffd}&#34;&#62;\"/></testcase>\n";
+        assert!(xml.contains(case), "{xml}");
+    }
+}
