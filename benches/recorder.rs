@@ -23,7 +23,7 @@ use masseter_shared::messages::codes::Source;
 use masseter_shared::messages::{Command as CommandMessage, Event, FrameTap, Reading, State, Truth};
 use masseter_shared::realtime::Cycle;
 use masseter_shared::realtime::scheduling::{SchedulingRequest, obtain};
-use masseter_shared::transport::{Node, Publisher, ScratchDomain};
+use masseter_shared::transport::{BatchPublisher, Node, Publisher, ScratchDomain};
 use rustix::process::{Pid, Signal, kill_process};
 
 const MASSETER: &str = env!("CARGO_BIN_EXE_masseter");
@@ -89,7 +89,7 @@ struct Publishers {
     reading: Publisher<Reading>,
     state: Publisher<State>,
     truth: Publisher<Truth>,
-    frame: Publisher<[FrameTap]>,
+    frame: BatchPublisher<FrameTap>,
     /// The controller's, and the plant's.
     events: [Publisher<Event>; 2],
 }
@@ -101,7 +101,7 @@ impl Publishers {
             reading: node.publisher()?,
             state: node.publisher()?,
             truth: node.publisher()?,
-            frame: node.batch_publisher()?,
+            frame: BatchPublisher::open(node)?,
             events: [node.publisher()?, node.publisher()?],
         })
     }

@@ -25,7 +25,7 @@ impl ProcessArgs {
 
 /// A controller of the rig.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
-pub enum ControllerKind {
+pub(crate) enum ControllerKind {
     /// Plays the motion of the scenario
     #[default]
     Motion,
@@ -54,7 +54,7 @@ pub(crate) fn name_of(value: &impl ValueEnum) -> String {
 
 /// The real CAN interface of each bus; none for simulated buses.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Wires(pub Vec<String>);
+pub(crate) struct Wires(pub Vec<String>);
 
 pub(crate) fn parse_cores(text: &str) -> Result<[usize; 2], String> {
     let cores: Result<Vec<usize>, _> = text.split(',').map(|core| core.trim().parse()).collect();

@@ -11,9 +11,9 @@ use crate::bench::{self, args::BenchArgs};
 use crate::can::{self, CanVerb};
 use crate::clean;
 use crate::controller::{self, ControllerArgs};
-use crate::csv_kinematics::{self, CsvArgs, FkArgs};
 use crate::doctor::{self, DoctorArgs};
-use crate::kinematics::{self, KinematicsArgs};
+use crate::kinematics_cli::{self, CsvArgs, FkArgs};
+use crate::paper_study::{self, KinematicsArgs};
 use crate::plant::{self, PlantArgs};
 use crate::recorder::{self, RecorderArgs};
 use crate::recording_cli::{self, RecordingVerb};
@@ -95,11 +95,11 @@ fn execute(verb: Verb) -> Result<Exit, Failure> {
         Verb::Report(args) => report_cli::report(&args),
         Verb::Bench(args) => bench::run(&args),
         Verb::BenchPeer(args) => bench::ipc::answer(&args).map(|()| Exit::Passed).usage(),
-        Verb::Fk(args) => csv_kinematics::forward(&args).usage(),
-        Verb::Ik(args) => csv_kinematics::inverse(&args).usage(),
+        Verb::Fk(args) => kinematics_cli::forward(&args).usage(),
+        Verb::Ik(args) => kinematics_cli::inverse(&args).usage(),
         Verb::Can(verb) => can::execute(&verb).usage(),
         Verb::Uniqueness(verb) => uniqueness::uniqueness(&verb).usage(),
-        Verb::Kinematics(args) => kinematics::kinematics(&args).usage(),
+        Verb::Kinematics(args) => paper_study::study(&args).usage(),
         Verb::Doctor(args) => doctor::examine(&args).usage(),
         Verb::Recording(verb) => recording_cli::execute(&verb).usage(),
         Verb::Clean => clean::clean().usage(),

@@ -1,8 +1,8 @@
-//! The `masseter` command. Modules of verbs: `bench`, `can`, `clean`, `csv_kinematics`, `doctor`, `plant`,
-//! `recording_cli`, `report_cli` and `run`; [`cli`] dispatches to them.
+//! The `masseter` command. Modules of verbs: `bench`, `can`, `clean`, `doctor`, `kinematics_cli`,
+//! `paper_study`, `plant`, `recording_cli`, `report_cli`, `run` and `uniqueness`; [`cli`] dispatches to them.
 //!
-//! `run` starts controller, plant and `recorder` as processes of this executable ([`run::supervisor`]), or steps their
-//! cores in one thread under virtual time ([`run::virtual_time`]). Figures of a run are computed from its recording and
+//! `run` starts controller, plant and `recorder` as processes of this executable (`run::supervisor`), or steps their
+//! cores in one thread under virtual time (`run::virtual_time`). Figures of a run are computed from its recording and
 //! manifest only (crate `masseter_analysis`), so `report` can compute them again. This crate holds no control, physics,
 //! analysis or file formats.
 
@@ -10,19 +10,19 @@
 #![warn(clippy::print_stdout, clippy::print_stderr)]
 
 mod arguments;
-pub mod bench;
+mod bench;
 mod can;
 mod clean;
 pub mod cli;
 mod controller;
-pub mod csv_kinematics;
 mod doctor;
-pub mod foxglove;
-mod kinematics;
+mod foxglove;
+mod kinematics_cli;
 pub mod machine;
+mod paper_study;
 mod plant;
 mod recorder;
 mod recording_cli;
 mod report_cli;
-pub mod run;
+mod run;
 mod uniqueness;

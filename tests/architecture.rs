@@ -1,12 +1,15 @@
-//! The architecture's two rules on dependencies: crates keep their layers, and the files of a crate have no circle of
-//! imports.
+//! The architecture's rules on dependencies: crates keep their layers, the files of a crate have no circle of imports,
+//! and an inherent impl of a type stands in the file that defines the type.
 //!
 //! A file imports another file of its crate when a path in a `use` or in its code leads to an item of that file. A
 //! re-export of a file below (`mod child; pub use child::Item;`) is no import, and a path through a re-export leads to
-//! the file that defines the item. Code for tests does not count. Method calls carry no path and are not seen.
+//! the file that defines the item. Code for tests does not count. Method calls carry no path and are not
+//! seen, so a type must not be split over files.
 
 #[path = "architecture/circles.rs"]
 mod circles;
+#[path = "architecture/impls.rs"]
+mod impls;
 #[path = "architecture/imports.rs"]
 mod imports;
 #[path = "architecture/layers.rs"]
@@ -18,6 +21,7 @@ use std::fs;
 use std::path::Path;
 
 use circles::circles;
+use impls::split_types;
 use layers::layer_violations;
 
 #[test]
@@ -32,10 +36,17 @@ fn no_crate_has_a_circle_of_imports() {
     assert!(circles.is_empty(), "\n{}", circles.join("\n"));
 }
 
+#[test]
+fn every_type_has_its_methods_in_its_own_file() {
+    let split = split_types(project());
+    assert!(split.is_empty(), "\n{}", split.join("\n"));
+}
+
 fn project() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }
-// The proof that both rules can fail.
+
+// The proof that every rule can fail.
 
 /// A workspace of the files given, in a temporary folder.
 fn planted(files: &[(&str, &str)]) -> tempfile::TempDir {
@@ -52,6 +63,27 @@ fn planted_circles(files: &[(&str, &str)]) -> Vec<String> {
     let manifest = ("Cargo.toml", "[package]\nname = \"planted\"\nedition = \"2024\"\n");
     let workspace = planted(&[&[manifest], files].concat());
     circles(workspace.path())
+}
+
+#[test]
+fn a_planted_impl_in_another_file_than_its_type_is_found() {
+    let manifest = ("Cargo.toml", "[package]\nname = \"planted\"\nedition = \"2024\"\n");
+    let lib = ("src/lib.rs", "mod one;\nmod two;\npub use one::Whole;");
+    let one = (
+        "src/one.rs",
+        "pub struct Whole<T>(T);\nimpl<T> Whole<T> {}\nmod inner { impl super::Whole<u8> {} }",
+    );
+    for (two, is_split) in [
+        ("impl crate::one::Whole<u8> {}", true),
+        ("use crate::Whole as Renamed;\nimpl Renamed<u8> {}", true),
+        ("impl Default for crate::one::Whole<u8> { fn default() -> Self { Self(0) } }", false),
+        ("struct Whole;\nimpl Whole {}", false),
+        ("#[cfg(test)]\nimpl crate::one::Whole<u8> {}", false),
+    ] {
+        let found = split_types(planted(&[manifest, lib, one, ("src/two.rs", two)]).path());
+        let expected = "src/two.rs has an impl of Whole, which src/one.rs defines";
+        assert_eq!(found, if is_split { vec![expected] } else { vec![] }, "{two}");
+    }
 }
 
 #[test]
@@ -105,7 +137,20 @@ fn macros_tie_files_and_code_for_tests_does_not() {
 
 #[test]
 fn planted_violations_of_layers_are_found() {
-    let folders = ["shared/can", "shared", "controller", "plant", "rig/recording", "rig/report", "rig/study"];
+    let folders = [
+        "shared/can",
+        "shared",
+        "controller",
+        "plant",
+        "rig/terminal",
+        "rig/charts",
+        "rig/plan",
+        "rig/recording",
+        "rig/analysis",
+        "rig/report",
+        "rig/study",
+        "rig/unknown",
+    ];
     let name = |folder: &str| folder.replace('/', "-");
     let depending = |from: &str, to: &str| {
         let package = |folder: &str| format!("[package]\nname = \"{}\"\nedition = \"2024\"\n", name(folder));
@@ -129,6 +174,15 @@ fn planted_violations_of_layers_are_found() {
         ("plant", "rig/report"),
         ("rig/recording", "rig/report"),
         ("rig/report", "rig/study"),
+        ("rig/plan", "rig/recording"),
+        ("rig/recording", "controller"),
+        ("rig/analysis", "plant"),
+        ("rig/report", "controller"),
+        ("rig/charts", "rig/terminal"),
+        ("rig/terminal", "shared"),
+        ("rig/study", "plant"),
+        ("rig/study", "rig/report"),
+        ("rig/unknown", "shared"),
     ] {
         let expected = format!("{} ({from}/) depends on {} ({to}/)", name(from), name(to));
         assert_eq!(depending(from, to), [expected]);
@@ -139,6 +193,9 @@ fn planted_violations_of_layers_are_found() {
         ("plant", "shared/can"),
         ("rig/recording", "shared"),
         ("rig/report", "rig/recording"),
+        ("rig/plan", "plant"),
+        ("rig/analysis", "rig/recording"),
+        ("rig/report", "rig/charts"),
         ("rig/study", "controller"),
     ] {
         assert_eq!(depending(from, to), [""; 0]);

@@ -113,13 +113,13 @@ fn every_fault_of_a_bus_is_borne_or_stops_the_rig_safely_with_its_cause() {
 }
 
 #[test]
-fn a_run_whose_declared_fault_never_strikes_fails() {
+fn a_run_whose_declared_fault_never_acts_fails() {
     let never = "[[faults]]\nkind = 'disconnect'\nbus = 0\nnode = 1\nfrom_s = 1000.0";
     let workspace = Workspace::new(&format!("duration_s = 1.0\n{never}"));
     let output = workspace.run_virtual(&[]);
     assert_eq!(output.status.code(), Some(1), "{}", stdout(&output));
     let summary = workspace.summary();
-    assert_eq!(check(&summary, "faults")["finding"], "0 of 1 declared struck, number 1 never");
+    assert_eq!(check(&summary, "faults")["finding"], "0 of 1 declared faults acted, number 1 never");
 }
 
 #[test]

@@ -7,7 +7,7 @@ use std::hint::black_box;
 
 use masseter_shared::config::Scenario;
 use masseter_shared::control::{Controller, Outcome, Tick};
-use masseter_shared::geometry::{AXES, Actuators, Joints, Mechanism, Pose};
+use masseter_shared::geometry::{AXES, Actuators, Jacobian, Joints, Mechanism, Pose};
 use masseter_shared::messages::codes::ControllerState;
 use masseter_shared::messages::{Command, Event, Reading, State};
 
@@ -22,6 +22,24 @@ use crate::trajectory::Trajectory;
 const LATE_READING_CYCLES: u64 = 1;
 
 /// The default controller: plays a trajectory.
+///
+/// ```
+/// use masseter_controller::motion_controller::MotionController;
+/// use masseter_controller::trajectory::Trajectory;
+/// use masseter_shared::config::Scenario;
+/// use masseter_shared::control::{Controller, Tick};
+/// use masseter_shared::geometry::Mechanism;
+/// use masseter_shared::messages::codes::ControllerState;
+///
+/// let scenario = Scenario::default();
+/// let mechanism = Mechanism::new(&scenario.mechanism)?;
+/// let motion = Trajectory::new(&scenario.motion, &scenario.jaw, &mechanism, scenario.duration_s)?;
+/// let mut controller = MotionController::new(&scenario, mechanism, motion);
+/// controller.observe(None);
+/// controller.decide(Tick { cycle: 1, now_ns: 540_000 });
+/// assert_eq!(controller.state(), ControllerState::WaitReadings);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug)]
 pub struct MotionController {
     sequencer: Sequencer,
@@ -157,7 +175,7 @@ impl Controller for MotionController {
         state.motion_time_s = self.playback.motion_time_ahead_s(-self.sample_age_s());
         if let Some(estimate) = &self.sequencer.estimate {
             let joints = Joints { actuators: estimate.measured, theta_rad: estimate.solution.theta_rad };
-            state.condition = self.mechanism.condition(&estimate.solution.pose, &joints);
+            state.condition = Jacobian::new(&self.mechanism, &estimate.solution.pose, &joints).condition();
         }
     }
 

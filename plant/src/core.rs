@@ -12,7 +12,7 @@ use masseter_shared::messages::{Command, Event, FrameTap, Reading, Truth, tap};
 use masseter_shared::realtime::Wake;
 
 use crate::emulation::VirtualLink;
-pub use crate::error::PlantError;
+use crate::error::PlantError;
 use crate::journal::{Journal, overflow};
 use crate::link::Link;
 use crate::link::sockets::SocketLink;

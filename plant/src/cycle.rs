@@ -6,7 +6,8 @@ use masseter_shared::messages::{Command, Reading, Truth};
 use masseter_shared::realtime::Wake;
 use masseter_shared::schedule::CycleSchedule;
 
-use crate::core::{PlantCore, PlantError};
+use crate::core::PlantCore;
+use crate::error::PlantError;
 use crate::link::Link;
 
 /// Where the plant's messages come from and go to, and how the plant waits.
@@ -51,6 +52,26 @@ pub trait PlantPorts<L: Link> {
 }
 
 /// Runs one cycle: SYNC, process data, reading, truth, command; then frames and events, for which nobody waits.
+///
+/// ```
+/// use masseter_plant::core::PlantCore;
+/// use masseter_plant::cycle::{PlantPorts, run_cycle};
+/// use masseter_plant::emulation::VirtualLink;
+/// use masseter_shared::realtime::Wake;
+/// use masseter_shared::schedule::CycleSchedule;
+///
+/// /// A second at 1 kHz, in simulated time.
+/// fn run_second<P: PlantPorts<VirtualLink>>(
+///     plant: &mut PlantCore,
+///     ports: &mut P,
+///     schedule: &CycleSchedule,
+/// ) -> Result<(), P::Error> {
+///     for cycle in 1..=1000 {
+///         run_cycle(plant, ports, schedule, &Wake::on_time(cycle, (cycle - 1) * 1_000_000))?;
+///     }
+///     Ok(())
+/// }
+/// ```
 ///
 /// # Errors
 /// Those of the plant and of the ports.

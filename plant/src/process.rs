@@ -6,10 +6,13 @@ use masseter_shared::lifecycle::{ProcessArguments, ProcessContext, ProcessError}
 use masseter_shared::messages::{Command, Event, FrameTap, Reading, Truth};
 use masseter_shared::realtime::{Cycle, Wake};
 use masseter_shared::schedule::CycleSchedule;
-use masseter_shared::transport::{Node, Publisher, Received, Subscriber, TransportError};
+use masseter_shared::transport::{
+    BatchPublisher, Node, Publisher, ReceivedMessage, Subscriber, TransportError,
+};
 
-use crate::core::{PlantCore, PlantError};
+use crate::core::PlantCore;
 use crate::cycle::{PlantPorts, run_cycle};
+use crate::error::PlantError;
 use crate::link::Link;
 
 /// Longest time for the drives to stop after the request to end, ns.
@@ -48,7 +51,7 @@ struct Ports {
     commands: Subscriber<Command>,
     readings: Publisher<Reading>,
     truths: Publisher<Truth>,
-    frames: Publisher<[FrameTap]>,
+    frames: BatchPublisher<FrameTap>,
     events: Publisher<Event>,
 }
 
@@ -58,7 +61,7 @@ impl Ports {
             commands: node.newest_subscriber()?,
             readings: node.publisher()?,
             truths: node.publisher()?,
-            frames: node.batch_publisher()?,
+            frames: BatchPublisher::open(node)?,
             events: node.publisher()?,
         })
     }
@@ -101,7 +104,7 @@ struct RealTime<'a> {
 }
 
 impl<L: Link> PlantPorts<L> for RealTime<'_> {
-    type Command = Received<Command>;
+    type Command = ReceivedMessage<Command>;
     type Error = PlantProcessError;
 
     fn now_ns(&self) -> u64 {
@@ -124,7 +127,7 @@ impl<L: Link> PlantPorts<L> for RealTime<'_> {
         Ok(self.ports.truths.publish(|message| *message = *truth)?)
     }
 
-    fn command(&mut self, wake: &Wake) -> Result<Option<Received<Command>>, PlantProcessError> {
+    fn command(&mut self, wake: &Wake) -> Result<Option<ReceivedMessage<Command>>, PlantProcessError> {
         if !self.takes_commands {
             return Ok(None);
         }

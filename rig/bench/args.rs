@@ -7,7 +7,7 @@ use masseter_terminal::Format;
 
 /// The benches.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum Kind {
+pub(crate) enum Kind {
     /// Wake-ups of the real-time loop, against cyclictest
     Loop,
     /// Command and reading between two processes, against bare iceoryx2, a cache line, a socket
@@ -18,7 +18,7 @@ pub enum Kind {
 
 /// The arguments.
 #[derive(Debug, Clone, Args)]
-pub struct BenchArgs {
+pub(crate) struct BenchArgs {
     /// What to measure
     #[arg(required = true, value_enum)]
     pub(super) kinds: Vec<Kind>,

@@ -51,22 +51,22 @@ pub(super) struct Candidate {
     /// Rounds that count.
     pub(super) n: usize,
     /// Over the rounds that count, ns.
-    pub(super) percentiles: Vec<Figure>,
+    pub(super) percentiles: Vec<Spread>,
     /// Over the rounds that gave them, %.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub(super) shares: Vec<Figure>,
+    pub(super) shares: Vec<Spread>,
 }
 
 /// A value that varies from round to round.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub(super) struct Figure {
+pub(super) struct Spread {
     pub(super) name: String,
     pub(super) median: f64,
     pub(super) min: f64,
     pub(super) max: f64,
 }
 
-impl Figure {
+impl Spread {
     /// None without a value.
     fn from_values(name: &str, values: Vec<f64>) -> Option<Self> {
         let min = values.iter().copied().reduce(f64::min)?;
@@ -82,7 +82,7 @@ pub(super) struct Ratio {
     pub(super) to: String,
     /// Rounds that count for both.
     pub(super) n: usize,
-    pub(super) percentiles: Vec<Figure>,
+    pub(super) percentiles: Vec<Spread>,
 }
 
 /// Percentiles, each with the fewest samples of a round that it is given for: ten lie above the 99.9th.
@@ -99,16 +99,16 @@ impl Candidate {
         let percentiles = PERCENTILES.iter().filter_map(|&(name, quantile, samples)| {
             let is_reached = counted.iter().all(|round| round.len() >= samples);
             let values = counted.iter().map(|round| round.value_at_quantile(quantile) as f64);
-            is_reached.then(|| Figure::from_values(name, values.collect()))?
+            is_reached.then(|| Spread::from_values(name, values.collect()))?
         });
-        let max = Figure::from_values("max", counted.iter().map(|round| round.max() as f64).collect());
+        let max = Spread::from_values("max", counted.iter().map(|round| round.max() as f64).collect());
         Self {
             name: name.to_owned(),
             n: counted.len(),
             percentiles: percentiles.chain(max).collect(),
             shares: shares
                 .into_iter()
-                .filter_map(|(name, values)| Figure::from_values(&name, values))
+                .filter_map(|(name, values)| Spread::from_values(&name, values))
                 .collect(),
             rounds,
         }
@@ -123,7 +123,7 @@ impl Candidate {
             let is_reached = both.iter().all(|(mine, its)| mine.len().min(its.len()) >= samples);
             let of = |round: &Durations| round.value_at_quantile(quantile) as f64;
             is_reached.then(|| {
-                Figure::from_values(name, both.iter().map(|(mine, its)| of(mine) / of(its)).collect())
+                Spread::from_values(name, both.iter().map(|(mine, its)| of(mine) / of(its)).collect())
             })?
         });
         Ratio {
@@ -153,8 +153,8 @@ mod tests {
         round.into()
     }
 
-    fn figure(median: f64, min: f64, max: f64) -> Figure {
-        Figure { name: "p50".to_owned(), median, min, max }
+    fn figure(median: f64, min: f64, max: f64) -> Spread {
+        Spread { name: "p50".to_owned(), median, min, max }
     }
 
     #[test]
@@ -179,7 +179,7 @@ mod tests {
             record(&mut round, 100, samples);
             let candidate = Candidate::from_rounds("", vec![round.into()]);
             let names =
-                |figures: &[Figure]| figures.iter().map(|figure| figure.name.clone()).collect::<Vec<_>>();
+                |figures: &[Spread]| figures.iter().map(|figure| figure.name.clone()).collect::<Vec<_>>();
             (names(&candidate.percentiles), names(&candidate.ratio_to(&candidate).percentiles))
         };
         assert_eq!(of(9_999).0, ["p50", "p99", "max"]);
@@ -190,7 +190,7 @@ mod tests {
 
     #[test]
     fn the_median_of_an_even_number_lies_between() {
-        assert_eq!(Figure::from_values("p50", vec![4.0, 1.0, 3.0, 2.0]), Some(figure(2.5, 1.0, 4.0)));
-        assert_eq!(Figure::from_values("p50", vec![3.0, 1.0, 2.0]), Some(figure(2.0, 1.0, 3.0)));
+        assert_eq!(Spread::from_values("p50", vec![4.0, 1.0, 3.0, 2.0]), Some(figure(2.5, 1.0, 4.0)));
+        assert_eq!(Spread::from_values("p50", vec![3.0, 1.0, 2.0]), Some(figure(2.0, 1.0, 3.0)));
     }
 }

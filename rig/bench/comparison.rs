@@ -79,7 +79,7 @@ impl Comparison {
 
 #[cfg(test)]
 mod tests {
-    use super::super::candidate::{Figure, no_durations};
+    use super::super::candidate::{Spread, no_durations};
     use super::*;
 
     fn round(value_ns: u64) -> Round {
@@ -105,11 +105,11 @@ mod tests {
         let comparison = Comparison::by_turns("x", "", 3, &[0], turns).unwrap().comparing([("a", "b")]);
         assert_eq!(*order.borrow(), ["a", "b", "b", "a", "a", "b"]);
         let [p50, p99] = &comparison.ratios[0].percentiles[..] else { panic!("{:?}", comparison.ratios) };
-        assert_eq!(*p50, Figure { name: "p50".to_owned(), median: 0.25, min: 0.25, max: 0.25 });
+        assert_eq!(*p50, Spread { name: "p50".to_owned(), median: 0.25, min: 0.25, max: 0.25 });
         assert_eq!(p99.name, "p99");
         assert_eq!(
             comparison.candidates[0].percentiles[0],
-            Figure { name: "p50".to_owned(), median: 200.0, min: 100.0, max: 300.0 }
+            Spread { name: "p50".to_owned(), median: 200.0, min: 100.0, max: 300.0 }
         );
     }
 

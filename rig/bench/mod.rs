@@ -3,12 +3,12 @@
 //! Candidates take turns, round by round, because a machine changes its speed from second to second; the ratio within a
 //! round counts (`comparison`). No bench judges the rig; the machine is judged by `disturbance`.
 
-pub mod args;
+pub(crate) mod args;
 mod candidate;
 mod circumstances;
 mod comparison;
 mod disturbance;
-pub mod ipc;
+pub(crate) mod ipc;
 mod rate;
 mod table;
 mod thread;

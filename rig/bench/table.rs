@@ -1,6 +1,6 @@
 //! A comparison as text for a terminal.
 
-use super::candidate::{Figure, Ratio};
+use super::candidate::{Ratio, Spread};
 use super::comparison::Comparison;
 
 /// Candidates in µs, then their ratios: median (minimum to maximum) over the rounds.
@@ -31,7 +31,7 @@ pub(super) fn text(comparison: &Comparison) -> String {
     text
 }
 
-fn percentiles(figures: &[Figure], scale: f64) -> String {
+fn percentiles(figures: &[Spread], scale: f64) -> String {
     let cells = figures.iter().map(|figure| {
         let [median, min, max] = [figure.median, figure.min, figure.max].map(|value| short(value * scale));
         format!("{:<5} {:<20}", figure.name, format!("{median} ({min}–{max})"))
@@ -39,7 +39,7 @@ fn percentiles(figures: &[Figure], scale: f64) -> String {
     cells.collect::<Vec<_>>().join("  ").trim_end().to_owned()
 }
 
-fn shares(figures: &[Figure]) -> String {
+fn shares(figures: &[Spread]) -> String {
     let cells = figures.iter().map(|figure| {
         let [median, min, max] = [figure.median, figure.min, figure.max].map(short);
         format!("{} {median} % ({min}–{max})", figure.name)

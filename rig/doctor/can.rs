@@ -20,7 +20,7 @@ const SUPPORT: &str = "SocketCAN";
 
 fn unsupported(root: &SystemRoot, error: &io::Error) -> Finding {
     Finding::warn(SUPPORT, format!("not supported ({error})"), "runs can only use simulated buses")
-        .mended_by(on_host(root, "sudo modprobe can-raw"))
+        .with_remedy(on_host(root, "sudo modprobe can-raw"))
 }
 
 fn interfaces(root: &SystemRoot) -> Finding {
@@ -30,15 +30,15 @@ fn interfaces(root: &SystemRoot) -> Finding {
     if names.is_empty() {
         return Finding::ok(CHECK, "none; simulated buses need none");
     }
-    let (states, mends): (Vec<_>, Vec<_>) = interfaces.iter().filter_map(obstacle).unzip();
+    let (states, remedies): (Vec<_>, Vec<_>) = interfaces.iter().filter_map(obstacle).unzip();
     if states.is_empty() {
         return Finding::ok(CHECK, names);
     }
     let found = format!("{names}; {}", states.join(", "));
-    Finding::warn(CHECK, found, "such an interface cannot send").mended_by(mends.join(" && "))
+    Finding::warn(CHECK, found, "such an interface cannot send").with_remedy(remedies.join(" && "))
 }
 
-/// Why an interface cannot send, and the command that mends it.
+/// Why an interface cannot send, and the command that remedies it.
 fn obstacle(Interface { name, is_up, is_bus_off, is_virtual, .. }: &Interface) -> Option<(String, String)> {
     if !is_up {
         let controller = if *is_virtual { "" } else { " type can bitrate 1000000 restart-ms 100" };
@@ -83,14 +83,14 @@ mod tests {
                 ("sys/class/net/can0/carrier", carrier),
             ]);
             let finding = interfaces(&fixture.root());
-            (finding.level, finding.found, finding.mend)
+            (finding.level, finding.found, finding.remedy)
         };
         assert_eq!(of("0x400c1", "1"), (Fine, "can0".to_owned(), None));
         let (level, found, _) = of("0x400c0", "");
         assert_eq!((level, found.as_str()), (Warn, "can0; can0 down"));
-        let (level, found, mend) = of("0x400c1", "0");
+        let (level, found, remedy) = of("0x400c1", "0");
         assert_eq!((level, found.as_str()), (Warn, "can0; can0 bus-off"));
-        assert_eq!(mend.as_deref(), Some("sudo ip link set can0 down && sudo ip link set can0 up"));
+        assert_eq!(remedy.as_deref(), Some("sudo ip link set can0 down && sudo ip link set can0 up"));
         assert_eq!(interfaces(&Fixture::with_files(&[]).root()).level, Fine);
     }
 
@@ -104,7 +104,7 @@ mod tests {
             ("sys/class/net/vcan0/flags", "0x80"),
         ]);
         assert_eq!(
-            interfaces(&down.root()).mend.as_deref(),
+            interfaces(&down.root()).remedy.as_deref(),
             Some(
                 "sudo ip link set can0 up txqueuelen 100 type can bitrate 1000000 restart-ms 100 && \
                  sudo ip link set vcan0 up txqueuelen 100"

@@ -26,17 +26,17 @@ mod tests {
 
     #[test]
     fn a_container_is_started_anew_by_its_engine() {
-        let mend =
+        let remedy =
             |files: &[(&str, &str)]| start_with(&Fixture::with_files(files).root(), "--shm-size 1g", "mount");
-        assert_eq!(mend(&[]), "mount");
-        assert_eq!(mend(&[(".dockerenv", "")]), "docker run --shm-size 1g …");
-        assert_eq!(mend(&[("run/.containerenv", "engine=podman")]), "podman run --shm-size 1g …");
+        assert_eq!(remedy(&[]), "mount");
+        assert_eq!(remedy(&[(".dockerenv", "")]), "docker run --shm-size 1g …");
+        assert_eq!(remedy(&[("run/.containerenv", "engine=podman")]), "podman run --shm-size 1g …");
     }
 
     #[test]
     fn the_kernel_is_changed_on_the_host() {
-        let mend = |files: &[(&str, &str)]| on_host(&Fixture::with_files(files).root(), "modprobe");
-        assert_eq!(mend(&[]), "modprobe");
-        assert_eq!(mend(&[(".dockerenv", "")]), "on the host: modprobe");
+        let remedy = |files: &[(&str, &str)]| on_host(&Fixture::with_files(files).root(), "modprobe");
+        assert_eq!(remedy(&[]), "modprobe");
+        assert_eq!(remedy(&[(".dockerenv", "")]), "on the host: modprobe");
     }
 }

@@ -26,18 +26,18 @@ pub(super) struct Finding {
     /// The effect on runs; none at level `ok`.
     pub cost: Option<String>,
     /// The command that improves it; none at level `ok`, or where no command helps.
-    pub mend: Option<String>,
+    pub remedy: Option<String>,
 }
 
 impl Finding {
     /// A finding without effect.
     pub(super) fn ok(check: &'static str, found: impl Into<String>) -> Self {
-        Self { check, level: Level::Ok, found: found.into(), cost: None, mend: None }
+        Self { check, level: Level::Ok, found: found.into(), cost: None, remedy: None }
     }
 
     /// A finding that degrades runs.
     pub(super) fn warn(check: &'static str, found: impl Into<String>, cost: impl Into<String>) -> Self {
-        Self { check, level: Level::Warn, found: found.into(), cost: Some(cost.into()), mend: None }
+        Self { check, level: Level::Warn, found: found.into(), cost: Some(cost.into()), remedy: None }
     }
 
     /// A finding that rules real time out.
@@ -47,7 +47,7 @@ impl Finding {
 
     /// Adds the command that improves it.
     #[must_use]
-    pub(super) fn mended_by(self, command: impl Into<String>) -> Self {
-        Self { mend: Some(command.into()), ..self }
+    pub(super) fn with_remedy(self, command: impl Into<String>) -> Self {
+        Self { remedy: Some(command.into()), ..self }
     }
 }

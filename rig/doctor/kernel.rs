@@ -22,18 +22,21 @@ fn preemption(root: &SystemRoot) -> Finding {
     }
     // The current mode is in brackets: `none voluntary (full) lazy`.
     let modes = root.text("sys/kernel/debug/sched/preempt").unwrap_or_else(|| "not readable".to_owned());
-    let (found, mend) = if has("PREEMPT_DYNAMIC") && !modes.contains("(full)") {
-        let mend = "sudo mount -t debugfs debugfs /sys/kernel/debug; \
+    let (found, remedy) = if has("PREEMPT_DYNAMIC") && !modes.contains("(full)") {
+        let remedy = "sudo mount -t debugfs debugfs /sys/kernel/debug; \
                     echo full | sudo tee /sys/kernel/debug/sched/preempt";
-        (format!("PREEMPT_DYNAMIC, modes {modes}"), mend)
+        (format!("PREEMPT_DYNAMIC, modes {modes}"), remedy)
     } else {
         let is_preemptible = has("PREEMPT") || has("PREEMPT_DYNAMIC");
-        let mend = "install a kernel with PREEMPT_RT: on Debian `sudo apt install linux-image-rt-amd64`, on Ubuntu \
+        let remedy = "install a kernel with PREEMPT_RT: on Debian `sudo apt install linux-image-rt-amd64`, on Ubuntu \
                     `sudo pro enable realtime-kernel`; then boot again";
-        (if is_preemptible { "preemptible (full)" } else { "not preemptible in the kernel" }.to_owned(), mend)
+        (
+            if is_preemptible { "preemptible (full)" } else { "not preemptible in the kernel" }.to_owned(),
+            remedy,
+        )
     };
     let cost = "a system call of another task may occupy a core for up to a millisecond";
-    Finding::warn(CHECK, format!("{release}: {found}"), cost).mended_by(on_host(root, mend))
+    Finding::warn(CHECK, format!("{release}: {found}"), cost).with_remedy(on_host(root, remedy))
 }
 
 fn throttling(root: &SystemRoot) -> Finding {
@@ -53,7 +56,7 @@ fn throttling(root: &SystemRoot) -> Finding {
     };
     // The kernel's default share of the current period. Setting both values fails in one order or the other.
     let default_us = period_us - period_us / 20;
-    finding.mended_by(on_host(root, format!("sudo sysctl kernel.sched_rt_runtime_us={default_us}")))
+    finding.with_remedy(on_host(root, format!("sudo sysctl kernel.sched_rt_runtime_us={default_us}")))
 }
 
 fn isolation(root: &SystemRoot) -> Finding {
@@ -68,13 +71,13 @@ fn isolation(root: &SystemRoot) -> Finding {
     let Some([one, other]) = cores_to_spare(root).filter(|_| cores > 2) else {
         return Finding::ok(CHECK, format!("none; with {cores} cores none can be spared"));
     };
-    let mend = format!(
+    let remedy = format!(
         "add `isolcpus={one},{other} nohz_full={one},{other}` to the kernel's command line (on Debian and Ubuntu: \
          GRUB_CMDLINE_LINUX_DEFAULT in /etc/default/grub, then `sudo update-grub`), and boot again; then: masseter run \
          --cores {one},{other}"
     );
     Finding::warn(CHECK, "none", "other tasks and interrupts also run on the rig's cores")
-        .mended_by(on_host(root, mend))
+        .with_remedy(on_host(root, remedy))
 }
 
 /// The last core, and the last other one on another physical core.
@@ -99,7 +102,7 @@ fn clock_source(root: &SystemRoot) -> Finding {
     let finding = Finding::warn(CHECK, current, "reading the clock takes a microsecond or more");
     match available.split_whitespace().find(|source| FAST_SOURCES.contains(source)) {
         Some(better) => finding
-            .mended_by(on_host(root, format!("echo {better} | sudo tee /{folder}/current_clocksource"))),
+            .with_remedy(on_host(root, format!("echo {better} | sudo tee /{folder}/current_clocksource"))),
         None => finding,
     }
 }
@@ -142,7 +145,7 @@ mod tests {
         ];
         let findings = examine(&Fixture::with_files(&files).root());
         for finding in findings.into_iter().filter(|finding| finding.level != Ok) {
-            assert!(finding.mend.unwrap().starts_with("on the host: "), "{}", finding.check);
+            assert!(finding.remedy.unwrap().starts_with("on the host: "), "{}", finding.check);
         }
     }
 
@@ -166,8 +169,8 @@ mod tests {
     #[test]
     fn the_default_share_is_asked_for_of_whatever_period_there_is() {
         for (period_us, restored_us) in [("1000000", "950000"), ("100000", "95000"), ("30", "29")] {
-            let mend = throttled("0", period_us).mend.unwrap();
-            assert_eq!(mend, format!("sudo sysctl kernel.sched_rt_runtime_us={restored_us}"));
+            let remedy = throttled("0", period_us).remedy.unwrap();
+            assert_eq!(remedy, format!("sudo sysctl kernel.sched_rt_runtime_us={restored_us}"));
             assert_eq!(throttled(restored_us, period_us).level, Ok);
         }
     }
@@ -183,7 +186,7 @@ mod tests {
         assert_eq!(cores("0-7", "6-7\n").level, Ok);
         let shared = cores("0-7", "\n");
         assert_eq!(shared.level, Warn);
-        assert!(shared.mend.unwrap().contains("isolcpus=6,7 nohz_full=6,7"));
+        assert!(shared.remedy.unwrap().contains("isolcpus=6,7 nohz_full=6,7"));
     }
 
     #[test]
@@ -221,7 +224,7 @@ mod tests {
             clock_source(&Fixture::with_files(&[(&one, current), (&other, available)]).root())
         };
         assert_eq!(of("tsc\n", "tsc hpet\n").level, Ok);
-        assert!(of("hpet", "hpet tsc acpi_pm").mend.unwrap().starts_with("echo tsc |"));
-        assert_eq!((of("hpet", "hpet acpi_pm").level, of("hpet", "hpet acpi_pm").mend), (Warn, None));
+        assert!(of("hpet", "hpet tsc acpi_pm").remedy.unwrap().starts_with("echo tsc |"));
+        assert_eq!((of("hpet", "hpet acpi_pm").level, of("hpet", "hpet acpi_pm").remedy), (Warn, None));
     }
 }

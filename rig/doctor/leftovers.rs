@@ -21,14 +21,14 @@ fn leftovers(count: &Result<[usize; 2], DomainError>) -> Finding {
         Ok([0, 0]) => Finding::ok(CHECK, "none running, no files of killed ones"),
         Ok([alive, 0]) => {
             Finding::warn(CHECK, format!("{alive} running"), "rigs on the same cores delay each other")
-                .mended_by("masseter run --cores N,N")
+                .with_remedy("masseter run --cores N,N")
         }
         Ok([alive, dead]) => Finding::warn(
             CHECK,
             format!("{alive} running, files of {dead} killed ones"),
             "these files occupy shared memory",
         )
-        .mended_by("masseter clean"),
+        .with_remedy("masseter clean"),
         Err(error) => Finding::warn(CHECK, error.to_string(), "files of killed runs cannot be removed"),
     }
 }
@@ -39,9 +39,9 @@ mod tests {
 
     #[test]
     fn dead_rigs_are_swept_and_living_ones_avoided() {
-        let mend = |alive, dead| leftovers(&Ok([alive, dead])).mend;
-        assert_eq!(mend(0, 0), None);
-        assert!(mend(1, 0).unwrap().contains("--cores"));
-        assert_eq!(mend(1, 2).as_deref(), Some("masseter clean"));
+        let remedy = |alive, dead| leftovers(&Ok([alive, dead])).remedy;
+        assert_eq!(remedy(0, 0), None);
+        assert!(remedy(1, 0).unwrap().contains("--cores"));
+        assert_eq!(remedy(1, 2).as_deref(), Some("masseter clean"));
     }
 }

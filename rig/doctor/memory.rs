@@ -25,7 +25,7 @@ fn huge_pages(root: &SystemRoot) -> Finding {
     }
     let cost = "a cycle waits when it touches a page that the kernel is moving";
     Finding::warn(CHECK, format!("transparent: {modes}"), cost)
-        .mended_by(on_host(root, format!("echo madvise | sudo tee /{MODES}")))
+        .with_remedy(on_host(root, format!("echo madvise | sudo tee /{MODES}")))
 }
 
 /// Judges blocks and free bytes of the file system of shared memory; none if there is none.
@@ -35,7 +35,7 @@ fn room(root: &SystemRoot, shared: Option<(u64, u64)>) -> Finding {
         |mount: &str| start_with(root, "--shm-size 1g", format!("sudo mount {mount} {SHARED_MEMORY}"));
     match shared {
         None => Finding::bad(CHECK, format!("no {SHARED_MEMORY}"), "the processes cannot exchange messages")
-            .mended_by(enlarge("-t tmpfs tmpfs")),
+            .with_remedy(enlarge("-t tmpfs tmpfs")),
         // A tmpfs without limit.
         Some((0, _)) => Finding::ok(CHECK, format!("{SHARED_MEMORY} has no limit")),
         Some((_, free)) => {
@@ -44,7 +44,7 @@ fn room(root: &SystemRoot, shared: Option<(u64, u64)>) -> Finding {
                 return Finding::ok(CHECK, found);
             }
             Finding::bad(CHECK, found, "a run may have no room for its topics")
-                .mended_by(enlarge("-o remount,size=1g"))
+                .with_remedy(enlarge("-o remount,size=1g"))
         }
     }
 }
@@ -72,7 +72,7 @@ mod tests {
         let of = |shared| room(&container.root(), shared);
         let levels = [None, Some((100, 60 << 20)), Some((100, 1 << 30))].map(|shared| of(shared).level);
         assert_eq!(levels, [Bad, Bad, Ok]);
-        assert_eq!(of(Some((100, 60 << 20))).mend.as_deref(), Some("docker run --shm-size 1g …"));
+        assert_eq!(of(Some((100, 60 << 20))).remedy.as_deref(), Some("docker run --shm-size 1g …"));
     }
 
     #[test]

@@ -80,7 +80,7 @@ impl Report {
                 Level::Bad => "BAD",
             };
             let _ = writeln!(text, "{mark:<4} {:<21} {}", finding.check, finding.found);
-            for (label, entry) in [("costs:", &finding.cost), ("mend: ", &finding.mend)] {
+            for (label, entry) in [("costs: ", &finding.cost), ("remedy:", &finding.remedy)] {
                 if let Some(entry) = entry {
                     let _ = writeln!(text, "     {:<21} {label} {entry}", "");
                 }
@@ -102,7 +102,7 @@ mod tests {
     #[test]
     fn the_worst_finding_decides() {
         let fine = || Finding::ok("a", "as it should be");
-        let warned = || Finding::warn("b", "odd", "some").mended_by("do this");
+        let warned = || Finding::warn("b", "odd", "some").with_remedy("do this");
         let bad = || Finding::bad("c", "gone", "all");
         let cases = [
             (vec![fine()], Level::Ok),
@@ -116,7 +116,7 @@ mod tests {
 
     #[test]
     fn the_form_is_as_documented() {
-        let report = Report::new(vec![Finding::warn("b", "odd", "some").mended_by("do this")]);
+        let report = Report::new(vec![Finding::warn("b", "odd", "some").with_remedy("do this")]);
         assert_eq!(
             serde_json::to_value(&report).unwrap(),
             serde_json::json!({
@@ -124,7 +124,7 @@ mod tests {
                 "masseter": env!("CARGO_PKG_VERSION"),
                 "level": "warn",
                 "findings": [
-                    { "check": "b", "level": "warn", "found": "odd", "cost": "some", "mend": "do this" }
+                    { "check": "b", "level": "warn", "found": "odd", "cost": "some", "remedy": "do this" }
                 ]
             })
         );

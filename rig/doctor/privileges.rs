@@ -38,7 +38,7 @@ fn fifo(root: &SystemRoot, priority: u8, obtained: &Obtained) -> Finding {
         format!("priority {priority} refused"),
         "every ordinary task can delay a cycle by milliseconds",
     )
-    .mended_by(container::start_with(root, "--cap-add SYS_NICE --ulimit rtprio=95", RAISE_LIMITS))
+    .with_remedy(container::start_with(root, "--cap-add SYS_NICE --ulimit rtprio=95", RAISE_LIMITS))
 }
 
 fn locked_memory(root: &SystemRoot, obtained: &Obtained) -> Finding {
@@ -47,7 +47,7 @@ fn locked_memory(root: &SystemRoot, obtained: &Obtained) -> Finding {
         return Finding::ok(CHECK, "granted");
     }
     Finding::bad(CHECK, "refused", "a page fault in a cycle takes microseconds, from disk milliseconds")
-        .mended_by(container::start_with(root, "--ulimit memlock=-1", RAISE_LIMITS))
+        .with_remedy(container::start_with(root, "--ulimit memlock=-1", RAISE_LIMITS))
 }
 
 #[cfg(test)]
@@ -71,14 +71,14 @@ mod tests {
             assert_eq!(fifo(&machine.root(), 80, &obtained(granted, false)).level, level);
         }
         assert_eq!(locked_memory(&machine.root(), &obtained(None, true)).level, Level::Ok);
-        let mends = |root: &SystemRoot| {
+        let remedies = |root: &SystemRoot| {
             [fifo(root, 80, &obtained(None, false)), locked_memory(root, &obtained(None, false))]
-                .map(|finding| finding.mend.unwrap())
+                .map(|finding| finding.remedy.unwrap())
         };
-        assert!(mends(&machine.root()).iter().all(|mend| mend.contains("limits.d")));
+        assert!(remedies(&machine.root()).iter().all(|remedy| remedy.contains("limits.d")));
         let container = Fixture::with_files(&[(".dockerenv", "")]);
         assert_eq!(
-            mends(&container.root()),
+            remedies(&container.root()),
             ["docker run --cap-add SYS_NICE --ulimit rtprio=95 …", "docker run --ulimit memlock=-1 …"]
         );
     }

@@ -7,7 +7,7 @@ use masseter_shared::realtime::scheduling::usable_cores;
 
 use super::container::{on_host, start_with};
 use super::finding::Finding;
-use crate::machine::{SystemRoot, dma_latency};
+use crate::machine::{SystemRoot, dma_latency, is_virtual};
 
 /// Longest exit latency of an idle state that the loops' spin covers, µs.
 const LATEST_EXIT_US: i64 = 200;
@@ -31,7 +31,7 @@ fn number(root: &SystemRoot, usable: usize, online: &[usize]) -> Finding {
         (2.., _) => Finding::ok(CHECK, found),
         (_, [one, other, ..]) => {
             Finding::bad(CHECK, found, "controller and plant share a core and delay each other")
-                .mended_by(start_with(root, &format!("--cpuset-cpus {one},{other}"), leave_cpuset()))
+                .with_remedy(start_with(root, &format!("--cpuset-cpus {one},{other}"), leave_cpuset()))
         }
         _ => Finding::bad(CHECK, found, "controller and plant share the only core and delay each other"),
     }
@@ -56,7 +56,7 @@ fn governor(root: &SystemRoot) -> Finding {
         [] => Finding::ok(CHECK, "none: this system cannot change the frequency"),
         [only] if only == "performance" => Finding::ok(CHECK, found),
         _ => Finding::warn(CHECK, found, "after a sleep the core computes up to several times slower")
-            .mended_by(on_host(
+            .with_remedy(on_host(
                 root,
                 "echo performance | sudo tee /sys/devices/system/cpu/cpu*/cpufreq/scaling_governor",
             )),
@@ -75,19 +75,20 @@ fn idle(root: &SystemRoot, may_hold: bool) -> Finding {
         return Finding::ok(CHECK, found);
     }
     let cost = "a loop that slept wakes after its deadline";
-    match (root.is_virtual(), may_hold) {
+    match (is_virtual(root), may_hold) {
         (false, true) => Finding::ok(CHECK, format!("{found}; a run disables it")),
         (false, false) => {
             let device = dma_latency::DEVICE;
             let grant = format!("sudo setfacl -m u:\"$USER\":rw {device}");
-            Finding::warn(CHECK, found, cost).mended_by(start_with(
+            Finding::warn(CHECK, found, cost).with_remedy(start_with(
                 root,
                 &format!("--device {device}"),
                 grant,
             ))
         }
-        (true, _) => Finding::warn(CHECK, found, cost)
-            .mended_by("masseter bench loop  # measures whether `realtime.cpu_dma_latency = \"hold\"` helps"),
+        (true, _) => Finding::warn(CHECK, found, cost).with_remedy(
+            "masseter bench loop  # measures whether `realtime.cpu_dma_latency = \"hold\"` helps",
+        ),
     }
 }
 
@@ -107,7 +108,7 @@ fn deepest_state(root: &SystemRoot, core: usize) -> Option<(i64, String)> {
 
 fn hypervisor(root: &SystemRoot) -> Finding {
     const CHECK: &str = "virtual machine";
-    if !root.is_virtual() {
+    if !is_virtual(root) {
         return Finding::ok(CHECK, "no");
     }
     let ticks = root.core_ticks().unwrap_or_default();
@@ -130,11 +131,11 @@ mod tests {
         assert_eq!(of(2, &[0, 1]).level, Ok);
         let hidden = of(1, &[0, 1, 2, 3]);
         assert_eq!((hidden.level, hidden.found.as_str()), (Bad, "1 of 4 usable"));
-        assert!(hidden.mend.unwrap().contains("systemd-run --scope --uid=\"$(id -u)\" '/"));
-        assert_eq!((of(1, &[0]).level, of(1, &[0]).mend), (Bad, None));
+        assert!(hidden.remedy.unwrap().contains("systemd-run --scope --uid=\"$(id -u)\" '/"));
+        assert_eq!((of(1, &[0]).level, of(1, &[0]).remedy), (Bad, None));
         let container = Fixture::with_files(&[(".dockerenv", "")]);
         assert_eq!(
-            number(&container.root(), 1, &[0, 2, 3]).mend.as_deref(),
+            number(&container.root(), 1, &[0, 2, 3]).remedy.as_deref(),
             Some("docker run --cpuset-cpus 0,2 …")
         );
     }
@@ -173,8 +174,8 @@ mod tests {
         assert_eq!(state("0", real, true).level, Ok);
         let refused = state("0", real, false);
         assert_eq!(refused.level, Warn);
-        assert!(refused.found.contains("C6, 890") && refused.mend.unwrap().contains("setfacl"));
-        assert!(state("0", guest, true).mend.unwrap().contains("bench loop"), "left alone there");
+        assert!(refused.found.contains("C6, 890") && refused.remedy.unwrap().contains("setfacl"));
+        assert!(state("0", guest, true).remedy.unwrap().contains("bench loop"), "left alone there");
     }
 
     #[test]

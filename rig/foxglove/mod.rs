@@ -23,11 +23,11 @@ use masseter_shared::clock;
 use client::Client;
 
 /// The default address: this machine only, on Foxglove's usual port.
-pub const DEFAULT_ADDRESS: &str = "127.0.0.1:8765";
+pub(crate) const DEFAULT_ADDRESS: &str = "127.0.0.1:8765";
 
 /// Connected clients, and what they missed so far.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct ClientCounts {
+pub(crate) struct ClientCounts {
     /// Clients.
     pub connected: usize,
     /// Dropped messages, summed over the clients.
@@ -36,7 +36,7 @@ pub struct ClientCounts {
 
 /// What clients missed in a whole run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct ClientLosses {
+pub(crate) struct ClientLosses {
     /// Dropped messages, summed over the clients.
     pub dropped: u64,
     /// Clients that had not read everything when the server closed.
@@ -48,7 +48,7 @@ pub struct ClientLosses {
 #[error(
     "cannot listen for Foxglove on {address}: {error}; choose another address with --live=ADDR:PORT (port 0 takes a free one)"
 )]
-pub struct ListenError {
+pub(crate) struct ListenError {
     /// The requested address.
     pub address: SocketAddr,
     /// The system's error.
@@ -65,7 +65,7 @@ const CLOSING_POLLS: u32 = 50;
 
 /// A running server.
 #[derive(Debug)]
-pub struct FoxgloveServer {
+pub(crate) struct FoxgloveServer {
     address: SocketAddr,
     clients: Arc<Clients>,
     dropped: AtomicU64,
@@ -103,7 +103,7 @@ impl Clients {
 ///
 /// # Errors
 /// When the system refuses the address.
-pub fn check(address: SocketAddr) -> Result<(), ListenError> {
+pub(crate) fn check(address: SocketAddr) -> Result<(), ListenError> {
     bind(address).map(drop)
 }
 
@@ -120,7 +120,7 @@ impl FoxgloveServer {
     ///
     /// # Errors
     /// When the system refuses the address.
-    pub fn start(address: SocketAddr, scene: Scene, session: &str) -> Result<Self, ListenError> {
+    pub(crate) fn start(address: SocketAddr, scene: Scene, session: &str) -> Result<Self, ListenError> {
         let listener = bind(address)?;
         let address = listener.local_addr().map_err(|error| ListenError { address, error })?;
         let clients = Arc::new(Clients::default());
@@ -131,26 +131,26 @@ impl FoxgloveServer {
     }
 
     /// The URL for clients.
-    pub fn url(&self) -> String {
+    pub(crate) fn url(&self) -> String {
         format!("ws://{}", self.address)
     }
 
     /// Queues a message that was received at `log_time_ns` for the clients that subscribe to its topic. Never waits for
     /// one.
-    pub fn offer(&self, message: &Recorded, log_time_ns: u64) {
+    pub(crate) fn offer(&self, message: &Recorded, log_time_ns: u64) {
         let clients = self.clients.connected();
         let dropped = clients.iter().filter(|client| !client.offer(message, log_time_ns)).count();
         self.dropped.fetch_add(dropped as u64, Ordering::Relaxed);
     }
 
     /// The clients at this moment.
-    pub fn counts(&self) -> ClientCounts {
+    pub(crate) fn counts(&self) -> ClientCounts {
         let connected = self.clients.connected().iter().filter(|client| !client.is_gone()).count();
         ClientCounts { connected, dropped: self.dropped.load(Ordering::Relaxed) }
     }
 
     /// Sends what is queued, gives clients half a second to read it, and closes; returns what they missed.
-    pub fn finish(self) -> ClientLosses {
+    pub(crate) fn finish(self) -> ClientLosses {
         self.clients.is_closing.store(true, Ordering::Relaxed);
         // A panic of this thread is on standard error already, and does not concern the recording.
         let _ = self.accepting.join();

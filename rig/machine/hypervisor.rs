@@ -1,6 +1,6 @@
 //! Whether this is a virtual machine: by a processor flag on x86, elsewhere by the firmware's description.
 
-use super::SystemRoot;
+use super::system_root::SystemRoot;
 
 const DEVICE_TREE: &str = "proc/device-tree";
 /// Compatible strings of device trees of virtual machines.
@@ -26,37 +26,36 @@ const GUESTS: [&str; 15] = [
     "Apple Virtualization",
 ];
 
-impl SystemRoot {
-    /// Whether a hypervisor runs this machine.
-    pub fn is_virtual(&self) -> bool {
-        if self.text("sys/hypervisor/type").is_some() {
-            return true;
-        }
-        let cpuinfo = self.text("proc/cpuinfo").unwrap_or_default();
-        match cpuinfo.lines().find_map(|line| line.strip_prefix("flags")) {
-            Some(flags) => flags.split_whitespace().any(|flag| flag == "hypervisor"),
-            None => self.device_tree_is_virtual() || self.is_named_virtual(),
-        }
+/// Whether a hypervisor runs this machine.
+pub(crate) fn is_virtual(root: &SystemRoot) -> bool {
+    if root.text("sys/hypervisor/type").is_some() {
+        return true;
     }
+    let cpuinfo = root.text("proc/cpuinfo").unwrap_or_default();
+    match cpuinfo.lines().find_map(|line| line.strip_prefix("flags")) {
+        Some(flags) => flags.split_whitespace().any(|flag| flag == "hypervisor"),
+        None => device_tree_is_virtual(root) || is_named_virtual(root),
+    }
+}
 
-    fn device_tree_is_virtual(&self) -> bool {
-        let compatible = self.text(&format!("{DEVICE_TREE}/compatible")).unwrap_or_default();
-        self.text(&format!("{DEVICE_TREE}/hypervisor/compatible")).is_some()
-            || self.names(DEVICE_TREE).iter().any(|node| node.starts_with("fw-cfg@"))
-            || compatible.split('\0').any(|board| NO_BOARD.contains(&board))
-    }
+fn device_tree_is_virtual(root: &SystemRoot) -> bool {
+    let compatible = root.text(&format!("{DEVICE_TREE}/compatible")).unwrap_or_default();
+    root.text(&format!("{DEVICE_TREE}/hypervisor/compatible")).is_some()
+        || root.names(DEVICE_TREE).iter().any(|node| node.starts_with("fw-cfg@"))
+        || compatible.split('\0').any(|board| NO_BOARD.contains(&board))
+}
 
-    /// By product and vendor. Clouds also name their bare machines so; those are called `m7g.metal` and the like.
-    fn is_named_virtual(&self) -> bool {
-        let name = |name: &str| self.text(&format!("sys/class/dmi/id/{name}")).unwrap_or_default();
-        let is_guest = |name: String| GUESTS.iter().any(|guest| name.starts_with(guest));
-        !name("product_name").contains(".metal") && NAMES.into_iter().map(name).any(is_guest)
-    }
+/// By product and vendor. Clouds also name their bare machines so; those are called `m7g.metal` and the like.
+fn is_named_virtual(root: &SystemRoot) -> bool {
+    let name = |name: &str| root.text(&format!("sys/class/dmi/id/{name}")).unwrap_or_default();
+    let is_guest = |name: String| GUESTS.iter().any(|guest| name.starts_with(guest));
+    !name("product_name").contains(".metal") && NAMES.into_iter().map(name).any(is_guest)
 }
 
 #[cfg(test)]
 mod tests {
     use super::super::fixture::Fixture;
+    use super::is_virtual;
 
     const X86: (&str, &str) = ("proc/cpuinfo", "flags\t\t: fpu vme lahf_lm\nmodel name : hypervisor\n");
     const X86_GUEST: (&str, &str) = ("proc/cpuinfo", "flags\t\t: fpu vme hypervisor lahf_lm\n");
@@ -93,7 +92,7 @@ mod tests {
             (&[ARM, (VENDOR, "Microsoft Corporation\n"), (PRODUCT, "Surface Pro X\n")], false),
         ];
         for (files, expected) in cases {
-            assert_eq!(Fixture::with_files(files).root().is_virtual(), expected, "{files:?}");
+            assert_eq!(is_virtual(&Fixture::with_files(files).root()), expected, "{files:?}");
         }
     }
 }

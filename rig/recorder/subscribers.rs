@@ -3,7 +3,7 @@
 use masseter_recording::Recorded;
 use masseter_shared::clock;
 use masseter_shared::messages::{Command, Event, FrameTap, Message, Reading, State, Truth};
-use masseter_shared::transport::{Node, Subscriber, TransportError};
+use masseter_shared::transport::{BatchSubscriber, Node, Subscriber, TransportError};
 
 use super::sinks::Sinks;
 
@@ -12,7 +12,7 @@ pub(super) struct Subscribers {
     readings: Subscriber<Reading>,
     states: Subscriber<State>,
     truths: Subscriber<Truth>,
-    frames: Subscriber<[FrameTap]>,
+    frames: BatchSubscriber<FrameTap>,
     events: Subscriber<Event>,
 }
 
@@ -23,7 +23,7 @@ impl Subscribers {
             readings: node.subscriber()?,
             states: node.subscriber()?,
             truths: node.subscriber()?,
-            frames: node.batch_subscriber()?,
+            frames: BatchSubscriber::open(node)?,
             events: node.subscriber()?,
         })
     }
@@ -55,7 +55,7 @@ fn drain<M: Message>(
 
 /// The same for a topic that travels in batches.
 fn drain_batches<M: Message>(
-    subscriber: &Subscriber<[M]>,
+    subscriber: &BatchSubscriber<M>,
     sinks: &mut Sinks,
     on_topic: impl Fn(M) -> Recorded,
 ) -> Result<(), TransportError> {

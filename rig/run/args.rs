@@ -16,7 +16,7 @@ use crate::foxglove;
 #[command(
     after_help = "Examples:\n  masseter run --duration 30s\n  masseter run scenario.toml --live\n  masseter run --clock virtual --seed 2 --out /tmp/run"
 )]
-pub struct RunArgs {
+pub(crate) struct RunArgs {
     /// Scenario file [default: ten seconds of chewing]
     pub scenario: Option<PathBuf>,
     /// Recorded jaw motion (CSV), instead of the scenario's motion
@@ -85,7 +85,7 @@ impl RunArgs {
 
 /// The clock of a run.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
-pub enum ClockKind {
+pub(crate) enum ClockKind {
     /// Real time, in three processes
     #[default]
     Rt,

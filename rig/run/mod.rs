@@ -3,13 +3,13 @@
 //! [`masseter_plan`] refuses a scenario that cannot run before anything starts. Then [`supervisor`] runs the three
 //! processes, or [`virtual_time`] steps their cores. Analysis and report judge the recording.
 
-pub mod args;
-pub mod child;
-pub mod ending;
+pub(crate) mod args;
+mod child;
+mod ending;
 mod room;
-pub mod supervisor;
-pub mod usage;
-pub mod virtual_time;
+mod supervisor;
+mod usage;
+mod virtual_time;
 
 use std::path::Path;
 
@@ -30,7 +30,7 @@ use room::Reserve;
 const RUNS: &str = "runs";
 
 /// Plays the motion, judges the run, and writes its folder.
-pub fn run(args: &RunArgs) -> Result<Exit, Failure> {
+pub(crate) fn run(args: &RunArgs) -> Result<Exit, Failure> {
     room::check_memory().usage()?;
     let plan = resolve(args).usage()?;
     room::check_disk(args.out.as_deref().unwrap_or(RUNS.as_ref()), &plan).incomplete()?;

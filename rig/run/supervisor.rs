@@ -19,7 +19,7 @@ use masseter_shared::config::Scenario;
 use masseter_shared::lifecycle::Start;
 use masseter_shared::realtime::scheduling::Obtained;
 use masseter_shared::schedule::OFF_TICK_NS;
-use masseter_shared::transport::{Claim, Domain, DomainError};
+use masseter_shared::transport::{Domain, DomainError, DomainLock};
 use masseter_terminal::{Exit, Failure, OrFailure, status};
 
 use super::args::RunArgs;
@@ -29,7 +29,7 @@ use super::room::reserve_shared_memory;
 use super::usage::UsageMeter;
 use crate::arguments::name_of;
 use crate::machine::interrupts::Interrupts;
-use crate::machine::{SystemRoot, dma_latency};
+use crate::machine::{self, SystemRoot, dma_latency};
 
 /// Polling interval of the processes.
 const POLL: Duration = Duration::from_millis(2);
@@ -50,7 +50,7 @@ const SAFE_STOP_NS: u64 = SECOND_NS / 2;
 ///
 /// # Errors
 /// When a running rig has the name, or shared memory cannot be used.
-pub(super) fn reserve_domain(name: Option<&str>) -> Result<(Domain, Claim), DomainError> {
+pub(super) fn reserve_domain(name: Option<&str>) -> Result<(Domain, DomainLock), DomainError> {
     Domain::all()?.iter().try_for_each(|domain| domain.sweep().map(drop))?;
     let unique = || format!("{}-{:x}", std::process::id(), clock::now_ns());
     let domain = Domain::named(&name.map_or_else(unique, str::to_owned))?;
@@ -60,7 +60,7 @@ pub(super) fn reserve_domain(name: Option<&str>) -> Result<(Domain, Claim), Doma
 
 /// Runs the rig in real time, then releases its domain. Enters the circumstances and the ending into the manifest.
 pub(super) fn run(
-    (domain, claim): (Domain, Claim),
+    (domain, claim): (Domain, DomainLock),
     plan: &RunPlan,
     folder: &RunFolder,
     args: &RunArgs,
@@ -126,7 +126,7 @@ impl Rig {
         };
         manifest.scheduling = scheduling;
         reserve_shared_memory(domain)?;
-        let is_virtual = SystemRoot::of_this_machine().is_virtual();
+        let is_virtual = machine::is_virtual(&SystemRoot::of_this_machine());
         let hold = dma_latency::Hold::new(plan.scenario.realtime.cpu_dma_latency, is_virtual);
         manifest.cpu_dma_latency = Some(hold.obtained.clone());
         let refusals = print_refusals(&manifest.scheduling, &hold.obtained);

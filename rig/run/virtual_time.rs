@@ -9,7 +9,8 @@ use std::convert::Infallible;
 use anyhow::Context;
 use masseter_controller::process::BuildController;
 use masseter_plan::RunPlan;
-use masseter_plant::core::{PlantCore, PlantError};
+use masseter_plant::PlantError;
+use masseter_plant::core::PlantCore;
 use masseter_plant::cycle::PlantPorts;
 use masseter_plant::emulation::VirtualLink;
 use masseter_recording::{Backlog, Ending, Pace, Recorded, Recorder, RunFolder, Scene};
@@ -27,7 +28,7 @@ use crate::machine::interrupts::Interrupts;
 const EPOCH_NS: u64 = SECOND_NS;
 
 /// Runs the rig under virtual time; it ends as the processes would, also when the user stops it.
-pub fn run(plan: &RunPlan, folder: &RunFolder, build: BuildController) -> anyhow::Result<Ending> {
+pub(crate) fn run(plan: &RunPlan, folder: &RunFolder, build: BuildController) -> anyhow::Result<Ending> {
     let interrupts = Interrupts::listen().context("cannot listen for signals")?;
     let controller = build(&plan.scenario, plan.mechanism.clone(), plan.trajectory.clone());
     let ending = play(controller, plan, folder, &interrupts);

@@ -8,7 +8,7 @@
 use std::fmt;
 
 use crate::clock::{MILLISECOND_NS, SECOND_NS};
-use crate::config::{CanConfig, RATES_HZ};
+use crate::config::{CanConfig, MASTER_NODE, RATES_HZ};
 use masseter_can::canopen::{Cob, NodeId, NodeIdError};
 use masseter_can::wire::{INTERFRAME_BITS, unstuffed_bits, worst_case_bits};
 use masseter_can::{
@@ -201,6 +201,17 @@ const HEARTBEAT_LENGTH: u32 = 1;
 /// The plan of every bus: SYNC, process data and heartbeats. SYNC releases the drives' process data. The master releases
 /// SYNC and its own process data once a cycle, here without jitter.
 ///
+/// ```
+/// use masseter_shared::config::CanConfig;
+/// use masseter_shared::schedule::plans;
+///
+/// for plan in plans(&CanConfig::default(), 1_000_000)? {
+///     plan.check()?;
+///     println!("{:.0} % of the bus in use", plan.utilisation() * 100.0);
+/// }
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
 /// # Errors
 /// [`ScheduleError`] for unknown bit rates, node ids and releasers. [`BusPlan::check`] finds messages that do not fit.
 pub fn plans(can: &CanConfig, period_ns: u64) -> Result<Vec<BusPlan>, ScheduleError> {
@@ -251,7 +262,7 @@ fn messages(drives: &[NodeId], can: &CanConfig, period_ns: u64, boots: bool) -> 
         });
         messages.push(message(format!("RPDO1 {}", node.get()), Cob::Rpdo1(node), rpdo, period_ns));
     }
-    for &node in drives.iter().chain([&NodeId::MASTER]) {
+    for &node in drives.iter().chain([&MASTER_NODE]) {
         let name = format!("heartbeat {}", node.get());
         messages.push(message(name, Cob::Heartbeat(node), HEARTBEAT_LENGTH, heartbeat_ns));
     }

@@ -24,6 +24,7 @@ mod domain;
 mod error;
 mod ports;
 
-pub use domain::{Claim, Domain, DomainError, ScratchDomain};
+pub use batches::{BatchPublisher, BatchSubscriber};
+pub use domain::{Domain, DomainError, DomainLock, ScratchDomain};
 pub use error::TransportError;
-pub use ports::{Node, Payload, Publisher, Received, Subscriber};
+pub use ports::{Node, Payload, Publisher, ReceivedMessage, Subscriber};

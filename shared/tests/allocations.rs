@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use masseter_shared::clock;
 use masseter_shared::messages::{Command, Event, FrameTap, Message, Reading, State, Truth};
 use masseter_shared::realtime::Cycle;
-use masseter_shared::transport::{Node, ScratchDomain};
+use masseter_shared::transport::{BatchPublisher, BatchSubscriber, Node, ScratchDomain};
 
 struct Counting;
 
@@ -73,8 +73,8 @@ fn check_topic<M: Message>(node: &Node) {
 }
 
 fn check_batches(node: &Node) {
-    let subscriber = node.batch_subscriber::<FrameTap>().unwrap();
-    let mut publisher = node.batch_publisher::<FrameTap>().unwrap();
+    let subscriber = BatchSubscriber::<FrameTap>::open(node).unwrap();
+    let mut publisher = BatchPublisher::<FrameTap>::open(node).unwrap();
     let frames = [FrameTap::default(); 14];
     publisher.warm_up().unwrap();
     publisher.connect().unwrap();

@@ -1,7 +1,7 @@
 //! Connections that cannot be made. Alone in its file: the limit that refuses them is the whole process's.
 
 use masseter_shared::messages::{Event, FrameTap};
-use masseter_shared::transport::{Node, ScratchDomain, TransportError};
+use masseter_shared::transport::{BatchPublisher, BatchSubscriber, Node, ScratchDomain, TransportError};
 use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
 
 /// What `connect` says where no file may be opened.
@@ -39,8 +39,8 @@ fn a_refused_connection_is_reported() {
     }
     {
         let node = Node::join(&domain).unwrap();
-        let subscriber = node.batch_subscriber::<FrameTap>().unwrap();
-        let _outlet = node.batch_publisher::<FrameTap>().unwrap();
+        let subscriber = BatchSubscriber::<FrameTap>::open(&node).unwrap();
+        let _outlet = BatchPublisher::<FrameTap>::open(&node).unwrap();
         assert_tells(&refused(|| subscriber.receive()), "frame");
     }
 }

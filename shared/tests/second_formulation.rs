@@ -4,7 +4,7 @@
 //! The second formulation is the loop closure of each leg, from the dimensions alone:
 //! Cᵢ + dᵢûᵢ + lᵢ(cos θᵢ v̂ᵢ + sin θᵢ ẑ) − (p + R Pᵢ) = 0. Its derivatives are central differences. Nothing of `geometry` is called for it.
 
-use masseter_shared::geometry::{LEGS, Mechanism, MechanismConfig, Pose, SlideConfig};
+use masseter_shared::geometry::{Jacobian, LEGS, Mechanism, MechanismConfig, Pose, SlideConfig};
 use nalgebra::{Matrix3, Quaternion, Translation3, UnitQuaternion, Vector3};
 use proptest::prelude::*;
 
@@ -108,7 +108,7 @@ proptest! {
         let mechanism = Mechanism::new(&config).unwrap();
         let at = pose(position_m, rotation);
         let joints = mechanism.inverse(&at).unwrap();
-        let jacobian = mechanism.jacobian(&at, &joints);
+        let jacobian = Jacobian::new(&mechanism, &at, &joints);
         for leg in 0..LEGS {
             let q = [joints.actuators.slide_m[leg], joints.actuators.leg_m[leg], joints.theta_rad[leg]];
             let per_joint = Matrix3::from_columns(&[0, 1, 2].map(|joint| {
@@ -165,7 +165,7 @@ fn a_multibody_simulation_has_the_same_joints_and_rates() {
         let span_s = after.0 - before.0;
         let velocity = (after.1.translation.vector - before.1.translation.vector) / span_s;
         let angular = (after.1.rotation * before.1.rotation.inverse()).scaled_axis() / span_s;
-        let rates = mechanism.jacobian(&now.1, &joints).actuators
+        let rates = Jacobian::new(&mechanism, &now.1, &joints).actuators
             * nalgebra::Vector6::new(velocity.x, velocity.y, velocity.z, angular.x, angular.y, angular.z);
         for (axis, rate_m_s) in rates.iter().enumerate() {
             let known_m_s = rows[1][14 + axis];

@@ -3,19 +3,12 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
-use serde_json::Value;
-
 use super::imports::{Crate, Imports};
-use super::workspace::{list, metadata, text, within};
+use super::workspace::{crate_roots, within};
 
 /// Every circle of every crate: its files, and the items that tie them.
 pub(super) fn circles(workspace: &Path) -> Vec<String> {
-    let metadata = metadata(workspace);
-    let packages = list(&metadata["packages"]).iter();
-    let targets = packages.flat_map(|package| list(&package["targets"]));
-    let is_crate = |target: &&Value| list(&target["kind"]).iter().any(|kind| kind == "lib" || kind == "bin");
-    let roots: BTreeSet<_> = targets.filter(is_crate).map(|target| text(&target["src_path"])).collect();
-    roots.into_iter().flat_map(|root| circles_of(workspace, &Crate::read(Path::new(root)))).collect()
+    crate_roots(workspace).iter().flat_map(|root| circles_of(workspace, &Crate::read(root))).collect()
 }
 
 fn circles_of(workspace: &Path, read: &Crate) -> Vec<String> {

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use proc_macro2::{TokenStream, TokenTree};
 use syn::visit::{self, Visit};
-use syn::{Attribute, ImplItemFn, Item, ItemUse, Macro, Meta, UseTree, Visibility};
+use syn::{Attribute, ImplItemFn, Item, ItemImpl, ItemUse, Macro, Meta, Type, UseTree, Visibility};
 
 /// The names that lead to a module or an item, from the root of its crate.
 type Names = Vec<String>;
@@ -30,6 +30,8 @@ struct Module {
     paths: BTreeSet<Names>,
     /// Calls of macros by their names alone.
     macros: BTreeSet<String>,
+    /// The types of inherent impls.
+    impls: BTreeSet<Names>,
 }
 
 /// The names by which each file imports each other file.
@@ -59,6 +61,9 @@ enum Absent {
     IsElsewhere,
 }
 
+/// Imports that a path may lead through.
+const DEPTH: usize = 32;
+
 impl Crate {
     pub(super) fn read(root: &Path) -> Self {
         let mut read = Self::default();
@@ -82,6 +87,7 @@ impl Crate {
                     self.macros.insert(name.clone(), path.clone());
                 }
                 module.items.extend(name);
+                module.impls.extend(type_of_inherent_impl(item));
                 module.visit_item(item);
                 continue;
             };
@@ -156,9 +162,27 @@ impl Crate {
         in_glob.or_else(|| (absent == Absent::IsMade).then(item))
     }
 
+    /// Inherent impls in another file than their type: file, name of the type, file of the type.
+    pub(super) fn foreign_impls(&self) -> Vec<(&Path, String, &Path)> {
+        let mut found = Vec::new();
+        for (path, module) in &self.modules {
+            for written in &module.impls {
+                let Some(Target { module: defined_in, item: Some(name) }) =
+                    self.resolve(path, written, DEPTH)
+                else {
+                    continue;
+                };
+                let defined_in = &self.modules[&defined_in].file;
+                if *defined_in != module.file {
+                    found.push((module.file.as_path(), name, defined_in.as_path()));
+                }
+            }
+        }
+        found
+    }
+
     /// From every file to the files it imports, with the items.
     pub(super) fn imports(&self) -> Imports<'_> {
-        const DEPTH: usize = 32;
         let mut found: BTreeMap<&Path, BTreeMap<&Path, BTreeSet<String>>> = BTreeMap::new();
         for (path, module) in &self.modules {
             let edges = found.entry(&module.file).or_default();
@@ -190,6 +214,12 @@ impl Crate {
         }
         found
     }
+}
+
+fn type_of_inherent_impl(item: &Item) -> Option<Names> {
+    let Item::Impl(ItemImpl { trait_: None, self_ty, .. }) = item else { return None };
+    let Type::Path(written) = &**self_ty else { return None };
+    Some(written.path.segments.iter().map(|segment| segment.ident.to_string()).collect())
 }
 
 fn below(module: &[String], name: &str) -> Names {

@@ -1,6 +1,7 @@
 //! The workspace as cargo describes it.
 
-use std::path::Path;
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use serde_json::Value;
@@ -29,4 +30,13 @@ pub(super) fn text(value: &Value) -> &str {
 pub(super) fn within(workspace: &Path, path: &Path) -> String {
     let workspace = workspace.canonicalize().unwrap();
     path.canonicalize().unwrap().strip_prefix(workspace).unwrap().display().to_string()
+}
+
+/// The root files of all libraries and programs.
+pub(super) fn crate_roots(workspace: &Path) -> BTreeSet<PathBuf> {
+    let metadata = metadata(workspace);
+    let packages = list(&metadata["packages"]).iter();
+    let targets = packages.flat_map(|package| list(&package["targets"]));
+    let is_crate = |target: &&Value| list(&target["kind"]).iter().any(|kind| kind == "lib" || kind == "bin");
+    targets.filter(is_crate).map(|target| text(&target["src_path"]).into()).collect()
 }

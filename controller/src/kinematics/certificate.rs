@@ -31,7 +31,7 @@ use std::f64::consts::PI;
 use masseter_shared::geometry::LEGS;
 
 use super::legs::each;
-use super::loop_equations::{LoopEquations, Residuals, Side};
+use super::loop_equations::{LoopEquations, PlatformSide, Residuals};
 
 /// z per unit of y.
 const INVERSE_ROUNDINGS: f64 = 4.0;
@@ -91,7 +91,7 @@ fn largest([a, b, c]: [f64; LEGS]) -> Option<f64> {
 
 /// The most by which row k of the Jacobian changes, in total, per radian of the largest change.
 #[inline]
-fn curvature_bound(side: &Side) -> f64 {
+fn curvature_bound(side: &PlatformSide) -> f64 {
     side.near_cos.abs() + side.far_cos.abs() + 2.0 * (1.0 + side.cos_cos.abs()) + side.rounding
 }
 

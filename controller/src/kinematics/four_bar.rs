@@ -7,7 +7,7 @@
 //! chain closes are *one* interval of x. The third side is not part of this module.
 
 use super::leg_angle::LegAngle;
-use super::loop_equations::Side;
+use super::loop_equations::PlatformSide;
 
 /// A closed interval; empty when its ends are not in order.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -51,12 +51,12 @@ impl Interval {
 
 impl FourBar {
     /// Of the side that leaves the driving leg.
-    pub(super) fn driven_from_near(side: &Side) -> Self {
+    pub(super) fn driven_from_near(side: &PlatformSide) -> Self {
         Self { offset: [side.constant, side.near_cos], along: [side.far_cos, -side.cos_cos] }
     }
 
     /// Of the side that arrives at the driving leg.
-    pub(super) fn driven_from_far(side: &Side) -> Self {
+    pub(super) fn driven_from_far(side: &PlatformSide) -> Self {
         Self { offset: [side.constant, side.far_cos], along: [side.near_cos, -side.cos_cos] }
     }
 

@@ -16,7 +16,7 @@ use super::leg_angle::LegAngle;
 use super::legs::{each, next};
 
 /// Bound of the error of gₖ and its derivatives, in units of the machine epsilon times the `scale` of
-/// [`Side::new`].
+/// [`PlatformSide::new`].
 ///
 /// At most 33 roundings of half an epsilon each add up:
 /// - 20 from the hinges to κ,
@@ -29,7 +29,7 @@ const LONGEST_STEP_RAD: f64 = 1.0;
 
 /// The coefficients of one gₖ; unitless.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Side {
+pub(super) struct PlatformSide {
     pub constant: f64,
     pub near_cos: f64,
     pub far_cos: f64,
@@ -49,7 +49,7 @@ pub(super) struct LoopEquations<'a> {
     pub(super) actuators: Actuators,
     /// Bᵢ, metres.
     pub(super) hinges: [Vec3; LEGS],
-    pub(super) sides: [Side; LEGS],
+    pub(super) sides: [PlatformSide; LEGS],
 }
 
 /// Values and derivatives of the three gₖ at one set of leg angles.
@@ -97,7 +97,7 @@ impl End {
     }
 }
 
-impl Side {
+impl PlatformSide {
     #[inline]
     fn new(near: &End, far: &End, length_m: f64) -> Self {
         let hinges = near.hinge - far.hinge;
@@ -155,16 +155,20 @@ impl<'a> LoopEquations<'a> {
             mechanism,
             actuators: *actuators,
             hinges: each(|leg| ends[leg].hinge),
-            sides: each(|side| Side::new(&ends[side], &ends[next(side)], lengths_m[side])),
+            sides: each(|side| PlatformSide::new(&ends[side], &ends[next(side)], lengths_m[side])),
         }
     }
 
     #[inline]
     pub(super) fn evaluate(&self, leg_angles: &[LegAngle; LEGS]) -> Residuals {
-        let at = |formula: fn(&Side, LegAngle, LegAngle) -> f64| {
+        let at = |formula: fn(&PlatformSide, LegAngle, LegAngle) -> f64| {
             each(|side| formula(&self.sides[side], leg_angles[side], leg_angles[next(side)]))
         };
-        Residuals { value: at(Side::value), near: at(Side::near_derivative), far: at(Side::far_derivative) }
+        Residuals {
+            value: at(PlatformSide::value),
+            near: at(PlatformSide::near_derivative),
+            far: at(PlatformSide::far_derivative),
+        }
     }
 
     /// The platform's corners Aᵢ in the base frame, metres.

@@ -6,7 +6,7 @@
 //! carries beyond a stroke is held at its end.
 
 use masseter_shared::config::TrajectoryLimitsConfig;
-use masseter_shared::geometry::{AXES, AXIS_NAMES, Mechanism, Pose, StrokeLimits};
+use masseter_shared::geometry::{AXES, AXIS_NAMES, Jacobian, Mechanism, Pose, StrokeLimits};
 
 use crate::kinematics::Assembly;
 
@@ -40,6 +40,20 @@ impl TrajectoryReport {
 }
 
 /// Samples the whole trajectory every `period_s` (above 0) and judges it.
+///
+/// ```
+/// use masseter_controller::trajectory::{Trajectory, check};
+/// use masseter_shared::config::Scenario;
+/// use masseter_shared::geometry::Mechanism;
+///
+/// let scenario = Scenario::default();
+/// let mechanism = Mechanism::new(&scenario.mechanism)?;
+/// let motion = Trajectory::new(&scenario.motion, &scenario.jaw, &mechanism, scenario.duration_s)?;
+/// let report = check(&motion, &mechanism, &scenario.limits, scenario.period_s())?;
+/// assert!(report.margin_m(mechanism.strokes()).iter().all(|&margin_m| margin_m > 0.0));
+/// assert!(report.condition < scenario.limits.max_condition);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 ///
 /// # Errors
 /// The first sample that the mechanism or the limits do not allow: when, where in the file, and why.
@@ -114,7 +128,7 @@ impl<'a> Survey<'a> {
         {
             return Err(format!("{violated}; make the motion smaller"));
         }
-        let condition = self.mechanism.condition(pose, &joints);
+        let condition = Jacobian::new(self.mechanism, pose, &joints).condition();
         self.report.condition = self.report.condition.max(condition);
         let limit = self.limits.max_condition;
         if condition > limit {

@@ -13,7 +13,7 @@ use masseter_shared::config::{ChewingConfig, JawConfig};
 use masseter_shared::geometry::Pose;
 
 use super::TrajectoryError;
-use super::cycle::Cycle;
+use super::cycle::MotionRhythm;
 use super::error::require;
 use super::mandible::{Mandible, Posture, reach};
 
@@ -28,7 +28,7 @@ const PROOF_POINTS: u32 = 256;
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Chewing {
     mandible: Mandible,
-    pub cycle: Cycle,
+    pub cycle: MotionRhythm,
     down_m: f64,
     back_m: f64,
     balancing_m: f64,
@@ -46,7 +46,7 @@ impl Chewing {
             (config.condylar_inclination_deg, config.bennett_angle_deg);
         let mut chewing = Self {
             mandible: Mandible::new(jaw, inclination_deg, bennett_angle_deg, config.side)?,
-            cycle: Cycle::new(config.cycle_rate_hz, &config.phases)?,
+            cycle: MotionRhythm::new(config.cycle_rate_hz, &config.phases)?,
             down_m: vertical_mm / 1000.0,
             back_m: anterior_posterior_mm / 1000.0,
             balancing_m: 0.0,
@@ -103,7 +103,7 @@ impl Chewing {
 
 #[cfg(test)]
 mod tests {
-    use masseter_shared::config::Side;
+    use masseter_shared::config::JawSide;
 
     use super::*;
 
@@ -113,7 +113,7 @@ mod tests {
 
     #[test]
     fn amplitudes_are_reached_on_the_working_side() {
-        for (side, sign) in [(Side::Left, 1.0), (Side::Right, -1.0)] {
+        for (side, sign) in [(JawSide::Left, 1.0), (JawSide::Right, -1.0)] {
             let config = ChewingConfig { side, ..Default::default() };
             let widest_s = config.phases.opening / config.cycle_rate_hz;
             let incisal_mm = chewing(&config).displacement(widest_s).translation.vector * 1000.0;
@@ -125,8 +125,8 @@ mod tests {
 
     #[test]
     fn sides_are_mirror_images() {
-        let left = chewing(&ChewingConfig { side: Side::Left, ..Default::default() });
-        let right = chewing(&ChewingConfig { side: Side::Right, ..Default::default() });
+        let left = chewing(&ChewingConfig { side: JawSide::Left, ..Default::default() });
+        let right = chewing(&ChewingConfig { side: JawSide::Right, ..Default::default() });
         for step in 0..70 {
             let (a, b) =
                 (left.displacement(f64::from(step) / 100.0), right.displacement(f64::from(step) / 100.0));

@@ -13,14 +13,14 @@ const SWING_BEGINS: f64 = 0.3;
 
 /// A repeating cycle.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Cycle {
+pub(super) struct MotionRhythm {
     rate_hz: f64,
     /// The phase at which the jaw is widest open.
     pub opening: f64,
     closing: f64,
 }
 
-impl Cycle {
+impl MotionRhythm {
     pub(super) fn new(rate_hz: f64, phases: &PhaseShares) -> Result<Self, TrajectoryError> {
         let PhaseShares { opening, closing, occlusion } = *phases;
         require("cycle_rate_hz", rate_hz, rate_hz > 0.0 && rate_hz <= 10.0, "above 0 and at most 10 Hz")?;
@@ -84,7 +84,7 @@ mod tests {
 
     #[test]
     fn a_cycle_goes_out_comes_back_and_rests() {
-        let cycle = Cycle::new(1.43, &PhaseShares::default()).unwrap();
+        let cycle = MotionRhythm::new(1.43, &PhaseShares::default()).unwrap();
         let table = [(0.0, 0.0), (0.215, 0.5), (0.43, 1.0), (0.63, 0.5), (0.83, 0.0), (0.95, 0.0)];
         for (phase, opened) in table {
             assert!((cycle.opened(phase) - opened).abs() < 1e-12, "{phase}");
@@ -95,15 +95,15 @@ mod tests {
     #[test]
     fn shares_that_do_not_fill_the_cycle_are_refused() {
         let phases = PhaseShares { opening: 0.5, ..Default::default() };
-        assert!(Cycle::new(1.0, &phases).unwrap_err().to_string().starts_with("phases add up to "));
+        assert!(MotionRhythm::new(1.0, &phases).unwrap_err().to_string().starts_with("phases add up to "));
         for rate_hz in [0.0, -1.0, f64::NAN, 11.0] {
-            assert!(Cycle::new(rate_hz, &PhaseShares::default()).is_err());
+            assert!(MotionRhythm::new(rate_hz, &PhaseShares::default()).is_err());
         }
     }
 
     #[test]
     fn whole_cycles_fill_the_time_without_exceeding_it() {
-        let cycle = Cycle::new(2.0, &PhaseShares::default()).unwrap();
+        let cycle = MotionRhythm::new(2.0, &PhaseShares::default()).unwrap();
         assert!((cycle.whole_cycles_s(9.9) - 9.5).abs() < 1e-12);
         assert!((cycle.whole_cycles_s(9.5) - 9.5).abs() < 1e-12);
         assert!((cycle.whole_cycles_s(0.1) - 0.5).abs() < 1e-12);

@@ -10,7 +10,7 @@ use masseter_shared::config::{JawConfig, LateralConfig, OpeningConfig, Protrusio
 use masseter_shared::geometry::Pose;
 
 use super::TrajectoryError;
-use super::cycle::Cycle;
+use super::cycle::MotionRhythm;
 use super::error::require;
 use super::mandible::{Mandible, Posture, reach};
 
@@ -25,14 +25,14 @@ const LARGEST_BALANCING_M: f64 = 0.025;
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Excursion {
     mandible: Mandible,
-    pub cycle: Cycle,
+    pub cycle: MotionRhythm,
     farthest: Posture,
 }
 
 impl Excursion {
     pub(super) fn opening(config: &OpeningConfig, jaw: &JawConfig) -> Result<Self, TrajectoryError> {
         let mandible = Mandible::symmetric(jaw, config.condylar_inclination_deg)?;
-        let cycle = Cycle::new(config.cycle_rate_hz, &config.phases)?;
+        let cycle = MotionRhythm::new(config.cycle_rate_hz, &config.phases)?;
         let posture = |pitch_rad| Posture {
             pitch_rad,
             advance_m: ADVANCE_PER_PITCH_M * pitch_rad,
@@ -47,7 +47,7 @@ impl Excursion {
 
     pub(super) fn protrusion(config: &ProtrusionConfig, jaw: &JawConfig) -> Result<Self, TrajectoryError> {
         let mandible = Mandible::symmetric(jaw, config.condylar_inclination_deg)?;
-        let cycle = Cycle::new(config.cycle_rate_hz, &config.phases)?;
+        let cycle = MotionRhythm::new(config.cycle_rate_hz, &config.phases)?;
         let amplitude_mm = config.amplitude_mm;
         require("amplitude_mm", amplitude_mm, (0.0..=15.0).contains(&amplitude_mm), "0 to 15 mm")?;
         let farthest = Posture { advance_m: amplitude_mm / 1000.0, ..Default::default() };
@@ -57,7 +57,7 @@ impl Excursion {
     pub(super) fn lateral(config: &LateralConfig, jaw: &JawConfig) -> Result<Self, TrajectoryError> {
         let LateralConfig { condylar_inclination_deg, bennett_angle_deg, side, .. } = *config;
         let mandible = Mandible::new(jaw, condylar_inclination_deg, bennett_angle_deg, side)?;
-        let cycle = Cycle::new(config.cycle_rate_hz, &config.phases)?;
+        let cycle = MotionRhythm::new(config.cycle_rate_hz, &config.phases)?;
         let posture = |balancing_m| Posture { balancing_m, ..Default::default() };
         let balancing_m = farthest(config.amplitude_mm, LARGEST_BALANCING_M, |balancing_m| {
             side.sign() * mandible.displacement(&posture(balancing_m)).translation.y
@@ -80,7 +80,7 @@ fn farthest(amplitude_mm: f64, highest: f64, travel_m: impl Fn(f64) -> f64) -> R
 
 #[cfg(test)]
 mod tests {
-    use masseter_shared::config::Side;
+    use masseter_shared::config::JawSide;
     use masseter_shared::geometry::Vec3;
 
     use super::*;
@@ -103,7 +103,7 @@ mod tests {
         let config = ProtrusionConfig { amplitude_mm: 9.0, ..Default::default() };
         let incisal = farthest_mm(&Excursion::protrusion(&config, &jaw).unwrap());
         assert!((incisal.norm() - 9.0).abs() < 1e-9 && incisal.x > 0.0);
-        for side in [Side::Left, Side::Right] {
+        for side in [JawSide::Left, JawSide::Right] {
             let config = LateralConfig { side, ..Default::default() };
             let incisal = farthest_mm(&Excursion::lateral(&config, &jaw).unwrap());
             assert!((incisal.y * side.sign() - 8.0).abs() < 1e-9);

@@ -9,7 +9,7 @@
 //! Simplified: the paths are straight, working and balancing side share their inclination, and
 //! neither discs, muscles nor tooth contacts guide anything.
 
-use masseter_shared::config::{JawConfig, Side};
+use masseter_shared::config::{JawConfig, JawSide};
 use masseter_shared::geometry::{Pose, Vec3};
 use nalgebra::{Quaternion, UnitQuaternion};
 
@@ -77,7 +77,7 @@ impl Mandible {
         jaw: &JawConfig,
         inclination_deg: f64,
         bennett_angle_deg: f64,
-        working: Side,
+        working: JawSide,
     ) -> Result<Self, TrajectoryError> {
         let range = 0.0..=80.0;
         require("condylar_inclination_deg", inclination_deg, range.contains(&inclination_deg), "0 to 80")?;
@@ -97,7 +97,7 @@ impl Mandible {
 
     /// For motions in which both sides do the same.
     pub(super) fn symmetric(jaw: &JawConfig, inclination_deg: f64) -> Result<Self, TrajectoryError> {
-        Self::new(jaw, inclination_deg, 0.0, Side::Left)
+        Self::new(jaw, inclination_deg, 0.0, JawSide::Left)
     }
 
     /// Displacement of the jaw from the closed pose: where the incisal point went, and the turn.
@@ -186,7 +186,7 @@ mod tests {
 
     use super::*;
 
-    fn mandible(working: Side) -> Mandible {
+    fn mandible(working: JawSide) -> Mandible {
         Mandible::new(&JawConfig::default(), 40.0, 8.0, working).unwrap()
     }
 
@@ -203,7 +203,7 @@ mod tests {
         fn condyles_stay_on_their_paths(
             pitch_rad in 0.0..0.7f64, advance_m in 0.0..0.02f64, balancing_m in 0.0..0.012f64, left: bool,
         ) {
-            let mandible = mandible(if left { Side::Left } else { Side::Right });
+            let mandible = mandible(if left { JawSide::Left } else { JawSide::Right });
             let displacement = mandible.displacement(&Posture { pitch_rad, advance_m, balancing_m });
             let [working, balancing] = condyles(&mandible, &displacement);
             let common = mandible.path * advance_m;
@@ -217,7 +217,7 @@ mod tests {
         fn the_posture_for_a_point_is_the_one_that_led_there(
             pitch_rad in 0.0..0.7f64, advance_m in 0.0..0.02f64, balancing_m in 0.0..0.012f64,
         ) {
-            let mandible = mandible(Side::Left);
+            let mandible = mandible(JawSide::Left);
             let posture = Posture { pitch_rad, advance_m, balancing_m };
             let incisal = mandible.displacement(&posture).translation;
             let again = mandible.posture_at(incisal.x, incisal.z, balancing_m).unwrap();
@@ -228,7 +228,7 @@ mod tests {
 
     #[test]
     fn opening_lowers_the_incisal_point_and_balancing_swings_it_to_the_working_side() {
-        for (side, sign) in [(Side::Left, 1.0), (Side::Right, -1.0)] {
+        for (side, sign) in [(JawSide::Left, 1.0), (JawSide::Right, -1.0)] {
             let mandible = mandible(side);
             let opened = mandible.displacement(&Posture { pitch_rad: 0.2, ..Default::default() });
             assert!(opened.translation.z < -0.01 && opened.translation.x < 0.0);
@@ -239,6 +239,6 @@ mod tests {
 
     #[test]
     fn what_lies_beyond_the_mandible_is_out_of_reach() {
-        assert_eq!(mandible(Side::Left).posture_at(-0.3, -0.3, 0.0), None);
+        assert_eq!(mandible(JawSide::Left).posture_at(-0.3, -0.3, 0.0), None);
     }
 }

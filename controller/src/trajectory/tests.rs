@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use masseter_shared::config::{
-    ChewingConfig, FileConfig, JawConfig, LateralConfig, MotionConfig, OpeningConfig, ProtrusionConfig, Side,
-    TrajectoryLimitsConfig,
+    ChewingConfig, FileConfig, JawConfig, JawSide, LateralConfig, MotionConfig, OpeningConfig,
+    ProtrusionConfig, TrajectoryLimitsConfig,
 };
 use masseter_shared::geometry::{AXES, Mechanism, MechanismConfig};
 use nalgebra::SVector;
@@ -28,7 +28,11 @@ fn judge(trajectory: &Trajectory) -> Result<TrajectoryReport, TrajectoryError> {
 fn generators() -> [MotionConfig; 6] {
     [
         MotionConfig::default(),
-        MotionConfig::Chewing(ChewingConfig { cycle_rate_hz: 2.17, side: Side::Right, ..Default::default() }),
+        MotionConfig::Chewing(ChewingConfig {
+            cycle_rate_hz: 2.17,
+            side: JawSide::Right,
+            ..Default::default()
+        }),
         MotionConfig::Opening(OpeningConfig::default()),
         MotionConfig::Opening(OpeningConfig { amplitude_mm: 56.1, ..Default::default() }),
         MotionConfig::Protrusion(ProtrusionConfig::default()),

@@ -31,7 +31,7 @@ pub(super) fn from_report(
 /// The event for the beginning or the end of a fault on a bus; `axis` is the axis of the node concerned.
 pub(super) fn from_note(note: &FaultNote, bus: usize, axis: Option<usize>, cycle: u64) -> Event {
     let cause = if note.has_ended { Cause::FaultEnded } else { Cause::FaultInjected };
-    let (value, limit) = ((note.fault + 1) as f64, note.strikes as f64);
+    let (value, limit) = ((note.fault + 1) as f64, note.activations as f64);
     Event { time_ns: note.time_ns, cycle, value, limit, ..notice(cause, bus, axis) }
 }
 

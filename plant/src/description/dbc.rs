@@ -5,7 +5,7 @@
 
 use masseter_can::CanId;
 use masseter_can::canopen::{Cob, CobId, NmtCommand, NmtState, NodeId};
-use masseter_shared::config::DriveConfig;
+use masseter_shared::config::{DriveConfig, MASTER_NODE};
 use masseter_shared::geometry::{AXES, AXIS_NAMES};
 
 use crate::drive::DriveSettings;
@@ -38,7 +38,7 @@ pub(super) fn write(drives: &[DriveSettings; AXES]) -> String {
         format!("VERSION \"\"\n\nNS_ :\n\nBS_:\n\nBU_: {MASTER} {}\n\n", AXIS_NAMES.join(" ")),
         message(Cob::Nmt.into(), "NMT", to_all, &numbers([("Command", 8), ("Node", 8)])),
         message(Cob::Sync.into(), "SYNC", to_all, &[]),
-        message(Cob::Heartbeat(NodeId::MASTER).into(), "Master_heartbeat", to_all, &numbers([("State", 8)])),
+        message(Cob::Heartbeat(MASTER_NODE).into(), "Master_heartbeat", to_all, &numbers([("State", 8)])),
     ];
     for (settings, name) in drives.iter().zip(AXIS_NAMES) {
         parts.extend(services(settings.node, name));
@@ -46,7 +46,7 @@ pub(super) fn write(drives: &[DriveSettings; AXES]) -> String {
     }
     parts.push(values(Cob::Nmt, "Command", &NmtCommand::ALL.map(|command| (command.code(), command.name()))));
     let states = NmtState::ALL.map(|state| (state.code(), state.name()));
-    let nodes = [NodeId::MASTER].into_iter().chain(drives.iter().map(|settings| settings.node));
+    let nodes = [MASTER_NODE].into_iter().chain(drives.iter().map(|settings| settings.node));
     parts.extend(nodes.map(|node| values(Cob::Heartbeat(node), "State", &states)));
     parts.concat()
 }

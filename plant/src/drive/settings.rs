@@ -1,7 +1,7 @@
 //! The settings of an emulated drive, from the scenario.
 
 use masseter_can::canopen::NodeId;
-use masseter_shared::config::{DriveConfig, Scenario};
+use masseter_shared::config::{DriveConfig, MASTER_NODE, Scenario};
 use masseter_shared::geometry::AXES;
 
 use super::axis::configure;
@@ -31,7 +31,7 @@ impl DriveSettings {
     pub(crate) fn for_axes(scenario: &Scenario) -> Result<[Self; AXES], PlantError> {
         check_quantities(scenario)?;
         let ids = node_ids(&scenario.can)?;
-        let watched = u32::from(NodeId::MASTER.get()) << 16 | u32::from(scenario.can.heartbeat_consumer_ms);
+        let watched = u32::from(MASTER_NODE.get()) << 16 | u32::from(scenario.can.heartbeat_consumer_ms);
         Ok(std::array::from_fn(|axis| {
             let (node, drive) = (ids[axis], scenario.drives.of_axis(axis));
             let stroke_m = scenario.mechanism.strokes.of_axis(axis);

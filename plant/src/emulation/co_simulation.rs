@@ -9,7 +9,7 @@ use masseter_shared::messages::{Truth, pose_fields};
 use crate::checks::check_quantities;
 use crate::drive::{DriveNode, DriveSettings, Encoder};
 use crate::error::PlantError;
-use crate::mechanism::{Dynamics, DynamicsError, Food, State, closed_mouth, level};
+use crate::mechanism::{Dynamics, DynamicsError, Food, MechanismState, closed_mouth, level};
 
 /// The six drives and the mechanism that they move.
 ///
@@ -49,7 +49,7 @@ pub struct Emulation {
 #[derive(Debug, Clone, Copy)]
 struct Sample {
     time_ns: u64,
-    state: State,
+    state: MechanismState,
     force_n: [f64; AXES],
     bite_force_n: f64,
 }

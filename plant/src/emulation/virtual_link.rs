@@ -1,9 +1,8 @@
 //! Simulated wires with the emulated drives on them, for a master on port 0 and for free ports.
 
-use masseter_can::canopen::NodeId;
 use masseter_can::faults::{FaultNote, Faults};
 use masseter_can::{Bus, ReceiveError, Tapped, VirtualWire, WireConfig};
-use masseter_shared::config::Scenario;
+use masseter_shared::config::{MASTER_NODE, Scenario};
 use masseter_shared::geometry::AXES;
 use masseter_shared::messages::Truth;
 use masseter_shared::realtime::Waiter;
@@ -138,7 +137,7 @@ fn wire(scenario: &Scenario, bus: usize, free_ports: usize, now_ns: u64) -> Resu
     let can = &scenario.can;
     let ids = node_ids(can)?;
     let drives = can.buses[bus].iter().map(|&axis| ids[axis]);
-    let nodes: Vec<_> = std::iter::once(NodeId::MASTER).chain(drives).collect();
+    let nodes: Vec<_> = std::iter::once(MASTER_NODE).chain(drives).collect();
     let config = WireConfig {
         bitrate: can.bitrate()?,
         ports: nodes.len() + free_ports,

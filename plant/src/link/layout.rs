@@ -1,7 +1,7 @@
 //! The axes on the buses: port and node id of each, as a scenario declares them.
 
 use masseter_can::canopen::NodeId;
-use masseter_shared::config::CanConfig;
+use masseter_shared::config::{CanConfig, MASTER_NODE};
 use masseter_shared::geometry::{AXES, AXIS_NAMES};
 
 use crate::error::PlantError;
@@ -43,11 +43,11 @@ pub(crate) fn drive_ports(can: &CanConfig) -> Result<[DrivePort; AXES], PlantErr
 
 /// The node id of each axis' drive.
 pub(crate) fn node_ids(can: &CanConfig) -> Result<[NodeId; AXES], PlantError> {
-    let mut ids = [NodeId::MASTER; AXES];
+    let mut ids = [MASTER_NODE; AXES];
     for (axis, &id) in can.node_ids.iter().enumerate() {
-        let is_taken = id == NodeId::MASTER.get() || can.node_ids[..axis].contains(&id);
+        let is_taken = id == MASTER_NODE.get() || can.node_ids[..axis].contains(&id);
         if is_taken {
-            let reason = format!("node {id} is listed twice, or is the master's ({})", NodeId::MASTER);
+            let reason = format!("node {id} is listed twice, or is the master's ({MASTER_NODE})");
             return Err(PlantError::Scenario(format!("can.node_ids: {reason}; give every drive its own")));
         }
         ids[axis] = NodeId::new(id)?;

@@ -3,11 +3,10 @@
 use std::os::unix::net::UnixDatagram;
 
 use masseter_can::PortFaults;
-use masseter_can::canopen::NodeId;
 use masseter_can::faults::FaultNote;
 use masseter_can::{Bus, ReceiveError, SocketCan, Tapped};
 use masseter_shared::clock;
-use masseter_shared::config::Scenario;
+use masseter_shared::config::{MASTER_NODE, Scenario};
 use masseter_shared::geometry::AXES;
 use masseter_shared::realtime::Waiter;
 
@@ -37,7 +36,7 @@ impl SocketLink {
         check_quantities(scenario)?;
         let can = &scenario.can;
         let faults_of_port = |bus: usize| {
-            let faults = faults_of_bus(&scenario.faults, bus, &[NodeId::MASTER], now_ns)?;
+            let faults = faults_of_bus(&scenario.faults, bus, &[MASTER_NODE], now_ns)?;
             let (seed, restart_after_ns) = (fault_seed(scenario, bus), restart_after_ns(can));
             Ok(PortFaults::new(faults, MASTER_PORT, seed, restart_after_ns)?)
         };

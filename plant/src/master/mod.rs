@@ -23,9 +23,9 @@ mod supervision;
 #[cfg(test)]
 mod tests;
 
-use masseter_can::canopen::{Cob, Heartbeat, NmtState, NodeId, sync};
+use masseter_can::canopen::{Cob, Heartbeat, NmtState, sync};
 use masseter_can::{Bus, Frame, ReceiveError, Received};
-use masseter_shared::config::Scenario;
+use masseter_shared::config::{MASTER_NODE, Scenario};
 use masseter_shared::geometry::AXES;
 use masseter_shared::messages::codes::{
     BootPhase, Cause, DriveRequest, DriveState, Source, drive_state_code,
@@ -94,7 +94,7 @@ impl Master {
         for bus in 0..self.buses.len() {
             self.send(now_ns, bus, sync::frame(), buses);
             if is_heartbeat_due {
-                let heartbeat = Heartbeat { state: NmtState::Operational }.frame(NodeId::MASTER);
+                let heartbeat = Heartbeat { state: NmtState::Operational }.frame(MASTER_NODE);
                 self.send(now_ns, bus, heartbeat, buses);
             }
         }
@@ -320,7 +320,7 @@ impl Master {
         let time_ns = received.time_ns;
         let sender = Message::sender(cob);
         // Only a master sends SYNC, and this master does not receive its own frames.
-        if cob == Cob::Sync || sender == Some(NodeId::MASTER) {
+        if cob == Cob::Sync || sender == Some(MASTER_NODE) {
             return self.yield_to_other_master(time_ns, bus);
         }
         let Some(id) = sender else { return };

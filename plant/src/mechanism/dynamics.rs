@@ -22,14 +22,14 @@ use super::friction;
 
 /// Pose, twist and joint coordinates of the mechanism.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct State {
+pub(crate) struct MechanismState {
     /// The platform in the base frame.
     pub(crate) pose: Pose,
     twist: Twist,
     joints: Joints,
 }
 
-impl State {
+impl MechanismState {
     /// Joint positions d₁ d₂ d₃ l₁ l₂ l₃, m.
     pub(crate) fn positions_m(&self) -> [f64; AXES] {
         self.joints.actuators.to_axes()
@@ -41,7 +41,7 @@ impl State {
 pub(crate) struct Dynamics {
     mechanism: Mechanism,
     config: DynamicsConfig,
-    state: State,
+    state: MechanismState,
     /// V̇ under the forces that act.
     acceleration: Twist,
     food: Option<Food>,
@@ -94,7 +94,7 @@ impl Dynamics {
             return Err(DynamicsError::Start { initial_leg_m: config.initial_leg_m, violation });
         }
         let (twist, acceleration) = (Twist::zeros(), Twist::zeros());
-        let state = State { pose, twist, joints };
+        let state = MechanismState { pose, twist, joints };
         let dynamics = Self { mechanism, config, state, acceleration, food };
         match dynamics.longest_step_ns()? {
             longest_ns if longest_ns < *DynamicsConfig::STEPS_NS.start() => Err(DynamicsError::Stiff),
@@ -128,12 +128,12 @@ impl Dynamics {
     }
 
     /// The present state.
-    pub(crate) fn state(&self) -> &State {
+    pub(crate) fn state(&self) -> &MechanismState {
         &self.state
     }
 
     /// Joint velocities in a state, m/s. They cost more than a step, so that only callers who need them pay.
-    pub(crate) fn velocities_m_s(&self, state: &State) -> [f64; AXES] {
+    pub(crate) fn velocities_m_s(&self, state: &MechanismState) -> [f64; AXES] {
         (self.jacobian_at(state).actuators * state.twist).into()
     }
 
@@ -161,7 +161,7 @@ impl Dynamics {
 
     /// Integrates over `dt_s`: semi-implicit Euler.
     pub(crate) fn advance(&mut self, dt_s: f64) -> Result<(), DynamicsError> {
-        let State { pose, twist, joints } = &mut self.state;
+        let MechanismState { pose, twist, joints } = &mut self.state;
         *twist += self.acceleration * dt_s;
         let linear = twist.fixed_rows::<3>(0) * dt_s;
         let angular = twist.fixed_rows::<3>(3) * dt_s;
@@ -172,8 +172,8 @@ impl Dynamics {
         Ok(())
     }
 
-    fn jacobian_at(&self, State { pose, joints, .. }: &State) -> Jacobian {
-        self.mechanism.jacobian(pose, joints)
+    fn jacobian_at(&self, MechanismState { pose, joints, .. }: &MechanismState) -> Jacobian {
+        Jacobian::new(&self.mechanism, pose, joints)
     }
 
     /// Inertia of the platform about its origin in base axes, kg m².
@@ -196,7 +196,7 @@ impl Dynamics {
     /// also the centrifugal lθ̇², the hinge the Coriolis −2l̇θ̇/l. The first three columns of a row of the
     /// Jacobian are the direction to project on.
     fn bias(&self, jacobian: &Jacobian) -> (Vector6<f64>, Vector3<f64>) {
-        let State { pose, twist, joints } = &self.state;
+        let MechanismState { pose, twist, joints } = &self.state;
         let omega: Vec3 = twist.fixed_rows::<3>(3).into();
         let rates = jacobian.actuators * twist;
         let swings = jacobian.hinges * twist;

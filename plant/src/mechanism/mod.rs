@@ -8,6 +8,6 @@ mod friction;
 mod resting;
 
 pub use dynamics::DynamicsError;
-pub(crate) use dynamics::{Dynamics, State};
+pub(crate) use dynamics::{Dynamics, MechanismState};
 pub(crate) use food::Food;
 pub(crate) use resting::{closed_mouth, level};

@@ -14,7 +14,7 @@ use crate::freshness::Freshness;
 use crate::intervals::Intervals;
 use crate::longest_cycles::LongestCycles;
 use crate::outage::OutageWatch;
-use crate::over_time::{CONTROLLER, PLANT, Watch};
+use crate::over_time::{CONTROLLER, OverTimeCollector, PLANT};
 use crate::response::Responses;
 use crate::sequence::SequenceCheck;
 use crate::skips::{Counters, Skips};
@@ -47,7 +47,7 @@ pub struct Analysis {
     sequence: SequenceCheck,
     frames: Vec<u64>,
     events: Vec<EventRecord>,
-    watch: Watch,
+    over_time: OverTimeCollector,
     responses: Responses,
     cycles: u64,
     freshness: Freshness,
@@ -73,7 +73,7 @@ impl Analysis {
             sequence: SequenceCheck::default(),
             frames: Vec::new(),
             events: Vec::new(),
-            watch: Watch::new(scenario.can.bitrate().ok()),
+            over_time: OverTimeCollector::new(scenario.can.bitrate().ok()),
             responses: Responses::for_scenario(scenario),
             cycles: 0,
             freshness: Freshness::default(),
@@ -113,7 +113,7 @@ impl Analysis {
         let skipped = self.plant_skips.take(&Counters::from(reading), self.period_ns);
         self.intervals.reading(reading, skipped);
         self.longest_cycles.reading(reading);
-        self.watch.wake_up(PLANT, reading.due_ns, reading.woke_ns);
+        self.over_time.wake_up(PLANT, reading.due_ns, reading.woke_ns);
         self.outage.reading(reading);
         self.first_sample_ns.get_or_insert(reading.sampled_ns);
         self.last_sample_ns = reading.sampled_ns;
@@ -124,7 +124,7 @@ impl Analysis {
         let skipped = self.controller_skips.take(&Counters::from(state), self.period_ns);
         self.intervals.state(state, is_fresh, skipped);
         self.longest_cycles.state(state, is_fresh);
-        self.watch.wake_up(CONTROLLER, state.due_ns, state.woke_ns);
+        self.over_time.wake_up(CONTROLLER, state.due_ns, state.woke_ns);
         self.outage.state(state);
         if is_fresh {
             self.tracking.solution(state);
@@ -136,7 +136,7 @@ impl Analysis {
     fn truth(&mut self, truth: &Truth) {
         self.tracking.truth(truth);
         self.bite_force_max_n = self.bite_force_max_n.map(|most_n| most_n.max(truth.bite_force_n));
-        self.watch.truth(truth);
+        self.over_time.truth(truth);
     }
 
     fn frame(&mut self, tap: &FrameTap) -> Result<(), TapError> {
@@ -146,7 +146,7 @@ impl Analysis {
             self.frames.resize(bus + 1, 0);
         }
         self.frames[bus] += u64::from(tapped.frame().is_some());
-        self.watch.frame(tap.time_ns, bus, &tapped);
+        self.over_time.frame(tap.time_ns, bus, &tapped);
         self.responses.frame(tap, bus, &tapped);
         Ok(())
     }
@@ -181,7 +181,7 @@ impl Analysis {
             cut_short,
             damage: damage.to_vec(),
             track,
-            over_time: self.watch.finish(),
+            over_time: self.over_time.finish(),
         }
     }
 }

@@ -31,7 +31,6 @@ pub struct Figures {
     /// Which readings the controller's cycles used.
     pub readings: ReadingFigures,
     /// Rig or machine as the cause of the overlong stretches of work; none where no such stretch cost a deadline.
-    #[serde(rename = "suspicion")]
     pub overrun_attribution: Option<OverrunAttribution>,
     /// The last state of the controller's sequence; none without a single state message.
     pub final_state: Option<Code<ControllerState>>,

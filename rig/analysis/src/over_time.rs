@@ -28,7 +28,7 @@ pub struct OverTime {
 
 /// Collects them.
 #[derive(Debug, Default)]
-pub(super) struct Watch {
+pub(super) struct OverTimeCollector {
     began_ns: Option<u64>,
     late: Series<Extremes<2>>,
     axes: Series<Extremes<{ 3 * AXES }>>,
@@ -41,7 +41,7 @@ pub(super) struct Watch {
 pub(super) const CONTROLLER: usize = 0;
 pub(super) const PLANT: usize = 1;
 
-impl Watch {
+impl OverTimeCollector {
     /// For buses of this bit rate; without one there is no load.
     pub(super) fn new(bitrate: Option<Bitrate>) -> Self {
         Self { bitrate, ..Self::default() }
@@ -103,12 +103,12 @@ mod tests {
     fn a_bus_that_is_half_full_is_said_to_be() {
         let frame = Frame::fixed(CanId::standard(0x123).unwrap(), [0x55; 8]);
         let bits = wire::frame_bits(&frame);
-        let mut watch = Watch::new(Some(Bitrate::new(2 * 1000 * bits).unwrap()));
+        let mut collector = OverTimeCollector::new(Some(Bitrate::new(2 * 1000 * bits).unwrap()));
         for millisecond in 0..1000 {
             let time_ns = millisecond * 1_000_000;
-            watch.frame(time_ns, 0, &Tapped::Frame(TappedFrame { frame, time_ns, queued_ns: None }));
+            collector.frame(time_ns, 0, &Tapped::Frame(TappedFrame { frame, time_ns, queued_ns: None }));
         }
-        let over_time = watch.finish();
+        let over_time = collector.finish();
         assert_eq!(over_time.bus_load.len(), 1);
         assert!(over_time.bus_load[0].iter().all(|(_, share)| (share - 0.5).abs() < 1e-3));
     }

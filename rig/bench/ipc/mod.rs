@@ -57,7 +57,7 @@ fn round_trips(channel: Channel, [own_core, peer_core]: [usize; 2]) -> anyhow::R
 
 /// The arguments of the other process.
 #[derive(Debug, Clone, Args)]
-pub struct PeerArgs {
+pub(crate) struct PeerArgs {
     /// The channel to answer on.
     #[arg(long, value_enum)]
     channel: Channel,
@@ -70,7 +70,7 @@ pub struct PeerArgs {
 }
 
 /// Answers every message until the process is killed or the channel closes. The socket is standard input.
-pub fn answer(args: &PeerArgs) -> anyhow::Result<()> {
+pub(crate) fn answer(args: &PeerArgs) -> anyhow::Result<()> {
     set_parent_process_death_signal(Some(Signal::KILL))?;
     realtime_on(args.core);
     let socket = UnixStream::from(io::stdin().as_fd().try_clone_to_owned()?);

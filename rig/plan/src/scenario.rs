@@ -24,7 +24,7 @@ pub fn read_scenario_with(
     change(&mut scenario)?;
     let checked = scenario.validate();
     checked.map_err(|error| match path {
-        Some(path) => error.in_file(path),
+        Some(path) => Scenario::place_refusal(error, path),
         None => error,
     })?;
     Ok(scenario)

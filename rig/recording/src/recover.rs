@@ -34,6 +34,29 @@ pub struct Recovered {
 /// Copies everything readable from `reader` to `medium`. The rest is in the reader's [`damage`](Reader::damage).
 ///
 /// A channel whose schema is lost is defined without one, so that its messages are kept.
+///
+/// ```
+/// use std::io::Cursor;
+///
+/// use masseter_recording::{Reader, Recorded, Recorder, Scene, recover};
+/// # use masseter_shared::config::Scenario;
+/// # use masseter_shared::geometry::{Mechanism, MechanismConfig};
+/// # use masseter_shared::messages::{Message, State};
+///
+/// # let folder = tempfile::tempdir()?;
+/// # let path = folder.path().join("recording.mcap");
+/// # let scene = Scene::new(&Mechanism::new(&MechanismConfig::default())?, &Scenario::default().jaw);
+/// # let mut state = State::default();
+/// # state.stamp(1, 1_000_000);
+/// let mut recorder = Recorder::create(&path, scene)?;
+/// recorder.record(&Recorded::State(state), 1_000_000)?;
+/// recorder.flush()?;
+/// let mut whole = Vec::new();
+/// let recovered = recover(&mut Reader::open(&path)?, Cursor::new(&mut whole))?;
+/// assert_eq!(recovered.undefined, 0);
+/// assert!(Reader::new(Cursor::new(&whole))?.next_message()?.is_some());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn recover<R: Read + Seek, W: Write + Seek>(
     reader: &mut Reader<R>,
     medium: W,

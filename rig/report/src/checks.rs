@@ -136,13 +136,13 @@ fn tracking(tracking: &TrackingFigures, limit_mm: f64, is_played: bool) -> Check
 
 /// A test with faults that passes without them has tested nothing. None where none is declared.
 fn faults(declared: usize, events: &[EventRecord], is_played: bool) -> Option<Check> {
-    let struck = |number: usize| {
+    let begun = |number: usize| {
         events.iter().any(|event| event.cause == Cause::FaultInjected && event.value as usize == number)
     };
     let idle: Vec<_> =
-        (1..=declared).filter(|&number| !struck(number)).map(|number| number.to_string()).collect();
+        (1..=declared).filter(|&number| !begun(number)).map(|number| number.to_string()).collect();
     let which = if idle.is_empty() { String::new() } else { format!(", number {} never", idle.join(", ")) };
-    let finding = format!("{} of {declared} declared struck{which}", declared - idle.len());
+    let finding = format!("{} of {declared} declared faults acted{which}", declared - idle.len());
     (declared > 0).then(|| Check::judged("faults", finding, idle.is_empty()).unless(!is_played))
 }
 
@@ -206,21 +206,21 @@ mod tests {
 
     use super::*;
 
-    fn struck(number: usize) -> EventRecord {
+    fn begun(number: usize) -> EventRecord {
         let injected = Event::new(Source::Wire, EventKind::Notice, Cause::FaultInjected);
         EventRecord::from(&Event { value: number as f64, ..injected })
     }
 
     #[test]
-    fn a_declared_fault_that_never_struck_fails_a_run_that_was_played_to_its_end() {
-        let ended = EventRecord { cause: Code::Known(Cause::FaultEnded), ..struck(2) };
-        let events = [struck(1), ended];
+    fn a_declared_fault_that_never_acted_fails_a_run_that_was_played_to_its_end() {
+        let ended = EventRecord { cause: Code::Known(Cause::FaultEnded), ..begun(2) };
+        let events = [begun(1), ended];
         let cases = [
             (0, true, None),
-            (1, true, Some(("ok", "1 of 1 declared struck"))),
-            (2, true, Some(("FAIL", "1 of 2 declared struck, number 2 never"))),
-            (2, false, Some(("skip", "1 of 2 declared struck, number 2 never"))),
-            (3, true, Some(("FAIL", "1 of 3 declared struck, number 2, 3 never"))),
+            (1, true, Some(("ok", "1 of 1 declared faults acted"))),
+            (2, true, Some(("FAIL", "1 of 2 declared faults acted, number 2 never"))),
+            (2, false, Some(("skip", "1 of 2 declared faults acted, number 2 never"))),
+            (3, true, Some(("FAIL", "1 of 3 declared faults acted, number 2, 3 never"))),
         ];
         for (declared, is_played, expected) in cases {
             let check = faults(declared, &events, is_played);

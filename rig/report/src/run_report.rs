@@ -28,6 +28,19 @@ enum AnalysisError {
 /// Analyses and judges a run that has just ended, prints its report and writes it. `reserved` holds the summary's room on the
 /// disk until the verdict is printed.
 ///
+/// ```no_run
+/// use masseter_recording::{Manifest, RunFolder};
+/// use masseter_report::report_run;
+/// use masseter_terminal::Format;
+///
+/// let folder = RunFolder::open("runs/latest".as_ref())?;
+/// let manifest = Manifest::read(&folder)?;
+/// let reserved = std::fs::File::create(folder.file("reserved"))?;
+/// let exit = report_run(&folder, &manifest, Format::Human, reserved).map_err(|failure| failure.error)?;
+/// println!("{exit:?}");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
 /// # Errors
 /// With [`Exit::Incomplete`] when the recording cannot be read, or a file or standard output cannot be written.
 pub fn report_run(
@@ -44,6 +57,15 @@ pub fn report_run(
 }
 
 /// `masseter report`: the same of a past run. Where its folder is read-only, the run is shown and no file is written.
+///
+/// ```no_run
+/// use masseter_report::report_past_run;
+/// use masseter_terminal::Format;
+///
+/// let exit = report_past_run("runs/latest".as_ref(), Format::Human).map_err(|failure| failure.error)?;
+/// println!("{exit:?}");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 ///
 /// # Errors
 /// With [`Exit::Usage`] when the folder holds no readable run, with [`Exit::Incomplete`] when a file cannot be written.

@@ -97,9 +97,9 @@ fn overload(usage: &RunUsage, rate_hz: u32) -> Option<String> {
     ))
 }
 
-type Judgement = (Exit, String);
+type ExitReason = (Exit, String);
 
-fn ending(ending: &Ending, events: &[EventRecord]) -> Option<Judgement> {
+fn ending(ending: &Ending, events: &[EventRecord]) -> Option<ExitReason> {
     match ending {
         Ending::Completed => None,
         Ending::SafeStop => Some((Exit::SafeStop, stopped(events))),
@@ -119,7 +119,7 @@ fn stopped(events: &[EventRecord]) -> String {
     format!("the controller stopped the rig{why}")
 }
 
-fn incomplete(figures: &Figures) -> Option<Judgement> {
+fn incomplete(figures: &Figures) -> Option<ExitReason> {
     let missing = figures.missing_messages();
     let reason = if missing > 0 {
         format!("{missing} messages are missing from the recording")
@@ -135,7 +135,7 @@ fn incomplete(figures: &Figures) -> Option<Judgement> {
 
 /// Whether the machine kept the rig from too many cycles to judge it, or never granted it real time. A safe stop is
 /// excused only when many of them were missed just before it, and is so however many may be missed.
-fn disturbed(manifest: &Manifest, figures: &Figures) -> Option<Judgement> {
+fn disturbed(manifest: &Manifest, figures: &Figures) -> Option<ExitReason> {
     let refusal = manifest.refusal();
     let (skipped, by_machine) = figures.skipped();
     let stop = excuse(
@@ -168,7 +168,7 @@ fn withheld(figures: &Figures) -> String {
 }
 
 /// Real interfaces stamp frames by the wall clock: once it was set, these times are useless. Simulated ones do not use it.
-fn clock_jump(usage: &RunUsage, can: &CanConfig) -> Option<Judgement> {
+fn clock_jump(usage: &RunUsage, can: &CanConfig) -> Option<ExitReason> {
     let jump_s = usage.clock_jump_s;
     (jump_s != 0.0 && !can.is_virtual()).then(|| {
         let reason = format!(
@@ -204,7 +204,7 @@ fn excuse(
     }
 }
 
-fn failed(checks: &[Check]) -> Option<Judgement> {
+fn failed(checks: &[Check]) -> Option<ExitReason> {
     let failed: Vec<_> =
         checks.iter().filter(|check| check.result == CheckResult::Failed).map(|check| check.name).collect();
     (!failed.is_empty()).then(|| (Exit::Failed, format!("failed: {}", failed.join(", "))))

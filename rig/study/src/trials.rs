@@ -23,19 +23,19 @@ pub(super) struct Reached {
 }
 
 /// The end of an attempt: a solution, or why none was reached.
-type Attempt = Result<Reached, &'static str>;
+type TrialResult = Result<Reached, &'static str>;
 
 /// One guess for one input, given to every solver.
 #[derive(Debug, Clone)]
 pub(super) struct Trial {
     pub start: Start,
     /// In the order of [`SOLVERS`].
-    outcomes: [Attempt; SOLVERS.len()],
+    outcomes: [TrialResult; SOLVERS.len()],
 }
 
 impl Trial {
     /// The outcome of one solver.
-    pub(super) fn by(&self, solver: Solver) -> Attempt {
+    pub(super) fn by(&self, solver: Solver) -> TrialResult {
         let place = SOLVERS.iter().position(|&other| other == solver);
         self.outcomes[place.expect("every solver takes part")]
     }
@@ -74,7 +74,7 @@ impl Trials {
     }
 
     /// The outcomes of one solver with guesses from this origin.
-    fn outcomes(&self, solver: Solver, guesses: Guesses) -> impl Iterator<Item = Attempt> {
+    fn outcomes(&self, solver: Solver, guesses: Guesses) -> impl Iterator<Item = TrialResult> {
         self.with(guesses).iter().map(move |trial| trial.by(solver))
     }
 

@@ -21,43 +21,41 @@ struct Page<'a> {
     version: &'static str,
 }
 
-impl Study {
-    /// Writes tables, figures and `claims.md` into an existing folder, and returns the claims in the paper's order.
-    /// `command` is what repeats this study, for the page.
-    ///
-    /// # Errors
-    /// When a file cannot be written.
-    pub fn write(&self, folder: &Path, command: &str) -> anyhow::Result<Vec<PaperClaim>> {
-        let write = |name: &str, extension: &str, text: &str| {
-            let path = folder.join(name).with_extension(extension);
-            fs::write(&path, text).with_context(|| format!("cannot write {}", path.display()))
-        };
-        let figures = plot::figures(self).context("cannot draw the figures")?;
-        for (name, table) in self.tables() {
-            write(name, "csv", &table)?;
-        }
-        for (name, svg) in &figures {
-            write(name, "svg", svg)?;
-        }
-        let claims = claims::judge(self);
-        let version = env!("CARGO_PKG_VERSION");
-        write("claims", "md", &Page { study: self, command, claims: &claims, version }.render()?)?;
-        Ok(claims)
+/// Writes tables, figures and `claims.md` into an existing folder, and returns the claims in the paper's order.
+/// `command` is what repeats this study, for the page.
+///
+/// # Errors
+/// When a file cannot be written.
+pub fn write(study: &Study, folder: &Path, command: &str) -> anyhow::Result<Vec<PaperClaim>> {
+    let keep = |name: &str, extension: &str, text: &str| {
+        let path = folder.join(name).with_extension(extension);
+        fs::write(&path, text).with_context(|| format!("cannot write {}", path.display()))
+    };
+    let figures = plot::figures(study).context("cannot draw the figures")?;
+    for (name, table) in tables(study) {
+        keep(name, "csv", &table)?;
     }
+    for (name, svg) in &figures {
+        keep(name, "svg", svg)?;
+    }
+    let claims = claims::judge(study);
+    let version = env!("CARGO_PKG_VERSION");
+    keep("claims", "md", &Page { study, command, claims: &claims, version }.render()?)?;
+    Ok(claims)
+}
 
-    fn tables(&self) -> Vec<(&'static str, String)> {
-        let mut tables = vec![
-            ("success", self.trials.success_table()),
-            ("iterations", self.trials.iterations_table()),
-            ("cost", self.trials.cost_table()),
-            ("speed", speed::table(&self.speed)),
-            ("fig8_solutions", self.set.table()),
-            ("multiplicity", self.multiplicity.table()),
-            ("basins", self.basins.table()),
-            ("motions", motions::table(&self.motions, &self.mechanism)),
-        ];
-        tables.extend(self.pairs.iter().map(|one| (one.name, one.table())));
-        tables.extend(self.maps.iter().map(|map| (map.slice.name, map.table())));
-        tables
-    }
+fn tables(study: &Study) -> Vec<(&'static str, String)> {
+    let mut tables = vec![
+        ("success", study.trials.success_table()),
+        ("iterations", study.trials.iterations_table()),
+        ("cost", study.trials.cost_table()),
+        ("speed", speed::table(&study.speed)),
+        ("fig8_solutions", study.set.table()),
+        ("multiplicity", study.multiplicity.table()),
+        ("basins", study.basins.table()),
+        ("motions", motions::table(&study.motions, &study.mechanism)),
+    ];
+    tables.extend(study.pairs.iter().map(|one| (one.name, one.table())));
+    tables.extend(study.maps.iter().map(|map| (map.slice.name, map.table())));
+    tables
 }

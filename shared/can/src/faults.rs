@@ -67,7 +67,7 @@ pub struct FaultNote {
     /// The node concerned, if the fault names one.
     pub port: Option<usize>,
     /// Number of activations; 0 at the beginning.
-    pub strikes: u64,
+    pub activations: u64,
     /// Whether the fault has ended.
     pub has_ended: bool,
 }
@@ -85,6 +85,36 @@ pub(super) struct NumberedFrame {
 }
 
 /// The faults of one bus, and their activations so far.
+///
+/// ```
+/// use masseter_can::faults::{Fault, FaultKind, Faults};
+/// use masseter_can::{Bus, Tapped, VirtualWire, canopen::sync};
+/// # use masseter_can::{Bitrate, WireConfig};
+///
+/// # let config = WireConfig {
+/// #     bitrate: Bitrate::MAX,
+/// #     ports: 2,
+/// #     transmit_capacity: 8,
+/// #     receive_capacity: 8,
+/// #     restart_after_ns: None,
+/// # };
+/// let destroys_one = Fault {
+///     number: 0,
+///     kind: FaultKind::Corrupt,
+///     from_ns: 0,
+///     until_ns: u64::MAX,
+///     id: None,
+///     port: None,
+///     probability: 1.0,
+///     count: 1,
+/// };
+/// let mut wire = VirtualWire::with_faults(&config, Faults::new(vec![destroys_one], 7));
+/// wire.port(0).send(0, sync::frame())?;
+/// wire.advance(1_000_000);
+/// assert!(matches!(wire.tap(1_000_000)?, Some(Tapped::Error(_))));
+/// assert!(wire.port(1).receive(1_000_000)?.is_some(), "its sender has repeated it");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone, Default)]
 pub struct Faults {
     list: Vec<Listed>,
@@ -94,7 +124,7 @@ pub struct Faults {
 #[derive(Debug, Clone, Copy)]
 struct Listed {
     fault: Fault,
-    strikes: u64,
+    activations: u64,
     began_ns: Option<u64>,
     is_begin_reported: bool,
     is_end_reported: bool,
@@ -102,7 +132,7 @@ struct Listed {
 
 impl Listed {
     fn is_live(&self, now_ns: u64) -> bool {
-        (self.fault.from_ns..self.fault.until_ns).contains(&now_ns) && self.strikes < self.fault.count
+        (self.fault.from_ns..self.fault.until_ns).contains(&now_ns) && self.activations < self.fault.count
     }
 
     fn concerns(&self, port: usize, id: CanId) -> bool {
@@ -115,7 +145,7 @@ impl Faults {
     pub fn new(faults: Vec<Fault>, seed: u64) -> Self {
         let listed = |fault| Listed {
             fault,
-            strikes: 0,
+            activations: 0,
             began_ns: None,
             is_begin_reported: false,
             is_end_reported: false,
@@ -233,17 +263,17 @@ impl Faults {
     pub(super) fn record(&mut self, activation: FaultActivation) {
         let listed = &mut self.list[activation.place];
         listed.began_ns.get_or_insert(activation.at_ns);
-        listed.strikes += 1;
+        listed.activations += 1;
     }
 
     /// The next forced bus-off of a node that is on the bus from `from_ns` on.
     pub(super) fn next_bus_off(&self, from_ns: u64, port: usize) -> Option<FaultActivation> {
         let bus_offs = of_port(&self.list, port, |kind| kind == FaultKind::BusOff);
-        let strikes = bus_offs.filter_map(|(place, listed)| {
+        let next = bus_offs.filter_map(|(place, listed)| {
             let at_ns = listed.fault.from_ns.max(from_ns);
             listed.is_live(at_ns).then_some(FaultActivation { place, at_ns })
         });
-        strikes.min_by_key(|activation| activation.at_ns)
+        next.min_by_key(|activation| activation.at_ns)
     }
 
     /// Marks disconnections as begun. The frames they suppress are not counted.
@@ -261,12 +291,12 @@ impl Faults {
             let Fault { number: fault, port, .. } = listed.fault;
             if !listed.is_begin_reported {
                 listed.is_begin_reported = true;
-                return Some(FaultNote { time_ns: began_ns, fault, port, strikes: 0, has_ended: false });
+                return Some(FaultNote { time_ns: began_ns, fault, port, activations: 0, has_ended: false });
             }
             if !listed.is_end_reported && !listed.is_live(now_ns) {
                 listed.is_end_reported = true;
-                let strikes = listed.strikes;
-                return Some(FaultNote { time_ns: now_ns, fault, port, strikes, has_ended: true });
+                let activations = listed.activations;
+                return Some(FaultNote { time_ns: now_ns, fault, port, activations, has_ended: true });
             }
             None
         })

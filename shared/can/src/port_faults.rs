@@ -22,6 +22,39 @@ pub struct NotByPort {
 }
 
 /// The faults of one port.
+///
+/// ```
+/// use masseter_can::faults::{Fault, FaultKind};
+/// use masseter_can::{Bus, CanId, Frame, PortFaults, VirtualWire};
+/// # use masseter_can::{Bitrate, WireConfig};
+///
+/// # let config = WireConfig {
+/// #     bitrate: Bitrate::MAX,
+/// #     ports: 2,
+/// #     transmit_capacity: 8,
+/// #     receive_capacity: 8,
+/// #     restart_after_ns: None,
+/// # };
+/// let loses_one = Fault {
+///     number: 0,
+///     kind: FaultKind::Lose,
+///     from_ns: 0,
+///     until_ns: u64::MAX,
+///     id: None,
+///     port: None,
+///     probability: 1.0,
+///     count: 1,
+/// };
+/// let mut faults = PortFaults::new(vec![loses_one], 1, 7, None)?;
+/// let mut wire = VirtualWire::new(&config);
+/// for byte in [1, 2] {
+///     wire.port(0).send(0, Frame::fixed(CanId::standard(0x181)?, [byte]))?;
+/// }
+/// wire.advance(1_000_000);
+/// let received = faults.over(wire.port(1)).receive(1_000_000)?.expect("only the first frame is lost");
+/// assert_eq!(received.frame.data(), [2]);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug)]
 pub struct PortFaults {
     faults: Faults,

@@ -73,6 +73,17 @@ pub enum RequestError {
 }
 
 /// Requests that arrive in pieces over a stream.
+///
+/// ```
+/// use masseter_can::socketcand::{Request, Requests};
+///
+/// let mut requests = Requests::default();
+/// requests.push(b"< open can0 >< raw");
+/// assert_eq!(requests.take(), Some(Ok(Request::Open("can0".to_owned()))));
+/// assert_eq!(requests.take(), None);
+/// requests.push(b"mode >");
+/// assert_eq!(requests.take(), Some(Ok(Request::RawMode)));
+/// ```
 #[derive(Debug, Default)]
 pub struct Requests {
     pending: Vec<u8>,

@@ -2,11 +2,18 @@
 
 use std::collections::BTreeSet;
 
+use masseter_can::canopen::NodeId;
 use masseter_can::{Bitrate, BitrateError};
 
 use super::error::ScenarioError;
 use super::need::{keyed, require_positive};
 use crate::geometry::AXES;
+
+/// The node id of the rig's master.
+pub const MASTER_NODE: NodeId = match NodeId::new(127) {
+    Ok(node) => node,
+    Err(_) => unreachable!(),
+};
 
 section! {
     /// The CAN link between the master and the six drives.

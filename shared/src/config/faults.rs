@@ -2,9 +2,9 @@
 
 use std::fmt::Display;
 
-use masseter_can::canopen::NodeId;
 use serde::{Deserialize, Serialize};
 
+use super::can::MASTER_NODE;
 use super::error::ScenarioError;
 use super::need::{require_not_negative, require_within};
 
@@ -78,9 +78,9 @@ impl FaultConfig {
             let need = "leave it away with can.interfaces: only on a simulated bus can frames be destroyed on the wire";
             return refuse("faults.kind", &"corrupt", need);
         }
-        if let Some(node) = self.node.filter(|&node| node != NodeId::MASTER.get()) {
+        if let Some(node) = self.node.filter(|&node| node != MASTER_NODE.get()) {
             let need =
-                format!("on a real interface only the master (node {}) can be given faults", NodeId::MASTER);
+                format!("on a real interface only the master (node {MASTER_NODE}) can be given faults");
             return refuse("faults.node", &node, need);
         }
         Ok(())

@@ -20,7 +20,7 @@ mod motion;
 mod need;
 mod scenario;
 
-pub use can::{CanConfig, IdentityConfig};
+pub use can::{CanConfig, IdentityConfig, MASTER_NODE};
 pub use control::{ChecksConfig, ControllerConfig, CpuDmaLatency, RealtimeConfig};
 pub use drives::{DriveConfig, DrivesConfig};
 pub use dynamics::DynamicsConfig;

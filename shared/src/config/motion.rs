@@ -11,14 +11,14 @@ use serde::{Deserialize, Serialize};
 /// A side of the jaw, from the patient's view.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Side {
+pub enum JawSide {
     /// +y.
     Left,
     /// −y.
     Right,
 }
 
-impl Side {
+impl JawSide {
     /// +1 for left, −1 for right: the sign of y on this side.
     pub fn sign(self) -> f64 {
         match self {
@@ -65,7 +65,7 @@ section! {
         /// How far the incisal point goes back while it goes down, mm.
         pub anterior_posterior_mm: f64 = 5.0,
         /// The working side.
-        pub side: Side = Side::Left,
+        pub side: JawSide = JawSide::Left,
         /// Inclination of the condylar path below the horizontal, degrees.
         pub condylar_inclination_deg: f64 = 40.0,
         /// Inward turn of the balancing condyle's path, degrees.
@@ -123,7 +123,7 @@ section! {
         /// How far the incisal point goes to the side, mm.
         pub amplitude_mm: f64 = 8.0,
         /// The working side, to which the jaw goes.
-        pub side: Side = Side::Left,
+        pub side: JawSide = JawSide::Left,
         /// Excursions per second, Hz.
         pub cycle_rate_hz: f64 = 0.5,
         /// Shares of a cycle; together 1.

@@ -62,6 +62,17 @@ section! {
 }
 
 impl Scenario {
+    /// A refusal with its place in the file of the scenario, if the file alone leads to it: an argument may have replaced
+    /// the value.
+    #[must_use]
+    pub fn place_refusal(mut refusal: ScenarioError, path: &Path) -> ScenarioError {
+        let in_words = refusal.to_string();
+        if let ScenarioError::BadValue { place, entry, key, .. } = &mut refusal {
+            *place = place_of_refusal(path, &in_words, key, *entry);
+        }
+        refusal
+    }
+
     /// Reads a scenario file. The path of a recording is relative to the folder of the scenario. The values are not checked
     /// yet: see [`Self::validate`].
     ///
@@ -162,19 +173,6 @@ impl Scenario {
     }
 }
 
-impl ScenarioError {
-    /// The same with its place in the file of the scenario, if the file alone leads to it: an argument may have replaced
-    /// the value.
-    #[must_use]
-    pub fn in_file(mut self, path: &Path) -> Self {
-        let refusal = self.to_string();
-        if let Self::BadValue { place, entry, key, .. } = &mut self {
-            *place = place_of_refusal(path, &refusal, key, *entry);
-        }
-        self
-    }
-}
-
 fn place_of_refusal(path: &Path, refusal: &str, key: &str, entry: Option<usize>) -> Option<String> {
     let text = read_text(path, MOST_BYTES).ok()?;
     let refused_alone = Scenario::parse(path, &text).ok()?.validate().err()?;
@@ -261,9 +259,9 @@ mod tests {
         let fault = |bus| format!("[[faults]]\nkind = 'lose'\nbus = {bus}\nfrom_s = 1.0\n");
         std::fs::write(&path, format!("seed = 1\n{}{}", fault(0), fault(2))).unwrap();
         let scenario = Scenario::read(&path).unwrap();
-        let in_file = scenario.validate().unwrap_err().in_file(&path).to_string();
+        let in_file = Scenario::place_refusal(scenario.validate().unwrap_err(), &path).to_string();
         let replaced = Scenario { rate_hz: 5, ..scenario };
-        let elsewhere = replaced.validate().unwrap_err().in_file(&path).to_string();
+        let elsewhere = Scenario::place_refusal(replaced.validate().unwrap_err(), &path).to_string();
         std::fs::remove_file(&path).unwrap();
         assert_eq!(
             in_file.split_once("masseter-placed-").unwrap().1.split_once(".toml").unwrap().1,

@@ -43,6 +43,19 @@ pub trait ControllerPorts {
 
 /// Runs one cycle: reading, decision, command; then state and event, which no other loop waits for.
 ///
+/// ```
+/// use masseter_shared::control::{Controller, ControllerPorts, run_cycle};
+/// use masseter_shared::realtime::Wake;
+///
+/// /// A second at 1 kHz, in simulated time.
+/// fn run_second<P: ControllerPorts>(controller: &mut dyn Controller, ports: &mut P) -> Result<(), P::Error> {
+///     for cycle in 1..=1000 {
+///         run_cycle(controller, ports, &Wake::on_time(cycle, (cycle - 1) * 1_000_000 + 540_000))?;
+///     }
+///     Ok(())
+/// }
+/// ```
+///
 /// # Errors
 /// Those of the ports.
 pub fn run_cycle<P: ControllerPorts>(

@@ -6,9 +6,20 @@ use crate::config::Scenario;
 use crate::lifecycle::{ProcessArguments, ProcessContext, ProcessError};
 use crate::messages::{Command, Event, Reading, State};
 use crate::realtime::{Cycle, Wake};
-use crate::transport::{Publisher, Received, Subscriber, TransportError};
+use crate::transport::{Publisher, ReceivedMessage, Subscriber, TransportError};
 
 /// Runs the controller that `build` makes, until it is done.
+///
+/// ```no_run
+/// use masseter_shared::config::Scenario;
+/// use masseter_shared::control::{Controller, Outcome, process};
+/// use masseter_shared::lifecycle::{ProcessArguments, ProcessError};
+///
+/// fn control(build: fn(&Scenario) -> Box<dyn Controller>) -> Result<Outcome, ProcessError> {
+///     let arguments = ProcessArguments { scenario: "scenario.toml".into(), domain: "bench".into() };
+///     process::run(&arguments, |scenario| Ok(build(scenario)))
+/// }
+/// ```
 ///
 /// # Errors
 /// Those of `build`, and [`ProcessError`] when the process cannot start or loses its messages.
@@ -83,14 +94,14 @@ impl Ports {
 }
 
 impl ControllerPorts for Ports {
-    type Reading = Received<Reading>;
+    type Reading = ReceivedMessage<Reading>;
     type Error = TransportError;
 
     fn now_ns(&self) -> u64 {
         clock::now_ns()
     }
 
-    fn reading(&mut self, wake: &Wake) -> Result<Option<Received<Reading>>, TransportError> {
+    fn reading(&mut self, wake: &Wake) -> Result<Option<ReceivedMessage<Reading>>, TransportError> {
         let deadline_ns = wake.due_ns + self.reading_timeout_ns;
         let is_awaited = |reading: &Reading| reading.cycle >= wake.cycle;
         self.readings.latest_by(deadline_ns, self.cycle.waiter(), is_awaited)

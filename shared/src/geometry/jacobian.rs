@@ -16,60 +16,59 @@ pub struct Jacobian {
     pub actuators: Matrix6<f64>,
     /// Rows θ₁ θ₂ θ₃: θ̇ = `hinges` · twist; rad/s.
     pub hinges: Matrix3x6<f64>,
+    /// Side A₁A₂ of the platform.
+    length_m: f64,
 }
 
-impl Mechanism {
+impl Jacobian {
     /// The Jacobian at a pose and its joint coordinates (of [`Mechanism::inverse`]).
     ///
     /// # Examples
     /// ```
-    /// use masseter_shared::geometry::{Mechanism, MechanismConfig, Pose, Twist};
+    /// use masseter_shared::geometry::{Jacobian, Mechanism, MechanismConfig, Pose, Twist};
     ///
     /// let mechanism = Mechanism::new(&MechanismConfig::default())?;
     /// let pose = Pose::translation(0.0, 0.0, 0.268_452_355);
-    /// let jacobian = mechanism.jacobian(&pose, &mechanism.inverse(&pose)?);
+    /// let jacobian = Jacobian::new(&mechanism, &pose, &mechanism.inverse(&pose)?);
     /// let upwards = Twist::new(0.0, 0.0, 0.01, 0.0, 0.0, 0.0);
     /// let rates_m_s = jacobian.actuators * upwards;
     /// assert!(rates_m_s[0].abs() < 1e-12, "the slides stand still");
     /// assert!((rates_m_s[3] - 0.00994).abs() < 1e-5, "the legs extend");
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
-    pub fn jacobian(&self, pose: &Pose, joints: &Joints) -> Jacobian {
-        let mut jacobian = Jacobian { actuators: Matrix6::zeros(), hinges: Matrix3x6::zeros() };
+    pub fn new(mechanism: &Mechanism, pose: &Pose, joints: &Joints) -> Self {
+        let mut jacobian = Self {
+            actuators: Matrix6::zeros(),
+            hinges: Matrix3x6::zeros(),
+            length_m: mechanism.platform_sides_m()[0],
+        };
         for leg in 0..LEGS {
-            let arm = pose.rotation * self.platform_corners()[leg];
+            let arm = pose.rotation * mechanism.platform_corners()[leg];
             let (sin, cos) = joints.theta_rad[leg].sin_cos();
-            let inward = self.inward_direction(leg);
+            let inward = mechanism.inward_direction(leg);
             let along_leg = inward * cos + Vec3::z() * sin;
             let across_leg = Vec3::z() * cos - inward * sin;
             let rate_along = |direction: &Vec3| {
                 let moment = arm.cross(direction);
                 Vector6::new(direction.x, direction.y, direction.z, moment.x, moment.y, moment.z).transpose()
             };
-            jacobian.actuators.set_row(leg, &rate_along(&self.slide_direction(leg)));
+            jacobian.actuators.set_row(leg, &rate_along(&mechanism.slide_direction(leg)));
             jacobian.actuators.set_row(LEGS + leg, &rate_along(&along_leg));
             jacobian.hinges.set_row(leg, &(rate_along(&across_leg) / joints.actuators.leg_m[leg]));
         }
         jacobian
     }
 
-    /// Condition number of the actuators' rates at a pose and its joint coordinates, with angular velocities
-    /// scaled by the platform's side A₁A₂. Infinite when singular.
-    pub fn condition(&self, pose: &Pose, joints: &Joints) -> f64 {
-        self.jacobian(pose, joints).condition(self.platform_sides_m()[0])
-    }
-}
-
-impl Jacobian {
-    /// Ratio of the largest to the smallest singular value of the actuators' rows, with angular
-    /// velocities scaled by `length_m` so that all columns are velocities. Infinite when singular, or no number.
-    fn condition(&self, length_m: f64) -> f64 {
+    /// Condition number of the actuators' rates: the ratio of the largest to the smallest singular value of their rows, with
+    /// angular velocities scaled by the platform's side A₁A₂ so that all columns are velocities. Infinite when singular, or
+    /// no number.
+    pub fn condition(&self) -> f64 {
         let mut scaled = self.actuators;
         // The eigenvalue iteration terminates for finite numbers only.
         if !scaled.iter().all(|rate| rate.is_finite()) {
             return f64::INFINITY;
         }
-        scaled.fixed_columns_mut::<3>(3).scale_mut(1.0 / length_m);
+        scaled.fixed_columns_mut::<3>(3).scale_mut(1.0 / self.length_m);
         // Eigenvalues of JᵀJ cost half as much as the singular values of J and are as good as long as the
         // condition number stays far below 10⁷, where a mechanism is of no use any more.
         let squares = (scaled.transpose() * scaled).symmetric_eigenvalues();
@@ -108,7 +107,7 @@ mod tests {
                 UnitQuaternion::from_scaled_axis(Vec3::from(turn)),
             );
             let twist = Twist::from(twist);
-            let jacobian = mechanism.jacobian(&pose, &mechanism.inverse(&pose).unwrap());
+            let jacobian = Jacobian::new(&mechanism, &pose, &mechanism.inverse(&pose).unwrap());
             let h = 1e-6;
             let before = mechanism.inverse(&moved(&pose, &twist, -h)).unwrap();
             let after = mechanism.inverse(&moved(&pose, &twist, h)).unwrap();
@@ -127,8 +126,9 @@ mod tests {
 
     #[test]
     fn a_jacobian_that_is_not_finite_has_an_infinite_condition() {
-        let not_finite = Jacobian { actuators: Matrix6::repeat(f64::NAN), hinges: Matrix3x6::zeros() };
-        assert!(not_finite.condition(0.05).is_infinite());
+        let not_finite =
+            Jacobian { actuators: Matrix6::repeat(f64::NAN), hinges: Matrix3x6::zeros(), length_m: 0.05 };
+        assert!(not_finite.condition().is_infinite());
     }
 
     #[test]
@@ -136,7 +136,7 @@ mod tests {
         let mechanism = Mechanism::new(&MechanismConfig::default()).unwrap();
         let pose = Pose::translation(0.0, 0.0, 0.268_452_355);
         let joints = mechanism.inverse(&pose).unwrap();
-        let condition = mechanism.condition(&pose, &joints);
+        let condition = Jacobian::new(&mechanism, &pose, &joints).condition();
         assert!((1.0..5.0).contains(&condition), "{condition}");
     }
 
@@ -148,7 +148,7 @@ mod tests {
             config.platform_sides_m = config.platform_sides_m.map(|side_m| scale * side_m);
             let mechanism = Mechanism::new(&config).unwrap();
             let pose = Pose::translation(0.0, 0.005 * scale, 0.268 * scale);
-            mechanism.condition(&pose, &mechanism.inverse(&pose).unwrap())
+            Jacobian::new(&mechanism, &pose, &mechanism.inverse(&pose).unwrap()).condition()
         };
         assert!((condition_at_scale(3.0) - condition_at_scale(1.0)).abs() < 1e-9);
     }

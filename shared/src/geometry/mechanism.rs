@@ -1,9 +1,11 @@
-//! The mechanism's dimensions, validated once, and the positions of its points at any pose.
+//! The mechanism's dimensions, validated once, the positions of its points at any pose, and the inverse kinematics in closed
+//! form: dᵢ = (Aᵢ − Bᵢ⁰)·ûᵢ, lᵢ and θᵢ from the part of Aᵢ − Bᵢ perpendicular to ûᵢ. Strokes are not checked here: see
+//! [`StrokeLimits`].
 
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion};
 use serde::{Deserialize, Serialize};
 
-use super::{Actuators, LEGS, Pose, StrokeLimits, Vec3};
+use super::{Actuators, Joints, LEGS, Pose, StrokeLimits, Vec3};
 
 /// One slide in the base plane.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -55,20 +57,40 @@ const LEAST_BASE_M2: f64 = 1e-6;
 #[error("mechanism.{0}")]
 pub struct GeometryError(String);
 
+/// A leg shorter than this has no direction.
+const SHORTEST_LEG_M: f64 = 1e-9;
+
+/// A pose without joint coordinates.
+#[doc(alias = "IK")]
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum InverseError {
+    /// The pose holds a value that is no finite number.
+    #[error("the pose holds a value that is not a finite number")]
+    NotFinite,
+    /// Platform corner and hinge coincide, so the leg's angle is undefined.
+    #[error("leg {leg} has no length ({leg_m:e} m): its angle is undefined")]
+    NoLength {
+        /// Index of the leg, from 0.
+        leg: usize,
+        /// Its length.
+        leg_m: f64,
+    },
+}
+
 /// A slide with its directions resolved; base frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Slide {
-    pub centre: Vec3,
+struct Slide {
+    centre: Vec3,
     /// ûᵢ: positive displacement.
-    pub along: Vec3,
+    along: Vec3,
     /// −r̂ᵢ: horizontal, perpendicular to the slide, towards the middle of the base.
-    pub inward: Vec3,
+    inward: Vec3,
 }
 
 /// A mechanism whose dimensions have been checked.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Mechanism {
-    pub(super) slides: [Slide; LEGS],
+    slides: [Slide; LEGS],
     corners: [Vec3; LEGS],
     sides_m: [f64; LEGS],
     strokes: StrokeLimits,
@@ -154,6 +176,44 @@ impl Mechanism {
     /// Corners A₁, A₂, A₃ in the base frame at a pose.
     pub fn corners_at(&self, pose: &Pose) -> [Vec3; LEGS] {
         self.corners.map(|corner| pose.rotation * corner + pose.translation.vector)
+    }
+
+    /// Joint coordinates that hold the platform at `pose` (platform in the base frame, metres): metres, and angles in
+    /// (−π, π].
+    ///
+    /// ```
+    /// use masseter_shared::geometry::{Mechanism, MechanismConfig, Pose};
+    ///
+    /// let mechanism = Mechanism::new(&MechanismConfig::default())?;
+    /// let joints = mechanism.inverse(&Pose::translation(0.0, 0.0, 0.268_452_355))?;
+    /// assert!((joints.actuators.leg_m[0] - 0.27).abs() < 1e-9);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`InverseError`] for a pose that is not finite, and where a corner lies on its slide's hinge.
+    #[doc(alias("inverse kinematics", "IK"))]
+    pub fn inverse(&self, pose: &Pose) -> Result<Joints, InverseError> {
+        let mut joints = Joints {
+            actuators: Actuators { slide_m: [0.0; LEGS], leg_m: [0.0; LEGS] },
+            theta_rad: [0.0; LEGS],
+        };
+        for (leg, corner) in self.corners_at(pose).iter().enumerate() {
+            let slide = &self.slides[leg];
+            let from_centre = corner - slide.centre;
+            let horizontal = from_centre.dot(&slide.inward);
+            let leg_m = horizontal.hypot(from_centre.z);
+            if !from_centre.iter().all(|x| x.is_finite()) {
+                return Err(InverseError::NotFinite);
+            }
+            if leg_m < SHORTEST_LEG_M {
+                return Err(InverseError::NoLength { leg, leg_m });
+            }
+            joints.actuators.slide_m[leg] = from_centre.dot(&slide.along);
+            joints.actuators.leg_m[leg] = leg_m;
+            joints.theta_rad[leg] = from_centre.z.atan2(horizontal);
+        }
+        Ok(joints)
     }
 }
 
@@ -246,66 +306,4 @@ fn platform_corners(sides_m: [f64; LEGS]) -> Result<[Vec3; LEGS], GeometryError>
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_default_is_the_papers_mechanism() {
-        let mechanism = Mechanism::new(&MechanismConfig::default()).unwrap();
-        let [b1, b2, b3] = [0, 1, 2].map(|leg| mechanism.hinge(leg, 0.0));
-        for side in [b2 - b1, b3 - b2, b1 - b3] {
-            assert!((side.norm() - 0.10).abs() < 1e-12);
-        }
-        // Condition 2 of the paper fixes the reading: slide 1 is parallel to A₂A₃, A₂ beyond A₃.
-        let [_, a2, a3] = mechanism.platform_corners();
-        assert!(((a2 - a3).normalize() - mechanism.slide_direction(0)).norm() < 1e-12);
-    }
-
-    #[test]
-    fn corners_keep_the_declared_sides_and_the_frame() {
-        let config = MechanismConfig { platform_sides_m: [0.05, 0.06, 0.045], ..Default::default() };
-        let mechanism = Mechanism::new(&config).unwrap();
-        let [a1, a2, a3] = *mechanism.platform_corners();
-        assert!(((a1 - a2).norm() - 0.05).abs() < 1e-12);
-        assert!(((a2 - a3).norm() - 0.06).abs() < 1e-12);
-        assert!(((a3 - a1).norm() - 0.045).abs() < 1e-12);
-        assert!((a1 + a2 + a3).norm() < 1e-12);
-        assert!(a1.x > 0.0 && a1.y.abs() < 1e-12);
-        assert!((a2 - a1).cross(&(a3 - a1)).z > 0.0);
-    }
-
-    #[test]
-    fn impossible_dimensions_are_refused_with_their_reason() {
-        let good = MechanismConfig::default();
-        let mut outward = good.clone();
-        outward.slides[1].azimuth_deg += 180.0;
-        let mut flat = good.clone();
-        flat.slides = [0.0, 0.05, 0.1].map(|x| SlideConfig { centre_m: [x, 0.0], azimuth_deg: 90.0 });
-        let mut clockwise = good.clone();
-        clockwise.slides.swap(1, 2);
-        let mut boundless = good.clone();
-        boundless.slides[0].centre_m = [1e200, 1e200];
-        let mut adrift = good.clone();
-        adrift.slides[2].azimuth_deg = f64::NAN;
-        let mut vanishing = good.clone();
-        vanishing.strokes.leg_m = [0.0, 0.3];
-        let with_sides = |platform_sides_m| MechanismConfig { platform_sides_m, ..good.clone() };
-        let cases = [
-            (with_sides([0.05, 0.05, 0.1]), "close to no triangle"),
-            (with_sides([f64::NAN, 0.05, 0.1]), "platform_sides_m: NaN m; use 0.001 to 100 m"),
-            (with_sides([1e200; LEGS]), "platform_sides_m: 1e200 m; use 0.001 to 100 m"),
-            (with_sides([1e-100; LEGS]), "use 0.001 to 100 m"),
-            (with_sides([0.05, -0.05, 0.05]), "use 0.001 to 100 m"),
-            (outward, "add 180"),
-            (flat, "one line"),
-            (clockwise, "counter-clockwise seen from above"),
-            (boundless, "slides.centre_m: 1e200 m; use -100 to 100 m"),
-            (adrift, "slides[2]: the azimuth is NaN; give a finite number"),
-            (vanishing, "above 0"),
-        ];
-        for (config, reason) in cases {
-            let error = Mechanism::new(&config).unwrap_err().to_string();
-            assert!(error.contains(reason), "{error}");
-        }
-    }
-}
+mod tests;

@@ -171,7 +171,7 @@ codes! {
         BusOff = 42 "bus_off",
         /// A fault of the scenario began to act (number in its list, from 1).
         FaultInjected = 43 "fault_injected",
-        /// A fault of the scenario is over (number in its list, from 1; how often it struck).
+        /// A fault of the scenario is over (number in its list, from 1; number of activations).
         FaultEnded = 44 "fault_ended",
     }
 }

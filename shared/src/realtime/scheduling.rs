@@ -39,6 +39,14 @@ pub struct Obtained {
 
 /// Requests `request`, then reads back the granted scheduling. Memory is locked for the whole process, the rest holds for
 /// the calling thread.
+///
+/// ```
+/// use masseter_shared::realtime::scheduling::{SchedulingRequest, obtain};
+///
+/// let request = SchedulingRequest { core: None, fifo_priority: Some(80), locked_memory: false };
+/// let obtained = std::thread::spawn(move || obtain(request)).join().expect("obtain does not panic");
+/// assert_eq!(obtained.fifo_priority == Some(80), obtained.refusals.is_empty());
+/// ```
 pub fn obtain(request: SchedulingRequest) -> Obtained {
     let pinned = request.core.map_or(Ok(()), |core| stay_on(&[core]));
     let fifo = request.fifo_priority.map_or(Ok(()), fifo::set);

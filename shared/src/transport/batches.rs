@@ -14,27 +14,32 @@ use crate::messages::Message;
 /// Most messages in a sample: those of a cycle of six drives.
 const BATCH: usize = 16;
 
-impl Node {
-    fn batch_service<M: Message>(&self) -> Result<PortFactory<ipc::Service, [M], ()>, TransportError> {
-        let builder = self.topic::<M, [M]>(M::DEPTH / BATCH)?;
-        builder.open_or_create().map_err(failed("opening topic", M::TOPIC))
-    }
+/// Publishes batches of one message type and numbers the messages.
+#[derive(Debug)]
+pub struct BatchPublisher<M: Message>(Publisher<[M]>);
 
-    /// A publisher of batches.
-    pub fn batch_publisher<M: Message>(&self) -> Result<Publisher<[M]>, TransportError> {
-        let service = self.batch_service()?;
-        let builder = service.publisher_builder().initial_max_slice_len(BATCH);
-        Publisher::create(builder.allocation_strategy(AllocationStrategy::Static))
-    }
+/// Receives batches, oldest first. It keeps up to [`Message::DEPTH`] messages, less where batches are not full.
+#[derive(Debug)]
+pub struct BatchSubscriber<M: Message>(Subscriber<[M]>);
 
-    /// A subscriber of batches; it keeps up to [`Message::DEPTH`] messages, less
-    /// where batches are not full.
-    pub fn batch_subscriber<M: Message>(&self) -> Result<Subscriber<[M]>, TransportError> {
-        Subscriber::create(self.batch_service()?.subscriber_builder())
-    }
+fn service<M: Message>(node: &Node) -> Result<PortFactory<ipc::Service, [M], ()>, TransportError> {
+    let builder = node.topic::<M, [M]>(M::DEPTH / BATCH)?;
+    builder.open_or_create().map_err(failed("opening topic", M::TOPIC))
 }
 
-impl<M: Message> Publisher<[M]> {
+impl<M: Message> BatchPublisher<M> {
+    /// A publisher of the type's topic.
+    pub fn open(node: &Node) -> Result<Self, TransportError> {
+        let service = service(node)?;
+        let builder = service.publisher_builder().initial_max_slice_len(BATCH);
+        Publisher::create(builder.allocation_strategy(AllocationStrategy::Static)).map(Self)
+    }
+
+    /// Connects to the subscribers that are there by now, as [`Publisher::connect`].
+    pub fn connect(&self) -> Result<(), TransportError> {
+        self.0.connect()
+    }
+
     /// Writes the messages into shared memory, stamps and publishes them in their order.
     pub fn publish(
         &mut self,
@@ -43,12 +48,12 @@ impl<M: Message> Publisher<[M]> {
         let mut messages = messages.into_iter();
         while messages.len() > 0 {
             let count = messages.len().min(BATCH);
-            let sample = self.port.loan_slice_uninit(count).map_err(failed("loaning", M::TOPIC))?;
+            let sample = self.0.port.loan_slice_uninit(count).map_err(failed("loaning", M::TOPIC))?;
             let mut sample = sample.write_from_fn(|_| messages.next().expect("as many as it says"));
             let published_ns = clock::now_ns();
             for message in sample.payload_mut() {
-                self.sent += 1;
-                message.stamp(self.sent, published_ns);
+                self.0.sent += 1;
+                message.stamp(self.0.sent, published_ns);
             }
             sample.send().map_err(failed("sending", M::TOPIC))?;
         }
@@ -57,18 +62,23 @@ impl<M: Message> Publisher<[M]> {
 
     /// Touches the memory of the next batch, as the `warm_up` of a publisher of single messages.
     pub fn warm_up(&self) -> Result<(), TransportError> {
-        let sample = self.port.loan_slice_uninit(BATCH).map_err(failed("loaning", M::TOPIC))?;
+        let sample = self.0.port.loan_slice_uninit(BATCH).map_err(failed("loaning", M::TOPIC))?;
         drop(sample.write_from_fn(|_| M::default()));
         Ok(())
     }
 }
 
-impl<M: Message> Subscriber<[M]> {
+impl<M: Message> BatchSubscriber<M> {
+    /// A subscriber of the type's topic.
+    pub fn open(node: &Node) -> Result<Self, TransportError> {
+        Subscriber::create(service(node)?.subscriber_builder()).map(Self)
+    }
+
     /// The oldest batch not yet received; never waits. Refused when a connection to a publisher failed, since its messages
     /// would be missing.
     pub fn receive(&self) -> Result<Option<Sample<ipc::Service, [M], ()>>, TransportError> {
-        let sample = self.port.receive().map_err(failed("receiving", M::TOPIC))?;
-        self.refused.check(M::TOPIC)?;
+        let sample = self.0.port.receive().map_err(failed("receiving", M::TOPIC))?;
+        self.0.refused.check(M::TOPIC)?;
         sample.iter().flat_map(|sample| sample.iter()).try_for_each(check_version)?;
         Ok(sample)
     }
@@ -84,8 +94,8 @@ mod tests {
     fn messages_arrive_in_order_however_many_come_at_once() {
         let domain = ScratchDomain::claim("test-batches").unwrap();
         let node = Node::join(&domain).unwrap();
-        let subscriber = node.batch_subscriber::<FrameTap>().unwrap();
-        let mut publisher = node.batch_publisher::<FrameTap>().unwrap();
+        let subscriber = BatchSubscriber::<FrameTap>::open(&node).unwrap();
+        let mut publisher = BatchPublisher::<FrameTap>::open(&node).unwrap();
         let mut sent = 0;
         for count in [0, 1, BATCH, BATCH + 1, 5 * BATCH, 3] {
             let frames: Vec<_> =
@@ -105,8 +115,8 @@ mod tests {
     fn a_slow_subscriber_loses_the_oldest_and_sees_the_gap() {
         let domain = ScratchDomain::claim("test-behind").unwrap();
         let node = Node::join(&domain).unwrap();
-        let subscriber = node.batch_subscriber::<FrameTap>().unwrap();
-        let mut publisher = node.batch_publisher::<FrameTap>().unwrap();
+        let subscriber = BatchSubscriber::<FrameTap>::open(&node).unwrap();
+        let mut publisher = BatchPublisher::<FrameTap>::open(&node).unwrap();
         let frames = [FrameTap::default(); BATCH];
         for _ in 0..FrameTap::DEPTH / BATCH + 2 {
             publisher.publish(frames).unwrap();

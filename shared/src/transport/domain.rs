@@ -51,7 +51,7 @@ pub enum DomainError {
 
 /// Exclusive use of a domain; children started meanwhile share it.
 #[derive(Debug)]
-pub struct Claim {
+pub struct DomainLock {
     _lock: File,
 }
 
@@ -59,7 +59,7 @@ pub struct Claim {
 #[derive(Debug)]
 pub struct ScratchDomain {
     domain: Domain,
-    claim: Option<Claim>,
+    claim: Option<DomainLock>,
 }
 
 impl ScratchDomain {
@@ -114,7 +114,7 @@ impl Domain {
     }
 
     /// Locks the domain for this process and its children until all have ended.
-    pub fn claim(&self) -> Result<Claim, DomainError> {
+    pub fn claim(&self) -> Result<DomainLock, DomainError> {
         let _turn = take_turn()?;
         let path = self.root().join(LOCK);
         let lock = create(&path)?;
@@ -125,7 +125,7 @@ impl Domain {
         }
         // Children inherit the lock, so the domain counts as alive until the last of them ended.
         fcntl_setfd(&lock, FdFlags::empty()).map_err(io::Error::from).map_err(file_error("share", &path))?;
-        Ok(Claim { _lock: lock })
+        Ok(DomainLock { _lock: lock })
     }
 
     /// Whether any process of the run still lives.

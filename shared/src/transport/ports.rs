@@ -166,9 +166,9 @@ pub struct Subscriber<P: Payload + ?Sized> {
 
 /// A message in shared memory.
 #[derive(Debug)]
-pub struct Received<M: Message>(Sample<ipc::Service, M, ()>);
+pub struct ReceivedMessage<M: Message>(Sample<ipc::Service, M, ()>);
 
-impl<M: Message> Deref for Received<M> {
+impl<M: Message> Deref for ReceivedMessage<M> {
     type Target = M;
 
     fn deref(&self) -> &M {
@@ -176,7 +176,7 @@ impl<M: Message> Deref for Received<M> {
     }
 }
 
-impl<M: Message> Borrow<M> for Received<M> {
+impl<M: Message> Borrow<M> for ReceivedMessage<M> {
     fn borrow(&self) -> &M {
         self
     }
@@ -202,10 +202,10 @@ impl<P: Payload + ?Sized> Subscriber<P> {
 impl<M: Message> Subscriber<M> {
     /// The oldest message not yet received; never waits. Refused when a connection to a publisher failed, since its messages
     /// would be missing.
-    pub fn receive(&self) -> Result<Option<Received<M>>, TransportError> {
+    pub fn receive(&self) -> Result<Option<ReceivedMessage<M>>, TransportError> {
         let sample = self.port.receive().map_err(failed("receiving", M::TOPIC))?;
         self.refused.check(M::TOPIC)?;
-        sample.map(|sample| check_version(&*sample).map(|()| Received(sample))).transpose()
+        sample.map(|sample| check_version(&*sample).map(|()| ReceivedMessage(sample))).transpose()
     }
 
     /// The first message that `is_awaited`, or the newest there is when `deadline_ns` has passed. Polls without
@@ -215,7 +215,7 @@ impl<M: Message> Subscriber<M> {
         deadline_ns: u64,
         waiter: &mut Waiter,
         is_awaited: impl Fn(&M) -> bool,
-    ) -> Result<Option<Received<M>>, TransportError> {
+    ) -> Result<Option<ReceivedMessage<M>>, TransportError> {
         let mut newest = None;
         let mut spin = waiter.spin();
         loop {

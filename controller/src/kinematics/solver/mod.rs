@@ -25,6 +25,17 @@ use super::{Equations, ForwardError, Solution};
 
 /// Solves from a guess of the leg angles (radians) by the method asked for.
 ///
+/// ```
+/// use masseter_controller::kinematics::{Method, Options, solve};
+/// use masseter_shared::geometry::{Actuators, Mechanism, MechanismConfig};
+///
+/// let mechanism = Mechanism::new(&MechanismConfig::default())?;
+/// let neutral = Actuators { slide_m: [0.0; 3], leg_m: [0.27; 3] };
+/// let solution = solve(Method::Published, &mechanism, &neutral, &[1.3; 3], &Options::default())?;
+/// assert!((solution.theta_rad[0].to_degrees() - 83.862).abs() < 1e-3);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
 /// # Errors
 /// Any but [`ForwardError::WrongAssembly`]: whether the solution is the true one is for the caller.
 pub fn solve(

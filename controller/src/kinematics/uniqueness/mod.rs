@@ -1,7 +1,7 @@
 //! Proof, by interval arithmetic, that inputs have at most one true solution.
 //!
 //! [`Proof::examine`] takes a box of inputs and encloses every solution in it that meets the
-//! conditions ([`Claim`]). If the slopes of the three equations over that enclosure form a regular
+//! conditions ([`SolutionKind`]). If the slopes of the three equations over that enclosure form a regular
 //! matrix, then no input in the box has two: with solutions h ≠ h′, the slopes S between them would
 //! give S (h − h′) = 0. Otherwise the box stays undecided, and the caller examines its
 //! [halves](InputBox::halves).
@@ -16,4 +16,4 @@ mod proof;
 
 pub use enclosure::Enclosure;
 pub use input_box::InputBox;
-pub use proof::{Claim, Finding, Proof, Reaches};
+pub use proof::{Finding, Proof, Reaches, SolutionKind};

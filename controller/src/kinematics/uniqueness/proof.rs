@@ -23,7 +23,7 @@ const WORTH_REPEATING: f64 = 0.8;
 
 /// The kind of solution that must be unique. All solutions are above the base.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Claim {
+pub enum SolutionKind {
     /// Solutions that meet the paper's two conditions, with the platform's plane oriented.
     PaperConditions,
     /// Of these, those whose [determinant](crate::kinematics::Solution::determinant) is at least this.
@@ -44,17 +44,17 @@ pub enum Finding {
     Undecided(Reaches),
 }
 
-/// A mechanism and the claim about it.
+/// A mechanism and the kind of solution that must be unique.
 #[derive(Debug, Clone)]
 pub struct Proof {
     mechanism: Mechanism,
-    claim: Claim,
+    kind: SolutionKind,
 }
 
 impl Proof {
-    /// The proof of a claim about a mechanism.
-    pub fn new(mechanism: &Mechanism, claim: Claim) -> Self {
-        Self { mechanism: mechanism.clone(), claim }
+    /// The proof for one mechanism and one kind of solution.
+    pub fn new(mechanism: &Mechanism, kind: SolutionKind) -> Self {
+        Self { mechanism: mechanism.clone(), kind }
     }
 
     /// All reaches of legs of these lengths: the start of the search.
@@ -127,7 +127,7 @@ impl Proof {
     }
 
     fn may_be_conditioned(&self, platforms: &Platforms) -> bool {
-        let Claim::DeterminantAtLeast(margin) = self.claim else { return true };
+        let SolutionKind::DeterminantAtLeast(margin) = self.kind else { return true };
         let slopes = platforms.slopes(&self.mechanism);
         let determinant = slopes.and_then(|slopes| platforms.determinant(&self.mechanism, &slopes));
         determinant.is_none_or(|determinant| determinant.high() >= margin)
@@ -210,30 +210,33 @@ mod tests {
         InputBox { slide_m: actuators.slide_m.map(around), leg_m: actuators.leg_m.map(around) }
     }
 
-    fn examine(claim: Claim, actuators: &Actuators, radius_m: f64) -> Finding {
+    fn examine(kind: SolutionKind, actuators: &Actuators, radius_m: f64) -> Finding {
         let inputs = around(actuators, radius_m);
-        Proof::new(&published_mechanism(), claim).examine(&inputs, &Proof::any_reaches(&inputs))
+        Proof::new(&published_mechanism(), kind).examine(&inputs, &Proof::any_reaches(&inputs))
     }
 
     #[test]
     fn inputs_near_the_neutral_one_have_at_most_one() {
         let neutral = Actuators { slide_m: [0.0; LEGS], leg_m: [0.27; LEGS] };
-        assert_eq!(examine(Claim::PaperConditions, &neutral, 1e-3), Finding::AtMostOne);
+        assert_eq!(examine(SolutionKind::PaperConditions, &neutral, 1e-3), Finding::AtMostOne);
         let tilted = Actuators { slide_m: [0.005, -0.004, 0.003], leg_m: [0.26, 0.27, 0.275] };
-        assert_eq!(examine(Claim::PaperConditions, &tilted, 1e-3), Finding::AtMostOne);
+        assert_eq!(examine(SolutionKind::PaperConditions, &tilted, 1e-3), Finding::AtMostOne);
     }
 
     #[test]
     fn nothing_is_proven_where_two_true_solutions_are_known() {
         let known = Solutions::new(&published_mechanism(), &AMBIGUOUS).unwrap();
         assert_eq!(known.true_ones().count(), 2);
-        for claim in [Claim::PaperConditions, Claim::DeterminantAtLeast(0.0), Claim::DeterminantAtLeast(0.04)]
-        {
+        for kind in [
+            SolutionKind::PaperConditions,
+            SolutionKind::DeterminantAtLeast(0.0),
+            SolutionKind::DeterminantAtLeast(0.04),
+        ] {
             for radius_m in [1e-9, 1e-6, 1e-4] {
-                let Finding::Undecided(within) = examine(claim, &AMBIGUOUS, radius_m) else {
-                    panic!("{claim:?} within {radius_m} m")
+                let Finding::Undecided(within) = examine(kind, &AMBIGUOUS, radius_m) else {
+                    panic!("{kind:?} within {radius_m} m")
                 };
-                assert!(within[0].width() < 0.1, "the search gave up: {claim:?}, {radius_m} m");
+                assert!(within[0].width() < 0.1, "the search gave up: {kind:?}, {radius_m} m");
                 for one in known.true_ones() {
                     for (leg, reach_m) in within.iter().enumerate() {
                         assert!(reach_m.contains(AMBIGUOUS.leg_m[leg] * one.theta_rad[leg].cos()));
@@ -250,7 +253,7 @@ mod tests {
         let one = known.true_ones().next().unwrap();
         let reach_m: [f64; LEGS] = std::array::from_fn(|leg| AMBIGUOUS.leg_m[leg] * one.theta_rad[leg].cos());
         let inputs = around(&AMBIGUOUS, 1e-6);
-        let proof = Proof::new(&published_mechanism(), Claim::PaperConditions);
+        let proof = Proof::new(&published_mechanism(), SolutionKind::PaperConditions);
         let point = reach_m.map(Enclosure::point);
         assert_eq!(proof.examine(&inputs, &point), Finding::AtMostOne);
         let segment = [Enclosure::new(reach_m[0] - 1e-3, reach_m[0] + 1e-3), point[1], point[2]];
@@ -261,13 +264,13 @@ mod tests {
     fn a_determinant_between_the_two_settles_the_same_input() {
         let known = Solutions::new(&published_mechanism(), &AMBIGUOUS).unwrap();
         let between = known.true_ones().map(|one| one.determinant).sum::<f64>() / 2.0;
-        let claim = Claim::DeterminantAtLeast(between);
-        assert_eq!(examine(claim, &AMBIGUOUS, 1e-7), Finding::AtMostOne);
+        let kind = SolutionKind::DeterminantAtLeast(between);
+        assert_eq!(examine(kind, &AMBIGUOUS, 1e-7), Finding::AtMostOne);
     }
 
     #[test]
     fn what_cannot_be_assembled_has_no_solution() {
         let apart = Actuators { slide_m: [0.0; LEGS], leg_m: [0.30, 0.30, 0.20] };
-        assert_eq!(examine(Claim::PaperConditions, &apart, 1e-3), Finding::NoSolution);
+        assert_eq!(examine(SolutionKind::PaperConditions, &apart, 1e-3), Finding::NoSolution);
     }
 }

@@ -19,7 +19,7 @@ const BASE: FaultConfig = FaultConfig {
     delay_us: None,
 };
 
-fn struck_by(fault: FaultConfig) -> Bench {
+fn bench_with(fault: FaultConfig) -> Bench {
     Bench::new(&Scenario { faults: vec![fault], ..Scenario::default() })
 }
 
@@ -36,7 +36,7 @@ fn error_frames(bench: &Bench) -> usize {
 
 #[test]
 fn with_one_frame_in_a_hundred_corrupted_the_motion_goes_on_and_errors_are_counted() {
-    let mut bench = struck_by(FaultConfig { probability: 0.01, ..BASE });
+    let mut bench = bench_with(FaultConfig { probability: 0.01, ..BASE });
     let worst_m = play_until(&mut bench, 2.5);
     assert!(worst_m < 1e-3, "{worst_m}");
     assert_eq!(bench.causes(EventKind::Fault), []);
@@ -61,7 +61,7 @@ fn the_same_seed_corrupts_the_same_frames_and_another_one_others() {
 
 #[test]
 fn a_babbling_node_makes_a_safe_stop() {
-    let mut bench = struck_by(FaultConfig { kind: FaultKindConfig::Babble, node: Some(2), ..BASE });
+    let mut bench = bench_with(FaultConfig { kind: FaultKindConfig::Babble, node: Some(2), ..BASE });
     play_until(&mut bench, 1.0);
     assert_eq!(bench.reading.master_fault, 1);
     assert_eq!(bench.causes(EventKind::Fault)[0], Cause::ProcessDataLost);
@@ -77,7 +77,7 @@ fn a_babbling_node_makes_a_safe_stop() {
 #[test]
 fn a_disconnected_node_is_detected_and_all_drives_stop() {
     let fault = FaultConfig { kind: FaultKindConfig::Disconnect, bus: 1, node: Some(5), ..BASE };
-    let mut bench = struck_by(fault);
+    let mut bench = bench_with(fault);
     play_until(&mut bench, 1.0);
     let fault = bench.events.iter().find(|event| event.kind == EventKind::Fault.code()).unwrap();
     assert_eq!((fault.cause, fault.axis), (Cause::ProcessDataLost.code(), 4));
@@ -88,7 +88,7 @@ fn a_disconnected_node_is_detected_and_all_drives_stop() {
 #[test]
 fn a_drive_in_bus_off_is_reported_and_stops_the_rig() {
     let fault = FaultConfig { kind: FaultKindConfig::BusOff, node: Some(3), ..BASE };
-    let mut bench = struck_by(fault);
+    let mut bench = bench_with(fault);
     play_until(&mut bench, 1.0);
     let told = bench.events.iter().find(|event| event.cause == Cause::BusOff.code()).unwrap();
     assert_eq!((told.source, told.axis), (Source::Wire.code(), 2));
@@ -101,7 +101,8 @@ fn a_drive_in_bus_off_is_reported_and_stops_the_rig() {
 
 #[test]
 fn the_masters_own_controller_in_bus_off_is_reported_with_the_bus() {
-    let mut bench = struck_by(FaultConfig { kind: FaultKindConfig::BusOff, bus: 1, node: Some(127), ..BASE });
+    let mut bench =
+        bench_with(FaultConfig { kind: FaultKindConfig::BusOff, bus: 1, node: Some(127), ..BASE });
     play_until(&mut bench, 0.6);
     let told = bench.events.iter().find(|event| event.cause == Cause::BusOff.code()).unwrap();
     assert_eq!((told.source, told.bus, told.axis), (Source::Wire.code(), 1, NO_AXIS));
@@ -128,7 +129,7 @@ fn drives_boot_though_one_frame_in_a_hundred_comes_twice() {
 fn a_lost_synchronisation_costs_one_drive_one_cycle() {
     let fault =
         FaultConfig { kind: FaultKindConfig::Lose, node: Some(1), id: Some(0x080), count: Some(1), ..BASE };
-    let mut bench = struck_by(fault);
+    let mut bench = bench_with(fault);
     play_until(&mut bench, 1.0);
     assert_eq!(bench.causes(EventKind::Fault), []);
     assert_eq!(error_frames(&bench), 0);
@@ -147,7 +148,7 @@ fn process_data_of_the_cycle_before_are_no_answer_however_late_they_come() {
             delay_us: Some(delay_us),
             ..BASE
         };
-        let mut bench = struck_by(fault);
+        let mut bench = bench_with(fault);
         play_until(&mut bench, 0.6);
         assert_eq!(bench.reading.fresh_axes & 1, 0, "late by {delay_us} µs");
     }

@@ -14,7 +14,7 @@ mod positioning;
 mod profile;
 mod servo;
 
-use masseter_can::cia402::{Command, Controlword, DriveState, StatusBit, Statusword};
+use masseter_can::cia402::{Controlword, DriveState, StateCommand, StatusBit, Statusword};
 use masseter_shared::config::DriveConfig;
 
 use crate::drive::dictionary::{Objects, names};
@@ -155,7 +155,7 @@ impl Axis {
         was_fault && self.power != DriveState::Fault
     }
 
-    fn obey(&mut self, command: Command, now_ns: u64) {
+    fn obey(&mut self, command: StateCommand, now_ns: u64) {
         let next = if self.parameters.holds_quick_stop {
             self.power.after_in_held_quick_stop(command)
         } else {
@@ -170,8 +170,8 @@ impl Axis {
         match self.parameters.abort_connection_option {
             0 => {}
             1 => self.enter(self.power.after_fault(), now_ns),
-            2 => self.obey(Command::DisableVoltage, now_ns),
-            _ => self.obey(Command::QuickStop, now_ns),
+            2 => self.obey(StateCommand::DisableVoltage, now_ns),
+            _ => self.obey(StateCommand::QuickStop, now_ns),
         }
         self.is_in_fault() && !was_in_fault
     }

@@ -6,7 +6,7 @@
 use masseter_can::canopen::{Cob, CobId, NodeId, ObjectAddress};
 use masseter_can::cia402::{Controlword, interpolation_period};
 use masseter_can::{CanId, EVERY_SYNC, Rpdo1, Tpdo1};
-use masseter_shared::config::Scenario;
+use masseter_shared::config::{MASTER_NODE, Scenario};
 use masseter_shared::messages::codes::{BootPhase, Cause};
 
 /// 6041h.
@@ -115,7 +115,7 @@ pub(super) fn plan(node: NodeId, scenario: &Scenario, axis: usize) -> Vec<Step> 
 /// The least number of SDO exchanges that the boot of a drive takes: of a drive without a fault and without other PDOs
 /// that gives the expected answers at once.
 pub(crate) fn shortest_boot(scenario: &Scenario) -> usize {
-    let steps = plan(NodeId::MASTER, scenario, 0);
+    let steps = plan(MASTER_NODE, scenario, 0);
     let without_exchange = |step: &Step| match step {
         Step::Enter(_) => 1,
         Step::Read(_, Check::FaultElseSkip(skipped) | Check::PdoElseSkip(skipped)) => *skipped,
@@ -153,7 +153,7 @@ fn check_pdo(communication: u16, cob: Cob, mapping: &[u32]) -> impl Iterator<Ite
 
 fn configure(scenario: &Scenario, axis: usize) -> [Step; 12] {
     let (can, drive) = (&scenario.can, scenario.drives.of_axis(axis));
-    let consumed = u32::from(NodeId::MASTER.get()) << 16 | u32::from(can.heartbeat_consumer_ms);
+    let consumed = u32::from(MASTER_NODE.get()) << 16 | u32::from(can.heartbeat_consumer_ms);
     // Increments/s² are taken to be the drive's unit of acceleration (6097h, 60AAh).
     let quick_stop = drive.increments(drive.quick_stop_deceleration_m_s2) as u32;
     let window = drive.increments(drive.following_error_m) as u32;

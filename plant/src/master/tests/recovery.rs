@@ -3,6 +3,8 @@
 use masseter_can::Frame;
 use masseter_can::canopen::{Cob, Emergency, EmergencyCode, Heartbeat, NmtState, sync};
 
+use masseter_shared::config::MASTER_NODE;
+
 use super::peer::POSITION;
 use super::*;
 
@@ -185,7 +187,7 @@ fn frames_of_wrong_length_are_reported_once_and_so_are_unknown_nodes() {
 #[test]
 fn a_second_master_stops_the_drives() {
     let mut bench = Bench::enabled();
-    let (now_ns, id) = (bench.now_ns(), NodeId::MASTER);
+    let (now_ns, id) = (bench.now_ns(), MASTER_NODE);
     bench.wires.wire(1).arrive(now_ns, Heartbeat { state: NmtState::Operational }.frame(id));
     bench.cycles(3, DriveRequest::Enable);
     assert_eq!(bench.causes(EventKind::Fault), [Cause::SecondMaster]);
@@ -199,7 +201,7 @@ fn a_stop_that_could_be_restored_is_for_good_once_there_is_a_second_master() {
     let mut bench = Bench::enabled();
     bench.drive(4).cycle_power();
     bench.cycles(5, DriveRequest::Enable);
-    let (now_ns, id) = (bench.now_ns(), NodeId::MASTER);
+    let (now_ns, id) = (bench.now_ns(), MASTER_NODE);
     bench.wires.wire(0).arrive(now_ns, Heartbeat { state: NmtState::Operational }.frame(id));
     bench.cycles(600, DriveRequest::Off);
     assert_eq!(bench.causes(EventKind::Fault), [Cause::NodeRestarted, Cause::SecondMaster]);

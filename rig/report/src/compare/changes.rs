@@ -16,7 +16,7 @@ const NO_RESULTS: [&str; 6] = ["_noise_", "_at_ns", "events", "worst_cycles", "d
 /// The weight of a change.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub(super) enum Judgement {
+pub(super) enum ChangeJudgement {
     BeyondSpread,
     WithinSpread,
     SpreadUnknown,
@@ -25,7 +25,7 @@ pub(super) enum Judgement {
     Same,
 }
 
-impl Judgement {
+impl ChangeJudgement {
     /// Those of changes, the surest first.
     pub(super) const CHANGED: [Self; 5] =
         [Self::BeyondSpread, Self::OnlyInA, Self::OnlyInB, Self::SpreadUnknown, Self::WithinSpread];
@@ -51,7 +51,7 @@ pub(super) struct Change {
     pub b: Option<f64>,
     /// Standard error of the difference by the seconds of both runs, where it is known.
     pub noise: Option<f64>,
-    pub judgement: Judgement,
+    pub judgement: ChangeJudgement,
 }
 
 /// Every number by its path.
@@ -115,16 +115,16 @@ fn resolution(figure: &str, value: f64) -> f64 {
     if figure.starts_with("intervals.") { masseter_analysis::resolution_ns(value as u64) as f64 } else { 0.0 }
 }
 
-fn judge(a: Option<f64>, b: Option<f64>, noise: Option<f64>) -> Judgement {
+fn judge(a: Option<f64>, b: Option<f64>, noise: Option<f64>) -> ChangeJudgement {
     let (Some(a), Some(b)) = (a, b) else {
-        return if a.is_some() { Judgement::OnlyInA } else { Judgement::OnlyInB };
+        return if a.is_some() { ChangeJudgement::OnlyInA } else { ChangeJudgement::OnlyInB };
     };
     let difference = b - a;
     match noise {
-        _ if difference == 0.0 => Judgement::Same,
-        Some(noise) if difference.abs() > BEYOND * noise => Judgement::BeyondSpread,
-        Some(_) => Judgement::WithinSpread,
-        None => Judgement::SpreadUnknown,
+        _ if difference == 0.0 => ChangeJudgement::Same,
+        Some(noise) if difference.abs() > BEYOND * noise => ChangeJudgement::BeyondSpread,
+        Some(_) => ChangeJudgement::WithinSpread,
+        None => ChangeJudgement::SpreadUnknown,
     }
 }
 
@@ -148,13 +148,13 @@ mod tests {
         assert_eq!(
             judged,
             [
-                ("intervals.control.max_ns", Judgement::SpreadUnknown),
-                ("intervals.control.p50_ns", Judgement::WithinSpread),
-                ("tracking.rms_mm", Judgement::WithinSpread),
+                ("intervals.control.max_ns", ChangeJudgement::SpreadUnknown),
+                ("intervals.control.p50_ns", ChangeJudgement::WithinSpread),
+                ("tracking.rms_mm", ChangeJudgement::WithinSpread),
             ]
         );
-        assert_eq!(judge(Some(30.0), Some(10.0), Some(4.0)), Judgement::BeyondSpread);
-        assert_eq!(judge(Some(10.0), Some(10.0), None), Judgement::Same);
+        assert_eq!(judge(Some(30.0), Some(10.0), Some(4.0)), ChangeJudgement::BeyondSpread);
+        assert_eq!(judge(Some(10.0), Some(10.0), None), ChangeJudgement::Same);
     }
 
     #[test]
@@ -178,10 +178,10 @@ mod tests {
         assert_eq!(
             told,
             [
-                ("can0 SYNC.max_ns", Some(48.0), Some(49.0), Judgement::SpreadUnknown),
-                ("can0 TPDO1 1.max_ns", Some(190.0), None, Judgement::OnlyInA),
-                ("can1 SYNC.max_ns", Some(50.0), Some(50.0), Judgement::Same),
-                ("can1 TPDO1 4.max_ns", None, Some(200.0), Judgement::OnlyInB),
+                ("can0 SYNC.max_ns", Some(48.0), Some(49.0), ChangeJudgement::SpreadUnknown),
+                ("can0 TPDO1 1.max_ns", Some(190.0), None, ChangeJudgement::OnlyInA),
+                ("can1 SYNC.max_ns", Some(50.0), Some(50.0), ChangeJudgement::Same),
+                ("can1 TPDO1 4.max_ns", None, Some(200.0), ChangeJudgement::OnlyInB),
             ]
         );
     }
@@ -192,8 +192,8 @@ mod tests {
             flatten(&json!({"intervals": [{"name": "control", "p50_ns": p50, "p50_noise_ns": 0.0}]}))
         };
         let judged = |a, b| changes(&run(a), &run(b))[0].judgement;
-        assert_eq!(judged(16.0, 17.0), Judgement::WithinSpread);
-        assert_eq!(judged(16.0, 24.0), Judgement::BeyondSpread);
-        assert_eq!(judged(400_000.0, 400_400.0), Judgement::WithinSpread);
+        assert_eq!(judged(16.0, 17.0), ChangeJudgement::WithinSpread);
+        assert_eq!(judged(16.0, 24.0), ChangeJudgement::BeyondSpread);
+        assert_eq!(judged(400_000.0, 400_400.0), ChangeJudgement::WithinSpread);
     }
 }

@@ -21,7 +21,7 @@ const CIRCUMSTANCES: [&str; 4] = ["scenario", "clock", "machine", "masseter"];
 #[derive(Debug, Serialize)]
 pub(super) struct ComparedRun {
     pub path: String,
-    pub verdict: Verdict,
+    pub verdict: StoredVerdict,
     #[serde(skip)]
     pub figures: BTreeMap<String, f64>,
     #[serde(skip)]
@@ -30,7 +30,7 @@ pub(super) struct ComparedRun {
 
 /// The verdict in a summary.
 #[derive(Debug, PartialEq, Serialize, Deserialize)]
-pub(super) struct Verdict {
+pub(super) struct StoredVerdict {
     pub word: String,
     pub reason: String,
 }
@@ -58,7 +58,7 @@ impl ComparedRun {
         let form = &summary["form"];
         ensure!(*form == FORM, "it has form {form}, this program compares form {FORM}");
         let Value::Object(_) = &summary["figures"] else { bail!("it has no figures") };
-        let verdict = Verdict::deserialize(&summary["verdict"]).context("it has no verdict")?;
+        let verdict = StoredVerdict::deserialize(&summary["verdict"]).context("it has no verdict")?;
         let of_manifest = CIRCUMSTANCES.map(|key| (key.to_owned(), manifest[key].clone()));
         let circumstances = leaves(&Value::Object(of_manifest.into_iter().collect()));
         let in_words = |value: Value| value.as_str().map_or_else(|| value.to_string(), str::to_owned);

@@ -13,7 +13,7 @@ use masseter_terminal::{Exit, Format, result};
 use serde::Serialize;
 
 use crate::text::or_dash;
-use changes::{Change, Judgement, changes};
+use changes::{Change, ChangeJudgement, changes};
 use compared_run::{ComparedRun, Difference, differences};
 
 /// Version of the comparison's form.
@@ -36,6 +36,14 @@ struct Comparison {
 }
 
 /// `masseter report A B`.
+///
+/// ```no_run
+/// use masseter_report::compare;
+/// use masseter_terminal::Format;
+///
+/// compare::runs("runs/before".as_ref(), "runs/after".as_ref(), Format::Human)?;
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn runs(a: &Path, b: &Path, format: Format) -> anyhow::Result<Exit> {
     let (a, b) = (ComparedRun::read(a)?, ComparedRun::read(b)?);
     let differs = differences(&a.circumstances, &b.circumstances);
@@ -65,9 +73,9 @@ impl Comparison {
         }
         write!(text, "\n{LEGEND}\n{:<50} {:>14} {:>14} {:>9}\n", "figure", "A", "B", "change")?;
         let of = |judgement| self.changes.iter().filter(move |change| change.judgement == judgement);
-        let changed = Judgement::CHANGED.into_iter().flat_map(of);
+        let changed = ChangeJudgement::CHANGED.into_iter().flat_map(of);
         changed.into_iter().try_for_each(|change| row(&mut text, change))?;
-        writeln!(text, "{} figures are the same", of(Judgement::Same).count())?;
+        writeln!(text, "{} figures are the same", of(ChangeJudgement::Same).count())?;
         Ok(text)
     }
 }

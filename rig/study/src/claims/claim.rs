@@ -9,7 +9,7 @@ pub(super) const RARELY: f64 = 0.01;
 
 /// Whether a claim holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Judgement {
+pub enum ClaimJudgement {
     /// By its criterion.
     Holds,
     /// By the weaker criterion.
@@ -30,12 +30,12 @@ pub struct PaperClaim {
     /// When it holds, and when it holds partly.
     pub criterion: &'static str,
     /// Whether it holds.
-    pub judgement: Judgement,
+    pub judgement: ClaimJudgement,
     /// The figure that shows it.
     pub figure: Option<&'static str>,
 }
 
-impl Judgement {
+impl ClaimJudgement {
     /// As the page and the terminal show it.
     #[must_use]
     pub fn name(self) -> &'static str {

@@ -1,6 +1,6 @@
 //! The paper's claims about convergence.
 
-use super::claim::{ANY, Judgement, PaperClaim, RARELY};
+use super::claim::{ANY, ClaimJudgement, PaperClaim, RARELY};
 use crate::sample::Guesses;
 use crate::share::Share;
 use crate::solver::{CONTROLLER, NEWTON, PUBLISHED, SOLVERS, Solver};
@@ -20,7 +20,7 @@ pub(super) fn any_guess_converges(study: &Study) -> PaperClaim {
              ({variant}) in {best}"
         ),
         criterion: "holds if all guesses above the base converge; partly if at least all within ±5° do",
-        judgement: Judgement::new(solved.is_all(), study.trials.solved(PUBLISHED, CLOSE).is_all()),
+        judgement: ClaimJudgement::new(solved.is_all(), study.trials.solved(PUBLISHED, CLOSE).is_all()),
         figure: Some("success"),
     }
 }
@@ -55,7 +55,7 @@ pub(super) fn newton_diverges(study: &Study) -> PaperClaim {
              the paper's solver stalls, {stalling}"
         ),
         criterion: "holds if at least half of the guesses show it; partly if any does",
-        judgement: Judgement::new(diverging.value() >= 0.5, diverging.hits > 0),
+        judgement: ClaimJudgement::new(diverging.value() >= 0.5, diverging.hits > 0),
         figure: Some("fig3_diverging"),
     }
 }
@@ -67,7 +67,7 @@ pub(super) fn newton_oscillates(study: &Study) -> PaperClaim {
         section: "Results, first advantage; Fig. 4",
         measured: format!("{share} of guesses above the base ({} of {})", share.hits, share.of),
         criterion: "holds if any guess shows it: the last 40 errors repeat with a period of 2 to 8 iterations",
-        judgement: Judgement::new(share.hits > 0, false),
+        judgement: ClaimJudgement::new(share.hits > 0, false),
         figure: Some("fig4_oscillating"),
     }
 }
@@ -85,7 +85,7 @@ pub(super) fn close_guess_converges(study: &Study) -> PaperClaim {
             solved.hits, solved.of
         ),
         criterion: "holds if all guesses within ±5° converge; partly if 99 % do",
-        judgement: Judgement::new(solved.is_all(), solved.value() >= 1.0 - RARELY),
+        judgement: ClaimJudgement::new(solved.is_all(), solved.value() >= 1.0 - RARELY),
         figure: Some("success"),
     }
 }
@@ -109,12 +109,12 @@ fn is_predictable(closest: Share) -> bool {
     closest.of > 0 && closest.value() >= 1.0 - RARELY
 }
 
-fn reaches_the_closest([anywhere, close]: [Share; 2]) -> Judgement {
-    Judgement::new(is_predictable(anywhere), is_predictable(close))
+fn reaches_the_closest([anywhere, close]: [Share; 2]) -> ClaimJudgement {
+    ClaimJudgement::new(is_predictable(anywhere), is_predictable(close))
 }
 
-fn cannot_be_predicted([anywhere, close]: [Share; 2]) -> Judgement {
-    Judgement::new(!is_predictable(close), !is_predictable(anywhere))
+fn cannot_be_predicted([anywhere, close]: [Share; 2]) -> ClaimJudgement {
+    ClaimJudgement::new(!is_predictable(close), !is_predictable(anywhere))
 }
 
 pub(super) fn closest_solution(study: &Study) -> PaperClaim {
@@ -152,7 +152,7 @@ pub(super) fn always_the_true_one(study: &Study) -> PaperClaim {
              {controller} and {controller_close}"
         ),
         criterion: "holds if every guess above the base leads to the true solution; partly if every one within ±5° does",
-        judgement: Judgement::new(anywhere.is_all(), close.is_all()),
+        judgement: ClaimJudgement::new(anywhere.is_all(), close.is_all()),
         figure: Some("success"),
     }
 }
@@ -170,13 +170,13 @@ pub(super) fn successive_poses(study: &Study) -> PaperClaim {
             followed[0].iterations_mean
         ),
         criterion: "holds if no step is lost; partly if fewer than 1 % are",
-        judgement: Judgement::new(steps > 0 && lost == 0, (lost as f64) < RARELY * steps as f64),
+        judgement: ClaimJudgement::new(steps > 0 && lost == 0, (lost as f64) < RARELY * steps as f64),
         figure: None,
     }
 }
 
-fn wider(published: Share, newton: Share, best_variant: Share) -> Judgement {
-    Judgement::new(published.clearly_exceeds(newton), best_variant.clearly_exceeds(newton))
+fn wider(published: Share, newton: Share, best_variant: Share) -> ClaimJudgement {
+    ClaimJudgement::new(published.clearly_exceeds(newton), best_variant.clearly_exceeds(newton))
 }
 
 /// The paper's variant that most often reaches a solution from above the base, and how often it does.
@@ -193,9 +193,9 @@ mod tests {
     #[test]
     fn the_same_figures_never_fulfil_both_claims_of_one_solver() {
         for (anywhere, close, reaches, unpredictable) in [
-            (995, 999, Judgement::Holds, Judgement::DoesNotHold),
-            (300, 999, Judgement::HoldsPartly, Judgement::HoldsPartly),
-            (300, 980, Judgement::DoesNotHold, Judgement::Holds),
+            (995, 999, ClaimJudgement::Holds, ClaimJudgement::DoesNotHold),
+            (300, 999, ClaimJudgement::HoldsPartly, ClaimJudgement::HoldsPartly),
+            (300, 980, ClaimJudgement::DoesNotHold, ClaimJudgement::Holds),
         ] {
             let closest = [anywhere, close].map(share);
             assert_eq!(reaches_the_closest(closest), reaches);
@@ -209,8 +209,8 @@ mod tests {
 
     #[test]
     fn a_wider_range_is_one_that_another_sample_would_show_as_well() {
-        assert_eq!(wider(share(900), share(600), share(900)), Judgement::Holds);
-        assert_eq!(wider(share(605), share(600), share(900)), Judgement::HoldsPartly);
-        assert_eq!(wider(share(500), share(600), share(605)), Judgement::DoesNotHold);
+        assert_eq!(wider(share(900), share(600), share(900)), ClaimJudgement::Holds);
+        assert_eq!(wider(share(605), share(600), share(900)), ClaimJudgement::HoldsPartly);
+        assert_eq!(wider(share(500), share(600), share(605)), ClaimJudgement::DoesNotHold);
     }
 }

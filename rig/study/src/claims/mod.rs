@@ -10,7 +10,7 @@ use super::motions::Motion;
 use super::share::Share;
 use crate::study::Study;
 
-pub use claim::{Judgement, PaperClaim};
+pub use claim::{ClaimJudgement, PaperClaim};
 
 /// All claims that can be measured, in the paper's order.
 pub(super) fn judge(study: &Study) -> Vec<PaperClaim> {
@@ -53,7 +53,7 @@ fn movement_is_covered(study: &Study) -> PaperClaim {
         measured: study.motions.iter().map(texts).collect::<Vec<_>>().join("; "),
         criterion: "holds if every motion stays within strokes, speeds and conditioning, with openings of 44 and 56 mm (mean \
                     and 95th percentile of adults); partly if any does",
-        judgement: Judgement::new(covered.is_all(), covered.hits > 0),
+        judgement: ClaimJudgement::new(covered.is_all(), covered.hits > 0),
         figure: Some("workspace_translation"),
     }
 }

@@ -1,6 +1,6 @@
 //! The paper's claims about the number of solutions.
 
-use super::claim::{Judgement, PaperClaim, RARELY};
+use super::claim::{ClaimJudgement, PaperClaim, RARELY};
 use crate::multiplicity::{CONDITIONS, ORIENTED};
 use crate::share::Share;
 use crate::study::Study;
@@ -17,7 +17,7 @@ pub(super) fn two_positions(study: &Study) -> PaperClaim {
         section: "Results, on multiplicity; Fig. 6",
         measured,
         criterion: "holds if both are among all solutions of the neutral input",
-        judgement: Judgement::new(folded.is_some(), false),
+        judgement: ClaimJudgement::new(folded.is_some(), false),
         figure: Some("fig6_assemblies"),
     }
 }
@@ -33,7 +33,7 @@ pub(super) fn several_solutions(study: &Study) -> PaperClaim {
              more than one mirrored pair"
         ),
         criterion: "holds if the neutral input has more than one mirrored pair",
-        judgement: Judgement::new(solutions > 2, false),
+        judgement: ClaimJudgement::new(solutions > 2, false),
         figure: Some("fig8_solutions"),
     }
 }
@@ -55,8 +55,8 @@ pub(super) fn conditions_leave_one(study: &Study) -> PaperClaim {
     }
 }
 
-fn unique(several: Share) -> Judgement {
-    Judgement::new(several.of > 0 && several.hits == 0, several.value() < RARELY)
+fn unique(several: Share) -> ClaimJudgement {
+    ClaimJudgement::new(several.of > 0 && several.hits == 0, several.value() < RARELY)
 }
 
 #[cfg(test)]
@@ -69,9 +69,9 @@ mod tests {
 
     #[test]
     fn one_exception_refutes_uniqueness_and_an_empty_sample_shows_nothing() {
-        assert_eq!(unique(share(0)), Judgement::Holds);
-        assert_eq!(unique(share(1)), Judgement::HoldsPartly);
-        assert_eq!(unique(share(10)), Judgement::DoesNotHold);
-        assert_eq!(unique(Share::default()), Judgement::DoesNotHold);
+        assert_eq!(unique(share(0)), ClaimJudgement::Holds);
+        assert_eq!(unique(share(1)), ClaimJudgement::HoldsPartly);
+        assert_eq!(unique(share(10)), ClaimJudgement::DoesNotHold);
+        assert_eq!(unique(Share::default()), ClaimJudgement::DoesNotHold);
     }
 }

@@ -1,6 +1,6 @@
 //! The paper's claims about speed.
 
-use super::claim::{ANY, Judgement, PaperClaim};
+use super::claim::{ANY, ClaimJudgement, PaperClaim};
 use crate::share::median;
 use crate::solver::{Found, PUBLISHED};
 use crate::study::Study;
@@ -44,7 +44,7 @@ pub(super) fn stated_time(study: &Study) -> PaperClaim {
              10⁻¹⁰ s is less than one cycle of any Pentium's clock"
         ),
         criterion: "holds if the median here is not above 10⁻¹⁰ s",
-        judgement: Judgement::new(published_ns <= STATED_NS, false),
+        judgement: ClaimJudgement::new(published_ns <= STATED_NS, false),
         figure: Some("fig5_speed"),
     }
 }
@@ -60,7 +60,7 @@ pub(super) fn real_time(study: &Study) -> PaperClaim {
             warm.median_ns, warm.p99_ns, random.median_ns, random.p99_ns
         ),
         criterion: "holds if both medians are below a tenth of a 1 ms cycle; partly if the warm one is",
-        judgement: Judgement::new(
+        judgement: ClaimJudgement::new(
             warm.median_ns.max(random.median_ns) <= REAL_TIME_NS,
             warm.median_ns <= REAL_TIME_NS,
         ),
@@ -68,8 +68,8 @@ pub(super) fn real_time(study: &Study) -> PaperClaim {
     }
 }
 
-fn faster([published, newton]: [f64; 2]) -> Judgement {
-    Judgement::new(newton >= MUCH_MORE * published, newton > published)
+fn faster([published, newton]: [f64; 2]) -> ClaimJudgement {
+    ClaimJudgement::new(newton >= MUCH_MORE * published, newton > published)
 }
 
 #[cfg(test)]
@@ -78,9 +78,9 @@ mod tests {
 
     #[test]
     fn many_more_iterations_are_twice_as_many() {
-        assert_eq!(faster([7.0, 14.0]), Judgement::Holds);
-        assert_eq!(faster([7.0, 13.0]), Judgement::HoldsPartly);
-        assert_eq!(faster([7.0, 7.0]), Judgement::DoesNotHold);
-        assert_eq!(faster([f64::NAN, f64::NAN]), Judgement::DoesNotHold);
+        assert_eq!(faster([7.0, 14.0]), ClaimJudgement::Holds);
+        assert_eq!(faster([7.0, 13.0]), ClaimJudgement::HoldsPartly);
+        assert_eq!(faster([7.0, 7.0]), ClaimJudgement::DoesNotHold);
+        assert_eq!(faster([f64::NAN, f64::NAN]), ClaimJudgement::DoesNotHold);
     }
 }

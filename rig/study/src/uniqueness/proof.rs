@@ -2,7 +2,7 @@
 //! boxes were examined. Shares of volume are exact except for the rounding of the boxes: every halving halves, and of
 //! several boxes at the start each counts the same.
 
-use masseter_controller::kinematics::uniqueness::{Claim, Finding, InputBox, Proof, Reaches};
+use masseter_controller::kinematics::uniqueness::{Finding, InputBox, Proof, Reaches, SolutionKind};
 use masseter_shared::geometry::Mechanism;
 use rayon::prelude::*;
 
@@ -33,7 +33,8 @@ pub fn prove(
     most: usize,
     progress: impl Fn(usize, f64),
 ) -> Proven {
-    let proof = Proof::new(mechanism, margin.map_or(Claim::PaperConditions, Claim::DeterminantAtLeast));
+    let proof =
+        Proof::new(mechanism, margin.map_or(SolutionKind::PaperConditions, SolutionKind::DeterminantAtLeast));
     let mut share_of_one = 1.0 / boxes.len() as f64;
     let mut open: Vec<Open> = boxes.into_iter().map(|whole| (whole, Proof::any_reaches(&whole))).collect();
     let mut proven = Proven::default();

@@ -41,6 +41,18 @@ pub struct Search {
 }
 
 /// Looks for inputs with two solutions that meet the paper's conditions among so many random inputs of a box.
+///
+/// ```
+/// use masseter_controller::kinematics::uniqueness::InputBox;
+/// use masseter_shared::geometry::{Mechanism, MechanismConfig};
+/// use masseter_study::uniqueness::search;
+///
+/// let mechanism = Mechanism::new(&MechanismConfig::default())?;
+/// let around_neutral = InputBox::uniform([-0.002, 0.002], [0.268, 0.272]);
+/// let found = search(&mechanism, &around_neutral, 100, 1);
+/// assert_eq!((found.with_one, found.with_two), (100, 0));
+/// # Ok::<(), masseter_shared::geometry::GeometryError>(())
+/// ```
 #[must_use]
 pub fn search(mechanism: &Mechanism, region: &InputBox, inputs: usize, seed: u64) -> Search {
     let limits: [[f64; 2]; AXES] = region.axes().map(|axis| [axis.low(), axis.high()]);

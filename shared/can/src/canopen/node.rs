@@ -15,9 +15,6 @@ pub struct NodeIdError {
 pub struct NodeId(u8);
 
 impl NodeId {
-    /// The usual id of a master.
-    pub const MASTER: Self = Self(127);
-
     /// The node of that number.
     ///
     /// # Errors

@@ -2,7 +2,7 @@
 //!
 //! The bits of the modes of operation (4 to 6) and halt (8) can be read; their effect is not part of this module.
 
-use super::DriveState;
+use super::{DriveState, StateCommand};
 
 const SWITCH_ON: u16 = 1 << 0;
 const ENABLE_VOLTAGE: u16 = 1 << 1;
@@ -14,23 +14,6 @@ const CHANGE_IMMEDIATELY: u16 = 1 << 5;
 const RELATIVE: u16 = 1 << 6;
 const FAULT_RESET: u16 = 1 << 7;
 const HALT: u16 = 1 << 8;
-
-/// The command in a controlword.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Command {
-    /// To ready to switch on.
-    Shutdown,
-    /// To switched on. From operation enabled the same bits are "disable operation".
-    SwitchOn,
-    /// To operation enabled.
-    EnableOperation,
-    /// To switch on disabled at once, without braking.
-    DisableVoltage,
-    /// Brake along the quick-stop ramp.
-    QuickStop,
-    /// Leave fault.
-    FaultReset,
-}
 
 /// Object 6040 as it is on the wire.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -54,20 +37,20 @@ impl Controlword {
     ///
     /// Fault reset is the rising edge of bit 7 in the state fault. Any other bit 7 is ignored and leaves the other
     /// bits valid, so that bit 7 can never mask a quick stop.
-    pub const fn command(self, previous: Self, state: DriveState) -> Command {
+    pub const fn command(self, previous: Self, state: DriveState) -> StateCommand {
         let is_edge = self.has(FAULT_RESET) && !previous.has(FAULT_RESET);
         if is_edge && matches!(state, DriveState::Fault) {
-            Command::FaultReset
+            StateCommand::FaultReset
         } else if !self.has(ENABLE_VOLTAGE) {
-            Command::DisableVoltage
+            StateCommand::DisableVoltage
         } else if !self.has(NO_QUICK_STOP) {
-            Command::QuickStop
+            StateCommand::QuickStop
         } else if !self.has(SWITCH_ON) {
-            Command::Shutdown
+            StateCommand::Shutdown
         } else if !self.has(ENABLE_OPERATION) {
-            Command::SwitchOn
+            StateCommand::SwitchOn
         } else {
-            Command::EnableOperation
+            StateCommand::EnableOperation
         }
     }
 
@@ -110,12 +93,12 @@ mod tests {
     #[test]
     fn words_are_those_of_the_standard() {
         let table = [
-            (Controlword::SHUTDOWN, 0x06, Command::Shutdown),
-            (Controlword::SWITCH_ON, 0x07, Command::SwitchOn),
-            (Controlword::ENABLE_OPERATION, 0x0F, Command::EnableOperation),
-            (Controlword::DISABLE_VOLTAGE, 0x00, Command::DisableVoltage),
-            (Controlword::QUICK_STOP, 0x02, Command::QuickStop),
-            (Controlword::FAULT_RESET, 0x80, Command::FaultReset),
+            (Controlword::SHUTDOWN, 0x06, StateCommand::Shutdown),
+            (Controlword::SWITCH_ON, 0x07, StateCommand::SwitchOn),
+            (Controlword::ENABLE_OPERATION, 0x0F, StateCommand::EnableOperation),
+            (Controlword::DISABLE_VOLTAGE, 0x00, StateCommand::DisableVoltage),
+            (Controlword::QUICK_STOP, 0x02, StateCommand::QuickStop),
+            (Controlword::FAULT_RESET, 0x80, StateCommand::FaultReset),
         ];
         for (word, bits, command) in table {
             assert_eq!(word.0, bits);
@@ -126,10 +109,10 @@ mod tests {
     #[test]
     fn dont_care_bits_do_not_matter() {
         let table = [
-            (0b0000_1110, Command::Shutdown),
-            (0b0000_1101, Command::DisableVoltage),
-            (0b0000_1011, Command::QuickStop),
-            (0b1_0111_1111, Command::EnableOperation),
+            (0b0000_1110, StateCommand::Shutdown),
+            (0b0000_1101, StateCommand::DisableVoltage),
+            (0b0000_1011, StateCommand::QuickStop),
+            (0b1_0111_1111, StateCommand::EnableOperation),
         ];
         for (bits, command) in table {
             assert_eq!(Controlword(bits).command(IDLE, DriveState::Fault), command, "{bits:04X}h");
@@ -140,17 +123,17 @@ mod tests {
     fn only_the_rising_edge_of_bit_7_resets() {
         for previous in 0..=0xFF {
             let command = Controlword::FAULT_RESET.command(Controlword(previous), DriveState::Fault);
-            assert_eq!(command == Command::FaultReset, previous & FAULT_RESET == 0);
+            assert_eq!(command == StateCommand::FaultReset, previous & FAULT_RESET == 0);
         }
     }
 
     #[test]
     fn bit_7_masks_no_stop() {
         let held = Controlword(Controlword::QUICK_STOP.0 | FAULT_RESET);
-        assert_eq!(held.command(Controlword::FAULT_RESET, DriveState::Fault), Command::QuickStop);
+        assert_eq!(held.command(Controlword::FAULT_RESET, DriveState::Fault), StateCommand::QuickStop);
         let enabled = DriveState::OperationEnabled;
-        assert_eq!(held.command(Controlword::ENABLE_OPERATION, enabled), Command::QuickStop);
+        assert_eq!(held.command(Controlword::ENABLE_OPERATION, enabled), StateCommand::QuickStop);
         let off = Controlword::FAULT_RESET.command(Controlword::ENABLE_OPERATION, enabled);
-        assert_eq!(off, Command::DisableVoltage);
+        assert_eq!(off, StateCommand::DisableVoltage);
     }
 }

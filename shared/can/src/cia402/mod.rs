@@ -6,13 +6,12 @@
 
 mod controlword;
 mod interpolation;
-mod machine;
 mod next_controlword;
 mod state;
 mod statusword;
 
-pub use controlword::{Command, Controlword};
+pub use controlword::Controlword;
 pub use interpolation::interpolation_period;
 pub use next_controlword::{DriveRequest, next_controlword};
-pub use state::DriveState;
+pub use state::{DriveState, StateCommand};
 pub use statusword::{StatusBit, Statusword, StatuswordError};

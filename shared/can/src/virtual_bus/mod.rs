@@ -29,7 +29,6 @@
 mod completion;
 mod confinement;
 mod nodes;
-mod port;
 mod queue;
 mod transmission;
 mod wire;
@@ -38,5 +37,4 @@ mod wire;
 mod tests;
 
 pub use nodes::WireConfig;
-pub use port::Port;
-pub use wire::VirtualWire;
+pub use wire::{Port, VirtualWire};

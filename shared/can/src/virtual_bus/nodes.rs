@@ -2,8 +2,10 @@
 
 use super::confinement::Confinement;
 use super::queue::{ReceiveQueue, TransmitQueue};
-use crate::bus::Received;
+use crate::bus::{ErrorState, Received};
+use crate::error_frame::{ErrorKind, ErrorReport};
 use crate::faults::Faults;
+use crate::tap::Tapped;
 use crate::wire::{Bitrate, INTERFRAME_BITS};
 
 /// What a wire is made of.
@@ -33,12 +35,13 @@ pub(super) struct Station {
     pub(super) suspended_until_ns: u64,
 }
 
-/// All nodes, their faults and the state of the wire between them.
+/// All nodes, their faults, and the state and the tap of the wire between them.
 #[derive(Debug)]
 pub(super) struct Nodes {
     pub(super) config: WireConfig,
     pub(super) stations: Vec<Station>,
     pub(super) faults: Faults,
+    pub(super) tap: ReceiveQueue<Tapped>,
     /// Transmissions so far. Faults select transmissions by this number.
     pub(super) transmissions: u64,
     pub(super) idle_from_ns: u64,
@@ -59,6 +62,7 @@ impl Nodes {
             config: *config,
             stations: (0..config.ports).map(|_| station()).collect(),
             faults,
+            tap: ReceiveQueue::new(config.receive_capacity * config.ports),
             transmissions: 0,
             idle_from_ns: 0,
             interframe_ns: config.bitrate.bits_to_ns(INTERFRAME_BITS),
@@ -68,5 +72,20 @@ impl Nodes {
     /// Whether a port takes part in the traffic.
     pub(super) fn is_on_bus(&self, port: usize, now_ns: u64) -> bool {
         !self.stations[port].confinement.is_off() && !self.faults.is_disconnected(now_ns, port)
+    }
+    /// Changes a port's fault confinement. The tap gets a change of state, and a port that leaves the bus discards its queue.
+    pub(super) fn confine(&mut self, port: usize, now_ns: u64, change: impl FnOnce(&mut Confinement)) {
+        let station = &mut self.stations[port];
+        let before = station.confinement.state();
+        change(&mut station.confinement);
+        let status = station.confinement.status();
+        if status.state == before {
+            return;
+        }
+        let kind = ErrorKind::State(status.state);
+        self.tap.push(now_ns, Tapped::Error(ErrorReport::new(now_ns, port as u8, kind, status)));
+        if status.state == ErrorState::BusOff {
+            station.transmit.clear();
+        }
     }
 }

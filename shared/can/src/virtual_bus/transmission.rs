@@ -38,7 +38,7 @@ impl PortSet {
         Self(self.0 & (u64::MAX - 1) << port)
     }
 
-    fn ports(self) -> impl Iterator<Item = usize> {
+    fn iter(self) -> impl Iterator<Item = usize> {
         let mut rest = self.0;
         std::iter::from_fn(move || {
             let port = rest.trailing_zeros() as usize;
@@ -60,14 +60,14 @@ pub(super) struct Transmission {
     pub(super) end_ns: u64,
     /// When the next frame may start.
     pub(super) idle_from_ns: u64,
-    pub(super) contest: Contest,
-    pub(super) outcome: Outcome,
+    pub(super) arbitration: ArbitrationResult,
+    pub(super) outcome: TransmissionOutcome,
     pub(super) activation: Option<FaultActivation>,
 }
 
 /// How a transmission ends.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Outcome {
+pub(super) enum TransmissionOutcome {
     /// All nodes receive the frame.
     Received,
     /// All nodes receive the frame, and the transmitter repeats it.
@@ -90,85 +90,92 @@ impl Candidate {
     }
 }
 
-impl Nodes {
+/// The arbitration among the nodes when the wire is next idle.
+pub(super) struct Arbitration<'a> {
+    pub(super) nodes: &'a Nodes,
+}
+
+impl Arbitration<'_> {
     /// The next transmission if no other frame is queued until then.
     pub(super) fn next_transmission(&self) -> Option<Transmission> {
-        let contenders = self.contenders();
+        let ports = self.candidate_ports();
         // As soon as the bus is idle and a node has something to send.
-        let start_ns = contenders.ports().filter_map(|port| self.ready_ns(port)).min()?;
-        let (contest, strongest) = self.arbitrate(contenders, start_ns)?;
+        let start_ns = ports.iter().filter_map(|port| self.ready_ns(port)).min()?;
+        let (arbitration, strongest) = self.arbitrate(ports, start_ns)?;
         let Queued { frame, duration_ns, since_ns: queued_ns } = strongest.queued;
         let numbered = NumberedFrame {
             at_ns: start_ns,
             port: strongest.port,
             id: frame.id(),
-            number: self.transmissions,
+            number: self.nodes.transmissions,
         };
         let mut transmission = Transmission {
             frame,
             queued_ns,
             start_ns,
-            received_ns: start_ns + duration_ns - self.interframe_ns,
-            end_ns: start_ns + duration_ns - self.interframe_ns,
+            received_ns: start_ns + duration_ns - self.nodes.interframe_ns,
+            end_ns: start_ns + duration_ns - self.nodes.interframe_ns,
             idle_from_ns: start_ns + duration_ns,
-            contest,
-            outcome: Outcome::Received,
+            arbitration,
+            outcome: TransmissionOutcome::Received,
             activation: strongest.babbles,
         };
-        if let Some(bit) = contest.destroyed_at {
-            transmission.destroy(self, bit, ErrorKind::Bit);
-        } else if let Some(activation) = self.faults.corrupts(numbered) {
+        if let Some(bit) = arbitration.destroyed_at {
+            transmission.destroy(self.nodes, bit, ErrorKind::Bit);
+        } else if let Some(activation) = self.nodes.faults.corrupts(numbered) {
             let last = frame_bits(&frame) - INTERFRAME_BITS;
-            let bit = 1 + self.faults.pick(activation, self.transmissions, last);
+            let bit = 1 + self.nodes.faults.pick(activation, self.nodes.transmissions, last);
             transmission.activation = Some(activation);
-            transmission.destroy(self, bit, ErrorKind::Bit);
+            transmission.destroy(self.nodes, bit, ErrorKind::Bit);
         } else if !self.is_acknowledged(&transmission) {
             let slot = frame_bits(&frame) - INTERFRAME_BITS - BEHIND_ACKNOWLEDGE_BITS;
-            transmission.destroy(self, slot, ErrorKind::Acknowledge);
-        } else if let Some(activation) = self.faults.duplicates(numbered) {
+            transmission.destroy(self.nodes, slot, ErrorKind::Acknowledge);
+        } else if let Some(activation) = self.nodes.faults.duplicates(numbered) {
             transmission.activation = Some(activation);
-            transmission.repeat(self);
+            transmission.repeat(self.nodes);
         }
         Some(transmission)
     }
 
     /// The ports that may have a frame to send, now or later.
-    fn contenders(&self) -> PortSet {
-        let mut contenders = PortSet::default();
-        for (port, station) in self.stations.iter().enumerate() {
+    fn candidate_ports(&self) -> PortSet {
+        let mut ports = PortSet::default();
+        for (port, station) in self.nodes.stations.iter().enumerate() {
             // A node that babbles needs no queue.
-            if !station.transmit.is_empty() || !self.faults.is_empty() {
-                contenders.add(port);
+            if !station.transmit.is_empty() || !self.nodes.faults.is_empty() {
+                ports.add(port);
             }
         }
-        contenders
+        ports
     }
 
     /// When a port can next take part in an arbitration, if at all.
     fn ready_ns(&self, port: usize) -> Option<u64> {
-        let station = &self.stations[port];
+        let station = &self.nodes.stations[port];
         if station.confinement.is_off() {
             return None;
         }
-        let may_ns = station.suspended_until_ns.max(station.on_bus_from_ns).max(self.idle_from_ns);
+        let may_ns = station.suspended_until_ns.max(station.on_bus_from_ns).max(self.nodes.idle_from_ns);
         let queued_ns = station.transmit.earliest_ns();
-        let sends_ns = queued_ns.map(|since_ns| self.faults.connected_from_ns(may_ns.max(since_ns), port));
-        let babbles_ns = self.faults.babbles_from_ns(may_ns, port);
+        let sends_ns =
+            queued_ns.map(|since_ns| self.nodes.faults.connected_from_ns(may_ns.max(since_ns), port));
+        let babbles_ns = self.nodes.faults.babbles_from_ns(may_ns, port);
         let at_ns = sends_ns.unwrap_or(u64::MAX).min(babbles_ns.unwrap_or(u64::MAX));
         (at_ns < u64::MAX).then_some(at_ns)
     }
 
     /// The frame that each of those ports would send at that time.
-    fn candidates(&self, contenders: PortSet, start_ns: u64) -> impl Iterator<Item = Candidate> {
-        contenders.ports().filter_map(move |port| {
+    fn candidates(&self, ports: PortSet, start_ns: u64) -> impl Iterator<Item = Candidate> {
+        ports.iter().filter_map(move |port| {
             let candidate = self.candidate(port, start_ns)?;
-            let may = self.stations[port].suspended_until_ns <= start_ns && self.is_on_bus(port, start_ns);
+            let may = self.nodes.stations[port].suspended_until_ns <= start_ns
+                && self.nodes.is_on_bus(port, start_ns);
             may.then_some(candidate)
         })
     }
 
     fn candidate(&self, port: usize, start_ns: u64) -> Option<Candidate> {
-        let queued = self.stations[port].transmit.most_urgent(start_ns);
+        let queued = self.nodes.stations[port].transmit.most_urgent(start_ns);
         let queued = queued.map(|&queued| Candidate { port, queued, babbles: None });
         match self.babbled(port, start_ns) {
             Some(babbled) if queued.is_none_or(|queued| babbled.id() < queued.id()) => Some(babbled),
@@ -177,52 +184,52 @@ impl Nodes {
     }
 
     fn babbled(&self, port: usize, start_ns: u64) -> Option<Candidate> {
-        let (activation, frame) = self.faults.makes_babble(start_ns, port)?;
-        let queued = Queued::new(frame, self.config.bitrate, start_ns);
+        let (activation, frame) = self.nodes.faults.makes_babble(start_ns, port)?;
+        let queued = Queued::new(frame, self.nodes.config.bitrate, start_ns);
         Some(Candidate { port, queued, babbles: Some(activation) })
     }
 
     /// Whether a port that does not send the frame receives it.
     fn is_acknowledged(&self, transmission: &Transmission) -> bool {
-        (0..self.stations.len())
-            .any(|port| !transmission.is_from(port) && self.is_on_bus(port, transmission.start_ns))
+        (0..self.nodes.stations.len())
+            .any(|port| !transmission.is_from(port) && self.nodes.is_on_bus(port, transmission.start_ns))
     }
 
     /// The lowest port with the most urgent identifier of all wins. The frames of later ports that send the same
     /// identifier are compared with its frame; the result has the one that stays on the bus.
-    fn arbitrate(&self, contenders: PortSet, start_ns: u64) -> Option<(Contest, Candidate)> {
-        let winner = self.candidates(contenders, start_ns).min_by_key(Candidate::id)?;
-        let (mut contest, mut strongest) = (Contest::default(), winner);
-        contest.admit(winner);
-        let rivals = self.candidates(contenders.above(winner.port), start_ns);
+    fn arbitrate(&self, ports: PortSet, start_ns: u64) -> Option<(ArbitrationResult, Candidate)> {
+        let winner = self.candidates(ports, start_ns).min_by_key(Candidate::id)?;
+        let (mut arbitration, mut strongest) = (ArbitrationResult::default(), winner);
+        arbitration.admit(winner);
+        let rivals = self.candidates(ports.above(winner.port), start_ns);
         for rival in rivals.filter(|rival| rival.id() == winner.id()) {
             let difference = first_difference(&strongest.queued.frame, &rival.queued.frame);
             let Some(difference) = difference else {
-                contest.admit(rival);
+                arbitration.admit(rival);
                 continue;
             };
             let loser = if difference.first_is_dominant { rival } else { strongest };
-            if self.stations[loser.port].confinement.state() == ErrorState::Active {
-                contest.admit(rival);
-                contest.destroyed_at =
-                    Some(contest.destroyed_at.map_or(difference.bit, |bit| bit.min(difference.bit)));
+            if self.nodes.stations[loser.port].confinement.state() == ErrorState::Active {
+                arbitration.admit(rival);
+                arbitration.destroyed_at =
+                    Some(arbitration.destroyed_at.map_or(difference.bit, |bit| bit.min(difference.bit)));
             } else if difference.first_is_dominant {
                 // A passive error flag is recessive: the dominant frame goes on.
-                contest.losers.add(rival.port);
+                arbitration.losers.add(rival.port);
             } else {
-                contest.losers.0 |= contest.senders.0;
-                (contest.senders, contest.babbling) = (PortSet::default(), PortSet::default());
-                contest.admit(rival);
+                arbitration.losers.0 |= arbitration.senders.0;
+                (arbitration.senders, arbitration.babbling) = (PortSet::default(), PortSet::default());
+                arbitration.admit(rival);
                 strongest = rival;
             }
         }
-        Some((contest, strongest))
+        Some((arbitration, strongest))
     }
 }
 
-/// Ports that send one identifier at once.
+/// The result of an arbitration: ports that send one identifier at once.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Contest {
+pub(super) struct ArbitrationResult {
     /// All ports with the same frame.
     pub(super) senders: PortSet,
     /// The senders that babble.
@@ -233,7 +240,7 @@ pub(super) struct Contest {
     destroyed_at: Option<u32>,
 }
 
-impl Contest {
+impl ArbitrationResult {
     fn admit(&mut self, candidate: Candidate) {
         self.senders.add(candidate.port);
         if candidate.babbles.is_some() {
@@ -245,26 +252,26 @@ impl Contest {
 impl Transmission {
     /// Whether the port sent that identifier. A loser has signalled an error and does not receive the frame.
     pub(super) fn is_from(&self, port: usize) -> bool {
-        self.contest.senders.contains(port) || self.contest.losers.contains(port)
+        self.arbitration.senders.contains(port) || self.arbitration.losers.contains(port)
     }
 
     /// An error flag begins behind bit number `bit` of the frame.
     fn destroy(&mut self, nodes: &Nodes, bit: u32, kind: ErrorKind) {
         let is_echoed = (0..nodes.stations.len()).any(|port| {
-            !self.contest.senders.contains(port)
+            !self.arbitration.senders.contains(port)
                 && nodes.is_on_bus(port, self.start_ns)
                 && nodes.stations[port].confinement.state() == ErrorState::Active
         });
         let flag_bits = if is_echoed { 2 * ERROR_FLAG_BITS } else { ERROR_FLAG_BITS };
         let error_ns = self.start_ns + nodes.config.bitrate.bits_to_ns(bit);
         self.end_in_error_frame(nodes, error_ns, flag_bits);
-        self.outcome = Outcome::Destroyed(kind);
+        self.outcome = TransmissionOutcome::Destroyed(kind);
     }
 
     /// The transmitter alone signals an error in the last bit of the frame.
     fn repeat(&mut self, nodes: &Nodes) {
         self.end_in_error_frame(nodes, self.received_ns, LATE_FLAG_BITS);
-        self.outcome = Outcome::ReceivedAndRepeated;
+        self.outcome = TransmissionOutcome::ReceivedAndRepeated;
     }
 
     fn end_in_error_frame(&mut self, nodes: &Nodes, error_ns: u64, flag_bits: u32) {

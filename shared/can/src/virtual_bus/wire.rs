@@ -1,23 +1,32 @@
-//! The wire in virtual time: its public methods, and the order of its events.
+//! The wire in virtual time: its ports, its tap, and the order of its events.
 
+use super::completion::Completion;
 use super::confinement::{Confinement, SEQUENCE_BITS};
 use super::nodes::{Nodes, Station, WireConfig};
-use super::queue::ReceiveQueue;
-use super::transmission::{PortSet, Transmission};
-use crate::bus::{ErrorState, ReceiveError};
-use crate::error_frame::{ErrorKind, ErrorReport};
-use crate::faults::{FaultActivation, FaultNote, Faults};
+use super::queue::Queued;
+use super::transmission::{Arbitration, PortSet, Transmission};
+use crate::bus::{Bus, BusStatus, ErrorState, ReceiveError, Received, SendError};
+use crate::faults::{FaultActivation, FaultNote, Faults, NumberedFrame};
+use crate::frame::Frame;
 use crate::tap::Tapped;
 
 /// A simulated wire and the ports on it.
 #[derive(Debug)]
 pub struct VirtualWire {
     pub(super) nodes: Nodes,
-    pub(super) tap: ReceiveQueue<Tapped>,
     traffic: Traffic,
-    pub(super) advanced_to_ns: u64,
+    advanced_to_ns: u64,
     /// Frames that ports took for transmission. Faults select the frames to delay by this number.
-    pub(super) queued: u64,
+    queued: u64,
+}
+
+/// A port, borrowed from its wire for as long as it is used.
+///
+/// A port does not move time: frames arrive when the caller [advances](VirtualWire::advance) the wire.
+#[derive(Debug)]
+pub struct Port<'a> {
+    wire: &'a mut VirtualWire,
+    port: usize,
 }
 
 /// The present or next transmission.
@@ -51,13 +60,17 @@ impl VirtualWire {
     /// With more than 64 ports.
     pub fn with_faults(config: &WireConfig, faults: Faults) -> Self {
         assert!(config.ports <= PortSet::CAPACITY, "{} ports", config.ports);
-        Self {
-            nodes: Nodes::new(config, faults),
-            tap: ReceiveQueue::new(config.receive_capacity * config.ports),
-            traffic: Traffic::Unknown,
-            advanced_to_ns: 0,
-            queued: 0,
-        }
+        Self { nodes: Nodes::new(config, faults), traffic: Traffic::Unknown, advanced_to_ns: 0, queued: 0 }
+    }
+
+    /// One port, to be used as a [`Bus`].
+    ///
+    /// # Panics
+    /// If no port has that index.
+    pub fn port(&mut self, port: usize) -> Port<'_> {
+        let ports = self.nodes.stations.len();
+        assert!(port < ports, "port {port} of a wire with {ports}");
+        Port { wire: self, port }
     }
 
     /// The next frame or error that was on the wire up to `now_ns`, of any port.
@@ -65,7 +78,7 @@ impl VirtualWire {
     /// # Errors
     /// [`ReceiveError::Overrun`] where the tap missed frames because its queue was full; no other.
     pub fn tap(&mut self, now_ns: u64) -> Result<Option<Tapped>, ReceiveError> {
-        self.tap.pop(now_ns)
+        self.nodes.tap.pop(now_ns)
     }
 
     /// The next note on the wire's faults up to `now_ns`.
@@ -130,14 +143,14 @@ impl VirtualWire {
     #[inline]
     fn update_traffic(&mut self) {
         if let Traffic::Unknown = self.traffic {
-            let transmission = self.nodes.next_transmission();
+            let transmission = Arbitration { nodes: &self.nodes }.next_transmission();
             self.traffic = transmission
                 .map_or(Traffic::Nothing, |transmission| Traffic::Coming { transmission, is_on_wire: false });
         }
     }
 
     /// Discards the computed next transmission after a change. A transmission on the wire stays.
-    pub(super) fn invalidate_traffic(&mut self) {
+    fn invalidate_traffic(&mut self) {
         if !self.is_busy() {
             self.traffic = Traffic::Unknown;
         }
@@ -148,7 +161,7 @@ impl VirtualWire {
         match self.traffic {
             Traffic::Coming { transmission, is_on_wire: true } if transmission.end_ns <= until_ns => {
                 self.traffic = Traffic::Unknown;
-                self.end(&transmission);
+                Completion { nodes: &mut self.nodes, transmission: &transmission }.apply();
                 true
             }
             _ => false,
@@ -194,27 +207,44 @@ impl VirtualWire {
         if let Some(activation) = bus_off {
             self.nodes.faults.record(activation);
             let restart_after_ns = self.nodes.config.restart_after_ns;
-            self.confine(port, at_ns, |node| node.leave_bus(at_ns, restart_after_ns));
+            self.nodes.confine(port, at_ns, |node| node.leave_bus(at_ns, restart_after_ns));
         } else {
             self.nodes.stations[port].on_bus_from_ns = at_ns;
-            self.confine(port, at_ns, Confinement::come_back);
+            self.nodes.confine(port, at_ns, Confinement::come_back);
         }
         self.invalidate_traffic();
     }
+}
 
-    /// Changes a port's fault confinement. The tap gets a change of state, and a port that leaves the bus discards its queue.
-    pub(super) fn confine(&mut self, port: usize, now_ns: u64, change: impl FnOnce(&mut Confinement)) {
-        let station = &mut self.nodes.stations[port];
-        let before = station.confinement.state();
-        change(&mut station.confinement);
+impl Bus for Port<'_> {
+    /// # Errors
+    /// [`SendError::QueueFull`] and [`SendError::BusOff`]; no other.
+    fn send(&mut self, now_ns: u64, frame: Frame) -> Result<(), SendError> {
+        let VirtualWire { nodes, queued: number, advanced_to_ns, .. } = self.wire;
+        let station = &mut nodes.stations[self.port];
         let status = station.confinement.status();
-        if status.state == before {
-            return;
-        }
-        let kind = ErrorKind::State(status.state);
-        self.tap.push(now_ns, Tapped::Error(ErrorReport::new(now_ns, port as u8, kind, status)));
         if status.state == ErrorState::BusOff {
-            station.transmit.clear();
+            return Err(SendError::BusOff { tec: status.tec });
         }
+        let numbered = NumberedFrame { at_ns: now_ns, port: self.port, id: frame.id(), number: *number };
+        let delay = nodes.faults.delays(numbered);
+        let queued_ns = now_ns.max(*advanced_to_ns) + delay.map_or(0, |(_, by_ns)| by_ns);
+        station.transmit.push(Queued::new(frame, nodes.config.bitrate, queued_ns))?;
+        if let Some((activation, _)) = delay {
+            nodes.faults.record(activation);
+        }
+        *number += 1;
+        self.wire.invalidate_traffic();
+        Ok(())
+    }
+
+    /// # Errors
+    /// [`ReceiveError::Overrun`] where frames were lost because the port's queue was full; no other.
+    fn receive(&mut self, now_ns: u64) -> Result<Option<Received>, ReceiveError> {
+        self.wire.nodes.stations[self.port].receive.pop(now_ns)
+    }
+
+    fn status(&self) -> BusStatus {
+        self.wire.nodes.stations[self.port].confinement.status()
     }
 }

@@ -109,7 +109,7 @@ fn a_node_in_bus_off_sends_and_receives_nothing_until_its_restart_and_the_wait_a
         .transmit
         .push(Queued { frame: sync::frame(), duration_ns: 51_000, since_ns: 9_000_000 })
         .unwrap();
-    wire.confine(0, 0, |node| node.leave_bus(0, Some(10_000_000)));
+    wire.nodes.confine(0, 0, |node| node.leave_bus(0, Some(10_000_000)));
     assert!(wire.nodes.stations[0].transmit.is_empty(), "both frames are discarded");
     assert_eq!(wire.port(0).send(0, sync::frame()), Err(SendError::BusOff { tec: 256 }));
     wire.port(1).send(0, frame(0x181, &[])).unwrap();
@@ -134,13 +134,12 @@ fn a_node_in_bus_off_sends_and_receives_nothing_until_its_restart_and_the_wait_a
 #[test]
 fn every_frame_that_passes_counts_as_a_recessive_sequence() {
     let mut wire = wire();
-    wire.confine(0, 0, |node| node.leave_bus(0, Some(0)));
-    let mut sent = 0;
+    wire.nodes.confine(0, 0, |node| node.leave_bus(0, Some(0)));
+    let (mut sent, mut now_ns) = (0, 0);
     while status(&mut wire, 0).state == ErrorState::BusOff {
-        let now_ns = wire.advanced_to_ns;
         wire.port(1).send(now_ns, sync::frame()).unwrap();
-        let arrival_ns = wire.next_event_ns().unwrap();
-        wire.advance(arrival_ns + 3 * BIT_NS);
+        now_ns = wire.next_event_ns().unwrap() + 3 * BIT_NS;
+        wire.advance(now_ns);
         sent += 1;
         assert!(sent <= 128);
     }

@@ -15,7 +15,7 @@ const ANY: Fault = Fault {
     count: FOREVER,
 };
 
-fn struck_by(fault: Fault) -> VirtualWire {
+fn wire_with(fault: Fault) -> VirtualWire {
     let config = WireConfig { restart_after_ns: Some(1_000_000), ..CONFIG };
     VirtualWire::with_faults(&config, Faults::new(vec![fault], 1))
 }
@@ -31,7 +31,7 @@ fn of(wire: &mut VirtualWire) -> [(u16, u16); PORTS] {
 
 #[test]
 fn a_corrupted_frame_is_repeated_and_counted_by_everybody() {
-    let mut wire = struck_by(Fault { count: 1, ..ANY });
+    let mut wire = wire_with(Fault { count: 1, ..ANY });
     let frame = frame(0x181, &[1, 2, 3]);
     wire.port(1).send(0, frame).unwrap();
     wire.advance(FOREVER / 2);
@@ -49,7 +49,7 @@ fn a_corrupted_frame_is_repeated_and_counted_by_everybody() {
 
 #[test]
 fn a_frame_that_is_always_corrupted_takes_its_sender_off_the_bus_alone() {
-    let mut wire = struck_by(Fault { count: 32, ..ANY });
+    let mut wire = wire_with(Fault { count: 32, ..ANY });
     wire.port(1).send(0, sync::frame()).unwrap();
     wire.advance(100_000_000);
     assert_eq!(of(&mut wire), [(0, 32), (0, 0), (0, 32)], "restarted after a millisecond, counters cleared");
@@ -64,7 +64,7 @@ fn a_frame_that_is_always_corrupted_takes_its_sender_off_the_bus_alone() {
 
 #[test]
 fn one_receiver_loses_a_frame_without_an_error_on_the_wire() {
-    let mut wire = struck_by(Fault { kind: FaultKind::Lose, port: Some(2), ..ANY });
+    let mut wire = wire_with(Fault { kind: FaultKind::Lose, port: Some(2), ..ANY });
     wire.port(1).send(0, sync::frame()).unwrap();
     wire.advance(FOREVER / 2);
     assert_eq!([0, 2].map(|port| fetch(&mut wire, port).len()), [1, 0]);
@@ -73,7 +73,7 @@ fn one_receiver_loses_a_frame_without_an_error_on_the_wire() {
 
 #[test]
 fn a_delayed_frame_is_queued_later() {
-    let mut wire = struck_by(Fault { kind: FaultKind::Delay { by_ns: 300_000 }, ..ANY });
+    let mut wire = wire_with(Fault { kind: FaultKind::Delay { by_ns: 300_000 }, ..ANY });
     wire.port(1).send(1000, sync::frame()).unwrap();
     wire.advance(FOREVER / 2);
     assert_eq!(arrivals(&mut wire), [(0x080, 301_000 + 48_000)]);
@@ -82,7 +82,7 @@ fn a_delayed_frame_is_queued_later() {
 #[test]
 fn a_frame_that_finds_no_room_is_not_counted_as_delayed() {
     let mut wire =
-        struck_by(Fault { kind: FaultKind::Delay { by_ns: 300_000 }, from_ns: 1000, count: 1, ..ANY });
+        wire_with(Fault { kind: FaultKind::Delay { by_ns: 300_000 }, from_ns: 1000, count: 1, ..ANY });
     while wire.port(1).send(0, sync::frame()).is_ok() {}
     assert!(wire.port(1).send(1000, sync::frame()).is_err());
     wire.advance(FOREVER / 4);
@@ -94,7 +94,7 @@ fn a_frame_that_finds_no_room_is_not_counted_as_delayed() {
 
 #[test]
 fn a_duplicated_frame_arrives_twice() {
-    let mut wire = struck_by(Fault { kind: FaultKind::Duplicate, count: 1, ..ANY });
+    let mut wire = wire_with(Fault { kind: FaultKind::Duplicate, count: 1, ..ANY });
     wire.port(1).send(0, sync::frame()).unwrap();
     wire.advance(FOREVER / 2);
     assert_eq!(arrivals(&mut wire), [(0x080, 48_000), (0x080, (48 + 7 + 8 + 3 + 48) * BIT_NS)]);
@@ -106,7 +106,7 @@ fn a_duplicated_frame_arrives_twice() {
 fn a_babbling_node_leaves_no_gap_to_lower_priorities() {
     let babble = frame(0x001, &[0x55; 8]);
     let kind = FaultKind::Babble { frame: babble };
-    let mut wire = struck_by(Fault { kind, port: Some(2), from_ns: 500_000, until_ns: 2_000_000, ..ANY });
+    let mut wire = wire_with(Fault { kind, port: Some(2), from_ns: 500_000, until_ns: 2_000_000, ..ANY });
     wire.port(1).send(600_000, sync::frame()).unwrap();
     wire.advance(FOREVER / 2);
     let arrivals = arrivals(&mut wire);
@@ -120,7 +120,7 @@ fn a_babbling_node_leaves_no_gap_to_lower_priorities() {
 #[test]
 fn a_disconnected_node_neither_hears_nor_sends_nor_acknowledges() {
     let mut wire =
-        struck_by(Fault { kind: FaultKind::Disconnect, port: Some(0), until_ns: 1_000_000, ..ANY });
+        wire_with(Fault { kind: FaultKind::Disconnect, port: Some(0), until_ns: 1_000_000, ..ANY });
     wire.port(0).send(0, frame(0x080, &[])).unwrap();
     wire.port(1).send(0, frame(0x181, &[])).unwrap();
     wire.advance(900_000);
@@ -135,7 +135,7 @@ fn a_disconnected_node_neither_hears_nor_sends_nor_acknowledges() {
 #[test]
 fn bus_off_is_forced_once_between_frames() {
     let mut wire =
-        struck_by(Fault { kind: FaultKind::BusOff, port: Some(1), from_ns: 20_000, count: 1, ..ANY });
+        wire_with(Fault { kind: FaultKind::BusOff, port: Some(1), from_ns: 20_000, count: 1, ..ANY });
     wire.port(1).send(0, sync::frame()).unwrap();
     wire.advance(60_000);
     assert_eq!(status(&mut wire, 1).state, ErrorState::BusOff);

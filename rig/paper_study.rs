@@ -33,12 +33,12 @@ pub(crate) struct KinematicsArgs {
 }
 
 /// Makes the study. A claim of the paper that does not hold is a result, not a failure.
-pub(crate) fn kinematics(args: &KinematicsArgs) -> anyhow::Result<Exit> {
+pub(crate) fn study(args: &KinematicsArgs) -> anyhow::Result<Exit> {
     let prepared = Study::prepare(args.own_scenario()?.as_ref())?;
     new_folder(&args.out)?;
     let settings = Settings { seed: args.seed, samples: args.samples as usize, cells: args.cells as usize };
     let study = prepared.run(settings, |stage| status!("{stage}"))?;
-    for claim in study.write(&args.out, &args.command())? {
+    for claim in masseter_study::write(&study, &args.out, &args.command())? {
         result_line!("{:<13}  {}", claim.judgement.name(), claim.statement)?;
     }
     result_line!("{}", args.out.join("claims.md").display())?;
