@@ -5,7 +5,6 @@
 
 use std::fs::File;
 use std::io::Write;
-use std::iter;
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
@@ -14,6 +13,7 @@ use masseter_controller::kinematics::uniqueness::InputBox;
 use masseter_plan::{Overrides, RunPlan};
 use masseter_recording::output::new_file;
 use masseter_shared::geometry::{AXIS_NAMES, Mechanism, MechanismConfig};
+use masseter_study::table::{csv, number};
 use masseter_study::uniqueness::{Ambiguous, boxes, prove, search};
 use masseter_terminal::{Exit, result_line, status};
 
@@ -102,9 +102,8 @@ fn prove_and_print(args: &ProveArgs) -> anyhow::Result<bool> {
     result_line!("at most one solution {:.4} % of the volume", 100.0 * proven.unique_share)?;
     result_line!("undecided            {} boxes", proven.undecided.len())?;
     let header = AXIS_NAMES.map(|axis| format!("{axis}_low_m,{axis}_high_m")).join(",");
-    let row =
-        |inputs: &InputBox| inputs.axes().map(|axis| format!("{},{}", axis.low(), axis.high())).join(",");
-    write_rows(args.out.as_deref(), file, header, proven.undecided.iter().map(row))?;
+    let row = |inputs: &InputBox| inputs.axes().map(|axis| [axis.low(), axis.high()].map(number));
+    write(args.out.as_deref(), file, &csv(&header, proven.undecided.iter().map(row)))?;
     Ok(proven.undecided.is_empty())
 }
 
@@ -121,21 +120,14 @@ fn search_and_print(args: &SearchArgs) -> anyhow::Result<bool> {
         result_line!("greatest lesser determinant, after climbing       {lesser:.4} at {axes_m:?}")?;
     }
     let header = AXIS_NAMES.map(|axis| format!("{axis}_m")).join(",") + ",lesser_determinant";
-    let row =
-        |one: &Ambiguous| one.axes_m.map(|value| value.to_string()).join(",") + &format!(",{}", one.lesser);
-    write_rows(args.out.as_deref(), file, header, found.climbed.iter().map(row))?;
+    let row = |one: &Ambiguous| (one.axes_m.map(number), number(one.lesser));
+    write(args.out.as_deref(), file, &csv(&header, found.climbed.iter().map(row)))?;
     Ok(found.climbed.iter().all(|one| one.lesser <= 0.0))
 }
 
-/// Writes CSV, if a file is named.
-fn write_rows(
-    out: Option<&Path>,
-    file: Option<File>,
-    header: String,
-    rows: impl Iterator<Item = String>,
-) -> anyhow::Result<()> {
+/// Writes the text, if a file is named.
+fn write(out: Option<&Path>, file: Option<File>, text: &str) -> anyhow::Result<()> {
     let (Some(path), Some(mut file)) = (out, file) else { return Ok(()) };
-    let text: String = iter::once(header).chain(rows).map(|row| row + "\n").collect();
     file.write_all(text.as_bytes()).with_context(|| format!("cannot write {}", path.display()))
 }
 

@@ -120,13 +120,13 @@ fn a_file_and_its_parent_are_a_circle_when_both_use_each_other() {
 #[test]
 fn macros_tie_files_and_code_for_tests_does_not() {
     let lib = ("src/lib.rs", "#[macro_use]\nmod one;\nmod two;");
-    let two = ("src/two.rs", "tell!(Made);");
+    let two = ("src/two.rs", "define!(Made);");
     for (one, is_circle) in [
-        ("macro_rules! tell { ($x:ident) => { $crate::two::Made }; }", true),
-        ("macro_rules! tell { ($x:ident) => { pub struct $x; }; }", false),
-        ("macro_rules! tell { ($x:ident) => { pub struct $x; }; }\nuse crate::two::Made;", true),
+        ("macro_rules! define { ($x:ident) => { $crate::two::Made }; }", true),
+        ("macro_rules! define { ($x:ident) => { pub struct $x; }; }", false),
+        ("macro_rules! define { ($x:ident) => { pub struct $x; }; }\nuse crate::two::Made;", true),
         (
-            "macro_rules! tell { ($x:ident) => { pub struct $x; }; }\n#[cfg(test)]\nmod tests { use crate::two::Made; }",
+            "macro_rules! define { ($x:ident) => { pub struct $x; }; }\n#[cfg(test)]\nmod tests { use crate::two::Made; }",
             false,
         ),
     ] {

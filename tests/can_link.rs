@@ -222,7 +222,7 @@ fn a_foreign_tool_reads_an_object_of_a_drive_on_two_buses_and_on_one() {
         expect(&mut stream, "< ok >");
         stream.write_all(b"< rawmode >").unwrap();
         expect(&mut stream, "< ok >");
-        // The drive answers no SDO before it has booted, which its boot-up or heartbeat tells.
+        // The drive answers SDO only after its boot-up message.
         expect(&mut stream, "< frame 701 ");
         // Upload of 1000, the device type, from node 1: a servo drive is 0002_0192h.
         stream.write_all(b"< send 601 8 40 0 10 0 0 0 0 0 >").unwrap();

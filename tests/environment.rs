@@ -163,7 +163,7 @@ fn a_disk_without_room_for_the_run_is_refused_with_figures() {
     }) else {
         return;
     };
-    assert_eq!(output.status.code(), Some(2), "{}", stderr(&output));
+    assert_eq!(output.status.code(), Some(6), "{}", stderr(&output));
     assert!(stderr(&output).contains("has 2.1 MB free, and the run may need 20.0 MB"), "{}", stderr(&output));
 }
 

@@ -26,7 +26,7 @@ fn a_closed_terminal_ends_the_motion_in_order() {
     let cores = Cores::take();
     let (workspace, mut child) = Workspace::running(&cores, LENIENT);
     let roles = ["controller", "plant", "recorder"].map(|role| child_of(&child, role));
-    // Nobody reads any more what is said, and the whole group hears of it.
+    // Nothing reads the output any more, and every process gets SIGHUP.
     drop((child.stdout.take(), child.stderr.take()));
     for id in roles.into_iter().chain([Pid::from_child(&child)]) {
         kill_process(id, Signal::HUP).unwrap();

@@ -80,8 +80,8 @@ fn a_bad_line_is_named_and_the_rest_is_done() {
     assert_eq!(statuses(&output), expected);
     let reasons = [
         (3, "d3_m is 'zero'"),
-        (4, "l1_m is NaN"),
-        (5, "2 values, expected 6"),
+        (4, "l1_m is 'NaN'"),
+        (5, "2 fields, expected 6"),
         (6, "an empty line"),
         (7, "d1_m is '\"0'"),
     ];
@@ -121,7 +121,7 @@ fn statuses_name_what_the_mechanism_cannot_do() {
     assert!(!line.ends_with(",ok") && line.starts_with(",,,"), "{line}");
 }
 
-/// Upside down, and below the base: the strokes would do, and `fk` tells another pose of them.
+/// Upside down, and below the base: the strokes would do, and `fk` gives another pose for them.
 #[test]
 fn a_pose_in_which_the_mechanism_cannot_stand_is_a_wrong_assembly() {
     let output = pipe(

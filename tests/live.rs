@@ -1,4 +1,4 @@
-//! Runs that are watched while they go on: what watchers see, and that the recording does not care.
+//! Runs that are watched while they go on: what watchers see, and that their recordings stay complete.
 
 mod common;
 
@@ -50,7 +50,7 @@ impl Shown {
     }
 }
 
-/// A client that has heard which channels there are.
+/// A client that has received the list of channels.
 struct Watcher {
     socket: WebSocket<TcpStream>,
     info: Value,

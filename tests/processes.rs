@@ -90,7 +90,7 @@ fn a_controller_that_does_not_end_when_asked_to_is_killed() {
     kill_process(Pid::from_child(&child), Signal::TERM).unwrap();
     let output = child.wait_with_output().unwrap();
     assert_eq!(output.status.code(), Some(4), "{}{}", stdout(&output), stderr(&output));
-    assert!(stdout(&output).contains("did not end when asked to"), "{}", stdout(&output));
+    assert!(stdout(&output).contains("did not end after SIGTERM"), "{}", stdout(&output));
 }
 
 #[test]

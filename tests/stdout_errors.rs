@@ -6,10 +6,12 @@ use std::fs::File;
 use std::io;
 use std::process::{Command, Stdio};
 
-use common::{MASSETER, Workspace, stderr};
+use common::{Cores, MASSETER, Workspace, stderr};
 
 #[test]
 fn a_full_disk_behind_standard_output_is_exit_6_and_a_closed_pipe_is_no_failure() {
+    // The bench occupies them.
+    let _cores = Cores::take();
     let workspace = Workspace::new("duration_s = 0.5");
     assert_eq!(workspace.run_virtual(&[]).status.code(), Some(0));
     let folder = workspace.run_folder();

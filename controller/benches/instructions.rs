@@ -11,8 +11,7 @@ use std::process::Command;
 
 use workloads::{CYCLES, WORKS};
 
-/// What tells a process that it is the one whose instructions are counted; then follow the work's name and
-/// the number of calls.
+/// Argument of the process whose instructions are counted, followed by the work's name and the number of calls.
 const COUNTED: &str = "--counted";
 
 fn main() -> Result<(), Box<dyn Error>> {

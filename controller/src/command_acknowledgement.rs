@@ -8,6 +8,7 @@ const LATEST_ANSWER_CYCLES: u64 = 2;
 
 /// The cycle of the last step of the motion.
 #[derive(Debug, Clone, Default)]
+#[doc(alias("flow control", "stop-and-wait"))]
 pub(crate) struct CommandAcknowledgement {
     step_cycle: u64,
 }

@@ -21,7 +21,7 @@ use crate::trajectory::Trajectory;
 /// Age of a reading that comes late but is used.
 const LATE_READING_CYCLES: u64 = 1;
 
-/// The controller's whole memory.
+/// The default controller: plays a trajectory.
 ///
 /// ```
 /// use masseter_controller::motion_controller::MotionController;

@@ -7,7 +7,7 @@ use masseter_shared::messages::codes::{ControllerState as State, DriveRequest};
 /// What changes a state. In one cycle only the most urgent trigger counts: the last in this order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Trigger {
-    /// What the state waits for has come about.
+    /// The condition that ends the state holds.
     Done,
     /// A stop is requested.
     StopRequested,

@@ -161,7 +161,7 @@ impl Sequencer {
         Some(event)
     }
 
-    /// Whether what the state waits for has come about.
+    /// Whether the condition that ends the state holds.
     fn is_done(&self, is_over: bool) -> bool {
         let enabled = DriveState::OperationEnabled.code();
         match self.state {

@@ -78,7 +78,7 @@ fn check_pose(mechanism: &Mechanism, actuators: &Actuators, solution: &Solution)
     }
 }
 
-/// The complete method, which knows nothing of the stream, finds the same solution or more than one true one.
+/// The complete method, which does not use earlier inputs, finds the same solution or more than one true one.
 fn check_alone(mechanism: &Mechanism, actuators: &Actuators, tracked: &Solution) {
     match solve_completely(mechanism, actuators) {
         Ok(alone) => {

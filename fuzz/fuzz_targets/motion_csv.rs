@@ -1,5 +1,5 @@
 //! Any file is a recorded motion or refused with the reason; a motion has proper poses at any time, rests at
-//! both ends and knows the line it comes from.
+//! both ends and has the line of each pose.
 #![no_main]
 
 use std::fmt::Write;

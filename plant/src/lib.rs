@@ -11,8 +11,8 @@
 //! | [`core`] | master and link as one pure step function | `master`, `emulation`, `link` |
 //! | [`process`] | the core bound to iceoryx2 and to real time | [`core`] |
 //!
-//! Between master and drives there are frames on a bus and nothing else. The plant never sees the controller and never
-//! solves the forward kinematics: its truth is the integrated mechanism.
+//! Between master and drives there are frames on a bus and nothing else. The plant does not depend on the controller
+//! and does not solve the forward kinematics: its truth is the integrated mechanism.
 
 mod checks;
 pub mod core;

@@ -15,9 +15,9 @@ use crate::cycle::{PlantPorts, run_cycle};
 use crate::error::PlantError;
 use crate::link::Link;
 
-/// How long the drives may take to stop after the end has been asked for, ns.
+/// Longest time for the drives to stop after the request to end, ns.
 const STOP_WITHIN_NS: u64 = 500_000_000;
-/// Cycles that they may take at least: the word goes out in one, holds from the next, and is answered in the one after
+/// Least number of cycles for that. The request is sent in one cycle, takes effect in the next, and is confirmed after
 /// the ramp.
 const STOP_WITHIN_CYCLES: u64 = 10;
 /// Silence after which no command will come any more, beyond the one that stops the drives, ns.

@@ -88,10 +88,7 @@ fn cyclictest(core: usize, loops: u64, more: &[&str]) -> anyhow::Result<Duration
         .context("cyclictest cannot be started (`sudo apt install rt-tests`)")?;
     if !output.status.success() {
         let said = String::from_utf8_lossy(&output.stderr);
-        bail!(
-            "cyclictest failed: {}",
-            said.lines().find(|line| !line.is_empty()).unwrap_or("it says nothing")
-        );
+        bail!("cyclictest failed: {}", said.lines().find(|line| !line.is_empty()).unwrap_or("no message"));
     }
     histogram_of(&String::from_utf8_lossy(&output.stdout))
 }

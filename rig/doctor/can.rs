@@ -1,77 +1,59 @@
 //! CAN: kernel support and interfaces. Simulated buses need neither.
 
-use std::num::NonZeroU32;
+use std::io;
 
-use rustix::io::Errno;
-use rustix::net::{AddressFamily, Protocol, SocketType, socket};
+use masseter_can::{Interface, is_supported};
 
 use super::container::on_host;
 use super::finding::Finding;
 use crate::machine::SystemRoot;
 
-/// ARPHRD_CAN, the hardware type of CAN interfaces.
-const HARDWARE_TYPE: i64 = 280;
-/// `CAN_RAW`: the kernel has no default among the protocols of `AF_CAN`.
-const RAW: u32 = 1;
-/// Flag of an interface that is up.
-const IFF_UP: u32 = 1;
-/// Holds one folder per interface.
-const INTERFACES: &str = "sys/class/net";
-
 /// All findings of this family.
 pub(super) fn examine(root: &SystemRoot) -> Vec<Finding> {
-    match open() {
+    match is_supported() {
         Ok(()) => vec![Finding::ok(SUPPORT, "supported by the kernel"), interfaces(root)],
-        Err(error) => vec![unsupported(root, error)],
+        Err(error) => vec![unsupported(root, &error)],
     }
 }
 
 const SUPPORT: &str = "SocketCAN";
 
-fn open() -> Result<(), Errno> {
-    socket(AddressFamily::CAN, SocketType::RAW, NonZeroU32::new(RAW).map(Protocol::from_raw)).map(drop)
-}
-
-fn unsupported(root: &SystemRoot, error: Errno) -> Finding {
+fn unsupported(root: &SystemRoot, error: &io::Error) -> Finding {
     Finding::warn(SUPPORT, format!("not supported ({error})"), "runs can only use simulated buses")
         .with_remedy(on_host(root, "sudo modprobe can-raw"))
 }
 
 fn interfaces(root: &SystemRoot) -> Finding {
     const CHECK: &str = "CAN interfaces";
-    let is_can = |name: &String| root.number(&format!("{INTERFACES}/{name}/type")) == Some(HARDWARE_TYPE);
-    let names: Vec<_> = root.names(INTERFACES).into_iter().filter(is_can).collect();
+    let interfaces = Interface::list(root.path());
+    let names = interfaces.iter().map(|interface| interface.name.as_str()).collect::<Vec<_>>().join(", ");
     if names.is_empty() {
         return Finding::ok(CHECK, "none; simulated buses need none");
     }
-    let (states, remedies): (Vec<_>, Vec<_>) = names.iter().filter_map(|name| obstacle(root, name)).unzip();
+    let (states, remedies): (Vec<_>, Vec<_>) = interfaces.iter().filter_map(obstacle).unzip();
     if states.is_empty() {
-        return Finding::ok(CHECK, names.join(", "));
+        return Finding::ok(CHECK, names);
     }
-    let found = format!("{}; {}", names.join(", "), states.join(", "));
+    let found = format!("{names}; {}", states.join(", "));
     Finding::warn(CHECK, found, "such an interface cannot send").with_remedy(remedies.join(" && "))
 }
 
-/// Why an interface cannot send, and the command that remedies it. From flags and carrier: `operstate` changes up to a second
-/// later.
-fn obstacle(root: &SystemRoot, name: &str) -> Option<(String, String)> {
-    let property = |property| format!("{INTERFACES}/{name}/{property}");
-    let flags = root.text(&property("flags"))?;
-    let flags = u32::from_str_radix(flags.trim_start_matches("0x"), 16).ok()?;
-    if flags & IFF_UP == 0 {
-        // Only an interface of a hardware controller has a bit rate.
-        let is_virtual = root.names(&property("device")).is_empty();
-        let controller = if is_virtual { "" } else { " type can bitrate 1000000 restart-ms 100" };
+/// Why an interface cannot send, and the command that remedies it.
+fn obstacle(Interface { name, is_up, is_bus_off, is_virtual, .. }: &Interface) -> Option<(String, String)> {
+    if !is_up {
+        let controller = if *is_virtual { "" } else { " type can bitrate 1000000 restart-ms 100" };
         let bring_up = format!("sudo ip link set {name} up txqueuelen 100{controller}");
         return Some((format!("{name} down"), bring_up));
     }
     // The kernel refuses `type can restart` if the interface restarts by itself.
     let restart = format!("sudo ip link set {name} down && sudo ip link set {name} up");
-    (root.number(&property("carrier")) == Some(0)).then(|| (format!("{name} bus-off"), restart))
+    is_bus_off.then(|| (format!("{name} bus-off"), restart))
 }
 
 #[cfg(test)]
 mod tests {
+    use rustix::io::Errno;
+
     use super::super::finding::Level::{Ok as Fine, Warn};
     use super::*;
     use crate::machine::fixture::Fixture;
@@ -79,12 +61,12 @@ mod tests {
     #[test]
     fn a_kernel_without_can_is_a_warning_only() {
         let machine = Fixture::with_files(&[]);
-        assert_eq!(unsupported(&machine.root(), Errno::AFNOSUPPORT).level, Warn);
+        assert_eq!(unsupported(&machine.root(), &Errno::AFNOSUPPORT.into()).level, Warn);
     }
 
     #[test]
     fn a_kernel_with_can_knows_the_protocol_asked_for() {
-        let refused = open().err();
+        let refused = is_supported().err().map(|error| Errno::from_io_error(&error).unwrap());
         assert!([None, Some(Errno::AFNOSUPPORT), Some(Errno::PERM)].contains(&refused), "{refused:?}");
     }
 

@@ -1,7 +1,7 @@
 //! The CSV frame around both commands: columns checked, lines counted, bad ones reported.
 //!
 //! Lines are read in batches, solved on all cores and written in order, so memory stays the same
-//! however long the input is. What is computed from a line is not known here.
+//! however long the input is. The computation is an argument.
 
 use std::io::{self, Write};
 use std::iter;
@@ -11,10 +11,11 @@ use anyhow::{anyhow, ensure};
 use clap::Args;
 use masseter_shared::geometry::Mechanism;
 use masseter_shared::input::excerpt;
+use masseter_shared::rows::{Line, fields, numbers};
 use masseter_terminal::{Exit, status, taken};
 use rayon::prelude::*;
 
-use super::input::{Input, Line};
+use super::input::Input;
 
 /// Columns of actuator positions, as `fk` reads and `ik` writes them.
 pub(super) const ACTUATOR_COLUMNS: &str = "d1_m,d2_m,d3_m,l1_m,l2_m,l3_m";
@@ -48,9 +49,8 @@ pub(super) struct Columns {
 pub(super) type Solved = Result<(), String>;
 
 /// Output lines under way.
-#[derive(Debug, Default)]
 pub(super) struct Lines {
-    text: Vec<u8>,
+    csv: csv::Writer<Vec<u8>>,
     /// Values of a line.
     width: usize,
     /// Where and why lines could not be read.
@@ -60,15 +60,10 @@ pub(super) struct Lines {
 impl Lines {
     /// One line: its values, nothing for those that are no number or absent, then its status.
     pub(super) fn row(&mut self, values: impl IntoIterator<Item = f64>, status: &str) {
-        for value in values.into_iter().chain(iter::repeat(f64::NAN)).take(self.width) {
-            if !value.is_nan() {
-                // A vector takes all that is written to it.
-                let _ = write!(self.text, "{value}");
-            }
-            self.text.push(b',');
-        }
-        self.text.extend_from_slice(status.as_bytes());
-        self.text.push(b'\n');
+        let values = values.into_iter().chain(iter::repeat(f64::NAN)).take(self.width);
+        let cells = values.map(|value| if value.is_nan() { String::new() } else { value.to_string() });
+        let written = self.csv.write_record(cells.chain([status.to_owned()]));
+        written.expect("all lines have the same width, and a vector takes them");
     }
 }
 
@@ -95,10 +90,13 @@ pub(super) fn solve_lines<const IN: usize>(
     columns: Columns,
     mut solve: impl FnMut(u64, [f64; IN], &mut Lines) -> Solved,
 ) -> Lines {
-    let mut lines = Lines { width: columns.written.split(',').count(), ..Lines::default() };
+    let width = columns.written.split(',').count();
+    let mut lines = Lines { csv: csv::Writer::from_writer(Vec::new()), width, refusals: Vec::new() };
+    let read: Vec<_> = columns.read.split(',').collect();
     for line in batch {
         let text = line.text.as_deref().map_err(Clone::clone);
-        let values = text.and_then(|text| numbers(text, columns.read));
+        let values = text.and_then(|text| numbers(text, &read));
+        let values = values.map(|values| values.try_into().expect("a number for each column"));
         if let Err(reason) = values.and_then(|values| solve(line.number, values, &mut lines)) {
             lines.row([], BAD_LINE);
             lines.refusals.push((line.number, reason));
@@ -125,8 +123,9 @@ pub(super) fn stream(
             if batch.is_empty() {
                 return output.flush();
             }
-            for lines in solve(&batch) {
-                output.write_all(&lines.text)?;
+            for mut lines in solve(&batch) {
+                lines.csv.flush()?;
+                output.write_all(lines.csv.get_ref())?;
                 for (line, reason) in lines.refusals {
                     status!("{}:{line}: {reason}", input.name);
                     exit = Exit::Usage;
@@ -146,31 +145,4 @@ fn check_columns(input: &mut Input, expected: &str) -> anyhow::Result<()> {
     let found = found.join(",");
     ensure!(found == expected, "{place}: the columns are '{}', expected '{expected}'", excerpt(&found));
     Ok(())
-}
-
-fn numbers<const IN: usize>(line: &str, columns: &str) -> Result<[f64; IN], String> {
-    if line.is_empty() {
-        return Err("an empty line".to_owned());
-    }
-    let found = fields(line).count();
-    if found != IN {
-        return Err(format!("{found} values, expected {IN}"));
-    }
-    let mut values = [0.0_f64; IN];
-    for ((value, text), column) in values.iter_mut().zip(fields(line)).zip(columns.split(',')) {
-        *value = text.parse().map_err(|_| format!("{column} is '{}', not a number", excerpt(text)))?;
-        if !value.is_finite() {
-            return Err(format!("{column} is {value}, not a finite number"));
-        }
-    }
-    Ok(values)
-}
-
-/// Some programs write names and numbers in quotes. Neither holds a comma or the end of a line, so a quote without its
-/// other is a part of the field.
-fn fields(line: &str) -> impl Iterator<Item = &str> {
-    line.split(',').map(|field| {
-        let field = field.trim();
-        field.strip_prefix('"').and_then(|rest| rest.strip_suffix('"')).unwrap_or(field)
-    })
 }

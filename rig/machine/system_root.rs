@@ -19,6 +19,11 @@ impl SystemRoot {
         Self(path.to_owned())
     }
 
+    /// The folder.
+    pub fn path(&self) -> &Path {
+        &self.0
+    }
+
     /// A file's text without surrounding white space; none if the file cannot be read.
     pub fn text(&self, path: &str) -> Option<String> {
         Some(fs::read_to_string(self.0.join(path)).ok()?.trim().to_owned())

@@ -3,7 +3,7 @@
 //! A definition may hold numbers, arrays of fixed length, and one byte sequence at its end. Other definitions, and those
 //! of messages longer than any of the rig's, are refused.
 
-use std::fmt::Write;
+use data_encoding::HEXUPPER;
 
 /// A primitive type of the definition language.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -35,19 +35,18 @@ impl Kind {
         size
     }
 
-    /// Writes the little-endian value at the beginning of `bytes`.
-    fn write(self, line: &mut String, bytes: &[u8]) {
+    /// The little-endian value at the beginning of `bytes`.
+    fn text(self, bytes: &[u8]) -> String {
         let mut wide = [0; 8];
         wide[..self.size()].copy_from_slice(&bytes[..self.size()]);
         let unsigned = u64::from_le_bytes(wide);
         let unused = 64 - 8 * self.size() as u32;
-        let written = match self {
-            Self::Unsigned(_) => write!(line, "{unsigned}"),
-            Self::Signed(_) => write!(line, "{}", (unsigned << unused).cast_signed() >> unused),
-            Self::Float(4) => write!(line, "{}", f32::from_bits(unsigned as u32)),
-            Self::Float(_) => write!(line, "{}", f64::from_bits(unsigned)),
-        };
-        written.expect("a string takes any text");
+        match self {
+            Self::Unsigned(_) => unsigned.to_string(),
+            Self::Signed(_) => ((unsigned << unused).cast_signed() >> unused).to_string(),
+            Self::Float(4) => f32::from_bits(unsigned as u32).to_string(),
+            Self::Float(_) => f64::from_bits(unsigned).to_string(),
+        }
     }
 }
 
@@ -122,33 +121,20 @@ impl Columns {
         Some(())
     }
 
-    /// The names of the columns, separated by commas.
-    pub(super) fn header(&self) -> String {
-        let names = self.fixed.iter().map(|column| &column.name).chain(&self.tail);
-        names.map(String::as_str).collect::<Vec<_>>().join(",")
+    /// The names of the columns.
+    pub(super) fn names(&self) -> impl Iterator<Item = &str> {
+        self.fixed.iter().map(|column| &column.name).chain(&self.tail).map(String::as_str)
     }
 
-    /// Appends the values of a message; false if its length differs from the definition's.
-    pub(super) fn write(&self, line: &mut String, body: &[u8]) -> bool {
-        let Some((fixed, tail)) = body.split_at_checked(self.bytes) else { return false };
+    /// The values of a message; none if its length differs from the definition's.
+    pub(super) fn values(&self, body: &[u8]) -> Option<impl Iterator<Item = String>> {
+        let (fixed, tail) = body.split_at_checked(self.bytes)?;
         let fits = match self.tail {
             Some(_) => fixed.ends_with(&(tail.len() as u32).to_le_bytes()),
             None => tail.is_empty(),
         };
-        if !fits {
-            return false;
-        }
-        for (index, column) in self.fixed.iter().enumerate() {
-            if index > 0 {
-                line.push(',');
-            }
-            column.kind.write(line, &body[column.offset..]);
-        }
-        if self.tail.is_some() {
-            line.push(',');
-            tail.iter().try_for_each(|byte| write!(line, "{byte:02X}")).expect("a string takes any text");
-        }
-        true
+        let values = self.fixed.iter().map(|column| column.kind.text(&body[column.offset..]));
+        fits.then(|| values.chain(self.tail.iter().map(|_| HEXUPPER.encode(tail))))
     }
 }
 
@@ -158,18 +144,22 @@ mod tests {
 
     use super::*;
 
+    fn line(columns: &Columns, body: &[u8]) -> Option<String> {
+        Some(columns.values(body)?.collect::<Vec<_>>().join(","))
+    }
+
     #[test]
     fn a_message_of_the_rig_becomes_a_row() {
         let columns = Columns::from_definition(&FrameTap::schema()).unwrap();
-        assert_eq!(columns.header(), "seq,published_ns,version,time_ns,queued_ns,id,bus,flags,data");
+        let names = columns.names().collect::<Vec<_>>().join(",");
+        assert_eq!(names, "seq,published_ns,version,time_ns,queued_ns,id,bus,flags,data");
         for length in 0..3 {
             let data = CanData::new(&[0xAA; 3][..length]);
             let frame = FrameTap { seq: 3, id: 0x181, bus: 1, data, ..Default::default() };
-            let mut line = String::new();
-            assert!(columns.write(&mut line, frame.body()));
-            assert_eq!(line, "3,0,0,0,0,385,1,0,".to_owned() + &"AA".repeat(length));
-            assert!(!columns.write(&mut line, &frame.body()[..frame.body().len() - 1]));
-            assert!(!columns.write(&mut line, &[frame.body(), &[0]].concat()));
+            let row = "3,0,0,0,0,385,1,0,".to_owned() + &"AA".repeat(length);
+            assert_eq!(line(&columns, frame.body()), Some(row));
+            assert_eq!(line(&columns, &frame.body()[..frame.body().len() - 1]), None);
+            assert_eq!(line(&columns, &[frame.body(), &[0]].concat()), None);
         }
         assert_eq!(Columns::from_definition(&Reading::schema()).unwrap().bytes, size_of::<Reading>());
     }
@@ -184,9 +174,8 @@ mod tests {
         body.extend(300i16.to_le_bytes());
         body.extend([0; 4]);
         body.extend((-0.1f64).to_le_bytes());
-        let mut line = String::new();
-        assert!(columns.write(&mut line, &body));
-        assert_eq!((columns.header().as_str(), line.as_str()), ("a,b,c_0,c_1,d", "-1,0.5,-2,300,-0.1"));
+        assert_eq!(columns.names().collect::<Vec<_>>(), ["a", "b", "c_0", "c_1", "d"]);
+        assert_eq!(line(&columns, &body).as_deref(), Some("-1,0.5,-2,300,-0.1"));
     }
 
     #[test]
@@ -204,7 +193,6 @@ mod tests {
         ] {
             assert_eq!(Columns::from_definition(definition), None, "{definition}");
         }
-        let mut line = String::new();
-        assert!(!Columns::from_definition("uint64 a").unwrap().write(&mut line, &[0; 7]));
+        assert_eq!(line(&Columns::from_definition("uint64 a").unwrap(), &[0; 7]), None);
     }
 }

@@ -2,7 +2,8 @@
 
 use std::collections::BTreeMap;
 use std::fs::File;
-use std::io::{BufWriter, Read, Seek, Write};
+use std::io::{Read, Seek};
+use std::iter;
 use std::path::Path;
 
 use anyhow::Context;
@@ -16,7 +17,7 @@ use super::columns::Columns;
 struct CsvFile {
     name: String,
     columns: Columns,
-    file: BufWriter<File>,
+    table: csv::Writer<File>,
     rows: u64,
 }
 
@@ -31,10 +32,9 @@ pub(super) fn write<R: Read + Seek>(
         files.insert(channel, CsvFile::create(folder, &topic, columns)?);
     }
     let mut candump = CandumpLogs::new(folder, &[]);
-    let mut line = String::new();
     while let Some(entry) = reader.next_entry()? {
         let Some(csv) = files.get_mut(&entry.header.channel_id) else { continue };
-        csv.write(&mut line, &entry)?;
+        csv.write(&entry)?;
         if let Some(Ok(Recorded::Frame(frame))) = entry.recorded() {
             candump.write(tap::bus_of(&frame)?, &tap::decode(&frame)?)?;
         }
@@ -55,23 +55,22 @@ impl CsvFile {
         let name = format!("{}.csv", topic.chars().map(safe).collect::<String>());
         let path = folder.join(&name);
         let file = File::create_new(&path).with_context(|| format!("cannot create {}", path.display()))?;
-        let mut file = BufWriter::new(file);
-        writeln!(file, "log_time_ns,{}", columns.header())?;
-        Ok(Self { name, columns, file, rows: 0 })
+        let mut table = csv::Writer::from_writer(file);
+        table.write_record(iter::once("log_time_ns").chain(columns.names()))?;
+        Ok(Self { name, columns, table, rows: 0 })
     }
 
-    fn write(&mut self, line: &mut String, entry: &Entry) -> anyhow::Result<()> {
+    fn write(&mut self, entry: &Entry) -> anyhow::Result<()> {
         let Some(body) = entry.data.strip_prefix(&CDR_LITTLE_ENDIAN) else { return Ok(()) };
-        line.clear();
-        if self.columns.write(line, body) {
-            writeln!(self.file, "{},{line}", entry.header.log_time)?;
+        if let Some(values) = self.columns.values(body) {
+            self.table.write_record(iter::once(entry.header.log_time.to_string()).chain(values))?;
             self.rows += 1;
         }
         Ok(())
     }
 
     fn finish(mut self) -> anyhow::Result<(String, u64)> {
-        self.file.flush().with_context(|| format!("cannot write {}", self.name))?;
+        self.table.flush().with_context(|| format!("cannot write {}", self.name))?;
         Ok((self.name, self.rows))
     }
 }

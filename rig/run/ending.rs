@@ -34,7 +34,7 @@ pub(super) fn of_plant_and_recorder(
 }
 
 pub(super) fn died(role: &str, status: Option<ExitStatus>) -> Ending {
-    let how = status.map_or_else(|| "it did not end when asked to, and was killed".to_owned(), describe);
+    let how = status.map_or_else(|| "it did not end after SIGTERM, and was killed".to_owned(), describe);
     Ending::died(role, how)
 }
 

@@ -33,7 +33,7 @@ const RUNS: &str = "runs";
 pub(crate) fn run(args: &RunArgs) -> Result<Exit, Failure> {
     room::check_memory().usage()?;
     let plan = resolve(args).usage()?;
-    room::check_disk(args.out.as_deref().unwrap_or(RUNS.as_ref()), &plan).usage()?;
+    room::check_disk(args.out.as_deref().unwrap_or(RUNS.as_ref()), &plan).incomplete()?;
     let domain = match args.clock {
         ClockKind::Virtual => None,
         ClockKind::Rt => {

@@ -37,7 +37,7 @@ const POLL: Duration = Duration::from_millis(2);
 const SIGNAL_DELAY: Duration = Duration::from_millis(100);
 /// Time from the start message to the first SYNC, ns.
 const START_LEAD_NS: u64 = 100_000_000;
-/// Longest time for a process to end when asked to, beyond the work it must finish first, ns.
+/// Longest time for a process to end after SIGTERM, beyond the work it must finish first, ns.
 const END_TIMEOUT_NS: u64 = 5 * SECOND_NS;
 /// Longest time for the recorder to write what is left to a slow disk, ns.
 const RECORD_TIMEOUT_NS: u64 = 60 * SECOND_NS;
@@ -81,7 +81,7 @@ pub(super) fn run(
 
 /// The three processes, in the order of their start.
 struct Rig {
-    /// Longest time for the controller to end when asked to, ns.
+    /// Longest time for the controller to end after SIGTERM, ns.
     stop_timeout_ns: u64,
     /// Time for the plant to stop the drives without the controller, ns.
     plant_alone_ns: u64,

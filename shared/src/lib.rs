@@ -1,5 +1,5 @@
-//! What both sides of the rig agree on: the mechanism's geometry, the messages, the CAN link, the
-//! real-time loop and the configuration.
+//! What both sides of the rig agree on: geometry, messages, transport, schedule, the real-time loop, scenarios and the
+//! trait `Controller`.
 //!
 //! Forward kinematics belongs to the controller and dynamics to the plant. This crate is the same in every process.
 
@@ -11,5 +11,6 @@ pub mod input;
 pub mod lifecycle;
 pub mod messages;
 pub mod realtime;
+pub mod rows;
 pub mod schedule;
 pub mod transport;

@@ -59,10 +59,10 @@ pub enum ProcessError {
     #[error("cannot listen for signals: {0}")]
     Signals(io::Error),
     /// The pipes to the supervisor failed.
-    #[error("talking to the supervisor failed: {0}")]
+    #[error("the pipe to the supervisor failed: {0}")]
     Pipe(io::Error),
     /// The supervisor ended before the start, or cancelled the start.
-    #[error("the supervisor gave no start")]
+    #[error("the supervisor ended or cancelled the start")]
     NoStart,
 }
 

@@ -99,25 +99,25 @@ def reaction_ms(run, role, hit_ns):
     raise SystemExit(f"the {role} was hit and nobody reported {REACTION[role]}: {faults}")
 
 
-def log(masseter, verb, recording, expected, *more):
+def run_verb(masseter, verb, recording, expected, *more):
     """Runs a verb of `masseter recording`, which must end with the expected exit code."""
     words = [masseter, "recording", verb, recording, *more]
     result = subprocess.run(words, capture_output=True, text=True)
     if result.returncode != expected:
-        raise SystemExit(f"log {verb} ended with {result.returncode}: {result.stdout}{result.stderr}")
+        raise SystemExit(f"recording {verb} ended with {result.returncode}: {result.stdout}{result.stderr}")
 
 
 def lost_ms(masseter, run, hit_ns):
     """What the recording of a killed recorder lacks at its end, ms; everything before that can be read."""
     recording, recovered, tables = run / "recording.mcap", run / "recovered.mcap", run / "tables"
-    log(masseter, "verify", recording, INCOMPLETE)
+    run_verb(masseter, "verify", recording, INCOMPLETE)
     summary = json.loads((run / "summary.json").read_text())
     if any(topic["missing"] for topic in summary["figures"]["topics"]):
         # The recorder was starved before the hit, and counted that.
         raise Disturbed
-    log(masseter, "recover", recording, 0, "--out", recovered)
-    log(masseter, "verify", recovered, 0)
-    log(masseter, "export", recovered, 0, "--topic", "reading", "--out", tables)
+    run_verb(masseter, "recover", recording, 0, "--out", recovered)
+    run_verb(masseter, "verify", recovered, 0)
+    run_verb(masseter, "export", recovered, 0, "--topic", "reading", "--out", tables)
     with (tables / "reading.csv").open() as table:
         last_ns = max(int(line["log_time_ns"]) for line in csv.DictReader(table))
     return max(0.0, (hit_ns - last_ns) / 1e6)
@@ -137,7 +137,7 @@ def stop_recorder(masseter, rig, run, recorder):
     if code != INTERRUPTED:
         raise SystemExit(f"the recorder was stopped for {RECORDER_STOPPED_S} s and the rig ended with {code}")
     assert_clean(rig, "recorder")
-    log(masseter, "verify", run / "recording.mcap", 0)
+    run_verb(masseter, "verify", run / "recording.mcap", 0)
     return {OVER: over_ms}
 
 

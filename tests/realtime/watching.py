@@ -25,7 +25,7 @@ from pathlib import Path
 CHANNELS = 9
 TRIES = 5
 INTERVALS = ("plant wake-up", "controller wake-up", "controller cycle")
-# p99.9 is told from 10,000 cycles on.
+# p99.9 needs 10,000 cycles.
 QUANTILES = ("p50_ns", "p99_ns", "p999_ns", "max_ns")
 
 

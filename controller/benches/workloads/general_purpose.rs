@@ -1,5 +1,5 @@
-//! What a solver that knows nothing of this mechanism does with it: MINPACK's Levenberg–Marquardt, as the
-//! crate of that name has it, on the paper's equations and their derivatives, to full precision.
+//! A general solver without knowledge of the mechanism's structure: MINPACK's Levenberg–Marquardt, from the
+//! crate of that name, on the paper's equations and their derivatives, to full precision.
 
 use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt};
 use masseter_controller::kinematics::Equations;

@@ -1,22 +1,30 @@
 //! Proof that a solution exists near computed leg angles, and that no other is close.
 //!
-//! The theorem of Newton and Kantorovich in its form with an approximate inverse Y of the Jacobian:
-//! with ‖Y g(θ)‖ ≤ y, ‖1 − Y g′(θ)‖ ≤ z and ‖Y (g′(α) − g′(β))‖ ≤ K ‖α − β‖ everywhere, if
-//! (1 − z)² > 2 K y then exactly one zero lies within R of θ, and it lies within r:
+//! The theorem of Newton and Kantorovich, in its form with an approximate inverse Y of the Jacobian.
+//! Hypotheses:
+//! - ‖Y g(θ)‖ ≤ y;
+//! - ‖1 − Y g′(θ)‖ ≤ z < 1;
+//! - ‖Y (g′(α) − g′(β))‖ ≤ K ‖α − β‖ for all α and β;
+//! - (1 − z)² > 2 K y.
+//!
+//! Result: exactly one zero lies within R of θ, and it lies within r:
 //!
 //! r = 2y / (1 − z + √((1 − z)² − 2Ky)), R = (1 − z + √((1 − z)² − 2Ky)) / K.
 //!
-//! The norm is the largest of the three legs. K holds on the whole torus: with κ = ω cos θᵢ cos θⱼ +
-//! sin θᵢ sin θⱼ and κ′ = ω sin θᵢ sin θⱼ + cos θᵢ cos θⱼ the second derivatives of gₖ are
-//! κ − p cos θᵢ, κ − q cos θⱼ and twice −κ′, and |κ| + |κ′| ≤ 1 + |ω| because κ ± κ′ are
-//! (ω ± 1) times a cosine; so row k of the Jacobian changes by at most |p| + |q| + 2(1 + |ω|) times
-//! the change of the angles. Rounding is covered by explicit margins: y contains the bound ρₖ of each
-//! residual's rounding, and r and R are rounded outward and inward. ρₖ also bounds the rounding of
-//! each derivative, of which a row has two, and Y's own rounding counts no more than that again; hence
-//! z ≤ 4 max Σ|Yᵢₖ| ρₖ ≤ 4y.
+//! The norm is the largest of the three legs. K holds on the whole torus:
+//! - Let κ = ω cos θᵢ cos θⱼ + sin θᵢ sin θⱼ and κ′ = ω sin θᵢ sin θⱼ + cos θᵢ cos θⱼ.
+//! - The second derivatives of gₖ are κ − p cos θᵢ, κ − q cos θⱼ and twice −κ′.
+//! - |κ| + |κ′| ≤ 1 + |ω|, because κ ± κ′ are (ω ± 1) times a cosine.
+//! - So row k of the Jacobian changes by at most |p| + |q| + 2(1 + |ω|) times the change of the angles.
 //!
-//! The proof is about the input as given, an exact set of numbers, not about what the encoders
-//! measured; and it does not say which solution this is.
+//! Explicit margins cover rounding:
+//! - y contains the bound ρₖ of each residual's rounding.
+//! - r is rounded outward, and R inward.
+//! - ρₖ also bounds the rounding of each derivative, of which a row has two. Y's own rounding counts no
+//!   more than these two again. Hence z ≤ 4 max Σ|Yᵢₖ| ρₖ ≤ 4y.
+//!
+//! The proof is about the input as an exact set of numbers, not about what the encoders measured, and it
+//! does not identify the solution.
 
 use std::f64::consts::PI;
 

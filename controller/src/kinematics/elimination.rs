@@ -1,14 +1,16 @@
 //! Every set of leg angles that closes the platform, by eliminating two of the three.
 //!
 //! At a given θ₁ legs 2 and 3 have two possible angles each ([`FourBar`]); side 23 decides which of the four
-//! pairs close. With Nⱼ = Bⱼ² + Cⱼ² the product over the pairs,
+//! pairs close. With Nⱼ = Bⱼ² + Cⱼ² the product over the pairs is
 //!
-//! r(x) = (N₂ N₃)² ∏ g₂₃, x = cos θ₁,
+//! r(x) = (N₂ N₃)² ∏ g₂₃, x = cos θ₁.
 //!
-//! is symmetric in both pairs of leg angles, hence a polynomial in the coefficients of the two lines:
-//! by Poisson's formula the product over the two leg angles of one leg has the denominator Nⱼ and a
-//! numerator quadratic in Aⱼ, Bⱼ, Cⱼ. So r has degree 8 in (cos θ₁, sin θ₁), and as mirroring all
-//! legs leaves it as it is, degree 8 in x: the known 16 solutions in 8 mirrored pairs.
+//! r is a polynomial of degree 8 in x:
+//! - It is symmetric in both pairs of leg angles, hence a polynomial in the coefficients of the two lines.
+//! - By Poisson's formula the product over the two angles of one leg has the denominator Nⱼ and a numerator
+//!   quadratic in Aⱼ, Bⱼ, Cⱼ. So r has degree 8 in (cos θ₁, sin θ₁).
+//! - Mirroring all legs does not change r, so the degree in x is 8, too: the known 16 solutions in 8
+//!   mirrored pairs.
 //!
 //! Completeness: at every real solution both chains close, so x lies in the one interval where both do, and r(x) = 0.
 //! Nine values determine r there. Each is a product of four g₂₃; a g₂₃ cancels near a solution, so its error is that of
@@ -190,9 +192,10 @@ impl<'a> Elimination<'a> {
     }
 }
 
-/// The sign of the Jacobian's determinant where g₂₃ of a pair crosses zero, rising or falling with x: as
-/// both chains stay closed, it is that of ∂g₁₂/∂θ₂ · ∂g₃₁/∂θ₃ · dg₂₃/dx, and each of the first two is
-/// negative on a chain's first leg angle and positive on its second.
+/// Whether the Jacobian's determinant is positive where g₂₃ of a pair crosses zero, rising or falling with x.
+///
+/// - Both chains stay closed, so its sign is that of ∂g₁₂/∂θ₂ · ∂g₃₁/∂θ₃ · dg₂₃/dx.
+/// - Each of the first two factors is negative on a chain's first leg angle and positive on its second.
 fn has_positive_determinant(pair: usize, rising: bool) -> bool {
     ((pair & 1) == (pair >> 1)) == rising
 }

@@ -16,7 +16,7 @@ pub(super) struct Interval {
     pub high: f64,
 }
 
-/// The side's equation as a line in the plane of the driven leg's leg angle.
+/// The side's equation as a line in the plane of the driven leg.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct FourBar {
     /// A at x = 0, and its slope.
@@ -25,7 +25,7 @@ pub(super) struct FourBar {
     along: [f64; 2],
 }
 
-/// The driven leg's leg angles at one θ₁.
+/// The driven leg's angles at one θ₁.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Branches {
     /// The two leg angles; equal at the ends of the interval, where the chain is stretched or folded.

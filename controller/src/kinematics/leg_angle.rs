@@ -73,8 +73,8 @@ impl LegAngle {
     }
 }
 
-/// Leg angles whose angles are known, from which the angles of others nearby follow to 3 roundings without
-/// an arc tangent.
+/// Leg angles with known values in radians. Values nearby follow from them to 3 roundings, without an arc
+/// tangent.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Anchor {
     leg_angles: [LegAngle; LEGS],

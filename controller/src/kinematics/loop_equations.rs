@@ -15,9 +15,14 @@ use masseter_shared::geometry::{Actuators, LEGS, Mechanism, Vec3};
 use super::leg_angle::LegAngle;
 use super::legs::{each, next};
 
-/// What gₖ and its derivatives may be off by, in units of the machine epsilon times the `scale` of
-/// [`PlatformSide::new`]: at most 33 roundings of half an epsilon each, 20 of them on the way from the hinges
-/// to κ, 6 on the sum, 3 in a product, 4 for leg angles 2 roundings off the circle.
+/// Bound of the error of gₖ and its derivatives, in units of the machine epsilon times the `scale` of
+/// [`PlatformSide::new`].
+///
+/// At most 33 roundings of half an epsilon each add up:
+/// - 20 from the hinges to κ,
+/// - 6 in the sum,
+/// - 3 in a product,
+/// - 4 for leg angles that are 2 roundings off the circle.
 const ROUNDINGS: f64 = 20.0;
 /// No Newton step is longer; a longer one only shows that the Jacobian is nearly singular.
 const LONGEST_STEP_RAD: f64 = 1.0;
@@ -38,6 +43,7 @@ pub(super) struct PlatformSide {
 
 /// The equations for one input.
 #[derive(Debug, Clone, Copy)]
+#[doc(alias("loop-closure equations", "constraint equations"))]
 pub(super) struct LoopEquations<'a> {
     pub(super) mechanism: &'a Mechanism,
     pub(super) actuators: Actuators,

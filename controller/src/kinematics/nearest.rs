@@ -1,8 +1,8 @@
 //! How far an input is from one that can be assembled.
 //!
-//! Measured by the least root of the paper's error (eq. 2) over all leg angles, that is, by how much
-//! the platform's sides would have to give. It is searched by descent from each of a grid of starts, in a
-//! bounded number of steps, so it is an upper bound: other angles may come a little closer.
+//! The distance is the least root of the paper's error (eq. 2) over all leg angles, that is, the change of
+//! the platform's sides that would be needed. A bounded descent from each of a grid of starts finds an upper
+//! bound: other angles may come a little closer.
 
 use masseter_shared::geometry::{Actuators, Mechanism};
 use nalgebra::{Matrix3, Vector3};

@@ -31,7 +31,7 @@ impl Solution {
         Self::with_angles(loops, closed, closed.leg_angles.map(LegAngle::to_rad))
     }
 
-    /// The same with the leg angles' angles from elsewhere, radians.
+    /// The same solution with these angles, radians.
     #[inline]
     pub(super) fn with_angles(
         loops: &LoopEquations<'_>,

@@ -1,10 +1,14 @@
 //! Forward kinematics cycle by cycle: warm from the last solution, proven, and complete when not.
 //!
-//! A warm result is accepted only if Newton's iteration ended within `WARM_ITERATIONS`, its
-//! [`Certificate`](super::Certificate) holds, the mechanism can stand there, and it is the last
-//! solution's continuation: each of the two lies in the other's ball of uniqueness, in which neither
-//! input has a second solution to confuse it with. In every other case the complete method decides.
-//! So the guess only saves time; it cannot make the result wrong.
+//! A warm result is accepted only under these conditions:
+//! - Newton's iteration ended within `WARM_ITERATIONS`.
+//! - The result's [`Certificate`](super::Certificate) holds.
+//! - The mechanism can stand there.
+//! - The result continues the last solution: each of the two lies in the other's ball of uniqueness, which
+//!   contains no second solution of its input.
+//!
+//! In every other case the complete method decides. So the guess only saves time; it cannot make the result
+//! wrong.
 
 use masseter_shared::geometry::{Actuators, LEGS, Mechanism};
 

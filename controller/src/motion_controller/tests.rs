@@ -113,7 +113,7 @@ impl Bench {
         }
     }
 
-    /// Plays the motion with something trigger in its midst.
+    /// Plays the motion, and calls `trigger` halfway.
     fn played(trigger: impl FnOnce(&mut Self)) -> Self {
         let mut bench = Self::new();
         bench.run_until(ControllerState::Running);

@@ -1,4 +1,4 @@
-//! Every check fires beyond its limit and not before it, for every axis, and says what it found.
+//! Every check fires beyond its limit and not before it, for every axis, and reports its value.
 
 use masseter_shared::geometry::Vec3;
 use masseter_shared::messages::codes::{EventKind, NO_DRIVE_STATE, Source};

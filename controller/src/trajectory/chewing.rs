@@ -1,10 +1,11 @@
 //! Chewing: a tear-drop loop of the incisal point.
 //!
 //! The incisal point goes down and back, near the midline at first, swings to the working side, and
-//! closes from there to rest in occlusion. Defaults after published figures: cycle of 0.70 s (Dental
-//! Biotribology; rates of 1.46 ± 0.21 Hz, Fuentes 2018, and 1.57 Hz, Po 2011), 16–20 mm of opening,
-//! lateral 3–5 mm and anteroposterior 3–6 mm (textbook), condylar inclination 40°, Bennett angle 8°
-//! (about 42° and 7–9°, IADR 177411), phases of 43, 40 and 17 %.
+//! closes from there to rest in occlusion. The defaults follow published figures:
+//! - cycle of 0.70 s (Dental Biotribology); rates of 1.46 ± 0.21 Hz (Fuentes 2018) and 1.57 Hz (Po 2011);
+//! - opening 16–20 mm, lateral 3–5 mm, anteroposterior 3–6 mm (textbook);
+//! - condylar inclination 40° and Bennett angle 8° (about 42° and 7–9°, IADR 177411);
+//! - phases of 43, 40 and 17 %.
 //!
 //! Simplified: every cycle is the same, the sagittal path is a straight line, food does not matter.
 
@@ -50,7 +51,7 @@ impl Chewing {
             back_m: anterior_posterior_mm / 1000.0,
             balancing_m: 0.0,
         };
-        // What is out of reach without any swing is not the swing's fault.
+        // A point that is out of reach without a swing is reported as such.
         chewing.prove()?;
         chewing.balancing_m = chewing.balancing_for(lateral_mm, config.side.sign())?;
         chewing.prove()?;

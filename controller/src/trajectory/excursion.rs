@@ -122,7 +122,7 @@ mod tests {
     fn too_much_is_refused_with_what_is_possible() {
         let config = OpeningConfig { amplitude_mm: 120.0, ..Default::default() };
         let error = Excursion::opening(&config, &JawConfig::default()).unwrap_err();
-        assert!(error.to_string().contains("out of reach: the mandible gets to 68.7 mm"), "{error}");
+        assert!(error.to_string().contains("out of reach: the mandible reaches at most 68.7 mm"), "{error}");
         let config = LateralConfig { amplitude_mm: f64::NAN, ..Default::default() };
         assert!(Excursion::lateral(&config, &JawConfig::default()).is_err());
     }

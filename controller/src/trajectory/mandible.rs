@@ -173,7 +173,8 @@ pub(super) fn reach(
     let reached_mm = 1000.0 * travel_m(below).unwrap_or_default();
     if amplitude_mm - reached_mm > REACHED_MM {
         return Err(TrajectoryError(format!(
-            "{name} of {amplitude_mm} mm is out of reach: the mandible gets to {reached_mm:.1} mm; ask for less"
+            "{name} of {amplitude_mm} mm is out of reach: the mandible reaches at most {reached_mm:.1} mm; \
+             choose a smaller amplitude"
         )));
     }
     Ok(below)

@@ -1,4 +1,4 @@
-//! Whether a recording looks like the motion of a jaw: doubts for its author, who alone can decide.
+//! Warnings about a recording that may not be the motion of a jaw. The user decides.
 
 use nalgebra::Vector6;
 

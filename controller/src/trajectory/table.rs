@@ -1,9 +1,9 @@
 //! The recording as a table of finite numbers over increasing time.
 //!
-//! Plain CSV: no quotes, comments from `#`, blank lines ignored. The module reads the columns'
-//! names; their meaning is not part of it.
+//! Blank lines are ignored. The module reads the columns' names; their meaning is not part of it.
 
 use masseter_shared::input::excerpt;
+use masseter_shared::rows::{Line, fields, lines, numbers};
 
 use super::error::Located;
 
@@ -53,7 +53,7 @@ impl Format {
     }
 
     fn of_header(header: &str) -> Result<Self, String> {
-        let found: Vec<&str> = header.split(',').map(str::trim).collect();
+        let found: Vec<&str> = fields(header).collect();
         let is_of_markers = found.iter().any(|name| name.starts_with("m1"));
         let format = if is_of_markers { Self::Markers } else { Self::Poses };
         let columns = format.columns();
@@ -69,17 +69,16 @@ impl Format {
 
 impl Table {
     pub(super) fn parse(text: &str) -> Result<Self, Located> {
-        let text = text.trim_start_matches('\u{feff}');
-        let lines = (1..).zip(text.lines().map(str::trim));
-        let mut content = lines.filter(|(_, line)| !line.is_empty() && !line.starts_with('#'));
+        let mut content = lines(text.as_bytes()).filter(|line| line.text.as_deref() != Ok(""));
         let too_few =
             |rows| Located::whole(format!("{rows} rows of data, at least {FEWEST_ROWS} are needed"));
-        let (line, header) = content.next().ok_or_else(|| too_few(0))?;
-        let format = Format::of_header(header).map_err(|problem| Located::at(line, problem))?;
+        let Line { number, text } = content.next().ok_or_else(|| too_few(0))?;
+        let format = text.and_then(|header| Format::of_header(&header));
+        let format = format.map_err(|problem| Located::at(number, problem))?;
         let mut rows: Vec<Row> = Vec::new();
-        for (line, text) in content {
-            let row = parse_row(line, text, format.columns(), rows.last());
-            rows.push(row.map_err(|problem| Located::at(line, problem))?);
+        for Line { number, text } in content {
+            let row = text.and_then(|text| parse_row(number, &text, format.columns(), rows.last()));
+            rows.push(row.map_err(|problem| Located::at(number, problem))?);
         }
         if rows.len() < FEWEST_ROWS {
             return Err(too_few(rows.len()));
@@ -89,32 +88,14 @@ impl Table {
 }
 
 fn parse_row(line: u64, text: &str, columns: &[&str], previous: Option<&Row>) -> Result<Row, String> {
-    let fields: Vec<&str> = text.split(',').map(str::trim).collect();
-    let (found, expected) = (fields.len(), columns.len());
-    if found != expected {
-        let remedy = "complete the row or delete it";
-        return Err(format!("{found} fields, but the header names {expected}; {remedy}"));
+    let mut values = numbers(text, columns)?;
+    let is_too_far = |(value, column): &(&f64, &&str)| column.ends_with("_mm") && value.abs() > LARGEST_MM;
+    if let Some((value, column)) = values.iter().zip(columns).find(is_too_far) {
+        return Err(format!("{column} is {value:e}, beyond ±{LARGEST_MM} mm; is the unit millimetres?"));
     }
-    let numbers = fields.iter().zip(columns).map(|(text, column)| parse_number(text, column));
-    let mut values = numbers.collect::<Result<Vec<f64>, _>>()?;
     let time_s = values.remove(0);
     previous.map_or(Ok(()), |previous| check_time(time_s, previous.time_s))?;
     Ok(Row { line, time_s, values })
-}
-
-fn parse_number(text: &str, column: &str) -> Result<f64, String> {
-    let finite = text.parse().ok().filter(|value: &f64| value.is_finite());
-    let value = finite.ok_or_else(|| {
-        format!(
-            "`{}` in column `{column}` is not a finite number; write it with a decimal point",
-            excerpt(text)
-        )
-    })?;
-    if column.ends_with("_mm") && value.abs() > LARGEST_MM {
-        let problem = format!("{value:e} in column `{column}` lies beyond ±{LARGEST_MM} mm");
-        return Err(problem + "; is the unit millimetres?");
-    }
-    Ok(value)
 }
 
 fn check_time(time_s: f64, previous_s: f64) -> Result<(), String> {
@@ -149,6 +130,14 @@ mod tests {
     }
 
     #[test]
+    fn names_and_numbers_may_stand_in_quotes() {
+        let quoted = |line: &str| format!("\"{}\"\n", line.replace(',', "\",\""));
+        let text: String = (HEADER.to_owned() + ROWS).lines().map(quoted).collect();
+        assert_eq!(Table::parse(&text).ok(), Table::parse(&(HEADER.to_owned() + ROWS)).ok());
+        assert!(Table::parse(&text).is_ok());
+    }
+
+    #[test]
     fn bad_files_are_refused_with_line_and_reason() {
         let with = |row: &str| format!("{HEADER}{ROWS}{row}\n");
         let table = [
@@ -159,14 +148,15 @@ mod tests {
             ("time_s,m1_x_mm,m1_y_mm".to_owned(), Some(1), "column 4 is ``, expected `m1_z_mm`"),
             ("time_s,x_mm,y_mm,z_mm,qw,qx,qy,qz,more".to_owned(), Some(1), "column 9 is `more`"),
             (with("0.04,0,0,0,1,0,0"), Some(6), "7 fields"),
-            (with("0.04,0,zero,0,1,0,0,0"), Some(6), "`zero` in column `y_mm`"),
-            (with("0.04,0,0,NaN,1,0,0,0"), Some(6), "`NaN` in column `z_mm`"),
-            (with("inf,0,0,0,1,0,0,0"), Some(6), "`inf` in column `time_s`"),
+            (with("0.04,0,zero,0,1,0,0,0"), Some(6), "y_mm is 'zero'"),
+            (with("0.04,0,0,NaN,1,0,0,0"), Some(6), "z_mm is 'NaN'"),
+            (with("inf,0,0,0,1,0,0,0"), Some(6), "time_s is 'inf'"),
+            (with(&"0".repeat(5000)), Some(6), "longer than 4096 bytes"),
             (with("0.03,0,0,0,1,0,0,0"), Some(6), "does not come after"),
             (with("0.02,0,0,0,1,0,0,0"), Some(6), "does not come after"),
             (with("0.0300001,0,0,0,1,0,0,0"), Some(6), "does not come after"),
             (with("9.03,0,0,0,1,0,0,0"), Some(6), "without a sample"),
-            (with("0.04,0,0,-4e262,1,0,0,0"), Some(6), "-4e262 in column `z_mm` lies beyond"),
+            (with("0.04,0,0,-4e262,1,0,0,0"), Some(6), "z_mm is -4e262, beyond"),
         ];
         for (text, line, reason) in table {
             let error = Table::parse(&text).err().unwrap();

@@ -76,8 +76,7 @@ impl Bench {
     }
 }
 
-/// Who waits for the link's next event finds the process data complete at the instant at which the last of them arrive, in
-/// few looks.
+/// A wait for the link's next event ends exactly when the last process data arrive.
 #[test]
 fn the_process_data_are_complete_at_one_of_the_links_events() {
     const EVENTS: usize = 16;

@@ -20,7 +20,7 @@ pub(crate) struct DrivePort {
 pub(crate) fn drive_ports(can: &CanConfig) -> Result<[DrivePort; AXES], PlantError> {
     if let Some(bus) = can.buses.iter().position(Vec::is_empty) {
         return Err(PlantError::Scenario(format!(
-            "can.buses: bus {bus} has no drive, and nobody would acknowledge what the master sends; leave it away"
+            "can.buses: bus {bus} has no drive, so no node would acknowledge the master's frames; remove this bus"
         )));
     }
     let named = || can.buses.iter().flatten().copied();

@@ -21,12 +21,13 @@ const LEAST_CHANCE: f64 = 0.01;
 
 /// The overlong stretches of work of a run, beside the stalls of the machine.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[doc(alias("root cause", "binomial test"))]
 pub struct OverrunAttribution {
     /// Stretches of work at least as long as the shortest that cost a deadline.
     pub while_working: u64,
     /// Stalls of that length while waiting.
     pub while_waiting: u64,
-    /// Share of work in the running time, without the time lost.
+    /// Share of work in the running time, without the stalls.
     pub work_share: f64,
     /// Probability that chance puts so many of both into work.
     pub chance: f64,

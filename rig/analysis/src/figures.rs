@@ -65,8 +65,8 @@ pub struct Figures {
 }
 
 impl Figures {
-    /// Deadlines that the two processes skipped, and those of them that the machine caused: it withheld the core while
-    /// they waited, or may have done so while they worked.
+    /// Deadlines that the two processes skipped, and those of them that the machine caused: it stalled while they
+    /// waited, or may have stalled while they worked.
     pub fn skipped(&self) -> (u64, u64) {
         let (controller, plant) = (&self.controller_skips, &self.plant_skips);
         let is_machine = self.overrun_attribution.is_some_and(|overruns| overruns.may_be_the_machine());

@@ -19,7 +19,7 @@ pub(super) struct CyclePath {
     pub(super) received_ns: u64,
     /// When its last process data were on the wire.
     pub(super) sent_ns: u64,
-    /// Time that the machine withheld meanwhile.
+    /// Time for which the machine stalled meanwhile.
     pub(super) stalled_ns: u64,
 }
 

@@ -33,8 +33,8 @@ pub struct WorstCycle {
     pub hop_ns: u64,
     /// How long it takes in half of all cycles, ns.
     pub hop_p50_ns: u64,
-    /// Time that the machine withheld from the plant from that deadline on until the one after the command, and from the
-    /// controller from its deadline until the next, ns.
+    /// Time for which the machine stalled while waiting: of the plant between that deadline and the one after the
+    /// command, and of the controller between its deadline and the next, ns.
     pub stalled_ns: u64,
     /// The kernel's counters around it; none without samples.
     #[serde(flatten)]
@@ -196,7 +196,7 @@ mod tests {
     }
 
     impl Rig {
-        /// A cycle in which each hop takes as long as it is told, and the messages that tell of it.
+        /// The messages of a cycle with these hop times.
         fn cycle(&mut self, cycle: u64, hops_ns: HopTimes) {
             let [wake_up, data, publication, late, pick_up, solving, control, publishing, transport, to_wire] =
                 hops_ns;

@@ -1,18 +1,18 @@
 //! Skipped deadlines, and what the time before them went to.
 //!
-//! The machine caused a skip that is explained by time withheld while the process waited. A skip that only an overlong
-//! stretch of work explains may have either cause: [`OverrunAttribution`](crate::OverrunAttribution) weighs those of the
-//! whole run. The rig caused all others.
+//! The machine caused a skip that stalls while the process waited explain. A skip that only an overlong stretch of work
+//! explains may have either cause: [`OverrunAttribution`](crate::OverrunAttribution) weighs those of the whole run. The
+//! rig caused all others.
 //!
-//! To skip n deadlines a process has to come back n + 1 periods after the last one that it kept, or later. One of
-//! them is its own: a cycle that keeps its time takes no longer, whatever it works and waits. The other n must have
-//! been lost, so lost time explains as many skips as it has whole periods, and a moment explains none.
+//! A process that skips n deadlines comes back at least n + 1 periods after the last one that it kept. A cycle in time
+//! takes one of them at most; the other n were lost, to stalls or to overlong work. Lost time explains as many skips as
+//! it has whole periods, so less than a period explains none.
 //!
-//! Two losses count: the time lost in the cycle before the skip, and the part of earlier losses that is carried over.
-//! A process that wakes late carries over as much as it is late; one that wakes in time carries over nothing.
+//! Two losses count: that in the cycle before the skip, and the part of earlier losses that is carried over. A process
+//! that wakes late carries over as much as it is late; one that wakes in time carries over nothing.
 //!
 //! Where messages are missing from the recording, single cycles are unknown: skips in between have no known cause, and
-//! the time lost is no single stall.
+//! the time lost in between is not counted as one stall.
 
 use hdrhistogram::Histogram;
 use masseter_shared::messages::{Reading, State};
@@ -25,15 +25,15 @@ use super::measured::histogram;
 pub struct SkipFigures {
     /// Deadlines skipped.
     pub skipped: u64,
-    /// Those before which the machine withheld the core while the process waited.
+    /// Those before which the machine stalled for whole periods while the process waited.
     pub by_machine: u64,
     /// Those before which a stretch of work took too long.
     pub while_working: u64,
     /// Those behind messages that were not recorded.
     pub unknown_cause: u64,
-    /// Time that the machine withheld from the process while it waited, ns.
+    /// Time for which the machine stalled while the process waited, ns.
     pub stalled_ns: u64,
-    /// Time that the process spun, without the time withheld, ns.
+    /// Time that the process spun, without the stalls, ns.
     pub spun_ns: u64,
     /// Time that the process worked, ns.
     pub worked_ns: u64,
@@ -83,7 +83,7 @@ impl From<&State> for Counters {
     }
 }
 
-/// Time lost, ns.
+/// Time lost to stalls and to overlong work, ns.
 #[derive(Debug, Clone, Copy, Default)]
 struct Loss {
     waiting_ns: u64,
@@ -98,7 +98,7 @@ impl Loss {
         }
     }
 
-    /// The part of it that can have made a wake-up so late. Time lost while waiting comes first, since the recording
+    /// The part of it that can have made a wake-up so late. Stalls come first, since the recording
     /// does not show the share of either.
     fn carried_over(self, late_ns: u64) -> Self {
         let waiting_ns = self.waiting_ns.min(late_ns);

@@ -99,10 +99,10 @@ pub(crate) fn checks(manifest: &Manifest, figures: &Figures, is_disturbed: bool)
     checks
 }
 
-/// The motion must be played to its end, and not be broken off by somebody who asked the controller to stop.
+/// The motion must be played to its end, and not be stopped by request.
 fn sequence(state: Option<Code<ControllerState>>, events: &[EventRecord]) -> Check {
     let was_stopped = events.iter().any(|event| event.cause == Cause::StopRequested);
-    let how = if was_stopped { ", asked to stop before the motion's end" } else { "" };
+    let how = if was_stopped { ", stopped by request before the motion's end" } else { "" };
     let in_words = state.map_or_else(|| "none".to_owned(), |state| state.to_string());
     let is_finished = state.is_some_and(|state| state == ControllerState::Finished);
     Check::judged("sequence", format!("ended in state {in_words}{how}"), is_finished && !was_stopped)
@@ -179,7 +179,7 @@ pub(crate) fn missed_cycles(manifest: &Manifest, figures: &Figures) -> CheckResu
     }
 }
 
-/// Said of cycles that were missed behind messages which were not recorded.
+/// The number of cycles missed after unrecorded messages, in words.
 fn of_unknown_cause(figures: &Figures) -> String {
     match figures.skipped_of_unknown_cause() {
         0 => String::new(),
@@ -187,11 +187,11 @@ fn of_unknown_cause(figures: &Figures) -> String {
     }
 }
 
-/// What stretches of work that cost deadlines were held against.
+/// The evidence on the stretches of work that cost deadlines.
 fn overruns_in_words(overruns: OverrunAttribution) -> String {
     format!(
-        "; {} stretches of work against {} stalls as long while waiting, {:.1} % of the time at work: chance does so \
-         with probability {:.2}",
+        "; {} overlong stretches of work, {} stalls of that length while waiting, work is {:.1} % of the time: \
+         probability by chance {:.2}",
         overruns.while_working,
         overruns.while_waiting,
         overruns.work_share * 100.0,

@@ -1,44 +1,51 @@
 //! `junit.xml`: each check of the run as a test case, as CI systems show it.
 
-use crate::checks::CheckResult;
-use crate::text::escape;
-use crate::verdict::Verdict;
+use askama::Template;
 use masseter_analysis::Figures;
 use masseter_recording::Manifest;
 
-/// One suite; a run that ended wrongly or cannot be judged has an `error` case of its own.
-pub(crate) fn xml(manifest: &Manifest, figures: &Figures, verdict: &Verdict) -> String {
-    let count = |result| verdict.checks.iter().filter(|check| check.result == result).count();
-    let (failures, skipped) = (count(CheckResult::Failed), count(CheckResult::NotJudged));
-    let judged = verdict.is_judged();
-    let tests = verdict.checks.len() + 1;
-    let mut xml = format!(
-        "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n\
-         <testsuite name=\"masseter.{}\" tests=\"{tests}\" failures=\"{failures}\" skipped=\"{skipped}\" errors=\"{}\" time=\"{:.3}\" timestamp=\"{}\">\n",
-        escape(&manifest.scenario.name),
-        usize::from(!judged),
-        figures.duration_s,
-        escape(manifest.began.trim_end_matches('Z')),
-    );
-    let problem = (!judged).then(|| ("error", format!("{}: {}", verdict.word, verdict.reason)));
-    xml += &case("run", problem);
-    for check in &verdict.checks {
-        let problem = match check.result {
-            CheckResult::Passed => None,
-            CheckResult::Failed => Some("failure"),
-            CheckResult::NotJudged => Some("skipped"),
-        };
-        xml += &case(check.name, problem.map(|kind| (kind, check.finding.clone())));
-    }
-    xml + "</testsuite>\n"
+use crate::checks::CheckResult;
+use crate::verdict::Verdict;
+
+/// One suite; a run that ended wrongly or cannot be judged has an `error` in a case of its own.
+#[derive(Template)]
+#[template(path = "junit.xml")]
+struct Suite<'a> {
+    manifest: &'a Manifest,
+    figures: &'a Figures,
+    verdict: &'a Verdict,
 }
 
-fn case(name: &str, problem: Option<(&str, String)>) -> String {
-    match problem {
-        None => format!("  <testcase classname=\"masseter.run\" name=\"{name}\"/>\n"),
-        Some((kind, message)) => format!(
-            "  <testcase classname=\"masseter.run\" name=\"{name}\"><{kind} message=\"{}\"/></testcase>\n",
-            escape(&message)
-        ),
+impl Suite<'_> {
+    fn count(&self, result: CheckResult) -> usize {
+        self.verdict.checks.iter().filter(|check| check.result == result).count()
+    }
+}
+
+/// The document. XML has no form for most control characters: they become replacement characters.
+pub(crate) fn xml(manifest: &Manifest, figures: &Figures, verdict: &Verdict) -> askama::Result<String> {
+    let is_no_xml = |c: char| c.is_control() && c != '\n' || ('\u{fffe}'..='\u{ffff}').contains(&c);
+    Ok(Suite { manifest, figures, verdict }.render()?.replace(is_no_xml, "\u{fffd}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use masseter_analysis::Analysis;
+    use masseter_recording::MachineInfo;
+    use masseter_shared::config::Scenario;
+
+    use super::*;
+
+    #[test]
+    fn a_reason_of_any_characters_leaves_the_document_xml() {
+        let machine = MachineInfo { cpu: String::new(), cores: 2, kernel: String::new(), is_virtual: false };
+        let manifest = Manifest::new(Scenario::default(), 10.0, "virtual", machine);
+        let figures = Analysis::new(&manifest.scenario).finish(false, &[]);
+        let verdict =
+            Verdict { reason: "<&\u{1b}\u{ffff}\">".to_owned(), ..Verdict::new(&manifest, &figures) };
+        let xml = xml(&manifest, &figures, &verdict).unwrap();
+        let case = "  <testcase classname=\"masseter.run\" name=\"run\">\
+                    <error message=\"DIED: &#60;&#38;\u{fffd}\u{fffd}&#34;&#62;\"/></testcase>\n";
+        assert!(xml.contains(case), "{xml}");
     }
 }

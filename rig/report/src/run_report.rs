@@ -122,6 +122,7 @@ fn show_and_write(
     let verdict = Verdict::new(manifest, figures);
     let summary = summary::json(&verdict, figures).context("cannot write the summary").incomplete()?;
     let page = page::html(manifest, figures, &verdict).context("cannot write the page").incomplete()?;
+    let junit = junit::xml(manifest, figures, &verdict).context("cannot write junit.xml").incomplete()?;
     let shown = match format {
         Format::Human => {
             let table = table::text(manifest, figures, &verdict);
@@ -135,7 +136,6 @@ fn show_and_write(
         logged?;
         histogram_log::write_all(&folder.file("hist"), &figures.intervals)?;
         event_log::write(&folder.file("events.jsonl"), &figures.events)?;
-        let junit = junit::xml(manifest, figures, &verdict);
         [(folder.file("junit.xml"), junit), (folder.file("report.html"), page)]
             .into_iter()
             .try_for_each(|(path, text)| fs::write(&path, text).map_err(WriteError::for_file(&path)))

@@ -58,7 +58,7 @@ fn write_text(
     responses(text, &figures.bus_response)?;
     writeln!(
         text,
-        "\nskipped cycles: controller {}, plant {}; withheld by the machine while waiting: controller {:.2} ms, plant {:.2} ms",
+        "\nskipped cycles: controller {}, plant {}; stalls of the machine while waiting: controller {:.2} ms, plant {:.2} ms",
         figures.controller_skips.skipped,
         figures.plant_skips.skipped,
         figures.controller_skips.stalled_ns as f64 / 1e6,

@@ -3,11 +3,6 @@
 use masseter_analysis::{Code, EventRecord};
 use masseter_shared::messages::codes::Cause;
 
-/// Text that may stand in XML and HTML.
-pub(crate) fn escape(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
-}
-
 /// A dash where there is no such figure.
 pub(crate) fn or_dash<T>(figure: Option<T>, format: impl Fn(T) -> String) -> String {
     figure.map_or_else(|| "–".to_owned(), format)

@@ -152,17 +152,17 @@ fn disturbed(manifest: &Manifest, figures: &Figures) -> Option<ExitReason> {
     Some((Exit::Invalid, reason))
 }
 
-/// The time that the machine withheld, and the cycles missed.
+/// The time for which the machine stalled, and the cycles missed.
 fn withheld(figures: &Figures) -> String {
     let (controller, plant) = (&figures.controller_skips, &figures.plant_skips);
     let stalled_ms = (controller.stalled_ns + plant.stalled_ns) as f64 / 1e6;
     let (skipped, _) = figures.skipped();
     let while_working = match controller.while_working + plant.while_working {
         0 => String::new(),
-        n => format!(", {n} of them while it worked, which the machine may have caused too"),
+        n => format!(", {n} of them during work, possibly also by a stall"),
     };
     format!(
-        "the machine withheld the cores for {stalled_ms:.1} ms while the rig waited, and {skipped} cycles were \
+        "the machine stalled for {stalled_ms:.1} ms while the rig waited, and {skipped} cycles were \
          missed{while_working}"
     )
 }
@@ -178,7 +178,7 @@ fn clock_jump(usage: &RunUsage, can: &CanConfig) -> Option<ExitReason> {
     })
 }
 
-/// The remedy against time withheld by the machine.
+/// The remedy against stalls of the machine.
 fn remedy(manifest: &Manifest) -> &'static str {
     match &manifest.cpu_dma_latency {
         Some(DmaLatency { limit_us: None, .. }) => {

@@ -29,12 +29,13 @@ mod solution_set;
 mod solver;
 mod speed;
 mod study;
-mod table;
+pub mod table;
 mod trials;
 pub mod uniqueness;
 mod workspace;
 mod write;
 
 pub use claims::{ClaimJudgement, PaperClaim};
+pub use share::median;
 pub use study::{PreparedStudy, Settings, Study};
 pub use write::write;

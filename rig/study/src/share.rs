@@ -43,16 +43,18 @@ impl fmt::Display for Share {
     }
 }
 
-/// The value at a quantile between 0 and 1, of the sample itself; no number for an empty sample.
+/// The value at a quantile between 0 and 1: a member of the sample, or the middle between two; no number for an empty
+/// sample.
 pub(super) fn quantile(sample: impl IntoIterator<Item = f64>, quantile: f64) -> f64 {
     let mut sample: Vec<_> = sample.into_iter().collect();
     sample.sort_by(f64::total_cmp);
-    let index = (quantile * sample.len().saturating_sub(1) as f64).round() as usize;
-    sample.get(index).copied().unwrap_or(f64::NAN)
+    let place = quantile * sample.len().saturating_sub(1) as f64;
+    let at = |place: f64| sample.get(place as usize).copied().unwrap_or(f64::NAN);
+    f64::midpoint(at(place.floor()), at(place.ceil()))
 }
 
-/// The middle of a sample.
-pub(super) fn median(sample: impl IntoIterator<Item = f64>) -> f64 {
+/// The middle of a sample; no number for an empty one.
+pub fn median(sample: impl IntoIterator<Item = f64>) -> f64 {
     quantile(sample, 0.5)
 }
 
@@ -77,9 +79,10 @@ mod tests {
     }
 
     #[test]
-    fn quantiles_are_members_of_the_sample() {
+    fn quantiles_are_members_of_the_sample_or_lie_between_two() {
         assert!((median([3.0, 1.0, 2.0]) - 2.0).abs() < f64::EPSILON);
         assert!((quantile([1.0, 2.0, 3.0, 4.0], 1.0) - 4.0).abs() < f64::EPSILON);
+        assert!((median([4.0, 1.0, 3.0, 2.0]) - 2.5).abs() < f64::EPSILON);
         assert!(median([]).is_nan());
     }
 }

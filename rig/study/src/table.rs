@@ -1,4 +1,4 @@
-//! Data of a figure as CSV.
+//! Data of figures and proofs as CSV.
 
 use serde::Serialize;
 
@@ -6,7 +6,7 @@ use serde::Serialize;
 ///
 /// # Panics
 /// When a row has not as many columns as the header.
-pub(super) fn csv(header: &str, rows: impl IntoIterator<Item = impl Serialize>) -> String {
+pub fn csv(header: &str, rows: impl IntoIterator<Item = impl Serialize>) -> String {
     let mut writer = csv::WriterBuilder::new().has_headers(false).from_writer(Vec::new());
     let mut written = writer.write_record(header.split(','));
     written = written.and_then(|()| rows.into_iter().try_for_each(|row| writer.serialize(row)));
@@ -15,11 +15,11 @@ pub(super) fn csv(header: &str, rows: impl IntoIterator<Item = impl Serialize>) 
 }
 
 /// A number as short as it reads back the same; an empty cell where there is none.
-pub(super) fn number(value: f64) -> String {
+pub fn number(value: f64) -> String {
     if value.is_finite() { value.to_string() } else { String::new() }
 }
 
 /// An angle in degrees.
-pub(super) fn degrees(angle_rad: f64) -> String {
+pub fn degrees(angle_rad: f64) -> String {
     number(angle_rad.to_degrees())
 }

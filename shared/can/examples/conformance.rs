@@ -12,10 +12,10 @@ use masseter_can::{
     Bus, BusStatus, Frame, OpenError, PortFaults, ReceiveError, Received, SendError, SocketCan,
 };
 
-/// How often is looked whether all frames have arrived.
+/// Interval of the checks whether all frames have arrived.
 const LOOK: Duration = Duration::from_millis(1);
-/// A frame that has not arrived after so many looks without any progress was lost.
-const PATIENCE: u32 = 500;
+/// A frame is lost if it has not arrived after so many checks without progress.
+const IDLE_LIMIT: u32 = 500;
 
 /// Two ports under all wrappers, and two more to know when everything sent has left the one side and reached the other.
 struct SocketPair {
@@ -109,7 +109,7 @@ impl Pair for SocketPair {
     fn settle(&mut self) {
         let sent: u64 = self.ends.iter().map(|end| end.sent).sum();
         let (mut before, mut idle_looks) = ([0; 2], 0);
-        while before != [sent; 2] && idle_looks < PATIENCE {
+        while before != [sent; 2] && idle_looks < IDLE_LIMIT {
             std::thread::sleep(LOOK);
             let seen = self.watches.each_mut().map(Watch::look);
             idle_looks = if seen == before { idle_looks + 1 } else { 0 };

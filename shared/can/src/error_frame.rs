@@ -47,9 +47,9 @@ pub struct ErrorReport {
     pub rec: u8,
 }
 
-/// An error message of a class that is not represented.
+/// An error message of an unsupported class.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("error message {id:X}h is of no class that the rig's buses report")]
+#[error("error message {id:X}h is of an unsupported class")]
 pub struct ErrorReportError {
     /// The identifier with its flag.
     pub id: u32,

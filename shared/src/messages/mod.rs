@@ -144,9 +144,9 @@ messages! {
         woke_ns: u64,
         /// Deadlines skipped since start because an earlier cycle overran.
         skipped_cycles: u64,
-        /// Time lost to the machine while the process waited, since start, ns.
+        /// Time for which the machine stalled while the process waited, since start, ns.
         stalled_ns: u64,
-        /// Time that the process spun, without the lost time, since start, ns.
+        /// Time that the process spun, without the stalls, since start, ns.
         spun_ns: u64,
         /// Time that the process worked, since start, ns.
         worked_ns: u64,
@@ -184,9 +184,9 @@ messages! {
         commanded_ns: u64,
         /// Deadlines skipped since start because an earlier cycle overran.
         skipped_cycles: u64,
-        /// Time lost to the machine while the process waited, since start, ns.
+        /// Time for which the machine stalled while the process waited, since start, ns.
         stalled_ns: u64,
-        /// Time that the process spun, without the lost time, since start, ns.
+        /// Time that the process spun, without the stalls, since start, ns.
         spun_ns: u64,
         /// Time that the process worked, since start, ns.
         worked_ns: u64,

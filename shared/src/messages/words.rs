@@ -33,7 +33,7 @@ fn complaint(cause: Cause, event: &Event) -> Option<String> {
         }
         Cause::SdoAborted => format!("object {object}: {}", AbortCode(value)),
         Cause::SdoTimeout => {
-            format!("object {object}: no answer for {value} ms, asked anew every {limit} ms")
+            format!("object {object}: no answer for {value} ms, the request was repeated every {limit} ms")
         }
         Cause::DuplicateNode if value == 0 => "more answers than SDO requests, again and again".to_owned(),
         Cause::DuplicateNode => "different process data after one SYNC, again and again".to_owned(),
@@ -90,29 +90,29 @@ const fn remedy(cause: Cause) -> Option<&'static str> {
     Some(match cause {
         Cause::WrongIdentity => "connect the drive that is configured, or correct can.identity",
         Cause::WrongPdo => "give the drive the rig's PDO mapping and store it",
-        Cause::NotAccepted => "see whether the drive supports cyclic synchronous position",
-        Cause::SdoAborted => "see the drive's manual for this object",
-        Cause::SdoTimeout => "see power, wiring and bit rate of this drive",
+        Cause::NotAccepted => "check whether the drive supports cyclic synchronous position",
+        Cause::SdoAborted => "look the object up in the drive's manual",
+        Cause::SdoTimeout => "check power, wiring and bit rate of this drive",
         Cause::DuplicateNode => "give every node an id of its own, and let no other client use SDO meanwhile",
-        Cause::NodeRestarted => "look at its supply",
+        Cause::NodeRestarted => "check its power supply",
         Cause::NodeStopped => {
-            "see its own emergency message, if there is one, and who else sends NMT commands"
+            "read the drive's own emergency message, if there is one, and find the node that sends NMT commands"
         }
-        Cause::FaultAtStart => "remove what the drive complains of and switch it on again",
-        Cause::StillPowered => "end what else guides it, and switch its power off and on again",
-        Cause::HomeOffset => "set it to 0, and see that the drive counts from the rig's zero",
-        Cause::BootTimeout => "see power, wiring, bit rate and node id of this drive",
-        Cause::BusOff => "see bit rate, termination and wiring",
-        Cause::BusRefused => "see that the interface is up, and that somebody acknowledges",
-        Cause::WrongLength => "see who else sends with this identifier, and how the PDO is mapped",
-        Cause::UnknownNode => "see can.buses and can.node_ids",
-        Cause::SecondMaster => {
-            "let one master guide the drives: end the other, or give that node an id of its own"
+        Cause::FaultAtStart => "remove the cause of the drive's error code, then switch the drive off and on",
+        Cause::StillPowered => {
+            "stop the other program that controls the drive, then switch its power off and on"
         }
+        Cause::HomeOffset => "set it to 0, and check that the drive counts from the rig's zero",
+        Cause::BootTimeout => "check power, wiring, bit rate and node id of this drive",
+        Cause::BusOff => "check bit rate, termination and wiring",
+        Cause::BusRefused => "check that the interface is up and that another node acknowledges",
+        Cause::WrongLength => "find the other sender of this identifier, and check the mapping of the PDO",
+        Cause::UnknownNode => "check can.buses and can.node_ids",
+        Cause::SecondMaster => "use one master only: stop the other, or give that node another id",
         Cause::ForwardKinematics => {
             "compare what the encoders count with the rig, and the rig with the scenario's [mechanism]"
         }
-        Cause::InverseKinematics => "see the motion, and the scenario's [mechanism]",
+        Cause::InverseKinematics => "check the motion, and the scenario's [mechanism]",
         _ => return None,
     })
 }
@@ -161,7 +161,7 @@ mod tests {
              with the rig, and the rig with the scenario's [mechanism]"
         );
         let short = stopped(Cause::InverseKinematics, 4, NoPose::NoLength);
-        assert!(short.starts_with("axis l2: the leg has no length; see the motion"), "{short}");
+        assert!(short.starts_with("axis l2: the leg has no length; check the motion"), "{short}");
     }
 
     #[test]

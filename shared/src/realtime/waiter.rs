@@ -14,7 +14,7 @@ const SHORTEST_SLEEP_NS: u64 = 50_000;
 /// The use of a task's time since its first wait, ns.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Account {
-    /// Lost to the machine while waiting: late ends of sleeps, and gaps while spinning.
+    /// Stalls of the machine while waiting: late ends of sleeps, and gaps while spinning.
     pub stalled_ns: u64,
     /// Spinning, without the gaps.
     pub spun_ns: u64,

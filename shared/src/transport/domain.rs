@@ -113,7 +113,7 @@ impl Domain {
         format!("masseter_{}_{}.", getuid().as_raw(), self.id)
     }
 
-    /// Makes the domain ours until the claim and every process started meanwhile are gone.
+    /// Locks the domain for this process and its children until all have ended.
     pub fn claim(&self) -> Result<DomainLock, DomainError> {
         let _turn = take_turn()?;
         let path = self.root().join(LOCK);

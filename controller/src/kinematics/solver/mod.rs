@@ -6,7 +6,7 @@
 //!
 //! The text leaves two things open, and both are options. *The residual*: eq. 1 prints distances, and
 //! [`Residual::Distance`] is that reading. *The step rule*: "the increment is reduced" names no
-//! factor and no amount of decrease. [`StepRule::Halving`] takes the flow chart by the word; its
+//! factor and no amount of decrease. [`StepRule::Halving`] follows the flow chart literally; its
 //! reference 13 (Numerical Recipes, chapter 9) minimises with [`StepRule::QuadraticBacktracking`].
 //! With any choice the claims "no oscillation, no divergence" (Figs. 3 and 4) hold in the residual chosen,
 //! because its error cannot increase. Whether the iteration then reaches a solution is another matter.

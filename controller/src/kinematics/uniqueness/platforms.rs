@@ -1,15 +1,19 @@
 //! Enclosures of all positions of the platform's corners for a box of inputs and of reaches.
 //!
-//! A leg's *reach* is the horizontal part of the leg, h = l cos θ, and its height z = l sin θ, so
-//! Aᵢ = Bᵢ + hᵢ v̂ᵢ + zᵢ ẑ with z = √(l² − h²) above the base: no sine, no cosine. Side k from leg
-//! i = k to leg j = k + 1 closes where ½(|Aᵢ − Aⱼ|² − L²) = 0.
+//! A leg's *reach* is the horizontal part of the leg, h = l cos θ. Its height is z = l sin θ. Above the
+//! base z = √(l² − h²), so Aᵢ = Bᵢ + hᵢ v̂ᵢ + zᵢ ẑ contains no sine and no cosine. Side k from leg i = k to
+//! leg j = k + 1 closes where ½(|Aᵢ − Aⱼ|² − L²) = 0.
 //!
-//! Two solutions of one input share d and l, therefore z − z′ = σ (h − h′) with
-//! σ = −(h + h′)/(z + z′), and the difference of the side's equation is *exactly*
-//! nᵢ (hᵢ − hᵢ′) + fⱼ (hⱼ − hⱼ′), n = C·v̂ᵢ + W σᵢ, f = −(C·v̂ⱼ + W σⱼ), where C and W are the means of
-//! the horizontal and vertical differences Aᵢ − Aⱼ of the two. These means, and −σ as a quotient of
-//! means, lie in the boxes in which both solutions lie: so [`Slopes`] enclose the derivatives and the
-//! slopes between any two solutions alike. The mechanism's dimensions count as exact.
+//! Hypotheses for two solutions of one input:
+//! - They share d and l. Therefore z − z′ = σ (h − h′) with σ = −(h + h′)/(z + z′).
+//! - C and W are the means of their horizontal and vertical differences Aᵢ − Aⱼ.
+//!
+//! Result: the difference of the side's equation is *exactly* nᵢ (hᵢ − hᵢ′) + fⱼ (hⱼ − hⱼ′), with
+//! n = C·v̂ᵢ + W σᵢ and f = −(C·v̂ⱼ + W σⱼ).
+//!
+//! The means C and W, and −σ as a quotient of means, lie in every box that contains both solutions. So
+//! [`Slopes`] encloses the derivatives and also the slopes between any two solutions. The mechanism's
+//! dimensions count as exact.
 
 use masseter_shared::geometry::{LEGS, Mechanism, Vec3};
 

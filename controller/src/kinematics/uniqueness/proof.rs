@@ -1,8 +1,9 @@
 //! One step of the proof: the verdict on one box of inputs.
 //!
-//! The reaches h of all its solutions are enclosed by halving and pruning: a part of h-space is removed
-//! when a side cannot close in it or a condition cannot hold, and shrinks by Krawczyk's operator
-//! −Y E(m) + (1 − Y S)(h − m), which holds every solution because the slopes S hold every difference.
+//! Halving and pruning enclose the reaches h of all its solutions:
+//! - A part of h-space is removed when a side cannot close in it, or a condition cannot hold.
+//! - Krawczyk's operator −Y E(m) + (1 − Y S)(h − m) shrinks a part. It contains every solution, because the
+//!   slopes S contain every difference.
 
 use masseter_shared::geometry::{LEGS, Mechanism};
 use nalgebra::Matrix3;

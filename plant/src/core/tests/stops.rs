@@ -7,7 +7,7 @@ use masseter_can::{Bus, Frame, Rpdo1};
 use super::*;
 use crate::link::Buses;
 
-/// Close enough before the next SYNC to be the last word, early enough to be there in time.
+/// Late enough that no frame follows before SYNC, early enough to be sent before it.
 const LATE_NS: u64 = 850_000;
 
 /// A plant at full speed, and the commander that keeps it there.

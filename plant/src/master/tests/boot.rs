@@ -171,8 +171,7 @@ fn a_drive_may_have_a_home_offset_that_is_zero() {
     assert!(bench.all_are(DriveState::OperationEnabled), "{:?}", bench.events);
 }
 
-/// As a tool leaves it that told it not to care for the link (6007 = 0). The scripted drive minds what else is written
-/// to it before it is off.
+/// A tool has set 6007 to 0 on an enabled drive. The scripted drive refuses other writes until it is off.
 #[test]
 fn a_drive_that_was_left_enabled_is_stopped_before_it_is_configured() {
     let mut bench = Bench::new();

@@ -12,7 +12,7 @@ fn scene() -> Scene {
     Scene::new(&Mechanism::new(&MechanismConfig::default()).unwrap(), &JawConfig::default())
 }
 
-/// A disk that does not answer before it is told to, and then does as it is told.
+/// A disk that blocks until the test releases it.
 struct Stuck {
     definitions: u64,
     bytes: Cursor<Vec<u8>>,
@@ -23,7 +23,7 @@ struct Stuck {
 /// What fits into a batch in real time.
 const BATCH: u64 = Pace::RealTime.batch_messages() as u64;
 
-/// What a disk that is well again says.
+/// The result of a released disk.
 const WELL: io::ErrorKind = io::ErrorKind::Other;
 
 impl Write for Stuck {

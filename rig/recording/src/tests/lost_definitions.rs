@@ -1,4 +1,4 @@
-//! Recordings that no longer say at their beginning what their channels are.
+//! Recordings whose channel definitions at the beginning are damaged.
 
 use super::*;
 

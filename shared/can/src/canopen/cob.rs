@@ -66,9 +66,9 @@ pub enum Cob {
     Heartbeat(NodeId),
 }
 
-/// An identifier outside the part of the predefined connection set that the rig uses.
+/// An identifier outside the supported part of the predefined connection set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("identifier {id} is no communication object of the rig")]
+#[error("identifier {id} is not in the supported part of the predefined connection set")]
 pub struct CobError {
     /// The identifier.
     pub id: CanId,

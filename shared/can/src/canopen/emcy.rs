@@ -5,7 +5,7 @@ use std::fmt;
 use super::{Cob, LengthError, NodeId, exactly};
 use crate::frame::Frame;
 
-/// Emergency error code. Every number is a valid code; the constants are the codes of the emulated drives.
+/// Emergency error code. Every number is a valid code; the constants are common codes of CiA 301 and 402.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct EmergencyCode(pub u16);
 

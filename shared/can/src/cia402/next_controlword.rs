@@ -40,6 +40,7 @@ codes! {
 /// }
 /// assert_eq!(words, [0x06, 0x07, 0x0F], "shutdown, switch on, enable operation");
 /// ```
+#[doc(alias("device control", "device control command"))]
 pub const fn next_controlword(
     state: DriveState,
     request: DriveRequest,

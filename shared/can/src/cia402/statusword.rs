@@ -27,6 +27,7 @@ pub enum StatusBit {
     /// Profile position and homing: the target is reached.
     TargetReached = 10,
     /// An internal limit is active, such as the software position limit 607D.
+    #[doc(alias = "internal limit active")]
     InternalLimit = 11,
     /// Cyclic synchronous modes: the target is being followed.
     TargetFollowed = 12,

@@ -43,7 +43,7 @@ pub struct Overload(pub Box<BusPlan>);
 
 /// A message whose release is not by a more urgent message of its bus.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("{name} is said to be released by {releaser}h, which is no more urgent message of its bus")]
+#[error("{name}: its releaser {releaser}h is not a more urgent message of the same bus")]
 pub struct NoReleaser {
     /// The message.
     pub name: String,

@@ -1,8 +1,8 @@
-//! The check of an interface, with the remedy for every refusal.
+//! The CAN interfaces of this machine, and the check of one, with the remedy for every refusal.
 
 use std::fs;
 use std::io;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use socketcan::{CanSocket, Socket};
 
@@ -67,7 +67,10 @@ impl OpenError {
         let interface = interface.to_owned();
         match errno {
             libc::EAFNOSUPPORT | libc::EPROTONOSUPPORT => Self::NoCan { interface },
-            libc::ENODEV | libc::ENXIO => Self::NoInterface { interface, there: can_interfaces() },
+            libc::ENODEV | libc::ENXIO => {
+                let there = Interface::list(Path::new("/"));
+                Self::NoInterface { interface, there: there.into_iter().map(|one| one.name).collect() }
+            }
             libc::ENETDOWN => Self::Down { interface },
             libc::EPERM | libc::EACCES => Self::Forbidden { interface, errno },
             _ => Self::Os { interface, errno },
@@ -75,41 +78,65 @@ impl OpenError {
     }
 }
 
+/// A CAN interface of this machine, up or not.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Interface {
+    /// Its name, such as `can0`.
+    pub name: String,
+    /// Whether it is up.
+    pub is_up: bool,
+    /// Whether its controller is bus-off.
+    pub is_bus_off: bool,
+    /// Whether no hardware belongs to it, as for `vcan0`: only a controller of hardware has a bit rate.
+    pub is_virtual: bool,
+    /// Length of its transmit queue, frames.
+    pub transmit_capacity: usize,
+}
+
+impl Interface {
+    /// All CAN interfaces by name. The kernel describes them below `root/sys/class/net`; `root` is `/` but for tests.
+    pub fn list(root: &Path) -> Vec<Self> {
+        let folders = fs::read_dir(root.join("sys/class/net")).into_iter().flatten().flatten();
+        let mut interfaces: Vec<_> =
+            folders.filter_map(|entry| Self::read(entry.file_name().to_str()?, &entry.path())).collect();
+        interfaces.sort_by(|one, other| one.name.cmp(&other.name));
+        interfaces
+    }
+
+    /// None if it is no CAN interface. From flags and carrier: `operstate` changes up to a second later.
+    fn read(name: &str, folder: &Path) -> Option<Self> {
+        let text = |property: &str| fs::read_to_string(folder.join(property)).ok();
+        let number = |property: &str| text(property)?.trim().parse::<u32>().ok();
+        let flags = || u32::from_str_radix(text("flags")?.trim().strip_prefix("0x")?, 16).ok();
+        (number("type") == Some(CAN_TYPE)).then(|| Self {
+            name: name.to_owned(),
+            is_up: flags().is_none_or(|flags| flags & UP != 0),
+            is_bus_off: number("carrier") == Some(0),
+            is_virtual: !folder.join("device").exists(),
+            transmit_capacity: number("tx_queue_len").unwrap_or(0) as usize,
+        })
+    }
+}
+
+/// Whether this kernel has CAN, and lets this process use it.
+///
+/// # Errors
+/// The system's error if not.
+pub fn is_supported() -> io::Result<()> {
+    // A socket on all interfaces exists wherever the kernel has CAN.
+    CanSocket::open_iface(0).map(drop)
+}
+
 /// The length of the interface's transmit queue, frames. Refuses an interface that does not exist, is not a CAN
 /// interface, or is down.
 pub(super) fn check(interface: &str) -> Result<usize, OpenError> {
-    // A socket on all interfaces exists wherever the kernel has CAN.
-    CanSocket::open_iface(0).map_err(|error| OpenError::from_errno(interface, errno(&error)))?;
-    if !can_interfaces().iter().any(|there| there == interface) {
-        return Err(OpenError::from_errno(interface, libc::ENODEV));
+    is_supported().map_err(|error| OpenError::from_errno(interface, errno(&error)))?;
+    let found = Interface::list(Path::new("/")).into_iter().find(|there| there.name == interface);
+    match found {
+        None => Err(OpenError::from_errno(interface, libc::ENODEV)),
+        Some(down) if !down.is_up => Err(OpenError::from_errno(interface, libc::ENETDOWN)),
+        Some(up) => Ok(up.transmit_capacity),
     }
-    let folder = Path::new(INTERFACES).join(interface);
-    if flags(&folder).is_some_and(|flags| flags & UP == 0) {
-        return Err(OpenError::Down { interface: interface.to_owned() });
-    }
-    Ok(number(&folder.join("tx_queue_len")).unwrap_or(0) as usize)
-}
-
-/// Where the kernel lists its network interfaces.
-const INTERFACES: &str = "/sys/class/net";
-
-/// The names of the existing CAN interfaces.
-fn can_interfaces() -> Vec<String> {
-    let folders = fs::read_dir(INTERFACES).into_iter().flatten().flatten();
-    let is_can = |folder: &PathBuf| number(&folder.join("type")) == Some(CAN_TYPE);
-    let can = folders.map(|entry| entry.path()).filter(is_can);
-    let mut names: Vec<_> = can.filter_map(|folder| Some(folder.file_name()?.to_str()?.to_owned())).collect();
-    names.sort();
-    names
-}
-
-fn flags(interface: &Path) -> Option<u32> {
-    let text = fs::read_to_string(interface.join("flags")).ok()?;
-    u32::from_str_radix(text.trim().strip_prefix("0x")?, 16).ok()
-}
-
-fn number(file: &Path) -> Option<u32> {
-    fs::read_to_string(file).ok()?.trim().parse().ok()
 }
 
 fn existing(there: &[String]) -> String {

@@ -35,5 +35,5 @@ mod errno;
 mod interface;
 mod port;
 
-pub use interface::OpenError;
+pub use interface::{Interface, OpenError, is_supported};
 pub use port::SocketCan;

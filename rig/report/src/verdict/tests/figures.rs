@@ -42,7 +42,7 @@ impl Run {
         Verdict::new(&run.manifest, &run.figures)
     }
 
-    /// The controller skipped deadlines for which the machine withheld the core.
+    /// The controller skipped deadlines because the machine stalled.
     fn disturb(&mut self) {
         self.figures.controller_skips =
             SkipFigures { skipped: 3, by_machine: 3, stalled_ns: 3_500_000, ..SkipFigures::default() };
@@ -226,14 +226,14 @@ fn skips_of_the_rig_fail_a_run_and_those_of_the_machine_make_it_invalid() {
         (
             |run| run.overruns(5, 0.02),
             Invalid,
-            "ended in state finished; 2 (2 by the machine; 5 stretches of work against 1 stalls as long while waiting, \
-             25.0 % of the time at work: chance does so with probability 0.02), limit 0",
+            "ended in state finished; 2 (2 by the machine; 5 overlong stretches of work, 1 stalls of that length \
+             while waiting, work is 25.0 % of the time: probability by chance 0.02), limit 0",
         ),
         (
             |run| run.overruns(5, 0.002),
             Fail,
-            "ended in state finished; 2 (0 by the machine; 5 stretches of work against 1 stalls as long while waiting, \
-             25.0 % of the time at work: chance does so with probability 0.00), limit 0",
+            "ended in state finished; 2 (0 by the machine; 5 overlong stretches of work, 1 stalls of that length \
+             while waiting, work is 25.0 % of the time: probability by chance 0.00), limit 0",
         ),
         (
             |run| {
@@ -274,7 +274,7 @@ fn an_invalid_run_says_what_the_machine_withheld_and_what_helps() {
         run.manifest.cpu_dma_latency =
             Some(DmaLatency { requested: CpuDmaLatency::Auto, limit_us, refusal: None });
     };
-    let withheld = "the machine withheld the cores for 4.8 ms while the rig waited, and 3 cycles were missed";
+    let withheld = "the machine stalled for 4.8 ms while the rig waited, and 3 cycles were missed";
     let doctor = "`masseter doctor` shows the remedies";
     assert_eq!(reason(|_| ()), format!("{withheld}; {doctor}"));
     let mut run = Run::new();
@@ -290,8 +290,8 @@ fn an_invalid_run_says_what_the_machine_withheld_and_what_helps() {
     });
     assert_eq!(
         said,
-        "the machine withheld the cores for 4.8 ms while the rig waited, and 10 cycles were missed, 7 of them while it \
-         worked, which the machine may have caused too; `masseter doctor` shows the remedies"
+        "the machine stalled for 4.8 ms while the rig waited, and 10 cycles were missed, 7 of them during work, possibly \
+         also by a stall; `masseter doctor` shows the remedies"
     );
     let said = reason(|run| {
         run.refuse();

@@ -20,7 +20,9 @@ pub enum SdoError {
     Length(#[from] LengthError),
     /// An unsupported command specifier; a server aborts with
     /// [`AbortCode::UNKNOWN_COMMAND`].
-    #[error("command {command:02X}h for {object} is no SDO service known here (block transfer is not)")]
+    #[error(
+        "command {command:02X}h for {object} is not a supported SDO service (block transfer is not supported)"
+    )]
     UnknownCommand {
         /// The first byte.
         command: u8,

@@ -1,0 +1,71 @@
+//! The documents lead to files that exist, and ARCHITECTURE.md to code that exists.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+fn project() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+}
+
+fn documents() -> Vec<PathBuf> {
+    let folders = [".", "docs", "shared/can"].map(|folder| project().join(folder));
+    let files =
+        folders.iter().flat_map(|folder| fs::read_dir(folder).unwrap()).map(|entry| entry.unwrap().path());
+    files.filter(|path| path.extension().is_some_and(|extension| extension == "md")).collect()
+}
+
+/// Text and target of every link.
+fn links(text: &str) -> impl Iterator<Item = (&str, &str)> {
+    text.match_indices("](").map(|(at, mark)| {
+        let start = text[..at].rfind('[').map_or(0, |start| start + 1);
+        let target = text[at + mark.len()..].split(')').next().unwrap();
+        (&text[start..at], target)
+    })
+}
+
+#[test]
+fn every_link_leads_to_a_file_and_its_heading() {
+    let documents = documents();
+    assert!(documents.len() > 10, "{documents:?}");
+    for document in documents {
+        let text = fs::read_to_string(&document).unwrap();
+        for (_, target) in links(&text).filter(|(_, target)| !target.contains("://")) {
+            let (file, heading) = target.split_once('#').unwrap_or((target, ""));
+            let path = if file.is_empty() { document.clone() } else { document.with_file_name(file) };
+            assert!(path.exists(), "{}: {target}", document.display());
+            assert!(heading.is_empty() || has_heading(&path, heading), "{}: {target}", document.display());
+        }
+    }
+}
+
+/// Whether a heading has this name in a link: lower case, hyphens for blanks, no other signs.
+fn has_heading(document: &Path, name: &str) -> bool {
+    let text = fs::read_to_string(document).unwrap();
+    let headings =
+        text.lines().filter(|line| line.starts_with('#')).map(|line| line.trim_start_matches(['#', ' ']));
+    let as_name = |heading: &str| -> String {
+        let kept = heading.chars().filter(|sign| sign.is_alphanumeric() || matches!(sign, ' ' | '-' | '_'));
+        kept.collect::<String>().to_lowercase().replace(' ', "-")
+    };
+    headings.map(as_name).any(|heading| heading == name)
+}
+
+/// "Follow one cycle through the code" names a function before the link to the file that has it.
+#[test]
+fn every_function_of_the_architecture_is_in_the_file_beside_it() {
+    let text = fs::read_to_string(project().join("ARCHITECTURE.md")).unwrap();
+    assert!(text.lines().count() <= 140, "{} lines", text.lines().count());
+    let (_, walk) = text.split_once("## Follow one cycle through the code").unwrap();
+    let (walk, _) = walk.split_once("\n## ").unwrap();
+    let mut checked = 0;
+    for (at, mark) in walk.match_indices("` in\n").chain(walk.match_indices("` in [")) {
+        let name = walk[..at].rsplit('`').next().unwrap();
+        let (_, target) = links(&walk[at + mark.len() - 1..]).next().unwrap();
+        let code = fs::read_to_string(project().join(target)).unwrap();
+        let function = name.rsplit("::").next().unwrap();
+        let is_there = ["fn ", "struct "].iter().any(|kind| code.contains(&format!("{kind}{function}")));
+        assert!(is_there, "{name} is not in {target}");
+        checked += 1;
+    }
+    assert!(checked >= 15, "only {checked} functions were found");
+}
