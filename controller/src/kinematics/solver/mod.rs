@@ -31,7 +31,7 @@ use super::{Equations, ForwardError, Solution};
 ///
 /// let mechanism = Mechanism::new(&MechanismConfig::default())?;
 /// let neutral = Actuators { slide_m: [0.0; 3], leg_m: [0.27; 3] };
-/// let solution = solve(Method::Published, &mechanism, &neutral, &[1.3; 3], &Options::default())?;
+/// let solution = solve(Method::Published, &mechanism, &neutral, &[1.46; 3], &Options::default())?;
 /// assert!((solution.theta_rad[0].to_degrees() - 83.862).abs() < 1e-3);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
