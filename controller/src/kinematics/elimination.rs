@@ -43,6 +43,8 @@ const FEW_ITERATIONS: u32 = 6;
 const NARROW_ENOUGH: f64 = 1e-10;
 /// Below this determinant ([`LoopEquations::determinant`]) another solution may be close.
 pub(super) const NEARLY_SINGULAR: f64 = 1e-2;
+/// A range of x narrower than this is tried in pieces: rounding hides r, and also whether the range is empty.
+const NARROW: f64 = 1e-8;
 /// An undecided interval wider than this share of the range is tried in pieces.
 const WIDE: f64 = 1.0 / 512.0;
 const PIECES: u32 = 16;
@@ -88,7 +90,11 @@ impl<'a> Elimination<'a> {
         mut found: impl FnMut(LoopSolution),
     ) -> Result<(), Vanishing> {
         let range = self.range();
-        if range.low > range.high {
+        if range.width() < -NARROW {
+            return Ok(());
+        }
+        if range.width() < NARROW {
+            self.try_pieces(range, &mut found);
             return Ok(());
         }
         let products = NODES.map(|node| self.product(range.at(node)));

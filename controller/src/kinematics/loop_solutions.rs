@@ -19,7 +19,7 @@ const MERGED_WITHIN_RAD: f64 = 1e-6;
 /// The same if neither has: rounding alone moves an estimate this far next to a singularity.
 const MERGED_UNCERTIFIED_WITHIN_RAD: f64 = 1e-4;
 /// A second solution is looked for unless the certificate excludes one within this distance, radians.
-const CLOSE_RAD: f64 = 3e-4;
+pub(super) const CLOSE_RAD: f64 = 3e-4;
 /// How far from a nearly singular solution its neighbour is looked for, radians along the null direction.
 const NEIGHBOUR_DISTANCES_RAD: [f64; 12] =
     [1e-7, 3e-7, 1e-6, 3e-6, 1e-5, 3e-5, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2];

@@ -61,6 +61,7 @@ mod tests {
     use super::*;
     use crate::kinematics::elimination::Elimination;
     use crate::kinematics::leg_angle::{LegAngle, coincide, separation_rad};
+    use crate::kinematics::loop_solutions::CLOSE_RAD;
     use crate::kinematics::tests::{NearlySingular, mechanisms, nearly_singular, published_mechanism};
     use crate::kinematics::{Method, Options, solve};
 
@@ -117,8 +118,8 @@ mod tests {
             if within(blurred_rad.clamp(1e-9, 1e-6)).any(|solution| solution.certificate.is_some()) {
                 return Ok(());
             }
-            let close = within(1e-4).count();
-            let singular = within(1e-4).filter(|solution| solution.certificate.is_none()).count();
+            let close = within(CLOSE_RAD).count();
+            let singular = within(CLOSE_RAD).filter(|solution| solution.certificate.is_none()).count();
             prop_assert!(close >= 2 && singular >= 1, "{singular} of {close} at determinant {determinant:e}");
         }
     }
