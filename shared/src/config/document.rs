@@ -4,6 +4,7 @@ use std::borrow::Cow;
 use std::path::Path;
 
 use serde::Deserialize;
+use serde_json::Value;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue, Deserializer, Error};
 
@@ -65,7 +66,7 @@ impl<'a> Document<'a> {
 
     /// The first array that stands where the scenario as resolved has a table, with its place: serde takes an array for
     /// a table without names.
-    pub(super) fn unnamed_table(&self, resolved: &toml::Table) -> Option<(String, String)> {
+    pub(super) fn unnamed_table(&self, resolved: &Value) -> Option<(String, String)> {
         let (key, offset) = unnamed_in(&self.root, resolved)?;
         Some((key, place(self.path, self.text, offset)))
     }
@@ -97,20 +98,19 @@ fn key_in(table: &DeTable<'_>, offset: usize) -> Option<String> {
     })
 }
 
-fn unnamed_in(given: &DeTable<'_>, resolved: &toml::Table) -> Option<(String, usize)> {
+fn unnamed_in(given: &DeTable<'_>, resolved: &Value) -> Option<(String, usize)> {
     given.iter().find_map(|(key, value)| {
-        let inner = unnamed(value, resolved.get(key.get_ref().as_ref())?)?;
-        let (path, offset) = inner;
+        let (path, offset) = unnamed(value, resolved.get(key.get_ref().as_ref())?)?;
         let separator = if path.is_empty() { "" } else { "." };
         Some((format!("{}{separator}{path}", key.get_ref()), offset))
     })
 }
 
-fn unnamed(given: &Spanned<DeValue<'_>>, resolved: &toml::Value) -> Option<(String, usize)> {
+fn unnamed(given: &Spanned<DeValue<'_>>, resolved: &Value) -> Option<(String, usize)> {
     match (given.get_ref(), resolved) {
-        (DeValue::Array(_), toml::Value::Table(_)) => Some((String::new(), given.span().start)),
-        (DeValue::Table(given), toml::Value::Table(resolved)) => unnamed_in(given, resolved),
-        (DeValue::Array(given), toml::Value::Array(resolved)) => {
+        (DeValue::Array(_), Value::Object(_)) => Some((String::new(), given.span().start)),
+        (DeValue::Table(given), Value::Object(_)) => unnamed_in(given, resolved),
+        (DeValue::Array(given), Value::Array(resolved)) => {
             given.iter().zip(resolved).find_map(|(given, resolved)| unnamed(given, resolved))
         }
         _ => None,

