@@ -66,6 +66,7 @@ impl Bench {
         Reading {
             cycle: self.cycle + 1,
             answers_cycle: last.cycle,
+            sampled_ns: (self.cycle + 1) * PERIOD_NS,
             position_m: told.target_m,
             drive_state: [state.code(); AXES],
             fresh_axes: ALL_AXES,

@@ -12,6 +12,7 @@ pub mod compare;
 mod event_log;
 pub mod histogram_log;
 mod junit;
+mod motion_checks;
 mod page;
 mod run_report;
 mod summary;

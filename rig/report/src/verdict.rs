@@ -8,6 +8,7 @@ use masseter_terminal::Exit;
 use serde::Serialize;
 
 use crate::checks::{Check, CheckResult, checks, missed_cycles};
+use crate::motion_checks::FAULTS;
 use crate::text;
 
 /// The judgement of a run.
@@ -41,8 +42,11 @@ impl Verdict {
     pub fn new(manifest: &Manifest, figures: &Figures) -> Self {
         let disturbed = disturbed(manifest, figures);
         let checks = checks(manifest, figures, disturbed.is_some());
+        let is_too_late =
+            checks.iter().any(|check| check.name == FAULTS && check.result == CheckResult::Failed);
         let (exit_code, mut reason) = ending(&manifest.ending, &figures.events)
-            .filter(|(exit, _)| !(*exit == Exit::SafeStop && disturbed.is_some()))
+            // The machine caused the stop, or it came only after a fault had led the jaw too far.
+            .filter(|(exit, _)| !(*exit == Exit::SafeStop && (disturbed.is_some() || is_too_late)))
             .or_else(|| incomplete(figures))
             .or(disturbed)
             .or_else(|| {

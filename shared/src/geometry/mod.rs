@@ -8,11 +8,13 @@
 //! This module holds the geometry, the closed-form inverse kinematics and the Jacobian, which controller and plant
 //! share. It does not hold forward kinematics: only the controller has it, so that the plant stays an independent oracle.
 
+mod deviation;
 mod inverse;
 mod jacobian;
 mod joints;
 mod mechanism;
 
+pub use deviation::Deviation;
 pub use inverse::InverseError;
 pub use jacobian::{Jacobian, Twist};
 pub use joints::{AXES, AXIS_NAMES, Actuators, Joints, LEGS, LimitViolation, StrokeLimits};
