@@ -23,7 +23,9 @@ mod batches;
 mod domain;
 mod error;
 mod ports;
+mod runtime;
 
-pub use domain::{Claim, Domain, DomainError, ScratchDomain};
-pub use error::TransportError;
+pub use domain::{Claim, Domain, ScratchDomain, Swept};
+pub use error::{DomainError, TransportError};
 pub use ports::{Node, Payload, Publisher, Received, Subscriber};
+pub use runtime::secret;
