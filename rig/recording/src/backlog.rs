@@ -79,13 +79,15 @@ impl WriteOutcome {
 /// use masseter_recording::{Backlog, Pace, Reader, Recorded, Recorder, Scene};
 /// use masseter_shared::config::Scenario;
 /// use masseter_shared::geometry::{Mechanism, MechanismConfig};
-/// use masseter_shared::messages::State;
+/// use masseter_shared::messages::{Message, State};
 ///
 /// let folder = tempfile::tempdir()?;
 /// let path = folder.path().join("recording.mcap");
 /// let scene = Scene::new(&Mechanism::new(&MechanismConfig::default())?, &Scenario::default().jaw);
 /// let mut backlog = Backlog::start(Recorder::create(&path, scene)?, Pace::Virtual);
-/// backlog.record(&Recorded::State(State { seq: 1, cycle: 1, ..State::default() }), 1_000_000);
+/// let mut state = State { cycle: 1, ..State::default() };
+/// state.stamp(1, 1_000_000);
+/// backlog.record(&Recorded::State(state), 1_000_000);
 /// assert_eq!(backlog.finish().loss(), None);
 /// assert!(Reader::open(&path)?.next_message()?.is_some());
 /// # Ok::<(), Box<dyn std::error::Error>>(())
