@@ -37,17 +37,23 @@ fn a_drive_that_misses_its_targets_is_detected_before_the_jaw_is_far_from_its_pa
     }
 }
 
+/// Whether the run is played to its end or a safe stop comes too late.
 #[test]
 fn a_fault_that_leads_the_jaw_far_from_its_path_fails_the_run_where_supervision_is_lax() {
-    let lax = "[controller]\ntracking_limit_m = 1.0\ntracking_limit_rad = 1.0\ntracking_rms_limit_m = 1.0\n\
-               tracking_rms_limit_rad = 1.0";
-    let workspace = Workspace::new(&(deaf_drive(2.5, 80) + lax));
-    let output = workspace.run_virtual(&[]);
-    let summary = workspace.summary();
-    let fault = &summary["figures"]["faults"][0];
-    let expected = if is_beyond(fault) { (Some(1), "failed") } else { (Some(5), "passed") };
-    let found = (output.status.code(), check(&summary, "faults")["result"].as_str().unwrap());
-    assert_eq!(found, expected, "{}", stdout(&output));
+    for limit_m in [1.0, 1.5e-3] {
+        let lax = format!(
+            "[controller]\ntracking_limit_m = {limit_m}\ntracking_limit_rad = 1.0\ntracking_rms_limit_m = 1.0\n\
+             tracking_rms_limit_rad = 1.0"
+        );
+        let workspace = Workspace::new(&(deaf_drive(2.5, 80) + &lax));
+        let output = workspace.run_virtual(&[]);
+        let summary = workspace.summary();
+        let fault = &summary["figures"]["faults"][0];
+        // Who watches the drives themselves may stop the rig before.
+        let expected = if is_beyond(fault) { (Some(1), "failed") } else { (Some(5), "passed") };
+        let found = (output.status.code(), check(&summary, "faults")["result"].as_str().unwrap());
+        assert_eq!(found, expected, "{}", stdout(&output));
+    }
 }
 
 /// The drive interpolates to its next target, as after a late SYNC.

@@ -350,4 +350,29 @@ mod tests {
         assert!((figures.actual.max_mm.unwrap() - 4.0).abs() < 1e-9);
         assert!((figures.actual.rms_mm.unwrap() - (12.5f64).sqrt()).abs() < 1e-9);
     }
+
+    /// Cycle 3 has no reading of sample 2, and the motion ends with cycle 4.
+    #[test]
+    fn cycles_without_a_reading_and_the_last_one_have_a_deviation_too() {
+        let mut tracking = Tracking::new(PoseSource::Truth, [0.0; 3]);
+        let stale = State { reading_cycle: 1, ..state(3, 0.0) };
+        let stopped =
+            |cycle| State { controller_state: ControllerState::SafeStop.code(), ..state(cycle, 0.0) };
+        let mut deviations = Vec::new();
+        let found = [
+            tracking.state(&state(1, 0.0), true),
+            tracking.state(&stale, false),
+            tracking.state(&stopped(4), true),
+            tracking.state(&stopped(5), true),
+        ];
+        assert!(found.iter().all(Option::is_none), "{found:?}");
+        for (cycle, x) in [(1, 0.001), (2, 0.003), (4, 0.004), (5, 0.005)] {
+            deviations.extend(tracking.truth(&truth(cycle, x)).into_iter().flatten());
+        }
+        let deviations: Vec<_> = deviations.iter().map(|sample| sample.deviation.origin_m).collect();
+        assert_eq!(deviations, [0.001, 0.003, 0.004]);
+        let (figures, _) = tracking.finish();
+        assert_eq!((figures.samples, figures.actual.max_mm), (1, Some(3.0)));
+        assert!((figures.actual.rms_mm.unwrap() - 1.0).abs() < 1e-12);
+    }
 }

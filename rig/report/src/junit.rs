@@ -1,6 +1,6 @@
 //! `junit.xml`: each check of the run as a test case, as CI systems show it.
 
-use crate::checks::CheckResult;
+use crate::check::CheckResult;
 use crate::text::escape;
 use crate::verdict::Verdict;
 use masseter_analysis::Figures;

@@ -3,7 +3,7 @@
 use masseter_analysis::{FaultFigures, PoseErrors};
 use masseter_shared::config::{ChecksConfig, FaultConfig};
 
-use crate::checks::{Check, CheckResult};
+use crate::check::{Check, CheckResult};
 
 /// The name of the check of the declared faults.
 pub(crate) const FAULTS: &str = "faults";

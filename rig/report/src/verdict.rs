@@ -7,7 +7,8 @@ use masseter_shared::messages::codes::EventKind;
 use masseter_terminal::Exit;
 use serde::Serialize;
 
-use crate::checks::{Check, CheckResult, checks, missed_cycles};
+use crate::check::{Check, CheckResult};
+use crate::checks::{checks, missed_cycles};
 use crate::motion_checks::FAULTS;
 use crate::text;
 
