@@ -59,11 +59,12 @@ impl Victim {
         self.masseter(&["clean"]).output().unwrap()
     }
 
-    /// A domain without a process; its folder.
-    fn own_dead_domain(&self) -> PathBuf {
-        assert_eq!(self.clean().status.code(), Some(0));
-        let dead = leave_a_dead_domain(&self.runtime_folder());
-        self.own(&dead);
+    /// A domain without a process; its folder. Others may look into the runtime folder, until the victim's next command.
+    fn leave_a_dead_domain(&self) -> PathBuf {
+        let dead = self.runtime_folder().join("dead");
+        let made = as_user(self.id, "mkdir").arg("-p").arg(&dead).status().unwrap();
+        assert!(made.success());
+        fs::write(dead.join("lock"), "abc").unwrap();
         self.own(&dead.join("lock"));
         dead
     }
@@ -77,13 +78,6 @@ impl Drop for Victim {
     fn drop(&mut self) {
         self.remove_runtime_folder();
     }
-}
-
-fn leave_a_dead_domain(folder: &Path) -> PathBuf {
-    let dead = folder.join("dead");
-    DirBuilder::new().mode(0o700).recursive(true).create(&dead).unwrap();
-    fs::write(dead.join("lock"), "abc").unwrap();
-    dead
 }
 
 fn as_user(id: u32, program: &str) -> Command {
@@ -143,7 +137,7 @@ fn a_link_in_place_of_the_folder_is_not_followed() {
 #[test]
 fn a_stranger_cannot_hold_the_lock() {
     let Some(victim) = Victim::new(61_003, "") else { return };
-    victim.own_dead_domain();
+    victim.leave_a_dead_domain();
     assert_eq!(victim.clean().status.code(), Some(0));
     let lock = victim.runtime_folder().join(".turn");
     assert!(lock.exists());
@@ -153,7 +147,13 @@ fn a_stranger_cannot_hold_the_lock() {
 #[test]
 fn a_lock_that_is_held_too_long_ends_in_an_error_that_names_the_process() {
     let session = tempfile::tempdir().unwrap();
-    leave_a_dead_domain(&session.path().join("masseter"));
+    fs::set_permissions(session.path(), PermissionsExt::from_mode(0o700)).unwrap();
+    // A domain is swept under the lock.
+    let leave_a_dead_domain = || {
+        let dead = session.path().join("masseter/dead");
+        DirBuilder::new().mode(0o700).recursive(true).create(dead).unwrap();
+    };
+    leave_a_dead_domain();
     let clean = || {
         let mut command = Command::new(MASSETER);
         command.arg("clean").env("XDG_RUNTIME_DIR", session.path()).output().unwrap()
@@ -161,7 +161,7 @@ fn a_lock_that_is_held_too_long_ends_in_an_error_that_names_the_process() {
     assert_eq!(clean().status.code(), Some(0));
     let lock = File::open(session.path().join("masseter/.turn")).unwrap();
     lock.lock().unwrap();
-    leave_a_dead_domain(&session.path().join("masseter"));
+    leave_a_dead_domain();
     let output = clean();
     assert_eq!(output.status.code(), Some(2), "{}", stderr(&output));
     let holder = format!("process {} (", std::process::id());
@@ -173,7 +173,7 @@ fn a_lock_that_is_held_too_long_ends_in_an_error_that_names_the_process() {
 #[test]
 fn a_file_of_a_stranger_is_reported_and_blocks_nobody() {
     let Some(victim) = Victim::new(61_004, "") else { return };
-    let dead = victim.own_dead_domain();
+    let dead = victim.leave_a_dead_domain();
     let file = format!("/dev/shm/masseter_{}_dead.abc_x", victim.id);
     assert!(stranger_can("touch", &[&file]));
     let output = victim.clean();
