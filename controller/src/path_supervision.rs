@@ -123,27 +123,29 @@ mod tests {
         PathSupervision::new(&Scenario { controller, jaw, ..Scenario::default() })
     }
 
-    fn shifted(share: f64) -> Pose {
-        Pose::translation(0.0, share * LIMIT_M, 0.0)
-    }
-
-    fn turned(share: f64) -> Pose {
-        Pose::new(Vec3::zeros(), Vec3::new(0.0, 0.0, share * LIMIT_RAD))
-    }
-
-    type Displace = fn(f64) -> Pose;
+    type Displace = fn(Vec3) -> Pose;
     const QUANTITIES: [(Cause, Displace, f64); 2] =
         [(Cause::TrackingLost, shifted, LIMIT_M), (Cause::OrientationLost, turned, LIMIT_RAD)];
 
+    fn shifted(limits: Vec3) -> Pose {
+        Pose::new(limits * LIMIT_M, Vec3::zeros())
+    }
+
+    fn turned(limits: Vec3) -> Pose {
+        Pose::new(Vec3::zeros(), limits * LIMIT_RAD)
+    }
+
     #[test]
-    fn a_moment_beyond_its_limit_is_a_fault_with_value_and_limit() {
+    fn a_moment_beyond_its_limit_in_any_direction_is_a_fault_with_value_and_limit() {
         let here = Pose::identity();
         for (cause, displace, limit) in QUANTITIES {
-            let mut supervision = supervision();
-            supervision.check(&here, &displace(0.99), &here).unwrap();
-            let fault = supervision.check(&here, &displace(1.01), &here).unwrap_err();
-            assert_eq!((fault.cause, fault.limit), (cause, limit));
-            assert!((fault.value / (1.01 * limit) - 1.0).abs() < 1e-9, "{fault:?}");
+            for direction in [Vec3::x(), -Vec3::x(), Vec3::y(), -Vec3::y(), Vec3::z(), -Vec3::z()] {
+                let mut supervision = supervision();
+                supervision.check(&here, &displace(direction * 0.99), &here).unwrap();
+                let fault = supervision.check(&here, &displace(direction * 1.01), &here).unwrap_err();
+                assert_eq!((fault.cause, fault.axis, fault.limit), (cause, None, limit));
+                assert!((fault.value / (1.01 * limit) - 1.0).abs() < 1e-9, "{fault:?}");
+            }
         }
     }
 
@@ -153,8 +155,9 @@ mod tests {
         for (cause, displace, limit) in QUANTITIES {
             let cycles_to_fault = |share: f64| {
                 let mut supervision = supervision();
-                (1..=1000)
-                    .find_map(|cycle| Some((cycle, supervision.check(&here, &displace(share), &here).err()?)))
+                (1..=1000).find_map(|cycle| {
+                    Some((cycle, supervision.check(&here, &displace(Vec3::z() * share), &here).err()?))
+                })
             };
             assert_eq!(cycles_to_fault(0.99 / 2.0), None);
             let (cycle, fault) = cycles_to_fault(1.01 / 2.0).unwrap();
@@ -170,8 +173,10 @@ mod tests {
         let here = Pose::identity();
         for (cause, displace, limit) in QUANTITIES {
             let mut supervision = supervision();
-            supervision.check(&here, &displace(-3.99), &displace(3.0)).unwrap();
-            let fault = supervision.check(&here, &displace(-4.01), &displace(3.0)).unwrap_err();
+            supervision.check(&here, &displace(Vec3::z() * -3.99), &displace(Vec3::z() * 3.0)).unwrap();
+            let fault = supervision
+                .check(&here, &displace(Vec3::z() * -4.01), &displace(Vec3::z() * 3.0))
+                .unwrap_err();
             assert!(fault.cause == cause && (fault.limit / limit - 4.0).abs() < 1e-9, "{fault:?}");
         }
     }
