@@ -94,14 +94,15 @@ pub fn main() -> ExitCode {
     }
 }
 
-/// Lets no other user read new files, unless `run --readable-by` allows it; the processes of a run inherit that.
+/// Lets no other user read new files, unless `run --readable-by` allows it. The processes of a run inherit that, and its
+/// reports take it from the folder.
 fn keep_files_private(verb: &Verb) {
-    let mask = match verb {
+    umask(match verb {
         Verb::Controller(_) | Verb::Recorder(_) => return,
-        Verb::Run(args) => args.readable_by,
-        _ => Readers::Owner,
-    };
-    umask(mask.umask());
+        Verb::Run(args) => args.readable_by.umask(),
+        Verb::Report(args) => args.umask(),
+        _ => Readers::Owner.umask(),
+    });
 }
 
 /// Errors lead to exit code 2 unless the verb itself chooses another.
