@@ -9,7 +9,9 @@ use std::os::unix::fs::{DirBuilderExt, MetadataExt, PermissionsExt, chown, symli
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 
-use common::{Cores, LENIENT, MASSETER, Workspace, assert_played, skip, stderr, stdout, wait_until};
+use common::{
+    Cores, LENIENT, MASSETER, Workspace, assert_played, masseter, skip, stderr, stdout, wait_until,
+};
 use rustix::process::getuid;
 
 const STRANGER: u32 = 61_000;
@@ -218,6 +220,9 @@ fn a_run_is_readable_by_whom_its_user_says() {
         assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
         let run = workspace.run_folder();
         assert_eq!(mode(&run), folder, "{who}");
+        // A later report makes its files for the same readers.
+        fs::remove_file(run.join("summary.json")).unwrap();
+        assert_eq!(masseter(&["report", run.to_str().unwrap()]).status.code(), Some(0));
         for name in ["recording.mcap", "manifest.json", "scenario.toml", "summary.json"] {
             assert_eq!(mode(&run.join(name)), file, "{who} {name}");
         }

@@ -132,6 +132,7 @@ impl Rig {
             return Ok(Ending::Interrupted);
         };
         manifest.scheduling = scheduling;
+        domain.make_private()?;
         reserve_shared_memory(domain)?;
         let is_virtual = SystemRoot::of_this_machine().is_virtual();
         let hold = dma_latency::Hold::new(plan.scenario.realtime.cpu_dma_latency, is_virtual);

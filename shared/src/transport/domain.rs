@@ -7,7 +7,7 @@
 use std::fs::{self, File, TryLockError};
 use std::io::{self, Write};
 use std::ops::Deref;
-use std::os::unix::fs::{MetadataExt, PermissionsExt};
+use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -162,20 +162,22 @@ impl Domain {
     }
 
     /// The files in shared memory of the domain's claim, if there is one.
-    fn shared_memory(&self) -> Result<Vec<PathBuf>, DomainError> {
+    ///
+    /// # Errors
+    /// When shared memory cannot be listed.
+    pub fn shared_memory(&self) -> Result<Vec<PathBuf>, DomainError> {
         let Ok(prefix) = self.prefix() else { return Ok(Vec::new()) };
         let files = entries(Path::new(SHARED_MEMORY))?;
         Ok(files.into_iter().filter(|path| file_name(path).starts_with(&prefix)).collect())
     }
 
-    /// Takes the rights of other users from our files in shared memory: iceoryx2 makes one of them for everybody. Nobody
+    /// Takes the rights of other users from the files in shared memory: iceoryx2 makes one of them for everybody. Nobody
     /// can exchange an own file, since the folder is sticky.
-    pub(super) fn make_private(&self) -> Result<(), DomainError> {
-        let files = self.shared_memory()?;
-        files.iter().filter(|path| runtime::is_own_file_open_to_others(path)).try_for_each(|path| {
-            let only_owner = PermissionsExt::from_mode(0o600);
-            fs::set_permissions(path, only_owner).map_err(file_error("make private", path))
-        })
+    ///
+    /// # Errors
+    /// [`DomainError::Foreign`] if another user has made one: the first files show the prefix of the others.
+    pub fn make_private(&self) -> Result<(), DomainError> {
+        self.shared_memory()?.iter().try_for_each(|path| runtime::make_private(path))
     }
 
     /// Asking takes the lock for a moment, which only one may do at a time.
@@ -284,6 +286,16 @@ mod tests {
         assert_ne!(domain.prefix().unwrap(), prefix);
         drop(claim);
         swept(&domain);
+    }
+
+    #[test]
+    fn a_file_that_is_not_ours_is_refused() {
+        let domain = ScratchDomain::claim("test-foreign").unwrap();
+        let foreign = segment(&domain);
+        domain.make_private().unwrap();
+        std::os::unix::fs::symlink("/dev/null", &foreign).unwrap();
+        let refused = domain.make_private();
+        assert!(matches!(&refused, Err(DomainError::Foreign { path }) if *path == foreign), "{refused:?}");
     }
 
     #[test]

@@ -42,6 +42,12 @@ pub enum DomainError {
         /// The folder, or what has its name.
         path: PathBuf,
     },
+    /// Another user has made a file in the place of ours.
+    #[error("another user has made {path}: start the rig again, whose files then have other names")]
+    Foreign {
+        /// The file.
+        path: PathBuf,
+    },
     /// The file system refused.
     #[error("cannot {action} {path}: {error}")]
     File {

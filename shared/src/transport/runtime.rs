@@ -56,11 +56,20 @@ fn is_own_folder_without(rights: u32, path: &Path) -> bool {
         .is_ok_and(|found| found.is_dir() && found.uid() == geteuid().as_raw() && found.mode() & rights == 0)
 }
 
-/// Whether it is a file, not a link, of this user, and others have rights to it.
-pub(super) fn is_own_file_open_to_others(path: &Path) -> bool {
-    fs::symlink_metadata(path).is_ok_and(|found| {
-        found.is_file() && found.uid() == geteuid().as_raw() && found.mode() & OF_OTHERS != 0
-    })
+/// Takes the rights of others from a file of this user.
+///
+/// # Errors
+/// [`DomainError::Foreign`] if it is a link or another user's.
+pub(super) fn make_private(path: &Path) -> Result<(), DomainError> {
+    // iceoryx2 may have removed it since it was listed.
+    let Ok(found) = fs::symlink_metadata(path) else { return Ok(()) };
+    if !found.is_file() || found.uid() != geteuid().as_raw() {
+        return Err(DomainError::Foreign { path: path.to_owned() });
+    }
+    if found.mode() & OF_OTHERS == 0 {
+        return Ok(());
+    }
+    fs::set_permissions(path, PermissionsExt::from_mode(0o600)).map_err(file_error("make private", path))
 }
 
 /// Makes a folder for its owner only, unless something has the name.
