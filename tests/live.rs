@@ -37,7 +37,7 @@ impl Shown {
         }
         let url = line.split_whitespace().nth(2).unwrap().to_owned();
         let address = url.split('/').nth(2).unwrap().to_owned();
-        Self { url, address, run, errors }
+        Self { run, errors, url, address }
     }
 
     /// Waits for the end of the run; returns how it ended, and what it said.

@@ -169,7 +169,7 @@ impl Client {
                     write_frame(&mut text, &received).expect("writing to a string does not fail");
                 }
                 Err(ReceiveError::Overrun { lost }) => {
-                    stderr.write(&format!("a client lost {lost} frames\n"))
+                    stderr.write(&format!("a client lost {lost} frames\n"));
                 }
                 Ok(None) | Err(_) => break,
             }

@@ -13,7 +13,7 @@ use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
 use masseter_recording::{Channel, Encoded, Encoder, Recorded, Scene, Topic};
-use tungstenite::handshake::server::{ErrorResponse, Request, Response};
+use tungstenite::handshake::server::{Callback, ErrorResponse, Request, Response};
 use tungstenite::http::{HeaderValue, StatusCode, header::SEC_WEBSOCKET_PROTOCOL};
 use tungstenite::protocol::frame::{CloseFrame, coding::CloseCode};
 use tungstenite::protocol::{Message, WebSocket, WebSocketConfig};
@@ -150,8 +150,8 @@ impl Session {
         let config = WebSocketConfig::default()
             .max_message_size(Some(MAX_REQUEST_BYTES))
             .max_frame_size(Some(MAX_REQUEST_BYTES));
-        let answer = |request: &Request, response| answer_handshake(request, response, secret);
-        let socket = accept_hdr_with_config(stream, answer, Some(config)).map_err(|_| Disconnected)?;
+        let socket =
+            accept_hdr_with_config(stream, Handshake { secret }, Some(config)).map_err(|_| Disconnected)?;
         socket.get_ref().set_read_timeout(Some(INTERVAL)).map_err(Error::Io)?;
         let subscriptions = [None; Channel::COUNT];
         Ok(Self { socket, encoder: Encoder::new(scene), subscriptions, subscribed })
@@ -245,20 +245,21 @@ impl Session {
 }
 
 /// Accepts the handshake of a client that is admitted and offers one of Foxglove's subprotocols, and refuses every other.
-#[expect(clippy::result_large_err, reason = "the library's callback returns it by value")]
-fn answer_handshake(
-    request: &Request,
-    mut response: Response,
-    secret: &str,
-) -> Result<Response, ErrorResponse> {
-    admit(request, secret).map_err(|refusal| refused(StatusCode::FORBIDDEN, &refusal))?;
-    let mut offers = request.headers().get_all(SEC_WEBSOCKET_PROTOCOL).iter();
-    let chosen = offers.find_map(|offer| protocol::choose_subprotocol(offer.to_str().ok()?));
-    let Some(chosen) = chosen else {
-        return Err(refused(StatusCode::BAD_REQUEST, &"this is a Foxglove WebSocket server"));
-    };
-    response.headers_mut().insert(SEC_WEBSOCKET_PROTOCOL, HeaderValue::from_static(chosen));
-    Ok(response)
+struct Handshake<'a> {
+    secret: &'a str,
+}
+
+impl Callback for Handshake<'_> {
+    fn on_request(self, request: &Request, mut response: Response) -> Result<Response, ErrorResponse> {
+        admit(request, self.secret).map_err(|refusal| refused(StatusCode::FORBIDDEN, &refusal))?;
+        let mut offers = request.headers().get_all(SEC_WEBSOCKET_PROTOCOL).iter();
+        let chosen = offers.find_map(|offer| protocol::choose_subprotocol(offer.to_str().ok()?));
+        let Some(chosen) = chosen else {
+            return Err(refused(StatusCode::BAD_REQUEST, &"this is a Foxglove WebSocket server"));
+        };
+        response.headers_mut().insert(SEC_WEBSOCKET_PROTOCOL, HeaderValue::from_static(chosen));
+        Ok(response)
+    }
 }
 
 fn refused(status: StatusCode, reason: &dyn Display) -> ErrorResponse {

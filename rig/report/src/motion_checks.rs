@@ -92,6 +92,8 @@ mod tests {
 
     use super::*;
 
+    type Spoil = fn(&mut PoseErrors, Option<f64>);
+
     #[test]
     fn every_error_has_its_own_limit_and_the_closest_is_shown() {
         let limits = ChecksConfig::default();
@@ -109,7 +111,6 @@ mod tests {
             ("ok", "closest of 9 samples: incisal point max 0.1000 mm, limit 0.5 mm")
         );
         let mm = |share: f64, limit: f64| Some(share * limit);
-        type Spoil = fn(&mut PoseErrors, Option<f64>);
         let each: [(Spoil, f64); 6] = [
             (|errors, value| errors.rms_mm = value, limits.tracking_rms_mm),
             (|errors, value| errors.max_mm = value, limits.tracking_max_mm),
