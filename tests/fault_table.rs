@@ -16,6 +16,9 @@ use rayon::prelude::*;
 const CYCLES: [u32; 8] = [1, 2, 5, 10, 20, 50, 100, 500];
 /// Since switch-on: while easing, while chewing, and where the legs move fastest.
 const FROM_S: [f64; 4] = [0.7, 2.5, 3.0, 3.25];
+/// Every message is sent within so many cycles.
+const SENT_WITHIN: u32 = 100;
+const NEVER_STRUCK: &str = "never struck";
 const MASTER: u8 = 127;
 const SYNC: u16 = 0x080;
 const TPDO1: u16 = 0x180;
@@ -86,7 +89,7 @@ fn row(fault: &FaultConfig, cycles: u32, from_s: f64) -> (String, bool) {
     let number = |key: &str| found[key].as_f64().expect(key);
     let (mm, deg) = (number("deviation_mm"), number("deviation_deg"));
     let word = summary["verdict"]["word"].as_str().expect("a verdict");
-    let verdict = if found["struck_ns"].is_null() { "never struck" } else { word };
+    let verdict = if found["struck_ns"].is_null() { NEVER_STRUCK } else { word };
     let detection = &found["detection"];
     let row = format!(
         "{},{},{},{},{cycles},{from_s},{mm:.4},{deg:.4},{},{},{verdict}\n",
@@ -97,6 +100,8 @@ fn row(fault: &FaultConfig, cycles: u32, from_s: f64) -> (String, bool) {
         detection["cause"].as_str().unwrap_or_default(),
         or_none(detection["latency_ms"].as_f64()),
     );
+    // Heartbeats are rarer than the shorter faults.
+    assert!(cycles < SENT_WITHIN || verdict != NEVER_STRUCK, "{row}");
     let ChecksConfig { tracking_max_mm, tracking_max_deg, .. } = ChecksConfig::default();
     (row, verdict == "PASS" && (mm > tracking_max_mm || deg > tracking_max_deg))
 }
