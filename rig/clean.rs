@@ -1,14 +1,17 @@
 //! `masseter clean`: removes the shared memory of killed runs. Live runs are not touched.
 
 use masseter_shared::transport::Domain;
-use masseter_terminal::{Exit, result_line};
+use masseter_terminal::{Exit, result_line, status};
 
 /// Sweeps every dead domain of this user and lists all domains.
 pub(crate) fn clean() -> anyhow::Result<Exit> {
     let domains = Domain::all()?;
     for domain in &domains {
         match domain.sweep()? {
-            Some(files) => result_line!("{}: {files} files removed from shared memory", domain.id())?,
+            Some(swept) => {
+                result_line!("{}: {} files removed from shared memory", domain.id(), swept.removed)?;
+                swept.remaining.iter().for_each(|error| status!("masseter: {error}"));
+            }
             None => result_line!("{}: running, not removed", domain.id())?,
         }
     }

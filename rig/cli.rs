@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use clap::{Parser, Subcommand};
 use masseter_terminal::{Exit, Failure, OrFailure, status};
+use rustix::process::umask;
 
 use crate::bench::ipc::PeerArgs;
 use crate::bench::{self, args::BenchArgs};
@@ -18,7 +19,10 @@ use crate::plant::{self, PlantArgs};
 use crate::recorder::{self, RecorderArgs};
 use crate::recording_cli::{self, RecordingVerb};
 use crate::report_cli::{self, ReportArgs};
-use crate::run::{self, args::RunArgs};
+use crate::run::{
+    self,
+    args::{Readers, RunArgs},
+};
 use crate::uniqueness::{self, UniquenessVerb};
 
 /// A hardware-in-the-loop rig for a 6-DOF mastication robot
@@ -79,13 +83,26 @@ enum Verb {
 pub fn main() -> ExitCode {
     // A write beyond the limit on the size of files is then an error, not the end.
     let _ = signal_hook::flag::register(signal_hook::consts::SIGXFSZ, Arc::default());
-    match execute(Cli::parse().verb) {
+    let verb = Cli::parse().verb;
+    keep_files_private(&verb);
+    match execute(verb) {
         Ok(exit) => exit.into(),
         Err(Failure { exit, error }) => {
             status!("masseter: {}", in_one_line(&error));
             exit.into()
         }
     }
+}
+
+/// Lets no other user read new files, unless `run --readable-by` allows it. The processes of a run inherit that, and its
+/// reports take it from the folder.
+fn keep_files_private(verb: &Verb) {
+    umask(match verb {
+        Verb::Controller(_) | Verb::Recorder(_) => return,
+        Verb::Run(args) => args.readable_by.umask(),
+        Verb::Report(args) => args.umask(),
+        _ => Readers::Owner.umask(),
+    });
 }
 
 /// Errors lead to exit code 2 unless the verb itself chooses another.

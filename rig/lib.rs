@@ -25,4 +25,5 @@ mod recorder;
 mod recording_cli;
 mod report_cli;
 mod run;
+mod stderr_writer;
 mod uniqueness;

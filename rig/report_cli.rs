@@ -1,9 +1,14 @@
 //! `masseter report`: the report of a run folder, or the comparison of two.
 
+use std::fs;
+use std::os::unix::fs::MetadataExt;
 use std::path::PathBuf;
 
 use clap::Args;
 use masseter_terminal::{Exit, Failure, Format, OrFailure};
+use rustix::fs::Mode;
+
+use crate::run::args::Readers;
 
 /// The arguments of `report`.
 #[derive(Debug, Clone, Args)]
@@ -19,6 +24,14 @@ pub(crate) struct ReportArgs {
     /// Format of standard output
     #[arg(long, value_enum, default_value_t)]
     format: Format,
+}
+
+impl ReportArgs {
+    /// The rights that new files do not get: who may not read the folder may not read them.
+    pub(crate) fn umask(&self) -> Mode {
+        let folder = fs::metadata(&self.folder).map_or(0, |folder| folder.mode());
+        Readers::Owner.umask() & (Readers::All.umask() | Mode::from_bits_truncate(!folder))
+    }
 }
 
 /// Judges a run again, or compares two runs.

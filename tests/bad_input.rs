@@ -37,6 +37,16 @@ fn scenarios_are_refused_with_place_and_remedy() {
     }
 }
 
+/// A terminal would obey them.
+#[test]
+fn control_characters_of_a_file_are_printed_as_codes() {
+    let workspace = Workspace::new("[motion]\nkind = 'file'\npath = \"no\\u001b]0;evil\\u0007where.csv\"");
+    let output = workspace.run_virtual(&[]);
+    assert_eq!(output.status.code(), Some(2), "{}", stderr(&output));
+    assert!(stderr(&output).contains(r"no\u{1b}]0;evil\u{7}where.csv"), "{}", stderr(&output));
+    assert!(!stderr(&output).contains(['\u{1b}', '\u{7}']));
+}
+
 #[test]
 fn files_without_an_end_are_refused_at_once() {
     let workspace = Workspace::new(&format!("# {}", "x".repeat(2 << 20)));

@@ -2,12 +2,13 @@
 
 mod common;
 
-use std::io::{BufRead, BufReader, Read, Write};
-use std::net::TcpStream;
+use std::io::{self, BufRead, BufReader, Read, Write};
+use std::net::{TcpListener, TcpStream};
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
-use common::{MASSETER, Workspace, check, masseter, stdout};
+use common::{MASSETER, Workspace, check, masseter, stdout, wait_until};
+use rustix::process::{Pid, Signal, kill_process};
 use serde_json::Value;
 
 #[test]
@@ -190,6 +191,66 @@ fn clients_beyond_the_limit_do_not_disturb_the_others() {
     // The server may take a moment to notice.
     let is_greeted = |_| connect().read(&mut [0; 16]).is_ok_and(|count| count > 0);
     assert!((0..100).any(is_greeted), "a place that was left can be taken");
+}
+
+#[test]
+fn silent_clients_lose_their_places() {
+    let server = Server::start(&Workspace::new(""));
+    let connect = || {
+        let stream = TcpStream::connect(&server.address).unwrap();
+        stream.set_read_timeout(Some(Duration::from_secs(20))).unwrap();
+        stream
+    };
+    let mut silent: Vec<_> = (0..16).map(|_| connect()).collect();
+    for stream in &mut silent {
+        expect(stream, "< hi >");
+    }
+    assert_eq!(connect().read(&mut [0; 16]).unwrap(), 0, "there is no place");
+    silent[0].write_all(b"< open can0 >").unwrap();
+    expect(&mut silent[0], "< ok >");
+    for stream in &mut silent[1..] {
+        expect(stream, "opened no bus within 5 s");
+    }
+    expect(&mut connect(), "< hi >");
+    silent[0].write_all(b"< echo >").unwrap();
+    expect(&mut silent[0], "< echo >");
+}
+
+/// A web page can make a browser send this to any port of this machine.
+#[test]
+fn a_request_of_a_browser_opens_no_bus() {
+    let server = Server::start(&Workspace::new(""));
+    let mut stream = TcpStream::connect(&server.address).unwrap();
+    stream.set_read_timeout(Some(Duration::from_secs(20))).unwrap();
+    let body = "< open can0 >< rawmode >< send 0 2 80 0 >";
+    let request = format!("POST / HTTP/1.1\r\nHost: localhost\r\nContent-Type: text/plain\r\n\r\n{body}");
+    stream.write_all(request.as_bytes()).unwrap();
+    let mut answer = String::new();
+    // The server may reset the connection, since it reads no further.
+    let _ = stream.read_to_string(&mut answer);
+    assert!(!answer.contains("< ok >"), "{answer}");
+}
+
+#[test]
+fn a_server_whose_standard_error_is_full_serves_and_ends() {
+    // Taken again at once: the server cannot say which port it has.
+    let address = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
+    let (_reader, mut pipe) = io::pipe().unwrap();
+    rustix::io::ioctl_fionbio(&pipe, true).unwrap();
+    while pipe.write(&[b'.'; 4096]).is_ok() {}
+    rustix::io::ioctl_fionbio(&pipe, false).unwrap();
+    let mut serve = Command::new(MASSETER);
+    serve.args(["can", "serve", "--listen", &address.to_string()]).stderr(pipe);
+    let mut server = Server { child: serve.spawn().unwrap(), address: address.to_string() };
+    wait_until("it listens", || TcpStream::connect(&server.address).is_ok());
+    let mut stream = TcpStream::connect(&server.address).unwrap();
+    stream.set_read_timeout(Some(Duration::from_secs(20))).unwrap();
+    stream.write_all(b"< open can0 >").unwrap();
+    expect(&mut stream, "< ok >");
+    stream.write_all(b"no request >").unwrap();
+    expect(&mut stream, "< error text outside");
+    kill_process(Pid::from_child(&server.child), Signal::TERM).unwrap();
+    wait_until("it ends", || server.child.try_wait().unwrap().is_some());
 }
 
 #[test]

@@ -12,8 +12,7 @@ use std::thread;
 use std::time::Duration;
 
 use common::{
-    Cores, LENIENT, Workspace, assert_played, child_of, cramped, masseter, skip, stderr, stdout,
-    wait_until_it_records,
+    Cores, LENIENT, Workspace, assert_played, cramped, masseter, skip, stderr, stdout, wait_until_it_records,
 };
 use masseter_shared::clock::{self, SECOND_NS};
 use masseter_shared::messages::State;
@@ -217,7 +216,7 @@ fn a_full_disk_does_not_stop_the_rig() {
     let mut motion_s = 0.0;
     let output = run_on_a_small_disk("24m", |small| {
         let rig = small.start(&cores, &["--duration", "3s", "--name", &name]);
-        child_of(&rig, "controller");
+        wait_until_it_records(small);
         SmallDisk::fill(&small.file(""));
         motion_s = played_s(&name);
         let output = rig.wait_with_output().unwrap();

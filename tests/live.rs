@@ -22,6 +22,7 @@ const MESSAGE_HEAD: usize = 13;
 struct Shown {
     run: Child,
     errors: BufReader<ChildStderr>,
+    url: String,
     address: String,
 }
 
@@ -34,8 +35,9 @@ impl Shown {
             line.clear();
             assert!(errors.read_line(&mut line).unwrap() > 0, "the run ended before it was shown");
         }
-        let url = line.split_whitespace().nth(2).unwrap();
-        Self { address: url.trim_start_matches("ws://").to_owned(), run, errors }
+        let url = line.split_whitespace().nth(2).unwrap().to_owned();
+        let address = url.split('/').nth(2).unwrap().to_owned();
+        Self { run, errors, url, address }
     }
 
     /// Waits for the end of the run; returns how it ended, and what it said.
@@ -58,10 +60,10 @@ struct Watcher {
 }
 
 impl Watcher {
-    fn connect(address: &str, protocol: &'static str) -> Self {
-        let mut request = format!("ws://{address}").into_client_request().unwrap();
+    fn connect(shown: &Shown, protocol: &'static str) -> Self {
+        let mut request = shown.url.as_str().into_client_request().unwrap();
         request.headers_mut().insert("Sec-WebSocket-Protocol", HeaderValue::from_static(protocol));
-        let stream = TcpStream::connect(address).unwrap();
+        let stream = TcpStream::connect(&shown.address).unwrap();
         let (mut socket, _) = tungstenite::client(request, stream).unwrap();
         let info = text(&mut socket);
         let mut advertised = text(&mut socket);
@@ -116,7 +118,7 @@ fn a_watcher_sees_the_channels_and_messages_of_the_recording() {
     let cores = Cores::take();
     let workspace = Workspace::new(&format!("duration_s = 3.0\n{LENIENT}"));
     let shown = Shown::start(&cores, &workspace);
-    let mut watcher = Watcher::connect(&shown.address, "foxglove.sdk.v1, foxglove.websocket.v1");
+    let mut watcher = Watcher::connect(&shown, "foxglove.sdk.v1, foxglove.websocket.v1");
     assert_eq!(watcher.info["op"], "serverInfo");
     assert_eq!(watcher.info["capabilities"], json!([]));
     watcher.subscribe_to_all();
@@ -138,7 +140,7 @@ fn messages_for_a_watcher_that_does_not_read_are_counted_and_the_recording_is_co
     let cores = Cores::take();
     let workspace = Workspace::new(&format!("duration_s = 6.0\n{LENIENT}"));
     let shown = Shown::start(&cores, &workspace);
-    let mut watcher = Watcher::connect(&shown.address, "foxglove.websocket.v1");
+    let mut watcher = Watcher::connect(&shown, "foxglove.websocket.v1");
     watcher.subscribe_to_all();
     let (status, said) = shown.finish();
     assert_played(&workspace.run_folder(), status, &said);
@@ -155,12 +157,12 @@ fn clients_that_misbehave_or_vanish_disturb_neither_the_recording_nor_other_watc
     let _silent = TcpStream::connect(&shown.address).unwrap();
     let mut browser = TcpStream::connect(&shown.address).unwrap();
     browser.write_all(b"GET / HTTP/1.1\r\nHost: here\r\n\r\n").unwrap();
-    let mut deserter = Watcher::connect(&shown.address, "foxglove.sdk.v1");
+    let mut deserter = Watcher::connect(&shown, "foxglove.sdk.v1");
     deserter.subscribe_to_all();
     deserter.socket.read().unwrap();
     // What it has not read makes the kernel reset the connection, as the death of its process would.
     drop(deserter);
-    let mut chatter = Watcher::connect(&shown.address, "foxglove.sdk.v1");
+    let mut chatter = Watcher::connect(&shown, "foxglove.sdk.v1");
     for words in [
         "chat",
         r#"{"op": "getParameters"}"#,
@@ -182,7 +184,7 @@ fn a_client_that_sends_without_end_delays_neither_the_recording_nor_the_end() {
     let cores = Cores::take();
     let workspace = Workspace::new(&format!("duration_s = 1.0\n{LENIENT}"));
     let shown = Shown::start(&cores, &workspace);
-    let mut flooder = Watcher::connect(&shown.address, "foxglove.sdk.v1");
+    let mut flooder = Watcher::connect(&shown, "foxglove.sdk.v1");
     // The beginning of a text, and then nothing but its empty continuation.
     flooder.socket.get_mut().write_all(&[0x01, 0x80, 0, 0, 0, 0]).unwrap();
     let flood = [0x00, 0x80, 0, 0, 0, 0].repeat(1 << 16);

@@ -256,7 +256,7 @@ fn a_check_that_fails_fails_the_run() {
     assert_eq!(printed["verdict"]["word"], "FAIL");
     assert_eq!(printed["verdict"]["exit_code"], json!(1));
     let junit = fs::read_to_string(workspace.run_folder().join("junit.xml")).unwrap();
-    assert!(junit.contains("failures=\"1\""), "{junit}");
+    assert!(junit.contains("failures=\"2\""), "{junit}");
 }
 
 #[test]

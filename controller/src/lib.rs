@@ -7,6 +7,7 @@ mod command_acknowledgement;
 pub mod hold_position;
 pub mod kinematics;
 pub mod motion_controller;
+mod path_supervision;
 mod playback;
 mod pose_control;
 pub mod process;

@@ -12,6 +12,7 @@ use masseter_shared::messages::codes::ControllerState;
 use masseter_shared::messages::{Command, Event, Reading, State};
 
 use crate::command_acknowledgement::CommandAcknowledgement;
+use crate::path_supervision::PathSupervision;
 use crate::playback::Playback;
 use crate::pose_control::PoseControl;
 use crate::safety::{self, Fault};
@@ -50,6 +51,9 @@ pub struct MotionController {
     playback: Playback,
     acknowledgement: CommandAcknowledgement,
     control: PoseControl,
+    supervision: PathSupervision,
+    /// By how many cycles the platform may be elsewhere on its path.
+    slack_cycles: f64,
     /// Cycles in this state since the desired pose no longer changes.
     cycles_at_rest: u64,
     desired: Option<Pose>,
@@ -68,6 +72,8 @@ impl MotionController {
             playback: Playback::new(trajectory, config.ease_s, config.stop_ramp_s),
             acknowledgement: CommandAcknowledgement::default(),
             control: PoseControl::new(config),
+            supervision: PathSupervision::new(scenario),
+            slack_cycles: 0.0,
             cycles_at_rest: 0,
             desired: None,
             target: None,
@@ -80,17 +86,17 @@ impl MotionController {
     }
 
     /// Pose control, inverse kinematics and limits: the targets of this cycle.
-    fn control(&mut self) -> Result<(), Fault> {
-        let desired = self.playback.pose_ahead(-self.sample_age_s());
-        self.desired = Some(desired);
+    fn control(&mut self, desired: Pose) -> Result<(), Fault> {
         if !self.sequencer.is_moving() {
             return Ok(());
         }
-        let Sequencer { config, period_s, .. } = self.sequencer;
+        let period_s = self.sequencer.period_s;
         if let Some(estimate) = &self.sequencer.estimate
             && self.sequencer.silent_cycles == 0
         {
-            safety::check_tracking(&desired, &estimate.solution.pose, config.tracking_limit_m)?;
+            let slack_s = self.slack_cycles * period_s;
+            let elsewhere = self.playback.pose_ahead(-self.sample_age_s() - slack_s);
+            self.supervision.check(&desired, &estimate.solution.pose, &elsewhere)?;
             self.control.observe(&desired, &estimate.solution.pose, period_s);
         }
         let joints = self.mechanism.inverse(&self.corrected_pose())?;
@@ -148,6 +154,11 @@ impl MotionController {
 impl Controller for MotionController {
     fn observe(&mut self, reading: Option<&Reading>) {
         self.sequencer.observe(reading);
+        if let Some(estimate) = &self.sequencer.estimate
+            && self.sequencer.silent_cycles == 0
+        {
+            self.slack_cycles = self.supervision.slack_cycles(estimate);
+        }
     }
 
     fn decide(&mut self, tick: Tick) -> Option<Event> {
@@ -156,7 +167,10 @@ impl Controller for MotionController {
         if self.acknowledgement.takes_step(tick.cycle, answered_cycle) {
             self.playback.advance(self.sequencer.period_s);
         }
-        let fault = self.sequencer.begin_cycle(tick).or_else(|| self.control().err());
+        let fault = self.sequencer.begin_cycle(tick);
+        let desired = self.playback.pose_ahead(-self.sample_age_s());
+        self.desired = Some(desired);
+        let fault = fault.or_else(|| self.control(desired).err());
         let event = self.sequencer.follow(fault, self.is_over(), tick);
         if event.is_some() {
             self.enter();

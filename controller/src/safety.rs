@@ -1,6 +1,6 @@
 //! Checks that stop the controller: each fault has a cause, a value and a limit.
 
-use masseter_shared::geometry::{AXES, Actuators, InverseError, LEGS, LimitViolation, Pose};
+use masseter_shared::geometry::{AXES, Actuators, InverseError, LEGS, LimitViolation};
 use masseter_shared::messages::codes::{Cause, DriveState, NO_AXIS, NoPose, drive_state};
 use masseter_shared::messages::{Event, Reading};
 
@@ -115,15 +115,6 @@ pub(crate) fn check_drives(reading: &Reading, moving: bool) -> Result<(), Fault>
             let enabled = f64::from(DriveState::OperationEnabled.code());
             return Err(Fault::for_axis(Cause::DriveFault, axis, f64::from(code), enabled));
         }
-    }
-    Ok(())
-}
-
-/// Whether the platform is where it should be, within `limit_m`.
-pub(crate) fn check_tracking(desired: &Pose, estimated: &Pose, limit_m: f64) -> Result<(), Fault> {
-    let distance_m = (desired.translation.vector - estimated.translation.vector).norm();
-    if distance_m > limit_m {
-        return Err(Fault::new(Cause::TrackingLost, distance_m, limit_m));
     }
     Ok(())
 }

@@ -9,12 +9,17 @@ use std::net::TcpStream;
 use masseter_can::socketcand::{ECHO, GREETING, OK, Request, RequestError, Requests, write_frame};
 use masseter_can::{Bus, ReceiveError};
 use masseter_plant::emulation::{NodePort, OpenLink};
-use masseter_terminal::status;
+use masseter_shared::clock::SECOND_NS;
+
+use crate::stderr_writer::StderrWriter;
 
 /// Most unsent bytes of a client; a bus at full load makes about 0.5 MB a second.
 const MAX_UNSENT: usize = 1 << 20;
 /// Delay of frames after the answer to a change of mode: clients expect that answer in a packet of its own, ns.
 const MODE_DELAY_NS: u64 = 20_000_000;
+
+/// Time for a new client to open a bus, so that silent connections keep no places, ns.
+const OPEN_TIMEOUT_NS: u64 = 5 * SECOND_NS;
 
 /// A connected client.
 #[derive(Debug)]
@@ -24,6 +29,7 @@ pub(super) struct Client {
     unsent: Vec<u8>,
     node: Option<NodePort>,
     frames_from_ns: Option<u64>,
+    open_by_ns: u64,
 }
 
 /// Why a connection is closed.
@@ -37,6 +43,8 @@ enum CloseReason {
     Request(#[from] RequestError),
     #[error("no bus `{name}`, or no place left on it; the buses are can0 to can{}", .buses - 1)]
     NoPlace { name: String, buses: usize },
+    #[error("it opened no bus within {} s", OPEN_TIMEOUT_NS / SECOND_NS)]
+    Silent,
     #[error("a connection opens one bus: use another connection for another bus")]
     OpenTwice,
     #[error("it reads too slowly: {0} bytes are unread")]
@@ -45,11 +53,13 @@ enum CloseReason {
 
 impl Client {
     /// Greets a new client.
-    pub(super) fn accept(stream: TcpStream) -> io::Result<Self> {
+    pub(super) fn accept(stream: TcpStream, now_ns: u64) -> io::Result<Self> {
         stream.set_nonblocking(true)?;
         stream.set_nodelay(true)?;
         let unsent = GREETING.as_bytes().to_vec();
-        Ok(Self { stream, requests: Requests::default(), unsent, node: None, frames_from_ns: None })
+        let open_by_ns = now_ns + OPEN_TIMEOUT_NS;
+        let requests = Requests::default();
+        Ok(Self { stream, requests, unsent, node: None, frames_from_ns: None, open_by_ns })
     }
 
     /// The connection, for polling.
@@ -58,15 +68,16 @@ impl Client {
     }
 
     /// Answers requests and sends received frames; false once the connection is closed.
-    pub(super) fn serve(&mut self, link: &mut OpenLink, now_ns: u64) -> bool {
+    pub(super) fn serve(&mut self, link: &mut OpenLink, now_ns: u64, stderr: &StderrWriter) -> bool {
         let served = self.read_requests().and_then(|()| {
             self.answer(link, now_ns)?;
-            self.queue_frames(link, now_ns);
+            self.queue_frames(link, now_ns, stderr);
+            self.check_open(now_ns)?;
             self.write_unsent()
         });
         let Err(reason) = served else { return true };
         if !matches!(reason, CloseReason::Closed) {
-            status!("a client is disconnected: {reason}");
+            stderr.write(&format!("a client is disconnected: {reason}\n"));
             // The client may have closed its end already.
             self.refuse(&reason);
             let _ = self.write_unsent();
@@ -75,6 +86,10 @@ impl Client {
             link.disconnect(node);
         }
         false
+    }
+
+    fn check_open(&self, now_ns: u64) -> Result<(), CloseReason> {
+        if self.node.is_none() && now_ns > self.open_by_ns { Err(CloseReason::Silent) } else { Ok(()) }
     }
 
     fn read_requests(&mut self) -> Result<(), CloseReason> {
@@ -142,7 +157,7 @@ impl Client {
     }
 
     /// Queues the frames that the node has received.
-    fn queue_frames(&mut self, link: &mut OpenLink, now_ns: u64) {
+    fn queue_frames(&mut self, link: &mut OpenLink, now_ns: u64, stderr: &StderrWriter) {
         let (Some(node), Some(from_ns)) = (&self.node, self.frames_from_ns) else { return };
         if now_ns < from_ns {
             return;
@@ -153,7 +168,9 @@ impl Client {
                 Ok(Some(received)) => {
                     write_frame(&mut text, &received).expect("writing to a string does not fail");
                 }
-                Err(ReceiveError::Overrun { lost }) => status!("a client lost {lost} frames"),
+                Err(ReceiveError::Overrun { lost }) => {
+                    stderr.write(&format!("a client lost {lost} frames\n"));
+                }
                 Ok(None) | Err(_) => break,
             }
         }

@@ -20,7 +20,8 @@ use rustix::io::Errno;
 
 use super::client::Client;
 
-use masseter_terminal::{Exit, status};
+use crate::stderr_writer::StderrWriter;
+use masseter_terminal::Exit;
 
 /// Clients on one bus at a time.
 const CLIENTS: usize = 8;
@@ -46,15 +47,17 @@ pub(crate) fn serve(args: &ServeArgs) -> anyhow::Result<Exit> {
     let stop = StopRequest::listen_alone().context("cannot listen for signals")?;
     let listener = listen(args.listen)?;
     let mut link = OpenLink::new(&scenario, CLIENTS, clock::now_ns())?;
-    announce(&listener, &scenario)?;
+    let stderr = StderrWriter::start();
+    announce(&listener, &scenario, &stderr)?;
     let mut clients = Vec::new();
     while !stop.is_made() {
         wait(&listener, &clients).context("cannot wait for clients")?;
         let now_ns = clock::now_ns();
         link.advance(now_ns)?;
-        accept(&listener, &mut clients, CLIENTS * link.buses());
-        clients.retain_mut(|client| client.serve(&mut link, now_ns));
+        accept(&listener, &mut clients, CLIENTS * link.buses(), &stderr);
+        clients.retain_mut(|client| client.serve(&mut link, now_ns, &stderr));
     }
+    stderr.finish();
     Ok(Exit::Passed)
 }
 
@@ -66,14 +69,14 @@ fn listen(address: SocketAddr) -> anyhow::Result<TcpListener> {
 }
 
 /// Lists buses, drives and the address on standard error.
-fn announce(listener: &TcpListener, scenario: &Scenario) -> anyhow::Result<()> {
+fn announce(listener: &TcpListener, scenario: &Scenario, stderr: &StderrWriter) -> anyhow::Result<()> {
     let address = listener.local_addr().context("the server has no address")?;
     for (bus, axes) in scenario.can.buses.iter().enumerate() {
         let node = |&axis: &usize| format!("{} (node {})", AXIS_NAMES[axis], scenario.can.node_ids[axis]);
         let nodes: Vec<String> = axes.iter().map(node).collect();
-        status!("can{bus}: {}", nodes.join(", "));
+        stderr.write(&format!("can{bus}: {}\n", nodes.join(", ")));
     }
-    status!("socketcand protocol on {address}; stop with Ctrl-C");
+    stderr.write(&format!("socketcand protocol on {address}; stop with Ctrl-C\n"));
     Ok(())
 }
 
@@ -88,12 +91,12 @@ fn wait(listener: &TcpListener, clients: &[Client]) -> io::Result<()> {
 }
 
 /// Accepts connections while there are places and closes the others.
-fn accept(listener: &TcpListener, clients: &mut Vec<Client>, places: usize) {
+fn accept(listener: &TcpListener, clients: &mut Vec<Client>, places: usize, stderr: &StderrWriter) {
     while let Ok((stream, address)) = listener.accept() {
         if clients.len() == places {
-            status!("refused a client from {address}: {places} clients are connected");
+            stderr.write(&format!("refused a client from {address}: {places} clients are connected\n"));
         } else {
-            clients.extend(Client::accept(stream));
+            clients.extend(Client::accept(stream, clock::now_ns()));
         }
     }
 }

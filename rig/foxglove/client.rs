@@ -3,29 +3,31 @@
 //! The thread may wait for its client, since only this client's messages wait with it: once its queue is full, further
 //! ones are dropped and counted.
 
+use std::fmt::Display;
 use std::io::ErrorKind;
 use std::net::{Shutdown, TcpStream};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU8, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU8, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, TryRecvError, TrySendError, sync_channel};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
 use masseter_recording::{Channel, Encoded, Encoder, Recorded, Scene, Topic};
-use tungstenite::handshake::server::{ErrorResponse, Request, Response};
+use tungstenite::handshake::server::{Callback, ErrorResponse, Request, Response};
 use tungstenite::http::{HeaderValue, StatusCode, header::SEC_WEBSOCKET_PROTOCOL};
 use tungstenite::protocol::frame::{CloseFrame, coding::CloseCode};
 use tungstenite::protocol::{Message, WebSocket, WebSocketConfig};
 use tungstenite::{Error, accept_hdr_with_config};
 
+use super::admission::admit;
 use super::protocol::{self, ClientMessage, Level};
 
 /// Length of a client's queue: almost half a second of every topic at 1 kHz.
 const QUEUE: usize = 8192;
 /// The longest message from a client, bytes; clients only subscribe.
 const MAX_REQUEST_BYTES: usize = 1 << 16;
-/// Time that a client may take over its handshake, so that an idle connection does not keep a client's place.
-const HANDSHAKE: Duration = Duration::from_secs(5);
+/// A client that takes nothing for this long is disconnected.
+const PATIENCE: Duration = Duration::from_secs(30);
 /// Time that the thread waits for a request before it sends what is queued.
 const INTERVAL: Duration = Duration::from_millis(10);
 
@@ -40,26 +42,44 @@ pub(super) struct Client {
     queue: Option<SyncSender<Queued>>,
     /// One bit per [`Topic`] that it subscribes to.
     subscribed: Arc<AtomicU8>,
+    is_admitted: Arc<AtomicBool>,
+    handshake_by_ns: u64,
     serving: JoinHandle<()>,
+}
+
+/// What a client must know, and what it is told first.
+#[derive(Debug, Clone)]
+pub(super) struct Greeting {
+    pub secret: String,
+    pub texts: [String; 2],
 }
 
 const _: () = assert!(Topic::ALL.len() <= u8::BITS as usize, "every topic has a bit in `Client::subscribed`");
 
 impl Client {
-    /// Starts the thread, which makes the handshake and then sends `greeting`.
-    pub(super) fn start(stream: TcpStream, scene: Scene, greeting: [String; 2]) -> std::io::Result<Self> {
+    /// Starts the thread, which makes the handshake and then sends the greeting.
+    pub(super) fn start(
+        stream: TcpStream,
+        scene: Scene,
+        greeting: Greeting,
+        handshake_by_ns: u64,
+    ) -> std::io::Result<Self> {
         stream.set_nodelay(true)?;
-        stream.set_read_timeout(Some(HANDSHAKE))?;
+        stream.set_write_timeout(Some(PATIENCE))?;
         let served = stream.try_clone()?;
         let (queue, queued) = sync_channel(QUEUE);
         let subscribed = Arc::new(AtomicU8::new(0));
         let published = Arc::clone(&subscribed);
+        let is_admitted = Arc::new(AtomicBool::new(false));
+        let admitted = Arc::clone(&is_admitted);
         let serving = thread::spawn(move || {
             // A client may leave at any time.
-            let _ =
-                Session::open(served, scene, published).and_then(|session| session.serve(greeting, &queued));
+            let _ = Session::open(served, scene, published, &greeting.secret).and_then(|session| {
+                admitted.store(true, Ordering::Relaxed);
+                session.serve(greeting.texts, &queued)
+            });
         });
-        Ok(Self { stream, queue: Some(queue), subscribed, serving })
+        Ok(Self { stream, queue: Some(queue), subscribed, is_admitted, handshake_by_ns, serving })
     }
 
     /// Queues a message if the client subscribes to its topic. False if the message is dropped for want of room.
@@ -71,6 +91,15 @@ impl Client {
 
     pub(super) fn is_subscribed(&self) -> bool {
         self.subscribed.load(Ordering::Relaxed) != 0
+    }
+
+    /// Whether its handshake takes too long.
+    pub(super) fn is_overdue(&self, now_ns: u64) -> bool {
+        !self.is_admitted.load(Ordering::Relaxed) && now_ns > self.handshake_by_ns
+    }
+
+    pub(super) fn is_watching(&self) -> bool {
+        self.is_admitted.load(Ordering::Relaxed) && !self.is_gone()
     }
 
     pub(super) fn is_gone(&self) -> bool {
@@ -112,12 +141,17 @@ struct Session {
 }
 
 impl Session {
-    fn open(stream: TcpStream, scene: Scene, subscribed: Arc<AtomicU8>) -> Result<Self, Disconnected> {
+    fn open(
+        stream: TcpStream,
+        scene: Scene,
+        subscribed: Arc<AtomicU8>,
+        secret: &str,
+    ) -> Result<Self, Disconnected> {
         let config = WebSocketConfig::default()
             .max_message_size(Some(MAX_REQUEST_BYTES))
             .max_frame_size(Some(MAX_REQUEST_BYTES));
         let socket =
-            accept_hdr_with_config(stream, choose_subprotocol, Some(config)).map_err(|_| Disconnected)?;
+            accept_hdr_with_config(stream, Handshake { secret }, Some(config)).map_err(|_| Disconnected)?;
         socket.get_ref().set_read_timeout(Some(INTERVAL)).map_err(Error::Io)?;
         let subscriptions = [None; Channel::COUNT];
         Ok(Self { socket, encoder: Encoder::new(scene), subscriptions, subscribed })
@@ -210,16 +244,26 @@ impl Session {
     }
 }
 
-/// Accepts a handshake that offers one of Foxglove's subprotocols, and refuses every other.
-#[expect(clippy::result_large_err, reason = "the library's callback returns it by value")]
-fn choose_subprotocol(request: &Request, mut response: Response) -> Result<Response, ErrorResponse> {
-    let mut offers = request.headers().get_all(SEC_WEBSOCKET_PROTOCOL).iter();
-    let chosen = offers.find_map(|offer| protocol::choose_subprotocol(offer.to_str().ok()?));
-    let Some(chosen) = chosen else {
-        let mut refusal = ErrorResponse::new(Some("this is a Foxglove WebSocket server\n".to_owned()));
-        *refusal.status_mut() = StatusCode::BAD_REQUEST;
-        return Err(refusal);
-    };
-    response.headers_mut().insert(SEC_WEBSOCKET_PROTOCOL, HeaderValue::from_static(chosen));
-    Ok(response)
+/// Accepts the handshake of a client that is admitted and offers one of Foxglove's subprotocols, and refuses every other.
+struct Handshake<'a> {
+    secret: &'a str,
+}
+
+impl Callback for Handshake<'_> {
+    fn on_request(self, request: &Request, mut response: Response) -> Result<Response, ErrorResponse> {
+        admit(request, self.secret).map_err(|refusal| refused(StatusCode::FORBIDDEN, &refusal))?;
+        let mut offers = request.headers().get_all(SEC_WEBSOCKET_PROTOCOL).iter();
+        let chosen = offers.find_map(|offer| protocol::choose_subprotocol(offer.to_str().ok()?));
+        let Some(chosen) = chosen else {
+            return Err(refused(StatusCode::BAD_REQUEST, &"this is a Foxglove WebSocket server"));
+        };
+        response.headers_mut().insert(SEC_WEBSOCKET_PROTOCOL, HeaderValue::from_static(chosen));
+        Ok(response)
+    }
+}
+
+fn refused(status: StatusCode, reason: &dyn Display) -> ErrorResponse {
+    let mut refusal = ErrorResponse::new(Some(format!("{reason}\n")));
+    *refusal.status_mut() = status;
+    refusal
 }

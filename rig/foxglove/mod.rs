@@ -3,8 +3,9 @@
 //! Each client has a thread and a queue of fixed length of its own. The recorder puts messages into the queues and never
 //! waits for a client; no other process is involved. A message without room is dropped and counted. The server of the
 //! `foxglove` crate counts no drops and brings an asynchronous runtime, so it is not used. There are no parameters,
-//! services, assets or publishing clients, and no authentication.
+//! services, assets or publishing clients. A client must know the secret of the URL.
 
+mod admission;
 mod client;
 mod protocol;
 #[cfg(test)]
@@ -18,9 +19,9 @@ use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
 use masseter_recording::{Recorded, Scene};
-use masseter_shared::clock;
+use masseter_shared::clock::{self, SECOND_NS};
 
-use client::Client;
+use client::{Client, Greeting};
 
 /// The default address: this machine only, on Foxglove's usual port.
 pub(crate) const DEFAULT_ADDRESS: &str = "127.0.0.1:8765";
@@ -57,6 +58,8 @@ pub(crate) struct ListenError {
 
 /// Most clients at a time; each has a thread and a queue of its own.
 const MAX_CLIENTS: usize = 8;
+/// Time that a client may take over its handshake, however it divides it: an idle connection keeps no place, ns.
+const HANDSHAKE_NS: u64 = 5 * SECOND_NS;
 /// Time between two looks for new clients.
 const INTERVAL: Duration = Duration::from_millis(50);
 /// Time between two looks whether all clients have read the rest, and how many there are: 0.5 s.
@@ -67,6 +70,7 @@ const CLOSING_POLLS: u32 = 50;
 #[derive(Debug)]
 pub(crate) struct FoxgloveServer {
     address: SocketAddr,
+    secret: String,
     clients: Arc<Clients>,
     dropped: AtomicU64,
     accepting: JoinHandle<()>,
@@ -84,16 +88,20 @@ impl Clients {
     }
 
     /// Accepts clients while there is room and disconnects the others, until the server closes.
-    fn accept(&self, listener: &TcpListener, scene: &Scene, greeting: &[String; 2]) {
+    fn accept(&self, listener: &TcpListener, scene: &Scene, greeting: &Greeting) {
         while !self.is_closing.load(Ordering::Relaxed) {
+            let now_ns = clock::now_ns();
+            let mut connected = self.connected();
+            connected.iter().filter(|client| client.is_overdue(now_ns)).for_each(Client::cut_off);
+            connected.retain(|client| !client.is_gone());
             let Ok((stream, _)) = listener.accept() else {
+                drop(connected);
                 clock::sleep(INTERVAL);
                 continue;
             };
-            let mut connected = self.connected();
-            connected.retain(|client| !client.is_gone());
             if connected.len() < MAX_CLIENTS {
-                connected.extend(Client::start(stream, scene.clone(), greeting.clone()));
+                let handshake_by_ns = now_ns + HANDSHAKE_NS;
+                connected.extend(Client::start(stream, scene.clone(), greeting.clone(), handshake_by_ns));
             }
         }
     }
@@ -116,23 +124,29 @@ fn bind(address: SocketAddr) -> Result<TcpListener, ListenError> {
 }
 
 impl FoxgloveServer {
-    /// Listens for clients. `session` differs between runs.
+    /// Listens for clients that know the secret. `session` differs between runs.
     ///
     /// # Errors
     /// When the system refuses the address.
-    pub(crate) fn start(address: SocketAddr, scene: Scene, session: &str) -> Result<Self, ListenError> {
+    pub(crate) fn start(
+        address: SocketAddr,
+        scene: Scene,
+        session: &str,
+        secret: String,
+    ) -> Result<Self, ListenError> {
         let listener = bind(address)?;
         let address = listener.local_addr().map_err(|error| ListenError { address, error })?;
         let clients = Arc::new(Clients::default());
         let accepted = Arc::clone(&clients);
-        let greeting = [protocol::server_info(session), protocol::advertise()];
+        let texts = [protocol::server_info(session), protocol::advertise()];
+        let greeting = Greeting { secret: secret.clone(), texts };
         let accepting = thread::spawn(move || accepted.accept(&listener, &scene, &greeting));
-        Ok(Self { address, clients, dropped: AtomicU64::new(0), accepting })
+        Ok(Self { address, secret, clients, dropped: AtomicU64::new(0), accepting })
     }
 
-    /// The URL for clients.
+    /// The URL for clients, with the secret.
     pub(crate) fn url(&self) -> String {
-        format!("ws://{}", self.address)
+        format!("ws://{}/{}", self.address, self.secret)
     }
 
     /// Queues a message that was received at `log_time_ns` for the clients that subscribe to its topic. Never waits for
@@ -145,7 +159,7 @@ impl FoxgloveServer {
 
     /// The clients at this moment.
     pub(crate) fn counts(&self) -> ClientCounts {
-        let connected = self.clients.connected().iter().filter(|client| !client.is_gone()).count();
+        let connected = self.clients.connected().iter().filter(|client| client.is_watching()).count();
         ClientCounts { connected, dropped: self.dropped.load(Ordering::Relaxed) }
     }
 

@@ -1,3 +1,4 @@
+use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
 use std::time::Duration;
 
@@ -14,7 +15,7 @@ use super::*;
 
 fn server() -> FoxgloveServer {
     let scene = Scene::new(&Mechanism::new(&MechanismConfig::default()).unwrap(), &JawConfig::default());
-    FoxgloveServer::start("127.0.0.1:0".parse().unwrap(), scene, "test").unwrap()
+    FoxgloveServer::start("127.0.0.1:0".parse().unwrap(), scene, "test", "secret".to_owned()).unwrap()
 }
 
 /// A client whose subscription to the controller's state the server has received.
@@ -28,6 +29,51 @@ fn client_of(server: &FoxgloveServer) -> WebSocket<TcpStream> {
     let is_subscribed = || server.clients.connected().iter().any(Client::is_subscribed);
     assert!(comes_true(is_subscribed), "the subscription did not arrive");
     socket
+}
+
+/// The first line that the server answers to a handshake with these headers.
+fn answer_to(server: &FoxgloveServer, path: &str, headers: &str) -> String {
+    let mut stream = TcpStream::connect(server.address).unwrap();
+    let request = format!(
+        "GET {path} HTTP/1.1\r\nUpgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\n\
+         Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\nSec-WebSocket-Protocol: foxglove.sdk.v1\r\n{headers}\r\n"
+    );
+    stream.write_all(request.as_bytes()).unwrap();
+    let mut line = String::new();
+    BufReader::new(stream).read_line(&mut line).unwrap();
+    line
+}
+
+#[test]
+fn a_client_without_the_secret_or_of_another_site_is_forbidden() {
+    let server = server();
+    let host = "Host: 127.0.0.1\r\n";
+    let evil = format!("{host}Origin: https://evil.example\r\n");
+    for (path, headers) in [("/", host), ("/secret", &evil), ("/secret", "Host: evil.example\r\n")] {
+        let answer = answer_to(&server, path, headers);
+        assert!(answer.starts_with("HTTP/1.1 403"), "{path} {headers}: {answer}");
+    }
+    assert!(answer_to(&server, "/secret", host).starts_with("HTTP/1.1 101"));
+}
+
+#[test]
+fn clients_that_do_not_finish_their_handshake_lose_their_places() {
+    let server = server();
+    let mut slow: Vec<_> = (0..MAX_CLIENTS).map(|_| TcpStream::connect(server.address).unwrap()).collect();
+    assert!(comes_true(|| server.clients.connected().len() == MAX_CLIENTS));
+    let mut refused = TcpStream::connect(server.address).unwrap();
+    assert_eq!(refused.read(&mut [0]).unwrap(), 0, "there is no place");
+    // A byte now and then buys no time.
+    for _ in 0..7 {
+        for stream in &mut slow {
+            // It fails once the server has closed the connection.
+            let _ = stream.write_all(b"G");
+        }
+        clock::sleep(Duration::from_secs(1));
+    }
+    assert_eq!(server.counts().connected, 0);
+    client_of(&server);
+    assert_eq!(server.counts().connected, 1);
 }
 
 /// Whether the condition comes true within a generous time.

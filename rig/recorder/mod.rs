@@ -7,27 +7,28 @@
 mod machine_topic;
 mod progress;
 mod sinks;
-mod stderr_writer;
 mod subscribers;
 
 use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::time::Duration;
 
+use anyhow::Context;
 use clap::Args;
 use masseter_recording::{Backlog, Pace, Recorded, Recorder, Scene};
 use masseter_shared::clock;
 use masseter_shared::geometry::Mechanism;
 use masseter_shared::realtime::scheduling::keep_off;
+use masseter_shared::transport::secret;
 use masseter_terminal::Exit;
 
 use crate::arguments::ProcessArgs;
 use crate::foxglove::FoxgloveServer;
 use crate::machine::SystemRoot;
 use crate::machine::sampler::Sampler;
+use crate::stderr_writer::StderrWriter;
 use progress::Progress;
 use sinks::Sinks;
-use stderr_writer::StderrWriter;
 use subscribers::Subscribers;
 
 /// Time between two drains of the topics; a fraction of what their buffers hold.
@@ -61,15 +62,18 @@ pub(crate) fn record(args: RecorderArgs) -> anyhow::Result<Exit> {
     let subscribers = Subscribers::open(&process.node)?;
     let scene = Scene::new(&Mechanism::new(&scenario.mechanism)?, &scenario.jaw);
     let server = match args.live {
-        Some(address) => Some(FoxgloveServer::start(address, scene.clone(), &process_arguments.domain)?),
+        Some(address) => {
+            let secret = secret().context("cannot make the secret of the live address")?;
+            Some(FoxgloveServer::start(address, scene.clone(), &process_arguments.domain, secret)?)
+        }
         None => None,
     };
     let backlog = Backlog::start(Recorder::create(&args.recording, scene)?, Pace::RealTime);
     let start = process.ready(None)?;
 
     let stderr = StderrWriter::start();
-    if let Some(server) = server.as_ref().filter(|_| !args.quiet) {
-        stderr.write(format!("live on {} for Foxglove\n", server.url()));
+    if let Some(server) = &server {
+        stderr.write(&format!("live on {} for Foxglove\n", server.url()));
     }
     let progress = (!args.quiet).then(|| Progress::new(args.motion_s, start.epoch_ns));
     let mut sinks = Sinks { backlog, server, progress, stderr };

@@ -5,8 +5,8 @@ use masseter_shared::messages::Message;
 use masseter_terminal::Exit;
 
 use super::progress::{Losses, Progress};
-use super::stderr_writer::StderrWriter;
 use crate::foxglove::{ClientLosses, FoxgloveServer};
+use crate::stderr_writer::StderrWriter;
 
 pub(super) struct Sinks {
     pub backlog: Backlog,
@@ -39,20 +39,20 @@ impl Sinks {
         let failure = self.backlog.new_failure().map(ToString::to_string);
         if let Some(failure) = failure {
             self.end_line(losses);
-            self.stderr.write(format!("masseter: {failure}; the run goes on without recording\n"));
+            self.stderr.write(&format!("masseter: {failure}; the run goes on without recording\n"));
         }
         if let Some(progress) = &mut self.progress
             && progress.is_due(now_ns)
             && self.stderr.is_idle()
         {
-            self.stderr.write(progress.next(now_ns, losses));
+            self.stderr.control(progress.next(now_ns, losses));
         }
     }
 
     /// Ends the line that shows the progress, since other text follows.
     fn end_line(&self, losses: Losses) {
         if let Some(line) = self.progress.as_ref().and_then(|progress| progress.end_line(losses)) {
-            self.stderr.write(line);
+            self.stderr.control(line);
         }
     }
 
@@ -61,10 +61,10 @@ impl Sinks {
         self.end_line(self.losses());
         let loss = self.backlog.finish().loss();
         if let Some(loss) = &loss {
-            self.stderr.write(format!("masseter: {loss}\n"));
+            self.stderr.write(&format!("masseter: {loss}\n"));
         }
         if let Some(losses) = self.server.and_then(|server| client_losses(server.finish())) {
-            self.stderr.write(format!("masseter: {losses}\n"));
+            self.stderr.write(&format!("masseter: {losses}\n"));
         }
         self.stderr.finish();
         if loss.is_some() { Exit::Incomplete } else { Exit::Passed }

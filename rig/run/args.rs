@@ -7,6 +7,7 @@ use std::time::Duration;
 use clap::{Args, ValueEnum};
 use masseter_plan::Overrides;
 use masseter_terminal::Format;
+use rustix::fs::Mode;
 
 use crate::arguments::{ControllerKind, Wires, parse_cores, parse_wires};
 use crate::foxglove;
@@ -64,6 +65,9 @@ pub(crate) struct RunArgs {
         default_missing_value = foxglove::DEFAULT_ADDRESS
     )]
     pub live: Option<SocketAddr>,
+    /// Who may read the run's files
+    #[arg(long, value_enum, default_value_t, value_name = "WHO")]
+    pub readable_by: Readers,
     /// Show no progress
     #[arg(long)]
     pub quiet: bool,
@@ -79,6 +83,29 @@ impl RunArgs {
             interfaces: self.can.as_ref().map(|wires| wires.0.clone()),
             cores: self.cores,
             seed: self.seed,
+        }
+    }
+}
+
+/// Who may read the files of a run. They hold the motion of a person's jaw.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Readers {
+    /// This user
+    #[default]
+    Owner,
+    /// This user and the group
+    Group,
+    /// Every user of the machine
+    All,
+}
+
+impl Readers {
+    /// The rights that new files do not get.
+    pub(crate) fn umask(self) -> Mode {
+        match self {
+            Self::Owner => Mode::RWXG | Mode::RWXO,
+            Self::Group => Mode::WGRP | Mode::RWXO,
+            Self::All => Mode::WGRP | Mode::WOTH,
         }
     }
 }

@@ -79,15 +79,10 @@ pub(super) fn check_shared_memory() -> anyhow::Result<()> {
 
 /// Gives every page of the domain's shared memory its place, once all processes have opened their ports.
 pub(super) fn reserve_shared_memory(domain: &Domain) -> anyhow::Result<()> {
-    let prefix = domain.prefix();
-    for entry in fs::read_dir(SHARED_MEMORY)? {
-        let entry = entry?;
-        if entry.file_name().as_encoded_bytes().starts_with(prefix.as_bytes()) {
-            let path = entry.path();
-            let file = OpenOptions::new().read(true).write(true).open(&path);
-            file.and_then(|file| allocate(&file, file.metadata()?.len()))
-                .with_context(|| format!("no room in shared memory for {}", path.display()))?;
-        }
+    for path in domain.shared_memory()? {
+        let file = OpenOptions::new().read(true).write(true).open(&path);
+        file.and_then(|file| allocate(&file, file.metadata()?.len()))
+            .with_context(|| format!("no room in shared memory for {}", path.display()))?;
     }
     Ok(())
 }

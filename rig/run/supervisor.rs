@@ -19,7 +19,7 @@ use masseter_shared::config::Scenario;
 use masseter_shared::lifecycle::Start;
 use masseter_shared::realtime::scheduling::Obtained;
 use masseter_shared::schedule::OFF_TICK_NS;
-use masseter_shared::transport::{Domain, DomainError, DomainLock};
+use masseter_shared::transport::{Domain, DomainError, DomainLock, Swept};
 use masseter_terminal::{Exit, Failure, OrFailure, status};
 
 use super::args::RunArgs;
@@ -49,9 +49,11 @@ const SAFE_STOP_NS: u64 = SECOND_NS / 2;
 /// Sweeps the domains of killed runs, and reserves the domain `name`, or one with a unique name.
 ///
 /// # Errors
-/// When a running rig has the name, or shared memory cannot be used.
+/// When a running rig has the name, or shared memory cannot be used. A file that cannot be removed is no error.
 pub(super) fn reserve_domain(name: Option<&str>) -> Result<(Domain, DomainLock), DomainError> {
-    Domain::all()?.iter().try_for_each(|domain| domain.sweep().map(drop))?;
+    for domain in Domain::all()? {
+        report_remaining(&domain.sweep()?.unwrap_or_default());
+    }
     let unique = || format!("{}-{:x}", std::process::id(), clock::now_ns());
     let domain = Domain::named(&name.map_or_else(unique, str::to_owned))?;
     let claim = domain.claim()?;
@@ -71,12 +73,17 @@ pub(super) fn run(
         .and_then(|mut rig| rig.run(plan, &domain, args.require_rt, &interrupts, manifest));
     drop(claim);
     interrupts.restore_default_actions();
-    if let Err(error) = domain.sweep() {
-        status!("masseter: {error}; `masseter clean` removes the rest of this run");
+    match domain.sweep() {
+        Ok(swept) => report_remaining(&swept.unwrap_or_default()),
+        Err(error) => status!("masseter: {error}; `masseter clean` removes the rest of this run"),
     }
     // Input errors were found before.
     manifest.ending = result.died()?;
     Ok(())
+}
+
+fn report_remaining(swept: &Swept) {
+    swept.remaining.iter().for_each(|error| status!("masseter: {error}"));
 }
 
 /// The three processes, in the order of their start.
@@ -125,6 +132,7 @@ impl Rig {
             return Ok(Ending::Interrupted);
         };
         manifest.scheduling = scheduling;
+        domain.make_private()?;
         reserve_shared_memory(domain)?;
         let is_virtual = machine::is_virtual(&SystemRoot::of_this_machine());
         let hold = dma_latency::Hold::new(plan.scenario.realtime.cpu_dma_latency, is_virtual);

@@ -23,8 +23,10 @@ mod batches;
 mod domain;
 mod error;
 mod ports;
+mod runtime;
 
 pub use batches::{BatchPublisher, BatchSubscriber};
-pub use domain::{Domain, DomainError, DomainLock, ScratchDomain};
-pub use error::TransportError;
+pub use domain::{Domain, DomainLock, ScratchDomain, Swept};
+pub use error::{DomainError, TransportError};
 pub use ports::{Node, Payload, Publisher, ReceivedMessage, Subscriber};
+pub use runtime::secret;

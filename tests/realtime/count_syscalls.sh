@@ -16,6 +16,9 @@ cat >"$work/lenient.toml" <<'END'
 [controller]
 stale_cycles = 5000
 tracking_limit_m = 1.0
+tracking_limit_rad = 1.0
+tracking_rms_limit_m = 1.0
+tracking_rms_limit_rad = 1.0
 [can]
 command_timeout_cycles = 5000
 heartbeat_consumer_ms = 5000

@@ -45,6 +45,9 @@ duration_s = 60.0
 [controller]
 stale_cycles = {silent_cycles}
 tracking_limit_m = 0.1
+tracking_limit_rad = 1.0
+tracking_rms_limit_m = 0.1
+tracking_rms_limit_rad = 1.0
 [can]
 command_timeout_cycles = {silent_cycles}
 heartbeat_consumer_ms = {heartbeat_ms}

@@ -36,12 +36,13 @@ def frame(text):
     return struct.pack(">BBH4x", 0x81, 0xFE, len(data)) + data
 
 
-def take_everything(address):
+def take_everything(url):
     """Subscribes to every channel and reads all that comes; returns how many bytes came."""
+    address, secret = url.removeprefix("ws://").split("/")
     host, port = address.split(":")
     with socket.create_connection((host, int(port))) as link:
         link.sendall(
-            f"GET / HTTP/1.1\r\nHost: {address}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+            f"GET /{secret} HTTP/1.1\r\nHost: {address}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
             "Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\nSec-WebSocket-Version: 13\r\n"
             "Sec-WebSocket-Protocol: foxglove.sdk.v1\r\n\r\n".encode()
         )
@@ -79,9 +80,9 @@ def live(command):
     rig = subprocess.Popen(
         [*command, "--live=127.0.0.1:0"], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
     )
-    address = next(line.split()[2] for line in rig.stderr if line.startswith("live on ")).removeprefix("ws://")
+    url = next(line.split()[2] for line in rig.stderr if line.startswith("live on "))
     taken = []
-    watcher = threading.Thread(target=lambda: taken.append(take_everything(address)))
+    watcher = threading.Thread(target=lambda: taken.append(take_everything(url)))
     watcher.start()
     said = rig.stderr.read()
     rig.wait()

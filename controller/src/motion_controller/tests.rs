@@ -66,6 +66,7 @@ impl Bench {
         Reading {
             cycle: self.cycle + 1,
             answers_cycle: last.cycle,
+            sampled_ns: (self.cycle + 1) * PERIOD_NS,
             position_m: told.target_m,
             drive_state: [state.code(); AXES],
             fresh_axes: ALL_AXES,
@@ -206,7 +207,14 @@ fn axes_slightly_outside_their_strokes_are_eased_back() {
 fn what_the_trim_carries_beyond_a_stroke_is_held_at_its_end() {
     let [_, highest_m] = MechanismConfig::default().strokes.leg_m;
     let jaw = JawConfig { closed_leg_m: highest_m, ..JawConfig::default() };
-    let mut bench = Bench::of(&Scenario { jaw, ..short() }, [0.29; LEGS]);
+    let controller = ControllerConfig {
+        tracking_limit_m: 1.0,
+        tracking_limit_rad: 1.0,
+        tracking_rms_limit_m: 1.0,
+        tracking_rms_limit_rad: 1.0,
+        ..ControllerConfig::default()
+    };
+    let mut bench = Bench::of(&Scenario { jaw, controller, ..short() }, [0.29; LEGS]);
     bench.run_until(ControllerState::Running);
     while bench.controller.state() != ControllerState::Finished {
         assert!(bench.cycle < 20_000);

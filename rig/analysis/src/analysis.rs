@@ -8,6 +8,7 @@ use masseter_shared::messages::{FrameTap, Message, Reading, State, Truth};
 
 use crate::attribution::OverrunAttribution;
 use crate::code::Code;
+use crate::declared_faults::FaultWatch;
 use crate::events::EventRecord;
 use crate::figures::Figures;
 use crate::freshness::Freshness;
@@ -44,6 +45,7 @@ pub struct Analysis {
     intervals: Intervals,
     longest_cycles: LongestCycles,
     tracking: Tracking,
+    faults: FaultWatch,
     sequence: SequenceCheck,
     frames: Vec<u64>,
     events: Vec<EventRecord>,
@@ -69,7 +71,11 @@ impl Analysis {
             period_ns,
             intervals: Intervals::new(period_ns),
             longest_cycles: LongestCycles::default(),
-            tracking: Tracking::new(if is_emulated { PoseSource::Truth } else { PoseSource::Estimate }),
+            tracking: Tracking::new(
+                if is_emulated { PoseSource::Truth } else { PoseSource::Estimate },
+                scenario.jaw.reference_point_m,
+            ),
+            faults: FaultWatch::new(scenario.faults.len()),
             sequence: SequenceCheck::default(),
             frames: Vec::new(),
             events: Vec::new(),
@@ -103,7 +109,7 @@ impl Analysis {
             Recorded::State(state) => self.state(state),
             Recorded::Truth(truth) => self.truth(truth),
             Recorded::Frame(frame) => self.frame(frame)?,
-            Recorded::Event(event) => self.events.push(event.into()),
+            Recorded::Event(event) => self.event(event.into()),
             Recorded::Machine(machine) => self.longest_cycles.machine(machine),
         }
         Ok(())
@@ -126,17 +132,20 @@ impl Analysis {
         self.longest_cycles.state(state, is_fresh);
         self.over_time.wake_up(CONTROLLER, state.due_ns, state.woke_ns);
         self.outage.state(state);
-        if is_fresh {
-            self.tracking.solution(state);
-        }
+        self.tracking.state(state, is_fresh).into_iter().for_each(|sample| self.faults.sample(sample));
         self.cycles = self.cycles.max(state.seq);
         self.final_state = Some(state.controller_state.into());
     }
 
     fn truth(&mut self, truth: &Truth) {
-        self.tracking.truth(truth);
+        self.tracking.truth(truth).into_iter().flatten().for_each(|sample| self.faults.sample(sample));
         self.bite_force_max_n = self.bite_force_max_n.map(|most_n| most_n.max(truth.bite_force_n));
         self.over_time.truth(truth);
+    }
+
+    fn event(&mut self, event: EventRecord) {
+        self.faults.event(&event);
+        self.events.push(event);
     }
 
     fn frame(&mut self, tap: &FrameTap) -> Result<(), TapError> {
@@ -171,6 +180,7 @@ impl Analysis {
             final_state: self.final_state,
             outage: self.outage.finish(self.period_ns),
             tracking,
+            faults: self.faults.finish(),
             bite_force_max_n: self.bite_force_max_n,
             worst_cycles: self.longest_cycles.finish(),
             intervals: self.intervals.finish(),

@@ -7,6 +7,7 @@ use serde::Serialize;
 use crate::attribution::OverrunAttribution;
 use crate::bus_response::BusResponse;
 use crate::code::Code;
+use crate::declared_faults::FaultFigures;
 use crate::events::EventRecord;
 use crate::freshness::ReadingFigures;
 use crate::longest_cycles::WorstCycle;
@@ -38,6 +39,8 @@ pub struct Figures {
     pub outage: Option<Outage>,
     /// Distance of the platform from its desired pose, while the motion played.
     pub tracking: TrackingFigures,
+    /// The scenario's faults, in their order.
+    pub faults: Vec<FaultFigures>,
     /// The greatest force with which the emulated jaw bit on food, N; none without food, and on the robot.
     pub bite_force_max_n: Option<f64>,
     /// Measured intervals.

@@ -2,13 +2,14 @@
 //! and forward kinematics' estimate on the robot, whose true pose is unknown.
 
 use masseter_shared::clock::SECOND_NS;
-use masseter_shared::geometry::Pose;
+use masseter_shared::geometry::{Deviation, Pose};
 use masseter_shared::messages::codes::ControllerState;
 use masseter_shared::messages::{State, Truth, pose_from_fields};
 use serde::Serialize;
 
 use super::by_cycle::ByCycle;
 use super::noise::standard_error;
+use super::pose_errors::{Accumulator, PoseErrorSums, PoseErrors};
 use super::series::{Curve, Extremes, Series};
 
 /// States in which the platform has a desired pose.
@@ -49,17 +50,13 @@ pub struct TrackingFigures {
     pub actual_source: PoseSource,
     /// Cycles compared.
     pub samples: u64,
-    /// Root mean square distance of the platform's origin, actual against desired, mm; none without samples, as the
-    /// others.
-    pub rms_mm: Option<f64>,
-    /// Standard error of that figure, by its seconds, mm; none with less than three of them.
+    /// Errors of the actual pose against the desired one.
+    #[serde(flatten)]
+    pub actual: PoseErrors,
+    /// Standard error of `rms_mm`, by its seconds, mm; none with less than three of them.
     pub rms_noise_mm: Option<f64>,
-    /// Largest distance, mm.
-    pub max_mm: Option<f64>,
-    /// Root mean square angle, actual against desired, degrees.
-    pub rms_deg: Option<f64>,
-    /// Largest angle, degrees.
-    pub max_deg: Option<f64>,
+    /// Errors of the pose estimated by forward kinematics against the desired one.
+    pub estimated: PoseErrors,
     /// Root mean square distance, estimated by forward kinematics against true, mm; none without truth.
     pub estimate_rms_mm: Option<f64>,
 }
@@ -102,15 +99,37 @@ const SAMPLE_NS: u64 = SECOND_NS / 60;
 /// Samples of the track: half a minute.
 const MOST_SAMPLES: usize = 2048;
 
+/// The state of a cycle, and its sample.
+#[derive(Debug, Clone, Copy)]
+struct Sample {
+    state: State,
+    /// Of the plant.
+    cycle: u64,
+    /// Whether the state is the first to use its reading.
+    is_fresh: bool,
+    /// Whether the platform had a desired pose, also in the cycle that ended the motion.
+    is_on_path: bool,
+}
+
+/// A cycle's distance from the desired path, by the actual pose.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct PathSample {
+    pub(super) sampled_ns: u64,
+    pub(super) deviation: Deviation,
+}
+
 /// Joins desired, estimated and, where there are any, true poses of the same sample.
 #[derive(Debug, Default)]
 pub(super) struct Tracking {
     source: PoseSource,
-    /// By the plant's cycle, until the other of the two comes.
-    states: ByCycle<State>,
+    /// The incisal point in the platform frame.
+    incisal_m: [f64; 3],
+    /// By the controller's cycle, until their truths come.
+    waiting: ByCycle<Sample>,
     truths: ByCycle<Truth>,
-    distances: Accumulator,
-    angles: Accumulator,
+    was_moving: bool,
+    actual: PoseErrorSums,
+    estimated: PoseErrorSums,
     estimates: Accumulator,
     track: Vec<TrackingSample>,
     next_sample_ns: u64,
@@ -124,81 +143,88 @@ pub(super) struct Tracking {
     seconds: Vec<f64>,
 }
 
-/// Root mean square and maximum of what is added.
-#[derive(Debug, Default)]
-pub struct Accumulator {
-    samples: u64,
-    squares: f64,
-    /// The largest value.
-    pub largest: f64,
-}
-
-impl Accumulator {
-    /// Takes a value.
-    pub fn add(&mut self, value: f64) {
-        self.samples += 1;
-        self.squares += value * value;
-        self.largest = self.largest.max(value);
-    }
-
-    /// The root of the mean square; 0 without values.
-    pub fn rms(&self) -> f64 {
-        (self.squares / self.samples.max(1) as f64).sqrt()
-    }
-}
-
 impl Tracking {
-    pub(super) fn new(source: PoseSource) -> Self {
-        Self { source, ..Self::default() }
+    pub(super) fn new(source: PoseSource, incisal_m: [f64; 3]) -> Self {
+        Self { source, incisal_m, ..Self::default() }
     }
 
-    /// The state of a cycle with a fresh reading: one used again was compared when it was fresh.
-    pub(super) fn solution(&mut self, state: &State) {
+    /// The state of a cycle. In one without a fresh reading, the desired pose is that of the sample that failed to come.
+    pub(super) fn state(&mut self, state: &State, is_fresh: bool) -> Option<PathSample> {
+        let is_moving = is_moving(state);
+        let is_on_path = is_moving || self.was_moving;
+        self.was_moving = is_moving;
+        let cycle = if is_fresh { state.reading_cycle } else { state.cycle.saturating_sub(1) };
+        let sample = Sample { state: *state, cycle, is_fresh, is_on_path };
         if self.source == PoseSource::Estimate {
             let estimated = pose_from_fields(state.estimated_position_m, state.estimated_quaternion_wxyz);
-            return self.compare(state, state.sampled_ns, estimated);
+            return is_fresh.then(|| self.compare(&sample, state.sampled_ns, estimated)).flatten();
         }
-        match self.truths.take(state.reading_cycle) {
-            Some(truth) => self.compare_with_truth(state, &truth),
-            None => self.states.insert(state.reading_cycle, *state),
-        }
+        let Some(truth) = self.truths.get(cycle) else {
+            self.waiting.insert(state.cycle, sample);
+            return None;
+        };
+        self.compare_with_truth(&sample, &truth)
     }
 
-    pub(super) fn truth(&mut self, truth: &Truth) {
-        match self.states.take(truth.cycle) {
-            Some(state) => self.compare_with_truth(&state, truth),
-            None => self.truths.insert(truth.cycle, *truth),
-        }
+    /// The true pose of a sample, with the states that wait for it: its own cycle's and its neighbours'.
+    pub(super) fn truth(&mut self, truth: &Truth) -> [Option<PathSample>; 3] {
+        self.truths.insert(truth.cycle, *truth);
+        let cycles = [truth.cycle.saturating_sub(1), truth.cycle, truth.cycle + 1];
+        cycles.map(|cycle| {
+            self.waiting.get(cycle).filter(|sample| sample.cycle == truth.cycle)?;
+            let sample = self.waiting.take(cycle)?;
+            self.compare_with_truth(&sample, truth)
+        })
     }
 
-    fn compare_with_truth(&mut self, state: &State, truth: &Truth) {
+    fn compare_with_truth(&mut self, sample: &Sample, truth: &Truth) -> Option<PathSample> {
         let actual = pose_from_fields(truth.position_m, truth.quaternion_wxyz);
-        self.compare(state, truth.sampled_ns, actual);
+        self.compare(sample, truth.sampled_ns, actual)
     }
 
-    fn compare(&mut self, state: &State, sampled_ns: u64, actual: Pose) {
+    /// The deviation from the path, where there is one.
+    fn compare(&mut self, sample: &Sample, sampled_ns: u64, actual: Pose) -> Option<PathSample> {
+        let Sample { state, is_fresh, is_on_path, .. } = sample;
         let desired = pose_from_fields(state.desired_position_m, state.desired_quaternion_wxyz);
-        let estimated = pose_from_fields(state.estimated_position_m, state.estimated_quaternion_wxyz);
-        let distance_m = (desired.translation.vector - actual.translation.vector).norm();
-        if state.controller_state == ControllerState::Running.code() {
-            self.distances.add(distance_m);
-            self.angles.add(desired.rotation.angle_to(&actual.rotation));
-            self.estimates.add((estimated.translation.vector - actual.translation.vector).norm());
-            self.add_to_second(distance_m, sampled_ns);
+        let deviation = Deviation::between(&desired, &actual, self.incisal_m);
+        if is_moving(state) {
+            self.actual.peak(&deviation);
+            if *is_fresh {
+                self.solution(state, sampled_ns, desired, actual, &deviation);
+            }
         }
-        if MOVING.iter().any(|moving| moving.code() == state.controller_state) {
-            let (began_ns, began_at) = *self.began.get_or_insert((sampled_ns, desired));
-            let stretch = self.moved_m.at(sampled_ns.saturating_sub(began_ns));
-            stretch.take(DISTANCE, distance_m);
-            for (first, pose) in [(DESIRED, &desired), (ACTUAL, &actual)] {
-                let moved_m = pose.translation.vector - began_at.translation.vector;
-                moved_m.iter().enumerate().for_each(|(axis, moved_m)| stretch.take(first + axis, *moved_m));
-            }
-            self.ended_ns = sampled_ns;
-            if sampled_ns >= self.next_sample_ns && self.track.len() < MOST_SAMPLES {
-                self.track.push(TrackingSample { sampled_ns, desired, estimated, actual });
-                self.next_sample_ns = sampled_ns + SAMPLE_NS;
-            }
+        is_on_path.then_some(PathSample { sampled_ns, deviation })
+    }
+
+    /// A cycle with an estimate of its own.
+    fn solution(
+        &mut self,
+        state: &State,
+        sampled_ns: u64,
+        desired: Pose,
+        actual: Pose,
+        deviation: &Deviation,
+    ) {
+        let estimated = pose_from_fields(state.estimated_position_m, state.estimated_quaternion_wxyz);
+        let estimate = Deviation::between(&desired, &estimated, self.incisal_m);
+        self.estimated.peak(&estimate);
+        if state.controller_state == ControllerState::Running.code() {
+            self.actual.add(deviation);
+            self.estimated.add(&estimate);
+            self.estimates.add((estimated.translation.vector - actual.translation.vector).norm());
+            self.add_to_second(deviation.origin_m, sampled_ns);
+        }
+        let (began_ns, began_at) = *self.began.get_or_insert((sampled_ns, desired));
+        let stretch = self.moved_m.at(sampled_ns.saturating_sub(began_ns));
+        stretch.take(DISTANCE, deviation.origin_m);
+        for (first, pose) in [(DESIRED, &desired), (ACTUAL, &actual)] {
+            let moved_m = pose.translation.vector - began_at.translation.vector;
+            moved_m.iter().enumerate().for_each(|(axis, moved_m)| stretch.take(first + axis, *moved_m));
+        }
+        self.ended_ns = sampled_ns;
+        if sampled_ns >= self.next_sample_ns && self.track.len() < MOST_SAMPLES {
+            self.track.push(TrackingSample { sampled_ns, desired, estimated, actual });
+            self.next_sample_ns = sampled_ns + SAMPLE_NS;
         }
     }
 
@@ -215,18 +241,15 @@ impl Tracking {
     }
 
     pub(super) fn finish(self) -> (TrackingFigures, Track) {
-        let samples = self.distances.samples;
-        let compared = |value: f64| (samples > 0).then_some(value);
+        let samples = self.actual.samples();
         let has_truth = self.source == PoseSource::Truth;
         let figures = TrackingFigures {
             actual_source: self.source,
             samples,
-            rms_mm: compared(self.distances.rms() * 1e3),
+            actual: self.actual.finish(),
             rms_noise_mm: standard_error(&self.seconds),
-            max_mm: compared(self.distances.largest * 1e3),
-            rms_deg: compared(self.angles.rms().to_degrees()),
-            max_deg: compared(self.angles.largest.to_degrees()),
-            estimate_rms_mm: compared(self.estimates.rms() * 1e3).filter(|_| has_truth),
+            estimated: self.estimated.finish(),
+            estimate_rms_mm: (samples > 0 && has_truth).then(|| self.estimates.rms() * 1e3),
         };
         let began_ns = self.began.map_or(self.ended_ns, |(began_ns, _)| began_ns);
         let bands = |first: usize| std::array::from_fn(|axis| self.moved_m.band(first + axis));
@@ -239,6 +262,10 @@ impl Tracking {
         };
         (figures, track)
     }
+}
+
+fn is_moving(state: &State) -> bool {
+    MOVING.iter().any(|moving| moving.code() == state.controller_state)
 }
 
 #[cfg(test)]
@@ -270,31 +297,31 @@ mod tests {
 
     #[test]
     fn without_truth_the_estimate_takes_its_place() {
-        let mut tracking = Tracking::new(PoseSource::Estimate);
-        tracking.solution(&State { estimated_position_m: [0.001, 0.0, 0.0], ..state(1, 0.003) });
+        let mut tracking = Tracking::new(PoseSource::Estimate, [0.0; 3]);
+        tracking.state(&State { estimated_position_m: [0.001, 0.0, 0.0], ..state(1, 0.003) }, true);
         let (figures, track) = tracking.finish();
         assert_eq!((figures.samples, figures.estimate_rms_mm), (1, None));
-        assert!((figures.rms_mm.unwrap() - 2.0).abs() < 1e-9);
+        assert!((figures.actual.rms_mm.unwrap() - 2.0).abs() < 1e-9);
         assert!((track.samples[0].actual.translation.x - 0.001).abs() < 1e-12);
     }
 
     #[test]
     fn a_platform_that_never_ran_has_no_tracking_error() {
-        let mut tracking = Tracking::new(PoseSource::Truth);
-        tracking.solution(&State { controller_state: ControllerState::Easing.code(), ..state(1, 0.0) });
+        let mut tracking = Tracking::new(PoseSource::Truth, [0.0; 3]);
+        tracking.state(&State { controller_state: ControllerState::Easing.code(), ..state(1, 0.0) }, true);
         tracking.truth(&truth(1, 0.0));
         let (figures, _) = tracking.finish();
         assert_eq!(figures, TrackingFigures::default());
-        assert_eq!((figures.rms_mm, figures.estimate_rms_mm), (None, None));
+        assert_eq!((figures.actual.rms_mm, figures.estimate_rms_mm), (None, None));
     }
 
     #[test]
     fn a_long_run_keeps_every_turn_of_its_motion_and_close_samples_of_its_beginning() {
-        let mut tracking = Tracking::new(PoseSource::Truth);
+        let mut tracking = Tracking::new(PoseSource::Truth, [0.0; 3]);
         for cycle in 0..100_000 {
             // To and fro in 0.7 s, as fast as chewing.
             let x = (cycle as f64 / 700.0 * std::f64::consts::TAU).sin();
-            tracking.solution(&state(cycle, x));
+            tracking.state(&state(cycle, x), true);
             tracking.truth(&Truth { sampled_ns: cycle * PERIOD_NS, ..truth(cycle, x) });
         }
         let (_, track) = tracking.finish();
@@ -312,15 +339,40 @@ mod tests {
 
     #[test]
     fn poses_are_compared_by_cycle_in_whatever_order_they_come() {
-        let mut tracking = Tracking::new(PoseSource::Truth);
-        tracking.solution(&state(1, 0.003));
-        tracking.solution(&state(2, 0.000));
+        let mut tracking = Tracking::new(PoseSource::Truth, [0.0; 3]);
+        tracking.state(&state(1, 0.003), true);
+        tracking.state(&state(2, 0.000), true);
         tracking.truth(&truth(2, 0.004));
         tracking.truth(&truth(1, 0.000));
         tracking.truth(&truth(3, 9.000));
         let (figures, _) = tracking.finish();
         assert_eq!(figures.samples, 2);
-        assert!((figures.max_mm.unwrap() - 4.0).abs() < 1e-9);
-        assert!((figures.rms_mm.unwrap() - (12.5f64).sqrt()).abs() < 1e-9);
+        assert!((figures.actual.max_mm.unwrap() - 4.0).abs() < 1e-9);
+        assert!((figures.actual.rms_mm.unwrap() - (12.5f64).sqrt()).abs() < 1e-9);
+    }
+
+    /// Cycle 3 has no reading of sample 2, and the motion ends with cycle 4.
+    #[test]
+    fn cycles_without_a_reading_and_the_last_one_have_a_deviation_too() {
+        let mut tracking = Tracking::new(PoseSource::Truth, [0.0; 3]);
+        let stale = State { reading_cycle: 1, ..state(3, 0.0) };
+        let stopped =
+            |cycle| State { controller_state: ControllerState::SafeStop.code(), ..state(cycle, 0.0) };
+        let mut deviations = Vec::new();
+        let found = [
+            tracking.state(&state(1, 0.0), true),
+            tracking.state(&stale, false),
+            tracking.state(&stopped(4), true),
+            tracking.state(&stopped(5), true),
+        ];
+        assert!(found.iter().all(Option::is_none), "{found:?}");
+        for (cycle, x) in [(1, 0.001), (2, 0.003), (4, 0.004), (5, 0.005)] {
+            deviations.extend(tracking.truth(&truth(cycle, x)).into_iter().flatten());
+        }
+        let deviations: Vec<_> = deviations.iter().map(|sample| sample.deviation.origin_m).collect();
+        assert_eq!(deviations, [0.001, 0.003, 0.004]);
+        let (figures, _) = tracking.finish();
+        assert_eq!((figures.samples, figures.actual.max_mm), (1, Some(3.0)));
+        assert!((figures.actual.rms_mm.unwrap() - 1.0).abs() < 1e-12);
     }
 }

@@ -3,70 +3,14 @@
 //! What the checks come to is the [verdict](super::verdict)'s.
 
 use masseter_shared::messages::codes::{Cause, ControllerState};
-use serde::Serialize;
 
+use crate::check::{Check, CheckResult};
+use crate::motion_checks::{faults, tracking};
 use crate::text;
 use masseter_analysis::{
     BusResponse, Code, EventRecord, Figures, OverrunAttribution, ResponseFigures, TrackingFigures,
 };
 use masseter_recording::{Ending, Manifest};
-
-/// Whether what was checked is as it should be.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum CheckResult {
-    /// It is.
-    Passed,
-    /// It is not.
-    Failed,
-    /// This run does not decide the check; the finding has the reason.
-    NotJudged,
-}
-
-impl CheckResult {
-    pub(crate) fn is_failed(self) -> bool {
-        self == Self::Failed
-    }
-
-    /// The word in tables.
-    pub fn mark(self) -> &'static str {
-        match self {
-            Self::Passed => "ok",
-            Self::Failed => "FAIL",
-            Self::NotJudged => "skip",
-        }
-    }
-}
-
-/// One thing that was judged.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Check {
-    /// What.
-    pub name: &'static str,
-    /// What was found, with its limit.
-    pub finding: String,
-    /// Whether it is as it should be.
-    pub result: CheckResult,
-}
-
-impl Check {
-    fn judged(name: &'static str, finding: String, passed: bool) -> Self {
-        let result = if passed { CheckResult::Passed } else { CheckResult::Failed };
-        Self { name, finding, result }
-    }
-
-    /// A failure that `excused` explains is none.
-    fn unless(self, excused: bool) -> Self {
-        match self.result {
-            CheckResult::Failed if excused => Self { result: CheckResult::NotJudged, ..self },
-            _ => self,
-        }
-    }
-
-    fn not_judged(name: &'static str, why: String) -> Self {
-        Self { name, finding: why, result: CheckResult::NotJudged }
-    }
-}
 
 /// `is_disturbed`: the machine kept the rig from too many cycles to hold its sequence or its tracking against it.
 pub(crate) fn checks(manifest: &Manifest, figures: &Figures, is_disturbed: bool) -> Vec<Check> {
@@ -74,9 +18,10 @@ pub(crate) fn checks(manifest: &Manifest, figures: &Figures, is_disturbed: bool)
     let (skipped, by_machine) = figures.skipped();
     let sequence = sequence(figures.final_state, &figures.events);
     let is_played = sequence.result == CheckResult::Passed;
+    let TrackingFigures { actual_source, samples, actual, estimated, .. } = &figures.tracking;
     let mut checks = vec![
         sequence.unless(is_disturbed),
-        tracking(&figures.tracking, limits.tracking_rms_mm, is_played).unless(is_disturbed),
+        tracking("tracking", *samples, actual, limits, is_played).unless(is_disturbed),
         Check {
             name: "missed cycles",
             finding: format!(
@@ -95,7 +40,12 @@ pub(crate) fn checks(manifest: &Manifest, figures: &Figures, is_disturbed: bool)
         ),
         bus_response(&figures.bus_response),
     ];
-    checks.extend(faults(manifest.scenario.faults.len(), &figures.events, is_played));
+    if actual_source.is_truth() {
+        let estimated = tracking("estimated tracking", *samples, estimated, limits, is_played);
+        checks.insert(2, estimated.unless(is_disturbed));
+    }
+    let faults = faults(&manifest.scenario.faults, &figures.faults, limits, is_played);
+    checks.extend(faults.map(|check| check.unless(is_disturbed)));
     checks
 }
 
@@ -120,30 +70,6 @@ fn dropped_messages(missing: u64, ending: &Ending, is_cut_short: bool, is_damage
         Some((_, why)) if missing == 0 => Check::not_judged(NAME, format!("no gap, but {why}")),
         _ => Check::judged(NAME, missing.to_string(), missing == 0),
     }
-}
-
-/// A motion that was played and left nothing to compare is no less a failure than one that was followed badly.
-fn tracking(tracking: &TrackingFigures, limit_mm: f64, is_played: bool) -> Check {
-    const NAME: &str = "tracking";
-    let TrackingFigures { rms_mm, samples, .. } = *tracking;
-    if rms_mm.is_none() && !is_played {
-        return Check::not_judged(NAME, "the motion never began".to_owned());
-    }
-    let in_words = text::or_dash(rms_mm, text::decimals);
-    let finding = format!("rms {in_words} mm over {samples} samples, limit {limit_mm} mm");
-    Check::judged(NAME, finding, rms_mm.is_some_and(|rms_mm| rms_mm <= limit_mm))
-}
-
-/// A test with faults that passes without them has tested nothing. None where none is declared.
-fn faults(declared: usize, events: &[EventRecord], is_played: bool) -> Option<Check> {
-    let begun = |number: usize| {
-        events.iter().any(|event| event.cause == Cause::FaultInjected && event.value as usize == number)
-    };
-    let idle: Vec<_> =
-        (1..=declared).filter(|&number| !begun(number)).map(|number| number.to_string()).collect();
-    let which = if idle.is_empty() { String::new() } else { format!(", number {} never", idle.join(", ")) };
-    let finding = format!("{} of {declared} declared faults acted{which}", declared - idle.len());
-    (declared > 0).then(|| Check::judged("faults", finding, idle.is_empty()).unless(!is_played))
 }
 
 /// No message may take longer on its bus than the plan allows at worst.
@@ -201,57 +127,7 @@ fn overruns_in_words(overruns: OverrunAttribution) -> String {
 
 #[cfg(test)]
 mod tests {
-    use masseter_shared::messages::Event;
-    use masseter_shared::messages::codes::{EventKind, Source};
-
     use super::*;
-
-    fn begun(number: usize) -> EventRecord {
-        let injected = Event::new(Source::Wire, EventKind::Notice, Cause::FaultInjected);
-        EventRecord::from(&Event { value: number as f64, ..injected })
-    }
-
-    #[test]
-    fn a_declared_fault_that_never_acted_fails_a_run_that_was_played_to_its_end() {
-        let ended = EventRecord { cause: Code::Known(Cause::FaultEnded), ..begun(2) };
-        let events = [begun(1), ended];
-        let cases = [
-            (0, true, None),
-            (1, true, Some(("ok", "1 of 1 declared faults acted"))),
-            (2, true, Some(("FAIL", "1 of 2 declared faults acted, number 2 never"))),
-            (2, false, Some(("skip", "1 of 2 declared faults acted, number 2 never"))),
-            (3, true, Some(("FAIL", "1 of 3 declared faults acted, number 2, 3 never"))),
-        ];
-        for (declared, is_played, expected) in cases {
-            let check = faults(declared, &events, is_played);
-            let found = check.as_ref().map(|check| (check.result.mark(), check.finding.as_str()));
-            assert_eq!(found, expected);
-        }
-    }
-
-    #[test]
-    fn a_motion_that_never_began_is_not_judged_unless_the_run_says_that_it_was_played() {
-        let still = TrackingFigures::default();
-        let moved = TrackingFigures { samples: 9, rms_mm: Some(0.2), ..still };
-        let cases = [
-            (still, false, "skip", "the motion never began"),
-            (still, true, "FAIL", "rms – mm over 0 samples, limit 0.1 mm"),
-            (moved, false, "FAIL", "rms 0.2000 mm over 9 samples, limit 0.1 mm"),
-        ];
-        for (figures, is_played, mark, finding) in cases {
-            let check = tracking(&figures, 0.1, is_played);
-            assert_eq!((check.result.mark(), check.finding.as_str()), (mark, finding));
-        }
-    }
-
-    #[test]
-    fn only_a_failure_is_excused() {
-        let check = |passed| Check::judged("tracking", String::new(), passed);
-        let cases = [(false, true, "skip"), (false, false, "FAIL"), (true, true, "ok"), (true, false, "ok")];
-        for (passed, excused, mark) in cases {
-            assert_eq!(check(passed).unless(excused).result.mark(), mark);
-        }
-    }
 
     #[test]
     fn no_gap_in_a_part_of_a_recording_says_nothing_of_the_rest() {

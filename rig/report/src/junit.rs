@@ -4,7 +4,7 @@ use askama::Template;
 use masseter_analysis::Figures;
 use masseter_recording::Manifest;
 
-use crate::checks::CheckResult;
+use crate::check::CheckResult;
 use crate::verdict::Verdict;
 
 /// One suite; a run that ended wrongly or cannot be judged has an `error` in a case of its own.

@@ -7,11 +7,13 @@
 mod animation;
 mod candump_logs;
 mod charts;
+mod check;
 mod checks;
 pub mod compare;
 mod event_log;
 pub mod histogram_log;
 mod junit;
+mod motion_checks;
 mod page;
 mod run_report;
 mod summary;
@@ -22,7 +24,7 @@ mod verdict;
 mod write_error;
 
 pub use candump_logs::CandumpLogs;
-pub use checks::{Check, CheckResult};
+pub use check::{Check, CheckResult};
 pub use run_report::{report_past_run, report_run};
 pub use verdict::Verdict;
 pub use write_error::WriteError;

@@ -8,7 +8,7 @@ use masseter_shared::messages::codes::EventKind;
 use crate::text::{decimals, event_with_cycle, microseconds, or_dash};
 use crate::verdict::Verdict;
 use masseter_analysis::{
-    BusResponse, Figures, IntervalFigures, ReadingFigures, ResponseFigures, TrackingFigures,
+    BusResponse, Figures, IntervalFigures, PoseErrors, ReadingFigures, ResponseFigures, TrackingFigures,
 };
 use masseter_recording::{Manifest, RunUsage, Usage};
 
@@ -135,11 +135,13 @@ fn responses(text: &mut String, response: &BusResponse) -> std::fmt::Result {
 
 /// Distances between actual and desired pose.
 pub(crate) fn distances(tracking: &TrackingFigures) -> String {
-    let TrackingFigures { rms_mm, max_mm, rms_deg, max_deg, .. } = *tracking;
-    let [rms_mm, max_mm, rms_deg, max_deg] =
-        [rms_mm, max_mm, rms_deg, max_deg].map(|value| or_dash(value, decimals));
+    let PoseErrors { rms_mm, max_mm, incisal_rms_mm, incisal_max_mm, rms_deg, max_deg } = tracking.actual;
+    let [rms_mm, max_mm, incisal_rms_mm, incisal_max_mm, rms_deg, max_deg] =
+        [rms_mm, max_mm, incisal_rms_mm, incisal_max_mm, rms_deg, max_deg]
+            .map(|value| or_dash(value, decimals));
     format!(
-        "{} against desired: rms {rms_mm} mm, max {max_mm} mm; rms {rms_deg}°, max {max_deg}°",
+        "{} against desired: rms {rms_mm} mm, max {max_mm} mm; rms {rms_deg}°, max {max_deg}°; incisal point rms \
+         {incisal_rms_mm} mm, max {incisal_max_mm} mm",
         tracking.actual_source.adjective()
     )
 }

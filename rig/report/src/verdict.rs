@@ -7,7 +7,9 @@ use masseter_shared::messages::codes::EventKind;
 use masseter_terminal::Exit;
 use serde::Serialize;
 
-use crate::checks::{Check, CheckResult, checks, missed_cycles};
+use crate::check::{Check, CheckResult};
+use crate::checks::{checks, missed_cycles};
+use crate::motion_checks::FAULTS;
 use crate::text;
 
 /// The judgement of a run.
@@ -41,8 +43,11 @@ impl Verdict {
     pub fn new(manifest: &Manifest, figures: &Figures) -> Self {
         let disturbed = disturbed(manifest, figures);
         let checks = checks(manifest, figures, disturbed.is_some());
+        let is_too_late =
+            checks.iter().any(|check| check.name == FAULTS && check.result == CheckResult::Failed);
         let (exit_code, mut reason) = ending(&manifest.ending, &figures.events)
-            .filter(|(exit, _)| !(*exit == Exit::SafeStop && disturbed.is_some()))
+            // The machine caused the stop, or it came only after a fault had led the jaw too far.
+            .filter(|(exit, _)| !(*exit == Exit::SafeStop && (disturbed.is_some() || is_too_late)))
             .or_else(|| incomplete(figures))
             .or(disturbed)
             .or_else(|| {

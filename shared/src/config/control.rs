@@ -36,8 +36,19 @@ section! {
         pub trim_limit_rad: f64 = 0.02,
         /// Cycles without a fresh, complete reading after which the controller stops safely.
         pub stale_cycles: u32 = 20,
-        /// Distance of the platform from where it should be at which the controller stops safely, m.
-        pub tracking_limit_m: f64 = 3e-3,
+        /// Distance of the incisal point from its desired position at which the controller stops safely, m.
+        /// Six times the largest of the default motions and of the default food, 0.036 mm. A drive that misses its targets
+        /// in the fastest motion adds 0.14 mm a cycle, so the stop comes before 0.5 mm.
+        pub tracking_limit_m: f64 = 0.2e-3,
+        /// Angle of the platform to its desired orientation at which the controller stops safely, rad.
+        /// 0.2°, four times the largest of the default food, 0.052°; such a drive adds up to 0.18° a cycle.
+        pub tracking_limit_rad: f64 = 3.5e-3,
+        /// Time constant of the mean squares of that distance and that angle, in cycles.
+        pub tracking_rms_cycles: u32 = 50,
+        /// Root mean square distance at which the controller stops safely, m. Half of the limit for a moment.
+        pub tracking_rms_limit_m: f64 = 0.1e-3,
+        /// Root mean square angle at which the controller stops safely, rad. Half of the limit for a moment.
+        pub tracking_rms_limit_rad: f64 = 1.75e-3,
     }
 }
 
@@ -74,8 +85,15 @@ section! {
     /// The limits beyond which a run fails.
     #[derive(Copy)]
     pub struct ChecksConfig {
-        /// Largest rms distance of the platform's origin from its desired position while the motion plays, mm.
+        /// Largest rms distance of the platform's origin, and of the incisal point, from the desired position while the
+        /// motion plays, mm. True and estimated pose are each held against it, as against the next three limits.
         pub tracking_rms_mm: f64 = 0.1,
+        /// Largest such distance, mm. No fault may lead further before it is detected.
+        pub tracking_max_mm: f64 = 0.5,
+        /// Largest rms angle of the platform to its desired orientation, degrees.
+        pub tracking_rms_deg: f64 = 0.1,
+        /// Largest such angle, degrees. No fault may turn the platform further before it is detected.
+        pub tracking_max_deg: f64 = 0.5,
         /// Most deadlines that the controller and the plant together may skip.
         pub missed_cycles: u64 = 0,
     }
@@ -88,7 +106,7 @@ impl ControllerConfig {
         ))?;
         require_positive(&keyed!("controller", self,
             steady_readings lead_cycles integral_gain_per_s trim_limit_m trim_limit_rad stale_cycles
-            tracking_limit_m
+            tracking_limit_m tracking_limit_rad tracking_rms_cycles tracking_rms_limit_m tracking_rms_limit_rad
         ))?;
         // The lead is no longer than a drive needs, and an error is corrected only once within the lead.
         if self.lead_cycles > MOST_LEAD_CYCLES {
@@ -125,7 +143,9 @@ impl RealtimeConfig {
 
 impl ChecksConfig {
     pub(super) fn validate(&self) -> Result<(), ScenarioError> {
-        require_positive(&keyed!("checks", self, tracking_rms_mm))
+        require_positive(&keyed!("checks", self,
+            tracking_rms_mm tracking_max_mm tracking_rms_deg tracking_max_deg
+        ))
     }
 }
 

@@ -1,6 +1,6 @@
 //! Faults on the buses: `[[faults]]`. On a simulated bus they act on any node, on a real bus only on the master's port.
 
-use std::fmt::Display;
+use std::fmt::{self, Display, Formatter};
 
 use serde::{Deserialize, Serialize};
 
@@ -26,6 +26,20 @@ pub enum FaultKindConfig {
     Disconnect,
     /// A node's controller goes off the bus.
     BusOff,
+}
+
+impl Display for FaultKindConfig {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Corrupt => "corrupt",
+            Self::Lose => "lose",
+            Self::Delay => "delay",
+            Self::Duplicate => "duplicate",
+            Self::Babble => "babble",
+            Self::Disconnect => "disconnect",
+            Self::BusOff => "bus_off",
+        })
+    }
 }
 
 /// One fault.
@@ -57,6 +71,16 @@ pub struct FaultConfig {
 
 const fn always() -> f64 {
     1.0
+}
+
+/// Kind and place: `lose (bus 1, node 4, id 204h)`.
+impl Display for FaultConfig {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        write!(f, "{} (bus {}", self.kind, self.bus)?;
+        self.node.map_or(Ok(()), |node| write!(f, ", node {node}"))?;
+        self.id.map_or(Ok(()), |id| write!(f, ", id {id:03X}h"))?;
+        f.write_str(")")
+    }
 }
 
 impl FaultConfig {

@@ -113,7 +113,7 @@ codes! {
         ForeignCommand = 8 "foreign_command",
         /// The drives did not reach operation enabled, or at the end off, in time (cycles).
         EnableTimeout = 9 "enable_timeout",
-        /// Platform too far from where it should be (m).
+        /// Incisal point too far from where it should be (m).
         TrackingLost = 10 "tracking_lost",
         /// No fresh command for too long (cycles).
         CommandLost = 11 "command_lost",
@@ -173,6 +173,8 @@ codes! {
         FaultInjected = 43 "fault_injected",
         /// A fault of the scenario is over (number in its list, from 1; number of activations).
         FaultEnded = 44 "fault_ended",
+        /// Platform turned too far from where it should be (rad).
+        OrientationLost = 48 "orientation_lost",
     }
 }
 

@@ -1,58 +1,61 @@
 //! The file names of a run, the check for living processes of the run, and the removal of the files.
 //!
-//! iceoryx2 leaves files in two places, both in `/dev/shm`: below a root folder, and beside it with a prefix. Every
-//! process of a run holds an inherited lock on `<root>/lock`; while anyone holds it, the run is alive.
+//! iceoryx2 leaves files in two places: in a root folder, which is private, and in `/dev/shm` with a prefix. The prefix
+//! contains a random number of the claim, so no other user can squat a name. Every process of a run holds an inherited
+//! lock on `<root>/lock`, whose text is that number; while anyone holds it, the run is alive.
 
 use std::fs::{self, File, TryLockError};
-use std::io;
+use std::io::{self, Write};
 use std::ops::Deref;
+use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use rustix::io::{FdFlags, fcntl_setfd};
 use rustix::process::getuid;
+
+use super::error::{DomainError, file_error};
+use super::runtime;
+use crate::clock::{self, SECOND_NS};
 
 const SHARED_MEMORY: &str = "/dev/shm";
 const LOCK: &str = "lock";
 /// No domain can have this name.
 const TURN: &str = ".turn";
+/// Claims and sweeps take milliseconds, ns.
+const TURN_TIMEOUT_NS: u64 = 5 * SECOND_NS;
+const TURN_POLL: Duration = Duration::from_millis(5);
 
 /// The names of one run.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Domain {
     id: String,
-}
-
-/// Why a domain could not be claimed or removed.
-#[derive(Debug, thiserror::Error)]
-pub enum DomainError {
-    /// Another run uses the name.
-    #[error("a rig named '{id}' is running; wait for it, stop it, or give this one another `--name`")]
-    InUse {
-        /// The domain's id.
-        id: String,
-    },
-    /// The id cannot be a file name.
-    #[error("'{id}' cannot name a rig: use 1 to 32 letters, digits, '-' or '_'")]
-    BadName {
-        /// The id as given.
-        id: String,
-    },
-    /// The file system refused.
-    #[error("cannot {action} {path}: {error}")]
-    File {
-        /// What was tried.
-        action: &'static str,
-        /// Where.
-        path: PathBuf,
-        /// What the system said.
-        error: io::Error,
-    },
+    root: PathBuf,
 }
 
 /// Exclusive use of a domain; children started meanwhile share it.
 #[derive(Debug)]
 pub struct DomainLock {
     _lock: File,
+}
+
+/// What a sweep did.
+#[derive(Debug, Default)]
+pub struct Swept {
+    /// Removed files of shared memory.
+    pub removed: usize,
+    /// Why others remain, as those that another user has put there.
+    pub remaining: Vec<DomainError>,
+}
+
+impl Swept {
+    fn remove(&mut self, path: &Path, remove: impl FnOnce(&Path) -> io::Result<()>) -> bool {
+        let removed = remove(path);
+        let is_gone =
+            removed.as_ref().map_or_else(|error| error.kind() == io::ErrorKind::NotFound, |()| true);
+        self.remaining.extend(removed.err().filter(|_| !is_gone).map(file_error("remove", path)));
+        is_gone
+    }
 }
 
 /// A domain whose files are removed on drop, for tests and measurements.
@@ -88,11 +91,11 @@ impl Drop for ScratchDomain {
 }
 
 impl Domain {
-    /// A domain by its id.
+    /// A domain by its id, in the private folder of this user.
     pub fn named(id: &str) -> Result<Self, DomainError> {
         let fits = (1..=32).contains(&id.len());
         if fits && id.bytes().all(|b| b.is_ascii_alphanumeric() || b == b'-' || b == b'_') {
-            Ok(Self { id: id.to_owned() })
+            Ok(Self { id: id.to_owned(), root: runtime::folder()?.join(id) })
         } else {
             Err(DomainError::BadName { id: id.to_owned() })
         }
@@ -103,26 +106,34 @@ impl Domain {
         &self.id
     }
 
-    /// The domain's root folder: one folder for each user, so that users never share files.
-    pub fn root(&self) -> PathBuf {
-        domains_of_this_user().join(&self.id)
+    /// The domain's root folder.
+    pub fn root(&self) -> &Path {
+        &self.root
     }
 
-    /// The prefix of its shared-memory files. No id contains a dot, so no other domain has this prefix.
-    pub fn prefix(&self) -> String {
-        format!("masseter_{}_{}.", getuid().as_raw(), self.id)
+    /// The prefix of the files in shared memory of the domain's claim.
+    ///
+    /// # Errors
+    /// When nobody has claimed the domain.
+    pub fn prefix(&self) -> io::Result<String> {
+        let secret = fs::read_to_string(self.root.join(LOCK))?;
+        Ok(format!("masseter_{}_{}.{secret}_", getuid().as_raw(), self.id))
     }
 
     /// Locks the domain for this process and its children until all have ended.
     pub fn claim(&self) -> Result<DomainLock, DomainError> {
         let _turn = take_turn()?;
-        let path = self.root().join(LOCK);
-        let lock = create(&path)?;
-        match lock.try_lock() {
-            Ok(()) => {}
-            Err(TryLockError::WouldBlock) => return Err(DomainError::InUse { id: self.id.clone() }),
-            Err(TryLockError::Error(error)) => return Err(file_error("lock", &path)(error)),
+        if self.is_locked() {
+            return Err(DomainError::InUse { id: self.id.clone() });
         }
+        self.remove()?;
+        let path = self.root.join(LOCK);
+        runtime::make(&self.root).map_err(file_error("create", &self.root))?;
+        let mut lock = runtime::open(&path)?;
+        lock.try_lock().map_err(io::Error::from).map_err(file_error("lock", &path))?;
+        runtime::secret()
+            .and_then(|secret| lock.write_all(secret.as_bytes()))
+            .map_err(file_error("write", &path))?;
         // Children inherit the lock, so the domain counts as alive until the last of them ended.
         fcntl_setfd(&lock, FdFlags::empty()).map_err(io::Error::from).map_err(file_error("share", &path))?;
         Ok(DomainLock { _lock: lock })
@@ -134,61 +145,84 @@ impl Domain {
         Ok(self.is_locked())
     }
 
-    /// Removes everything that a domain without a living process left in shared memory and in the file system;
-    /// how many files of shared memory that were, none while it is alive.
-    pub fn sweep(&self) -> Result<Option<usize>, DomainError> {
+    /// Removes what a domain without a living process left in shared memory and in the file system; nothing while it is
+    /// alive.
+    pub fn sweep(&self) -> Result<Option<Swept>, DomainError> {
         let _turn = take_turn()?;
-        if self.is_locked() {
-            return Ok(None);
+        if self.is_locked() { Ok(None) } else { self.remove().map(Some) }
+    }
+
+    fn remove(&self) -> Result<Swept, DomainError> {
+        let mut swept = Swept::default();
+        for path in self.shared_memory()? {
+            swept.removed += usize::from(swept.remove(&path, |path| fs::remove_file(path)));
         }
-        let prefix = self.prefix();
-        let mut removed = 0;
-        for path in entries(Path::new(SHARED_MEMORY))? {
-            if file_name(&path).starts_with(&prefix) {
-                remove(&path, fs::remove_file(&path))?;
-                removed += 1;
-            }
-        }
-        let root = self.root();
-        remove(&root, fs::remove_dir_all(&root))?;
-        Ok(Some(removed))
+        swept.remove(&self.root, |path| fs::remove_dir_all(path));
+        Ok(swept)
+    }
+
+    /// The files in shared memory of the domain's claim, if there is one.
+    ///
+    /// # Errors
+    /// When shared memory cannot be listed.
+    pub fn shared_memory(&self) -> Result<Vec<PathBuf>, DomainError> {
+        let Ok(prefix) = self.prefix() else { return Ok(Vec::new()) };
+        let files = entries(Path::new(SHARED_MEMORY))?;
+        Ok(files.into_iter().filter(|path| file_name(path).starts_with(&prefix)).collect())
+    }
+
+    /// Takes the rights of other users from the files in shared memory: iceoryx2 makes one of them for everybody. Nobody
+    /// can exchange an own file, since the folder is sticky.
+    ///
+    /// # Errors
+    /// [`DomainError::Foreign`] if another user has made one: the first files show the prefix of the others.
+    pub fn make_private(&self) -> Result<(), DomainError> {
+        self.shared_memory()?.iter().try_for_each(|path| runtime::make_private(path))
     }
 
     /// Asking takes the lock for a moment, which only one may do at a time.
     fn is_locked(&self) -> bool {
-        File::open(self.root().join(LOCK))
+        File::open(self.root.join(LOCK))
             .is_ok_and(|lock| matches!(lock.try_lock(), Err(TryLockError::WouldBlock)))
     }
 
     /// Every domain of this user that left something behind.
     pub fn all() -> Result<Vec<Self>, DomainError> {
-        let folder = domains_of_this_user();
-        if !folder.exists() {
-            return Ok(Vec::new());
-        }
-        Ok(entries(&folder)?.iter().filter_map(|path| Self::named(file_name(path)).ok()).collect())
+        let domains = entries(&runtime::folder()?)?;
+        Ok(domains.iter().filter_map(|path| Self::named(file_name(path)).ok()).collect())
     }
-}
-
-/// The folder of the locks, in shared memory beside the files of the domains: temporary folders may differ between
-/// processes.
-fn domains_of_this_user() -> PathBuf {
-    Path::new(SHARED_MEMORY).join(format!("masseter-{}", getuid().as_raw()))
 }
 
 /// Waits until no other process of this user claims or sweeps a domain: a lock not yet taken must not look like one
 /// that was let go. The turn ends with the file.
 fn take_turn() -> Result<File, DomainError> {
-    let path = domains_of_this_user().join(TURN);
-    let turn = create(&path)?;
-    turn.lock().map_err(file_error("lock", &path))?;
-    Ok(turn)
+    let path = runtime::folder()?.join(TURN);
+    let turn = runtime::open(&path)?;
+    let give_up_ns = clock::now_ns() + TURN_TIMEOUT_NS;
+    loop {
+        match turn.try_lock() {
+            Ok(()) => return Ok(turn),
+            Err(TryLockError::Error(error)) => return Err(file_error("lock", &path)(error)),
+            Err(TryLockError::WouldBlock) if clock::now_ns() < give_up_ns => clock::sleep(TURN_POLL),
+            Err(TryLockError::WouldBlock) => {
+                let holder = turn.metadata().ok().and_then(|file| holder(file.ino()));
+                let holder = holder.unwrap_or_else(|| "an unknown process".to_owned());
+                return Err(DomainError::Busy { path, holder });
+            }
+        }
+    }
 }
 
-/// Creates a file and the folders above it.
-fn create(path: &Path) -> Result<File, DomainError> {
-    let folder = path.parent().expect("the file is in a folder");
-    fs::create_dir_all(folder).and_then(|()| File::create(path)).map_err(file_error("create", path))
+/// The process that locked the file with this number, by its id and name.
+fn holder(inode: u64) -> Option<String> {
+    let locks = fs::read_to_string("/proc/locks").ok()?;
+    // 1: FLOCK  ADVISORY  WRITE 4711 00:1a:12345 0 EOF
+    let of_file = |line: &&str| {
+        line.split_whitespace().nth(5).and_then(|file| file.rsplit(':').next()) == Some(&inode.to_string())
+    };
+    let id = locks.lines().find(of_file)?.split_whitespace().nth(4)?;
+    let name = fs::read_to_string(format!("/proc/{id}/comm")).unwrap_or_default();
+    Some(format!("process {id} ({})", name.trim_end()))
 }
 
 fn entries(folder: &Path) -> Result<Vec<PathBuf>, DomainError> {
@@ -198,17 +232,6 @@ fn entries(folder: &Path) -> Result<Vec<PathBuf>, DomainError> {
 
 fn file_name(path: &Path) -> &str {
     path.file_name().and_then(|name| name.to_str()).unwrap_or_default()
-}
-
-fn remove(path: &Path, result: io::Result<()>) -> Result<(), DomainError> {
-    result.or_else(|error| match error.kind() {
-        io::ErrorKind::NotFound => Ok(()),
-        _ => Err(file_error("remove", path)(error)),
-    })
-}
-
-fn file_error(action: &'static str, path: &Path) -> impl FnOnce(io::Error) -> DomainError {
-    move |error| DomainError::File { action, path: path.to_owned(), error }
 }
 
 #[cfg(test)]
@@ -221,17 +244,71 @@ mod tests {
         Domain::named(&format!("test-{name}-{}", std::process::id())).unwrap()
     }
 
+    fn segment(domain: &Domain) -> PathBuf {
+        Path::new(SHARED_MEMORY).join(domain.prefix().unwrap() + "segment")
+    }
+
+    /// Removed files of a dead domain, all of which can be removed.
+    fn swept(domain: &Domain) -> usize {
+        let swept = domain.sweep().unwrap().unwrap();
+        assert!(swept.remaining.is_empty(), "{swept:?}");
+        swept.removed
+    }
+
+    #[test]
+    fn what_cannot_be_removed_is_reported_and_the_rest_removed() {
+        let domain = unique("remaining");
+        let claim = domain.claim().unwrap();
+        let file = segment(&domain);
+        let foreign = PathBuf::from(format!("{}-folder", file.display()));
+        fs::write(&file, "").unwrap();
+        // No user can remove a folder as a file.
+        fs::create_dir(&foreign).unwrap();
+        drop(claim);
+        let swept = domain.sweep().unwrap().unwrap();
+        fs::remove_dir(&foreign).unwrap();
+        assert_eq!(swept.removed, 1);
+        assert!(
+            matches!(&swept.remaining[..], [DomainError::File { path, .. }] if *path == foreign),
+            "{swept:?}"
+        );
+        assert!(!file.exists() && !domain.root().exists());
+    }
+
+    #[test]
+    fn a_new_claim_has_another_prefix_and_removes_what_the_last_one_left() {
+        let domain = unique("again");
+        drop(domain.claim().unwrap());
+        let (left, prefix) = (segment(&domain), domain.prefix().unwrap());
+        fs::write(&left, "").unwrap();
+        let claim = domain.claim().unwrap();
+        assert!(!left.exists());
+        assert_ne!(domain.prefix().unwrap(), prefix);
+        drop(claim);
+        swept(&domain);
+    }
+
+    #[test]
+    fn a_file_that_is_not_ours_is_refused() {
+        let domain = ScratchDomain::claim("test-foreign").unwrap();
+        let foreign = segment(&domain);
+        domain.make_private().unwrap();
+        std::os::unix::fs::symlink("/dev/null", &foreign).unwrap();
+        let refused = domain.make_private();
+        assert!(matches!(&refused, Err(DomainError::Foreign { path }) if *path == foreign), "{refused:?}");
+    }
+
     #[test]
     fn a_claimed_domain_is_alive_refused_to_others_and_not_swept() {
         let domain = unique("claim");
         let claim = domain.claim().unwrap();
         assert!(domain.is_alive().unwrap());
         assert!(matches!(domain.claim(), Err(DomainError::InUse { .. })));
-        assert_eq!(domain.sweep().unwrap(), None);
+        assert!(domain.sweep().unwrap().is_none());
         assert!(domain.root().exists());
         drop(claim);
         assert!(!domain.is_alive().unwrap());
-        assert_eq!(domain.sweep().unwrap(), Some(0));
+        assert_eq!(swept(&domain), 0);
         assert!(!domain.root().exists());
     }
 
@@ -239,7 +316,7 @@ mod tests {
     fn a_scratch_domain_leaves_nothing_behind() {
         let scratch = ScratchDomain::claim("test-scratch").unwrap();
         let domain = (*scratch).clone();
-        let file = Path::new(SHARED_MEMORY).join(format!("{}segment", domain.prefix()));
+        let file = segment(&domain);
         fs::write(&file, "").unwrap();
         assert!(domain.is_alive().unwrap());
         drop(scratch);
@@ -250,13 +327,13 @@ mod tests {
     fn a_domain_whose_id_begins_another_ones_leaves_it_its_files() {
         let (short, long) =
             (unique("prefix"), Domain::named(&format!("{}_2", unique("prefix").id())).unwrap());
-        let file = Path::new(SHARED_MEMORY).join(format!("{}segment", long.prefix()));
         let claim = long.claim().unwrap();
+        let file = segment(&long);
         fs::write(&file, "").unwrap();
-        assert_eq!(short.sweep().unwrap(), Some(0));
+        assert_eq!(swept(&short), 0);
         assert!(file.exists());
         drop(claim);
-        assert_eq!(long.sweep().unwrap(), Some(1));
+        assert_eq!(swept(&long), 1);
     }
 
     #[test]

@@ -1,6 +1,8 @@
-//! Failures of ports, and connections that iceoryx2 could not make.
+//! Failures of domains and ports, and connections that iceoryx2 could not make.
 
 use std::fmt::Debug;
+use std::io;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
 
@@ -8,6 +10,59 @@ use iceoryx2::port::update_connections::UpdateConnections;
 use iceoryx2::port::{DegradationAction, DegradationFn};
 
 use crate::messages::{LAYOUT_VERSION, Message};
+
+/// Why a domain could not be claimed or removed.
+#[derive(Debug, thiserror::Error)]
+pub enum DomainError {
+    /// Another run uses the name.
+    #[error("a rig named '{id}' is running; wait for it, stop it, or give this one another `--name`")]
+    InUse {
+        /// The domain's id.
+        id: String,
+    },
+    /// The id cannot be a file name.
+    #[error("'{id}' cannot name a rig: use 1 to 32 letters, digits, '-' or '_'")]
+    BadName {
+        /// The id as given.
+        id: String,
+    },
+    /// Another process claims or sweeps domains for longer than that takes.
+    #[error("{holder} holds the lock {path} for more than 5 s; end it, or let it go on")]
+    Busy {
+        /// The lock.
+        path: PathBuf,
+        /// The process that holds it.
+        holder: String,
+    },
+    /// Other users could read or replace the files of a run.
+    #[error(
+        "{path} is not a private folder of this user (mode 0700): remove it, or have root remove it, or set XDG_RUNTIME_DIR to a private folder"
+    )]
+    NotPrivate {
+        /// The folder, or what has its name.
+        path: PathBuf,
+    },
+    /// Another user has made a file in the place of ours.
+    #[error("another user has made {path}: start the rig again, whose files then have other names")]
+    Foreign {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The file system refused.
+    #[error("cannot {action} {path}: {error}")]
+    File {
+        /// What was tried.
+        action: &'static str,
+        /// Where.
+        path: PathBuf,
+        /// What the system said.
+        error: io::Error,
+    },
+}
+
+pub(super) fn file_error(action: &'static str, path: &Path) -> impl FnOnce(io::Error) -> DomainError {
+    move |error| DomainError::File { action, path: path.to_owned(), error }
+}
 
 /// Why a port could not be made or used.
 #[derive(Debug, thiserror::Error)]
@@ -20,7 +75,9 @@ pub struct TransportError {
 /// What helps against the refusals users meet.
 fn help(reason: &str) -> &'static str {
     if reason.contains("Permission") {
-        "another user owns files of this name in /dev/shm"
+        "another user has made a file of this name in /dev/shm; start the rig again"
+    } else if reason.contains("NotFound") {
+        "no rig of this name runs"
     } else if reason.contains("Incompatible") {
         "a process of another version uses this topic; stop it"
     } else if reason.contains("ConnectionsRefused") {

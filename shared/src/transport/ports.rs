@@ -45,11 +45,14 @@ impl Node {
         set_log_level(LogLevel::Fatal);
         let id = domain.id();
         let mut config = Config::default();
-        config.global.prefix = domain.prefix().as_str().try_into().map_err(failed("joining domain", id))?;
+        let prefix = domain.prefix().map_err(failed("joining domain", id))?;
+        config.global.prefix = prefix.as_str().try_into().map_err(failed("joining domain", id))?;
         let root = iceoryx2::prelude::Path::new(domain.root().as_os_str().as_encoded_bytes());
         config.global.set_root_path(&root.map_err(failed("joining domain", id))?);
         let builder = NodeBuilder::new().config(&config).signal_handling_mode(SignalHandlingMode::Disabled);
-        Ok(Self { node: builder.create().map_err(failed("joining domain", id))? })
+        let node = builder.create().map_err(failed("joining domain", id))?;
+        domain.make_private().map_err(failed("joining domain", id))?;
+        Ok(Self { node })
     }
 
     /// The iceoryx2 node beneath, for measurements against bare iceoryx2.
@@ -236,11 +239,57 @@ impl<M: Message> Subscriber<M> {
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+    use std::os::unix::fs::PermissionsExt;
+    use std::path::{Path, PathBuf};
+
     use iceoryx2::prelude::ZeroCopySend;
 
     use super::*;
-    use crate::messages::Event;
-    use crate::transport::ScratchDomain;
+    use crate::messages::{Event, FrameTap};
+    use crate::transport::{BatchPublisher, BatchSubscriber, ScratchDomain, runtime};
+
+    /// Every file below a folder.
+    fn files_below(folder: &Path, found: &mut Vec<PathBuf>) {
+        for path in fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()) {
+            if path.is_dir() {
+                files_below(&path, found);
+            } else {
+                found.push(path);
+            }
+        }
+    }
+
+    #[test]
+    fn no_other_user_may_touch_a_file_of_a_domain_and_every_path_leaves_room_for_a_session_folder() {
+        let domain = ScratchDomain::claim("test-of-the-longest-name").unwrap();
+        let node = Node::join(&domain).unwrap();
+        let _subscriber = BatchSubscriber::<FrameTap>::open(&node).unwrap();
+        let publisher = BatchPublisher::<FrameTap>::open(&node).unwrap();
+        publisher.connect().unwrap();
+        let mode = |path: &Path| fs::metadata(path).unwrap().permissions().mode() & 0o777;
+        assert_eq!(mode(domain.root()), 0o700);
+        assert_eq!(mode(domain.root().parent().unwrap()), 0o700);
+
+        let prefix = domain.prefix().unwrap();
+        let shared = fs::read_dir("/dev/shm").unwrap().map(|entry| entry.unwrap());
+        let shared: Vec<_> =
+            shared.filter(|file| file.file_name().to_string_lossy().starts_with(&prefix)).collect();
+        assert!(shared.len() > 3, "{shared:?}");
+        for file in shared {
+            assert_eq!(mode(&file.path()), 0o600, "{file:?}");
+        }
+        let mut files = Vec::new();
+        files_below(domain.root(), &mut files);
+        assert!(!files.is_empty());
+        let room = 255 - runtime::LONGEST_SESSION_FOLDER - "/masseter/".len() - 32 - 1;
+        // The name may have 32 bytes, the user's id 10 digits, the node's number 39.
+        let longer = (32 - domain.id().len()) + 9 + 15;
+        for file in files {
+            let beside_the_id = file.strip_prefix(domain.root()).unwrap().as_os_str().len();
+            assert!(beside_the_id + longer <= room, "{file:?}");
+        }
+    }
 
     #[test]
     fn the_newest_message_is_found_among_many_and_while_one_is_held() {

@@ -1,6 +1,9 @@
 //! Verdicts on figures made by hand, each differing in one thing from those of a run that passes.
 
-use masseter_analysis::{Analysis, Code, OverrunAttribution, ResponseFigures, SkipFigures, TopicFigures};
+use masseter_analysis::{
+    Analysis, Code, FaultFigures, OverrunAttribution, PoseErrors, ResponseFigures, SkipFigures, TopicFigures,
+    TrackingFigures,
+};
 use masseter_recording::{Damage, MachineInfo};
 use masseter_shared::config::{CpuDmaLatency, FaultConfig, FaultKindConfig, Scenario};
 use masseter_shared::messages::codes::ControllerState;
@@ -21,7 +24,9 @@ impl Run {
         let scenario = Scenario::default();
         let mut figures = Analysis::new(&scenario).finish(false, &[]);
         figures.final_state = Some(Code::Known(ControllerState::Finished));
-        (figures.tracking.rms_mm, figures.tracking.samples) = (Some(0.05), 1000);
+        let on_path = PoseErrors { rms_mm: Some(0.05), ..PoseErrors::default() };
+        figures.tracking =
+            TrackingFigures { samples: 1000, actual: on_path, estimated: on_path, ..figures.tracking };
         figures.bus_response.unbounded = None;
         figures.bus_response.messages = vec![ResponseFigures {
             bus: 0,
@@ -61,7 +66,16 @@ impl Run {
             [1, missing - 1].map(|missing| TopicFigures { topic: "state", messages: 9, missing }).to_vec();
     }
 
+    /// It never struck.
     fn declare_fault(&mut self) {
+        let idle = FaultFigures {
+            number: 1,
+            struck_ns: None,
+            deviation_mm: 0.0,
+            deviation_deg: 0.0,
+            detection: None,
+        };
+        self.figures.faults.push(idle);
         self.manifest.scenario.faults.push(FaultConfig {
             kind: FaultKindConfig::Lose,
             bus: 0,
@@ -90,15 +104,17 @@ fn results(verdict: &Verdict) -> Vec<(&'static str, &'static str)> {
 fn a_run_without_anything_wrong_passes_every_check() {
     let verdict = Run::with(|_| ());
     assert_eq!((verdict.exit_code, verdict.reason.as_str()), (Exit::Passed, "every check passed"));
-    let expected = ["sequence", "tracking", "missed cycles", "dropped messages", "bus response"]
-        .map(|name| (name, "ok"));
+    let expected =
+        ["sequence", "tracking", "estimated tracking", "missed cycles", "dropped messages", "bus response"]
+            .map(|name| (name, "ok"));
     assert_eq!(results(&verdict), expected);
     let findings: Vec<_> = verdict.checks.iter().map(|check| check.finding.as_str()).collect();
     assert_eq!(
         findings,
         [
             "ended in state finished",
-            "rms 0.0500 mm over 1000 samples, limit 0.1 mm",
+            "closest of 1000 samples: platform rms 0.0500 mm, limit 0.1 mm",
+            "closest of 1000 samples: platform rms 0.0500 mm, limit 0.1 mm",
             "0 (0 by the machine), limit 0",
             "0",
             "closest: SYNC on bus 0 took 150.00 µs, bound 190.00 µs",
@@ -108,11 +124,16 @@ fn a_run_without_anything_wrong_passes_every_check() {
 
 #[test]
 fn each_thing_that_is_wrong_has_its_verdict() {
-    let cases: [(Change, Exit, &str); 17] = [
+    let cases: [(Change, Exit, &str); 18] = [
         (|run| run.figures.controller_skips.skipped = 3, Exit::Failed, "failed: missed cycles"),
         (|run| run.figures.plant_skips.skipped = 1, Exit::Failed, "failed: missed cycles"),
-        (|run| run.figures.tracking.rms_mm = Some(0.11), Exit::Failed, "failed: tracking"),
-        (|run| run.figures.tracking.rms_mm = None, Exit::Failed, "failed: tracking"),
+        (|run| run.figures.tracking.actual.rms_mm = Some(0.11), Exit::Failed, "failed: tracking"),
+        (|run| run.figures.tracking.actual.rms_mm = None, Exit::Failed, "failed: tracking"),
+        (
+            |run| run.figures.tracking.estimated.max_deg = Some(0.51),
+            Exit::Failed,
+            "failed: estimated tracking",
+        ),
         (|run| run.figures.final_state = None, Exit::Failed, "failed: sequence"),
         (
             |run| run.figures.final_state = Some(Code::Known(ControllerState::Disabling)),
@@ -136,7 +157,7 @@ fn each_thing_that_is_wrong_has_its_verdict() {
         (Run::declare_fault, Exit::Failed, "failed: faults"),
         (
             |run| {
-                run.figures.tracking.rms_mm = Some(0.2);
+                run.figures.tracking.actual.rms_mm = Some(0.2);
                 run.figures.plant_skips.skipped = 1;
             },
             Exit::Failed,
@@ -177,7 +198,7 @@ fn a_damaged_recording_is_incomplete_whatever_its_figures_say() {
     for damage in damages {
         let mut run = Run::new();
         damage(&mut run);
-        (run.figures.plant_skips.skipped, run.figures.tracking.rms_mm) = (5, Some(1.0));
+        (run.figures.plant_skips.skipped, run.figures.tracking.actual.rms_mm) = (5, Some(1.0));
         assert_eq!(Verdict::new(&run.manifest, &run.figures).exit_code, Exit::Incomplete);
         run.figures.plant_skips.skipped = 0;
         run.disturb();
@@ -254,7 +275,7 @@ fn skips_of_the_rig_fail_a_run_and_those_of_the_machine_make_it_invalid() {
     ];
     for (change, outcome, findings) in cases {
         let verdict = Run::with(change);
-        let [sequence, missed] = [0, 2].map(|place| verdict.checks[place].finding.as_str());
+        let [sequence, missed] = [0, 3].map(|place| verdict.checks[place].finding.as_str());
         assert_eq!((verdict.exit_code, format!("{sequence}; {missed}").as_str()), (outcome, findings));
     }
 }
@@ -305,12 +326,13 @@ fn what_a_disturbed_run_failed_is_not_judged() {
     let mut run = Run::new();
     run.disturb();
     run.declare_fault();
-    (run.figures.tracking.rms_mm, run.figures.final_state) = (Some(3.0), None);
+    (run.figures.tracking.actual.rms_mm, run.figures.final_state) = (Some(3.0), None);
     let verdict = Verdict::new(&run.manifest, &run.figures);
     assert_eq!(verdict.exit_code, Exit::Invalid);
     let expected = [
         ("sequence", "skip"),
         ("tracking", "skip"),
+        ("estimated tracking", "ok"),
         ("missed cycles", "skip"),
         ("dropped messages", "ok"),
         ("bus response", "ok"),
@@ -324,7 +346,7 @@ fn without_real_time_only_missed_cycles_are_excused() {
     assert_eq!(Run::with(Run::refuse).exit_code, Exit::Passed);
     let refused_and_off = Run::with(|run| {
         run.refuse();
-        run.figures.tracking.rms_mm = Some(0.2);
+        run.figures.tracking.actual.rms_mm = Some(0.2);
     });
     assert_eq!(refused_and_off.reason, "failed: tracking");
 }
@@ -364,7 +386,7 @@ fn a_jump_of_the_clock_excuses_failures_and_nothing_else() {
         Verdict::new(&run.manifest, &run.figures).exit_code
     };
     assert_eq!(jumped(|_| ()), Exit::Passed);
-    assert_eq!(jumped(|run| run.figures.tracking.rms_mm = Some(0.2)), Exit::Invalid);
+    assert_eq!(jumped(|run| run.figures.tracking.actual.rms_mm = Some(0.2)), Exit::Invalid);
     assert_eq!(jumped(|run| run.manifest.ending = Ending::SafeStop), Exit::SafeStop);
 }
 
@@ -374,7 +396,7 @@ fn a_busy_core_is_a_remark_on_a_run_that_does_not_pass() {
         let mut run = Run::new();
         let usage = Usage { observed_s: 2.0, cpu_s: 2.0 * share, ..Usage::default() };
         run.manifest.usage.processes.insert("controller".to_owned(), usage);
-        run.figures.tracking.rms_mm = Some(rms_mm);
+        run.figures.tracking.actual.rms_mm = Some(rms_mm);
         Verdict::new(&run.manifest, &run.figures).reason
     };
     assert_eq!(busy(1.0, 0.05), "every check passed");
@@ -385,9 +407,9 @@ fn a_busy_core_is_a_remark_on_a_run_that_does_not_pass() {
 
 #[test]
 fn a_verdict_is_written_with_its_word_and_exit_code() {
-    let verdict = Run::with(|run| run.figures.tracking.rms_mm = Some(0.2));
+    let verdict = Run::with(|run| run.figures.tracking.actual.rms_mm = Some(0.2));
     let written = serde_json::to_value(&verdict).unwrap();
     assert_eq!((&written["word"], &written["exit_code"]), (&"FAIL".into(), &1.into()));
     assert_eq!(written["reason"], "failed: tracking");
-    assert_eq!(written["checks"].as_array().map(Vec::len), Some(5));
+    assert_eq!(written["checks"].as_array().map(Vec::len), Some(6));
 }

@@ -1,0 +1,208 @@
+//! Whether the platform is on its path: distance of the incisal point and angle of the platform, for a moment and on
+//! average.
+//!
+//! The drives interpolate between SYNCs, and hold their targets while a command is missing. So after a SYNC or a command
+//! that came at another time than planned, the platform is elsewhere on its path. What the motion makes in that time is no
+//! deviation.
+
+use masseter_shared::config::Scenario;
+use masseter_shared::geometry::{Deviation, Pose};
+use masseter_shared::messages::codes::Cause;
+
+use crate::safety::Fault;
+use crate::sequencer::Estimate;
+
+/// Readings in which a disturbed one still shows: the drives take a target at the next SYNC and reach it at the second,
+/// and the motion makes up for it in the third.
+const SHOWS_FOR: usize = 4;
+/// The motion goes on for as long without an answer.
+const MOST_SLACK_CYCLES: f64 = 2.0;
+
+/// The limits of one quantity, with its mean square.
+#[derive(Debug, Clone)]
+struct Supervised {
+    cause: Cause,
+    limit: f64,
+    rms_limit: f64,
+    mean_square: f64,
+}
+
+impl Supervised {
+    /// Takes a value, of which `allowance` is no deviation.
+    fn check(&mut self, value: f64, allowance: f64, share: f64) -> Result<(), Fault> {
+        let excess = (value - allowance).max(0.0);
+        self.mean_square += (excess * excess - self.mean_square) * share;
+        let rms = self.mean_square.sqrt();
+        if excess > self.limit {
+            Err(Fault::new(self.cause, value, self.limit + allowance))
+        } else if rms > self.rms_limit {
+            Err(Fault::new(self.cause, rms, self.rms_limit))
+        } else {
+            Ok(())
+        }
+    }
+}
+
+/// Supervision of the platform's pose.
+#[derive(Debug, Clone)]
+pub(crate) struct PathSupervision {
+    incisal_m: [f64; 3],
+    period_ns: u64,
+    /// Weight of a cycle in the mean squares.
+    share: f64,
+    position: Supervised,
+    orientation: Supervised,
+    last_sampled_ns: u64,
+    /// By how much the last readings differ from planned ones, in cycles.
+    recent_slack: [f64; SHOWS_FOR],
+}
+
+impl PathSupervision {
+    pub(crate) fn new(scenario: &Scenario) -> Self {
+        let config = &scenario.controller;
+        let supervised = |cause, limit, rms_limit| Supervised { cause, limit, rms_limit, mean_square: 0.0 };
+        Self {
+            incisal_m: scenario.jaw.reference_point_m,
+            period_ns: scenario.period_ns(),
+            share: 1.0 / f64::from(config.tracking_rms_cycles),
+            position: supervised(Cause::TrackingLost, config.tracking_limit_m, config.tracking_rms_limit_m),
+            orientation: supervised(
+                Cause::OrientationLost,
+                config.tracking_limit_rad,
+                config.tracking_rms_limit_rad,
+            ),
+            last_sampled_ns: 0,
+            recent_slack: [0.0; SHOWS_FOR],
+        }
+    }
+
+    /// By how many cycles the platform may be elsewhere on its path, as a new estimate is taken.
+    pub(crate) fn slack_cycles(&mut self, estimate: &Estimate) -> f64 {
+        let Estimate { reading_cycle, answers_cycle, sampled_ns, .. } = *estimate;
+        let apart_ns = sampled_ns.saturating_sub(self.last_sampled_ns);
+        let late_cycles = apart_ns.abs_diff(self.period_ns) as f64 / self.period_ns as f64;
+        let unanswered = reading_cycle.saturating_sub(answers_cycle + 1) as f64;
+        self.last_sampled_ns = sampled_ns;
+        self.recent_slack.rotate_right(1);
+        self.recent_slack[0] = late_cycles.max(unanswered).min(MOST_SLACK_CYCLES);
+        self.recent_slack.iter().copied().fold(0.0, f64::max)
+    }
+
+    /// Compares desired and estimated pose at one instant; `elsewhere` is the desired pose by the slack before.
+    pub(crate) fn check(&mut self, desired: &Pose, estimated: &Pose, elsewhere: &Pose) -> Result<(), Fault> {
+        let between = |to| Deviation::between(desired, to, self.incisal_m);
+        let (found, allowance) = (between(estimated), between(elsewhere));
+        let position = self.position.check(found.incisal_m, allowance.incisal_m, self.share);
+        let orientation = self.orientation.check(found.angle_rad, allowance.angle_rad, self.share);
+        position.and(orientation)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use masseter_shared::config::{ControllerConfig, JawConfig};
+    use masseter_shared::geometry::{Actuators, LEGS, Mechanism, MechanismConfig, Vec3};
+
+    use super::*;
+    use crate::kinematics::ForwardTracker;
+
+    const LIMIT_M: f64 = 1e-3;
+    const LIMIT_RAD: f64 = 2e-3;
+
+    /// The incisal point is in the axis of the turns, so that they do not move it.
+    fn supervision() -> PathSupervision {
+        let controller = ControllerConfig {
+            tracking_limit_m: LIMIT_M,
+            tracking_limit_rad: LIMIT_RAD,
+            tracking_rms_cycles: 10,
+            tracking_rms_limit_m: LIMIT_M / 2.0,
+            tracking_rms_limit_rad: LIMIT_RAD / 2.0,
+            ..ControllerConfig::default()
+        };
+        let jaw = JawConfig { reference_point_m: [0.0, 0.0, 0.1], ..JawConfig::default() };
+        PathSupervision::new(&Scenario { controller, jaw, ..Scenario::default() })
+    }
+
+    type Displace = fn(Vec3) -> Pose;
+    const QUANTITIES: [(Cause, Displace, f64); 2] =
+        [(Cause::TrackingLost, shifted, LIMIT_M), (Cause::OrientationLost, turned, LIMIT_RAD)];
+
+    fn shifted(limits: Vec3) -> Pose {
+        Pose::new(limits * LIMIT_M, Vec3::zeros())
+    }
+
+    fn turned(limits: Vec3) -> Pose {
+        Pose::new(Vec3::zeros(), limits * LIMIT_RAD)
+    }
+
+    #[test]
+    fn a_moment_beyond_its_limit_in_any_direction_is_a_fault_with_value_and_limit() {
+        let here = Pose::identity();
+        for (cause, displace, limit) in QUANTITIES {
+            for direction in [Vec3::x(), -Vec3::x(), Vec3::y(), -Vec3::y(), Vec3::z(), -Vec3::z()] {
+                let mut supervision = supervision();
+                supervision.check(&here, &displace(direction * 0.99), &here).unwrap();
+                let fault = supervision.check(&here, &displace(direction * 1.01), &here).unwrap_err();
+                assert_eq!((fault.cause, fault.axis, fault.limit), (cause, None, limit));
+                assert!((fault.value / (1.01 * limit) - 1.0).abs() < 1e-9, "{fault:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn an_average_beyond_its_limit_is_a_fault_that_a_short_deviation_is_not() {
+        let here = Pose::identity();
+        for (cause, displace, limit) in QUANTITIES {
+            let cycles_to_fault = |share: f64| {
+                let mut supervision = supervision();
+                (1..=1000).find_map(|cycle| {
+                    Some((cycle, supervision.check(&here, &displace(Vec3::z() * share), &here).err()?))
+                })
+            };
+            assert_eq!(cycles_to_fault(0.99 / 2.0), None);
+            let (cycle, fault) = cycles_to_fault(1.01 / 2.0).unwrap();
+            assert!(cycle > 20 && fault.cause == cause, "{cycle} {fault:?}");
+            assert!((fault.limit - limit / 2.0).abs() < 1e-15 && fault.value > fault.limit, "{fault:?}");
+            let (cycle, _) = cycles_to_fault(0.99).unwrap();
+            assert!((2..5).contains(&cycle), "{cycle}");
+        }
+    }
+
+    #[test]
+    fn what_the_motion_makes_in_the_time_of_a_disturbance_is_no_deviation() {
+        let here = Pose::identity();
+        for (cause, displace, limit) in QUANTITIES {
+            let mut supervision = supervision();
+            supervision.check(&here, &displace(Vec3::z() * -3.99), &displace(Vec3::z() * 3.0)).unwrap();
+            let fault = supervision
+                .check(&here, &displace(Vec3::z() * -4.01), &displace(Vec3::z() * 3.0))
+                .unwrap_err();
+            assert!(fault.cause == cause && (fault.limit / limit - 4.0).abs() < 1e-9, "{fault:?}");
+        }
+    }
+
+    /// A SYNC 0.3 periods late, two skipped, and a command that came too late for its SYNC.
+    #[test]
+    fn readings_at_unplanned_times_and_unanswered_commands_give_slack_for_a_while() {
+        let readings = [(1, 1.0, 0.0), (2, 2.3, 0.3), (3, 3.0, 0.3), (6, 6.0, 2.0), (7, 7.0, 2.0)];
+        let mut supervision = supervision();
+        let mut slack = |reading_cycle: u64, answers_cycle, sampled_cycles: f64| {
+            let sampled_ns = (sampled_cycles * 1e6) as u64;
+            supervision.slack_cycles(&estimate(reading_cycle, answers_cycle, sampled_ns))
+        };
+        for (cycle, sampled_cycles, expected) in readings {
+            assert!((slack(cycle, cycle - 1, sampled_cycles) - expected).abs() < 1e-9, "cycle {cycle}");
+        }
+        for (cycle, expected) in [(8, 2.0), (9, 2.0), (10, 0.0), (11, 0.0)] {
+            assert!((slack(cycle, cycle - 1, cycle as f64) - expected).abs() < 1e-9, "cycle {cycle}");
+        }
+        assert!((slack(12, 10, 12.0) - 1.0).abs() < 1e-9);
+    }
+
+    fn estimate(reading_cycle: u64, answers_cycle: u64, sampled_ns: u64) -> Estimate {
+        let measured = Actuators { slide_m: [0.0; LEGS], leg_m: [0.29; LEGS] };
+        let mechanism = Mechanism::new(&MechanismConfig::default()).unwrap();
+        let solution = ForwardTracker::new(mechanism).update(&measured).unwrap();
+        Estimate { reading_cycle, answers_cycle, sampled_ns, measured, solution }
+    }
+}

@@ -1,0 +1,196 @@
+//! Each declared fault: when it first struck, what detected it, and how far the platform left its path until then.
+
+use std::collections::VecDeque;
+
+use masseter_shared::geometry::Deviation;
+use masseter_shared::messages::codes::{Cause, EventKind, Source};
+use serde::Serialize;
+
+use super::code::Code;
+use super::events::EventRecord;
+use super::tracking::PathSample;
+
+/// A declared fault and its effect.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct FaultFigures {
+    /// Number in the scenario's list, from 1.
+    pub number: usize,
+    /// When it first struck, ns of the run's clock; none where it never did.
+    pub struck_ns: Option<u64>,
+    /// Largest distance of the incisal point from its path, from then until the detection, or else the motion's end, mm.
+    pub deviation_mm: f64,
+    /// Largest angle in that time, degrees.
+    pub deviation_deg: f64,
+    /// The first event of kind fault from then on; none without.
+    pub detection: Option<Detection>,
+}
+
+/// The first reaction to a fault.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Detection {
+    /// Who reported it.
+    pub source: Code<Source>,
+    /// As what.
+    pub cause: Code<Cause>,
+    /// Time from the first strike, ms.
+    pub latency_ms: f64,
+    /// Distance of the incisal point from its path in the last sample before, mm.
+    pub deviation_mm: f64,
+    /// Angle in that sample, degrees.
+    pub deviation_deg: f64,
+}
+
+/// Samples kept until the events of their time have come: the recorder drains topic after topic.
+const KEPT: usize = 1 << 13;
+
+/// Follows the declared faults.
+#[derive(Debug)]
+pub(super) struct FaultWatch {
+    faults: Vec<Followed>,
+    reactions: Vec<Reaction>,
+    recent: VecDeque<PathSample>,
+}
+
+#[derive(Debug, Clone, Copy, Default)]
+struct Followed {
+    struck_ns: Option<u64>,
+    largest: Deviation,
+    last: Deviation,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Reaction {
+    time_ns: u64,
+    source: Code<Source>,
+    cause: Code<Cause>,
+}
+
+impl FaultWatch {
+    pub(super) fn new(declared: usize) -> Self {
+        let recent = VecDeque::with_capacity(if declared > 0 { KEPT } else { 0 });
+        Self { faults: vec![Followed::default(); declared], reactions: Vec::new(), recent }
+    }
+
+    pub(super) fn event(&mut self, event: &EventRecord) {
+        let EventRecord { time_ns, source, cause, .. } = *event;
+        if cause == Cause::FaultInjected
+            && let Some(fault) = (event.value as usize).checked_sub(1).and_then(|i| self.faults.get_mut(i))
+        {
+            fault.struck_ns = Some(fault.struck_ns.map_or(time_ns, |struck_ns| struck_ns.min(time_ns)));
+        }
+        if event.kind == EventKind::Fault && !self.faults.is_empty() {
+            self.reactions.push(Reaction { time_ns, source, cause });
+        }
+    }
+
+    pub(super) fn sample(&mut self, sample: PathSample) {
+        if self.faults.is_empty() {
+            return;
+        }
+        if self.recent.len() == KEPT
+            && let Some(oldest) = self.recent.pop_front()
+        {
+            self.settle(&oldest);
+        }
+        self.recent.push_back(sample);
+    }
+
+    /// Counts a sample for every fault that had struck and was not detected.
+    fn settle(&mut self, sample: &PathSample) {
+        for fault in &mut self.faults {
+            let Some(struck_ns) = fault.struck_ns.filter(|struck_ns| *struck_ns <= sample.sampled_ns) else {
+                continue;
+            };
+            if first_reaction(&self.reactions, struck_ns)
+                .is_none_or(|found| sample.sampled_ns <= found.time_ns)
+            {
+                let Deviation { origin_m, incisal_m, angle_rad } = sample.deviation;
+                fault.last = sample.deviation;
+                fault.largest = Deviation {
+                    origin_m: fault.largest.origin_m.max(origin_m),
+                    incisal_m: fault.largest.incisal_m.max(incisal_m),
+                    angle_rad: fault.largest.angle_rad.max(angle_rad),
+                };
+            }
+        }
+    }
+
+    pub(super) fn finish(mut self) -> Vec<FaultFigures> {
+        while let Some(sample) = self.recent.pop_front() {
+            self.settle(&sample);
+        }
+        let figures = |(index, fault): (usize, &Followed)| {
+            let reaction = fault.struck_ns.and_then(|struck_ns| first_reaction(&self.reactions, struck_ns));
+            FaultFigures {
+                number: index + 1,
+                struck_ns: fault.struck_ns,
+                deviation_mm: fault.largest.incisal_m * 1e3,
+                deviation_deg: fault.largest.angle_rad.to_degrees(),
+                detection: reaction.map(|Reaction { time_ns, source, cause }| Detection {
+                    source,
+                    cause,
+                    latency_ms: (time_ns - fault.struck_ns.unwrap_or(time_ns)) as f64 / 1e6,
+                    deviation_mm: fault.last.incisal_m * 1e3,
+                    deviation_deg: fault.last.angle_rad.to_degrees(),
+                }),
+            }
+        };
+        self.faults.iter().enumerate().map(figures).collect()
+    }
+}
+
+fn first_reaction(reactions: &[Reaction], struck_ns: u64) -> Option<Reaction> {
+    reactions.iter().filter(|found| found.time_ns >= struck_ns).min_by_key(|found| found.time_ns).copied()
+}
+
+#[cfg(test)]
+mod tests {
+    use masseter_shared::messages::Event;
+
+    use super::*;
+
+    fn event(time_ns: u64, source: Source, kind: EventKind, cause: Cause, value: f64) -> EventRecord {
+        (&Event { time_ns, value, ..Event::new(source, kind, cause) }).into()
+    }
+
+    fn sample(sampled_ns: u64, incisal_m: f64) -> PathSample {
+        let deviation = Deviation { incisal_m, angle_rad: 10.0 * incisal_m, origin_m: 0.0 };
+        PathSample { sampled_ns, deviation }
+    }
+
+    /// Fault 1 strikes at 1 ms and is detected at 3.5 ms; fault 2 strikes after that; fault 3 never.
+    #[test]
+    fn the_path_is_followed_from_the_strike_to_the_first_reaction_whatever_comes_first() {
+        let mut watch = FaultWatch::new(3);
+        let struck =
+            |time_ns, value| event(time_ns, Source::Wire, EventKind::Notice, Cause::FaultInjected, value);
+        for (sampled_ns, incisal_m) in
+            [(0, 9e-3), (1_000_000, 1e-4), (2_000_000, 3e-4), (3_000_000, 2e-4), (4_000_000, 5e-3)]
+        {
+            watch.sample(sample(sampled_ns, incisal_m));
+        }
+        watch.event(&event(5_000_000, Source::Controller, EventKind::Fault, Cause::MasterFault, 1.0));
+        watch.event(&event(3_500_000, Source::Master, EventKind::Fault, Cause::ProcessDataLost, 4.0));
+        watch.event(&struck(1_000_000, 1.0));
+        watch.event(&struck(6_000_000, 2.0));
+        let found = watch.finish();
+
+        let first = &found[0];
+        assert!((first.deviation_mm - 0.3).abs() < 1e-12, "{first:?}");
+        assert!((first.deviation_deg - 3e-3f64.to_degrees()).abs() < 1e-12, "{first:?}");
+        let detection = first.detection.unwrap();
+        assert!(detection.source == Source::Master && detection.cause == Cause::ProcessDataLost);
+        assert!((detection.latency_ms - 2.5).abs() < 1e-12 && (detection.deviation_mm - 0.2).abs() < 1e-12);
+        assert_eq!((found[1].struck_ns, found[1].detection), (Some(6_000_000), None));
+        assert_eq!((found[2].struck_ns, found[2].detection), (None, None));
+    }
+
+    #[test]
+    fn an_undetected_fault_is_followed_to_the_end_of_a_long_run() {
+        let mut watch = FaultWatch::new(1);
+        watch.event(&event(5, Source::Wire, EventKind::Notice, Cause::FaultInjected, 1.0));
+        (0..3 * KEPT as u64).for_each(|i| watch.sample(sample(i, if i == 10 { 2e-3 } else { 1e-5 })));
+        let found = watch.finish();
+        assert!((found[0].deviation_mm - 2.0).abs() < 1e-12, "{found:?}");
+    }
+}

@@ -1,0 +1,74 @@
+//! One thing that a run is checked for: its finding, and whether that is as it should be.
+
+use serde::Serialize;
+
+/// Whether what was checked is as it should be.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum CheckResult {
+    /// It is.
+    Passed,
+    /// It is not.
+    Failed,
+    /// This run cannot tell; the finding says why.
+    NotJudged,
+}
+
+impl CheckResult {
+    pub(crate) fn is_failed(self) -> bool {
+        self == Self::Failed
+    }
+
+    /// The word in tables.
+    pub fn mark(self) -> &'static str {
+        match self {
+            Self::Passed => "ok",
+            Self::Failed => "FAIL",
+            Self::NotJudged => "skip",
+        }
+    }
+}
+
+/// One thing that was judged.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Check {
+    /// What.
+    pub name: &'static str,
+    /// What was found, with its limit.
+    pub finding: String,
+    /// Whether it is as it should be.
+    pub result: CheckResult,
+}
+
+impl Check {
+    pub(crate) fn judged(name: &'static str, finding: String, passed: bool) -> Self {
+        let result = if passed { CheckResult::Passed } else { CheckResult::Failed };
+        Self { name, finding, result }
+    }
+
+    /// A failure that `excused` explains is none.
+    pub(crate) fn unless(self, excused: bool) -> Self {
+        match self.result {
+            CheckResult::Failed if excused => Self { result: CheckResult::NotJudged, ..self },
+            _ => self,
+        }
+    }
+
+    pub(crate) fn not_judged(name: &'static str, why: String) -> Self {
+        Self { name, finding: why, result: CheckResult::NotJudged }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_a_failure_is_excused() {
+        let check = |passed| Check::judged("tracking", String::new(), passed);
+        let cases = [(false, true, "skip"), (false, false, "FAIL"), (true, true, "ok"), (true, false, "ok")];
+        for (passed, excused, mark) in cases {
+            assert_eq!(check(passed).unless(excused).result.mark(), mark);
+        }
+    }
+}

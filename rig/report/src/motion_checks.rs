@@ -1,0 +1,194 @@
+//! Whether the platform followed its path: its errors while the motion played, and where each fault led it.
+
+use masseter_analysis::{FaultFigures, PoseErrors};
+use masseter_shared::config::{ChecksConfig, FaultConfig};
+
+use crate::check::{Check, CheckResult};
+
+/// The name of the check of the declared faults.
+pub(crate) const FAULTS: &str = "faults";
+
+/// The worst error against its limit, or all that exceed theirs. A motion that was played and left nothing to compare is
+/// no less a failure than one that was followed badly.
+pub(crate) fn tracking(
+    name: &'static str,
+    samples: u64,
+    errors: &PoseErrors,
+    limits: &ChecksConfig,
+    is_played: bool,
+) -> Check {
+    if samples == 0 && !is_played {
+        return Check::not_judged(name, "the motion never began".to_owned());
+    }
+    let ChecksConfig { tracking_rms_mm, tracking_max_mm, tracking_rms_deg, tracking_max_deg, .. } = *limits;
+    let figures = [
+        ("incisal point rms", errors.incisal_rms_mm, tracking_rms_mm, " mm"),
+        ("incisal point max", errors.incisal_max_mm, tracking_max_mm, " mm"),
+        ("platform rms", errors.rms_mm, tracking_rms_mm, " mm"),
+        ("platform max", errors.max_mm, tracking_max_mm, " mm"),
+        ("platform rms", errors.rms_deg, tracking_rms_deg, "°"),
+        ("platform max", errors.max_deg, tracking_max_deg, "°"),
+    ];
+    let mut found: Vec<_> = figures
+        .into_iter()
+        .filter_map(|(what, value, limit, unit)| {
+            let value = value?;
+            Some((value / limit, format!("{what} {value:.4}{unit}, limit {limit}{unit}")))
+        })
+        .collect();
+    found.sort_by(|(a, _), (b, _)| b.total_cmp(a));
+    let exceeding: Vec<_> =
+        found.iter().filter(|(share, _)| *share > 1.0).map(|(_, text)| text.as_str()).collect();
+    match (found.first(), exceeding.is_empty()) {
+        (None, _) => Check::judged(name, "no sample to compare".to_owned(), false),
+        (Some((_, closest)), true) => {
+            Check::judged(name, format!("closest of {samples} samples: {closest}"), true)
+        }
+        _ => Check::judged(name, exceeding.join("; "), false),
+    }
+}
+
+/// A test with faults that passes without them has tested nothing, and a fault that leads the jaw beyond the limits must be
+/// detected before. None where no fault is declared.
+pub(crate) fn faults(
+    declared: &[FaultConfig],
+    found: &[FaultFigures],
+    limits: &ChecksConfig,
+    is_played: bool,
+) -> Option<Check> {
+    let ChecksConfig { tracking_max_mm, tracking_max_deg, .. } = *limits;
+    let idle: Vec<_> = found
+        .iter()
+        .filter(|fault| fault.struck_ns.is_none())
+        .map(|fault| fault.number.to_string())
+        .collect();
+    let beyond: Vec<_> = declared
+        .iter()
+        .zip(found)
+        .filter(|(_, found)| {
+            found.deviation_mm > tracking_max_mm || found.deviation_deg > tracking_max_deg
+        })
+        .map(|(fault, FaultFigures { number, deviation_mm, deviation_deg, detection, .. })| {
+            let until = if detection.is_some() { "before it was detected" } else { "undetected" };
+            format!(
+                "; number {number}, {fault}, led {deviation_mm:.3} mm and {deviation_deg:.3}° from the path {until}, limit \
+                 {tracking_max_mm} mm and {tracking_max_deg}°"
+            )
+        })
+        .collect();
+    let which = if idle.is_empty() { String::new() } else { format!(", number {} never", idle.join(", ")) };
+    let struck = format!("{} of {} declared struck{which}", declared.len() - idle.len(), declared.len());
+    let result = match (beyond.is_empty(), idle.is_empty()) {
+        (true, true) => CheckResult::Passed,
+        (true, false) if !is_played => CheckResult::NotJudged,
+        _ => CheckResult::Failed,
+    };
+    (!declared.is_empty()).then(|| Check { name: FAULTS, finding: struck + &beyond.concat(), result })
+}
+
+#[cfg(test)]
+mod tests {
+    use masseter_shared::config::FaultKindConfig;
+
+    use super::*;
+
+    type Spoil = fn(&mut PoseErrors, Option<f64>);
+
+    #[test]
+    fn every_error_has_its_own_limit_and_the_closest_is_shown() {
+        let limits = ChecksConfig::default();
+        let good = PoseErrors {
+            rms_mm: Some(0.01),
+            max_mm: Some(0.02),
+            incisal_rms_mm: Some(0.01),
+            incisal_max_mm: Some(0.1),
+            rms_deg: Some(0.01),
+            max_deg: Some(0.02),
+        };
+        let check = tracking("tracking", 9, &good, &limits, true);
+        assert_eq!(
+            (check.result.mark(), check.finding.as_str()),
+            ("ok", "closest of 9 samples: incisal point max 0.1000 mm, limit 0.5 mm")
+        );
+        let mm = |share: f64, limit: f64| Some(share * limit);
+        let each: [(Spoil, f64); 6] = [
+            (|errors, value| errors.rms_mm = value, limits.tracking_rms_mm),
+            (|errors, value| errors.max_mm = value, limits.tracking_max_mm),
+            (|errors, value| errors.incisal_rms_mm = value, limits.tracking_rms_mm),
+            (|errors, value| errors.incisal_max_mm = value, limits.tracking_max_mm),
+            (|errors, value| errors.rms_deg = value, limits.tracking_rms_deg),
+            (|errors, value| errors.max_deg = value, limits.tracking_max_deg),
+        ];
+        for (spoil, limit) in each {
+            for (share, mark) in [(0.99, "ok"), (1.01, "FAIL")] {
+                let mut errors = good;
+                spoil(&mut errors, mm(share, limit));
+                assert_eq!(tracking("tracking", 9, &errors, &limits, true).result.mark(), mark, "{errors:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_motion_that_never_began_is_not_judged_unless_the_run_says_that_it_was_played() {
+        let still = PoseErrors::default();
+        for (is_played, mark, finding) in
+            [(false, "skip", "the motion never began"), (true, "FAIL", "no sample to compare")]
+        {
+            let check = tracking("tracking", 0, &still, &ChecksConfig::default(), is_played);
+            assert_eq!((check.result.mark(), check.finding.as_str()), (mark, finding));
+        }
+    }
+
+    fn fault() -> FaultConfig {
+        FaultConfig {
+            kind: FaultKindConfig::Lose,
+            bus: 1,
+            from_s: 2.5,
+            until_s: None,
+            node: Some(4),
+            id: Some(0x204),
+            probability: 1.0,
+            count: None,
+            delay_us: None,
+        }
+    }
+
+    fn figures(number: usize, struck_ns: Option<u64>, deviation_mm: f64) -> FaultFigures {
+        FaultFigures { number, struck_ns, deviation_mm, deviation_deg: 0.1, detection: None }
+    }
+
+    #[test]
+    fn a_declared_fault_that_never_struck_fails_a_run_that_was_played_to_its_end() {
+        let cases = [
+            (0, true, None),
+            (1, true, Some(("ok", "1 of 1 declared struck"))),
+            (2, true, Some(("FAIL", "1 of 2 declared struck, number 2 never"))),
+            (2, false, Some(("skip", "1 of 2 declared struck, number 2 never"))),
+            (3, true, Some(("FAIL", "1 of 3 declared struck, number 2, 3 never"))),
+        ];
+        for (declared, is_played, expected) in cases {
+            let found: Vec<_> =
+                (1..=declared).map(|number| figures(number, (number == 1).then_some(5), 0.0)).collect();
+            let check = faults(&vec![fault(); declared], &found, &ChecksConfig::default(), is_played);
+            let found = check.as_ref().map(|check| (check.result.mark(), check.finding.as_str()));
+            assert_eq!(found, expected);
+        }
+    }
+
+    #[test]
+    fn a_fault_that_leads_the_jaw_beyond_the_limit_fails_the_run_with_its_name() {
+        for (deviation_mm, mark) in [(0.49, "ok"), (0.51, "FAIL")] {
+            for is_played in [true, false] {
+                let found = [figures(1, Some(5), deviation_mm)];
+                let check = faults(&[fault()], &found, &ChecksConfig::default(), is_played).unwrap();
+                assert_eq!(check.result.mark(), mark, "{check:?}");
+                let named = "number 1, lose (bus 1, node 4, id 204h), led 0.510 mm and 0.100° from the path undetected, \
+                             limit 0.5 mm and 0.5°";
+                assert_eq!(check.finding.contains(named), mark == "FAIL", "{check:?}");
+            }
+        }
+        let turned = FaultFigures { deviation_deg: 0.51, ..figures(1, Some(5), 0.1) };
+        let check = faults(&[fault()], &[turned], &ChecksConfig::default(), true).unwrap();
+        assert_eq!(check.result.mark(), "FAIL", "{check:?}");
+    }
+}

@@ -1,0 +1,136 @@
+//! Every kind of fault, at every node and message, for several durations, at four instants of the motion: what it does to
+//! the jaw and what detects it, as a table. Takes minutes, so it runs on request:
+//!
+//!     cargo test --release --test fault_table -- --ignored
+
+mod common;
+
+use std::fmt::Display;
+use std::fs;
+use std::path::Path;
+
+use common::Workspace;
+use masseter_shared::config::{ChecksConfig, FaultConfig, FaultKindConfig, Scenario};
+use rayon::prelude::*;
+
+const CYCLES: [u32; 8] = [1, 2, 5, 10, 20, 50, 100, 500];
+/// Since switch-on: while easing, while chewing, and where the legs move fastest.
+const FROM_S: [f64; 4] = [0.7, 2.5, 3.0, 3.25];
+/// Every message is sent within so many cycles.
+const SENT_WITHIN: u32 = 100;
+const NEVER_STRUCK: &str = "never struck";
+const MASTER: u8 = 127;
+const SYNC: u16 = 0x080;
+const TPDO1: u16 = 0x180;
+const RPDO1: u16 = 0x200;
+const HEARTBEAT: u16 = 0x700;
+
+/// The messages of a bus in each cycle, with their senders and receivers.
+fn messages(nodes: &[u8]) -> Vec<(u8, u8, u16)> {
+    let of_node = |&node: &u8| {
+        let id = u16::from(node);
+        [
+            (MASTER, node, SYNC),
+            (MASTER, node, RPDO1 + id),
+            (MASTER, node, HEARTBEAT + u16::from(MASTER)),
+            (node, MASTER, TPDO1 + id),
+            (node, MASTER, HEARTBEAT + id),
+        ]
+    };
+    nodes.iter().flat_map(of_node).collect()
+}
+
+fn fault(kind: FaultKindConfig, bus: usize, node: u8, id: Option<u16>) -> FaultConfig {
+    let delay_us = (kind == FaultKindConfig::Delay).then_some(1500);
+    FaultConfig {
+        kind,
+        bus,
+        from_s: 0.0,
+        until_s: None,
+        node: Some(node),
+        id,
+        probability: 1.0,
+        count: None,
+        delay_us,
+    }
+}
+
+/// Every fault of a bus, without its time.
+fn faults_of_bus(bus: usize, nodes: &[u8]) -> Vec<FaultConfig> {
+    use FaultKindConfig::{Babble, BusOff, Corrupt, Delay, Disconnect, Duplicate, Lose};
+    let messages = messages(nodes);
+    let lost = messages.iter().map(|&(_, receiver, id)| fault(Lose, bus, receiver, Some(id)));
+    let mut sent: Vec<_> = messages.iter().map(|&(sender, _, id)| (sender, id)).collect();
+    sent.sort_unstable();
+    sent.dedup();
+    let sent = sent
+        .iter()
+        .flat_map(|&(sender, id)| [Corrupt, Delay, Duplicate].map(|kind| fault(kind, bus, sender, Some(id))));
+    let gone = nodes
+        .iter()
+        .chain([&MASTER])
+        .flat_map(|&node| [Babble, Disconnect, BusOff].map(|kind| fault(kind, bus, node, None)));
+    lost.chain(sent).chain(gone).collect()
+}
+
+fn or_none(value: Option<impl Display>) -> String {
+    value.map_or_else(String::new, |value| value.to_string())
+}
+
+/// A row, and whether the run passed although the jaw left its path by more than the limits.
+fn row(fault: &FaultConfig, cycles: u32, from_s: f64) -> (String, bool) {
+    let until_s = Some(from_s + f64::from(cycles) * 1e-3);
+    let faults = vec![FaultConfig { from_s, until_s, ..*fault }];
+    let scenario = Scenario { duration_s: Some(4.0), faults, ..Scenario::default() };
+    let workspace = Workspace::new(&scenario.to_toml());
+    workspace.run_virtual(&["--quiet"]);
+    let summary = workspace.summary();
+    let found = &summary["figures"]["faults"][0];
+    let number = |key: &str| found[key].as_f64().expect(key);
+    let (mm, deg) = (number("deviation_mm"), number("deviation_deg"));
+    let word = summary["verdict"]["word"].as_str().expect("a verdict");
+    let verdict = if found["struck_ns"].is_null() { NEVER_STRUCK } else { word };
+    let detection = &found["detection"];
+    let row = format!(
+        "{},{},{},{},{cycles},{from_s},{mm:.4},{deg:.4},{},{},{verdict}\n",
+        fault.kind,
+        fault.bus,
+        or_none(fault.node),
+        or_none(fault.id.map(|id| format!("{id:03X}h"))),
+        detection["cause"].as_str().unwrap_or_default(),
+        or_none(detection["latency_ms"].as_f64()),
+    );
+    // Heartbeats are rarer than the shorter faults.
+    assert!(cycles < SENT_WITHIN || verdict != NEVER_STRUCK, "{row}");
+    let ChecksConfig { tracking_max_mm, tracking_max_deg, .. } = ChecksConfig::default();
+    (row, verdict == "PASS" && (mm > tracking_max_mm || deg > tracking_max_deg))
+}
+
+#[test]
+#[ignore = "takes minutes; a step of CI runs it"]
+fn no_fault_leads_the_jaw_beyond_the_limits_and_passes() {
+    let can = Scenario::default().can;
+    let of_bus = |(bus, axes): (usize, &Vec<usize>)| {
+        let nodes: Vec<_> = axes.iter().map(|&axis| can.node_ids[axis]).collect();
+        faults_of_bus(bus, &nodes)
+    };
+    let faults: Vec<_> = can.buses.iter().enumerate().flat_map(of_bus).collect();
+    let cases: Vec<_> = faults
+        .iter()
+        .flat_map(|fault| {
+            CYCLES.into_iter().flat_map(move |cycles| FROM_S.map(|from_s| (fault, cycles, from_s)))
+        })
+        .collect();
+    let rows: Vec<_> =
+        cases.into_par_iter().map(|(fault, cycles, from_s)| row(fault, cycles, from_s)).collect();
+    let header = "kind,bus,node,id,cycles,from_s,deviation_mm,deviation_deg,detected_by,latency_ms,verdict\n";
+    let table = rows.iter().map(|(row, _)| row.as_str()).collect::<String>();
+    let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join("fault-table.csv");
+    fs::write(&path, header.to_owned() + &table).expect("the table is written");
+    let wrong: String = rows.iter().filter(|(_, is_wrong)| *is_wrong).map(|(row, _)| row.as_str()).collect();
+    assert!(
+        wrong.is_empty(),
+        "passed beyond the limits, of the rows in {}:\n{header}{wrong}",
+        path.display()
+    );
+}

@@ -1,0 +1,68 @@
+//! Faults that lead the jaw off its path are detected before it is far, or fail the run.
+
+mod common;
+
+use common::{Workspace, check, stdout};
+use serde_json::Value;
+
+/// The largest deviation that may go undetected: the default limits of the checks.
+const LIMIT_MM: f64 = 0.5;
+const LIMIT_DEG: f64 = 0.5;
+
+/// Drive l1 misses its targets for so many cycles from `from_s` on.
+fn deaf_drive(from_s: f64, cycles: u32) -> String {
+    let until_s = from_s + f64::from(cycles) * 1e-3;
+    format!(
+        "duration_s = 4.0\n[[faults]]\nkind = 'lose'\nbus = 1\nnode = 4\nid = 0x204\nfrom_s = {from_s}\nuntil_s = {until_s}\n"
+    )
+}
+
+fn is_beyond(fault: &Value) -> bool {
+    let [mm, deg] = ["deviation_mm", "deviation_deg"].map(|key| fault[key].as_f64().unwrap());
+    mm > LIMIT_MM || deg > LIMIT_DEG
+}
+
+/// Also where the legs move fastest, 3.25 s after switch-on.
+#[test]
+fn a_drive_that_misses_its_targets_is_detected_before_the_jaw_is_far_from_its_path() {
+    for from_s in [2.5, 3.25] {
+        let workspace = Workspace::new(&deaf_drive(from_s, 80));
+        let output = workspace.run_virtual(&[]);
+        assert_eq!(output.status.code(), Some(5), "{}", stdout(&output));
+        let summary = workspace.summary();
+        let fault = &summary["figures"]["faults"][0];
+        assert!(!is_beyond(fault), "{fault}");
+        assert!(fault["detection"]["latency_ms"].as_f64().unwrap() < 20.0, "{fault}");
+        assert_eq!(check(&summary, "faults")["result"], "passed", "{}", stdout(&output));
+    }
+}
+
+/// Whether the run is played to its end or a safe stop comes too late.
+#[test]
+fn a_fault_that_leads_the_jaw_far_from_its_path_fails_the_run_where_supervision_is_lax() {
+    for limit_m in [1.0, 1.5e-3] {
+        let lax = format!(
+            "[controller]\ntracking_limit_m = {limit_m}\ntracking_limit_rad = 1.0\ntracking_rms_limit_m = 1.0\n\
+             tracking_rms_limit_rad = 1.0"
+        );
+        let workspace = Workspace::new(&(deaf_drive(2.5, 80) + &lax));
+        let output = workspace.run_virtual(&[]);
+        let summary = workspace.summary();
+        let fault = &summary["figures"]["faults"][0];
+        // Who watches the drives themselves may stop the rig before.
+        let expected = if is_beyond(fault) { (Some(1), "failed") } else { (Some(5), "passed") };
+        let found = (output.status.code(), check(&summary, "faults")["result"].as_str().unwrap());
+        assert_eq!(found, expected, "{}", stdout(&output));
+    }
+}
+
+/// The drive interpolates to its next target, as after a late SYNC.
+#[test]
+fn a_single_lost_target_leads_nowhere_and_passes() {
+    let workspace = Workspace::new(&deaf_drive(3.25, 1));
+    let output = workspace.run_virtual(&[]);
+    assert_eq!(output.status.code(), Some(0), "{}", stdout(&output));
+    let fault = &workspace.summary()["figures"]["faults"][0];
+    assert!(!is_beyond(fault) && fault["detection"].is_null(), "{fault}");
+    assert!(fault["deviation_mm"].as_f64().unwrap() > 0.05, "{fault}");
+}
