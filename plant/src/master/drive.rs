@@ -11,6 +11,7 @@ use masseter_shared::messages::Reading;
 use masseter_shared::messages::codes::{BootPhase, Cause, drive_state_code};
 
 use super::boot::{Boot, late};
+use super::following::Following;
 use super::interlock::Failure;
 use super::presence::Presence;
 
@@ -26,6 +27,7 @@ pub(super) struct RemoteDrive {
     /// The phase of the boot that was reported last.
     reported_phase: BootPhase,
     pub(super) presence: Presence,
+    following: Following,
     nmt: Option<NmtState>,
     /// Whether it was started as a verified drive: only then its process data are used.
     pub(super) is_started: bool,
@@ -53,6 +55,7 @@ impl RemoteDrive {
             reported_phase: boot.phase,
             boot,
             presence: Presence::new(now_ns),
+            following: Following::new(scenario, axis),
             nmt: None,
             is_started: false,
             is_absence_known: false,
@@ -88,18 +91,25 @@ impl RemoteDrive {
 
     /// Writes its actual values and its state.
     pub(super) fn fill_reading(&self, axis: usize, reading: &mut Reading) {
-        reading.position_m[axis] = f64::from(self.actual_increments) * self.config.encoder_resolution_m;
+        reading.position_m[axis] = self.position_m();
         reading.force_n[axis] = f64::from(self.torque_permille) / 1000.0 * self.config.rated_force_n;
         reading.drive_state[axis] = drive_state_code(self.drive_state());
     }
 
-    /// Whether 607Ah can hold a target; NaN has no increments.
-    pub(super) fn can_go_to(&self, target_m: f64) -> bool {
-        (f64::from(i32::MIN)..=f64::from(i32::MAX)).contains(&self.increments(target_m))
+    fn position_m(&self) -> f64 {
+        f64::from(self.actual_increments) * self.config.encoder_resolution_m
     }
 
-    fn increments(&self, position_m: f64) -> f64 {
-        (position_m / self.config.encoder_resolution_m).round()
+    /// Its position, if it follows targets.
+    pub(super) fn following_m(&self) -> Option<f64> {
+        let is_enabled = self.drive_state() == Some(DriveState::OperationEnabled);
+        is_enabled.then(|| self.position_m())
+    }
+
+    /// SYNC goes out.
+    pub(super) fn begin_cycle(&mut self, now_ns: u64) {
+        self.presence.begin_cycle();
+        self.following.synchronise(now_ns);
     }
 
     /// Takes a heartbeat; `may_boot` says whether drives may be booted now.
@@ -181,6 +191,17 @@ impl RemoteDrive {
         Some(Failure::with(Cause::NodeStopped, states))
     }
 
+    /// Why the drive counts as one that does not obey, once it does: it `must_be_enabled` and is not, or it does not follow
+    /// its targets; `is_fresh` says whether its position is new.
+    pub(super) fn disobedience(&mut self, is_fresh: bool, must_be_enabled: bool) -> Option<Failure> {
+        let state = self.drive_state();
+        if must_be_enabled && state != Some(DriveState::OperationEnabled) {
+            return Some(Failure::with(Cause::DriveFault, [f64::from(drive_state_code(state)), 0.0]));
+        }
+        let position_m = self.following_m().filter(|_| is_fresh)?;
+        self.following.judge(position_m)
+    }
+
     /// Discards everything found out about the drive; it has to boot again.
     pub(super) fn forget(&mut self, now_ns: u64) {
         self.boot.forget(now_ns);
@@ -190,6 +211,7 @@ impl RemoteDrive {
 
     /// Discards process data until the drive is started anew.
     fn stop_exchange(&mut self) {
+        self.following.stop();
         self.presence.answered_ns = 0;
         (self.is_started, self.power) = (false, None);
         self.controlword = Controlword::DISABLE_VOLTAGE;
@@ -226,8 +248,13 @@ impl RemoteDrive {
         let state = self.power.unwrap_or(DriveState::NotReadyToSwitchOn);
         self.controlword = next_controlword(state, request, self.controlword);
         let follows = state == DriveState::OperationEnabled && request == DriveRequest::Enable;
-        let target_increments =
-            if follows { self.increments(target_m) as i32 } else { self.actual_increments };
+        let target_increments = if follows {
+            self.following.follow(self.position_m(), target_m);
+            self.config.increments(target_m) as i32
+        } else {
+            self.following.stop();
+            self.actual_increments
+        };
         Some(Rpdo1 { controlword: self.controlword, target_increments }.frame(self.id))
     }
 

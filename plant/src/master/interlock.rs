@@ -61,7 +61,13 @@ impl Interlock {
         let is_first = *self == Self::Released;
         if is_first {
             *self = match cause {
-                Cause::CommandLost | Cause::BadMessage | Cause::DriveFault => Self::Permanent,
+                Cause::CommandLost
+                | Cause::BadMessage
+                | Cause::StrokeLimit
+                | Cause::VelocityLimit
+                | Cause::AccelerationLimit
+                | Cause::DriveFault
+                | Cause::FollowingError => Self::Permanent,
                 _ => Self::UntilRestored,
             };
         }

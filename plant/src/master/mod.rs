@@ -15,6 +15,8 @@ mod commands;
 mod drive;
 mod events;
 mod exchange;
+mod following;
+mod gate;
 mod incoming;
 mod interlock;
 mod presence;
@@ -80,7 +82,7 @@ impl Master {
             drives: std::array::from_fn(drive),
             buses: vec![BusMonitor::default(); can.buses.len()],
             exchange: Exchange::new(can, now_ns)?,
-            commands: Commands::new(can.command_timeout_cycles),
+            commands: Commands::new(scenario),
             were_enabled: false,
             interlock: Interlock::Released,
             events: EventLog::new(addresses),
@@ -93,7 +95,7 @@ impl Master {
         let now_ns = wake.woke_ns;
         self.events.cycle = wake.cycle;
         let is_heartbeat_due = self.exchange.begin_cycle(wake);
-        self.drives.iter_mut().for_each(|drive| drive.presence.begin_cycle());
+        self.drives.iter_mut().for_each(|drive| drive.begin_cycle(now_ns));
         self.watch_buses(now_ns, buses);
         for bus in 0..self.buses.len() {
             self.send(now_ns, bus, sync::frame(), buses);
@@ -192,12 +194,11 @@ impl Master {
                 self.drives[axis].forget(now_ns);
                 self.report_boot(now_ns, axis, Ok(()));
             }
-            let state = self.drives[axis].drive_state();
-            all_are_enabled &= state == Some(DriveState::OperationEnabled);
-            if is_enable && self.were_enabled && state != Some(DriveState::OperationEnabled) {
-                let failure = Failure::with(Cause::DriveFault, [f64::from(drive_state_code(state)), 0.0]);
+            let must_be_enabled = is_enable && self.were_enabled;
+            if let Some(failure) = self.drives[axis].disobedience(is_fresh, must_be_enabled) {
                 self.fail(now_ns, Subject::Axis(axis), &failure);
             }
+            all_are_enabled &= self.drives[axis].drive_state() == Some(DriveState::OperationEnabled);
         }
         self.were_enabled = is_enable && (self.were_enabled || all_are_enabled);
     }
@@ -220,8 +221,9 @@ impl Master {
     fn take_command(&mut self, now_ns: u64, command: Option<&Command>) {
         // A controller whose drives are off or stopping may be silent: they need no command.
         let needs_command = self.request() == DriveRequest::Enable;
-        let can_go_to = |axis: usize, target_m| self.drives[axis].can_go_to(target_m);
-        if let Err((subject, failure)) = self.commands.take(now_ns, command, needs_command, can_go_to) {
+        let following_m = self.drives.each_ref().map(RemoteDrive::following_m);
+        let times = [self.exchange.wake.cycle, now_ns];
+        if let Err((subject, failure)) = self.commands.take(times, command, needs_command, following_m) {
             self.fail(now_ns, subject, &failure);
         }
     }

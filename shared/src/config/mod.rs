@@ -20,7 +20,7 @@ mod need;
 mod scenario;
 
 pub use can::{CanConfig, IdentityConfig};
-pub use control::{ChecksConfig, ControllerConfig, CpuDmaLatency, RealtimeConfig};
+pub use control::{ChecksConfig, ControllerConfig, CpuDmaLatency, MOST_LEAD_CYCLES, RealtimeConfig};
 pub use drives::{DriveConfig, DrivesConfig};
 pub use dynamics::DynamicsConfig;
 pub use error::ScenarioError;

@@ -111,7 +111,7 @@ macro_rules! messages {
 
 messages! {
     /// Targets and request for the drives, once a cycle.
-    Command on "command" keeping 2048 as "masseter/Command/c023a3b20d68a651" {
+    Command on "command" keeping 2048 as "masseter/Command/11373be8f4790ed4" {
         /// Cycle of the controller, from 1.
         cycle: u64,
         /// Cycle of the reading it was computed from; 0 when there was none.
@@ -125,7 +125,7 @@ messages! {
     }
 
     /// Positions, forces and states of the drives, once a cycle.
-    Reading on "reading" keeping 2048 as "masseter/Reading/66b12ac3e4f2b2b9" {
+    Reading on "reading" keeping 2048 as "masseter/Reading/41200ee64cc0583c" {
         /// Cycle of the plant, from 1.
         cycle: u64,
         /// Cycle of the last command received when the sample was taken; 0 before the first.
@@ -165,7 +165,7 @@ messages! {
     }
 
     /// The controller's state and its estimate, once a cycle.
-    State on "state" keeping 2048 as "masseter/State/771acc0e84997397" {
+    State on "state" keeping 2048 as "masseter/State/cdd92d4d058fe856" {
         /// Cycle of the controller, from 1.
         cycle: u64,
         /// Cycle of the reading it was computed from; 0 when there was none.
@@ -217,7 +217,7 @@ messages! {
     }
 
     /// The true state of the mechanism, once a cycle; the controller never reads it.
-    Truth on "truth" keeping 2048 as "masseter/Truth/07a8a31fea5af454" {
+    Truth on "truth" keeping 2048 as "masseter/Truth/17d8d1aeb886b707" {
         /// Cycle of the plant, from 1.
         cycle: u64,
         /// The instant it describes: that of the reading's sample, ns.
@@ -237,7 +237,7 @@ messages! {
     }
 
     /// An observation of a tap on a CAN wire: a frame, or an error message in the coding of `linux/can/error.h`.
-    FrameTap on "frame" keeping 32768 as "masseter/FrameTap/bc4d1792091bd667" {
+    FrameTap on "frame" keeping 32768 as "masseter/FrameTap/794826467f5c38e6" {
         /// When its last bit was on the wire, ns.
         time_ns: u64,
         /// When its transmitter had it queued, ns; 0 on real wires.
@@ -254,7 +254,7 @@ messages! {
 
     /// Counters of the kernel for the machine and both loops. The recorder reads and records them; the message is not
     /// published.
-    Machine on "machine" keeping 1 as "masseter/Machine/b486849065fde2ff" {
+    Machine on "machine" keeping 1 as "masseter/Machine/8fc22495600355be" {
         /// Time of the sample, ns.
         time_ns: u64,
         /// Time that the hypervisor had taken from all cores together, as far as the hypervisor reports it, ns.
@@ -266,7 +266,7 @@ messages! {
     }
 
     /// A single occurrence: a change of state, a fault, an alarm.
-    Event on "event" keeping 1024 as "masseter/Event/59933b5d7db65044" {
+    Event on "event" keeping 1024 as "masseter/Event/f8f1dd2b770cc8b7" {
         /// When, ns.
         time_ns: u64,
         /// Cycle of the process that reports it.
