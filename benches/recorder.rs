@@ -22,7 +22,7 @@ use masseter_shared::lifecycle::Start;
 use masseter_shared::messages::codes::Source;
 use masseter_shared::messages::{Command as CommandMessage, Event, FrameTap, Reading, State, Truth};
 use masseter_shared::realtime::Cycle;
-use masseter_shared::realtime::scheduling::{Wanted, obtain};
+use masseter_shared::realtime::scheduling::{SchedulingRequest, obtain};
 use masseter_shared::transport::{Node, Publisher, ScratchDomain};
 use rustix::process::{Pid, Signal, kill_process};
 
@@ -194,12 +194,12 @@ struct Played {
 /// Publishes a cycle at a time by the clock.
 fn play(cycles: &[Vec<Recorded>], publishers: &mut Publishers) -> anyhow::Result<Played> {
     let realtime = Scenario::default().realtime;
-    let wanted = Wanted {
+    let request = SchedulingRequest {
         core: Some(realtime.cores[0]),
         fifo_priority: Some(realtime.priority),
         locked_memory: realtime.lock_memory,
     };
-    for refusal in obtain(wanted).refusals {
+    for refusal in obtain(request).refusals {
         println!("  {refusal}");
     }
     let period_ns = SECOND_NS / RATE_HZ;

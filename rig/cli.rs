@@ -1,6 +1,7 @@
 //! The command line: dispatches each verb to its module, and prints errors. Arguments are defined beside their verbs.
 
 use std::process::ExitCode;
+use std::sync::Arc;
 
 use clap::{Parser, Subcommand};
 use masseter_terminal::{Exit, Failure, OrFailure, status};
@@ -76,6 +77,8 @@ enum Verb {
 
 /// Parses the arguments, executes the verb, and prints its error.
 pub fn main() -> ExitCode {
+    // A write beyond the limit on the size of files is then an error, not the end.
+    let _ = signal_hook::flag::register(signal_hook::consts::SIGXFSZ, Arc::default());
     match execute(Cli::parse().verb) {
         Ok(exit) => exit.into(),
         Err(Failure { exit, error }) => {

@@ -10,7 +10,7 @@ use masseter_plant::process::{self, Reason};
 use masseter_shared::clock;
 use masseter_shared::config::Scenario;
 use masseter_shared::lifecycle::{ProcessArguments, StopRequest};
-use masseter_shared::realtime::scheduling::{Wanted, obtain};
+use masseter_shared::realtime::scheduling::{SchedulingRequest, obtain};
 use masseter_terminal::{Exit, result_line, status};
 
 use crate::arguments::{Wires, parse_wires};
@@ -49,7 +49,7 @@ pub(crate) fn plant(args: &PlantArgs) -> anyhow::Result<Exit> {
         return Ok(Exit::Passed);
     };
     Ok(match process::run(&process_arguments)? {
-        Reason::Asked => Exit::Passed,
+        Reason::Requested => Exit::Passed,
         Reason::Abandoned => Exit::SafeStop,
     })
 }
@@ -59,7 +59,7 @@ fn emulate(args: &PlantArgs) -> anyhow::Result<()> {
     let stop = StopRequest::listen_alone().context("cannot listen for signals")?;
     let emulator = Emulator::open(&scenario, clock::now_ns()).context("the drives cannot be emulated")?;
     let realtime = &scenario.realtime;
-    let obtained = obtain(Wanted {
+    let obtained = obtain(SchedulingRequest {
         core: None,
         fifo_priority: Some(realtime.priority),
         locked_memory: realtime.lock_memory,

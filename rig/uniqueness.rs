@@ -12,8 +12,8 @@ use anyhow::Context;
 use clap::{Args, Subcommand, ValueEnum};
 use masseter_controller::kinematics::uniqueness::InputBox;
 use masseter_plan::{Overrides, RunPlan};
+use masseter_recording::output::new_file;
 use masseter_shared::geometry::{AXIS_NAMES, Mechanism, MechanismConfig};
-use masseter_shared::output::new_file;
 use masseter_study::uniqueness::{Ambiguous, boxes, prove, search};
 use masseter_terminal::{Exit, result_line, status};
 

@@ -2,13 +2,19 @@
 
 mod common;
 
-use common::{Workspace, masseter, stderr, stdout};
+use std::process::Command;
+
+use common::{MASSETER, Workspace, masseter, stderr, stdout};
 use serde_json::{Value, json};
 
 #[test]
 fn scenarios_are_refused_with_place_and_remedy() {
     let cases = [
+        ("seeed = 1", "scenario.toml:1:1: unknown field `seeed`"),
         ("seeed = 1", "did you mean `seed`?"),
+        ("seed = 1\n[drives.leg]\nmax_force_n = -1.0", "scenario.toml:3:1: drives.leg.max_force_n = -1"),
+        ("checks = [999.0, 7]", "scenario.toml:1:10: checks is an array"),
+        ("[dynamics]\ncarriage_mass_kg = 1e300", "use 0.001 to 100"),
         ("[motion]\nkind = 'chewing'\nvertical = 3.0", "did you mean `vertical_mm`?"),
         ("[motion]\nkind = 'yawning'", "yawning"),
         ("rate_hz = 0", "use 10 to 20000 Hz"),
@@ -28,6 +34,75 @@ fn scenarios_are_refused_with_place_and_remedy() {
         assert_eq!(output.status.code(), Some(2), "{scenario}: {}", stderr(&output));
         assert!(stderr(&output).contains(reason), "{scenario:?} gave {:?}", stderr(&output));
         assert!(!workspace.run_folder().exists(), "{scenario}: something was started");
+    }
+}
+
+#[test]
+fn files_without_an_end_are_refused_at_once() {
+    let workspace = Workspace::new(&format!("# {}", "x".repeat(2 << 20)));
+    let large = workspace.file("scenario.toml");
+    for (arguments, reason) in [
+        (["run", "/dev/zero"], "/dev/zero: it is no regular file"),
+        (["run", "--trajectory=/dev/zero"], "/dev/zero: cannot be read (it is no regular file"),
+        (["run", large.to_str().unwrap()], "it is larger than 1048576 bytes"),
+        (["fk", "--scenario=/dev/zero"], "no regular file"),
+        (["fk", "--input=/dev/zero"], "/dev/zero:1: longer than 4096 bytes"),
+        (["ik", "--input=/dev/zero"], "/dev/zero:1: longer than 4096 bytes"),
+    ] {
+        let output = masseter(&arguments);
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {}", stderr(&output));
+        assert!(stderr(&output).contains(reason), "{arguments:?}: {}", stderr(&output));
+    }
+}
+
+#[test]
+fn limits_on_memory_and_files_are_refused_with_figures() {
+    let workspace = Workspace::new("");
+    let run = workspace.run_folder();
+    for (limit, reason) in [
+        ("-v 150000", "153.6 MB of address space, and a run needs 200.0 MB"),
+        ("-d 100000", "102.4 MB of data, and a run needs 120.0 MB"),
+        ("-f 8", "a file may have 0.0 MB, and the recording may need"),
+    ] {
+        for clock in ["rt", "virtual"] {
+            let output = Command::new("sh")
+                .args([
+                    "-c",
+                    &format!("ulimit {limit}; exec \"$@\""),
+                    "sh",
+                    MASSETER,
+                    "run",
+                    "--clock",
+                    clock,
+                ])
+                .arg("--out")
+                .arg(&run)
+                .output()
+                .unwrap();
+            assert_eq!(output.status.code(), Some(2), "{limit}, {clock}: {}", stderr(&output));
+            assert!(stderr(&output).contains(reason), "{limit}, {clock}: {}", stderr(&output));
+            assert!(!run.exists(), "{limit}, {clock}: something was started");
+        }
+    }
+}
+
+#[test]
+fn a_doubtful_motion_is_played_with_a_warning_that_names_the_line() {
+    let head = "time_s,x_mm,y_mm,z_mm,qw,qx,qy,qz\n";
+    let rows = |z_mm: &dyn Fn(i32) -> f64| {
+        let row = |i: i32| format!("{},0,0,{},1,0,0,0\n", f64::from(i) * 0.02, z_mm(i));
+        (0..50).map(row).collect::<String>()
+    };
+    let still = |i: i32| -f64::from(i % 10) * 1e-3;
+    let jump = |i: i32| if i == 25 { -2.0 } else { 0.0 };
+    let cases: [(&dyn Fn(i32) -> f64, &str); 2] =
+        [(&still, "is the unit millimetres?"), (&jump, "line 27: one row jumps")];
+    for (z_mm, warning) in cases {
+        let workspace = Workspace::new("");
+        let file = workspace.write("jaw.csv", &(head.to_owned() + &rows(z_mm)));
+        let output = workspace.run_virtual(&["--trajectory", file.to_str().unwrap()]);
+        assert!(stderr(&output).contains(warning), "{}", stderr(&output));
+        assert!(workspace.run_folder().exists(), "{}", stderr(&output));
     }
 }
 

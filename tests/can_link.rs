@@ -51,7 +51,9 @@ fn the_rate_that_a_plan_promises_is_one_that_fits() {
 
 #[test]
 fn every_message_of_a_run_arrives_within_the_bound_of_its_plan() {
-    for scenario in ["duration_s = 2.0", "duration_s = 1.0\n[can]\nfd = true\nbuses = [[0, 1, 2, 3, 4, 5]]"] {
+    for scenario in
+        ["duration_s = 2.0", "rate_hz = 500\nduration_s = 1.0\n[can]\nbuses = [[0, 1, 2, 3, 4, 5]]"]
+    {
         let workspace = Workspace::new(scenario);
         let output = workspace.run_virtual(&[]);
         assert_eq!(output.status.code(), Some(0), "{scenario}: {}", stdout(&output));
@@ -232,8 +234,8 @@ fn a_request_that_cannot_be_served_is_an_error_and_keeps_the_connection() {
 }
 
 #[test]
-fn a_foreign_tool_reads_an_object_of_a_drive_on_a_classical_and_on_an_fd_bus() {
-    for scenario in ["", "[can]\nfd = true\nbuses = [[0, 1, 2, 3, 4, 5]]"] {
+fn a_foreign_tool_reads_an_object_of_a_drive_on_two_buses_and_on_one() {
+    for scenario in ["", "rate_hz = 500\n[can]\nbuses = [[0, 1, 2, 3, 4, 5]]"] {
         let server = Server::start(&Workspace::new(scenario));
         let mut stream = TcpStream::connect(&server.address).unwrap();
         stream.set_read_timeout(Some(Duration::from_secs(20))).unwrap();

@@ -2,13 +2,19 @@
 
 mod common;
 
-use std::fs;
+use std::ffi::OsStr;
+use std::fs::{self, File};
+use std::io::Write;
+use std::os::unix::ffi::OsStrExt;
 use std::path::Path;
 use std::process::{Command, Output};
 use std::thread;
 use std::time::Duration;
 
-use common::{Cores, LENIENT, Workspace, assert_played, child_of, cramped, masseter, skip, stderr, stdout};
+use common::{
+    Cores, LENIENT, Workspace, assert_played, child_of, cramped, masseter, skip, stderr, stdout,
+    wait_until_it_records,
+};
 use masseter_shared::clock::{self, SECOND_NS};
 use masseter_shared::messages::State;
 use masseter_shared::messages::codes::ControllerState::Finished;
@@ -78,15 +84,21 @@ fn a_run_in_a_read_only_folder_is_reported() {
     assert_eq!(stderr(&output).lines().count(), 1, "{}", stderr(&output));
 }
 
-/// A disk with room for 2 MiB, there as long as this is.
+/// A disk of limited size, there as long as this is.
 struct SmallDisk<'a>(&'a Path);
 
 impl<'a> SmallDisk<'a> {
     /// None where nothing may be mounted, as by ordinary users and in most containers.
-    fn on(folder: &'a Path) -> Option<Self> {
+    fn on(folder: &'a Path, size: &str) -> Option<Self> {
         let mut mount = Command::new("mount");
-        mount.args(["-t", "tmpfs", "-o", "size=2m", "tmpfs"]).arg(folder);
+        mount.args(["-t", "tmpfs", "-o", &format!("size={size}"), "tmpfs"]).arg(folder);
         mount.status().is_ok_and(|status| status.success()).then(|| Self(folder))
+    }
+
+    /// Takes all the room that is left.
+    fn fill(folder: &Path) {
+        let mut filler = File::create(folder.join("filler")).unwrap();
+        while filler.write_all(&[0; 4096]).is_ok() {}
     }
 }
 
@@ -98,10 +110,10 @@ impl Drop for SmallDisk<'_> {
 }
 
 /// A run on a small disk; none where such a disk cannot be mounted.
-fn run_on_a_small_disk(run: impl FnOnce(&Workspace) -> Output) -> Option<Output> {
+fn run_on_a_small_disk(size: &str, run: impl FnOnce(&Workspace) -> Output) -> Option<Output> {
     let workspace = Workspace::new("");
     let folder = workspace.file("");
-    let Some(_disk) = SmallDisk::on(&folder) else {
+    let Some(_disk) = SmallDisk::on(&folder, size) else {
         skip("mounting a small disk is refused");
         return None;
     };
@@ -129,16 +141,88 @@ fn played_s(rig: &str) -> f64 {
     panic!("in 30 s the rig did not finish");
 }
 
+/// The verdict outlives the disk: on standard output, in the summary and in a later report.
+fn assert_judged(small: &Workspace, output: &Output) {
+    assert!(stdout(output).starts_with("INCOMPLETE"), "{}{}", stdout(output), stderr(output));
+    assert_eq!(small.summary()["verdict"]["word"], "INCOMPLETE");
+    assert_eq!(small.manifest()["ending"]["kind"], "recording_failed");
+    let mut files = fs::read_dir(small.run_folder()).unwrap().map(|entry| entry.unwrap().path());
+    assert!(!files.any(|file| file.extension() == Some(OsStr::new("part"))));
+    fs::remove_file(small.file("filler")).unwrap();
+    let again = masseter(&["report", small.run_folder().to_str().unwrap()]);
+    assert_eq!(again.status.code(), Some(6), "{}", stderr(&again));
+    assert!(stdout(&again).starts_with("INCOMPLETE"), "{}", stdout(&again));
+}
+
+#[test]
+fn a_disk_without_room_for_the_run_is_refused_with_figures() {
+    let Some(output) = run_on_a_small_disk("2m", |small| {
+        let output = small.run_virtual(&["--duration", "3s"]);
+        assert!(!small.run_folder().exists());
+        output
+    }) else {
+        return;
+    };
+    assert_eq!(output.status.code(), Some(2), "{}", stderr(&output));
+    assert!(stderr(&output).contains("has 2.1 MB free, and the run may need 20.0 MB"), "{}", stderr(&output));
+}
+
+/// In a mount namespace of its own, `/dev/shm` has any size.
+#[test]
+fn shared_memory_without_room_for_a_rig_is_refused_and_with_just_enough_it_runs() {
+    let cores = Cores::take();
+    let workspace = Workspace::new(&format!("duration_s = 1.0\n{LENIENT}"));
+    let run = |size: &str| {
+        let mount = format!("mount -t tmpfs -o size={size} tmpfs /dev/shm && exec \"$@\"");
+        let rig = workspace.command(&cores, &[]);
+        let mut command = Command::new("unshare");
+        command.args(["-m", "sh", "-c", &mount, "sh"]).arg(rig.get_program()).args(rig.get_args());
+        command.output().unwrap()
+    };
+    let output = run("8m");
+    if !stderr(&output).contains("masseter:") {
+        skip("mounting a small /dev/shm is refused");
+        return;
+    }
+    assert_eq!(output.status.code(), Some(2), "{}", stderr(&output));
+    let refusal = "/dev/shm has 8.4 MB free, and a rig needs 32.0 MB";
+    assert!(stderr(&output).contains(refusal), "{}", stderr(&output));
+    assert!(!workspace.run_folder().exists());
+    let output = run("31m");
+    assert_played(&workspace.run_folder(), output.status, &(stdout(&output) + &stderr(&output)));
+}
+
+#[test]
+fn a_folder_that_is_no_utf_8_takes_runs_under_both_clocks() {
+    let _cores = Cores::take();
+    let motion = "[motion]\nkind = 'file'\npath = 'jaw.csv'";
+    let workspace = Workspace::new(&format!("{motion}\n{LENIENT}"));
+    let row = |i: i32| format!("{},0,0,{},1,0,0,0\n", f64::from(i) * 0.02, -(f64::from(i) * 0.1).sin());
+    let rows: String = (0..50).map(row).collect();
+    workspace.write("jaw.csv", &format!("time_s,x_mm,y_mm,z_mm,qw,qx,qy,qz\n{rows}"));
+    for clock in ["virtual", "rt"] {
+        let name = [format!("run-{clock}-").as_bytes(), b"\xff"].concat();
+        let folder = workspace.file("").join(OsStr::from_bytes(&name));
+        let mut run = Command::new(common::MASSETER);
+        run.arg("run").arg(workspace.file("scenario.toml")).args(["--clock", clock, "--out"]).arg(&folder);
+        let output = run.output().unwrap();
+        assert_played(&folder, output.status, &(stdout(&output) + &stderr(&output)));
+    }
+}
+
 #[test]
 fn a_full_disk_does_not_stop_the_rig() {
     let cores = Cores::take();
     let name = format!("full-{}", std::process::id());
     let mut motion_s = 0.0;
-    let output = run_on_a_small_disk(|small| {
+    let output = run_on_a_small_disk("24m", |small| {
         let rig = small.start(&cores, &["--duration", "3s", "--name", &name]);
         child_of(&rig, "controller");
+        SmallDisk::fill(&small.file(""));
         motion_s = played_s(&name);
-        rig.wait_with_output().unwrap()
+        let output = rig.wait_with_output().unwrap();
+        assert_judged(small, &output);
+        output
     });
     let Some(output) = output else { return };
     assert_eq!(output.status.code(), Some(6), "{}{}", stdout(&output), stderr(&output));
@@ -149,7 +233,16 @@ fn a_full_disk_does_not_stop_the_rig() {
 
 #[test]
 fn a_full_disk_ends_a_run_under_virtual_time() {
-    let Some(output) = run_on_a_small_disk(|small| small.run_virtual(&["--duration", "3s"])) else { return };
+    let output = run_on_a_small_disk("160m", |small| {
+        small.write("scenario.toml", &format!("duration_s = 60.0\n{LENIENT}"));
+        let rig = small.start_virtual();
+        wait_until_it_records(small);
+        SmallDisk::fill(&small.file(""));
+        let output = rig.wait_with_output().unwrap();
+        assert_judged(small, &output);
+        output
+    });
+    let Some(output) = output else { return };
     assert_eq!(output.status.code(), Some(6), "{}{}", stdout(&output), stderr(&output));
     assert!(stderr(&output).contains("the run ends here"), "{}", stderr(&output));
 }

@@ -15,7 +15,7 @@ fn a_full_disk_behind_standard_output_is_exit_6_and_a_closed_pipe_is_no_failure(
     let folder = workspace.run_folder();
     let folder = folder.to_str().unwrap();
     let poses = workspace.write("poses.csv", "x_m,y_m,z_m,qw,qx,qy,qz\n0,0,0.27,1,0,0,0\n");
-    let verbs: [&[&str]; 9] = [
+    let verbs: [&[&str]; 11] = [
         &["ik", "--input", poses.to_str().unwrap()],
         &["doctor", "--format", "json"],
         &["can", "plan"],
@@ -23,6 +23,8 @@ fn a_full_disk_behind_standard_output_is_exit_6_and_a_closed_pipe_is_no_failure(
         &["recording", "info", folder],
         &["recording", "verify", folder],
         &["report", folder, folder],
+        &["report", folder, "--format", "json"],
+        &["report", folder],
         &["uniqueness", "search", "--inputs", "10"],
         &["bench", "ipc", "--rounds", "1", "--format", "json"],
     ];
@@ -39,5 +41,18 @@ fn a_full_disk_behind_standard_output_is_exit_6_and_a_closed_pipe_is_no_failure(
         let (code, said) = into(writer.into());
         // The machine may be too disturbed for a bench, or not fit for real time.
         assert!(matches!(code, Some(0 | 3)), "{verb:?}: {said}");
+    }
+}
+
+#[test]
+fn a_run_whose_result_nobody_could_read_is_exit_6_and_leaves_its_files() {
+    for format in ["json", "human"] {
+        let workspace = Workspace::new("duration_s = 0.5");
+        let full = File::options().write(true).open("/dev/full").unwrap();
+        let mut run = Command::new(MASSETER);
+        run.args(["run", "--clock", "virtual", "--format", format, "--out"]).arg(workspace.run_folder());
+        let output = run.arg(workspace.file("scenario.toml")).stdout(full).output().unwrap();
+        assert_eq!(output.status.code(), Some(6), "{format}: {}", stderr(&output));
+        assert_eq!(workspace.summary()["verdict"]["word"], "PASS", "{format}");
     }
 }

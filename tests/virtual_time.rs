@@ -5,7 +5,7 @@ mod common;
 use std::fs;
 use std::path::Path;
 
-use common::{Workspace, cramped, json, stderr, stdout, wait_until_it_records};
+use common::{Workspace, json, stderr, stdout, wait_until_it_records};
 use rustix::process::{Pid, Signal, kill_process};
 use serde_json::json;
 
@@ -281,13 +281,4 @@ fn a_report_can_be_made_again_and_says_that_a_recording_is_cut() {
     }
     fs::write(&recording, "no recording").unwrap();
     assert_eq!(report().status.code(), Some(2));
-}
-
-#[test]
-fn a_run_folder_that_takes_no_scenario_leaves_the_run_incomplete() {
-    let workspace = Workspace::new("");
-    let out = workspace.run_folder();
-    let output = cramped(0, &["run", "--clock", "virtual", "--out", out.to_str().unwrap()]);
-    assert!(stderr(&output).contains("scenario.toml: File too large"), "{}", stderr(&output));
-    assert_eq!(output.status.code(), Some(6), "{}", stderr(&output));
 }

@@ -12,6 +12,24 @@ use masseter_shared::messages::{Command, Event, Reading, State};
 use crate::sequencer::{Estimate, Sequencer};
 
 /// Holds the position found at the start.
+///
+/// ```
+/// use masseter_controller::hold_position::HoldPosition;
+/// use masseter_shared::config::Scenario;
+/// use masseter_shared::control::{Controller, Tick};
+/// use masseter_shared::geometry::{Mechanism, MechanismConfig};
+/// use masseter_shared::messages::Command;
+/// use masseter_shared::messages::codes::DriveRequest;
+///
+/// let mut controller = HoldPosition::new(&Scenario::default(), Mechanism::new(&MechanismConfig::default())?, 2.0);
+/// controller.observe(None);
+/// controller.decide(Tick { cycle: 1, now_ns: 540_000 });
+/// let mut command = Command::default();
+/// controller.fill_command(&mut command);
+/// // Without a reading the drives stay off.
+/// assert_eq!((command.cycle, command.request), (1, DriveRequest::Off.code()));
+/// # Ok::<_, masseter_shared::geometry::GeometryError>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct HoldPosition {
     sequencer: Sequencer,

@@ -115,3 +115,6 @@ fn interpolate(from: &Pose, to: &Pose, share: f64) -> Pose {
     let position = from.translation.vector.lerp(&to.translation.vector, share);
     Pose::from_parts(position.into(), nalgebra::UnitQuaternion::from_scaled_axis(turn) * from.rotation)
 }
+
+#[cfg(test)]
+mod tests;

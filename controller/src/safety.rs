@@ -144,3 +144,6 @@ pub(crate) fn check_velocity(
     }
     Ok(())
 }
+
+#[cfg(test)]
+mod tests;

@@ -130,8 +130,8 @@ impl Sequencer {
         }
     }
 
-    /// Follows the most urgent trigger to the next state, and reports it. `is_over` says whether the controller has moved
-    /// and held for as long as this state asks for; a state without motion does not need it.
+    /// Follows the most urgent trigger to the next state, and reports it. `is_over`: whether the controller has moved and
+    /// held for as long as this state takes; a state without motion ignores it.
     pub(crate) fn follow(&mut self, fault: Option<Fault>, is_over: bool, tick: Tick) -> Option<Event> {
         let triggers = [
             (Trigger::Fault, fault.is_some()),
@@ -193,7 +193,7 @@ impl Sequencer {
         }
     }
 
-    /// This cycle's command. Before the first target the drives are asked to be off, so that none follows the zeros.
+    /// This cycle's command. Before the first target the request is off, so that no drive follows the zeros.
     pub(crate) fn command(&self, target: Option<Actuators>) -> Command {
         Command {
             cycle: self.cycle,

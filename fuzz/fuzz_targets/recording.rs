@@ -74,9 +74,11 @@ fn read(reader: &mut Reader<Cursor<&[u8]>>) -> Option<Vec<Found>> {
         match reader.next_entry() {
             Ok(None) => break,
             Ok(Some(entry)) => all.push(Found {
-                schema: entry.channel.as_ref().and_then(|channel| channel.schema.as_ref()).map(|schema| {
-                    (schema.name.clone(), schema.encoding.clone(), schema.data.to_vec())
-                }),
+                schema: entry
+                    .channel
+                    .as_ref()
+                    .and_then(|channel| channel.schema.as_ref())
+                    .map(|schema| (schema.name.clone(), schema.encoding.clone(), schema.data.to_vec())),
                 topic: entry.channel.map(|channel| channel.topic.clone()),
                 channel: entry.header.channel_id,
                 sequence: entry.header.sequence,

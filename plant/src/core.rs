@@ -48,8 +48,8 @@ const TAPPED: usize = 4096;
 /// ```
 #[derive(Debug)]
 pub struct PlantCore<L = VirtualLink> {
-    pub(crate) master: Master,
-    pub(crate) link: L,
+    master: Master,
+    link: L,
     buses: usize,
     cycle: u64,
     /// With the index of its bus.
@@ -151,6 +151,26 @@ impl<L: Link> PlantCore<L> {
         self.link.advance(now_ns)?;
         self.master.apply(now_ns, command, &mut self.link);
         Ok(())
+    }
+
+    /// Stops the drives from the next process data on, for the end: commands are not needed any more.
+    pub(crate) fn stop(&mut self) {
+        self.master.stop();
+    }
+
+    /// Cycles since the last command.
+    pub(crate) fn silent_cycles(&self) -> u32 {
+        self.master.silent_cycles()
+    }
+
+    /// Whether no drive reports voltage.
+    pub(crate) fn drives_are_off(&self) -> bool {
+        self.master.drives_are_off()
+    }
+
+    /// The link to the drives.
+    pub(crate) fn link(&mut self) -> &mut L {
+        &mut self.link
     }
 
     /// Hands out the frames and errors tapped since the last drain. They are encoded only now, after the reading.

@@ -65,7 +65,7 @@ pub fn run_cycle<L: Link, P: PlantPorts<L>>(
     let reading_by_ns = wake.woke_ns + schedule.reading_by_ns;
     let mut now_ns = ports.wait_until(wake.woke_ns + schedule.reading_from_ns, reading_by_ns);
     while !plant.collect(now_ns)? && now_ns < reading_by_ns {
-        now_ns = ports.wait_for_frames(&mut plant.link, reading_by_ns);
+        now_ns = ports.wait_for_frames(plant.link(), reading_by_ns);
     }
     ports.publish_reading(|reading| plant.fill_reading(reading))?;
     if let Some(truth) = plant.truth() {

@@ -23,9 +23,9 @@ const ABANDONED_AFTER_NS: u64 = 5_000_000_000;
 /// Why the plant ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Reason {
-    /// It was asked to.
-    Asked,
-    /// Its controller has been silent for so long that it will not speak again.
+    /// A stop was requested.
+    Requested,
+    /// Its controller was silent for longer than a controller can be that still runs.
     Abandoned,
 }
 
@@ -96,8 +96,8 @@ struct RealTime<'a> {
     ports: Ports,
     cycle: Cycle,
     schedule: &'a CycleSchedule,
-    /// Whether commands are obeyed; at the end they no longer are.
-    obeys: bool,
+    /// Whether commands are received; at the end they no longer are.
+    takes_commands: bool,
 }
 
 impl<L: Link> PlantPorts<L> for RealTime<'_> {
@@ -125,7 +125,7 @@ impl<L: Link> PlantPorts<L> for RealTime<'_> {
     }
 
     fn command(&mut self, wake: &Wake) -> Result<Option<Received<Command>>, PlantProcessError> {
-        if !self.obeys {
+        if !self.takes_commands {
             return Ok(None);
         }
         // No command can arrive before the controller wakes.
@@ -164,8 +164,8 @@ fn serve<L: Link>(
 
     let mut plant = build(scenario, start.epoch_ns)?;
     let cycle = Cycle::new(start.epoch_ns, scenario.period_ns());
-    let mut real_time = RealTime { ports, cycle, schedule, obeys: true };
-    while !context.stop.is_made() && u64::from(plant.master.commands.silent_cycles) <= abandoned_cycles {
+    let mut real_time = RealTime { ports, cycle, schedule, takes_commands: true };
+    while !context.stop.is_made() && u64::from(plant.silent_cycles()) <= abandoned_cycles {
         let RealTime { cycle, ports, .. } = &mut real_time;
         let wake = cycle.wait_warm(|| -> Result<(), PlantProcessError> {
             // Works out what has happened on the wires by now.
@@ -174,15 +174,15 @@ fn serve<L: Link>(
         })?;
         run_cycle(&mut plant, &mut real_time, schedule, &wake)?;
     }
-    plant.master.is_ending = true;
-    real_time.obeys = false;
+    plant.stop();
+    real_time.takes_commands = false;
     let give_up_ns = clock::now_ns() + STOP_WITHIN_NS.max(STOP_WITHIN_CYCLES * scenario.period_ns());
-    while !plant.master.drives_are_off() && clock::now_ns() < give_up_ns {
+    while !plant.drives_are_off() && clock::now_ns() < give_up_ns {
         let wake = real_time.cycle.wait();
         run_cycle(&mut plant, &mut real_time, schedule, &wake)?;
     }
     // The last cycle's process data are on the wire only by now.
     plant.collect(real_time.cycle.wait().woke_ns)?;
     real_time.publish_frames_and_events(&mut plant)?;
-    Ok(if context.stop.is_made() { Reason::Asked } else { Reason::Abandoned })
+    Ok(if context.stop.is_made() { Reason::Requested } else { Reason::Abandoned })
 }

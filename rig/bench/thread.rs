@@ -1,12 +1,12 @@
 //! Threads with the real-time settings of a run.
 
 use masseter_shared::config::RealtimeConfig;
-use masseter_shared::realtime::scheduling::{Obtained, Wanted, obtain};
+use masseter_shared::realtime::scheduling::{Obtained, SchedulingRequest, obtain};
 
 /// Asks the kernel for the settings of a run on behalf of the calling thread.
 pub(super) fn realtime_on(core: usize) -> Obtained {
     let priority = RealtimeConfig::default().priority;
-    obtain(Wanted { core: Some(core), fifo_priority: Some(priority), locked_memory: true })
+    obtain(SchedulingRequest { core: Some(core), fifo_priority: Some(priority), locked_memory: true })
 }
 
 /// Runs `work` on a new thread with these settings, as far as the kernel grants them.

@@ -58,7 +58,7 @@ pub(crate) fn plan(args: &PlanArgs) -> anyhow::Result<Exit> {
 /// Why a run with this plan would be refused.
 fn refusal(scenario: &Scenario, plans: &[BusPlan], room: &Room) -> Option<String> {
     if let Some(overload) = plans.iter().find_map(|plan| plan.check().err()) {
-        return Some(format!("bus {} does not fit; {room}", overload.0.bus()));
+        return Some(format!("bus {} does not fit; {room}", overload.0.bus));
     }
     let schedule = CycleSchedule::new(&scenario.can, scenario.period_ns()).map_err(|error| error.to_string());
     let plant = plant::check(scenario).map_err(|error| error.to_string());
@@ -66,14 +66,14 @@ fn refusal(scenario: &Scenario, plans: &[BusPlan], room: &Room) -> Option<String
 }
 
 fn of_bus(plan: &BusPlan, can: &CanConfig) -> Result<Value, ScheduleError> {
-    let alone = CanConfig { buses: vec![can.buses[plan.bus()].clone()], ..can.clone() };
+    let alone = CanConfig { buses: vec![can.buses[plan.bus].clone()], ..can.clone() };
     Ok(json!({
-        "bus": plan.bus(),
+        "bus": plan.bus,
         "fits": plan.check().is_ok(),
         "cycle_time_ns": plan.cycle_time_ns(),
         "utilisation": plan.utilisation(),
         "max_rate_hz": Room::for_link(&alone)?.max_rate_hz,
-        "messages": plan.messages().iter().map(of_message).collect::<Vec<_>>(),
+        "messages": plan.messages.iter().map(of_message).collect::<Vec<_>>(),
     }))
 }
 

@@ -10,6 +10,7 @@ use std::path::PathBuf;
 use anyhow::{anyhow, ensure};
 use clap::Args;
 use masseter_shared::geometry::Mechanism;
+use masseter_shared::input::excerpt;
 use masseter_terminal::{Exit, status, taken};
 use rayon::prelude::*;
 
@@ -43,8 +44,7 @@ pub(super) struct Columns {
     pub written: &'static str,
 }
 
-/// Solves one line's values and writes the output lines they lead to. Its error says what is wrong
-/// with the values.
+/// Solves one line's values and writes the output lines. The error names what is wrong with the values.
 pub(super) type Solved = Result<(), String>;
 
 /// Output lines under way.
@@ -144,7 +144,7 @@ fn check_columns(input: &mut Input, expected: &str) -> anyhow::Result<()> {
     let text = header.text.map_err(|reason| anyhow!("{place}: {reason}"))?;
     let found: Vec<_> = fields(&text).collect();
     let found = found.join(",");
-    ensure!(found == expected, "{place}: the columns are '{found}', expected '{expected}'");
+    ensure!(found == expected, "{place}: the columns are '{}', expected '{expected}'", excerpt(&found));
     Ok(())
 }
 
@@ -158,7 +158,7 @@ fn numbers<const IN: usize>(line: &str, columns: &str) -> Result<[f64; IN], Stri
     }
     let mut values = [0.0_f64; IN];
     for ((value, text), column) in values.iter_mut().zip(fields(line)).zip(columns.split(',')) {
-        *value = text.parse().map_err(|_| format!("{column} is '{text}', not a number"))?;
+        *value = text.parse().map_err(|_| format!("{column} is '{}', not a number", excerpt(text)))?;
         if !value.is_finite() {
             return Err(format!("{column} is {value}, not a finite number"));
         }

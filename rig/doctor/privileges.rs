@@ -3,7 +3,7 @@
 use std::thread;
 
 use masseter_shared::config::RealtimeConfig;
-use masseter_shared::realtime::scheduling::{Obtained, Wanted, obtain};
+use masseter_shared::realtime::scheduling::{Obtained, SchedulingRequest, obtain};
 
 use super::container;
 use super::finding::Finding;
@@ -15,17 +15,17 @@ const RAISE_LIMITS: &str = "printf '%s - rtprio 95\\n%s - memlock unlimited\\n' 
 
 /// All findings of this family.
 pub(super) fn examine(root: &SystemRoot) -> Vec<Finding> {
-    let nothing = Wanted { core: None, fifo_priority: None, locked_memory: false };
+    let nothing = SchedulingRequest { core: None, fifo_priority: None, locked_memory: false };
     let priority = RealtimeConfig::default().priority;
     vec![
-        fifo(root, priority, &try_out(Wanted { fifo_priority: Some(priority), ..nothing })),
-        locked_memory(root, &try_out(Wanted { locked_memory: true, ..nothing })),
+        fifo(root, priority, &try_out(SchedulingRequest { fifo_priority: Some(priority), ..nothing })),
+        locked_memory(root, &try_out(SchedulingRequest { locked_memory: true, ..nothing })),
     ]
 }
 
 /// Requests scheduling in a thread of its own, so that this one keeps its priority.
-fn try_out(wanted: Wanted) -> Obtained {
-    thread::spawn(move || obtain(wanted)).join().expect("asking the kernel does not panic")
+fn try_out(request: SchedulingRequest) -> Obtained {
+    thread::spawn(move || obtain(request)).join().expect("asking the kernel does not panic")
 }
 
 fn fifo(root: &SystemRoot, priority: u8, obtained: &Obtained) -> Finding {
@@ -58,9 +58,9 @@ mod tests {
 
     #[test]
     fn what_counts_is_what_was_read_back() {
-        let wanted = Wanted { core: None, fifo_priority: Some(80), locked_memory: true };
+        let requested = SchedulingRequest { core: None, fifo_priority: Some(80), locked_memory: true };
         let obtained = |fifo_priority, locked_memory| Obtained {
-            wanted,
+            requested,
             core: None,
             fifo_priority,
             locked_memory,

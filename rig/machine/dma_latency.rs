@@ -18,12 +18,12 @@ pub(crate) struct Hold {
 }
 
 impl Hold {
-    /// Opens the device if `wanted` says so for this kind of machine.
-    pub(crate) fn new(wanted: CpuDmaLatency, is_virtual: bool) -> Self {
-        let opened = is_to_be_held(wanted, is_virtual).then(open);
+    /// Opens the device if `requested` demands that for this kind of machine.
+    pub(crate) fn new(requested: CpuDmaLatency, is_virtual: bool) -> Self {
+        let opened = is_to_be_held(requested, is_virtual).then(open);
         let (device, limit_us, refusal) = match opened {
             Some(Ok((device, limit_us))) => (Some(device), Some(limit_us), None),
-            Some(Err(error)) if wanted == CpuDmaLatency::Hold => {
+            Some(Err(error)) if requested == CpuDmaLatency::Hold => {
                 let refusal = format!(
                     "{DEVICE} refused ({error}): run as root, or allow it with `sudo setfacl -m u:\"$USER\":rw {DEVICE}`"
                 );
@@ -31,12 +31,12 @@ impl Hold {
             }
             Some(Err(_)) | None => (None, None, None),
         };
-        Self { obtained: DmaLatency { requested: wanted, limit_us, refusal }, _device: device }
+        Self { obtained: DmaLatency { requested, limit_us, refusal }, _device: device }
     }
 }
 
-fn is_to_be_held(wanted: CpuDmaLatency, is_virtual: bool) -> bool {
-    match wanted {
+fn is_to_be_held(requested: CpuDmaLatency, is_virtual: bool) -> bool {
+    match requested {
         CpuDmaLatency::Auto => !is_virtual,
         CpuDmaLatency::Hold => true,
         CpuDmaLatency::Leave => false,
@@ -65,8 +65,8 @@ mod tests {
             (CpuDmaLatency::Hold, true, true),
             (CpuDmaLatency::Leave, false, false),
         ];
-        for (wanted, is_virtual, expected) in cases {
-            assert_eq!(is_to_be_held(wanted, is_virtual), expected, "{wanted:?} {is_virtual}");
+        for (requested, is_virtual, expected) in cases {
+            assert_eq!(is_to_be_held(requested, is_virtual), expected, "{requested:?} {is_virtual}");
         }
     }
 

@@ -20,7 +20,8 @@ const LINE_INTERVAL_NS: u64 = SECOND_NS;
 const REWRITE_INTERVAL_NS: u64 = SECOND_NS / 5;
 /// Erases the line and switches wrapping off: a wrapped line could not be rewritten.
 const BEFORE_REWRITE: &str = "\r\x1b[2K\x1b[?7l";
-const WRAP_ON: &str = "\x1b[?7h";
+/// Switches wrapping on again, and leaves the cursor where an echoed ^C stays in the line.
+const AFTER_REWRITE: &str = "\x1b[?7h\r";
 
 /// What did not reach the recording or a Foxglove client.
 #[derive(Debug, Clone, Copy, Default)]
@@ -114,7 +115,7 @@ impl Progress {
     }
 
     fn rewritten(&self, losses: Losses) -> String {
-        format!("{BEFORE_REWRITE}{}{WRAP_ON}", self.line(losses))
+        format!("{BEFORE_REWRITE}{}{AFTER_REWRITE}", self.line(losses))
     }
 
     fn line(&self, Losses { unrecorded, clients }: Losses) -> String {
@@ -122,16 +123,15 @@ impl Progress {
             format!("   live {connected} watching, {dropped} dropped")
         });
         format!(
-            "  {:<13} motion {:>7.2} of {:.2} s   tracking error {:.3} mm, max {:.3}   wake-up latency max {:.0} µs   \
-             missed {}   dropped {}{live}",
+            "{:<13} motion {:>5.2} of {:.2} s   missed {}   dropped {}   tracking error {:.3} mm, max {:.3}   latest {:.0} µs{live}",
             self.controller_state().map_or("?", ControllerState::name),
             self.state.motion_time_s.max(0.0),
             self.motion_s,
+            self.state.skipped_cycles + self.reading.skipped_cycles,
+            self.missing + unrecorded,
             self.error_mm(),
             self.max_error_mm,
             self.max_late_ns as f64 / 1e3,
-            self.state.skipped_cycles + self.reading.skipped_cycles,
-            self.missing + unrecorded,
         )
     }
 
@@ -175,8 +175,8 @@ mod tests {
         let line = after_ten_cycles(false).next(SECOND_NS, Losses { unrecorded: 2, clients });
         assert_eq!(
             line,
-            "  running       motion    1.00 of 4.00 s   tracking error 2.000 mm, max 4.000   \
-             wake-up latency max 50 µs   missed 6   dropped 5   live 1 watching, 7 dropped\n"
+            "running       motion  1.00 of 4.00 s   missed 6   dropped 5   tracking error 2.000 mm, max 4.000   latest 50 µs   \
+             live 1 watching, 7 dropped\n"
         );
     }
 
@@ -184,7 +184,7 @@ mod tests {
     fn on_a_terminal_the_line_is_rewritten_until_other_text_follows() {
         let mut progress = after_ten_cycles(true);
         let rewritten = progress.next(SECOND_NS, Losses::default());
-        assert!(rewritten.starts_with(BEFORE_REWRITE) && rewritten.ends_with(WRAP_ON), "{rewritten:?}");
+        assert!(rewritten.starts_with(BEFORE_REWRITE) && rewritten.ends_with(AFTER_REWRITE), "{rewritten:?}");
         assert!(!rewritten.contains("live"), "{rewritten}");
         assert_eq!(progress.end_line(Losses::default()), Some(rewritten + "\n"));
         assert_eq!(after_ten_cycles(false).end_line(Losses::default()), None);

@@ -1,5 +1,6 @@
 //! A child process of the supervisor: start, readiness, end. It does not decide what its end means for the run.
 
+use std::ffi::OsString;
 use std::io::{self, BufRead, BufReader, Write};
 use std::os::unix::process::ExitStatusExt;
 use std::process::{Child, Command, ExitStatus, Stdio};
@@ -33,7 +34,7 @@ pub(super) struct Process {
 
 impl Process {
     /// Starts this executable as `role`.
-    pub(super) fn spawn(role: &'static str, arguments: &[&str]) -> anyhow::Result<Self> {
+    pub(super) fn spawn(role: &'static str, arguments: &[OsString]) -> anyhow::Result<Self> {
         let mut child = std::env::current_exe()
             .and_then(|executable| {
                 Command::new(executable)

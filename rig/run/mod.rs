@@ -6,34 +6,46 @@
 pub mod args;
 pub mod child;
 pub mod ending;
+mod room;
 pub mod supervisor;
 pub mod usage;
 pub mod virtual_time;
 
-use std::fs;
 use std::path::Path;
 
 use anyhow::{Context, bail};
 use masseter_plan::RunPlan;
 use masseter_plant::core as plant;
 use masseter_recording::{Ending, MOTION, Manifest, RunFolder};
-use masseter_shared::config::{MotionConfig, Scenario};
+use masseter_shared::config::{FileConfig, MotionConfig, Scenario};
+use masseter_shared::input::read_text;
 use masseter_terminal::{Exit, Failure, OrFailure, status};
 
 use crate::arguments::name_of;
 use crate::{foxglove, machine};
 use args::{ClockKind, RunArgs};
+use room::Reserve;
+
+/// Where runs without `--out` go.
+const RUNS: &str = "runs";
 
 /// Plays the motion, judges the run, and writes its folder.
 pub fn run(args: &RunArgs) -> Result<Exit, Failure> {
+    room::check_memory().usage()?;
     let plan = resolve(args).usage()?;
+    room::check_disk(args.out.as_deref().unwrap_or(RUNS.as_ref()), &plan).usage()?;
     let domain = match args.clock {
         ClockKind::Virtual => None,
-        ClockKind::Rt => Some(supervisor::reserve_domain(args.name.as_deref()).usage()?),
+        ClockKind::Rt => {
+            // This also removes what killed runs left.
+            let domain = supervisor::reserve_domain(args.name.as_deref()).usage()?;
+            room::check_shared_memory().usage()?;
+            Some(domain)
+        }
     };
     let folder = match &args.out {
         Some(path) => RunFolder::create(path).usage()?,
-        None => RunFolder::create_in("runs".as_ref(), &plan.scenario.name).usage()?,
+        None => RunFolder::create_in(RUNS.as_ref(), &plan.scenario.name).usage()?,
     };
     keep_scenario(&folder, &plan.scenario).incomplete()?;
     if !args.quiet {
@@ -45,6 +57,8 @@ pub fn run(args: &RunArgs) -> Result<Exit, Failure> {
     let mut manifest = Manifest::new(plan.scenario.clone(), motion_s, &clock, machine::describe());
     // This one remains if the supervisor is killed.
     write_manifest(&folder, &manifest)?;
+    let no_room = || format!("no room in {} for the verdict", folder.path().display());
+    let reserve = Reserve::take(folder.path()).with_context(no_room).incomplete()?;
     let ran = match domain {
         None => virtual_time::run(&plan, &folder, args.controller.builder())
             .map(|ending| manifest.ending = ending)
@@ -54,14 +68,17 @@ pub fn run(args: &RunArgs) -> Result<Exit, Failure> {
     if let Err(failure) = &ran {
         manifest.ending = Ending::died("rig", format!("{:#}", failure.error));
     }
-    write_manifest(&folder, &manifest)?;
+    drop(reserve.manifest);
+    let written = write_manifest(&folder, &manifest);
     ran?;
     // Interrupted before every process was ready: nothing is recorded.
     let is_unstarted = args.clock == ClockKind::Rt && manifest.scheduling.is_empty();
     if manifest.ending == Ending::Interrupted && is_unstarted {
         return Ok(Exit::Interrupted);
     }
-    masseter_report::report_run(&folder, &manifest, args.format)
+    let exit = masseter_report::report_run(&folder, &manifest, args.format, reserve.summary)?;
+    written?;
+    Ok(exit)
 }
 
 fn write_manifest(folder: &RunFolder, manifest: &Manifest) -> Result<(), Failure> {
@@ -74,7 +91,9 @@ fn resolve(args: &RunArgs) -> anyhow::Result<RunPlan> {
     let scenario = masseter_plan::scenario_with_overrides(args.scenario.as_deref(), &args.overrides())?;
     check_clock(args, &scenario)?;
     args.live.map_or(Ok(()), foxglove::check)?;
-    let plan = RunPlan::new(scenario)?;
+    let of_file = args.scenario.as_deref().map(|path| path.display().to_string());
+    let plan = RunPlan::new(scenario)
+        .with_context(|| of_file.unwrap_or_else(|| "the default scenario".to_owned()))?;
     plant::check_interfaces(&plan.scenario).context("the plant cannot be built")?;
     Ok(plan)
 }
@@ -100,8 +119,8 @@ fn check_clock(args: &RunArgs, scenario: &Scenario) -> anyhow::Result<()> {
 fn keep_scenario(folder: &RunFolder, scenario: &Scenario) -> anyhow::Result<()> {
     let mut kept = scenario.clone();
     if let MotionConfig::File(file) = &mut kept.motion {
-        let rows =
-            fs::read_to_string(&file.path).with_context(|| format!("cannot read {}", file.path.display()))?;
+        let rows = read_text(&file.path, FileConfig::MOST_BYTES);
+        let rows = rows.with_context(|| format!("cannot read {}", file.path.display()))?;
         keep(folder, &folder.motion(), &rows)?;
         file.path = MOTION.into();
     }

@@ -6,6 +6,7 @@
 //! plant detects. The supervisor reads no message of the run and judges nothing.
 
 use std::collections::BTreeMap;
+use std::ffi::OsString;
 use std::io;
 use std::process::ExitStatus;
 use std::time::Duration;
@@ -24,6 +25,7 @@ use masseter_terminal::{Exit, Failure, OrFailure, status};
 use super::args::RunArgs;
 use super::child::{CONTROLLER, PLANT, Process, RECORDER};
 use super::ending::{died, of_plant_and_recorder, of_run};
+use super::room::reserve_shared_memory;
 use super::usage::UsageMeter;
 use crate::arguments::name_of;
 use crate::machine::interrupts::Interrupts;
@@ -66,7 +68,7 @@ pub(super) fn run(
 ) -> Result<(), Failure> {
     let interrupts = Interrupts::listen().context("cannot listen for signals").died()?;
     let result = Rig::spawn(plan, folder, &domain, args)
-        .and_then(|mut rig| rig.run(plan, args.require_rt, &interrupts, manifest));
+        .and_then(|mut rig| rig.run(plan, &domain, args.require_rt, &interrupts, manifest));
     drop(claim);
     interrupts.restore_default_actions();
     if let Err(error) = domain.sweep() {
@@ -90,19 +92,15 @@ struct Rig {
 
 impl Rig {
     fn spawn(plan: &RunPlan, folder: &RunFolder, domain: &Domain, args: &RunArgs) -> anyhow::Result<Self> {
-        let scenario = folder.scenario();
-        let scenario = scenario.to_str().context("the run folder's path is not UTF-8")?;
-        let recording = folder.recording();
-        let recording = recording.to_str().context("the run folder's path is not UTF-8")?;
-        let common = ["--scenario", scenario, "--domain", domain.id()];
-        let live = args.live.map(|address| format!("--live={address}"));
+        let common: Vec<OsString> =
+            vec!["--scenario".into(), folder.scenario().into(), "--domain".into(), domain.id().into()];
+        let with = |more: Vec<OsString>| [common.clone(), more].concat();
         let motion_s = plan.trajectory.motion_time_s(plan.trajectory.duration_s());
-        let motion = format!("--motion-s={motion_s}");
-        let mut recorder_arguments = [&common[..], &["--recording", recording, &motion]].concat();
-        recorder_arguments.extend(args.quiet.then_some("--quiet"));
-        recorder_arguments.extend(live.as_deref());
-        let kind = name_of(&args.controller);
-        let controller_arguments = [&common[..], &["--kind", &kind]].concat();
+        let motion = format!("--motion-s={motion_s}").into();
+        let mut recorder_arguments = with(vec!["--recording".into(), folder.recording().into(), motion]);
+        recorder_arguments.extend(args.quiet.then(|| "--quiet".into()));
+        recorder_arguments.extend(args.live.map(|address| format!("--live={address}").into()));
+        let controller_arguments = with(vec!["--kind".into(), name_of(&args.controller).into()]);
         let Scenario { controller, can, .. } = &plan.scenario;
         // It stops the motion, holds it, and switches the drives off.
         let stop_s = controller.stop_ramp_s + controller.hold_s + controller.start_timeout_s;
@@ -118,6 +116,7 @@ impl Rig {
     fn run(
         &mut self,
         plan: &RunPlan,
+        domain: &Domain,
         require_rt: bool,
         interrupts: &Interrupts,
         manifest: &mut Manifest,
@@ -126,6 +125,7 @@ impl Rig {
             return Ok(Ending::Interrupted);
         };
         manifest.scheduling = scheduling;
+        reserve_shared_memory(domain)?;
         let is_virtual = SystemRoot::of_this_machine().is_virtual();
         let hold = dma_latency::Hold::new(plan.scenario.realtime.cpu_dma_latency, is_virtual);
         manifest.cpu_dma_latency = Some(hold.obtained.clone());

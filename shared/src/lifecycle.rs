@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 
 use crate::config::{Scenario, ScenarioError};
-use crate::realtime::scheduling::{Obtained, Wanted, obtain};
+use crate::realtime::scheduling::{Obtained, SchedulingRequest, obtain};
 use crate::schedule::{CycleSchedule, ScheduleError};
 use crate::transport::{Domain, DomainError, Node, TransportError};
 
@@ -83,7 +83,7 @@ impl ProcessContext {
     /// without a core.
     pub fn ready(&self, core: Option<usize>) -> Result<Start, ProcessError> {
         let realtime = &self.scenario.realtime;
-        let scheduling = obtain(Wanted {
+        let scheduling = obtain(SchedulingRequest {
             core,
             fifo_priority: core.map(|_| realtime.priority),
             locked_memory: core.is_some() && realtime.lock_memory,

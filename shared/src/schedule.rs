@@ -312,7 +312,7 @@ mod tests {
     fn the_last_process_data_of_a_cycle_wait_for_all_others_and_a_heartbeat() {
         let plans = plans(&CanConfig::default(), 1_000_000).unwrap();
         let last = Cob::Rpdo1(NodeId::new(3).unwrap()).into();
-        let last = plans[0].messages().iter().find(|planned| planned.message.id == last).unwrap();
+        let last = plans[0].messages.iter().find(|planned| planned.message.id == last).unwrap();
         assert_eq!(last.response_ns, Some((65 + 55 + 3 * 135 + 3 * 115) * 1000));
     }
 

@@ -20,7 +20,7 @@ with open(sys.argv[1], "rb") as file:
         if schema.name == "foxglove.SceneUpdate":
             parts |= {entity.id: entity for entity in body.entities}
 
-assert set(frames) == {"platform", "platform_estimated", "platform_wanted"}, set(frames)
+assert set(frames) == {"platform", "platform_estimated", "platform_desired"}, set(frames)
 assert {"base", "legs", "jaw", "platform"} <= set(parts), set(parts)
 ends = parts["legs"].lines[0].points
 for hinge, corner in zip(ends[::2], ends[1::2]):

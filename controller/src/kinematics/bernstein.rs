@@ -57,7 +57,7 @@ struct Piece {
 
 /// What the signs of the coefficients prove.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Verdict {
+enum SignTest {
     NoZero,
     OneZero,
     Unknown,
@@ -88,12 +88,12 @@ pub(super) fn locate(
         waiting -= 1;
         let piece = pending[waiting];
         match piece.verdict(noise) {
-            Verdict::NoZero => {}
-            Verdict::OneZero => found(Zeros::One(piece.interval)),
-            Verdict::Unknown if piece.depth == DEEPEST => {
+            SignTest::NoZero => {}
+            SignTest::OneZero => found(Zeros::One(piece.interval)),
+            SignTest::Unknown if piece.depth == DEEPEST => {
                 undecided = Some(joined(undecided, piece.interval, &mut found));
             }
-            Verdict::Unknown => {
+            SignTest::Unknown => {
                 let [low, high] = piece.halved();
                 (pending[waiting], pending[waiting + 1]) = (high, low);
                 waiting += 2;
@@ -121,7 +121,7 @@ impl Piece {
     }
 
     /// Coefficients within the noise count as either sign.
-    fn verdict(&self, noise: f64) -> Verdict {
+    fn verdict(&self, noise: f64) -> SignTest {
         let (mut positive, mut negative) = (0u32, 0u32);
         for (index, &coefficient) in self.coefficients.iter().enumerate() {
             positive |= u32::from(coefficient > noise) << index;
@@ -129,7 +129,7 @@ impl Piece {
         }
         let clear = positive | negative;
         if clear & ENDS != ENDS {
-            return Verdict::Unknown;
+            return SignTest::Unknown;
         }
         // Each doubtful coefficient takes the sign of the one before.
         let mut doubtful = !clear & ((1 << (DEGREE + 1)) - 1);
@@ -138,15 +138,15 @@ impl Piece {
             let before = positive >> (index - 1) & 1;
             // One doubtful value between two signs adds no change, more of them or equal signs may.
             if clear >> (index + 1) & 1 == 0 || positive >> (index + 1) & 1 == before {
-                return Verdict::Unknown;
+                return SignTest::Unknown;
             }
             positive |= before << index;
             doubtful &= doubtful - 1;
         }
         match ((positive ^ positive >> 1) & ((1 << DEGREE) - 1)).count_ones() {
-            0 => Verdict::NoZero,
-            1 => Verdict::OneZero,
-            _ => Verdict::Unknown,
+            0 => SignTest::NoZero,
+            1 => SignTest::OneZero,
+            _ => SignTest::Unknown,
         }
     }
 

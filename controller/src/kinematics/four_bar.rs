@@ -4,7 +4,7 @@
 //! With x = cos θ₁ and y = sin θ₁ the side's equation reads A + B cos θ + C sin θ = 0, where A and B
 //! are affine in x and C = −y: a line that cuts the unit circle where D = B² + C² − A² ≥ 0. D is a
 //! quadratic in x whose leading coefficient ω² − 1 − p² is never positive, so the angles at which a
-//! chain closes are *one* interval of x. Nothing here knows of the third side.
+//! chain closes are *one* interval of x. The third side is not part of this module.
 
 use super::leg_angle::LegAngle;
 use super::loop_equations::Side;

@@ -19,7 +19,7 @@ use super::legs::{each, next};
 /// [`Side::new`]: at most 33 roundings of half an epsilon each, 20 of them on the way from the hinges
 /// to κ, 6 on the sum, 3 in a product, 4 for leg angles 2 roundings off the circle.
 const ROUNDINGS: f64 = 20.0;
-/// No Newton step is longer; a longer one says only that the Jacobian is nearly singular.
+/// No Newton step is longer; a longer one only shows that the Jacobian is nearly singular.
 const LONGEST_STEP_RAD: f64 = 1.0;
 
 /// The coefficients of one gₖ; unitless.

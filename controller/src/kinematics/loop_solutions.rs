@@ -53,6 +53,7 @@ impl LoopSolutions {
         let mut solutions = Self { all: [None; MOST_SOLUTIONS], count: 0, overflowed: false };
         let isolated = Elimination::new(loops).solve(filter, |closed| solutions.add_pair(loops, &closed));
         solutions.add_neighbours(loops);
+        solutions.double_singular_ones(loops);
         if isolated.is_err() || solutions.overflowed {
             return Err(ForwardError::Undecided { solutions: solutions.count });
         }
@@ -102,6 +103,23 @@ impl LoopSolutions {
         }
     }
 
+    /// Adds the second of two solutions that rounding has made one: a solution at a singularity is at least double.
+    fn double_singular_ones(&mut self, loops: &LoopEquations<'_>) {
+        for index in 0..self.count {
+            let Some(closed) = self.all[index] else { continue };
+            let is_double = loops.determinant(&closed.residuals).abs() <= NEARLY_SINGULAR
+                && !is_certified(loops, &closed)
+                && !(0..self.count).any(|other| {
+                    other != index
+                        && self.all[other]
+                            .is_some_and(|other| coincide(&other.leg_angles, &closed.leg_angles, CLOSE_RAD))
+                });
+            if is_double {
+                self.push(&closed);
+            }
+        }
+    }
+
     fn add_pair(&mut self, loops: &LoopEquations<'_>, closed: &LoopSolution) {
         self.add(loops, closed);
         self.add(loops, &closed.mirrored());
@@ -117,9 +135,12 @@ impl LoopSolutions {
                 && (coincide(&known.leg_angles, &closed.leg_angles, MERGED_WITHIN_RAD)
                     || !(is_certified(loops, known) || is_certified(loops, closed)))
         };
-        if self.iter().any(is_same) {
-            return;
+        if !self.iter().any(is_same) {
+            self.push(closed);
         }
+    }
+
+    fn push(&mut self, closed: &LoopSolution) {
         match self.all.get_mut(self.count) {
             Some(place) => {
                 *place = Some(*closed);

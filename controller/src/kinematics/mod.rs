@@ -3,12 +3,12 @@
 //! What the loop and the command line use is [`ForwardTracker`]: Newton's iteration from the last
 //! solution, a [`Certificate`] for its result, and [`solve_completely`] whenever that is not enough.
 //! The latter finds every solution ([`Solutions`]) and picks the one in which the mechanism stands as
-//! it was assembled ([`Assembly`]), or says that there is none, or more than one. The paper's own
+//! it was assembled ([`Assembly`]), or reports that there is none, or more than one. The paper's own
 //! algorithm and plain Newton–Raphson ([`solve`], on the paper's form of the [`Equations`]) stand
 //! beside it for comparison.
 //!
-//! Everything is pure, allocates nothing and ends after a fixed number of iterations. It does not
-//! judge strokes or speeds, and believes the mechanism's dimensions.
+//! Everything is pure, allocates nothing and ends after a fixed number of iterations. Strokes and
+//! speeds are not checked, and the dimensions of the mechanism are taken as given.
 
 mod assembly;
 mod bernstein;

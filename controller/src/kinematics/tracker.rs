@@ -49,7 +49,7 @@ struct Last {
 }
 
 impl ForwardTracker {
-    /// A tracker that knows no solution yet.
+    /// A tracker without a solution yet.
     pub fn new(mechanism: Mechanism) -> Self {
         Self { mechanism, last: None, anchor: Anchor::nowhere() }
     }

@@ -9,6 +9,7 @@ use super::*;
 use crate::sequencer::{ALL_AXES, REPEATED_CYCLES, SAFE_STOP_S};
 
 mod faults;
+mod limits;
 mod stalls;
 
 const PERIOD_NS: u64 = 1_000_000;
@@ -191,6 +192,7 @@ fn axes_slightly_outside_their_strokes_are_eased_back() {
     let mut bench = Bench::standing_at(start_m);
     bench.run_until(ControllerState::Easing);
     while bench.controller.state() == ControllerState::Easing {
+        assert!(bench.cycle < 20_000);
         bench.cycle(Some);
         let target_m = &bench.commands[1].target_m[LEGS..];
         assert!(target_m.iter().zip(start_m).all(|(to_m, from_m)| *to_m >= from_m.min(lowest_m)));
@@ -207,6 +209,7 @@ fn what_the_trim_carries_beyond_a_stroke_is_held_at_its_end() {
     let mut bench = Bench::of(&Scenario { jaw, ..short() }, [0.29; LEGS]);
     bench.run_until(ControllerState::Running);
     while bench.controller.state() != ControllerState::Finished {
+        assert!(bench.cycle < 20_000);
         bench.cycle(|mut reading| {
             let lacking_m = [2.5e-3, 0.5e-3, 0.5e-3];
             reading.position_m[LEGS..].iter_mut().zip(lacking_m).for_each(|(leg_m, by_m)| *leg_m -= by_m);

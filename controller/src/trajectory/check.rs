@@ -12,7 +12,7 @@ use crate::kinematics::Assembly;
 
 use super::{Trajectory, TrajectoryError};
 
-/// What a trajectory asks of the axes, in the order d₁ d₂ d₃ l₁ l₂ l₃.
+/// The demands of a trajectory on the axes, in the order d₁ d₂ d₃ l₁ l₂ l₃.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TrajectoryReport {
     /// Samples taken.

@@ -5,6 +5,7 @@
 
 use masseter_shared::config::{FileConfig, JawConfig};
 use masseter_shared::geometry::Vec3;
+use masseter_shared::input::read_text;
 
 use super::TrajectoryError;
 use super::axes::Axes;
@@ -33,7 +34,8 @@ pub(super) fn import(config: &FileConfig, jaw: &JawConfig) -> Result<Recording, 
 fn recording(config: &FileConfig, reference: &Vec3) -> Result<Recording, Located> {
     let axes = Axes::parse(&config.axes).map_err(Located::whole)?;
     let unreadable = |error| format!("cannot be read ({error}); check the path and that it is UTF-8 text");
-    let text = std::fs::read_to_string(&config.path).map_err(|error| Located::whole(unreadable(error)))?;
+    let text =
+        read_text(&config.path, FileConfig::MOST_BYTES).map_err(|error| Located::whole(unreadable(error)))?;
     let table = Table::parse(&text)?;
     check_points(config, table.format).map_err(Located::whole)?;
     let origin = config.marker_origin_mm.map(|mm| Vec3::from(mm) / 1000.0);

@@ -4,7 +4,7 @@
 //! allocated) and then evaluated in the loop, without allocation and without iteration. It comes
 //! from a generator on a rigid mandible ([`MotionConfig`]'s kinds) or from a recording, starts and
 //! ends at rest, and moves nothing by itself: [`check`] judges beforehand whether the mechanism can
-//! follow it. How the rig gets to its first pose is the controller's matter.
+//! follow it. The way of the rig to the first pose is not part of it.
 
 mod axes;
 mod check;
@@ -18,6 +18,7 @@ mod jaw_frame;
 mod lowpass;
 mod mandible;
 mod markers;
+mod plausibility;
 mod pose_csv;
 mod recording;
 mod spline;
@@ -127,8 +128,14 @@ impl Trajectory {
         recording.centroid_turn_deg
     }
 
-    /// File and line of the recording nearest to a time of the trajectory; none for a generator.
-    fn source_line(&self, t_s: f64) -> Option<String> {
+    /// What is doubtful in a recording, each with its line; nothing for a generator.
+    pub fn doubts(&self) -> &[String] {
+        let Motion::Recording(recording) = &self.motion else { return &[] };
+        &recording.doubts
+    }
+
+    /// File and line, `motion.csv:7`, of the recording nearest to a time of the trajectory; none for a generator.
+    pub fn source_line(&self, t_s: f64) -> Option<String> {
         let Motion::Recording(recording) = &self.motion else { return None };
         Some(recording.source_line(self.motion_time_s(t_s)))
     }

@@ -10,6 +10,7 @@ use nalgebra::{UnitQuaternion, Vector6};
 
 use super::error::Located;
 use super::lowpass::lowpass;
+use super::plausibility::doubts;
 use super::spline::Spline;
 
 /// Least rate of the even grid, Hz: well above what a jaw does. What is sampled faster keeps its rate, because what a
@@ -39,11 +40,13 @@ pub(super) struct Recording {
     curve: Spline<6>,
     /// The largest turn, degrees, if it makes the markers' centroid a bad substitute for the incisal point.
     pub centroid_turn_deg: Option<f64>,
+    /// What is doubtful, with the line.
+    pub doubts: Vec<String>,
 }
 
 impl Recording {
-    /// From samples at strictly increasing times; a corner of 0 leaves them unfiltered. `are_of_centroid` says that they are
-    /// displacements of the markers' centroid, because the incisal point is not given.
+    /// From samples at strictly increasing times; a corner of 0 leaves them unfiltered. `are_of_centroid`: whether the samples
+    /// are displacements of the markers' centroid, because the incisal point is not given.
     pub(super) fn new(
         path: PathBuf,
         samples: &[Sample],
@@ -58,10 +61,13 @@ impl Recording {
         let largest_turn_deg = turns_deg.fold(0.0, f64::max);
         let is_bad = are_of_centroid && largest_turn_deg > CENTROID_TURN_DEG;
         let time_s: Vec<f64> = samples.iter().map(|sample| sample.time_s - first.time_s).collect();
+        let lines: Vec<_> = samples.iter().map(|sample| sample.line).collect();
+        let doubts = doubts(&time_s, &coordinates, &lines);
         let raw = Spline::through(time_s.clone(), coordinates);
         Ok(Self {
             path,
-            lines: samples.iter().map(|sample| sample.line).collect(),
+            lines,
+            doubts,
             first_rotation,
             curve: if lowpass_hz == 0.0 { raw } else { smoothed(&raw, &time_s, lowpass_hz) },
             centroid_turn_deg: is_bad.then_some(largest_turn_deg),

@@ -1,7 +1,9 @@
 //! The recording as a table of finite numbers over increasing time.
 //!
-//! Plain CSV: no quotes, comments from `#`, blank lines ignored. The module knows the columns'
-//! names, not their meaning.
+//! Plain CSV: no quotes, comments from `#`, blank lines ignored. The module reads the columns'
+//! names; their meaning is not part of it.
+
+use masseter_shared::input::excerpt;
 
 use super::error::Located;
 
@@ -60,6 +62,7 @@ impl Format {
         let [found, expected] =
             [&found, columns].map(|names| names.get(position).copied().unwrap_or_default());
         let (position, header) = (position + 1, columns.join(","));
+        let found = excerpt(found);
         Err(format!("column {position} is `{found}`, expected `{expected}`; the header must be `{header}`"))
     }
 }
@@ -102,7 +105,10 @@ fn parse_row(line: u64, text: &str, columns: &[&str], previous: Option<&Row>) ->
 fn parse_number(text: &str, column: &str) -> Result<f64, String> {
     let finite = text.parse().ok().filter(|value: &f64| value.is_finite());
     let value = finite.ok_or_else(|| {
-        format!("`{text}` in column `{column}` is not a finite number; write it with a decimal point")
+        format!(
+            "`{}` in column `{column}` is not a finite number; write it with a decimal point",
+            excerpt(text)
+        )
     })?;
     if column.ends_with("_mm") && value.abs() > LARGEST_MM {
         let problem = format!("{value:e} in column `{column}` lies beyond ±{LARGEST_MM} mm");

@@ -147,7 +147,7 @@ fn drives_boot_enable_and_follow_within_a_tenth_of_a_millimetre() {
     for _ in 0..50 {
         bench.cycle(Some(&|reading| (reading.position_m, DriveRequest::Off)));
     }
-    assert!(bench.plant.master.drives_are_off());
+    assert!(bench.plant.drives_are_off());
 }
 
 #[test]
@@ -173,14 +173,14 @@ fn without_commands_the_master_stops_the_drives_and_stays_stopped() {
     for _ in 0..60 {
         bench.cycle(None);
     }
-    assert!(bench.plant.master.drives_are_off());
+    assert!(bench.plant.drives_are_off());
     assert!(bench.fastest_axis_m_s() < 1e-3);
     assert_eq!(bench.causes(EventKind::Fault), [Cause::CommandLost]);
     assert_eq!(bench.reading.master_fault, 1);
     for _ in 0..50 {
         bench.cycle(Some(&|reading| (reading.position_m, DriveRequest::Enable)));
     }
-    assert!(bench.plant.master.drives_are_off(), "a late commander moved the rig again");
+    assert!(bench.plant.drives_are_off(), "a late commander moved the rig again");
 }
 
 #[test]
@@ -219,7 +219,7 @@ fn a_bad_command_stops_the_rig_and_its_bad_value_is_reported() {
         for _ in 0..60 {
             bench.cycle(Some(&|reading| (reading.position_m, DriveRequest::Enable)));
         }
-        assert!(bench.plant.master.drives_are_off());
+        assert!(bench.plant.drives_are_off());
         assert_eq!(bench.causes(EventKind::Fault), [Cause::BadMessage]);
         let told = bench.events.iter().find(|event| event.kind == EventKind::Fault.code()).unwrap();
         assert_eq!((told.axis, told.value.to_bits()), (axis, value.to_bits()), "{}", told.value);

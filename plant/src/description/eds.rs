@@ -23,7 +23,7 @@ pub(super) fn write(settings: &DriveSettings) -> String {
     [head(settings.node)].into_iter().chain(lists).chain(sections).collect()
 }
 
-/// What the file says of itself and of the device.
+/// The sections on the file and the device.
 fn head(node: NodeId) -> String {
     format!(
         include_str!("eds_head.txt"),

@@ -1,6 +1,6 @@
 //! The emulated robot: six drives, the mechanism that they move, and the wires they are on.
 //!
-//! [`Emulation`] co-simulates drives and mechanism and knows no wires. Simulated wires step it with a master
+//! [`Emulation`] co-simulates drives and mechanism, without wires. Simulated wires step it with a master
 //! (the plant's default link) or without one ([`OpenLink`]); [`Emulator`] steps it on real interfaces.
 
 mod co_simulation;

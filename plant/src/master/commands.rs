@@ -6,18 +6,17 @@ use masseter_shared::messages::codes::{Cause, DriveRequest};
 use masseter_shared::messages::{Command, Reading};
 
 use super::events::Subject;
+use super::failure::Failure;
 use super::gate::Gate;
-use super::interlock::Failure;
 
 /// The received commands.
 #[derive(Debug, Clone)]
-pub(crate) struct Commands {
+pub(super) struct Commands {
     timeout_cycles: u32,
     gate: Gate,
     newest: Option<Command>,
     received_ns: u64,
-    /// Cycles since the last command.
-    pub(crate) silent_cycles: u32,
+    silent_cycles: u32,
 }
 
 impl Commands {
@@ -32,9 +31,14 @@ impl Commands {
         }
     }
 
+    /// Cycles since the last command.
+    pub(super) fn silent_cycles(&self) -> u32 {
+        self.silent_cycles
+    }
+
     /// The request of the newest valid command.
     pub(super) fn request(&self) -> DriveRequest {
-        let request = self.newest.and_then(|command| DriveRequest::from_code(command.request));
+        let request = self.newest.and_then(|command| DriveRequest::try_from(command.request).ok());
         request.unwrap_or(DriveRequest::Off)
     }
 

@@ -2,7 +2,7 @@
 //!
 //! A [`RemoteDrive`] sends nothing; it returns frames and judgements.
 
-use masseter_can::canopen::{Cob, NmtCommand, NmtState, NodeId, SdoResponse};
+use masseter_can::canopen::{Cob, Nmt, NmtCommand, NmtState, NmtTarget, NodeId, SdoResponse};
 use masseter_can::cia402::{Controlword, DriveRequest, DriveState, next_controlword};
 use masseter_can::{CanId, Frame, Rpdo1, Tpdo1};
 use masseter_shared::clock::MILLISECOND_NS;
@@ -11,26 +11,26 @@ use masseter_shared::messages::Reading;
 use masseter_shared::messages::codes::{BootPhase, Cause, drive_state_code};
 
 use super::boot::{Boot, late};
+use super::failure::Failure;
 use super::following::Following;
-use super::interlock::Failure;
 use super::presence::Presence;
 
 /// One drive.
 #[derive(Debug, Clone)]
 pub(super) struct RemoteDrive {
-    pub(super) id: NodeId,
-    pub(super) bus: usize,
+    id: NodeId,
+    bus: usize,
     config: DriveConfig,
     heartbeat_timeout_ns: u64,
     boot_timeout_ns: u64,
-    pub(super) boot: Boot,
+    boot: Boot,
     /// The phase of the boot that was reported last.
     reported_phase: BootPhase,
-    pub(super) presence: Presence,
+    presence: Presence,
     following: Following,
     nmt: Option<NmtState>,
     /// Whether it was started as a verified drive: only then its process data are used.
-    pub(super) is_started: bool,
+    is_started: bool,
     /// Whether its absence was reported, or it was lost.
     is_absence_known: bool,
     /// The function codes of its objects that had a wrong length, bit i for function code i.
@@ -52,7 +52,7 @@ impl RemoteDrive {
             config,
             heartbeat_timeout_ns: u64::from(can.heartbeat_consumer_ms) * MILLISECOND_NS,
             boot_timeout_ns: u64::from(can.boot_timeout_ms) * MILLISECOND_NS,
-            reported_phase: boot.phase,
+            reported_phase: boot.phase(),
             boot,
             presence: Presence::new(now_ns),
             following: Following::new(scenario, axis),
@@ -67,9 +67,24 @@ impl RemoteDrive {
         }
     }
 
+    /// Whether it has that node id, on that bus.
+    pub(super) fn is_at(&self, bus: usize, id: NodeId) -> bool {
+        (self.bus, self.id) == (bus, id)
+    }
+
+    /// The index of its bus.
+    pub(super) fn bus(&self) -> usize {
+        self.bus
+    }
+
+    /// How far its boot is.
+    pub(super) fn boot_phase(&self) -> BootPhase {
+        self.boot.phase()
+    }
+
     /// The reported phase of its boot and the present one, once after a change.
     pub(super) fn phase_change(&mut self) -> Option<[BootPhase; 2]> {
-        let now = self.boot.phase;
+        let now = self.boot.phase();
         let before = std::mem::replace(&mut self.reported_phase, now);
         (before != now).then_some([before, now])
     }
@@ -79,9 +94,19 @@ impl RemoteDrive {
         self.is_started && self.nmt == Some(NmtState::Operational)
     }
 
+    /// Whether it was started as a verified drive.
+    pub(super) fn is_started(&self) -> bool {
+        self.is_started
+    }
+
+    /// Whether its identity and configuration are verified.
+    pub(super) fn is_verified(&self) -> bool {
+        self.boot.is_verified()
+    }
+
     /// Whether it is verified and exchanges process data.
     pub(super) fn is_ready(&self) -> bool {
-        self.is_operational() && self.boot.phase == BootPhase::Ready
+        self.is_operational() && self.boot_phase() == BootPhase::Ready
     }
 
     /// State of its power stage, as far as it is known.
@@ -106,13 +131,18 @@ impl RemoteDrive {
         is_enabled.then(|| self.position_m())
     }
 
-    /// SYNC goes out.
+    /// SYNC goes out: the drive takes its target and answers with new process data.
     pub(super) fn begin_cycle(&mut self, now_ns: u64) {
         self.presence.begin_cycle();
         self.following.synchronise(now_ns);
     }
 
-    /// Takes a heartbeat; `may_boot` says whether drives may be booted now.
+    /// Whether process data came after that time.
+    pub(super) fn has_answered_since(&self, time_ns: u64) -> bool {
+        self.presence.has_answered_since(time_ns)
+    }
+
+    /// Takes a heartbeat, given whether drives may be booted now.
     pub(super) fn take_heartbeat(
         &mut self,
         time_ns: u64,
@@ -136,7 +166,7 @@ impl RemoteDrive {
     /// Returns its state before and after; none while its process data are not used.
     pub(super) fn take_process_data(&mut self, time_ns: u64, tpdo: Tpdo1) -> Option<[Option<DriveState>; 2]> {
         self.hear_state(time_ns, NmtState::Operational);
-        self.presence.missing_cycles = 0;
+        self.presence.end_missing();
         if !self.is_started {
             return None;
         }
@@ -152,7 +182,7 @@ impl RemoteDrive {
 
     /// Takes an answer of its SDO server.
     pub(super) fn take_sdo_answer(&mut self, time_ns: u64, answer: SdoResponse) -> Result<(), Failure> {
-        self.presence.heard_ns = time_ns;
+        self.presence.hear(time_ns);
         self.boot.take(time_ns, answer)
     }
 
@@ -167,19 +197,19 @@ impl RemoteDrive {
     /// Why the drive counts as absent, once it does: it never came.
     pub(super) fn absence(&mut self, now_ns: u64) -> Option<Failure> {
         let (waited_ns, limit_ns) = (self.boot.waited_ns(now_ns), self.boot_timeout_ns);
-        let is_absent = self.boot.phase == BootPhase::Waiting && waited_ns > limit_ns;
+        let is_absent = self.boot_phase() == BootPhase::Waiting && waited_ns > limit_ns;
         let is_new = is_absent && !std::mem::replace(&mut self.is_absence_known, true);
         is_new.then(|| late(waited_ns, limit_ns))
     }
 
-    /// Why the drive counts as lost, if it does; `is_fresh` says whether it has answered SYNC. A verified drive must be
-    /// received, and an operational one must answer every SYNC once.
+    /// Why the drive counts as lost, if it does, given whether it has answered SYNC. A verified drive must be received,
+    /// and an operational one must answer every SYNC once.
     pub(super) fn loss(&mut self, now_ns: u64, is_fresh: bool) -> Option<Failure> {
-        if !matches!(self.boot.phase, BootPhase::Configured | BootPhase::Ready) {
+        if !matches!(self.boot_phase(), BootPhase::Configured | BootPhase::Ready) {
             return None;
         }
         if !is_fresh && self.is_operational() {
-            self.presence.missing_cycles += 1;
+            self.presence.miss_cycle();
         }
         self.presence.judge(now_ns, self.heartbeat_timeout_ns).or_else(|| self.stop_by_itself())
     }
@@ -191,13 +221,8 @@ impl RemoteDrive {
         Some(Failure::with(Cause::NodeStopped, states))
     }
 
-    /// Why the drive counts as one that does not obey, once it does: it `must_be_enabled` and is not, or it does not follow
-    /// its targets; `is_fresh` says whether its position is new.
-    pub(super) fn disobedience(&mut self, is_fresh: bool, must_be_enabled: bool) -> Option<Failure> {
-        let state = self.drive_state();
-        if must_be_enabled && state != Some(DriveState::OperationEnabled) {
-            return Some(Failure::with(Cause::DriveFault, [f64::from(drive_state_code(state)), 0.0]));
-        }
+    /// Why the drive counts as one that does not follow its targets, once it does, given whether it has answered SYNC.
+    pub(super) fn following_error(&mut self, is_fresh: bool) -> Option<Failure> {
         let position_m = self.following_m().filter(|_| is_fresh)?;
         self.following.judge(position_m)
     }
@@ -205,38 +230,53 @@ impl RemoteDrive {
     /// Discards everything found out about the drive; it has to boot again.
     pub(super) fn forget(&mut self, now_ns: u64) {
         self.boot.forget(now_ns);
-        (self.presence.missing_cycles, self.presence.surplus) = (0, 0);
+        self.presence.restart();
         (self.is_absence_known, self.power) = (true, None);
     }
 
     /// Discards process data until the drive is started anew.
     fn stop_exchange(&mut self) {
         self.following.stop();
-        self.presence.answered_ns = 0;
+        self.presence.forget_answer();
         (self.is_started, self.power) = (false, None);
         self.controlword = Controlword::DISABLE_VOLTAGE;
     }
 
     /// Completes its boot if it was started and has become operational; otherwise continues it after some time.
     pub(super) fn advance_boot(&mut self, now_ns: u64) -> Result<(), Failure> {
-        if self.boot.phase == BootPhase::Starting && self.is_operational() {
-            self.boot.phase = BootPhase::Ready;
+        if self.boot_phase() == BootPhase::Starting && self.is_operational() {
+            self.boot.complete();
         }
         self.boot.expire(now_ns)
     }
 
-    /// The command of network management that its boot needs, if any.
-    pub(super) fn boot_command(&mut self, now_ns: u64) -> Option<NmtCommand> {
-        let command = self.boot.command(now_ns)?;
-        self.stop_exchange();
-        Some(command)
+    /// It is not booted any further.
+    pub(super) fn give_up(&mut self) {
+        self.boot.give_up();
     }
 
-    /// The drive is told to become operational.
-    pub(super) fn start(&mut self, now_ns: u64) {
+    /// The message of network management that its boot needs, if any.
+    pub(super) fn boot_command(&mut self, now_ns: u64) -> Option<Frame> {
+        let command = self.boot.command(now_ns)?;
+        self.stop_exchange();
+        Some(self.nmt_frame(command))
+    }
+
+    /// The SDO request that its boot needs, if one is due.
+    pub(super) fn sdo_request(&mut self, now_ns: u64) -> Option<Frame> {
+        self.boot.request(now_ns).map(|request| request.frame(self.id))
+    }
+
+    /// The message that starts the drive.
+    pub(super) fn start(&mut self, now_ns: u64) -> Frame {
         self.boot.start(now_ns);
-        self.presence.missing_cycles = 0;
+        self.presence.end_missing();
         self.is_started = true;
+        self.nmt_frame(NmtCommand::Start)
+    }
+
+    fn nmt_frame(&self, command: NmtCommand) -> Frame {
+        Nmt { command, target: NmtTarget::Node(self.id) }.frame()
     }
 
     /// The process data for a request and a target, if the drive exchanges any. Until the drive follows targets, its
@@ -259,7 +299,7 @@ impl RemoteDrive {
     }
 
     fn hear_state(&mut self, time_ns: u64, state: NmtState) {
-        self.presence.heard_ns = time_ns;
+        self.presence.hear(time_ns);
         self.nmt = Some(state);
     }
 }

@@ -21,9 +21,9 @@ pub(super) enum Subject {
 /// The log.
 #[derive(Debug)]
 pub(super) struct EventLog {
-    pub(super) journal: Journal,
+    journal: Journal,
     /// The cycle of new events.
-    pub(super) cycle: u64,
+    cycle: u64,
     /// Node id and bus of each axis.
     addresses: [(NodeId, usize); AXES],
 }
@@ -32,6 +32,16 @@ impl EventLog {
     /// An empty log for drives with these node ids and buses.
     pub(super) fn new(addresses: [(NodeId, usize); AXES]) -> Self {
         Self { journal: Journal::new(), cycle: 0, addresses }
+    }
+
+    /// Begins a cycle.
+    pub(super) fn begin_cycle(&mut self, cycle: u64) {
+        self.cycle = cycle;
+    }
+
+    /// Hands out the events since the last drain.
+    pub(super) fn drain(&mut self, out: &mut impl FnMut(Event)) {
+        self.journal.drain(out);
     }
 
     /// Adds an event.

@@ -1,6 +1,6 @@
 //! The times of a cycle's exchange: SYNC, the process data that answer it, and the master's heartbeat.
 //!
-//! The exchange sends nothing; it says what is due and since when process data are an answer.
+//! The exchange sends nothing. It computes what is due, and the time after which process data are an answer.
 
 use masseter_can::BitrateError;
 use masseter_can::canopen::sync;
@@ -17,11 +17,11 @@ pub(super) struct Exchange {
     sync_frame_ns: u64,
     heartbeat_ns: u64,
     next_heartbeat_ns: u64,
-    pub(super) wake: Wake,
+    wake: Wake,
     /// When the tap saw the last SYNC of each bus.
     seen_sync_ns: Vec<u64>,
     /// When the last process data of the cycle arrived.
-    pub(super) complete_ns: u64,
+    complete_ns: u64,
 }
 
 impl Exchange {
@@ -47,6 +47,21 @@ impl Exchange {
             self.next_heartbeat_ns = wake.woke_ns + self.heartbeat_ns;
         }
         is_due
+    }
+
+    /// The number of the cycle.
+    pub(super) fn cycle(&self) -> u64 {
+        self.wake.cycle
+    }
+
+    /// When the cycle began, ns.
+    pub(super) fn woke_ns(&self) -> u64 {
+        self.wake.woke_ns
+    }
+
+    /// Process data of the cycle arrived.
+    pub(super) fn note_process_data(&mut self, time_ns: u64) {
+        self.complete_ns = self.complete_ns.max(time_ns);
     }
 
     /// A SYNC was seen on a wire. Only the first one of a cycle counts: a repeated one has its answers already.

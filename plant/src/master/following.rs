@@ -7,7 +7,7 @@
 use masseter_shared::config::{MOST_LEAD_CYCLES, Scenario};
 use masseter_shared::messages::codes::Cause;
 
-use super::interlock::Failure;
+use super::failure::Failure;
 
 /// SYNC and a line of one period, which every drive takes.
 const LEAST_LEAD_CYCLES: f64 = 2.0;

@@ -9,7 +9,7 @@ use masseter_shared::messages::codes::{Cause, DriveRequest};
 use masseter_shared::messages::{Command, LAYOUT_VERSION};
 
 use super::events::Subject;
-use super::interlock::Failure;
+use super::failure::Failure;
 
 /// Standard deviations of the encoder by which a position held at the end of a stroke may be beyond it.
 const NOISE_DEVIATIONS: f64 = 6.0;
@@ -74,7 +74,7 @@ impl Gate {
         if let Some(axis) = command.target_m.iter().position(|target_m| !target_m.is_finite()) {
             return Err(bad(Subject::Axis(axis), [command.target_m[axis], 0.0]));
         }
-        let Some(request) = DriveRequest::from_code(command.request) else {
+        let Ok(request) = DriveRequest::try_from(command.request) else {
             return Err(bad(Subject::Rig, [f64::from(command.request), 0.0]));
         };
         let periods = self.periods(cycle, command.cycle);

@@ -1,6 +1,6 @@
 //! Received frames as messages to the master.
 //!
-//! Decoding only: the effect of a message is the master's matter.
+//! Decoding only: the master decides the effect of a message.
 
 use masseter_can::Tpdo1;
 use masseter_can::canopen::{

@@ -1,9 +1,9 @@
 //! The CAN master: boots the drives and verifies them, exchanges process data with them every cycle, supervises them,
 //! and stops them when commands cease.
 //!
-//! [`Master`] sequences its parts. [`boot`] verifies one drive, [`drive`] keeps what is known of it, [`exchange`] keeps
-//! the cycle's times, [`commands`] the controller's commands, and [`interlock`] remembers whether drives may move. The
-//! parts return frames and judgements; only the master sends.
+//! [`Master`] sequences its parts: [`boot`] verifies one drive, [`drive`] holds the state of one drive, [`exchange`] the
+//! times of the cycle, [`commands`] the controller's commands, and [`supervision`] decides whether drives may move. The
+//! parts return frames and failures; only the master sends.
 //!
 //! The master is written against the bus trait alone ([`Buses`]), so that simulated and real wires are the same to it.
 //! SDO takes place only with drives that exchange no process data, with one request a bus and cycle, queued after the
@@ -15,17 +15,18 @@ mod commands;
 mod drive;
 mod events;
 mod exchange;
+mod failure;
 mod following;
 mod gate;
 mod incoming;
-mod interlock;
 mod presence;
+mod supervision;
 
 #[cfg(test)]
 mod tests;
 
-use masseter_can::canopen::{Cob, Heartbeat, Nmt, NmtCommand, NmtState, NmtTarget, NodeId, sync};
-use masseter_can::{Bus, ErrorState, Frame, ReceiveError, Received};
+use masseter_can::canopen::{Cob, Heartbeat, NmtState, NodeId, sync};
+use masseter_can::{Bus, Frame, ReceiveError, Received};
 use masseter_shared::config::Scenario;
 use masseter_shared::geometry::AXES;
 use masseter_shared::messages::codes::{
@@ -42,8 +43,9 @@ use commands::Commands;
 use drive::RemoteDrive;
 use events::{EventLog, Subject, notice, transition};
 use exchange::Exchange;
+use failure::Failure;
 use incoming::Message;
-use interlock::{Failure, Interlock};
+use supervision::Supervision;
 
 pub(crate) use boot::shortest_boot;
 
@@ -56,13 +58,9 @@ pub(crate) struct Master {
     drives: [RemoteDrive; AXES],
     buses: Vec<BusMonitor>,
     exchange: Exchange,
-    pub(crate) commands: Commands,
-    /// Whether all drives have been enabled since they were to be: none may leave operation by itself.
-    were_enabled: bool,
-    interlock: Interlock,
+    commands: Commands,
+    supervision: Supervision,
     events: EventLog,
-    /// Whether the drives are to stop from the next process data on, for the end: then commands are not needed any more.
-    pub(crate) is_ending: bool,
 }
 
 impl Master {
@@ -83,17 +81,15 @@ impl Master {
             buses: vec![BusMonitor::default(); can.buses.len()],
             exchange: Exchange::new(can, now_ns)?,
             commands: Commands::new(scenario),
-            were_enabled: false,
-            interlock: Interlock::Released,
+            supervision: Supervision::default(),
             events: EventLog::new(addresses),
-            is_ending: false,
         })
     }
 
     /// Begins a cycle: SYNC on every bus, and the heartbeat when it is due.
     pub(crate) fn begin_cycle(&mut self, wake: Wake, buses: &mut impl Buses) {
         let now_ns = wake.woke_ns;
-        self.events.cycle = wake.cycle;
+        self.events.begin_cycle(wake.cycle);
         let is_heartbeat_due = self.exchange.begin_cycle(wake);
         self.drives.iter_mut().for_each(|drive| drive.begin_cycle(now_ns));
         self.watch_buses(now_ns, buses);
@@ -126,10 +122,9 @@ impl Master {
         self.exchange.note_sync(bus, time_ns);
     }
 
-    /// Writes this cycle's reading, without the times that only the link knows.
+    /// Writes this cycle's reading, without the times that only the link has.
     pub(crate) fn fill_reading(&self, reading: &mut Reading) {
-        *reading =
-            Reading { master_fault: u32::from(self.interlock != Interlock::Released), ..Reading::default() };
+        *reading = Reading { master_fault: u32::from(self.supervision.is_stopped()), ..Reading::default() };
         self.exchange.fill_reading(reading);
         self.commands.fill_reading(reading);
         for (axis, drive) in self.drives.iter().enumerate() {
@@ -147,10 +142,20 @@ impl Master {
         let (request, targets_m) = (self.request(), self.commands.targets_m());
         for (axis, target_m) in targets_m.into_iter().enumerate() {
             if let Some(frame) = self.drives[axis].process_data(request, target_m) {
-                self.send(now_ns, self.drives[axis].bus, frame, buses);
+                self.send_to(now_ns, axis, frame, buses);
             }
         }
         self.boot(now_ns, buses);
+    }
+
+    /// Stops the drives from the next process data on, for the end: commands are not needed any more.
+    pub(crate) fn stop(&mut self) {
+        self.supervision.end();
+    }
+
+    /// Cycles since the last command.
+    pub(crate) fn silent_cycles(&self) -> u32 {
+        self.commands.silent_cycles()
     }
 
     /// Whether no drive reports voltage. A lost drive reports nothing and is not waited for: it stops by itself.
@@ -160,25 +165,18 @@ impl Master {
 
     /// Hands out the events since the last drain.
     pub(crate) fn drain_events(&mut self, out: &mut impl FnMut(Event)) {
-        self.events.journal.drain(out);
+        self.events.drain(out);
     }
 
     /// Whether a drive has answered this cycle's SYNC.
     fn is_fresh(&self, axis: usize) -> bool {
         let drive = &self.drives[axis];
-        drive.presence.answered_ns > self.exchange.answered_after_ns(drive.bus)
+        drive.has_answered_since(self.exchange.answered_after_ns(drive.bus()))
     }
 
-    /// The request to the drives: that of the last valid command, unless there is a fault or the end is asked for, and
-    /// none that moves before every drive is verified.
+    /// The request to the drives.
     fn request(&self) -> DriveRequest {
-        if self.interlock != Interlock::Released || self.is_ending {
-            DriveRequest::QuickStop
-        } else if self.drives.iter().all(RemoteDrive::is_ready) {
-            self.commands.request()
-        } else {
-            DriveRequest::Off
-        }
+        self.supervision.request(self.commands.request(), self.drives.iter().all(RemoteDrive::is_ready))
     }
 
     fn supervise(&mut self, now_ns: u64) {
@@ -194,13 +192,14 @@ impl Master {
                 self.drives[axis].forget(now_ns);
                 self.report_boot(now_ns, axis, Ok(()));
             }
-            let must_be_enabled = is_enable && self.were_enabled;
-            if let Some(failure) = self.drives[axis].disobedience(is_fresh, must_be_enabled) {
+            let state = self.drives[axis].drive_state();
+            all_are_enabled &= state == Some(DriveState::OperationEnabled);
+            let disobedience = self.supervision.judge(state, is_enable);
+            if let Some(failure) = disobedience.or_else(|| self.drives[axis].following_error(is_fresh)) {
                 self.fail(now_ns, Subject::Axis(axis), &failure);
             }
-            all_are_enabled &= self.drives[axis].drive_state() == Some(DriveState::OperationEnabled);
         }
-        self.were_enabled = is_enable && (self.were_enabled || all_are_enabled);
+        self.supervision.end_cycle(is_enable, all_are_enabled);
     }
 
     /// Reports a bus that goes off and one that returns; the drives of a bus in bus-off stop by themselves.
@@ -208,12 +207,12 @@ impl Master {
         for bus in 0..self.buses.len() {
             let status = buses.port(bus).status();
             let (subject, value) = (Subject::Bus(bus), f64::from(status.tec));
-            let is_off = status.state == ErrorState::BusOff;
-            let was_off = std::mem::replace(&mut self.buses[bus].is_off, is_off);
-            if is_off && !was_off {
-                self.fail(now_ns, subject, &Failure::with(Cause::BusOff, [value, 0.0]));
-            } else if was_off && !is_off {
-                self.events.add(now_ns, subject, Event { value, ..notice(Cause::Recovered) });
+            match self.buses[bus].set_error_state(status.state) {
+                Some(true) => self.fail(now_ns, subject, &Failure::with(Cause::BusOff, [value, 0.0])),
+                Some(false) => {
+                    self.events.add(now_ns, subject, Event { value, ..notice(Cause::Recovered) });
+                }
+                None => {}
             }
         }
     }
@@ -222,7 +221,7 @@ impl Master {
         // A controller whose drives are off or stopping may be silent: they need no command.
         let needs_command = self.request() == DriveRequest::Enable;
         let following_m = self.drives.each_ref().map(RemoteDrive::following_m);
-        let times = [self.exchange.wake.cycle, now_ns];
+        let times = [self.exchange.cycle(), now_ns];
         if let Err((subject, failure)) = self.commands.take(times, command, needs_command, following_m) {
             self.fail(now_ns, subject, &failure);
         }
@@ -231,33 +230,33 @@ impl Master {
     /// Ends a stop once every drive is verified again, none has voltage, and the controller has switched them off: a
     /// controller that still demands motion does not know of the stop.
     fn restore(&mut self, now_ns: u64) {
-        let is_restored = self.interlock == Interlock::UntilRestored
+        let is_restored = self.supervision.awaits_restoration()
             && self.commands.switch_off()
-            && !self.buses.iter().any(|bus| bus.is_off)
+            && !self.buses.iter().any(|bus| bus.is_off())
             && self.drives.iter().all(RemoteDrive::is_ready)
             && self.drives_are_off();
         if is_restored {
-            (self.interlock, self.were_enabled) = (Interlock::Released, false);
+            self.supervision.restore();
             self.events.add(now_ns, Subject::Rig, notice(Cause::Recovered));
         }
     }
 
     /// Stops the drives. The first cause is reported, its consequences are not.
     fn fail(&mut self, now_ns: u64, subject: Subject, failure: &Failure) {
-        if self.interlock.lock(failure.cause) {
+        if self.supervision.stop(failure.cause) {
             self.events.add(now_ns, subject, failure.event());
         }
     }
 
     /// Leaves the drives to another master, permanently.
     fn yield_to_other_master(&mut self, now_ns: u64, bus: usize) {
-        if std::mem::replace(&mut self.interlock, Interlock::Permanent) != Interlock::Permanent {
+        if self.supervision.stop_permanently() {
             self.events.add(now_ns, Subject::Bus(bus), Failure::new(Cause::SecondMaster).event());
         }
     }
 
     fn may_boot(&self) -> bool {
-        self.interlock.may_boot(self.drives_are_off())
+        self.supervision.may_boot(self.drives_are_off())
     }
 
     /// Advances the boot of all drives and sends its messages.
@@ -270,8 +269,8 @@ impl Master {
             return;
         }
         for axis in 0..AXES {
-            if let Some(command) = self.drives[axis].boot_command(now_ns) {
-                self.send_nmt(now_ns, axis, command, buses);
+            if let Some(frame) = self.drives[axis].boot_command(now_ns) {
+                self.send_to(now_ns, axis, frame, buses);
             }
         }
         for bus in 0..self.buses.len() {
@@ -282,14 +281,12 @@ impl Master {
 
     /// Sends one SDO request at most; the drives of a bus take turns.
     fn send_sdo(&mut self, now_ns: u64, bus: usize, buses: &mut impl Buses) {
-        let last = self.buses[bus].last_served;
-        for axis in (1..=AXES).map(|step| (last + step) % AXES) {
+        for axis in self.buses[bus].turns() {
             let drive = &mut self.drives[axis];
-            if drive.bus == bus
-                && let Some(request) = drive.boot.request(now_ns)
+            if drive.bus() == bus
+                && let Some(frame) = drive.sdo_request(now_ns)
             {
-                let frame = request.frame(drive.id);
-                self.buses[bus].last_served = axis;
+                self.buses[bus].note_served(axis);
                 return self.send(now_ns, bus, frame, buses);
             }
         }
@@ -297,29 +294,27 @@ impl Master {
 
     /// Starts the drives once all are verified: none moves beside one that is not.
     fn start_drives(&mut self, now_ns: u64, buses: &mut impl Buses) {
-        if !self.drives.iter().all(|drive| drive.boot.is_verified()) {
+        if !self.drives.iter().all(RemoteDrive::is_verified) {
             return;
         }
         for axis in 0..AXES {
-            if self.drives[axis].boot.phase == BootPhase::Configured {
-                self.send_nmt(now_ns, axis, NmtCommand::Start, buses);
-                self.drives[axis].start(now_ns);
+            if self.drives[axis].boot_phase() == BootPhase::Configured {
+                let frame = self.drives[axis].start(now_ns);
+                self.send_to(now_ns, axis, frame, buses);
                 self.report_boot(now_ns, axis, Ok(()));
             }
         }
     }
 
-    fn send_nmt(&mut self, now_ns: u64, axis: usize, command: NmtCommand, buses: &mut impl Buses) {
-        let drive = &self.drives[axis];
-        let frame = Nmt { command, target: NmtTarget::Node(drive.id) }.frame();
-        self.send(now_ns, drive.bus, frame, buses);
+    fn send_to(&mut self, now_ns: u64, axis: usize, frame: Frame, buses: &mut impl Buses) {
+        self.send(now_ns, self.drives[axis].bus(), frame, buses);
     }
 
     fn send(&mut self, now_ns: u64, bus: usize, frame: Frame, buses: &mut impl Buses) {
         if let Err(refusal) = buses.port(bus).send(now_ns, frame)
             && self.buses[bus].is_unexplained(&refusal)
         {
-            self.fail(self.exchange.wake.woke_ns, Subject::Bus(bus), &Failure::new(Cause::BusRefused));
+            self.fail(self.exchange.woke_ns(), Subject::Bus(bus), &Failure::new(Cause::BusRefused));
         }
     }
 
@@ -333,20 +328,20 @@ impl Master {
             return self.yield_to_other_master(time_ns, bus);
         }
         let Some(id) = sender else { return };
-        let Some(axis) = self.drives.iter().position(|drive| drive.id == id && drive.bus == bus) else {
+        let Some(axis) = self.drives.iter().position(|drive| drive.is_at(bus, id)) else {
             if self.buses[bus].is_new_unknown(id) {
                 let event = Event { node: u16::from(id.get()), ..notice(Cause::UnknownNode) };
                 self.events.add(time_ns, Subject::Bus(bus), event);
             }
             return;
         };
-        self.buses[bus].has_drives = true;
+        self.buses[bus].note_drive();
         let drive = &mut self.drives[axis];
         match Message::decode(cob, received.frame.data()) {
             Ok(Message::Heartbeat(state)) => self.take_heartbeat(axis, state, time_ns),
             Ok(Message::ProcessData(tpdo)) => {
                 let Some([before, after]) = drive.take_process_data(time_ns, tpdo) else { return };
-                self.exchange.complete_ns = self.exchange.complete_ns.max(time_ns);
+                self.exchange.note_process_data(time_ns);
                 if before != after {
                     let event = transition(Source::Drive, drive_state_code(before), drive_state_code(after));
                     self.events.add(time_ns, Subject::Axis(axis), event);
@@ -354,7 +349,7 @@ impl Master {
             }
             Ok(Message::Emergency(emergency)) => {
                 // Before its boot-up, a drive reports emergencies of a time before this master, which resets it.
-                let is_past = emergency.is_reset() || drive.boot.phase == BootPhase::Waiting;
+                let is_past = emergency.is_reset() || drive.boot_phase() == BootPhase::Waiting;
                 self.events.add(time_ns, Subject::Axis(axis), events::emergency(emergency, is_past));
             }
             Ok(Message::SdoAnswer(answer)) => {
@@ -370,7 +365,7 @@ impl Master {
 
     fn take_heartbeat(&mut self, axis: usize, state: NmtState, time_ns: u64) {
         let may_boot = self.may_boot();
-        if state == NmtState::BootUp && self.drives[axis].is_started {
+        if state == NmtState::BootUp && self.drives[axis].is_started() {
             self.fail(time_ns, Subject::Axis(axis), &Failure::new(Cause::NodeRestarted));
         }
         let result = self.drives[axis].take_heartbeat(time_ns, state, may_boot);
@@ -380,7 +375,7 @@ impl Master {
     /// Reports a change of a drive's boot, or its failure.
     fn report_boot(&mut self, time_ns: u64, axis: usize, result: Result<(), Failure>) {
         if let Err(failure) = result {
-            self.drives[axis].boot.phase = BootPhase::Failed;
+            self.drives[axis].give_up();
             self.fail_boot(time_ns, axis, &failure);
         }
         if let Some([before, after]) = self.drives[axis].phase_change() {
@@ -392,7 +387,7 @@ impl Master {
     /// Reports why a drive was given up. The failure of one drive to boot is no consequence of another's, so that each is
     /// reported.
     fn fail_boot(&mut self, now_ns: u64, axis: usize, failure: &Failure) {
-        self.interlock.lock(failure.cause);
+        self.supervision.stop(failure.cause);
         self.events.add(now_ns, Subject::Axis(axis), failure.event());
     }
 }

@@ -2,7 +2,7 @@
 
 use masseter_shared::messages::codes::Cause;
 
-use super::interlock::Failure;
+use super::failure::Failure;
 
 /// Cycles in which an operational drive's process data may be missing.
 const MISSING_CYCLES: u32 = 3;
@@ -13,14 +13,14 @@ const SURPLUS: u32 = MISSING_CYCLES + 2;
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Presence {
     /// When the drive sent something.
-    pub(super) heard_ns: u64,
+    heard_ns: u64,
     /// Time of the newest process data.
-    pub(super) answered_ns: u64,
+    answered_ns: u64,
     /// Cycles in a row without process data.
-    pub(super) missing_cycles: u32,
+    missing_cycles: u32,
     /// Recent new process data beyond one a SYNC. A late drive makes up for a cycle without any, one that receives a
     /// repeated SYNC answers twice, and two of one id send one more every cycle.
-    pub(super) surplus: u32,
+    surplus: u32,
     /// New process data since the last SYNC.
     new_data: u32,
 }
@@ -39,10 +39,40 @@ impl Presence {
         };
     }
 
+    /// The drive sent something.
+    pub(super) fn hear(&mut self, time_ns: u64) {
+        self.heard_ns = time_ns;
+    }
+
     /// The drive sent process data; a frame that its transmitter had to repeat is not new.
     pub(super) fn answer(&mut self, time_ns: u64, is_new: bool) {
         self.answered_ns = time_ns;
         self.new_data += u32::from(is_new);
+    }
+
+    /// Whether process data came after that time.
+    pub(super) fn has_answered_since(&self, time_ns: u64) -> bool {
+        self.answered_ns > time_ns
+    }
+
+    /// A cycle ended without process data.
+    pub(super) fn miss_cycle(&mut self) {
+        self.missing_cycles += 1;
+    }
+
+    /// Missing process data are counted anew.
+    pub(super) fn end_missing(&mut self) {
+        self.missing_cycles = 0;
+    }
+
+    /// Process data up to now are no answer any more.
+    pub(super) fn forget_answer(&mut self) {
+        self.answered_ns = 0;
+    }
+
+    /// Missing and surplus process data are counted anew.
+    pub(super) fn restart(&mut self) {
+        (self.missing_cycles, self.surplus) = (0, 0);
     }
 
     /// The reason why the drive counts as lost, if it does.

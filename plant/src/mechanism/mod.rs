@@ -1,6 +1,6 @@
 //! The mechanism that the drives move: its dynamics, friction, food between the teeth, and the pose in which it starts.
 //!
-//! This module never solves the forward kinematics and knows no drive and no bus.
+//! This module never solves the forward kinematics. Drives and buses are not part of it.
 
 mod dynamics;
 mod food;

@@ -4,7 +4,7 @@ use std::fmt;
 
 use serde::{Serialize, Serializer};
 
-/// The meaning of a code, or its number where this program knows no meaning.
+/// The meaning of a code, or its number where the code has no meaning in this version.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Code<T> {
     /// The meaning.

@@ -43,7 +43,8 @@ impl From<&Event> for EventRecord {
         let state = |code: u32| match source {
             Code::Known(Source::Controller) => Code::<ControllerState>::from(code).to_string(),
             Code::Known(Source::Master) => Code::<BootPhase>::from(code).to_string(),
-            _ => drive_state_name(code).map_or_else(|code| format!("code {code}"), str::to_owned),
+            _ => drive_state_name(code)
+                .map_or_else(|unknown| format!("code {}", unknown.number), str::to_owned),
         };
         let moved = event.from != event.to;
         Self {

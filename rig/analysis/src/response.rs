@@ -64,7 +64,7 @@ impl Responses {
 
     fn with(plans: Vec<BusPlan>, has_faults: bool) -> Self {
         let followed = |plan: BusPlan| Followed {
-            messages: vec![Seen::default(); plan.messages().len()],
+            messages: vec![Seen::default(); plan.messages.len()],
             plan,
             others: Seen::default(),
             frames: 0,
@@ -76,7 +76,7 @@ impl Responses {
     /// `tapped`: what `tap` holds.
     pub(super) fn frame(&mut self, tap: &FrameTap, bus: usize, tapped: &Tapped) {
         let Some(bus) = self.buses.get_mut(bus) else { return };
-        let planned = bus.plan.messages().iter().position(|planned| planned.message.id.flagged() == tap.id);
+        let planned = bus.plan.messages.iter().position(|planned| planned.message.id.flagged() == tap.id);
         let seen = match planned {
             Some(index) => &mut bus.messages[index],
             None if matches!(tapped, Tapped::Error(_)) => {
@@ -113,8 +113,8 @@ impl Responses {
 
 impl Followed {
     fn figures(&self, bounds_ns: &[Option<u64>]) -> Vec<ResponseFigures> {
-        let bus = self.plan.bus();
-        let planned = self.plan.messages().iter().zip(&self.messages).zip(bounds_ns);
+        let bus = self.plan.bus;
+        let planned = self.plan.messages.iter().zip(&self.messages).zip(bounds_ns);
         let planned =
             planned.map(|((planned, seen), bound_ns)| seen.figures(bus, &planned.message.name, *bound_ns));
         planned.chain([self.others.figures(bus, "other", None)]).collect()
@@ -123,7 +123,7 @@ impl Followed {
     /// For the plan's messages, both as planned and as they were queued.
     fn bounds_ns(&self, are_bounded: bool) -> Vec<Option<u64>> {
         let as_queued = self.plan_as_queued();
-        let both = self.plan.messages().iter().zip(as_queued.messages());
+        let both = self.plan.messages.iter().zip(&as_queued.messages);
         let bound_ns = |(planned, queued): (&PlannedMessage, &PlannedMessage)| {
             let (planned_ns, queued_ns) = planned.response_ns.zip(queued.response_ns)?;
             are_bounded.then_some(planned_ns.max(queued_ns))
@@ -133,7 +133,7 @@ impl Followed {
 
     /// Why there are no bounds here.
     fn unbounded(&self) -> Option<String> {
-        let bus = self.plan.bus();
+        let bus = self.plan.bus;
         if self.frames == 0 {
             return Some(format!("no frame of bus {bus} was recorded"));
         }
@@ -144,7 +144,7 @@ impl Followed {
             return Some(format!("bus {bus} had {} errors", self.error_frames));
         }
         let as_queued = self.plan_as_queued();
-        let unbounded = as_queued.messages().iter().find(|queued| queued.response_ns.is_none())?;
+        let unbounded = as_queued.messages.iter().find(|queued| queued.response_ns.is_none())?;
         let name = &unbounded.message.name;
         Some(format!("messages of bus {bus} were queued so close together that {name} has no bound"))
     }
@@ -157,8 +157,8 @@ impl Followed {
                 seen.least_period_ns.map_or(message.period_ns, |ns| ns.clamp(1, message.period_ns));
             PeriodicMessage { period_ns, release: None, ..message }
         };
-        let messages = self.plan.messages().iter().zip(&self.messages).map(as_queued).collect();
-        BusPlan::new(self.plan.bus(), self.plan.bitrate(), self.plan.cycle_ns(), messages)
+        let messages = self.plan.messages.iter().zip(&self.messages).map(as_queued).collect();
+        BusPlan::new(self.plan.bus, self.plan.bitrate, self.plan.cycle_ns, messages)
             .expect("no message has a releaser")
     }
 }

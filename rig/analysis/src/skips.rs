@@ -199,6 +199,8 @@ impl Skips {
 
 #[cfg(test)]
 mod tests {
+    mod counters;
+
     use proptest::prelude::*;
 
     use super::*;

@@ -17,7 +17,7 @@ mod scenario;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use anyhow::Context;
+use anyhow::{Context, ensure};
 use masseter_controller::trajectory::{self, Trajectory, TrajectoryError, TrajectoryReport};
 use masseter_plant::core as plant;
 use masseter_shared::config::{FileConfig, MotionConfig, Scenario};
@@ -72,7 +72,7 @@ impl RunPlan {
         Ok(Self { scenario, mechanism, trajectory, demands, schedule })
     }
 
-    /// A line that describes the run, and a second one if the motion file lacks the marker's offset.
+    /// A line that describes the run, one if the motion file lacks the marker's offset, and one for each doubt about it.
     pub fn announcement(&self) -> String {
         let scenario = &self.scenario;
         let wires = match &scenario.can.interfaces[..] {
@@ -84,8 +84,11 @@ impl RunPlan {
             format!("; cut short: the whole motion takes {whole_s:.1} s")
         });
         let centroid = self.trajectory.centroid_turn_deg().map_or_else(String::new, of_centroid);
+        let doubts =
+            self.trajectory.doubts().iter().map(|doubt| format!("\n  warning: the motion's {doubt}"));
+        let doubts: String = doubts.collect();
         format!(
-            "{}: {:.1} s at {} Hz on {wires}, seed {}{cut}{centroid}",
+            "{}: {:.1} s at {} Hz on {wires}, seed {}{cut}{centroid}{doubts}",
             scenario.name,
             self.trajectory.duration_s(),
             scenario.rate_hz,
@@ -153,5 +156,9 @@ pub fn play_file(path: &Path, scenario: &mut Scenario) {
 
 /// The absolute path, for readers of the manifest in other folders.
 fn absolute(path: &Path) -> anyhow::Result<PathBuf> {
-    path.canonicalize().with_context(|| format!("cannot read {}", path.display()))
+    let absolute = path.canonicalize().with_context(|| format!("cannot read {}", path.display()))?;
+    // The manifest is written down with it.
+    let is_text = absolute.to_str().is_some();
+    ensure!(is_text, "motion.path = {}: use folders and a file whose names are UTF-8", path.display());
+    Ok(absolute)
 }

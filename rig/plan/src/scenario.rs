@@ -22,6 +22,10 @@ pub fn read_scenario_with(
 ) -> anyhow::Result<Scenario> {
     let mut scenario = path.map_or_else(|| Ok(Scenario::default()), Scenario::read)?;
     change(&mut scenario)?;
-    scenario.validate()?;
+    let checked = scenario.validate();
+    checked.map_err(|error| match path {
+        Some(path) => error.in_file(path),
+        None => error,
+    })?;
     Ok(scenario)
 }

@@ -52,14 +52,14 @@ type Batch = Vec<(u64, Recorded)>;
 
 /// How a recording ended.
 #[derive(Debug)]
-pub struct Outcome {
+pub struct WriteOutcome {
     /// Messages that were offered and are not safe on the disk.
     pub lost: u64,
     /// Why writing ended early, if it did.
     pub error: Option<WriteError>,
 }
 
-impl Outcome {
+impl WriteOutcome {
     /// The messages that the recording lacks, and why, in words; none if it is complete.
     pub fn loss(&self) -> Option<String> {
         let lost = format!("{} messages did not reach the disk", self.lost);
@@ -74,6 +74,24 @@ impl Outcome {
 }
 
 /// The caller's end of the queue.
+///
+/// ```
+/// use masseter_recording::{Backlog, Pace, Reader, Recorded, Recorder, Scene};
+/// use masseter_shared::config::Scenario;
+/// use masseter_shared::geometry::{Mechanism, MechanismConfig};
+/// use masseter_shared::messages::{Message, State};
+///
+/// let folder = tempfile::tempdir()?;
+/// let path = folder.path().join("recording.mcap");
+/// let scene = Scene::new(&Mechanism::new(&MechanismConfig::default())?, &Scenario::default().jaw);
+/// let mut backlog = Backlog::start(Recorder::create(&path, scene)?, Pace::Virtual);
+/// let mut state = State { cycle: 1, ..State::default() };
+/// state.stamp(1, 1_000_000);
+/// backlog.record(&Recorded::State(state), 1_000_000);
+/// assert_eq!(backlog.finish().loss(), None);
+/// assert!(Reader::open(&path)?.next_message()?.is_some());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub struct Backlog {
     pace: Pace,
     pending: Batch,
@@ -168,13 +186,16 @@ impl Backlog {
     }
 
     /// Waits until everything is written and the recording has its index.
-    pub fn finish(mut self) -> Outcome {
+    pub fn finish(mut self) -> WriteOutcome {
         if !self.pending.is_empty() {
             self.hand_over_waiting();
         }
         drop(self.to_disk);
         let safe = self.disk.join().expect("the writing thread does not panic");
-        Outcome { lost: self.offered - safe, error: self.error.or_else(|| self.failures.try_recv().ok()) }
+        WriteOutcome {
+            lost: self.offered - safe,
+            error: self.error.or_else(|| self.failures.try_recv().ok()),
+        }
     }
 }
 

@@ -24,8 +24,12 @@ pub(super) fn unpack(chunk: &[u8]) -> Result<(Vec<Record<'static>>, u64), McapEr
                 rest = behind;
             }
             LinearReadEvent::Record { data, opcode } => {
-                records.push(mcap::parse_record(opcode, data)?.into_owned());
                 bytes += (HEAD + data.len()) as u64;
+                // The size in the header is checked only beside a checksum, and a few bytes can unpack to any size.
+                if bytes > LONGEST_RECORD {
+                    return Err(McapError::ChunkTooLarge(bytes));
+                }
+                records.push(mcap::parse_record(opcode, data)?.into_owned());
             }
         }
     }

@@ -6,8 +6,8 @@ use std::os::unix::fs::symlink;
 use std::path::{Path, PathBuf};
 use std::time::UNIX_EPOCH;
 
+use crate::output::{OutputError, new_folder};
 use masseter_shared::clock;
-use masseter_shared::output::{OutputError, new_folder};
 
 /// Name of the recorded motion within the folder, as its scenario knows it.
 pub const MOTION: &str = "motion.csv";
@@ -70,10 +70,15 @@ impl RunFolder {
     /// recording.
     pub fn keep(&self, path: &Path, text: &str) -> io::Result<()> {
         let unfinished = path.with_extension("part");
-        let mut file = File::create(&unfinished)?;
-        file.write_all(text.as_bytes())?;
-        file.sync_all()?;
-        fs::rename(unfinished, path)?;
+        let write = || {
+            let mut file = File::create(&unfinished)?;
+            file.write_all(text.as_bytes())?;
+            file.sync_all()?;
+            fs::rename(&unfinished, path)
+        };
+        write().inspect_err(|_| {
+            let _ = fs::remove_file(&unfinished);
+        })?;
         secure_names(&self.0);
         Ok(())
     }

@@ -15,6 +15,7 @@ mod definitions;
 mod encoding;
 mod folder;
 mod manifest;
+pub mod output;
 mod reader;
 mod recover;
 mod scene;
@@ -24,7 +25,7 @@ mod topic;
 mod walk;
 mod writer;
 
-pub use backlog::{Backlog, Outcome, Pace};
+pub use backlog::{Backlog, Pace, WriteOutcome};
 pub use circumstances::{DmaLatency, Ending, Machine as MachineInfo, RunUsage, Usage};
 pub use encoding::{CDR_LITTLE_ENDIAN, Channel, Encoded, Encoder, SCHEMA_ENCODING, definitions};
 pub use folder::{FolderError, MOTION, RunFolder};

@@ -1,7 +1,7 @@
 //! The mechanism for 3-D views: Foxglove's frame transforms and scene entities, made from `truth` and `state` at 60 Hz.
 //!
 //! Frames: `base`; in it `platform` (true), `platform_estimated` (by forward kinematics) and
-//! `platform_wanted`. Entities: base triangle with its slides, the three legs, the three platforms, and the
+//! `platform_desired`. Entities: base triangle with its slides, the three legs, the three platforms, and the
 //! jaw's incisal point and condyles, which move with the true platform.
 
 use foxglove::messages::line_primitive::Type as LineType;
@@ -21,7 +21,7 @@ const STILL_EVERY_NS: u64 = SECOND_NS;
 const BASE: &str = "base";
 const TRUE: &str = "platform";
 const ESTIMATED: &str = "platform_estimated";
-const DESIRED: &str = "platform_wanted";
+const DESIRED: &str = "platform_desired";
 const LINE_M: f64 = 0.003;
 const POINT_M: f64 = 0.006;
 

@@ -69,7 +69,7 @@ pub(super) fn options() -> WriteOptions {
         .library(LIBRARY)
 }
 
-/// Adds the schema of a channel to a file. Returns its number; 0 stands for no schema.
+/// Adds the schema of a channel to a file. Returns its number; 0 means no schema.
 pub(super) fn add_schema<W: Write + Seek>(
     writer: &mut Writer<W>,
     channel: &mcap::Channel,

@@ -19,7 +19,7 @@ pub enum CheckResult {
     Passed,
     /// It is not.
     Failed,
-    /// This run cannot tell; the finding says why.
+    /// This run does not decide the check; the finding has the reason.
     NotJudged,
 }
 

@@ -1,6 +1,6 @@
 //! The report of a run folder: one pass over its recording, then every file of the report.
 
-use std::fs;
+use std::fs::{self, File};
 use std::io::{self, ErrorKind};
 use std::path::Path;
 
@@ -9,7 +9,7 @@ use masseter_analysis::{Analysis, Figures};
 use masseter_recording::{Manifest, ReadError, Reader, Recorded, RunFolder};
 use masseter_shared::config::Scenario;
 use masseter_shared::messages::tap::{self, TapError};
-use masseter_terminal::{Exit, Failure, Format, OrFailure, show, status};
+use masseter_terminal::{Exit, Failure, Format, OrFailure, result, status};
 
 use crate::candump_logs::CandumpLogs;
 use crate::verdict::Verdict;
@@ -25,14 +25,20 @@ enum AnalysisError {
     Frame(#[from] TapError),
 }
 
-/// Analyses and judges a run that has just ended, writes its report and prints it.
+/// Analyses and judges a run that has just ended, prints its report and writes it. `reserved` holds the summary's room on the
+/// disk until the verdict is printed.
 ///
 /// # Errors
-/// With [`Exit::Incomplete`] when the recording cannot be read or a file cannot be written.
-pub fn report_run(folder: &RunFolder, manifest: &Manifest, format: Format) -> Result<Exit, Failure> {
+/// With [`Exit::Incomplete`] when the recording cannot be read, or a file or standard output cannot be written.
+pub fn report_run(
+    folder: &RunFolder,
+    manifest: &Manifest,
+    format: Format,
+    reserved: File,
+) -> Result<Exit, Failure> {
     let (figures, logged) =
         analyse(folder, &manifest.scenario).context("the run's recording cannot be analysed").incomplete()?;
-    let (exit, written) = show_and_write(folder, manifest, &figures, logged, format)?;
+    let (exit, written) = show_and_write(folder, manifest, &figures, logged, format, Some(reserved))?;
     written.incomplete()?;
     Ok(exit)
 }
@@ -46,7 +52,7 @@ pub fn report_past_run(path: &Path, format: Format) -> Result<Exit, Failure> {
     let unread = || format!("cannot read {}", folder.manifest().display());
     let manifest = Manifest::read(&folder).with_context(unread).usage()?;
     let (figures, logged) = analyse(&folder, &manifest.scenario).usage()?;
-    let (exit, written) = show_and_write(&folder, &manifest, &figures, logged, format)?;
+    let (exit, written) = show_and_write(&folder, &manifest, &figures, logged, format, None)?;
     match written {
         Err(WriteError { path, error }) if is_read_only(&error) => status!(
             "masseter: cannot write {}: {error}; the run is shown, and no file written",
@@ -82,31 +88,37 @@ fn analyse(
     Ok((figures, logs.and_then(CandumpLogs::finish).map(drop)))
 }
 
-/// Judges the run and prints the result, then writes every file of the report, if the logs could be written.
+/// Judges the run and prints the result, then writes every file of the report, the summary first.
 fn show_and_write(
     folder: &RunFolder,
     manifest: &Manifest,
     figures: &Figures,
     logged: Result<(), WriteError>,
     format: Format,
+    reserved: Option<File>,
 ) -> Result<(Exit, Result<(), WriteError>), Failure> {
     let verdict = Verdict::new(manifest, figures);
     let summary = summary::json(&verdict, figures).context("cannot write the summary").incomplete()?;
     let page = page::html(manifest, figures, &verdict).context("cannot write the page").incomplete()?;
-    match format {
+    let shown = match format {
         Format::Human => {
             let table = table::text(manifest, figures, &verdict);
-            show(&format!("{table}\nfiles: {}\n", folder.path().display()));
+            result(&format!("{table}\nfiles: {}\n", folder.path().display()))
         }
-        Format::Json => show(&summary),
-    }
+        Format::Json => result(&summary),
+    };
+    drop(reserved);
     let write = || {
+        fs::write(folder.summary(), summary).map_err(WriteError::for_file(&folder.summary()))?;
+        logged?;
         histogram_log::write_all(&folder.file("hist"), &figures.intervals)?;
         event_log::write(&folder.file("events.jsonl"), &figures.events)?;
         let junit = junit::xml(manifest, figures, &verdict);
-        [(folder.summary(), summary), (folder.file("junit.xml"), junit), (folder.file("report.html"), page)]
+        [(folder.file("junit.xml"), junit), (folder.file("report.html"), page)]
             .into_iter()
             .try_for_each(|(path, text)| fs::write(&path, text).map_err(WriteError::for_file(&path)))
     };
-    Ok((verdict.exit_code, logged.and_then(|()| write())))
+    let written = write();
+    shown.incomplete()?;
+    Ok((verdict.exit_code, written))
 }

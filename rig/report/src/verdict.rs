@@ -11,6 +11,19 @@ use crate::checks::{Check, CheckResult, checks, missed_cycles};
 use crate::text;
 
 /// The judgement of a run.
+///
+/// ```
+/// use masseter_analysis::Analysis;
+/// use masseter_recording::{MachineInfo, Manifest};
+/// use masseter_report::Verdict;
+/// use masseter_shared::config::Scenario;
+///
+/// let machine = MachineInfo { cpu: "any".into(), cores: 2, kernel: "Linux".into(), is_virtual: false };
+/// let manifest = Manifest::new(Scenario::default(), 10.0, "virtual", machine);
+/// let figures = Analysis::new(&manifest.scenario).finish(false, &[]);
+/// // The supervisor has not entered yet how the run ended.
+/// assert_eq!(Verdict::new(&manifest, &figures).word, "DIED");
+/// ```
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Verdict {
     /// The outcome in a word.
@@ -199,6 +212,8 @@ fn failed(checks: &[Check]) -> Option<Judgement> {
 
 #[cfg(test)]
 mod tests {
+    mod figures;
+
     use masseter_shared::messages::Event;
     use masseter_shared::messages::codes::{Cause, Source};
 

@@ -65,7 +65,7 @@ impl Study {
 }
 
 impl PreparedStudy {
-    /// Measures on all cores; `progress` is told each stage.
+    /// Measures on all cores; `progress` receives each stage.
     ///
     /// # Errors
     /// When the neutral input has no finite set of solutions.

@@ -23,19 +23,19 @@ pub(super) struct Reached {
 }
 
 /// The end of an attempt: a solution, or why none was reached.
-type Outcome = Result<Reached, &'static str>;
+type Attempt = Result<Reached, &'static str>;
 
 /// One guess for one input, given to every solver.
 #[derive(Debug, Clone)]
 pub(super) struct Trial {
     pub start: Start,
     /// In the order of [`SOLVERS`].
-    outcomes: [Outcome; SOLVERS.len()],
+    outcomes: [Attempt; SOLVERS.len()],
 }
 
 impl Trial {
     /// The outcome of one solver.
-    pub(super) fn by(&self, solver: Solver) -> Outcome {
+    pub(super) fn by(&self, solver: Solver) -> Attempt {
         let place = SOLVERS.iter().position(|&other| other == solver);
         self.outcomes[place.expect("every solver takes part")]
     }
@@ -74,7 +74,7 @@ impl Trials {
     }
 
     /// The outcomes of one solver with guesses from this origin.
-    fn outcomes(&self, solver: Solver, guesses: Guesses) -> impl Iterator<Item = Outcome> {
+    fn outcomes(&self, solver: Solver, guesses: Guesses) -> impl Iterator<Item = Attempt> {
         self.with(guesses).iter().map(move |trial| trial.by(solver))
     }
 

@@ -1,7 +1,7 @@
 //! Output to the terminal, and exit codes.
 //!
 //! Unlike `println!` and `eprintln!`, nothing here panics: a closed pipe, a closed terminal or a full disk must not end a
-//! run. Only [`result`] reports errors, because its text is in no file. This crate knows no verb and no file format.
+//! run. Only [`result`] reports errors. This crate depends on no verb and no file format.
 //!
 //! ```
 //! use masseter_terminal::{result_line, status};
@@ -28,11 +28,6 @@ pub enum Format {
     Human,
     /// JSON for programs
     Json,
-}
-
-/// Writes text to standard output that is also in a file; ignores errors.
-pub fn show(text: &str) {
-    let _ = io::stdout().write_all(text.as_bytes());
 }
 
 /// Writes a result to standard output.

@@ -1,5 +1,15 @@
 //! Enumerations with fixed numbers and names.
 
+/// A number that is no value of an enumeration.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("{enumeration} has no value with the number {number}")]
+pub struct UnknownCode {
+    /// Name of the enumeration.
+    pub enumeration: &'static str,
+    /// The number.
+    pub number: u32,
+}
+
 /// Declares enumerations with the number and the name of every value.
 #[macro_export]
 macro_rules! codes {
@@ -22,11 +32,6 @@ macro_rules! codes {
                 self as $number
             }
 
-            /// The value with that number.
-            pub fn from_code(code: $number) -> Option<Self> {
-                Self::ALL.into_iter().find(|value| value.code() == code)
-            }
-
             /// The name in files and reports.
             pub const fn name(self) -> &'static str {
                 match self {
@@ -35,12 +40,12 @@ macro_rules! codes {
             }
         }
 
-        /// An unknown number is handed back.
         impl TryFrom<$number> for $name {
-            type Error = $number;
+            type Error = $crate::UnknownCode;
 
-            fn try_from(code: $number) -> Result<Self, $number> {
-                Self::from_code(code).ok_or(code)
+            fn try_from(code: $number) -> Result<Self, Self::Error> {
+                let unknown = $crate::UnknownCode { enumeration: stringify!($name), number: code.into() };
+                Self::ALL.into_iter().find(|value| value.code() == code).ok_or(unknown)
             }
         }
 

@@ -36,27 +36,6 @@ pub enum FaultKind {
     BusOff,
 }
 
-impl FaultKind {
-    fn delay_ns(self) -> Option<u64> {
-        match self {
-            Self::Delay { by_ns } => Some(by_ns),
-            _ => None,
-        }
-    }
-
-    fn babbled(self) -> Option<Frame> {
-        match self {
-            Self::Babble { frame } => Some(frame),
-            _ => None,
-        }
-    }
-
-    /// A selector of faults of one kind.
-    fn is(selected: Self) -> impl Fn(Self) -> Option<()> {
-        move |kind| (kind == selected).then_some(())
-    }
-}
-
 /// One fault.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Fault {
@@ -151,39 +130,37 @@ impl Faults {
 
     /// The fault that destroys a frame.
     pub(super) fn corrupts(&self, frame: NumberedFrame) -> Option<FaultActivation> {
-        self.activation(frame, FaultKind::is(FaultKind::Corrupt)).map(|(activation, ())| activation)
+        self.on_frame(frame, |kind| kind == FaultKind::Corrupt)
     }
 
     /// The fault that makes a transmitter send the frame twice.
     pub(super) fn duplicates(&self, frame: NumberedFrame) -> Option<FaultActivation> {
-        self.activation(frame, FaultKind::is(FaultKind::Duplicate)).map(|(activation, ())| activation)
+        self.on_frame(frame, |kind| kind == FaultKind::Duplicate)
     }
 
     /// The fault that holds a frame back, and for how long, ns.
     pub(super) fn delays(&self, frame: NumberedFrame) -> Option<(FaultActivation, u64)> {
-        self.activation(frame, FaultKind::delay_ns)
+        let activation = self.on_frame(frame, |kind| matches!(kind, FaultKind::Delay { .. }))?;
+        let FaultKind::Delay { by_ns } = self.list[activation.place].fault.kind else { return None };
+        Some((activation, by_ns))
     }
 
     /// Whether a fault makes the receiving port lose the frame. The activation is recorded.
     pub(super) fn loses(&mut self, frame: NumberedFrame) -> bool {
-        let activation = self.activation(frame, FaultKind::is(FaultKind::Lose));
-        activation.inspect(|&(activation, ())| self.record(activation)).is_some()
+        let activation = self.on_frame(frame, |kind| kind == FaultKind::Lose);
+        activation.inspect(|&activation| self.record(activation)).is_some()
     }
 
-    /// The first of the faults selected by `part` that acts on the frame, with the value of `part`.
+    /// The first fault of that kind that acts on the frame.
     #[inline]
-    fn activation<T>(
-        &self,
-        NumberedFrame { at_ns, port, id, number }: NumberedFrame,
-        part: impl Fn(FaultKind) -> Option<T>,
-    ) -> Option<(FaultActivation, T)> {
+    fn on_frame(&self, frame: NumberedFrame, is_kind: impl Fn(FaultKind) -> bool) -> Option<FaultActivation> {
+        let NumberedFrame { at_ns, port, id, number } = frame;
         self.unless_empty(|list| {
-            list.iter().enumerate().find_map(|(place, listed)| {
-                let part = part(listed.fault.kind)?;
-                let may = listed.is_live(at_ns) && listed.concerns(port, id);
-                let is_hit = may && self.chance(place, number).random_bool(listed.fault.probability);
-                is_hit.then_some((FaultActivation { place, at_ns }, part))
-            })
+            let place = list.iter().enumerate().position(|(place, listed)| {
+                let may = is_kind(listed.fault.kind) && listed.is_live(at_ns) && listed.concerns(port, id);
+                may && self.chance(place, number).random_bool(listed.fault.probability)
+            })?;
+            Some(FaultActivation { place, at_ns })
         })
     }
 
@@ -196,30 +173,35 @@ impl Faults {
 
     /// Whether a node is disconnected at that time.
     pub(super) fn is_disconnected(&self, now_ns: u64, port: usize) -> bool {
-        self.of_node(now_ns, port, FaultKind::is(FaultKind::Disconnect)).is_some()
+        self.disconnection(now_ns, port).is_some()
+    }
+
+    fn disconnection(&self, now_ns: u64, port: usize) -> Option<FaultActivation> {
+        self.on_node(now_ns, port, |kind| kind == FaultKind::Disconnect)
     }
 
     /// The fault that puts a node into bus-off at that time.
     pub(super) fn puts_off(&self, now_ns: u64, port: usize) -> Option<FaultActivation> {
-        self.of_node(now_ns, port, FaultKind::is(FaultKind::BusOff)).map(|(activation, ())| activation)
+        self.on_node(now_ns, port, |kind| kind == FaultKind::BusOff)
     }
 
     /// The fault that makes a node babble at that time, and the babbled frame.
     pub(super) fn makes_babble(&self, now_ns: u64, port: usize) -> Option<(FaultActivation, Frame)> {
-        self.of_node(now_ns, port, FaultKind::babbled)
+        let activation = self.on_node(now_ns, port, |kind| matches!(kind, FaultKind::Babble { .. }))?;
+        let FaultKind::Babble { frame } = self.list[activation.place].fault.kind else { return None };
+        Some((activation, frame))
     }
 
     #[inline]
-    fn of_node<T>(
+    fn on_node(
         &self,
         now_ns: u64,
         port: usize,
-        part: impl Fn(FaultKind) -> Option<T>,
-    ) -> Option<(FaultActivation, T)> {
+        is_kind: impl Fn(FaultKind) -> bool,
+    ) -> Option<FaultActivation> {
         self.unless_empty(|list| {
-            let mut live = of_port(list, port, part).filter(|(_, listed, _)| listed.is_live(now_ns));
-            live.next()
-                .map(|(place, listed, part)| (FaultActivation { place, at_ns: listed.fault.from_ns }, part))
+            let (place, listed) = of_port(list, port, is_kind).find(|(_, listed)| listed.is_live(now_ns))?;
+            Some(FaultActivation { place, at_ns: listed.fault.from_ns })
         })
     }
 
@@ -228,7 +210,7 @@ impl Faults {
     pub(super) fn connected_from_ns(&self, from_ns: u64, port: usize) -> u64 {
         let mut connected_ns = from_ns;
         // Each turn leaves one disconnection behind.
-        while let Some((off, ())) = self.of_node(connected_ns, port, FaultKind::is(FaultKind::Disconnect)) {
+        while let Some(off) = self.disconnection(connected_ns, port) {
             connected_ns = self.list[off.place].fault.until_ns;
         }
         connected_ns
@@ -238,8 +220,8 @@ impl Faults {
     #[inline]
     pub(super) fn babbles_from_ns(&self, able_ns: u64, port: usize) -> Option<u64> {
         self.unless_empty(|list| {
-            let babbles = of_port(list, port, FaultKind::babbled);
-            let starts_ns = babbles.filter_map(|(_, listed, _)| {
+            let babbles = of_port(list, port, |kind| matches!(kind, FaultKind::Babble { .. }));
+            let starts_ns = babbles.filter_map(|(_, listed)| {
                 let from_ns = self.connected_from_ns(able_ns.max(listed.fault.from_ns), port);
                 listed.is_live(from_ns).then_some(from_ns)
             });
@@ -256,8 +238,8 @@ impl Faults {
 
     /// The next forced bus-off of a node that is on the bus from `from_ns` on.
     pub(super) fn next_bus_off(&self, from_ns: u64, port: usize) -> Option<FaultActivation> {
-        let bus_offs = of_port(&self.list, port, FaultKind::is(FaultKind::BusOff));
-        let strikes = bus_offs.filter_map(|(place, listed, ())| {
+        let bus_offs = of_port(&self.list, port, |kind| kind == FaultKind::BusOff);
+        let strikes = bus_offs.filter_map(|(place, listed)| {
             let at_ns = listed.fault.from_ns.max(from_ns);
             listed.is_live(at_ns).then_some(FaultActivation { place, at_ns })
         });
@@ -309,15 +291,15 @@ impl Faults {
     }
 }
 
-/// The faults at a port, with their places in the list and the value of `part`.
-fn of_port<T>(
+/// The faults of that kind at a port, with their places in the list.
+fn of_port(
     list: &[Listed],
     port: usize,
-    part: impl Fn(FaultKind) -> Option<T>,
-) -> impl Iterator<Item = (usize, &Listed, T)> {
-    let of_port =
-        list.iter().enumerate().filter(move |(_, listed)| listed.fault.port.is_none_or(|own| own == port));
-    of_port.filter_map(move |(place, listed)| Some((place, listed, part(listed.fault.kind)?)))
+    is_kind: impl Fn(FaultKind) -> bool,
+) -> impl Iterator<Item = (usize, &Listed)> {
+    list.iter().enumerate().filter(move |(_, listed)| {
+        listed.fault.port.is_none_or(|own| own == port) && is_kind(listed.fault.kind)
+    })
 }
 
 /// A fault that acts.

@@ -23,6 +23,7 @@ mod virtual_bus;
 pub mod wire;
 
 pub use bus::{Bus, BusStatus, ErrorState, ReceiveError, Received, SendError};
+pub use codes::UnknownCode;
 pub use error_frame::{ERROR_FLAG, ErrorKind, ErrorReport, ErrorReportError};
 pub use frame::Frame;
 pub use frame_error::FrameError;

@@ -15,7 +15,7 @@ section! {
         pub interfaces: Vec<String> = Vec::new(),
         /// Bit rate of every bus, bit/s.
         pub bitrate_bps: u32 = 1_000_000,
-        /// Whether a bit takes a nanosecond, whatever `bitrate_bps` says (simulated buses only): for cycles that no CAN
+        /// Whether a bit takes a nanosecond, whatever `bitrate_bps` is (simulated buses only): for cycles that no CAN
         /// holds.
         pub ideal: bool = false,
         /// How long after bus-off a controller restarts by itself, ms; 0 for never (as `ip link … restart-ms`).

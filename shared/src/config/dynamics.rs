@@ -3,7 +3,15 @@
 use std::ops::RangeInclusive;
 
 use super::error::ScenarioError;
-use super::need::{keyed, require_not_negative, require_positive};
+use super::need::{keyed, require_not_negative, require_positive, require_within};
+
+/// Masses of a mechanism that fits on a table, kg. Beyond them the equations of motion lose their digits.
+const LEAST_KG: f64 = 0.001;
+const MOST_KG: f64 = 100.0;
+/// The largest inertia: the largest mass at a length of 0.3 m, kg m².
+const MOST_KG_M2: f64 = 10.0;
+/// Ten times the Earth's, for tests of the drives, m/s².
+const MOST_GRAVITY_M_S2: f64 = 100.0;
 
 section! {
     /// The moving masses and their friction.
@@ -37,14 +45,19 @@ impl DynamicsConfig {
     pub const STEPS_NS: RangeInclusive<u64> = 10_000..=250_000;
 
     pub(super) fn validate(&self) -> Result<(), ScenarioError> {
-        require_positive(&keyed!("dynamics", self,
-            carriage_mass_kg rod_mass_kg platform_mass_kg initial_leg_m
-        ))?;
-        require_not_negative(&keyed!("dynamics", self,
-            leg_inertia_kg_m2 slide_friction_n viscous_friction_n_s_per_m gravity_m_s2
-        ))?;
+        let Self { carriage_mass_kg, rod_mass_kg, platform_mass_kg, leg_inertia_kg_m2, gravity_m_s2, .. } =
+            *self;
+        require_within(&[
+            ("dynamics.carriage_mass_kg", carriage_mass_kg, LEAST_KG, MOST_KG),
+            ("dynamics.rod_mass_kg", rod_mass_kg, LEAST_KG, MOST_KG),
+            ("dynamics.platform_mass_kg", platform_mass_kg, LEAST_KG, MOST_KG),
+            ("dynamics.leg_inertia_kg_m2", leg_inertia_kg_m2, 0.0, MOST_KG_M2),
+            ("dynamics.gravity_m_s2", gravity_m_s2, 0.0, MOST_GRAVITY_M_S2),
+        ])?;
         let inertia = self.platform_inertia_kg_m2;
-        require_not_negative(&inertia.map(|kg_m2| ("dynamics.platform_inertia_kg_m2", kg_m2)))?;
+        require_within(&inertia.map(|kg_m2| ("dynamics.platform_inertia_kg_m2", kg_m2, 0.0, MOST_KG_M2)))?;
+        require_positive(&keyed!("dynamics", self, initial_leg_m))?;
+        require_not_negative(&keyed!("dynamics", self, slide_friction_n viscous_friction_n_s_per_m))?;
         if !Self::STEPS_NS.contains(&self.step_ns) {
             return Err(ScenarioError::bad("dynamics.step_ns", &self.step_ns, "use 10000 to 250000 ns"));
         }

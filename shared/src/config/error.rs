@@ -3,6 +3,8 @@
 use std::fmt;
 use std::path::PathBuf;
 
+use crate::input::excerpt;
+
 /// Why a scenario was refused.
 #[derive(Debug, thiserror::Error)]
 pub enum ScenarioError {
@@ -15,18 +17,20 @@ pub enum ScenarioError {
         error: std::io::Error,
     },
     /// The text is not TOML, has an unknown key, or a value of the wrong type.
-    #[error("{}:{line}: {reason}", path.display())]
+    #[error("{place}: {reason}")]
     Malformed {
-        /// The file.
-        path: PathBuf,
-        /// Line of the fault, from 1.
-        line: usize,
-        /// The error, with the most similar key.
+        /// File, line and column.
+        place: String,
+        /// The key and its error, with the most similar valid one.
         reason: String,
     },
     /// An invalid value.
-    #[error("{key} = {value}: {need}")]
+    #[error("{}{key} = {value}: {need}", place.as_ref().map(|place| format!("{place}: ")).unwrap_or_default())]
     BadValue {
+        /// File, line and column, if the value stands in a file.
+        place: Option<String>,
+        /// The number of the table in a list of tables, from 0.
+        entry: Option<usize>,
         /// The key, with its table.
         key: &'static str,
         /// The given value.
@@ -38,6 +42,15 @@ pub enum ScenarioError {
 
 impl ScenarioError {
     pub(super) fn bad(key: &'static str, value: &dyn fmt::Display, need: impl Into<String>) -> Self {
-        Self::BadValue { key, value: value.to_string(), need: need.into() }
+        let value = excerpt(&value.to_string());
+        Self::BadValue { place: None, entry: None, key, value, need: need.into() }
+    }
+
+    /// The same of a table in a list of tables.
+    pub(super) fn of_entry(mut self, number: usize) -> Self {
+        if let Self::BadValue { entry, .. } = &mut self {
+            *entry = Some(number);
+        }
+        self
     }
 }

@@ -8,6 +8,7 @@ mod section;
 
 mod can;
 mod control;
+mod document;
 mod drives;
 mod dynamics;
 mod error;

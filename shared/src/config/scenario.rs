@@ -1,8 +1,8 @@
 //! A scenario as a whole: read from TOML, checked, and written back as resolved.
 
-use std::fs;
 use std::path::Path;
 
+use super::document::{Document, place};
 use super::error::ScenarioError;
 use super::need::require_duration;
 use super::{
@@ -11,6 +11,12 @@ use super::{
 };
 use crate::clock::SECOND_NS;
 use crate::geometry::MechanismConfig;
+use crate::input::{excerpt, read_text};
+
+/// Size of the largest scenario file, bytes.
+const MOST_BYTES: u64 = 1 << 20;
+/// Characters of the longest message of the TOML reader.
+const LONGEST_REASON: usize = 2000;
 
 /// Rates at which the rig can be asked to run, Hz.
 pub(crate) const RATES_HZ: std::ops::RangeInclusive<u32> = 10..=20_000;
@@ -60,9 +66,10 @@ impl Scenario {
     /// yet: see [`Self::validate`].
     ///
     /// # Errors
-    /// [`ScenarioError`] for a file that cannot be read, and those of [`Self::parse`].
+    /// [`ScenarioError`] for a file that cannot be read, is no regular file or is larger than 1 MiB, and those of
+    /// [`Self::parse`].
     pub fn read(path: &Path) -> Result<Self, ScenarioError> {
-        let text = fs::read_to_string(path)
+        let text = read_text(path, MOST_BYTES)
             .map_err(|error| ScenarioError::Unreadable { path: path.to_owned(), error })?;
         let mut scenario = Self::parse(path, &text)?;
         if let (MotionConfig::File(file), Some(folder)) = (&mut scenario.motion, path.parent()) {
@@ -84,14 +91,26 @@ impl Scenario {
     /// scenario.validate()?;
     /// assert_eq!(scenario.period_ns(), 2_000_000);
     /// let error = Scenario::parse(path, "rate_hzz = 500").unwrap_err().to_string();
-    /// assert!(error.starts_with("slow.toml:1: unknown field") && error.ends_with("did you mean `rate_hz`?"));
+    /// assert!(error.starts_with("slow.toml:1:1: unknown field") && error.ends_with("did you mean `rate_hz`?"));
     /// # Ok::<(), masseter_shared::config::ScenarioError>(())
     /// ```
     ///
     /// # Errors
-    /// [`ScenarioError::Malformed`] with the line, and with the most similar key for an unknown one.
+    /// [`ScenarioError::Malformed`] with line, column and key, and with the most similar key for an unknown one. An array
+    /// in place of a table is refused.
     pub fn parse(path: &Path, text: &str) -> Result<Self, ScenarioError> {
-        toml::from_str(text).map_err(|error| malformed(path, text, &error))
+        let refused = |error| malformed(path, text, None, &error);
+        let document = Document::parse(path, text).map_err(refused)?;
+        let scenario: Self =
+            toml::from_str(text).map_err(|error| malformed(path, text, Some(&document), &error))?;
+        let resolved = serde_json::to_value(&scenario).expect("every part of a scenario has a JSON form");
+        match document.unnamed_table(&resolved) {
+            None => Ok(scenario),
+            Some((key, place)) => {
+                let reason = format!("{key} is an array; write a table, which names its values");
+                Err(ScenarioError::Malformed { place, reason })
+            }
+        }
     }
 
     /// The scenario with every default filled in, as TOML.
@@ -117,17 +136,12 @@ impl Scenario {
             require_duration(&[("duration_s", duration_s)])?;
         }
         self.realtime.validate()?;
-        if let MotionConfig::File(file) = &self.motion
-            && file.path.to_str().is_none()
-        {
-            let need = "use folders and a file whose names are UTF-8: the scenario is written down with them";
-            return Err(ScenarioError::bad("motion.path", &file.path.display(), need));
-        }
         self.can.validate()?;
         self.drives.validate()?;
         self.dynamics.validate()?;
-        for fault in &self.faults {
-            fault.validate(self.can.buses.len(), self.can.is_virtual())?;
+        for (number, fault) in self.faults.iter().enumerate() {
+            let checked = fault.validate(self.can.buses.len(), self.can.is_virtual());
+            checked.map_err(|error| error.of_entry(number))?;
         }
         if let Some(food) = &self.food {
             food.validate()?;
@@ -148,32 +162,78 @@ impl Scenario {
     }
 }
 
-fn malformed(path: &Path, text: &str, error: &toml::de::Error) -> ScenarioError {
-    let offset = error.span().map_or(0, |span| span.start);
-    let line = text[..offset].matches('\n').count() + 1;
-    let mut reason = error.message().to_owned();
-    if let Some(nearest) = nearest_key(&reason) {
-        reason = format!("{reason}; did you mean `{nearest}`?");
+impl ScenarioError {
+    /// The same with its place in the file of the scenario, if the file alone leads to it: an argument may have replaced
+    /// the value.
+    #[must_use]
+    pub fn in_file(mut self, path: &Path) -> Self {
+        let refusal = self.to_string();
+        if let Self::BadValue { place, entry, key, .. } = &mut self {
+            *place = place_of_refusal(path, &refusal, key, *entry);
+        }
+        self
     }
-    ScenarioError::Malformed { path: path.to_owned(), line, reason }
 }
 
-/// The expected key most like the unknown one, both taken from serde's message.
-fn nearest_key(message: &str) -> Option<&str> {
+fn place_of_refusal(path: &Path, refusal: &str, key: &str, entry: Option<usize>) -> Option<String> {
+    let text = read_text(path, MOST_BYTES).ok()?;
+    let refused_alone = Scenario::parse(path, &text).ok()?.validate().err()?;
+    let document = Document::parse(path, &text).ok()?;
+    (refused_alone.to_string() == refusal).then(|| document.place_of(key, entry))
+}
+
+fn malformed(path: &Path, text: &str, document: Option<&Document>, error: &toml::de::Error) -> ScenarioError {
+    let offset = error.span().map_or(0, |span| span.start);
+    let mut place = place(path, text, offset);
+    let mut reason = cut(error.message().lines().next().unwrap_or_default());
+    if let Some(nearest) = nearest(&reason) {
+        reason = format!("{reason}; did you mean `{nearest}`?");
+    }
+    let key = document.and_then(|document| {
+        let key = document.key_at(offset)?;
+        let culprit = document.culprit::<Scenario>(&key);
+        if let Some(culprit) = &culprit {
+            place = document.place_of(culprit, None);
+        }
+        Some(culprit.unwrap_or(key))
+    });
+    if let Some(key) = key.filter(|_| !reason.starts_with("unknown field")) {
+        reason = format!("{}: {reason}", excerpt(&key));
+    }
+    ScenarioError::Malformed { place, reason }
+}
+
+/// A message of the TOML reader with every quotation cut.
+fn cut(message: &str) -> String {
+    let quotations = message.split_inclusive(['`', '"']).map(|part| match part.chars().next_back() {
+        Some(mark @ ('`' | '"')) => excerpt(&part[..part.len() - 1]) + mark.encode_utf8(&mut [0; 4]),
+        _ => excerpt(part),
+    });
+    quotations.collect::<String>().chars().take(LONGEST_REASON).collect()
+}
+
+/// The expected key or word most like the unknown one, both taken from serde's message.
+fn nearest(message: &str) -> Option<&str> {
     let mut quoted = message.split('`').skip(1).step_by(2);
-    let unknown = message.starts_with("unknown field").then(|| quoted.next())??;
+    let is_unknown = ["unknown field", "unknown variant"].iter().any(|start| message.starts_with(start));
+    let unknown = is_unknown.then(|| quoted.next())??;
     quoted.max_by(|a, b| strsim::jaro_winkler(unknown, a).total_cmp(&strsim::jaro_winkler(unknown, b)))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::{DriveConfig, FileConfig};
+    use crate::config::DriveConfig;
 
     fn parse(text: &str) -> Result<Scenario, String> {
         let scenario = Scenario::parse(Path::new("s.toml"), text).map_err(|error| error.to_string())?;
         scenario.validate().map_err(|error| error.to_string())?;
         Ok(scenario)
+    }
+
+    #[test]
+    fn the_largest_seed_is_one() {
+        assert_eq!(parse("seed = 18446744073709551615").unwrap().seed, u64::MAX);
     }
 
     #[test]
@@ -196,12 +256,38 @@ mod tests {
     }
 
     #[test]
-    fn a_recording_whose_path_is_not_utf_8_is_refused() {
-        use std::os::unix::ffi::OsStrExt;
-        let path = Path::new(std::ffi::OsStr::from_bytes(b"/jaw\xFF/m.csv"));
-        let scenario = Scenario { motion: MotionConfig::File(FileConfig::new(path)), ..Scenario::default() };
-        let error = scenario.validate().unwrap_err().to_string();
-        assert!(error.contains("motion.path") && error.contains("UTF-8"), "{error}");
+    fn a_value_out_of_range_is_placed_in_its_file_unless_it_is_not_from_there() {
+        let path = std::env::temp_dir().join(format!("masseter-placed-{}.toml", std::process::id()));
+        let fault = |bus| format!("[[faults]]\nkind = 'lose'\nbus = {bus}\nfrom_s = 1.0\n");
+        std::fs::write(&path, format!("seed = 1\n{}{}", fault(0), fault(2))).unwrap();
+        let scenario = Scenario::read(&path).unwrap();
+        let in_file = scenario.validate().unwrap_err().in_file(&path).to_string();
+        let replaced = Scenario { rate_hz: 5, ..scenario };
+        let elsewhere = replaced.validate().unwrap_err().in_file(&path).to_string();
+        std::fs::remove_file(&path).unwrap();
+        assert_eq!(
+            in_file.split_once("masseter-placed-").unwrap().1.split_once(".toml").unwrap().1,
+            ":8:1: faults.bus = 2: name a bus of can.buses, from 0"
+        );
+        assert!(elsewhere.starts_with("rate_hz = 5"), "{elsewhere}");
+    }
+
+    #[test]
+    fn long_and_strange_values_are_cut_and_escaped() {
+        let long = "x".repeat(100_000);
+        for text in [
+            format!("rate_hz = '{long}'"),
+            format!("name = '{long}'"),
+            format!("{long} = 1"),
+            format!("rate_hz = '{}'", "`\"".repeat(50_000)),
+            format!("[motion]\nkind = '{long}'"),
+            "name = \"\\u001b[2J\"".to_owned(),
+            "rate_hz = \"\\u001b[2J\"".to_owned(),
+            "\"\\u001b[2J\" = 1".to_owned(),
+        ] {
+            let error = parse(&text).unwrap_err();
+            assert!(error.len() < 2500 && !error.contains('\u{1b}'), "{error}");
+        }
     }
 
     #[test]
@@ -214,7 +300,20 @@ mod tests {
     #[test]
     fn wrong_scenarios_are_refused_with_place_and_remedy() {
         let cases = [
-            ("seed = 1\nrate_hzz = 5", "s.toml:2: unknown field `rate_hzz`"),
+            ("seed = 1\nrate_hzz = 5", "s.toml:2:1: unknown field `rate_hzz`"),
+            ("seed = 1\n  rate_hz = 'fast'", "s.toml:2:13: rate_hz: invalid type"),
+            ("[drives.leg]\nmax_force_n = 'much'", "s.toml:2:1: drives.leg.max_force_n: invalid type"),
+            ("[motion]\nkind = 'chewing'\nvertical = 3.0", "s.toml:3:1: unknown field `vertical`"),
+            ("[motion]\nvertical_mm = []\nkind = 'chewing'", "s.toml:2:1: motion.vertical_mm: invalid type"),
+            ("[motion]\nkind = 'yawning'", "did you mean `opening`?"),
+            ("checks = [999.0, 7]", "s.toml:1:10: checks is an array; write a table"),
+            ("[drives]\nleg = [1.0]", "s.toml:2:7: drives.leg: invalid type: sequence"),
+            (
+                "[motion]\nkind = 'chewing'\nphases = [0.5, 0.4, 0.1]",
+                "s.toml:3:10: motion.phases is an array",
+            ),
+            ("faults = [['lose', 1]]", "s.toml:1:"),
+            ("motion = ['chewing']", "s.toml:1:"),
             ("seed = 1\nrate_hzz = 5", "did you mean `rate_hz`?"),
             ("[controller]\nease = 1.0", "did you mean `ease_s`?"),
             ("[mechanism.strokes]\nslide_m = [0, 1]\nleg = [1, 2]", "did you mean `leg_m`?"),
@@ -233,10 +332,12 @@ mod tests {
             ),
             ("[drives.slide]\nencoder_noise_m = 1e300", "drives.slide.encoder_noise_m"),
             ("[dynamics]\nstep_ns = 1000000", "dynamics.step_ns = 1000000: use 10000 to 250000 ns"),
-            (
-                "[dynamics]\ngravity_m_s2 = -1.0",
-                "dynamics.gravity_m_s2 = -1: use a finite number not below 0",
-            ),
+            ("[dynamics]\ngravity_m_s2 = -1.0", "dynamics.gravity_m_s2 = -1: use 0 to 100"),
+            ("[dynamics]\ngravity_m_s2 = 1e5", "dynamics.gravity_m_s2 = 100000: use 0 to 100"),
+            ("[dynamics]\ncarriage_mass_kg = 1e300", "dynamics.carriage_mass_kg = 1000"),
+            ("[dynamics]\nrod_mass_kg = 1e-300", "dynamics.rod_mass_kg = 0.000"),
+            ("[dynamics]\nleg_inertia_kg_m2 = 1e12", "dynamics.leg_inertia_kg_m2"),
+            ("[dynamics]\nplatform_mass_kg = nan", "dynamics.platform_mass_kg = NaN: use 0.001 to 100"),
             (
                 "[dynamics]\nplatform_inertia_kg_m2 = [1e-4, -1e-4, 1e-4]",
                 "dynamics.platform_inertia_kg_m2 = -0.0001",
@@ -278,7 +379,10 @@ mod tests {
             ("[food]\npoint_m = [0.0, 1e150, 0.0]", "food.point_m"),
             ("[food]\nstiffness_n_per_m = 0.0", "food.stiffness_n_per_m = 0: use 1 to 1000000"),
             ("[food]\nthickness_mm = 10.0", "did you mean `thickness_m`?"),
-            ("[[faults]]\nkind = 'melt'\nbus = 0\nfrom_s = 1.0", "unknown variant `melt`"),
+            (
+                "[[faults]]\nkind = 'melt'\nbus = 0\nfrom_s = 1.0",
+                "s.toml:2:8: faults.kind: unknown variant `melt`",
+            ),
             (
                 "[can]\ninterfaces = ['a', 'b']\n[[faults]]\nkind = 'corrupt'\nbus = 0\nfrom_s = 1.0",
                 "faults.kind = corrupt: leave it away with can.interfaces",

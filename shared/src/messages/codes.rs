@@ -1,6 +1,6 @@
 //! The enumerations that messages carry as numbers. A number without a meaning is refused, never guessed.
 
-use masseter_can::codes;
+use masseter_can::{UnknownCode, codes};
 
 pub use masseter_can::cia402::{DriveRequest, DriveState};
 
@@ -27,7 +27,7 @@ codes! {
         Disabling = 5 "disabling",
         /// Done: drives off.
         Finished = 6 "finished",
-        /// Stopped by a fault: quick stop asked for, nothing moves again.
+        /// Stopped by a fault: quick stop requested, nothing moves again.
         SafeStop = 7 "safe_stop",
     }
 
@@ -43,11 +43,11 @@ codes! {
         Configuring = 3 "configuring",
         /// Verified and configured; waiting for the others.
         Configured = 4 "configured",
-        /// Told to become operational.
+        /// Commanded to become operational.
         Starting = 5 "starting",
         /// Operational, exchanging process data.
         Ready = 6 "ready",
-        /// Given up until it boots again; its own event says why.
+        /// Given up until it boots again; an event of its own has the reason.
         Failed = 7 "failed",
     }
 
@@ -129,7 +129,7 @@ codes! {
         BadMessage = 19 "bad_message",
         /// A drive did not boot in time (ms).
         BootTimeout = 20 "boot_timeout",
-        /// The CAN master refuses to move anything; its own event says why.
+        /// The CAN master refuses to move anything; an event of its own has the reason.
         MasterFault = 23 "master_fault",
         /// A bounded buffer had no room (items lost).
         Overflow = 24 "overflow",
@@ -189,7 +189,7 @@ pub fn drive_state_code(state: Option<DriveState>) -> u32 {
 ///
 /// # Errors
 /// A code that no state has.
-pub fn drive_state(code: u32) -> Result<Option<DriveState>, u32> {
+pub fn drive_state(code: u32) -> Result<Option<DriveState>, UnknownCode> {
     if code == NO_DRIVE_STATE { Ok(None) } else { DriveState::try_from(code).map(Some) }
 }
 
@@ -197,7 +197,7 @@ pub fn drive_state(code: u32) -> Result<Option<DriveState>, u32> {
 ///
 /// # Errors
 /// A code that no state has.
-pub fn drive_state_name(code: u32) -> Result<&'static str, u32> {
+pub fn drive_state_name(code: u32) -> Result<&'static str, UnknownCode> {
     Ok(drive_state(code)?.map_or("unknown", DriveState::name))
 }
 
@@ -206,13 +206,25 @@ mod tests {
     use super::*;
 
     #[test]
-    fn codes_mean_themselves_and_others_are_refused() {
-        for code in 0..256 {
-            assert_eq!(DriveRequest::try_from(code).is_ok(), code <= 2, "{code}");
-            assert_eq!(Source::try_from(code).is_ok(), matches!(code, 1..=3 | 5), "{code}");
-            assert!(Cause::try_from(code).map_or_else(|unknown| unknown, Cause::code) == code, "{code}");
-            let state_code = drive_state(code).map(drive_state_code);
-            assert!(state_code.map_or(code > 8, |found| found == code), "{code}");
+    fn every_number_is_its_value_or_refused() {
+        /// The numbers below 256 that are values, each checked to be the number of its value.
+        fn numbers<T: TryFrom<u32, Error = UnknownCode>>(code: impl Fn(T) -> u32) -> Vec<u32> {
+            let check = |number| match T::try_from(number) {
+                Ok(value) => assert_eq!(code(value), number),
+                Err(unknown) => assert_eq!(unknown.number, number),
+            };
+            (0..256).for_each(check);
+            (0..256).filter(|&number| T::try_from(number).is_ok()).collect()
         }
+        assert_eq!(numbers(ControllerState::code).len(), ControllerState::ALL.len());
+        assert_eq!(numbers(BootPhase::code).len(), BootPhase::ALL.len());
+        assert_eq!(numbers(Source::code), [1, 2, 3, 5]);
+        assert_eq!(numbers(EventKind::code).len(), EventKind::ALL.len());
+        assert_eq!(numbers(NoPose::code).len(), NoPose::ALL.len());
+        assert_eq!(numbers(Cause::code).len(), Cause::ALL.len());
+        assert_eq!(numbers(DriveRequest::code), [0, 1, 2]);
+        assert_eq!(numbers(DriveState::code), [1, 2, 3, 4, 5, 6, 7, 8]);
+        assert_eq!(drive_state(NO_DRIVE_STATE), Ok(None));
+        assert_eq!(drive_state(9), Err(UnknownCode { enumeration: "DriveState", number: 9 }));
     }
 }

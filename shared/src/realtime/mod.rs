@@ -1,7 +1,7 @@
 //! The real-time loop: absolute deadlines, and the scheduling that keeps them.
 //!
 //! [`Cycle`] waits for deadlines and applies the overrun policy. [`Waiter`] waits and measures how long the machine
-//! stalled. [`scheduling`] asks the kernel for a core, a real-time priority and locked memory, and reports what the kernel
+//! stalled. [`scheduling`] requests a core, a real-time priority and locked memory, and reports what the kernel
 //! granted. The work of a cycle is not part of this module.
 
 mod cycle;

@@ -1,4 +1,4 @@
-//! Core, real-time priority and locked memory of a process: what it asks the kernel for, and what the kernel granted, read
+//! Core, real-time priority and locked memory of a process: what it requests, and what the kernel granted, read
 //! back.
 //!
 //! A refusal is reported and never ends a run: screen, manifest and `--require-rt` judge it.
@@ -10,9 +10,9 @@ use rustix::mm::{MlockAllFlags, mlockall};
 use rustix::thread::{CpuSet, sched_getaffinity, sched_setaffinity};
 use serde::{Deserialize, Serialize};
 
-/// The scheduling that a process asks for.
+/// The scheduling that a process requests.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Wanted {
+pub struct SchedulingRequest {
     /// The only core to run on; none leaves the choice to the kernel.
     pub core: Option<usize>,
     /// SCHED_FIFO priority, 1 to 99; none keeps the ordinary policy.
@@ -25,8 +25,8 @@ pub struct Wanted {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Obtained {
     /// The request.
-    #[serde(rename = "requested", alias = "wanted")]
-    pub wanted: Wanted,
+    #[serde(alias = "wanted")]
+    pub requested: SchedulingRequest,
     /// The only core the process may run on, if there is only one.
     pub core: Option<usize>,
     /// Its SCHED_FIFO priority, if it has that policy.
@@ -37,35 +37,35 @@ pub struct Obtained {
     pub refusals: Vec<String>,
 }
 
-/// Requests `wanted`, then reads back the granted scheduling. Memory is locked for the whole process, the rest holds for
+/// Requests `request`, then reads back the granted scheduling. Memory is locked for the whole process, the rest holds for
 /// the calling thread.
-pub fn obtain(wanted: Wanted) -> Obtained {
-    let pinned = wanted.core.map_or(Ok(()), |core| stay_on(&[core]));
-    let fifo = wanted.fifo_priority.map_or(Ok(()), fifo::set);
-    let locked = if wanted.locked_memory {
+pub fn obtain(request: SchedulingRequest) -> Obtained {
+    let pinned = request.core.map_or(Ok(()), |core| stay_on(&[core]));
+    let fifo = request.fifo_priority.map_or(Ok(()), fifo::set);
+    let locked = if request.locked_memory {
         mlockall(MlockAllFlags::CURRENT | MlockAllFlags::FUTURE).map_err(io::Error::from)
     } else {
         Ok(())
     };
     let (core, fifo_priority, locked_memory) = (pinned_core(), fifo::get(), is_locked());
     let mut refusals = Vec::new();
-    if let Some(wanted) = wanted.core
-        && let Some(why) = refusal(pinned, core == Some(wanted))
+    if let Some(requested) = request.core
+        && let Some(why) = refusal(pinned, core == Some(requested))
     {
-        refusals.push(refused_core(wanted, &why, &usable_cores()));
+        refusals.push(refused_core(requested, &why, &usable_cores()));
     }
     let mut refuse = |what: String, why: String| {
         refusals.push(format!("{what} refused ({why}): `masseter doctor` shows how to allow it"));
     };
-    if let Some(wanted) = wanted.fifo_priority
-        && let Some(why) = refusal(fifo, fifo_priority == Some(wanted))
+    if let Some(requested) = request.fifo_priority
+        && let Some(why) = refusal(fifo, fifo_priority == Some(requested))
     {
-        refuse(format!("SCHED_FIFO {wanted}"), why);
+        refuse(format!("SCHED_FIFO {requested}"), why);
     }
-    if let Some(why) = refusal(locked, locked_memory || !wanted.locked_memory) {
+    if let Some(why) = refusal(locked, locked_memory || !request.locked_memory) {
         refuse("locked memory".to_owned(), why);
     }
-    Obtained { wanted, core, fifo_priority, locked_memory, refusals }
+    Obtained { requested: request, core, fifo_priority, locked_memory, refusals }
 }
 
 /// Why a request was not granted, if it was not. The kernel may accept a request without effect: what is read back counts.
@@ -175,16 +175,16 @@ mod tests {
 
     #[test]
     fn a_core_that_does_not_exist_is_refused_by_its_number() {
-        let wanted = Wanted { core: Some(4096), fifo_priority: None, locked_memory: false };
-        let obtained = std::thread::spawn(move || obtain(wanted)).join().unwrap();
+        let request = SchedulingRequest { core: Some(4096), fifo_priority: None, locked_memory: false };
+        let obtained = std::thread::spawn(move || obtain(request)).join().unwrap();
         assert!(obtained.refusals[0].starts_with("core 4096 refused"), "{:?}", obtained.refusals);
     }
 
     #[test]
     fn pinning_is_read_back() {
         let core = allowed_cores()[0];
-        let wanted = Wanted { core: Some(core), fifo_priority: None, locked_memory: false };
-        let obtained = std::thread::spawn(move || obtain(wanted)).join().unwrap();
+        let request = SchedulingRequest { core: Some(core), fifo_priority: None, locked_memory: false };
+        let obtained = std::thread::spawn(move || obtain(request)).join().unwrap();
         assert_eq!((obtained.core, obtained.refusals), (Some(core), Vec::new()));
     }
 

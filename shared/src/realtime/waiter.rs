@@ -8,7 +8,7 @@ use crate::clock;
 /// itself may be the cause, so [`Account`] keeps such gaps apart.
 const GAP_NS: u64 = 50_000;
 /// A wait that may end late sleeps only for longer than this: a sleep takes 20 to 40 µs of the core on some virtual
-/// machines (`masseter doctor` measures it).
+/// machines.
 const SHORTEST_SLEEP_NS: u64 = 50_000;
 
 /// The use of a task's time since its first wait, ns.

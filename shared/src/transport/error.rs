@@ -24,7 +24,7 @@ fn help(reason: &str) -> &'static str {
     } else if reason.contains("Incompatible") {
         "a process of another version uses this topic; stop it"
     } else if reason.contains("ConnectionsRefused") {
-        "/dev/shm is full, or too little memory may be locked or too few files opened; `masseter doctor` shows which"
+        "/dev/shm is full, or too little memory may be locked (`masseter doctor`), or too few files opened (`ulimit -n`)"
     } else {
         "`masseter clean` removes what killed runs left behind"
     }

@@ -149,7 +149,7 @@ mod tests {
         ) {
             let joints = mechanism.inverse(&pose).unwrap();
             let guess = std::array::from_fn(|leg| joints.theta_rad[leg] + off[leg]);
-            // Two solutions closer together than the guess is accurate are not a near guess's matter.
+            // A near guess cannot separate two solutions that are closer together than its error.
             let here = Equations::new(&mechanism, &joints.actuators);
             prop_assume!(here.determinant(&here.evaluate(joints.theta_rad.into())).abs() > 0.2);
             let by = |method| solve(method, &mechanism, &joints.actuators, &guess, &default()).unwrap();

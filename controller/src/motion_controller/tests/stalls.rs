@@ -39,7 +39,7 @@ fn after_a_stall_the_motion_continues_from_the_position_of_the_drives_without_a_
     }
 }
 
-/// What is wanted stands still with the drives: within what the motion makes in a cycle.
+/// The desired pose waits with the drives: its steps stay as small as those of the undisturbed motion.
 #[test]
 fn a_stall_is_not_taken_for_lost_tracking() {
     let usual_m = Bench::played(|_| ()).largest_step_m;

@@ -47,7 +47,7 @@ fn a_quick_stop_slows_down_along_its_ramp() {
     let ramp_m_s2 = Scenario::default().drives.leg.quick_stop_deceleration_m_s2;
     let mut hardest_m_s2: f64 = 0.0;
     let mut cycles = 0;
-    while cycles < 2 || !bench.plant.master.drives_are_off() {
+    while cycles < 2 || !bench.plant.drives_are_off() {
         let before = bench.truth.joint_m_s;
         bench.cycle(Some(&|reading| (reading.position_m, DriveRequest::QuickStop)));
         let slowed = before.into_iter().zip(bench.truth.joint_m_s).map(|(was, is)| (was - is).abs() / 1e-3);
@@ -66,7 +66,7 @@ fn a_drive_that_leaves_operation_stops_them_all_for_good() {
     let stop = Rpdo1 { controlword: Controlword::QUICK_STOP, target_increments: 0 };
     moving.disturb(1, stop.frame(NodeId::new(4).unwrap()));
     (0..100).for_each(|_| moving.cycle());
-    assert!(moving.bench.plant.master.drives_are_off(), "{:?}", moving.bench.reading.drive_state);
+    assert!(moving.bench.plant.drives_are_off(), "{:?}", moving.bench.reading.drive_state);
     assert_eq!(moving.bench.causes(EventKind::Fault), [Cause::DriveFault]);
 }
 
@@ -76,7 +76,7 @@ fn a_drive_taken_out_of_operational_stops_them_all() {
     let target = NmtTarget::Node(NodeId::new(4).unwrap());
     moving.disturb(1, Nmt { command: NmtCommand::EnterPreOperational, target }.frame());
     (0..200).for_each(|_| moving.cycle());
-    assert!(moving.bench.plant.master.drives_are_off(), "{:?}", moving.bench.reading.drive_state);
+    assert!(moving.bench.plant.drives_are_off(), "{:?}", moving.bench.reading.drive_state);
     assert_eq!(moving.bench.causes(EventKind::Fault), [Cause::ProcessDataLost]);
 }
 
@@ -136,7 +136,7 @@ fn a_commander_that_stops_the_drives_may_end_before_they_are_at_rest() {
     let Moving { mut bench, .. } = Moving::new();
     bench.cycle(Some(&|reading| (reading.position_m, DriveRequest::QuickStop)));
     (0..100).for_each(|_| bench.cycle(None));
-    assert!(bench.plant.master.drives_are_off());
+    assert!(bench.plant.drives_are_off());
     assert_eq!(bench.causes(EventKind::Fault), []);
     assert_eq!(bench.reading.master_fault, 0);
 }
@@ -148,7 +148,7 @@ fn a_commander_that_dies_while_it_enables_the_drives_is_missed() {
         bench.cycle(Some(&|reading| (reading.position_m, DriveRequest::Enable)));
     }
     (0..100).for_each(|_| bench.cycle(None));
-    assert!(bench.plant.master.drives_are_off());
+    assert!(bench.plant.drives_are_off());
     assert_eq!(bench.causes(EventKind::Fault), [Cause::CommandLost]);
 }
 
@@ -160,9 +160,9 @@ fn at_the_end_the_drives_are_stopped_at_once_however_long_commands_are_waited_fo
     bench.enable();
     play(&mut bench, 180);
     assert!(bench.fastest_axis_m_s() > 0.05);
-    bench.plant.master.is_ending = true;
+    bench.plant.stop();
     (0..30).for_each(|_| bench.cycle(None));
-    assert!(bench.plant.master.drives_are_off());
+    assert!(bench.plant.drives_are_off());
     assert!(bench.fastest_axis_m_s() < 1e-3);
     assert_eq!(bench.causes(EventKind::Fault), []);
 }

@@ -8,10 +8,20 @@ pub(super) struct FollowingErrorMonitor {
     /// Since when the error has been outside its window, ns.
     outside_since_ns: Option<u64>,
     /// Whether the drive is in fault because of it: statusword bit 13 of the position modes.
-    pub(super) is_fault: bool,
+    is_fault: bool,
 }
 
 impl FollowingErrorMonitor {
+    /// Statusword bit 13: whether the drive is in fault because of the following error.
+    pub(super) fn is_fault(self) -> bool {
+        self.is_fault
+    }
+
+    /// The following error has put the drive into fault.
+    pub(super) fn fail(&mut self) {
+        self.is_fault = true;
+    }
+
     /// Judges an error (m); whether it has been outside the window for longer than the time out.
     pub(super) fn exceeds(&mut self, now_ns: u64, error_m: f64, window_m: f64, timeout_ns: u64) -> bool {
         if error_m.abs() <= window_m {

@@ -1,6 +1,6 @@
 //! The drive's axis under CiA 402: power states, modes of operation, and the objects that show them.
 //!
-//! An axis knows no frames and works in SI units. [`Axis`] sequences its parts: [`Positioning`] and [`Homing`] return
+//! An axis handles no frames and works in SI units. [`Axis`] sequences its parts: [`Positioning`] and [`Homing`] return
 //! commands, the servo follows the [`Demand`], [`FollowingErrorMonitor`] supervises the servo. [`Parameters`] is
 //! the configuration in the object dictionary.
 
@@ -50,10 +50,10 @@ pub(super) struct Axis {
     demand: Demand,
     following: FollowingErrorMonitor,
     positioning: Positioning,
-    pub(super) homing: Homing,
+    homing: Homing,
     mode: Mode,
     /// State of the power stage.
-    pub(super) power: DriveState,
+    power: DriveState,
     controlword: Controlword,
     /// The encoder's last count.
     counts: i32,
@@ -62,7 +62,7 @@ pub(super) struct Axis {
     /// Whether the newest cyclic target was limited.
     is_target_limited: bool,
     /// The force of the last step on the mechanism, N.
-    pub(super) force_n: f64,
+    force_n: f64,
     /// The motor's share of the force: without current the brake holds.
     motor_n: f64,
 }
@@ -94,6 +94,17 @@ impl Axis {
             force_n: 0.0,
             motor_n: 0.0,
         }
+    }
+
+    /// State of the power stage.
+    #[cfg(test)]
+    pub(super) fn power(&self) -> DriveState {
+        self.power
+    }
+
+    /// Whether homing is under way.
+    pub(super) fn is_homing(&self) -> bool {
+        self.homing.is_running()
     }
 
     /// Whether the axis follows targets.
@@ -153,7 +164,7 @@ impl Axis {
         self.enter(next, now_ns);
     }
 
-    /// Reacts as 6007h says when nobody controls the drive any more; returns whether that put it into fault.
+    /// Reacts by 6007h when nobody controls the drive any more; returns whether that put it into fault.
     pub(super) fn abort_connection(&mut self, now_ns: u64) -> bool {
         let was_in_fault = self.is_in_fault();
         match self.parameters.abort_connection_option {
@@ -199,8 +210,9 @@ impl Axis {
         self.demand = Demand::Force { force_n };
     }
 
-    /// A step of the servo loops with the axis at `position_m`; returns whether the following error became a fault.
-    pub(super) fn step(&mut self, now_ns: u64, position_m: f64) -> bool {
+    /// A step of the servo loops with the axis at `position_m`; returns the force until the next one, N, and
+    /// whether the following error became a fault.
+    pub(super) fn step(&mut self, now_ns: u64, position_m: f64) -> (f64, bool) {
         self.complete_transition(now_ns);
         let before = std::mem::replace(&mut self.counts, self.encoder.read(position_m));
         if self.is_enabled() {
@@ -217,7 +229,7 @@ impl Axis {
         let command = self.demand.servo_command(now_ns);
         self.force_n = self.servo.step(measured_m, command, &limits);
         self.motor_n = if command == ServoCommand::Brake { 0.0 } else { self.force_n };
-        self.supervise_following(now_ns)
+        (self.force_n, self.supervise_following(now_ns))
     }
 
     /// Reads the encoder with the axis at `position_m`, as SYNC demands.
@@ -234,14 +246,14 @@ impl Axis {
         objects.set(names::MODE_DISPLAY, self.mode.number());
         objects.set(names::POSITION_DEMAND, demand);
         objects.set(names::POSITION_ACTUAL, actual);
-        objects.set(names::VELOCITY_ACTUAL, self.encoder.nearest(self.servo.motion.velocity_m_s));
+        objects.set(names::VELOCITY_ACTUAL, self.encoder.nearest(self.servo.motion().velocity_m_s));
         objects.set(names::TORQUE_ACTUAL, torque.round() as i16);
         objects.set(names::FOLLOWING_ERROR, demand.saturating_sub(actual));
     }
 
     fn statusword(&self, now_ns: u64) -> Statusword {
         let is_enabled = self.is_enabled();
-        let is_limited = self.is_target_limited || self.positioning.is_limited || self.servo.is_limited;
+        let is_limited = self.is_target_limited || self.positioning.is_limited() || self.servo.is_limited();
         let word = Statusword::for_state(self.power)
             .with(StatusBit::VoltageEnabled, true)
             .with(StatusBit::Remote, true)
@@ -249,19 +261,19 @@ impl Axis {
         match self.mode {
             Mode::CyclicPosition => word
                 .with(StatusBit::TargetFollowed, is_enabled)
-                .with(StatusBit::FollowingError, self.following.is_fault),
+                .with(StatusBit::FollowingError, self.following.is_fault()),
             Mode::CyclicTorque => word.with(StatusBit::TargetFollowed, is_enabled),
             Mode::ProfilePosition => word
                 .with(StatusBit::TargetReached, is_enabled && self.has_reached_setpoint(now_ns))
-                .with(StatusBit::SETPOINT_ACKNOWLEDGED, is_enabled && self.positioning.is_acknowledged)
-                .with(StatusBit::FollowingError, self.following.is_fault),
+                .with(StatusBit::SETPOINT_ACKNOWLEDGED, is_enabled && self.positioning.is_acknowledged())
+                .with(StatusBit::FollowingError, self.following.is_fault()),
             Mode::Homing => self.homing.show(word, self.demand.is_at_rest(now_ns)),
         }
     }
 
     /// Statusword bit 10 of profile position: within the position window of the last set-point, or halted.
     fn has_reached_setpoint(&self, now_ns: u64) -> bool {
-        if !self.demand.is_at_rest(now_ns) || self.positioning.waiting.is_some() {
+        if !self.demand.is_at_rest(now_ns) || self.positioning.has_waiting() {
             return false;
         }
         let demand_m = self.demand.position_m(now_ns).unwrap_or(self.measured_m());
@@ -318,7 +330,7 @@ impl Axis {
             return false;
         }
         self.enter(self.power.after_fault(), now_ns);
-        self.following.is_fault = true;
+        self.following.fail();
         true
     }
 
@@ -349,7 +361,7 @@ impl Axis {
     }
 
     fn slow_down(&mut self, now_ns: u64, deceleration_m_s2: f64) {
-        self.demand.slow_down(now_ns, self.servo.motion, deceleration_m_s2);
+        self.demand.slow_down(now_ns, self.servo.motion(), deceleration_m_s2);
     }
 
     /// In force control the axis may be no faster than it can stop before the software position limits, at the
@@ -373,7 +385,7 @@ impl Axis {
 
     /// The measured position, m in the encoder's coordinates.
     fn measured_m(&self) -> f64 {
-        self.servo.motion.position_m
+        self.servo.motion().position_m
     }
 
     /// Position actual value (6064h).

@@ -14,16 +14,31 @@ pub(super) struct Positioning {
     /// Under way, or interrupted by a halt.
     running: Option<i32>,
     /// Waits for the running one.
-    pub(super) waiting: Option<i32>,
+    waiting: Option<i32>,
     /// The last one reached.
     reached: Option<i32>,
     /// Statusword bit 12.
-    pub(super) is_acknowledged: bool,
+    is_acknowledged: bool,
     /// Whether the newest set-point was clamped to the software position limits.
-    pub(super) is_limited: bool,
+    is_limited: bool,
 }
 
 impl Positioning {
+    /// Whether a set-point waits for the running one.
+    pub(super) fn has_waiting(&self) -> bool {
+        self.waiting.is_some()
+    }
+
+    /// Statusword bit 12: the last set-point was taken, and the master has not ended the handshake.
+    pub(super) fn is_acknowledged(&self) -> bool {
+        self.is_acknowledged
+    }
+
+    /// Whether the newest set-point was clamped to the software position limits.
+    pub(super) fn is_limited(&self) -> bool {
+        self.is_limited
+    }
+
     /// Takes a controlword, given the one before and the target position (607Ah).
     pub(super) fn control(
         &mut self,

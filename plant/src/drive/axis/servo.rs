@@ -44,11 +44,11 @@ pub(super) struct Servo {
     config: DriveConfig,
     step_s: f64,
     /// The last measured position with the filtered velocity.
-    pub(super) motion: Motion,
+    motion: Motion,
     integral_n: f64,
     brake_at_m: Option<f64>,
     /// Whether the last step limited force or velocity.
-    pub(super) is_limited: bool,
+    is_limited: bool,
 }
 
 impl Servo {
@@ -62,6 +62,16 @@ impl Servo {
             brake_at_m: Some(position_m),
             is_limited: false,
         }
+    }
+
+    /// The last measured position with the filtered velocity.
+    pub(super) fn motion(&self) -> Motion {
+        self.motion
+    }
+
+    /// Whether the last step limited force or velocity.
+    pub(super) fn is_limited(&self) -> bool {
+        self.is_limited
     }
 
     /// One step of the loops: the force for the next `step_s`, N.

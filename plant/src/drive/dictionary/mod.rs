@@ -1,6 +1,6 @@
 //! The drive's object dictionary: one table, and the memory behind it.
 //!
-//! The dictionary knows type, limits and access of its objects, but not their effects.
+//! The dictionary has type, limits and access of its objects, but not their effects.
 
 mod entry;
 pub(super) mod names;

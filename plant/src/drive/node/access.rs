@@ -1,7 +1,6 @@
 //! SDO access to the object dictionary: reading, writing, and the checks of both.
 //!
-//! A write only changes the dictionary; its effect on the drive is the node's matter, which finds the written object in
-//! [`DictionaryAccess::written`].
+//! A write only changes the dictionary. The node applies its effect on the drive, from [`DictionaryAccess::written`].
 
 use masseter_can::canopen::{AbortCode, Expedited, ObjectAddress};
 
@@ -56,7 +55,7 @@ impl DictionaryAccess<'_> {
         check(object, word, self.objects, self.axis, self.is_operational)?;
         match object.index {
             0x1010 => self.storage.store(self.objects),
-            0x1011 => self.storage.stored = self.storage.factory.clone(),
+            0x1011 => self.storage.restore_factory(),
             _ => {
                 self.objects.words[place] = word;
                 self.written = Some(object);

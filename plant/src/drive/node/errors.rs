@@ -13,7 +13,7 @@ const GENERIC: u8 = 1 << 0;
 const COMMUNICATION: u8 = 1 << 4;
 const PROFILE: u8 = 1 << 5;
 
-/// The number of errors that the drive knows: room for every error once.
+/// The number of errors that the drive can report: room for each of them once.
 const COUNT: usize = 9;
 
 /// The errors that put the drive into fault and last until it is reset: a following error outside its window for longer

@@ -29,7 +29,7 @@ use errors::{Errors, FAULTS, clear_history};
 use heartbeats::{Consumer, Producer};
 use nmt::{BOOT_NS, Nmt};
 use outbox::Outbox;
-use pdo::{Effects, ProcessData, Rpdo, Tpdo};
+use pdo::{Effects, ProcessData};
 use sdo::SdoServer;
 use storage::Storage;
 
@@ -60,7 +60,7 @@ impl DriveNode {
         let stagger_ns = heartbeat_ns / 8 * u64::from(settings.node.get() % 8);
         Self {
             id: settings.node,
-            storage: Storage { stored: objects.clone(), factory: objects.clone() },
+            storage: Storage::new(&objects),
             axis: Axis::new(settings.drive, encoder, settings.step_s, position_m, &objects),
             nmt: Nmt::booting(now_ns),
             errors: Errors::default(),
@@ -77,7 +77,7 @@ impl DriveNode {
     /// State of the drive's power stage.
     #[cfg(test)]
     pub(crate) fn power(&self) -> masseter_can::cia402::DriveState {
-        self.axis.power
+        self.axis.power()
     }
 
     /// Values of its object dictionary.
@@ -106,7 +106,7 @@ impl DriveNode {
             Ok(Cob::SdoRequest(node)) if node == self.id && self.nmt.is_served() => {
                 self.serve(now_ns, frame.data());
             }
-            Ok(Cob::Heartbeat(node)) if self.nmt.state.is_some() => {
+            Ok(Cob::Heartbeat(node)) if self.nmt.state().is_some() => {
                 self.take_heartbeat(now_ns, node, frame.data());
             }
             _ => self.take_process_data(now_ns, frame),
@@ -118,7 +118,7 @@ impl DriveNode {
         if self.nmt.boot(now_ns) {
             self.outbox.add(Heartbeat { state: NmtState::BootUp }.frame(self.id));
         }
-        if let Some(state) = self.nmt.state
+        if let Some(state) = self.nmt.state()
             && self.producer.is_due(now_ns)
         {
             self.outbox.add(Heartbeat { state }.frame(self.id));
@@ -127,14 +127,15 @@ impl DriveNode {
         if let Some(abort) = self.sdo.expire(now_ns) {
             self.outbox.add(abort.frame(self.id));
         }
-        if self.axis.step(now_ns, position_m) {
+        let (force_n, has_following_error) = self.axis.step(now_ns, position_m);
+        if has_following_error {
             self.raise(EmergencyCode::FOLLOWING_ERROR);
         }
-        if self.nmt.is_operational() && self.process_data.tpdos.iter().any(Tpdo::is_event_driven) {
+        if self.nmt.is_operational() && self.process_data.is_event_driven() {
             self.axis.show(now_ns, &mut self.objects);
             self.process_data.send(&mut self.outbox, |tpdo| tpdo.at_event(now_ns, &self.objects));
         }
-        self.axis.force_n
+        force_n
     }
 
     /// Takes the error state of the drive's CAN controller. In bus-off the communication has failed, which an emergency
@@ -160,15 +161,15 @@ impl DriveNode {
 
     /// Obeys a command of network management, once the node has booted.
     fn obey_nmt(&mut self, command: NmtCommand, now_ns: u64) {
-        if self.nmt.state.is_none() {
+        if self.nmt.state().is_none() {
             return;
         }
         match command {
             NmtCommand::Start => {
                 if !self.nmt.is_operational() {
-                    self.process_data.tpdos.iter_mut().for_each(Tpdo::clear);
+                    self.process_data.forget_sent();
                 }
-                self.nmt.state = Some(NmtState::Operational);
+                self.nmt.enter(NmtState::Operational);
             }
             NmtCommand::Stop => self.leave_operational(NmtState::Stopped, now_ns),
             NmtCommand::EnterPreOperational => self.leave_operational(NmtState::PreOperational, now_ns),
@@ -186,15 +187,15 @@ impl DriveNode {
         if self.nmt.is_operational() || state == NmtState::Stopped {
             self.abort_connection(now_ns);
         }
-        self.nmt.state = Some(state);
+        self.nmt.enter(state);
         self.process_data.discard_received();
         self.sdo = SdoServer::default();
     }
 
     /// Restores the stored communication objects and boots. The history of errors (1003h) and the faults stay.
     fn reset_communication(&mut self, now_ns: u64) {
-        self.objects.copy_range(&self.storage.stored, 0x1000..=0x1002);
-        self.objects.copy_range(&self.storage.stored, 0x1004..=0x1FFF);
+        self.objects.copy_range(self.storage.stored(), 0x1000..=0x1002);
+        self.objects.copy_range(self.storage.stored(), 0x1004..=0x1FFF);
         self.errors.forget_communication(&mut self.objects);
         self.producer.configure(&self.objects, now_ns + BOOT_NS);
         self.consumer = Consumer::new(&self.objects);
@@ -205,7 +206,7 @@ impl DriveNode {
 
     /// The state after power-on: the brake closes, every object has its stored value, the node boots.
     fn reset_node(&mut self, now_ns: u64) {
-        self.objects = self.storage.stored.clone();
+        self.objects = self.storage.stored().clone();
         self.errors = Errors::default();
         self.axis.restart(now_ns, &self.objects);
         self.reset_communication(now_ns);
@@ -228,7 +229,7 @@ impl DriveNode {
                 self.apply_process_data(number, now_ns);
             }
         }
-        self.axis.synchronise(now_ns, std::mem::take(&mut self.process_data.new_targets), &self.objects);
+        self.axis.synchronise(now_ns, self.process_data.take_targets(), &self.objects);
         if is_operational {
             self.axis.sample(position_m);
             self.axis.show(now_ns, &mut self.objects);
@@ -243,13 +244,13 @@ impl DriveNode {
         }
         let Some(number) = self.process_data.receive(now_ns, frame) else { return };
         self.judge_process_data();
-        if !self.process_data.rpdos[number].is_synchronous {
+        if !self.process_data.is_synchronous(number) {
             self.apply_process_data(number, now_ns);
         }
     }
 
     fn apply_process_data(&mut self, number: usize, now_ns: u64) {
-        if let Some(effects) = self.process_data.rpdos[number].apply(&mut self.objects) {
+        if let Some(effects) = self.process_data.apply(number, &mut self.objects) {
             self.act(effects, now_ns);
         }
     }
@@ -296,7 +297,7 @@ impl DriveNode {
         }
     }
 
-    /// Reacts as 6007h says when nobody controls the axis any more. A fault outlasts its cause.
+    /// Reacts by 6007h when nobody controls the axis any more. A fault outlasts its cause.
     fn abort_connection(&mut self, now_ns: u64) {
         if self.axis.abort_connection(now_ns) {
             self.raise(EmergencyCode::COMMUNICATION);
@@ -334,18 +335,17 @@ impl DriveNode {
             }
             0x1017 => self.producer.configure(&self.objects, now_ns),
             0x1400..0x1800 => {
-                self.process_data.rpdos[number] = Rpdo::new(&self.objects, number);
+                self.process_data.configure_rpdo(number, &self.objects);
                 self.judge_process_data();
             }
-            0x1800..0x1C00 => self.process_data.tpdos[number] = Tpdo::new(&self.objects, number),
+            0x1800..0x1C00 => self.process_data.configure_tpdo(number, &self.objects),
             index => self.act(Effects::of([index]), now_ns),
         }
     }
 
     /// Objects of the profile take effect: targets wait for SYNC, a new configuration comes before the controlword.
     fn act(&mut self, Effects { targets, configures, commands }: Effects, now_ns: u64) {
-        self.process_data.new_targets.position |= targets.position;
-        self.process_data.new_targets.torque |= targets.torque;
+        self.process_data.add_targets(targets);
         if configures {
             self.axis.configure(now_ns, &self.objects);
         }

@@ -1,6 +1,6 @@
 //! The NMT state of a drive (CiA 301) and its boot-up.
 //!
-//! What a change of state means for the rest of the drive is the node's matter.
+//! The node decides what a change of state means for the rest of the drive.
 
 use masseter_can::canopen::NmtState;
 use masseter_shared::clock::MILLISECOND_NS;
@@ -12,7 +12,7 @@ pub(super) const BOOT_NS: u64 = 20 * MILLISECOND_NS;
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Nmt {
     /// None while the node boots.
-    pub(super) state: Option<NmtState>,
+    state: Option<NmtState>,
     boot_at_ns: u64,
 }
 
@@ -20,6 +20,16 @@ impl Nmt {
     /// A node that begins to boot at `now_ns`.
     pub(super) fn booting(now_ns: u64) -> Self {
         Self { state: None, boot_at_ns: now_ns + BOOT_NS }
+    }
+
+    /// The state; none while the node boots.
+    pub(super) fn state(self) -> Option<NmtState> {
+        self.state
+    }
+
+    /// Enters a state.
+    pub(super) fn enter(&mut self, state: NmtState) {
+        self.state = Some(state);
     }
 
     /// Whether process data are exchanged.

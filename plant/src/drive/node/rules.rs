@@ -62,7 +62,7 @@ pub(super) fn check(
         }
         0x6098 => {
             allow(Homing::is_method(word as i8), AbortCode::INVALID_VALUE)?;
-            allow(!axis.homing.is_running(), AbortCode::DEVICE_STATE)
+            allow(!axis.is_homing(), AbortCode::DEVICE_STATE)
         }
         0x60C2 => allow(!axis.is_enabled(), AbortCode::DEVICE_STATE),
         _ => Ok(()),

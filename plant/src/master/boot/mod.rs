@@ -1,7 +1,7 @@
 //! The boot of one drive: from its first message to the moment when it may be started.
 //!
-//! A pure state machine that executes its [`plan`] over its [SDO client](sdo). It judges one drive alone; when drives are
-//! started, and what a failure means for the rig, is the master's matter.
+//! A pure state machine that executes its [`plan`] over its [SDO client](sdo). It judges one drive alone; the master decides
+//! when drives are started, and what follows from a failure.
 
 mod plan;
 mod sdo;
@@ -14,7 +14,7 @@ use masseter_shared::clock::MILLISECOND_NS;
 use masseter_shared::config::Scenario;
 use masseter_shared::messages::codes::{BootPhase, Cause};
 
-use super::interlock::Failure;
+use super::failure::Failure;
 use plan::{Check, Step, plan};
 use sdo::{ATTEMPTS, SdoClient, SdoFailure, TIMEOUT_NS};
 
@@ -56,7 +56,7 @@ impl From<SdoFailure> for Failure {
 /// Progress of a boot.
 #[derive(Debug, Clone)]
 pub(super) struct Boot {
-    pub(super) phase: BootPhase,
+    phase: BootPhase,
     steps: Vec<Step>,
     next: usize,
     readings: u32,
@@ -86,6 +86,21 @@ impl Boot {
             reset_at_ns: now_ns + RESET_EVERY_NS,
             since_ns: now_ns,
         }
+    }
+
+    /// How far the boot is.
+    pub(super) fn phase(&self) -> BootPhase {
+        self.phase
+    }
+
+    /// The drive was started and has become operational.
+    pub(super) fn complete(&mut self) {
+        self.phase = BootPhase::Ready;
+    }
+
+    /// The drive is not booted any further.
+    pub(super) fn give_up(&mut self) {
+        self.phase = BootPhase::Failed;
     }
 
     /// Whether SDO transfers take place.
@@ -141,7 +156,7 @@ impl Boot {
         })
     }
 
-    /// The drive is told to become operational.
+    /// The drive is commanded to become operational.
     pub(super) fn start(&mut self, now_ns: u64) {
         (self.phase, self.since_ns) = (BootPhase::Starting, now_ns);
     }

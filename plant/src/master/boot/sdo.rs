@@ -2,7 +2,7 @@
 //! time. Only expedited transfers are used, because no object of a boot has more than four bytes.
 //!
 //! A pure state machine: [`SdoClient::poll`] returns the request to send, [`SdoClient::take`] takes the answer.
-//! It knows neither frames nor buses.
+//! Frames and buses are not part of it.
 
 use masseter_can::canopen::{AbortCode, Expedited, ObjectAddress, SdoRequest, SdoResponse};
 

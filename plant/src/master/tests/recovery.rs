@@ -63,7 +63,7 @@ fn a_drive_that_boots_again_during_a_stop_is_configured_from_the_first_object_on
         // The one that is missing keeps the other from being started.
         bench.drive(0).is_dead = phase == BootPhase::Configured;
         bench.drive(5).cycle_power();
-        while bench.master.drives[5].boot.phase != phase {
+        while bench.master.drives[5].boot_phase() != phase {
             bench.cycle(Some(DriveRequest::Off));
         }
         bench.cycles(10, DriveRequest::Off);
@@ -72,18 +72,18 @@ fn a_drive_that_boots_again_during_a_stop_is_configured_from_the_first_object_on
         bench.drive(5).cycle_power();
         bench.drive(5).objects.remove(&(0x1016, 1));
         bench.cycles(5, DriveRequest::Off);
-        assert_eq!(bench.master.drives[5].boot.phase, BootPhase::Waiting);
+        assert_eq!(bench.master.drives[5].boot_phase(), BootPhase::Waiting);
         (bench.drive(0).is_dead, bench.drive(2).is_reacting) = (false, false);
         bench.cycles(1500, DriveRequest::Off);
         assert_eq!(bench.drive(5).written(0x1016, 1), 0x007F_0096);
-        assert_eq!(bench.master.drives[5].boot.phase, BootPhase::Ready);
+        assert_eq!(bench.master.drives[5].boot_phase(), BootPhase::Ready);
     }
 }
 
 #[test]
 fn a_drive_that_became_operational_is_not_given_up_for_another_that_is_lost() {
     let mut bench = Bench::new();
-    while bench.master.drives[3].boot.phase != BootPhase::Starting {
+    while bench.master.drives[3].boot_phase() != BootPhase::Starting {
         bench.cycle(Some(DriveRequest::Off));
     }
     bench.drive(3).nmt = Some(NmtState::PreOperational);

@@ -67,7 +67,7 @@ fn reading(seq: u64) -> Recorded {
 }
 
 /// Offers so many readings to a disk that is stuck meanwhile.
-fn record_on_a_stuck_disk(offered: u64, then: io::ErrorKind) -> (u64, Outcome) {
+fn record_on_a_stuck_disk(offered: u64, then: io::ErrorKind) -> (u64, WriteOutcome) {
     let (let_go, go_on) = channel();
     let disk = Stuck { definitions: definitions(), bytes: Cursor::default(), go_on, then };
     let mut backlog = Backlog::start(Recorder::new(disk, scene()).unwrap(), Pace::RealTime);
@@ -125,7 +125,7 @@ fn a_disk_failure_is_reported_once_during_the_recording_and_again_at_its_end() {
 #[test]
 fn what_a_recording_lacks_is_said_with_its_reason_and_never_as_nothing() {
     let loss = |lost, error: Option<io::ErrorKind>| {
-        Outcome { lost, error: error.map(|kind| WriteError::Create(kind.into())) }.loss()
+        WriteOutcome { lost, error: error.map(|kind| WriteError::Create(kind.into())) }.loss()
     };
     let full = Some(io::ErrorKind::StorageFull);
     assert_eq!(loss(0, None), None);

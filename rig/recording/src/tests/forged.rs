@@ -50,6 +50,26 @@ fn a_chunk_of_impossible_length_is_passed_over() {
     assert!(read.messages == WHOLE.messages);
 }
 
+/// 80 MB in one chunk without a checksum, which take some kilobytes in the file.
+#[test]
+fn a_chunk_that_unpacks_to_more_than_a_record_may_have_is_damaged() {
+    let mut medium = Cursor::new(Vec::new());
+    let options = mcap::WriteOptions::new().chunk_size(None).calculate_chunk_crcs(false);
+    let mut writer = options.create(&mut medium).unwrap();
+    let channel = writer.add_channel(0, "reading", "cdr", &BTreeMap::new()).unwrap();
+    for sequence in 1..=80 {
+        let header = MessageHeader { channel_id: channel, sequence, log_time: 0, publish_time: 0 };
+        writer.write_to_known_channel(&header, &vec![0; 1_000_000]).unwrap();
+    }
+    writer.finish().unwrap();
+    drop(writer);
+    assert!(medium.get_ref().len() < 100_000);
+    let read = read(medium.get_ref()).unwrap();
+    assert!(read.messages.is_empty());
+    let [damage] = read.damage.as_slice() else { panic!("{:?}", read.damage) };
+    assert!(damage.reason.contains("cannot be unpacked"), "{damage}");
+}
+
 /// Counts the bytes that are read.
 struct Counted<'a> {
     bytes: Cursor<Vec<u8>>,

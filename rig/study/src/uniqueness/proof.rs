@@ -23,7 +23,7 @@ pub struct Proven {
 }
 
 /// Proves by interval arithmetic that no input of `boxes` has two solutions that meet the paper's conditions and, with a
-/// `margin`, have a determinant of at least that. Examines at most `most` boxes; `progress` is told the number of boxes
+/// `margin`, have a determinant of at least that. Examines at most `most` boxes; `progress` receives the number of boxes
 /// examined and the decided share of the volume.
 #[must_use]
 pub fn prove(

@@ -51,7 +51,7 @@ impl Heartbeat {
     /// [`HeartbeatError`] for another length than 1 or an unknown state.
     pub fn decode(data: &[u8]) -> Result<Self, HeartbeatError> {
         let [code] = exactly("heartbeat", data)?;
-        let state = NmtState::from_code(code).ok_or(HeartbeatError::UnknownState { code })?;
+        let state = NmtState::try_from(code).map_err(|_| HeartbeatError::UnknownState { code })?;
         Ok(Self { state })
     }
 }

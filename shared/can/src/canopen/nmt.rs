@@ -57,7 +57,7 @@ impl Nmt {
     /// Reads the data bytes; `None` for another length than 2, an unknown command or a target above 127.
     pub fn decode(data: &[u8]) -> Option<Self> {
         let &[code, target] = data else { return None };
-        let command = NmtCommand::from_code(code)?;
+        let command = NmtCommand::try_from(code).ok()?;
         let target = if target == 0 { NmtTarget::All } else { NmtTarget::Node(NodeId::new(target).ok()?) };
         Some(Self { command, target })
     }

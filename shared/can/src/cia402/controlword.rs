@@ -6,7 +6,7 @@ use super::DriveState;
 
 const SWITCH_ON: u16 = 1 << 0;
 const ENABLE_VOLTAGE: u16 = 1 << 1;
-/// Low-active: cleared, it asks for a quick stop.
+/// Low-active: a cleared bit demands a quick stop.
 const NO_QUICK_STOP: u16 = 1 << 2;
 const ENABLE_OPERATION: u16 = 1 << 3;
 const MODE_START: u16 = 1 << 4;

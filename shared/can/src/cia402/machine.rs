@@ -1,7 +1,7 @@
 //! The drive's state machine: transitions by commands, by faults, and by the drive's own progress.
 //!
 //! T-numbers are the transitions of CiA 402. T0 (power-on) creates the drive. T16 (operation enabled
-//! again out of quick stop) exists only where the quick-stop option code 605A says that the drive stays
+//! again out of quick stop) exists only where the quick-stop option code 605A makes the drive stay
 //! in quick stop: [`DriveState::after_in_held_quick_stop`].
 
 use super::{Command, DriveState};

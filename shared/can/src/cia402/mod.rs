@@ -1,7 +1,7 @@
 //! The drive profile (CiA 402, IEC 61800-7-201): states, statusword, controlword and the state machine
 //! between them.
 //!
-//! Pure values and tables, for both ends: a drive asks [`DriveState::after`], a master asks [`next_controlword`].
+//! Pure values and tables, for both ends: a drive uses [`DriveState::after`], a master uses [`next_controlword`].
 //! Modes of operation, targets, ramps and the policy of restarting after a fault are not here.
 
 mod controlword;

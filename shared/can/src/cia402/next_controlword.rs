@@ -3,7 +3,7 @@
 use super::{Controlword, DriveState};
 
 codes! {
-    /// What a master asks of a drive.
+    /// The request of a master to a drive.
     DriveRequest as u32 {
         /// No voltage: the drive is free.
         Off = 0 "off",
@@ -69,11 +69,11 @@ mod tests {
     const STEPS: usize = 8;
 
     /// States of a drive that finishes its own doings at once and then obeys [`next_controlword`].
-    fn journey(start: DriveState, wanted: DriveRequest, mut previous: Controlword) -> Vec<DriveState> {
+    fn journey(start: DriveState, request: DriveRequest, mut previous: Controlword) -> Vec<DriveState> {
         let mut state = start;
         let mut states = vec![start];
         for _ in 0..STEPS {
-            let word = next_controlword(state, wanted, previous);
+            let word = next_controlword(state, request, previous);
             state = state.after_completion();
             state = state.after(word.command(previous, state));
             previous = word;
@@ -94,12 +94,12 @@ mod tests {
 
     #[test]
     fn off_and_quick_stop_end_without_force_and_leave_a_fault_alone() {
-        for wanted in [DriveRequest::Off, DriveRequest::QuickStop] {
+        for request in [DriveRequest::Off, DriveRequest::QuickStop] {
             for state in DriveState::ALL {
-                let end = journey(state, wanted, Controlword::FAULT_RESET).pop();
+                let end = journey(state, request, Controlword::FAULT_RESET).pop();
                 let faulted = state.after_completion() == DriveState::Fault;
                 let expected = if faulted { DriveState::Fault } else { DriveState::SwitchOnDisabled };
-                assert_eq!(end, Some(expected), "{wanted} from {state}");
+                assert_eq!(end, Some(expected), "{request} from {state}");
             }
         }
     }

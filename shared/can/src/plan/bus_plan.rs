@@ -19,17 +19,21 @@ use crate::wire::{Bitrate, worst_case_bits};
 /// let messages = vec![message(0x080, 0)?, message(0x181, 8)?];
 /// let plan = BusPlan::new(0, Bitrate::MAX, 1_000_000, messages)?;
 /// plan.check()?;
-/// let sync_ns = plan.response_ns(CanId::standard(0x080)?);
+/// let sync_ns = plan.messages[0].response_ns;
 /// assert_eq!(sync_ns, Some(190_000), "135 bits of the longer frame, 55 bits of its own");
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[doc(alias("schedulability", "response-time analysis"))]
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct BusPlan {
-    pub(super) bus: usize,
-    pub(super) bitrate: Bitrate,
-    pub(super) cycle_ns: u64,
-    pub(super) messages: Vec<PlannedMessage>,
+    /// Index of the bus in its link.
+    pub bus: usize,
+    /// Bit rate.
+    pub bitrate: Bitrate,
+    /// Period of a cycle, ns.
+    pub cycle_ns: u64,
+    /// The messages, the most urgent first.
+    pub messages: Vec<PlannedMessage>,
 }
 
 /// A bus whose messages do not arrive in time.
@@ -74,26 +78,6 @@ impl BusPlan {
             planned[index].response_ns = response_ns(&planned, index, bit_ns);
         }
         Ok(Self { bus, bitrate, cycle_ns, messages: planned })
-    }
-
-    /// Index of the bus.
-    pub fn bus(&self) -> usize {
-        self.bus
-    }
-
-    /// Bit rates.
-    pub fn bitrate(&self) -> Bitrate {
-        self.bitrate
-    }
-
-    /// Length of a cycle, ns.
-    pub fn cycle_ns(&self) -> u64 {
-        self.cycle_ns
-    }
-
-    /// The messages, the most urgent first.
-    pub fn messages(&self) -> &[PlannedMessage] {
-        &self.messages
     }
 
     /// The longest that all messages of one cycle take together, ns.
@@ -152,7 +136,7 @@ mod tests {
     }
 
     fn responses_us(plan: &BusPlan) -> Vec<Option<u64>> {
-        plan.messages().iter().map(|planned| planned.response_ns.map(|ns| ns / 1000)).collect()
+        plan.messages.iter().map(|planned| planned.response_ns.map(|ns| ns / 1000)).collect()
     }
 
     /// Table 2 of the paper: three messages of 1 ms transmission time at 125 kbit/s, where the second instance of
@@ -161,7 +145,7 @@ mod tests {
     fn the_example_that_refuted_earlier_analyses() {
         let messages = vec![message(1, 7, 2500), message(2, 7, 3500), message(3, 7, 3500)];
         let plan = plan(125_000, messages);
-        assert_eq!(plan.messages()[0].transmission_ns, 1_000_000, "125 bits at 125 kbit/s");
+        assert_eq!(plan.messages[0].transmission_ns, 1_000_000, "125 bits at 125 kbit/s");
         assert_eq!(responses_us(&plan), [Some(2000), Some(3000), Some(3500)]);
         assert_eq!(plan.check(), Ok(()));
     }
@@ -182,7 +166,7 @@ mod tests {
         let messages =
             vec![message(1, 0, 2000), released(1, message(2, 8, 2000)), released(2, message(3, 8, 2000))];
         let plan = plan(1_000_000, messages);
-        let [first, second, third] = plan.messages() else { panic!("{plan}") };
+        let [first, second, third] = &plan.messages[..] else { panic!("{plan}") };
         let latest_ns = |planned: &PlannedMessage| planned.jitter_ns.unwrap() + planned.response_ns.unwrap();
         assert_eq!(first.jitter_ns, Some(0));
         assert_eq!(second.jitter_ns, first.response_ns);
@@ -197,7 +181,7 @@ mod tests {
             let answer = PeriodicMessage { release: Some(Release { by, within_ns }), ..message(2, 8, 1000) };
             plan(1_000_000, vec![message(1, 0, 1000), answer, message(3, 8, 1000)])
         };
-        let [at_once, late] = [0, 890_000].map(|within_ns| answering(within_ns).messages().to_vec());
+        let [at_once, late] = [0, 890_000].map(|within_ns| answering(within_ns).messages);
         assert_eq!(late[1].jitter_ns, at_once[1].jitter_ns.map(|jitter_ns| jitter_ns + 890_000));
         assert_eq!(late[1].response_ns, at_once[1].response_ns);
         assert!(late[2].response_ns > at_once[2].response_ns, "two of it may meet the next");
@@ -207,7 +191,7 @@ mod tests {
     fn what_an_unbounded_message_releases_has_no_bound_either() {
         let messages = vec![message(1, 8, 100), released(1, message(2, 0, 1_000_000))];
         let plan = plan(1_000_000, messages);
-        assert_eq!((plan.messages()[1].jitter_ns, responses_us(&plan)), (None, vec![None, None]));
+        assert_eq!((plan.messages[1].jitter_ns, responses_us(&plan)), (None, vec![None, None]));
         assert!(plan.check().is_err());
     }
 
@@ -250,7 +234,7 @@ mod tests {
         ) {
             let messages = set.iter().map(|(&id, &(length, period))| message(id, length, period * 1000)).collect();
             let plan = plan(1_000_000, messages);
-            let planned = plan.messages();
+            let planned = &plan.messages;
             for (index, own) in planned.iter().enumerate() {
                 let Some(bound_ns) = own.response_ns else { continue };
                 let blocking_ns = planned[index + 1..].iter().map(|other| other.transmission_ns).max();

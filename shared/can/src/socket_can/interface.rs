@@ -16,7 +16,7 @@ const UP: u32 = 1;
 /// Why an interface cannot be used.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum OpenError {
-    /// The kernel knows no CAN.
+    /// The kernel has no CAN.
     #[error(
         "{interface}: this kernel has no CAN (no AF_CAN); load its modules with `modprobe can-raw`, or use \
          `--can virtual`"
@@ -78,7 +78,7 @@ impl OpenError {
 /// The length of the interface's transmit queue, frames. Refuses an interface that does not exist, is not a CAN
 /// interface, or is down.
 pub(super) fn check(interface: &str) -> Result<usize, OpenError> {
-    // A socket on all interfaces exists wherever the kernel knows CAN.
+    // A socket on all interfaces exists wherever the kernel has CAN.
     CanSocket::open_iface(0).map_err(|error| OpenError::from_errno(interface, errno(&error)))?;
     if !can_interfaces().iter().any(|there| there == interface) {
         return Err(OpenError::from_errno(interface, libc::ENODEV));

@@ -54,7 +54,7 @@ impl SocketCan {
     /// Opens a port on an interface that is there and up.
     ///
     /// # Errors
-    /// [`OpenError`], which says what to do.
+    /// [`OpenError`], with the remedy.
     pub fn open(interface: &str) -> Result<Self, OpenError> {
         let transmit_capacity = interface::check(interface)?;
         let failed = |error| OpenError::from_errno(interface, errno(&error));

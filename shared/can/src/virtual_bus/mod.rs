@@ -37,5 +37,6 @@ mod wire;
 #[cfg(test)]
 mod tests;
 
+pub use nodes::WireConfig;
 pub use port::Port;
-pub use wire::{VirtualWire, WireConfig};
+pub use wire::VirtualWire;

@@ -2,10 +2,24 @@
 
 use super::confinement::Confinement;
 use super::queue::{ReceiveQueue, TransmitQueue};
-use super::wire::WireConfig;
 use crate::bus::Received;
 use crate::faults::Faults;
-use crate::wire::INTERFRAME_BITS;
+use crate::wire::{Bitrate, INTERFRAME_BITS};
+
+/// What a wire is made of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct WireConfig {
+    /// Bit rate.
+    pub bitrate: Bitrate,
+    /// Ports, one a node.
+    pub ports: usize,
+    /// Frames a port may have waiting for transmission.
+    pub transmit_capacity: usize,
+    /// Frames a port may have received and not fetched; the tap's queue is as long for each port.
+    pub receive_capacity: usize,
+    /// How long after bus-off a port restarts by itself, ns; `None` for never.
+    pub restart_after_ns: Option<u64>,
+}
 
 /// A port with its controller.
 #[derive(Debug)]

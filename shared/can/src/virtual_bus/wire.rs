@@ -1,29 +1,13 @@
 //! The wire in virtual time: its public methods, and the order of its events.
 
 use super::confinement::{Confinement, SEQUENCE_BITS};
-use super::nodes::{Nodes, Station};
+use super::nodes::{Nodes, Station, WireConfig};
 use super::queue::ReceiveQueue;
 use super::transmission::{PortSet, Transmission};
 use crate::bus::{ErrorState, ReceiveError};
 use crate::error_frame::{ErrorKind, ErrorReport};
 use crate::faults::{FaultActivation, FaultNote, Faults};
 use crate::tap::Tapped;
-use crate::wire::Bitrate;
-
-/// What a wire is made of.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct WireConfig {
-    /// Bit rate.
-    pub bitrate: Bitrate,
-    /// Ports, one a node.
-    pub ports: usize,
-    /// Frames a port may have waiting for transmission.
-    pub transmit_capacity: usize,
-    /// Frames a port may have received and not fetched; the tap's queue is as long for each port.
-    pub receive_capacity: usize,
-    /// How long after bus-off a port restarts by itself, ns; `None` for never.
-    pub restart_after_ns: Option<u64>,
-}
 
 /// A simulated wire and the ports on it.
 #[derive(Debug)]

@@ -14,18 +14,18 @@ use masseter_can::canopen::EmergencyCode;
 use super::outbox::Outbox;
 use crate::drive::axis::NewTargets;
 use crate::drive::dictionary::{Objects, PDOS};
-use receive::ERRORS;
+use receive::{ERRORS, Rpdo};
+use transmit::Tpdo;
 
-pub(super) use receive::{Effects, Rpdo};
-pub(super) use transmit::Tpdo;
+pub(super) use receive::Effects;
 
 /// The PDOs of both directions.
 #[derive(Debug, Clone)]
 pub(super) struct ProcessData {
-    pub(super) rpdos: [Rpdo; PDOS],
-    pub(super) tpdos: [Tpdo; PDOS],
+    rpdos: [Rpdo; PDOS],
+    tpdos: [Tpdo; PDOS],
     /// Cyclic targets written since the last SYNC.
-    pub(super) new_targets: NewTargets,
+    new_targets: NewTargets,
 }
 
 impl ProcessData {
@@ -40,19 +40,60 @@ impl ProcessData {
 
     /// Buffers the data of a frame; returns the number of its RPDO.
     pub(super) fn receive(&mut self, now_ns: u64, frame: &Frame) -> Option<usize> {
-        let number = self.rpdos.iter().position(|rpdo| rpdo.id == Some(frame.id()))?;
+        let number = self.rpdos.iter().position(|rpdo| rpdo.has_id(frame.id()))?;
         self.rpdos[number].take(now_ns, frame.data());
         Some(number)
     }
 
     /// Each error of process data, and whether any RPDO has it.
     pub(super) fn errors(&self) -> [(EmergencyCode, bool); ERRORS.len()] {
-        std::array::from_fn(|error| (ERRORS[error], self.rpdos.iter().any(|rpdo| rpdo.has[error])))
+        std::array::from_fn(|error| (ERRORS[error], self.rpdos.iter().any(|rpdo| rpdo.errors()[error])))
     }
 
     /// Whether the event timer of an RPDO has just run out. Outside of operational no timer runs.
     pub(super) fn expires(&mut self, now_ns: u64) -> bool {
         self.rpdos.iter_mut().fold(false, |any, rpdo| rpdo.expires(now_ns) | any)
+    }
+
+    /// Whether the data of an RPDO take effect at the next SYNC instead of at once.
+    pub(super) fn is_synchronous(&self, number: usize) -> bool {
+        self.rpdos[number].is_synchronous()
+    }
+
+    /// Writes the received data of an RPDO into the dictionary; returns their other effects, if there were data.
+    pub(super) fn apply(&mut self, number: usize, objects: &mut Objects) -> Option<Effects> {
+        self.rpdos[number].apply(objects)
+    }
+
+    /// Adds cyclic targets that wait for SYNC.
+    pub(super) fn add_targets(&mut self, targets: NewTargets) {
+        self.new_targets.position |= targets.position;
+        self.new_targets.torque |= targets.torque;
+    }
+
+    /// The cyclic targets written since the last SYNC.
+    pub(super) fn take_targets(&mut self) -> NewTargets {
+        std::mem::take(&mut self.new_targets)
+    }
+
+    /// An RPDO has new parameters.
+    pub(super) fn configure_rpdo(&mut self, number: usize, objects: &Objects) {
+        self.rpdos[number] = Rpdo::new(objects, number);
+    }
+
+    /// A TPDO has new parameters.
+    pub(super) fn configure_tpdo(&mut self, number: usize, objects: &Objects) {
+        self.tpdos[number] = Tpdo::new(objects, number);
+    }
+
+    /// Whether any TPDO is sent at events instead of SYNC.
+    pub(super) fn is_event_driven(&self) -> bool {
+        self.tpdos.iter().any(Tpdo::is_event_driven)
+    }
+
+    /// The TPDOs count as not sent.
+    pub(super) fn forget_sent(&mut self) {
+        self.tpdos.iter_mut().for_each(Tpdo::clear);
     }
 
     /// Discards the received data.

@@ -22,15 +22,15 @@ const OVERDUE: usize = 2;
 #[derive(Debug, Clone)]
 pub(crate) struct Rpdo {
     /// Its identifier; none where the PDO does not exist.
-    pub(crate) id: Option<CanId>,
+    id: Option<CanId>,
     /// Whether its data take effect at the next SYNC instead of at once.
-    pub(crate) is_synchronous: bool,
+    is_synchronous: bool,
     deadline_ns: u64,
     mapped: Mapped,
     heard_ns: Option<u64>,
     buffered: Option<[u8; MAX_BYTES]>,
     /// Which of [`ERRORS`] it has.
-    pub(crate) has: [bool; ERRORS.len()],
+    has: [bool; ERRORS.len()],
     effects: Effects,
 }
 
@@ -77,6 +77,21 @@ impl Rpdo {
             buffered: None,
             has: [false; ERRORS.len()],
         }
+    }
+
+    /// Whether frames with that identifier are its.
+    pub(crate) fn has_id(&self, id: CanId) -> bool {
+        self.id == Some(id)
+    }
+
+    /// Whether its data take effect at the next SYNC instead of at once.
+    pub(crate) fn is_synchronous(&self) -> bool {
+        self.is_synchronous
+    }
+
+    /// Which of [`ERRORS`] it has.
+    pub(crate) fn errors(&self) -> [bool; ERRORS.len()] {
+        self.has
     }
 
     /// Buffers a frame's data; only the newest are kept.

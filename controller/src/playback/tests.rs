@@ -1,0 +1,134 @@
+//! The desired pose moves forward on its path, and comes to rest where it is told to.
+
+use masseter_shared::config::{JawConfig, MotionConfig};
+use masseter_shared::geometry::{Mechanism, MechanismConfig, Vec3};
+
+use super::*;
+
+const PERIOD_S: f64 = 1e-3;
+const EASE_S: f64 = 0.8;
+const RAMP_S: f64 = 0.3;
+const DURATION_S: f64 = 3.0;
+
+fn trajectory() -> Trajectory {
+    let mechanism = Mechanism::new(&MechanismConfig::default()).unwrap();
+    Trajectory::new(&MotionConfig::default(), &JawConfig::default(), &mechanism, Some(DURATION_S)).unwrap()
+}
+
+fn playback() -> Playback {
+    Playback::new(trajectory(), EASE_S, RAMP_S)
+}
+
+/// As found at the start: shifted and turned against the first pose of the motion.
+fn start() -> Pose {
+    trajectory().pose(0.0) * Pose::new(Vec3::new(2e-3, -3e-3, 4e-3), Vec3::new(0.05, -0.04, 0.03))
+}
+
+/// Lets about that time pass, in cycles.
+fn advance(playback: &mut Playback, time_s: f64) {
+    (0..(time_s / PERIOD_S).round() as u64).for_each(|_| playback.advance(PERIOD_S));
+}
+
+fn are_near(a: &Pose, b: &Pose) -> bool {
+    (a.translation.vector - b.translation.vector).norm() < 1e-9 && a.rotation.angle_to(&b.rotation) < 1e-7
+}
+
+/// A motion that has played for some time.
+fn playing(time_s: f64) -> Playback {
+    let mut playback = playback();
+    playback.play();
+    advance(&mut playback, time_s);
+    playback
+}
+
+#[test]
+fn a_stopped_motion_slows_down_evenly_to_rest_within_its_ramp() {
+    let mut playback = playing(1.0);
+    playback.stop();
+    let (began_s, mut last_s, mut last_step_s) = (playback.elapsed_s, playback.elapsed_s, PERIOD_S);
+    let cycles = (RAMP_S / PERIOD_S).round() as u64;
+    for cycle in 1..=cycles {
+        playback.advance(PERIOD_S);
+        let step_s = playback.elapsed_s - last_s;
+        assert!((0.0..last_step_s).contains(&step_s), "cycle {cycle}: {step_s} s after {last_step_s} s");
+        let is_at_rest = playback.rate < 1e-9;
+        assert_eq!(is_at_rest, cycle == cycles, "cycle {cycle}");
+        (last_s, last_step_s) = (playback.elapsed_s, step_s);
+    }
+    assert!((last_s - began_s - RAMP_S / 2.0).abs() < 1e-9, "half the ramp's time: {}", last_s - began_s);
+    let rests_at = playback.pose_ahead(0.0);
+    assert!(are_near(&rests_at, &trajectory().pose(last_s)), "on its own path");
+    advance(&mut playback, 0.5);
+    assert!(playback.is_at_rest() && !playback.is_over());
+    assert!(are_near(&playback.pose_ahead(0.0), &rests_at));
+    assert!(are_near(&playback.pose_ahead(0.1), &rests_at), "a clock at rest has nothing ahead");
+}
+
+#[test]
+fn what_lies_ahead_of_a_slowing_motion_comes_nearer() {
+    let mut playback = playing(1.0);
+    let ahead_s = |playback: &Playback| playback.time_ahead_s(0.01) - playback.time_ahead_s(0.0);
+    assert!((ahead_s(&playback) - 0.01).abs() < 1e-12);
+    playback.stop();
+    advance(&mut playback, RAMP_S / 2.0);
+    assert!((ahead_s(&playback) - 0.005).abs() < 1e-9);
+}
+
+#[test]
+fn a_motion_that_nobody_stops_plays_at_full_speed_to_its_end() {
+    let mut playback = playing(DURATION_S - 2.0 * PERIOD_S);
+    assert!(!playback.is_over() && !playback.is_at_rest());
+    assert!((playback.elapsed_s - (DURATION_S - 2.0 * PERIOD_S)).abs() < 1e-9);
+    advance(&mut playback, 3.0 * PERIOD_S);
+    assert!(playback.is_over() && playback.is_at_rest());
+    assert!(are_near(&playback.pose_ahead(0.0), &trajectory().pose(DURATION_S)));
+}
+
+#[test]
+fn the_ease_leads_from_the_pose_held_to_the_first_of_the_motion() {
+    let mut playback = playback();
+    assert!(are_near(&playback.pose_ahead(0.0), &trajectory().pose(0.0)), "before a pose is known");
+    playback.hold(start());
+    assert!(playback.is_over() && playback.is_at_rest());
+    assert!(are_near(&playback.pose_ahead(0.0), &start()));
+    playback.ease();
+    assert!(are_near(&playback.pose_ahead(0.0), &start()), "without a jump");
+    advance(&mut playback, EASE_S / 2.0);
+    let (half, first) = (playback.pose_ahead(0.0), trajectory().pose(0.0));
+    let middle_m = (start().translation.vector + first.translation.vector) / 2.0;
+    assert!((half.translation.vector - middle_m).norm() < 1e-9);
+    let turns = [start().rotation, first.rotation].map(|rotation| rotation.angle_to(&half.rotation));
+    let whole = start().rotation.angle_to(&first.rotation);
+    assert!(turns.iter().all(|turn| (turn - whole / 2.0).abs() < 1e-7), "{turns:?} of {whole}");
+    advance(&mut playback, EASE_S / 2.0 - 2.0 * PERIOD_S);
+    assert!(!playback.is_over() && !playback.is_at_rest());
+    advance(&mut playback, 3.0 * PERIOD_S);
+    assert!(playback.is_over());
+    assert!(are_near(&playback.pose_ahead(0.0), &first));
+}
+
+#[test]
+fn a_stop_of_one_part_is_none_of_the_next() {
+    let mut playback = playback();
+    playback.hold(start());
+    playback.ease();
+    advance(&mut playback, 0.2);
+    playback.stop();
+    advance(&mut playback, RAMP_S + PERIOD_S);
+    assert!(playback.is_at_rest() && !playback.is_over(), "an ease stops on its way too");
+    playback.play();
+    assert!(!playback.is_at_rest());
+    advance(&mut playback, 0.7);
+    assert!((playback.elapsed_s - 0.7).abs() < 1e-9);
+}
+
+#[test]
+fn the_time_of_the_motion_is_negative_before_it_begins() {
+    let mut playback = playback();
+    assert!(playback.motion_time_ahead_s(0.0) < 0.0);
+    playback.ease();
+    assert!(playback.motion_time_ahead_s(0.5) < 0.0);
+    let playback = playing(1.0);
+    let expected_s = trajectory().motion_time_s(1.2);
+    assert!((playback.motion_time_ahead_s(0.2) - expected_s).abs() < 1e-9);
+}

@@ -1,0 +1,105 @@
+//! Supervision of the drives' motion: whether the master lets the drives move, and how long a stop lasts.
+//!
+//! Other parts find the causes of a stop. The supervision keeps their consequence; the master sends it to the drives.
+
+use masseter_shared::messages::codes::{Cause, DriveRequest, DriveState, drive_state_code};
+
+use super::failure::Failure;
+
+/// How long the drives stay stopped.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+enum Stop {
+    #[default]
+    None,
+    /// Until every drive is verified again and the controller has switched them off.
+    UntilRestored,
+    Permanent,
+}
+
+/// The supervision of all drives.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Supervision {
+    stop: Stop,
+    /// Whether all drives have been enabled since they were to be: none may leave operation by itself.
+    were_enabled: bool,
+    /// Whether the drives stop for the end of the run.
+    is_ending: bool,
+}
+
+impl Supervision {
+    /// Whether a fault stops the drives.
+    pub(super) fn is_stopped(self) -> bool {
+        self.stop != Stop::None
+    }
+
+    /// Whether the stop ends once the drives are restored.
+    pub(super) fn awaits_restoration(self) -> bool {
+        self.stop == Stop::UntilRestored
+    }
+
+    /// The request to the drives, given the controller's.
+    pub(super) fn request(self, commanded: DriveRequest, all_are_ready: bool) -> DriveRequest {
+        if self.is_stopped() || self.is_ending {
+            DriveRequest::QuickStop
+        } else if all_are_ready {
+            commanded
+        } else {
+            DriveRequest::Off
+        }
+    }
+
+    /// Judges the state of a drive in a cycle in which the drives are to be enabled, or not.
+    pub(super) fn judge(self, state: Option<DriveState>, is_enable: bool) -> Option<Failure> {
+        let has_left = is_enable && self.were_enabled && state != Some(DriveState::OperationEnabled);
+        has_left.then(|| Failure::with(Cause::DriveFault, [f64::from(drive_state_code(state)), 0.0]))
+    }
+
+    /// Ends the judgement of a cycle.
+    pub(super) fn end_cycle(&mut self, is_enable: bool, all_are_enabled: bool) {
+        self.were_enabled = is_enable && (self.were_enabled || all_are_enabled);
+    }
+
+    /// Whether drives may be booted. During a stop they may not: it needs every drive's attention. After a permanent stop
+    /// nobody moves the drives again, and another master may control them.
+    pub(super) fn may_boot(self, drives_are_off: bool) -> bool {
+        match self.stop {
+            Stop::None => true,
+            Stop::UntilRestored => drives_are_off,
+            Stop::Permanent => false,
+        }
+    }
+
+    /// Stops the drives for a cause; returns whether this is the first cause. A later cause, which is mostly a
+    /// consequence of the first, changes nothing.
+    pub(super) fn stop(&mut self, cause: Cause) -> bool {
+        let is_first = !self.is_stopped();
+        if is_first {
+            self.stop = match cause {
+                Cause::CommandLost
+                | Cause::BadMessage
+                | Cause::StrokeLimit
+                | Cause::VelocityLimit
+                | Cause::AccelerationLimit
+                | Cause::DriveFault
+                | Cause::FollowingError => Stop::Permanent,
+                _ => Stop::UntilRestored,
+            };
+        }
+        is_first
+    }
+
+    /// Stops the drives permanently, whatever stopped them before; returns whether they were not stopped permanently yet.
+    pub(super) fn stop_permanently(&mut self) -> bool {
+        std::mem::replace(&mut self.stop, Stop::Permanent) != Stop::Permanent
+    }
+
+    /// Ends a stop.
+    pub(super) fn restore(&mut self) {
+        (self.stop, self.were_enabled) = (Stop::None, false);
+    }
+
+    /// Stops the drives for the end of the run.
+    pub(super) fn end(&mut self) {
+        self.is_ending = true;
+    }
+}

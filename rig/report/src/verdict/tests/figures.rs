@@ -1,0 +1,393 @@
+//! Verdicts on figures made by hand, each differing in one thing from those of a run that passes.
+
+use masseter_analysis::{Analysis, Code, OverrunAttribution, ResponseFigures, SkipFigures, TopicFigures};
+use masseter_recording::{Damage, MachineInfo};
+use masseter_shared::config::{CpuDmaLatency, FaultConfig, FaultKindConfig, Scenario};
+use masseter_shared::messages::codes::ControllerState;
+use masseter_shared::realtime::scheduling::{Obtained, SchedulingRequest};
+
+use super::*;
+
+/// A run that passes.
+struct Run {
+    manifest: Manifest,
+    figures: Figures,
+}
+
+type Change = fn(&mut Run);
+
+impl Run {
+    fn new() -> Self {
+        let scenario = Scenario::default();
+        let mut figures = Analysis::new(&scenario).finish(false, &[]);
+        figures.final_state = Some(Code::Known(ControllerState::Finished));
+        (figures.tracking.rms_mm, figures.tracking.samples) = (Some(0.05), 1000);
+        figures.bus_response.unbounded = None;
+        figures.bus_response.messages = vec![ResponseFigures {
+            bus: 0,
+            message: "SYNC".to_owned(),
+            frames: 1000,
+            max_ns: Some(150_000),
+            bound_ns: Some(190_000),
+        }];
+        let machine = MachineInfo { cpu: "any".into(), cores: 2, kernel: "Linux".into(), is_virtual: false };
+        let mut manifest = Manifest::new(scenario, 10.0, "rt", machine);
+        manifest.ending = Ending::Completed;
+        Self { manifest, figures }
+    }
+
+    fn with(change: Change) -> Verdict {
+        let mut run = Self::new();
+        change(&mut run);
+        Verdict::new(&run.manifest, &run.figures)
+    }
+
+    /// The controller skipped deadlines for which the machine withheld the core.
+    fn disturb(&mut self) {
+        self.figures.controller_skips =
+            SkipFigures { skipped: 3, by_machine: 3, stalled_ns: 3_500_000, ..SkipFigures::default() };
+    }
+
+    fn refuse(&mut self) {
+        let requested = SchedulingRequest { core: Some(0), fifo_priority: Some(80), locked_memory: true };
+        let refusals = vec!["no priority".to_owned()];
+        let obtained =
+            Obtained { requested, core: None, fifo_priority: None, locked_memory: false, refusals };
+        self.manifest.scheduling.insert("controller".to_owned(), obtained);
+    }
+
+    fn lose(&mut self, missing: u64) {
+        self.figures.topics =
+            [1, missing - 1].map(|missing| TopicFigures { topic: "state", messages: 9, missing }).to_vec();
+    }
+
+    fn declare_fault(&mut self) {
+        self.manifest.scenario.faults.push(FaultConfig {
+            kind: FaultKindConfig::Lose,
+            bus: 0,
+            from_s: 1.0,
+            until_s: None,
+            node: None,
+            id: None,
+            probability: 1.0,
+            count: None,
+            delay_us: None,
+        });
+    }
+
+    fn overruns(&mut self, while_working: u64, chance: f64) {
+        self.figures.plant_skips = SkipFigures { skipped: 2, while_working: 2, ..SkipFigures::default() };
+        self.figures.overrun_attribution =
+            Some(OverrunAttribution { while_working, while_waiting: 1, work_share: 0.25, chance });
+    }
+}
+
+fn results(verdict: &Verdict) -> Vec<(&'static str, &'static str)> {
+    verdict.checks.iter().map(|check| (check.name, check.result.mark())).collect()
+}
+
+#[test]
+fn a_run_without_anything_wrong_passes_every_check() {
+    let verdict = Run::with(|_| ());
+    assert_eq!((verdict.exit_code, verdict.reason.as_str()), (Exit::Passed, "every check passed"));
+    let expected = ["sequence", "tracking", "missed cycles", "dropped messages", "bus response"]
+        .map(|name| (name, "ok"));
+    assert_eq!(results(&verdict), expected);
+    let findings: Vec<_> = verdict.checks.iter().map(|check| check.finding.as_str()).collect();
+    assert_eq!(
+        findings,
+        [
+            "ended in state finished",
+            "rms 0.0500 mm over 1000 samples, limit 0.1 mm",
+            "0 (0 by the machine), limit 0",
+            "0",
+            "closest: SYNC on bus 0 took 150.00 µs, bound 190.00 µs",
+        ]
+    );
+}
+
+#[test]
+fn each_thing_that_is_wrong_has_its_verdict() {
+    let cases: [(Change, Exit, &str); 17] = [
+        (|run| run.figures.controller_skips.skipped = 3, Exit::Failed, "failed: missed cycles"),
+        (|run| run.figures.plant_skips.skipped = 1, Exit::Failed, "failed: missed cycles"),
+        (|run| run.figures.tracking.rms_mm = Some(0.11), Exit::Failed, "failed: tracking"),
+        (|run| run.figures.tracking.rms_mm = None, Exit::Failed, "failed: tracking"),
+        (|run| run.figures.final_state = None, Exit::Failed, "failed: sequence"),
+        (
+            |run| run.figures.final_state = Some(Code::Known(ControllerState::Disabling)),
+            Exit::Failed,
+            "failed: sequence",
+        ),
+        (
+            |run| {
+                let stop = Event::new(Source::Controller, EventKind::Transition, Cause::StopRequested);
+                run.figures.events.push((&stop).into());
+            },
+            Exit::Failed,
+            "failed: sequence",
+        ),
+        (
+            |run| run.figures.bus_response.messages[0].max_ns = Some(190_001),
+            Exit::Failed,
+            "failed: bus response",
+        ),
+        (|run| run.figures.bus_response.messages.clear(), Exit::Failed, "failed: bus response"),
+        (Run::declare_fault, Exit::Failed, "failed: faults"),
+        (
+            |run| {
+                run.figures.tracking.rms_mm = Some(0.2);
+                run.figures.plant_skips.skipped = 1;
+            },
+            Exit::Failed,
+            "failed: tracking, missed cycles",
+        ),
+        (|run| run.lose(5), Exit::Incomplete, "5 messages are missing from the recording"),
+        (|run| run.figures.cut_short = true, Exit::Incomplete, "the recording lacks its end"),
+        (
+            |run| run.figures.damage.push(Damage { from: 7, to: 9, reason: "a wrong checksum".to_owned() }),
+            Exit::Incomplete,
+            "the recording is damaged: bytes 7 to 9: a wrong checksum",
+        ),
+        (
+            |run| run.manifest.ending = Ending::died("plant", "signal 9".to_owned()),
+            Exit::Died,
+            "the plant died: signal 9",
+        ),
+        (|run| run.manifest.ending = Ending::Interrupted, Exit::Interrupted, "stopped by the user"),
+        (
+            |run| run.manifest.ending = Ending::RecordingFailed,
+            Exit::Incomplete,
+            "the recorder could not write everything",
+        ),
+    ];
+    for (change, outcome, reason) in cases {
+        let verdict = Run::with(change);
+        assert_eq!((verdict.exit_code, verdict.reason.as_str()), (outcome, reason));
+    }
+}
+
+#[test]
+fn a_damaged_recording_is_incomplete_whatever_its_figures_say() {
+    let damages: [Change; 3] = [
+        |run| run.lose(5),
+        |run| run.figures.cut_short = true,
+        |run| run.figures.damage.push(Damage { from: 7, to: 9, reason: String::new() }),
+    ];
+    for damage in damages {
+        let mut run = Run::new();
+        damage(&mut run);
+        (run.figures.plant_skips.skipped, run.figures.tracking.rms_mm) = (5, Some(1.0));
+        assert_eq!(Verdict::new(&run.manifest, &run.figures).exit_code, Exit::Incomplete);
+        run.figures.plant_skips.skipped = 0;
+        run.disturb();
+        assert_eq!(Verdict::new(&run.manifest, &run.figures).exit_code, Exit::Incomplete);
+    }
+}
+
+#[test]
+fn skips_of_the_rig_fail_a_run_and_those_of_the_machine_make_it_invalid() {
+    use Exit::{Failed as Fail, Invalid, Passed as Pass};
+    let cases: [(Change, Exit, &str); 9] = [
+        (Run::disturb, Invalid, "ended in state finished; 3 (3 by the machine), limit 0"),
+        (
+            |run| {
+                run.disturb();
+                run.figures.controller_skips.skipped = 4;
+            },
+            Fail,
+            "ended in state finished; 4 (3 by the machine), limit 0",
+        ),
+        (
+            |run| {
+                run.disturb();
+                run.figures.plant_skips.skipped = 1;
+            },
+            Fail,
+            "ended in state finished; 4 (3 by the machine), limit 0",
+        ),
+        (
+            |run| {
+                run.disturb();
+                (run.figures.plant_skips.skipped, run.figures.plant_skips.by_machine) = (2, 2);
+            },
+            Invalid,
+            "ended in state finished; 5 (5 by the machine), limit 0",
+        ),
+        (
+            |run| {
+                run.disturb();
+                (run.figures.plant_skips.skipped, run.figures.plant_skips.unknown_cause) = (2, 2);
+            },
+            Invalid,
+            "ended in state finished; 5 (3 by the machine, 2 of unknown cause: the messages before them are missing), \
+             limit 0",
+        ),
+        (
+            |run| run.overruns(5, 0.02),
+            Invalid,
+            "ended in state finished; 2 (2 by the machine; 5 stretches of work against 1 stalls as long while waiting, \
+             25.0 % of the time at work: chance does so with probability 0.02), limit 0",
+        ),
+        (
+            |run| run.overruns(5, 0.002),
+            Fail,
+            "ended in state finished; 2 (0 by the machine; 5 stretches of work against 1 stalls as long while waiting, \
+             25.0 % of the time at work: chance does so with probability 0.00), limit 0",
+        ),
+        (
+            |run| {
+                run.manifest.scenario.checks.missed_cycles = 4;
+                (run.figures.controller_skips.skipped, run.figures.plant_skips.skipped) = (1, 3);
+            },
+            Pass,
+            "ended in state finished; 4 (0 by the machine), limit 4",
+        ),
+        (
+            |run| {
+                run.manifest.scenario.checks.missed_cycles = 3;
+                (run.figures.controller_skips.skipped, run.figures.plant_skips.skipped) = (1, 3);
+            },
+            Fail,
+            "ended in state finished; 4 (0 by the machine), limit 3",
+        ),
+    ];
+    for (change, outcome, findings) in cases {
+        let verdict = Run::with(change);
+        let [sequence, missed] = [0, 2].map(|place| verdict.checks[place].finding.as_str());
+        assert_eq!((verdict.exit_code, format!("{sequence}; {missed}").as_str()), (outcome, findings));
+    }
+}
+
+#[test]
+fn an_invalid_run_says_what_the_machine_withheld_and_what_helps() {
+    let reason = |change: Change| {
+        let mut run = Run::new();
+        run.disturb();
+        run.figures.plant_skips.stalled_ns = 1_250_000;
+        change(&mut run);
+        let Verdict { exit_code: outcome, reason, .. } = Verdict::new(&run.manifest, &run.figures);
+        assert_eq!(outcome, Exit::Invalid);
+        reason
+    };
+    let latency = |run: &mut Run, limit_us| {
+        run.manifest.cpu_dma_latency =
+            Some(DmaLatency { requested: CpuDmaLatency::Auto, limit_us, refusal: None });
+    };
+    let withheld = "the machine withheld the cores for 4.8 ms while the rig waited, and 3 cycles were missed";
+    let doctor = "`masseter doctor` shows the remedies";
+    assert_eq!(reason(|_| ()), format!("{withheld}; {doctor}"));
+    let mut run = Run::new();
+    latency(&mut run, Some(0));
+    assert_eq!(remedy(&run.manifest), doctor);
+    latency(&mut run, None);
+    assert!(remedy(&run.manifest).contains("cpu_dma_latency"));
+    let said = reason(|run| {
+        run.overruns(1, 0.5);
+        run.figures.controller_skips.while_working = 5;
+        run.figures.controller_skips.skipped = 8;
+        run.figures.plant_skips.stalled_ns = 1_250_000;
+    });
+    assert_eq!(
+        said,
+        "the machine withheld the cores for 4.8 ms while the rig waited, and 10 cycles were missed, 7 of them while it \
+         worked, which the machine may have caused too; `masseter doctor` shows the remedies"
+    );
+    let said = reason(|run| {
+        run.refuse();
+        run.figures.controller_skips.skipped = 9;
+    });
+    assert_eq!(said, "9 cycles were missed without real time; controller: no priority");
+}
+
+#[test]
+fn what_a_disturbed_run_failed_is_not_judged() {
+    let mut run = Run::new();
+    run.disturb();
+    run.declare_fault();
+    (run.figures.tracking.rms_mm, run.figures.final_state) = (Some(3.0), None);
+    let verdict = Verdict::new(&run.manifest, &run.figures);
+    assert_eq!(verdict.exit_code, Exit::Invalid);
+    let expected = [
+        ("sequence", "skip"),
+        ("tracking", "skip"),
+        ("missed cycles", "skip"),
+        ("dropped messages", "ok"),
+        ("bus response", "ok"),
+        ("faults", "skip"),
+    ];
+    assert_eq!(results(&verdict), expected);
+}
+
+#[test]
+fn without_real_time_only_missed_cycles_are_excused() {
+    assert_eq!(Run::with(Run::refuse).exit_code, Exit::Passed);
+    let refused_and_off = Run::with(|run| {
+        run.refuse();
+        run.figures.tracking.rms_mm = Some(0.2);
+    });
+    assert_eq!(refused_and_off.reason, "failed: tracking");
+}
+
+#[test]
+fn a_safe_stop_is_one_unless_the_machine_alone_explains_it() {
+    let stop = |change: Change| {
+        let mut run = Run::new();
+        run.manifest.ending = Ending::SafeStop;
+        run.disturb();
+        run.figures.outage = Some(Outage { missed: 30, of: 100 });
+        change(&mut run);
+        let Verdict { exit_code: outcome, reason, .. } = Verdict::new(&run.manifest, &run.figures);
+        (outcome, reason)
+    };
+    let (outcome, reason) = stop(|_| ());
+    assert_eq!(outcome, Exit::Invalid);
+    assert!(reason.contains("3 cycles were missed, 30 of 100 just before the safe stop; "), "{reason}");
+    let stopped = (Exit::SafeStop, "the controller stopped the rig".to_owned());
+    assert_eq!(stop(|run| run.figures.outage = None), stopped);
+    assert_eq!(stop(|run| run.figures.outage = Some(Outage { missed: 9, of: 100 })), stopped);
+    assert_eq!(stop(|run| run.figures.controller_skips.by_machine = 2), stopped, "one was the rig's");
+    let (outcome, _) = stop(|run| {
+        run.figures.controller_skips.by_machine = 2;
+        run.refuse();
+    });
+    assert_eq!(outcome, Exit::Invalid, "it never had real time");
+}
+
+#[test]
+fn a_jump_of_the_clock_excuses_failures_and_nothing_else() {
+    let jumped = |change: Change| {
+        let mut run = Run::new();
+        run.manifest.usage.clock_jump_s = 2.0;
+        run.manifest.scenario.can.interfaces = vec!["can0".to_owned()];
+        change(&mut run);
+        Verdict::new(&run.manifest, &run.figures).exit_code
+    };
+    assert_eq!(jumped(|_| ()), Exit::Passed);
+    assert_eq!(jumped(|run| run.figures.tracking.rms_mm = Some(0.2)), Exit::Invalid);
+    assert_eq!(jumped(|run| run.manifest.ending = Ending::SafeStop), Exit::SafeStop);
+}
+
+#[test]
+fn a_busy_core_is_a_remark_on_a_run_that_does_not_pass() {
+    let busy = |share: f64, rms_mm: f64| {
+        let mut run = Run::new();
+        let usage = Usage { observed_s: 2.0, cpu_s: 2.0 * share, ..Usage::default() };
+        run.manifest.usage.processes.insert("controller".to_owned(), usage);
+        run.figures.tracking.rms_mm = Some(rms_mm);
+        Verdict::new(&run.manifest, &run.figures).reason
+    };
+    assert_eq!(busy(1.0, 0.05), "every check passed");
+    assert_eq!(busy(0.9, 0.2), "failed: tracking");
+    let said = busy(0.92, 0.2);
+    assert!(said.starts_with("failed: tracking; the controller kept its core busy for 92 %"), "{said}");
+}
+
+#[test]
+fn a_verdict_is_written_with_its_word_and_exit_code() {
+    let verdict = Run::with(|run| run.figures.tracking.rms_mm = Some(0.2));
+    let written = serde_json::to_value(&verdict).unwrap();
+    assert_eq!((&written["word"], &written["exit_code"]), (&"FAIL".into(), &1.into()));
+    assert_eq!(written["reason"], "failed: tracking");
+    assert_eq!(written["checks"].as_array().map(Vec::len), Some(5));
+}

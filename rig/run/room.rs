@@ -1,0 +1,129 @@
+//! Room for a run: memory, file size, disk and shared memory, checked before anything is armed.
+
+use std::fs::{self, OpenOptions};
+use std::io;
+use std::path::Path;
+
+use anyhow::{Context, ensure};
+use masseter_plan::RunPlan;
+use masseter_shared::transport::Domain;
+use rustix::fs::{FallocateFlags, fallocate, statvfs};
+use rustix::process::{Resource, getrlimit};
+
+const SHARED_MEMORY: &str = "/dev/shm";
+/// What the topics of a rig take in shared memory: 27 MB measured, and some for observers.
+const SHARED_BYTES: u64 = 32_000_000;
+/// What a cycle leaves on the disk: 1.7 kB measured, half of them in the recording.
+const CYCLE_BYTES: f64 = 2000.0;
+/// What a run leaves on the disk besides: page, figures, scenario.
+const REPORT_BYTES: f64 = 4e6;
+/// Start and end of a run, around the motion, s.
+const AROUND_MOTION_S: f64 = 5.0;
+/// The least address space and data of a process: twice what the default run takes.
+const LEAST_MEMORY: [(Resource, &str, &str, u64); 2] =
+    [(Resource::As, "address space", "v", 200_000_000), (Resource::Data, "data", "d", 120_000_000)];
+
+/// Refuses limits on memory under which a process would die of its next allocation.
+pub(super) fn check_memory() -> anyhow::Result<()> {
+    for (resource, name, option, least) in LEAST_MEMORY {
+        let limit = getrlimit(resource).current.unwrap_or(u64::MAX);
+        ensure!(
+            limit >= least,
+            "a process may have {} of {name}, and a run needs {}: raise the limit (`ulimit -{option} unlimited`)",
+            megabytes(limit),
+            megabytes(least)
+        );
+    }
+    Ok(())
+}
+
+/// Refuses a run whose files have no room in the folder `path`, which need not exist yet.
+pub(super) fn check_disk(path: &Path, plan: &RunPlan) -> anyhow::Result<()> {
+    let run_s = plan.trajectory.duration_s() + AROUND_MOTION_S;
+    let needed = (run_s * f64::from(plan.scenario.rate_hz) * CYCLE_BYTES + REPORT_BYTES) as u64;
+    let largest = getrlimit(Resource::Fsize).current.unwrap_or(u64::MAX);
+    ensure!(
+        largest >= needed,
+        "a file may have {}, and the recording may need {}: raise the limit (`ulimit -f unlimited`), or shorten the \
+         run (--duration)",
+        megabytes(largest),
+        megabytes(needed)
+    );
+    let absolute = std::path::absolute(path)?;
+    let existing = absolute.ancestors().find(|folder| folder.is_dir()).unwrap_or(&absolute);
+    let free = free_bytes(existing)?;
+    ensure!(
+        free >= needed,
+        "{} has {} free, and the run may need {}: free some, choose another disk (--out), or shorten the run \
+         (--duration)",
+        existing.display(),
+        megabytes(free),
+        megabytes(needed)
+    );
+    Ok(())
+}
+
+/// Refuses a rig whose topics have no room in shared memory: the kernel ends a process that touches a page for which there
+/// is none.
+pub(super) fn check_shared_memory() -> anyhow::Result<()> {
+    let free = free_bytes(SHARED_MEMORY.as_ref())?;
+    ensure!(
+        free >= SHARED_BYTES,
+        "{SHARED_MEMORY} has {} free, and a rig needs {}: remove leftovers (`masseter clean`), or enlarge it (`mount -o \
+         remount,size=64m {SHARED_MEMORY}`; in a container `--shm-size=64m`)",
+        megabytes(free),
+        megabytes(SHARED_BYTES)
+    );
+    Ok(())
+}
+
+/// Gives every page of the domain's shared memory its place, once all processes have opened their ports.
+pub(super) fn reserve_shared_memory(domain: &Domain) -> anyhow::Result<()> {
+    let prefix = domain.prefix();
+    for entry in fs::read_dir(SHARED_MEMORY)? {
+        let entry = entry?;
+        if entry.file_name().as_encoded_bytes().starts_with(prefix.as_bytes()) {
+            let path = entry.path();
+            let file = OpenOptions::new().read(true).write(true).open(&path);
+            file.and_then(|file| allocate(&file, file.metadata()?.len()))
+                .with_context(|| format!("no room in shared memory for {}", path.display()))?;
+        }
+    }
+    Ok(())
+}
+
+/// Room on the disk for the files that say how a run ended. Its files have no names, so nothing of them outlives a kill.
+pub(super) struct Reserve {
+    pub manifest: fs::File,
+    pub summary: fs::File,
+}
+
+impl Reserve {
+    pub(super) fn take(folder: &Path) -> io::Result<Self> {
+        let take = |bytes| {
+            let file = tempfile::tempfile_in(folder)?;
+            allocate(&file, bytes)?;
+            Ok::<_, io::Error>(file)
+        };
+        Ok(Self { manifest: take(128 << 10)?, summary: take(1 << 20)? })
+    }
+}
+
+/// Some file systems cannot allocate ahead.
+fn allocate(file: &fs::File, bytes: u64) -> io::Result<()> {
+    match fallocate(file, FallocateFlags::empty(), 0, bytes.max(1)) {
+        Err(rustix::io::Errno::OPNOTSUPP) => Ok(()),
+        allocated => Ok(allocated?),
+    }
+}
+
+/// What an ordinary user may still write; a file system that does not count its blocks has no limit.
+fn free_bytes(folder: &Path) -> anyhow::Result<u64> {
+    let found =
+        statvfs(folder).with_context(|| format!("cannot see how much room {} has", folder.display()))?;
+    Ok(if found.f_blocks == 0 { u64::MAX } else { found.f_bavail.saturating_mul(found.f_frsize) })
+}
+
+fn megabytes(bytes: u64) -> String {
+    format!("{:.1} MB", bytes as f64 / 1e6)
+}
