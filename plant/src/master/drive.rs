@@ -13,7 +13,7 @@ use masseter_shared::messages::codes::{BootPhase, Cause, drive_state_code};
 use super::boot::{Boot, late};
 use super::failure::Failure;
 use super::following::Following;
-use super::presence::Presence;
+use super::presence::{MISSING_CYCLES, Presence};
 
 /// One drive.
 #[derive(Debug, Clone)]
@@ -43,7 +43,14 @@ pub(super) struct RemoteDrive {
 
 impl RemoteDrive {
     /// The drive of an axis, of which nothing is known at `now_ns`.
-    pub(super) fn new(scenario: &Scenario, axis: usize, id: NodeId, bus: usize, now_ns: u64) -> Self {
+    pub(super) fn new(
+        scenario: &Scenario,
+        axis: usize,
+        id: NodeId,
+        bus: usize,
+        following: Following,
+        now_ns: u64,
+    ) -> Self {
         let (can, config) = (&scenario.can, scenario.drives.of_axis(axis));
         let boot = Boot::new(id, scenario, axis, now_ns);
         Self {
@@ -55,7 +62,7 @@ impl RemoteDrive {
             reported_phase: boot.phase(),
             boot,
             presence: Presence::new(now_ns),
-            following: Following::new(scenario, axis),
+            following,
             nmt: None,
             is_started: false,
             is_absence_known: false,
@@ -211,7 +218,8 @@ impl RemoteDrive {
         if !is_fresh && self.is_operational() {
             self.presence.miss_cycle();
         }
-        self.presence.judge(now_ns, self.heartbeat_timeout_ns).or_else(|| self.stop_by_itself())
+        let may_miss = self.following.may_miss_cycles(MISSING_CYCLES);
+        self.presence.judge(now_ns, self.heartbeat_timeout_ns, may_miss).or_else(|| self.stop_by_itself())
     }
 
     /// The loss of a started drive that left operational by itself.
@@ -281,7 +289,12 @@ impl RemoteDrive {
 
     /// The process data for a request and a target, if the drive exchanges any. Until the drive follows targets, its
     /// target is its position, so that nothing jumps when it begins to (607Ah := 6064h).
-    pub(super) fn process_data(&mut self, request: DriveRequest, target_m: f64) -> Option<Frame> {
+    pub(super) fn process_data(
+        &mut self,
+        now_ns: u64,
+        request: DriveRequest,
+        target_m: f64,
+    ) -> Option<Frame> {
         if !self.is_operational() {
             return None;
         }
@@ -289,7 +302,7 @@ impl RemoteDrive {
         self.controlword = next_controlword(state, request, self.controlword);
         let follows = state == DriveState::OperationEnabled && request == DriveRequest::Enable;
         let target_increments = if follows {
-            self.following.follow(self.position_m(), target_m);
+            self.following.follow(now_ns, self.position_m(), target_m);
             self.config.increments(target_m) as i32
         } else {
             self.following.stop();

@@ -26,7 +26,8 @@ mod supervision;
 mod tests;
 
 use masseter_can::canopen::{Cob, Heartbeat, NmtState, NodeId, sync};
-use masseter_can::{Bus, Frame, ReceiveError, Received};
+use masseter_can::wire::worst_case_bits;
+use masseter_can::{Bus, Frame, ReceiveError, Received, Rpdo1};
 use masseter_shared::config::Scenario;
 use masseter_shared::geometry::AXES;
 use masseter_shared::messages::codes::{
@@ -44,6 +45,7 @@ use drive::RemoteDrive;
 use events::{EventLog, Subject, notice, transition};
 use exchange::Exchange;
 use failure::Failure;
+use following::Following;
 use incoming::Message;
 use supervision::Supervision;
 
@@ -72,9 +74,11 @@ impl Master {
         let can = &scenario.can;
         let (ports, ids) = (drive_ports(can)?, node_ids(can)?);
         let addresses = std::array::from_fn(|axis| (ids[axis], ports[axis].bus));
+        let rpdo_ns = can.bitrate()?.bits_to_ns(worst_case_bits(Rpdo1::LENGTH as u32, false));
         let drive = |axis: usize| {
             let (id, bus) = addresses[axis];
-            RemoteDrive::new(scenario, axis, id, bus, now_ns)
+            let following = Following::new(scenario, axis, can.buses[bus].len() as u64 * rpdo_ns);
+            RemoteDrive::new(scenario, axis, id, bus, following, now_ns)
         };
         Ok(Self {
             drives: std::array::from_fn(drive),
@@ -141,7 +145,7 @@ impl Master {
         self.restore(now_ns);
         let (request, targets_m) = (self.request(), self.commands.targets_m());
         for (axis, target_m) in targets_m.into_iter().enumerate() {
-            if let Some(frame) = self.drives[axis].process_data(request, target_m) {
+            if let Some(frame) = self.drives[axis].process_data(now_ns, request, target_m) {
                 self.send_to(now_ns, axis, frame, buses);
             }
         }
