@@ -15,12 +15,12 @@ use super::failure::Failure;
 const LEAST_LEAD_CYCLES: f64 = 2.0;
 /// Deviation of an even SYNC from its time, in periods.
 const JITTER: f64 = 0.1;
-/// SYNCs until a drive has settled after an uneven demand.
+/// SYNCs until a drive has settled after an uneven demand; the emulated drives' error falls by 12 % a cycle.
 const SETTLING: u32 = 12;
 /// Distance that an uneven demand excuses, in steps of that demand: one for a target that SYNC overtook, and one for
 /// the drive, which brakes and accelerates late.
 const EXCUSED_STEPS: f64 = 2.0;
-/// Way on which a drive may be unseen, in limits of the following error.
+/// Way that a drive may miss while its position is unknown, in limits of the following error.
 const UNSEEN_LIMITS: f64 = 4.0;
 /// Demands that are kept: SYNCs may follow each other within half a period.
 const KEPT: usize = 2 * MOST_LEAD_CYCLES;
@@ -52,7 +52,7 @@ pub(super) struct Following {
     period_ns: f64,
     /// Time that a target needs to be on the wire before SYNC, ns.
     sending_ns: u64,
-    /// By the drive's limit of velocity, m.
+    /// Longest step of the demand, by the drive's limit of velocity, m.
     longest_step_m: f64,
     /// Largest change from one step to the next of an even demand, m.
     even_change_m: f64,
@@ -144,10 +144,10 @@ impl Following {
     /// Takes the position sampled at the last SYNC; returns the failure once too many in a row are beyond the limit.
     pub(super) fn judge(&mut self, position_m: f64) -> Option<Failure> {
         self.line?;
-        let error_m = self.error_m(position_m);
-        self.cycles_beyond = if error_m > self.limit_m + self.excused_m { self.cycles_beyond + 1 } else { 0 };
+        let (error_m, limit_m) = (self.error_m(position_m), self.limit_m + self.excused_m);
+        self.cycles_beyond = if error_m > limit_m { self.cycles_beyond + 1 } else { 0 };
         (self.cycles_beyond >= self.limit_cycles)
-            .then(|| Failure::with(Cause::FollowingError, [error_m, self.limit_m]))
+            .then(|| Failure::with(Cause::FollowingError, [error_m, limit_m]))
     }
 
     /// Cycles in a row in which the drive's position may be missing, up to `most`: an unseen drive may stand still.
