@@ -113,6 +113,28 @@ fn every_fault_of_a_bus_is_borne_or_stops_the_rig_safely_with_its_cause() {
     }
 }
 
+/// At the fastest moment of the default motion, for any time.
+#[test]
+fn a_drive_that_misses_its_targets_is_noticed_within_few_cycles() {
+    for cycles in [2, 4, 10, 80] {
+        let until_s = 3.25 + f64::from(cycles) * 1e-3;
+        let fault = format!(
+            "[[faults]]\nkind = 'lose'\nbus = 1\nnode = 4\nid = 0x204\nfrom_s = 3.25\nuntil_s = {until_s}"
+        );
+        let workspace = Workspace::new(&format!("duration_s = 4.0\n{fault}"));
+        let output = workspace.run_virtual(&[]);
+        assert_eq!(output.status.code(), Some(5), "{fault}: {}", stdout(&output));
+        let summary = workspace.summary();
+        let events = summary["figures"]["events"].as_array().unwrap();
+        let time_ns = |event: Option<&Value>| event.unwrap()["time_ns"].as_u64().unwrap();
+        let first_fault = events.iter().find(|event| event["kind"] == "fault");
+        assert_eq!(first_fault.unwrap()["cause"], "following_error");
+        let injected = events.iter().find(|event| event["cause"] == "fault_injected");
+        let latency_ns = time_ns(first_fault) - time_ns(injected);
+        assert!(latency_ns < 3_100_000, "{latency_ns} ns");
+    }
+}
+
 #[test]
 fn a_run_whose_declared_fault_never_acts_fails() {
     let never = "[[faults]]\nkind = 'disconnect'\nbus = 0\nnode = 1\nfrom_s = 1000.0";

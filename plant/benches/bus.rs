@@ -9,7 +9,7 @@ use masseter_can::{Bitrate, Bus, Rpdo1, Tpdo1, VirtualWire, WireConfig};
 use masseter_plant::core::PlantCore;
 use masseter_shared::config::Scenario;
 use masseter_shared::messages::codes::DriveRequest;
-use masseter_shared::messages::{Command, Reading};
+use masseter_shared::messages::{Command, LAYOUT_VERSION, Reading};
 use masseter_shared::realtime::Wake;
 
 const PERIOD_NS: u64 = 1_000_000;
@@ -103,7 +103,13 @@ fn plant(bencher: Bencher<'_, '_>) {
         plant.collect(sync_ns + 525_000).expect("dynamics");
         plant.fill_reading(&mut reading);
         let request = DriveRequest::Enable.code();
-        let command = Command { cycle, target_m: reading.position_m, request, ..Command::default() };
+        let command = Command {
+            cycle,
+            target_m: reading.position_m,
+            request,
+            version: LAYOUT_VERSION,
+            ..Command::default()
+        };
         plant.apply(sync_ns + 545_000, Some(&command)).expect("dynamics");
         for frame in plant.drain_frames() {
             black_box(frame);

@@ -9,7 +9,8 @@ use crate::error::PlantError;
 /// Refuses the first quantity that contradicts others.
 pub(crate) fn check_quantities(scenario: &Scenario) -> Result<(), PlantError> {
     check_counts(scenario)?;
-    check_heartbeats(scenario)
+    check_heartbeats(scenario)?;
+    check_process_data(scenario)
 }
 
 /// A drive counts increments in 32 bits (objects 6064h and 607Ah).
@@ -34,6 +35,17 @@ fn check_heartbeats(scenario: &Scenario) -> Result<(), PlantError> {
     }
     let need = "use more than can.heartbeat_producer_ms and a cycle (1000 / rate_hz) together";
     Err(PlantError::Scenario(format!("can.heartbeat_consumer_ms = {timeout_ms}: {need}")))
+}
+
+/// The time-out of process data must be longer than two cycles, between which jitter may leave that much.
+fn check_process_data(scenario: &Scenario) -> Result<(), PlantError> {
+    match scenario.can.rpdo_timeout_ms {
+        Some(timeout_ms @ 1..) if u64::from(timeout_ms) * MILLISECOND_NS <= 2 * scenario.period_ns() => {
+            let need = "use 0 for none, or more than two cycles (2000 / rate_hz)";
+            Err(PlantError::Scenario(format!("can.rpdo_timeout_ms = {timeout_ms}: {need}")))
+        }
+        _ => Ok(()),
+    }
 }
 
 /// The master sends its heartbeat with the first SYNC after the interval, whose end jitter may delay by a cycle.

@@ -8,7 +8,7 @@ use std::hint::black_box;
 use masseter_plant::core::PlantCore;
 use masseter_shared::config::Scenario;
 use masseter_shared::messages::codes::{DriveRequest, DriveState};
-use masseter_shared::messages::{Command, Reading};
+use masseter_shared::messages::{Command, LAYOUT_VERSION, Reading};
 use masseter_shared::realtime::Wake;
 
 struct Counting;
@@ -49,7 +49,13 @@ fn cycle(plant: &mut PlantCore, cycle: u64, reading: &mut Reading) {
     plant.collect(sync_ns + 525_000).unwrap();
     plant.fill_reading(reading);
     let request = DriveRequest::Enable.code();
-    let command = Command { cycle, target_m: reading.position_m, request, ..Command::default() };
+    let command = Command {
+        cycle,
+        target_m: reading.position_m,
+        request,
+        version: LAYOUT_VERSION,
+        ..Command::default()
+    };
     plant.apply(sync_ns + 545_000, Some(&command)).unwrap();
     for frame in plant.drain_frames() {
         black_box(frame);

@@ -1,25 +1,34 @@
-//! The controller's commands: the newest valid one, and the silence since the last.
+//! The controller's commands: the newest that passed the [gate](super::gate), and the silence since the last.
 
+use masseter_shared::config::Scenario;
 use masseter_shared::geometry::AXES;
 use masseter_shared::messages::codes::{Cause, DriveRequest};
 use masseter_shared::messages::{Command, Reading};
 
 use super::events::Subject;
 use super::failure::Failure;
+use super::gate::Gate;
 
 /// The received commands.
 #[derive(Debug, Clone)]
 pub(super) struct Commands {
     timeout_cycles: u32,
+    gate: Gate,
     newest: Option<Command>,
     received_ns: u64,
     silent_cycles: u32,
 }
 
 impl Commands {
-    /// No command yet; silence beyond `timeout_cycles` is a failure.
-    pub(super) fn new(timeout_cycles: u32) -> Self {
-        Self { timeout_cycles, newest: None, received_ns: 0, silent_cycles: 0 }
+    /// No command yet.
+    pub(super) fn new(scenario: &Scenario) -> Self {
+        Self {
+            timeout_cycles: scenario.can.command_timeout_cycles,
+            gate: Gate::new(scenario),
+            newest: None,
+            received_ns: 0,
+            silent_cycles: 0,
+        }
     }
 
     /// Cycles since the last command.
@@ -45,13 +54,13 @@ impl Commands {
     }
 
     /// Takes the command of a cycle, if one came. Silence is a failure only where `needs_command`; a command is one if
-    /// an axis cannot go to its target or the request is unknown.
+    /// the gate refuses it. `following_m` has the position of every drive that would follow its target.
     pub(super) fn take(
         &mut self,
-        now_ns: u64,
+        [cycle, now_ns]: [u64; 2],
         command: Option<&Command>,
         needs_command: bool,
-        can_go_to: impl Fn(usize, f64) -> bool,
+        following_m: [Option<f64>; AXES],
     ) -> Result<(), (Subject, Failure)> {
         let Some(command) = command else {
             self.silent_cycles = self.silent_cycles.saturating_add(1);
@@ -62,13 +71,7 @@ impl Commands {
             return Err((Subject::Rig, Failure::with(Cause::CommandLost, cycles)));
         };
         self.silent_cycles = 0;
-        let bad = |subject, value| (subject, Failure::with(Cause::BadMessage, [value, 0.0]));
-        if let Some(axis) = (0..AXES).find(|&axis| !can_go_to(axis, command.target_m[axis])) {
-            return Err(bad(Subject::Axis(axis), command.target_m[axis]));
-        }
-        if DriveRequest::try_from(command.request).is_err() {
-            return Err(bad(Subject::Rig, f64::from(command.request)));
-        }
+        self.gate.pass(cycle, command, following_m)?;
         (self.newest, self.received_ns) = (Some(*command), now_ns);
         Ok(())
     }

@@ -12,7 +12,8 @@ use masseter_shared::messages::codes::{BootPhase, Cause, drive_state_code};
 
 use super::boot::{Boot, late};
 use super::failure::Failure;
-use super::presence::Presence;
+use super::following::Following;
+use super::presence::{MISSING_CYCLES, Presence};
 
 /// One drive.
 #[derive(Debug, Clone)]
@@ -26,6 +27,7 @@ pub(super) struct RemoteDrive {
     /// The phase of the boot that was reported last.
     reported_phase: BootPhase,
     presence: Presence,
+    following: Following,
     nmt: Option<NmtState>,
     /// Whether it was started as a verified drive: only then its process data are used.
     is_started: bool,
@@ -41,7 +43,14 @@ pub(super) struct RemoteDrive {
 
 impl RemoteDrive {
     /// The drive of an axis, of which nothing is known at `now_ns`.
-    pub(super) fn new(scenario: &Scenario, axis: usize, id: NodeId, bus: usize, now_ns: u64) -> Self {
+    pub(super) fn new(
+        scenario: &Scenario,
+        axis: usize,
+        id: NodeId,
+        bus: usize,
+        following: Following,
+        now_ns: u64,
+    ) -> Self {
         let (can, config) = (&scenario.can, scenario.drives.of_axis(axis));
         let boot = Boot::new(id, scenario, axis, now_ns);
         Self {
@@ -53,6 +62,7 @@ impl RemoteDrive {
             reported_phase: boot.phase(),
             boot,
             presence: Presence::new(now_ns),
+            following,
             nmt: None,
             is_started: false,
             is_absence_known: false,
@@ -113,23 +123,25 @@ impl RemoteDrive {
 
     /// Writes its actual values and its state.
     pub(super) fn fill_reading(&self, axis: usize, reading: &mut Reading) {
-        reading.position_m[axis] = f64::from(self.actual_increments) * self.config.encoder_resolution_m;
+        reading.position_m[axis] = self.position_m();
         reading.force_n[axis] = f64::from(self.torque_permille) / 1000.0 * self.config.rated_force_n;
         reading.drive_state[axis] = drive_state_code(self.drive_state());
     }
 
-    /// Whether 607Ah can hold a target; NaN has no increments.
-    pub(super) fn can_go_to(&self, target_m: f64) -> bool {
-        (f64::from(i32::MIN)..=f64::from(i32::MAX)).contains(&self.increments(target_m))
+    fn position_m(&self) -> f64 {
+        f64::from(self.actual_increments) * self.config.encoder_resolution_m
     }
 
-    fn increments(&self, position_m: f64) -> f64 {
-        (position_m / self.config.encoder_resolution_m).round()
+    /// Its position, if it follows targets.
+    pub(super) fn following_m(&self) -> Option<f64> {
+        let is_enabled = self.drive_state() == Some(DriveState::OperationEnabled);
+        is_enabled.then(|| self.position_m())
     }
 
-    /// SYNC demands new process data.
-    pub(super) fn begin_cycle(&mut self) {
+    /// SYNC goes out: the drive takes its target and answers with new process data.
+    pub(super) fn begin_cycle(&mut self, now_ns: u64) {
         self.presence.begin_cycle();
+        self.following.synchronise(now_ns);
     }
 
     /// Whether process data came after that time.
@@ -206,7 +218,8 @@ impl RemoteDrive {
         if !is_fresh && self.is_operational() {
             self.presence.miss_cycle();
         }
-        self.presence.judge(now_ns, self.heartbeat_timeout_ns).or_else(|| self.stop_by_itself())
+        let may_miss = self.following.may_miss_cycles(MISSING_CYCLES);
+        self.presence.judge(now_ns, self.heartbeat_timeout_ns, may_miss).or_else(|| self.stop_by_itself())
     }
 
     /// The loss of a started drive that left operational by itself.
@@ -214,6 +227,12 @@ impl RemoteDrive {
         let state = self.nmt.filter(|&state| self.is_started && state != NmtState::Operational)?;
         let states = [state, NmtState::Operational].map(|state| f64::from(state.code()));
         Some(Failure::with(Cause::NodeStopped, states))
+    }
+
+    /// Why the drive counts as one that does not follow its targets, once it does, given whether it has answered SYNC.
+    pub(super) fn following_error(&mut self, is_fresh: bool) -> Option<Failure> {
+        let position_m = self.following_m().filter(|_| is_fresh)?;
+        self.following.judge(position_m)
     }
 
     /// Discards everything found out about the drive; it has to boot again.
@@ -225,6 +244,7 @@ impl RemoteDrive {
 
     /// Discards process data until the drive is started anew.
     fn stop_exchange(&mut self) {
+        self.following.stop();
         self.presence.forget_answer();
         (self.is_started, self.power) = (false, None);
         self.controlword = Controlword::DISABLE_VOLTAGE;
@@ -269,15 +289,25 @@ impl RemoteDrive {
 
     /// The process data for a request and a target, if the drive exchanges any. Until the drive follows targets, its
     /// target is its position, so that nothing jumps when it begins to (607Ah := 6064h).
-    pub(super) fn process_data(&mut self, request: DriveRequest, target_m: f64) -> Option<Frame> {
+    pub(super) fn process_data(
+        &mut self,
+        now_ns: u64,
+        request: DriveRequest,
+        target_m: f64,
+    ) -> Option<Frame> {
         if !self.is_operational() {
             return None;
         }
         let state = self.power.unwrap_or(DriveState::NotReadyToSwitchOn);
         self.controlword = next_controlword(state, request, self.controlword);
         let follows = state == DriveState::OperationEnabled && request == DriveRequest::Enable;
-        let target_increments =
-            if follows { self.increments(target_m) as i32 } else { self.actual_increments };
+        let target_increments = if follows {
+            self.following.follow(now_ns, self.position_m(), target_m);
+            self.config.increments(target_m) as i32
+        } else {
+            self.following.stop();
+            self.actual_increments
+        };
         Some(Rpdo1 { controlword: self.controlword, target_increments }.frame(self.id))
     }
 

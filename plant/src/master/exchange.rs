@@ -49,6 +49,11 @@ impl Exchange {
         is_due
     }
 
+    /// The number of the cycle.
+    pub(super) fn cycle(&self) -> u64 {
+        self.wake.cycle
+    }
+
     /// When the cycle began, ns.
     pub(super) fn woke_ns(&self) -> u64 {
         self.wake.woke_ns

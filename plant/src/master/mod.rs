@@ -16,6 +16,8 @@ mod drive;
 mod events;
 mod exchange;
 mod failure;
+mod following;
+mod gate;
 mod incoming;
 mod presence;
 mod supervision;
@@ -24,7 +26,8 @@ mod supervision;
 mod tests;
 
 use masseter_can::canopen::{Cob, Heartbeat, NmtState, sync};
-use masseter_can::{Bus, Frame, ReceiveError, Received};
+use masseter_can::wire::worst_case_bits;
+use masseter_can::{Bus, Frame, ReceiveError, Received, Rpdo1};
 use masseter_shared::config::{MASTER_NODE, Scenario};
 use masseter_shared::geometry::AXES;
 use masseter_shared::messages::codes::{
@@ -42,6 +45,7 @@ use drive::RemoteDrive;
 use events::{EventLog, Subject, notice, transition};
 use exchange::Exchange;
 use failure::Failure;
+use following::Following;
 use incoming::Message;
 use supervision::Supervision;
 
@@ -70,15 +74,17 @@ impl Master {
         let can = &scenario.can;
         let (ports, ids) = (drive_ports(can)?, node_ids(can)?);
         let addresses = std::array::from_fn(|axis| (ids[axis], ports[axis].bus));
+        let rpdo_ns = can.bitrate()?.bits_to_ns(worst_case_bits(Rpdo1::LENGTH as u32, false));
         let drive = |axis: usize| {
             let (id, bus) = addresses[axis];
-            RemoteDrive::new(scenario, axis, id, bus, now_ns)
+            let following = Following::new(scenario, axis, can.buses[bus].len() as u64 * rpdo_ns);
+            RemoteDrive::new(scenario, axis, id, bus, following, now_ns)
         };
         Ok(Self {
             drives: std::array::from_fn(drive),
             buses: vec![BusMonitor::default(); can.buses.len()],
             exchange: Exchange::new(can, now_ns)?,
-            commands: Commands::new(can.command_timeout_cycles),
+            commands: Commands::new(scenario),
             supervision: Supervision::default(),
             events: EventLog::new(addresses),
         })
@@ -89,7 +95,7 @@ impl Master {
         let now_ns = wake.woke_ns;
         self.events.begin_cycle(wake.cycle);
         let is_heartbeat_due = self.exchange.begin_cycle(wake);
-        self.drives.iter_mut().for_each(RemoteDrive::begin_cycle);
+        self.drives.iter_mut().for_each(|drive| drive.begin_cycle(now_ns));
         self.watch_buses(now_ns, buses);
         for bus in 0..self.buses.len() {
             self.send(now_ns, bus, sync::frame(), buses);
@@ -139,7 +145,7 @@ impl Master {
         self.restore(now_ns);
         let (request, targets_m) = (self.request(), self.commands.targets_m());
         for (axis, target_m) in targets_m.into_iter().enumerate() {
-            if let Some(frame) = self.drives[axis].process_data(request, target_m) {
+            if let Some(frame) = self.drives[axis].process_data(now_ns, request, target_m) {
                 self.send_to(now_ns, axis, frame, buses);
             }
         }
@@ -192,7 +198,8 @@ impl Master {
             }
             let state = self.drives[axis].drive_state();
             all_are_enabled &= state == Some(DriveState::OperationEnabled);
-            if let Some(failure) = self.supervision.judge(state, is_enable) {
+            let disobedience = self.supervision.judge(state, is_enable);
+            if let Some(failure) = disobedience.or_else(|| self.drives[axis].following_error(is_fresh)) {
                 self.fail(now_ns, Subject::Axis(axis), &failure);
             }
         }
@@ -217,8 +224,9 @@ impl Master {
     fn take_command(&mut self, now_ns: u64, command: Option<&Command>) {
         // A controller whose drives are off or stopping may be silent: they need no command.
         let needs_command = self.request() == DriveRequest::Enable;
-        let can_go_to = |axis: usize, target_m| self.drives[axis].can_go_to(target_m);
-        if let Err((subject, failure)) = self.commands.take(now_ns, command, needs_command, can_go_to) {
+        let following_m = self.drives.each_ref().map(RemoteDrive::following_m);
+        let times = [self.exchange.cycle(), now_ns];
+        if let Err((subject, failure)) = self.commands.take(times, command, needs_command, following_m) {
             self.fail(now_ns, subject, &failure);
         }
     }

@@ -4,8 +4,8 @@ use masseter_shared::messages::codes::Cause;
 
 use super::failure::Failure;
 
-/// Cycles in which an operational drive's process data may be missing.
-const MISSING_CYCLES: u32 = 3;
+/// Cycles in a row in which an operational drive's process data may be missing at most.
+pub(super) const MISSING_CYCLES: u32 = 3;
 /// New process data beyond one a SYNC that a single node may send: all those that may be missing may come late, at once.
 const SURPLUS: u32 = MISSING_CYCLES + 2;
 
@@ -75,16 +75,16 @@ impl Presence {
         (self.missing_cycles, self.surplus) = (0, 0);
     }
 
-    /// The reason why the drive counts as lost, if it does.
-    pub(super) fn judge(&self, now_ns: u64, heartbeat_timeout_ns: u64) -> Option<Failure> {
+    /// The reason why the drive counts as lost, if it does, given how many cycles in a row may be without process data.
+    pub(super) fn judge(&self, now_ns: u64, heartbeat_timeout_ns: u64, may_miss: u32) -> Option<Failure> {
         let silent_ns = now_ns.saturating_sub(self.heard_ns);
         if silent_ns > heartbeat_timeout_ns {
             let times_ms = [silent_ns, heartbeat_timeout_ns].map(|ns| ns as f64 / 1e6);
             Some(Failure::with(Cause::HeartbeatLost, times_ms))
         } else if self.surplus > SURPLUS {
             Some(Failure::with(Cause::DuplicateNode, [self.surplus, SURPLUS].map(f64::from)))
-        } else if self.missing_cycles > MISSING_CYCLES {
-            Some(Failure::with(Cause::ProcessDataLost, [self.missing_cycles, MISSING_CYCLES].map(f64::from)))
+        } else if self.missing_cycles > may_miss {
+            Some(Failure::with(Cause::ProcessDataLost, [self.missing_cycles, may_miss].map(f64::from)))
         } else {
             None
         }
@@ -126,7 +126,7 @@ mod tests {
             presence.answer(0, false);
         }
         presence.begin_cycle();
-        assert_eq!(presence.judge(0, 1), None);
+        assert_eq!(presence.judge(0, 1, 0), None);
         assert_eq!(presence.surplus, 0);
     }
 

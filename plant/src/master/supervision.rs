@@ -75,7 +75,13 @@ impl Supervision {
         let is_first = !self.is_stopped();
         if is_first {
             self.stop = match cause {
-                Cause::CommandLost | Cause::BadMessage | Cause::DriveFault => Stop::Permanent,
+                Cause::CommandLost
+                | Cause::BadMessage
+                | Cause::StrokeLimit
+                | Cause::VelocityLimit
+                | Cause::AccelerationLimit
+                | Cause::DriveFault
+                | Cause::FollowingError => Stop::Permanent,
                 _ => Stop::UntilRestored,
             };
         }

@@ -46,6 +46,15 @@ section! {
         pub boot_timeout_ms: u32 = 2000,
         /// Cycles without a fresh command after which the master quick-stops the drives.
         pub command_timeout_cycles: u32 = 20,
+        /// Distance of a drive from where its targets should have taken it, m. Drives that follow are within half of
+        /// it, also with food. At the fastest default motion a leg goes 0.116 mm a cycle, so that two missed targets in
+        /// a row exceed it.
+        pub following_limit_m: f64 = 7.5e-5,
+        /// Positions in a row beyond that distance after which the master quick-stops the drives.
+        pub following_limit_cycles: u32 = 1,
+        /// Silence of the process data after which a drive stops by itself (object 1400h:05), ms; 0 for never. By
+        /// default as long as the heartbeat may be missing, or commands, whichever is longer.
+        pub rpdo_timeout_ms: Option<u16> = None,
     }
 }
 
@@ -67,7 +76,8 @@ impl CanConfig {
             return Err(ScenarioError::bad("can.heartbeat_producer_ms", &0, need));
         }
         require_positive(&keyed!("can", self,
-            heartbeat_consumer_ms boot_timeout_ms command_timeout_cycles
+            heartbeat_consumer_ms boot_timeout_ms command_timeout_cycles following_limit_m
+            following_limit_cycles
         ))?;
         if self.ideal && !self.is_virtual() {
             let need = "leave it away with can.interfaces: it replaces their bit rate";

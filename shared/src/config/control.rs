@@ -7,7 +7,7 @@ use super::need::{keyed, require_duration, require_positive};
 
 /// SYNC takes one cycle and the drives' interpolation one; drives that smooth their targets take some more. The
 /// controller extrapolates the motion by this time.
-const MOST_LEAD_CYCLES: f64 = 10.0;
+pub const MOST_LEAD_CYCLES: usize = 10;
 
 section! {
     /// Sequence, pose control and safety of the controller.
@@ -109,7 +109,7 @@ impl ControllerConfig {
             tracking_limit_m tracking_limit_rad tracking_rms_cycles tracking_rms_limit_m tracking_rms_limit_rad
         ))?;
         // The lead is no longer than a drive needs, and an error is corrected only once within the lead.
-        if self.lead_cycles > MOST_LEAD_CYCLES {
+        if self.lead_cycles > MOST_LEAD_CYCLES as f64 {
             let need = format!(
                 "use at most {MOST_LEAD_CYCLES}: one until SYNC, and what the drives interpolate over"
             );

@@ -21,6 +21,8 @@ pub struct DriveConfig {
     pub max_force_n: f64,
     /// Velocity limit of the drive, m/s.
     pub max_velocity_m_s: f64,
+    /// Largest change of the targets' velocity that the master sends, m/s².
+    pub max_acceleration_m_s2: f64,
     /// Deceleration of the quick-stop ramp (6085), m/s². The drive's unit of acceleration is taken to be one increment of
     /// its position a second squared.
     pub quick_stop_deceleration_m_s2: f64,
@@ -81,6 +83,7 @@ impl Default for DrivesConfig {
             rated_force_n: 500.0,
             max_force_n: 1000.0,
             max_velocity_m_s: 0.4,
+            max_acceleration_m_s2: 40.0,
             quick_stop_deceleration_m_s2: 10.0,
             following_error_m: 0.002,
             following_error_timeout_ms: 20,
@@ -114,8 +117,8 @@ impl DrivesConfig {
             };
         }
         let positive = of_both!(
-            rated_force_n max_force_n max_velocity_m_s quick_stop_deceleration_m_s2 following_error_m
-            position_gain_per_s velocity_gain_n_s_per_m velocity_integral_time_s encoder_resolution_m
+            rated_force_n max_force_n max_velocity_m_s max_acceleration_m_s2 quick_stop_deceleration_m_s2
+            following_error_m position_gain_per_s velocity_gain_n_s_per_m velocity_integral_time_s encoder_resolution_m
         );
         require_positive(positive.as_flattened())?;
         let noise = of_both!(encoder_noise_m).map(|[(key, value_m)]| (key, value_m, 0.0, NOISIEST_M));

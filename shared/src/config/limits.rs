@@ -44,6 +44,8 @@ impl TrajectoryLimitsConfig {
         Self {
             slide_velocity_m_s: self.slide_velocity_m_s.min(drives.slide.max_velocity_m_s),
             leg_velocity_m_s: self.leg_velocity_m_s.min(drives.leg.max_velocity_m_s),
+            slide_acceleration_m_s2: self.slide_acceleration_m_s2.min(drives.slide.max_acceleration_m_s2),
+            leg_acceleration_m_s2: self.leg_acceleration_m_s2.min(drives.leg.max_acceleration_m_s2),
             ..self
         }
     }

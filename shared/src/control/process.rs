@@ -104,7 +104,8 @@ impl ControllerPorts for Ports {
     fn reading(&mut self, wake: &Wake) -> Result<Option<ReceivedMessage<Reading>>, TransportError> {
         let deadline_ns = wake.due_ns + self.reading_timeout_ns;
         let is_awaited = |reading: &Reading| reading.cycle >= wake.cycle;
-        self.readings.latest_by(deadline_ns, self.cycle.waiter(), is_awaited)
+        let reading = self.readings.latest_by(deadline_ns, self.cycle.waiter(), is_awaited)?;
+        reading.map(ReceivedMessage::checked).transpose()
     }
 
     fn publish_command(&mut self, fill: impl FnOnce(&mut Command)) -> Result<(), TransportError> {

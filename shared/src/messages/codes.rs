@@ -125,7 +125,7 @@ codes! {
         ProcessDataLost = 16 "process_data_lost",
         /// The bus refused a frame.
         BusRefused = 18 "bus_refused",
-        /// A value in a message is not a finite number or no known code.
+        /// A value in a message is not a finite number or no known code, or the message has another version.
         BadMessage = 19 "bad_message",
         /// A drive did not boot in time (ms).
         BootTimeout = 20 "boot_timeout",
@@ -173,6 +173,10 @@ codes! {
         FaultInjected = 43 "fault_injected",
         /// A fault of the scenario is over (number in its list, from 1; number of activations).
         FaultEnded = 44 "fault_ended",
+        /// An axis asked to change its velocity faster than it may (m/s²).
+        AccelerationLimit = 45 "acceleration_limit",
+        /// A drive is not where its targets should have taken it (m).
+        FollowingError = 46 "following_error",
         /// Platform turned too far from where it should be (rad).
         OrientationLost = 48 "orientation_lost",
     }

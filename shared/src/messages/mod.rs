@@ -111,7 +111,7 @@ macro_rules! messages {
 
 messages! {
     /// Targets and request for the drives, once a cycle.
-    Command on "command" keeping 2048 as "masseter/Command/765b2e880ac1226d" {
+    Command on "command" keeping 2048 as "masseter/Command/19d59251ed3e41b0" {
         /// Cycle of the controller, from 1.
         cycle: u64,
         /// Cycle of the reading it was computed from; 0 when there was none.
@@ -125,7 +125,7 @@ messages! {
     }
 
     /// Positions, forces and states of the drives, once a cycle.
-    Reading on "reading" keeping 2048 as "masseter/Reading/20641d75a68c4265" {
+    Reading on "reading" keeping 2048 as "masseter/Reading/587197189c86d388" {
         /// Cycle of the plant, from 1.
         cycle: u64,
         /// Cycle of the last command received when the sample was taken; 0 before the first.
@@ -165,7 +165,7 @@ messages! {
     }
 
     /// The controller's state and its estimate, once a cycle.
-    State on "state" keeping 2048 as "masseter/State/2e862cea62cb148b" {
+    State on "state" keeping 2048 as "masseter/State/790167a97a0cbdfa" {
         /// Cycle of the controller, from 1.
         cycle: u64,
         /// Cycle of the reading it was computed from; 0 when there was none.
@@ -217,7 +217,7 @@ messages! {
     }
 
     /// The true state of the mechanism, once a cycle; the controller never reads it.
-    Truth on "truth" keeping 2048 as "masseter/Truth/be17d3d6dcbe9f30" {
+    Truth on "truth" keeping 2048 as "masseter/Truth/84ef96c36d0eee1b" {
         /// Cycle of the plant, from 1.
         cycle: u64,
         /// The instant it describes: that of the reading's sample, ns.
@@ -237,7 +237,7 @@ messages! {
     }
 
     /// An observation of a tap on a CAN wire: a frame, or an error message in the coding of `linux/can/error.h`.
-    FrameTap on "frame" keeping 32768 as "masseter/FrameTap/66b1f8a4812b8fbb" {
+    FrameTap on "frame" keeping 32768 as "masseter/FrameTap/2900f5cf6c20462a" {
         /// When its last bit was on the wire, ns.
         time_ns: u64,
         /// When its transmitter had it queued, ns; 0 on real wires.
@@ -254,7 +254,7 @@ messages! {
 
     /// Counters of the kernel for the machine and both loops. The recorder reads and records them; the message is not
     /// published.
-    Machine on "machine" keeping 1 as "masseter/Machine/81f145a00f524643" {
+    Machine on "machine" keeping 1 as "masseter/Machine/8fdb255883b1eab2" {
         /// Time of the sample, ns.
         time_ns: u64,
         /// Time that the hypervisor had taken from all cores together, as far as the hypervisor reports it, ns.
@@ -266,7 +266,7 @@ messages! {
     }
 
     /// A single occurrence: a change of state, a fault, an alarm.
-    Event on "event" keeping 1024 as "masseter/Event/418d501e533b5a00" {
+    Event on "event" keeping 1024 as "masseter/Event/cbd530597486c7eb" {
         /// When, ns.
         time_ns: u64,
         /// Cycle of the process that reports it.

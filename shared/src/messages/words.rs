@@ -51,6 +51,11 @@ fn complaint(cause: Cause, event: &Event) -> Option<String> {
         Cause::BootTimeout => format!("not operational after {value} ms"),
         Cause::HeartbeatLost => format!("silent for {value} ms"),
         Cause::ProcessDataLost => format!("process data missing for {value} cycles"),
+        Cause::FollowingError => format!(
+            "{:.3} mm from where its targets should have taken it, limit {:.3} mm",
+            event.value * 1e3,
+            event.limit * 1e3
+        ),
         Cause::NodeStopped => {
             format!("left the NMT state operational without a command of the master; now in state {value}")
         }
@@ -97,6 +102,9 @@ const fn remedy(cause: Cause) -> Option<&'static str> {
         Cause::NodeRestarted => "check its power supply",
         Cause::NodeStopped => {
             "read the drive's own emergency message, if there is one, and find the node that sends NMT commands"
+        }
+        Cause::FollowingError => {
+            "check its wiring, its load, and controller.lead_cycles if it smooths its targets"
         }
         Cause::FaultAtStart => "remove the cause of the drive's error code, then switch the drive off and on",
         Cause::StillPowered => {

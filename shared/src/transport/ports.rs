@@ -171,6 +171,16 @@ pub struct Subscriber<P: Payload + ?Sized> {
 #[derive(Debug)]
 pub struct ReceivedMessage<M: Message>(Sample<ipc::Service, M, ()>);
 
+impl<M: Message> ReceivedMessage<M> {
+    /// The message, unless it has another version.
+    ///
+    /// # Errors
+    /// For another version.
+    pub fn checked(self) -> Result<Self, TransportError> {
+        check_version(&*self.0).map(|()| self)
+    }
+}
+
 impl<M: Message> Deref for ReceivedMessage<M> {
     type Target = M;
 
@@ -206,13 +216,17 @@ impl<M: Message> Subscriber<M> {
     /// The oldest message not yet received; never waits. Refused when a connection to a publisher failed, since its messages
     /// would be missing.
     pub fn receive(&self) -> Result<Option<ReceivedMessage<M>>, TransportError> {
+        self.take()?.map(ReceivedMessage::checked).transpose()
+    }
+
+    fn take(&self) -> Result<Option<ReceivedMessage<M>>, TransportError> {
         let sample = self.port.receive().map_err(failed("receiving", M::TOPIC))?;
         self.refused.check(M::TOPIC)?;
-        sample.map(|sample| check_version(&*sample).map(|()| ReceivedMessage(sample))).transpose()
+        Ok(sample.map(ReceivedMessage))
     }
 
     /// The first message that `is_awaited`, or the newest there is when `deadline_ns` has passed. Polls without
-    /// sleeping: for waits of microseconds.
+    /// sleeping: for waits of microseconds. The version of the message is the caller's to check.
     pub fn latest_by(
         &self,
         deadline_ns: u64,
@@ -223,7 +237,7 @@ impl<M: Message> Subscriber<M> {
         let mut spin = waiter.spin();
         loop {
             for _ in 0..=self.port.buffer_size() {
-                let Some(message) = self.receive()? else { break };
+                let Some(message) = self.take()? else { break };
                 let is_here = is_awaited(&message);
                 newest = Some(message);
                 if is_here {

@@ -85,6 +85,52 @@ fn a_disconnected_node_is_detected_and_all_drives_stop() {
     assert!(bench.fastest_axis_m_s() < 1e-3, "{}", bench.fastest_axis_m_s());
 }
 
+/// 0x204 for drive 4, which stands still: no position shows the loss.
+fn deaf(until_s: Option<f64>) -> FaultConfig {
+    FaultConfig { kind: FaultKindConfig::Lose, bus: 1, node: Some(4), id: Some(0x204), until_s, ..BASE }
+}
+
+#[test]
+fn a_standing_drive_without_process_data_stops_by_itself_and_with_it_all() {
+    let mut bench = bench_with(deaf(None));
+    bench.enable();
+    let held_m = bench.reading.position_m;
+    while bench.cycle < 630 {
+        bench.cycle(Some(&|_| (held_m, DriveRequest::Enable)));
+    }
+    assert_eq!(bench.causes(EventKind::Fault), []);
+    for _ in 0..100 {
+        bench.cycle(Some(&|_| (held_m, DriveRequest::Enable)));
+    }
+    let faults: Vec<_> = bench.events.iter().filter(|event| event.kind == EventKind::Fault.code()).collect();
+    assert_eq!((faults[0].cause, faults[0].axis), (Cause::Emergency.code(), 3));
+    assert_eq!(EmergencyCode(faults[0].value as u16), EmergencyCode::RPDO_TIMEOUT);
+    assert_eq!((faults[1].cause, faults[1].axis), (Cause::DriveFault.code(), 3));
+    assert!(bench.plant.master.drives_are_off());
+}
+
+/// The machine stalls for as long as the heartbeat may.
+#[test]
+fn process_data_that_come_back_within_the_time_of_a_heartbeat_trip_no_drive() {
+    let mut bench = bench_with(deaf(Some(0.64)));
+    bench.enable();
+    let held_m = bench.reading.position_m;
+    while bench.cycle < 800 {
+        bench.cycle(Some(&|_| (held_m, DriveRequest::Enable)));
+    }
+    assert_eq!(bench.causes(EventKind::Fault), []);
+}
+
+#[test]
+fn a_moving_drive_that_misses_its_targets_stops_all_within_three_cycles_of_the_second() {
+    let mut bench = bench_with(deaf(None));
+    play_until(&mut bench, 0.6);
+    let fault = bench.events.iter().find(|event| event.kind == EventKind::Fault.code()).unwrap();
+    assert_eq!((fault.cause, fault.axis, fault.limit), (Cause::FollowingError.code(), 3, 7.5e-5));
+    assert!(fault.value > 7.5e-5 && fault.value < 3e-4, "{}", fault.value);
+    assert_eq!(bench.reading.master_fault, 1);
+}
+
 #[test]
 fn a_drive_in_bus_off_is_reported_and_stops_the_rig() {
     let fault = FaultConfig { kind: FaultKindConfig::BusOff, node: Some(3), ..BASE };

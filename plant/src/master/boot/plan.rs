@@ -6,6 +6,7 @@
 use masseter_can::canopen::{Cob, CobId, NodeId, ObjectAddress};
 use masseter_can::cia402::{Controlword, interpolation_period};
 use masseter_can::{CanId, EVERY_SYNC, Rpdo1, Tpdo1};
+use masseter_shared::clock::MILLISECOND_NS;
 use masseter_shared::config::{MASTER_NODE, Scenario};
 use masseter_shared::messages::codes::{BootPhase, Cause};
 
@@ -92,6 +93,9 @@ pub(super) fn plan(node: NodeId, scenario: &Scenario, axis: usize) -> Vec<Step> 
     // of the rig.
     let home_offset = ObjectAddress::new(0x607C, 0);
     steps.push(Step::Read(home_offset, Check::Unset { otherwise: Cause::HomeOffset }));
+    let (object, value) = (ObjectAddress::new(0x1400, 5), u32::from(rpdo_timeout_ms(scenario)));
+    // Many drives have no such timer; the heartbeat and the master supervise them too.
+    steps.push(Step::Write { object, value, bytes: 2, is_optional: true });
     steps.extend(configure(scenario, axis));
     // A drive may begin to follow its target with the mode, and may have moved before the last step.
     steps.extend(HOLD_POSITION);
@@ -149,6 +153,15 @@ fn check_pdo(communication: u16, cob: Cob, mapping: &[u32]) -> impl Iterator<Ite
     ];
     let mapped = move |(place, &entry)| expect(communication + 0x200, place, entry, Cause::WrongPdo);
     head.into_iter().chain((1..).zip(mapping).map(mapped))
+}
+
+/// The event timer of a drive's RPDO: a stall of the machine that neither heartbeat nor commands make a fault trips no
+/// drive.
+fn rpdo_timeout_ms(scenario: &Scenario) -> u16 {
+    let can = &scenario.can;
+    let commands_ms = u64::from(can.command_timeout_cycles) * scenario.period_ns() / MILLISECOND_NS;
+    let longest_ms = u16::try_from(commands_ms).unwrap_or(u16::MAX).max(can.heartbeat_consumer_ms);
+    can.rpdo_timeout_ms.unwrap_or(longest_ms)
 }
 
 fn configure(scenario: &Scenario, axis: usize) -> [Step; 12] {

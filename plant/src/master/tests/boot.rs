@@ -35,6 +35,7 @@ fn a_drive_is_configured_as_the_scenario_declares() {
     let table = [
         ((0x1017, 0), 50),
         ((0x1016, 1), 0x007F_0096),
+        ((0x1400, 5), 150),
         ((0x6007, 0), 3),
         ((0x605A, 0), 2),
         ((0x6085, 0), 10_000_000),
@@ -48,7 +49,8 @@ fn a_drive_is_configured_as_the_scenario_declares() {
     for ((index, subindex), value) in table {
         assert_eq!(drive.written(index, subindex), value, "{index:04X}:{subindex}");
     }
-    assert!(drive.written(0x607D, 1) < drive.written(0x607D, 2));
+    let [low, high] = [1, 2].map(|end| drive.written(0x607D, end) as i32);
+    assert!(low < high, "{low} {high}");
 }
 
 #[test]

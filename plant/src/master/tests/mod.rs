@@ -9,7 +9,7 @@ use masseter_can::cia402::DriveState;
 use masseter_shared::config::Scenario;
 use masseter_shared::geometry::AXES;
 use masseter_shared::messages::codes::{BootPhase, Cause, DriveRequest, EventKind, Source};
-use masseter_shared::messages::{Command, Event, Reading};
+use masseter_shared::messages::{Command, Event, LAYOUT_VERSION, Reading};
 use masseter_shared::realtime::Wake;
 
 use super::Master;
@@ -31,7 +31,8 @@ struct Bench {
 impl Bench {
     /// Everything switched on, the drives as the master expects them.
     fn new() -> Self {
-        let scenario = Scenario::default();
+        let mut scenario = Scenario::default();
+        scenario.mechanism.strokes.leg_m = scenario.mechanism.strokes.slide_m;
         let ids = scenario.can.node_ids.map(|id| NodeId::new(id).unwrap());
         Self {
             master: Master::new(&scenario, EPOCH_NS).unwrap(),
@@ -64,6 +65,7 @@ impl Bench {
             cycle: self.cycle,
             target_m: self.reading.position_m,
             request: request.code(),
+            version: LAYOUT_VERSION,
             ..Command::default()
         });
         self.master.apply(sync_ns + 550_000, command.as_ref(), &mut self.wires);
