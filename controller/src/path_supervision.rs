@@ -12,11 +12,13 @@ use masseter_shared::messages::codes::Cause;
 use crate::safety::Fault;
 use crate::sequencer::Estimate;
 
-/// Readings in which a disturbed one still shows: the drives take a target at the next SYNC and reach it at the second,
-/// and the motion makes up for it in the third.
+/// Least readings, and least time, in which a disturbed one still shows: the drives take a target at the next SYNC and reach
+/// it at the second, and the motion makes up for it in the third. The drives' loops need milliseconds, whatever the rate.
 const SHOWS_FOR: usize = 4;
-/// The motion goes on for as long without an answer.
+const SHOWS_FOR_S: f64 = 0.004;
+/// The motion goes on for as long without an answer, or the drives stop as late.
 const MOST_SLACK_CYCLES: f64 = 2.0;
+const MOST_SLACK_S: f64 = 0.002;
 
 /// The limits of one quantity, with its mean square.
 #[derive(Debug, Clone)]
@@ -53,18 +55,19 @@ pub(crate) struct PathSupervision {
     position: Supervised,
     orientation: Supervised,
     last_sampled_ns: u64,
+    most_slack_cycles: f64,
     /// By how much the last readings differ from planned ones, in cycles.
-    recent_slack: [f64; SHOWS_FOR],
+    recent_slack: Vec<f64>,
 }
 
 impl PathSupervision {
     pub(crate) fn new(scenario: &Scenario) -> Self {
-        let config = &scenario.controller;
+        let (config, period_s) = (&scenario.controller, scenario.period_s());
         let supervised = |cause, limit, rms_limit| Supervised { cause, limit, rms_limit, mean_square: 0.0 };
         Self {
             incisal_m: scenario.jaw.reference_point_m,
             period_ns: scenario.period_ns(),
-            share: 1.0 / f64::from(config.tracking_rms_cycles),
+            share: (period_s / config.tracking_rms_time_s).min(1.0),
             position: supervised(Cause::TrackingLost, config.tracking_limit_m, config.tracking_rms_limit_m),
             orientation: supervised(
                 Cause::OrientationLost,
@@ -72,7 +75,8 @@ impl PathSupervision {
                 config.tracking_rms_limit_rad,
             ),
             last_sampled_ns: 0,
-            recent_slack: [0.0; SHOWS_FOR],
+            most_slack_cycles: MOST_SLACK_CYCLES.max(MOST_SLACK_S / period_s),
+            recent_slack: vec![0.0; SHOWS_FOR.max((SHOWS_FOR_S / period_s).ceil() as usize)],
         }
     }
 
@@ -84,7 +88,7 @@ impl PathSupervision {
         let unanswered = reading_cycle.saturating_sub(answers_cycle + 1) as f64;
         self.last_sampled_ns = sampled_ns;
         self.recent_slack.rotate_right(1);
-        self.recent_slack[0] = late_cycles.max(unanswered).min(MOST_SLACK_CYCLES);
+        self.recent_slack[0] = late_cycles.max(unanswered).min(self.most_slack_cycles);
         self.recent_slack.iter().copied().fold(0.0, f64::max)
     }
 
@@ -114,7 +118,7 @@ mod tests {
         let controller = ControllerConfig {
             tracking_limit_m: LIMIT_M,
             tracking_limit_rad: LIMIT_RAD,
-            tracking_rms_cycles: 10,
+            tracking_rms_time_s: 0.01,
             tracking_rms_limit_m: LIMIT_M / 2.0,
             tracking_rms_limit_rad: LIMIT_RAD / 2.0,
             ..ControllerConfig::default()

@@ -15,11 +15,12 @@ use super::failure::Failure;
 const LEAST_LEAD_CYCLES: f64 = 2.0;
 /// Deviation of an even SYNC from its time, in periods.
 const JITTER: f64 = 0.1;
-/// SYNCs until a drive has settled after an uneven demand; the emulated drives' error falls by 12 % a cycle.
-const SETTLING: u32 = 12;
-/// Distance that an uneven demand excuses, in steps of that demand: one for a target that SYNC overtook, and one for
-/// the drive, which brakes and accelerates late.
-const EXCUSED_STEPS: f64 = 2.0;
+/// Least SYNCs, and least time, until a drive has settled after an uneven demand. The emulated drives' error falls by 12 %
+/// a millisecond.
+const SETTLING_SYNCS: u32 = 12;
+const SETTLING_S: f64 = 0.012;
+/// Time by which a drive brakes and accelerates late after an uneven demand, at least a period.
+const LATE_S: f64 = 0.001;
 /// Way that a drive may miss while its position is unknown, in limits of the following error.
 const UNSEEN_LIMITS: f64 = 4.0;
 /// Demands that are kept: SYNCs may follow each other within half a period.
@@ -56,6 +57,10 @@ pub(super) struct Following {
     longest_step_m: f64,
     /// Largest change from one step to the next of an even demand, m.
     even_change_m: f64,
+    /// Distance that an uneven demand excuses, in steps of that demand: one for a target that SYNC overtook, the others
+    /// for the drive, which is late.
+    excused_steps: f64,
+    settling_syncs: u32,
     /// Time by which the drive lags behind the demand, in periods.
     lag_periods: f64,
     /// None while the drive follows no targets.
@@ -86,6 +91,8 @@ impl Following {
             sending_ns,
             longest_step_m: drive.max_velocity_m_s * period_s,
             even_change_m: drive.max_acceleration_m_s2 * period_s * period_s,
+            excused_steps: 1.0 + (LATE_S / period_s).max(1.0),
+            settling_syncs: SETTLING_SYNCS.max((SETTLING_S / period_s).ceil() as u32),
             lag_periods: (scenario.controller.lead_cycles - LEAST_LEAD_CYCLES).ceil().max(0.0),
             line: None,
             demands: [Demand::default(); KEPT],
@@ -136,8 +143,8 @@ impl Following {
         }
         if !is_even {
             let longest_m = line.step_m().abs().max(next.step_m().abs());
-            self.excused_m = self.excused_m.max(EXCUSED_STEPS * longest_m);
-            self.excused_syncs = SETTLING;
+            self.excused_m = self.excused_m.max(self.excused_steps * longest_m);
+            self.excused_syncs = self.settling_syncs;
         }
     }
 
@@ -323,6 +330,15 @@ mod tests {
         let unseen_m = bench.sync(MS);
         bench.send(unseen_m, true);
         assert!(bench.cycle(MS, true).is_some());
+    }
+
+    /// A drive is late by a time, whatever the rate.
+    #[test]
+    fn at_high_rates_an_uneven_demand_excuses_the_way_of_a_millisecond_and_12_ms() {
+        for (rate_hz, steps, syncs) in [(500, 2.0, 12), (1000, 2.0, 12), (20_000, 21.0, 240)] {
+            let monitor = Following::new(&Scenario { rate_hz, ..Scenario::default() }, 3, SENDING_NS);
+            assert_eq!((monitor.excused_steps, monitor.settling_syncs), (steps, syncs), "{rate_hz} Hz");
+        }
     }
 
     #[test]

@@ -43,8 +43,8 @@ section! {
         /// Angle of the platform to its desired orientation at which the controller stops safely, rad.
         /// 0.2°, four times the largest of the default food, 0.052°; such a drive adds up to 0.18° a cycle.
         pub tracking_limit_rad: f64 = 3.5e-3,
-        /// Time constant of the mean squares of that distance and that angle, in cycles.
-        pub tracking_rms_cycles: u32 = 50,
+        /// Time constant of the mean squares of that distance and that angle, s.
+        pub tracking_rms_time_s: f64 = 0.05,
         /// Root mean square distance at which the controller stops safely, m. Half of the limit for a moment.
         pub tracking_rms_limit_m: f64 = 0.1e-3,
         /// Root mean square angle at which the controller stops safely, rad. Half of the limit for a moment.
@@ -106,7 +106,7 @@ impl ControllerConfig {
         ))?;
         require_positive(&keyed!("controller", self,
             steady_readings lead_cycles integral_gain_per_s trim_limit_m trim_limit_rad stale_cycles
-            tracking_limit_m tracking_limit_rad tracking_rms_cycles tracking_rms_limit_m tracking_rms_limit_rad
+            tracking_limit_m tracking_limit_rad tracking_rms_time_s tracking_rms_limit_m tracking_rms_limit_rad
         ))?;
         // The lead is no longer than a drive needs, and an error is corrected only once within the lead.
         if self.lead_cycles > MOST_LEAD_CYCLES as f64 {
