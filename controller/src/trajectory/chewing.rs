@@ -13,9 +13,9 @@ use masseter_shared::config::{ChewingConfig, JawConfig};
 use masseter_shared::geometry::Pose;
 
 use super::TrajectoryError;
-use super::cycle::MotionRhythm;
 use super::error::require;
 use super::mandible::{Mandible, Posture, reach};
+use super::rhythm::MotionRhythm;
 
 /// Advance of the balancing condyle beyond which no jaw goes, metres.
 const LARGEST_BALANCING_M: f64 = 0.02;

@@ -1,7 +1,7 @@
 //! The motion's own clock: it starts and stops smoothly, so that any motion starts and ends at rest
 //! while its path stays what it is.
 
-use super::cycle::minimum_jerk_integral;
+use super::rhythm::minimum_jerk_integral;
 
 /// How long the clock takes to reach full speed, and to stop, s.
 pub(super) const RAMP_S: f64 = 0.5;

@@ -10,9 +10,9 @@ use masseter_shared::config::{JawConfig, LateralConfig, OpeningConfig, Protrusio
 use masseter_shared::geometry::Pose;
 
 use super::TrajectoryError;
-use super::cycle::MotionRhythm;
 use super::error::require;
 use super::mandible::{Mandible, Posture, reach};
+use super::rhythm::MotionRhythm;
 
 /// Condylar advance a radian of opening, m/rad.
 const ADVANCE_PER_PITCH_M: f64 = 0.0148 / (32.2 * std::f64::consts::PI / 180.0);

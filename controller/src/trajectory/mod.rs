@@ -10,7 +10,6 @@ mod axes;
 mod check;
 mod chewing;
 mod clock;
-mod cycle;
 mod error;
 mod excursion;
 mod import;
@@ -21,6 +20,7 @@ mod markers;
 mod plausibility;
 mod pose_csv;
 mod recording;
+mod rhythm;
 mod spline;
 mod table;
 
@@ -30,7 +30,7 @@ use masseter_shared::geometry::{Mechanism, Pose};
 pub use check::{TrajectoryReport, check};
 pub use error::TrajectoryError;
 
-pub(crate) use cycle::minimum_jerk;
+pub(crate) use rhythm::minimum_jerk;
 
 use chewing::Chewing;
 use clock::{MotionClock, RAMP_S};

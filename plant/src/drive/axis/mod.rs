@@ -28,17 +28,8 @@ use servo::{Servo, ServoCommand, ServoLimits};
 
 pub(crate) use encoder::Encoder;
 pub(super) use homing::Homing;
-pub(super) use motion::Mode;
+pub(super) use motion::{Mode, NewTargets};
 pub(super) use parameters::configure;
-
-/// The cyclic targets that are new at a SYNC.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub(super) struct NewTargets {
-    /// Target position (607Ah).
-    pub(super) position: bool,
-    /// Target torque (6071h).
-    pub(super) torque: bool,
-}
 
 /// One axis.
 #[derive(Debug, Clone)]

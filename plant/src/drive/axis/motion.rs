@@ -44,6 +44,15 @@ impl Mode {
     }
 }
 
+/// The cyclic targets that are new at a SYNC.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(crate) struct NewTargets {
+    /// Target position (607Ah).
+    pub(crate) position: bool,
+    /// Target torque (6071h).
+    pub(crate) torque: bool,
+}
+
 /// Positions of an axis as a mode of operation sees them, increments of the dictionary.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct PositionView {
