@@ -77,7 +77,7 @@ pub(crate) fn faults(
         })
         .collect();
     let which = if idle.is_empty() { String::new() } else { format!(", number {} never", idle.join(", ")) };
-    let struck = format!("{} of {} declared struck{which}", declared.len() - idle.len(), declared.len());
+    let struck = format!("{} of {} declared faults acted{which}", declared.len() - idle.len(), declared.len());
     let result = match (beyond.is_empty(), idle.is_empty()) {
         (true, true) => CheckResult::Passed,
         (true, false) if !is_played => CheckResult::NotJudged,
@@ -158,13 +158,13 @@ mod tests {
     }
 
     #[test]
-    fn a_declared_fault_that_never_struck_fails_a_run_that_was_played_to_its_end() {
+    fn a_declared_fault_that_never_acted_fails_a_run_that_was_played_to_its_end() {
         let cases = [
             (0, true, None),
-            (1, true, Some(("ok", "1 of 1 declared struck"))),
-            (2, true, Some(("FAIL", "1 of 2 declared struck, number 2 never"))),
-            (2, false, Some(("skip", "1 of 2 declared struck, number 2 never"))),
-            (3, true, Some(("FAIL", "1 of 3 declared struck, number 2, 3 never"))),
+            (1, true, Some(("ok", "1 of 1 declared faults acted"))),
+            (2, true, Some(("FAIL", "1 of 2 declared faults acted, number 2 never"))),
+            (2, false, Some(("skip", "1 of 2 declared faults acted, number 2 never"))),
+            (3, true, Some(("FAIL", "1 of 3 declared faults acted, number 2, 3 never"))),
         ];
         for (declared, is_played, expected) in cases {
             let found: Vec<_> =
