@@ -15,6 +15,9 @@ use super::failure::Failure;
 const LEAST_LEAD_CYCLES: f64 = 2.0;
 /// Deviation of an even SYNC from its time, in periods.
 const JITTER: f64 = 0.1;
+/// Largest acceleration of an even demand: the default motions take 1.3 m/s², and a drive that stops from such a change at once
+/// stays within the following error's limit.
+const EVEN_CHANGE_M_S2: f64 = 40.0;
 /// Least SYNCs, and least time, until a drive has settled after an uneven demand. The emulated drives' error falls by 12 %
 /// a millisecond.
 const SETTLING_SYNCS: u32 = 12;
@@ -90,7 +93,7 @@ impl Following {
             period_ns: scenario.period_ns() as f64,
             sending_ns,
             longest_step_m: drive.max_velocity_m_s * period_s,
-            even_change_m: drive.max_acceleration_m_s2 * period_s * period_s,
+            even_change_m: EVEN_CHANGE_M_S2 * period_s * period_s,
             excused_steps: 1.0 + (LATE_S / period_s).max(1.0),
             settling_syncs: SETTLING_SYNCS.max((SETTLING_S / period_s).ceil() as u32),
             lag_periods: (scenario.controller.lead_cycles - LEAST_LEAD_CYCLES).ceil().max(0.0),

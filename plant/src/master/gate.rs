@@ -163,6 +163,14 @@ mod tests {
     type Change = fn(&mut Command);
 
     const PERIOD_S: f64 = 1e-3;
+    /// With a limit of acceleration that is reached below the limit of velocity.
+    fn scenario() -> Scenario {
+        let mut scenario = Scenario::default();
+        scenario.drives.slide.max_acceleration_m_s2 = 40.0;
+        scenario.drives.leg.max_acceleration_m_s2 = 40.0;
+        scenario
+    }
+
     /// Of every axis, m.
     const MIDDLE_M: [f64; AXES] = [0.0, 0.0, 0.0, 0.27, 0.27, 0.27];
 
@@ -175,7 +183,7 @@ mod tests {
 
     impl Bench {
         fn new() -> Self {
-            let mut bench = Self { gate: Gate::new(&Scenario::default()), cycle: 0, target_m: MIDDLE_M };
+            let mut bench = Self { gate: Gate::new(&scenario()), cycle: 0, target_m: MIDDLE_M };
             bench.send(|_| {}).unwrap();
             bench
         }
@@ -209,7 +217,7 @@ mod tests {
     /// For every axis and direction, a hundredth below the limit passes and a hundredth above is refused by its name.
     #[test]
     fn every_limit_of_a_motion_is_where_it_is_said_to_be() {
-        let drives = Scenario::default().drives;
+        let drives = scenario().drives;
         for (axis, direction) in (0..AXES).flat_map(|axis| [(axis, -1.0), (axis, 1.0)]) {
             let drive = drives.of_axis(axis);
             let (velocity_m_s, acceleration_m_s2) = (drive.max_velocity_m_s, drive.max_acceleration_m_s2);
@@ -269,7 +277,7 @@ mod tests {
     #[test]
     fn the_first_target_is_compared_with_the_position() {
         for (step_m, passes) in [(0.99 * 0.4e-3, true), (1.01 * 0.4e-3, false)] {
-            let mut bench = Bench { gate: Gate::new(&Scenario::default()), cycle: 0, target_m: MIDDLE_M };
+            let mut bench = Bench { gate: Gate::new(&scenario()), cycle: 0, target_m: MIDDLE_M };
             let judged = bench.send(|command| command.target_m[4] += step_m);
             assert_eq!(
                 judged.map_err(|(_, failure)| failure.cause),

@@ -83,7 +83,7 @@ impl Default for DrivesConfig {
             rated_force_n: 500.0,
             max_force_n: 1000.0,
             max_velocity_m_s: 0.4,
-            max_acceleration_m_s2: 40.0,
+            max_acceleration_m_s2: 100.0,
             quick_stop_deceleration_m_s2: 10.0,
             following_error_m: 0.002,
             following_error_timeout_ms: 20,

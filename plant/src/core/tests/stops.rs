@@ -89,7 +89,7 @@ fn a_command_beyond_a_limit_is_refused_as_a_whole_and_stops_the_rig() {
         (|at| [at[0], -0.0301, at[2], at[3], at[4], at[5]], Cause::StrokeLimit, 1),
         (|at| at.map(|at_m| at_m - 0.01), Cause::VelocityLimit, 0),
         (|_| [1e9; AXES], Cause::StrokeLimit, 0),
-        (|at| [at[0], at[1], at[2], at[3], at[4], at[5] + 1e-4], Cause::AccelerationLimit, 5),
+        (|at| [at[0], at[1], at[2], at[3], at[4], at[5] + 1.5e-4], Cause::AccelerationLimit, 5),
     ];
     for (change, cause, axis) in cases {
         let mut bench = Bench::new(&Scenario::default());
