@@ -176,8 +176,8 @@ mod tests {
             |supervision: Supervision| left.iter().all(|&state| supervision.judge(state, true).is_none());
         supervision.end_cycle(true, false);
         assert!(may_leave(supervision), "while they are switched on");
-        supervision.end_cycle(true, true);
         for all_are_enabled in [true, false] {
+            supervision.end_cycle(true, all_are_enabled);
             assert_eq!(supervision.judge(Some(DriveState::OperationEnabled), true), None);
             for state in left {
                 let explanation = [f64::from(drive_state_code(state)), 0.0];
@@ -185,7 +185,6 @@ mod tests {
                 assert_eq!(supervision.judge(state, true), Some(failure));
                 assert_eq!(supervision.judge(state, false), None);
             }
-            supervision.end_cycle(true, all_are_enabled);
         }
         let mut restored = supervision;
         restored.restore();
