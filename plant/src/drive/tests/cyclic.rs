@@ -77,28 +77,6 @@ fn sync_samples_the_position_at_its_own_time() {
     assert_eq!(sampled, expected);
 }
 
-/// At the deceleration of the profile, 2.5 m/s². Without a load: the velocity loop under a torque has no integral.
-#[test]
-fn under_a_torque_the_axis_can_always_stop_before_either_software_limit() {
-    for (permille, limit) in [(200_i16, LIMITS[1]), (-200, LIMITS[0])] {
-        let mut bench = Bench::enabled(CYCLIC_TORQUE);
-        bench.load_n = 0.0;
-        for _ in 0..1000 {
-            bench.write(TORQUE, &permille.to_le_bytes()).unwrap();
-            bench.sync();
-            bench.run_ms(1);
-            let way_m = (f64::from(limit) * 1e-6 - bench.position_m).abs();
-            let braking_m_s = (2.0 * 2.5 * way_m).sqrt().min(0.4);
-            assert!(
-                bench.velocity_m_s.abs() < 1.1 * braking_m_s + 0.02,
-                "{} at {way_m} m",
-                bench.velocity_m_s
-            );
-        }
-        assert!((bench.position() - limit).abs() < 2000, "{}", bench.position());
-    }
-}
-
 /// Object 6007 and the state at once, before any ramp has ended.
 #[test]
 fn an_aborted_connection_switches_off_or_begins_its_ramp_at_once() {
