@@ -21,7 +21,7 @@ has_any() { local name; for name in "$@"; do command -v "$name" >/dev/null && re
 
 # A cargo tool in exactly this version. It goes into the project's target folder, beside a developer's own tools.
 install_cargo_tool() { # name, version
-    has_any "$1" && [[ "$("$1" --version)" == *" $2"* ]] && return
+    has_any "$1" && [[ "$(cargo "${1#cargo-}" --version)" == *" $2"* ]] && return
     cargo install --locked --quiet --root "$tools" "$1" --version "=$2"
 }
 

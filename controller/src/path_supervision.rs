@@ -154,6 +154,13 @@ mod tests {
     }
 
     #[test]
+    fn at_its_limits_a_value_is_no_fault() {
+        let mut supervised =
+            Supervised { cause: Cause::TrackingLost, limit: 0.5, rms_limit: 0.5, mean_square: 0.0 };
+        assert_eq!(supervised.check(0.5, 0.0, 1.0), Ok(()));
+    }
+
+    #[test]
     fn an_average_beyond_its_limit_is_a_fault_that_a_short_deviation_is_not() {
         let here = Pose::identity();
         for (cause, displace, limit) in QUANTITIES {

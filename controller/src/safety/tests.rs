@@ -11,8 +11,9 @@ fn good_reading() -> Reading {
 
 #[test]
 fn the_velocity_limit_of_each_axis_holds_in_both_directions() {
-    let limit_m_s: [f64; AXES] = std::array::from_fn(|axis| 0.1 * (axis + 1) as f64);
-    let (before_m, period_s) = ([0.01, -0.02, 0.03, 0.27, 0.28, 0.29], 2e-3);
+    // Powers of two, so that the limit is met exactly.
+    let limit_m_s: [f64; AXES] = std::array::from_fn(|axis| 0.125 * (axis + 1) as f64);
+    let (before_m, period_s) = ([0.125, -0.25, 0.25, 0.375, 0.5, 0.625], 1.0 / 512.0);
     for axis in 0..AXES {
         for direction in [1.0, -1.0] {
             let check = |share: f64| {
@@ -21,7 +22,7 @@ fn the_velocity_limit_of_each_axis_holds_in_both_directions() {
                 let [target, before] = [target_m, before_m].map(Actuators::from_axes);
                 check_velocity(&target, &before, &limit_m_s, period_s)
             };
-            assert_eq!(check(0.99), Ok(()), "axis {axis}, direction {direction}");
+            assert_eq!([0.99, 1.0].map(check), [Ok(()); 2], "axis {axis}, direction {direction}");
             let fault = check(1.01).unwrap_err();
             assert_eq!((fault.cause, fault.axis), (Cause::VelocityLimit, Some(axis)));
             assert_eq!((fault.limit, fault.no_pose), (limit_m_s[axis], None));

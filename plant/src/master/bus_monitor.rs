@@ -62,3 +62,47 @@ impl BusMonitor {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_bus_reports_each_change_once_and_each_stranger_once() {
+        let mut bus = BusMonitor::default();
+        let states = [
+            (ErrorState::Active, None, false),
+            (ErrorState::Passive, None, false),
+            (ErrorState::BusOff, Some(true), true),
+            (ErrorState::BusOff, None, true),
+            (ErrorState::Passive, Some(false), false),
+            (ErrorState::Active, None, false),
+        ];
+        for (state, change, is_off) in states {
+            assert_eq!(bus.set_error_state(state), change, "{state:?}");
+            assert_eq!(bus.is_off(), is_off);
+        }
+        let strangers = [1, 2, 127, 1, 127, 1, 3, 2].map(|id| bus.is_new_unknown(NodeId::new(id).unwrap()));
+        assert_eq!(strangers, [true, true, true, false, false, false, true, false]);
+    }
+
+    #[test]
+    fn a_refusal_to_send_is_explained_by_bus_off_or_by_drives_that_are_not_there_yet() {
+        let mut bus = BusMonitor::default();
+        let refusals = [
+            SendError::BusOff { tec: 256 },
+            SendError::QueueFull { capacity: 9 },
+            SendError::Os { errno: 100 },
+        ];
+        assert_eq!(refusals.each_ref().map(|refusal| bus.is_unexplained(refusal)), [false, false, true]);
+        bus.note_drive();
+        assert_eq!(refusals.each_ref().map(|refusal| bus.is_unexplained(refusal)), [false, true, true]);
+    }
+
+    #[test]
+    fn the_axis_served_last_is_the_last_to_be_served_again() {
+        let mut bus = BusMonitor::default();
+        bus.note_served(3);
+        assert_eq!(bus.turns().collect::<Vec<_>>(), [4, 5, 0, 1, 2, 3]);
+    }
+}

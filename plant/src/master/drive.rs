@@ -316,3 +316,19 @@ impl RemoteDrive {
         self.nmt = Some(state);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_drive_is_absent_once_beyond_its_time() {
+        let scenario = Scenario::default();
+        let (id, following) = (NodeId::new(1).unwrap(), Following::new(&scenario, 0, 0));
+        let mut drive = RemoteDrive::new(&scenario, 0, id, 0, following, 500);
+        let limit_ns = u64::from(scenario.can.boot_timeout_ms) * MILLISECOND_NS;
+        assert_eq!(drive.absence(500 + limit_ns), None);
+        assert_eq!(drive.absence(501 + limit_ns), Some(late(limit_ns + 1, limit_ns)));
+        assert_eq!(drive.absence(502 + limit_ns), None);
+    }
+}

@@ -91,3 +91,49 @@ impl Exchange {
         reading.overlong_ns = account.overlong_ns;
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use masseter_shared::config::Scenario;
+
+    use super::*;
+
+    #[test]
+    fn process_data_answer_the_first_sync_that_is_seen_in_a_cycle() {
+        let can = Scenario::default().can;
+        let mut exchange = Exchange::new(&can, 1000).unwrap();
+        assert!(!exchange.begin_cycle(Wake::on_time(1, 999)), "the first heartbeat is due at 1000");
+        assert!(exchange.begin_cycle(Wake::on_time(2, 1000)));
+        assert_eq!([0, 1].map(|bus| exchange.answered_after_ns(bus)), [1000, 1000]);
+        exchange.note_sync(1, 1200);
+        exchange.note_sync(1, 1700);
+        assert_eq!([0, 1].map(|bus| exchange.answered_after_ns(bus)), [1000, 1200]);
+        let next_ns = 1000 + u64::from(can.heartbeat_producer_ms) * MILLISECOND_NS;
+        assert!(!exchange.begin_cycle(Wake::on_time(3, next_ns - 1)));
+        assert!(exchange.begin_cycle(Wake::on_time(4, next_ns)));
+        assert_eq!((exchange.cycle(), exchange.woke_ns()), (4, next_ns));
+        // A SYNC seen at the very time it was sent is this cycle's.
+        exchange.note_sync(0, next_ns);
+        exchange.note_sync(0, next_ns + 5);
+        assert_eq!(exchange.answered_after_ns(0), next_ns);
+    }
+
+    #[test]
+    fn a_reading_has_the_times_of_its_cycle() {
+        let mut exchange = Exchange::new(&Scenario::default().can, 0).unwrap();
+        let mut wake = Wake::on_time(7, 5000);
+        (wake.due_ns, wake.skipped) = (4000, 3);
+        exchange.begin_cycle(wake);
+        exchange.note_process_data(9000);
+        exchange.note_process_data(8000);
+        let mut reading = Reading::default();
+        exchange.fill_reading(&mut reading);
+        let Reading { cycle, due_ns, woke_ns, skipped_cycles, complete_ns, .. } = reading;
+        assert_eq!((cycle, due_ns, woke_ns, skipped_cycles, complete_ns), (7, 4000, 5000, 3, 9000));
+        // SYNC without data at 1 Mbit/s: 44 bits and 4 stuff bits, at whose last the drives sample.
+        assert_eq!(reading.sampled_ns - 5000, 48_000);
+        exchange.begin_cycle(Wake::on_time(8, 6000));
+        exchange.fill_reading(&mut reading);
+        assert_eq!(reading.complete_ns, 0);
+    }
+}

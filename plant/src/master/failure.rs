@@ -31,3 +31,18 @@ impl Failure {
         Event { object, value, limit, ..Event::new(Source::Master, EventKind::Fault, cause) }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_failure_is_reported_with_its_object_value_and_limit() {
+        let object = Some(ObjectAddress::new(0x1018, 0x02));
+        let event = Failure { object, ..Failure::with(Cause::WrongIdentity, [7.0, 8.0]) }.event();
+        assert_eq!((event.cause, event.object), (Cause::WrongIdentity.code(), 0x10_1802));
+        assert_eq!((event.value, event.limit), (7.0, 8.0));
+        assert_eq!((event.kind, event.source), (EventKind::Fault.code(), Source::Master.code()));
+        assert_eq!(Failure::new(Cause::BusOff).event().object, 0);
+    }
+}

@@ -326,6 +326,7 @@ mod tests {
             bench.reach(4, 0.1);
             (0..waited).for_each(|_| bench.step(4, 0.0).unwrap());
             assert!(bench.step(4, 0.15).is_err());
+            assert_eq!(bench.step(4, 0.05), Ok(()), "for a part of a period");
             assert_eq!(bench.step(4, 0.1), Ok(()));
             assert_eq!(bench.step(4, 0.1), Ok(()));
         }
@@ -338,6 +339,11 @@ mod tests {
         bench.cycle += 1;
         assert_eq!(bench.step(4, 0.6), Ok(()), "two periods since the last command");
         assert_eq!(bench.step(4, 0.3), Ok(()));
+        let after_a_late_one = bench.send(|command| {
+            command.cycle += 1;
+            command.target_m[4] += 0.6 * PERIOD_S;
+        });
+        assert_eq!(after_a_late_one, Ok(()), "the last command was one cycle late");
         let jump = bench.send(|command| {
             command.cycle += 100;
             command.target_m[4] += 0.9 * PERIOD_S;

@@ -135,4 +135,44 @@ mod tests {
         assert_eq!(surplus(10, |_| 1), 0);
         assert_eq!(surplus(10, |_| 2), 10);
     }
+
+    #[test]
+    fn a_drive_is_lost_beyond_each_limit_and_not_at_it() {
+        let cause = |presence: &Presence, now_ns, may_miss| {
+            presence.judge(now_ns, 1000, may_miss).map(|failure| failure.cause)
+        };
+        let mut presence = Presence::new(500);
+        assert_eq!(cause(&presence, 1500, 0), None);
+        assert_eq!(cause(&presence, 1501, 0), Some(Cause::HeartbeatLost));
+        assert_eq!(cause(&presence, 0, 0), None, "a clock that lags is no silence");
+        presence.hear(2500);
+        assert_eq!(cause(&presence, 3500, 0), None);
+        let silent = presence.judge(4_002_500, 1_000_000, 0).unwrap();
+        assert_eq!((silent.value, silent.limit), (4.0, 1.0), "ms");
+
+        for (missing, may_miss, is_lost) in [(1, 1, false), (2, 1, true), (3, 3, false), (4, 3, true)] {
+            presence.end_missing();
+            (0..missing).for_each(|_| presence.miss_cycle());
+            assert_eq!(cause(&presence, 2500, may_miss), is_lost.then_some(Cause::ProcessDataLost));
+        }
+        for (answers, is_duplicate) in [(1, false), (6, false), (7, true), (9, true)] {
+            presence.restart();
+            presence.begin_cycle();
+            (0..answers).for_each(|_| presence.answer(2500, true));
+            presence.begin_cycle();
+            assert_eq!(cause(&presence, 2500, 0), is_duplicate.then_some(Cause::DuplicateNode), "{answers}");
+        }
+        presence.miss_cycle();
+        presence.restart();
+        assert_eq!(cause(&presence, 2500, 0), None);
+    }
+
+    #[test]
+    fn an_answer_is_one_after_the_time_that_is_asked_for() {
+        let mut presence = Presence::new(0);
+        presence.answer(100, true);
+        assert!(presence.has_answered_since(99) && !presence.has_answered_since(100));
+        presence.forget_answer();
+        assert!(!presence.has_answered_since(0));
+    }
 }

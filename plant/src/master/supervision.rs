@@ -103,3 +103,93 @@ impl Supervision {
         self.is_ending = true;
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_wrong_command_and_a_disobedient_drive_stop_permanently_and_the_first_cause_counts() {
+        let permanent = [
+            Cause::CommandLost,
+            Cause::BadMessage,
+            Cause::StrokeLimit,
+            Cause::VelocityLimit,
+            Cause::AccelerationLimit,
+            Cause::DriveFault,
+            Cause::FollowingError,
+        ];
+        let restorable = [
+            Cause::BusOff,
+            Cause::BusRefused,
+            Cause::NodeRestarted,
+            Cause::NodeStopped,
+            Cause::HeartbeatLost,
+            Cause::ProcessDataLost,
+            Cause::DuplicateNode,
+            Cause::SdoAborted,
+            Cause::BootTimeout,
+        ];
+        for (causes, is_permanent) in [(&permanent[..], true), (&restorable[..], false)] {
+            for &cause in causes {
+                let mut supervision = Supervision::default();
+                assert!(!supervision.is_stopped() && !supervision.awaits_restoration());
+                assert!(supervision.may_boot(false));
+                assert!(supervision.stop(cause));
+                for later in permanent.iter().chain(&restorable) {
+                    assert!(!supervision.stop(*later), "{later} is no first cause after {cause}");
+                }
+                assert!(supervision.is_stopped() && !supervision.may_boot(false), "{cause}");
+                assert_eq!(supervision.awaits_restoration(), !is_permanent, "{cause}");
+                assert_eq!(supervision.may_boot(true), !is_permanent, "{cause}");
+                assert_eq!(supervision.stop_permanently(), !is_permanent, "{cause}");
+                assert!(!supervision.stop_permanently() && !supervision.awaits_restoration(), "{cause}");
+                assert!(!supervision.may_boot(true), "{cause}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_controllers_request_reaches_drives_that_are_all_ready_and_not_to_stop() {
+        use DriveRequest::{Enable, Off, QuickStop};
+        let [mut stopped, mut ending] = [Supervision::default(); 2];
+        stopped.stop(Cause::BusOff);
+        ending.end();
+        for commanded in [Off, Enable, QuickStop] {
+            let requests = |supervision: Supervision| {
+                [true, false].map(|all_are_ready| supervision.request(commanded, all_are_ready))
+            };
+            assert_eq!(requests(Supervision::default()), [commanded, Off]);
+            assert_eq!((requests(stopped), requests(ending)), ([QuickStop; 2], [QuickStop; 2]));
+        }
+        assert!(!ending.is_stopped(), "the end is no fault");
+        stopped.restore();
+        assert!(!stopped.is_stopped() && stopped.may_boot(false));
+        assert_eq!(stopped.request(Enable, true), Enable);
+    }
+
+    #[test]
+    fn a_drive_may_leave_operation_only_before_all_were_enabled_or_when_it_is_told_to() {
+        let mut supervision = Supervision::default();
+        let left = [None, Some(DriveState::SwitchedOn), Some(DriveState::Fault)];
+        let may_leave =
+            |supervision: Supervision| left.iter().all(|&state| supervision.judge(state, true).is_none());
+        supervision.end_cycle(true, false);
+        assert!(may_leave(supervision), "while they are switched on");
+        for all_are_enabled in [true, false] {
+            supervision.end_cycle(true, all_are_enabled);
+            assert_eq!(supervision.judge(Some(DriveState::OperationEnabled), true), None);
+            for state in left {
+                let explanation = [f64::from(drive_state_code(state)), 0.0];
+                let failure = Failure::with(Cause::DriveFault, explanation);
+                assert_eq!(supervision.judge(state, true), Some(failure));
+                assert_eq!(supervision.judge(state, false), None);
+            }
+        }
+        let mut restored = supervision;
+        restored.restore();
+        assert!(may_leave(restored), "after a stop");
+        supervision.end_cycle(false, true);
+        assert!(may_leave(supervision), "after they were switched off");
+    }
+}

@@ -174,6 +174,7 @@ mod tests {
         watch.event(&struck(1_000_000, 1.0));
         watch.event(&struck(6_000_000, 2.0));
         let found = watch.finish();
+        assert_eq!(found.iter().map(|figures| figures.number).collect::<Vec<_>>(), [1, 2, 3]);
 
         let first = &found[0];
         assert!((first.deviation_mm - 0.3).abs() < 1e-12, "{first:?}");
@@ -181,6 +182,7 @@ mod tests {
         let detection = first.detection.unwrap();
         assert!(detection.source == Source::Master && detection.cause == Cause::ProcessDataLost);
         assert!((detection.latency_ms - 2.5).abs() < 1e-12 && (detection.deviation_mm - 0.2).abs() < 1e-12);
+        assert!((detection.deviation_deg - 2e-3f64.to_degrees()).abs() < 1e-12, "{first:?}");
         assert_eq!((found[1].struck_ns, found[1].detection), (Some(6_000_000), None));
         assert_eq!((found[2].struck_ns, found[2].detection), (None, None));
     }

@@ -224,7 +224,7 @@ mod tests {
         const STALL: u64 = 8_600_000;
         const MORE: u64 = STALL + 3_000_000;
         // What is counted message by message; skips by the machine, while working, and all.
-        let cases: [(Messages, [u64; 3]); 13] = [
+        let cases: [(Messages, [u64; 3]); 14] = [
             (&[[0, 0, 0, 0], [0, 0, 0, 0]], [0, 0, 0]),
             // Woken 8.6 ms late; the passed deadlines are skipped after the late cycle.
             (&[[0, 0, 0, 0], [0, STALL, 0, STALL], [7, STALL, 0, 100]], [7, 0, 7]),
@@ -245,6 +245,8 @@ mod tests {
             (&[[0, 0, 0, 0], [3, 0, 3_000_000, 900_000], [6, 0, 3_000_000, 0]], [0, 3, 6]),
             // A carried-over loss explains a later skip, and a new loss its own.
             (&[[0, STALL, 0, STALL], [8, MORE, 0, 3_000_000], [11, MORE, 0, 0]], [11, 0, 11]),
+            // As late as both losses together, but not by all of the work.
+            (&[[0, 1_000_000, 3_000_000, 2_000_000], [4, 1_000_000, 3_000_000, 0]], [1, 1, 4]),
             // Time that a wake-up in time had made up for explains nothing.
             (&[[0, STALL, STALL, 0], [2, STALL, STALL, 0]], [0, 0, 2]),
         ];
@@ -354,7 +356,10 @@ mod tests {
             skips_of(&[[0, 60_000, 70_000, 0], [1, 60_000, 2_070_000, 0], [5, 4_060_000, 7_070_000, 0]]);
         assert_eq!(skips.shortest_costly_ns, Some(2_000_000));
         assert_eq!(skips.as_long_as(2_000_000), (1, 2));
-        assert_eq!(skips.as_long_as(1), (2, 3));
+        assert_eq!([0, 1].map(|least_ns| skips.as_long_as(least_ns)), [(2, 3); 2]);
+        // A stretch that a wake-up in time made up for is none of the next.
+        let skips = skips_of(&[[0, 0, 5_000_000, 0], [2, 0, 7_000_000, 0]]);
+        assert_eq!(skips.shortest_costly_ns, Some(2_000_000));
         // What is left of a stretch is not a shorter one.
         let skips = skips_of(&[[0, 0, 5_000_000, 2_000_000], [2, 0, 5_000_000, 0]]);
         assert_eq!(skips.shortest_costly_ns, Some(5_000_000));

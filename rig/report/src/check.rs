@@ -64,6 +64,12 @@ mod tests {
     use super::*;
 
     #[test]
+    fn what_is_not_judged_has_not_failed() {
+        let results = [CheckResult::Passed, CheckResult::Failed, CheckResult::NotJudged];
+        assert_eq!(results.map(CheckResult::is_failed), [false, true, false]);
+    }
+
+    #[test]
     fn only_a_failure_is_excused() {
         let check = |passed| Check::judged("tracking", String::new(), passed);
         let cases = [(false, true, "skip"), (false, false, "FAIL"), (true, true, "ok"), (true, false, "ok")];

@@ -121,10 +121,13 @@ mod tests {
             (|errors, value| errors.max_deg = value, limits.tracking_max_deg),
         ];
         for (spoil, limit) in each {
-            for (share, mark) in [(0.99, "ok"), (1.01, "FAIL")] {
+            for (share, mark) in [(0.99, "ok"), (1.0, "ok"), (1.01, "FAIL")] {
                 let mut errors = good;
                 spoil(&mut errors, mm(share, limit));
-                assert_eq!(tracking("tracking", 9, &errors, &limits, true).result.mark(), mark, "{errors:?}");
+                for is_played in [true, false] {
+                    let check = tracking("tracking", 9, &errors, &limits, is_played);
+                    assert_eq!(check.result.mark(), mark, "{errors:?}");
+                }
             }
         }
     }
@@ -178,7 +181,7 @@ mod tests {
 
     #[test]
     fn a_fault_that_leads_the_jaw_beyond_the_limit_fails_the_run_with_its_name() {
-        for (deviation_mm, mark) in [(0.49, "ok"), (0.51, "FAIL")] {
+        for (deviation_mm, mark) in [(0.5, "ok"), (0.51, "FAIL")] {
             for is_played in [true, false] {
                 let found = [figures(1, Some(5), deviation_mm)];
                 let check = faults(&[fault()], &found, &ChecksConfig::default(), is_played).unwrap();
@@ -188,8 +191,10 @@ mod tests {
                 assert_eq!(check.finding.contains(named), mark == "FAIL", "{check:?}");
             }
         }
-        let turned = FaultFigures { deviation_deg: 0.51, ..figures(1, Some(5), 0.1) };
-        let check = faults(&[fault()], &[turned], &ChecksConfig::default(), true).unwrap();
-        assert_eq!(check.result.mark(), "FAIL", "{check:?}");
+        for (deviation_deg, mark) in [(0.5, "ok"), (0.51, "FAIL")] {
+            let turned = FaultFigures { deviation_deg, ..figures(1, Some(5), 0.1) };
+            let check = faults(&[fault()], &[turned], &ChecksConfig::default(), true).unwrap();
+            assert_eq!(check.result.mark(), mark, "{check:?}");
+        }
     }
 }

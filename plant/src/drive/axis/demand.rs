@@ -138,4 +138,28 @@ mod tests {
         demand.slow_down(0, Motion { position_m: 0.28, velocity_m_s: 0.1 }, 10.0);
         assert!((demand.position_m(100 * MS).unwrap() - 0.2805).abs() < 1e-9);
     }
+
+    #[test]
+    fn a_line_to_a_target_is_straight_and_ends_there() {
+        let mut demand = Demand::Brake;
+        assert!(demand.is_at_rest(0));
+        assert!(!demand.interpolate(5 * MS, 0.27, 0.2704, 2e-3, 0.4));
+        assert!(!demand.is_at_rest(5 * MS));
+        for (at_ms, position_m, velocity_m_s) in
+            [(4, 0.27, 0.2), (5, 0.27, 0.2), (6, 0.2702, 0.2), (7, 0.2704, 0.0), (8, 0.2704, 0.0)]
+        {
+            let motion = demand.at(at_ms * MS).unwrap();
+            assert!((motion.position_m - position_m).abs() < 1e-12, "{at_ms} ms: {motion:?}");
+            assert!((motion.velocity_m_s - velocity_m_s).abs() < 1e-9, "{at_ms} ms: {motion:?}");
+            assert_eq!(demand.servo_command(at_ms * MS), ServoCommand::Follow(motion));
+        }
+        assert!(demand.interpolate(7 * MS, 0.5, 0.26, 2e-3, 0.4), "backwards, too far");
+        let end = demand.at(9 * MS).unwrap();
+        assert!((end.position_m - 0.2696).abs() < 1e-12, "{end:?}");
+        assert!(!Demand::Force { force_n: 1.0 }.is_at_rest(20 * MS));
+        let mut demand = Demand::Brake;
+        assert_eq!(demand.servo_command(20 * MS), ServoCommand::Brake);
+        demand.slow_down(20 * MS, Motion { position_m: 0.27, velocity_m_s: 0.1 }, 10.0);
+        assert_eq!(demand.servo_command(21 * MS), ServoCommand::Brake, "a closed brake stays closed");
+    }
 }

@@ -36,3 +36,36 @@ impl FollowingErrorMonitor {
         *self = Self { outside_since_ns: None, is_fault: self.is_fault && is_in_fault };
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_following_error_counts_beyond_window_and_time_out() {
+        for error_m in [0.011, -0.011] {
+            let mut monitor = FollowingErrorMonitor::default();
+            let mut exceeds = |now_ns, error_m| monitor.exceeds(now_ns, error_m, 0.01, 20);
+            assert!(!exceeds(1000, 0.01) && !exceeds(2000, -0.01), "at the edge of the window");
+            assert!(!exceeds(3000, error_m) && !exceeds(3020, error_m));
+            assert!(exceeds(3021, error_m) && exceeds(3022, error_m));
+            assert!(!exceeds(3023, 0.0));
+            assert!(!exceeds(3024, error_m) && !exceeds(3044, error_m) && exceeds(3045, error_m), "anew");
+            monitor.restart(false);
+            assert!(!monitor.exceeds(3046, error_m, 0.01, 20), "anew");
+        }
+    }
+
+    #[test]
+    fn a_following_error_that_is_a_fault_is_one_as_long_as_the_drive_is_in_fault() {
+        let mut monitor = FollowingErrorMonitor::default();
+        monitor.restart(true);
+        assert!(!monitor.is_fault(), "another fault");
+        monitor.fail();
+        assert!(monitor.is_fault());
+        monitor.restart(true);
+        assert!(monitor.is_fault());
+        monitor.restart(false);
+        assert!(!monitor.is_fault());
+    }
+}

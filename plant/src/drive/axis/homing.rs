@@ -101,3 +101,14 @@ impl Homing {
         MotionCommand::SetHome { counts }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn methods_without_switches_are_offered() {
+        let methods: Vec<_> = (i8::MIN..=i8::MAX).filter(|&method| Homing::is_method(method)).collect();
+        assert_eq!(methods, [33, 34, 35, 37]);
+    }
+}

@@ -92,4 +92,20 @@ mod tests {
             assert_eq!(clamp(asked, [-1.0, 2.0]), kept);
         }
     }
+
+    #[test]
+    fn a_target_is_moved_to_the_nearest_end_of_what_is_allowed() {
+        let view = PositionView { actual: 0, allowed: [-20, 30] };
+        assert_eq!([-50, -20, 5, 30, 50].map(|target| view.clamp(target)), [-20, -20, 5, 30, 30]);
+    }
+
+    #[test]
+    fn a_mode_has_the_number_of_cia_402() {
+        let numbers: Vec<_> =
+            (i8::MIN..=i8::MAX).filter(|&number| Mode::from_number(number).is_some()).collect();
+        assert_eq!(numbers, [1, 6, 8, 10]);
+        for number in numbers {
+            assert_eq!(Mode::from_number(number).map(Mode::number), Some(number));
+        }
+    }
 }

@@ -140,13 +140,16 @@ mod tests {
 
     use super::*;
 
+    fn near(a: f64, b: f64) -> bool {
+        (a - b).abs() <= 1e-9 * b.abs()
+    }
+
     #[test]
     fn what_the_scenario_says_comes_back_in_si() {
         let drive = DrivesConfig::default().leg;
         let mut objects = Objects::new(NodeId::new(1).unwrap());
         configure(&mut objects, &drive, MILLISECOND_NS, [-5, 7]);
         let parameters = Parameters::from_objects(&objects, &drive);
-        let near = |a: f64, b: f64| (a - b).abs() < 1e-9;
         assert!(near(parameters.period_s, 1e-3));
         assert!(near(parameters.velocity_limit_m_s, drive.max_velocity_m_s));
         assert!(near(parameters.force_limit_n, drive.max_force_n));
@@ -155,5 +158,132 @@ mod tests {
         assert_eq!(parameters.position_limits, [-5, 7]);
         assert!(near(parameters.quick_stop_m_s2.unwrap(), drive.quick_stop_deceleration_m_s2));
         assert_eq!(parameters.abort_connection_option, 3, "quick stop");
+    }
+
+    /// A drive whose dictionary differs from its abilities in every limit.
+    fn objects() -> (Objects, DriveConfig) {
+        let drive = DriveConfig { encoder_resolution_m: 2e-6, ..DrivesConfig::default().leg };
+        let mut objects = Objects::new(NodeId::new(1).unwrap());
+        configure(&mut objects, &drive, MILLISECOND_NS, [-5, 7]);
+        objects.set(names::MAX_VELOCITY, 150_000);
+        objects.set(names::PROFILE_VELOCITY, 20_000);
+        objects.set(names::PROFILE_ACCELERATION, 3_000_000);
+        objects.set(names::PROFILE_DECELERATION, 4_000_000);
+        objects.set(names::QUICK_STOP_DECELERATION, 6_000_000);
+        objects.set(names::MAX_TORQUE, 1500);
+        objects.set(names::FOLLOWING_WINDOW, 700);
+        objects.set(names::FOLLOWING_TIMEOUT_MS, 30);
+        objects.set(names::POSITION_WINDOW, 40);
+        objects.set(names::HOME_OFFSET, 100);
+        objects.set(names::HOMING_METHOD, 34);
+        objects.set(names::HOMING_SPEED_ZERO, 5000);
+        objects.set(names::HOMING_ACCELERATION, 1_000_000);
+        objects.set(names::PERIOD_VALUE, 25);
+        objects.set(names::PERIOD_INDEX, -4);
+        (objects, drive)
+    }
+
+    #[test]
+    fn every_parameter_is_read_in_si() {
+        let (objects, drive) = objects();
+        let parameters = Parameters::from_objects(&objects, &drive);
+        assert!(near(parameters.period_s, 2.5e-3));
+        assert!(near(parameters.velocity_limit_m_s, 0.3));
+        assert!(near(parameters.force_limit_n, 750.0));
+        assert_eq!(parameters.position_limits, [-105, -93]);
+        assert!(near(parameters.following_window_m.unwrap(), 1.4e-3));
+        assert_eq!(parameters.following_timeout_ns, 30 * MILLISECOND_NS);
+        assert!(near(parameters.position_window_m, 80e-6));
+        let limits =
+            |limits: MotionLimits| [limits.velocity_m_s, limits.acceleration_m_s2, limits.deceleration_m_s2];
+        let found = [limits(parameters.profile), limits(parameters.homing)];
+        let expected = [[0.04, 6.0, 8.0], [0.01, 2.0, 2.0]];
+        assert!(
+            found.iter().flatten().zip(expected.iter().flatten()).all(|(a, b)| near(*a, *b)),
+            "{found:?}"
+        );
+        assert_eq!((parameters.homing_method, parameters.home_offset), (34, 100));
+    }
+
+    /// However high the dictionary's limits are.
+    #[test]
+    fn no_parameter_exceeds_the_abilities_of_the_drive() {
+        let (mut objects, drive) = objects();
+        for velocity in [names::MAX_VELOCITY, names::PROFILE_VELOCITY, names::HOMING_SPEED_ZERO] {
+            objects.set(velocity, 10_000_000);
+        }
+        objects.set(names::MAX_TORQUE, u16::MAX);
+        let parameters = Parameters::from_objects(&objects, &drive);
+        let velocities =
+            [parameters.velocity_limit_m_s, parameters.profile.velocity_m_s, parameters.homing.velocity_m_s];
+        assert!(velocities.iter().all(|velocity_m_s| near(*velocity_m_s, 0.4)), "{velocities:?}");
+        assert!(near(parameters.force_limit_n, 1000.0));
+    }
+
+    #[test]
+    fn stops_brake_or_slow_down_as_their_options_say() {
+        let (mut objects, drive) = objects();
+        let table = [
+            (0, None, false),
+            (1, Some(8.0), false),
+            (2, Some(12.0), false),
+            (5, Some(8.0), true),
+            (6, Some(12.0), true),
+        ];
+        for (option, ramp_m_s2, holds) in table {
+            objects.set(names::QUICK_STOP_OPTION, option);
+            objects.set(names::FAULT_OPTION, 2);
+            let parameters = Parameters::from_objects(&objects, &drive);
+            assert_eq!(
+                (parameters.quick_stop_m_s2, parameters.holds_quick_stop),
+                (ramp_m_s2, holds),
+                "{option}"
+            );
+            assert_eq!(parameters.fault_stop_m_s2, Some(12.0));
+            objects.set(names::FAULT_OPTION, option);
+            assert_eq!(Parameters::from_objects(&objects, &drive).fault_stop_m_s2, ramp_m_s2, "{option}");
+        }
+        objects.set(names::FOLLOWING_WINDOW, u32::MAX);
+        assert_eq!(Parameters::from_objects(&objects, &drive).following_window_m, None);
+    }
+
+    #[test]
+    fn a_new_drive_has_its_abilities_in_its_dictionary() {
+        let read = |drive: &DriveConfig| {
+            let mut objects = Objects::new(NodeId::new(1).unwrap());
+            configure(&mut objects, drive, 2 * MILLISECOND_NS, [-5, 7]);
+            let window = objects.get(names::POSITION_WINDOW);
+            assert_eq!(
+                (objects.get(names::MIN_POSITION_LIMIT), objects.get(names::MAX_POSITION_LIMIT)),
+                (-5, 7)
+            );
+            assert_eq!((objects.get(names::FOLLOWING_TIMEOUT_MS), objects.get(names::PERIOD_VALUE)), (20, 2));
+            let numbers = [
+                names::FOLLOWING_WINDOW,
+                names::MAX_VELOCITY,
+                names::PROFILE_VELOCITY,
+                names::PROFILE_ACCELERATION,
+                names::PROFILE_DECELERATION,
+                names::QUICK_STOP_DECELERATION,
+                names::HOMING_SPEED_SWITCH,
+                names::HOMING_SPEED_ZERO,
+                names::HOMING_ACCELERATION,
+            ];
+            (numbers.map(|number| objects.get(number)), objects.get(names::MAX_TORQUE), window)
+        };
+        let drive = DriveConfig { max_force_n: 600.0, encoder_noise_m: 5e-6, ..DrivesConfig::default().leg };
+        let (numbers, torque, window) = read(&drive);
+        let ramp = 10_000_000;
+        let expected = [2000, 400_000, 100_000, ramp / 4, ramp / 4, ramp, 20_000, 4000, ramp / 4];
+        assert_eq!((numbers, torque, window), (expected, 1200, 50));
+        // A drive slower than an increment a second can still be moved.
+        let slow = DriveConfig {
+            max_velocity_m_s: 1e-9,
+            quick_stop_deceleration_m_s2: 1e-9,
+            encoder_noise_m: 0.0,
+            ..drive
+        };
+        let (numbers, _, window) = read(&slow);
+        assert_eq!((numbers, window), ([2000, 1, 1, 1, 1, 1, 1, 1, 1], 10));
     }
 }

@@ -9,9 +9,9 @@ use crate::drive::dictionary::names::{ERROR_CODE, ERROR_COUNT, ERROR_REGISTER, N
 use crate::drive::dictionary::{HISTORY, Objects};
 
 /// Bits of the error register (1001h).
-const GENERIC: u8 = 1 << 0;
-const COMMUNICATION: u8 = 1 << 4;
-const PROFILE: u8 = 1 << 5;
+const GENERIC: u8 = 0x01;
+const COMMUNICATION: u8 = 0x10;
+const PROFILE: u8 = 0x20;
 
 /// The number of errors that the drive can report: room for each of them once.
 const COUNT: usize = 9;
@@ -135,7 +135,10 @@ mod tests {
         assert_eq!(objects.get(ERROR_COUNT), 8);
         let history = |place: usize| objects.words[NEWEST_ERROR.place + place];
         assert_eq!([history(0), history(1), history(7)], [0x8220, 0x8210, 0x8210]);
+        let [before, behind] = [ERROR_COUNT.place - 1, NEWEST_ERROR.place + HISTORY];
+        (objects.words[before], objects.words[behind]) = (77, 77);
         clear_history(&mut objects);
         assert_eq!((objects.get(ERROR_COUNT), objects.get(NEWEST_ERROR)), (0, 0));
+        assert_eq!([before, NEWEST_ERROR.place + 7, behind].map(|place| objects.words[place]), [77, 0, 77]);
     }
 }

@@ -141,3 +141,56 @@ fn a_search_never_goes_against_its_direction() {
     bench.run_ms(100);
     assert!(bench.has(StatusBit::HOMING_ERROR) && bench.is_near(0));
 }
+
+/// Fast, so that the axis takes 40 ms to stop behind the mark. The controlword may come again meanwhile.
+#[test]
+fn a_home_is_attained_once_the_axis_stands_and_stays_so() {
+    let mut bench = Bench::enabled(HOMING);
+    bench.write((0x6098, 0), &[34]).unwrap();
+    bench.write((0x6099, 2), &100_000_u32.to_le_bytes()).unwrap();
+    bench.control(0x1F);
+    let attained = (1..1000).find(|_| {
+        bench.control(0x1F);
+        bench.run_ms(1);
+        bench.has(StatusBit::HOMING_ATTAINED)
+    });
+    assert!(attained.is_some() && bench.velocity_m_s.abs() < 5e-3, "{} m/s", bench.velocity_m_s);
+    bench.control(0x0F);
+    assert!(bench.has(StatusBit::HOMING_ATTAINED));
+}
+
+#[test]
+fn homing_that_was_interrupted_reaches_its_target_only_at_rest() {
+    let mut bench = Bench::enabled(HOMING);
+    bench.write((0x6098, 0), &[34]).unwrap();
+    bench.write((0x6099, 2), &50_000_u32.to_le_bytes()).unwrap();
+    bench.control(0x1F);
+    bench.run_ms(15);
+    for word in [0x0F, 0x10F] {
+        bench.control(word);
+        assert!(!bench.has(StatusBit::TargetReached), "it slows down");
+    }
+    bench.run_ms(100);
+    assert!(bench.has(StatusBit::TargetReached) && !bench.has(StatusBit::HOMING_ATTAINED));
+}
+
+/// Bit 8 (halt) beside bit 4.
+#[test]
+fn homing_does_not_start_while_it_is_halted_and_ends_at_a_halt() {
+    let mut bench = Bench::enabled(HOMING);
+    bench.write((0x6098, 0), &[34]).unwrap();
+    bench.run_ms(20);
+    let start = bench.position();
+    bench.control(0x11F);
+    bench.run_ms(100);
+    assert!(bench.is_near(start), "{}", bench.position() - start);
+    bench.control(0x1F);
+    bench.run_ms(100);
+    assert!(bench.position() > start + 100);
+    bench.control(0x11F);
+    bench.run_ms(20);
+    let halted = bench.position();
+    bench.run_ms(400);
+    assert!(bench.is_near(halted), "{}", bench.position() - halted);
+    assert!(!bench.has(StatusBit::HOMING_ATTAINED) && bench.has(StatusBit::TargetReached));
+}

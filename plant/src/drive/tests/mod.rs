@@ -1,6 +1,7 @@
 //! Scenarios of a single drive that moves a mass, driven by frames alone.
 
 mod communication;
+mod cyclic;
 mod homing;
 mod modes;
 mod objects;

@@ -1,14 +1,17 @@
 //! Scenarios of the master with scripted drives.
 
 mod boot;
+mod lost;
 mod peer;
 mod recovery;
+mod stops;
+mod targets;
 
 use masseter_can::canopen::NodeId;
 use masseter_can::cia402::DriveState;
 use masseter_shared::config::Scenario;
 use masseter_shared::geometry::AXES;
-use masseter_shared::messages::codes::{BootPhase, Cause, DriveRequest, EventKind, Source};
+use masseter_shared::messages::codes::{BootPhase, Cause, DriveRequest, EventKind, NO_DRIVE_STATE, Source};
 use masseter_shared::messages::{Command, Event, LAYOUT_VERSION, Reading};
 use masseter_shared::realtime::Wake;
 
@@ -26,6 +29,8 @@ struct Bench {
     reading: Reading,
     events: Vec<Event>,
     cycle: u64,
+    /// How far the targets of its commands are beyond the measured positions, m.
+    offset_m: f64,
 }
 
 impl Bench {
@@ -40,6 +45,7 @@ impl Bench {
             reading: Reading::default(),
             events: Vec::new(),
             cycle: 0,
+            offset_m: 0.0,
         }
     }
 
@@ -54,6 +60,11 @@ impl Bench {
 
     /// A cycle with that request, or without any command.
     fn cycle(&mut self, request: Option<DriveRequest>) {
+        self.cycle_with(|command| Some(Command { request: request?.code(), ..command }));
+    }
+
+    /// A cycle with the command that `make` makes of one without a request.
+    fn cycle_with(&mut self, make: impl FnOnce(Command) -> Option<Command>) {
         self.cycle += 1;
         let sync_ns = self.now_ns();
         let wake = Wake::on_time(self.cycle, sync_ns);
@@ -61,19 +72,26 @@ impl Bench {
         self.master.begin_cycle(wake, &mut self.wires);
         self.master.collect(sync_ns + 500_000, &mut self.wires);
         self.master.fill_reading(&mut self.reading);
-        let command = request.map(|request| Command {
-            cycle: self.cycle,
-            target_m: self.reading.position_m,
-            request: request.code(),
-            version: LAYOUT_VERSION,
-            ..Command::default()
-        });
+        let target_m = self.reading.position_m.map(|position_m| position_m + self.offset_m);
+        let cycle = self.cycle;
+        let command = make(Command { cycle, target_m, version: LAYOUT_VERSION, ..Command::default() });
         self.master.apply(sync_ns + 550_000, command.as_ref(), &mut self.wires);
         self.master.drain_events(&mut |event| self.events.push(event));
     }
 
     fn cycles(&mut self, count: u64, request: DriveRequest) {
         (0..count).for_each(|_| self.cycle(Some(request)));
+    }
+
+    /// Cycles without motion, until the boot of an axis is in that phase.
+    fn cycles_until(&mut self, axis: usize, phase: BootPhase) {
+        for _ in 0..5000 {
+            if self.master.drives[axis].boot_phase() == phase {
+                return;
+            }
+            self.cycle(Some(DriveRequest::Off));
+        }
+        panic!("{phase} was not reached, but {}", self.master.drives[axis].boot_phase());
     }
 
     /// Boots and enables all drives.

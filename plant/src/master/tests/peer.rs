@@ -16,7 +16,7 @@ use super::PERIOD_NS;
 use crate::link::Buses;
 
 const HEARTBEAT_NS: u64 = 50 * PERIOD_NS;
-/// Position of every drive, increments.
+/// Position of every drive as it is switched on, increments.
 pub(super) const POSITION: i32 = 1234;
 
 /// A drive.
@@ -41,6 +41,14 @@ pub(super) struct Peer {
     pub(super) requests: Vec<(u64, SdoRequest)>,
     controlword: Controlword,
     buffered: Option<Rpdo1>,
+    /// Its torque, ‰ of the rated one.
+    pub(super) torque_permille: i16,
+    /// Its position, increments.
+    pub(super) position: i32,
+    /// Whether targets may be elsewhere than it is.
+    pub(super) may_move: bool,
+    /// The targets it received, each with the state that it was in.
+    pub(super) targets: Vec<(DriveState, i32)>,
     pub(super) next_beat_ns: u64,
 }
 
@@ -82,6 +90,10 @@ impl Peer {
             requests: Vec::new(),
             controlword: Controlword::DISABLE_VOLTAGE,
             buffered: None,
+            torque_permille: 0,
+            position: POSITION,
+            may_move: false,
+            targets: Vec::new(),
             next_beat_ns: 0,
         }
     }
@@ -128,7 +140,11 @@ impl Peer {
         match Cob::try_from(frame.id()).unwrap() {
             Cob::Nmt => self.obey(Nmt::decode(frame.data()).unwrap()),
             Cob::Sync if self.nmt == Some(NmtState::Operational) => self.synchronise(out),
-            Cob::Rpdo1(id) if id == self.id => self.buffered = Some(Rpdo1::decode(frame.data()).unwrap()),
+            Cob::Rpdo1(id) if id == self.id => {
+                let rpdo = Rpdo1::decode(frame.data()).unwrap();
+                self.targets.push((self.power, rpdo.target_increments));
+                self.buffered = Some(rpdo);
+            }
             Cob::SdoRequest(id) if id == self.id => {
                 let request = SdoRequest::decode(frame.data()).unwrap();
                 self.requests.push((now_ns, request));
@@ -154,13 +170,13 @@ impl Peer {
 
     fn synchronise(&mut self, out: &mut Vec<Frame>) {
         if let Some(rpdo) = self.buffered.take() {
-            assert_eq!(rpdo.target_increments, POSITION, "no request moves it");
+            assert!(self.may_move || rpdo.target_increments == self.position, "no request moves it");
             self.control(rpdo.controlword);
         }
         self.complete();
         let statusword = Statusword::for_state(self.power);
-        for actual_increments in self.twin_position.into_iter().chain([POSITION]) {
-            let tpdo = Tpdo1 { statusword, actual_increments, torque_permille: 0 };
+        for actual_increments in self.twin_position.into_iter().chain([self.position]) {
+            let tpdo = Tpdo1 { statusword, actual_increments, torque_permille: self.torque_permille };
             out.push(tpdo.frame(self.id));
         }
     }

@@ -65,9 +65,7 @@ fn a_drive_that_boots_again_during_a_stop_is_configured_from_the_first_object_on
         // The one that is missing keeps the other from being started.
         bench.drive(0).is_dead = phase == BootPhase::Configured;
         bench.drive(5).cycle_power();
-        while bench.master.drives[5].boot_phase() != phase {
-            bench.cycle(Some(DriveRequest::Off));
-        }
+        bench.cycles_until(5, phase);
         bench.cycles(10, DriveRequest::Off);
         bench.drive(2).is_reacting = true;
         bench.cycles(5, DriveRequest::Off);
@@ -85,9 +83,7 @@ fn a_drive_that_boots_again_during_a_stop_is_configured_from_the_first_object_on
 #[test]
 fn a_drive_that_became_operational_is_not_given_up_for_another_that_is_lost() {
     let mut bench = Bench::new();
-    while bench.master.drives[3].boot_phase() != BootPhase::Starting {
-        bench.cycle(Some(DriveRequest::Off));
-    }
+    bench.cycles_until(3, BootPhase::Starting);
     bench.drive(3).nmt = Some(NmtState::PreOperational);
     bench.cycles(20, DriveRequest::Off);
     bench.drive(0).is_dead = true;
