@@ -1,7 +1,12 @@
-//! Every kind of fault, at every node and message, for several durations, at four instants of the motion: what it does to
-//! the jaw and what detects it, as a table. Takes minutes, so it runs on request:
+//! Every kind of fault, at every node and message, for several durations, at several instants of the motion: what it does to
+//! the jaw and what detects it, as a table. None may lead the jaw beyond the limits. CI takes half of the durations and of
+//! the instants; all of them take four times as long:
 //!
-//!     cargo test --release --test fault_table -- --ignored
+//!     cargo test --release --test fault_table -- --ignored half
+//!     cargo test --release --test fault_table -- --ignored whole
+//!
+//! The table lacks the loss of SDO, EMCY and NMT messages, delays other than 1.5 ms, faults that act on a part of the
+//! frames, and two faults at a time. The motion is the default one, at 1 kHz, without food.
 
 mod common;
 
@@ -14,8 +19,10 @@ use masseter_shared::config::{ChecksConfig, FaultConfig, FaultKindConfig, Scenar
 use rayon::prelude::*;
 
 const CYCLES: [u32; 8] = [1, 2, 5, 10, 20, 50, 100, 500];
+const HALF_OF_CYCLES: [u32; 4] = [1, 5, 20, 100];
 /// Since switch-on: while easing, while chewing, and where the legs move fastest.
 const FROM_S: [f64; 4] = [0.7, 2.5, 3.0, 3.25];
+const HALF_OF_FROM_S: [f64; 2] = [2.5, 3.25];
 /// Every message is sent within so many cycles.
 const SENT_WITHIN: u32 = 100;
 const NEVER_STRUCK: &str = "never struck";
@@ -77,7 +84,7 @@ fn or_none(value: Option<impl Display>) -> String {
     value.map_or_else(String::new, |value| value.to_string())
 }
 
-/// A row, and whether the run passed although the jaw left its path by more than the limits.
+/// A row, and whether the fault never struck although its message was due, or led the jaw beyond the limits.
 fn row(fault: &FaultConfig, cycles: u32, from_s: f64) -> (String, bool) {
     let until_s = Some(from_s + f64::from(cycles) * 1e-3);
     let faults = vec![FaultConfig { from_s, until_s, ..*fault }];
@@ -100,15 +107,26 @@ fn row(fault: &FaultConfig, cycles: u32, from_s: f64) -> (String, bool) {
         detection["cause"].as_str().unwrap_or_default(),
         or_none(detection["latency_ms"].as_f64()),
     );
-    // Heartbeats are rarer than the shorter faults.
-    assert!(cycles < SENT_WITHIN || verdict != NEVER_STRUCK, "{row}");
     let ChecksConfig { tracking_max_mm, tracking_max_deg, .. } = ChecksConfig::default();
-    (row, verdict == "PASS" && (mm > tracking_max_mm || deg > tracking_max_deg))
+    // Heartbeats are rarer than the shorter faults.
+    let is_missing = cycles >= SENT_WITHIN && verdict == NEVER_STRUCK;
+    (row, is_missing || mm > tracking_max_mm || deg > tracking_max_deg)
 }
 
 #[test]
 #[ignore = "takes minutes; a step of CI runs it"]
-fn no_fault_leads_the_jaw_beyond_the_limits_and_passes() {
+fn no_fault_of_half_of_the_table_leads_the_jaw_beyond_the_limits() {
+    judge("fault-table.csv", &HALF_OF_CYCLES, &HALF_OF_FROM_S);
+}
+
+#[test]
+#[ignore = "takes four times as long"]
+fn no_fault_of_the_whole_table_leads_the_jaw_beyond_the_limits() {
+    judge("fault-table-whole.csv", &CYCLES, &FROM_S);
+}
+
+/// Plays every fault for every duration at every instant, and leaves the table in the file.
+fn judge(file: &str, cycles: &[u32], from_s: &[f64]) {
     let can = Scenario::default().can;
     let of_bus = |(bus, axes): (usize, &Vec<usize>)| {
         let nodes: Vec<_> = axes.iter().map(|&axis| can.node_ids[axis]).collect();
@@ -118,19 +136,19 @@ fn no_fault_leads_the_jaw_beyond_the_limits_and_passes() {
     let cases: Vec<_> = faults
         .iter()
         .flat_map(|fault| {
-            CYCLES.into_iter().flat_map(move |cycles| FROM_S.map(|from_s| (fault, cycles, from_s)))
+            cycles.iter().flat_map(move |&cycles| from_s.iter().map(move |&from_s| (fault, cycles, from_s)))
         })
         .collect();
     let rows: Vec<_> =
         cases.into_par_iter().map(|(fault, cycles, from_s)| row(fault, cycles, from_s)).collect();
     let header = "kind,bus,node,id,cycles,from_s,deviation_mm,deviation_deg,detected_by,latency_ms,verdict\n";
     let table = rows.iter().map(|(row, _)| row.as_str()).collect::<String>();
-    let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join("fault-table.csv");
+    let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join(file);
     fs::write(&path, header.to_owned() + &table).expect("the table is written");
     let wrong: String = rows.iter().filter(|(_, is_wrong)| *is_wrong).map(|(row, _)| row.as_str()).collect();
     assert!(
         wrong.is_empty(),
-        "passed beyond the limits, of the rows in {}:\n{header}{wrong}",
+        "beyond the limits or never struck, of the rows in {}:\n{header}{wrong}",
         path.display()
     );
 }

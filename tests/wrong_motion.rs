@@ -3,11 +3,8 @@
 mod common;
 
 use common::{Workspace, check, stdout};
+use masseter_shared::config::ChecksConfig;
 use serde_json::Value;
-
-/// The largest deviation that may go undetected: the default limits of the checks.
-const LIMIT_MM: f64 = 0.5;
-const LIMIT_DEG: f64 = 0.5;
 
 /// Drive l1 misses its targets for so many cycles from `from_s` on.
 fn deaf_drive(from_s: f64, cycles: u32) -> String {
@@ -19,7 +16,8 @@ fn deaf_drive(from_s: f64, cycles: u32) -> String {
 
 fn is_beyond(fault: &Value) -> bool {
     let [mm, deg] = ["deviation_mm", "deviation_deg"].map(|key| fault[key].as_f64().unwrap());
-    mm > LIMIT_MM || deg > LIMIT_DEG
+    let ChecksConfig { tracking_max_mm, tracking_max_deg, .. } = ChecksConfig::default();
+    mm > tracking_max_mm || deg > tracking_max_deg
 }
 
 /// Also where the legs move fastest, 3.25 s after switch-on.
@@ -37,23 +35,43 @@ fn a_drive_that_misses_its_targets_is_detected_before_the_jaw_is_far_from_its_pa
     }
 }
 
-/// Whether the run is played to its end or a safe stop comes too late.
+/// Nobody watches the drives closely, and the controller only beyond `limit_m`.
+fn lax(limit_m: f64) -> Workspace {
+    let limits = format!(
+        "[can]\nfollowing_limit_m = 1.0\n[controller]\ntracking_limit_m = {limit_m}\ntracking_limit_rad = 1.0\n\
+         tracking_rms_limit_m = 1.0\ntracking_rms_limit_rad = 1.0"
+    );
+    Workspace::new(&(deaf_drive(2.5, 80) + &limits))
+}
+
 #[test]
 fn a_fault_that_leads_the_jaw_far_from_its_path_fails_the_run_where_supervision_is_lax() {
-    for limit_m in [1.0, 1.5e-3] {
-        let lax = format!(
-            "[controller]\ntracking_limit_m = {limit_m}\ntracking_limit_rad = 1.0\ntracking_rms_limit_m = 1.0\n\
-             tracking_rms_limit_rad = 1.0"
-        );
-        let workspace = Workspace::new(&(deaf_drive(2.5, 80) + &lax));
-        let output = workspace.run_virtual(&[]);
-        let summary = workspace.summary();
-        let fault = &summary["figures"]["faults"][0];
-        // Who watches the drives themselves may stop the rig before.
-        let expected = if is_beyond(fault) { (Some(1), "failed") } else { (Some(5), "passed") };
-        let found = (output.status.code(), check(&summary, "faults")["result"].as_str().unwrap());
-        assert_eq!(found, expected, "{}", stdout(&output));
+    let workspace = lax(1.0);
+    let output = workspace.run_virtual(&[]);
+    let summary = workspace.summary();
+    let found = (output.status.code(), check(&summary, "faults")["result"].as_str().unwrap());
+    assert_eq!(found, (Some(1), "failed"), "{}", stdout(&output));
+    let fault = &summary["figures"]["faults"][0];
+    assert!(is_beyond(fault) && fault["detection"].is_null(), "{fault}");
+}
+
+/// The stop at 1.5 mm is three limits too late.
+#[test]
+fn a_safe_stop_that_comes_too_late_fails_the_run() {
+    let workspace = lax(1.5e-3);
+    let output = workspace.run_virtual(&[]);
+    let summary = workspace.summary();
+    for name in ["faults", "tracking"] {
+        assert_eq!(check(&summary, name)["result"], "failed", "{}", stdout(&output));
     }
+    assert_eq!(output.status.code(), Some(1), "{}", stdout(&output));
+    let fault = &summary["figures"]["faults"][0];
+    assert_eq!(fault["detection"]["cause"], "tracking_lost", "{fault}");
+    let (deviation_mm, latency_ms) = (&fault["deviation_mm"], &fault["detection"]["latency_ms"]);
+    assert!((1.5..1.7).contains(&deviation_mm.as_f64().unwrap()), "{fault}");
+    assert!((5.0..40.0).contains(&latency_ms.as_f64().unwrap()), "{fault}");
+    let peak_mm = summary["figures"]["tracking"]["incisal_max_mm"].as_f64().unwrap();
+    assert!((1.5..1.7).contains(&peak_mm), "{peak_mm}");
 }
 
 /// The drive interpolates to its next target, as after a late SYNC.

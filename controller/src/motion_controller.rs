@@ -52,7 +52,7 @@ pub struct MotionController {
     acknowledgement: CommandAcknowledgement,
     control: PoseControl,
     supervision: PathSupervision,
-    /// By how many cycles the platform may be elsewhere on its path.
+    /// By how many cycles the platform may be earlier or later on its path.
     slack_cycles: f64,
     /// Cycles in this state since the desired pose no longer changes.
     cycles_at_rest: u64,
@@ -95,8 +95,8 @@ impl MotionController {
             && self.sequencer.silent_cycles == 0
         {
             let slack_s = self.slack_cycles * period_s;
-            let elsewhere = self.playback.pose_ahead(-self.sample_age_s() - slack_s);
-            self.supervision.check(&desired, &estimate.solution.pose, &elsewhere)?;
+            let earlier = self.playback.pose_ahead(-self.sample_age_s() - slack_s);
+            self.supervision.check(&desired, &estimate.solution.pose, &earlier)?;
             self.control.observe(&desired, &estimate.solution.pose, period_s);
         }
         let joints = self.mechanism.inverse(&self.corrected_pose())?;

@@ -3,7 +3,7 @@
 //!
 //! The drives interpolate between SYNCs, and hold their targets while a command is missing. So after a SYNC or a command
 //! that came at another time than planned, the platform is elsewhere on its path. What the motion makes in that time is no
-//! deviation.
+//! deviation: that is the slack.
 
 use masseter_shared::config::Scenario;
 use masseter_shared::geometry::{Deviation, Pose};
@@ -30,13 +30,14 @@ struct Supervised {
 }
 
 impl Supervised {
-    /// Takes a value, of which `allowance` is no deviation.
-    fn check(&mut self, value: f64, allowance: f64, share: f64) -> Result<(), Fault> {
-        let excess = (value - allowance).max(0.0);
-        self.mean_square += (excess * excess - self.mean_square) * share;
+    /// Takes a value, of which `slack` is no deviation. What is no number is infinitely far.
+    fn check(&mut self, value: f64, slack: f64, share: f64) -> Result<(), Fault> {
+        let beyond_slack = value - slack;
+        let deviation = if beyond_slack.is_finite() { beyond_slack.max(0.0) } else { f64::INFINITY };
+        self.mean_square += (deviation * deviation - self.mean_square) * share;
         let rms = self.mean_square.sqrt();
-        if excess > self.limit {
-            Err(Fault::new(self.cause, value, self.limit + allowance))
+        if deviation > self.limit {
+            Err(Fault::new(self.cause, value, self.limit + slack))
         } else if rms > self.rms_limit {
             Err(Fault::new(self.cause, rms, self.rms_limit))
         } else {
@@ -80,7 +81,7 @@ impl PathSupervision {
         }
     }
 
-    /// By how many cycles the platform may be elsewhere on its path, as a new estimate is taken.
+    /// The slack in cycles, as a new estimate is taken.
     pub(crate) fn slack_cycles(&mut self, estimate: &Estimate) -> f64 {
         let Estimate { reading_cycle, answers_cycle, sampled_ns, .. } = *estimate;
         let apart_ns = sampled_ns.saturating_sub(self.last_sampled_ns);
@@ -92,12 +93,12 @@ impl PathSupervision {
         self.recent_slack.iter().copied().fold(0.0, f64::max)
     }
 
-    /// Compares desired and estimated pose at one instant; `elsewhere` is the desired pose by the slack before.
-    pub(crate) fn check(&mut self, desired: &Pose, estimated: &Pose, elsewhere: &Pose) -> Result<(), Fault> {
+    /// Compares desired and estimated pose at one instant; `earlier` is the desired pose by the slack before.
+    pub(crate) fn check(&mut self, desired: &Pose, estimated: &Pose, earlier: &Pose) -> Result<(), Fault> {
         let between = |to| Deviation::between(desired, to, self.incisal_m);
-        let (found, allowance) = (between(estimated), between(elsewhere));
-        let position = self.position.check(found.incisal_m, allowance.incisal_m, self.share);
-        let orientation = self.orientation.check(found.angle_rad, allowance.angle_rad, self.share);
+        let (found, slack) = (between(estimated), between(earlier));
+        let position = self.position.check(found.incisal_m, slack.incisal_m, self.share);
+        let orientation = self.orientation.check(found.angle_rad, slack.angle_rad, self.share);
         position.and(orientation)
     }
 }
@@ -150,6 +151,28 @@ mod tests {
                 assert_eq!((fault.cause, fault.axis, fault.limit), (cause, None, limit));
                 assert!((fault.value / (1.01 * limit) - 1.0).abs() < 1e-9, "{fault:?}");
             }
+        }
+    }
+
+    /// Positions without a number stop by the position; of a turn without one, the incisal point is nowhere either.
+    #[test]
+    fn a_pose_that_is_no_number_is_a_fault_wherever_it_stands() {
+        let here = Pose::identity();
+        for number in [f64::NAN, f64::INFINITY] {
+            for nowhere in [Pose::translation(0.0, number, 0.0), Pose::new(Vec3::zeros(), Vec3::x() * number)]
+            {
+                for [desired, estimated, earlier] in
+                    [[&nowhere, &here, &here], [&here, &nowhere, &here], [&here, &here, &nowhere]]
+                {
+                    let fault = supervision().check(desired, estimated, earlier).unwrap_err();
+                    assert_eq!(fault.cause, Cause::TrackingLost);
+                }
+            }
+        }
+        for (value, slack) in [(f64::NAN, 0.0), (0.0, f64::NAN), (f64::INFINITY, f64::INFINITY)] {
+            let PathSupervision { position, orientation, .. } = &mut supervision();
+            position.check(value, slack, 1.0).unwrap_err();
+            orientation.check(value, slack, 1.0).unwrap_err();
         }
     }
 

@@ -1,13 +1,15 @@
-//! Each declared fault: when it first struck, what detected it, and how far the platform left its path until then.
+//! Each declared fault: when it first struck, what detected it and began a safe stop, and how far the platform left its path
+//! until then.
 
 use std::collections::VecDeque;
 
 use masseter_shared::geometry::Deviation;
-use masseter_shared::messages::codes::{Cause, EventKind, Source};
+use masseter_shared::messages::codes::{Cause, ControllerState, EventKind, Source};
 use serde::Serialize;
 
 use super::code::Code;
 use super::events::EventRecord;
+use super::pose_errors::worse;
 use super::tracking::PathSample;
 
 /// A declared fault and its effect.
@@ -17,15 +19,15 @@ pub struct FaultFigures {
     pub number: usize,
     /// When it first struck, ns of the run's clock; none where it never did.
     pub struck_ns: Option<u64>,
-    /// Largest distance of the incisal point from its path, from then until the detection, or else the motion's end, mm.
+    /// Largest distance of the incisal point from its path, from then until a safe stop began, or else the motion's end, mm.
     pub deviation_mm: f64,
     /// Largest angle in that time, degrees.
     pub deviation_deg: f64,
-    /// The first event of kind fault from then on; none without.
+    /// What began the first safe stop from then on; none without.
     pub detection: Option<Detection>,
 }
 
-/// The first reaction to a fault.
+/// The event that begins a safe stop: the controller's or the master's.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Detection {
     /// Who reported it.
@@ -46,20 +48,21 @@ const KEPT: usize = 1 << 13;
 /// Follows the declared faults.
 #[derive(Debug)]
 pub(super) struct FaultWatch {
-    faults: Vec<Followed>,
-    reactions: Vec<Reaction>,
+    faults: Vec<Effect>,
+    stops: Vec<Stop>,
     recent: VecDeque<PathSample>,
 }
 
 #[derive(Debug, Clone, Copy, Default)]
-struct Followed {
+struct Effect {
     struck_ns: Option<u64>,
     largest: Deviation,
     last: Deviation,
 }
 
+/// The beginning of a safe stop.
 #[derive(Debug, Clone, Copy)]
-struct Reaction {
+struct Stop {
     time_ns: u64,
     source: Code<Source>,
     cause: Code<Cause>,
@@ -68,7 +71,7 @@ struct Reaction {
 impl FaultWatch {
     pub(super) fn new(declared: usize) -> Self {
         let recent = VecDeque::with_capacity(if declared > 0 { KEPT } else { 0 });
-        Self { faults: vec![Followed::default(); declared], reactions: Vec::new(), recent }
+        Self { faults: vec![Effect::default(); declared], stops: Vec::new(), recent }
     }
 
     pub(super) fn event(&mut self, event: &EventRecord) {
@@ -78,8 +81,8 @@ impl FaultWatch {
         {
             fault.struck_ns = Some(fault.struck_ns.map_or(time_ns, |struck_ns| struck_ns.min(time_ns)));
         }
-        if event.kind == EventKind::Fault && !self.faults.is_empty() {
-            self.reactions.push(Reaction { time_ns, source, cause });
+        if begins_stop(event) && !self.faults.is_empty() {
+            self.stops.push(Stop { time_ns, source, cause });
         }
     }
 
@@ -95,21 +98,19 @@ impl FaultWatch {
         self.recent.push_back(sample);
     }
 
-    /// Counts a sample for every fault that had struck and was not detected.
+    /// Counts a sample for every fault that had struck, until the stop.
     fn settle(&mut self, sample: &PathSample) {
         for fault in &mut self.faults {
             let Some(struck_ns) = fault.struck_ns.filter(|struck_ns| *struck_ns <= sample.sampled_ns) else {
                 continue;
             };
-            if first_reaction(&self.reactions, struck_ns)
-                .is_none_or(|found| sample.sampled_ns <= found.time_ns)
-            {
+            if first_stop(&self.stops, struck_ns).is_none_or(|found| sample.sampled_ns <= found.time_ns) {
                 let Deviation { origin_m, incisal_m, angle_rad } = sample.deviation;
                 fault.last = sample.deviation;
                 fault.largest = Deviation {
-                    origin_m: fault.largest.origin_m.max(origin_m),
-                    incisal_m: fault.largest.incisal_m.max(incisal_m),
-                    angle_rad: fault.largest.angle_rad.max(angle_rad),
+                    origin_m: worse(fault.largest.origin_m, origin_m),
+                    incisal_m: worse(fault.largest.incisal_m, incisal_m),
+                    angle_rad: worse(fault.largest.angle_rad, angle_rad),
                 };
             }
         }
@@ -119,14 +120,14 @@ impl FaultWatch {
         while let Some(sample) = self.recent.pop_front() {
             self.settle(&sample);
         }
-        let figures = |(index, fault): (usize, &Followed)| {
-            let reaction = fault.struck_ns.and_then(|struck_ns| first_reaction(&self.reactions, struck_ns));
+        let figures = |(index, fault): (usize, &Effect)| {
+            let stop = fault.struck_ns.and_then(|struck_ns| first_stop(&self.stops, struck_ns));
             FaultFigures {
                 number: index + 1,
                 struck_ns: fault.struck_ns,
                 deviation_mm: fault.largest.incisal_m * 1e3,
                 deviation_deg: fault.largest.angle_rad.to_degrees(),
-                detection: reaction.map(|Reaction { time_ns, source, cause }| Detection {
+                detection: stop.map(|Stop { time_ns, source, cause }| Detection {
                     source,
                     cause,
                     latency_ms: (time_ns - fault.struck_ns.unwrap_or(time_ns)) as f64 / 1e6,
@@ -139,8 +140,15 @@ impl FaultWatch {
     }
 }
 
-fn first_reaction(reactions: &[Reaction], struck_ns: u64) -> Option<Reaction> {
-    reactions.iter().filter(|found| found.time_ns >= struck_ns).min_by_key(|found| found.time_ns).copied()
+/// The master's faults all stop the drives. A drive's emergency alone stops nothing.
+fn begins_stop(event: &EventRecord) -> bool {
+    let is_safe_stop = |[_, to]: &[String; 2]| to == ControllerState::SafeStop.name();
+    (event.source == Source::Controller && event.transition.as_ref().is_some_and(is_safe_stop))
+        || (event.source == Source::Master && event.kind == EventKind::Fault)
+}
+
+fn first_stop(stops: &[Stop], struck_ns: u64) -> Option<Stop> {
+    stops.iter().filter(|found| found.time_ns >= struck_ns).min_by_key(|found| found.time_ns).copied()
 }
 
 #[cfg(test)]
@@ -153,14 +161,20 @@ mod tests {
         (&Event { time_ns, value, ..Event::new(source, kind, cause) }).into()
     }
 
+    fn safe_stop(time_ns: u64) -> EventRecord {
+        let [from, to] = [ControllerState::Running, ControllerState::SafeStop].map(ControllerState::code);
+        let fault = Event::new(Source::Controller, EventKind::Fault, Cause::MasterFault);
+        (&Event { time_ns, from, to, ..fault }).into()
+    }
+
     fn sample(sampled_ns: u64, incisal_m: f64) -> PathSample {
         let deviation = Deviation { incisal_m, angle_rad: 10.0 * incisal_m, origin_m: 0.0 };
         PathSample { sampled_ns, deviation }
     }
 
-    /// Fault 1 strikes at 1 ms and is detected at 3.5 ms; fault 2 strikes after that; fault 3 never.
+    /// Fault 1 strikes at 1 ms, a drive reports an emergency at 1.5 ms, and the master stops at 3.5 ms; fault 2 strikes after that; fault 3 never.
     #[test]
-    fn the_path_is_followed_from_the_strike_to_the_first_reaction_whatever_comes_first() {
+    fn the_path_is_followed_from_the_strike_to_the_stop_whatever_comes_first() {
         let mut watch = FaultWatch::new(3);
         let struck =
             |time_ns, value| event(time_ns, Source::Wire, EventKind::Notice, Cause::FaultInjected, value);
@@ -169,10 +183,13 @@ mod tests {
         {
             watch.sample(sample(sampled_ns, incisal_m));
         }
-        watch.event(&event(5_000_000, Source::Controller, EventKind::Fault, Cause::MasterFault, 1.0));
+        let emergency = |time_ns| event(time_ns, Source::Drive, EventKind::Fault, Cause::Emergency, 33_792.0);
+        watch.event(&emergency(1_500_000));
+        watch.event(&safe_stop(5_000_000));
         watch.event(&event(3_500_000, Source::Master, EventKind::Fault, Cause::ProcessDataLost, 4.0));
         watch.event(&struck(1_000_000, 1.0));
         watch.event(&struck(6_000_000, 2.0));
+        watch.event(&emergency(6_500_000));
         let found = watch.finish();
         assert_eq!(found.iter().map(|figures| figures.number).collect::<Vec<_>>(), [1, 2, 3]);
 
@@ -185,6 +202,29 @@ mod tests {
         assert!((detection.deviation_deg - 2e-3f64.to_degrees()).abs() < 1e-12, "{first:?}");
         assert_eq!((found[1].struck_ns, found[1].detection), (Some(6_000_000), None));
         assert_eq!((found[2].struck_ns, found[2].detection), (None, None));
+    }
+
+    #[test]
+    fn the_controllers_safe_stop_is_one_and_its_other_steps_are_not() {
+        let mut watch = FaultWatch::new(1);
+        watch.event(&event(5, Source::Wire, EventKind::Notice, Cause::FaultInjected, 1.0));
+        watch.event(&event(7, Source::Controller, EventKind::Fault, Cause::TrackingLost, 1e-3));
+        watch.event(&safe_stop(2_000_000));
+        (0..4).for_each(|i| watch.sample(sample(i * 1_000_000, i as f64 * 1e-3)));
+        let found = watch.finish();
+        assert!((found[0].deviation_mm - 2.0).abs() < 1e-12, "{found:?}");
+        assert!(found[0].detection.unwrap().source == Source::Controller, "{found:?}");
+    }
+
+    #[test]
+    fn a_deviation_that_is_no_number_is_infinite() {
+        for bad in [0, 2] {
+            let mut watch = FaultWatch::new(1);
+            watch.event(&event(0, Source::Wire, EventKind::Notice, Cause::FaultInjected, 1.0));
+            (0..3).for_each(|i| watch.sample(sample(i, if i == bad { f64::NAN } else { 1e-5 })));
+            let found = watch.finish();
+            assert_eq!((found[0].deviation_mm, found[0].deviation_deg), (f64::INFINITY, f64::INFINITY));
+        }
     }
 
     #[test]

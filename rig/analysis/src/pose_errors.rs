@@ -1,10 +1,34 @@
-//! Errors of the platform's pose against the desired one: their root mean squares and their peaks.
+//! Errors of the platform's pose against the desired one: their root mean squares and their peaks. A pose that is none is
+//! infinitely far.
 
-use masseter_shared::geometry::Deviation;
+use masseter_shared::geometry::{Deviation, Pose};
+use masseter_shared::messages::pose_from_fields;
 use serde::Serialize;
 
-/// Errors of a pose while the motion played; none without samples. The peaks also count the moves to its beginning and
-/// the hold at its end, and cycles without a fresh reading.
+/// A quaternion's length may differ from 1 by so much: single precision and more.
+const LENGTH_TOLERANCE: f64 = 1e-3;
+
+/// The pose in a message; none where a number is not finite or the quaternion is no rotation.
+pub(super) fn pose(position_m: [f64; 3], quaternion_wxyz: [f64; 4]) -> Option<Pose> {
+    let length = quaternion_wxyz.iter().map(|part| part * part).sum::<f64>().sqrt();
+    let is_pose = position_m.iter().all(|x| x.is_finite()) && (length - 1.0).abs() <= LENGTH_TOLERANCE;
+    is_pose.then(|| pose_from_fields(position_m, quaternion_wxyz))
+}
+
+/// How far two poses are apart.
+pub(super) fn deviation(a: Option<&Pose>, b: Option<&Pose>, incisal_m: [f64; 3]) -> Deviation {
+    const NOWHERE: Deviation =
+        Deviation { origin_m: f64::INFINITY, incisal_m: f64::INFINITY, angle_rad: f64::INFINITY };
+    a.zip(b).map_or(NOWHERE, |(a, b)| Deviation::between(a, b, incisal_m))
+}
+
+/// The worse of two errors; what is no number is infinite.
+pub(super) fn worse(a: f64, b: f64) -> f64 {
+    if a.is_nan() || b.is_nan() { f64::INFINITY } else { a.max(b) }
+}
+
+/// Errors of a pose while the motion played; none without samples. The peaks also count the moves to its beginning, the
+/// hold at its end, the sample at which a safe stop began, and cycles without a fresh reading.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct PoseErrors {
     /// Root mean square distance of the platform's origin, mm.
@@ -26,20 +50,20 @@ pub struct PoseErrors {
 pub(super) struct Accumulator {
     pub(super) samples: u64,
     squares: f64,
-    largest: f64,
+    largest: Option<f64>,
 }
 
 impl Accumulator {
     /// Takes a value.
     pub(super) fn add(&mut self, value: f64) {
         self.samples += 1;
-        self.squares += value * value;
+        self.squares += worse(value, 0.0).powi(2);
         self.peak(value);
     }
 
     /// Takes a value that counts for the maximum alone.
     fn peak(&mut self, value: f64) {
-        self.largest = self.largest.max(value);
+        self.largest = Some(worse(self.largest.unwrap_or(0.0), value));
     }
 
     /// The root of the mean square; 0 without values.
@@ -76,14 +100,14 @@ impl PoseErrorSums {
     }
 
     pub(super) fn finish(&self) -> PoseErrors {
-        let figure = |value: f64| (self.samples() > 0).then_some(value);
+        let rms = |sum: &Accumulator| (sum.samples > 0).then(|| sum.rms());
         PoseErrors {
-            rms_mm: figure(self.origin.rms()),
-            max_mm: figure(self.origin.largest),
-            incisal_rms_mm: figure(self.incisal.rms()),
-            incisal_max_mm: figure(self.incisal.largest),
-            rms_deg: figure(self.angle.rms()),
-            max_deg: figure(self.angle.largest),
+            rms_mm: rms(&self.origin),
+            max_mm: self.origin.largest,
+            incisal_rms_mm: rms(&self.incisal),
+            incisal_max_mm: self.incisal.largest,
+            rms_deg: rms(&self.angle),
+            max_deg: self.angle.largest,
         }
     }
 }

@@ -4,12 +4,12 @@
 use masseter_shared::clock::SECOND_NS;
 use masseter_shared::geometry::{Deviation, Pose};
 use masseter_shared::messages::codes::ControllerState;
-use masseter_shared::messages::{State, Truth, pose_from_fields};
+use masseter_shared::messages::{State, Truth};
 use serde::Serialize;
 
 use super::by_cycle::ByCycle;
 use super::noise::standard_error;
-use super::pose_errors::{Accumulator, PoseErrorSums, PoseErrors};
+use super::pose_errors::{Accumulator, PoseErrorSums, PoseErrors, deviation, pose};
 use super::series::{Curve, Extremes, Series};
 
 /// States in which the platform has a desired pose.
@@ -156,7 +156,7 @@ impl Tracking {
         let cycle = if is_fresh { state.reading_cycle } else { state.cycle.saturating_sub(1) };
         let sample = Sample { state: *state, cycle, is_fresh, is_on_path };
         if self.source == PoseSource::Estimate {
-            let estimated = pose_from_fields(state.estimated_position_m, state.estimated_quaternion_wxyz);
+            let estimated = pose(state.estimated_position_m, state.estimated_quaternion_wxyz);
             return is_fresh.then(|| self.compare(&sample, state.sampled_ns, estimated)).flatten();
         }
         let Some(truth) = self.truths.get(cycle) else {
@@ -178,22 +178,22 @@ impl Tracking {
     }
 
     fn compare_with_truth(&mut self, sample: &Sample, truth: &Truth) -> Option<PathSample> {
-        let actual = pose_from_fields(truth.position_m, truth.quaternion_wxyz);
+        let actual = pose(truth.position_m, truth.quaternion_wxyz);
         self.compare(sample, truth.sampled_ns, actual)
     }
 
     /// The deviation from the path, where there is one.
-    fn compare(&mut self, sample: &Sample, sampled_ns: u64, actual: Pose) -> Option<PathSample> {
+    fn compare(&mut self, sample: &Sample, sampled_ns: u64, actual: Option<Pose>) -> Option<PathSample> {
         let Sample { state, is_fresh, is_on_path, .. } = sample;
-        let desired = pose_from_fields(state.desired_position_m, state.desired_quaternion_wxyz);
-        let deviation = Deviation::between(&desired, &actual, self.incisal_m);
-        if is_moving(state) {
-            self.actual.peak(&deviation);
-            if *is_fresh {
-                self.solution(state, sampled_ns, desired, actual, &deviation);
-            }
+        let desired = pose(state.desired_position_m, state.desired_quaternion_wxyz);
+        let error = deviation(desired.as_ref(), actual.as_ref(), self.incisal_m);
+        if *is_on_path {
+            self.actual.peak(&error);
         }
-        is_on_path.then_some(PathSample { sampled_ns, deviation })
+        if is_moving(state) && *is_fresh {
+            self.solution(state, sampled_ns, desired, actual, &error);
+        }
+        is_on_path.then_some(PathSample { sampled_ns, deviation: error })
     }
 
     /// A cycle with an estimate of its own.
@@ -201,29 +201,38 @@ impl Tracking {
         &mut self,
         state: &State,
         sampled_ns: u64,
-        desired: Pose,
-        actual: Pose,
-        deviation: &Deviation,
+        desired: Option<Pose>,
+        actual: Option<Pose>,
+        error: &Deviation,
     ) {
-        let estimated = pose_from_fields(state.estimated_position_m, state.estimated_quaternion_wxyz);
-        let estimate = Deviation::between(&desired, &estimated, self.incisal_m);
+        let estimated = pose(state.estimated_position_m, state.estimated_quaternion_wxyz);
+        let to_estimate = |from: Option<Pose>| deviation(from.as_ref(), estimated.as_ref(), self.incisal_m);
+        let (estimate, estimate_error) = (to_estimate(desired), to_estimate(actual));
         self.estimated.peak(&estimate);
         if state.controller_state == ControllerState::Running.code() {
-            self.actual.add(deviation);
+            self.actual.add(error);
             self.estimated.add(&estimate);
-            self.estimates.add((estimated.translation.vector - actual.translation.vector).norm());
-            self.add_to_second(deviation.origin_m, sampled_ns);
+            self.estimates.add(estimate_error.origin_m);
+            self.add_to_second(error.origin_m, sampled_ns);
         }
+        if let (Some(desired), Some(estimated), Some(actual)) = (desired, estimated, actual) {
+            self.draw(TrackingSample { sampled_ns, desired, estimated, actual }, error.origin_m);
+        }
+    }
+
+    /// Takes a sample into the track.
+    fn draw(&mut self, sample: TrackingSample, distance_m: f64) {
+        let TrackingSample { sampled_ns, desired, actual, .. } = sample;
         let (began_ns, began_at) = *self.began.get_or_insert((sampled_ns, desired));
         let stretch = self.moved_m.at(sampled_ns.saturating_sub(began_ns));
-        stretch.take(DISTANCE, deviation.origin_m);
+        stretch.take(DISTANCE, distance_m);
         for (first, pose) in [(DESIRED, &desired), (ACTUAL, &actual)] {
             let moved_m = pose.translation.vector - began_at.translation.vector;
             moved_m.iter().enumerate().for_each(|(axis, moved_m)| stretch.take(first + axis, *moved_m));
         }
         self.ended_ns = sampled_ns;
         if sampled_ns >= self.next_sample_ns && self.track.len() < MOST_SAMPLES {
-            self.track.push(TrackingSample { sampled_ns, desired, estimated, actual });
+            self.track.push(sample);
             self.next_sample_ns = sampled_ns + SAMPLE_NS;
         }
     }
@@ -269,110 +278,4 @@ fn is_moving(state: &State) -> bool {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    const PERIOD_NS: u64 = 1_000_000;
-
-    fn state(cycle: u64, x: f64) -> State {
-        State {
-            cycle,
-            reading_cycle: cycle,
-            desired_position_m: [x, 0.0, 0.0],
-            desired_quaternion_wxyz: [1.0, 0.0, 0.0, 0.0],
-            estimated_quaternion_wxyz: [1.0, 0.0, 0.0, 0.0],
-            controller_state: ControllerState::Running.code(),
-            ..Default::default()
-        }
-    }
-
-    fn truth(cycle: u64, x: f64) -> Truth {
-        Truth {
-            cycle,
-            position_m: [x, 0.0, 0.0],
-            quaternion_wxyz: [1.0, 0.0, 0.0, 0.0],
-            ..Default::default()
-        }
-    }
-
-    #[test]
-    fn without_truth_the_estimate_takes_its_place() {
-        let mut tracking = Tracking::new(PoseSource::Estimate, [0.0; 3]);
-        tracking.state(&State { estimated_position_m: [0.001, 0.0, 0.0], ..state(1, 0.003) }, true);
-        let (figures, track) = tracking.finish();
-        assert_eq!((figures.samples, figures.estimate_rms_mm), (1, None));
-        assert!((figures.actual.rms_mm.unwrap() - 2.0).abs() < 1e-9);
-        assert!((track.samples[0].actual.translation.x - 0.001).abs() < 1e-12);
-    }
-
-    #[test]
-    fn a_platform_that_never_ran_has_no_tracking_error() {
-        let mut tracking = Tracking::new(PoseSource::Truth, [0.0; 3]);
-        tracking.state(&State { controller_state: ControllerState::Easing.code(), ..state(1, 0.0) }, true);
-        tracking.truth(&truth(1, 0.0));
-        let (figures, _) = tracking.finish();
-        assert_eq!(figures, TrackingFigures::default());
-        assert_eq!((figures.actual.rms_mm, figures.estimate_rms_mm), (None, None));
-    }
-
-    #[test]
-    fn a_long_run_keeps_every_turn_of_its_motion_and_close_samples_of_its_beginning() {
-        let mut tracking = Tracking::new(PoseSource::Truth, [0.0; 3]);
-        for cycle in 0..100_000 {
-            // To and fro in 0.7 s, as fast as chewing.
-            let x = (cycle as f64 / 700.0 * std::f64::consts::TAU).sin();
-            tracking.state(&state(cycle, x), true);
-            tracking.truth(&Truth { sampled_ns: cycle * PERIOD_NS, ..truth(cycle, x) });
-        }
-        let (_, track) = tracking.finish();
-        let reach = track.actual_m[0].iter().map(|(_, x)| *x);
-        assert!(reach.clone().filter(|x| *x > 0.99).count() > 140 && reach.fold(0.0, f64::min) < -0.99);
-        assert!((track.duration_s - 99.999).abs() < 1e-9);
-        assert!(
-            track
-                .samples
-                .windows(2)
-                .all(|pair| pair[1].sampled_ns - pair[0].sampled_ns <= SAMPLE_NS + PERIOD_NS)
-        );
-        assert_eq!(track.samples[0].sampled_ns, 0);
-    }
-
-    #[test]
-    fn poses_are_compared_by_cycle_in_whatever_order_they_come() {
-        let mut tracking = Tracking::new(PoseSource::Truth, [0.0; 3]);
-        tracking.state(&state(1, 0.003), true);
-        tracking.state(&state(2, 0.000), true);
-        tracking.truth(&truth(2, 0.004));
-        tracking.truth(&truth(1, 0.000));
-        tracking.truth(&truth(3, 9.000));
-        let (figures, _) = tracking.finish();
-        assert_eq!(figures.samples, 2);
-        assert!((figures.actual.max_mm.unwrap() - 4.0).abs() < 1e-9);
-        assert!((figures.actual.rms_mm.unwrap() - (12.5f64).sqrt()).abs() < 1e-9);
-    }
-
-    /// Cycle 3 has no reading of sample 2, and the motion ends with cycle 4.
-    #[test]
-    fn cycles_without_a_reading_and_the_last_one_have_a_deviation_too() {
-        let mut tracking = Tracking::new(PoseSource::Truth, [0.0; 3]);
-        let stale = State { reading_cycle: 1, ..state(3, 0.0) };
-        let stopped =
-            |cycle| State { controller_state: ControllerState::SafeStop.code(), ..state(cycle, 0.0) };
-        let mut deviations = Vec::new();
-        let found = [
-            tracking.state(&state(1, 0.0), true),
-            tracking.state(&stale, false),
-            tracking.state(&stopped(4), true),
-            tracking.state(&stopped(5), true),
-        ];
-        assert!(found.iter().all(Option::is_none), "{found:?}");
-        for (cycle, x) in [(1, 0.001), (2, 0.003), (4, 0.004), (5, 0.005)] {
-            deviations.extend(tracking.truth(&truth(cycle, x)).into_iter().flatten());
-        }
-        let deviations: Vec<_> = deviations.iter().map(|sample| sample.deviation.origin_m).collect();
-        assert_eq!(deviations, [0.001, 0.003, 0.004]);
-        let (figures, _) = tracking.finish();
-        assert_eq!((figures.samples, figures.actual.max_mm), (1, Some(3.0)));
-        assert!((figures.actual.rms_mm.unwrap() - 1.0).abs() < 1e-12);
-    }
-}
+mod tests;

@@ -8,7 +8,26 @@ use crate::check::{Check, CheckResult};
 /// The name of the check of the declared faults.
 pub(crate) const FAULTS: &str = "faults";
 
-/// The worst error against its limit, or all that exceed theirs. A motion that was played and left nothing to compare is
+/// Fewer samples of a motion show nothing.
+const FEWEST_SAMPLES: u64 = 10;
+
+/// What is no number is within no limit.
+fn is_within(value: f64, limit: f64) -> bool {
+    value <= limit
+}
+
+/// Whether the jaw left its path by more than the limits for a moment, before a safe stop or without one.
+pub(crate) fn left_its_path(errors: &PoseErrors, limits: &ChecksConfig) -> bool {
+    let ChecksConfig { tracking_max_mm, tracking_max_deg, .. } = *limits;
+    let peaks = [
+        (errors.incisal_max_mm, tracking_max_mm),
+        (errors.max_mm, tracking_max_mm),
+        (errors.max_deg, tracking_max_deg),
+    ];
+    peaks.into_iter().any(|(value, limit)| value.is_some_and(|value| !is_within(value, limit)))
+}
+
+/// The worst error against its limit, or all that exceed theirs. A motion that was played and left too little to compare is
 /// no less a failure than one that was followed badly.
 pub(crate) fn tracking(
     name: &'static str,
@@ -17,9 +36,6 @@ pub(crate) fn tracking(
     limits: &ChecksConfig,
     is_played: bool,
 ) -> Check {
-    if samples == 0 && !is_played {
-        return Check::not_judged(name, "the motion never began".to_owned());
-    }
     let ChecksConfig { tracking_rms_mm, tracking_max_mm, tracking_rms_deg, tracking_max_deg, .. } = *limits;
     let figures = [
         ("incisal point rms", errors.incisal_rms_mm, tracking_rms_mm, " mm"),
@@ -33,18 +49,27 @@ pub(crate) fn tracking(
         .into_iter()
         .filter_map(|(what, value, limit, unit)| {
             let value = value?;
-            Some((value / limit, format!("{what} {value:.4}{unit}, limit {limit}{unit}")))
+            Some((value, limit, format!("{what} {value:.4}{unit}, limit {limit}{unit}")))
         })
         .collect();
-    found.sort_by(|(a, _), (b, _)| b.total_cmp(a));
-    let exceeding: Vec<_> =
-        found.iter().filter(|(share, _)| *share > 1.0).map(|(_, text)| text.as_str()).collect();
-    match (found.first(), exceeding.is_empty()) {
-        (None, _) => Check::judged(name, "no sample to compare".to_owned(), false),
-        (Some((_, closest)), true) => {
+    found.sort_by(|(a, of_a, _), (b, of_b, _)| (b / of_b).total_cmp(&(a / of_a)));
+    let exceeding: Vec<_> = found
+        .iter()
+        .filter(|(value, limit, _)| !is_within(*value, *limit))
+        .map(|(_, _, text)| text.as_str())
+        .collect();
+    match found.first() {
+        _ if !exceeding.is_empty() => Check::judged(name, exceeding.join("; "), false),
+        _ if samples == 0 && !is_played => Check::not_judged(name, "the motion never began".to_owned()),
+        Some((_, _, closest)) if samples >= FEWEST_SAMPLES => {
             Check::judged(name, format!("closest of {samples} samples: {closest}"), true)
         }
-        _ => Check::judged(name, exceeding.join("; "), false),
+        _ if is_played => Check::judged(
+            name,
+            format!("{samples} samples to compare, at least {FEWEST_SAMPLES} needed"),
+            false,
+        ),
+        _ => Check::not_judged(name, format!("only {samples} samples to compare")),
     }
 }
 
@@ -66,7 +91,7 @@ pub(crate) fn faults(
         .iter()
         .zip(found)
         .filter(|(_, found)| {
-            found.deviation_mm > tracking_max_mm || found.deviation_deg > tracking_max_deg
+            !is_within(found.deviation_mm, tracking_max_mm) || !is_within(found.deviation_deg, tracking_max_deg)
         })
         .map(|(fault, FaultFigures { number, deviation_mm, deviation_deg, detection, .. })| {
             let until = if detection.is_some() { "before it was detected" } else { "undetected" };
@@ -106,10 +131,10 @@ mod tests {
             rms_deg: Some(0.01),
             max_deg: Some(0.02),
         };
-        let check = tracking("tracking", 9, &good, &limits, true);
+        let check = tracking("tracking", 10, &good, &limits, true);
         assert_eq!(
             (check.result.mark(), check.finding.as_str()),
-            ("ok", "closest of 9 samples: incisal point max 0.1000 mm, limit 0.5 mm")
+            ("ok", "closest of 10 samples: incisal point max 0.1000 mm, limit 0.5 mm")
         );
         let mm = |share: f64, limit: f64| Some(share * limit);
         let each: [(Spoil, f64); 6] = [
@@ -121,24 +146,40 @@ mod tests {
             (|errors, value| errors.max_deg = value, limits.tracking_max_deg),
         ];
         for (spoil, limit) in each {
-            for (share, mark) in [(0.99, "ok"), (1.0, "ok"), (1.01, "FAIL")] {
+            for (share, mark) in [
+                (0.99, "ok"),
+                (1.0, "ok"),
+                (1.01, "FAIL"),
+                (f64::INFINITY, "FAIL"),
+                (f64::NAN, "FAIL"),
+                (-f64::NAN, "FAIL"),
+            ] {
                 let mut errors = good;
                 spoil(&mut errors, mm(share, limit));
-                for is_played in [true, false] {
-                    let check = tracking("tracking", 9, &errors, &limits, is_played);
-                    assert_eq!(check.result.mark(), mark, "{errors:?}");
+                for (samples, is_played) in [(10, true), (1, false), (0, false)] {
+                    let check = tracking("tracking", samples, &errors, &limits, is_played);
+                    let expected = if mark == "ok" && !is_played { "skip" } else { mark };
+                    assert_eq!(check.result.mark(), expected, "{check:?}");
                 }
             }
         }
     }
 
     #[test]
-    fn a_motion_that_never_began_is_not_judged_unless_the_run_says_that_it_was_played() {
+    fn a_motion_that_hardly_began_is_not_judged_unless_the_run_says_that_it_was_played() {
         let still = PoseErrors::default();
-        for (is_played, mark, finding) in
-            [(false, "skip", "the motion never began"), (true, "FAIL", "no sample to compare")]
-        {
-            let check = tracking("tracking", 0, &still, &ChecksConfig::default(), is_played);
+        let eased = PoseErrors { max_mm: Some(0.02), ..still };
+        let begun = PoseErrors { rms_mm: Some(0.01), ..eased };
+        let cases = [
+            (0, still, false, "skip", "the motion never began"),
+            (0, eased, false, "skip", "the motion never began"),
+            (9, begun, false, "skip", "only 9 samples to compare"),
+            (0, still, true, "FAIL", "0 samples to compare, at least 10 needed"),
+            (9, begun, true, "FAIL", "9 samples to compare, at least 10 needed"),
+            (10, begun, true, "ok", "closest of 10 samples: platform rms 0.0100 mm, limit 0.1 mm"),
+        ];
+        for (samples, errors, is_played, mark, finding) in cases {
+            let check = tracking("tracking", samples, &errors, &ChecksConfig::default(), is_played);
             assert_eq!((check.result.mark(), check.finding.as_str()), (mark, finding));
         }
     }
@@ -191,10 +232,16 @@ mod tests {
                 assert_eq!(check.finding.contains(named), mark == "FAIL", "{check:?}");
             }
         }
-        for (deviation_deg, mark) in [(0.5, "ok"), (0.51, "FAIL")] {
+        let turned = FaultFigures { deviation_deg: 0.5, ..figures(1, Some(5), 0.1) };
+        let check = faults(&[fault()], &[turned], &ChecksConfig::default(), true).unwrap();
+        assert_eq!(check.result.mark(), "ok", "{check:?}");
+        for deviation_deg in [0.51, f64::INFINITY, f64::NAN] {
             let turned = FaultFigures { deviation_deg, ..figures(1, Some(5), 0.1) };
-            let check = faults(&[fault()], &[turned], &ChecksConfig::default(), true).unwrap();
-            assert_eq!(check.result.mark(), mark, "{check:?}");
+            let shifted = FaultFigures { deviation_mm: deviation_deg, ..figures(1, Some(5), 0.1) };
+            for found in [turned, shifted] {
+                let check = faults(&[fault()], &[found], &ChecksConfig::default(), true).unwrap();
+                assert_eq!(check.result.mark(), "FAIL", "{check:?}");
+            }
         }
     }
 }

@@ -9,7 +9,7 @@ use serde::Serialize;
 
 use crate::check::{Check, CheckResult};
 use crate::checks::{checks, missed_cycles};
-use crate::motion_checks::FAULTS;
+use crate::motion_checks::{FAULTS, left_its_path};
 use crate::text;
 
 /// The judgement of a run.
@@ -43,10 +43,10 @@ impl Verdict {
     pub fn new(manifest: &Manifest, figures: &Figures) -> Self {
         let disturbed = disturbed(manifest, figures);
         let checks = checks(manifest, figures, disturbed.is_some());
-        let is_too_late =
-            checks.iter().any(|check| check.name == FAULTS && check.result == CheckResult::Failed);
+        let is_too_late = left_its_path(&figures.tracking.actual, &manifest.scenario.checks)
+            || checks.iter().any(|check| check.name == FAULTS && check.result == CheckResult::Failed);
         let (exit_code, mut reason) = ending(&manifest.ending, &figures.events)
-            // The machine caused the stop, or it came only after a fault had led the jaw too far.
+            // The machine caused the stop, or it came only after the jaw had left its path.
             .filter(|(exit, _)| !(*exit == Exit::SafeStop && (disturbed.is_some() || is_too_late)))
             .or_else(|| incomplete(figures))
             .or(disturbed)

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::document::{Document, place};
 use super::error::ScenarioError;
-use super::need::require_duration;
+use super::need::{LONGEST_S, SHORTEST_MOTION_S, require_within};
 use super::{
     CanConfig, ChecksConfig, ControllerConfig, DrivesConfig, DynamicsConfig, FaultConfig, FoodConfig,
     JawConfig, MotionConfig, RealtimeConfig, TrajectoryLimitsConfig,
@@ -144,7 +144,7 @@ impl Scenario {
             return Err(ScenarioError::bad("rate_hz", &self.rate_hz, need));
         }
         if let Some(duration_s) = self.duration_s {
-            require_duration(&[("duration_s", duration_s)])?;
+            require_within(&[("duration_s", duration_s, SHORTEST_MOTION_S, LONGEST_S)])?;
         }
         self.realtime.validate()?;
         self.can.validate()?;
@@ -317,8 +317,9 @@ mod tests {
             ("[mechanism.strokes]\nslide_m = [0, 1]\nleg = [1, 2]", "did you mean `leg_m`?"),
             ("rate_hz = 'fast'", "invalid type"),
             ("rate_hz = 1", "use 10 to 20000 Hz"),
-            ("duration_s = -1.0", "duration_s = -1: use more than 0"),
-            ("duration_s = nan", "use more than 0"),
+            ("duration_s = -1.0", "duration_s = -1: use 0.1 to 86400"),
+            ("duration_s = 1e-320", "use 0.1 to 86400"),
+            ("duration_s = nan", "use 0.1 to 86400"),
             ("name = '../x'", "letters"),
             ("[realtime]\npriority = 0", "use 1 to 99"),
             ("[realtime]\ncores = [1, 1]", "realtime.cores = 1,1: name two"),

@@ -376,6 +376,51 @@ fn a_safe_stop_is_one_unless_the_machine_alone_explains_it() {
     assert_eq!(outcome, Exit::Invalid, "it never had real time");
 }
 
+/// A peak is of a time before the stop, an average also of a slow way to it.
+#[test]
+fn a_safe_stop_that_comes_too_late_fails_the_run() {
+    let cases: [(Change, Exit, &str); 6] = [
+        (|run| run.figures.tracking.actual.max_mm = Some(8.0), Exit::Failed, "failed: sequence, tracking"),
+        (
+            |run| run.figures.tracking.actual.incisal_max_mm = Some(8.0),
+            Exit::Failed,
+            "failed: sequence, tracking",
+        ),
+        (
+            |run| run.figures.tracking.actual.max_deg = Some(f64::NAN),
+            Exit::Failed,
+            "failed: sequence, tracking",
+        ),
+        (
+            |run| {
+                // While easing.
+                run.figures.tracking.samples = 0;
+                run.figures.tracking.actual.max_mm = Some(8.0);
+            },
+            Exit::Failed,
+            "failed: sequence, tracking",
+        ),
+        (
+            |run| run.figures.tracking.actual.rms_mm = Some(0.2),
+            Exit::SafeStop,
+            "the controller stopped the rig",
+        ),
+        (
+            |run| run.figures.tracking.estimated.max_mm = Some(8.0),
+            Exit::SafeStop,
+            "the controller stopped the rig",
+        ),
+    ];
+    for (change, outcome, reason) in cases {
+        let mut run = Run::new();
+        run.manifest.ending = Ending::SafeStop;
+        run.figures.final_state = Some(Code::Known(ControllerState::SafeStop));
+        change(&mut run);
+        let verdict = Verdict::new(&run.manifest, &run.figures);
+        assert_eq!((verdict.exit_code, verdict.reason.as_str()), (outcome, reason));
+    }
+}
+
 #[test]
 fn a_jump_of_the_clock_excuses_failures_and_nothing_else() {
     let jumped = |change: Change| {
