@@ -37,7 +37,7 @@ fn scenarios_are_refused_with_place_and_remedy() {
     }
 }
 
-/// A terminal would obey them.
+/// A terminal would carry them out.
 #[test]
 fn control_characters_of_a_file_are_printed_as_codes() {
     let workspace = Workspace::new("[motion]\nkind = 'file'\npath = \"no\\u001b]0;evil\\u0007where.csv\"");

@@ -45,7 +45,17 @@ impl Victim {
         format!("/dev/shm/masseter-{}", self.id).into()
     }
 
+    /// Those that are tried where strangers hold the first.
+    fn further_folders(&self) -> Vec<PathBuf> {
+        (1..8).map(|number| format!("/dev/shm/masseter-{}-{number}", self.id).into()).collect()
+    }
+
+    fn remove_further_folders(&self) {
+        self.further_folders().iter().for_each(|folder| drop(fs::remove_dir_all(folder)));
+    }
+
     fn remove_runtime_folder(&self) {
+        self.remove_further_folders();
         let folder = self.runtime_folder();
         let _ = fs::remove_file(&folder);
         let _ = fs::remove_dir_all(&folder);
@@ -100,21 +110,44 @@ fn mode(path: &Path) -> u32 {
 }
 
 #[test]
-fn a_folder_of_a_stranger_is_not_used_and_the_error_says_what_to_do() {
+fn a_folder_of_a_stranger_is_not_used_and_without_any_other_the_error_says_what_to_do() {
     let Some(victim) = Victim::new(61_001, "") else { return };
     let (folder, precious) = (victim.runtime_folder(), victim.workspace.write("precious", "content"));
     victim.own(&precious);
     assert!(stranger_can("mkdir", &["-m", "777", folder.to_str().unwrap()]));
     // The lock would be opened through this link.
     symlink(&precious, folder.join(".turn")).unwrap();
-    let squatted = victim.clean();
+    for (number, other) in victim.further_folders().into_iter().enumerate() {
+        let dead = other.join(format!("dead-{number}"));
+        let made = as_user(victim.id, "mkdir").args(["-m", "700", "-p"]).args([&other, &dead]).status();
+        assert!(made.unwrap().success());
+    }
+    let cleaned = victim.clean();
+    assert_eq!(cleaned.status.code(), Some(0), "{}", stderr(&cleaned));
+    for number in 0..victim.further_folders().len() {
+        assert!(stdout(&cleaned).contains(&format!("dead-{number}:")), "{}", stdout(&cleaned));
+    }
+    victim.remove_further_folders();
+    assert_eq!(victim.clean().status.code(), Some(0));
+    assert_eq!(mode(&victim.further_folders()[0]), 0o700);
+    victim.remove_further_folders();
+    for other in victim.further_folders() {
+        assert!(stranger_can("mkdir", &[other.to_str().unwrap()]));
+    }
+    let long = victim.workspace.file(&"x".repeat(60));
+    let squatted = victim.masseter(&["clean"]).env("XDG_RUNTIME_DIR", &long).output().unwrap();
     assert_eq!(squatted.status.code(), Some(2), "{}", stderr(&squatted));
-    for what in ["is not a private folder", folder.to_str().unwrap(), "set XDG_RUNTIME_DIR"] {
+    for what in [
+        "is not a private folder",
+        folder.to_str().unwrap(),
+        "set XDG_RUNTIME_DIR",
+        "is passed over: its path has",
+    ] {
         assert!(stderr(&squatted).contains(what), "{}", stderr(&squatted));
     }
     assert_eq!(fs::read_to_string(&precious).unwrap(), "content");
 
-    // What the error says helps.
+    // A private folder of the session helps.
     let session = victim.workspace.file("s");
     fs::create_dir(&session).unwrap();
     fs::set_permissions(&session, PermissionsExt::from_mode(0o700)).unwrap();
@@ -132,7 +165,8 @@ fn a_link_in_place_of_the_folder_is_not_followed() {
     victim.own(&elsewhere);
     let link = victim.runtime_folder();
     assert!(stranger_can("ln", &["-s", elsewhere.to_str().unwrap(), link.to_str().unwrap()]));
-    assert_eq!(victim.clean().status.code(), Some(2));
+    let cleaned = victim.clean();
+    assert_eq!(cleaned.status.code(), Some(0), "{}", stderr(&cleaned));
     assert_eq!(fs::read_dir(&elsewhere).unwrap().count(), 0);
 }
 
@@ -183,6 +217,31 @@ fn a_file_of_a_stranger_is_reported_and_blocks_nobody() {
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
     assert!(stderr(&output).contains(&format!("cannot remove {file}")), "{}", stderr(&output));
     assert!(!dead.exists());
+}
+
+/// The stranger waits for the first file, whose name shows the prefix of all others.
+#[test]
+fn a_stranger_that_makes_files_of_every_run_stops_none() {
+    let cores = Cores::take();
+    let Some(victim) = Victim::new(61_006, &format!("duration_s = 1.0\n{LENIENT}")) else { return };
+    let script = format!(
+        "while :; do for file in /dev/shm/masseter_{}_*.global_mgmt; do
+           prefix=${{file%%.*}}.$(echo ${{file#*.}} | cut -c 1-17); test -e $file && touch ${{prefix}}x
+         done; done",
+        victim.id
+    );
+    let mut squatting = as_user(STRANGER, "sh").args(["-c", &script]).stderr(Stdio::null()).spawn().unwrap();
+    let output = victim.masseter(&["run", "scenario.toml", "--out", "run"]).output().unwrap();
+    squatting.kill().unwrap();
+    squatting.wait().unwrap();
+    drop(cores);
+    let prefix = format!("/dev/shm/masseter_{}_", victim.id);
+    let left = fs::read_dir("/dev/shm").unwrap().map(|entry| entry.unwrap().path());
+    let left: Vec<_> = left.filter(|path| path.to_string_lossy().starts_with(&prefix)).collect();
+    left.iter().for_each(|path| fs::remove_file(path).unwrap());
+    assert_eq!(left.len(), 1, "{left:?}: {}", stderr(&output));
+    assert!(stderr(&output).contains("cannot remove /dev/shm/masseter_"), "{}", stderr(&output));
+    assert_played(&victim.workspace.run_folder(), output.status, &(stdout(&output) + &stderr(&output)));
 }
 
 #[test]

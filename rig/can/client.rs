@@ -27,22 +27,29 @@ pub(super) struct Client {
     stream: TcpStream,
     requests: Requests,
     unsent: Vec<u8>,
+    /// The bus that it asked for, and its place there once it has one.
+    bus: Option<usize>,
     node: Option<NodePort>,
     frames_from_ns: Option<u64>,
     open_by_ns: u64,
+    heard_ns: u64,
 }
 
 /// Why a connection is closed.
 #[derive(Debug, thiserror::Error)]
-enum CloseReason {
+pub(super) enum CloseReason {
     #[error("closed")]
     Closed,
     #[error(transparent)]
     Io(#[from] io::Error),
     #[error(transparent)]
     Request(#[from] RequestError),
-    #[error("no bus `{name}`, or no place left on it; the buses are can0 to can{}", .buses - 1)]
-    NoPlace { name: String, buses: usize },
+    #[error("no bus `{name}`; the buses are can0 to can{}", .buses - 1)]
+    NoBus { name: String, buses: usize },
+    #[error("another client takes its place, since it has asked for nothing for longest")]
+    Idle,
+    #[error("others take its place, since it has opened no bus yet")]
+    Crowded,
     #[error("it opened no bus within {} s", OPEN_TIMEOUT_NS / SECOND_NS)]
     Silent,
     #[error("a connection opens one bus: use another connection for another bus")]
@@ -59,7 +66,36 @@ impl Client {
         let unsent = GREETING.as_bytes().to_vec();
         let open_by_ns = now_ns + OPEN_TIMEOUT_NS;
         let requests = Requests::default();
-        Ok(Self { stream, requests, unsent, node: None, frames_from_ns: None, open_by_ns })
+        let heard_ns = now_ns;
+        Ok(Self {
+            stream,
+            requests,
+            unsent,
+            bus: None,
+            node: None,
+            frames_from_ns: None,
+            open_by_ns,
+            heard_ns,
+        })
+    }
+
+    /// When its last request came, ns.
+    pub(super) fn heard_ns(&self) -> u64 {
+        self.heard_ns
+    }
+
+    /// The bus on which it waits for a place.
+    pub(super) fn awaited(&self) -> Option<usize> {
+        self.bus.filter(|_| !self.is_open())
+    }
+
+    pub(super) fn is_open(&self) -> bool {
+        self.node.is_some()
+    }
+
+    /// Whether it has a place on this bus.
+    pub(super) fn is_on(&self, bus: usize) -> bool {
+        self.is_open() && self.bus == Some(bus)
     }
 
     /// The connection, for polling.
@@ -69,34 +105,41 @@ impl Client {
 
     /// Answers requests and sends received frames; false once the connection is closed.
     pub(super) fn serve(&mut self, link: &mut OpenLink, now_ns: u64, stderr: &StderrWriter) -> bool {
-        let served = self.read_requests().and_then(|()| {
+        let served = self.read_requests(now_ns).and_then(|()| {
+            self.connect(link);
             self.answer(link, now_ns)?;
             self.queue_frames(link, now_ns, stderr);
             self.check_open(now_ns)?;
             self.write_unsent()
         });
         let Err(reason) = served else { return true };
+        self.close(&reason, link, stderr);
+        false
+    }
+
+    /// Says why, and frees its place.
+    pub(super) fn close(&mut self, reason: &CloseReason, link: &mut OpenLink, stderr: &StderrWriter) {
         if !matches!(reason, CloseReason::Closed) {
             stderr.write(&format!("a client is disconnected: {reason}\n"));
             // The client may have closed its end already.
-            self.refuse(&reason);
+            self.refuse(reason);
             let _ = self.write_unsent();
         }
         if let Some(node) = self.node.take() {
             link.disconnect(node);
         }
-        false
     }
 
     fn check_open(&self, now_ns: u64) -> Result<(), CloseReason> {
         if self.node.is_none() && now_ns > self.open_by_ns { Err(CloseReason::Silent) } else { Ok(()) }
     }
 
-    fn read_requests(&mut self) -> Result<(), CloseReason> {
+    fn read_requests(&mut self, now_ns: u64) -> Result<(), CloseReason> {
         let mut bytes = [0; 4096];
         match self.stream.read(&mut bytes) {
             Ok(0) => Err(CloseReason::Closed),
             Ok(count) => {
+                self.heard_ns = now_ns;
                 self.requests.push(&bytes[..count]);
                 Ok(())
             }
@@ -106,7 +149,9 @@ impl Client {
     }
 
     fn answer(&mut self, link: &mut OpenLink, now_ns: u64) -> Result<(), CloseReason> {
-        while let Some(request) = self.requests.take() {
+        while self.awaited().is_none()
+            && let Some(request) = self.requests.take()
+        {
             match request {
                 Ok(request) => self.handle(request, link, now_ns)?,
                 Err(stray @ RequestError::Stray) => return Err(stray.into()),
@@ -118,10 +163,7 @@ impl Client {
 
     fn handle(&mut self, request: Request, link: &mut OpenLink, now_ns: u64) -> Result<(), CloseReason> {
         match request {
-            Request::Open(name) => {
-                self.open(&name, link)?;
-                self.queue(OK);
-            }
+            Request::Open(name) => self.open(&name, link)?,
             Request::RawMode => {
                 self.frames_from_ns = Some(now_ns + MODE_DELAY_NS);
                 self.queue(OK);
@@ -148,11 +190,21 @@ impl Client {
         if self.node.is_some() {
             return Err(CloseReason::OpenTwice);
         }
-        let bus = name.strip_prefix("can").and_then(|bus| bus.parse().ok());
-        self.node = bus.and_then(|bus| link.connect(bus));
-        match self.node {
-            Some(_) => Ok(()),
-            None => Err(CloseReason::NoPlace { name: name.to_owned(), buses: link.buses() }),
+        let buses = link.buses();
+        self.bus = name.strip_prefix("can").and_then(|bus| bus.parse().ok()).filter(|bus| *bus < buses);
+        if self.bus.is_none() {
+            return Err(CloseReason::NoBus { name: name.to_owned(), buses });
+        }
+        self.connect(link);
+        Ok(())
+    }
+
+    /// Takes a place on the bus for which it waits, if there is one.
+    fn connect(&mut self, link: &mut OpenLink) {
+        let Some(bus) = self.awaited() else { return };
+        self.node = link.connect(bus);
+        if self.is_open() {
+            self.queue(OK);
         }
     }
 

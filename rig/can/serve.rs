@@ -2,7 +2,8 @@
 //!
 //! Every client is a node on the bus that it opens: its frames take part in arbitration and reach the drives and the
 //! other clients. No master runs here; a client can be one. A client that reads too slowly first loses frames, then the
-//! connection, and delays no other.
+//! connection, and delays no other. On a full bus a new client takes the place of the one that has asked for nothing for
+//! longest: idle clients lock nobody out, and who only listens is disconnected for want of room alone.
 
 use std::io;
 use std::net::{SocketAddr, TcpListener};
@@ -18,13 +19,16 @@ use masseter_shared::lifecycle::StopRequest;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::io::Errno;
 
-use super::client::Client;
-
+use super::client::{Client, CloseReason};
 use crate::stderr_writer::StderrWriter;
 use masseter_terminal::Exit;
 
 /// Clients on one bus at a time.
 const CLIENTS: usize = 8;
+/// Clients that have opened no bus yet.
+const NEWCOMERS: usize = 32;
+/// Least time between two new clients, so that a client has some time to open a bus before many others come, ns.
+const ACCEPT_INTERVAL_NS: u64 = 2_000_000;
 /// Longest wait between two steps of the buses.
 const STEP: Timespec = Timespec { tv_sec: 0, tv_nsec: 500_000 };
 
@@ -50,12 +54,16 @@ pub(crate) fn serve(args: &ServeArgs) -> anyhow::Result<Exit> {
     let stderr = StderrWriter::start();
     announce(&listener, &scenario, &stderr)?;
     let mut clients = Vec::new();
+    let mut accept_from_ns = 0;
     while !stop.is_made() {
         wait(&listener, &clients).context("cannot wait for clients")?;
         let now_ns = clock::now_ns();
         link.advance(now_ns)?;
-        accept(&listener, &mut clients, CLIENTS * link.buses(), &stderr);
+        if now_ns >= accept_from_ns && accept(&listener, &mut clients, now_ns) {
+            accept_from_ns = now_ns + ACCEPT_INTERVAL_NS;
+        }
         clients.retain_mut(|client| client.serve(&mut link, now_ns, &stderr));
+        make_room(&mut clients, &mut link, &stderr);
     }
     stderr.finish();
     Ok(Exit::Passed)
@@ -90,13 +98,28 @@ fn wait(listener: &TcpListener, clients: &[Client]) -> io::Result<()> {
     }
 }
 
-/// Accepts connections while there are places and closes the others.
-fn accept(listener: &TcpListener, clients: &mut Vec<Client>, places: usize, stderr: &StderrWriter) {
-    while let Ok((stream, address)) = listener.accept() {
-        if clients.len() == places {
-            stderr.write(&format!("refused a client from {address}: {places} clients are connected\n"));
-        } else {
-            clients.extend(Client::accept(stream, clock::now_ns()));
+/// Whether a client came.
+fn accept(listener: &TcpListener, clients: &mut Vec<Client>, now_ns: u64) -> bool {
+    let accepted = listener.accept();
+    let is_new = accepted.is_ok();
+    // A client may leave at any time.
+    clients.extend(accepted.and_then(|(stream, _)| Client::accept(stream, now_ns)));
+    is_new
+}
+
+/// Disconnects, for each client that waits for a place on a bus, the one there that has asked for nothing for longest, and
+/// the oldest of too many newcomers.
+fn make_room(clients: &mut Vec<Client>, link: &mut OpenLink, stderr: &StderrWriter) {
+    let awaited: Vec<_> = clients.iter().filter_map(Client::awaited).collect();
+    for bus in awaited {
+        let of_bus = (0..clients.len()).filter(|&at| clients[at].is_on(bus));
+        if let Some(idle) = of_bus.min_by_key(|&at| clients[at].heard_ns()) {
+            clients.remove(idle).close(&CloseReason::Idle, link, stderr);
         }
+    }
+    if clients.iter().filter(|client| !client.is_open()).count() > NEWCOMERS
+        && let Some(oldest) = clients.iter().position(|client| !client.is_open())
+    {
+        clients.remove(oldest).close(&CloseReason::Crowded, link, stderr);
     }
 }

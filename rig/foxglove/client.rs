@@ -27,7 +27,7 @@ const QUEUE: usize = 8192;
 /// The longest message from a client, bytes; clients only subscribe.
 const MAX_REQUEST_BYTES: usize = 1 << 16;
 /// A client that takes nothing for this long is disconnected.
-const PATIENCE: Duration = Duration::from_secs(30);
+const WRITE_TIMEOUT: Duration = Duration::from_secs(30);
 /// Time that the thread waits for a request before it sends what is queued.
 const INTERVAL: Duration = Duration::from_millis(10);
 
@@ -47,7 +47,7 @@ pub(super) struct Client {
     serving: JoinHandle<()>,
 }
 
-/// What a client must know, and what it is told first.
+/// The secret that a client must name, and the first texts to it.
 #[derive(Debug, Clone)]
 pub(super) struct Greeting {
     pub secret: String,
@@ -65,20 +65,20 @@ impl Client {
         handshake_by_ns: u64,
     ) -> std::io::Result<Self> {
         stream.set_nodelay(true)?;
-        stream.set_write_timeout(Some(PATIENCE))?;
+        stream.set_write_timeout(Some(WRITE_TIMEOUT))?;
         let served = stream.try_clone()?;
         let (queue, queued) = sync_channel(QUEUE);
         let subscribed = Arc::new(AtomicU8::new(0));
         let published = Arc::clone(&subscribed);
         let is_admitted = Arc::new(AtomicBool::new(false));
         let admitted = Arc::clone(&is_admitted);
-        let serving = thread::spawn(move || {
+        let serving = thread::Builder::new().spawn(move || {
             // A client may leave at any time.
             let _ = Session::open(served, scene, published, &greeting.secret).and_then(|session| {
                 admitted.store(true, Ordering::Relaxed);
                 session.serve(greeting.texts, &queued)
             });
-        });
+        })?;
         Ok(Self { stream, queue: Some(queue), subscribed, is_admitted, handshake_by_ns, serving })
     }
 
@@ -95,11 +95,11 @@ impl Client {
 
     /// Whether its handshake takes too long.
     pub(super) fn is_overdue(&self, now_ns: u64) -> bool {
-        !self.is_admitted.load(Ordering::Relaxed) && now_ns > self.handshake_by_ns
+        !self.is_admitted() && now_ns > self.handshake_by_ns
     }
 
-    pub(super) fn is_watching(&self) -> bool {
-        self.is_admitted.load(Ordering::Relaxed) && !self.is_gone()
+    pub(super) fn is_admitted(&self) -> bool {
+        self.is_admitted.load(Ordering::Relaxed)
     }
 
     pub(super) fn is_gone(&self) -> bool {

@@ -3,7 +3,7 @@
 //! Each client has a thread and a queue of fixed length of its own. The recorder puts messages into the queues and never
 //! waits for a client; no other process is involved. A message without room is dropped and counted. The server of the
 //! `foxglove` crate counts no drops and brings an asynchronous runtime, so it is not used. There are no parameters,
-//! services, assets or publishing clients. A client must know the secret of the URL.
+//! services, assets or publishing clients. Who connects must name the secret of the URL.
 
 mod admission;
 mod client;
@@ -58,10 +58,14 @@ pub(crate) struct ListenError {
 
 /// Most clients at a time; each has a thread and a queue of its own.
 const MAX_CLIENTS: usize = 8;
+/// Most connections in their handshakes, which anybody may begin: a further one takes the place of the oldest.
+const MAX_NEWCOMERS: usize = 16;
 /// Time that a client may take over its handshake, however it divides it: an idle connection keeps no place, ns.
 const HANDSHAKE_NS: u64 = 5 * SECOND_NS;
 /// Time between two looks for new clients.
 const INTERVAL: Duration = Duration::from_millis(50);
+/// Time between two new connections: a handshake takes less than that of [`MAX_NEWCOMERS`] others.
+const ACCEPT_INTERVAL: Duration = Duration::from_millis(10);
 /// Time between two looks whether all clients have read the rest, and how many there are: 0.5 s.
 const CLOSING_POLL: Duration = Duration::from_millis(10);
 const CLOSING_POLLS: u32 = 50;
@@ -87,23 +91,41 @@ impl Clients {
         self.connected.lock().expect("no thread panics with it")
     }
 
-    /// Accepts clients while there is room and disconnects the others, until the server closes.
+    /// Accepts clients and disconnects those without room, until the server closes.
     fn accept(&self, listener: &TcpListener, scene: &Scene, greeting: &Greeting) {
+        let mut newcomers = Vec::new();
         while !self.is_closing.load(Ordering::Relaxed) {
             let now_ns = clock::now_ns();
-            let mut connected = self.connected();
-            connected.iter().filter(|client| client.is_overdue(now_ns)).for_each(Client::cut_off);
-            connected.retain(|client| !client.is_gone());
+            self.admit(&mut newcomers, now_ns);
             let Ok((stream, _)) = listener.accept() else {
-                drop(connected);
                 clock::sleep(INTERVAL);
                 continue;
             };
-            if connected.len() < MAX_CLIENTS {
-                let handshake_by_ns = now_ns + HANDSHAKE_NS;
-                connected.extend(Client::start(stream, scene.clone(), greeting.clone(), handshake_by_ns));
+            if newcomers.len() == MAX_NEWCOMERS {
+                newcomers.remove(0).cut_off();
             }
+            let handshake_by_ns = now_ns + HANDSHAKE_NS;
+            // Without a thread for it, the client is disconnected.
+            newcomers.extend(Client::start(stream, scene.clone(), greeting.clone(), handshake_by_ns));
+            clock::sleep(ACCEPT_INTERVAL);
         }
+        self.admit(&mut newcomers, clock::now_ns());
+        newcomers.iter().for_each(Client::cut_off);
+    }
+
+    /// Moves the newcomers that have named the secret to the clients, and disconnects those that take too long. The
+    /// recorder waits for the list of clients, so nothing slow is done with it.
+    fn admit(&self, newcomers: &mut Vec<Client>, now_ns: u64) {
+        newcomers.iter().filter(|client| client.is_overdue(now_ns)).for_each(Client::cut_off);
+        newcomers.retain(|client| !client.is_gone());
+        let mut admitted: Vec<_> = newcomers.extract_if(.., |client| client.is_admitted()).collect();
+        let mut connected = self.connected();
+        let gone: Vec<_> = connected.extract_if(.., |client| client.is_gone()).collect();
+        let room = MAX_CLIENTS - connected.len();
+        connected.extend(admitted.drain(..room.min(admitted.len())));
+        drop(connected);
+        drop(gone);
+        admitted.iter().for_each(Client::cut_off);
     }
 }
 
@@ -140,7 +162,9 @@ impl FoxgloveServer {
         let accepted = Arc::clone(&clients);
         let texts = [protocol::server_info(session), protocol::advertise()];
         let greeting = Greeting { secret: secret.clone(), texts };
-        let accepting = thread::spawn(move || accepted.accept(&listener, &scene, &greeting));
+        let accept = move || accepted.accept(&listener, &scene, &greeting);
+        let accepting =
+            thread::Builder::new().spawn(accept).map_err(|error| ListenError { address, error })?;
         Ok(Self { address, secret, clients, dropped: AtomicU64::new(0), accepting })
     }
 
@@ -159,7 +183,7 @@ impl FoxgloveServer {
 
     /// The clients at this moment.
     pub(crate) fn counts(&self) -> ClientCounts {
-        let connected = self.clients.connected().iter().filter(|client| client.is_watching()).count();
+        let connected = self.clients.connected().iter().filter(|client| !client.is_gone()).count();
         ClientCounts { connected, dropped: self.dropped.load(Ordering::Relaxed) }
     }
 

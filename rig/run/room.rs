@@ -4,7 +4,7 @@ use std::fs::{self, OpenOptions};
 use std::io;
 use std::path::Path;
 
-use anyhow::{Context, ensure};
+use anyhow::{Context, anyhow, ensure};
 use masseter_plan::RunPlan;
 use masseter_shared::transport::Domain;
 use rustix::fs::{FallocateFlags, fallocate, statvfs};
@@ -69,25 +69,37 @@ pub(super) fn check_shared_memory() -> anyhow::Result<()> {
     let free = free_bytes(SHARED_MEMORY.as_ref())?;
     ensure!(
         free >= SHARED_BYTES,
-        "{SHARED_MEMORY} has {} free, and a rig needs {}: remove leftovers (`masseter clean`), or enlarge it (`mount -o \
-         remount,size=64m {SHARED_MEMORY}`; in a container `--shm-size=64m`)",
+        "{SHARED_MEMORY} has {} free, and a rig needs {}: {}",
         megabytes(free),
-        megabytes(SHARED_BYTES)
+        megabytes(SHARED_BYTES),
+        more_shared_memory()
     );
     Ok(())
 }
 
 /// Gives every page of the domain's shared memory its place, once all processes have opened their ports.
 pub(super) fn reserve_shared_memory(domain: &Domain) -> anyhow::Result<()> {
-    for path in domain.shared_memory()? {
+    for path in domain.own_shared_memory()? {
         let file = OpenOptions::new().read(true).write(true).open(&path);
-        file.and_then(|file| allocate(&file, file.metadata()?.len()))
-            .with_context(|| format!("no room in shared memory for {}", path.display()))?;
+        let allocated = file.and_then(|file| allocate(&file, file.metadata()?.len()));
+        // As text: full shared memory is no full disk.
+        allocated.map_err(|error| {
+            anyhow!("no room in shared memory for {} ({error}): {}", path.display(), more_shared_memory())
+        })?;
     }
     Ok(())
 }
 
-/// Room on the disk for the files that say how a run ended. Its files have no names, so nothing of them outlives a kill.
+/// What to do for a rig and as much again.
+fn more_shared_memory() -> String {
+    let mebibytes = (2 * SHARED_BYTES).div_ceil(1 << 20);
+    format!(
+        "remove leftovers (`masseter clean`), or enlarge it (`mount -o remount,size={mebibytes}m {SHARED_MEMORY}`; in a \
+         container `--shm-size={mebibytes}m`)"
+    )
+}
+
+/// Room on the disk for the manifest and the summary at the end of a run. Its files have no names, so nothing of them outlives a kill.
 pub(super) struct Reserve {
     pub manifest: fs::File,
     pub summary: fs::File,
@@ -121,4 +133,30 @@ fn free_bytes(folder: &Path) -> anyhow::Result<u64> {
 
 fn megabytes(bytes: u64) -> String {
     format!("{:.1} MB", bytes as f64 / 1e6)
+}
+
+#[cfg(test)]
+mod tests {
+    use masseter_shared::transport::ScratchDomain;
+    use masseter_terminal::{Exit, OrFailure};
+
+    use super::*;
+
+    #[test]
+    fn shared_memory_without_room_is_no_full_disk_and_no_death() {
+        let domain = ScratchDomain::claim("test-no-room").unwrap();
+        let path = Path::new(SHARED_MEMORY).join(domain.prefix().unwrap() + "large");
+        fs::File::create_new(&path).unwrap().set_len(1 << 50).unwrap();
+        let failure = reserve_shared_memory(&domain).usage().unwrap_err();
+        assert_eq!(failure.exit, Exit::Usage);
+        assert!(failure.error.to_string().contains("--shm-size=62m"), "{}", failure.error);
+    }
+
+    #[test]
+    fn a_file_of_others_is_not_reserved() {
+        let domain = ScratchDomain::claim("test-not-reserved").unwrap();
+        let path = Path::new(SHARED_MEMORY).join(domain.prefix().unwrap() + "x");
+        std::os::unix::fs::symlink("/dev/null", path).unwrap();
+        reserve_shared_memory(&domain).unwrap();
+    }
 }

@@ -7,6 +7,7 @@
 
 use std::collections::BTreeMap;
 use std::ffi::OsString;
+use std::fs;
 use std::io;
 use std::process::ExitStatus;
 use std::time::Duration;
@@ -45,6 +46,8 @@ const RECORD_TIMEOUT_NS: u64 = 60 * SECOND_NS;
 const SILENT: &str = "it stopped sending commands, and was killed";
 /// Time for the plant to stop the drives once its master has detected the controller's death, ns.
 const SAFE_STOP_NS: u64 = SECOND_NS / 2;
+/// Claims, each with names that cannot be guessed, until a rig whose names another user takes is given up.
+const NAMES: u32 = 4;
 
 /// Sweeps the domains of killed runs, and reserves the domain `name`, or one with a unique name.
 ///
@@ -62,29 +65,52 @@ pub(super) fn reserve_domain(name: Option<&str>) -> Result<(Domain, DomainLock),
 
 /// Runs the rig in real time, then releases its domain. Enters the circumstances and the ending into the manifest.
 pub(super) fn run(
-    (domain, claim): (Domain, DomainLock),
+    (domain, mut claim): (Domain, DomainLock),
     plan: &RunPlan,
     folder: &RunFolder,
     args: &RunArgs,
     manifest: &mut Manifest,
 ) -> Result<(), Failure> {
     let interrupts = Interrupts::listen().context("cannot listen for signals").died()?;
-    let result = Rig::spawn(plan, folder, &domain, args)
-        .and_then(|mut rig| rig.run(plan, &domain, args.require_rt, &interrupts, manifest));
+    let mut names_left = NAMES;
+    let prepared = loop {
+        let prepared = Rig::prepare(plan, folder, &domain, args, &interrupts);
+        names_left -= 1;
+        let squatter = domain.foreign_file().ok().flatten().filter(|_| names_left > 0);
+        let (Err(failure), Some(path)) = (&prepared, squatter) else { break prepared };
+        status!(
+            "masseter: {:#}; another user has made {}: trying other names",
+            failure.error,
+            path.display()
+        );
+        drop(claim);
+        claim = domain.claim().usage()?;
+        // The processes that have not started have recorded nothing.
+        let _ = fs::remove_file(folder.recording());
+    };
+    let result = prepared.and_then(|rig| match rig {
+        Some((mut rig, scheduling)) => {
+            manifest.scheduling = scheduling;
+            rig.run(plan, args.require_rt, &interrupts, manifest).died()
+        }
+        None => Ok(Ending::Interrupted),
+    });
     drop(claim);
     interrupts.restore_default_actions();
     match domain.sweep() {
         Ok(swept) => report_remaining(&swept.unwrap_or_default()),
         Err(error) => status!("masseter: {error}; `masseter clean` removes the rest of this run"),
     }
-    // Input errors were found before.
-    manifest.ending = result.died()?;
+    manifest.ending = result?;
     Ok(())
 }
 
 fn report_remaining(swept: &Swept) {
     swept.remaining.iter().for_each(|error| status!("masseter: {error}"));
 }
+
+/// What the kernel granted each process.
+type Scheduling = BTreeMap<String, Obtained>;
 
 /// The three processes, in the order of their start.
 struct Rig {
@@ -120,20 +146,28 @@ impl Rig {
         })
     }
 
+    /// The processes, ready to start, with the scheduling of each; none if the user interrupts before.
+    fn prepare(
+        plan: &RunPlan,
+        folder: &RunFolder,
+        domain: &Domain,
+        args: &RunArgs,
+        interrupts: &Interrupts,
+    ) -> Result<Option<(Self, Scheduling)>, Failure> {
+        let mut rig = Self::spawn(plan, folder, domain, args).died()?;
+        let Some(scheduling) = rig.wait_ready(interrupts).died()? else { return Ok(None) };
+        domain.make_private().usage()?;
+        reserve_shared_memory(domain).usage()?;
+        Ok(Some((rig, scheduling)))
+    }
+
     fn run(
         &mut self,
         plan: &RunPlan,
-        domain: &Domain,
         require_rt: bool,
         interrupts: &Interrupts,
         manifest: &mut Manifest,
     ) -> anyhow::Result<Ending> {
-        let Some(scheduling) = self.wait_ready(interrupts)? else {
-            return Ok(Ending::Interrupted);
-        };
-        manifest.scheduling = scheduling;
-        domain.make_private()?;
-        reserve_shared_memory(domain)?;
         let is_virtual = machine::is_virtual(&SystemRoot::of_this_machine());
         let hold = dma_latency::Hold::new(plan.scenario.realtime.cpu_dma_latency, is_virtual);
         manifest.cpu_dma_latency = Some(hold.obtained.clone());
@@ -154,7 +188,7 @@ impl Rig {
     }
 
     /// The scheduling of each process once all are ready; none if the user interrupts before.
-    fn wait_ready(&mut self, interrupts: &Interrupts) -> anyhow::Result<Option<BTreeMap<String, Obtained>>> {
+    fn wait_ready(&mut self, interrupts: &Interrupts) -> anyhow::Result<Option<Scheduling>> {
         let mut scheduling = BTreeMap::new();
         for process in [&mut self.recorder, &mut self.plant, &mut self.controller] {
             match process.wait_ready(|| interrupts.is_stop_requested()) {
@@ -276,7 +310,7 @@ fn wait_for(
 }
 
 /// Prints what the kernel refused; returns the number of refusals.
-fn print_refusals(scheduling: &BTreeMap<String, Obtained>, latency: &DmaLatency) -> usize {
+fn print_refusals(scheduling: &Scheduling, latency: &DmaLatency) -> usize {
     let of_processes = scheduling.iter().flat_map(|(name, obtained)| {
         obtained.refusals.iter().map(move |refusal| format!("  {name}: {refusal}"))
     });

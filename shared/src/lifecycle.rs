@@ -80,8 +80,9 @@ impl ProcessArguments {
 
 impl ProcessContext {
     /// Reports that the process is ready, and waits for the start; before, requests real-time scheduling on `core`, or none
-    /// without a core.
+    /// without a core. The ports are open by then, and none may use another user's memory.
     pub fn ready(&self, core: Option<usize>) -> Result<Start, ProcessError> {
+        self.node.check_mapped()?;
         let realtime = &self.scenario.realtime;
         let scheduling = obtain(SchedulingRequest {
             core,

@@ -2,8 +2,7 @@
 //!
 //! Unlike `println!` and `eprintln!`, nothing here panics: a closed pipe, a closed terminal or a full disk must not end a
 //! run. Only [`result`] reports errors. Control characters are written as their codes, since names and values of files must
-//! not command a terminal. This crate depends on no verb and no file
-//! format.
+//! not command a terminal. This crate depends on no verb and no file format.
 //!
 //! ```
 //! use masseter_terminal::{result_line, status};
@@ -26,7 +25,7 @@ pub use exit::{Exit, Failure, OrFailure};
 
 /// A pipe that takes anything takes as many bytes as one write, bytes.
 const PIPE_PART: usize = 4096;
-const PATIENCE: Timespec = Timespec { tv_sec: 2, tv_nsec: 0 };
+const WRITE_TIMEOUT: Timespec = Timespec { tv_sec: 2, tv_nsec: 0 };
 
 /// The format of results.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
@@ -64,7 +63,7 @@ pub fn taken(written: io::Result<()>) -> anyhow::Result<()> {
 /// 2 s is lost: a full pipe must not keep a program from its work or its end.
 pub fn warn(text: &str) {
     for part in escaped(text).as_bytes().chunks(PIPE_PART) {
-        let is_taken = poll(&mut [PollFd::new(&io::stderr(), PollFlags::OUT)], Some(&PATIENCE));
+        let is_taken = poll(&mut [PollFd::new(&io::stderr(), PollFlags::OUT)], Some(&WRITE_TIMEOUT));
         if is_taken == Ok(0) {
             return;
         }

@@ -49,7 +49,8 @@ impl<M: Message> BatchPublisher<M> {
         while messages.len() > 0 {
             let count = messages.len().min(BATCH);
             let sample = self.0.port.loan_slice_uninit(count).map_err(failed("loaning", M::TOPIC))?;
-            let mut sample = sample.write_from_fn(|_| messages.next().expect("as many as it says"));
+            let mut sample =
+                sample.write_from_fn(|_| messages.next().expect("`count` is at most its length"));
             let published_ns = clock::now_ns();
             for message in sample.payload_mut() {
                 self.0.sent += 1;

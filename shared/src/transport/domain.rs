@@ -4,13 +4,14 @@
 //! contains a random number of the claim, so no other user can squat a name. Every process of a run holds an inherited
 //! lock on `<root>/lock`, whose text is that number; while anyone holds it, the run is alive.
 
-use std::fs::{self, File, TryLockError};
+use std::fs::{self, File, Metadata, TryLockError};
 use std::io::{self, Write};
 use std::ops::Deref;
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
+use rustix::fs::{major, minor};
 use rustix::io::{FdFlags, fcntl_setfd};
 use rustix::process::getuid;
 
@@ -93,8 +94,7 @@ impl Drop for ScratchDomain {
 impl Domain {
     /// A domain by its id, in the private folder of this user.
     pub fn named(id: &str) -> Result<Self, DomainError> {
-        let fits = (1..=32).contains(&id.len());
-        if fits && id.bytes().all(|b| b.is_ascii_alphanumeric() || b == b'-' || b == b'_') {
+        if is_id(id) {
             Ok(Self { id: id.to_owned(), root: runtime::folder()?.join(id) })
         } else {
             Err(DomainError::BadName { id: id.to_owned() })
@@ -122,7 +122,7 @@ impl Domain {
 
     /// Locks the domain for this process and its children until all have ended.
     pub fn claim(&self) -> Result<DomainLock, DomainError> {
-        let _turn = take_turn()?;
+        let _turn = self.take_turn()?;
         if self.is_locked() {
             return Err(DomainError::InUse { id: self.id.clone() });
         }
@@ -141,14 +141,14 @@ impl Domain {
 
     /// Whether any process of the run still lives.
     pub fn is_alive(&self) -> Result<bool, DomainError> {
-        let _turn = take_turn()?;
+        let _turn = self.take_turn()?;
         Ok(self.is_locked())
     }
 
     /// Removes what a domain without a living process left in shared memory and in the file system; nothing while it is
     /// alive.
     pub fn sweep(&self) -> Result<Option<Swept>, DomainError> {
-        let _turn = take_turn()?;
+        let _turn = self.take_turn()?;
         if self.is_locked() { Ok(None) } else { self.remove().map(Some) }
     }
 
@@ -171,13 +171,55 @@ impl Domain {
         Ok(files.into_iter().filter(|path| file_name(path).starts_with(&prefix)).collect())
     }
 
-    /// Takes the rights of other users from the files in shared memory: iceoryx2 makes one of them for everybody. Nobody
+    /// Takes the rights of other users from this user's files in shared memory. iceoryx2 makes one of them for everybody,
+    /// whatever the umask: until then others may change its only content, the count of the nodes so far.
+    ///
+    /// # Errors
+    /// When shared memory cannot be listed, or the system refuses.
+    pub fn make_private(&self) -> Result<(), DomainError> {
+        self.own_shared_memory()?.iter().try_for_each(|path| runtime::make_private(path))
+    }
+
+    /// The files of this user among [`Self::shared_memory`].
+    ///
+    /// # Errors
+    /// When shared memory cannot be listed.
+    pub fn own_shared_memory(&self) -> Result<Vec<PathBuf>, DomainError> {
+        Ok(self.shared_memory()?.into_iter().filter(|path| runtime::own_file(path).is_some()).collect())
+    }
+
+    /// A file of another user in shared memory that bears the prefix, which the first own file shows to everybody.
+    ///
+    /// # Errors
+    /// When shared memory cannot be listed.
+    pub fn foreign_file(&self) -> Result<Option<PathBuf>, DomainError> {
+        let files = self.shared_memory()?;
+        // iceoryx2 may have removed a file since it was listed.
+        let is_foreign =
+            |path: &PathBuf| path.symlink_metadata().is_ok() && runtime::own_file(path).is_none();
+        Ok(files.into_iter().find(is_foreign))
+    }
+
+    /// Refuses shared memory of another user that this process uses. Files that the process does not use do no harm. Nobody
     /// can exchange an own file, since the folder is sticky.
     ///
     /// # Errors
-    /// [`DomainError::Foreign`] if another user has made one: the first files show the prefix of the others.
-    pub fn make_private(&self) -> Result<(), DomainError> {
-        self.shared_memory()?.iter().try_for_each(|path| runtime::make_private(path))
+    /// [`DomainError::Foreign`] for a file that is not this user's, or no longer there.
+    pub fn check_mapped(&self) -> Result<(), DomainError> {
+        let maps = Path::new("/proc/self/maps");
+        let text = fs::read_to_string(maps).map_err(file_error("read", maps))?;
+        let prefix = self.prefix().map_err(file_error("read", &self.root))?;
+        let prefix = format!("{SHARED_MEMORY}/{prefix}");
+        // 7f00-7f01 rw-s 00000000 00:1a 12345    /dev/shm/masseter_…
+        let is_own = |line: &str, path: &str| {
+            let inode = line.split_whitespace().nth(4).and_then(|inode| inode.parse().ok());
+            runtime::own_file(Path::new(path)).is_some_and(|file| Some(file.ino()) == inode)
+        };
+        let mapped = text.lines().filter_map(|line| Some((line, &line[line.find(&prefix)?..])));
+        match mapped.into_iter().find(|(line, path)| !is_own(line, path)) {
+            Some((_, path)) => Err(DomainError::Foreign { path: path.into() }),
+            None => Ok(()),
+        }
     }
 
     /// Asking takes the lock for a moment, which only one may do at a time.
@@ -188,38 +230,45 @@ impl Domain {
 
     /// Every domain of this user that left something behind.
     pub fn all() -> Result<Vec<Self>, DomainError> {
-        let domains = entries(&runtime::folder()?)?;
-        Ok(domains.iter().filter_map(|path| Self::named(file_name(path)).ok()).collect())
+        let mut domains = Vec::new();
+        for folder in runtime::folders()? {
+            let found = entries(&folder)?.into_iter().map(|root| (file_name(&root).to_owned(), root));
+            domains.extend(found.filter(|(id, _)| is_id(id)).map(|(id, root)| Self { id, root }));
+        }
+        Ok(domains)
     }
-}
 
-/// Waits until no other process of this user claims or sweeps a domain: a lock not yet taken must not look like one
-/// that was let go. The turn ends with the file.
-fn take_turn() -> Result<File, DomainError> {
-    let path = runtime::folder()?.join(TURN);
-    let turn = runtime::open(&path)?;
-    let give_up_ns = clock::now_ns() + TURN_TIMEOUT_NS;
-    loop {
-        match turn.try_lock() {
-            Ok(()) => return Ok(turn),
-            Err(TryLockError::Error(error)) => return Err(file_error("lock", &path)(error)),
-            Err(TryLockError::WouldBlock) if clock::now_ns() < give_up_ns => clock::sleep(TURN_POLL),
-            Err(TryLockError::WouldBlock) => {
-                let holder = turn.metadata().ok().and_then(|file| holder(file.ino()));
-                let holder = holder.unwrap_or_else(|| "an unknown process".to_owned());
-                return Err(DomainError::Busy { path, holder });
+    /// Waits until no other process of this user claims or sweeps a domain: a lock not yet taken must not look like one
+    /// that was let go. The turn ends with the file.
+    fn take_turn(&self) -> Result<File, DomainError> {
+        let path = self.root.with_file_name(TURN);
+        let turn = runtime::open(&path)?;
+        let give_up_ns = clock::now_ns() + TURN_TIMEOUT_NS;
+        loop {
+            match turn.try_lock() {
+                Ok(()) => return Ok(turn),
+                Err(TryLockError::Error(error)) => return Err(file_error("lock", &path)(error)),
+                Err(TryLockError::WouldBlock) if clock::now_ns() < give_up_ns => clock::sleep(TURN_POLL),
+                Err(TryLockError::WouldBlock) => {
+                    let holder = turn.metadata().ok().and_then(|file| holder(&file));
+                    let holder = holder.unwrap_or_else(|| "an unknown process".to_owned());
+                    return Err(DomainError::Busy { path, holder });
+                }
             }
         }
     }
 }
 
-/// The process that locked the file with this number, by its id and name.
-fn holder(inode: u64) -> Option<String> {
+fn is_id(id: &str) -> bool {
+    (1..=32).contains(&id.len()) && id.bytes().all(|b| b.is_ascii_alphanumeric() || b == b'-' || b == b'_')
+}
+
+/// The process that locked the file, by its id and name.
+fn holder(file: &Metadata) -> Option<String> {
     let locks = fs::read_to_string("/proc/locks").ok()?;
     // 1: FLOCK  ADVISORY  WRITE 4711 00:1a:12345 0 EOF
-    let of_file = |line: &&str| {
-        line.split_whitespace().nth(5).and_then(|file| file.rsplit(':').next()) == Some(&inode.to_string())
-    };
+    let place = format!("{:02x}:{:02x}:{}", major(file.dev()), minor(file.dev()), file.ino());
+    let of_file = |line: &&str| line.split_whitespace().nth(5) == Some(&place);
     let id = locks.lines().find(of_file)?.split_whitespace().nth(4)?;
     let name = fs::read_to_string(format!("/proc/{id}/comm")).unwrap_or_default();
     Some(format!("process {id} ({})", name.trim_end()))
@@ -289,13 +338,17 @@ mod tests {
     }
 
     #[test]
-    fn a_file_that_is_not_ours_is_refused() {
+    fn a_file_of_others_is_found_and_does_no_harm() {
         let domain = ScratchDomain::claim("test-foreign").unwrap();
-        let foreign = segment(&domain);
-        domain.make_private().unwrap();
+        let own = segment(&domain);
+        let foreign = PathBuf::from(format!("{}-x", own.display()));
+        fs::write(&own, "").unwrap();
+        assert_eq!(domain.foreign_file().unwrap(), None);
         std::os::unix::fs::symlink("/dev/null", &foreign).unwrap();
-        let refused = domain.make_private();
-        assert!(matches!(&refused, Err(DomainError::Foreign { path }) if *path == foreign), "{refused:?}");
+        assert_eq!(domain.foreign_file().unwrap().as_ref(), Some(&foreign));
+        domain.make_private().unwrap();
+        domain.check_mapped().unwrap();
+        assert_eq!(fs::metadata(&own).unwrap().mode() & 0o777, 0o600);
     }
 
     #[test]

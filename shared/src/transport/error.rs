@@ -36,13 +36,15 @@ pub enum DomainError {
     },
     /// Other users could read or replace the files of a run.
     #[error(
-        "{path} is not a private folder of this user (mode 0700): remove it, or have root remove it, or set XDG_RUNTIME_DIR to a private folder"
+        "{path} is not a private folder of this user (mode 0700): remove it, or have root remove it, or set XDG_RUNTIME_DIR to a private folder{passed_over}"
     )]
     NotPrivate {
         /// The folder, or what has its name.
         path: PathBuf,
+        /// Why the session's folder is of no use, if there is one.
+        passed_over: String,
     },
-    /// Another user has made a file in the place of ours.
+    /// This process uses a file that is not this user's.
     #[error("another user has made {path}: start the rig again, whose files then have other names")]
     Foreign {
         /// The file.

@@ -17,7 +17,7 @@ use iceoryx2::service::port_factory::publisher::PortFactoryPublisher;
 use iceoryx2::service::port_factory::subscriber::PortFactorySubscriber;
 
 use super::Domain;
-use super::error::{Refused, TransportError, check_version, failed};
+use super::error::{DomainError, Refused, TransportError, check_version, failed};
 use crate::clock;
 use crate::messages::Message;
 use crate::realtime::Waiter;
@@ -37,6 +37,7 @@ const MAX_HELD: usize = 3;
 #[derive(Debug)]
 pub struct Node {
     node: IceoryxNode<ipc::Service>,
+    domain: Domain,
 }
 
 impl Node {
@@ -52,7 +53,15 @@ impl Node {
         let builder = NodeBuilder::new().config(&config).signal_handling_mode(SignalHandlingMode::Disabled);
         let node = builder.create().map_err(failed("joining domain", id))?;
         domain.make_private().map_err(failed("joining domain", id))?;
-        Ok(Self { node })
+        Ok(Self { node, domain: domain.clone() })
+    }
+
+    /// Refuses shared memory of another user beneath a port of this process.
+    ///
+    /// # Errors
+    /// As [`Domain::check_mapped`].
+    pub fn check_mapped(&self) -> Result<(), DomainError> {
+        self.domain.check_mapped()
     }
 
     /// The iceoryx2 node beneath, for measurements against bare iceoryx2.

@@ -1,10 +1,12 @@
 //! The private folder of locks and iceoryx2's files: no other user may hold a lock, squat a name or read a file in it.
 //!
-//! It is `masseter` below the session's `XDG_RUNTIME_DIR`, `/run/masseter` of root, or `/dev/shm/masseter-UID`.
+//! It is `masseter` below the session's `XDG_RUNTIME_DIR`, `/run/masseter` of root, or `/dev/shm/masseter-UID`. Where another
+//! user has taken that name, it is `/dev/shm/masseter-UID-1`, or one of the next.
 
 use std::env;
-use std::fs::{self, DirBuilder, File, OpenOptions};
+use std::fs::{self, DirBuilder, File, Metadata, OpenOptions};
 use std::io::{self, ErrorKind, Read};
+use std::iter;
 use std::os::unix::fs::{DirBuilderExt, MetadataExt, OpenOptionsExt, PermissionsExt};
 use std::path::{Path, PathBuf};
 
@@ -12,6 +14,7 @@ use rustix::fs::Mode;
 use rustix::process::geteuid;
 
 use super::error::{DomainError, file_error};
+use crate::input::excerpt;
 
 const ONLY_OWNER: Mode = Mode::RWXU;
 /// Permissions of group and others.
@@ -19,31 +22,94 @@ const OF_OTHERS: u32 = 0o077;
 const WRITE_OF_OTHERS: u32 = 0o022;
 /// Longest session folder, bytes: iceoryx2 aborts on paths of more than 255, and needs most of them for its own names.
 pub(super) const LONGEST_SESSION_FOLDER: usize = 40;
+/// Folders of a user in `/dev/shm`, so that nobody stops another user by taking one name.
+const FOLDERS: usize = 8;
 
 /// The folder, made if it does not exist, and verified.
 ///
 /// # Errors
-/// [`DomainError::NotPrivate`] if another user made it or may use it.
+/// [`DomainError::NotPrivate`] if other users made or may use every folder that it could be.
 pub(super) fn folder() -> Result<PathBuf, DomainError> {
-    choose(env::var_os("XDG_RUNTIME_DIR").map(PathBuf::from))
+    folders().map(|mut folders| folders.swap_remove(0))
 }
 
-/// A session folder of another user, as after `su`, is passed over.
-fn choose(session: Option<PathBuf>) -> Result<PathBuf, DomainError> {
-    let is_usable = |path: &PathBuf| {
-        path.is_absolute() && path.as_os_str().len() <= LONGEST_SESSION_FOLDER && is_private(path)
-    };
-    let of_session = session.filter(is_usable).map(|session| session.join("masseter"));
+/// The folder, and further ones that earlier runs may have used.
+///
+/// # Errors
+/// As [`folder`].
+pub(super) fn folders() -> Result<Vec<PathBuf>, DomainError> {
+    let own = format!("/dev/shm/masseter-{}", geteuid().as_raw());
+    let others = (1..FOLDERS).map(|number| format!("{own}-{number}").into());
+    let of_user: Vec<PathBuf> = iter::once(own.clone().into()).chain(others).collect();
+    choose(env::var_os("XDG_RUNTIME_DIR").map(PathBuf::from), &of_user)
+}
+
+/// A session folder of another user, as after `su`, is passed over. Of the user's folders, those that are there come first:
+/// the choice holds when another user gives a name back.
+fn choose(session: Option<PathBuf>, of_user: &[PathBuf]) -> Result<Vec<PathBuf>, DomainError> {
+    let passed_over = session.as_deref().and_then(unusable);
+    let of_session = session.filter(|_| passed_over.is_none()).map(|session| session.join("masseter"));
     let of_root = geteuid().is_root().then(|| PathBuf::from("/run/masseter"));
-    let preferred = of_session.or(of_root).filter(|path| make(path).is_ok());
-    let folder = preferred.unwrap_or_else(|| format!("/dev/shm/masseter-{}", geteuid().as_raw()).into());
-    make(&folder).map_err(file_error("create", &folder))?;
-    if is_own_folder_without(WRITE_OF_OTHERS, &folder) {
-        // Others could only look into it.
-        fs::set_permissions(&folder, PermissionsExt::from_mode(0o700))
-            .map_err(file_error("make private", &folder))?;
+    if let Some(preferred) = of_session.or(of_root).filter(|path| make(path).is_ok()) {
+        return if take(&preferred)? {
+            Ok(vec![preferred])
+        } else {
+            Err(not_private(&preferred, passed_over))
+        };
     }
-    if is_private(&folder) { Ok(folder) } else { Err(DomainError::NotPrivate { path: folder }) }
+    let found = private_ones(of_user)?;
+    if found.is_empty() { Err(not_private(&of_user[0], passed_over)) } else { Ok(found) }
+}
+
+/// The private ones of these folders, or else the first that can be made; none if all names are taken.
+fn private_ones(folders: &[PathBuf]) -> Result<Vec<PathBuf>, DomainError> {
+    let mut found = Vec::new();
+    for path in folders {
+        found.extend(take(path)?.then(|| path.clone()));
+    }
+    for path in folders {
+        if found.is_empty() {
+            make(path).map_err(file_error("create", path))?;
+            found.extend(take(path)?.then(|| path.clone()));
+        }
+    }
+    Ok(found)
+}
+
+/// Whether a folder is private, after the rights of others who could only look into it are taken.
+fn take(folder: &Path) -> Result<bool, DomainError> {
+    if is_own_folder_without(WRITE_OF_OTHERS, folder) {
+        fs::set_permissions(folder, PermissionsExt::from_mode(0o700))
+            .map_err(file_error("make private", folder))?;
+    }
+    Ok(is_private(folder))
+}
+
+fn not_private(folder: &Path, passed_over: Option<String>) -> DomainError {
+    DomainError::NotPrivate { path: folder.to_owned(), passed_over: passed_over.unwrap_or_default() }
+}
+
+/// Why a session's folder is passed over, if it is.
+fn unusable(session: &Path) -> Option<String> {
+    let length = session.as_os_str().len();
+    let reason = if !session.is_absolute() {
+        "it is no absolute path".to_owned()
+    } else if length > LONGEST_SESSION_FOLDER {
+        format!("its path has {length} bytes, at most {LONGEST_SESSION_FOLDER} are of use")
+    } else {
+        match fs::symlink_metadata(session) {
+            Err(error) => error.to_string(),
+            Ok(found) if !found.is_dir() => "it is no folder".to_owned(),
+            Ok(found) if found.uid() != geteuid().as_raw() => {
+                format!("it is user {}'s, not {}'s", found.uid(), geteuid().as_raw())
+            }
+            Ok(found) if found.mode() & OF_OTHERS != 0 => {
+                format!("its mode is {:04o}, not 0700", found.mode() & 0o7777)
+            }
+            Ok(_) => return None,
+        }
+    };
+    Some(format!("; XDG_RUNTIME_DIR = {} is passed over: {reason}", excerpt(&session.to_string_lossy())))
 }
 
 fn is_private(path: &Path) -> bool {
@@ -56,20 +122,20 @@ fn is_own_folder_without(rights: u32, path: &Path) -> bool {
         .is_ok_and(|found| found.is_dir() && found.uid() == geteuid().as_raw() && found.mode() & rights == 0)
 }
 
-/// Takes the rights of others from a file of this user.
-///
-/// # Errors
-/// [`DomainError::Foreign`] if it is a link or another user's.
+/// What the system says of a file of this user; none for a link, another user's file, or one that is gone.
+pub(super) fn own_file(path: &Path) -> Option<Metadata> {
+    fs::symlink_metadata(path).ok().filter(|found| found.is_file() && found.uid() == geteuid().as_raw())
+}
+
+/// Takes the rights of others from a file of this user; leaves other files alone.
 pub(super) fn make_private(path: &Path) -> Result<(), DomainError> {
-    // iceoryx2 may have removed it since it was listed.
-    let Ok(found) = fs::symlink_metadata(path) else { return Ok(()) };
-    if !found.is_file() || found.uid() != geteuid().as_raw() {
-        return Err(DomainError::Foreign { path: path.to_owned() });
+    match own_file(path) {
+        Some(found) if found.mode() & OF_OTHERS != 0 => {
+            let made = fs::set_permissions(path, PermissionsExt::from_mode(0o600));
+            made.map_err(file_error("make private", path))
+        }
+        _ => Ok(()),
     }
-    if found.mode() & OF_OTHERS == 0 {
-        return Ok(());
-    }
-    fs::set_permissions(path, PermissionsExt::from_mode(0o600)).map_err(file_error("make private", path))
 }
 
 /// Makes a folder for its owner only, unless something has the name.
@@ -124,14 +190,36 @@ mod tests {
     #[test]
     fn a_private_session_folder_is_used_and_another_one_passed_over() {
         let (own, open) = (Session::new("own", 0o700), Session::new("open", 0o750));
-        let found = choose(Some(own.0.clone())).unwrap();
-        assert_eq!(found, own.0.join("masseter"));
-        assert!(is_private(&found));
-        for unusable in
-            [Some(open.0.clone()), Some("relative".into()), Some(own.0.join("x".repeat(99))), None]
-        {
-            assert!(!choose(unusable).unwrap().starts_with(env::temp_dir()));
+        let found = choose(Some(own.0.clone()), &[]).unwrap();
+        assert_eq!(found, [own.0.join("masseter")]);
+        assert!(is_private(&found[0]));
+        let long = own.0.join("x".repeat(99));
+        for (unusable, reason) in [
+            (open.0.clone(), "its mode is 0750, not 0700"),
+            ("relative".into(), "it is no absolute path"),
+            (long, "bytes, at most 40 are of use"),
+            (own.0.join("none"), "No such file"),
+        ] {
+            let said = super::unusable(&unusable).unwrap();
+            assert!(said.contains(reason), "{said}");
+            let of_user = [own.0.join("user")];
+            assert!(!choose(Some(unusable), &of_user).unwrap().contains(&own.0.join("masseter")));
         }
+        assert_eq!(super::unusable(&own.0), None);
+    }
+
+    #[test]
+    fn a_folder_that_is_taken_gives_way_to_the_next_for_as_long_as_that_is_there() {
+        let session = Session::new("taken", 0o700);
+        let [taken, next, third] = ["a", "b", "c"].map(|name| session.0.join(name));
+        let of_user = [taken.clone(), next.clone(), third.clone()];
+        fs::write(&taken, "").unwrap();
+        let chosen = || private_ones(&of_user).unwrap();
+        assert_eq!(chosen(), vec![next.clone()]);
+        fs::remove_file(&taken).unwrap();
+        assert_eq!(chosen(), vec![next.clone()]);
+        make(&third).unwrap();
+        assert_eq!(chosen(), vec![next, third]);
     }
 
     #[test]
@@ -139,7 +227,7 @@ mod tests {
         let session = Session::new("refused", 0o700);
         let folder = session.0.join("masseter");
         make(&folder).unwrap();
-        let refused = || matches!(choose(Some(session.0.clone())), Err(DomainError::NotPrivate { path }) if path == folder);
+        let refused = || matches!(choose(Some(session.0.clone()), &[]), Err(DomainError::NotPrivate { path, .. }) if path == folder);
         fs::set_permissions(&folder, PermissionsExt::from_mode(0o755)).unwrap();
         assert!(!refused() && is_private(&folder), "others only looked into it");
         fs::set_permissions(&folder, PermissionsExt::from_mode(0o775)).unwrap();
