@@ -172,7 +172,8 @@ mod tests {
         PathSample { sampled_ns, deviation }
     }
 
-    /// Fault 1 strikes at 1 ms, a drive reports an emergency at 1.5 ms, and the master stops at 3.5 ms; fault 2 strikes after that; fault 3 never.
+    /// Fault 1 strikes at 1 ms, a drive reports an emergency at 1.5 ms, and the master stops at 3.5 ms. Fault 2 strikes after
+    /// that, and fault 3 never.
     #[test]
     fn the_path_is_followed_from_the_strike_to_the_stop_whatever_comes_first() {
         let mut watch = FaultWatch::new(3);

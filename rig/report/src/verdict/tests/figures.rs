@@ -376,7 +376,7 @@ fn a_safe_stop_is_one_unless_the_machine_alone_explains_it() {
     assert_eq!(outcome, Exit::Invalid, "it never had real time");
 }
 
-/// A peak is of a time before the stop, an average also of a slow way to it.
+/// An average beyond its limit may be what the stop came for.
 #[test]
 fn a_safe_stop_that_comes_too_late_fails_the_run() {
     let cases: [(Change, Exit, &str); 6] = [
