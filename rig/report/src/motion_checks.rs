@@ -77,7 +77,8 @@ pub(crate) fn faults(
         })
         .collect();
     let which = if idle.is_empty() { String::new() } else { format!(", number {} never", idle.join(", ")) };
-    let struck = format!("{} of {} declared faults acted{which}", declared.len() - idle.len(), declared.len());
+    let struck =
+        format!("{} of {} declared faults acted{which}", declared.len() - idle.len(), declared.len());
     let result = match (beyond.is_empty(), idle.is_empty()) {
         (true, true) => CheckResult::Passed,
         (true, false) if !is_played => CheckResult::NotJudged,

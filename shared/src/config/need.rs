@@ -11,7 +11,7 @@ macro_rules! keyed {
 pub(super) use keyed;
 
 /// Longest run, s.
-const LONGEST_S: f64 = 86_400.0;
+pub(super) const LONGEST_S: f64 = 86_400.0;
 
 /// Refuses the first of `values` that is not a finite number above 0.
 pub(super) fn require_positive(values: &[(&'static str, f64)]) -> Result<(), ScenarioError> {
