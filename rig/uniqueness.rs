@@ -139,7 +139,8 @@ fn inputs_to_prove(args: &ProveArgs) -> anyhow::Result<(Mechanism, Vec<InputBox>
         return Ok((mechanism, vec![inputs]));
     };
     let overrides = Overrides { trajectory: args.trajectory.clone(), ..Overrides::default() };
-    let plan = RunPlan::new(masseter_plan::scenario_with_overrides(args.scenario.as_deref(), &overrides)?)?;
+    let path = args.scenario.as_deref();
+    let plan = RunPlan::of_file(masseter_plan::scenario_with_overrides(path, &overrides)?, path)?;
     let inputs = boxes(&plan, around_mm * 1e-3)?;
     result_line!("{}: {} boxes around its inputs", plan.scenario.name, inputs.len())?;
     Ok((plan.mechanism, inputs))

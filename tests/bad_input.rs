@@ -22,9 +22,25 @@ fn scenarios_are_refused_with_place_and_remedy() {
         ("[can]\nbuses = [[0, 1, 2], [3, 4]]", "axis"),
         ("[can]\nnode_ids = [1, 1, 2, 3, 4, 5]", "node"),
         ("[mechanism]\nplatform_sides_m = [0.05, 0.05, 0.2]", "no triangle"),
-        ("[motion]\nkind = 'opening'\namplitude_mm = 90.0", "out of reach"),
+        (
+            "[motion]\nkind = 'opening'\namplitude_mm = 90.0",
+            "scenario.toml:3:1: motion.amplitude_mm of 90.0 mm is out of reach",
+        ),
+        ("[jaw]\nreference_point_m = [nan, 0, 0]", "scenario.toml:2:1: jaw.reference_point_m is NaN"),
+        ("[jaw]\nreference_point_m = [1e300, 0, 0]", "scenario.toml:2:1: jaw.reference_point_m is 1e300"),
+        (
+            "rate_hz = 10\n[controller]\nstart_timeout_s = 5",
+            "scenario.toml:3:1: controller.start_timeout_s = 5: at 10 Hz",
+        ),
+        (
+            "\n[[faults]]\nkind = 'lose'\nbus = 0\nfrom_s = 1\nnode = 0",
+            "scenario.toml:6:1: faults.node = 0: bus 0 has the nodes",
+        ),
+        ("[can]\nnode_ids = [127, 1, 2, 3, 4, 5]", "scenario.toml:2:1: can.node_ids = 127"),
+        ("seed = 1\nseed = 1", "scenario.toml:2:1: seed: the key is there already"),
         ("[jaw]\nclosed_offset_m = [0.04, 0.0, 0.0]", "stroke"),
-        ("[motion]\nkind = 'chewing'\ncycle_rate_hz = 5.0", "limit"),
+        ("[motion]\nkind = 'chewing'\ncycle_rate_hz = 5.0", "scenario.toml:1:2: motion at"),
+        ("[motion]\nkind = 'chewing'\ncycle_rate_hz = 5.0", "limits.leg_"),
         ("[drives.leg]\nmax_velocity_m_s = 0.1", "axis l1 would move at 0.100 m/s, limit 0.1 m/s"),
         ("[motion]\nkind = 'file'\npath = 'nowhere.csv'", "nowhere.csv"),
     ];

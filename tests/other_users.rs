@@ -226,7 +226,7 @@ fn a_stranger_that_makes_files_of_every_run_stops_none() {
     let Some(victim) = Victim::new(61_006, &format!("duration_s = 1.0\n{LENIENT}")) else { return };
     let script = format!(
         "while :; do for file in /dev/shm/masseter_{}_*.global_mgmt; do
-           prefix=${{file%%.*}}.$(echo ${{file#*.}} | cut -c 1-17); test -e \"$file\" && touch \"${{prefix}}x\"
+           prefix=${{file%%.*}}.$(echo ${{file#*.}} | cut -c 1-17); case $prefix in *[*]*) ;; *) touch ${{prefix}}x; exit;; esac
          done; done",
         victim.id
     );

@@ -91,10 +91,8 @@ fn resolve(args: &RunArgs) -> anyhow::Result<RunPlan> {
     let scenario = masseter_plan::scenario_with_overrides(args.scenario.as_deref(), &args.overrides())?;
     check_clock(args, &scenario)?;
     args.live.map_or(Ok(()), foxglove::check)?;
-    let of_file = args.scenario.as_deref().map(|path| path.display().to_string());
-    let plan = RunPlan::new(scenario)
-        .with_context(|| of_file.unwrap_or_else(|| "the default scenario".to_owned()))?;
-    plant::check_interfaces(&plan.scenario).context("the plant cannot be built")?;
+    let plan = RunPlan::of_file(scenario, args.scenario.as_deref())?;
+    plant::check_interfaces(&plan.scenario)?;
     Ok(plan)
 }
 

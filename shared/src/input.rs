@@ -1,7 +1,7 @@
 //! Input files of limited size, and their text as messages quote it.
 
 use std::fs::OpenOptions;
-use std::io::{self, Read};
+use std::io::{self, ErrorKind, Read};
 use std::os::unix::fs::OpenOptionsExt;
 use std::path::Path;
 
@@ -30,12 +30,16 @@ pub fn read_text(path: &Path, most_bytes: u64) -> io::Result<String> {
     if !file.metadata()?.is_file() {
         return Err(io::Error::other("it is no regular file; copy its content into one"));
     }
-    let mut text = String::new();
-    file.take(most_bytes + 1).read_to_string(&mut text)?;
-    if text.len() as u64 > most_bytes {
+    let mut bytes = Vec::new();
+    file.take(most_bytes + 1).read_to_end(&mut bytes)?;
+    if bytes.len() as u64 > most_bytes {
         return Err(io::Error::other(format!("it is larger than {most_bytes} bytes")));
     }
-    Ok(text)
+    String::from_utf8(bytes).map_err(|error| {
+        let valid = &error.as_bytes()[..error.utf8_error().valid_up_to()];
+        let line = valid.iter().filter(|byte| **byte == b'\n').count() + 1;
+        io::Error::new(ErrorKind::InvalidData, format!("line {line} is no text in UTF-8"))
+    })
 }
 
 /// A value as messages quote it: at most 80 characters, without control characters.
@@ -74,6 +78,15 @@ mod tests {
         let error = read_text(&path, 4).unwrap_err().to_string();
         std::fs::remove_file(&path).unwrap();
         assert_eq!(error, "it is larger than 4 bytes");
+    }
+
+    #[test]
+    fn the_line_that_is_no_text_is_named() {
+        let path = std::env::temp_dir().join(format!("masseter-text-{}", std::process::id()));
+        std::fs::write(&path, b"1\n2\n\xff").unwrap();
+        let error = read_text(&path, 10).unwrap_err().to_string();
+        std::fs::remove_file(&path).unwrap();
+        assert_eq!(error, "line 3 is no text in UTF-8");
     }
 
     #[test]

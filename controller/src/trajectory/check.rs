@@ -6,7 +6,7 @@
 //! carries beyond a stroke is held at its end.
 
 use masseter_shared::config::TrajectoryLimitsConfig;
-use masseter_shared::geometry::{AXES, AXIS_NAMES, Jacobian, Mechanism, Pose, StrokeLimits};
+use masseter_shared::geometry::{AXES, AXIS_NAMES, Jacobian, LEGS, Mechanism, Pose, StrokeLimits};
 
 use crate::kinematics::Assembly;
 
@@ -69,7 +69,7 @@ pub fn check(
         let time_s = sample as f64 * period_s;
         survey.visit(&trajectory.pose(time_s)).map_err(|problem| {
             let line = trajectory.source_line(time_s).map_or_else(String::new, |line| format!(" ({line})"));
-            TrajectoryError(format!("the trajectory at {time_s:.3} s{line}: {problem}"))
+            TrajectoryError(format!("motion at {time_s:.3} s{line}: {problem}"))
         })?;
     }
     Ok(survey.report)
@@ -104,11 +104,16 @@ impl<'a> Survey<'a> {
         let Some(last_m) = self.last_m.replace(axes_m) else { return Ok(()) };
         let velocity_m_s = self.rates(&last_m, &axes_m);
         let limit = |axis| self.limits.velocity_m_s(axis);
-        keep_largest(&velocity_m_s, &mut self.report.velocity_m_s, limit, ["move", "m/s"])?;
+        keep_largest(&velocity_m_s, &mut self.report.velocity_m_s, limit, ["move", "m/s", "velocity_m_s"])?;
         let Some(last_m_s) = self.last_velocity_m_s.replace(velocity_m_s) else { return Ok(()) };
         let acceleration_m_s2 = self.rates(&last_m_s, &velocity_m_s);
         let limit = |axis| self.limits.acceleration_m_s2(axis);
-        keep_largest(&acceleration_m_s2, &mut self.report.acceleration_m_s2, limit, ["accelerate", "m/s²"])
+        keep_largest(
+            &acceleration_m_s2,
+            &mut self.report.acceleration_m_s2,
+            limit,
+            ["accelerate", "m/s²", "acceleration_m_s2"],
+        )
     }
 
     fn visit_pose(&mut self, pose: &Pose) -> Result<[f64; AXES], String> {
@@ -133,7 +138,9 @@ impl<'a> Survey<'a> {
         let limit = self.limits.max_condition;
         if condition > limit {
             let remedy = "too close to a singularity; make the motion smaller";
-            return Err(format!("condition number {condition:.1}, limit {limit}: {remedy}"));
+            return Err(format!(
+                "condition number {condition:.1}, limit {limit:?} (limits.max_condition): {remedy}"
+            ));
         }
         Ok(axes_m)
     }
@@ -148,15 +155,16 @@ fn keep_largest(
     values: &[f64; AXES],
     largest: &mut [f64; AXES],
     limit: impl Fn(usize) -> f64,
-    [does, unit]: [&str; 2],
+    [does, unit, quantity]: [&str; 3],
 ) -> Result<(), String> {
     for (axis, value) in values.iter().map(|value| value.abs()).enumerate() {
         largest[axis] = largest[axis].max(value);
         if value > limit(axis) {
             let (name, limit) = (AXIS_NAMES[axis], limit(axis));
+            let drive = if axis < LEGS { "slide" } else { "leg" };
             return Err(format!(
-                "axis {name} would {does} at {value:.3} {unit}, limit {limit} {unit}; slow the motion or lower the \
-                 low-pass"
+                "axis {name} would {does} at {value:.3} {unit}, limit {limit:?} {unit} (the lower of \
+                 limits.{drive}_{quantity} and drives.{drive}.max_{quantity}); slow the motion or lower the low-pass"
             ));
         }
     }

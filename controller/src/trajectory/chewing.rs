@@ -37,11 +37,11 @@ pub(super) struct Chewing {
 impl Chewing {
     pub(super) fn new(config: &ChewingConfig, jaw: &JawConfig) -> Result<Self, TrajectoryError> {
         let ChewingConfig { vertical_mm, lateral_mm, anterior_posterior_mm, .. } = *config;
-        require("vertical_mm", vertical_mm, (0.0..=60.0).contains(&vertical_mm), "0 to 60 mm")?;
-        require("lateral_mm", lateral_mm, (0.0..=15.0).contains(&lateral_mm), "0 to 15 mm")?;
+        require("motion.vertical_mm", vertical_mm, (0.0..=60.0).contains(&vertical_mm), "0 to 60 mm")?;
+        require("motion.lateral_mm", lateral_mm, (0.0..=15.0).contains(&lateral_mm), "0 to 15 mm")?;
         let range = -15.0..=40.0;
         let holds = range.contains(&anterior_posterior_mm);
-        require("anterior_posterior_mm", anterior_posterior_mm, holds, "-15 to 40 mm")?;
+        require("motion.anterior_posterior_mm", anterior_posterior_mm, holds, "-15 to 40 mm")?;
         let (inclination_deg, bennett_angle_deg) =
             (config.condylar_inclination_deg, config.bennett_angle_deg);
         let mut chewing = Self {
@@ -77,7 +77,7 @@ impl Chewing {
             let widest = Self { balancing_m, ..*self }.posture(self.cycle.opening)?;
             Some(sign * self.mandible.displacement(&widest).translation.y)
         };
-        reach("lateral_mm", lateral_mm, LARGEST_BALANCING_M, swing_m)
+        reach("motion.lateral_mm", lateral_mm, LARGEST_BALANCING_M, swing_m)
     }
 
     fn prove(&self) -> Result<(), TrajectoryError> {
@@ -85,14 +85,14 @@ impl Chewing {
             let phase = f64::from(point) / f64::from(PROOF_POINTS);
             let Some(Posture { advance_m, .. }) = self.posture(phase) else {
                 return Err(TrajectoryError(format!(
-                    "at {phase:.2} of the chewing cycle the incisal point would be out of the mandible's reach; \
+                    "motion: at {phase:.2} of the chewing cycle the incisal point would be out of the mandible's reach; \
                      bring vertical_mm or anterior_posterior_mm closer to the defaults (18 and 5), or condylar_inclination_deg (40)"
                 )));
             };
             if advance_m < -LARGEST_RETRUSION_M {
                 let advance_mm = 1000.0 * advance_m;
                 return Err(TrajectoryError(format!(
-                    "at {phase:.2} of the chewing cycle the condyles would be {advance_mm:.1} mm along their paths; \
+                    "motion: at {phase:.2} of the chewing cycle the condyles would be {advance_mm:.1} mm along their paths; \
                      bring anterior_posterior_mm or lateral_mm closer to what vertical_mm allows (defaults 5, 4 and 18)"
                 )));
             }

@@ -2,8 +2,7 @@
 
 use std::path::Path;
 
-/// A motion that cannot be built or followed: the key, the time or the line of the recording, what is wrong there, and the
-/// remedy.
+/// A motion that cannot be built or followed: the key, or the line of the recording, what is wrong there, and the remedy.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{0}")]
 pub struct TrajectoryError(pub(super) String);
@@ -13,7 +12,7 @@ pub(super) fn require(name: &str, value: f64, holds: bool, need: &str) -> Result
     if holds && value.is_finite() {
         Ok(value)
     } else {
-        Err(TrajectoryError(format!("{name} is {value}; it must be {need}")))
+        Err(TrajectoryError(format!("{name} is {value:?}; it must be {need}")))
     }
 }
 

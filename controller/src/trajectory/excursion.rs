@@ -49,7 +49,7 @@ impl Excursion {
         let mandible = Mandible::symmetric(jaw, config.condylar_inclination_deg)?;
         let cycle = MotionRhythm::new(config.cycle_rate_hz, &config.phases)?;
         let amplitude_mm = config.amplitude_mm;
-        require("amplitude_mm", amplitude_mm, (0.0..=15.0).contains(&amplitude_mm), "0 to 15 mm")?;
+        require("motion.amplitude_mm", amplitude_mm, (0.0..=15.0).contains(&amplitude_mm), "0 to 15 mm")?;
         let farthest = Posture { advance_m: amplitude_mm / 1000.0, ..Default::default() };
         Ok(Self { mandible, cycle, farthest })
     }
@@ -74,8 +74,8 @@ impl Excursion {
 
 /// The coordinate at which the incisal point's travel, metres, is the amplitude.
 fn farthest(amplitude_mm: f64, highest: f64, travel_m: impl Fn(f64) -> f64) -> Result<f64, TrajectoryError> {
-    require("amplitude_mm", amplitude_mm, amplitude_mm >= 0.0, "0 or above")?;
-    reach("amplitude_mm", amplitude_mm, highest, |coordinate| Some(travel_m(coordinate)))
+    require("motion.amplitude_mm", amplitude_mm, amplitude_mm >= 0.0, "0 or above")?;
+    reach("motion.amplitude_mm", amplitude_mm, highest, |coordinate| Some(travel_m(coordinate)))
 }
 
 #[cfg(test)]

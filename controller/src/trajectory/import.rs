@@ -19,10 +19,15 @@ use super::{markers, pose_csv};
 pub(super) fn import(config: &FileConfig, jaw: &JawConfig) -> Result<Recording, TrajectoryError> {
     let lowpass_hz = config.lowpass_hz;
     let holds = lowpass_hz == 0.0 || (0.5..=50.0).contains(&lowpass_hz);
-    require("lowpass_hz", lowpass_hz, holds, "0 (none) or 0.5 to 50 Hz")?;
+    require("motion.lowpass_hz", lowpass_hz, holds, "0 (none) or 0.5 to 50 Hz")?;
     for &coordinate in config.reference_point_mm.iter().chain(&config.marker_origin_mm).flatten() {
         let is_near = coordinate.abs() <= LARGEST_MM;
-        require("reference_point_mm or marker_origin_mm", coordinate, is_near, "within ±100000 mm")?;
+        require(
+            "motion.reference_point_mm or motion.marker_origin_mm",
+            coordinate,
+            is_near,
+            "within ±100000 mm",
+        )?;
     }
     let reference = match config.reference_point_mm {
         Some(point_mm) => Vec3::from(point_mm) / 1000.0,

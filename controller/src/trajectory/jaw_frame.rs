@@ -12,6 +12,9 @@ use crate::kinematics::solve_completely;
 use super::TrajectoryError;
 use super::error::require;
 
+/// Farthest offset on a robot that fits on a table, m.
+const FARTHEST_M: f64 = 1.0;
+
 /// The jaw on the platform.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct JawFrame {
@@ -28,12 +31,12 @@ impl JawFrame {
             [("jaw.reference_point_m", jaw.reference_point_m), ("jaw.closed_offset_m", jaw.closed_offset_m)]
         {
             for coordinate in point {
-                require(name, coordinate, coordinate.is_finite(), "finite")?;
+                require(name, coordinate, coordinate.abs() <= FARTHEST_M, "within ±1 m")?;
             }
         }
         let actuators = Actuators { slide_m: [0.0; LEGS], leg_m: [closed_leg_m; LEGS] };
         let no_pose = |error| {
-            let problem = format!("jaw.closed_leg_m = {closed_leg_m} m gives no closed pose: {error}");
+            let problem = format!("jaw.closed_leg_m = {closed_leg_m:?} m gives no closed pose: {error}");
             TrajectoryError(problem)
         };
         let closed = solve_completely(mechanism, &actuators).map_err(no_pose)?.pose;

@@ -80,9 +80,19 @@ impl Mandible {
         working: JawSide,
     ) -> Result<Self, TrajectoryError> {
         let range = 0.0..=80.0;
-        require("condylar_inclination_deg", inclination_deg, range.contains(&inclination_deg), "0 to 80")?;
+        require(
+            "motion.condylar_inclination_deg",
+            inclination_deg,
+            range.contains(&inclination_deg),
+            "0 to 80",
+        )?;
         let range = 0.0..=45.0;
-        require("bennett_angle_deg", bennett_angle_deg, range.contains(&bennett_angle_deg), "0 to 45")?;
+        require(
+            "motion.bennett_angle_deg",
+            bennett_angle_deg,
+            range.contains(&bennett_angle_deg),
+            "0 to 45",
+        )?;
         let (down, forward) = inclination_deg.to_radians().sin_cos();
         let (inward, straight) = bennett_angle_deg.to_radians().sin_cos();
         let working = working.sign();
@@ -173,7 +183,7 @@ pub(super) fn reach(
     let reached_mm = 1000.0 * travel_m(below).unwrap_or_default();
     if amplitude_mm - reached_mm > REACHED_MM {
         return Err(TrajectoryError(format!(
-            "{name} of {amplitude_mm} mm is out of reach: the mandible reaches at most {reached_mm:.1} mm; \
+            "{name} of {amplitude_mm:?} mm is out of reach: the mandible reaches at most {reached_mm:.1} mm; \
              choose a smaller amplitude"
         )));
     }

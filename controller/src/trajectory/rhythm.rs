@@ -23,14 +23,19 @@ pub(super) struct MotionRhythm {
 impl MotionRhythm {
     pub(super) fn new(rate_hz: f64, phases: &PhaseShares) -> Result<Self, TrajectoryError> {
         let PhaseShares { opening, closing, occlusion } = *phases;
-        require("cycle_rate_hz", rate_hz, rate_hz > 0.0 && rate_hz <= 10.0, "above 0 and at most 10 Hz")?;
-        require("phases.opening", opening, opening > 0.0, "above 0")?;
-        require("phases.closing", closing, closing > 0.0, "above 0")?;
-        require("phases.occlusion", occlusion, occlusion >= 0.0, "0 or above")?;
+        require(
+            "motion.cycle_rate_hz",
+            rate_hz,
+            rate_hz > 0.0 && rate_hz <= 10.0,
+            "above 0 and at most 10 Hz",
+        )?;
+        require("motion.phases.opening", opening, opening > 0.0, "above 0")?;
+        require("motion.phases.closing", closing, closing > 0.0, "above 0")?;
+        require("motion.phases.occlusion", occlusion, occlusion >= 0.0, "0 or above")?;
         let sum = opening + closing + occlusion;
         if (sum - 1.0).abs() > 1e-6 {
             let problem = "opening, closing and occlusion must add up to 1";
-            return Err(TrajectoryError(format!("phases add up to {sum}; {problem}")));
+            return Err(TrajectoryError(format!("motion.phases add up to {sum:?}; {problem}")));
         }
         Ok(Self { rate_hz, opening, closing })
     }
@@ -95,7 +100,9 @@ mod tests {
     #[test]
     fn shares_that_do_not_fill_the_cycle_are_refused() {
         let phases = PhaseShares { opening: 0.5, ..Default::default() };
-        assert!(MotionRhythm::new(1.0, &phases).unwrap_err().to_string().starts_with("phases add up to "));
+        assert!(
+            MotionRhythm::new(1.0, &phases).unwrap_err().to_string().starts_with("motion.phases add up to ")
+        );
         for rate_hz in [0.0, -1.0, f64::NAN, 11.0] {
             assert!(MotionRhythm::new(rate_hz, &PhaseShares::default()).is_err());
         }

@@ -143,7 +143,7 @@ fn what_exceeds_a_limit_is_refused_with_time_axis_and_limit() {
     for (limits, reason) in table {
         let error = refuse(limits).to_string();
         assert!(error.contains(reason), "{error}");
-        let time_s = error.strip_prefix("the trajectory at ").unwrap().split(" s: ").next().unwrap();
+        let time_s = error.strip_prefix("motion at ").unwrap().split(" s: ").next().unwrap();
         assert!(time_s.parse::<f64>().unwrap() < 1.5, "{error}");
     }
     let low = JawConfig { closed_leg_m: 0.245, ..Default::default() };

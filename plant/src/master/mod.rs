@@ -231,8 +231,8 @@ impl Master {
         }
     }
 
-    /// Ends a stop once every drive is verified again, none has voltage, and the controller has switched them off: a
-    /// controller that still demands motion does not know of the stop.
+    /// Ends a stop once every drive is verified again, none has voltage, and the controller has switched them off:
+    /// what still demands motion was sent before the report of the stop.
     fn restore(&mut self, now_ns: u64) {
         let is_restored = self.supervision.awaits_restoration()
             && self.commands.switch_off()

@@ -66,10 +66,22 @@ impl RunPlan {
     pub fn new(scenario: Scenario) -> anyhow::Result<Self> {
         let mechanism = Mechanism::new(&scenario.mechanism)?;
         let schedule = CycleSchedule::new(&scenario.can, scenario.period_ns())?;
-        plant::check(&scenario).context("the plant cannot be built")?;
+        plant::check(&scenario)?;
         let trajectory = Trajectory::new(&scenario.motion, &scenario.jaw, &mechanism, scenario.duration_s)?;
         let demands = demands(&scenario, &trajectory, &mechanism)?;
         Ok(Self { scenario, mechanism, trajectory, demands, schedule })
+    }
+
+    /// Plans the scenario of a file, or the default one.
+    ///
+    /// # Errors
+    /// Those of [`Self::new`], with the place of the key in the file.
+    pub fn of_file(scenario: Scenario, path: Option<&Path>) -> anyhow::Result<Self> {
+        let Some(path) = path else { return Self::new(scenario).context("the default scenario") };
+        Self::new(scenario.clone()).map_err(|error| {
+            let place = scenario.place_of(path, &error.to_string());
+            error.context(place.unwrap_or_else(|| path.display().to_string()))
+        })
     }
 
     /// A line that describes the run, one if the motion file lacks the marker's offset, and one for each doubt about it.

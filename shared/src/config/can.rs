@@ -79,6 +79,12 @@ impl CanConfig {
             heartbeat_consumer_ms boot_timeout_ms command_timeout_cycles following_limit_m
             following_limit_cycles
         ))?;
+        for (axis, id) in self.node_ids.iter().enumerate() {
+            if !(1..MASTER_NODE.get()).contains(id) || self.node_ids[..axis].contains(id) {
+                let need = format!("use 1 to 126, none twice; {MASTER_NODE} is the master");
+                return Err(ScenarioError::bad("can.node_ids", id, need));
+            }
+        }
         if self.ideal && !self.is_virtual() {
             let need = "leave it away with can.interfaces: it replaces their bit rate";
             return Err(ScenarioError::bad("can.ideal", &true, need));

@@ -3,11 +3,15 @@
 use serde::{Deserialize, Serialize};
 
 use super::error::ScenarioError;
-use super::need::{keyed, require_duration, require_positive};
+use super::need::{LONGEST_S, keyed, require_duration, require_positive, require_within};
 
 /// SYNC takes one cycle and the drives' interpolation one; drives that smooth their targets take some more. The
 /// controller extrapolates the motion by this time.
 pub const MOST_LEAD_CYCLES: usize = 10;
+
+/// From the default start, 7 mm away, the move takes half of the legs' velocity then; a shorter one is none that drives
+/// follow, s.
+const SHORTEST_EASE_S: f64 = 0.1;
 
 section! {
     /// Sequence, pose control and safety of the controller.
@@ -103,9 +107,8 @@ section! {
 
 impl ControllerConfig {
     pub(super) fn validate(&self, rate_hz: u32) -> Result<(), ScenarioError> {
-        require_duration(&keyed!("controller", self,
-            start_timeout_s ease_s hold_s stop_ramp_s
-        ))?;
+        require_duration(&keyed!("controller", self, start_timeout_s hold_s stop_ramp_s))?;
+        require_within(&[("controller.ease_s", self.ease_s, SHORTEST_EASE_S, LONGEST_S)])?;
         require_positive(&keyed!("controller", self,
             steady_readings lead_cycles integral_gain_per_s trim_limit_m trim_limit_rad stale_cycles
             tracking_limit_m tracking_limit_rad tracking_rms_time_s tracking_rms_limit_m tracking_rms_limit_rad

@@ -8,6 +8,10 @@ use super::error::ScenarioError;
 use super::need::{keyed, require_positive, require_within};
 use crate::geometry::LEGS;
 
+/// Increments of encoders: with a coarser one the drives are never as near to their targets as the following limit
+/// asks, m.
+const FINEST_M: f64 = 1e-12;
+const COARSEST_M: f64 = 1e-5;
 /// Most noise of an encoder, m.
 const NOISIEST_M: f64 = 1e-3;
 
@@ -118,9 +122,11 @@ impl DrivesConfig {
         }
         let positive = of_both!(
             rated_force_n max_force_n max_velocity_m_s max_acceleration_m_s2 quick_stop_deceleration_m_s2
-            following_error_m position_gain_per_s velocity_gain_n_s_per_m velocity_integral_time_s encoder_resolution_m
+            following_error_m position_gain_per_s velocity_gain_n_s_per_m velocity_integral_time_s
         );
         require_positive(positive.as_flattened())?;
+        let increments = of_both!(encoder_resolution_m).map(|[(key, m)]| (key, m, FINEST_M, COARSEST_M));
+        require_within(&increments)?;
         let noise = of_both!(encoder_noise_m).map(|[(key, value_m)]| (key, value_m, 0.0, NOISIEST_M));
         require_within(&noise)
     }

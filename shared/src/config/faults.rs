@@ -1,10 +1,11 @@
 //! Faults on the buses: `[[faults]]`. On a simulated bus they act on any node, on a real bus only on the master's port.
 
 use std::fmt::{self, Display, Formatter};
+use std::iter;
 
 use serde::{Deserialize, Serialize};
 
-use super::can::MASTER_NODE;
+use super::can::{CanConfig, MASTER_NODE};
 use super::error::ScenarioError;
 use super::need::{require_not_negative, require_within};
 
@@ -59,7 +60,7 @@ pub struct FaultConfig {
     pub node: Option<u8>,
     /// COB-ID of the frames concerned, or of those that are babbled (11 bits); all when absent.
     pub id: Option<u16>,
-    /// Probability that the fault acts on a frame, 0 to 1; only for kinds that act on single frames.
+    /// Probability that the fault acts on a frame, above 0 to 1; only for kinds that act on single frames.
     #[serde(default = "always")]
     pub probability: f64,
     /// Activations after which the fault ends; when absent one for bus-off, any number for the others. A disconnection ends by
@@ -84,13 +85,19 @@ impl Display for FaultConfig {
 }
 
 impl FaultConfig {
-    /// Checks one fault of the list on so many buses.
-    pub(super) fn validate(&self, buses: usize, is_virtual: bool) -> Result<(), ScenarioError> {
-        if self.bus >= buses {
+    /// Checks one fault of the list.
+    pub(super) fn validate(&self, can: &CanConfig) -> Result<(), ScenarioError> {
+        let Some(axes) = can.buses.get(self.bus) else {
             return refuse("faults.bus", &self.bus, "name a bus of can.buses, from 0");
-        }
-        if !is_virtual {
+        };
+        if !can.is_virtual() {
             self.check_port()?;
+        }
+        let drives = axes.iter().filter_map(|&axis| can.node_ids.get(axis).copied());
+        let nodes: Vec<u8> = iter::once(MASTER_NODE.get()).chain(drives).collect();
+        if let Some(node) = self.node.filter(|node| !nodes.contains(node)) {
+            let nodes = nodes.iter().map(u8::to_string).collect::<Vec<_>>().join(", ");
+            return refuse("faults.node", &node, format!("bus {} has the nodes {nodes}", self.bus));
         }
         self.check_ranges()?;
         self.check_kind()
@@ -117,6 +124,16 @@ impl FaultConfig {
             return refuse("faults.until_s", &until_s, "use a finite number above from_s");
         }
         require_within(&[("faults.probability", self.probability, 0.0, 1.0)])?;
+        if self.probability == 0.0 {
+            return refuse(
+                "faults.probability",
+                &0,
+                "use more than 0, or leave the fault away: it would never act",
+            );
+        }
+        if self.count == Some(0) {
+            return refuse("faults.count", &0, "use at least 1, or leave the fault away: it would never act");
+        }
         match self.id {
             Some(id) if id > 0x7FF => refuse("faults.id", &id, "use an 11-bit identifier, at most 0x7FF"),
             _ => Ok(()),

@@ -73,6 +73,21 @@ impl Scenario {
         refusal
     }
 
+    /// The place in its file of the key with which a refusal of the whole scenario begins; none where the file does not
+    /// have this value: an argument may have replaced it.
+    pub fn place_of(&self, path: &Path, refusal: &str) -> Option<String> {
+        let is_of_key = |c: char| c.is_ascii_alphanumeric() || matches!(c, '_' | '.');
+        let key = refusal.split(|c| !is_of_key(c)).next()?;
+        let value_in = |scenario: &Self| {
+            let values = serde_json::to_value(scenario).ok()?;
+            values.pointer(&format!("/{}", key.replace('.', "/"))).cloned()
+        };
+        let text = read_text(path, MOST_BYTES).ok()?;
+        let given = Self::parse(path, &text).ok()?;
+        let is_given = value_in(&given)? == value_in(self)?;
+        is_given.then(|| Some(Document::parse(path, &text).ok()?.place_of(key, None))).flatten()
+    }
+
     /// Reads a scenario file. The path of a recording is relative to the folder of the scenario. The values are not checked
     /// yet: see [`Self::validate`].
     ///
@@ -112,16 +127,17 @@ impl Scenario {
     pub fn parse(path: &Path, text: &str) -> Result<Self, ScenarioError> {
         let refused = |error| malformed(path, text, None, &error);
         let document = Document::parse(path, text).map_err(refused)?;
-        let scenario: Self =
-            toml::from_str(text).map_err(|error| malformed(path, text, Some(&document), &error))?;
-        let resolved = serde_json::to_value(&scenario).expect("every part of a scenario has a JSON form");
-        match document.unnamed_table(&resolved) {
-            None => Ok(scenario),
-            Some((key, place)) => {
-                let reason = format!("{key} is an array; write a table, which names its values");
-                Err(ScenarioError::Malformed { place, reason })
-            }
-        }
+        let unnamed = |scenario: &Self| {
+            let resolved = serde_json::to_value(scenario).expect("every part of a scenario has a JSON form");
+            let (key, place) = document.unnamed_table(&resolved)?;
+            let reason = format!("{key} is an array; write a table, which names its values");
+            Some(ScenarioError::Malformed { place, reason })
+        };
+        let scenario: Self = toml::from_str(text).map_err(|error| {
+            let every_table = Self { food: Some(FoodConfig::default()), ..Self::default() };
+            unnamed(&every_table).unwrap_or_else(|| malformed(path, text, Some(&document), &error))
+        })?;
+        unnamed(&scenario).map_or(Ok(scenario), Err)
     }
 
     /// The scenario with every default filled in, as TOML.
@@ -151,7 +167,7 @@ impl Scenario {
         self.drives.validate()?;
         self.dynamics.validate()?;
         for (number, fault) in self.faults.iter().enumerate() {
-            let checked = fault.validate(self.can.buses.len(), self.can.is_virtual());
+            let checked = fault.validate(&self.can);
             checked.map_err(|error| error.of_entry(number))?;
         }
         if let Some(food) = &self.food {
@@ -186,6 +202,9 @@ fn malformed(path: &Path, text: &str, document: Option<&Document>, error: &toml:
     let mut reason = cut(error.message().lines().next().unwrap_or_default());
     if let Some(nearest) = nearest(&reason) {
         reason = format!("{reason}; did you mean `{nearest}`?");
+    }
+    if let Some(twice) = error.span().filter(|_| reason == "duplicate key").and_then(|span| text.get(span)) {
+        reason = format!("{}: the key is there already", excerpt(twice));
     }
     let key = document.and_then(|document| {
         let key = document.key_at(offset)?;
@@ -305,7 +324,28 @@ mod tests {
             ("[motion]\nvertical_mm = []\nkind = 'chewing'", "s.toml:2:1: motion.vertical_mm: invalid type"),
             ("[motion]\nkind = 'yawning'", "did you mean `opening`?"),
             ("checks = [999.0, 7]", "s.toml:1:10: checks is an array; write a table"),
-            ("[drives]\nleg = [1.0]", "s.toml:2:7: drives.leg: invalid type: sequence"),
+            ("[drives]\nleg = [1.0]", "s.toml:2:7: drives.leg is an array; write a table"),
+            ("food = [1.0, 2.0, 3.0]", "s.toml:1:8: food is an array; write a table"),
+            ("seed = 1\nseed = 1", "s.toml:2:1: seed: the key is there already"),
+            (
+                "[[faults]]\nkind = 'lose'\nbus = 0\nfrom_s = 1.0\nprobability = 0.0",
+                "faults.probability = 0: use more than 0",
+            ),
+            (
+                "[[faults]]\nkind = 'lose'\nbus = 0\nfrom_s = 1.0\ncount = 0",
+                "faults.count = 0: use at least 1",
+            ),
+            (
+                "[[faults]]\nkind = 'lose'\nbus = 0\nnode = 0\nfrom_s = 1.0",
+                "faults.node = 0: bus 0 has the nodes 127, 1, 2, 3",
+            ),
+            ("[can]\nnode_ids = [1, 2, 3, 4, 5, 127]", "can.node_ids = 127: use 1 to 126, none twice"),
+            ("[can]\nnode_ids = [1, 2, 3, 4, 5, 1]", "can.node_ids = 1: use 1 to 126, none twice"),
+            ("[controller]\nease_s = 1e-9", "controller.ease_s = 0.000000001: use 0.1 to 86400"),
+            (
+                "[drives.leg]\nencoder_resolution_m = 1.0",
+                "drives.leg.encoder_resolution_m = 1: use 0.000000000001 to 0.00001",
+            ),
             (
                 "[motion]\nkind = 'chewing'\nphases = [0.5, 0.4, 0.1]",
                 "s.toml:3:10: motion.phases is an array",
@@ -342,7 +382,7 @@ mod tests {
                 "dynamics.platform_inertia_kg_m2 = -0.0001",
             ),
             ("[can]\nboot_timeout_ms = 0", "can.boot_timeout_ms = 0: use a finite number above 0"),
-            ("[controller]\nease_s = 0.0", "controller.ease_s = 0: use more than 0"),
+            ("[controller]\nease_s = 0.0", "controller.ease_s = 0: use 0.1 to"),
             ("[checks]\ntracking_rms_mm = inf", "checks.tracking_rms_mm"),
             ("[drives.leg]\nmax_force = 1.0", "did you mean `max_force_n`?"),
             ("name = ", "s.toml:1"),
