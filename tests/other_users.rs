@@ -238,7 +238,9 @@ fn a_stranger_that_makes_files_of_every_run_stops_none() {
     let prefix = format!("/dev/shm/masseter_{}_", victim.id);
     let left = fs::read_dir("/dev/shm").unwrap().map(|entry| entry.unwrap().path());
     let left: Vec<_> = left.filter(|path| path.to_string_lossy().starts_with(&prefix)).collect();
-    left.iter().for_each(|path| fs::remove_file(path).unwrap());
+    for path in &left {
+        fs::remove_file(path).unwrap();
+    }
     assert_eq!(left.len(), 1, "{left:?}: {}", stderr(&output));
     assert!(stderr(&output).contains("cannot remove /dev/shm/masseter_"), "{}", stderr(&output));
     assert_played(&victim.workspace.run_folder(), output.status, &(stdout(&output) + &stderr(&output)));

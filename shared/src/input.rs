@@ -37,7 +37,7 @@ pub fn read_text(path: &Path, most_bytes: u64) -> io::Result<String> {
     }
     String::from_utf8(bytes).map_err(|error| {
         let valid = &error.as_bytes()[..error.utf8_error().valid_up_to()];
-        let line = valid.iter().filter(|byte| **byte == b'\n').count() + 1;
+        let line = valid.split(|byte| *byte == b'\n').count();
         io::Error::new(ErrorKind::InvalidData, format!("line {line} is no text in UTF-8"))
     })
 }

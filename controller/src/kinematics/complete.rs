@@ -25,7 +25,7 @@ use super::{Condition, ForwardError, Solution};
 /// [`ForwardError::NotFinite`] and [`ForwardError::NoLength`] for what is no input;
 /// [`ForwardError::Unassemblable`] without any solution, [`ForwardError::WrongAssembly`] without a
 /// true one, [`ForwardError::Ambiguous`] with more than one; [`ForwardError::Singular`] and
-/// [`ForwardError::Undecided`] where solutions meet.
+/// [`ForwardError::Undecided`] where solutions meet or rounding is too large for a certificate.
 #[doc(alias("direct kinematics", "forward kinematics", "FK"))]
 pub fn solve_completely(mechanism: &Mechanism, actuators: &Actuators) -> Result<Solution, ForwardError> {
     check(actuators)?;
@@ -44,7 +44,8 @@ fn only_true_one(loops: &LoopEquations<'_>) -> Option<Solution> {
     let solutions = LoopSolutions::find(loops, SolutionFilter::PositiveDeterminant).ok()?;
     let mut true_ones = solutions.true_ones(loops);
     let solution = Solution::new(loops, true_ones.next()?);
-    (true_ones.next().is_none() && solutions.singular_one(loops).is_none()).then_some(solution)
+    let is_sure = solution.certificate.is_some() && solutions.singular_one(loops).is_none();
+    (true_ones.next().is_none() && is_sure).then_some(solution)
 }
 
 fn judged(loops: &LoopEquations<'_>) -> Result<Solution, ForwardError> {
@@ -59,7 +60,12 @@ fn judged(loops: &LoopEquations<'_>) -> Result<Solution, ForwardError> {
             determinant: loops.determinant(&closed.residuals),
             residual_m: loops.residual_m(&closed.residuals),
         }),
-        (Some(closed), ..) => Ok(Solution::new(loops, closed)),
+        (Some(closed), ..) => {
+            let solution = Solution::new(loops, closed);
+            // On a mechanism of extreme dimensions rounding may hide even a regular solution.
+            let undecided = ForwardError::Undecided { solutions: solutions.count };
+            if solution.certificate.is_some() { Ok(solution) } else { Err(undecided) }
+        }
         (None, ..) => Err(match nearly_true(loops, &solutions) {
             Some(violated) => ForwardError::WrongAssembly { violated },
             None => ForwardError::Unassemblable,

@@ -1,0 +1,175 @@
+use super::*;
+use crate::config::DriveConfig;
+
+fn parse(text: &str) -> Result<Scenario, String> {
+    let scenario = Scenario::parse(Path::new("s.toml"), text).map_err(|error| error.to_string())?;
+    scenario.validate().map_err(|error| error.to_string())?;
+    Ok(scenario)
+}
+
+#[test]
+fn the_largest_seed_is_one() {
+    assert_eq!(parse("seed = 18446744073709551615").unwrap().seed, u64::MAX);
+}
+
+#[test]
+fn an_empty_file_is_the_default_run() {
+    assert_eq!(parse("").unwrap(), Scenario::default());
+}
+
+#[test]
+fn a_key_missing_in_a_drives_table_keeps_its_default() {
+    let default = Scenario::default().drives;
+    let drives = parse("[drives.slide]\nfollowing_error_m = 1").unwrap().drives;
+    assert_eq!(drives.slide, DriveConfig { following_error_m: 1.0, ..default.slide });
+    assert_eq!(drives.leg, default.leg);
+}
+
+#[test]
+fn a_resolved_scenario_reads_as_the_same_scenario() {
+    let scenario = parse("name = 'x'\nduration_s = 3.0\n[motion]\nkind = 'opening'").unwrap();
+    assert_eq!(parse(&scenario.to_toml()).unwrap(), scenario);
+}
+
+#[test]
+fn a_value_out_of_range_is_placed_in_its_file_unless_it_is_not_from_there() {
+    let path = std::env::temp_dir().join(format!("masseter-placed-{}.toml", std::process::id()));
+    let fault = |bus| format!("[[faults]]\nkind = 'lose'\nbus = {bus}\nfrom_s = 1.0\n");
+    std::fs::write(&path, format!("seed = 1\n{}{}", fault(0), fault(2))).unwrap();
+    let scenario = Scenario::read(&path).unwrap();
+    let in_file = Scenario::place_refusal(scenario.validate().unwrap_err(), &path).to_string();
+    let replaced = Scenario { rate_hz: 5, ..scenario };
+    let elsewhere = Scenario::place_refusal(replaced.validate().unwrap_err(), &path).to_string();
+    std::fs::remove_file(&path).unwrap();
+    assert_eq!(
+        in_file.split_once("masseter-placed-").unwrap().1.split_once(".toml").unwrap().1,
+        ":8:1: faults.bus = 2: name a bus of can.buses, from 0"
+    );
+    assert!(elsewhere.starts_with("rate_hz = 5"), "{elsewhere}");
+}
+
+#[test]
+fn long_and_strange_values_are_cut_and_escaped() {
+    let long = "x".repeat(100_000);
+    for text in [
+        format!("rate_hz = '{long}'"),
+        format!("name = '{long}'"),
+        format!("{long} = 1"),
+        format!("rate_hz = '{}'", "`\"".repeat(50_000)),
+        format!("[motion]\nkind = '{long}'"),
+        "name = \"\\u001b[2J\"".to_owned(),
+        "rate_hz = \"\\u001b[2J\"".to_owned(),
+        "\"\\u001b[2J\" = 1".to_owned(),
+    ] {
+        let error = parse(&text).unwrap_err();
+        assert!(error.len() < 2500 && !error.contains('\u{1b}'), "{error}");
+    }
+}
+
+#[test]
+fn the_masters_port_may_be_faulty_on_a_real_interface() {
+    let fault = "[[faults]]\nkind = 'disconnect'\nbus = 1\nnode = 127\nfrom_s = 1.0";
+    let scenario = parse(&format!("[can]\ninterfaces = ['a', 'b']\n{fault}")).unwrap();
+    assert_eq!(scenario.faults[0].node, Some(127));
+}
+
+/// Wrong scenarios, and a part of their refusals.
+const WRONG: &[(&str, &str)] = &[
+    ("seed = 1\nrate_hzz = 5", "s.toml:2:1: unknown field `rate_hzz`"),
+    ("seed = 1\n  rate_hz = 'fast'", "s.toml:2:13: rate_hz: invalid type"),
+    ("[drives.leg]\nmax_force_n = 'much'", "s.toml:2:1: drives.leg.max_force_n: invalid type"),
+    ("[motion]\nkind = 'chewing'\nvertical = 3.0", "s.toml:3:1: unknown field `vertical`"),
+    ("[motion]\nvertical_mm = []\nkind = 'chewing'", "s.toml:2:1: motion.vertical_mm: invalid type"),
+    ("[motion]\nkind = 'yawning'", "did you mean `opening`?"),
+    ("checks = [999.0, 7]", "s.toml:1:10: checks is an array; write a table"),
+    ("[drives]\nleg = [1.0]", "s.toml:2:7: drives.leg is an array; write a table"),
+    ("food = [1.0, 2.0, 3.0]", "s.toml:1:8: food is an array; write a table"),
+    ("seed = 1\nseed = 1", "s.toml:2:1: seed: the key is there already"),
+    (
+        "[[faults]]\nkind = 'lose'\nbus = 0\nfrom_s = 1.0\nprobability = 0.0",
+        "faults.probability = 0: use more than 0",
+    ),
+    ("[[faults]]\nkind = 'lose'\nbus = 0\nfrom_s = 1.0\ncount = 0", "faults.count = 0: use at least 1"),
+    (
+        "[[faults]]\nkind = 'lose'\nbus = 0\nnode = 0\nfrom_s = 1.0",
+        "faults.node = 0: bus 0 has the nodes 127, 1, 2, 3",
+    ),
+    ("[can]\nnode_ids = [1, 2, 3, 4, 5, 127]", "can.node_ids = 127: use 1 to 126, none twice"),
+    ("[can]\nnode_ids = [1, 2, 3, 4, 5, 1]", "can.node_ids = 1: use 1 to 126, none twice"),
+    ("[controller]\nease_s = 1e-9", "controller.ease_s = 0.000000001: use 0.1 to 86400"),
+    (
+        "[drives.leg]\nencoder_resolution_m = 1.0",
+        "drives.leg.encoder_resolution_m = 1: use 0.000000000001 to 0.00001",
+    ),
+    ("[motion]\nkind = 'chewing'\nphases = [0.5, 0.4, 0.1]", "s.toml:3:10: motion.phases is an array"),
+    ("faults = [['lose', 1]]", "s.toml:1:"),
+    ("motion = ['chewing']", "s.toml:1:"),
+    ("seed = 1\nrate_hzz = 5", "did you mean `rate_hz`?"),
+    ("[controller]\nease = 1.0", "did you mean `ease_s`?"),
+    ("[mechanism.strokes]\nslide_m = [0, 1]\nleg = [1, 2]", "did you mean `leg_m`?"),
+    ("rate_hz = 'fast'", "invalid type"),
+    ("rate_hz = 1", "use 10 to 20000 Hz"),
+    ("duration_s = -1.0", "duration_s = -1: use 0.1 to 86400"),
+    ("duration_s = 1e-320", "use 0.1 to 86400"),
+    ("duration_s = nan", "use 0.1 to 86400"),
+    ("name = '../x'", "letters"),
+    ("[realtime]\npriority = 0", "use 1 to 99"),
+    ("[realtime]\ncores = [1, 1]", "realtime.cores = 1,1: name two"),
+    ("[can]\ninterfaces = ['can0']", "can.interfaces = can0: name 2 interfaces"),
+    ("[can]\ninterfaces = ['can0', 'can0']", "name 2 interfaces"),
+    ("[drives.leg]\nrated_force_n = nan", "drives.leg.rated_force_n = NaN: use a finite number above 0"),
+    ("[drives.slide]\nencoder_noise_m = 1e300", "drives.slide.encoder_noise_m"),
+    ("[dynamics]\nstep_ns = 1000000", "dynamics.step_ns = 1000000: use 10000 to 250000 ns"),
+    ("[dynamics]\ngravity_m_s2 = -1.0", "dynamics.gravity_m_s2 = -1: use 0 to 100"),
+    ("[dynamics]\ngravity_m_s2 = 1e5", "dynamics.gravity_m_s2 = 100000: use 0 to 100"),
+    ("[dynamics]\ncarriage_mass_kg = 1e300", "dynamics.carriage_mass_kg = 1000"),
+    ("[dynamics]\nrod_mass_kg = 1e-300", "dynamics.rod_mass_kg = 0.000"),
+    ("[dynamics]\nleg_inertia_kg_m2 = 1e12", "dynamics.leg_inertia_kg_m2"),
+    ("[dynamics]\nplatform_mass_kg = nan", "dynamics.platform_mass_kg = NaN: use 0.001 to 100"),
+    ("[dynamics]\nplatform_inertia_kg_m2 = [1e-4, -1e-4, 1e-4]", "dynamics.platform_inertia_kg_m2 = -0.0001"),
+    ("[can]\nboot_timeout_ms = 0", "can.boot_timeout_ms = 0: use a finite number above 0"),
+    ("[controller]\nease_s = 0.0", "controller.ease_s = 0: use 0.1 to"),
+    ("[checks]\ntracking_rms_mm = inf", "checks.tracking_rms_mm"),
+    ("[drives.leg]\nmax_force = 1.0", "did you mean `max_force_n`?"),
+    ("name = ", "s.toml:1"),
+    ("[can]\nideal = true\ninterfaces = ['a', 'b']", "can.ideal = true: leave it away"),
+    ("[[faults]]\nkind = 'corrupt'\nbus = 2\nfrom_s = 0.0", "faults.bus = 2: name a bus"),
+    ("[[faults]]\nkind = 'babble'\nbus = 0\nfrom_s = 0.0", "faults.node = none"),
+    ("[[faults]]\nkind = 'delay'\nbus = 0\nfrom_s = 0.0", "faults.delay_us"),
+    ("[[faults]]\nkind = 'lose'\nbus = 0\nfrom_s = 1.0\nuntil_s = 1.0", "faults.until_s = 1"),
+    ("[[faults]]\nkind = 'lose'\nbus = 0\nfrom_s = 1.0\nprobability = 1.5", "faults.probability"),
+    (
+        "[[faults]]\nkind = 'bus_off'\nbus = 0\nnode = 1\nfrom_s = 1.0\nprobability = 0.5",
+        "faults.probability = 0.5: leave it away",
+    ),
+    ("[[faults]]\nkind = 'bus_off'\nbus = 0\nnode = 1\nfrom_s = 1.0\nid = 5", "faults.id = 5: leave it"),
+    (
+        "[[faults]]\nkind = 'disconnect'\nbus = 0\nnode = 1\nfrom_s = 1.0\ncount = 2",
+        "faults.count = 2: leave it away",
+    ),
+    ("[can]\nbitrate_bps = 2000000", "can.bitrate_bps = 2000000: bit rate 2000000"),
+    ("[can]\nheartbeat_producer_ms = 0", "can.heartbeat_producer_ms = 0: use at least 1 ms"),
+    ("[controller]\nhold_s = 1e9", "controller.hold_s = 1000000000: use more than 0 and at most 86400 s"),
+    ("[limits]\nleg_velocity_m_s = nan", "limits.leg_velocity_m_s = NaN: use a finite number above 0"),
+    ("[limits]\nmax_condition = -1.0", "limits.max_condition = -1: use a finite number above 0"),
+    ("[food]\npoint_m = [0.0, 1e150, 0.0]", "food.point_m"),
+    ("[food]\nstiffness_n_per_m = 0.0", "food.stiffness_n_per_m = 0: use 1 to 1000000"),
+    ("[food]\nthickness_mm = 10.0", "did you mean `thickness_m`?"),
+    ("[[faults]]\nkind = 'melt'\nbus = 0\nfrom_s = 1.0", "s.toml:2:8: faults.kind: unknown variant `melt`"),
+    (
+        "[can]\ninterfaces = ['a', 'b']\n[[faults]]\nkind = 'corrupt'\nbus = 0\nfrom_s = 1.0",
+        "faults.kind = corrupt: leave it away with can.interfaces",
+    ),
+    (
+        "[can]\ninterfaces = ['a', 'b']\n[[faults]]\nkind = 'disconnect'\nbus = 0\nnode = 1\nfrom_s = 1.0",
+        "faults.node = 1: on a real interface only the master (node 127)",
+    ),
+];
+
+#[test]
+fn wrong_scenarios_are_refused_with_place_and_remedy() {
+    for (text, expected) in WRONG {
+        let error = parse(text).unwrap_err();
+        assert!(error.contains(expected), "{text:?} gave {error:?}");
+    }
+}
