@@ -136,6 +136,9 @@ mod tests {
             (check.result.mark(), check.finding.as_str()),
             ("ok", "closest of 10 samples: incisal point max 0.1000 mm, limit 0.5 mm")
         );
+        let rms_is_closest = PoseErrors { rms_mm: Some(0.05), incisal_max_mm: Some(0.2), ..good };
+        let check = tracking("tracking", 10, &rms_is_closest, &limits, true);
+        assert_eq!(check.finding, "closest of 10 samples: platform rms 0.0500 mm, limit 0.1 mm");
         let mm = |share: f64, limit: f64| Some(share * limit);
         let each: [(Spoil, f64); 6] = [
             (|errors, value| errors.rms_mm = value, limits.tracking_rms_mm),

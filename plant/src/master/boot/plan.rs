@@ -213,4 +213,16 @@ mod tests {
             assert_eq!(limits, [-10, 20]);
         }
     }
+
+    #[test]
+    fn process_data_may_be_silent_as_long_as_commands_or_the_heartbeat() {
+        let timeout_ms = |rate_hz, configured| {
+            let mut scenario = Scenario { rate_hz, ..Scenario::default() };
+            scenario.can.rpdo_timeout_ms = configured;
+            rpdo_timeout_ms(&scenario)
+        };
+        assert_eq!(timeout_ms(100, None), 200, "20 cycles");
+        assert_eq!(timeout_ms(1000, None), Scenario::default().can.heartbeat_consumer_ms);
+        assert_eq!(timeout_ms(1000, Some(0)), 0);
+    }
 }
