@@ -42,9 +42,9 @@ impl Commands {
         request.unwrap_or(DriveRequest::Off)
     }
 
-    /// The targets of the newest valid command, m.
-    pub(super) fn targets_m(&self) -> [f64; AXES] {
-        self.newest.map_or([0.0; AXES], |command| command.target_m)
+    /// The newest target for each drive, m; none before a target has passed the gate while the drive followed targets.
+    pub(super) fn targets_m(&self) -> [Option<f64>; AXES] {
+        self.gate.targets_m()
     }
 
     /// Whether a command of this cycle switches the drives off.
@@ -62,17 +62,17 @@ impl Commands {
         needs_command: bool,
         following_m: [Option<f64>; AXES],
     ) -> Result<(), (Subject, Failure)> {
+        // A refused command is none.
+        self.silent_cycles = self.silent_cycles.saturating_add(1);
         let Some(command) = command else {
-            self.silent_cycles = self.silent_cycles.saturating_add(1);
             if !needs_command || self.silent_cycles <= self.timeout_cycles {
                 return Ok(());
             }
             let cycles = [self.silent_cycles, self.timeout_cycles].map(f64::from);
             return Err((Subject::Rig, Failure::with(Cause::CommandLost, cycles)));
         };
-        self.silent_cycles = 0;
         self.gate.pass(cycle, command, following_m)?;
-        (self.newest, self.received_ns) = (Some(*command), now_ns);
+        (self.newest, self.received_ns, self.silent_cycles) = (Some(*command), now_ns, 0);
         Ok(())
     }
 

@@ -293,7 +293,7 @@ impl RemoteDrive {
         &mut self,
         now_ns: u64,
         request: DriveRequest,
-        target_m: f64,
+        target_m: Option<f64>,
     ) -> Option<Frame> {
         if !self.is_operational() {
             return None;
@@ -301,7 +301,7 @@ impl RemoteDrive {
         let state = self.power.unwrap_or(DriveState::NotReadyToSwitchOn);
         self.controlword = next_controlword(state, request, self.controlword);
         let follows = state == DriveState::OperationEnabled && request == DriveRequest::Enable;
-        let target_increments = if follows {
+        let target_increments = if let Some(target_m) = target_m.filter(|_| follows) {
             self.following.follow(now_ns, self.position_m(), target_m);
             self.config.increments(target_m) as i32
         } else {

@@ -79,6 +79,11 @@ impl Gate {
         Ok(())
     }
 
+    /// The target that passed last for each drive that follows targets, m.
+    pub(super) fn targets_m(&self) -> [Option<f64>; AXES] {
+        self.axes.map(|axis| axis.followed.map(|followed| followed.target_m))
+    }
+
     /// Periods since the last command by the controller's count, but at most one more than by the master's: a command
     /// may be one cycle late.
     fn periods(&self, cycle: u64, command_cycle: u64) -> u64 {

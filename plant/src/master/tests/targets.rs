@@ -33,6 +33,31 @@ fn until_a_drive_is_enabled_its_target_is_its_position() {
     }
 }
 
+/// The commands cease before the drives follow, so that nobody has judged their targets.
+#[test]
+fn a_target_from_before_a_drive_follows_is_never_sent() {
+    let mut bench = Bench::new();
+    (0..AXES).for_each(|axis| bench.drive(axis).may_move = true);
+    bench.offset_m = 9.0;
+    while !bench.all_are(DriveState::SwitchedOn) {
+        bench.cycle(Some(DriveRequest::Enable));
+    }
+    (0..20).for_each(|_| bench.cycle(None));
+    assert!(bench.all_are(DriveState::OperationEnabled));
+    for axis in 0..AXES {
+        assert!(bench.drive(axis).targets.iter().all(|(_, target)| *target == POSITION), "axis {axis}");
+    }
+    assert_eq!(bench.causes(EventKind::Fault), []);
+}
+
+#[test]
+fn a_refused_command_counts_as_none() {
+    let mut bench = Bench::enabled();
+    bench.cycles(1, DriveRequest::Off);
+    bench.cycle_with(|command| Some(Command { request: 77, ..command }));
+    assert_eq!(bench.master.silent_cycles(), 1);
+}
+
 /// Whatever stops the drives, which have moved meanwhile.
 #[test]
 fn from_the_first_cycle_of_a_stop_the_target_is_the_position() {
