@@ -14,7 +14,9 @@ use super::gate::Gate;
 pub(super) struct Commands {
     timeout_cycles: u32,
     gate: Gate,
-    newest: Option<Command>,
+    /// Request and cycle of the newest valid command.
+    request: DriveRequest,
+    answers_cycle: u64,
     received_ns: u64,
     silent_cycles: u32,
 }
@@ -25,7 +27,8 @@ impl Commands {
         Self {
             timeout_cycles: scenario.can.command_timeout_cycles,
             gate: Gate::new(scenario),
-            newest: None,
+            request: DriveRequest::Off,
+            answers_cycle: 0,
             received_ns: 0,
             silent_cycles: 0,
         }
@@ -38,8 +41,7 @@ impl Commands {
 
     /// The request of the newest valid command.
     pub(super) fn request(&self) -> DriveRequest {
-        let request = self.newest.and_then(|command| DriveRequest::try_from(command.request).ok());
-        request.unwrap_or(DriveRequest::Off)
+        self.request
     }
 
     /// The newest target for each drive, m; none before a target has passed the gate while the drive followed targets.
@@ -49,8 +51,7 @@ impl Commands {
 
     /// Whether a command of this cycle switches the drives off.
     pub(super) fn switch_off(&self) -> bool {
-        self.silent_cycles == 0
-            && self.newest.is_some_and(|command| command.request == DriveRequest::Off.code())
+        self.silent_cycles == 0 && self.request == DriveRequest::Off
     }
 
     /// Takes the command of a cycle, if one came. Silence is a failure only where `needs_command`; a command is one if
@@ -71,14 +72,14 @@ impl Commands {
             let cycles = [self.silent_cycles, self.timeout_cycles].map(f64::from);
             return Err((Subject::Rig, Failure::with(Cause::CommandLost, cycles)));
         };
-        self.gate.pass(cycle, command, following_m)?;
-        (self.newest, self.received_ns, self.silent_cycles) = (Some(*command), now_ns, 0);
+        self.request = self.gate.pass(cycle, command, following_m)?;
+        (self.answers_cycle, self.received_ns, self.silent_cycles) = (command.cycle, now_ns, 0);
         Ok(())
     }
 
     /// Writes the command that a reading answers.
     pub(super) fn fill_reading(&self, reading: &mut Reading) {
-        reading.answers_cycle = self.newest.map_or(0, |command| command.cycle);
+        reading.answers_cycle = self.answers_cycle;
         reading.command_received_ns = self.received_ns;
     }
 }

@@ -224,7 +224,8 @@ impl Master {
     fn take_command(&mut self, now_ns: u64, command: Option<&Command>) {
         // A controller whose drives are off or stopping may be silent: they need no command.
         let needs_command = self.request() == DriveRequest::Enable;
-        let following_m = self.drives.each_ref().map(RemoteDrive::following_m);
+        let may_move = self.supervision.may_move();
+        let following_m = self.drives.each_ref().map(|drive| drive.following_m().filter(|_| may_move));
         let times = [self.exchange.cycle(), now_ns];
         if let Err((subject, failure)) = self.commands.take(times, command, needs_command, following_m) {
             self.fail(now_ns, subject, &failure);
@@ -245,7 +246,7 @@ impl Master {
         }
     }
 
-    /// Stops the drives. The first cause is reported, its consequences are not.
+    /// Stops the drives. The first cause and the first refused command are reported, consequences are not.
     fn fail(&mut self, now_ns: u64, subject: Subject, failure: &Failure) {
         if self.supervision.stop(failure.cause) {
             self.events.add(now_ns, subject, failure.event());

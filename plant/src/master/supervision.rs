@@ -24,6 +24,8 @@ pub(super) struct Supervision {
     were_enabled: bool,
     /// Whether the drives stop for the end of the run.
     is_ending: bool,
+    /// Whether a refused command stopped the drives.
+    has_refused: bool,
 }
 
 impl Supervision {
@@ -37,9 +39,14 @@ impl Supervision {
         self.stop == Stop::UntilRestored
     }
 
+    /// Whether the drives may move: neither a fault nor the end stops them.
+    pub(super) fn may_move(self) -> bool {
+        !self.is_stopped() && !self.is_ending
+    }
+
     /// The request to the drives, given the controller's.
     pub(super) fn request(self, commanded: DriveRequest, all_are_ready: bool) -> DriveRequest {
-        if self.is_stopped() || self.is_ending {
+        if !self.may_move() {
             DriveRequest::QuickStop
         } else if all_are_ready {
             commanded
@@ -69,19 +76,17 @@ impl Supervision {
         }
     }
 
-    /// Stops the drives for a cause; returns whether this is the first cause. A later cause, which is mostly a
-    /// consequence of the first, changes nothing.
+    /// Stops the drives for a cause; returns whether the cause is new. A later cause is mostly a consequence of the first
+    /// and changes nothing, but a refused command is never a consequence.
     pub(super) fn stop(&mut self, cause: Cause) -> bool {
+        if is_refusal(cause) {
+            self.stop = Stop::Permanent;
+            return !std::mem::replace(&mut self.has_refused, true);
+        }
         let is_first = !self.is_stopped();
         if is_first {
             self.stop = match cause {
-                Cause::CommandLost
-                | Cause::BadMessage
-                | Cause::StrokeLimit
-                | Cause::VelocityLimit
-                | Cause::AccelerationLimit
-                | Cause::DriveFault
-                | Cause::FollowingError => Stop::Permanent,
+                Cause::CommandLost | Cause::DriveFault | Cause::FollowingError => Stop::Permanent,
                 _ => Stop::UntilRestored,
             };
         }
@@ -102,6 +107,11 @@ impl Supervision {
     pub(super) fn end(&mut self) {
         self.is_ending = true;
     }
+}
+
+/// Whether the gate refused a command.
+fn is_refusal(cause: Cause) -> bool {
+    matches!(cause, Cause::BadMessage | Cause::StrokeLimit | Cause::VelocityLimit | Cause::AccelerationLimit)
 }
 
 #[cfg(test)]
@@ -136,7 +146,7 @@ mod tests {
                 assert!(!supervision.is_stopped() && !supervision.awaits_restoration());
                 assert!(supervision.may_boot(false));
                 assert!(supervision.stop(cause));
-                for later in permanent.iter().chain(&restorable) {
+                for later in permanent.iter().chain(&restorable).filter(|later| !is_refusal(**later)) {
                     assert!(!supervision.stop(*later), "{later} is no first cause after {cause}");
                 }
                 assert!(supervision.is_stopped() && !supervision.may_boot(false), "{cause}");
@@ -145,6 +155,20 @@ mod tests {
                 assert_eq!(supervision.stop_permanently(), !is_permanent, "{cause}");
                 assert!(!supervision.stop_permanently() && !supervision.awaits_restoration(), "{cause}");
                 assert!(!supervision.may_boot(true), "{cause}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_first_refused_command_is_new_and_permanent_whatever_stopped_the_drives_before() {
+        use Cause::{AccelerationLimit, BadMessage, BusOff, CommandLost, StrokeLimit, VelocityLimit};
+        for refusal in [BadMessage, StrokeLimit, VelocityLimit, AccelerationLimit] {
+            for before in [None, Some(BusOff), Some(CommandLost)] {
+                let mut supervision = Supervision::default();
+                before.map(|cause| supervision.stop(cause));
+                assert!(supervision.stop(refusal), "{refusal} after {before:?}");
+                assert!(!supervision.awaits_restoration(), "{refusal} after {before:?}");
+                assert!(!supervision.stop(BadMessage), "the next refused command is no news");
             }
         }
     }
