@@ -64,7 +64,7 @@ struct CondylarLine {
 pub(super) fn condylar_middle(jaw: &JawConfig) -> Result<Vec3, TrajectoryError> {
     let side_m = jaw.bonwill_side_m;
     let balkwill_deg = jaw.balkwill_angle_deg;
-    require("jaw.bonwill_side_m", side_m, side_m > 0.01, "above 0.01 m")?;
+    require("jaw.bonwill_side_m", side_m, (0.01..=1.0).contains(&side_m), "0.01 m to 1 m")?;
     require("jaw.balkwill_angle_deg", balkwill_deg, (0.0..90.0).contains(&balkwill_deg), "0 to below 90")?;
     let height_m = side_m * 3f64.sqrt() / 2.0;
     let (sin, cos) = balkwill_deg.to_radians().sin_cos();
@@ -198,6 +198,21 @@ mod tests {
 
     fn mandible(working: JawSide) -> Mandible {
         Mandible::new(&JawConfig::default(), 40.0, 8.0, working).unwrap()
+    }
+
+    #[test]
+    fn a_jaw_of_impossible_size_is_refused() {
+        let of = |bonwill_side_m, balkwill_angle_deg| {
+            let jaw = JawConfig { bonwill_side_m, balkwill_angle_deg, ..JawConfig::default() };
+            condylar_middle(&jaw).map_err(|error| error.to_string())
+        };
+        assert!([(0.01, 0.0), (1.0, 89.9)].into_iter().all(|(side_m, deg)| of(side_m, deg).is_ok()));
+        for side_m in [0.0099, 1.01, 3.8e173, f64::NAN] {
+            assert!(of(side_m, 22.5).is_err_and(|error| error.contains("0.01 m to 1 m")), "{side_m}");
+        }
+        for deg in [-0.1, 90.0] {
+            assert!(of(0.1, deg).is_err_and(|error| error.contains("0 to below 90")), "{deg}");
+        }
     }
 
     /// Where the condyles have gone, working and balancing, metres.

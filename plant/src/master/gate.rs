@@ -3,8 +3,8 @@
 //! Strokes, velocities and accelerations are those of targets that drives follow; others are not sent. The gate only
 //! judges; a command passes as a whole or not at all.
 //!
-//! A motion waits while a process stalls. So targets may stop at once and go on as before, within the time-out of commands;
-//! after that they start from rest.
+//! A motion waits while a process stalls. So targets may stop at once and go on as before, within twice the time-out of
+//! commands; after that they start from rest.
 
 use masseter_shared::config::Scenario;
 use masseter_shared::geometry::AXES;
@@ -24,9 +24,16 @@ const MOST_PERIODS: u64 = 2;
 struct Followed {
     target_m: f64,
     velocity_m_s: f64,
-    /// Velocity of the motion, even while the motion waits, and the cycle of its last step.
-    motion_m_s: f64,
-    motion_cycle: u64,
+    recent: RecentVelocities,
+}
+
+/// The velocities of late: between these a motion stops at once and goes on.
+#[derive(Debug, Clone, Copy, Default)]
+struct RecentVelocities {
+    /// When the newer of two stretches of cycles began.
+    since_cycle: u64,
+    /// The lowest and highest of each stretch, the newer first; rest is always among them.
+    ranges_m_s: [[f64; 2]; 2],
 }
 
 /// What one axis may be asked for.
@@ -44,7 +51,6 @@ struct AxisGate {
 #[derive(Debug, Clone, Copy)]
 struct Step {
     cycle: u64,
-    periods: u64,
     duration_s: f64,
 }
 
@@ -109,7 +115,7 @@ impl Gate {
         let [last_command_cycle, last_cycle] = self.passed;
         let most = (cycle.saturating_sub(last_cycle) + 1).min(MOST_PERIODS);
         let periods = command_cycle.saturating_sub(last_command_cycle).clamp(1, most);
-        Step { cycle, periods, duration_s: periods as f64 * self.period_s }
+        Step { cycle, duration_s: periods as f64 * self.period_s }
     }
 }
 
@@ -131,15 +137,29 @@ fn check_limit(cause: Cause, value: f64, limit: f64) -> Result<(), Failure> {
     if value <= limit { Ok(()) } else { Err(Failure::with(cause, [value, limit])) }
 }
 
-impl Followed {
-    /// Change of velocity that no waiting explains.
-    fn unexplained_m_s(&self, velocity_m_s: f64, step: Step, timeout_cycles: u64) -> f64 {
-        let change_m_s = (velocity_m_s - self.velocity_m_s).abs();
-        if step.cycle.saturating_sub(self.motion_cycle) > timeout_cycles {
-            return change_m_s;
+impl RecentVelocities {
+    /// Those still recent in a cycle: of the stretch of `length` cycles that has begun, and of the one before.
+    fn at(self, cycle: u64, length: u64) -> Self {
+        let [newer, _] = self.ranges_m_s;
+        match cycle.saturating_sub(self.since_cycle) {
+            elapsed if elapsed < length => self,
+            elapsed if elapsed < 2 * length => {
+                Self { since_cycle: self.since_cycle + length, ranges_m_s: [[0.0; 2], newer] }
+            }
+            _ => Self { since_cycle: cycle, ranges_m_s: [[0.0; 2]; 2] },
         }
-        let waiting_m_s = velocity_m_s.clamp(self.motion_m_s.min(0.0), self.motion_m_s.max(0.0));
-        change_m_s.min((velocity_m_s - waiting_m_s).abs())
+    }
+
+    /// The nearest velocity that needs no explanation.
+    fn nearest(&self, velocity_m_s: f64) -> f64 {
+        let [[low, high], [older_low, older_high]] = self.ranges_m_s;
+        velocity_m_s.clamp(low.min(older_low), high.max(older_high))
+    }
+
+    fn with(mut self, velocity_m_s: f64) -> Self {
+        let [low, high] = self.ranges_m_s[0];
+        self.ranges_m_s[0] = [low.min(velocity_m_s), high.max(velocity_m_s)];
+        self
     }
 }
 
@@ -156,21 +176,18 @@ impl AxisGate {
         let before = self.followed.unwrap_or_else(|| self.standing(target_m, position_m));
         let velocity_m_s = (target_m - before.target_m) / step.duration_s;
         check_limit(Cause::VelocityLimit, velocity_m_s.abs(), self.max_velocity_m_s)?;
-        let acceleration_m_s2 = before.unexplained_m_s(velocity_m_s, step, timeout_cycles) / step.duration_s;
+        let recent = before.recent.at(step.cycle, timeout_cycles);
+        let change_m_s = (velocity_m_s - before.velocity_m_s).abs();
+        let unexplained_m_s = (velocity_m_s - recent.nearest(velocity_m_s)).abs().min(change_m_s);
+        let acceleration_m_s2 = unexplained_m_s / step.duration_s;
         check_limit(Cause::AccelerationLimit, acceleration_m_s2, self.max_acceleration_m_s2)?;
-        let change_m_s = self.max_acceleration_m_s2 * step.duration_s;
-        let is_smooth = (velocity_m_s - before.velocity_m_s).abs() <= change_m_s;
-        let next = Followed { target_m, velocity_m_s, ..before };
-        if is_smooth && step.periods == 1 && velocity_m_s.abs() > change_m_s {
-            return Ok(Followed { motion_m_s: velocity_m_s, motion_cycle: step.cycle, ..next });
-        }
-        Ok(next)
+        Ok(Followed { target_m, velocity_m_s, recent: recent.with(velocity_m_s) })
     }
 
     /// A drive that stands at its first target, or as near as its position allows.
     fn standing(&self, target_m: f64, position_m: f64) -> Followed {
         let target_m = target_m.clamp(position_m - self.standing_m, position_m + self.standing_m);
-        Followed { target_m, velocity_m_s: 0.0, motion_m_s: 0.0, motion_cycle: 0 }
+        Followed { target_m, velocity_m_s: 0.0, recent: RecentVelocities::default() }
     }
 
     fn check_stroke(&self, target_m: f64) -> Result<(), Failure> {
