@@ -6,6 +6,7 @@ use std::time::Duration;
 
 use clap::{Args, ValueEnum};
 use masseter_plan::Overrides;
+use masseter_report::Detail;
 use masseter_terminal::Format;
 use rustix::fs::Mode;
 
@@ -68,12 +69,20 @@ pub(crate) struct RunArgs {
     /// Who may read the run's files
     #[arg(long, value_enum, default_value_t, value_name = "WHO")]
     pub readable_by: Readers,
+    /// Show every figure, not only verdict and checks
+    #[arg(long)]
+    pub verbose: bool,
     /// Show no progress
     #[arg(long)]
     pub quiet: bool,
 }
 
 impl RunArgs {
+    /// How much of the report standard output gets.
+    pub(super) fn detail(&self) -> Detail {
+        if self.verbose { Detail::Whole } else { Detail::Brief }
+    }
+
     /// The changes to the scenario.
     pub(super) fn overrides(&self) -> Overrides {
         Overrides {

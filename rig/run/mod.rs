@@ -76,7 +76,7 @@ pub(crate) fn run(args: &RunArgs) -> Result<Exit, Failure> {
     if manifest.ending == Ending::Interrupted && is_unstarted {
         return Ok(Exit::Interrupted);
     }
-    let exit = masseter_report::report_run(&folder, &manifest, args.format, reserve.summary)?;
+    let exit = masseter_report::report_run(&folder, &manifest, args.format, args.detail(), reserve.summary)?;
     written?;
     Ok(exit)
 }

@@ -9,6 +9,7 @@ use masseter_shared::messages::{FrameTap, Message, Reading, State, Truth};
 use crate::attribution::OverrunAttribution;
 use crate::code::Code;
 use crate::declared_faults::FaultWatch;
+use crate::disturbance::Disturbance;
 use crate::events::EventRecord;
 use crate::figures::Figures;
 use crate::freshness::Freshness;
@@ -53,6 +54,7 @@ pub struct Analysis {
     responses: Responses,
     cycles: u64,
     freshness: Freshness,
+    disturbance: Disturbance,
     first_sample_ns: Option<u64>,
     last_sample_ns: u64,
     controller_skips: Skips,
@@ -83,6 +85,7 @@ impl Analysis {
             responses: Responses::for_scenario(scenario),
             cycles: 0,
             freshness: Freshness::default(),
+            disturbance: Disturbance::default(),
             first_sample_ns: None,
             last_sample_ns: 0,
             controller_skips: Skips::default(),
@@ -132,7 +135,11 @@ impl Analysis {
         self.longest_cycles.state(state, is_fresh);
         self.over_time.wake_up(CONTROLLER, state.due_ns, state.woke_ns);
         self.outage.state(state);
-        self.tracking.state(state, is_fresh).into_iter().for_each(|sample| self.faults.sample(sample));
+        let is_disturbed = self.disturbance.take(state, is_fresh);
+        self.tracking
+            .state(state, is_fresh, is_disturbed)
+            .into_iter()
+            .for_each(|sample| self.faults.sample(sample));
         self.cycles = self.cycles.max(state.seq);
         self.final_state = Some(state.controller_state.into());
     }

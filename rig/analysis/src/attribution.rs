@@ -9,8 +9,8 @@
 //!
 //! Late returns from sleep count as stalls, and sleep does not count as running time. Both choices favour the machine.
 //!
-//! The price: a fault of the rig that costs one or two deadlines in a run looks like a stall. Such a run is INVALID,
-//! never passed; a longer run decides.
+//! The price: a fault of the rig that costs one or two deadlines in a run looks like a stall. The timing of such a run is
+//! disturbed, never held; a longer run decides.
 
 use serde::Serialize;
 

@@ -35,6 +35,8 @@ impl ResponseFigures {
 pub struct BusResponse {
     /// The messages of each bus, the most urgent first.
     pub messages: Vec<ResponseFigures>,
+    /// Frames queued off their times by a stall, and those beside them, which are not judged.
+    pub off_time_frames: u64,
     /// Why there are no bounds for this run; none where there are.
     pub unbounded: Option<String>,
 }

@@ -2,13 +2,22 @@
 //!
 //! A bound holds for undisturbed buses. A late process may queue messages closer together than planned; then the plan
 //! is worked out again for the closest queueing. Real interfaces do not report when a frame was queued.
+//!
+//! A stall queues messages far off their times. The bound does not hold for these frames and those of the next two cycles,
+//! so that they are counted and not judged.
 
-use masseter_can::{BusPlan, PeriodicMessage, PlannedMessage, Tapped};
+use masseter_can::canopen::Cob;
+use masseter_can::{BusPlan, CanId, PeriodicMessage, PlannedMessage, Tapped};
 use masseter_shared::config::Scenario;
 use masseter_shared::messages::FrameTap;
 use masseter_shared::schedule::plans;
 
 use super::bus_response::{BusResponse, ResponseFigures};
+
+/// Cycles after a message off its time in which the bus may still be crowded.
+const CROWDED_CYCLES: u64 = 2;
+/// Largest share of frames off their times that leaves a bus to be judged by the others.
+const MOST_OFF_TIME: f64 = 0.05;
 
 /// Follows every frame.
 #[derive(Debug)]
@@ -27,6 +36,9 @@ struct Followed {
     /// Whether or not the time of queueing is known.
     frames: u64,
     error_frames: u64,
+    /// Frames off their times, and until when others are counted as such, ns.
+    off_time: u64,
+    off_time_until_ns: u64,
 }
 
 /// Times of a message on the bus.
@@ -40,8 +52,13 @@ struct Seen {
 }
 
 impl Seen {
-    fn take(&mut self, queued_ns: u64, arrived_ns: u64) {
+    /// A frame off its time is counted only.
+    fn take(&mut self, queued_ns: u64, arrived_ns: u64, is_off_time: bool) {
         self.frames += 1;
+        if is_off_time {
+            self.last_queued_ns = Some(queued_ns);
+            return;
+        }
         self.max_ns = self.max_ns.max(arrived_ns.saturating_sub(queued_ns));
         if let Some(last_ns) = self.last_queued_ns.replace(queued_ns) {
             let period_ns = queued_ns.saturating_sub(last_ns);
@@ -69,6 +86,8 @@ impl Responses {
             others: Seen::default(),
             frames: 0,
             error_frames: 0,
+            off_time: 0,
+            off_time_until_ns: 0,
         };
         Self { buses: plans.into_iter().map(followed).collect(), has_faults }
     }
@@ -77,17 +96,13 @@ impl Responses {
     pub(super) fn frame(&mut self, tap: &FrameTap, bus: usize, tapped: &Tapped) {
         let Some(bus) = self.buses.get_mut(bus) else { return };
         let planned = bus.plan.messages.iter().position(|planned| planned.message.id.flagged() == tap.id);
-        let seen = match planned {
-            Some(index) => &mut bus.messages[index],
-            None if matches!(tapped, Tapped::Error(_)) => {
-                bus.error_frames += 1;
-                return;
-            }
-            None => &mut bus.others,
-        };
+        if planned.is_none() && matches!(tapped, Tapped::Error(_)) {
+            bus.error_frames += 1;
+            return;
+        }
         bus.frames += 1;
         if tap.queued_ns > 0 {
-            seen.take(tap.queued_ns, tap.time_ns);
+            bus.take(planned, tap.queued_ns, tap.time_ns);
         }
     }
 
@@ -96,7 +111,8 @@ impl Responses {
         let unbounded = self.unbounded(missing);
         let figures = |bus: &Followed| bus.figures(&bus.bounds_ns(unbounded.is_none()));
         let messages = self.buses.iter().flat_map(figures).collect();
-        BusResponse { messages, unbounded }
+        let off_time_frames = self.buses.iter().map(|bus| bus.off_time).sum();
+        BusResponse { messages, off_time_frames, unbounded }
     }
 
     /// Why there are no bounds for this run.
@@ -112,6 +128,25 @@ impl Responses {
 }
 
 impl Followed {
+    /// Takes a frame of a planned message, by its place in the plan, or another one.
+    fn take(&mut self, planned: Option<usize>, queued_ns: u64, arrived_ns: u64) {
+        if planned.is_some_and(|index| self.is_off_time(index, queued_ns)) {
+            self.off_time_until_ns = queued_ns + CROWDED_CYCLES * self.plan.cycle_ns;
+        }
+        let is_off_time = queued_ns < self.off_time_until_ns;
+        self.off_time += u64::from(is_off_time);
+        let seen = planned.map_or(&mut self.others, |index| &mut self.messages[index]);
+        seen.take(queued_ns, arrived_ns, is_off_time);
+    }
+
+    /// Whether a message comes less than half of its period after the last one, or SYNC more than one and a half.
+    fn is_off_time(&self, index: usize, queued_ns: u64) -> bool {
+        let PeriodicMessage { id, period_ns, .. } = &self.plan.messages[index].message;
+        let Some(last_ns) = self.messages[index].last_queued_ns else { return false };
+        let interval_ns = queued_ns.saturating_sub(last_ns);
+        2 * interval_ns < *period_ns || (*id == CanId::from(Cob::Sync) && 2 * interval_ns > 3 * period_ns)
+    }
+
     fn figures(&self, bounds_ns: &[Option<u64>]) -> Vec<ResponseFigures> {
         let bus = self.plan.bus;
         let planned = self.plan.messages.iter().zip(&self.messages).zip(bounds_ns);
@@ -143,6 +178,12 @@ impl Followed {
         if self.error_frames > 0 {
             return Some(format!("bus {bus} had {} errors", self.error_frames));
         }
+        if self.off_time as f64 > self.frames as f64 * MOST_OFF_TIME {
+            return Some(format!(
+                "{} of {} frames of bus {bus} were off their times",
+                self.off_time, self.frames
+            ));
+        }
         let as_queued = self.plan_as_queued();
         let unbounded = as_queued.messages.iter().find(|queued| queued.response_ns.is_none())?;
         let name = &unbounded.message.name;
@@ -165,8 +206,7 @@ impl Followed {
 
 #[cfg(test)]
 mod tests {
-    use masseter_can::canopen::Cob;
-    use masseter_can::{Bitrate, CanId, ErrorKind, ErrorReport};
+    use masseter_can::{Bitrate, ErrorKind, ErrorReport};
 
     use masseter_shared::messages::tap;
 
@@ -247,8 +287,14 @@ mod tests {
             (vec![], "no frame of bus 0 was recorded"),
             (vec![seen(0x080, 0, 0)], "lacks the queuing times of the frames"),
             (vec![seen(0x080, 1000, 51), error], "bus 0 had 1 errors"),
-            (vec![seen(0x080, 1000, 51), seen(0x080, 61_000, 51)], "so close together"),
-            (vec![seen(0x080, 1000, 51), seen(0x080, 1000, 102)], "so close together"),
+            (
+                vec![seen(0x080, 1000, 51), seen(0x080, 61_000, 51)],
+                "1 of 2 frames of bus 0 were off their times",
+            ),
+            (
+                vec![seen(0x080, 1000, 51), seen(0x080, 1000, 102)],
+                "1 of 2 frames of bus 0 were off their times",
+            ),
         ];
         for (frames, reason) in cases {
             let found = followed_without_faults(frames.clone());
@@ -256,6 +302,35 @@ mod tests {
             assert!(why.is_some_and(|why| why.contains(reason)), "{frames:?}: {found:?}");
             assert!(found.messages.iter().all(|message| message.bound_ns.is_none()), "{found:?}");
         }
+    }
+
+    /// SYNC of cycle 100 comes late or early, and frames of that and the next cycles wait for each other.
+    #[test]
+    fn frames_beside_a_stall_are_not_judged_and_the_others_are() {
+        let run = |shift_us: i64, crowded: std::ops::RangeInclusive<u64>| {
+            followed_without_faults((1..=400).flat_map(move |cycle| {
+                let shift_ns = if cycle == 100 { shift_us * 1000 } else { 0 };
+                let at_ns = (cycle * PERIOD_NS).saturating_add_signed(shift_ns);
+                let took_us = if crowded.contains(&cycle) { 500 } else { 120 };
+                [seen(0x080, at_ns, took_us), seen(0x181, at_ns + 60_000, took_us)]
+            }))
+        };
+        for (shift_us, off_time) in [(600, 7), (700, 7), (-600, 6)] {
+            let found = run(shift_us, 100..=101);
+            assert_eq!((found.unbounded.as_deref(), found.off_time_frames), (None, off_time), "{shift_us}");
+            assert_eq!(found.exceeding().count(), 0, "{found:?}");
+            assert_eq!(
+                run(shift_us, 100..=104).exceeding().count(),
+                2,
+                "they wait longer than a stall explains"
+            );
+        }
+        let kept = run(0, 100..=100);
+        assert_eq!(
+            (kept.off_time_frames, kept.exceeding().count()),
+            (0, 2),
+            "nothing explains their waiting"
+        );
     }
 
     #[test]

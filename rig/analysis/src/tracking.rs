@@ -59,6 +59,20 @@ pub struct TrackingFigures {
     pub estimated: PoseErrors,
     /// Root mean square distance, estimated by forward kinematics against true, mm; none without truth.
     pub estimate_rms_mm: Option<f64>,
+    /// The same without the time in which a lost cycle may have acted on the jaw.
+    pub undisturbed: UndisturbedFigures,
+}
+
+/// Errors of the platform's pose where no lost cycle may have acted on the jaw.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+pub struct UndisturbedFigures {
+    /// Cycles compared.
+    pub samples: u64,
+    /// Errors of the actual pose against the desired one.
+    #[serde(flatten)]
+    pub actual: PoseErrors,
+    /// Errors of the pose estimated by forward kinematics against the desired one.
+    pub estimated: PoseErrors,
 }
 
 /// One cycle of the track.
@@ -109,6 +123,8 @@ struct Sample {
     is_fresh: bool,
     /// Whether the platform had a desired pose, also in the cycle that ended the motion.
     is_on_path: bool,
+    /// Whether a lost cycle may have acted on the jaw.
+    is_disturbed: bool,
 }
 
 /// A cycle's distance from the desired path, by the actual pose.
@@ -130,6 +146,8 @@ pub(super) struct Tracking {
     was_moving: bool,
     actual: PoseErrorSums,
     estimated: PoseErrorSums,
+    undisturbed_actual: PoseErrorSums,
+    undisturbed_estimated: PoseErrorSums,
     estimates: Accumulator,
     track: Vec<TrackingSample>,
     next_sample_ns: u64,
@@ -149,12 +167,13 @@ impl Tracking {
     }
 
     /// The state of a cycle. In one without a fresh reading, the desired pose is that of the sample that failed to come.
-    pub(super) fn state(&mut self, state: &State, is_fresh: bool) -> Option<PathSample> {
+    /// `is_disturbed`: a lost cycle may have acted on the jaw.
+    pub(super) fn state(&mut self, state: &State, is_fresh: bool, is_disturbed: bool) -> Option<PathSample> {
         let is_moving = is_moving(state);
         let is_on_path = is_moving || self.was_moving;
         self.was_moving = is_moving;
         let cycle = if is_fresh { state.reading_cycle } else { state.cycle.saturating_sub(1) };
-        let sample = Sample { state: *state, cycle, is_fresh, is_on_path };
+        let sample = Sample { state: *state, cycle, is_fresh, is_on_path, is_disturbed };
         if self.source == PoseSource::Estimate {
             let estimated = pose(state.estimated_position_m, state.estimated_quaternion_wxyz);
             return is_fresh.then(|| self.compare(&sample, state.sampled_ns, estimated)).flatten();
@@ -184,14 +203,17 @@ impl Tracking {
 
     /// The deviation from the path, where there is one.
     fn compare(&mut self, sample: &Sample, sampled_ns: u64, actual: Option<Pose>) -> Option<PathSample> {
-        let Sample { state, is_fresh, is_on_path, .. } = sample;
+        let Sample { state, is_fresh, is_on_path, is_disturbed, .. } = sample;
         let desired = pose(state.desired_position_m, state.desired_quaternion_wxyz);
         let error = deviation(desired.as_ref(), actual.as_ref(), self.incisal_m);
         if *is_on_path {
             self.actual.peak(&error);
+            if !is_disturbed {
+                self.undisturbed_actual.peak(&error);
+            }
         }
         if is_moving(state) && *is_fresh {
-            self.solution(state, sampled_ns, desired, actual, &error);
+            self.solution(sample, sampled_ns, desired, actual, &error);
         }
         is_on_path.then_some(PathSample { sampled_ns, deviation: error })
     }
@@ -199,7 +221,7 @@ impl Tracking {
     /// A cycle with an estimate of its own.
     fn solution(
         &mut self,
-        state: &State,
+        Sample { state, is_disturbed, .. }: &Sample,
         sampled_ns: u64,
         desired: Option<Pose>,
         actual: Option<Pose>,
@@ -208,8 +230,16 @@ impl Tracking {
         let estimated = pose(state.estimated_position_m, state.estimated_quaternion_wxyz);
         let to_estimate = |from: Option<Pose>| deviation(from.as_ref(), estimated.as_ref(), self.incisal_m);
         let (estimate, estimate_error) = (to_estimate(desired), to_estimate(actual));
+        let is_running = state.controller_state == ControllerState::Running.code();
         self.estimated.peak(&estimate);
-        if state.controller_state == ControllerState::Running.code() {
+        if !is_disturbed {
+            self.undisturbed_estimated.peak(&estimate);
+        }
+        if is_running && !is_disturbed {
+            self.undisturbed_actual.add(error);
+            self.undisturbed_estimated.add(&estimate);
+        }
+        if is_running {
             self.actual.add(error);
             self.estimated.add(&estimate);
             self.estimates.add(estimate_error.origin_m);
@@ -259,6 +289,11 @@ impl Tracking {
             rms_noise_mm: standard_error(&self.seconds),
             estimated: self.estimated.finish(),
             estimate_rms_mm: (samples > 0 && has_truth).then(|| self.estimates.rms() * 1e3),
+            undisturbed: UndisturbedFigures {
+                samples: self.undisturbed_actual.samples(),
+                actual: self.undisturbed_actual.finish(),
+                estimated: self.undisturbed_estimated.finish(),
+            },
         };
         let began_ns = self.began.map_or(self.ended_ns, |(began_ns, _)| began_ns);
         let bands = |first: usize| std::array::from_fn(|axis| self.moved_m.band(first + axis));

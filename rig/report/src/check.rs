@@ -10,6 +10,8 @@ pub enum CheckResult {
     Passed,
     /// It is not.
     Failed,
+    /// It is not, and the machine may be the cause.
+    Excused,
     /// This run cannot tell; the finding says why.
     NotJudged,
 }
@@ -24,6 +26,7 @@ impl CheckResult {
         match self {
             Self::Passed => "ok",
             Self::Failed => "FAIL",
+            Self::Excused => "lost",
             Self::NotJudged => "skip",
         }
     }
@@ -46,10 +49,10 @@ impl Check {
         Self { name, finding, result }
     }
 
-    /// A failure that `excused` explains is none.
-    pub(crate) fn unless(self, excused: bool) -> Self {
+    /// A failure that the machine may explain is excused.
+    pub(crate) fn unless(self, is_explained: bool) -> Self {
         match self.result {
-            CheckResult::Failed if excused => Self { result: CheckResult::NotJudged, ..self },
+            CheckResult::Failed if is_explained => Self { result: CheckResult::Excused, ..self },
             _ => self,
         }
     }
@@ -65,14 +68,15 @@ mod tests {
 
     #[test]
     fn what_is_not_judged_has_not_failed() {
-        let results = [CheckResult::Passed, CheckResult::Failed, CheckResult::NotJudged];
-        assert_eq!(results.map(CheckResult::is_failed), [false, true, false]);
+        let results =
+            [CheckResult::Passed, CheckResult::Failed, CheckResult::Excused, CheckResult::NotJudged];
+        assert_eq!(results.map(CheckResult::is_failed), [false, true, false, false]);
     }
 
     #[test]
     fn only_a_failure_is_excused() {
         let check = |passed| Check::judged("tracking", String::new(), passed);
-        let cases = [(false, true, "skip"), (false, false, "FAIL"), (true, true, "ok"), (true, false, "ok")];
+        let cases = [(false, true, "lost"), (false, false, "FAIL"), (true, true, "ok"), (true, false, "ok")];
         for (passed, excused, mark) in cases {
             assert_eq!(check(passed).unless(excused).result.mark(), mark);
         }

@@ -7,31 +7,29 @@ use masseter_shared::messages::codes::{Cause, ControllerState};
 use crate::check::{Check, CheckResult};
 use crate::motion_checks::{faults, tracking};
 use crate::text;
-use masseter_analysis::{
-    BusResponse, Code, EventRecord, Figures, OverrunAttribution, ResponseFigures, TrackingFigures,
-};
+use crate::timing::{Timing, TimingWord};
+use masseter_analysis::{BusResponse, Code, EventRecord, Figures, ResponseFigures, TrackingFigures};
 use masseter_recording::{Ending, Manifest};
 
-/// `is_disturbed`: the machine kept the rig from too many cycles to hold its sequence or its tracking against it.
-pub(crate) fn checks(manifest: &Manifest, figures: &Figures, is_disturbed: bool) -> Vec<Check> {
+pub(crate) fn checks(manifest: &Manifest, figures: &Figures, timing: &Timing) -> Vec<Check> {
     let limits = &manifest.scenario.checks;
-    let (skipped, by_machine) = figures.skipped();
+    let is_disturbed = timing.is_disturbed();
     let sequence = sequence(figures.final_state, &figures.events);
     let is_played = sequence.result == CheckResult::Passed;
-    let TrackingFigures { actual_source, samples, actual, estimated, .. } = &figures.tracking;
-    let mut checks = vec![
-        sequence.unless(is_disturbed),
-        tracking("tracking", *samples, actual, limits, is_played).unless(is_disturbed),
-        Check {
-            name: "missed cycles",
-            finding: format!(
-                "{skipped} ({by_machine} by the machine{}{}), limit {}",
-                of_unknown_cause(figures),
-                figures.overrun_attribution.map(overruns_in_words).unwrap_or_default(),
-                limits.missed_cycles
-            ),
-            result: missed_cycles(manifest, figures),
-        },
+    let TrackingFigures { actual_source, samples, actual, estimated, undisturbed, .. } = &figures.tracking;
+    let tracking_of = |name, errors, undisturbed_errors| {
+        let check = tracking(name, *samples, errors, limits, is_played);
+        // What also fails where no lost cycle acted on the jaw is the rig's.
+        let rest = tracking(name, undisturbed.samples, undisturbed_errors, limits, false);
+        check.unless(is_disturbed && !rest.result.is_failed())
+    };
+    let mut checks =
+        vec![sequence.unless(is_disturbed), tracking_of("tracking", actual, &undisturbed.actual)];
+    if actual_source.is_truth() {
+        checks.push(tracking_of("estimated tracking", estimated, &undisturbed.estimated));
+    }
+    checks.extend(kept_time(timing, limits.missed_cycles));
+    checks.extend([
         dropped_messages(
             figures.missing_messages(),
             &manifest.ending,
@@ -39,14 +37,22 @@ pub(crate) fn checks(manifest: &Manifest, figures: &Figures, is_disturbed: bool)
             !figures.damage.is_empty(),
         ),
         bus_response(&figures.bus_response),
-    ];
-    if actual_source.is_truth() {
-        let estimated = tracking("estimated tracking", *samples, estimated, limits, is_played);
-        checks.insert(2, estimated.unless(is_disturbed));
-    }
+    ]);
     let faults = faults(&manifest.scenario.faults, &figures.faults, limits, is_played);
     checks.extend(faults.map(|check| check.unless(is_disturbed)));
     checks
+}
+
+/// Cycles that the machine lost are no failure of the rig. None in simulated time, which has no deadlines.
+fn kept_time(timing: &Timing, limit: u64) -> Option<Check> {
+    let result = match timing.word {
+        TimingWord::Held => CheckResult::Passed,
+        TimingWord::Missed => CheckResult::Failed,
+        TimingWord::Disturbed => CheckResult::NotJudged,
+        TimingWord::Simulated => return None,
+    };
+    let finding = format!("{timing}{}, limit of the rig {limit}", timing.evidence);
+    Some(Check { name: "timing", finding, result })
 }
 
 /// The motion must be played to its end, and not be stopped by request.
@@ -83,46 +89,17 @@ fn bus_response(response: &BusResponse) -> Check {
             [message.max_ns, message.bound_ns].map(|ns| text::or_dash(ns, text::microseconds));
         format!("{} on bus {} took {max_us} µs, bound {bound_us} µs", message.message, message.bus)
     };
+    let unjudged = match response.off_time_frames {
+        0 => String::new(),
+        frames => format!("; {} beside stalls not judged", text::counted(frames, "frame")),
+    };
     let exceeding: Vec<_> = response.exceeding().map(in_words).collect();
     if exceeding.is_empty() {
         let tightest = response.tightest().map_or_else(|| "no message has a bound".to_owned(), in_words);
-        Check::judged(NAME, format!("closest: {tightest}"), response.tightest().is_some())
+        Check::judged(NAME, format!("closest: {tightest}{unjudged}"), response.tightest().is_some())
     } else {
         Check::judged(NAME, exceeding.join("; "), false)
     }
-}
-
-/// Whether too many cycles were missed. When none of them is certainly the rig's doing, or it was not given the cores
-/// that it asked for, there is nothing to judge it by.
-pub(crate) fn missed_cycles(manifest: &Manifest, figures: &Figures) -> CheckResult {
-    let (skipped, by_machine) = figures.skipped();
-    if skipped <= manifest.scenario.checks.missed_cycles {
-        CheckResult::Passed
-    } else if by_machine + figures.skipped_of_unknown_cause() == skipped || manifest.refusal().is_some() {
-        CheckResult::NotJudged
-    } else {
-        CheckResult::Failed
-    }
-}
-
-/// The number of cycles missed after unrecorded messages, in words.
-fn of_unknown_cause(figures: &Figures) -> String {
-    match figures.skipped_of_unknown_cause() {
-        0 => String::new(),
-        n => format!(", {n} of unknown cause: the messages before them are missing"),
-    }
-}
-
-/// The evidence on the stretches of work that cost deadlines.
-fn overruns_in_words(overruns: OverrunAttribution) -> String {
-    format!(
-        "; {} overlong stretches of work, {} stalls of that length while waiting, work is {:.1} % of the time: \
-         probability by chance {:.2}",
-        overruns.while_working,
-        overruns.while_waiting,
-        overruns.work_share * 100.0,
-        overruns.chance
-    )
 }
 
 #[cfg(test)]
@@ -153,7 +130,7 @@ mod tests {
             max_ns: Some(max_ns),
             bound_ns: unbounded.is_none().then_some(190_000),
         };
-        BusResponse { messages: vec![sync], unbounded: unbounded.map(str::to_owned) }
+        BusResponse { messages: vec![sync], off_time_frames: 0, unbounded: unbounded.map(str::to_owned) }
     }
 
     #[test]

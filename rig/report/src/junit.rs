@@ -20,6 +20,10 @@ impl Suite<'_> {
     fn count(&self, result: CheckResult) -> usize {
         self.verdict.checks.iter().filter(|check| check.result == result).count()
     }
+
+    fn skipped(&self) -> usize {
+        self.count(CheckResult::Excused) + self.count(CheckResult::NotJudged)
+    }
 }
 
 /// The document. XML has no form for most control characters: they become replacement characters.

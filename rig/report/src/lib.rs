@@ -20,11 +20,14 @@ mod summary;
 mod table;
 mod text;
 mod time_line;
+mod timing;
 mod verdict;
 mod write_error;
 
 pub use candump_logs::CandumpLogs;
 pub use check::{Check, CheckResult};
 pub use run_report::{report_past_run, report_run};
+pub use table::Detail;
+pub use timing::{Timing, TimingWord};
 pub use verdict::Verdict;
 pub use write_error::WriteError;

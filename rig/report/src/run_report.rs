@@ -12,6 +12,7 @@ use masseter_shared::messages::tap::{self, TapError};
 use masseter_terminal::{Exit, Failure, Format, OrFailure, result, status};
 
 use crate::candump_logs::CandumpLogs;
+use crate::table::Detail;
 use crate::verdict::Verdict;
 use crate::write_error::WriteError;
 use crate::{event_log, histogram_log, junit, page, summary, table};
@@ -30,13 +31,13 @@ enum AnalysisError {
 ///
 /// ```no_run
 /// use masseter_recording::{Manifest, RunFolder};
-/// use masseter_report::report_run;
+/// use masseter_report::{Detail, report_run};
 /// use masseter_terminal::Format;
 ///
 /// let folder = RunFolder::open("runs/latest".as_ref())?;
 /// let manifest = Manifest::read(&folder)?;
 /// let reserved = std::fs::File::create(folder.file("reserved"))?;
-/// let exit = report_run(&folder, &manifest, Format::Human, reserved).map_err(|failure| failure.error)?;
+/// let exit = report_run(&folder, &manifest, Format::Human, Detail::Brief, reserved).map_err(|failure| failure.error)?;
 /// println!("{exit:?}");
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
@@ -47,11 +48,13 @@ pub fn report_run(
     folder: &RunFolder,
     manifest: &Manifest,
     format: Format,
+    detail: Detail,
     reserved: File,
 ) -> Result<Exit, Failure> {
     let (figures, logged) =
         analyse(folder, &manifest.scenario).context("the run's recording cannot be analysed").incomplete()?;
-    let (exit, written) = show_and_write(folder, manifest, &figures, logged, format, Some(reserved))?;
+    let (exit, written) =
+        show_and_write(folder, manifest, &figures, logged, (format, detail), Some(reserved))?;
     written.incomplete()?;
     Ok(exit)
 }
@@ -74,7 +77,8 @@ pub fn report_past_run(path: &Path, format: Format) -> Result<Exit, Failure> {
     let unread = || format!("cannot read {}", folder.manifest().display());
     let manifest = Manifest::read(&folder).with_context(unread).usage()?;
     let (figures, logged) = analyse(&folder, &manifest.scenario).usage()?;
-    let (exit, written) = show_and_write(&folder, &manifest, &figures, logged, format, None)?;
+    let (exit, written) =
+        show_and_write(&folder, &manifest, &figures, logged, (format, Detail::Whole), None)?;
     match written {
         Err(WriteError { path, error }) if is_read_only(&error) => status!(
             "masseter: cannot write {}: {error}; the run is shown, and no file written",
@@ -116,7 +120,7 @@ fn show_and_write(
     manifest: &Manifest,
     figures: &Figures,
     logged: Result<(), WriteError>,
-    format: Format,
+    (format, detail): (Format, Detail),
     reserved: Option<File>,
 ) -> Result<(Exit, Result<(), WriteError>), Failure> {
     let verdict = Verdict::new(manifest, figures);
@@ -125,8 +129,9 @@ fn show_and_write(
     let junit = junit::xml(manifest, figures, &verdict).context("cannot write junit.xml").incomplete()?;
     let shown = match format {
         Format::Human => {
-            let table = table::text(manifest, figures, &verdict);
-            result(&format!("{table}\nfiles: {}\n", folder.path().display()))
+            let table = table::text(manifest, figures, &verdict, detail);
+            let more = if detail == Detail::Brief { "; --verbose shows every figure" } else { "" };
+            result(&format!("{table}\nreport: {}{more}\n", folder.file("report.html").display()))
         }
         Format::Json => result(&summary),
     };

@@ -6,7 +6,7 @@ use serde::Serialize;
 use crate::verdict::Verdict;
 
 /// Version of the summary's form.
-pub(crate) const FORM: u32 = 1;
+pub(crate) const FORM: u32 = 2;
 
 #[derive(Serialize)]
 struct Summary<'a> {

@@ -11,15 +11,35 @@ use masseter_analysis::{
     BusResponse, Figures, IntervalFigures, PoseErrors, ReadingFigures, ResponseFigures, TrackingFigures,
 };
 use masseter_recording::{Manifest, RunUsage, Usage};
+use masseter_terminal::Exit;
 
-/// Verdict, checks, latencies, losses and faults.
-pub(crate) fn text(manifest: &Manifest, figures: &Figures, verdict: &Verdict) -> String {
+/// How much is shown.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Detail {
+    /// Verdict and checks, and the faults of a run that did not pass: at most fifteen lines of one that did.
+    Brief,
+    /// Every figure.
+    Whole,
+}
+
+/// Verdict, checks and faults; with every detail also latencies and losses.
+pub(crate) fn text(manifest: &Manifest, figures: &Figures, verdict: &Verdict, detail: Detail) -> String {
     let mut text = String::new();
-    write_text(&mut text, manifest, figures, verdict).expect("a string takes any text");
+    let mut write = || -> std::fmt::Result {
+        write_verdict(&mut text, manifest, figures, verdict)?;
+        if detail == Detail::Whole {
+            write_figures(&mut text, manifest, figures)?;
+        }
+        if detail == Detail::Whole || verdict.exit_code != Exit::Passed {
+            write_faults(&mut text, figures)?;
+        }
+        Ok(())
+    };
+    write().expect("a string takes any text");
     text
 }
 
-fn write_text(
+fn write_verdict(
     text: &mut String,
     manifest: &Manifest,
     figures: &Figures,
@@ -27,6 +47,10 @@ fn write_text(
 ) -> std::fmt::Result {
     let scenario = &manifest.scenario;
     writeln!(text, "{}: {}", verdict.word, verdict.reason)?;
+    writeln!(text, "timing: {}", verdict.timing)?;
+    if let Some(advice) = verdict.advice(manifest) {
+        writeln!(text, "  {advice}")?;
+    }
     writeln!(
         text,
         "{}: {:.1} s of motion at {} Hz ({} clock), {} cycles in {:.1} s, seed {}",
@@ -45,6 +69,10 @@ fn write_text(
     for check in &verdict.checks {
         writeln!(text, "  {:<4} {:<18} {}", check.result.mark(), check.name, check.finding)?;
     }
+    Ok(())
+}
+
+fn write_figures(text: &mut String, manifest: &Manifest, figures: &Figures) -> std::fmt::Result {
     let tracking = &figures.tracking;
     writeln!(text, "\nplatform, {}", distances(tracking))?;
     if let Some(rms_mm) = tracking.estimate_rms_mm {
@@ -66,8 +94,7 @@ fn write_text(
     )?;
     writeln!(text, "{}", readings(&figures.readings))?;
     usage(text, &manifest.usage)?;
-    losses(text, figures)?;
-    events(text, figures)
+    losses(text, figures)
 }
 
 fn latencies(text: &mut String, intervals: &[IntervalFigures]) -> std::fmt::Result {
@@ -170,7 +197,7 @@ fn losses(text: &mut String, figures: &Figures) -> std::fmt::Result {
     writeln!(text, "frames: {}", frames.join(", "))
 }
 
-fn events(text: &mut String, figures: &Figures) -> std::fmt::Result {
+fn write_faults(text: &mut String, figures: &Figures) -> std::fmt::Result {
     let faults: Vec<_> = figures.events.iter().filter(|event| event.kind == EventKind::Fault).collect();
     if faults.is_empty() {
         return Ok(());

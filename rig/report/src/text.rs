@@ -18,6 +18,25 @@ pub(crate) fn microseconds(ns: u64) -> String {
     format!("{:.2}", ns as f64 / 1e3)
 }
 
+/// A number with its digits in groups of three.
+pub(crate) fn grouped(number: u64) -> String {
+    let digits = number.to_string();
+    let first = digits.len() % 3;
+    let (head, rest) = digits.split_at(first);
+    let groups = (0..rest.len() / 3).map(|group| &rest[3 * group..3 * group + 3]);
+    [head].into_iter().filter(|head| !head.is_empty()).chain(groups).collect::<Vec<_>>().join(",")
+}
+
+/// A number of things: "1 cycle", "2 cycles", "2 stretches".
+pub(crate) fn counted(number: u64, thing: &str) -> String {
+    let plural = match number {
+        1 => "",
+        _ if thing.ends_with("ch") => "es",
+        _ => "s",
+    };
+    format!("{} {thing}{plural}", grouped(number))
+}
+
 /// An event with its cycle.
 pub(crate) fn event_with_cycle(record: &EventRecord) -> String {
     format!("cycle {:>6} {}", record.cycle, event(record))
@@ -37,4 +56,17 @@ pub(crate) fn event(event: &EventRecord) -> String {
         _ => format!("{source}{axis}: {cause} (value {}, limit {}) {transition}", event.value, event.limit),
     };
     text.trim_end().to_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_grouped_and_things_counted() {
+        let numbers = [0, 7, 999, 1000, 11_379, 1_234_567];
+        assert_eq!(numbers.map(grouped), ["0", "7", "999", "1,000", "11,379", "1,234,567"]);
+        let things = [counted(1, "cycle"), counted(0, "cycle"), counted(1000, "stretch")];
+        assert_eq!(things, ["1 cycle", "0 cycles", "1,000 stretches"]);
+    }
 }

@@ -1,16 +1,19 @@
-//! The verdict on a run: by its end, then its recording, then the machine, then its checks.
+//! The verdict on the function of a run: by its end, then its recording, then the machine, then its checks.
+//!
+//! [`Timing`] is judged apart. Lost cycles matter here only where they leave nothing to judge the function by.
 
 use masseter_analysis::{EventRecord, Figures, Outage};
 use masseter_recording::{DmaLatency, Ending, Manifest, RunUsage};
-use masseter_shared::config::CanConfig;
+use masseter_shared::config::{CanConfig, ChecksConfig, TimingConfig};
 use masseter_shared::messages::codes::EventKind;
 use masseter_terminal::Exit;
 use serde::Serialize;
 
 use crate::check::{Check, CheckResult};
-use crate::checks::{checks, missed_cycles};
+use crate::checks::checks;
 use crate::motion_checks::{FAULTS, left_its_path};
-use crate::text;
+use crate::text::{self, counted, grouped};
+use crate::timing::{Timing, TimingWord};
 
 /// The judgement of a run.
 ///
@@ -34,6 +37,8 @@ pub struct Verdict {
     pub reason: String,
     /// The outcome as the exit code of the program.
     pub exit_code: Exit,
+    /// Whether the deadlines were kept.
+    pub timing: Timing,
     /// Every check, also those that passed.
     pub checks: Vec<Check>,
 }
@@ -41,15 +46,19 @@ pub struct Verdict {
 impl Verdict {
     /// Judges a run.
     pub fn new(manifest: &Manifest, figures: &Figures) -> Self {
-        let disturbed = disturbed(manifest, figures);
-        let checks = checks(manifest, figures, disturbed.is_some());
+        let timing = Timing::new(manifest, figures);
+        let checks = checks(manifest, figures, &timing);
+        let excuse = excuse(&manifest.ending, &timing, figures.outage);
         let is_too_late = left_its_path(&figures.tracking.actual, &manifest.scenario.checks)
             || checks.iter().any(|check| check.name == FAULTS && check.result == CheckResult::Failed);
         let (exit_code, mut reason) = ending(&manifest.ending, &figures.events)
             // The machine caused the stop, or it came only after the jaw had left its path.
-            .filter(|(exit, _)| !(*exit == Exit::SafeStop && (disturbed.is_some() || is_too_late)))
+            .filter(|(exit, _)| !(*exit == Exit::SafeStop && (excuse.is_some() || is_too_late)))
             .or_else(|| incomplete(figures))
-            .or(disturbed)
+            .or_else(|| {
+                let unjudged = excuse.or_else(|| unjudged(&manifest.scenario.checks, &timing, &checks))?;
+                Some((Exit::Invalid, format!("{unjudged}; {}", account(manifest, figures))))
+            })
             .or_else(|| {
                 failed(&checks)
                     .map(|failure| clock_jump(&manifest.usage, &manifest.scenario.can).unwrap_or(failure))
@@ -58,11 +67,21 @@ impl Verdict {
         if exit_code != Exit::Passed {
             reason += &overload(&manifest.usage, manifest.scenario.rate_hz).unwrap_or_default();
         }
-        Self { word: word(exit_code), reason, exit_code, checks }
+        Self { word: word(exit_code), reason, exit_code, timing, checks }
     }
 
-    pub(crate) fn is_passed(&self) -> bool {
-        self.exit_code == Exit::Passed
+    /// The colour of the run: passed with its timing held, passed without, or not passed.
+    pub(crate) fn colour(&self) -> &'static str {
+        match (self.exit_code, self.timing.word) {
+            (Exit::Passed, TimingWord::Disturbed) => "disturbed",
+            (Exit::Passed, _) => "pass",
+            _ => "",
+        }
+    }
+
+    /// What to do about the machine; none where the machine disturbed nothing.
+    pub(crate) fn advice(&self, manifest: &Manifest) -> Option<String> {
+        (self.timing.word == TimingWord::Disturbed).then(|| remedy(manifest))
     }
 
     /// Whether the checks decided it.
@@ -138,38 +157,44 @@ fn incomplete(figures: &Figures) -> Option<ExitReason> {
     Some((Exit::Incomplete, reason))
 }
 
-/// Whether the machine kept the rig from too many cycles to judge it, or never granted it real time. A safe stop is
-/// excused only when many of them were missed just before it, and is so however many may be missed.
-fn disturbed(manifest: &Manifest, figures: &Figures) -> Option<ExitReason> {
-    let refusal = manifest.refusal();
-    let (skipped, by_machine) = figures.skipped();
-    let stop = excuse(
-        &manifest.ending,
-        missed_cycles(manifest, figures),
-        figures.outage,
-        by_machine == skipped || refusal.is_some(),
-    )?;
-    let reason = if let Some((process, refusal)) = refusal {
-        format!("{skipped} cycles were missed without real time{stop}; {process}: {refusal}")
-    } else {
-        format!("{}{stop}; {}", withheld(figures), remedy(manifest))
-    };
-    Some((Exit::Invalid, reason))
+/// Why the machine leaves nothing to judge a run by that ended normally; none where the run can be judged. What the rig
+/// missed by itself fails the run.
+fn unjudged(limits: &ChecksConfig, timing: &Timing, checks: &[Check]) -> Option<String> {
+    let has = |result| checks.iter().any(|check| check.result == result);
+    if timing.word == TimingWord::Missed {
+        return None;
+    }
+    if timing.is_disturbed() && limits.timing == TimingConfig::Strict {
+        return Some("checks.timing = \"strict\" allows no lost cycle".to_owned());
+    }
+    if timing.lost_percent() > limits.machine_lost_percent {
+        let (lost, limit) = (timing.lost_percent(), limits.machine_lost_percent);
+        return Some(format!("the machine lost {lost:.1} % of the cycles, limit {limit} %"));
+    }
+    let excused =
+        || named(checks, CheckResult::Excused).map(|names| format!("lost cycles may explain: {names}"));
+    if has(CheckResult::Failed) { None } else { excused() }
 }
 
-/// The time for which the machine stalled, and the cycles missed.
-fn withheld(figures: &Figures) -> String {
+/// How many cycles were lost, and what helps.
+fn account(manifest: &Manifest, figures: &Figures) -> String {
+    let (skipped, _) = figures.skipped();
+    let skipped = counted(skipped, "cycle");
+    match manifest.refusal() {
+        Some((process, refusal)) => format!("{skipped} lost without real time; {process}: {refusal}"),
+        None => format!("{skipped} lost, {}; {}", stalls(figures), remedy(manifest)),
+    }
+}
+
+/// The time for which the machine stalled.
+fn stalls(figures: &Figures) -> String {
     let (controller, plant) = (&figures.controller_skips, &figures.plant_skips);
     let stalled_ms = (controller.stalled_ns + plant.stalled_ns) as f64 / 1e6;
-    let (skipped, _) = figures.skipped();
     let while_working = match controller.while_working + plant.while_working {
         0 => String::new(),
-        n => format!(", {n} of them during work, possibly also by a stall"),
+        n => format!(", {} of them during work", grouped(n)),
     };
-    format!(
-        "the machine stalled for {stalled_ms:.1} ms while the rig waited, and {skipped} cycles were \
-         missed{while_working}"
-    )
+    format!("the machine stalled for {stalled_ms:.1} ms while the rig waited{while_working}")
 }
 
 /// Real interfaces stamp frames by the wall clock: once it was set, these times are useless. Simulated ones do not use it.
@@ -184,35 +209,32 @@ fn clock_jump(usage: &RunUsage, can: &CanConfig) -> Option<ExitReason> {
 }
 
 /// The remedy against stalls of the machine.
-fn remedy(manifest: &Manifest) -> &'static str {
-    match &manifest.cpu_dma_latency {
-        Some(DmaLatency { limit_us: None, .. }) => {
-            "`realtime.cpu_dma_latency = \"hold\"` may help; `masseter bench loop` measures that"
-        }
-        _ => "`masseter doctor` shows the remedies",
-    }
+fn remedy(manifest: &Manifest) -> String {
+    let latency = match &manifest.cpu_dma_latency {
+        Some(DmaLatency { limit_us: None, .. }) => "; realtime.cpu_dma_latency = \"hold\" may help too",
+        _ => "",
+    };
+    format!("masseter doctor lists what disturbs this machine{latency}")
 }
 
-/// The excuse for the end of a disturbed run, in words: empty when it ended normally, none without an excuse.
-fn excuse(
-    ending: &Ending,
-    missed: CheckResult,
-    outage: Option<Outage>,
-    is_excusable: bool,
-) -> Option<String> {
-    match (ending, outage) {
-        (Ending::SafeStop, Some(outage)) if is_excusable && outage.explains_the_stop() => {
-            Some(format!(", {} of {} just before the safe stop", outage.missed, outage.of))
-        }
-        (Ending::SafeStop, _) => None,
-        _ => (missed == CheckResult::NotJudged).then(String::new),
-    }
+/// The excuse for a safe stop, in words: the machine lost all missed cycles, and many of them just before the stop.
+fn excuse(ending: &Ending, timing: &Timing, outage: Option<Outage>) -> Option<String> {
+    let outage = outage.filter(|outage| *ending == Ending::SafeStop && outage.explains_the_stop())?;
+    let is_machines = timing.is_disturbed() && timing.missed == 0;
+    is_machines.then(|| {
+        format!("lost cycles may explain the safe stop: {} of {} just before it", outage.missed, outage.of)
+    })
 }
 
 fn failed(checks: &[Check]) -> Option<ExitReason> {
-    let failed: Vec<_> =
-        checks.iter().filter(|check| check.result == CheckResult::Failed).map(|check| check.name).collect();
-    (!failed.is_empty()).then(|| (Exit::Failed, format!("failed: {}", failed.join(", "))))
+    named(checks, CheckResult::Failed).map(|names| (Exit::Failed, format!("failed: {names}")))
+}
+
+/// The checks of a result by their names; none without such checks.
+fn named(checks: &[Check], result: CheckResult) -> Option<String> {
+    let names: Vec<_> =
+        checks.iter().filter(|check| check.result == result).map(|check| check.name).collect();
+    (!names.is_empty()).then(|| names.join(", "))
 }
 
 #[cfg(test)]
@@ -265,29 +287,5 @@ mod tests {
         let (outcome, reason) = jump(-3.5, &real).unwrap();
         assert_eq!(outcome, Exit::Invalid);
         assert!(reason.contains("jumped by -3.500 s"), "{reason}");
-    }
-
-    #[test]
-    fn what_the_machine_did_excuses_missed_cycles_and_a_safe_stop_that_follows_them() {
-        use CheckResult::{Failed, NotJudged, Passed};
-        use Ending::{Completed, SafeStop};
-        let short = Some(Outage { missed: 9, of: 100 });
-        let long = Some(Outage { missed: 75, of: 100 });
-        let explained = Some(", 75 of 100 just before the safe stop");
-        let cases = [
-            (Completed, NotJudged, None, true, Some("")),
-            (Completed, Passed, None, true, None),
-            (Completed, Failed, None, false, None),
-            (SafeStop, NotJudged, long, true, explained),
-            (SafeStop, Passed, long, true, explained),
-            (SafeStop, Passed, long, false, None),
-            (SafeStop, Failed, long, false, None),
-            (SafeStop, NotJudged, short, true, None),
-            (SafeStop, NotJudged, None, true, None),
-        ];
-        for (ending, missed, outage, is_excusable, expected) in cases {
-            let excuse = excuse(&ending, missed, outage, is_excusable);
-            assert_eq!(excuse.as_deref(), expected, "{ending:?} {missed:?} {outage:?} {is_excusable}");
-        }
     }
 }

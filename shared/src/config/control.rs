@@ -100,9 +100,25 @@ section! {
         pub tracking_rms_deg: f64 = 0.1,
         /// Largest such angle, degrees. No fault may turn the platform further before it is detected.
         pub tracking_max_deg: f64 = 0.5,
-        /// Most deadlines that the controller and the plant together may skip.
+        /// Most cycles that the rig itself, controller and plant together, may miss.
         pub missed_cycles: u64 = 0,
+        /// Largest share of the cycles that the machine may lose before nothing is left to judge the function by, %. In
+        /// a run of ten seconds, 5 % are half a second.
+        pub machine_lost_percent: f64 = 5.0,
+        /// Whether the machine may lose any cycle.
+        pub timing: TimingConfig = TimingConfig::default(),
     }
+}
+
+/// The use of a run whose cycles the machine lost.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum TimingConfig {
+    /// The function is judged, and the lost cycles are reported.
+    #[default]
+    Reported,
+    /// A lost cycle makes the run INVALID.
+    Strict,
 }
 
 impl ControllerConfig {
@@ -150,7 +166,8 @@ impl ChecksConfig {
     pub(super) fn validate(&self) -> Result<(), ScenarioError> {
         require_positive(&keyed!("checks", self,
             tracking_rms_mm tracking_max_mm tracking_rms_deg tracking_max_deg
-        ))
+        ))?;
+        require_within(&[("checks.machine_lost_percent", self.machine_lost_percent, 0.0, 100.0)])
     }
 }
 

@@ -21,7 +21,9 @@ mod need;
 mod scenario;
 
 pub use can::{CanConfig, IdentityConfig, MASTER_NODE};
-pub use control::{ChecksConfig, ControllerConfig, CpuDmaLatency, MOST_LEAD_CYCLES, RealtimeConfig};
+pub use control::{
+    ChecksConfig, ControllerConfig, CpuDmaLatency, MOST_LEAD_CYCLES, RealtimeConfig, TimingConfig,
+};
 pub use drives::{DriveConfig, DrivesConfig};
 pub use dynamics::DynamicsConfig;
 pub use error::ScenarioError;

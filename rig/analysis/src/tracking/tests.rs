@@ -23,7 +23,7 @@ fn truth(cycle: u64, x: f64) -> Truth {
 #[test]
 fn without_truth_the_estimate_takes_its_place() {
     let mut tracking = Tracking::new(PoseSource::Estimate, [0.0; 3]);
-    tracking.state(&State { estimated_position_m: [0.001, 0.0, 0.0], ..state(1, 0.003) }, true);
+    tracking.state(&State { estimated_position_m: [0.001, 0.0, 0.0], ..state(1, 0.003) }, true, false);
     let (figures, track) = tracking.finish();
     assert_eq!((figures.samples, figures.estimate_rms_mm), (1, None));
     assert!((figures.actual.rms_mm.unwrap() - 2.0).abs() < 1e-9);
@@ -33,7 +33,7 @@ fn without_truth_the_estimate_takes_its_place() {
 #[test]
 fn a_platform_that_never_ran_has_no_tracking_error() {
     let mut tracking = Tracking::new(PoseSource::Truth, [0.0; 3]);
-    tracking.state(&State { controller_state: ControllerState::Easing.code(), ..state(1, 0.0) }, true);
+    tracking.state(&State { controller_state: ControllerState::Easing.code(), ..state(1, 0.0) }, true, false);
     tracking.truth(&truth(1, 0.0));
     let (figures, _) = tracking.finish();
     let moved =
@@ -49,7 +49,7 @@ fn a_long_run_keeps_every_turn_of_its_motion_and_close_samples_of_its_beginning(
     for cycle in 0..100_000 {
         // To and fro in 0.7 s, as fast as chewing.
         let x = (cycle as f64 / 700.0 * std::f64::consts::TAU).sin();
-        tracking.state(&state(cycle, x), true);
+        tracking.state(&state(cycle, x), true, false);
         tracking.truth(&Truth { sampled_ns: cycle * PERIOD_NS, ..truth(cycle, x) });
     }
     let (_, track) = tracking.finish();
@@ -65,8 +65,8 @@ fn a_long_run_keeps_every_turn_of_its_motion_and_close_samples_of_its_beginning(
 #[test]
 fn poses_are_compared_by_cycle_in_whatever_order_they_come() {
     let mut tracking = Tracking::new(PoseSource::Truth, [0.0; 3]);
-    tracking.state(&state(1, 0.003), true);
-    tracking.state(&state(2, 0.000), true);
+    tracking.state(&state(1, 0.003), true, false);
+    tracking.state(&state(2, 0.000), true, false);
     tracking.truth(&truth(2, 0.004));
     tracking.truth(&truth(1, 0.000));
     tracking.truth(&truth(3, 9.000));
@@ -84,10 +84,10 @@ fn cycles_without_a_reading_and_the_last_one_have_a_deviation_too() {
     let stopped = |cycle| State { controller_state: ControllerState::SafeStop.code(), ..state(cycle, 0.0) };
     let mut deviations = Vec::new();
     let found = [
-        tracking.state(&state(1, 0.0), true),
-        tracking.state(&stale, false),
-        tracking.state(&stopped(4), true),
-        tracking.state(&stopped(5), true),
+        tracking.state(&state(1, 0.0), true, false),
+        tracking.state(&stale, false, false),
+        tracking.state(&stopped(4), true, false),
+        tracking.state(&stopped(5), true, false),
     ];
     assert!(found.iter().all(Option::is_none), "{found:?}");
     for (cycle, x) in [(1, 0.001), (2, 0.003), (4, 0.004), (5, 0.005)] {
@@ -128,7 +128,7 @@ fn a_pose_that_is_none_is_infinitely_far_from_its_path() {
                     if is_spoiled(cycle) {
                         field(&mut state, &mut truth)[index] = number;
                     }
-                    tracking.state(&state, true);
+                    tracking.state(&state, true, false);
                     deviations.extend(tracking.truth(&truth).into_iter().flatten());
                 }
                 let (figures, _) = tracking.finish();

@@ -93,9 +93,9 @@ mod tests {
     fn what_is_no_summary_of_this_form_is_refused() {
         let verdict = json!({"word": "PASS", "reason": "every check passed"});
         for (summary, why) in [
-            (json!({"form": 1, "verdict": verdict, "figures": {}}), None),
-            (json!({"form": 2, "verdict": verdict, "figures": {}}), Some("it has form 2")),
-            (json!({"form": 1, "verdict": verdict, "figures": []}), Some("it has no figures")),
+            (json!({"form": FORM, "verdict": verdict, "figures": {}}), None),
+            (json!({"form": 9, "verdict": verdict, "figures": {}}), Some("it has form 9")),
+            (json!({"form": FORM, "verdict": verdict, "figures": []}), Some("it has no figures")),
             (json!({"form": 1, "figures": {}}), Some("it has no verdict")),
             (json!([]), Some("it has form null")),
         ] {

@@ -2,7 +2,7 @@
 
 use masseter_analysis::{
     Analysis, Code, FaultFigures, OverrunAttribution, PoseErrors, ResponseFigures, SkipFigures, TopicFigures,
-    TrackingFigures,
+    TrackingFigures, UndisturbedFigures,
 };
 use masseter_recording::{Damage, MachineInfo};
 use masseter_shared::config::{CpuDmaLatency, FaultConfig, FaultKindConfig, Scenario};
@@ -27,8 +27,15 @@ impl Run {
         let mut figures = Analysis::new(&scenario).finish(false, &[]);
         figures.final_state = Some(Code::Known(ControllerState::Finished));
         let on_path = PoseErrors { rms_mm: Some(0.05), ..PoseErrors::default() };
-        figures.tracking =
-            TrackingFigures { samples: 1000, actual: on_path, estimated: on_path, ..figures.tracking };
+        let undisturbed = UndisturbedFigures { samples: 900, actual: on_path, estimated: on_path };
+        figures.cycles = 1000;
+        figures.tracking = TrackingFigures {
+            samples: 1000,
+            actual: on_path,
+            estimated: on_path,
+            undisturbed,
+            ..figures.tracking
+        };
         figures.bus_response.unbounded = None;
         figures.bus_response.messages = vec![ResponseFigures {
             bus: 0,
@@ -107,7 +114,7 @@ fn a_run_without_anything_wrong_passes_every_check() {
     let verdict = Run::with(|_| ());
     assert_eq!((verdict.exit_code, verdict.reason.as_str()), (Exit::Passed, "every check passed"));
     let expected =
-        ["sequence", "tracking", "estimated tracking", "missed cycles", "dropped messages", "bus response"]
+        ["sequence", "tracking", "estimated tracking", "timing", "dropped messages", "bus response"]
             .map(|name| (name, "ok"));
     assert_eq!(results(&verdict), expected);
     let findings: Vec<_> = verdict.checks.iter().map(|check| check.finding.as_str()).collect();
@@ -117,7 +124,7 @@ fn a_run_without_anything_wrong_passes_every_check() {
             "ended in state finished",
             "closest of 1000 samples: platform rms 0.0500 mm, limit 0.1 mm",
             "closest of 1000 samples: platform rms 0.0500 mm, limit 0.1 mm",
-            "0 (0 by the machine), limit 0",
+            "held, limit of the rig 0",
             "0",
             "closest: SYNC on bus 0 took 150.00 µs, bound 190.00 µs",
         ]
@@ -127,8 +134,8 @@ fn a_run_without_anything_wrong_passes_every_check() {
 #[test]
 fn each_thing_that_is_wrong_has_its_verdict() {
     let cases: [(Change, Exit, &str); 18] = [
-        (|run| run.figures.controller_skips.skipped = 3, Exit::Failed, "failed: missed cycles"),
-        (|run| run.figures.plant_skips.skipped = 1, Exit::Failed, "failed: missed cycles"),
+        (|run| run.figures.controller_skips.skipped = 3, Exit::Failed, "failed: timing"),
+        (|run| run.figures.plant_skips.skipped = 1, Exit::Failed, "failed: timing"),
         (|run| run.figures.tracking.actual.rms_mm = Some(0.11), Exit::Failed, "failed: tracking"),
         (|run| run.figures.tracking.actual.rms_mm = None, Exit::Failed, "failed: tracking"),
         (
@@ -163,7 +170,7 @@ fn each_thing_that_is_wrong_has_its_verdict() {
                 run.figures.plant_skips.skipped = 1;
             },
             Exit::Failed,
-            "failed: tracking, missed cycles",
+            "failed: tracking, timing",
         ),
         (|run| run.lose(5), Exit::Incomplete, "5 messages are missing from the recording"),
         (|run| run.figures.cut_short = true, Exit::Incomplete, "the recording lacks its end"),
@@ -209,17 +216,20 @@ fn a_damaged_recording_is_incomplete_whatever_its_figures_say() {
 }
 
 #[test]
-fn skips_of_the_rig_fail_a_run_and_those_of_the_machine_make_it_invalid() {
-    use Exit::{Failed as Fail, Invalid, Passed as Pass};
-    let cases: [(Change, Exit, &str); 9] = [
-        (Run::disturb, Invalid, "ended in state finished; 3 (3 by the machine), limit 0"),
+fn cycles_that_the_rig_missed_fail_a_run_and_those_that_the_machine_lost_do_not() {
+    use Exit::{Failed as Fail, Passed as Pass};
+    use TimingWord::{Disturbed, Held, Missed};
+    let cases: [(Change, Exit, TimingWord, &str); 10] = [
+        (|_| (), Pass, Held, "held"),
+        (Run::disturb, Pass, Disturbed, "disturbed by the machine (3 of 1,003 cycles, 0.30 %)"),
         (
             |run| {
                 run.disturb();
                 run.figures.controller_skips.skipped = 4;
             },
             Fail,
-            "ended in state finished; 4 (3 by the machine), limit 0",
+            Missed,
+            "missed by the rig (1)",
         ),
         (
             |run| {
@@ -227,44 +237,42 @@ fn skips_of_the_rig_fail_a_run_and_those_of_the_machine_make_it_invalid() {
                 run.figures.plant_skips.skipped = 1;
             },
             Fail,
-            "ended in state finished; 4 (3 by the machine), limit 0",
+            Missed,
+            "missed by the rig (1)",
         ),
         (
             |run| {
                 run.disturb();
                 (run.figures.plant_skips.skipped, run.figures.plant_skips.by_machine) = (2, 2);
             },
-            Invalid,
-            "ended in state finished; 5 (5 by the machine), limit 0",
+            Pass,
+            Disturbed,
+            "disturbed by the machine (5 of 1,003 cycles, 0.50 %)",
         ),
         (
             |run| {
                 run.disturb();
                 (run.figures.plant_skips.skipped, run.figures.plant_skips.unknown_cause) = (2, 2);
             },
-            Invalid,
-            "ended in state finished; 5 (3 by the machine, 2 of unknown cause: the messages before them are missing), \
-             limit 0",
+            Pass,
+            Disturbed,
+            "disturbed by the machine (5 of 1,003 cycles, 0.50 %)",
         ),
         (
             |run| run.overruns(5, 0.02),
-            Invalid,
-            "ended in state finished; 2 (2 by the machine; 5 overlong stretches of work, 1 stalls of that length \
-             while waiting, work is 25.0 % of the time: probability by chance 0.02), limit 0",
+            Pass,
+            Disturbed,
+            "disturbed by the machine (2 of 1,000 cycles, 0.20 %)",
         ),
-        (
-            |run| run.overruns(5, 0.002),
-            Fail,
-            "ended in state finished; 2 (0 by the machine; 5 overlong stretches of work, 1 stalls of that length \
-             while waiting, work is 25.0 % of the time: probability by chance 0.00), limit 0",
-        ),
+        (|run| run.overruns(5, 0.002), Fail, Missed, "missed by the rig (2)"),
         (
             |run| {
                 run.manifest.scenario.checks.missed_cycles = 4;
                 (run.figures.controller_skips.skipped, run.figures.plant_skips.skipped) = (1, 3);
             },
             Pass,
-            "ended in state finished; 4 (0 by the machine), limit 4",
+            Held,
+            "held (4 cycles missed, as allowed)",
         ),
         (
             |run| {
@@ -272,14 +280,32 @@ fn skips_of_the_rig_fail_a_run_and_those_of_the_machine_make_it_invalid() {
                 (run.figures.controller_skips.skipped, run.figures.plant_skips.skipped) = (1, 3);
             },
             Fail,
-            "ended in state finished; 4 (0 by the machine), limit 3",
+            Missed,
+            "missed by the rig (4)",
         ),
     ];
-    for (change, outcome, findings) in cases {
+    for (change, outcome, word, timing) in cases {
         let verdict = Run::with(change);
-        let [sequence, missed] = [0, 3].map(|place| verdict.checks[place].finding.as_str());
-        assert_eq!((verdict.exit_code, format!("{sequence}; {missed}").as_str()), (outcome, findings));
+        let found = (verdict.exit_code, verdict.timing.word, verdict.timing.to_string());
+        assert_eq!(found, (outcome, word, timing.to_owned()));
     }
+}
+
+#[test]
+fn the_evidence_on_overlong_work_is_part_of_the_finding() {
+    let verdict = Run::with(|run| run.overruns(5, 0.002));
+    assert_eq!(
+        verdict.checks[3].finding,
+        "missed by the rig (2); 5 stretches of work too long, 1 stall of that length while waiting, work is 25.0 % of the \
+         time: probability by chance 0.00, limit of the rig 0"
+    );
+}
+
+#[test]
+fn simulated_time_has_no_deadlines_to_keep() {
+    let verdict = Run::with(|run| run.manifest.clock = "virtual".to_owned());
+    assert_eq!((verdict.exit_code, verdict.timing.to_string().as_str()), (Exit::Passed, "simulated"));
+    assert!(verdict.checks.iter().all(|check| check.name != "timing"));
 }
 
 #[test]
@@ -295,7 +321,8 @@ fn a_safe_stop_is_one_unless_the_machine_alone_explains_it() {
     };
     let (outcome, reason) = stop(|_| ());
     assert_eq!(outcome, Exit::Invalid);
-    assert!(reason.contains("3 cycles were missed, 30 of 100 just before the safe stop; "), "{reason}");
+    let said = "lost cycles may explain the safe stop: 30 of 100 just before it; 3 cycles lost, ";
+    assert!(reason.starts_with(said), "{reason}");
     let stopped = (Exit::SafeStop, "the controller stopped the rig".to_owned());
     assert_eq!(stop(|run| run.figures.outage = None), stopped);
     assert_eq!(stop(|run| run.figures.outage = Some(Outage { missed: 9, of: 100 })), stopped);
@@ -304,7 +331,7 @@ fn a_safe_stop_is_one_unless_the_machine_alone_explains_it() {
         run.figures.controller_skips.by_machine = 2;
         run.refuse();
     });
-    assert_eq!(outcome, Exit::Invalid, "it never had real time");
+    assert_eq!(outcome, Exit::Invalid, "the rig never had real time");
 }
 
 /// An average beyond its limit may be what the stop came for.

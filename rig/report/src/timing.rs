@@ -1,0 +1,106 @@
+//! The judgement of a run's timing: whether controller and plant kept their deadlines, and who lost the others.
+//!
+//! What the lost cycles mean for the function of the rig is the [verdict](super::verdict)'s.
+
+use std::fmt::{self, Display, Formatter};
+
+use masseter_analysis::{Figures, OverrunAttribution};
+use masseter_recording::Manifest;
+use serde::Serialize;
+
+use crate::text::{counted, grouped};
+
+/// Whether the deadlines were kept.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum TimingWord {
+    /// They were, or the rig missed no more of them than the scenario allows.
+    Held,
+    /// The machine lost some; the rig missed no more than the scenario allows.
+    Disturbed,
+    /// The rig missed too many.
+    Missed,
+    /// There are none in simulated time.
+    Simulated,
+}
+
+/// The judgement of a run's timing.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Timing {
+    /// The judgement in a word.
+    pub word: TimingWord,
+    /// Cycles of the controller, with those that it skipped.
+    pub cycles: u64,
+    /// Cycles that the machine took from controller or plant, and those of unknown cause. Without the scheduling that the
+    /// rig requested, all that were skipped.
+    pub lost: u64,
+    /// Cycles that the rig missed by itself.
+    pub missed: u64,
+    /// The evidence on overlong stretches of work, in words; empty without such stretches.
+    #[serde(skip)]
+    pub(crate) evidence: String,
+}
+
+impl Timing {
+    /// Judges a run.
+    pub(crate) fn new(manifest: &Manifest, figures: &Figures) -> Self {
+        let (skipped, by_machine) = figures.skipped();
+        let is_granted = manifest.refusal().is_none();
+        let lost = if is_granted { by_machine + figures.skipped_of_unknown_cause() } else { skipped };
+        let missed = skipped.saturating_sub(lost);
+        let word = if manifest.clock != "rt" {
+            TimingWord::Simulated
+        } else if missed > manifest.scenario.checks.missed_cycles {
+            TimingWord::Missed
+        } else if lost > 0 {
+            TimingWord::Disturbed
+        } else {
+            TimingWord::Held
+        };
+        let cycles = figures.cycles + figures.controller_skips.skipped;
+        let evidence = figures.overrun_attribution.map(in_words).unwrap_or_default();
+        Self { word, cycles, lost, missed, evidence }
+    }
+
+    /// Share of the cycles that the machine lost, %.
+    pub(crate) fn lost_percent(&self) -> f64 {
+        100.0 * self.lost as f64 / self.cycles.max(1) as f64
+    }
+
+    /// Whether the machine may explain a failure.
+    pub(crate) fn is_disturbed(&self) -> bool {
+        self.lost > 0
+    }
+}
+
+impl Display for Timing {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        let Self { lost, missed, cycles, .. } = self;
+        match self.word {
+            TimingWord::Held if *missed > 0 => {
+                write!(f, "held ({} missed, as allowed)", counted(*missed, "cycle"))
+            }
+            TimingWord::Held => f.write_str("held"),
+            TimingWord::Disturbed => write!(
+                f,
+                "disturbed by the machine ({} of {} cycles, {:.2} %)",
+                grouped(*lost),
+                grouped(*cycles),
+                self.lost_percent()
+            ),
+            TimingWord::Missed => write!(f, "missed by the rig ({})", grouped(*missed)),
+            TimingWord::Simulated => f.write_str("simulated"),
+        }
+    }
+}
+
+/// The evidence on the stretches of work that cost deadlines.
+fn in_words(overruns: OverrunAttribution) -> String {
+    format!(
+        "; {} of work too long, {} of that length while waiting, work is {:.1} % of the time: probability by chance {:.2}",
+        counted(overruns.while_working, "stretch"),
+        counted(overruns.while_waiting, "stall"),
+        overruns.work_share * 100.0,
+        overruns.chance
+    )
+}
