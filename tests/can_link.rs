@@ -56,7 +56,7 @@ fn every_message_of_a_run_arrives_within_the_bound_of_its_plan() {
         ["duration_s = 2.0", "rate_hz = 500\nduration_s = 1.0\n[can]\nbuses = [[0, 1, 2, 3, 4, 5]]"]
     {
         let workspace = Workspace::new(scenario);
-        let output = workspace.run_virtual(&[]);
+        let output = workspace.run_virtual(&["--verbose"]);
         assert_eq!(output.status.code(), Some(0), "{scenario}: {}", stdout(&output));
         let summary = workspace.summary();
         let judged = check(&summary, "bus response");

@@ -3,8 +3,8 @@
 //! A bound holds for undisturbed buses. A late process may queue messages closer together than planned; then the plan
 //! is worked out again for the closest queueing. Real interfaces do not report when a frame was queued.
 //!
-//! A stall queues messages far off their times. The bound does not hold for these frames and those of the next two cycles,
-//! so that they are counted and not judged.
+//! A stall queues messages far off their times. The bound does not hold for these frames, those of the cycle of the stall and
+//! of the next two, so that they are counted and not judged.
 
 use masseter_can::canopen::Cob;
 use masseter_can::{BusPlan, CanId, PeriodicMessage, PlannedMessage, Tapped};
@@ -39,14 +39,25 @@ struct Followed {
     /// Frames off their times, and until when others are counted as such, ns.
     off_time: u64,
     off_time_until_ns: u64,
+    /// Frames since the last SYNC: they are judged once the next SYNC shows that no stall was among them.
+    pending: Vec<Pending>,
+}
+
+/// A frame that is not judged yet: its place in the plan, none for others, and its times.
+#[derive(Debug, Clone, Copy)]
+struct Pending {
+    planned: Option<usize>,
+    queued_ns: u64,
+    arrived_ns: u64,
 }
 
 /// Times of a message on the bus.
 #[derive(Debug, Clone, Copy, Default)]
 struct Seen {
     frames: u64,
-    max_ns: u64,
+    max_ns: Option<u64>,
     last_queued_ns: Option<u64>,
+    last_judged_ns: Option<u64>,
     /// The least time between two of it being queued.
     least_period_ns: Option<u64>,
 }
@@ -55,20 +66,20 @@ impl Seen {
     /// A frame off its time is counted only.
     fn take(&mut self, queued_ns: u64, arrived_ns: u64, is_off_time: bool) {
         self.frames += 1;
+        let last_ns = self.last_judged_ns.replace(queued_ns);
         if is_off_time {
-            self.last_queued_ns = Some(queued_ns);
             return;
         }
-        self.max_ns = self.max_ns.max(arrived_ns.saturating_sub(queued_ns));
-        if let Some(last_ns) = self.last_queued_ns.replace(queued_ns) {
+        self.max_ns = self.max_ns.max(Some(arrived_ns.saturating_sub(queued_ns)));
+        if let Some(last_ns) = last_ns {
             let period_ns = queued_ns.saturating_sub(last_ns);
             self.least_period_ns = Some(self.least_period_ns.map_or(period_ns, |least| least.min(period_ns)));
         }
     }
 
     fn figures(&self, bus: usize, message: &str, bound_ns: Option<u64>) -> ResponseFigures {
-        let max_ns = (self.frames > 0).then_some(self.max_ns);
-        ResponseFigures { bus, message: message.to_owned(), frames: self.frames, max_ns, bound_ns }
+        let Self { frames, max_ns, .. } = *self;
+        ResponseFigures { bus, message: message.to_owned(), frames, max_ns, bound_ns }
     }
 }
 
@@ -88,6 +99,7 @@ impl Responses {
             error_frames: 0,
             off_time: 0,
             off_time_until_ns: 0,
+            pending: Vec::new(),
         };
         Self { buses: plans.into_iter().map(followed).collect(), has_faults }
     }
@@ -107,7 +119,8 @@ impl Responses {
     }
 
     /// `missing`: frames that were not recorded.
-    pub(super) fn finish(self, missing: u64) -> BusResponse {
+    pub(super) fn finish(mut self, missing: u64) -> BusResponse {
+        self.buses.iter_mut().for_each(Followed::judge);
         let unbounded = self.unbounded(missing);
         let figures = |bus: &Followed| bus.figures(&bus.bounds_ns(unbounded.is_none()));
         let messages = self.buses.iter().flat_map(figures).collect();
@@ -130,21 +143,42 @@ impl Responses {
 impl Followed {
     /// Takes a frame of a planned message, by its place in the plan, or another one.
     fn take(&mut self, planned: Option<usize>, queued_ns: u64, arrived_ns: u64) {
-        if planned.is_some_and(|index| self.is_off_time(index, queued_ns)) {
+        let is_off_time = planned.is_some_and(|index| self.is_off_time(index, queued_ns));
+        if is_off_time {
             self.off_time_until_ns = queued_ns + CROWDED_CYCLES * self.plan.cycle_ns;
         }
-        let is_off_time = queued_ns < self.off_time_until_ns;
-        self.off_time += u64::from(is_off_time);
-        let seen = planned.map_or(&mut self.others, |index| &mut self.messages[index]);
-        seen.take(queued_ns, arrived_ns, is_off_time);
+        if planned.is_some_and(|index| self.is_sync(index)) {
+            self.judge();
+        }
+        self.pending.push(Pending { planned, queued_ns, arrived_ns });
+        if let Some(index) = planned {
+            self.messages[index].last_queued_ns = Some(queued_ns);
+        }
     }
 
-    /// Whether a message comes less than half of its period after the last one, or SYNC more than one and a half.
+    /// Judges the frames of a cycle, unless they or the next SYNC are off their times.
+    fn judge(&mut self) {
+        let mut pending = std::mem::take(&mut self.pending);
+        for Pending { planned, queued_ns, arrived_ns } in pending.drain(..) {
+            let is_off_time = queued_ns < self.off_time_until_ns;
+            self.off_time += u64::from(is_off_time);
+            let seen = planned.map_or(&mut self.others, |index| &mut self.messages[index]);
+            seen.take(queued_ns, arrived_ns, is_off_time);
+        }
+        self.pending = pending;
+    }
+
+    fn is_sync(&self, index: usize) -> bool {
+        self.plan.messages[index].message.id == CanId::from(Cob::Sync)
+    }
+
+    /// Whether a message of every cycle comes less than half a cycle after the last one, or SYNC more than one and a half.
     fn is_off_time(&self, index: usize, queued_ns: u64) -> bool {
-        let PeriodicMessage { id, period_ns, .. } = &self.plan.messages[index].message;
+        let (message, cycle_ns) = (&self.plan.messages[index].message, self.plan.cycle_ns);
         let Some(last_ns) = self.messages[index].last_queued_ns else { return false };
         let interval_ns = queued_ns.saturating_sub(last_ns);
-        2 * interval_ns < *period_ns || (*id == CanId::from(Cob::Sync) && 2 * interval_ns > 3 * period_ns)
+        let is_early = message.period_ns == cycle_ns && 2 * interval_ns < cycle_ns;
+        is_early || (self.is_sync(index) && 2 * interval_ns > 3 * cycle_ns)
     }
 
     fn figures(&self, bounds_ns: &[Option<u64>]) -> Vec<ResponseFigures> {
@@ -289,11 +323,11 @@ mod tests {
             (vec![seen(0x080, 1000, 51), error], "bus 0 had 1 errors"),
             (
                 vec![seen(0x080, 1000, 51), seen(0x080, 61_000, 51)],
-                "1 of 2 frames of bus 0 were off their times",
+                "2 of 2 frames of bus 0 were off their times",
             ),
             (
                 vec![seen(0x080, 1000, 51), seen(0x080, 1000, 102)],
-                "1 of 2 frames of bus 0 were off their times",
+                "2 of 2 frames of bus 0 were off their times",
             ),
         ];
         for (frames, reason) in cases {
@@ -315,8 +349,8 @@ mod tests {
                 [seen(0x080, at_ns, took_us), seen(0x181, at_ns + 60_000, took_us)]
             }))
         };
-        for (shift_us, off_time) in [(600, 7), (700, 7), (-600, 6)] {
-            let found = run(shift_us, 100..=101);
+        for (shift_us, off_time) in [(600, 9), (700, 9), (-600, 8)] {
+            let found = run(shift_us, 99..=101);
             assert_eq!((found.unbounded.as_deref(), found.off_time_frames), (None, off_time), "{shift_us}");
             assert_eq!(found.exceeding().count(), 0, "{found:?}");
             assert_eq!(

@@ -23,8 +23,7 @@ pub(crate) fn checks(manifest: &Manifest, figures: &Figures, timing: &Timing) ->
         let rest = tracking(name, undisturbed.samples, undisturbed_errors, limits, false);
         check.unless(is_disturbed && !rest.result.is_failed())
     };
-    let mut checks =
-        vec![sequence.unless(is_disturbed), tracking_of("tracking", actual, &undisturbed.actual)];
+    let mut checks = vec![sequence, tracking_of("tracking", actual, &undisturbed.actual)];
     if actual_source.is_truth() {
         checks.push(tracking_of("estimated tracking", estimated, &undisturbed.estimated));
     }

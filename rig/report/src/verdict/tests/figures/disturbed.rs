@@ -15,7 +15,7 @@ fn disturbed(change: Change) -> Verdict {
 /// A failure where no lost cycle acted on the jaw is the rig's; any other may be the machine's.
 #[test]
 fn a_failure_is_excused_only_if_the_undisturbed_rest_passes() {
-    let cases: [(Change, Exit, &str); 5] = [
+    let cases: [(Change, Exit, &str); 6] = [
         (|_| (), Exit::Passed, "every check passed"),
         (
             |run| run.figures.tracking.actual.rms_mm = Some(3.0),
@@ -40,13 +40,14 @@ fn a_failure_is_excused_only_if_the_undisturbed_rest_passes() {
         ),
         (
             |run| {
-                run.figures.final_state = None;
+                run.figures.tracking.actual.rms_mm = Some(3.0);
                 run.figures.tracking.estimated.max_deg = Some(3.0);
                 run.figures.tracking.undisturbed.estimated.max_deg = Some(3.0);
             },
             Exit::Failed,
             "failed: estimated tracking",
         ),
+        (|run| run.figures.final_state = None, Exit::Failed, "failed: sequence"),
     ];
     for (change, outcome, reason) in cases {
         let verdict = disturbed(change);
@@ -149,17 +150,17 @@ fn a_passed_run_that_was_disturbed_is_amber_and_says_what_to_do() {
 fn checks_that_the_machine_may_explain_are_marked() {
     let verdict = disturbed(|run| {
         run.declare_fault();
-        (run.figures.tracking.actual.rms_mm, run.figures.final_state) = (Some(3.0), None);
+        run.figures.tracking.actual.rms_mm = Some(3.0);
     });
     assert_eq!(verdict.exit_code, Exit::Invalid);
     let expected = [
-        ("sequence", "lost"),
+        ("sequence", "ok"),
         ("tracking", "lost"),
         ("estimated tracking", "ok"),
         ("timing", "skip"),
         ("dropped messages", "ok"),
         ("bus response", "ok"),
-        ("faults", "skip"),
+        ("faults", "lost"),
     ];
     assert_eq!(results(&verdict), expected);
 }
