@@ -6,6 +6,7 @@
 use std::io::{self, BufRead, Read};
 
 use crate::input::excerpt;
+use crate::wording::counted;
 
 /// Bytes of the longest line that is read. Numbers of full precision make lines a tenth as long.
 const LONGEST_LINE: usize = 4096;
@@ -51,7 +52,10 @@ pub fn numbers(line: &str, columns: &[&str]) -> Result<Vec<f64>, String> {
     }
     let (found, expected) = (fields(line).count(), columns.len());
     if found != expected {
-        return Err(format!("{found} fields, expected {expected}; complete the line or delete it"));
+        return Err(format!(
+            "{}, expected {expected}; complete the line or delete it",
+            counted(found as u64, "field")
+        ));
     }
     fields(line).zip(columns).map(|(text, column)| number(text, column)).collect()
 }
