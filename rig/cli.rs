@@ -191,10 +191,10 @@ mod tests {
             .collect()
     }
 
-    /// The command lines of a text, without what the shell takes from them.
+    /// The command lines of a text, without what the shell takes from them, or what explains them.
     fn command_lines(text: &str) -> impl Iterator<Item = &str> {
         let lines = text.lines().map(str::trim_start).filter(|line| line.starts_with("masseter "));
-        lines.map(|line| line.split(['<', '>', '|', '#']).next().unwrap_or_default())
+        lines.map(|line| line.split(['<', '>', '|', '#', '(']).next().unwrap_or_default())
     }
 
     fn assert_parsed(line: &str) {
@@ -219,7 +219,7 @@ mod tests {
     fn every_command_line_of_the_readme_is_right() {
         let readme = include_str!("../README.md").lines().filter(|line| line.starts_with("    "));
         let readme: Vec<_> = readme.flat_map(command_lines).collect();
-        assert!(readme.len() > 20, "{readme:?}");
+        assert!(readme.len() > 10, "{readme:?}");
         readme.into_iter().for_each(assert_parsed);
     }
 

@@ -168,7 +168,7 @@ mod tests {
     fn what_is_no_row_of_the_columns_is_refused_with_the_reason() {
         for (line, reason) in [
             ("", "an empty line"),
-            ("1", "1 fields, expected 2; complete the line or delete it"),
+            ("1", "1 field, expected 2; complete the line or delete it"),
             ("1,2,3", "3 fields, expected 2"),
             ("1,zero", "b is 'zero', not a finite number; write it with a decimal point"),
             ("NaN,1", "a is 'NaN', not a finite number"),

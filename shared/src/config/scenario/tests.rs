@@ -89,7 +89,7 @@ const WRONG: &[(&str, &str)] = &[
     ("[motion]\nkind = 'lateral'\nside = 'rigth'", "did you mean 'right'?"),
     ("[[faults]]\nkind = 'corupt'\nbus = 0\nfrom_s = 1.0", "did you mean 'corrupt'?"),
     ("[[faults]]\nkind = 'busoff'\nbus = 0\nfrom_s = 1.0", "did you mean 'bus_off'?"),
-    ("[realtime]\ncpu_dma_latency = 'on-hold'", "did you mean 'hold'?"),
+    ("[realtime]\ncpu_dma_latency = 'holds'", "did you mean 'hold'?"),
     ("checks = [999.0, 7]", "s.toml:1:10: checks is an array; write a table"),
     ("[drives]\nleg = [1.0]", "s.toml:2:7: drives.leg is an array; write a table"),
     ("food = [1.0, 2.0, 3.0]", "s.toml:1:8: food is an array; write a table"),
