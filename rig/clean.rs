@@ -1,6 +1,7 @@
 //! `masseter clean`: removes the shared memory of killed runs. Live runs are not touched.
 
 use masseter_shared::transport::Domain;
+use masseter_shared::wording::counted;
 use masseter_terminal::{Exit, result_line, status};
 
 /// Sweeps every dead domain of this user and lists all domains.
@@ -9,7 +10,11 @@ pub(crate) fn clean() -> anyhow::Result<Exit> {
     for domain in &domains {
         match domain.sweep()? {
             Some(swept) => {
-                result_line!("{}: {} files removed from shared memory", domain.id(), swept.removed)?;
+                result_line!(
+                    "{}: {} removed from shared memory",
+                    domain.id(),
+                    counted(swept.removed as u64, "file")
+                )?;
                 swept.remaining.iter().for_each(|error| status!("masseter: {error}"));
             }
             None => result_line!("{}: running, not removed", domain.id())?,

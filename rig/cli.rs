@@ -3,8 +3,8 @@
 use std::process::ExitCode;
 use std::sync::Arc;
 
-use clap::{Parser, Subcommand};
-use masseter_terminal::{Exit, Failure, OrFailure, status};
+use clap::{ColorChoice, Command, CommandFactory, FromArgMatches, Parser, Subcommand};
+use masseter_terminal::{Exit, Failure, OrFailure, choose_colour, status};
 use rustix::process::umask;
 
 use crate::bench::ipc::PeerArgs;
@@ -13,7 +13,9 @@ use crate::can::{self, CanVerb};
 use crate::clean;
 use crate::controller::{self, ControllerArgs};
 use crate::doctor::{self, DoctorArgs};
+use crate::help::with_overview;
 use crate::kinematics_cli::{self, CsvArgs, FkArgs};
+use crate::manuals::{self, CompletionsArgs, ManArgs};
 use crate::paper_study::{self, KinematicsArgs};
 use crate::plant::{self, PlantArgs};
 use crate::recorder::{self, RecorderArgs};
@@ -25,18 +27,35 @@ use crate::run::{
 };
 use crate::uniqueness::{self, UniquenessVerb};
 
+const FIRST_STEPS: &str = "\
+First steps:
+  masseter doctor
+  masseter run
+  masseter help run";
+const EXIT_CODES: &str = "\
+Exit codes of every verb: 0 passed, 1 a check failed, 2 wrong usage or input, 3 cannot be judged,
+4 a process died, 5 unexpected safe stop, 6 files incomplete, 130 interrupted.";
+
 /// A hardware-in-the-loop rig for a 6-DOF mastication robot
-///
-/// Exit codes of every verb: 0 passed, 1 a check failed, 2 wrong usage or input, 3 cannot be judged, 4 a process died,
-/// 5 unexpected safe stop, 6 files incomplete, 130 interrupted.
 #[derive(Debug, Parser)]
 #[command(
     name = "masseter",
     version,
     max_term_width = 100,
-    after_help = "Start with `masseter doctor`, then `masseter run`."
+    after_help = FIRST_STEPS,
+    after_long_help = format!("{FIRST_STEPS}\n\n{EXIT_CODES}")
 )]
 struct Cli {
+    /// Colour: auto (on a terminal, unless NO_COLOR is set), always or never
+    #[arg(
+        long,
+        global = true,
+        value_name = "WHEN",
+        default_value_t,
+        hide_default_value = true,
+        hide_possible_values = true
+    )]
+    color: ColorChoice,
     #[command(subcommand)]
     verb: Verb,
 }
@@ -47,7 +66,8 @@ enum Verb {
     Run(RunArgs),
     /// Forward kinematics of a CSV file: actuator positions to poses
     Fk(FkArgs),
-    /// Inverse kinematics of a CSV file: poses to actuator positions and hinge angles
+    /// Inverse kinematics of a CSV file: poses to actuator positions
+    #[command(after_help = "Example:\n  masseter ik < poses.csv > joints.csv")]
     Ik(CsvArgs),
     /// Emulate the six drives and the mechanism on real CAN interfaces
     Plant(PlantArgs),
@@ -58,7 +78,7 @@ enum Verb {
     /// Inspect, verify, recover and export recordings
     #[command(subcommand, alias = "log")]
     Recording(RecordingVerb),
-    /// Plan the CAN buses, describe the drives (EDS, DBC), serve the simulated buses
+    /// Plan the buses, describe the drives (EDS, DBC), serve simulated buses
     #[command(subcommand)]
     Can(CanVerb),
     /// Measure parts of the rig, each beside a baseline
@@ -66,11 +86,16 @@ enum Verb {
     /// Prove where the six inputs determine one pose, or search for exceptions
     #[command(subcommand)]
     Uniqueness(UniquenessVerb),
-    /// Reproduce the paper's study of the forward kinematics: figures, data, claims
+    /// Reproduce the paper's study of the kinematics: figures, data, claims
     #[command(visible_alias = "paper")]
     Kinematics(KinematicsArgs),
     /// Remove what killed runs left in shared memory
+    #[command(after_help = "Example:\n  masseter clean")]
     Clean,
+    /// Print the completions of the command line for a shell
+    Completions(CompletionsArgs),
+    /// Write manual pages
+    Man(ManArgs),
     #[command(hide = true)]
     BenchPeer(PeerArgs),
     #[command(hide = true)]
@@ -83,7 +108,8 @@ enum Verb {
 pub fn main() -> ExitCode {
     // A write beyond the limit on the size of files is then an error, not the end.
     let _ = signal_hook::flag::register(signal_hook::consts::SIGXFSZ, Arc::default());
-    let verb = Cli::parse().verb;
+    let Cli { color, verb } = parse();
+    choose_colour(color);
     keep_files_private(&verb);
     match execute(verb) {
         Ok(exit) => exit.into(),
@@ -92,6 +118,15 @@ pub fn main() -> ExitCode {
             exit.into()
         }
     }
+}
+
+/// The whole command line.
+fn command() -> Command {
+    with_overview(Cli::command())
+}
+
+fn parse() -> Cli {
+    Cli::from_arg_matches(&command().get_matches()).unwrap_or_else(|error| error.exit())
 }
 
 /// Lets no other user read new files, unless `run --readable-by` allows it. The processes of a run inherit that, and its
@@ -120,6 +155,8 @@ fn execute(verb: Verb) -> Result<Exit, Failure> {
         Verb::Doctor(args) => doctor::examine(&args).usage(),
         Verb::Recording(verb) => recording_cli::execute(&verb).usage(),
         Verb::Clean => clean::clean().usage(),
+        Verb::Completions(args) => manuals::completions(&args, command()).usage(),
+        Verb::Man(args) => manuals::manual(&args, command()).usage(),
         Verb::Controller(args) => controller::control(args).usage(),
         Verb::Plant(args) => plant::plant(&args).usage(),
         Verb::Recorder(args) => recorder::record(args).usage(),
@@ -136,4 +173,64 @@ fn in_one_line(error: &anyhow::Error) -> String {
             _ => text + ": " + &cause,
         }
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Every command that a user meets, with its names from the verb on.
+    fn visible(command: &Command, names: &str) -> Vec<(String, Command)> {
+        let verbs = command.get_subcommands().filter(|verb| !verb.is_hide_set());
+        verbs
+            .flat_map(|verb| {
+                let name = format!("{names} {}", verb.get_name());
+                let inner = visible(verb, &name);
+                if inner.is_empty() { vec![(name, verb.clone())] } else { inner }
+            })
+            .collect()
+    }
+
+    /// The command lines of a text, without what the shell takes from them, or what explains them.
+    fn command_lines(text: &str) -> impl Iterator<Item = &str> {
+        let lines = text.lines().map(str::trim_start).filter(|line| line.starts_with("masseter "));
+        lines.map(|line| line.split(['<', '>', '|', '#', '(']).next().unwrap_or_default())
+    }
+
+    fn assert_parsed(line: &str) {
+        let parsed = command().try_get_matches_from(line.split_whitespace());
+        assert!(parsed.is_ok(), "{line}: {}", parsed.unwrap_err());
+    }
+
+    #[test]
+    fn every_verb_has_an_example_that_is_right_and_a_help_without_marks_of_markup() {
+        let verbs = visible(&command(), "masseter");
+        assert!(verbs.len() > 20, "{verbs:?}");
+        for (name, mut verb) in verbs {
+            let help = verb.render_long_help().to_string();
+            let example = format!("  {name}");
+            assert!(help.lines().any(|line| line.starts_with(&example)), "{name}: no example in {help}");
+            assert!(!help.contains('`'), "{name}: {help}");
+            command_lines(&help).for_each(assert_parsed);
+        }
+    }
+
+    #[test]
+    fn every_command_line_of_the_readme_is_right() {
+        let readme = include_str!("../README.md").lines().filter(|line| line.starts_with("    "));
+        let readme: Vec<_> = readme.flat_map(command_lines).collect();
+        assert!(readme.len() > 10, "{readme:?}");
+        readme.into_iter().for_each(assert_parsed);
+    }
+
+    #[test]
+    fn the_overview_shows_every_visible_verb_once() {
+        let command = command();
+        let help = command.clone().render_help().to_string();
+        for verb in command.get_subcommands() {
+            let entries = help.lines().filter(|line| line.starts_with(&format!("  {} ", verb.get_name())));
+            assert_eq!(entries.count(), usize::from(!verb.is_hide_set()), "{}: {help}", verb.get_name());
+        }
+        assert!(help.lines().all(|line| line.chars().count() <= 100), "{help}");
+    }
 }

@@ -1,5 +1,5 @@
 //! The `masseter` command. Modules of verbs: `bench`, `can`, `clean`, `doctor`, `kinematics_cli`,
-//! `paper_study`, `plant`, `recording_cli`, `report_cli`, `run` and `uniqueness`; [`cli`] dispatches to them.
+//! `manuals`, `paper_study`, `plant`, `recording_cli`, `report_cli`, `run` and `uniqueness`; [`cli`] dispatches to them.
 //!
 //! `run` starts controller, plant and `recorder` as processes of this executable (`run::supervisor`), or steps their
 //! cores in one thread under virtual time (`run::virtual_time`). Figures of a run are computed from its recording and
@@ -17,8 +17,10 @@ pub mod cli;
 mod controller;
 mod doctor;
 mod foxglove;
+mod help;
 mod kinematics_cli;
 pub mod machine;
+mod manuals;
 mod paper_study;
 mod plant;
 mod recorder;

@@ -11,6 +11,7 @@ use masseter_terminal::{Exit, result_line, status};
 
 /// The arguments of `kinematics`.
 #[derive(Debug, Clone, Args)]
+#[command(after_help = "Example:\n  masseter kinematics --out study")]
 pub(crate) struct KinematicsArgs {
     /// Folder for figures (SVG), data (CSV) and claims.md; must not exist
     #[arg(long, value_name = "DIR")]

@@ -81,7 +81,7 @@ fn resolve(args: &PlantArgs) -> anyhow::Result<Scenario> {
     }
     if !args.emulate {
         bail!(
-            "this verb only emulates drives: add --emulate; to drive a robot, use `masseter run --can {}`",
+            "this verb only emulates drives: add --emulate; to drive a robot, use 'masseter run --can {}'",
             scenario.can.interfaces.join(",")
         );
     }

@@ -13,6 +13,7 @@ use masseter_controller::kinematics::uniqueness::InputBox;
 use masseter_plan::{Overrides, RunPlan};
 use masseter_recording::output::new_file;
 use masseter_shared::geometry::{AXIS_NAMES, Mechanism, MechanismConfig};
+use masseter_shared::wording::counted;
 use masseter_study::table::{csv, number};
 use masseter_study::uniqueness::{Ambiguous, boxes, prove, search};
 use masseter_terminal::{Exit, result_line, status};
@@ -28,6 +29,9 @@ pub(crate) enum UniquenessVerb {
 
 /// The arguments of `prove`.
 #[derive(Debug, Clone, Args)]
+#[command(
+    after_help = "Examples:\n  masseter uniqueness prove --region jaw\n  masseter uniqueness prove --around-mm 1 --scenario examples/patient.toml"
+)]
 pub(crate) struct ProveArgs {
     /// Which inputs
     #[arg(long, value_enum, default_value_t)]
@@ -54,6 +58,7 @@ pub(crate) struct ProveArgs {
 
 /// The arguments of `search`.
 #[derive(Debug, Clone, Args)]
+#[command(after_help = "Example:\n  masseter uniqueness search --inputs 100000 --out found.csv")]
 pub(crate) struct SearchArgs {
     /// Which inputs
     #[arg(long, value_enum, default_value = "box")]
@@ -95,12 +100,16 @@ fn prove_and_print(args: &ProveArgs) -> anyhow::Result<bool> {
     let (mechanism, inputs) = inputs_to_prove(args)?;
     let file = args.out.as_deref().map(new_file).transpose()?;
     let proven = prove(&mechanism, inputs, args.margin, args.boxes, |examined, decided| {
-        status!("{examined} boxes examined, {:.2} % of the volume decided", 100.0 * decided);
+        status!(
+            "{} examined, {:.2} % of the volume decided",
+            counted(examined as u64, "box"),
+            100.0 * decided
+        );
     });
     result_line!("boxes examined       {}", proven.examined)?;
     result_line!("no solution          {:.4} % of the volume", 100.0 * proven.unsolvable_share)?;
     result_line!("at most one solution {:.4} % of the volume", 100.0 * proven.unique_share)?;
-    result_line!("undecided            {} boxes", proven.undecided.len())?;
+    result_line!("undecided            {}", counted(proven.undecided.len() as u64, "box"))?;
     let header = AXIS_NAMES.map(|axis| format!("{axis}_low_m,{axis}_high_m")).join(",");
     let row = |inputs: &InputBox| inputs.axes().map(|axis| [axis.low(), axis.high()].map(number));
     write(args.out.as_deref(), file, &csv(&header, proven.undecided.iter().map(row)))?;
@@ -142,7 +151,7 @@ fn inputs_to_prove(args: &ProveArgs) -> anyhow::Result<(Mechanism, Vec<InputBox>
     let path = args.scenario.as_deref();
     let plan = RunPlan::of_file(masseter_plan::scenario_with_overrides(path, &overrides)?, path)?;
     let inputs = boxes(&plan, around_mm * 1e-3)?;
-    result_line!("{}: {} boxes around its inputs", plan.scenario.name, inputs.len())?;
+    result_line!("{}: {} around its inputs", plan.scenario.name, counted(inputs.len() as u64, "box"))?;
     Ok((plan.mechanism, inputs))
 }
 

@@ -144,7 +144,7 @@ fn messages_for_a_watcher_that_does_not_read_are_counted_and_the_recording_is_co
     watcher.subscribe_to_all();
     let (status, said) = shown.finish();
     assert_played(&workspace.run_folder(), status, &said);
-    assert!(said.contains("messages were not shown live"), "{said}");
+    assert!(said.contains("messages not shown live"), "{said}");
     let proof = masseter(&["recording", "verify", workspace.run_folder().to_str().unwrap()]);
     assert_eq!(proof.status.code(), Some(0), "{}", stdout(&proof));
 }
@@ -225,7 +225,7 @@ fn a_live_view_that_cannot_be_served_is_refused_before_the_run_starts() {
     let taken = TcpListener::bind("127.0.0.1:0").unwrap();
     let port = format!("--live={}", taken.local_addr().unwrap());
     let cases: [(&[&str], &str); 3] = [
-        (&[&port], "choose another address with --live=ADDR:PORT"),
+        (&[&port], "choose another with --live=PORT"),
         (&["--live", "--clock", "virtual"], "--live needs --clock rt"),
         (&["--live=somewhere"], "invalid socket address"),
     ];

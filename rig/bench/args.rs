@@ -18,6 +18,7 @@ pub(crate) enum Kind {
 
 /// The arguments.
 #[derive(Debug, Clone, Args)]
+#[command(after_help = "Examples:\n  masseter bench loop\n  masseter bench loop ipc rate --out figures")]
 pub(crate) struct BenchArgs {
     /// What to measure
     #[arg(required = true, value_enum)]
@@ -28,10 +29,10 @@ pub(crate) struct BenchArgs {
     /// Cores of the two sides
     #[arg(long, value_name = "N,N", value_parser = crate::arguments::parse_cores, default_value = "0,1")]
     pub(super) cores: [usize; 2],
-    /// Writes results and HdrHistogram logs there
+    /// Folder for results and HdrHistogram logs
     #[arg(long, value_name = "DIR")]
     pub(super) out: Option<PathBuf>,
-    /// How the result is written to standard output
+    /// Format of standard output
     #[arg(long, value_enum, default_value_t)]
     pub(super) format: Format,
 }

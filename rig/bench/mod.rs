@@ -24,6 +24,7 @@ use crate::arguments::name_of;
 use args::{BenchArgs, Kind};
 use circumstances::Circumstances;
 use comparison::Comparison;
+use masseter_shared::wording::counted;
 use masseter_terminal::{Exit, Failure, Format, OrFailure, result, status};
 
 /// Version of the form of `results.json`.
@@ -64,7 +65,7 @@ pub(crate) fn run(args: &BenchArgs) -> Result<Exit, Failure> {
 fn measure_each(args: &BenchArgs, results: &mut Results) -> anyhow::Result<()> {
     for kind in &args.kinds {
         let name = name_of(kind);
-        status!("bench {name}: {} rounds …", args.rounds);
+        status!("bench {name}: {} …", counted(args.rounds.into(), "round"));
         let comparison = match kind {
             Kind::Loop => wake::measure(args.rounds, args.cores[0]),
             Kind::Ipc => ipc::measure(args.rounds, args.cores),

@@ -85,7 +85,7 @@ fn cyclictest(core: usize, loops: u64, more: &[&str]) -> anyhow::Result<Duration
         .arg(format!("--histogram={CYCLICTEST_UP_TO_US}"))
         .args(more)
         .output()
-        .context("cyclictest cannot be started (`sudo apt install rt-tests`)")?;
+        .context("cyclictest cannot be started ('sudo apt install rt-tests')")?;
     if !output.status.success() {
         let said = String::from_utf8_lossy(&output.stderr);
         bail!("cyclictest failed: {}", said.lines().find(|line| !line.is_empty()).unwrap_or("no message"));

@@ -10,6 +10,7 @@ use masseter_can::socketcand::{ECHO, GREETING, OK, Request, RequestError, Reques
 use masseter_can::{Bus, ReceiveError};
 use masseter_plant::emulation::{NodePort, OpenLink};
 use masseter_shared::clock::SECOND_NS;
+use masseter_shared::wording::counted;
 
 use crate::stderr_writer::StderrWriter;
 
@@ -44,7 +45,7 @@ pub(super) enum CloseReason {
     Io(#[from] io::Error),
     #[error(transparent)]
     Request(#[from] RequestError),
-    #[error("no bus `{name}`; the buses are can0 to can{}", .buses - 1)]
+    #[error("no bus '{name}'; the buses are can0 to can{}", .buses - 1)]
     NoBus { name: String, buses: usize },
     #[error("another client takes its place, since it has asked for nothing for longest")]
     Idle,
@@ -221,7 +222,7 @@ impl Client {
                     write_frame(&mut text, &received).expect("writing to a string does not fail");
                 }
                 Err(ReceiveError::Overrun { lost }) => {
-                    stderr.write(&format!("a client lost {lost} frames\n"));
+                    stderr.write(&format!("a client lost {}\n", counted(lost, "frame")));
                 }
                 Ok(None) | Err(_) => break,
             }

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use masseter_plan::read_scenario;
 use masseter_plant::description;
 use masseter_shared::geometry::AXIS_NAMES;
@@ -10,16 +11,18 @@ use masseter_terminal::{Exit, result};
 
 /// The arguments of `can eds`.
 #[derive(Debug, Clone, Args)]
+#[command(after_help = "Example:\n  masseter can eds --axis l1 > l1.eds")]
 pub(crate) struct EdsArgs {
     /// Scenario file with the drives [default: the published rig]
     scenario: Option<PathBuf>,
-    /// Axis of the drive: d1, d2, d3, l1, l2 or l3
-    #[arg(long, default_value = "d1", value_parser = parse_axis)]
+    /// Axis of the drive
+    #[arg(long, default_value = "d1", value_parser = PossibleValuesParser::new(AXIS_NAMES).map(|name| axis_of(&name)))]
     axis: usize,
 }
 
 /// The arguments of `can dbc`.
 #[derive(Debug, Clone, Args)]
+#[command(after_help = "Example:\n  masseter can dbc > masseter.dbc")]
 pub(crate) struct DbcArgs {
     /// Scenario file with the drives [default: the published rig]
     scenario: Option<PathBuf>,
@@ -38,7 +41,6 @@ pub(crate) fn dbc(args: &DbcArgs) -> anyhow::Result<Exit> {
     Ok(Exit::Passed)
 }
 
-fn parse_axis(text: &str) -> Result<usize, String> {
-    let axis = AXIS_NAMES.iter().position(|name| *name == text);
-    axis.ok_or_else(|| format!("the axes are {}", AXIS_NAMES.join(" ")))
+fn axis_of(name: &str) -> usize {
+    AXIS_NAMES.iter().position(|axis| *axis == name).expect("the parser knows no other names")
 }

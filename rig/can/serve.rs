@@ -20,6 +20,7 @@ use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::io::Errno;
 
 use super::client::{Client, CloseReason};
+use crate::arguments::parse_address;
 use crate::stderr_writer::StderrWriter;
 use masseter_terminal::Exit;
 
@@ -40,8 +41,8 @@ const STEP: Timespec = Timespec { tv_sec: 0, tv_nsec: 500_000 };
 pub(crate) struct ServeArgs {
     /// Scenario file with buses and drives [default: the published rig]
     scenario: Option<PathBuf>,
-    /// Address to listen on; every client that reaches it can move the emulated drives
-    #[arg(long, default_value = "127.0.0.1:29536")]
+    /// Port of this machine, or address, to listen on; every client that reaches it can move the emulated drives
+    #[arg(long, value_name = "PORT|ADDR:PORT", default_value = "127.0.0.1:29536", value_parser = parse_address)]
     listen: SocketAddr,
 }
 

@@ -3,6 +3,7 @@
 use super::container::on_host;
 use super::finding::Finding;
 use crate::machine::SystemRoot;
+use masseter_shared::wording::counted;
 
 /// Clock sources that are read in tens of nanoseconds, without a system call.
 const FAST_SOURCES: [&str; 4] = ["tsc", "kvm-clock", "arch_sys_counter", "hyperv_clocksource_tsc_page"];
@@ -28,8 +29,8 @@ fn preemption(root: &SystemRoot) -> Finding {
         (format!("PREEMPT_DYNAMIC, modes {modes}"), remedy)
     } else {
         let is_preemptible = has("PREEMPT") || has("PREEMPT_DYNAMIC");
-        let remedy = "install a kernel with PREEMPT_RT: on Debian `sudo apt install linux-image-rt-amd64`, on Ubuntu \
-                    `sudo pro enable realtime-kernel`; then boot again";
+        let remedy = "install a kernel with PREEMPT_RT: on Debian 'sudo apt install linux-image-rt-amd64', on Ubuntu \
+                    'sudo pro enable realtime-kernel'; then boot again";
         (
             if is_preemptible { "preemptible (full)" } else { "not preemptible in the kernel" }.to_owned(),
             remedy,
@@ -69,11 +70,14 @@ fn isolation(root: &SystemRoot) -> Finding {
     }
     let cores = root.online_cores().len();
     let Some([one, other]) = cores_to_spare(root).filter(|_| cores > 2) else {
-        return Finding::ok(CHECK, format!("none; with {cores} cores none can be spared"));
+        return Finding::ok(
+            CHECK,
+            format!("none; with {} none can be spared", counted(cores as u64, "core")),
+        );
     };
     let remedy = format!(
-        "add `isolcpus={one},{other} nohz_full={one},{other}` to the kernel's command line (on Debian and Ubuntu: \
-         GRUB_CMDLINE_LINUX_DEFAULT in /etc/default/grub, then `sudo update-grub`), and boot again; then: masseter run \
+        "add 'isolcpus={one},{other} nohz_full={one},{other}' to the kernel's command line (on Debian and Ubuntu: \
+         GRUB_CMDLINE_LINUX_DEFAULT in /etc/default/grub, then 'sudo update-grub'), and boot again; then: masseter run \
          --cores {one},{other}"
     );
     Finding::warn(CHECK, "none", "other tasks and interrupts also run on the rig's cores")

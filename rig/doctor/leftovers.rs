@@ -1,6 +1,7 @@
 //! Other rigs of this user: running ones, and files of killed ones in shared memory.
 
 use masseter_shared::transport::{Domain, DomainError};
+use masseter_shared::wording::counted;
 
 use super::finding::Finding;
 
@@ -25,7 +26,7 @@ fn leftovers(count: &Result<[usize; 2], DomainError>) -> Finding {
         }
         Ok([alive, dead]) => Finding::warn(
             CHECK,
-            format!("{alive} running, files of {dead} killed ones"),
+            format!("{alive} running, files of {}", counted(*dead as u64, "killed one")),
             "these files occupy shared memory",
         )
         .with_remedy("masseter clean"),

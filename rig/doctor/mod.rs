@@ -15,7 +15,7 @@ mod processors;
 use std::fmt::Write;
 
 use clap::Args;
-use masseter_terminal::{Exit, Format, result};
+use masseter_terminal::{Exit, Format, Tone, result, result_with_tones};
 use serde::Serialize;
 
 use finding::{Finding, Level};
@@ -24,12 +24,15 @@ use crate::machine::SystemRoot;
 
 /// The arguments of `doctor`.
 #[derive(Debug, Clone, Args)]
+#[command(after_help = "Example:\n  masseter doctor")]
 pub(crate) struct DoctorArgs {
     /// Format of standard output
     #[arg(long, value_enum, default_value_t)]
     format: Format,
 }
 
+/// The marks of the levels.
+const TONES: [(&str, Tone); 3] = [("ok", Tone::Good), ("warn", Tone::Doubtful), ("BAD", Tone::Bad)];
 /// Version of the report's form.
 const FORM: u32 = 1;
 
@@ -46,10 +49,10 @@ struct Report {
 /// Examines the machine and prints the report; [`Exit::Invalid`] if a finding is bad.
 pub(crate) fn examine(args: &DoctorArgs) -> anyhow::Result<Exit> {
     let report = Report::new(findings(&SystemRoot::of_this_machine()));
-    result(&match args.format {
-        Format::Human => report.to_text(),
-        Format::Json => serde_json::to_string_pretty(&report)? + "\n",
-    })?;
+    match args.format {
+        Format::Human => result_with_tones(&report.to_text(), &TONES),
+        Format::Json => result(&(serde_json::to_string_pretty(&report)? + "\n")),
+    }?;
     Ok(if report.level == Level::Bad { Exit::Invalid } else { Exit::Passed })
 }
 

@@ -86,9 +86,8 @@ fn idle(root: &SystemRoot, may_hold: bool) -> Finding {
                 grant,
             ))
         }
-        (true, _) => Finding::warn(CHECK, found, cost).with_remedy(
-            "masseter bench loop  # measures whether `realtime.cpu_dma_latency = \"hold\"` helps",
-        ),
+        (true, _) => Finding::warn(CHECK, found, cost)
+            .with_remedy("masseter bench loop  # measures whether realtime.cpu_dma_latency = 'hold' helps"),
     }
 }
 

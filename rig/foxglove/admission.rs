@@ -16,7 +16,7 @@ pub(super) enum Refusal {
     Host,
     #[error("only pages of foxglove.dev and of this machine may watch")]
     Origin,
-    #[error("the address contains a secret: use the one that `masseter run --live` prints")]
+    #[error("the address contains a secret: use the one that 'masseter run --live' prints")]
     Secret,
 }
 

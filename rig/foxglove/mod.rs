@@ -47,7 +47,7 @@ pub(crate) struct ClientLosses {
 /// The server cannot listen on its address.
 #[derive(Debug, thiserror::Error)]
 #[error(
-    "cannot listen for Foxglove on {address}: {error}; choose another address with --live=ADDR:PORT (port 0 takes a free one)"
+    "cannot listen for Foxglove on {address}: {error}; choose another with --live=PORT or --live=ADDR:PORT (port 0 takes a free one)"
 )]
 pub(crate) struct ListenError {
     /// The requested address.

@@ -18,6 +18,9 @@ const NEUTRAL_RAD: [f64; LEGS] = [1.46; LEGS];
 
 /// What `fk` takes.
 #[derive(Debug, Clone, Args)]
+#[command(
+    after_help = "Examples:\n  masseter fk < actuators.csv > poses.csv\n  masseter fk --all --input actuators.csv"
+)]
 pub(crate) struct FkArgs {
     #[command(flatten)]
     csv: CsvArgs,

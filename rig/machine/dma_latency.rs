@@ -25,7 +25,7 @@ impl Hold {
             Some(Ok((device, limit_us))) => (Some(device), Some(limit_us), None),
             Some(Err(error)) if requested == CpuDmaLatency::Hold => {
                 let refusal = format!(
-                    "{DEVICE} refused ({error}): run as root, or allow it with `sudo setfacl -m u:\"$USER\":rw {DEVICE}`"
+                    "{DEVICE} refused ({error}): run as root, or allow it with 'sudo setfacl -m u:\"$USER\":rw {DEVICE}'"
                 );
                 (None, None, Some(refusal))
             }

@@ -41,7 +41,7 @@ pub(crate) struct RecorderArgs {
     process: ProcessArgs,
     #[arg(long)]
     recording: PathBuf,
-    /// Duration of the motion in its own time, s
+    /// Duration of the motion, s
     #[arg(long)]
     motion_s: f64,
     /// Address of the Foxglove server
@@ -75,7 +75,7 @@ pub(crate) fn record(args: RecorderArgs) -> anyhow::Result<Exit> {
     if let Some(server) = &server {
         stderr.write(&format!("live on {} for Foxglove\n", server.url()));
     }
-    let progress = (!args.quiet).then(|| Progress::new(args.motion_s, start.epoch_ns));
+    let progress = (!args.quiet).then(|| Progress::new(args.motion_s, scenario.period_s(), start.epoch_ns));
     let mut sinks = Sinks { backlog, server, progress, stderr };
     let loops = start.loops.to_vec();
     let root = SystemRoot::of_this_machine();

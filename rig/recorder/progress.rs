@@ -37,8 +37,11 @@ pub(super) struct Losses {
 pub(super) struct Progress {
     /// Whether the line is rewritten.
     is_in_place: bool,
-    /// Duration of the motion in its own time, s.
+    /// Duration of the motion, and of a cycle, s.
     motion_s: f64,
+    period_s: f64,
+    /// Cycles in which the motion ran.
+    running: u64,
     shown_ns: u64,
     /// The newest state and reading.
     state: State,
@@ -54,15 +57,17 @@ pub(super) struct Progress {
 
 impl Progress {
     /// In the form that suits standard error.
-    pub(super) fn new(motion_s: f64, now_ns: u64) -> Self {
+    pub(super) fn new(motion_s: f64, period_s: f64, now_ns: u64) -> Self {
         let is_dumb = std::env::var_os("TERM").is_none_or(|term| term == "dumb");
-        Self::with_form(io::stderr().is_terminal() && !is_dumb, motion_s, now_ns)
+        Self::with_form(io::stderr().is_terminal() && !is_dumb, motion_s, period_s, now_ns)
     }
 
-    fn with_form(is_in_place: bool, motion_s: f64, now_ns: u64) -> Self {
+    fn with_form(is_in_place: bool, motion_s: f64, period_s: f64, now_ns: u64) -> Self {
         Self {
             is_in_place,
             motion_s,
+            period_s,
+            running: 0,
             shown_ns: now_ns,
             state: State::default(),
             reading: Reading::default(),
@@ -85,6 +90,7 @@ impl Progress {
                 self.max_late_ns = self.max_late_ns.max(state.woke_ns.saturating_sub(state.due_ns));
                 let is_fresh = state.reading_cycle > self.state.reading_cycle;
                 self.state = *state;
+                self.running += u64::from(self.controller_state() == Some(ControllerState::Running));
                 if is_fresh && self.controller_state().is_some_and(|state| MOVING.contains(&state)) {
                     self.max_error_mm = self.max_error_mm.max(self.error_mm());
                 }
@@ -125,7 +131,7 @@ impl Progress {
         format!(
             "{:<13} motion {:>5.2} of {:.2} s   missed {}   dropped {}   tracking error {:.3} mm, max {:.3}   latest {:.0} µs{live}",
             self.controller_state().map_or("?", ControllerState::name),
-            self.state.motion_time_s.max(0.0),
+            self.motion_s.min(self.running as f64 * self.period_s),
             self.motion_s,
             self.state.skipped_cycles + self.reading.skipped_cycles,
             self.missing + unrecorded,
@@ -151,7 +157,7 @@ mod tests {
     use super::*;
 
     fn after_ten_cycles(is_in_place: bool) -> Progress {
-        let mut progress = Progress::with_form(is_in_place, 4.0, 0);
+        let mut progress = Progress::with_form(is_in_place, 4.0, 0.1, 0);
         for cycle in 1..=10 {
             progress.add(&Recorded::State(State {
                 seq: cycle,
@@ -159,7 +165,6 @@ mod tests {
                 reading_cycle: cycle,
                 due_ns: 1000,
                 woke_ns: if cycle == 3 { 51_000 } else { 1100 },
-                motion_time_s: 1.0,
                 controller_state: ControllerState::Running.code(),
                 estimated_position_m: [if cycle == 3 { 0.004 } else { 0.002 }, 0.0, 0.0],
                 ..Default::default()
@@ -193,7 +198,7 @@ mod tests {
     #[test]
     fn a_line_is_due_every_second_and_rewritten_five_times_a_second() {
         for (is_in_place, interval_ns) in [(false, SECOND_NS), (true, SECOND_NS / 5)] {
-            let progress = Progress::with_form(is_in_place, 4.0, 0);
+            let progress = Progress::with_form(is_in_place, 4.0, 0.1, 0);
             assert!(progress.is_due(interval_ns) && !progress.is_due(interval_ns - 1));
         }
     }

@@ -2,6 +2,7 @@
 
 use masseter_recording::{Backlog, Recorded};
 use masseter_shared::messages::Message;
+use masseter_shared::wording::counted;
 use masseter_terminal::Exit;
 
 use super::progress::{Losses, Progress};
@@ -74,8 +75,9 @@ impl Sinks {
 /// A sentence on what Foxglove clients missed; none if they missed nothing.
 fn client_losses(ClientLosses { dropped, cut_off }: ClientLosses) -> Option<String> {
     let dropped = (dropped > 0)
-        .then(|| format!("{dropped} messages were not shown live, because clients read too slowly"));
-    let cut_off = (cut_off > 0).then(|| format!("{cut_off} clients did not read to the end"));
+        .then(|| format!("{} not shown live, because clients read too slowly", counted(dropped, "message")));
+    let cut_off =
+        (cut_off > 0).then(|| format!("{} did not read to the end", counted(cut_off as u64, "client")));
     let losses: Vec<_> = [dropped, cut_off].into_iter().flatten().collect();
     (!losses.is_empty()).then(|| losses.join("; "))
 }

@@ -17,7 +17,8 @@ use std::path::{Path, PathBuf};
 use anyhow::Context;
 use clap::{Args, Subcommand};
 use masseter_recording::{Reader, Recovered, RunFolder, recover};
-use masseter_terminal::{Exit, result};
+use masseter_shared::wording::counted;
+use masseter_terminal::{Exit, result, result_with_tones};
 
 use selection::Selection;
 use survey::Survey;
@@ -26,8 +27,10 @@ use survey::Survey;
 #[derive(Debug, Clone, Subcommand)]
 pub(crate) enum RecordingVerb {
     /// Print topics, schemas, message counts, times and sizes
+    #[command(after_help = "Example:\n  masseter recording info runs/latest")]
     Info(RecordingArgs),
     /// Check checksums and the sequence numbers of every topic
+    #[command(after_help = "Example:\n  masseter recording verify runs/latest")]
     Verify(RecordingArgs),
     /// Save the readable messages of a damaged recording in a new one
     Recover(RecoverArgs),
@@ -45,10 +48,11 @@ pub(crate) struct RecordingArgs {
 
 /// The arguments of `recover`.
 #[derive(Debug, Clone, Args)]
+#[command(after_help = "Example:\n  masseter recording recover killed/recording.mcap --out whole.mcap")]
 pub(crate) struct RecoverArgs {
     #[command(flatten)]
     from: RecordingArgs,
-    /// New recording; must not exist [default: beside the old one, with `.recovered` in its name]
+    /// New recording; must not exist [default: beside the old one, with '.recovered' in its name]
     #[arg(long, value_name = "FILE.mcap")]
     out: Option<PathBuf>,
 }
@@ -102,7 +106,7 @@ fn inspect(
 ) -> anyhow::Result<Exit> {
     let path = args.path()?;
     let survey = survey(&path, &mut open(&path)?)?;
-    result(&format!("{}\n{}", path.display(), to_text(&survey)?))?;
+    result_with_tones(&format!("{}\n{}", path.display(), to_text(&survey)?), &survey::TONES)?;
     Ok(survey.exit())
 }
 
@@ -121,7 +125,7 @@ fn save_readable(args: &RecoverArgs) -> anyhow::Result<Exit> {
 }
 
 fn recovered_text(recovered: Recovered) -> String {
-    let saved = format!("{} messages saved\n", recovered.messages);
+    let saved = format!("{} saved\n", counted(recovered.messages, "message"));
     match recovered.undefined {
         0 => saved,
         undefined => saved + &format!("{undefined} not saved: the definition of their channel is lost\n"),

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use anyhow::bail;
 use masseter_recording::SCHEMA_ENCODING;
+use masseter_shared::wording::nearest;
 use mcap::{Channel, Schema};
 
 use super::columns::Columns;
@@ -40,7 +41,11 @@ impl Selection {
             }
         }
         match requested.iter().find(|topic| !topics.contains(&topic.as_str())) {
-            Some(unknown) => bail!("the recording has no topic '{unknown}'; it has {}", topics.join(", ")),
+            Some(unknown) => {
+                let likely = nearest(unknown, topics.iter().copied());
+                let likely = likely.map_or_else(String::new, |topic| format!("; did you mean '{topic}'?"));
+                bail!("the recording has no topic '{unknown}'; it has {}{likely}", topics.join(", "))
+            }
             None => Ok(selection),
         }
     }

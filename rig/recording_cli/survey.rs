@@ -6,7 +6,8 @@ use std::io::{Read, Seek};
 
 use masseter_analysis::{SequenceCheck, TopicFigures};
 use masseter_recording::{Chunks, Damage, Entry, ReadError, Reader};
-use masseter_terminal::Exit;
+use masseter_shared::wording::counted;
+use masseter_terminal::{Exit, Tone};
 
 /// Figures of one channel.
 #[derive(Debug, Clone, Default)]
@@ -99,14 +100,19 @@ impl Survey {
         let compression = if chunks.compression.is_empty() { "no compression" } else { &chunks.compression };
         writeln!(
             text,
-            "{} bytes; {} chunks, {compression}, {:.2} of their {} bytes",
+            "{} bytes; {}, {compression}, {:.2} of their {} bytes",
             self.size,
-            chunks.count,
+            counted(chunks.count, "chunk"),
             chunks.compressed_bytes as f64 / chunks.uncompressed_bytes.max(1) as f64,
             chunks.uncompressed_bytes,
         )?;
         if let Some(cycles) = self.cycles() {
-            writeln!(text, "{cycles} cycles, {:.0} bytes a cycle", self.size as f64 / cycles as f64)?;
+            writeln!(
+                text,
+                "{}, {:.0} bytes a cycle",
+                counted(cycles, "cycle"),
+                self.size as f64 / cycles as f64
+            )?;
         }
         writeln!(text, "{:<8} {:>9} {:>10} {:>10}  schema", "topic", "messages", "Hz", "bytes each")?;
         for (channel, figures) in &self.channels {
@@ -145,10 +151,14 @@ impl Survey {
         for topic in &self.sequences {
             let TopicFigures { topic, messages, missing } = topic;
             let mark = mark(*missing);
-            writeln!(text, "{mark} {topic:<8} {messages:>9} messages, {missing} missing between them")?;
+            writeln!(
+                text,
+                "{mark} {topic:<8} {:>18}, {missing} missing between them",
+                counted(*messages, "message")
+            )?;
         }
         let Chunks { count, damaged, .. } = self.chunks;
-        writeln!(text, "{} {count} chunks match their checksums, {damaged} do not", mark(damaged))?;
+        writeln!(text, "{} chunks with their checksum: {count}, without: {damaged}", mark(damaged))?;
         let unreadable: u64 = self.damage.iter().map(|damage| damage.to - damage.from).sum();
         writeln!(text, "{} {unreadable} of {} bytes cannot be read", mark(unreadable), self.size)?;
         let end = if self.was_cut_short { "lacks" } else { "has" };
@@ -163,22 +173,29 @@ impl Survey {
             writeln!(text, "unreadable: {damage}")?;
         }
         for topic in self.sequences.iter().filter(|topic| topic.missing > 0) {
-            writeln!(text, "missing: {} messages on '{}'", topic.missing, topic.topic)?;
+            writeln!(text, "missing: {} on '{}'", counted(topic.missing, "message"), topic.topic)?;
         }
         for (_, figures) in &self.channels {
             if let Some(reason) = &figures.reason {
-                writeln!(text, "unreadable: {} messages; {reason}", figures.unreadable)?;
+                writeln!(text, "unreadable: {}; {reason}", counted(figures.unreadable, "message"))?;
             }
         }
         if self.undefined > 0 {
-            writeln!(text, "unreadable: {} messages whose channel is not defined", self.undefined)?;
+            writeln!(
+                text,
+                "unreadable: {} without a definition of the channel",
+                counted(self.undefined, "message")
+            )?;
         }
         if self.was_cut_short {
-            writeln!(text, "the file lacks its end: `masseter recording recover` writes a complete file")?;
+            writeln!(text, "the file lacks its end: 'masseter recording recover' writes a complete file")?;
         }
         Ok(text)
     }
 }
+
+/// The marks of lines.
+pub(super) const TONES: [(&str, Tone); 2] = [("ok", Tone::Good), ("FAIL", Tone::Bad)];
 
 /// The mark of a line with so many faults.
 fn mark(faults: u64) -> &'static str {

@@ -10,70 +10,78 @@ use masseter_report::Detail;
 use masseter_terminal::Format;
 use rustix::fs::Mode;
 
-use crate::arguments::{ControllerKind, Wires, parse_cores, parse_wires};
+use crate::arguments::{ControllerKind, Wires, parse_address, parse_cores, parse_duration, parse_wires};
 use crate::foxglove;
+
+const WHAT: &str = "Choose what to play";
+const HOW: &str = "Choose how it runs";
+const WATCH: &str = "Watch the run";
+const KEEP: &str = "Keep the result";
 
 /// The arguments of `run`.
 #[derive(Debug, Clone, Default, Args)]
 #[command(
-    after_help = "Examples:\n  masseter run --duration 30s\n  masseter run scenario.toml --live\n  masseter run --clock virtual --seed 2 --out /tmp/run"
+    after_help = "Examples:\n  masseter run --duration 30\n  masseter run scenario.toml --live\n  masseter run --clock virtual --seed 2 --out /tmp/run"
 )]
 pub(crate) struct RunArgs {
     /// Scenario file [default: ten seconds of chewing]
     pub scenario: Option<PathBuf>,
     /// Recorded jaw motion (CSV), instead of the scenario's motion
-    #[arg(long, value_name = "FILE.csv")]
+    #[arg(long, value_name = "FILE.csv", help_heading = WHAT)]
     pub trajectory: Option<PathBuf>,
-    /// Duration of the motion, such as 10s or 2min
-    #[arg(long, value_parser = humantime::parse_duration)]
+    /// Duration of the motion in seconds, or with a unit, such as 10, 10s or 2min
+    #[arg(long, value_name = "TIME", value_parser = parse_duration, help_heading = WHAT)]
     pub duration: Option<Duration>,
     /// Cycles per second
-    #[arg(long)]
+    #[arg(long, value_name = "HZ", help_heading = HOW)]
     pub rate_hz: Option<u32>,
     /// Clock of the run
-    #[arg(long, value_enum, default_value_t)]
+    #[arg(long, value_enum, default_value_t, help_heading = HOW)]
     pub clock: ClockKind,
     /// Play the motion, or only hold the position found at the start
-    #[arg(long, value_enum, default_value_t)]
+    #[arg(long, value_enum, default_value_t, help_heading = WHAT)]
     pub controller: ControllerKind,
     /// Simulated buses, or the CAN interface of each bus, such as can0,can1
-    #[arg(long, value_name = "virtual|IF[,IF]", value_parser = parse_wires)]
+    #[arg(long, value_name = "virtual|IF[,IF]", value_parser = parse_wires, help_heading = HOW)]
     pub can: Option<Wires>,
     /// Cores of controller and plant
-    #[arg(long, value_name = "N,N", value_parser = parse_cores)]
+    #[arg(long, value_name = "N,N", value_parser = parse_cores, help_heading = HOW)]
     pub cores: Option<[usize; 2]>,
     /// Seed of every random number
-    #[arg(long)]
+    #[arg(long, help_heading = HOW)]
     pub seed: Option<u64>,
     /// Run folder; must not exist [default: runs/UTC_TIME-NAME]
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", help_heading = KEEP)]
     pub out: Option<PathBuf>,
     /// Name of this rig, unique among running rigs [default: a generated one]
-    #[arg(long)]
+    #[arg(long, help_heading = HOW)]
     pub name: Option<String>,
     /// Format of standard output
-    #[arg(long, value_enum, default_value_t)]
+    #[arg(long, value_enum, default_value_t, help_heading = WATCH)]
     pub format: Format,
     /// Exit with 3 unless the kernel grants cores, SCHED_FIFO, locked memory and, if requested, /dev/cpu_dma_latency
-    #[arg(long)]
+    #[arg(long, help_heading = HOW)]
     pub require_rt: bool,
-    /// Show the run live in Foxglove (WebSocket) [default address: 127.0.0.1:8765]
+    /// Show the run live in Foxglove (WebSocket) on a port of this machine, such as --live=9000, or on an address
+    /// [default: 127.0.0.1:8765]
     #[arg(
         long,
-        value_name = "ADDR:PORT",
+        value_name = "PORT|ADDR:PORT",
+        value_parser = parse_address,
+        help_heading = WATCH,
         num_args = 0..=1,
         require_equals = true,
         default_missing_value = foxglove::DEFAULT_ADDRESS
     )]
     pub live: Option<SocketAddr>,
     /// Who may read the run's files
-    #[arg(long, value_enum, default_value_t, value_name = "WHO")]
+    #[arg(long, value_enum, default_value_t, value_name = "WHO", help_heading = KEEP)]
     pub readable_by: Readers,
     /// Show every figure, not only verdict and checks
     #[arg(long)]
     pub verbose: bool,
     /// Show no progress
-    #[arg(long)]
+    #[arg(long, help_heading = WATCH)]
     pub quiet: bool,
 }
 

@@ -21,7 +21,7 @@ use masseter_shared::config::{FileConfig, MotionConfig, Scenario};
 use masseter_shared::input::read_text;
 use masseter_terminal::{Exit, Failure, OrFailure, status};
 
-use crate::arguments::name_of;
+use crate::arguments::{check_cores, name_of};
 use crate::{foxglove, machine};
 use args::{ClockKind, RunArgs};
 use room::Reserve;
@@ -90,6 +90,7 @@ fn write_manifest(folder: &RunFolder, manifest: &Manifest) -> Result<(), Failure
 fn resolve(args: &RunArgs) -> anyhow::Result<RunPlan> {
     let scenario = masseter_plan::scenario_with_overrides(args.scenario.as_deref(), &args.overrides())?;
     check_clock(args, &scenario)?;
+    args.cores.map_or(Ok(()), |cores| check_cores(&cores))?;
     args.live.map_or(Ok(()), foxglove::check)?;
     let plan = RunPlan::of_file(scenario, args.scenario.as_deref())?;
     plant::check_interfaces(&plan.scenario)?;

@@ -29,7 +29,7 @@ pub(super) fn check_memory() -> anyhow::Result<()> {
         let limit = getrlimit(resource).current.unwrap_or(u64::MAX);
         ensure!(
             limit >= least,
-            "a process may have {} of {name}, and a run needs {}: raise the limit (`ulimit -{option} unlimited`)",
+            "a process may have {} of {name}, and a run needs {}: raise the limit ('ulimit -{option} unlimited')",
             megabytes(limit),
             megabytes(least)
         );
@@ -44,7 +44,7 @@ pub(super) fn check_disk(path: &Path, plan: &RunPlan) -> anyhow::Result<()> {
     let largest = getrlimit(Resource::Fsize).current.unwrap_or(u64::MAX);
     ensure!(
         largest >= needed,
-        "a file may have {}, and the recording may need {}: raise the limit (`ulimit -f unlimited`), or shorten the \
+        "a file may have {}, and the recording may need {}: raise the limit ('ulimit -f unlimited'), or shorten the \
          run (--duration)",
         megabytes(largest),
         megabytes(needed)
@@ -94,8 +94,8 @@ pub(super) fn reserve_shared_memory(domain: &Domain) -> anyhow::Result<()> {
 fn more_shared_memory() -> String {
     let mebibytes = (2 * SHARED_BYTES).div_ceil(1 << 20);
     format!(
-        "remove leftovers (`masseter clean`), or enlarge it (`mount -o remount,size={mebibytes}m {SHARED_MEMORY}`; in a \
-         container `--shm-size={mebibytes}m`)"
+        "remove leftovers ('masseter clean'), or enlarge it ('mount -o remount,size={mebibytes}m {SHARED_MEMORY}'; in a \
+         container '--shm-size={mebibytes}m')"
     )
 }
 

@@ -99,7 +99,7 @@ pub(super) fn run(
     interrupts.restore_default_actions();
     match domain.sweep() {
         Ok(swept) => report_remaining(&swept.unwrap_or_default()),
-        Err(error) => status!("masseter: {error}; `masseter clean` removes the rest of this run"),
+        Err(error) => status!("masseter: {error}; 'masseter clean' removes the rest of this run"),
     }
     manifest.ending = result?;
     Ok(())
@@ -128,8 +128,7 @@ impl Rig {
         let common: Vec<OsString> =
             vec!["--scenario".into(), folder.scenario().into(), "--domain".into(), domain.id().into()];
         let with = |more: Vec<OsString>| [common.clone(), more].concat();
-        let motion_s = plan.trajectory.motion_time_s(plan.trajectory.duration_s());
-        let motion = format!("--motion-s={motion_s}").into();
+        let motion = format!("--motion-s={}", plan.trajectory.duration_s()).into();
         let mut recorder_arguments = with(vec!["--recording".into(), folder.recording().into(), motion]);
         recorder_arguments.extend(args.quiet.then(|| "--quiet".into()));
         recorder_arguments.extend(args.live.map(|address| format!("--live={address}").into()));

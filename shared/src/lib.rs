@@ -14,3 +14,4 @@ pub mod realtime;
 pub mod rows;
 pub mod schedule;
 pub mod transport;
+pub mod wording;

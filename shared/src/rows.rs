@@ -6,6 +6,7 @@
 use std::io::{self, BufRead, Read};
 
 use crate::input::excerpt;
+use crate::wording::counted;
 
 /// Bytes of the longest line that is read. Numbers of full precision make lines a tenth as long.
 const LONGEST_LINE: usize = 4096;
@@ -51,7 +52,10 @@ pub fn numbers(line: &str, columns: &[&str]) -> Result<Vec<f64>, String> {
     }
     let (found, expected) = (fields(line).count(), columns.len());
     if found != expected {
-        return Err(format!("{found} fields, expected {expected}; complete the line or delete it"));
+        return Err(format!(
+            "{}, expected {expected}; complete the line or delete it",
+            counted(found as u64, "field")
+        ));
     }
     fields(line).zip(columns).map(|(text, column)| number(text, column)).collect()
 }
@@ -164,7 +168,7 @@ mod tests {
     fn what_is_no_row_of_the_columns_is_refused_with_the_reason() {
         for (line, reason) in [
             ("", "an empty line"),
-            ("1", "1 fields, expected 2; complete the line or delete it"),
+            ("1", "1 field, expected 2; complete the line or delete it"),
             ("1,2,3", "3 fields, expected 2"),
             ("1,zero", "b is 'zero', not a finite number; write it with a decimal point"),
             ("NaN,1", "a is 'NaN', not a finite number"),

@@ -4,6 +4,7 @@
 
 use masseter_shared::input::excerpt;
 use masseter_shared::rows::{Line, fields, lines, numbers};
+use masseter_shared::wording::counted;
 
 use super::error::Located;
 
@@ -63,15 +64,19 @@ impl Format {
             [&found, columns].map(|names| names.get(position).copied().unwrap_or_default());
         let (position, header) = (position + 1, columns.join(","));
         let found = excerpt(found);
-        Err(format!("column {position} is `{found}`, expected `{expected}`; the header must be `{header}`"))
+        Err(format!("column {position} is '{found}', expected '{expected}'; the header must be '{header}'"))
     }
 }
 
 impl Table {
     pub(super) fn parse(text: &str) -> Result<Self, Located> {
         let mut content = lines(text.as_bytes()).filter(|line| line.text.as_deref() != Ok(""));
-        let too_few =
-            |rows| Located::whole(format!("{rows} rows of data, at least {FEWEST_ROWS} are needed"));
+        let too_few = |rows| {
+            Located::whole(format!(
+                "{} of data, at least {FEWEST_ROWS} are needed",
+                counted(rows as u64, "row")
+            ))
+        };
         let Line { number, text } = content.next().ok_or_else(|| too_few(0))?;
         let format = text.and_then(|header| Format::of_header(&header));
         let format = format.map_err(|problem| Located::at(number, problem))?;
@@ -143,10 +148,10 @@ mod tests {
         let table = [
             (String::new(), None, "0 rows"),
             (HEADER.to_owned(), None, "0 rows"),
-            (ROWS.to_owned(), Some(1), "column 1 is `0.00`, expected `time_s`"),
-            ("time_s,x_mm,ymm,z_mm,qw,qx,qy,qz".to_owned(), Some(1), "column 3 is `ymm`, expected `y_mm`"),
-            ("time_s,m1_x_mm,m1_y_mm".to_owned(), Some(1), "column 4 is ``, expected `m1_z_mm`"),
-            ("time_s,x_mm,y_mm,z_mm,qw,qx,qy,qz,more".to_owned(), Some(1), "column 9 is `more`"),
+            (ROWS.to_owned(), Some(1), "column 1 is '0.00', expected 'time_s'"),
+            ("time_s,x_mm,ymm,z_mm,qw,qx,qy,qz".to_owned(), Some(1), "column 3 is 'ymm', expected 'y_mm'"),
+            ("time_s,m1_x_mm,m1_y_mm".to_owned(), Some(1), "column 4 is '', expected 'm1_z_mm'"),
+            ("time_s,x_mm,y_mm,z_mm,qw,qx,qy,qz,more".to_owned(), Some(1), "column 9 is 'more'"),
             (with("0.04,0,0,0,1,0,0"), Some(6), "7 fields"),
             (with("0.04,0,zero,0,1,0,0,0"), Some(6), "y_mm is 'zero'"),
             (with("0.04,0,0,NaN,1,0,0,0"), Some(6), "z_mm is 'NaN'"),

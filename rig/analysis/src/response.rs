@@ -11,6 +11,7 @@ use masseter_can::{BusPlan, CanId, PeriodicMessage, PlannedMessage, Tapped};
 use masseter_shared::config::Scenario;
 use masseter_shared::messages::FrameTap;
 use masseter_shared::schedule::plans;
+use masseter_shared::wording::counted;
 
 use super::bus_response::{BusResponse, ResponseFigures};
 
@@ -134,7 +135,7 @@ impl Responses {
             return Some("the scenario's faults are in no plan".to_owned());
         }
         if missing > 0 {
-            return Some(format!("{missing} frames are missing from the recording"));
+            return Some(format!("the recording lacks {}", counted(missing, "frame")));
         }
         self.buses.iter().find_map(Followed::unbounded)
     }
@@ -210,7 +211,7 @@ impl Followed {
             return Some(format!("bus {bus}: its recording lacks the queuing times of the frames"));
         }
         if self.error_frames > 0 {
-            return Some(format!("bus {bus} had {} errors", self.error_frames));
+            return Some(format!("bus {bus} had {}", counted(self.error_frames, "error")));
         }
         if self.off_time as f64 > self.frames as f64 * MOST_OFF_TIME {
             return Some(format!(
@@ -320,7 +321,7 @@ mod tests {
         let cases = [
             (vec![], "no frame of bus 0 was recorded"),
             (vec![seen(0x080, 0, 0)], "lacks the queuing times of the frames"),
-            (vec![seen(0x080, 1000, 51), error], "bus 0 had 1 errors"),
+            (vec![seen(0x080, 1000, 51), error], "bus 0 had 1 error"),
             (
                 vec![seen(0x080, 1000, 51), seen(0x080, 61_000, 51)],
                 "2 of 2 frames of bus 0 were off their times",
@@ -372,7 +373,7 @@ mod tests {
         let mut responses = responses(false);
         take(&mut responses, &seen(0x080, 1000, 191));
         let found = responses.finish(3);
-        assert_eq!(found.unbounded.as_deref(), Some("3 frames are missing from the recording"));
+        assert_eq!(found.unbounded.as_deref(), Some("the recording lacks 3 frames"));
         assert_eq!(found.exceeding().count(), 0);
     }
 

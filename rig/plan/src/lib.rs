@@ -100,7 +100,7 @@ impl RunPlan {
             self.trajectory.doubts().iter().map(|doubt| format!("\n  warning: the motion's {doubt}"));
         let doubts: String = doubts.collect();
         format!(
-            "{}: {:.1} s at {} Hz on {wires}, seed {}{cut}{centroid}{doubts}",
+            "{}: {:.1} s of motion at {} Hz on {wires}, seed {}{cut}{centroid}{doubts}",
             scenario.name,
             self.trajectory.duration_s(),
             scenario.rate_hz,

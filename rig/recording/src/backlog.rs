@@ -14,6 +14,7 @@ use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
 use masseter_shared::clock::{self, SECOND_NS};
+use masseter_shared::wording::counted;
 
 use super::topic::Recorded;
 use super::writer::{Medium, Recorder, WriteError};
@@ -62,7 +63,7 @@ pub struct WriteOutcome {
 impl WriteOutcome {
     /// The messages that the recording lacks, and why, in words; none if it is complete.
     pub fn loss(&self) -> Option<String> {
-        let lost = format!("{} messages did not reach the disk", self.lost);
+        let lost = format!("{} did not reach the disk", counted(self.lost, "message"));
         match &self.error {
             None if self.lost == 0 => None,
             None => Some(lost),

@@ -190,7 +190,7 @@ impl<R: Read + Seek> Reader<R> {
                     op::CHUNK => self.open_chunk()?,
                     // Damage can turn other records into messages, and no checksum covers a single record.
                     op::MESSAGE => {
-                        let reason = "messages outside of chunks (`mcap compress` packs them)";
+                        let reason = "messages outside of chunks ('mcap compress' packs them)";
                         let damage = self.walk.damaged(reason.to_owned());
                         self.add(damage);
                     }

@@ -3,6 +3,7 @@
 //! What the checks come to is the [verdict](super::verdict)'s.
 
 use masseter_shared::messages::codes::{Cause, ControllerState};
+use masseter_shared::wording::counted;
 
 use crate::check::{Check, CheckResult};
 use crate::motion_checks::{faults, tracking};
@@ -90,7 +91,7 @@ fn bus_response(response: &BusResponse) -> Check {
     };
     let unjudged = match response.off_time_frames {
         0 => String::new(),
-        frames => format!("; {} beside stalls not judged", text::counted(frames, "frame")),
+        frames => format!("; {} beside stalls not judged", counted(frames, "frame")),
     };
     let exceeding: Vec<_> = response.exceeding().map(in_words).collect();
     if exceeding.is_empty() {

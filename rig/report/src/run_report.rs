@@ -9,7 +9,7 @@ use masseter_analysis::{Analysis, Figures};
 use masseter_recording::{Manifest, ReadError, Reader, Recorded, RunFolder};
 use masseter_shared::config::Scenario;
 use masseter_shared::messages::tap::{self, TapError};
-use masseter_terminal::{Exit, Failure, Format, OrFailure, result, status};
+use masseter_terminal::{Exit, Failure, Format, OrFailure, result, result_with_tones, status};
 
 use crate::candump_logs::CandumpLogs;
 use crate::table::Detail;
@@ -131,7 +131,8 @@ fn show_and_write(
         Format::Human => {
             let table = table::text(manifest, figures, &verdict, detail);
             let more = if detail == Detail::Brief { "; --verbose shows every figure" } else { "" };
-            result(&format!("{table}\nreport: {}{more}\n", folder.file("report.html").display()))
+            let text = format!("{table}\nreport: {}{more}\n", folder.file("report.html").display());
+            result_with_tones(&text, &table::TONES)
         }
         Format::Json => result(&summary),
     };

@@ -11,7 +11,23 @@ use masseter_analysis::{
     BusResponse, Figures, IntervalFigures, PoseErrors, ReadingFigures, ResponseFigures, TrackingFigures,
 };
 use masseter_recording::{Manifest, RunUsage, Usage};
-use masseter_terminal::Exit;
+use masseter_terminal::{Exit, Tone};
+
+/// The words that judge.
+pub(crate) const TONES: [(&str, Tone); 12] = [
+    ("PASS", Tone::Good),
+    ("FAIL", Tone::Bad),
+    ("NOT RUN", Tone::Bad),
+    ("INVALID", Tone::Doubtful),
+    ("DIED", Tone::Bad),
+    ("SAFE STOP", Tone::Bad),
+    ("INCOMPLETE", Tone::Bad),
+    ("INTERRUPTED", Tone::Doubtful),
+    ("ok", Tone::Good),
+    ("lost", Tone::Doubtful),
+    ("timing: disturbed", Tone::Doubtful),
+    ("timing: missed", Tone::Bad),
+];
 
 /// How much is shown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -27,16 +27,6 @@ pub(crate) fn grouped(number: u64) -> String {
     [head].into_iter().filter(|head| !head.is_empty()).chain(groups).collect::<Vec<_>>().join(",")
 }
 
-/// A number of things: "1 cycle", "2 cycles", "2 stretches".
-pub(crate) fn counted(number: u64, thing: &str) -> String {
-    let plural = match number {
-        1 => "",
-        _ if thing.ends_with("ch") => "es",
-        _ => "s",
-    };
-    format!("{} {thing}{plural}", grouped(number))
-}
-
 /// An event with its cycle.
 pub(crate) fn event_with_cycle(record: &EventRecord) -> String {
     format!("cycle {:>6} {}", record.cycle, event(record))
@@ -63,10 +53,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_are_grouped_and_things_counted() {
+    fn digits_are_grouped_by_three() {
         let numbers = [0, 7, 999, 1000, 11_379, 1_234_567];
         assert_eq!(numbers.map(grouped), ["0", "7", "999", "1,000", "11,379", "1,234,567"]);
-        let things = [counted(1, "cycle"), counted(0, "cycle"), counted(1000, "stretch")];
-        assert_eq!(things, ["1 cycle", "0 cycles", "1,000 stretches"]);
     }
 }

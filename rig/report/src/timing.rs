@@ -6,9 +6,10 @@ use std::fmt::{self, Display, Formatter};
 
 use masseter_analysis::{Figures, OverrunAttribution};
 use masseter_recording::Manifest;
+use masseter_shared::wording::counted;
 use serde::Serialize;
 
-use crate::text::{counted, grouped};
+use crate::text::grouped;
 
 /// Whether the deadlines were kept.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]

@@ -6,13 +6,14 @@ use masseter_analysis::{EventRecord, Figures, Outage};
 use masseter_recording::{DmaLatency, Ending, Manifest, RunUsage};
 use masseter_shared::config::{CanConfig, ChecksConfig, TimingConfig};
 use masseter_shared::messages::codes::EventKind;
+use masseter_shared::wording::counted;
 use masseter_terminal::Exit;
 use serde::Serialize;
 
 use crate::check::{Check, CheckResult};
 use crate::checks::checks;
 use crate::motion_checks::{FAULTS, left_its_path};
-use crate::text::{self, counted, grouped};
+use crate::text::{self, grouped};
 use crate::timing::{Timing, TimingWord};
 
 /// The judgement of a run.

@@ -12,6 +12,7 @@
 //! # Ok::<(), anyhow::Error>(())
 //! ```
 
+mod colour;
 mod exit;
 
 use std::fmt::Write as _;
@@ -21,6 +22,7 @@ use anyhow::Context;
 use clap::ValueEnum;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 
+pub use colour::{Tone, choose_colour, result_with_tones};
 pub use exit::{Exit, Failure, OrFailure};
 
 /// A pipe that takes anything takes as many bytes as one write, bytes.

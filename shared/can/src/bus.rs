@@ -78,7 +78,7 @@ pub enum SendError {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum ReceiveError {
     /// Frames arrived while the receive queue was full. Reported once for each group of losses.
-    #[error("{lost} received frames lost: the receive queue was not emptied in time")]
+    #[error("received frames lost: {lost}; the receive queue was not emptied in time")]
     Overrun {
         /// Frames lost since the last report.
         lost: u64,

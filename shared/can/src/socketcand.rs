@@ -45,13 +45,13 @@ pub enum Request {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum RequestError {
     /// No request of raw mode.
-    #[error("unknown command `{text}`: expected open, rawmode, send or echo")]
+    #[error("unknown command '{text}': expected open, rawmode, send or echo")]
     Unknown {
         /// The text between the brackets.
         text: String,
     },
     /// The bytes sent are not as many as announced.
-    #[error("{announced} data bytes announced, {sent} sent")]
+    #[error("data bytes announced: {announced}, sent: {sent}")]
     Length {
         /// The length field.
         announced: String,
@@ -59,7 +59,7 @@ pub enum RequestError {
         sent: usize,
     },
     /// An identifier or a data byte is not a number.
-    #[error("`{text}` is no number in hexadecimal digits")]
+    #[error("'{text}' is no number in hexadecimal digits")]
     Number {
         /// The word.
         text: String,
@@ -223,8 +223,8 @@ mod tests {
             ("< open >", "unknown command"),
             ("open can0 >", "outside"),
             ("\u{e9} >", "outside"),
-            ("< send 123 3 11 22 >", "3 data bytes announced, 2 sent"),
-            ("< send 123 x >", "x data bytes announced"),
+            ("< send 123 3 11 22 >", "data bytes announced: 3, sent: 2"),
+            ("< send 123 x >", "data bytes announced: x"),
             ("< send 123 1 1g >", "no number"),
             ("< send 123 1 -1 >", "no number"),
             ("< send 12x 0 >", "no number"),

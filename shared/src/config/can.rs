@@ -8,6 +8,7 @@ use masseter_can::{Bitrate, BitrateError};
 use super::error::ScenarioError;
 use super::need::{keyed, require_positive};
 use crate::geometry::AXES;
+use crate::wording::counted;
 
 /// The node id of the rig's master.
 pub const MASTER_NODE: NodeId = match NodeId::new(127) {
@@ -96,7 +97,8 @@ impl CanConfig {
         if self.is_virtual() || [self.interfaces.len(), distinct] == [self.buses.len(); 2] {
             return Ok(());
         }
-        let need = format!("name {} interfaces, one for each of can.buses", self.buses.len());
+        let need =
+            format!("name {}, one for each of can.buses", counted(self.buses.len() as u64, "interface"));
         Err(ScenarioError::bad("can.interfaces", &self.interfaces.join(","), need))
     }
 }

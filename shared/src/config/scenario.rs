@@ -12,9 +12,12 @@ use super::{
 use crate::clock::SECOND_NS;
 use crate::geometry::MechanismConfig;
 use crate::input::{excerpt, read_text};
+use crate::wording::nearest;
 
 /// Size of the largest scenario file, bytes.
 const MOST_BYTES: u64 = 1 << 20;
+/// What a message on an unknown key begins with.
+const UNKNOWN_KEY: &str = "unknown key";
 /// Characters of the longest message of the TOML reader.
 const LONGEST_REASON: usize = 2000;
 
@@ -117,7 +120,7 @@ impl Scenario {
     /// scenario.validate()?;
     /// assert_eq!(scenario.period_ns(), 2_000_000);
     /// let error = Scenario::parse(path, "rate_hzz = 500").unwrap_err().to_string();
-    /// assert!(error.starts_with("slow.toml:1:1: unknown field") && error.ends_with("did you mean `rate_hz`?"));
+    /// assert!(error.starts_with("slow.toml:1:1: unknown key") && error.ends_with("did you mean 'rate_hz'?"));
     /// # Ok::<(), masseter_shared::config::ScenarioError>(())
     /// ```
     ///
@@ -199,10 +202,7 @@ fn place_of_refusal(path: &Path, refusal: &str, key: &str, entry: Option<usize>)
 fn malformed(path: &Path, text: &str, document: Option<&Document>, error: &toml::de::Error) -> ScenarioError {
     let offset = error.span().map_or(0, |span| span.start);
     let mut place = place(path, text, offset);
-    let mut reason = cut(error.message().lines().next().unwrap_or_default());
-    if let Some(nearest) = nearest(&reason) {
-        reason = format!("{reason}; did you mean `{nearest}`?");
-    }
+    let mut reason = in_words(error.message().lines().next().unwrap_or_default());
     if let Some(twice) = error.span().filter(|_| reason == "duplicate key").and_then(|span| text.get(span)) {
         reason = format!("{}: the key is there already", excerpt(twice));
     }
@@ -214,10 +214,27 @@ fn malformed(path: &Path, text: &str, document: Option<&Document>, error: &toml:
         }
         Some(culprit.unwrap_or(key))
     });
-    if let Some(key) = key.filter(|_| !reason.starts_with("unknown field")) {
+    if let Some(key) = key.filter(|_| !reason.starts_with(UNKNOWN_KEY)) {
         reason = format!("{}: {reason}", excerpt(&key));
     }
     ScenarioError::Malformed { place, reason }
+}
+
+/// A message of the TOML reader in the words of the documents, with the most similar of the keys or values that it
+/// expects.
+fn in_words(message: &str) -> String {
+    let message = cut(message);
+    let known = [("unknown field", UNKNOWN_KEY), ("unknown variant", "unknown value")];
+    let known = known.iter().find_map(|(of_reader, ours)| Some((*ours, message.strip_prefix(of_reader)?)));
+    let Some((ours, rest)) = known else { return quoted(&message) };
+    let mut names = rest.split('`').skip(1).step_by(2);
+    let likely = names.next().and_then(|unknown| nearest(unknown, names));
+    let question = likely.map_or_else(String::new, |likely| format!("; did you mean '{likely}'?"));
+    format!("{ours}{}{question}", quoted(rest))
+}
+
+fn quoted(message: &str) -> String {
+    message.replace('`', "'")
 }
 
 /// A message of the TOML reader with every quotation cut.
@@ -227,14 +244,6 @@ fn cut(message: &str) -> String {
         _ => excerpt(part),
     });
     quotations.collect::<String>().chars().take(LONGEST_REASON).collect()
-}
-
-/// The expected key or word most like the unknown one, both taken from serde's message.
-fn nearest(message: &str) -> Option<&str> {
-    let mut quoted = message.split('`').skip(1).step_by(2);
-    let is_unknown = ["unknown field", "unknown variant"].iter().any(|start| message.starts_with(start));
-    let unknown = is_unknown.then(|| quoted.next())??;
-    quoted.max_by(|a, b| strsim::jaro_winkler(unknown, a).total_cmp(&strsim::jaro_winkler(unknown, b)))
 }
 
 #[cfg(test)]

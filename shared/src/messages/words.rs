@@ -3,6 +3,7 @@
 use super::Event;
 use super::codes::{Cause, EventKind, NoPose, Source};
 use crate::geometry::AXIS_NAMES;
+use crate::wording::counted;
 use masseter_can::canopen::{AbortCode, EmergencyCode, ObjectAddress};
 
 /// The sentence for an event that names a node, a bus, an object, or why there is no pose; `None` for other events.
@@ -50,7 +51,7 @@ fn complaint(cause: Cause, event: &Event) -> Option<String> {
         }
         Cause::BootTimeout => format!("not operational after {value} ms"),
         Cause::HeartbeatLost => format!("silent for {value} ms"),
-        Cause::ProcessDataLost => format!("process data missing for {value} cycles"),
+        Cause::ProcessDataLost => format!("process data missing for {}", counted(value.into(), "cycle")),
         Cause::FollowingError => format!(
             "{:.3} mm from where its targets should have taken it, limit {:.3} mm",
             event.value * 1e3,
@@ -66,7 +67,11 @@ fn complaint(cause: Cause, event: &Event) -> Option<String> {
         Cause::BusOff => format!("off after too many errors (transmit error counter {value})"),
         Cause::BusRefused => "a frame could not be sent".to_owned(),
         Cause::WrongLength => {
-            format!("frame {:03X}h has {value} data bytes, expected {limit}", event.object)
+            format!(
+                "frame {:03X}h has {}, expected {limit}",
+                event.object,
+                counted(value.into(), "data byte")
+            )
         }
         Cause::UnknownNode => "a node that no axis is configured with".to_owned(),
         Cause::SecondMaster => "another node sends SYNC or has the master's id".to_owned(),

@@ -63,7 +63,7 @@ pub fn obtain(request: SchedulingRequest) -> Obtained {
         refusals.push(refused_core(requested, &why, &usable_cores()));
     }
     let mut refuse = |what: String, why: String| {
-        refusals.push(format!("{what} refused ({why}): `masseter doctor` shows how to allow it"));
+        refusals.push(format!("{what} refused ({why}): 'masseter doctor' shows how to allow it"));
     };
     if let Some(requested) = request.fifo_priority
         && let Some(why) = refusal(fifo, fifo_priority == Some(requested))
@@ -88,7 +88,7 @@ fn refused_core(core: usize, why: &str, choice: &[usize]) -> String {
     let choice: Vec<_> = choice.iter().map(usize::to_string).collect();
     let remedy = match &choice[..] {
         [only] => format!(
-            "only core {only} may be used, and controller and plant delay each other there: `masseter doctor` shows how \
+            "only core {only} may be used, and controller and plant delay each other there: 'masseter doctor' shows how \
              to allow two"
         ),
         choice => format!("choose two among {} with --cores", choice.join(", ")),
@@ -240,6 +240,6 @@ mod tests {
     #[test]
     fn a_refused_core_comes_with_its_remedy() {
         assert!(refused_core(4, "EINVAL", &[0, 2]).contains("choose two among 0, 2 with --cores"));
-        assert!(refused_core(1, "EINVAL", &[0]).contains("`masseter doctor` shows how to allow two"));
+        assert!(refused_core(1, "EINVAL", &[0]).contains("'masseter doctor' shows how to allow two"));
     }
 }

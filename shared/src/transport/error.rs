@@ -15,7 +15,7 @@ use crate::messages::{LAYOUT_VERSION, Message};
 #[derive(Debug, thiserror::Error)]
 pub enum DomainError {
     /// Another run uses the name.
-    #[error("a rig named '{id}' is running; wait for it, stop it, or give this one another `--name`")]
+    #[error("a rig named '{id}' is running; wait for it, stop it, or give this one another --name")]
     InUse {
         /// The domain's id.
         id: String,
@@ -83,9 +83,9 @@ fn help(reason: &str) -> &'static str {
     } else if reason.contains("Incompatible") {
         "a process of another version uses this topic; stop it"
     } else if reason.contains("ConnectionsRefused") {
-        "/dev/shm is full, or too little memory may be locked (`masseter doctor`), or too few files opened (`ulimit -n`)"
+        "/dev/shm is full, or too little memory may be locked ('masseter doctor'), or too few files opened ('ulimit -n')"
     } else {
-        "`masseter clean` removes what killed runs left behind"
+        "'masseter clean' removes what killed runs left behind"
     }
 }
 

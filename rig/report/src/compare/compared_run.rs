@@ -47,7 +47,7 @@ impl ComparedRun {
     pub(super) fn read(path: &Path) -> anyhow::Result<Self> {
         let folder = RunFolder::open(path)?;
         let summary = folder.summary();
-        let help = || format!("{}; `masseter report {}` writes it", summary.display(), path.display());
+        let help = || format!("{}; 'masseter report {}' writes it", summary.display(), path.display());
         let found = json(&summary).with_context(help)?;
         let manifest = folder.manifest();
         let circumstances = json(&manifest).with_context(|| manifest.display().to_string())?;

@@ -78,6 +78,6 @@ mod tests {
     #[test]
     fn another_length_is_refused() {
         let error = Heartbeat::decode(&[5, 0]).unwrap_err();
-        assert_eq!(error.to_string(), "heartbeat has 1 data bytes, received 2");
+        assert_eq!(error.to_string(), "data bytes of heartbeat: 2, expected 1");
     }
 }

@@ -2,7 +2,7 @@
 
 /// An object of a length that its definition does not allow.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("{object} has {expected} data bytes, received {actual}")]
+#[error("data bytes of {object}: {actual}, expected {expected}")]
 pub struct LengthError {
     /// The communication object.
     pub object: &'static str,

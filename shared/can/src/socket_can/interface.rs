@@ -18,15 +18,15 @@ const UP: u32 = 1;
 pub enum OpenError {
     /// The kernel has no CAN.
     #[error(
-        "{interface}: this kernel has no CAN (no AF_CAN); load its modules with `modprobe can-raw`, or use \
-         `--can virtual`"
+        "{interface}: this kernel has no CAN (no AF_CAN); load its modules with 'modprobe can-raw', or use \
+         --can virtual"
     )]
     NoCan {
         /// The interface asked for.
         interface: String,
     },
     /// No CAN interface of that name.
-    #[error("no CAN interface `{interface}`; there {}", existing(.there))]
+    #[error("no CAN interface '{interface}'; there {}", existing(.there))]
     NoInterface {
         /// The interface asked for.
         interface: String,
@@ -34,7 +34,7 @@ pub enum OpenError {
         there: Vec<String>,
     },
     /// The interface is down.
-    #[error("{interface} is down; `ip link set {interface} up type can bitrate …` brings it up")]
+    #[error("{interface} is down; 'ip link set {interface} up type can bitrate …' brings it up")]
     Down {
         /// The interface.
         interface: String,
@@ -141,7 +141,7 @@ pub(super) fn check(interface: &str) -> Result<usize, OpenError> {
 
 fn existing(there: &[String]) -> String {
     match there {
-        [] => "is none: load the driver of your adapter, or `ip link add vcan0 type vcan`".to_owned(),
+        [] => "is none: load the driver of your adapter, or 'ip link add vcan0 type vcan'".to_owned(),
         [only] => format!("is {only}"),
         more => format!("are {}", more.join(", ")),
     }
@@ -156,7 +156,7 @@ mod tests {
         let of = |errno| OpenError::from_errno("can7", errno).to_string();
         let table = [
             (libc::EAFNOSUPPORT, "modprobe can-raw"),
-            (libc::ENODEV, "no CAN interface `can7`"),
+            (libc::ENODEV, "no CAN interface 'can7'"),
             (libc::ENETDOWN, "ip link set can7 up"),
             (libc::EPERM, "no permission"),
             (libc::EIO, "can7 cannot be opened"),

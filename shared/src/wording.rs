@@ -1,0 +1,39 @@
+//! Parts of sentences that many messages share.
+
+/// Likeness from which a name may be meant.
+const LIKELY: f64 = 0.7;
+
+/// A number of things, with the noun in the number that fits.
+///
+/// # Examples
+/// ```
+/// use masseter_shared::wording::counted;
+///
+/// assert_eq!(counted(1, "cycle"), "1 cycle");
+/// assert_eq!(counted(0, "box"), "0 boxes");
+/// ```
+pub fn counted(number: u64, noun: &str) -> String {
+    let ending = match number {
+        1 => "",
+        _ if noun.ends_with(['x', 'h']) => "es",
+        _ => "s",
+    };
+    format!("{number} {noun}{ending}")
+}
+
+/// The most similar of the names to one that is none of them, whatever its case; none if all are unlike it.
+///
+/// # Examples
+/// ```
+/// use masseter_shared::wording::nearest;
+///
+/// let topics = ["reading", "command", "state"];
+/// assert_eq!(nearest("States", topics), Some("state"));
+/// assert_eq!(nearest("jaw", topics), None);
+/// ```
+pub fn nearest<'a>(unknown: &str, names: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    let unknown = unknown.to_lowercase();
+    let rated = names.into_iter().map(|name| (strsim::jaro_winkler(&unknown, name), name));
+    let likely = rated.filter(|(likeness, _)| *likeness >= LIKELY);
+    likely.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, name)| name)
+}
