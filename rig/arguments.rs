@@ -6,7 +6,7 @@ use clap::{Args, ValueEnum};
 use masseter_controller::hold_position::HoldPosition;
 use masseter_controller::motion_controller::MotionController;
 use masseter_controller::process::BuildController;
-use masseter_shared::lifecycle::ProcessArguments;
+use masseter_shared::lifecycle::{Patience, ProcessArguments};
 
 /// The arguments that the supervisor passes to every process of a run.
 #[derive(Debug, Clone, Args)]
@@ -15,11 +15,14 @@ pub(crate) struct ProcessArgs {
     scenario: PathBuf,
     #[arg(long)]
     domain: String,
+    /// For a run in lockstep
+    #[arg(long, value_parser = parse_patience)]
+    lockstep: Option<Patience>,
 }
 
 impl ProcessArgs {
     pub(crate) fn process_arguments(self) -> ProcessArguments {
-        ProcessArguments { scenario: self.scenario, domain: self.domain }
+        ProcessArguments { scenario: self.scenario, domain: self.domain, lockstep: self.lockstep }
     }
 }
 
@@ -62,6 +65,20 @@ pub(crate) fn parse_cores(text: &str) -> Result<[usize; 2], String> {
         Ok([controller, plant]) => Ok([*controller, *plant]),
         _ => Err("expected two cores, such as 0,1".to_owned()),
     }
+}
+
+/// `none`, or a duration.
+pub(crate) fn parse_patience(text: &str) -> Result<Patience, String> {
+    if text == "none" {
+        return Ok(Patience(None));
+    }
+    let duration = humantime::parse_duration(text);
+    duration.map(|duration| Patience(Some(duration))).map_err(|error| format!("{error}; or `none`"))
+}
+
+/// The same as [`parse_patience`] reads.
+pub(crate) fn patience_text(Patience(patience): Patience) -> String {
+    patience.map_or_else(|| "none".to_owned(), |patience| humantime::format_duration(patience).to_string())
 }
 
 pub(crate) fn parse_wires(text: &str) -> Result<Wires, String> {

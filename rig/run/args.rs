@@ -6,11 +6,15 @@ use std::time::Duration;
 
 use clap::{Args, ValueEnum};
 use masseter_plan::Overrides;
+use masseter_shared::lifecycle::Patience;
 use masseter_terminal::Format;
 use rustix::fs::Mode;
 
-use crate::arguments::{ControllerKind, Wires, parse_cores, parse_wires};
+use crate::arguments::{ControllerKind, Wires, parse_cores, parse_patience, parse_wires};
 use crate::foxglove;
+
+/// The patience of a run in lockstep.
+const DEFAULT_PATIENCE: Duration = Duration::from_secs(10);
 
 /// The arguments of `run`.
 #[derive(Debug, Clone, Default, Args)]
@@ -32,6 +36,10 @@ pub(crate) struct RunArgs {
     /// Clock of the run
     #[arg(long, value_enum, default_value_t)]
     pub clock: ClockKind,
+    /// In lockstep, how long a process may take to answer before the run ends: such as 10s, or none for a debugger
+    /// [default: 10s]
+    #[arg(long, value_name = "DURATION", value_parser = parse_patience)]
+    pub patience: Option<Patience>,
     /// Play the motion, or only hold the position found at the start
     #[arg(long, value_enum, default_value_t)]
     pub controller: ControllerKind,
@@ -74,6 +82,12 @@ pub(crate) struct RunArgs {
 }
 
 impl RunArgs {
+    /// For how long a process may be silent in lockstep.
+    pub(super) fn lockstep(&self) -> Option<Patience> {
+        let patience = self.patience.unwrap_or(Patience(Some(DEFAULT_PATIENCE)));
+        (self.clock == ClockKind::Lockstep).then_some(patience)
+    }
+
     /// The changes to the scenario.
     pub(super) fn overrides(&self) -> Overrides {
         Overrides {
@@ -116,6 +130,8 @@ pub(crate) enum ClockKind {
     /// Real time, in three processes
     #[default]
     Rt,
+    /// Simulated time in three processes that wait for each other: the same bytes as virtual
+    Lockstep,
     /// Virtual time, in one thread: as fast as possible, the same bytes every time
     Virtual,
 }
