@@ -2,7 +2,7 @@
 //!
 //! A turn ends with a signal to the other loop, after all messages of the turn. A process that waits sleeps. Whoever
 //! stops answering for longer than the [`Patience`] is given up: the process that waits says so on standard output and
-//! goes on alone, so that its watchdogs end the run.
+//! goes on alone, in real time, so that its watchdogs end the run.
 
 use std::time::Duration;
 
@@ -90,6 +90,10 @@ impl Lockstep {
 
     /// Begins the next cycle, in time.
     pub fn begin_cycle(&mut self) -> Wake {
+        if self.lost.is_some() {
+            // Nothing else keeps this loop from running far ahead of the recorder.
+            clock::sleep(Duration::from_nanos(self.period_ns));
+        }
         self.cycle += 1;
         self.now_ns = self.first_due_ns + (self.cycle - 1) * self.period_ns;
         Wake::on_time(self.cycle, self.now_ns)
@@ -126,6 +130,9 @@ impl Lockstep {
     /// # Errors
     /// Those of the signals.
     pub fn end_turn(&mut self, is_last: bool) -> Result<(), DomainError> {
+        if self.lost == Some(self.other.0) {
+            return Ok(());
+        }
         self.other.1.send(if is_last { LAST_TURN_ENDED } else { TURN_ENDED })
     }
 
@@ -145,7 +152,7 @@ impl Lockstep {
     /// As [`Self::await_turn`].
     pub fn await_recorder(&mut self, messages: usize) -> Result<(), ProcessError> {
         self.unrecorded += messages;
-        if self.unrecorded < WINDOW_MESSAGES {
+        if self.unrecorded < WINDOW_MESSAGES || self.lost == Some(Party::Recorder) {
             return Ok(());
         }
         if self.is_recording {
