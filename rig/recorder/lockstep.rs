@@ -22,8 +22,8 @@ pub(super) struct InOrder {
 
 impl InOrder {
     /// Adds a message that has arrived.
-    pub(super) fn add(&mut self, message: Recorded) {
-        let lane = match &message {
+    pub(super) fn add(&mut self, message: &Recorded) {
+        let lane = match message {
             Recorded::Reading(reading) => {
                 self.complete_before_ns = reading.published_ns;
                 0
@@ -35,7 +35,7 @@ impl InOrder {
             Recorded::Frame(_) => 5,
             Recorded::Event(_) | Recorded::Machine(_) => 6,
         };
-        self.lanes[lane].push_back(message);
+        self.lanes[lane].push_back(*message);
     }
 
     /// Hands out, in order, the messages of complete cycles, or all of them at the end.
@@ -82,8 +82,8 @@ mod tests {
         let mut in_order = InOrder::default();
         // Topic by topic, the events in any order of their publishers.
         for place in [0, 2, 3, 1, 5, 6, 4] {
-            in_order.add(first[place]);
-            in_order.add(second[place]);
+            in_order.add(&first[place]);
+            in_order.add(&second[place]);
         }
         let drained = |in_order: &mut InOrder, is_last| {
             let mut drained = Vec::new();

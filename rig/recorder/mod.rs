@@ -105,7 +105,7 @@ fn record_in_real_time(
     loop {
         let is_last = stop.is_made();
         // Each message has its own time, because some are published during the drain.
-        subscribers.drain(&mut |message| sinks.write(&message, clock::now_ns()))?;
+        subscribers.drain(&mut |message| sinks.write(message, clock::now_ns()))?;
         let now_ns = clock::now_ns();
         if let Some(sample) = sampler.sample(now_ns)
             && let Some(machine) = machine_topic::message(samples + 1, &sample)

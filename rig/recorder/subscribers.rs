@@ -27,7 +27,7 @@ impl Subscribers {
 
     /// Hands everything that has arrived to `take`, topic by topic. Readings come first: what was published before the
     /// last of them follows in the same drain.
-    pub(super) fn drain(&self, take: &mut impl FnMut(Recorded)) -> Result<(), TransportError> {
+    pub(super) fn drain(&self, take: &mut impl FnMut(&Recorded)) -> Result<(), TransportError> {
         drain(&self.readings, take)?;
         drain(&self.commands, take)?;
         drain(&self.states, take)?;
@@ -40,11 +40,11 @@ impl Subscribers {
 /// Drains one topic, at most its queue's length, so that a flood cannot delay the other topics.
 fn drain<M: Message + Into<Recorded>>(
     subscriber: &Subscriber<M>,
-    take: &mut impl FnMut(Recorded),
+    take: &mut impl FnMut(&Recorded),
 ) -> Result<(), TransportError> {
     for _ in 0..M::DEPTH {
         let Some(message) = subscriber.receive()? else { break };
-        take((*message).into());
+        take(&(*message).into());
     }
     Ok(())
 }
@@ -52,11 +52,11 @@ fn drain<M: Message + Into<Recorded>>(
 /// The same for a topic that travels in batches.
 fn drain_batches<M: Message + Into<Recorded>>(
     subscriber: &BatchSubscriber<M>,
-    take: &mut impl FnMut(Recorded),
+    take: &mut impl FnMut(&Recorded),
 ) -> Result<(), TransportError> {
     for _ in 0..M::DEPTH {
         let Some(batch) = subscriber.receive()? else { break };
-        batch.iter().for_each(|&message| take(message.into()));
+        batch.iter().for_each(|&message| take(&message.into()));
     }
     Ok(())
 }
