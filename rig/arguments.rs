@@ -9,7 +9,7 @@ use clap::{Args, ValueEnum};
 use masseter_controller::hold_position::HoldPosition;
 use masseter_controller::motion_controller::MotionController;
 use masseter_controller::process::BuildController;
-use masseter_shared::lifecycle::ProcessArguments;
+use masseter_shared::lifecycle::{Patience, ProcessArguments};
 use masseter_shared::realtime::scheduling::usable_cores;
 
 /// The arguments that the supervisor passes to every process of a run.
@@ -19,11 +19,14 @@ pub(crate) struct ProcessArgs {
     scenario: PathBuf,
     #[arg(long)]
     domain: String,
+    /// For a run in lockstep
+    #[arg(long, value_parser = parse_patience)]
+    lockstep: Option<Patience>,
 }
 
 impl ProcessArgs {
     pub(crate) fn process_arguments(self) -> ProcessArguments {
-        ProcessArguments { scenario: self.scenario, domain: self.domain }
+        ProcessArguments { scenario: self.scenario, domain: self.domain, lockstep: self.lockstep }
     }
 }
 
@@ -98,6 +101,19 @@ fn check_among(cores: &[usize], usable: &[usize]) -> anyhow::Result<()> {
         }
         _ => Ok(()),
     }
+}
+
+/// `none`, or a duration.
+pub(crate) fn parse_patience(text: &str) -> Result<Patience, String> {
+    if text == "none" {
+        return Ok(Patience(None));
+    }
+    parse_duration(text).map(|duration| Patience(Some(duration))).map_err(|error| format!("{error}; or none"))
+}
+
+/// The same as [`parse_patience`] reads.
+pub(crate) fn patience_text(Patience(patience): Patience) -> String {
+    patience.map_or_else(|| "none".to_owned(), |patience| humantime::format_duration(patience).to_string())
 }
 
 pub(crate) fn parse_wires(text: &str) -> Result<Wires, String> {

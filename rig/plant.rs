@@ -9,11 +9,11 @@ use masseter_plant::emulation::{Emulator, EmulatorCounters};
 use masseter_plant::process::{self, Reason};
 use masseter_shared::clock;
 use masseter_shared::config::Scenario;
-use masseter_shared::lifecycle::{ProcessArguments, StopRequest};
+use masseter_shared::lifecycle::{Patience, ProcessArguments, StopRequest};
 use masseter_shared::realtime::scheduling::{SchedulingRequest, obtain};
 use masseter_terminal::{Exit, result_line, status};
 
-use crate::arguments::{Wires, parse_wires};
+use crate::arguments::{Wires, parse_patience, parse_wires};
 
 /// The arguments of `plant`.
 #[derive(Debug, Clone, Args)]
@@ -32,12 +32,15 @@ pub(crate) struct PlantArgs {
     scenario: Option<PathBuf>,
     #[arg(long, hide = true, requires = "scenario")]
     domain: Option<String>,
+    #[arg(long, hide = true, requires = "scenario", value_parser = parse_patience)]
+    lockstep: Option<Patience>,
 }
 
 impl PlantArgs {
     /// The arguments from the supervisor; none for a plant that a user starts.
     fn process_arguments(&self) -> Option<ProcessArguments> {
-        Some(ProcessArguments { scenario: self.scenario.clone()?, domain: self.domain.clone()? })
+        let (scenario, domain) = (self.scenario.clone()?, self.domain.clone()?);
+        Some(ProcessArguments { scenario, domain, lockstep: self.lockstep })
     }
 }
 

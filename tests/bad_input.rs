@@ -234,7 +234,10 @@ fn interfaces_that_cannot_be_used_are_refused_with_what_to_do() {
         (&["run", "--can", "can0"], &["name 2 interfaces"]),
         (&["run", "--can", "can0,can0"], &["name 2 interfaces"]),
         (&["run", "--can", "can0,"], &["such as can0,can1"]),
-        (&["run", "--clock", "virtual", "--can", "can0,can1"], &["virtual time has no real CAN interfaces"]),
+        (
+            &["run", "--clock", "virtual", "--can", "can0,can1"],
+            &["simulated time has no real CAN interfaces"],
+        ),
         (
             &["plant", "--emulate", "--can", "no-such-a,no-such-b"],
             &["modprobe can-raw", "no CAN interface 'no-such-a'"],

@@ -1,8 +1,9 @@
-//! The plant's process: binds the pure core to iceoryx2 and to real time, and decides nothing.
+//! The plant's process: binds the pure core to iceoryx2, and to real time or to lockstep. It decides nothing.
 
 use masseter_shared::clock;
 use masseter_shared::config::Scenario;
-use masseter_shared::lifecycle::{ProcessArguments, ProcessContext, ProcessError};
+use masseter_shared::lifecycle::{Party, ProcessArguments, ProcessContext, ProcessError, StopRequest};
+use masseter_shared::lockstep::Lockstep;
 use masseter_shared::messages::{Command, Event, FrameTap, Reading, Truth};
 use masseter_shared::realtime::{Cycle, Wake};
 use masseter_shared::schedule::CycleSchedule;
@@ -94,59 +95,132 @@ pub fn run(arguments: &ProcessArguments) -> Result<Reason, PlantProcessError> {
     }
 }
 
-/// Ports and deadlines of the plant's process.
-struct RealTime<'a> {
+/// The clock of the cycles.
+enum Clock {
+    RealTime(Cycle),
+    Lockstep(Lockstep),
+}
+
+impl Clock {
+    fn now_ns(&self) -> u64 {
+        match self {
+            Self::RealTime(_) => clock::now_ns(),
+            Self::Lockstep(lockstep) => lockstep.now_ns(),
+        }
+    }
+}
+
+/// Ports and clock of the plant's process.
+struct Binding<'a> {
     ports: Ports,
-    cycle: Cycle,
+    clock: Clock,
     schedule: &'a CycleSchedule,
     /// Whether commands are received; at the end they no longer are.
     takes_commands: bool,
+    /// The largest number of samples that the last cycle left on one topic.
+    samples: usize,
 }
 
-impl<L: Link> PlantPorts<L> for RealTime<'_> {
+impl Binding<'_> {
+    /// Whether the run goes on. In lockstep, a plant that has lost its controller continues until its master has stopped the
+    /// drives.
+    fn goes_on(&self, stop: &StopRequest) -> bool {
+        match &self.clock {
+            Clock::RealTime(_) => !stop.is_made(),
+            Clock::Lockstep(lockstep) => match lockstep.lost() {
+                None => !lockstep.is_last() && !stop.is_made(),
+                Some(lost) => lost == Party::Controller,
+            },
+        }
+    }
+
+    /// Waits for the next cycle. Before it, warms up; in lockstep, lets the recorder catch up.
+    fn wait<L: Link>(&mut self, plant: &mut PlantCore<L>) -> Result<Wake, PlantProcessError> {
+        let Self { clock, ports, .. } = self;
+        match clock {
+            Clock::RealTime(cycle) => cycle.wait_warm(|| {
+                // Works out what has happened on the wires by now.
+                plant.advance(clock::now_ns())?;
+                Ok(ports.warm_up()?)
+            }),
+            Clock::Lockstep(lockstep) => {
+                lockstep.await_recorder(self.samples)?;
+                Ok(lockstep.begin_cycle())
+            }
+        }
+    }
+}
+
+impl<L: Link> PlantPorts<L> for Binding<'_> {
     type Command = ReceivedMessage<Command>;
     type Error = PlantProcessError;
 
     fn now_ns(&self) -> u64 {
-        clock::now_ns()
+        self.clock.now_ns()
     }
 
     fn wait_until(&mut self, due_ns: u64, latest_ns: u64) -> u64 {
-        self.cycle.waiter().until_between(due_ns, latest_ns)
+        match &mut self.clock {
+            Clock::RealTime(cycle) => cycle.waiter().until_between(due_ns, latest_ns),
+            Clock::Lockstep(lockstep) => lockstep.advance(latest_ns),
+        }
     }
 
     fn wait_for_frames(&mut self, link: &mut L, latest_ns: u64) -> u64 {
-        link.wait(latest_ns, self.cycle.waiter())
+        match &mut self.clock {
+            Clock::RealTime(cycle) => link.wait(latest_ns, cycle.waiter()),
+            Clock::Lockstep(lockstep) => lockstep.advance(latest_ns),
+        }
     }
 
     fn publish_reading(&mut self, fill: impl FnOnce(&mut Reading)) -> Result<(), PlantProcessError> {
-        Ok(self.ports.readings.publish(fill)?)
+        Ok(self.ports.readings.publish_by(|| self.clock.now_ns(), fill)?)
     }
 
     fn publish_truth(&mut self, truth: &Truth) -> Result<(), PlantProcessError> {
-        Ok(self.ports.truths.publish(|message| *message = *truth)?)
+        Ok(self.ports.truths.publish_by(|| self.clock.now_ns(), |message| *message = *truth)?)
     }
 
     fn command(&mut self, wake: &Wake) -> Result<Option<ReceivedMessage<Command>>, PlantProcessError> {
-        if !self.takes_commands {
-            return Ok(None);
-        }
         // No command can arrive before the controller wakes.
-        let command_by_ns = wake.due_ns + self.schedule.command_by_ns;
-        let waiter = self.cycle.waiter();
-        waiter.until_between(wake.due_ns + self.schedule.controller_at_ns, command_by_ns);
+        let controller_at_ns = wake.due_ns + self.schedule.controller_at_ns;
         let is_awaited = |command: &Command| command.cycle >= wake.cycle;
-        Ok(self.ports.commands.latest_by(command_by_ns, waiter, is_awaited)?)
+        Ok(match &mut self.clock {
+            Clock::RealTime(_) if !self.takes_commands => None,
+            Clock::RealTime(cycle) => {
+                let command_by_ns = wake.due_ns + self.schedule.command_by_ns;
+                let waiter = cycle.waiter();
+                waiter.until_between(controller_at_ns, command_by_ns);
+                self.ports.commands.latest_by(command_by_ns, waiter, is_awaited)?
+            }
+            Clock::Lockstep(lockstep) => {
+                lockstep.advance(controller_at_ns);
+                if !self.takes_commands {
+                    return Ok(None);
+                }
+                lockstep.end_turn(false).map_err(ProcessError::from)?;
+                if !lockstep.await_turn()? {
+                    return Ok(None);
+                }
+                self.ports.commands.latest_by(0, lockstep.waiter(), is_awaited)?
+            }
+        })
     }
 
     fn publish_frames_and_events(&mut self, plant: &mut PlantCore<L>) -> Result<(), PlantProcessError> {
         let Ports { frames, events, .. } = &mut self.ports;
-        let mut result = frames.publish(plant.drain_frames());
+        let now_ns = || self.clock.now_ns();
+        let tapped = plant.drain_frames();
+        let mut occurred = 0;
+        self.samples = BatchPublisher::<FrameTap>::samples(tapped.len());
+        let mut result = frames.publish_by(now_ns, tapped);
         plant.drain_events(&mut |event| {
+            occurred += 1;
             if result.is_ok() {
-                result = events.publish(|message| *message = event);
+                result = events.publish_by(now_ns, |message| *message = event);
             }
         });
+        self.samples = self.samples.max(occurred + 1);
         Ok(result?)
     }
 }
@@ -156,36 +230,67 @@ fn serve<L: Link>(
     build: impl Fn(&Scenario, u64) -> Result<PlantCore<L>, PlantError>,
 ) -> Result<Reason, PlantProcessError> {
     let (scenario, schedule) = (&context.scenario, &context.schedule);
-    let timeout_cycles = u64::from(scenario.can.command_timeout_cycles);
-    let abandoned_cycles = timeout_cycles + ABANDONED_AFTER_NS / scenario.period_ns();
     // Built once before the start, so that a plant that cannot be built is never reported ready.
     build(scenario, 0)?;
     let ports = Ports::open(&context.node)?;
     ports.warm_up()?;
+    let lockstep =
+        context.lockstep.map(|patience| Lockstep::open(context, patience, Party::Plant, Party::Controller));
+    let lockstep = lockstep.transpose().map_err(ProcessError::from)?;
     let start = context.ready(Some(scenario.realtime.cores[1]))?;
     ports.connect()?;
 
     let mut plant = build(scenario, start.epoch_ns)?;
-    let cycle = Cycle::new(start.epoch_ns, scenario.period_ns());
-    let mut real_time = RealTime { ports, cycle, schedule, takes_commands: true };
-    while !context.stop.is_made() && u64::from(plant.silent_cycles()) <= abandoned_cycles {
-        let RealTime { cycle, ports, .. } = &mut real_time;
-        let wake = cycle.wait_warm(|| -> Result<(), PlantProcessError> {
-            // Works out what has happened on the wires by now.
-            plant.advance(clock::now_ns())?;
-            Ok(ports.warm_up()?)
-        })?;
-        run_cycle(&mut plant, &mut real_time, schedule, &wake)?;
+    let clock = match lockstep {
+        None => Clock::RealTime(Cycle::new(start.epoch_ns, scenario.period_ns())),
+        Some(mut lockstep) => {
+            lockstep.start(start.epoch_ns);
+            Clock::Lockstep(lockstep)
+        }
+    };
+    let mut binding = Binding { ports, clock, schedule, takes_commands: true, samples: 0 };
+    let most_silent_cycles = most_silent_cycles(context);
+    while binding.goes_on(&context.stop) && u64::from(plant.silent_cycles()) <= most_silent_cycles {
+        let wake = binding.wait(&mut plant)?;
+        run_cycle(&mut plant, &mut binding, schedule, &wake)?;
     }
+    let is_stopped = match &binding.clock {
+        // The run is over, as under virtual time.
+        Clock::Lockstep(lockstep) if lockstep.is_last() => lockstep.await_stop(),
+        _ => {
+            stop_drives(&mut plant, &mut binding, scenario.period_ns())?;
+            context.stop.is_made()
+        }
+    };
+    Ok(if is_stopped { Reason::Requested } else { Reason::Abandoned })
+}
+
+/// Cycles without commands after which no command will come any more.
+fn most_silent_cycles(context: &ProcessContext) -> u64 {
+    let scenario = &context.scenario;
+    let until_stopped = u64::from(scenario.can.command_timeout_cycles);
+    match context.lockstep {
+        None => until_stopped + ABANDONED_AFTER_NS / scenario.period_ns(),
+        // The plant has waited before.
+        Some(_) => until_stopped + STOP_WITHIN_NS / scenario.period_ns(),
+    }
+}
+
+/// Runs further cycles without commands until the drives are off, at most for a while.
+fn stop_drives<L: Link>(
+    plant: &mut PlantCore<L>,
+    binding: &mut Binding<'_>,
+    period_ns: u64,
+) -> Result<(), PlantProcessError> {
     plant.stop();
-    real_time.takes_commands = false;
-    let give_up_ns = clock::now_ns() + STOP_WITHIN_NS.max(STOP_WITHIN_CYCLES * scenario.period_ns());
-    while !plant.drives_are_off() && clock::now_ns() < give_up_ns {
-        let wake = real_time.cycle.wait();
-        run_cycle(&mut plant, &mut real_time, schedule, &wake)?;
+    binding.takes_commands = false;
+    let give_up_ns = binding.clock.now_ns() + STOP_WITHIN_NS.max(STOP_WITHIN_CYCLES * period_ns);
+    while !plant.drives_are_off() && binding.clock.now_ns() < give_up_ns {
+        let wake = binding.wait(plant)?;
+        run_cycle(plant, binding, binding.schedule, &wake)?;
     }
     // The last cycle's process data are on the wire only by now.
-    plant.collect(real_time.cycle.wait().woke_ns)?;
-    real_time.publish_frames_and_events(&mut plant)?;
-    Ok(if context.stop.is_made() { Reason::Requested } else { Reason::Abandoned })
+    let last = binding.wait(plant)?;
+    plant.collect(last.woke_ns)?;
+    binding.publish_frames_and_events(plant)
 }

@@ -4,6 +4,7 @@
 //! because the plant has less time to spare. It computes no figure of the run and judges nothing: analysis does, from
 //! the recording.
 
+mod lockstep;
 mod machine_topic;
 mod progress;
 mod sinks;
@@ -15,9 +16,11 @@ use std::time::Duration;
 
 use anyhow::Context;
 use clap::Args;
-use masseter_recording::{Backlog, Pace, Recorded, Recorder, Scene};
+use masseter_recording::{Backlog, Pace, Recorder, Scene};
 use masseter_shared::clock;
 use masseter_shared::geometry::Mechanism;
+use masseter_shared::lifecycle::{Start, StopRequest};
+use masseter_shared::lockstep::RecorderSignals;
 use masseter_shared::realtime::scheduling::keep_off;
 use masseter_shared::transport::secret;
 use masseter_terminal::Exit;
@@ -27,6 +30,7 @@ use crate::foxglove::FoxgloveServer;
 use crate::machine::SystemRoot;
 use crate::machine::sampler::Sampler;
 use crate::stderr_writer::StderrWriter;
+use lockstep::InOrder;
 use progress::Progress;
 use sinks::Sinks;
 use subscribers::Subscribers;
@@ -57,8 +61,11 @@ pub(crate) fn record(args: RecorderArgs) -> anyhow::Result<Exit> {
     let process_arguments = args.process.process_arguments();
     let process = process_arguments.init()?;
     let scenario = &process.scenario;
-    // The threads started below inherit the cores.
-    keep_off(&scenario.realtime.cores);
+    let is_lockstep = process.lockstep.is_some();
+    if !is_lockstep {
+        // The threads started below inherit the cores.
+        keep_off(&scenario.realtime.cores);
+    }
     let subscribers = Subscribers::open(&process.node)?;
     let scene = Scene::new(&Mechanism::new(&scenario.mechanism)?, &scenario.jaw);
     let server = match args.live {
@@ -68,28 +75,43 @@ pub(crate) fn record(args: RecorderArgs) -> anyhow::Result<Exit> {
         }
         None => None,
     };
-    let backlog = Backlog::start(Recorder::create(&args.recording, scene)?, Pace::RealTime);
+    let pace = if is_lockstep { Pace::Virtual } else { Pace::RealTime };
+    let backlog = Backlog::start(Recorder::create(&args.recording, scene)?, pace);
+    let signals = is_lockstep.then(|| RecorderSignals::open(&process, DRAIN_INTERVAL)).transpose()?;
     let start = process.ready(None)?;
 
     let stderr = StderrWriter::start();
     if let Some(server) = &server {
         stderr.write(&format!("live on {} for Foxglove\n", server.url()));
     }
-    let progress = (!args.quiet).then(|| Progress::new(args.motion_s, scenario.period_s(), start.epoch_ns));
-    let mut sinks = Sinks { backlog, server, progress, stderr };
+    let progress = (!args.quiet).then(|| Progress::new(args.motion_s, scenario.period_s(), clock::now_ns()));
+    let sinks = Sinks { backlog, server, progress, stderr };
+    match signals {
+        None => record_in_real_time(&process.stop, start, &subscribers, sinks),
+        Some(signals) => record_in_lockstep(&process.stop, &signals, &subscribers, sinks),
+    }
+}
+
+fn record_in_real_time(
+    stop: &StopRequest,
+    start: Start,
+    subscribers: &Subscribers,
+    mut sinks: Sinks,
+) -> anyhow::Result<Exit> {
     let loops = start.loops.to_vec();
     let root = SystemRoot::of_this_machine();
     let mut sampler = Sampler::new(root, loops, machine_topic::INTERVAL_NS, start.epoch_ns);
     let mut samples = 0;
     loop {
-        let is_last = process.stop.is_made();
-        subscribers.drain(&mut sinks)?;
+        let is_last = stop.is_made();
+        // Each message has its own time, because some are published during the drain.
+        subscribers.drain(&mut |message| sinks.write(message, clock::now_ns()))?;
         let now_ns = clock::now_ns();
         if let Some(sample) = sampler.sample(now_ns)
             && let Some(machine) = machine_topic::message(samples + 1, &sample)
         {
             samples += 1;
-            sinks.write(&machine, clock::now_ns(), Recorded::Machine);
+            sinks.write(&machine.into(), clock::now_ns());
         }
         if is_last {
             return Ok(sinks.finish());
@@ -97,5 +119,28 @@ pub(crate) fn record(args: RecorderArgs) -> anyhow::Result<Exit> {
         sinks.backlog.hand_over();
         sinks.show_progress(now_ns);
         clock::sleep(DRAIN_INTERVAL);
+    }
+}
+
+/// The same in simulated time: nothing is lost, because the plant waits for the answers.
+fn record_in_lockstep(
+    stop: &StopRequest,
+    signals: &RecorderSignals,
+    subscribers: &Subscribers,
+    mut sinks: Sinks,
+) -> anyhow::Result<Exit> {
+    let mut in_order = InOrder::default();
+    loop {
+        let is_last = stop.is_made();
+        let is_asked = !is_last && signals.wait()?;
+        subscribers.drain(&mut |message| in_order.add(message))?;
+        in_order.drain(is_last, |message| sinks.write(message, message.published_ns()));
+        if is_asked {
+            signals.answer()?;
+        }
+        if is_last {
+            return Ok(sinks.finish());
+        }
+        sinks.show_progress(clock::now_ns());
     }
 }

@@ -1,7 +1,6 @@
 //! The sinks of every received message: the recording, Foxglove clients, and the progress on standard error.
 
 use masseter_recording::{Backlog, Recorded};
-use masseter_shared::messages::Message;
 use masseter_shared::wording::counted;
 use masseter_terminal::Exit;
 
@@ -18,14 +17,13 @@ pub(super) struct Sinks {
 
 impl Sinks {
     /// Hands a message that was received at `now_ns` to every sink.
-    pub(super) fn write<M: Message>(&mut self, message: &M, now_ns: u64, on_topic: impl Fn(M) -> Recorded) {
-        let message = on_topic(*message);
-        self.backlog.record(&message, now_ns);
+    pub(super) fn write(&mut self, message: &Recorded, now_ns: u64) {
+        self.backlog.record(message, now_ns);
         if let Some(progress) = &mut self.progress {
-            progress.add(&message);
+            progress.add(message);
         }
         if let Some(server) = &self.server {
-            server.offer(&message, now_ns);
+            server.offer(message, now_ns);
         }
     }
 

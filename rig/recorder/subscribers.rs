@@ -1,11 +1,8 @@
 //! One subscriber per topic.
 
 use masseter_recording::Recorded;
-use masseter_shared::clock;
 use masseter_shared::messages::{Command, Event, FrameTap, Message, Reading, State, Truth};
 use masseter_shared::transport::{BatchSubscriber, Node, Subscriber, TransportError};
-
-use super::sinks::Sinks;
 
 pub(super) struct Subscribers {
     commands: Subscriber<Command>,
@@ -28,41 +25,38 @@ impl Subscribers {
         })
     }
 
-    /// Hands everything that has arrived to `sinks`, topic by topic.
-    pub(super) fn drain(&self, sinks: &mut Sinks) -> Result<(), TransportError> {
-        drain(&self.commands, sinks, Recorded::Command)?;
-        drain(&self.readings, sinks, Recorded::Reading)?;
-        drain(&self.states, sinks, Recorded::State)?;
-        drain(&self.truths, sinks, Recorded::Truth)?;
-        drain_batches(&self.frames, sinks, Recorded::Frame)?;
-        drain(&self.events, sinks, Recorded::Event)
+    /// Hands everything that has arrived to `take`, topic by topic. Readings come first: what was published before the
+    /// last of them follows in the same drain.
+    pub(super) fn drain(&self, take: &mut impl FnMut(&Recorded)) -> Result<(), TransportError> {
+        drain(&self.readings, take)?;
+        drain(&self.commands, take)?;
+        drain(&self.states, take)?;
+        drain(&self.truths, take)?;
+        drain_batches(&self.frames, take)?;
+        drain(&self.events, take)
     }
 }
 
-/// Drains one topic, at most its queue's length, so that a flood cannot delay the other topics. Each message gets its own
-/// log time, because some are published during the drain.
-fn drain<M: Message>(
+/// Drains one topic, at most its queue's length, so that a flood cannot delay the other topics.
+fn drain<M: Message + Into<Recorded>>(
     subscriber: &Subscriber<M>,
-    sinks: &mut Sinks,
-    on_topic: impl Fn(M) -> Recorded,
+    take: &mut impl FnMut(&Recorded),
 ) -> Result<(), TransportError> {
     for _ in 0..M::DEPTH {
         let Some(message) = subscriber.receive()? else { break };
-        sinks.write(&*message, clock::now_ns(), &on_topic);
+        take(&(*message).into());
     }
     Ok(())
 }
 
 /// The same for a topic that travels in batches.
-fn drain_batches<M: Message>(
+fn drain_batches<M: Message + Into<Recorded>>(
     subscriber: &BatchSubscriber<M>,
-    sinks: &mut Sinks,
-    on_topic: impl Fn(M) -> Recorded,
+    take: &mut impl FnMut(&Recorded),
 ) -> Result<(), TransportError> {
     for _ in 0..M::DEPTH {
         let Some(batch) = subscriber.receive()? else { break };
-        let now_ns = clock::now_ns();
-        batch.iter().for_each(|message| sinks.write(message, now_ns, &on_topic));
+        batch.iter().for_each(|&message| take(&message.into()));
     }
     Ok(())
 }

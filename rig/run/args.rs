@@ -7,16 +7,22 @@ use std::time::Duration;
 use clap::{Args, ValueEnum};
 use masseter_plan::Overrides;
 use masseter_report::Detail;
+use masseter_shared::lifecycle::Patience;
 use masseter_terminal::Format;
 use rustix::fs::Mode;
 
-use crate::arguments::{ControllerKind, Wires, parse_address, parse_cores, parse_duration, parse_wires};
+use crate::arguments::{
+    ControllerKind, Wires, parse_address, parse_cores, parse_duration, parse_patience, parse_wires,
+};
 use crate::foxglove;
 
 const WHAT: &str = "Choose what to play";
 const HOW: &str = "Choose how it runs";
 const WATCH: &str = "Watch the run";
 const KEEP: &str = "Keep the result";
+
+/// The patience of a run in lockstep.
+const DEFAULT_PATIENCE: Duration = Duration::from_secs(10);
 
 /// The arguments of `run`.
 #[derive(Debug, Clone, Default, Args)]
@@ -38,6 +44,10 @@ pub(crate) struct RunArgs {
     /// Clock of the run
     #[arg(long, value_enum, default_value_t, help_heading = HOW)]
     pub clock: ClockKind,
+    /// In lockstep, how long a process may take to answer before the run ends: such as 10s, or none for a debugger
+    /// [default: 10s]
+    #[arg(long, value_name = "TIME", value_parser = parse_patience, help_heading = HOW)]
+    pub patience: Option<Patience>,
     /// Play the motion, or only hold the position found at the start
     #[arg(long, value_enum, default_value_t, help_heading = WHAT)]
     pub controller: ControllerKind,
@@ -78,7 +88,7 @@ pub(crate) struct RunArgs {
     #[arg(long, value_enum, default_value_t, value_name = "WHO", help_heading = KEEP)]
     pub readable_by: Readers,
     /// Show every figure, not only verdict and checks
-    #[arg(long)]
+    #[arg(long, help_heading = WATCH)]
     pub verbose: bool,
     /// Show no progress
     #[arg(long, help_heading = WATCH)]
@@ -89,6 +99,12 @@ impl RunArgs {
     /// How much of the report standard output gets.
     pub(super) fn detail(&self) -> Detail {
         if self.verbose { Detail::Whole } else { Detail::Brief }
+    }
+
+    /// For how long a process may be silent in lockstep.
+    pub(super) fn lockstep(&self) -> Option<Patience> {
+        let patience = self.patience.unwrap_or(Patience(Some(DEFAULT_PATIENCE)));
+        (self.clock == ClockKind::Lockstep).then_some(patience)
     }
 
     /// The changes to the scenario.
@@ -133,6 +149,8 @@ pub(crate) enum ClockKind {
     /// Real time, in three processes
     #[default]
     Rt,
+    /// Simulated time in three processes that wait for each other: the same bytes as virtual
+    Lockstep,
     /// Virtual time, in one thread: as fast as possible, the same bytes every time
     Virtual,
 }

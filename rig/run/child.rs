@@ -9,7 +9,7 @@ use std::thread;
 use std::time::Duration;
 
 use anyhow::{Context, bail};
-use masseter_shared::lifecycle::{Ready, Start};
+use masseter_shared::lifecycle::{Party, Ready, Silence, Start};
 use rustix::process::{Pid, Signal, kill_process};
 
 /// Longest time for a process to open its ports and lock its memory.
@@ -19,9 +19,9 @@ const READY_TIMEOUT: Duration = Duration::from_secs(20);
 const POLL: Duration = Duration::from_millis(20);
 
 // The names of the processes, which are also their subcommands.
-pub(super) const CONTROLLER: &str = "controller";
-pub(super) const PLANT: &str = "plant";
-pub(super) const RECORDER: &str = "recorder";
+pub(super) const CONTROLLER: &str = Party::Controller.name();
+pub(super) const PLANT: &str = Party::Plant.name();
+pub(super) const RECORDER: &str = Party::Recorder.name();
 
 /// A process; killed when dropped.
 pub(super) struct Process {
@@ -91,6 +91,12 @@ impl Process {
         let input = self.child.stdin.as_mut().expect("standard input is piped");
         serde_json::to_writer(&mut *input, &start)?;
         writeln!(input)
+    }
+
+    /// Its report that another process was silent, if it has ended with one.
+    pub(super) fn reported_silence(&mut self) -> Option<Silence> {
+        let last = self.lines.iter().last()?;
+        serde_json::from_str(&last).ok()
     }
 
     /// Its exit status, if it has ended.

@@ -36,7 +36,7 @@ pub(crate) fn run(args: &RunArgs) -> Result<Exit, Failure> {
     room::check_disk(args.out.as_deref().unwrap_or(RUNS.as_ref()), &plan).incomplete()?;
     let domain = match args.clock {
         ClockKind::Virtual => None,
-        ClockKind::Rt => {
+        ClockKind::Rt | ClockKind::Lockstep => {
             // This also removes what killed runs left.
             let domain = supervisor::reserve_domain(args.name.as_deref()).usage()?;
             room::check_shared_memory().usage()?;
@@ -72,7 +72,7 @@ pub(crate) fn run(args: &RunArgs) -> Result<Exit, Failure> {
     let written = write_manifest(&folder, &manifest);
     ran?;
     // Interrupted before every process was ready: nothing is recorded.
-    let is_unstarted = args.clock == ClockKind::Rt && manifest.scheduling.is_empty();
+    let is_unstarted = args.clock != ClockKind::Virtual && manifest.scheduling.is_empty();
     if manifest.ending == Ending::Interrupted && is_unstarted {
         return Ok(Exit::Interrupted);
     }
@@ -97,16 +97,25 @@ fn resolve(args: &RunArgs) -> anyhow::Result<RunPlan> {
     Ok(plan)
 }
 
-/// Refuses arguments that need real time under virtual time.
+/// Refuses arguments that the clock has no use for.
 fn check_clock(args: &RunArgs, scenario: &Scenario) -> anyhow::Result<()> {
+    if args.patience.is_some() && args.clock != ClockKind::Lockstep {
+        bail!("--patience needs --clock lockstep");
+    }
     if args.clock == ClockKind::Rt {
         return Ok(());
     }
     if !scenario.can.is_virtual() {
-        bail!("virtual time has no real CAN interfaces: use --can virtual, or --clock rt");
+        bail!("simulated time has no real CAN interfaces: use --can virtual, or --clock rt");
     }
-    if args.require_rt || args.name.is_some() {
-        bail!("--require-rt and --name need --clock rt");
+    if args.require_rt {
+        bail!("--require-rt needs --clock rt");
+    }
+    if args.clock == ClockKind::Lockstep {
+        return Ok(());
+    }
+    if args.name.is_some() {
+        bail!("--name needs --clock rt or lockstep: virtual time has no processes to name");
     }
     if args.live.is_some() {
         bail!("--live needs --clock rt: virtual time is over before a client can connect");

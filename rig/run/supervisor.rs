@@ -15,9 +15,10 @@ use std::time::Duration;
 use anyhow::Context;
 use masseter_plan::RunPlan;
 use masseter_recording::{DmaLatency, Ending, Manifest, RunFolder};
-use masseter_shared::clock::{self, SECOND_NS};
+use masseter_shared::clock::{self, MILLISECOND_NS, SECOND_NS};
 use masseter_shared::config::Scenario;
-use masseter_shared::lifecycle::Start;
+use masseter_shared::lifecycle::{Party, Silence, Start};
+use masseter_shared::lockstep;
 use masseter_shared::realtime::scheduling::Obtained;
 use masseter_shared::schedule::OFF_TICK_NS;
 use masseter_shared::transport::{Domain, DomainError, DomainLock, Swept};
@@ -28,7 +29,7 @@ use super::child::{CONTROLLER, PLANT, Process, RECORDER};
 use super::ending::{died, of_plant_and_recorder, of_run};
 use super::room::reserve_shared_memory;
 use super::usage::UsageMeter;
-use crate::arguments::name_of;
+use crate::arguments::{name_of, patience_text};
 use crate::machine::interrupts::Interrupts;
 use crate::machine::{self, SystemRoot, dma_latency};
 
@@ -63,7 +64,7 @@ pub(super) fn reserve_domain(name: Option<&str>) -> Result<(Domain, DomainLock),
     Ok((domain, claim))
 }
 
-/// Runs the rig in real time, then releases its domain. Enters the circumstances and the ending into the manifest.
+/// Runs the rig in real time or in lockstep, then releases its domain. Enters the circumstances and the ending into the manifest.
 pub(super) fn run(
     (domain, mut claim): (Domain, DomainLock),
     plan: &RunPlan,
@@ -91,7 +92,11 @@ pub(super) fn run(
     let result = prepared.and_then(|rig| match rig {
         Some((mut rig, scheduling)) => {
             manifest.scheduling = scheduling;
-            rig.run(plan, args.require_rt, &interrupts, manifest).died()
+            let ending = match args.lockstep() {
+                None => rig.run(plan, args.require_rt, &interrupts, manifest),
+                Some(_) => rig.run_in_lockstep(&interrupts),
+            };
+            ending.died()
         }
         None => Ok(Ending::Interrupted),
     });
@@ -118,6 +123,7 @@ struct Rig {
     stop_timeout_ns: u64,
     /// Time for the plant to stop the drives without the controller, ns.
     plant_alone_ns: u64,
+    is_lockstep: bool,
     recorder: Process,
     plant: Process,
     controller: Process,
@@ -125,8 +131,10 @@ struct Rig {
 
 impl Rig {
     fn spawn(plan: &RunPlan, folder: &RunFolder, domain: &Domain, args: &RunArgs) -> anyhow::Result<Self> {
-        let common: Vec<OsString> =
+        let mut common: Vec<OsString> =
             vec!["--scenario".into(), folder.scenario().into(), "--domain".into(), domain.id().into()];
+        let lockstep = args.lockstep();
+        common.extend(lockstep.map(|patience| format!("--lockstep={}", patience_text(patience)).into()));
         let with = |more: Vec<OsString>| [common.clone(), more].concat();
         let motion = format!("--motion-s={}", plan.trajectory.duration_s()).into();
         let mut recorder_arguments = with(vec!["--recording".into(), folder.recording().into(), motion]);
@@ -138,7 +146,12 @@ impl Rig {
         let stop_s = controller.stop_ramp_s + controller.hold_s + controller.start_timeout_s;
         Ok(Self {
             stop_timeout_ns: ((stop_s * 1e9) as u64).saturating_add(END_TIMEOUT_NS),
-            plant_alone_ns: u64::from(can.command_timeout_cycles) * plan.scenario.period_ns() + SAFE_STOP_NS,
+            plant_alone_ns: match lockstep {
+                None => u64::from(can.command_timeout_cycles) * plan.scenario.period_ns() + SAFE_STOP_NS,
+                // It waits for the controller until it is asked to end, and then stops the drives.
+                Some(_) => 0,
+            },
+            is_lockstep: lockstep.is_some(),
             recorder: Process::spawn(RECORDER, &recorder_arguments)?,
             plant: Process::spawn(PLANT, &common)?,
             controller: Process::spawn(CONTROLLER, &controller_arguments)?,
@@ -177,13 +190,19 @@ impl Rig {
             );
             return Ok(Ending::NotStarted);
         }
-        let epoch_ns = self.start(plan.scenario.period_ns())?;
+        let epoch_ns = next_epoch_ns(plan.scenario.period_ns());
+        self.start(epoch_ns)?;
         let processes = [&self.recorder, &self.plant, &self.controller];
         let names_and_ids = processes.map(|process| (process.role, process.id()));
         let mut meter = UsageMeter::new(epoch_ns, &names_and_ids);
-        let ending = self.monitor(interrupts, &mut meter)?;
+        let ending = self.monitor(interrupts, |now_ns| meter.update(now_ns))?;
         manifest.usage = meter.finish();
         Ok(ending)
+    }
+
+    fn run_in_lockstep(&mut self, interrupts: &Interrupts) -> anyhow::Result<Ending> {
+        self.start(lockstep::EPOCH_NS)?;
+        self.monitor(interrupts, |_| ())
     }
 
     /// The scheduling of each process once all are ready; none if the user interrupts before.
@@ -203,20 +222,17 @@ impl Rig {
         Ok(Some(scheduling))
     }
 
-    /// Sends the start message; returns the time of the first SYNC, ns.
-    fn start(&mut self, period_ns: u64) -> io::Result<u64> {
-        let millisecond = SECOND_NS / 1000;
-        let earliest = clock::now_ns() + START_LEAD_NS;
-        let epoch_ns = earliest.next_multiple_of(millisecond.max(period_ns)) + OFF_TICK_NS.min(period_ns / 4);
+    /// Sends the start message with the time of the first SYNC, ns.
+    fn start(&mut self, epoch_ns: u64) -> io::Result<()> {
         let loops = [self.controller.id(), self.plant.id()];
         for process in [&mut self.recorder, &mut self.plant, &mut self.controller] {
             process.start(Start { epoch_ns, loops })?;
         }
-        Ok(epoch_ns)
+        Ok(())
     }
 
-    /// Monitors the processes until the controller has ended, then ends plant and recorder.
-    fn monitor(&mut self, interrupts: &Interrupts, meter: &mut UsageMeter) -> anyhow::Result<Ending> {
+    /// Monitors the processes until the controller has ended, then ends plant and recorder. Calls `at` with the time.
+    fn monitor(&mut self, interrupts: &Interrupts, mut at: impl FnMut(u64)) -> anyhow::Result<Ending> {
         let mut interruption = None;
         let mut give_up_ns = None;
         let status = loop {
@@ -235,7 +251,7 @@ impl Rig {
                 self.controller.kill();
                 break None;
             }
-            meter.update(now_ns);
+            at(now_ns);
             clock::sleep(POLL);
         };
         let controller = self.controller_ending(status, interrupts)?;
@@ -252,11 +268,16 @@ impl Rig {
         let ending = if interrupts.is_stop_requested() {
             Ending::Interrupted
         } else if let Some(status) = self.recorder.exit_status()? {
+            if self.is_lockstep {
+                // It would wait for the recorder.
+                self.plant.terminate();
+            }
             died(RECORDER, Some(status))
         } else if let Some(status) = self.plant.exit_status()? {
             if status.code() == Some(Exit::SafeStop as i32) {
                 self.controller.kill();
-                return Ok(Some(Ending::died(CONTROLLER, SILENT.to_owned())));
+                let reported = self.plant.reported_silence().map(|silence| self.end_silent(&silence));
+                return Ok(Some(reported.unwrap_or_else(|| Ending::died(CONTROLLER, SILENT.to_owned()))));
             }
             died(PLANT, Some(status))
         } else {
@@ -266,12 +287,29 @@ impl Rig {
         Ok(Some(ending))
     }
 
+    /// Kills a process that stopped answering in lockstep; it may be stopped.
+    fn end_silent(&mut self, silence: &Silence) -> Ending {
+        let Silence { process, cycle, silent_s } = silence;
+        let process = match process {
+            Party::Controller => &mut self.controller,
+            Party::Plant => &mut self.plant,
+            Party::Recorder => &mut self.recorder,
+        };
+        process.kill();
+        let how =
+            format!("it did not answer in cycle {cycle} for {silent_s:.1} s (--patience), and was killed");
+        Ending::died(process.role, how)
+    }
+
     /// The controller's ending. If it died, waits for the plant's master to stop the drives.
     fn controller_ending(
         &mut self,
         status: Option<ExitStatus>,
         interrupts: &Interrupts,
     ) -> io::Result<Ending> {
+        if let Some(silence) = status.and_then(|_| self.controller.reported_silence()) {
+            return Ok(self.end_silent(&silence));
+        }
         match status.and_then(|status| status.code()) {
             Some(code) if code == Exit::Passed as i32 => Ok(Ending::Completed),
             Some(code) if code == Exit::SafeStop as i32 => Ok(Ending::SafeStop),
@@ -281,6 +319,12 @@ impl Rig {
             }
         }
     }
+}
+
+/// The time of the first SYNC in real time, ns.
+fn next_epoch_ns(period_ns: u64) -> u64 {
+    let earliest = clock::now_ns() + START_LEAD_NS;
+    earliest.next_multiple_of(MILLISECOND_NS.max(period_ns)) + OFF_TICK_NS.min(period_ns / 4)
 }
 
 /// Asks a process to end, and kills it if it does not; its status if it did.

@@ -14,8 +14,8 @@ use masseter_plant::core::PlantCore;
 use masseter_plant::cycle::PlantPorts;
 use masseter_plant::emulation::VirtualLink;
 use masseter_recording::{Backlog, Ending, Pace, Recorded, Recorder, RunFolder, Scene};
-use masseter_shared::clock::SECOND_NS;
 use masseter_shared::control::{Controller, ControllerPorts, Outcome};
+use masseter_shared::lockstep::EPOCH_NS;
 use masseter_shared::messages::{Command, Event, Message, Reading, State, Truth};
 use masseter_shared::realtime::Wake;
 use masseter_shared::schedule::CycleSchedule;
@@ -23,9 +23,6 @@ use masseter_terminal::status;
 
 use super::child::PLANT;
 use crate::machine::interrupts::Interrupts;
-
-/// Virtual time of the first SYNC, ns.
-const EPOCH_NS: u64 = SECOND_NS;
 
 /// Runs the rig under virtual time; it ends as the processes would, also when the user stops it.
 pub(crate) fn run(plan: &RunPlan, folder: &RunFolder, build: BuildController) -> anyhow::Result<Ending> {

@@ -9,6 +9,7 @@ pub mod control;
 pub mod geometry;
 pub mod input;
 pub mod lifecycle;
+pub mod lockstep;
 pub mod messages;
 pub mod realtime;
 pub mod rows;

@@ -8,6 +8,7 @@ use std::io::{self, Write};
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
 
 use rustix::process::{Signal, set_parent_process_death_signal};
 use serde::{Deserialize, Serialize};
@@ -25,6 +26,68 @@ pub struct ProcessArguments {
     pub scenario: PathBuf,
     /// The id of the run's domain.
     pub domain: String,
+    /// For a run in lockstep: how long a process may be silent. None for real time.
+    pub lockstep: Option<Patience>,
+}
+
+/// How long a process may be silent in lockstep; none for ever.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Patience(pub Option<Duration>);
+
+impl Patience {
+    /// Whether a silence of this length is still bearable.
+    pub fn lasts(self, silent_ns: u64) -> bool {
+        self.0.is_none_or(|patience| u128::from(silent_ns) < patience.as_nanos())
+    }
+}
+
+/// A process of a run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Party {
+    /// The controller.
+    Controller,
+    /// The plant.
+    Plant,
+    /// The recorder.
+    Recorder,
+}
+
+impl Party {
+    /// Its name, which is also its subcommand.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Controller => "controller",
+            Self::Plant => "plant",
+            Self::Recorder => "recorder",
+        }
+    }
+}
+
+/// The report that another process has stopped answering, in lockstep.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Silence {
+    /// The silent process.
+    pub process: Party,
+    /// The cycle in which it was waited for.
+    pub cycle: u64,
+    /// For how long, s.
+    pub silent_s: f64,
+}
+
+impl Silence {
+    /// Reports it to the supervisor.
+    ///
+    /// # Errors
+    /// [`ProcessError::Pipe`].
+    pub fn report(&self) -> Result<(), ProcessError> {
+        report(self)
+    }
+}
+
+fn report(message: &impl Serialize) -> Result<(), ProcessError> {
+    let line = serde_json::to_string(message).expect("plain data");
+    writeln!(io::stdout(), "{line}").map_err(ProcessError::Pipe)
 }
 
 /// The context of an initialised process.
@@ -36,6 +99,8 @@ pub struct ProcessContext {
     pub schedule: CycleSchedule,
     /// The node in the run's domain.
     pub node: Node,
+    /// As in [`ProcessArguments`].
+    pub lockstep: Option<Patience>,
     /// The request to end.
     pub stop: StopRequest,
 }
@@ -74,23 +139,23 @@ impl ProcessArguments {
         scenario.validate()?;
         let schedule = CycleSchedule::new(&scenario.can, scenario.period_ns())?;
         let node = Node::join(&Domain::named(&self.domain)?)?;
-        Ok(ProcessContext { scenario, schedule, node, stop })
+        Ok(ProcessContext { scenario, schedule, node, lockstep: self.lockstep, stop })
     }
 }
 
 impl ProcessContext {
     /// Reports that the process is ready, and waits for the start; before, requests real-time scheduling on `core`, or none
-    /// without a core. The ports are open by then, and none may use another user's memory.
+    /// without a core and in lockstep. The ports are open by then, and none may use another user's memory.
     pub fn ready(&self, core: Option<usize>) -> Result<Start, ProcessError> {
         self.node.check_mapped()?;
         let realtime = &self.scenario.realtime;
+        let core = core.filter(|_| self.lockstep.is_none());
         let scheduling = obtain(SchedulingRequest {
             core,
             fifo_priority: core.map(|_| realtime.priority),
             locked_memory: core.is_some() && realtime.lock_memory,
         });
-        let report = serde_json::to_string(&Ready { scheduling }).expect("plain data");
-        writeln!(io::stdout(), "{report}").map_err(ProcessError::Pipe)?;
+        report(&Ready { scheduling })?;
         let mut line = String::new();
         io::stdin().read_line(&mut line).map_err(ProcessError::Pipe)?;
         serde_json::from_str(&line).map_err(|_| ProcessError::NoStart)

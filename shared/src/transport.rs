@@ -24,9 +24,11 @@ mod domain;
 mod error;
 mod ports;
 mod runtime;
+mod signals;
 
 pub use batches::{BatchPublisher, BatchSubscriber};
 pub use domain::{Domain, DomainLock, ScratchDomain, Swept};
 pub use error::{DomainError, TransportError};
 pub use ports::{Node, Payload, Publisher, ReceivedMessage, Subscriber};
 pub use runtime::secret;
+pub use signals::{SignalReceiver, SignalSender};

@@ -130,6 +130,13 @@ impl Workspace {
         command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("masseter starts")
     }
 
+    /// Starts a run in lockstep.
+    pub(crate) fn start_lockstep(&self, arguments: &[&str]) -> Child {
+        let mut command = self.masseter_run(arguments);
+        command.args(["--clock", "lockstep", "--quiet"]);
+        command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("masseter starts")
+    }
+
     pub(crate) fn run_folder(&self) -> PathBuf {
         self.file("run")
     }

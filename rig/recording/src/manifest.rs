@@ -41,7 +41,7 @@ pub struct Manifest {
     pub masseter: String,
     /// When the run began, UTC.
     pub began: String,
-    /// `rt` or `virtual`.
+    /// `rt`, `lockstep` or `virtual`.
     pub clock: String,
     /// The scenario as resolved.
     pub scenario: Scenario,
@@ -51,9 +51,9 @@ pub struct Manifest {
     pub machine: Machine,
     /// The scheduling that each process requested and obtained; empty under virtual time.
     pub scheduling: BTreeMap<String, Obtained>,
-    /// Request to `/dev/cpu_dma_latency` and its result; none under virtual time.
+    /// Request to `/dev/cpu_dma_latency` and its result; none in simulated time.
     pub cpu_dma_latency: Option<DmaLatency>,
-    /// Resources that the processes used in their steady state; empty under virtual time.
+    /// Resources that the processes used in their steady state; empty in simulated time.
     pub usage: RunUsage,
     /// How the run ended.
     pub ending: Ending,

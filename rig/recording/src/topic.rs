@@ -94,7 +94,16 @@ impl Topic {
 impl Recorded {
     /// Its sequence number on its topic, counted by its publisher.
     pub fn seq(&self) -> u64 {
-        Stamps::read(self.body()).expect("every message begins with its stamps").seq
+        self.stamps().seq
+    }
+
+    /// When it was published, ns.
+    pub fn published_ns(&self) -> u64 {
+        self.stamps().published_ns
+    }
+
+    fn stamps(&self) -> Stamps {
+        Stamps::read(self.body()).expect("every message begins with its stamps")
     }
 }
 

@@ -35,6 +35,11 @@ impl<M: Message> BatchPublisher<M> {
         Publisher::create(builder.allocation_strategy(AllocationStrategy::Static)).map(Self)
     }
 
+    /// The number of samples in which so many messages travel.
+    pub fn samples(messages: usize) -> usize {
+        messages.div_ceil(BATCH)
+    }
+
     /// Connects to the subscribers that are there by now, as [`Publisher::connect`].
     pub fn connect(&self) -> Result<(), TransportError> {
         self.0.connect()
@@ -45,13 +50,22 @@ impl<M: Message> BatchPublisher<M> {
         &mut self,
         messages: impl IntoIterator<Item = M, IntoIter: ExactSizeIterator>,
     ) -> Result<(), TransportError> {
+        self.publish_by(clock::now_ns, messages)
+    }
+
+    /// The same with the time of another clock in the stamps.
+    pub fn publish_by(
+        &mut self,
+        now_ns: impl Fn() -> u64,
+        messages: impl IntoIterator<Item = M, IntoIter: ExactSizeIterator>,
+    ) -> Result<(), TransportError> {
         let mut messages = messages.into_iter();
         while messages.len() > 0 {
             let count = messages.len().min(BATCH);
             let sample = self.0.port.loan_slice_uninit(count).map_err(failed("loaning", M::TOPIC))?;
             let mut sample =
                 sample.write_from_fn(|_| messages.next().expect("`count` is at most its length"));
-            let published_ns = clock::now_ns();
+            let published_ns = now_ns();
             for message in sample.payload_mut() {
                 self.0.sent += 1;
                 message.stamp(self.0.sent, published_ns);

@@ -64,6 +64,10 @@ impl Node {
         self.domain.check_mapped()
     }
 
+    pub(super) fn domain(&self) -> &Domain {
+        &self.domain
+    }
+
     /// The iceoryx2 node beneath, for measurements against bare iceoryx2.
     pub fn iceoryx(&self) -> &IceoryxNode<ipc::Service> {
         &self.node
@@ -151,11 +155,20 @@ impl<P: Payload + ?Sized> Publisher<P> {
 impl<M: Message> Publisher<M> {
     /// Lets `fill` write the message into shared memory, then stamps and publishes the message.
     pub fn publish(&mut self, fill: impl FnOnce(&mut M)) -> Result<(), TransportError> {
+        self.publish_by(clock::now_ns, fill)
+    }
+
+    /// The same with the time of another clock in the stamp.
+    pub fn publish_by(
+        &mut self,
+        now_ns: impl FnOnce() -> u64,
+        fill: impl FnOnce(&mut M),
+    ) -> Result<(), TransportError> {
         let mut sample = self.port.loan().map_err(failed("loaning", M::TOPIC))?;
         let message = sample.payload_mut();
         fill(message);
         self.sent += 1;
-        message.stamp(self.sent, clock::now_ns());
+        message.stamp(self.sent, now_ns());
         sample.send().map_err(failed("sending", M::TOPIC))?;
         Ok(())
     }

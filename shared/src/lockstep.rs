@@ -1,0 +1,240 @@
+//! Simulated time in three processes: plant and controller take turns, and the plant never runs far ahead of the recorder.
+//!
+//! A turn ends with a signal to the other loop, after all messages of the turn. A process that waits sleeps. Whoever
+//! stops answering for longer than the [`Patience`] is given up: the process that waits says so on standard output and
+//! goes on alone, in real time, so that its watchdogs end the run.
+
+use std::time::Duration;
+
+use crate::clock;
+use crate::lifecycle::{Party, Patience, ProcessContext, ProcessError, Silence, StopRequest};
+use crate::realtime::{Waiter, Wake};
+use crate::transport::{DomainError, SignalReceiver, SignalSender};
+
+/// Time of the first SYNC, ns.
+pub const EPOCH_NS: u64 = clock::SECOND_NS;
+
+// The signals.
+const TURN_ENDED: u8 = 0;
+const LAST_TURN_ENDED: u8 = 1;
+const RECORD: u8 = 2;
+const RECORDED: u8 = 3;
+
+/// Longest uninterrupted sleep.
+const SLICE: Duration = Duration::from_millis(20);
+/// Longest silence of another process once this one was asked to end: it has probably ended, ns.
+const STOP_PATIENCE_NS: u64 = clock::SECOND_NS;
+/// Messages of the plant between two requests to the recorder. The recorder has room for more than two such windows and
+/// everything that a cycle may add.
+const WINDOW_MESSAGES: usize = 256;
+
+/// A loop that takes turns with another one, and its simulated clock.
+#[derive(Debug)]
+pub struct Lockstep {
+    signals: SignalReceiver,
+    /// The signals that have arrived and were not taken yet, as bits.
+    arrived: u8,
+    other: (Party, SignalSender),
+    recorder: SignalSender,
+    patience: Patience,
+    stop: StopRequest,
+    waiter: Waiter,
+    first_due_ns: u64,
+    period_ns: u64,
+    cycle: u64,
+    now_ns: u64,
+    /// The process that was given up.
+    lost: Option<Party>,
+    /// Whether the other loop has had its last turn.
+    is_last: bool,
+    unrecorded: usize,
+    is_recording: bool,
+}
+
+impl Lockstep {
+    /// The lockstep of the loop `own` with the loop `other`.
+    ///
+    /// # Errors
+    /// Those of the signals.
+    pub fn open(
+        context: &ProcessContext,
+        patience: Patience,
+        own: Party,
+        other: Party,
+    ) -> Result<Self, DomainError> {
+        let node = &context.node;
+        let period_ns = context.scenario.period_ns();
+        Ok(Self {
+            signals: SignalReceiver::open(node, own.name(), SLICE)?,
+            arrived: 0,
+            other: (other, SignalSender::open(node, other.name())?),
+            recorder: SignalSender::open(node, Party::Recorder.name())?,
+            patience,
+            stop: context.stop.clone(),
+            waiter: Waiter::new(period_ns),
+            first_due_ns: EPOCH_NS,
+            period_ns,
+            cycle: 0,
+            now_ns: 0,
+            lost: None,
+            is_last: false,
+            unrecorded: 0,
+            is_recording: false,
+        })
+    }
+
+    /// Begins the first cycle at this time, ns.
+    pub fn start(&mut self, first_due_ns: u64) {
+        self.first_due_ns = first_due_ns;
+    }
+
+    /// Begins the next cycle, in time.
+    pub fn begin_cycle(&mut self) -> Wake {
+        if self.lost.is_some() {
+            // Nothing else keeps this loop from running far ahead of the recorder.
+            clock::sleep(Duration::from_nanos(self.period_ns));
+        }
+        self.cycle += 1;
+        self.now_ns = self.first_due_ns + (self.cycle - 1) * self.period_ns;
+        Wake::on_time(self.cycle, self.now_ns)
+    }
+
+    /// Now, ns of simulated time.
+    pub fn now_ns(&self) -> u64 {
+        self.now_ns
+    }
+
+    /// Goes on to `now_ns` of simulated time; returns it.
+    pub fn advance(&mut self, now_ns: u64) -> u64 {
+        self.now_ns = now_ns;
+        now_ns
+    }
+
+    /// For a look at what has arrived, without a wait.
+    pub fn waiter(&mut self) -> &mut Waiter {
+        &mut self.waiter
+    }
+
+    /// The process that was given up, if any: nothing waits for it again.
+    pub fn lost(&self) -> Option<Party> {
+        self.lost
+    }
+
+    /// Whether the other loop has had its last turn.
+    pub fn is_last(&self) -> bool {
+        self.is_last
+    }
+
+    /// Ends a turn of this loop.
+    ///
+    /// # Errors
+    /// Those of the signals.
+    pub fn end_turn(&mut self, is_last: bool) -> Result<(), DomainError> {
+        if self.lost == Some(self.other.0) {
+            return Ok(());
+        }
+        self.other.1.send(if is_last { LAST_TURN_ENDED } else { TURN_ENDED })
+    }
+
+    /// Waits until the other loop has ended its turn; false once the other loop was given up.
+    ///
+    /// # Errors
+    /// Those of the signals, and of standard output.
+    pub fn await_turn(&mut self) -> Result<bool, ProcessError> {
+        let ended = self.wait(&[TURN_ENDED, LAST_TURN_ENDED], self.other.0)?;
+        self.is_last |= ended == Some(LAST_TURN_ENDED);
+        Ok(ended.is_some())
+    }
+
+    /// Takes note of a cycle that left this many messages on the fullest topic. Waits if the recorder lags behind.
+    ///
+    /// # Errors
+    /// As [`Self::await_turn`].
+    pub fn await_recorder(&mut self, messages: usize) -> Result<(), ProcessError> {
+        self.unrecorded += messages;
+        if self.unrecorded < WINDOW_MESSAGES || self.lost == Some(Party::Recorder) {
+            return Ok(());
+        }
+        if self.is_recording {
+            self.wait(&[RECORDED], Party::Recorder)?;
+        }
+        self.unrecorded = 0;
+        self.is_recording = true;
+        Ok(self.recorder.send(RECORD)?)
+    }
+
+    /// Waits for the request to end, after the last turn; false if it does not come.
+    pub fn await_stop(&self) -> bool {
+        let mut waited_ns = 0;
+        while !self.stop.is_made() && self.patience.lasts(waited_ns) {
+            clock::sleep(STOP_POLL);
+            waited_ns += STOP_POLL.as_nanos() as u64;
+        }
+        self.stop.is_made()
+    }
+
+    /// Waits for one of the signals from a process; none once that process was given up.
+    fn wait(&mut self, signals: &[u8], from: Party) -> Result<Option<u8>, ProcessError> {
+        let mut silent_ns = 0;
+        while self.lost != Some(from) {
+            let wanted = signals.iter().find(|&&signal| self.arrived >> signal & 1 == 1);
+            if let Some(&signal) = wanted {
+                self.arrived &= !(1 << signal);
+                return Ok(Some(signal));
+            }
+            let from_ns = clock::now_ns();
+            if let Some(signal) = self.signals.receive()? {
+                self.arrived |= 1 << signal;
+                continue;
+            }
+            // Stretches in which this process itself was stopped do not count.
+            silent_ns += (clock::now_ns() - from_ns).min(SLICE.as_nanos() as u64);
+            // The plant may have to wait for the recorder meanwhile.
+            let waits = if from == Party::Plant { 2 } else { 1 };
+            if !self.patience.lasts(silent_ns / waits) {
+                self.lost = Some(from);
+                Silence { process: from, cycle: self.cycle, silent_s: silent_ns as f64 / 1e9 }.report()?;
+            } else if self.stop.is_made() && silent_ns >= STOP_PATIENCE_NS {
+                self.lost = Some(from);
+            }
+        }
+        Ok(None)
+    }
+}
+
+/// Polling interval of the request to end.
+const STOP_POLL: Duration = Duration::from_millis(1);
+
+/// The recorder's end: it learns when the plant wants to be sure that everything is received.
+#[derive(Debug)]
+pub struct RecorderSignals {
+    signals: SignalReceiver,
+    plant: SignalSender,
+}
+
+impl RecorderSignals {
+    /// Opens the signals between plant and recorder. Each wait lasts at most `timeout`.
+    ///
+    /// # Errors
+    /// Those of the signals.
+    pub fn open(context: &ProcessContext, timeout: Duration) -> Result<Self, DomainError> {
+        let signals = SignalReceiver::open(&context.node, Party::Recorder.name(), timeout)?;
+        Ok(Self { signals, plant: SignalSender::open(&context.node, Party::Plant.name())? })
+    }
+
+    /// Waits for a request of the plant; returns whether one came.
+    ///
+    /// # Errors
+    /// Those of the signals.
+    pub fn wait(&self) -> Result<bool, DomainError> {
+        Ok(self.signals.receive()? == Some(RECORD))
+    }
+
+    /// Answers a request, once everything that had been sent before is received.
+    ///
+    /// # Errors
+    /// Those of the signals.
+    pub fn answer(&self) -> Result<(), DomainError> {
+        self.plant.send(RECORDED)
+    }
+}

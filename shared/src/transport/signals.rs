@@ -1,0 +1,114 @@
+//! Signals from one process to another, which wake a process that sleeps: datagrams of one byte in the domain's root
+//! folder. iceoryx2's events would need longer paths than sockets may have.
+
+use std::io::{self, ErrorKind};
+use std::os::unix::net::UnixDatagram;
+use std::path::PathBuf;
+use std::time::Duration;
+
+use super::error::{DomainError, file_error};
+use super::ports::Node;
+
+/// Longest wait for room in the receiver's queue, which holds more signals than processes leave there.
+const SEND_TIMEOUT: Duration = Duration::from_secs(1);
+
+/// Receives the signals to this process.
+#[derive(Debug)]
+pub struct SignalReceiver {
+    socket: UnixDatagram,
+    path: PathBuf,
+}
+
+/// Sends signals to one process.
+#[derive(Debug)]
+pub struct SignalSender {
+    socket: UnixDatagram,
+    path: PathBuf,
+}
+
+impl SignalReceiver {
+    /// The receiver of this name. Each of its waits lasts at most `timeout`.
+    ///
+    /// # Errors
+    /// When the socket cannot be made.
+    pub fn open(node: &Node, name: &str, timeout: Duration) -> Result<Self, DomainError> {
+        let path = node.domain().root().join(name);
+        let bind = || {
+            let socket = UnixDatagram::bind(&path)?;
+            socket.set_read_timeout(Some(timeout))?;
+            Ok(socket)
+        };
+        let socket = bind().map_err(file_error("receive at", &path))?;
+        Ok(Self { socket, path })
+    }
+
+    /// The next signal; none when it does not come within the timeout, or when the kernel interrupts the wait. It sleeps at
+    /// once: spinning before took half of the speed on one core, and gained nothing beside other work.
+    ///
+    /// # Errors
+    /// When the socket fails.
+    pub fn receive(&self) -> Result<Option<u8>, DomainError> {
+        let mut signal = [0];
+        match self.socket.recv(&mut signal) {
+            Ok(_) => Ok(Some(signal[0])),
+            Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted) => Ok(None),
+            Err(error) => Err(file_error("receive at", &self.path)(error)),
+        }
+    }
+}
+
+impl SignalSender {
+    /// A sender to the receiver of this name, which may be opened later.
+    ///
+    /// # Errors
+    /// When the socket cannot be made.
+    pub fn open(node: &Node, receiver: &str) -> Result<Self, DomainError> {
+        let path = node.domain().root().join(receiver);
+        let unbound = || {
+            let socket = UnixDatagram::unbound()?;
+            socket.set_write_timeout(Some(SEND_TIMEOUT))?;
+            Ok(socket)
+        };
+        let socket = unbound().map_err(file_error("send to", &path))?;
+        Ok(Self { socket, path })
+    }
+
+    /// Sends a signal. Without a receiver the signal is lost: that process has ended, which its supervisor notices.
+    ///
+    /// # Errors
+    /// When the socket fails.
+    pub fn send(&self, signal: u8) -> Result<(), DomainError> {
+        match self.socket.send_to(&[signal], &self.path) {
+            Err(error) if !is_gone(&error) => Err(file_error("send to", &self.path)(error)),
+            _ => Ok(()),
+        }
+    }
+}
+
+fn is_gone(error: &io::Error) -> bool {
+    matches!(error.kind(), ErrorKind::ConnectionRefused | ErrorKind::NotFound)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::transport::ScratchDomain;
+
+    #[test]
+    fn signals_wait_for_their_receiver_in_order_and_are_lost_without_one() {
+        let domain = ScratchDomain::claim("test-of-the-longest-name").unwrap();
+        let node = Node::join(&domain).unwrap();
+        let timeout = Duration::from_millis(1);
+        let [receiver, other] =
+            ["controller", "plant"].map(|name| SignalReceiver::open(&node, name, timeout).unwrap());
+        let sender = SignalSender::open(&node, "controller").unwrap();
+        for signal in [7, 5, 5] {
+            sender.send(signal).unwrap();
+        }
+        let received = || receiver.receive().unwrap();
+        assert_eq!([received(), received(), received(), received()], [Some(7), Some(5), Some(5), None]);
+        assert_eq!(other.receive().unwrap(), None);
+        drop(receiver);
+        sender.send(1).unwrap();
+    }
+}

@@ -1,0 +1,194 @@
+//! Runs in lockstep: three real processes leave the bytes of virtual time, whatever the machine does to them. A process
+//! that is killed or stays silent ends the run with its name.
+
+mod common;
+
+use std::fs;
+use std::process::{Child, Command, Stdio};
+use std::time::Duration;
+
+use common::{SharedMemory, Workspace, child_of, has_event, masseter, stderr, stdout, wait_until_it_records};
+use masseter_shared::clock;
+use rustix::process::{Pid, Signal, kill_process};
+
+const ROLES: [&str; 3] = ["controller", "plant", "recorder"];
+
+/// Every frame of a node is destroyed for a while, then a node is disconnected: the rig stops.
+const FAULTS: &str = "[[faults]]\nkind = 'corrupt'\nbus = 0\nfrom_s = 1.6\nuntil_s = 1.605\nprobability = 0.3\n\
+     [[faults]]\nkind = 'lose'\nbus = 1\nfrom_s = 1.7\ncount = 3\n\
+     [[faults]]\nkind = 'disconnect'\nbus = 1\nnode = 5\nfrom_s = 2.2\n";
+
+/// The recording of a scenario under virtual time, and how that run exits.
+fn virtual_run(scenario: &str, arguments: &[&str]) -> (Vec<u8>, Option<i32>) {
+    let workspace = Workspace::new(scenario);
+    let output = workspace.run_virtual(&[&["--quiet"], arguments].concat());
+    (recording(&workspace), output.status.code())
+}
+
+fn recording(workspace: &Workspace) -> Vec<u8> {
+    fs::read(workspace.run_folder().join("recording.mcap")).expect("a recording")
+}
+
+/// A rig in lockstep that records already.
+fn running(scenario: &str, arguments: &[&str]) -> (Workspace, Child, SharedMemory) {
+    let workspace = Workspace::new(scenario);
+    let child = workspace.start_lockstep(arguments);
+    let memory = SharedMemory::of_running(&format!("{}-", child.id()));
+    wait_until_it_records(&workspace);
+    (workspace, child, memory)
+}
+
+/// Four processes that never sleep.
+struct Load([Child; 4]);
+
+impl Load {
+    fn start() -> Self {
+        let busy = || Command::new("sh").args(["-c", "while :; do :; done"]).stdin(Stdio::null()).spawn();
+        Self([(); 4].map(|()| busy().expect("a shell starts")))
+    }
+}
+
+impl Drop for Load {
+    fn drop(&mut self) {
+        for child in &mut self.0 {
+            child.kill().expect("it is a child");
+            child.wait().expect("it was killed");
+        }
+    }
+}
+
+#[test]
+fn three_processes_leave_the_bytes_of_virtual_time() {
+    let scenario = "duration_s = 2.0\n";
+    let faulty = format!("{scenario}{FAULTS}");
+    for (scenario, arguments) in [
+        (scenario, &["--seed", "1"][..]),
+        (scenario, &["--seed", "2", "--controller", "hold"]),
+        (scenario, &["--seed", "3", "--rate-hz", "500"]),
+        (&faulty, &["--seed", "4"]),
+        (&faulty, &["--seed", "5"]),
+    ] {
+        let (expected, code) = virtual_run(scenario, arguments);
+        let workspace = Workspace::new(scenario);
+        let child = workspace.start_lockstep(arguments);
+        let memory = SharedMemory::of_running(&format!("{}-", child.id()));
+        let output = child.wait_with_output().unwrap();
+        let context = format!("{arguments:?}: {}{}", stdout(&output), stderr(&output));
+        assert_eq!(output.status.code(), code, "{context}");
+        assert!(recording(&workspace) == expected, "{context}");
+        assert_eq!(memory.files(), Vec::<String>::new(), "{context}");
+        assert_eq!(workspace.manifest()["clock"], "lockstep");
+        let is_faulty = scenario.contains("faults");
+        assert_eq!(code, Some(if is_faulty { 5 } else { 0 }), "{context}");
+    }
+}
+
+#[test]
+fn a_busy_machine_changes_no_byte() {
+    let scenario = "duration_s = 2.0";
+    let (expected, _) = virtual_run(scenario, &[]);
+    let _load = Load::start();
+    for _ in 0..3 {
+        let workspace = Workspace::new(scenario);
+        let output = workspace.start_lockstep(&[]).wait_with_output().unwrap();
+        assert_eq!(output.status.code(), Some(0), "{}{}", stdout(&output), stderr(&output));
+        assert!(recording(&workspace) == expected);
+    }
+}
+
+#[test]
+fn a_process_that_is_stopped_for_a_moment_changes_no_byte() {
+    let scenario = "duration_s = 20.0";
+    let (expected, _) = virtual_run(scenario, &[]);
+    for role in ROLES {
+        let (workspace, child, _memory) = running(scenario, &[]);
+        let victim = child_of(&child, role);
+        for _ in 0..3 {
+            kill_process(victim, Signal::STOP).unwrap();
+            clock::sleep(Duration::from_millis(200));
+            kill_process(victim, Signal::CONT).unwrap();
+            clock::sleep(Duration::from_millis(3));
+        }
+        let output = child.wait_with_output().unwrap();
+        let context = format!("{role}: {}{}", stdout(&output), stderr(&output));
+        assert_eq!(output.status.code(), Some(0), "{context}");
+        assert!(recording(&workspace) == expected, "{context}");
+    }
+}
+
+#[test]
+fn a_process_that_is_killed_ends_the_run_with_its_name() {
+    for role in ROLES {
+        let (workspace, child, memory) = running("duration_s = 60.0", &[]);
+        kill_process(child_of(&child, role), Signal::KILL).unwrap();
+        let output = child.wait_with_output().unwrap();
+        let context = format!("{role}: {}{}", stdout(&output), stderr(&output));
+        assert_eq!(output.status.code(), Some(4), "{context}");
+        let summary = workspace.summary();
+        assert_eq!(summary["verdict"]["reason"], format!("the {role} died: SIGKILL (9)"), "{context}");
+        assert_eq!(memory.files(), Vec::<String>::new(), "{context}");
+        match role {
+            "controller" => assert!(has_event(&summary, "fault", "command_lost"), "{context}"),
+            "plant" => assert!(has_event(&summary, "fault", "stale_reading"), "{context}"),
+            _ => {}
+        }
+    }
+}
+
+#[test]
+fn a_process_that_stays_silent_ends_the_run_with_its_name_and_the_cycle() {
+    for role in ROLES {
+        let (workspace, child, memory) = running("duration_s = 60.0", &["--patience", "1s"]);
+        kill_process(child_of(&child, role), Signal::STOP).unwrap();
+        let output = child.wait_with_output().unwrap();
+        let context = format!("{role}: {}{}", stdout(&output), stderr(&output));
+        assert_eq!(output.status.code(), Some(4), "{context}");
+        let summary = workspace.summary();
+        let reason = summary["verdict"]["reason"].as_str().unwrap();
+        let silent_s = if role == "plant" { "2.0" } else { "1.0" };
+        assert!(reason.starts_with(&format!("the {role} died: it did not answer in cycle ")), "{context}");
+        assert!(reason.contains(&format!("for {silent_s} s (--patience)")), "{context}");
+        assert_eq!(memory.files(), Vec::<String>::new(), "{context}");
+    }
+}
+
+#[test]
+fn endless_patience_waits_and_the_user_ends_it() {
+    let (workspace, child, memory) = running("duration_s = 60.0", &["--patience", "none"]);
+    let plant = child_of(&child, "plant");
+    kill_process(plant, Signal::STOP).unwrap();
+    clock::sleep(Duration::from_secs(3));
+    kill_process(plant, Signal::CONT).unwrap();
+    kill_process(Pid::from_child(&child), Signal::INT).unwrap();
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(130), "{}{}", stdout(&output), stderr(&output));
+    let figures = &workspace.summary()["figures"];
+    assert_eq!(figures["final_state"], "finished", "{figures}");
+    assert_eq!(figures["cut_short"], false);
+    assert_eq!(memory.files(), Vec::<String>::new());
+}
+
+#[test]
+fn the_processes_of_a_killed_supervisor_end() {
+    let (_workspace, mut child, memory) = running("duration_s = 60.0", &[]);
+    child.kill().unwrap();
+    child.wait().unwrap();
+    common::wait_until("all is swept", || {
+        assert_eq!(masseter(&["clean"]).status.code(), Some(0));
+        memory.files().is_empty()
+    });
+}
+
+#[test]
+fn arguments_of_other_clocks_are_refused() {
+    for (arguments, expected) in [
+        (&["--patience", "1s"][..], "--patience needs --clock lockstep"),
+        (&["--clock", "lockstep", "--require-rt"], "--require-rt needs --clock rt"),
+        (&["--clock", "lockstep", "--can", "can0,can1"], "simulated time has no real CAN interfaces"),
+        (&["--clock", "lockstep", "--patience", "long"], "or `none`"),
+    ] {
+        let output = masseter(&[&["run"], arguments].concat());
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}");
+        assert!(stderr(&output).contains(expected), "{arguments:?}: {}", stderr(&output));
+    }
+}
