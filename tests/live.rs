@@ -227,7 +227,7 @@ fn a_live_view_that_cannot_be_served_is_refused_before_the_run_starts() {
     let cases: [(&[&str], &str); 3] = [
         (&[&port], "choose another with --live=PORT"),
         (&["--live", "--clock", "virtual"], "--live needs --clock rt"),
-        (&["--live=somewhere"], "invalid socket address"),
+        (&["--live=somewhere"], "give a port, or an IP address and a port"),
     ];
     for (arguments, words) in cases {
         let workspace = Workspace::new("");
