@@ -53,7 +53,7 @@ fn an_ordinary_user_runs_the_rig_without_real_time() {
     let output = Command::new("setpriv")
         .args(["--reuid=65534", "--regid=65534", "--clear-groups"])
         .arg(&executable)
-        .args(["run", "scenario.toml", "--out", "run"])
+        .args(["run", "scenario.toml", "--clock", "rt", "--out", "run"])
         .current_dir(&folder)
         .output()
         .unwrap();

@@ -231,7 +231,8 @@ fn a_stranger_that_makes_files_of_every_run_stops_none() {
         victim.id
     );
     let mut squatting = as_user(STRANGER, "sh").args(["-c", &script]).stderr(Stdio::null()).spawn().unwrap();
-    let output = victim.masseter(&["run", "scenario.toml", "--out", "run"]).output().unwrap();
+    let output =
+        victim.masseter(&["run", "scenario.toml", "--clock", "rt", "--out", "run"]).output().unwrap();
     squatting.kill().unwrap();
     squatting.wait().unwrap();
     drop(cores);
@@ -250,7 +251,7 @@ fn a_stranger_that_makes_files_of_every_run_stops_none() {
 fn nothing_of_a_run_can_be_read_by_a_stranger() {
     let cores = Cores::take();
     let Some(victim) = Victim::new(61_005, &format!("duration_s = 2.0\n{LENIENT}")) else { return };
-    let mut run = victim.masseter(&["run", "scenario.toml", "--out", "run"]);
+    let mut run = victim.masseter(&["run", "scenario.toml", "--clock", "rt", "--out", "run"]);
     let run = run.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
     wait_until("the rig records", || victim.workspace.recorded_bytes() > 500_000);
 

@@ -124,7 +124,7 @@ fn run_at(rate_hz: u32, cores: [usize; 2], interrupts: &Interrupts) -> anyhow::R
     let folder = scratch.path().join("run");
     let errors = scratch.path().join("errors");
     let mut run = Command::new(std::env::current_exe()?)
-        .args(["run", "--quiet", "--format", "json", "--out"])
+        .args(["run", "--clock", "rt", "--quiet", "--format", "json", "--out"])
         .args([&folder, &file])
         .stdin(Stdio::null())
         .stdout(Stdio::null())

@@ -146,8 +146,10 @@ impl Readers {
 /// The clock of a run.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
 pub(crate) enum ClockKind {
-    /// Real time, in three processes
+    /// Real time where the kernel grants it, otherwise lockstep
     #[default]
+    Auto,
+    /// Real time, in three processes
     Rt,
     /// Simulated time in three processes that wait for each other: the same bytes as virtual
     Lockstep,

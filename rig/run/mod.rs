@@ -5,6 +5,7 @@
 
 pub(crate) mod args;
 mod child;
+mod clock;
 mod ending;
 mod room;
 mod supervisor;
@@ -13,7 +14,7 @@ mod virtual_time;
 
 use std::path::Path;
 
-use anyhow::{Context, bail};
+use anyhow::Context;
 use masseter_plan::RunPlan;
 use masseter_plant::core as plant;
 use masseter_recording::{Ending, MOTION, Manifest, RunFolder};
@@ -32,11 +33,11 @@ const RUNS: &str = "runs";
 /// Plays the motion, judges the run, and writes its folder.
 pub(crate) fn run(args: &RunArgs) -> Result<Exit, Failure> {
     room::check_memory().usage()?;
-    let plan = resolve(args).usage()?;
-    room::check_disk(args.out.as_deref().unwrap_or(RUNS.as_ref()), &plan).incomplete()?;
+    let (plan, args) = &resolve(args).usage()?;
+    room::check_disk(args.out.as_deref().unwrap_or(RUNS.as_ref()), plan).incomplete()?;
     let domain = match args.clock {
         ClockKind::Virtual => None,
-        ClockKind::Rt | ClockKind::Lockstep => {
+        ClockKind::Auto | ClockKind::Rt | ClockKind::Lockstep => {
             // This also removes what killed runs left.
             let domain = supervisor::reserve_domain(args.name.as_deref()).usage()?;
             room::check_shared_memory().usage()?;
@@ -60,10 +61,10 @@ pub(crate) fn run(args: &RunArgs) -> Result<Exit, Failure> {
     let no_room = || format!("no room in {} for the verdict", folder.path().display());
     let reserve = Reserve::take(folder.path()).with_context(no_room).incomplete()?;
     let ran = match domain {
-        None => virtual_time::run(&plan, &folder, args.controller.builder())
+        None => virtual_time::run(plan, &folder, args.controller.builder())
             .map(|ending| manifest.ending = ending)
             .incomplete(),
-        Some(domain) => supervisor::run(domain, &plan, &folder, args, &mut manifest),
+        Some(domain) => supervisor::run(domain, plan, &folder, args, &mut manifest),
     };
     if let Err(failure) = &ran {
         manifest.ending = Ending::died("rig", format!("{:#}", failure.error));
@@ -86,41 +87,16 @@ fn write_manifest(folder: &RunFolder, manifest: &Manifest) -> Result<(), Failure
     manifest.write(folder).with_context(|| format!("cannot write {}", path.display())).incomplete()
 }
 
-/// Plans the run, and refuses interfaces and addresses that this machine does not have.
-fn resolve(args: &RunArgs) -> anyhow::Result<RunPlan> {
+/// Plans the run and chooses its clock; refuses interfaces and addresses that this machine does not have.
+fn resolve(args: &RunArgs) -> anyhow::Result<(RunPlan, RunArgs)> {
     let scenario = masseter_plan::scenario_with_overrides(args.scenario.as_deref(), &args.overrides())?;
-    check_clock(args, &scenario)?;
     args.cores.map_or(Ok(()), |cores| check_cores(&cores))?;
+    let args = clock::choose(args, &scenario);
+    clock::check(&args, &scenario)?;
     args.live.map_or(Ok(()), foxglove::check)?;
     let plan = RunPlan::of_file(scenario, args.scenario.as_deref())?;
     plant::check_interfaces(&plan.scenario)?;
-    Ok(plan)
-}
-
-/// Refuses arguments that the clock has no use for.
-fn check_clock(args: &RunArgs, scenario: &Scenario) -> anyhow::Result<()> {
-    if args.patience.is_some() && args.clock != ClockKind::Lockstep {
-        bail!("--patience needs --clock lockstep");
-    }
-    if args.clock == ClockKind::Rt {
-        return Ok(());
-    }
-    if !scenario.can.is_virtual() {
-        bail!("simulated time has no real CAN interfaces: use --can virtual, or --clock rt");
-    }
-    if args.require_rt {
-        bail!("--require-rt needs --clock rt");
-    }
-    if args.clock == ClockKind::Lockstep {
-        return Ok(());
-    }
-    if args.name.is_some() {
-        bail!("--name needs --clock rt or lockstep: virtual time has no processes to name");
-    }
-    if args.live.is_some() {
-        bail!("--live needs --clock rt: virtual time is over before a client can connect");
-    }
-    Ok(())
+    Ok((plan, args))
 }
 
 /// Copies the scenario, and the motion file that it plays, into the run folder: the original may change later.

@@ -104,7 +104,9 @@ impl Workspace {
 
     /// `masseter run` with this scenario into the run folder, in real time, ready to be started.
     pub(crate) fn command(&self, _cores: &Cores, arguments: &[&str]) -> Command {
-        self.masseter_run(arguments)
+        let mut command = self.masseter_run(arguments);
+        command.args(["--clock", "rt"]);
+        command
     }
 
     fn masseter_run(&self, arguments: &[&str]) -> Command {

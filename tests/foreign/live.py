@@ -99,7 +99,7 @@ def watch(link, channels, on_thousandth):
 
 def watch_a_run(masseter, out):
     """Starts a run, and a second watcher that is killed on the way; returns what the first one saw."""
-    arguments = [masseter, "run", LENIENT, "--live=127.0.0.1:0", "--duration", "5s", "--out", out]
+    arguments = [masseter, "run", LENIENT, "--clock", "rt", "--live=127.0.0.1:0", "--duration", "5s", "--out", out]
     rig = subprocess.Popen(arguments, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True)
     url = next(line.split()[2] for line in rig.stderr if line.startswith("live on "))
 

@@ -32,7 +32,7 @@ VERDICTS = ("PASS: ", "INVALID: ", "INCOMPLETE: ", "INTERRUPTED: ")
 def run(masseter, arguments, term="xterm-256color", interrupt_after=None):
     """Runs on a terminal of its own; returns exit code, output and what stands on the screen."""
     with tempfile.TemporaryDirectory() as folder:
-        command = [masseter, "run", str(LENIENT), "--out", str(Path(folder) / "run"), *arguments]
+        command = [masseter, "run", str(LENIENT), "--clock", "rt", "--out", str(Path(folder) / "run"), *arguments]
         process, terminal = pty.fork()
         if process == 0:
             os.environ["TERM"] = term

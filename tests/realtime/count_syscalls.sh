@@ -26,7 +26,7 @@ heartbeat_consumer_ms = 5000
 slide.following_error_m = 1.0
 leg.following_error_m = 1.0
 END
-"$masseter" run "$work/lenient.toml" --duration 60s --rate-hz $rate_hz --out "$work/run" >"$work/said" 2>&1 &
+"$masseter" run "$work/lenient.toml" --duration 60s --rate-hz $rate_hz --clock rt --out "$work/run" >"$work/said" 2>&1 &
 rig=$!
 trap 'kill -INT $rig 2>/dev/null; wait $rig 2>/dev/null || true; rm -rf "$work"' EXIT
 

@@ -155,7 +155,7 @@ def hit_once(masseter, role, how, silent_cycles, chance):
         scenario, run = Path(folder) / "scenario.toml", Path(folder) / "run"
         scenario.write_text(SCENARIO.format(silent_cycles=silent_cycles, heartbeat_ms=max(150, 4 * silent_cycles)))
         rig = subprocess.Popen(
-            [masseter, "run", scenario, "--out", run], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+            [masseter, "run", scenario, "--clock", "rt", "--out", run], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
         )
         victims = [child_of(rig, one) for one in (PROCESSES if role == ALL else [role])]
         wait_until_it_records(rig, run)

@@ -95,7 +95,7 @@ def figures(masseter, how, seconds):
     for _ in range(TRIES):
         with tempfile.TemporaryDirectory() as folder:
             run = Path(folder) / "run"
-            bytes_taken = how([masseter, "run", "--duration", f"{seconds}s", "--out", str(run)])
+            bytes_taken = how([masseter, "run", "--clock", "rt", "--duration", f"{seconds}s", "--out", str(run)])
             summary = json.loads((run / "summary.json").read_text())
         print(f"  {how.__name__:<9} {summary['verdict']['word']}", flush=True)
         if summary["figures"]["final_state"] == "finished":

@@ -9,6 +9,7 @@ use masseter_shared::messages::{FrameTap, Message, Reading, State, Truth};
 use crate::attribution::OverrunAttribution;
 use crate::code::Code;
 use crate::declared_faults::FaultWatch;
+use crate::digest::Digest;
 use crate::disturbance::Disturbance;
 use crate::events::EventRecord;
 use crate::figures::Figures;
@@ -55,6 +56,7 @@ pub struct Analysis {
     cycles: u64,
     freshness: Freshness,
     disturbance: Disturbance,
+    digest: Digest,
     first_sample_ns: Option<u64>,
     last_sample_ns: u64,
     controller_skips: Skips,
@@ -86,6 +88,7 @@ impl Analysis {
             cycles: 0,
             freshness: Freshness::default(),
             disturbance: Disturbance::default(),
+            digest: Digest::default(),
             first_sample_ns: None,
             last_sample_ns: 0,
             controller_skips: Skips::default(),
@@ -103,6 +106,7 @@ impl Analysis {
     /// When a message on topic `frame` holds no CAN frame.
     pub fn take(&mut self, message: &Recorded) -> Result<(), TapError> {
         self.sequence.take(message);
+        self.digest.take(message);
         match message {
             Recorded::Command(command) => {
                 self.intervals.command(command);
@@ -178,6 +182,7 @@ impl Analysis {
             topics.iter().find(|topic| topic.topic == FrameTap::TOPIC).map_or(0, |topic| topic.missing);
         self.events.sort_by_key(|event| event.time_ns);
         Figures {
+            digest: self.digest.finish(),
             cycles: self.cycles,
             duration_s: duration_ns as f64 / 1e9,
             overrun_attribution: OverrunAttribution::new(&[&self.controller_skips, &self.plant_skips]),

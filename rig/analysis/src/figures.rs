@@ -21,6 +21,8 @@ use crate::tracking::{Track, TrackingFigures};
 /// The figures of a run. As JSON: `figures` of `summary.json`.
 #[derive(Debug, Clone, Serialize)]
 pub struct Figures {
+    /// A short number for targets, positions and states by cycle: equal where two runs did the same.
+    pub digest: String,
     /// Cycles that the controller ran.
     pub cycles: u64,
     /// From the first to the last reading, s.

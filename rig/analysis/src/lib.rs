@@ -10,6 +10,7 @@ mod bus_response;
 mod by_cycle;
 mod code;
 mod declared_faults;
+mod digest;
 mod disturbance;
 mod events;
 mod figures;

@@ -11,6 +11,7 @@ use masseter_analysis::{
     BusResponse, Figures, IntervalFigures, PoseErrors, ReadingFigures, ResponseFigures, TrackingFigures,
 };
 use masseter_recording::{Manifest, RunUsage, Usage};
+use masseter_shared::wording::counted;
 use masseter_terminal::{Exit, Tone};
 
 /// The words that judge.
@@ -69,14 +70,15 @@ fn write_verdict(
     }
     writeln!(
         text,
-        "{}: {:.1} s of motion at {} Hz ({} clock), {} cycles in {:.1} s, seed {}",
+        "{}: {:.1} s of motion at {} Hz ({} clock), {} in {:.1} s of cycle time, seed {}, digest {}",
         scenario.name,
         manifest.motion_s,
         scenario.rate_hz,
         manifest.clock,
-        figures.cycles,
+        counted(figures.cycles, "cycle"),
         figures.duration_s,
         scenario.seed,
+        figures.digest,
     )?;
     if let MotionConfig::File(file) = &scenario.motion {
         writeln!(text, "recording played: {}", file.path.display())?;

@@ -215,7 +215,9 @@ fn remedy(manifest: &Manifest) -> String {
         Some(DmaLatency { limit_us: None, .. }) => "; realtime.cpu_dma_latency = \"hold\" may help too",
         _ => "",
     };
-    format!("masseter doctor lists what disturbs this machine{latency}")
+    format!(
+        "masseter doctor lists what disturbs this machine, --clock lockstep keeps it out of the result{latency}"
+    )
 }
 
 /// The excuse for a safe stop, in words: the machine lost all missed cycles, and many of them just before the stop.

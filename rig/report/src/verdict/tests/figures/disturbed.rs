@@ -110,7 +110,8 @@ fn an_invalid_run_says_what_the_machine_lost_and_what_helps() {
         let reason = Verdict::new(&run.manifest, &run.figures).reason;
         reason.split_once("; ").map(|(_, account)| account.to_owned()).unwrap()
     };
-    let doctor = "masseter doctor lists what disturbs this machine";
+    let doctor =
+        "masseter doctor lists what disturbs this machine, --clock lockstep keeps it out of the result";
     assert_eq!(
         reason(|_| ()),
         format!("3 cycles lost, the machine stalled for 4.8 ms while the rig waited; {doctor}")

@@ -1,0 +1,96 @@
+//! The clock of a run: what `--clock auto` comes to on this machine, and which arguments a clock has no use for.
+
+use std::thread;
+
+use anyhow::bail;
+use masseter_shared::config::Scenario;
+use masseter_shared::realtime::scheduling::{SchedulingRequest, obtain};
+use masseter_terminal::status;
+
+use super::args::{ClockKind, RunArgs};
+
+/// The arguments with a clock that this machine can keep: real time where the kernel grants it, otherwise lockstep.
+pub(super) fn choose(args: &RunArgs, scenario: &Scenario) -> RunArgs {
+    let chosen = |clock| RunArgs { clock, ..args.clone() };
+    if args.clock != ClockKind::Auto {
+        return args.clone();
+    }
+    // Real drives know no other time, and a required real time is refused by its own verdict.
+    if !scenario.can.is_virtual() || args.require_rt {
+        return chosen(ClockKind::Rt);
+    }
+    let Some(refusal) = refusal(scenario) else { return chosen(ClockKind::Rt) };
+    if !args.quiet {
+        status!(
+            "clock: lockstep, because real time is not granted: {refusal}; --clock rt tries it all the same"
+        );
+    }
+    chosen(ClockKind::Lockstep)
+}
+
+/// Why the kernel does not grant the cores and the priority of the scenario; none if it does.
+fn refusal(scenario: &Scenario) -> Option<String> {
+    let realtime = &scenario.realtime;
+    let fifo_priority = Some(realtime.priority);
+    let try_on = |core| {
+        let request = SchedulingRequest { core: Some(core), fifo_priority, locked_memory: false };
+        // The thread ends with its priority.
+        let tried = thread::spawn(move || obtain(request).refusals);
+        tried.join().expect("asking the kernel does not panic").into_iter().next()
+    };
+    realtime.cores.into_iter().find_map(try_on)
+}
+
+/// Refuses arguments that the clock has no use for.
+pub(super) fn check(args: &RunArgs, scenario: &Scenario) -> anyhow::Result<()> {
+    if args.patience.is_some() && args.clock != ClockKind::Lockstep {
+        bail!("--patience needs --clock lockstep");
+    }
+    if args.clock == ClockKind::Rt {
+        return Ok(());
+    }
+    if !scenario.can.is_virtual() {
+        bail!("simulated time has no real CAN interfaces: use --can virtual, or --clock rt");
+    }
+    if args.require_rt {
+        bail!("--require-rt needs --clock rt");
+    }
+    if args.clock == ClockKind::Lockstep {
+        return Ok(());
+    }
+    if args.name.is_some() {
+        bail!("--name needs --clock rt or lockstep: virtual time has no processes to name");
+    }
+    if args.live.is_some() {
+        bail!("--live needs --clock rt: virtual time is over before a client can connect");
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_chosen_clock_stays_and_the_robot_has_real_time() {
+        let of = |clock, interfaces: &[&str], require_rt| {
+            let mut scenario = Scenario::default();
+            scenario.can.interfaces = interfaces.iter().map(|name| (*name).to_owned()).collect();
+            let args = RunArgs { clock, require_rt, quiet: true, ..RunArgs::default() };
+            choose(&args, &scenario).clock
+        };
+        for clock in [ClockKind::Rt, ClockKind::Lockstep, ClockKind::Virtual] {
+            assert_eq!(of(clock, &[], false), clock);
+        }
+        assert_eq!(of(ClockKind::Auto, &["can0", "can1"], false), ClockKind::Rt);
+        assert_eq!(of(ClockKind::Auto, &[], true), ClockKind::Rt);
+    }
+
+    #[test]
+    fn without_the_cores_of_the_scenario_the_clock_is_lockstep() {
+        let mut scenario = Scenario::default();
+        scenario.realtime.cores = [0, 4000];
+        let args = RunArgs { quiet: true, ..RunArgs::default() };
+        assert_eq!(choose(&args, &scenario).clock, ClockKind::Lockstep);
+    }
+}
