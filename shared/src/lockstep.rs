@@ -175,7 +175,7 @@ impl Lockstep {
 
     /// Waits for one of the signals from a process; none once that process was given up.
     fn wait(&mut self, signals: &[u8], from: Party) -> Result<Option<u8>, ProcessError> {
-        let mut silent_ns = 0;
+        let (mut silent_ns, mut silent_since_stop_ns) = (0, 0);
         while self.lost != Some(from) {
             let wanted = signals.iter().find(|&&signal| self.arrived >> signal & 1 == 1);
             if let Some(&signal) = wanted {
@@ -188,13 +188,15 @@ impl Lockstep {
                 continue;
             }
             // Stretches in which this process itself was stopped do not count.
-            silent_ns += (clock::now_ns() - from_ns).min(SLICE.as_nanos() as u64);
+            let slept_ns = (clock::now_ns() - from_ns).min(SLICE.as_nanos() as u64);
+            silent_ns += slept_ns;
+            silent_since_stop_ns += if self.stop.is_made() { slept_ns } else { 0 };
             // The plant may have to wait for the recorder meanwhile.
             let waits = if from == Party::Plant { 2 } else { 1 };
             if !self.patience.lasts(silent_ns / waits) {
                 self.lost = Some(from);
                 Silence { process: from, cycle: self.cycle, silent_s: silent_ns as f64 / 1e9 }.report()?;
-            } else if self.stop.is_made() && silent_ns >= STOP_PATIENCE_NS {
+            } else if silent_since_stop_ns >= STOP_PATIENCE_NS {
                 self.lost = Some(from);
             }
         }
