@@ -96,7 +96,7 @@ mod tests {
             (json!({"form": FORM, "verdict": verdict, "figures": {}}), None),
             (json!({"form": 9, "verdict": verdict, "figures": {}}), Some("it has form 9")),
             (json!({"form": FORM, "verdict": verdict, "figures": []}), Some("it has no figures")),
-            (json!({"form": 1, "figures": {}}), Some("it has no verdict")),
+            (json!({"form": FORM, "figures": {}}), Some("it has no verdict")),
             (json!([]), Some("it has form null")),
         ] {
             let refusal = ComparedRun::new("A", &summary, &json!({})).err().map(|error| error.to_string());

@@ -104,7 +104,7 @@ mod tests {
             "intervals": [{"name": "control", "p50_ns": p50_ns, "p50_noise_ns": 1.0, "max_ns": p50_ns}],
         });
         let summary = json!({
-            "form": FORM, "verdict": {"word": "PASS", "reason": "every check passed"}, "figures": figures,
+            "form": crate::summary::FORM, "verdict": {"word": "PASS", "reason": "every check passed"}, "figures": figures,
         });
         ComparedRun::new(path, &summary, &json!({"clock": "rt", "scenario": {"seed": seed}})).unwrap()
     }
