@@ -310,7 +310,7 @@ fn wrong_usage_exits_with_2() {
         (&["run", "--cores", "1,1"], "name two"),
         (&["run", "--cores", "0,4000"], "no core 4000 for this process; choose among 0"),
         (&["run", "--clock", "virtual", "--cores", "4000,0"], "no core 4000"),
-        (&["run", "--clock", "virtual", "--require-rt"], "need --clock rt"),
+        (&["run", "--clock", "virtual", "--require-rt"], "needs --clock rt"),
         (&["run", "--clock", "virual"], "a similar value exists: 'virtual'"),
         (&["run", "--duration", "soon"], "such as 10, 10s or 2min"),
         (&["run", "--duration", "1e300"], "such as 10, 10s or 2min"),

@@ -113,7 +113,7 @@ fn hypervisor(root: &SystemRoot) -> Finding {
     let ticks = root.core_ticks().unwrap_or_default();
     let (total, [.., stolen]) = (ticks.iter().sum::<u64>(), ticks);
     let percent = 100.0 * stolen as f64 / total.max(1) as f64;
-    let cost = "the hypervisor may stop a core for milliseconds; such runs are INVALID";
+    let cost = "the hypervisor may stop a core for milliseconds; such runs are disturbed";
     Finding::warn(CHECK, format!("yes; its host stole {percent:.3} % of the time since boot"), cost)
 }
 
