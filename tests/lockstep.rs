@@ -184,8 +184,9 @@ fn arguments_of_other_clocks_are_refused() {
     for (arguments, expected) in [
         (&["--patience", "1s"][..], "--patience needs --clock lockstep"),
         (&["--clock", "lockstep", "--require-rt"], "--require-rt needs --clock rt"),
+        (&["--clock", "virtual", "--live"], "--live needs --clock rt"),
         (&["--clock", "lockstep", "--can", "can0,can1"], "simulated time has no real CAN interfaces"),
-        (&["--clock", "lockstep", "--patience", "long"], "or `none`"),
+        (&["--clock", "lockstep", "--patience", "long"], "or none"),
     ] {
         let output = masseter(&[&["run"], arguments].concat());
         assert_eq!(output.status.code(), Some(2), "{arguments:?}");

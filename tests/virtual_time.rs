@@ -12,7 +12,7 @@ use serde_json::json;
 #[test]
 fn a_run_passes_tracks_within_a_tenth_of_a_millimetre_and_leaves_its_folder() {
     let workspace = Workspace::new("duration_s = 4.0");
-    let output = workspace.run_virtual(&[]);
+    let output = workspace.run_virtual(&["--verbose"]);
     assert_eq!(output.status.code(), Some(0), "{}{}", stdout(&output), stderr(&output));
     let figures = &workspace.summary()["figures"];
     assert!(figures["tracking"]["rms_mm"].as_f64().unwrap() < 0.1, "{}", figures["tracking"]);
@@ -224,7 +224,7 @@ fn a_plant_that_fails_is_reported_as_dead_by_the_run_and_by_report() {
     let workspace = Workspace::new(
         "[drives.leg]\nvelocity_gain_n_s_per_m = 6e7\nrated_force_n = 1e7\nmax_force_n = 1e8\nfollowing_error_m = 1.0",
     );
-    let output = workspace.run_virtual(&[]);
+    let output = workspace.run_virtual(&["--verbose"]);
     assert_eq!(output.status.code(), Some(4), "{}{}", stdout(&output), stderr(&output));
     let again = common::masseter(&["report", workspace.run_folder().to_str().unwrap()]);
     assert_eq!(stdout(&again), stdout(&output));

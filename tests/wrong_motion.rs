@@ -35,7 +35,7 @@ fn a_drive_that_misses_its_targets_is_detected_before_the_jaw_is_far_from_its_pa
     }
 }
 
-/// Nobody watches the drives closely, and the controller only beyond `limit_m`.
+/// With wide limits of the drives and of the master, and `limit_m` for the controller.
 fn lax(limit_m: f64) -> Workspace {
     let limits = format!(
         "[can]\nfollowing_limit_m = 1.0\n[controller]\ntracking_limit_m = {limit_m}\ntracking_limit_rad = 1.0\n\

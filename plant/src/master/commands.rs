@@ -63,6 +63,7 @@ impl Commands {
         needs_command: bool,
         following_m: [Option<f64>; AXES],
     ) -> Result<(), (Subject, Failure)> {
+        self.gate.begin_cycle(cycle, following_m);
         // A refused command is none.
         self.silent_cycles = self.silent_cycles.saturating_add(1);
         let Some(command) = command else {
@@ -72,7 +73,7 @@ impl Commands {
             let cycles = [self.silent_cycles, self.timeout_cycles].map(f64::from);
             return Err((Subject::Rig, Failure::with(Cause::CommandLost, cycles)));
         };
-        self.request = self.gate.pass(cycle, command, following_m)?;
+        self.request = self.gate.pass(command, following_m)?;
         (self.answers_cycle, self.received_ns, self.silent_cycles) = (command.cycle, now_ns, 0);
         Ok(())
     }

@@ -18,6 +18,8 @@ use super::failure::Failure;
 const NOISE_DEVIATIONS: f64 = 6.0;
 /// Periods that one target may take, however many commands were missed: a motion may go on for one of them, then it waits.
 const MOST_PERIODS: u64 = 2;
+/// Periods that targets may have left: a late cycle of the master may take a command that came early, after late ones.
+const MOST_FREE_PERIODS: u64 = 3;
 
 /// The target that a drive follows.
 #[derive(Debug, Clone, Copy)]
@@ -60,8 +62,12 @@ pub(super) struct Gate {
     period_s: f64,
     timeout_cycles: u64,
     axes: [AxisGate; AXES],
-    /// Of the last command that passed: the controller's cycle and the master's.
-    passed: [u64; 2],
+    /// The controller's cycle of the last command that passed.
+    passed_cycle: u64,
+    /// The master's cycle.
+    cycle: u64,
+    /// Periods that no target has taken yet.
+    free_periods: u64,
 }
 
 impl Gate {
@@ -80,19 +86,35 @@ impl Gate {
             }
         });
         let timeout_cycles = scenario.can.command_timeout_cycles.into();
-        Self { period_s: scenario.period_s(), timeout_cycles, axes, passed: [0; 2] }
+        Self {
+            period_s: scenario.period_s(),
+            timeout_cycles,
+            axes,
+            passed_cycle: 0,
+            cycle: 0,
+            free_periods: MOST_FREE_PERIODS,
+        }
     }
 
-    /// Judges the command that comes in a cycle of the master; returns its request. `following_m` has the position of every
-    /// drive that would follow its target.
+    /// Begins a cycle of the master. A drive whose position is none follows no target: its last one is forgotten.
+    pub(super) fn begin_cycle(&mut self, cycle: u64, following_m: [Option<f64>; AXES]) {
+        self.free_periods = (self.free_periods + cycle.saturating_sub(self.cycle)).min(MOST_FREE_PERIODS);
+        self.cycle = cycle;
+        for (axis, position_m) in self.axes.iter_mut().zip(following_m) {
+            axis.followed = axis.followed.filter(|_| position_m.is_some());
+        }
+    }
+
+    /// Judges the command that comes in this cycle; returns its request. `following_m` has the position of every drive that
+    /// would follow its target.
     pub(super) fn pass(
         &mut self,
-        cycle: u64,
         command: &Command,
         following_m: [Option<f64>; AXES],
     ) -> Result<DriveRequest, (Subject, Failure)> {
         let request = check_message(command)?;
-        let step = self.step(cycle, command.cycle);
+        let periods = self.periods(command.cycle);
+        let step = Step { cycle: self.cycle, duration_s: periods as f64 * self.period_s };
         let mut followed = [None; AXES];
         for (axis, position_m) in following_m.into_iter().enumerate() {
             let Some(position_m) = position_m.filter(|_| request == DriveRequest::Enable) else { continue };
@@ -100,7 +122,7 @@ impl Gate {
             followed[axis] = Some(next.map_err(|failure| (Subject::Axis(axis), failure))?);
         }
         self.axes.iter_mut().zip(followed).for_each(|(axis, followed)| axis.followed = followed);
-        self.passed = [command.cycle, cycle];
+        (self.passed_cycle, self.free_periods) = (command.cycle, self.free_periods.saturating_sub(periods));
         Ok(request)
     }
 
@@ -109,13 +131,11 @@ impl Gate {
         self.axes.map(|axis| axis.followed.map(|followed| followed.target_m))
     }
 
-    /// The step to the target of a command. It takes the periods since the last command by the controller's count, but one
-    /// more than by the master's at most: a command may be one cycle late.
-    fn step(&self, cycle: u64, command_cycle: u64) -> Step {
-        let [last_command_cycle, last_cycle] = self.passed;
-        let most = (cycle.saturating_sub(last_cycle) + 1).min(MOST_PERIODS);
-        let periods = command_cycle.saturating_sub(last_command_cycle).clamp(1, most);
-        Step { cycle, duration_s: periods as f64 * self.period_s }
+    /// Periods that the step to a command's target takes: those since the last command by the controller's count. The
+    /// count alone proves nothing: all steps together take no more periods than the master's cycles.
+    fn periods(&self, command_cycle: u64) -> u64 {
+        let most = self.free_periods.clamp(1, MOST_PERIODS);
+        command_cycle.saturating_sub(self.passed_cycle).clamp(1, most)
     }
 }
 
@@ -156,7 +176,15 @@ impl RecentVelocities {
         velocity_m_s.clamp(low.min(older_low), high.max(older_high))
     }
 
+    /// With one more. A motion that has turned back does not go on in its old direction.
     fn with(mut self, velocity_m_s: f64) -> Self {
+        for range_m_s in &mut self.ranges_m_s {
+            if velocity_m_s > 0.0 {
+                range_m_s[0] = 0.0;
+            } else if velocity_m_s < 0.0 {
+                range_m_s[1] = 0.0;
+            }
+        }
         let [low, high] = self.ranges_m_s[0];
         self.ranges_m_s[0] = [low.min(velocity_m_s), high.max(velocity_m_s)];
         self

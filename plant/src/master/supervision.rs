@@ -66,7 +66,7 @@ impl Supervision {
         self.were_enabled = is_enable && (self.were_enabled || all_are_enabled);
     }
 
-    /// Whether drives may be booted. During a stop they may not: it needs every drive's attention. After a permanent stop
+    /// Whether drives may be booted. During a stop they may not: the drives have to stop first. After a permanent stop
     /// nobody moves the drives again, and another master may control them.
     pub(super) fn may_boot(self, drives_are_off: bool) -> bool {
         match self.stop {
@@ -119,7 +119,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_wrong_command_and_a_disobedient_drive_stop_permanently_and_the_first_cause_counts() {
+    fn a_wrong_command_and_a_drive_that_does_not_follow_stop_permanently_and_the_first_cause_counts() {
         let permanent = [
             Cause::CommandLost,
             Cause::BadMessage,

@@ -121,7 +121,10 @@ impl FaultWatch {
             self.settle(&sample);
         }
         let figures = |(index, fault): (usize, &Effect)| {
-            let stop = fault.struck_ns.and_then(|struck_ns| first_stop(&self.stops, struck_ns));
+            // A fault that strikes during a stop has not begun it.
+            let stop = fault
+                .struck_ns
+                .and_then(|struck_ns| first_stop(&self.stops, 0).filter(|stop| stop.time_ns >= struck_ns));
             FaultFigures {
                 number: index + 1,
                 struck_ns: fault.struck_ns,

@@ -56,7 +56,9 @@ mod tests {
 
     fn digest(messages: &[Recorded]) -> String {
         let mut digest = Digest::default();
-        messages.iter().for_each(|message| digest.take(message));
+        for message in messages {
+            digest.take(message);
+        }
         digest.finish()
     }
 

@@ -42,7 +42,8 @@ impl Bench {
             ..Command::default()
         };
         change(&mut command);
-        self.gate.pass(self.cycle, &command, MIDDLE_M.map(Some))?;
+        self.gate.begin_cycle(self.cycle, MIDDLE_M.map(Some));
+        self.gate.pass(&command, MIDDLE_M.map(Some))?;
         self.target_m = command.target_m;
         Ok(())
     }
@@ -107,7 +108,9 @@ fn the_ends_of_every_stroke_may_be_held_with_the_encoders_noise_and_no_more() {
                 (command.version, command.request) = (LAYOUT_VERSION, DriveRequest::Enable.code());
                 positions_m[axis] = position_m;
                 command.target_m = positions_m;
-                Gate::new(&scenario).pass(1, &command, positions_m.map(Some))
+                let mut gate = Gate::new(&scenario);
+                gate.begin_cycle(1, positions_m.map(Some));
+                gate.pass(&command, positions_m.map(Some))
             };
             assert_eq!([hold(0.0), hold(2e-6)], [Ok(DriveRequest::Enable); 2], "axis {axis}");
             let (subject, failure) = hold(3e-6).unwrap_err();
@@ -220,24 +223,60 @@ fn a_target_is_two_periods_away_at_most_however_many_commands_were_missed() {
 }
 
 #[test]
-fn a_late_command_leaves_two_periods_for_the_next_and_a_wrong_count_does_not() {
-    let after = |cycles: u64| {
-        let mut bench = Bench::new();
-        bench.reach(4, 0.3);
-        bench.send(|command| {
-            command.cycle += cycles;
-            command.target_m[4] += 0.6 * PERIOD_S;
-        })
-    };
-    assert_eq!(after(1), Ok(()));
-    assert_eq!(after(0).unwrap_err().1.cause, Cause::VelocityLimit);
+fn a_late_command_leaves_two_periods_for_the_next() {
     let mut bench = Bench::new();
     bench.reach(4, 0.3);
+    bench.send(|command| command.cycle -= 1).unwrap();
+    assert_eq!(bench.step(4, 0.6), Ok(()));
+    assert_eq!(bench.step(4, 0.6).unwrap_err().1.cause, Cause::VelocityLimit);
+}
+
+/// Each command would have two periods by its own count.
+#[test]
+fn a_count_that_runs_ahead_of_the_masters_gives_no_more_than_its_cycles() {
+    let mut bench = Bench::new();
+    bench.reach(4, 0.3);
+    let passed = (1..=50u64).take_while(|ahead| {
+        let judged = bench.send(|command| {
+            command.cycle += ahead;
+            command.target_m[4] += 0.6 * PERIOD_S;
+        });
+        judged.is_ok()
+    });
+    assert!(passed.count() <= 2);
     let jump = bench.send(|command| {
         command.cycle += 100;
         command.target_m[4] += 0.9 * PERIOD_S;
     });
     assert_eq!(jump.unwrap_err().1.cause, Cause::VelocityLimit);
+}
+
+/// After a legal reversal, at once or with a stop between.
+#[test]
+fn a_motion_turns_back_only_as_fast_as_it_may() {
+    for direction in [-1.0, 1.0] {
+        for stops in [0, 1, 3] {
+            let mut bench = Bench::new();
+            bench.reach(4, direction * 0.3);
+            for part in 1..=20 {
+                bench.step(4, direction * (0.3 - 0.6 * f64::from(part) / 20.0)).unwrap();
+            }
+            (0..stops).for_each(|_| bench.step(4, 0.0).unwrap());
+            let back = bench.step(4, direction * 0.3).unwrap_err();
+            assert_eq!(back.1.cause, Cause::AccelerationLimit, "{direction} {stops}");
+            assert_eq!(bench.step(4, -direction * 0.3), Ok(()));
+        }
+    }
+}
+
+#[test]
+fn a_drive_that_stopped_following_without_a_command_needs_a_new_target() {
+    let mut bench = Bench::new();
+    let mut others_m = MIDDLE_M.map(Some);
+    others_m[3] = None;
+    bench.gate.begin_cycle(2, others_m);
+    bench.gate.begin_cycle(3, MIDDLE_M.map(Some));
+    assert_eq!(bench.gate.targets_m(), others_m);
 }
 
 #[test]
