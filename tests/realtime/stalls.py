@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""Stops controller and plant of a running rig for moments, again and again: the motion waits and goes on, and the last
-gate refuses none of the rig's own commands.
+"""Stops controller and plant of a running rig for moments, again and again. The motion waits and goes on. The last gate
+refuses a command only where a stall left a target more than two periods behind, which is rare.
 
     tests/realtime/stalls.py target/release/masseter --runs 10
 
-Fails if the gate refuses a command. Other stops of so disturbed a rig are counted only. Only the Python standard library is
-used.
+Fails if the gate refuses more than one command in 500 stalls, or one that no stall explains. Other stops of so disturbed a
+rig are only counted. Only the Python standard library is used.
 """
 
 import argparse
@@ -26,6 +26,7 @@ LONGEST_PAUSE_S = 0.06
 MOTION_S = 5.0
 # A rig that ends after few stalls shows nothing.
 LEAST_STALLS = 50
+STALLS_PER_REFUSAL = 500
 
 
 def stall(victims, chance):
@@ -72,12 +73,14 @@ def main():
         ends[word, cause] += 1
         all_stalls += stalls
         all_refused += refused
+        if refused and word != "INVALID":
+            raise SystemExit(f"no stall explains that the gate refused a command: {refused}")
     for (word, cause), count in ends.most_common():
         print(f"{count:>3} × {word}, {cause}")
     print(f"{all_stalls} stalls in {arguments.runs} runs, {len(all_refused)} refused commands")
     if all_stalls < LEAST_STALLS * arguments.runs:
         raise SystemExit("the rigs ended too early to show anything")
-    if all_refused:
+    if len(all_refused) > max(1, all_stalls // STALLS_PER_REFUSAL):
         raise SystemExit(f"the gate refused commands of the rig: {all_refused}")
 
 

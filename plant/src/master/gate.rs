@@ -176,12 +176,13 @@ impl RecentVelocities {
         velocity_m_s.clamp(low.min(older_low), high.max(older_high))
     }
 
-    /// With one more. A motion that has turned back does not go on in its old direction.
-    fn with(mut self, velocity_m_s: f64) -> Self {
+    /// With one more. A motion that has turned back does not go on in its old direction; pose control moves the targets of
+    /// one that waits by less than `slow_m_s`.
+    fn with(mut self, velocity_m_s: f64, slow_m_s: f64) -> Self {
         for range_m_s in &mut self.ranges_m_s {
-            if velocity_m_s > 0.0 {
+            if velocity_m_s > slow_m_s {
                 range_m_s[0] = 0.0;
-            } else if velocity_m_s < 0.0 {
+            } else if velocity_m_s < -slow_m_s {
                 range_m_s[1] = 0.0;
             }
         }
@@ -209,7 +210,11 @@ impl AxisGate {
         let unexplained_m_s = (velocity_m_s - recent.nearest(velocity_m_s)).abs().min(change_m_s);
         let acceleration_m_s2 = unexplained_m_s / step.duration_s;
         check_limit(Cause::AccelerationLimit, acceleration_m_s2, self.max_acceleration_m_s2)?;
-        Ok(Followed { target_m, velocity_m_s, recent: recent.with(velocity_m_s) })
+        Ok(Followed {
+            target_m,
+            velocity_m_s,
+            recent: recent.with(velocity_m_s, self.max_acceleration_m_s2 * step.duration_s),
+        })
     }
 
     /// A drive that stands at its first target, or as near as its position allows.

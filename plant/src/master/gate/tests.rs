@@ -188,7 +188,8 @@ fn a_motion_may_wait_in_every_second_cycle() {
         let mut bench = Bench::new();
         for part in (1..=end).chain((1..end).rev()) {
             let velocity_m_s = direction * 1e-3 * f64::from(part);
-            assert_eq!(bench.step(4, 0.0), Ok(()), "waits at {velocity_m_s}");
+            // Pose control goes on.
+            assert_eq!(bench.step(4, -direction * 0.002), Ok(()), "waits at {velocity_m_s}");
             assert_eq!(bench.step(4, velocity_m_s), Ok(()), "goes on with {velocity_m_s}");
         }
         assert!(bench.step(4, -direction * 0.09).is_err(), "backwards at once");
