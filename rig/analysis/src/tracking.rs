@@ -93,6 +93,8 @@ pub struct TrackingSample {
 pub struct Track {
     /// Cycles from the first on, as many as a screen shows; of a long run not to its end.
     pub samples: Vec<TrackingSample>,
+    /// When the first sample was taken, ns of the run's clock.
+    pub began_ns: u64,
     /// How long it went on, s.
     pub duration_s: f64,
     /// Desired displacement along x, y and z, from the first desired pose, m: lowest and highest of each stretch of time.
@@ -298,6 +300,7 @@ impl Tracking {
         let began_ns = self.began.map_or(self.ended_ns, |(began_ns, _)| began_ns);
         let bands = |first: usize| std::array::from_fn(|axis| self.moved_m.band(first + axis));
         let track = Track {
+            began_ns,
             duration_s: self.ended_ns.saturating_sub(began_ns) as f64 / 1e9,
             desired_m: bands(DESIRED),
             actual_m: bands(ACTUAL),

@@ -70,12 +70,17 @@ type Plots<const N: usize> = [(&'static str, Option<Drawn>); N];
 pub(super) fn motion(figures: &Figures) -> Plots<2> {
     let track = &figures.track;
     let actual = figures.tracking.actual_source.adjective();
+    // Every chart has the time of the recording.
+    let began_s = track.began_ns.saturating_sub(figures.over_time.began_ns) as f64 / 1e9;
+    let in_run = |curve: &Curve| -> Curve {
+        in_unit(curve, 1e3).into_iter().map(|(at_s, value)| (at_s + began_s, value)).collect()
+    };
     let pair = |(axis, name): (usize, &str)| {
         [("desired", &track.desired_m), (actual, &track.actual_m)]
-            .map(|(kind, curves)| Line::new(&format!("{name} {kind}"), in_unit(&curves[axis], 1e3)))
+            .map(|(kind, curves)| Line::new(&format!("{name} {kind}"), in_run(&curves[axis])))
     };
     let lines = ["x", "y", "z"].into_iter().enumerate().flat_map(pair).collect();
-    let distance = Line::new("distance", in_unit(&track.distance_m, 1e3));
+    let distance = Line::new("distance", in_run(&track.distance_m));
     [
         ("motion", chart_over_time(linear("displacement of the platform, mm"), lines, Vec::new())),
         ("error", chart_over_time(linear("distance from desired, mm"), vec![distance], Vec::new())),

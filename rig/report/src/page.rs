@@ -3,10 +3,12 @@
 //! The template `templates/report.html` holds the markup and formats single numbers. This module draws the plots.
 
 use askama::Template;
-use masseter_analysis::{Figures, Track};
+use masseter_analysis::{EventRecord, Figures, Track};
 use masseter_charts::Drawn;
 use masseter_recording::Manifest;
 use masseter_shared::config::MotionConfig;
+use masseter_shared::messages::codes::ControllerState;
+use masseter_shared::wording::counted;
 
 use crate::text::{microseconds, or_dash};
 use crate::verdict::Verdict;
@@ -43,6 +45,23 @@ pub(crate) fn html(manifest: &Manifest, figures: &Figures, verdict: &Verdict) ->
         time_line: time_line::svg(figures),
     };
     page.render()
+}
+
+/// The events until the controller first moves the jaw, and those from then on.
+fn phases(events: &[EventRecord]) -> (&[EventRecord], &[EventRecord]) {
+    let moves = |event: &EventRecord| {
+        event.transition.as_ref().is_some_and(|[_, to]| to == ControllerState::Easing.name())
+    };
+    events.split_at(events.iter().position(moves).unwrap_or(0))
+}
+
+fn events_in_words(events: &[EventRecord]) -> String {
+    counted(events.len() as u64, "event")
+}
+
+/// When an event came, on the time of the charts.
+fn seconds(figures: &Figures, event: &EventRecord) -> String {
+    format!("{:.3} s", in_unit(event.time_ns.saturating_sub(figures.over_time.began_ns), 1e9))
 }
 
 /// The part of the motion that the animation shows, if it does not show all.
