@@ -164,8 +164,12 @@ impl<'a> Elimination<'a> {
         {
             return found(closed);
         }
-        let x = narrowed(within, low[pair], high[pair], |x| self.residuals_23(x).0[pair]);
-        match self.loops.close(&self.leg_angles(x)[pair], MOST_ITERATIONS) {
+        let residual = |x| self.residuals_23(x).0[pair];
+        let close_from = |x| self.loops.close(&self.leg_angles(x)[pair], MOST_ITERATIONS);
+        // Next to a solution beyond the interval the residual is small too, so that one may be found instead.
+        let own = close_from(narrowed(within, low[pair], high[pair], residual));
+        let own = own.filter(|closed| lies_within(within, closed));
+        match own.or_else(|| close_from(bisected(within, low[pair], residual))) {
             Some(closed) => found(closed),
             None => {
                 self.try_all(within, found);
@@ -219,6 +223,16 @@ fn scaled(range: Interval, within: Interval) -> Interval {
 /// Where the straight line through two points crosses zero.
 fn crossing([kept, newest]: [f64; 2], [at_kept, at_newest]: [f64; 2]) -> f64 {
     newest - at_newest * (newest - kept) / (at_newest - at_kept)
+}
+
+/// Where a function changes sign, to the last digit.
+fn bisected(mut within: Interval, at_low: f64, function: impl Fn(f64) -> f64) -> f64 {
+    for _ in 0..f64::MANTISSA_DIGITS {
+        let middle = within.at(0.5);
+        let end = if (function(middle) > 0.0) == (at_low > 0.0) { &mut within.low } else { &mut within.high };
+        *end = middle;
+    }
+    within.at(0.5)
 }
 
 /// Where a function changes sign, by false position with the Illinois rule.
