@@ -103,12 +103,18 @@ fn check_among(cores: &[usize], usable: &[usize]) -> anyhow::Result<()> {
     }
 }
 
+const LEAST_PATIENCE: Duration = Duration::from_millis(100);
+
 /// `none`, or a duration.
 pub(crate) fn parse_patience(text: &str) -> Result<Patience, String> {
     if text == "none" {
         return Ok(Patience(None));
     }
-    parse_duration(text).map(|duration| Patience(Some(duration))).map_err(|error| format!("{error}; or none"))
+    match parse_duration(text) {
+        Ok(duration) if duration >= LEAST_PATIENCE => Ok(Patience(Some(duration))),
+        Ok(_) => Err("give at least 100ms, which a busy machine may need; or none".to_owned()),
+        Err(error) => Err(format!("{error}; or none")),
+    }
 }
 
 /// The same as [`parse_patience`] reads.

@@ -182,8 +182,9 @@ fn the_processes_of_a_killed_supervisor_end() {
 #[test]
 fn arguments_of_other_clocks_are_refused() {
     for (arguments, expected) in [
-        (&["--patience", "1s"][..], "--patience needs --clock lockstep"),
+        (&["--patience", "1s", "--clock", "rt"][..], "--patience needs --clock lockstep"),
         (&["--clock", "lockstep", "--require-rt"], "--require-rt needs --clock rt"),
+        (&["--patience", "1ms"], "give at least 100ms"),
         (&["--clock", "virtual", "--live"], "--live needs --clock rt"),
         (&["--clock", "lockstep", "--can", "can0,can1"], "simulated time has no real CAN interfaces"),
         (&["--clock", "lockstep", "--patience", "long"], "or none"),

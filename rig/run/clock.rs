@@ -12,6 +12,10 @@ use super::args::{ClockKind, RunArgs};
 /// The arguments with a clock that this machine can keep: real time where the kernel grants it, otherwise lockstep.
 pub(super) fn choose(args: &RunArgs, scenario: &Scenario) -> RunArgs {
     let chosen = |clock| RunArgs { clock, ..args.clone() };
+    // Whoever names a patience wants the clock that has one.
+    if args.clock == ClockKind::Auto && args.patience.is_some() {
+        return chosen(ClockKind::Lockstep);
+    }
     if args.clock != ClockKind::Auto {
         return args.clone();
     }

@@ -35,7 +35,7 @@ pub struct ProcessArguments {
 pub struct Patience(pub Option<Duration>);
 
 impl Patience {
-    /// Whether a silence of this length is still bearable.
+    /// Whether a silence of this length is not too long.
     pub fn lasts(self, silent_ns: u64) -> bool {
         self.0.is_none_or(|patience| u128::from(silent_ns) < patience.as_nanos())
     }

@@ -24,6 +24,8 @@ const RECORDED: u8 = 3;
 const SLICE: Duration = Duration::from_millis(20);
 /// Longest silence of another process once this one was asked to end: it has probably ended, ns.
 const STOP_PATIENCE_NS: u64 = clock::SECOND_NS;
+/// Longest wait for the request to end, after the last turn, ns.
+const STOP_REQUEST_NS: u64 = 10 * clock::SECOND_NS;
 /// Messages of the plant between two requests to the recorder. The recorder has room for more than two such windows and
 /// everything that a cycle may add.
 const WINDOW_MESSAGES: usize = 256;
@@ -166,7 +168,7 @@ impl Lockstep {
     /// Waits for the request to end, after the last turn; false if it does not come.
     pub fn await_stop(&self) -> bool {
         let mut waited_ns = 0;
-        while !self.stop.is_made() && self.patience.lasts(waited_ns) {
+        while !self.stop.is_made() && waited_ns < STOP_REQUEST_NS {
             clock::sleep(STOP_POLL);
             waited_ns += STOP_POLL.as_nanos() as u64;
         }
@@ -196,7 +198,7 @@ impl Lockstep {
             if !self.patience.lasts(silent_ns / waits) {
                 self.lost = Some(from);
                 Silence { process: from, cycle: self.cycle, silent_s: silent_ns as f64 / 1e9 }.report()?;
-            } else if silent_since_stop_ns >= STOP_PATIENCE_NS {
+            } else if silent_since_stop_ns / waits >= STOP_PATIENCE_NS {
                 self.lost = Some(from);
             }
         }

@@ -116,7 +116,7 @@ def kill_once(masseter, role, after_s):
             time.sleep(0.01)
         if role == "supervisor":
             subprocess.run([masseter, "clean"], env=environment, check=True, stdout=subprocess.DEVNULL)
-        left = shared_memory_of(rig.pid) + [str(path) for path in Path(runtime).rglob("*.lock") if role != "supervisor"]
+        left = shared_memory_of(rig.pid) + [str(path) for path in Path(runtime).rglob("*") if path.is_file()]
         if left:
             raise SystemExit(f"{role} killed in {moment}: {left} stayed")
         if not was_there:

@@ -1,7 +1,7 @@
 //! Stretches of a run in which a late or lost cycle may still act on the jaw.
 //!
 //! A lost cycle shows in the controller's own messages, whichever process lost the cycle: the controller skipped deadlines,
-//! or had no reading of its own cycle. Who caused the loss is not decided here.
+//! or ceases to have a reading of its own cycle. Who caused the loss is not decided here.
 
 use masseter_shared::messages::State;
 
@@ -13,7 +13,7 @@ const SETTLING_NS: u64 = 100_000_000;
 #[derive(Debug, Default)]
 pub(super) struct Disturbance {
     skipped: u64,
-    has_begun: bool,
+    was_in_time: bool,
     until_ns: u64,
 }
 
@@ -21,10 +21,10 @@ impl Disturbance {
     /// Whether a lost cycle may act on the jaw in the cycle of a state. `is_fresh`: the state is the first to use its reading.
     pub(super) fn take(&mut self, state: &State, is_fresh: bool) -> bool {
         let skipped = std::mem::replace(&mut self.skipped, state.skipped_cycles);
-        let has_reading = is_fresh && state.reading_cycle >= state.cycle;
-        // Before the first reading, the drives boot.
-        let is_lost = state.skipped_cycles > skipped || (self.has_begun && !has_reading);
-        self.has_begun |= is_fresh;
+        let is_in_time = is_fresh && state.reading_cycle >= state.cycle;
+        // Readings that always come late are the rig's.
+        let was_in_time = std::mem::replace(&mut self.was_in_time, is_in_time);
+        let is_lost = state.skipped_cycles > skipped || (was_in_time && !is_in_time);
         if is_lost {
             self.until_ns = state.woke_ns.saturating_add(SETTLING_NS);
         }

@@ -30,10 +30,10 @@ pub enum TimingWord {
 pub struct Timing {
     /// The judgement in a word.
     pub word: TimingWord,
-    /// Cycles of the controller, with those that it skipped.
+    /// Cycles of controller and plant together, with those that they skipped.
     pub cycles: u64,
     /// Cycles that the machine took from controller or plant, and those of unknown cause. Without the scheduling that the
-    /// rig requested, all that were skipped.
+    /// rig requested, also those after overlong work.
     pub lost: u64,
     /// Cycles that the rig missed by itself.
     pub missed: u64,
@@ -46,8 +46,13 @@ impl Timing {
     /// Judges a run.
     pub(crate) fn new(manifest: &Manifest, figures: &Figures) -> Self {
         let (skipped, by_machine) = figures.skipped();
-        let is_granted = manifest.refusal().is_none();
-        let lost = if is_granted { by_machine + figures.skipped_of_unknown_cause() } else { skipped };
+        let (controller, plant) = (&figures.controller_skips, &figures.plant_skips);
+        // Without real time, overlong work is no evidence against the rig.
+        let by_machine = match manifest.refusal() {
+            None => by_machine,
+            Some(_) => [controller, plant].map(|skips| skips.by_machine + skips.while_working).iter().sum(),
+        };
+        let lost = by_machine + figures.skipped_of_unknown_cause();
         let missed = skipped.saturating_sub(lost);
         let word = if manifest.clock != "rt" {
             TimingWord::Simulated
@@ -58,7 +63,7 @@ impl Timing {
         } else {
             TimingWord::Held
         };
-        let cycles = figures.cycles + figures.controller_skips.skipped;
+        let cycles = 2 * figures.cycles + skipped;
         let evidence = figures.overrun_attribution.map(in_words).unwrap_or_default();
         Self { word, cycles, lost, missed, evidence }
     }

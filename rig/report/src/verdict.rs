@@ -58,7 +58,7 @@ impl Verdict {
             .or_else(|| incomplete(figures))
             .or_else(|| {
                 let unjudged = excuse.or_else(|| unjudged(&manifest.scenario.checks, &timing, &checks))?;
-                Some((Exit::Invalid, format!("{unjudged}; {}", account(manifest, figures))))
+                Some((Exit::Invalid, format!("{unjudged}; {}", account(manifest, figures, &timing))))
             })
             .or_else(|| {
                 failed(&checks)
@@ -76,13 +76,15 @@ impl Verdict {
         match (self.exit_code, self.timing.word) {
             (Exit::Passed, TimingWord::Disturbed) => "disturbed",
             (Exit::Passed, _) => "pass",
-            _ => "",
+            _ => "not-passed",
         }
     }
 
     /// What to do about the machine; none where the machine disturbed nothing.
     pub(crate) fn advice(&self, manifest: &Manifest) -> Option<String> {
-        (self.timing.word == TimingWord::Disturbed).then(|| remedy(manifest))
+        // The reason of an INVALID run contains the advice.
+        let is_missing = self.timing.word == TimingWord::Disturbed && self.exit_code != Exit::Invalid;
+        is_missing.then(|| remedy(manifest))
     }
 
     /// Whether the checks decided it.
@@ -178,12 +180,11 @@ fn unjudged(limits: &ChecksConfig, timing: &Timing, checks: &[Check]) -> Option<
 }
 
 /// How many cycles were lost, and what helps.
-fn account(manifest: &Manifest, figures: &Figures) -> String {
-    let (skipped, _) = figures.skipped();
-    let skipped = counted(skipped, "cycle");
+fn account(manifest: &Manifest, figures: &Figures, timing: &Timing) -> String {
+    let lost = counted(timing.lost, "cycle");
     match manifest.refusal() {
-        Some((process, refusal)) => format!("{skipped} lost without real time; {process}: {refusal}"),
-        None => format!("{skipped} lost, {}; {}", stalls(figures), remedy(manifest)),
+        Some((process, refusal)) => format!("{lost} lost without real time; {process}: {refusal}"),
+        None => format!("{lost} lost{}; {}", stalls(figures), remedy(manifest)),
     }
 }
 
@@ -195,7 +196,7 @@ fn stalls(figures: &Figures) -> String {
         0 => String::new(),
         n => format!(", {} of them during work", grouped(n)),
     };
-    format!("the machine stalled for {stalled_ms:.1} ms while the rig waited{while_working}")
+    format!("{while_working}; the machine stalled for {stalled_ms:.1} ms while the rig waited")
 }
 
 /// Real interfaces stamp frames by the wall clock: once it was set, these times are useless. Simulated ones do not use it.
@@ -215,9 +216,11 @@ fn remedy(manifest: &Manifest) -> String {
         Some(DmaLatency { limit_us: None, .. }) => "; realtime.cpu_dma_latency = \"hold\" may help too",
         _ => "",
     };
-    format!(
-        "masseter doctor lists what disturbs this machine, --clock lockstep keeps it out of the result{latency}"
-    )
+    let lockstep = match manifest.scenario.can.is_virtual() {
+        true => ", --clock lockstep keeps it out of the result",
+        false => "",
+    };
+    format!("masseter doctor lists what disturbs this machine{lockstep}{latency}")
 }
 
 /// The excuse for a safe stop, in words: the machine lost all missed cycles, and many of them just before the stop.

@@ -221,7 +221,7 @@ fn cycles_that_the_rig_missed_fail_a_run_and_those_that_the_machine_lost_do_not(
     use TimingWord::{Disturbed, Held, Missed};
     let cases: [(Change, Exit, TimingWord, &str); 10] = [
         (|_| (), Pass, Held, "held"),
-        (Run::disturb, Pass, Disturbed, "disturbed by the machine (3 of 1,003 cycles, 0.30 %)"),
+        (Run::disturb, Pass, Disturbed, "disturbed by the machine (3 of 2,003 cycles, 0.15 %)"),
         (
             |run| {
                 run.disturb();
@@ -247,7 +247,7 @@ fn cycles_that_the_rig_missed_fail_a_run_and_those_that_the_machine_lost_do_not(
             },
             Pass,
             Disturbed,
-            "disturbed by the machine (5 of 1,003 cycles, 0.50 %)",
+            "disturbed by the machine (5 of 2,005 cycles, 0.25 %)",
         ),
         (
             |run| {
@@ -256,13 +256,13 @@ fn cycles_that_the_rig_missed_fail_a_run_and_those_that_the_machine_lost_do_not(
             },
             Pass,
             Disturbed,
-            "disturbed by the machine (5 of 1,003 cycles, 0.50 %)",
+            "disturbed by the machine (5 of 2,005 cycles, 0.25 %)",
         ),
         (
             |run| run.overruns(5, 0.02),
             Pass,
             Disturbed,
-            "disturbed by the machine (2 of 1,000 cycles, 0.20 %)",
+            "disturbed by the machine (2 of 2,002 cycles, 0.10 %)",
         ),
         (|run| run.overruns(5, 0.002), Fail, Missed, "missed by the rig (2)"),
         (
@@ -321,14 +321,14 @@ fn a_safe_stop_is_one_unless_the_machine_alone_explains_it() {
     };
     let (outcome, reason) = stop(|_| ());
     assert_eq!(outcome, Exit::Invalid);
-    let said = "lost cycles may explain the safe stop: 30 of 100 just before it; 3 cycles lost, ";
+    let said = "lost cycles may explain the safe stop: 30 of 100 just before it; 3 cycles lost; ";
     assert!(reason.starts_with(said), "{reason}");
     let stopped = (Exit::SafeStop, "the controller stopped the rig".to_owned());
     assert_eq!(stop(|run| run.figures.outage = None), stopped);
     assert_eq!(stop(|run| run.figures.outage = Some(Outage { missed: 9, of: 100 })), stopped);
     assert_eq!(stop(|run| run.figures.controller_skips.by_machine = 2), stopped, "one was the rig's");
     let (outcome, _) = stop(|run| {
-        run.figures.controller_skips.by_machine = 2;
+        (run.figures.controller_skips.by_machine, run.figures.controller_skips.while_working) = (2, 1);
         run.refuse();
     });
     assert_eq!(outcome, Exit::Invalid, "the rig never had real time");
