@@ -216,10 +216,8 @@ fn remedy(manifest: &Manifest) -> String {
         Some(DmaLatency { limit_us: None, .. }) => "; realtime.cpu_dma_latency = \"hold\" may help too",
         _ => "",
     };
-    let lockstep = match manifest.scenario.can.is_virtual() {
-        true => ", --clock lockstep keeps it out of the result",
-        false => "",
-    };
+    let is_virtual = manifest.scenario.can.is_virtual();
+    let lockstep = if is_virtual { ", --clock lockstep keeps it out of the result" } else { "" };
     format!("masseter doctor lists what disturbs this machine{lockstep}{latency}")
 }
 
