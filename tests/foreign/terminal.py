@@ -26,6 +26,7 @@ ACCEPTED = (0, 3, 6)
 PROGRESS = "tracking error"
 # The part of the line that fits into these columns.
 MOTION = re.compile(r"motion +[0-9.]+ of [0-9.]+ s")
+GREEN_OR_AMBER = ("\x1b[1m\x1b[32m", "\x1b[1m\x1b[33m")
 VERDICTS = ("PASS: ", "INVALID: ", "INCOMPLETE: ", "INTERRUPTED: ")
 
 
@@ -82,4 +83,7 @@ code, output, shown = run(masseter, ["--duration", "1s"], term="dumb")
 assert code in ACCEPTED and "\x1b" not in output and PROGRESS in output, (code, output)
 
 code, output, shown = run(masseter, ["--duration", "1s", "--quiet"])
+assert code in ACCEPTED and output.startswith(GREEN_OR_AMBER) and PROGRESS not in output, output
+
+code, output, shown = run(masseter, ["--duration", "1s", "--quiet", "--color", "never"])
 assert code in ACCEPTED and "\x1b" not in output and PROGRESS not in output, output
