@@ -3,7 +3,7 @@
 use masseter_shared::clock;
 use masseter_shared::config::Scenario;
 use masseter_shared::lifecycle::{Party, ProcessArguments, ProcessContext, ProcessError, StopRequest};
-use masseter_shared::lockstep::Lockstep;
+use masseter_shared::lockstep::{Clock, Lockstep};
 use masseter_shared::messages::{Command, Event, FrameTap, Reading, Truth};
 use masseter_shared::realtime::{Cycle, Wake};
 use masseter_shared::schedule::CycleSchedule;
@@ -92,21 +92,6 @@ pub fn run(arguments: &ProcessArguments) -> Result<Reason, PlantProcessError> {
         serve(&context, PlantCore::new)
     } else {
         serve(&context, PlantCore::on_interfaces)
-    }
-}
-
-/// The clock of the cycles.
-enum Clock {
-    RealTime(Cycle),
-    Lockstep(Lockstep),
-}
-
-impl Clock {
-    fn now_ns(&self) -> u64 {
-        match self {
-            Self::RealTime(_) => clock::now_ns(),
-            Self::Lockstep(lockstep) => lockstep.now_ns(),
-        }
     }
 }
 

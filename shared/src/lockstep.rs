@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use crate::clock;
 use crate::lifecycle::{Party, Patience, ProcessContext, ProcessError, Silence, StopRequest};
-use crate::realtime::{Waiter, Wake};
+use crate::realtime::{Cycle, Waiter, Wake};
 use crate::transport::{DomainError, SignalReceiver, SignalSender};
 
 /// Time of the first SYNC, ns.
@@ -29,6 +29,25 @@ const STOP_REQUEST_NS: u64 = 10 * clock::SECOND_NS;
 /// Messages of the plant between two requests to the recorder. The recorder has room for more than two such windows and
 /// everything that a cycle may add.
 const WINDOW_MESSAGES: usize = 256;
+
+/// The clock of a loop's cycles.
+#[derive(Debug)]
+pub enum Clock {
+    /// The machine's.
+    RealTime(Cycle),
+    /// Simulated.
+    Lockstep(Lockstep),
+}
+
+impl Clock {
+    /// Now, ns.
+    pub fn now_ns(&self) -> u64 {
+        match self {
+            Self::RealTime(_) => clock::now_ns(),
+            Self::Lockstep(lockstep) => lockstep.now_ns(),
+        }
+    }
+}
 
 /// A loop that takes turns with another one, and its simulated clock.
 #[derive(Debug)]

@@ -21,7 +21,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from kill import lives
+from kill import lives, shared_memory_of
 
 ROLES = ("supervisor", "controller", "plant", "recorder")
 MOMENTS = ("start", "boot", "motion", "end")
@@ -48,10 +48,6 @@ def children_of(rig):
         if len(arguments) > 1:
             found[arguments[1].decode(errors="replace")] = int(child)
     return found
-
-
-def shared_memory_of(supervisor):
-    return [name for name in os.listdir("/dev/shm") if name.startswith(f"masseter_{os.getuid()}_{supervisor}-")]
 
 
 def start(masseter, run, runtime, motion="1s"):

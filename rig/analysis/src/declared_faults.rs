@@ -175,8 +175,8 @@ mod tests {
         PathSample { sampled_ns, deviation }
     }
 
-    /// Fault 1 strikes at 1 ms, a drive reports an emergency at 1.5 ms, and the master stops at 3.5 ms. Fault 2 strikes after
-    /// that, and fault 3 never.
+    /// Fault 1 strikes at 1 ms, a drive reports an emergency at 1.5 ms, and the master stops at 3.5 ms. Fault 2 strikes during
+    /// that stop, and fault 3 never.
     #[test]
     fn the_path_is_followed_from_the_strike_to_the_stop_whatever_comes_first() {
         let mut watch = FaultWatch::new(3);
@@ -192,7 +192,7 @@ mod tests {
         watch.event(&safe_stop(5_000_000));
         watch.event(&event(3_500_000, Source::Master, EventKind::Fault, Cause::ProcessDataLost, 4.0));
         watch.event(&struck(1_000_000, 1.0));
-        watch.event(&struck(6_000_000, 2.0));
+        watch.event(&struck(4_500_000, 2.0));
         watch.event(&emergency(6_500_000));
         let found = watch.finish();
         assert_eq!(found.iter().map(|figures| figures.number).collect::<Vec<_>>(), [1, 2, 3]);
@@ -204,7 +204,7 @@ mod tests {
         assert!(detection.source == Source::Master && detection.cause == Cause::ProcessDataLost);
         assert!((detection.latency_ms - 2.5).abs() < 1e-12 && (detection.deviation_mm - 0.2).abs() < 1e-12);
         assert!((detection.deviation_deg - 2e-3f64.to_degrees()).abs() < 1e-12, "{first:?}");
-        assert_eq!((found[1].struck_ns, found[1].detection), (Some(6_000_000), None));
+        assert_eq!((found[1].struck_ns, found[1].detection), (Some(4_500_000), None));
         assert_eq!((found[2].struck_ns, found[2].detection), (None, None));
     }
 

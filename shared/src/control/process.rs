@@ -1,10 +1,9 @@
 //! A controller as a process: binds it to iceoryx2, and to real time or to lockstep. It decides nothing.
 
 use super::{Controller, ControllerPorts, Outcome, run_cycle};
-use crate::clock;
 use crate::config::Scenario;
 use crate::lifecycle::{Party, ProcessArguments, ProcessContext, ProcessError};
-use crate::lockstep::Lockstep;
+use crate::lockstep::{Clock, Lockstep};
 use crate::messages::{Command, Event, Reading, State};
 use crate::realtime::{Cycle, Wake};
 use crate::transport::{Publisher, ReceivedMessage, Subscriber, TransportError};
@@ -45,21 +44,6 @@ fn run_to_end(context: &ProcessContext, controller: &mut dyn Controller) -> Resu
         let wake = ports.wait(controller)?;
         run_cycle(controller, &mut ports, &wake)?;
         ports.end_cycle(controller.outcome().is_some())?;
-    }
-}
-
-/// The clock of the cycles.
-enum Clock {
-    RealTime(Cycle),
-    Lockstep(Lockstep),
-}
-
-impl Clock {
-    fn now_ns(&self) -> u64 {
-        match self {
-            Self::RealTime(_) => clock::now_ns(),
-            Self::Lockstep(lockstep) => lockstep.now_ns(),
-        }
     }
 }
 
