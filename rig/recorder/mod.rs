@@ -77,7 +77,7 @@ pub(crate) fn record(args: RecorderArgs) -> anyhow::Result<Exit> {
     };
     let pace = if is_lockstep { Pace::Virtual } else { Pace::RealTime };
     let backlog = Backlog::start(Recorder::create(&args.recording, scene)?, pace);
-    let signals = is_lockstep.then(|| RecorderSignals::open(&process, DRAIN_INTERVAL)).transpose()?;
+    let mut signals = is_lockstep.then(|| RecorderSignals::open(&process, DRAIN_INTERVAL)).transpose()?;
     let start = process.ready(None)?;
 
     let stderr = StderrWriter::start();
@@ -86,9 +86,9 @@ pub(crate) fn record(args: RecorderArgs) -> anyhow::Result<Exit> {
     }
     let progress = (!args.quiet).then(|| Progress::new(args.motion_s, scenario.period_s(), clock::now_ns()));
     let sinks = Sinks { backlog, server, progress, stderr };
-    match signals {
+    match &mut signals {
         None => record_in_real_time(&process.stop, start, &subscribers, sinks),
-        Some(signals) => record_in_lockstep(&process.stop, &signals, &subscribers, sinks),
+        Some(signals) => record_in_lockstep(&process.stop, signals, &subscribers, sinks),
     }
 }
 
@@ -125,7 +125,7 @@ fn record_in_real_time(
 /// The same in simulated time: nothing is lost, because the plant waits for the answers.
 fn record_in_lockstep(
     stop: &StopRequest,
-    signals: &RecorderSignals,
+    signals: &mut RecorderSignals,
     subscribers: &Subscribers,
     mut sinks: Sinks,
 ) -> anyhow::Result<Exit> {

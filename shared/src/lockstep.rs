@@ -249,7 +249,7 @@ impl RecorderSignals {
     ///
     /// # Errors
     /// Those of the signals.
-    pub fn wait(&self) -> Result<bool, DomainError> {
+    pub fn wait(&mut self) -> Result<bool, DomainError> {
         Ok(self.signals.receive()? == Some(RECORD))
     }
 
