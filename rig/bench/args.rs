@@ -14,6 +14,8 @@ pub(crate) enum Kind {
     Ipc,
     /// The whole rig at 1 to 20 kHz without bus delays
     Rate,
+    /// Whole runs in lockstep and in virtual time, against real time and a round trip over bare iceoryx2
+    Simulated,
 }
 
 /// The arguments.

@@ -44,7 +44,7 @@ fn check(kinds: &[Kind], [own, peer]: [usize; 2], allowed: &[usize]) -> anyhow::
     ensure!(
         kinds.iter().all(|kind| *kind == Kind::Loop)
             || own != peer && [own, peer].iter().all(|core| allowed.contains(core)),
-        "bench ipc and rate need two cores: choose two among {named} with --cores; 'masseter doctor' shows how to allow \
+        "bench ipc, rate and simulated need two cores: choose two among {named} with --cores; 'masseter doctor' shows how to allow \
          other cores. bench loop needs one"
     );
     Ok(())

@@ -9,7 +9,9 @@ mod circumstances;
 mod comparison;
 mod disturbance;
 pub(crate) mod ipc;
+mod played_run;
 mod rate;
+mod simulated;
 mod table;
 mod thread;
 mod wake;
@@ -55,7 +57,7 @@ pub(crate) fn run(args: &BenchArgs) -> Result<Exit, Failure> {
         results.to_json().and_then(|json| result(&json)).usage()?;
     }
     measured.map_err(|error| {
-        let exit = if error.is::<rate::Interrupted>() { Exit::Interrupted } else { Exit::Usage };
+        let exit = if error.is::<played_run::Interrupted>() { Exit::Interrupted } else { Exit::Usage };
         Failure::with(exit, error)
     })?;
     let disturbed = results.comparisons.iter().any(|comparison| comparison.disturbance.disturbed);
@@ -70,6 +72,7 @@ fn measure_each(args: &BenchArgs, results: &mut Results) -> anyhow::Result<()> {
             Kind::Loop => wake::measure(args.rounds, args.cores[0]),
             Kind::Ipc => ipc::measure(args.rounds, args.cores),
             Kind::Rate => rate::measure(args.rounds, args.cores),
+            Kind::Simulated => simulated::measure(args.rounds, args.cores),
         };
         results.comparisons.push(comparison.with_context(|| format!("bench {name}"))?);
         if let Some(folder) = &args.out {

@@ -4,22 +4,16 @@
 //! Each round of a rate is a run with three processes; the figures come from its recording. The run's verdict is not used,
 //! except to find out whether the machine stalled.
 
-use std::fs::{self, File};
-use std::os::unix::process::CommandExt;
-use std::process::{Child, Command, ExitStatus, Stdio};
-use std::time::Duration;
-
-use anyhow::{Context, bail};
+use anyhow::Context;
 use masseter_analysis::{Analysis, Code, Figures};
 use masseter_recording::{Manifest, Reader, RunFolder};
-use masseter_shared::clock;
 use masseter_shared::config::Scenario;
 use masseter_shared::messages::codes::ControllerState;
 use masseter_terminal::Exit;
-use rustix::process::{Pid, Signal, kill_process};
 
 use super::candidate::{Candidate, Durations, Round, no_durations};
 use super::comparison::{Comparison, take_turns};
+use super::played_run::PlayedRun;
 use crate::machine::interrupts::Interrupts;
 
 /// Rates, Hz; the others are compared with the first.
@@ -28,8 +22,6 @@ const RATES_HZ: [u32; 5] = [1000, 2000, 5000, 10_000, 20_000];
 const MOTION_S: f64 = 2.0;
 /// Silence after which the rig stops, ms: at every rate that of a run at 1 kHz.
 const TIMEOUT_MS: u32 = 20;
-/// Time between two checks whether a run has ended; long, since the checks disturb the run.
-const CHECK_EVERY: Duration = Duration::from_millis(50);
 /// The intervals that are compared, with their names in the figures of a run. The last carries the shares.
 const INTERVALS: [(&str, &str); 3] = [
     ("wake-up", "controller wake-up"),
@@ -41,11 +33,6 @@ const UNCOUNTED: [&str; 3] = [TOO_SLOW, STALLED, INCOMPLETE];
 const TOO_SLOW: &str = "did not play to their end: the cores are too slow for this rate";
 const STALLED: &str = "did not play to their end: the machine stalled for too long";
 const INCOMPLETE: &str = "are not judged: messages are missing from their recordings";
-
-/// The user stopped the bench.
-#[derive(Debug, thiserror::Error)]
-#[error("interrupted")]
-pub(super) struct Interrupted;
 
 /// The figures of a run.
 #[derive(Debug)]
@@ -118,48 +105,15 @@ fn scenario(rate_hz: u32, cores: [usize; 2]) -> Scenario {
 
 /// Makes a run at that rate.
 fn run_at(rate_hz: u32, cores: [usize; 2], interrupts: &Interrupts) -> anyhow::Result<Run> {
-    let scratch = tempfile::tempdir().context("cannot create a folder for the runs")?;
-    let file = scratch.path().join("scenario.toml");
-    fs::write(&file, scenario(rate_hz, cores).to_toml()).context("cannot write the scenario")?;
-    let folder = scratch.path().join("run");
-    let errors = scratch.path().join("errors");
-    let mut run = Command::new(std::env::current_exe()?)
-        .args(["run", "--clock", "rt", "--quiet", "--format", "json", "--out"])
-        .args([&folder, &file])
-        .stdin(Stdio::null())
-        .stdout(Stdio::null())
-        .stderr(File::create(&errors).context("cannot create a file for the errors of a run")?)
-        // An interrupt from the terminal reaches this process alone; it passes it on to the run.
-        .process_group(0)
-        .spawn()
-        .context("cannot start a run")?;
-    let status = wait_for(&mut run, interrupts)?;
-    if !folder.join("summary.json").exists() {
-        bail!("a run at {rate_hz} Hz left no summary: {}", fs::read_to_string(errors)?.trim());
-    }
-    let folder = RunFolder::open(&folder)?;
+    let played = PlayedRun::make(&scenario(rate_hz, cores), "rt", interrupts)
+        .with_context(|| format!("a run at {rate_hz} Hz"))?;
+    let folder = RunFolder::open(&played.folder())?;
     let manifest = Manifest::read(&folder)?;
     Ok(Run::new(
         &figures(&folder, &manifest.scenario)?,
         &manifest,
-        status.code() == Some(Exit::Invalid as i32),
+        played.status.code() == Some(Exit::Invalid as i32),
     ))
-}
-
-/// Waits for a run. Each interrupt is passed on to the run; the bench ends after it.
-fn wait_for(run: &mut Child, interrupts: &Interrupts) -> anyhow::Result<ExitStatus> {
-    let mut passed_on = 0;
-    loop {
-        if let Some(status) = run.try_wait()? {
-            return if interrupts.is_stop_requested() { Err(Interrupted.into()) } else { Ok(status) };
-        }
-        if passed_on < u8::from(interrupts.is_stop_requested()) + u8::from(interrupts.is_abort_requested()) {
-            // The run may have ended meanwhile.
-            let _ = kill_process(Pid::from_child(run), Signal::TERM);
-            passed_on += 1;
-        }
-        clock::sleep(CHECK_EVERY);
-    }
 }
 
 fn figures(folder: &RunFolder, scenario: &Scenario) -> anyhow::Result<Figures> {

@@ -43,6 +43,11 @@ pub(super) fn measure(rounds: u32, cores: [usize; 2]) -> anyhow::Result<Comparis
     Ok(Comparison::by_turns("ipc", measures, rounds, &cores, turns)?.comparing(pairs))
 }
 
+/// Round trips over bare iceoryx2.
+pub(super) fn bare_round_trips(cores: [usize; 2]) -> anyhow::Result<Durations> {
+    round_trips(Channel::Iceoryx2, cores)
+}
+
 /// The other process starts first and from an ordinary thread: from a real-time thread it would inherit core and priority,
 /// and get no time while that thread polls.
 fn round_trips(channel: Channel, [own_core, peer_core]: [usize; 2]) -> anyhow::Result<Durations> {

@@ -1,0 +1,65 @@
+//! `bench simulated`: how fast runs in simulated time are, from the start of the run to its verdict.
+//!
+//! Each round of a clock is a whole run of the default scenario. Its wall time, divided by its cycles, is compared with one
+//! round trip over bare iceoryx2: the least that a cycle of two processes can take.
+
+use std::fs;
+
+use anyhow::{Context, ensure};
+use masseter_shared::clock;
+use masseter_shared::config::Scenario;
+use masseter_terminal::Exit;
+use serde_json::Value;
+
+use super::candidate::{Candidate, Durations, no_durations, record};
+use super::comparison::{Comparison, Turn};
+use super::ipc;
+use super::played_run::PlayedRun;
+use crate::machine::interrupts::Interrupts;
+
+/// Motion of a run, s; start and report are a small part of so long a run.
+const MOTION_S: f64 = 30.0;
+
+pub(super) fn measure(rounds: u32, cores: [usize; 2]) -> anyhow::Result<Comparison> {
+    const LOCKSTEP: &str = "lockstep";
+    const VIRTUAL: &str = "virtual";
+    const BARE: &str = "bare iceoryx2, round trip";
+    let interrupts = Interrupts::listen().context("cannot listen for signals")?;
+    let interrupts_seen = &interrupts;
+    let run = |clock| -> Turn { Box::new(move || Ok(per_cycle(clock, interrupts_seen)?.into())) };
+    let turns = vec![
+        (LOCKSTEP, run(LOCKSTEP)),
+        (VIRTUAL, run(VIRTUAL)),
+        (BARE, Box::new(move || Ok(ipc::bare_round_trips(cores)?.into()))),
+    ];
+    let measures = "wall time of a whole run, from its start to its verdict, per cycle";
+    let compared = Comparison::by_turns("simulated", measures, rounds, &cores, turns);
+    interrupts.restore_default_actions();
+    let mut comparison = compared?.comparing([(LOCKSTEP, VIRTUAL), (LOCKSTEP, BARE), (VIRTUAL, BARE)]);
+    let runs = comparison.candidates.iter().filter(|candidate| candidate.name != BARE);
+    comparison.notes = runs.filter_map(times_real_time).collect();
+    Ok(comparison)
+}
+
+/// Wall time per cycle, once: a round has one run.
+fn per_cycle(clock: &str, interrupts: &Interrupts) -> anyhow::Result<Durations> {
+    let scenario =
+        Scenario { name: "simulated".to_owned(), duration_s: Some(MOTION_S), ..Scenario::default() };
+    let from_ns = clock::now_ns();
+    let run =
+        PlayedRun::make(&scenario, clock, interrupts).with_context(|| format!("a run by --clock {clock}"))?;
+    let wall_ns = clock::now_ns() - from_ns;
+    let code = run.status.code();
+    ensure!(code == Some(Exit::Passed as i32), "a run by --clock {clock} ended with {code:?} instead of 0");
+    let summary: Value = serde_json::from_slice(&fs::read(run.folder().join("summary.json"))?)?;
+    let cycles = summary["figures"]["cycles"].as_u64().context("a summary has no cycles")?;
+    let mut durations = no_durations();
+    record(&mut durations, wall_ns / cycles.max(1), 1);
+    Ok(durations)
+}
+
+fn times_real_time(candidate: &Candidate) -> Option<String> {
+    let taken = candidate.percentiles.first()?;
+    let period_ns = Scenario::default().period_ns() as f64;
+    Some(format!("{}: {:.1} times real time", candidate.name, period_ns / taken.median))
+}
