@@ -107,7 +107,8 @@ def draw(browser, page, picture):
 masseter, browser, pictures = os.path.abspath(sys.argv[1]), sys.argv[2], Path(sys.argv[3])
 with tempfile.TemporaryDirectory(prefix="rig-") as folder:
     terminal, report = Path(folder) / "terminal.html", Path(folder) / "run" / "report.html"
-    terminal.write_text(page_of(play(masseter, folder)))
+    # Another folder's name would make another picture.
+    terminal.write_text(page_of(play(masseter, folder)).replace(folder, "/home/you"))
     draw(browser, terminal, pictures / "terminal.png")
     with report.open("a") as file:
         file.write(CUT_REPORT)
