@@ -14,6 +14,7 @@ use crate::clean;
 use crate::controller::{self, ControllerArgs};
 use crate::doctor::{self, DoctorArgs};
 use crate::help::with_overview;
+use crate::init::{self, InitArgs};
 use crate::kinematics_cli::{self, CsvArgs, FkArgs};
 use crate::manuals::{self, CompletionsArgs, ManArgs};
 use crate::paper_study::{self, KinematicsArgs};
@@ -29,8 +30,9 @@ use crate::uniqueness::{self, UniquenessVerb};
 
 const FIRST_STEPS: &str = "\
 First steps:
-  masseter doctor
   masseter run
+  masseter init DIR
+  masseter doctor
   masseter help run";
 const EXIT_CODES: &str = "\
 Exit codes of every verb: 0 passed, 1 a check failed, 2 wrong usage or input, 3 cannot be judged,
@@ -64,6 +66,8 @@ struct Cli {
 enum Verb {
     /// Run a jaw motion through controller, plant and recorder, and judge it
     Run(RunArgs),
+    /// Lay down a scenario, a motion and a CI workflow to start from
+    Init(InitArgs),
     /// Forward kinematics of a CSV file: actuator positions to poses
     Fk(FkArgs),
     /// Inverse kinematics of a CSV file: poses to actuator positions
@@ -144,6 +148,7 @@ fn keep_files_private(verb: &Verb) {
 fn execute(verb: Verb) -> Result<Exit, Failure> {
     match verb {
         Verb::Run(args) => run::run(&args),
+        Verb::Init(args) => init::init(&args).usage(),
         Verb::Report(args) => report_cli::report(&args),
         Verb::Bench(args) => bench::run(&args),
         Verb::BenchPeer(args) => bench::ipc::answer(&args).map(|()| Exit::Passed).usage(),
@@ -216,7 +221,11 @@ mod tests {
     }
 
     #[test]
-    fn every_command_line_of_the_readme_is_right() {
+    fn every_command_line_of_the_readme_and_the_workflow_is_right() {
+        let workflow = include_str!("../examples/workflow.yml").replace("run: masseter", "masseter");
+        let workflow: Vec<_> = command_lines(&workflow).collect();
+        assert!(!workflow.is_empty());
+        workflow.into_iter().for_each(assert_parsed);
         let readme = include_str!("../README.md").lines().filter(|line| line.starts_with("    "));
         let readme: Vec<_> = readme.flat_map(command_lines).collect();
         assert!(readme.len() > 10, "{readme:?}");

@@ -6,7 +6,7 @@ use clap::Command;
 
 /// What a user wants, and the verbs for that.
 const GROUPS: [(&str, &[&str]); 5] = [
-    ("Play a motion and judge it", &["run", "report", "recording"]),
+    ("Play a motion and judge it", &["init", "run", "report", "recording"]),
     ("Prepare this machine", &["doctor", "bench", "clean"]),
     ("Work with CAN and the drives", &["can", "plant"]),
     ("Solve the kinematics", &["ik", "fk", "uniqueness", "kinematics"]),

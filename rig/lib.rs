@@ -1,4 +1,4 @@
-//! The `masseter` command. Modules of verbs: `bench`, `can`, `clean`, `doctor`, `kinematics_cli`,
+//! The `masseter` command. Modules of verbs: `bench`, `can`, `clean`, `doctor`, `init`, `kinematics_cli`,
 //! `manuals`, `paper_study`, `plant`, `recording_cli`, `report_cli`, `run` and `uniqueness`; [`cli`] dispatches to them.
 //!
 //! `run` starts controller, plant and `recorder` as processes of this executable (`run::supervisor`), or steps their
@@ -18,6 +18,7 @@ mod controller;
 mod doctor;
 mod foxglove;
 mod help;
+mod init;
 mod kinematics_cli;
 pub mod machine;
 mod manuals;

@@ -1,6 +1,11 @@
-//! The documents lead to files that exist, and ARCHITECTURE.md to code that exists.
+//! The documents lead to files that exist, and ARCHITECTURE.md to code that exists. What their console blocks show is
+//! what a user sees.
+
+#[path = "documents/console.rs"]
+mod console;
 
 use std::fs;
+use std::os::unix::fs::symlink;
 use std::path::{Path, PathBuf};
 
 fn project() -> &'static Path {
@@ -8,7 +13,7 @@ fn project() -> &'static Path {
 }
 
 fn documents() -> Vec<PathBuf> {
-    let folders = [".", "docs", "shared/can"].map(|folder| project().join(folder));
+    let folders = [".", "docs", "docs/tutorials", "shared/can"].map(|folder| project().join(folder));
     let files =
         folders.iter().flat_map(|folder| fs::read_dir(folder).unwrap()).map(|entry| entry.unwrap().path());
     files.filter(|path| path.extension().is_some_and(|extension| extension == "md")).collect()
@@ -68,4 +73,20 @@ fn every_function_of_the_architecture_is_in_the_file_beside_it() {
         checked += 1;
     }
     assert!(checked >= 15, "only {checked} functions were found");
+}
+
+/// The commands of a document run one after the other in a folder of its own, beside the project's examples.
+#[test]
+fn every_console_block_shows_what_a_user_sees() {
+    let masseter = Path::new(env!("CARGO_BIN_EXE_masseter"));
+    let mut run = 0;
+    for document in documents() {
+        let steps = console::steps(&fs::read_to_string(&document).unwrap());
+        let folder = tempfile::tempdir().unwrap();
+        symlink(project().join("examples"), folder.path().join("examples")).unwrap();
+        let differences = console::differences(&steps, folder.path(), masseter.parent().unwrap());
+        assert!(differences.is_empty(), "{}:\n{}", document.display(), differences.join("\n"));
+        run += steps.len();
+    }
+    assert!(run >= 20, "only {run} commands were found");
 }
