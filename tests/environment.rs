@@ -12,7 +12,8 @@ use std::thread;
 use std::time::Duration;
 
 use common::{
-    Cores, LENIENT, SharedMemory, Workspace, assert_played, cramped, masseter, skip, stderr, stdout, wait_until_it_records,
+    Cores, LENIENT, SharedMemory, Workspace, assert_played, cramped, masseter, skip, stderr, stdout,
+    wait_until_it_records,
 };
 use masseter_shared::clock::{self, SECOND_NS};
 use masseter_shared::messages::State;

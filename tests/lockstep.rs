@@ -147,6 +147,27 @@ fn a_process_that_stays_silent_ends_the_run_with_its_name_and_the_cycle() {
     }
 }
 
+/// It would find the others silent, which have given it up.
+#[test]
+fn a_process_that_goes_on_too_late_is_still_the_one_that_ends_the_run() {
+    // Alone, the controller waits for steady readings as long as that.
+    let boot = "[controller]\nsteady_readings = 10000000\nstart_timeout_s = 20000.0";
+    for role in ROLES {
+        let (workspace, child, _memory) = running(boot, &["--patience", "500ms"]);
+        let victim = child_of(&child, role);
+        kill_process(victim, Signal::STOP).unwrap();
+        clock::sleep(Duration::from_secs(2));
+        // It may have been killed by now.
+        let _ = kill_process(victim, Signal::CONT);
+        let output = child.wait_with_output().unwrap();
+        let context = format!("{role}: {}{}", stdout(&output), stderr(&output));
+        assert_eq!(output.status.code(), Some(4), "{context}");
+        let summary = workspace.summary();
+        let reason = summary["verdict"]["reason"].as_str().unwrap();
+        assert!(reason.starts_with(&format!("the {role} died: it did not answer in cycle ")), "{context}");
+    }
+}
+
 #[test]
 fn endless_patience_waits_and_the_user_ends_it() {
     let (workspace, child, memory) = running("duration_s = 60.0", &["--patience", "none"]);
