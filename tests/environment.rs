@@ -4,15 +4,16 @@ mod common;
 
 use std::ffi::OsStr;
 use std::fs::{self, File};
-use std::io::Write;
+use std::io::{Read, Write};
 use std::os::unix::ffi::OsStrExt;
 use std::path::Path;
-use std::process::{Command, Output};
+use std::process::{Child, Command, Output, Stdio};
 use std::thread;
 use std::time::Duration;
 
 use common::{
-    Cores, LENIENT, Workspace, assert_played, cramped, masseter, skip, stderr, stdout, wait_until_it_records,
+    Cores, LENIENT, SharedMemory, Workspace, assert_played, cramped, masseter, skip, stderr, stdout,
+    wait_until_it_records,
 };
 use masseter_shared::clock::{self, SECOND_NS};
 use masseter_shared::messages::State;
@@ -87,11 +88,34 @@ fn a_run_in_a_read_only_folder_is_reported() {
 struct SmallDisk<'a>(&'a Path);
 
 impl<'a> SmallDisk<'a> {
-    /// None where nothing may be mounted, as by ordinary users and in most containers.
+    /// In memory.
     fn on(folder: &'a Path, size: &str) -> Option<Self> {
-        let mut mount = Command::new("mount");
-        mount.args(["-t", "tmpfs", "-o", &format!("size={size}"), "tmpfs"]).arg(folder);
-        mount.status().is_ok_and(|status| status.success()).then(|| Self(folder))
+        Self::mount(folder, &["-t", "tmpfs", "-o", &format!("size={size}"), "tmpfs"])
+    }
+
+    /// In the file `image`, as a file system that can be frozen.
+    fn in_file(folder: &'a Path, image: &Path) -> Option<Self> {
+        File::create(image).unwrap().set_len(128 << 20).unwrap();
+        let made = Command::new("mkfs.ext4").arg("-q").arg(image).status();
+        made.is_ok_and(|status| status.success()).then_some(())?;
+        Self::mount(folder, &["-o", "loop", image.to_str()?])
+    }
+
+    /// None where nothing may be mounted, as by ordinary users and in most containers.
+    fn mount(folder: &'a Path, what: &[&str]) -> Option<Self> {
+        let mounted = Command::new("mount").args(what).arg(folder).status();
+        mounted.is_ok_and(|status| status.success()).then(|| Self(folder))
+    }
+
+    /// Lets all writers wait for so long. The disk is thawed even if this test ends before.
+    fn freeze_s(folder: &Path, seconds: u32) -> Child {
+        let script = "fsfreeze -f \"$1\" && echo frozen && sleep \"$2\"; fsfreeze -u \"$1\"";
+        let mut freeze = Command::new("sh");
+        freeze.args(["-c", script, "sh"]).arg(folder).arg(seconds.to_string()).stdout(Stdio::piped());
+        let mut child = freeze.spawn().expect("a shell starts");
+        let mut said = [0; 6];
+        child.stdout.as_mut().expect("it is piped").read_exact(&mut said).expect("the disk is frozen");
+        child
     }
 
     /// Takes all the room that is left.
@@ -247,6 +271,50 @@ fn a_full_disk_ends_a_run_under_virtual_time() {
     let Some(output) = output else { return };
     assert_eq!(output.status.code(), Some(6), "{}{}", stdout(&output), stderr(&output));
     assert!(stderr(&output).contains("the run ends here"), "{}", stderr(&output));
+}
+
+#[test]
+fn a_full_disk_leaves_a_verdict_of_a_run_in_lockstep() {
+    let output = run_on_a_small_disk("32m", |small| {
+        let rig = small.start_lockstep(&["--duration", "6s"]);
+        let memory = SharedMemory::of_running(&format!("{}-", rig.id()));
+        wait_until_it_records(small);
+        SmallDisk::fill(&small.file(""));
+        let output = rig.wait_with_output().unwrap();
+        assert_judged(small, &output);
+        assert_eq!(memory.files(), Vec::<String>::new());
+        output
+    });
+    let Some(output) = output else { return };
+    assert_eq!(output.status.code(), Some(6), "{}{}", stdout(&output), stderr(&output));
+    assert!(stderr(&output).contains("No space left on device"), "{}", stderr(&output));
+}
+
+/// The recorder waits for the disk, and plant and controller for the recorder.
+#[test]
+fn a_disk_that_stands_still_for_five_seconds_changes_no_byte_of_a_run_in_lockstep() {
+    let scenario = "duration_s = 10.0";
+    let [reference, workspace] = [1, 2].map(|_| Workspace::new(scenario));
+    let folder = workspace.file("");
+    let Some(_disk) = SmallDisk::in_file(&folder, &reference.file("disk")) else {
+        skip("mounting a disk that can be frozen is refused");
+        return;
+    };
+    workspace.write("scenario.toml", scenario);
+    assert_eq!(reference.run_virtual(&[]).status.code(), Some(0));
+    let rig = workspace.start_lockstep(&[]);
+    wait_until_it_records(&workspace);
+    let mut freeze = SmallDisk::freeze_s(&folder, 5);
+    clock::sleep(Duration::from_secs(1));
+    let recorded_bytes = workspace.recorded_bytes();
+    clock::sleep(Duration::from_secs(3));
+    assert_eq!(workspace.recorded_bytes(), recorded_bytes);
+    assert!(freeze.wait().unwrap().success());
+    let output = rig.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(0), "{}{}", stdout(&output), stderr(&output));
+    let recording = workspace.recording();
+    assert!(recorded_bytes < recording.len() as u64, "the run was over before the disk stood still");
+    assert!(recording == reference.recording());
 }
 
 /// A limit on the size of files stands for the full disk.

@@ -3,7 +3,6 @@
 
 mod common;
 
-use std::fs;
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
@@ -22,11 +21,7 @@ const FAULTS: &str = "[[faults]]\nkind = 'corrupt'\nbus = 0\nfrom_s = 1.6\nuntil
 fn virtual_run(scenario: &str, arguments: &[&str]) -> (Vec<u8>, Option<i32>) {
     let workspace = Workspace::new(scenario);
     let output = workspace.run_virtual(&[&["--quiet"], arguments].concat());
-    (recording(&workspace), output.status.code())
-}
-
-fn recording(workspace: &Workspace) -> Vec<u8> {
-    fs::read(workspace.run_folder().join("recording.mcap")).expect("a recording")
+    (workspace.recording(), output.status.code())
 }
 
 /// A rig in lockstep that records already.
@@ -75,7 +70,7 @@ fn three_processes_leave_the_bytes_of_virtual_time() {
         let output = child.wait_with_output().unwrap();
         let context = format!("{arguments:?}: {}{}", stdout(&output), stderr(&output));
         assert_eq!(output.status.code(), code, "{context}");
-        assert!(recording(&workspace) == expected, "{context}");
+        assert!(workspace.recording() == expected, "{context}");
         assert_eq!(memory.files(), Vec::<String>::new(), "{context}");
         assert_eq!(workspace.manifest()["clock"], "lockstep");
         let is_faulty = scenario.contains("faults");
@@ -92,7 +87,7 @@ fn a_busy_machine_changes_no_byte() {
         let workspace = Workspace::new(scenario);
         let output = workspace.start_lockstep(&[]).wait_with_output().unwrap();
         assert_eq!(output.status.code(), Some(0), "{}{}", stdout(&output), stderr(&output));
-        assert!(recording(&workspace) == expected);
+        assert!(workspace.recording() == expected);
     }
 }
 
@@ -112,7 +107,7 @@ fn a_process_that_is_stopped_for_a_moment_changes_no_byte() {
         let output = child.wait_with_output().unwrap();
         let context = format!("{role}: {}{}", stdout(&output), stderr(&output));
         assert_eq!(output.status.code(), Some(0), "{context}");
-        assert!(recording(&workspace) == expected, "{context}");
+        assert!(workspace.recording() == expected, "{context}");
     }
 }
 
@@ -149,6 +144,27 @@ fn a_process_that_stays_silent_ends_the_run_with_its_name_and_the_cycle() {
         assert!(reason.starts_with(&format!("the {role} died: it did not answer in cycle ")), "{context}");
         assert!(reason.contains(&format!("for {silent_s} s (--patience)")), "{context}");
         assert_eq!(memory.files(), Vec::<String>::new(), "{context}");
+    }
+}
+
+/// It would find the others silent, which have given it up.
+#[test]
+fn a_process_that_goes_on_too_late_is_still_the_one_that_ends_the_run() {
+    // Alone, the controller waits for steady readings as long as that.
+    let boot = "[controller]\nsteady_readings = 10000000\nstart_timeout_s = 20000.0";
+    for role in ROLES {
+        let (workspace, child, _memory) = running(boot, &["--patience", "500ms"]);
+        let victim = child_of(&child, role);
+        kill_process(victim, Signal::STOP).unwrap();
+        clock::sleep(Duration::from_secs(2));
+        // It may have been killed by now.
+        let _ = kill_process(victim, Signal::CONT);
+        let output = child.wait_with_output().unwrap();
+        let context = format!("{role}: {}{}", stdout(&output), stderr(&output));
+        assert_eq!(output.status.code(), Some(4), "{context}");
+        let summary = workspace.summary();
+        let reason = summary["verdict"]["reason"].as_str().unwrap();
+        assert!(reason.starts_with(&format!("the {role} died: it did not answer in cycle ")), "{context}");
     }
 }
 

@@ -25,6 +25,27 @@ fn no_message_of_one_rig_reaches_another() {
 }
 
 #[test]
+fn two_rigs_in_lockstep_leave_the_bytes_of_virtual_time() {
+    let seeds = ["1", "2"];
+    let expected = seeds.map(|seed| {
+        let workspace = Workspace::new("duration_s = 2.0");
+        assert_eq!(workspace.run_virtual(&["--seed", seed]).status.code(), Some(0));
+        workspace.recording()
+    });
+    assert!(expected[0] != expected[1]);
+    let rigs = seeds.map(|seed| {
+        let workspace = Workspace::new("duration_s = 2.0");
+        let child = workspace.start_lockstep(&["--seed", seed]);
+        (workspace, child)
+    });
+    for ((workspace, child), expected) in rigs.into_iter().zip(expected) {
+        let output = child.wait_with_output().unwrap();
+        assert_eq!(output.status.code(), Some(0), "{}{}", stdout(&output), stderr(&output));
+        assert!(workspace.recording() == expected);
+    }
+}
+
+#[test]
 fn a_second_rig_of_the_same_name_is_refused() {
     let cores = Cores::take();
     let name = format!("robot-{}", std::process::id());

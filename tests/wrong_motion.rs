@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{Workspace, check, stdout};
+use common::{Cores, Workspace, check, stdout};
 use masseter_shared::config::ChecksConfig;
 use serde_json::Value;
 
@@ -83,4 +83,45 @@ fn a_single_lost_target_leads_nowhere_and_passes() {
     let fault = &workspace.summary()["figures"]["faults"][0];
     assert!(!is_beyond(fault) && fault["detection"].is_null(), "{fault}");
     assert!(fault["deviation_mm"].as_f64().unwrap() > 0.05, "{fault}");
+}
+
+/// A pose control of this integral gain, and supervision as `supervised` says. The motion is slow: with a lead of one cycle
+/// the targets come a cycle late.
+fn pose_control(gain_per_s: f64, supervised: &str) -> Workspace {
+    Workspace::new(&format!(
+        "duration_s = 1.0\n[motion]\nkind = 'chewing'\ncycle_rate_hz = 0.7\n[controller]\nlead_cycles = 1.0\n\
+         integral_gain_per_s = {gain_per_s}\n{supervised}"
+    ))
+}
+
+/// The machine may have disturbed a run in real time, and then explains its safe stop.
+fn is_excused(summary: &Value) -> bool {
+    summary["verdict"]["exit_code"] == 3 && summary["verdict"]["timing"]["word"] == "disturbed"
+}
+
+#[test]
+fn a_gain_that_makes_the_pose_control_unstable_fails_under_every_clock() {
+    // Supervision that lets the jaw leave its path: the checks find that.
+    let lax = "tracking_limit_m = 0.1\ntracking_limit_rad = 1.0\ntracking_rms_limit_m = 0.1\n\
+        tracking_rms_limit_rad = 1.0\n[can]\nfollowing_limit_m = 1.0\n[drives]\n\
+        slide.max_acceleration_m_s2 = 2000.0\nleg.max_acceleration_m_s2 = 2000.0";
+    for (supervised, expected) in [("", 5), (lax, 1)] {
+        assert_eq!(pose_control(5.0, supervised).run_virtual(&[]).status.code(), Some(0), "{supervised}");
+        for simulated in ["virtual", "lockstep"] {
+            let workspace = pose_control(800.0, supervised);
+            let output = match simulated {
+                "virtual" => workspace.run_virtual(&[]),
+                _ => workspace.start_lockstep(&[]).wait_with_output().unwrap(),
+            };
+            assert_eq!(output.status.code(), Some(expected), "{simulated}: {}", stdout(&output));
+            if expected == 1 {
+                assert_eq!(check(&workspace.summary(), "tracking")["result"], "failed");
+            }
+        }
+        // Which limit is met first depends on the machine, too.
+        let workspace = pose_control(800.0, supervised);
+        let output = workspace.run(&Cores::take(), &[]);
+        let is_failed = [Some(1), Some(5)].contains(&output.status.code());
+        assert!(is_failed || is_excused(&workspace.summary()), "{}", stdout(&output));
+    }
 }

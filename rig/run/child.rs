@@ -93,10 +93,12 @@ impl Process {
         writeln!(input)
     }
 
-    /// Its report that another process was silent, if it has ended with one.
+    /// Its report that another process was silent, if it has made one.
     pub(super) fn reported_silence(&mut self) -> Option<Silence> {
-        let last = self.lines.iter().last()?;
-        serde_json::from_str(&last).ok()
+        let has_ended = matches!(self.exit_status(), Ok(Some(_)));
+        let parse = |line: String| serde_json::from_str(&line).ok();
+        // The last lines of a process that has ended may still be on their way.
+        if has_ended { self.lines.iter().find_map(parse) } else { self.lines.try_iter().find_map(parse) }
     }
 
     /// Its exit status, if it has ended.

@@ -263,21 +263,23 @@ impl Rig {
         Ok(of_run(interruption, controller, of_plant_and_recorder(plant, recorder)))
     }
 
-    /// Asks the controller to end if the user interrupts or another process has ended; returns that ending.
+    /// Asks the controller to end if the user interrupts, or another process was silent or has ended; returns that ending.
     fn interrupt_controller(&mut self, interrupts: &Interrupts) -> io::Result<Option<Ending>> {
+        let (recorder, plant) = (self.recorder.exit_status()?, self.plant.exit_status()?);
         let ending = if interrupts.is_stop_requested() {
             Ending::Interrupted
-        } else if let Some(status) = self.recorder.exit_status()? {
+        } else if let Some(ending) = self.end_silent() {
+            ending
+        } else if recorder.is_some() {
             if self.is_lockstep {
                 // It would wait for the recorder.
                 self.plant.terminate();
             }
-            died(RECORDER, Some(status))
-        } else if let Some(status) = self.plant.exit_status()? {
+            died(RECORDER, recorder)
+        } else if let Some(status) = plant {
             if status.code() == Some(Exit::SafeStop as i32) {
                 self.controller.kill();
-                let reported = self.plant.reported_silence().map(|silence| self.end_silent(&silence));
-                return Ok(Some(reported.unwrap_or_else(|| Ending::died(CONTROLLER, SILENT.to_owned()))));
+                return Ok(Some(Ending::died(CONTROLLER, SILENT.to_owned())));
             }
             died(PLANT, Some(status))
         } else {
@@ -287,9 +289,11 @@ impl Rig {
         Ok(Some(ending))
     }
 
-    /// Kills a process that stopped answering in lockstep; it may be stopped.
-    fn end_silent(&mut self, silence: &Silence) -> Ending {
-        let Silence { process, cycle, silent_s } = silence;
+    /// Kills the first process that was reported to be silent in lockstep, if any. Were it stopped and went on, it would
+    /// find the others silent.
+    fn end_silent(&mut self) -> Option<Ending> {
+        let reports = [&mut self.controller, &mut self.plant].map(Process::reported_silence);
+        let Silence { process, cycle, silent_s } = reports.into_iter().flatten().next()?;
         let process = match process {
             Party::Controller => &mut self.controller,
             Party::Plant => &mut self.plant,
@@ -298,7 +302,7 @@ impl Rig {
         process.kill();
         let how =
             format!("it did not answer in cycle {cycle} for {silent_s:.1} s (--patience), and was killed");
-        Ending::died(process.role, how)
+        Some(Ending::died(process.role, how))
     }
 
     /// The controller's ending. If it died, waits for the plant's master to stop the drives.
@@ -307,8 +311,8 @@ impl Rig {
         status: Option<ExitStatus>,
         interrupts: &Interrupts,
     ) -> io::Result<Ending> {
-        if let Some(silence) = status.and_then(|_| self.controller.reported_silence()) {
-            return Ok(self.end_silent(&silence));
+        if let Some(ending) = self.end_silent() {
+            return Ok(ending);
         }
         match status.and_then(|status| status.code()) {
             Some(code) if code == Exit::Passed as i32 => Ok(Ending::Completed),

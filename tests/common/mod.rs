@@ -143,6 +143,11 @@ impl Workspace {
         self.file("run")
     }
 
+    /// The bytes of the recording.
+    pub(crate) fn recording(&self) -> Vec<u8> {
+        fs::read(self.run_folder().join("recording.mcap")).expect("a recording")
+    }
+
     /// Length of the recording so far.
     pub(crate) fn recorded_bytes(&self) -> u64 {
         fs::metadata(self.run_folder().join("recording.mcap")).map_or(0, |file| file.len())

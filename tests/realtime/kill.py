@@ -27,6 +27,8 @@ import tempfile
 import time
 from pathlib import Path
 
+from rig import children_of, lives, shared_memory_of, start
+
 # Beyond the silent cycles of 1 ms, which take twice as long where every other deadline is missed.
 REACTION_MARGIN_MS = 60.0
 # `masseter clean`, the start of its process included. The aim is 50 ms, which a busy machine stretches.
@@ -62,14 +64,8 @@ def child_of(rig, role):
     for _ in range(1000):
         if rig.poll() is not None:
             raise Disturbed
-        children = Path(f"/proc/{rig.pid}/task/{rig.pid}/children").read_text().split()
-        for child in children:
-            try:
-                arguments = Path(f"/proc/{child}/cmdline").read_bytes().split(b"\0")
-            except FileNotFoundError:
-                continue
-            if len(arguments) > 1 and arguments[1] == role.encode():
-                return int(child)
+        if found := children_of(rig).get(role):
+            return found
         time.sleep(0.01)
     raise SystemExit(f"no {role} appeared")
 
@@ -144,19 +140,12 @@ def stop_recorder(masseter, rig, run, recorder):
     return {OVER: over_ms}
 
 
-def shared_memory_of(supervisor):
-    """A rig's files in shared memory."""
-    return [name for name in os.listdir("/dev/shm") if name.startswith(f"masseter_{os.getuid()}_{supervisor}-")]
-
-
 def hit_once(masseter, role, how, silent_cycles, chance):
     """One rig, one hit: what was measured, ms."""
     with tempfile.TemporaryDirectory() as folder:
         scenario, run = Path(folder) / "scenario.toml", Path(folder) / "run"
         scenario.write_text(SCENARIO.format(silent_cycles=silent_cycles, heartbeat_ms=max(150, 4 * silent_cycles)))
-        rig = subprocess.Popen(
-            [masseter, "run", scenario, "--clock", "rt", "--out", run], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
-        )
+        rig = start(masseter, run, "rt", scenario)
         victims = [child_of(rig, one) for one in (PROCESSES if role == ALL else [role])]
         wait_until_it_records(rig, run)
         time.sleep(chance.uniform(0.0, 1.0))
@@ -202,16 +191,6 @@ def clean_ms(masseter, rig, children):
     taken_ms = (time.monotonic_ns() - began_ns) / 1e6
     assert_clean(rig, ALL)
     return taken_ms
-
-
-def lives(process):
-    """Whether any of its threads does: the first may be dead while others still hold the process's files, and its lock."""
-    proc = Path(f"/proc/{process}")
-    try:
-        threads = len(os.listdir(proc / "task"))
-        return threads > 1 or (proc / "stat").read_text().rsplit(")", 1)[1].split()[0] != "Z"
-    except (FileNotFoundError, ProcessLookupError):
-        return False
 
 
 def assert_clean(rig, role):

@@ -18,7 +18,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from moments import children_of, start
+from rig import children_of, start
 
 REFUSALS = {"bad_message", "stroke_limit", "velocity_limit", "acceleration_limit"}
 STALLS_S = (0.001, 0.002, 0.004, 0.008)
@@ -45,7 +45,7 @@ def run_once(masseter, chance):
     """Returns the verdict's word, the cause of the first fault, the stalls, and the refused commands."""
     with tempfile.TemporaryDirectory() as folder:
         run = Path(folder) / "run"
-        rig, _ = start(masseter, run, folder, f"{MOTION_S}s")
+        rig = start(masseter, run, "rt", "--duration", f"{MOTION_S}s", runtime=folder)
         while rig.poll() is None and not {"controller", "plant"} <= children_of(rig).keys():
             time.sleep(0.01)
         children, stalls = children_of(rig), 0

@@ -3,6 +3,7 @@
 use std::borrow::Borrow;
 use std::fmt::Debug;
 use std::ops::Deref;
+use std::time::Duration;
 
 use iceoryx2::config::Config;
 use iceoryx2::node::{Node as IceoryxNode, NodeBuilder};
@@ -32,6 +33,9 @@ const KEPT_FOR_THE_NEWEST: usize = 4;
 /// Messages a subscriber may hold at once: while it looks for a newer one than it has, it holds the one
 /// it has, the newest found so far, and the next.
 const MAX_HELD: usize = 3;
+/// Longest wait for another process that makes the same part of the domain: that process may be stopped for a moment, or
+/// starved.
+const CREATION_TIMEOUT: Duration = Duration::from_secs(5);
 
 /// A process's access to a domain.
 #[derive(Debug)]
@@ -49,6 +53,7 @@ impl Node {
         let prefix = domain.prefix().map_err(failed("joining domain", id))?;
         config.global.prefix = prefix.as_str().try_into().map_err(failed("joining domain", id))?;
         let root = iceoryx2::prelude::Path::new(domain.root().as_os_str().as_encoded_bytes());
+        config.global.creation_timeout = CREATION_TIMEOUT;
         config.global.set_root_path(&root.map_err(failed("joining domain", id))?);
         let builder = NodeBuilder::new().config(&config).signal_handling_mode(SignalHandlingMode::Disabled);
         let node = builder.create().map_err(failed("joining domain", id))?;
