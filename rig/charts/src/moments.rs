@@ -65,12 +65,12 @@ pub(crate) fn draw(area: &Area, chart: &Chart<'_, '_>, moments: &[Moment]) -> Re
         moments.iter().map(|moment| CHARACTER * moment.name.chars().count() as i32).collect();
     let places = places(&lines, &widths, [across.start - left, across.end - left]);
     let text = ("sans-serif", TEXT - 1).into_text_style(area).color(&COLOUR);
-    let text = text.pos(Pos::new(HPos::Left, VPos::Center));
     for ((moment, x), place) in moments.iter().zip(lines).zip(places) {
         let mut from = plot_top;
         if let Some(Place { row, ends, .. }) = place {
             from -= ROW * row as i32 + ROW / 2;
-            area.draw_text(&moment.name, &text, (ends[0], from))?;
+            let (side, end) = if ends[0] > x { (HPos::Left, ends[0]) } else { (HPos::Right, ends[1]) };
+            area.draw_text(&moment.name, &text.pos(Pos::new(side, VPos::Center)), (end, from))?;
         }
         for y in (from..bottom).step_by(DASH.iter().sum::<i32>() as usize) {
             let dash = [(x, y), (x, (y + DASH[0]).min(bottom))];
