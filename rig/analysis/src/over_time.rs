@@ -177,11 +177,11 @@ mod tests {
             }
         }
         let over_time = collector.finish();
-        assert_eq!(over_time.duration_s, 0.039);
+        assert!((over_time.duration_s - 0.039).abs() < 1e-12);
         let ends = |curve: &Curve| [curve[0], curve[curve.len() - 1]];
         assert_eq!(ends(&over_time.actual_incisal_m[0]), [(0.0, 0.03), (0.039, 0.069)]);
         assert_eq!(ends(&over_time.desired_incisal_m[0]), [(0.0, 0.031), (0.019, 0.05)]);
         assert_eq!(ends(&over_time.actual_incisal_m[2]), [(0.0, -0.01), (0.03, -0.01)]);
-        assert!(over_time.distance_m.iter().all(|(_, distance_m)| *distance_m == 1e-3));
+        assert!(over_time.distance_m.iter().all(|(_, distance_m)| (distance_m - 1e-3).abs() < 1e-12));
     }
 }

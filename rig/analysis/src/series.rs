@@ -159,9 +159,9 @@ mod tests {
         }
         let band = series.band(0);
         assert!(band.len() <= 2 * MOST && band.is_sorted_by(|a, b| a.0 < b.0));
-        assert_eq!(band.iter().filter(|(_, value)| *value == 99.0).collect::<Vec<_>>(), [&(54.321, 99.0)]);
+        assert_eq!(band.iter().filter(|(_, value)| *value > 98.0).collect::<Vec<_>>(), [&(54.321, 99.0)]);
         assert!(series.highest(0).iter().all(|(_, value)| *value >= 6.0));
-        assert_eq!(series.stretches.len(), band.iter().filter(|(_, value)| *value == 0.0).count());
+        assert_eq!(series.stretches.len(), band.iter().filter(|(_, value)| *value < 0.5).count());
     }
 
     /// Chewing, with flanks that fall through many stretches of time.

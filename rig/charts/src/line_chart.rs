@@ -295,7 +295,7 @@ mod tests {
         let moment = |at: f64| Moment { name: format!("moment {at}"), at };
         let moments = vec![moment(0.5), moment(0.51), moment(2.5), moment(f64::NAN)];
         let x = Axis::new("time, s", Scale::Linear, [0.0, 2.0]);
-        let drawn = LineChart { moments, x, ..over_time(line(), Vec::new()) }.draw(260).unwrap();
+        let drawn = LineChart { x, moments, ..over_time(line(), Vec::new()) }.draw(260).unwrap();
         let heights = heights_of(&["moment 0.51".to_owned(), "moment 0.5".to_owned()], &drawn.svg);
         assert!(heights[1] < heights[0] && heights[0] < 50, "{heights:?}");
         assert!(!drawn.svg.contains("moment 2.5") && !drawn.svg.contains("NaN"));
