@@ -177,7 +177,7 @@ fn planted_violations_of_layers_are_found() {
         ("rig/plan", "rig/recording"),
         ("rig/recording", "controller"),
         ("rig/analysis", "plant"),
-        ("rig/report", "controller"),
+        ("rig/report", "plant"),
         ("rig/charts", "rig/terminal"),
         ("rig/terminal", "shared"),
         ("rig/study", "plant"),

@@ -44,8 +44,14 @@ fn a_whole_recording_passes_info_and_verify() {
     for of in [workspace.run_folder(), workspace.run_folder().join("recording.mcap")] {
         let info = log("info", &of, &[]);
         assert_eq!(info.status.code(), Some(0), "{}", stdout(&info));
-        for word in ["masseter/Reading (cdr)", "foxglove.FrameTransforms (protobuf)", "zstd", "bytes a cycle"]
-        {
+        for word in [
+            "masseter/msg/Reading (cdr)",
+            "tf2_msgs/msg/TFMessage (cdr)",
+            "attached: scenario.toml, ",
+            "attached: circumstances.json, ",
+            "zstd",
+            "bytes a cycle",
+        ] {
             assert!(stdout(&info).contains(word), "{word}: {}", stdout(&info));
         }
         let proof = log("verify", &of, &[]);
@@ -88,7 +94,7 @@ fn only_the_lines_of_failed_proofs_say_fail() {
     let whole = fs::read(workspace.run_folder().join("recording.mcap")).unwrap();
     let mut flipped = whole.clone();
     // In the first chunk, that of the definitions.
-    flipped[2000] ^= 0x10;
+    flipped[1000] ^= 0x10;
     let cases = [
         (whole[..whole.len() - 1].to_vec(), &["7 of ", "the file lacks its end"][..]),
         ([&whole[..], b"x"].concat(), &["1 of "]),
@@ -183,14 +189,39 @@ fn topics_without_a_table_are_listed_and_refused_on_request() {
     let refused = export(&["--topic", "reading", "--topic", "/tf"]);
     assert_eq!(refused.status.code(), Some(2));
     let said = stderr(&refused);
-    assert!(said.contains("'/tf' cannot become a table: its messages are protobuf"), "{said}");
+    assert!(said.contains("'/tf' cannot become a table: its messages hold more than numbers"), "{said}");
     assert!(!out.exists());
 
     let said = stdout(&export(&[]));
-    assert!(said.contains("no table  /tf: its messages are protobuf"), "{said}");
+    assert!(said.contains("no table  /tf: its messages hold more than numbers"), "{said}");
     assert!(said.contains("no table  /scene: "), "{said}");
     let silent = fs::read_to_string(out.join("machine.csv")).unwrap();
     assert_eq!(silent.lines().count(), 1, "a topic without messages has its header");
+}
+
+/// A run of real time also attaches when and where it was made.
+#[test]
+fn a_recording_explains_itself() {
+    let workspace = virtual_run();
+    let reader_of = |path: &Path| {
+        let mut reader = Reader::open(path).unwrap();
+        while reader.next_message().unwrap().is_some() {}
+        reader
+    };
+    let recording = workspace.run_folder().join("recording.mcap");
+    let recovered = workspace.file("recovered.mcap");
+    let output = log("recover", &recording, &["--out", recovered.to_str().unwrap()]);
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    for path in [recording, recovered] {
+        let reader = reader_of(&path);
+        let [scenario, circumstances] = reader.attachments() else { panic!("{:?}", reader.attachments()) };
+        assert_eq!((&*scenario.name, &*circumstances.name), ("scenario.toml", "circumstances.json"));
+        assert_eq!(*scenario.data, fs::read(workspace.run_folder().join("scenario.toml")).unwrap());
+        let known: serde_json::Value = serde_json::from_slice(&circumstances.data).unwrap();
+        assert_eq!(known["motion_s"], workspace.manifest()["motion_s"]);
+        assert_eq!(known["masseter"], workspace.manifest()["masseter"]);
+        assert!(known["began"].is_null(), "recordings of simulated time are equal: {known}");
+    }
 }
 
 #[test]

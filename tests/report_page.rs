@@ -69,3 +69,36 @@ fn the_page_works_in_a_browser() {
         assert!(!offline.contains(outside), "the page refers to {outside}");
     }
 }
+
+/// The drawing of a part of the page.
+fn drawing<'a>(page: &'a str, id: &str) -> &'a str {
+    let (_, from) = page.split_once(&format!("<div id=\"{id}\">")).expect("the part is there");
+    from.split_once("</svg>").expect("it is a drawing").0
+}
+
+/// The right end of the thin lines of a drawing, px.
+fn last_x(drawing: &str) -> f64 {
+    let lines = drawing.split("<polyline").skip(1).filter(|line| line.contains("stroke-width=\"2\""));
+    let points = lines.filter_map(|line| line.split("points=\"").nth(1)?.split('"').next());
+    points
+        .flat_map(str::split_whitespace)
+        .filter_map(|point| point.split(',').next()?.parse().ok())
+        .fold(0.0, f64::max)
+}
+
+#[test]
+fn after_a_safe_stop_the_charts_go_on_and_show_the_fault_and_its_detection() {
+    let workspace = Workspace::new(
+        "duration_s = 4.0\n[[faults]]\nkind = 'disconnect'\nbus = 1\nnode = 5\nfrom_s = 2.2\n",
+    );
+    assert_eq!(workspace.run_virtual(&[]).status.code(), Some(5));
+    let page = std::fs::read_to_string(workspace.run_folder().join("report.html")).unwrap();
+    for id in ["motion", "error", "slides", "legs", "velocities", "forces", "buses"] {
+        let drawing = drawing(&page, id);
+        assert!(drawing.contains("fault 1: disconnect (bus 1, node 5), 2.2"), "{id}");
+        assert!(drawing.contains("safe stop: master, "), "{id}");
+    }
+    // The jaw is followed for as long as the axes are.
+    let [motion, legs] = ["motion", "legs"].map(|id| last_x(drawing(&page, id)));
+    assert!(motion > 0.0 && (motion - legs).abs() < 2.0, "{motion} and {legs}");
+}

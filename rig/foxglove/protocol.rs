@@ -4,7 +4,6 @@
 //! Text messages are JSON objects with an `op`. Messages of channels are binary and little-endian: opcode, subscription
 //! id, time, bytes.
 
-use data_encoding::BASE64;
 use serde::{Deserialize, Serialize};
 
 use masseter_recording::{Channel, Encoded, definitions};
@@ -91,11 +90,7 @@ pub(super) fn advertise() -> String {
             encoding: channel.message_encoding.clone(),
             schema_name: schema.name.clone(),
             schema_encoding: schema.encoding.clone(),
-            // JSON holds no bytes: text schemas are sent as they are, binary ones in base 64.
-            schema: match schema.encoding.as_str() {
-                "protobuf" => BASE64.encode(&schema.data),
-                _ => String::from_utf8_lossy(&schema.data).into_owned(),
-            },
+            schema: String::from_utf8_lossy(&schema.data).into_owned(),
         }
     };
     to_json(&ServerMessage::Advertise { channels: (0..).zip(&channels).map(advertised).collect() })
@@ -144,12 +139,8 @@ mod tests {
             assert_eq!(channel["topic"], definition.topic);
             assert_eq!(channel["encoding"], *definition.message_encoding);
             assert_eq!(channel["schemaName"], *defined.name);
-            let schema = channel["schema"].as_str().unwrap();
-            match channel["schemaEncoding"].as_str().unwrap() {
-                "ros2msg" => assert_eq!(schema.as_bytes(), &*defined.data),
-                "protobuf" => assert_eq!(BASE64.decode(schema.as_bytes()).unwrap(), *defined.data),
-                other => panic!("{other}"),
-            }
+            assert_eq!(channel["schemaEncoding"], "ros2msg");
+            assert_eq!(channel["schema"].as_str().unwrap().as_bytes(), &*defined.data);
         }
     }
 

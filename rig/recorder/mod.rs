@@ -16,7 +16,7 @@ use std::time::Duration;
 
 use anyhow::Context;
 use clap::Args;
-use masseter_recording::{Backlog, Pace, Recorder, Scene};
+use masseter_recording::{Backlog, Pace, Recorder, RunFolder, Scene};
 use masseter_shared::clock;
 use masseter_shared::geometry::Mechanism;
 use masseter_shared::lifecycle::{Start, StopRequest};
@@ -76,7 +76,7 @@ pub(crate) fn record(args: RecorderArgs) -> anyhow::Result<Exit> {
         None => None,
     };
     let pace = if is_lockstep { Pace::Virtual } else { Pace::RealTime };
-    let backlog = Backlog::start(Recorder::create(&args.recording, scene)?, pace);
+    let backlog = Backlog::start(Recorder::of_run(&RunFolder::of_recording(&args.recording), scene)?, pace);
     let mut signals = is_lockstep.then(|| RecorderSignals::open(&process, DRAIN_INTERVAL)).transpose()?;
     let start = process.ready(None)?;
 

@@ -28,6 +28,8 @@ pub(super) struct Survey {
     channels: Vec<(mcap::Channel<'static>, ChannelFigures)>,
     sequences: Vec<TopicFigures>,
     undefined: u64,
+    /// Names and bytes of the attached files.
+    attachments: Vec<(String, usize)>,
     chunks: Chunks,
     damage: Vec<Damage>,
     was_cut_short: bool,
@@ -59,6 +61,11 @@ impl Survey {
             channels,
             sequences: sequence.finish(),
             undefined,
+            attachments: reader
+                .attachments()
+                .iter()
+                .map(|file| (file.name.clone(), file.data.len()))
+                .collect(),
             chunks: reader.chunks().clone(),
             damage: reader.damage().to_vec(),
             was_cut_short: reader.was_cut_short(),
@@ -127,6 +134,9 @@ impl Survey {
                 channel.schema.as_ref().map_or("no schema", |schema| &schema.name),
                 channel.message_encoding,
             )?;
+        }
+        for (name, bytes) in &self.attachments {
+            writeln!(text, "attached: {name}, {}", counted(*bytes as u64, "byte"))?;
         }
         let from_ns = self.times().map(|(first, _)| first).min().unwrap_or(0);
         let to_ns = self.times().map(|(_, last)| last).max().unwrap_or(0);

@@ -42,7 +42,7 @@ fn play(
     let scenario = &plan.scenario;
     let mut plant = PlantCore::new(scenario, EPOCH_NS)?;
     let scene = Scene::new(&plan.mechanism, &scenario.jaw);
-    let backlog = Backlog::start(Recorder::create(&folder.recording(), scene)?, Pace::Virtual);
+    let backlog = Backlog::start(Recorder::of_run(folder, scene)?, Pace::Virtual);
     let log = Log { backlog, published: Default::default() };
     let mut rig = VirtualRig { controller, schedule: &plan.schedule, log, now_ns: EPOCH_NS, reading: None };
 

@@ -15,7 +15,18 @@ const MAY_USE: [(&str, &[&str]); 11] = [
     ("rig/plan", &["shared", "controller", "plant"]),
     ("rig/recording", &["shared"]),
     ("rig/analysis", &["shared/can", "shared", "rig/recording"]),
-    ("rig/report", &["shared/can", "shared", "rig/recording", "rig/analysis", "rig/charts", "rig/terminal"]),
+    (
+        "rig/report",
+        &[
+            "shared/can",
+            "shared",
+            "controller",
+            "rig/recording",
+            "rig/analysis",
+            "rig/charts",
+            "rig/terminal",
+        ],
+    ),
     ("rig/study", &["shared", "controller", "rig/plan", "rig/charts"]),
 ];
 

@@ -11,14 +11,12 @@ import multiprocessing
 import struct
 import subprocess
 import sys
-from base64 import b64decode
 from collections import Counter
 from contextlib import contextmanager
 from pathlib import Path
 
 from mcap.records import Schema
-from mcap_protobuf.decoder import DecoderFactory as ProtobufDecoderFactory
-from mcap_ros2.decoder import DecoderFactory as Ros2DecoderFactory
+from mcap_ros2.decoder import DecoderFactory
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
@@ -53,11 +51,9 @@ def subscribe_to_all(link):
 
 def decoder_of(channel):
     """How the channel's messages are decoded by its schema."""
-    is_protobuf = channel["schemaEncoding"] == "protobuf"
-    data = b64decode(channel["schema"]) if is_protobuf else channel["schema"].encode()
+    data = channel["schema"].encode()
     schema = Schema(id=channel["id"] + 1, data=data, encoding=channel["schemaEncoding"], name=channel["schemaName"])
-    factory = ProtobufDecoderFactory() if is_protobuf else Ros2DecoderFactory()
-    return factory.decoder_for(channel["encoding"], schema)
+    return DecoderFactory().decoder_for(channel["encoding"], schema)
 
 
 def desert(url, is_watching):
@@ -91,7 +87,7 @@ def watch(link, channels, on_thousandth):
                 assert abs(sum(q * q for q in message.estimated_quaternion_wxyz) - 1) < 1e-9
                 assert abs(log_time_ns - message.published_ns) < 1_000_000_000, log_time_ns
             if topic == "/scene":
-                parts |= {entity.id for entity in message.entities}
+                parts |= {marker.ns for marker in message.markers}
     except ConnectionClosed as end:
         assert end.rcvd and end.rcvd.code == 1001, end
     return counts, parts

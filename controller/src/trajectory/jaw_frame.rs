@@ -26,21 +26,7 @@ pub(super) struct JawFrame {
 
 impl JawFrame {
     pub(super) fn new(jaw: &JawConfig, mechanism: &Mechanism) -> Result<Self, TrajectoryError> {
-        let closed_leg_m = require("jaw.closed_leg_m", jaw.closed_leg_m, jaw.closed_leg_m > 0.0, "above 0")?;
-        for (name, point) in
-            [("jaw.reference_point_m", jaw.reference_point_m), ("jaw.closed_offset_m", jaw.closed_offset_m)]
-        {
-            for coordinate in point {
-                require(name, coordinate, coordinate.abs() <= FARTHEST_M, "within ±1 m")?;
-            }
-        }
-        let actuators = Actuators { slide_m: [0.0; LEGS], leg_m: [closed_leg_m; LEGS] };
-        let no_pose = |error| {
-            let problem = format!("jaw.closed_leg_m = {closed_leg_m:?} m gives no closed pose: {error}");
-            TrajectoryError(problem)
-        };
-        let closed = solve_completely(mechanism, &actuators).map_err(no_pose)?.pose;
-        let closed = Translation3::from(jaw.closed_offset_m) * closed;
+        let closed = closed_pose(jaw, mechanism)?;
         let jaw_in_platform =
             Pose::from_parts(Translation3::from(jaw.reference_point_m), closed.rotation.inverse());
         Ok(Self { jaw: closed * jaw_in_platform, platform_in_jaw: jaw_in_platform.inverse() })
@@ -50,4 +36,26 @@ impl JawFrame {
     pub(super) fn platform(&self, displacement: &Pose) -> Pose {
         self.jaw * displacement * self.platform_in_jaw
     }
+}
+
+/// The platform in the base frame when the jaw is closed.
+///
+/// # Errors
+/// When a value lies outside its range, or no such pose exists.
+pub fn closed_pose(jaw: &JawConfig, mechanism: &Mechanism) -> Result<Pose, TrajectoryError> {
+    let closed_leg_m = require("jaw.closed_leg_m", jaw.closed_leg_m, jaw.closed_leg_m > 0.0, "above 0")?;
+    for (name, point) in
+        [("jaw.reference_point_m", jaw.reference_point_m), ("jaw.closed_offset_m", jaw.closed_offset_m)]
+    {
+        for coordinate in point {
+            require(name, coordinate, coordinate.abs() <= FARTHEST_M, "within ±1 m")?;
+        }
+    }
+    let actuators = Actuators { slide_m: [0.0; LEGS], leg_m: [closed_leg_m; LEGS] };
+    let no_pose = |error| {
+        let problem = format!("jaw.closed_leg_m = {closed_leg_m:?} m gives no closed pose: {error}");
+        TrajectoryError(problem)
+    };
+    let closed = solve_completely(mechanism, &actuators).map_err(no_pose)?.pose;
+    Ok(Translation3::from(jaw.closed_offset_m) * closed)
 }

@@ -18,10 +18,11 @@ use crate::intervals::Intervals;
 use crate::longest_cycles::LongestCycles;
 use crate::outage::OutageWatch;
 use crate::over_time::{CONTROLLER, OverTimeCollector, PLANT};
+use crate::pose_errors::pose;
 use crate::response::Responses;
 use crate::sequence::SequenceCheck;
 use crate::skips::{Counters, Skips};
-use crate::tracking::{PoseSource, Tracking};
+use crate::tracking::{PathSample, PoseSource, Tracking};
 
 /// Computes the [`Figures`] of a run from its messages, in their order in the recording.
 ///
@@ -44,6 +45,8 @@ use crate::tracking::{PoseSource, Tracking};
 #[derive(Debug)]
 pub struct Analysis {
     period_ns: u64,
+    /// Whether the mechanism is emulated, so that its true motion is recorded.
+    has_truth: bool,
     intervals: Intervals,
     longest_cycles: LongestCycles,
     tracking: Tracking,
@@ -73,6 +76,7 @@ impl Analysis {
         let period_ns = scenario.period_ns();
         Self {
             period_ns,
+            has_truth: is_emulated,
             intervals: Intervals::new(period_ns),
             longest_cycles: LongestCycles::default(),
             tracking: Tracking::new(
@@ -83,7 +87,7 @@ impl Analysis {
             sequence: SequenceCheck::default(),
             frames: Vec::new(),
             events: Vec::new(),
-            over_time: OverTimeCollector::new(scenario.can.bitrate().ok()),
+            over_time: OverTimeCollector::new(scenario.jaw.reference_point_m, scenario.can.bitrate().ok()),
             responses: Responses::for_scenario(scenario),
             cycles: 0,
             freshness: Freshness::default(),
@@ -140,18 +144,26 @@ impl Analysis {
         self.over_time.wake_up(CONTROLLER, state.due_ns, state.woke_ns);
         self.outage.state(state);
         let is_disturbed = self.disturbance.take(state, is_fresh);
-        self.tracking
-            .state(state, is_fresh, is_disturbed)
-            .into_iter()
-            .for_each(|sample| self.faults.sample(sample));
+        if is_fresh && !self.has_truth {
+            let estimated = pose(state.estimated_position_m, state.estimated_quaternion_wxyz);
+            self.over_time.actual(state.sampled_ns, estimated.as_ref());
+        }
+        self.tracking.state(state, is_fresh, is_disturbed).into_iter().for_each(|sample| self.path(sample));
         self.cycles = self.cycles.max(state.seq);
         self.final_state = Some(state.controller_state.into());
     }
 
     fn truth(&mut self, truth: &Truth) {
-        self.tracking.truth(truth).into_iter().flatten().for_each(|sample| self.faults.sample(sample));
+        self.tracking.truth(truth).into_iter().flatten().for_each(|sample| self.path(sample));
         self.bite_force_max_n = self.bite_force_max_n.map(|most_n| most_n.max(truth.bite_force_n));
         self.over_time.truth(truth);
+        let actual = pose(truth.position_m, truth.quaternion_wxyz);
+        self.over_time.actual(truth.sampled_ns, actual.as_ref());
+    }
+
+    fn path(&mut self, sample: PathSample) {
+        self.over_time.path(&sample);
+        self.faults.sample(sample);
     }
 
     fn event(&mut self, event: EventRecord) {

@@ -4,7 +4,7 @@
 use std::collections::VecDeque;
 
 use masseter_shared::geometry::Deviation;
-use masseter_shared::messages::codes::{Cause, ControllerState, EventKind, Source};
+use masseter_shared::messages::codes::{Cause, Source};
 use serde::Serialize;
 
 use super::code::Code;
@@ -81,7 +81,7 @@ impl FaultWatch {
         {
             fault.struck_ns = Some(fault.struck_ns.map_or(time_ns, |struck_ns| struck_ns.min(time_ns)));
         }
-        if begins_stop(event) && !self.faults.is_empty() {
+        if event.begins_stop() && !self.faults.is_empty() {
             self.stops.push(Stop { time_ns, source, cause });
         }
     }
@@ -143,13 +143,6 @@ impl FaultWatch {
     }
 }
 
-/// The master's faults all stop the drives. A drive's emergency alone stops nothing.
-fn begins_stop(event: &EventRecord) -> bool {
-    let is_safe_stop = |[_, to]: &[String; 2]| to == ControllerState::SafeStop.name();
-    (event.source == Source::Controller && event.transition.as_ref().is_some_and(is_safe_stop))
-        || (event.source == Source::Master && event.kind == EventKind::Fault)
-}
-
 fn first_stop(stops: &[Stop], struck_ns: u64) -> Option<Stop> {
     stops.iter().filter(|found| found.time_ns >= struck_ns).min_by_key(|found| found.time_ns).copied()
 }
@@ -157,6 +150,7 @@ fn first_stop(stops: &[Stop], struck_ns: u64) -> Option<Stop> {
 #[cfg(test)]
 mod tests {
     use masseter_shared::messages::Event;
+    use masseter_shared::messages::codes::{ControllerState, EventKind};
 
     use super::*;
 
@@ -172,7 +166,7 @@ mod tests {
 
     fn sample(sampled_ns: u64, incisal_m: f64) -> PathSample {
         let deviation = Deviation { incisal_m, angle_rad: 10.0 * incisal_m, origin_m: 0.0 };
-        PathSample { sampled_ns, deviation }
+        PathSample { sampled_ns, desired: None, deviation }
     }
 
     /// Fault 1 strikes at 1 ms, a drive reports an emergency at 1.5 ms, and the master stops at 3.5 ms. Fault 2 strikes during

@@ -37,6 +37,15 @@ pub struct EventRecord {
     pub limit: f64,
 }
 
+impl EventRecord {
+    /// Whether it begins a safe stop. The master's faults all stop the drives; a drive's emergency alone stops nothing.
+    pub fn begins_stop(&self) -> bool {
+        let is_safe_stop = |[_, to]: &[String; 2]| to == ControllerState::SafeStop.name();
+        (self.source == Source::Controller && self.transition.as_ref().is_some_and(is_safe_stop))
+            || (self.source == Source::Master && self.kind == EventKind::Fault)
+    }
+}
+
 impl From<&Event> for EventRecord {
     fn from(event: &Event) -> Self {
         let source = Code::from(event.source);

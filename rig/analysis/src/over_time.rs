@@ -1,17 +1,27 @@
-//! Wake-ups, axes and buses of a run over time, for plots.
+//! Jaw, axes, wake-ups and buses of a run over time, for plots.
 
 use masseter_can::Tapped;
 use masseter_can::{Bitrate, wire};
-use masseter_shared::geometry::AXES;
+use masseter_shared::geometry::{AXES, Pose, Vec3};
 use masseter_shared::messages::Truth;
 
 use super::series::{Curve, Extremes, Series};
+use super::tracking::PathSample;
 
-/// A run over time: seconds since its first SYNC, and the lowest and the highest value of each stretch of time.
+/// A run over time, from the first message to the last: seconds since its first SYNC, and the lowest and the highest value
+/// of each stretch of time.
 #[derive(Debug, Clone, Default)]
 pub struct OverTime {
     /// The instant that curves count from, ns of the run's clock.
     pub began_ns: u64,
+    /// When the last value came, s.
+    pub duration_s: f64,
+    /// Place of the incisal point along x, y and z of the base while it has a desired one, m.
+    pub desired_incisal_m: [Curve; 3],
+    /// The same of the actual pose of the platform, in the whole run.
+    pub actual_incisal_m: [Curve; 3],
+    /// Largest distance of the incisal point from its desired place, m.
+    pub distance_m: Curve,
     /// Latest wake-up of the controller in each stretch, ns late.
     pub controller_late_ns: Curve,
     /// Latest wake-up of the plant in each stretch, ns late.
@@ -30,6 +40,10 @@ pub struct OverTime {
 #[derive(Debug, Default)]
 pub(super) struct OverTimeCollector {
     began_ns: Option<u64>,
+    lasted_ns: u64,
+    /// The incisal point in the platform frame.
+    incisal_m: [f64; 3],
+    jaw: Series<Extremes<{ DISTANCE + 1 }>>,
     late: Series<Extremes<2>>,
     axes: Series<Extremes<{ 3 * AXES }>>,
     /// Time that frames took on each bus.
@@ -37,31 +51,59 @@ pub(super) struct OverTimeCollector {
     bitrate: Option<Bitrate>,
 }
 
+/// Indices of the incisal point's place along x, y and z, desired and actual, and of the distance between the two.
+const DESIRED: usize = 0;
+const ACTUAL: usize = 3;
+const DISTANCE: usize = 6;
+
 /// Indices of the two processes.
 pub(super) const CONTROLLER: usize = 0;
 pub(super) const PLANT: usize = 1;
 
 impl OverTimeCollector {
-    /// For buses of this bit rate; without one there is no load.
-    pub(super) fn new(bitrate: Option<Bitrate>) -> Self {
-        Self { bitrate, ..Self::default() }
+    /// For a jaw with this incisal point in the platform frame, and buses of this bit rate; without one there is no load.
+    pub(super) fn new(incisal_m: [f64; 3], bitrate: Option<Bitrate>) -> Self {
+        Self { incisal_m, bitrate, ..Self::default() }
     }
 
     fn since(&mut self, time_ns: u64) -> u64 {
-        time_ns.saturating_sub(*self.began_ns.get_or_insert(time_ns))
+        let since_ns = time_ns.saturating_sub(*self.began_ns.get_or_insert(time_ns));
+        self.lasted_ns = self.lasted_ns.max(since_ns);
+        since_ns
     }
 
     pub(super) fn wake_up(&mut self, process: usize, due_ns: u64, woke_ns: u64) {
         let since_ns = self.since(due_ns);
-        self.late.at(since_ns).take(process, woke_ns.saturating_sub(due_ns) as f64);
+        self.late.take(since_ns, process, woke_ns.saturating_sub(due_ns) as f64);
+    }
+
+    /// The desired pose of a sample, and how far the actual one is from it.
+    pub(super) fn path(&mut self, sample: &PathSample) {
+        let since_ns = self.since(sample.sampled_ns);
+        self.jaw.take(since_ns, DISTANCE, sample.deviation.incisal_m);
+        self.incisal(since_ns, DESIRED, sample.desired.as_ref());
+    }
+
+    /// The actual pose of the platform.
+    pub(super) fn actual(&mut self, sampled_ns: u64, pose: Option<&Pose>) {
+        let since_ns = self.since(sampled_ns);
+        self.incisal(since_ns, ACTUAL, pose);
+    }
+
+    fn incisal(&mut self, since_ns: u64, first: usize, pose: Option<&Pose>) {
+        let Some(pose) = pose else { return };
+        let place_m = pose.translation.vector + pose.rotation * Vec3::from(self.incisal_m);
+        place_m
+            .iter()
+            .enumerate()
+            .for_each(|(axis, place_m)| self.jaw.take(since_ns, first + axis, *place_m));
     }
 
     pub(super) fn truth(&mut self, truth: &Truth) {
         let since_ns = self.since(truth.sampled_ns);
-        let stretch = self.axes.at(since_ns);
         let values = [truth.joint_m, truth.joint_m_s, truth.force_n];
         for (index, value) in values.into_iter().flatten().enumerate() {
-            stretch.take(index, value);
+            self.axes.take(since_ns, index, value);
         }
     }
 
@@ -76,12 +118,17 @@ impl OverTimeCollector {
 
     pub(super) fn finish(self) -> OverTime {
         let bands = |quantity: usize| std::array::from_fn(|axis| self.axes.band(quantity * AXES + axis));
+        let places = |first: usize| std::array::from_fn(|axis| self.jaw.band(first + axis));
         let load = |bus: &Series<u64>| {
             let full_ns = bus.width_s() * 1e9;
             bus.iter().map(|(at_s, busy_ns)| (at_s, *busy_ns as f64 / full_ns)).collect()
         };
         OverTime {
             began_ns: self.began_ns.unwrap_or(0),
+            duration_s: self.lasted_ns as f64 / 1e9,
+            desired_incisal_m: places(DESIRED),
+            actual_incisal_m: places(ACTUAL),
+            distance_m: self.jaw.highest(DISTANCE),
             controller_late_ns: self.late.highest(CONTROLLER),
             plant_late_ns: self.late.highest(PLANT),
             position_m: bands(0),
@@ -96,6 +143,7 @@ impl OverTimeCollector {
 mod tests {
     use masseter_can::TappedFrame;
     use masseter_can::{Bitrate, CanId, Frame};
+    use masseter_shared::geometry::Deviation;
 
     use super::*;
 
@@ -103,7 +151,7 @@ mod tests {
     fn a_bus_that_is_half_full_is_said_to_be() {
         let frame = Frame::fixed(CanId::standard(0x123).unwrap(), [0x55; 8]);
         let bits = wire::frame_bits(&frame);
-        let mut collector = OverTimeCollector::new(Some(Bitrate::new(2 * 1000 * bits).unwrap()));
+        let mut collector = OverTimeCollector::new([0.0; 3], Some(Bitrate::new(2 * 1000 * bits).unwrap()));
         for millisecond in 0..1000 {
             let time_ns = millisecond * 1_000_000;
             collector.frame(time_ns, 0, &Tapped::Frame(TappedFrame { frame, time_ns, queued_ns: None }));
@@ -111,5 +159,29 @@ mod tests {
         let over_time = collector.finish();
         assert_eq!(over_time.bus_load.len(), 1);
         assert!(over_time.bus_load[0].iter().all(|(_, share)| (share - 0.5).abs() < 1e-3));
+    }
+
+    /// The platform moves by 1 mm a cycle, and from cycle 20 on without a desired pose.
+    #[test]
+    fn the_incisal_point_is_followed_in_the_whole_run_and_its_path_to_its_end() {
+        let mut collector = OverTimeCollector::new([0.03, 0.0, -0.01], None);
+        for cycle in 0..40_u64 {
+            let sampled_ns = 5_000_000 + cycle * 1_000_000;
+            let x = cycle as f64 * 1e-3;
+            let pose = Pose::translation(x, 0.0, 0.0);
+            collector.actual(sampled_ns, Some(&pose));
+            if cycle < 20 {
+                let desired = Some(Pose::translation(x + 1e-3, 0.0, 0.0));
+                let deviation = Deviation { origin_m: 9.0, incisal_m: 1e-3, angle_rad: 9.0 };
+                collector.path(&PathSample { sampled_ns, desired, deviation });
+            }
+        }
+        let over_time = collector.finish();
+        assert!((over_time.duration_s - 0.039).abs() < 1e-12);
+        let ends = |curve: &Curve| [curve[0], curve[curve.len() - 1]];
+        assert_eq!(ends(&over_time.actual_incisal_m[0]), [(0.0, 0.03), (0.039, 0.069)]);
+        assert_eq!(ends(&over_time.desired_incisal_m[0]), [(0.0, 0.031), (0.019, 0.05)]);
+        assert_eq!(ends(&over_time.actual_incisal_m[2]), [(0.0, -0.01), (0.03, -0.01)]);
+        assert!(over_time.distance_m.iter().all(|(_, distance_m)| (distance_m - 1e-3).abs() < 1e-12));
     }
 }

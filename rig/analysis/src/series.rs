@@ -1,7 +1,11 @@
-//! Values over time in memory of a fixed size: the longer the run, the wider the stretches of time that share one value.
+//! Values over time in memory of a fixed size: the longer the run, the wider the stretches of time that share their lowest
+//! and highest value.
 
-/// A curve: seconds since the beginning, and values.
-pub type Curve = Vec<(f64, f64)>;
+/// A point of a curve: seconds since the beginning, and a value.
+type Point = (f64, f64);
+
+/// A curve in the order of time.
+pub type Curve = Vec<Point>;
 
 /// Stretches kept at most.
 const MOST: usize = 1024;
@@ -66,46 +70,71 @@ impl<T: Merge> Series<T> {
 }
 
 impl<const N: usize> Series<Extremes<N>> {
+    /// Takes one of the values of a time since the beginning; what is no finite number is left out.
+    pub(super) fn take(&mut self, since_ns: u64, index: usize, value: f64) {
+        if value.is_finite() {
+            let point = (since_ns as f64 / 1e9, value);
+            self.at(since_ns).take(index, Span { lowest: point, highest: point });
+        }
+    }
+
     /// Highest value of each stretch.
     pub(super) fn highest(&self, index: usize) -> Curve {
-        let points = self.iter().map(|(at_s, stretch)| (at_s, stretch.highest[index]));
-        points.filter(|(_, value)| value.is_finite()).collect()
+        self.spans(index).map(|span| span.highest).collect()
     }
 
-    /// Lowest and highest value of each stretch, as one curve that touches both.
+    /// Lowest and highest value of each stretch, each at its own time. So a curve that only rises or only falls within
+    /// its stretches is drawn as it is.
     pub(super) fn band(&self, index: usize) -> Curve {
-        let ends = |(at_s, stretch): (f64, &Extremes<N>)| {
-            [(at_s, stretch.lowest[index]), (at_s, stretch.highest[index])]
-        };
-        self.iter().flat_map(ends).filter(|(_, value)| value.is_finite()).collect()
+        let mut band = Curve::new();
+        for Span { lowest, highest } in self.spans(index) {
+            let is_rising = lowest.0 <= highest.0;
+            band.extend(if is_rising { [lowest, highest] } else { [highest, lowest] });
+        }
+        band.dedup();
+        band
+    }
+
+    fn spans(&self, index: usize) -> impl Iterator<Item = Span> {
+        self.stretches.iter().filter_map(move |stretch| stretch.0[index])
     }
 }
 
-/// Smallest and largest of `N` values.
+/// The points with the smallest and the largest value.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Extremes<const N: usize> {
-    pub lowest: [f64; N],
-    pub highest: [f64; N],
+struct Span {
+    lowest: Point,
+    highest: Point,
 }
+
+/// Smallest and largest of each of `N` values; none before the first.
+#[derive(Debug, Clone)]
+pub(super) struct Extremes<const N: usize>([Option<Span>; N]);
 
 impl<const N: usize> Default for Extremes<N> {
     fn default() -> Self {
-        Self { lowest: [f64::INFINITY; N], highest: [f64::NEG_INFINITY; N] }
+        Self([None; N])
     }
 }
 
 impl<const N: usize> Extremes<N> {
-    pub(super) fn take(&mut self, index: usize, value: f64) {
-        self.lowest[index] = self.lowest[index].min(value);
-        self.highest[index] = self.highest[index].max(value);
+    fn take(&mut self, index: usize, next: Span) {
+        let span = self.0[index].get_or_insert(next);
+        if next.lowest.1 < span.lowest.1 {
+            span.lowest = next.lowest;
+        }
+        if next.highest.1 > span.highest.1 {
+            span.highest = next.highest;
+        }
     }
 }
 
 impl<const N: usize> Merge for Extremes<N> {
     fn merge(&mut self, next: &Self) {
-        for index in 0..N {
-            self.lowest[index] = self.lowest[index].min(next.lowest[index]);
-            self.highest[index] = self.highest[index].max(next.highest[index]);
+        for (index, span) in next.0.iter().enumerate() {
+            if let Some(span) = span {
+                self.take(index, *span);
+            }
         }
     }
 }
@@ -122,16 +151,49 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_long_run_keeps_its_extremes_in_wider_stretches() {
+    fn a_long_run_keeps_its_extremes_at_their_times() {
         let mut series = Series::<Extremes<1>>::default();
         for millisecond in 0..100_000u64 {
             let value = if millisecond == 54_321 { 99.0 } else { (millisecond % 7) as f64 };
-            series.at(millisecond * 1_000_000).take(0, value);
+            series.take(millisecond * 1_000_000, 0, value);
         }
-        assert!(series.iter().count() <= MOST);
-        let (at_s, _) = series.iter().find(|(_, stretch)| stretch.highest[0] > 98.0).unwrap();
-        assert!((at_s - 54.321).abs() <= series.width_s());
-        assert!(series.iter().all(|(_, stretch)| stretch.lowest[0] < 1.0));
+        let band = series.band(0);
+        assert!(band.len() <= 2 * MOST && band.is_sorted_by(|a, b| a.0 < b.0));
+        assert_eq!(band.iter().filter(|(_, value)| *value > 98.0).collect::<Vec<_>>(), [&(54.321, 99.0)]);
+        assert!(series.highest(0).iter().all(|(_, value)| *value >= 6.0));
+        assert_eq!(series.stretches.len(), band.iter().filter(|(_, value)| *value < 0.5).count());
+    }
+
+    /// Chewing, with flanks that fall through many stretches of time.
+    #[test]
+    fn every_point_of_a_curve_is_a_point_of_its_signal() {
+        let signal = |at_s: f64| 20.0 * (std::f64::consts::TAU * at_s / 0.7).cos();
+        let mut series = Series::<Extremes<1>>::default();
+        for millisecond in 0..60_000u64 {
+            series.take(millisecond * 1_000_000, 0, signal(millisecond as f64 / 1e3));
+        }
+        let band = series.band(0);
+        assert!(series.width_ns > 4 * FIRST_WIDTH_NS, "each stretch holds many values");
+        for (at_s, value) in &band {
+            assert!((value - signal(*at_s)).abs() < 1e-9, "{value} at {at_s} s");
+        }
+        // No line between two points leaves the signal further than one across a turn of it does.
+        for ends in band.windows(2) {
+            let [(from_s, from), (to_s, to)] = [ends[0], ends[1]];
+            let off = (from.midpoint(to) - signal(from_s.midpoint(to_s))).abs();
+            assert!(off < 2.5, "{off} between {from_s} s and {to_s} s");
+        }
+        let turns = band.iter().filter(|(_, value)| value.abs() > 19.99).count();
+        assert!(turns >= 2 * 85, "{turns} turns");
+    }
+
+    #[test]
+    fn a_curve_of_one_value_is_a_straight_line_and_no_number_is_left_out() {
+        let mut series = Series::<Extremes<1>>::default();
+        for (millisecond, value) in [(0, 1.0), (1, f64::NAN), (2, f64::INFINITY), (3, 1.0), (10, 1.0)] {
+            series.take(millisecond * 1_000_000, 0, value);
+        }
+        assert_eq!(series.band(0), [(0.0, 1.0), (0.01, 1.0)]);
     }
 
     #[test]

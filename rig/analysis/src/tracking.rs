@@ -10,7 +10,6 @@ use serde::Serialize;
 use super::by_cycle::ByCycle;
 use super::noise::standard_error;
 use super::pose_errors::{Accumulator, PoseErrorSums, PoseErrors, deviation, pose};
-use super::series::{Curve, Extremes, Series};
 
 /// States in which the platform has a desired pose.
 pub const MOVING: [ControllerState; 3] =
@@ -88,27 +87,15 @@ pub struct TrackingSample {
     pub actual: Pose,
 }
 
-/// The platform from the first easing to the last hold; times in seconds since the first sample.
+/// The platform from the first easing to the last hold, or to the standstill of a safe stop. From the stop on, its desired
+/// pose is the last one.
 #[derive(Debug, Clone, Default)]
 pub struct Track {
     /// Cycles from the first on, as many as a screen shows; of a long run not to its end.
     pub samples: Vec<TrackingSample>,
-    /// When the first sample was taken, ns of the run's clock.
-    pub began_ns: u64,
     /// How long it went on, s.
     pub duration_s: f64,
-    /// Desired displacement along x, y and z, from the first desired pose, m: lowest and highest of each stretch of time.
-    pub desired_m: [Curve; 3],
-    /// The same of the actual pose.
-    pub actual_m: [Curve; 3],
-    /// Largest distance from the desired position in each stretch of time, m.
-    pub distance_m: Curve,
 }
-
-/// Indices of the displacements along x, y and z, desired and actual, and of the distance between the two.
-const DESIRED: usize = 0;
-const ACTUAL: usize = 3;
-const DISTANCE: usize = 6;
 
 /// Time between two samples of the track, ns: the 60 Hz of a screen.
 const SAMPLE_NS: u64 = SECOND_NS / 60;
@@ -129,10 +116,11 @@ struct Sample {
     is_disturbed: bool,
 }
 
-/// A cycle's distance from the desired path, by the actual pose.
+/// A cycle's desired pose, and the actual pose's distance from it.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct PathSample {
     pub(super) sampled_ns: u64,
+    pub(super) desired: Option<Pose>,
     pub(super) deviation: Deviation,
 }
 
@@ -153,11 +141,10 @@ pub(super) struct Tracking {
     estimates: Accumulator,
     track: Vec<TrackingSample>,
     next_sample_ns: u64,
-    /// When and where the motion began.
-    began: Option<(u64, Pose)>,
+    began_ns: Option<u64>,
     ended_ns: u64,
-    /// Desired and actual displacement along x, y and z, and the distance between the two.
-    moved_m: Series<Extremes<{ DISTANCE + 1 }>>,
+    /// The last one before a stop.
+    desired: Option<Pose>,
     second: Accumulator,
     second_ends_ns: u64,
     seconds: Vec<f64>,
@@ -209,6 +196,7 @@ impl Tracking {
         let desired = pose(state.desired_position_m, state.desired_quaternion_wxyz);
         let error = deviation(desired.as_ref(), actual.as_ref(), self.incisal_m);
         if *is_on_path {
+            self.desired = desired;
             self.actual.peak(&error);
             if !is_disturbed {
                 self.undisturbed_actual.peak(&error);
@@ -217,7 +205,11 @@ impl Tracking {
         if is_moving(state) && *is_fresh {
             self.solution(sample, sampled_ns, desired, actual, &error);
         }
-        is_on_path.then_some(PathSample { sampled_ns, deviation: error })
+        if *is_fresh && (is_moving(state) || state.controller_state == ControllerState::SafeStop.code()) {
+            let estimated = pose(state.estimated_position_m, state.estimated_quaternion_wxyz);
+            self.draw(sampled_ns, [self.desired, estimated, actual]);
+        }
+        is_on_path.then_some(PathSample { sampled_ns, desired, deviation: error })
     }
 
     /// A cycle with an estimate of its own.
@@ -247,24 +239,15 @@ impl Tracking {
             self.estimates.add(estimate_error.origin_m);
             self.add_to_second(error.origin_m, sampled_ns);
         }
-        if let (Some(desired), Some(estimated), Some(actual)) = (desired, estimated, actual) {
-            self.draw(TrackingSample { sampled_ns, desired, estimated, actual }, error.origin_m);
-        }
     }
 
-    /// Takes a sample into the track.
-    fn draw(&mut self, sample: TrackingSample, distance_m: f64) {
-        let TrackingSample { sampled_ns, desired, actual, .. } = sample;
-        let (began_ns, began_at) = *self.began.get_or_insert((sampled_ns, desired));
-        let stretch = self.moved_m.at(sampled_ns.saturating_sub(began_ns));
-        stretch.take(DISTANCE, distance_m);
-        for (first, pose) in [(DESIRED, &desired), (ACTUAL, &actual)] {
-            let moved_m = pose.translation.vector - began_at.translation.vector;
-            moved_m.iter().enumerate().for_each(|(axis, moved_m)| stretch.take(first + axis, *moved_m));
-        }
+    /// Takes a sample with a desired, an estimated and an actual pose into the track.
+    fn draw(&mut self, sampled_ns: u64, poses: [Option<Pose>; 3]) {
+        let [Some(desired), Some(estimated), Some(actual)] = poses else { return };
+        self.began_ns.get_or_insert(sampled_ns);
         self.ended_ns = sampled_ns;
         if sampled_ns >= self.next_sample_ns && self.track.len() < MOST_SAMPLES {
-            self.track.push(sample);
+            self.track.push(TrackingSample { sampled_ns, desired, estimated, actual });
             self.next_sample_ns = sampled_ns + SAMPLE_NS;
         }
     }
@@ -297,16 +280,8 @@ impl Tracking {
                 estimated: self.undisturbed_estimated.finish(),
             },
         };
-        let began_ns = self.began.map_or(self.ended_ns, |(began_ns, _)| began_ns);
-        let bands = |first: usize| std::array::from_fn(|axis| self.moved_m.band(first + axis));
-        let track = Track {
-            began_ns,
-            duration_s: self.ended_ns.saturating_sub(began_ns) as f64 / 1e9,
-            desired_m: bands(DESIRED),
-            actual_m: bands(ACTUAL),
-            distance_m: self.moved_m.highest(DISTANCE),
-            samples: self.track,
-        };
+        let lasted_ns = self.ended_ns.saturating_sub(self.began_ns.unwrap_or(self.ended_ns));
+        let track = Track { samples: self.track, duration_s: lasted_ns as f64 / 1e9 };
         (figures, track)
     }
 }

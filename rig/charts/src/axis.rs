@@ -85,6 +85,12 @@ impl Axis {
         self.ends.get_or_insert([low, high.max(low + least)]);
     }
 
+    /// Whether a value lies between its ends.
+    pub(crate) fn covers(&self, value: f64) -> bool {
+        let [low, high] = self.ends();
+        (low..=high).contains(&self.scale.position(value))
+    }
+
     pub(crate) fn has_names(&self) -> bool {
         !self.names.is_empty()
     }

@@ -16,6 +16,10 @@ const MARGIN: u32 = 10;
 const MESH: RGBColor = RGBColor(0xe4, 0xe4, 0xe4);
 /// From one row of a legend to the next, px.
 pub(crate) const ROW: u32 = 20;
+/// Width of a wide line, px.
+const WIDE: u32 = 8;
+/// Opacity of a wide line.
+const PALE: f64 = 0.35;
 /// Length of a dash and of the gap after it, px.
 pub(crate) const DASH: [u32; 2] = [6, 4];
 
@@ -44,6 +48,8 @@ pub struct Bar {
 pub enum Key {
     /// A stroke.
     Line,
+    /// A wide, pale stroke.
+    Wide,
     /// A dashed stroke.
     Dashes,
     /// A filled box.
@@ -59,6 +65,11 @@ pub struct LegendEntry {
     pub colour: RGBColor,
     /// What stands before the name.
     pub key: Key,
+}
+
+/// The style of a line, or of a wide, pale one.
+pub(crate) fn stroke(colour: RGBColor, is_wide: bool) -> ShapeStyle {
+    if is_wide { colour.mix(PALE).stroke_width(WIDE) } else { colour.stroke_width(2) }
 }
 
 /// A drawing of so many pixels on white.
@@ -86,10 +97,21 @@ pub fn chart<'a, 'svg>(
     x: Axis,
     y: Axis,
 ) -> Result<Chart<'a, 'svg>, Error> {
+    chart_below(0, area, title, x, y)
+}
+
+/// The same with so many pixels left free above the plot.
+pub(crate) fn chart_below<'a, 'svg>(
+    room: u32,
+    area: &'a Area<'svg>,
+    title: &str,
+    x: Axis,
+    y: Axis,
+) -> Result<Chart<'a, 'svg>, Error> {
     let labels = [x.label.clone(), y.label.clone()];
     let [below, numbers, names] = LABELS;
     let mut builder = ChartBuilder::on(area);
-    builder.margin(MARGIN).margin_right(2 * MARGIN).x_label_area_size(below);
+    builder.margin(MARGIN).margin_top(MARGIN + room).margin_right(2 * MARGIN).x_label_area_size(below);
     builder.y_label_area_size(if y.has_names() { names } else { numbers });
     if !title.is_empty() {
         builder.caption(title, ("sans-serif", TITLE));
@@ -176,7 +198,8 @@ pub fn legend(area: &Area, entries: &[LegendEntry], columns: usize) -> Result<()
         let x = MARGIN as i32 + column * (index % columns) as i32;
         let y = (MARGIN / 2 + ROW / 2) as i32 + ROW as i32 * (index / columns) as i32;
         let stroke = |from: i32, length: i32| {
-            area.draw(&PathElement::new([(from, y), (from + length, y)], colour.stroke_width(2)))
+            let style = stroke(*colour, *key == Key::Wide);
+            area.draw(&PathElement::new([(from, y), (from + length, y)], style))
         };
         match key {
             Key::Box => {
@@ -184,7 +207,7 @@ pub fn legend(area: &Area, entries: &[LegendEntry], columns: usize) -> Result<()
                 area.draw(&Rectangle::new(corners, colour.filled()))?;
                 area.draw(&Rectangle::new(corners, BLACK))?;
             }
-            Key::Line => stroke(x, 3 * dash)?,
+            Key::Line | Key::Wide => stroke(x, 3 * dash)?,
             Key::Dashes => stroke(x, dash).and_then(|()| stroke(x + dash + gap, dash))?,
         }
         area.draw_text(name, &text, (x + 24, y))?;

@@ -12,6 +12,7 @@
 //!     y: Axis::fitted("stroke, mm", Scale::Linear),
 //!     lines: vec![Line::new("slide 1", vec![(0.0, 0.0), (0.1, 4.0), (0.2, 5.0)])],
 //!     limits: Vec::new(),
+//!     moments: Vec::new(),
 //!     legend: Legend::Beside,
 //! };
 //! let drawn = chart.draw(260).expect("three points make a chart");
@@ -22,6 +23,7 @@ mod axis;
 mod canvas;
 mod colour_scale;
 mod line_chart;
+mod moments;
 pub mod palette;
 mod ticks;
 
@@ -31,4 +33,5 @@ pub use canvas::{
 };
 pub use colour_scale::ColourScale;
 pub use line_chart::{Drawn, Legend, Limit, Line, LineChart};
+pub use moments::Moment;
 pub use plotters::chart::SeriesLabelPosition;

@@ -4,6 +4,7 @@ use plotters::prelude::*;
 
 use crate::axis::{Axis, Scale};
 use crate::canvas::{self, Area, Chart, DASH, Error, Key, LegendEntry, ROW, TEXT};
+use crate::moments::{self, Moment};
 use crate::palette;
 
 /// Width of a chart of its own, px.
@@ -28,13 +29,15 @@ pub struct Line {
     pub colour: Option<RGBColor>,
     /// Whether each point is marked.
     pub is_marked: bool,
+    /// Whether it is wide and pale, so that a line on top of it leaves it visible.
+    pub is_wide: bool,
 }
 
 impl Line {
     /// In the palette's colour, without marks.
     #[must_use]
     pub fn new(name: &str, points: Vec<(f64, f64)>) -> Self {
-        Self { name: name.to_owned(), points, colour: None, is_marked: false }
+        Self { name: name.to_owned(), points, colour: None, is_marked: false, is_wide: false }
     }
 
     /// In this colour.
@@ -48,6 +51,13 @@ impl Line {
     #[must_use]
     pub fn marked(mut self) -> Self {
         self.is_marked = true;
+        self
+    }
+
+    /// Wide and pale.
+    #[must_use]
+    pub fn wide(mut self) -> Self {
+        self.is_wide = true;
         self
     }
 }
@@ -83,6 +93,8 @@ pub struct LineChart {
     pub lines: Vec<Line>,
     /// Drawn over the whole width.
     pub limits: Vec<Limit>,
+    /// Drawn over the whole height, where they lie on the x axis.
+    pub moments: Vec<Moment>,
     /// Where the names stand.
     pub legend: Legend,
 }
@@ -103,7 +115,7 @@ impl LineChart {
     pub fn draw(mut self, height: u32) -> Option<Drawn> {
         let beyond = self.fit()?;
         let entries = self.lines.len() + self.limits.len();
-        let size = (WIDTH, height.max((entries as u32 + 1) * ROW));
+        let size = (WIDTH, height.max((entries as u32 + 1) * ROW) + moments::room(&self.moments));
         let svg = canvas::svg(size, |area| self.draw_fitted(area)).ok()?;
         Some(Drawn { svg, beyond })
     }
@@ -139,6 +151,7 @@ impl LineChart {
         let margin = MARGIN * (up[1] - up[0]);
         let up = [up[0] - margin.max(1e-6), up[1] + margin.max(1e-6)];
         self.x.fit(across);
+        self.moments.retain(|moment| self.x.covers(moment.at));
         self.y.fit(up);
         let is_finite = |[low, high]: [f64; 2]| (high - low).is_finite();
         (is_finite(across) && is_finite(up)).then_some(beyond)
@@ -170,10 +183,11 @@ impl LineChart {
     }
 
     fn plot<'a, 'svg>(&self, area: &'a Area<'svg>) -> Result<Chart<'a, 'svg>, Error> {
-        let mut chart = canvas::chart(area, &self.title, self.x.clone(), self.y.clone())?;
+        let room = moments::room(&self.moments);
+        let mut chart = canvas::chart_below(room, area, &self.title, self.x.clone(), self.y.clone())?;
         for (index, line) in self.lines.iter().enumerate() {
             let colour = line.colour.unwrap_or(palette::series(index));
-            let style = colour.stroke_width(2);
+            let style = canvas::stroke(colour, line.is_wide);
             let points = line.points.iter().copied();
             let series = if palette::is_dashed(index) {
                 chart.draw_series(DashedLineSeries::new(points.clone(), DASH[0], DASH[1], style))?
@@ -192,13 +206,18 @@ impl LineChart {
             PathElement::new([(across.start, value), (across.end, value)], palette::RED.stroke_width(2))
         };
         chart.draw_series(self.limits.iter().flat_map(|limit| &limit.values).map(level))?;
+        moments::draw(area, &chart, &self.moments)?;
         Ok(chart)
     }
 
     fn entries(&self) -> Vec<LegendEntry> {
         let entry = |name: &String, colour, key| LegendEntry { name: name.clone(), colour, key };
         let lines = self.lines.iter().enumerate().map(|(index, line)| {
-            let key = if palette::is_dashed(index) { Key::Dashes } else { Key::Line };
+            let key = match line.is_wide {
+                true => Key::Wide,
+                false if palette::is_dashed(index) => Key::Dashes,
+                false => Key::Line,
+            };
             entry(&line.name, line.colour.unwrap_or(palette::series(index)), key)
         });
         let limits = self.limits.iter().map(|limit| entry(&limit.name, palette::RED, Key::Line));
@@ -223,6 +242,7 @@ mod tests {
             y: Axis::fitted("y", Scale::Linear),
             lines,
             limits,
+            moments: Vec::new(),
             legend: Legend::Beside,
         }
     }
@@ -267,6 +287,18 @@ mod tests {
     fn a_line_without_points_makes_no_chart() {
         assert!(over_time(Vec::new(), Vec::new()).draw(260).is_none());
         assert!(over_time(vec![Line::new("a", Vec::new())], Vec::new()).draw(260).is_none());
+    }
+
+    #[test]
+    fn moments_on_the_axis_are_named_above_the_plot_and_others_left_out() {
+        let line = || vec![Line::new("a", vec![(0.0, 1.0), (1.0, 2.0)]).wide()];
+        let moment = |at: f64| Moment { name: format!("moment {at}"), at };
+        let moments = vec![moment(0.5), moment(0.51), moment(2.5), moment(f64::NAN)];
+        let x = Axis::new("time, s", Scale::Linear, [0.0, 2.0]);
+        let drawn = LineChart { x, moments, ..over_time(line(), Vec::new()) }.draw(260).unwrap();
+        let heights = heights_of(&["moment 0.51".to_owned(), "moment 0.5".to_owned()], &drawn.svg);
+        assert!(heights[1] < heights[0] && heights[0] < 50, "{heights:?}");
+        assert!(!drawn.svg.contains("moment 2.5") && !drawn.svg.contains("NaN"));
     }
 
     #[test]

@@ -3,17 +3,17 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use foxglove::Encode;
-use foxglove::messages::{FrameTransforms, SceneUpdate};
+use cdr::{CdrLe, Infinite};
 
+use super::ros::{MarkerArray, RosMessage, TfMessage};
 use super::scene::Scene;
 use super::topic::{Recorded, Stamps, Topic};
 
 /// Encapsulation header of plain little-endian CDR (version 1, OMG CDR).
 pub const CDR_LITTLE_ENDIAN: [u8; 4] = [0x00, 0x01, 0x00, 0x00];
-/// Encoding of the rig's own messages.
+/// Encoding of all messages.
 const MESSAGE_ENCODING: &str = "cdr";
-/// Encoding of the schemas of the rig's own topics.
+/// Encoding of all schemas.
 pub const SCHEMA_ENCODING: &str = "ros2msg";
 
 /// A channel of messages.
@@ -24,7 +24,7 @@ pub enum Channel {
     /// Poses of the frames of a 3-D view.
     Transforms,
     /// Shapes in these frames.
-    Entities,
+    Markers,
 }
 
 impl Channel {
@@ -36,7 +36,7 @@ impl Channel {
         match self {
             Self::Topic(topic) => topic as usize,
             Self::Transforms => Topic::ALL.len(),
-            Self::Entities => Topic::ALL.len() + 1,
+            Self::Markers => Topic::ALL.len() + 1,
         }
     }
 
@@ -44,7 +44,7 @@ impl Channel {
     pub fn for_topic(topic: Topic) -> Vec<Self> {
         match topic {
             Topic::State => vec![Self::Topic(topic), Self::Transforms],
-            Topic::Truth => vec![Self::Topic(topic), Self::Transforms, Self::Entities],
+            Topic::Truth => vec![Self::Topic(topic), Self::Transforms, Self::Markers],
             _ => vec![Self::Topic(topic)],
         }
     }
@@ -54,25 +54,24 @@ impl Channel {
 pub fn definitions() -> Vec<mcap::Channel<'static>> {
     let topics = Topic::ALL.map(|topic| {
         let (name, definition) = topic.definition();
-        let schema = foxglove::Schema::new(name, SCHEMA_ENCODING, definition.into_bytes());
-        (topic.name(), schema, MESSAGE_ENCODING.to_owned())
+        (topic.name(), name, definition)
     });
-    let views = [view::<FrameTransforms>(Scene::TRANSFORMS), view::<SceneUpdate>(Scene::ENTITIES)];
-    let channel = |(id, (topic, schema, message_encoding)): (u16, (&str, foxglove::Schema, String))| {
-        let foxglove::Schema { name, encoding, data } = schema;
+    let views = [view::<TfMessage>(Scene::TRANSFORMS), view::<MarkerArray>(Scene::MARKERS)];
+    let channel = |(id, (topic, name, definition)): (u16, (&str, String, String))| {
+        let (encoding, data) = (SCHEMA_ENCODING.to_owned(), definition.into_bytes().into());
         mcap::Channel {
             id,
             topic: topic.to_owned(),
             schema: Some(Arc::new(mcap::Schema { id, name, encoding, data })),
-            message_encoding,
+            message_encoding: MESSAGE_ENCODING.to_owned(),
             metadata: BTreeMap::new(),
         }
     };
     (1..).zip(topics.into_iter().chain(views)).map(channel).collect()
 }
 
-fn view<E: Encode>(topic: &'static str) -> (&'static str, foxglove::Schema, String) {
-    (topic, E::get_schema().expect("Foxglove's own messages have schemas"), E::get_message_encoding())
+fn view<M: RosMessage>(topic: &'static str) -> (&'static str, String, String) {
+    (topic, M::TYPE_NAME.to_owned(), M::DEFINITION.to_owned())
 }
 
 /// A message as its channel carries it.
@@ -124,17 +123,17 @@ impl Encoder {
             _ => None,
         };
         let Some(shown) = shown else { return Ok(()) };
-        put(self.foxglove(Channel::Transforms, &shown.transforms, shown.time_ns))?;
-        match &shown.entities {
-            Some(entities) => put(self.foxglove(Channel::Entities, entities, shown.time_ns)),
+        put(self.view(Channel::Transforms, &shown.transforms, shown.time_ns))?;
+        match &shown.markers {
+            Some(markers) => put(self.view(Channel::Markers, markers, shown.time_ns)),
             None => Ok(()),
         }
     }
 
-    fn foxglove(&mut self, channel: Channel, message: &impl Encode, publish_time_ns: u64) -> Encoded<'_> {
+    fn view(&mut self, channel: Channel, message: &impl RosMessage, publish_time_ns: u64) -> Encoded<'_> {
         self.bytes.clear();
-        if message.encode(&mut self.bytes).is_err() {
-            unreachable!("protobuf refuses only buffers that cannot grow");
+        if cdr::serialize_into::<_, _, _, CdrLe>(&mut self.bytes, message, Infinite).is_err() {
+            unreachable!("a buffer that grows takes every number, string and list");
         }
         Encoded { channel, sequence: 0, publish_time_ns, bytes: &self.bytes }
     }
@@ -153,7 +152,7 @@ mod tests {
             found.extend(Channel::for_topic(topic));
         }
         assert_eq!(definitions[Channel::Transforms.place()].topic, Scene::TRANSFORMS);
-        assert_eq!(definitions[Channel::Entities.place()].topic, Scene::ENTITIES);
+        assert_eq!(definitions[Channel::Markers.place()].topic, Scene::MARKERS);
         assert!((0..definitions.len()).all(|place| found.iter().any(|channel| channel.place() == place)));
     }
 }

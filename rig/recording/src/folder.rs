@@ -60,6 +60,11 @@ impl RunFolder {
         Ok(Self(folder))
     }
 
+    /// The folder of a run that is to be recorded in this file.
+    pub fn of_recording(recording: &Path) -> Self {
+        Self(recording.parent().map_or_else(PathBuf::new, Path::to_owned))
+    }
+
     /// Opens the folder of a past run.
     pub fn open(path: &Path) -> Result<Self, FolderError> {
         let folder = Self(path.to_owned());

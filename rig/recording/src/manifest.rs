@@ -9,6 +9,7 @@ use masseter_shared::clock;
 use masseter_shared::config::Scenario;
 use masseter_shared::realtime::scheduling::Obtained;
 use serde::{Deserialize, Serialize};
+use serde_json::json;
 
 use crate::circumstances::{DmaLatency, Ending, Machine, RunUsage};
 use crate::folder::RunFolder;
@@ -76,6 +77,18 @@ impl Manifest {
             usage: RunUsage::default(),
             ending: Ending::died("supervisor", UNJUDGED.to_owned()),
         }
+    }
+
+    /// What is known at the start beside the scenario, as JSON. Without what differs between runs in simulated time, whose
+    /// recordings are equal.
+    pub(crate) fn at_start(&self) -> String {
+        let mut known = json!({ "masseter": self.masseter, "motion_s": self.motion_s });
+        if self.clock == "rt" {
+            known["began"] = json!(self.began);
+            known["clock"] = json!(self.clock);
+            known["machine"] = json!(self.machine);
+        }
+        format!("{known:#}\n")
     }
 
     /// The first refused request for scheduling, with its remedy, and the process that made it.

@@ -1,6 +1,7 @@
 //! Reads a recording from its beginning in constant memory, also one that was cut short or damaged: every whole chunk is
 //! read, and every stretch that cannot be read is reported with its place.
 
+use std::borrow::Cow;
 use std::fs::File;
 use std::io::{self, BufReader, Read, Seek};
 use std::path::Path;
@@ -8,7 +9,8 @@ use std::sync::Arc;
 use std::vec;
 
 use masseter_shared::messages::LAYOUT_VERSION;
-use mcap::records::{MessageHeader, Record, op};
+use mcap::Attachment;
+use mcap::records::{AttachmentHeader, MessageHeader, Record, op};
 
 use super::chunk;
 use super::definitions::Definitions;
@@ -92,6 +94,7 @@ pub struct Reader<R = BufReader<File>> {
     /// The rest of the current chunk.
     unpacked: vec::IntoIter<Record<'static>>,
     definitions: Definitions,
+    attachments: Vec<Attachment<'static>>,
     chunks: Chunks,
     damage: Vec<Damage>,
     records: u64,
@@ -113,6 +116,7 @@ impl<R: Read + Seek> Reader<R> {
             walk: Walk::new(source)?,
             unpacked: Vec::new().into_iter(),
             definitions: Definitions::default(),
+            attachments: Vec::new(),
             chunks: Chunks::default(),
             damage: Vec::new(),
             records: 0,
@@ -133,6 +137,11 @@ impl<R: Read + Seek> Reader<R> {
     /// The channels defined so far, by their id.
     pub fn channels(&self) -> impl Iterator<Item = &mcap::Channel<'static>> {
         self.definitions.channels.values().map(Arc::as_ref)
+    }
+
+    /// The files attached so far.
+    pub fn attachments(&self) -> &[Attachment<'static>] {
+        &self.attachments
     }
 
     /// Bytes of the file.
@@ -188,6 +197,7 @@ impl<R: Read + Seek> Reader<R> {
                 self.records += 1;
                 match opcode {
                     op::CHUNK => self.open_chunk()?,
+                    op::ATTACHMENT => self.take_attachment(),
                     // Damage can turn other records into messages, and no checksum covers a single record.
                     op::MESSAGE => {
                         let reason = "messages outside of chunks ('mcap compress' packs them)";
@@ -221,6 +231,21 @@ impl<R: Read + Seek> Reader<R> {
                 let damage = self.walk.damaged(format!("a chunk that cannot be unpacked ({error})"));
                 self.skip(damage)
             }
+        }
+    }
+
+    /// Takes an attached file, if its checksum agrees.
+    fn take_attachment(&mut self) {
+        let body = self.walk.body();
+        if let Ok(Record::Attachment { header, data, crc }) = mcap::parse_record(op::ATTACHMENT, body)
+            && (crc == 0 || crc32fast::hash(&body[..body.len() - 4]) == crc)
+        {
+            let AttachmentHeader { log_time, create_time, name, media_type } = header;
+            let data = Cow::Owned(data.into_owned());
+            self.attachments.push(Attachment { log_time, create_time, name, media_type, data });
+        } else {
+            let damage = self.walk.damaged("an attached file that cannot be read".to_owned());
+            self.add(damage);
         }
     }
 

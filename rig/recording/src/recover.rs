@@ -1,7 +1,7 @@
 //! Writes the readable part of a damaged recording into a new, whole one.
 //!
-//! Messages and channels keep their bytes, numbers and times; schemas are numbered anew, since damage may have given
-//! two of them the same number. Attachments and metadata, which Masseter does not write, are not carried over.
+//! Messages, channels and attached files keep their bytes, numbers and times; schemas are numbered anew, since damage may
+//! have given two of them the same number. Metadata, which Masseter does not write, are not carried over.
 
 use std::collections::BTreeSet;
 use std::io::{Read, Seek, Write};
@@ -77,6 +77,7 @@ pub fn recover<R: Read + Seek, W: Write + Seek>(
         writer.write_to_known_channel(&header, &data)?;
         recovered.messages += 1;
     }
+    reader.attachments().iter().try_for_each(|attachment| writer.attach(attachment))?;
     writer.finish()?;
     Ok(recovered)
 }

@@ -1,18 +1,15 @@
-//! The mechanism for 3-D views: Foxglove's frame transforms and scene entities, made from `truth` and `state` at 60 Hz.
+//! The mechanism for 3-D views: transforms of frames and markers of ROS 2, made from `truth` and `state` at 60 Hz.
 //!
 //! Frames: `base`; in it `platform` (true), `platform_estimated` (by forward kinematics) and
-//! `platform_desired`. Entities: base triangle with its slides, the three legs, the three platforms, and the
+//! `platform_desired`. Markers: base triangle with its slides, the three legs, the three platforms, and the
 //! jaw's incisal point and condyles, which move with the true platform.
 
-use foxglove::messages::line_primitive::Type as LineType;
-use foxglove::messages::{
-    Color, FrameTransform, FrameTransforms, LinePrimitive, Point3, Pose as FoxglovePose, Quaternion,
-    SceneEntity, SceneUpdate, SpherePrimitive, Timestamp, TriangleListPrimitive, Vector3,
-};
 use masseter_shared::clock::SECOND_NS;
 use masseter_shared::config::JawConfig;
 use masseter_shared::geometry::{LEGS, Mechanism, Vec3};
 use masseter_shared::messages::{State, Truth};
+
+use super::ros::{Header, Marker, MarkerArray, Shape, TfMessage, Time, TransformStamped, Unused};
 
 /// Time between two updates, ns: the 60 Hz of a screen.
 const EVERY_NS: u64 = SECOND_NS / 60;
@@ -25,17 +22,17 @@ const DESIRED: &str = "platform_desired";
 const LINE_M: f64 = 0.003;
 const POINT_M: f64 = 0.006;
 
-const GREY: [f64; 4] = [0.45, 0.45, 0.5, 1.0];
-const BLUE: [f64; 4] = [0.0, 0.45, 0.7, 1.0];
-const ORANGE: [f64; 4] = [0.84, 0.37, 0.0, 0.5];
-const GREEN: [f64; 4] = [0.0, 0.62, 0.45, 0.5];
-const RED: [f64; 4] = [0.8, 0.2, 0.2, 1.0];
+const GREY: [f32; 4] = [0.45, 0.45, 0.5, 1.0];
+const BLUE: [f32; 4] = [0.0, 0.45, 0.7, 1.0];
+const ORANGE: [f32; 4] = [0.84, 0.37, 0.0, 0.5];
+const GREEN: [f32; 4] = [0.0, 0.62, 0.45, 0.5];
+const RED: [f32; 4] = [0.8, 0.2, 0.2, 1.0];
 
 /// The scene at one instant.
 pub(super) struct Shown {
     pub time_ns: u64,
-    pub transforms: FrameTransforms,
-    pub entities: Option<SceneUpdate>,
+    pub transforms: TfMessage,
+    pub markers: Option<MarkerArray>,
 }
 
 /// The scene of a mechanism, updated by its messages.
@@ -50,7 +47,7 @@ pub struct Scene {
 
 impl Scene {
     pub(super) const TRANSFORMS: &str = "/tf";
-    pub(super) const ENTITIES: &str = "/scene";
+    pub(super) const MARKERS: &str = "/scene";
 
     /// The scene of a mechanism and the jaw on it.
     pub fn new(mechanism: &Mechanism, jaw: &JawConfig) -> Self {
@@ -69,15 +66,15 @@ impl Scene {
         if !is_due(&mut self.next_truth_ns, time_ns, EVERY_NS) {
             return None;
         }
-        let mut entities = vec![self.legs(truth)];
+        let mut markers = self.legs(truth);
         if is_due(&mut self.next_still_ns, time_ns, STILL_EVERY_NS) {
-            entities.extend(self.still(time_ns));
+            markers.extend(self.still(time_ns));
         }
         let platform = transform(time_ns, TRUE, truth.position_m, truth.quaternion_wxyz);
         Some(Shown {
             time_ns,
-            transforms: FrameTransforms { transforms: vec![platform] },
-            entities: Some(SceneUpdate { deletions: Vec::new(), entities }),
+            transforms: TfMessage { transforms: vec![platform] },
+            markers: Some(MarkerArray { markers }),
         })
     }
 
@@ -91,47 +88,35 @@ impl Scene {
             transform(time_ns, ESTIMATED, state.estimated_position_m, state.estimated_quaternion_wxyz),
             transform(time_ns, DESIRED, state.desired_position_m, state.desired_quaternion_wxyz),
         ];
-        Some(Shown { time_ns, transforms: FrameTransforms { transforms }, entities: None })
+        Some(Shown { time_ns, transforms: TfMessage { transforms }, markers: None })
     }
 
     /// Legs from hinge to platform corner, with the hinges as points.
-    fn legs(&self, truth: &Truth) -> SceneEntity {
+    fn legs(&self, truth: &Truth) -> Vec<Marker> {
         let pose = masseter_shared::messages::pose_from_fields(truth.position_m, truth.quaternion_wxyz);
         let hinges: [Vec3; LEGS] = std::array::from_fn(|leg| self.mechanism.hinge(leg, truth.joint_m[leg]));
         let ends =
             hinges.iter().zip(self.mechanism.corners_at(&pose)).flat_map(|(hinge, corner)| [*hinge, corner]);
-        SceneEntity {
-            lines: vec![lines(LineType::LineList, ends, GREY)],
-            spheres: hinges.iter().map(|hinge| sphere(*hinge, GREY)).collect(),
-            ..entity("legs", BASE, truth.sampled_ns)
-        }
+        let legs = marker(Shape::LineList, GREY, ends);
+        let hinges = marker(Shape::SphereList, GREY, hinges);
+        part("legs", BASE, truth.sampled_ns, vec![legs, hinges])
     }
 
     /// The parts that do not move in their frames.
-    fn still(&self, time_ns: u64) -> Vec<SceneEntity> {
+    fn still(&self, time_ns: u64) -> Vec<Marker> {
         let [lowest, highest] = self.mechanism.strokes().slide_m;
         let slides = (0..LEGS).flat_map(|leg| [lowest, highest].map(|end| self.mechanism.hinge(leg, end)));
-        let centres = (0..LEGS).map(|leg| self.mechanism.hinge(leg, 0.0));
-        let base = SceneEntity {
-            lines: vec![lines(LineType::LineLoop, centres, GREY), lines(LineType::LineList, slides, BLUE)],
-            ..entity("base", BASE, time_ns)
+        let centres = std::array::from_fn(|leg| self.mechanism.hinge(leg, 0.0));
+        let slides = marker(Shape::LineList, BLUE, slides);
+        let base = part("base", BASE, time_ns, vec![closed_line(centres, GREY), slides]);
+        let corners = *self.mechanism.platform_corners();
+        let platform = |frame, colour| {
+            let shapes = vec![marker(Shape::TriangleList, colour, corners), closed_line(corners, colour)];
+            part(frame, frame, time_ns, shapes)
         };
-        let platform = |frame, colour| SceneEntity {
-            triangles: vec![TriangleListPrimitive {
-                points: self.mechanism.platform_corners().iter().map(|corner| point(*corner)).collect(),
-                color: Some(colour_of(colour)),
-                pose: Some(at(Vec3::zeros())),
-                ..Default::default()
-            }],
-            lines: vec![lines(LineType::LineLoop, self.mechanism.platform_corners().iter().copied(), colour)],
-            ..entity(frame, frame, time_ns)
-        };
-        let jaw = SceneEntity {
-            spheres: self.jaw_points.iter().map(|point| sphere(*point, RED)).collect(),
-            lines: vec![lines(LineType::LineLoop, self.jaw_points.iter().copied(), RED)],
-            ..entity("jaw", TRUE, time_ns)
-        };
-        vec![base, platform(TRUE, BLUE), platform(ESTIMATED, ORANGE), platform(DESIRED, GREEN), jaw]
+        let jaw = vec![marker(Shape::SphereList, RED, self.jaw_points), closed_line(self.jaw_points, RED)];
+        let jaw = part("jaw", TRUE, time_ns, jaw);
+        [base, platform(TRUE, BLUE), platform(ESTIMATED, ORANGE), platform(DESIRED, GREEN), jaw].concat()
     }
 }
 
@@ -156,60 +141,52 @@ fn is_due(next_ns: &mut u64, time_ns: u64, every_ns: u64) -> bool {
     due
 }
 
-fn timestamp(time_ns: u64) -> Timestamp {
-    Timestamp::new((time_ns / SECOND_NS) as u32, (time_ns % SECOND_NS) as u32)
+fn header(time_ns: u64, frame: &str) -> Header {
+    Header { stamp: Time::from_ns(time_ns), frame_id: frame.to_owned() }
 }
 
-fn transform(time_ns: u64, child: &str, [x, y, z]: [f64; 3], quaternion: [f64; 4]) -> FrameTransform {
-    let [qw, qx, qy, qz] = quaternion;
-    FrameTransform {
-        timestamp: Some(timestamp(time_ns)),
-        parent_frame_id: BASE.to_owned(),
+fn transform(time_ns: u64, child: &str, translation: [f64; 3], [w, x, y, z]: [f64; 4]) -> TransformStamped {
+    TransformStamped {
+        header: header(time_ns, BASE),
         child_frame_id: child.to_owned(),
-        translation: Some(Vector3 { x, y, z }),
-        rotation: Some(Quaternion { x: qx, y: qy, z: qz, w: qw }),
+        translation,
+        rotation_xyzw: [x, y, z, w],
     }
 }
 
-fn entity(id: &str, frame: &str, time_ns: u64) -> SceneEntity {
-    SceneEntity {
-        timestamp: Some(timestamp(time_ns)),
-        frame_id: frame.to_owned(),
-        id: id.to_owned(),
+/// The shapes of a part of the mechanism, numbered.
+fn part(name: &str, frame: &str, time_ns: u64, mut shapes: Vec<Marker>) -> Vec<Marker> {
+    for (id, shape) in (0..).zip(&mut shapes) {
+        (shape.ns, shape.id, shape.header) = (name.to_owned(), id, header(time_ns, frame));
+    }
+    shapes
+}
+
+fn closed_line(corners: [Vec3; 3], colour: [f32; 4]) -> Marker {
+    marker(Shape::LineStrip, colour, corners.into_iter().chain([corners[0]]))
+}
+
+fn marker(shape: Shape, color: [f32; 4], points: impl IntoIterator<Item = Vec3>) -> Marker {
+    let scale = match shape {
+        Shape::LineStrip | Shape::LineList => LINE_M,
+        Shape::SphereList => POINT_M,
+        Shape::TriangleList => 1.0,
+    };
+    Marker {
+        header: Header::default(),
+        ns: String::new(),
+        id: 0,
+        shape: shape as i32,
+        action: 0,
+        position: [0.0; 3],
+        orientation_xyzw: [0.0, 0.0, 0.0, 1.0],
+        scale: [scale; 3],
+        color,
+        lifetime: Time::default(),
         frame_locked: true,
-        ..Default::default()
+        points: points.into_iter().map(Into::into).collect(),
+        unused: Unused::default(),
     }
-}
-
-fn lines(kind: LineType, points: impl Iterator<Item = Vec3>, colour: [f64; 4]) -> LinePrimitive {
-    LinePrimitive {
-        r#type: kind.into(),
-        pose: Some(at(Vec3::zeros())),
-        thickness: LINE_M,
-        points: points.map(point).collect(),
-        color: Some(colour_of(colour)),
-        ..Default::default()
-    }
-}
-
-fn sphere(centre: Vec3, colour: [f64; 4]) -> SpherePrimitive {
-    let size = Some(Vector3 { x: POINT_M, y: POINT_M, z: POINT_M });
-    SpherePrimitive { pose: Some(at(centre)), size, color: Some(colour_of(colour)) }
-}
-
-fn at(place: Vec3) -> FoxglovePose {
-    FoxglovePose {
-        position: Some(Vector3 { x: place.x, y: place.y, z: place.z }),
-        orientation: Some(Quaternion { x: 0.0, y: 0.0, z: 0.0, w: 1.0 }),
-    }
-}
-
-fn point(place: Vec3) -> Point3 {
-    Point3 { x: place.x, y: place.y, z: place.z }
-}
-
-fn colour_of([r, g, b, a]: [f64; 4]) -> Color {
-    Color { r, g, b, a }
 }
 
 #[cfg(test)]
@@ -235,9 +212,9 @@ mod tests {
         });
         let shown: Vec<_> = shown.collect();
         assert_eq!(shown.len(), 60);
-        let entities = |shown: &Shown| shown.entities.as_ref().unwrap().entities.len();
-        assert_eq!(entities(&shown[0]), 6, "what stands still comes once a second");
-        assert!(shown[1..].iter().all(|shown| entities(shown) == 1));
+        let markers = |shown: &Shown| shown.markers.as_ref().unwrap().markers.len();
+        assert_eq!(markers(&shown[0]), 12, "what stands still comes once a second");
+        assert!(shown[1..].iter().all(|shown| markers(shown) == 2));
     }
 
     #[test]
@@ -250,9 +227,9 @@ mod tests {
             ..Default::default()
         };
         let shown = scene.truth(&truth).unwrap();
-        let points = &shown.entities.unwrap().entities[0].lines[0].points;
+        let points = &shown.markers.unwrap().markers[0].points;
         for ends in points.chunks(2) {
-            let [from, to] = [&ends[0], &ends[1]].map(|p| Vec3::new(p.x, p.y, p.z));
+            let [from, to] = [ends[0], ends[1]].map(Vec3::from);
             assert!(((to - from).norm() - 0.27).abs() < 1e-6, "a leg of {} m", (to - from).norm());
         }
     }

@@ -52,6 +52,13 @@ fn cycle(cycle: u64) -> Vec<Recorded> {
     ]
 }
 
+/// What the recordings below have attached.
+const ATTACHED: &[u8] = b"seed = 1\n";
+
+fn attach<W: Medium>(recorder: &mut Recorder<W>) {
+    recorder.attach("scenario.toml", "application/toml", ATTACHED).unwrap();
+}
+
 /// A whole recording.
 struct Whole {
     bytes: Vec<u8>,
@@ -61,6 +68,7 @@ struct Whole {
 static WHOLE: LazyLock<Whole> = LazyLock::new(|| {
     let mut medium = Cursor::new(Vec::new());
     let mut recorder = Recorder::new(&mut medium, scene()).unwrap();
+    attach(&mut recorder);
     let mut messages = Vec::new();
     for number in 1..=CYCLES {
         for message in cycle(number) {
@@ -82,6 +90,8 @@ static FLUSHED: LazyLock<Vec<(usize, usize)>> = LazyLock::new(|| {
     for flushes in 0..=CYCLES / CYCLES_A_FLUSH {
         medium = Cursor::new(Vec::new());
         let mut recorder = Recorder::new(&mut medium, scene()).unwrap();
+        attach(&mut recorder);
+        recorder.flush().unwrap();
         let mut messages = 0;
         for number in 1..=flushes * CYCLES_A_FLUSH {
             for message in cycle(number) {
@@ -101,6 +111,7 @@ static FLUSHED: LazyLock<Vec<(usize, usize)>> = LazyLock::new(|| {
 
 struct Read {
     messages: Vec<Recorded>,
+    attached: Vec<Vec<u8>>,
     damage: Vec<Damage>,
     cut_short: bool,
 }
@@ -111,7 +122,8 @@ fn read(bytes: &[u8]) -> Result<Read, ReadError> {
     while let Some(message) = reader.next_message()? {
         messages.push(message);
     }
-    Ok(Read { messages, damage: reader.damage().to_vec(), cut_short: reader.was_cut_short() })
+    let attached = reader.attachments().iter().map(|file| file.data.to_vec()).collect();
+    Ok(Read { messages, attached, damage: reader.damage().to_vec(), cut_short: reader.was_cut_short() })
 }
 
 fn recovered(bytes: &[u8]) -> (Recovered, Vec<u8>) {
@@ -124,6 +136,7 @@ fn recovered(bytes: &[u8]) -> (Recovered, Vec<u8>) {
 fn what_was_recorded_is_read() {
     let read = read(&WHOLE.bytes).unwrap();
     assert!(read.messages == WHOLE.messages);
+    assert_eq!(read.attached, [ATTACHED]);
     assert_eq!(read.damage, []);
     assert!(!read.cut_short);
 }
@@ -207,6 +220,7 @@ proptest! {
         let (_, safe) = FLUSHED.iter().rev().find(|(length, _)| *length <= cut).copied().unwrap_or_default();
         prop_assert!(read.messages.len() >= safe, "{} of {safe} messages", read.messages.len());
         prop_assert!(read.messages == WHOLE.messages[..read.messages.len()]);
+        prop_assert!(cut < FLUSHED[0].0 || read.attached == [ATTACHED]);
         prop_assert!(read.cut_short);
     }
 
@@ -217,6 +231,7 @@ proptest! {
         let (_, bytes) = recovered(bytes);
         let after = read(&bytes).unwrap();
         prop_assert!(after.messages == before.messages);
+        prop_assert_eq!(after.attached, [ATTACHED]);
         prop_assert_eq!(after.damage, []);
         prop_assert!(!after.cut_short);
     }
@@ -235,6 +250,7 @@ proptest! {
         let mut written = WHOLE.messages.iter();
         let all_written = read.messages.iter().all(|message| written.any(|known| known == message));
         prop_assert!(all_written, "a message that nobody wrote");
+        prop_assert!(read.attached.iter().all(|attached| attached == ATTACHED), "a file that nobody attached");
     }
 
     #[test]

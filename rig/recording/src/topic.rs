@@ -28,10 +28,10 @@ macro_rules! topics {
                 }
             }
 
-            /// Name and ROS 2 definition of the message type.
-            pub(super) fn definition(self) -> (&'static str, String) {
+            /// Name and definition of the message type, as ROS 2 has them.
+            pub(super) fn definition(self) -> (String, String) {
                 match self {
-                    $(Self::$name => (<$message>::TYPE_NAME, <$message>::schema())),*
+                    $(Self::$name => (<$message>::TYPE_NAME.replacen('/', "/msg/", 1), <$message>::schema())),*
                 }
             }
         }

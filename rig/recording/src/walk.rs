@@ -244,6 +244,15 @@ fn chunk_length(body: &[u8]) -> Option<u64> {
     data.checked_add(header as u64)
 }
 
+/// Length of an attachment by those of its name, its media type and its data.
+fn attachment_length(body: &[u8]) -> Option<u64> {
+    let name = u32::from_le_bytes(*body.get(16..)?.first_chunk()?) as usize;
+    let media_type = u32::from_le_bytes(*body.get(name.checked_add(20)?..)?.first_chunk()?) as usize;
+    let head = name.checked_add(media_type)?.checked_add(24)?;
+    let data = u64::from_le_bytes(*body.get(head..)?.first_chunk()?);
+    data.checked_add(head as u64 + 12)
+}
+
 /// Whether the lengths inside a record agree with its own. Only records between chunks and before the footer are
 /// checked: a wrong length there would hide the chunks behind, or the end.
 fn is_consistent(opcode: u8, body: &[u8]) -> bool {
@@ -257,6 +266,7 @@ fn is_consistent(opcode: u8, body: &[u8]) -> bool {
         op::HEADER => length_at(0)
             .and_then(|profile| Some(profile + length_at(profile.checked_add(4)?)? + 8))
             .is_some_and(|length| length == body.len()),
+        op::ATTACHMENT => attachment_length(body) == Some(body.len() as u64),
         op::FOOTER => body.len() == 20,
         op::DATA_END => body.len() == 4,
         op::SUMMARY_OFFSET => body.len() == 17,

@@ -4,17 +4,20 @@
 //! It waits for its medium; a process that must not wait records through a
 //! [`Backlog`](super::Backlog).
 
+use std::borrow::Cow;
 use std::error::Error;
-use std::fs::File;
+use std::fs::{self, File};
 use std::io::{self, BufWriter, Cursor, Seek, SeekFrom, Write};
 use std::path::Path;
 use std::sync::mpsc::{Receiver, SyncSender, channel, sync_channel};
 use std::thread::{self, JoinHandle};
 
 use mcap::records::MessageHeader;
-use mcap::{Compression, McapError, WriteOptions, Writer};
+use mcap::{Attachment, Compression, McapError, WriteOptions, Writer};
 
 use super::encoding::{Encoded, Encoder, definitions};
+use super::folder::RunFolder;
+use super::manifest::Manifest;
 use super::scene::Scene;
 use super::topic::Recorded;
 
@@ -23,15 +26,19 @@ use super::topic::Recorded;
 const CHUNK_BYTES: u64 = 600 << 10;
 /// zstd's fastest level: its ratio on these messages is within a tenth of the default level's.
 const COMPRESSION_LEVEL: u32 = 1;
+/// The profile in the header of a recording: its messages are those of ROS 2, so its tools open the file.
+const PROFILE: &str = "ros2";
 /// The name of this program in the header of a recording.
 const LIBRARY: &str = concat!("masseter ", env!("CARGO_PKG_VERSION"));
+/// A recorded motion with more bytes than this lies beside the recording alone: readers hold attached files in memory.
+const LONGEST_MOTION: u64 = 16 << 20;
 /// Bytes gathered before they go to the system.
 const BUFFER_BYTES: usize = 1 << 18;
 
 /// Why a recording cannot be written.
 #[derive(Debug, thiserror::Error)]
 pub enum WriteError {
-    /// The file could not be created.
+    /// The file could not be created, or what is attached not be read.
     #[error("cannot create the recording: {0}")]
     Create(#[from] io::Error),
     /// Writing failed.
@@ -66,6 +73,7 @@ pub(super) fn options() -> WriteOptions {
         .compression_threads(0)
         .chunk_size(Some(CHUNK_BYTES))
         .disable_seeking(true)
+        .profile(PROFILE)
         .library(LIBRARY)
 }
 
@@ -133,6 +141,21 @@ impl Recorder {
     pub fn create(path: &Path, scene: Scene) -> Result<Self, WriteError> {
         Self::new(DurableFile::create(path)?, scene)
     }
+
+    /// Creates the recording of a run, with what explains it attached: the scenario, the recorded motion that it plays,
+    /// and the circumstances at the start. A file that is cut short contains them.
+    pub fn of_run(folder: &RunFolder, scene: Scene) -> Result<Self, WriteError> {
+        let mut recorder = Self::create(&folder.recording(), scene)?;
+        let manifest = Manifest::read(folder)?;
+        recorder.attach("scenario.toml", "application/toml", &fs::read(folder.scenario())?)?;
+        let motion = fs::metadata(folder.motion());
+        if motion.is_ok_and(|file| file.len() <= LONGEST_MOTION) {
+            recorder.attach("motion.csv", "text/csv", &fs::read(folder.motion())?)?;
+        }
+        recorder.attach("circumstances.json", "application/json", manifest.at_start().as_bytes())?;
+        recorder.flush()?;
+        Ok(recorder)
+    }
 }
 
 impl<W: Medium> Recorder<W> {
@@ -152,6 +175,19 @@ impl<W: Medium> Recorder<W> {
         }
         writer.flush()?;
         Ok(Self { channels: Channels { writer, ids }, encoder: Encoder::new(scene) })
+    }
+
+    /// Attaches a file. It has no time, since runs in simulated time leave the same bytes whenever they are made.
+    pub fn attach(&mut self, name: &str, media_type: &str, data: &[u8]) -> Result<(), WriteError> {
+        let (name, media_type) = (name.to_owned(), media_type.to_owned());
+        let data = Cow::Borrowed(data);
+        Ok(self.channels.writer.attach(&Attachment {
+            log_time: 0,
+            create_time: 0,
+            name,
+            media_type,
+            data,
+        })?)
     }
 
     /// Appends a message that was received at `log_time_ns`, and its view in 3-D.

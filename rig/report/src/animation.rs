@@ -24,7 +24,9 @@ struct Animation {
     corners: [[f64; 3]; LEGS],
     /// Incisal point and condyles in the platform frame.
     jaw: [[f64; 3]; 3],
-    /// Time in s, then the actual and the desired pose of the platform and, where the actual pose is the true one, the
+    /// When the first frame was sampled, s of the recording.
+    began_s: f64,
+    /// Time in s since the first frame, then the actual and the desired pose of the platform and, where the actual pose is the true one, the
     /// estimated one, each as x y z, w x y z.
     frames: Vec<Vec<f64>>,
 }
@@ -41,6 +43,7 @@ pub(crate) fn json(scenario: &Scenario, figures: &Figures) -> Option<String> {
         slide_ends: mechanism.strokes().slide_m,
         corners: mechanism.platform_corners().map(Into::into),
         jaw: jaw_points(&scenario.jaw).map(Into::into),
+        began_s: first.sampled_ns.saturating_sub(figures.over_time.began_ns) as f64 / 1e9,
         frames: samples.iter().map(frame).collect(),
     };
     serde_json::to_string(&animation).ok()

@@ -1,11 +1,12 @@
 //! The report's charts: which values they show, and beside which limits.
 
+use masseter_controller::trajectory::closed_pose;
 use masseter_shared::config::Scenario;
-use masseter_shared::geometry::{AXIS_NAMES, LEGS};
+use masseter_shared::geometry::{AXIS_NAMES, LEGS, Mechanism, Vec3};
 use masseter_shared::schedule::CycleSchedule;
 
-use masseter_analysis::{Curve, Figures, IntervalFigures};
-use masseter_charts::{Axis, Drawn, Legend, Limit, Line, LineChart, Scale};
+use masseter_analysis::{Curve, EventRecord, FaultFigures, Figures, IntervalFigures};
+use masseter_charts::{Axis, Drawn, Legend, Limit, Line, LineChart, Moment, Scale, palette};
 
 /// Height of a chart over time, px.
 const LOW: u32 = 260;
@@ -28,6 +29,7 @@ pub(super) fn percentiles(scenario: &Scenario, figures: &Figures) -> Option<Draw
         y: Axis::fitted("µs", Scale::Log),
         lines: measured.map(line).collect(),
         limits: budgets(scenario),
+        moments: Vec::new(),
         legend: Legend::Beside,
     }
     .draw(HIGH)
@@ -45,7 +47,7 @@ fn budgets(scenario: &Scenario) -> Vec<Limit> {
 }
 
 /// The latest wake-ups over time; none under virtual time, where no wake-up is late.
-pub(super) fn jitter(figures: &Figures) -> Option<Drawn> {
+pub(super) fn jitter(scenario: &Scenario, figures: &Figures) -> Option<Drawn> {
     let over_time = &figures.over_time;
     let late = |name: &str, curve: &Curve| {
         Line::new(name, curve.iter().map(|&(at_s, late_ns)| (at_s, microseconds(late_ns))).collect())
@@ -56,7 +58,8 @@ pub(super) fn jitter(figures: &Figures) -> Option<Drawn> {
     }
     let lines =
         vec![late("controller", &over_time.controller_late_ns), late("plant", &over_time.plant_late_ns)];
-    chart_over_time(Axis::fitted("latest wake-up, µs", Scale::Log), lines, Vec::new())
+    let y = Axis::fitted("latest wake-up, µs", Scale::Log);
+    chart_over_time(scenario, figures, y, lines, Vec::new())
 }
 
 fn microseconds(ns: f64) -> f64 {
@@ -66,25 +69,52 @@ fn microseconds(ns: f64) -> f64 {
 /// Plots, each with its id in the page.
 type Plots<const N: usize> = [(&'static str, Option<Drawn>); N];
 
-/// The platform's displacement, desired and actual, and the distance between the two.
-pub(super) fn motion(figures: &Figures) -> Plots<2> {
-    let track = &figures.track;
-    let actual = figures.tracking.actual_source.adjective();
-    // Every chart has the time of the recording.
-    let began_s = track.began_ns.saturating_sub(figures.over_time.began_ns) as f64 / 1e9;
-    let in_run = |curve: &Curve| -> Curve {
-        in_unit(curve, 1e3).into_iter().map(|(at_s, value)| (at_s + began_s, value)).collect()
+/// Displacement of the incisal point from the closed jaw, desired and actual, and the distance between the two.
+pub(super) fn motion(scenario: &Scenario, figures: &Figures) -> Plots<2> {
+    let over_time = &figures.over_time;
+    let distance = Line::new("distance", in_unit(&over_time.distance_m, 1e3));
+    let chart = |label, lines| chart_over_time(scenario, figures, linear(label), lines, Vec::new());
+    let displacement = closed_incisal_m(scenario).and_then(|closed_m| {
+        let lines = |kind: &str, curves: &[Curve; 3]| {
+            let names = ["x", "y", "z"].into_iter().zip([palette::BLUE, palette::VERMILION, palette::GREEN]);
+            let line = |(((name, colour), curve), closed_m): (((&str, _), &Curve), &f64)| {
+                let displacement = |&(at_s, place_m): &(f64, f64)| (at_s, (place_m - closed_m) * 1e3);
+                Line::new(&format!("{name} {kind}"), curve.iter().map(displacement).collect())
+                    .coloured(colour)
+            };
+            names.zip(curves).zip(&closed_m).map(line).collect::<Vec<_>>()
+        };
+        let desired = lines("desired", &over_time.desired_incisal_m).into_iter().map(Line::wide);
+        let actual = lines(figures.tracking.actual_source.adjective(), &over_time.actual_incisal_m);
+        chart("incisal point from closed, mm", desired.chain(actual).collect())
+    });
+    [("motion", displacement), ("error", chart("incisal point from desired, mm", vec![distance]))]
+}
+
+/// Place of the incisal point when the jaw is closed, base frame; none for a scenario without a closed pose, which no run
+/// has.
+fn closed_incisal_m(scenario: &Scenario) -> Option<[f64; 3]> {
+    let mechanism = Mechanism::new(&scenario.mechanism).ok()?;
+    let closed = closed_pose(&scenario.jaw, &mechanism).ok()?;
+    let incisal = Vec3::from(scenario.jaw.reference_point_m);
+    Some((closed.translation.vector + closed.rotation * incisal).into())
+}
+
+/// The first strike of every fault, and the event that began the first safe stop.
+fn moments(scenario: &Scenario, figures: &Figures) -> Vec<Moment> {
+    let moment = |name: String, time_ns: u64| {
+        let at = time_ns.saturating_sub(figures.over_time.began_ns) as f64 / 1e9;
+        Moment { name: format!("{name}, {at:.3} s"), at }
     };
-    let pair = |(axis, name): (usize, &str)| {
-        [("desired", &track.desired_m), (actual, &track.actual_m)]
-            .map(|(kind, curves)| Line::new(&format!("{name} {kind}"), in_run(&curves[axis])))
+    let strike = |fault: &FaultFigures| {
+        let declared = scenario.faults.get(fault.number - 1)?;
+        Some(moment(format!("fault {}: {declared}", fault.number), fault.struck_ns?))
     };
-    let lines = ["x", "y", "z"].into_iter().enumerate().flat_map(pair).collect();
-    let distance = Line::new("distance", in_run(&track.distance_m));
-    [
-        ("motion", chart_over_time(linear("displacement of the platform, mm"), lines, Vec::new())),
-        ("error", chart_over_time(linear("distance from desired, mm"), vec![distance], Vec::new())),
-    ]
+    let stop = figures.events.iter().find(|event| event.begins_stop());
+    let detection = |EventRecord { source, cause, time_ns, .. }: &EventRecord| {
+        moment(format!("safe stop: {source}, {cause}"), *time_ns)
+    };
+    figures.faults.iter().filter_map(strike).chain(stop.map(detection)).collect()
 }
 
 /// Positions of slides and legs, velocities and forces, against their limits.
@@ -94,7 +124,8 @@ pub(super) fn actuators(scenario: &Scenario, figures: &Figures) -> Plots<4> {
     let (slide, leg) = (&scenario.drives.slide, &scenario.drives.leg);
     let axes = |label: &str, bands: &[Curve], first: usize, unit: f64, limits: Vec<Limit>| {
         let line = |(axis, band)| Line::new(AXIS_NAMES[first + axis], in_unit(band, unit));
-        chart_over_time(linear(label), bands.iter().enumerate().map(line).collect(), limits)
+        let lines = bands.iter().enumerate().map(line).collect();
+        chart_over_time(scenario, figures, linear(label), lines, limits)
     };
     let stroke = |[lowest, highest]: [f64; 2]| {
         vec![limit("lower end", &[lowest * 1e3]), limit("upper end", &[highest * 1e3])]
@@ -114,15 +145,24 @@ pub(super) fn actuators(scenario: &Scenario, figures: &Figures) -> Plots<4> {
 }
 
 /// Share of each bus in use.
-pub(super) fn bus_load(figures: &Figures) -> Option<Drawn> {
+pub(super) fn bus_load(scenario: &Scenario, figures: &Figures) -> Option<Drawn> {
     let loads = figures.over_time.bus_load.iter().enumerate();
     let line = |(bus, load): (usize, &Curve)| Line::new(&format!("can{bus}"), in_unit(load, 100.0));
-    chart_over_time(linear("bus load, %"), loads.map(line).collect(), vec![limit("full", &[100.0])])
+    let full = vec![limit("full", &[100.0])];
+    chart_over_time(scenario, figures, linear("bus load, %"), loads.map(line).collect(), full)
 }
 
-fn chart_over_time(y: Axis, lines: Vec<Line>, limits: Vec<Limit>) -> Option<Drawn> {
-    let x = Axis::fitted("time, s", Scale::Linear).including(0.0);
-    LineChart { title: String::new(), x, y, lines, limits, legend: Legend::Beside }.draw(LOW)
+/// A chart over the whole run, with its moments.
+fn chart_over_time(
+    scenario: &Scenario,
+    figures: &Figures,
+    y: Axis,
+    lines: Vec<Line>,
+    limits: Vec<Limit>,
+) -> Option<Drawn> {
+    let x = Axis::new("time, s", Scale::Linear, [0.0, figures.over_time.duration_s]);
+    let moments = moments(scenario, figures);
+    LineChart { title: String::new(), x, y, lines, limits, moments, legend: Legend::Beside }.draw(LOW)
 }
 
 fn linear(label: &str) -> Axis {

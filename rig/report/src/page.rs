@@ -37,11 +37,11 @@ pub(crate) fn html(manifest: &Manifest, figures: &Figures, verdict: &Verdict) ->
         figures,
         verdict,
         animation: animation::json(scenario, figures),
-        motions: charts::motion(figures),
+        motions: charts::motion(scenario, figures),
         actuators: charts::actuators(scenario, figures),
         percentiles: charts::percentiles(scenario, figures),
-        jitter: charts::jitter(figures),
-        bus_load: charts::bus_load(figures),
+        jitter: charts::jitter(scenario, figures),
+        bus_load: charts::bus_load(scenario, figures),
         time_line: time_line::svg(figures),
     };
     page.render()

@@ -83,7 +83,7 @@
     platform(frame, ACTUAL, COLOURS.actual, 3);
     // Without truth the estimate is the actual pose.
     if (frame.length > ESTIMATED) platform(frame, ESTIMATED, COLOURS.estimated, 2, [8, 8]);
-    clock.textContent = at.toFixed(2) + ' s';
+    clock.textContent = (animation.began_s + at).toFixed(2) + ' s';
     time.value = end > 0 ? at / end : 0;
   }
 

@@ -67,6 +67,7 @@ fn loci<'a>(study: &Study, found: impl Iterator<Item = &'a Solution>) -> LineCha
         y: Axis::new("z (up), mm", Scale::Linear, WINDOW_MM[1]),
         lines: circles.into_iter().map(circle).chain(triangles).collect(),
         limits: Vec::new(),
+        moments: Vec::new(),
         legend: Legend::Inside(SeriesLabelPosition::UpperRight),
     }
 }

@@ -36,6 +36,7 @@ fn panel(title: &str, share: impl Fn(Solver, Guesses) -> Share) -> LineChart {
         y: Axis::new("share of guesses, %", Scale::Linear, [0.0, 102.0]),
         lines: COMPARED.into_iter().zip(SOLVER_COLOURS).map(line).collect(),
         limits: Vec::new(),
+        moments: Vec::new(),
         legend: Legend::Inside(SeriesLabelPosition::LowerLeft),
     }
 }

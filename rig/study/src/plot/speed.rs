@@ -38,6 +38,7 @@ fn iterations(study: &Study) -> LineChart {
         y: Axis::new("share of guesses solved, %", Scale::Linear, [0.0, 102.0]),
         lines: COMPARED.into_iter().zip(SOLVER_COLOURS).map(line).collect(),
         limits: Vec::new(),
+        moments: Vec::new(),
         legend: Legend::Inside(SeriesLabelPosition::LowerRight),
     }
 }

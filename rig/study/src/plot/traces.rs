@@ -39,6 +39,7 @@ fn course(disagreement: &Disagreement) -> LineChart {
         y: Axis::fitted("error f₁² + f₂² + f₃², cm²", Scale::Log).including(1.0),
         lines: named.zip(SOLVER_COLOURS).map(line).collect(),
         limits: Vec::new(),
+        moments: Vec::new(),
         legend: Legend::Inside(SeriesLabelPosition::MiddleRight),
     }
 }
@@ -54,6 +55,7 @@ fn last_cycles(errors_cm2: &[f64]) -> LineChart {
         y: Axis::fitted("", Scale::Linear),
         lines: vec![Line::new("", points.collect()).coloured(colour).marked()],
         limits: Vec::new(),
+        moments: Vec::new(),
         legend: Legend::Inside(SeriesLabelPosition::UpperRight),
     }
 }
