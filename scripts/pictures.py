@@ -20,7 +20,7 @@ import pyte
 # Wider and higher than all that is said.
 COLUMNS, LINES = 122, 20
 WIDTH_PX = 1000
-MOST_BYTES = 150_000
+MOST_BYTES = 200_000
 # The time that a page has for its scripts, ms.
 SCRIPTS_MS = 2000
 

@@ -49,20 +49,25 @@ fn open(browser: &Path, page: &Path, profile: &Path) -> Output {
         .expect("the browser starts")
 }
 
+/// The time that the animation shows in a document, s.
+fn clock_s(output: &Output) -> Option<f64> {
+    let document = String::from_utf8_lossy(&output.stdout);
+    document.split("id=\"clock\">").nth(1)?.split(' ').next()?.parse().ok()
+}
+
 #[test]
 fn the_page_works_in_a_browser() {
     let Some(browser) = browser() else { return };
     let workspace = Workspace::new("duration_s = 2.0");
     assert_eq!(workspace.run_virtual(&[]).status.code(), Some(0));
     let page = workspace.run_folder().join("report.html");
-    let output = open(&browser, &page, &workspace.file("profile"));
+    // The animation plays: its clock has left the beginning. A browser beside much other work may draw no frame.
+    let mut openings = (0..5).map(|_| open(&browser, &page, &workspace.file("profile")));
+    let output = openings.find(|output| clock_s(output) > Some(0.0)).expect("the animation plays");
     let document = String::from_utf8_lossy(&output.stdout);
     for id in ELEMENTS {
         assert!(document.contains(&format!("id=\"{id}\"")), "{id} is missing: {}", stderr(&output));
     }
-    // The animation plays: its clock has left the beginning.
-    let clock = document.split("id=\"clock\">").nth(1).and_then(|rest| rest.split(' ').next()).unwrap();
-    assert!(clock.parse::<f64>().unwrap() > 0.0, "{clock}");
     assert!(!stderr(&output).contains("CONSOLE"), "{}", stderr(&output));
     let offline = document.replace("http://www.w3.org/2000/svg", "");
     for outside in ["http://", "https://", "src=", "<link", "@import"] {

@@ -140,6 +140,13 @@ mod tests {
     }
 
     #[test]
+    fn an_axis_on_its_way_does_not_stop_first() {
+        let profile = Profile::to(0, Motion { position_m: 0.2, velocity_m_s: 0.05 }, 0.25, &LIMITS);
+        let at = profile.at(20_000_000);
+        assert!((at.velocity_m_s - 0.07).abs() < 1e-12, "{at:?}");
+    }
+
+    #[test]
     fn a_stop_takes_the_way_of_its_ramp() {
         let profile = Profile::stop(0, Motion { position_m: 0.27, velocity_m_s: 0.2 }, 10.0);
         assert!(!profile.is_over(19_000_000) && profile.is_over(21_000_000));

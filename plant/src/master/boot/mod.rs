@@ -190,7 +190,6 @@ impl Boot {
     pub(super) fn expire(&mut self, now_ns: u64) -> Result<(), Failure> {
         if self.is_under_way() {
             self.client.expire(now_ns)?;
-            self.has_repeated |= self.client.is_repeating();
             return Ok(());
         }
         let is_late = self.phase == BootPhase::Starting && self.waited_ns(now_ns) > START_WITHIN_NS;
@@ -309,4 +308,16 @@ fn in_fault(statusword: u32) -> bool {
 /// A value as an unsigned little-endian number.
 fn number(value: Expedited) -> u32 {
     value.data().iter().rfold(0, |number, &byte| number << 8 | u32::from(byte))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_drive_that_is_waited_for_is_reset_twice_a_second() {
+        let mut boot = Boot::new(NodeId::new(4).unwrap(), &Scenario::default(), 3, 0);
+        let resets: Vec<_> = (0..1600).filter(|ms| boot.command(ms * MILLISECOND_NS).is_some()).collect();
+        assert_eq!(resets, [500, 1000, 1500]);
+    }
 }
