@@ -137,7 +137,8 @@ fn parse() -> Cli {
 /// reports take it from the folder.
 fn keep_files_private(verb: &Verb) {
     umask(match verb {
-        Verb::Controller(_) | Verb::Recorder(_) => return,
+        // What init lays down is public.
+        Verb::Controller(_) | Verb::Recorder(_) | Verb::Init(_) => return,
         Verb::Run(args) => args.readable_by.umask(),
         Verb::Report(args) => args.umask(),
         _ => Readers::Owner.umask(),

@@ -32,13 +32,27 @@ pub(crate) struct InitArgs {
 /// Writes every file, and prints the next command.
 pub(crate) fn init(InitArgs { folder }: &InitArgs) -> anyhow::Result<Exit> {
     refuse_content(folder)?;
-    for (name, content, about) in FILES {
+    for (index, (name, content, _)) in FILES.iter().enumerate() {
         let path = folder.join(name);
-        write(&path, content).with_context(|| format!("cannot write {}", path.display()))?;
-        result_line!("{}: {about}", path.display())?;
+        if let Err(error) = write(&path, content) {
+            // So that the same command can be given again.
+            FILES[..=index].iter().for_each(|(name, ..)| drop(fs::remove_file(folder.join(name))));
+            return Err(error).with_context(|| format!("cannot write {}", path.display()));
+        }
     }
-    result_line!("next: masseter run {}", folder.join(SCENARIO).display())?;
+    for (name, _, about) in FILES {
+        result_line!("{}: {about}", folder.join(name).display())?;
+    }
+    result_line!("next: masseter run {}", quoted(&folder.join(SCENARIO)))?;
     Ok(Exit::Passed)
+}
+
+/// A path as a shell takes it for one word that is no option.
+fn quoted(path: &Path) -> String {
+    let text = path.display().to_string();
+    let text = if text.starts_with('-') { format!("./{text}") } else { text };
+    let is_plain = |character: char| character.is_alphanumeric() || "/._-+,:@%".contains(character);
+    if text.chars().all(is_plain) { text } else { format!("'{}'", text.replace('\'', "'\\''")) }
 }
 
 /// Refuses a folder with anything in it.
@@ -61,4 +75,21 @@ fn refuse_content(folder: &Path) -> anyhow::Result<()> {
 fn write(path: &Path, content: &str) -> std::io::Result<()> {
     path.parent().map_or(Ok(()), fs::create_dir_all)?;
     File::create_new(path)?.write_all(content.as_bytes())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_next_command_is_one_that_a_shell_runs() {
+        for (path, expected) in [
+            ("rig/scenario.toml", "rig/scenario.toml"),
+            ("my rig; rm -x/s.toml", "'my rig; rm -x/s.toml'"),
+            ("it's/s.toml", "'it'\\''s/s.toml'"),
+            ("-dash/s.toml", "./-dash/s.toml"),
+        ] {
+            assert_eq!(quoted(Path::new(path)), expected);
+        }
+    }
 }

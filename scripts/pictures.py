@@ -50,11 +50,11 @@ def play(masseter, folder):
     arguments = ["run", "--clock", "lockstep", "--out", "run"]
     process, terminal = pty.fork()
     if process == 0:
+        termios.tcsetwinsize(0, (LINES, COLUMNS))
         os.chdir(folder)
         # With NO_COLOR or CI set, colours are others than a user's.
         environment = {name: value for name, value in os.environ.items() if name not in ("CI", "NO_COLOR")}
         os.execve(masseter, ["masseter", *arguments], environment | {"TERM": "xterm-256color"})
-    termios.tcsetwinsize(terminal, (LINES, COLUMNS))
     screen = pyte.Screen(COLUMNS, LINES)
     stream = pyte.ByteStream(screen)
     stream.feed(f"$ masseter {' '.join(arguments)}\r\n".encode())

@@ -20,7 +20,9 @@ pub(crate) enum Kind {
 
 /// The arguments.
 #[derive(Debug, Clone, Args)]
-#[command(after_help = "Examples:\n  masseter bench loop\n  masseter bench loop ipc rate --out figures")]
+#[command(
+    after_help = "Examples:\n  masseter bench loop\n  masseter bench loop ipc rate simulated --out figures"
+)]
 pub(crate) struct BenchArgs {
     /// What to measure
     #[arg(required = true, value_enum)]

@@ -14,9 +14,6 @@ use tempfile::TempDir;
 
 use crate::machine::interrupts::Interrupts;
 
-/// Time between two checks whether a run has ended; long, since the checks disturb the run.
-const CHECK_EVERY: Duration = Duration::from_millis(50);
-
 /// The user stopped the bench.
 #[derive(Debug, thiserror::Error)]
 #[error("interrupted")]
@@ -30,8 +27,13 @@ pub(super) struct PlayedRun {
 }
 
 impl PlayedRun {
-    /// Plays the scenario by this clock.
-    pub(super) fn make(scenario: &Scenario, clock: &str, interrupts: &Interrupts) -> anyhow::Result<Self> {
+    /// Plays the scenario by this clock, and checks this often whether the run has ended.
+    pub(super) fn make(
+        scenario: &Scenario,
+        clock: &str,
+        check_every: Duration,
+        interrupts: &Interrupts,
+    ) -> anyhow::Result<Self> {
         let scratch = tempfile::tempdir().context("cannot create a folder for the runs")?;
         let file = scratch.path().join("scenario.toml");
         fs::write(&file, scenario.to_toml()).context("cannot write the scenario")?;
@@ -46,7 +48,7 @@ impl PlayedRun {
             .process_group(0)
             .spawn()
             .context("cannot start a run")?;
-        let status = wait_for(&mut run, interrupts)?;
+        let status = wait_for(&mut run, check_every, interrupts)?;
         let played = Self { scratch, status };
         if !played.folder().join("summary.json").exists() {
             bail!("the run left no summary: {}", fs::read_to_string(errors)?.trim());
@@ -61,7 +63,7 @@ impl PlayedRun {
 }
 
 /// Waits for a run. Each interrupt is passed on to the run; the bench ends after it.
-fn wait_for(run: &mut Child, interrupts: &Interrupts) -> anyhow::Result<ExitStatus> {
+fn wait_for(run: &mut Child, check_every: Duration, interrupts: &Interrupts) -> anyhow::Result<ExitStatus> {
     let mut passed_on = 0;
     loop {
         if let Some(status) = run.try_wait()? {
@@ -72,6 +74,6 @@ fn wait_for(run: &mut Child, interrupts: &Interrupts) -> anyhow::Result<ExitStat
             let _ = kill_process(Pid::from_child(run), Signal::TERM);
             passed_on += 1;
         }
-        clock::sleep(CHECK_EVERY);
+        clock::sleep(check_every);
     }
 }

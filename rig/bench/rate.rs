@@ -4,6 +4,8 @@
 //! Each round of a rate is a run with three processes; the figures come from its recording. The run's verdict is not used,
 //! except to find out whether the machine stalled.
 
+use std::time::Duration;
+
 use anyhow::Context;
 use masseter_analysis::{Analysis, Code, Figures};
 use masseter_recording::{Manifest, Reader, RunFolder};
@@ -22,6 +24,8 @@ const RATES_HZ: [u32; 5] = [1000, 2000, 5000, 10_000, 20_000];
 const MOTION_S: f64 = 2.0;
 /// Silence after which the rig stops, ms: at every rate that of a run at 1 kHz.
 const TIMEOUT_MS: u32 = 20;
+/// Time between two checks whether a run has ended; long, since the checks disturb the run.
+const CHECK_EVERY: Duration = Duration::from_millis(50);
 /// The intervals that are compared, with their names in the figures of a run. The last carries the shares.
 const INTERVALS: [(&str, &str); 3] = [
     ("wake-up", "controller wake-up"),
@@ -105,7 +109,7 @@ fn scenario(rate_hz: u32, cores: [usize; 2]) -> Scenario {
 
 /// Makes a run at that rate.
 fn run_at(rate_hz: u32, cores: [usize; 2], interrupts: &Interrupts) -> anyhow::Result<Run> {
-    let played = PlayedRun::make(&scenario(rate_hz, cores), "rt", interrupts)
+    let played = PlayedRun::make(&scenario(rate_hz, cores), "rt", CHECK_EVERY, interrupts)
         .with_context(|| format!("a run at {rate_hz} Hz"))?;
     let folder = RunFolder::open(&played.folder())?;
     let manifest = Manifest::read(&folder)?;

@@ -4,6 +4,7 @@
 //! round trip over bare iceoryx2: the least that a cycle of two processes can take.
 
 use std::fs;
+use std::time::Duration;
 
 use anyhow::{Context, ensure};
 use masseter_shared::clock;
@@ -19,6 +20,8 @@ use crate::machine::interrupts::Interrupts;
 
 /// Motion of a run, s; start and report are a small part of so long a run.
 const MOTION_S: f64 = 30.0;
+/// Time between two checks whether a run has ended.
+const CHECK_EVERY: Duration = Duration::from_millis(2);
 
 pub(super) fn measure(rounds: u32, cores: [usize; 2]) -> anyhow::Result<Comparison> {
     const LOCKSTEP: &str = "lockstep";
@@ -26,7 +29,7 @@ pub(super) fn measure(rounds: u32, cores: [usize; 2]) -> anyhow::Result<Comparis
     const BARE: &str = "bare iceoryx2, round trip";
     let interrupts = Interrupts::listen().context("cannot listen for signals")?;
     let interrupts_seen = &interrupts;
-    let run = |clock| -> Turn { Box::new(move || Ok(per_cycle(clock, interrupts_seen)?.into())) };
+    let run = |clock| -> Turn { Box::new(move || Ok(per_cycle(clock, cores, interrupts_seen)?.into())) };
     let turns = vec![
         (LOCKSTEP, run(LOCKSTEP)),
         (VIRTUAL, run(VIRTUAL)),
@@ -42,12 +45,13 @@ pub(super) fn measure(rounds: u32, cores: [usize; 2]) -> anyhow::Result<Comparis
 }
 
 /// Wall time per cycle, once: a round has one run.
-fn per_cycle(clock: &str, interrupts: &Interrupts) -> anyhow::Result<Durations> {
-    let scenario =
+fn per_cycle(clock: &str, cores: [usize; 2], interrupts: &Interrupts) -> anyhow::Result<Durations> {
+    let mut scenario =
         Scenario { name: "simulated".to_owned(), duration_s: Some(MOTION_S), ..Scenario::default() };
+    scenario.realtime.cores = cores;
     let from_ns = clock::now_ns();
-    let run =
-        PlayedRun::make(&scenario, clock, interrupts).with_context(|| format!("a run by --clock {clock}"))?;
+    let run = PlayedRun::make(&scenario, clock, CHECK_EVERY, interrupts)
+        .with_context(|| format!("a run by --clock {clock}"))?;
     let wall_ns = clock::now_ns() - from_ns;
     let code = run.status.code();
     ensure!(code == Some(Exit::Passed as i32), "a run by --clock {clock} ended with {code:?} instead of 0");

@@ -1,5 +1,7 @@
 //! A comparison as text for a terminal.
 
+use masseter_shared::wording::counted;
+
 use super::candidate::{Ratio, Spread};
 use super::comparison::Comparison;
 
@@ -13,7 +15,10 @@ pub(super) fn text(comparison: &Comparison) -> String {
         candidates.iter().map(|candidate| candidate.name.clone()).chain(ratios.iter().map(ratio_name));
     let width = names.map(|name| name.chars().count()).max().unwrap_or(0);
     let row = |name: &str, figures: String| format!("  {name:<width$} {figures}\n");
-    let mut text = format!("\n{bench}: {measures}\nmedian (minimum–maximum) of {rounds} rounds, µs\n");
+    let mut text = format!(
+        "\n{bench}: {measures}\nmedian (minimum–maximum) of {}, µs\n",
+        counted(rounds as u64, "round")
+    );
     for candidate in candidates {
         text += &row(&candidate.name, percentiles(&candidate.percentiles, 1e-3) + &of_rounds(candidate.n));
         if !candidate.shares.is_empty() {

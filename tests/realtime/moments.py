@@ -80,7 +80,9 @@ class Rigs:
             moment = moment_of(run, children, self.clock)
             was_there = rig.poll() is None and victim is not None and lives(victim)
             if was_there:
-                send(victim, how, stop_s)
+                was_there = send(victim, how, stop_s)
+                # The run may have gone on until the signal came.
+                moment = "end" if moment_of(run, children, self.clock) == "end" and role == "supervisor" else moment
             self.wait(rig, children, f"{role} hit by SIG{how} in {moment}")
             environment = {**os.environ, "XDG_RUNTIME_DIR": runtime}
             if role == "supervisor" and how == "KILL":
@@ -156,17 +158,20 @@ class Rigs:
 
 
 def send(victim, how, stop_s):
-    """Kills the process, or stops it for a time."""
+    """Kills the process, or stops it for a time; returns whether it was there."""
     try:
         if how == "KILL":
             os.kill(victim, signal.SIGKILL)
         elif how == "STOP":
             os.kill(victim, signal.SIGSTOP)
             time.sleep(stop_s)
-            os.kill(victim, signal.SIGCONT)
+            with contextlib.suppress(ProcessLookupError):
+                # The supervisor may have killed it.
+                os.kill(victim, signal.SIGCONT)
     except ProcessLookupError:
-        # Its end came in the last moment, or the supervisor has killed it.
-        pass
+        # Its end came in the last moment.
+        return False
+    return True
 
 
 def moment_of(run, children, clock):

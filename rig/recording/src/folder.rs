@@ -30,7 +30,7 @@ pub struct RunFolder(PathBuf);
 #[derive(Debug, thiserror::Error)]
 pub enum FolderError {
     /// It is no run folder.
-    #[error("{} is no run folder: it holds no recording.mcap", .0.display())]
+    #[error("{} is no folder with a recording.mcap; name the folder of a run", .0.display())]
     NoRun(PathBuf),
     /// It could not be made.
     #[error(transparent)]

@@ -26,7 +26,7 @@ use super::topic::Recorded;
 const CHUNK_BYTES: u64 = 600 << 10;
 /// zstd's fastest level: its ratio on these messages is within a tenth of the default level's.
 const COMPRESSION_LEVEL: u32 = 1;
-/// The profile in the header of a recording: its messages are those of ROS 2, so its tools open the file.
+/// The profile in the header of a recording: its messages have ROS 2's encoding and definitions.
 const PROFILE: &str = "ros2";
 /// The name of this program in the header of a recording.
 const LIBRARY: &str = concat!("masseter ", env!("CARGO_PKG_VERSION"));

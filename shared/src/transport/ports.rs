@@ -34,8 +34,8 @@ const KEPT_FOR_THE_NEWEST: usize = 4;
 /// it has, the newest found so far, and the next.
 const MAX_HELD: usize = 3;
 /// Longest wait for another process that makes the same part of the domain: that process may be stopped for a moment, or
-/// starved.
-const CREATION_TIMEOUT: Duration = Duration::from_secs(5);
+/// starved. Shorter than the time in which a process must end.
+const CREATION_TIMEOUT: Duration = Duration::from_secs(3);
 
 /// A process's access to a domain.
 #[derive(Debug)]
