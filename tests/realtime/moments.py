@@ -43,7 +43,7 @@ END_S = 45.0
 TURN = ".turn"
 VERIFY_CODES = {0: "complete", 6: "cut short"}
 TYPED = range(1, 7)
-PASSED, DIED = "PASS", "DIED"
+PASSED = "PASS"
 
 # What is left of a run: its exit code, the verdict's word and reason, its digest, the recording, and how that verifies.
 End = collections.namedtuple("End", "code word reason digest recording verified")
@@ -56,6 +56,8 @@ class Rigs:
         self.masseter, self.clock, self.how = masseter, clock, how
         # In real time no two runs are equal.
         self.reference = None if clock == "rt" else self.undisturbed("virtual")[1]
+        if self.reference and not (self.reference.code == 0 and self.reference.word == PASSED):
+            raise SystemExit(f"the reference did not pass: {self.reference.word}: {self.reference.reason}")
 
     def options(self, clock):
         is_impatient = clock == "lockstep" and self.how == "STOP"
@@ -152,7 +154,7 @@ class Rigs:
         if how == "KILL" and role == "recorder" and not self.reference.recording.startswith(end.recording):
             return "the recording is not the beginning of the reference"
         # Without a reason no process had reported ready.
-        if how == "STOP" and end.code and end.reason and not (DIED in end.word and role in end.reason):
+        if how == "STOP" and end.code and end.reason and not end.reason.startswith(f"the {role} died"):
             return "the reason does not name the stopped process"
         return None
 

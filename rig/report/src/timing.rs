@@ -89,7 +89,7 @@ impl Display for Timing {
             TimingWord::Held => f.write_str("held"),
             TimingWord::Disturbed => write!(
                 f,
-                "disturbed by the machine ({} of {} cycles, {:.2} %)",
+                "disturbed by the machine ({} of {} cycles of both loops, {:.2} %)",
                 grouped(*lost),
                 grouped(*cycles),
                 self.lost_percent()

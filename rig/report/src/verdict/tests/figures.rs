@@ -222,7 +222,7 @@ fn cycles_that_the_rig_missed_fail_a_run_and_those_that_the_machine_lost_do_not(
     use TimingWord::{Disturbed, Held, Missed};
     let cases: [(Change, Exit, TimingWord, &str); 10] = [
         (|_| (), Pass, Held, "held"),
-        (Run::disturb, Pass, Disturbed, "disturbed by the machine (3 of 2,003 cycles, 0.15 %)"),
+        (Run::disturb, Pass, Disturbed, "disturbed by the machine (3 of 2,003 cycles of both loops, 0.15 %)"),
         (
             |run| {
                 run.disturb();
@@ -248,7 +248,7 @@ fn cycles_that_the_rig_missed_fail_a_run_and_those_that_the_machine_lost_do_not(
             },
             Pass,
             Disturbed,
-            "disturbed by the machine (5 of 2,005 cycles, 0.25 %)",
+            "disturbed by the machine (5 of 2,005 cycles of both loops, 0.25 %)",
         ),
         (
             |run| {
@@ -257,13 +257,13 @@ fn cycles_that_the_rig_missed_fail_a_run_and_those_that_the_machine_lost_do_not(
             },
             Pass,
             Disturbed,
-            "disturbed by the machine (5 of 2,005 cycles, 0.25 %)",
+            "disturbed by the machine (5 of 2,005 cycles of both loops, 0.25 %)",
         ),
         (
             |run| run.overruns(5, 0.02),
             Pass,
             Disturbed,
-            "disturbed by the machine (2 of 2,002 cycles, 0.10 %)",
+            "disturbed by the machine (2 of 2,002 cycles of both loops, 0.10 %)",
         ),
         (|run| run.overruns(5, 0.002), Fail, Missed, "missed by the rig (2)"),
         (
