@@ -199,7 +199,7 @@ fn a_client_that_sends_without_end_delays_neither_the_recording_nor_the_end() {
 #[test]
 fn a_paused_reader_of_the_progress_costs_no_message_and_delays_no_end() {
     let cores = Cores::take();
-    let workspace = Workspace::new(&format!("duration_s = 4.0\n{LENIENT}"));
+    let workspace = Workspace::new(&format!("duration_s = 12.0\n{LENIENT}"));
     let (errors, mut filler) = io::pipe().unwrap();
     let mut command = workspace.command(&cores, &[]);
     let run = command.stdout(Stdio::piped()).stderr(filler.try_clone().unwrap()).spawn().unwrap();
@@ -209,7 +209,7 @@ fn a_paused_reader_of_the_progress_costs_no_message_and_delays_no_end() {
         line.clear();
         assert!(errors.read_line(&mut line).unwrap() > 0, "the run ended before it was under way");
     }
-    // From now on the pipe is full.
+    // From now on the pipe is full, also when the next line of the progress is due.
     let filling = thread::spawn(move || filler.write_all(&b".".repeat(1 << 20)));
     let output = run.wait_with_output().unwrap();
     drop(errors);

@@ -171,10 +171,11 @@ fn a_process_that_goes_on_too_late_is_still_the_one_that_ends_the_run() {
 #[test]
 fn endless_patience_waits_and_the_user_ends_it() {
     let (workspace, child, memory) = running("duration_s = 60.0", &["--patience", "none"]);
-    let plant = child_of(&child, "plant");
-    kill_process(plant, Signal::STOP).unwrap();
-    clock::sleep(Duration::from_secs(3));
-    kill_process(plant, Signal::CONT).unwrap();
+    // Longer than the default patience.
+    let controller = child_of(&child, "controller");
+    kill_process(controller, Signal::STOP).unwrap();
+    clock::sleep(Duration::from_secs(11));
+    kill_process(controller, Signal::CONT).unwrap();
     kill_process(Pid::from_child(&child), Signal::INT).unwrap();
     let output = child.wait_with_output().unwrap();
     assert_eq!(output.status.code(), Some(130), "{}{}", stdout(&output), stderr(&output));

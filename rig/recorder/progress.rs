@@ -1,5 +1,5 @@
-//! The progress of a run on standard error: a line that is rewritten in place on a terminal, a new line every second
-//! elsewhere.
+//! The progress of a run on standard error: a line that is rewritten in place on a terminal, a new line every ten
+//! seconds elsewhere.
 //!
 //! It uses what the recorder receives anyway. It leaves no mode of the terminal changed.
 
@@ -14,8 +14,8 @@ use nalgebra::Vector3;
 
 use crate::foxglove::ClientCounts;
 
-/// Time between two lines, ns.
-const LINE_INTERVAL_NS: u64 = SECOND_NS;
+/// Time between two lines, ns: a log of a short run has its verdict in sight.
+const LINE_INTERVAL_NS: u64 = 10 * SECOND_NS;
 /// The same where the line is rewritten, ns.
 const REWRITE_INTERVAL_NS: u64 = SECOND_NS / 5;
 /// Erases the line and switches wrapping off: a wrapped line could not be rewritten.
@@ -196,8 +196,8 @@ mod tests {
     }
 
     #[test]
-    fn a_line_is_due_every_second_and_rewritten_five_times_a_second() {
-        for (is_in_place, interval_ns) in [(false, SECOND_NS), (true, SECOND_NS / 5)] {
+    fn a_line_is_due_every_ten_seconds_and_rewritten_five_times_a_second() {
+        for (is_in_place, interval_ns) in [(false, 10 * SECOND_NS), (true, SECOND_NS / 5)] {
             let progress = Progress::with_form(is_in_place, 4.0, 0.1, 0);
             assert!(progress.is_due(interval_ns) && !progress.is_due(interval_ns - 1));
         }

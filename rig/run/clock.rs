@@ -66,7 +66,7 @@ pub(super) fn check(args: &RunArgs, scenario: &Scenario) -> anyhow::Result<()> {
         bail!("--name needs --clock rt or lockstep: virtual time has no processes to name");
     }
     if args.live.is_some() {
-        bail!("--live needs --clock rt: virtual time is over before a client can connect");
+        bail!("--live needs --clock rt or lockstep: virtual time is over before a client can connect");
     }
     Ok(())
 }

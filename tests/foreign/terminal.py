@@ -80,7 +80,7 @@ code, output, shown = run(masseter, ["--duration", "60s"], interrupt_after="runn
 assert code == INTERRUPTED, (code, output)
 assert_one_line_above_a_verdict(shown)
 
-code, output, shown = run(masseter, ["--duration", "1s"], term="dumb")
+code, output, shown = run(masseter, ["--duration", "10s"], term="dumb")
 assert code in ACCEPTED and "\x1b" not in output and PROGRESS in output, (code, output)
 
 code, output, shown = run(masseter, ["--duration", "1s", "--quiet"])

@@ -21,8 +21,8 @@ const SEND_TIMEOUT: Duration = Duration::from_secs(1);
 const YIELD_NS: u64 = 50_000;
 /// A yield that takes longer has given the core to other work, ns.
 const TAKEN_NS: u64 = 500_000;
-/// Waits that sleep at once after such a yield, since other work gives the core back late.
-const WAITS_BESIDE_OTHERS: u32 = 4096;
+/// Waits that sleep at once after such a yield, since other work gives the core back late: the fewest, and the most.
+const SLEEPS: [u32; 2] = [64, 4096];
 
 /// Receives the signals to this process.
 #[derive(Debug)]
@@ -31,6 +31,8 @@ pub struct SignalReceiver {
     path: PathBuf,
     /// Waits from now on that sleep at once.
     sleeps: u32,
+    /// Those after the next yield that takes long: twice as many each time, fewer with each signal that a yield brings.
+    next_sleeps: u32,
 }
 
 /// Sends signals to one process.
@@ -53,7 +55,7 @@ impl SignalReceiver {
             Ok(socket)
         };
         let socket = bind().map_err(file_error("receive at", &path))?;
-        Ok(Self { socket, path, sleeps: 0 })
+        Ok(Self { socket, path, sleeps: 0, next_sleeps: SLEEPS[0] })
     }
 
     /// The next signal; none when it does not come within the timeout, or when the kernel interrupts the wait.
@@ -83,13 +85,15 @@ impl SignalReceiver {
         while now_ns - from_ns < YIELD_NS {
             let mut signal = [0];
             if recv(&self.socket, &mut signal, RecvFlags::DONTWAIT).is_ok() {
+                self.next_sleeps = (self.next_sleeps - 1).max(SLEEPS[0]);
                 return Some(signal[0]);
             }
             let before_ns = now_ns;
             thread::yield_now();
             now_ns = clock::now_ns();
             if now_ns - before_ns > TAKEN_NS {
-                self.sleeps = WAITS_BESIDE_OTHERS;
+                self.sleeps = self.next_sleeps;
+                self.next_sleeps = (2 * self.next_sleeps).min(SLEEPS[1]);
             }
         }
         None
