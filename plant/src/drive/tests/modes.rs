@@ -298,13 +298,16 @@ fn under_a_torque_the_axis_can_always_stop_before_either_software_limit() {
     for (permille, limit) in [(200, LIMITS[1]), (-200, LIMITS[0])] {
         let mut bench = Bench::enabled(CYCLIC_TORQUE);
         bench.load_n = 0.0;
+        let mut nearest_to_limit = 0.0_f64;
         for _ in 0..1000 {
             bench.push(permille, 1);
             let way_m = (f64::from(limit) * 1e-6 - bench.position_m).abs();
             let braking_m_s = (2.0 * 2.5 * way_m).sqrt().min(0.4);
             let speed_m_s = bench.velocity_m_s.abs();
             assert!(speed_m_s < 1.1 * braking_m_s + 0.02, "{speed_m_s} at {way_m} m");
+            nearest_to_limit = nearest_to_limit.max(speed_m_s / (braking_m_s + 0.02));
         }
+        assert!(nearest_to_limit > 0.8, "slower than it needs to be: {nearest_to_limit}");
         assert!((bench.position() - limit).abs() < 2000, "{}", bench.position());
         assert!(bench.has(StatusBit::InternalLimit));
     }
