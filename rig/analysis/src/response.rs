@@ -15,8 +15,7 @@ use masseter_shared::wording::counted;
 
 use super::bus_response::{BusResponse, ResponseFigures};
 
-/// Share of a cycle by which a message may come early, and SYNC late, without being off its time. At worst the default buses are
-/// in use for seven eighths of a cycle: with messages much closer together no message has a bound.
+/// Share of a cycle by which a message may come early, and SYNC late. The default buses are in use for up to seven eighths.
 const JITTER: f64 = 0.1;
 /// Cycles after a message off its time in which the bus may still be crowded.
 const CROWDED_CYCLES: u64 = 2;

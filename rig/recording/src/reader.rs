@@ -1,4 +1,4 @@
-//! Reads a recording from its beginning in bounded memory, also one that was cut short or damaged: every whole chunk is
+//! Reads a recording from its beginning, also one that was cut short or damaged: every whole chunk is
 //! read, and every stretch that cannot be read is reported with its place.
 
 use std::borrow::Cow;
@@ -17,9 +17,6 @@ use super::definitions::Definitions;
 use super::encoding::CDR_LITTLE_ENDIAN;
 use super::topic::{Recorded, Stamps, Topic};
 use super::walk::{Damage, Step, Walk};
-
-/// Bytes of attached files that are held; the rig attaches fewer, other programs may attach more.
-const MOST_ATTACHED: usize = 64 << 20;
 
 /// Why a recording cannot be read.
 #[derive(Debug, thiserror::Error)]
@@ -237,16 +234,12 @@ impl<R: Read + Seek> Reader<R> {
         }
     }
 
-    /// Takes an attached file, if its checksum agrees and there is room.
+    /// Takes an attached file, if its checksum agrees.
     fn take_attachment(&mut self) {
         let body = self.walk.body();
         if let Ok(Record::Attachment { header, data, crc }) = mcap::parse_record(op::ATTACHMENT, body)
             && (crc == 0 || crc32fast::hash(&body[..body.len() - 4]) == crc)
         {
-            let held: usize = self.attachments.iter().map(|file| file.data.len()).sum();
-            if held + data.len() > MOST_ATTACHED {
-                return;
-            }
             let AttachmentHeader { log_time, create_time, name, media_type } = header;
             let data = Cow::Owned(data.into_owned());
             self.attachments.push(Attachment { log_time, create_time, name, media_type, data });
