@@ -35,8 +35,8 @@ First steps:
   masseter doctor
   masseter help run";
 const EXIT_CODES: &str = "\
-Exit codes of every verb: 0 passed, 1 a check failed, 2 wrong usage or input, 3 cannot be judged,
-4 a process died, 5 unexpected safe stop, 6 files incomplete, 130 interrupted.";
+Exit codes of every verb: 0 passed, 1 a check failed or was not tested, 2 wrong usage or input,
+3 cannot be judged, 4 a process died, 5 unexpected safe stop, 6 files incomplete, 130 interrupted.";
 
 /// A hardware-in-the-loop rig for a 6-DOF mastication robot
 #[derive(Debug, Parser)]

@@ -135,13 +135,16 @@ fn a_drive_that_misses_its_targets_is_noticed_within_few_cycles() {
 }
 
 #[test]
-fn a_run_whose_declared_fault_never_acts_fails() {
+fn a_run_whose_declared_fault_never_acts_is_untested() {
     let never = "[[faults]]\nkind = 'disconnect'\nbus = 0\nnode = 1\nfrom_s = 1000.0";
     let workspace = Workspace::new(&format!("duration_s = 1.0\n{never}"));
     let output = workspace.run_virtual(&[]);
     assert_eq!(output.status.code(), Some(1), "{}", stdout(&output));
     let summary = workspace.summary();
-    assert_eq!(check(&summary, "faults")["finding"], "0 of 1 declared faults acted, number 1 never");
+    let faults = check(&summary, "faults");
+    assert_eq!((&summary["verdict"]["word"], &faults["result"]), (&"UNTESTED".into(), &"untested".into()));
+    let finding = faults["finding"].as_str().unwrap();
+    assert!(finding.starts_with("0 of 1 declared faults acted, number 1 never: raise "), "{finding}");
 }
 
 #[test]

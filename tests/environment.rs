@@ -19,7 +19,7 @@ use masseter_shared::clock::{self, SECOND_NS};
 use masseter_shared::messages::State;
 use masseter_shared::messages::codes::ControllerState::Finished;
 use masseter_shared::transport::{Domain, Node, Subscriber};
-use serde_json::Value;
+use serde_json::{Value, json};
 
 #[test]
 fn refusals_of_the_kernel_are_reported_and_required_real_time_is_exit_3() {
@@ -31,6 +31,11 @@ fn refusals_of_the_kernel_are_reported_and_required_real_time_is_exit_3() {
     assert!(!workspace.manifest()["scheduling"]["plant"]["refusals"].as_array().unwrap().is_empty());
     let shown: Value = serde_json::from_str(&stdout(&output)).expect("a summary on standard output");
     assert_eq!(shown["verdict"]["word"], "INVALID", "{shown}");
+    // No cycle ran, so nothing kept its time and nothing failed.
+    assert_eq!(
+        (&shown["verdict"]["timing"]["word"], &shown["verdict"]["checks"]),
+        (&"unknown".into(), &json!([]))
+    );
     assert_eq!(shown, workspace.summary());
     assert!(workspace.run_folder().join("junit.xml").exists());
 }

@@ -12,7 +12,9 @@ pub enum CheckResult {
     Failed,
     /// It is not, and the machine may be the cause.
     Excused,
-    /// This run cannot tell; the finding says why.
+    /// It could not show: what it needs did not happen. The finding says what to do.
+    Untested,
+    /// It does not apply to this run; the finding says why.
     NotJudged,
 }
 
@@ -21,12 +23,18 @@ impl CheckResult {
         self == Self::Failed
     }
 
+    /// Whether a run with it does not pass, whatever else it shows.
+    pub(crate) fn is_short(self) -> bool {
+        matches!(self, Self::Failed | Self::Untested)
+    }
+
     /// The word in tables.
     pub fn mark(self) -> &'static str {
         match self {
             Self::Passed => "ok",
             Self::Failed => "FAIL",
             Self::Excused => "lost",
+            Self::Untested => "UNTESTED",
             Self::NotJudged => "skip",
         }
     }
@@ -57,6 +65,10 @@ impl Check {
         }
     }
 
+    pub(crate) fn untested(name: &'static str, why: String) -> Self {
+        Self { name, finding: why, result: CheckResult::Untested }
+    }
+
     pub(crate) fn not_judged(name: &'static str, why: String) -> Self {
         Self { name, finding: why, result: CheckResult::NotJudged }
     }
@@ -67,10 +79,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_not_judged_has_not_failed() {
-        let results =
-            [CheckResult::Passed, CheckResult::Failed, CheckResult::Excused, CheckResult::NotJudged];
-        assert_eq!(results.map(CheckResult::is_failed), [false, true, false, false]);
+    fn what_is_untested_has_not_failed_and_does_not_pass() {
+        use CheckResult::{Excused, Failed, NotJudged, Passed, Untested};
+        let results = [Passed, Failed, Excused, Untested, NotJudged];
+        assert_eq!(results.map(CheckResult::is_failed), [false, true, false, false, false]);
+        assert_eq!(results.map(CheckResult::is_short), [false, true, false, true, false]);
     }
 
     #[test]

@@ -14,16 +14,19 @@ use masseter_analysis::{
 };
 use masseter_recording::{Ending, Manifest};
 
+/// None in a run that ended before its first cycle.
 pub(crate) fn checks(manifest: &Manifest, figures: &Figures, timing: &Timing) -> Vec<Check> {
+    if figures.cycles == 0 {
+        return Vec::new();
+    }
     let limits = &manifest.scenario.checks;
     let is_disturbed = timing.is_disturbed();
     let sequence = sequence(figures.final_state, &figures.events);
-    let is_played = sequence.result == CheckResult::Passed;
     let TrackingFigures { actual_source, samples, actual, estimated, undisturbed, .. } = &figures.tracking;
     let tracking_of = |name, errors, undisturbed_errors| {
-        let check = tracking(name, *samples, errors, limits, is_played);
+        let check = tracking(name, *samples, errors, limits);
         // What also fails where no lost cycle acted on the jaw is the rig's.
-        let rest = tracking(name, undisturbed.samples, undisturbed_errors, limits, false);
+        let rest = tracking(name, undisturbed.samples, undisturbed_errors, limits);
         check.unless(is_disturbed && !rest.result.is_failed())
     };
     let mut checks = vec![sequence, tracking_of("tracking", actual, &undisturbed.actual)];
@@ -41,7 +44,7 @@ pub(crate) fn checks(manifest: &Manifest, figures: &Figures, timing: &Timing) ->
         bus_response(&figures.bus_response, is_disturbed, &figures.plant_skips),
     ]);
     // No lost cycle excuses a declared fault that led the jaw too far.
-    checks.extend(faults(&manifest.scenario.faults, &figures.faults, limits, is_played));
+    checks.extend(faults(&manifest.scenario.faults, &figures.faults, limits));
     checks
 }
 
@@ -51,7 +54,7 @@ fn kept_time(timing: &Timing, limit: u64) -> Option<Check> {
         TimingWord::Held => CheckResult::Passed,
         TimingWord::Missed => CheckResult::Failed,
         TimingWord::Disturbed => CheckResult::NotJudged,
-        TimingWord::Simulated => return None,
+        TimingWord::Simulated | TimingWord::Unknown => return None,
     };
     let finding = format!("{timing}{}, limit of the rig {limit}", timing.evidence);
     Some(Check { name: "timing", finding, result })

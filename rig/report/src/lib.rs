@@ -14,6 +14,7 @@ mod event_log;
 pub mod histogram_log;
 mod junit;
 mod motion_checks;
+mod outcome;
 mod page;
 mod run_report;
 mod summary;

@@ -2,6 +2,7 @@
 
 use masseter_analysis::{FaultFigures, PoseErrors};
 use masseter_shared::config::{ChecksConfig, FaultConfig};
+use masseter_shared::wording::counted;
 
 use crate::check::{Check, CheckResult};
 
@@ -27,14 +28,12 @@ pub(crate) fn left_its_path(errors: &PoseErrors, limits: &ChecksConfig) -> bool 
     peaks.into_iter().any(|(value, limit)| value.is_some_and(|value| !is_within(value, limit)))
 }
 
-/// The worst error against its limit, or all that exceed theirs. A motion that was played and left too little to compare is
-/// no less a failure than one that was followed badly.
+/// The worst error against its limit, or all that exceed theirs; untested if the motion left too little to compare.
 pub(crate) fn tracking(
     name: &'static str,
     samples: u64,
     errors: &PoseErrors,
     limits: &ChecksConfig,
-    is_played: bool,
 ) -> Check {
     let ChecksConfig { tracking_rms_mm, tracking_max_mm, tracking_rms_deg, tracking_max_deg, .. } = *limits;
     let figures = [
@@ -60,16 +59,15 @@ pub(crate) fn tracking(
         .collect();
     match found.first() {
         _ if !exceeding.is_empty() => Check::judged(name, exceeding.join("; "), false),
-        _ if samples == 0 && !is_played => Check::not_judged(name, "the motion never began".to_owned()),
         Some((_, _, closest)) if samples >= FEWEST_SAMPLES => {
             Check::judged(name, format!("closest of {samples} samples: {closest}"), true)
         }
-        _ if is_played => Check::judged(
-            name,
-            format!("{samples} samples to compare, at least {FEWEST_SAMPLES} needed"),
-            false,
-        ),
-        _ => Check::not_judged(name, format!("only {samples} samples to compare")),
+        _ => {
+            let samples = counted(samples, "sample");
+            let why =
+                format!("{samples} to compare, at least {FEWEST_SAMPLES} needed: play more of the motion");
+            Check::untested(name, why)
+        }
     }
 }
 
@@ -79,7 +77,6 @@ pub(crate) fn faults(
     declared: &[FaultConfig],
     found: &[FaultFigures],
     limits: &ChecksConfig,
-    is_played: bool,
 ) -> Option<Check> {
     let ChecksConfig { tracking_max_mm, tracking_max_deg, .. } = *limits;
     let idle: Vec<_> = found
@@ -101,13 +98,19 @@ pub(crate) fn faults(
             )
         })
         .collect();
-    let which = if idle.is_empty() { String::new() } else { format!(", number {} never", idle.join(", ")) };
+    let which = match idle.as_slice() {
+        [] => String::new(),
+        idle => format!(
+            ", number {} never: raise its probability, or widen the time from from_s to until_s",
+            idle.join(", ")
+        ),
+    };
     let struck =
         format!("{} of {} declared faults acted{which}", declared.len() - idle.len(), declared.len());
     let result = match (beyond.is_empty(), idle.is_empty()) {
         (true, true) => CheckResult::Passed,
-        (true, false) if !is_played => CheckResult::NotJudged,
-        _ => CheckResult::Failed,
+        (true, false) => CheckResult::Untested,
+        (false, _) => CheckResult::Failed,
     };
     (!declared.is_empty()).then(|| Check { name: FAULTS, finding: struck + &beyond.concat(), result })
 }
@@ -131,13 +134,13 @@ mod tests {
             rms_deg: Some(0.01),
             max_deg: Some(0.02),
         };
-        let check = tracking("tracking", 10, &good, &limits, true);
+        let check = tracking("tracking", 10, &good, &limits);
         assert_eq!(
             (check.result.mark(), check.finding.as_str()),
             ("ok", "closest of 10 samples: incisal point max 0.1000 mm, limit 0.5 mm")
         );
         let rms_is_closest = PoseErrors { rms_mm: Some(0.05), incisal_max_mm: Some(0.2), ..good };
-        let check = tracking("tracking", 10, &rms_is_closest, &limits, true);
+        let check = tracking("tracking", 10, &rms_is_closest, &limits);
         assert_eq!(check.finding, "closest of 10 samples: platform rms 0.0500 mm, limit 0.1 mm");
         let mm = |share: f64, limit: f64| Some(share * limit);
         let each: [(Spoil, f64); 6] = [
@@ -159,9 +162,9 @@ mod tests {
             ] {
                 let mut errors = good;
                 spoil(&mut errors, mm(share, limit));
-                for (samples, is_played) in [(10, true), (1, false), (0, false)] {
-                    let check = tracking("tracking", samples, &errors, &limits, is_played);
-                    let expected = if mark == "ok" && !is_played { "skip" } else { mark };
+                for samples in [10, 1, 0] {
+                    let check = tracking("tracking", samples, &errors, &limits);
+                    let expected = if mark == "ok" && samples < 10 { "UNTESTED" } else { mark };
                     assert_eq!(check.result.mark(), expected, "{check:?}");
                 }
             }
@@ -169,20 +172,18 @@ mod tests {
     }
 
     #[test]
-    fn a_motion_that_hardly_began_is_not_judged_unless_the_run_says_that_it_was_played() {
+    fn a_motion_that_hardly_began_is_untested() {
         let still = PoseErrors::default();
         let eased = PoseErrors { max_mm: Some(0.02), ..still };
         let begun = PoseErrors { rms_mm: Some(0.01), ..eased };
         let cases = [
-            (0, still, false, "skip", "the motion never began"),
-            (0, eased, false, "skip", "the motion never began"),
-            (9, begun, false, "skip", "only 9 samples to compare"),
-            (0, still, true, "FAIL", "0 samples to compare, at least 10 needed"),
-            (9, begun, true, "FAIL", "9 samples to compare, at least 10 needed"),
-            (10, begun, true, "ok", "closest of 10 samples: platform rms 0.0100 mm, limit 0.1 mm"),
+            (0, still, "UNTESTED", "0 samples to compare, at least 10 needed: play more of the motion"),
+            (0, eased, "UNTESTED", "0 samples to compare, at least 10 needed: play more of the motion"),
+            (9, begun, "UNTESTED", "9 samples to compare, at least 10 needed: play more of the motion"),
+            (10, begun, "ok", "closest of 10 samples: platform rms 0.0100 mm, limit 0.1 mm"),
         ];
-        for (samples, errors, is_played, mark, finding) in cases {
-            let check = tracking("tracking", samples, &errors, &ChecksConfig::default(), is_played);
+        for (samples, errors, mark, finding) in cases {
+            let check = tracking("tracking", samples, &errors, &ChecksConfig::default());
             assert_eq!((check.result.mark(), check.finding.as_str()), (mark, finding));
         }
     }
@@ -206,43 +207,43 @@ mod tests {
     }
 
     #[test]
-    fn a_declared_fault_that_never_acted_fails_a_run_that_was_played_to_its_end() {
+    fn a_declared_fault_that_never_acted_tested_nothing() {
+        let what_to_do = ": raise its probability, or widen the time from from_s to until_s";
         let cases = [
-            (0, true, None),
-            (1, true, Some(("ok", "1 of 1 declared faults acted"))),
-            (2, true, Some(("FAIL", "1 of 2 declared faults acted, number 2 never"))),
-            (2, false, Some(("skip", "1 of 2 declared faults acted, number 2 never"))),
-            (3, true, Some(("FAIL", "1 of 3 declared faults acted, number 2, 3 never"))),
+            (0, None),
+            (1, Some(("ok", "1 of 1 declared faults acted".to_owned()))),
+            (2, Some(("UNTESTED", format!("1 of 2 declared faults acted, number 2 never{what_to_do}")))),
+            (3, Some(("UNTESTED", format!("1 of 3 declared faults acted, number 2, 3 never{what_to_do}")))),
         ];
-        for (declared, is_played, expected) in cases {
+        for (declared, expected) in cases {
             let found: Vec<_> =
                 (1..=declared).map(|number| figures(number, (number == 1).then_some(5), 0.0)).collect();
-            let check = faults(&vec![fault(); declared], &found, &ChecksConfig::default(), is_played);
-            let found = check.as_ref().map(|check| (check.result.mark(), check.finding.as_str()));
-            assert_eq!(found, expected);
+            let check = faults(&vec![fault(); declared], &found, &ChecksConfig::default());
+            assert_eq!(check.map(|check| (check.result.mark(), check.finding)), expected);
         }
+        let found = [figures(1, None, 0.0), figures(2, Some(5), 0.6)];
+        let check = faults(&[fault(), fault()], &found, &ChecksConfig::default()).unwrap();
+        assert_eq!(check.result.mark(), "FAIL", "one fault led the jaw too far: {check:?}");
     }
 
     #[test]
     fn a_fault_that_leads_the_jaw_beyond_the_limit_fails_the_run_with_its_name() {
         for (deviation_mm, mark) in [(0.5, "ok"), (0.51, "FAIL")] {
-            for is_played in [true, false] {
-                let found = [figures(1, Some(5), deviation_mm)];
-                let check = faults(&[fault()], &found, &ChecksConfig::default(), is_played).unwrap();
-                assert_eq!(check.result.mark(), mark, "{check:?}");
-                let named = "number 1, lose (bus 1, node 4, id 204h), led 0.510 mm and 0.100° from the path undetected, \
-                             limit 0.5 mm and 0.5°";
-                assert_eq!(check.finding.contains(named), mark == "FAIL", "{check:?}");
-            }
+            let found = [figures(1, Some(5), deviation_mm)];
+            let check = faults(&[fault()], &found, &ChecksConfig::default()).unwrap();
+            assert_eq!(check.result.mark(), mark, "{check:?}");
+            let named = "number 1, lose (bus 1, node 4, id 204h), led 0.510 mm and 0.100° from the path undetected, \
+                         limit 0.5 mm and 0.5°";
+            assert_eq!(check.finding.contains(named), mark == "FAIL", "{check:?}");
         }
         let turned = FaultFigures { deviation_deg: 0.5, ..figures(1, Some(5), 0.1) };
-        let check = faults(&[fault()], &[turned], &ChecksConfig::default(), true).unwrap();
+        let check = faults(&[fault()], &[turned], &ChecksConfig::default()).unwrap();
         assert_eq!(check.result.mark(), "ok", "{check:?}");
         for deviation_deg in [0.51, f64::INFINITY, f64::NAN] {
             let turned = FaultFigures { deviation_deg, ..figures(1, Some(5), 0.1) };
             let shifted = FaultFigures { deviation_mm: deviation_deg, ..figures(1, Some(5), 0.1) };
             for found in [turned, shifted] {
-                let check = faults(&[fault()], &[found], &ChecksConfig::default(), true).unwrap();
+                let check = faults(&[fault()], &[found], &ChecksConfig::default()).unwrap();
                 assert_eq!(check.result.mark(), "FAIL", "{check:?}");
             }
         }

@@ -18,7 +18,7 @@ use masseter_terminal::{Exit, Tone};
 pub(crate) const TONES: [(&str, Tone); 12] = [
     ("PASS", Tone::Good),
     ("FAIL", Tone::Bad),
-    ("NOT RUN", Tone::Bad),
+    ("UNTESTED", Tone::Doubtful),
     ("INVALID", Tone::Doubtful),
     ("DIED", Tone::Bad),
     ("SAFE STOP", Tone::Bad),

@@ -23,6 +23,8 @@ pub enum TimingWord {
     Missed,
     /// There are none in simulated time.
     Simulated,
+    /// No cycle ran.
+    Unknown,
 }
 
 /// The judgement of a run's timing.
@@ -54,7 +56,9 @@ impl Timing {
         };
         let lost = by_machine + figures.skipped_of_unknown_cause();
         let missed = skipped.saturating_sub(lost);
-        let word = if manifest.clock != "rt" {
+        let word = if figures.cycles == 0 {
+            TimingWord::Unknown
+        } else if manifest.clock != "rt" {
             TimingWord::Simulated
         } else if missed > manifest.scenario.checks.missed_cycles {
             TimingWord::Missed
@@ -96,6 +100,7 @@ impl Display for Timing {
             ),
             TimingWord::Missed => write!(f, "missed by the rig ({})", grouped(*missed)),
             TimingWord::Simulated => f.write_str("simulated"),
+            TimingWord::Unknown => f.write_str("unknown, because no cycle ran"),
         }
     }
 }

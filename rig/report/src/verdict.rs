@@ -13,6 +13,7 @@ use serde::Serialize;
 use crate::check::{Check, CheckResult};
 use crate::checks::checks;
 use crate::motion_checks::{FAULTS, left_its_path};
+use crate::outcome::Outcome;
 use crate::text::{self, grouped};
 use crate::timing::{Timing, TimingWord};
 
@@ -52,23 +53,24 @@ impl Verdict {
         let excuse = excuse(&manifest.ending, &timing, figures.outage);
         let is_too_late = left_its_path(&figures.tracking.actual, &manifest.scenario.checks)
             || checks.iter().any(|check| check.name == FAULTS && check.result == CheckResult::Failed);
-        let (exit_code, mut reason) = ending(&manifest.ending, &figures.events)
+        let (outcome, mut reason) = ending(&manifest.ending, &figures.events)
             // The machine caused the stop, or it came only after the jaw had left its path.
-            .filter(|(exit, _)| !(*exit == Exit::SafeStop && (excuse.is_some() || is_too_late)))
+            .filter(|(outcome, _)| !(*outcome == Outcome::SafeStop && (excuse.is_some() || is_too_late)))
             .or_else(|| incomplete(figures))
             .or_else(|| {
                 let unjudged = excuse.or_else(|| unjudged(&manifest.scenario.checks, &timing, &checks))?;
-                Some((Exit::Invalid, format!("{unjudged}; {}", account(manifest, figures, &timing))))
+                Some((Outcome::Invalid, format!("{unjudged}; {}", account(manifest, figures, &timing))))
             })
             .or_else(|| {
                 failed(&checks)
                     .map(|failure| clock_jump(&manifest.usage, &manifest.scenario.can).unwrap_or(failure))
             })
-            .unwrap_or_else(|| (Exit::Passed, "every check passed".to_owned()));
-        if exit_code != Exit::Passed {
+            .or_else(|| untested(&checks, figures.cycles))
+            .unwrap_or_else(|| (Outcome::Passed, "every check passed".to_owned()));
+        if outcome != Outcome::Passed {
             reason += &overload(&manifest.usage, manifest.scenario.rate_hz).unwrap_or_default();
         }
-        Self { word: word(exit_code), reason, exit_code, timing, checks }
+        Self { word: outcome.word(), reason, exit_code: outcome.exit(), timing, checks }
     }
 
     /// The colour of the run: passed with its timing held, passed without, or not passed.
@@ -93,20 +95,6 @@ impl Verdict {
     }
 }
 
-/// The word for an outcome in reports.
-fn word(outcome: Exit) -> &'static str {
-    match outcome {
-        Exit::Passed => "PASS",
-        Exit::Failed => "FAIL",
-        Exit::Usage => "NOT RUN",
-        Exit::Invalid => "INVALID",
-        Exit::Died => "DIED",
-        Exit::SafeStop => "SAFE STOP",
-        Exit::Incomplete => "INCOMPLETE",
-        Exit::Interrupted => "INTERRUPTED",
-    }
-}
-
 /// Share of its core above which a real-time process is too busy: the kernel throttles at 95 %, by default.
 const TOO_BUSY: f64 = 0.9;
 
@@ -124,17 +112,17 @@ fn overload(usage: &RunUsage, rate_hz: u32) -> Option<String> {
     ))
 }
 
-type ExitReason = (Exit, String);
+type OutcomeReason = (Outcome, String);
 
-fn ending(ending: &Ending, events: &[EventRecord]) -> Option<ExitReason> {
+fn ending(ending: &Ending, events: &[EventRecord]) -> Option<OutcomeReason> {
     match ending {
         Ending::Completed => None,
-        Ending::SafeStop => Some((Exit::SafeStop, stopped(events))),
-        Ending::Died { process, how } => Some((Exit::Died, format!("the {process} died: {how}"))),
-        Ending::Interrupted => Some((Exit::Interrupted, "stopped by the user".to_owned())),
-        Ending::NotStarted => Some((Exit::Invalid, "real time was required and refused".to_owned())),
+        Ending::SafeStop => Some((Outcome::SafeStop, stopped(events))),
+        Ending::Died { process, how } => Some((Outcome::Died, format!("the {process} died: {how}"))),
+        Ending::Interrupted => Some((Outcome::Interrupted, "stopped by the user".to_owned())),
+        Ending::NotStarted => Some((Outcome::Invalid, "real time was required and refused".to_owned())),
         Ending::RecordingFailed => {
-            Some((Exit::Incomplete, "the recorder could not write everything".to_owned()))
+            Some((Outcome::Incomplete, "the recorder could not write everything".to_owned()))
         }
     }
 }
@@ -146,7 +134,7 @@ fn stopped(events: &[EventRecord]) -> String {
     format!("the controller stopped the rig{why}")
 }
 
-fn incomplete(figures: &Figures) -> Option<ExitReason> {
+fn incomplete(figures: &Figures) -> Option<OutcomeReason> {
     let missing = figures.missing_messages();
     let reason = if missing > 0 {
         format!("{missing} messages are missing from the recording")
@@ -157,7 +145,7 @@ fn incomplete(figures: &Figures) -> Option<ExitReason> {
     } else {
         return None;
     };
-    Some((Exit::Incomplete, reason))
+    Some((Outcome::Incomplete, reason))
 }
 
 /// Why the machine leaves nothing to judge a run by that ended normally; none where the run can be judged. What the rig
@@ -200,13 +188,13 @@ fn stalls(figures: &Figures) -> String {
 }
 
 /// Real interfaces stamp frames by the wall clock: once it was set, these times are useless. Simulated ones do not use it.
-fn clock_jump(usage: &RunUsage, can: &CanConfig) -> Option<ExitReason> {
+fn clock_jump(usage: &RunUsage, can: &CanConfig) -> Option<OutcomeReason> {
     let jump_s = usage.clock_jump_s;
     (jump_s != 0.0 && !can.is_virtual()).then(|| {
         let reason = format!(
             "the wall clock jumped by {jump_s:.3} s, as it does when it is set or the machine was suspended; repeat the run"
         );
-        (Exit::Invalid, reason)
+        (Outcome::Invalid, reason)
     })
 }
 
@@ -230,8 +218,19 @@ fn excuse(ending: &Ending, timing: &Timing, outage: Option<Outage>) -> Option<St
     })
 }
 
-fn failed(checks: &[Check]) -> Option<ExitReason> {
-    named(checks, CheckResult::Failed).map(|names| (Exit::Failed, format!("failed: {names}")))
+fn failed(checks: &[Check]) -> Option<OutcomeReason> {
+    named(checks, CheckResult::Failed).map(|names| (Outcome::Failed, format!("failed: {names}")))
+}
+
+/// What was not tested, with what to do. Without a cycle that was everything.
+fn untested(checks: &[Check], cycles: u64) -> Option<OutcomeReason> {
+    let findings: Vec<_> = checks
+        .iter()
+        .filter(|check| check.result == CheckResult::Untested)
+        .map(|check| format!("{}: {}", check.name, check.finding))
+        .collect();
+    let why = if cycles == 0 { "no cycle ran".to_owned() } else { findings.join("; ") };
+    (!why.is_empty()).then_some((Outcome::Untested, why))
 }
 
 /// The checks of a result by their names; none without such checks.
@@ -261,7 +260,7 @@ mod tests {
             event(Source::Controller, EventKind::Fault, Cause::MasterFault),
         ];
         let (outcome, reason) = ending(&Ending::SafeStop, &events.map(|event| (&event).into())).unwrap();
-        assert_eq!(outcome, Exit::SafeStop);
+        assert_eq!(outcome, Outcome::SafeStop);
         assert_eq!(
             reason,
             "the controller stopped the rig; first fault: master: process_data_lost \
@@ -289,7 +288,7 @@ mod tests {
         assert_eq!(jump(0.0, &real), None);
         assert_eq!(jump(-3.5, &simulated), None);
         let (outcome, reason) = jump(-3.5, &real).unwrap();
-        assert_eq!(outcome, Exit::Invalid);
+        assert_eq!(outcome, Outcome::Invalid);
         assert!(reason.contains("jumped by -3.500 s"), "{reason}");
     }
 }

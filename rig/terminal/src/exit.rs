@@ -9,7 +9,7 @@ use std::process::ExitCode;
 pub enum Exit {
     /// Success.
     Passed = 0,
-    /// A check failed.
+    /// A check failed, or was not tested.
     Failed = 1,
     /// Wrong usage, scenario or input file.
     Usage = 2,

@@ -48,7 +48,7 @@ fn a_failure_is_excused_only_if_the_undisturbed_rest_passes() {
             "failed: estimated tracking",
         ),
         (|run| run.figures.final_state = None, Exit::Failed, "failed: sequence"),
-        (Run::declare_fault, Exit::Failed, "failed: faults"),
+        (Run::declare_fault, Exit::Failed, "faults: 0 of 1 declared faults acted"),
     ];
     for (change, outcome, reason) in cases {
         let verdict = disturbed(change);

@@ -1,0 +1,46 @@
+//! What a run comes to: a word in reports, and the exit code of the program.
+
+use masseter_terminal::Exit;
+
+/// The outcome of a run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Outcome {
+    Passed,
+    Failed,
+    /// Nothing failed, and something that the scenario asks for was not tested.
+    Untested,
+    Invalid,
+    Died,
+    SafeStop,
+    Incomplete,
+    Interrupted,
+}
+
+impl Outcome {
+    /// The word in reports.
+    pub(crate) fn word(self) -> &'static str {
+        match self {
+            Self::Passed => "PASS",
+            Self::Failed => "FAIL",
+            Self::Untested => "UNTESTED",
+            Self::Invalid => "INVALID",
+            Self::Died => "DIED",
+            Self::SafeStop => "SAFE STOP",
+            Self::Incomplete => "INCOMPLETE",
+            Self::Interrupted => "INTERRUPTED",
+        }
+    }
+
+    /// A test that tested nothing is as red as one that failed.
+    pub(crate) fn exit(self) -> Exit {
+        match self {
+            Self::Passed => Exit::Passed,
+            Self::Failed | Self::Untested => Exit::Failed,
+            Self::Invalid => Exit::Invalid,
+            Self::Died => Exit::Died,
+            Self::SafeStop => Exit::SafeStop,
+            Self::Incomplete => Exit::Incomplete,
+            Self::Interrupted => Exit::Interrupted,
+        }
+    }
+}
