@@ -143,8 +143,10 @@ fn on_a_phone_the_page_is_as_wide_as_the_screen() {
 
 /// What the recording of a run says about time.
 struct Times {
-    /// The first message, ns.
+    /// Deadline of the first cycle, ns.
     zero_ns: u64,
+    /// When the first message was recorded, ns.
+    first_ns: u64,
     /// The last true position, s.
     end_s: f64,
     events: Vec<Event>,
@@ -153,16 +155,17 @@ struct Times {
 impl Times {
     fn of(workspace: &Workspace) -> Self {
         let mut reader = Reader::open(&workspace.run_folder().join("recording.mcap")).unwrap();
-        let (mut zero_ns, mut end_ns, mut events) = (u64::MAX, 0, Vec::new());
+        let (mut zero_ns, mut first_ns, mut end_ns, mut events) = (u64::MAX, u64::MAX, 0, Vec::new());
         while let Some(entry) = reader.next_entry().unwrap() {
-            zero_ns = zero_ns.min(entry.header.log_time);
+            first_ns = first_ns.min(entry.header.log_time);
             match entry.recorded() {
+                Some(Ok(Recorded::Reading(reading))) => zero_ns = zero_ns.min(reading.due_ns),
                 Some(Ok(Recorded::Truth(truth))) => end_ns = end_ns.max(truth.sampled_ns),
                 Some(Ok(Recorded::Event(event))) => events.push(event),
                 _ => {}
             }
         }
-        Self { zero_ns, end_s: (end_ns - zero_ns) as f64 / 1e9, events }
+        Self { zero_ns, first_ns, end_s: (end_ns - zero_ns) as f64 / 1e9, events }
     }
 
     fn since_s(&self, event: &Event) -> f64 {
@@ -261,6 +264,10 @@ fn every_chart_over_time_has_the_zero_of_the_recording() {
     let workspace = Workspace::new("duration_s = 1.0");
     assert_eq!(workspace.run_virtual(&[]).status.code(), Some(0));
     assert_one_zero(&workspace, &OVER_TIME);
+    // In real time the recorder may begin later.
+    let times = Times::of(&workspace);
+    let later_ns = times.first_ns - times.zero_ns;
+    assert!(later_ns < 1_000_000, "the first message was recorded {later_ns} ns after the charts' zero");
 
     let workspace = Workspace::new(&format!("duration_s = 1.0\n{LENIENT}"));
     let output = workspace.run(&Cores::take(), &[]);
