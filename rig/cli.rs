@@ -80,15 +80,15 @@ enum Verb {
     /// Check whether this machine is fit for real-time runs
     Doctor(DoctorArgs),
     /// Inspect, verify, recover and export recordings
-    #[command(subcommand, alias = "log")]
+    #[command(subcommand, alias = "log", after_help = "Example:\n  masseter recording info runs/latest")]
     Recording(RecordingVerb),
     /// Plan the buses, describe the drives (EDS, DBC), serve simulated buses
-    #[command(subcommand)]
+    #[command(subcommand, after_help = "Example:\n  masseter can plan --rate-hz 1500")]
     Can(CanVerb),
     /// Measure parts of the rig, each beside a baseline
     Bench(BenchArgs),
     /// Prove where the six inputs determine one pose, or search for exceptions
-    #[command(subcommand)]
+    #[command(subcommand, after_help = "Example:\n  masseter uniqueness prove --region jaw")]
     Uniqueness(UniquenessVerb),
     /// Reproduce the paper's study of the kinematics: figures, data, claims
     #[command(visible_alias = "paper")]
@@ -183,6 +183,8 @@ fn in_one_line(error: &anyhow::Error) -> String {
 
 #[cfg(test)]
 mod tests {
+    use std::iter;
+
     use super::*;
 
     /// Every command that a user meets, with its names from the verb on.
@@ -192,7 +194,7 @@ mod tests {
             .flat_map(|verb| {
                 let name = format!("{names} {}", verb.get_name());
                 let inner = visible(verb, &name);
-                if inner.is_empty() { vec![(name, verb.clone())] } else { inner }
+                iter::once((name, verb.clone())).chain(inner)
             })
             .collect()
     }
@@ -214,8 +216,10 @@ mod tests {
         assert!(verbs.len() > 20, "{verbs:?}");
         for (name, mut verb) in verbs {
             let help = verb.render_long_help().to_string();
+            let (_, examples) =
+                help.split_once("\nExample").unwrap_or_else(|| panic!("{name}: no example in {help}"));
             let example = format!("  {name}");
-            assert!(help.lines().any(|line| line.starts_with(&example)), "{name}: no example in {help}");
+            assert!(examples.lines().any(|line| line.starts_with(&example)), "{name}: {examples}");
             assert!(!help.contains('`'), "{name}: {help}");
             command_lines(&help).for_each(assert_parsed);
         }

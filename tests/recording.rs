@@ -8,7 +8,7 @@ use std::path::Path;
 use std::process::Output;
 use std::time::Duration;
 
-use common::{Cores, LENIENT, Workspace, child_of, cramped, masseter, stderr, stdout, wait_until};
+use common::{Cores, LENIENT, Workspace, child_of, cramped, json, masseter, stderr, stdout, wait_until};
 use masseter_recording::{Reader, Recorded, Recorder, Scene};
 use masseter_shared::clock::{self, SECOND_NS};
 use masseter_shared::config::Scenario;
@@ -222,6 +222,35 @@ fn a_recording_explains_itself() {
         assert_eq!(known["masseter"], workspace.manifest()["masseter"]);
         assert!(known["began"].is_null(), "recordings of simulated time are equal: {known}");
     }
+}
+
+/// A recording alone is enough to play its run again.
+#[test]
+fn the_attached_scenario_and_motion_give_the_same_run_again() {
+    let workspace = Workspace::new("duration_s = 1.0\n[motion]\nkind = 'file'\npath = 'jaw.csv'\n");
+    let examples = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples");
+    fs::copy(examples.join("jaw.csv"), workspace.file("jaw.csv")).unwrap();
+    assert_eq!(workspace.run_virtual(&[]).status.code(), Some(0));
+    let (lone, out, again) =
+        (workspace.file("lone.mcap"), workspace.file("attached"), workspace.file("again"));
+    fs::write(&lone, workspace.recording()).unwrap();
+    let digest = workspace.summary()["figures"]["digest"].clone();
+    // Nothing else is left of the run.
+    fs::remove_dir_all(workspace.run_folder()).unwrap();
+    fs::remove_file(workspace.file("jaw.csv")).unwrap();
+    let export = || log("export", &lone, &["--attached", "--out", out.to_str().unwrap()]);
+    let output = export();
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    for name in ["scenario.toml", "motion.csv", "circumstances.json"] {
+        assert!(stdout(&output).contains(out.join(name).to_str().unwrap()), "{}", stdout(&output));
+    }
+    assert_eq!(export().status.code(), Some(2), "an existing folder was written to");
+
+    let [scenario, run] = [out.join("scenario.toml"), again.clone()].map(|path| path.display().to_string());
+    let output = masseter(&["run", &scenario, "--clock", "virtual", "--out", &run]);
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    assert_eq!(json(&again.join("summary.json"))["figures"]["digest"], digest);
+    assert!(fs::read(again.join("recording.mcap")).unwrap() == fs::read(&lone).unwrap(), "other bytes");
 }
 
 #[test]

@@ -4,6 +4,7 @@
 //! holds bytes that Masseter did not write. `recover` ends with 0 once it has saved what is readable. No verb changes the
 //! recording it reads.
 
+mod attached;
 mod columns;
 mod export;
 mod selection;
@@ -34,7 +35,7 @@ pub(crate) enum RecordingVerb {
     Verify(RecordingArgs),
     /// Save the readable messages of a damaged recording in a new one
     Recover(RecoverArgs),
-    /// Write one CSV file per topic, and the CAN frames as candump logs
+    /// Write one CSV file per topic, and the CAN frames as candump logs; or the attached files
     Export(ExportArgs),
 }
 
@@ -59,7 +60,9 @@ pub(crate) struct RecoverArgs {
 
 /// The arguments of `export`.
 #[derive(Debug, Clone, Args)]
-#[command(after_help = "Example:\n  masseter recording export runs/latest --topic state --out /tmp/tables")]
+#[command(
+    after_help = "Examples:\n  masseter recording export runs/latest --topic state --out /tmp/tables\n  masseter recording export recording.mcap --attached --out /tmp/again"
+)]
 pub(crate) struct ExportArgs {
     #[command(flatten)]
     from: RecordingArgs,
@@ -69,6 +72,9 @@ pub(crate) struct ExportArgs {
     /// Topic to export; may be repeated [default: all that fit a table]
     #[arg(long = "topic", value_name = "TOPIC")]
     topics: Vec<String>,
+    /// Write the attached files instead: the scenario, and the recorded motion that it plays
+    #[arg(long, conflicts_with = "topics")]
+    attached: bool,
 }
 
 impl RecordingArgs {
@@ -136,6 +142,13 @@ fn export(args: &ExportArgs) -> anyhow::Result<Exit> {
     let path = args.from.path()?;
     let mut reader = open(&path)?;
     let survey = survey(&path, &mut reader)?;
+    if args.attached {
+        for (name, bytes) in attached::write(reader.attachments(), &args.out)? {
+            result(&format!("{bytes:>10}  {}\n", args.out.join(name).display()))?;
+        }
+        result(&survey.loss()?)?;
+        return Ok(survey.exit());
+    }
     let Selection { tables, skipped } = Selection::new(reader.channels(), &args.topics)?;
     fs::create_dir(&args.out).with_context(|| format!("cannot create {}", args.out.display()))?;
     for (name, rows) in export::write(&mut open(&path)?, &args.out, tables)? {

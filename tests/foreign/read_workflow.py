@@ -1,7 +1,8 @@
-"""Reads the workflow that `masseter init` lays down, with a real parser, and runs its step in a shell.
+"""Reads the workflow that `masseter init` lays down, with a real parser, and runs its scripts in a shell.
 
 Fails when the file is no YAML, when a step is neither an action nor a script, when a script fails, or when a file is
-missing that the workflow keeps.
+missing that the workflow keeps. The step that builds must fail before its variables are entered, with a message that
+names the empty one and the file; once they are entered it must give them to cargo.
 """
 
 import os
@@ -12,20 +13,52 @@ from pathlib import Path
 
 import yaml
 
+WORKFLOW = ".github/workflows/masseter.yml"
+ENTERED = {"MASSETER_GIT": "https://example.org/rig with a blank", "MASSETER_COMMIT": "0123abc"}
+# Stands in for cargo: prints its arguments, one a line.
+CARGO = "#!/bin/sh\nprintf '%s\\n' \"$@\"\n"
+
 masseter = Path(sys.argv[1]).resolve()
-environment = os.environ | {"PATH": f"{masseter.parent}:{os.environ['PATH']}"}
+
+
+def run(script, folder, programs, **variables):
+    """Runs a script as GitHub does."""
+    environment = os.environ | {"PATH": f"{programs}:{os.environ['PATH']}"} | variables
+    return subprocess.run(["bash", "-e", "-c", script], cwd=folder, env=environment, capture_output=True, text=True)
+
 
 with tempfile.TemporaryDirectory() as place:
-    folder = Path(place) / "rig"
+    folder, programs = Path(place) / "rig", Path(place) / "programs"
     subprocess.run([masseter, "init", folder], check=True, stdout=subprocess.DEVNULL)
-    workflow = yaml.safe_load((folder / ".github/workflows/masseter.yml").read_text())
+    workflow = yaml.safe_load((folder / WORKFLOW).read_text())
     # YAML 1.1 reads the key `on` as true.
     assert set(workflow[True]) == {"push", "pull_request"}, workflow
     (job,) = workflow["jobs"].values()
     assert all(("uses" in step) != ("run" in step) for step in job["steps"]), job
+
+    programs.mkdir()
+    (programs / "cargo").write_text(CARGO)
+    (programs / "cargo").chmod(0o755)
+    (build,) = [step["run"] for step in job["steps"] if step.get("name") == "Build"]
+    empty = workflow["env"]
+    assert set(empty) == set(ENTERED) and not any(empty.values()), empty
+    for missing in ENTERED:
+        # The first one is missing in the file as laid down; the second once the first is entered.
+        built = run(build, folder, programs, **(ENTERED | {missing: empty[missing]}))
+        assert built.returncode not in (0, 126) and not built.stdout, built
+        (message,) = built.stderr.splitlines()
+        assert f"{missing}: is empty" in message and WORKFLOW in message and "enter" in message, built
+    built = run(build, folder, programs, **empty)
+    assert built.returncode != 0 and "MASSETER_GIT: is empty" in built.stderr and not built.stdout, built
+    built = run(build, folder, programs, **ENTERED)
+    git, commit = ENTERED["MASSETER_GIT"], ENTERED["MASSETER_COMMIT"]
+    expected = ["install", "--locked", "masseter", "--git", git, "--rev", commit]
+    assert built.returncode == 0 and built.stdout.splitlines() == expected, built
+
     scripts = [step["run"] for step in job["steps"] if step.get("run", "").startswith("masseter ")]
     for script in scripts:
-        subprocess.run(["bash", "-e", "-c", script], cwd=folder, env=environment, check=True, stdout=subprocess.DEVNULL)
+        played = run(script, folder, masseter.parent)
+        assert played.returncode == 0, played
     (kept,) = [step["with"]["path"].split() for step in job["steps"] if "upload-artifact" in step.get("uses", "")]
     assert scripts and kept and all((folder / name).is_file() for name in kept), (scripts, kept)
-print(f"the workflow ran {'; '.join(scripts)} and kept {' '.join(kept)}")
+print(f"the workflow asked for its variables, ran {'; '.join(scripts)} and kept {' '.join(kept)}")

@@ -2,7 +2,8 @@
 
 Fails when the progress is not rewritten in its line, when the verdict does not stand readable below it, when a line
 that is wider than the terminal wraps, or when the terminal is not left as it was: after a run, after Ctrl-C, with
---quiet and on a terminal that only prints.
+--quiet and on a terminal that only prints. Fails when words are coloured against NO_COLOR or --color, or are not where
+--color asks for it.
 """
 
 import os
@@ -24,20 +25,24 @@ LENIENT = Path(__file__).parents[1] / "lenient.toml"
 # Passed, too disturbed to judge, or incomplete because the machine starved the recorder: this judges the terminal.
 ACCEPTED = (0, 3, 6)
 PROGRESS = "tracking error"
+# Variables that decide whether words are coloured.
+CHOOSE_COLOUR = ("CI", "NO_COLOR", "CLICOLOR", "CLICOLOR_FORCE")
 # The part of the line that fits into these columns.
 MOTION = re.compile(r"motion +[0-9.]+ of [0-9.]+ s")
 GREEN_OR_AMBER = ("\x1b[1m\x1b[32m", "\x1b[1m\x1b[33m")
+COLOUR = re.compile(r"\x1b\[[0-9;]*m")
 VERDICTS = ("PASS: ", "INVALID: ", "INCOMPLETE: ", "INTERRUPTED: ")
 
 
-def run(masseter, arguments, term="xterm-256color", interrupt_after=None):
+def run(masseter, arguments, term="xterm-256color", interrupt_after=None, **more):
     """Runs on a terminal of its own; returns exit code, output and what stands on the screen."""
     with tempfile.TemporaryDirectory() as folder:
         command = [masseter, "run", str(LENIENT), "--clock", "rt", "--out", str(Path(folder) / "run"), *arguments]
         process, terminal = pty.fork()
         if process == 0:
             # With CI set, colours are printed on every terminal: this looks at a user's.
-            environment = {name: value for name, value in os.environ.items() if name != "CI"} | {"TERM": term}
+            others = {name: value for name, value in os.environ.items() if name not in CHOOSE_COLOUR}
+            environment = others | {"TERM": term, **more}
             os.execve(masseter, command, environment)
         termios.tcsetwinsize(terminal, (LINES, COLUMNS))
         before = termios.tcgetattr(terminal)
@@ -86,5 +91,18 @@ assert code in ACCEPTED and "\x1b" not in output and PROGRESS in output, (code, 
 code, output, shown = run(masseter, ["--duration", "1s", "--quiet"])
 assert code in ACCEPTED and output.startswith(GREEN_OR_AMBER) and PROGRESS not in output, output
 
-code, output, shown = run(masseter, ["--duration", "1s", "--quiet", "--color", "never"])
-assert code in ACCEPTED and "\x1b" not in output and PROGRESS not in output, output
+for arguments, environment, term, is_coloured in [
+    (["--color", "never"], {}, "xterm-256color", False),
+    ([], {"NO_COLOR": "1"}, "xterm-256color", False),
+    (["--color", "always"], {"NO_COLOR": "1"}, "xterm-256color", True),
+    (["--color", "always"], {}, "dumb", True),
+]:
+    code, output, shown = run(masseter, ["--duration", "1s", "--quiet", *arguments], term, **environment)
+    case = (arguments, environment, term, output)
+    assert code in ACCEPTED and PROGRESS not in output, case
+    assert output.startswith(GREEN_OR_AMBER) if is_coloured else "\x1b" not in output, case
+
+# The line of the progress is rewritten without colours, too.
+code, output, shown = run(masseter, ["--duration", "2s"], NO_COLOR="1")
+assert code in ACCEPTED and not COLOUR.search(output) and output.count(PROGRESS) >= 2, (code, output)
+assert_one_line_above_a_verdict(shown)

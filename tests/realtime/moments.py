@@ -2,6 +2,8 @@
 """Kills or stops each process of a rig in turn, at random moments between start and end, and counts by process and part
 of the run what the verdict says. A negative exit code is the supervisor's own death.
 
+The recorder is hit when the recording has a random share of its length: at a random time it often has not begun.
+
     tests/realtime/moments.py target/release/masseter --times 800
     tests/realtime/moments.py target/release/masseter --times 800 --clock lockstep --signal STOP --busy 4
     tests/realtime/moments.py target/release/masseter --times 100 --clock lockstep --signal NONE --busy 4
@@ -39,6 +41,8 @@ PATIENCE_S = 1.0
 SHORT_S, LONG_S = (0.0, PATIENCE_S / 2), (3 * PATIENCE_S, 4 * PATIENCE_S)
 # Longest time from the signal to the end of all processes of the rig, s.
 END_S = 45.0
+# The share of the recorder's hits that come before anything is recorded, against those after that.
+BEGINNING = 0.1
 # The lock that all rigs of a user share stays.
 TURN = ".turn"
 VERIFY_CODES = {0: "complete", 6: "cut short"}
@@ -71,13 +75,14 @@ class Rigs:
             rig.wait(timeout=END_S)
             return time.monotonic() - began, self.end_of(rig, run, dict(os.environ))
 
-    def hit(self, role, after_s, stop_s):
-        """Returns the moment and how the run ended; none if the process was not there."""
+    def hit(self, role, after_s, recorded_bytes, stop_s):
+        """Hits a process after a time and once so much is recorded. Returns the moment and how the run ended; none if the
+        process was not there."""
         with tempfile.TemporaryDirectory() as folder, tempfile.TemporaryDirectory() as runtime:
             run, how = Path(folder) / "run", self.how
             rig = start(self.masseter, run, self.clock, *self.options(self.clock), runtime=runtime)
             time.sleep(after_s)
-            children = children_of(rig)
+            children = self.wait_until_recorded(rig, run, recorded_bytes)
             victim = rig.pid if role == "supervisor" else children.get(role)
             moment = moment_of(run, children, self.clock)
             was_there = rig.poll() is None and victim is not None and lives(victim)
@@ -94,6 +99,18 @@ class Rigs:
             if left:
                 raise SystemExit(f"{role} hit by SIG{how} in {moment}: {left} stayed")
             return (moment, self.end_of(rig, run, environment)) if was_there else None
+
+    def wait_until_recorded(self, rig, run, recorded_bytes):
+        """Returns the processes below the rig, by role. With a number of bytes, even 0, the recorder is among them."""
+        recording, deadline = run / "recording.mcap", time.monotonic() + END_S
+        while recorded_bytes is not None and rig.poll() is None:
+            length = recording.stat().st_size if recording.exists() else 0
+            if length >= recorded_bytes and "recorder" in children_of(rig):
+                break
+            if time.monotonic() > deadline:
+                raise SystemExit(f"after {END_S:.0f} s there are {length} of {recorded_bytes} bytes")
+            time.sleep(0.0005)
+        return children_of(rig)
 
     def wait(self, rig, children, what):
         deadline = time.monotonic() + END_S
@@ -206,28 +223,37 @@ def main():
     parser.add_argument("--times", type=int, default=500, help="processes that are hit, or runs without a hit")
     parser.add_argument("--clock", choices=["rt", "lockstep", "virtual"], default="rt")
     parser.add_argument("--signal", choices=["KILL", "STOP", "NONE"], default="KILL")
+    parser.add_argument("--role", action="append", choices=ROLES, help="only this one")
     parser.add_argument("--busy", type=int, default=0, help="processes that never sleep, beside the rigs")
     parser.add_argument("--seed", type=int, default=1)
     arguments = parser.parse_args()
     how, chance = arguments.signal, random.Random(arguments.seed)
     rigs = Rigs(arguments.masseter.resolve(), arguments.clock, how)
-    lengths_s = []
+    lengths_s, whole_bytes = [], 0
     for count in (0, arguments.busy):
         with busy(count):
-            lengths_s.append(rigs.undisturbed(arguments.clock)[0])
-    roles = ROLES[:1] if arguments.clock == "virtual" or how == "NONE" else ROLES
-    counts, absent, failed = collections.Counter(), 0, []
+            length_s, end = rigs.undisturbed(arguments.clock)
+            lengths_s.append(length_s)
+            whole_bytes = len(end.recording)
+    roles = ROLES[:1] if arguments.clock == "virtual" or how == "NONE" else arguments.role or ROLES
+    counts, quarters, absent, failed = collections.Counter(), collections.Counter(), 0, []
     while counts.total() < arguments.times:
         role = roles[counts.total() % len(roles)]
         is_busy = how == "NONE" or counts.total() // len(roles) % 2 == 1
-        after_s = 0.0 if how == "NONE" else chance.uniform(0.0, lengths_s[is_busy])
+        # The share of the run's time, or of its recording. A negative share of the recording is its beginning.
+        share, recorded_bytes = chance.uniform(0.0, 1.0), None
+        if role == "recorder":
+            recorded_bytes = max(0.0, share * (1 + BEGINNING) - BEGINNING) * whole_bytes
+        after_s = 0.0 if how == "NONE" or role == "recorder" else share * lengths_s[is_busy]
         stop_s = chance.uniform(*chance.choice([SHORT_S, SHORT_S, SHORT_S, LONG_S])) if how == "STOP" else 0.0
         with busy(arguments.busy if is_busy else 0):
-            hit = rigs.hit(role, after_s, stop_s)
+            hit = rigs.hit(role, after_s, recorded_bytes, stop_s)
         if hit is None:
             absent += 1
             continue
         moment, end = hit
+        if role == "recorder" and how == "KILL":
+            quarters[min(4, 1 + 4 * len(end.recording) // whole_bytes) if end.recording else 0] += 1
         wrong = rigs.judge(role, moment, stop_s, end)
         if wrong:
             failed.append(f"{role}, SIG{how} in {moment} for {stop_s:.2f} s: {wrong}: {end.code}, {end.word}: {end.reason}")
@@ -241,6 +267,9 @@ def main():
     order = lambda key: (key[0], MOMENTS.index(key[1].split(" ", 1)[-1] if key[1] not in MOMENTS else key[1]), key)
     for role, moment, word in sorted(counts, key=order):
         print(f"{role:<10}  {moment:<12}  {counts[role, moment, word]:>3} × {word}")
+    if quarters:
+        shares = ", ".join(f"{quarters[quarter]} in quarter {quarter}" for quarter in range(1, 5))
+        print(f"the killed recorder's recordings end: {quarters[0]} before their beginning, {shares}")
     if failed:
         sys.exit("\n".join(failed))
 
