@@ -56,6 +56,20 @@ pub(crate) fn examine(args: &DoctorArgs) -> anyhow::Result<Exit> {
     Ok(if report.level == Level::Bad { Exit::Invalid } else { Exit::Passed })
 }
 
+/// The command that grants SCHED_FIFO on this machine.
+pub(crate) fn grant_command() -> String {
+    privileges::grant_command(&SystemRoot::of_this_machine())
+}
+
+/// The command against what disturbs real-time runs most on this machine; none if the doctor knows none.
+pub(crate) fn mending_command() -> Option<String> {
+    let root = &SystemRoot::of_this_machine();
+    let findings = [processors::examine(root), kernel::examine(root)].concat();
+    let with_command = findings.into_iter().rev().filter(|finding| finding.remedy.is_some());
+    // The first of the worst.
+    with_command.max_by_key(|finding| finding.level)?.remedy
+}
+
 fn findings(root: &SystemRoot) -> Vec<Finding> {
     [
         privileges::examine(root),

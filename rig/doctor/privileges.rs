@@ -38,7 +38,12 @@ fn fifo(root: &SystemRoot, priority: u8, obtained: &Obtained) -> Finding {
         format!("priority {priority} refused"),
         "every ordinary task can delay a cycle by milliseconds",
     )
-    .with_remedy(container::start_with(root, "--cap-add SYS_NICE --ulimit rtprio=95", RAISE_LIMITS))
+    .with_remedy(grant_command(root))
+}
+
+/// The command that lets this user have SCHED_FIFO.
+pub(super) fn grant_command(root: &SystemRoot) -> String {
+    container::start_with(root, "--cap-add SYS_NICE --ulimit rtprio=95", RAISE_LIMITS)
 }
 
 fn locked_memory(root: &SystemRoot, obtained: &Obtained) -> Finding {

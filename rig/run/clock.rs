@@ -8,6 +8,7 @@ use masseter_shared::realtime::scheduling::{SchedulingRequest, obtain};
 use masseter_terminal::status;
 
 use super::args::{ClockKind, RunArgs};
+use crate::doctor;
 
 /// The arguments with a clock that this machine can keep: real time where the kernel grants it, otherwise lockstep.
 pub(super) fn choose(args: &RunArgs, scenario: &Scenario) -> RunArgs {
@@ -25,8 +26,10 @@ pub(super) fn choose(args: &RunArgs, scenario: &Scenario) -> RunArgs {
     }
     let Some(refusal) = refusal(scenario) else { return chosen(ClockKind::Rt) };
     if !args.quiet {
+        let live =
+            if args.live.is_some() { "; --live shows a run that is faster than real time" } else { "" };
         status!(
-            "clock: lockstep, because real time is not granted: {refusal}; --clock rt tries it all the same"
+            "clock: lockstep, because real time is not granted: {refusal}; or try --clock rt all the same{live}"
         );
     }
     chosen(ClockKind::Lockstep)
@@ -39,8 +42,12 @@ fn refusal(scenario: &Scenario) -> Option<String> {
     let try_on = |core| {
         let request = SchedulingRequest { core: Some(core), fifo_priority, locked_memory: false };
         // The thread ends with its priority.
-        let tried = thread::spawn(move || obtain(request).refusals);
-        tried.join().expect("asking the kernel does not panic").into_iter().next()
+        let tried = thread::spawn(move || obtain(request));
+        let obtained = tried.join().expect("asking the kernel does not panic");
+        if obtained.core == Some(core) && obtained.fifo_priority != fifo_priority {
+            return Some(format!("SCHED_FIFO is refused; to allow it: {}", doctor::grant_command()));
+        }
+        obtained.refusals.into_iter().next()
     };
     realtime.cores.into_iter().find_map(try_on)
 }

@@ -23,7 +23,7 @@ use masseter_shared::input::read_text;
 use masseter_terminal::{Exit, Failure, OrFailure, status};
 
 use crate::arguments::{check_cores, name_of};
-use crate::{foxglove, machine};
+use crate::{doctor, foxglove, machine};
 use args::{ClockKind, RunArgs};
 use room::Reserve;
 
@@ -56,6 +56,9 @@ pub(crate) fn run(args: &RunArgs) -> Result<Exit, Failure> {
     let motion_s = plan.trajectory.duration_s();
     let clock = name_of(&args.clock);
     let mut manifest = Manifest::new(plan.scenario.clone(), motion_s, &clock, machine::describe());
+    if args.clock == ClockKind::Rt {
+        manifest.mending_command = doctor::mending_command();
+    }
     // This one remains if the supervisor is killed.
     write_manifest(&folder, &manifest)?;
     let no_room = || format!("no room in {} for the verdict", folder.path().display());

@@ -19,8 +19,8 @@ use super::bus_response::{BusResponse, ResponseFigures};
 const JITTER: f64 = 0.1;
 /// Cycles after a message off its time in which the bus may still be crowded.
 const CROWDED_CYCLES: u64 = 2;
-/// Largest share of frames off their times that leaves a bus to be judged by the others.
-const MOST_OFF_TIME: f64 = 0.05;
+/// Fewest frames at their times by which a bus with other frames is judged.
+const FEWEST_ON_TIME: u64 = 10;
 
 /// Follows every frame.
 #[derive(Debug)]
@@ -215,7 +215,7 @@ impl Followed {
         if self.error_frames > 0 {
             return Some(format!("bus {bus} had {}", counted(self.error_frames, "error")));
         }
-        if self.off_time as f64 > self.frames as f64 * MOST_OFF_TIME {
+        if self.off_time > 0 && self.frames - self.off_time < FEWEST_ON_TIME {
             return Some(format!(
                 "{} of {} frames of bus {bus} were off their times",
                 self.off_time, self.frames
@@ -361,6 +361,17 @@ mod tests {
                 2,
                 "they wait longer than a stall explains"
             );
+        }
+        // However many frames are off their times, the others are judged.
+        for (slow, exceeding) in [(0, 0), (397, 2)] {
+            let found = followed_without_faults((1..=400).flat_map(move |cycle| {
+                let shift_ns = if cycle % 4 == 1 && cycle < 390 { 600_000 } else { 0 };
+                let at_ns = cycle * PERIOD_NS + shift_ns;
+                let took_us = if cycle == slow { 500 } else { 120 };
+                [seen(0x080, at_ns, took_us), seen(0x181, at_ns + 60_000, took_us)]
+            }));
+            assert!(found.off_time_frames > 400 && found.unbounded.is_none(), "{found:?}");
+            assert_eq!(found.exceeding().count(), exceeding, "{found:?}");
         }
         let kept = run(0, 100..=100);
         assert_eq!(

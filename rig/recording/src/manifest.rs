@@ -54,6 +54,9 @@ pub struct Manifest {
     pub scheduling: BTreeMap<String, Obtained>,
     /// Request to `/dev/cpu_dma_latency` and its result; none in simulated time.
     pub cpu_dma_latency: Option<DmaLatency>,
+    /// The command against what disturbs real-time runs most on this machine, if one is known and the run is in real time.
+    #[serde(default)]
+    pub mending_command: Option<String>,
     /// Resources that the processes used in their steady state; empty in simulated time.
     pub usage: RunUsage,
     /// How the run ended.
@@ -74,6 +77,7 @@ impl Manifest {
             machine,
             scheduling: BTreeMap::new(),
             cpu_dma_latency: None,
+            mending_command: None,
             usage: RunUsage::default(),
             ending: Ending::died("supervisor", UNJUDGED.to_owned()),
         }

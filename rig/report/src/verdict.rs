@@ -206,7 +206,9 @@ fn remedy(manifest: &Manifest) -> String {
     };
     let is_virtual = manifest.scenario.can.is_virtual();
     let lockstep = if is_virtual { ", --clock lockstep keeps it out of the result" } else { "" };
-    format!("masseter doctor lists what disturbs this machine{lockstep}{latency}")
+    let first = manifest.mending_command.as_ref();
+    let first = first.map_or_else(String::new, |command| format!("; first try: {command}"));
+    format!("masseter doctor lists what disturbs this machine{lockstep}{latency}{first}")
 }
 
 /// The excuse for a safe stop, in words: the machine lost all missed cycles, and many of them just before the stop.

@@ -123,6 +123,9 @@ fn an_invalid_run_says_what_the_machine_lost_and_what_helps() {
     assert_eq!(remedy(&run.manifest), doctor);
     run.manifest.cpu_dma_latency = latency(None);
     assert_eq!(remedy(&run.manifest), format!("{doctor}; realtime.cpu_dma_latency = \"hold\" may help too"));
+    run.manifest.cpu_dma_latency = None;
+    run.manifest.mending_command = Some("echo full".to_owned());
+    assert_eq!(remedy(&run.manifest), format!("{doctor}; first try: echo full"));
     let said = reason(|run| {
         run.overruns(1, 0.5);
         run.figures.controller_skips.while_working = 5;
