@@ -84,8 +84,9 @@ fn write_verdict(
         writeln!(text, "recording played: {}", file.path.display())?;
     }
     text.push('\n');
+    let widest = verdict.checks.iter().map(|check| check.result.mark().len()).max().unwrap_or(0).max(4);
     for check in &verdict.checks {
-        writeln!(text, "  {:<4} {:<18} {}", check.result.mark(), check.name, check.finding)?;
+        writeln!(text, "  {:<widest$} {:<18} {}", check.result.mark(), check.name, check.finding)?;
     }
     Ok(())
 }
