@@ -1,6 +1,7 @@
 //! Command-line arguments that several verbs share, and the parsers of their values.
 
 use std::net::{Ipv4Addr, SocketAddr};
+use std::os::unix::fs::PermissionsExt;
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -51,6 +52,53 @@ impl ControllerKind {
                 Box::new(HoldPosition::new(scenario, mechanism, motion.duration_s()))
             },
         }
+    }
+}
+
+/// Who controls the robot in a run.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) enum ControllerChoice {
+    /// A controller of the rig.
+    Own(ControllerKind),
+    /// A program that the user starts.
+    External,
+    /// A program that the rig starts.
+    Executable(PathBuf),
+}
+
+impl Default for ControllerChoice {
+    fn default() -> Self {
+        Self::Own(ControllerKind::default())
+    }
+}
+
+impl ControllerChoice {
+    /// How a controller of the rig is built; none for a program of the user.
+    pub(crate) fn builder(&self) -> Option<BuildController> {
+        match self {
+            Self::Own(kind) => Some(kind.builder()),
+            Self::External | Self::Executable(_) => None,
+        }
+    }
+}
+
+/// The name of a controller of the rig, `external`, or the path of an executable file.
+pub(crate) fn parse_controller(text: &str) -> Result<ControllerChoice, String> {
+    if let Ok(kind) = ControllerKind::from_str(text, false) {
+        return Ok(ControllerChoice::Own(kind));
+    }
+    if text == "external" {
+        return Ok(ControllerChoice::External);
+    }
+    let path = PathBuf::from(text);
+    match path.metadata() {
+        Ok(found) if found.is_file() && found.permissions().mode() & 0o111 != 0 => {
+            // Without a folder, the system would search PATH.
+            std::path::absolute(path).map(ControllerChoice::Executable).map_err(|error| error.to_string())
+        }
+        Ok(found) if found.is_file() => Err(format!("the file is not executable: chmod +x {text}")),
+        Ok(_) => Err("it is a folder: give the executable file of your controller".to_owned()),
+        Err(error) => Err(format!("use motion, hold, external, or the path of an executable file ({error})")),
     }
 }
 

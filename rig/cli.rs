@@ -73,6 +73,8 @@ enum Verb {
     /// Inverse kinematics of a CSV file: poses to actuator positions
     #[command(after_help = "Example:\n  masseter ik < poses.csv > joints.csv")]
     Ik(CsvArgs),
+    /// Attach a controller of the rig to a rig that waits for one
+    Controller(ControllerArgs),
     /// Emulate the six drives and the mechanism on real CAN interfaces
     Plant(PlantArgs),
     /// Write the report of a run again, or compare two runs
@@ -102,8 +104,6 @@ enum Verb {
     Man(ManArgs),
     #[command(hide = true)]
     BenchPeer(PeerArgs),
-    #[command(hide = true)]
-    Controller(ControllerArgs),
     #[command(hide = true)]
     Recorder(RecorderArgs),
 }
@@ -163,7 +163,7 @@ fn execute(verb: Verb) -> Result<Exit, Failure> {
         Verb::Clean => clean::clean().usage(),
         Verb::Completions(args) => manuals::completions(&args, command()).usage(),
         Verb::Man(args) => manuals::manual(&args, command()).usage(),
-        Verb::Controller(args) => controller::control(args).usage(),
+        Verb::Controller(args) => controller::control(&args).usage(),
         Verb::Plant(args) => plant::plant(&args).usage(),
         Verb::Recorder(args) => recorder::record(args).usage(),
     }

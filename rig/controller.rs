@@ -1,24 +1,52 @@
-//! The hidden verb `controller`: the controller's process, started by the supervisor.
+//! `masseter controller`: one of the rig's controllers as a program that attaches to a rig; with the supervisor's hidden
+//! arguments, the controller's process.
+
+use std::path::PathBuf;
 
 use clap::Args;
 use masseter_controller::process;
 use masseter_shared::control::Outcome;
+use masseter_shared::lifecycle::{Patience, ProcessArguments};
 use masseter_terminal::Exit;
 
-use crate::arguments::{ControllerKind, ProcessArgs};
+use crate::arguments::{ControllerKind, parse_patience};
 
-/// The arguments that the supervisor passes to the controller.
+/// The arguments of `controller`.
 #[derive(Debug, Clone, Args)]
+#[command(
+    after_help = "Example:\n  masseter run --controller external --name bench\n  masseter controller --rig bench"
+)]
 pub(crate) struct ControllerArgs {
-    #[command(flatten)]
-    process: ProcessArgs,
+    /// Name of the rig [default: that of MASSETER_RIG, or the only rig that takes a controller]
+    #[arg(long, value_name = "NAME")]
+    rig: Option<String>,
+    /// Which controller
     #[arg(long, value_enum, default_value_t)]
     kind: ControllerKind,
+    #[arg(long, hide = true, requires = "domain", conflicts_with = "rig")]
+    scenario: Option<PathBuf>,
+    #[arg(long, hide = true, requires = "scenario")]
+    domain: Option<String>,
+    #[arg(long, hide = true, requires = "scenario", value_parser = parse_patience)]
+    lockstep: Option<Patience>,
+}
+
+impl ControllerArgs {
+    /// The arguments from the supervisor; none for a controller that a user starts.
+    fn process_arguments(&self) -> Option<ProcessArguments> {
+        let (scenario, domain) = (self.scenario.clone()?, self.domain.clone()?);
+        Some(ProcessArguments { scenario, domain, lockstep: self.lockstep })
+    }
 }
 
 /// Runs the controller to the end of its motion or a safe stop.
-pub(crate) fn control(args: ControllerArgs) -> anyhow::Result<Exit> {
-    Ok(match process::run(&args.process.process_arguments(), args.kind.builder())? {
+pub(crate) fn control(args: &ControllerArgs) -> anyhow::Result<Exit> {
+    let build = args.kind.builder();
+    let outcome = match args.process_arguments() {
+        Some(arguments) => process::run(&arguments, build)?,
+        None => process::run_attached(args.rig.as_deref(), build)?,
+    };
+    Ok(match outcome {
         Outcome::Finished => Exit::Passed,
         Outcome::SafeStop => Exit::SafeStop,
     })

@@ -1,9 +1,10 @@
 //! The controller's process: the mechanism and the motion of its scenario, and the controller that is built for them.
 
 use masseter_shared::config::Scenario;
-use masseter_shared::control::{Controller, Outcome, process};
+use masseter_shared::control::{Controller, Outcome, Session};
 use masseter_shared::geometry::{GeometryError, Mechanism};
-use masseter_shared::lifecycle::{ProcessArguments, ProcessError};
+use masseter_shared::lifecycle::attach::{AttachError, attach};
+use masseter_shared::lifecycle::{ProcessArguments, ProcessContext, ProcessError};
 
 use crate::trajectory::{Trajectory, TrajectoryError};
 
@@ -16,6 +17,9 @@ pub enum ControllerError {
     /// The start of the process, or its messages.
     #[error(transparent)]
     Process(#[from] ProcessError),
+    /// No rig takes this program.
+    #[error(transparent)]
+    Attach(#[from] AttachError),
     /// The mechanism's dimensions.
     #[error(transparent)]
     Geometry(#[from] GeometryError),
@@ -29,9 +33,21 @@ pub enum ControllerError {
 /// # Errors
 /// [`ControllerError`] when the scenario cannot be used, or the process cannot start or loses its messages.
 pub fn run(arguments: &ProcessArguments, build: BuildController) -> Result<Outcome, ControllerError> {
-    process::run(arguments, |scenario| {
-        let mechanism = Mechanism::new(&scenario.mechanism)?;
-        let trajectory = Trajectory::new(&scenario.motion, &scenario.jaw, &mechanism, scenario.duration_s)?;
-        Ok(build(scenario, mechanism, trajectory))
-    })
+    play(arguments.init()?, build)
+}
+
+/// The same for a rig that waits for a controller: the named one, or as [`attach`] finds it.
+///
+/// # Errors
+/// As [`run`], and when the program cannot attach.
+pub fn run_attached(rig: Option<&str>, build: BuildController) -> Result<Outcome, ControllerError> {
+    play(attach(rig)?, build)
+}
+
+fn play(context: ProcessContext, build: BuildController) -> Result<Outcome, ControllerError> {
+    let scenario = &context.scenario;
+    let mechanism = Mechanism::new(&scenario.mechanism)?;
+    let trajectory = Trajectory::new(&scenario.motion, &scenario.jaw, &mechanism, scenario.duration_s)?;
+    let mut controller = build(scenario, mechanism, trajectory);
+    Ok(Session::start(context)?.run(&mut *controller)?)
 }

@@ -12,7 +12,8 @@ use masseter_terminal::Format;
 use rustix::fs::Mode;
 
 use crate::arguments::{
-    ControllerKind, Wires, parse_address, parse_cores, parse_duration, parse_patience, parse_wires,
+    ControllerChoice, Wires, parse_address, parse_controller, parse_cores, parse_duration, parse_patience,
+    parse_wires,
 };
 use crate::foxglove;
 
@@ -48,9 +49,17 @@ pub(crate) struct RunArgs {
     /// [default: 10s]
     #[arg(long, value_name = "TIME", value_parser = parse_patience, help_heading = HOW)]
     pub patience: Option<Patience>,
-    /// Play the motion, or only hold the position found at the start
-    #[arg(long, value_enum, default_value_t, help_heading = WHAT)]
-    pub controller: ControllerKind,
+    /// Who controls the robot: motion plays the motion, hold keeps the position found at the start, a path starts your own
+    /// program, external waits until you start it [default: motion]
+    #[arg(
+        long,
+        value_name = "motion|hold|external|PATH",
+        value_parser = parse_controller,
+        default_value = "motion",
+        hide_default_value = true,
+        help_heading = WHAT
+    )]
+    pub controller: ControllerChoice,
     /// Simulated buses, or the CAN interface of each bus, such as can0,can1
     #[arg(long, value_name = "virtual|IF[,IF]", value_parser = parse_wires, help_heading = HOW)]
     pub can: Option<Wires>,

@@ -1,22 +1,23 @@
 //! A child process of the supervisor: start, readiness, end. It does not decide what its end means for the run.
 
 use std::ffi::OsString;
-use std::io::{self, BufRead, BufReader, Write};
+use std::io::{self, Write};
 use std::os::unix::process::ExitStatusExt;
 use std::process::{Child, Command, ExitStatus, Stdio};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
-use std::thread;
 use std::time::Duration;
 
 use anyhow::{Context, bail};
-use masseter_shared::lifecycle::{Party, Ready, Silence, Start};
+use masseter_shared::lifecycle::{Order, Party, Silence, Start, line};
+use masseter_shared::realtime::scheduling::Obtained;
 use rustix::process::{Pid, Signal, kill_process};
 
+use super::reports::{Readiness, Reports};
+
 /// Longest time for a process to open its ports and lock its memory.
-const READY_TIMEOUT: Duration = Duration::from_secs(20);
+pub(super) const READY_TIMEOUT: Duration = Duration::from_secs(20);
 
 /// Polling interval while waiting for readiness.
-const POLL: Duration = Duration::from_millis(20);
+pub(super) const POLL: Duration = Duration::from_millis(20);
 
 // The names of the processes, which are also their subcommands.
 pub(super) const CONTROLLER: &str = Party::Controller.name();
@@ -28,7 +29,7 @@ pub(super) struct Process {
     /// Its name.
     pub(super) role: &'static str,
     child: Child,
-    lines: Receiver<String>,
+    reports: Reports,
     status: Option<ExitStatus>,
 }
 
@@ -46,15 +47,7 @@ impl Process {
             })
             .with_context(|| format!("the {role} cannot be started"))?;
         let output = child.stdout.take().expect("standard output is piped");
-        let (sender, lines) = channel();
-        thread::spawn(move || {
-            for line in BufReader::new(output).lines().map_while(Result::ok) {
-                if sender.send(line).is_err() {
-                    break;
-                }
-            }
-        });
-        Ok(Self { role, child, lines, status: None })
+        Ok(Self { role, child, reports: Reports::of(output), status: None })
     }
 
     /// Its process id.
@@ -63,42 +56,30 @@ impl Process {
     }
 
     /// Waits until it reports that it is ready; none if `is_cancelled` becomes true first.
-    pub(super) fn wait_ready(&mut self, is_cancelled: impl Fn() -> bool) -> anyhow::Result<Option<Ready>> {
+    pub(super) fn wait_ready(&mut self, is_cancelled: impl Fn() -> bool) -> anyhow::Result<Option<Obtained>> {
         let not_ready = || format!("the {} did not get ready", self.role);
-        let mut polls = READY_TIMEOUT.as_millis() / POLL.as_millis();
-        loop {
-            match self.lines.recv_timeout(POLL) {
-                Ok(line) => {
-                    let ready =
-                        serde_json::from_str(&line).with_context(|| format!("its report is '{line}'"));
-                    return ready.map(Some).with_context(not_ready);
-                }
+        for _ in 0..READY_TIMEOUT.as_millis() / POLL.as_millis() {
+            match self.reports.await_ready(POLL).with_context(not_ready)? {
+                Readiness::Ready(scheduling) => return Ok(Some(scheduling)),
                 // Ctrl-C also reaches the process, and may end it before it handles signals.
-                Err(_) if is_cancelled() => return Ok(None),
-                Err(RecvTimeoutError::Timeout) if polls > 0 => polls -= 1,
-                Err(RecvTimeoutError::Timeout) => {
-                    bail!("{}: no report within {} s", not_ready(), READY_TIMEOUT.as_secs())
-                }
-                Err(RecvTimeoutError::Disconnected) => {
-                    bail!("{}: it ended; see its message above", not_ready())
-                }
+                _ if is_cancelled() => return Ok(None),
+                Readiness::NotYet => {}
+                Readiness::Closed => bail!("{}: it ended; see its message above", not_ready()),
             }
         }
+        bail!("{}: no report within {} s", not_ready(), READY_TIMEOUT.as_secs())
     }
 
     /// Starts its work.
     pub(super) fn start(&mut self, start: Start) -> io::Result<()> {
         let input = self.child.stdin.as_mut().expect("standard input is piped");
-        serde_json::to_writer(&mut *input, &start)?;
-        writeln!(input)
+        input.write_all(line(&Order::Start(start)).as_bytes())
     }
 
     /// Its report that another process was silent, if it has made one.
     pub(super) fn reported_silence(&mut self) -> Option<Silence> {
         let has_ended = matches!(self.exit_status(), Ok(Some(_)));
-        let parse = |line: String| serde_json::from_str(&line).ok();
-        // The last lines of a process that has ended may still be on their way.
-        if has_ended { self.lines.iter().find_map(parse) } else { self.lines.try_iter().find_map(parse) }
+        self.reports.silence(has_ended)
     }
 
     /// Its exit status, if it has ended.

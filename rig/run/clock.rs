@@ -69,6 +69,9 @@ pub(super) fn check(args: &RunArgs, scenario: &Scenario) -> anyhow::Result<()> {
     if args.clock == ClockKind::Lockstep {
         return Ok(());
     }
+    if args.controller.builder().is_none() {
+        bail!("--controller with a program of yours needs --clock rt or lockstep: virtual time has one process");
+    }
     if args.name.is_some() {
         bail!("--name needs --clock rt or lockstep: virtual time has no processes to name");
     }

@@ -33,8 +33,11 @@ pub(super) fn of_plant_and_recorder(
     }
 }
 
+/// The cause of death of a process that did not end when it was asked to.
+pub(super) const NOT_ENDED: &str = "it did not end after SIGTERM, and was killed";
+
 pub(super) fn died(role: &str, status: Option<ExitStatus>) -> Ending {
-    let how = status.map_or_else(|| "it did not end after SIGTERM, and was killed".to_owned(), describe);
+    let how = status.map_or_else(|| NOT_ENDED.to_owned(), describe);
     Ending::died(role, how)
 }
 

@@ -6,7 +6,10 @@
 pub(crate) mod args;
 mod child;
 mod clock;
+mod controller;
 mod ending;
+mod program;
+mod reports;
 mod room;
 mod supervisor;
 mod usage;
@@ -64,7 +67,7 @@ pub(crate) fn run(args: &RunArgs) -> Result<Exit, Failure> {
     let no_room = || format!("no room in {} for the verdict", folder.path().display());
     let reserve = Reserve::take(folder.path()).with_context(no_room).incomplete()?;
     let ran = match domain {
-        None => virtual_time::run(plan, &folder, args.controller.builder())
+        None => virtual_time::run(plan, &folder, args.controller.builder().expect("the clock is checked"))
             .map(|ending| manifest.ending = ending)
             .incomplete(),
         Some(domain) => supervisor::run(domain, plan, &folder, args, &mut manifest),

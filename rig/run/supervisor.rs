@@ -17,7 +17,8 @@ use masseter_plan::RunPlan;
 use masseter_recording::{DmaLatency, Ending, Manifest, RunFolder};
 use masseter_shared::clock::{self, MILLISECOND_NS, SECOND_NS};
 use masseter_shared::config::Scenario;
-use masseter_shared::lifecycle::{Party, Silence, Start};
+use masseter_shared::lifecycle::attach::Invitation;
+use masseter_shared::lifecycle::{End, Party, Silence, Start};
 use masseter_shared::lockstep;
 use masseter_shared::realtime::scheduling::Obtained;
 use masseter_shared::schedule::OFF_TICK_NS;
@@ -26,10 +27,11 @@ use masseter_terminal::{Exit, Failure, OrFailure, status};
 
 use super::args::RunArgs;
 use super::child::{CONTROLLER, PLANT, Process, RECORDER};
-use super::ending::{died, of_plant_and_recorder, of_run};
+use super::controller::Controller;
+use super::ending::{NOT_ENDED, died, of_plant_and_recorder, of_run};
 use super::room::reserve_shared_memory;
 use super::usage::UsageMeter;
-use crate::arguments::{name_of, patience_text};
+use crate::arguments::patience_text;
 use crate::machine::interrupts::Interrupts;
 use crate::machine::{self, SystemRoot, dma_latency};
 
@@ -126,7 +128,7 @@ struct Rig {
     is_lockstep: bool,
     recorder: Process,
     plant: Process,
-    controller: Process,
+    controller: Controller,
 }
 
 impl Rig {
@@ -140,7 +142,7 @@ impl Rig {
         let mut recorder_arguments = with(vec!["--recording".into(), folder.recording().into(), motion]);
         recorder_arguments.extend(args.quiet.then(|| "--quiet".into()));
         recorder_arguments.extend(args.live.map(|address| format!("--live={address}").into()));
-        let controller_arguments = with(vec!["--kind".into(), name_of(&args.controller).into()]);
+        let invitation = Invitation::new(std::path::absolute(folder.scenario())?, lockstep);
         let Scenario { controller, can, .. } = &plan.scenario;
         // It stops the motion, holds it, and switches the drives off.
         let stop_s = controller.stop_ramp_s + controller.hold_s + controller.start_timeout_s;
@@ -154,7 +156,7 @@ impl Rig {
             is_lockstep: lockstep.is_some(),
             recorder: Process::spawn(RECORDER, &recorder_arguments)?,
             plant: Process::spawn(PLANT, &common)?,
-            controller: Process::spawn(CONTROLLER, &controller_arguments)?,
+            controller: Controller::start_process(&args.controller, domain, invitation, common)?,
         })
     }
 
@@ -192,8 +194,8 @@ impl Rig {
         }
         let epoch_ns = next_epoch_ns(plan.scenario.period_ns());
         self.start(epoch_ns)?;
-        let processes = [&self.recorder, &self.plant, &self.controller];
-        let names_and_ids = processes.map(|process| (process.role, process.id()));
+        let names_and_ids =
+            [(RECORDER, self.recorder.id()), (PLANT, self.plant.id()), (CONTROLLER, self.controller.id())];
         let mut meter = UsageMeter::new(epoch_ns, &names_and_ids);
         let ending = self.monitor(interrupts, |now_ns| meter.update(now_ns))?;
         manifest.usage = meter.finish();
@@ -207,10 +209,16 @@ impl Rig {
 
     /// The scheduling of each process once all are ready; none if the user interrupts before.
     fn wait_ready(&mut self, interrupts: &Interrupts) -> anyhow::Result<Option<Scheduling>> {
+        let is_cancelled = || interrupts.is_stop_requested();
+        let ready = [
+            (RECORDER, self.recorder.wait_ready(is_cancelled)),
+            (PLANT, self.plant.wait_ready(is_cancelled)),
+            (CONTROLLER, self.controller.wait_ready(is_cancelled)),
+        ];
         let mut scheduling = BTreeMap::new();
-        for process in [&mut self.recorder, &mut self.plant, &mut self.controller] {
-            match process.wait_ready(|| interrupts.is_stop_requested()) {
-                Ok(Some(ready)) => scheduling.insert(process.role.to_owned(), ready.scheduling),
+        for (role, ready) in ready {
+            match ready {
+                Ok(Some(obtained)) => scheduling.insert(role.to_owned(), obtained),
                 Ok(None) => return Ok(None),
                 Err(error) => {
                     // Ctrl-C also reaches the processes, and may have ended this one before the supervisor sees it.
@@ -225,25 +233,25 @@ impl Rig {
     /// Sends the start message with the time of the first SYNC, ns.
     fn start(&mut self, epoch_ns: u64) -> io::Result<()> {
         let loops = [self.controller.id(), self.plant.id()];
-        for process in [&mut self.recorder, &mut self.plant, &mut self.controller] {
-            process.start(Start { epoch_ns, loops })?;
-        }
-        Ok(())
+        let start = Start { epoch_ns, loops };
+        self.recorder.start(start)?;
+        self.plant.start(start)?;
+        self.controller.start(start)
     }
 
     /// Monitors the processes until the controller has ended, then ends plant and recorder. Calls `at` with the time.
     fn monitor(&mut self, interrupts: &Interrupts, mut at: impl FnMut(u64)) -> anyhow::Result<Ending> {
         let mut interruption = None;
         let mut give_up_ns = None;
-        let status = loop {
+        let end_of_controller = loop {
             if interrupts.is_abort_requested() {
                 return Ok(Ending::Interrupted);
             }
             if interruption.is_none() {
                 interruption = self.interrupt_controller(interrupts)?;
             }
-            if let Some(status) = self.controller.exit_status()? {
-                break Some(status);
+            if let Some(end) = self.controller.end()? {
+                break Some(end);
             }
             let now_ns = clock::now_ns();
             let give_up_after_ns = now_ns.saturating_add(self.stop_timeout_ns);
@@ -254,7 +262,7 @@ impl Rig {
             at(now_ns);
             clock::sleep(POLL);
         };
-        let controller = self.controller_ending(status, interrupts)?;
+        let controller = self.controller_ending(end_of_controller, interrupts)?;
         let plant = end(&mut self.plant, END_TIMEOUT_NS, interrupts)?;
         let recorder = end(&mut self.recorder, RECORD_TIMEOUT_NS, interrupts)?;
         if interrupts.is_abort_requested() {
@@ -292,36 +300,31 @@ impl Rig {
     /// Kills the first process that was reported to be silent in lockstep, if any. Were it stopped and went on, it would
     /// find the others silent.
     fn end_silent(&mut self) -> Option<Ending> {
-        let reports = [&mut self.controller, &mut self.plant].map(Process::reported_silence);
+        let reports = [self.controller.reported_silence(), self.plant.reported_silence()];
         let Silence { process, cycle, silent_s } = reports.into_iter().flatten().next()?;
-        let process = match process {
-            Party::Controller => &mut self.controller,
-            Party::Plant => &mut self.plant,
-            Party::Recorder => &mut self.recorder,
-        };
-        process.kill();
+        match process {
+            Party::Controller => self.controller.kill(),
+            Party::Plant => self.plant.kill(),
+            Party::Recorder => self.recorder.kill(),
+        }
         let how =
             format!("it did not answer in cycle {cycle} for {silent_s:.1} s (--patience), and was killed");
-        Some(Ending::died(process.role, how))
+        Some(Ending::died(process.name(), how))
     }
 
     /// The controller's ending. If it died, waits for the plant's master to stop the drives.
-    fn controller_ending(
-        &mut self,
-        status: Option<ExitStatus>,
-        interrupts: &Interrupts,
-    ) -> io::Result<Ending> {
+    fn controller_ending(&mut self, end: Option<End>, interrupts: &Interrupts) -> io::Result<Ending> {
         if let Some(ending) = self.end_silent() {
             return Ok(ending);
         }
-        match status.and_then(|status| status.code()) {
-            Some(code) if code == Exit::Passed as i32 => Ok(Ending::Completed),
-            Some(code) if code == Exit::SafeStop as i32 => Ok(Ending::SafeStop),
-            _ => {
-                wait_for(&mut self.plant, self.plant_alone_ns, interrupts)?;
-                Ok(died(CONTROLLER, status))
-            }
-        }
+        let reason = match end {
+            Some(End::Finished) => return Ok(Ending::Completed),
+            Some(End::SafeStop) => return Ok(Ending::SafeStop),
+            Some(End::Failed { reason }) => reason,
+            None => NOT_ENDED.to_owned(),
+        };
+        wait_for(&mut self.plant, self.plant_alone_ns, interrupts)?;
+        Ok(Ending::died(CONTROLLER, reason))
     }
 }
 

@@ -1,13 +1,15 @@
 //! Simulated time in three processes: plant and controller take turns, and the plant never runs far ahead of the recorder.
 //!
 //! A turn ends with a signal to the other loop, after all messages of the turn. A process that waits sleeps. Whoever
-//! stops answering for longer than the [`Patience`] is given up: the process that waits says so on standard output and
+//! stops answering for longer than the [`Patience`] is given up: the process that waits reports that to the supervisor and
 //! goes on alone, in real time, so that its watchdogs end the run.
 
 use std::time::Duration;
 
 use crate::clock;
-use crate::lifecycle::{Party, Patience, ProcessContext, ProcessError, Silence, StopRequest};
+use crate::lifecycle::{
+    Party, Patience, ProcessContext, ProcessError, Report, Silence, StopRequest, SupervisorLink,
+};
 use crate::realtime::{Cycle, Waiter, Wake};
 use crate::transport::{DomainError, SignalReceiver, SignalSender};
 
@@ -59,6 +61,7 @@ pub struct Lockstep {
     recorder: SignalSender,
     patience: Patience,
     stop: StopRequest,
+    supervisor: SupervisorLink,
     waiter: Waiter,
     first_due_ns: u64,
     period_ns: u64,
@@ -92,6 +95,7 @@ impl Lockstep {
             recorder: SignalSender::open(node, Party::Recorder.name())?,
             patience,
             stop: context.stop.clone(),
+            supervisor: context.link.clone(),
             waiter: Waiter::new(period_ns),
             first_due_ns: EPOCH_NS,
             period_ns,
@@ -167,6 +171,24 @@ impl Lockstep {
         Ok(ended.is_some())
     }
 
+    /// Whether the other loop ends its turn within this time, which [`Self::await_turn`] then returns at once. The patience
+    /// does not count here.
+    ///
+    /// # Errors
+    /// Those of the signals.
+    pub fn is_turn_within(&mut self, timeout: Duration) -> Result<bool, DomainError> {
+        let until_ns = clock::now_ns() + timeout.as_nanos() as u64;
+        while self.arrived & (1 << TURN_ENDED | 1 << LAST_TURN_ENDED) == 0 && self.lost.is_none() {
+            let left_ns = until_ns.saturating_sub(clock::now_ns());
+            match self.signals.receive_within(Duration::from_nanos(left_ns))? {
+                Some(signal) => self.arrived |= 1 << signal,
+                None if left_ns == 0 => return Ok(false),
+                None => {}
+            }
+        }
+        Ok(true)
+    }
+
     /// Takes note of a cycle that left this many messages on the fullest topic. Waits if the recorder lags behind.
     ///
     /// # Errors
@@ -216,7 +238,8 @@ impl Lockstep {
             let waits = if from == Party::Plant { 2 } else { 1 };
             if !self.patience.lasts(silent_ns / waits) {
                 self.lost = Some(from);
-                Silence { process: from, cycle: self.cycle, silent_s: silent_ns as f64 / 1e9 }.report()?;
+                let silence = Silence { process: from, cycle: self.cycle, silent_s: silent_ns as f64 / 1e9 };
+                self.supervisor.report(&Report::Silence(silence)).map_err(ProcessError::Supervisor)?;
             } else if silent_since_stop_ns / waits >= STOP_PATIENCE_NS {
                 self.lost = Some(from);
             }

@@ -72,11 +72,17 @@ pub fn run_cycle<P: ControllerPorts>(
     ports.publish_command(|command| controller.fill_command(command))?;
     ports.publish_state(|state| {
         controller.fill_state(state);
-        (state.due_ns, state.woke_ns) = (wake.due_ns, wake.woke_ns);
-        (state.received_ns, state.solved_ns, state.commanded_ns) = (received_ns, solved_ns, commanded_ns);
-        (state.skipped_cycles, state.stalled_ns) = (wake.skipped, wake.account.stalled_ns);
-        (state.spun_ns, state.worked_ns) = (wake.account.spun_ns, wake.account.worked_ns);
-        state.overlong_ns = wake.account.overlong_ns;
+        stamp(state, wake, [received_ns, solved_ns, commanded_ns]);
     })?;
     event.map_or(Ok(()), |event| ports.publish_event(&event))
+}
+
+/// Enters the cycle's times and the use of time into a state: when the reading was received, the pose was found, and the
+/// command was ready.
+pub(super) fn stamp(state: &mut State, wake: &Wake, [received_ns, solved_ns, commanded_ns]: [u64; 3]) {
+    (state.due_ns, state.woke_ns) = (wake.due_ns, wake.woke_ns);
+    (state.received_ns, state.solved_ns, state.commanded_ns) = (received_ns, solved_ns, commanded_ns);
+    (state.skipped_cycles, state.stalled_ns) = (wake.skipped, wake.account.stalled_ns);
+    (state.spun_ns, state.worked_ns) = (wake.account.spun_ns, wake.account.worked_ns);
+    state.overlong_ns = wake.account.overlong_ns;
 }

@@ -1,15 +1,16 @@
-//! The seam between the rig and a controller: the trait, the order of a cycle, and the process.
+//! The seam between the rig and a controller: the trait, the order of a cycle, and a controller's part in a run.
 //!
-//! A [`Controller`] is a pure step function. Only [`run_cycle`] orders a cycle. [`process::run`] calls it in
-//! real time; the runner of virtual time calls it in one thread. Kinematics, trajectories and safety of a
+//! A [`Controller`] is a pure step function. Only [`run_cycle`] orders a cycle. [`Session::run`] calls it in
+//! real time and in lockstep; the runner of virtual time calls it in one thread. Kinematics, trajectories and safety of a
 //! particular controller are not here.
 
 mod cycle;
-pub mod process;
+mod session;
 
 use crate::messages::{Command, Event, Reading, State};
 
 pub use cycle::{ControllerPorts, run_cycle};
+pub use session::{Session, SessionError, Waited};
 
 /// A cycle's place in time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

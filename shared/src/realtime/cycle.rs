@@ -63,6 +63,11 @@ impl Cycle {
         self.first_due_ns + (cycle - 1) * self.period_ns
     }
 
+    /// When the next deadline is due, ns; it may have passed.
+    pub fn next_due_ns(&self) -> u64 {
+        self.due_ns(self.next + 1)
+    }
+
     /// The next deadline that is at most a period past at `now_ns`, counting those before it as skipped.
     fn claim(&mut self, now_ns: u64) -> u64 {
         self.next += 1;

@@ -7,6 +7,8 @@ use std::path::PathBuf;
 use std::thread;
 use std::time::Duration;
 
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use rustix::io::Errno;
 use rustix::net::{RecvFlags, recv};
 
 use super::error::{DomainError, file_error};
@@ -71,6 +73,20 @@ impl SignalReceiver {
             Ok(_) => Ok(Some(signal[0])),
             Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted) => Ok(None),
             Err(error) => Err(file_error("receive at", &self.path)(error)),
+        }
+    }
+
+    /// The next signal, if it comes within this time; without any time, this only looks.
+    ///
+    /// # Errors
+    /// When the socket fails.
+    pub fn receive_within(&mut self, timeout: Duration) -> Result<Option<u8>, DomainError> {
+        let timeout = Timespec { tv_sec: timeout.as_secs() as i64, tv_nsec: i64::from(timeout.subsec_nanos()) };
+        let arrived = poll(&mut [PollFd::new(&self.socket, PollFlags::IN)], Some(&timeout));
+        match arrived {
+            Ok(0) | Err(Errno::INTR) => Ok(None),
+            Ok(_) => self.receive(),
+            Err(error) => Err(file_error("receive at", &self.path)(error.into())),
         }
     }
 

@@ -1,23 +1,26 @@
 //! Start and end of a process of the rig.
 //!
-//! The process writes one line of JSON to standard output: that it is ready, and the scheduling that the kernel granted. It
-//! reads the epoch of the first cycle and the process ids of both loops from standard input. SIGTERM requests an orderly
-//! end; the kernel also sends SIGTERM when the supervisor dies. All data travel over iceoryx2.
+//! The process reports to the supervisor that it is ready, and the scheduling that the kernel granted. It gets the epoch of
+//! the first cycle and the process ids of both loops. The own processes use standard output and input for that; SIGTERM
+//! requests their orderly end, and the kernel also sends SIGTERM when the supervisor dies. A program of the user
+//! [attaches](attach) over a socket. All data travel over iceoryx2.
 
-use std::io::{self, Write};
+pub mod attach;
+mod link;
+
+use std::io;
 use std::path::PathBuf;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-use rustix::process::{Signal, set_parent_process_death_signal};
 use serde::{Deserialize, Serialize};
-use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 
 use crate::config::{Scenario, ScenarioError};
-use crate::realtime::scheduling::{Obtained, SchedulingRequest, obtain};
+use crate::realtime::scheduling::{SchedulingRequest, obtain};
 use crate::schedule::{CycleSchedule, ScheduleError};
 use crate::transport::{Domain, DomainError, Node, TransportError};
+
+pub(crate) use link::SupervisorLink;
+pub use link::{End, Order, Report, Start, StopRequest, line};
 
 /// The arguments of a process.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -75,21 +78,6 @@ pub struct Silence {
     pub silent_s: f64,
 }
 
-impl Silence {
-    /// Reports it to the supervisor.
-    ///
-    /// # Errors
-    /// [`ProcessError::Pipe`].
-    pub fn report(&self) -> Result<(), ProcessError> {
-        report(self)
-    }
-}
-
-fn report(message: &impl Serialize) -> Result<(), ProcessError> {
-    let line = serde_json::to_string(message).expect("plain data");
-    writeln!(io::stdout(), "{line}").map_err(ProcessError::Pipe)
-}
-
 /// The context of an initialised process.
 #[derive(Debug)]
 pub struct ProcessContext {
@@ -103,6 +91,7 @@ pub struct ProcessContext {
     pub lockstep: Option<Patience>,
     /// The request to end.
     pub stop: StopRequest,
+    pub(crate) link: SupervisorLink,
 }
 
 /// Why a process could not start or run.
@@ -123,9 +112,9 @@ pub enum ProcessError {
     /// Signals cannot be received.
     #[error("cannot listen for signals: {0}")]
     Signals(io::Error),
-    /// The pipes to the supervisor failed.
-    #[error("the pipe to the supervisor failed: {0}")]
-    Pipe(io::Error),
+    /// The line to the supervisor failed.
+    #[error("the line to the supervisor failed: {0}")]
+    Supervisor(io::Error),
     /// The supervisor ended before the start, or cancelled the start.
     #[error("the supervisor ended or cancelled the start")]
     NoStart,
@@ -135,15 +124,23 @@ impl ProcessArguments {
     /// Reads the scenario, joins the domain and listens for the request to end.
     pub fn init(&self) -> Result<ProcessContext, ProcessError> {
         let stop = StopRequest::listen().map_err(ProcessError::Signals)?;
-        let scenario = Scenario::read(&self.scenario)?;
-        scenario.validate()?;
-        let schedule = CycleSchedule::new(&scenario.can, scenario.period_ns())?;
-        let node = Node::join(&Domain::named(&self.domain)?)?;
-        Ok(ProcessContext { scenario, schedule, node, lockstep: self.lockstep, stop })
+        ProcessContext::new(self, stop, SupervisorLink::Pipes)
     }
 }
 
 impl ProcessContext {
+    fn new(
+        arguments: &ProcessArguments,
+        stop: StopRequest,
+        link: SupervisorLink,
+    ) -> Result<Self, ProcessError> {
+        let scenario = Scenario::read(&arguments.scenario)?;
+        scenario.validate()?;
+        let schedule = CycleSchedule::new(&scenario.can, scenario.period_ns())?;
+        let node = Node::join(&Domain::named(&arguments.domain)?)?;
+        Ok(Self { scenario, schedule, node, lockstep: arguments.lockstep, stop, link })
+    }
+
     /// Reports that the process is ready, and waits for the start; before, requests real-time scheduling on `core`, or none
     /// without a core and in lockstep. The ports are open by then, and none may use another user's memory.
     pub fn ready(&self, core: Option<usize>) -> Result<Start, ProcessError> {
@@ -155,58 +152,11 @@ impl ProcessContext {
             fifo_priority: core.map(|_| realtime.priority),
             locked_memory: core.is_some() && realtime.lock_memory,
         });
-        report(&Ready { scheduling })?;
-        let mut line = String::new();
-        io::stdin().read_line(&mut line).map_err(ProcessError::Pipe)?;
-        serde_json::from_str(&line).map_err(|_| ProcessError::NoStart)
-    }
-}
-
-/// The report that a process is ready.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Ready {
-    /// The requested and the granted scheduling.
-    pub scheduling: Obtained,
-}
-
-/// The start of the first cycle.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Start {
-    /// Time of the first SYNC, ns of `CLOCK_MONOTONIC`.
-    pub epoch_ns: u64,
-    /// Process ids of controller and plant, for the recorder.
-    pub loops: [u32; 2],
-}
-
-/// A request to end, made by a signal.
-#[derive(Debug, Clone)]
-pub struct StopRequest(Arc<AtomicBool>);
-
-impl StopRequest {
-    /// Listens for SIGTERM, also on the supervisor's death. A terminal sends SIGINT and SIGHUP to the whole
-    /// process group; the supervisor reacts to them, and this process ignores them.
-    fn listen() -> io::Result<Self> {
-        Self::by(&[SIGINT, SIGHUP])?;
-        let requested = Self::by(&[SIGTERM])?;
-        set_parent_process_death_signal(Some(Signal::TERM))?;
-        Ok(requested)
+        self.report(&Report::Ready { scheduling })?;
+        self.link.await_start().map_err(ProcessError::Supervisor)?.ok_or(ProcessError::NoStart)
     }
 
-    /// Listens for SIGTERM and SIGINT, in a process without a supervisor.
-    pub fn listen_alone() -> io::Result<Self> {
-        Self::by(&[SIGTERM, SIGINT])
-    }
-
-    fn by(signals: &[i32]) -> io::Result<Self> {
-        let requested = Arc::default();
-        for &signal in signals {
-            signal_hook::flag::register(signal, Arc::clone(&requested))?;
-        }
-        Ok(Self(requested))
-    }
-
-    /// Whether a signal has requested the end.
-    pub fn is_made(&self) -> bool {
-        self.0.load(Ordering::Relaxed)
+    pub(crate) fn report(&self, report: &Report) -> Result<(), ProcessError> {
+        self.link.report(report).map_err(ProcessError::Supervisor)
     }
 }

@@ -1,0 +1,101 @@
+//! The controller as the supervisor sees it: the rig's own process, or a program of the user.
+
+use std::ffi::OsString;
+use std::io;
+
+use masseter_shared::lifecycle::{End, Silence, Start};
+use masseter_shared::lifecycle::attach::Invitation;
+use masseter_shared::realtime::scheduling::Obtained;
+use masseter_shared::transport::Domain;
+use masseter_terminal::Exit;
+
+use super::child::{CONTROLLER, Process, describe};
+use super::program::Program;
+use crate::arguments::{ControllerChoice, name_of};
+
+/// The controller of a run.
+pub(super) enum Controller {
+    Own(Process),
+    Program(Program),
+}
+
+impl Controller {
+    /// Starts the chosen controller, or listens for one.
+    pub(super) fn start_process(
+        choice: &ControllerChoice,
+        domain: &Domain,
+        invitation: Invitation,
+        arguments: Vec<OsString>,
+    ) -> anyhow::Result<Self> {
+        Ok(match choice {
+            ControllerChoice::Own(kind) => {
+                let kind = ["--kind".into(), name_of(kind).into()];
+                Self::Own(Process::spawn(CONTROLLER, &[arguments, kind.to_vec()].concat())?)
+            }
+            ControllerChoice::External => Self::Program(Program::external(domain, invitation)?),
+            ControllerChoice::Executable(path) => {
+                Self::Program(Program::executable(domain, invitation, path)?)
+            }
+        })
+    }
+
+    /// Its process id; 0 where it is not known.
+    pub(super) fn id(&self) -> u32 {
+        match self {
+            Self::Own(process) => process.id(),
+            Self::Program(program) => program.id(),
+        }
+    }
+
+    /// Waits until it reports that it is ready; none if `is_cancelled` becomes true first.
+    pub(super) fn wait_ready(&mut self, is_cancelled: impl Fn() -> bool) -> anyhow::Result<Option<Obtained>> {
+        match self {
+            Self::Own(process) => process.wait_ready(is_cancelled),
+            Self::Program(program) => program.wait_ready(is_cancelled),
+        }
+    }
+
+    /// Starts its work.
+    pub(super) fn start(&mut self, start: Start) -> io::Result<()> {
+        match self {
+            Self::Own(process) => process.start(start),
+            Self::Program(program) => program.start(start),
+        }
+    }
+
+    /// Its report that another process was silent, if it has made one.
+    pub(super) fn reported_silence(&mut self) -> Option<Silence> {
+        match self {
+            Self::Own(process) => process.reported_silence(),
+            Self::Program(program) => program.reported_silence(),
+        }
+    }
+
+    /// How it ended its work; none while it works.
+    pub(super) fn end(&mut self) -> io::Result<Option<End>> {
+        match self {
+            Self::Program(program) => program.end(),
+            Self::Own(process) => Ok(process.exit_status()?.map(|status| match status.code() {
+                Some(code) if code == Exit::Passed as i32 => End::Finished,
+                Some(code) if code == Exit::SafeStop as i32 => End::SafeStop,
+                _ => End::Failed { reason: describe(status) },
+            })),
+        }
+    }
+
+    /// Asks it to end.
+    pub(super) fn terminate(&mut self) {
+        match self {
+            Self::Own(process) => process.terminate(),
+            Self::Program(program) => program.terminate(),
+        }
+    }
+
+    /// Ends it at once, unless the user has started it.
+    pub(super) fn kill(&mut self) {
+        match self {
+            Self::Own(process) => process.kill(),
+            Self::Program(program) => program.kill(),
+        }
+    }
+}

@@ -1,0 +1,337 @@
+//! A controller's part in a run: bound to iceoryx2, and to real time or to lockstep. It decides nothing.
+
+use std::time::Duration;
+
+use super::cycle::stamp;
+use super::{Controller, ControllerPorts, Outcome, Tick, run_cycle};
+use crate::clock;
+use crate::lifecycle::{End, Party, ProcessContext, ProcessError};
+use crate::lockstep::{Clock, Lockstep};
+use crate::messages::{Command, Event, Reading, State};
+use crate::realtime::{Cycle, Wake};
+use crate::transport::{Publisher, ReceivedMessage, Subscriber, TransportError};
+
+/// A started run, from the side of its controller.
+///
+/// Either [`Self::run`] runs a [`Controller`] to its end; or a program runs the cycles itself: [`Self::wait`],
+/// [`Self::publish`], and at last [`Self::finish`] or [`Self::fail`]. Nothing is published beside the cycle's own time:
+/// a cycle begins with [`Self::wait`] and ends with the next one.
+///
+/// ```no_run
+/// use masseter_shared::control::{Outcome, Session, Waited};
+/// use masseter_shared::lifecycle::attach::attach;
+/// use masseter_shared::messages::codes::DriveRequest;
+/// use masseter_shared::messages::{Command, State};
+///
+/// let mut session = Session::start(attach(None)?)?;
+/// while !session.is_stop_requested() {
+///     let Waited::Cycle { tick, reading } = session.wait(None)? else { continue };
+///     let reading_cycle = reading.map_or(0, |reading| reading.cycle);
+///     let request = DriveRequest::Off.code();
+///     let command = Command { cycle: tick.cycle, reading_cycle, request, ..Command::default() };
+///     session.publish(&command, &State { cycle: tick.cycle, reading_cycle, ..State::default() })?;
+/// }
+/// session.finish(Outcome::Finished)?;
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Debug)]
+pub struct Session {
+    context: ProcessContext,
+    ports: Ports,
+    /// The cycle whose turn has not ended.
+    cycle: Option<OpenCycle>,
+}
+
+/// A cycle that has begun.
+#[derive(Debug, Clone, Copy)]
+struct OpenCycle {
+    wake: Wake,
+    received_ns: u64,
+    is_published: bool,
+}
+
+/// What a wait led to.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[expect(clippy::large_enum_variant, reason = "it lives for a moment")]
+pub enum Waited {
+    /// A cycle has begun.
+    Cycle {
+        /// Its number and time.
+        tick: Tick,
+        /// The newest reading; none where no new one arrived in time.
+        reading: Option<Reading>,
+    },
+    /// None has begun within the given time.
+    TimedOut,
+}
+
+/// Why a message was not published.
+#[derive(Debug, thiserror::Error)]
+pub enum SessionError {
+    /// A message before the first cycle.
+    #[error("no cycle has begun: call wait first")]
+    NoCycle,
+    /// A second command.
+    #[error("cycle {cycle} has its command already: call wait for the next cycle")]
+    Published {
+        /// The cycle.
+        cycle: u64,
+    },
+    /// The transport or the supervisor.
+    #[error(transparent)]
+    Process(#[from] ProcessError),
+}
+
+impl Session {
+    /// Opens the ports, reports ready, and waits for the start of the run.
+    ///
+    /// # Errors
+    /// [`ProcessError`] when the ports cannot be opened, or the start is cancelled.
+    pub fn start(context: ProcessContext) -> Result<Self, ProcessError> {
+        let ports = Ports::open(&context)?;
+        Ok(Self { context, ports, cycle: None })
+    }
+
+    /// Runs a controller until it is done.
+    ///
+    /// # Errors
+    /// [`ProcessError`] when messages cannot be exchanged.
+    pub fn run(mut self, controller: &mut dyn Controller) -> Result<Outcome, ProcessError> {
+        loop {
+            if let Some(outcome) = controller.outcome() {
+                self.finish(outcome)?;
+                return Ok(outcome);
+            }
+            if self.is_stop_requested() {
+                controller.request_stop();
+            }
+            self.end_turn(false)?;
+            let wake = self.ports.wait(controller)?;
+            run_cycle(controller, &mut self.ports, &wake)?;
+            self.cycle = Some(OpenCycle { wake, received_ns: 0, is_published: true });
+        }
+    }
+
+    /// Whether an orderly end is requested: bring the motion to rest, switch the drives off, then [`Self::finish`].
+    pub fn is_stop_requested(&self) -> bool {
+        self.context.stop.is_made()
+    }
+
+    /// The context of the run: its scenario and time table.
+    pub fn context(&self) -> &ProcessContext {
+        &self.context
+    }
+
+    /// Ends the current cycle and waits for the next; with a time-out of zero, only looks whether it has begun.
+    ///
+    /// # Errors
+    /// [`ProcessError`] when messages cannot be exchanged.
+    pub fn wait(&mut self, timeout: Option<Duration>) -> Result<Waited, ProcessError> {
+        self.end_turn(false)?;
+        if let Some(timeout) = timeout
+            && !self.ports.begins_within(timeout)?
+        {
+            return Ok(Waited::TimedOut);
+        }
+        let wake = self.ports.wait_for_cycle()?;
+        let reading = self.ports.reading(&wake)?.map(|reading| *reading);
+        let received_ns = self.ports.now_ns();
+        self.cycle = Some(OpenCycle { wake, received_ns, is_published: false });
+        Ok(Waited::Cycle { tick: Tick { cycle: wake.cycle, now_ns: received_ns }, reading })
+    }
+
+    /// Publishes this cycle's command and what the program made of the reading. The session enters the time stamps and the
+    /// use of time into the state.
+    ///
+    /// # Errors
+    /// [`SessionError`] for a second command in one cycle, before the first cycle, or when it cannot be sent.
+    pub fn publish(&mut self, command: &Command, state: &State) -> Result<(), SessionError> {
+        let OpenCycle { wake, received_ns, is_published } = self.cycle.ok_or(SessionError::NoCycle)?;
+        if is_published {
+            return Err(SessionError::Published { cycle: wake.cycle });
+        }
+        let commanded_ns = self.ports.now_ns();
+        self.ports.publish_command(|message| *message = *command)?;
+        self.ports.publish_state(|message| {
+            *message = *state;
+            stamp(message, &wake, [received_ns, commanded_ns, commanded_ns]);
+        })?;
+        self.cycle = Some(OpenCycle { wake, received_ns, is_published: true });
+        Ok(())
+    }
+
+    /// Publishes an event.
+    ///
+    /// # Errors
+    /// [`ProcessError`] when it cannot be sent.
+    pub fn publish_event(&mut self, event: &Event) -> Result<(), ProcessError> {
+        self.ports.publish_event(event)
+    }
+
+    /// Ends the work in order.
+    ///
+    /// # Errors
+    /// [`ProcessError`] when the supervisor is gone.
+    pub fn finish(mut self, outcome: Outcome) -> Result<(), ProcessError> {
+        let end = match outcome {
+            Outcome::Finished => End::Finished,
+            Outcome::SafeStop => End::SafeStop,
+        };
+        self.end(end)
+    }
+
+    /// Ends the work because the program cannot go on. The plant's master stops the drives, since no command follows.
+    ///
+    /// # Errors
+    /// [`ProcessError`] when the supervisor is gone.
+    pub fn fail(mut self, reason: &str) -> Result<(), ProcessError> {
+        self.end(End::Failed { reason: reason.to_owned() })
+    }
+
+    fn end(&mut self, end: End) -> Result<(), ProcessError> {
+        self.end_turn(true)?;
+        self.context.link.end(end).map_err(ProcessError::Supervisor)
+    }
+
+    /// Ends the turn of a cycle that has begun, in lockstep.
+    fn end_turn(&mut self, is_last: bool) -> Result<(), ProcessError> {
+        if self.cycle.take().is_some() || is_last {
+            self.ports.end_turn(is_last)?;
+        }
+        Ok(())
+    }
+}
+
+/// The controller's ports on iceoryx2, and the deadlines of its cycles.
+#[derive(Debug)]
+struct Ports {
+    readings: Subscriber<Reading>,
+    commands: Publisher<Command>,
+    states: Publisher<State>,
+    events: Publisher<Event>,
+    clock: Clock,
+    /// From the deadline until the newest reading is used, whichever that is, ns.
+    reading_timeout_ns: u64,
+}
+
+impl Ports {
+    /// Opens the ports, reports ready, and connects to the ports of the other processes before the first cycle, since a
+    /// connection makes and maps files.
+    fn open(context: &ProcessContext) -> Result<Self, ProcessError> {
+        let (node, scenario, schedule) = (&context.node, &context.scenario, &context.schedule);
+        let readings = node.newest_subscriber()?;
+        let (commands, states) = (node.publisher::<Command>()?, node.publisher::<State>()?);
+        let events = node.publisher::<Event>()?;
+        commands.warm_up()?;
+        states.warm_up()?;
+        events.warm_up()?;
+        let lockstep = context
+            .lockstep
+            .map(|patience| Lockstep::open(context, patience, Party::Controller, Party::Plant));
+        let lockstep = lockstep.transpose()?;
+        let start = context.ready(Some(scenario.realtime.cores[0]))?;
+        readings.connect()?;
+        commands.connect()?;
+        states.connect()?;
+        events.connect()?;
+        let first_due_ns = start.epoch_ns + schedule.controller_at_ns;
+        let clock = match lockstep {
+            None => Clock::RealTime(Cycle::new(first_due_ns, scenario.period_ns())),
+            Some(mut lockstep) => {
+                lockstep.start(first_due_ns);
+                Clock::Lockstep(lockstep)
+            }
+        };
+        Ok(Self {
+            readings,
+            commands,
+            states,
+            events,
+            clock,
+            reading_timeout_ns: (schedule.command_by_ns - schedule.controller_at_ns) / 2,
+        })
+    }
+
+    /// Waits for the next deadline. Before it, warms the controller up and touches the memory of the next messages.
+    fn wait(&mut self, controller: &dyn Controller) -> Result<Wake, TransportError> {
+        match &mut self.clock {
+            Clock::RealTime(cycle) => cycle.wait_warm(|| {
+                controller.warm_up();
+                self.commands.warm_up()?;
+                self.states.warm_up()
+            }),
+            Clock::Lockstep(lockstep) => Ok(lockstep.begin_cycle()),
+        }
+    }
+
+    /// Waits for the next deadline, without a controller that needs warming up.
+    fn wait_for_cycle(&mut self) -> Result<Wake, TransportError> {
+        match &mut self.clock {
+            Clock::RealTime(cycle) => cycle.wait_warm(|| {
+                self.commands.warm_up()?;
+                self.states.warm_up()
+            }),
+            Clock::Lockstep(lockstep) => Ok(lockstep.begin_cycle()),
+        }
+    }
+
+    /// Whether the next cycle begins within this time. Sleeps for that time otherwise.
+    fn begins_within(&mut self, timeout: Duration) -> Result<bool, ProcessError> {
+        match &mut self.clock {
+            Clock::RealTime(cycle) => {
+                let begins = cycle.next_due_ns() <= clock::now_ns() + timeout.as_nanos() as u64;
+                if !begins {
+                    clock::sleep(timeout);
+                }
+                Ok(begins)
+            }
+            Clock::Lockstep(lockstep) => Ok(lockstep.is_turn_within(timeout)?),
+        }
+    }
+
+    /// Ends the controller's turn in lockstep.
+    fn end_turn(&mut self, is_last: bool) -> Result<(), ProcessError> {
+        match &mut self.clock {
+            Clock::RealTime(_) => Ok(()),
+            Clock::Lockstep(lockstep) => Ok(lockstep.end_turn(is_last)?),
+        }
+    }
+}
+
+impl ControllerPorts for Ports {
+    type Reading = ReceivedMessage<Reading>;
+    type Error = ProcessError;
+
+    fn now_ns(&self) -> u64 {
+        self.clock.now_ns()
+    }
+
+    fn reading(&mut self, wake: &Wake) -> Result<Option<ReceivedMessage<Reading>>, ProcessError> {
+        let is_awaited = |reading: &Reading| reading.cycle >= wake.cycle;
+        let reading = match &mut self.clock {
+            Clock::RealTime(cycle) => {
+                let deadline_ns = wake.due_ns + self.reading_timeout_ns;
+                self.readings.latest_by(deadline_ns, cycle.waiter(), is_awaited)?
+            }
+            Clock::Lockstep(lockstep) => {
+                if !lockstep.await_turn()? {
+                    return Ok(None);
+                }
+                self.readings.latest_by(0, lockstep.waiter(), is_awaited)?
+            }
+        };
+        Ok(reading.map(ReceivedMessage::checked).transpose()?)
+    }
+
+    fn publish_command(&mut self, fill: impl FnOnce(&mut Command)) -> Result<(), ProcessError> {
+        Ok(self.commands.publish_by(|| self.clock.now_ns(), fill)?)
+    }
+
+    fn publish_state(&mut self, fill: impl FnOnce(&mut State)) -> Result<(), ProcessError> {
+        Ok(self.states.publish_by(|| self.clock.now_ns(), fill)?)
+    }
+
+    fn publish_event(&mut self, event: &Event) -> Result<(), ProcessError> {
+        Ok(self.events.publish_by(|| self.clock.now_ns(), |message| *message = *event)?)
+    }
+}

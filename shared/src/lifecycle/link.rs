@@ -1,0 +1,190 @@
+//! The line between a process of the rig and its supervisor: JSON, one message a line. No data of the run travel here.
+
+use std::io::{self, BufRead, BufReader, Write};
+use std::os::unix::net::UnixStream;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, channel};
+use std::sync::{Arc, Mutex};
+use std::thread;
+
+use rustix::net::{SendFlags, send};
+use rustix::process::{Signal, set_parent_process_death_signal};
+use serde::{Deserialize, Serialize};
+use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+
+use super::Silence;
+use crate::realtime::scheduling::Obtained;
+
+/// A message of a process to the supervisor.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Report {
+    /// The ports are open.
+    Ready {
+        /// The requested and the granted scheduling.
+        scheduling: Obtained,
+    },
+    /// Another process has stopped answering, in lockstep.
+    Silence(Silence),
+    /// An attached program has ended its work. The own processes end with an exit code instead.
+    Ended(End),
+}
+
+/// How an attached program ended its work.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum End {
+    /// It did what it was asked to.
+    Finished,
+    /// A fault ended the motion.
+    SafeStop,
+    /// It cannot go on.
+    Failed {
+        /// Why.
+        reason: String,
+    },
+}
+
+/// A message of the supervisor to a process.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Order {
+    /// Start of the first cycle.
+    Start(Start),
+    /// Come to an orderly end. The own processes get SIGTERM instead.
+    Stop,
+}
+
+/// The start of the first cycle.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Start {
+    /// Time of the first SYNC, ns of `CLOCK_MONOTONIC`.
+    pub epoch_ns: u64,
+    /// Process ids of controller and plant, for the recorder.
+    pub loops: [u32; 2],
+}
+
+/// A message as its line.
+///
+/// # Panics
+/// Never: messages are plain data.
+pub fn line(message: &impl Serialize) -> String {
+    serde_json::to_string(message).expect("plain data") + "\n"
+}
+
+/// The process's end of the line.
+#[derive(Debug, Clone)]
+pub(crate) enum SupervisorLink {
+    /// Standard input and output of a process that the supervisor has started from its own executable.
+    Pipes,
+    /// The socket of an attached program, whose standard input and output are the user's.
+    Socket(Arc<Socket>),
+}
+
+/// An attached program's end of the socket.
+#[derive(Debug)]
+pub(crate) struct Socket {
+    stream: UnixStream,
+    starts: Mutex<Receiver<Start>>,
+}
+
+impl SupervisorLink {
+    /// The line over a connected socket, and the request to end: an order, or the end of the supervisor.
+    pub(crate) fn over(stream: UnixStream) -> io::Result<(Self, StopRequest)> {
+        let input = BufReader::new(stream.try_clone()?);
+        let (sender, starts) = channel();
+        let stop = StopRequest::default();
+        let to_request = stop.clone();
+        thread::Builder::new().name("supervisor".to_owned()).spawn(move || {
+            for line in input.lines().map_while(Result::ok) {
+                match serde_json::from_str(&line) {
+                    Ok(Order::Start(start)) if sender.send(start).is_ok() => {}
+                    _ => break,
+                }
+            }
+            to_request.make();
+        })?;
+        Ok((Self::Socket(Arc::new(Socket { stream, starts: Mutex::new(starts) })), stop))
+    }
+
+    pub(crate) fn report(&self, report: &Report) -> io::Result<()> {
+        match self {
+            Self::Pipes => io::stdout().write_all(line(report).as_bytes()),
+            Self::Socket(socket) => send_all(&socket.stream, line(report).as_bytes()),
+        }
+    }
+
+    /// Waits for the start; none when the supervisor ends or cancels it.
+    pub(crate) fn await_start(&self) -> io::Result<Option<Start>> {
+        match self {
+            Self::Pipes => {
+                let mut line = String::new();
+                io::stdin().read_line(&mut line)?;
+                Ok(match serde_json::from_str(&line) {
+                    Ok(Order::Start(start)) => Some(start),
+                    _ => None,
+                })
+            }
+            Self::Socket(socket) => {
+                Ok(socket.starts.lock().ok().and_then(|starts| starts.recv().ok()))
+            }
+        }
+    }
+
+    /// Reports the end of an attached program's work. An exit code reports that of the own processes.
+    pub(crate) fn end(&self, end: End) -> io::Result<()> {
+        match self {
+            Self::Pipes => Ok(()),
+            Self::Socket(_) => self.report(&Report::Ended(end)),
+        }
+    }
+}
+
+/// Sends without SIGPIPE, which would end a program that is not written in Rust.
+pub(crate) fn send_all(stream: &UnixStream, mut bytes: &[u8]) -> io::Result<()> {
+    while !bytes.is_empty() {
+        match send(stream, bytes, SendFlags::NOSIGNAL) {
+            Ok(sent) => bytes = &bytes[sent..],
+            Err(rustix::io::Errno::INTR) => {}
+            Err(error) => return Err(error.into()),
+        }
+    }
+    Ok(())
+}
+
+/// A request to end.
+#[derive(Debug, Clone, Default)]
+pub struct StopRequest(Arc<AtomicBool>);
+
+impl StopRequest {
+    /// Listens for SIGTERM, also on the supervisor's death. A terminal sends SIGINT and SIGHUP to the whole
+    /// process group; the supervisor reacts to them, and this process ignores them.
+    pub(super) fn listen() -> io::Result<Self> {
+        Self::by(&[SIGINT, SIGHUP])?;
+        let requested = Self::by(&[SIGTERM])?;
+        set_parent_process_death_signal(Some(Signal::TERM))?;
+        Ok(requested)
+    }
+
+    /// Listens for SIGTERM and SIGINT, in a process without a supervisor.
+    pub fn listen_alone() -> io::Result<Self> {
+        Self::by(&[SIGTERM, SIGINT])
+    }
+
+    fn by(signals: &[i32]) -> io::Result<Self> {
+        let requested = Self::default();
+        for &signal in signals {
+            signal_hook::flag::register(signal, Arc::clone(&requested.0))?;
+        }
+        Ok(requested)
+    }
+
+    fn make(&self) {
+        self.0.store(true, Ordering::Relaxed);
+    }
+
+    /// Whether the end has been requested.
+    pub fn is_made(&self) -> bool {
+        self.0.load(Ordering::Relaxed)
+    }
+}
