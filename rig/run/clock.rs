@@ -13,6 +13,14 @@ use crate::doctor;
 /// The arguments with a clock that this machine can keep: real time where the kernel grants it, otherwise lockstep.
 pub(super) fn choose(args: &RunArgs, scenario: &Scenario) -> RunArgs {
     let chosen = |clock| RunArgs { clock, ..args.clone() };
+    if args.clock == ClockKind::Virtual && args.controller.builder().is_none() {
+        if !args.quiet {
+            status!(
+                "clock: lockstep, which gives the bytes of virtual: your controller is a process of its own"
+            );
+        }
+        return chosen(ClockKind::Lockstep);
+    }
     // Whoever names a patience wants the clock that has one.
     if args.clock == ClockKind::Auto && args.patience.is_some() {
         return chosen(ClockKind::Lockstep);
@@ -68,9 +76,6 @@ pub(super) fn check(args: &RunArgs, scenario: &Scenario) -> anyhow::Result<()> {
     }
     if args.clock == ClockKind::Lockstep {
         return Ok(());
-    }
-    if args.controller.builder().is_none() {
-        bail!("--controller with a program of yours needs --clock rt or lockstep: virtual time has one process");
     }
     if args.name.is_some() {
         bail!("--name needs --clock rt or lockstep: virtual time has no processes to name");

@@ -3,8 +3,8 @@
 use std::ffi::OsString;
 use std::io;
 
-use masseter_shared::lifecycle::{End, Silence, Start};
 use masseter_shared::lifecycle::attach::Invitation;
+use masseter_shared::lifecycle::{End, Silence, Start};
 use masseter_shared::realtime::scheduling::Obtained;
 use masseter_shared::transport::Domain;
 use masseter_terminal::Exit;

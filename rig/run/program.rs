@@ -93,7 +93,9 @@ impl Program {
         loop {
             self.admit()?;
             let readiness = match &mut self.admitted {
-                Some(admitted) => admitted.reports.await_ready(POLL).context("the controller did not get ready")?,
+                Some(admitted) => {
+                    admitted.reports.await_ready(POLL).context("the controller did not get ready")?
+                }
                 None => {
                     clock::sleep(POLL);
                     Readiness::NotYet
@@ -151,8 +153,8 @@ impl Program {
                 status!("masseter: a program that attaches to '{}' is refused: {reason}", self.rig);
             }
             if (&stream).write_all(line(&answer).as_bytes()).is_ok() && is_admitted {
-                let process_id =
-                    socket_peercred(&stream).map_or(0, |peer| peer.pid.as_raw_nonzero().get().cast_unsigned());
+                let process_id = socket_peercred(&stream)
+                    .map_or(0, |peer| peer.pid.as_raw_nonzero().get().cast_unsigned());
                 let reports = Reports::of(stream.try_clone()?);
                 self.admitted = Some(Admitted { stream, process_id, reports });
             }
@@ -254,5 +256,8 @@ fn receive_hello(stream: &UnixStream) -> io::Result<Option<Hello>> {
     // The program sends nothing more before the answer, so nothing is lost in this buffer.
     BufReader::new(io::Read::take(stream, 4096)).read_line(&mut text)?;
     stream.set_read_timeout(None)?;
+    if text.is_empty() {
+        return Err(ErrorKind::UnexpectedEof.into());
+    }
     Ok(serde_json::from_str(&text).ok())
 }

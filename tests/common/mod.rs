@@ -122,8 +122,13 @@ impl Workspace {
 
     /// Runs the rig under virtual time.
     pub(crate) fn run_virtual(&self, arguments: &[&str]) -> Output {
+        self.run_simulated("virtual", arguments)
+    }
+
+    /// Runs the rig in simulated time: `virtual` or `lockstep`.
+    pub(crate) fn run_simulated(&self, clock: &str, arguments: &[&str]) -> Output {
         let mut command = self.masseter_run(arguments);
-        command.args(["--clock", "virtual"]).output().expect("masseter starts")
+        command.args(["--clock", clock]).output().expect("masseter starts")
     }
 
     /// Starts a run under virtual time.

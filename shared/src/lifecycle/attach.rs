@@ -15,6 +15,7 @@ use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 
+use super::link::send_all;
 use super::{Patience, ProcessArguments, ProcessContext, ProcessError, SupervisorLink, line};
 use crate::messages::{Command, Event, Message, Reading, State};
 use crate::transport::{Domain, DomainError};
@@ -49,7 +50,10 @@ impl Hello {
     pub fn difference(&self) -> Option<(String, String)> {
         let own = Self::new().layouts;
         let theirs = |index: usize| self.layouts.get(index).cloned().unwrap_or_default();
-        own.into_iter().enumerate().map(|(index, own)| (theirs(index), own)).find(|(theirs, own)| theirs != own)
+        own.into_iter()
+            .enumerate()
+            .map(|(index, own)| (theirs(index), own))
+            .find(|(theirs, own)| theirs != own)
     }
 }
 
@@ -185,7 +189,7 @@ pub fn attach(rig: Option<&str>) -> Result<ProcessContext, AttachError> {
 }
 
 fn greet(stream: &UnixStream) -> io::Result<Answer> {
-    super::link::send_all(stream, line(&Hello::new()).as_bytes())?;
+    send_all(stream, line(&Hello::new()).as_bytes())?;
     stream.set_read_timeout(Some(ANSWER_TIMEOUT))?;
     let mut text = String::new();
     // The rig sends nothing more before this program is ready, so nothing is lost in this buffer.

@@ -1,4 +1,4 @@
-//! The line between a process of the rig and its supervisor: JSON, one message a line. No data of the run travel here.
+//! The line between a process of the rig and its supervisor. What travels on it is in [`protocol`](super::protocol).
 
 use std::io::{self, BufRead, BufReader, Write};
 use std::os::unix::net::UnixStream;
@@ -9,68 +9,9 @@ use std::thread;
 
 use rustix::net::{SendFlags, send};
 use rustix::process::{Signal, set_parent_process_death_signal};
-use serde::{Deserialize, Serialize};
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 
-use super::Silence;
-use crate::realtime::scheduling::Obtained;
-
-/// A message of a process to the supervisor.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Report {
-    /// The ports are open.
-    Ready {
-        /// The requested and the granted scheduling.
-        scheduling: Obtained,
-    },
-    /// Another process has stopped answering, in lockstep.
-    Silence(Silence),
-    /// An attached program has ended its work. The own processes end with an exit code instead.
-    Ended(End),
-}
-
-/// How an attached program ended its work.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum End {
-    /// It did what it was asked to.
-    Finished,
-    /// A fault ended the motion.
-    SafeStop,
-    /// It cannot go on.
-    Failed {
-        /// Why.
-        reason: String,
-    },
-}
-
-/// A message of the supervisor to a process.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Order {
-    /// Start of the first cycle.
-    Start(Start),
-    /// Come to an orderly end. The own processes get SIGTERM instead.
-    Stop,
-}
-
-/// The start of the first cycle.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Start {
-    /// Time of the first SYNC, ns of `CLOCK_MONOTONIC`.
-    pub epoch_ns: u64,
-    /// Process ids of controller and plant, for the recorder.
-    pub loops: [u32; 2],
-}
-
-/// A message as its line.
-///
-/// # Panics
-/// Never: messages are plain data.
-pub fn line(message: &impl Serialize) -> String {
-    serde_json::to_string(message).expect("plain data") + "\n"
-}
+use super::protocol::{End, Order, Report, Start, line};
 
 /// The process's end of the line.
 #[derive(Debug, Clone)]
@@ -125,9 +66,7 @@ impl SupervisorLink {
                     _ => None,
                 })
             }
-            Self::Socket(socket) => {
-                Ok(socket.starts.lock().ok().and_then(|starts| starts.recv().ok()))
-            }
+            Self::Socket(socket) => Ok(socket.starts.lock().ok().and_then(|starts| starts.recv().ok())),
         }
     }
 

@@ -7,20 +7,20 @@
 
 pub mod attach;
 mod link;
+mod protocol;
 
 use std::io;
 use std::path::PathBuf;
 use std::time::Duration;
-
-use serde::{Deserialize, Serialize};
 
 use crate::config::{Scenario, ScenarioError};
 use crate::realtime::scheduling::{SchedulingRequest, obtain};
 use crate::schedule::{CycleSchedule, ScheduleError};
 use crate::transport::{Domain, DomainError, Node, TransportError};
 
+pub use link::StopRequest;
 pub(crate) use link::SupervisorLink;
-pub use link::{End, Order, Report, Start, StopRequest, line};
+pub use protocol::{End, Order, Party, Report, Silence, Start, line};
 
 /// The arguments of a process.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -42,40 +42,6 @@ impl Patience {
     pub fn lasts(self, silent_ns: u64) -> bool {
         self.0.is_none_or(|patience| u128::from(silent_ns) < patience.as_nanos())
     }
-}
-
-/// A process of a run.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Party {
-    /// The controller.
-    Controller,
-    /// The plant.
-    Plant,
-    /// The recorder.
-    Recorder,
-}
-
-impl Party {
-    /// Its name, which is also its subcommand.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Controller => "controller",
-            Self::Plant => "plant",
-            Self::Recorder => "recorder",
-        }
-    }
-}
-
-/// The report that another process has stopped answering, in lockstep.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Silence {
-    /// The silent process.
-    pub process: Party,
-    /// The cycle in which it was waited for.
-    pub cycle: u64,
-    /// For how long, s.
-    pub silent_s: f64,
 }
 
 /// The context of an initialised process.

@@ -81,7 +81,8 @@ impl SignalReceiver {
     /// # Errors
     /// When the socket fails.
     pub fn receive_within(&mut self, timeout: Duration) -> Result<Option<u8>, DomainError> {
-        let timeout = Timespec { tv_sec: timeout.as_secs() as i64, tv_nsec: i64::from(timeout.subsec_nanos()) };
+        let timeout =
+            Timespec { tv_sec: timeout.as_secs() as i64, tv_nsec: i64::from(timeout.subsec_nanos()) };
         let arrived = poll(&mut [PollFd::new(&self.socket, PollFlags::IN)], Some(&timeout));
         match arrived {
             Ok(0) | Err(Errno::INTR) => Ok(None),

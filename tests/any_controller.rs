@@ -1,0 +1,195 @@
+//! A program as the controller: started by the rig or by hand, in lockstep and in real time. The rig watches and judges it as
+//! its own; programs that cannot take part are refused with the reason.
+
+mod common;
+
+use std::fs;
+use std::io::{BufRead, BufReader, Write};
+use std::os::unix::fs::PermissionsExt;
+use std::os::unix::net::UnixStream;
+use std::path::PathBuf;
+use std::process::{Child, Command, Output, Stdio};
+
+use common::{Cores, LENIENT, MASSETER, PASSED_OR_INVALID, Workspace, masseter, stderr, stdout, wait_until};
+use masseter_shared::lifecycle::attach::socket;
+use masseter_shared::transport::Domain;
+use rustix::process::{Pid, Signal, kill_process};
+
+const SCENARIO: &str = "duration_s = 1.0\n";
+
+/// An executable script in the workspace.
+fn script(workspace: &Workspace, text: &str) -> PathBuf {
+    let path = workspace.write("controller.sh", &format!("#!/bin/sh\n{text}\n"));
+    fs::set_permissions(&path, fs::Permissions::from_mode(0o755)).unwrap();
+    path
+}
+
+/// A rig in lockstep that waits for a controller.
+fn waiting(workspace: &Workspace, name: &str) -> Child {
+    let child = workspace.start_lockstep(&["--controller", "external", "--name", name]);
+    let socket = socket(&Domain::named(name).unwrap());
+    wait_until("the rig waits", || UnixStream::connect(&socket).is_ok());
+    child
+}
+
+/// The rig's own controller as a program.
+fn attach(arguments: &[&str]) -> Command {
+    let mut command = Command::new(MASSETER);
+    command.arg("controller").args(arguments).env_remove("MASSETER_RIG");
+    command
+}
+
+fn unique(name: &str) -> String {
+    format!("{name}-{}", std::process::id())
+}
+
+fn run(workspace: &Workspace, controller: &PathBuf, clock: &str) -> Output {
+    let controller = controller.to_str().unwrap();
+    workspace.run_simulated(clock, &["--quiet", "--controller", controller])
+}
+
+#[test]
+fn a_program_leaves_the_bytes_of_the_rigs_own_controller() {
+    let own = Workspace::new(SCENARIO);
+    assert_eq!(own.run_virtual(&["--quiet"]).status.code(), Some(0));
+
+    let by_hand = Workspace::new(SCENARIO);
+    let name = unique("by-hand");
+    let rig = waiting(&by_hand, &name);
+    assert_eq!(attach(&["--rig", &name]).status().unwrap().code(), Some(0));
+    let output = rig.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    assert!(by_hand.recording() == own.recording());
+
+    for clock in ["lockstep", "virtual"] {
+        let started = Workspace::new(SCENARIO);
+        let program = script(&started, &format!("echo a line of the program\nexec {MASSETER} controller"));
+        let output = run(&started, &program, clock);
+        assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+        assert!(started.recording() == own.recording(), "{clock}");
+        assert_eq!(started.manifest()["clock"], "lockstep");
+        let printed =
+            (stdout(&output).contains("of the program"), stderr(&output).contains("of the program"));
+        assert_eq!(printed, (false, true), "standard output is the rig's");
+    }
+}
+
+#[test]
+fn a_program_controls_the_robot_in_real_time() {
+    let cores = Cores::take();
+    let workspace = Workspace::new(&format!("{SCENARIO}{LENIENT}"));
+    let program = script(&workspace, &format!("exec {MASSETER} controller --kind hold"));
+    let controller = program.to_str().unwrap();
+    let output = workspace.run(&cores, &["--quiet", "--controller", controller]);
+    assert!(PASSED_OR_INVALID.contains(&output.status.code()), "{}{}", stdout(&output), stderr(&output));
+    assert!(workspace.manifest()["scheduling"]["controller"].is_object());
+}
+
+#[test]
+fn a_program_that_dies_or_never_attaches_is_named_with_its_exit_and_the_drives_stop() {
+    let workspace = Workspace::new(SCENARIO);
+    let output = run(&workspace, &script(&workspace, "exit 3"), "lockstep");
+    let said = stderr(&output);
+    assert_eq!(output.status.code(), Some(4), "{said}");
+    assert!(said.contains("ended (exit code 3) before it was ready"), "{said}");
+
+    let workspace = Workspace::new("duration_s = 60.0\n");
+    let pid = workspace.file("pid");
+    let text = format!("echo $$ > {}\nexec {MASSETER} controller", pid.display());
+    let program = script(&workspace, &text);
+    let rig = workspace.start_lockstep(&["--controller", program.to_str().unwrap()]);
+    common::wait_until_it_records(&workspace);
+    let pid: i32 = fs::read_to_string(pid).unwrap().trim().parse().unwrap();
+    kill_process(Pid::from_raw(pid).unwrap(), Signal::KILL).unwrap();
+    let output = rig.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(4), "{}", stdout(&output));
+    assert!(
+        stdout(&output).contains("controller") && stdout(&output).contains("SIGKILL"),
+        "{}",
+        stdout(&output)
+    );
+}
+
+#[test]
+fn a_program_that_hangs_is_given_up_by_its_silence() {
+    let workspace = Workspace::new("duration_s = 60.0\n");
+    let pid = workspace.file("pid");
+    let program = script(&workspace, &format!("echo $$ > {}\nexec {MASSETER} controller", pid.display()));
+    let controller = program.to_str().unwrap();
+    let rig = workspace.start_lockstep(&["--controller", controller, "--patience", "1s"]);
+    common::wait_until_it_records(&workspace);
+    let pid: i32 = fs::read_to_string(pid).unwrap().trim().parse().unwrap();
+    kill_process(Pid::from_raw(pid).unwrap(), Signal::STOP).unwrap();
+    let output = rig.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(4), "{}", stdout(&output));
+    assert!(stdout(&output).contains("did not answer in cycle"), "{}", stdout(&output));
+}
+
+#[test]
+fn a_second_program_another_version_and_a_stranger_are_refused_and_the_run_goes_on() {
+    let workspace = Workspace::new(SCENARIO);
+    let name = unique("strangers");
+    let rig = waiting(&workspace, &name);
+    let path = socket(&Domain::named(&name).unwrap());
+    let answer_to = |greeting: &str| {
+        let mut stream = UnixStream::connect(&path).unwrap();
+        writeln!(stream, "{greeting}").unwrap();
+        let mut answer = String::new();
+        BufReader::new(stream).read_line(&mut answer).unwrap();
+        answer
+    };
+    let other = answer_to(r#"{"layouts":["masseter/Reading/0000000000000000"]}"#);
+    assert!(other.contains("refused") && other.contains("build it against this version"), "{other}");
+    let stranger = answer_to("GET / HTTP/1.1");
+    assert!(stranger.contains("refused") && stranger.contains("greeting"), "{stranger}");
+
+    let hello = serde_json::to_string(&masseter_shared::lifecycle::attach::Hello::new()).unwrap();
+    let mut first = UnixStream::connect(&path).unwrap();
+    writeln!(first, "{hello}").unwrap();
+    let mut answer = String::new();
+    BufReader::new(&first).read_line(&mut answer).unwrap();
+    assert!(answer.contains("invited"), "{answer}");
+    let second = attach(&["--rig", &name]).output().unwrap();
+    assert_eq!(second.status.code(), Some(2));
+    assert!(stderr(&second).contains("has its controller"), "{}", stderr(&second));
+
+    // The first one leaves before it is ready: the rig waits for the next.
+    drop(first);
+    wait_until("another program is admitted", || {
+        attach(&["--rig", &name]).stderr(Stdio::null()).status().unwrap().success()
+    });
+    let output = rig.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(0), "{}{}", stdout(&output), stderr(&output));
+    assert!(stderr(&output).contains("is refused"), "{}", stderr(&output));
+}
+
+#[test]
+fn without_such_a_rig_those_that_wait_are_listed() {
+    let workspace = Workspace::new(SCENARIO);
+    let name = unique("listed");
+    let rig = waiting(&workspace, &name);
+    let output = attach(&["--rig", "nowhere"]).output().unwrap();
+    assert_eq!(output.status.code(), Some(2));
+    let said = stderr(&output);
+    assert!(said.contains("no rig named 'nowhere' takes a controller") && said.contains(&name), "{said}");
+    let id = Pid::from_child(&rig);
+    kill_process(id, Signal::INT).unwrap();
+    let output = rig.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(130), "{}", stderr(&output));
+}
+
+#[test]
+fn a_file_that_is_no_executable_is_refused_before_anything_starts() {
+    let workspace = Workspace::new(SCENARIO);
+    let plain = workspace.write("plain.txt", "no program");
+    for (controller, expected) in [
+        (plain.to_str().unwrap(), "chmod +x"),
+        (workspace.file("none").to_str().unwrap(), "motion, hold, external"),
+        (std::env::temp_dir().to_str().unwrap(), "it is a folder"),
+        ("moton", "motion, hold, external"),
+    ] {
+        let output = masseter(&["run", "--controller", controller]);
+        assert_eq!(output.status.code(), Some(2));
+        assert!(stderr(&output).contains(expected), "{}", stderr(&output));
+    }
+}
