@@ -7,7 +7,7 @@ use std::fs;
 use std::io::{BufRead, BufReader, Write};
 use std::os::unix::fs::PermissionsExt;
 use std::os::unix::net::UnixStream;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 
 use common::{Cores, LENIENT, MASSETER, PASSED_OR_INVALID, Workspace, masseter, stderr, stdout, wait_until};
@@ -43,7 +43,7 @@ fn unique(name: &str) -> String {
     format!("{name}-{}", std::process::id())
 }
 
-fn run(workspace: &Workspace, controller: &PathBuf, clock: &str) -> Output {
+fn run(workspace: &Workspace, controller: &Path, clock: &str) -> Output {
     let controller = controller.to_str().unwrap();
     workspace.run_simulated(clock, &["--quiet", "--controller", controller])
 }

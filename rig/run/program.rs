@@ -91,17 +91,7 @@ impl Program {
         }
         let mut polls = READY_TIMEOUT.as_millis() / POLL.as_millis();
         loop {
-            self.admit()?;
-            let readiness = match &mut self.admitted {
-                Some(admitted) => {
-                    admitted.reports.await_ready(POLL).context("the controller did not get ready")?
-                }
-                None => {
-                    clock::sleep(POLL);
-                    Readiness::NotYet
-                }
-            };
-            match readiness {
+            match self.await_readiness()? {
                 Readiness::Ready(scheduling) => return Ok(Some(scheduling)),
                 _ if is_cancelled() => return Ok(None),
                 // The user may correct it and start it again.
@@ -114,6 +104,15 @@ impl Program {
             }
             self.check_executable(polls > 0)?;
         }
+    }
+
+    fn await_readiness(&mut self) -> anyhow::Result<Readiness> {
+        self.admit()?;
+        if let Some(admitted) = &mut self.admitted {
+            return admitted.reports.await_ready(POLL).context("the controller did not get ready");
+        }
+        clock::sleep(POLL);
+        Ok(Readiness::NotYet)
     }
 
     /// Refuses an executable that has ended or has taken too long.

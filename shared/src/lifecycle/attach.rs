@@ -172,10 +172,8 @@ pub fn socket(domain: &Domain) -> PathBuf {
 pub fn attach(rig: Option<&str>) -> Result<ProcessContext, AttachError> {
     let named = rig.map(str::to_owned).or_else(|| env::var(RIG_VARIABLE).ok());
     let rig = named.map_or_else(only_rig, Ok)?;
-    let stream = UnixStream::connect(socket(&Domain::named(&rig)?));
-    let stream = match stream {
-        Ok(stream) => stream,
-        Err(_) => return Err(AttachError::NoSuchRig { name: rig, waiting: waiting()? }),
+    let Ok(stream) = UnixStream::connect(socket(&Domain::named(&rig)?)) else {
+        return Err(AttachError::NoSuchRig { name: rig, waiting: waiting()? });
     };
     let invitation = match greet(&stream) {
         Ok(Answer::Invited(invitation)) => invitation,
