@@ -10,6 +10,7 @@ pub mod motion_controller;
 mod path_supervision;
 mod playback;
 mod pose_control;
+pub mod pose_law;
 pub mod process;
 mod safety;
 mod sequence;

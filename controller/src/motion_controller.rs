@@ -15,6 +15,7 @@ use crate::command_acknowledgement::CommandAcknowledgement;
 use crate::path_supervision::PathSupervision;
 use crate::playback::Playback;
 use crate::pose_control::PoseControl;
+use crate::pose_law::{Demand, PoseLaw};
 use crate::safety::{self, Fault};
 use crate::sequencer::Sequencer;
 use crate::trajectory::Trajectory;
@@ -50,19 +51,32 @@ pub struct MotionController {
     trim_reach_m: f64,
     playback: Playback,
     acknowledgement: CommandAcknowledgement,
-    control: PoseControl,
+    law: Box<dyn PoseLaw>,
     supervision: PathSupervision,
     /// By how many cycles the platform may be earlier or later on its path.
     slack_cycles: f64,
     /// Cycles in this state since the desired pose no longer changes.
     cycles_at_rest: u64,
     desired: Option<Pose>,
+    /// The pose that the law asked for last.
+    asked: Option<Pose>,
     target: Option<Actuators>,
 }
 
 impl MotionController {
     /// A controller that plays `trajectory` on `mechanism` once the rig is ready.
     pub fn new(scenario: &Scenario, mechanism: Mechanism, trajectory: Trajectory) -> Self {
+        let law = Box::new(PoseControl::new(scenario.controller));
+        Self::with_law(scenario, mechanism, trajectory, law)
+    }
+
+    /// The same with another pose law.
+    pub fn with_law(
+        scenario: &Scenario,
+        mechanism: Mechanism,
+        trajectory: Trajectory,
+        law: Box<dyn PoseLaw>,
+    ) -> Self {
         let config = scenario.controller;
         Self {
             sequencer: Sequencer::new(scenario, mechanism.clone()),
@@ -71,11 +85,12 @@ impl MotionController {
             mechanism,
             playback: Playback::new(trajectory, config.ease_s, config.stop_ramp_s),
             acknowledgement: CommandAcknowledgement::default(),
-            control: PoseControl::new(config),
+            law,
             supervision: PathSupervision::new(scenario),
             slack_cycles: 0.0,
             cycles_at_rest: 0,
             desired: None,
+            asked: None,
             target: None,
         }
     }
@@ -85,33 +100,40 @@ impl MotionController {
         self.sequencer.state
     }
 
-    /// Pose control, inverse kinematics and limits: the targets of this cycle.
+    /// Pose law, inverse kinematics and limits: the targets of this cycle.
     fn control(&mut self, desired: Pose) -> Result<(), Fault> {
         if !self.sequencer.is_moving() {
             return Ok(());
         }
-        let period_s = self.sequencer.period_s;
-        if let Some(estimate) = &self.sequencer.estimate
-            && self.sequencer.silent_cycles == 0
-        {
-            let slack_s = self.slack_cycles * period_s;
+        let demand = self.demand(desired);
+        if let Some(estimated) = &demand.estimated {
+            let slack_s = self.slack_cycles * demand.period_s;
             let earlier = self.playback.pose_ahead(-self.sample_age_s() - slack_s);
-            self.supervision.check(&desired, &estimate.solution.pose, &earlier)?;
-            self.control.observe(&desired, &estimate.solution.pose, period_s);
+            self.supervision.check(&desired, estimated, &earlier)?;
         }
-        let joints = self.mechanism.inverse(&self.corrected_pose())?;
+        let asked = self.law.command(&demand)?;
+        safety::check_asked(&asked)?;
+        self.asked = Some(asked);
+        let joints = self.mechanism.inverse(&asked)?;
         // A motion that uses its strokes to the end leaves no room for the trim.
         let before = self.target.unwrap_or(joints.actuators);
         let target = self.mechanism.strokes().clamp(&joints.actuators, &before, self.trim_reach_m)?;
-        safety::check_velocity(&target, &before, &self.velocity_limit_m_s, period_s)?;
+        safety::check_velocity(&target, &before, &self.velocity_limit_m_s, demand.period_s)?;
         self.target = Some(target);
         Ok(())
     }
 
-    /// The pose to ask for at the instant at which this cycle's command is reached.
-    fn corrected_pose(&self) -> Pose {
-        let lead_s = self.sequencer.config.lead_cycles * self.sequencer.period_s;
-        self.control.correct(&self.playback.pose_ahead(lead_s))
+    fn demand(&self, desired: Pose) -> Demand {
+        let Sequencer { cycle, period_s, state, config, silent_cycles, estimate, .. } = &self.sequencer;
+        Demand {
+            cycle: *cycle,
+            period_s: *period_s,
+            state: *state,
+            motion_time_s: self.playback.motion_time_ahead_s(-self.sample_age_s()),
+            desired,
+            estimated: estimate.filter(|_| *silent_cycles == 0).map(|estimate| estimate.solution.pose),
+            ahead: self.playback.pose_ahead(config.lead_cycles * period_s),
+        }
     }
 
     /// Age of the estimate's sample beyond that of a reading in time, s. The motion waits for readings that are later.
@@ -204,7 +226,7 @@ impl Controller for MotionController {
     fn warm_up(&self) {
         if let Some(estimate) = &self.sequencer.estimate {
             let solution = self.sequencer.tracker.clone().update(&estimate.measured);
-            let joints = self.mechanism.inverse(&self.corrected_pose());
+            let joints = self.mechanism.inverse(&self.asked.unwrap_or(estimate.solution.pose));
             let _ = black_box((solution, joints));
         }
     }

@@ -1,4 +1,4 @@
-//! Pose control: a slow integral trim on top of the drives' own position loops.
+//! The default pose law: a slow integral trim on top of the drives' own position loops.
 //!
 //! The drives follow fast motion by feed-forward; what remains on average (friction, gravity,
 //! calibration) is corrected here. The trim adds no damping and no feed-forward.
@@ -6,6 +6,8 @@
 use masseter_shared::config::ControllerConfig;
 use masseter_shared::geometry::{Pose, Vec3};
 use nalgebra::UnitQuaternion;
+
+use crate::pose_law::{Demand, LawFailed, PoseLaw};
 
 /// The present correction.
 #[derive(Debug, Clone)]
@@ -21,7 +23,7 @@ impl PoseControl {
     }
 
     /// Takes the difference between the desired pose and the estimated pose, at the same instant.
-    pub(crate) fn observe(&mut self, desired: &Pose, estimated: &Pose, dt_s: f64) {
+    fn observe(&mut self, desired: &Pose, estimated: &Pose, dt_s: f64) {
         let share = self.config.integral_gain_per_s * dt_s;
         let offset = desired.translation.vector - estimated.translation.vector;
         let turn = (desired.rotation * estimated.rotation.inverse()).scaled_axis();
@@ -30,11 +32,20 @@ impl PoseControl {
     }
 
     /// The pose to ask for so that the desired pose comes about.
-    pub(crate) fn correct(&self, desired: &Pose) -> Pose {
+    fn correct(&self, desired: &Pose) -> Pose {
         Pose::from_parts(
             (desired.translation.vector + self.position_m).into(),
             UnitQuaternion::from_scaled_axis(self.rotation_rad) * desired.rotation,
         )
+    }
+}
+
+impl PoseLaw for PoseControl {
+    fn command(&mut self, demand: &Demand) -> Result<Pose, LawFailed> {
+        if let Some(estimated) = &demand.estimated {
+            self.observe(&demand.desired, estimated, demand.period_s);
+        }
+        Ok(self.correct(&demand.ahead))
     }
 }
 

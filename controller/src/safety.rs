@@ -1,10 +1,14 @@
 //! Checks that stop the controller: each fault has a cause, a value and a limit.
 
-use masseter_shared::geometry::{AXES, Actuators, InverseError, LEGS, LimitViolation};
+use masseter_shared::geometry::{AXES, Actuators, InverseError, LEGS, LimitViolation, Pose};
 use masseter_shared::messages::codes::{Cause, DriveState, NO_AXIS, NoPose, drive_state};
 use masseter_shared::messages::{Event, Reading};
 
 use crate::kinematics::ForwardError;
+use crate::pose_law::LawFailed;
+
+/// Beyond it, a quaternion is no rotation: the error would turn the platform's points by as much of their distance.
+const MOST_NORM_ERROR: f64 = 1e-6;
 
 /// A fault, in the form of an event.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -77,6 +81,22 @@ impl From<InverseError> for Fault {
         };
         Self::for_kinematics(Cause::InverseKinematics, reason, leg, f64::NAN)
     }
+}
+
+impl From<LawFailed> for Fault {
+    fn from(_: LawFailed) -> Self {
+        Self::new(Cause::LawFailed, 0.0, 0.0)
+    }
+}
+
+/// Whether a law's pose consists of finite numbers, and its quaternion has the length 1.
+pub(crate) fn check_asked(asked: &Pose) -> Result<(), Fault> {
+    let position = &asked.translation.vector;
+    let norm = asked.rotation.quaternion().norm();
+    let is_rotation = (norm - 1.0).abs() < MOST_NORM_ERROR;
+    let bad = position.iter().copied().find(|value_m| !value_m.is_finite());
+    let bad = if is_rotation { bad } else { bad.or(Some(norm)) };
+    bad.map_or(Ok(()), |value| Err(Fault::new(Cause::LawFailed, value, 0.0)))
 }
 
 /// Whether every value of a reading is a number and every code known.

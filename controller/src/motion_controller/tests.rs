@@ -9,6 +9,7 @@ use super::*;
 use crate::sequencer::{ALL_AXES, REPEATED_CYCLES, SAFE_STOP_S};
 
 mod faults;
+mod laws;
 mod limits;
 mod stalls;
 

@@ -179,6 +179,8 @@ codes! {
         FollowingError = 46 "following_error",
         /// Platform turned too far from where it should be (rad).
         OrientationLost = 48 "orientation_lost",
+        /// The pose law failed (0), or gave a pose that is none (the bad coordinate, m, or the quaternion's length).
+        LawFailed = 49 "law_failed",
     }
 }
 

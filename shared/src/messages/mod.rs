@@ -48,7 +48,7 @@ pub trait Message: Pod + ZeroCopySend + Default + std::fmt::Debug + PartialEq {
 }
 
 /// Version of the layouts below; it changes with any of them, and with what a field means.
-pub const LAYOUT_VERSION: u64 = 7;
+pub const LAYOUT_VERSION: u64 = 8;
 
 macro_rules! messages {
     ($($(#[$doc:meta])* $name:ident on $topic:literal keeping $depth:literal as $type_name:tt {
@@ -111,7 +111,7 @@ macro_rules! messages {
 
 messages! {
     /// Targets and request for the drives, once a cycle.
-    Command on "command" keeping 2048 as "masseter/Command/19d59251ed3e41b0" {
+    Command on "command" keeping 2048 as "masseter/Command/765fe161c86f3ae1" {
         /// Cycle of the controller, from 1.
         cycle: u64,
         /// Cycle of the reading it was computed from; 0 when there was none.
@@ -125,7 +125,7 @@ messages! {
     }
 
     /// Positions, forces and states of the drives, once a cycle.
-    Reading on "reading" keeping 2048 as "masseter/Reading/587197189c86d388" {
+    Reading on "reading" keeping 2048 as "masseter/Reading/d90fbf69f124d93f" {
         /// Cycle of the plant, from 1.
         cycle: u64,
         /// Cycle of the last command received when the sample was taken; 0 before the first.
@@ -165,7 +165,7 @@ messages! {
     }
 
     /// The controller's state and its estimate, once a cycle.
-    State on "state" keeping 2048 as "masseter/State/790167a97a0cbdfa" {
+    State on "state" keeping 2048 as "masseter/State/f96001ba642535d1" {
         /// Cycle of the controller, from 1.
         cycle: u64,
         /// Cycle of the reading it was computed from; 0 when there was none.
@@ -217,7 +217,7 @@ messages! {
     }
 
     /// The true state of the mechanism, once a cycle; the controller never reads it.
-    Truth on "truth" keeping 2048 as "masseter/Truth/84ef96c36d0eee1b" {
+    Truth on "truth" keeping 2048 as "masseter/Truth/9779c4cee2a384d0" {
         /// Cycle of the plant, from 1.
         cycle: u64,
         /// The instant it describes: that of the reading's sample, ns.
@@ -237,7 +237,7 @@ messages! {
     }
 
     /// An observation of a tap on a CAN wire: a frame, or an error message in the coding of `linux/can/error.h`.
-    FrameTap on "frame" keeping 32768 as "masseter/FrameTap/2900f5cf6c20462a" {
+    FrameTap on "frame" keeping 32768 as "masseter/FrameTap/e6f1a78fd6012653" {
         /// When its last bit was on the wire, ns.
         time_ns: u64,
         /// When its transmitter had it queued, ns; 0 on real wires.
@@ -254,7 +254,7 @@ messages! {
 
     /// Counters of the kernel for the machine and both loops. The recorder reads and records them; the message is not
     /// published.
-    Machine on "machine" keeping 1 as "masseter/Machine/8fdb255883b1eab2" {
+    Machine on "machine" keeping 1 as "masseter/Machine/e4a72062f22cdb73" {
         /// Time of the sample, ns.
         time_ns: u64,
         /// Time that the hypervisor had taken from all cores together, as far as the hypervisor reports it, ns.
@@ -266,7 +266,7 @@ messages! {
     }
 
     /// A single occurrence: a change of state, a fault, an alarm.
-    Event on "event" keeping 1024 as "masseter/Event/cbd530597486c7eb" {
+    Event on "event" keeping 1024 as "masseter/Event/e089476317e241b0" {
         /// When, ns.
         time_ns: u64,
         /// Cycle of the process that reports it.
@@ -365,7 +365,7 @@ mod tests {
     fn the_hash_covers_version_fields_data_bytes_and_codes() {
         let layout = layout::<FrameTap>();
         for (found, other) in
-            [("v7", "v8"), ("queued_ns", "waiting_ns"), ("[<=64]", "[<=8]"), ("fault=8", "fault=9")]
+            [("v8", "v9"), ("queued_ns", "waiting_ns"), ("[<=64]", "[<=8]"), ("fault=8", "fault=9")]
         {
             let changed = layout.replace(found, other);
             assert_ne!((hash(&layout), &layout), (hash(&changed), &changed));

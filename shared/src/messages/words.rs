@@ -75,6 +75,8 @@ fn complaint(cause: Cause, event: &Event) -> Option<String> {
         }
         Cause::UnknownNode => "a node that no axis is configured with".to_owned(),
         Cause::SecondMaster => "another node sends SYNC or has the master's id".to_owned(),
+        Cause::LawFailed if event.value == 0.0 => "the pose law failed".to_owned(),
+        Cause::LawFailed => format!("the pose law gave no pose: it contains {}", event.value),
         Cause::ForwardKinematics | Cause::InverseKinematics => {
             no_pose(NoPose::try_from(event.object).ok()?).to_owned()
         }
@@ -122,6 +124,7 @@ const fn remedy(cause: Cause) -> Option<&'static str> {
         Cause::WrongLength => "find the other sender of this identifier, and check the mapping of the PDO",
         Cause::UnknownNode => "check can.buses and can.node_ids",
         Cause::SecondMaster => "use one master only: stop the other, or give that node another id",
+        Cause::LawFailed => "see the message of your controller",
         Cause::ForwardKinematics => {
             "compare what the encoders count with the rig, and the rig with the scenario's [mechanism]"
         }

@@ -1,0 +1,68 @@
+//! The seam for a user's pose control: one call a cycle, from a demand to the pose to ask for.
+//!
+//! The sequence (enable, ease, run, hold, disable), kinematics, playback and every safety check stay with
+//! [`MotionController`](crate::motion_controller::MotionController), whatever the law is.
+
+use masseter_shared::geometry::Pose;
+use masseter_shared::messages::codes::ControllerState;
+
+/// What a pose law needs of a cycle. Poses are those of the platform in the base frame, m.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Demand {
+    /// Number of the cycle, from 1; skipped cycles leave a gap.
+    pub cycle: u64,
+    /// Time from one cycle to the next, s.
+    pub period_s: f64,
+    /// `Easing`, `Running` or `Holding`: in other states the law is not asked.
+    pub state: ControllerState,
+    /// How far the motion has come at the sample, s; negative before the motion begins.
+    pub motion_time_s: f64,
+    /// The desired pose at the sample.
+    pub desired: Pose,
+    /// The pose at the sample, by forward kinematics; none in a cycle without a fresh, complete reading.
+    pub estimated: Option<Pose>,
+    /// The desired pose at the instant at which this cycle's command is reached.
+    pub ahead: Pose,
+}
+
+/// A law gave no pose. The program itself says why; the event of the safe stop has the cause `law_failed`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("the pose law failed")]
+pub struct LawFailed;
+
+/// A law of pose control.
+///
+/// # Examples
+/// A law that asks for the desired pose and corrects nothing:
+///
+/// ```
+/// use masseter_controller::motion_controller::MotionController;
+/// use masseter_controller::pose_law::{Demand, LawFailed, PoseLaw};
+/// use masseter_controller::trajectory::Trajectory;
+/// use masseter_shared::config::Scenario;
+/// use masseter_shared::geometry::{Mechanism, Pose};
+///
+/// #[derive(Debug)]
+/// struct FeedForward;
+///
+/// impl PoseLaw for FeedForward {
+///     fn command(&mut self, demand: &Demand) -> Result<Pose, LawFailed> {
+///         Ok(demand.ahead)
+///     }
+/// }
+///
+/// let scenario = Scenario::default();
+/// let mechanism = Mechanism::new(&scenario.mechanism)?;
+/// let motion = Trajectory::new(&scenario.motion, &scenario.jaw, &mechanism, scenario.duration_s)?;
+/// let controller = MotionController::with_law(&scenario, mechanism, motion, Box::new(FeedForward));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[doc(alias("control law", "regulator"))]
+pub trait PoseLaw: std::fmt::Debug {
+    /// The pose to ask for, so that the desired pose comes about when this cycle's command is reached. In real time it must
+    /// not block.
+    ///
+    /// # Errors
+    /// When there is no such pose: the controller then stops safely.
+    fn command(&mut self, demand: &Demand) -> Result<Pose, LawFailed>;
+}
