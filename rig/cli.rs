@@ -15,6 +15,7 @@ use crate::controller::{self, ControllerArgs};
 use crate::doctor::{self, DoctorArgs};
 use crate::help::with_overview;
 use crate::init::{self, InitArgs};
+use crate::interface::{self, InterfaceArgs};
 use crate::kinematics_cli::{self, CsvArgs, FkArgs};
 use crate::manuals::{self, CompletionsArgs, ManArgs};
 use crate::paper_study::{self, KinematicsArgs};
@@ -75,6 +76,8 @@ enum Verb {
     Ik(CsvArgs),
     /// Attach a controller of the rig to a rig that waits for one
     Controller(ControllerArgs),
+    /// Print the messages as types of C or Python
+    Interface(InterfaceArgs),
     /// Emulate the six drives and the mechanism on real CAN interfaces
     Plant(PlantArgs),
     /// Write the report of a run again, or compare two runs
@@ -163,6 +166,7 @@ fn execute(verb: Verb) -> Result<Exit, Failure> {
         Verb::Clean => clean::clean().usage(),
         Verb::Completions(args) => manuals::completions(&args, command()).usage(),
         Verb::Man(args) => manuals::manual(&args, command()).usage(),
+        Verb::Interface(args) => interface::interface(&args).died(),
         Verb::Controller(args) => controller::control(&args).usage(),
         Verb::Plant(args) => plant::plant(&args).usage(),
         Verb::Recorder(args) => recorder::record(args).usage(),

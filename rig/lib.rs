@@ -19,6 +19,7 @@ mod doctor;
 mod foxglove;
 mod help;
 mod init;
+mod interface;
 mod kinematics_cli;
 pub mod machine;
 mod manuals;

@@ -14,13 +14,13 @@ pub struct UnknownCode {
 #[macro_export]
 macro_rules! codes {
     ($($(#[$doc:meta])* $name:ident as $number:ident {
-        $($(#[$variant_doc:meta])* $variant:ident = $code:literal $text:literal,)*
+        $($(#[doc = $variant_doc:literal])* $variant:ident = $code:literal $text:literal,)*
     })*) => {$(
         $(#[$doc])*
         #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
         #[repr($number)]
         pub enum $name {
-            $($(#[$variant_doc])* $variant = $code,)*
+            $($(#[doc = $variant_doc])* $variant = $code,)*
         }
 
         impl $name {
@@ -36,6 +36,13 @@ macro_rules! codes {
             pub const fn name(self) -> &'static str {
                 match self {
                     $(Self::$variant => $text,)*
+                }
+            }
+
+            /// What the value means.
+            pub const fn about(self) -> &'static str {
+                match self {
+                    $(Self::$variant => concat!($($variant_doc),*),)*
                 }
             }
         }

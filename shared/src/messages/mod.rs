@@ -14,6 +14,8 @@ mod schema;
 pub mod tap;
 mod words;
 
+use std::mem::offset_of;
+
 use bytemuck::{Pod, Zeroable, bytes_of, bytes_of_mut};
 use iceoryx2::prelude::ZeroCopySend;
 
@@ -22,6 +24,7 @@ use codes::{Cause, EventKind, NO_AXIS, Source};
 use schema::FieldType;
 
 pub use data::CanData;
+pub use schema::Field;
 pub use words::explain;
 
 /// The type of the messages of a topic.
@@ -37,8 +40,14 @@ pub trait Message: Pod + ZeroCopySend + Default + std::fmt::Debug + PartialEq {
     const SHARED_MEMORY_NAME: &'static str;
     /// [`LAYOUT_VERSION`] of the sender.
     fn version(&self) -> u64;
+    /// What the message is.
+    fn about() -> &'static str;
+    /// The fields in order.
+    fn fields() -> Vec<Field>;
     /// The layout in the ROS 2 message definition language, as recordings carry it.
-    fn schema() -> String;
+    fn schema() -> String {
+        schema::definition(&Self::fields())
+    }
     /// The CDR body: all bytes except the unused ones at the end.
     fn body(&self) -> &[u8];
     /// The message with this body; none when no message of this type has such a body.
@@ -51,10 +60,10 @@ pub trait Message: Pod + ZeroCopySend + Default + std::fmt::Debug + PartialEq {
 pub const LAYOUT_VERSION: u64 = 8;
 
 macro_rules! messages {
-    ($($(#[$doc:meta])* $name:ident on $topic:literal keeping $depth:literal as $type_name:tt {
-        $($(#[$field_doc:meta])* $field:ident: $type:ty,)*
+    ($($(#[doc = $doc:literal])* $name:ident on $topic:literal keeping $depth:literal as $type_name:tt {
+        $($(#[doc = $field_doc:literal])* $field:ident: $type:ty,)*
     })*) => {$(
-        $(#[$doc])*
+        $(#[doc = $doc])*
         #[repr(C)]
         #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable, ZeroCopySend)]
         #[type_name($type_name)]
@@ -65,7 +74,7 @@ macro_rules! messages {
             pub published_ns: u64,
             /// [`LAYOUT_VERSION`] of the sender.
             pub version: u64,
-            $($(#[$field_doc])* pub $field: $type,)*
+            $($(#[doc = $field_doc])* pub $field: $type,)*
         }
 
         impl Default for $name {
@@ -85,10 +94,21 @@ macro_rules! messages {
                 self.version
             }
 
-            fn schema() -> String {
-                let header = ["seq", "published_ns", "version"].map(|name| (name, u64::ros_type()));
-                let fields = [$((stringify!($field), <$type>::ros_type()),)*];
-                schema::definition(header.into_iter().chain(fields))
+            fn about() -> &'static str {
+                concat!($($doc),*)
+            }
+
+            fn fields() -> Vec<Field> {
+                vec![
+                    Field::new::<u64>("seq", offset_of!(Self, seq), " Number of this message on its topic, from 1."),
+                    Field::new::<u64>("published_ns", offset_of!(Self, published_ns), " When it was published, ns."),
+                    Field::new::<u64>("version", offset_of!(Self, version), " Version of the sender's layouts."),
+                    $(Field::new::<$type>(
+                        stringify!($field),
+                        offset_of!(Self, $field),
+                        concat!($($field_doc),*),
+                    ),)*
+                ]
             }
 
             fn body(&self) -> &[u8] {

@@ -1,4 +1,4 @@
-//! The ROS 2 message definition of a layout, from the field types of its table.
+//! The fields of a message, and their ROS 2 message definition, from the table of the layouts.
 
 /// A type that a message field may have.
 pub(super) trait FieldType {
@@ -28,9 +28,28 @@ impl<T: FieldType, const N: usize> FieldType for [T; N] {
     }
 }
 
+/// A field of a message.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Field {
+    /// Its name, which ends with the unit.
+    pub name: &'static str,
+    /// Its type in the ROS 2 message definition language.
+    pub ros_type: String,
+    /// Where it begins in the message, bytes.
+    pub offset: usize,
+    /// What it is.
+    pub about: &'static str,
+}
+
+impl Field {
+    pub(super) fn new<T: FieldType>(name: &'static str, offset: usize, about: &'static str) -> Self {
+        Self { name, ros_type: T::ros_type(), offset, about }
+    }
+}
+
 /// One `type name` line a field.
-pub(super) fn definition<'a>(fields: impl Iterator<Item = (&'a str, String)>) -> String {
-    fields.fold(String::new(), |text, (name, ros_type)| text + &ros_type + " " + name + "\n")
+pub(super) fn definition(fields: &[Field]) -> String {
+    fields.iter().fold(String::new(), |text, field| text + &field.ros_type + " " + field.name + "\n")
 }
 
 #[cfg(test)]
