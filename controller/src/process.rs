@@ -6,6 +6,8 @@ use masseter_shared::geometry::{GeometryError, Mechanism};
 use masseter_shared::lifecycle::attach::{AttachError, attach};
 use masseter_shared::lifecycle::{ProcessArguments, ProcessContext, ProcessError};
 
+use crate::motion_controller::MotionController;
+use crate::pose_law::PoseLaw;
 use crate::trajectory::{Trajectory, TrajectoryError};
 
 /// Builds a controller for a scenario, its mechanism and its motion.
@@ -44,7 +46,20 @@ pub fn run_attached(rig: Option<&str>, build: BuildController) -> Result<Outcome
     play(attach(rig)?, build)
 }
 
-fn play(context: ProcessContext, build: BuildController) -> Result<Outcome, ControllerError> {
+/// Runs [`MotionController`] with this pose law, on an attached program's part of a run.
+///
+/// # Errors
+/// As [`run`].
+pub fn run_with_law(context: ProcessContext, law: Box<dyn PoseLaw>) -> Result<Outcome, ControllerError> {
+    play(context, |scenario, mechanism, motion| {
+        Box::new(MotionController::with_law(scenario, mechanism, motion, law))
+    })
+}
+
+fn play(
+    context: ProcessContext,
+    build: impl FnOnce(&Scenario, Mechanism, Trajectory) -> Box<dyn Controller>,
+) -> Result<Outcome, ControllerError> {
     let scenario = &context.scenario;
     let mechanism = Mechanism::new(&scenario.mechanism)?;
     let trajectory = Trajectory::new(&scenario.motion, &scenario.jaw, &mechanism, scenario.duration_s)?;

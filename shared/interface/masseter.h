@@ -1,0 +1,126 @@
+/* A controller in C for a Masseter rig. Link with libmasseter_c (cargo build --release -p masseter-c).
+ *
+ * Two ways. A pose controller gives a law: the rig's own controller does sequence, kinematics and every check, and asks the
+ * law for a pose in each cycle.
+ *
+ *     masseter_session *session;
+ *     if (masseter_attach(NULL, &session) || masseter_run(session, my_law, &my_data) < 0)
+ *         fprintf(stderr, "%s\n", masseter_error());
+ *
+ * A controller of the drives does everything itself: masseter_attach, masseter_start, then in each cycle masseter_wait and
+ * masseter_publish, at last masseter_finish or masseter_fail.
+ *
+ * Functions return a masseter_result, or what their comment says. A session belongs to one thread at a time. No function
+ * changes signal handlers. Units and frames are those of masseter_messages.h. docs/interface.md has life cycle and timing. */
+#ifndef MASSETER_H
+#define MASSETER_H
+
+#include "masseter_messages.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+enum masseter_result {
+    /* masseter_error has the message. */
+    MASSETER_ERROR = -1,
+    MASSETER_OK = 0,
+    /* masseter_wait: no cycle has begun within the time. */
+    MASSETER_TIMED_OUT = 1,
+    /* masseter_run: a fault ended the motion; the rig's verdict has the cause. */
+    MASSETER_SAFE_STOP = 2,
+};
+
+typedef struct masseter_session masseter_session;
+
+/* A cycle that has begun. */
+typedef struct masseter_cycle {
+    /* From 1; skipped cycles leave a gap. */
+    uint64_t cycle;
+    /* When the reading was received, ns; simulated time in lockstep. */
+    uint64_t now_ns;
+    /* 0 where no new reading came in time. */
+    uint32_t has_reading;
+    uint32_t unused;
+} masseter_cycle;
+
+/* A pose of the platform. */
+typedef struct masseter_pose {
+    /* In the base frame, m. */
+    double position_m[3];
+    /* Unit quaternion. */
+    double quaternion_wxyz[4];
+} masseter_pose;
+
+/* What a pose law needs of a cycle. */
+typedef struct masseter_demand {
+    /* From 1; skipped cycles leave a gap. */
+    uint64_t cycle;
+    /* Time from one cycle to the next, s. */
+    double period_s;
+    /* How far the motion has come at the sample, s; negative before it begins. */
+    double motion_time_s;
+    /* MASSETER_CONTROLLER_STATE_EASING, _RUNNING or _HOLDING. */
+    uint32_t controller_state;
+    /* 0 in a cycle without a fresh, complete reading. */
+    uint32_t has_estimate;
+    /* The desired pose at the sample. */
+    masseter_pose desired;
+    /* The pose at the sample by forward kinematics; zeros without an estimate. */
+    masseter_pose estimated;
+    /* The desired pose when this cycle's command is reached. */
+    masseter_pose ahead;
+} masseter_demand;
+
+static_assert(sizeof(masseter_cycle) == 24, "size of masseter_cycle");
+static_assert(sizeof(masseter_pose) == 56, "size of masseter_pose");
+static_assert(sizeof(masseter_demand) == 200, "size of masseter_demand");
+static_assert(offsetof(masseter_demand, desired) == 32, "offset of desired");
+static_assert(offsetof(masseter_demand, ahead) == 144, "offset of ahead");
+
+/* Writes the pose to ask for, which holds `ahead` before the call. Another result than 0 leads to a safe stop. In real time
+ * it must not block. */
+typedef int (*masseter_law)(const masseter_demand *demand, masseter_pose *pose, void *user);
+
+/* The message of the last error in this thread; it lasts until the next error. Never null. */
+const char *masseter_error(void);
+
+/* Attaches to the rig of this name; null: to that of MASSETER_RIG, which the rig sets for what it starts, or to the only rig
+ * that takes a controller. */
+int masseter_attach(const char *rig, masseter_session **session);
+
+/* Time from one cycle to the next, ns; 0 without a session. */
+uint64_t masseter_period_ns(const masseter_session *session);
+
+/* Runs the rig's own controller with this law until the motion is over, and frees the session. Returns MASSETER_OK,
+ * MASSETER_SAFE_STOP or MASSETER_ERROR. */
+int masseter_run(masseter_session *session, masseter_law law, void *user);
+
+/* Opens the ports, reports ready, and waits for the start of the run. */
+int masseter_start(masseter_session *session);
+
+/* Ends the current cycle and waits for the next: for ever if timeout_ns is negative; 0 only looks. In lockstep the plant
+ * goes on meanwhile, and not before. Returns MASSETER_OK, MASSETER_TIMED_OUT or MASSETER_ERROR. */
+int masseter_wait(masseter_session *session, int64_t timeout_ns, masseter_cycle *cycle, masseter_reading *reading);
+
+/* Publishes this cycle's command, and what the controller made of the reading. Once a cycle. The session numbers and stamps
+ * both, and enters the cycle's times into the state. The rig judges the desired pose of the state. */
+int masseter_publish(masseter_session *session, const masseter_command *command, const masseter_state *state);
+
+/* Publishes an event. */
+int masseter_publish_event(masseter_session *session, const masseter_event *event);
+
+/* 1 once the rig wants an orderly end, or is gone: bring the motion to rest, switch the drives off, then finish. */
+int masseter_is_stop_requested(const masseter_session *session);
+
+/* Ends the work in order, and frees the session. is_safe_stop: a fault ended the motion. */
+int masseter_finish(masseter_session *session, int is_safe_stop);
+
+/* Ends the work because the program cannot go on, and frees the session. The plant's master stops the drives. */
+int masseter_fail(masseter_session *session, const char *reason);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

@@ -1,0 +1,118 @@
+// A controller in C++17 for a Masseter rig: owners and exceptions around masseter.h, which documents every function.
+//
+//     masseter::Session session;                       // attaches
+//     session.run([&](const masseter_demand &demand) { return demand.ahead; });
+#pragma once
+
+#include <chrono>
+#include <exception>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <utility>
+
+#include "masseter.h"
+
+namespace masseter {
+
+// The message of the rig, with what to do.
+class Error : public std::runtime_error {
+public:
+    Error() : std::runtime_error(masseter_error()) {}
+};
+
+enum class Outcome { finished, safe_stop };
+
+// A cycle that has begun.
+struct Cycle {
+    std::uint64_t number;
+    std::uint64_t now_ns;
+    // None where no new reading came in time.
+    std::optional<masseter_reading> reading;
+};
+
+// Takes part in a run. A session that is destroyed before its end counts as dead.
+class Session {
+public:
+    // The rig of this name; empty: that of MASSETER_RIG, or the only one that takes a controller.
+    explicit Session(const std::string &rig = {}) {
+        check(masseter_attach(rig.empty() ? nullptr : rig.c_str(), &session_));
+    }
+
+    Session(const Session &) = delete;
+    Session &operator=(const Session &) = delete;
+
+    ~Session() {
+        if (session_ != nullptr)
+            masseter_fail(session_, "the session was destroyed before its end");
+    }
+
+    std::chrono::nanoseconds period() const {
+        return std::chrono::nanoseconds(masseter_period_ns(session_));
+    }
+
+    // Runs the rig's own controller with a pose law, masseter_pose(const masseter_demand &). An exception of the law stops
+    // the rig safely, and is thrown again.
+    template <typename Law> Outcome run(Law &&law) {
+        Call<Law> call{law, nullptr};
+        const int result = masseter_run(release(), &Call<Law>::ask, &call);
+        if (call.exception)
+            std::rethrow_exception(call.exception);
+        check(result);
+        return result == MASSETER_SAFE_STOP ? Outcome::safe_stop : Outcome::finished;
+    }
+
+    void start() { check(masseter_start(session_)); }
+
+    // The next cycle; none within the time-out.
+    std::optional<Cycle> wait(std::optional<std::chrono::nanoseconds> timeout = std::nullopt) {
+        masseter_cycle cycle;
+        masseter_reading reading;
+        const std::int64_t timeout_ns = timeout ? timeout->count() : -1;
+        if (check(masseter_wait(session_, timeout_ns, &cycle, &reading)) == MASSETER_TIMED_OUT)
+            return std::nullopt;
+        return Cycle{cycle.cycle, cycle.now_ns,
+                     cycle.has_reading ? std::optional<masseter_reading>(reading) : std::nullopt};
+    }
+
+    void publish(const masseter_command &command, const masseter_state &state) {
+        check(masseter_publish(session_, &command, &state));
+    }
+
+    void publish(const masseter_event &event) { check(masseter_publish_event(session_, &event)); }
+
+    bool is_stop_requested() const { return masseter_is_stop_requested(session_) != 0; }
+
+    void finish(Outcome outcome) { check(masseter_finish(release(), outcome == Outcome::safe_stop)); }
+
+    void fail(const std::string &reason) { check(masseter_fail(release(), reason.c_str())); }
+
+private:
+    template <typename Law> struct Call {
+        Law &law;
+        std::exception_ptr exception;
+
+        static int ask(const masseter_demand *demand, masseter_pose *pose, void *user) {
+            auto &call = *static_cast<Call *>(user);
+            try {
+                *pose = call.law(*demand);
+                return 0;
+            } catch (...) {
+                call.exception = std::current_exception();
+                return 1;
+            }
+        }
+    };
+
+    static int check(int result) {
+        if (result == MASSETER_ERROR)
+            throw Error();
+        return result;
+    }
+
+    masseter_session *release() { return std::exchange(session_, nullptr); }
+
+    masseter_session *session_ = nullptr;
+};
+
+} // namespace masseter
