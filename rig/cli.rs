@@ -18,6 +18,7 @@ use crate::init::{self, InitArgs};
 use crate::interface::{self, InterfaceArgs};
 use crate::kinematics_cli::{self, CsvArgs, FkArgs};
 use crate::manuals::{self, CompletionsArgs, ManArgs};
+use crate::new::{self, NewVerb};
 use crate::paper_study::{self, KinematicsArgs};
 use crate::plant::{self, PlantArgs};
 use crate::recorder::{self, RecorderArgs};
@@ -76,6 +77,9 @@ enum Verb {
     Ik(CsvArgs),
     /// Attach a controller of the rig to a rig that waits for one
     Controller(ControllerArgs),
+    /// Lay down a project for your own controller
+    #[command(subcommand, after_help = "Example:\n  masseter new controller --lang cpp my_controller")]
+    New(NewVerb),
     /// Print the messages as types of C or Python
     Interface(InterfaceArgs),
     /// Emulate the six drives and the mechanism on real CAN interfaces
@@ -141,7 +145,7 @@ fn parse() -> Cli {
 fn keep_files_private(verb: &Verb) {
     umask(match verb {
         // What init lays down is public.
-        Verb::Controller(_) | Verb::Recorder(_) | Verb::Init(_) => return,
+        Verb::Controller(_) | Verb::Recorder(_) | Verb::Init(_) | Verb::New(_) => return,
         Verb::Run(args) => args.readable_by.umask(),
         Verb::Report(args) => args.umask(),
         _ => Readers::Owner.umask(),
@@ -166,6 +170,7 @@ fn execute(verb: Verb) -> Result<Exit, Failure> {
         Verb::Clean => clean::clean().usage(),
         Verb::Completions(args) => manuals::completions(&args, command()).usage(),
         Verb::Man(args) => manuals::manual(&args, command()).usage(),
+        Verb::New(verb) => new::new(&verb).usage(),
         Verb::Interface(args) => interface::interface(&args).died(),
         Verb::Controller(args) => controller::control(&args).usage(),
         Verb::Plant(args) => plant::plant(&args).usage(),

@@ -5,7 +5,7 @@ use std::fmt::Write;
 use masseter_shared::messages::LAYOUT_VERSION;
 use masseter_shared::messages::codes::{NO_AXIS, NO_DRIVE_STATE};
 
-use super::{Enumeration, Layout, LayoutField, constant, snake_case};
+use super::description::{Enumeration, Layout, LayoutField, constant, snake_case};
 
 /// The header, for C11 and C++17.
 pub(super) fn header(layouts: &[Layout], enumerations: &[Enumeration]) -> String {
@@ -19,8 +19,12 @@ pub(super) fn header(layouts: &[Layout], enumerations: &[Enumeration]) -> String
          /* masseter_reading.drive_state of a drive not heard of yet, or lost. */\n\
          #define MASSETER_NO_DRIVE_STATE {NO_DRIVE_STATE}u\n"
     );
-    enumerations.iter().for_each(|enumeration| write_enumeration(&mut text, enumeration));
-    layouts.iter().for_each(|layout| write_layout(&mut text, layout));
+    for enumeration in enumerations {
+        write_enumeration(&mut text, enumeration);
+    }
+    for layout in layouts {
+        write_layout(&mut text, layout);
+    }
     text + "\n#endif\n"
 }
 

@@ -2,16 +2,13 @@
 //! the messages. Frames and counters are not among them, since no controller uses them.
 
 mod c;
+mod description;
 mod python;
 
-use std::mem::size_of;
-
 use clap::{Args, ValueEnum};
-use masseter_shared::messages::codes::{
-    Cause, ControllerState, DriveRequest, DriveState, EventKind, NoPose, Source,
-};
-use masseter_shared::messages::{Command, Event, Field, Message, Reading, State, Truth};
 use masseter_terminal::{Exit, result};
+
+use description::{enumerations, layouts};
 
 /// The arguments of `interface`.
 #[derive(Debug, Clone, Args)]
@@ -27,7 +24,7 @@ pub(crate) struct InterfaceArgs {
 enum Language {
     /// C header, for C++ too
     C,
-    /// Python module: ctypes, `NumPy` types, enumerations
+    /// Python module: ctypes, NumPy types, enumerations
     Python,
 }
 
@@ -40,93 +37,6 @@ pub(crate) fn interface(args: &InterfaceArgs) -> anyhow::Result<Exit> {
     };
     result(&text)?;
     Ok(Exit::Passed)
-}
-
-/// A message as other languages need it.
-struct Layout {
-    /// In camel case.
-    name: &'static str,
-    topic: &'static str,
-    shared_memory_name: &'static str,
-    about: &'static str,
-    size: usize,
-    fields: Vec<LayoutField>,
-}
-
-struct LayoutField {
-    name: &'static str,
-    /// `uint32`, `uint64` or `float64`, and so on.
-    element: String,
-    /// None for a single value.
-    count: Option<usize>,
-    offset: usize,
-    about: String,
-}
-
-struct Enumeration {
-    /// In camel case.
-    name: &'static str,
-    /// Name, number and meaning.
-    values: Vec<(&'static str, u32, String)>,
-}
-
-fn layouts() -> Vec<Layout> {
-    vec![layout::<Reading>(), layout::<Command>(), layout::<State>(), layout::<Event>(), layout::<Truth>()]
-}
-
-fn layout<M: Message>() -> Layout {
-    Layout {
-        name: M::TYPE_NAME.trim_start_matches("masseter/"),
-        topic: M::TOPIC,
-        shared_memory_name: M::SHARED_MEMORY_NAME,
-        about: M::about().trim(),
-        size: size_of::<M>(),
-        fields: M::fields().into_iter().map(layout_field).collect(),
-    }
-}
-
-fn layout_field(Field { name, ros_type, offset, about }: Field) -> LayoutField {
-    let (element, count) = match ros_type.split_once('[') {
-        Some((element, count)) => (element.to_owned(), count.trim_end_matches(']').parse().ok()),
-        None => (ros_type, None),
-    };
-    LayoutField { name, element, count, offset, about: plain(about) }
-}
-
-/// A comment without the links of Rust's documentation.
-fn plain(about: &str) -> String {
-    let text = about.replace("codes::", "").replace("super::", "");
-    let text = text.replace("[`", "").replace("`]", "").replace('`', "");
-    text.split_whitespace().collect::<Vec<_>>().join(" ")
-}
-
-fn enumerations() -> Vec<Enumeration> {
-    macro_rules! enumerations {
-        ($($name:ident),*) => {
-            vec![$(Enumeration {
-                name: stringify!($name),
-                values: $name::ALL.map(|value| (value.name(), u32::from(value.code()), plain(value.about()))).to_vec(),
-            }),*]
-        };
-    }
-    enumerations!(DriveRequest, DriveState, ControllerState, Source, EventKind, Cause, NoPose)
-}
-
-/// `DriveState` as `drive_state`.
-fn snake_case(name: &str) -> String {
-    let mut text = String::new();
-    for letter in name.chars() {
-        if letter.is_uppercase() && !text.is_empty() {
-            text.push('_');
-        }
-        text.extend(letter.to_lowercase());
-    }
-    text
-}
-
-/// A name of a value as a constant.
-fn constant(name: &str) -> String {
-    name.to_uppercase().replace([' ', '-'], "_")
 }
 
 #[cfg(test)]

@@ -5,7 +5,7 @@ use std::fmt::Write;
 use masseter_shared::messages::LAYOUT_VERSION;
 use masseter_shared::messages::codes::{NO_AXIS, NO_DRIVE_STATE};
 
-use super::{Enumeration, Layout, LayoutField, constant};
+use super::description::{Enumeration, Layout, LayoutField, constant};
 
 /// A machine that lays structures out otherwise cannot use them.
 const CHECK: &str = r#"
@@ -28,8 +28,12 @@ pub(super) fn module(layouts: &[Layout], enumerations: &[Enumeration]) -> String
          #: Reading.drive_state of a drive not heard of yet, or lost.\nNO_DRIVE_STATE = {NO_DRIVE_STATE}\n"
     );
     text.push_str(CHECK);
-    enumerations.iter().for_each(|enumeration| write_enumeration(&mut text, enumeration));
-    layouts.iter().for_each(|layout| write_layout(&mut text, layout));
+    for enumeration in enumerations {
+        write_enumeration(&mut text, enumeration);
+    }
+    for layout in layouts {
+        write_layout(&mut text, layout);
+    }
     text
 }
 

@@ -5,10 +5,11 @@ use std::path::Path;
 use super::workspace::{list, metadata, text, within};
 
 /// The crates of the workspace that each crate may use, all by their folders. The root package may use all.
-const MAY_USE: [(&str, &[&str]); 11] = [
+const MAY_USE: [(&str, &[&str]); 12] = [
     ("shared/can", &[]),
     ("shared", &["shared/can"]),
     ("controller", &["shared/can", "shared"]),
+    ("shared/c", &["shared", "controller"]),
     ("plant", &["shared/can", "shared"]),
     ("rig/terminal", &[]),
     ("rig/charts", &[]),

@@ -1,0 +1,66 @@
+"""Projects of `masseter new controller`: built, run, and equal in every language.
+
+    controllers.py MASSETER TARGET
+"""
+
+import json
+import re
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+LANGUAGES = ["rust", "c", "cpp"]
+MOST_LINES = 60
+
+
+def shell(command: str, folder: Path) -> str:
+    ended = subprocess.run(command, shell=True, cwd=folder, capture_output=True, text=True)
+    assert ended.returncode == 0, f"{command}: {ended.returncode}\n{ended.stdout}{ended.stderr}"
+    return ended.stdout
+
+
+def make(masseter: str, language: str, folder: Path, target: Path) -> str:
+    """The program of a new project, built by the command that `new` prints."""
+    said = shell(f"{masseter} new controller --lang {language} {language}", folder)
+    command, program = re.search(r"next: \(cd \w+ && (.*)\) && masseter run --controller (\S+)", said).groups()
+    project = folder / language
+    for source in [*project.glob("**/*.rs"), *project.glob("controller.*")]:
+        lines = len(source.read_text().splitlines())
+        assert lines <= MOST_LINES, f"{source}: {lines} lines"
+    if language == "rust":
+        # Only to share what is built already.
+        shell(f"{command} --target-dir {target}", project)
+        return str(target / "release" / "my_controller")
+    shell(command.replace("-B build", f"-B build -DMASSETER_TARGET={target}"), project)
+    return str(folder / program)
+
+
+def run(masseter: str, program: str, folder: Path, clock: str) -> dict:
+    arguments = ["--quiet", "--duration", "2", "--clock", clock, "--format", "json", "--controller", program]
+    ended = subprocess.run([masseter, "run", *arguments], cwd=folder, capture_output=True, text=True)
+    # The machine may take cycles from a run in real time, which is then not judged.
+    allowed = [0, 3] if clock == "rt" else [0]
+    assert ended.returncode in allowed, f"{program}, {clock}: {ended.returncode}\n{ended.stdout}{ended.stderr}"
+    return json.loads(ended.stdout)
+
+
+def main(masseter: str, target: str) -> None:
+    masseter = str(Path(masseter).resolve())
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        digests = {}
+        for language in LANGUAGES:
+            program = make(masseter, language, folder, Path(target))
+            digests[language] = [
+                run(masseter, program, folder, clock)["figures"]["digest"] for clock in ["lockstep", "virtual", "lockstep"]
+            ]
+            run(masseter, program, folder, "rt")
+            print(f"{language}: digest {digests[language][0]}, and a run in real time")
+        found = {digest for of_language in digests.values() for digest in of_language}
+        assert len(found) == 1, digests
+        own = run(masseter, "motion", folder, "lockstep")["figures"]["digest"]
+        assert own not in found, "the law of the projects is not the rig's own"
+
+
+main(*sys.argv[1:])
