@@ -38,6 +38,8 @@ enum Language {
     Cpp,
     /// C11, with CMake
     C,
+    /// Python 3.11 or later, with pip
+    Python,
 }
 
 /// A project: what it is, how it is built in its folder, what is built, and its files; the first one has the law.
@@ -50,6 +52,9 @@ struct Project {
 
 const README: &str = include_str!("../examples/controllers/README.md");
 const CMAKE: &str = "cmake -S . -B build && cmake --build build";
+
+const PIP: &str =
+    "python3 -m venv .venv && .venv/bin/pip install @SOURCE@/shared/python && chmod +x controller.py";
 
 impl Language {
     const fn project(self) -> Project {
@@ -83,6 +88,15 @@ impl Language {
                     ("CMakeLists.txt", include_str!("../examples/controllers/c/CMakeLists.txt")),
                 ],
             },
+            Self::Python => Project {
+                about: "Python, the package masseter",
+                build: PIP,
+                program: "controller.py",
+                files: &[
+                    ("controller.py", include_str!("../examples/controllers/python/controller.py")),
+                    ("pyproject.toml", include_str!("../examples/controllers/python/pyproject.toml")),
+                ],
+            },
         }
     }
 }
@@ -95,33 +109,33 @@ pub(crate) fn new(NewVerb::Controller(args): &NewVerb) -> anyhow::Result<Exit> {
         "{} is not Masseter's source: give it by --source",
         source.display()
     );
+    let (source, folder) = (std::path::absolute(source)?, std::path::absolute(&args.folder)?);
     let project = args.lang.project();
-    lay_down(&args.folder, &files(&project, &std::path::absolute(source)?))?;
-    let program = as_program(&args.folder.join(project.program));
+    lay_down(&args.folder, &files(&project, &source, &folder))?;
     result_line!(
         "{}: the controller; README.md has the next steps\n\
          next: (cd {} && {}) && masseter run --controller {}",
         args.folder.join(project.files[0].0).display(),
         quoted(&args.folder),
-        project.build,
-        quoted(&program)
+        project.build.replace("@SOURCE@", &quoted(&source)),
+        quoted(&as_program(&args.folder.join(project.program)))
     )?;
     Ok(Exit::Passed)
 }
 
-fn files(project: &Project, source: &Path) -> Vec<StarterFile> {
-    let source_text = source.display().to_string();
+fn files(project: &Project, source: &Path, folder: &Path) -> Vec<StarterFile> {
     let readme = README
         .replace("@ABOUT@", project.about)
         .replace("@BUILD@", project.build)
         .replace("@PROGRAM@", &format!("./{}", project.program))
         .replace("@FILE@", project.files[0].0);
     let files = project.files.iter().map(|&(path, content)| (path, content.to_owned()));
-    let of_source = |(path, content): (_, String)| StarterFile {
+    let in_place = |(path, content): (_, String)| StarterFile {
         path,
         content: content
-            .replace("@SOURCE@", &source_text)
-            .replace("@TARGET@", &source.join("target").display().to_string()),
+            .replace("@SOURCE@", &source.display().to_string())
+            .replace("@TARGET@", &source.join("target").display().to_string())
+            .replace("@FOLDER@", &folder.display().to_string()),
     };
-    files.chain([("README.md", readme)]).map(of_source).collect()
+    files.chain([("README.md", readme)]).map(in_place).collect()
 }

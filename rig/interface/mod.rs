@@ -54,7 +54,7 @@ mod tests {
                 c::header(&layouts, &enumerations),
             ),
             (
-                include_str!("../../shared/interface/masseter_messages.py"),
+                include_str!("../../shared/python/masseter/messages.py"),
                 "python",
                 python::module(&layouts, &enumerations),
             ),

@@ -195,12 +195,15 @@ impl Lockstep {
     /// As [`Self::await_turn`].
     pub fn await_recorder(&mut self, messages: usize) -> Result<(), ProcessError> {
         self.unrecorded += messages;
-        if self.unrecorded < WINDOW_MESSAGES || self.lost == Some(Party::Recorder) {
+        let is_first = !self.is_recording;
+        if (self.unrecorded < WINDOW_MESSAGES && !is_first) || self.lost == Some(Party::Recorder) {
             return Ok(());
         }
-        if self.is_recording {
-            self.wait(&[RECORDED], Party::Recorder)?;
+        if is_first {
+            // Before any message: a recorder that connects after a short run has ended receives nothing of it.
+            self.recorder.send(RECORD)?;
         }
+        self.wait(&[RECORDED], Party::Recorder)?;
         self.unrecorded = 0;
         self.is_recording = true;
         Ok(self.recorder.send(RECORD)?)

@@ -5,11 +5,12 @@ use std::path::Path;
 use super::workspace::{list, metadata, text, within};
 
 /// The crates of the workspace that each crate may use, all by their folders. The root package may use all.
-const MAY_USE: [(&str, &[&str]); 12] = [
+const MAY_USE: [(&str, &[&str]); 13] = [
     ("shared/can", &[]),
     ("shared", &["shared/can"]),
     ("controller", &["shared/can", "shared"]),
     ("shared/c", &["shared", "controller"]),
+    ("shared/python", &["shared", "controller", "rig/recording"]),
     ("plant", &["shared/can", "shared"]),
     ("rig/terminal", &[]),
     ("rig/charts", &[]),

@@ -10,7 +10,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-LANGUAGES = ["rust", "c", "cpp"]
+LANGUAGES = ["rust", "c", "cpp", "python"]
 MOST_LINES = 60
 
 
@@ -32,6 +32,9 @@ def make(masseter: str, language: str, folder: Path, target: Path) -> str:
         # Only to share what is built already.
         shell(f"{command} --target-dir {target}", project)
         return str(target / "release" / "my_controller")
+    if language == "python":
+        shell(command, project)
+        return str(folder / program)
     shell(command.replace("-B build", f"-B build -DMASSETER_TARGET={target}"), project)
     return str(folder / program)
 

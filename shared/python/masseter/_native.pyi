@@ -1,0 +1,64 @@
+from os import PathLike
+
+from collections.abc import Callable
+
+class MasseterError(Exception): ...
+
+class Mechanism:
+    def __new__(cls, scenario: str | PathLike[str] | None = None) -> Mechanism: ...
+    def forward(self, positions: bytes) -> bytes: ...
+    def inverse(self, poses: bytes) -> bytes: ...
+
+class Pose:
+    """A pose of the platform: position in the base frame, m, and unit quaternion w x y z."""
+
+    def __new__(
+        cls,
+        position_m: tuple[float, float, float] | list[float],
+        quaternion_wxyz: tuple[float, float, float, float] | list[float],
+    ) -> Pose: ...
+    @property
+    def position_m(self) -> tuple[float, float, float]: ...
+    @property
+    def quaternion_wxyz(self) -> tuple[float, float, float, float]: ...
+
+class Demand:
+    """What a pose law needs of a cycle."""
+
+    @property
+    def cycle(self) -> int:
+        """Number of the cycle, from 1; skipped cycles leave a gap."""
+    @property
+    def period_s(self) -> float:
+        """Time from one cycle to the next, s."""
+    @property
+    def motion_time_s(self) -> float:
+        """How far the motion has come at the sample, s; negative before it begins."""
+    @property
+    def controller_state(self) -> int:
+        """messages.ControllerState: EASING, RUNNING or HOLDING."""
+    @property
+    def desired(self) -> Pose:
+        """The desired pose at the sample."""
+    @property
+    def estimated(self) -> Pose | None:
+        """The pose at the sample by forward kinematics; None in a cycle without a fresh, complete reading."""
+    @property
+    def ahead(self) -> Pose:
+        """The desired pose when this cycle's command is reached."""
+
+class Session:
+    def __new__(cls, rig: str | None = None) -> Session: ...
+    def start(self) -> None: ...
+    @property
+    def period_s(self) -> float: ...
+    @property
+    def is_stop_requested(self) -> bool: ...
+    def wait(self, timeout_s: float | None) -> tuple[int, int, bytes | None] | None: ...
+    def publish(self, command: bytes, state: bytes) -> None: ...
+    def publish_event(self, event: bytes) -> None: ...
+    def finish(self, is_safe_stop: bool) -> None: ...
+    def fail(self, reason: str) -> None: ...
+
+def control(law: Callable[[Demand], Pose], rig: str | None = None) -> bool: ...
+def topics(path: str | PathLike[str]) -> tuple[dict[str, bytes], bool]: ...

@@ -1,0 +1,92 @@
+"""What a run has left: arrays of its messages, its figures and its circumstances."""
+
+import json
+import tomllib
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from masseter import _native, messages
+
+if TYPE_CHECKING:
+    import pandas
+    import polars
+
+Messages = NDArray[np.void]
+
+_LAYOUTS = {
+    layout.TOPIC: layout
+    for layout in (messages.Reading, messages.Command, messages.State, messages.Event, messages.Truth)
+}
+
+
+@dataclass(frozen=True)
+class Run:
+    """A run. Arrays have one row a message and one field a value, whose name ends with its unit."""
+
+    folder: Path
+    reading: Messages
+    command: Messages
+    state: Messages
+    event: Messages
+    truth: Messages
+    #: Whether the whole recording could be read.
+    is_whole: bool
+    scenario: dict[str, Any]
+    manifest: dict[str, Any]
+    #: Verdict and figures; empty for a run that was never judged.
+    summary: dict[str, Any]
+
+    def columns(self, topic: str) -> dict[str, NDArray[Any]]:
+        """The values of a topic by column; a value of several numbers has a column each, such as position_m_0."""
+        rows: Messages = getattr(self, topic)
+        columns: dict[str, NDArray[Any]] = {}
+        for name in rows.dtype.names or ():
+            values = rows[name]
+            if values.ndim == 1:
+                columns[name] = values
+            else:
+                columns |= {f"{name}_{index}": values[:, index] for index in range(values.shape[1])}
+        return columns
+
+    def to_polars(self, topic: str) -> "polars.DataFrame":
+        """A topic as a table of Polars."""
+        import polars
+
+        return polars.DataFrame(self.columns(topic))
+
+    def to_pandas(self, topic: str) -> "pandas.DataFrame":
+        """A topic as a table of pandas."""
+        import pandas
+
+        return pandas.DataFrame(self.columns(topic))
+
+
+def load(folder: str | PathLike[str]) -> Run:
+    """The run in this folder. Raises MasseterError where the recording cannot be read."""
+    folder = Path(folder)
+    if not folder.is_dir():
+        raise _native.MasseterError(f"{folder} is no run folder: give the folder that 'masseter run' names")
+    topics, is_whole = _native.topics(folder / "recording.mcap")
+    arrays = {name: np.frombuffer(data, dtype=np.dtype(_LAYOUTS[name])) for name, data in topics.items()}
+    return Run(
+        folder=folder,
+        is_whole=is_whole,
+        scenario=tomllib.loads((folder / "scenario.toml").read_text()),
+        manifest=json.loads((folder / "manifest.json").read_text()),
+        summary=read_summary(folder),
+        **arrays,
+    )
+
+
+def read_summary(folder: Path) -> dict[str, Any]:
+    """Verdict and figures of the run in this folder; empty if it was never judged."""
+    path = folder / "summary.json"
+    if not path.is_file():
+        return {}
+    summary: dict[str, Any] = json.loads(path.read_text())
+    return summary

@@ -1,0 +1,128 @@
+//! A pose law that is a function of Python.
+
+use std::thread;
+use std::time::Duration;
+
+use masseter_controller::pose_law::{Demand as RigDemand, LawFailed, PoseLaw};
+use masseter_controller::process::run_with_law;
+use masseter_shared::control::Outcome;
+use masseter_shared::geometry;
+use masseter_shared::lifecycle::attach::attach;
+use masseter_shared::messages::pose_fields;
+use nalgebra::{Quaternion, Translation3, Unit};
+use pyo3::prelude::*;
+
+use crate::failed;
+
+/// Time between two looks at Ctrl-C.
+const POLL: Duration = Duration::from_millis(20);
+
+/// A pose: position in the base frame, m, and unit quaternion.
+#[pyclass(frozen, from_py_object)]
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Pose {
+    #[pyo3(get)]
+    position_m: (f64, f64, f64),
+    #[pyo3(get)]
+    quaternion_wxyz: (f64, f64, f64, f64),
+}
+
+#[pymethods]
+impl Pose {
+    #[new]
+    fn new(position_m: [f64; 3], quaternion_wxyz: [f64; 4]) -> Self {
+        let ([px, py, pz], [w, x, y, z]) = (position_m, quaternion_wxyz);
+        Self { position_m: (px, py, pz), quaternion_wxyz: (w, x, y, z) }
+    }
+
+    fn __repr__(&self) -> String {
+        format!("Pose(position_m={:?}, quaternion_wxyz={:?})", self.position_m, self.quaternion_wxyz)
+    }
+}
+
+impl From<&geometry::Pose> for Pose {
+    fn from(pose: &geometry::Pose) -> Self {
+        let (position_m, quaternion_wxyz) = pose_fields(pose);
+        Self::new(position_m, quaternion_wxyz)
+    }
+}
+
+impl From<Pose> for geometry::Pose {
+    /// As it is: the controller refuses what is no pose.
+    fn from(Pose { position_m: (px, py, pz), quaternion_wxyz: (w, x, y, z) }: Pose) -> Self {
+        let rotation = Unit::new_unchecked(Quaternion::new(w, x, y, z));
+        geometry::Pose::from_parts(Translation3::new(px, py, pz), rotation)
+    }
+}
+
+/// What a pose law needs of a cycle.
+#[pyclass(frozen, get_all)]
+#[derive(Debug)]
+pub(crate) struct Demand {
+    cycle: u64,
+    period_s: f64,
+    motion_time_s: f64,
+    controller_state: u32,
+    desired: Pose,
+    estimated: Option<Pose>,
+    ahead: Pose,
+}
+
+impl From<&RigDemand> for Demand {
+    fn from(demand: &RigDemand) -> Self {
+        Self {
+            cycle: demand.cycle,
+            period_s: demand.period_s,
+            motion_time_s: demand.motion_time_s,
+            controller_state: demand.state.code(),
+            desired: (&demand.desired).into(),
+            estimated: demand.estimated.as_ref().map(Pose::from),
+            ahead: (&demand.ahead).into(),
+        }
+    }
+}
+
+#[derive(Debug)]
+struct PythonLaw {
+    function: Py<PyAny>,
+    /// Where the exception goes that ends the motion.
+    exception: std::sync::mpsc::Sender<PyErr>,
+}
+
+impl PoseLaw for PythonLaw {
+    fn command(&mut self, demand: &RigDemand) -> Result<geometry::Pose, LawFailed> {
+        Python::attach(|py| {
+            let pose: PyResult<Pose> = self
+                .function
+                .call1(py, (Demand::from(demand),))
+                .and_then(|pose| pose.extract(py).map_err(|_| failed("the law returned no masseter.Pose")));
+            pose.map(geometry::Pose::from).map_err(|error| {
+                // Nobody waits for it once the caller was interrupted.
+                let _ = self.exception.send(error);
+                LawFailed
+            })
+        })
+    }
+}
+
+/// Attaches to a rig and runs its controller with this law. Returns whether the motion was finished; false after a safe stop.
+#[pyfunction]
+#[pyo3(signature = (law, rig=None))]
+pub(crate) fn control(py: Python<'_>, law: Py<PyAny>, rig: Option<String>) -> PyResult<bool> {
+    let (exception, exceptions) = std::sync::mpsc::channel();
+    // A thread of its own: real-time priority and core end with it.
+    let running = thread::spawn(move || {
+        let context = attach(rig.as_deref()).map_err(|error| error.to_string())?;
+        let law = Box::new(PythonLaw { function: law, exception });
+        run_with_law(context, law).map_err(|error| error.to_string())
+    });
+    while !running.is_finished() {
+        py.detach(|| thread::sleep(POLL));
+        py.check_signals()?;
+    }
+    let ran = py.detach(|| running.join()).map_err(|_| failed("a fault of Masseter itself"))?;
+    if let Ok(exception) = exceptions.try_recv() {
+        return Err(exception);
+    }
+    ran.map(|outcome| outcome == Outcome::Finished).map_err(failed)
+}

@@ -1,0 +1,122 @@
+//! A controller of the drives in Python: its part in a run, cycle by cycle. Messages cross as the bytes of their structures.
+
+use std::time::Duration;
+
+use masseter_shared::control::{self, Outcome, Tick, Waited};
+use masseter_shared::lifecycle::ProcessContext;
+use masseter_shared::lifecycle::attach::attach;
+use masseter_shared::messages::{Command, Event, Message, State};
+use pyo3::prelude::*;
+use pyo3::types::PyBytes;
+
+use crate::failed;
+
+/// A part in a run. It belongs to the thread that made it.
+#[pyclass(unsendable)]
+pub(crate) struct Session {
+    stage: Option<Stage>,
+}
+
+enum Stage {
+    Attached(Box<ProcessContext>),
+    Started(Box<control::Session>),
+}
+
+type CycleOfPython<'py> = (u64, u64, Option<Bound<'py, PyBytes>>);
+
+#[pymethods]
+impl Session {
+    #[new]
+    #[pyo3(signature = (rig=None))]
+    fn new(rig: Option<&str>) -> PyResult<Self> {
+        let context = attach(rig).map_err(failed)?;
+        Ok(Self { stage: Some(Stage::Attached(Box::new(context))) })
+    }
+
+    fn start(&mut self) -> PyResult<()> {
+        match self.stage.take() {
+            Some(Stage::Attached(context)) => {
+                let session = control::Session::start(*context).map_err(failed)?;
+                self.stage = Some(Stage::Started(Box::new(session)));
+                Ok(())
+            }
+            stage => {
+                self.stage = stage;
+                Err(failed("the session is started already, or over"))
+            }
+        }
+    }
+
+    #[getter]
+    fn period_s(&self) -> PyResult<f64> {
+        Ok(match self.stage.as_ref().ok_or_else(over)? {
+            Stage::Attached(context) => context.scenario.period_s(),
+            Stage::Started(session) => session.context().scenario.period_s(),
+        })
+    }
+
+    #[getter]
+    fn is_stop_requested(&self) -> bool {
+        match &self.stage {
+            Some(Stage::Attached(context)) => context.stop.is_made(),
+            Some(Stage::Started(session)) => session.is_stop_requested(),
+            None => true,
+        }
+    }
+
+    fn wait<'py>(&mut self, py: Python<'py>, timeout_s: Option<f64>) -> PyResult<Option<CycleOfPython<'py>>> {
+        let timeout = timeout_s.map(Duration::try_from_secs_f64).transpose().map_err(failed)?;
+        py.check_signals()?;
+        Ok(match self.started()?.wait(timeout).map_err(failed)? {
+            Waited::TimedOut => None,
+            Waited::Cycle { tick: Tick { cycle, now_ns }, reading } => {
+                Some((cycle, now_ns, reading.map(|reading| PyBytes::new(py, reading.body()))))
+            }
+        })
+    }
+
+    fn publish(&mut self, command: &[u8], state: &[u8]) -> PyResult<()> {
+        let (command, state) = (message::<Command>(command)?, message::<State>(state)?);
+        self.started()?.publish(&command, &state).map_err(failed)
+    }
+
+    fn publish_event(&mut self, event: &[u8]) -> PyResult<()> {
+        let event = message::<Event>(event)?;
+        self.started()?.publish_event(&event).map_err(failed)
+    }
+
+    fn finish(&mut self, is_safe_stop: bool) -> PyResult<()> {
+        let outcome = if is_safe_stop { Outcome::SafeStop } else { Outcome::Finished };
+        self.end()?.finish(outcome).map_err(failed)
+    }
+
+    fn fail(&mut self, reason: &str) -> PyResult<()> {
+        self.end()?.fail(reason).map_err(failed)
+    }
+}
+
+impl Session {
+    fn started(&mut self) -> PyResult<&mut control::Session> {
+        match &mut self.stage {
+            Some(Stage::Started(session)) => Ok(session),
+            Some(Stage::Attached(_)) => Err(failed("the session is not started: call start first")),
+            None => Err(over()),
+        }
+    }
+
+    fn end(&mut self) -> PyResult<control::Session> {
+        self.started()?;
+        match self.stage.take() {
+            Some(Stage::Started(session)) => Ok(*session),
+            _ => Err(over()),
+        }
+    }
+}
+
+fn over() -> PyErr {
+    failed("the session is over")
+}
+
+fn message<M: Message>(bytes: &[u8]) -> PyResult<M> {
+    M::from_body(bytes).ok_or_else(|| failed(format!("{} bytes are no {}", bytes.len(), M::TYPE_NAME)))
+}

@@ -1,0 +1,234 @@
+"""Runs from Python: laws, controllers of the drives, what they leave, and what goes wrong."""
+
+import subprocess
+import threading
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import masseter
+from masseter.messages import Command, ControllerState, DriveRequest, State
+
+SHORT = ["--duration", "1"]
+
+
+def ahead(demand: masseter.Demand) -> masseter.Pose:
+    return demand.ahead
+
+
+def test_a_law_gives_the_same_digest_under_both_simulated_clocks_and_passes() -> None:
+    results = [masseter.run(controller=ahead, clock=clock, arguments=SHORT) for clock in ("virtual", "lockstep")]
+    assert [result.verdict for result in results] == ["PASS", "PASS"]
+    assert results[0].figures["digest"] == results[1].figures["digest"]
+    own = masseter.run(clock="virtual", arguments=SHORT)
+    assert own.passed and own.figures["digest"] != results[0].figures["digest"]
+
+
+def test_a_law_controls_in_real_time() -> None:
+    result = masseter.run(controller=ahead, clock="rt", arguments=SHORT)
+    # The machine may take cycles from the run, which is then not judged.
+    assert result.exit_code in (0, 3), result.messages
+
+
+def test_the_demand_is_what_the_state_message_reports() -> None:
+    demands = []
+
+    def law(demand: masseter.Demand) -> masseter.Pose:
+        demands.append(demand)
+        return demand.ahead
+
+    run = masseter.run(controller=law, arguments=SHORT).load()
+    states = {int(state["cycle"]): state for state in run.state}
+    assert run.is_whole and len(demands) > 1000
+    for demand in demands:
+        state = states[demand.cycle]
+        assert demand.desired.position_m == tuple(state["desired_position_m"])
+        assert demand.estimated is not None
+        assert demand.estimated.quaternion_wxyz == tuple(state["estimated_quaternion_wxyz"])
+        # A change of state comes after the law's turn.
+        if demand.controller_state == state["controller_state"]:
+            assert demand.motion_time_s == state["motion_time_s"]
+
+
+def far(demand: masseter.Demand) -> masseter.Pose:
+    x, y, z = demand.ahead.position_m
+    return masseter.Pose([x, y + 0.01, z], demand.ahead.quaternion_wxyz)
+
+
+def not_a_number(demand: masseter.Demand) -> masseter.Pose:
+    return masseter.Pose([float("nan"), 0.0, 0.27], demand.ahead.quaternion_wxyz)
+
+
+def no_rotation(demand: masseter.Demand) -> masseter.Pose:
+    return masseter.Pose(demand.ahead.position_m, [0.5, 0.0, 0.0, 0.0])
+
+
+@pytest.mark.parametrize(
+    ("wrong", "cause"), [(far, "velocity_limit"), (not_a_number, "law_failed"), (no_rotation, "law_failed")]
+)
+def test_a_wrong_pose_stops_the_rig_safely(wrong: Callable[[masseter.Demand], masseter.Pose], cause: str) -> None:
+    def law(demand: masseter.Demand) -> masseter.Pose:
+        return wrong(demand) if demand.motion_time_s > 0.3 else demand.ahead
+
+    result = masseter.run(controller=law, arguments=SHORT)
+    assert (result.verdict, result.exit_code) == ("SAFE STOP", 5)
+    assert cause in {event["cause"] for event in result.figures["events"]}
+
+
+def test_an_exception_of_the_law_stops_the_rig_safely_and_is_raised_again(tmp_path: Path) -> None:
+    def law(demand: masseter.Demand) -> masseter.Pose:
+        if demand.motion_time_s > 0.3:
+            raise ZeroDivisionError("my law broke")
+        return demand.ahead
+
+    with pytest.raises(ZeroDivisionError, match="my law broke"):
+        masseter.run(controller=law, arguments=SHORT, out=tmp_path / "run")
+    summary = masseter.load(tmp_path / "run").summary
+    assert "law_failed" in {event["cause"] for event in summary["figures"]["events"]}
+
+    with pytest.raises(masseter.MasseterError, match="returned no masseter.Pose"):
+        masseter.run(controller=lambda demand: None, arguments=SHORT)  # type: ignore[arg-type, return-value]
+
+
+def start(command: str, name: str, *arguments: str) -> "subprocess.Popen[str]":
+    return subprocess.Popen(
+        [command, "run", "--clock", "lockstep", "--quiet", "--controller", "external", "--name", name, *arguments],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+
+
+def attached(name: str, rig: "subprocess.Popen[str]") -> masseter.Session:
+    while True:
+        try:
+            return masseter.Session(name)
+        except masseter.MasseterError:
+            assert rig.poll() is None, rig.communicate()
+
+
+def play(session: masseter.Session, misbehave: Callable[[int, Command], None]) -> None:
+    """Leaves the drives without voltage for 200 cycles; `misbehave` changes each command."""
+    for _ in range(200):
+        cycle = session.wait()
+        assert cycle is not None
+        reading_cycle = cycle.reading.cycle if cycle.reading else 0
+        command = Command(cycle=cycle.number, reading_cycle=reading_cycle, request=DriveRequest.OFF)
+        state = State(
+            cycle=cycle.number, reading_cycle=reading_cycle, controller_state=ControllerState.WAIT_READINGS
+        )
+        misbehave(cycle.number, command)
+        session.publish(command, state)
+
+
+def session_run(masseter_command: str, folder: Path, work: Callable[[masseter.Session], None]) -> tuple[int, str]:
+    name = f"session-{folder.name[-20:]}"
+    rig = start(masseter_command, name, "--duration", "1", "--out", str(folder / "run"), "--patience", "1s")
+    try:
+        with attached(name, rig) as session:
+            work(session)
+    except masseter.MasseterError as error:
+        output = rig.communicate(timeout=60)
+        return rig.returncode, "".join(output) + str(error)
+    output = rig.communicate(timeout=60)
+    return rig.returncode, "".join(output)
+
+
+def test_a_controller_of_the_drives_is_recorded(masseter_command: str, tmp_path: Path) -> None:
+    def work(session: masseter.Session) -> None:
+        assert session.period_s == 1e-3
+        play(session, lambda number, command: None)
+        session.finish()
+
+    code, said = session_run(masseter_command, tmp_path, work)
+    run = masseter.load(tmp_path / "run")
+    # The motion was never played, and the verdict says so.
+    assert code == 1, said
+    assert list(run.command["cycle"]) == list(range(1, 201))
+    assert np.all(run.reading["position_m"][:, 3:] > 0.2)
+
+
+def nan(number: int, command: Command) -> None:
+    if number > 100:
+        command.target_m[0] = float("nan")
+
+
+def unknown_request(number: int, command: Command) -> None:
+    if number > 100:
+        command.request = 77
+
+
+@pytest.mark.parametrize("misbehave", [nan, unknown_request])
+def test_a_bad_command_is_refused_by_the_master_and_named(
+    masseter_command: str, tmp_path: Path, misbehave: Callable[[int, Command], None]
+) -> None:
+    def work(session: masseter.Session) -> None:
+        play(session, misbehave)
+        session.finish(is_safe_stop=True)
+
+    code, said = session_run(masseter_command, tmp_path, work)
+    assert code == 5, said
+    causes = {event["cause"] for event in masseter.load(tmp_path / "run").summary["figures"]["events"]}
+    assert "bad_message" in causes
+
+
+def test_a_second_command_in_a_cycle_is_refused_and_the_run_ends_with_its_reason(
+    masseter_command: str, tmp_path: Path
+) -> None:
+    def work(session: masseter.Session) -> None:
+        session.wait()
+        session.publish(Command(cycle=1), State(cycle=1))
+        session.publish(Command(cycle=1), State(cycle=1))
+
+    code, said = session_run(masseter_command, tmp_path, work)
+    assert code == 4 and "cycle 1 has its command already" in said, said
+
+
+def test_a_controller_that_leaves_or_hangs_is_named(masseter_command: str, tmp_path: Path) -> None:
+    code, said = session_run(masseter_command, tmp_path, lambda session: session.fail("no more ideas"))
+    assert code == 4 and "no more ideas" in said, said
+
+    over = threading.Event()
+
+    def hang(session: masseter.Session) -> None:
+        session.wait()
+        over.wait(4.0)
+
+    hung = tmp_path / "hung"
+    hung.mkdir()
+    code, said = session_run(masseter_command, hung, hang)
+    assert code == 4 and "did not answer in cycle" in said, said
+
+
+def test_without_a_rig_or_a_run_the_reason_is_given(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with pytest.raises(masseter.MasseterError, match="no rig named 'nowhere' takes a controller"):
+        masseter.control(ahead, "nowhere")
+    with pytest.raises(masseter.MasseterError, match="is no run folder"):
+        masseter.load(tmp_path / "nowhere")
+    with pytest.raises(masseter.MasseterError, match="nowhere.toml"):
+        masseter.run("nowhere.toml")
+    monkeypatch.delenv("MASSETER")
+    monkeypatch.setenv("PATH", "")
+    with pytest.raises(masseter.MasseterError, match="not on the PATH"):
+        masseter.run()
+
+
+def test_tables_have_the_units_in_their_names() -> None:
+    run = masseter.run(clock="virtual", arguments=SHORT).load()
+    states = run.to_polars("state")
+    assert states.height == len(run.state) and "desired_position_m_2" in states.columns
+    assert list(run.to_pandas("state").columns) == states.columns
+
+
+def test_a_recording_that_is_cut_short_is_read_as_far_as_it_goes(tmp_path: Path) -> None:
+    result = masseter.run(clock="virtual", arguments=SHORT, out=tmp_path / "run")
+    recording = tmp_path / "run" / "recording.mcap"
+    whole = len(result.load().state)
+    recording.write_bytes(recording.read_bytes()[: recording.stat().st_size // 2])
+    cut = masseter.load(tmp_path / "run")
+    assert not cut.is_whole and 0 < len(cut.state) < whole
+    recording.write_bytes(b"no recording")
+    with pytest.raises(masseter.MasseterError, match="not readable as MCAP"):
+        masseter.load(tmp_path / "run")
