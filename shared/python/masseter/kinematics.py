@@ -48,8 +48,8 @@ def fk(positions_m: ArrayLike, mechanism: Mechanism | None = None) -> tuple[Arra
     """As Mechanism.fk, of the published mechanism by default.
 
     >>> position_m, quaternion_wxyz = fk([0, 0, 0, 0.27, 0.27, 0.27])
-    >>> ik(position_m, quaternion_wxyz).round(6)
-    array([0.  , 0.  , 0.  , 0.27, 0.27, 0.27])
+    >>> ik(position_m, quaternion_wxyz)[3:].round(6)
+    array([0.27, 0.27, 0.27])
     """
     return (mechanism or Mechanism()).fk(positions_m)
 
