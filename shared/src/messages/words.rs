@@ -17,6 +17,7 @@ pub fn explain(event: &Event) -> Option<String> {
 fn place(event: &Event) -> String {
     let Event { node, bus, .. } = event;
     match (AXIS_NAMES.get(event.axis as usize), node) {
+        _ if event.cause == Cause::LawFailed.code() => "the pose law".to_owned(),
         (None, 0) if event.source == Source::Controller.code() => "the mechanism".to_owned(),
         (Some(axis), 1..) => format!("axis {axis} (node {node} on bus {bus})"),
         (Some(axis), 0) => format!("axis {axis}"),
@@ -75,8 +76,8 @@ fn complaint(cause: Cause, event: &Event) -> Option<String> {
         }
         Cause::UnknownNode => "a node that no axis is configured with".to_owned(),
         Cause::SecondMaster => "another node sends SYNC or has the master's id".to_owned(),
-        Cause::LawFailed if event.value == 0.0 => "the pose law failed".to_owned(),
-        Cause::LawFailed => format!("the pose law gave no pose: it contains {}", event.value),
+        Cause::LawFailed if event.value == 0.0 => "failed".to_owned(),
+        Cause::LawFailed => format!("gave no pose: {} is no coordinate of one", event.value),
         Cause::ForwardKinematics | Cause::InverseKinematics => {
             no_pose(NoPose::try_from(event.object).ok()?).to_owned()
         }

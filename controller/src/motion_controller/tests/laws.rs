@@ -54,16 +54,16 @@ fn a_law_is_asked_only_while_the_platform_may_move_and_gets_what_the_state_messa
 fn whatever_a_law_does_wrong_ends_in_a_safe_stop_with_its_cause() {
     type Wrong = fn(&Demand) -> Result<Pose, LawFailed>;
     let cases: [(Wrong, Cause, &str); 6] = [
-        (|_| Err(LawFailed), Cause::LawFailed, "the pose law failed"),
-        (|_| Ok(Pose::translation(f64::NAN, 0.0, 0.27)), Cause::LawFailed, "it contains NaN"),
-        (|_| Ok(Pose::translation(0.0, f64::INFINITY, 0.27)), Cause::LawFailed, "it contains inf"),
+        (|_| Err(LawFailed), Cause::LawFailed, "the pose law: failed"),
+        (|_| Ok(Pose::translation(f64::NAN, 0.0, 0.27)), Cause::LawFailed, "gave no pose: NaN"),
+        (|_| Ok(Pose::translation(0.0, f64::INFINITY, 0.27)), Cause::LawFailed, "gave no pose: inf"),
         (
             |demand| {
                 let rotation = Unit::new_unchecked(Quaternion::new(0.5, 0.0, 0.0, 0.0));
                 Ok(Pose::from_parts(demand.ahead.translation, rotation))
             },
             Cause::LawFailed,
-            "it contains 0.5",
+            "gave no pose: 0.5",
         ),
         (|demand| Ok(Pose::translation(0.0, 0.002, 0.0) * demand.ahead), Cause::VelocityLimit, ""),
         (|demand| Ok(Pose::translation(0.0, 0.0, 1.0) * demand.ahead), Cause::StrokeLimit, ""),
