@@ -39,6 +39,9 @@ pub struct Timing {
     pub lost: u64,
     /// Cycles that the rig missed by itself.
     pub missed: u64,
+    /// Those of controller and plant.
+    #[serde(skip)]
+    missed_by: [u64; 2],
     /// The evidence on overlong stretches of work, in words; empty without such stretches.
     #[serde(skip)]
     pub(crate) evidence: String,
@@ -47,15 +50,17 @@ pub struct Timing {
 impl Timing {
     /// Judges a run.
     pub(crate) fn new(manifest: &Manifest, figures: &Figures) -> Self {
-        let (skipped, by_machine) = figures.skipped();
-        let (controller, plant) = (&figures.controller_skips, &figures.plant_skips);
+        let loops = [&figures.controller_skips, &figures.plant_skips];
+        let may_be_the_machine =
+            figures.overrun_attribution.is_some_and(|overruns| overruns.may_be_the_machine());
         // Without real time, overlong work is no evidence against the rig.
-        let by_machine = match manifest.refusal() {
-            None => by_machine,
-            Some(_) => [controller, plant].map(|skips| skips.by_machine + skips.while_working).iter().sum(),
-        };
-        let lost = by_machine + figures.skipped_of_unknown_cause();
-        let missed = skipped.saturating_sub(lost);
+        let is_work_excused = may_be_the_machine || manifest.refusal().is_some();
+        let lost_by = loops.map(|skips| {
+            let working = if is_work_excused { skips.while_working } else { 0 };
+            skips.by_machine + working + skips.unknown_cause
+        });
+        let missed_by = [0, 1].map(|index| loops[index].skipped.saturating_sub(lost_by[index]));
+        let (lost, missed) = (lost_by.iter().sum(), missed_by.iter().sum());
         let word = if figures.cycles == 0 {
             TimingWord::Unknown
         } else if manifest.clock != "rt" {
@@ -67,9 +72,9 @@ impl Timing {
         } else {
             TimingWord::Held
         };
-        let cycles = 2 * figures.cycles + skipped;
+        let cycles = 2 * figures.cycles + loops[0].skipped + loops[1].skipped;
         let evidence = figures.overrun_attribution.map(in_words).unwrap_or_default();
-        Self { word, cycles, lost, missed, evidence }
+        Self { word, cycles, lost, missed, missed_by, evidence }
     }
 
     /// Share of the cycles that the machine lost, %.
@@ -98,7 +103,13 @@ impl Display for Timing {
                 grouped(*cycles),
                 self.lost_percent()
             ),
-            TimingWord::Missed => write!(f, "missed by the rig ({})", grouped(*missed)),
+            TimingWord::Missed => match self.missed_by.map(grouped) {
+                [controller, _] if self.missed_by[1] == 0 => {
+                    write!(f, "missed by the controller ({controller})")
+                }
+                [_, plant] if self.missed_by[0] == 0 => write!(f, "missed by the plant ({plant})"),
+                [controller, plant] => write!(f, "missed by controller ({controller}) and plant ({plant})"),
+            },
             TimingWord::Simulated => f.write_str("simulated"),
             TimingWord::Unknown => f.write_str("unknown, because no cycle ran"),
         }

@@ -235,7 +235,7 @@ fn cycles_that_the_rig_missed_fail_a_run_and_those_that_the_machine_lost_do_not(
             },
             Fail,
             Missed,
-            "missed by the rig (1)",
+            "missed by the controller (1)",
         ),
         (
             |run| {
@@ -244,7 +244,7 @@ fn cycles_that_the_rig_missed_fail_a_run_and_those_that_the_machine_lost_do_not(
             },
             Fail,
             Missed,
-            "missed by the rig (1)",
+            "missed by the plant (1)",
         ),
         (
             |run| {
@@ -270,7 +270,7 @@ fn cycles_that_the_rig_missed_fail_a_run_and_those_that_the_machine_lost_do_not(
             Disturbed,
             "disturbed by the machine (2 of 2,002 cycles of both loops, 0.10 %)",
         ),
-        (|run| run.overruns(5, 0.002), Fail, Missed, "missed by the rig (2)"),
+        (|run| run.overruns(5, 0.002), Fail, Missed, "missed by the plant (2)"),
         (
             |run| {
                 run.manifest.scenario.checks.missed_cycles = 4;
@@ -287,7 +287,7 @@ fn cycles_that_the_rig_missed_fail_a_run_and_those_that_the_machine_lost_do_not(
             },
             Fail,
             Missed,
-            "missed by the rig (4)",
+            "missed by controller (1) and plant (3)",
         ),
     ];
     for (change, outcome, word, timing) in cases {
@@ -302,7 +302,7 @@ fn the_evidence_on_overlong_work_is_part_of_the_finding() {
     let verdict = Run::with(|run| run.overruns(5, 0.002));
     assert_eq!(
         verdict.checks[3].finding,
-        "missed by the rig (2); 5 stretches of work too long, 1 stall of that length while waiting, work is 25.0 % of the \
+        "missed by the plant (2); 5 stretches of work too long, 1 stall of that length while waiting, work is 25.0 % of the \
          time: probability by chance 0.00, limit of the rig 0"
     );
 }
