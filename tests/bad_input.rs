@@ -55,6 +55,32 @@ fn scenarios_are_refused_with_place_and_remedy() {
     }
 }
 
+#[test]
+fn a_key_that_is_set_by_an_argument_is_used_or_refused_with_the_argument() {
+    let workspace = Workspace::new("duration_s = 1.0\n[motion]\nkind = 'opening'\namplitude_mm = 9.0\n");
+    let set =
+        ["--set", "motion.amplitude_mm=8", "--set", "name=mine", "--set", "checks.tracking_max_mm = 0.4"];
+    let output = workspace.run_virtual(&set);
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    let scenario = &workspace.manifest()["scenario"];
+    let found =
+        [&scenario["motion"]["amplitude_mm"], &scenario["name"], &scenario["checks"]["tracking_max_mm"]];
+    assert_eq!(found, [&json!(8.0), &json!("mine"), &json!(0.4)]);
+    for (assignment, reason) in [
+        ("controller.integral_gain=5", "did you mean 'integral_gain_per_s'?"),
+        ("controller.integral_gain_per_s=much", "--set: controller.integral_gain_per_s=much"),
+        ("controller.integral_gain_per_s=5000", "controller.integral_gain_per_s = 5000: use at most 500"),
+        ("rate_hz", "write KEY=VALUE"),
+        ("motion.kind=yawning", "unknown value 'yawning'"),
+        ("a b=1", "a b=1"),
+    ] {
+        let workspace = Workspace::new("");
+        let output = workspace.run_virtual(&["--set", assignment]);
+        assert_eq!(output.status.code(), Some(2), "{assignment}");
+        assert!(stderr(&output).contains(reason), "{assignment}: {}", stderr(&output));
+    }
+}
+
 /// A terminal would carry them out.
 #[test]
 fn control_characters_of_a_file_are_printed_as_codes() {

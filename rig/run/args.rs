@@ -39,6 +39,9 @@ pub(crate) struct RunArgs {
     /// Duration of the motion in seconds, or with a unit, such as 10, 10s or 2min
     #[arg(long, value_name = "TIME", value_parser = parse_duration, help_heading = WHAT)]
     pub duration: Option<Duration>,
+    /// Change a key of the scenario, such as controller.integral_gain_per_s=50; may be given several times
+    #[arg(long, value_name = "KEY=VALUE", help_heading = WHAT)]
+    pub set: Vec<String>,
     /// Cycles per second
     #[arg(long, value_name = "HZ", help_heading = HOW)]
     pub rate_hz: Option<u32>,
@@ -119,6 +122,7 @@ impl RunArgs {
     /// The changes to the scenario.
     pub(super) fn overrides(&self) -> Overrides {
         Overrides {
+            set: self.set.clone(),
             trajectory: self.trajectory.clone(),
             duration: self.duration,
             rate_hz: self.rate_hz,

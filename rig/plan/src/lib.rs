@@ -44,6 +44,8 @@ pub struct RunPlan {
 /// Changes of a command's arguments to a scenario.
 #[derive(Debug, Clone, Default)]
 pub struct Overrides {
+    /// Values of keys of the scenario, each as `KEY=VALUE`. The other changes come after them.
+    pub set: Vec<String>,
     /// File of a recorded motion that replaces the scenario's.
     pub trajectory: Option<PathBuf>,
     /// Duration of the motion.
@@ -138,6 +140,9 @@ pub fn demands(
 }
 
 fn apply(overrides: &Overrides, scenario: &mut Scenario) -> anyhow::Result<()> {
+    for assignment in &overrides.set {
+        *scenario = scenario.with(assignment).context("--set")?;
+    }
     if let Some(path) = &overrides.trajectory {
         play_file(path, scenario);
     }

@@ -2,6 +2,8 @@
 
 use std::path::Path;
 
+use toml::Table;
+
 use super::document::{Document, place};
 use super::error::ScenarioError;
 use super::need::{LONGEST_S, SHORTEST_MOTION_S, require_within};
@@ -143,6 +145,34 @@ impl Scenario {
         unnamed(&scenario).map_or(Ok(scenario), Err)
     }
 
+    /// The scenario with one value changed: `KEY=VALUE`, with the key and the value as in a file. A value that is no TOML is
+    /// text. The value is not checked yet: see [`Self::validate`].
+    ///
+    /// ```
+    /// use masseter_shared::config::Scenario;
+    ///
+    /// let scenario = Scenario::default().with("controller.integral_gain_per_s=50")?;
+    /// assert_eq!(scenario.controller.integral_gain_per_s, 50.0);
+    /// # Ok::<(), masseter_shared::config::ScenarioError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`ScenarioError::Malformed`] for an unknown key or a value of another type.
+    pub fn with(&self, assignment: &str) -> Result<Self, ScenarioError> {
+        let refused = |reason| ScenarioError::Malformed { place: assignment.to_owned(), reason };
+        let (key, value) = assignment.split_once('=').ok_or_else(|| refused("write KEY=VALUE".to_owned()))?;
+        let as_toml = toml::from_str::<Table>(&format!("{key} = {value}"));
+        let as_text = || toml::from_str(&format!("{key} = {}", toml::Value::from(value)));
+        let given = as_toml.or_else(|_| as_text()).map_err(|error| refused(error.message().to_owned()))?;
+        let mut whole: Table = toml::from_str(&self.to_toml()).expect("it was written from a scenario");
+        merge(&mut whole, given);
+        Self::parse(Path::new(assignment), &whole.to_string()).map_err(|error| match error {
+            // The place is one in the resolved scenario, which the user does not see.
+            ScenarioError::Malformed { reason, .. } => refused(reason),
+            other => other,
+        })
+    }
+
     /// The scenario with every default filled in, as TOML.
     pub fn to_toml(&self) -> String {
         toml::to_string_pretty(self).expect("every part of a scenario has a TOML form")
@@ -189,6 +219,18 @@ impl Scenario {
     /// Duration of a cycle, s.
     pub fn period_s(&self) -> f64 {
         self.period_ns() as f64 / SECOND_NS as f64
+    }
+}
+
+/// Replaces the values that are given, and leaves the others of their tables.
+fn merge(whole: &mut Table, given: Table) {
+    for (key, value) in given {
+        match (whole.get_mut(&key), value) {
+            (Some(toml::Value::Table(inner)), toml::Value::Table(given)) => merge(inner, given),
+            (_, value) => {
+                whole.insert(key, value);
+            }
+        }
     }
 }
 
