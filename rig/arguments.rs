@@ -80,6 +80,15 @@ impl ControllerChoice {
             Self::External | Self::Executable(_) => None,
         }
     }
+
+    /// Its name in the manifest; none for the controller that runs by default.
+    pub(crate) fn name(&self) -> Option<String> {
+        match self {
+            Self::Own(kind) => Some(name_of(kind)).filter(|_| *kind != ControllerKind::default()),
+            Self::External => Some("external".to_owned()),
+            Self::Executable(path) => Some(path.display().to_string()),
+        }
+    }
 }
 
 /// The name of a controller of the rig, `external`, or the path of an executable file.

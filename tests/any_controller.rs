@@ -68,6 +68,8 @@ fn a_program_leaves_the_bytes_of_the_rigs_own_controller() {
         assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
         assert!(started.recording() == own.recording(), "{clock}");
         assert_eq!(started.manifest()["clock"], "lockstep");
+        assert_eq!(started.manifest()["controller"], program.to_str().unwrap());
+        assert!(stdout(&output).contains(&format!("controller: {}", program.display())));
         let printed =
             (stdout(&output).contains("of the program"), stderr(&output).contains("of the program"));
         assert_eq!(printed, (false, true), "standard output is the rig's");

@@ -59,6 +59,7 @@ pub(crate) fn run(args: &RunArgs) -> Result<Exit, Failure> {
     let motion_s = plan.trajectory.duration_s();
     let clock = name_of(&args.clock);
     let mut manifest = Manifest::new(plan.scenario.clone(), motion_s, &clock, machine::describe());
+    manifest.controller = args.controller.name();
     if args.clock == ClockKind::Rt {
         manifest.mending_command = doctor::mending_command();
     }

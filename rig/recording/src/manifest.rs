@@ -44,6 +44,9 @@ pub struct Manifest {
     pub began: String,
     /// `rt`, `lockstep` or `virtual`.
     pub clock: String,
+    /// Who controlled the robot, if not the motion controller of the rig: `hold`, `external` or the path of a program.
+    #[serde(default)]
+    pub controller: Option<String>,
     /// The scenario as resolved.
     pub scenario: Scenario,
     /// Duration of the motion, s.
@@ -72,6 +75,7 @@ impl Manifest {
             masseter: env!("CARGO_PKG_VERSION").to_owned(),
             began: began.to_string(),
             clock: clock.to_owned(),
+            controller: None,
             scenario,
             motion_s,
             machine,

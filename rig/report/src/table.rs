@@ -80,6 +80,9 @@ fn write_verdict(
         scenario.seed,
         figures.digest,
     )?;
+    if let Some(controller) = &manifest.controller {
+        writeln!(text, "controller: {controller}")?;
+    }
     if let MotionConfig::File(file) = &scenario.motion {
         writeln!(text, "recording played: {}", file.path.display())?;
     }
