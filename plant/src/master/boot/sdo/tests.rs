@@ -81,7 +81,8 @@ fn answers_without_a_request_change_nothing() {
     let segment = SdoResponse::DownloadSegment { toggle: false };
     let other = SdoResponse::Abort { object: HEARTBEAT, code: AbortCode::GENERAL };
     let wrong_way = SdoResponse::Download { object: NAME };
-    for foreign in [answer, segment, other, wrong_way] {
+    let long = SdoResponse::InitiateUpload { object: HEARTBEAT, size: Some(9) };
+    for foreign in [answer, segment, other, wrong_way, long] {
         assert_eq!(client.take(foreign), None);
         assert_eq!(client, before);
     }
