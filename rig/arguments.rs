@@ -13,15 +13,15 @@ use masseter_controller::process::BuildController;
 use masseter_shared::lifecycle::{Patience, ProcessArguments};
 use masseter_shared::realtime::scheduling::usable_cores;
 
-/// The arguments that the supervisor passes to every process of a run.
+/// The arguments that the supervisor passes to every process of a run. Some verbs are also a user's, without them.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct ProcessArgs {
-    #[arg(long)]
+    #[arg(long, hide = true, required = false, requires = "domain")]
     scenario: PathBuf,
-    #[arg(long)]
+    #[arg(long, hide = true, required = false, requires = "scenario")]
     domain: String,
     /// For a run in lockstep
-    #[arg(long, value_parser = parse_patience)]
+    #[arg(long, hide = true, requires = "scenario", value_parser = parse_patience)]
     lockstep: Option<Patience>,
 }
 

@@ -1,15 +1,12 @@
 //! `masseter controller`: one of the rig's controllers as a program that attaches to a rig; with the supervisor's hidden
 //! arguments, the controller's process.
 
-use std::path::PathBuf;
-
 use clap::Args;
 use masseter_controller::process;
 use masseter_shared::control::Outcome;
-use masseter_shared::lifecycle::{Patience, ProcessArguments};
 use masseter_terminal::Exit;
 
-use crate::arguments::{ControllerKind, parse_patience};
+use crate::arguments::{ControllerKind, ProcessArgs};
 
 /// The arguments of `controller`.
 #[derive(Debug, Clone, Args)]
@@ -23,27 +20,15 @@ pub(crate) struct ControllerArgs {
     /// Which controller
     #[arg(long, value_enum, default_value_t)]
     kind: ControllerKind,
-    #[arg(long, hide = true, requires = "domain", conflicts_with = "rig")]
-    scenario: Option<PathBuf>,
-    #[arg(long, hide = true, requires = "scenario")]
-    domain: Option<String>,
-    #[arg(long, hide = true, requires = "scenario", value_parser = parse_patience)]
-    lockstep: Option<Patience>,
-}
-
-impl ControllerArgs {
-    /// The arguments from the supervisor; none for a controller that a user starts.
-    fn process_arguments(&self) -> Option<ProcessArguments> {
-        let (scenario, domain) = (self.scenario.clone()?, self.domain.clone()?);
-        Some(ProcessArguments { scenario, domain, lockstep: self.lockstep })
-    }
+    #[command(flatten)]
+    process: Option<ProcessArgs>,
 }
 
 /// Runs the controller to the end of its motion or a safe stop.
-pub(crate) fn control(args: &ControllerArgs) -> anyhow::Result<Exit> {
+pub(crate) fn control(args: ControllerArgs) -> anyhow::Result<Exit> {
     let build = args.kind.builder();
-    let outcome = match args.process_arguments() {
-        Some(arguments) => process::run(&arguments, build)?,
+    let outcome = match args.process {
+        Some(process) => process::run(&process.process_arguments(), build)?,
         None => process::run_attached(args.rig.as_deref(), build)?,
     };
     Ok(match outcome {

@@ -9,11 +9,11 @@ use masseter_plant::emulation::{Emulator, EmulatorCounters};
 use masseter_plant::process::{self, Reason};
 use masseter_shared::clock;
 use masseter_shared::config::Scenario;
-use masseter_shared::lifecycle::{Patience, ProcessArguments, StopRequest};
+use masseter_shared::lifecycle::StopRequest;
 use masseter_shared::realtime::scheduling::{SchedulingRequest, obtain};
 use masseter_terminal::{Exit, result_line, status};
 
-use crate::arguments::{Wires, parse_patience, parse_wires};
+use crate::arguments::{ProcessArgs, Wires, parse_wires};
 
 /// The arguments of `plant`.
 #[derive(Debug, Clone, Args)]
@@ -28,30 +28,18 @@ pub(crate) struct PlantArgs {
     /// Connect the emulated drives to the interfaces, until Ctrl-C
     #[arg(long)]
     emulate: bool,
-    #[arg(long, hide = true, requires = "domain")]
-    scenario: Option<PathBuf>,
-    #[arg(long, hide = true, requires = "scenario")]
-    domain: Option<String>,
-    #[arg(long, hide = true, requires = "scenario", value_parser = parse_patience)]
-    lockstep: Option<Patience>,
-}
-
-impl PlantArgs {
-    /// The arguments from the supervisor; none for a plant that a user starts.
-    fn process_arguments(&self) -> Option<ProcessArguments> {
-        let (scenario, domain) = (self.scenario.clone()?, self.domain.clone()?);
-        Some(ProcessArguments { scenario, domain, lockstep: self.lockstep })
-    }
+    #[command(flatten)]
+    process: Option<ProcessArgs>,
 }
 
 /// Emulates until Ctrl-C, or runs as the supervisor's process until asked to end. That process also ends, by a safe stop,
 /// when commands stop arriving.
-pub(crate) fn plant(args: &PlantArgs) -> anyhow::Result<Exit> {
-    let Some(process_arguments) = args.process_arguments() else {
-        emulate(args)?;
+pub(crate) fn plant(args: PlantArgs) -> anyhow::Result<Exit> {
+    let Some(process) = args.process else {
+        emulate(&args)?;
         return Ok(Exit::Passed);
     };
-    Ok(match process::run(&process_arguments)? {
+    Ok(match process::run(&process.process_arguments())? {
         Reason::Requested => Exit::Passed,
         Reason::Abandoned => Exit::SafeStop,
     })

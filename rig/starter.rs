@@ -33,11 +33,7 @@ fn refuse_content(folder: &Path) -> anyhow::Result<()> {
         Err(error) => Err(error).with_context(|| format!("cannot read the folder {}", folder.display())),
         Ok(mut entries) => match entries.next() {
             None => Ok(()),
-            Some(_) => bail!(
-                "{} is not empty, and nothing is replaced; name a new folder, such as {}",
-                folder.display(),
-                folder.join("rig").display()
-            ),
+            Some(_) => bail!("{} is not empty, and nothing is replaced; name a new folder", folder.display()),
         },
     }
 }

@@ -7,13 +7,14 @@ use std::fs;
 use std::io::{BufRead, BufReader, Write};
 use std::os::unix::fs::PermissionsExt;
 use std::os::unix::net::UnixStream;
+use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 
 use common::{Cores, LENIENT, MASSETER, PASSED_OR_INVALID, Workspace, masseter, stderr, stdout, wait_until};
 use masseter_shared::lifecycle::attach::socket;
 use masseter_shared::transport::Domain;
-use rustix::process::{Pid, Signal, kill_process};
+use rustix::process::{Pid, Signal, kill_process, kill_process_group};
 
 const SCENARIO: &str = "duration_s = 1.0\n";
 
@@ -125,6 +126,55 @@ fn a_program_that_hangs_is_given_up_by_its_silence() {
     let output = rig.wait_with_output().unwrap();
     assert_eq!(output.status.code(), Some(4), "{}", stdout(&output));
     assert!(stdout(&output).contains("did not answer in cycle"), "{}", stdout(&output));
+}
+
+#[test]
+fn a_program_of_the_user_that_hangs_is_left_to_its_user_and_the_run_ends() {
+    let workspace = Workspace::new("duration_s = 60.0\n");
+    let name = unique("hangs");
+    let arguments = ["--controller", "external", "--name", &name, "--patience", "1s"];
+    let rig = workspace.start_lockstep(&arguments);
+    let socket = socket(&Domain::named(&name).unwrap());
+    wait_until("the rig waits", || UnixStream::connect(&socket).is_ok());
+    let mut program = attach(&["--rig", &name]).spawn().unwrap();
+    common::wait_until_it_records(&workspace);
+    kill_process(Pid::from_child(&program), Signal::STOP).unwrap();
+    let output = rig.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(4), "{}", stdout(&output));
+    assert!(stdout(&output).contains("and was left to its user"), "{}", stdout(&output));
+    assert!(program.try_wait().unwrap().is_none(), "the rig has killed it");
+    program.kill().unwrap();
+    program.wait().unwrap();
+}
+
+#[test]
+fn a_terminals_interrupt_ends_the_motion_of_a_program_in_order() {
+    let workspace = Workspace::new("duration_s = 60.0\n");
+    // Unlike the rig's own processes, this program would end at once.
+    let program = script(&workspace, &format!("exec {MASSETER} controller"));
+    let mut rig = Command::new(MASSETER);
+    rig.args(["run", "--clock", "lockstep", "--quiet", "--out"]).arg(workspace.run_folder());
+    rig.args(["--controller", program.to_str().unwrap()]).arg(workspace.file("scenario.toml"));
+    let rig = rig.process_group(0).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    common::wait_until_it_records(&workspace);
+    kill_process_group(Pid::from_child(&rig), Signal::INT).unwrap();
+    let output = rig.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(130), "{}{}", stdout(&output), stderr(&output));
+    assert_eq!(workspace.manifest()["ending"]["kind"], "interrupted");
+    assert!(common::has_event(&workspace.summary(), "transition", "stop_requested"));
+}
+
+#[test]
+fn a_rig_whose_plant_dies_while_it_waits_for_a_controller_waits_no_longer() {
+    let workspace = Workspace::new(SCENARIO);
+    let name = unique("no-plant");
+    let mut rig = workspace.start_lockstep(&["--controller", "external", "--name", &name]);
+    let mut said = BufReader::new(rig.stderr.take().unwrap()).lines().map_while(Result::ok);
+    assert!(said.any(|line| line.contains("waiting for a controller")), "plant and recorder are ready");
+    kill_process(common::child_of(&rig, "plant"), Signal::KILL).unwrap();
+    let rest: Vec<_> = said.collect();
+    assert_eq!(rig.wait().unwrap().code(), Some(4), "{rest:?}");
+    assert!(rest.join(" ").contains("the plant ended (SIGKILL (9)) before the start"), "{rest:?}");
 }
 
 #[test]

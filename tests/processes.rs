@@ -85,7 +85,11 @@ fn a_controller_that_does_not_end_when_asked_to_is_killed() {
     kill_process(Pid::from_child(&child), Signal::TERM).unwrap();
     let output = child.wait_with_output().unwrap();
     assert_eq!(output.status.code(), Some(4), "{}{}", stdout(&output), stderr(&output));
-    assert!(stdout(&output).contains("did not end after SIGTERM"), "{}", stdout(&output));
+    assert!(
+        stdout(&output).contains("did not end when it was asked to, and was killed"),
+        "{}",
+        stdout(&output)
+    );
 }
 
 #[test]

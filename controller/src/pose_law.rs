@@ -59,8 +59,9 @@ pub struct LawFailed;
 /// ```
 #[doc(alias("control law", "regulator"))]
 pub trait PoseLaw: std::fmt::Debug {
-    /// The pose to ask for, so that the desired pose comes about when this cycle's command is reached. In real time it must
-    /// not block.
+    /// The pose to ask for, so that the desired pose comes about when this cycle's command is reached. It must not block
+    /// or allocate: in real time, the cycle waits for it. A target beyond a stroke by less than the default trim's reach is
+    /// clamped.
     ///
     /// # Errors
     /// When there is no such pose: the controller then stops safely.

@@ -92,11 +92,12 @@ impl From<LawFailed> for Fault {
 /// Whether a law's pose consists of finite numbers, and its quaternion has the length 1.
 pub(crate) fn check_asked(asked: &Pose) -> Result<(), Fault> {
     let position = &asked.translation.vector;
+    if let Some(&value_m) = position.iter().find(|value_m| !value_m.is_finite()) {
+        return Err(Fault::new(Cause::LawFailed, value_m, 0.0));
+    }
     let norm = asked.rotation.quaternion().norm();
     let is_rotation = (norm - 1.0).abs() < MOST_NORM_ERROR;
-    let bad = position.iter().copied().find(|value_m| !value_m.is_finite());
-    let bad = if is_rotation { bad } else { bad.or(Some(norm)) };
-    bad.map_or(Ok(()), |value| Err(Fault::new(Cause::LawFailed, value, 0.0)))
+    if is_rotation { Ok(()) } else { Err(Fault::new(Cause::LawFailed, norm, 1.0)) }
 }
 
 /// Whether every value of a reading is a number and every code known.

@@ -19,6 +19,9 @@ pub(super) const READY_TIMEOUT: Duration = Duration::from_secs(20);
 /// Polling interval while waiting for readiness.
 pub(super) const POLL: Duration = Duration::from_millis(20);
 
+/// What became of a process that the rig ended.
+pub(super) const KILLED: &str = "was killed";
+
 // The names of the processes, which are also their subcommands.
 pub(super) const CONTROLLER: &str = Party::Controller.name();
 pub(super) const PLANT: &str = Party::Plant.name();
@@ -98,6 +101,18 @@ impl Process {
     /// Ends it at once (SIGKILL).
     pub(super) fn kill(&mut self) {
         self.signal(Signal::KILL);
+    }
+
+    /// The same; returns what became of it, in words.
+    pub(super) fn give_up(&mut self) -> &'static str {
+        self.kill();
+        KILLED
+    }
+
+    /// That it has ended before the start, in words, if it has.
+    pub(super) fn death(&mut self) -> Option<String> {
+        let status = self.exit_status().ok()??;
+        Some(format!("the {} ended ({}) before the start", self.role, describe(status)))
     }
 
     fn signal(&mut self, signal: Signal) {

@@ -47,11 +47,16 @@ impl Controller {
         }
     }
 
-    /// Waits until it reports that it is ready; none if `is_cancelled` becomes true first.
-    pub(super) fn wait_ready(&mut self, is_cancelled: impl Fn() -> bool) -> anyhow::Result<Option<Obtained>> {
+    /// Waits until it reports that it is ready; none if `is_cancelled` becomes true first. The wait for a program fails once
+    /// another process has died.
+    pub(super) fn wait_ready(
+        &mut self,
+        is_cancelled: impl Fn() -> bool,
+        has_died: impl FnMut() -> Option<String>,
+    ) -> anyhow::Result<Option<Obtained>> {
         match self {
             Self::Own(process) => process.wait_ready(is_cancelled),
-            Self::Program(program) => program.wait_ready(is_cancelled),
+            Self::Program(program) => program.wait_ready(is_cancelled, has_died),
         }
     }
 
@@ -91,11 +96,11 @@ impl Controller {
         }
     }
 
-    /// Ends it at once, unless the user has started it.
-    pub(super) fn kill(&mut self) {
+    /// Goes on without it; returns what became of it, in words.
+    pub(super) fn give_up(&mut self) -> &'static str {
         match self {
-            Self::Own(process) => process.kill(),
-            Self::Program(program) => program.kill(),
+            Self::Own(process) => process.give_up(),
+            Self::Program(program) => program.give_up(),
         }
     }
 }

@@ -5,7 +5,7 @@ use std::process::ExitStatus;
 use masseter_recording::Ending;
 use masseter_terminal::Exit;
 
-use super::child::{PLANT, RECORDER, describe};
+use super::child::{KILLED, PLANT, RECORDER, describe};
 
 /// The ending of the run: the first death of a process, else an incomplete recording, else the interruption, else the
 /// controller's ending.
@@ -34,10 +34,10 @@ pub(super) fn of_plant_and_recorder(
 }
 
 /// The cause of death of a process that did not end when it was asked to.
-pub(super) const NOT_ENDED: &str = "it did not end after SIGTERM, and was killed";
+pub(super) const NOT_ENDED: &str = "it did not end when it was asked to";
 
 pub(super) fn died(role: &str, status: Option<ExitStatus>) -> Ending {
-    let how = status.map_or_else(|| NOT_ENDED.to_owned(), describe);
+    let how = status.map_or_else(|| format!("{NOT_ENDED}, and {KILLED}"), describe);
     Ending::died(role, how)
 }
 

@@ -5,10 +5,12 @@
 
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, ErrorKind, Write};
+use std::net::Shutdown;
 use std::os::fd::AsFd;
 use std::os::unix::net::{UnixListener, UnixStream};
+use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Stdio};
+use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::Duration;
 
 use anyhow::{Context, bail};
@@ -20,7 +22,7 @@ use masseter_shared::transport::Domain;
 use masseter_terminal::status;
 use rustix::net::sockopt::socket_peercred;
 
-use super::child::{POLL, READY_TIMEOUT, describe};
+use super::child::{KILLED, POLL, READY_TIMEOUT, describe};
 use super::reports::{Readiness, Reports};
 
 /// Longest wait for the greeting of a program that has connected.
@@ -70,6 +72,8 @@ impl Program {
             .env(RIG_VARIABLE, domain.id())
             .stdin(Stdio::null())
             .stdout(File::from(output))
+            // A terminal's Ctrl-C is for the rig, which then asks the program to end.
+            .process_group(0)
             .spawn()
             .with_context(|| format!("the controller {} cannot be started", path.display()))?;
         program.executable = Some(Executable { path: path.to_owned(), child });
@@ -81,8 +85,13 @@ impl Program {
         self.admitted.as_ref().map_or(0, |admitted| admitted.process_id)
     }
 
-    /// Waits until the program has attached and is ready; none if `is_cancelled` becomes true first.
-    pub(super) fn wait_ready(&mut self, is_cancelled: impl Fn() -> bool) -> anyhow::Result<Option<Obtained>> {
+    /// Waits until the program has attached and is ready; none if `is_cancelled` becomes true first. Fails once another process
+    /// has died.
+    pub(super) fn wait_ready(
+        &mut self,
+        is_cancelled: impl Fn() -> bool,
+        mut has_died: impl FnMut() -> Option<String>,
+    ) -> anyhow::Result<Option<Obtained>> {
         if self.executable.is_none() {
             status!(
                 "waiting for a controller: start yours with {RIG_VARIABLE}={}; Ctrl-C gives up",
@@ -101,6 +110,9 @@ impl Program {
                 }
                 Readiness::Closed => bail!("the controller ended before it was ready; see its message above"),
                 Readiness::NotYet => polls = polls.saturating_sub(1),
+            }
+            if let Some(death) = has_died() {
+                bail!(death);
             }
             self.check_executable(polls > 0)?;
         }
@@ -218,7 +230,7 @@ impl Program {
     }
 
     /// The exit status of an executable, if it ends in time.
-    fn await_exit(&mut self) -> io::Result<Option<std::process::ExitStatus>> {
+    fn await_exit(&mut self) -> io::Result<Option<ExitStatus>> {
         let Some(Executable { child, .. }) = &mut self.executable else { return Ok(None) };
         for _ in 0..EXIT_TIMEOUT.as_millis() / POLL.as_millis() {
             if let Some(status) = child.try_wait()? {
@@ -229,18 +241,29 @@ impl Program {
         Ok(None)
     }
 
-    /// Ends an executable at once (SIGKILL); leaves a program that the user has started.
-    pub(super) fn kill(&mut self) {
-        if let Some(Executable { child, .. }) = &mut self.executable {
-            let _ = child.kill();
+    /// Closes the line, and ends an executable at once (SIGKILL); returns what became of the program, in words.
+    pub(super) fn give_up(&mut self) -> &'static str {
+        self.close();
+        let Some(Executable { child, .. }) = &mut self.executable else { return "was left to its user" };
+        // It may have ended meanwhile.
+        let _ = child.kill();
+        KILLED
+    }
+
+    /// Closes the line, by which the program notices that the rig is gone.
+    fn close(&mut self) {
+        if let Some(admitted) = &self.admitted {
+            // The program may have closed it before.
+            let _ = admitted.stream.shutdown(Shutdown::Both);
         }
     }
 }
 
 impl Drop for Program {
     fn drop(&mut self) {
+        self.close();
         let _ = self.await_exit();
-        self.kill();
+        self.give_up();
         if let Some(Executable { child, .. }) = &mut self.executable {
             let _ = child.wait();
         }

@@ -46,7 +46,7 @@ const END_TIMEOUT_NS: u64 = 5 * SECOND_NS;
 /// Longest time for the recorder to write what is left to a slow disk, ns.
 const RECORD_TIMEOUT_NS: u64 = 60 * SECOND_NS;
 /// The cause of death of a controller whose commands stopped.
-const SILENT: &str = "it stopped sending commands, and was killed";
+const SILENT: &str = "it stopped sending commands";
 /// Time for the plant to stop the drives once its master has detected the controller's death, ns.
 const SAFE_STOP_NS: u64 = SECOND_NS / 2;
 /// Claims, each with names that cannot be guessed, until a rig whose names another user takes is given up.
@@ -209,24 +209,25 @@ impl Rig {
 
     /// The scheduling of each process once all are ready; none if the user interrupts before.
     fn wait_ready(&mut self, interrupts: &Interrupts) -> anyhow::Result<Option<Scheduling>> {
+        self.collect_ready(interrupts).or_else(|error| {
+            // Ctrl-C also reaches the processes, and may have ended one before the supervisor sees it.
+            clock::sleep(SIGNAL_DELAY);
+            if interrupts.is_stop_requested() { Ok(None) } else { Err(error) }
+        })
+    }
+
+    fn collect_ready(&mut self, interrupts: &Interrupts) -> anyhow::Result<Option<Scheduling>> {
+        let Self { recorder, plant, controller, .. } = self;
         let is_cancelled = || interrupts.is_stop_requested();
-        let ready = [
-            (RECORDER, self.recorder.wait_ready(is_cancelled)),
-            (PLANT, self.plant.wait_ready(is_cancelled)),
-            (CONTROLLER, self.controller.wait_ready(is_cancelled)),
-        ];
         let mut scheduling = BTreeMap::new();
-        for (role, ready) in ready {
-            match ready {
-                Ok(Some(obtained)) => scheduling.insert(role.to_owned(), obtained),
-                Ok(None) => return Ok(None),
-                Err(error) => {
-                    // Ctrl-C also reaches the processes, and may have ended this one before the supervisor sees it.
-                    clock::sleep(SIGNAL_DELAY);
-                    return if interrupts.is_stop_requested() { Ok(None) } else { Err(error) };
-                }
-            };
+        for process in [&mut *recorder, &mut *plant] {
+            let Some(obtained) = process.wait_ready(is_cancelled)? else { return Ok(None) };
+            scheduling.insert(process.role.to_owned(), obtained);
         }
+        // A user may take long to start a controller.
+        let has_died = || [&mut *recorder, &mut *plant].into_iter().find_map(Process::death);
+        let Some(obtained) = controller.wait_ready(is_cancelled, has_died)? else { return Ok(None) };
+        scheduling.insert(CONTROLLER.to_owned(), obtained);
         Ok(Some(scheduling))
     }
 
@@ -251,13 +252,13 @@ impl Rig {
                 interruption = self.interrupt_controller(interrupts)?;
             }
             if let Some(end) = self.controller.end()? {
-                break Some(end);
+                break end;
             }
             let now_ns = clock::now_ns();
             let give_up_after_ns = now_ns.saturating_add(self.stop_timeout_ns);
             if interruption.is_some() && now_ns > *give_up_ns.get_or_insert(give_up_after_ns) {
-                self.controller.kill();
-                break None;
+                let fate = self.controller.give_up();
+                break End::Failed { reason: format!("{NOT_ENDED}, and {fate}") };
             }
             at(now_ns);
             clock::sleep(POLL);
@@ -286,8 +287,8 @@ impl Rig {
             died(RECORDER, recorder)
         } else if let Some(status) = plant {
             if status.code() == Some(Exit::SafeStop as i32) {
-                self.controller.kill();
-                return Ok(Some(Ending::died(CONTROLLER, SILENT.to_owned())));
+                let fate = self.controller.give_up();
+                return Ok(Some(Ending::died(CONTROLLER, format!("{SILENT}, and {fate}"))));
             }
             died(PLANT, Some(status))
         } else {
@@ -302,26 +303,24 @@ impl Rig {
     fn end_silent(&mut self) -> Option<Ending> {
         let reports = [self.controller.reported_silence(), self.plant.reported_silence()];
         let Silence { process, cycle, silent_s } = reports.into_iter().flatten().next()?;
-        match process {
-            Party::Controller => self.controller.kill(),
-            Party::Plant => self.plant.kill(),
-            Party::Recorder => self.recorder.kill(),
-        }
-        let how =
-            format!("it did not answer in cycle {cycle} for {silent_s:.1} s (--patience), and was killed");
+        let fate = match process {
+            Party::Controller => self.controller.give_up(),
+            Party::Plant => self.plant.give_up(),
+            Party::Recorder => self.recorder.give_up(),
+        };
+        let how = format!("it did not answer in cycle {cycle} for {silent_s:.1} s (--patience), and {fate}");
         Some(Ending::died(process.name(), how))
     }
 
     /// The controller's ending. If it died, waits for the plant's master to stop the drives.
-    fn controller_ending(&mut self, end: Option<End>, interrupts: &Interrupts) -> io::Result<Ending> {
+    fn controller_ending(&mut self, end: End, interrupts: &Interrupts) -> io::Result<Ending> {
         if let Some(ending) = self.end_silent() {
             return Ok(ending);
         }
         let reason = match end {
-            Some(End::Finished) => return Ok(Ending::Completed),
-            Some(End::SafeStop) => return Ok(Ending::SafeStop),
-            Some(End::Failed { reason }) => reason,
-            None => NOT_ENDED.to_owned(),
+            End::Finished => return Ok(Ending::Completed),
+            End::SafeStop => return Ok(Ending::SafeStop),
+            End::Failed { reason } => reason,
         };
         wait_for(&mut self.plant, self.plant_alone_ns, interrupts)?;
         Ok(Ending::died(CONTROLLER, reason))

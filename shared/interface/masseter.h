@@ -10,7 +10,7 @@
  * A controller of the drives does everything itself: masseter_attach, masseter_start, then in each cycle masseter_wait and
  * masseter_publish, at last masseter_finish or masseter_fail.
  *
- * Functions return a masseter_result, or what their comment says. A session belongs to one thread at a time. No function
+ * Functions return a masseter_result, or what their comment says. A session belongs to the thread that attached. No function
  * changes signal handlers. Units and frames are those of masseter_messages.h. docs/interface.md has life cycle and timing. */
 #ifndef MASSETER_H
 #define MASSETER_H

@@ -167,7 +167,7 @@ enum masseter_cause {
     MASSETER_CAUSE_FOLLOWING_ERROR = 46,
     /* Platform turned too far from where it should be (rad). */
     MASSETER_CAUSE_ORIENTATION_LOST = 48,
-    /* The pose law failed (0), or gave a pose that is none (the bad coordinate, m, or the quaternion's length). */
+    /* The pose law failed (0), or gave a pose with a bad coordinate (m), or with a bad quaternion (its length; the limit is 1). */
     MASSETER_CAUSE_LAW_FAILED = 49,
 };
 
@@ -397,7 +397,7 @@ typedef struct masseter_event {
     uint64_t cycle;
     /* Reporter, a Source. */
     uint32_t source;
-    /* Kind, a EventKind. */
+    /* Kind, an EventKind. */
     uint32_t kind;
     /* Cause, a Cause. */
     uint32_t cause;

@@ -1,5 +1,7 @@
 """fk and ik over arrays."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -41,6 +43,13 @@ def test_a_bad_row_is_named_with_the_reason() -> None:
         masseter.fk([0.0] * 5)
 
 
-def test_the_mechanism_of_a_scenario_is_used(tmp_path: object) -> None:
+def test_the_mechanism_of_a_scenario_is_used(tmp_path: Path) -> None:
+    scenario = tmp_path / "large.toml"
+    scenario.write_text("[mechanism]\nplatform_sides_m = [0.11, 0.11, 0.11]\n")
+    large = masseter.Mechanism(scenario)
+    positions_m = motion(1)
+    position_m, quaternion_wxyz = masseter.fk(positions_m, large)
+    assert np.abs(position_m - masseter.fk(positions_m)[0]).max() > 1e-4
+    assert np.allclose(masseter.ik(position_m, quaternion_wxyz, large), positions_m, rtol=0, atol=1e-12)
     with pytest.raises(masseter.MasseterError, match="nowhere.toml"):
         masseter.Mechanism("nowhere.toml")

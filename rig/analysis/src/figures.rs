@@ -79,11 +79,6 @@ impl Figures {
         (controller.skipped + plant.skipped, controller.by_machine + plant.by_machine + while_working)
     }
 
-    /// Skipped deadlines whose cause is unknown, because messages before them are missing.
-    pub fn skipped_of_unknown_cause(&self) -> u64 {
-        self.controller_skips.unknown_cause + self.plant_skips.unknown_cause
-    }
-
     /// Messages that were published and not recorded.
     pub fn missing_messages(&self) -> u64 {
         self.topics.iter().map(|topic| topic.missing).sum()

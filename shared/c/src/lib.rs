@@ -1,7 +1,7 @@
 //! The rig's interface for controllers in C and C++; `shared/interface/masseter.h` documents every function.
 //!
 //! Each function returns a result and keeps its message for [`masseter_error`]. No panic leaves this library: it becomes an
-//! error. A session belongs to one thread at a time.
+//! error. A session belongs to the thread that attached.
 #![allow(unsafe_code, reason = "C passes pointers")]
 
 mod law;

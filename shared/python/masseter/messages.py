@@ -174,7 +174,7 @@ class Cause(enum.IntEnum):
     FOLLOWING_ERROR = 46
     #: Platform turned too far from where it should be (rad).
     ORIENTATION_LOST = 48
-    #: The pose law failed (0), or gave a pose that is none (the bad coordinate, m, or the quaternion's length).
+    #: The pose law failed (0), or gave a pose with a bad coordinate (m), or with a bad quaternion (its length; the limit is 1).
     LAW_FAILED = 49
 
 
@@ -367,7 +367,7 @@ class Event(ctypes.Structure):
         ("cycle", ctypes.c_uint64),
         # Reporter, a Source.
         ("source", ctypes.c_uint32),
-        # Kind, a EventKind.
+        # Kind, an EventKind.
         ("kind", ctypes.c_uint32),
         # Cause, a Cause.
         ("cause", ctypes.c_uint32),

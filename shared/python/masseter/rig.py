@@ -72,19 +72,24 @@ def run(
     chosen = ["external", "--name", name] if law else [os.fspath(controller)]  # type: ignore[arg-type]
     command = [_command(), "run", *([os.fspath(scenario)] if scenario is not None else [])]
     command += ["--clock", clock, "--out", str(folder), "--quiet", "--controller", *chosen, *arguments]
-    rig = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    # A terminal's Ctrl-C is for this process, which then asks the rig to end.
+    rig = subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
+    )
     output = _Output(rig)
     try:
         if law:
             _control(law, name, rig)
+        output.join()
+    except KeyboardInterrupt:
+        rig.terminate()
+        raise
     finally:
-        _end(rig)
         output.join()
     summary = read_summary(folder)
     if not summary:
         raise _native.MasseterError(output.error.strip() or f"the rig ended with exit code {rig.returncode}")
-    verdict = output.result.partition(":")[0].partition("\n")[0]
-    return Result(verdict, rig.returncode, folder, summary, output.error)
+    return Result(summary["verdict"]["word"], rig.returncode, folder, summary, output.error)
 
 
 def _command() -> str:
@@ -102,11 +107,11 @@ class _Output(threading.Thread):
     def __init__(self, rig: "subprocess.Popen[str]") -> None:
         super().__init__(daemon=True)
         self._rig = rig
-        self.result = self.error = ""
+        self.error = ""
         self.start()
 
     def run(self) -> None:
-        self.result, self.error = self._rig.communicate()
+        _, self.error = self._rig.communicate()
 
 
 def _control(law: Law, name: str, rig: "subprocess.Popen[str]") -> None:
@@ -119,12 +124,3 @@ def _control(law: Law, name: str, rig: "subprocess.Popen[str]") -> None:
             if "takes a controller" not in str(error):
                 raise
             time.sleep(_POLL_S)
-
-
-def _end(rig: "subprocess.Popen[str]") -> None:
-    """Waits for the rig; after an exception, such as Ctrl-C, asks it to end before."""
-    try:
-        rig.wait()
-    except BaseException:
-        rig.terminate()
-        raise

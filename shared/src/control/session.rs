@@ -106,7 +106,7 @@ impl Session {
                 controller.request_stop();
             }
             self.end_turn(false)?;
-            let wake = self.ports.wait(controller)?;
+            let wake = self.ports.begin_cycle(|| controller.warm_up())?;
             run_cycle(controller, &mut self.ports, &wake)?;
             self.cycle = Some(OpenCycle { wake, received_ns: 0, is_published: true });
         }
@@ -133,7 +133,7 @@ impl Session {
         {
             return Ok(Waited::TimedOut);
         }
-        let wake = self.ports.wait_for_cycle()?;
+        let wake = self.ports.begin_cycle(|| ())?;
         let reading = self.ports.reading(&wake)?.map(|reading| *reading);
         let received_ns = self.ports.now_ns();
         self.cycle = Some(OpenCycle { wake, received_ns, is_published: false });
@@ -252,22 +252,11 @@ impl Ports {
         })
     }
 
-    /// Waits for the next deadline. Before it, warms the controller up and touches the memory of the next messages.
-    fn wait(&mut self, controller: &dyn Controller) -> Result<Wake, TransportError> {
+    /// Waits for the next deadline. Before it, calls `warm_up` and touches the memory of the next messages.
+    fn begin_cycle(&mut self, warm_up: impl FnOnce()) -> Result<Wake, TransportError> {
         match &mut self.clock {
             Clock::RealTime(cycle) => cycle.wait_warm(|| {
-                controller.warm_up();
-                self.commands.warm_up()?;
-                self.states.warm_up()
-            }),
-            Clock::Lockstep(lockstep) => Ok(lockstep.begin_cycle()),
-        }
-    }
-
-    /// Waits for the next deadline, without a controller that needs warming up.
-    fn wait_for_cycle(&mut self) -> Result<Wake, TransportError> {
-        match &mut self.clock {
-            Clock::RealTime(cycle) => cycle.wait_warm(|| {
+                warm_up();
                 self.commands.warm_up()?;
                 self.states.warm_up()
             }),

@@ -179,7 +179,7 @@ codes! {
         FollowingError = 46 "following_error",
         /// Platform turned too far from where it should be (rad).
         OrientationLost = 48 "orientation_lost",
-        /// The pose law failed (0), or gave a pose that is none (the bad coordinate, m, or the quaternion's length).
+        /// The pose law failed (0), or gave a pose with a bad coordinate (m), or with a bad quaternion (its length; the limit is 1).
         LawFailed = 49 "law_failed",
     }
 }

@@ -293,7 +293,7 @@ messages! {
         cycle: u64,
         /// Reporter, a [`codes::Source`].
         source: u32,
-        /// Kind, a [`codes::EventKind`].
+        /// Kind, an [`codes::EventKind`].
         kind: u32,
         /// Cause, a [`codes::Cause`].
         cause: u32,

@@ -76,8 +76,11 @@ fn complaint(cause: Cause, event: &Event) -> Option<String> {
         }
         Cause::UnknownNode => "a node that no axis is configured with".to_owned(),
         Cause::SecondMaster => "another node sends SYNC or has the master's id".to_owned(),
+        Cause::LawFailed if event.limit > 0.0 => {
+            format!("gave no pose: its quaternion has the length {}, not 1", event.value)
+        }
         Cause::LawFailed if event.value == 0.0 => "failed".to_owned(),
-        Cause::LawFailed => format!("gave no pose: {} is no coordinate of one", event.value),
+        Cause::LawFailed => format!("gave no pose: its position contains {}", event.value),
         Cause::ForwardKinematics | Cause::InverseKinematics => {
             no_pose(NoPose::try_from(event.object).ok()?).to_owned()
         }

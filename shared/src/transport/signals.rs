@@ -156,7 +156,7 @@ mod tests {
 
     #[test]
     fn signals_wait_for_their_receiver_in_order_and_are_lost_without_one() {
-        let domain = ScratchDomain::claim("test-of-the-longest-name").unwrap();
+        let domain = ScratchDomain::claim("test-of-signals-longname").unwrap();
         let node = Node::join(&domain).unwrap();
         let timeout = Duration::from_millis(1);
         let [mut receiver, mut other] =

@@ -1,5 +1,6 @@
 //! Pose laws of a user: what they may do, and that whatever they do wrong ends in a safe stop with its cause.
 
+use masseter_shared::geometry::Vec3;
 use masseter_shared::messages::explain;
 use nalgebra::{Quaternion, Unit};
 
@@ -28,6 +29,31 @@ fn bench(law: fn(&Demand) -> Result<Pose, LawFailed>) -> Bench {
     Bench { controller, ..Bench::new() }
 }
 
+/// A law of a user that computes what the default one does.
+#[derive(Debug)]
+struct Copied(PoseControl);
+
+impl PoseLaw for Copied {
+    fn command(&mut self, demand: &Demand) -> Result<Pose, LawFailed> {
+        self.0.command(demand)
+    }
+}
+
+#[test]
+fn a_law_equal_to_the_default_one_gives_equal_commands_whether_warmed_up_or_not() {
+    let scenario = short();
+    let law = Box::new(Copied(PoseControl::new(scenario.controller)));
+    let controller = MotionController::with_law(&scenario, mechanism(), trajectory(&scenario), law);
+    let (mut default, mut own) = (Bench::new(), Bench { controller, ..Bench::new() });
+    while own.controller.state() != ControllerState::Finished {
+        // Work in advance must not reach the law: it would integrate an error twice.
+        own.controller.warm_up();
+        default.cycle(Some);
+        own.cycle(Some);
+        assert_eq!(own.commands, default.commands, "cycle {}", own.cycle);
+    }
+}
+
 #[test]
 fn a_law_that_asks_for_the_desired_pose_plays_the_motion() {
     let mut bench = bench(|demand| Ok(demand.ahead));
@@ -53,17 +79,30 @@ fn a_law_is_asked_only_while_the_platform_may_move_and_gets_what_the_state_messa
 #[test]
 fn whatever_a_law_does_wrong_ends_in_a_safe_stop_with_its_cause() {
     type Wrong = fn(&Demand) -> Result<Pose, LawFailed>;
-    let cases: [(Wrong, Cause, &str); 6] = [
+    let cases: [(Wrong, Cause, &str); 7] = [
         (|_| Err(LawFailed), Cause::LawFailed, "the pose law: failed"),
-        (|_| Ok(Pose::translation(f64::NAN, 0.0, 0.27)), Cause::LawFailed, "gave no pose: NaN"),
-        (|_| Ok(Pose::translation(0.0, f64::INFINITY, 0.27)), Cause::LawFailed, "gave no pose: inf"),
+        (
+            |_| Ok(Pose::translation(f64::NAN, 0.0, 0.27)),
+            Cause::LawFailed,
+            "gave no pose: its position contains NaN",
+        ),
+        (
+            |_| Ok(Pose::translation(0.0, f64::INFINITY, 0.27)),
+            Cause::LawFailed,
+            "gave no pose: its position contains inf",
+        ),
         (
             |demand| {
                 let rotation = Unit::new_unchecked(Quaternion::new(0.5, 0.0, 0.0, 0.0));
                 Ok(Pose::from_parts(demand.ahead.translation, rotation))
             },
             Cause::LawFailed,
-            "gave no pose: 0.5",
+            "its quaternion has the length 0.5, not 1",
+        ),
+        (
+            |_| Ok(Pose::from_parts(Vec3::zeros().into(), Unit::new_unchecked(Quaternion::from([0.0; 4])))),
+            Cause::LawFailed,
+            "its quaternion has the length 0, not 1",
         ),
         (|demand| Ok(Pose::translation(0.0, 0.002, 0.0) * demand.ahead), Cause::VelocityLimit, ""),
         (|demand| Ok(Pose::translation(0.0, 0.0, 1.0) * demand.ahead), Cause::StrokeLimit, ""),
