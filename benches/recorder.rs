@@ -21,6 +21,7 @@ use masseter_shared::geometry::Mechanism;
 use masseter_shared::lifecycle::Start;
 use masseter_shared::messages::codes::Source;
 use masseter_shared::messages::{Command as CommandMessage, Event, FrameTap, Reading, State, Truth};
+use masseter_shared::named::Declared;
 use masseter_shared::realtime::Cycle;
 use masseter_shared::realtime::scheduling::{SchedulingRequest, obtain};
 use masseter_shared::transport::{BatchPublisher, Node, Publisher, ScratchDomain};
@@ -118,7 +119,8 @@ impl Publishers {
             Recorded::State(message) => self.state.publish(|place| *place = *message)?,
             Recorded::Truth(message) => self.truth.publish(|place| *place = *message)?,
             // Those of a cycle travel together, and the recorder has this topic from nobody.
-            Recorded::Frame(_) | Recorded::Machine(_) => {}
+            // There is no signal or parameter.
+            Recorded::Frame(_) | Recorded::Machine(_) | Recorded::Signals(_) | Recorded::Parameters(_) => {}
             Recorded::Event(message) => {
                 let is_of_controller = message.source == Source::Controller.code();
                 self.events[usize::from(!is_of_controller)].publish(|place| *place = *message)?;
@@ -175,7 +177,11 @@ fn start_recorder(scenario: &Path, domain: &str, recording: &Path) -> anyhow::Re
     writeln!(
         input,
         "{}",
-        serde_json::to_string(&Start { epoch_ns: clock::now_ns(), loops: [std::process::id(); 2] })?
+        serde_json::to_string(&Start {
+            epoch_ns: clock::now_ns(),
+            loops: [std::process::id(); 2],
+            declared: Declared::default()
+        })?
     )?;
     Ok(recorder)
 }

@@ -64,6 +64,8 @@ pub(crate) enum ControllerChoice {
     External,
     /// A program that the rig starts.
     Executable(PathBuf),
+    /// Nobody, or whoever publishes commands: the rig starts, invites and watches no controller.
+    None,
 }
 
 impl Default for ControllerChoice {
@@ -77,7 +79,7 @@ impl ControllerChoice {
     pub(crate) fn builder(&self) -> Option<BuildController> {
         match self {
             Self::Own(kind) => Some(kind.builder()),
-            Self::External | Self::Executable(_) => None,
+            Self::External | Self::Executable(_) | Self::None => None,
         }
     }
 
@@ -86,6 +88,7 @@ impl ControllerChoice {
         match self {
             Self::Own(kind) => Some(name_of(kind)).filter(|_| *kind != ControllerKind::default()),
             Self::External => Some("external".to_owned()),
+            Self::None => Some("none".to_owned()),
             Self::Executable(path) => Some(path.display().to_string()),
         }
     }
@@ -99,6 +102,9 @@ pub(crate) fn parse_controller(text: &str) -> Result<ControllerChoice, String> {
     if text == "external" {
         return Ok(ControllerChoice::External);
     }
+    if text == "none" {
+        return Ok(ControllerChoice::None);
+    }
     let path = PathBuf::from(text);
     match path.metadata() {
         Ok(found) if found.is_file() && found.permissions().mode() & 0o111 != 0 => {
@@ -107,7 +113,9 @@ pub(crate) fn parse_controller(text: &str) -> Result<ControllerChoice, String> {
         }
         Ok(found) if found.is_file() => Err(format!("the file is not executable: chmod +x {text}")),
         Ok(_) => Err("it is a folder: give the executable file of your controller".to_owned()),
-        Err(error) => Err(format!("use motion, hold, external, or the path of an executable file ({error})")),
+        Err(error) => {
+            Err(format!("use motion, hold, external, none, or the path of an executable file ({error})"))
+        }
     }
 }
 

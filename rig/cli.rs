@@ -20,6 +20,7 @@ use crate::kinematics_cli::{self, CsvArgs, FkArgs};
 use crate::manuals::{self, CompletionsArgs, ManArgs};
 use crate::new::{self, NewVerb};
 use crate::paper_study::{self, KinematicsArgs};
+use crate::param::{self, ParamVerb};
 use crate::plant::{self, PlantArgs};
 use crate::recorder::{self, RecorderArgs};
 use crate::recording_cli::{self, RecordingVerb};
@@ -80,6 +81,9 @@ enum Verb {
     /// Lay down a project for your own controller
     #[command(subcommand, after_help = "Example:\n  masseter new controller --lang cpp my_controller")]
     New(NewVerb),
+    /// List, read and set the parameters of a running controller
+    #[command(subcommand, after_help = "Example:\n  masseter param set integral_gain_per_s=8")]
+    Param(ParamVerb),
     /// Print the messages as types of C or Python
     Interface(InterfaceArgs),
     /// Emulate the six drives and the mechanism on real CAN interfaces
@@ -171,6 +175,7 @@ fn execute(verb: Verb) -> Result<Exit, Failure> {
         Verb::Completions(args) => manuals::completions(&args, command()).usage(),
         Verb::Man(args) => manuals::manual(&args, command()).usage(),
         Verb::New(verb) => new::new(&verb).usage(),
+        Verb::Param(verb) => param::param(&verb).usage(),
         Verb::Interface(args) => interface::interface(&args).died(),
         Verb::Controller(args) => controller::control(args).usage(),
         Verb::Plant(args) => plant::plant(args).usage(),

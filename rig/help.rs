@@ -7,7 +7,7 @@ use clap::Command;
 /// What a user wants, and the verbs for that.
 const GROUPS: [(&str, &[&str]); 6] = [
     ("Play a motion and judge it", &["init", "run", "report", "recording"]),
-    ("Bring your own controller", &["new", "interface", "controller"]),
+    ("Bring your own controller", &["new", "interface", "controller", "param"]),
     ("Prepare this machine", &["doctor", "bench", "clean"]),
     ("Work with CAN and the drives", &["can", "plant"]),
     ("Solve the kinematics", &["ik", "fk", "uniqueness", "kinematics"]),

@@ -25,6 +25,7 @@ pub mod machine;
 mod manuals;
 mod new;
 mod paper_study;
+mod param;
 mod plant;
 mod recorder;
 mod recording_cli;

@@ -245,3 +245,20 @@ fn a_file_that_is_no_executable_is_refused_before_anything_starts() {
         assert!(stderr(&output).contains(expected), "{}", stderr(&output));
     }
 }
+
+#[test]
+fn without_a_controller_plant_and_recorder_run_for_the_length_of_the_motion() {
+    let cores = Cores::take();
+    let workspace = Workspace::new(&format!("duration_s = 1.0\n{LENIENT}"));
+    let output = workspace.run(&cores, &["--controller", "none", "--quiet"]);
+    assert_eq!(output.status.code(), Some(1), "{}", stderr(&output));
+    assert!(stdout(&output).starts_with("UNTESTED: no cycle ran"), "{}", stdout(&output));
+    let topics = &workspace.summary()["figures"]["topics"];
+    let messages = |name: &str| {
+        let topic = topics.as_array().unwrap().iter().find(|topic| topic["topic"] == name);
+        topic.map_or(0, |topic| topic["messages"].as_u64().unwrap())
+    };
+    assert!(messages("reading") > 900 && messages("command") == 0 && messages("state") == 0, "{topics}");
+    let refused = workspace.run_virtual(&["--controller", "none"]);
+    assert!(refused.status.code() == Some(2) && stderr(&refused).contains("needs --clock rt"));
+}

@@ -8,7 +8,7 @@ use std::net::{TcpListener, TcpStream};
 use std::process::{Child, ChildStderr, ExitStatus, Stdio};
 use std::thread;
 
-use common::{Cores, LENIENT, Workspace, assert_played, masseter, stderr, stdout};
+use common::{Cores, LENIENT, Workspace, assert_played, has_event, masseter, stderr, stdout};
 use masseter_recording::Reader;
 use serde_json::{Value, json};
 use tungstenite::client::IntoClientRequest;
@@ -76,8 +76,11 @@ impl Watcher {
     fn subscribe_to_all(&mut self) {
         let ids = self.channels.iter().map(|channel| channel["id"].as_u64().unwrap());
         let wanted: Vec<_> = ids.map(|id| json!({"id": id + 100, "channelId": id})).collect();
-        let ask = json!({"op": "subscribe", "subscriptions": wanted});
-        self.socket.send(Message::Text(ask.to_string().into())).unwrap();
+        self.ask(&json!({"op": "subscribe", "subscriptions": wanted}));
+    }
+
+    fn ask(&mut self, request: &Value) {
+        self.socket.send(Message::Text(request.to_string().into())).unwrap();
     }
 
     /// Every message of every topic, until the server says goodbye.
@@ -88,7 +91,8 @@ impl Watcher {
                 Ok(Message::Binary(data)) => {
                     assert_eq!(data[0], 1);
                     let id = u32::from_le_bytes(data[1..5].try_into().unwrap()) - 100;
-                    let topic = self.channels[id as usize]["topic"].as_str().unwrap();
+                    let channel = self.channels.iter().find(|channel| channel["id"] == id).unwrap();
+                    let topic = channel["topic"].as_str().unwrap();
                     seen.entry(topic.to_owned()).or_default().push(data[MESSAGE_HEAD..].to_vec());
                 }
                 Ok(Message::Close(_)) => return seen,
@@ -120,7 +124,7 @@ fn a_watcher_sees_the_channels_and_messages_of_the_recording() {
     let shown = Shown::start(&cores, &workspace);
     let mut watcher = Watcher::connect(&shown, "foxglove.sdk.v1, foxglove.websocket.v1");
     assert_eq!(watcher.info["op"], "serverInfo");
-    assert_eq!(watcher.info["capabilities"], json!([]));
+    assert_eq!(watcher.info["capabilities"], json!(["parameters", "parametersSubscribe"]));
     watcher.subscribe_to_all();
     let seen = watcher.watch();
     let (status, said) = shown.finish();
@@ -133,6 +137,40 @@ fn a_watcher_sees_the_channels_and_messages_of_the_recording() {
         assert!(seen.iter().all(|message| recorded[topic].contains(message)), "{topic}");
     }
     assert!(seen["/tf"].len() > 100 && seen["/scene"].len() > 50);
+}
+
+#[test]
+fn a_watcher_sets_a_parameter_and_another_one_sees_the_change() {
+    let cores = Cores::take();
+    let workspace = Workspace::new(&format!("duration_s = 3.0\n{LENIENT}"));
+    let shown = Shown::start(&cores, &workspace);
+    let mut onlooker = Watcher::connect(&shown, "foxglove.sdk.v1");
+    let mut setter = Watcher::connect(&shown, "foxglove.sdk.v1");
+    let gain = |value: f64| json!({"name": "integral_gain_per_s", "value": value, "type": "float64"});
+    onlooker.ask(&json!({"op": "subscribeParameterUpdates", "parameterNames": ["integral_gain_per_s"]}));
+    setter.ask(&json!({"op": "getParameters", "parameterNames": ["integral_gain_per_s"], "id": "1"}));
+    assert_eq!(
+        text(&mut setter.socket),
+        json!({"op": "parameterValues", "parameters": [gain(5.0)], "id": "1"})
+    );
+    setter.ask(&json!({"op": "setParameters", "parameters": [gain(8.0)], "id": "2"}));
+    assert_eq!(
+        text(&mut setter.socket),
+        json!({"op": "parameterValues", "parameters": [gain(8.0)], "id": "2"})
+    );
+    while text(&mut onlooker.socket)["parameters"][0] != gain(8.0) {}
+    // A refused value is replaced on the client's screen, with the reason.
+    setter.ask(&json!({"op": "setParameters", "parameters": [gain(-1.0)]}));
+    assert_eq!(text(&mut setter.socket), json!({"op": "parameterValues", "parameters": [gain(8.0)]}));
+    let refusal = text(&mut setter.socket);
+    assert!(
+        refusal["op"] == "status" && refusal["message"].as_str().unwrap().contains("0 to 500"),
+        "{refusal}"
+    );
+    drop([onlooker, setter]);
+    let (status, said) = shown.finish();
+    assert_played(&workspace.run_folder(), status, &said);
+    assert!(has_event(&workspace.summary(), "notice", "parameter_set"));
 }
 
 #[test]

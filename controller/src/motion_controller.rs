@@ -10,6 +10,7 @@ use masseter_shared::control::{Controller, Outcome, Tick};
 use masseter_shared::geometry::{AXES, Actuators, Jacobian, Joints, Mechanism, Pose};
 use masseter_shared::messages::codes::ControllerState;
 use masseter_shared::messages::{Command, Event, Reading, State};
+use masseter_shared::named::Declared;
 
 use crate::command_acknowledgement::CommandAcknowledgement;
 use crate::path_supervision::PathSupervision;
@@ -66,7 +67,7 @@ pub struct MotionController {
 impl MotionController {
     /// A controller that plays `trajectory` on `mechanism` once the rig is ready.
     pub fn new(scenario: &Scenario, mechanism: Mechanism, trajectory: Trajectory) -> Self {
-        let law = Box::new(PoseControl::new(scenario.controller));
+        let law = Box::new(PoseControl::new(scenario.controller, scenario.rate_hz));
         Self::with_law(scenario, mechanism, trajectory, law)
     }
 
@@ -221,6 +222,18 @@ impl Controller for MotionController {
 
     fn outcome(&self) -> Option<Outcome> {
         self.sequencer.outcome()
+    }
+
+    fn declared(&self) -> Declared {
+        self.law.declared()
+    }
+
+    fn set_parameter(&mut self, place: usize, value: f64) {
+        self.law.set_parameter(place, value);
+    }
+
+    fn fill_signals(&self, signals: &mut [f64]) {
+        self.law.fill_signals(signals);
     }
 
     fn warm_up(&self) {

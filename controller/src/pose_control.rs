@@ -5,6 +5,7 @@
 
 use masseter_shared::config::ControllerConfig;
 use masseter_shared::geometry::{Pose, Vec3};
+use masseter_shared::named::{Declared, Parameter};
 use nalgebra::UnitQuaternion;
 
 use crate::pose_law::{Demand, LawFailed, PoseLaw};
@@ -13,13 +14,16 @@ use crate::pose_law::{Demand, LawFailed, PoseLaw};
 #[derive(Debug, Clone)]
 pub(crate) struct PoseControl {
     config: ControllerConfig,
+    most_gain_per_s: f64,
     position_m: Vec3,
     rotation_rad: Vec3,
 }
 
 impl PoseControl {
-    pub(crate) fn new(config: ControllerConfig) -> Self {
-        Self { config, position_m: Vec3::zeros(), rotation_rad: Vec3::zeros() }
+    /// At this rate of cycles, Hz.
+    pub(crate) fn new(config: ControllerConfig, rate_hz: u32) -> Self {
+        let most_gain_per_s = config.most_integral_gain_per_s(rate_hz);
+        Self { config, most_gain_per_s, position_m: Vec3::zeros(), rotation_rad: Vec3::zeros() }
     }
 
     /// Takes the difference between the desired pose and the estimated pose, at the same instant.
@@ -47,6 +51,49 @@ impl PoseLaw for PoseControl {
         }
         Ok(self.correct(&demand.ahead))
     }
+
+    /// The gains of the scenario. A trim limit can only become narrower: the strokes are checked against the scenario's.
+    fn declared(&self) -> Declared {
+        let ControllerConfig { integral_gain_per_s, trim_limit_m, trim_limit_rad, .. } = self.config;
+        let parameter = |name, unit: &str, about: &str, value, most| Parameter {
+            unit: unit.to_owned(),
+            about: about.to_owned(),
+            range: [0.0, most],
+            ..Parameter::new(name, value)
+        };
+        let parameters = vec![
+            parameter(
+                "integral_gain_per_s",
+                "1/s",
+                "Integral gain of the trim.",
+                integral_gain_per_s,
+                self.most_gain_per_s,
+            ),
+            parameter(
+                "trim_limit_m",
+                "m",
+                "The trim moves the platform by no more.",
+                trim_limit_m,
+                trim_limit_m,
+            ),
+            parameter(
+                "trim_limit_rad",
+                "rad",
+                "The trim turns the platform by no more.",
+                trim_limit_rad,
+                trim_limit_rad,
+            ),
+        ];
+        Declared { parameters, signals: Vec::new() }
+    }
+
+    fn set_parameter(&mut self, place: usize, value: f64) {
+        match place {
+            0 => self.config.integral_gain_per_s = value,
+            1 => self.config.trim_limit_m = value,
+            _ => self.config.trim_limit_rad = value,
+        }
+    }
 }
 
 #[cfg(test)]
@@ -56,7 +103,7 @@ mod tests {
     /// A platform that always stands a fixed step beside what was asked for.
     #[test]
     fn a_constant_offset_is_taken_out() {
-        let mut control = PoseControl::new(ControllerConfig::default());
+        let mut control = PoseControl::new(ControllerConfig::default(), 1000);
         let offset = Pose::new(Vec3::new(2e-4, -1e-4, 5e-5), Vec3::new(1e-3, 0.0, -2e-3));
         let desired = Pose::translation(0.0, 0.0, 0.27);
         let estimated = |asked: &Pose| {
@@ -77,7 +124,7 @@ mod tests {
     #[test]
     fn the_correction_is_bounded() {
         let config = ControllerConfig::default();
-        let mut control = PoseControl::new(config);
+        let mut control = PoseControl::new(config, 1000);
         let (desired, estimated) = (Pose::identity(), Pose::new(Vec3::repeat(1.0), Vec3::repeat(0.5)));
         for _ in 0..10_000 {
             control.observe(&desired, &estimated, 1e-3);

@@ -5,6 +5,7 @@
 
 use masseter_shared::geometry::Pose;
 use masseter_shared::messages::codes::ControllerState;
+use masseter_shared::named::Declared;
 
 /// What a pose law needs of a cycle. Poses are those of the platform in the base frame, m.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -66,4 +67,15 @@ pub trait PoseLaw: std::fmt::Debug {
     /// # Errors
     /// When there is no such pose: the controller then stops safely.
     fn command(&mut self, demand: &Demand) -> Result<Pose, LawFailed>;
+
+    /// The signals and parameters of the law. Called once, before the start.
+    fn declared(&self) -> Declared {
+        Declared::default()
+    }
+
+    /// Takes a parameter's value, which is within its range.
+    fn set_parameter(&mut self, _place: usize, _value: f64) {}
+
+    /// Writes the declared signals, also in cycles in which the law is not asked.
+    fn fill_signals(&self, _signals: &mut [f64]) {}
 }

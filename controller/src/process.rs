@@ -64,5 +64,5 @@ fn play(
     let mechanism = Mechanism::new(&scenario.mechanism)?;
     let trajectory = Trajectory::new(&scenario.motion, &scenario.jaw, &mechanism, scenario.duration_s)?;
     let mut controller = build(scenario, mechanism, trajectory);
-    Ok(Session::start(context)?.run(&mut *controller)?)
+    Ok(Session::start(context, controller.declared())?.run(&mut *controller)?)
 }

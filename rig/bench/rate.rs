@@ -11,6 +11,7 @@ use masseter_analysis::{Analysis, Code, Figures};
 use masseter_recording::{Manifest, Reader, RunFolder};
 use masseter_shared::config::Scenario;
 use masseter_shared::messages::codes::ControllerState;
+use masseter_shared::named::Declared;
 use masseter_terminal::Exit;
 
 use super::candidate::{Candidate, Durations, Round, no_durations};
@@ -122,7 +123,7 @@ fn run_at(rate_hz: u32, cores: [usize; 2], interrupts: &Interrupts) -> anyhow::R
 
 fn figures(folder: &RunFolder, scenario: &Scenario) -> anyhow::Result<Figures> {
     let mut reader = Reader::open(&folder.recording())?;
-    let mut analysis = Analysis::new(scenario);
+    let mut analysis = Analysis::new(scenario, &Declared::default());
     while let Some(message) = reader.next_message()? {
         analysis.take(&message)?;
     }
@@ -214,7 +215,7 @@ mod tests {
 
     /// A run of ten cycles whose last state has this sequence number.
     fn run(last_seq: u64, state: ControllerState, is_disturbed: bool) -> Run {
-        let mut analysis = Analysis::new(&Scenario::default());
+        let mut analysis = Analysis::new(&Scenario::default(), &Declared::default());
         for cycle in 1..=10 {
             let seq = if cycle == 10 { last_seq } else { cycle };
             let (due_ns, skipped_cycles) = (cycle * 1_000_000, if cycle > 5 { 5 } else { 0 });

@@ -2,8 +2,9 @@
 //!
 //! Each client has a thread and a queue of fixed length of its own. The recorder puts messages into the queues and never
 //! waits for a client; no other process is involved. A message without room is dropped and counted. The server of the
-//! `foxglove` crate counts no drops and brings an asynchronous runtime, so it is not used. There are no parameters,
-//! services, assets or publishing clients. Who connects must name the secret of the URL.
+//! `foxglove` crate counts no drops and brings an asynchronous runtime, so it is not used. Parameters are read and set at the
+//! controller, by the client's thread. There are no services, assets or publishing clients. Who connects must name the
+//! secret of the URL.
 
 mod admission;
 mod client;
@@ -20,6 +21,8 @@ use std::time::Duration;
 
 use masseter_recording::{Recorded, Scene};
 use masseter_shared::clock::{self, SECOND_NS};
+use masseter_shared::named::Declared;
+use masseter_shared::transport::{Domain, secret};
 
 use client::{Client, Greeting};
 
@@ -69,6 +72,25 @@ const ACCEPT_INTERVAL: Duration = Duration::from_millis(10);
 /// Time between two looks whether all clients have read the rest, and how many there are: 0.5 s.
 const CLOSING_POLL: Duration = Duration::from_millis(10);
 const CLOSING_POLLS: u32 = 50;
+
+/// A socket that listens, and does not answer yet.
+#[derive(Debug)]
+pub(crate) struct Listener {
+    listener: TcpListener,
+    address: SocketAddr,
+}
+
+impl Listener {
+    /// Listens on an address.
+    ///
+    /// # Errors
+    /// When the system refuses the address.
+    pub(crate) fn bind(address: SocketAddr) -> Result<Self, ListenError> {
+        let listener = bind(address)?;
+        let address = listener.local_addr().map_err(|error| ListenError { address, error })?;
+        Ok(Self { listener, address })
+    }
+}
 
 /// A running server.
 #[derive(Debug)]
@@ -122,6 +144,7 @@ impl Clients {
         let mut connected = self.connected();
         let gone: Vec<_> = connected.extract_if(.., |client| client.is_gone()).collect();
         let room = MAX_CLIENTS - connected.len();
+        admitted.iter().take(room).for_each(Client::connect);
         connected.extend(admitted.drain(..room.min(admitted.len())));
         drop(connected);
         drop(gone);
@@ -146,22 +169,23 @@ fn bind(address: SocketAddr) -> Result<TcpListener, ListenError> {
 }
 
 impl FoxgloveServer {
-    /// Listens for clients that know the secret. `session` differs between runs.
+    /// Serves clients that name the secret, which is new. The domain is that of the run, whose controller makes the
+    /// declaration.
     ///
     /// # Errors
-    /// When the system refuses the address.
+    /// When the system refuses a thread or random numbers.
     pub(crate) fn start(
-        address: SocketAddr,
+        Listener { listener, address }: Listener,
         scene: Scene,
-        session: &str,
-        secret: String,
+        declared: Declared,
+        domain: Domain,
     ) -> Result<Self, ListenError> {
-        let listener = bind(address)?;
-        let address = listener.local_addr().map_err(|error| ListenError { address, error })?;
+        let secret = secret().map_err(|error| ListenError { address, error })?;
         let clients = Arc::new(Clients::default());
         let accepted = Arc::clone(&clients);
-        let texts = [protocol::server_info(session), protocol::advertise()];
-        let greeting = Greeting { secret: secret.clone(), texts };
+        let texts = [protocol::server_info(domain.id(), &declared), protocol::advertise(&declared)];
+        let declared = Arc::new(declared);
+        let greeting = Greeting { secret: secret.clone(), texts, declared, domain };
         let accept = move || accepted.accept(&listener, &scene, &greeting);
         let accepting =
             thread::Builder::new().spawn(accept).map_err(|error| ListenError { address, error })?;

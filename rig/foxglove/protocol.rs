@@ -1,5 +1,4 @@
-//! Messages of the Foxglove WebSocket protocol that a server without parameters, services, assets or publishing clients
-//! needs.
+//! Messages of the Foxglove WebSocket protocol that a server without services, assets or publishing clients needs.
 //!
 //! Text messages are JSON objects with an `op`. Messages of channels are binary and little-endian: opcode, subscription
 //! id, time, bytes.
@@ -7,6 +6,7 @@
 use serde::{Deserialize, Serialize};
 
 use masseter_recording::{Channel, Encoded, definitions};
+use masseter_shared::named::{Declared, Parameter};
 
 /// Supported subprotocols, the newest first. The messages used here are the same in both.
 const SUBPROTOCOLS: [&str; 2] = ["foxglove.sdk.v1", "foxglove.websocket.v1"];
@@ -30,9 +30,23 @@ pub(super) enum Level {
 #[derive(Serialize)]
 #[serde(tag = "op", rename_all = "camelCase", rename_all_fields = "camelCase")]
 enum ServerMessage<'a> {
-    ServerInfo { name: &'a str, capabilities: [&'a str; 0], session_id: &'a str },
-    Advertise { channels: Vec<Advertised> },
-    Status { level: u8, message: &'a str },
+    ServerInfo {
+        name: &'a str,
+        capabilities: &'a [&'a str],
+        session_id: &'a str,
+    },
+    Advertise {
+        channels: Vec<Advertised>,
+    },
+    Status {
+        level: u8,
+        message: &'a str,
+    },
+    ParameterValues {
+        parameters: Vec<ParameterValue>,
+        #[serde(skip_serializing_if = "Option::is_none")]
+        id: Option<&'a str>,
+    },
 }
 
 #[derive(Serialize)]
@@ -46,14 +60,46 @@ struct Advertised {
     schema: String,
 }
 
+/// A parameter with its value. Without a type, a client takes a whole number for an integer.
+#[derive(Serialize)]
+struct ParameterValue {
+    name: String,
+    value: f64,
+    r#type: &'static str,
+}
+
+/// A value that a client gives to a parameter; something else than a number is refused.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+pub(super) struct WantedValue {
+    pub name: String,
+    #[serde(default)]
+    pub value: serde_json::Value,
+}
+
 /// A request of a client.
-#[derive(Debug, PartialEq, Eq, Deserialize)]
+#[derive(Debug, PartialEq, Deserialize)]
 #[serde(tag = "op", rename_all = "camelCase", rename_all_fields = "camelCase")]
 pub(super) enum ClientMessage {
     /// Subscribes to channels.
     Subscribe { subscriptions: Vec<Subscription> },
     /// Ends subscriptions.
     Unsubscribe { subscription_ids: Vec<u32> },
+    /// Asks for parameters: those named, or all.
+    GetParameters {
+        parameter_names: Vec<String>,
+        #[serde(default)]
+        id: Option<String>,
+    },
+    /// Gives values to parameters; an answer is wanted if there is an id.
+    SetParameters {
+        parameters: Vec<WantedValue>,
+        #[serde(default)]
+        id: Option<String>,
+    },
+    /// Asks for changes of parameters.
+    SubscribeParameterUpdates { parameter_names: Vec<String> },
+    /// Ends that.
+    UnsubscribeParameterUpdates { parameter_names: Vec<String> },
     /// An operation that this server does not offer.
     #[serde(other)]
     Unsupported,
@@ -75,17 +121,32 @@ impl Subscription {
 }
 
 /// The first message to a client. `session` differs between runs, so that clients discard data of an earlier run.
-pub(super) fn server_info(session: &str) -> String {
-    to_json(&ServerMessage::ServerInfo { name: "masseter", capabilities: [], session_id: session })
+pub(super) fn server_info(session: &str, declared: &Declared) -> String {
+    let capabilities: &[_] =
+        if declared.parameters.is_empty() { &[] } else { &["parameters", "parametersSubscribe"] };
+    to_json(&ServerMessage::ServerInfo { name: "masseter", capabilities, session_id: session })
 }
 
-/// All channels, each with its index as id.
-pub(super) fn advertise() -> String {
-    let channels = definitions();
-    let advertised = |(id, channel): (u64, &'_ mcap::Channel<'static>)| {
+/// Parameters with their values; `id` is that of the request, if they answer one.
+pub(super) fn parameter_values<'a>(
+    parameters: impl Iterator<Item = (&'a Parameter, f64)>,
+    id: Option<&str>,
+) -> String {
+    let value = |(parameter, value): (&Parameter, f64)| ParameterValue {
+        name: parameter.name.clone(),
+        value,
+        r#type: "float64",
+    };
+    to_json(&ServerMessage::ParameterValues { parameters: parameters.map(value).collect(), id })
+}
+
+/// All channels, each with its place as id.
+pub(super) fn advertise(declared: &Declared) -> String {
+    let channels = definitions(declared);
+    let advertised = |(place, channel): &(Channel, mcap::Channel<'static>)| {
         let schema = channel.schema.as_ref().expect("every channel of the rig has a schema");
         Advertised {
-            id,
+            id: place.place() as u64,
             topic: channel.topic.clone(),
             encoding: channel.message_encoding.clone(),
             schema_name: schema.name.clone(),
@@ -93,7 +154,7 @@ pub(super) fn advertise() -> String {
             schema: String::from_utf8_lossy(&schema.data).into_owned(),
         }
     };
-    to_json(&ServerMessage::Advertise { channels: (0..).zip(&channels).map(advertised).collect() })
+    to_json(&ServerMessage::Advertise { channels: channels.iter().map(advertised).collect() })
 }
 
 /// A message for the client's user.
@@ -121,6 +182,7 @@ mod tests {
 
     use super::*;
     use masseter_recording::Topic;
+    use masseter_shared::named::Signal;
 
     #[test]
     fn the_newest_common_subprotocol_is_chosen() {
@@ -131,11 +193,14 @@ mod tests {
 
     #[test]
     fn channels_are_advertised_as_recordings_define_them() {
-        let message: Value = serde_json::from_str(&advertise()).unwrap();
+        let signal = Signal { name: "grip".into(), unit: "N".into(), about: String::new() };
+        let declared = Declared { signals: vec![signal], parameters: Vec::new() };
+        let message: Value = serde_json::from_str(&advertise(&declared)).unwrap();
         assert_eq!(message["op"], "advertise");
-        for (id, definition) in definitions().iter().enumerate() {
-            let (channel, defined) = (&message["channels"][id], definition.schema.as_ref().unwrap());
-            assert_eq!(channel["id"], id);
+        assert!(message.to_string().contains("float64 grip"));
+        for (index, (place, definition)) in definitions(&declared).iter().enumerate() {
+            let (channel, defined) = (&message["channels"][index], definition.schema.as_ref().unwrap());
+            assert_eq!(channel["id"], place.place());
             assert_eq!(channel["topic"], definition.topic);
             assert_eq!(channel["encoding"], *definition.message_encoding);
             assert_eq!(channel["schemaName"], *defined.name);
@@ -154,10 +219,13 @@ mod tests {
         assert_eq!(beyond.channel_index(), None);
         let unsubscribe = r#"{"op": "unsubscribe", "subscriptionIds": [7]}"#;
         assert_eq!(parse(unsubscribe).unwrap(), ClientMessage::Unsubscribe { subscription_ids: vec![7] });
+        let set = json!({"op": "setParameters", "parameters": [{"name": "gain", "value": 3}], "id": "7"});
+        let Ok(ClientMessage::SetParameters { parameters, id }) = parse(&set.to_string()) else { panic!() };
         assert_eq!(
-            parse(r#"{"op": "getParameters", "parameterNames": []}"#).unwrap(),
-            ClientMessage::Unsupported
+            (&*parameters[0].name, parameters[0].value.as_f64(), id.as_deref()),
+            ("gain", Some(3.0), Some("7"))
         );
+        assert_eq!(parse(r#"{"op": "fetchAsset", "uri": "x"}"#).unwrap(), ClientMessage::Unsupported);
         assert!(parse("{}").is_err() && parse("chat").is_err());
     }
 

@@ -15,7 +15,8 @@ use super::*;
 
 fn server() -> FoxgloveServer {
     let scene = Scene::new(&Mechanism::new(&MechanismConfig::default()).unwrap(), &JawConfig::default());
-    FoxgloveServer::start("127.0.0.1:0".parse().unwrap(), scene, "test", "secret".to_owned()).unwrap()
+    let listener = Listener::bind("127.0.0.1:0".parse().unwrap()).unwrap();
+    FoxgloveServer::start(listener, scene, Declared::default(), Domain::named("test").unwrap()).unwrap()
 }
 
 /// A client whose subscription to the controller's state the server has received.
@@ -49,11 +50,12 @@ fn a_client_without_the_secret_or_of_another_site_is_forbidden() {
     let server = server();
     let host = "Host: 127.0.0.1\r\n";
     let evil = format!("{host}Origin: https://evil.example\r\n");
-    for (path, headers) in [("/", host), ("/secret", &evil), ("/secret", "Host: evil.example\r\n")] {
+    let path = format!("/{}", server.secret);
+    for (path, headers) in [("/", host), (&path, &evil), (&path, "Host: evil.example\r\n")] {
         let answer = answer_to(&server, path, headers);
         assert!(answer.starts_with("HTTP/1.1 403"), "{path} {headers}: {answer}");
     }
-    assert!(answer_to(&server, "/secret", host).starts_with("HTTP/1.1 101"));
+    assert!(answer_to(&server, &path, host).starts_with("HTTP/1.1 101"));
 }
 
 #[test]

@@ -9,7 +9,7 @@ use masseter_recording::Recorded;
 use masseter_shared::messages::codes::Source;
 
 /// The publishers.
-const LANES: usize = 7;
+const LANES: usize = 9;
 
 /// Messages that wait for their turn.
 #[derive(Debug, Default)]
@@ -31,9 +31,11 @@ impl InOrder {
             Recorded::Truth(_) => 1,
             Recorded::Command(_) => 2,
             Recorded::State(_) => 3,
-            Recorded::Event(event) if event.source == Source::Controller.code() => 4,
-            Recorded::Frame(_) => 5,
-            Recorded::Event(_) | Recorded::Machine(_) => 6,
+            Recorded::Signals(_) => 4,
+            Recorded::Parameters(_) => 5,
+            Recorded::Event(event) if event.source == Source::Controller.code() => 6,
+            Recorded::Frame(_) => 7,
+            Recorded::Event(_) | Recorded::Machine(_) => 8,
         };
         self.lanes[lane].push_back(*message);
     }

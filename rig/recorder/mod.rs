@@ -14,7 +14,6 @@ use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::time::Duration;
 
-use anyhow::Context;
 use clap::Args;
 use masseter_recording::{Backlog, Pace, Recorder, RunFolder, Scene};
 use masseter_shared::clock;
@@ -22,11 +21,11 @@ use masseter_shared::geometry::Mechanism;
 use masseter_shared::lifecycle::{Start, StopRequest};
 use masseter_shared::lockstep::RecorderSignals;
 use masseter_shared::realtime::scheduling::keep_off;
-use masseter_shared::transport::secret;
+use masseter_shared::transport::Domain;
 use masseter_terminal::Exit;
 
 use crate::arguments::ProcessArgs;
-use crate::foxglove::FoxgloveServer;
+use crate::foxglove::{FoxgloveServer, Listener};
 use crate::machine::SystemRoot;
 use crate::machine::sampler::Sampler;
 use crate::stderr_writer::StderrWriter;
@@ -68,17 +67,16 @@ pub(crate) fn record(args: RecorderArgs) -> anyhow::Result<Exit> {
     }
     let subscribers = Subscribers::open(&process.node)?;
     let scene = Scene::new(&Mechanism::new(&scenario.mechanism)?, &scenario.jaw);
-    let server = match args.live {
-        Some(address) => {
-            let secret = secret().context("cannot make the secret of the live address")?;
-            Some(FoxgloveServer::start(address, scene.clone(), &process_arguments.domain, secret)?)
-        }
-        None => None,
-    };
+    let listener = args.live.map(Listener::bind).transpose()?;
     let pace = if is_lockstep { Pace::Virtual } else { Pace::RealTime };
-    let backlog = Backlog::start(Recorder::of_run(&RunFolder::of_recording(&args.recording), scene)?, pace);
+    let mut recorder = Recorder::of_run(&RunFolder::of_recording(&args.recording), scene.clone())?;
     let mut signals = is_lockstep.then(|| RecorderSignals::open(&process, DRAIN_INTERVAL)).transpose()?;
     let start = process.ready(None)?;
+    recorder.declare(&start.declared)?;
+    let backlog = Backlog::start(recorder, pace);
+    let domain = Domain::named(&process_arguments.domain)?;
+    let serve = |listener| FoxgloveServer::start(listener, scene, start.declared.clone(), domain);
+    let server = listener.map(serve).transpose()?;
 
     let stderr = StderrWriter::start();
     if let Some(server) = &server {
@@ -87,14 +85,14 @@ pub(crate) fn record(args: RecorderArgs) -> anyhow::Result<Exit> {
     let progress = (!args.quiet).then(|| Progress::new(args.motion_s, scenario.period_s(), clock::now_ns()));
     let sinks = Sinks { backlog, server, progress, stderr };
     match &mut signals {
-        None => record_in_real_time(&process.stop, start, &subscribers, sinks),
+        None => record_in_real_time(&process.stop, &start, &subscribers, sinks),
         Some(signals) => record_in_lockstep(&process.stop, signals, &subscribers, sinks),
     }
 }
 
 fn record_in_real_time(
     stop: &StopRequest,
-    start: Start,
+    start: &Start,
     subscribers: &Subscribers,
     mut sinks: Sinks,
 ) -> anyhow::Result<Exit> {

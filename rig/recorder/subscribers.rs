@@ -1,13 +1,17 @@
 //! One subscriber per topic.
 
 use masseter_recording::Recorded;
-use masseter_shared::messages::{Command, Event, FrameTap, Message, Reading, State, Truth};
+use masseter_shared::messages::{
+    Command, Event, FrameTap, Message, Parameters, Reading, Signals, State, Truth,
+};
 use masseter_shared::transport::{BatchSubscriber, Node, Subscriber, TransportError};
 
 pub(super) struct Subscribers {
     commands: Subscriber<Command>,
     readings: Subscriber<Reading>,
     states: Subscriber<State>,
+    signals: Subscriber<Signals>,
+    parameters: Subscriber<Parameters>,
     truths: Subscriber<Truth>,
     frames: BatchSubscriber<FrameTap>,
     events: Subscriber<Event>,
@@ -19,6 +23,8 @@ impl Subscribers {
             commands: node.subscriber()?,
             readings: node.subscriber()?,
             states: node.subscriber()?,
+            signals: node.subscriber()?,
+            parameters: node.subscriber()?,
             truths: node.subscriber()?,
             frames: BatchSubscriber::open(node)?,
             events: node.subscriber()?,
@@ -31,6 +37,8 @@ impl Subscribers {
         drain(&self.readings, take)?;
         drain(&self.commands, take)?;
         drain(&self.states, take)?;
+        drain(&self.signals, take)?;
+        drain(&self.parameters, take)?;
         drain(&self.truths, take)?;
         drain_batches(&self.frames, take)?;
         drain(&self.events, take)

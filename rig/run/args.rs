@@ -56,7 +56,7 @@ pub(crate) struct RunArgs {
     /// program, external waits until you start it [default: motion]
     #[arg(
         long,
-        value_name = "motion|hold|external|PATH",
+        value_name = "motion|hold|external|none|PATH",
         value_parser = parse_controller,
         default_value = "motion",
         hide_default_value = true,

@@ -8,10 +8,9 @@ use std::time::Duration;
 
 use anyhow::{Context, bail};
 use masseter_shared::lifecycle::{Order, Party, Silence, Start, line};
-use masseter_shared::realtime::scheduling::Obtained;
 use rustix::process::{Pid, Signal, kill_process};
 
-use super::reports::{Readiness, Reports};
+use super::reports::{Readiness, Ready, Reports};
 
 /// Longest time for a process to open its ports and lock its memory.
 pub(super) const READY_TIMEOUT: Duration = Duration::from_secs(20);
@@ -59,11 +58,11 @@ impl Process {
     }
 
     /// Waits until it reports that it is ready; none if `is_cancelled` becomes true first.
-    pub(super) fn wait_ready(&mut self, is_cancelled: impl Fn() -> bool) -> anyhow::Result<Option<Obtained>> {
+    pub(super) fn wait_ready(&mut self, is_cancelled: impl Fn() -> bool) -> anyhow::Result<Option<Ready>> {
         let not_ready = || format!("the {} did not get ready", self.role);
         for _ in 0..READY_TIMEOUT.as_millis() / POLL.as_millis() {
             match self.reports.await_ready(POLL).with_context(not_ready)? {
-                Readiness::Ready(scheduling) => return Ok(Some(scheduling)),
+                Readiness::Ready(ready) => return Ok(Some(ready)),
                 // Ctrl-C also reaches the process, and may end it before it handles signals.
                 _ if is_cancelled() => return Ok(None),
                 Readiness::NotYet => {}
@@ -74,9 +73,9 @@ impl Process {
     }
 
     /// Starts its work.
-    pub(super) fn start(&mut self, start: Start) -> io::Result<()> {
+    pub(super) fn start(&mut self, start: &Start) -> io::Result<()> {
         let input = self.child.stdin.as_mut().expect("standard input is piped");
-        input.write_all(line(&Order::Start(start)).as_bytes())
+        input.write_all(line(&Order::Start(start.clone())).as_bytes())
     }
 
     /// Its report that another process was silent, if it has made one.

@@ -7,13 +7,19 @@ use masseter_shared::config::Scenario;
 use masseter_shared::realtime::scheduling::{SchedulingRequest, obtain};
 use masseter_terminal::status;
 
+use crate::arguments::ControllerChoice;
+
 use super::args::{ClockKind, RunArgs};
 use crate::doctor;
 
 /// The arguments with a clock that this machine can keep: real time where the kernel grants it, otherwise lockstep.
 pub(super) fn choose(args: &RunArgs, scenario: &Scenario) -> RunArgs {
     let chosen = |clock| RunArgs { clock, ..args.clone() };
-    if args.clock == ClockKind::Virtual && args.controller.builder().is_none() {
+    if args.clock == ClockKind::Auto && args.controller == ControllerChoice::None {
+        return chosen(ClockKind::Rt);
+    }
+    let is_program = matches!(args.controller, ControllerChoice::External | ControllerChoice::Executable(_));
+    if args.clock == ClockKind::Virtual && is_program {
         if !args.quiet {
             status!(
                 "clock: lockstep, which gives the bytes of virtual: your controller is a process of its own"
@@ -67,6 +73,9 @@ pub(super) fn check(args: &RunArgs, scenario: &Scenario) -> anyhow::Result<()> {
     }
     if args.clock == ClockKind::Rt {
         return Ok(());
+    }
+    if args.controller == ControllerChoice::None {
+        bail!("--controller none needs --clock rt: in simulated time each cycle waits for a command");
     }
     if !scenario.can.is_virtual() {
         bail!("simulated time has no real CAN interfaces: use --can virtual, or --clock rt");

@@ -3,20 +3,26 @@
 use std::ffi::OsString;
 use std::io;
 
+use masseter_shared::clock;
 use masseter_shared::lifecycle::attach::Invitation;
 use masseter_shared::lifecycle::{End, Silence, Start};
-use masseter_shared::realtime::scheduling::Obtained;
 use masseter_shared::transport::Domain;
 use masseter_terminal::Exit;
 
 use super::child::{CONTROLLER, Process, describe};
 use super::program::Program;
+use super::reports::Ready;
 use crate::arguments::{ControllerChoice, name_of};
 
 /// The controller of a run.
 pub(super) enum Controller {
     Own(Process),
     Program(Program),
+    /// The run lasts as long as the motion, from its start.
+    None {
+        motion_ns: u64,
+        ends_ns: u64,
+    },
 }
 
 impl Controller {
@@ -26,6 +32,7 @@ impl Controller {
         domain: &Domain,
         invitation: Invitation,
         arguments: Vec<OsString>,
+        motion_s: f64,
     ) -> anyhow::Result<Self> {
         Ok(match choice {
             ControllerChoice::Own(kind) => {
@@ -33,6 +40,7 @@ impl Controller {
                 Self::Own(Process::spawn(CONTROLLER, &[arguments, kind.to_vec()].concat())?)
             }
             ControllerChoice::External => Self::Program(Program::external(domain, invitation)?),
+            ControllerChoice::None => Self::None { motion_ns: (motion_s * 1e9) as u64, ends_ns: u64::MAX },
             ControllerChoice::Executable(path) => {
                 Self::Program(Program::executable(domain, invitation, path)?)
             }
@@ -44,7 +52,13 @@ impl Controller {
         match self {
             Self::Own(process) => process.id(),
             Self::Program(program) => program.id(),
+            Self::None { .. } => 0,
         }
+    }
+
+    /// Whether the rig has a controller to wait for.
+    pub(super) fn is_awaited(&self) -> bool {
+        !matches!(self, Self::None { .. })
     }
 
     /// Waits until it reports that it is ready; none if `is_cancelled` becomes true first. The wait for a program fails once
@@ -53,18 +67,23 @@ impl Controller {
         &mut self,
         is_cancelled: impl Fn() -> bool,
         has_died: impl FnMut() -> Option<String>,
-    ) -> anyhow::Result<Option<Obtained>> {
+    ) -> anyhow::Result<Option<Ready>> {
         match self {
             Self::Own(process) => process.wait_ready(is_cancelled),
             Self::Program(program) => program.wait_ready(is_cancelled, has_died),
+            Self::None { .. } => Ok(None),
         }
     }
 
     /// Starts its work.
-    pub(super) fn start(&mut self, start: Start) -> io::Result<()> {
+    pub(super) fn start(&mut self, start: &Start) -> io::Result<()> {
         match self {
             Self::Own(process) => process.start(start),
             Self::Program(program) => program.start(start),
+            Self::None { motion_ns, ends_ns } => {
+                *ends_ns = start.epoch_ns + *motion_ns;
+                Ok(())
+            }
         }
     }
 
@@ -73,6 +92,7 @@ impl Controller {
         match self {
             Self::Own(process) => process.reported_silence(),
             Self::Program(program) => program.reported_silence(),
+            Self::None { .. } => None,
         }
     }
 
@@ -80,6 +100,7 @@ impl Controller {
     pub(super) fn end(&mut self) -> io::Result<Option<End>> {
         match self {
             Self::Program(program) => program.end(),
+            Self::None { ends_ns, .. } => Ok((clock::now_ns() >= *ends_ns).then_some(End::Finished)),
             Self::Own(process) => Ok(process.exit_status()?.map(|status| match status.code() {
                 Some(code) if code == Exit::Passed as i32 => End::Finished,
                 Some(code) if code == Exit::SafeStop as i32 => End::SafeStop,
@@ -93,6 +114,7 @@ impl Controller {
         match self {
             Self::Own(process) => process.terminate(),
             Self::Program(program) => program.terminate(),
+            Self::None { ends_ns, .. } => *ends_ns = 0,
         }
     }
 
@@ -101,6 +123,7 @@ impl Controller {
         match self {
             Self::Own(process) => process.give_up(),
             Self::Program(program) => program.give_up(),
+            Self::None { .. } => "was not started by the rig",
         }
     }
 }

@@ -23,6 +23,7 @@ use masseter_plant::core as plant;
 use masseter_recording::{Ending, MOTION, Manifest, RunFolder};
 use masseter_shared::config::{FileConfig, MotionConfig, Scenario};
 use masseter_shared::input::read_text;
+use masseter_shared::named::{NameError, NamedValues};
 use masseter_terminal::{Exit, Failure, OrFailure, status};
 
 use crate::arguments::{check_cores, name_of};
@@ -68,9 +69,10 @@ pub(crate) fn run(args: &RunArgs) -> Result<Exit, Failure> {
     let no_room = || format!("no room in {} for the verdict", folder.path().display());
     let reserve = Reserve::take(folder.path()).with_context(no_room).incomplete()?;
     let ran = match domain {
-        None => virtual_time::run(plan, &folder, args.controller.builder().expect("the clock is checked"))
-            .map(|ending| manifest.ending = ending)
-            .incomplete(),
+        None => {
+            let build = args.controller.builder().expect("the clock is checked");
+            virtual_time::run(plan, &folder, build, &mut manifest).incomplete()
+        }
         Some(domain) => supervisor::run(domain, plan, &folder, args, &mut manifest),
     };
     if let Err(failure) = &ran {
@@ -103,7 +105,23 @@ fn resolve(args: &RunArgs) -> anyhow::Result<(RunPlan, RunArgs)> {
     args.live.map_or(Ok(()), foxglove::check)?;
     let plan = RunPlan::of_file(scenario, args.scenario.as_deref())?;
     plant::check_interfaces(&plan.scenario)?;
+    if let Some(build) = args.controller.builder() {
+        let controller = build(&plan.scenario, plan.mechanism.clone(), plan.trajectory.clone());
+        NamedValues::new(controller.declared(), &plan.scenario.parameters)
+            .map_err(|error| with_question(&error))?;
+    }
     Ok((plan, args))
+}
+
+/// A refusal of `[parameters]`: a name that `--set` was given may be meant as a key of the scenario.
+fn with_question(error: &NameError) -> anyhow::Error {
+    let question = match error {
+        NameError::Unknown { name, .. } => Scenario::question_for(name),
+        _ => None,
+    };
+    let question =
+        question.map_or_else(String::new, |question| format!("; of the keys of a scenario, {question}"));
+    anyhow::anyhow!("[parameters]: {error}{question}")
 }
 
 /// Copies the scenario, and the motion file that it plays, into the run folder: the original may change later.

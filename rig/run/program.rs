@@ -17,13 +17,12 @@ use anyhow::{Context, bail};
 use masseter_shared::clock;
 use masseter_shared::lifecycle::attach::{Answer, Hello, Invitation, RIG_VARIABLE, socket};
 use masseter_shared::lifecycle::{End, Order, Silence, Start, line};
-use masseter_shared::realtime::scheduling::Obtained;
 use masseter_shared::transport::Domain;
 use masseter_terminal::status;
 use rustix::net::sockopt::socket_peercred;
 
 use super::child::{KILLED, POLL, READY_TIMEOUT, describe};
-use super::reports::{Readiness, Reports};
+use super::reports::{Readiness, Ready, Reports};
 
 /// Longest wait for the greeting of a program that has connected.
 const HELLO_TIMEOUT: Duration = Duration::from_millis(500);
@@ -91,7 +90,7 @@ impl Program {
         &mut self,
         is_cancelled: impl Fn() -> bool,
         mut has_died: impl FnMut() -> Option<String>,
-    ) -> anyhow::Result<Option<Obtained>> {
+    ) -> anyhow::Result<Option<Ready>> {
         if self.executable.is_none() {
             status!(
                 "waiting for a controller: start yours with {RIG_VARIABLE}={}; Ctrl-C gives up",
@@ -101,7 +100,7 @@ impl Program {
         let mut polls = READY_TIMEOUT.as_millis() / POLL.as_millis();
         loop {
             match self.await_readiness()? {
-                Readiness::Ready(scheduling) => return Ok(Some(scheduling)),
+                Readiness::Ready(ready) => return Ok(Some(ready)),
                 _ if is_cancelled() => return Ok(None),
                 // The user may correct it and start it again.
                 Readiness::Closed if self.executable.is_none() => {
@@ -192,18 +191,18 @@ impl Program {
     }
 
     /// Starts its work.
-    pub(super) fn start(&mut self, start: Start) -> io::Result<()> {
-        self.order(Order::Start(start))
+    pub(super) fn start(&mut self, start: &Start) -> io::Result<()> {
+        self.order(&Order::Start(start.clone()))
     }
 
     /// Asks it to end. A program whose line is closed has ended.
     pub(super) fn terminate(&mut self) {
-        let _ = self.order(Order::Stop);
+        let _ = self.order(&Order::Stop);
     }
 
-    fn order(&mut self, order: Order) -> io::Result<()> {
+    fn order(&mut self, order: &Order) -> io::Result<()> {
         let Some(admitted) = &self.admitted else { return Ok(()) };
-        (&admitted.stream).write_all(line(&order).as_bytes())
+        (&admitted.stream).write_all(line(order).as_bytes())
     }
 
     /// Its report that another process was silent, if it has made one.

@@ -7,6 +7,7 @@ use std::time::Duration;
 
 use anyhow::Context;
 use masseter_shared::lifecycle::{End, Report, Silence};
+use masseter_shared::named::Declared;
 use masseter_shared::realtime::scheduling::Obtained;
 
 /// The reports that were read and not yet looked at, and those that matter until the end.
@@ -17,9 +18,16 @@ pub(super) struct Reports {
     is_closed: bool,
 }
 
+/// The report of a process that is ready.
+pub(super) struct Ready {
+    pub(super) scheduling: Obtained,
+    /// Of the controller.
+    pub(super) declared: Declared,
+}
+
 /// The next step on the way to readiness.
 pub(super) enum Readiness {
-    Ready(Obtained),
+    Ready(Ready),
     NotYet,
     /// The process has closed the line.
     Closed,
@@ -47,7 +55,7 @@ impl Reports {
             Err(RecvTimeoutError::Disconnected) => return Ok(Readiness::Closed),
         };
         match serde_json::from_str(&line).with_context(|| format!("its report is '{line}'"))? {
-            Report::Ready { scheduling } => Ok(Readiness::Ready(scheduling)),
+            Report::Ready { scheduling, declared } => Ok(Readiness::Ready(Ready { scheduling, declared })),
             Report::Silence(silence) => {
                 self.silence = Some(silence);
                 Ok(Readiness::NotYet)

@@ -20,6 +20,7 @@ use masseter_shared::config::Scenario;
 use masseter_shared::lifecycle::attach::Invitation;
 use masseter_shared::lifecycle::{End, Party, Silence, Start};
 use masseter_shared::lockstep;
+use masseter_shared::named::Declared;
 use masseter_shared::realtime::scheduling::Obtained;
 use masseter_shared::schedule::OFF_TICK_NS;
 use masseter_shared::transport::{Domain, DomainError, DomainLock, Swept};
@@ -94,6 +95,9 @@ pub(super) fn run(
     let result = prepared.and_then(|rig| match rig {
         Some((mut rig, scheduling)) => {
             manifest.scheduling = scheduling;
+            manifest.declared = rig.declared.clone();
+            // The supervisor may be killed: a report of what is recorded then needs the names.
+            manifest.write(folder).context("cannot write the manifest").incomplete()?;
             let ending = match args.lockstep() {
                 None => rig.run(plan, args.require_rt, &interrupts, manifest),
                 Some(_) => rig.run_in_lockstep(&interrupts),
@@ -126,6 +130,8 @@ struct Rig {
     /// Time for the plant to stop the drives without the controller, ns.
     plant_alone_ns: u64,
     is_lockstep: bool,
+    /// The signals and parameters of the controller, once the controller is ready.
+    declared: Declared,
     recorder: Process,
     plant: Process,
     controller: Controller,
@@ -154,9 +160,16 @@ impl Rig {
                 Some(_) => 0,
             },
             is_lockstep: lockstep.is_some(),
+            declared: Declared::default(),
             recorder: Process::spawn(RECORDER, &recorder_arguments)?,
             plant: Process::spawn(PLANT, &common)?,
-            controller: Controller::start_process(&args.controller, domain, invitation, common)?,
+            controller: Controller::start_process(
+                &args.controller,
+                domain,
+                invitation,
+                common,
+                plan.trajectory.duration_s(),
+            )?,
         })
     }
 
@@ -217,27 +230,31 @@ impl Rig {
     }
 
     fn collect_ready(&mut self, interrupts: &Interrupts) -> anyhow::Result<Option<Scheduling>> {
-        let Self { recorder, plant, controller, .. } = self;
+        let Self { recorder, plant, controller, declared, .. } = self;
         let is_cancelled = || interrupts.is_stop_requested();
         let mut scheduling = BTreeMap::new();
         for process in [&mut *recorder, &mut *plant] {
-            let Some(obtained) = process.wait_ready(is_cancelled)? else { return Ok(None) };
-            scheduling.insert(process.role.to_owned(), obtained);
+            let Some(ready) = process.wait_ready(is_cancelled)? else { return Ok(None) };
+            scheduling.insert(process.role.to_owned(), ready.scheduling);
+        }
+        if !controller.is_awaited() {
+            return Ok(Some(scheduling));
         }
         // A user may take long to start a controller.
         let has_died = || [&mut *recorder, &mut *plant].into_iter().find_map(Process::death);
-        let Some(obtained) = controller.wait_ready(is_cancelled, has_died)? else { return Ok(None) };
-        scheduling.insert(CONTROLLER.to_owned(), obtained);
+        let Some(ready) = controller.wait_ready(is_cancelled, has_died)? else { return Ok(None) };
+        scheduling.insert(CONTROLLER.to_owned(), ready.scheduling);
+        *declared = ready.declared;
         Ok(Some(scheduling))
     }
 
     /// Sends the start message with the time of the first SYNC, ns.
     fn start(&mut self, epoch_ns: u64) -> io::Result<()> {
         let loops = [self.controller.id(), self.plant.id()];
-        let start = Start { epoch_ns, loops };
-        self.recorder.start(start)?;
-        self.plant.start(start)?;
-        self.controller.start(start)
+        let start = Start { epoch_ns, loops, declared: self.declared.clone() };
+        self.recorder.start(&start)?;
+        self.plant.start(&start)?;
+        self.controller.start(&start)
     }
 
     /// Monitors the processes until the controller has ended, then ends plant and recorder. Calls `at` with the time.

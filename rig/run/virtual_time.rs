@@ -13,10 +13,11 @@ use masseter_plant::PlantError;
 use masseter_plant::core::PlantCore;
 use masseter_plant::cycle::PlantPorts;
 use masseter_plant::emulation::VirtualLink;
-use masseter_recording::{Backlog, Ending, Pace, Recorded, Recorder, RunFolder, Scene};
-use masseter_shared::control::{Controller, ControllerPorts, Outcome};
+use masseter_recording::{Backlog, Ending, Manifest, Pace, Recorded, Recorder, RunFolder, Scene};
+use masseter_shared::control::{Controller, ControllerPorts, Outcome, set_parameters};
 use masseter_shared::lockstep::EPOCH_NS;
-use masseter_shared::messages::{Command, Event, Message, Reading, State, Truth};
+use masseter_shared::messages::{Command, Event, Message, Parameters, Reading, Signals, State, Truth};
+use masseter_shared::named::NamedValues;
 use masseter_shared::realtime::Wake;
 use masseter_shared::schedule::CycleSchedule;
 use masseter_terminal::status;
@@ -24,17 +25,28 @@ use masseter_terminal::status;
 use super::child::PLANT;
 use crate::machine::interrupts::Interrupts;
 
-/// Runs the rig under virtual time; it ends as the processes would, also when the user stops it.
-pub(crate) fn run(plan: &RunPlan, folder: &RunFolder, build: BuildController) -> anyhow::Result<Ending> {
+/// Runs the rig under virtual time; it ends as the processes would, also when the user stops it. Enters the ending and what
+/// the controller declares into the manifest.
+pub(crate) fn run(
+    plan: &RunPlan,
+    folder: &RunFolder,
+    build: BuildController,
+    manifest: &mut Manifest,
+) -> anyhow::Result<()> {
     let interrupts = Interrupts::listen().context("cannot listen for signals")?;
-    let controller = build(&plan.scenario, plan.mechanism.clone(), plan.trajectory.clone());
-    let ending = play(controller, plan, folder, &interrupts);
+    let mut controller = build(&plan.scenario, plan.mechanism.clone(), plan.trajectory.clone());
+    let named = NamedValues::new(controller.declared(), &plan.scenario.parameters)?;
+    set_parameters(&mut *controller, &named);
+    manifest.declared = named.settings().declared().clone();
+    let ending = play(controller, named, plan, folder, &interrupts);
     interrupts.restore_default_actions();
-    ending
+    manifest.ending = ending?;
+    Ok(())
 }
 
 fn play(
     controller: Box<dyn Controller>,
+    named: NamedValues,
     plan: &RunPlan,
     folder: &RunFolder,
     interrupts: &Interrupts,
@@ -42,9 +54,12 @@ fn play(
     let scenario = &plan.scenario;
     let mut plant = PlantCore::new(scenario, EPOCH_NS)?;
     let scene = Scene::new(&plan.mechanism, &scenario.jaw);
-    let backlog = Backlog::start(Recorder::of_run(folder, scene)?, Pace::Virtual);
+    let mut recorder = Recorder::of_run(folder, scene)?;
+    recorder.declare(named.settings().declared())?;
+    let backlog = Backlog::start(recorder, Pace::Virtual);
     let log = Log { backlog, published: Default::default() };
-    let mut rig = VirtualRig { controller, schedule: &plan.schedule, log, now_ns: EPOCH_NS, reading: None };
+    let mut rig =
+        VirtualRig { controller, named, schedule: &plan.schedule, log, now_ns: EPOCH_NS, reading: None };
 
     let (mut cycle, mut plant_error) = (0, None);
     while plant_error.is_none()
@@ -76,6 +91,7 @@ fn play(
 /// Both sides of the rig in one thread: the controller's cycle runs where the plant waits for its command.
 struct VirtualRig<'a> {
     controller: Box<dyn Controller>,
+    named: NamedValues,
     schedule: &'a CycleSchedule,
     log: Log,
     now_ns: u64,
@@ -115,7 +131,8 @@ impl PlantPorts<VirtualLink> for VirtualRig<'_> {
         let wake = Wake::on_time(sync.cycle, self.now_ns);
         let (reading, now_ns) = (self.reading.take(), self.now_ns);
         let mut ports = VirtualPorts { log: &mut self.log, now_ns, reading, command: None };
-        let Ok(()) = masseter_shared::control::run_cycle(&mut *self.controller, &mut ports, &wake);
+        let Ok(()) =
+            masseter_shared::control::run_cycle(&mut *self.controller, &mut self.named, &mut ports, &wake);
         Ok(ports.command)
     }
 
@@ -155,6 +172,16 @@ impl ControllerPorts for VirtualPorts<'_> {
         Ok(())
     }
 
+    fn publish_signals(&mut self, fill: impl FnOnce(&mut Signals)) -> Result<(), Infallible> {
+        self.log.record(Publisher::Signals, self.now_ns, fill);
+        Ok(())
+    }
+
+    fn publish_parameters(&mut self, fill: impl FnOnce(&mut Parameters)) -> Result<(), Infallible> {
+        self.log.record(Publisher::Parameters, self.now_ns, fill);
+        Ok(())
+    }
+
     fn publish_event(&mut self, event: &Event) -> Result<(), Infallible> {
         self.log.record(Publisher::ControllerEvent, self.now_ns, |message| *message = *event);
         Ok(())
@@ -167,6 +194,8 @@ enum Publisher {
     Command,
     Reading,
     State,
+    Signals,
+    Parameters,
     Truth,
     Frame,
     ControllerEvent,

@@ -70,11 +70,15 @@ typedef struct masseter_demand {
     masseter_pose estimated;
     /* The desired pose when this cycle's command is reached. */
     masseter_pose ahead;
+    /* The declared parameters, by their places. */
+    const double *parameters;
+    /* The declared signals, by their places; the law writes them. */
+    double *signals;
 } masseter_demand;
 
 static_assert(sizeof(masseter_cycle) == 24, "size of masseter_cycle");
 static_assert(sizeof(masseter_pose) == 56, "size of masseter_pose");
-static_assert(sizeof(masseter_demand) == 200, "size of masseter_demand");
+static_assert(sizeof(masseter_demand) == 216, "size of masseter_demand");
 static_assert(offsetof(masseter_demand, desired) == 32, "offset of desired");
 static_assert(offsetof(masseter_demand, ahead) == 144, "offset of ahead");
 
@@ -92,11 +96,28 @@ int masseter_attach(const char *rig, masseter_session **session);
 /* Time from one cycle to the next, ns; 0 without a session. */
 uint64_t masseter_period_ns(const masseter_session *session);
 
+/* Declares a number that the controller publishes in each cycle, before masseter_start or masseter_run: up to 64, with a name
+ * in lower case, a unit and a description (null for none). Recorded, drawn in the report. Returns its place, from 0, or
+ * MASSETER_ERROR. */
+int masseter_declare_signal(masseter_session *session, const char *name, const char *unit, const char *about);
+
+/* Declares a number that the user sets, also while the controller runs, between least and most. The scenario may give another
+ * value at the start. Returns its place, from 0, or MASSETER_ERROR. */
+int masseter_declare_parameter(masseter_session *session, const char *name, const char *unit, const char *about,
+                               double value, double least, double most);
+
+/* The value of a parameter in this cycle, by its place. Not a number before the start, and for another place. */
+double masseter_parameter(const masseter_session *session, int parameter);
+
+/* Gives a signal its value, which goes out with this cycle's command and stays until it is given another. */
+int masseter_set_signal(masseter_session *session, int signal, double value);
+
 /* Runs the rig's own controller with this law until the motion is over, and frees the session. Returns MASSETER_OK,
  * MASSETER_SAFE_STOP or MASSETER_ERROR. */
 int masseter_run(masseter_session *session, masseter_law law, void *user);
 
-/* Opens the ports, reports ready, and waits for the start of the run. */
+/* Opens the ports, reports ready, and waits for the start of the run. In real time the calling thread gets the scenario's core and
+ * priority, and keeps both. */
 int masseter_start(masseter_session *session);
 
 /* Ends the current cycle and waits for the next: for ever if timeout_ns is negative; 0 only looks. In lockstep the plant

@@ -51,6 +51,21 @@ public:
         return std::chrono::nanoseconds(masseter_period_ns(session_));
     }
 
+    // A number that the controller publishes in each cycle. Declared before run or start; returns its place.
+    int declare_signal(const std::string &name, const std::string &unit = {}, const std::string &about = {}) {
+        return check(masseter_declare_signal(session_, name.c_str(), unit.c_str(), about.c_str()));
+    }
+
+    // A number that the user sets, also during the run. Declared before run or start; returns its place.
+    int declare_parameter(const std::string &name, double value, double least, double most,
+                          const std::string &unit = {}, const std::string &about = {}) {
+        return check(masseter_declare_parameter(session_, name.c_str(), unit.c_str(), about.c_str(), value, least, most));
+    }
+
+    // In a session that start has started; a law finds both in its demand.
+    double parameter(int place) const { return masseter_parameter(session_, place); }
+    void signal(int place, double value) { check(masseter_set_signal(session_, place, value)); }
+
     // Runs the rig's own controller with a pose law, masseter_pose(const masseter_demand &). An exception of the law stops
     // the rig safely, and is thrown again.
     template <typename Law> Outcome run(Law &&law) {

@@ -7,7 +7,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#define MASSETER_LAYOUT_VERSION 8u
+#define MASSETER_LAYOUT_VERSION 9u
 /* masseter_event.axis when no axis is concerned. */
 #define MASSETER_NO_AXIS 4294967295u
 /* masseter_reading.drive_state of a drive not heard of yet, or lost. */
@@ -169,6 +169,8 @@ enum masseter_cause {
     MASSETER_CAUSE_ORIENTATION_LOST = 48,
     /* The pose law failed (0), or gave a pose with a bad coordinate (m), or with a bad quaternion (its length; the limit is 1). */
     MASSETER_CAUSE_LAW_FAILED = 49,
+    /* A parameter of the controller was set (new value; the limit is the value before). The object is its place. */
+    MASSETER_CAUSE_PARAMETER_SET = 50,
 };
 
 enum masseter_no_pose {
@@ -189,7 +191,7 @@ enum masseter_no_pose {
 };
 
 #define MASSETER_READING_TOPIC "reading"
-#define MASSETER_READING_TYPE_NAME "masseter/Reading/d90fbf69f124d93f"
+#define MASSETER_READING_TYPE_NAME "masseter/Reading/d48418c615909bcc"
 
 /* Positions, forces and states of the drives, once a cycle. */
 typedef struct masseter_reading {
@@ -261,7 +263,7 @@ static_assert(offsetof(masseter_reading, fresh_axes) == 248, "offset of fresh_ax
 static_assert(offsetof(masseter_reading, master_fault) == 252, "offset of master_fault");
 
 #define MASSETER_COMMAND_TOPIC "command"
-#define MASSETER_COMMAND_TYPE_NAME "masseter/Command/765fe161c86f3ae1"
+#define MASSETER_COMMAND_TYPE_NAME "masseter/Command/afe52f250c742778"
 
 /* Targets and request for the drives, once a cycle. */
 typedef struct masseter_command {
@@ -294,7 +296,7 @@ static_assert(offsetof(masseter_command, request) == 88, "offset of request");
 static_assert(offsetof(masseter_command, controller_state) == 92, "offset of controller_state");
 
 #define MASSETER_STATE_TOPIC "state"
-#define MASSETER_STATE_TYPE_NAME "masseter/State/f96001ba642535d1"
+#define MASSETER_STATE_TYPE_NAME "masseter/State/f65ae9b1b72b2a36"
 
 /* The controller's state and its estimate, once a cycle. */
 typedef struct masseter_state {
@@ -381,7 +383,7 @@ static_assert(offsetof(masseter_state, iterations) == 288, "offset of iterations
 static_assert(offsetof(masseter_state, controller_state) == 292, "offset of controller_state");
 
 #define MASSETER_EVENT_TOPIC "event"
-#define MASSETER_EVENT_TYPE_NAME "masseter/Event/e089476317e241b0"
+#define MASSETER_EVENT_TYPE_NAME "masseter/Event/4f34a13697c9e73d"
 
 /* A single occurrence: a change of state, a fault, an alarm. */
 typedef struct masseter_event {
@@ -438,7 +440,7 @@ static_assert(offsetof(masseter_event, value) == 72, "offset of value");
 static_assert(offsetof(masseter_event, limit) == 80, "offset of limit");
 
 #define MASSETER_TRUTH_TOPIC "truth"
-#define MASSETER_TRUTH_TYPE_NAME "masseter/Truth/9779c4cee2a384d0"
+#define MASSETER_TRUTH_TYPE_NAME "masseter/Truth/3e98544d0721d685"
 
 /* The true state of the mechanism, once a cycle; the controller never reads it. */
 typedef struct masseter_truth {

@@ -11,6 +11,7 @@ pub mod input;
 pub mod lifecycle;
 pub mod lockstep;
 pub mod messages;
+pub mod named;
 pub mod realtime;
 pub mod rows;
 pub mod schedule;

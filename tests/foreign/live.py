@@ -20,9 +20,11 @@ from mcap_ros2.decoder import DecoderFactory
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
-TOPICS = ("command", "reading", "state", "truth", "frame", "event", "machine", "/tf", "/scene")
-RARE = ("event", "machine", "/tf", "/scene")
+TOPICS = ("command", "reading", "state", "truth", "frame", "event", "machine", "parameter", "/tf", "/scene")
+RARE = ("event", "machine", "parameter", "/tf", "/scene")
 DECODED_ONE_IN = 20
+# Set by the watcher.
+GAIN_PER_S = 6.5
 PROTOCOLS = ["foxglove.sdk.v1", "foxglove.websocket.v1"]
 # Opcode, subscription and time, before the message itself.
 MESSAGE_HEAD = struct.Struct("<BIQ")
@@ -86,6 +88,8 @@ def watch(link, channels, on_thousandth):
                 last_cycle = message.cycle
                 assert abs(sum(q * q for q in message.estimated_quaternion_wxyz) - 1) < 1e-9
                 assert abs(log_time_ns - message.published_ns) < 1_000_000_000, log_time_ns
+            if topic == "parameter":
+                assert message.integral_gain_per_s == GAIN_PER_S, message
             if topic == "/scene":
                 parts |= {marker.ns for marker in message.markers}
     except ConnectionClosed as end:
@@ -105,6 +109,8 @@ def watch_a_run(masseter, out):
     assert is_watching.wait(10)
 
     with open_and_subscribe(url) as (link, channels):
+        gain = {"name": "integral_gain_per_s", "value": GAIN_PER_S}
+        link.send(json.dumps({"op": "setParameters", "parameters": [gain]}))
         seen = watch(link, channels, on_thousandth=deserter.kill)
     said = rig.stderr.read()
     assert rig.wait() in PASSED_OR_INVALID, (rig.returncode, said)

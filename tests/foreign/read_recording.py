@@ -8,8 +8,8 @@ from collections import Counter
 
 from mcap_ros2.reader import read_ros2_messages
 
-LAYOUT_VERSION = 8
-TOPICS = ("command", "reading", "state", "truth", "frame", "event")
+LAYOUT_VERSION = 9
+TOPICS = ("command", "reading", "state", "truth", "frame", "event", "parameter")
 
 counts = Counter()
 last_seq = {}
@@ -29,6 +29,8 @@ for message in read_ros2_messages(sys.argv[1], topics=TOPICS):
     if topic == "frame":
         assert body.bus in (0, 1) and len(body.data) <= 8, (body.bus, body.data)
         largest_data = max(largest_data, len(body.data))
+    if topic == "parameter":
+        assert (body.length, body.integral_gain_per_s, body.trim_limit_rad) == (3, 5.0, 0.02), body
     if topic == "reading" and body.fresh_axes == 63:
         assert all(0.24 <= length <= 0.30 for length in body.position_m[3:]), body.position_m
 

@@ -16,7 +16,7 @@ from mcap.reader import make_reader
 from rosbags.highlevel import AnyReader
 
 # A run in simulated time has no messages about the machine.
-TOPICS = {"command", "reading", "state", "truth", "frame", "event", "/tf", "/scene"}
+TOPICS = {"command", "reading", "state", "truth", "frame", "event", "parameter", "/tf", "/scene"}
 
 folder = Path(sys.argv[1])
 summary = json.loads((folder / "summary.json").read_text())

@@ -2,6 +2,7 @@
 
 import subprocess
 import threading
+import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -9,7 +10,7 @@ import numpy as np
 import pytest
 
 import masseter
-from masseter.messages import Command, ControllerState, DriveRequest, State
+from masseter.messages import Command, ControllerState, DriveRequest, Event, State
 
 SHORT = ["--duration", "1"]
 
@@ -92,9 +93,48 @@ def test_an_exception_of_the_law_stops_the_rig_safely_and_is_raised_again(tmp_pa
         masseter.run(controller=lambda demand: None, arguments=SHORT)  # type: ignore[arg-type, return-value]
 
 
+def test_signals_and_parameters_are_recorded_by_their_names() -> None:
+    seen = []
+
+    def law(demand: masseter.Demand) -> masseter.Pose:
+        seen.append(demand.parameters["gain"])
+        demand.signals["height"] = 1e3 * demand.desired.position_m[2]
+        return demand.ahead
+
+    result = masseter.run(
+        controller=law,
+        arguments=[*SHORT, "--set", "gain=3"],
+        signals=[masseter.Signal("height", "mm", "Height of the platform.")],
+        parameters=[masseter.Parameter("gain", 1.0, (0.0, 10.0), "1/s")],
+    )
+    assert result.passed and set(seen) == {3.0}
+    run = result.load()
+    heights = {int(row["cycle"]): row["height"] for row in run.signal}
+    played = run.state[run.state["motion_time_s"] > 0.1]
+    # A late reading apart, the state has the desired pose that the law saw.
+    assert np.allclose([heights[int(row["cycle"])] for row in played], 1e3 * played["desired_position_m"][:, 2])
+    assert list(run.parameter["gain"]) == [3.0]
+    assert run.to_polars("signal").columns == ["seq", "published_ns", "version", "cycle", "height"]
+    assert result.figures["signals"][0]["unit"] == "mm"
+    assert (result.folder / "report.html").read_text().count("Height of the platform.") == 1
+
+
+def test_names_that_are_not_declared_are_refused() -> None:
+    def law(demand: masseter.Demand) -> masseter.Pose:
+        demand.signals["depth"] = 1.0
+        return demand.ahead
+
+    with pytest.raises(masseter.MasseterError, match="not declared: .*depth"):
+        masseter.run(controller=law, arguments=SHORT)
+    with pytest.raises(masseter.MasseterError, match="no name of a signal"):
+        masseter.run(controller=ahead, signals=[masseter.Signal("Depth")])
+    with pytest.raises(masseter.MasseterError, match="no parameter 'gain'; it declares none"):
+        masseter.run(controller=ahead, arguments=[*SHORT, "--set", "gain=3"])
+
+
 def start(command: str, name: str, *arguments: str) -> "subprocess.Popen[str]":
     return subprocess.Popen(
-        [command, "run", "--clock", "lockstep", "--quiet", "--controller", "external", "--name", name, *arguments],
+        [command, "run", "--quiet", "--controller", "external", "--name", name, *arguments],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
@@ -123,17 +163,27 @@ def play(session: masseter.Session, misbehave: Callable[[int, Command], None]) -
         session.publish(command, state)
 
 
-def session_run(masseter_command: str, folder: Path, work: Callable[[masseter.Session], None]) -> tuple[int, str]:
+def session_run(
+    masseter_command: str, folder: Path, work: Callable[[masseter.Session], None], *more: str
+) -> tuple[int, str]:
+    clock = more or ("--clock", "lockstep", "--patience", "1s")
     name = f"session-{folder.name[-20:]}"
-    rig = start(masseter_command, name, "--duration", "1", "--out", str(folder / "run"), "--patience", "1s")
-    try:
-        with attached(name, rig) as session:
-            work(session)
-    except masseter.MasseterError as error:
-        output = rig.communicate(timeout=60)
-        return rig.returncode, "".join(output) + str(error)
+    rig = start(masseter_command, name, "--duration", "1", "--out", str(folder / "run"), *clock)
+    said = []
+
+    def control() -> None:
+        try:
+            with attached(name, rig) as session:
+                work(session)
+        except masseter.MasseterError as error:
+            said.append(str(error))
+
+    # A thread of its own: core and priority of a session in real time end with it.
+    controlling = threading.Thread(target=control)
+    controlling.start()
     output = rig.communicate(timeout=60)
-    return rig.returncode, "".join(output)
+    controlling.join()
+    return rig.returncode, "".join([*output, *said])
 
 
 def test_a_controller_of_the_drives_is_recorded(masseter_command: str, tmp_path: Path) -> None:
@@ -185,6 +235,44 @@ def test_a_second_command_in_a_cycle_is_refused_and_the_run_ends_with_its_reason
 
     code, said = session_run(masseter_command, tmp_path, work)
     assert code == 4 and "cycle 1 has its command already" in said, said
+
+
+def test_a_controller_that_begins_late_is_waited_for(masseter_command: str, tmp_path: Path) -> None:
+    def work(session: masseter.Session) -> None:
+        time.sleep(0.5)
+        play(session, lambda number, command: None)
+        session.finish()
+
+    code, said = session_run(masseter_command, tmp_path, work, "--clock", "rt")
+    # No drive has moved: the master waits for the first command.
+    causes = {event["cause"] for event in masseter.load(tmp_path / "run").summary["figures"]["events"]}
+    assert code in (1, 3) and "command_lost" not in causes, said
+
+
+def test_a_controller_that_hangs_in_real_time_is_given_up(masseter_command: str, tmp_path: Path) -> None:
+    def hang(session: masseter.Session) -> None:
+        play(session, lambda number, command: None)
+        # The plant waits five seconds for a controller that has become silent.
+        time.sleep(7.0)
+
+    code, said = session_run(masseter_command, tmp_path, hang, "--clock", "rt")
+    assert code == 4 and "stopped sending commands" in said, said
+
+
+def test_a_flood_of_events_costs_the_flooder_alone(masseter_command: str, tmp_path: Path) -> None:
+    def flood(session: masseter.Session) -> None:
+        play(session, lambda number, command: None)
+        for _ in range(20_000):
+            session.publish_event(Event())
+        play(session, lambda number, command: None)
+        session.finish()
+
+    code, said = session_run(masseter_command, tmp_path, flood)
+    run = masseter.load(tmp_path / "run")
+    lost = {topic["topic"]: topic["missing"] for topic in run.summary["figures"]["topics"]}
+    # What the recorder could not take is counted.
+    assert code == 6 and lost["event"] > 10_000 and lost["reading"] == lost["command"] == 0, (said, lost)
+    assert len(run.command) == 400
 
 
 def test_a_controller_that_leaves_or_hangs_is_named(masseter_command: str, tmp_path: Path) -> None:

@@ -5,6 +5,7 @@ use masseter_shared::config::Scenario;
 use masseter_shared::messages::codes::ControllerState;
 use masseter_shared::messages::tap::{self, TapError};
 use masseter_shared::messages::{FrameTap, Message, Reading, State, Truth};
+use masseter_shared::named::Declared;
 
 use crate::attribution::OverrunAttribution;
 use crate::code::Code;
@@ -16,6 +17,7 @@ use crate::figures::Figures;
 use crate::freshness::Freshness;
 use crate::intervals::Intervals;
 use crate::longest_cycles::LongestCycles;
+use crate::named::NamedWatch;
 use crate::outage::OutageWatch;
 use crate::over_time::{CONTROLLER, OverTimeCollector, PLANT};
 use crate::pose_errors::pose;
@@ -33,8 +35,9 @@ use crate::tracking::{PathSample, PoseSource, Tracking};
 /// use masseter_recording::Recorded;
 /// use masseter_shared::config::Scenario;
 /// use masseter_shared::messages::State;
+/// use masseter_shared::named::Declared;
 ///
-/// let mut analysis = Analysis::new(&Scenario::default());
+/// let mut analysis = Analysis::new(&Scenario::default(), &Declared::default());
 /// for cycle in 1..=3 {
 ///     analysis.take(&Recorded::State(State { seq: cycle, cycle, ..State::default() }))?;
 /// }
@@ -45,6 +48,8 @@ use crate::tracking::{PathSample, PoseSource, Tracking};
 #[derive(Debug)]
 pub struct Analysis {
     period_ns: u64,
+    declared: Declared,
+    named: NamedWatch,
     /// Whether the mechanism is emulated, so that its true motion is recorded.
     has_truth: bool,
     intervals: Intervals,
@@ -70,12 +75,14 @@ pub struct Analysis {
 }
 
 impl Analysis {
-    /// For a run of this scenario, which was accepted when the run began.
-    pub fn new(scenario: &Scenario) -> Self {
+    /// For a run of this scenario, which was accepted when the run began, with what its controller declared.
+    pub fn new(scenario: &Scenario, declared: &Declared) -> Self {
         let is_emulated = scenario.can.is_virtual();
         let period_ns = scenario.period_ns();
         Self {
             period_ns,
+            declared: declared.clone(),
+            named: NamedWatch::new(declared),
             has_truth: is_emulated,
             intervals: Intervals::new(period_ns),
             longest_cycles: LongestCycles::default(),
@@ -120,7 +127,12 @@ impl Analysis {
             Recorded::State(state) => self.state(state),
             Recorded::Truth(truth) => self.truth(truth),
             Recorded::Frame(frame) => self.frame(frame)?,
-            Recorded::Event(event) => self.event(event.into()),
+            Recorded::Signals(message) => {
+                self.named.signals(message);
+                self.over_time.signals(message);
+            }
+            Recorded::Parameters(message) => self.named.parameters(message),
+            Recorded::Event(event) => self.event(EventRecord::of_run(event, &self.declared)),
             Recorded::Machine(machine) => self.longest_cycles.machine(machine),
         }
         Ok(())
@@ -192,6 +204,7 @@ impl Analysis {
         let topics = self.sequence.finish();
         let missing_frames =
             topics.iter().find(|topic| topic.topic == FrameTap::TOPIC).map_or(0, |topic| topic.missing);
+        let (signals, parameters) = self.named.finish();
         self.events.sort_by_key(|event| event.time_ns);
         Figures {
             digest: self.digest.finish(),
@@ -205,6 +218,8 @@ impl Analysis {
             outage: self.outage.finish(self.period_ns),
             tracking,
             faults: self.faults.finish(),
+            signals,
+            parameters,
             bite_force_max_n: self.bite_force_max_n,
             worst_cycles: self.longest_cycles.finish(),
             intervals: self.intervals.finish(),
@@ -215,7 +230,7 @@ impl Analysis {
             cut_short,
             damage: damage.to_vec(),
             track,
-            over_time: self.over_time.finish(),
+            over_time: self.over_time.finish(self.declared.signals.len()),
         }
     }
 }

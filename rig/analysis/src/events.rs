@@ -5,6 +5,7 @@ use masseter_shared::messages::codes::{
     BootPhase, Cause, ControllerState, EventKind, Source, drive_state_name,
 };
 use masseter_shared::messages::{Event, explain};
+use masseter_shared::named::Declared;
 use serde::Serialize;
 
 use super::code::Code;
@@ -46,6 +47,14 @@ impl EventRecord {
     }
 }
 
+impl EventRecord {
+    /// The same, of a run whose controller declared these parameters.
+    pub(crate) fn of_run(event: &Event, declared: &Declared) -> Self {
+        let text = explain(event).or_else(|| change(event, declared));
+        Self { text, ..event.into() }
+    }
+}
+
 impl From<&Event> for EventRecord {
     fn from(event: &Event) -> Self {
         let source = Code::from(event.source);
@@ -69,4 +78,13 @@ impl From<&Event> for EventRecord {
             limit: event.limit,
         }
     }
+}
+
+/// The sentence for a parameter that was set.
+fn change(event: &Event, declared: &Declared) -> Option<String> {
+    let is_set = event.cause == Cause::ParameterSet.code();
+    let parameter = declared.parameters.get(event.object as usize).filter(|_| is_set)?;
+    let text =
+        format!("{} was set from {} to {} {}", parameter.name, event.limit, event.value, parameter.unit);
+    Some(text.trim_end().to_owned())
 }

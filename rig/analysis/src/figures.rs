@@ -12,6 +12,7 @@ use crate::events::EventRecord;
 use crate::freshness::ReadingFigures;
 use crate::longest_cycles::WorstCycle;
 use crate::measured::IntervalFigures;
+use crate::named::{ParameterFigures, SignalFigures};
 use crate::outage::Outage;
 use crate::over_time::OverTime;
 use crate::sequence::TopicFigures;
@@ -43,6 +44,10 @@ pub struct Figures {
     pub tracking: TrackingFigures,
     /// The scenario's faults, in their order.
     pub faults: Vec<FaultFigures>,
+    /// The controller's signals.
+    pub signals: Vec<SignalFigures>,
+    /// The controller's parameters.
+    pub parameters: Vec<ParameterFigures>,
     /// The greatest force with which the emulated jaw bit on food, N; none without food, and on the robot.
     pub bite_force_max_n: Option<f64>,
     /// Measured intervals.

@@ -3,7 +3,7 @@
 use masseter_can::Tapped;
 use masseter_can::{Bitrate, wire};
 use masseter_shared::geometry::{AXES, Pose, Vec3};
-use masseter_shared::messages::Truth;
+use masseter_shared::messages::{MOST_VALUES, Signals, Truth};
 
 use super::series::{Curve, Extremes, Series};
 use super::tracking::PathSample;
@@ -34,6 +34,8 @@ pub struct OverTime {
     pub force_n: [Curve; AXES],
     /// Share of each bus in use, 0 to 1.
     pub bus_load: Vec<Curve>,
+    /// The controller's signals.
+    pub signals: Vec<Curve>,
 }
 
 /// Collects them.
@@ -48,6 +50,7 @@ pub(super) struct OverTimeCollector {
     axes: Series<Extremes<{ 3 * AXES }>>,
     /// Time that frames took on each bus.
     busy_ns: Vec<Series<u64>>,
+    signals: Series<Extremes<MOST_VALUES>>,
     bitrate: Option<Bitrate>,
 }
 
@@ -107,6 +110,13 @@ impl OverTimeCollector {
         }
     }
 
+    pub(super) fn signals(&mut self, message: &Signals) {
+        let since_ns = self.since(message.published_ns);
+        for (place, &value) in message.signals.as_slice().iter().enumerate() {
+            self.signals.take(since_ns, place, value);
+        }
+    }
+
     pub(super) fn frame(&mut self, time_ns: u64, bus: usize, tapped: &Tapped) {
         let since_ns = self.since(time_ns);
         if let Some((received, bitrate)) = tapped.frame().zip(self.bitrate) {
@@ -116,7 +126,8 @@ impl OverTimeCollector {
         }
     }
 
-    pub(super) fn finish(self) -> OverTime {
+    /// The values, with those of this many signals.
+    pub(super) fn finish(self, signals: usize) -> OverTime {
         let bands = |quantity: usize| std::array::from_fn(|axis| self.axes.band(quantity * AXES + axis));
         let places = |first: usize| std::array::from_fn(|axis| self.jaw.band(first + axis));
         let load = |bus: &Series<u64>| {
@@ -135,6 +146,7 @@ impl OverTimeCollector {
             velocity_m_s: bands(1),
             force_n: bands(2),
             bus_load: self.busy_ns.iter().map(load).collect(),
+            signals: (0..signals).map(|place| self.signals.band(place)).collect(),
         }
     }
 }
@@ -156,7 +168,7 @@ mod tests {
             let time_ns = millisecond * 1_000_000;
             collector.frame(time_ns, 0, &Tapped::Frame(TappedFrame { frame, time_ns, queued_ns: None }));
         }
-        let over_time = collector.finish();
+        let over_time = collector.finish(0);
         assert_eq!(over_time.bus_load.len(), 1);
         assert!(over_time.bus_load[0].iter().all(|(_, share)| (share - 0.5).abs() < 1e-3));
     }
@@ -176,7 +188,7 @@ mod tests {
                 collector.path(&PathSample { sampled_ns, desired, deviation });
             }
         }
-        let over_time = collector.finish();
+        let over_time = collector.finish(0);
         assert!((over_time.duration_s - 0.039).abs() < 1e-12);
         let ends = |curve: &Curve| [curve[0], curve[curve.len() - 1]];
         assert_eq!(ends(&over_time.actual_incisal_m[0]), [(0.0, 0.03), (0.039, 0.069)]);

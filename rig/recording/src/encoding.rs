@@ -5,6 +5,8 @@ use std::sync::Arc;
 
 use cdr::{CdrLe, Infinite};
 
+use masseter_shared::named::Declared;
+
 use super::ros::{MarkerArray, RosMessage, TfMessage};
 use super::scene::Scene;
 use super::topic::{Recorded, Stamps, Topic};
@@ -31,7 +33,12 @@ impl Channel {
     /// How many there are.
     pub const COUNT: usize = Topic::ALL.len() + 2;
 
-    /// Its place in [`definitions`].
+    /// Every channel, by its place.
+    pub fn all() -> impl Iterator<Item = Self> {
+        Topic::ALL.into_iter().map(Self::Topic).chain([Self::Transforms, Self::Markers])
+    }
+
+    /// Its place among all.
     pub fn place(self) -> usize {
         match self {
             Self::Topic(topic) => topic as usize,
@@ -50,24 +57,52 @@ impl Channel {
     }
 }
 
-/// The definition of every channel, by its place; numbered from 1.
-pub fn definitions() -> Vec<mcap::Channel<'static>> {
-    let topics = Topic::ALL.map(|topic| {
-        let (name, definition) = topic.definition();
-        (topic.name(), name, definition)
-    });
-    let views = [view::<TfMessage>(Scene::TRANSFORMS), view::<MarkerArray>(Scene::MARKERS)];
-    let channel = |(id, (topic, name, definition)): (u16, (&str, String, String))| {
-        let (encoding, data) = (SCHEMA_ENCODING.to_owned(), definition.into_bytes().into());
-        mcap::Channel {
-            id,
-            topic: topic.to_owned(),
-            schema: Some(Arc::new(mcap::Schema { id, name, encoding, data })),
-            message_encoding: MESSAGE_ENCODING.to_owned(),
-            metadata: BTreeMap::new(),
+/// The definitions of the channels of a run whose controller declares these signals and parameters, numbered by their places
+/// from 1.
+pub fn definitions(declared: &Declared) -> Vec<(Channel, mcap::Channel<'static>)> {
+    Channel::all().filter_map(|channel| Some((channel, definition(channel, declared)?))).collect()
+}
+
+fn definition(channel: Channel, declared: &Declared) -> Option<mcap::Channel<'static>> {
+    let (topic, name, definition) = match channel {
+        Channel::Topic(topic) => {
+            let (name, definition) = topic.definition();
+            (topic.name(), name, named_definition(topic, definition, declared)?)
         }
+        Channel::Transforms => view::<TfMessage>(Scene::TRANSFORMS),
+        Channel::Markers => view::<MarkerArray>(Scene::MARKERS),
     };
-    (1..).zip(topics.into_iter().chain(views)).map(channel).collect()
+    let id = channel.place() as u16 + 1;
+    let (encoding, data) = (SCHEMA_ENCODING.to_owned(), definition.into_bytes().into());
+    Some(mcap::Channel {
+        id,
+        topic: topic.to_owned(),
+        schema: Some(Arc::new(mcap::Schema { id, name, encoding, data })),
+        message_encoding: MESSAGE_ENCODING.to_owned(),
+        metadata: BTreeMap::new(),
+    })
+}
+
+/// The definition of a topic in a run; none for signals or parameters that nobody declares. CDR writes the sequence of values
+/// as its length and, on their alignment, the values: so each may be a field of its own.
+fn named_definition(topic: Topic, definition: String, declared: &Declared) -> Option<String> {
+    let fields: Vec<_> = match topic {
+        Topic::Signals => {
+            declared.signals.iter().map(|signal| field(&signal.name, &signal.unit, &signal.about)).collect()
+        }
+        Topic::Parameters => {
+            declared.parameters.iter().map(|known| field(&known.name, &known.unit, &known.about)).collect()
+        }
+        _ => return Some(definition),
+    };
+    let before = definition.lines().filter(|line| !line.contains("[<="));
+    let before = before.fold(String::new(), |text, line| text + line + "\n");
+    (!fields.is_empty()).then(|| before + "uint32 length\n" + &fields.concat())
+}
+
+fn field(name: &str, unit: &str, about: &str) -> String {
+    let comment = [unit, about].map(|text| text.replace(['\n', '\r'], " ")).join(" ");
+    format!("float64 {name}  # {}\n", comment.trim())
 }
 
 fn view<M: RosMessage>(topic: &'static str) -> (&'static str, String, String) {
@@ -141,18 +176,36 @@ impl Encoder {
 
 #[cfg(test)]
 mod tests {
+    use masseter_shared::named::Signal;
+
     use super::*;
 
     #[test]
-    fn every_channel_stands_at_its_place() {
-        let definitions = definitions();
-        let mut found = Vec::new();
-        for topic in Topic::ALL {
-            assert_eq!(definitions[Channel::Topic(topic).place()].topic, topic.name());
-            found.extend(Channel::for_topic(topic));
-        }
-        assert_eq!(definitions[Channel::Transforms.place()].topic, Scene::TRANSFORMS);
-        assert_eq!(definitions[Channel::Markers.place()].topic, Scene::MARKERS);
-        assert!((0..definitions.len()).all(|place| found.iter().any(|channel| channel.place() == place)));
+    fn every_channel_stands_at_its_place_and_carries_a_topic() {
+        assert!(Channel::all().map(Channel::place).eq(0..Channel::COUNT));
+        let found: Vec<_> = Topic::ALL.into_iter().flat_map(Channel::for_topic).collect();
+        assert!(Channel::all().all(|channel| found.contains(&channel)));
+    }
+
+    #[test]
+    fn signals_are_fields_of_their_message_and_without_any_there_is_no_channel() {
+        let is_named = |channel: Channel| channel == Channel::Topic(Topic::Signals);
+        let none = definitions(&Declared::default());
+        assert!(!none.iter().any(|(channel, _)| is_named(*channel)) && none.len() == Channel::COUNT - 2);
+        let signal = |name: &str, unit: &str| Signal {
+            name: name.into(),
+            unit: unit.into(),
+            about: "What\nit is.".into(),
+        };
+        let declared =
+            Declared { signals: vec![signal("grip", "N"), signal("count", "")], parameters: Vec::new() };
+        let definitions = definitions(&declared);
+        let (_, channel) = definitions.iter().find(|(channel, _)| is_named(*channel)).unwrap();
+        let definition = str::from_utf8(&channel.schema.as_ref().unwrap().data).unwrap();
+        assert_eq!(
+            definition,
+            "uint64 seq\nuint64 published_ns\nuint64 version\nuint64 cycle\nuint32 length\n\
+             float64 grip  # N What it is.\nfloat64 count  # What it is.\n"
+        );
     }
 }

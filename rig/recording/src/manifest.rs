@@ -7,6 +7,7 @@ use std::time::UNIX_EPOCH;
 
 use masseter_shared::clock;
 use masseter_shared::config::Scenario;
+use masseter_shared::named::Declared;
 use masseter_shared::realtime::scheduling::Obtained;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
@@ -47,6 +48,9 @@ pub struct Manifest {
     /// Who controlled the robot, if not the motion controller of the rig: `hold`, `external` or the path of a program.
     #[serde(default)]
     pub controller: Option<String>,
+    /// The signals and parameters of the controller; parameters with their values at the start.
+    #[serde(default)]
+    pub declared: Declared,
     /// The scenario as resolved.
     pub scenario: Scenario,
     /// Duration of the motion, s.
@@ -76,6 +80,7 @@ impl Manifest {
             began: began.to_string(),
             clock: clock.to_owned(),
             controller: None,
+            declared: Declared::default(),
             scenario,
             motion_s,
             machine,

@@ -1,6 +1,8 @@
 //! The topics of a recording and their messages: one table of both.
 
-use masseter_shared::messages::{Command, Event, FrameTap, Machine, Message, Reading, State, Truth};
+use masseter_shared::messages::{
+    Command, Event, FrameTap, Machine, Message, Parameters, Reading, Signals, State, Truth,
+};
 
 macro_rules! topics {
     ($($(#[$doc:meta])* $name:ident: $message:ty),* $(,)?) => {
@@ -82,6 +84,10 @@ topics! {
     Event: Event,
     /// The kernel's counters.
     Machine: Machine,
+    /// The controller's signals.
+    Signals: Signals,
+    /// The controller's parameters.
+    Parameters: Parameters,
 }
 
 impl Topic {

@@ -12,10 +12,11 @@ use std::path::Path;
 use std::sync::mpsc::{Receiver, SyncSender, channel, sync_channel};
 use std::thread::{self, JoinHandle};
 
+use masseter_shared::named::Declared;
 use mcap::records::MessageHeader;
 use mcap::{Attachment, Compression, McapError, WriteOptions, Writer};
 
-use super::encoding::{Encoded, Encoder, definitions};
+use super::encoding::{Channel, Encoded, Encoder, definitions};
 use super::folder::RunFolder;
 use super::manifest::Manifest;
 use super::scene::Scene;
@@ -121,13 +122,15 @@ pub struct Recorder<W: Medium = DurableFile> {
 /// The file with the numbers of its channels, by their places.
 struct Channels<W: Medium> {
     writer: Writer<W>,
-    ids: Vec<u16>,
+    ids: [Option<u16>; Channel::COUNT],
 }
 
 impl<W: Medium> Channels<W> {
     fn write(&mut self, message: &Encoded, log_time_ns: u64) -> Result<(), WriteError> {
+        // Nobody declared what it holds.
+        let Some(channel_id) = self.ids[message.channel.place()] else { return Ok(()) };
         let header = MessageHeader {
-            channel_id: self.ids[message.channel.place()],
+            channel_id,
             sequence: message.sequence,
             log_time: log_time_ns,
             publish_time: message.publish_time_ns,
@@ -162,19 +165,24 @@ impl<W: Medium> Recorder<W> {
     /// Begins a recording with the definitions of all channels, which are flushed at once: without them no message can be
     /// read.
     pub fn new(medium: W, scene: Scene) -> Result<Self, WriteError> {
-        let mut writer = options().create(medium)?;
-        let mut ids = Vec::new();
-        for channel in definitions() {
-            let schema = add_schema(&mut writer, &channel)?;
-            ids.push(writer.add_channel(
-                schema,
-                &channel.topic,
-                &channel.message_encoding,
-                &channel.metadata,
-            )?);
+        let channels = Channels { writer: options().create(medium)?, ids: [None; Channel::COUNT] };
+        let mut recorder = Self { channels, encoder: Encoder::new(scene) };
+        recorder.declare(&Declared::default())?;
+        Ok(recorder)
+    }
+
+    /// Adds the channels of the signals and parameters that a controller declares; before, their messages are left out.
+    pub fn declare(&mut self, declared: &Declared) -> Result<(), WriteError> {
+        let Channels { writer, ids } = &mut self.channels;
+        for (channel, definition) in definitions(declared) {
+            let id = &mut ids[channel.place()];
+            if id.is_none() {
+                let schema = add_schema(writer, &definition)?;
+                let mcap::Channel { topic, message_encoding, metadata, .. } = &definition;
+                *id = Some(writer.add_channel(schema, topic, message_encoding, metadata)?);
+            }
         }
-        writer.flush()?;
-        Ok(Self { channels: Channels { writer, ids }, encoder: Encoder::new(scene) })
+        Ok(writer.flush()?)
     }
 
     /// Attaches a file. It has no time, since runs in simulated time leave the same bytes whenever they are made.

@@ -5,7 +5,7 @@ use masseter_shared::config::Scenario;
 use masseter_shared::geometry::{AXIS_NAMES, LEGS, Mechanism, Vec3};
 use masseter_shared::schedule::CycleSchedule;
 
-use masseter_analysis::{Curve, EventRecord, FaultFigures, Figures, IntervalFigures};
+use masseter_analysis::{Curve, EventRecord, FaultFigures, Figures, IntervalFigures, SignalFigures};
 use masseter_charts::{Axis, Drawn, Legend, Limit, Line, LineChart, Moment, Scale, palette};
 
 /// Height of a chart over time, px.
@@ -142,6 +142,23 @@ pub(super) fn actuators(scenario: &Scenario, figures: &Figures) -> Plots<4> {
         ("velocities", axes("velocity, mm/s", &over_time.velocity_m_s, 0, 1e3, velocities)),
         ("forces", axes("force, N", &over_time.force_n, 0, 1.0, forces)),
     ]
+}
+
+/// The controller's signals, one chart for each unit, in the order of their declaration.
+pub(super) fn signals(scenario: &Scenario, figures: &Figures) -> Vec<(String, Option<Drawn>)> {
+    let mut charts: Vec<(&str, Vec<Line>)> = Vec::new();
+    for (SignalFigures { signal, .. }, curve) in figures.signals.iter().zip(&figures.over_time.signals) {
+        let line = Line::new(&signal.name, curve.clone());
+        match charts.iter_mut().find(|(unit, _)| *unit == signal.unit) {
+            Some((_, lines)) => lines.push(line),
+            None => charts.push((&signal.unit, vec![line])),
+        }
+    }
+    let drawn = |(number, (unit, lines)): (usize, (&str, Vec<Line>))| {
+        let axis = linear(if unit.is_empty() { "signals without unit" } else { unit });
+        (format!("signals-{number}"), chart_over_time(scenario, figures, axis, lines, Vec::new()))
+    };
+    charts.into_iter().enumerate().map(drawn).collect()
 }
 
 /// Share of each bus in use.

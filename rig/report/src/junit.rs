@@ -42,6 +42,7 @@ mod tests {
     use masseter_analysis::Analysis;
     use masseter_recording::MachineInfo;
     use masseter_shared::config::Scenario;
+    use masseter_shared::named::Declared;
 
     use super::*;
 
@@ -49,7 +50,7 @@ mod tests {
     fn a_reason_of_any_characters_leaves_the_document_xml() {
         let machine = MachineInfo { cpu: String::new(), cores: 2, kernel: String::new(), is_virtual: false };
         let manifest = Manifest::new(Scenario::default(), 10.0, "virtual", machine);
-        let figures = Analysis::new(&manifest.scenario).finish(false, &[]);
+        let figures = Analysis::new(&manifest.scenario, &Declared::default()).finish(false, &[]);
         let verdict =
             Verdict { reason: "<&\u{1b}\u{ffff}\">".to_owned(), ..Verdict::new(&manifest, &figures) };
         let xml = xml(&manifest, &figures, &verdict).unwrap();

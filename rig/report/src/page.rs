@@ -23,6 +23,7 @@ struct Page<'a> {
     animation: Option<String>,
     motions: [(&'static str, Option<Drawn>); 2],
     actuators: [(&'static str, Option<Drawn>); 4],
+    signals: Vec<(String, Option<Drawn>)>,
     percentiles: Option<Drawn>,
     jitter: Option<Drawn>,
     bus_load: Option<Drawn>,
@@ -39,6 +40,7 @@ pub(crate) fn html(manifest: &Manifest, figures: &Figures, verdict: &Verdict) ->
         animation: animation::json(scenario, figures),
         motions: charts::motion(scenario, figures),
         actuators: charts::actuators(scenario, figures),
+        signals: charts::signals(scenario, figures),
         percentiles: charts::percentiles(scenario, figures),
         jitter: charts::jitter(scenario, figures),
         bus_load: charts::bus_load(scenario, figures),
@@ -81,6 +83,10 @@ fn us(ns: Option<u64>) -> String {
     or_dash(ns, microseconds)
 }
 
+fn value(value: Option<f64>) -> String {
+    or_dash(value, |value| format!("{value:.6}").trim_end_matches('0').trim_end_matches('.').to_owned())
+}
+
 fn count(count: Option<u64>) -> String {
     or_dash(count, |count| count.to_string())
 }
@@ -96,6 +102,7 @@ mod tests {
     use masseter_recording::MachineInfo;
     use masseter_shared::config::Scenario;
     use masseter_shared::geometry::Pose;
+    use masseter_shared::named::Declared;
 
     use super::*;
 
@@ -103,7 +110,7 @@ mod tests {
     fn page(interfaces: &[&str]) -> String {
         let mut scenario = Scenario::default();
         scenario.can.interfaces = interfaces.iter().map(|name| (*name).to_owned()).collect();
-        let mut figures = Analysis::new(&scenario).finish(false, &[]);
+        let mut figures = Analysis::new(&scenario, &Declared::default()).finish(false, &[]);
         let still = Pose::identity();
         figures.track.samples =
             vec![TrackingSample { sampled_ns: 0, desired: still, estimated: still, actual: still }];

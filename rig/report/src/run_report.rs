@@ -7,7 +7,6 @@ use std::path::Path;
 use anyhow::Context;
 use masseter_analysis::{Analysis, Figures};
 use masseter_recording::{Manifest, ReadError, Reader, Recorded, RunFolder};
-use masseter_shared::config::Scenario;
 use masseter_shared::messages::tap::{self, TapError};
 use masseter_terminal::{Exit, Failure, Format, OrFailure, result, result_with_tones, status};
 
@@ -52,7 +51,7 @@ pub fn report_run(
     reserved: File,
 ) -> Result<Exit, Failure> {
     let (figures, logged) =
-        analyse(folder, &manifest.scenario).context("the run's recording cannot be analysed").incomplete()?;
+        analyse(folder, manifest).context("the run's recording cannot be analysed").incomplete()?;
     let (exit, written) =
         show_and_write(folder, manifest, &figures, logged, (format, detail), Some(reserved))?;
     written.incomplete()?;
@@ -76,7 +75,7 @@ pub fn report_past_run(path: &Path, format: Format) -> Result<Exit, Failure> {
     let folder = RunFolder::open(path).usage()?;
     let unread = || format!("cannot read {}", folder.manifest().display());
     let manifest = Manifest::read(&folder).with_context(unread).usage()?;
-    let (figures, logged) = analyse(&folder, &manifest.scenario).usage()?;
+    let (figures, logged) = analyse(&folder, &manifest).usage()?;
     let (exit, written) =
         show_and_write(&folder, &manifest, &figures, logged, (format, Detail::Whole), None)?;
     match written {
@@ -97,11 +96,11 @@ fn is_read_only(error: &io::Error) -> bool {
 /// Reads the recording once: its figures, and whether its CAN frames could be written as candump logs.
 fn analyse(
     folder: &RunFolder,
-    scenario: &Scenario,
+    manifest: &Manifest,
 ) -> Result<(Figures, Result<(), WriteError>), AnalysisError> {
     let mut reader = Reader::open(&folder.recording())?;
-    let mut analysis = Analysis::new(scenario);
-    let mut logs = Ok(CandumpLogs::new(folder.path(), &scenario.can.interfaces));
+    let mut analysis = Analysis::new(&manifest.scenario, &manifest.declared);
+    let mut logs = Ok(CandumpLogs::new(folder.path(), &manifest.scenario.can.interfaces));
     while let Some(message) = reader.next_message()? {
         analysis.take(&message)?;
         if let (Recorded::Frame(frame), Ok(open)) = (&message, &mut logs)

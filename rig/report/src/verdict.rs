@@ -24,10 +24,11 @@ use crate::timing::{Timing, TimingWord};
 /// use masseter_recording::{MachineInfo, Manifest};
 /// use masseter_report::Verdict;
 /// use masseter_shared::config::Scenario;
+/// use masseter_shared::named::Declared;
 ///
 /// let machine = MachineInfo { cpu: "any".into(), cores: 2, kernel: "Linux".into(), is_virtual: false };
 /// let manifest = Manifest::new(Scenario::default(), 10.0, "virtual", machine);
-/// let figures = Analysis::new(&manifest.scenario).finish(false, &[]);
+/// let figures = Analysis::new(&manifest.scenario, &Declared::default()).finish(false, &[]);
 /// // The supervisor has not entered yet how the run ended.
 /// assert_eq!(Verdict::new(&manifest, &figures).word, "DIED");
 /// ```
@@ -261,7 +262,8 @@ mod tests {
             Event { axis: 0, node: 1, value: 4.0, ..lost },
             event(Source::Controller, EventKind::Fault, Cause::MasterFault),
         ];
-        let (outcome, reason) = ending(&Ending::SafeStop, &events.map(|event| (&event).into())).unwrap();
+        let (outcome, reason) =
+            ending(&Ending::SafeStop, &events.map(|event| EventRecord::from(&event))).unwrap();
         assert_eq!(outcome, Outcome::SafeStop);
         assert_eq!(
             reason,

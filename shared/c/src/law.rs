@@ -5,6 +5,7 @@ use std::ffi::{c_int, c_void};
 use masseter_controller::pose_law::{Demand, LawFailed, PoseLaw};
 use masseter_shared::geometry::Pose;
 use masseter_shared::messages::pose_fields;
+use masseter_shared::named::Declared;
 use nalgebra::{Quaternion, Translation3, Unit};
 
 /// A pose: position in the base frame, m, and unit quaternion.
@@ -27,10 +28,12 @@ pub struct MasseterDemand {
     desired: MasseterPose,
     estimated: MasseterPose,
     ahead: MasseterPose,
+    parameters: *const f64,
+    signals: *mut f64,
 }
 
 // As masseter.h asserts.
-const _: () = assert!(size_of::<MasseterPose>() == 56 && size_of::<MasseterDemand>() == 200);
+const _: () = assert!(size_of::<MasseterPose>() == 56 && size_of::<MasseterDemand>() == 216);
 
 /// The law: 0 if it has written a pose.
 pub(crate) type LawFunction =
@@ -38,22 +41,45 @@ pub(crate) type LawFunction =
 
 #[derive(Debug)]
 pub(crate) struct CLaw {
-    pub(crate) function: LawFunction,
-    pub(crate) user: *mut c_void,
+    function: LawFunction,
+    user: *mut c_void,
+    declared: Declared,
+    parameters: Vec<f64>,
+    signals: Vec<f64>,
+}
+
+impl CLaw {
+    pub(crate) fn new(function: LawFunction, user: *mut c_void, declared: Declared) -> Self {
+        let (parameters, signals) = (vec![0.0; declared.parameters.len()], vec![0.0; declared.signals.len()]);
+        Self { function, user, declared, parameters, signals }
+    }
 }
 
 impl PoseLaw for CLaw {
     fn command(&mut self, demand: &Demand) -> Result<Pose, LawFailed> {
         let mut asked = MasseterPose::from(&demand.ahead);
+        let demand = self.demand(demand);
         // SAFETY: the caller of masseter_run passes a function and its argument that are valid until it returns.
-        let failed = unsafe { (self.function)(&demand.into(), &raw mut asked, self.user) };
+        let failed = unsafe { (self.function)(&raw const demand, &raw mut asked, self.user) };
         if failed == 0 { Ok(asked.into()) } else { Err(LawFailed) }
+    }
+
+    fn declared(&self) -> Declared {
+        self.declared.clone()
+    }
+
+    fn set_parameter(&mut self, place: usize, value: f64) {
+        self.parameters[place] = value;
+    }
+
+    fn fill_signals(&self, signals: &mut [f64]) {
+        signals.copy_from_slice(&self.signals);
     }
 }
 
-impl From<&Demand> for MasseterDemand {
-    fn from(demand: &Demand) -> Self {
-        Self {
+impl CLaw {
+    fn demand(&mut self, demand: &Demand) -> MasseterDemand {
+        MasseterDemand {
             cycle: demand.cycle,
             period_s: demand.period_s,
             motion_time_s: demand.motion_time_s,
@@ -62,6 +88,8 @@ impl From<&Demand> for MasseterDemand {
             desired: (&demand.desired).into(),
             estimated: demand.estimated.as_ref().map_or_else(MasseterPose::default, MasseterPose::from),
             ahead: (&demand.ahead).into(),
+            parameters: self.parameters.as_ptr(),
+            signals: self.signals.as_mut_ptr(),
         }
     }
 }

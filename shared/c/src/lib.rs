@@ -15,6 +15,7 @@ use masseter_shared::control::{Outcome, Session, Tick, Waited};
 use masseter_shared::lifecycle::ProcessContext;
 use masseter_shared::lifecycle::attach::attach;
 use masseter_shared::messages::{Command, Event, Reading, State};
+use masseter_shared::named::{Declared, Parameter, Signal};
 
 use law::{CLaw, LawFunction};
 use outcome::{Failure, OK, SAFE_STOP, TIMED_OUT, guarded};
@@ -24,6 +25,7 @@ use outcome::{Failure, OK, SAFE_STOP, TIMED_OUT, guarded};
 pub struct MasseterSession {
     stage: Stage,
     period_ns: u64,
+    declared: Declared,
 }
 
 #[derive(Debug)]
@@ -45,6 +47,18 @@ pub struct MasseterCycle {
 }
 
 impl MasseterSession {
+    /// Adds to what is declared before the start; `add` returns how many there are then. Returns the place of the last.
+    fn declare(&mut self, add: impl FnOnce(&mut Declared) -> usize) -> Result<c_int, Failure> {
+        let Stage::Attached(_) = self.stage else {
+            return Err("the session is started: declare before".into());
+        };
+        let mut declared = self.declared.clone();
+        let count = add(&mut declared);
+        declared.check()?;
+        self.declared = declared;
+        Ok(c_int::try_from(count).expect("a few are accepted") - 1)
+    }
+
     fn started(&mut self) -> Result<&mut Session, Failure> {
         match &mut self.stage {
             Stage::Started(session) => Ok(session),
@@ -72,7 +86,11 @@ pub unsafe extern "C" fn masseter_attach(rig: *const c_char, session: *mut *mut 
         let rig = unsafe { text(rig) }?;
         let context = attach(rig)?;
         let period_ns = context.scenario.period_ns();
-        let attached = MasseterSession { stage: Stage::Attached(Box::new(context)), period_ns };
+        let attached = MasseterSession {
+            stage: Stage::Attached(Box::new(context)),
+            period_ns,
+            declared: Declared::default(),
+        };
         // SAFETY: valid by the contract of this function.
         unsafe { session.as_mut() }
             .map(|session| *session = Box::into_raw(Box::new(attached)))
@@ -92,7 +110,8 @@ pub unsafe extern "C" fn masseter_start(session: *mut MasseterSession) -> c_int 
         let session = unsafe { session.as_mut() }.ok_or(NULL)?;
         match std::mem::replace(&mut session.stage, Stage::Over) {
             Stage::Attached(context) => {
-                session.stage = Stage::Started(Box::new(Session::start(*context)?));
+                let declared = std::mem::take(&mut session.declared);
+                session.stage = Stage::Started(Box::new(Session::start(*context, declared)?));
                 Ok(OK)
             }
             stage => {
@@ -100,6 +119,86 @@ pub unsafe extern "C" fn masseter_start(session: *mut MasseterSession) -> c_int 
                 Err("the session is started already".into())
             }
         }
+    })
+}
+
+/// Declares a signal; returns its place.
+///
+/// # Safety
+/// `session` is null or from [`masseter_attach`]; the texts are null or strings.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn masseter_declare_signal(
+    session: *mut MasseterSession,
+    name: *const c_char,
+    unit: *const c_char,
+    about: *const c_char,
+) -> c_int {
+    guarded(|| {
+        // SAFETY: as this function's.
+        let (session, [name, unit, about]) = unsafe { (session.as_mut(), texts([name, unit, about])?) };
+        session.ok_or(NULL)?.declare(|declared| {
+            declared.signals.push(Signal { name, unit, about });
+            declared.signals.len()
+        })
+    })
+}
+
+/// Declares a parameter; returns its place.
+///
+/// # Safety
+/// `session` is null or from [`masseter_attach`]; the texts are null or strings.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn masseter_declare_parameter(
+    session: *mut MasseterSession,
+    name: *const c_char,
+    unit: *const c_char,
+    about: *const c_char,
+    value: f64,
+    least: f64,
+    most: f64,
+) -> c_int {
+    guarded(|| {
+        // SAFETY: as this function's.
+        let (session, [name, unit, about]) = unsafe { (session.as_mut(), texts([name, unit, about])?) };
+        session.ok_or(NULL)?.declare(|declared| {
+            declared.parameters.push(Parameter { name, unit, about, value, range: [least, most] });
+            declared.parameters.len()
+        })
+    })
+}
+
+/// A parameter in force; no number for a place without a parameter, and before the start.
+///
+/// # Safety
+/// `session` is null or from [`masseter_attach`].
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn masseter_parameter(session: *const MasseterSession, parameter: c_int) -> f64 {
+    // SAFETY: as this function's.
+    let session = unsafe { session.as_ref() };
+    let place = usize::try_from(parameter).ok();
+    let value = session.zip(place).and_then(|(session, place)| match &session.stage {
+        Stage::Started(session) => session.parameters().get(place).copied(),
+        Stage::Attached(_) | Stage::Over => None,
+    });
+    value.unwrap_or(f64::NAN)
+}
+
+/// Gives a signal its value of this cycle.
+///
+/// # Safety
+/// `session` is null or from [`masseter_attach`].
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn masseter_set_signal(
+    session: *mut MasseterSession,
+    signal: c_int,
+    value: f64,
+) -> c_int {
+    guarded(|| {
+        // SAFETY: as this function's.
+        let session = unsafe { session.as_mut() }.ok_or(NULL)?.started()?;
+        let place = usize::try_from(signal).ok().and_then(|place| session.signals_mut().get_mut(place));
+        *place.ok_or(Failure::of("no signal of this place is declared"))? = value;
+        Ok(OK)
     })
 }
 
@@ -229,7 +328,7 @@ pub unsafe extern "C" fn masseter_run(
     guarded(|| {
         // SAFETY: as this function's.
         let session = unsafe { owned(session) }?;
-        let law = CLaw { function: law.ok_or(NULL)?, user };
+        let law = CLaw::new(law.ok_or(NULL)?, user, session.declared);
         let Stage::Attached(context) = session.stage else {
             return Err("the session is started already: call masseter_run instead of masseter_start".into());
         };
@@ -247,6 +346,19 @@ const NULL: Failure = Failure::of("a pointer is null");
 unsafe fn owned(session: *mut MasseterSession) -> Result<MasseterSession, Failure> {
     // SAFETY: made by Box::into_raw, by the contract of this function.
     if session.is_null() { Err(NULL) } else { Ok(*unsafe { Box::from_raw(session) }) }
+}
+
+/// Three strings of C; empty ones for null.
+///
+/// # Safety
+/// Each is null or ends with a zero.
+unsafe fn texts(given: [*const c_char; 3]) -> Result<[String; 3], Failure> {
+    let mut texts = [const { String::new() }; 3];
+    for (text, given) in texts.iter_mut().zip(given) {
+        // SAFETY: as this function's.
+        unsafe { self::text(given) }?.unwrap_or_default().clone_into(text);
+    }
+    Ok(texts)
 }
 
 /// A string of C; none for null.

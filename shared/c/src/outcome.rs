@@ -44,7 +44,8 @@ failures!(
     masseter_controller::process::ControllerError,
     masseter_shared::control::SessionError,
     masseter_shared::lifecycle::ProcessError,
-    masseter_shared::lifecycle::attach::AttachError
+    masseter_shared::lifecycle::attach::AttachError,
+    masseter_shared::named::NameError
 );
 
 /// The result of `work`. A panic is an error, since it must not unwind through C.

@@ -9,7 +9,7 @@ Lengths are in m, angles in rad, times in s unless a name says otherwise; poses 
 """
 
 from masseter._native import Demand, MasseterError, Pose
-from masseter.controller import Session, control
+from masseter.controller import Parameter, Session, Signal, control
 from masseter.kinematics import Mechanism, fk, ik
 from masseter.recording import Run, load
 from masseter.rig import Result, run
@@ -18,10 +18,12 @@ __all__ = [
     "Demand",
     "MasseterError",
     "Mechanism",
+    "Parameter",
     "Pose",
     "Result",
     "Run",
     "Session",
+    "Signal",
     "control",
     "fk",
     "ik",

@@ -1,6 +1,7 @@
 """A controller in Python, in a run that somebody else has started."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from types import TracebackType
 from typing import NamedTuple, Self
 
@@ -10,13 +11,57 @@ from masseter.messages import Command, Event, Reading, State
 Law = Callable[[_native.Demand], _native.Pose]
 
 
-def control(law: Law, rig: str | None = None) -> bool:
+@dataclass(frozen=True)
+class Signal:
+    """A number that a controller publishes in each cycle: recorded, and drawn in the report."""
+
+    #: In lower case, such as "grip_force".
+    name: str
+    #: Such as "mm"; empty for none.
+    unit: str = ""
+    about: str = ""
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A number that the user of a controller sets: in the scenario, with --set, or while the controller runs."""
+
+    #: In lower case, such as "gain".
+    name: str
+    #: At the start, where the scenario does not give another one.
+    value: float
+    #: Smallest and largest value.
+    range: tuple[float, float]
+    unit: str = ""
+    about: str = ""
+
+
+def _signals(signals: Sequence[Signal]) -> list[tuple[str, str, str]]:
+    return [(signal.name, signal.unit, signal.about) for signal in signals]
+
+
+def _parameters(parameters: Sequence[Parameter]) -> list[tuple[str, str, str, float, tuple[float, float]]]:
+    return [(known.name, known.unit, known.about, known.value, known.range) for known in parameters]
+
+
+def check_declaration(signals: Sequence[Signal], parameters: Sequence[Parameter]) -> None:
+    """Raises MasseterError for names that no recording can have, and values beyond their range."""
+    _native.check(_signals(signals), _parameters(parameters))
+
+
+def control(
+    law: Law,
+    rig: str | None = None,
+    signals: Sequence[Signal] = (),
+    parameters: Sequence[Parameter] = (),
+) -> bool:
     """Attaches to a rig and controls it with a pose law until the motion is over.
 
     The rig: the named one, or that of MASSETER_RIG, or the only one that takes a controller. Returns True when the motion was
-    finished, False after a safe stop. An exception of the law stops the rig safely, and is raised again.
+    finished, False after a safe stop. An exception of the law stops the rig safely, and is raised again. The law reads
+    demand.parameters and fills demand.signals, both by their names.
     """
-    return _native.control(law, rig)
+    return _native.control(law, rig, _signals(signals), _parameters(parameters))
 
 
 class Cycle(NamedTuple):
@@ -44,9 +89,18 @@ class Session:
     An exception within the block ends the run with its message.
     """
 
-    def __init__(self, rig: str | None = None) -> None:
-        self._native = _native.Session(rig)
+    def __init__(
+        self,
+        rig: str | None = None,
+        signals: Sequence[Signal] = (),
+        parameters: Sequence[Parameter] = (),
+    ) -> None:
+        self._native = _native.Session(rig, _signals(signals), _parameters(parameters))
         self._is_over = False
+        self._parameters = [parameter.name for parameter in parameters]
+        #: The signals that go out with each command; a value stays until it is replaced.
+        self.signals = {signal.name: 0.0 for signal in signals}
+        self._signals = list(self.signals)
 
     def __enter__(self) -> Self:
         self._native.start()
@@ -68,6 +122,11 @@ class Session:
         """Whether the rig wants an orderly end: bring the motion to rest, switch the drives off, then finish."""
         return self._native.is_stop_requested
 
+    @property
+    def parameters(self) -> dict[str, float]:
+        """The parameters in this cycle."""
+        return dict(zip(self._parameters, self._native.parameters(), strict=True))
+
     def wait(self, timeout_s: float | None = None) -> Cycle | None:
         """Ends the current cycle and waits for the next; None if it has not begun within the time."""
         begun = self._native.wait(timeout_s)
@@ -77,8 +136,11 @@ class Session:
         return Cycle(number, now_ns, None if reading is None else Reading.from_buffer_copy(reading))
 
     def publish(self, command: Command, state: State) -> None:
-        """Publishes this cycle's command, and what the controller made of the reading. Once a cycle."""
-        self._native.publish(bytes(command), bytes(state))
+        """Publishes this cycle's command, what the controller made of the reading, and the signals. Once a cycle."""
+        values = [self.signals[name] for name in self._signals]
+        if len(self.signals) > len(values):
+            raise _native.MasseterError(f"signals that are not declared: {sorted(set(self.signals) - set(self._signals))}")
+        self._native.publish(bytes(command), bytes(state), values)
 
     def publish_event(self, event: Event) -> None:
         """Publishes an event."""

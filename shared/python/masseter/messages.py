@@ -7,7 +7,7 @@ numpy.dtype(Reading) is the NumPy type of a message.
 import ctypes
 import enum
 
-LAYOUT_VERSION = 8
+LAYOUT_VERSION = 9
 #: Event.axis when no axis is concerned.
 NO_AXIS = 4294967295
 #: Reading.drive_state of a drive not heard of yet, or lost.
@@ -176,6 +176,8 @@ class Cause(enum.IntEnum):
     ORIENTATION_LOST = 48
     #: The pose law failed (0), or gave a pose with a bad coordinate (m), or with a bad quaternion (its length; the limit is 1).
     LAW_FAILED = 49
+    #: A parameter of the controller was set (new value; the limit is the value before). The object is its place.
+    PARAMETER_SET = 50
 
 
 class NoPose(enum.IntEnum):
@@ -246,7 +248,7 @@ class Reading(ctypes.Structure):
 
     @staticmethod
     def type_name() -> str:
-        return "masseter/Reading/d90fbf69f124d93f"
+        return "masseter/Reading/d48418c615909bcc"
 
 
 _check(Reading, 256, [0, 8, 16, 24, 32, 40, 48, 56, 64, 72, 80, 88, 96, 104, 112, 120, 128, 176, 224, 248, 252])
@@ -277,7 +279,7 @@ class Command(ctypes.Structure):
 
     @staticmethod
     def type_name() -> str:
-        return "masseter/Command/765fe161c86f3ae1"
+        return "masseter/Command/afe52f250c742778"
 
 
 _check(Command, 96, [0, 8, 16, 24, 32, 40, 88, 92])
@@ -344,7 +346,7 @@ class State(ctypes.Structure):
 
     @staticmethod
     def type_name() -> str:
-        return "masseter/State/f96001ba642535d1"
+        return "masseter/State/f65ae9b1b72b2a36"
 
 
 _check(State, 296, [0, 8, 16, 24, 32, 40, 48, 56, 64, 72, 80, 88, 96, 104, 112, 120, 128, 136, 160, 192, 216, 248, 272, 280, 288, 292])
@@ -391,7 +393,7 @@ class Event(ctypes.Structure):
 
     @staticmethod
     def type_name() -> str:
-        return "masseter/Event/e089476317e241b0"
+        return "masseter/Event/4f34a13697c9e73d"
 
 
 _check(Event, 88, [0, 8, 16, 24, 32, 40, 44, 48, 52, 56, 60, 62, 64, 68, 72, 80])
@@ -428,7 +430,7 @@ class Truth(ctypes.Structure):
 
     @staticmethod
     def type_name() -> str:
-        return "masseter/Truth/9779c4cee2a384d0"
+        return "masseter/Truth/3e98544d0721d685"
 
 
 _check(Truth, 248, [0, 8, 16, 24, 32, 40, 64, 96, 144, 192, 240])

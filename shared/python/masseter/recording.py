@@ -34,6 +34,10 @@ class Run:
     state: Messages
     event: Messages
     truth: Messages
+    #: A field for each signal that the controller declared.
+    signal: Messages
+    #: A field for each parameter, with a row at the start and one for each change.
+    parameter: Messages
     #: Whether the whole recording could be read.
     is_whole: bool
     scenario: dict[str, Any]
@@ -72,14 +76,34 @@ def load(folder: str | PathLike[str]) -> Run:
     if not folder.is_dir():
         raise _native.MasseterError(f"{folder} is no run folder: give the folder that 'masseter run' names")
     topics, is_whole = _native.topics(folder / "recording.mcap")
-    arrays = {name: np.frombuffer(data, dtype=np.dtype(_LAYOUTS[name])) for name, data in topics.items()}
+    manifest = json.loads((folder / "manifest.json").read_text())
+    declared = manifest.get("declared", {})
+    layouts = {name: np.dtype(layout) for name, layout in _LAYOUTS.items()}
+    layouts |= {topic: _named(declared.get(f"{topic}s", [])) for topic in ("signal", "parameter")}
+    arrays = {name: np.frombuffer(data, dtype=layouts[name]) for name, data in topics.items()}
     return Run(
         folder=folder,
         is_whole=is_whole,
         scenario=tomllib.loads((folder / "scenario.toml").read_text()),
-        manifest=json.loads((folder / "manifest.json").read_text()),
+        manifest=manifest,
         summary=read_summary(folder),
         **arrays,
+    )
+
+
+def _named(declared: list[dict[str, Any]]) -> np.dtype[Any]:
+    """The layout of a message with a field for each declared name."""
+    before = ["seq", "published_ns", "version", "cycle"]
+    names = [named["name"] for named in declared]
+    # The number of values, a length of CDR, takes eight bytes with what aligns the first of them.
+    offsets = [8 * place for place in range(len(before))] + [8 * (len(before) + 1 + place) for place in range(len(names))]
+    return np.dtype(
+        {
+            "names": before + names,
+            "formats": [np.uint64] * len(before) + [np.float64] * len(names),
+            "offsets": offsets,
+            "itemsize": 8 * (len(before) + 1 + len(names)),
+        }
     )
 
 

@@ -7,16 +7,18 @@ import tempfile
 import threading
 import time
 import uuid
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 from typing import Any, Literal
 
 from masseter import _native
-from masseter.controller import Law, control
+from masseter.controller import Law, Parameter, Signal, check_declaration, control
 from masseter.recording import Run, load, read_summary
 
+#: Time for a rig to stop safely and judge its run, s.
+_END_S = 5.0
 #: Interval of looking whether the rig takes the controller, s.
 _POLL_S = 0.01
 
@@ -56,16 +58,19 @@ def run(
     clock: Literal["virtual", "lockstep", "rt"] = "lockstep",
     out: str | PathLike[str] | None = None,
     arguments: Sequence[str] = (),
+    signals: Sequence[Signal] = (),
+    parameters: Sequence[Parameter] = (),
 ) -> Result:
     """Plays a scenario and judges it.
 
     controller: a pose law in Python, "motion" or "hold", or the path of a program. A pose law runs in lockstep under the clock
     "virtual" too: the bytes are the same. out: the run folder, which must not exist; a temporary folder by default. arguments:
-    more of 'masseter run', such as ["--duration", "2"].
+    more of 'masseter run', such as ["--duration", "2"]. signals, parameters: what a pose law declares.
 
     Raises MasseterError with the message of the rig where no run was made; what the law raises is raised again. The command is
     that of the variable MASSETER, or masseter on the PATH.
     """
+    check_declaration(signals, parameters)
     folder = Path(out) if out is not None else Path(tempfile.mkdtemp(prefix="masseter-")) / "run"
     law = controller if callable(controller) else None
     name = f"python-{uuid.uuid4().hex[:12]}"
@@ -79,9 +84,11 @@ def run(
     output = _Output(rig)
     try:
         if law:
-            _control(law, name, rig)
+            _control(rig, lambda: control(law, name, signals, parameters))
         output.join()
-    except KeyboardInterrupt:
+    except BaseException as error:
+        # After an exception of the law the rig ends by itself; a rig without a controller would wait for ever.
+        output.join(0.0 if isinstance(error, KeyboardInterrupt) else _END_S)
         rig.terminate()
         raise
     finally:
@@ -114,11 +121,11 @@ class _Output(threading.Thread):
         _, self.error = self._rig.communicate()
 
 
-def _control(law: Law, name: str, rig: "subprocess.Popen[str]") -> None:
+def _control(rig: "subprocess.Popen[str]", control: Callable[[], bool]) -> None:
     """Controls the rig once it takes a controller; returns if it ends before."""
     while rig.poll() is None:
         try:
-            control(law, name)
+            control()
             return
         except _native.MasseterError as error:
             if "takes a controller" not in str(error):

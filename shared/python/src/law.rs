@@ -9,8 +9,10 @@ use masseter_shared::control::Outcome;
 use masseter_shared::geometry;
 use masseter_shared::lifecycle::attach::attach;
 use masseter_shared::messages::pose_fields;
+use masseter_shared::named::{Declared, Parameter, Signal};
 use nalgebra::{Quaternion, Translation3, Unit};
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 
 use crate::failed;
 
@@ -66,11 +68,13 @@ pub(crate) struct Demand {
     desired: Pose,
     estimated: Option<Pose>,
     ahead: Pose,
+    parameters: Py<PyDict>,
+    signals: Py<PyDict>,
 }
 
-impl From<&RigDemand> for Demand {
-    fn from(demand: &RigDemand) -> Self {
-        Self {
+impl PythonLaw {
+    fn demand(&self, py: Python<'_>, demand: &RigDemand) -> Demand {
+        Demand {
             cycle: demand.cycle,
             period_s: demand.period_s,
             motion_time_s: demand.motion_time_s,
@@ -78,6 +82,8 @@ impl From<&RigDemand> for Demand {
             desired: (&demand.desired).into(),
             estimated: demand.estimated.as_ref().map(Pose::from),
             ahead: (&demand.ahead).into(),
+            parameters: self.parameters.clone_ref(py),
+            signals: self.signals.clone_ref(py),
         }
     }
 }
@@ -85,6 +91,11 @@ impl From<&RigDemand> for Demand {
 #[derive(Debug)]
 struct PythonLaw {
     function: Py<PyAny>,
+    declared: Declared,
+    parameters: Py<PyDict>,
+    /// What the law fills.
+    signals: Py<PyDict>,
+    filled: Vec<f64>,
     /// Where the exception goes that ends the motion.
     exception: std::sync::mpsc::Sender<PyErr>,
 }
@@ -92,29 +103,110 @@ struct PythonLaw {
 impl PoseLaw for PythonLaw {
     fn command(&mut self, demand: &RigDemand) -> Result<geometry::Pose, LawFailed> {
         Python::attach(|py| {
+            let demand = self.demand(py, demand);
             let pose: PyResult<Pose> = self
                 .function
-                .call1(py, (Demand::from(demand),))
+                .call1(py, (demand,))
                 .and_then(|pose| pose.extract(py).map_err(|_| failed("the law returned no masseter.Pose")));
-            pose.map(geometry::Pose::from).map_err(|error| {
+            pose.and_then(|pose| self.take_signals(py).map(|()| pose.into())).map_err(|error| {
                 // Nobody waits for it once the caller was interrupted.
                 let _ = self.exception.send(error);
                 LawFailed
             })
         })
     }
+
+    fn declared(&self) -> Declared {
+        self.declared.clone()
+    }
+
+    fn set_parameter(&mut self, place: usize, value: f64) {
+        let name = &self.declared.parameters[place].name;
+        Python::attach(|py| self.parameters.bind(py).set_item(name, value))
+            .expect("a dictionary takes a text");
+    }
+
+    fn fill_signals(&self, signals: &mut [f64]) {
+        signals.copy_from_slice(&self.filled);
+    }
+}
+
+impl PythonLaw {
+    fn new(
+        py: Python<'_>,
+        function: Py<PyAny>,
+        declared: Declared,
+        exception: std::sync::mpsc::Sender<PyErr>,
+    ) -> PyResult<Self> {
+        let (parameters, signals) = (PyDict::new(py), PyDict::new(py));
+        for signal in &declared.signals {
+            signals.set_item(&signal.name, 0.0)?;
+        }
+        let filled = vec![0.0; declared.signals.len()];
+        Ok(Self {
+            function,
+            declared,
+            parameters: parameters.into(),
+            signals: signals.into(),
+            filled,
+            exception,
+        })
+    }
+
+    /// Takes the values that the law has filled.
+    fn take_signals(&mut self, py: Python<'_>) -> PyResult<()> {
+        let signals = self.signals.bind(py);
+        for (filled, signal) in self.filled.iter_mut().zip(&self.declared.signals) {
+            *filled = signals.as_any().get_item(&signal.name)?.extract()?;
+        }
+        if signals.len() > self.filled.len() {
+            return Err(failed(format!("the law fills signals that are not declared: {}", signals.keys())));
+        }
+        Ok(())
+    }
+}
+
+/// Name, unit and meaning.
+pub(crate) type SignalOfPython = (String, String, String);
+/// The same, then the value and its range.
+pub(crate) type ParameterOfPython = (String, String, String, f64, [f64; 2]);
+
+/// Refuses what a recording could not contain.
+#[pyfunction]
+pub(crate) fn check(signals: Vec<SignalOfPython>, parameters: Vec<ParameterOfPython>) -> PyResult<()> {
+    declared(signals, parameters).map(drop)
+}
+
+/// What a program of Python declares.
+pub(crate) fn declared(
+    signals: Vec<SignalOfPython>,
+    parameters: Vec<ParameterOfPython>,
+) -> PyResult<Declared> {
+    let signal = |(name, unit, about)| Signal { name, unit, about };
+    let parameter = |(name, unit, about, value, range)| Parameter { name, unit, about, value, range };
+    let declared = Declared {
+        signals: signals.into_iter().map(signal).collect(),
+        parameters: parameters.into_iter().map(parameter).collect(),
+    };
+    declared.check().map_err(failed)?;
+    Ok(declared)
 }
 
 /// Attaches to a rig and runs its controller with this law. Returns whether the motion was finished; false after a safe stop.
 #[pyfunction]
-#[pyo3(signature = (law, rig=None))]
-pub(crate) fn control(py: Python<'_>, law: Py<PyAny>, rig: Option<String>) -> PyResult<bool> {
+pub(crate) fn control(
+    py: Python<'_>,
+    law: Py<PyAny>,
+    rig: Option<String>,
+    signals: Vec<SignalOfPython>,
+    parameters: Vec<ParameterOfPython>,
+) -> PyResult<bool> {
     let (exception, exceptions) = std::sync::mpsc::channel();
+    let law = PythonLaw::new(py, law, declared(signals, parameters)?, exception)?;
     // A thread of its own: real-time priority and core end with it.
     let running = thread::spawn(move || {
         let context = attach(rig.as_deref()).map_err(|error| error.to_string())?;
-        let law = Box::new(PythonLaw { function: law, exception });
-        run_with_law(context, law).map_err(|error| error.to_string())
+        run_with_law(context, Box::new(law)).map_err(|error| error.to_string())
     });
     while !running.is_finished() {
         py.detach(|| thread::sleep(POLL));

@@ -26,6 +26,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<law::Demand>()?;
     module.add_class::<law::Pose>()?;
     module.add_class::<session::Session>()?;
+    module.add_function(wrap_pyfunction!(law::check, module)?)?;
     module.add_function(wrap_pyfunction!(law::control, module)?)?;
     module.add_function(wrap_pyfunction!(recording::topics, module)?)?;
     Ok(())

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use masseter_recording::{Reader, Recorded};
-use masseter_shared::messages::{Command, Event, Message, Reading, State, Truth};
+use masseter_shared::messages::{Command, Event, Message, Parameters, Reading, Signals, State, Truth};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
@@ -25,7 +25,15 @@ type Topics = BTreeMap<&'static str, Vec<u8>>;
 
 fn read(path: &std::path::Path) -> Result<(Topics, bool), masseter_recording::ReadError> {
     let mut reader = Reader::open(path)?;
-    let names = [Reading::TOPIC, Command::TOPIC, State::TOPIC, Event::TOPIC, Truth::TOPIC];
+    let names = [
+        Reading::TOPIC,
+        Command::TOPIC,
+        State::TOPIC,
+        Event::TOPIC,
+        Truth::TOPIC,
+        Signals::TOPIC,
+        Parameters::TOPIC,
+    ];
     let mut topics: Topics = names.map(|name| (name, Vec::new())).into_iter().collect();
     while let Some(message) = reader.next_message()? {
         let (name, body) = match &message {
@@ -34,6 +42,8 @@ fn read(path: &std::path::Path) -> Result<(Topics, bool), masseter_recording::Re
             Recorded::State(message) => (State::TOPIC, message.body()),
             Recorded::Event(message) => (Event::TOPIC, message.body()),
             Recorded::Truth(message) => (Truth::TOPIC, message.body()),
+            Recorded::Signals(message) => (Signals::TOPIC, message.body()),
+            Recorded::Parameters(message) => (Parameters::TOPIC, message.body()),
             _ => continue,
         };
         topics.entry(name).or_default().extend_from_slice(body);

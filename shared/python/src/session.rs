@@ -6,10 +6,12 @@ use masseter_shared::control::{self, Outcome, Tick, Waited};
 use masseter_shared::lifecycle::ProcessContext;
 use masseter_shared::lifecycle::attach::attach;
 use masseter_shared::messages::{Command, Event, Message, State};
+use masseter_shared::named::Declared;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
 use crate::failed;
+use crate::law::{ParameterOfPython, SignalOfPython, declared};
 
 /// A part in a run. It belongs to the thread that made it.
 #[pyclass(unsendable)]
@@ -18,7 +20,7 @@ pub(crate) struct Session {
 }
 
 enum Stage {
-    Attached(Box<ProcessContext>),
+    Attached(Box<ProcessContext>, Declared),
     Started(Box<control::Session>),
 }
 
@@ -27,16 +29,20 @@ type CycleOfPython<'py> = (u64, u64, Option<Bound<'py, PyBytes>>);
 #[pymethods]
 impl Session {
     #[new]
-    #[pyo3(signature = (rig=None))]
-    fn new(rig: Option<&str>) -> PyResult<Self> {
+    fn new(
+        rig: Option<&str>,
+        signals: Vec<SignalOfPython>,
+        parameters: Vec<ParameterOfPython>,
+    ) -> PyResult<Self> {
+        let declared = declared(signals, parameters)?;
         let context = attach(rig).map_err(failed)?;
-        Ok(Self { stage: Some(Stage::Attached(Box::new(context))) })
+        Ok(Self { stage: Some(Stage::Attached(Box::new(context), declared)) })
     }
 
     fn start(&mut self) -> PyResult<()> {
         match self.stage.take() {
-            Some(Stage::Attached(context)) => {
-                let session = control::Session::start(*context).map_err(failed)?;
+            Some(Stage::Attached(context, declared)) => {
+                let session = control::Session::start(*context, declared).map_err(failed)?;
                 self.stage = Some(Stage::Started(Box::new(session)));
                 Ok(())
             }
@@ -50,7 +56,7 @@ impl Session {
     #[getter]
     fn period_s(&self) -> PyResult<f64> {
         Ok(match self.stage.as_ref().ok_or_else(over)? {
-            Stage::Attached(context) => context.scenario.period_s(),
+            Stage::Attached(context, _) => context.scenario.period_s(),
             Stage::Started(session) => session.context().scenario.period_s(),
         })
     }
@@ -58,7 +64,7 @@ impl Session {
     #[getter]
     fn is_stop_requested(&self) -> bool {
         match &self.stage {
-            Some(Stage::Attached(context)) => context.stop.is_made(),
+            Some(Stage::Attached(context, _)) => context.stop.is_made(),
             Some(Stage::Started(session)) => session.is_stop_requested(),
             None => true,
         }
@@ -75,9 +81,15 @@ impl Session {
         })
     }
 
-    fn publish(&mut self, command: &[u8], state: &[u8]) -> PyResult<()> {
+    fn parameters(&mut self) -> PyResult<Vec<f64>> {
+        Ok(self.started()?.parameters().to_vec())
+    }
+
+    fn publish(&mut self, command: &[u8], state: &[u8], signals: Vec<f64>) -> PyResult<()> {
         let (command, state) = (message::<Command>(command)?, message::<State>(state)?);
-        self.started()?.publish(&command, &state).map_err(failed)
+        let session = self.started()?;
+        session.signals_mut().iter_mut().zip(signals).for_each(|(place, value)| *place = value);
+        session.publish(&command, &state).map_err(failed)
     }
 
     fn publish_event(&mut self, event: &[u8]) -> PyResult<()> {
@@ -99,7 +111,7 @@ impl Session {
     fn started(&mut self) -> PyResult<&mut control::Session> {
         match &mut self.stage {
             Some(Stage::Started(session)) => Ok(session),
-            Some(Stage::Attached(_)) => Err(failed("the session is not started: call start first")),
+            Some(Stage::Attached(..)) => Err(failed("the session is not started: call start first")),
             None => Err(over()),
         }
     }

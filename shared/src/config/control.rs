@@ -122,6 +122,11 @@ pub enum TimingConfig {
 }
 
 impl ControllerConfig {
+    /// The largest integral gain at this rate of cycles, 1/s.
+    pub fn most_integral_gain_per_s(&self, rate_hz: u32) -> f64 {
+        f64::from(rate_hz) / self.lead_cycles
+    }
+
     pub(super) fn validate(&self, rate_hz: u32) -> Result<(), ScenarioError> {
         require_duration(&keyed!("controller", self, start_timeout_s hold_s stop_ramp_s))?;
         require_within(&[("controller.ease_s", self.ease_s, SHORTEST_EASE_S, LONGEST_S)])?;
@@ -136,7 +141,7 @@ impl ControllerConfig {
             );
             return Err(ScenarioError::bad("controller.lead_cycles", &self.lead_cycles, need));
         }
-        let (gain_per_s, most_per_s) = (self.integral_gain_per_s, f64::from(rate_hz) / self.lead_cycles);
+        let (gain_per_s, most_per_s) = (self.integral_gain_per_s, self.most_integral_gain_per_s(rate_hz));
         if gain_per_s > most_per_s {
             let need = format!(
                 "use at most {most_per_s} (rate_hz / lead_cycles): with more, an error is corrected more than once before \

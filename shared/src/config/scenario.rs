@@ -1,5 +1,6 @@
 //! A scenario as a whole: read from TOML, checked, and written back as resolved.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use toml::Table;
@@ -48,6 +49,9 @@ section! {
         pub mechanism: MechanismConfig = MechanismConfig::default(),
         /// The controller.
         pub controller: ControllerConfig = ControllerConfig::default(),
+        /// Values of the controller's parameters at the start, by their names.
+        #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+        pub parameters: BTreeMap<String, f64> = BTreeMap::new(),
         /// The CAN link.
         pub can: CanConfig = CanConfig::default(),
         /// The drives.
@@ -146,13 +150,15 @@ impl Scenario {
     }
 
     /// The scenario with one value changed: `KEY=VALUE`, with the key and the value as in a file. A value that is no TOML is
-    /// text. The value is not checked yet: see [`Self::validate`].
+    /// text. A name that is no key of a scenario is that of a parameter of the controller. The value is not checked yet:
+    /// see [`Self::validate`].
     ///
     /// ```
     /// use masseter_shared::config::Scenario;
     ///
     /// let scenario = Scenario::default().with("controller.integral_gain_per_s=50")?;
     /// assert_eq!(scenario.controller.integral_gain_per_s, 50.0);
+    /// assert_eq!(scenario.with("stiffness=3")?.parameters["stiffness"], 3.0);
     /// # Ok::<(), masseter_shared::config::ScenarioError>(())
     /// ```
     ///
@@ -161,6 +167,9 @@ impl Scenario {
     pub fn with(&self, assignment: &str) -> Result<Self, ScenarioError> {
         let refused = |reason| ScenarioError::Malformed { place: assignment.to_owned(), reason };
         let (key, value) = assignment.split_once('=').ok_or_else(|| refused("write KEY=VALUE".to_owned()))?;
+        if !key.contains('.') && refusal_of(key.trim()).is_some() {
+            return self.with(&format!("parameters.{assignment}"));
+        }
         let as_toml = toml::from_str::<Table>(&format!("{key} = {value}"));
         let as_text = || toml::from_str(&format!("{key} = {}", toml::Value::from(value)));
         let given = as_toml.or_else(|_| as_text()).map_err(|error| refused(error.message().to_owned()))?;
@@ -171,6 +180,19 @@ impl Scenario {
             ScenarioError::Malformed { reason, .. } => refused(reason),
             other => other,
         })
+    }
+
+    /// The question whether a key of a scenario is meant, for a name that is none but like one.
+    ///
+    /// ```
+    /// use masseter_shared::config::Scenario;
+    ///
+    /// assert_eq!(Scenario::question_for("rate_hzz").as_deref(), Some("did you mean 'rate_hz'?"));
+    /// assert_eq!(Scenario::question_for("rate_hz"), None);
+    /// ```
+    pub fn question_for(name: &str) -> Option<String> {
+        let refusal = refusal_of(name)?;
+        refusal.rsplit_once("; ").map(|(_, question)| question.to_owned())
     }
 
     /// The scenario with every default filled in, as TOML.
@@ -220,6 +242,13 @@ impl Scenario {
     pub fn period_s(&self) -> f64 {
         self.period_ns() as f64 / SECOND_NS as f64
     }
+}
+
+/// The message on a key that is none of a scenario.
+fn refusal_of(key: &str) -> Option<String> {
+    let refused = toml::from_str::<Scenario>(&format!("{key} = 0")).err()?;
+    let message = in_words(refused.message());
+    message.starts_with(UNKNOWN_KEY).then_some(message)
 }
 
 /// Replaces the values that are given, and leaves the others of their tables.

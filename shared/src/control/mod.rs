@@ -8,8 +8,9 @@ mod cycle;
 mod session;
 
 use crate::messages::{Command, Event, Reading, State};
+use crate::named::Declared;
 
-pub use cycle::{ControllerPorts, run_cycle};
+pub use cycle::{ControllerPorts, run_cycle, set_parameters};
 pub use session::{Session, SessionError, Waited};
 
 /// A cycle's place in time.
@@ -95,6 +96,17 @@ pub trait Controller {
 
     /// How the controller ended; none while it still has something to do.
     fn outcome(&self) -> Option<Outcome>;
+
+    /// The signals that the controller publishes, and the parameters that its user sets. Called once, before the start.
+    fn declared(&self) -> Declared {
+        Declared::default()
+    }
+
+    /// Takes a parameter's value, which is within its range: before the first cycle, and at the beginning of a cycle.
+    fn set_parameter(&mut self, _place: usize, _value: f64) {}
+
+    /// Writes the declared signals of this cycle.
+    fn fill_signals(&self, _signals: &mut [f64]) {}
 
     /// Does work of the next cycle once in advance and without effect, so that its code and data are in the caches.
     fn warm_up(&self) {}

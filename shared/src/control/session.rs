@@ -2,12 +2,13 @@
 
 use std::time::Duration;
 
-use super::cycle::stamp;
+use super::cycle::{publish_named, set_parameters, stamp};
 use super::{Controller, ControllerPorts, Outcome, Tick, run_cycle};
 use crate::clock;
 use crate::lifecycle::{End, Party, ProcessContext, ProcessError};
 use crate::lockstep::{Clock, Lockstep};
-use crate::messages::{Command, Event, Reading, State};
+use crate::messages::{Command, Event, Parameters, Reading, Signals, State};
+use crate::named::{Declared, NamedValues, access};
 use crate::realtime::{Cycle, Wake};
 use crate::transport::{Publisher, ReceivedMessage, Subscriber, TransportError};
 
@@ -22,8 +23,9 @@ use crate::transport::{Publisher, ReceivedMessage, Subscriber, TransportError};
 /// use masseter_shared::lifecycle::attach::attach;
 /// use masseter_shared::messages::codes::DriveRequest;
 /// use masseter_shared::messages::{Command, State};
+/// use masseter_shared::named::Declared;
 ///
-/// let mut session = Session::start(attach(None)?)?;
+/// let mut session = Session::start(attach(None)?, Declared::default())?;
 /// while !session.is_stop_requested() {
 ///     let Waited::Cycle { tick, reading } = session.wait(None)? else { continue };
 ///     let reading_cycle = reading.map_or(0, |reading| reading.cycle);
@@ -38,6 +40,7 @@ use crate::transport::{Publisher, ReceivedMessage, Subscriber, TransportError};
 pub struct Session {
     context: ProcessContext,
     ports: Ports,
+    named: NamedValues,
     /// The cycle whose turn has not ended.
     cycle: Option<OpenCycle>,
 }
@@ -83,20 +86,28 @@ pub enum SessionError {
 }
 
 impl Session {
-    /// Opens the ports, reports ready, and waits for the start of the run.
+    /// Opens the ports, reports ready, and waits for the start of the run. The signals and parameters are those of the
+    /// controller; the scenario may give the parameters other values.
     ///
     /// # Errors
-    /// [`ProcessError`] when the ports cannot be opened, or the start is cancelled.
-    pub fn start(context: ProcessContext) -> Result<Self, ProcessError> {
-        let ports = Ports::open(&context)?;
-        Ok(Self { context, ports, cycle: None })
+    /// [`ProcessError`] when the ports cannot be opened, the start is cancelled, or the declaration does not fit the
+    /// scenario.
+    pub fn start(context: ProcessContext, declared: Declared) -> Result<Self, ProcessError> {
+        let named = NamedValues::new(declared, &context.scenario.parameters)?;
+        if !named.parameters().is_empty() {
+            access::serve(context.node.domain(), named.settings().clone())
+                .map_err(ProcessError::Parameters)?;
+        }
+        let ports = Ports::open(&context, named.settings().declared())?;
+        Ok(Self { context, ports, named, cycle: None })
     }
 
-    /// Runs a controller until it is done.
+    /// Runs the controller that made the declaration until it is done.
     ///
     /// # Errors
     /// [`ProcessError`] when messages cannot be exchanged.
     pub fn run(mut self, controller: &mut dyn Controller) -> Result<Outcome, ProcessError> {
+        set_parameters(controller, &self.named);
         loop {
             if let Some(outcome) = controller.outcome() {
                 self.finish(outcome)?;
@@ -107,7 +118,7 @@ impl Session {
             }
             self.end_turn(false)?;
             let wake = self.ports.begin_cycle(|| controller.warm_up())?;
-            run_cycle(controller, &mut self.ports, &wake)?;
+            run_cycle(controller, &mut self.named, &mut self.ports, &wake)?;
             self.cycle = Some(OpenCycle { wake, received_ns: 0, is_published: true });
         }
     }
@@ -134,10 +145,23 @@ impl Session {
             return Ok(Waited::TimedOut);
         }
         let wake = self.ports.begin_cycle(|| ())?;
+        if let Some(change) = self.named.take_change() {
+            self.ports.publish_event(&change.event(wake.cycle, self.ports.now_ns()))?;
+        }
         let reading = self.ports.reading(&wake)?.map(|reading| *reading);
         let received_ns = self.ports.now_ns();
         self.cycle = Some(OpenCycle { wake, received_ns, is_published: false });
         Ok(Waited::Cycle { tick: Tick { cycle: wake.cycle, now_ns: received_ns }, reading })
+    }
+
+    /// The parameters in force in this cycle, in the order of their declaration.
+    pub fn parameters(&self) -> &[f64] {
+        self.named.parameters()
+    }
+
+    /// The signals that go out with this cycle's command, in the order of their declaration.
+    pub fn signals_mut(&mut self) -> &mut [f64] {
+        self.named.signals_mut()
     }
 
     /// Publishes this cycle's command and what the program made of the reading. The session enters the time stamps and the
@@ -156,6 +180,8 @@ impl Session {
             *message = *state;
             stamp(message, &wake, [received_ns, commanded_ns, commanded_ns]);
         })?;
+        let tick = Tick { cycle: wake.cycle, now_ns: commanded_ns };
+        publish_named(&mut self.named, None, &mut self.ports, tick)?;
         self.cycle = Some(OpenCycle { wake, received_ns, is_published: true });
         Ok(())
     }
@@ -208,6 +234,10 @@ struct Ports {
     readings: Subscriber<Reading>,
     commands: Publisher<Command>,
     states: Publisher<State>,
+    /// None where no signal is declared.
+    signals: Option<Publisher<Signals>>,
+    /// None where no parameter is declared.
+    parameters: Option<Publisher<Parameters>>,
     events: Publisher<Event>,
     clock: Clock,
     /// From the deadline until the newest reading is used, whichever that is, ns.
@@ -217,22 +247,29 @@ struct Ports {
 impl Ports {
     /// Opens the ports, reports ready, and connects to the ports of the other processes before the first cycle, since a
     /// connection makes and maps files.
-    fn open(context: &ProcessContext) -> Result<Self, ProcessError> {
+    fn open(context: &ProcessContext, declared: &Declared) -> Result<Self, ProcessError> {
         let (node, scenario, schedule) = (&context.node, &context.scenario, &context.schedule);
         let readings = node.newest_subscriber()?;
         let (commands, states) = (node.publisher::<Command>()?, node.publisher::<State>()?);
+        let signals = (!declared.signals.is_empty()).then(|| node.publisher::<Signals>()).transpose()?;
+        let parameters =
+            (!declared.parameters.is_empty()).then(|| node.publisher::<Parameters>()).transpose()?;
         let events = node.publisher::<Event>()?;
         commands.warm_up()?;
         states.warm_up()?;
+        signals.as_ref().map_or(Ok(()), Publisher::warm_up)?;
+        parameters.as_ref().map_or(Ok(()), Publisher::warm_up)?;
         events.warm_up()?;
         let lockstep = context
             .lockstep
             .map(|patience| Lockstep::open(context, patience, Party::Controller, Party::Plant));
         let lockstep = lockstep.transpose()?;
-        let start = context.ready(Some(scenario.realtime.cores[0]))?;
+        let start = context.ready_with(Some(scenario.realtime.cores[0]), declared)?;
         readings.connect()?;
         commands.connect()?;
         states.connect()?;
+        signals.as_ref().map_or(Ok(()), Publisher::connect)?;
+        parameters.as_ref().map_or(Ok(()), Publisher::connect)?;
         events.connect()?;
         let first_due_ns = start.epoch_ns + schedule.controller_at_ns;
         let clock = match lockstep {
@@ -246,6 +283,8 @@ impl Ports {
             readings,
             commands,
             states,
+            signals,
+            parameters,
             events,
             clock,
             reading_timeout_ns: (schedule.command_by_ns - schedule.controller_at_ns) / 2,
@@ -258,7 +297,8 @@ impl Ports {
             Clock::RealTime(cycle) => cycle.wait_warm(|| {
                 warm_up();
                 self.commands.warm_up()?;
-                self.states.warm_up()
+                self.states.warm_up()?;
+                self.signals.as_ref().map_or(Ok(()), Publisher::warm_up)
             }),
             Clock::Lockstep(lockstep) => Ok(lockstep.begin_cycle()),
         }
@@ -318,6 +358,16 @@ impl ControllerPorts for Ports {
 
     fn publish_state(&mut self, fill: impl FnOnce(&mut State)) -> Result<(), ProcessError> {
         Ok(self.states.publish_by(|| self.clock.now_ns(), fill)?)
+    }
+
+    fn publish_signals(&mut self, fill: impl FnOnce(&mut Signals)) -> Result<(), ProcessError> {
+        let Some(signals) = &mut self.signals else { return Ok(()) };
+        Ok(signals.publish_by(|| self.clock.now_ns(), fill)?)
+    }
+
+    fn publish_parameters(&mut self, fill: impl FnOnce(&mut Parameters)) -> Result<(), ProcessError> {
+        let Some(parameters) = &mut self.parameters else { return Ok(()) };
+        Ok(parameters.publish_by(|| self.clock.now_ns(), fill)?)
     }
 
     fn publish_event(&mut self, event: &Event) -> Result<(), ProcessError> {

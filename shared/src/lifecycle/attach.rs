@@ -160,10 +160,11 @@ pub fn socket(domain: &Domain) -> PathBuf {
 /// ```no_run
 /// use masseter_shared::control::Session;
 /// use masseter_shared::lifecycle::attach::attach;
+/// use masseter_shared::named::Declared;
 ///
 /// let context = attach(Some("bench"))?;
 /// println!("{} cycles per second", context.scenario.rate_hz);
-/// let mut session = Session::start(context)?;
+/// let mut session = Session::start(context, Declared::default())?;
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 ///

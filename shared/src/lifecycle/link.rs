@@ -38,9 +38,9 @@ impl SupervisorLink {
         let to_request = stop.clone();
         thread::Builder::new().name("supervisor".to_owned()).spawn(move || {
             for line in input.lines().map_while(Result::ok) {
-                match serde_json::from_str(&line) {
-                    Ok(Order::Start(start)) if sender.send(start).is_ok() => {}
-                    _ => break,
+                let Ok(Order::Start(start)) = serde_json::from_str(&line) else { break };
+                if sender.send(start).is_err() {
+                    break;
                 }
             }
             to_request.make();

@@ -14,6 +14,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use crate::config::{Scenario, ScenarioError};
+use crate::named::{Declared, NameError};
 use crate::realtime::scheduling::{SchedulingRequest, obtain};
 use crate::schedule::{CycleSchedule, ScheduleError};
 use crate::transport::{Domain, DomainError, Node, TransportError};
@@ -75,6 +76,12 @@ pub enum ProcessError {
     /// iceoryx2.
     #[error(transparent)]
     Transport(#[from] TransportError),
+    /// A signal or parameter of the controller, or a value for one.
+    #[error(transparent)]
+    Name(#[from] NameError),
+    /// Other programs cannot reach the controller's parameters.
+    #[error("cannot serve the parameters: {0}")]
+    Parameters(io::Error),
     /// Signals cannot be received.
     #[error("cannot listen for signals: {0}")]
     Signals(io::Error),
@@ -110,6 +117,11 @@ impl ProcessContext {
     /// Reports that the process is ready, and waits for the start; before, requests real-time scheduling on `core`, or none
     /// without a core and in lockstep. The ports are open by then, and none may use another user's memory.
     pub fn ready(&self, core: Option<usize>) -> Result<Start, ProcessError> {
+        self.ready_with(core, &Declared::default())
+    }
+
+    /// The same for a controller with signals and parameters.
+    pub(crate) fn ready_with(&self, core: Option<usize>, declared: &Declared) -> Result<Start, ProcessError> {
         self.node.check_mapped()?;
         let realtime = &self.scenario.realtime;
         let core = core.filter(|_| self.lockstep.is_none());
@@ -118,7 +130,7 @@ impl ProcessContext {
             fifo_priority: core.map(|_| realtime.priority),
             locked_memory: core.is_some() && realtime.lock_memory,
         });
-        self.report(&Report::Ready { scheduling })?;
+        self.report(&Report::Ready { scheduling, declared: declared.clone() })?;
         self.link.await_start().map_err(ProcessError::Supervisor)?.ok_or(ProcessError::NoStart)
     }
 

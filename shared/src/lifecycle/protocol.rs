@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::named::Declared;
 use crate::realtime::scheduling::Obtained;
 
 /// A process of a run.
@@ -46,6 +47,9 @@ pub enum Report {
     Ready {
         /// The requested and the granted scheduling.
         scheduling: Obtained,
+        /// The signals and parameters of a controller.
+        #[serde(default)]
+        declared: Declared,
     },
     /// Another process has stopped answering, in lockstep.
     Silence(Silence),
@@ -69,7 +73,7 @@ pub enum End {
 }
 
 /// A message of the supervisor to a process.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Order {
     /// Start of the first cycle.
@@ -79,12 +83,14 @@ pub enum Order {
 }
 
 /// The start of the first cycle.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Start {
     /// Time of the first SYNC, ns of `CLOCK_MONOTONIC`.
     pub epoch_ns: u64,
     /// Process ids of controller and plant, for the recorder.
     pub loops: [u32; 2],
+    /// The signals and parameters of the controller, for the recorder.
+    pub declared: Declared,
 }
 
 /// A message as its line.

@@ -12,6 +12,7 @@ pub mod codes;
 mod data;
 mod schema;
 pub mod tap;
+mod values;
 mod words;
 
 use std::mem::offset_of;
@@ -25,6 +26,7 @@ use schema::FieldType;
 
 pub use data::CanData;
 pub use schema::Field;
+pub use values::{MOST_VALUES, Values};
 pub use words::explain;
 
 /// The type of the messages of a topic.
@@ -57,7 +59,7 @@ pub trait Message: Pod + ZeroCopySend + Default + std::fmt::Debug + PartialEq {
 }
 
 /// Version of the layouts below; it changes with any of them, and with what a field means.
-pub const LAYOUT_VERSION: u64 = 8;
+pub const LAYOUT_VERSION: u64 = 9;
 
 macro_rules! messages {
     ($($(#[doc = $doc:literal])* $name:ident on $topic:literal keeping $depth:literal as $type_name:tt {
@@ -131,7 +133,7 @@ macro_rules! messages {
 
 messages! {
     /// Targets and request for the drives, once a cycle.
-    Command on "command" keeping 2048 as "masseter/Command/765fe161c86f3ae1" {
+    Command on "command" keeping 2048 as "masseter/Command/afe52f250c742778" {
         /// Cycle of the controller, from 1.
         cycle: u64,
         /// Cycle of the reading it was computed from; 0 when there was none.
@@ -145,7 +147,7 @@ messages! {
     }
 
     /// Positions, forces and states of the drives, once a cycle.
-    Reading on "reading" keeping 2048 as "masseter/Reading/d90fbf69f124d93f" {
+    Reading on "reading" keeping 2048 as "masseter/Reading/d48418c615909bcc" {
         /// Cycle of the plant, from 1.
         cycle: u64,
         /// Cycle of the last command received when the sample was taken; 0 before the first.
@@ -185,7 +187,7 @@ messages! {
     }
 
     /// The controller's state and its estimate, once a cycle.
-    State on "state" keeping 2048 as "masseter/State/f96001ba642535d1" {
+    State on "state" keeping 2048 as "masseter/State/f65ae9b1b72b2a36" {
         /// Cycle of the controller, from 1.
         cycle: u64,
         /// Cycle of the reading it was computed from; 0 when there was none.
@@ -236,8 +238,26 @@ messages! {
         controller_state: u32,
     }
 
+    /// The signals that the controller declares, once a cycle; without any, there is no such message. A recording's
+    /// definition of the message has a field for each signal.
+    Signals on "signal" keeping 2048 as "masseter/Signals/fc61a8b1835c4def" {
+        /// Cycle of the controller, from 1.
+        cycle: u64,
+        /// The signals, in the order of their declaration.
+        signals: Values,
+    }
+
+    /// The parameters that the controller declares, in its first cycle and in each that begins with another value. A
+    /// recording's definition of the message has a field for each parameter.
+    Parameters on "parameter" keeping 256 as "masseter/Parameters/7db697764f780549" {
+        /// Cycle of the controller, from 1.
+        cycle: u64,
+        /// The parameters, in the order of their declaration.
+        parameters: Values,
+    }
+
     /// The true state of the mechanism, once a cycle; the controller never reads it.
-    Truth on "truth" keeping 2048 as "masseter/Truth/9779c4cee2a384d0" {
+    Truth on "truth" keeping 2048 as "masseter/Truth/3e98544d0721d685" {
         /// Cycle of the plant, from 1.
         cycle: u64,
         /// The instant it describes: that of the reading's sample, ns.
@@ -257,7 +277,7 @@ messages! {
     }
 
     /// An observation of a tap on a CAN wire: a frame, or an error message in the coding of `linux/can/error.h`.
-    FrameTap on "frame" keeping 32768 as "masseter/FrameTap/e6f1a78fd6012653" {
+    FrameTap on "frame" keeping 32768 as "masseter/FrameTap/c5f255b8e7a5618e" {
         /// When its last bit was on the wire, ns.
         time_ns: u64,
         /// When its transmitter had it queued, ns; 0 on real wires.
@@ -274,7 +294,7 @@ messages! {
 
     /// Counters of the kernel for the machine and both loops. The recorder reads and records them; the message is not
     /// published.
-    Machine on "machine" keeping 1 as "masseter/Machine/e4a72062f22cdb73" {
+    Machine on "machine" keeping 1 as "masseter/Machine/31d0236cf9dfa05a" {
         /// Time of the sample, ns.
         time_ns: u64,
         /// Time that the hypervisor had taken from all cores together, as far as the hypervisor reports it, ns.
@@ -286,7 +306,7 @@ messages! {
     }
 
     /// A single occurrence: a change of state, a fault, an alarm.
-    Event on "event" keeping 1024 as "masseter/Event/e089476317e241b0" {
+    Event on "event" keeping 1024 as "masseter/Event/4f34a13697c9e73d" {
         /// When, ns.
         time_ns: u64,
         /// Cycle of the process that reports it.
@@ -375,6 +395,8 @@ mod tests {
         check::<Command>();
         check::<Reading>();
         check::<State>();
+        check::<Signals>();
+        check::<Parameters>();
         check::<Truth>();
         check::<FrameTap>();
         check::<Machine>();
@@ -385,7 +407,7 @@ mod tests {
     fn the_hash_covers_version_fields_data_bytes_and_codes() {
         let layout = layout::<FrameTap>();
         for (found, other) in
-            [("v8", "v9"), ("queued_ns", "waiting_ns"), ("[<=64]", "[<=8]"), ("fault=8", "fault=9")]
+            [("v9", "v10"), ("queued_ns", "waiting_ns"), ("[<=64]", "[<=8]"), ("fault=8", "fault=9")]
         {
             let changed = layout.replace(found, other);
             assert_ne!((hash(&layout), &layout), (hash(&changed), &changed));

@@ -69,7 +69,7 @@ impl Node {
         self.domain.check_mapped()
     }
 
-    pub(super) fn domain(&self) -> &Domain {
+    pub(crate) fn domain(&self) -> &Domain {
         &self.domain
     }
 

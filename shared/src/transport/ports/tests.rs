@@ -130,7 +130,7 @@ fn a_message_of_another_version_is_refused() {
     sample.payload_mut().version += 1;
     sample.send().unwrap();
     let error = subscriber.receive().unwrap_err().to_string();
-    assert!(error.contains("IncompatibleVersion(9") && error.contains("another version"), "{error}");
+    assert!(error.contains("IncompatibleVersion(10") && error.contains("another version"), "{error}");
 }
 
 /// Reads like an event, but for the name of its layout.

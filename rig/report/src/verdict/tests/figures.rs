@@ -7,6 +7,7 @@ use masseter_analysis::{
 use masseter_recording::{Damage, MachineInfo};
 use masseter_shared::config::{CpuDmaLatency, FaultConfig, FaultKindConfig, Scenario};
 use masseter_shared::messages::codes::ControllerState;
+use masseter_shared::named::Declared;
 use masseter_shared::realtime::scheduling::{Obtained, SchedulingRequest};
 
 use super::*;
@@ -25,7 +26,7 @@ type Change = fn(&mut Run);
 impl Run {
     fn new() -> Self {
         let scenario = Scenario::default();
-        let mut figures = Analysis::new(&scenario).finish(false, &[]);
+        let mut figures = Analysis::new(&scenario, &Declared::default()).finish(false, &[]);
         figures.final_state = Some(Code::Known(ControllerState::Finished));
         let on_path = PoseErrors { rms_mm: Some(0.05), ..PoseErrors::default() };
         let undisturbed = UndisturbedFigures { samples: 900, actual: on_path, estimated: on_path };

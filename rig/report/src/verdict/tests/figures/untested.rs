@@ -1,6 +1,7 @@
 //! Runs that tested too little: what each form of the report says of them.
 
 use crate::{junit, page, table};
+use masseter_shared::named::Declared;
 
 use super::*;
 
@@ -68,7 +69,7 @@ fn a_run_without_a_cycle_claims_nothing() {
     ];
     for (ending, word, reason) in endings {
         let mut run = Run::new();
-        run.figures = Analysis::new(&run.manifest.scenario).finish(false, &[]);
+        run.figures = Analysis::new(&run.manifest.scenario, &Declared::default()).finish(false, &[]);
         run.manifest.ending = ending;
         let verdict = Verdict::new(&run.manifest, &run.figures);
         assert_eq!((verdict.word, verdict.reason.as_str()), (word, reason));

@@ -1,0 +1,158 @@
+//! The values of a run: signals as the controller fills them, parameters as they are set.
+
+use std::array;
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use super::declaration::{Declared, NameError};
+use crate::messages::codes::{Cause, EventKind, Source};
+use crate::messages::{Event, MOST_VALUES, Values};
+
+/// The parameters as their user wants them. Any thread may set them; the loop that takes them over never waits.
+#[derive(Debug)]
+pub struct Settings {
+    declared: Declared,
+    /// The bits of each value.
+    wanted: [AtomicU64; MOST_VALUES],
+}
+
+impl Settings {
+    fn new(declared: Declared) -> Self {
+        let value = |place: usize| declared.parameters.get(place).map_or(0.0, |parameter| parameter.value);
+        let wanted = array::from_fn(|place| AtomicU64::new(value(place).to_bits()));
+        Self { declared, wanted }
+    }
+
+    /// What the controller declares.
+    pub fn declared(&self) -> &Declared {
+        &self.declared
+    }
+
+    /// The value of a parameter that is set, and takes effect in the next cycle if it has not yet.
+    pub fn value(&self, place: usize) -> f64 {
+        f64::from_bits(self.wanted[place].load(Ordering::Relaxed))
+    }
+
+    /// Sets a parameter.
+    ///
+    /// # Errors
+    /// [`NameError`] for an unknown parameter, or a value beyond its range.
+    pub fn set(&self, name: &str, value: f64) -> Result<(), NameError> {
+        let place = self.declared.place_of(name)?;
+        self.declared.parameters[place].check(value)?;
+        self.wanted[place].store(value.to_bits(), Ordering::Relaxed);
+        Ok(())
+    }
+}
+
+/// A parameter that has a new value.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Change {
+    /// The place of the parameter.
+    pub place: usize,
+    /// Its value before.
+    pub from: f64,
+    /// Its value from now on.
+    pub to: f64,
+}
+
+impl Change {
+    /// The event of the change in this cycle.
+    pub fn event(&self, cycle: u64, time_ns: u64) -> Event {
+        Event {
+            time_ns,
+            cycle,
+            object: self.place as u32,
+            value: self.to,
+            limit: self.from,
+            ..Event::new(Source::Controller, EventKind::Notice, Cause::ParameterSet)
+        }
+    }
+}
+
+/// The values of a controller's signals and parameters in a run.
+#[derive(Debug)]
+pub struct NamedValues {
+    settings: Arc<Settings>,
+    parameters: Values,
+    signals: Values,
+    is_changed: bool,
+}
+
+impl NamedValues {
+    /// The values at the start: the declared ones, or those given for parameters by their names.
+    ///
+    /// # Errors
+    /// [`NameError`] when the declaration cannot be used, or the given values do not fit.
+    pub fn new(declared: Declared, given: &BTreeMap<String, f64>) -> Result<Self, NameError> {
+        let declared = declared.with(given)?;
+        let mut parameters = Values::zeros(declared.parameters.len());
+        let values = declared.parameters.iter().map(|parameter| parameter.value);
+        parameters.as_mut_slice().iter_mut().zip(values).for_each(|(place, value)| *place = value);
+        let signals = Values::zeros(declared.signals.len());
+        let is_changed = !declared.parameters.is_empty();
+        Ok(Self { settings: Arc::new(Settings::new(declared)), parameters, signals, is_changed })
+    }
+
+    /// The parameters as their user wants them.
+    pub fn settings(&self) -> &Arc<Settings> {
+        &self.settings
+    }
+
+    /// The parameters in force.
+    pub fn parameters(&self) -> &[f64] {
+        self.parameters.as_slice()
+    }
+
+    /// The signals, to be filled.
+    pub fn signals_mut(&mut self) -> &mut [f64] {
+        self.signals.as_mut_slice()
+    }
+
+    /// The signals of a cycle, if any are declared.
+    pub fn signals(&self) -> Option<Values> {
+        (self.signals.length > 0).then_some(self.signals)
+    }
+
+    /// Takes over one parameter that is set otherwise than it is in force: at most one a cycle, so that the work of a cycle
+    /// is bounded.
+    pub fn take_change(&mut self) -> Option<Change> {
+        let changed = |(place, value): (usize, &f64)| {
+            let to = self.settings.value(place);
+            (to.to_bits() != value.to_bits()).then_some(Change { place, from: *value, to })
+        };
+        let change = self.parameters.as_slice().iter().enumerate().find_map(changed)?;
+        self.parameters.values[change.place] = change.to;
+        self.is_changed = true;
+        Some(change)
+    }
+
+    /// The parameters, once after the start and once after each change.
+    pub fn take_changed_parameters(&mut self) -> Option<Values> {
+        std::mem::take(&mut self.is_changed).then_some(self.parameters)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::named::Parameter;
+
+    #[test]
+    fn a_cycle_takes_one_change_over() {
+        let parameters = ["a", "b"].map(|name| Parameter { range: [0.0, 9.0], ..Parameter::new(name, 1.0) });
+        let declared = Declared { parameters: parameters.to_vec(), signals: Vec::new() };
+        let mut named = NamedValues::new(declared, &BTreeMap::new()).unwrap();
+        assert_eq!(named.take_changed_parameters().unwrap().as_slice(), [1.0, 1.0]);
+        assert_eq!((named.take_change(), named.take_changed_parameters()), (None, None));
+        let settings = Arc::clone(named.settings());
+        settings.set("b", 5.0).unwrap();
+        settings.set("a", 4.0).unwrap();
+        assert!(settings.set("a", 10.0).is_err() && settings.set("c", 1.0).is_err());
+        assert_eq!(named.take_change(), Some(Change { place: 0, from: 1.0, to: 4.0 }));
+        assert_eq!(named.take_changed_parameters().unwrap().as_slice(), [4.0, 1.0]);
+        assert_eq!(named.take_change(), Some(Change { place: 1, from: 1.0, to: 5.0 }));
+        assert_eq!(named.take_change(), None);
+    }
+}
