@@ -39,8 +39,8 @@ def make(masseter: str, language: str, folder: Path, target: Path) -> str:
     return str(folder / program)
 
 
-def run(masseter: str, program: str, folder: Path, clock: str) -> dict:
-    arguments = ["--quiet", "--duration", "2", "--clock", clock, "--format", "json", "--controller", program]
+def run(masseter: str, program: str, folder: Path, clock: str, *more: str) -> dict:
+    arguments = [*more, "--quiet", "--duration", "2", "--clock", clock, "--format", "json", "--controller", program]
     ended = subprocess.run([masseter, "run", *arguments], cwd=folder, capture_output=True, text=True)
     # The machine may take cycles from a run in real time, which is then not judged.
     allowed = [0, 3] if clock == "rt" else [0]
@@ -52,16 +52,21 @@ def main(masseter: str, target: str) -> None:
     masseter = str(Path(masseter).resolve())
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        digests = {}
+        digests, stiff = {}, {}
         for language in LANGUAGES:
             program = make(masseter, language, folder, Path(target))
             digests[language] = [
                 run(masseter, program, folder, clock)["figures"]["digest"] for clock in ["lockstep", "virtual", "lockstep"]
             ]
             run(masseter, program, folder, "rt")
+            stiff[language] = run(masseter, program, folder, "lockstep", "--set", "gain=20")["figures"]
             print(f"{language}: digest {digests[language][0]}, and a run in real time")
         found = {digest for of_language in digests.values() for digest in of_language}
         assert len(found) == 1, digests
+        # Another gain moves the robot otherwise, in every language alike, and the signal is the same number.
+        assert len({figures["digest"] for figures in stiff.values()} - found) == 1, stiff
+        trims = {figures["signals"][0]["max"] for figures in stiff.values()}
+        assert len(trims) == 1 and 0.001 < trims.pop() < 1.0, stiff
         own = run(masseter, "motion", folder, "lockstep")["figures"]["digest"]
         assert own not in found, "the law of the projects is not the rig's own"
 

@@ -3,48 +3,55 @@
 use std::process::ExitCode;
 
 use masseter_controller::pose_law::{Demand, LawFailed, PoseLaw};
-use masseter_controller::process::run_with_law;
+use masseter_controller::process::{ControllerError, run_with_law};
 use masseter_shared::geometry::{Pose, Vec3};
 use masseter_shared::lifecycle::attach::attach;
+use masseter_shared::named::{Declared, Parameter, Signal};
 
-/// Integral gain, 1/s.
-const GAIN_PER_S: f64 = 5.0;
-/// The most that is added, m.
-const LIMIT_M: f64 = 1e-3;
+const LIMIT_M: f64 = 1e-3; // the most that is added
 
 #[derive(Debug, Default)]
 struct IntegralLaw {
+    gain_per_s: f64,
     trim_m: Vec3,
+    trim_mm: f64,
 }
 
 impl PoseLaw for IntegralLaw {
     fn command(&mut self, demand: &Demand) -> Result<Pose, LawFailed> {
         if let Some(estimated) = &demand.estimated {
             let error_m = demand.desired.translation.vector - estimated.translation.vector;
-            self.trim_m += error_m * (GAIN_PER_S * demand.period_s);
+            self.trim_m += error_m * (self.gain_per_s * demand.period_s);
             let length_m = self.trim_m.dot(&self.trim_m).sqrt();
             if length_m > LIMIT_M {
                 self.trim_m *= LIMIT_M / length_m;
             }
+            self.trim_mm = 1e3 * length_m;
         }
         let mut pose = demand.ahead;
         pose.translation.vector += self.trim_m;
         Ok(pose)
     }
-}
 
-fn main() -> ExitCode {
-    let context = match attach(None) {
-        Ok(context) => context,
-        Err(error) => return failed(&error),
-    };
-    match run_with_law(context, Box::new(IntegralLaw::default())) {
-        Ok(_) => ExitCode::SUCCESS,
-        Err(error) => failed(&error),
+    fn declared(&self) -> Declared {
+        let gain = Parameter { unit: "1/s".into(), range: [0.0, 100.0], ..Parameter::new("gain", 5.0) };
+        let about = "Length of the correction.".into();
+        let trim = Signal { name: "trim".into(), unit: "mm".into(), about };
+        Declared { signals: vec![trim], parameters: vec![gain] }
+    }
+
+    fn set_parameter(&mut self, _place: usize, value: f64) {
+        self.gain_per_s = value;
+    }
+
+    fn fill_signals(&self, signals: &mut [f64]) {
+        signals[0] = self.trim_mm;
     }
 }
 
-fn failed(error: &dyn std::error::Error) -> ExitCode {
-    eprintln!("my_controller: {error}");
-    ExitCode::FAILURE
+fn main() -> ExitCode {
+    let attached = attach(None).map_err(ControllerError::from);
+    let ran = attached.and_then(|context| run_with_law(context, Box::new(IntegralLaw::default())));
+    let report = |error| eprintln!("my_controller: {error}");
+    ran.map_err(report).map_or(ExitCode::FAILURE, |_| ExitCode::SUCCESS)
 }
