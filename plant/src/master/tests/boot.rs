@@ -74,7 +74,7 @@ fn one_request_a_bus_and_cycle_and_none_beside_process_data() {
 #[test]
 fn a_drive_that_is_not_as_expected_is_named_and_no_drive_is_enabled() {
     type Change = fn(&mut Peer);
-    let table: [(Change, Cause, u32); 12] = [
+    let table: [(Change, Cause, u32); 14] = [
         (|drive| drop(drive.objects.insert((0x6064, 0), vec![0; 5])), Cause::SdoAborted, 0x60_6400),
         (|drive| drop(drive.objects.insert((0x1000, 0), vec![0; 4])), Cause::WrongIdentity, 0x10_0000),
         (|drive| drop(drive.objects.insert((0x1018, 2), vec![9, 9, 0, 0])), Cause::WrongIdentity, 0x10_1802),
@@ -87,6 +87,9 @@ fn a_drive_that_is_not_as_expected_is_named_and_no_drive_is_enabled() {
         (|drive| drop(drive.objects.insert((0x1400, 2), vec![255])), Cause::WrongPdo, 0x14_0002),
         (|drive| drop(drive.objects.remove(&(0x6064, 0))), Cause::SdoAborted, 0x60_6400),
         (|drive| drive.refuses = Some(((0x6007, 0), AbortCode::READ_ONLY)), Cause::SdoAborted, 0x60_0700),
+        // Only an object that a drive does not have may be left out.
+        (|drive| drive.refuses = Some(((0x607C, 0), AbortCode::GENERAL)), Cause::SdoAborted, 0x60_7C00),
+        (|drive| drive.refuses = Some(((0x1801, 1), AbortCode::GENERAL)), Cause::SdoAborted, 0x18_0101),
         (|drive| drive.get_stuck_in(DriveState::QuickStopActive), Cause::StillPowered, 0x60_4100),
         (
             |drive| drop(drive.objects.insert((0x607C, 0), vec![0x10, 0x27, 0, 0])),

@@ -35,7 +35,7 @@ pub(super) struct Peer {
     pub(super) servers: usize,
     /// Position that another drive of its id reports, increments.
     pub(super) twin_position: Option<i32>,
-    /// An object that it refuses to have written.
+    /// An object that it refuses to have read or written.
     pub(super) refuses: Option<((u16, u8), AbortCode)>,
     /// SDO requests received, each with its time.
     pub(super) requests: Vec<(u64, SdoRequest)>,
@@ -207,6 +207,9 @@ impl Peer {
     }
 
     fn read(&mut self, object: ObjectAddress) -> SdoResponse {
+        if let Some(refusal) = self.refusal(object) {
+            return refusal;
+        }
         let statusword = Statusword::for_state(self.power).0.to_le_bytes().to_vec();
         let value = match (object.index, object.subindex) {
             (0x6041, 0) => Some(&statusword),
@@ -223,10 +226,15 @@ impl Peer {
         }
     }
 
+    fn refusal(&self, object: ObjectAddress) -> Option<SdoResponse> {
+        let is_refused = |(refused, _): &((u16, u8), AbortCode)| *refused == (object.index, object.subindex);
+        self.refuses.filter(is_refused).map(|(_, code)| SdoResponse::Abort { object, code })
+    }
+
     fn write(&mut self, object: ObjectAddress, data: &[u8]) -> SdoResponse {
         let address = (object.index, object.subindex);
-        if let Some((_, code)) = self.refuses.filter(|(refused, _)| *refused == address) {
-            return SdoResponse::Abort { object, code };
+        if let Some(refusal) = self.refusal(object) {
+            return refusal;
         }
         let is_powered = self.power.is_powered();
         let stops = matches!(address, (0x605A | 0x6040, 0));

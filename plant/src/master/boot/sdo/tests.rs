@@ -86,4 +86,8 @@ fn answers_without_a_request_change_nothing() {
         assert_eq!(client.take(foreign), None);
         assert_eq!(client, before);
     }
+    let mut client = writing(NAME, &[50, 0]);
+    client.poll(0);
+    let before = client;
+    assert_eq!((client.take(answer), client), (None, before), "another object was written");
 }
