@@ -155,8 +155,10 @@ pub(super) fn signals(scenario: &Scenario, figures: &Figures) -> Vec<(String, Op
         }
     }
     let drawn = |(number, (unit, lines)): (usize, (&str, Vec<Line>))| {
-        let axis = linear(if unit.is_empty() { "signals without unit" } else { unit });
-        (format!("signals-{number}"), chart_over_time(scenario, figures, axis, lines, Vec::new()))
+        // A chart of one line has no legend.
+        let name = if let [only] = &lines[..] { &*only.name } else { "signals" };
+        let label = if unit.is_empty() { name.to_owned() } else { format!("{name}, {unit}") };
+        (format!("signals-{number}"), chart_over_time(scenario, figures, linear(&label), lines, Vec::new()))
     };
     charts.into_iter().enumerate().map(drawn).collect()
 }
