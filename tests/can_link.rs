@@ -88,7 +88,7 @@ fn every_fault_of_a_bus_is_borne_or_stops_the_rig_safely_with_its_cause() {
         ("corrupt", now_and_then, None),
         ("lose", now_and_then, None),
         ("duplicate", now_and_then, None),
-        ("delay", "delay_us = 300\nprobability = 0.01", None),
+        ("delay", "size = \"300 us\"\nprobability = 0.01", None),
         ("babble", "node = 2", Some("process_data_lost")),
         ("disconnect", "node = 2", Some("process_data_lost")),
         ("bus_off", "node = 2", Some("process_data_lost")),

@@ -71,18 +71,8 @@ fn boot_messages(nodes: &[u8]) -> Vec<(u8, u8, u16)> {
 }
 
 fn fault(kind: FaultKindConfig, bus: usize, node: u8, id: Option<u16>) -> FaultConfig {
-    let delay_us = (kind == FaultKindConfig::Delay).then_some(1500);
-    FaultConfig {
-        kind,
-        bus,
-        from_s: 0.0,
-        until_s: None,
-        node: Some(node),
-        id,
-        probability: 1.0,
-        count: None,
-        delay_us,
-    }
+    let size = (kind == FaultKindConfig::Delay).then(|| "1500 us".parse().expect("a time"));
+    FaultConfig { bus: Some(bus), node: Some(node), id, size, ..FaultConfig::new(kind) }
 }
 
 /// Every fault of a bus, without its time.
@@ -115,7 +105,7 @@ fn or_none(value: Option<impl Display>) -> String {
 /// than with a pass or a safe stop.
 fn row(fault: &FaultConfig, cycles: u32, from_s: f64) -> (String, bool) {
     let until_s = Some(from_s + f64::from(cycles) * 1e-3);
-    let faults = vec![FaultConfig { from_s, until_s, ..*fault }];
+    let faults = vec![FaultConfig { from_s: Some(from_s), until_s, ..fault.clone() }];
     let scenario = Scenario { duration_s: Some(4.0), faults, ..Scenario::default() };
     let workspace = Workspace::new(&scenario.to_toml());
     workspace.run_virtual(&["--quiet"]);
@@ -129,7 +119,7 @@ fn row(fault: &FaultConfig, cycles: u32, from_s: f64) -> (String, bool) {
     let row = format!(
         "{},{},{},{},{cycles},{from_s},{mm:.4},{deg:.4},{},{},{verdict}\n",
         fault.kind,
-        fault.bus,
+        or_none(fault.bus),
         or_none(fault.node),
         or_none(fault.id.map(|id| format!("{id:03X}h"))),
         detection["cause"].as_str().unwrap_or_default(),

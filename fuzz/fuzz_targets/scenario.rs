@@ -74,15 +74,15 @@ fn any_kind(bytes: &mut Unstructured<'_>) -> Result<Scenario> {
         _ => MotionConfig::Lateral(LateralConfig::default()),
     };
     let fault = FaultConfig {
-        kind: FaultKindConfig::Delay,
-        bus: 0,
-        from_s: 1.0,
+        bus: Some(0),
+        from_s: Some(1.0),
         until_s: Some(2.0),
         node: Some(1),
         id: Some(0x181),
         probability: 0.5,
         count: Some(3),
-        delay_us: Some(100),
+        size: Some("100 us".parse().expect("a time")),
+        ..FaultConfig::new(FaultKindConfig::Delay)
     };
     let faults = if bytes.arbitrary()? { vec![fault] } else { Vec::new() };
     let duration_s = bytes.arbitrary::<bool>()?.then_some(3.0);

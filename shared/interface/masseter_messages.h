@@ -7,7 +7,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#define MASSETER_LAYOUT_VERSION 9u
+#define MASSETER_LAYOUT_VERSION 10u
 /* masseter_event.axis when no axis is concerned. */
 #define MASSETER_NO_AXIS 4294967295u
 /* masseter_reading.drive_state of a drive not heard of yet, or lost. */
@@ -69,6 +69,8 @@ enum masseter_source {
     MASSETER_SOURCE_DRIVE = 3,
     /* A simulated wire, or the faults of a real one. */
     MASSETER_SOURCE_WIRE = 5,
+    /* The scenario: its faults and stimuli. */
+    MASSETER_SOURCE_SCENARIO = 6,
 };
 
 enum masseter_event_kind {
@@ -171,6 +173,10 @@ enum masseter_cause {
     MASSETER_CAUSE_LAW_FAILED = 49,
     /* A parameter of the controller was set (new value; the limit is the value before). The object is its place. */
     MASSETER_CAUSE_PARAMETER_SET = 50,
+    /* A stimulus of the scenario began (number in its list, from 1). */
+    MASSETER_CAUSE_STIMULUS_BEGAN = 51,
+    /* A stimulus of the scenario is over (number in its list, from 1). */
+    MASSETER_CAUSE_STIMULUS_ENDED = 52,
 };
 
 enum masseter_no_pose {
@@ -191,7 +197,7 @@ enum masseter_no_pose {
 };
 
 #define MASSETER_READING_TOPIC "reading"
-#define MASSETER_READING_TYPE_NAME "masseter/Reading/d48418c615909bcc"
+#define MASSETER_READING_TYPE_NAME "masseter/Reading/bb2f589d33e3a1bb"
 
 /* Positions, forces and states of the drives, once a cycle. */
 typedef struct masseter_reading {
@@ -263,7 +269,7 @@ static_assert(offsetof(masseter_reading, fresh_axes) == 248, "offset of fresh_ax
 static_assert(offsetof(masseter_reading, master_fault) == 252, "offset of master_fault");
 
 #define MASSETER_COMMAND_TOPIC "command"
-#define MASSETER_COMMAND_TYPE_NAME "masseter/Command/afe52f250c742778"
+#define MASSETER_COMMAND_TYPE_NAME "masseter/Command/767c9c9017684645"
 
 /* Targets and request for the drives, once a cycle. */
 typedef struct masseter_command {
@@ -296,7 +302,7 @@ static_assert(offsetof(masseter_command, request) == 88, "offset of request");
 static_assert(offsetof(masseter_command, controller_state) == 92, "offset of controller_state");
 
 #define MASSETER_STATE_TOPIC "state"
-#define MASSETER_STATE_TYPE_NAME "masseter/State/f65ae9b1b72b2a36"
+#define MASSETER_STATE_TYPE_NAME "masseter/State/f421712d5da92ad3"
 
 /* The controller's state and its estimate, once a cycle. */
 typedef struct masseter_state {
@@ -383,7 +389,7 @@ static_assert(offsetof(masseter_state, iterations) == 288, "offset of iterations
 static_assert(offsetof(masseter_state, controller_state) == 292, "offset of controller_state");
 
 #define MASSETER_EVENT_TOPIC "event"
-#define MASSETER_EVENT_TYPE_NAME "masseter/Event/4f34a13697c9e73d"
+#define MASSETER_EVENT_TYPE_NAME "masseter/Event/cc6511c727ba4a8c"
 
 /* A single occurrence: a change of state, a fault, an alarm. */
 typedef struct masseter_event {
@@ -440,7 +446,7 @@ static_assert(offsetof(masseter_event, value) == 72, "offset of value");
 static_assert(offsetof(masseter_event, limit) == 80, "offset of limit");
 
 #define MASSETER_TRUTH_TOPIC "truth"
-#define MASSETER_TRUTH_TYPE_NAME "masseter/Truth/3e98544d0721d685"
+#define MASSETER_TRUTH_TYPE_NAME "masseter/Truth/c6324a5cf49e118a"
 
 /* The true state of the mechanism, once a cycle; the controller never reads it. */
 typedef struct masseter_truth {

@@ -7,6 +7,7 @@ pub mod clock;
 pub mod config;
 pub mod control;
 pub mod geometry;
+pub mod injection;
 pub mod input;
 pub mod lifecycle;
 pub mod lockstep;

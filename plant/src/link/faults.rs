@@ -32,7 +32,7 @@ pub(crate) fn faults_of_bus(
     nodes: &[NodeId],
     now_ns: u64,
 ) -> Result<Vec<Fault>, PlantError> {
-    let of_bus = list.iter().enumerate().filter(|(_, config)| config.bus == bus);
+    let of_bus = list.iter().enumerate().filter(|(_, config)| config.bus == Some(bus));
     of_bus.map(|(number, config)| Ok(fault(number, config, port_of(config, nodes)?, now_ns))).collect()
 }
 
@@ -41,7 +41,7 @@ fn fault(number: usize, config: &FaultConfig, port: Option<usize>, now_ns: u64) 
     Fault {
         number,
         kind: kind(config),
-        from_ns: at_ns(config.from_s),
+        from_ns: config.from_s.map_or(u64::MAX, at_ns),
         until_ns: config.until_s.map_or(u64::MAX, at_ns),
         id: config.id.filter(|_| config.kind != FaultKindConfig::Babble).map(standard),
         port,
@@ -53,9 +53,8 @@ fn fault(number: usize, config: &FaultConfig, port: Option<usize>, now_ns: u64) 
 fn kind(config: &FaultConfig) -> FaultKind {
     match config.kind {
         FaultKindConfig::Corrupt => FaultKind::Corrupt,
-        FaultKindConfig::Lose => FaultKind::Lose,
         FaultKindConfig::Delay => {
-            FaultKind::Delay { by_ns: u64::from(config.delay_us.unwrap_or_default()) * 1000 }
+            FaultKind::Delay { by_ns: (config.size_si() * SECOND_NS as f64).round() as u64 }
         }
         FaultKindConfig::Duplicate => FaultKind::Duplicate,
         FaultKindConfig::Babble => {
@@ -63,6 +62,8 @@ fn kind(config: &FaultConfig) -> FaultKind {
         }
         FaultKindConfig::Disconnect => FaultKind::Disconnect,
         FaultKindConfig::BusOff => FaultKind::BusOff,
+        // The other kinds have no bus.
+        _ => FaultKind::Lose,
     }
 }
 
@@ -76,6 +77,6 @@ fn port_of(config: &FaultConfig, nodes: &[NodeId]) -> Result<Option<usize>, Plan
         return Ok(Some(port));
     }
     let present = nodes.iter().map(|id| id.get().to_string()).collect::<Vec<_>>().join(", ");
-    let bus = config.bus;
+    let bus = config.bus.unwrap_or_default();
     Err(PlantError::Scenario(format!("faults.node = {node}: bus {bus} has the nodes {present}")))
 }

@@ -190,15 +190,11 @@ mod tests {
 
     fn fault() -> FaultConfig {
         FaultConfig {
-            kind: FaultKindConfig::Lose,
-            bus: 1,
-            from_s: 2.5,
-            until_s: None,
+            bus: Some(1),
+            from_s: Some(2.5),
             node: Some(4),
             id: Some(0x204),
-            probability: 1.0,
-            count: None,
-            delay_us: None,
+            ..FaultConfig::new(FaultKindConfig::Lose)
         }
     }
 

@@ -7,7 +7,7 @@ numpy.dtype(Reading) is the NumPy type of a message.
 import ctypes
 import enum
 
-LAYOUT_VERSION = 9
+LAYOUT_VERSION = 10
 #: Event.axis when no axis is concerned.
 NO_AXIS = 4294967295
 #: Reading.drive_state of a drive not heard of yet, or lost.
@@ -76,6 +76,8 @@ class Source(enum.IntEnum):
     DRIVE = 3
     #: A simulated wire, or the faults of a real one.
     WIRE = 5
+    #: The scenario: its faults and stimuli.
+    SCENARIO = 6
 
 
 class EventKind(enum.IntEnum):
@@ -178,6 +180,10 @@ class Cause(enum.IntEnum):
     LAW_FAILED = 49
     #: A parameter of the controller was set (new value; the limit is the value before). The object is its place.
     PARAMETER_SET = 50
+    #: A stimulus of the scenario began (number in its list, from 1).
+    STIMULUS_BEGAN = 51
+    #: A stimulus of the scenario is over (number in its list, from 1).
+    STIMULUS_ENDED = 52
 
 
 class NoPose(enum.IntEnum):
@@ -248,7 +254,7 @@ class Reading(ctypes.Structure):
 
     @staticmethod
     def type_name() -> str:
-        return "masseter/Reading/d48418c615909bcc"
+        return "masseter/Reading/bb2f589d33e3a1bb"
 
 
 _check(Reading, 256, [0, 8, 16, 24, 32, 40, 48, 56, 64, 72, 80, 88, 96, 104, 112, 120, 128, 176, 224, 248, 252])
@@ -279,7 +285,7 @@ class Command(ctypes.Structure):
 
     @staticmethod
     def type_name() -> str:
-        return "masseter/Command/afe52f250c742778"
+        return "masseter/Command/767c9c9017684645"
 
 
 _check(Command, 96, [0, 8, 16, 24, 32, 40, 88, 92])
@@ -346,7 +352,7 @@ class State(ctypes.Structure):
 
     @staticmethod
     def type_name() -> str:
-        return "masseter/State/f65ae9b1b72b2a36"
+        return "masseter/State/f421712d5da92ad3"
 
 
 _check(State, 296, [0, 8, 16, 24, 32, 40, 48, 56, 64, 72, 80, 88, 96, 104, 112, 120, 128, 136, 160, 192, 216, 248, 272, 280, 288, 292])
@@ -393,7 +399,7 @@ class Event(ctypes.Structure):
 
     @staticmethod
     def type_name() -> str:
-        return "masseter/Event/4f34a13697c9e73d"
+        return "masseter/Event/cc6511c727ba4a8c"
 
 
 _check(Event, 88, [0, 8, 16, 24, 32, 40, 44, 48, 52, 56, 60, 62, 64, 68, 72, 80])
@@ -430,7 +436,7 @@ class Truth(ctypes.Structure):
 
     @staticmethod
     def type_name() -> str:
-        return "masseter/Truth/3e98544d0721d685"
+        return "masseter/Truth/c6324a5cf49e118a"
 
 
 _check(Truth, 248, [0, 8, 16, 24, 32, 40, 64, 96, 144, 192, 240])

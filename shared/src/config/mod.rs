@@ -18,7 +18,11 @@ mod jaw;
 mod limits;
 mod motion;
 mod need;
+mod quantity;
+mod requirements;
 mod scenario;
+mod stimuli;
+mod when;
 
 pub use can::{CanConfig, IdentityConfig, MASTER_NODE};
 pub use control::{
@@ -27,10 +31,14 @@ pub use control::{
 pub use drives::{DriveConfig, DrivesConfig};
 pub use dynamics::DynamicsConfig;
 pub use error::ScenarioError;
-pub use faults::{FaultConfig, FaultKindConfig};
+pub use faults::{FaultConfig, FaultKindConfig, FaultLayer, FaultPlace, FaultSize};
 pub use food::FoodConfig;
 pub use jaw::JawConfig;
 pub use limits::TrajectoryLimitsConfig;
 pub use motion::*;
+pub use quantity::{Dimension, Quantity, QuantityError, UNITS, Unit};
+pub use requirements::{During, ExpectConfig, ExpectedVerdict, RequirementConfig, Statistic, TimeWindow};
 pub(crate) use scenario::RATES_HZ;
 pub use scenario::Scenario;
+pub use stimuli::{Shape, StimulusConfig};
+pub use when::{Start, When};

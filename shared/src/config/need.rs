@@ -50,3 +50,20 @@ fn require(
         None => Ok(()),
     }
 }
+
+/// Refuses a name that cannot be a part of a signal's.
+pub(super) fn require_name(key: &'static str, name: &str) -> Result<(), ScenarioError> {
+    let is_good = |byte: u8| byte.is_ascii_lowercase() || byte.is_ascii_digit() || byte == b'_';
+    if !name.is_empty() && name.len() <= 64 && name.bytes().all(is_good) {
+        return Ok(());
+    }
+    Err(ScenarioError::bad(key, &format!("'{name}'"), "use 1 to 64 lower-case letters, digits or '_'"))
+}
+
+/// Refuses a text that no report can show in a line.
+pub(super) fn require_text(key: &'static str, text: &str) -> Result<(), ScenarioError> {
+    if !text.trim().is_empty() && text.chars().count() <= 120 && !text.chars().any(char::is_control) {
+        return Ok(());
+    }
+    Err(ScenarioError::bad(key, &format!("'{text}'"), "use 1 to 120 characters in one line"))
+}

@@ -9,8 +9,9 @@ use super::document::{Document, place};
 use super::error::ScenarioError;
 use super::need::{LONGEST_S, SHORTEST_MOTION_S, require_within};
 use super::{
-    CanConfig, ChecksConfig, ControllerConfig, DrivesConfig, DynamicsConfig, FaultConfig, FoodConfig,
-    JawConfig, MotionConfig, RealtimeConfig, TrajectoryLimitsConfig,
+    CanConfig, ChecksConfig, ControllerConfig, DrivesConfig, DynamicsConfig, ExpectConfig, FaultConfig,
+    FoodConfig, JawConfig, MotionConfig, RealtimeConfig, RequirementConfig, StimulusConfig,
+    TrajectoryLimitsConfig,
 };
 use crate::clock::SECOND_NS;
 use crate::geometry::MechanismConfig;
@@ -64,9 +65,17 @@ section! {
         pub realtime: RealtimeConfig = RealtimeConfig::default(),
         /// The limits beyond which the run fails.
         pub checks: ChecksConfig = ChecksConfig::default(),
-        /// Faults on the buses.
+        /// Faults of every layer.
         #[serde(skip_serializing_if = "Vec::is_empty")]
         pub faults: Vec<FaultConfig> = Vec::new(),
+        /// What happens during the motion.
+        #[serde(skip_serializing_if = "Vec::is_empty")]
+        pub stimulus: Vec<StimulusConfig> = Vec::new(),
+        /// What must hold.
+        #[serde(skip_serializing_if = "Vec::is_empty")]
+        pub require: Vec<RequirementConfig> = Vec::new(),
+        /// The expected outcome; that every check passes when absent.
+        pub expect: Option<ExpectConfig> = None,
     }
 }
 
@@ -143,7 +152,8 @@ impl Scenario {
             Some(ScenarioError::Malformed { place, reason })
         };
         let scenario: Self = toml::from_str(text).map_err(|error| {
-            let every_table = Self { food: Some(FoodConfig::default()), ..Self::default() };
+            let (food, expect) = (Some(FoodConfig::default()), Some(ExpectConfig::default()));
+            let every_table = Self { food, expect, ..Self::default() };
             unnamed(&every_table).unwrap_or_else(|| malformed(path, text, Some(&document), &error))
         })?;
         unnamed(&scenario).map_or(Ok(scenario), Err)
@@ -222,8 +232,13 @@ impl Scenario {
         self.drives.validate()?;
         self.dynamics.validate()?;
         for (number, fault) in self.faults.iter().enumerate() {
-            let checked = fault.validate(&self.can);
-            checked.map_err(|error| error.of_entry(number))?;
+            fault.validate(self).map_err(|error| error.of_entry(number))?;
+        }
+        for (number, stimulus) in self.stimulus.iter().enumerate() {
+            stimulus.validate(self).map_err(|error| error.of_entry(number))?;
+        }
+        for (number, requirement) in self.require.iter().enumerate() {
+            requirement.validate().map_err(|error| error.of_entry(number))?;
         }
         if let Some(food) = &self.food {
             food.validate()?;
@@ -231,6 +246,16 @@ impl Scenario {
         self.limits.validate()?;
         self.controller.validate(self.rate_hz)?;
         self.checks.validate()
+    }
+
+    /// The names of the faults, in their order.
+    pub fn fault_names(&self) -> Vec<&str> {
+        self.faults.iter().map(FaultConfig::name).collect()
+    }
+
+    /// The names of the stimuli, in their order.
+    pub fn stimulus_names(&self) -> Vec<&str> {
+        self.stimulus.iter().map(StimulusConfig::name).collect()
     }
 
     /// Duration of a cycle, ns.

@@ -61,6 +61,8 @@ codes! {
         Drive = 3 "drive",
         /// A simulated wire, or the faults of a real one.
         Wire = 5 "wire",
+        /// The scenario: its faults and stimuli.
+        Scenario = 6 "scenario",
     }
 
     /// What kind of event it is.
@@ -183,6 +185,10 @@ codes! {
         LawFailed = 49 "law_failed",
         /// A parameter of the controller was set (new value; the limit is the value before). The object is its place.
         ParameterSet = 50 "parameter_set",
+        /// A stimulus of the scenario began (number in its list, from 1).
+        StimulusBegan = 51 "stimulus_began",
+        /// A stimulus of the scenario is over (number in its list, from 1).
+        StimulusEnded = 52 "stimulus_ended",
     }
 }
 
@@ -224,7 +230,7 @@ mod tests {
         }
         assert_eq!(numbers(ControllerState::code).len(), ControllerState::ALL.len());
         assert_eq!(numbers(BootPhase::code).len(), BootPhase::ALL.len());
-        assert_eq!(numbers(Source::code), [1, 2, 3, 5]);
+        assert_eq!(numbers(Source::code), [1, 2, 3, 5, 6]);
         assert_eq!(numbers(EventKind::code).len(), EventKind::ALL.len());
         assert_eq!(numbers(NoPose::code).len(), NoPose::ALL.len());
         assert_eq!(numbers(Cause::code).len(), Cause::ALL.len());

@@ -7,17 +7,8 @@ use masseter_shared::messages::codes::NO_AXIS;
 
 use super::*;
 
-const BASE: FaultConfig = FaultConfig {
-    kind: FaultKindConfig::Corrupt,
-    bus: 0,
-    from_s: 0.5,
-    until_s: None,
-    node: None,
-    id: None,
-    probability: 1.0,
-    count: None,
-    delay_us: None,
-};
+const BASE: FaultConfig =
+    FaultConfig { bus: Some(0), from_s: Some(0.5), ..FaultConfig::new(FaultKindConfig::Corrupt) };
 
 fn bench_with(fault: FaultConfig) -> Bench {
     Bench::new(&Scenario { faults: vec![fault], ..Scenario::default() })
@@ -49,7 +40,7 @@ fn with_one_frame_in_a_hundred_corrupted_the_motion_goes_on_and_errors_are_count
 #[test]
 fn the_same_seed_corrupts_the_same_frames_and_another_one_others() {
     let frames = |seed| {
-        let faults = vec![FaultConfig { probability: 0.05, from_s: 0.0, ..BASE }];
+        let faults = vec![FaultConfig { probability: 0.05, from_s: Some(0.0), ..BASE }];
         let mut bench = Bench::new(&Scenario { seed, faults, ..Scenario::default() });
         (0..300).for_each(|_| bench.cycle(None));
         bench.frames
@@ -76,7 +67,7 @@ fn a_babbling_node_makes_a_safe_stop() {
 
 #[test]
 fn a_disconnected_node_is_detected_and_all_drives_stop() {
-    let fault = FaultConfig { kind: FaultKindConfig::Disconnect, bus: 1, node: Some(5), ..BASE };
+    let fault = FaultConfig { kind: FaultKindConfig::Disconnect, bus: Some(1), node: Some(5), ..BASE };
     let mut bench = bench_with(fault);
     play_until(&mut bench, 1.0);
     let fault = bench.events.iter().find(|event| event.kind == EventKind::Fault.code()).unwrap();
@@ -87,7 +78,7 @@ fn a_disconnected_node_is_detected_and_all_drives_stop() {
 
 /// 0x204 for drive 4, which stands still: no position shows the loss.
 fn deaf(until_s: Option<f64>) -> FaultConfig {
-    FaultConfig { kind: FaultKindConfig::Lose, bus: 1, node: Some(4), id: Some(0x204), until_s, ..BASE }
+    FaultConfig { kind: FaultKindConfig::Lose, bus: Some(1), node: Some(4), id: Some(0x204), until_s, ..BASE }
 }
 
 #[test]
@@ -148,7 +139,7 @@ fn a_drive_in_bus_off_is_reported_and_stops_the_rig() {
 #[test]
 fn the_masters_own_controller_in_bus_off_is_reported_with_the_bus() {
     let mut bench =
-        bench_with(FaultConfig { kind: FaultKindConfig::BusOff, bus: 1, node: Some(127), ..BASE });
+        bench_with(FaultConfig { kind: FaultKindConfig::BusOff, bus: Some(1), node: Some(127), ..BASE });
     play_until(&mut bench, 0.6);
     let told = bench.events.iter().find(|event| event.cause == Cause::BusOff.code()).unwrap();
     assert_eq!((told.source, told.bus, told.axis), (Source::Wire.code(), 1, NO_AXIS));
@@ -159,8 +150,8 @@ fn drives_boot_though_one_frame_in_a_hundred_comes_twice() {
     for seed in 0..20 {
         let fault = |bus| FaultConfig {
             kind: FaultKindConfig::Duplicate,
-            bus,
-            from_s: 0.0,
+            bus: Some(bus),
+            from_s: Some(0.0),
             probability: 0.01,
             ..BASE
         };
@@ -191,7 +182,7 @@ fn process_data_of_the_cycle_before_are_no_answer_however_late_they_come() {
             kind: FaultKindConfig::Delay,
             id: Some(0x181),
             node: Some(1),
-            delay_us: Some(delay_us),
+            size: Some(format!("{delay_us} us").parse().unwrap()),
             ..BASE
         };
         let mut bench = bench_with(fault);
@@ -205,7 +196,7 @@ fn drives_that_are_switched_on_after_the_master_are_waited_for() {
     let faults = [1, 2, 3].map(|node| FaultConfig {
         kind: FaultKindConfig::Disconnect,
         node: Some(node),
-        from_s: 0.0,
+        from_s: Some(0.0),
         until_s: Some(0.5),
         ..BASE
     });

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use iceoryx2::prelude::ZeroCopySend;
 
 use super::*;
-use crate::messages::{Event, FrameTap};
+use crate::messages::{Event, FrameTap, LAYOUT_VERSION};
 use crate::transport::{BatchPublisher, BatchSubscriber, ScratchDomain, runtime};
 
 /// Every file below a folder.
@@ -130,7 +130,8 @@ fn a_message_of_another_version_is_refused() {
     sample.payload_mut().version += 1;
     sample.send().unwrap();
     let error = subscriber.receive().unwrap_err().to_string();
-    assert!(error.contains("IncompatibleVersion(10") && error.contains("another version"), "{error}");
+    let other = format!("IncompatibleVersion({}", LAYOUT_VERSION + 1);
+    assert!(error.contains(&other) && error.contains("another version"), "{error}");
 }
 
 /// Reads like an event, but for the name of its layout.

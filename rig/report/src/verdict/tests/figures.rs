@@ -88,15 +88,9 @@ impl Run {
         };
         self.figures.faults.push(idle);
         self.manifest.scenario.faults.push(FaultConfig {
-            kind: FaultKindConfig::Lose,
-            bus: 0,
-            from_s: 1.0,
-            until_s: None,
-            node: None,
-            id: None,
-            probability: 1.0,
-            count: None,
-            delay_us: None,
+            bus: Some(0),
+            from_s: Some(1.0),
+            ..FaultConfig::new(FaultKindConfig::Lose)
         });
     }
 
