@@ -40,7 +40,6 @@ impl Section {
         let required = match self.path() {
             "faults" => "kind = 'lose'",
             "stimulus" => "at_s = 0.0",
-            "require" => "name = 'a'",
             "motion" if rest.contains("file") => "path = 'jaw.csv'",
             _ => "",
         };

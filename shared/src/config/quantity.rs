@@ -124,8 +124,8 @@ impl Dimension {
 /// ```
 /// use masseter_shared::config::{Dimension, Quantity};
 ///
-/// let limit: Quantity = "50 um".parse()?;
-/// assert_eq!((limit.si(), limit.dimension()), (50e-6, Dimension::Length));
+/// let limit: Quantity = "2 mm".parse()?;
+/// assert_eq!((limit.si(), limit.dimension()), (0.002, Dimension::Length));
 /// assert_eq!("50 furlong".parse::<Quantity>().unwrap_err().to_string(), "'50 furlong': the unit 'furlong' is unknown");
 /// # Ok::<(), masseter_shared::config::QuantityError>(())
 /// ```

@@ -7,8 +7,9 @@ use masseter_shared::messages::codes::NO_AXIS;
 
 use super::*;
 
-const BASE: FaultConfig =
-    FaultConfig { bus: Some(0), from_s: Some(0.5), ..FaultConfig::new(FaultKindConfig::Corrupt) };
+fn base() -> FaultConfig {
+    FaultConfig { bus: Some(0), from_s: Some(0.5), ..FaultConfig::new(FaultKindConfig::Corrupt) }
+}
 
 fn bench_with(fault: FaultConfig) -> Bench {
     Bench::new(&Scenario { faults: vec![fault], ..Scenario::default() })
@@ -27,7 +28,7 @@ fn error_frames(bench: &Bench) -> usize {
 
 #[test]
 fn with_one_frame_in_a_hundred_corrupted_the_motion_goes_on_and_errors_are_counted() {
-    let mut bench = bench_with(FaultConfig { probability: 0.01, ..BASE });
+    let mut bench = bench_with(FaultConfig { probability: 0.01, ..base() });
     let worst_m = play_until(&mut bench, 2.5);
     assert!(worst_m < 1e-3, "{worst_m}");
     assert_eq!(bench.causes(EventKind::Fault), []);
@@ -40,7 +41,7 @@ fn with_one_frame_in_a_hundred_corrupted_the_motion_goes_on_and_errors_are_count
 #[test]
 fn the_same_seed_corrupts_the_same_frames_and_another_one_others() {
     let frames = |seed| {
-        let faults = vec![FaultConfig { probability: 0.05, from_s: Some(0.0), ..BASE }];
+        let faults = vec![FaultConfig { probability: 0.05, from_s: Some(0.0), ..base() }];
         let mut bench = Bench::new(&Scenario { seed, faults, ..Scenario::default() });
         (0..300).for_each(|_| bench.cycle(None));
         bench.frames
@@ -52,7 +53,7 @@ fn the_same_seed_corrupts_the_same_frames_and_another_one_others() {
 
 #[test]
 fn a_babbling_node_makes_a_safe_stop() {
-    let mut bench = bench_with(FaultConfig { kind: FaultKindConfig::Babble, node: Some(2), ..BASE });
+    let mut bench = bench_with(FaultConfig { kind: FaultKindConfig::Babble, node: Some(2), ..base() });
     play_until(&mut bench, 1.0);
     assert_eq!(bench.reading.master_fault, 1);
     assert_eq!(bench.causes(EventKind::Fault)[0], Cause::ProcessDataLost);
@@ -67,7 +68,7 @@ fn a_babbling_node_makes_a_safe_stop() {
 
 #[test]
 fn a_disconnected_node_is_detected_and_all_drives_stop() {
-    let fault = FaultConfig { kind: FaultKindConfig::Disconnect, bus: Some(1), node: Some(5), ..BASE };
+    let fault = FaultConfig { kind: FaultKindConfig::Disconnect, bus: Some(1), node: Some(5), ..base() };
     let mut bench = bench_with(fault);
     play_until(&mut bench, 1.0);
     let fault = bench.events.iter().find(|event| event.kind == EventKind::Fault.code()).unwrap();
@@ -78,7 +79,14 @@ fn a_disconnected_node_is_detected_and_all_drives_stop() {
 
 /// 0x204 for drive 4, which stands still: no position shows the loss.
 fn deaf(until_s: Option<f64>) -> FaultConfig {
-    FaultConfig { kind: FaultKindConfig::Lose, bus: Some(1), node: Some(4), id: Some(0x204), until_s, ..BASE }
+    FaultConfig {
+        kind: FaultKindConfig::Lose,
+        bus: Some(1),
+        node: Some(4),
+        id: Some(0x204),
+        until_s,
+        ..base()
+    }
 }
 
 #[test]
@@ -124,7 +132,7 @@ fn a_moving_drive_that_misses_its_targets_stops_all_within_three_cycles_of_the_s
 
 #[test]
 fn a_drive_in_bus_off_is_reported_and_stops_the_rig() {
-    let fault = FaultConfig { kind: FaultKindConfig::BusOff, node: Some(3), ..BASE };
+    let fault = FaultConfig { kind: FaultKindConfig::BusOff, node: Some(3), ..base() };
     let mut bench = bench_with(fault);
     play_until(&mut bench, 1.0);
     let told = bench.events.iter().find(|event| event.cause == Cause::BusOff.code()).unwrap();
@@ -139,7 +147,7 @@ fn a_drive_in_bus_off_is_reported_and_stops_the_rig() {
 #[test]
 fn the_masters_own_controller_in_bus_off_is_reported_with_the_bus() {
     let mut bench =
-        bench_with(FaultConfig { kind: FaultKindConfig::BusOff, bus: Some(1), node: Some(127), ..BASE });
+        bench_with(FaultConfig { kind: FaultKindConfig::BusOff, bus: Some(1), node: Some(127), ..base() });
     play_until(&mut bench, 0.6);
     let told = bench.events.iter().find(|event| event.cause == Cause::BusOff.code()).unwrap();
     assert_eq!((told.source, told.bus, told.axis), (Source::Wire.code(), 1, NO_AXIS));
@@ -153,7 +161,7 @@ fn drives_boot_though_one_frame_in_a_hundred_comes_twice() {
             bus: Some(bus),
             from_s: Some(0.0),
             probability: 0.01,
-            ..BASE
+            ..base()
         };
         let mut bench =
             Bench::new(&Scenario { seed, faults: [0, 1].map(fault).into(), ..Scenario::default() });
@@ -165,7 +173,7 @@ fn drives_boot_though_one_frame_in_a_hundred_comes_twice() {
 #[test]
 fn a_lost_synchronisation_costs_one_drive_one_cycle() {
     let fault =
-        FaultConfig { kind: FaultKindConfig::Lose, node: Some(1), id: Some(0x080), count: Some(1), ..BASE };
+        FaultConfig { kind: FaultKindConfig::Lose, node: Some(1), id: Some(0x080), count: Some(1), ..base() };
     let mut bench = bench_with(fault);
     play_until(&mut bench, 1.0);
     assert_eq!(bench.causes(EventKind::Fault), []);
@@ -183,7 +191,7 @@ fn process_data_of_the_cycle_before_are_no_answer_however_late_they_come() {
             id: Some(0x181),
             node: Some(1),
             size: Some(format!("{delay_us} us").parse().unwrap()),
-            ..BASE
+            ..base()
         };
         let mut bench = bench_with(fault);
         play_until(&mut bench, 0.6);
@@ -198,7 +206,7 @@ fn drives_that_are_switched_on_after_the_master_are_waited_for() {
         node: Some(node),
         from_s: Some(0.0),
         until_s: Some(0.5),
-        ..BASE
+        ..base()
     });
     let mut bench = Bench::new(&Scenario { faults: faults.into(), ..Scenario::default() });
     (0..600).for_each(|_| bench.cycle(None));
@@ -208,7 +216,7 @@ fn drives_that_are_switched_on_after_the_master_are_waited_for() {
 
 #[test]
 fn a_fault_of_an_absent_node_is_refused() {
-    let fault = FaultConfig { kind: FaultKindConfig::Disconnect, node: Some(5), ..BASE };
+    let fault = FaultConfig { kind: FaultKindConfig::Disconnect, node: Some(5), ..base() };
     let scenario = Scenario { faults: vec![fault], ..Scenario::default() };
     let error = PlantCore::new(&scenario, 0).unwrap_err().to_string();
     assert_eq!(error, "faults.node = 5: bus 0 has the nodes 127, 1, 2, 3");
