@@ -29,6 +29,7 @@ use crate::run::{
     self,
     args::{Readers, RunArgs},
 };
+use crate::signals_cli::{self, SignalsArgs};
 use crate::uniqueness::{self, UniquenessVerb};
 
 const FIRST_STEPS: &str = "\
@@ -84,6 +85,8 @@ enum Verb {
     /// List, read and set the parameters of a running controller
     #[command(subcommand, after_help = "Example:\n  masseter param set integral_gain_per_s=8")]
     Param(ParamVerb),
+    /// List the signals that requirements can use
+    Signals(SignalsArgs),
     /// Print the messages as types of C or Python
     Interface(InterfaceArgs),
     /// Emulate the six drives and the mechanism on real CAN interfaces
@@ -161,6 +164,7 @@ fn execute(verb: Verb) -> Result<Exit, Failure> {
     match verb {
         Verb::Run(args) => run::run(&args),
         Verb::Init(args) => init::init(&args).usage(),
+        Verb::Signals(args) => signals_cli::signals(&args).usage(),
         Verb::Report(args) => report_cli::report(&args),
         Verb::Bench(args) => bench::run(&args),
         Verb::BenchPeer(args) => bench::ipc::answer(&args).map(|()| Exit::Passed).usage(),

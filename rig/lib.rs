@@ -31,6 +31,7 @@ mod recorder;
 mod recording_cli;
 mod report_cli;
 mod run;
+mod signals_cli;
 mod starter;
 mod stderr_writer;
 mod uniqueness;

@@ -18,6 +18,7 @@ mod virtual_time;
 use std::path::Path;
 
 use anyhow::Context;
+use masseter_analysis::requirements::check_requirements;
 use masseter_plan::RunPlan;
 use masseter_plant::core as plant;
 use masseter_recording::{Ending, MOTION, Manifest, RunFolder};
@@ -107,8 +108,11 @@ fn resolve(args: &RunArgs) -> anyhow::Result<(RunPlan, RunArgs)> {
     plant::check_interfaces(&plan.scenario)?;
     if let Some(build) = args.controller.builder() {
         let controller = build(&plan.scenario, plan.mechanism.clone(), plan.trajectory.clone());
-        NamedValues::new(controller.declared(), &plan.scenario.parameters)
-            .map_err(|error| with_question(&error))?;
+        let declared = controller.declared();
+        check_requirements(&plan.scenario, Some(&declared)).map_err(anyhow::Error::msg)?;
+        NamedValues::new(declared, &plan.scenario.parameters).map_err(|error| with_question(&error))?;
+    } else {
+        check_requirements(&plan.scenario, None).map_err(anyhow::Error::msg)?;
     }
     Ok((plan, args))
 }

@@ -21,6 +21,7 @@ use crate::named::NamedWatch;
 use crate::outage::OutageWatch;
 use crate::over_time::{CONTROLLER, OverTimeCollector, PLANT};
 use crate::pose_errors::pose;
+use crate::requirements::Requirements;
 use crate::response::Responses;
 use crate::sequence::SequenceCheck;
 use crate::skips::{Counters, Skips};
@@ -72,6 +73,8 @@ pub struct Analysis {
     outage: OutageWatch,
     final_state: Option<Code<ControllerState>>,
     bite_force_max_n: Option<f64>,
+    /// None where the scenario requires nothing.
+    requirements: Option<Requirements>,
 }
 
 impl Analysis {
@@ -79,6 +82,7 @@ impl Analysis {
     pub fn new(scenario: &Scenario, declared: &Declared) -> Self {
         let is_emulated = scenario.can.is_virtual();
         let period_ns = scenario.period_ns();
+        let requirements = Requirements::new(scenario, declared);
         Self {
             period_ns,
             declared: declared.clone(),
@@ -108,6 +112,7 @@ impl Analysis {
             final_state: None,
             // The robot has no sensor for this force.
             bite_force_max_n: scenario.food.filter(|_| is_emulated).map(|_| 0.0),
+            requirements: (!requirements.is_empty()).then_some(requirements),
         }
     }
 
@@ -118,6 +123,9 @@ impl Analysis {
     pub fn take(&mut self, message: &Recorded) -> Result<(), TapError> {
         self.sequence.take(message);
         self.digest.take(message);
+        if let Some(requirements) = &mut self.requirements {
+            requirements.take(message);
+        }
         match message {
             Recorded::Command(command) => {
                 self.intervals.command(command);
@@ -156,6 +164,9 @@ impl Analysis {
         self.over_time.wake_up(CONTROLLER, state.due_ns, state.woke_ns);
         self.outage.state(state);
         let is_disturbed = self.disturbance.take(state, is_fresh);
+        if let Some(requirements) = self.requirements.as_mut().filter(|_| is_disturbed) {
+            requirements.disturb(state.cycle);
+        }
         if is_fresh && !self.has_truth {
             let estimated = pose(state.estimated_position_m, state.estimated_quaternion_wxyz);
             self.over_time.actual(state.sampled_ns, estimated.as_ref());
@@ -180,6 +191,9 @@ impl Analysis {
 
     fn event(&mut self, event: EventRecord) {
         self.faults.event(&event);
+        if let Some(requirements) = &mut self.requirements {
+            requirements.event(&event);
+        }
         self.events.push(event);
     }
 
@@ -218,6 +232,7 @@ impl Analysis {
             outage: self.outage.finish(self.period_ns),
             tracking,
             faults: self.faults.finish(),
+            requirements: self.requirements.map(Requirements::finish).unwrap_or_default(),
             signals,
             parameters,
             bite_force_max_n: self.bite_force_max_n,

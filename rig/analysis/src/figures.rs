@@ -15,6 +15,7 @@ use crate::measured::IntervalFigures;
 use crate::named::{ParameterFigures, SignalFigures};
 use crate::outage::Outage;
 use crate::over_time::OverTime;
+use crate::requirements::RequirementFigures;
 use crate::sequence::TopicFigures;
 use crate::skips::SkipFigures;
 use crate::tracking::{Track, TrackingFigures};
@@ -44,6 +45,8 @@ pub struct Figures {
     pub tracking: TrackingFigures,
     /// The scenario's faults, in their order.
     pub faults: Vec<FaultFigures>,
+    /// The scenario's requirements, in their order, then the events that it expects.
+    pub requirements: Vec<RequirementFigures>,
     /// The controller's signals.
     pub signals: Vec<SignalFigures>,
     /// The controller's parameters.

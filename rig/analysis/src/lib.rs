@@ -25,9 +25,11 @@ mod noise;
 mod outage;
 mod over_time;
 mod pose_errors;
+pub mod requirements;
 mod response;
 mod sequence;
 mod series;
+pub mod signals;
 mod skips;
 mod tracking;
 

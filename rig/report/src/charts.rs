@@ -5,6 +5,7 @@ use masseter_shared::config::Scenario;
 use masseter_shared::geometry::{AXIS_NAMES, LEGS, Mechanism, Vec3};
 use masseter_shared::schedule::CycleSchedule;
 
+use masseter_analysis::requirements::{RequirementFigures, RequirementPlot};
 use masseter_analysis::{Curve, EventRecord, FaultFigures, Figures, IntervalFigures, SignalFigures};
 use masseter_charts::{Axis, Drawn, Legend, Limit, Line, LineChart, Moment, Scale, palette};
 
@@ -102,19 +103,20 @@ fn closed_incisal_m(scenario: &Scenario) -> Option<[f64; 3]> {
 
 /// The first strike of every fault, and the event that began the first safe stop.
 fn moments(scenario: &Scenario, figures: &Figures) -> Vec<Moment> {
-    let moment = |name: String, time_ns: u64| {
-        let at = time_ns.saturating_sub(figures.over_time.began_ns) as f64 / 1e9;
-        Moment { name: format!("{name}, {at:.3} s"), at }
-    };
     let strike = |fault: &FaultFigures| {
         let declared = scenario.faults.get(fault.number - 1)?;
-        Some(moment(format!("fault {}: {declared}", fault.number), fault.struck_ns?))
+        Some(moment(figures, &format!("fault {}: {declared}", fault.number), fault.struck_ns?))
     };
     let stop = figures.events.iter().find(|event| event.begins_stop());
     let detection = |EventRecord { source, cause, time_ns, .. }: &EventRecord| {
-        moment(format!("safe stop: {source}, {cause}"), *time_ns)
+        moment(figures, &format!("safe stop: {source}, {cause}"), *time_ns)
     };
     figures.faults.iter().filter_map(strike).chain(stop.map(detection)).collect()
+}
+
+fn moment(figures: &Figures, name: &str, time_ns: u64) -> Moment {
+    let at = time_ns.saturating_sub(figures.over_time.began_ns) as f64 / 1e9;
+    Moment { name: format!("{name}, {at:.3} s"), at }
 }
 
 /// Positions of slides and legs, velocities and forces, against their limits.
@@ -163,6 +165,18 @@ pub(super) fn signals(scenario: &Scenario, figures: &Figures) -> Vec<(String, Op
     charts.into_iter().enumerate().map(drawn).collect()
 }
 
+/// The signal of a requirement, its limits, and the moment of the smallest margin; none without a signal.
+pub(super) fn requirement(scenario: &Scenario, figures: &Figures, of: &RequirementFigures) -> Option<Drawn> {
+    let RequirementPlot { signal, unit, began_ns, curve, limits } = of.plot.as_ref()?;
+    let shift_s = (*began_ns as f64 - figures.over_time.began_ns as f64) / 1e9;
+    let line = Line::new(signal, curve.iter().map(|&(at_s, value)| (at_s + shift_s, value)).collect());
+    let y = linear(&if unit.is_empty() { signal.clone() } else { format!("{signal}, {unit}") });
+    let limits = if limits.is_empty() { Vec::new() } else { vec![limit("limit", limits)] };
+    let mut chart = over_time(scenario, figures, y, vec![line], limits);
+    chart.moments.extend(of.worst_ns.map(|ns| moment(figures, "smallest margin", ns)));
+    chart.draw(LOW)
+}
+
 /// Share of each bus in use.
 pub(super) fn bus_load(scenario: &Scenario, figures: &Figures) -> Option<Drawn> {
     let loads = figures.over_time.bus_load.iter().enumerate();
@@ -179,9 +193,19 @@ fn chart_over_time(
     lines: Vec<Line>,
     limits: Vec<Limit>,
 ) -> Option<Drawn> {
+    over_time(scenario, figures, y, lines, limits).draw(LOW)
+}
+
+fn over_time(
+    scenario: &Scenario,
+    figures: &Figures,
+    y: Axis,
+    lines: Vec<Line>,
+    limits: Vec<Limit>,
+) -> LineChart {
     let x = Axis::new("time, s", Scale::Linear, [0.0, figures.over_time.duration_s]);
     let moments = moments(scenario, figures);
-    LineChart { title: String::new(), x, y, lines, limits, moments, legend: Legend::Beside }.draw(LOW)
+    LineChart { title: String::new(), x, y, lines, limits, moments, legend: Legend::Beside }
 }
 
 fn linear(label: &str) -> Axis {

@@ -1,5 +1,7 @@
 //! One thing that a run is checked for: its finding, and whether that is as it should be.
 
+use std::borrow::Cow;
+
 use serde::Serialize;
 
 /// Whether what was checked is as it should be.
@@ -40,21 +42,48 @@ impl CheckResult {
     }
 }
 
+/// The figures of a requirement beside its check.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct CheckFigures {
+    /// How far the requirement is from failing.
+    pub margin: Option<f64>,
+    /// Unit of the margin.
+    pub margin_unit: &'static str,
+    /// The margin as a share of the limit.
+    pub relative_margin: Option<f64>,
+    /// The moment of the smallest margin, s since the motion began.
+    pub worst_at_s: Option<f64>,
+    /// The longest time from a trigger to its response, ms.
+    pub latency_ms: Option<f64>,
+}
+
 /// One thing that was judged.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Check {
     /// What.
-    pub name: &'static str,
+    pub name: Cow<'static, str>,
     /// What was found, with its limit.
     pub finding: String,
     /// Whether it is as it should be.
     pub result: CheckResult,
+    /// The figures, where it is a requirement of the scenario.
+    #[serde(flatten, skip_serializing_if = "Option::is_none")]
+    pub figures: Option<CheckFigures>,
 }
 
 impl Check {
+    pub(crate) fn new(name: impl Into<Cow<'static, str>>, finding: String, result: CheckResult) -> Self {
+        Self { name: name.into(), finding, result, figures: None }
+    }
+
+    /// Whether it is a requirement of the scenario.
+    pub(crate) fn is_requirement(&self) -> bool {
+        self.figures.is_some()
+    }
+
     pub(crate) fn judged(name: &'static str, finding: String, passed: bool) -> Self {
         let result = if passed { CheckResult::Passed } else { CheckResult::Failed };
-        Self { name, finding, result }
+        Self::new(name, finding, result)
     }
 
     /// A failure that the machine may explain is excused.
@@ -66,11 +95,11 @@ impl Check {
     }
 
     pub(crate) fn untested(name: &'static str, why: String) -> Self {
-        Self { name, finding: why, result: CheckResult::Untested }
+        Self::new(name, why, CheckResult::Untested)
     }
 
     pub(crate) fn not_judged(name: &'static str, why: String) -> Self {
-        Self { name, finding: why, result: CheckResult::NotJudged }
+        Self::new(name, why, CheckResult::NotJudged)
     }
 }
 

@@ -2,13 +2,15 @@
 //!
 //! What the checks come to is the [verdict](super::verdict)'s.
 
+use masseter_shared::config::ExpectedVerdict;
 use masseter_shared::messages::codes::{Cause, ControllerState};
 use masseter_shared::wording::counted;
 
-use crate::check::{Check, CheckResult};
+use crate::check::{Check, CheckFigures, CheckResult};
 use crate::motion_checks::{faults, tracking};
 use crate::text;
 use crate::timing::{Timing, TimingWord};
+use masseter_analysis::requirements::{RequirementFigures, RequirementResult};
 use masseter_analysis::{
     BusResponse, Code, EventRecord, Figures, ResponseFigures, SkipFigures, TrackingFigures,
 };
@@ -21,7 +23,8 @@ pub(crate) fn checks(manifest: &Manifest, figures: &Figures, timing: &Timing) ->
     }
     let limits = &manifest.scenario.checks;
     let is_disturbed = timing.is_disturbed();
-    let sequence = sequence(figures.final_state, &figures.events);
+    let expected = manifest.scenario.expect.as_ref().and_then(|expect| expect.verdict);
+    let sequence = sequence(figures.final_state, &figures.events, expected);
     let TrackingFigures { actual_source, samples, actual, estimated, undisturbed, .. } = &figures.tracking;
     let tracking_of = |name, errors, undisturbed_errors| {
         let check = tracking(name, *samples, errors, limits);
@@ -46,6 +49,8 @@ pub(crate) fn checks(manifest: &Manifest, figures: &Figures, timing: &Timing) ->
     // No lost cycle excuses a declared fault that led the jaw too far.
     checks.extend(faults(&manifest.scenario.faults, &figures.faults, limits));
     checks
+        .extend(figures.requirements.iter().map(|requirement| self::requirement(requirement, is_disturbed)));
+    checks
 }
 
 /// Cycles that the machine lost are no failure of the rig. None in simulated time, which has no deadlines.
@@ -57,16 +62,56 @@ fn kept_time(timing: &Timing, limit: u64) -> Option<Check> {
         TimingWord::Simulated | TimingWord::Unknown => return None,
     };
     let finding = format!("{timing}{}, limit of the rig {limit}", timing.evidence);
-    Some(Check { name: "timing", finding, result })
+    Some(Check::new("timing", finding, result))
 }
 
-/// The motion must be played to its end, and not be stopped by request.
-fn sequence(state: Option<Code<ControllerState>>, events: &[EventRecord]) -> Check {
+/// The motion must be played to its end, and not be stopped by request, unless the scenario expects that.
+fn sequence(
+    state: Option<Code<ControllerState>>,
+    events: &[EventRecord],
+    expected: Option<ExpectedVerdict>,
+) -> Check {
     let was_stopped = events.iter().any(|event| event.cause == Cause::StopRequested);
     let how = if was_stopped { ", stopped by request before the motion's end" } else { "" };
     let in_words = state.map_or_else(|| "none".to_owned(), |state| state.to_string());
-    let is_finished = state.is_some_and(|state| state == ControllerState::Finished);
-    Check::judged("sequence", format!("ended in state {in_words}{how}"), is_finished && !was_stopped)
+    let is_in = |expected| state.is_some_and(|state| state == expected);
+    let (is_good, as_expected) = match expected {
+        Some(ExpectedVerdict::SafeStop) if is_in(ControllerState::SafeStop) => (true, ", as expected"),
+        Some(ExpectedVerdict::Interrupted) => {
+            (was_stopped && is_in(ControllerState::Finished), ", as expected")
+        }
+        Some(ExpectedVerdict::Died | ExpectedVerdict::Incomplete) => {
+            return Check::not_judged("sequence", format!("ended in state {in_words}{how}"));
+        }
+        _ => (is_in(ControllerState::Finished) && !was_stopped, ""),
+    };
+    let as_expected = if is_good { as_expected } else { "" };
+    Check::judged("sequence", format!("ended in state {in_words}{how}{as_expected}"), is_good)
+}
+
+/// A requirement of the scenario. The machine excuses a failure where a lost cycle may have caused it.
+fn requirement(found: &RequirementFigures, is_disturbed: bool) -> Check {
+    let result = match found.result {
+        RequirementResult::Passed => CheckResult::Passed,
+        RequirementResult::Failed => CheckResult::Failed,
+        RequirementResult::Untested => CheckResult::Untested,
+    };
+    let margin =
+        found.margin.map(|margin| format!("; margin {} {}", text::significant(margin), found.margin_unit));
+    let moment = found.worst_at_s.map(|at_s| format!(" at {at_s:.3} s"));
+    let words = [Some(found.must.clone()).filter(|must| !must.is_empty()), Some(found.finding.clone())];
+    let words = words.into_iter().flatten().collect::<Vec<_>>().join(": ");
+    let finding = [Some(words), margin.map(|margin| margin.trim_end().to_owned()), moment];
+    let figures = CheckFigures {
+        margin: found.margin,
+        margin_unit: found.margin_unit,
+        relative_margin: found.relative_margin,
+        worst_at_s: found.worst_at_s,
+        latency_ms: found.latency_ms,
+    };
+    let finding = finding.into_iter().flatten().collect::<String>();
+    let check = Check { figures: Some(figures), ..Check::new(found.name.clone(), finding, result) };
+    check.unless(is_disturbed && found.may_be_disturbed)
 }
 
 /// Gaps show losses before the last recorded message. Losses behind it, and in unreadable parts, are unknown.

@@ -4,7 +4,7 @@ use askama::Template;
 use masseter_analysis::Figures;
 use masseter_recording::Manifest;
 
-use crate::check::CheckResult;
+use crate::check::{Check, CheckResult};
 use crate::verdict::Verdict;
 
 /// One suite; a run that ended wrongly or cannot be judged has an `error` in a case of its own.
@@ -17,9 +17,14 @@ struct Suite<'a> {
 }
 
 impl Suite<'_> {
-    /// With what was not tested: most CI systems show a suite with skipped cases as passed.
+    /// With checks of the rig that were not tested: most CI systems show a suite with skipped cases as passed.
     fn failures(&self) -> usize {
-        self.count(CheckResult::Failed) + self.count(CheckResult::Untested)
+        self.count(CheckResult::Failed) + self.count(CheckResult::Untested) - self.untested_requirements()
+    }
+
+    fn untested_requirements(&self) -> usize {
+        let is_untested = |check: &&Check| check.is_requirement() && check.result == CheckResult::Untested;
+        self.verdict.checks.iter().filter(is_untested).count()
     }
 
     fn count(&self, result: CheckResult) -> usize {
@@ -27,7 +32,7 @@ impl Suite<'_> {
     }
 
     fn skipped(&self) -> usize {
-        self.count(CheckResult::Excused) + self.count(CheckResult::NotJudged)
+        self.count(CheckResult::Excused) + self.count(CheckResult::NotJudged) + self.untested_requirements()
     }
 }
 

@@ -26,7 +26,7 @@ mod verdict;
 mod write_error;
 
 pub use candump_logs::CandumpLogs;
-pub use check::{Check, CheckResult};
+pub use check::{Check, CheckFigures, CheckResult};
 pub use run_report::{report_past_run, report_run};
 pub use table::Detail;
 pub use timing::{Timing, TimingWord};

@@ -101,7 +101,7 @@ pub(crate) fn faults(
     let which = match idle.as_slice() {
         [] => String::new(),
         idle => format!(
-            ", number {} never: raise its probability, or widen the time from from_s to until_s",
+            ", number {} never: raise its probability, or let the fault act earlier or longer",
             idle.join(", ")
         ),
     };
@@ -112,7 +112,7 @@ pub(crate) fn faults(
         (true, false) => CheckResult::Untested,
         (false, _) => CheckResult::Failed,
     };
-    (!declared.is_empty()).then(|| Check { name: FAULTS, finding: struck + &beyond.concat(), result })
+    (!declared.is_empty()).then(|| Check::new(FAULTS, struck + &beyond.concat(), result))
 }
 
 #[cfg(test)]

@@ -1,5 +1,6 @@
 //! What a run comes to: a word in reports, and the exit code of the program.
 
+use masseter_shared::config::ExpectedVerdict;
 use masseter_terminal::Exit;
 
 /// The outcome of a run.
@@ -17,6 +18,19 @@ pub(crate) enum Outcome {
 }
 
 impl Outcome {
+    /// The outcome that a scenario expects.
+    pub(crate) fn of(expected: ExpectedVerdict) -> Self {
+        match expected {
+            ExpectedVerdict::Pass => Self::Passed,
+            ExpectedVerdict::Fail => Self::Failed,
+            ExpectedVerdict::SafeStop => Self::SafeStop,
+            ExpectedVerdict::Died => Self::Died,
+            ExpectedVerdict::Interrupted => Self::Interrupted,
+            ExpectedVerdict::Incomplete => Self::Incomplete,
+            ExpectedVerdict::Untested => Self::Untested,
+        }
+    }
+
     /// The word in reports.
     pub(crate) fn word(self) -> &'static str {
         match self {

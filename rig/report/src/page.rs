@@ -3,14 +3,15 @@
 //! The template `templates/report.html` holds the markup and formats single numbers. This module draws the plots.
 
 use askama::Template;
+use masseter_analysis::requirements::RequirementFigures;
 use masseter_analysis::{EventRecord, Figures, Track};
 use masseter_charts::Drawn;
 use masseter_recording::Manifest;
-use masseter_shared::config::MotionConfig;
+use masseter_shared::config::{MotionConfig, Scenario};
 use masseter_shared::messages::codes::ControllerState;
 use masseter_shared::wording::counted;
 
-use crate::text::{microseconds, or_dash};
+use crate::text::{microseconds, or_dash, significant};
 use crate::verdict::Verdict;
 use crate::{animation, charts, time_line};
 
@@ -24,6 +25,7 @@ struct Page<'a> {
     motions: [(&'static str, Option<Drawn>); 2],
     actuators: [(&'static str, Option<Drawn>); 4],
     signals: Vec<(String, Option<Drawn>)>,
+    requirements: Vec<(String, Option<Drawn>)>,
     percentiles: Option<Drawn>,
     jitter: Option<Drawn>,
     bus_load: Option<Drawn>,
@@ -41,12 +43,22 @@ pub(crate) fn html(manifest: &Manifest, figures: &Figures, verdict: &Verdict) ->
         motions: charts::motion(scenario, figures),
         actuators: charts::actuators(scenario, figures),
         signals: charts::signals(scenario, figures),
+        requirements: requirements(scenario, figures),
         percentiles: charts::percentiles(scenario, figures),
         jitter: charts::jitter(scenario, figures),
         bus_load: charts::bus_load(scenario, figures),
         time_line: time_line::svg(figures),
     };
     page.render()
+}
+
+/// The plots of the requirements that have one.
+fn requirements(scenario: &Scenario, figures: &Figures) -> Vec<(String, Option<Drawn>)> {
+    let of = |requirement: &RequirementFigures| {
+        let drawn = charts::requirement(scenario, figures, requirement);
+        requirement.plot.as_ref().map(|_| (requirement.name.clone(), drawn))
+    };
+    figures.requirements.iter().filter_map(of).collect()
 }
 
 /// The events until the controller first moves the jaw, and those from then on.

@@ -1,6 +1,7 @@
 //! Numbers and events as text, for the table, the checks and the page.
 
 use masseter_analysis::{Code, EventRecord};
+use masseter_shared::config::Dimension;
 use masseter_shared::messages::codes::Cause;
 
 /// A dash where there is no such figure.
@@ -11,6 +12,11 @@ pub(crate) fn or_dash<T>(figure: Option<T>, format: impl Fn(T) -> String) -> Str
 /// Millimetres or degrees, with four decimals.
 pub(crate) fn decimals(value: f64) -> String {
     format!("{value:.4}")
+}
+
+/// A number with four significant digits.
+pub(crate) fn significant(value: f64) -> String {
+    Dimension::One.si_unit().text(value)
 }
 
 /// Nanoseconds as microseconds with two decimals.

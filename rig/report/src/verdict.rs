@@ -4,7 +4,7 @@
 
 use masseter_analysis::{EventRecord, Figures, Outage};
 use masseter_recording::{DmaLatency, Ending, Manifest, RunUsage};
-use masseter_shared::config::{CanConfig, ChecksConfig, TimingConfig};
+use masseter_shared::config::{CanConfig, ChecksConfig, ExpectedVerdict, TimingConfig};
 use masseter_shared::messages::codes::EventKind;
 use masseter_shared::wording::counted;
 use masseter_terminal::Exit;
@@ -50,11 +50,15 @@ impl Verdict {
     /// Judges a run.
     pub fn new(manifest: &Manifest, figures: &Figures) -> Self {
         let timing = Timing::new(manifest, figures);
-        let checks = checks(manifest, figures, &timing);
+        let all = checks(manifest, figures, &timing);
+        let expected = manifest.scenario.expect.as_ref().and_then(|expect| expect.verdict);
+        // An expected outcome is that of the rig's own checks; the requirements are judged beside it.
+        let (requirements, checks): (Vec<_>, Vec<_>) =
+            all.iter().cloned().partition(|check| check.is_requirement() && expected.is_some());
         let excuse = excuse(&manifest.ending, &timing, figures.outage);
         let is_too_late = left_its_path(&figures.tracking.actual, &manifest.scenario.checks)
             || checks.iter().any(|check| check.name == FAULTS && check.result == CheckResult::Failed);
-        let (outcome, mut reason) = ending(&manifest.ending, &figures.events)
+        let (mut outcome, mut reason) = ending(&manifest.ending, &figures.events)
             // The machine caused the stop, or it came only after the jaw had left its path.
             .filter(|(outcome, _)| !(*outcome == Outcome::SafeStop && (excuse.is_some() || is_too_late)))
             .or_else(|| incomplete(figures))
@@ -68,10 +72,13 @@ impl Verdict {
             })
             .or_else(|| untested(&checks, figures.cycles))
             .unwrap_or_else(|| (Outcome::Passed, "every check passed".to_owned()));
+        if let Some(expected) = expected {
+            (outcome, reason) = against(expected, (outcome, reason), &requirements, figures.cycles);
+        }
         if outcome != Outcome::Passed {
             reason += &overload(&manifest.usage, manifest.scenario.rate_hz).unwrap_or_default();
         }
-        Self { word: outcome.word(), reason, exit_code: outcome.exit(), timing, checks }
+        Self { word: outcome.word(), reason, exit_code: outcome.exit(), timing, checks: all }
     }
 
     /// The colour of the run: passed with its timing held, passed without, or not passed.
@@ -236,10 +243,37 @@ fn untested(checks: &[Check], cycles: u64) -> Option<OutcomeReason> {
     (!why.is_empty()).then_some((Outcome::Untested, why))
 }
 
+/// The outcome of a run that expects one: passed if the outcome is this one and every requirement is met. A run that the
+/// machine spoiled stays INVALID.
+fn against(
+    expected: ExpectedVerdict,
+    (outcome, reason): OutcomeReason,
+    requirements: &[Check],
+    cycles: u64,
+) -> OutcomeReason {
+    if outcome == Outcome::Invalid {
+        return (outcome, reason);
+    }
+    let wanted = Outcome::of(expected);
+    // A stop that the scenario itself requests ends the run in order: the sequence's check has judged it.
+    let is_requested = wanted == Outcome::Interrupted && outcome == Outcome::Passed;
+    if outcome != wanted && !is_requested {
+        return (Outcome::Failed, format!("expected {}, but {}: {reason}", wanted.word(), outcome.word()));
+    }
+    let lost = || {
+        let names = named(requirements, CheckResult::Excused)?;
+        Some((Outcome::Invalid, format!("lost cycles may explain: {names}")))
+    };
+    failed(requirements)
+        .or_else(lost)
+        .or_else(|| untested(requirements, cycles))
+        .unwrap_or_else(|| (Outcome::Passed, format!("{}, as expected: {reason}", wanted.word())))
+}
+
 /// The checks of a result by their names; none without such checks.
 fn named(checks: &[Check], result: CheckResult) -> Option<String> {
     let names: Vec<_> =
-        checks.iter().filter(|check| check.result == result).map(|check| check.name).collect();
+        checks.iter().filter(|check| check.result == result).map(|check| check.name.as_ref()).collect();
     (!names.is_empty()).then(|| names.join(", "))
 }
 

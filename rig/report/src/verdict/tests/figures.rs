@@ -101,8 +101,8 @@ impl Run {
     }
 }
 
-fn results(verdict: &Verdict) -> Vec<(&'static str, &'static str)> {
-    verdict.checks.iter().map(|check| (check.name, check.result.mark())).collect()
+fn results(verdict: &Verdict) -> Vec<(&str, &'static str)> {
+    verdict.checks.iter().map(|check| (check.name.as_ref(), check.result.mark())).collect()
 }
 
 #[test]

@@ -1,0 +1,70 @@
+//! The quantity that bounds are held against: a signal, or an expression of signals.
+//!
+//! Expressions are those of the crate `exmex`, in SI units, with signals in braces: `abs({l1.force}) + abs({l2.force})`.
+
+use exmex::{Express, FlatEx};
+use masseter_shared::config::{RequirementConfig, Unit};
+
+use crate::signals::Values;
+
+/// A signal or an expression.
+#[derive(Debug, Clone)]
+pub(super) struct Quantified {
+    /// As written.
+    pub(super) text: String,
+    /// The unit in which it is shown.
+    pub(super) unit: Unit,
+    source: Source,
+}
+
+#[derive(Debug, Clone)]
+enum Source {
+    Signal(usize),
+    Expression { parsed: FlatEx<f64>, signals: Vec<usize>, arguments: Vec<f64> },
+}
+
+impl Quantified {
+    pub(super) fn new(config: &RequirementConfig, values: &mut Values) -> Result<Self, String> {
+        match (&config.signal, &config.expression) {
+            (Some(name), None) => {
+                let signal = values.choose(name)?;
+                let named = values.signal(signal);
+                if named.states().is_some() {
+                    return Err(format!(
+                        "{name} is a state, which has no bounds; use never, or when and then"
+                    ));
+                }
+                Ok(Self { text: name.clone(), unit: named.shown(), source: Source::Signal(signal) })
+            }
+            (None, Some(text)) => {
+                let name = config.unit.as_deref().unwrap_or_default();
+                let unit =
+                    Unit::named(name).ok_or_else(|| format!("unit = '{name}': the unit is unknown"))?;
+                let parsed =
+                    exmex::parse::<f64>(text).map_err(|error| format!("expression = '{text}': {error}"))?;
+                let signals: Vec<_> =
+                    parsed.var_names().iter().map(|name| values.choose(name)).collect::<Result<_, _>>()?;
+                let arguments = vec![0.0; signals.len()];
+                Ok(Self {
+                    text: text.clone(),
+                    unit,
+                    source: Source::Expression { parsed, signals, arguments },
+                })
+            }
+            _ => Err("give a signal or an expression".to_owned()),
+        }
+    }
+
+    /// The value in SI units; NaN where a signal is missing.
+    pub(super) fn value(&mut self, values: &[f64]) -> f64 {
+        match &mut self.source {
+            Source::Signal(signal) => values[*signal],
+            Source::Expression { parsed, signals, arguments } => {
+                for (argument, signal) in arguments.iter_mut().zip(&*signals) {
+                    *argument = values[*signal];
+                }
+                parsed.eval(arguments).unwrap_or(f64::NAN)
+            }
+        }
+    }
+}

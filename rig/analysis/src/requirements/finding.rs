@@ -1,0 +1,103 @@
+//! What a requirement comes to.
+
+use masseter_shared::config::Unit;
+use serde::Serialize;
+
+use crate::series::Curve;
+
+/// Whether a requirement holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum RequirementResult {
+    /// It holds.
+    Passed,
+    /// It does not.
+    Failed,
+    /// What it needs did not happen; the finding says what.
+    Untested,
+}
+
+/// The judgement of a requirement, in SI units.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Finding {
+    pub(super) result: RequirementResult,
+    /// What was found, in words.
+    pub(super) text: String,
+    /// How far the requirement is from failing; negative where it fails.
+    pub(super) margin: Option<f64>,
+    /// The margin as a share of the limit.
+    pub(super) relative_margin: Option<f64>,
+    /// Unit in which the margin is shown.
+    pub(super) unit: Unit,
+    /// The moment of the smallest margin.
+    pub(super) worst_ns: Option<u64>,
+    /// The longest time from a trigger to its response, s.
+    pub(super) latency_s: Option<f64>,
+    /// Whether the machine may have caused a failure, where the machine lost cycles.
+    pub(super) may_be_disturbed: bool,
+}
+
+impl Finding {
+    /// The requirement could not show; `why` says what did not happen.
+    pub(super) fn untested(why: String, unit: Unit) -> Self {
+        Self { result: RequirementResult::Untested, ..Self::new(true, why, unit) }
+    }
+
+    /// A judgement without figures.
+    pub(super) fn new(passes: bool, text: String, unit: Unit) -> Self {
+        let result = if passes { RequirementResult::Passed } else { RequirementResult::Failed };
+        let (margin, relative_margin, worst_ns, latency_s) = (None, None, None, None);
+        Self { result, text, margin, relative_margin, unit, worst_ns, latency_s, may_be_disturbed: true }
+    }
+
+    /// The share of a margin in its limit; none without a limit other than 0.
+    pub(super) fn share(margin: f64, limit: f64) -> Option<f64> {
+        (limit != 0.0 && margin.is_finite()).then(|| margin / limit.abs())
+    }
+}
+
+/// A requirement of the scenario and what it comes to.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct RequirementFigures {
+    /// Its name.
+    pub name: String,
+    /// What must hold, in words.
+    pub must: String,
+    /// Whether it does.
+    pub result: RequirementResult,
+    /// What was found, in words.
+    pub finding: String,
+    /// How far the requirement is from failing, in `margin_unit`; negative where it fails; none where there is no number.
+    pub margin: Option<f64>,
+    /// Its unit.
+    pub margin_unit: &'static str,
+    /// The margin as a share of the limit.
+    pub relative_margin: Option<f64>,
+    /// The moment of the smallest margin, s since the motion began.
+    pub worst_at_s: Option<f64>,
+    /// The same, ns of the run's clock.
+    pub worst_ns: Option<u64>,
+    /// The longest time from a trigger to its response, ms.
+    pub latency_ms: Option<f64>,
+    /// Whether the machine may have caused a failure, where the machine lost cycles.
+    #[serde(skip)]
+    pub may_be_disturbed: bool,
+    /// The signal over time, for plots.
+    #[serde(skip)]
+    pub plot: Option<RequirementPlot>,
+}
+
+/// The signal of a requirement over time, in the unit in which it is shown.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct RequirementPlot {
+    /// The signal's name.
+    pub signal: String,
+    /// The signal's unit.
+    pub unit: &'static str,
+    /// The instant that the curve counts from, ns of the run's clock.
+    pub began_ns: u64,
+    /// Lowest and highest values, by seconds.
+    pub curve: Curve,
+    /// Its limits.
+    pub limits: Vec<f64>,
+}

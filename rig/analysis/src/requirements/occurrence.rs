@@ -1,0 +1,64 @@
+//! Occurrences in the events of a run: `fault.NAME`, `stimulus.NAME`, their ends, and `SOURCE.CAUSE`.
+
+use masseter_shared::config::Scenario;
+use masseter_shared::messages::codes::{Cause, Source};
+use masseter_shared::wording::nearest;
+
+use crate::events::EventRecord;
+
+/// The events that count as an occurrence.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Occurrence {
+    /// An entry of the scenario begins or ends, by its number from 1.
+    Entry { cause: Cause, number: usize },
+    /// A reporter reports that cause.
+    Event { source: Source, cause: Cause },
+}
+
+impl Occurrence {
+    /// The occurrence of that name.
+    pub(super) fn parse(name: &str, scenario: &Scenario) -> Result<Self, String> {
+        let known = known(scenario);
+        let found: Vec<_> = known.iter().filter(|(known, _)| known == name).collect();
+        match found.as_slice() {
+            [(_, occurrence)] => Ok(*occurrence),
+            [] => {
+                let question = nearest(name, known.iter().map(|(known, _)| known.as_str()))
+                    .map_or_else(String::new, |likely| format!("; did you mean '{likely}'?"));
+                Err(format!(
+                    "'{name}' is no occurrence: use fault.NAME, stimulus.NAME, controller.STATE or SOURCE.CAUSE{question}"
+                ))
+            }
+            _ => Err(format!("'{name}': several entries have this name; give each a name of its own")),
+        }
+    }
+
+    /// Whether the event is one.
+    pub(super) fn matches(&self, event: &EventRecord) -> bool {
+        match self {
+            Self::Entry { cause, number } => event.cause == *cause && event.value == *number as f64,
+            Self::Event { source, cause } => event.source == *source && event.cause == *cause,
+        }
+    }
+}
+
+/// Every occurrence that a run of the scenario can have, with its name.
+fn known(scenario: &Scenario) -> Vec<(String, Occurrence)> {
+    let entries = |names: Vec<&str>, what: &str, causes: [Cause; 2]| -> Vec<_> {
+        let of_entry = |(place, name): (usize, &str)| {
+            let entry = |cause| Occurrence::Entry { cause, number: place + 1 };
+            [(format!("{what}.{name}"), entry(causes[0])), (format!("{what}.{name}.ended"), entry(causes[1]))]
+        };
+        names.into_iter().enumerate().flat_map(of_entry).collect()
+    };
+    let faults = entries(scenario.fault_names(), "fault", [Cause::FaultInjected, Cause::FaultEnded]);
+    let stimuli =
+        entries(scenario.stimulus_names(), "stimulus", [Cause::StimulusBegan, Cause::StimulusEnded]);
+    let events = Source::ALL.iter().flat_map(|source| {
+        let of_source = |cause: &Cause| {
+            (format!("{source}.{cause}"), Occurrence::Event { source: *source, cause: *cause })
+        };
+        Cause::ALL.iter().map(of_source).collect::<Vec<_>>()
+    });
+    faults.into_iter().chain(stimuli).chain(events).collect()
+}

@@ -1,0 +1,232 @@
+//! Responses: after each trigger, a condition follows within a time and holds for a time.
+//!
+//! A trigger at t is answered if, for some sample τ of [t + delay, t + within], the condition holds at every sample of
+//! [τ, τ + `stays_for`]. Both windows end at the last sample of the run. The robustness of an answer is the largest, over τ, of
+//! the smallest robustness of the condition in its window: the discrete semantics of signal temporal logic.
+
+use std::collections::VecDeque;
+
+use masseter_shared::clock::SECOND_NS;
+use masseter_shared::config::{Dimension, Quantity, RequirementConfig, Scenario, Unit};
+use masseter_shared::wording::counted;
+
+use super::condition::Condition;
+use super::finding::Finding;
+use super::moment::Moment;
+use super::trigger::Trigger;
+use super::window::Window;
+use crate::signals::Values;
+
+/// Triggers that are followed at a time. More are counted, not judged.
+const MOST_OPEN: usize = 1000;
+
+/// Judges responses.
+#[derive(Debug)]
+pub(super) struct Response {
+    trigger: Trigger,
+    then: Condition,
+    window: Window,
+    delay_ns: u64,
+    within_ns: Option<u64>,
+    stays_for_ns: u64,
+    /// Samples whose window has not ended yet, with the condition's robustness.
+    waiting: VecDeque<(u64, f64)>,
+    /// Of the waiting samples, those that may be the smallest of a window, in ascending order.
+    smallest: VecDeque<(u64, f64)>,
+    open: Vec<Answer>,
+    triggers: u64,
+    answered: u64,
+    not_followed: u64,
+    worst: Option<Answer>,
+    longest_s: Option<f64>,
+    last_ns: u64,
+}
+
+/// The answer to a trigger so far.
+#[derive(Debug, Clone, Copy)]
+struct Answer {
+    /// The sample at which the trigger counts, ns.
+    at_ns: u64,
+    /// When the trigger occurred, ns.
+    occurred_ns: u64,
+    /// The best robustness within the time.
+    best: f64,
+    /// When the condition first held as required, ns.
+    answered_ns: Option<u64>,
+}
+
+impl Answer {
+    fn latency_s(&self) -> Option<f64> {
+        Some((self.answered_ns? as f64 - self.occurred_ns as f64) / SECOND_NS as f64)
+    }
+}
+
+impl Response {
+    pub(super) fn new(
+        config: &RequirementConfig,
+        scenario: &Scenario,
+        values: &mut Values,
+    ) -> Result<Self, String> {
+        let given = config.when.as_deref().zip(config.then.as_deref());
+        let (when, then) = given.ok_or("give when and then")?;
+        let time_ns = |key: &str, time: Option<Quantity>| {
+            let seconds = time
+                .map(|time| time.si_of(Dimension::Time).map_err(|need| format!("{key} = {time}: {need}")));
+            Ok::<_, String>(seconds.transpose()?.map(|seconds| (seconds * SECOND_NS as f64).round() as u64))
+        };
+        let (delay_ns, within_ns) =
+            (time_ns("delay", config.delay)?.unwrap_or(0), time_ns("within", config.within)?);
+        if within_ns.is_some_and(|within_ns| within_ns < delay_ns) {
+            return Err("within is shorter than delay".to_owned());
+        }
+        Ok(Self {
+            trigger: Trigger::parse(when, scenario, values)?,
+            then: Condition::parse(then, values)?,
+            window: Window::new(config.during.as_ref(), scenario, values)?,
+            delay_ns,
+            within_ns,
+            stays_for_ns: time_ns("stays_for", config.stays_for)?.unwrap_or(0),
+            waiting: VecDeque::new(),
+            smallest: VecDeque::new(),
+            open: Vec::new(),
+            triggers: 0,
+            answered: 0,
+            not_followed: 0,
+            worst: None,
+            longest_s: None,
+            last_ns: 0,
+        })
+    }
+
+    /// What must hold, in words.
+    pub(super) fn must(&self) -> String {
+        let ms = |ns: u64| format!("{} ms", ns as f64 / 1e6);
+        let within = self.within_ns.map_or_else(String::new, |ns| format!(" within {}", ms(ns)));
+        let delay =
+            if self.delay_ns > 0 { format!(" not before {}", ms(self.delay_ns)) } else { String::new() };
+        let stays =
+            if self.stays_for_ns > 0 { format!(", for {}", ms(self.stays_for_ns)) } else { String::new() };
+        format!("after {}: {}{delay}{within}{stays}{}", self.trigger.text, self.then.text, self.window.text)
+    }
+
+    pub(super) fn take(&mut self, moment: &Moment<'_>) {
+        self.settle(moment.time_ns);
+        let robustness = self.then.robustness(moment.values).unwrap_or(f64::NEG_INFINITY);
+        self.waiting.push_back((moment.time_ns, robustness));
+        while self.smallest.back().is_some_and(|(_, last)| *last >= robustness) {
+            self.smallest.pop_back();
+        }
+        self.smallest.push_back((moment.time_ns, robustness));
+        self.last_ns = moment.time_ns;
+        let occurred = self.trigger.take(moment);
+        if self.window.contains(moment) {
+            occurred.into_iter().for_each(|occurred_ns| self.begin(moment.time_ns, occurred_ns));
+        }
+    }
+
+    fn begin(&mut self, at_ns: u64, occurred_ns: u64) {
+        self.triggers += 1;
+        if self.open.len() == MOST_OPEN {
+            self.not_followed += 1;
+        } else {
+            self.open.push(Answer { at_ns, occurred_ns, best: f64::NEG_INFINITY, answered_ns: None });
+        }
+    }
+
+    /// Judges the samples whose windows end before `now_ns`.
+    fn settle(&mut self, now_ns: u64) {
+        while let Some(&(time_ns, _)) = self.waiting.front()
+            && time_ns.saturating_add(self.stays_for_ns) < now_ns
+        {
+            self.waiting.pop_front();
+            while self.smallest.front().is_some_and(|(at_ns, _)| *at_ns < time_ns) {
+                self.smallest.pop_front();
+            }
+            let robustness = self.smallest.front().map_or(f64::NEG_INFINITY, |(_, smallest)| *smallest);
+            self.judge(time_ns, robustness);
+        }
+    }
+
+    fn judge(&mut self, time_ns: u64, robustness: f64) {
+        let (delay_ns, within_ns) = (self.delay_ns, self.within_ns);
+        for answer in self.open.iter_mut().filter(|answer| time_ns >= answer.at_ns.saturating_add(delay_ns)) {
+            if within_ns.is_none_or(|within_ns| time_ns <= answer.at_ns.saturating_add(within_ns)) {
+                answer.best = answer.best.max(robustness);
+            }
+            if robustness >= 0.0 {
+                answer.answered_ns.get_or_insert(time_ns);
+            }
+        }
+        // An answer is known once its time is over and the condition has held.
+        let is_known = |answer: &Answer| {
+            let is_over = within_ns.is_none_or(|within_ns| time_ns > answer.at_ns.saturating_add(within_ns));
+            is_over && answer.answered_ns.is_some()
+        };
+        let known: Vec<_> = self.open.extract_if(.., |answer| is_known(answer)).collect();
+        known.into_iter().for_each(|answer| self.close(answer));
+    }
+
+    fn close(&mut self, answer: Answer) {
+        self.answered += u64::from(answer.best >= 0.0);
+        let margin = self.margin(&answer).unwrap_or(f64::NEG_INFINITY);
+        let worst = self.worst.map(|worst| self.margin(&worst).unwrap_or(f64::NEG_INFINITY));
+        if worst.is_none_or(|worst| margin < worst) {
+            self.worst = Some(answer);
+        }
+        self.longest_s = match (self.longest_s, answer.latency_s()) {
+            (Some(longest_s), Some(latency_s)) => Some(latency_s.max(longest_s)),
+            (longest_s, latency_s) => longest_s.or(latency_s),
+        };
+    }
+
+    /// Of a signal its robustness; of a state the time left, s.
+    fn margin(&self, answer: &Answer) -> Option<f64> {
+        if self.then.is_numeric() {
+            return Some(answer.best);
+        }
+        let left_ns =
+            |within_ns: u64| Some(within_ns as f64 - (answer.answered_ns? as f64 - answer.at_ns as f64));
+        Some(left_ns(self.within_ns?)? / SECOND_NS as f64)
+    }
+
+    pub(super) fn finish(mut self) -> Finding {
+        // The windows that are left end with the run.
+        let stays_for_ns = std::mem::replace(&mut self.stays_for_ns, 0);
+        self.settle(u64::MAX);
+        self.stays_for_ns = stays_for_ns;
+        std::mem::take(&mut self.open).into_iter().for_each(|answer| self.close(answer));
+        let unit = self.unit();
+        let Some(worst) = self.worst else {
+            return Finding::untested(format!("{} never came", self.trigger.text), unit);
+        };
+        let margin = self.margin(&worst).filter(|margin| margin.is_finite());
+        let relative_margin = margin.and_then(|margin| {
+            let within_s = self.within_ns.map(|ns| ns as f64 / SECOND_NS as f64);
+            if self.then.is_numeric() { self.then.share(margin) } else { Finding::share(margin, within_s?) }
+        });
+        Finding {
+            margin,
+            relative_margin,
+            worst_ns: Some(worst.at_ns),
+            latency_s: self.longest_s,
+            ..Finding::new(self.answered == self.triggers, self.text(), unit)
+        }
+    }
+
+    fn text(&self) -> String {
+        let latency = match self.longest_s {
+            Some(longest_s) => format!("; longest latency {:.3} ms", longest_s * 1e3),
+            None => "; never followed".to_owned(),
+        };
+        let cut = match self.not_followed {
+            0 => String::new(),
+            more => format!("; {more} more not followed, as {MOST_OPEN} were open"),
+        };
+        format!("{} of {} answered{latency}{cut}", self.answered, counted(self.triggers, "trigger"))
+    }
+
+    /// The unit of the margin.
+    pub(super) fn unit(&self) -> Unit {
+        if self.then.is_numeric() { self.then.unit } else { Unit::named("ms").expect("a unit of time") }
+    }
+}

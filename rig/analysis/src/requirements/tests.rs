@@ -1,0 +1,285 @@
+//! Requirements over runs of a few samples, a millisecond apart.
+
+use masseter_recording::Recorded;
+use masseter_shared::config::Scenario;
+use masseter_shared::messages::codes::{Cause, ControllerState, EventKind, Source};
+use masseter_shared::messages::{Event, Reading, State};
+use masseter_shared::named::Declared;
+
+use super::{RequirementFigures, RequirementResult, Requirements, check_requirements};
+use crate::events::EventRecord;
+
+const MS: u64 = 1_000_000;
+
+/// A run: the force of axis l1 at each sample, N, and the controller's state.
+struct Run {
+    forces_n: Vec<f64>,
+    states: Vec<ControllerState>,
+    /// Times of the first fault's activations, ms.
+    strikes_ms: Vec<f64>,
+}
+
+impl Run {
+    /// The motion begins with the first sample.
+    fn of(forces_n: &[f64]) -> Self {
+        let states = vec![ControllerState::Running; forces_n.len()];
+        Self { forces_n: forces_n.to_vec(), states, strikes_ms: Vec::new() }
+    }
+
+    fn stopping_at(mut self, sample: usize) -> Self {
+        self.states[sample..].fill(ControllerState::SafeStop);
+        self
+    }
+
+    fn struck_at(mut self, time_ms: f64) -> Self {
+        self.strikes_ms.push(time_ms);
+        self
+    }
+
+    fn judge(&self, requirement: &str) -> RequirementFigures {
+        let text = format!(
+            "[[faults]]\nkind = 'encoder_stuck'\naxis = 'l2'\nat_s = 0.0\n[[require]]\nname = 'it'\n{requirement}"
+        );
+        let scenario = Scenario::parse("s.toml".as_ref(), &text).unwrap();
+        scenario.validate().unwrap();
+        check_requirements(&scenario, None).unwrap();
+        let mut requirements = Requirements::new(&scenario, &Declared::default());
+        for time_ms in &self.strikes_ms {
+            let event = Event::new(Source::Scenario, EventKind::Notice, Cause::FaultInjected);
+            let time_ns = (1e9 + time_ms * 1e6) as u64;
+            requirements.event(&EventRecord::from(&Event { time_ns, value: 1.0, ..event }));
+        }
+        for (place, (force_n, state)) in self.forces_n.iter().zip(&self.states).enumerate() {
+            let (cycle, sampled_ns) = (place as u64 + 1, 1000 * MS + place as u64 * MS);
+            if !force_n.is_nan() {
+                let mut reading = Reading { cycle, sampled_ns, ..Reading::default() };
+                reading.force_n[3] = *force_n;
+                requirements.take(&Recorded::Reading(reading));
+            }
+            let controller_state = state.code();
+            requirements.take(&Recorded::State(State {
+                cycle,
+                due_ns: sampled_ns,
+                controller_state,
+                ..State::default()
+            }));
+        }
+        requirements.finish().swap_remove(0)
+    }
+}
+
+/// Result, margin, and the moment of the smallest margin in samples.
+fn found(figures: &RequirementFigures) -> (RequirementResult, Option<f64>, Option<f64>) {
+    let rounded = |value: f64| (value * 1e6).round() / 1e6;
+    (figures.result, figures.margin.map(rounded), figures.worst_at_s.map(|at_s| rounded(at_s * 1e3)))
+}
+
+use RequirementResult::{Failed, Passed, Untested};
+
+#[test]
+fn bounds_have_the_smallest_margin_and_its_moment() {
+    let run = Run::of(&[1.0, 4.0, 3.0, -2.0]);
+    for (bounds, expected) in [
+        ("max = '5 N'", (Passed, Some(1.0), Some(1.0))),
+        ("max = '4 N'", (Passed, Some(0.0), Some(1.0))),
+        ("max = '3.5 N'", (Failed, Some(-0.5), Some(1.0))),
+        ("min = '-3 N'\nmax = '5 N'", (Passed, Some(1.0), Some(1.0))),
+        ("min = '-2.5 N'\nmax = '5 N'", (Passed, Some(0.5), Some(3.0))),
+        ("statistic = 'abs'\nmax = '4.5 N'", (Passed, Some(0.5), Some(1.0))),
+        ("statistic = 'mean'\nmax = '2 N'", (Passed, Some(0.5), None)),
+        ("statistic = 'rms'\nmax = '2 N'", (Failed, Some(-0.738_613), None)),
+        ("statistic = 'peak_to_peak'\nmax = '5 N'", (Failed, Some(-1.0), None)),
+        ("statistic = 'percentile'\npercentile = 50\nmax = '2 N'", (Passed, Some(1.0), None)),
+        ("max = '5 N'\nduring = { from_s = 0.002, to_s = 0.003 }", (Passed, Some(2.0), Some(2.0))),
+        ("max = '0.005 kN'", (Passed, Some(1.0), Some(1.0))),
+    ] {
+        let figures = run.judge(&format!("signal = 'l1.force'\n{bounds}"));
+        assert_eq!(found(&figures), expected, "{bounds}: {figures:?}");
+    }
+    let sum = run.judge("expression = 'abs({l1.force}) * 2'\nunit = 'N'\nmax = '9 N'");
+    assert_eq!(found(&sum), (Passed, Some(1.0), Some(1.0)));
+}
+
+#[test]
+fn bounds_without_a_sample_are_untested_and_missing_samples_are_counted() {
+    let gap = Run::of(&[1.0, f64::NAN, 3.0]);
+    let figures = gap.judge("signal = 'l1.force'\nmax = '5 N'");
+    assert_eq!(found(&figures).0, Passed);
+    assert_eq!(figures.finding, "3 N in 2 samples, 1 missing");
+    let lost = Run::of(&[f64::NAN; 3]).judge("signal = 'l1.force'\nmax = '5 N'");
+    assert_eq!(found(&lost), (Untested, None, None), "{lost:?}");
+    let never = gap.judge("signal = 'l1.force'\nmax = '5 N'\nduring = 'safe_stop'");
+    assert_eq!(
+        (never.result, never.finding.as_str()),
+        (Untested, "no sample while controller.state == safe_stop")
+    );
+    let never = gap.judge("signal = 'l1.force'\nmax = '5 N'\nduring = { after = 'fault.encoder_stuck' }");
+    assert_eq!(never.result, Untested);
+}
+
+#[test]
+fn a_window_after_an_occurrence_begins_with_the_next_sample() {
+    let run = Run::of(&[9.0, 9.0, 1.0, 2.0, 9.0]).struck_at(1.5);
+    let figures = run.judge(
+        "signal = 'l1.force'\nmax = '3 N'\nduring = { after = 'fault.encoder_stuck', for_s = 0.0015 }",
+    );
+    assert_eq!(found(&figures), (Passed, Some(1.0), Some(3.0)), "{figures:?}");
+}
+
+#[test]
+fn a_response_has_a_latency_and_the_time_left_as_its_margin() {
+    let run = Run::of(&[0.0; 12]).struck_at(1.5).stopping_at(6);
+    let respond = "when = 'fault.encoder_stuck'\nthen = 'controller.state == safe_stop'";
+    // The fault counts at sample 2, the stop is at sample 6.
+    for (within, expected) in [
+        ("within = '5 ms'", (Passed, Some(1.0), Some(2.0))),
+        ("within = '4 ms'", (Passed, Some(0.0), Some(2.0))),
+        ("within = '3 ms'", (Failed, Some(-1.0), Some(2.0))),
+        ("within = '5 ms'\nstays_for = '100 ms'", (Passed, Some(1.0), Some(2.0))),
+        ("within = '9 ms'\ndelay = '5 ms'", (Passed, Some(4.0), Some(2.0))),
+    ] {
+        let figures = run.judge(&format!("{respond}\n{within}"));
+        assert_eq!(found(&figures), expected, "{within}: {figures:?}");
+        let latency_ms = if within.contains("delay") { 5.5 } else { 4.5 };
+        assert!((figures.latency_ms.unwrap() - latency_ms).abs() < 1e-9, "{figures:?}");
+    }
+    let idle = Run::of(&[0.0; 4]).judge(&format!("{respond}\nwithin = '5 ms'"));
+    assert_eq!((idle.result, idle.finding.as_str()), (Untested, "fault.encoder_stuck never came"));
+    let never = Run::of(&[0.0; 12]).struck_at(1.5).judge(&format!("{respond}\nwithin = '5 ms'"));
+    assert_eq!((never.result, never.margin, never.latency_ms), (Failed, None, None));
+}
+
+#[test]
+fn a_response_that_does_not_stay_fails() {
+    let mut run = Run::of(&[0.0; 12]).struck_at(0.0).stopping_at(2);
+    run.states[5..].fill(ControllerState::Running);
+    let respond = "when = 'fault.encoder_stuck'\nthen = 'safe_stop'\nwithin = '9 ms'";
+    let respond = respond.replace("'safe_stop'", "'controller.state == safe_stop'");
+    assert_eq!(run.judge(&format!("{respond}\nstays_for = '2 ms'")).result, Passed);
+    assert_eq!(run.judge(&format!("{respond}\nstays_for = '3 ms'")).result, Failed);
+}
+
+/// The largest, over the answers in time, of the smallest robustness while it must stay: by the definition.
+fn robustness(forces_n: &[f64], trigger: usize, within: usize, stays_for: usize, limit_n: f64) -> f64 {
+    let end = forces_n.len() - 1;
+    let smallest = |at: usize| {
+        (at..=(at + stays_for).min(end)).map(|i| limit_n - forces_n[i]).fold(f64::INFINITY, f64::min)
+    };
+    (trigger..=(trigger + within).min(end)).map(smallest).fold(f64::NEG_INFINITY, f64::max)
+}
+
+#[test]
+fn the_margin_of_a_response_of_a_signal_is_the_robustness_of_temporal_logic() {
+    let mut seed = 7_u64;
+    let mut random = || {
+        seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (seed >> 40) as f64 / (1_u64 << 24) as f64
+    };
+    for _ in 0..200 {
+        let forces_n: Vec<f64> = (0..30).map(|_| random() * 10.0).collect();
+        let (trigger, within, stays_for) =
+            ((random() * 29.0) as usize, (random() * 12.0) as usize, (random() * 6.0) as usize);
+        let run = Run::of(&forces_n).struck_at(trigger as f64);
+        let figures = run.judge(&format!(
+            "when = 'fault.encoder_stuck'\nthen = 'l1.force < 5 N'\nwithin = '{within} ms'\nstays_for = '{stays_for} ms'"
+        ));
+        let expected = robustness(&forces_n, trigger, within, stays_for, 5.0);
+        assert!(
+            (figures.margin.unwrap() - expected).abs() < 1e-9,
+            "{trigger} {within} {stays_for}: {figures:?}"
+        );
+        assert_eq!(figures.result == Passed, expected >= 0.0, "{figures:?}");
+    }
+}
+
+#[test]
+fn a_condition_as_trigger_counts_when_it_begins() {
+    let run = Run::of(&[0.0, 6.0, 6.0, 1.0, 6.0, 6.0, 6.0, 1.0]);
+    let figures = run.judge("when = 'l1.force > 5 N'\nthen = 'l1.force < 2 N'\nwithin = '2 ms'");
+    assert_eq!(
+        (figures.result, figures.finding.as_str()),
+        (Failed, "1 of 2 triggers answered; longest latency 3.000 ms")
+    );
+    assert_eq!(figures.worst_at_s, Some(0.004));
+}
+
+#[test]
+fn what_must_never_hold_has_its_first_moment() {
+    let run = Run::of(&[1.0, 6.0, 7.0, 2.0]).struck_at(2.0);
+    let figures = run.judge("never = 'l1.force > 5 N'");
+    assert_eq!(
+        (found(&figures), figures.finding.as_str()),
+        ((Failed, Some(-2.0), Some(1.0)), "in 2 of 4 samples")
+    );
+    let figures = run.judge("never = 'l1.force > 8 N'");
+    assert_eq!(found(&figures), (Passed, Some(1.0), Some(2.0)));
+    assert_eq!(run.judge("never = 'fault.encoder_stuck'").result, Failed);
+    assert_eq!(run.judge("never = 'master.following_error'").result, Passed);
+    assert_eq!(run.judge("never = 'safe_stop'").result, Passed);
+}
+
+#[test]
+fn occurrences_are_counted_and_ordered() {
+    let run = Run::of(&[0.0; 12]).struck_at(1.0).struck_at(3.0).stopping_at(6);
+    for (requirement, result) in [
+        ("event = 'fault.encoder_stuck'\nat_least = 2", Passed),
+        ("event = 'fault.encoder_stuck'\nat_least = 3", Failed),
+        ("event = 'fault.encoder_stuck'\nat_most = 1", Failed),
+        ("event = 'fault.encoder_stuck'\nat_most = 1\nduring = { from_s = 0.002 }", Passed),
+        ("order = ['fault.encoder_stuck', 'controller.safe_stop']", Passed),
+        ("order = ['controller.safe_stop', 'fault.encoder_stuck']", Failed),
+        ("order = ['controller.running', 'controller.holding']", Failed),
+        ("order = ['controller.holding', 'controller.running']", Untested),
+    ] {
+        assert_eq!(run.judge(requirement).result, result, "{requirement}");
+    }
+}
+
+#[test]
+fn wrong_requirements_are_refused_with_what_to_write() {
+    for (requirement, expected) in [
+        (
+            "signal = 'l1.forse'\nmax = '1 N'",
+            "there is no signal 'l1.forse'; masseter signals lists them; did you mean 'l1.force'?",
+        ),
+        ("signal = 'l1.force'\nmax = '1 mm'", "max = 1 mm: give a number with one of the units N, mN, kN"),
+        ("signal = 'l1.force'", "give min, max or both"),
+        ("signal = 'l1.force'\nmax = '1 N'\nwithin = '1 ms'", "within has no effect with signal"),
+        ("signal = 'l1.force'\nnever = 'safe_stop'\nmax = '1 N'", "give exactly one of signal"),
+        ("signal = 'controller.state'\nmax = 3", "controller.state is a state, which has no bounds"),
+        ("signal = 'l1.force'\nmax = '1 N'\nduring = 'runing'", "'runing' is no condition"),
+        ("never = 'l1.force == 1 N'", "a measured value is never exactly a number"),
+        ("never = 'controller.state == stopped'", "'stopped' is no state: use wait_readings"),
+        ("never = 'controller.state < running'", "states have no order"),
+        (
+            "when = 'fault.encoder_stock'\nthen = 'controller.state == safe_stop'",
+            "did you mean 'fault.encoder_stuck'?",
+        ),
+        ("when = 'fault.encoder_stuck'", "give when and then"),
+        ("event = 'fault.encoder_stuck'", "give at_least, at_most or both"),
+        ("order = ['fault.encoder_stuck']", "give at least two occurrences"),
+        ("expression = '{l1.force} +'\nunit = 'N'\nmax = '1 N'", "expression = '{l1.force} +'"),
+        ("expression = '{l1.force}'\nunit = 'stone'\nmax = '1 N'", "unit = 'stone': the unit is unknown"),
+    ] {
+        let text = format!(
+            "[[faults]]\nkind = 'encoder_stuck'\naxis = 'l2'\nat_s = 0.0\n[[require]]\nname = 'it'\n{requirement}"
+        );
+        let scenario = Scenario::parse("s.toml".as_ref(), &text).unwrap();
+        let error = check_requirements(&scenario, None).unwrap_err();
+        assert!(error.starts_with("require 'it': ") && error.contains(expected), "{requirement}: {error}");
+    }
+}
+
+#[test]
+fn signals_of_a_controller_are_checked_once_it_has_declared_them() {
+    use masseter_shared::named::Signal;
+    let text = "[[require]]\nname = 'grip'\nsignal = 'signal.grip'\nmax = '3 N'";
+    let scenario = Scenario::parse("s.toml".as_ref(), text).unwrap();
+    check_requirements(&scenario, None).unwrap();
+    assert!(check_requirements(&scenario, Some(&Declared::default())).unwrap_err().contains("'signal.grip'"));
+    let signal = Signal { name: "grip".into(), unit: "N".into(), about: String::new() };
+    let declared = Declared { signals: vec![signal], parameters: Vec::new() };
+    check_requirements(&scenario, Some(&declared)).unwrap();
+    let found = Requirements::new(&scenario, &Declared::default()).finish();
+    assert_eq!(found[0].result, Untested, "the controller has no such signal");
+}

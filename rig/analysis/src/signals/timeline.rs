@@ -1,0 +1,148 @@
+//! The cycles of a run in the order of time, from messages that come topic after topic.
+//!
+//! A cycle is handed out once no message of it can come any more, together with the events up to its sample.
+
+use std::collections::VecDeque;
+
+use masseter_recording::Recorded;
+use masseter_shared::messages::Parameters;
+
+use super::cycle::CycleMessages;
+use crate::events::EventRecord;
+
+/// Cycles kept; more than a subscriber's queue holds of any topic.
+const KEPT: usize = 1 << 13;
+
+/// A cycle whose messages are complete.
+#[derive(Debug, Clone)]
+pub struct Sample {
+    /// When the drives sampled, ns.
+    pub time_ns: u64,
+    /// Its messages.
+    pub messages: CycleMessages,
+    /// The events since the cycle before, up to this sample.
+    pub events: Vec<EventRecord>,
+}
+
+/// Joins the messages of each cycle.
+#[derive(Debug, Default)]
+pub struct Timeline {
+    cycles: VecDeque<CycleMessages>,
+    /// Events that were not handed out yet.
+    events: Vec<EventRecord>,
+    parameters: Option<Parameters>,
+    last_ns: u64,
+}
+
+impl Timeline {
+    /// Takes a message of a cycle; hands out a cycle that is complete now.
+    pub fn take(&mut self, message: &Recorded) -> Option<Sample> {
+        match message {
+            Recorded::Reading(reading) => self.at(reading.cycle)?.reading = Some(*reading),
+            Recorded::Truth(truth) => self.at(truth.cycle)?.truth = Some(*truth),
+            Recorded::State(state) => self.at(state.cycle)?.state = Some(*state),
+            Recorded::Command(command) => self.at(command.cycle)?.command = Some(*command),
+            Recorded::Signals(signals) => self.at(signals.cycle)?.signals = Some(*signals),
+            Recorded::Parameters(parameters) => self.at(parameters.cycle)?.parameters = Some(*parameters),
+            Recorded::Event(_) | Recorded::Frame(_) | Recorded::Machine(_) => {}
+        }
+        if self.cycles.len() > KEPT { self.hand_out() } else { None }
+    }
+
+    /// A lost cycle may have acted on the jaw in this cycle.
+    pub fn disturb(&mut self, cycle: u64) {
+        if let Some(messages) = self.at(cycle) {
+            messages.is_disturbed = true;
+        }
+    }
+
+    /// Takes an event, which belongs to the first sample at or after its time.
+    pub fn event(&mut self, event: &EventRecord) {
+        self.events.push(event.clone());
+    }
+
+    /// The next cycle of those that are left once every message has come.
+    pub fn finish(&mut self) -> Option<Sample> {
+        while !self.cycles.is_empty() {
+            if let Some(sample) = self.hand_out() {
+                return Some(sample);
+            }
+        }
+        None
+    }
+
+    /// The messages of a cycle; none where the cycle was handed out, or is impossibly far ahead.
+    fn at(&mut self, cycle: u64) -> Option<&mut CycleMessages> {
+        let first = self.cycles.front().map_or(cycle, |messages| messages.cycle);
+        if self.cycles.is_empty() {
+            self.cycles.push_back(CycleMessages { cycle, ..CycleMessages::default() });
+        }
+        let place = cycle.checked_sub(first)? as usize;
+        if place > 2 * KEPT {
+            return None;
+        }
+        while self.cycles.len() <= place {
+            let cycle = first + self.cycles.len() as u64;
+            self.cycles.push_back(CycleMessages { cycle, ..CycleMessages::default() });
+        }
+        self.cycles.get_mut(place)
+    }
+
+    /// The oldest cycle; none where it has no message, as a skipped one.
+    fn hand_out(&mut self) -> Option<Sample> {
+        let mut messages = self.cycles.pop_front()?;
+        self.parameters = messages.parameters.or(self.parameters);
+        messages.parameters = self.parameters;
+        let time_ns = messages.time_ns().filter(|time_ns| *time_ns > self.last_ns)?;
+        self.last_ns = time_ns;
+        let mut events = Vec::new();
+        if !self.events.is_empty() {
+            let is_due = |event: &mut EventRecord| event.time_ns <= time_ns;
+            events.extend(self.events.extract_if(.., is_due));
+            events.sort_by_key(|event| event.time_ns);
+        }
+        Some(Sample { time_ns, messages, events })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use masseter_shared::messages::{Event, Reading, State};
+
+    use super::*;
+
+    fn reading(cycle: u64) -> Recorded {
+        Recorded::Reading(Reading { cycle, sampled_ns: cycle * 1000, ..Reading::default() })
+    }
+
+    #[test]
+    fn messages_of_a_cycle_come_together_in_the_order_of_time_with_the_events_before_them() {
+        let mut timeline = Timeline::default();
+        for cycle in [1, 2, 4] {
+            assert!(timeline.take(&reading(cycle)).is_none());
+        }
+        for cycle in 1..=4 {
+            timeline.take(&Recorded::State(State { cycle, due_ns: cycle * 1000 + 500, ..State::default() }));
+        }
+        for time_ns in [2000, 1500, 9000] {
+            timeline.event(&EventRecord::from(&Event { time_ns, ..Event::default() }));
+        }
+        let samples: Vec<_> = std::iter::from_fn(|| timeline.finish()).collect();
+        let times: Vec<_> = samples.iter().map(|sample| sample.time_ns).collect();
+        assert_eq!(times, [1000, 2000, 3500, 4000], "cycle 3 has no reading");
+        assert!(samples.iter().all(|sample| sample.messages.state.unwrap().cycle == sample.messages.cycle));
+        let events: Vec<Vec<_>> =
+            samples.iter().map(|sample| sample.events.iter().map(|event| event.time_ns).collect()).collect();
+        assert_eq!(events, [vec![], vec![1500, 2000], vec![], vec![]]);
+    }
+
+    #[test]
+    fn a_long_run_is_handed_out_while_it_goes_on() {
+        let mut timeline = Timeline::default();
+        let total = 3 * KEPT as u64;
+        let early = (1..=total).filter_map(|cycle| timeline.take(&reading(cycle))).count() as u64;
+        assert_eq!(early, total - KEPT as u64);
+        assert!(timeline.take(&reading(1)).is_none(), "too old");
+        assert_eq!(std::iter::from_fn(|| timeline.finish()).count(), KEPT);
+    }
+}
