@@ -204,7 +204,7 @@ mod tests {
 
     #[test]
     fn a_declared_fault_that_never_acted_tested_nothing() {
-        let what_to_do = ": raise its probability, or widen the time from from_s to until_s";
+        let what_to_do = ": raise its probability, or let the fault act earlier or longer";
         let cases = [
             (0, None),
             (1, Some(("ok", "1 of 1 declared faults acted".to_owned()))),
