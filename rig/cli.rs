@@ -13,6 +13,7 @@ use crate::can::{self, CanVerb};
 use crate::clean;
 use crate::controller::{self, ControllerArgs};
 use crate::doctor::{self, DoctorArgs};
+use crate::error_text::in_one_line;
 use crate::help::with_overview;
 use crate::init::{self, InitArgs};
 use crate::interface::{self, InterfaceArgs};
@@ -30,6 +31,7 @@ use crate::run::{
     args::{Readers, RunArgs},
 };
 use crate::signals_cli::{self, SignalsArgs};
+use crate::suite::{self, args::TestArgs};
 use crate::uniqueness::{self, UniquenessVerb};
 
 const FIRST_STEPS: &str = "\
@@ -70,6 +72,8 @@ struct Cli {
 enum Verb {
     /// Run a jaw motion through controller, plant and recorder, and judge it
     Run(RunArgs),
+    /// Run the scenarios of a folder as a suite of tests
+    Test(TestArgs),
     /// Lay down a scenario, a motion and a CI workflow to start from
     Init(InitArgs),
     /// Forward kinematics of a CSV file: actuator positions to poses
@@ -163,6 +167,7 @@ fn keep_files_private(verb: &Verb) {
 fn execute(verb: Verb) -> Result<Exit, Failure> {
     match verb {
         Verb::Run(args) => run::run(&args),
+        Verb::Test(args) => suite::test(&args),
         Verb::Init(args) => init::init(&args).usage(),
         Verb::Signals(args) => signals_cli::signals(&args).usage(),
         Verb::Report(args) => report_cli::report(&args),
@@ -185,18 +190,6 @@ fn execute(verb: Verb) -> Result<Exit, Failure> {
         Verb::Plant(args) => plant::plant(args).usage(),
         Verb::Recorder(args) => recorder::record(args).usage(),
     }
-}
-
-/// An error and its causes in one line, without causes that the text before quotes.
-fn in_one_line(error: &anyhow::Error) -> String {
-    error.chain().fold(String::new(), |text, cause| {
-        let cause = cause.to_string();
-        match text.as_str() {
-            "" => cause,
-            _ if text.contains(&cause) => text,
-            _ => text + ": " + &cause,
-        }
-    })
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 use std::thread;
 
 use anyhow::bail;
-use masseter_shared::config::Scenario;
+use masseter_shared::config::{FaultKindConfig, FaultLayer, Scenario};
 use masseter_shared::realtime::scheduling::{SchedulingRequest, obtain};
 use masseter_terminal::status;
 
@@ -64,6 +64,17 @@ fn refusal(scenario: &Scenario) -> Option<String> {
         obtained.refusals.into_iter().next()
     };
     realtime.cores.into_iter().find_map(try_on)
+}
+
+/// The first fault of a process, which exists only where there are processes.
+fn fault_of_process(scenario: &Scenario) -> Option<FaultKindConfig> {
+    let kinds = scenario.faults.iter().map(|fault| fault.kind);
+    kinds.into_iter().find(|kind| kind.layer() == FaultLayer::Process)
+}
+
+/// Whether the scenario cannot run in one thread.
+pub(crate) fn needs_processes(scenario: &Scenario) -> bool {
+    fault_of_process(scenario).is_some()
 }
 
 /// Refuses arguments that the clock has no use for.

@@ -74,11 +74,11 @@ pub(super) fn run(
     folder: &RunFolder,
     args: &RunArgs,
     manifest: &mut Manifest,
+    interrupts: &Interrupts,
 ) -> Result<(), Failure> {
-    let interrupts = Interrupts::listen().context("cannot listen for signals").died()?;
     let mut names_left = NAMES;
     let prepared = loop {
-        let prepared = Rig::prepare(plan, folder, &domain, args, &interrupts);
+        let prepared = Rig::prepare(plan, folder, &domain, args, interrupts);
         names_left -= 1;
         let squatter = domain.foreign_file().ok().flatten().filter(|_| names_left > 0);
         let (Err(failure), Some(path)) = (&prepared, squatter) else { break prepared };
@@ -99,15 +99,14 @@ pub(super) fn run(
             // The supervisor may be killed: a report of what is recorded then needs the names.
             manifest.write(folder).context("cannot write the manifest").incomplete()?;
             let ending = match args.lockstep() {
-                None => rig.run(plan, args.require_rt, &interrupts, manifest),
-                Some(_) => rig.run_in_lockstep(&interrupts),
+                None => rig.run(plan, args.require_rt, interrupts, manifest),
+                Some(_) => rig.run_in_lockstep(interrupts),
             };
             ending.died()
         }
         None => Ok(Ending::Interrupted),
     });
     drop(claim);
-    interrupts.restore_default_actions();
     match domain.sweep() {
         Ok(swept) => report_remaining(&swept.unwrap_or_default()),
         Err(error) => status!("masseter: {error}; 'masseter clean' removes the rest of this run"),

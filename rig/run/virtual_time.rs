@@ -1,4 +1,4 @@
-//! The run under virtual time: the same cores in one thread, as fast as they go, recorded by another.
+//! The run under virtual time: the same cores in one thread, as fast as they go. Its messages go to a [`Sink`].
 //!
 //! Every step happens exactly when the time table has it, so the same scenario and seed leave the
 //! same bytes. Computing takes no time here, and readings and commands go out when the time table has them at the
@@ -7,6 +7,7 @@
 use std::convert::Infallible;
 
 use anyhow::Context;
+use masseter_analysis::{Analysis, Figures};
 use masseter_controller::process::BuildController;
 use masseter_plan::RunPlan;
 use masseter_plant::PlantError;
@@ -23,83 +24,107 @@ use masseter_shared::schedule::CycleSchedule;
 use masseter_terminal::status;
 
 use super::child::PLANT;
+use super::sink::{Sink, Stream};
 use crate::machine::interrupts::Interrupts;
 
-/// Runs the rig under virtual time; it ends as the processes would, also when the user stops it. Enters the ending and what
+/// Runs the rig and records the run; it ends as the processes would, also when the user stops it. Enters the ending and what
 /// the controller declares into the manifest.
-pub(crate) fn run(
+pub(super) fn record(
     plan: &RunPlan,
     folder: &RunFolder,
     build: BuildController,
     manifest: &mut Manifest,
+    interrupts: &Interrupts,
 ) -> anyhow::Result<()> {
-    let interrupts = Interrupts::listen().context("cannot listen for signals")?;
-    let mut controller = build(&plan.scenario, plan.mechanism.clone(), plan.trajectory.clone());
-    let named = NamedValues::new(controller.declared(), &plan.scenario.parameters)?;
-    set_parameters(&mut *controller, &named);
-    manifest.declared = named.settings().declared().clone();
-    let ending = play(controller, named, plan, folder, &interrupts);
-    interrupts.restore_default_actions();
-    manifest.ending = ending?;
+    let run = Run::new(plan, build, manifest)?;
+    let scene = Scene::new(&plan.mechanism, &plan.scenario.jaw);
+    let mut recorder = Recorder::of_run(folder, scene)?;
+    recorder.declare(run.named.settings().declared())?;
+    let (backlog, ending) = run.play(plan, Backlog::start(recorder, Pace::Virtual), interrupts)?;
+    manifest.ending = ending;
+    if let Some(loss) = backlog.finish().loss() {
+        status!("masseter: {loss}; the run ends here");
+        manifest.ending = match &manifest.ending {
+            died @ Ending::Died { .. } => died.clone(),
+            _ => Ending::RecordingFailed,
+        };
+    }
     Ok(())
 }
 
-fn play(
+/// The same without a recording: the figures of the run.
+pub(super) fn analyse(
+    plan: &RunPlan,
+    build: BuildController,
+    manifest: &mut Manifest,
+    interrupts: &Interrupts,
+) -> anyhow::Result<Figures> {
+    let run = Run::new(plan, build, manifest)?;
+    let stream = Stream::new(Analysis::new(&plan.scenario, &manifest.declared));
+    let (stream, ending) = run.play(plan, stream, interrupts)?;
+    manifest.ending = ending;
+    stream.finish().context("a message on topic 'frame' holds no CAN frame")
+}
+
+/// The controller of a run that has not begun.
+struct Run {
     controller: Box<dyn Controller>,
     named: NamedValues,
-    plan: &RunPlan,
-    folder: &RunFolder,
-    interrupts: &Interrupts,
-) -> anyhow::Result<Ending> {
-    let scenario = &plan.scenario;
-    let mut plant = PlantCore::new(scenario, EPOCH_NS)?;
-    let scene = Scene::new(&plan.mechanism, &scenario.jaw);
-    let mut recorder = Recorder::of_run(folder, scene)?;
-    recorder.declare(named.settings().declared())?;
-    let backlog = Backlog::start(recorder, Pace::Virtual);
-    let log = Log { backlog, published: Default::default() };
-    let mut rig =
-        VirtualRig { controller, named, schedule: &plan.schedule, log, now_ns: EPOCH_NS, reading: None };
+}
 
-    let (mut cycle, mut plant_error) = (0, None);
-    while plant_error.is_none()
-        && rig.controller.outcome().is_none()
-        // Everything so far is or will be recorded.
-        && rig.log.backlog.dropped() == 0
-        && !interrupts.is_abort_requested()
-    {
-        cycle += 1;
-        if interrupts.is_stop_requested() {
-            rig.controller.request_stop();
+impl Run {
+    fn new(plan: &RunPlan, build: BuildController, manifest: &mut Manifest) -> anyhow::Result<Self> {
+        let mut controller = build(&plan.scenario, plan.mechanism.clone(), plan.trajectory.clone());
+        let named = NamedValues::new(controller.declared(), &plan.scenario.parameters)?;
+        set_parameters(&mut *controller, &named);
+        manifest.declared = named.settings().declared().clone();
+        Ok(Self { controller, named })
+    }
+
+    /// Plays the motion; returns the sink, and how the run ended if the sink took everything.
+    fn play<S: Sink>(self, plan: &RunPlan, sink: S, interrupts: &Interrupts) -> anyhow::Result<(S, Ending)> {
+        let Self { controller, named } = self;
+        let scenario = &plan.scenario;
+        let mut plant = PlantCore::new(scenario, EPOCH_NS)?;
+        let log = Log { sink, published: Default::default() };
+        let mut rig =
+            VirtualRig { controller, named, schedule: &plan.schedule, log, now_ns: EPOCH_NS, reading: None };
+
+        let (mut cycle, mut plant_error) = (0, None);
+        while plant_error.is_none()
+            && rig.controller.outcome().is_none()
+            && !rig.log.sink.has_failed()
+            && !interrupts.is_abort_requested()
+        {
+            cycle += 1;
+            if interrupts.is_stop_requested() {
+                rig.controller.request_stop();
+            }
+            let sync = Wake::on_time(cycle, EPOCH_NS + (cycle - 1) * scenario.period_ns());
+            plant_error = masseter_plant::cycle::run_cycle(&mut plant, &mut rig, &plan.schedule, &sync).err();
         }
-        let sync = Wake::on_time(cycle, EPOCH_NS + (cycle - 1) * scenario.period_ns());
-        plant_error = masseter_plant::cycle::run_cycle(&mut plant, &mut rig, &plan.schedule, &sync).err();
+        let ending = match (plant_error, rig.controller.outcome()) {
+            (Some(error), _) => Ending::died(PLANT, error.to_string()),
+            _ if interrupts.is_stop_requested() => Ending::Interrupted,
+            (None, Some(Outcome::SafeStop)) => Ending::SafeStop,
+            (None, _) => Ending::Completed,
+        };
+        Ok((rig.log.sink, ending))
     }
-    let loss = rig.log.backlog.finish().loss();
-    if let Some(loss) = &loss {
-        status!("masseter: {loss}; the run ends here");
-    }
-    Ok(match (plant_error, rig.controller.outcome()) {
-        (Some(error), _) => Ending::died(PLANT, error.to_string()),
-        _ if loss.is_some() => Ending::RecordingFailed,
-        _ if interrupts.is_stop_requested() => Ending::Interrupted,
-        (None, Some(Outcome::SafeStop)) => Ending::SafeStop,
-        (None, _) => Ending::Completed,
-    })
 }
 
 /// Both sides of the rig in one thread: the controller's cycle runs where the plant waits for its command.
-struct VirtualRig<'a> {
+struct VirtualRig<'a, S> {
     controller: Box<dyn Controller>,
     named: NamedValues,
     schedule: &'a CycleSchedule,
-    log: Log,
+    log: Log<S>,
     now_ns: u64,
     /// The reading of this cycle, as published.
     reading: Option<Reading>,
 }
 
-impl PlantPorts<VirtualLink> for VirtualRig<'_> {
+impl<S: Sink> PlantPorts<VirtualLink> for VirtualRig<'_, S> {
     type Command = Command;
     type Error = PlantError;
 
@@ -143,14 +168,14 @@ impl PlantPorts<VirtualLink> for VirtualRig<'_> {
 }
 
 /// The controller's side of a cycle.
-struct VirtualPorts<'a> {
-    log: &'a mut Log,
+struct VirtualPorts<'a, S> {
+    log: &'a mut Log<S>,
     now_ns: u64,
     reading: Option<Reading>,
     command: Option<Command>,
 }
 
-impl ControllerPorts for VirtualPorts<'_> {
+impl<S: Sink> ControllerPorts for VirtualPorts<'_, S> {
     type Reading = Reading;
     type Error = Infallible;
 
@@ -202,14 +227,14 @@ enum Publisher {
     PlantEvent,
 }
 
-/// The recording, and how many messages of each publisher it contains.
-struct Log {
-    backlog: Backlog,
+/// The sink, and how many messages of each publisher it took.
+struct Log<S> {
+    sink: S,
     published: [u64; Publisher::PlantEvent as usize + 1],
 }
 
-impl Log {
-    /// Numbers and records a message, as its publisher would.
+impl<S: Sink> Log<S> {
+    /// Numbers a message, as its publisher would, and hands it on.
     fn record<M: Message + Into<Recorded>>(
         &mut self,
         publisher: Publisher,
@@ -221,11 +246,11 @@ impl Log {
         let number = &mut self.published[publisher as usize];
         *number += 1;
         message.stamp(*number, now_ns);
-        self.backlog.record(&message.into(), now_ns);
+        self.sink.take(&message.into(), now_ns);
         message
     }
 
-    /// Records the frames and events of a cycle.
+    /// Hands on the frames and events of a cycle.
     fn drain(&mut self, plant: &mut PlantCore, now_ns: u64) {
         for frame in plant.drain_frames() {
             self.record(Publisher::Frame, now_ns, |message| *message = frame);

@@ -12,6 +12,7 @@ mod checks;
 pub mod compare;
 mod event_log;
 pub mod histogram_log;
+mod judgement;
 mod junit;
 mod motion_checks;
 mod outcome;
@@ -27,7 +28,8 @@ mod write_error;
 
 pub use candump_logs::CandumpLogs;
 pub use check::{Check, CheckFigures, CheckResult};
-pub use run_report::{report_past_run, report_run};
+pub use judgement::Judgement;
+pub use run_report::{judge_run, report_past_run, report_run};
 pub use table::Detail;
 pub use timing::{Timing, TimingWord};
 pub use verdict::Verdict;

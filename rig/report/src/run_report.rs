@@ -11,6 +11,7 @@ use masseter_shared::messages::tap::{self, TapError};
 use masseter_terminal::{Exit, Failure, Format, OrFailure, result, result_with_tones, status};
 
 use crate::candump_logs::CandumpLogs;
+use crate::judgement::Judgement;
 use crate::table::Detail;
 use crate::verdict::Verdict;
 use crate::write_error::WriteError;
@@ -56,6 +57,20 @@ pub fn report_run(
         show_and_write(folder, manifest, &figures, logged, (format, detail), Some(reserved))?;
     written.incomplete()?;
     Ok(exit)
+}
+
+/// The same without printing, for a run of many.
+///
+/// # Errors
+/// As [`report_run`].
+pub fn judge_run(folder: &RunFolder, manifest: &Manifest, reserved: File) -> Result<Judgement, Failure> {
+    let (figures, logged) =
+        analyse(folder, manifest).context("the run's recording cannot be analysed").incomplete()?;
+    let judgement = Judgement::new(manifest, &figures);
+    let documents = Documents::new(manifest, &figures, &judgement.verdict)?;
+    drop(reserved);
+    documents.write(folder, &figures, logged).incomplete()?;
+    Ok(judgement)
 }
 
 /// `masseter report`: the same of a past run. Where its folder is read-only, the run is shown and no file is written.
@@ -123,9 +138,7 @@ fn show_and_write(
     reserved: Option<File>,
 ) -> Result<(Exit, Result<(), WriteError>), Failure> {
     let verdict = Verdict::new(manifest, figures);
-    let summary = summary::json(&verdict, figures).context("cannot write the summary").incomplete()?;
-    let page = page::html(manifest, figures, &verdict).context("cannot write the page").incomplete()?;
-    let junit = junit::xml(manifest, figures, &verdict).context("cannot write junit.xml").incomplete()?;
+    let documents = Documents::new(manifest, figures, &verdict)?;
     let shown = match format {
         Format::Human => {
             let table = table::text(manifest, figures, &verdict, detail);
@@ -133,19 +146,43 @@ fn show_and_write(
             let text = format!("{table}\nreport: {}{more}\n", folder.file("report.html").display());
             result_with_tones(&text, &table::TONES)
         }
-        Format::Json => result(&summary),
+        Format::Json => result(&documents.summary),
     };
     drop(reserved);
-    let write = || {
-        fs::write(folder.summary(), summary).map_err(WriteError::for_file(&folder.summary()))?;
+    let written = documents.write(folder, figures, logged);
+    shown.incomplete()?;
+    Ok((verdict.exit_code, written))
+}
+
+/// The documents of a report.
+struct Documents {
+    summary: String,
+    page: String,
+    junit: String,
+}
+
+impl Documents {
+    fn new(manifest: &Manifest, figures: &Figures, verdict: &Verdict) -> Result<Self, Failure> {
+        Ok(Self {
+            summary: summary::json(verdict, figures).context("cannot write the summary").incomplete()?,
+            page: page::html(manifest, figures, verdict).context("cannot write the page").incomplete()?,
+            junit: junit::xml(manifest, figures, verdict).context("cannot write junit.xml").incomplete()?,
+        })
+    }
+
+    /// Writes them and the logs; `logged` is whether the logs of the buses were written.
+    fn write(
+        self,
+        folder: &RunFolder,
+        figures: &Figures,
+        logged: Result<(), WriteError>,
+    ) -> Result<(), WriteError> {
+        fs::write(folder.summary(), self.summary).map_err(WriteError::for_file(&folder.summary()))?;
         logged?;
         histogram_log::write_all(&folder.file("hist"), &figures.intervals)?;
         event_log::write(&folder.file("events.jsonl"), &figures.events)?;
-        [(folder.file("junit.xml"), junit), (folder.file("report.html"), page)]
+        [(folder.file("junit.xml"), self.junit), (folder.file("report.html"), self.page)]
             .into_iter()
             .try_for_each(|(path, text)| fs::write(&path, text).map_err(WriteError::for_file(&path)))
-    };
-    let written = write();
-    shown.incomplete()?;
-    Ok((verdict.exit_code, written))
+    }
 }

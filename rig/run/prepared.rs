@@ -1,0 +1,169 @@
+//! A run with its folder: prepared, played into the folder, and reported from there.
+
+use std::fs::File;
+use std::path::Path;
+
+use anyhow::Context;
+use masseter_plan::RunPlan;
+use masseter_recording::{Ending, MOTION, Manifest, RunFolder};
+use masseter_report::Judgement;
+use masseter_shared::config::{FileConfig, MotionConfig, Scenario};
+use masseter_shared::input::read_text;
+use masseter_shared::transport::{Domain, DomainLock};
+use masseter_terminal::{Exit, Failure, OrFailure, status};
+
+use super::args::{ClockKind, RunArgs};
+use super::resolve::resolve;
+use super::room::{self, Reserve};
+use super::{supervisor, virtual_time};
+use crate::arguments::name_of;
+use crate::machine::interrupts::Interrupts;
+use crate::{doctor, machine};
+
+/// Where runs without `--out` go.
+pub(super) const RUNS: &str = "runs";
+
+/// A run that can start.
+pub(crate) struct PreparedRun {
+    plan: RunPlan,
+    args: RunArgs,
+    /// None under virtual time.
+    domain: Option<(Domain, DomainLock)>,
+    folder: RunFolder,
+    manifest: Manifest,
+    reserve: Reserve,
+}
+
+/// A run that has ended.
+pub(crate) struct PlayedRun {
+    args: RunArgs,
+    folder: RunFolder,
+    manifest: Manifest,
+    /// The summary's room on the disk.
+    reserved: File,
+    /// Whether the manifest was written.
+    written: Result<(), Failure>,
+}
+
+impl PreparedRun {
+    /// Refuses a run that cannot start, and makes the folder of one that can.
+    pub(crate) fn new(args: &RunArgs) -> Result<Self, Failure> {
+        room::check_memory().usage()?;
+        let (plan, args) = resolve(args).usage()?;
+        room::check_disk(args.out.as_deref().unwrap_or(RUNS.as_ref()), &plan).incomplete()?;
+        let domain = match args.clock {
+            ClockKind::Virtual => None,
+            ClockKind::Auto | ClockKind::Rt | ClockKind::Lockstep => {
+                // This also removes what killed runs left.
+                let domain = supervisor::reserve_domain(args.name.as_deref()).usage()?;
+                room::check_shared_memory().usage()?;
+                Some(domain)
+            }
+        };
+        let folder = match &args.out {
+            Some(path) => RunFolder::create(path).usage()?,
+            None => RunFolder::create_in(RUNS.as_ref(), &plan.scenario.name).usage()?,
+        };
+        keep_scenario(&folder, &plan.scenario).incomplete()?;
+        if !args.quiet {
+            status!("{}", plan.announcement());
+        }
+        let manifest = manifest_of(&plan, &args);
+        // This one remains if the supervisor is killed.
+        write_manifest(&folder, &manifest)?;
+        let no_room = || format!("no room in {} for the verdict", folder.path().display());
+        let reserve = Reserve::take(folder.path()).with_context(no_room).incomplete()?;
+        Ok(Self { plan, args, domain, folder, manifest, reserve })
+    }
+
+    /// Plays the motion to its end.
+    pub(crate) fn play(self, interrupts: &Interrupts) -> Result<PlayedRun, Failure> {
+        let Self { plan, args, domain, folder, mut manifest, reserve } = self;
+        let ran = match domain {
+            None => {
+                let build = args.controller.builder().expect("the clock is checked");
+                virtual_time::record(&plan, &folder, build, &mut manifest, interrupts).incomplete()
+            }
+            Some(domain) => supervisor::run(domain, &plan, &folder, &args, &mut manifest, interrupts),
+        };
+        if let Err(failure) = &ran {
+            manifest.ending = Ending::died("rig", format!("{:#}", failure.error));
+        }
+        drop(reserve.manifest);
+        let written = write_manifest(&folder, &manifest);
+        ran?;
+        Ok(PlayedRun { args, folder, manifest, reserved: reserve.summary, written })
+    }
+}
+
+impl PlayedRun {
+    /// Judges the run, prints its report and writes it into the folder.
+    pub(super) fn report(self) -> Result<Exit, Failure> {
+        if self.is_unstarted() {
+            return Ok(Exit::Interrupted);
+        }
+        let Self { args, folder, manifest, reserved, written } = self;
+        let exit = masseter_report::report_run(&folder, &manifest, args.format, args.detail(), reserved)?;
+        written?;
+        Ok(exit)
+    }
+
+    /// The same without printing; none for a run that was interrupted before anything was recorded.
+    pub(crate) fn judge(self) -> Result<Option<Judgement>, Failure> {
+        if self.is_unstarted() {
+            return Ok(None);
+        }
+        let Self { folder, manifest, reserved, written, .. } = self;
+        let judgement = masseter_report::judge_run(&folder, &manifest, reserved)?;
+        written?;
+        Ok(Some(judgement))
+    }
+
+    /// Whether it was interrupted before every process was ready: nothing is recorded.
+    fn is_unstarted(&self) -> bool {
+        let has_processes = self.args.clock != ClockKind::Virtual;
+        self.manifest.ending == Ending::Interrupted && has_processes && self.manifest.scheduling.is_empty()
+    }
+}
+
+/// Plays a run under virtual time without a folder, and judges it from its messages.
+pub(crate) fn judge_unrecorded(args: &RunArgs, interrupts: &Interrupts) -> Result<Judgement, Failure> {
+    let (plan, args) = resolve(args).usage()?;
+    let mut manifest = manifest_of(&plan, &args);
+    let build =
+        args.controller.builder().context("virtual time runs controllers of the rig alone").usage()?;
+    let figures = virtual_time::analyse(&plan, build, &mut manifest, interrupts).died()?;
+    Ok(Judgement::new(&manifest, &figures))
+}
+
+/// What is known before the start.
+fn manifest_of(plan: &RunPlan, args: &RunArgs) -> Manifest {
+    let (motion_s, clock) = (plan.trajectory.duration_s(), name_of(&args.clock));
+    let mut manifest = Manifest::new(plan.scenario.clone(), motion_s, &clock, machine::describe());
+    manifest.controller = args.controller.name();
+    if args.clock == ClockKind::Rt {
+        manifest.mending_command = doctor::mending_command();
+    }
+    manifest
+}
+
+fn write_manifest(folder: &RunFolder, manifest: &Manifest) -> Result<(), Failure> {
+    let path = folder.manifest();
+    manifest.write(folder).with_context(|| format!("cannot write {}", path.display())).incomplete()
+}
+
+/// Copies the scenario, and the motion file that it plays, into the run folder: the original may change later.
+fn keep_scenario(folder: &RunFolder, scenario: &Scenario) -> anyhow::Result<()> {
+    let mut kept = scenario.clone();
+    if let MotionConfig::File(file) = &mut kept.motion {
+        let rows = read_text(&file.path, FileConfig::MOST_BYTES);
+        let rows = rows.with_context(|| format!("cannot read {}", file.path.display()))?;
+        keep(folder, &folder.motion(), &rows)?;
+        file.path = MOTION.into();
+    }
+    keep(folder, &folder.scenario(), &kept.to_toml())
+}
+
+fn keep(folder: &RunFolder, path: &Path, text: &str) -> anyhow::Result<()> {
+    folder.keep(path, text).with_context(|| format!("cannot write {}", path.display()))
+}

@@ -1,0 +1,236 @@
+//! `masseter test`: suites of real scenario files, their lines, exit codes, JUnit file and kept folders.
+
+mod common;
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::PathBuf;
+use std::process::{Command, Output, Stdio};
+use std::time::Duration;
+
+use common::{MASSETER, json, stderr, stdout, wait_until};
+use masseter_shared::clock;
+use rustix::process::{Pid, Signal, kill_process};
+
+const PASSES: &str = "duration_s = 1.0\n";
+const FAILS: &str = "duration_s = 1.0\n[checks]\ntracking_rms_mm = 1e-6\n";
+/// The fault would act after the end.
+const UNTESTED: &str = "duration_s = 1.0\n[[faults]]\nkind = 'lose'\nbus = 0\nfrom_s = 100.0\n";
+const UNREADABLE: &str = "sed = 1\n";
+
+/// A folder with scenarios in `suite`.
+struct Suite(tempfile::TempDir);
+
+impl Suite {
+    fn of(files: &[(&str, &str)]) -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        fs::create_dir(folder.path().join("suite")).unwrap();
+        for (name, text) in files {
+            fs::write(folder.path().join("suite").join(name), text).unwrap();
+        }
+        Self(folder)
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
+    fn command(&self, arguments: &[&str]) -> Command {
+        let mut command = Command::new(MASSETER);
+        command.current_dir(self.0.path()).arg("test").args(arguments);
+        command
+    }
+
+    fn test(&self, arguments: &[&str]) -> Output {
+        self.command(arguments).output().expect("masseter starts")
+    }
+}
+
+fn all_kinds() -> Suite {
+    Suite::of(&[
+        ("passes.toml", PASSES),
+        ("fails.toml", FAILS),
+        ("untested.toml", UNTESTED),
+        ("unreadable.toml", UNREADABLE),
+        ("notes.txt", "no scenario"),
+    ])
+}
+
+/// The test cases of a JUnit file by suite and name, each with the element in it.
+fn junit_cases(xml: &str) -> BTreeMap<(String, String), String> {
+    let attribute = |line: &str, name: &str| {
+        let rest = line.split_once(&format!(" {name}=\"")).expect("the attribute is there").1;
+        rest.split_once('"').expect("the attribute ends").0.to_owned()
+    };
+    let cases = xml.lines().filter(|line| line.trim_start().starts_with("<testcase "));
+    cases
+        .map(|line| {
+            let inner = line.split_once('>').unwrap().1;
+            let element = inner.trim_start_matches('<').split([' ', '/']).next().unwrap();
+            ((attribute(line, "classname"), attribute(line, "name")), element.to_owned())
+        })
+        .collect()
+}
+
+#[test]
+fn a_suite_lists_its_tests_and_the_reasons_of_those_that_failed() {
+    let suite = all_kinds();
+    let output = suite.test(&["suite", "--junit", "junit.xml", "--out", "kept"]);
+    let said = stdout(&output);
+    assert_eq!(output.status.code(), Some(1), "{said}{}", stderr(&output));
+    for line in [
+        "running 4 tests",
+        "test passes ... ok",
+        "test fails ... FAILED",
+        "test untested ... UNTESTED",
+        "test unreadable ... FAILED",
+        "---- fails ----",
+        "FAIL: failed: tracking",
+        "again: masseter run suite/fails.toml --clock virtual",
+        "report: kept/fails/report.html",
+        "suite/unreadable.toml:1:1: unknown key 'sed'",
+        "test result: FAILED. 1 passed; 2 failed; 1 untested; finished in ",
+    ] {
+        assert!(said.lines().any(|found| found.starts_with(line)), "{line}: {said}");
+    }
+    let mut kept: Vec<_> = fs::read_dir(suite.path("kept")).unwrap().map(|entry| entry.unwrap()).collect();
+    kept.sort_by_key(fs::DirEntry::file_name);
+    let kept: Vec<_> = kept.iter().map(|entry| entry.file_name().into_string().unwrap()).collect();
+    assert_eq!(kept, ["fails", "untested"]);
+    for file in ["report.html", "summary.json", "junit.xml", "recording.mcap", "manifest.json"] {
+        assert!(suite.path("kept/fails").join(file).is_file(), "{file}");
+    }
+    assert_eq!(json(&suite.path("kept/fails/summary.json"))["verdict"]["word"], "FAIL");
+
+    let cases = junit_cases(&fs::read_to_string(suite.path("junit.xml")).unwrap());
+    let found = |suite: &str, name: &str| cases[&(suite.to_owned(), name.to_owned())].as_str();
+    assert_eq!(found("passes", "run"), "");
+    assert_eq!(found("fails", "run"), "");
+    assert_eq!(found("fails", "tracking"), "failure");
+    assert_eq!(found("untested", "faults"), "failure");
+    assert_eq!(found("unreadable", "run"), "error");
+}
+
+/// The figures of a run without a recording are those of its recording.
+#[test]
+fn what_fails_without_a_recording_fails_with_it_in_the_same_words() {
+    let suite = Suite::of(&[("fails.toml", FAILS)]);
+    let output = suite.test(&["suite", "--out", "kept"]);
+    let summary = json(&suite.path("kept/fails/summary.json"));
+    let reason = summary["verdict"]["reason"].as_str().unwrap();
+    assert!(stdout(&output).contains(&format!("FAIL: {reason}\n")), "{}", stdout(&output));
+    let again = Command::new(MASSETER)
+        .args(["run", "suite/fails.toml", "--clock", "virtual", "--quiet", "--out", "again"])
+        .current_dir(suite.0.path())
+        .output()
+        .unwrap();
+    assert_eq!(again.status.code(), Some(1));
+    assert_eq!(json(&suite.path("again/summary.json")), summary);
+    let bytes = |folder: &str| fs::read(suite.path(folder).join("recording.mcap")).unwrap();
+    assert!(bytes("again") == bytes("kept/fails"));
+}
+
+#[test]
+fn a_suite_passes_if_every_scenario_does() {
+    let suite = Suite::of(&[("one.toml", PASSES), ("two.toml", PASSES)]);
+    let output = suite.test(&["suite", "--junit", "junit.xml"]);
+    assert_eq!(output.status.code(), Some(0), "{}{}", stdout(&output), stderr(&output));
+    assert!(stdout(&output).contains("test result: ok. 2 passed; 0 failed; 0 untested; finished in"));
+    assert!(!suite.path("runs").exists(), "nothing failed");
+    let xml = fs::read_to_string(suite.path("junit.xml")).unwrap();
+    assert!(xml.contains("failures=\"0\" errors=\"0\""), "{xml}");
+}
+
+#[test]
+fn what_is_untested_fails_unless_it_is_allowed() {
+    let suite = Suite::of(&[("untested.toml", UNTESTED)]);
+    for (arguments, code) in [(&["suite"][..], 1), (&["suite", "--allow-untested", "--out", "allowed"], 0)] {
+        let output = suite.test(arguments);
+        assert_eq!(output.status.code(), Some(code), "{}", stdout(&output));
+        assert!(stdout(&output).contains("0 passed; 0 failed; 1 untested"), "{}", stdout(&output));
+    }
+    assert!(!suite.path("allowed").exists());
+}
+
+#[test]
+fn a_filter_chooses_by_name_and_must_leave_something() {
+    let suite = all_kinds();
+    let output = suite.test(&["suite", "--filter", "passes"]);
+    assert_eq!(output.status.code(), Some(0), "{}", stdout(&output));
+    let said = stdout(&output);
+    assert!(said.contains("running 1 test\n") && said.contains("3 filtered out"), "{said}");
+    let none = suite.test(&["suite", "--filter", "encoder"]);
+    assert_eq!(none.status.code(), Some(2));
+    let expected = "there are: fails, passes, unreadable, untested";
+    assert!(stderr(&none).contains(expected), "{}", stderr(&none));
+}
+
+#[test]
+fn what_cannot_be_a_suite_is_refused() {
+    let suite = Suite::of(&[("one.toml", PASSES)]);
+    fs::create_dir(suite.path("empty")).unwrap();
+    for (arguments, expected) in [
+        (&["empty"][..], "has no scenario"),
+        (&["missing"], "cannot read missing"),
+        (&[], "required"),
+        (&["suite", "--out", "empty"], "exists and is not overwritten"),
+    ] {
+        let output = suite.test(arguments);
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {}", stdout(&output));
+        assert!(stderr(&output).contains(expected), "{arguments:?}: {}", stderr(&output));
+    }
+}
+
+#[test]
+fn files_can_be_named_and_runs_with_processes_keep_folders_of_failures_alone() {
+    let suite = all_kinds();
+    let arguments =
+        ["suite/passes.toml", "suite/fails.toml", "--clock", "lockstep", "--retries", "1", "--out", "kept"];
+    let output = suite.test(&arguments);
+    let said = stdout(&output);
+    assert_eq!(output.status.code(), Some(1), "{said}{}", stderr(&output));
+    assert!(said.contains("test passes ... ok\n"), "{said}");
+    assert!(said.contains("test fails ... FAILED (also after 1 retry)\n"), "{said}");
+    assert!(suite.path("kept/fails/report.html").is_file());
+    assert!(!suite.path("kept/passes").exists());
+}
+
+#[test]
+fn a_scenario_that_passes_after_a_retry_is_shown_as_such() {
+    // A controller that gives up in its first run, and attaches in the second.
+    let suite = Suite::of(&[("one.toml", PASSES)]);
+    let program = suite.path("controller.sh");
+    let script = format!(
+        "#!/bin/sh\nif [ -e {0} ]; then exec {MASSETER} controller; fi\ntouch {0}\nexit 1\n",
+        suite.path("tried").display()
+    );
+    fs::write(&program, script).unwrap();
+    Command::new("chmod").arg("+x").arg(&program).status().unwrap();
+    let output = suite.test(&["suite", "--controller", "./controller.sh", "--retries", "2"]);
+    let said = stdout(&output);
+    assert_eq!(output.status.code(), Some(0), "{said}{}", stderr(&output));
+    assert!(said.contains("test one ... ok (only after 1 retry)\n"), "{said}");
+}
+
+#[test]
+fn an_interrupt_ends_the_suite() {
+    let files: Vec<_> = (0..40).map(|number| format!("long{number}.toml")).collect();
+    let files: Vec<_> = files.iter().map(|name| (name.as_str(), "duration_s = 20.0\n")).collect();
+    let suite = Suite::of(&files);
+    let mut command = suite.command(&["suite"]);
+    let child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    let status = PathBuf::from(format!("/proc/{}/status", child.id()));
+    wait_until("it catches SIGINT", || {
+        let text = fs::read_to_string(&status).unwrap_or_default();
+        let caught = text.lines().find_map(|line| line.strip_prefix("SigCgt:"));
+        caught
+            .and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok())
+            .is_some_and(|mask| mask >> 1 & 1 == 1)
+    });
+    clock::sleep(Duration::from_millis(500));
+    kill_process(Pid::from_child(&child), Signal::INT).unwrap();
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(130), "{}{}", stdout(&output), stderr(&output));
+    assert!(stderr(&output).contains("interrupted after"), "{}", stderr(&output));
+    assert!(!suite.path("runs").exists());
+}
