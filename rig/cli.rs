@@ -14,6 +14,7 @@ use crate::clean;
 use crate::controller::{self, ControllerArgs};
 use crate::doctor::{self, DoctorArgs};
 use crate::error_text::in_one_line;
+use crate::faults::{self, FaultsVerb};
 use crate::help::with_overview;
 use crate::init::{self, InitArgs};
 use crate::interface::{self, InterfaceArgs};
@@ -89,6 +90,9 @@ enum Verb {
     /// List, read and set the parameters of a running controller
     #[command(subcommand, after_help = "Example:\n  masseter param set integral_gain_per_s=8")]
     Param(ParamVerb),
+    /// List the kinds of faults, or play them all: who detects which
+    #[command(subcommand, after_help = "Example:\n  masseter faults matrix")]
+    Faults(FaultsVerb),
     /// List the signals that requirements can use
     Signals(SignalsArgs),
     /// Print the messages as types of C or Python
@@ -169,6 +173,7 @@ fn execute(verb: Verb) -> Result<Exit, Failure> {
         Verb::Run(args) => run::run(&args),
         Verb::Test(args) => suite::test(&args),
         Verb::Init(args) => init::init(&args).usage(),
+        Verb::Faults(verb) => faults::execute(&verb),
         Verb::Signals(args) => signals_cli::signals(&args).usage(),
         Verb::Report(args) => report_cli::report(&args),
         Verb::Bench(args) => bench::run(&args),

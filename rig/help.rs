@@ -6,7 +6,7 @@ use clap::Command;
 
 /// What a user wants, and the verbs for that.
 const GROUPS: [(&str, &[&str]); 6] = [
-    ("Play a motion and judge it", &["init", "run", "test", "signals", "report", "recording"]),
+    ("Play a motion and judge it", &["init", "run", "test", "signals", "faults", "report", "recording"]),
     ("Bring your own controller", &["new", "interface", "controller", "param"]),
     ("Prepare this machine", &["doctor", "bench", "clean"]),
     ("Work with CAN and the drives", &["can", "plant"]),

@@ -17,6 +17,7 @@ pub mod cli;
 mod controller;
 mod doctor;
 mod error_text;
+mod faults;
 mod foxglove;
 mod help;
 mod init;

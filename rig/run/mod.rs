@@ -26,7 +26,7 @@ use crate::machine::interrupts::Interrupts;
 use args::RunArgs;
 
 pub(crate) use clock::needs_processes;
-pub(crate) use prepared::{PreparedRun, judge_unrecorded};
+pub(crate) use prepared::{PreparedRun, figures_unrecorded, judge_unrecorded};
 
 /// Plays the motion, judges the run, and writes its folder.
 pub(crate) fn run(args: &RunArgs) -> Result<Exit, Failure> {

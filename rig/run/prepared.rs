@@ -4,6 +4,7 @@ use std::fs::File;
 use std::path::Path;
 
 use anyhow::Context;
+use masseter_analysis::Figures;
 use masseter_plan::RunPlan;
 use masseter_recording::{Ending, MOTION, Manifest, RunFolder};
 use masseter_report::Judgement;
@@ -129,11 +130,28 @@ impl PlayedRun {
 /// Plays a run under virtual time without a folder, and judges it from its messages.
 pub(crate) fn judge_unrecorded(args: &RunArgs, interrupts: &Interrupts) -> Result<Judgement, Failure> {
     let (plan, args) = resolve(args).usage()?;
-    let mut manifest = manifest_of(&plan, &args);
+    let (manifest, figures) = unrecorded(&plan, &args, interrupts)?;
+    Ok(Judgement::new(&manifest, &figures))
+}
+
+/// Plays a plan under virtual time by the rig's own controller; its figures, without a folder.
+pub(crate) fn figures_unrecorded(
+    plan: &RunPlan,
+    interrupts: &Interrupts,
+) -> Result<(Manifest, Figures), Failure> {
+    unrecorded(plan, &RunArgs { clock: ClockKind::Virtual, ..RunArgs::default() }, interrupts)
+}
+
+fn unrecorded(
+    plan: &RunPlan,
+    args: &RunArgs,
+    interrupts: &Interrupts,
+) -> Result<(Manifest, Figures), Failure> {
+    let mut manifest = manifest_of(plan, args);
     let build =
         args.controller.builder().context("virtual time runs controllers of the rig alone").usage()?;
-    let figures = virtual_time::analyse(&plan, build, &mut manifest, interrupts).died()?;
-    Ok(Judgement::new(&manifest, &figures))
+    let figures = virtual_time::analyse(plan, build, &mut manifest, interrupts).died()?;
+    Ok((manifest, figures))
 }
 
 /// What is known before the start.

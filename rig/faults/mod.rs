@@ -1,0 +1,54 @@
+//! `masseter faults`: the kinds of faults, and the coverage of the rig: who detects which fault, and how far the jaw
+//! leaves its path until then.
+
+mod case;
+mod matrix;
+mod phases;
+mod picture;
+mod table;
+
+use std::path::PathBuf;
+
+use clap::{Args, Subcommand};
+use masseter_shared::config::FaultKindConfig;
+use masseter_terminal::{Exit, Failure, OrFailure, result};
+
+/// The verbs of `faults`.
+#[derive(Debug, Clone, Subcommand)]
+pub(crate) enum FaultsVerb {
+    /// List the kinds of faults with what they stand for
+    #[command(after_help = "Example:\n  masseter faults list")]
+    List,
+    /// Play every kind at every axis and phase of the motion: who detects it, how fast, how far the jaw leaves its path
+    #[command(after_help = "Example:\n  masseter faults matrix --out faults")]
+    Matrix(MatrixArgs),
+}
+
+/// The arguments of `faults matrix`.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct MatrixArgs {
+    /// Scenario file [default: chewing]
+    scenario: Option<PathBuf>,
+    /// Folder for matrix.csv and matrix.svg; must not exist
+    #[arg(long, value_name = "DIR", default_value = "faults")]
+    out: PathBuf,
+    /// Only kinds with this text in their names
+    #[arg(long, value_name = "TEXT")]
+    filter: Option<String>,
+}
+
+/// Lists the kinds, or plays the matrix.
+pub(crate) fn execute(verb: &FaultsVerb) -> Result<Exit, Failure> {
+    match verb {
+        FaultsVerb::List => list().usage(),
+        FaultsVerb::Matrix(args) => matrix::play(args),
+    }
+}
+
+fn list() -> anyhow::Result<Exit> {
+    let line = |kind: &FaultKindConfig| {
+        format!("{:<22} {:<10} {}\n", kind.name(), kind.layer().name(), kind.about())
+    };
+    result(&FaultKindConfig::ALL.iter().map(line).collect::<String>())?;
+    Ok(Exit::Passed)
+}
