@@ -13,6 +13,7 @@ use masseter_shared::realtime::Wake;
 
 use crate::emulation::VirtualLink;
 use crate::error::PlantError;
+use crate::injection::Injector;
 use crate::journal::{Journal, overflow};
 use crate::link::Link;
 use crate::link::sockets::SocketLink;
@@ -55,6 +56,7 @@ pub struct PlantCore<L = VirtualLink> {
     /// With the index of its bus.
     tapped: Vec<(u16, Tapped)>,
     wire_events: Journal,
+    injector: Injector,
     command_sent_ns: u64,
 }
 
@@ -102,15 +104,18 @@ pub fn check_interfaces(scenario: &Scenario) -> Result<(), PlantError> {
 
 impl<L: Link> PlantCore<L> {
     fn with_link(link: L, scenario: &Scenario, now_ns: u64) -> Result<Self, PlantError> {
-        Ok(Self {
+        let mut plant = Self {
             master: Master::new(scenario, now_ns)?,
             link,
+            injector: Injector::new(scenario, now_ns)?,
             buses: scenario.can.buses.len(),
             cycle: 0,
             tapped: Vec::with_capacity(TAPPED),
             wire_events: Journal::new(),
             command_sent_ns: 0,
-        })
+        };
+        plant.follow_injections();
+        Ok(plant)
     }
 
     /// Simulates everything up to `now_ns` now, instead of when the next cycle begins.
@@ -149,8 +154,33 @@ impl<L: Link> PlantCore<L> {
     /// Answers the cycle with the newest command, if one came.
     pub fn apply(&mut self, now_ns: u64, command: Option<&Command>) -> Result<(), PlantError> {
         self.link.advance(now_ns)?;
-        self.master.apply(now_ns, command, &mut self.link);
+        if self.injector.is_empty() {
+            self.master.apply(now_ns, command, &mut self.link);
+        } else {
+            let command = self.inject(now_ns, command);
+            self.master.apply(now_ns, command.as_ref(), &mut self.link);
+        }
         Ok(())
+    }
+
+    /// Begins the faults and stimuli that count from the command's state; returns the command that reaches the master.
+    fn inject(&mut self, now_ns: u64, command: Option<&Command>) -> Option<Command> {
+        let sampled_ns = self.master.sampled_ns();
+        if let Some(command) = command {
+            self.injector.note_command(command, sampled_ns);
+        }
+        self.follow_injections();
+        self.injector.alter(self.cycle, [sampled_ns, now_ns], command)
+    }
+
+    /// Takes what the emulation reports, and tells the link the times that have become known.
+    fn follow_injections(&mut self) {
+        while let Some(occurrence) = self.link.next_occurrence() {
+            self.injector.note(&occurrence, self.cycle);
+        }
+        while let Some((injected, window_ns)) = self.injector.next_window() {
+            self.link.set_window(injected, window_ns);
+        }
     }
 
     /// Stops the drives from the next process data on, for the end: commands are not needed any more.
@@ -180,6 +210,7 @@ impl<L: Link> PlantCore<L> {
 
     /// Hands out the events since the last drain.
     pub fn drain_events(&mut self, out: &mut impl FnMut(Event)) {
+        self.injector.drain_events(out);
         self.wire_events.drain(out);
         self.master.drain_events(out);
     }
@@ -196,9 +227,15 @@ impl<L: Link> PlantCore<L> {
                 }
             }
             while let Some(note) = self.link.next_note(bus, now_ns) {
+                if !note.has_ended {
+                    self.injector.note_bus_fault(note.fault, note.time_ns);
+                }
                 let axis = note.port.and_then(|port| self.link.axis_at(bus, port));
                 self.wire_events.add(wire_events::from_note(&note, bus, axis, self.cycle));
             }
+        }
+        if !self.injector.is_empty() {
+            self.follow_injections();
         }
     }
 

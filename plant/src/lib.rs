@@ -2,8 +2,9 @@
 //!
 //! | module | holds | depends on |
 //! | --- | --- | --- |
-//! | `mechanism` | dynamics, friction, food, poses at rest | |
-//! | `link` | traits between master and wires, real interfaces, layout of the buses | `mechanism` (its errors) |
+//! | `injection` | times and events of faults and stimuli, faults of commands | |
+//! | `mechanism` | dynamics, friction, food, disturbances, poses at rest | `injection` |
+//! | `link` | traits between master and wires, real interfaces, layout of the buses | `mechanism` (its errors), `injection` |
 //! | `drive` | an emulated drive: node (CiA 301), axis (CiA 402), object dictionary | `link` (layout) |
 //! | `master` | boot, exchange, supervision of the drives | `link` |
 //! | [`emulation`] | drives and mechanism on simulated wires or real interfaces | `drive`, `mechanism`, `link` |
@@ -21,6 +22,7 @@ pub mod description;
 mod drive;
 pub mod emulation;
 mod error;
+mod injection;
 mod journal;
 mod link;
 mod master;

@@ -2,7 +2,9 @@
 
 use masseter_can::canopen::{Cob, NodeId};
 use masseter_shared::geometry::{AXES, Mechanism, MechanismConfig, Pose, Vec3};
-use masseter_shared::messages::codes::{Cause, DriveRequest, DriveState, EventKind, NO_AXIS, Source};
+use masseter_shared::messages::codes::{
+    Cause, ControllerState, DriveRequest, DriveState, EventKind, NO_AXIS, Source,
+};
 use masseter_shared::messages::{LAYOUT_VERSION, tap};
 
 use super::*;
@@ -22,6 +24,7 @@ struct Bench {
     truth: Truth,
     frames: Vec<FrameTap>,
     events: Vec<Event>,
+    controller_state: ControllerState,
 }
 
 impl Bench {
@@ -34,6 +37,7 @@ impl Bench {
             truth: Truth::default(),
             frames: Vec::new(),
             events: Vec::new(),
+            controller_state: ControllerState::Easing,
         }
     }
 
@@ -52,6 +56,7 @@ impl Bench {
                 cycle: self.cycle,
                 target_m,
                 request: request.code(),
+                controller_state: self.controller_state.code(),
                 version: LAYOUT_VERSION,
                 ..Command::default()
             }
@@ -298,6 +303,9 @@ fn drives_that_never_boot_are_named_each() {
 }
 
 mod following;
+mod injected_faults;
+mod injected_times;
 mod refusals;
+mod stimuli;
 mod stops;
 mod wire_faults;

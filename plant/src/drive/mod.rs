@@ -11,6 +11,6 @@ mod settings;
 #[cfg(test)]
 mod tests;
 
-pub(crate) use axis::Encoder;
+pub(crate) use axis::{Encoder, Shaft};
 pub(crate) use node::DriveNode;
 pub(crate) use settings::DriveSettings;

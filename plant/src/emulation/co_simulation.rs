@@ -1,14 +1,20 @@
 //! Drives and mechanism, co-simulated in the order of time.
 
+use std::ops::Range;
+
 use masseter_can::canopen::Cob;
 use masseter_can::{CanId, ErrorState, Frame};
-use masseter_shared::config::Scenario;
+use masseter_shared::config::{FaultConfig, FaultKindConfig, FaultLayer, Scenario};
 use masseter_shared::geometry::{AXES, Mechanism};
+use masseter_shared::injection::{Injected, Injection};
 use masseter_shared::messages::{Truth, pose_fields};
 
+use super::agenda::{Agenda, Change, Effect};
+use super::encoder_faults::{EncoderFaults, past_of};
 use crate::checks::check_quantities;
-use crate::drive::{DriveNode, DriveSettings, Encoder};
+use crate::drive::{DriveNode, DriveSettings, Encoder, Shaft};
 use crate::error::PlantError;
+use crate::injection::{Occurrence, known_windows};
 use crate::mechanism::{Dynamics, DynamicsError, Food, MechanismState, closed_mouth, level};
 
 /// The six drives and the mechanism that they move.
@@ -43,6 +49,10 @@ pub struct Emulation {
     sample: Sample,
     /// Whether each drive has received the SYNC of the sample.
     synchronised: [bool; AXES],
+    agenda: Agenda,
+    encoder_faults: [EncoderFaults; AXES],
+    /// The scenario's own food.
+    food: Option<Food>,
 }
 
 /// State of the mechanism at a SYNC. The truth is computed from it later, once the reading is on its way.
@@ -71,7 +81,16 @@ impl Emulation {
         let mechanism = Mechanism::new(&scenario.mechanism)?;
         let food = scenario.food.map(|config| Food::new(config, &closed_mouth(&mechanism, &scenario.jaw)));
         let start = level(&mechanism, scenario.dynamics.initial_leg_m);
-        let dynamics = Dynamics::new(mechanism, scenario.dynamics, start, food)?;
+        let mut agenda = Agenda::new(scenario, &mechanism);
+        let injection =
+            Injection::new(scenario, now_ns).map_err(|error| PlantError::Scenario(error.to_string()))?;
+        for (injected, window_ns) in known_windows(scenario, &injection) {
+            agenda.set_window(injected, &window_ns);
+        }
+        let mut dynamics = Dynamics::new(mechanism, scenario.dynamics, start, food.clone())?;
+        if !agenda.is_empty() {
+            dynamics.prepare_injection(scenario.jaw.reference_point_m);
+        }
         let positions_m = dynamics.state().positions_m();
         let drive = |(axis, settings): (usize, &DriveSettings)| {
             let config = &settings.drive;
@@ -90,6 +109,9 @@ impl Emulation {
             moved_to_ns: now_ns,
             force_n,
             synchronised: [true; AXES],
+            agenda,
+            encoder_faults: encoder_faults(scenario),
+            food,
         })
     }
 
@@ -119,13 +141,26 @@ impl Emulation {
         self.moved_to_ns
     }
 
-    /// Delivers a frame to a drive. Only a SYNC moves the mechanism to this very instant.
+    /// The time in which a fault or a stimulus acts has become known.
+    pub(crate) fn set_window(&mut self, injected: Injected, window_ns: Range<u64>) {
+        self.agenda.set_window(injected, &window_ns);
+    }
+
+    /// The next beginning or end of a fault or a stimulus.
+    pub(crate) fn next_occurrence(&mut self) -> Option<Occurrence> {
+        self.agenda.next_occurrence()
+    }
+
+    /// Delivers a frame to a drive. Only a SYNC moves the mechanism to this very instant, and makes the drive look at it.
     pub fn deliver(&mut self, axis: usize, frame: &Frame, now_ns: u64) -> Result<(), DynamicsError> {
+        let mut position_m = self.dynamics.drive_positions_m()[axis];
         if frame.id() == CanId::from(Cob::Sync) {
             self.move_mechanism(now_ns)?;
+            self.follow_agenda(now_ns);
             self.synchronise(axis, now_ns);
+            position_m = self.encoder_faults[axis].seen_m(now_ns, self.dynamics.drive_positions_m()[axis]);
         }
-        self.drives[axis].receive(now_ns, frame, self.dynamics.state().positions_m()[axis]);
+        self.drives[axis].receive(now_ns, frame, position_m);
         Ok(())
     }
 
@@ -138,13 +173,99 @@ impl Emulation {
     pub fn step(&mut self) -> Result<(), DynamicsError> {
         let now_ns = self.next_step_ns;
         self.move_mechanism(now_ns)?;
-        let positions_m = self.dynamics.state().positions_m();
-        for (axis, position_m) in positions_m.into_iter().enumerate() {
-            self.force_n[axis] = self.drives[axis].step(now_ns, position_m);
+        self.follow_agenda(now_ns);
+        let positions_m = self.dynamics.drive_positions_m();
+        for (axis, is_m) in positions_m.into_iter().enumerate() {
+            let seen_m = self.encoder_faults[axis].seen_m(now_ns, is_m);
+            self.force_n[axis] = self.drives[axis].step(now_ns, Shaft { seen_m, is_m });
         }
-        self.dynamics.push(&self.force_n)?;
+        if self.agenda.is_empty() {
+            self.dynamics.push(&self.force_n)?;
+        } else {
+            self.push_injected(now_ns)?;
+        }
         self.next_step_ns += self.step_ns;
         Ok(())
+    }
+
+    /// Pushes the mechanism with the scenario's forces too, and reports the faults that have struck.
+    fn push_injected(&mut self, now_ns: u64) -> Result<(), DynamicsError> {
+        self.dynamics.release();
+        for (force_n, point_m) in self.agenda.pushes(now_ns) {
+            self.dynamics.load(force_n, point_m);
+        }
+        self.dynamics.push(&self.force_n)?;
+        let mut from = 0;
+        while let Some(place) = self.agenda.next_waiting(from) {
+            if self.has_struck(place) {
+                self.agenda.strike(place, now_ns);
+            }
+            from = place + 1;
+        }
+        Ok(())
+    }
+
+    /// Begins and ends what the scenario does to drives and mechanism by now.
+    #[inline]
+    fn follow_agenda(&mut self, now_ns: u64) {
+        while let Some(change) = self.agenda.next_change(now_ns) {
+            self.carry_out(change);
+        }
+    }
+
+    fn carry_out(&mut self, Change { place, is_begin }: Change) {
+        match *self.agenda.effect(place) {
+            Effect::Fault { kind, size, axis } if is_begin => {
+                axes_of(axis).for_each(|axis| self.begin_fault(axis, kind, size));
+            }
+            Effect::Fault { kind, axis, .. } => {
+                if !self.agenda.has_another(kind, axis) {
+                    axes_of(axis).for_each(|axis| self.end_fault(axis, kind));
+                }
+            }
+            Effect::FaultyPayload { .. } | Effect::Payload { .. } => {
+                let payloads_kg = self.agenda.active().filter_map(|effect| match effect {
+                    Effect::FaultyPayload { kg } | Effect::Payload { kg } => Some(*kg),
+                    _ => None,
+                });
+                self.dynamics.set_payload(payloads_kg.sum());
+            }
+            Effect::Food(_) => {
+                let served = self.agenda.active().filter_map(|effect| match effect {
+                    Effect::Food(food) => Some((**food).clone()),
+                    _ => None,
+                });
+                self.dynamics.set_food(served.last().or_else(|| self.food.clone()));
+            }
+            // Its force is asked for at every step.
+            Effect::Push(_) => {}
+        }
+    }
+
+    fn begin_fault(&mut self, axis: usize, kind: FaultKindConfig, size: f64) {
+        match kind.layer() {
+            FaultLayer::Encoder => self.encoder_faults[axis].begin(kind, size),
+            FaultLayer::Drive => self.drives[axis].faults_mut().begin(kind, size),
+            _ => self.dynamics.begin_fault(axis, kind, size),
+        }
+    }
+
+    fn end_fault(&mut self, axis: usize, kind: FaultKindConfig) {
+        match kind.layer() {
+            FaultLayer::Encoder => self.encoder_faults[axis].end(kind),
+            FaultLayer::Drive => self.drives[axis].faults_mut().end(kind),
+            _ => self.dynamics.end_fault(axis, kind),
+        }
+    }
+
+    /// Whether the fault at that place of the agenda has changed something.
+    fn has_struck(&self, place: usize) -> bool {
+        let Effect::Fault { kind, axis, .. } = *self.agenda.effect(place) else { return false };
+        axes_of(axis).any(|axis| match kind.layer() {
+            FaultLayer::Encoder => self.encoder_faults[axis].has_struck(kind),
+            FaultLayer::Drive => self.drives[axis].faults().has_struck(kind),
+            _ => self.dynamics.has_struck(axis, kind),
+        })
     }
 
     /// Skips the steps due before `now_ns`: the mechanism rests meanwhile. Returns the skipped time, ns.
@@ -179,6 +300,22 @@ impl Emulation {
         }
         self.synchronised[axis] = true;
     }
+}
+
+/// The axis, or all of them.
+fn axes_of(axis: Option<usize>) -> Range<usize> {
+    axis.map_or(0..AXES, |axis| axis..axis + 1)
+}
+
+/// No faults yet, with room for the past of the slowest encoder that the scenario has on each axis.
+fn encoder_faults(scenario: &Scenario) -> [EncoderFaults; AXES] {
+    let durations_ns = [scenario.dynamics.step_ns, scenario.period_ns()];
+    std::array::from_fn(|axis| {
+        let delays = scenario.faults.iter().filter(|fault| fault.kind == FaultKindConfig::EncoderDelay);
+        let of_axis = delays.filter(|fault| fault.axis() == Some(axis)).map(FaultConfig::size_si);
+        let past = of_axis.reduce(f64::max).map_or(0, |delay_s| past_of(delay_s, durations_ns));
+        EncoderFaults::new(scenario.seed, axis, past)
+    })
 }
 
 #[cfg(test)]

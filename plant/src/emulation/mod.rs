@@ -3,8 +3,10 @@
 //! [`Emulation`] co-simulates drives and mechanism, without wires. Simulated wires step it with a master
 //! (the plant's default link) or without one ([`OpenLink`]); [`Emulator`] steps it on real interfaces.
 
+mod agenda;
 mod co_simulation;
 mod emulator;
+mod encoder_faults;
 mod open_link;
 mod virtual_link;
 

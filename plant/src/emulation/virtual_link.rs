@@ -1,14 +1,18 @@
 //! Simulated wires with the emulated drives on them, for a master on port 0 and for free ports.
 
+use std::ops::Range;
+
 use masseter_can::faults::{FaultNote, Faults};
 use masseter_can::{Bus, ReceiveError, Tapped, VirtualWire, WireConfig};
 use masseter_shared::config::{MASTER_NODE, Scenario};
 use masseter_shared::geometry::AXES;
+use masseter_shared::injection::Injected;
 use masseter_shared::messages::Truth;
 use masseter_shared::realtime::Waiter;
 
 use super::co_simulation::Emulation;
 use crate::error::PlantError;
+use crate::injection::Occurrence;
 use crate::link::faults::{fault_seed, faults_of_bus, restart_after_ns};
 use crate::link::layout::{DrivePort, MASTER_PORT, drive_ports, node_ids};
 use crate::link::{Buses, Link};
@@ -58,6 +62,17 @@ impl Link for VirtualLink {
 
     fn next_note(&mut self, bus: usize, now_ns: u64) -> Option<FaultNote> {
         self.wires[bus].next_note(now_ns)
+    }
+
+    fn set_window(&mut self, injected: Injected, window_ns: Range<u64>) {
+        if let Injected::Fault(number) = injected {
+            self.wires.iter_mut().for_each(|wire| wire.set_fault_window(number, window_ns.clone()));
+        }
+        self.emulation.set_window(injected, window_ns);
+    }
+
+    fn next_occurrence(&mut self) -> Option<Occurrence> {
+        self.emulation.next_occurrence()
     }
 
     fn axis_at(&self, bus: usize, port: usize) -> Option<usize> {
@@ -145,6 +160,6 @@ fn wire(scenario: &Scenario, bus: usize, free_ports: usize, now_ns: u64) -> Resu
         receive_capacity: RECEIVE_CAPACITY,
         restart_after_ns: restart_after_ns(can),
     };
-    let faults = faults_of_bus(&scenario.faults, bus, &nodes, now_ns)?;
+    let faults = faults_of_bus(scenario, bus, &nodes, now_ns)?;
     Ok(VirtualWire::with_faults(&config, Faults::new(faults, fault_seed(scenario, bus))))
 }

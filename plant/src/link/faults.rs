@@ -2,11 +2,14 @@
 //!
 //! This module injects nothing; the wires do.
 
+use std::ops::Range;
+
 use masseter_can::canopen::NodeId;
 use masseter_can::faults::{Fault, FaultKind};
 use masseter_can::{CanId, Frame};
 use masseter_shared::clock::{MILLISECOND_NS, SECOND_NS};
 use masseter_shared::config::{CanConfig, FaultConfig, FaultKindConfig, Scenario};
+use masseter_shared::injection::{Injected, Injection};
 
 use crate::error::PlantError;
 
@@ -25,24 +28,29 @@ pub(crate) fn restart_after_ns(can: &CanConfig) -> Option<u64> {
 }
 
 /// The faults of a bus whose ports have these nodes, switched on at `now_ns`. A fault's number is its index in the
-/// scenario's list.
+/// scenario's list. A fault whose time is not known at switch-on does not act before it is set.
 pub(crate) fn faults_of_bus(
-    list: &[FaultConfig],
+    scenario: &Scenario,
     bus: usize,
     nodes: &[NodeId],
     now_ns: u64,
 ) -> Result<Vec<Fault>, PlantError> {
-    let of_bus = list.iter().enumerate().filter(|(_, config)| config.bus == Some(bus));
-    of_bus.map(|(number, config)| Ok(fault(number, config, port_of(config, nodes)?, now_ns))).collect()
+    let injection =
+        Injection::new(scenario, now_ns).map_err(|error| PlantError::Scenario(error.to_string()))?;
+    let of_bus = scenario.faults.iter().enumerate().filter(|(_, config)| config.bus == Some(bus));
+    let fault = |(number, config): (usize, &FaultConfig)| {
+        let window_ns = injection.window_ns(Injected::Fault(number)).unwrap_or(u64::MAX..u64::MAX);
+        Ok(fault(number, config, port_of(config, nodes)?, window_ns))
+    };
+    of_bus.map(fault).collect()
 }
 
-fn fault(number: usize, config: &FaultConfig, port: Option<usize>, now_ns: u64) -> Fault {
-    let at_ns = |time_s: f64| now_ns.saturating_add((time_s * SECOND_NS as f64) as u64);
+fn fault(number: usize, config: &FaultConfig, port: Option<usize>, window_ns: Range<u64>) -> Fault {
     Fault {
         number,
         kind: kind(config),
-        from_ns: config.from_s.map_or(u64::MAX, at_ns),
-        until_ns: config.until_s.map_or(u64::MAX, at_ns),
+        from_ns: window_ns.start,
+        until_ns: window_ns.end,
         id: config.id.filter(|_| config.kind != FaultKindConfig::Babble).map(standard),
         port,
         probability: config.probability,

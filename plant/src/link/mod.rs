@@ -3,11 +3,15 @@
 //! [`sockets`] connects the master to real interfaces; the emulation brings simulated wires of its own. [`layout`]
 //! assigns drives to buses, [`faults`] assigns faults to them.
 
+use std::ops::Range;
+
 use masseter_can::faults::FaultNote;
 use masseter_can::{Bus, ReceiveError, Tapped};
+use masseter_shared::injection::Injected;
 use masseter_shared::messages::Truth;
 use masseter_shared::realtime::Waiter;
 
+use crate::injection::Occurrence;
 use crate::mechanism::DynamicsError;
 
 pub(crate) mod faults;
@@ -33,6 +37,14 @@ pub trait Link: Buses {
 
     /// The next beginning or end of an injected fault up to `now_ns`.
     fn next_note(&mut self, bus: usize, now_ns: u64) -> Option<FaultNote>;
+
+    /// The time in which a fault or a stimulus acts has become known.
+    fn set_window(&mut self, injected: Injected, window_ns: Range<u64>);
+
+    /// The next beginning or end of what the emulation carries out; the wires have notes instead.
+    fn next_occurrence(&mut self) -> Option<Occurrence> {
+        None
+    }
 
     /// The axis whose drive is at a port of a simulated wire; none at the master's.
     fn axis_at(&self, _bus: usize, _port: usize) -> Option<usize> {

@@ -1,5 +1,6 @@
 //! The link to real drives: SocketCAN interfaces. It has no truth of the mechanism.
 
+use std::ops::Range;
 use std::os::unix::net::UnixDatagram;
 
 use masseter_can::PortFaults;
@@ -8,6 +9,7 @@ use masseter_can::{Bus, ReceiveError, SocketCan, Tapped};
 use masseter_shared::clock;
 use masseter_shared::config::{MASTER_NODE, Scenario};
 use masseter_shared::geometry::AXES;
+use masseter_shared::injection::Injected;
 use masseter_shared::realtime::Waiter;
 
 use super::faults::{fault_seed, faults_of_bus, restart_after_ns};
@@ -36,7 +38,7 @@ impl SocketLink {
         check_quantities(scenario)?;
         let can = &scenario.can;
         let faults_of_port = |bus: usize| {
-            let faults = faults_of_bus(&scenario.faults, bus, &[MASTER_NODE], now_ns)?;
+            let faults = faults_of_bus(scenario, bus, &[MASTER_NODE], now_ns)?;
             let (seed, restart_after_ns) = (fault_seed(scenario, bus), restart_after_ns(can));
             Ok(PortFaults::new(faults, MASTER_PORT, seed, restart_after_ns)?)
         };
@@ -62,6 +64,12 @@ impl Link for SocketLink {
 
     fn next_note(&mut self, bus: usize, now_ns: u64) -> Option<FaultNote> {
         self.faults[bus].next_note(now_ns)
+    }
+
+    fn set_window(&mut self, injected: Injected, window_ns: Range<u64>) {
+        if let Injected::Fault(number) = injected {
+            self.faults.iter_mut().for_each(|port| port.set_fault_window(number, window_ns.clone()));
+        }
     }
 
     fn wait(&mut self, latest_ns: u64, waiter: &mut Waiter) -> u64 {

@@ -59,6 +59,11 @@ impl Exchange {
         self.wake.woke_ns
     }
 
+    /// When the drives sampled, ns: at the last bit of SYNC.
+    pub(super) fn sampled_ns(&self) -> u64 {
+        self.wake.woke_ns + self.sync_frame_ns
+    }
+
     /// Process data of the cycle arrived.
     pub(super) fn note_process_data(&mut self, time_ns: u64) {
         self.complete_ns = self.complete_ns.max(time_ns);
@@ -81,8 +86,8 @@ impl Exchange {
     /// Writes the cycle and its times.
     pub(super) fn fill_reading(&self, reading: &mut Reading) {
         let Wake { cycle, due_ns, woke_ns, skipped, account, .. } = self.wake;
+        reading.sampled_ns = self.sampled_ns();
         (reading.cycle, reading.due_ns, reading.woke_ns) = (cycle, due_ns, woke_ns);
-        reading.sampled_ns = woke_ns + self.sync_frame_ns;
         reading.complete_ns = self.complete_ns;
         reading.skipped_cycles = skipped;
         reading.stalled_ns = account.stalled_ns;

@@ -126,6 +126,11 @@ impl Master {
         self.exchange.note_sync(bus, time_ns);
     }
 
+    /// When the drives sampled in this cycle, as the reading has it, ns.
+    pub(crate) fn sampled_ns(&self) -> u64 {
+        self.exchange.sampled_ns()
+    }
+
     /// Writes this cycle's reading, without the times that only the link has.
     pub(crate) fn fill_reading(&self, reading: &mut Reading) {
         *reading = Reading { master_fault: u32::from(self.supervision.is_stopped()), ..Reading::default() };

@@ -9,16 +9,18 @@
 //!
 //! (M_platform + Jᵀ M_q J) V̇ = Jᵀ(τ − friction − M_q J̇V) + gravity + food − gyroscopic moment.
 //!
-//! End stops, play and elasticity are left out.
+//! End stops, play and elasticity are left out, unless a scenario has [faults](super::disturbances) of the mechanism.
 
-use masseter_shared::config::DynamicsConfig;
+use masseter_shared::config::{DynamicsConfig, FaultKindConfig};
 use masseter_shared::geometry::{
     AXES, InverseError, Jacobian, Joints, LEGS, LimitViolation, Mechanism, Pose, Twist, Vec3,
 };
 use nalgebra::{Matrix3, Matrix6, UnitQuaternion, Vector3, Vector6};
 
+use super::disturbances::{AxisMotion, Disturbances, Disturbed};
 use super::food::{Food, vertical};
 use super::friction;
+use super::load::Load;
 
 /// Pose, twist and joint coordinates of the mechanism.
 #[derive(Debug, Clone, Copy)]
@@ -45,6 +47,15 @@ pub(crate) struct Dynamics {
     /// V̇ under the forces that act.
     acceleration: Twist,
     food: Option<Food>,
+    /// None where the scenario has neither faults nor stimuli of the mechanism.
+    injected: Option<Injected>,
+}
+
+/// What a scenario does to the mechanism.
+#[derive(Debug, Clone)]
+struct Injected {
+    disturbances: Disturbances,
+    load: Load,
 }
 
 /// Dynamics that cannot be built or cannot be integrated.
@@ -95,13 +106,79 @@ impl Dynamics {
         }
         let (twist, acceleration) = (Twist::zeros(), Twist::zeros());
         let state = MechanismState { pose, twist, joints };
-        let dynamics = Self { mechanism, config, state, acceleration, food };
+        let dynamics = Self { mechanism, config, state, acceleration, food, injected: None };
         match dynamics.longest_step_ns()? {
             longest_ns if longest_ns < *DynamicsConfig::STEPS_NS.start() => Err(DynamicsError::Stiff),
             longest_step_ns if config.step_ns > longest_step_ns => {
                 Err(DynamicsError::Friction { longest_step_ns })
             }
             _ => Ok(dynamics),
+        }
+    }
+
+    /// Makes the mechanism ready for faults and loads, with the incisal point in the platform frame, m.
+    pub(crate) fn prepare_injection(&mut self, incisal_m: [f64; 3]) {
+        let strokes = self.mechanism.strokes();
+        let disturbances = Disturbances::new(std::array::from_fn(|axis| strokes.of_axis(axis)));
+        self.injected = Some(Injected { disturbances, load: Load::new(Vec3::from(incisal_m)) });
+    }
+
+    /// A fault of an axis begins.
+    pub(crate) fn begin_fault(&mut self, axis: usize, kind: FaultKindConfig, size: f64) {
+        let (positions_m, speeds_m_s) = (self.state.positions_m(), self.velocities_m_s(&self.state));
+        let (position_m, speed_m_s) = (positions_m[axis], speeds_m_s[axis]);
+        let motion = AxisMotion { position_m, speed_m_s, mass_kg: self.axis_mass_kg()[axis] };
+        if let Some(injected) = &mut self.injected {
+            injected.disturbances.begin(axis, kind, size, motion);
+        }
+    }
+
+    /// A fault of an axis ends.
+    pub(crate) fn end_fault(&mut self, axis: usize, kind: FaultKindConfig) {
+        let position_m = self.state.positions_m()[axis];
+        if let Some(injected) = &mut self.injected {
+            injected.disturbances.end(axis, kind, position_m);
+        }
+    }
+
+    /// Whether a fault of an axis has changed something.
+    pub(crate) fn has_struck(&self, axis: usize, kind: FaultKindConfig) -> bool {
+        let acting = self.injected.as_ref().map(|injected| injected.disturbances.acting(axis));
+        acting.is_some_and(|acting| acting.has_struck(kind))
+    }
+
+    /// Another mass at the incisal point, kg.
+    pub(crate) fn set_payload(&mut self, payload_kg: f64) {
+        if let Some(injected) = &mut self.injected {
+            injected.load.set_payload(payload_kg);
+        }
+    }
+
+    /// Takes the forces of the last step from the platform.
+    pub(crate) fn release(&mut self) {
+        if let Some(injected) = &mut self.injected {
+            injected.load.release();
+        }
+    }
+
+    /// Adds a force for the coming step (N, base axes) at a point of the platform (m; the incisal point when absent).
+    pub(crate) fn load(&mut self, force_n: [f64; 3], point_m: Option<[f64; 3]>) {
+        if let Some(injected) = &mut self.injected {
+            injected.load.push(&self.state.pose, Vec3::from(force_n), point_m.map(Vec3::from));
+        }
+    }
+
+    /// Another food, or none.
+    pub(crate) fn set_food(&mut self, food: Option<Food>) {
+        self.food = food;
+    }
+
+    /// Where the encoders see the axes, m: at the drives' side of each joint.
+    pub(crate) fn drive_positions_m(&self) -> [f64; AXES] {
+        let joints_m = self.state.positions_m();
+        match &self.injected {
+            None => joints_m,
+            Some(injected) => injected.disturbances.drive_positions_m(joints_m),
         }
     }
 
@@ -143,7 +220,9 @@ impl Dynamics {
         let jacobian = self.jacobian_at(&self.state);
         let (axes, hinges) = self.bias(&jacobian);
         let inertia = self.platform_inertia();
-        let axes_n = Vector6::from(*force_n)
+        let disturbed = self.disturb(&jacobian, force_n);
+        let driven_n = disturbed.map_or(Vector6::from(*force_n), |disturbed| disturbed.force_n);
+        let axes_n = driven_n
             - friction::force_n(&self.config, &(jacobian.actuators * self.state.twist))
             - self.axis_mass_kg().component_mul(&axes);
         let food = self
@@ -151,12 +230,43 @@ impl Dynamics {
             .as_mut()
             .map_or_else(Vector6::zeros, |food| food.bite(&self.state.pose, &self.state.twist));
         let hinges_nm = hinges * -self.config.leg_inertia_kg_m2;
-        let wrench =
+        let mut wrench =
             jacobian.actuators.tr_mul(&axes_n) + jacobian.hinges.tr_mul(&hinges_nm) + self.gravity() + food
                 - self.gyroscopic(&inertia);
-        let solver = self.mass(&jacobian, &inertia).cholesky().ok_or(DynamicsError::Mass)?;
+        let mut mass = self.mass(&jacobian, &inertia);
+        if let (Some(disturbed), Some(injected)) = (disturbed, &self.injected) {
+            let MechanismState { pose, twist, .. } = &self.state;
+            wrench += injected.load.wrench(pose, twist, self.config.gravity_m_s2)
+                + jacobian.actuators.tr_mul(&disturbed.parted_kg.component_mul(&axes));
+            let moved_kg = Matrix6::from_diagonal(&(disturbed.resisting_kg - disturbed.parted_kg));
+            mass += injected.load.mass(pose) + jacobian.actuators.tr_mul(&(moved_kg * jacobian.actuators));
+        }
+        let solver = mass.cholesky().ok_or(DynamicsError::Mass)?;
         self.acceleration = solver.solve(&wrench);
+        let step_s = self.step_s();
+        if let Some(injected) = &mut self.injected {
+            let change_m_s2 = jacobian.actuators * self.acceleration + axes;
+            let speeds_m_s = jacobian.actuators * self.state.twist + change_m_s2 * step_s;
+            injected.disturbances.settle(&speeds_m_s);
+        }
         Ok(())
+    }
+
+    /// What the faults make of the drives' forces (N) in a step; none where there are no faults.
+    fn disturb(&mut self, jacobian: &Jacobian, force_n: &[f64; AXES]) -> Option<Disturbed> {
+        let (positions_m, masses_kg) = (self.state.positions_m(), self.axis_mass_kg());
+        let injected = self.injected.as_mut()?;
+        let speeds_m_s = jacobian.actuators * self.state.twist;
+        let motions = std::array::from_fn(|axis| AxisMotion {
+            position_m: positions_m[axis],
+            speed_m_s: speeds_m_s[axis],
+            mass_kg: masses_kg[axis],
+        });
+        Some(injected.disturbances.act(&self.config, force_n, motions))
+    }
+
+    fn step_s(&self) -> f64 {
+        self.config.step_ns as f64 * 1e-9
     }
 
     /// Integrates over `dt_s`: semi-implicit Euler.
@@ -169,6 +279,9 @@ impl Dynamics {
         rotation.renormalize();
         *pose = Pose::from_parts((pose.translation.vector + linear).into(), rotation);
         *joints = self.mechanism.inverse(pose)?;
+        if let Some(injected) = &mut self.injected {
+            injected.disturbances.advance(dt_s);
+        }
         Ok(())
     }
 

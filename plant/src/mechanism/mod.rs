@@ -1,11 +1,18 @@
-//! The mechanism that the drives move: its dynamics, friction, food between the teeth, and the pose in which it starts.
+//! The mechanism that the drives move: its dynamics, friction, food between the teeth, faults, and the pose in which it
+//! starts.
 //!
 //! This module never solves the forward kinematics. Drives and buses are not part of it.
 
+mod coupling;
+mod disturbances;
 mod dynamics;
+mod element;
 mod food;
 mod friction;
+mod load;
 mod resting;
+mod seizure;
+mod stops;
 
 pub use dynamics::DynamicsError;
 pub(crate) use dynamics::{Dynamics, MechanismState};

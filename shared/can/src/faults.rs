@@ -4,6 +4,8 @@
 //! frame, however often a caller asks. [`VirtualWire`](super::VirtualWire) carries the faults out, and on any other bus
 //! [`PortFaults`](super::PortFaults).
 
+use std::ops::Range;
+
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg32;
 
@@ -43,7 +45,7 @@ pub struct Fault {
     pub number: usize,
     /// What it does.
     pub kind: FaultKind,
-    /// Begin, ns.
+    /// Begin, ns; the greatest number where it is not known yet.
     pub from_ns: u64,
     /// End, ns.
     pub until_ns: u64,
@@ -151,6 +153,13 @@ impl Faults {
             is_end_reported: false,
         };
         Self { list: faults.into_iter().map(listed).collect(), seed }
+    }
+
+    /// Sets when a fault acts, where that is known only later. A number of none of these faults has no effect.
+    pub(super) fn set_window(&mut self, number: usize, window_ns: Range<u64>) {
+        for listed in self.list.iter_mut().filter(|listed| listed.fault.number == number) {
+            (listed.fault.from_ns, listed.fault.until_ns) = (window_ns.start, window_ns.end);
+        }
     }
 
     /// Whether there are none.

@@ -4,6 +4,8 @@
 //! bus-off returns after the restart time, like a controller with `restart-ms`, but does not wait for 128 sequences of
 //! recessive bits.
 
+use std::ops::Range;
+
 use crate::bus::{Bus, BusStatus, ErrorState, ReceiveError, Received, SendError};
 use crate::faults::{Fault, FaultKind, FaultNote, Faults, NumberedFrame};
 use crate::frame::Frame;
@@ -101,6 +103,11 @@ impl PortFaults {
     /// The next note on the faults up to `now_ns`.
     pub fn next_note(&mut self, now_ns: u64) -> Option<FaultNote> {
         self.faults.next_note(now_ns)
+    }
+
+    /// Sets when a fault acts. A number of no fault has no effect.
+    pub fn set_fault_window(&mut self, number: usize, window_ns: Range<u64>) {
+        self.faults.set_window(number, window_ns);
     }
 
     fn numbered(&self, at_ns: u64, frame: &Frame, number: u64) -> NumberedFrame {

@@ -7,26 +7,33 @@
 mod demand;
 mod encoder;
 mod following;
+mod gear;
 mod homing;
 mod motion;
+mod motor;
 mod parameters;
 mod positioning;
 mod profile;
 mod servo;
 
 use masseter_can::cia402::{Controlword, DriveState, StateCommand, StatusBit, Statusword};
-use masseter_shared::config::DriveConfig;
+use masseter_shared::clock::SECOND_NS;
+use masseter_shared::config::{DriveConfig, FaultKindConfig};
 
 use crate::drive::dictionary::{Objects, names};
+use crate::injection::Acting;
 use demand::Demand;
 use following::FollowingErrorMonitor;
+use gear::Gear;
 use motion::{Motion, MotionCommand, PositionView, clamp};
+use motor::{Asked, Motor};
 use parameters::Parameters;
 use positioning::Positioning;
 use profile::Profile;
 use servo::{Servo, ServoCommand, ServoLimits};
 
 pub(crate) use encoder::Encoder;
+pub(crate) use motion::Shaft;
 pub(super) use homing::Homing;
 pub(super) use motion::{Mode, NewTargets};
 pub(super) use parameters::configure;
@@ -52,8 +59,12 @@ pub(super) struct Axis {
     origin_increments: i32,
     /// Whether the newest cyclic target was limited.
     is_target_limited: bool,
-    /// The force of the last step on the mechanism, N.
-    force_n: f64,
+    gear: Gear,
+    motor: Motor,
+    /// Injected faults of the drive.
+    faults: Acting,
+    /// Since when a fault delays "operation enabled", ns.
+    enabling_since_ns: Option<u64>,
     /// The motor's share of the force: without current the brake holds.
     motor_n: f64,
 }
@@ -82,7 +93,10 @@ impl Axis {
             controlword: Controlword::DISABLE_VOLTAGE,
             origin_increments: 0,
             is_target_limited: false,
-            force_n: 0.0,
+            gear: Gear::default(),
+            motor: Motor::default(),
+            faults: Acting::default(),
+            enabling_since_ns: None,
             motor_n: 0.0,
         }
     }
@@ -101,6 +115,23 @@ impl Axis {
     /// Whether the axis follows targets.
     pub(super) fn is_enabled(&self) -> bool {
         self.power == DriveState::OperationEnabled
+    }
+
+    /// The injected faults that act on the drive.
+    pub(super) fn faults(&self) -> &Acting {
+        &self.faults
+    }
+
+    /// The injected faults, to begin and end them, and to tell that they struck.
+    pub(super) fn faults_mut(&mut self) -> &mut Acting {
+        &mut self.faults
+    }
+
+    /// Goes into fault by itself; returns whether it was in none.
+    pub(super) fn fail(&mut self, now_ns: u64) -> bool {
+        let fails = !self.is_in_fault();
+        self.enter(self.power.after_fault(), now_ns);
+        fails
     }
 
     fn is_in_fault(&self) -> bool {
@@ -152,7 +183,24 @@ impl Axis {
         } else {
             self.power.after(command)
         };
+        let next = self.delayed(next, now_ns);
         self.enter(next, now_ns);
+    }
+
+    /// The next state, where an injected fault delays "operation enabled".
+    fn delayed(&mut self, next: DriveState, now_ns: u64) -> DriveState {
+        let delay_s = self.faults.size(FaultKindConfig::DriveSlowEnable);
+        let is_enabling = next == DriveState::OperationEnabled && !self.is_enabled();
+        let Some(delay_s) = delay_s.filter(|_| is_enabling) else {
+            self.enabling_since_ns = None;
+            return next;
+        };
+        let since_ns = *self.enabling_since_ns.get_or_insert(now_ns);
+        if now_ns - since_ns >= (delay_s * SECOND_NS as f64) as u64 {
+            return next;
+        }
+        self.faults.strike(FaultKindConfig::DriveSlowEnable);
+        if self.power == DriveState::ReadyToSwitchOn { DriveState::SwitchedOn } else { self.power }
     }
 
     /// Reacts by 6007h when nobody controls the drive any more; returns whether that put it into fault.
@@ -169,7 +217,7 @@ impl Axis {
 
     /// The buffered cyclic targets take effect; a position beyond the velocity limit is approached further.
     pub(super) fn synchronise(&mut self, now_ns: u64, new: NewTargets, objects: &Objects) {
-        if !self.is_enabled() {
+        if !self.is_enabled() || self.ignores(new) {
             return;
         }
         match self.mode {
@@ -182,6 +230,15 @@ impl Axis {
             Mode::CyclicTorque if new.torque => self.apply_torque(objects.get(names::TARGET_TORQUE)),
             _ => {}
         }
+    }
+
+    /// Whether an injected fault makes the drive ignore its targets.
+    fn ignores(&mut self, new: NewTargets) -> bool {
+        let ignores = self.faults.has(FaultKindConfig::DriveIgnoresTargets);
+        if ignores && new != NewTargets::default() {
+            self.faults.strike(FaultKindConfig::DriveIgnoresTargets);
+        }
+        ignores
     }
 
     /// Follows a position target within the software position limits and the velocity limit.
@@ -201,11 +258,13 @@ impl Axis {
         self.demand = Demand::Force { force_n };
     }
 
-    /// A step of the servo loops with the axis at `position_m`; returns the force until the next one, N, and
-    /// whether the following error became a fault.
-    pub(super) fn step(&mut self, now_ns: u64, position_m: f64) -> (f64, bool) {
+    /// A step of the servo loops; returns the force until the next one, N, and whether the following error became a
+    /// fault.
+    pub(super) fn step(&mut self, now_ns: u64, shaft: Shaft) -> (f64, bool) {
         self.complete_transition(now_ns);
-        let before = std::mem::replace(&mut self.counts, self.encoder.read(position_m));
+        self.take_off_torque(now_ns);
+        let seen_m = shaft.seen_m + self.gear_error_m(now_ns);
+        let before = std::mem::replace(&mut self.counts, self.encoder.read(seen_m));
         if self.is_enabled() {
             let is_at_rest = self.demand.is_at_rest(now_ns);
             let command = match self.mode {
@@ -218,14 +277,61 @@ impl Axis {
         let limits = self.servo_limits();
         let measured_m = self.encoder.metres(self.counts);
         let command = self.demand.servo_command(now_ns);
-        self.force_n = self.servo.step(measured_m, command, &limits);
-        self.motor_n = if command == ServoCommand::Brake { 0.0 } else { self.force_n };
-        (self.force_n, self.supervise_following(now_ns))
+        let asked_n = self.servo.step(measured_m, seen_m - shaft.is_m, command, &limits);
+        let is_braking = command == ServoCommand::Brake;
+        self.motor_n = if is_braking { 0.0 } else { asked_n };
+        let force_n = self.drive_motor(Asked {
+            force_n: asked_n,
+            is_braking,
+            max_force_n: self.config.max_force_n,
+        });
+        (force_n, self.supervise_following(now_ns))
     }
 
-    /// Reads the encoder with the axis at `position_m`, as SYNC demands.
-    pub(super) fn sample(&mut self, position_m: f64) {
-        self.counts = self.encoder.read(position_m);
+    /// The force of motor and brake, N. The loops know nothing of a fault; the current that the drive shows is the motor's.
+    fn drive_motor(&mut self, asked: Asked) -> f64 {
+        let force_n = self.motor.force_n(asked, self.servo.shaft(), &mut self.faults);
+        if self.faults.has(FaultKindConfig::DriveRunaway) {
+            self.motor_n = asked.max_force_n;
+        }
+        if asked.is_braking && self.faults.has(FaultKindConfig::BrakeOpen) {
+            self.servo.release_brake();
+        }
+        force_n
+    }
+
+    /// Reads the encoder, as SYNC demands.
+    pub(super) fn sample(&mut self, now_ns: u64, seen_m: f64) {
+        let gear_error_m = self.gear_error_m(now_ns);
+        self.counts = self.encoder.read(seen_m + gear_error_m);
+    }
+
+    /// The distance of what the drive sees from the shaft, where its gear ratio is or was wrong.
+    fn gear_error_m(&mut self, now_ns: u64) -> f64 {
+        let ratio = self.faults.size(FaultKindConfig::DriveScale);
+        let error_m = self.gear.error_m(ratio, self.demand.position_m(now_ns));
+        if error_m != 0.0 {
+            self.faults.strike(FaultKindConfig::DriveScale);
+        }
+        error_m
+    }
+
+    /// While the torque is safely off, the drive stays in "switch on disabled", or in fault.
+    fn take_off_torque(&mut self, now_ns: u64) {
+        use DriveState::{
+            Fault, FaultReactionActive, OperationEnabled, QuickStopActive, ReadyToSwitchOn, SwitchOnDisabled,
+            SwitchedOn,
+        };
+        if !self.faults.has(FaultKindConfig::DriveSto) {
+            return;
+        }
+        let state = match self.power {
+            ReadyToSwitchOn | SwitchedOn | OperationEnabled | QuickStopActive => SwitchOnDisabled,
+            FaultReactionActive => Fault,
+            _ => return,
+        };
+        self.faults.strike(FaultKindConfig::DriveSto);
+        self.enter(state, now_ns);
     }
 
     /// Writes the state of the axis into the objects that show it.

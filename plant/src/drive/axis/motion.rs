@@ -16,6 +16,22 @@ impl Motion {
     }
 }
 
+/// A shaft as its encoder sees it, and as it is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Shaft {
+    /// The position that the encoder sees, m.
+    pub(crate) seen_m: f64,
+    /// The true position, m.
+    pub(crate) is_m: f64,
+}
+
+impl Shaft {
+    /// A shaft whose encoder sees where it is.
+    pub(crate) const fn at(position_m: f64) -> Self {
+        Self { seen_m: position_m, is_m: position_m }
+    }
+}
+
 /// The value clamped to `[low, high]`, and whether it was outside.
 pub(super) fn clamp(asked: f64, [low, high]: [f64; 2]) -> (f64, bool) {
     let kept = asked.max(low).min(high);

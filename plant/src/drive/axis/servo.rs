@@ -10,8 +10,8 @@ use super::motion::{Motion, clamp};
 /// Time constant of the filter on the measured velocity, s.
 const VELOCITY_FILTER_S: f64 = 5e-4;
 /// Stiffness of the closed brake, N/m, and its damping, N per m/s.
-const BRAKE_STIFFNESS_N_M: f64 = 2e5;
-const BRAKE_DAMPING_N_S_M: f64 = 400.0;
+pub(super) const BRAKE_STIFFNESS_N_M: f64 = 2e5;
+pub(super) const BRAKE_DAMPING_N_S_M: f64 = 400.0;
 
 /// The command of a step.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -45,6 +45,8 @@ pub(super) struct Servo {
     step_s: f64,
     /// The last measured position with the filtered velocity.
     motion: Motion,
+    /// The same of the shaft itself, which the brake holds: it differs where the encoder is wrong.
+    shaft: Motion,
     integral_n: f64,
     brake_at_m: Option<f64>,
     /// Whether the last step limited force or velocity.
@@ -58,6 +60,7 @@ impl Servo {
             config,
             step_s,
             motion: Motion::at_rest(position_m),
+            shaft: Motion::at_rest(position_m),
             integral_n: 0.0,
             brake_at_m: Some(position_m),
             is_limited: false,
@@ -69,17 +72,31 @@ impl Servo {
         self.motion
     }
 
+    /// The shaft's last position with its filtered velocity.
+    pub(super) fn shaft(&self) -> Motion {
+        self.shaft
+    }
+
+    /// The brake holds nothing: it closes anew where the shaft is then.
+    pub(super) fn release_brake(&mut self) {
+        (self.brake_at_m, self.integral_n) = (None, 0.0);
+    }
+
     /// Whether the last step limited force or velocity.
     pub(super) fn is_limited(&self) -> bool {
         self.is_limited
     }
 
-    /// One step of the loops: the force for the next `step_s`, N.
-    pub(super) fn step(&mut self, measured_m: f64, command: ServoCommand, limits: &ServoLimits) -> f64 {
-        let Motion { position_m, velocity_m_s } = &mut self.motion;
-        let raw = (measured_m - *position_m) / self.step_s;
-        *velocity_m_s += (raw - *velocity_m_s) * self.step_s / (self.step_s + VELOCITY_FILTER_S);
-        *position_m = measured_m;
+    /// One step of the loops with the encoder `error_m` beside the shaft: the force for the next `step_s`, N.
+    pub(super) fn step(
+        &mut self,
+        measured_m: f64,
+        error_m: f64,
+        command: ServoCommand,
+        limits: &ServoLimits,
+    ) -> f64 {
+        self.motion = self.moved(self.motion, measured_m);
+        self.shaft = self.moved(self.shaft, measured_m - error_m);
         match command {
             ServoCommand::Brake => self.brake(),
             ServoCommand::Follow(desired) => self.follow(desired, limits),
@@ -87,8 +104,15 @@ impl Servo {
         }
     }
 
+    /// A motion after a step to a position, with its velocity filtered.
+    fn moved(&self, before: Motion, position_m: f64) -> Motion {
+        let raw_m_s = (position_m - before.position_m) / self.step_s;
+        let share = (raw_m_s - before.velocity_m_s) * self.step_s / (self.step_s + VELOCITY_FILTER_S);
+        Motion { position_m, velocity_m_s: before.velocity_m_s + share }
+    }
+
     fn brake(&mut self) -> f64 {
-        let Motion { position_m, velocity_m_s } = self.motion;
+        let Motion { position_m, velocity_m_s } = self.shaft;
         let at_m = *self.brake_at_m.get_or_insert(position_m);
         self.is_limited = false;
         // When the loops take over they begin with the load that the brake carried.
@@ -143,7 +167,7 @@ mod tests {
         let mut servo = Servo::new(DrivesConfig::default().leg, STEP_S, 0.27);
         let (mut position_m, mut velocity_m_s, mut time_s) = (0.27, 0.0, 0.0);
         while time_s < seconds {
-            let force_n = servo.step(position_m, command(time_s), &LIMITS);
+            let force_n = servo.step(position_m, 0.0, command(time_s), &LIMITS);
             velocity_m_s += (force_n - load_n) / mass_kg * STEP_S;
             position_m += velocity_m_s * STEP_S;
             time_s += STEP_S;
@@ -178,7 +202,7 @@ mod tests {
     /// The force on an axis at rest far from its target, and whether it was limited.
     fn pull(limits: &ServoLimits) -> (f64, bool) {
         let mut servo = Servo::new(DrivesConfig::default().leg, STEP_S, 0.27);
-        let force_n = servo.step(0.27, ServoCommand::Follow(Motion::at_rest(5.0)), limits);
+        let force_n = servo.step(0.27, 0.0, ServoCommand::Follow(Motion::at_rest(5.0)), limits);
         (force_n, servo.is_limited)
     }
 
@@ -196,9 +220,9 @@ mod tests {
     #[test]
     fn a_force_is_given_as_it_is_asked_for() {
         let mut servo = Servo::new(DrivesConfig::default().leg, STEP_S, 0.27);
-        let force_n = servo.step(0.27, ServoCommand::Force { force_n: -33.0 }, &LIMITS);
+        let force_n = servo.step(0.27, 0.0, ServoCommand::Force { force_n: -33.0 }, &LIMITS);
         assert!((force_n + 33.0).abs() < 1e-12 && !servo.is_limited);
-        let force_n = servo.step(0.27, ServoCommand::Force { force_n: 5000.0 }, &LIMITS);
+        let force_n = servo.step(0.27, 0.0, ServoCommand::Force { force_n: 5000.0 }, &LIMITS);
         assert!((force_n - 240.0).abs() < 1e-9 && servo.is_limited, "0.4 m/s times the velocity gain");
     }
 

@@ -12,13 +12,16 @@ use crate::drive::dictionary::{HISTORY, Objects};
 const GENERIC: u8 = 0x01;
 const COMMUNICATION: u8 = 0x10;
 const PROFILE: u8 = 0x20;
+const VOLTAGE: u8 = 0x04;
 
 /// The number of errors that the drive can report: room for each of them once.
-const COUNT: usize = 9;
+const COUNT: usize = 10;
 
 /// The errors that put the drive into fault and last until it is reset: a following error outside its window for longer
-/// than its time out, and a drive that nobody controls any more where 6007h makes that a fault.
-pub(super) const FAULTS: [EmergencyCode; 2] = [EmergencyCode::FOLLOWING_ERROR, EmergencyCode::COMMUNICATION];
+/// than its time out, a drive that nobody controls any more where 6007h makes that a fault, and a logic supply that is
+/// too low.
+pub(super) const FAULTS: [EmergencyCode; 3] =
+    [EmergencyCode::FOLLOWING_ERROR, EmergencyCode::COMMUNICATION, EmergencyCode::LOGIC_SUPPLY];
 
 /// The present errors, the newest first.
 #[derive(Debug, Clone, Default)]
@@ -65,7 +68,12 @@ impl Errors {
 
 /// The bits of an error in the error register.
 fn register_bits(error: EmergencyCode) -> u8 {
-    GENERIC | if error == EmergencyCode::FOLLOWING_ERROR { PROFILE } else { COMMUNICATION }
+    GENERIC
+        | match error {
+            EmergencyCode::FOLLOWING_ERROR => PROFILE,
+            EmergencyCode::LOGIC_SUPPLY => VOLTAGE,
+            _ => COMMUNICATION,
+        }
 }
 
 /// Adds an error at the beginning of the history; the oldest one drops out.

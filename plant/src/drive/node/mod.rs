@@ -19,11 +19,13 @@ use masseter_can::canopen::{
 };
 use masseter_can::cia402::Controlword;
 use masseter_can::{ErrorState, Frame};
-use masseter_shared::clock::MILLISECOND_NS;
+use masseter_shared::clock::{MILLISECOND_NS, SECOND_NS};
+use masseter_shared::config::FaultKindConfig;
 
-use super::axis::{Axis, Encoder};
+use super::axis::{Axis, Encoder, Shaft};
 use super::dictionary::{Objects, PDOS, names};
 use super::settings::DriveSettings;
+use crate::injection::Acting;
 use access::DictionaryAccess;
 use errors::{Errors, FAULTS, clear_history};
 use heartbeats::{Consumer, Producer};
@@ -32,6 +34,9 @@ use outbox::Outbox;
 use pdo::{Effects, ProcessData};
 use sdo::SdoServer;
 use storage::Storage;
+
+/// The emergency of which a storm consists: one of the device, without an error that would last (CiA 301: FFxxh).
+const STORM: EmergencyCode = EmergencyCode(0xFF00);
 
 /// One drive.
 #[derive(Debug, Clone)]
@@ -49,6 +54,10 @@ pub(crate) struct DriveNode {
     process_data: ProcessData,
     sdo: SdoServer,
     outbox: Outbox,
+    /// Whether the supply is off.
+    is_off: bool,
+    /// When the next message of a storm of emergencies is due, ns.
+    next_storm_ns: u64,
 }
 
 impl DriveNode {
@@ -70,6 +79,8 @@ impl DriveNode {
             process_data: ProcessData::new(&objects),
             sdo: SdoServer::default(),
             outbox: Outbox::new(),
+            is_off: false,
+            next_storm_ns: 0,
             objects,
         }
     }
@@ -91,9 +102,22 @@ impl DriveNode {
         self.outbox.take()
     }
 
-    /// Takes a frame that arrived at `now_ns` with the axis at `position_m`. Frames for others and malformed frames have
+    /// The injected faults that act on the drive.
+    pub(crate) fn faults(&self) -> &Acting {
+        self.axis.faults()
+    }
+
+    /// The injected faults, to begin and end them.
+    pub(crate) fn faults_mut(&mut self) -> &mut Acting {
+        self.axis.faults_mut()
+    }
+
+    /// Takes a frame that arrived at `now_ns` with the encoder at `position_m`. Frames for others and malformed frames have
     /// no effect; process data of a wrong length are reported by EMCY.
     pub(crate) fn receive(&mut self, now_ns: u64, frame: &Frame, position_m: f64) {
+        if self.is_off {
+            return;
+        }
         match Cob::try_from(frame.id()) {
             Ok(Cob::Nmt) => {
                 if let Some(message) = NmtMessage::decode(frame.data())
@@ -113,8 +137,12 @@ impl DriveNode {
         }
     }
 
-    /// A step of the servo loops with the axis at `position_m`: the force until the next one, N.
-    pub(crate) fn step(&mut self, now_ns: u64, position_m: f64) -> f64 {
+    /// A step of the servo loops: the force until the next one, N.
+    pub(crate) fn step(&mut self, now_ns: u64, shaft: Shaft) -> f64 {
+        self.follow_supply(now_ns);
+        if self.is_off {
+            return self.axis.step(now_ns, shaft).0;
+        }
         if self.nmt.boot(now_ns) {
             self.outbox.add(Heartbeat { state: NmtState::BootUp }.frame(self.id));
         }
@@ -127,9 +155,12 @@ impl DriveNode {
         if let Some(abort) = self.sdo.expire(now_ns) {
             self.outbox.add(abort.frame(self.id));
         }
-        let (force_n, has_following_error) = self.axis.step(now_ns, position_m);
+        let (force_n, has_following_error) = self.axis.step(now_ns, shaft);
         if has_following_error {
             self.raise(EmergencyCode::FOLLOWING_ERROR);
+        }
+        if !self.axis.faults().is_empty() {
+            self.fail_as_injected(now_ns);
         }
         if self.nmt.is_operational() && self.process_data.is_event_driven() {
             self.axis.show(now_ns, &mut self.objects);
@@ -138,10 +169,42 @@ impl DriveNode {
         force_n
     }
 
+    /// Loses the supply, or boots when it is back. Without it the node is silent and the brake closed.
+    fn follow_supply(&mut self, now_ns: u64) {
+        let is_off = self.axis.faults().has(FaultKindConfig::DriveReboot);
+        match (std::mem::replace(&mut self.is_off, is_off), is_off) {
+            (false, true) => {
+                self.axis.faults_mut().strike(FaultKindConfig::DriveReboot);
+                self.axis.restart(now_ns, &self.objects);
+                self.outbox.clear();
+            }
+            (true, false) => self.reset_node(now_ns),
+            _ => {}
+        }
+    }
+
+    /// Injected faults of the node: its logic supply is too low, or it sends emergencies again and again.
+    fn fail_as_injected(&mut self, now_ns: u64) {
+        let has_booted = self.nmt.state().is_some();
+        if has_booted && self.axis.faults().has(FaultKindConfig::DriveFault) && self.axis.fail(now_ns) {
+            self.axis.faults_mut().strike(FaultKindConfig::DriveFault);
+            self.raise(EmergencyCode::LOGIC_SUPPLY);
+        }
+        if let Some(every_s) = self.axis.faults().size(FaultKindConfig::EmcyStorm)
+            && self.nmt.is_served()
+            && now_ns >= self.next_storm_ns
+        {
+            self.axis.faults_mut().strike(FaultKindConfig::EmcyStorm);
+            self.next_storm_ns = now_ns + (every_s * SECOND_NS as f64) as u64;
+            let register = self.objects.get(names::ERROR_REGISTER);
+            self.send_emergency(Some(Emergency { code: STORM, register, vendor: [0; 5] }));
+        }
+    }
+
     /// Takes the error state of the drive's CAN controller. In bus-off the communication has failed, which an emergency
     /// reports once the bus is back.
     pub(crate) fn set_error_state(&mut self, now_ns: u64, state: ErrorState) {
-        if state == self.error_state {
+        if self.is_off || state == self.error_state {
             return;
         }
         let before = std::mem::replace(&mut self.error_state, state);
@@ -231,7 +294,7 @@ impl DriveNode {
         }
         self.axis.synchronise(now_ns, self.process_data.take_targets(), &self.objects);
         if is_operational {
-            self.axis.sample(position_m);
+            self.axis.sample(now_ns, position_m);
             self.axis.show(now_ns, &mut self.objects);
             self.process_data.send(&mut self.outbox, |tpdo| tpdo.at_sync(now_ns, counter, &self.objects));
         }

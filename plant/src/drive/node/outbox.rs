@@ -24,6 +24,11 @@ impl Outbox {
         }
     }
 
+    /// Discards every frame: the node has lost its supply.
+    pub(super) fn clear(&mut self) {
+        self.0.clear();
+    }
+
     /// Takes the oldest frame.
     pub(super) fn take(&mut self) -> Option<Frame> {
         self.0.pop_front()

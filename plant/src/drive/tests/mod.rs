@@ -17,7 +17,7 @@ use masseter_can::{CanId, ErrorState, Frame};
 use masseter_shared::config::Scenario;
 
 use super::dictionary::names;
-use super::{DriveNode, DriveSettings, Encoder};
+use super::{DriveNode, DriveSettings, Encoder, Shaft};
 
 const STEP_NS: u64 = 125_000;
 const STEPS_PER_MS: u64 = 1_000_000 / STEP_NS;
@@ -106,7 +106,7 @@ impl Bench {
             self.velocity_m_s += (self.force_n - self.load_n) / MASS_KG * step_s;
             self.position_m += self.velocity_m_s * step_s;
             self.now_ns += STEP_NS;
-            self.force_n = self.drive.step(self.now_ns, self.position_m);
+            self.force_n = self.drive.step(self.now_ns, Shaft::at(self.position_m));
             self.collect();
         }
     }

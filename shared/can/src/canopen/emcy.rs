@@ -12,6 +12,8 @@ pub struct EmergencyCode(pub u16);
 impl EmergencyCode {
     /// No error any more.
     pub const RESET: Self = Self(0x0000);
+    /// The logic supply of the drive, 24 V, is too low (CiA 402: control supply U1).
+    pub const LOGIC_SUPPLY: Self = Self(0x5112);
     /// Communication error without further detail.
     pub const COMMUNICATION: Self = Self(0x8100);
     /// The CAN controller became error passive.

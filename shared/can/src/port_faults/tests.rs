@@ -183,3 +183,18 @@ fn corruption_needs_a_wire() {
     let corrupt = Fault { kind: FaultKind::Corrupt, number: 5, ..FAULT };
     assert_eq!(PortFaults::new(vec![FAULT, corrupt], 0, 1, None).unwrap_err(), NotByPort { number: 5 });
 }
+
+#[test]
+fn a_fault_whose_time_becomes_known_later_acts_from_then_on() {
+    let mut faults = PortFaults::new(vec![Fault { from_ns: u64::MAX, ..FAULT }], 1, 1, None).unwrap();
+    let mut wire = wire();
+    let mut arrives = |at_ns: u64, faults: &mut PortFaults| {
+        wire.port(0).send(at_ns, frame(1)).unwrap();
+        wire.advance(at_ns + 500_000);
+        faults.over(wire.port(1)).receive(at_ns + 500_000).unwrap().is_some()
+    };
+    assert!(arrives(0, &mut faults));
+    faults.set_fault_window(0, 1_000_000..2_000_000);
+    assert!(!arrives(1_000_000, &mut faults));
+    assert!(arrives(2_000_000, &mut faults));
+}

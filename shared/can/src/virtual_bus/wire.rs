@@ -1,5 +1,7 @@
 //! The wire in virtual time: its ports, its tap, and the order of its events.
 
+use std::ops::Range;
+
 use super::completion::Completion;
 use super::confinement::{Confinement, SEQUENCE_BITS};
 use super::nodes::{Nodes, Station, WireConfig};
@@ -84,6 +86,13 @@ impl VirtualWire {
     /// The next note on the wire's faults up to `now_ns`.
     pub fn next_note(&mut self, now_ns: u64) -> Option<FaultNote> {
         self.nodes.faults.next_note(now_ns)
+    }
+
+    /// Sets when a fault acts, from now on at the earliest: the wire's past stays. A number of no fault has no effect.
+    pub fn set_fault_window(&mut self, number: usize, window_ns: Range<u64>) {
+        let from_ns = window_ns.start.max(self.advanced_to_ns);
+        self.nodes.faults.set_window(number, from_ns..window_ns.end);
+        self.invalidate_traffic();
     }
 
     /// When the frame on the wire, or the next one, will have ended if nothing else is queued until then,

@@ -200,3 +200,31 @@ proptest! {
         prop_assert_eq!(run(&cuts).0, seen);
     }
 }
+
+#[test]
+fn a_fault_whose_time_becomes_known_later_acts_from_then_on() {
+    let mut wire = wire_with(Fault { kind: FaultKind::Lose, port: Some(2), from_ns: FOREVER, ..ANY });
+    let frame = frame(0x181, &[1]);
+    let mut arrives = |at_ns: u64, wire: &mut VirtualWire| {
+        wire.port(1).send(at_ns, frame).unwrap();
+        wire.advance(at_ns + 500_000);
+        wire.port(2).receive(FOREVER).unwrap().is_some()
+    };
+    assert!(arrives(0, &mut wire));
+    wire.set_fault_window(0, 1_000_000..2_000_000);
+    wire.set_fault_window(7, 0..FOREVER);
+    assert!(!arrives(1_000_000, &mut wire));
+    assert!(arrives(2_000_000, &mut wire));
+    assert_eq!(wire.next_note(2_500_000).map(|note| note.has_ended), Some(false));
+    assert_eq!(wire.next_note(2_500_000).map(|note| note.activations), Some(1));
+}
+
+#[test]
+fn a_node_begins_to_babble_no_earlier_than_when_its_time_becomes_known() {
+    let babble = FaultKind::Babble { frame: frame(0x001, &[0x55; 8]) };
+    let mut wire = wire_with(Fault { kind: babble, port: Some(2), from_ns: FOREVER, ..ANY });
+    assert_eq!(wire.next_event_ns(), None);
+    wire.advance(1_000_000);
+    wire.set_fault_window(0, 500_000..2_000_000);
+    assert!(wire.next_event_ns().is_some_and(|end_ns| end_ns > 1_000_000));
+}

@@ -1,0 +1,289 @@
+//! What a scenario does to drives and mechanism, and when: the entries that begin and end, in the order of time.
+//!
+//! The agenda acts on nothing. It tells each change once, and it keeps what the emulation reports.
+
+use std::collections::VecDeque;
+use std::ops::Range;
+
+use masseter_shared::clock::SECOND_NS;
+use masseter_shared::config::{FaultConfig, FaultKindConfig, FaultLayer, Scenario, StimulusConfig};
+use masseter_shared::geometry::{Mechanism, Pose};
+use masseter_shared::injection::Injected;
+
+use crate::injection::{Occurrence, acting_ns};
+use crate::mechanism::{Food, closed_mouth};
+
+/// What an entry does.
+#[derive(Debug, Clone)]
+pub(super) enum Effect {
+    /// A fault of one axis, or of all.
+    Fault { kind: FaultKindConfig, size: f64, axis: Option<usize> },
+    /// A mass at the incisal point, by a fault.
+    FaultyPayload { kg: f64 },
+    /// A force on the platform.
+    Push(Box<StimulusConfig>),
+    /// Another food.
+    Food(Box<Food>),
+    /// A mass at the incisal point.
+    Payload { kg: f64 },
+}
+
+/// An entry begins or ends.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Change {
+    /// Its place in the agenda.
+    pub(super) place: usize,
+    /// Whether it begins.
+    pub(super) is_begin: bool,
+}
+
+#[derive(Debug)]
+struct Entry {
+    injected: Injected,
+    effect: Effect,
+    /// The fault that cuts its own window.
+    fault: Option<FaultConfig>,
+    window_ns: Range<u64>,
+    is_active: bool,
+    has_struck: bool,
+}
+
+/// The agenda.
+#[derive(Debug)]
+pub(super) struct Agenda {
+    entries: Vec<Entry>,
+    /// Before then no entry begins or ends, ns.
+    next_change_ns: u64,
+    occurrences: VecDeque<Occurrence>,
+}
+
+impl Agenda {
+    /// The entries of a scenario that drives and mechanism carry out. None acts before its window is set.
+    pub(super) fn new(scenario: &Scenario, mechanism: &Mechanism) -> Self {
+        let closed = closed_mouth(mechanism, &scenario.jaw);
+        let faults = scenario.faults.iter().enumerate().filter_map(|(place, config)| {
+            Some(Entry::new(Injected::Fault(place), effect_of_fault(config)?, Some(config)))
+        });
+        let stimuli = scenario.stimulus.iter().enumerate().filter_map(|(place, config)| {
+            Some(Entry::new(Injected::Stimulus(place), effect_of_stimulus(config, &closed)?, None))
+        });
+        let entries: Vec<_> = faults.chain(stimuli).collect();
+        // An entry begins once and ends once.
+        let occurrences = VecDeque::with_capacity(2 * entries.len());
+        Self { entries, next_change_ns: u64::MAX, occurrences }
+    }
+
+    /// Whether there are no entries.
+    pub(super) fn is_empty(&self) -> bool {
+        self.entries.is_empty()
+    }
+
+    /// Sets when an entry acts.
+    pub(super) fn set_window(&mut self, injected: Injected, window_ns: &Range<u64>) {
+        for entry in self.entries.iter_mut().filter(|entry| entry.injected == injected) {
+            entry.window_ns = match &entry.fault {
+                Some(fault) => acting_ns(fault, window_ns.clone()),
+                None => window_ns.clone(),
+            };
+            self.next_change_ns = 0;
+        }
+    }
+
+    /// The next entry that begins or ends by `now_ns`. Ends come first, so that an entry can follow another of its kind.
+    #[inline]
+    pub(super) fn next_change(&mut self, now_ns: u64) -> Option<Change> {
+        if now_ns < self.next_change_ns { None } else { self.look_for_change(now_ns) }
+    }
+
+    fn look_for_change(&mut self, now_ns: u64) -> Option<Change> {
+        let found = [false, true].into_iter().find_map(|is_begin| {
+            let place = self.entries.iter().position(|entry| entry.changes(now_ns, is_begin))?;
+            Some(Change { place, is_begin })
+        });
+        match found {
+            Some(Change { place, is_begin }) => self.change(place, is_begin, now_ns),
+            None => {
+                let times = self.entries.iter().filter_map(|entry| entry.next_change_ns(now_ns));
+                self.next_change_ns = times.min().unwrap_or(u64::MAX);
+            }
+        }
+        found
+    }
+
+    fn change(&mut self, place: usize, is_begin: bool, now_ns: u64) {
+        let entry = &mut self.entries[place];
+        entry.is_active = is_begin;
+        if is_begin && entry.effect.strikes_at_once() {
+            self.strike(place, now_ns);
+        } else if !is_begin && entry.has_struck {
+            let occurrence = entry.occurrence(now_ns, true);
+            self.report(occurrence);
+        }
+    }
+
+    /// What the entry at that place does.
+    pub(super) fn effect(&self, place: usize) -> &Effect {
+        &self.entries[place].effect
+    }
+
+    /// Whether another entry that acts is a fault of that kind on that axis.
+    pub(super) fn has_another(&self, kind: FaultKindConfig, axis: Option<usize>) -> bool {
+        self.active().any(|effect| {
+            matches!(effect, Effect::Fault { kind: other, axis: at, .. } if *other == kind && *at == axis)
+        })
+    }
+
+    /// What acts now.
+    pub(super) fn active(&self) -> impl Iterator<Item = &Effect> {
+        self.entries.iter().filter(|entry| entry.is_active).map(|entry| &entry.effect)
+    }
+
+    /// The forces that act at that time: N in base axes, and their points.
+    pub(super) fn pushes(&self, now_ns: u64) -> impl Iterator<Item = ([f64; 3], Option<[f64; 3]>)> {
+        let active = self.entries.iter().filter(|entry| entry.is_active);
+        active.filter_map(move |entry| {
+            let Effect::Push(push) = &entry.effect else { return None };
+            let since_s = now_ns.saturating_sub(entry.window_ns.start) as f64 / SECOND_NS as f64;
+            let for_s = push.for_s.unwrap_or(f64::INFINITY);
+            let share = push.shape.at(since_s, for_s, push.frequency_hz.unwrap_or_default());
+            Some((push.push_n?.map(|newtons| newtons * share), push.point_m))
+        })
+    }
+
+    /// The next active fault from that place on whose strike is not reported yet.
+    pub(super) fn next_waiting(&self, from: usize) -> Option<usize> {
+        let waits = |entry: &Entry| entry.is_active && !entry.has_struck;
+        (from..self.entries.len()).find(|&place| waits(&self.entries[place]))
+    }
+
+    /// The entry at that place has changed something.
+    pub(super) fn strike(&mut self, place: usize, now_ns: u64) {
+        let entry = &mut self.entries[place];
+        entry.has_struck = true;
+        let occurrence = entry.occurrence(now_ns, false);
+        self.report(occurrence);
+    }
+
+    /// The next beginning or end.
+    pub(super) fn next_occurrence(&mut self) -> Option<Occurrence> {
+        self.occurrences.pop_front()
+    }
+
+    fn report(&mut self, occurrence: Occurrence) {
+        // Nothing is allocated in a cycle, should nobody take the occurrences.
+        if self.occurrences.len() < self.occurrences.capacity() {
+            self.occurrences.push_back(occurrence);
+        }
+    }
+}
+
+impl Entry {
+    fn new(injected: Injected, effect: Effect, fault: Option<&FaultConfig>) -> Self {
+        let window_ns = u64::MAX..u64::MAX;
+        Self { injected, effect, fault: fault.cloned(), window_ns, is_active: false, has_struck: false }
+    }
+
+    fn changes(&self, now_ns: u64, is_begin: bool) -> bool {
+        self.is_active != is_begin && self.window_ns.contains(&now_ns) == is_begin
+    }
+
+    fn next_change_ns(&self, now_ns: u64) -> Option<u64> {
+        let Range { start, end } = self.window_ns;
+        [start, end].into_iter().find(|&time_ns| time_ns > now_ns)
+    }
+
+    fn occurrence(&self, time_ns: u64, has_ended: bool) -> Occurrence {
+        Occurrence { injected: self.injected, time_ns, axis: self.effect.axis(), has_ended }
+    }
+}
+
+impl Effect {
+    fn axis(&self) -> Option<usize> {
+        match self {
+            Self::Fault { axis, .. } => *axis,
+            _ => None,
+        }
+    }
+
+    /// Whether it changes something as soon as it begins. What breaks a drive, an encoder or an axis says so itself.
+    fn strikes_at_once(&self) -> bool {
+        match self {
+            Self::Fault { .. } => false,
+            Self::FaultyPayload { kg } => *kg > 0.0,
+            Self::Push(_) | Self::Food(_) | Self::Payload { .. } => true,
+        }
+    }
+}
+
+fn effect_of_fault(config: &FaultConfig) -> Option<Effect> {
+    let (kind, size) = (config.kind, config.size_si());
+    match kind.layer() {
+        FaultLayer::Mechanism if kind == FaultKindConfig::Payload => Some(Effect::FaultyPayload { kg: size }),
+        FaultLayer::Encoder | FaultLayer::Drive | FaultLayer::Mechanism => {
+            Some(Effect::Fault { kind, size, axis: config.axis() })
+        }
+        FaultLayer::Bus | FaultLayer::Command | FaultLayer::Process => None,
+    }
+}
+
+fn effect_of_stimulus(config: &StimulusConfig, closed: &Pose) -> Option<Effect> {
+    if config.push_n.is_some() {
+        return Some(Effect::Push(Box::new(config.clone())));
+    }
+    let food = config.food.map(|food| Effect::Food(Box::new(Food::new(food, closed))));
+    food.or_else(|| config.payload.map(|payload| Effect::Payload { kg: payload.si() }))
+}
+
+#[cfg(test)]
+mod tests {
+    use masseter_shared::config::Shape;
+
+    use super::*;
+
+    fn agenda(scenario: &Scenario) -> Agenda {
+        Agenda::new(scenario, &Mechanism::new(&scenario.mechanism).unwrap())
+    }
+
+    #[test]
+    fn entries_begin_and_end_once_and_end_before_others_begin() {
+        let stuck = |size: &str| FaultConfig {
+            axis: Some("l1".to_owned()),
+            size: Some(size.parse().unwrap()),
+            ..FaultConfig::new(FaultKindConfig::EncoderOffset)
+        };
+        let faults = vec![stuck("1 mm"), stuck("2 mm")];
+        let mut agenda = agenda(&Scenario { faults, ..Scenario::default() });
+        agenda.set_window(Injected::Fault(1), &(200..300));
+        agenda.set_window(Injected::Fault(0), &(100..200));
+        let mut changes = |now_ns| {
+            let changes = std::iter::from_fn(|| agenda.next_change(now_ns));
+            changes.map(|change| (change.place, change.is_begin)).collect::<Vec<_>>()
+        };
+        assert_eq!(changes(99), []);
+        assert_eq!(changes(120), [(0, true)]);
+        assert_eq!(changes(199), []);
+        assert_eq!(changes(210), [(0, false), (1, true)]);
+        assert_eq!(changes(300), [(1, false)]);
+        assert_eq!(agenda.next_change_ns, u64::MAX);
+        assert_eq!(agenda.next_occurrence(), None, "they changed nothing");
+    }
+
+    #[test]
+    fn a_push_has_its_shape_from_the_beginning_of_its_window() {
+        let push = StimulusConfig {
+            push_n: Some([0.0, 0.0, -8.0]),
+            shape: Shape::Ramp,
+            for_s: Some(0.2),
+            ..StimulusConfig::at(1.0)
+        };
+        let mut agenda = agenda(&Scenario { stimulus: vec![push], ..Scenario::default() });
+        agenda.set_window(Injected::Stimulus(0), &(1_000_000_000..1_200_000_000));
+        assert!(agenda.next_change(1_000_050_000).is_some());
+        let (force_n, point_m) = agenda.pushes(1_050_000_000).next().unwrap();
+        assert!((force_n[2] + 2.0).abs() < 1e-9 && point_m.is_none(), "{force_n:?}");
+        assert_eq!(agenda.next_occurrence().map(|told| told.has_ended), Some(false));
+        assert!(agenda.next_change(1_200_000_000).is_some());
+        assert_eq!(agenda.next_occurrence().map(|told| told.has_ended), Some(true));
+        assert!(agenda.pushes(1_200_000_000).next().is_none());
+    }
+}

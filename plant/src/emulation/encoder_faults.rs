@@ -1,0 +1,193 @@
+//! Faults of an encoder: the position that it sees instead of the true one.
+//!
+//! Each fault changes what the faults before it left, in the order in which they began. Randomness comes from the
+//! scenario's seed. A fault has struck once it shows another position than the one that is there.
+
+use std::collections::VecDeque;
+
+use arrayvec::ArrayVec;
+use masseter_shared::clock::SECOND_NS;
+use masseter_shared::config::FaultKindConfig as Kind;
+use rand::{RngExt, SeedableRng};
+use rand_distr::StandardNormal;
+use rand_pcg::Pcg64Mcg;
+
+/// The number of kinds.
+const KINDS: usize = 8;
+
+/// The faults of one encoder.
+#[derive(Debug, Clone)]
+pub(super) struct EncoderFaults {
+    faults: ArrayVec<EncoderFault, KINDS>,
+    random: Pcg64Mcg,
+    /// Times (ns) and positions (m) that a slow interface has not shown yet, the oldest first.
+    past: VecDeque<(u64, f64)>,
+}
+
+/// One fault that acts.
+#[derive(Debug, Clone, Copy)]
+struct EncoderFault {
+    kind: Kind,
+    size: f64,
+    /// Time (ns) and position (m) at which it began.
+    from: Option<(u64, f64)>,
+    has_struck: bool,
+}
+
+impl EncoderFaults {
+    /// None yet, with the axis' own random numbers and room for so many past positions.
+    pub(super) fn new(seed: u64, axis: usize, past: usize) -> Self {
+        // Odd multiples keep the streams of the axes apart from each other and from those of the encoders' own noise.
+        let stream = seed ^ (axis as u64 + 1).wrapping_mul(0xD1B5_4A32_D192_ED03);
+        let random = Pcg64Mcg::seed_from_u64(stream);
+        Self { faults: ArrayVec::new(), random, past: VecDeque::with_capacity(past) }
+    }
+
+    /// A fault begins. One of its kind that acts already is replaced.
+    pub(super) fn begin(&mut self, kind: Kind, size: f64) {
+        self.end(kind);
+        // There are no more kinds than the list has room for.
+        let _ = self.faults.try_push(EncoderFault { kind, size, from: None, has_struck: false });
+    }
+
+    /// A fault ends: the encoder sees the true position again.
+    pub(super) fn end(&mut self, kind: Kind) {
+        self.faults.retain(|fault| fault.kind != kind);
+        if kind == Kind::EncoderDelay {
+            self.past.clear();
+        }
+    }
+
+    /// Whether the fault of that kind has shown a wrong position.
+    pub(super) fn has_struck(&self, kind: Kind) -> bool {
+        self.faults.iter().any(|fault| fault.kind == kind && fault.has_struck)
+    }
+
+    /// The position that the encoder sees at that time, m.
+    #[inline]
+    pub(super) fn seen_m(&mut self, now_ns: u64, position_m: f64) -> f64 {
+        let Self { faults, random, past } = self;
+        faults.iter_mut().fold(position_m, |position_m, fault| {
+            let seen_m = fault.seen_m(now_ns, position_m, random, past);
+            fault.has_struck |= seen_m.to_bits() != position_m.to_bits();
+            seen_m
+        })
+    }
+}
+
+impl EncoderFault {
+    fn seen_m(
+        &mut self,
+        now_ns: u64,
+        position_m: f64,
+        random: &mut Pcg64Mcg,
+        past: &mut VecDeque<(u64, f64)>,
+    ) -> f64 {
+        let size = self.size;
+        let (from_ns, from_m) = *self.from.get_or_insert((now_ns, position_m));
+        match self.kind {
+            Kind::EncoderStuck => from_m,
+            Kind::EncoderOffset => position_m + size,
+            Kind::EncoderDrift => {
+                position_m + size * now_ns.saturating_sub(from_ns) as f64 / SECOND_NS as f64
+            }
+            Kind::EncoderNoise => {
+                let noise: f64 = random.sample(StandardNormal);
+                position_m + size * noise
+            }
+            Kind::EncoderSteps => (position_m / size).round() * size,
+            Kind::EncoderSign => 2.0 * from_m - position_m,
+            Kind::EncoderLoses => from_m + (1.0 - size) * (position_m - from_m),
+            Kind::EncoderDelay => delayed_m(past, now_ns, (size * SECOND_NS as f64) as u64, position_m),
+            // The other kinds are no encoder's.
+            _ => position_m,
+        }
+    }
+}
+
+/// The newest position that is as old as the delay; the oldest one before that.
+fn delayed_m(past: &mut VecDeque<(u64, f64)>, now_ns: u64, delay_ns: u64, position_m: f64) -> f64 {
+    if past.len() < past.capacity() {
+        past.push_back((now_ns, position_m));
+    }
+    let is_old = |(time_ns, _): &(u64, f64)| time_ns.saturating_add(delay_ns) <= now_ns;
+    while past.len() > 1 && past.get(1).is_some_and(is_old) {
+        past.pop_front();
+    }
+    past.front().map_or(position_m, |(_, position_m)| *position_m)
+}
+
+/// Room for the past of a delay of that many seconds, with steps and SYNCs of these durations, ns.
+pub(super) fn past_of(delay_s: f64, [step_ns, period_ns]: [u64; 2]) -> usize {
+    let delay_ns = (delay_s * SECOND_NS as f64) as u64;
+    // Jitter may bring SYNCs together.
+    (delay_ns / step_ns + 2 * (delay_ns / period_ns) + 8) as usize
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const MS: u64 = 1_000_000;
+
+    /// What an encoder sees of a shaft that moves from 100 mm on by 1 mm a millisecond, in mm.
+    fn seen_mm(kind: Kind, size: f64) -> [f64; 4] {
+        let mut faults = EncoderFaults::new(1, 0, 100);
+        faults.begin(kind, size);
+        [0, 1, 2, 3].map(|ms| {
+            let seen_m = faults.seen_m(5 * MS + ms * MS, 0.1 + ms as f64 * 1e-3);
+            (seen_m * 1e6).round() / 1e3
+        })
+    }
+
+    #[test]
+    fn each_kind_shows_what_its_name_says() {
+        let table = [
+            (Kind::EncoderStuck, 0.0, [100.0, 100.0, 100.0, 100.0]),
+            (Kind::EncoderOffset, 0.002, [102.0, 103.0, 104.0, 105.0]),
+            (Kind::EncoderDrift, -0.5, [100.0, 100.5, 101.0, 101.5]),
+            (Kind::EncoderSteps, 0.002, [100.0, 102.0, 102.0, 104.0]),
+            (Kind::EncoderSign, 0.0, [100.0, 99.0, 98.0, 97.0]),
+            (Kind::EncoderLoses, 0.25, [100.0, 100.75, 101.5, 102.25]),
+            (Kind::EncoderDelay, 0.002, [100.0, 100.0, 100.0, 101.0]),
+        ];
+        for (kind, size, expected) in table {
+            assert_eq!(seen_mm(kind, size), expected, "{kind}");
+        }
+    }
+
+    #[test]
+    fn noise_has_the_declared_spread_and_the_seed_decides_it() {
+        let noise = |seed, axis| {
+            let mut faults = EncoderFaults::new(seed, axis, 0);
+            faults.begin(Kind::EncoderNoise, 1e-4);
+            (0..10_000).map(|step| faults.seen_m(step, 0.0)).collect::<Vec<f64>>()
+        };
+        let errors_m = noise(3, 0);
+        let variance = errors_m.iter().map(|m| m * m).sum::<f64>() / errors_m.len() as f64;
+        assert!((variance.sqrt() / 1e-4 - 1.0).abs() < 0.03, "{}", variance.sqrt());
+        assert_eq!(errors_m, noise(3, 0));
+        assert_ne!(errors_m, noise(3, 1));
+        assert_ne!(errors_m, noise(4, 0));
+    }
+
+    #[test]
+    fn a_fault_strikes_once_it_shows_a_wrong_position_and_ends_with_the_true_one() {
+        let mut faults = EncoderFaults::new(1, 0, 0);
+        faults.begin(Kind::EncoderSign, 0.0);
+        faults.seen_m(0, 0.1);
+        assert!(!faults.has_struck(Kind::EncoderSign), "it stands");
+        faults.seen_m(1, 0.101);
+        assert!(faults.has_struck(Kind::EncoderSign));
+        faults.end(Kind::EncoderSign);
+        assert_eq!(faults.seen_m(2, 0.102).to_bits(), 0.102_f64.to_bits());
+    }
+
+    #[test]
+    fn faults_add_up_in_the_order_in_which_they_began() {
+        let mut faults = EncoderFaults::new(1, 0, 0);
+        faults.begin(Kind::EncoderOffset, 0.0004);
+        faults.begin(Kind::EncoderSteps, 0.001);
+        assert!((faults.seen_m(0, 0.1002) - 0.101).abs() < 1e-12);
+    }
+}
