@@ -161,8 +161,8 @@ fn each_thing_that_is_wrong_has_its_verdict() {
         (
             Run::declare_fault,
             Exit::Failed,
-            "faults: 0 of 1 declared faults acted, number 1 never: raise its probability, or widen the time from from_s \
-             to until_s",
+            "faults: 0 of 1 declared faults acted, number 1 never: raise its probability, or let the fault act earlier or \
+             longer",
         ),
         (
             |run| {
