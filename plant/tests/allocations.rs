@@ -6,7 +6,10 @@ use std::cell::Cell;
 use std::hint::black_box;
 
 use masseter_plant::core::PlantCore;
-use masseter_shared::config::Scenario;
+use masseter_shared::config::{
+    FaultConfig, FaultKindConfig, FaultLayer, FaultPlace, FoodConfig, Scenario, StimulusConfig,
+};
+use masseter_shared::geometry::AXIS_NAMES;
 use masseter_shared::messages::codes::{DriveRequest, DriveState};
 use masseter_shared::messages::{Command, LAYOUT_VERSION, Reading};
 use masseter_shared::realtime::Wake;
@@ -63,6 +66,52 @@ fn cycle(plant: &mut PlantCore, cycle: u64, reading: &mut Reading) {
     plant.drain_events(&mut |event| {
         black_box(event);
     });
+}
+
+/// One of every kind of the plant, each for a while, on the axes in turn, and stimuli.
+fn injected() -> Scenario {
+    let mut scenario = Scenario::default();
+    let of_plant = |kind: &FaultKindConfig| {
+        !matches!(kind.layer(), FaultLayer::Bus | FaultLayer::Process | FaultLayer::Command)
+    };
+    for (place, &kind) in FaultKindConfig::ALL.iter().filter(|kind| of_plant(kind)).enumerate() {
+        let size = kind.size().map(|size| size.dimension.si_unit().text(size.min.max(0.001).min(size.max)));
+        let has_axis = kind.place() != FaultPlace::Fixed;
+        scenario.faults.push(FaultConfig {
+            name: Some(format!("fault_{place}")),
+            from_s: Some(0.4 + 0.005 * place as f64),
+            for_s: Some(0.1),
+            axis: has_axis.then(|| AXIS_NAMES[place % AXIS_NAMES.len()].to_owned()),
+            size: size.map(|text| text.parse().unwrap()),
+            ..FaultConfig::new(kind)
+        });
+    }
+    scenario.faults.push(FaultConfig {
+        at_s: Some(0.1),
+        after: Some("fault.fault_1".to_owned()),
+        ..FaultConfig::new(FaultKindConfig::CommandNan)
+    });
+    let at = |after: &str| StimulusConfig {
+        after: Some(after.to_owned()),
+        for_s: Some(0.1),
+        ..StimulusConfig::at(0.0)
+    };
+    scenario.stimulus = vec![
+        StimulusConfig { push_n: Some([1.0, 2.0, 3.0]), ..at("fault.fault_0") },
+        StimulusConfig { food: Some(FoodConfig::default()), ..at("fault.fault_0") },
+        StimulusConfig { payload: Some("0.1 kg".parse().unwrap()), ..at("fault.fault_1") },
+    ];
+    scenario
+}
+
+#[test]
+fn no_cycle_with_faults_and_stimuli_allocates() {
+    let scenario = injected();
+    scenario.validate().unwrap();
+    let mut plant = PlantCore::new(&scenario, 0).unwrap();
+    let mut reading = Reading::default();
+    let running = allocations_of(|| (1..1000).for_each(|number| cycle(&mut plant, number, &mut reading)));
+    assert_eq!(running, 0);
 }
 
 #[test]

@@ -122,10 +122,8 @@ mod tests {
     #[test]
     fn a_stall_begins_with_the_first_command_that_is_withheld_and_ends_after_its_size() {
         let size = Some("2 ms".parse().unwrap());
-        let mut faults = CommandFaults::new(&[FaultConfig {
-            size,
-            ..FaultConfig::new(FaultKindConfig::ControllerStall)
-        }]);
+        let mut faults =
+            CommandFaults::new(&[FaultConfig { size, ..FaultConfig::new(FaultKindConfig::ControllerStall) }]);
         faults.set_window(Injected::Fault(0), &(2_000_000..u64::MAX));
         let mut told = Vec::new();
         let arrived: Vec<_> = (1..7)

@@ -110,10 +110,8 @@ impl DriveSide {
         let moved = self.mass_kg + step_s * (damping + DRIVE_DAMPING_N_S_PER_M);
         let free_m_s = (self.mass_kg * self.speed_m_s + step_s * (drive_n - spring_n)) / moved;
         let per_speed = step_s * damping / moved;
-        self.step = Step {
-            free_m_s2: (free_m_s - self.speed_m_s) / step_s,
-            per_speed_per_s: per_speed / step_s,
-        };
+        self.step =
+            Step { free_m_s2: (free_m_s - self.speed_m_s) / step_s, per_speed_per_s: per_speed / step_s };
         let damping_n_s_per_m = damping * (1.0 - per_speed);
         let force_n = spring_n + damping * free_m_s - damping_n_s_per_m * joint_m_s;
         Element { force_n, damping_n_s_per_m }
@@ -162,15 +160,15 @@ mod tests {
     #[test]
     fn with_its_end_closed_both_sides_accelerate_as_one_mass() {
         let (joint_m, drive_m) = after(0.05, 0.0, 80.0, 0.0);
-        // 80 N on 0.8 kg for 50 ms, less some friction.
-        assert!((0.10..0.126).contains(&joint_m), "{joint_m}");
+        // 80 N on 0.8 kg for 50 ms, against 20 N per m/s.
+        assert!((joint_m - 0.0858).abs() < 1e-3, "{joint_m}");
         assert!((drive_m - joint_m).abs() < 1e-4);
     }
 
     #[test]
     fn a_broken_joint_passes_no_force_and_stays_beside_when_it_is_rigid_again() {
         let (joint_m, drive_m) = after(0.05, f64::INFINITY, 10.0, 0.0);
-        assert!(joint_m == 0.0 && drive_m > 0.02);
+        assert!(joint_m == 0.0 && drive_m > 0.01);
         let mut coupling = Coupling::Rigid { beyond_m: 0.0 };
         coupling.loosen(f64::INFINITY, 0.4, 0.3, 0.1);
         coupling.advance(0.01);

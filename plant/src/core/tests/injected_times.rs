@@ -67,7 +67,6 @@ fn faults_follow_each_other_over_every_layer() {
         named("second", after("fault.first", 0.01, lose)),
         named("fourth", after("fault.third", 0.005, FaultConfig::new(Kind::CommandForeign))),
     ]);
-    // It stuck for a while only, so that the motion goes on.
     let began_ns = run(&mut bench, 100);
     let struck = times_ns(&bench, Cause::FaultInjected);
     let order: Vec<_> = struck.iter().map(|(number, _)| *number).collect();
@@ -76,7 +75,7 @@ fn faults_follow_each_other_over_every_layer() {
     assert!((30.0..30.2).contains(&after_ms(0, began_ns)), "{struck:?}");
     assert!((10.0..11.1).contains(&after_ms(1, struck[0].1)), "the next frame to that node: {struck:?}");
     assert!((20.0..20.2).contains(&after_ms(2, struck[1].1)), "{struck:?}");
-    assert!((5.0..6.1).contains(&after_ms(3, struck[2].1)), "the next command: {struck:?}");
+    assert!((5.0..6.6).contains(&after_ms(3, struck[2].1)), "the next command: {struck:?}");
 }
 
 #[test]

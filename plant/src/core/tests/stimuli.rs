@@ -80,7 +80,8 @@ fn the_axes_carry_a_payload_at_the_incisal_point() {
 #[test]
 fn another_food_bites_otherwise_for_its_time() {
     // Between jaws that are 7.4 mm open.
-    let thick = FoodConfig { thickness_m: 0.02, yield_n: 500.0, stiffness_n_per_m: 1000.0, ..FoodConfig::default() };
+    let thick =
+        FoodConfig { thickness_m: 0.02, yield_n: 500.0, stiffness_n_per_m: 1000.0, ..FoodConfig::default() };
     let (mut bench, held_m) = bench_with(StimulusConfig { food: Some(thick), ..stimulus() });
     hold(&mut bench, held_m, 45);
     assert_eq!(bench.truth.bite_force_n, 0.0, "there is no food");
@@ -118,7 +119,9 @@ fn a_stimulus_reports_its_beginning_and_its_end_in_the_time_of_the_motion() {
     hold(&mut bench, held_m, 300);
     let told = bench.events.iter().filter(|event| event.source == Source::Scenario.code());
     let told: Vec<_> = told.map(|event| (event.cause, event.value, event.axis, event.time_ns)).collect();
-    let [(began, 1.0, NO_AXIS, begin_ns), (ended, 1.0, NO_AXIS, end_ns)] = told[..] else { panic!("{told:?}") };
+    let [(began, 1.0, NO_AXIS, begin_ns), (ended, 1.0, NO_AXIS, end_ns)] = told[..] else {
+        panic!("{told:?}")
+    };
     assert_eq!([began, ended], [Cause::StimulusBegan, Cause::StimulusEnded].map(Cause::code));
     assert!((50_000_000..50_200_000).contains(&(begin_ns - began_ns)), "{told:?}");
     assert!((250_000_000..250_200_000).contains(&(end_ns - began_ns)), "{told:?}");

@@ -33,8 +33,8 @@ use profile::Profile;
 use servo::{Servo, ServoCommand, ServoLimits};
 
 pub(crate) use encoder::Encoder;
-pub(crate) use motion::Shaft;
 pub(super) use homing::Homing;
+pub(crate) use motion::Shaft;
 pub(super) use motion::{Mode, NewTargets};
 pub(super) use parameters::configure;
 
@@ -280,11 +280,8 @@ impl Axis {
         let asked_n = self.servo.step(measured_m, seen_m - shaft.is_m, command, &limits);
         let is_braking = command == ServoCommand::Brake;
         self.motor_n = if is_braking { 0.0 } else { asked_n };
-        let force_n = self.drive_motor(Asked {
-            force_n: asked_n,
-            is_braking,
-            max_force_n: self.config.max_force_n,
-        });
+        let force_n =
+            self.drive_motor(Asked { force_n: asked_n, is_braking, max_force_n: self.config.max_force_n });
         (force_n, self.supervise_following(now_ns))
     }
 
