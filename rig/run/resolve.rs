@@ -3,6 +3,7 @@
 use masseter_plan::RunPlan;
 use masseter_plant::core as plant;
 use masseter_shared::config::Scenario;
+use masseter_shared::control::Operator;
 use masseter_shared::named::{NameError, NamedValues};
 
 use super::args::RunArgs;
@@ -21,8 +22,9 @@ pub(super) fn resolve(args: &RunArgs) -> anyhow::Result<(RunPlan, RunArgs)> {
     plant::check_interfaces(&plan.scenario)?;
     if let Some(build) = args.controller.builder() {
         let controller = build(&plan.scenario, plan.mechanism.clone(), plan.trajectory.clone());
-        NamedValues::new(controller.declared(), &plan.scenario.parameters)
+        let named = NamedValues::new(controller.declared(), &plan.scenario.parameters)
             .map_err(|error| with_question(&error))?;
+        Operator::new(&plan.scenario, named.settings().declared(), 0)?;
     }
     Ok((plan, args))
 }
