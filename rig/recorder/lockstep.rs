@@ -6,7 +6,6 @@
 use std::collections::VecDeque;
 
 use masseter_recording::Recorded;
-use masseter_shared::messages::codes::Source;
 
 /// The publishers.
 const LANES: usize = 9;
@@ -33,7 +32,7 @@ impl InOrder {
             Recorded::State(_) => 3,
             Recorded::Signals(_) => 4,
             Recorded::Parameters(_) => 5,
-            Recorded::Event(event) if event.source == Source::Controller.code() => 6,
+            Recorded::Event(event) if event.is_of_controller() => 6,
             Recorded::Frame(_) => 7,
             Recorded::Event(_) | Recorded::Machine(_) => 8,
         };
@@ -56,6 +55,7 @@ impl InOrder {
 
 #[cfg(test)]
 mod tests {
+    use masseter_shared::messages::codes::Source;
     use masseter_shared::messages::{Command, Event, FrameTap, Message, Reading, State, Truth};
 
     use super::*;

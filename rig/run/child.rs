@@ -2,15 +2,18 @@
 
 use std::ffi::OsString;
 use std::io::{self, Write};
+use std::os::fd::OwnedFd;
 use std::os::unix::process::ExitStatusExt;
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::Duration;
 
 use anyhow::{Context, bail};
 use masseter_shared::lifecycle::{Order, Party, Silence, Start, line};
-use rustix::process::{Pid, Signal, kill_process};
+use rustix::process::{
+    Pid, PidfdFlags, Resource, Rlimit, Signal, getrlimit, kill_process, pidfd_open, prlimit,
+};
 
-use super::reports::{Readiness, Ready, Reports};
+use super::reports::{Due, Readiness, Ready, Reports};
 
 /// Longest time for a process to open its ports and lock its memory.
 pub(super) const READY_TIMEOUT: Duration = Duration::from_secs(20);
@@ -82,6 +85,30 @@ impl Process {
     pub(super) fn reported_silence(&mut self) -> Option<Silence> {
         let has_ended = matches!(self.exit_status(), Ok(Some(_)));
         self.reports.silence(has_ended)
+    }
+
+    /// Its next report that a fault is due.
+    pub(super) fn due(&mut self) -> Option<Due> {
+        self.reports.due()
+    }
+
+    /// Tells it that the fault has struck.
+    pub(super) fn go_on(&mut self) {
+        let input = self.child.stdin.as_mut().expect("standard input is piped");
+        // It may have ended.
+        let _ = input.write_all(line(&Order::Struck).as_bytes());
+    }
+
+    /// Its process file, which stays its own whatever becomes of the id.
+    pub(super) fn handle(&self) -> io::Result<OwnedFd> {
+        Ok(pidfd_open(Pid::from_child(&self.child), PidfdFlags::empty())?)
+    }
+
+    /// Lets its files grow no further than to this length, in bytes.
+    pub(super) fn limit_files(&self, bytes: u64) -> io::Result<()> {
+        let limit = Rlimit { current: Some(bytes), ..getrlimit(Resource::Fsize) };
+        prlimit(Some(Pid::from_child(&self.child)), Resource::Fsize, limit)?;
+        Ok(())
     }
 
     /// Its exit status, if it has ended.

@@ -12,6 +12,9 @@ use crate::arguments::ControllerChoice;
 use super::args::{ClockKind, RunArgs};
 use crate::doctor;
 
+/// The highest SCHED_FIFO priority.
+const HIGHEST_PRIORITY: u8 = 99;
+
 /// The arguments with a clock that this machine can keep: real time where the kernel grants it, otherwise lockstep.
 pub(super) fn choose(args: &RunArgs, scenario: &Scenario) -> RunArgs {
     let chosen = |clock| RunArgs { clock, ..args.clone() };
@@ -82,6 +85,7 @@ pub(super) fn check(args: &RunArgs, scenario: &Scenario) -> anyhow::Result<()> {
     if args.patience.is_some() && args.clock != ClockKind::Lockstep {
         bail!("--patience needs --clock lockstep");
     }
+    check_process_faults(args, scenario)?;
     if args.clock == ClockKind::Rt {
         return Ok(());
     }
@@ -102,6 +106,36 @@ pub(super) fn check(args: &RunArgs, scenario: &Scenario) -> anyhow::Result<()> {
     }
     if args.live.is_some() {
         bail!("--live needs --clock rt or lockstep: virtual time is over before a client can connect");
+    }
+    Ok(())
+}
+
+/// Refuses faults of processes where there are no such processes, or nothing could carry them out.
+fn check_process_faults(args: &RunArgs, scenario: &Scenario) -> anyhow::Result<()> {
+    let Some(first) = fault_of_process(scenario) else { return Ok(()) };
+    let has = |kind| scenario.faults.iter().any(|fault| fault.kind == kind);
+    let (stall, kill) = (FaultKindConfig::CoreStall, FaultKindConfig::ControllerKill);
+    if args.clock == ClockKind::Virtual {
+        bail!("faults.kind = {first}: virtual time has no processes: use --clock lockstep, or rt");
+    }
+    if args.controller == ControllerChoice::None {
+        bail!(
+            "faults.kind = {first}: only a controller knows when the motion begins: leave --controller none away"
+        );
+    }
+    if args.controller == ControllerChoice::External && has(kill) {
+        bail!(
+            "faults.kind = {kill}: the rig kills only what it started: use --controller with the path of yours"
+        );
+    }
+    if has(stall) && args.clock != ClockKind::Rt {
+        bail!("faults.kind = {stall}: simulated time stands still meanwhile: use --clock rt");
+    }
+    if has(stall) && scenario.realtime.priority == HIGHEST_PRIORITY {
+        bail!(
+            "realtime.priority = {HIGHEST_PRIORITY}: {stall} needs a higher one: use at most {}",
+            HIGHEST_PRIORITY - 1
+        );
     }
     Ok(())
 }

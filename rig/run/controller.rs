@@ -11,7 +11,7 @@ use masseter_terminal::Exit;
 
 use super::child::{CONTROLLER, Process, describe};
 use super::program::Program;
-use super::reports::Ready;
+use super::reports::{Due, Ready};
 use crate::arguments::{ControllerChoice, name_of};
 
 /// The controller of a run.
@@ -93,6 +93,36 @@ impl Controller {
             Self::Own(process) => process.reported_silence(),
             Self::Program(program) => program.reported_silence(),
             Self::None { .. } => None,
+        }
+    }
+
+    /// Its next report that a fault is due.
+    pub(super) fn due(&mut self) -> Option<Due> {
+        match self {
+            Self::Own(process) => process.due(),
+            Self::Program(program) => program.due(),
+            Self::None { .. } => None,
+        }
+    }
+
+    /// Tells it that the fault has struck.
+    pub(super) fn go_on(&mut self) {
+        match self {
+            Self::Own(process) => process.go_on(),
+            Self::Program(program) => program.go_on(),
+            Self::None { .. } => {}
+        }
+    }
+
+    /// Kills it (SIGKILL), as a fault does; whether it could.
+    pub(super) fn kill(&mut self) -> bool {
+        match self {
+            Self::Own(process) => {
+                process.kill();
+                true
+            }
+            Self::Program(program) => program.kill(),
+            Self::None { .. } => false,
         }
     }
 

@@ -15,6 +15,7 @@ mod reports;
 mod resolve;
 mod room;
 mod sink;
+mod strikes;
 mod supervisor;
 mod usage;
 mod virtual_time;

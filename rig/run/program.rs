@@ -22,7 +22,7 @@ use masseter_terminal::status;
 use rustix::net::sockopt::socket_peercred;
 
 use super::child::{KILLED, POLL, READY_TIMEOUT, describe};
-use super::reports::{Readiness, Ready, Reports};
+use super::reports::{Due, Readiness, Ready, Reports};
 
 /// Longest wait for the greeting of a program that has connected.
 const HELLO_TIMEOUT: Duration = Duration::from_millis(500);
@@ -208,6 +208,21 @@ impl Program {
     /// Its report that another process was silent, if it has made one.
     pub(super) fn reported_silence(&mut self) -> Option<Silence> {
         self.admitted.as_mut()?.reports.silence(false)
+    }
+
+    /// Its next report that a fault is due.
+    pub(super) fn due(&mut self) -> Option<Due> {
+        self.admitted.as_mut()?.reports.due()
+    }
+
+    /// Tells it that the fault has struck. It may have ended.
+    pub(super) fn go_on(&mut self) {
+        let _ = self.order(&Order::Struck);
+    }
+
+    /// Kills an executable of the rig; whether it did.
+    pub(super) fn kill(&mut self) -> bool {
+        self.executable.as_mut().is_some_and(|Executable { child, .. }| child.kill().is_ok())
     }
 
     /// How the program ended its work; none while it works. It has failed where it gives no report.

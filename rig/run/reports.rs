@@ -1,5 +1,6 @@
 //! The reports of a process to the supervisor, read by a thread. What a report means for the run is not decided here.
 
+use std::collections::VecDeque;
 use std::io::{BufRead, BufReader, Read};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, TryRecvError, channel};
 use std::thread;
@@ -14,6 +15,7 @@ use masseter_shared::realtime::scheduling::Obtained;
 pub(super) struct Reports {
     lines: Receiver<String>,
     silence: Option<Silence>,
+    due: VecDeque<Due>,
     end: Option<End>,
     is_closed: bool,
 }
@@ -23,6 +25,15 @@ pub(super) struct Ready {
     pub(super) scheduling: Obtained,
     /// Of the controller.
     pub(super) declared: Declared,
+}
+
+/// A fault of a process that is due.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Due {
+    /// Its place in the scenario's list.
+    pub(super) fault: usize,
+    /// When it became due, ns of the run's clock.
+    pub(super) now_ns: u64,
 }
 
 /// The next step on the way to readiness.
@@ -44,7 +55,7 @@ impl Reports {
                 }
             }
         });
-        Self { lines, silence: None, end: None, is_closed: false }
+        Self { lines, silence: None, due: VecDeque::new(), end: None, is_closed: false }
     }
 
     /// Waits for the report of readiness, for at most this time.
@@ -60,6 +71,7 @@ impl Reports {
                 self.silence = Some(silence);
                 Ok(Readiness::NotYet)
             }
+            Report::Due { .. } => Ok(Readiness::NotYet),
             Report::Ended(end) => {
                 self.end = Some(end);
                 Ok(Readiness::Closed)
@@ -76,6 +88,12 @@ impl Reports {
         }
         self.look();
         self.silence.take()
+    }
+
+    /// The next report that a fault is due.
+    pub(super) fn due(&mut self) -> Option<Due> {
+        self.look();
+        self.due.pop_front()
     }
 
     /// How the program ended its work, if it has reported that.
@@ -105,6 +123,7 @@ impl Reports {
     fn keep(&mut self, line: &str) {
         match serde_json::from_str(line) {
             Ok(Report::Silence(silence)) => self.silence = Some(silence),
+            Ok(Report::Due { fault, now_ns }) => self.due.push_back(Due { fault, now_ns }),
             Ok(Report::Ended(end)) => self.end = Some(end),
             Ok(Report::Ready { .. }) | Err(_) => {}
         }

@@ -4,6 +4,7 @@ use masseter_analysis::requirements::check_requirements;
 use masseter_plan::RunPlan;
 use masseter_plant::core as plant;
 use masseter_shared::config::Scenario;
+use masseter_shared::control::Operator;
 use masseter_shared::named::{NameError, NamedValues};
 
 use super::args::RunArgs;
@@ -24,7 +25,9 @@ pub(super) fn resolve(args: &RunArgs) -> anyhow::Result<(RunPlan, RunArgs)> {
         let controller = build(&plan.scenario, plan.mechanism.clone(), plan.trajectory.clone());
         let declared = controller.declared();
         check_requirements(&plan.scenario, Some(&declared)).map_err(anyhow::Error::msg)?;
-        NamedValues::new(declared, &plan.scenario.parameters).map_err(|error| with_question(&error))?;
+        let named =
+            NamedValues::new(declared, &plan.scenario.parameters).map_err(|error| with_question(&error))?;
+        Operator::new(&plan.scenario, named.settings().declared(), 0)?;
     } else {
         check_requirements(&plan.scenario, None).map_err(anyhow::Error::msg)?;
     }

@@ -31,6 +31,7 @@ use super::child::{CONTROLLER, PLANT, Process, RECORDER};
 use super::controller::Controller;
 use super::ending::{NOT_ENDED, died, of_plant_and_recorder, of_run};
 use super::room::reserve_shared_memory;
+use super::strikes::{Strikes, Victims};
 use super::usage::UsageMeter;
 use crate::arguments::patience_text;
 use crate::machine::interrupts::Interrupts;
@@ -102,6 +103,7 @@ pub(super) fn run(
                 None => rig.run(plan, args.require_rt, interrupts, manifest),
                 Some(_) => rig.run_in_lockstep(interrupts),
             };
+            manifest.process_faults = rig.strikes.finish();
             ending.died()
         }
         None => Ok(Ending::Interrupted),
@@ -129,6 +131,7 @@ struct Rig {
     /// Time for the plant to stop the drives without the controller, ns.
     plant_alone_ns: u64,
     is_lockstep: bool,
+    strikes: Strikes,
     /// The signals and parameters of the controller, once the controller is ready.
     declared: Declared,
     recorder: Process,
@@ -159,6 +162,7 @@ impl Rig {
                 Some(_) => 0,
             },
             is_lockstep: lockstep.is_some(),
+            strikes: Strikes::new(&plan.scenario, folder, lockstep.is_some()),
             declared: Declared::default(),
             recorder: Process::spawn(RECORDER, &recorder_arguments)?,
             plant: Process::spawn(PLANT, &common)?,
@@ -264,6 +268,7 @@ impl Rig {
             if interrupts.is_abort_requested() {
                 return Ok(Ending::Interrupted);
             }
+            self.strike();
             if interruption.is_none() {
                 interruption = self.interrupt_controller(interrupts)?;
             }
@@ -286,6 +291,12 @@ impl Rig {
             return Ok(Ending::Interrupted);
         }
         Ok(of_run(interruption, controller, of_plant_and_recorder(plant, recorder)))
+    }
+
+    /// Carries out the faults of processes that are due.
+    fn strike(&mut self) {
+        let Self { strikes, controller, plant, recorder, .. } = self;
+        strikes.carry_out(&mut Victims { controller, plant, recorder });
     }
 
     /// Asks the controller to end if the user interrupts, or another process was silent or has ended; returns that ending.

@@ -15,7 +15,7 @@ use masseter_plant::core::PlantCore;
 use masseter_plant::cycle::PlantPorts;
 use masseter_plant::emulation::VirtualLink;
 use masseter_recording::{Backlog, Ending, Manifest, Pace, Recorded, Recorder, RunFolder, Scene};
-use masseter_shared::control::{Controller, ControllerPorts, Outcome, set_parameters};
+use masseter_shared::control::{Controller, ControllerPorts, Duties, Operator, Outcome, set_parameters};
 use masseter_shared::lockstep::EPOCH_NS;
 use masseter_shared::messages::{Command, Event, Message, Parameters, Reading, Signals, State, Truth};
 use masseter_shared::named::NamedValues;
@@ -39,7 +39,7 @@ pub(super) fn record(
     let run = Run::new(plan, build, manifest)?;
     let scene = Scene::new(&plan.mechanism, &plan.scenario.jaw);
     let mut recorder = Recorder::of_run(folder, scene)?;
-    recorder.declare(run.named.settings().declared())?;
+    recorder.declare(run.duties.named.settings().declared())?;
     let (backlog, ending) = run.play(plan, Backlog::start(recorder, Pace::Virtual), interrupts)?;
     manifest.ending = ending;
     if let Some(loss) = backlog.finish().loss() {
@@ -69,7 +69,7 @@ pub(super) fn analyse(
 /// The controller of a run that has not begun.
 struct Run {
     controller: Box<dyn Controller>,
-    named: NamedValues,
+    duties: Duties,
 }
 
 impl Run {
@@ -78,17 +78,18 @@ impl Run {
         let named = NamedValues::new(controller.declared(), &plan.scenario.parameters)?;
         set_parameters(&mut *controller, &named);
         manifest.declared = named.settings().declared().clone();
-        Ok(Self { controller, named })
+        let operator = Operator::new(&plan.scenario, &manifest.declared, EPOCH_NS)?;
+        Ok(Self { controller, duties: Duties { named, operator } })
     }
 
     /// Plays the motion; returns the sink, and how the run ended if the sink took everything.
     fn play<S: Sink>(self, plan: &RunPlan, sink: S, interrupts: &Interrupts) -> anyhow::Result<(S, Ending)> {
-        let Self { controller, named } = self;
+        let Self { controller, duties } = self;
         let scenario = &plan.scenario;
         let mut plant = PlantCore::new(scenario, EPOCH_NS)?;
         let log = Log { sink, published: Default::default() };
         let mut rig =
-            VirtualRig { controller, named, schedule: &plan.schedule, log, now_ns: EPOCH_NS, reading: None };
+            VirtualRig { controller, duties, schedule: &plan.schedule, log, now_ns: EPOCH_NS, reading: None };
 
         let (mut cycle, mut plant_error) = (0, None);
         while plant_error.is_none()
@@ -116,7 +117,7 @@ impl Run {
 /// Both sides of the rig in one thread: the controller's cycle runs where the plant waits for its command.
 struct VirtualRig<'a, S> {
     controller: Box<dyn Controller>,
-    named: NamedValues,
+    duties: Duties,
     schedule: &'a CycleSchedule,
     log: Log<S>,
     now_ns: u64,
@@ -157,7 +158,7 @@ impl<S: Sink> PlantPorts<VirtualLink> for VirtualRig<'_, S> {
         let (reading, now_ns) = (self.reading.take(), self.now_ns);
         let mut ports = VirtualPorts { log: &mut self.log, now_ns, reading, command: None };
         let Ok(()) =
-            masseter_shared::control::run_cycle(&mut *self.controller, &mut self.named, &mut ports, &wake);
+            masseter_shared::control::run_cycle(&mut *self.controller, &mut self.duties, &mut ports, &wake);
         Ok(ports.command)
     }
 

@@ -1,6 +1,6 @@
 //! One pass over the messages of a run.
 
-use masseter_recording::{Damage, Recorded};
+use masseter_recording::{Damage, ProcessFault, Recorded};
 use masseter_shared::config::Scenario;
 use masseter_shared::messages::codes::ControllerState;
 use masseter_shared::messages::tap::{self, TapError};
@@ -144,6 +144,11 @@ impl Analysis {
             Recorded::Machine(machine) => self.longest_cycles.machine(machine),
         }
         Ok(())
+    }
+
+    /// A fault of a process struck at this time, ns, of which no message tells. Comes before the messages.
+    pub fn process_fault(&mut self, fault: &ProcessFault) {
+        self.faults.strike(fault.number, fault.struck_ns);
     }
 
     fn reading(&mut self, reading: &Reading) {

@@ -76,13 +76,18 @@ impl FaultWatch {
 
     pub(super) fn event(&mut self, event: &EventRecord) {
         let EventRecord { time_ns, source, cause, .. } = *event;
-        if cause == Cause::FaultInjected
-            && let Some(fault) = (event.value as usize).checked_sub(1).and_then(|i| self.faults.get_mut(i))
-        {
-            fault.struck_ns = Some(fault.struck_ns.map_or(time_ns, |struck_ns| struck_ns.min(time_ns)));
+        if cause == Cause::FaultInjected {
+            self.strike(event.value as usize, time_ns);
         }
         if event.begins_stop() && !self.faults.is_empty() {
             self.stops.push(Stop { time_ns, source, cause });
+        }
+    }
+
+    /// A fault of this number, from 1, has struck.
+    pub(super) fn strike(&mut self, number: usize, time_ns: u64) {
+        if let Some(fault) = number.checked_sub(1).and_then(|place| self.faults.get_mut(place)) {
+            fault.struck_ns = Some(fault.struck_ns.map_or(time_ns, |struck_ns| struck_ns.min(time_ns)));
         }
     }
 

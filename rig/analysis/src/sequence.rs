@@ -19,8 +19,12 @@ pub struct TopicFigures {
     pub missing: u64,
 }
 
-/// The process that publishes an event: master, drives, simulated wires and the scenario are one process, the plant.
+/// The process that publishes an event: master, drives and simulated wires are one process. The stimuli of a scenario belong
+/// to the process that carries them out.
 fn publisher_of(event: &Event) -> u32 {
+    if event.is_of_controller() {
+        return Source::Controller.code();
+    }
     let is_of_plant =
         [Source::Drive, Source::Wire, Source::Scenario].map(Source::code).contains(&event.source);
     if is_of_plant { Source::Master.code() } else { event.source }

@@ -70,6 +70,15 @@ pub struct Machine {
     pub is_virtual: bool,
 }
 
+/// A fault of a process that the supervisor carried out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ProcessFault {
+    /// Number in the scenario's list, from 1.
+    pub number: usize,
+    /// When it struck, ns of the run's clock.
+    pub struck_ns: u64,
+}
+
 /// How a run ended.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]

@@ -27,7 +27,7 @@ mod walk;
 mod writer;
 
 pub use backlog::{Backlog, Pace, WriteOutcome};
-pub use circumstances::{DmaLatency, Ending, Machine as MachineInfo, RunUsage, Usage};
+pub use circumstances::{DmaLatency, Ending, Machine as MachineInfo, ProcessFault, RunUsage, Usage};
 pub use encoding::{CDR_LITTLE_ENDIAN, Channel, Encoded, Encoder, SCHEMA_ENCODING, definitions};
 pub use folder::{FolderError, MOTION, RunFolder};
 pub use manifest::Manifest;

@@ -12,7 +12,7 @@ use masseter_shared::realtime::scheduling::Obtained;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
-use crate::circumstances::{DmaLatency, Ending, Machine, RunUsage};
+use crate::circumstances::{DmaLatency, Ending, Machine, ProcessFault, RunUsage};
 use crate::folder::RunFolder;
 
 /// Version of the manifest's form.
@@ -66,6 +66,9 @@ pub struct Manifest {
     pub mending_command: Option<String>,
     /// Resources that the processes used in their steady state; empty in simulated time.
     pub usage: RunUsage,
+    /// The faults of processes that struck. No message tells of them.
+    #[serde(default)]
+    pub process_faults: Vec<ProcessFault>,
     /// How the run ended.
     pub ending: Ending,
 }
@@ -88,6 +91,7 @@ impl Manifest {
             cpu_dma_latency: None,
             mending_command: None,
             usage: RunUsage::default(),
+            process_faults: Vec::new(),
             ending: Ending::died("supervisor", UNJUDGED.to_owned()),
         }
     }

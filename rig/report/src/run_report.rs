@@ -115,6 +115,7 @@ fn analyse(
 ) -> Result<(Figures, Result<(), WriteError>), AnalysisError> {
     let mut reader = Reader::open(&folder.recording())?;
     let mut analysis = Analysis::new(&manifest.scenario, &manifest.declared);
+    manifest.process_faults.iter().for_each(|fault| analysis.process_fault(fault));
     let mut logs = Ok(CandumpLogs::new(folder.path(), &manifest.scenario.can.interfaces));
     while let Some(message) = reader.next_message()? {
         analysis.take(&message)?;

@@ -4,8 +4,8 @@
 
 use masseter_analysis::{EventRecord, Figures, Outage};
 use masseter_recording::{DmaLatency, Ending, Manifest, RunUsage};
-use masseter_shared::config::{CanConfig, ChecksConfig, ExpectedVerdict, TimingConfig};
-use masseter_shared::messages::codes::EventKind;
+use masseter_shared::config::{CanConfig, ChecksConfig, ExpectedVerdict, Scenario, TimingConfig};
+use masseter_shared::messages::codes::{Cause, EventKind};
 use masseter_shared::wording::counted;
 use masseter_terminal::Exit;
 use serde::Serialize;
@@ -59,6 +59,7 @@ impl Verdict {
         let is_too_late = left_its_path(&figures.tracking.actual, &manifest.scenario.checks)
             || checks.iter().any(|check| check.name == FAULTS && check.result == CheckResult::Failed);
         let (mut outcome, mut reason) = ending(&manifest.ending, &figures.events)
+            .or_else(|| stopped_by_stimulus(&manifest.scenario, &figures.events))
             // The machine caused the stop, or it came only after the jaw had left its path.
             .filter(|(outcome, _)| !(*outcome == Outcome::SafeStop && (excuse.is_some() || is_too_late)))
             .or_else(|| incomplete(figures))
@@ -133,6 +134,15 @@ fn ending(ending: &Ending, events: &[EventRecord]) -> Option<OutcomeReason> {
             Some((Outcome::Incomplete, "the recorder could not write everything".to_owned()))
         }
     }
+}
+
+/// A stop that the scenario asks for ends the run as one by the user does.
+fn stopped_by_stimulus(scenario: &Scenario, events: &[EventRecord]) -> Option<OutcomeReason> {
+    let began = events.iter().filter(|event| event.cause == Cause::StimulusBegan);
+    let number = began.map(|event| event.value as usize).find(|number| {
+        number.checked_sub(1).and_then(|place| scenario.stimulus.get(place)).is_some_and(|found| found.stop)
+    })?;
+    Some((Outcome::Interrupted, format!("stopped by stimulus {number} of the scenario")))
 }
 
 /// The first fault explains the stop: the controller's own event often names only the master.
@@ -255,9 +265,7 @@ fn against(
         return (outcome, reason);
     }
     let wanted = Outcome::of(expected);
-    // A stop that the scenario itself requests ends the run in order: the sequence's check has judged it.
-    let is_requested = wanted == Outcome::Interrupted && outcome == Outcome::Passed;
-    if outcome != wanted && !is_requested {
+    if outcome != wanted {
         return (Outcome::Failed, format!("expected {}, but {}: {reason}", wanted.word(), outcome.word()));
     }
     let lost = || {
@@ -282,7 +290,7 @@ mod tests {
     mod figures;
 
     use masseter_shared::messages::Event;
-    use masseter_shared::messages::codes::{Cause, Source};
+    use masseter_shared::messages::codes::Source;
 
     use super::*;
     use masseter_recording::Usage;

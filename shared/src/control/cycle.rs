@@ -2,7 +2,9 @@
 
 use std::borrow::Borrow;
 
+use super::operator::{self, Due, Operator};
 use super::{Controller, Tick};
+use crate::injection::Injected;
 use crate::messages::{Command, Event, Parameters, Reading, Signals, State};
 use crate::named::{Change, NamedValues};
 use crate::realtime::Wake;
@@ -52,23 +54,39 @@ pub trait ControllerPorts {
     /// # Errors
     /// When the message cannot be sent.
     fn publish_event(&mut self, event: &Event) -> Result<(), Self::Error>;
+
+    /// A fault of a process, with its place in the scenario's list, is due. Without processes there is nothing to do.
+    ///
+    /// # Errors
+    /// When the supervisor is gone.
+    fn fault_is_due(&mut self, _fault: usize) -> Result<(), Self::Error> {
+        Ok(())
+    }
+}
+
+/// What accompanies a controller through a run: the values of its named numbers, and the operator of the scenario.
+#[derive(Debug)]
+pub struct Duties {
+    /// The signals and parameters.
+    pub named: NamedValues,
+    /// Who sets parameters and asks for a stop.
+    pub operator: Operator,
 }
 
 /// Runs one cycle: reading, decision, command; then state, signals, parameters and events, which no other loop waits for.
 ///
 /// ```
-/// use masseter_shared::control::{Controller, ControllerPorts, run_cycle};
-/// use masseter_shared::named::NamedValues;
+/// use masseter_shared::control::{Controller, ControllerPorts, Duties, run_cycle};
 /// use masseter_shared::realtime::Wake;
 ///
 /// /// A second at 1 kHz, in simulated time.
 /// fn run_second<P: ControllerPorts>(
 ///     controller: &mut dyn Controller,
-///     named: &mut NamedValues,
+///     duties: &mut Duties,
 ///     ports: &mut P,
 /// ) -> Result<(), P::Error> {
 ///     for cycle in 1..=1000 {
-///         run_cycle(controller, named, ports, &Wake::on_time(cycle, (cycle - 1) * 1_000_000 + 540_000))?;
+///         run_cycle(controller, duties, ports, &Wake::on_time(cycle, (cycle - 1) * 1_000_000 + 540_000))?;
 ///     }
 ///     Ok(())
 /// }
@@ -78,16 +96,23 @@ pub trait ControllerPorts {
 /// Those of the ports.
 pub fn run_cycle<P: ControllerPorts>(
     controller: &mut dyn Controller,
-    named: &mut NamedValues,
+    Duties { named, operator }: &mut Duties,
     ports: &mut P,
     wake: &Wake,
 ) -> Result<(), P::Error> {
+    let reading = ports.reading(wake)?;
+    let received_ns = ports.now_ns();
+    let due = operator.take_due(reading.as_ref().map(|reading| reading.borrow().sampled_ns));
+    match due {
+        Some((_, Due::Set { place, value })) => named.settings().store(place, value),
+        Some((_, Due::Stop)) => controller.request_stop(),
+        Some((_, Due::Fault(fault))) => ports.fault_is_due(fault)?,
+        None => {}
+    }
     let change = named.take_change();
     if let Some(change) = &change {
         controller.set_parameter(change.place, change.to);
     }
-    let reading = ports.reading(wake)?;
-    let received_ns = ports.now_ns();
     controller.observe(reading.as_ref().map(Borrow::borrow));
     let solved_ns = ports.now_ns();
     let event = controller.decide(Tick { cycle: wake.cycle, now_ns: solved_ns });
@@ -95,10 +120,13 @@ pub fn run_cycle<P: ControllerPorts>(
     ports.publish_command(|command| controller.fill_command(command))?;
     ports.publish_state(|state| {
         controller.fill_state(state);
+        operator.note_state(state.controller_state);
         stamp(state, wake, [received_ns, solved_ns, commanded_ns]);
     })?;
     controller.fill_signals(named.signals_mut());
-    publish_named(named, change, ports, Tick { cycle: wake.cycle, now_ns: commanded_ns })?;
+    let tick = Tick { cycle: wake.cycle, now_ns: commanded_ns };
+    publish_named(named, change, ports, tick)?;
+    publish_begin(due, ports, tick)?;
     event.map_or(Ok(()), |event| ports.publish_event(&event))
 }
 
@@ -123,6 +151,16 @@ pub(super) fn publish_named<P: ControllerPorts>(
         })?;
     }
     change.map_or(Ok(()), |change| ports.publish_event(&change.event(cycle, now_ns)))
+}
+
+/// Reports a stimulus that began in a cycle.
+pub(super) fn publish_begin<P: ControllerPorts>(
+    due: Option<(Injected, Due)>,
+    ports: &mut P,
+    Tick { cycle, now_ns }: Tick,
+) -> Result<(), P::Error> {
+    let event = due.and_then(|(injected, _)| operator::event(injected, cycle, now_ns));
+    event.map_or(Ok(()), |event| ports.publish_event(&event))
 }
 
 /// Enters the cycle's times and the use of time into a state: when the reading was received, the pose was found, and the

@@ -5,12 +5,14 @@
 //! particular controller are not here.
 
 mod cycle;
+mod operator;
 mod session;
 
 use crate::messages::{Command, Event, Reading, State};
 use crate::named::Declared;
 
-pub use cycle::{ControllerPorts, run_cycle, set_parameters};
+pub use cycle::{ControllerPorts, Duties, run_cycle, set_parameters};
+pub use operator::{Operator, OperatorError};
 pub use session::{Session, SessionError, Waited};
 
 /// A cycle's place in time.

@@ -2,10 +2,11 @@
 
 use std::time::Duration;
 
-use super::cycle::{publish_named, set_parameters, stamp};
-use super::{Controller, ControllerPorts, Outcome, Tick, run_cycle};
+use super::cycle::{publish_begin, publish_named, set_parameters, stamp};
+use super::operator::{Due, Operator};
+use super::{Controller, ControllerPorts, Duties, Outcome, Tick, run_cycle};
 use crate::clock;
-use crate::lifecycle::{End, Party, ProcessContext, ProcessError};
+use crate::lifecycle::{End, Party, ProcessContext, ProcessError, Report, SupervisorLink};
 use crate::lockstep::{Clock, Lockstep};
 use crate::messages::{Command, Event, Parameters, Reading, Signals, State};
 use crate::named::{Declared, NamedValues, access};
@@ -40,7 +41,9 @@ use crate::transport::{Publisher, ReceivedMessage, Subscriber, TransportError};
 pub struct Session {
     context: ProcessContext,
     ports: Ports,
-    named: NamedValues,
+    duties: Duties,
+    /// Whether the operator of the scenario has asked for a stop.
+    is_stopped: bool,
     /// The cycle whose turn has not ended.
     cycle: Option<OpenCycle>,
 }
@@ -98,8 +101,13 @@ impl Session {
             access::serve(context.node.domain(), named.settings().clone())
                 .map_err(ProcessError::Parameters)?;
         }
-        let ports = Ports::open(&context, named.settings().declared())?;
-        Ok(Self { context, ports, named, cycle: None })
+        let declared = named.settings().declared();
+        // Once before the start, so that what cannot be done is refused in time.
+        Operator::new(&context.scenario, declared, 0)?;
+        let (ports, epoch_ns) = Ports::open(&context, declared)?;
+        let operator = Operator::new(&context.scenario, declared, epoch_ns)?;
+        let duties = Duties { named, operator };
+        Ok(Self { context, ports, duties, is_stopped: false, cycle: None })
     }
 
     /// Runs the controller that made the declaration until it is done.
@@ -107,7 +115,7 @@ impl Session {
     /// # Errors
     /// [`ProcessError`] when messages cannot be exchanged.
     pub fn run(mut self, controller: &mut dyn Controller) -> Result<Outcome, ProcessError> {
-        set_parameters(controller, &self.named);
+        set_parameters(controller, &self.duties.named);
         loop {
             if let Some(outcome) = controller.outcome() {
                 self.finish(outcome)?;
@@ -118,14 +126,14 @@ impl Session {
             }
             self.end_turn(false)?;
             let wake = self.ports.begin_cycle(|| controller.warm_up())?;
-            run_cycle(controller, &mut self.named, &mut self.ports, &wake)?;
+            run_cycle(controller, &mut self.duties, &mut self.ports, &wake)?;
             self.cycle = Some(OpenCycle { wake, received_ns: 0, is_published: true });
         }
     }
 
     /// Whether an orderly end is requested: bring the motion to rest, switch the drives off, then [`Self::finish`].
     pub fn is_stop_requested(&self) -> bool {
-        self.context.stop.is_made()
+        self.is_stopped || self.context.stop.is_made()
     }
 
     /// The context of the run: its scenario and time table.
@@ -145,23 +153,38 @@ impl Session {
             return Ok(Waited::TimedOut);
         }
         let wake = self.ports.begin_cycle(|| ())?;
-        if let Some(change) = self.named.take_change() {
-            self.ports.publish_event(&change.event(wake.cycle, self.ports.now_ns()))?;
-        }
         let reading = self.ports.reading(&wake)?.map(|reading| *reading);
         let received_ns = self.ports.now_ns();
+        let tick = Tick { cycle: wake.cycle, now_ns: received_ns };
+        self.act(reading.map(|reading| reading.sampled_ns), tick)?;
         self.cycle = Some(OpenCycle { wake, received_ns, is_published: false });
-        Ok(Waited::Cycle { tick: Tick { cycle: wake.cycle, now_ns: received_ns }, reading })
+        Ok(Waited::Cycle { tick, reading })
+    }
+
+    /// Does what is due, and takes over a parameter that was set.
+    fn act(&mut self, sampled_ns: Option<u64>, tick: Tick) -> Result<(), ProcessError> {
+        let Duties { named, operator } = &mut self.duties;
+        let due = operator.take_due(sampled_ns);
+        match due {
+            Some((_, Due::Set { place, value })) => named.settings().store(place, value),
+            Some((_, Due::Stop)) => self.is_stopped = true,
+            Some((_, Due::Fault(fault))) => self.ports.fault_is_due(fault)?,
+            None => {}
+        }
+        if let Some(change) = named.take_change() {
+            self.ports.publish_event(&change.event(tick.cycle, tick.now_ns))?;
+        }
+        publish_begin(due, &mut self.ports, tick)
     }
 
     /// The parameters in force in this cycle, in the order of their declaration.
     pub fn parameters(&self) -> &[f64] {
-        self.named.parameters()
+        self.duties.named.parameters()
     }
 
     /// The signals that go out with this cycle's command, in the order of their declaration.
     pub fn signals_mut(&mut self) -> &mut [f64] {
-        self.named.signals_mut()
+        self.duties.named.signals_mut()
     }
 
     /// Publishes this cycle's command and what the program made of the reading. The session enters the time stamps and the
@@ -178,10 +201,11 @@ impl Session {
         self.ports.publish_command(|message| *message = *command)?;
         self.ports.publish_state(|message| {
             *message = *state;
+            self.duties.operator.note_state(state.controller_state);
             stamp(message, &wake, [received_ns, commanded_ns, commanded_ns]);
         })?;
         let tick = Tick { cycle: wake.cycle, now_ns: commanded_ns };
-        publish_named(&mut self.named, None, &mut self.ports, tick)?;
+        publish_named(&mut self.duties.named, None, &mut self.ports, tick)?;
         self.cycle = Some(OpenCycle { wake, received_ns, is_published: true });
         Ok(())
     }
@@ -240,14 +264,15 @@ struct Ports {
     parameters: Option<Publisher<Parameters>>,
     events: Publisher<Event>,
     clock: Clock,
+    link: SupervisorLink,
     /// From the deadline until the newest reading is used, whichever that is, ns.
     reading_timeout_ns: u64,
 }
 
 impl Ports {
     /// Opens the ports, reports ready, and connects to the ports of the other processes before the first cycle, since a
-    /// connection makes and maps files.
-    fn open(context: &ProcessContext, declared: &Declared) -> Result<Self, ProcessError> {
+    /// connection makes and maps files. Returns the time of the first SYNC with them, ns.
+    fn open(context: &ProcessContext, declared: &Declared) -> Result<(Self, u64), ProcessError> {
         let (node, scenario, schedule) = (&context.node, &context.scenario, &context.schedule);
         let readings = node.newest_subscriber()?;
         let (commands, states) = (node.publisher::<Command>()?, node.publisher::<State>()?);
@@ -279,7 +304,7 @@ impl Ports {
                 Clock::Lockstep(lockstep)
             }
         };
-        Ok(Self {
+        let ports = Self {
             readings,
             commands,
             states,
@@ -287,8 +312,10 @@ impl Ports {
             parameters,
             events,
             clock,
+            link: context.link.clone(),
             reading_timeout_ns: (schedule.command_by_ns - schedule.controller_at_ns) / 2,
-        })
+        };
+        Ok((ports, start.epoch_ns))
     }
 
     /// Waits for the next deadline. Before it, calls `warm_up` and touches the memory of the next messages.
@@ -372,5 +399,16 @@ impl ControllerPorts for Ports {
 
     fn publish_event(&mut self, event: &Event) -> Result<(), ProcessError> {
         Ok(self.events.publish_by(|| self.clock.now_ns(), |message| *message = *event)?)
+    }
+
+    /// The supervisor carries it out. In lockstep, simulated time stands still until it has, so that the fault strikes in
+    /// this cycle.
+    fn fault_is_due(&mut self, fault: usize) -> Result<(), ProcessError> {
+        let report = Report::Due { fault, now_ns: self.clock.now_ns() };
+        self.link.report(&report).map_err(ProcessError::Supervisor)?;
+        match &self.clock {
+            Clock::RealTime(_) => Ok(()),
+            Clock::Lockstep(_) => self.link.await_struck().map_err(ProcessError::Supervisor),
+        }
     }
 }

@@ -27,6 +27,7 @@ pub(crate) enum SupervisorLink {
 pub(crate) struct Socket {
     stream: UnixStream,
     starts: Mutex<Receiver<Start>>,
+    strikes: Mutex<Receiver<()>>,
 }
 
 impl SupervisorLink {
@@ -34,18 +35,24 @@ impl SupervisorLink {
     pub(crate) fn over(stream: UnixStream) -> io::Result<(Self, StopRequest)> {
         let input = BufReader::new(stream.try_clone()?);
         let (sender, starts) = channel();
+        let (struck, strikes) = channel();
         let stop = StopRequest::default();
         let to_request = stop.clone();
         thread::Builder::new().name("supervisor".to_owned()).spawn(move || {
             for line in input.lines().map_while(Result::ok) {
-                let Ok(Order::Start(start)) = serde_json::from_str(&line) else { break };
-                if sender.send(start).is_err() {
+                let is_taken = match serde_json::from_str(&line) {
+                    Ok(Order::Start(start)) => sender.send(start).is_ok(),
+                    Ok(Order::Struck) => struck.send(()).is_ok(),
+                    Ok(Order::Stop) | Err(_) => false,
+                };
+                if !is_taken {
                     break;
                 }
             }
             to_request.make();
         })?;
-        Ok((Self::Socket(Arc::new(Socket { stream, starts: Mutex::new(starts) })), stop))
+        let socket = Socket { stream, starts: Mutex::new(starts), strikes: Mutex::new(strikes) };
+        Ok((Self::Socket(Arc::new(socket)), stop))
     }
 
     pub(crate) fn report(&self, report: &Report) -> io::Result<()> {
@@ -67,6 +74,17 @@ impl SupervisorLink {
                 })
             }
             Self::Socket(socket) => Ok(socket.starts.lock().ok().and_then(|starts| starts.recv().ok())),
+        }
+    }
+
+    /// Waits until the supervisor has carried out a fault; also ends when the supervisor does.
+    pub(crate) fn await_struck(&self) -> io::Result<()> {
+        match self {
+            Self::Pipes => io::stdin().read_line(&mut String::new()).map(drop),
+            Self::Socket(socket) => {
+                let _ = socket.strikes.lock().map(|strikes| strikes.recv());
+                Ok(())
+            }
         }
     }
 

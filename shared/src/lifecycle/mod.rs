@@ -14,6 +14,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use crate::config::{Scenario, ScenarioError};
+use crate::control::OperatorError;
 use crate::named::{Declared, NameError};
 use crate::realtime::scheduling::{SchedulingRequest, obtain};
 use crate::schedule::{CycleSchedule, ScheduleError};
@@ -79,6 +80,9 @@ pub enum ProcessError {
     /// A signal or parameter of the controller, or a value for one.
     #[error(transparent)]
     Name(#[from] NameError),
+    /// The operator of the scenario.
+    #[error(transparent)]
+    Operator(#[from] OperatorError),
     /// Other programs cannot reach the controller's parameters.
     #[error("cannot serve the parameters: {0}")]
     Parameters(io::Error),

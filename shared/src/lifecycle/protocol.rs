@@ -53,6 +53,13 @@ pub enum Report {
     },
     /// Another process has stopped answering, in lockstep.
     Silence(Silence),
+    /// A fault of a process is due, which the supervisor carries out.
+    Due {
+        /// Its place in the scenario's list.
+        fault: usize,
+        /// Now, ns of the run's clock.
+        now_ns: u64,
+    },
     /// An attached program has ended its work. The own processes end with an exit code instead.
     Ended(End),
 }
@@ -78,6 +85,8 @@ pub enum End {
 pub enum Order {
     /// Start of the first cycle.
     Start(Start),
+    /// In lockstep: the fault that was due has struck, or could not.
+    Struck,
     /// Come to an orderly end. The own processes get SIGTERM instead.
     Stop,
 }

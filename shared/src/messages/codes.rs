@@ -7,6 +7,9 @@ pub use masseter_can::cia402::{DriveRequest, DriveState};
 /// [`Event::axis`](super::Event::axis) when no axis is concerned.
 pub const NO_AXIS: u32 = u32::MAX;
 
+/// [`Event::object`](super::Event::object) of a stimulus that the controller's side carries out.
+pub const OF_OPERATOR: u32 = 1;
+
 /// [`Reading::drive_state`](super::Reading::drive_state) of a drive not heard of yet, or lost.
 pub const NO_DRIVE_STATE: u32 = 0;
 

@@ -21,7 +21,7 @@ use bytemuck::{Pod, Zeroable, bytes_of, bytes_of_mut};
 use iceoryx2::prelude::ZeroCopySend;
 
 use crate::geometry::{AXES, LEGS, Pose};
-use codes::{Cause, EventKind, NO_AXIS, Source};
+use codes::{Cause, EventKind, NO_AXIS, OF_OPERATOR, Source};
 use schema::FieldType;
 
 pub use data::CanData;
@@ -347,6 +347,12 @@ impl Event {
             axis: NO_AXIS,
             ..Self::zeroed()
         }
+    }
+
+    /// Whether the controller's side published it, which also carries out the operator's stimuli.
+    pub fn is_of_controller(&self) -> bool {
+        self.source == Source::Controller.code()
+            || (self.source == Source::Scenario.code() && self.object == OF_OPERATOR)
     }
 }
 

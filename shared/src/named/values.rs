@@ -34,6 +34,11 @@ impl Settings {
         f64::from_bits(self.wanted[place].load(Ordering::Relaxed))
     }
 
+    /// Sets the parameter at this place to a value within its range.
+    pub(crate) fn store(&self, place: usize, value: f64) {
+        self.wanted[place].store(value.to_bits(), Ordering::Relaxed);
+    }
+
     /// Sets a parameter.
     ///
     /// # Errors
@@ -41,7 +46,7 @@ impl Settings {
     pub fn set(&self, name: &str, value: f64) -> Result<(), NameError> {
         let place = self.declared.place_of(name)?;
         self.declared.parameters[place].check(value)?;
-        self.wanted[place].store(value.to_bits(), Ordering::Relaxed);
+        self.store(place, value);
         Ok(())
     }
 }

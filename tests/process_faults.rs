@@ -1,0 +1,137 @@
+//! Faults of processes: each strikes real processes at its time of the motion, and ends the run as it must.
+
+mod common;
+
+use std::fs;
+use std::process::Output;
+
+use common::{Cores, LENIENT, Workspace, check, masseter, skip, stderr, stdout};
+use masseter_shared::realtime::scheduling::{SchedulingRequest, obtain};
+
+/// A scenario with one fault, half a second into the motion.
+fn with_fault(kind: &str, more: &str) -> String {
+    format!("duration_s = 1.5\n[[faults]]\nkind = '{kind}'\nat_s = 0.5\n{more}")
+}
+
+fn in_lockstep(scenario: &str) -> (Workspace, Output, String) {
+    let workspace = Workspace::new(scenario);
+    let output = workspace.run_simulated("lockstep", &["--quiet"]);
+    let said = format!("{scenario}: {}{}", stdout(&output), stderr(&output));
+    (workspace, output, said)
+}
+
+/// The fault's strike, s from the beginning of the motion.
+fn struck_s(workspace: &Workspace) -> f64 {
+    let figures = &workspace.summary()["figures"];
+    let events = figures["events"].as_array().unwrap();
+    let runs = events.iter().find(|event| event["transition"][1] == "running").expect("the motion began");
+    let struck_ns = figures["faults"][0]["struck_ns"].as_f64().expect("the fault has struck");
+    (struck_ns - runs["time_ns"].as_f64().unwrap()) / 1e9
+}
+
+#[test]
+fn a_killed_process_ends_the_run_with_its_name() {
+    for role in ["controller", "plant", "recorder"] {
+        let (workspace, output, said) = in_lockstep(&with_fault(&format!("{role}_kill"), ""));
+        assert_eq!(output.status.code(), Some(4), "{said}");
+        let summary = workspace.summary();
+        assert_eq!(summary["verdict"]["reason"], format!("the {role} died: SIGKILL (9)"), "{said}");
+        let manifest = workspace.manifest();
+        assert_eq!(manifest["process_faults"][0]["number"], 1, "{said}");
+        // A killed recorder takes the newest messages with it, perhaps also the beginning of the motion.
+        if role != "recorder" {
+            assert!((struck_s(&workspace) - 0.5).abs() < 2e-3, "{}: {said}", struck_s(&workspace));
+        }
+    }
+}
+
+#[test]
+fn a_short_stall_changes_no_byte_in_lockstep() {
+    for role in ["plant", "recorder"] {
+        let scenario = with_fault(&format!("{role}_stall"), "size = '300 ms'\n");
+        let (workspace, output, said) = in_lockstep(&scenario);
+        assert_eq!(output.status.code(), Some(0), "{said}");
+        let summary = workspace.summary();
+        assert!(check(&summary, "faults")["finding"].as_str().unwrap().contains("1 of 1"), "{said}");
+        assert!((struck_s(&workspace) - 0.5).abs() < 2e-3, "{said}");
+        let plain = Workspace::new("duration_s = 1.5");
+        assert_eq!(plain.run_virtual(&["--quiet"]).status.code(), Some(0));
+        assert_eq!(summary["figures"]["digest"], plain.summary()["figures"]["digest"], "{said}");
+    }
+}
+
+#[test]
+fn a_stall_beyond_the_patience_ends_the_run_with_the_name_of_the_process() {
+    for role in ["plant", "recorder"] {
+        let workspace = Workspace::new(&with_fault(&format!("{role}_stall"), "size = '10 s'\n"));
+        let output = workspace.run_simulated("lockstep", &["--quiet", "--patience", "500ms"]);
+        assert_eq!(output.status.code(), Some(4), "{}{}", stdout(&output), stderr(&output));
+        let reason = workspace.summary()["verdict"]["reason"].as_str().unwrap().to_owned();
+        assert!(reason.starts_with(&format!("the {role} died: it did not answer")), "{reason}");
+    }
+}
+
+#[test]
+fn a_full_disk_leaves_an_incomplete_recording() {
+    let (workspace, output, said) = in_lockstep(&with_fault("disk_full", "").replace("1.5", "5.0"));
+    assert_eq!(output.status.code(), Some(6), "{said}");
+    assert_eq!(workspace.summary()["verdict"]["word"], "INCOMPLETE", "{said}");
+    assert_eq!(workspace.manifest()["process_faults"][0]["number"], 1, "{said}");
+}
+
+#[test]
+fn a_core_that_another_task_takes_is_judged_in_real_time() {
+    let cores = Cores::take();
+    let request = SchedulingRequest { core: Some(0), fifo_priority: Some(81), locked_memory: false };
+    let obtained = std::thread::spawn(move || obtain(request)).join().unwrap();
+    if let Some(refusal) = obtained.refusals.first() {
+        return skip(refusal);
+    }
+    let workspace = Workspace::new(&(with_fault("core_stall", "size = '5 ms'\n") + LENIENT));
+    let output = workspace.run(&cores, &["--quiet"]);
+    let said = format!("{}{}", stdout(&output), stderr(&output));
+    assert_eq!(workspace.manifest()["process_faults"][0]["number"], 1, "{said}");
+    assert!((struck_s(&workspace) - 0.5).abs() < 0.1, "{said}");
+    assert!(common::PASSED_OR_INVALID.contains(&output.status.code()), "{said}");
+}
+
+#[test]
+fn a_process_is_killed_in_real_time_too() {
+    let cores = Cores::take();
+    let workspace = Workspace::new(&(with_fault("plant_kill", "") + LENIENT));
+    let output = workspace.run(&cores, &["--quiet"]);
+    assert_eq!(output.status.code(), Some(4), "{}{}", stdout(&output), stderr(&output));
+    assert_eq!(workspace.summary()["verdict"]["reason"], "the plant died: SIGKILL (9)");
+    assert!((struck_s(&workspace) - 0.5).abs() < 0.1);
+}
+
+#[test]
+fn where_there_are_no_such_processes_the_fault_is_refused() {
+    for (kind, arguments, expected) in [
+        ("plant_kill", &["--clock", "virtual"][..], "virtual time has no processes: use --clock lockstep"),
+        ("core_stall", &["--clock", "lockstep"], "use --clock rt"),
+        ("plant_kill", &["--clock", "rt", "--controller", "none"], "only a controller knows"),
+        ("controller_kill", &["--clock", "rt", "--controller", "external"], "kills only what it started"),
+    ] {
+        let size = if kind == "core_stall" { "size = '1 ms'\n" } else { "" };
+        let workspace = Workspace::new(&with_fault(kind, size));
+        let file = workspace.file("scenario.toml");
+        let output = masseter(&[&["run", file.to_str().unwrap()], arguments].concat());
+        assert_eq!(output.status.code(), Some(2), "{kind} {arguments:?}: {}", stderr(&output));
+        assert!(stderr(&output).contains(expected), "{kind} {arguments:?}: {}", stderr(&output));
+    }
+}
+
+#[test]
+fn a_suite_runs_such_scenarios_in_lockstep_and_says_so() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("plain.toml"), "duration_s = 1.0\n").unwrap();
+    let stall = with_fault("plant_stall", "size = '50 ms'\n");
+    fs::write(folder.path().join("stall.toml"), stall).unwrap();
+    let output = masseter(&["test", folder.path().to_str().unwrap()]);
+    assert_eq!(output.status.code(), Some(0), "{}{}", stdout(&output), stderr(&output));
+    assert!(
+        stderr(&output).contains("in lockstep, one after the other") && stderr(&output).contains(": stall\n")
+    );
+    assert!(stdout(&output).contains("test stall ... ok"), "{}", stdout(&output));
+}
