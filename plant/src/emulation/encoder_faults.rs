@@ -130,29 +130,29 @@ mod tests {
 
     const MS: u64 = 1_000_000;
 
-    /// What an encoder sees of a shaft that moves from 100 mm on by 1 mm a millisecond, in mm.
-    fn seen_mm(kind: Kind, size: f64) -> [f64; 4] {
+    /// What an encoder sees of a shaft that moves from 100 mm on by 1 mm a millisecond, in µm.
+    fn seen_um(kind: Kind, size: f64) -> [i64; 4] {
         let mut faults = EncoderFaults::new(1, 0, 100);
         faults.begin(kind, size);
         [0, 1, 2, 3].map(|ms| {
             let seen_m = faults.seen_m(5 * MS + ms * MS, 0.1 + ms as f64 * 1e-3);
-            (seen_m * 1e6).round() / 1e3
+            (seen_m * 1e6).round() as i64
         })
     }
 
     #[test]
     fn each_kind_shows_what_its_name_says() {
         let table = [
-            (Kind::EncoderStuck, 0.0, [100.0, 100.0, 100.0, 100.0]),
-            (Kind::EncoderOffset, 0.002, [102.0, 103.0, 104.0, 105.0]),
-            (Kind::EncoderDrift, -0.5, [100.0, 100.5, 101.0, 101.5]),
-            (Kind::EncoderSteps, 0.002, [100.0, 102.0, 102.0, 104.0]),
-            (Kind::EncoderSign, 0.0, [100.0, 99.0, 98.0, 97.0]),
-            (Kind::EncoderLoses, 0.25, [100.0, 100.75, 101.5, 102.25]),
-            (Kind::EncoderDelay, 0.002, [100.0, 100.0, 100.0, 101.0]),
+            (Kind::EncoderStuck, 0.0, [100_000, 100_000, 100_000, 100_000]),
+            (Kind::EncoderOffset, 0.002, [102_000, 103_000, 104_000, 105_000]),
+            (Kind::EncoderDrift, -0.5, [100_000, 100_500, 101_000, 101_500]),
+            (Kind::EncoderSteps, 0.002, [100_000, 102_000, 102_000, 104_000]),
+            (Kind::EncoderSign, 0.0, [100_000, 99_000, 98_000, 97_000]),
+            (Kind::EncoderLoses, 0.25, [100_000, 100_750, 101_500, 102_250]),
+            (Kind::EncoderDelay, 0.002, [100_000, 100_000, 100_000, 101_000]),
         ];
         for (kind, size, expected) in table {
-            assert_eq!(seen_mm(kind, size), expected, "{kind}");
+            assert_eq!(seen_um(kind, size), expected, "{kind}");
         }
     }
 

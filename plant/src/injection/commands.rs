@@ -116,7 +116,7 @@ mod tests {
         assert_eq!((jump.target_m, jump.cycle), ([0.1, 0.1, 0.1, 0.1, 0.101, 0.1], 3));
         assert_eq!(alter(CommandVersion, None).unwrap().version, 11);
         let foreign = alter(CommandForeign, None).unwrap();
-        assert!(foreign.cycle > 1_000_000 && foreign.target_m == [0.1; 6]);
+        assert_eq!((foreign.cycle > 1_000_000, foreign.target_m), (true, [0.1; 6]));
     }
 
     #[test]

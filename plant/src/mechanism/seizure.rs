@@ -55,10 +55,11 @@ mod tests {
     }
 
     #[test]
-    fn it_holds_a_load_below_two_kilonewtons_without_creeping_and_yields_to_more() {
-        for mass_kg in [0.4, 1.6, 3.0] {
-            let (position_m, speed_m_s) = after(8000, mass_kg, 0.0, 1900.0);
-            assert!((position_m - 1.9e-4).abs() < 1e-6 && speed_m_s.abs() < 1e-6, "{mass_kg}: {position_m}");
+    fn it_holds_a_load_without_creeping_and_yields_to_more_than_two_kilonewtons() {
+        // A load that comes at once stretches the spring for a moment by up to twice as much.
+        for mass_kg in [0.01, 0.4, 3.0] {
+            let (position_m, speed_m_s) = after(8000, mass_kg, 0.0, 900.0);
+            assert!((position_m - 0.9e-4).abs() < 1e-6 && speed_m_s.abs() < 1e-6, "{mass_kg}: {position_m}");
         }
         let (position_m, _) = after(800, 1.0, 0.0, 2200.0);
         assert!(position_m > 0.5, "200 N accelerate a kilogram for 0.1 s: {position_m}");

@@ -31,14 +31,14 @@ mod tests {
     #[test]
     fn what_the_shaft_moves_too_little_adds_up_while_the_ratio_is_wrong_and_stays() {
         let mut gear = Gear::default();
-        let mut error_mm = |ratio, demand_m| (gear.error_m(ratio, demand_m) * 1e6).round() / 1e3;
-        assert_eq!(error_mm(None, Some(0.270)), 0.0);
-        assert_eq!(error_mm(Some(0.9), Some(0.270)), 0.0, "from where it is");
-        assert_eq!(error_mm(Some(0.9), Some(0.280)), 1.0);
-        assert_eq!(error_mm(Some(0.9), None), 1.0, "the brake is closed");
-        assert_eq!(error_mm(Some(0.9), Some(0.250)), 1.0);
-        assert_eq!(error_mm(Some(0.9), Some(0.240)), 0.0);
-        assert_eq!(error_mm(Some(1.5), Some(0.242)), -1.0);
-        assert_eq!(error_mm(None, Some(0.270)), -1.0);
+        let mut error_um = |ratio, demand_m| (gear.error_m(ratio, demand_m) * 1e6).round() as i64;
+        assert_eq!(error_um(None, Some(0.270)), 0);
+        assert_eq!(error_um(Some(0.9), Some(0.270)), 0, "from where it is");
+        assert_eq!(error_um(Some(0.9), Some(0.280)), 1000);
+        assert_eq!(error_um(Some(0.9), None), 1000, "the brake is closed");
+        assert_eq!(error_um(Some(0.9), Some(0.250)), 1000);
+        assert_eq!(error_um(Some(0.9), Some(0.240)), 0);
+        assert_eq!(error_um(Some(1.5), Some(0.242)), -1000);
+        assert_eq!(error_um(None, Some(0.270)), -1000);
     }
 }

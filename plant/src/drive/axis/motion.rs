@@ -27,6 +27,7 @@ pub(crate) struct Shaft {
 
 impl Shaft {
     /// A shaft whose encoder sees where it is.
+    #[cfg(test)]
     pub(crate) const fn at(position_m: f64) -> Self {
         Self { seen_m: position_m, is_m: position_m }
     }
