@@ -41,7 +41,7 @@ impl Strikes {
     pub(super) fn new(scenario: &Scenario, folder: &RunFolder, is_lockstep: bool) -> Self {
         Self {
             faults: scenario.faults.clone(),
-            realtime: scenario.realtime.clone(),
+            realtime: scenario.realtime,
             recording: folder.recording(),
             is_lockstep,
             struck: Vec::new(),
