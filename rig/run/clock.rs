@@ -3,7 +3,7 @@
 use std::thread;
 
 use anyhow::bail;
-use masseter_shared::config::{FaultKindConfig, FaultLayer, Scenario};
+use masseter_shared::config::{FaultKindConfig, FaultLayer, Scenario, StimulusConfig};
 use masseter_shared::realtime::scheduling::{SchedulingRequest, obtain};
 use masseter_terminal::status;
 
@@ -85,6 +85,7 @@ pub(super) fn check(args: &RunArgs, scenario: &Scenario) -> anyhow::Result<()> {
     if args.patience.is_some() && args.clock != ClockKind::Lockstep {
         bail!("--patience needs --clock lockstep");
     }
+    check_stimuli(args, scenario)?;
     check_process_faults(args, scenario)?;
     if args.clock == ClockKind::Rt {
         return Ok(());
@@ -106,6 +107,15 @@ pub(super) fn check(args: &RunArgs, scenario: &Scenario) -> anyhow::Result<()> {
     }
     if args.live.is_some() {
         bail!("--live needs --clock rt or lockstep: virtual time is over before a client can connect");
+    }
+    Ok(())
+}
+
+/// Refuses stimuli that nobody would carry out.
+fn check_stimuli(args: &RunArgs, scenario: &Scenario) -> anyhow::Result<()> {
+    let is_of_controller = scenario.stimulus.iter().any(StimulusConfig::is_of_controller);
+    if args.controller == ControllerChoice::None && is_of_controller {
+        bail!("[[stimulus]]: parameter and stop need a controller: leave --controller none away");
     }
     Ok(())
 }

@@ -4,7 +4,7 @@
 
 use std::fs;
 use std::io;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::mpsc::channel;
 use std::thread;
 use std::time::Duration;
@@ -41,7 +41,7 @@ impl Strikes {
     pub(super) fn new(scenario: &Scenario, folder: &RunFolder, is_lockstep: bool) -> Self {
         Self {
             faults: scenario.faults.clone(),
-            realtime: scenario.realtime.clone(),
+            realtime: scenario.realtime,
             recording: folder.recording(),
             is_lockstep,
             struck: Vec::new(),
@@ -122,7 +122,7 @@ fn stall_core(realtime: &RealtimeConfig, size: Duration) -> anyhow::Result<()> {
 }
 
 /// Lets the recording grow no further.
-fn fill_disk(recording: &PathBuf, recorder: &Process) -> anyhow::Result<()> {
+fn fill_disk(recording: &Path, recorder: &Process) -> anyhow::Result<()> {
     let length =
         fs::metadata(recording).with_context(|| format!("cannot see {}", recording.display()))?.len();
     recorder.limit_files(length).context("the limit on the size of its files cannot be set")

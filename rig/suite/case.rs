@@ -63,7 +63,9 @@ fn files_of(path: &Path) -> anyhow::Result<Vec<PathBuf>> {
 fn named(files: Vec<PathBuf>) -> Vec<Case> {
     let stem = |path: &Path| path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let mut times: BTreeMap<String, usize> = BTreeMap::new();
-    files.iter().for_each(|path| *times.entry(stem(path)).or_default() += 1);
+    for path in &files {
+        *times.entry(stem(path)).or_default() += 1;
+    }
     let name = |path: &Path| match stem(path) {
         stem if times[&stem] == 1 => stem,
         _ => path.with_extension("").display().to_string(),

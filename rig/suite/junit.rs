@@ -18,16 +18,17 @@ enum Case {
 /// The document.
 pub(super) fn xml(all: &[Tested], allow_untested: bool, took_s: f64) -> String {
     let suites: Vec<_> = all.iter().map(|tested| Suite::new(tested, allow_untested)).collect();
-    let sum = |of: fn(&Suite<'_>) -> usize| suites.iter().map(of).sum::<usize>();
+    let cases: usize = suites.iter().map(|suite| suite.cases.len()).sum();
+    let [failures, errors, skipped] =
+        [Suite::failures, Suite::errors, Suite::skipped].map(|of| suites.iter().map(of).sum::<usize>());
     let mut text = format!(
         "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n\
-         <testsuites name=\"masseter\" tests=\"{}\" failures=\"{}\" errors=\"{}\" skipped=\"{}\" time=\"{took_s:.3}\">\n",
-        sum(|suite| suite.cases.len()),
-        sum(|suite| suite.failures()),
-        sum(|suite| suite.errors()),
-        sum(|suite| suite.skipped()),
+         <testsuites name=\"masseter\" tests=\"{cases}\" failures=\"{failures}\" errors=\"{errors}\" \
+         skipped=\"{skipped}\" time=\"{took_s:.3}\">\n"
     );
-    suites.iter().for_each(|suite| text += &suite.xml());
+    for suite in &suites {
+        text += &suite.xml();
+    }
     text + "</testsuites>\n"
 }
 
@@ -41,7 +42,7 @@ impl<'a> Suite<'a> {
     fn new(tested: &'a Tested, allow_untested: bool) -> Self {
         let is_short = tested.outcome.is_short(allow_untested);
         let checks = tested.verdict.iter().flat_map(|verdict| &verdict.checks);
-        let mut cases: Vec<_> = checks.map(|check| (&*check.name, of_check(check, is_short))).collect();
+        let mut cases: Vec<_> = checks.map(|check| (check.name, of_check(check, is_short))).collect();
         let has_failure = cases.iter().any(|(_, case)| matches!(case, Case::Failed(_)));
         let is_by_checks = tested.verdict.as_ref().is_some_and(|verdict| verdict.exit_code == Exit::Failed);
         let is_explained = !is_short || has_failure && is_by_checks;

@@ -80,8 +80,9 @@ impl Operator {
                 continue;
             }
             let when = stimulus.when(scenario)?;
-            check_seen(when, scenario)
-                .ok_or(OperatorError::Unseen { table: "[[stimulus]]", number: place + 1 })?;
+            if !is_seen(when, scenario) {
+                return Err(OperatorError::Unseen { table: "[[stimulus]]", number: place + 1 });
+            }
             let due = due(stimulus, declared)
                 .map_err(|error| OperatorError::Parameter { number: place + 1, error })?;
             waiting.push((Injected::Stimulus(place), due));
@@ -91,8 +92,9 @@ impl Operator {
                 continue;
             }
             let when = fault.when(scenario)?;
-            check_seen(when, scenario)
-                .ok_or(OperatorError::Unseen { table: "[[faults]]", number: place + 1 })?;
+            if !is_seen(when, scenario) {
+                return Err(OperatorError::Unseen { table: "[[faults]]", number: place + 1 });
+            }
             waiting.push((Injected::Fault(place), Due::Fault(place)));
         }
         Ok(Self { injection: Injection::new(scenario, now_ns)?, waiting, sampled_ns: 0 })
@@ -129,15 +131,14 @@ pub(crate) fn event(injected: Injected, cycle: u64, time_ns: u64) -> Option<Even
 }
 
 /// Whether the controller sees what the time counts from.
-fn check_seen(when: When, scenario: &Scenario) -> Option<()> {
-    let is_seen = match when.start {
+fn is_seen(when: When, scenario: &Scenario) -> bool {
+    match when.start {
         Start::SwitchOn | Start::State(_) => true,
         Start::Stimulus(place) => scenario.stimulus.get(place).is_some_and(StimulusConfig::is_of_controller),
         Start::Fault(place) => {
             scenario.faults.get(place).is_some_and(|fault| fault.kind.layer() == FaultLayer::Process)
         }
-    };
-    is_seen.then_some(())
+    }
 }
 
 fn due(stimulus: &StimulusConfig, declared: &Declared) -> Result<Due, NameError> {
