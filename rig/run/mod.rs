@@ -8,6 +8,7 @@ mod child;
 mod clock;
 mod controller;
 mod ending;
+pub(crate) mod exec_program;
 mod program;
 mod reports;
 mod room;
