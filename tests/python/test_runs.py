@@ -1,5 +1,8 @@
 """Runs from Python: laws, controllers of the drives, what they leave, and what goes wrong."""
 
+import contextlib
+import os
+import signal
 import subprocess
 import threading
 import time
@@ -163,11 +166,26 @@ def play(session: masseter.Session, misbehave: Callable[[int, Command], None]) -
         session.publish(command, state)
 
 
+def rig_name(folder: Path) -> str:
+    return f"session-{folder.name[-20:]}"
+
+
+def plant_of(folder: Path) -> int:
+    """The process of the plant in a run of this folder."""
+    for arguments in Path("/proc").glob("[0-9]*/cmdline"):
+        # A process may end meanwhile.
+        with contextlib.suppress(OSError):
+            words = arguments.read_bytes().split(b"\0")
+            if b"plant" in words and rig_name(folder).encode() in words:
+                return int(arguments.parent.name)
+    raise AssertionError(f"no plant runs for {folder}")
+
+
 def session_run(
     masseter_command: str, folder: Path, work: Callable[[masseter.Session], None], *more: str
 ) -> tuple[int, str]:
     clock = more or ("--clock", "lockstep", "--patience", "1s")
-    name = f"session-{folder.name[-20:]}"
+    name = rig_name(folder)
     rig = start(masseter_command, name, "--duration", "1", "--out", str(folder / "run"), *clock)
     said = []
 
@@ -275,20 +293,42 @@ def test_a_flood_of_events_costs_the_flooder_alone(masseter_command: str, tmp_pa
     assert len(run.command) == 400
 
 
-def test_a_controller_that_leaves_or_hangs_is_named(masseter_command: str, tmp_path: Path) -> None:
+def test_a_controller_that_leaves_is_named(masseter_command: str, tmp_path: Path) -> None:
     code, said = session_run(masseter_command, tmp_path, lambda session: session.fail("no more ideas"))
     assert code == 4 and "no more ideas" in said, said
 
+
+@pytest.mark.parametrize("timeout_s", [None, 0.0, 0.01])
+def test_a_controller_that_waits_no_more_is_given_up_and_named(
+    masseter_command: str, tmp_path: Path, timeout_s: float | None
+) -> None:
     over = threading.Event()
 
     def hang(session: masseter.Session) -> None:
-        session.wait()
+        begun = 0
+        while begun < 50:
+            begun += session.wait(timeout_s) is not None
         over.wait(4.0)
 
-    hung = tmp_path / "hung"
-    hung.mkdir()
-    code, said = session_run(masseter_command, hung, hang)
-    assert code == 4 and "did not answer in cycle" in said, said
+    code, said = session_run(masseter_command, tmp_path, hang)
+    assert code == 4 and "the controller died: it did not answer in cycle 50 for 1.0 s" in said, said
+
+
+@pytest.mark.parametrize("timeout_s", [None, 0.0, 0.01])
+def test_a_plant_that_does_not_answer_is_given_up_by_a_controller_that_only_looks(
+    masseter_command: str, tmp_path: Path, timeout_s: float | None
+) -> None:
+    def work(session: masseter.Session) -> None:
+        for _ in range(50):
+            session.wait()
+        os.kill(plant_of(tmp_path), signal.SIGSTOP)
+        while not session.is_stop_requested:
+            session.wait(timeout_s)
+
+    code, said = session_run(masseter_command, tmp_path, work)
+    # A wait without a time-out has begun the next cycle.
+    number = 51 if timeout_s is None else 50
+    assert code == 4 and f"the plant died: it did not answer in cycle {number} for 2.0 s" in said, said
 
 
 def test_without_a_rig_or_a_run_the_reason_is_given(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

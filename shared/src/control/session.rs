@@ -314,7 +314,7 @@ impl Ports {
                 }
                 Ok(begins)
             }
-            Clock::Lockstep(lockstep) => Ok(lockstep.is_turn_within(timeout)?),
+            Clock::Lockstep(lockstep) => lockstep.is_turn_within(timeout),
         }
     }
 
