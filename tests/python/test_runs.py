@@ -255,6 +255,32 @@ def test_a_second_command_in_a_cycle_is_refused_and_the_run_ends_with_its_reason
     assert code == 4 and "cycle 1 has its command already" in said, said
 
 
+def test_other_threads_run_while_a_session_waits(masseter_command: str, tmp_path: Path) -> None:
+    begins = threading.Event()
+    counted: list[int] = []
+
+    def count(plant: int) -> None:
+        begins.wait()
+        counted.extend(range(1000))
+        os.kill(plant, signal.SIGCONT)
+
+    def work(session: masseter.Session) -> None:
+        session.wait()
+        plant = plant_of(tmp_path)
+        os.kill(plant, signal.SIGSTOP)
+        counting = threading.Thread(target=count, args=[plant])
+        counting.start()
+        begins.set()
+        # The plant answers only after the other thread has counted.
+        cycle = session.wait()
+        counting.join()
+        assert cycle is not None and cycle.reading is not None and len(counted) == 1000
+        session.finish()
+
+    code, said = session_run(masseter_command, tmp_path, work)
+    assert code == 1, said
+
+
 def test_a_controller_that_begins_late_is_waited_for(masseter_command: str, tmp_path: Path) -> None:
     def work(session: masseter.Session) -> None:
         time.sleep(0.5)
