@@ -30,6 +30,7 @@ use crate::report_cli::{self, ReportArgs};
 use crate::run::{
     self,
     args::{Readers, RunArgs},
+    exec_program::{ExecProgramArgs, exec_program},
 };
 use crate::signals_cli::{self, SignalsArgs};
 use crate::suite::{self, args::TestArgs};
@@ -128,6 +129,8 @@ enum Verb {
     BenchPeer(PeerArgs),
     #[command(hide = true)]
     Recorder(RecorderArgs),
+    #[command(hide = true)]
+    ExecProgram(ExecProgramArgs),
 }
 
 /// Parses the arguments, executes the verb, and prints its error.
@@ -160,7 +163,9 @@ fn parse() -> Cli {
 fn keep_files_private(verb: &Verb) {
     umask(match verb {
         // What init lays down is public.
-        Verb::Controller(_) | Verb::Recorder(_) | Verb::Init(_) | Verb::New(_) => return,
+        Verb::Controller(_) | Verb::Recorder(_) | Verb::ExecProgram(_) | Verb::Init(_) | Verb::New(_) => {
+            return;
+        }
         Verb::Run(args) => args.readable_by.umask(),
         Verb::Report(args) => args.umask(),
         _ => Readers::Owner.umask(),
@@ -194,6 +199,7 @@ fn execute(verb: Verb) -> Result<Exit, Failure> {
         Verb::Controller(args) => controller::control(args).usage(),
         Verb::Plant(args) => plant::plant(args).usage(),
         Verb::Recorder(args) => recorder::record(args).usage(),
+        Verb::ExecProgram(args) => exec_program(&args).usage(),
     }
 }
 

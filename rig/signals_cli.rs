@@ -30,11 +30,9 @@ pub(crate) fn signals(args: &SignalsArgs) -> anyhow::Result<Exit> {
     let registry = Registry::new(&plan.scenario, &declared);
     let text = match args.format {
         Format::Json => serde_json::to_string_pretty(registry.signals())? + "\n",
-        Format::Human => registry
-            .signals()
-            .iter()
-            .map(|signal| format!("{:<26} {:<6} {}\n", signal.name, signal.unit, signal.about))
-            .collect(),
+        Format::Human => registry.signals().iter().fold(String::new(), |text, signal| {
+            text + &format!("{:<26} {:<6} {}\n", signal.name, signal.unit, signal.about)
+        }),
     };
     result(&text)?;
     Ok(Exit::Passed)

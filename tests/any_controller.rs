@@ -147,6 +147,49 @@ fn a_program_of_the_user_that_hangs_is_left_to_its_user_and_the_run_ends() {
     program.wait().unwrap();
 }
 
+/// Whether a process is gone, or at least dead: who adopts it may leave it unawaited.
+fn is_dead(pid: i32) -> bool {
+    let status = fs::read_to_string(format!("/proc/{pid}/stat")).unwrap_or_default();
+    status.rsplit_once(") ").is_none_or(|(_, rest)| rest.starts_with(['Z', 'X']))
+}
+
+#[test]
+fn a_program_that_ignores_everything_dies_with_the_rig() {
+    // One never attaches; the other one takes part, and is then stopped.
+    let deaf = "trap '' HUP INT QUIT TERM PIPE\necho $$ > $PIDS\nwhile :; do sleep 0.1; done";
+    let attached = format!("echo $$ > $PIDS\nexec {MASSETER} controller");
+    for (text, records) in [(deaf, false), (&attached, true)] {
+        let workspace = Workspace::new("duration_s = 60.0\n");
+        let pids = workspace.file("pid");
+        let program = script(&workspace, &format!("PIDS={}\n{text}", pids.display()));
+        let controller = program.to_str().unwrap();
+        let mut rig = workspace.start_lockstep(&["--controller", controller, "--patience", "none"]);
+        let read = || fs::read_to_string(&pids).ok()?.trim().parse().ok();
+        wait_until("the program runs", || read().is_some());
+        let pid: i32 = read().unwrap();
+        if records {
+            common::wait_until_it_records(&workspace);
+            kill_process(Pid::from_raw(pid).unwrap(), Signal::STOP).unwrap();
+        }
+        assert!(!is_dead(pid), "{text}");
+        rig.kill().unwrap();
+        rig.wait().unwrap();
+        wait_until("the program is gone", || is_dead(pid));
+    }
+}
+
+#[test]
+fn a_program_that_cannot_be_executed_is_named_with_the_reason() {
+    let workspace = Workspace::new(SCENARIO);
+    let path = workspace.write("controller.sh", "#!/no/such/interpreter\n");
+    fs::set_permissions(&path, fs::Permissions::from_mode(0o755)).unwrap();
+    let output = run(&workspace, &path, "lockstep");
+    let said = stderr(&output);
+    assert_eq!(output.status.code(), Some(4), "{said}");
+    let reason = format!("the controller {} cannot be started: No such file", path.display());
+    assert!(said.contains(&reason) && said.contains("ended (exit code 2) before it was ready"), "{said}");
+}
+
 #[test]
 fn a_terminals_interrupt_ends_the_motion_of_a_program_in_order() {
     let workspace = Workspace::new("duration_s = 60.0\n");

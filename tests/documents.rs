@@ -3,6 +3,8 @@
 
 #[path = "documents/console.rs"]
 mod console;
+#[path = "documents/interface.rs"]
+mod interface;
 
 use std::fs;
 use std::os::unix::fs::symlink;

@@ -230,7 +230,7 @@ fn serve<L: Link>(
         None => Clock::RealTime(Cycle::new(start.epoch_ns, scenario.period_ns())),
         Some(mut lockstep) => {
             lockstep.start(start.epoch_ns);
-            Clock::Lockstep(lockstep)
+            Clock::Lockstep(Box::new(lockstep))
         }
     };
     let mut binding = Binding { ports, clock, schedule, takes_commands: true, samples: 0 };

@@ -1,8 +1,6 @@
 //! The cases of the matrix: a fault of each kind, at each axis, in each phase, with a size that a real one may have.
 
-use masseter_shared::config::{
-    FaultConfig, FaultKindConfig, FaultLayer, FaultPlace, Quantity, Scenario, StimulusConfig,
-};
+use masseter_shared::config::{FaultConfig, FaultKindConfig, FaultLayer, FaultPlace, Quantity, Scenario};
 use masseter_shared::geometry::AXIS_NAMES;
 
 use super::phases::Phase;
@@ -67,21 +65,19 @@ fn size(kind: FaultKindConfig) -> Option<&'static str> {
     use FaultKindConfig as Kind;
     Some(match kind {
         Kind::Delay => "1500 us",
-        Kind::EncoderOffset | Kind::CommandJump => "1 mm",
+        Kind::EncoderOffset | Kind::CommandJump | Kind::EndStop => "1 mm",
         Kind::EncoderDrift => "5 mm/s",
         Kind::EncoderNoise => "50 um",
         Kind::EncoderSteps => "0.1 mm",
         Kind::EncoderLoses => "5 %",
-        Kind::EncoderDelay => "5 ms",
+        Kind::EncoderDelay | Kind::EmcyStorm => "5 ms",
         Kind::DriveTorqueLoss => "50 %",
         Kind::DriveSlowEnable => "1 s",
         Kind::DriveReboot => "200 ms",
         Kind::DriveScale => "1.05",
-        Kind::EmcyStorm => "5 ms",
         Kind::Friction => "5",
         Kind::Payload => "0.5 kg",
         Kind::Play => "0.2 mm",
-        Kind::EndStop => "1 mm",
         Kind::ControllerStall => "50 ms",
         _ => return None,
     })
@@ -90,8 +86,7 @@ fn size(kind: FaultKindConfig) -> Option<&'static str> {
 /// The scenario of a case: long enough for the fault and what it leads to.
 pub(super) fn scenario_of(base: &Scenario, case: &Case) -> Scenario {
     let end_s = case.fault.at_s.unwrap_or(1.0) + FOR_S + 1.0;
-    let stimulus: Vec<StimulusConfig> = Vec::new();
-    Scenario { duration_s: Some(end_s), faults: vec![case.fault.clone()], stimulus, ..base.clone() }
+    Scenario { duration_s: Some(end_s), faults: vec![case.fault.clone()], ..base.clone() }
 }
 
 #[cfg(test)]

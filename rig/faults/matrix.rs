@@ -60,7 +60,9 @@ fn write(args: &MatrixArgs, rows: &[Row]) -> anyhow::Result<()> {
 /// How many cases came to what, and each that left the limits.
 fn summary(args: &MatrixArgs, rows: &[Row]) -> String {
     let mut counts: BTreeMap<Coverage, usize> = BTreeMap::new();
-    rows.iter().for_each(|row| *counts.entry(row.coverage).or_default() += 1);
+    for row in rows {
+        *counts.entry(row.coverage).or_default() += 1;
+    }
     let counts = counts.iter().map(|(coverage, count)| format!("{count:>5}  {}\n", coverage.word()));
     let bad = rows.iter().filter(|row| matches!(row.coverage, Coverage::Undetected | Coverage::Late));
     let bad = bad.map(|row| {

@@ -9,6 +9,7 @@ mod child;
 mod clock;
 mod controller;
 mod ending;
+pub(crate) mod exec_program;
 mod prepared;
 mod program;
 mod reports;

@@ -1,6 +1,6 @@
 //! A program of the user as the controller: admitted over the domain's socket, and watched until it ends.
 //!
-//! An executable is started and, if it does not end in time, killed. A program that the user starts by hand, perhaps under a
+//! An executable is started and, if it does not end in time, killed; the kernel kills it if the supervisor dies. A program that the user starts by hand, perhaps under a
 //! debugger, is waited for and never killed. The rig admits one program; it refuses any other with the reason.
 
 use std::fs::File;
@@ -10,7 +10,7 @@ use std::os::fd::AsFd;
 use std::os::unix::net::{UnixListener, UnixStream};
 use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, ExitStatus, Stdio};
+use std::process::{Child, ExitStatus, Stdio};
 use std::time::Duration;
 
 use anyhow::{Context, bail};
@@ -22,6 +22,7 @@ use masseter_terminal::status;
 use rustix::net::sockopt::socket_peercred;
 
 use super::child::{KILLED, POLL, READY_TIMEOUT, describe};
+use super::exec_program::tied_to_this_process;
 use super::reports::{Due, Readiness, Ready, Reports};
 
 /// Longest wait for the greeting of a program that has connected.
@@ -67,13 +68,17 @@ impl Program {
     pub(super) fn executable(domain: &Domain, invitation: Invitation, path: &Path) -> anyhow::Result<Self> {
         let mut program = Self::external(domain, invitation)?;
         let output = io::stderr().as_fd().try_clone_to_owned().context("standard error cannot be shared")?;
-        let child = Command::new(path)
-            .env(RIG_VARIABLE, domain.id())
-            .stdin(Stdio::null())
-            .stdout(File::from(output))
-            // A terminal's Ctrl-C is for the rig, which then asks the program to end.
-            .process_group(0)
-            .spawn()
+        // It ends with the supervisor's main thread, which is this one.
+        let child = tied_to_this_process(path)
+            .and_then(|mut command| {
+                command
+                    .env(RIG_VARIABLE, domain.id())
+                    .stdin(Stdio::null())
+                    .stdout(File::from(output))
+                    // A terminal's Ctrl-C is for the rig, which then asks the program to end.
+                    .process_group(0)
+                    .spawn()
+            })
             .with_context(|| format!("the controller {} cannot be started", path.display()))?;
         program.executable = Some(Executable { path: path.to_owned(), child });
         Ok(program)

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use masseter_report::{Check, CheckResult};
+use masseter_report::{Check, CheckFigures, CheckResult};
 use masseter_terminal::Exit;
 
 use super::outcome::Tested;
@@ -32,27 +32,39 @@ pub(super) fn xml(all: &[Tested], allow_untested: bool, took_s: f64) -> String {
     text + "</testsuites>\n"
 }
 
+/// A test case, with the figures of a requirement.
+struct TestCase<'a> {
+    name: &'a str,
+    case: Case,
+    figures: Option<&'a CheckFigures>,
+}
+
 struct Suite<'a> {
     tested: &'a Tested,
     /// The run itself, then its checks.
-    cases: Vec<(&'a str, Case)>,
+    cases: Vec<TestCase<'a>>,
 }
 
 impl<'a> Suite<'a> {
     fn new(tested: &'a Tested, allow_untested: bool) -> Self {
         let is_short = tested.outcome.is_short(allow_untested);
         let checks = tested.verdict.iter().flat_map(|verdict| &verdict.checks);
-        let mut cases: Vec<_> = checks.map(|check| (check.name, of_check(check, is_short))).collect();
-        let has_failure = cases.iter().any(|(_, case)| matches!(case, Case::Failed(_)));
+        let test_case = |check: &'a Check| TestCase {
+            name: check.name.as_ref(),
+            case: of_check(check, is_short),
+            figures: check.figures.as_ref(),
+        };
+        let mut cases: Vec<_> = checks.map(test_case).collect();
+        let has_failure = cases.iter().any(|found| matches!(found.case, Case::Failed(_)));
         let is_by_checks = tested.verdict.as_ref().is_some_and(|verdict| verdict.exit_code == Exit::Failed);
         let is_explained = !is_short || has_failure && is_by_checks;
         let of_run = if is_explained { Case::Passed } else { Case::Error(tested.reason.clone()) };
-        cases.insert(0, ("run", of_run));
+        cases.insert(0, TestCase { name: "run", case: of_run, figures: None });
         Self { tested, cases }
     }
 
     fn count(&self, is_counted: fn(&Case) -> bool) -> usize {
-        self.cases.iter().filter(|(_, case)| is_counted(case)).count()
+        self.cases.iter().filter(|found| is_counted(&found.case)).count()
     }
 
     fn failures(&self) -> usize {
@@ -82,7 +94,8 @@ impl<'a> Suite<'a> {
             self.skipped(),
             outcome.word(),
         );
-        for (check, case) in &self.cases {
+        for TestCase { name: check, case, figures } in &self.cases {
+            let properties = figures.map_or_else(String::new, properties);
             let inner = match case {
                 Case::Passed => String::new(),
                 Case::Failed(why) => format!("<failure message=\"{}\"/>", escaped(why)),
@@ -90,10 +103,27 @@ impl<'a> Suite<'a> {
                 Case::Skipped(why) => format!("<skipped message=\"{}\"/>", escaped(why)),
             };
             let check = escaped(check);
-            let _ = writeln!(text, "    <testcase classname=\"{name}\" name=\"{check}\">{inner}</testcase>");
+            let _ = writeln!(
+                text,
+                "    <testcase classname=\"{name}\" name=\"{check}\">{properties}{inner}</testcase>"
+            );
         }
         text + "  </testsuite>\n"
     }
+}
+
+/// Margin and latency of a requirement.
+fn properties(figures: &CheckFigures) -> String {
+    let CheckFigures { margin, margin_unit, latency_ms, worst_at_s, .. } = figures;
+    let property = |name: &str, value: String| {
+        format!("<property name=\"{name}\" value=\"{}\"/>", escaped(value.trim_end()))
+    };
+    let list = [
+        margin.map(|margin| property("margin", format!("{margin} {margin_unit}"))),
+        latency_ms.map(|ms| property("latency_ms", ms.to_string())),
+        worst_at_s.map(|at_s| property("worst_at_s", at_s.to_string())),
+    ];
+    format!("<properties>{}</properties>", list.into_iter().flatten().collect::<String>())
 }
 
 /// A check that failed fails its suite only if the scenario did not pass: a scenario may expect a failure.

@@ -124,8 +124,9 @@ int masseter_start(masseter_session *session);
  * goes on meanwhile, and not before. Returns MASSETER_OK, MASSETER_TIMED_OUT or MASSETER_ERROR. */
 int masseter_wait(masseter_session *session, int64_t timeout_ns, masseter_cycle *cycle, masseter_reading *reading);
 
-/* Publishes this cycle's command, and what the controller made of the reading. Once a cycle. The session numbers and stamps
- * both, and enters the cycle's times into the state. The rig judges the desired pose of the state. */
+/* Publishes this cycle's command, and what the controller made of the reading. Once a cycle. command->cycle is that of
+ * masseter_wait; any other is an error, and nothing is sent. The session numbers and stamps both messages, and enters the
+ * cycle's times into the state. The rig judges the desired pose of the state. */
 int masseter_publish(masseter_session *session, const masseter_command *command, const masseter_state *state);
 
 /* Publishes an event. */

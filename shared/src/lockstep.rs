@@ -4,6 +4,7 @@
 //! stops answering for longer than the [`Patience`] is given up: the process that waits reports that to the supervisor and
 //! goes on alone, in real time, so that its watchdogs end the run.
 
+use std::mem;
 use std::time::Duration;
 
 use crate::clock;
@@ -38,7 +39,7 @@ pub enum Clock {
     /// The machine's.
     RealTime(Cycle),
     /// Simulated.
-    Lockstep(Lockstep),
+    Lockstep(Box<Lockstep>),
 }
 
 impl Clock {
@@ -71,8 +72,31 @@ pub struct Lockstep {
     lost: Option<Party>,
     /// Whether the other loop has had its last turn.
     is_last: bool,
+    /// The silence of the other loop in the turn that is awaited.
+    silence: SilenceCount,
     unrecorded: usize,
     is_recording: bool,
+}
+
+/// For how long a process has been silent.
+#[derive(Debug, Clone, Copy, Default)]
+struct SilenceCount {
+    /// When this process last looked for a signal; none before the first time.
+    looked_ns: Option<u64>,
+    silent: Duration,
+    /// Part of it after this process was asked to end.
+    since_stop: Duration,
+}
+
+impl SilenceCount {
+    /// Takes note of a look in vain. Stretches in which this process itself was stopped hardly count.
+    fn look(&mut self, is_stop_requested: bool) {
+        let now_ns = clock::now_ns();
+        let looked_ns = self.looked_ns.replace(now_ns).unwrap_or(now_ns);
+        let counted = Duration::from_nanos(now_ns - looked_ns).min(SLICE);
+        self.silent += counted;
+        self.since_stop += if is_stop_requested { counted } else { Duration::ZERO };
+    }
 }
 
 impl Lockstep {
@@ -103,6 +127,7 @@ impl Lockstep {
             now_ns: 0,
             lost: None,
             is_last: false,
+            silence: SilenceCount::default(),
             unrecorded: 0,
             is_recording: false,
         })
@@ -171,19 +196,24 @@ impl Lockstep {
         Ok(ended.is_some())
     }
 
-    /// Whether the other loop ends its turn within this time, which [`Self::await_turn`] then returns at once. The patience
-    /// does not count here.
+    /// Whether the other loop ends its turn within this time, which [`Self::await_turn`] then returns at once. So it is once
+    /// the other loop was given up: its silence counts from one call to the next.
     ///
     /// # Errors
-    /// Those of the signals.
-    pub fn is_turn_within(&mut self, timeout: Duration) -> Result<bool, DomainError> {
-        let until_ns = clock::now_ns() + timeout.as_nanos() as u64;
-        while self.arrived & (1 << TURN_ENDED | 1 << LAST_TURN_ENDED) == 0 && self.lost.is_none() {
-            let left_ns = until_ns.saturating_sub(clock::now_ns());
-            match self.signals.receive_within(Duration::from_nanos(left_ns))? {
-                Some(signal) => self.arrived |= 1 << signal,
-                None if left_ns == 0 => return Ok(false),
-                None => {}
+    /// As [`Self::await_turn`].
+    pub fn is_turn_within(&mut self, timeout: Duration) -> Result<bool, ProcessError> {
+        let other = self.other.0;
+        let until_ns = clock::now_ns().saturating_add(timeout.as_nanos() as u64);
+        while self.arrived & (1 << TURN_ENDED | 1 << LAST_TURN_ENDED) == 0 && self.lost != Some(other) {
+            let left = Duration::from_nanos(until_ns.saturating_sub(clock::now_ns()));
+            if let Some(signal) = self.signals.receive_within(left.min(SLICE))? {
+                self.arrived |= 1 << signal;
+                continue;
+            }
+            self.silence.look(self.stop.is_made());
+            self.give_up_silent(other, self.silence)?;
+            if left.is_zero() {
+                return Ok(self.lost == Some(other));
             }
         }
         Ok(true)
@@ -221,33 +251,40 @@ impl Lockstep {
 
     /// Waits for one of the signals from a process; none once that process was given up.
     fn wait(&mut self, signals: &[u8], from: Party) -> Result<Option<u8>, ProcessError> {
-        let (mut silent_ns, mut silent_since_stop_ns) = (0, 0);
+        // Looks with a time limit may have been in vain before.
+        let mut silence =
+            if from == self.other.0 { mem::take(&mut self.silence) } else { SilenceCount::default() };
         while self.lost != Some(from) {
             let wanted = signals.iter().find(|&&signal| self.arrived >> signal & 1 == 1);
             if let Some(&signal) = wanted {
                 self.arrived &= !(1 << signal);
                 return Ok(Some(signal));
             }
-            let from_ns = clock::now_ns();
+            silence.looked_ns.get_or_insert_with(clock::now_ns);
             if let Some(signal) = self.signals.receive()? {
                 self.arrived |= 1 << signal;
                 continue;
             }
-            // Stretches in which this process itself was stopped do not count.
-            let slept_ns = (clock::now_ns() - from_ns).min(SLICE.as_nanos() as u64);
-            silent_ns += slept_ns;
-            silent_since_stop_ns += if self.stop.is_made() { slept_ns } else { 0 };
-            // The plant may have to wait for the recorder meanwhile.
-            let waits = if from == Party::Plant { 2 } else { 1 };
-            if !self.patience.lasts(silent_ns / waits) {
-                self.lost = Some(from);
-                let silence = Silence { process: from, cycle: self.cycle, silent_s: silent_ns as f64 / 1e9 };
-                self.supervisor.report(&Report::Silence(silence)).map_err(ProcessError::Supervisor)?;
-            } else if silent_since_stop_ns / waits >= STOP_PATIENCE_NS {
-                self.lost = Some(from);
-            }
+            silence.look(self.stop.is_made());
+            self.give_up_silent(from, silence)?;
         }
         Ok(None)
+    }
+
+    /// Gives a process up that has been silent for too long, and reports it.
+    fn give_up_silent(&mut self, process: Party, silence: SilenceCount) -> Result<(), ProcessError> {
+        let [silent_ns, since_stop_ns] =
+            [silence.silent, silence.since_stop].map(|silent| silent.as_nanos() as u64);
+        // The plant may have to wait for the recorder meanwhile.
+        let waits = if process == Party::Plant { 2 } else { 1 };
+        if !self.patience.lasts(silent_ns / waits) {
+            self.lost = Some(process);
+            let silence = Silence { process, cycle: self.cycle, silent_s: silent_ns as f64 / 1e9 };
+            self.supervisor.report(&Report::Silence(silence)).map_err(ProcessError::Supervisor)?;
+        } else if since_stop_ns / waits >= STOP_PATIENCE_NS {
+            self.lost = Some(process);
+        }
+        Ok(())
     }
 }
 

@@ -1,5 +1,8 @@
 """Runs from Python: laws, controllers of the drives, what they leave, and what goes wrong."""
 
+import contextlib
+import os
+import signal
 import subprocess
 import threading
 import time
@@ -10,7 +13,7 @@ import numpy as np
 import pytest
 
 import masseter
-from masseter.messages import Command, ControllerState, DriveRequest, Event, State
+from masseter.messages import Command, ControllerState, DriveRequest, DriveState, Event, State
 
 SHORT = ["--duration", "1"]
 
@@ -163,11 +166,26 @@ def play(session: masseter.Session, misbehave: Callable[[int, Command], None]) -
         session.publish(command, state)
 
 
+def rig_name(folder: Path) -> str:
+    return f"session-{folder.name[-20:]}"
+
+
+def plant_of(folder: Path) -> int:
+    """The process of the plant in a run of this folder."""
+    for arguments in Path("/proc").glob("[0-9]*/cmdline"):
+        # A process may end meanwhile.
+        with contextlib.suppress(OSError):
+            words = arguments.read_bytes().split(b"\0")
+            if b"plant" in words and rig_name(folder).encode() in words:
+                return int(arguments.parent.name)
+    raise AssertionError(f"no plant runs for {folder}")
+
+
 def session_run(
     masseter_command: str, folder: Path, work: Callable[[masseter.Session], None], *more: str
 ) -> tuple[int, str]:
     clock = more or ("--clock", "lockstep", "--patience", "1s")
-    name = f"session-{folder.name[-20:]}"
+    name = rig_name(folder)
     rig = start(masseter_command, name, "--duration", "1", "--out", str(folder / "run"), *clock)
     said = []
 
@@ -201,40 +219,169 @@ def test_a_controller_of_the_drives_is_recorded(masseter_command: str, tmp_path:
     assert np.all(run.reading["position_m"][-1, 3:] > 0.2)
 
 
-def nan(number: int, command: Command) -> None:
-    if number > 100:
-        command.target_m[0] = float("nan")
+#: Changes the command of a cycle, which is counted from the moment that all drives were enabled; says whether it is sent.
+Misbehaviour = Callable[[int, Command], bool]
 
 
-def unknown_request(number: int, command: Command) -> None:
-    if number > 100:
+def hold(session: masseter.Session, misbehave: Misbehaviour, cycles: int = 150) -> None:
+    """Enables the drives and holds them where they are, but for what `misbehave` does."""
+    began, target_m = 0, [0.0] * 6
+    while True:
+        cycle = session.wait()
+        assert cycle is not None and cycle.reading is not None
+        if not began:
+            target_m = list(cycle.reading.position_m)
+            if all(state == DriveState.OPERATION_ENABLED for state in cycle.reading.drive_state):
+                began = cycle.number
+        command = Command(cycle=cycle.number, reading_cycle=cycle.reading.cycle, request=DriveRequest.ENABLE)
+        command.target_m[:] = target_m
+        held = cycle.number - began if began else 0
+        if held > cycles:
+            return
+        if misbehave(held, command):
+            # A program may ignore what the session tells it.
+            with contextlib.suppress(masseter.MasseterError):
+                session.publish(command, State(cycle=cycle.number, reading_cycle=cycle.reading.cycle))
+
+
+def behave(held: int, command: Command) -> bool:
+    return True
+
+
+def stop_publishing(held: int, command: Command) -> bool:
+    return held < 50
+
+
+def repeat_a_cycle(held: int, command: Command) -> bool:
+    command.cycle -= max(held - 50, 0)
+    return True
+
+
+def jump(axis: int, by_m: float) -> Misbehaviour:
+    def misbehave(held: int, command: Command) -> bool:
+        if held == 50:
+            command.target_m[axis] += by_m
+        return True
+
+    return misbehave
+
+
+def unknown_request(held: int, command: Command) -> bool:
+    if held >= 50:
         command.request = 77
+    return True
 
 
-@pytest.mark.parametrize("misbehave", [nan, unknown_request])
-def test_a_bad_command_is_refused_by_the_master_and_named(
-    masseter_command: str, tmp_path: Path, misbehave: Callable[[int, Command], None]
+@pytest.mark.parametrize(
+    ("misbehave", "cause", "axis", "value", "limit"),
+    [
+        (stop_publishing, "command_lost", None, 21.0, 20.0),
+        (repeat_a_cycle, "command_lost", None, 21.0, 20.0),
+        (jump(0, 5e-3), "velocity_limit", "d1", 5.0, 0.2),
+        (jump(5, -5e-3), "velocity_limit", "l3", 5.0, 0.4),
+        (jump(4, 1.5e-4), "acceleration_limit", "l2", 150.0, 100.0),
+        (jump(3, 0.2), "stroke_limit", "l1", 0.49, 0.3),
+        (jump(2, float("nan")), "bad_message", "d3", None, 0.0),
+        (unknown_request, "bad_message", None, 77.0, 0.0),
+    ],
+)
+def test_a_misbehaving_controller_is_stopped_by_the_master_which_names_axis_and_limit(
+    masseter_command: str,
+    tmp_path: Path,
+    misbehave: Misbehaviour,
+    cause: str,
+    axis: str | None,
+    value: float | None,
+    limit: float,
 ) -> None:
     def work(session: masseter.Session) -> None:
-        play(session, misbehave)
+        hold(session, misbehave)
         session.finish(is_safe_stop=True)
 
     code, said = session_run(masseter_command, tmp_path, work)
     assert code == 5, said
-    causes = {event["cause"] for event in masseter.load(tmp_path / "run").summary["figures"]["events"]}
-    assert "bad_message" in causes
+    run = masseter.load(tmp_path / "run")
+    faults = [event for event in run.summary["figures"]["events"] if event["kind"] == "fault"]
+    # Consequences are not reported.
+    assert [(fault["source"], fault["cause"], fault.get("axis")) for fault in faults] == [("master", cause, axis)]
+    assert faults[0]["value"] == (None if value is None else pytest.approx(value, rel=0.01)), faults
+    assert faults[0]["limit"] == pytest.approx(limit, rel=0.01), faults
+    assert run.reading["master_fault"][-1] == 1
+    assert not np.any(run.reading["drive_state"][-1] == DriveState.OPERATION_ENABLED)
 
 
-def test_a_second_command_in_a_cycle_is_refused_and_the_run_ends_with_its_reason(
-    masseter_command: str, tmp_path: Path
-) -> None:
+def test_a_controller_that_holds_the_drives_is_not_stopped(masseter_command: str, tmp_path: Path) -> None:
     def work(session: masseter.Session) -> None:
-        session.wait()
-        session.publish(Command(cycle=1), State(cycle=1))
-        session.publish(Command(cycle=1), State(cycle=1))
+        hold(session, behave)
+        session.finish()
 
     code, said = session_run(masseter_command, tmp_path, work)
-    assert code == 4 and "cycle 1 has its command already" in said, said
+    run = masseter.load(tmp_path / "run")
+    # The motion was never played.
+    assert code == 1 and run.reading["master_fault"][-1] == 0, said
+    assert np.all(run.reading["drive_state"][-1] == DriveState.OPERATION_ENABLED)
+
+
+def test_a_controller_that_goes_on_without_commands_is_given_up(masseter_command: str, tmp_path: Path) -> None:
+    def work(session: masseter.Session) -> None:
+        play(session, lambda number, command: None)
+        while not session.is_stop_requested:
+            session.wait(timeout_s=0.01)
+
+    code, said = session_run(masseter_command, tmp_path, work)
+    assert code == 4 and "stopped sending commands" in said, said
+
+
+def publish_twice(session: masseter.Session) -> None:
+    session.wait()
+    session.publish(Command(cycle=1), State(cycle=1))
+    session.publish(Command(cycle=1), State(cycle=1))
+
+
+def publish_of_an_earlier_cycle(session: masseter.Session) -> None:
+    for _ in range(2):
+        session.wait()
+        session.publish(Command(cycle=1), State(cycle=1))
+
+
+@pytest.mark.parametrize(
+    ("work", "reason"),
+    [
+        (publish_twice, "cycle 1 has its command already"),
+        (publish_of_an_earlier_cycle, "the command is of cycle 1, but cycle 2 has begun"),
+    ],
+)
+def test_a_command_that_is_not_the_cycles_own_is_refused_and_the_run_ends_with_its_reason(
+    masseter_command: str, tmp_path: Path, work: Callable[[masseter.Session], None], reason: str
+) -> None:
+    code, said = session_run(masseter_command, tmp_path, work)
+    assert code == 4 and reason in said, said
+
+
+def test_other_threads_run_while_a_session_waits(masseter_command: str, tmp_path: Path) -> None:
+    begins = threading.Event()
+    counted: list[int] = []
+
+    def count(plant: int) -> None:
+        begins.wait()
+        counted.extend(range(1000))
+        os.kill(plant, signal.SIGCONT)
+
+    def work(session: masseter.Session) -> None:
+        session.wait()
+        plant = plant_of(tmp_path)
+        os.kill(plant, signal.SIGSTOP)
+        counting = threading.Thread(target=count, args=[plant])
+        counting.start()
+        begins.set()
+        # The plant answers only after the other thread has counted.
+        cycle = session.wait()
+        counting.join()
+        assert cycle is not None and cycle.reading is not None and len(counted) == 1000
+        session.finish()
+
+    code, said = session_run(masseter_command, tmp_path, work)
+    assert code == 1, said
 
 
 def test_a_controller_that_begins_late_is_waited_for(masseter_command: str, tmp_path: Path) -> None:
@@ -275,20 +422,42 @@ def test_a_flood_of_events_costs_the_flooder_alone(masseter_command: str, tmp_pa
     assert len(run.command) == 400
 
 
-def test_a_controller_that_leaves_or_hangs_is_named(masseter_command: str, tmp_path: Path) -> None:
+def test_a_controller_that_leaves_is_named(masseter_command: str, tmp_path: Path) -> None:
     code, said = session_run(masseter_command, tmp_path, lambda session: session.fail("no more ideas"))
     assert code == 4 and "no more ideas" in said, said
 
+
+@pytest.mark.parametrize("timeout_s", [None, 0.0, 0.01])
+def test_a_controller_that_waits_no_more_is_given_up_and_named(
+    masseter_command: str, tmp_path: Path, timeout_s: float | None
+) -> None:
     over = threading.Event()
 
     def hang(session: masseter.Session) -> None:
-        session.wait()
+        begun = 0
+        while begun < 50:
+            begun += session.wait(timeout_s) is not None
         over.wait(4.0)
 
-    hung = tmp_path / "hung"
-    hung.mkdir()
-    code, said = session_run(masseter_command, hung, hang)
-    assert code == 4 and "did not answer in cycle" in said, said
+    code, said = session_run(masseter_command, tmp_path, hang)
+    assert code == 4 and "the controller died: it did not answer in cycle 50 for 1.0 s" in said, said
+
+
+@pytest.mark.parametrize("timeout_s", [None, 0.0, 0.01])
+def test_a_plant_that_does_not_answer_is_given_up_by_a_controller_that_only_looks(
+    masseter_command: str, tmp_path: Path, timeout_s: float | None
+) -> None:
+    def work(session: masseter.Session) -> None:
+        for _ in range(50):
+            session.wait()
+        os.kill(plant_of(tmp_path), signal.SIGSTOP)
+        while not session.is_stop_requested:
+            session.wait(timeout_s)
+
+    code, said = session_run(masseter_command, tmp_path, work)
+    # A wait without a time-out has begun the next cycle.
+    number = 51 if timeout_s is None else 50
+    assert code == 4 and f"the plant died: it did not answer in cycle {number} for 2.0 s" in said, said
 
 
 def test_without_a_rig_or_a_run_the_reason_is_given(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

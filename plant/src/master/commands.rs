@@ -14,9 +14,10 @@ use super::gate::Gate;
 pub(super) struct Commands {
     timeout_cycles: u32,
     gate: Gate,
-    /// Request and cycle of the newest valid command.
+    /// Request of the newest valid command.
     request: DriveRequest,
-    answers_cycle: u64,
+    /// Its cycle; none before the first.
+    cycle: Option<u64>,
     received_ns: u64,
     silent_cycles: u32,
 }
@@ -28,7 +29,7 @@ impl Commands {
             timeout_cycles: scenario.can.command_timeout_cycles,
             gate: Gate::new(scenario),
             request: DriveRequest::Off,
-            answers_cycle: 0,
+            cycle: None,
             received_ns: 0,
             silent_cycles: 0,
         }
@@ -54,8 +55,8 @@ impl Commands {
         self.silent_cycles == 0 && self.request == DriveRequest::Off
     }
 
-    /// Takes the command of a cycle, if one came. Silence is a failure only where `needs_command`; a command is one if
-    /// the gate refuses it. `following_m` has the position of every drive that would follow its target.
+    /// Takes the command of a cycle, if one came; a stale one is none. Silence is a failure only where `needs_command`; a
+    /// command is one if the gate refuses it. `following_m` has the position of every drive that would follow its target.
     pub(super) fn take(
         &mut self,
         [cycle, now_ns]: [u64; 2],
@@ -66,7 +67,7 @@ impl Commands {
         self.gate.begin_cycle(cycle, following_m);
         // A refused command is none.
         self.silent_cycles = self.silent_cycles.saturating_add(1);
-        let Some(command) = command else {
+        let Some(command) = command.filter(|command| !self.is_stale(command)) else {
             if !needs_command || self.silent_cycles <= self.timeout_cycles {
                 return Ok(());
             }
@@ -74,13 +75,19 @@ impl Commands {
             return Err((Subject::Rig, Failure::with(Cause::CommandLost, cycles)));
         };
         self.request = self.gate.pass(command, following_m)?;
-        (self.answers_cycle, self.received_ns, self.silent_cycles) = (command.cycle, now_ns, 0);
+        (self.cycle, self.received_ns, self.silent_cycles) = (Some(command.cycle), now_ns, 0);
         Ok(())
+    }
+
+    /// Whether a command demands motion for a cycle that had its command: nobody may control any more, and the same
+    /// message is only sent again. A request to stop is never stale.
+    fn is_stale(&self, command: &Command) -> bool {
+        self.cycle == Some(command.cycle) && command.request == DriveRequest::Enable.code()
     }
 
     /// Writes the command that a reading answers.
     pub(super) fn fill_reading(&self, reading: &mut Reading) {
-        reading.answers_cycle = self.answers_cycle;
+        reading.answers_cycle = self.cycle.unwrap_or(0);
         reading.command_received_ns = self.received_ns;
     }
 }

@@ -76,8 +76,8 @@ class Cycle(NamedTuple):
 
 
 class Session:
-    """The part of a controller of the drives in a run. It belongs to the thread that made it, and holds the interpreter
-    while it waits.
+    """The part of a controller of the drives in a run. It belongs to the thread that made it; other threads run while it
+    waits.
 
         with masseter.Session() as session:
             while not session.is_stop_requested:
@@ -128,7 +128,10 @@ class Session:
         return dict(zip(self._parameters, self._native.parameters(), strict=True))
 
     def wait(self, timeout_s: float | None = None) -> Cycle | None:
-        """Ends the current cycle and waits for the next; None if it has not begun within the time."""
+        """Ends the current cycle and waits for the next; None if it has not begun within the time.
+
+        Other threads run meanwhile, except with a time of 0, which only looks.
+        """
         begun = self._native.wait(timeout_s)
         if begun is None:
             return None
@@ -136,7 +139,10 @@ class Session:
         return Cycle(number, now_ns, None if reading is None else Reading.from_buffer_copy(reading))
 
     def publish(self, command: Command, state: State) -> None:
-        """Publishes this cycle's command, what the controller made of the reading, and the signals. Once a cycle."""
+        """Publishes this cycle's command, what the controller made of the reading, and the signals. Once a cycle.
+
+        The command names the cycle that wait returned. Any other raises MasseterError, and is not sent.
+        """
         values = [self.signals[name] for name in self._signals]
         if len(self.signals) > len(values):
             raise _native.MasseterError(f"signals that are not declared: {sorted(set(self.signals) - set(self._signals))}")

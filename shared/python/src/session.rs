@@ -1,5 +1,6 @@
 //! A controller of the drives in Python: its part in a run, cycle by cycle. Messages cross as the bytes of their structures.
 
+use std::cell::RefCell;
 use std::time::Duration;
 
 use masseter_shared::control::{self, Outcome, Tick, Waited};
@@ -24,6 +25,12 @@ enum Stage {
     Started(Box<control::Session>),
 }
 
+thread_local! {
+    /// The session of this thread that waits without the interpreter. Only what may pass to other threads can be lent to such
+    /// a wait, and a session may not.
+    static WAITING: RefCell<Option<Stage>> = const { RefCell::new(None) };
+}
+
 type CycleOfPython<'py> = (u64, u64, Option<Bound<'py, PyBytes>>);
 
 #[pymethods]
@@ -39,18 +46,18 @@ impl Session {
         Ok(Self { stage: Some(Stage::Attached(Box::new(context), declared)) })
     }
 
-    fn start(&mut self) -> PyResult<()> {
-        match self.stage.take() {
+    fn start(&mut self, py: Python<'_>) -> PyResult<()> {
+        self.detached(py, |stage| match stage.take() {
             Some(Stage::Attached(context, declared)) => {
                 let session = control::Session::start(*context, declared).map_err(failed)?;
-                self.stage = Some(Stage::Started(Box::new(session)));
+                *stage = Some(Stage::Started(Box::new(session)));
                 Ok(())
             }
-            stage => {
-                self.stage = stage;
+            other => {
+                *stage = other;
                 Err(failed("the session is started already, or over"))
             }
-        }
+        })
     }
 
     #[getter]
@@ -73,7 +80,13 @@ impl Session {
     fn wait<'py>(&mut self, py: Python<'py>, timeout_s: Option<f64>) -> PyResult<Option<CycleOfPython<'py>>> {
         let timeout = timeout_s.map(Duration::try_from_secs_f64).transpose().map_err(failed)?;
         py.check_signals()?;
-        Ok(match self.started()?.wait(timeout).map_err(failed)? {
+        let wait = |stage: &mut Option<Stage>| started(stage)?.wait(timeout).map_err(failed);
+        let waited = match timeout {
+            // A mere look is over before the interpreter would be given away.
+            Some(Duration::ZERO) => wait(&mut self.stage),
+            _ => self.detached(py, wait),
+        };
+        Ok(match waited? {
             Waited::TimedOut => None,
             Waited::Cycle { tick: Tick { cycle, now_ns }, reading } => {
                 Some((cycle, now_ns, reading.map(|reading| PyBytes::new(py, reading.body()))))
@@ -108,12 +121,16 @@ impl Session {
 }
 
 impl Session {
+    /// Calls `work` while other threads of Python run.
+    fn detached<T: Send>(&mut self, py: Python<'_>, work: impl FnOnce(&mut Option<Stage>) -> T + Send) -> T {
+        WAITING.set(self.stage.take());
+        let result = py.detach(|| WAITING.with_borrow_mut(work));
+        self.stage = WAITING.take();
+        result
+    }
+
     fn started(&mut self) -> PyResult<&mut control::Session> {
-        match &mut self.stage {
-            Some(Stage::Started(session)) => Ok(session),
-            Some(Stage::Attached(..)) => Err(failed("the session is not started: call start first")),
-            None => Err(over()),
-        }
+        started(&mut self.stage)
     }
 
     fn end(&mut self) -> PyResult<control::Session> {
@@ -122,6 +139,14 @@ impl Session {
             Some(Stage::Started(session)) => Ok(*session),
             _ => Err(over()),
         }
+    }
+}
+
+fn started(stage: &mut Option<Stage>) -> PyResult<&mut control::Session> {
+    match stage {
+        Some(Stage::Started(session)) => Ok(session),
+        Some(Stage::Attached(..)) => Err(failed("the session is not started: call start first")),
+        None => Err(over()),
     }
 }
 

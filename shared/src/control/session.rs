@@ -83,6 +83,14 @@ pub enum SessionError {
         /// The cycle.
         cycle: u64,
     },
+    /// A command of an earlier cycle, or of none: whoever made it may have stopped.
+    #[error("the command is of cycle {given}, but cycle {cycle} has begun: make a command for each cycle")]
+    OtherCycle {
+        /// The cycle that the command names.
+        given: u64,
+        /// The cycle that has begun.
+        cycle: u64,
+    },
     /// The transport or the supervisor.
     #[error(transparent)]
     Process(#[from] ProcessError),
@@ -191,11 +199,15 @@ impl Session {
     /// use of time into the state.
     ///
     /// # Errors
-    /// [`SessionError`] for a second command in one cycle, before the first cycle, or when it cannot be sent.
+    /// [`SessionError`] for a second command in one cycle, a command that names another cycle, before the first cycle, or
+    /// when it cannot be sent.
     pub fn publish(&mut self, command: &Command, state: &State) -> Result<(), SessionError> {
         let OpenCycle { wake, received_ns, is_published } = self.cycle.ok_or(SessionError::NoCycle)?;
         if is_published {
             return Err(SessionError::Published { cycle: wake.cycle });
+        }
+        if command.cycle != wake.cycle {
+            return Err(SessionError::OtherCycle { given: command.cycle, cycle: wake.cycle });
         }
         let commanded_ns = self.ports.now_ns();
         self.ports.publish_command(|message| *message = *command)?;
@@ -301,7 +313,7 @@ impl Ports {
             None => Clock::RealTime(Cycle::new(first_due_ns, scenario.period_ns())),
             Some(mut lockstep) => {
                 lockstep.start(first_due_ns);
-                Clock::Lockstep(lockstep)
+                Clock::Lockstep(Box::new(lockstep))
             }
         };
         let ports = Self {
@@ -341,7 +353,7 @@ impl Ports {
                 }
                 Ok(begins)
             }
-            Clock::Lockstep(lockstep) => Ok(lockstep.is_turn_within(timeout)?),
+            Clock::Lockstep(lockstep) => lockstep.is_turn_within(timeout),
         }
     }
 

@@ -7,8 +7,12 @@ use super::*;
 type Trigger = fn(&mut Bench);
 
 /// What stops the drives permanently, and the cause that is reported.
-const PERMANENT: [(Cause, Trigger); 12] = [
+const PERMANENT: [(Cause, Trigger); 13] = [
     (Cause::CommandLost, |bench| (0..=TIMEOUT_CYCLES).for_each(|_| bench.cycle(None))),
+    (Cause::CommandLost, |bench| {
+        let stale_cycle = bench.cycle;
+        (0..=TIMEOUT_CYCLES).for_each(|_| bench.spoil(|command| command.cycle = stale_cycle));
+    }),
     (Cause::BadMessage, |bench| bench.spoil(|command| command.target_m[0] = f64::NAN)),
     (Cause::BadMessage, |bench| bench.spoil(|command| command.request = 99)),
     (Cause::BadMessage, |bench| bench.spoil(|command| command.version += 1)),
@@ -96,6 +100,21 @@ fn silence_is_borne_as_long_as_declared_and_only_while_motion_is_demanded() {
     bench.cycles(20, DriveRequest::Enable);
     assert!(bench.all_are(DriveState::OperationEnabled));
     assert_eq!(bench.master.silent_cycles(), 0);
+}
+
+#[test]
+fn a_repeated_cycle_is_silence_unless_it_asks_to_stop() {
+    for (request, silent_cycles) in
+        [(DriveRequest::Enable, 1), (DriveRequest::QuickStop, 0), (DriveRequest::Off, 0)]
+    {
+        let mut bench = Bench::enabled();
+        let stale_cycle = bench.cycle;
+        bench.spoil(|command| (command.cycle, command.request) = (stale_cycle, request.code()));
+        assert_eq!(bench.master.silent_cycles(), silent_cycles, "{request}");
+        bench.cycle(None);
+        assert_eq!(bench.nobody_is_enabled(), request != DriveRequest::Enable, "{request}");
+        assert_eq!(bench.causes(EventKind::Fault), [], "{request}");
+    }
 }
 
 #[test]

@@ -20,7 +20,7 @@ pub(super) struct Quantified {
 #[derive(Debug, Clone)]
 enum Source {
     Signal(usize),
-    Expression { parsed: FlatEx<f64>, signals: Vec<usize>, arguments: Vec<f64> },
+    Expression { parsed: Box<FlatEx<f64>>, signals: Vec<usize>, arguments: Vec<f64> },
 }
 
 impl Quantified {
@@ -48,7 +48,7 @@ impl Quantified {
                 Ok(Self {
                     text: text.clone(),
                     unit,
-                    source: Source::Expression { parsed, signals, arguments },
+                    source: Source::Expression { parsed: Box::new(parsed), signals, arguments },
                 })
             }
             _ => Err("give a signal or an expression".to_owned()),

@@ -36,7 +36,9 @@ impl Occurrence {
     /// Whether the event is one.
     pub(super) fn matches(&self, event: &EventRecord) -> bool {
         match self {
-            Self::Entry { cause, number } => event.cause == *cause && event.value == *number as f64,
+            Self::Entry { cause, number } => {
+                event.cause == *cause && event.value.to_bits() == (*number as f64).to_bits()
+            }
             Self::Event { source, cause } => event.source == *source && event.cause == *cause,
         }
     }

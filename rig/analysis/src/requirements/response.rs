@@ -120,7 +120,9 @@ impl Response {
         self.last_ns = moment.time_ns;
         let occurred = self.trigger.take(moment);
         if self.window.contains(moment) {
-            occurred.into_iter().for_each(|occurred_ns| self.begin(moment.time_ns, occurred_ns));
+            for occurred_ns in occurred {
+                self.begin(moment.time_ns, occurred_ns);
+            }
         }
     }
 
@@ -163,7 +165,9 @@ impl Response {
             is_over && answer.answered_ns.is_some()
         };
         let known: Vec<_> = self.open.extract_if(.., |answer| is_known(answer)).collect();
-        known.into_iter().for_each(|answer| self.close(answer));
+        for answer in known {
+            self.close(answer);
+        }
     }
 
     fn close(&mut self, answer: Answer) {
@@ -194,7 +198,9 @@ impl Response {
         let stays_for_ns = std::mem::replace(&mut self.stays_for_ns, 0);
         self.settle(u64::MAX);
         self.stays_for_ns = stays_for_ns;
-        std::mem::take(&mut self.open).into_iter().for_each(|answer| self.close(answer));
+        for answer in std::mem::take(&mut self.open) {
+            self.close(answer);
+        }
         let unit = self.unit();
         let Some(worst) = self.worst else {
             return Finding::untested(format!("{} never came", self.trigger.text), unit);
