@@ -100,12 +100,11 @@ impl Agenda {
             let place = self.entries.iter().position(|entry| entry.changes(now_ns, is_begin))?;
             Some(Change { place, is_begin })
         });
-        match found {
-            Some(Change { place, is_begin }) => self.change(place, is_begin, now_ns),
-            None => {
-                let times = self.entries.iter().filter_map(|entry| entry.next_change_ns(now_ns));
-                self.next_change_ns = times.min().unwrap_or(u64::MAX);
-            }
+        if let Some(Change { place, is_begin }) = found {
+            self.change(place, is_begin, now_ns);
+        } else {
+            let times = self.entries.iter().filter_map(|entry| entry.next_change_ns(now_ns));
+            self.next_change_ns = times.min().unwrap_or(u64::MAX);
         }
         found
     }

@@ -11,5 +11,5 @@ mod times;
 
 pub(crate) use acting::Acting;
 pub(crate) use injector::Injector;
-pub use occurrence::Occurrence;
+pub(crate) use occurrence::Occurrence;
 pub(crate) use times::{acting_ns, known_windows};

@@ -87,7 +87,7 @@ fn size_of(kind: Kind) -> Option<&'static str> {
 fn every_kind_strikes_on_every_axis_in_its_time_and_ends() {
     let of_others = |kind: &Kind| matches!(kind.layer(), FaultLayer::Bus | FaultLayer::Process);
     for &kind in Kind::ALL.iter().filter(|kind| !of_others(kind)) {
-        for axis in 0..AXES {
+        for (axis, name) in AXIS_NAMES.into_iter().enumerate() {
             let is_of_start = kind == Kind::DriveSlowEnable;
             // A brake that does not close shows only once the drives are switched off.
             let for_s = if kind == Kind::BrakeOpen { 0.3 } else { 0.1 };
@@ -100,7 +100,7 @@ fn every_kind_strikes_on_every_axis_in_its_time_and_ends() {
             for _ in 0..150 {
                 bench.cycle(Some(&|reading| (reading.position_m, DriveRequest::Off)));
             }
-            let place = format!("{kind} on {}", AXIS_NAMES[axis]);
+            let place = format!("{kind} on {name}");
             let injected = told(&bench, Cause::FaultInjected);
             let expected_axis = given.axis().map_or(NO_AXIS, |axis| axis as u32);
             assert_eq!(injected.len(), 1, "{place}");
@@ -183,7 +183,7 @@ fn a_drive_with_a_low_supply_is_in_fault_and_says_so() {
     play_until(&mut bench, 0.6);
     let emergency = told(&bench, Cause::Emergency)[0];
     assert_eq!((EmergencyCode(emergency.value as u16), emergency.axis), (EmergencyCode::LOGIC_SUPPLY, 4));
-    assert_eq!(emergency.limit, f64::from(0x05), "error register: generic, voltage");
+    assert_eq!(emergency.limit as u8, 0x05, "error register: generic, voltage");
     assert_eq!(bench.reading.drive_state[L2], DriveState::Fault.code());
     assert!(bench.plant.drives_are_off());
 }

@@ -205,7 +205,7 @@ proptest! {
 fn a_fault_whose_time_becomes_known_later_acts_from_then_on() {
     let mut wire = wire_with(Fault { kind: FaultKind::Lose, port: Some(2), from_ns: FOREVER, ..ANY });
     let frame = frame(0x181, &[1]);
-    let mut arrives = |at_ns: u64, wire: &mut VirtualWire| {
+    let arrives = |at_ns: u64, wire: &mut VirtualWire| {
         wire.port(1).send(at_ns, frame).unwrap();
         wire.advance(at_ns + 500_000);
         wire.port(2).receive(FOREVER).unwrap().is_some()
