@@ -87,7 +87,7 @@ fn size_of(kind: Kind) -> Option<&'static str> {
 fn every_kind_strikes_on_every_axis_in_its_time_and_ends() {
     let of_others = |kind: &Kind| matches!(kind.layer(), FaultLayer::Bus | FaultLayer::Process);
     for &kind in Kind::ALL.iter().filter(|kind| !of_others(kind)) {
-        for (axis, name) in AXIS_NAMES.iter().enumerate() {
+        for (axis, name) in AXIS_NAMES.into_iter().enumerate() {
             let is_of_start = kind == Kind::DriveSlowEnable;
             // A brake that does not close shows only once the drives are switched off.
             let for_s = if kind == Kind::BrakeOpen { 0.3 } else { 0.1 };
@@ -100,7 +100,7 @@ fn every_kind_strikes_on_every_axis_in_its_time_and_ends() {
             for _ in 0..150 {
                 bench.cycle(Some(&|reading| (reading.position_m, DriveRequest::Off)));
             }
-            let place = format!("{kind} on {}", name);
+            let place = format!("{kind} on {name}");
             let injected = told(&bench, Cause::FaultInjected);
             let expected_axis = given.axis().map_or(NO_AXIS, |axis| axis as u32);
             assert_eq!(injected.len(), 1, "{place}");
