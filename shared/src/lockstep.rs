@@ -83,9 +83,8 @@ pub struct Lockstep {
 struct SilenceCount {
     /// When this process last looked for a signal; none before the first time.
     looked_ns: Option<u64>,
-    silent: Duration,
-    /// Part of it after this process was asked to end.
-    since_stop: Duration,
+    /// In all, and since this process was asked to end, ns.
+    silent_ns: [u64; 2],
 }
 
 impl SilenceCount {
@@ -93,9 +92,9 @@ impl SilenceCount {
     fn look(&mut self, is_stop_requested: bool) {
         let now_ns = clock::now_ns();
         let looked_ns = self.looked_ns.replace(now_ns).unwrap_or(now_ns);
-        let counted = Duration::from_nanos(now_ns - looked_ns).min(SLICE);
-        self.silent += counted;
-        self.since_stop += if is_stop_requested { counted } else { Duration::ZERO };
+        let counted_ns = (now_ns - looked_ns).min(SLICE.as_nanos() as u64);
+        self.silent_ns[0] += counted_ns;
+        self.silent_ns[1] += if is_stop_requested { counted_ns } else { 0 };
     }
 }
 
@@ -273,8 +272,7 @@ impl Lockstep {
 
     /// Gives a process up that has been silent for too long, and reports it.
     fn give_up_silent(&mut self, process: Party, silence: SilenceCount) -> Result<(), ProcessError> {
-        let [silent_ns, since_stop_ns] =
-            [silence.silent, silence.since_stop].map(|silent| silent.as_nanos() as u64);
+        let [silent_ns, since_stop_ns] = silence.silent_ns;
         // The plant may have to wait for the recorder meanwhile.
         let waits = if process == Party::Plant { 2 } else { 1 };
         if !self.patience.lasts(silent_ns / waits) {
