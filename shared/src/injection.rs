@@ -50,9 +50,10 @@ impl Injection {
     /// # Errors
     /// Those of [`Scenario::validate`].
     pub fn new(scenario: &Scenario, now_ns: u64) -> Result<Self, ScenarioError> {
+        let entries = scenario.entry_names();
         let timed = |when: When| Timed { when, window_ns: None };
-        let faults = scenario.faults.iter().map(|fault| fault.when(scenario).map(timed));
-        let stimuli = scenario.stimulus.iter().map(|stimulus| stimulus.when(scenario).map(timed));
+        let faults = scenario.faults.iter().map(|fault| fault.when(&entries).map(timed));
+        let stimuli = scenario.stimulus.iter().map(|stimulus| stimulus.when(&entries).map(timed));
         let mut injection = Self {
             faults: faults.collect::<Result<_, _>>()?,
             stimuli: stimuli.collect::<Result<_, _>>()?,

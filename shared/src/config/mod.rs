@@ -41,4 +41,4 @@ pub use requirements::{During, ExpectConfig, ExpectedVerdict, RequirementConfig,
 pub(crate) use scenario::RATES_HZ;
 pub use scenario::Scenario;
 pub use stimuli::{Shape, StimulusConfig};
-pub use when::{Start, When};
+pub use when::{EntryNames, Start, When};

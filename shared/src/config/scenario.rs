@@ -8,6 +8,7 @@ use toml::Table;
 use super::document::{Document, place};
 use super::error::ScenarioError;
 use super::need::{LONGEST_S, SHORTEST_MOTION_S, require_within};
+use super::when::EntryNames;
 use super::{
     CanConfig, ChecksConfig, ControllerConfig, DrivesConfig, DynamicsConfig, ExpectConfig, FaultConfig,
     FoodConfig, JawConfig, MotionConfig, RealtimeConfig, RequirementConfig, StimulusConfig,
@@ -231,11 +232,12 @@ impl Scenario {
         self.can.validate()?;
         self.drives.validate()?;
         self.dynamics.validate()?;
+        let entries = self.entry_names();
         for (number, fault) in self.faults.iter().enumerate() {
-            fault.validate(self).map_err(|error| error.of_entry(number))?;
+            fault.validate(&self.can, &entries).map_err(|error| error.of_entry(number))?;
         }
         for (number, stimulus) in self.stimulus.iter().enumerate() {
-            stimulus.validate(self).map_err(|error| error.of_entry(number))?;
+            stimulus.validate(&entries).map_err(|error| error.of_entry(number))?;
         }
         for (number, requirement) in self.require.iter().enumerate() {
             requirement.validate().map_err(|error| error.of_entry(number))?;
@@ -248,14 +250,12 @@ impl Scenario {
         self.checks.validate()
     }
 
-    /// The names of the faults, in their order.
-    pub fn fault_names(&self) -> Vec<&str> {
-        self.faults.iter().map(FaultConfig::name).collect()
-    }
-
-    /// The names of the stimuli, in their order.
-    pub fn stimulus_names(&self) -> Vec<&str> {
-        self.stimulus.iter().map(StimulusConfig::name).collect()
+    /// The names of the faults and stimuli.
+    pub fn entry_names(&self) -> EntryNames<'_> {
+        EntryNames {
+            faults: self.faults.iter().map(FaultConfig::name).collect(),
+            stimuli: self.stimulus.iter().map(StimulusConfig::name).collect(),
+        }
     }
 
     /// Duration of a cycle, ns.

@@ -8,8 +8,7 @@ use super::error::ScenarioError;
 use super::food::FoodConfig;
 use super::need::{require_name, require_within};
 use super::quantity::{Dimension, Quantity};
-use super::scenario::Scenario;
-use super::when::{When, WhenKeys};
+use super::when::{EntryNames, When, WhenKeys};
 
 /// The course of a stimulus between its beginning and its end.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -134,16 +133,16 @@ impl StimulusConfig {
     ///
     /// # Errors
     /// Where that names nothing of the scenario.
-    pub fn when(&self, scenario: &Scenario) -> Result<When, ScenarioError> {
+    pub fn when(&self, entries: &EntryNames<'_>) -> Result<When, ScenarioError> {
         let names =
             ["stimulus.at_s", "stimulus.after", "stimulus.for_s", "stimulus.from_s", "stimulus.until_s"];
         let (at_s, after) = (Some(self.at_s), self.after.as_deref());
-        WhenKeys { names, at_s, after, for_s: self.for_s, from_s: None, until_s: None }.resolve(scenario)
+        WhenKeys { names, at_s, after, for_s: self.for_s, from_s: None, until_s: None }.resolve(entries)
     }
 
-    pub(super) fn validate(&self, scenario: &Scenario) -> Result<(), ScenarioError> {
+    pub(super) fn validate(&self, entries: &EntryNames<'_>) -> Result<(), ScenarioError> {
         let refuse = |key, value: &str, need: &str| Err(ScenarioError::bad(key, &value, need));
-        self.when(scenario)?;
+        self.when(entries)?;
         if let Some(name) = &self.name {
             require_name("stimulus.name", name)?;
         }

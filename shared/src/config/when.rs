@@ -5,7 +5,6 @@
 
 use super::error::ScenarioError;
 use super::need::{require_duration, require_not_negative};
-use super::scenario::Scenario;
 use crate::messages::codes::ControllerState;
 use crate::wording::nearest;
 
@@ -20,6 +19,15 @@ pub enum Start {
     Fault(usize),
     /// The stimulus with this place in the scenario's list begins.
     Stimulus(usize),
+}
+
+/// The names of a scenario's faults and stimuli, which `after` may use.
+#[derive(Debug, Clone)]
+pub struct EntryNames<'a> {
+    /// Of the faults, in their order.
+    pub faults: Vec<&'a str>,
+    /// Of the stimuli, in their order.
+    pub stimuli: Vec<&'a str>,
 }
 
 /// When something acts.
@@ -46,7 +54,7 @@ pub(super) struct WhenKeys<'a> {
 
 impl WhenKeys<'_> {
     /// Resolves the keys.
-    pub(super) fn resolve(&self, scenario: &Scenario) -> Result<When, ScenarioError> {
+    pub(super) fn resolve(&self, entries: &EntryNames<'_>) -> Result<When, ScenarioError> {
         let [at, after, for_s, from, until] = self.names;
         let refuse = |key, value: &str, need: &str| Err(ScenarioError::bad(key, &value, need));
         match (self.at_s, self.from_s) {
@@ -83,7 +91,7 @@ impl WhenKeys<'_> {
         }
         let start = match self.after {
             None => Start::State(ControllerState::Running),
-            Some(name) => start_named(name, scenario)
+            Some(name) => start_named(name, entries)
                 .map_err(|need| ScenarioError::bad(after, &format!("'{name}'"), need))?,
         };
         Ok(When { start, begin_s: self.at_s.unwrap_or_default(), for_s: self.for_s })
@@ -91,12 +99,12 @@ impl WhenKeys<'_> {
 }
 
 /// The occurrence of that name.
-fn start_named(name: &str, scenario: &Scenario) -> Result<Start, String> {
+fn start_named(name: &str, entries: &EntryNames<'_>) -> Result<Start, String> {
     let states = ControllerState::ALL
         .iter()
         .map(|state| (format!("controller.{}", state.name()), Start::State(*state)));
-    let faults = scenario.fault_names().into_iter().enumerate();
-    let stimuli = scenario.stimulus_names().into_iter().enumerate();
+    let faults = entries.faults.iter().enumerate();
+    let stimuli = entries.stimuli.iter().enumerate();
     let named: Vec<_> = states
         .chain(faults.map(|(place, name)| (format!("fault.{name}"), Start::Fault(place))))
         .chain(stimuli.map(|(place, name)| (format!("stimulus.{name}"), Start::Stimulus(place))))

@@ -79,7 +79,7 @@ impl Operator {
             if !stimulus.is_of_controller() {
                 continue;
             }
-            let when = stimulus.when(scenario)?;
+            let when = stimulus.when(&scenario.entry_names())?;
             if !is_seen(when, scenario) {
                 return Err(OperatorError::Unseen { table: "[[stimulus]]", number: place + 1 });
             }
@@ -91,7 +91,7 @@ impl Operator {
             if fault.kind.layer() != FaultLayer::Process {
                 continue;
             }
-            let when = fault.when(scenario)?;
+            let when = fault.when(&scenario.entry_names())?;
             if !is_seen(when, scenario) {
                 return Err(OperatorError::Unseen { table: "[[faults]]", number: place + 1 });
             }

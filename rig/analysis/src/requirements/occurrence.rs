@@ -53,9 +53,9 @@ fn known(scenario: &Scenario) -> Vec<(String, Occurrence)> {
         };
         names.into_iter().enumerate().flat_map(of_entry).collect()
     };
-    let faults = entries(scenario.fault_names(), "fault", [Cause::FaultInjected, Cause::FaultEnded]);
-    let stimuli =
-        entries(scenario.stimulus_names(), "stimulus", [Cause::StimulusBegan, Cause::StimulusEnded]);
+    let names = scenario.entry_names();
+    let faults = entries(names.faults, "fault", [Cause::FaultInjected, Cause::FaultEnded]);
+    let stimuli = entries(names.stimuli, "stimulus", [Cause::StimulusBegan, Cause::StimulusEnded]);
     let events = Source::ALL.iter().flat_map(|source| {
         let of_source = |cause: &Cause| {
             (format!("{source}.{cause}"), Occurrence::Event { source: *source, cause: *cause })

@@ -11,8 +11,7 @@ use super::can::{CanConfig, MASTER_NODE};
 use super::error::ScenarioError;
 use super::need::require_within;
 use super::quantity::Quantity;
-use super::scenario::Scenario;
-use super::when::{When, WhenKeys};
+use super::when::{EntryNames, When, WhenKeys};
 use crate::geometry::AXIS_NAMES;
 
 pub use kinds::{FaultKindConfig, FaultLayer, FaultPlace, FaultSize};
@@ -115,17 +114,17 @@ impl FaultConfig {
     ///
     /// # Errors
     /// Where that is missing, contradictory, or names nothing of the scenario.
-    pub fn when(&self, scenario: &Scenario) -> Result<When, ScenarioError> {
+    pub fn when(&self, entries: &EntryNames<'_>) -> Result<When, ScenarioError> {
         let names = ["faults.at_s", "faults.after", "faults.for_s", "faults.from_s", "faults.until_s"];
         let Self { at_s, after, for_s, from_s, until_s, .. } = self;
         let after = after.as_deref();
         WhenKeys { names, at_s: *at_s, after, for_s: *for_s, from_s: *from_s, until_s: *until_s }
-            .resolve(scenario)
+            .resolve(entries)
     }
 
     /// Checks one fault of the list.
-    pub(super) fn validate(&self, scenario: &Scenario) -> Result<(), ScenarioError> {
-        self.when(scenario)?;
+    pub(super) fn validate(&self, can: &CanConfig, entries: &EntryNames<'_>) -> Result<(), ScenarioError> {
+        self.when(entries)?;
         if let Some(name) = &self.name {
             super::need::require_name("faults.name", name)?;
         }
@@ -134,14 +133,12 @@ impl FaultConfig {
         self.check_size()?;
         self.check_ranges()?;
         match self.kind.layer() {
-            FaultLayer::Bus => self.check_bus(&scenario.can),
-            FaultLayer::Encoder | FaultLayer::Drive | FaultLayer::Mechanism if !scenario.can.is_virtual() => {
-                refuse(
-                    "faults.kind",
-                    &self.kind,
-                    "leave it away with can.interfaces: real drives take no such fault",
-                )
-            }
+            FaultLayer::Bus => self.check_bus(can),
+            FaultLayer::Encoder | FaultLayer::Drive | FaultLayer::Mechanism if !can.is_virtual() => refuse(
+                "faults.kind",
+                &self.kind,
+                "leave it away with can.interfaces: real drives take no such fault",
+            ),
             _ => Ok(()),
         }
     }
