@@ -10,7 +10,7 @@ use masseter_shared::config::Scenario;
 use masseter_terminal::{Exit, Failure, OrFailure, result, status};
 use rayon::prelude::*;
 
-use super::MatrixArgs;
+use super::args::MatrixArgs;
 use super::case::{Case, cases, scenario_of};
 use super::phases::phases;
 use super::picture;

@@ -1,17 +1,18 @@
 //! `masseter faults`: the kinds of faults, and the coverage of the rig: who detects which fault, and how far the jaw
 //! leaves its path until then.
 
+mod args;
 mod case;
 mod matrix;
 mod phases;
 mod picture;
 mod table;
 
-use std::path::PathBuf;
-
-use clap::{Args, Subcommand};
+use clap::Subcommand;
 use masseter_shared::config::FaultKindConfig;
 use masseter_terminal::{Exit, Failure, OrFailure, result};
+
+use args::MatrixArgs;
 
 /// The verbs of `faults`.
 #[derive(Debug, Clone, Subcommand)]
@@ -22,19 +23,6 @@ pub(crate) enum FaultsVerb {
     /// Play every kind at every axis and phase of the motion: who detects it, how fast, how far the jaw leaves its path
     #[command(after_help = "Example:\n  masseter faults matrix --out faults")]
     Matrix(MatrixArgs),
-}
-
-/// The arguments of `faults matrix`.
-#[derive(Debug, Clone, Args)]
-pub(crate) struct MatrixArgs {
-    /// Scenario file [default: chewing]
-    scenario: Option<PathBuf>,
-    /// Folder for matrix.csv and matrix.svg; must not exist
-    #[arg(long, value_name = "DIR", default_value = "faults")]
-    out: PathBuf,
-    /// Only kinds with this text in their names
-    #[arg(long, value_name = "TEXT")]
-    filter: Option<String>,
 }
 
 /// Lists the kinds, or plays the matrix.

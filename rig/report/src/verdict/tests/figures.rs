@@ -13,6 +13,7 @@ use masseter_shared::realtime::scheduling::{Obtained, SchedulingRequest};
 use super::*;
 
 mod disturbed;
+mod expected;
 mod untested;
 
 /// A run that passes.

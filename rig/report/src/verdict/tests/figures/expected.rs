@@ -1,0 +1,87 @@
+//! Runs that expect an outcome other than a pass.
+
+use masseter_analysis::requirements::{RequirementFigures, RequirementResult};
+use masseter_shared::config::{ExpectConfig, ExpectedVerdict};
+
+use super::*;
+
+/// A run that stops safely, as its scenario expects.
+fn stopped() -> Run {
+    let mut run = Run::new();
+    run.manifest.ending = Ending::SafeStop;
+    run.figures.final_state = Some(Code::Known(ControllerState::SafeStop));
+    expect(&mut run, ExpectedVerdict::SafeStop);
+    run
+}
+
+fn expect(run: &mut Run, verdict: ExpectedVerdict) {
+    run.manifest.scenario.expect = Some(ExpectConfig { verdict: Some(verdict), ..ExpectConfig::default() });
+}
+
+fn require(run: &mut Run, result: RequirementResult, may_be_disturbed: bool) {
+    run.figures.requirements.push(RequirementFigures {
+        name: "stops".to_owned(),
+        must: "after it: safe_stop".to_owned(),
+        result,
+        finding: "found".to_owned(),
+        margin: None,
+        margin_unit: "ms",
+        relative_margin: None,
+        worst_at_s: None,
+        worst_ns: None,
+        latency_ms: None,
+        may_be_disturbed,
+        plot: None,
+    });
+}
+
+fn judge(run: &Run) -> (&'static str, String) {
+    let verdict = Verdict::new(&run.manifest, &run.figures);
+    (verdict.word, verdict.reason)
+}
+
+#[test]
+fn the_expected_outcome_passes_and_any_other_fails() {
+    let (word, reason) = judge(&stopped());
+    assert_eq!((word, reason.as_str()), ("PASS", "SAFE STOP, as expected: the controller stopped the rig"));
+
+    let mut played = Run::new();
+    expect(&mut played, ExpectedVerdict::SafeStop);
+    assert_eq!(judge(&played), ("FAIL", "expected SAFE STOP, but PASS: every check passed".to_owned()));
+
+    let mut died = Run::new();
+    died.manifest.ending = Ending::died("plant", "signal 9".to_owned());
+    expect(&mut died, ExpectedVerdict::Died);
+    assert_eq!(judge(&died).0, "PASS");
+    expect(&mut died, ExpectedVerdict::SafeStop);
+    assert_eq!(judge(&died).0, "FAIL");
+}
+
+#[test]
+fn requirements_and_the_rigs_own_checks_count_beside_the_expected_outcome() {
+    type Case = (fn(&mut Run), &'static str);
+    let cases: [Case; 7] = [
+        (|run| require(run, RequirementResult::Passed, true), "PASS"),
+        (|run| require(run, RequirementResult::Failed, true), "FAIL"),
+        (|run| require(run, RequirementResult::Untested, true), "UNTESTED"),
+        (Run::declare_fault, "UNTESTED"),
+        (|run| run.lose(5), "INCOMPLETE"),
+        (|run| run.figures.plant_skips.skipped = 1, "FAIL"),
+        (|run| run.figures.tracking.actual.max_mm = Some(0.6), "FAIL"),
+    ];
+    for (number, (change, word)) in cases.into_iter().enumerate() {
+        let mut run = stopped();
+        change(&mut run);
+        assert_eq!(judge(&run).0, word, "case {number}: {}", judge(&run).1);
+    }
+}
+
+#[test]
+fn a_requirement_that_lost_cycles_may_have_failed_is_excused() {
+    for (may_be_disturbed, word) in [(true, "INVALID"), (false, "FAIL")] {
+        let mut run = Run::new();
+        run.disturb();
+        require(&mut run, RequirementResult::Failed, may_be_disturbed);
+        assert_eq!(judge(&run).0, word, "{}", judge(&run).1);
+    }
+}
