@@ -88,8 +88,10 @@ fn write_verdict(
     }
     text.push('\n');
     let widest = verdict.checks.iter().map(|check| check.result.mark().len()).max().unwrap_or(0).max(4);
+    let names =
+        verdict.checks.iter().map(|check| check.name.chars().count()).max().unwrap_or(0).clamp(18, 40);
     for check in &verdict.checks {
-        writeln!(text, "  {:<widest$} {:<18} {}", check.result.mark(), check.name, check.finding)?;
+        writeln!(text, "  {:<widest$} {:<names$} {}", check.result.mark(), check.name, check.finding)?;
     }
     Ok(())
 }

@@ -123,9 +123,6 @@ impl Bounds {
     pub(super) fn take(&mut self, moment: &Moment<'_>) {
         let value = self.of.value(moment.values);
         let began_ns = *self.began_ns.get_or_insert(moment.time_ns);
-        if !value.is_nan() {
-            self.series.take(moment.time_ns - began_ns, 0, value / self.of.unit.si);
-        }
         if !self.window.contains(moment) {
             return;
         }
@@ -133,6 +130,8 @@ impl Bounds {
             self.missing += 1;
             return;
         }
+        // What the requirement does not judge would only spoil the scale of the plot.
+        self.series.take(moment.time_ns - began_ns, 0, value / self.of.unit.si);
         let value = if self.statistic == Statistic::Abs { value.abs() } else { value };
         self.samples += 1;
         self.sum += value;

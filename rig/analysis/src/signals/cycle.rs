@@ -13,8 +13,10 @@ pub struct CycleMessages {
     pub reading: Option<Reading>,
     /// The true motion at the sample.
     pub truth: Option<Truth>,
-    /// What the controller made of the sample.
+    /// What the controller made of the sample; without a new sample, its state alone.
     pub state: Option<State>,
+    /// Whether the state was computed from this sample.
+    pub has_solution: bool,
     /// The controller's command.
     pub command: Option<Command>,
     /// The signals that the controller declares.

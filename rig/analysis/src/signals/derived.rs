@@ -51,12 +51,17 @@ impl Jaw {
 
 /// The pose that forward kinematics found.
 pub(super) fn estimated(messages: &CycleMessages) -> Option<Pose> {
-    let State { estimated_position_m, estimated_quaternion_wxyz, .. } = messages.state?;
+    let State { estimated_position_m, estimated_quaternion_wxyz, .. } = solution(messages)?;
     pose(estimated_position_m, estimated_quaternion_wxyz)
 }
 
 /// The pose that the jaw should have.
 pub(super) fn desired(messages: &CycleMessages) -> Option<Pose> {
-    let State { desired_position_m, desired_quaternion_wxyz, .. } = messages.state?;
+    let State { desired_position_m, desired_quaternion_wxyz, .. } = solution(messages)?;
     pose(desired_position_m, desired_quaternion_wxyz)
+}
+
+/// The state, where it was computed from the cycle's sample: only then are its poses those of the sample.
+pub(super) fn solution(messages: &CycleMessages) -> Option<State> {
+    messages.state.filter(|_| messages.has_solution)
 }

@@ -12,7 +12,7 @@ use masseter_shared::wording::nearest;
 use serde::Serialize;
 
 use super::cycle::CycleMessages;
-use super::derived::{Jaw, JawPoint, desired, estimated};
+use super::derived::{Jaw, JawPoint, desired, estimated, solution};
 
 /// How a signal's value follows from a cycle; none where the cycle does not have it.
 type Extract = Box<dyn Fn(&CycleMessages, &Start) -> Option<f64> + Send>;
@@ -257,13 +257,13 @@ impl Registry {
             Some(messages.state?.motion_time_s)
         });
         self.add("fk.residual", "um", "Largest difference of a platform side from its length.", |messages| {
-            Some(messages.state?.residual_m)
+            Some(solution(messages)?.residual_m)
         });
         self.add("fk.condition", "", "Condition number of the Jacobian.", |messages| {
-            Some(messages.state?.condition)
+            Some(solution(messages)?.condition)
         });
         self.add("fk.iterations", "", "Iterations of the forward kinematics.", |messages| {
-            Some(f64::from(messages.state?.iterations))
+            Some(f64::from(solution(messages)?.iterations))
         });
         self.add("master.fault", "", "1 once the master refuses to move anything.", |messages| {
             Some(f64::from(messages.reading?.master_fault))

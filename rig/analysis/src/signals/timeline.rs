@@ -5,7 +5,7 @@
 use std::collections::VecDeque;
 
 use masseter_recording::Recorded;
-use masseter_shared::messages::Parameters;
+use masseter_shared::messages::{Parameters, State};
 
 use super::cycle::CycleMessages;
 use crate::events::EventRecord;
@@ -31,6 +31,8 @@ pub struct Timeline {
     /// Events that were not handed out yet.
     events: Vec<EventRecord>,
     parameters: Option<Parameters>,
+    /// The newest cycle whose sample a state was computed from.
+    newest_reading: u64,
     last_ns: u64,
 }
 
@@ -40,13 +42,25 @@ impl Timeline {
         match message {
             Recorded::Reading(reading) => self.at(reading.cycle)?.reading = Some(*reading),
             Recorded::Truth(truth) => self.at(truth.cycle)?.truth = Some(*truth),
-            Recorded::State(state) => self.at(state.cycle)?.state = Some(*state),
+            Recorded::State(state) => self.state(state),
             Recorded::Command(command) => self.at(command.cycle)?.command = Some(*command),
             Recorded::Signals(signals) => self.at(signals.cycle)?.signals = Some(*signals),
             Recorded::Parameters(parameters) => self.at(parameters.cycle)?.parameters = Some(*parameters),
             Recorded::Event(_) | Recorded::Frame(_) | Recorded::Machine(_) => {}
         }
         if self.cycles.len() > KEPT { self.hand_out() } else { None }
+    }
+
+    /// A state belongs to the sample that it was computed from, which may be late. Without a new sample it belongs to its own
+    /// cycle, unless a state comes that was computed from that cycle's sample.
+    fn state(&mut self, state: &State) {
+        let is_fresh = state.reading_cycle > self.newest_reading;
+        self.newest_reading = self.newest_reading.max(state.reading_cycle);
+        let cycle = if is_fresh { state.reading_cycle } else { state.cycle };
+        let Some(messages) = self.at(cycle) else { return };
+        if is_fresh || messages.state.is_none() {
+            (messages.state, messages.has_solution) = (Some(*state), is_fresh);
+        }
     }
 
     /// A lost cycle may have acted on the jaw in this cycle.
@@ -134,6 +148,20 @@ mod tests {
         let events: Vec<Vec<_>> =
             samples.iter().map(|sample| sample.events.iter().map(|event| event.time_ns).collect()).collect();
         assert_eq!(events, [vec![], vec![1500, 2000], vec![], vec![]]);
+    }
+
+    #[test]
+    fn a_state_belongs_to_the_sample_that_it_was_computed_from() {
+        let mut timeline = Timeline::default();
+        (1..=4).for_each(|cycle| drop(timeline.take(&reading(cycle))));
+        // Reading 2 comes too late for cycle 2: cycle 3 uses it, and cycle 4 has its own again.
+        for (cycle, reading_cycle) in [(1, 1), (2, 1), (3, 2), (4, 4)] {
+            timeline.take(&Recorded::State(State { cycle, reading_cycle, ..State::default() }));
+        }
+        let found: Vec<_> = std::iter::from_fn(|| timeline.finish())
+            .map(|Sample { messages, .. }| (messages.state.map(|state| state.cycle), messages.has_solution))
+            .collect();
+        assert_eq!(found, [(Some(1), true), (Some(3), true), (None, false), (Some(4), true)]);
     }
 
     #[test]
