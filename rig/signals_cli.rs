@@ -5,6 +5,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use masseter_analysis::requirements::event_names;
 use masseter_analysis::signals::Registry;
 use masseter_plan::{RunPlan, read_scenario};
 use masseter_terminal::{Exit, Format, result};
@@ -30,9 +31,13 @@ pub(crate) fn signals(args: &SignalsArgs) -> anyhow::Result<Exit> {
     let registry = Registry::new(&plan.scenario, &declared);
     let text = match args.format {
         Format::Json => serde_json::to_string_pretty(registry.signals())? + "\n",
-        Format::Human => registry.signals().iter().fold(String::new(), |text, signal| {
-            text + &format!("{:<26} {:<6} {}\n", signal.name, signal.unit, signal.about)
-        }),
+        Format::Human => {
+            let signals = registry.signals().iter().fold(String::new(), |text, signal| {
+                text + &format!("{:<26} {:<6} {}\n", signal.name, signal.unit, signal.about)
+            });
+            let names: Vec<_> = event_names().collect();
+            format!("{signals}\nevents: {}\n", names.join(", "))
+        }
     };
     result(&text)?;
     Ok(Exit::Passed)

@@ -35,6 +35,8 @@ pub(crate) struct Estimate {
 pub(crate) struct Sequencer {
     pub(crate) config: ControllerConfig,
     pub(crate) period_s: f64,
+    /// How long a safe stop is observed, s.
+    observation_s: f64,
     pub(crate) tracker: ForwardTracker,
     pub(crate) state: ControllerState,
     pub(crate) cycles_in_state: u64,
@@ -56,6 +58,7 @@ impl Sequencer {
         Self {
             config: scenario.controller,
             period_s: scenario.period_s(),
+            observation_s: scenario.observation_s(),
             tracker: ForwardTracker::new(mechanism),
             state: ControllerState::WaitReadings,
             cycles_in_state: 0,
@@ -187,7 +190,7 @@ impl Sequencer {
             ControllerState::SafeStop => {
                 let waited_s = self.cycles_in_state as f64 * self.period_s;
                 let is_over = (is_repeated && self.drives_are_off()) || waited_s >= SAFE_STOP_S;
-                is_over.then_some(Outcome::SafeStop)
+                (is_over && waited_s >= self.observation_s).then_some(Outcome::SafeStop)
             }
             _ => None,
         }

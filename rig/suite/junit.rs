@@ -132,7 +132,9 @@ fn of_check(check: &Check, is_short: bool) -> Case {
     match check.result {
         CheckResult::Passed => Case::Passed,
         CheckResult::Failed if is_short => Case::Failed(finding),
-        CheckResult::Untested if is_short => Case::Failed(format!("not tested: {finding}")),
+        CheckResult::Untested if is_short && check.figures.is_none() => {
+            Case::Failed(format!("not tested: {finding}"))
+        }
         CheckResult::Failed | CheckResult::Untested | CheckResult::Excused | CheckResult::NotJudged => {
             Case::Skipped(finding)
         }

@@ -2,9 +2,9 @@
 
 use masseter_recording::{Damage, ProcessFault, Recorded};
 use masseter_shared::config::Scenario;
-use masseter_shared::messages::codes::ControllerState;
+use masseter_shared::messages::codes::{Cause, ControllerState, EventKind, Source};
 use masseter_shared::messages::tap::{self, TapError};
-use masseter_shared::messages::{FrameTap, Message, Reading, State, Truth};
+use masseter_shared::messages::{Event, FrameTap, Message, Reading, State, Truth};
 use masseter_shared::named::Declared;
 
 use crate::attribution::OverrunAttribution;
@@ -149,6 +149,11 @@ impl Analysis {
     /// A fault of a process struck at this time, ns, of which no message tells. Comes before the messages.
     pub fn process_fault(&mut self, fault: &ProcessFault) {
         self.faults.strike(fault.number, fault.struck_ns);
+        if let Some(requirements) = &mut self.requirements {
+            let event = Event::new(Source::Scenario, EventKind::Notice, Cause::FaultInjected);
+            let (time_ns, value) = (fault.struck_ns, fault.number as f64);
+            requirements.event(&EventRecord::from(&Event { time_ns, value, ..event }));
+        }
     }
 
     fn reading(&mut self, reading: &Reading) {

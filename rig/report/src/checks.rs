@@ -2,7 +2,7 @@
 //!
 //! What the checks come to is the [verdict](super::verdict)'s.
 
-use masseter_shared::config::ExpectedVerdict;
+use masseter_shared::config::{ExpectedVerdict, StimulusConfig};
 use masseter_shared::messages::codes::{Cause, ControllerState};
 use masseter_shared::wording::counted;
 
@@ -48,6 +48,7 @@ pub(crate) fn checks(manifest: &Manifest, figures: &Figures, timing: &Timing) ->
     ]);
     // No lost cycle excuses a declared fault that led the jaw too far.
     checks.extend(faults(&manifest.scenario.faults, &figures.faults, limits));
+    checks.extend(stimuli(&manifest.scenario.stimulus, &figures.events));
     checks
         .extend(figures.requirements.iter().map(|requirement| self::requirement(requirement, is_disturbed)));
     checks
@@ -87,6 +88,30 @@ fn sequence(
     };
     let as_expected = if is_good { as_expected } else { "" };
     Check::judged("sequence", format!("ended in state {in_words}{how}{as_expected}"), is_good)
+}
+
+/// The name of the check of the stimuli.
+pub(crate) const STIMULI: &str = "stimuli";
+
+/// A test with stimuli of which one never began has not tested what it should. None where there are none.
+fn stimuli(declared: &[StimulusConfig], events: &[EventRecord]) -> Option<Check> {
+    let is_begin =
+        |event: &EventRecord, number| event.cause == Cause::StimulusBegan && event.value as usize == number;
+    let idle: Vec<_> = (1..=declared.len())
+        .filter(|number| !events.iter().any(|event| is_begin(event, *number)))
+        .map(|number| number.to_string())
+        .collect();
+    let began = format!("{} of {} stimuli began", declared.len() - idle.len(), declared.len());
+    let check = if idle.is_empty() {
+        Check::judged(STIMULI, began, true)
+    } else {
+        let which = idle.join(", ");
+        Check::untested(
+            STIMULI,
+            format!("{began}, number {which} never: let the stimulus begin earlier, or play longer"),
+        )
+    };
+    (!declared.is_empty()).then_some(check)
 }
 
 /// A requirement of the scenario. The machine excuses a failure where a lost cycle may have caused it.

@@ -3,6 +3,7 @@
 use askama::Template;
 use masseter_analysis::Figures;
 use masseter_recording::Manifest;
+use masseter_terminal::Exit;
 
 use crate::check::{Check, CheckResult};
 use crate::verdict::Verdict;
@@ -19,7 +20,21 @@ struct Suite<'a> {
 impl Suite<'_> {
     /// With checks of the rig that were not tested: most CI systems show a suite with skipped cases as passed.
     fn failures(&self) -> usize {
+        if !self.is_short() {
+            return 0;
+        }
         self.count(CheckResult::Failed) + self.count(CheckResult::Untested) - self.untested_requirements()
+    }
+
+    /// Whether the run did not pass. A check that failed in a run that passed did so as the scenario expects.
+    fn is_short(&self) -> bool {
+        self.verdict.exit_code != Exit::Passed
+    }
+
+    /// Whether the case of the run itself is an error: no other case shows why the run did not pass.
+    fn is_unexplained(&self) -> bool {
+        let is_by_checks = self.verdict.reason.starts_with("failed: ") || self.verdict.word == "UNTESTED";
+        self.is_short() && !(self.verdict.is_judged() && is_by_checks)
     }
 
     fn untested_requirements(&self) -> usize {
@@ -32,6 +47,9 @@ impl Suite<'_> {
     }
 
     fn skipped(&self) -> usize {
+        if !self.is_short() {
+            return self.verdict.checks.iter().filter(|check| check.result != CheckResult::Passed).count();
+        }
         self.count(CheckResult::Excused) + self.count(CheckResult::NotJudged) + self.untested_requirements()
     }
 }

@@ -61,6 +61,11 @@ fn requirements(scenario: &Scenario, figures: &Figures) -> Vec<(String, Option<D
     figures.requirements.iter().filter_map(of).collect()
 }
 
+/// Numbers one after the other.
+fn values(values: &[f64]) -> String {
+    values.iter().map(|value| significant(*value)).collect::<Vec<_>>().join(", ")
+}
+
 /// The events until the controller first moves the jaw, and those from then on.
 fn phases(events: &[EventRecord]) -> (&[EventRecord], &[EventRecord]) {
     let moves = |event: &EventRecord| {

@@ -11,7 +11,7 @@ use masseter_terminal::Exit;
 use serde::Serialize;
 
 use crate::check::{Check, CheckResult};
-use crate::checks::checks;
+use crate::checks::{STIMULI, checks};
 use crate::motion_checks::{FAULTS, left_its_path};
 use crate::outcome::Outcome;
 use crate::text::{self, grouped};
@@ -57,7 +57,7 @@ impl Verdict {
             all.iter().cloned().partition(|check| check.is_requirement() && expected.is_some());
         let excuse = excuse(&manifest.ending, &timing, figures.outage);
         let is_too_late = left_its_path(&figures.tracking.actual, &manifest.scenario.checks)
-            || checks.iter().any(|check| check.name == FAULTS && check.result == CheckResult::Failed);
+            || checks.iter().any(|check| is_of_faults(check) && check.result == CheckResult::Failed);
         let (mut outcome, mut reason) = ending(&manifest.ending, &figures.events)
             .or_else(|| stopped_by_stimulus(&manifest.scenario, &figures.events))
             // The machine caused the stop, or it came only after the jaw had left its path.
@@ -266,15 +266,17 @@ fn against(
     }
     let wanted = Outcome::of(expected);
     if outcome != wanted {
+        let reason =
+            if outcome == Outcome::Passed { "every check of the rig passed" } else { reason.as_str() };
         return (Outcome::Failed, format!("expected {}, but {}: {reason}", wanted.word(), outcome.word()));
     }
     // The rig's own checks still count where the run goes on in order to its end.
     let own = || {
         let is_in_order = matches!(wanted, Outcome::SafeStop | Outcome::Interrupted);
-        let idle: Vec<_> = checks.iter().filter(|check| check.name == FAULTS).cloned().collect();
-        let short =
-            || incomplete(figures).or_else(|| failed(checks)).or_else(|| untested(&idle, figures.cycles));
-        is_in_order.then(short).flatten()
+        let short = || incomplete(figures).or_else(|| failed(checks));
+        let idle: Vec<_> = checks.iter().filter(|check| is_of_scenario(check)).cloned().collect();
+        let in_order = is_in_order.then(short).flatten();
+        in_order.or_else(|| if wanted == Outcome::Untested { None } else { untested(&idle, figures.cycles) })
     };
     let lost = || {
         let names = named(requirements, CheckResult::Excused)?;
@@ -285,6 +287,16 @@ fn against(
         .or_else(lost)
         .or_else(|| untested(requirements, figures.cycles))
         .unwrap_or_else(|| (Outcome::Passed, format!("{}, as expected: {reason}", wanted.word())))
+}
+
+/// Whether it is the check of the declared faults.
+fn is_of_faults(check: &Check) -> bool {
+    check.name == FAULTS && !check.is_requirement()
+}
+
+/// Whether it is a check of what the scenario lets happen.
+fn is_of_scenario(check: &Check) -> bool {
+    is_of_faults(check) || (check.name == STIMULI && !check.is_requirement())
 }
 
 /// The checks of a result by their names; none without such checks.

@@ -199,6 +199,9 @@ impl FromStr for Quantity {
                 .map_or_else(String::new, |likely| format!("; did you mean '{likely}'?"));
             refused(format!("the unit '{name}' is unknown{question}"))
         })?;
+        if !(number * unit.si).is_finite() {
+            return Err(refused("the number is too large".to_owned()));
+        }
         Ok(Self { number, unit })
     }
 }
@@ -243,7 +246,8 @@ impl<'de> Deserialize<'de> for Quantity {
             }
 
             fn visit_f64<E: Error>(self, number: f64) -> Result<Quantity, E> {
-                Ok(Quantity::new(number, Dimension::One.si_unit()))
+                let quantity = Quantity::new(number, Dimension::One.si_unit());
+                if number.is_finite() { Ok(quantity) } else { Err(E::custom("use a finite number")) }
             }
 
             fn visit_i64<E: Error>(self, number: i64) -> Result<Quantity, E> {
@@ -301,6 +305,9 @@ mod tests {
         for text in ["max = \"50 um\"\n", "max = 3.0\n"] {
             let table: Table = toml::from_str(text).unwrap();
             assert_eq!(toml::to_string(&table).unwrap(), text);
+        }
+        for text in ["max = nan", "max = inf", "max = '1e308 kN'"] {
+            toml::from_str::<Table>(text).unwrap_err();
         }
         let error = toml::from_str::<Table>("max = [1]").unwrap_err().to_string();
         assert!(error.contains("a number with its unit"), "{error}");

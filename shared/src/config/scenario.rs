@@ -23,6 +23,8 @@ use crate::wording::nearest;
 const MOST_BYTES: u64 = 1 << 20;
 /// What a message on an unknown key begins with.
 const UNKNOWN_KEY: &str = "unknown key";
+/// Longest time after a safe stop, s.
+const LONGEST_OBSERVATION_S: f64 = 10.0;
 /// Characters of the longest message of the TOML reader.
 const LONGEST_REASON: usize = 2000;
 
@@ -248,6 +250,13 @@ impl Scenario {
         self.limits.validate()?;
         self.controller.validate(self.rate_hz)?;
         self.checks.validate()
+    }
+
+    /// How long a run goes on after a safe stop, so that requirements can see that the rig stays stopped: the longest
+    /// `stays_for`, at most ten seconds, s.
+    pub fn observation_s(&self) -> f64 {
+        let times = self.require.iter().filter_map(|requirement| requirement.stays_for);
+        times.map(|time| time.si()).fold(0.0, f64::max).min(LONGEST_OBSERVATION_S)
     }
 
     /// The names of the faults and stimuli.

@@ -51,7 +51,9 @@ impl Limits {
         let below = self.max.map(|max| (max - value, max));
         let above = self.min.map(|min| (value - min, min));
         let nearest = below.into_iter().chain(above).min_by(|(a, _), (b, _)| a.total_cmp(b));
-        nearest.expect("a requirement has a limit")
+        let (margin, limit) = nearest.expect("a requirement has a limit");
+        // What is no number is within no limit.
+        (if margin.is_nan() { f64::NEG_INFINITY } else { margin }, limit)
     }
 }
 
@@ -122,11 +124,12 @@ impl Bounds {
 
     pub(super) fn take(&mut self, moment: &Moment<'_>) {
         let value = self.of.value(moment.values);
+        let (value, is_missing) = (value.unwrap_or(f64::NAN), value.is_none());
         let began_ns = *self.began_ns.get_or_insert(moment.time_ns);
-        if !self.window.contains(moment) {
+        if !self.window.contains(moment) || moment.is_closing {
             return;
         }
-        if value.is_nan() {
+        if is_missing {
             self.missing += 1;
             return;
         }
@@ -179,7 +182,7 @@ impl Bounds {
         let missing = if self.missing > 0 { format!(", {} missing", self.missing) } else { String::new() };
         let text = format!("{} in {} samples{missing}", unit.text(value), self.samples);
         Finding {
-            margin: Some(margin),
+            margin: Some(margin).filter(|margin| margin.is_finite()),
             relative_margin: Finding::share(margin, limit),
             worst_ns: is_of_values.then_some(worst.time_ns),
             may_be_disturbed: !(is_of_values && self.fails_undisturbed),
@@ -196,7 +199,8 @@ impl Bounds {
             Statistic::PeakToPeak => self.range[1] - self.range[0],
             Statistic::Percentile => {
                 self.values.sort_by(f64::total_cmp);
-                let rank = (self.percentile / 100.0 * samples).ceil() as usize;
+                // The nearest rank; products of decimals are a little too large.
+                let rank = (self.percentile * samples / 100.0 - 1e-9).ceil() as usize;
                 self.values[rank.saturating_sub(1).min(self.values.len() - 1)]
             }
         }

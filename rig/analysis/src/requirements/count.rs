@@ -31,6 +31,9 @@ impl Count {
         if at_least.is_none() && at_most.is_none() {
             return Err("give at_least, at_most or both".to_owned());
         }
+        if at_least.zip(at_most).is_some_and(|(least, most)| least > most) {
+            return Err("at_least is above at_most".to_owned());
+        }
         let trigger = Trigger::parse(config.event.as_deref().unwrap_or_default(), scenario, values)?;
         let window = Window::new(config.during.as_ref(), scenario, values)?;
         Ok(Self { trigger, window, at_least, at_most, samples: 0, times: 0, last_ns: None })

@@ -44,6 +44,18 @@ impl Quantified {
                     exmex::parse::<f64>(text).map_err(|error| format!("expression = '{text}': {error}"))?;
                 let signals: Vec<_> =
                     parsed.var_names().iter().map(|name| values.choose(name)).collect::<Result<_, _>>()?;
+                if signals.is_empty() || text.matches('{').count() != text.matches('}').count() {
+                    return Err(format!(
+                        "expression = '{text}': write signals in braces, such as {{l1.force}}"
+                    ));
+                }
+                if let Some(state) = signals.iter().find(|signal| values.signal(**signal).states().is_some())
+                {
+                    return Err(format!(
+                        "expression = '{text}': {} is a state, no number",
+                        values.signal(*state).name
+                    ));
+                }
                 let arguments = vec![0.0; signals.len()];
                 Ok(Self {
                     text: text.clone(),
@@ -55,15 +67,16 @@ impl Quantified {
         }
     }
 
-    /// The value in SI units; NaN where a signal is missing.
-    pub(super) fn value(&mut self, values: &[f64]) -> f64 {
+    /// The value in SI units; none where a signal is missing.
+    pub(super) fn value(&mut self, values: &[f64]) -> Option<f64> {
         match &mut self.source {
-            Source::Signal(signal) => values[*signal],
+            Source::Signal(signal) => Some(values[*signal]).filter(|value| !value.is_nan()),
             Source::Expression { parsed, signals, arguments } => {
                 for (argument, signal) in arguments.iter_mut().zip(&*signals) {
                     *argument = values[*signal];
                 }
-                parsed.eval(arguments).unwrap_or(f64::NAN)
+                let has_all = arguments.iter().all(|argument| !argument.is_nan());
+                has_all.then(|| parsed.eval(arguments).unwrap_or(f64::NAN))
             }
         }
     }

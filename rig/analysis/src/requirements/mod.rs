@@ -21,4 +21,5 @@ mod trigger;
 mod window;
 
 pub use finding::{RequirementFigures, RequirementPlot, RequirementResult};
+pub use occurrence::event_names;
 pub use set::{Requirements, check_requirements};

@@ -15,4 +15,6 @@ pub(super) struct Moment<'a> {
     pub(super) events: &'a [EventRecord],
     /// Whether a lost cycle may have acted on the jaw.
     pub(super) is_disturbed: bool,
+    /// Whether it is no sample, but holds the events after the last one.
+    pub(super) is_closing: bool,
 }

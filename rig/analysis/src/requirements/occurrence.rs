@@ -44,6 +44,81 @@ impl Occurrence {
     }
 }
 
+/// What each reporter can report.
+const REPORTS: [(Source, &[Cause]); 4] = [
+    (
+        Source::Controller,
+        &[
+            Cause::Sequence,
+            Cause::StopRequested,
+            Cause::StaleReading,
+            Cause::DriveFault,
+            Cause::ForwardKinematics,
+            Cause::StrokeLimit,
+            Cause::VelocityLimit,
+            Cause::InverseKinematics,
+            Cause::ForeignCommand,
+            Cause::EnableTimeout,
+            Cause::TrackingLost,
+            Cause::OrientationLost,
+            Cause::BadMessage,
+            Cause::MasterFault,
+            Cause::LawFailed,
+            Cause::ParameterSet,
+        ],
+    ),
+    (
+        Source::Master,
+        &[
+            Cause::Sequence,
+            Cause::DriveFault,
+            Cause::StrokeLimit,
+            Cause::VelocityLimit,
+            Cause::AccelerationLimit,
+            Cause::FollowingError,
+            Cause::CommandLost,
+            Cause::BadMessage,
+            Cause::HeartbeatLost,
+            Cause::ProcessDataLost,
+            Cause::BusRefused,
+            Cause::BusOff,
+            Cause::BootTimeout,
+            Cause::Overflow,
+            Cause::WrongIdentity,
+            Cause::WrongPdo,
+            Cause::NotAccepted,
+            Cause::SdoAborted,
+            Cause::SdoTimeout,
+            Cause::DuplicateNode,
+            Cause::NodeRestarted,
+            Cause::FaultAtStart,
+            Cause::NodeStopped,
+            Cause::Recovered,
+            Cause::WrongLength,
+            Cause::UnknownNode,
+            Cause::SecondMaster,
+            Cause::StillPowered,
+            Cause::HomeOffset,
+        ],
+    ),
+    (Source::Drive, &[Cause::Sequence, Cause::Emergency]),
+    (Source::Wire, &[Cause::ErrorActive, Cause::ErrorPassive, Cause::BusOff]),
+];
+
+/// Whether the name is the end of a stimulus that has none.
+fn is_endless(name: &str, scenario: &Scenario) -> bool {
+    let of_stimulus = name.strip_prefix("stimulus.").and_then(|rest| rest.strip_suffix(".ended"));
+    let mut endless = scenario.stimulus.iter().filter(|stimulus| stimulus.is_of_controller());
+    of_stimulus.is_some_and(|name| endless.any(|stimulus| stimulus.name() == name))
+}
+
+/// The names of the events of the rig that can be occurrences.
+pub fn event_names() -> impl Iterator<Item = String> {
+    REPORTS
+        .into_iter()
+        .flat_map(|(source, causes)| causes.iter().map(move |cause| format!("{source}.{cause}")))
+}
+
 /// Every occurrence that a run of the scenario can have, with its name.
 fn known(scenario: &Scenario) -> Vec<(String, Occurrence)> {
     let entries = |names: Vec<&str>, what: &str, causes: [Cause; 2]| -> Vec<_> {
@@ -56,11 +131,10 @@ fn known(scenario: &Scenario) -> Vec<(String, Occurrence)> {
     let names = scenario.entry_names();
     let faults = entries(names.faults, "fault", [Cause::FaultInjected, Cause::FaultEnded]);
     let stimuli = entries(names.stimuli, "stimulus", [Cause::StimulusBegan, Cause::StimulusEnded]);
-    let events = Source::ALL.iter().flat_map(|source| {
-        let of_source = |cause: &Cause| {
-            (format!("{source}.{cause}"), Occurrence::Event { source: *source, cause: *cause })
-        };
-        Cause::ALL.iter().map(of_source).collect::<Vec<_>>()
+    let events = REPORTS.into_iter().flat_map(|(source, causes)| {
+        let named =
+            move |cause: &Cause| (format!("{source}.{cause}"), Occurrence::Event { source, cause: *cause });
+        causes.iter().map(named).collect::<Vec<_>>()
     });
-    faults.into_iter().chain(stimuli).chain(events).collect()
+    faults.into_iter().chain(stimuli).chain(events).filter(|(name, _)| !is_endless(name, scenario)).collect()
 }

@@ -40,6 +40,10 @@ pub(super) struct Response {
     worst: Option<Answer>,
     longest_s: Option<f64>,
     last_ns: u64,
+    /// The whole of `stays_for`, ns.
+    full_ns: u64,
+    /// Triggers whose time lies beyond the end of the run.
+    beyond: u64,
 }
 
 /// The answer to a trigger so far.
@@ -53,6 +57,10 @@ struct Answer {
     best: f64,
     /// When the condition first held as required, ns.
     answered_ns: Option<u64>,
+    /// Whether a sample lay within the time.
+    is_judged: bool,
+    /// For how much of its window the condition was observed at the best answer, where the run ended in it, ns.
+    observed_ns: Option<u64>,
 }
 
 impl Answer {
@@ -72,7 +80,11 @@ impl Response {
         let time_ns = |key: &str, time: Option<Quantity>| {
             let seconds = time
                 .map(|time| time.si_of(Dimension::Time).map_err(|need| format!("{key} = {time}: {need}")));
-            Ok::<_, String>(seconds.transpose()?.map(|seconds| (seconds * SECOND_NS as f64).round() as u64))
+            let seconds = seconds.transpose()?;
+            if seconds.is_some_and(|seconds| seconds < 0.0) {
+                return Err(format!("{key}: use a time not below 0"));
+            }
+            Ok::<_, String>(seconds.map(|seconds| (seconds * SECOND_NS as f64).round() as u64))
         };
         let (delay_ns, within_ns) =
             (time_ns("delay", config.delay)?.unwrap_or(0), time_ns("within", config.within)?);
@@ -95,6 +107,8 @@ impl Response {
             worst: None,
             longest_s: None,
             last_ns: 0,
+            full_ns: time_ns("stays_for", config.stays_for)?.unwrap_or(0),
+            beyond: 0,
         })
     }
 
@@ -110,14 +124,9 @@ impl Response {
     }
 
     pub(super) fn take(&mut self, moment: &Moment<'_>) {
-        self.settle(moment.time_ns);
-        let robustness = self.then.robustness(moment.values).unwrap_or(f64::NEG_INFINITY);
-        self.waiting.push_back((moment.time_ns, robustness));
-        while self.smallest.back().is_some_and(|(_, last)| *last >= robustness) {
-            self.smallest.pop_back();
+        if !moment.is_closing {
+            self.sample(moment);
         }
-        self.smallest.push_back((moment.time_ns, robustness));
-        self.last_ns = moment.time_ns;
         let occurred = self.trigger.take(moment);
         if self.window.contains(moment) {
             for occurred_ns in occurred {
@@ -126,12 +135,30 @@ impl Response {
         }
     }
 
+    fn sample(&mut self, moment: &Moment<'_>) {
+        self.settle(moment.time_ns);
+        let robustness = self.then.robustness(moment.values).unwrap_or(f64::NEG_INFINITY);
+        self.waiting.push_back((moment.time_ns, robustness));
+        while self.smallest.back().is_some_and(|(_, last)| *last >= robustness) {
+            self.smallest.pop_back();
+        }
+        self.smallest.push_back((moment.time_ns, robustness));
+        self.last_ns = moment.time_ns;
+    }
+
     fn begin(&mut self, at_ns: u64, occurred_ns: u64) {
         self.triggers += 1;
         if self.open.len() == MOST_OPEN {
             self.not_followed += 1;
         } else {
-            self.open.push(Answer { at_ns, occurred_ns, best: f64::NEG_INFINITY, answered_ns: None });
+            self.open.push(Answer {
+                at_ns,
+                occurred_ns,
+                best: f64::NEG_INFINITY,
+                answered_ns: None,
+                is_judged: false,
+                observed_ns: None,
+            });
         }
     }
 
@@ -150,10 +177,14 @@ impl Response {
     }
 
     fn judge(&mut self, time_ns: u64, robustness: f64) {
+        let observed_ns = Some(self.last_ns.saturating_sub(time_ns)).filter(|ns| *ns < self.full_ns);
         let (delay_ns, within_ns) = (self.delay_ns, self.within_ns);
         for answer in self.open.iter_mut().filter(|answer| time_ns >= answer.at_ns.saturating_add(delay_ns)) {
             if within_ns.is_none_or(|within_ns| time_ns <= answer.at_ns.saturating_add(within_ns)) {
-                answer.best = answer.best.max(robustness);
+                answer.is_judged = true;
+                if robustness > answer.best {
+                    (answer.best, answer.observed_ns) = (robustness, observed_ns);
+                }
             }
             if robustness >= 0.0 {
                 answer.answered_ns.get_or_insert(time_ns);
@@ -171,6 +202,10 @@ impl Response {
     }
 
     fn close(&mut self, answer: Answer) {
+        if !answer.is_judged {
+            self.beyond += 1;
+            return;
+        }
         self.answered += u64::from(answer.best >= 0.0);
         let margin = self.margin(&answer).unwrap_or(f64::NEG_INFINITY);
         let worst = self.worst.map(|worst| self.margin(&worst).unwrap_or(f64::NEG_INFINITY));
@@ -203,7 +238,12 @@ impl Response {
         }
         let unit = self.unit();
         let Some(worst) = self.worst else {
-            return Finding::untested(format!("{} never came", self.trigger.text), unit);
+            let why = match self.triggers {
+                0 if self.window.text.is_empty() => format!("{} never came", self.trigger.text),
+                0 => format!("{} never came{}", self.trigger.text, self.window.text),
+                _ => format!("the run ended before the time after {}", self.trigger.text),
+            };
+            return Finding::untested(why, unit);
         };
         let margin = self.margin(&worst).filter(|margin| margin.is_finite());
         let relative_margin = margin.and_then(|margin| {
@@ -215,20 +255,32 @@ impl Response {
             relative_margin,
             worst_ns: Some(worst.at_ns),
             latency_s: self.longest_s,
-            ..Finding::new(self.answered == self.triggers, self.text(), unit)
+            ..Finding::new(self.answered == self.triggers - self.beyond, self.text(&worst), unit)
         }
     }
 
-    fn text(&self) -> String {
+    fn text(&self, worst: &Answer) -> String {
         let latency = match self.longest_s {
             Some(longest_s) => format!("; longest latency {:.3} ms", longest_s * 1e3),
             None => "; never followed".to_owned(),
+        };
+        let ms = |ns: u64| ns as f64 / 1e6;
+        let observed = worst.observed_ns.map_or_else(String::new, |ns| {
+            format!("; the run ended after {:.0} ms of {:.0} ms", ms(ns), ms(self.full_ns))
+        });
+        let beyond = match self.beyond {
+            0 => String::new(),
+            more => format!("; {} at the end of the run not judged", counted(more, "trigger")),
         };
         let cut = match self.not_followed {
             0 => String::new(),
             more => format!("; {more} more not followed, as {MOST_OPEN} were open"),
         };
-        format!("{} of {} answered{latency}{cut}", self.answered, counted(self.triggers, "trigger"))
+        format!(
+            "{} of {} answered{latency}{observed}{beyond}{cut}",
+            self.answered,
+            counted(self.triggers, "trigger")
+        )
     }
 
     /// The unit of the margin.

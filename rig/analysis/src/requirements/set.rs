@@ -18,6 +18,7 @@ use crate::signals::{Registry, Sample, Timeline, Values};
 /// use masseter_recording::Recorded;
 /// use masseter_shared::config::Scenario;
 /// use masseter_shared::messages::Reading;
+/// use masseter_shared::messages::codes::DriveState;
 /// use masseter_shared::named::Declared;
 ///
 /// let text = "[[require]]\nname = 'first leg'\nsignal = 'l1.position'\nmax = '300 mm'";
@@ -25,6 +26,7 @@ use crate::signals::{Registry, Sample, Timeline, Values};
 /// let mut requirements = Requirements::new(&scenario, &Declared::default());
 /// let mut reading = Reading { cycle: 1, sampled_ns: 1000, ..Reading::default() };
 /// reading.position_m[3] = 0.29;
+/// reading.drive_state = [DriveState::OperationEnabled.code(); 6];
 /// requirements.take(&Recorded::Reading(reading));
 /// let found = requirements.finish();
 /// assert_eq!(found[0].result, RequirementResult::Passed);
@@ -48,7 +50,10 @@ pub struct Requirements {
 /// A sentence that names the requirement.
 pub fn check_requirements(scenario: &Scenario, declared: Option<&Declared>) -> Result<(), String> {
     let mut values = Values::new(Registry::new(scenario, declared.unwrap_or(&Declared::default())));
-    for config in &scenario.require {
+    for (place, config) in scenario.require.iter().enumerate() {
+        if scenario.require[..place].iter().any(|other| other.name == config.name) {
+            return Err(format!("require '{}': another requirement has this name", config.name));
+        }
         let read = Requirement::new(config, scenario, &mut values);
         if let Err(reason) = read
             && (declared.is_some() || !(reason.contains("'signal.") || reason.contains("'parameter.")))
@@ -109,14 +114,15 @@ impl Requirements {
         self.list.into_iter().map(|requirement| requirement.finish(self.motion_ns)).collect()
     }
 
-    fn judge(&mut self, Sample { time_ns, messages, events }: &Sample) {
+    fn judge(&mut self, Sample { time_ns, messages, events, is_closing }: &Sample) {
         self.values.take(messages, &mut self.row);
         if self.row[self.state].to_bits() == f64::from(ControllerState::Running.code()).to_bits() {
             self.motion_ns.get_or_insert(*time_ns);
         }
         let motion_s = self.motion_ns.map(|motion_ns| (time_ns - motion_ns) as f64 / 1e9);
         let (values, is_disturbed) = (self.row.as_slice(), messages.is_disturbed);
-        let moment = Moment { time_ns: *time_ns, motion_s, values, events, is_disturbed };
+        let moment =
+            Moment { time_ns: *time_ns, motion_s, values, events, is_disturbed, is_closing: *is_closing };
         self.list.iter_mut().for_each(|requirement| requirement.take(&moment));
     }
 }

@@ -2,7 +2,8 @@
 
 use masseter_recording::Recorded;
 use masseter_shared::config::Scenario;
-use masseter_shared::messages::codes::{Cause, ControllerState, EventKind, Source};
+use masseter_shared::geometry::AXES;
+use masseter_shared::messages::codes::{Cause, ControllerState, DriveState, EventKind, Source};
 use masseter_shared::messages::{Event, Reading, State};
 use masseter_shared::named::Declared;
 
@@ -17,13 +18,15 @@ struct Run {
     states: Vec<ControllerState>,
     /// Times of the first fault's activations, ms.
     strikes_ms: Vec<f64>,
+    /// Samples without a state.
+    lost: Vec<usize>,
 }
 
 impl Run {
     /// The motion begins with the first sample.
     fn of(forces_n: &[f64]) -> Self {
         let states = vec![ControllerState::Running; forces_n.len()];
-        Self { forces_n: forces_n.to_vec(), states, strikes_ms: Vec::new() }
+        Self { forces_n: forces_n.to_vec(), states, strikes_ms: Vec::new(), lost: Vec::new() }
     }
 
     fn stopping_at(mut self, sample: usize) -> Self {
@@ -53,8 +56,12 @@ impl Run {
             let (cycle, sampled_ns) = (place as u64 + 1, 1000 * MS + place as u64 * MS);
             if !force_n.is_nan() {
                 let mut reading = Reading { cycle, sampled_ns, ..Reading::default() };
+                reading.drive_state = [DriveState::OperationEnabled.code(); AXES];
                 reading.force_n[3] = *force_n;
                 requirements.take(&Recorded::Reading(reading));
+            }
+            if self.lost.contains(&place) {
+                continue;
             }
             let controller_state = state.code();
             requirements.take(&Recorded::State(State {
@@ -236,6 +243,54 @@ fn occurrences_are_counted_and_ordered() {
 }
 
 #[test]
+fn a_lost_state_is_no_new_entry_into_it() {
+    let mut run = Run::of(&[0.0; 12]);
+    run.lost = vec![4, 5, 9];
+    assert_eq!(run.judge("event = 'controller.running'\nat_least = 1\nat_most = 1").result, Passed);
+    let window = "signal = 'l1.force'\nmax = '1 N'\nduring = { after = 'controller.running', for_s = 0.003 }";
+    assert!(run.judge(window).finding.contains("in 3 samples"), "{:?}", run.judge(window));
+}
+
+#[test]
+fn what_occurs_after_the_last_sample_counts() {
+    let run = Run::of(&[0.0; 4]).struck_at(50.0);
+    assert_eq!(run.judge("event = 'fault.encoder_stuck'\nat_least = 1").result, Passed);
+    assert_eq!(run.judge("never = 'fault.encoder_stuck'").result, Failed);
+    let respond = "when = 'fault.encoder_stuck'\nthen = 'controller.state == safe_stop'\nwithin = '5 ms'";
+    let figures = run.judge(respond);
+    let why = "the run ended before the time after fault.encoder_stuck";
+    assert_eq!((figures.result, figures.finding.as_str()), (Untested, why));
+}
+
+#[test]
+fn an_answer_that_the_end_of_the_run_cuts_is_said_to_be() {
+    let run = Run::of(&[0.0; 12]).struck_at(1.0).stopping_at(6);
+    let respond =
+        "when = 'fault.encoder_stuck'\nthen = 'controller.state == safe_stop'\nstays_for = '100 ms'";
+    let figures = run.judge(respond);
+    assert!(figures.finding.ends_with("the run ended after 5 ms of 100 ms"), "{figures:?}");
+}
+
+#[test]
+fn what_is_computed_to_no_number_fails() {
+    let run = Run::of(&[1.0, -1.0, 2.0]);
+    let figures = run.judge("expression = 'ln({l1.force})'\nunit = ''\nmax = 5");
+    assert_eq!((figures.result, figures.margin), (Failed, None), "{figures:?}");
+}
+
+#[test]
+fn a_percentile_is_the_nearest_rank() {
+    let forces_n: Vec<f64> = (1..=100).map(f64::from).collect();
+    let rank = |percentile: f64| {
+        let bounds = format!(
+            "signal = 'l1.force'\nstatistic = 'percentile'\npercentile = {percentile}\nmax = '200 N'"
+        );
+        200.0 - Run::of(&forces_n).judge(&bounds).margin.unwrap()
+    };
+    assert_eq!([6.5, 7.0, 7.5, 50.0, 100.0, 0.0].map(|p| rank(p).round()), [7.0, 7.0, 8.0, 50.0, 100.0, 1.0]);
+}
+
+#[test]
 fn wrong_requirements_are_refused_with_what_to_write() {
     for (requirement, expected) in [
         (
@@ -257,6 +312,18 @@ fn wrong_requirements_are_refused_with_what_to_write() {
         ),
         ("when = 'fault.encoder_stuck'", "give when and then"),
         ("event = 'fault.encoder_stuck'", "give at_least, at_most or both"),
+        ("never = 'controller.following_error'", "'controller.following_error' is no occurrence"),
+        (
+            "when = 'fault.encoder_stuck'\nthen = 'controller.state == safe_stop'\nwithin = '-5 ms'",
+            "within: use a time not below 0",
+        ),
+        (
+            "signal = 'l1.force'\nmax = '1 N'\nduring = { after = 'fault.encoder_stuck', for_s = -1.0 }",
+            "for_s: use a finite number above 0",
+        ),
+        ("event = 'fault.encoder_stuck'\nat_least = 5\nat_most = 2", "at_least is above at_most"),
+        ("expression = '5'\nunit = 'N'\nmax = '1 N'", "write signals in braces"),
+        ("expression = '{controller.state}'\nunit = ''\nmax = 1", "controller.state is a state, no number"),
         ("order = ['fault.encoder_stuck']", "give at least two occurrences"),
         ("expression = '{l1.force} +'\nunit = 'N'\nmax = '1 N'", "expression = '{l1.force} +'"),
         ("expression = '{l1.force}'\nunit = 'stone'\nmax = '1 N'", "unit = 'stone': the unit is unknown"),

@@ -61,6 +61,9 @@ impl Window {
                 return Err("give after and for_s, or from_s and to_s".to_owned());
             }
             let trigger = Trigger::parse(name, scenario, values)?;
+            if for_s.is_some_and(|for_s| !(for_s.is_finite() && for_s > 0.0)) {
+                return Err("for_s: use a finite number above 0".to_owned());
+            }
             let for_ns = for_s.map_or(u64::MAX, |for_s| (for_s * SECOND_NS as f64) as u64);
             let how_long = for_s.map_or_else(String::new, |for_s| format!("{for_s} s "));
             let text = format!(" {how_long}after {}", trigger.text);

@@ -6,7 +6,7 @@ use std::fmt;
 
 use masseter_shared::config::{Dimension, Scenario, Unit};
 use masseter_shared::geometry::{AXES, AXIS_NAMES, Pose};
-use masseter_shared::messages::codes::{ControllerState, DriveState};
+use masseter_shared::messages::codes::{ControllerState, DriveRequest, DriveState, NO_DRIVE_STATE};
 use masseter_shared::named::Declared;
 use masseter_shared::wording::nearest;
 use serde::Serialize;
@@ -225,11 +225,19 @@ impl Registry {
     fn add_axes(&mut self) {
         for (axis, name) in AXIS_NAMES.into_iter().enumerate() {
             let at = move |values: [f64; AXES]| values[axis];
+            // Before the first process data of a drive, and after its loss, a reading has no values of the drive.
+            let reading = move |messages: &CycleMessages| {
+                messages.reading.filter(|reading| reading.drive_state[axis] != NO_DRIVE_STATE)
+            };
+            // Without a request to the drives a command has no targets.
+            let command = |messages: &CycleMessages| {
+                messages.command.filter(|command| command.request != DriveRequest::Off.code())
+            };
             self.add(
                 format!("{name}.position"),
                 "mm",
                 "Position that the encoder reports.",
-                move |messages| Some(at(messages.reading?.position_m)),
+                move |messages| Some(at(reading(messages)?.position_m)),
             );
             self.add(format!("{name}.true_position"), "mm", "True position of the axis.", move |messages| {
                 Some(at(messages.truth?.joint_m))
@@ -238,13 +246,13 @@ impl Registry {
                 Some(at(messages.truth?.joint_m_s))
             });
             self.add(format!("{name}.force"), "N", "Force that the drive reports.", move |messages| {
-                Some(at(messages.reading?.force_n))
+                Some(at(reading(messages)?.force_n))
             });
             self.add(format!("{name}.target"), "mm", "Target of the cycle's command.", move |messages| {
-                Some(at(messages.command?.target_m))
+                Some(at(command(messages)?.target_m))
             });
             self.add_state(format!("{name}.drive"), "State of the drive.", drive_states, move |messages| {
-                Some(messages.reading?.drive_state[axis])
+                Some(reading(messages)?.drive_state[axis])
             });
         }
     }
@@ -284,10 +292,10 @@ impl Registry {
             move |messages| messages.state.and_then(|state| seconds(state.due_ns, state.woke_ns)),
         );
         self.add("controller.work", "us", "Time from the reading to the ready command.", move |messages| {
-            messages.state.and_then(|state| seconds(state.received_ns, state.commanded_ns))
+            solution(messages).and_then(|state| seconds(state.received_ns, state.commanded_ns))
         });
         self.add("fk.time", "us", "Time that the forward kinematics takes.", move |messages| {
-            messages.state.and_then(|state| seconds(state.received_ns, state.solved_ns))
+            solution(messages).and_then(|state| seconds(state.received_ns, state.solved_ns))
         });
         self.add("process_data.time", "us", "Time from SYNC to the last process data.", move |messages| {
             messages.reading.and_then(|reading| seconds(reading.sampled_ns, reading.complete_ns))

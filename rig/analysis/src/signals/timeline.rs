@@ -22,6 +22,8 @@ pub struct Sample {
     pub messages: CycleMessages,
     /// The events since the cycle before, up to this sample.
     pub events: Vec<EventRecord>,
+    /// Whether it is no sample: it only holds the events after the last one.
+    pub is_closing: bool,
 }
 
 /// Joins the messages of each cycle.
@@ -34,6 +36,7 @@ pub struct Timeline {
     /// The newest cycle whose sample a state was computed from.
     newest_reading: u64,
     last_ns: u64,
+    is_closed: bool,
 }
 
 impl Timeline {
@@ -75,14 +78,21 @@ impl Timeline {
         self.events.push(event.clone());
     }
 
-    /// The next cycle of those that are left once every message has come.
+    /// The next cycle of those that are left once every message has come; after the last one, a closing sample without
+    /// messages, which holds the events that came later.
     pub fn finish(&mut self) -> Option<Sample> {
         while !self.cycles.is_empty() {
             if let Some(sample) = self.hand_out() {
                 return Some(sample);
             }
         }
-        None
+        let is_first = !std::mem::replace(&mut self.is_closed, true);
+        is_first.then(|| {
+            self.events.sort_by_key(|event| event.time_ns);
+            let latest_ns = self.events.last().map_or(0, |event| event.time_ns);
+            let (time_ns, events) = (latest_ns.max(self.last_ns + 1), std::mem::take(&mut self.events));
+            Sample { time_ns, messages: CycleMessages::default(), events, is_closing: true }
+        })
     }
 
     /// The messages of a cycle; none where the cycle was handed out, or is impossibly far ahead.
@@ -115,7 +125,7 @@ impl Timeline {
             events.extend(self.events.extract_if(.., is_due));
             events.sort_by_key(|event| event.time_ns);
         }
-        Some(Sample { time_ns, messages, events })
+        Some(Sample { time_ns, messages, events, is_closing: false })
     }
 }
 
@@ -143,11 +153,13 @@ mod tests {
         }
         let samples: Vec<_> = std::iter::from_fn(|| timeline.finish()).collect();
         let times: Vec<_> = samples.iter().map(|sample| sample.time_ns).collect();
-        assert_eq!(times, [1000, 2000, 3500, 4000], "cycle 3 has no reading");
-        assert!(samples.iter().all(|sample| sample.messages.state.unwrap().cycle == sample.messages.cycle));
+        assert_eq!(times, [1000, 2000, 3500, 4000, 9000], "cycle 3 has no reading; the last one closes");
+        let (closing, cycles) = samples.split_last().unwrap();
+        assert!(closing.is_closing);
+        assert!(cycles.iter().all(|sample| sample.messages.state.unwrap().cycle == sample.messages.cycle));
         let events: Vec<Vec<_>> =
             samples.iter().map(|sample| sample.events.iter().map(|event| event.time_ns).collect()).collect();
-        assert_eq!(events, [vec![], vec![1500, 2000], vec![], vec![]]);
+        assert_eq!(events, [vec![], vec![1500, 2000], vec![], vec![], vec![9000]]);
     }
 
     #[test]
@@ -161,7 +173,7 @@ mod tests {
         let found: Vec<_> = std::iter::from_fn(|| timeline.finish())
             .map(|Sample { messages, .. }| (messages.state.map(|state| state.cycle), messages.has_solution))
             .collect();
-        assert_eq!(found, [(Some(1), true), (Some(3), true), (None, false), (Some(4), true)]);
+        assert_eq!(found, [(Some(1), true), (Some(3), true), (None, false), (Some(4), true), (None, false)]);
     }
 
     #[test]
@@ -171,6 +183,6 @@ mod tests {
         let early = (1..=total).filter_map(|cycle| timeline.take(&reading(cycle))).count() as u64;
         assert_eq!(early, total - KEPT as u64);
         assert!(timeline.take(&reading(1)).is_none(), "too old");
-        assert_eq!(std::iter::from_fn(|| timeline.finish()).count(), KEPT);
+        assert_eq!(std::iter::from_fn(|| timeline.finish()).count(), KEPT + 1);
     }
 }

@@ -47,7 +47,10 @@ fn the_expected_outcome_passes_and_any_other_fails() {
 
     let mut played = Run::new();
     expect(&mut played, ExpectedVerdict::SafeStop);
-    assert_eq!(judge(&played), ("FAIL", "expected SAFE STOP, but PASS: every check passed".to_owned()));
+    assert_eq!(
+        judge(&played),
+        ("FAIL", "expected SAFE STOP, but PASS: every check of the rig passed".to_owned())
+    );
 
     let mut died = Run::new();
     died.manifest.ending = Ending::died("plant", "signal 9".to_owned());
