@@ -170,12 +170,13 @@ fn bus_response(response: &BusResponse, plant: &SkipFigures) -> Check {
         frames => format!("; {} off their times not judged", counted(frames, "frame")),
     };
     let exceeding: Vec<_> = response.exceeding().map(in_words).collect();
+    let stalled_ns = plant.stalled_ns + plant.overlong_ns;
     if exceeding.is_empty() {
         let tightest = response.tightest().map_or_else(|| "no message has a bound".to_owned(), in_words);
         Check::judged(NAME, format!("closest: {tightest}{unjudged}"), response.tightest().is_some())
-    } else if longest_excess_ns(response) <= plant.stalled_ns + plant.overlong_ns {
+    } else if longest_excess_ns(response) <= stalled_ns {
         // The plant's process moves the frames of simulated wires.
-        let stalled_ms = (plant.stalled_ns + plant.overlong_ns) as f64 / 1e6;
+        let stalled_ms = stalled_ns as f64 / 1e6;
         let why = format!("; the plant stalled for {stalled_ms:.1} ms in all, which may explain that");
         Check::not_judged(NAME, exceeding.join("; ") + &why)
     } else {
