@@ -48,18 +48,39 @@ def run(masseter: str, program: str, folder: Path, clock: str, *more: str) -> di
     return json.loads(ended.stdout)
 
 
+# A requirement on what the controllers declare themselves.
+REQUIRED = """
+[[require]]
+name = "trim"
+signal = "signal.trim"
+during = "running"
+max = "1 mm"
+
+[[require]]
+name = "gain"
+signal = "parameter.gain"
+min = 20
+max = 20
+"""
+
+
 def main(masseter: str, target: str) -> None:
     masseter = str(Path(masseter).resolve())
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         digests, stiff = {}, {}
+        (folder / "required.toml").write_text(REQUIRED)
         for language in LANGUAGES:
             program = make(masseter, language, folder, Path(target))
             digests[language] = [
                 run(masseter, program, folder, clock)["figures"]["digest"] for clock in ["lockstep", "virtual", "lockstep"]
             ]
             run(masseter, program, folder, "rt")
-            stiff[language] = run(masseter, program, folder, "lockstep", "--set", "gain=20")["figures"]
+            summary = run(masseter, program, folder, "lockstep", "required.toml", "--set", "gain=20")
+            stiff[language] = summary["figures"]
+            checks = {check["name"]: check for check in summary["verdict"]["checks"]}
+            assert checks["trim"]["result"] == checks["gain"]["result"] == "passed", checks
+            assert 0.0 < checks["trim"]["margin"] < 1.0, checks["trim"]
             print(f"{language}: digest {digests[language][0]}, and a run in real time")
         found = {digest for of_language in digests.values() for digest in of_language}
         assert len(found) == 1, digests
