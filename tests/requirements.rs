@@ -179,3 +179,48 @@ fn requirements_can_use_the_signals_and_parameters_of_a_controller() {
     let (code, text) = run(&workspace);
     assert_eq!(code, Some(0), "{text}");
 }
+
+#[test]
+fn a_fault_of_a_process_is_an_occurrence() {
+    let workspace = Workspace::new(
+        "duration_s = 1.0
+         [[faults]]
+         kind = 'plant_stall'
+         size = '5 ms'
+         at_s = 0.3
+         [[require]]
+         name = 'it strikes'
+         event = 'fault.plant_stall'
+         at_least = 1",
+    );
+    let output = workspace.run_simulated("lockstep", &["--quiet"]);
+    assert_eq!(output.status.code(), Some(0), "{}", stdout(&output));
+}
+
+#[test]
+fn a_stimulus_that_never_begins_leaves_the_run_untested() {
+    let workspace = Workspace::new("duration_s = 0.5\n[[stimulus]]\nat_s = 50.0\npush_n = [0.0, 0.0, 5.0]");
+    let (code, text) = run(&workspace);
+    assert_eq!(code, Some(1), "{text}");
+    assert!(text.contains("UNTESTED: stimuli: 0 of 1 stimuli began, number 1 never"), "{text}");
+}
+
+/// A CI system that reads the file alone sees what the exit code says.
+#[test]
+fn junit_agrees_with_the_exit_code() {
+    let unmet = Workspace::new("duration_s = 0.5\n[expect]\nverdict = 'safe_stop'");
+    assert_eq!(run(&unmet).0, Some(1));
+    let junit = read(&unmet, "junit.xml");
+    assert!(
+        junit.contains("errors=\"1\"") && junit.contains("<error message=\"FAIL: expected SAFE STOP"),
+        "{junit}"
+    );
+
+    let met = Workspace::new("duration_s = 0.5\nchecks.tracking_max_mm = 0.0001\n[expect]\nverdict = 'fail'");
+    assert_eq!(run(&met).0, Some(0));
+    let junit = read(&met, "junit.xml");
+    assert!(
+        !junit.contains("<failure") && junit.contains("failures=\"0\"") && junit.contains("as expected: "),
+        "{junit}"
+    );
+}
