@@ -146,7 +146,7 @@ impl Analysis {
         Ok(())
     }
 
-    /// A fault of a process struck at this time, ns, of which no message tells. Comes before the messages.
+    /// Takes a fault of a process, which no message reports. Call this before [`take`](Self::take).
     pub fn process_fault(&mut self, fault: &ProcessFault) {
         self.faults.strike(fault.number, fault.struck_ns);
         if let Some(requirements) = &mut self.requirements {
