@@ -35,7 +35,11 @@ impl Section {
 
     /// A scenario that has this table with its defaults, and with what is required in it.
     fn text(&self) -> String {
-        let prelude = if self.path().starts_with("motion.") { "motion.kind = 'chewing'\n" } else { "" };
+        let prelude = match self.path().split_once('.') {
+            Some(("motion", _)) => "motion.kind = 'chewing'\n",
+            Some(("drive_profile", _)) => "[[drive_profile]]\n",
+            _ => "",
+        };
         let (header, rest) = self.toml.split_at(self.toml.rfind(']').map_or(0, |end| end + 1));
         let required = match self.path() {
             "faults" => "kind = 'lose'",
@@ -125,7 +129,7 @@ fn every_key_of_every_table_is_documented_and_no_others() {
         let unknown: Vec<_> = section.rows.keys().filter(|key| !keys.contains(*key)).collect();
         assert!(unknown.is_empty(), "{}: in docs/scenario.md, but no keys: {unknown:?}", section.toml);
     }
-    assert_eq!(sections.len(), 25);
+    assert_eq!(sections.len(), 30);
 }
 
 /// The word for a kind of motion. A new kind does not compile until it is here, and [`MOTIONS`] counts it.

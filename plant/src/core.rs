@@ -16,8 +16,10 @@ use crate::error::PlantError;
 use crate::injection::Injector;
 use crate::journal::{Journal, overflow};
 use crate::link::Link;
+use crate::link::layout::node_ids;
 use crate::link::sockets::SocketLink;
 use crate::master::{Master, shortest_boot};
+use crate::wanted::WantedDrive;
 
 /// Tapped frames kept between two drains, of which one follows every cycle.
 const TAPPED: usize = 4096;
@@ -85,7 +87,11 @@ pub fn check(scenario: &Scenario) -> Result<(), PlantError> {
 fn check_boot_time(scenario: &Scenario) -> Result<(), PlantError> {
     let Scenario { can, controller, rate_hz, .. } = scenario;
     let fullest = can.buses.iter().map(Vec::len).max().unwrap_or(0);
-    let cycles = shortest_boot(scenario) * fullest + controller.steady_readings as usize;
+    let longest = node_ids(can)?.into_iter().enumerate().try_fold(0, |longest, (axis, node)| {
+        let wanted = WantedDrive::of_axis(scenario, axis, node)?;
+        Ok::<_, PlantError>(shortest_boot(&wanted).max(longest))
+    })?;
+    let cycles = longest * fullest + controller.steady_readings as usize;
     let least_s = cycles as f64 * scenario.period_s();
     if controller.start_timeout_s > least_s {
         return Ok(());

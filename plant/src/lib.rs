@@ -6,7 +6,8 @@
 //! | `mechanism` | dynamics, friction, food, disturbances, poses at rest | `injection` |
 //! | `link` | traits between master and wires, real interfaces, layout of the buses | `mechanism` (its errors), `injection` |
 //! | `drive` | an emulated drive: node (CiA 301), axis (CiA 402), object dictionary | `link` (layout) |
-//! | `master` | boot, exchange, supervision of the drives | `link` |
+//! | [`wanted`] | the objects of a drive as the rig needs them | |
+//! | `master` | boot, exchange, supervision of the drives | `link`, [`wanted`] |
 //! | [`emulation`] | drives and mechanism on simulated wires or real interfaces | `drive`, `mechanism`, `link` |
 //! | [`description`] | EDS and DBC of the emulated drives | `drive` |
 //! | [`core`] | master and link as one pure step function | `master`, `emulation`, `link` |
@@ -28,6 +29,7 @@ mod link;
 mod master;
 mod mechanism;
 pub mod process;
+pub mod wanted;
 
 pub use error::PlantError;
 pub use mechanism::DynamicsError;

@@ -7,7 +7,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#define MASSETER_LAYOUT_VERSION 10u
+#define MASSETER_LAYOUT_VERSION 11u
 /* masseter_event.axis when no axis is concerned. */
 #define MASSETER_NO_AXIS 4294967295u
 /* masseter_reading.drive_state of a drive not heard of yet, or lost. */
@@ -177,6 +177,10 @@ enum masseter_cause {
     MASSETER_CAUSE_STIMULUS_BEGAN = 51,
     /* A stimulus of the scenario is over (number in its list, from 1). */
     MASSETER_CAUSE_STIMULUS_ENDED = 52,
+    /* An object of a drive is not as its profile says (value; the limit is the expected one). */
+    MASSETER_CAUSE_WRONG_OBJECT = 53,
+    /* A drive counts accelerations in another unit than its profile says (60AAh; the limit is the expected one). */
+    MASSETER_CAUSE_WRONG_UNIT = 54,
 };
 
 enum masseter_no_pose {
@@ -197,7 +201,7 @@ enum masseter_no_pose {
 };
 
 #define MASSETER_READING_TOPIC "reading"
-#define MASSETER_READING_TYPE_NAME "masseter/Reading/bb2f589d33e3a1bb"
+#define MASSETER_READING_TYPE_NAME "masseter/Reading/ef3a56a745011190"
 
 /* Positions, forces and states of the drives, once a cycle. */
 typedef struct masseter_reading {
@@ -269,7 +273,7 @@ static_assert(offsetof(masseter_reading, fresh_axes) == 248, "offset of fresh_ax
 static_assert(offsetof(masseter_reading, master_fault) == 252, "offset of master_fault");
 
 #define MASSETER_COMMAND_TOPIC "command"
-#define MASSETER_COMMAND_TYPE_NAME "masseter/Command/767c9c9017684645"
+#define MASSETER_COMMAND_TYPE_NAME "masseter/Command/2d16e906cbecc19c"
 
 /* Targets and request for the drives, once a cycle. */
 typedef struct masseter_command {
@@ -302,7 +306,7 @@ static_assert(offsetof(masseter_command, request) == 88, "offset of request");
 static_assert(offsetof(masseter_command, controller_state) == 92, "offset of controller_state");
 
 #define MASSETER_STATE_TOPIC "state"
-#define MASSETER_STATE_TYPE_NAME "masseter/State/f421712d5da92ad3"
+#define MASSETER_STATE_TYPE_NAME "masseter/State/50121e46202e7604"
 
 /* The controller's state and its estimate, once a cycle. */
 typedef struct masseter_state {
@@ -389,7 +393,7 @@ static_assert(offsetof(masseter_state, iterations) == 288, "offset of iterations
 static_assert(offsetof(masseter_state, controller_state) == 292, "offset of controller_state");
 
 #define MASSETER_EVENT_TOPIC "event"
-#define MASSETER_EVENT_TYPE_NAME "masseter/Event/cc6511c727ba4a8c"
+#define MASSETER_EVENT_TYPE_NAME "masseter/Event/3fbb3af877448017"
 
 /* A single occurrence: a change of state, a fault, an alarm. */
 typedef struct masseter_event {
@@ -446,7 +450,7 @@ static_assert(offsetof(masseter_event, value) == 72, "offset of value");
 static_assert(offsetof(masseter_event, limit) == 80, "offset of limit");
 
 #define MASSETER_TRUTH_TOPIC "truth"
-#define MASSETER_TRUTH_TYPE_NAME "masseter/Truth/c6324a5cf49e118a"
+#define MASSETER_TRUTH_TYPE_NAME "masseter/Truth/aa8226ad0adce9bd"
 
 /* The true state of the mechanism, once a cycle; the controller never reads it. */
 typedef struct masseter_truth {

@@ -3,9 +3,7 @@
 use masseter_can::canopen::NodeId;
 
 use crate::drive::DriveSettings;
-use crate::drive::dictionary::{
-    Access, Entry, IDENTITY, Initial, Mapping, OBJECTS, Object, Objects, PDOS, Shape,
-};
+use crate::drive::dictionary::{Access, Entry, Initial, Mapping, OBJECTS, Object, Objects, PDOS, Shape};
 
 /// Objects that CiA 301 makes mandatory.
 const MANDATORY: [u16; 3] = [0x1000, 0x1001, 0x1018];
@@ -20,18 +18,18 @@ pub(super) fn write(settings: &DriveSettings) -> String {
         list("ManufacturerObjects", &[]),
     ];
     let sections = OBJECTS.iter().map(|object| section(object, &settings.objects));
-    [head(settings.node)].into_iter().chain(lists).chain(sections).collect()
+    [head(settings.node, &settings.objects)].into_iter().chain(lists).chain(sections).collect()
 }
 
 /// The sections on the file and the device.
-fn head(node: NodeId) -> String {
+fn head(node: NodeId, objects: &Objects) -> String {
     format!(
         include_str!("eds_head.txt"),
         node = node,
         version = env!("CARGO_PKG_VERSION"),
-        vendor = IDENTITY.vendor_id,
-        product = IDENTITY.product_code,
-        revision = IDENTITY.revision,
+        vendor = objects.at(0x1018, 1),
+        product = objects.at(0x1018, 2),
+        revision = objects.at(0x1018, 3),
         pdos = PDOS,
     )
 }

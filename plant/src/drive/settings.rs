@@ -37,6 +37,11 @@ impl DriveSettings {
             let stroke_m = scenario.mechanism.strokes.of_axis(axis);
             let position_limits = stroke_m.map(|end_m| drive.increments(end_m) as i32);
             let mut objects = Objects::new(node);
+            let identity = &scenario.profile(axis).identity;
+            objects.set(names::DEVICE_TYPE, identity.device_type);
+            objects.set(names::VENDOR_ID, identity.vendor_id);
+            objects.set(names::PRODUCT_CODE, identity.product_code);
+            objects.set(names::REVISION, identity.revision);
             objects.set(names::CONSUMER_HEARTBEAT_TIME, watched);
             objects.set(names::PRODUCER_HEARTBEAT_TIME_MS, scenario.can.heartbeat_producer_ms);
             configure(&mut objects, &drive, scenario.period_ns(), position_limits);

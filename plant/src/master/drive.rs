@@ -6,7 +6,7 @@ use masseter_can::canopen::{Cob, Nmt, NmtCommand, NmtState, NmtTarget, NodeId, S
 use masseter_can::cia402::{Controlword, DriveRequest, DriveState, next_controlword};
 use masseter_can::{CanId, Frame, Rpdo1, Tpdo1};
 use masseter_shared::clock::MILLISECOND_NS;
-use masseter_shared::config::{DriveConfig, Scenario};
+use masseter_shared::config::{AxisScale, Scenario};
 use masseter_shared::messages::Reading;
 use masseter_shared::messages::codes::{BootPhase, Cause, drive_state_code};
 
@@ -14,13 +14,15 @@ use super::boot::{Boot, late};
 use super::failure::Failure;
 use super::following::Following;
 use super::presence::{MISSING_CYCLES, Presence};
+use crate::error::PlantError;
+use crate::wanted::WantedDrive;
 
 /// One drive.
 #[derive(Debug, Clone)]
 pub(super) struct RemoteDrive {
     id: NodeId,
     bus: usize,
-    config: DriveConfig,
+    scale: AxisScale,
     heartbeat_timeout_ns: u64,
     boot_timeout_ns: u64,
     boot: Boot,
@@ -43,6 +45,9 @@ pub(super) struct RemoteDrive {
 
 impl RemoteDrive {
     /// The drive of an axis, of which nothing is known at `now_ns`.
+    ///
+    /// # Errors
+    /// [`PlantError::Scenario`] for values that its profile does not allow.
     pub(super) fn new(
         scenario: &Scenario,
         axis: usize,
@@ -50,13 +55,13 @@ impl RemoteDrive {
         bus: usize,
         following: Following,
         now_ns: u64,
-    ) -> Self {
-        let (can, config) = (&scenario.can, scenario.drives.of_axis(axis));
-        let boot = Boot::new(id, scenario, axis, now_ns);
-        Self {
+    ) -> Result<Self, PlantError> {
+        let can = &scenario.can;
+        let boot = Boot::new(&WantedDrive::of_axis(scenario, axis, id)?, now_ns);
+        Ok(Self {
             id,
             bus,
-            config,
+            scale: scenario.scale(axis),
             heartbeat_timeout_ns: u64::from(can.heartbeat_consumer_ms) * MILLISECOND_NS,
             boot_timeout_ns: u64::from(can.boot_timeout_ms) * MILLISECOND_NS,
             reported_phase: boot.phase(),
@@ -71,7 +76,7 @@ impl RemoteDrive {
             actual_increments: 0,
             torque_permille: 0,
             controlword: Controlword::DISABLE_VOLTAGE,
-        }
+        })
     }
 
     /// Whether it has that node id, on that bus.
@@ -124,12 +129,12 @@ impl RemoteDrive {
     /// Writes its actual values and its state.
     pub(super) fn fill_reading(&self, axis: usize, reading: &mut Reading) {
         reading.position_m[axis] = self.position_m();
-        reading.force_n[axis] = f64::from(self.torque_permille) / 1000.0 * self.config.rated_force_n;
+        reading.force_n[axis] = f64::from(self.torque_permille) * self.scale.permille_n;
         reading.drive_state[axis] = drive_state_code(self.drive_state());
     }
 
     fn position_m(&self) -> f64 {
-        f64::from(self.actual_increments) * self.config.encoder_resolution_m
+        self.scale.metres(self.actual_increments)
     }
 
     /// Its position, if it follows targets.
@@ -303,7 +308,7 @@ impl RemoteDrive {
         let follows = state == DriveState::OperationEnabled && request == DriveRequest::Enable;
         let target_increments = if let Some(target_m) = target_m.filter(|_| follows) {
             self.following.follow(now_ns, self.position_m(), target_m);
-            self.config.increments(target_m) as i32
+            self.scale.increments(target_m)
         } else {
             self.following.stop();
             self.actual_increments
@@ -325,7 +330,7 @@ mod tests {
     fn a_drive_is_absent_once_beyond_its_time() {
         let scenario = Scenario::default();
         let (id, following) = (NodeId::new(1).unwrap(), Following::new(&scenario, 0, 0));
-        let mut drive = RemoteDrive::new(&scenario, 0, id, 0, following, 500);
+        let mut drive = RemoteDrive::new(&scenario, 0, id, 0, following, 500).unwrap();
         let limit_ns = u64::from(scenario.can.boot_timeout_ms) * MILLISECOND_NS;
         assert_eq!(drive.absence(500 + limit_ns), None);
         assert_eq!(drive.absence(501 + limit_ns), Some(late(limit_ns + 1, limit_ns)));

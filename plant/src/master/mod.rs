@@ -80,8 +80,9 @@ impl Master {
             let following = Following::new(scenario, axis, can.buses[bus].len() as u64 * rpdo_ns);
             RemoteDrive::new(scenario, axis, id, bus, following, now_ns)
         };
+        let drives = (0..AXES).map(drive).collect::<Result<Vec<_>, _>>()?;
         Ok(Self {
-            drives: std::array::from_fn(drive),
+            drives: drives.try_into().expect("one drive an axis"),
             buses: vec![BusMonitor::default(); can.buses.len()],
             exchange: Exchange::new(can, now_ns)?,
             commands: Commands::new(scenario),

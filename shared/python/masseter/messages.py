@@ -7,7 +7,7 @@ numpy.dtype(Reading) is the NumPy type of a message.
 import ctypes
 import enum
 
-LAYOUT_VERSION = 10
+LAYOUT_VERSION = 11
 #: Event.axis when no axis is concerned.
 NO_AXIS = 4294967295
 #: Reading.drive_state of a drive not heard of yet, or lost.
@@ -184,6 +184,10 @@ class Cause(enum.IntEnum):
     STIMULUS_BEGAN = 51
     #: A stimulus of the scenario is over (number in its list, from 1).
     STIMULUS_ENDED = 52
+    #: An object of a drive is not as its profile says (value; the limit is the expected one).
+    WRONG_OBJECT = 53
+    #: A drive counts accelerations in another unit than its profile says (60AAh; the limit is the expected one).
+    WRONG_UNIT = 54
 
 
 class NoPose(enum.IntEnum):
@@ -254,7 +258,7 @@ class Reading(ctypes.Structure):
 
     @staticmethod
     def type_name() -> str:
-        return "masseter/Reading/bb2f589d33e3a1bb"
+        return "masseter/Reading/ef3a56a745011190"
 
 
 _check(Reading, 256, [0, 8, 16, 24, 32, 40, 48, 56, 64, 72, 80, 88, 96, 104, 112, 120, 128, 176, 224, 248, 252])
@@ -285,7 +289,7 @@ class Command(ctypes.Structure):
 
     @staticmethod
     def type_name() -> str:
-        return "masseter/Command/767c9c9017684645"
+        return "masseter/Command/2d16e906cbecc19c"
 
 
 _check(Command, 96, [0, 8, 16, 24, 32, 40, 88, 92])
@@ -352,7 +356,7 @@ class State(ctypes.Structure):
 
     @staticmethod
     def type_name() -> str:
-        return "masseter/State/f421712d5da92ad3"
+        return "masseter/State/50121e46202e7604"
 
 
 _check(State, 296, [0, 8, 16, 24, 32, 40, 48, 56, 64, 72, 80, 88, 96, 104, 112, 120, 128, 136, 160, 192, 216, 248, 272, 280, 288, 292])
@@ -399,7 +403,7 @@ class Event(ctypes.Structure):
 
     @staticmethod
     def type_name() -> str:
-        return "masseter/Event/cc6511c727ba4a8c"
+        return "masseter/Event/3fbb3af877448017"
 
 
 _check(Event, 88, [0, 8, 16, 24, 32, 40, 44, 48, 52, 56, 60, 62, 64, 68, 72, 80])
@@ -436,7 +440,7 @@ class Truth(ctypes.Structure):
 
     @staticmethod
     def type_name() -> str:
-        return "masseter/Truth/c6324a5cf49e118a"
+        return "masseter/Truth/aa8226ad0adce9bd"
 
 
 _check(Truth, 248, [0, 8, 16, 24, 32, 40, 64, 96, 144, 192, 240])

@@ -41,8 +41,6 @@ section! {
         /// From SYNC to the moment a drive has its process data ready to be sent, at most, µs; none for the
         /// emulated drives on simulated buses.
         pub answer_us: u32 = 0,
-        /// The identity that every drive must report.
-        pub identity: IdentityConfig = IdentityConfig::default(),
         /// How long the drives may take to boot, ms.
         pub boot_timeout_ms: u32 = 2000,
         /// Cycles without a fresh command after which the master quick-stops the drives.
@@ -101,30 +99,4 @@ impl CanConfig {
             format!("name {}, one for each of can.buses", counted(self.buses.len() as u64, "interface"));
         Err(ScenarioError::bad("can.interfaces", &self.interfaces.join(","), need))
     }
-}
-
-section! {
-    /// The identity that the master checks before it writes to a drive.
-    #[derive(Copy, Eq)]
-    pub struct IdentityConfig {
-        /// Device type (object 1000).
-        pub device_type: u32 = Self::EMULATED.device_type,
-        /// Vendor (object 1018:01).
-        pub vendor_id: u32 = Self::EMULATED.vendor_id,
-        /// Product (object 1018:02).
-        pub product_code: u32 = Self::EMULATED.product_code,
-        /// Revision (object 1018:03).
-        pub revision: u32 = Self::EMULATED.revision,
-    }
-}
-
-impl IdentityConfig {
-    /// The emulated drives: servo drives of CiA 402. The vendor number is not registered with
-    /// CiA.
-    pub const EMULATED: Self = Self {
-        device_type: 0x0002_0192,
-        vendor_id: 0x004D_5354,
-        product_code: 0x0000_0402,
-        revision: 0x0001_0000,
-    };
 }

@@ -9,6 +9,7 @@ mod section;
 mod can;
 mod control;
 mod document;
+mod drive_profile;
 mod drives;
 mod dynamics;
 mod error;
@@ -16,6 +17,7 @@ mod faults;
 mod food;
 mod jaw;
 mod limits;
+mod merge;
 mod motion;
 mod need;
 mod quantity;
@@ -24,9 +26,13 @@ mod scenario;
 mod stimuli;
 mod when;
 
-pub use can::{CanConfig, IdentityConfig, MASTER_NODE};
+pub use can::{CanConfig, MASTER_NODE};
 pub use control::{
     ChecksConfig, ControllerConfig, CpuDmaLatency, MOST_LEAD_CYCLES, RealtimeConfig, TimingConfig,
+};
+pub use drive_profile::{
+    AccelerationUnit, AxisScale, BrakeConfig, DriveProfile, HomingConfig, IdentityConfig, ObjectConfig,
+    ObjectKey, ObjectRule, StoreConfig, UnitsConfig, VelocityUnit,
 };
 pub use drives::{DriveConfig, DrivesConfig};
 pub use dynamics::DynamicsConfig;

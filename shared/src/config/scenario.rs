@@ -6,13 +6,15 @@ use std::path::Path;
 use toml::Table;
 
 use super::document::{Document, place};
+use super::drive_profile::over_kinds;
 use super::error::ScenarioError;
+use super::merge::merge;
 use super::need::{LONGEST_S, SHORTEST_MOTION_S, require_within};
 use super::when::EntryNames;
 use super::{
-    CanConfig, ChecksConfig, ControllerConfig, DrivesConfig, DynamicsConfig, ExpectConfig, FaultConfig,
-    FoodConfig, JawConfig, MotionConfig, RealtimeConfig, RequirementConfig, StimulusConfig,
-    TrajectoryLimitsConfig,
+    AxisScale, CanConfig, ChecksConfig, ControllerConfig, DriveProfile, DrivesConfig, DynamicsConfig,
+    ExpectConfig, FaultConfig, FoodConfig, JawConfig, MotionConfig, RealtimeConfig, RequirementConfig,
+    StimulusConfig, TrajectoryLimitsConfig,
 };
 use crate::clock::SECOND_NS;
 use crate::geometry::MechanismConfig;
@@ -60,6 +62,9 @@ section! {
         pub can: CanConfig = CanConfig::default(),
         /// The drives.
         pub drives: DrivesConfig = DrivesConfig::default(),
+        /// What the master expects of each kind of drive; the emulated drives when absent.
+        #[serde(skip_serializing_if = "Vec::is_empty", deserialize_with = "over_kinds")]
+        pub drive_profile: Vec<DriveProfile> = Vec::new(),
         /// The emulated mechanism.
         pub dynamics: DynamicsConfig = DynamicsConfig::default(),
         /// Food between the teeth of the emulated jaw; none when absent.
@@ -233,6 +238,7 @@ impl Scenario {
         self.realtime.validate()?;
         self.can.validate()?;
         self.drives.validate()?;
+        DriveProfile::validate_all(&self.drive_profile)?;
         self.dynamics.validate()?;
         let entries = self.entry_names();
         for (number, fault) in self.faults.iter().enumerate() {
@@ -259,6 +265,16 @@ impl Scenario {
         times.map(|time| time.si()).fold(0.0, f64::max).min(LONGEST_OBSERVATION_S)
     }
 
+    /// What the master expects of the drive of an axis.
+    pub fn profile(&self, axis: usize) -> &DriveProfile {
+        DriveProfile::of_axis(&self.drive_profile, axis)
+    }
+
+    /// From metres to the numbers of the drive of an axis.
+    pub fn scale(&self, axis: usize) -> AxisScale {
+        AxisScale::new(&self.drives.of_axis(axis), self.profile(axis), axis)
+    }
+
     /// The names of the faults and stimuli.
     pub fn entry_names(&self) -> EntryNames<'_> {
         EntryNames {
@@ -283,18 +299,6 @@ fn refusal_of(key: &str) -> Option<String> {
     let refused = toml::from_str::<Scenario>(&format!("{key} = 0")).err()?;
     let message = in_words(refused.message());
     message.starts_with(UNKNOWN_KEY).then_some(message)
-}
-
-/// Replaces the values that are given, and leaves the others of their tables.
-fn merge(whole: &mut Table, given: Table) {
-    for (key, value) in given {
-        match (whole.get_mut(&key), value) {
-            (Some(toml::Value::Table(inner)), toml::Value::Table(given)) => merge(inner, given),
-            (_, value) => {
-                whole.insert(key, value);
-            }
-        }
-    }
 }
 
 fn place_of_refusal(path: &Path, refusal: &str, key: &str, entry: Option<usize>) -> Option<String> {

@@ -192,6 +192,10 @@ codes! {
         StimulusBegan = 51 "stimulus_began",
         /// A stimulus of the scenario is over (number in its list, from 1).
         StimulusEnded = 52 "stimulus_ended",
+        /// An object of a drive is not as its profile says (value; the limit is the expected one).
+        WrongObject = 53 "wrong_object",
+        /// A drive counts accelerations in another unit than its profile says (60AAh; the limit is the expected one).
+        WrongUnit = 54 "wrong_unit",
     }
 }
 

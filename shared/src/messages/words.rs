@@ -30,7 +30,12 @@ fn complaint(cause: Cause, event: &Event) -> Option<String> {
     let object = ObjectAddress::new((event.object >> 8) as u16, event.object as u8);
     let (value, limit) = (event.value as u32, event.limit as u32);
     Some(match cause {
-        Cause::WrongIdentity | Cause::WrongPdo | Cause::NotAccepted => {
+        Cause::WrongIdentity
+        | Cause::WrongPdo
+        | Cause::NotAccepted
+        | Cause::HomeOffset
+        | Cause::WrongObject
+        | Cause::WrongUnit => {
             format!("object {object} is {value:08X}h, expected {limit:08X}h")
         }
         Cause::SdoAborted => format!("object {object}: {}", AbortCode(value)),
@@ -46,9 +51,6 @@ fn complaint(cause: Cause, event: &Event) -> Option<String> {
         ),
         Cause::StillPowered => {
             format!("was left switched on, and a quick stop does not switch it off; statusword {value:04X}h")
-        }
-        Cause::HomeOffset => {
-            format!("object {object} is {} increments, by which its software limits are off", value as i32)
         }
         Cause::BootTimeout => format!("not operational after {value} ms"),
         Cause::HeartbeatLost => format!("silent for {value} ms"),
@@ -104,7 +106,7 @@ const fn no_pose(reason: NoPose) -> &'static str {
 
 const fn remedy(cause: Cause) -> Option<&'static str> {
     Some(match cause {
-        Cause::WrongIdentity => "connect the drive that is configured, or correct can.identity",
+        Cause::WrongIdentity => "connect the drive that is configured, or correct drive_profile.identity",
         Cause::WrongPdo => "give the drive the rig's PDO mapping and store it",
         Cause::NotAccepted => "check whether the drive supports cyclic synchronous position",
         Cause::SdoAborted => "look the object up in the drive's manual",
@@ -121,7 +123,9 @@ const fn remedy(cause: Cause) -> Option<&'static str> {
         Cause::StillPowered => {
             "stop the other program that controls the drive, then switch its power off and on"
         }
-        Cause::HomeOffset => "set it to 0, and check that the drive counts from the rig's zero",
+        Cause::HomeOffset => "home the drive, or correct drive_profile.homing.home_position_m",
+        Cause::WrongObject => "configure the drive, or correct drive_profile.objects",
+        Cause::WrongUnit => "correct drive_profile.units, or the unit in the drive",
         Cause::BootTimeout => "check power, wiring, bit rate and node id of this drive",
         Cause::BusOff => "check bit rate, termination and wiring",
         Cause::BusRefused => "check that the interface is up and that another node acknowledges",

@@ -9,4 +9,4 @@ mod table;
 
 pub(crate) use entry::{Access, DataType, Entry, Initial, Mapping, MappingEntry, Object, Shape};
 pub(crate) use objects::{ENTRIES, Objects, find};
-pub(crate) use table::{CONSUMED, HISTORY, IDENTITY, MAPPED_MAX, OBJECTS, PDOS};
+pub(crate) use table::{CONSUMED, HISTORY, MAPPED_MAX, OBJECTS, PDOS};

@@ -2,12 +2,16 @@
 
 use super::objects::{Slot, slot};
 
+pub(crate) const DEVICE_TYPE: Slot<u32> = slot(0x1000, 0);
 pub(crate) const ERROR_REGISTER: Slot<u8> = slot(0x1001, 0);
 pub(crate) const ERROR_COUNT: Slot<u8> = slot(0x1003, 0);
 pub(crate) const NEWEST_ERROR: Slot<u32> = slot(0x1003, 1);
 pub(crate) const EMERGENCY_COB_ID: Slot<u32> = slot(0x1014, 0);
 pub(crate) const CONSUMER_HEARTBEAT_TIME: Slot<u32> = slot(0x1016, 1);
 pub(crate) const PRODUCER_HEARTBEAT_TIME_MS: Slot<u16> = slot(0x1017, 0);
+pub(crate) const VENDOR_ID: Slot<u32> = slot(0x1018, 1);
+pub(crate) const PRODUCT_CODE: Slot<u32> = slot(0x1018, 2);
+pub(crate) const REVISION: Slot<u32> = slot(0x1018, 3);
 pub(crate) const SYNC_OVERFLOW: Slot<u8> = slot(0x1019, 0);
 pub(crate) const COMMUNICATION_ERROR: Slot<u8> = slot(0x1029, 1);
 #[doc(alias = "abort connection option code")]

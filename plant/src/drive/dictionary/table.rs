@@ -3,16 +3,14 @@
 //! Positions are encoder increments, velocities increments/s, accelerations increments/s², torques per
 //! mille of the rated torque (of the rated force, for a linear axis).
 
-use masseter_can::canopen::CobId;
-use masseter_can::{EVERY_SYNC, Rpdo1, Tpdo1};
-use masseter_shared::config::IdentityConfig;
-
 use super::entry::Access::{Constant, ReadOnly, ReadWrite};
 use super::entry::DataType::{I8, I16, I32, Text, U8, U16, U32};
 use super::entry::Initial::{Configured, OfNode, Value};
 use super::entry::Mapping::{Any, Tpdo};
 use super::entry::Shape::{Array, Record};
 use super::entry::{Access, DataType, Entry, Initial, Object, Shape};
+use masseter_can::canopen::CobId;
+use masseter_can::{EVERY_SYNC, Rpdo1, Tpdo1};
 
 /// PDOs of each direction.
 pub(crate) const PDOS: usize = 4;
@@ -22,8 +20,6 @@ pub(crate) const MAPPED_MAX: usize = 8;
 pub(crate) const HISTORY: usize = 8;
 /// Heartbeats that can be consumed (1016h).
 pub(crate) const CONSUMED: usize = 2;
-/// Device type and identity of the drive (1000h, 1018h).
-pub(crate) const IDENTITY: IdentityConfig = IdentityConfig::EMULATED;
 /// 6502h: profile position, homing, cyclic synchronous position and torque.
 const SUPPORTED_MODES: i64 = 1 << 0 | 1 << 5 | 1 << 7 | 1 << 9;
 
@@ -110,7 +106,7 @@ const fn mapping(index: u16, objects: &[u32]) -> [Entry; MAPPED_MAX + 1] {
 /// Every object, indices ascending.
 #[rustfmt::skip]
 pub(crate) static OBJECTS: &[Object] = &[
-    var(&[plain(0x1000, "Device type", U32, Constant, Value(IDENTITY.device_type as i64))]),
+    var(&[plain(0x1000, "Device type", U32, Constant, Configured)]),
     var(&[plain(0x1001, "Error register", U8, ReadOnly, Value(0)).mapped(Tpdo)]),
     object("Pre-defined error field", Array, &[
         plain(0x1003, "Number of errors", U8, ReadWrite, Value(0)),
@@ -144,9 +140,9 @@ pub(crate) static OBJECTS: &[Object] = &[
     var(&[plain(0x1017, "Producer heartbeat time", U16, ReadWrite, Configured)]),
     object("Identity object", Record, &[
         highest(0x1018, 4),
-        Entry::new((0x1018, 1), "Vendor-ID", U32, Constant, Value(IDENTITY.vendor_id as i64)),
-        Entry::new((0x1018, 2), "Product code", U32, Constant, Value(IDENTITY.product_code as i64)),
-        Entry::new((0x1018, 3), "Revision number", U32, Constant, Value(IDENTITY.revision as i64)),
+        Entry::new((0x1018, 1), "Vendor-ID", U32, Constant, Configured),
+        Entry::new((0x1018, 2), "Product code", U32, Constant, Configured),
+        Entry::new((0x1018, 3), "Revision number", U32, Constant, Configured),
         Entry::new((0x1018, 4), "Serial number", U32, Constant, OfNode(0)),
     ]),
     var(&[plain(0x1019, "Synchronous counter overflow value", U8, ReadWrite, Value(0)).within(0, 240)]),

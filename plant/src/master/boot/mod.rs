@@ -7,14 +7,15 @@ mod plan;
 mod sdo;
 
 use masseter_can::canopen::{
-    AbortCode, CobId, Expedited, NmtCommand, NmtState, NodeId, ObjectAddress, SdoRequest, SdoResponse,
+    AbortCode, CobId, Expedited, NmtCommand, NmtState, ObjectAddress, SdoRequest, SdoResponse,
 };
 use masseter_can::cia402::{DriveState, Statusword};
 use masseter_shared::clock::MILLISECOND_NS;
-use masseter_shared::config::Scenario;
+use masseter_shared::config::AccelerationUnit;
 use masseter_shared::messages::codes::{BootPhase, Cause};
 
 use super::failure::Failure;
+use crate::wanted::WantedDrive;
 use plan::{Check, Step, plan};
 use sdo::{ATTEMPTS, SdoClient, SdoFailure, TIMEOUT_NS};
 
@@ -72,10 +73,10 @@ pub(super) struct Boot {
 
 impl Boot {
     /// The boot of a drive of which nothing is known at `now_ns`.
-    pub(super) fn new(node: NodeId, scenario: &Scenario, axis: usize, now_ns: u64) -> Self {
+    pub(super) fn new(wanted: &WantedDrive, now_ns: u64) -> Self {
         Self {
             phase: BootPhase::Waiting,
-            steps: plan(node, scenario, axis),
+            steps: plan(wanted),
             next: 0,
             readings: 0,
             kept: Expedited::of_unknown_size([0; Expedited::MAX]),
@@ -216,7 +217,7 @@ impl Boot {
         let is_missing = matches!(code, AbortCode::NO_OBJECT | AbortCode::NO_SUBINDEX);
         match self.steps[self.next] {
             Step::Write { is_optional: true, .. } => Some(0),
-            Step::Read(_, Check::Unset { .. }) if is_missing => Some(0),
+            Step::Read(_, Check::EqualsIfPresent { value: 0, .. } | Check::Unit(_)) if is_missing => Some(0),
             Step::Read(_, Check::PdoElseSkip(skipped)) if is_missing => Some(skipped),
             _ => None,
         }
@@ -268,7 +269,12 @@ impl Boot {
                 let failure = at(otherwise, object, found, value);
                 return if otherwise == Cause::NotAccepted { self.read_again(failure) } else { Err(failure) };
             }
-            Check::Unset { otherwise } if found != 0 => return Err(at(otherwise, object, found, 0)),
+            Check::EqualsIfPresent { value, otherwise } if found != value => {
+                return Err(at(otherwise, object, found, value));
+            }
+            Check::Unit(declared) if is_other_unit(found, declared) => {
+                return Err(at(Cause::WrongUnit, object, found, declared.code()));
+            }
             Check::NoFault if in_fault(found) => {
                 return self.read_again(at(Cause::FaultAtStart, object, number(self.kept), 0));
             }
@@ -300,6 +306,10 @@ fn may_be_powered(statusword: u32) -> bool {
     !state.is_ok_and(|state| !state.is_powered())
 }
 
+fn is_other_unit(code: u32, declared: AccelerationUnit) -> bool {
+    code != declared.code() && AccelerationUnit::ALL.iter().any(|unit| unit.code() == code)
+}
+
 fn in_fault(statusword: u32) -> bool {
     let state = Statusword(statusword as u16).state();
     matches!(state, Ok(DriveState::Fault | DriveState::FaultReactionActive))
@@ -316,7 +326,9 @@ mod tests {
 
     #[test]
     fn a_drive_that_is_waited_for_is_reset_twice_a_second() {
-        let mut boot = Boot::new(NodeId::new(4).unwrap(), &Scenario::default(), 3, 0);
+        let node = masseter_can::canopen::NodeId::new(4).unwrap();
+        let wanted = WantedDrive::of_axis(&masseter_shared::config::Scenario::default(), 3, node).unwrap();
+        let mut boot = Boot::new(&wanted, 0);
         let resets: Vec<_> = (0..1600).filter(|ms| boot.command(ms * MILLISECOND_NS).is_some()).collect();
         assert_eq!(resets, [500, 1000, 1500]);
     }

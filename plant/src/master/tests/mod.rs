@@ -41,7 +41,7 @@ impl Bench {
         let ids = scenario.can.node_ids.map(|id| NodeId::new(id).unwrap());
         Self {
             master: Master::new(&scenario, EPOCH_NS).unwrap(),
-            wires: Wires::new(ids.map(|id| Peer::new(id, &scenario.can.identity))),
+            wires: Wires::new(ids.map(|id| Peer::new(id, &scenario.profile(0).identity))),
             reading: Reading::default(),
             events: Vec::new(),
             cycle: 0,

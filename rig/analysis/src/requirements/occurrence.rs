@@ -99,6 +99,8 @@ const REPORTS: [(Source, &[Cause]); 4] = [
             Cause::SecondMaster,
             Cause::StillPowered,
             Cause::HomeOffset,
+            Cause::WrongObject,
+            Cause::WrongUnit,
         ],
     ),
     (Source::Drive, &[Cause::Sequence, Cause::Emergency]),
