@@ -9,6 +9,7 @@
 //! | [`wanted`] | the objects of a drive as the rig needs them | |
 //! | `master` | boot, exchange, supervision of the drives | `link`, [`wanted`] |
 //! | [`emulation`] | drives and mechanism on simulated wires or real interfaces | `drive`, `mechanism`, `link` |
+//! | [`bringup`] | a client of single drives that inspects, configures and moves them | `link`, [`emulation`], [`wanted`] |
 //! | [`description`] | EDS and DBC of the emulated drives | `drive` |
 //! | [`core`] | master and link as one pure step function | `master`, `emulation`, `link` |
 //! | [`process`] | the core bound to iceoryx2 and to real time | [`core`] |
@@ -16,6 +17,7 @@
 //! Between master and drives there are frames on a bus and nothing else. The plant does not depend on the controller
 //! and does not solve the forward kinematics: its truth is the integrated mechanism.
 
+pub mod bringup;
 mod checks;
 pub mod core;
 pub mod cycle;

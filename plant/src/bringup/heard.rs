@@ -1,0 +1,72 @@
+//! What a line has heard: of each drive, and of nodes that should not be there.
+
+use std::collections::BTreeSet;
+
+use masseter_can::canopen::{Cob, Emergency, Heartbeat, NmtState, NodeId, SdoResponse};
+use masseter_can::{Frame, Tpdo1};
+use masseter_shared::config::MASTER_NODE;
+
+/// What was heard of one drive.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Heard {
+    /// State of its heartbeat.
+    pub nmt: Option<NmtState>,
+    /// Boot-up messages.
+    pub boot_ups: u32,
+    /// Its emergencies, the oldest first.
+    pub emergencies: Vec<Emergency>,
+    /// Its newest process data.
+    pub process_data: Option<Tpdo1>,
+    /// An answer of its SDO server that nobody has taken.
+    pub(super) answer: Option<SdoResponse>,
+}
+
+impl Heard {
+    /// Takes a frame of the drive. Malformed frames have no effect; the log has them.
+    pub(super) fn take(&mut self, cob: Cob, frame: &Frame) {
+        match cob {
+            Cob::Heartbeat(_) => {
+                if let Ok(Heartbeat { state }) = Heartbeat::decode(frame.data()) {
+                    self.boot_ups += u32::from(state == NmtState::BootUp);
+                    self.nmt = Some(state);
+                }
+            }
+            Cob::Emergency(_) => self.emergencies.extend(Emergency::decode(frame.data())),
+            Cob::Tpdo1(_) => self.process_data = Tpdo1::decode(frame.data()).ok().or(self.process_data),
+            Cob::SdoResponse(_) => self.answer = SdoResponse::decode(frame.data()).ok(),
+            _ => {}
+        }
+    }
+}
+
+/// Signs of other masters and of nodes that the scenario does not have.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Strangers {
+    /// SYNC, NMT, requests to SDO servers, or a heartbeat of the master's node id: with the bus.
+    pub masters: BTreeSet<(usize, &'static str)>,
+    /// Node ids that are none of the scenario, with their bus.
+    pub nodes: BTreeSet<(usize, NodeId)>,
+}
+
+impl Strangers {
+    /// Whether nobody else was heard.
+    pub fn is_empty(&self) -> bool {
+        self.masters.is_empty() && self.nodes.is_empty()
+    }
+
+    /// Takes a frame of a node that is no drive of the scenario.
+    pub(super) fn take(&mut self, bus: usize, cob: Cob) {
+        let sign = match cob {
+            Cob::Sync => "SYNC",
+            Cob::Nmt => "NMT",
+            Cob::SdoRequest(_) => "SDO requests",
+            Cob::Heartbeat(node) if node == MASTER_NODE => "a heartbeat of node 127",
+            Cob::Heartbeat(node) | Cob::Emergency(node) | Cob::SdoResponse(node) | Cob::Tpdo1(node) => {
+                self.nodes.insert((bus, node));
+                return;
+            }
+            _ => return,
+        };
+        self.masters.insert((bus, sign));
+    }
+}
