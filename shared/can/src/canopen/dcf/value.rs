@@ -5,6 +5,8 @@ use super::error::{DcfError, Problem};
 use super::ini::Field;
 use crate::canopen::NodeId;
 
+const NODE_ID: &str = "$NODEID";
+
 /// A value of an entry, or one of its limits.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Value {
@@ -39,7 +41,9 @@ impl Value {
             return Ok(Self::Text(field.text.to_owned()));
         };
         let no_number = || Problem::NoNumber { key: key.to_owned(), text: field.text.to_owned() };
-        if let Some(base) = of_node(field.text) {
+        let text = field.text.to_ascii_uppercase();
+        if let Some((before, after)) = text.split_once(NODE_ID) {
+            let base = beside_node_id(before.trim(), after.trim());
             return base.map(Self::OfNode).ok_or_else(|| no_number().at(field.line));
         }
         let mut number = integer(field.text).ok_or_else(|| no_number().at(field.line))?;
@@ -67,17 +71,14 @@ pub(super) fn plain(key: &str, field: Field<'_>, highest: u16) -> Result<u16, Dc
     fitting.ok_or_else(|| out.at(field.line))
 }
 
-/// The part beside `$NODEID`, on either side of the plus; none without `$NODEID`.
-fn of_node(text: &str) -> Option<Option<i128>> {
-    let text = text.to_ascii_uppercase();
-    let (before, after) = text.split_once("$NODEID")?;
-    let [before, after] = [before, after].map(str::trim);
-    Some(match (before, after) {
+/// The number beside `$NODEID`, on either side of the plus.
+fn beside_node_id(before: &str, after: &str) -> Option<i128> {
+    match (before, after) {
         ("", "") => Some(0),
-        ("", after) => after.strip_prefix('+').and_then(|base| integer(base.trim())),
-        (before, "") => before.strip_suffix('+').and_then(|base| integer(base.trim())),
+        ("", after) => integer(after.strip_prefix('+')?.trim()),
+        (before, "") => integer(before.strip_suffix('+')?.trim()),
         _ => None,
-    })
+    }
 }
 
 /// Whether it is written in hexadecimal or octal.
