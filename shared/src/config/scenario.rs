@@ -127,6 +127,8 @@ impl Scenario {
         if let (MotionConfig::File(file), Some(folder)) = (&mut scenario.motion, path.parent()) {
             file.path = folder.join(&file.path);
         }
+        let folder = path.parent().unwrap_or(Path::new(""));
+        scenario.drive_profile.iter_mut().try_for_each(|profile| profile.read_dcf(folder))?;
         Ok(scenario)
     }
 
