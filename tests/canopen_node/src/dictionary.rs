@@ -71,7 +71,8 @@ impl Dictionary {
     pub(crate) fn set(&mut self, address: Address, bytes: &[u8]) {
         if let Some(entry) = self.0.get_mut(&address) {
             let length = size(&entry.description).unwrap_or(bytes.len());
-            entry.value = bytes[..length].to_vec();
+            entry.value.clear();
+            entry.value.extend_from_slice(&bytes[..length]);
         }
     }
 

@@ -212,8 +212,8 @@ impl Drive {
         let error = flag(FOLLOWING_ERROR, self.outside_since_ns.is_some());
         let limited = flag(LIMITED, self.is_limited && is_enabled);
         let status = self.state.bits() | REMOTE | of_mode | error | limited;
-        let pressed = self.axis.pressing()
-            * dictionary.bytes((0x6072, 0)).map_or(RATED, |_| dictionary.number((0x6072, 0))) as f64;
+        let strongest = if dictionary.has((0x6072, 0)) { dictionary.number((0x6072, 0)) } else { RATED };
+        let pressed = self.axis.pressing() * strongest as f64;
         let moved = if self.axis.velocity() == 0.0 { 0.0 } else { FRICTION.copysign(self.axis.velocity()) };
         let velocity = self.axis.velocity() / self.velocity_unit(dictionary);
         dictionary.put(STATUSWORD, status.into());

@@ -11,7 +11,7 @@ use masseter_can::CanId;
 use socketcan::{CanFrame, CanSocket, EmbeddedFrame as _, Socket as _, StandardId};
 
 /// Longest pause between two steps.
-const STEP: Duration = Duration::from_millis(5);
+const STEP: Duration = Duration::from_millis(10);
 
 /// A CANopen servo drive for tests.
 #[derive(Debug, Parser)]

@@ -24,7 +24,7 @@ const PDO_LONG: (u16, u8) = (0x8220, 1 << 4);
 /// Of the device profile.
 const OF_DRIVE: u8 = 1 << 5;
 /// Motion of more than that is computed in several steps, ns.
-const STEP_NS: u64 = 1_000_000;
+const STEP_NS: u64 = 5_000_000;
 
 /// A servo drive on a bus.
 #[derive(Debug)]
@@ -71,17 +71,23 @@ impl Node {
 
     /// Takes a frame of another node.
     pub fn receive(&mut self, frame: Frame, now_ns: u64) {
-        self.step(now_ns);
-        let state = self.network.state;
-        if frame.id().is_extended() || state == NetworkState::Booting {
-            return;
-        }
         let id = frame.id().number() as u16;
-        let is_heard = state != NetworkState::Stopped;
         let sync_id = match self.dictionary.number((0x1005, 0)) as u16 & 0x7FF {
             0 => 0x80,
             id => id,
         };
+        let is_common = matches!(id, 0 | 0x701..=0x77F) || id == sync_id || id == self.own(0x600);
+        let is_process_data = || self.rpdos.iter().any(|rpdo| rpdo.has(&self.dictionary, frame));
+        // Most frames are for others, and cost nothing.
+        if frame.id().is_extended() || !is_common && !is_process_data() {
+            return;
+        }
+        self.step(now_ns);
+        let state = self.network.state;
+        if state == NetworkState::Booting {
+            return;
+        }
+        let is_heard = state != NetworkState::Stopped;
         match (id, frame.data()) {
             (0, &[command, target]) if target == 0 || target == self.settings.node.get() => {
                 self.manage(command);
@@ -168,7 +174,9 @@ impl Node {
         self.show_constants();
         self.uploads.end();
         self.rpdos.iter_mut().for_each(Rpdo::clear);
-        self.network = Network::start(self.now_ns, self.settings.quirks.boot_loader);
+        // The boot loader has no part in a reset of the communication.
+        let has_boot_loader = self.settings.quirks.boot_loader && last > COMMUNICATION_END;
+        self.network = Network::start(self.now_ns, has_boot_loader);
         self.step(self.now_ns);
     }
 

@@ -41,9 +41,14 @@ impl Rpdo {
             .collect()
     }
 
+    /// Whether the frame has its identifier.
+    pub(crate) fn has(&self, dictionary: &Dictionary, frame: Frame) -> bool {
+        identifier(dictionary, self.communication) == Some(frame.id())
+    }
+
     /// Takes a frame of its identifier; true if it takes effect now.
     pub(crate) fn take(&mut self, dictionary: &Dictionary, frame: Frame) -> bool {
-        if identifier(dictionary, self.communication) != Some(frame.id()) {
+        if !self.has(dictionary, frame) {
             return false;
         }
         self.waiting = Some(frame);

@@ -115,6 +115,11 @@ fn a_node_boots_once_or_twice_and_beats_as_it_is_told() {
     client.wait_ms(101);
     assert_eq!(client.take("705"), ["705#00", "705#00"]);
     assert!(client.read(0x1000, 0).is_ok());
+    client.send(0, &[0x82, 5]);
+    assert!(client.read(0x1000, 0).is_ok(), "the boot loader has no part in a reset of the communication");
+    client.send(0, &[0x81, 5]);
+    client.wait_ms(101);
+    assert_eq!(client.take("705").len(), 3);
 }
 
 #[test]

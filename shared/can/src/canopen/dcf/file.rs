@@ -2,7 +2,8 @@
 
 use std::collections::{BTreeMap, HashMap};
 
-use super::entry::{Access, DataType, Entry};
+use super::data_type::DataType;
+use super::entry::{Access, Entry};
 use super::error::{DcfError, Problem};
 use super::ini::Section;
 use super::value::{Value, plain};

@@ -4,6 +4,7 @@
 //! file, on bit rates and on dummy mapping are passed over. The texts of other code pages than UTF-8 are the caller's:
 //! `String::from_utf8_lossy` changes names alone.
 
+mod data_type;
 mod entry;
 mod error;
 mod file;
@@ -13,7 +14,8 @@ mod value;
 #[cfg(test)]
 mod tests;
 
-pub use entry::{Access, DataType, Entry};
+pub use data_type::DataType;
+pub use entry::{Access, Entry};
 pub use error::{DcfError, Problem};
 pub use file::Dcf;
 pub use value::Value;

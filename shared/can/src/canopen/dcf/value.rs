@@ -1,6 +1,6 @@
 //! Values: numbers in the notations of CiA 306, numbers that follow from the node id, and texts.
 
-use super::entry::DataType;
+use super::data_type::DataType;
 use super::error::{DcfError, Problem};
 use super::ini::Field;
 use crate::canopen::NodeId;
