@@ -188,3 +188,67 @@ fn of_object(survey: &Survey, difference: &Difference) -> Deviation {
     };
     new(*object, [wanted, found_text(survey, *object)], outcome, &remedy, &key)
 }
+
+#[cfg(test)]
+mod tests {
+    use std::io;
+    use std::path::Path;
+
+    use masseter_can::canopen::NodeId;
+    use masseter_shared::clock::MILLISECOND_NS;
+    use masseter_shared::config::Scenario;
+
+    use super::*;
+    use crate::bringup::Line;
+
+    /// What emulated drives lack of what this profile needs.
+    fn of_profile(text: &str) -> Vec<(String, Outcome, String)> {
+        let scenario = Scenario::parse(Path::new("robot.toml"), text).unwrap();
+        let mut line = Line::open(&Scenario::default(), Box::new(io::sink())).unwrap();
+        line.listen(100 * MILLISECOND_NS).unwrap();
+        let wanted = WantedDrive::of_axis(&scenario, 3, NodeId::new(4).unwrap()).unwrap();
+        let settings = Settings::wanted(&wanted);
+        let survey = Survey::take(&mut line, 3, settings.addresses()).unwrap();
+        let all = deviations(&survey, &wanted, &settings, scenario.profile(3));
+        all.into_iter().map(|one| (one.object, one.outcome, one.remedy)).collect()
+    }
+
+    #[test]
+    fn an_emulated_drive_has_all_that_the_rig_needs_but_the_event_timer() {
+        let timer = ("1400h:05h".to_owned(), Outcome::Mended, "write 150".to_owned());
+        assert_eq!(of_profile(""), [timer]);
+    }
+
+    #[test]
+    fn every_deviation_is_found_at_once_with_what_becomes_of_it() {
+        let all = of_profile(
+            "[[drive_profile]]\nidentity.revision = 7\nobjects.6066h = { value = 9 }\n\
+             objects.6007h = { rule = 'expect', value = 1 }\nobjects.2222h = { value = 1, bytes = 1 }\n\
+             homing = { home_object = '30B0h', home_position_m = 0.1 }",
+        );
+        let of = |object: &str| {
+            let found = all.iter().find(|(at, ..)| at == object);
+            found.map(|(_, outcome, remedy)| (*outcome, remedy.as_str()))
+        };
+        assert_eq!(of("6066h:00h"), Some((Outcome::Mended, "write 9")));
+        assert_eq!(of("6007h:00h"), Some((Outcome::Refused, "the profile expects another value")));
+        for object in ["1018h:03h", "2222h:00h", "30B0h:00h"] {
+            assert_eq!(of(object).map(|(outcome, _)| outcome), Some(Outcome::Refused), "{object}: {all:?}");
+        }
+    }
+
+    #[test]
+    fn a_unit_is_told_in_words() {
+        let mut survey = Survey::default();
+        survey.insert(ObjectAddress::new(0x60AA, 0), 0x00C0_0300);
+        survey.insert(ObjectAddress::new(0x6091, 1), 26);
+        survey.insert(ObjectAddress::new(0x6091, 2), 1);
+        let all = of_units(&survey, &DriveProfile::default());
+        assert_eq!(
+            all[0].remedy,
+            "the drive counts acceleration in rpm/s, the profile declares increments/s²: change one"
+        );
+        assert_eq!((all[0].outcome, all[1].outcome), (Outcome::Refused, Outcome::Doubtful));
+        assert_eq!(all[1].found, "26/1");
+    }
+}

@@ -283,7 +283,7 @@ impl Line {
     /// [`LineError`] except those of transfers.
     pub fn scan(&mut self) -> Result<(), LineError> {
         let request = SdoRequest::InitiateUpload { object: ObjectAddress::new(0x1000, 0) };
-        for id in 1..=NodeId::MAX.get() {
+        for id in 1..=MASTER_NODE.get() {
             let node = NodeId::new(id).expect("the id is in range");
             for bus in 0..self.names.len() {
                 self.send(bus, request.frame(node))?;

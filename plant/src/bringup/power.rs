@@ -77,3 +77,27 @@ fn motion(line: &mut Line, axis: usize, within_ns: u64) -> Result<u32, LineError
     line.listen(within_ns)?;
     Ok((line.read_number(axis, POSITION)? as i32).abs_diff(before))
 }
+
+#[cfg(test)]
+mod tests {
+    use std::io;
+
+    use masseter_shared::config::Scenario;
+
+    use super::*;
+
+    #[test]
+    fn a_drive_with_power_is_refused_until_it_is_taken_over() {
+        let mut line = Line::open(&Scenario::default(), Box::new(io::sink())).unwrap();
+        line.listen(100 * MILLISECOND_NS).unwrap();
+        prove_no_power(&mut line, 3, 50).unwrap();
+        for word in [Controlword::SHUTDOWN, Controlword::SWITCH_ON] {
+            line.control(3, word).unwrap();
+        }
+        line.listen(10 * MILLISECOND_NS).unwrap();
+        let refusal = prove_no_power(&mut line, 3, 50).unwrap_err().to_string();
+        assert!(refusal.starts_with("l1: statusword ") && refusal.ends_with("--take-over"), "{refusal}");
+        take_over(&mut line, 3, 50).unwrap();
+        prove_no_power(&mut line, 3, 50).unwrap();
+    }
+}

@@ -151,7 +151,7 @@ impl Settings {
             let timer = |part| read(part).filter(|_| like.is_transmitted());
             let mapping = || {
                 let count = survey.number(like.mapped(0)).and_then(|count| u8::try_from(count).ok())?;
-                (1..=count).map(|place| survey.number(like.mapped(place))).collect()
+                (1..=count).map(|place| survey.number(like.mapped(place))).collect::<Option<Vec<_>>>()
             };
             let layout = || {
                 let (inhibit, event) = (timer(3), timer(5));

@@ -86,3 +86,27 @@ fn unless_silent<T>(answer: Result<T, LineError>) -> Result<Option<T>, LineError
         answer => answer.map(Some),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::io;
+
+    use masseter_shared::config::Scenario;
+
+    use super::*;
+
+    #[test]
+    fn a_stored_value_survives_the_reset_and_another_does_not() {
+        let mut line = Line::open(&Scenario::default(), Box::new(io::sink())).unwrap();
+        line.listen(100 * MILLISECOND_NS).unwrap();
+        let window = ObjectAddress::new(0x6065, 0);
+        let delivered = line.read_number(3, window).unwrap();
+        line.write(3, window, 77, 4).unwrap();
+        reset(&mut line, 3).unwrap();
+        assert_eq!(line.read_number(3, window).unwrap(), delivered);
+        line.write(3, window, 77, 4).unwrap();
+        store(&mut line, 3, StoreConfig::default()).unwrap();
+        reset(&mut line, 3).unwrap();
+        assert_eq!(line.read_number(3, window).unwrap(), 77);
+    }
+}

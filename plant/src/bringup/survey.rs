@@ -86,6 +86,11 @@ impl Survey {
         Ok(())
     }
 
+    #[cfg(test)]
+    pub(super) fn insert(&mut self, object: ObjectAddress, value: u32) {
+        self.readings.insert(object, Ok(value.to_le_bytes().to_vec()));
+    }
+
     /// Whether the drive never answered.
     pub fn is_silent(&self) -> bool {
         self.readings.values().all(Result::is_err) && self.fell_silent()

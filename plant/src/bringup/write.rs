@@ -219,3 +219,109 @@ fn in_order<'s>(settings: &'s [Setting], survey: &Survey) -> Vec<&'s Setting> {
     }
     settings
 }
+
+#[cfg(test)]
+mod tests {
+    use std::io;
+
+    use masseter_can::canopen::NodeId;
+    use masseter_shared::config::Scenario;
+
+    use super::*;
+    use crate::wanted::WantedDrive;
+
+    const AXIS: usize = 3;
+
+    fn line(scenario: &Scenario) -> (Line, Settings) {
+        let mut line = Line::open(scenario, Box::new(io::sink())).unwrap();
+        line.listen(100 * MILLISECOND_NS).unwrap();
+        let node = NodeId::new(scenario.can.node_ids[AXIS]).unwrap();
+        (line, Settings::wanted(&WantedDrive::of_axis(scenario, AXIS, node).unwrap()))
+    }
+
+    fn survey(line: &mut Line, settings: &Settings) -> Survey {
+        Survey::take(line, AXIS, settings.addresses()).unwrap()
+    }
+
+    fn set(line: &mut Line, index: u16, subindex: u8, value: u32, bytes: usize) {
+        line.write(AXIS, ObjectAddress::new(index, subindex), value, bytes).unwrap();
+    }
+
+    /// The drive of an EPOS4 as delivered: one object in each PDO, other types, a further PDO.
+    fn as_delivered(line: &mut Line) {
+        for (communication, object) in [(0x1400, 0x6040_0010), (0x1800, 0x6041_0010)] {
+            let cob_id = line.read_number(AXIS, ObjectAddress::new(communication, 1)).unwrap();
+            set(line, communication, 1, CobId(cob_id).invalidated().0, 4);
+            set(line, communication + 0x200, 0, 0, 1);
+            set(line, communication + 0x200, 1, object, 4);
+            set(line, communication + 0x200, 0, 1, 1);
+            set(line, communication, 2, 255, 1);
+            set(line, communication, 1, cob_id, 4);
+        }
+        set(line, 0x1601, 1, 0x6040_0010, 4);
+        set(line, 0x1601, 0, 1, 1);
+        set(line, 0x1401, 1, 0x304, 4);
+        set(line, 0x6066, 0, 7, 2);
+    }
+
+    #[test]
+    fn a_drive_as_delivered_gets_the_rigs_objects_and_its_own_back() {
+        let scenario = Scenario::default();
+        let (mut line, wanted) = line(&scenario);
+        as_delivered(&mut line);
+        let delivered = survey(&mut line, &wanted);
+        assert_eq!(wanted.differences(&delivered).len(), 10, "{:?}", wanted.differences(&delivered));
+        let before = wanted.found(&delivered);
+        let profile = scenario.profile(AXIS);
+        let mut writer = Writer::new(&mut line, AXIS, profile);
+        writer.apply(&wanted, &delivered).unwrap();
+        let changes = writer.into_changes();
+        assert_eq!(changes.last().unwrap().after, "20", "{changes:?}");
+        let configured = survey(&mut line, &wanted);
+        assert_eq!(wanted.differences(&configured), []);
+        let mut writer = Writer::new(&mut line, AXIS, profile);
+        writer.apply(&wanted, &configured).unwrap();
+        assert_eq!(writer.into_changes(), [], "equal values are not written again");
+        Writer::new(&mut line, AXIS, profile).apply(&before, &configured).unwrap();
+        assert_eq!(survey(&mut line, &wanted), delivered);
+    }
+
+    #[test]
+    fn a_refusal_names_object_value_limits_and_key() {
+        let text = "[[drive_profile]]\nobjects.60C2h = { rule = 'absent' }\n\
+                    objects.'60C2h:01' = { rule = 'absent' }\nobjects.'60C2h:02' = { value = -9, lowest = -9 }";
+        let scenario = Scenario::parse(std::path::Path::new("robot.toml"), text).unwrap();
+        let (mut line, wanted) = line(&scenario);
+        let found = survey(&mut line, &wanted);
+        let mut writer = Writer::new(&mut line, AXIS, scenario.profile(AXIS));
+        let refusal = writer.apply(&wanted, &found).unwrap_err().to_string();
+        assert_eq!(
+            refusal,
+            "l1: object 60C2h:02h (Interpolation time index) := -9: 06090032h (value is too low); the profile takes -9 to \
+             any; change rate_hz"
+        );
+    }
+
+    #[test]
+    fn software_limits_never_cross() {
+        let scenario = Scenario::default();
+        let (mut line, wanted) = line(&scenario);
+        let values = |subindex| {
+            let limit = ObjectKey(ObjectAddress::new(0x607D, subindex));
+            wanted.objects.iter().find(|setting| setting.object == limit).unwrap().value as i32
+        };
+        let [low, high] = [values(1), values(2)];
+        for [old_low, old_high] in [[low - 900, low - 800], [high + 800, high + 900], [low + 1, high - 1]] {
+            // The emulated drive refuses limits that cross.
+            set(&mut line, 0x607D, 1, i32::MIN as u32, 4);
+            set(&mut line, 0x607D, 2, old_high as u32, 4);
+            set(&mut line, 0x607D, 1, old_low as u32, 4);
+            let found = survey(&mut line, &wanted);
+            let mut writer = Writer::new(&mut line, AXIS, scenario.profile(AXIS));
+            writer.apply(&wanted, &found).unwrap();
+            let changes = writer.into_changes();
+            let limits = changes.iter().filter(|change| change.object.starts_with("607Dh"));
+            assert_eq!(limits.count(), 2, "{changes:?}");
+        }
+    }
+}
