@@ -133,6 +133,28 @@ fn another_outcome_than_the_expected_one_fails() {
 }
 
 #[test]
+fn a_planted_bug_passes_by_the_requirement_that_it_fails() {
+    let bug = "
+        duration_s = 1.0
+        [[require]]
+        name = 'impossible'
+        signal = 'incisal.error'
+        max = '1 nm'
+        [expect]
+        exit_code = 1
+        verdict = 'fail'";
+    let (code, text) = run(&Workspace::new(bug));
+    assert_eq!(code, Some(0), "{text}");
+    assert!(text.contains("PASS: FAIL, as expected: failed: impossible"), "{text}");
+    let (code, text) = run(&Workspace::new(&bug.replace("1 nm", "1 m")));
+    assert_eq!(code, Some(1), "{text}");
+    assert!(text.contains("FAIL: expected FAIL, but PASS"), "{text}");
+    let (code, text) = run(&Workspace::new(&bug.replace("'fail'", "'safe_stop'")));
+    assert_eq!(code, Some(2), "{text}");
+    assert!(text.contains("expect.exit_code = 1: expect.verdict has the exit code 5"), "{text}");
+}
+
+#[test]
 fn a_trigger_that_never_came_leaves_the_requirement_untested() {
     let workspace = Workspace::new(
         "duration_s = 0.5
