@@ -56,7 +56,7 @@ pub(crate) fn checks(manifest: &Manifest, figures: &Figures, timing: &Timing) ->
 /// Cycles that the machine lost are no failure of the rig. None in simulated time, which has no deadlines.
 fn kept_time(timing: &Timing, limit: u64) -> Option<Check> {
     let result = match timing.word {
-        TimingWord::Held => CheckResult::Passed,
+        TimingWord::Held | TimingWord::Stalled => CheckResult::Passed,
         TimingWord::Missed => CheckResult::Failed,
         TimingWord::Disturbed => CheckResult::NotJudged,
         TimingWord::Simulated | TimingWord::Unknown => return None,

@@ -69,7 +69,7 @@ impl Requirement {
     }
 
     /// The same as an event that `[expect]` names.
-    pub(super) fn as_expected_event(self) -> Self {
+    pub(super) fn into_expected_event(self) -> Self {
         Self { is_expected_event: true, ..self }
     }
 

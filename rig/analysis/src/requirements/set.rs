@@ -79,7 +79,7 @@ impl Requirements {
                 .unwrap_or_else(|reason| Requirement::unknown(config, reason))
         };
         let mut list: Vec<_> = scenario.require.iter().map(&mut read).collect();
-        list.extend(expected.map(|config| read(&config).as_expected_event()));
+        list.extend(expected.map(|config| read(&config).into_expected_event()));
         let state = values.choose("controller.state").expect("every run has this signal");
         Self { list, values, timeline: Timeline::default(), row: Vec::new(), state, motion_ns: None }
     }
