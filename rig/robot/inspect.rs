@@ -137,7 +137,9 @@ fn describe(robot: &RobotLine, result: &InspectResult) -> (String, bool) {
     let _ = writeln!(text, "{}", devices(&result.drives));
     for interface in &result.interfaces {
         interface.faults.iter().for_each(|fault| fail(&mut text, fault));
-        interface.doubts.iter().for_each(|doubt| drop(writeln!(text, "warning: {doubt}")));
+        for doubt in &interface.doubts {
+            let _ = writeln!(text, "warning: {doubt}");
+        }
     }
     for sign in &result.masters {
         fail(&mut text, &format!("{sign}: another master is on the bus; end it before configure"));
