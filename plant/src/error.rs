@@ -1,5 +1,7 @@
 //! Errors of the plant: every reason why it cannot be built or cannot continue.
 
+use std::path::PathBuf;
+
 use masseter_can::NotByPort;
 use masseter_can::canopen::NodeIdError;
 use masseter_can::{BitrateError, OpenError};
@@ -31,6 +33,14 @@ pub enum PlantError {
     /// A fault that needs a simulated wire.
     #[error("faults: {0}")]
     NotByPort(#[from] NotByPort),
+    /// The file with the drives' memory.
+    #[error("drives.memory = {}: {reason}; mend the file, or remove it for drives that have stored nothing", path.display())]
+    Memory {
+        /// The file.
+        path: PathBuf,
+        /// Why it cannot be used.
+        reason: String,
+    },
     /// Values of the scenario that cannot be used together: their keys, the reason and the remedy.
     #[error("{0}")]
     Scenario(String),

@@ -1,13 +1,41 @@
-//! The emulated drives on simulated wires without a master, for foreign masters and other nodes.
+//! The emulated drives on simulated wires, for foreign masters, for tools and for other nodes.
 
 use masseter_can::Bus;
 use masseter_shared::config::Scenario;
+use masseter_shared::messages::Truth;
 
 use super::virtual_link::VirtualLink;
 use crate::error::PlantError;
 use crate::link::Link;
+use crate::link::layout::MASTER_PORT;
 
-/// Drives, mechanism and wires with free ports for other nodes.
+/// Drives, mechanism and wires, with the port of a master and free ports for other nodes.
+///
+/// A tool of one thread is the master itself:
+///
+/// ```
+/// use masseter_can::canopen::{Cob, NodeId, ObjectAddress, SdoRequest};
+/// use masseter_can::Bus;
+/// use masseter_plant::emulation::OpenLink;
+/// use masseter_shared::config::Scenario;
+///
+/// let mut link = OpenLink::new(&Scenario::default(), 0, 0)?;
+/// let (node, mut now_ns) = (NodeId::new(1)?, 100_000_000);
+/// link.advance(now_ns)?;
+/// let request = SdoRequest::InitiateUpload { object: ObjectAddress::new(0x6041, 0) };
+/// link.master(0).send(now_ns, request.frame(node))?;
+/// let answer = loop {
+///     now_ns += 1_000_000;
+///     link.advance(now_ns)?;
+///     match link.master(0).receive(now_ns)? {
+///         Some(received) if Cob::try_from(received.frame.id())? == Cob::SdoResponse(node) => break received,
+///         _ => {}
+///     }
+/// };
+/// assert_eq!(answer.frame.data()[1..3], [0x41, 0x60]);
+/// link.save_memory()?;
+/// # Ok::<_, Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug)]
 pub struct OpenLink {
     link: VirtualLink,
@@ -25,7 +53,8 @@ pub struct NodePort {
 impl OpenLink {
     /// The scenario's drives, switched on at `now_ns`, with this many free ports on each bus.
     pub fn new(scenario: &Scenario, others: usize, now_ns: u64) -> Result<Self, PlantError> {
-        let link = VirtualLink::new(scenario, others, now_ns)?;
+        let mut link = VirtualLink::new(scenario, others, now_ns)?;
+        link.emulation.add_stops();
         let ports = |axes: &Vec<usize>| (1 + axes.len()..1 + axes.len() + others).rev().collect();
         Ok(Self { link, free: scenario.can.buses.iter().map(ports).collect() })
     }
@@ -33,6 +62,27 @@ impl OpenLink {
     /// Number of buses.
     pub fn buses(&self) -> usize {
         self.free.len()
+    }
+
+    /// The master's port on a bus.
+    ///
+    /// # Panics
+    /// Where there is no such bus.
+    pub fn master(&mut self, bus: usize) -> impl Bus {
+        self.link.port_at(bus, MASTER_PORT)
+    }
+
+    /// The mechanism's true motion at the last SYNC.
+    pub fn truth(&self) -> Truth {
+        self.link.emulation.truth()
+    }
+
+    /// Writes what the drives have stored into the scenario's file (`drives.memory`), if that has changed.
+    ///
+    /// # Errors
+    /// [`PlantError::Memory`] for a file that cannot be written.
+    pub fn save_memory(&mut self) -> Result<(), PlantError> {
+        self.link.emulation.save_memory()
     }
 
     /// Simulates everything up to `now_ns`.

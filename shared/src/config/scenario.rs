@@ -109,7 +109,8 @@ impl Scenario {
         is_given.then(|| Some(Document::parse(path, &text).ok()?.place_of(key, None))).flatten()
     }
 
-    /// Reads a scenario file. The path of a recording is relative to the folder of the scenario. The values are not checked
+    /// Reads a scenario file. The paths of a recording and of the drives'
+    /// memory are relative to the folder of the scenario. The values are not checked
     /// yet: see [`Self::validate`].
     ///
     /// # Errors
@@ -119,8 +120,12 @@ impl Scenario {
         let text = read_text(path, MOST_BYTES)
             .map_err(|error| ScenarioError::Unreadable { path: path.to_owned(), error })?;
         let mut scenario = Self::parse(path, &text)?;
-        if let (MotionConfig::File(file), Some(folder)) = (&mut scenario.motion, path.parent()) {
+        let Some(folder) = path.parent() else { return Ok(scenario) };
+        if let MotionConfig::File(file) = &mut scenario.motion {
             file.path = folder.join(&file.path);
+        }
+        if let Some(memory) = &mut scenario.drives.memory {
+            *memory = folder.join(&*memory);
         }
         Ok(scenario)
     }
