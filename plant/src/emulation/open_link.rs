@@ -108,3 +108,70 @@ impl OpenLink {
         self.link.port_at(node.bus, node.port)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use masseter_can::canopen::{Cob, Expedited, NodeId, ObjectAddress, SdoRequest, SdoResponse};
+
+    use super::*;
+
+    const MS: u64 = 1_000_000;
+
+    /// What the drive of l1 answers.
+    fn ask(link: &mut OpenLink, now_ns: &mut u64, request: SdoRequest) -> SdoResponse {
+        let node = NodeId::new(4).unwrap();
+        link.master(1).send(*now_ns, request.frame(node)).unwrap();
+        for _ in 0..20 {
+            *now_ns += MS;
+            link.advance(*now_ns).unwrap();
+            while let Some(received) = link.master(1).receive(*now_ns).unwrap() {
+                if received.frame.id() == Cob::SdoResponse(node).into() {
+                    return SdoResponse::decode(received.frame.data()).unwrap();
+                }
+            }
+        }
+        panic!("no answer");
+    }
+
+    #[test]
+    fn what_a_master_has_saved_is_there_for_the_next_process() {
+        let path = std::env::temp_dir().join(format!("masseter-memory-{}.json", std::process::id()));
+        let mut scenario = Scenario::default();
+        scenario.drives.memory = Some(path.clone());
+        let object = ObjectAddress::new(0x6065, 0);
+        let write =
+            |object, data: &[u8]| SdoRequest::Download { object, data: Expedited::new(data).unwrap() };
+
+        let (mut link, mut now_ns) = (OpenLink::new(&scenario, 0, 0).unwrap(), 100 * MS);
+        link.advance(now_ns).unwrap();
+        link.save_memory().unwrap();
+        assert!(!path.exists(), "nothing is stored yet");
+        ask(&mut link, &mut now_ns, write(object, &777_u32.to_le_bytes()));
+        ask(&mut link, &mut now_ns, write(ObjectAddress::new(0x1010, 1), b"save"));
+        link.save_memory().unwrap();
+
+        let (mut next, mut now_ns) = (OpenLink::new(&scenario, 0, 0).unwrap(), 100 * MS);
+        next.advance(now_ns).unwrap();
+        let answer = ask(&mut next, &mut now_ns, SdoRequest::InitiateUpload { object });
+        let SdoResponse::Upload { data, .. } = answer else { panic!("{answer:?}") };
+        assert_eq!(data.data(), 777_u32.to_le_bytes());
+
+        std::fs::write(&path, "{ \"x1\": {} }").unwrap();
+        let refusal = OpenLink::new(&scenario, 0, 0).unwrap_err().to_string();
+        assert!(refusal.contains("'x1' is no axis") && refusal.contains("remove it"), "{refusal}");
+        std::fs::write(&path, "{ \"l1\": { \"values\": { \"6065:09\": 1 } } }").unwrap();
+        let refusal = OpenLink::new(&scenario, 0, 0).unwrap_err().to_string();
+        assert!(refusal.contains("l1: 6065:09: the drive has no such object"), "{refusal}");
+        std::fs::remove_file(&path).unwrap();
+    }
+
+    #[test]
+    fn the_jaw_can_stand_beside_its_place_and_all_six_axes_agree() {
+        let mut scenario = Scenario::default();
+        scenario.dynamics.initial_offset_m = [0.004, -0.003, 0.0];
+        let joints_m = OpenLink::new(&scenario, 0, 0).unwrap().truth().joint_m;
+        assert!(joints_m[..3].iter().any(|slide_m| slide_m.abs() > 1e-3), "{joints_m:?}");
+        scenario.dynamics.initial_offset_m = [0.4, 0.0, 0.0];
+        assert!(OpenLink::new(&scenario, 0, 0).is_err());
+    }
+}
