@@ -87,7 +87,9 @@ impl Quirks {
                 of_dictionary.push(quirk.clone());
             }
             Kind::MissingObjects => {
-                [0x6007, 0x6066, 0x6085].into_iter().for_each(|index| overlay.hide(index));
+                for index in [0x6007, 0x6066, 0x6085] {
+                    overlay.hide(index);
+                }
                 of_dictionary.push(quirk.clone());
             }
             Kind::PdosLockedInOperation => node.locks_pdos = true,

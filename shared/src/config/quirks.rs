@@ -153,7 +153,8 @@ impl QuirkConfig {
         if *kind == SlowBrake && open_s.is_none() && close_s.is_none() {
             return bad("drives.quirk.open_s", &"none", "give open_s, close_s or both");
         }
-        for name in axes.iter().flatten().filter(|name| !AXIS_NAMES.contains(&name.as_str())) {
+        let unknown = axes.iter().flatten().find(|name| !AXIS_NAMES.contains(&name.as_str()));
+        if let Some(name) = unknown {
             return bad("drives.quirk.axes", name, &format!("name axes: {}", AXIS_NAMES.join(", ")));
         }
         if axes.as_ref().is_some_and(Vec::is_empty) {

@@ -4,6 +4,7 @@
 
 /// The brake.
 #[derive(Debug, Clone, Copy)]
+#[expect(clippy::struct_field_names, reason = "each name ends with its unit")]
 pub(super) struct Brake {
     opening_ns: u64,
     /// None without a brake.

@@ -7,6 +7,7 @@
 mod brake;
 mod coordinates;
 mod demand;
+mod drivetrain;
 mod encoder;
 mod following;
 mod gear;
@@ -26,17 +27,15 @@ use masseter_shared::config::{DriveConfig, FaultKindConfig};
 use super::quirks::AxisQuirks;
 use crate::drive::dictionary::{Objects, names};
 use crate::injection::Acting;
-use brake::Brake;
 use coordinates::Coordinates;
 use demand::Demand;
+use drivetrain::Drivetrain;
 use following::FollowingErrorMonitor;
-use gear::Gear;
 use motion::{Motion, MotionCommand, PositionView, clamp};
-use motor::{Asked, Motor};
 use parameters::{Offsets, Parameters};
 use positioning::Positioning;
 use profile::Profile;
-use servo::{Servo, ServoCommand, ServoLimits};
+use servo::{ServoCommand, ServoLimits};
 use switches::Switches;
 
 pub(crate) use encoder::Encoder;
@@ -59,9 +58,6 @@ pub(super) struct AxisSettings {
     pub(super) stroke_m: [f64; 2],
 }
 
-/// Share of the rated force at which a motor counts as pushing against a stop.
-const STOP_SHARE: f64 = 0.2;
-
 /// One axis.
 #[derive(Debug, Clone)]
 pub(super) struct Axis {
@@ -69,7 +65,7 @@ pub(super) struct Axis {
     quirks: AxisQuirks,
     coordinates: Coordinates,
     switches: Switches,
-    servo: Servo,
+    drivetrain: Drivetrain,
     parameters: Parameters,
     demand: Demand,
     following: FollowingErrorMonitor,
@@ -87,15 +83,10 @@ pub(super) struct Axis {
     offsets: Offsets,
     /// Whether the newest cyclic target was limited.
     is_target_limited: bool,
-    gear: Gear,
-    motor: Motor,
-    brake: Brake,
     /// Injected faults of the drive.
     faults: Acting,
     /// Since when a fault delays "operation enabled", ns.
     enabling_since_ns: Option<u64>,
-    /// The motor's share of the force: without current the brake holds.
-    motor_n: f64,
 }
 
 impl Axis {
@@ -110,7 +101,7 @@ impl Axis {
         let AxisSettings { config, quirks, step_s, stroke_m } = *settings;
         Self {
             parameters: Parameters::from_objects(objects, &config, &quirks),
-            servo: Servo::new(config, step_s, position_m),
+            drivetrain: Drivetrain::new(config, &quirks, step_s, position_m),
             coordinates: Coordinates::new(encoder, position_m, quirks.is_incremental),
             switches: Switches::new(stroke_m, position_m),
             config,
@@ -126,12 +117,8 @@ impl Axis {
             torque_from_ns: now_ns.saturating_add(quirks.torque_off_ns),
             offsets: Offsets::default(),
             is_target_limited: false,
-            gear: Gear::default(),
-            motor: Motor::default(),
-            brake: Brake::new(quirks.opening_ns, quirks.closing_ns),
             faults: Acting::default(),
             enabling_since_ns: None,
-            motor_n: 0.0,
         }
     }
 
@@ -274,7 +261,7 @@ impl Axis {
 
     /// The buffered cyclic targets take effect; a position beyond the velocity limit is approached further.
     pub(super) fn synchronise(&mut self, now_ns: u64, new: NewTargets, objects: &Objects) {
-        let is_free = self.leaves_for.is_none() && self.brake.free_from_ns(now_ns) == now_ns;
+        let is_free = self.leaves_for.is_none() && self.drivetrain.free_from_ns(now_ns) == now_ns;
         if !self.is_enabled() || !is_free || self.ignores(new) {
             return;
         }
@@ -323,7 +310,8 @@ impl Axis {
     pub(super) fn step(&mut self, now_ns: u64, shaft: Shaft) -> (f64, bool) {
         self.complete_transition(now_ns);
         self.take_off_torque(now_ns);
-        let seen_m = shaft.seen_m + self.gear_error_m(now_ns);
+        let demand_m = self.demand.position_m(now_ns);
+        let seen_m = shaft.seen_m + self.drivetrain.gear_error_m(demand_m, &mut self.faults);
         let counts = self.coordinates.read(seen_m);
         self.switches.look(shaft.is_m);
         if self.is_enabled() && self.leaves_for.is_none() {
@@ -339,32 +327,10 @@ impl Axis {
             self.execute(command, now_ns);
         }
         let limits = self.servo_limits();
-        let measured_m = self.coordinates.read_m();
+        let places_m = [self.coordinates.read_m(), seen_m - shaft.is_m];
         let command = self.servo_command(now_ns);
-        let asked_n = self.servo.step(measured_m, seen_m - shaft.is_m, command, &limits);
-        let is_braking = command == ServoCommand::Brake;
-        self.motor_n = if is_braking { 0.0 } else { asked_n };
-        let force_n = self.drive_motor(
-            now_ns,
-            Asked { force_n: asked_n, is_braking, max_force_n: self.config.max_force_n },
-        );
+        let force_n = self.drivetrain.step(now_ns, places_m, command, &limits, &mut self.faults);
         (force_n, self.supervise_following(now_ns))
-    }
-
-    /// The force of motor and brake, N. The loops know nothing of a fault; the current that the drive shows is the motor's.
-    fn drive_motor(&mut self, now_ns: u64, mut asked: Asked) -> f64 {
-        if !self.brake.holds(now_ns, asked.is_braking) && asked.is_braking {
-            asked.force_n = 0.0;
-            self.servo.release_brake();
-        }
-        let force_n = self.motor.force_n(asked, self.servo.shaft(), &mut self.faults);
-        if self.faults.has(FaultKindConfig::DriveRunaway) {
-            self.motor_n = asked.max_force_n;
-        }
-        if asked.is_braking && self.faults.has(FaultKindConfig::BrakeOpen) {
-            self.servo.release_brake();
-        }
-        force_n
     }
 
     /// The command of the loops, with the velocity offset of cyclic synchronous position.
@@ -382,26 +348,16 @@ impl Axis {
 
     /// What homing sees.
     fn sensed(&self, counts: [i32; 2], is_at_rest: bool) -> Sensed {
-        let threshold_n = STOP_SHARE * self.config.rated_force_n;
-        let pushes = [self.motor_n <= -threshold_n, self.motor_n >= threshold_n];
+        let pushes = self.drivetrain.pushes();
         let (actual, limits) = (self.coordinates.actual(), self.switches.limits());
         Sensed { counts, actual, limits, pushes, is_at_rest }
     }
 
     /// Reads the encoder, as SYNC demands.
     pub(super) fn sample(&mut self, now_ns: u64, seen_m: f64) {
-        let gear_error_m = self.gear_error_m(now_ns);
+        let demand_m = self.demand.position_m(now_ns);
+        let gear_error_m = self.drivetrain.gear_error_m(demand_m, &mut self.faults);
         self.coordinates.read(seen_m + gear_error_m);
-    }
-
-    /// The distance of what the drive sees from the shaft, where its gear ratio is or was wrong.
-    fn gear_error_m(&mut self, now_ns: u64) -> f64 {
-        let ratio = self.faults.size(FaultKindConfig::DriveScale);
-        let error_m = self.gear.error_m(ratio, self.demand.position_m(now_ns));
-        if error_m != 0.0 {
-            self.faults.strike(FaultKindConfig::DriveScale);
-        }
-        error_m
     }
 
     /// While the torque is safely off, the drive stays in "switch on disabled", or in fault.
@@ -427,13 +383,14 @@ impl Axis {
         let actual = self.coordinates.actual();
         let demand_m = self.demand.position_m(now_ns);
         let demand = demand_m.map_or(actual, |demand_m| self.coordinates.increments(demand_m));
-        let torque = self.motor_n / self.config.rated_force_n * 1000.0;
+        let torque = self.drivetrain.motor_n() / self.config.rated_force_n * 1000.0;
         objects.set(names::STATUSWORD, self.statusword(now_ns).0);
         objects.set(names::MODE_DISPLAY, self.mode.number());
         objects.set(names::POSITION_DEMAND, demand);
         objects.set(names::ENCODER_COUNTS, self.coordinates.shown_counts());
         objects.set(names::POSITION_ACTUAL, actual);
-        objects.set(names::VELOCITY_ACTUAL, self.coordinates.difference(self.servo.motion().velocity_m_s));
+        objects
+            .set(names::VELOCITY_ACTUAL, self.coordinates.difference(self.drivetrain.motion().velocity_m_s));
         objects.set(names::TORQUE_ACTUAL, torque.round() as i16);
         objects.set(names::FOLLOWING_ERROR, demand.saturating_sub(actual));
         objects.set(names::DIGITAL_INPUTS, self.switches.inputs());
@@ -441,8 +398,9 @@ impl Axis {
 
     fn statusword(&self, now_ns: u64) -> Statusword {
         let is_enabled = self.is_enabled();
-        let is_free = is_enabled && self.brake.free_from_ns(now_ns) == now_ns;
-        let is_limited = self.is_target_limited || self.positioning.is_limited() || self.servo.is_limited();
+        let is_free = is_enabled && self.drivetrain.free_from_ns(now_ns) == now_ns;
+        let is_limited =
+            self.is_target_limited || self.positioning.is_limited() || self.drivetrain.is_limited();
         let word = Statusword::for_state(self.power)
             .with(StatusBit::VoltageEnabled, true)
             .with(StatusBit::Remote, true)
@@ -491,7 +449,7 @@ impl Axis {
 
     /// The cyclic modes wait for their first target behind a closed brake; the other modes hold the position.
     fn enable(&mut self, now_ns: u64) {
-        self.brake.open(now_ns);
+        self.drivetrain.open_brake(now_ns);
         if matches!(self.mode, Mode::ProfilePosition | Mode::Homing) {
             let here = Motion::at_rest(self.measured_m());
             self.demand =
@@ -505,8 +463,7 @@ impl Axis {
             DriveState::QuickStopActive => {
                 !self.parameters.holds_quick_stop && self.demand.is_at_rest(now_ns)
             }
-            DriveState::FaultReactionActive => self.demand.is_at_rest(now_ns),
-            DriveState::OperationEnabled => self.demand.is_at_rest(now_ns),
+            DriveState::FaultReactionActive | DriveState::OperationEnabled => self.demand.is_at_rest(now_ns),
             _ => true,
         };
         if is_complete {
@@ -534,7 +491,7 @@ impl Axis {
             _ => profile,
         };
         // Nothing moves while the brake opens.
-        let from_ns = self.brake.free_from_ns(now_ns);
+        let from_ns = self.drivetrain.free_from_ns(now_ns);
         match command {
             None => {}
             Some(MotionCommand::MoveTo { target }) => {
@@ -564,7 +521,7 @@ impl Axis {
     }
 
     fn slow_down(&mut self, now_ns: u64, deceleration_m_s2: f64) {
-        self.demand.slow_down(now_ns, self.servo.motion(), deceleration_m_s2);
+        self.demand.slow_down(now_ns, self.drivetrain.motion(), deceleration_m_s2);
     }
 
     /// The software position limits, which mean nothing before the homing of an incremental encoder.
@@ -596,6 +553,6 @@ impl Axis {
 
     /// The measured position, m in the encoder's coordinates.
     fn measured_m(&self) -> f64 {
-        self.servo.motion().position_m
+        self.drivetrain.motion().position_m
     }
 }
