@@ -4,9 +4,28 @@
 //! sequences of questions to a [`Line`]; time comes from the line, simulated or real. Files, arguments and the
 //! forward kinematics are not part of it.
 
+mod borrowed;
+mod caution;
 mod heard;
+mod home;
+mod jog;
 mod line;
+mod motion_error;
+mod mover;
+mod stand;
+mod step_response;
+mod switching;
+#[cfg(test)]
+mod tests;
+mod watch;
 mod wires;
 
+pub use caution::{Caution, Operator, Wish};
 pub use heard::{Heard, Strangers};
+pub use home::{HomeReport, home};
+pub use jog::{JogOrder, JogReport, jog};
 pub use line::{Line, LineError, SdoReason};
+pub use motion_error::{MotionError, StopCause};
+pub use stand::{Stand, stand};
+pub use step_response::StepResponse;
+pub use watch::Sample;
