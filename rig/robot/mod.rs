@@ -4,19 +4,37 @@
 //! ([`masseter_plant::bringup`]): these modules hold arguments, files and text.
 
 mod args;
+mod check_pose;
 mod evidence;
+mod hold;
+mod home;
+mod jog;
+mod lengths;
 mod past;
+mod permission;
+mod session;
 mod status;
 mod step;
 
 use clap::Subcommand;
 use masseter_terminal::{Exit, Failure, OrFailure};
 
+use check_pose::CheckPoseArgs;
+use home::HomeArgs;
+use jog::JogArgs;
 use status::StatusArgs;
+
+pub(crate) use permission::check_bring_up;
 
 /// Verbs of `robot`.
 #[derive(Debug, Clone, Subcommand)]
 pub(crate) enum RobotVerb {
+    /// Move one axis a short way and back, while the others have no power
+    Jog(JogArgs),
+    /// Home the axes, one after the other
+    Home(HomeArgs),
+    /// Check whether the axes tell the closed pose
+    CheckPose(CheckPoseArgs),
     /// Show which steps are done, and which is next
     Status(StatusArgs),
     /// Print the steps and their results as Markdown for a lab book
@@ -27,6 +45,9 @@ pub(crate) enum RobotVerb {
 /// Executes a verb.
 pub(crate) fn execute(verb: &RobotVerb) -> Result<Exit, Failure> {
     match verb {
+        RobotVerb::Jog(args) => jog::jog(args),
+        RobotVerb::Home(args) => home::home(args),
+        RobotVerb::CheckPose(args) => check_pose::check_pose(args),
         RobotVerb::Status(args) => status::status(args).usage(),
         RobotVerb::Report(args) => status::report(args).usage(),
     }

@@ -15,7 +15,7 @@ use super::watch::read_position;
 /// How far the axis goes back before it homes again, m: beyond the place where it stopped, not beyond the next index.
 const BACK_M: f64 = 1e-3;
 /// A homing with a shorter way needs no way back, m.
-const NO_WAY_M: f64 = 1e-4;
+const NO_WAY_M: f64 = 1e-5;
 /// Software limits are opened to this many strokes on either side of the axis.
 const OPENED: f64 = 1.1;
 /// The search may take this many times the way at the homing speeds.

@@ -88,6 +88,14 @@ impl<'a> Mover<'a> {
         ] {
             self.borrow(index, subindex, value, bytes)?;
         }
+        // A following error is a fault at once, and a fault closes the brake at once: the feedback may be what is wrong, and
+        // then a ramp only drives the axis further. Not every drive takes these values.
+        for (index, bytes) in [(0x6066, 2), (0x605E, 2)] {
+            match self.borrow(index, 0, 0, bytes) {
+                Err(error) if error.abort_code().is_none() => return Err(error),
+                _ => {}
+            }
+        }
         Ok(())
     }
 

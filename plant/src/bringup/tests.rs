@@ -157,7 +157,7 @@ fn an_axis_that_moves_against_its_target_is_stopped_at_once() {
     );
     assert!(is_right, "{cause:?}");
     let moved_m = bench.line.read_number(L1, ObjectAddress::new(0x6064, 0)).unwrap() as f64 * 1e-6 - 0.29;
-    assert!(moved_m.abs() < 0.002, "{moved_m}");
+    assert!(moved_m.abs() < 0.002, "{moved_m} {cause:?}");
 }
 
 #[test]
@@ -269,7 +269,7 @@ fn every_method_homes_twice_at_the_same_place() {
         let report = bench.home().unwrap();
         assert!((report.position_m - 0.27).abs() < 2e-4, "{method}: {report:?}");
         assert!(report.spread_m.unwrap() < 5e-5, "{method}: {report:?}");
-        assert_eq!(report.way_m.abs() > 1e-4, method < 35, "{method}: {report:?}");
+        assert_eq!(report.way_m.abs() > 1e-5, method < 35, "{method}: {report:?}");
         assert_eq!(bench.objects(), before, "{method}");
         bench.assert_off();
         let l1 = bench.scenario.can.node_ids[L1];
@@ -289,7 +289,7 @@ fn homing_needs_the_position_of_home_and_an_absolute_encoder_does_not_move() {
     assert!(matches!(homing(37, "").home(), Err(MotionError::NoHomePosition { axis: L1 })));
     let mut bench = Bench::new("");
     let report = bench.home().unwrap();
-    assert!((report.position_m - 0.29).abs() < 1e-5 && report.spread_m.is_none(), "{report:?}");
+    assert!((report.position_m - 0.29).abs() < 1e-4 && report.spread_m.is_none(), "{report:?}");
     assert!(bench.log.controlwords().is_empty());
 }
 
@@ -297,7 +297,7 @@ fn homing_needs_the_position_of_home_and_an_absolute_encoder_does_not_move() {
 fn the_stand_shows_every_axis_and_writes_nothing() {
     let mut bench = Bench::new("");
     let stand = stand(&mut bench.line, &bench.scenario, 200 * MILLISECOND_NS).unwrap();
-    assert!(stand.positions_m[L1..].iter().all(|position_m| (position_m - 0.29).abs() < 1e-5));
+    assert!(stand.positions_m[L1..].iter().all(|position_m| (position_m - 0.29).abs() < 1e-4));
     assert!(stand.moved_m.iter().all(|moved_m| moved_m.abs() < 1e-5));
     assert_eq!(stand.states.len(), AXES);
 }
