@@ -10,7 +10,7 @@ use masseter_shared::control::{Controller, Outcome, Tick};
 use masseter_shared::geometry::{AXES, Actuators, Jacobian, Joints, Mechanism, Pose};
 use masseter_shared::messages::codes::ControllerState;
 use masseter_shared::messages::{Command, Event, Reading, State};
-use masseter_shared::named::Declared;
+use masseter_shared::named::{Declared, Parameter};
 
 use crate::command_acknowledgement::CommandAcknowledgement;
 use crate::path_supervision::PathSupervision;
@@ -19,8 +19,11 @@ use crate::pose_control::PoseControl;
 use crate::pose_law::{Demand, PoseLaw};
 use crate::safety::{self, Fault};
 use crate::sequencer::Sequencer;
-use crate::trajectory::Trajectory;
+use crate::slew::Slew;
+use crate::trajectory::{self, Trajectory};
 
+/// How many parameters the controller has beside those of the law.
+const OWN: usize = 2;
 /// Age of a reading that comes late but is used.
 const LATE_READING_CYCLES: u64 = 1;
 
@@ -53,6 +56,8 @@ pub struct MotionController {
     playback: Playback,
     acknowledgement: CommandAcknowledgement,
     law: Box<dyn PoseLaw>,
+    /// What the law declares, then the controller's own parameters.
+    declared: Declared,
     supervision: PathSupervision,
     /// By how many cycles the platform may be earlier or later on its path.
     slack_cycles: f64,
@@ -79,14 +84,20 @@ impl MotionController {
         law: Box<dyn PoseLaw>,
     ) -> Self {
         let config = scenario.controller;
+        let limits = scenario.limits.within(&scenario.drives);
+        let demands = trajectory::check(&trajectory, &mechanism, &limits, scenario.period_s()).ok();
+        let change_s = Slew::change_s(demands.as_ref(), &limits);
+        let mut declared = law.declared();
+        declared.parameters.extend(own_parameters());
         Self {
             sequencer: Sequencer::new(scenario, mechanism.clone()),
             velocity_limit_m_s: std::array::from_fn(|axis| scenario.drives.of_axis(axis).max_velocity_m_s),
             trim_reach_m: config.trim_limit_m + config.trim_limit_rad * mechanism.platform_arm_m(),
             mechanism,
-            playback: Playback::new(trajectory, config.ease_s, config.stop_ramp_s),
+            playback: Playback::new(trajectory, config.ease_s, config.stop_ramp_s, change_s),
             acknowledgement: CommandAcknowledgement::default(),
             law,
+            declared,
             supervision: PathSupervision::new(scenario),
             slack_cycles: 0.0,
             cycles_at_rest: 0,
@@ -225,11 +236,16 @@ impl Controller for MotionController {
     }
 
     fn declared(&self) -> Declared {
-        self.law.declared()
+        self.declared.clone()
     }
 
     fn set_parameter(&mut self, place: usize, value: f64) {
-        self.law.set_parameter(place, value);
+        // From the end, where the own ones are.
+        match self.declared.parameters.len() - place {
+            OWN => self.playback.set_motion_rate(value),
+            1 => self.playback.set_motion_amplitude(value),
+            _ => self.law.set_parameter(place, value),
+        }
     }
 
     fn fill_signals(&self, signals: &mut [f64]) {
@@ -243,6 +259,19 @@ impl Controller for MotionController {
             let _ = black_box((solution, joints));
         }
     }
+}
+
+/// The parameters beside those of the law.
+fn own_parameters() -> [Parameter; OWN] {
+    let share = |name, about: &str| Parameter {
+        about: about.to_owned(),
+        range: [0.0, 1.0],
+        ..Parameter::new(name, 1.0)
+    };
+    [
+        share("motion_rate", "Speed of the motion; 1 as written."),
+        share("motion_amplitude", "Share of the way from the motion's first pose; 1 as written."),
+    ]
 }
 
 #[cfg(test)]

@@ -1,5 +1,7 @@
 //! Errors of the plant: every reason why it cannot be built or cannot continue.
 
+use std::path::PathBuf;
+
 use masseter_can::NotByPort;
 use masseter_can::canopen::NodeIdError;
 use masseter_can::{BitrateError, OpenError};
@@ -31,6 +33,16 @@ pub enum PlantError {
     /// A fault that needs a simulated wire.
     #[error("faults: {0}")]
     NotByPort(#[from] NotByPort),
+    /// A table of a stimulus.
+    #[error("{}{}: {problem}", path.display(), line.map(|line| format!(":{line}")).unwrap_or_default())]
+    Table {
+        /// The file.
+        path: PathBuf,
+        /// The line, from 1; none where the file as a whole is at fault.
+        line: Option<u64>,
+        /// What is wrong, with its remedy.
+        problem: String,
+    },
     /// Values of the scenario that cannot be used together: their keys, the reason and the remedy.
     #[error("{0}")]
     Scenario(String),

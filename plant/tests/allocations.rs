@@ -4,6 +4,7 @@
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 use std::hint::black_box;
+use std::path::{Path, PathBuf};
 
 use masseter_plant::core::PlantCore;
 use masseter_shared::config::{
@@ -68,6 +69,10 @@ fn cycle(plant: &mut PlantCore, cycle: u64, reading: &mut Reading) {
     });
 }
 
+fn table() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../examples/suite/push.csv")
+}
+
 /// One of every kind of the plant, each for a while, on the axes in turn, and stimuli.
 fn injected() -> Scenario {
     let mut scenario = Scenario::default();
@@ -97,7 +102,12 @@ fn injected() -> Scenario {
         ..StimulusConfig::at(0.0)
     };
     scenario.stimulus = vec![
-        StimulusConfig { push_n: Some([1.0, 2.0, 3.0]), ..at("fault.fault_0") },
+        StimulusConfig {
+            push_n: Some([1.0, 2.0, 3.0]),
+            torque_n_m: Some([0.1, 0.0, 0.0]),
+            ..at("fault.fault_0")
+        },
+        StimulusConfig { push_table: Some(table()), name: Some("table".to_owned()), ..at("fault.fault_0") },
         StimulusConfig { food: Some(FoodConfig::default()), ..at("fault.fault_0") },
         StimulusConfig { payload: Some("0.1 kg".parse().unwrap()), ..at("fault.fault_1") },
     ];

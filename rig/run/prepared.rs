@@ -6,9 +6,9 @@ use std::path::Path;
 use anyhow::Context;
 use masseter_analysis::Figures;
 use masseter_plan::RunPlan;
-use masseter_recording::{Ending, MOTION, Manifest, RunFolder};
+use masseter_recording::{Ending, Manifest, RunFolder};
 use masseter_report::Judgement;
-use masseter_shared::config::{FileConfig, MotionConfig, Scenario};
+use masseter_shared::config::{FileConfig, Scenario};
 use masseter_shared::input::read_text;
 use masseter_shared::transport::{Domain, DomainLock};
 use masseter_terminal::{Exit, Failure, OrFailure, status};
@@ -171,14 +171,14 @@ fn write_manifest(folder: &RunFolder, manifest: &Manifest) -> Result<(), Failure
     manifest.write(folder).with_context(|| format!("cannot write {}", path.display())).incomplete()
 }
 
-/// Copies the scenario, and the motion file that it plays, into the run folder: the original may change later.
+/// Copies the scenario and the files that it names into the run folder: the originals may change later.
 fn keep_scenario(folder: &RunFolder, scenario: &Scenario) -> anyhow::Result<()> {
     let mut kept = scenario.clone();
-    if let MotionConfig::File(file) = &mut kept.motion {
-        let rows = read_text(&file.path, FileConfig::MOST_BYTES);
-        let rows = rows.with_context(|| format!("cannot read {}", file.path.display()))?;
-        keep(folder, &folder.motion(), &rows)?;
-        file.path = MOTION.into();
+    for (name, file) in kept.files_mut() {
+        let rows = read_text(file, FileConfig::MOST_BYTES);
+        let rows = rows.with_context(|| format!("cannot read {}", file.display()))?;
+        keep(folder, &folder.file(&name), &rows)?;
+        *file = name.into();
     }
     keep(folder, &folder.scenario(), &kept.to_toml())
 }

@@ -30,7 +30,7 @@ for message in read_ros2_messages(sys.argv[1], topics=TOPICS):
         assert body.bus in (0, 1) and len(body.data) <= 8, (body.bus, body.data)
         largest_data = max(largest_data, len(body.data))
     if topic == "parameter":
-        assert (body.length, body.integral_gain_per_s, body.trim_limit_rad) == (3, 5.0, 0.02), body
+        assert (body.length, body.integral_gain_per_s, body.trim_limit_rad) == (5, 5.0, 0.02), body
     if topic == "reading" and body.fresh_axes == 63:
         assert all(0.24 <= length <= 0.30 for length in body.position_m[3:]), body.position_m
 

@@ -8,6 +8,7 @@ use masseter_shared::messages::{Command, State};
 use super::*;
 use crate::sequencer::{ALL_AXES, REPEATED_CYCLES, SAFE_STOP_S};
 
+mod changes;
 mod faults;
 mod laws;
 mod limits;

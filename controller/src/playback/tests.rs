@@ -1,7 +1,7 @@
 //! The desired pose moves forward on its path, and comes to rest where it is told to.
 
-use masseter_shared::config::{JawConfig, MotionConfig};
-use masseter_shared::geometry::{Mechanism, MechanismConfig, Vec3};
+use masseter_shared::config::{JawConfig, MotionConfig, TrajectoryLimitsConfig};
+use masseter_shared::geometry::{AXES, Mechanism, MechanismConfig, Vec3};
 
 use super::*;
 
@@ -16,7 +16,7 @@ fn trajectory() -> Trajectory {
 }
 
 fn playback() -> Playback {
-    Playback::new(trajectory(), EASE_S, RAMP_S)
+    Playback::new(trajectory(), EASE_S, RAMP_S, 1.0)
 }
 
 /// As found at the start: shifted and turned against the first pose of the motion.
@@ -131,4 +131,120 @@ fn the_time_of_the_motion_is_negative_before_it_begins() {
     let playback = playing(1.0);
     let expected_s = trajectory().motion_time_s(1.2);
     assert!((playback.motion_time_ahead_s(0.2) - expected_s).abs() < 1e-9);
+}
+
+/// Cycles until the part is over.
+fn cycles_to_end(playback: &mut Playback) -> u64 {
+    let cycles = (1..100_000).find(|_| {
+        playback.advance(PERIOD_S);
+        playback.is_over()
+    });
+    cycles.unwrap()
+}
+
+#[test]
+fn at_half_the_rate_the_motion_takes_twice_as_long_and_ends_where_it_would() {
+    let mut playback = playback();
+    playback.set_motion_rate(0.5);
+    playback.play();
+    let cycles = cycles_to_end(&mut playback);
+    assert!((cycles as f64 * PERIOD_S - 2.0 * DURATION_S).abs() < 2.0 * PERIOD_S, "{cycles}");
+    assert!(playback.is_at_rest());
+    assert!(are_near(&playback.pose_ahead(0.0), &trajectory().pose(DURATION_S)));
+}
+
+#[test]
+fn a_motion_that_waits_is_over_after_ten_durations() {
+    let mut playback = playing(1.0);
+    playback.set_motion_rate(0.0);
+    advance(&mut playback, 1.1);
+    let waits_at = playback.pose_ahead(0.0);
+    let cycles = cycles_to_end(&mut playback) as f64;
+    assert!((cycles * PERIOD_S - (10.0 * DURATION_S - 2.1)).abs() < 2.0 * PERIOD_S, "{cycles}");
+    assert!(are_near(&playback.pose_ahead(0.1), &waits_at));
+    assert!(!playback.is_at_rest(), "it could go on");
+}
+
+#[test]
+fn half_the_amplitude_is_half_of_the_incisal_points_way() {
+    let jaw = JawConfig::default();
+    let incisal = |pose: &Pose| pose.transform_point(&jaw.reference_point_m.into());
+    let mut playback = playback();
+    playback.set_motion_amplitude(0.5);
+    playback.play();
+    let first = incisal(&trajectory().pose(0.0));
+    for _ in 0..30 {
+        advance(&mut playback, 0.1);
+        let [half, whole] = [playback.pose_ahead(0.0), trajectory().pose(playback.elapsed_s)]
+            .map(|pose| incisal(&pose) - first);
+        assert!((half - whole * 0.5).norm() < 1e-12, "{half} of {whole}");
+    }
+}
+
+/// Limits a tenth above what the motion takes of each, and changes of both at all its phases.
+#[test]
+fn changes_of_rate_and_amplitude_keep_the_limits_of_the_axes() {
+    let mechanism = Mechanism::new(&MechanismConfig::default()).unwrap();
+    let demands =
+        crate::trajectory::check(&trajectory(), &mechanism, &TrajectoryLimitsConfig::default(), PERIOD_S)
+            .unwrap();
+    let most = |values: &[f64]| 1.1 * values.iter().copied().fold(0.0, f64::max);
+    let limits = TrajectoryLimitsConfig {
+        slide_velocity_m_s: most(&demands.velocity_m_s[..3]),
+        leg_velocity_m_s: most(&demands.velocity_m_s[3..]),
+        slide_acceleration_m_s2: most(&demands.acceleration_m_s2[..3]),
+        leg_acceleration_m_s2: most(&demands.acceleration_m_s2[3..]),
+        ..TrajectoryLimitsConfig::default()
+    };
+    let change_s = Slew::change_s(Some(&demands), &limits);
+    assert!((1.0..20.0).contains(&change_s), "{change_s}");
+    for phase in 0..15 {
+        let mut playback = Playback::new(trajectory(), EASE_S, RAMP_S, change_s);
+        playback.play();
+        advance(&mut playback, 0.6 + 0.05 * f64::from(phase));
+        let mut last: Option<([f64; AXES], [f64; AXES])> = None;
+        for cycle in 0..6000 {
+            if cycle % 1500 == 0 {
+                let [rate, amplitude] = [[0.2, 0.0], [1.0, 0.3], [0.6, 1.0], [1.0, 0.0]][cycle / 1500];
+                playback.set_motion_rate(rate);
+                playback.set_motion_amplitude(amplitude);
+            }
+            playback.advance(PERIOD_S);
+            let joints = mechanism.inverse(&playback.pose_ahead(0.0)).unwrap();
+            mechanism.strokes().check(&joints.actuators).unwrap();
+            let at_m = joints.actuators.to_axes();
+            let Some((last_m, last_m_s)) = last else {
+                last = Some((at_m, [0.0; AXES]));
+                continue;
+            };
+            let rates = |to: &[f64; AXES], from: &[f64; AXES]| -> [f64; AXES] {
+                std::array::from_fn(|axis| (to[axis] - from[axis]) / PERIOD_S)
+            };
+            let at_m_s = rates(&at_m, &last_m);
+            let at_m_s2 = rates(&at_m_s, &last_m_s);
+            for axis in 0..AXES {
+                assert!(at_m_s[axis].abs() <= limits.velocity_m_s(axis), "{phase} {cycle}");
+                assert!(
+                    cycle < 2 || at_m_s2[axis].abs() <= limits.acceleration_m_s2(axis),
+                    "{phase} {cycle}"
+                );
+            }
+            last = Some((at_m, at_m_s));
+        }
+    }
+}
+
+#[test]
+fn a_stop_during_changes_comes_to_rest_within_its_ramp_too() {
+    let mut playback = playing(1.0);
+    playback.set_motion_rate(0.3);
+    playback.set_motion_amplitude(0.1);
+    advance(&mut playback, 0.4);
+    playback.stop();
+    advance(&mut playback, RAMP_S + PERIOD_S);
+    assert!(playback.is_at_rest());
+    let rests_at = playback.pose_ahead(0.0);
+    playback.set_motion_amplitude(1.0);
+    advance(&mut playback, 1.0);
+    assert!(are_near(&playback.pose_ahead(0.1), &rests_at), "nothing moves it any more");
 }

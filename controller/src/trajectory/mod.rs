@@ -13,6 +13,7 @@ mod clock;
 mod error;
 mod excursion;
 mod import;
+mod interpolation;
 mod jaw_frame;
 mod lowpass;
 mod mandible;
@@ -31,6 +32,7 @@ pub use check::{TrajectoryReport, check};
 pub use error::TrajectoryError;
 pub use jaw_frame::{closed_pose, jaw_points};
 
+pub(crate) use interpolation::interpolate;
 pub(crate) use rhythm::minimum_jerk;
 
 use chewing::Chewing;
@@ -99,6 +101,16 @@ impl Trajectory {
     /// [`duration_s`](Self::duration_s).
     pub fn pose(&self, t_s: f64) -> Pose {
         self.pose_in_motion(self.motion_time_s(t_s))
+    }
+
+    /// The same with a share of the jaw's way from its first pose.
+    pub(crate) fn scaled_pose(&self, t_s: f64, amplitude: f64) -> Pose {
+        if amplitude >= 1.0 {
+            return self.pose(t_s);
+        }
+        let [first, there] =
+            [0.0, self.motion_time_s(t_s)].map(|motion_s| self.motion.displacement(motion_s));
+        self.frame.platform(&interpolate(&first, &there, amplitude))
     }
 
     /// The platform in the base frame at a time of the motion, s.

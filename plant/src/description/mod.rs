@@ -43,7 +43,8 @@ pub fn dbc(scenario: &Scenario) -> Result<String, PlantError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::drive::dictionary::{ENTRIES, OBJECTS};
+    use crate::drive::dictionary::{Access, ENTRIES, Initial, Mapping, OBJECTS};
+    use masseter_can::canopen::dcf::{self, Dcf};
 
     #[test]
     fn a_sheet_has_every_object_and_every_entry_once() {
@@ -54,6 +55,40 @@ mod tests {
         }
         let headings = first.matches("AccessType=").count();
         assert_eq!(headings, ENTRIES.len());
+    }
+
+    #[test]
+    fn a_reader_of_sheets_finds_every_entry_as_it_is_in_the_dictionary() {
+        let settings = DriveSettings::for_axes(&Scenario::default()).unwrap();
+        for settings in &settings {
+            let sheet = Dcf::parse(&eds::write(settings)).unwrap();
+            let mut entries: Vec<_> = ENTRIES.iter().collect();
+            entries.sort_by_key(|entry| (entry.address.index, entry.address.subindex));
+            assert_eq!(sheet.entries().len(), entries.len());
+            for (read, entry) in sheet.entries().zip(entries) {
+                let at = entry.address;
+                assert_eq!((read.address, read.name.as_str()), (at, entry.name));
+                assert_eq!(read.data_type.0, entry.kind as u16, "{at}");
+                assert_eq!(read.is_mappable, entry.mapping != Mapping::Never, "{at}");
+                let access = match entry.access {
+                    Access::Constant => dcf::Access::Constant,
+                    Access::ReadOnly => dcf::Access::ReadOnly,
+                    Access::ReadWrite => dcf::Access::ReadWrite,
+                };
+                assert_eq!(read.access, access, "{at}");
+                let number =
+                    |value: &Option<dcf::Value>| value.as_ref().and_then(|v| v.number(settings.node));
+                let limits = entry.limits.map(|(lowest, highest)| (lowest.into(), highest.into()));
+                assert_eq!(number(&read.lowest).zip(number(&read.highest)), limits, "{at}");
+                let value = match entry.initial {
+                    Initial::Text(text) => text.as_bytes().to_vec(),
+                    _ => settings.objects.at(at.index, at.subindex).to_le_bytes()[..entry.kind.bytes()]
+                        .to_vec(),
+                };
+                let default = read.default.as_ref().unwrap();
+                assert_eq!(read.encode(default, settings.node), Some(value), "{at}");
+            }
+        }
     }
 
     #[test]

@@ -5,11 +5,13 @@
 use std::collections::VecDeque;
 use std::ops::Range;
 
-use masseter_shared::clock::SECOND_NS;
 use masseter_shared::config::{FaultConfig, FaultKindConfig, FaultLayer, Scenario, StimulusConfig};
 use masseter_shared::geometry::{Mechanism, Pose};
 use masseter_shared::injection::Injected;
+use nalgebra::Vector6;
 
+use super::push::Push;
+use crate::error::PlantError;
 use crate::injection::{Occurrence, acting_ns};
 use crate::mechanism::{Food, closed_mouth};
 
@@ -20,8 +22,8 @@ pub(super) enum Effect {
     Fault { kind: FaultKindConfig, size: f64, axis: Option<usize> },
     /// A mass at the incisal point, by a fault.
     FaultyPayload { kg: f64 },
-    /// A force on the platform.
-    Push(Box<StimulusConfig>),
+    /// A force and a torque on the platform.
+    Push(Box<Push>),
     /// Another food.
     Food(Box<Food>),
     /// A mass at the incisal point.
@@ -59,18 +61,19 @@ pub(super) struct Agenda {
 
 impl Agenda {
     /// The entries of a scenario that drives and mechanism carry out. None acts before its window is set.
-    pub(super) fn new(scenario: &Scenario, mechanism: &Mechanism) -> Self {
+    pub(super) fn new(scenario: &Scenario, mechanism: &Mechanism) -> Result<Self, PlantError> {
         let closed = closed_mouth(mechanism, &scenario.jaw);
         let faults = scenario.faults.iter().enumerate().filter_map(|(place, config)| {
             Some(Entry::new(Injected::Fault(place), effect_of_fault(config)?, Some(config)))
         });
-        let stimuli = scenario.stimulus.iter().enumerate().filter_map(|(place, config)| {
-            Some(Entry::new(Injected::Stimulus(place), effect_of_stimulus(config, &closed)?, None))
-        });
-        let entries: Vec<_> = faults.chain(stimuli).collect();
+        let mut entries: Vec<_> = faults.collect();
+        for (place, config) in scenario.stimulus.iter().enumerate() {
+            let effect = effect_of_stimulus(config, &closed)?;
+            entries.extend(effect.map(|effect| Entry::new(Injected::Stimulus(place), effect, None)));
+        }
         // An entry begins once and ends once.
         let occurrences = VecDeque::with_capacity(2 * entries.len());
-        Self { entries, next_change_ns: u64::MAX, occurrences }
+        Ok(Self { entries, next_change_ns: u64::MAX, occurrences })
     }
 
     /// Whether there are no entries.
@@ -81,9 +84,10 @@ impl Agenda {
     /// Sets when an entry acts.
     pub(super) fn set_window(&mut self, injected: Injected, window_ns: &Range<u64>) {
         for entry in self.entries.iter_mut().filter(|entry| entry.injected == injected) {
-            entry.window_ns = match &entry.fault {
-                Some(fault) => acting_ns(fault, window_ns.clone()),
-                None => window_ns.clone(),
+            entry.window_ns = match (&entry.fault, &entry.effect) {
+                (Some(fault), _) => acting_ns(fault, window_ns.clone()),
+                (None, Effect::Push(push)) => push.acting_ns(window_ns),
+                (None, _) => window_ns.clone(),
             };
             self.next_change_ns = 0;
         }
@@ -137,15 +141,12 @@ impl Agenda {
         self.entries.iter().filter(|entry| entry.is_active).map(|entry| &entry.effect)
     }
 
-    /// The forces that act at that time: N in base axes, and their points.
-    pub(super) fn pushes(&self, now_ns: u64) -> impl Iterator<Item = ([f64; 3], Option<[f64; 3]>)> {
+    /// The forces (N) and torques (N m) in base axes that act at that time, and the points of the forces.
+    pub(super) fn pushes(&self, now_ns: u64) -> impl Iterator<Item = (Vector6<f64>, Option<[f64; 3]>)> {
         let active = self.entries.iter().filter(|entry| entry.is_active);
         active.filter_map(move |entry| {
             let Effect::Push(push) = &entry.effect else { return None };
-            let since_s = now_ns.saturating_sub(entry.window_ns.start) as f64 / SECOND_NS as f64;
-            let for_s = push.for_s.unwrap_or(f64::INFINITY);
-            let share = push.shape.at(since_s, for_s, push.frequency_hz.unwrap_or_default());
-            Some((push.push_n?.map(|newtons| newtons * share), push.point_m))
+            Some((push.wrench(now_ns.saturating_sub(entry.window_ns.start)), push.point_m))
         })
     }
 
@@ -225,12 +226,11 @@ fn effect_of_fault(config: &FaultConfig) -> Option<Effect> {
     }
 }
 
-fn effect_of_stimulus(config: &StimulusConfig, closed: &Pose) -> Option<Effect> {
-    if config.push_n.is_some() {
-        return Some(Effect::Push(Box::new(config.clone())));
-    }
-    let food = config.food.map(|food| Effect::Food(Box::new(Food::new(food, closed))));
-    food.or_else(|| config.payload.map(|payload| Effect::Payload { kg: payload.si() }))
+fn effect_of_stimulus(config: &StimulusConfig, closed: &Pose) -> Result<Option<Effect>, PlantError> {
+    let push = Push::new(config)?.map(|push| Effect::Push(Box::new(push)));
+    let food = || config.food.map(|food| Effect::Food(Box::new(Food::new(food, closed))));
+    let payload = || config.payload.map(|payload| Effect::Payload { kg: payload.si() });
+    Ok(push.or_else(food).or_else(payload))
 }
 
 #[cfg(test)]
@@ -240,7 +240,7 @@ mod tests {
     use super::*;
 
     fn agenda(scenario: &Scenario) -> Agenda {
-        Agenda::new(scenario, &Mechanism::new(&scenario.mechanism).unwrap())
+        Agenda::new(scenario, &Mechanism::new(&scenario.mechanism).unwrap()).unwrap()
     }
 
     #[test]
@@ -271,6 +271,7 @@ mod tests {
     fn a_push_has_its_shape_from_the_beginning_of_its_window() {
         let push = StimulusConfig {
             push_n: Some([0.0, 0.0, -8.0]),
+            torque_n_m: Some([0.4, 0.0, 0.0]),
             shape: Shape::Ramp,
             for_s: Some(0.2),
             ..StimulusConfig::at(1.0)
@@ -278,8 +279,11 @@ mod tests {
         let mut agenda = agenda(&Scenario { stimulus: vec![push], ..Scenario::default() });
         agenda.set_window(Injected::Stimulus(0), &(1_000_000_000..1_200_000_000));
         assert!(agenda.next_change(1_000_050_000).is_some());
-        let (force_n, point_m) = agenda.pushes(1_050_000_000).next().unwrap();
-        assert!((force_n[2] + 2.0).abs() < 1e-9 && point_m.is_none(), "{force_n:?}");
+        let (wrench, point_m) = agenda.pushes(1_050_000_000).next().unwrap();
+        assert!(
+            (wrench[2] + 2.0).abs() < 1e-9 && (wrench[3] - 0.1).abs() < 1e-9 && point_m.is_none(),
+            "{wrench}"
+        );
         assert_eq!(agenda.next_occurrence().map(|told| told.has_ended), Some(false));
         assert!(agenda.next_change(1_200_000_000).is_some());
         assert_eq!(agenda.next_occurrence().map(|told| told.has_ended), Some(true));

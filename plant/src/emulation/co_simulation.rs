@@ -81,7 +81,7 @@ impl Emulation {
         let mechanism = Mechanism::new(&scenario.mechanism)?;
         let food = scenario.food.map(|config| Food::new(config, &closed_mouth(&mechanism, &scenario.jaw)));
         let start = level(&mechanism, scenario.dynamics.initial_leg_m);
-        let mut agenda = Agenda::new(scenario, &mechanism);
+        let mut agenda = Agenda::new(scenario, &mechanism)?;
         let injection =
             Injection::new(scenario, now_ns).map_err(|error| PlantError::Scenario(error.to_string()))?;
         for (injected, window_ns) in known_windows(scenario, &injection) {
@@ -191,8 +191,8 @@ impl Emulation {
     /// Pushes the mechanism with the scenario's forces too, and reports the faults that have struck.
     fn push_injected(&mut self, now_ns: u64) -> Result<(), DynamicsError> {
         self.dynamics.release();
-        for (force_n, point_m) in self.agenda.pushes(now_ns) {
-            self.dynamics.load(force_n, point_m);
+        for (wrench, point_m) in self.agenda.pushes(now_ns) {
+            self.dynamics.load(&wrench, point_m);
         }
         self.dynamics.push(&self.force_n)?;
         let mut from = 0;

@@ -8,7 +8,9 @@ mod co_simulation;
 mod emulator;
 mod encoder_faults;
 mod open_link;
+mod push;
 mod virtual_link;
+mod wrench_table;
 
 pub use co_simulation::Emulation;
 pub use emulator::{Emulator, EmulatorCounters};

@@ -161,10 +161,11 @@ impl Dynamics {
         }
     }
 
-    /// Adds a force for the coming step (N, base axes) at a point of the platform (m; the incisal point when absent).
-    pub(crate) fn load(&mut self, force_n: [f64; 3], point_m: Option<[f64; 3]>) {
+    /// Adds a force (N) and a torque (N m) for the coming step, in base axes. The force acts at a point of the platform (m;
+    /// the incisal point when absent).
+    pub(crate) fn load(&mut self, wrench: &Vector6<f64>, point_m: Option<[f64; 3]>) {
         if let Some(injected) = &mut self.injected {
-            injected.load.push(&self.state.pose, Vec3::from(force_n), point_m.map(Vec3::from));
+            injected.load.push(&self.state.pose, wrench, point_m.map(Vec3::from));
         }
     }
 

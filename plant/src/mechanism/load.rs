@@ -1,4 +1,6 @@
-//! What a scenario loads the platform with: a mass at the incisal point, and forces of stimuli.
+//! What a scenario loads the platform with: a mass at the incisal point, and forces and torques of stimuli.
+
+use std::ops::AddAssign;
 
 use masseter_shared::geometry::{Pose, Twist, Vec3};
 use nalgebra::{Matrix3, Matrix6, Vector6};
@@ -11,7 +13,7 @@ pub(super) struct Load {
     /// The incisal point in the platform frame, m.
     incisal_m: Vec3,
     payload_kg: f64,
-    /// The wrench of the forces on the platform, about its origin, in base axes.
+    /// The wrench of the pushes on the platform, about its origin, in base axes.
     pushed: Vector6<f64>,
 }
 
@@ -26,16 +28,18 @@ impl Load {
         self.payload_kg = payload_kg;
     }
 
-    /// Takes every force away.
+    /// Takes every push away.
     pub(super) fn release(&mut self) {
         self.pushed = Vector6::zeros();
     }
 
-    /// Adds a force (N, base axes) at a point of the platform (m, platform frame; the incisal point when absent).
-    pub(super) fn push(&mut self, pose: &Pose, force_n: Vec3, point_m: Option<Vec3>) {
+    /// Adds a force (N) and a torque (N m), in base axes. The force acts at a point of the platform (m, platform frame; the
+    /// incisal point when absent).
+    pub(super) fn push(&mut self, pose: &Pose, wrench: &Vector6<f64>, point_m: Option<Vec3>) {
         let arm = pose.rotation * point_m.unwrap_or(self.incisal_m);
-        let moment = arm.cross(&force_n);
-        self.pushed += Vector6::new(force_n.x, force_n.y, force_n.z, moment.x, moment.y, moment.z);
+        let moment = arm.cross(&wrench.fixed_rows::<3>(0));
+        self.pushed += wrench;
+        self.pushed.fixed_rows_mut::<3>(3).add_assign(&moment);
     }
 
     /// The payload's share of the platform's mass matrix, which is that of a point mass.
@@ -87,11 +91,12 @@ mod tests {
     }
 
     #[test]
-    fn its_weight_and_a_force_act_where_they_are() {
+    fn its_weight_and_a_force_act_where_they_are_and_a_torque_anywhere() {
         let mut load = load();
-        load.push(&Pose::identity(), Vec3::new(0.0, 5.0, 0.0), Some(Vec3::new(0.1, 0.0, 0.0)));
+        let push = Vector6::new(0.0, 5.0, 0.0, 0.2, 0.0, 0.0);
+        load.push(&Pose::identity(), &push, Some(Vec3::new(0.1, 0.0, 0.0)));
         let wrench = load.wrench(&Pose::identity(), &Twist::zeros(), 10.0);
-        assert!((wrench - Vector6::new(0.0, 5.0, -20.0, 0.0, 0.6, 0.5)).amax() < 1e-12, "{wrench}");
+        assert!((wrench - Vector6::new(0.0, 5.0, -20.0, 0.2, 0.6, 0.5)).amax() < 1e-12, "{wrench}");
         load.release();
         assert_eq!(load.wrench(&Pose::identity(), &Twist::zeros(), 0.0), Vector6::zeros());
     }

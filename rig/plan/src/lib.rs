@@ -146,8 +146,8 @@ fn apply(overrides: &Overrides, scenario: &mut Scenario) -> anyhow::Result<()> {
     if let Some(path) = &overrides.trajectory {
         play_file(path, scenario);
     }
-    if let MotionConfig::File(file) = &mut scenario.motion {
-        file.path = absolute(&file.path)?;
+    for (_, file) in scenario.files_mut() {
+        *file = absolute(file)?;
     }
     if let Some(duration) = overrides.duration {
         scenario.duration_s = Some(duration.as_secs_f64());
@@ -176,6 +176,6 @@ fn absolute(path: &Path) -> anyhow::Result<PathBuf> {
     let absolute = path.canonicalize().with_context(|| format!("cannot read {}", path.display()))?;
     // The manifest is written down with it.
     let is_text = absolute.to_str().is_some();
-    ensure!(is_text, "motion.path = {}: use folders and a file whose names are UTF-8", path.display());
+    ensure!(is_text, "{}: use folders and a file whose names are UTF-8", path.display());
     Ok(absolute)
 }

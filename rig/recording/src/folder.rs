@@ -9,9 +9,6 @@ use std::time::UNIX_EPOCH;
 use crate::output::{OutputError, new_folder};
 use masseter_shared::clock;
 
-/// Name of the recorded motion within the folder, as its scenario knows it.
-pub const MOTION: &str = "motion.csv";
-
 /// The folder of a run.
 ///
 /// ```
@@ -96,11 +93,6 @@ impl RunFolder {
     /// The scenario as resolved; it runs the same again.
     pub fn scenario(&self) -> PathBuf {
         self.0.join("scenario.toml")
-    }
-
-    /// The recorded motion that was played, if it was one; the scenario beside it names it.
-    pub fn motion(&self) -> PathBuf {
-        self.0.join(MOTION)
     }
 
     /// Scenario, machine, scheduling and end of the run.

@@ -29,7 +29,7 @@ mod writer;
 pub use backlog::{Backlog, Pace, WriteOutcome};
 pub use circumstances::{DmaLatency, Ending, Machine as MachineInfo, ProcessFault, RunUsage, Usage};
 pub use encoding::{CDR_LITTLE_ENDIAN, Channel, Encoded, Encoder, SCHEMA_ENCODING, definitions};
-pub use folder::{FolderError, MOTION, RunFolder};
+pub use folder::{FolderError, RunFolder};
 pub use manifest::Manifest;
 pub use reader::{Chunks, Entry, ReadError, Reader};
 pub use recover::{RecoverError, Recovered, recover};

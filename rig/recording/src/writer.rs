@@ -31,8 +31,8 @@ const COMPRESSION_LEVEL: u32 = 1;
 const PROFILE: &str = "ros2";
 /// The name of this program in the header of a recording.
 const LIBRARY: &str = concat!("masseter ", env!("CARGO_PKG_VERSION"));
-/// A recorded motion with more bytes than this lies beside the recording alone: readers hold attached files in memory.
-const LONGEST_MOTION: u64 = 16 << 20;
+/// A file of the scenario with more bytes than this lies beside the recording alone: readers hold attached files in memory.
+const LONGEST_FILE: u64 = 16 << 20;
 /// Bytes gathered before they go to the system.
 const BUFFER_BYTES: usize = 1 << 18;
 
@@ -145,15 +145,17 @@ impl Recorder {
         Self::new(DurableFile::create(path)?, scene)
     }
 
-    /// Creates the recording of a run, with what explains it attached: the scenario, the recorded motion that it plays,
-    /// and the circumstances at the start. A file that is cut short contains them.
+    /// Creates the recording of a run, with what explains it attached: the scenario, the files that it names, and
+    /// the circumstances at the start. A file that is cut short contains them.
     pub fn of_run(folder: &RunFolder, scene: Scene) -> Result<Self, WriteError> {
         let mut recorder = Self::create(&folder.recording(), scene)?;
-        let manifest = Manifest::read(folder)?;
+        let mut manifest = Manifest::read(folder)?;
         recorder.attach("scenario.toml", "application/toml", &fs::read(folder.scenario())?)?;
-        let motion = fs::metadata(folder.motion());
-        if motion.is_ok_and(|file| file.len() <= LONGEST_MOTION) {
-            recorder.attach("motion.csv", "text/csv", &fs::read(folder.motion())?)?;
+        for (name, _) in manifest.scenario.files_mut() {
+            let path = folder.file(&name);
+            if fs::metadata(&path).is_ok_and(|file| file.len() <= LONGEST_FILE) {
+                recorder.attach(&name, "text/csv", &fs::read(path)?)?;
+            }
         }
         recorder.attach("circumstances.json", "application/json", manifest.at_start().as_bytes())?;
         recorder.flush()?;

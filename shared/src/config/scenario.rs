@@ -1,7 +1,7 @@
 //! A scenario as a whole: read from TOML, checked, and written back as resolved.
 
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use toml::Table;
 
@@ -114,7 +114,7 @@ impl Scenario {
         is_given.then(|| Some(Document::parse(path, &text).ok()?.place_of(key, None))).flatten()
     }
 
-    /// Reads a scenario file. The path of a recording is relative to the folder of the scenario. The values are not checked
+    /// Reads a scenario file. The paths of its files are relative to its folder. The values are not checked
     /// yet: see [`Self::validate`].
     ///
     /// # Errors
@@ -124,10 +124,24 @@ impl Scenario {
         let text = read_text(path, MOST_BYTES)
             .map_err(|error| ScenarioError::Unreadable { path: path.to_owned(), error })?;
         let mut scenario = Self::parse(path, &text)?;
-        if let (MotionConfig::File(file), Some(folder)) = (&mut scenario.motion, path.parent()) {
-            file.path = folder.join(&file.path);
+        if let Some(folder) = path.parent() {
+            scenario.files_mut().for_each(|(_, file)| *file = folder.join(&file));
         }
+        let folder = path.parent().unwrap_or(Path::new(""));
+        scenario.drive_profile.iter_mut().try_for_each(|profile| profile.read_dcf(folder))?;
         Ok(scenario)
+    }
+
+    /// The files that a run reads beside the scenario, each with the name of its copy in the run's folder.
+    pub fn files_mut(&mut self) -> impl Iterator<Item = (String, &mut PathBuf)> {
+        let motion = match &mut self.motion {
+            MotionConfig::File(file) => Some(("motion.csv".to_owned(), &mut file.path)),
+            _ => None,
+        };
+        let tables = self.stimulus.iter_mut().zip(1..).filter_map(|(stimulus, number)| {
+            Some((format!("stimulus_{number}.csv"), stimulus.push_table.as_mut()?))
+        });
+        motion.into_iter().chain(tables)
     }
 
     /// Parses the text of a scenario; `path` is for messages only.

@@ -1,6 +1,7 @@
 //! Stimuli: what happens to the jaw, the food and the controller during the motion: `[[stimulus]]`.
 
 use std::fmt::{self, Display, Formatter};
+use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
 
@@ -45,7 +46,8 @@ impl Shape {
     }
 }
 
-/// One stimulus. Exactly one of `push_n`, `food`, `payload`, `parameter` and `stop` says what happens.
+/// One stimulus. Exactly one of a push, `food`, `payload`, `parameter` and `stop` says what happens. A push is `push_n`,
+/// `torque_n_m` or both; or `push_table`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct StimulusConfig {
@@ -64,6 +66,10 @@ pub struct StimulusConfig {
     pub frequency_hz: Option<f64>,
     /// A force on the jaw, in base axes, N.
     pub push_n: Option<[f64; 3]>,
+    /// A torque on the jaw, in base axes, N m.
+    pub torque_n_m: Option<[f64; 3]>,
+    /// A CSV file with the force and the torque over time.
+    pub push_table: Option<PathBuf>,
     /// Where the force acts, in the platform frame, m; the incisal point when absent.
     pub point_m: Option<[f64; 3]>,
     /// Another food from then on.
@@ -87,6 +93,9 @@ impl Display for StimulusConfig {
 }
 
 impl StimulusConfig {
+    /// Size of the largest table, bytes: more than an hour at 50 Hz.
+    pub const MOST_TABLE_BYTES: u64 = 16 << 20;
+
     /// A stimulus at that time of the motion that does nothing yet.
     pub const fn at(at_s: f64) -> Self {
         Self {
@@ -97,6 +106,8 @@ impl StimulusConfig {
             shape: Shape::Step,
             frequency_hz: None,
             push_n: None,
+            torque_n_m: None,
+            push_table: None,
             point_m: None,
             food: None,
             payload: None,
@@ -114,7 +125,8 @@ impl StimulusConfig {
     /// What happens; none unless it is exactly one thing.
     fn what(&self) -> Option<&'static str> {
         let given = [
-            (self.push_n.is_some(), "push"),
+            (self.push_n.is_some() || self.torque_n_m.is_some(), "push"),
+            (self.push_table.is_some(), "push"),
             (self.food.is_some(), "food"),
             (self.payload.is_some(), "payload"),
             (self.parameter.is_some(), "parameter"),
@@ -147,13 +159,13 @@ impl StimulusConfig {
             require_name("stimulus.name", name)?;
         }
         let Some(what) = self.what() else {
-            let need = "give exactly one of push_n, food, payload, parameter, stop = true";
+            let need = "give exactly one of push_n and torque_n_m, push_table, food, payload, parameter, stop = true";
             return refuse("stimulus.push_n", "none or several", need);
         };
-        let is_push = what == "push";
+        let (has_force, is_table) = (self.push_n.is_some(), self.push_table.is_some());
         let keys = [
-            ("stimulus.point_m", self.point_m.is_some(), is_push),
-            ("stimulus.shape", self.shape != Shape::Step, is_push),
+            ("stimulus.point_m", self.point_m.is_some(), has_force || is_table),
+            ("stimulus.shape", self.shape != Shape::Step, what == "push" && !is_table),
             ("stimulus.frequency_hz", self.frequency_hz.is_some(), self.shape == Shape::Sine),
             ("stimulus.value", self.value.is_some(), what == "parameter"),
             ("stimulus.for_s", self.for_s.is_some(), what != "stop" && what != "parameter"),
@@ -176,6 +188,9 @@ impl StimulusConfig {
     fn check_ranges(&self) -> Result<(), ScenarioError> {
         for push_n in self.push_n.into_iter().flatten() {
             require_within(&[("stimulus.push_n", push_n, -2000.0, 2000.0)])?;
+        }
+        for torque_n_m in self.torque_n_m.into_iter().flatten() {
+            require_within(&[("stimulus.torque_n_m", torque_n_m, -200.0, 200.0)])?;
         }
         for point_m in self.point_m.into_iter().flatten() {
             require_within(&[("stimulus.point_m", point_m, -0.5, 0.5)])?;

@@ -1,4 +1,4 @@
-//! Stimuli that the plant carries out: forces on the jaw, food, payload.
+//! Stimuli that the plant carries out: pushes on the jaw, food, payload.
 
 use masseter_shared::config::{FoodConfig, Shape, StimulusConfig};
 
@@ -65,6 +65,36 @@ fn the_axes_balance_a_push_on_the_jaw_with_its_moment() {
     assert!((during - expected).fixed_rows::<3>(0).amax() < 0.3, "{during} for {expected}");
     assert!((during - expected).fixed_rows::<3>(3).amax() < 0.01, "{during} for {expected}");
     assert!(after.amax() < 0.3, "{after}");
+}
+
+#[test]
+fn the_axes_balance_a_torque_on_the_jaw() {
+    let torque = [0.3, -0.2, 0.4];
+    let [during, after] = wrench_changes(StimulusConfig { torque_n_m: Some(torque), ..stimulus() });
+    // Friction carries a part.
+    let expected = -nalgebra::Vector6::new(0.0, 0.0, 0.0, torque[0], torque[1], torque[2]);
+    assert!((during - expected).fixed_rows::<3>(0).amax() < 0.3, "{during} for {expected}");
+    assert!((during - expected).fixed_rows::<3>(3).amax() < 0.05, "{during} for {expected}");
+    assert!(after.amax() < 0.3, "{after}");
+}
+
+#[test]
+fn a_push_by_a_table_ends_with_the_table() {
+    let table = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../examples/suite/push.csv");
+    let (mut bench, held_m) =
+        bench_with(StimulusConfig { push_table: Some(table), ..StimulusConfig::at(AT_S) });
+    hold(&mut bench, held_m, 50);
+    let quiet_n = wrench(&bench)[2];
+    let mut most_n: f64 = 0.0;
+    for _ in 0..500 {
+        hold(&mut bench, held_m, 1);
+        most_n = most_n.max(wrench(&bench)[2] - quiet_n);
+    }
+    assert!((20.0..33.0).contains(&most_n), "{most_n} N against 26 N");
+    let told = bench.events.iter().filter(|event| event.source == Source::Scenario.code());
+    let times_ns: Vec<_> = told.map(|event| event.time_ns).collect();
+    let [began_ns, ended_ns] = times_ns[..] else { panic!("{times_ns:?}") };
+    assert!((399_500_000..400_500_000).contains(&(ended_ns - began_ns)), "{times_ns:?}");
 }
 
 #[test]

@@ -1,9 +1,11 @@
-//! CANopen messages (CiA 301): node ids, the predefined connection set, NMT, heartbeat, SYNC, EMCY and SDO.
+//! CANopen messages (CiA 301): node ids, the predefined connection set, NMT, heartbeat, SYNC, EMCY and SDO; and the
+//! [descriptions](dcf) of devices.
 //!
 //! This module encodes and decodes messages. Supervision, boot-up and reactions are not part of the crate. The PDOs are
 //! in the [crate root](crate).
 
 mod cob;
+pub mod dcf;
 mod emcy;
 mod heartbeat;
 mod nmt;

@@ -3,6 +3,7 @@
 //! A profile is data: identity, units, objects, storing, brake and homing. Nothing here talks to a drive, and an emulated drive
 //! takes nothing but its identity from its profile.
 
+mod dcf;
 mod homing;
 mod identity;
 mod kind;
@@ -11,7 +12,7 @@ mod scale;
 mod units;
 
 use std::collections::BTreeMap;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 
 use super::error::ScenarioError;
@@ -83,6 +84,11 @@ impl DriveProfile {
     pub fn of_axis(profiles: &[Self], axis: usize) -> &Self {
         let named = |profile: &&Self| profile.axes.iter().any(|name| name == AXIS_NAMES[axis]);
         profiles.iter().find(named).unwrap_or(&EMULATED)
+    }
+
+    /// Replaces `dcf`, whose path is relative to a folder, by the objects of its file.
+    pub(super) fn read_dcf(&mut self, folder: &Path) -> Result<(), ScenarioError> {
+        self.dcf.take().map_or(Ok(()), |path| dcf::add_objects(&mut self.objects, &folder.join(path)))
     }
 
     /// What the profile says of an object; nothing in particular when absent.

@@ -179,6 +179,19 @@ const WRONG: &[(&str, &str)] = &[
     ("[[stimulus]]\nat_s = 1.0", "stimulus.push_n = none or several: give exactly one"),
     ("[[stimulus]]\nat_s = 1.0\nstop = true\nvalue = 1.0", "stimulus.value = given: leave it away"),
     ("[[stimulus]]\nat_s = 1.0\npush_n = [0, 0, 1]\nshape = 'ramp'", "stimulus.for_s = none"),
+    (
+        "[[stimulus]]\nat_s = 1.0\npush_n = [0, 0, 1]\npush_table = 'a.csv'",
+        "none or several: give exactly one",
+    ),
+    (
+        "[[stimulus]]\nat_s = 1.0\npush_table = 'a.csv'\nshape = 'sine'",
+        "stimulus.shape = given: leave it away",
+    ),
+    (
+        "[[stimulus]]\nat_s = 1.0\ntorque_n_m = [0, 0, 1]\npoint_m = [0, 0, 0]",
+        "stimulus.point_m = given: leave it away",
+    ),
+    ("[[stimulus]]\nat_s = 1.0\ntorque_n_m = [0, 0, 201]", "stimulus.torque_n_m = 201: use -200 to 200"),
     ("[[require]]\nsignal = 'bite.force'", "require.name = ''"),
     ("[[require]]\nname = 'a'\nmax = '3 mms'", "the unit 'mms' is unknown"),
     ("[can]\nbitrate_bps = 2000000", "can.bitrate_bps = 2000000: bit rate 2000000"),

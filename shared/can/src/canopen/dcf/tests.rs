@@ -1,0 +1,118 @@
+use super::*;
+use crate::canopen::{NodeId, ObjectAddress};
+
+const HEAD: &str = "ParameterName=Some\nObjectType=0x7\nAccessType=rw\n";
+
+/// The entry 2000h:00h with these lines.
+fn read(lines: &str) -> Result<Entry, DcfError> {
+    let dcf = Dcf::parse(&format!("[2000]\n{HEAD}{lines}"))?;
+    Ok(dcf.entry(ObjectAddress::new(0x2000, 0)).unwrap().clone())
+}
+
+fn node(id: u8) -> NodeId {
+    NodeId::new(id).unwrap()
+}
+
+#[test]
+fn numbers_are_decimal_hexadecimal_octal_or_follow_from_the_node() {
+    let table = [
+        ("4", "-12", Value::Number(-12)),
+        ("7", "0x1F", Value::Number(31)),
+        ("7", "0X1f", Value::Number(31)),
+        ("7", "017", Value::Number(15)),
+        ("7", "0", Value::Number(0)),
+        ("7", "$NODEID+0x180", Value::OfNode(0x180)),
+        ("7", "0x80000200 + $NodeId", Value::OfNode(0x8000_0200)),
+        ("7", "$NODEID", Value::OfNode(0)),
+        ("4", "0x80000000", Value::Number(i32::MIN.into())),
+        ("2", "0xFD", Value::Number(-3)),
+        ("0x1B", "0xFFFFFFFFFFFFFFFF", Value::Number(u64::MAX.into())),
+        ("8", "2.5", Value::Real(2.5)),
+        ("9", "017", Value::Text("017".to_owned())),
+    ];
+    for (data_type, text, expected) in table {
+        let entry = read(&format!("DataType={data_type}\nDefaultValue={text}")).unwrap();
+        assert_eq!(entry.default, Some(expected), "{text}");
+    }
+}
+
+#[test]
+fn what_cannot_be_read_is_refused_with_its_line_and_a_remedy() {
+    let table = [
+        ("DataType=7\nDefaultValue=08", 6, "DefaultValue=08 is no number; write decimal, 0x hexadecimal,"),
+        ("DataType=7\nDefaultValue=0x", 6, "DefaultValue=0x is no number"),
+        ("DataType=7\nHighLimit=+-1", 6, "HighLimit=+-1 is no number"),
+        ("DataType=7\nHighLimit=$NODEID-1", 6, "HighLimit=$NODEID-1 is no number"),
+        ("DataType=5\nHighLimit=256", 6, "HighLimit=256 is not within 0 to 255"),
+        ("DataType=7\nLowLimit=-1", 6, "LowLimit=-1 is not within 0 to 4294967295"),
+        ("DataType=0x10000", 5, "DataType=0x10000 is not within 0 to 65535"),
+        ("DataType=7\nPDOMapping=2", 6, "PDOMapping=2 is not within 0 to 1"),
+        ("LowLimit=0", 1, "[2000] has no DataType; add it"),
+        ("DataType=7\n\nno value", 7, "\"no value\" is neither [section] nor key=value"),
+        ("DataType=7\ndatatype=7", 6, "datatype occurs twice in its section, first in line 5"),
+        ("DataType=7\n[2000]", 6, "[2000] occurs twice, first in line 1"),
+        ("DataType=7\n[2001sub0]", 6, "[2001sub0] has no section [2001] of its object; add it"),
+        ("DataType=7\n[2001]\nObjectType=3", 6, "ObjectType=0x3 is none of 2 (domain)"),
+    ];
+    for (lines, line, message) in table {
+        let error = read(lines).unwrap_err();
+        assert_eq!(error.line, line, "{error}");
+        assert!(error.to_string().starts_with(&format!("line {line}: {message}")), "{error}");
+    }
+    let access = Dcf::parse("[2000]\nParameterName=Some\nDataType=7\nAccessType=any").unwrap_err();
+    assert_eq!(access.to_string(), "line 4: AccessType=any is none of ro, wo, rw, rwr, rww, const");
+    let outside = Dcf::parse("; comment\nKey=1").unwrap_err();
+    assert_eq!(outside.to_string(), "line 2: Key stands before the first [section]");
+}
+
+#[test]
+fn entries_come_in_the_order_of_addresses_whatever_the_order_of_sections() {
+    let var = |name: &str| format!("[{name}]\n{HEAD}DataType=7\n");
+    let text = [
+        var("6040"),
+        "[1018]\nParameterName=Identity\nObjectType=9\nSubNumber=2\n".to_owned(),
+        var("1018sub10"),
+        var("1018SUB1"),
+        var("1000"),
+        "[Comments]\nLines=0\n".to_owned(),
+    ]
+    .concat();
+    let dcf = Dcf::parse(&text).unwrap();
+    let addresses: Vec<_> = dcf.entries().map(|entry| entry.address.to_string()).collect();
+    assert_eq!(addresses, ["1000h:00h", "1018h:01h", "1018h:10h", "6040h:00h"]);
+    assert!(dcf.has_object(0x1018) && !dcf.has_object(0x1017));
+}
+
+#[test]
+fn a_compact_array_has_all_its_entries() {
+    let text = "[1003]\nParameterName=Errors\nObjectType=8\nDataType=7\nAccessType=ro\nDefaultValue=9\nCompactSubObj=2\n\
+                [1003Name]\nNrOfEntries=1\n2=Older\n[1003Value]\nNrOfEntries=1\n1=0x10\n";
+    let dcf = Dcf::parse(text).unwrap();
+    let entry = |subindex| dcf.entry(ObjectAddress::new(0x1003, subindex)).unwrap();
+    let read = [0, 1, 2].map(|subindex| (entry(subindex).name.as_str(), entry(subindex).default.clone()));
+    let expected = [("Highest sub-index supported", 2), ("Errors1", 0x10), ("Older", 9)];
+    assert_eq!(read, expected.map(|(name, number)| (name, Some(Value::Number(number)))));
+}
+
+#[test]
+fn a_value_has_the_bytes_that_the_bus_carries() {
+    let bytes = |data_type: &str, text: &str| {
+        let entry = read(&format!("DataType={data_type}\nDefaultValue={text}")).unwrap();
+        entry.encode(entry.value().unwrap(), node(5)).unwrap()
+    };
+    assert_eq!(bytes("7", "$NODEID+0x180"), [0x85, 1, 0, 0]);
+    assert_eq!(bytes("2", "-3"), [0xFD]);
+    assert_eq!(bytes("9", "Kiefer"), b"Kiefer");
+    assert_eq!(bytes("8", "1.0"), [0, 0, 0x80, 0x3F]);
+}
+
+#[test]
+fn a_configuration_takes_the_place_of_the_value_as_delivered() {
+    let entry = read("DataType=7\nDefaultValue=1\nParameterValue=\nLowLimit=\n").unwrap();
+    assert_eq!((entry.value(), entry.lowest.clone()), (Some(&Value::Number(1)), None), "empty is absent");
+    let entry = read("DataType=7\nDefaultValue=1\nParameterValue=2\nLowLimit=0x1\nHighLimit=3").unwrap();
+    assert_eq!(entry.value(), Some(&Value::Number(2)));
+    assert_eq!([entry.lowest, entry.highest], [1, 3].map(|number| Some(Value::Number(number))));
+    let dcf = Dcf::parse("[DeviceComissioning]\nNodeID=0x7\n").unwrap();
+    assert_eq!(dcf.node_id(), Some(7));
+}

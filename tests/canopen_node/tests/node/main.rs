@@ -1,0 +1,6 @@
+//! The node as a master sees it.
+
+mod client;
+mod communication;
+mod motion;
+mod wire;
