@@ -143,21 +143,19 @@ fn a_reversed_profile_reverses_the_numbers_of_the_drive_alone() {
     assert!(matches!(error, MotionError::BeyondStroke { axis: L1, .. }), "{error}");
 }
 
-/// The motor turns the other way than the encoder counts.
+/// The motor turns the other way than the encoder counts, from standstill on and from the first moments of the way.
 #[test]
 fn an_axis_that_moves_against_its_target_is_stopped_at_once() {
-    let mut bench = Bench::with_fault("encoder_sign", L1, 0.0);
-    let cause = bench.stopped(0.001);
-    let is_right = matches!(
-        cause,
-        StopCause::WrongDirection { .. }
-            | StopCause::Restless { .. }
-            | StopCause::FollowingError { .. }
-            | StopCause::Force { .. }
-    );
-    assert!(is_right, "{cause:?}");
-    let moved_m = bench.line.read_number(L1, ObjectAddress::new(0x6064, 0)).unwrap() as f64 * 1e-6 - 0.29;
-    assert!(moved_m.abs() < 0.002, "{moved_m} {cause:?}");
+    let mut causes = Vec::new();
+    for from_s in (0..12).map(|step| 1.1 + 0.02 * f64::from(step)) {
+        let mut bench = Bench::with_fault("encoder_sign", L1, from_s);
+        let cause = bench.stopped(0.001);
+        let moved_m = stand(&mut bench.line, &bench.scenario, 0).unwrap().positions_m[L1] - 0.29;
+        assert!(moved_m.abs() < 0.002, "{moved_m} {cause:?}");
+        causes.push(cause);
+    }
+    let is_wrong_way = |cause: &StopCause| matches!(cause, StopCause::WrongDirection { .. });
+    assert!(causes.iter().any(is_wrong_way), "{causes:?}");
 }
 
 #[test]

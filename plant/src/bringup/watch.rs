@@ -1,6 +1,6 @@
 //! The watch over a motion: one look reads the moved axis and one of the others, and says what must stop the motion.
 
-use masseter_can::canopen::ObjectAddress;
+use masseter_can::canopen::{EmergencyCode, ObjectAddress};
 use masseter_can::cia402::{DriveState, StatusBit, Statusword};
 use masseter_shared::config::AxisScale;
 use masseter_shared::geometry::AXES;
@@ -132,7 +132,10 @@ impl Watch {
         for (sender, &before) in self.emergencies.iter().enumerate() {
             let new = line.heard(sender).emergencies[before..].iter().find(|emergency| !emergency.is_reset());
             if let Some(emergency) = new {
-                return Ok(Some(StopCause::Emergency { sender, code: emergency.code }));
+                let is_following = sender == axis && emergency.code == EmergencyCode::FOLLOWING_ERROR;
+                let emergency = StopCause::Emergency { sender, code: emergency.code };
+                let following = StopCause::FollowingError { window_m };
+                return Ok(Some(if is_following { following } else { emergency }));
             }
         }
         if fails {
