@@ -50,7 +50,7 @@ fn a_jog_that_is_stopped_ends_with_5_and_is_no_evidence() {
 #[test]
 fn nothing_moves_without_a_held_key() {
     let (code, out, err, result) = robot("", &["jog", "--axis", "d1", "--by=-1mm", "--hold"]);
-    assert_eq!(code, Some(5), "{out}{err}");
+    assert_eq!(code, Some(130), "{out}{err}");
     assert!(err.contains("stopped on request") && !out.contains("moved"), "{out}{err}");
     assert_eq!(result["passed"], false);
 }
@@ -88,6 +88,7 @@ fn a_step_needs_the_earlier_one_and_a_length_its_unit() {
     let output = masseter(&[&jog[..], &["1mm"]].concat());
     assert_eq!(output.status.code(), Some(2), "{}", stderr(&output));
     assert!(stderr(&output).contains("l1: configure not done"), "{}", stderr(&output));
+    assert!(!evidence.exists(), "a refused step makes no folder");
     let output = masseter(&[&jog[..], &["1"]].concat());
     assert!(stderr(&output).contains("such as 1mm"), "{}", stderr(&output));
 }

@@ -2,7 +2,7 @@
 
 use anyhow::{Context, anyhow};
 use masseter_can::canopen::ObjectAddress;
-use masseter_plant::bringup::{Line, MotionError};
+use masseter_plant::bringup::{Line, MotionError, StopCause};
 use masseter_shared::clock::MILLISECOND_NS;
 use masseter_shared::config::Scenario;
 use masseter_shared::geometry::AXES;
@@ -12,7 +12,7 @@ use serde::Serialize;
 use serde_json::json;
 
 use super::args::RobotArgs;
-use super::evidence::StepFolder;
+use super::evidence::{Basis, StepFolder};
 use super::past::Past;
 use super::step::Step;
 
@@ -38,6 +38,12 @@ impl Session {
         let scenario = args.scenario().usage()?;
         let stop = StopRequest::listen_alone().context("cannot listen for signals").died()?;
         let past = Past::read(&args.folder).usage()?;
+        let require = |basis: &Basis| {
+            let mut needed = axes.iter().filter_map(|&axis| Some((earlier(axis)?, axis)));
+            needed.try_for_each(|(earlier, axis)| past.require(earlier, &[axis], basis))
+        };
+        // A refused step makes no folder: it would replace the evidence of the same step from before.
+        require(&Basis::new(&scenario, [None; AXES]).usage()?).usage()?;
         let mut folder = StepFolder::begin(&args.folder, step, axes, &scenario).usage()?;
         let log = folder.log().context("cannot write the log of the buses").incomplete()?;
         let mut line = Line::open(&scenario, log).usage()?;
@@ -47,13 +53,8 @@ impl Session {
             return Err(Failure::with(Exit::Usage, other));
         }
         folder.note_serials(serials(&mut line));
-        let session = Self { scenario, line, stop, folder };
-        for &axis in axes {
-            if let Some(earlier) = earlier(axis) {
-                past.require(earlier, &[axis], &session.folder.basis()).usage()?;
-            }
-        }
-        Ok(session)
+        require(&folder.basis()).usage()?;
+        Ok(Self { scenario, line, stop, folder })
     }
 
     /// Writes the result, whether it is evidence, and where it is.
@@ -67,6 +68,7 @@ impl Session {
     /// Writes that the step failed, and why.
     pub(super) fn fail(self, error: MotionError) -> Failure {
         let exit = match &error {
+            MotionError::Stopped { cause: StopCause::Requested, .. } => Exit::Interrupted,
             MotionError::Stopped { .. } | MotionError::StaysOn { .. } | MotionError::Line(_) => {
                 Exit::SafeStop
             }

@@ -2,8 +2,8 @@
 
 use masseter_can::canopen::{NmtCommand, ObjectAddress};
 use masseter_can::cia402::{Controlword, StatusBit};
-use masseter_shared::clock::{MILLISECOND_NS, SECOND_NS};
-use masseter_shared::config::{AxisScale, DriveProfile, MASTER_NODE, ObjectKey, ObjectRule, Scenario};
+use masseter_shared::clock::SECOND_NS;
+use masseter_shared::config::{AxisScale, DriveProfile, MASTER_NODE, Scenario};
 use masseter_shared::geometry::AXES;
 
 use super::borrowed::Borrowed;
@@ -16,8 +16,6 @@ use super::watch::{Bounds, Sample, Watch, read_position};
 /// Profile position and homing (6060h).
 pub(super) const POSITIONING: i8 = 1;
 pub(super) const HOMING: i8 = 6;
-/// How long a drive may take to show another mode, ns.
-const MODE_NS: u64 = SECOND_NS / 2;
 /// How long an axis must stand with power on, and within which time it must, ns.
 const STILL_NS: u64 = SECOND_NS;
 const RESTLESS_NS: u64 = 5 * SECOND_NS;
@@ -34,7 +32,7 @@ pub(super) struct Mover<'a> {
     scenario: &'a Scenario,
     axis: usize,
     caution: Caution,
-    borrowed: Borrowed,
+    borrowed: Borrowed<'a>,
     watch: Watch,
     /// Half of the range of 6064h while the axis stood, m.
     noise_m: f64,
@@ -57,8 +55,15 @@ impl<'a> Mover<'a> {
         };
         let scales = std::array::from_fn::<_, AXES, _>(|axis| scenario.scale(axis));
         let watch = Watch::begin(line, axis, scales, bounds)?;
-        let mut mover =
-            Self { line, scenario, axis, caution, borrowed: Borrowed::of_axis(axis), watch, noise_m: 0.0 };
+        let mut mover = Self {
+            line,
+            scenario,
+            axis,
+            caution,
+            borrowed: Borrowed::of_axis(axis, scenario.profile(axis)),
+            watch,
+            noise_m: 0.0,
+        };
         match mover.configure() {
             Ok(()) => Ok(mover),
             Err(error) => {
@@ -90,16 +95,13 @@ impl<'a> Mover<'a> {
         }
         // A following error is a fault at once, and a fault closes the brake at once: the feedback may be what is wrong, and
         // then a ramp only drives the axis further. Not every drive takes these values.
-        for (index, bytes) in [(0x6066, 2), (0x605E, 2)] {
-            match self.borrow(index, 0, 0, bytes) {
-                Err(error) if error.abort_code().is_none() => return Err(error),
-                _ => {}
-            }
+        for index in [0x6066, 0x605E] {
+            self.borrowed.set_if_taken(self.line, ObjectAddress::new(index, 0), 0, 2)?;
         }
         Ok(())
     }
 
-    /// Changes an object until the end, as the profile's rule allows.
+    /// Changes an object until the end.
     pub(super) fn borrow(
         &mut self,
         index: u16,
@@ -107,31 +109,12 @@ impl<'a> Mover<'a> {
         value: u32,
         bytes: usize,
     ) -> Result<(), LineError> {
-        let object = ObjectAddress::new(index, subindex);
-        let rule = self.profile().object(ObjectKey(object)).rule;
-        if matches!(rule, ObjectRule::Absent | ObjectRule::Expect) {
-            return Ok(());
-        }
-        match self.borrowed.set(self.line, object, value, bytes) {
-            Err(error) if rule == ObjectRule::Optional && error.abort_code().is_some() => Ok(()),
-            done => done,
-        }
+        self.borrowed.set(self.line, ObjectAddress::new(index, subindex), value, bytes)
     }
 
-    /// Sets the software limits (607Dh) until the end, to positions as 6064h shows them, in increments.
+    /// Sets the software limits (607Dh) until the end, in increments of 6064h.
     pub(super) fn borrow_limits(&mut self, ends: [i32; 2]) -> Result<(), LineError> {
-        let offset = self.limit_offset();
-        self.borrowed.set_limits(self.line, ends.map(|end| end.saturating_sub(offset)))
-    }
-
-    /// What the drive adds to its software limits, increments: the position at home as the drive has it now.
-    fn limit_offset(&mut self) -> i32 {
-        let homing = self.profile().homing;
-        if !homing.limits_from_home {
-            return 0;
-        }
-        let home = self.line.read_number(self.axis, homing.home_object.0).unwrap_or(0) as i32;
-        home.saturating_mul(homing.home_sign.into())
+        self.borrowed.set_limits(self.line, ends)
     }
 
     /// The line, for questions beside the motion.
@@ -159,7 +142,7 @@ impl<'a> Mover<'a> {
         self.caution
     }
 
-    /// Half of the range of 6064h while the axis stood, m.
+    /// Noise of 6064h: half of its range while the axis stood, m.
     pub(super) fn noise_m(&self) -> f64 {
         self.noise_m
     }
@@ -186,7 +169,8 @@ impl<'a> Mover<'a> {
 
     /// Switches on in a mode, with the place of the axis as its target, and waits until brake and axis are ready.
     pub(super) fn switch_on(&mut self, mode: i8, operator: &mut Operator<'_>) -> Result<(), MotionError> {
-        self.choose(mode)?;
+        self.borrow(0x6060, 0, mode as u32, 1)?;
+        switching::wait_for_mode(self.line, self.axis, mode)?;
         let here = self.line.read_number(self.axis, ObjectAddress::new(0x6064, 0))?;
         self.line.write(self.axis, ObjectAddress::new(0x607A, 0), here, 4)?;
         switching::switch_on(self.line, self.axis)?;
@@ -195,21 +179,6 @@ impl<'a> Mover<'a> {
             self.look()?;
         }
         self.wait_until_still(operator)
-    }
-
-    fn choose(&mut self, mode: i8) -> Result<(), MotionError> {
-        self.borrow(0x6060, 0, mode as u32, 1)?;
-        let until_ns = self.line.now_ns() + MODE_NS;
-        loop {
-            let found = self.line.read_number(self.axis, ObjectAddress::new(0x6061, 0))? as i8;
-            if found == mode {
-                return Ok(());
-            }
-            if self.line.now_ns() >= until_ns {
-                return Err(MotionError::Mode { axis: self.axis, wanted: mode, found });
-            }
-            self.line.listen(MILLISECOND_NS)?;
-        }
     }
 
     /// Goes on only once the axis has stood for a second.
@@ -255,7 +224,7 @@ impl<'a> Mover<'a> {
         self.line.control(self.axis, word)?;
         self.line.control(self.axis, word.with_start().with_immediate_change())?;
         let mut until_ns = self.line.now_ns() + seconds(limit_s);
-        let (mut seen, mut is_taken, mut halted_ns) = (Vec::new(), false, None);
+        let (mut seen, mut is_taken, mut halted_ns) = (vec![], false, None);
         loop {
             let sample = self.look()?;
             seen.push(sample);

@@ -1,5 +1,6 @@
 //! Switching one drive on and off, with the times of its brake.
 
+use masseter_can::canopen::ObjectAddress;
 use masseter_can::cia402::{Controlword, DriveState};
 use masseter_shared::clock::{MILLISECOND_NS, SECOND_NS};
 use masseter_shared::config::{AxisScale, BrakeConfig};
@@ -75,6 +76,21 @@ fn disable_voltage(line: &mut Line, axis: usize) -> Result<(), MotionError> {
     };
     let reason = sent.err().map_or(reason, |error| error.to_string());
     Err(MotionError::StaysOn { axis, reason })
+}
+
+/// Waits until a drive shows a mode of operation (6061h).
+pub(super) fn wait_for_mode(line: &mut Line, axis: usize, wanted: i8) -> Result<(), MotionError> {
+    let until_ns = line.now_ns() + TRANSITION_NS;
+    loop {
+        let found = line.read_number(axis, ObjectAddress::new(0x6061, 0))? as i8;
+        if found == wanted {
+            return Ok(());
+        }
+        if line.now_ns() >= until_ns {
+            return Err(MotionError::Mode { axis, wanted, found });
+        }
+        line.listen(MILLISECOND_NS)?;
+    }
 }
 
 /// The state that a drive has when the condition holds, or at the end of the time.
