@@ -79,6 +79,49 @@ fn a_full_disk_leaves_an_incomplete_recording() {
     assert_eq!(workspace.manifest()["process_faults"][0]["number"], 1, "{said}");
 }
 
+/// A stopped controller sends nothing, and its loop loses the cycles: to the scenario, not to the machine.
+#[test]
+fn stalls_of_the_loops_are_real_in_real_time_and_the_scenarios_own() {
+    let cores = Cores::take();
+    for (kind, skips) in [("controller_stall", "controller_skips"), ("plant_stall", "plant_skips")] {
+        let require = format!(
+            "[[require]]\nname = 'once'\nevent = 'fault.{kind}'\nat_least = 1\nat_most = 1\n\
+             [[require]]\nname = 'ends'\nevent = 'fault.{kind}.ended'\nat_least = 1\nat_most = 1\n\
+             "
+        );
+        let workspace = Workspace::new(&(with_fault(kind, "size = '100 ms'\n") + LENIENT + &require));
+        let output = workspace.run(&cores, &["--quiet"]);
+        let said = format!("{kind}: {}{}", stdout(&output), stderr(&output));
+        assert!(common::PASSED_OR_INVALID.contains(&output.status.code()), "{said}");
+        let summary = workspace.summary();
+        let skipped = summary["figures"][skips]["by_scenario"].as_u64().unwrap();
+        assert!((80..200).contains(&skipped), "{skipped} skipped: {said}");
+        for name in ["once", "ends"] {
+            assert_eq!(check(&summary, name)["result"], "passed", "{said}");
+        }
+        let timing = &summary["verdict"]["timing"];
+        assert!(
+            timing["stalled"].as_u64() == Some(skipped) && timing["lost"].as_u64().unwrap() < 50,
+            "{said}"
+        );
+        let fault = &workspace.manifest()["process_faults"][0];
+        let lasted_ns = fault["ended_ns"].as_u64().unwrap() - fault["struck_ns"].as_u64().unwrap();
+        assert!((100_000_000..200_000_000).contains(&lasted_ns), "{lasted_ns} ns: {said}");
+    }
+}
+
+/// In simulated time a stall withholds commands, under every clock the same.
+#[test]
+fn a_stall_of_the_controller_has_the_bytes_of_virtual_time_in_lockstep() {
+    let scenario = with_fault("controller_stall", "size = '10 ms'\n");
+    let (workspace, output, said) = in_lockstep(&scenario);
+    assert_eq!(output.status.code(), Some(0), "{said}");
+    let alone = Workspace::new(&scenario);
+    assert_eq!(alone.run_virtual(&["--quiet"]).status.code(), Some(0));
+    assert_eq!(workspace.summary()["figures"], alone.summary()["figures"], "{said}");
+    assert_eq!(workspace.manifest()["process_faults"].as_array().unwrap().len(), 0, "{said}");
+}
+
 #[test]
 fn a_core_that_another_task_takes_is_judged_in_real_time() {
     let cores = Cores::take();
@@ -112,8 +155,9 @@ fn where_there_are_no_such_processes_the_fault_is_refused() {
         ("core_stall", &["--clock", "lockstep"], "use --clock rt"),
         ("plant_kill", &["--clock", "rt", "--controller", "none"], "only a controller knows"),
         ("controller_kill", &["--clock", "rt", "--controller", "external"], "kills only what it started"),
+        ("controller_stall", &["--clock", "rt", "--controller", "external"], "stops only what it started"),
     ] {
-        let size = if kind == "core_stall" { "size = '1 ms'\n" } else { "" };
+        let size = if kind.ends_with("_stall") { "size = '1 ms'\n" } else { "" };
         let workspace = Workspace::new(&with_fault(kind, size));
         let file = workspace.file("scenario.toml");
         let output = masseter(&[&["run", file.to_str().unwrap()], arguments].concat());

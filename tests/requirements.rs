@@ -4,7 +4,7 @@ mod common;
 
 use std::fs;
 
-use common::{Workspace, check, stdout};
+use common::{Cores, LENIENT, Workspace, check, stdout};
 
 /// Runs a scenario under virtual time; its exit code, and what it printed.
 fn run(workspace: &Workspace) -> (Option<i32>, String) {
@@ -133,6 +133,28 @@ fn another_outcome_than_the_expected_one_fails() {
 }
 
 #[test]
+fn a_planted_bug_passes_by_the_requirement_that_it_fails() {
+    let bug = "
+        duration_s = 1.0
+        [[require]]
+        name = 'impossible'
+        signal = 'incisal.error'
+        max = '1 nm'
+        [expect]
+        exit_code = 1
+        verdict = 'fail'";
+    let (code, text) = run(&Workspace::new(bug));
+    assert_eq!(code, Some(0), "{text}");
+    assert!(text.contains("PASS: FAIL, as expected: failed: impossible"), "{text}");
+    let (code, text) = run(&Workspace::new(&bug.replace("1 nm", "1 m")));
+    assert_eq!(code, Some(1), "{text}");
+    assert!(text.contains("FAIL: expected FAIL, but PASS"), "{text}");
+    let (code, text) = run(&Workspace::new(&bug.replace("'fail'", "'safe_stop'")));
+    assert_eq!(code, Some(2), "{text}");
+    assert!(text.contains("expect.exit_code = 1: expect.verdict has the exit code 5"), "{text}");
+}
+
+#[test]
 fn a_trigger_that_never_came_leaves_the_requirement_untested() {
     let workspace = Workspace::new(
         "duration_s = 0.5
@@ -158,6 +180,10 @@ fn a_wrong_requirement_is_refused_before_anything_starts() {
         ("signal = 'incisal.error'\nmax = '1 N'", "give a number with one of the units m, mm"),
         ("never = 'runing'", "'runing' is no occurrence"),
         ("never = 'fault.deaf'", "'fault.deaf' is no occurrence"),
+        (
+            "expression = '{l1.force} * {l1.velocity}'\nunit = 'N'\nmax = '1 N'",
+            "unit = 'N': the expression '{l1.force} * {l1.velocity}' has the unit W",
+        ),
     ] {
         let workspace = Workspace::new(&format!("[[require]]\nname = 'it'\n{requirement}"));
         let (code, text) = run(&workspace);
@@ -181,6 +207,27 @@ fn requirements_can_use_the_signals_and_parameters_of_a_controller() {
 }
 
 #[test]
+fn the_share_of_a_core_is_a_signal_of_real_time() {
+    let requirement = "
+        [[require]]
+        name = 'the controller is idle'
+        signal = 'controller.cpu'
+        during = 'running'
+        statistic = 'mean'
+        max = '90 %'";
+    let (code, text) = run(&Workspace::new(&format!("duration_s = 0.5\n{requirement}")));
+    assert_eq!(code, Some(1), "{text}");
+    let why = "UNTESTED: the controller is idle: ";
+    assert!(text.contains(why) && text.contains("simulated time takes no share of a core"), "{text}");
+    let cores = Cores::take();
+    let workspace = Workspace::new(&format!("duration_s = 0.5\n{LENIENT}\n{requirement}"));
+    let output = workspace.run(&cores, &["--quiet"]);
+    let summary = workspace.summary();
+    let margin = check(&summary, "the controller is idle")["margin"].as_f64();
+    assert!(margin.is_some_and(|margin| margin < 90.0), "{margin:?}: {}", stdout(&output));
+}
+
+#[test]
 fn a_fault_of_a_process_is_an_occurrence() {
     let workspace = Workspace::new(
         "duration_s = 1.0
@@ -191,7 +238,10 @@ fn a_fault_of_a_process_is_an_occurrence() {
          [[require]]
          name = 'it strikes'
          event = 'fault.plant_stall'
-         at_least = 1",
+         at_least = 1
+         [[require]]
+         name = 'it ends'
+         order = ['fault.plant_stall', 'fault.plant_stall.ended']",
     );
     let output = workspace.run_simulated("lockstep", &["--quiet"]);
     assert_eq!(output.status.code(), Some(0), "{}", stdout(&output));

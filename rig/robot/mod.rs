@@ -5,22 +5,32 @@
 
 mod args;
 mod check_pose;
+mod configure;
 mod evidence;
 mod hold;
 mod home;
+mod inspect;
+mod interfaces;
 mod jog;
 mod lengths;
 mod past;
 mod permission;
+mod restore;
+mod robot_line;
 mod session;
+mod snapshot;
 mod status;
 mod step;
+mod table;
+mod writing;
 
 use clap::Subcommand;
 use masseter_terminal::{Exit, Failure, OrFailure};
 
 use check_pose::CheckPoseArgs;
+use configure::WriteArgs;
 use home::HomeArgs;
+use inspect::InspectArgs;
 use jog::JogArgs;
 use status::StatusArgs;
 
@@ -29,6 +39,14 @@ pub(crate) use permission::check_bring_up;
 /// Verbs of `robot`.
 #[derive(Debug, Clone, Subcommand)]
 pub(crate) enum RobotVerb {
+    /// Read all drives, and show what is not as the scenario needs it
+    Inspect(InspectArgs),
+    /// Write the scenario's objects to drives without power
+    #[command(after_help = "Example:\n  masseter robot configure robot.toml --can can0,can1 --store")]
+    Configure(WriteArgs),
+    /// Write the values from before configure back
+    #[command(after_help = "Example:\n  masseter robot restore robot.toml --can can0,can1 --axis l1")]
+    Restore(WriteArgs),
     /// Move one axis a short way and back, while the others have no power
     Jog(JogArgs),
     /// Home the axes, one after the other
@@ -45,6 +63,9 @@ pub(crate) enum RobotVerb {
 /// Executes a verb.
 pub(crate) fn execute(verb: &RobotVerb) -> Result<Exit, Failure> {
     match verb {
+        RobotVerb::Inspect(args) => inspect::inspect(args),
+        RobotVerb::Configure(args) => configure::configure(args),
+        RobotVerb::Restore(args) => restore::restore(args),
         RobotVerb::Jog(args) => jog::jog(args),
         RobotVerb::Home(args) => home::home(args),
         RobotVerb::CheckPose(args) => check_pose::check_pose(args),

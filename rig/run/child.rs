@@ -101,7 +101,7 @@ impl Process {
 
     /// Its process file, which stays its own whatever becomes of the id.
     pub(super) fn handle(&self) -> io::Result<OwnedFd> {
-        Ok(pidfd_open(Pid::from_child(&self.child), PidfdFlags::empty())?)
+        open_handle(&self.child)
     }
 
     /// Lets its files grow no further than to this length, in bytes.
@@ -154,6 +154,11 @@ impl Drop for Process {
         self.kill();
         let _ = self.child.wait();
     }
+}
+
+/// The process file of a child.
+pub(super) fn open_handle(child: &Child) -> io::Result<OwnedFd> {
+    Ok(pidfd_open(Pid::from_child(child), PidfdFlags::empty())?)
 }
 
 /// An exit status as text.

@@ -3,7 +3,8 @@
 use std::thread;
 
 use anyhow::bail;
-use masseter_shared::config::{FaultKindConfig, FaultLayer, Scenario, StimulusConfig};
+use masseter_shared::config::{FaultConfig, FaultKindConfig, FaultLayer, Scenario, StimulusConfig};
+use masseter_shared::control::is_seen_by_controller;
 use masseter_shared::realtime::scheduling::{SchedulingRequest, obtain};
 use masseter_terminal::status;
 
@@ -86,6 +87,7 @@ pub(super) fn check(args: &RunArgs, scenario: &Scenario) -> anyhow::Result<()> {
         bail!("--patience needs --clock lockstep");
     }
     check_stimuli(args, scenario)?;
+    check_controller_stall(args, scenario)?;
     check_process_faults(args, scenario)?;
     if args.clock == ClockKind::Rt {
         return Ok(());
@@ -116,6 +118,29 @@ fn check_stimuli(args: &RunArgs, scenario: &Scenario) -> anyhow::Result<()> {
     let is_of_controller = scenario.stimulus.iter().any(StimulusConfig::is_of_controller);
     if args.controller == ControllerChoice::None && is_of_controller {
         bail!("[[stimulus]]: parameter and stop need a controller: leave --controller none away");
+    }
+    Ok(())
+}
+
+/// Refuses a stall of the controller that real time cannot have: there its process really stops.
+fn check_controller_stall(args: &RunArgs, scenario: &Scenario) -> anyhow::Result<()> {
+    let stall = FaultKindConfig::ControllerStall;
+    let of_stall = |fault: &&FaultConfig| fault.kind == stall;
+    if args.clock != ClockKind::Rt || args.controller == ControllerChoice::None {
+        return Ok(());
+    }
+    for fault in scenario.faults.iter().filter(of_stall) {
+        if args.controller == ControllerChoice::External {
+            bail!(
+                "faults.kind = {stall}: the rig stops only what it started: use --controller with the path of yours"
+            );
+        }
+        if !is_seen_by_controller(fault.when(&scenario.entry_names())?, scenario) {
+            bail!(
+                "faults.after: in real time {stall} cannot count from an occurrence in the plant, which the controller does not \
+                 see: count from the motion (at_s alone), or use --clock virtual"
+            );
+        }
     }
     Ok(())
 }

@@ -2,6 +2,7 @@
 
 use std::ffi::OsString;
 use std::io;
+use std::os::fd::OwnedFd;
 
 use masseter_shared::clock;
 use masseter_shared::lifecycle::attach::Invitation;
@@ -111,6 +112,15 @@ impl Controller {
             Self::Own(process) => process.go_on(),
             Self::Program(program) => program.go_on(),
             Self::None { .. } => {}
+        }
+    }
+
+    /// Its process file; none where the rig has not started it.
+    pub(super) fn handle(&self) -> io::Result<Option<OwnedFd>> {
+        match self {
+            Self::Own(process) => process.handle().map(Some),
+            Self::Program(program) => program.handle(),
+            Self::None { .. } => Ok(None),
         }
     }
 

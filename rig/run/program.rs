@@ -6,7 +6,7 @@
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, ErrorKind, Write};
 use std::net::Shutdown;
-use std::os::fd::AsFd;
+use std::os::fd::{AsFd, OwnedFd};
 use std::os::unix::net::{UnixListener, UnixStream};
 use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
@@ -21,7 +21,7 @@ use masseter_shared::transport::Domain;
 use masseter_terminal::status;
 use rustix::net::sockopt::socket_peercred;
 
-use super::child::{KILLED, POLL, READY_TIMEOUT, describe};
+use super::child::{KILLED, POLL, READY_TIMEOUT, describe, open_handle};
 use super::exec_program::tied_to_this_process;
 use super::reports::{Due, Readiness, Ready, Reports};
 
@@ -223,6 +223,12 @@ impl Program {
     /// Tells it that the fault has struck. It may have ended.
     pub(super) fn go_on(&mut self) {
         let _ = self.order(&Order::Struck);
+    }
+
+    /// The process file of an executable of the rig.
+    pub(super) fn handle(&self) -> io::Result<Option<OwnedFd>> {
+        let open = |executable: &Executable| open_handle(&executable.child);
+        self.executable.as_ref().map(open).transpose()
     }
 
     /// Kills an executable of the rig; whether it did.

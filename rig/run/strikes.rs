@@ -1,11 +1,12 @@
 //! The faults of processes, carried out: killed, stopped for a while, robbed of a core, or without room on the disk.
 //!
-//! The controller reports when one is due. A fault that cannot be carried out has not struck; the reason is printed.
+//! The controller reports when one is due. A fault that cannot be carried out has not struck; the reason is printed. In real
+//! time the controller's stall is one of them. In simulated time the plant alone makes it, by withholding the commands.
 
 use std::fs;
-use std::io;
+use std::os::fd::OwnedFd;
 use std::path::{Path, PathBuf};
-use std::sync::mpsc::channel;
+use std::sync::mpsc::{Receiver, channel};
 use std::thread;
 use std::time::Duration;
 
@@ -21,13 +22,16 @@ use super::child::Process;
 use super::controller::Controller;
 use super::reports::Due;
 
+/// Where the end of a fault is told, ns.
+type End = Receiver<u64>;
+
 /// The faults of a run, and those of processes that have struck.
 pub(super) struct Strikes {
     faults: Vec<FaultConfig>,
     realtime: RealtimeConfig,
     recording: PathBuf,
     is_lockstep: bool,
-    struck: Vec<ProcessFault>,
+    struck: Vec<(ProcessFault, Option<End>)>,
 }
 
 /// The processes that a fault may act on.
@@ -52,23 +56,38 @@ impl Strikes {
     pub(super) fn carry_out(&mut self, victims: &mut Victims<'_>) {
         while let Some(Due { fault, now_ns }) = victims.controller.due() {
             let Some(config) = self.faults.get(fault) else { continue };
-            let struck_ns = if self.is_lockstep { now_ns } else { clock::now_ns() };
-            match self.strike(config, victims) {
-                Ok(()) => self.struck.push(ProcessFault { number: fault + 1, struck_ns }),
-                Err(error) => status!("masseter: fault {} ({config}) did not strike: {error:#}", fault + 1),
-            }
             if self.is_lockstep {
+                if config.kind != FaultKindConfig::ControllerStall {
+                    self.carry_out_one(fault, now_ns, victims);
+                }
                 victims.controller.go_on();
+            } else {
+                self.carry_out_one(fault, clock::now_ns(), victims);
             }
         }
     }
 
-    /// The faults that have struck.
-    pub(super) fn finish(self) -> Vec<ProcessFault> {
-        self.struck
+    fn carry_out_one(&mut self, fault: usize, struck_ns: u64, victims: &mut Victims<'_>) {
+        let (config, number) = (&self.faults[fault], fault + 1);
+        match self.strike(config, victims) {
+            Ok(end) => self.struck.push((ProcessFault { number, struck_ns, ended_ns: None }, end)),
+            Err(error) => status!("masseter: fault {number} ({config}) did not strike: {error:#}"),
+        }
     }
 
-    fn strike(&self, fault: &FaultConfig, victims: &mut Victims<'_>) -> anyhow::Result<()> {
+    /// The faults that have struck, once the run is over.
+    pub(super) fn finish(self) -> Vec<ProcessFault> {
+        // Simulated time stands still while a process does.
+        let end_ns = |struck_ns, ended_ns| if self.is_lockstep { struck_ns } else { ended_ns };
+        let ended = |(fault, end): (ProcessFault, Option<End>)| {
+            let ended_ns = end.and_then(|end| end.try_recv().ok());
+            ProcessFault { ended_ns: ended_ns.map(|ended_ns| end_ns(fault.struck_ns, ended_ns)), ..fault }
+        };
+        self.struck.into_iter().map(ended).collect()
+    }
+
+    /// Carries out a fault. Returns where its end is told, if it has one.
+    fn strike(&self, fault: &FaultConfig, victims: &mut Victims<'_>) -> anyhow::Result<Option<End>> {
         use FaultKindConfig as Kind;
         let size = Duration::from_secs_f64(fault.size_si());
         match fault.kind {
@@ -78,36 +97,44 @@ impl Strikes {
             Kind::ControllerKill => {}
             Kind::PlantKill => victims.plant.kill(),
             Kind::RecorderKill => victims.recorder.kill(),
-            Kind::PlantStall => stall(victims.plant, size)?,
-            Kind::RecorderStall => stall(victims.recorder, size)?,
-            Kind::CoreStall => stall_core(&self.realtime, size)?,
+            Kind::ControllerStall => {
+                let handle = victims.controller.handle()?;
+                let Some(handle) = handle else {
+                    bail!("the rig stops only a controller that it has started")
+                };
+                return stall(handle, size).map(Some);
+            }
+            Kind::PlantStall => return stall(victims.plant.handle()?, size).map(Some),
+            Kind::RecorderStall => return stall(victims.recorder.handle()?, size).map(Some),
+            Kind::CoreStall => return stall_core(&self.realtime, size).map(Some),
             Kind::DiskFull => fill_disk(&self.recording, victims.recorder)?,
             _ => bail!("it is no fault of a process"),
         }
-        Ok(())
+        Ok(None)
     }
 }
 
 /// Stops a process; a thread lets it go on after this time.
-fn stall(process: &Process, size: Duration) -> io::Result<()> {
-    let handle = process.handle()?;
+fn stall(handle: OwnedFd, size: Duration) -> anyhow::Result<End> {
+    let (tell, end) = channel();
     pidfd_send_signal(&handle, Signal::STOP)?;
     thread::spawn(move || {
         clock::sleep(size);
         // It may have been killed meanwhile.
         let _ = pidfd_send_signal(&handle, Signal::CONT);
+        let _ = tell.send(clock::now_ns());
     });
-    Ok(())
+    Ok(end)
 }
 
 /// Keeps the controller's core busy above the priority of the loops.
-fn stall_core(realtime: &RealtimeConfig, size: Duration) -> anyhow::Result<()> {
+fn stall_core(realtime: &RealtimeConfig, size: Duration) -> anyhow::Result<End> {
     let request = SchedulingRequest {
         core: Some(realtime.cores[0]),
         fifo_priority: Some(realtime.priority + 1),
         locked_memory: false,
     };
-    let (report, reported) = channel();
+    let ((report, reported), (tell, end)) = (channel(), channel());
     thread::spawn(move || {
         let obtained = obtain(request);
         let until_ns = clock::now_ns() + size.as_nanos() as u64;
@@ -116,9 +143,10 @@ fn stall_core(realtime: &RealtimeConfig, size: Duration) -> anyhow::Result<()> {
         while is_granted && clock::now_ns() < until_ns {
             std::hint::spin_loop();
         }
+        let _ = tell.send(clock::now_ns());
     });
     let obtained = reported.recv().context("the thread that takes the core has ended")?;
-    obtained.refusals.into_iter().next().map_or(Ok(()), |refusal| Err(anyhow::anyhow!(refusal)))
+    obtained.refusals.into_iter().next().map_or(Ok(end), |refusal| Err(anyhow::anyhow!(refusal)))
 }
 
 /// Lets the recording grow no further.

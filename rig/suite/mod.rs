@@ -5,7 +5,6 @@
 
 pub(crate) mod args;
 mod case;
-mod junit;
 mod outcome;
 mod print;
 mod trial;
@@ -15,6 +14,7 @@ use std::path::PathBuf;
 use std::time::UNIX_EPOCH;
 
 use anyhow::{Context, ensure};
+use masseter_report::junit_of_suite;
 use masseter_shared::clock;
 use masseter_terminal::{Exit, Failure, OrFailure, status};
 use rayon::prelude::*;
@@ -42,9 +42,9 @@ pub(crate) fn test(args: &TestArgs) -> Result<Exit, Failure> {
     let took_s = (clock::now_ns() - began_ns) as f64 / 1e9;
     print::end(&all, filtered_out, args.allow_untested, took_s).incomplete()?;
     if let Some(path) = &args.junit {
-        fs::write(path, junit::xml(&all, args.allow_untested, took_s))
-            .with_context(|| format!("cannot write {}", path.display()))
-            .incomplete()?;
+        let runs: Vec<_> = all.iter().map(|tested| tested.junit(args.allow_untested)).collect();
+        let xml = junit_of_suite(&runs, took_s).context("cannot make the JUnit document").incomplete()?;
+        fs::write(path, xml).with_context(|| format!("cannot write {}", path.display())).incomplete()?;
     }
     let has_failed = all.iter().any(|tested| tested.outcome.is_short(args.allow_untested));
     Ok(if has_failed { Exit::Failed } else { Exit::Passed })

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use masseter_report::Verdict;
+use masseter_report::{JunitRun, Verdict};
 use masseter_terminal::Exit;
 
 use super::case::Case;
@@ -27,6 +27,17 @@ pub(super) struct Tested {
     pub(super) retries: u32,
     /// The time that it took, s.
     pub(super) took_s: f64,
+}
+
+impl Tested {
+    /// It as a test suite of a JUnit document.
+    pub(super) fn junit(&self, allow_untested: bool) -> JunitRun<'_> {
+        let verdict = self.verdict.as_ref().ok_or(self.reason.as_str());
+        let properties =
+            vec![("outcome", self.outcome.word().to_owned()), ("retries", self.retries.to_string())];
+        let is_short = self.outcome.is_short(allow_untested);
+        JunitRun::new(&self.case.name, verdict, is_short, self.took_s).with(properties)
+    }
 }
 
 /// How a scenario counts.

@@ -1,6 +1,7 @@
 //! One scenario of a suite: run, judged, and kept where it failed.
 
 use std::fs;
+use std::panic::{self, AssertUnwindSafe};
 use std::path::{Path, PathBuf};
 
 use masseter_report::Judgement;
@@ -38,11 +39,13 @@ impl Trials<'_> {
             return None;
         }
         let began_ns = clock::now_ns();
-        let judged = if clock == ClockKind::Virtual {
-            self.in_virtual_time(case)
-        } else {
-            self.in_processes(case, clock)
-        };
+        let judged = guarded(|| {
+            if clock == ClockKind::Virtual {
+                self.in_virtual_time(case)
+            } else {
+                self.in_processes(case, clock)
+            }
+        });
         if self.interrupts.is_stop_requested() {
             return None;
         }
@@ -136,6 +139,17 @@ impl Trials<'_> {
     }
 }
 
+/// Runs one scenario so that its panic is its own failure: the others go on.
+fn guarded<T>(run: impl FnOnce() -> Result<T, Failure>) -> Result<T, Failure> {
+    // What it leaves half done belongs to this scenario alone.
+    panic::catch_unwind(AssertUnwindSafe(run)).unwrap_or_else(|payload| {
+        let texts = [payload.downcast_ref::<String>().map(String::as_str), payload.downcast_ref().copied()];
+        let why = texts.into_iter().flatten().next().unwrap_or("it gave no message");
+        let error = anyhow::anyhow!("DIED: the rig panicked: {why}: report this as a defect of masseter");
+        Err(Failure::with(Exit::Died, error))
+    })
+}
+
 /// No judgement is an error here: nothing was recorded.
 fn interrupted(judgement: Option<Judgement>) -> Result<Judgement, Failure> {
     judgement.ok_or_else(|| Failure::with(Exit::Interrupted, anyhow::anyhow!("interrupted")))
@@ -152,7 +166,16 @@ fn word(text: &str) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::word;
+    use super::*;
+
+    #[test]
+    fn a_panic_is_the_failure_of_its_scenario() {
+        let said = |run: fn() -> Result<u8, Failure>| guarded(run).unwrap_err().error.to_string();
+        assert!(said(|| panic!("of {}", 3)).starts_with("DIED: the rig panicked: of 3: "));
+        assert!(said(|| panic!("plain")).starts_with("DIED: the rig panicked: plain: "));
+        assert!(said(|| panic::panic_any(7)).contains("it gave no message"));
+        assert_eq!(guarded(|| Ok(1)).ok(), Some(1));
+    }
 
     #[test]
     fn a_word_is_quoted_where_a_shell_would_read_more_than_one() {

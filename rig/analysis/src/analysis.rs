@@ -1,7 +1,7 @@
 //! One pass over the messages of a run.
 
 use masseter_recording::{Damage, ProcessFault, Recorded};
-use masseter_shared::config::Scenario;
+use masseter_shared::config::{FaultKindConfig, FaultLayer, Scenario};
 use masseter_shared::messages::codes::{Cause, ControllerState, EventKind, Source};
 use masseter_shared::messages::tap::{self, TapError};
 use masseter_shared::messages::{Event, FrameTap, Message, Reading, State, Truth};
@@ -23,6 +23,7 @@ use crate::over_time::{CONTROLLER, OverTimeCollector, PLANT};
 use crate::pose_errors::pose;
 use crate::requirements::Requirements;
 use crate::response::Responses;
+use crate::scenario_stalls::ScenarioStalls;
 use crate::sequence::SequenceCheck;
 use crate::skips::{Counters, Skips};
 use crate::tracking::{PathSample, PoseSource, Tracking};
@@ -34,7 +35,7 @@ use crate::tracking::{PathSample, PoseSource, Tracking};
 /// ```
 /// use masseter_analysis::Analysis;
 /// use masseter_recording::Recorded;
-/// use masseter_shared::config::Scenario;
+/// use masseter_shared::config::{FaultKindConfig, FaultLayer, Scenario};
 /// use masseter_shared::messages::State;
 /// use masseter_shared::named::Declared;
 ///
@@ -57,6 +58,8 @@ pub struct Analysis {
     longest_cycles: LongestCycles,
     tracking: Tracking,
     faults: FaultWatch,
+    fault_kinds: Vec<FaultKindConfig>,
+    stalls: ScenarioStalls,
     sequence: SequenceCheck,
     frames: Vec<u64>,
     events: Vec<EventRecord>,
@@ -95,6 +98,8 @@ impl Analysis {
                 scenario.jaw.reference_point_m,
             ),
             faults: FaultWatch::new(scenario.faults.len()),
+            fault_kinds: scenario.faults.iter().map(|fault| fault.kind).collect(),
+            stalls: ScenarioStalls::default(),
             sequence: SequenceCheck::default(),
             frames: Vec::new(),
             events: Vec::new(),
@@ -146,34 +151,47 @@ impl Analysis {
         Ok(())
     }
 
-    /// Takes a fault of a process, which no message reports. Call this before [`take`](Self::take).
+    /// Takes a fault that the supervisor carried out on a process. Call this before [`take`](Self::take).
     pub fn process_fault(&mut self, fault: &ProcessFault) {
+        let kind = fault.number.checked_sub(1).and_then(|place| self.fault_kinds.get(place));
+        let Some(kind) = kind else { return };
+        self.stalls.add(*kind, fault);
+        // The plant reports the others itself.
+        if kind.layer() != FaultLayer::Process {
+            return;
+        }
         self.faults.strike(fault.number, fault.struck_ns);
         if let Some(requirements) = &mut self.requirements {
-            let event = Event::new(Source::Scenario, EventKind::Notice, Cause::FaultInjected);
-            let (time_ns, value) = (fault.struck_ns, fault.number as f64);
-            requirements.event(&EventRecord::from(&Event { time_ns, value, ..event }));
+            let ends = [(Cause::FaultInjected, Some(fault.struck_ns)), (Cause::FaultEnded, fault.ended_ns)];
+            for (cause, time_ns) in ends {
+                let Some(time_ns) = time_ns else { continue };
+                let event = Event::new(Source::Scenario, EventKind::Notice, cause);
+                let value = fault.number as f64;
+                requirements.event(&EventRecord::from(&Event { time_ns, value, ..event }));
+            }
         }
     }
 
     fn reading(&mut self, reading: &Reading) {
-        let skipped = self.plant_skips.take(&Counters::from(reading), self.period_ns);
+        let is_of_scenario = self.stalls.reading(reading);
+        let skipped = self.plant_skips.take(&Counters::from(reading), self.period_ns, is_of_scenario);
         self.intervals.reading(reading, skipped);
         self.longest_cycles.reading(reading);
         self.over_time.wake_up(PLANT, reading.due_ns, reading.woke_ns);
-        self.outage.reading(reading);
+        self.outage.reading(reading, is_of_scenario);
         self.first_sample_ns.get_or_insert(reading.sampled_ns);
         self.last_sample_ns = reading.sampled_ns;
     }
 
     fn state(&mut self, state: &State) {
         let is_fresh = self.freshness.take(state);
-        let skipped = self.controller_skips.take(&Counters::from(state), self.period_ns);
+        let (is_of_scenario, is_path_of_scenario) = self.stalls.state(state);
+        let skipped = self.controller_skips.take(&Counters::from(state), self.period_ns, is_of_scenario);
         self.intervals.state(state, is_fresh, skipped);
         self.longest_cycles.state(state, is_fresh);
         self.over_time.wake_up(CONTROLLER, state.due_ns, state.woke_ns);
-        self.outage.state(state);
-        let is_disturbed = self.disturbance.take(state, is_fresh);
+        self.outage.state(state, is_of_scenario);
+        let is_disturbed = self.disturbance.take(state, is_fresh, is_path_of_scenario);
         if let Some(requirements) = self.requirements.as_mut().filter(|_| is_disturbed) {
             requirements.disturb(state.cycle);
         }

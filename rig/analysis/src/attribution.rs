@@ -104,7 +104,7 @@ mod tests {
                 counters.skipped += 2;
             }
             counters.seq += 1;
-            skips.take(&counters, PERIOD_NS);
+            skips.take(&counters, PERIOD_NS, false);
         }
         skips
     }

@@ -27,6 +27,7 @@ mod over_time;
 mod pose_errors;
 pub mod requirements;
 mod response;
+mod scenario_stalls;
 mod sequence;
 mod series;
 pub mod signals;

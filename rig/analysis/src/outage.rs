@@ -43,15 +43,16 @@ pub(super) struct OutageWatch {
 }
 
 impl OutageWatch {
-    pub(super) fn state(&mut self, state: &State) {
+    /// `is_of_scenario`: a fault of the scenario made the misses.
+    pub(super) fn state(&mut self, state: &State, is_of_scenario: bool) {
         if state.controller_state == ControllerState::SafeStop.code() {
             self.stopped_ns.get_or_insert(state.woke_ns);
         }
-        self.controller.take(state.woke_ns, state.skipped_cycles, self.stopped_ns);
+        self.controller.take(state.woke_ns, state.skipped_cycles, self.stopped_ns, is_of_scenario);
     }
 
-    pub(super) fn reading(&mut self, reading: &Reading) {
-        self.plant.take(reading.woke_ns, reading.skipped_cycles, self.stopped_ns);
+    pub(super) fn reading(&mut self, reading: &Reading, is_of_scenario: bool) {
+        self.plant.take(reading.woke_ns, reading.skipped_cycles, self.stopped_ns, is_of_scenario);
     }
 
     /// None without a safe stop.
@@ -70,9 +71,9 @@ struct Misses {
 }
 
 impl Misses {
-    fn take(&mut self, at_ns: u64, counted: u64, stopped_ns: Option<u64>) {
+    fn take(&mut self, at_ns: u64, counted: u64, stopped_ns: Option<u64>, is_of_scenario: bool) {
         let missed = counted.saturating_sub(std::mem::replace(&mut self.counted, counted));
-        if missed == 0 {
+        if missed == 0 || is_of_scenario {
             return;
         }
         let is_old = |&(counted_ns, _): &(u64, u64)| counted_ns + BEFORE_NS + DISORDER_NS < at_ns;
@@ -109,10 +110,13 @@ mod tests {
         let mut skipped_cycles = 0;
         for &(at_ms, missed) in missed {
             skipped_cycles += missed;
-            watch.reading(&Reading { woke_ns: at_ms * PERIOD_NS, skipped_cycles, ..Reading::default() });
+            watch.reading(
+                &Reading { woke_ns: at_ms * PERIOD_NS, skipped_cycles, ..Reading::default() },
+                false,
+            );
         }
         let controller_state = ControllerState::SafeStop.code();
-        watch.state(&State { woke_ns: 1000 * PERIOD_NS, controller_state, ..State::default() });
+        watch.state(&State { woke_ns: 1000 * PERIOD_NS, controller_state, ..State::default() }, false);
         watch.finish(PERIOD_NS)
     }
 
@@ -140,7 +144,7 @@ mod tests {
     #[test]
     fn a_run_that_did_not_stop_has_no_outage() {
         let mut watch = OutageWatch::default();
-        watch.reading(&Reading { skipped_cycles: 50, ..Reading::default() });
+        watch.reading(&Reading { skipped_cycles: 50, ..Reading::default() }, false);
         assert_eq!(watch.finish(PERIOD_NS), None);
     }
 }

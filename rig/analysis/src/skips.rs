@@ -31,6 +31,8 @@ pub struct SkipFigures {
     pub while_working: u64,
     /// Those behind messages that were not recorded.
     pub unknown_cause: u64,
+    /// Those of a stall that a fault of the scenario made.
+    pub by_scenario: u64,
     /// Time for which the machine stalled while the process waited, ns.
     pub stalled_ns: u64,
     /// Time that the process spun, without the stalls, ns.
@@ -155,8 +157,9 @@ impl Default for Skips {
 
 impl Skips {
     /// The process' counters in its next message. Returns how many deadlines were skipped just before its wake-up; none
-    /// where messages before it are missing, since which wake-up skipped them is not known.
-    pub(super) fn take(&mut self, counters: &Counters, period_ns: u64) -> u64 {
+    /// where messages before it are missing, since which wake-up skipped them is not known. A fault of the scenario may have
+    /// stalled the process before: what it lost is no evidence then.
+    pub(super) fn take(&mut self, counters: &Counters, period_ns: u64, is_of_scenario: bool) -> u64 {
         let past = self.figures;
         let stall_ns = counters.stalled_ns.saturating_sub(past.stalled_ns);
         let overlong_ns = counters.overlong_ns.saturating_sub(past.overlong_ns);
@@ -164,6 +167,9 @@ impl Skips {
         let lost = self.carried_over.and(Loss { waiting_ns: stall_ns, working_ns: overlong_ns });
         let is_next = counters.seq == std::mem::replace(&mut self.last_seq, counters.seq).wrapping_add(1);
         let known = if is_next { skipped } else { 0 };
+        if is_of_scenario {
+            return self.take_of_scenario(counters, skipped, known);
+        }
         let (by_machine, while_working) = lost.explains(known, period_ns);
         let stretch_ns = overlong_ns.max(self.carried_over_stretch_ns);
         if while_working > 0 {
@@ -175,6 +181,7 @@ impl Skips {
             by_machine: past.by_machine + by_machine,
             while_working: past.while_working + while_working,
             unknown_cause: past.unknown_cause + (skipped - known),
+            by_scenario: past.by_scenario,
             stalled_ns: counters.stalled_ns,
             spun_ns: counters.spun_ns,
             worked_ns: counters.worked_ns,
@@ -187,6 +194,20 @@ impl Skips {
         }
         self.carried_over = lost.carried_over(counters.late_ns);
         self.carried_over_stretch_ns = if self.carried_over.working_ns > 0 { stretch_ns } else { 0 };
+        known
+    }
+
+    fn take_of_scenario(&mut self, counters: &Counters, skipped: u64, known: u64) -> u64 {
+        self.figures = SkipFigures {
+            skipped: counters.skipped,
+            by_scenario: self.figures.by_scenario + skipped,
+            stalled_ns: counters.stalled_ns,
+            spun_ns: counters.spun_ns,
+            worked_ns: counters.worked_ns,
+            overlong_ns: counters.overlong_ns,
+            ..self.figures
+        };
+        (self.carried_over, self.carried_over_stretch_ns) = (Loss::default(), 0);
         known
     }
 
@@ -214,7 +235,7 @@ mod tests {
         let mut skips = Skips::default();
         for (seq, &[skipped, stalled_ns, overlong_ns, late_ns]) in (1..).zip(messages) {
             let counters = Counters { seq, skipped, stalled_ns, overlong_ns, late_ns, ..Counters::default() };
-            skips.take(&counters, PERIOD_NS);
+            skips.take(&counters, PERIOD_NS, false);
         }
         skips
     }
@@ -283,7 +304,7 @@ mod tests {
             }
             self.counters.late_ns = self.now_ns - due_ns;
             self.counters.seq += 1;
-            self.skips.take(&self.counters, PERIOD_NS);
+            self.skips.take(&self.counters, PERIOD_NS, false);
         }
     }
 
@@ -331,8 +352,8 @@ mod tests {
     fn skips_belong_to_a_wake_up_only_if_the_message_before_it_is_known() {
         let skipped_before = |seq| {
             let mut skips = Skips::default();
-            skips.take(&Counters { seq: 1, ..Counters::default() }, PERIOD_NS);
-            skips.take(&Counters { seq, skipped: 3, ..Counters::default() }, PERIOD_NS)
+            skips.take(&Counters { seq: 1, ..Counters::default() }, PERIOD_NS, false);
+            skips.take(&Counters { seq, skipped: 3, ..Counters::default() }, PERIOD_NS, false)
         };
         assert_eq!((skipped_before(2), skipped_before(3)), (3, 0));
     }
@@ -348,6 +369,24 @@ mod tests {
         let figures = process.skips.figures;
         assert_eq!((figures.skipped, figures.by_machine, figures.unknown_cause), (8, 4, 4));
         assert_eq!(process.skips.as_long_as(1), (1, 0));
+    }
+
+    #[test]
+    fn what_the_scenario_stalls_is_no_skip_of_machine_or_rig() {
+        let mut skips = Skips::default();
+        let stalls = [
+            (1, 0, 0, false),
+            (2, 0, 60_000_000, true),
+            (3, 60, 60_000_000, true),
+            (4, 61, 61_000_000, false),
+        ];
+        for (seq, skipped, stalled_ns, is_of_scenario) in stalls {
+            let counters = Counters { seq, skipped, stalled_ns, ..Counters::default() };
+            skips.take(&counters, PERIOD_NS, is_of_scenario);
+        }
+        let figures = skips.figures;
+        assert_eq!((figures.skipped, figures.by_scenario, figures.by_machine), (61, 60, 1));
+        assert_eq!(skips.as_long_as(1), (1, 0));
     }
 
     #[test]

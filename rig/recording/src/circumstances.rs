@@ -77,6 +77,10 @@ pub struct ProcessFault {
     pub number: usize,
     /// When it struck, ns of the run's clock.
     pub struck_ns: u64,
+    /// When it ended, ns of the run's clock: in simulated time, which stands still meanwhile, at once. None where it has no
+    /// end, or the run ended before.
+    #[serde(default)]
+    pub ended_ns: Option<u64>,
 }
 
 /// How a run ended.

@@ -66,7 +66,7 @@ pub struct Manifest {
     pub mending_command: Option<String>,
     /// Resources that the processes used in their steady state; empty in simulated time.
     pub usage: RunUsage,
-    /// The faults of processes that struck. No message tells of them.
+    /// The faults that the supervisor carried out on processes.
     #[serde(default)]
     pub process_faults: Vec<ProcessFault>,
     /// How the run ended.

@@ -55,6 +55,9 @@ pub struct CheckFigures {
     pub worst_at_s: Option<f64>,
     /// The longest time from a trigger to its response, ms.
     pub latency_ms: Option<f64>,
+    /// Whether it is an event that `[expect]` names.
+    #[serde(skip)]
+    pub(crate) is_expected_event: bool,
 }
 
 /// One thing that was judged.
@@ -79,6 +82,11 @@ impl Check {
     /// Whether it is a requirement of the scenario.
     pub(crate) fn is_requirement(&self) -> bool {
         self.figures.is_some()
+    }
+
+    /// Whether it is an event that the scenario expects of the run.
+    pub(crate) fn is_expected_event(&self) -> bool {
+        self.figures.as_ref().is_some_and(|figures| figures.is_expected_event)
     }
 
     pub(crate) fn judged(name: &'static str, finding: String, passed: bool) -> Self {

@@ -2,7 +2,7 @@
 //!
 //! What the checks come to is the [verdict](super::verdict)'s.
 
-use masseter_shared::config::{ExpectedVerdict, StimulusConfig};
+use masseter_shared::config::{ExpectConfig, ExpectedVerdict, StimulusConfig};
 use masseter_shared::messages::codes::{Cause, ControllerState};
 use masseter_shared::wording::counted;
 
@@ -23,8 +23,7 @@ pub(crate) fn checks(manifest: &Manifest, figures: &Figures, timing: &Timing) ->
     }
     let limits = &manifest.scenario.checks;
     let is_disturbed = timing.is_disturbed();
-    let expected = manifest.scenario.expect.as_ref().and_then(|expect| expect.verdict);
-    let sequence = sequence(figures.final_state, &figures.events, expected);
+    let sequence = sequence(figures.final_state, &figures.events, manifest.scenario.expect.as_ref());
     let TrackingFigures { actual_source, samples, actual, estimated, undisturbed, .. } = &figures.tracking;
     let tracking_of = |name, errors, undisturbed_errors| {
         let check = tracking(name, *samples, errors, limits);
@@ -57,7 +56,7 @@ pub(crate) fn checks(manifest: &Manifest, figures: &Figures, timing: &Timing) ->
 /// Cycles that the machine lost are no failure of the rig. None in simulated time, which has no deadlines.
 fn kept_time(timing: &Timing, limit: u64) -> Option<Check> {
     let result = match timing.word {
-        TimingWord::Held => CheckResult::Passed,
+        TimingWord::Held | TimingWord::Stalled => CheckResult::Passed,
         TimingWord::Missed => CheckResult::Failed,
         TimingWord::Disturbed => CheckResult::NotJudged,
         TimingWord::Simulated | TimingWord::Unknown => return None,
@@ -70,21 +69,23 @@ fn kept_time(timing: &Timing, limit: u64) -> Option<Check> {
 fn sequence(
     state: Option<Code<ControllerState>>,
     events: &[EventRecord],
-    expected: Option<ExpectedVerdict>,
+    expect: Option<&ExpectConfig>,
 ) -> Check {
     let was_stopped = events.iter().any(|event| event.cause == Cause::StopRequested);
     let how = if was_stopped { ", stopped by request before the motion's end" } else { "" };
     let in_words = state.map_or_else(|| "none".to_owned(), |state| state.to_string());
     let is_in = |expected| state.is_some_and(|state| state == expected);
-    let (is_good, as_expected) = match expected {
-        Some(ExpectedVerdict::SafeStop) if is_in(ControllerState::SafeStop) => (true, ", as expected"),
-        Some(ExpectedVerdict::Interrupted) => {
-            (was_stopped && is_in(ControllerState::Finished), ", as expected")
-        }
-        Some(ExpectedVerdict::Died | ExpectedVerdict::Incomplete) => {
-            return Check::not_judged("sequence", format!("ended in state {in_words}{how}"));
-        }
-        _ => (is_in(ControllerState::Finished) && !was_stopped, ""),
+    let is_expected = |outcome| expect.is_some_and(|expect| expect.accepts(outcome));
+    if is_expected(ExpectedVerdict::Died) || is_expected(ExpectedVerdict::Incomplete) {
+        return Check::not_judged("sequence", format!("ended in state {in_words}{how}"));
+    }
+    let (is_good, as_expected) = if is_expected(ExpectedVerdict::SafeStop) && is_in(ControllerState::SafeStop)
+    {
+        (true, ", as expected")
+    } else if is_expected(ExpectedVerdict::Interrupted) {
+        (was_stopped && is_in(ControllerState::Finished), ", as expected")
+    } else {
+        (is_in(ControllerState::Finished) && !was_stopped, "")
     };
     let as_expected = if is_good { as_expected } else { "" };
     Check::judged("sequence", format!("ended in state {in_words}{how}{as_expected}"), is_good)
@@ -133,6 +134,7 @@ fn requirement(found: &RequirementFigures, is_disturbed: bool) -> Check {
         relative_margin: found.relative_margin,
         worst_at_s: found.worst_at_s,
         latency_ms: found.latency_ms,
+        is_expected_event: found.is_expected_event,
     };
     let finding = finding.into_iter().flatten().collect::<String>();
     let check = Check { figures: Some(figures), ..Check::new(found.name.clone(), finding, result) };

@@ -1,63 +1,156 @@
-//! `junit.xml`: each check of the run as a test case, as CI systems show it.
+//! JUnit documents, as CI systems show them: a run or a whole suite of runs, each check as a test case.
 
 use askama::Template;
 use masseter_analysis::Figures;
 use masseter_recording::Manifest;
 use masseter_terminal::Exit;
 
-use crate::check::{Check, CheckResult};
+use crate::check::{Check, CheckFigures, CheckResult};
 use crate::verdict::Verdict;
 
-/// One suite; a run that ended wrongly or cannot be judged has an `error` in a case of its own.
+/// A document with one run, or with the runs of a suite that took so long.
 #[derive(Template)]
 #[template(path = "junit.xml")]
-struct Suite<'a> {
-    manifest: &'a Manifest,
-    figures: &'a Figures,
-    verdict: &'a Verdict,
+struct Document<'a> {
+    runs: &'a [JunitRun<'a>],
+    suite_s: Option<f64>,
 }
 
-impl Suite<'_> {
-    /// With checks of the rig that were not tested: most CI systems show a suite with skipped cases as passed.
+/// A run as a test suite: a case for the run itself, and one for each of its checks.
+#[derive(Debug)]
+pub struct JunitRun<'a> {
+    name: String,
+    /// The class of its cases.
+    class: String,
+    properties: Vec<(&'static str, String)>,
+    took_s: f64,
+    timestamp: Option<&'a str>,
+    cases: Vec<Case<'a>>,
+}
+
+#[derive(Debug)]
+struct Case<'a> {
+    name: &'a str,
+    result: CaseResult,
+    figures: Option<&'a CheckFigures>,
+}
+
+/// What a case comes to, with the reason.
+#[derive(Debug)]
+enum CaseResult {
+    Passed,
+    Failed(String),
+    /// A check of the rig that was not tested. Most CI systems show a suite with skipped cases as passed.
+    Untested(String),
+    Error(String),
+    Skipped(String),
+}
+
+impl CaseResult {
+    fn is_failure(&self) -> bool {
+        matches!(self, Self::Failed(_) | Self::Untested(_))
+    }
+}
+
+impl<'a> JunitRun<'a> {
+    /// A run with its verdict, or without one for that reason. `is_short`: the run does not count as passed.
+    pub fn new(name: &str, verdict: Result<&'a Verdict, &str>, is_short: bool, took_s: f64) -> Self {
+        let checks = verdict.iter().flat_map(|verdict| &verdict.checks);
+        let case = |check: &'a Check| Case {
+            name: check.name.as_ref(),
+            result: of_check(check, is_short),
+            figures: check.figures.as_ref(),
+        };
+        let mut cases: Vec<_> = checks.map(case).collect();
+        let has_failure = cases.iter().any(|case| case.result.is_failure());
+        let result = match verdict {
+            _ if !is_short => CaseResult::Passed,
+            // The cases of its checks say it.
+            Ok(verdict) if has_failure && verdict.is_by_checks() => CaseResult::Passed,
+            Ok(verdict) => CaseResult::Error(format!("{}: {}", verdict.word, verdict.reason)),
+            Err(why) => CaseResult::Error(why.to_owned()),
+        };
+        cases.insert(0, Case { name: "run", result, figures: None });
+        let (name, class) = (name.to_owned(), name.to_owned());
+        Self { name, class, properties: Vec::new(), took_s, timestamp: None, cases }
+    }
+
+    /// The same with these properties.
+    #[must_use]
+    pub fn with(self, properties: Vec<(&'static str, String)>) -> Self {
+        Self { properties, ..self }
+    }
+
+    fn tests(&self) -> usize {
+        self.cases.len()
+    }
+
     fn failures(&self) -> usize {
-        if !self.is_short() {
-            return 0;
-        }
-        self.count(CheckResult::Failed) + self.count(CheckResult::Untested) - self.untested_requirements()
+        self.count(CaseResult::is_failure)
     }
 
-    /// Whether the run did not pass. A check that failed in a run that passed did so as the scenario expects.
-    fn is_short(&self) -> bool {
-        self.verdict.exit_code != Exit::Passed
-    }
-
-    /// Whether the case of the run itself is an error: no other case shows why the run did not pass.
-    fn is_unexplained(&self) -> bool {
-        let is_by_checks = self.verdict.reason.starts_with("failed: ") || self.verdict.word == "UNTESTED";
-        self.is_short() && !(self.verdict.is_judged() && is_by_checks)
-    }
-
-    fn untested_requirements(&self) -> usize {
-        let is_untested = |check: &&Check| check.is_requirement() && check.result == CheckResult::Untested;
-        self.verdict.checks.iter().filter(is_untested).count()
-    }
-
-    fn count(&self, result: CheckResult) -> usize {
-        self.verdict.checks.iter().filter(|check| check.result == result).count()
+    fn errors(&self) -> usize {
+        self.count(|result| matches!(result, CaseResult::Error(_)))
     }
 
     fn skipped(&self) -> usize {
-        if !self.is_short() {
-            return self.verdict.checks.iter().filter(|check| check.result != CheckResult::Passed).count();
-        }
-        self.count(CheckResult::Excused) + self.count(CheckResult::NotJudged) + self.untested_requirements()
+        self.count(|result| matches!(result, CaseResult::Skipped(_)))
+    }
+
+    fn count(&self, is_counted: fn(&CaseResult) -> bool) -> usize {
+        self.cases.iter().filter(|case| is_counted(&case.result)).count()
     }
 }
 
-/// The document. XML has no form for most control characters: they become replacement characters.
+impl<'a> Document<'a> {
+    fn sum(&self, of: fn(&JunitRun<'a>) -> usize) -> usize {
+        self.runs.iter().map(of).sum()
+    }
+
+    /// XML has no form for most control characters: they become replacement characters.
+    fn xml(&self) -> askama::Result<String> {
+        let is_no_xml = |c: char| c.is_control() && c != '\n' || ('\u{fffe}'..='\u{ffff}').contains(&c);
+        Ok(self.render()?.replace(is_no_xml, "\u{fffd}"))
+    }
+}
+
+/// The case of a check. One that failed, in a run that passed, did so as the scenario expects.
+fn of_check(check: &Check, is_short: bool) -> CaseResult {
+    let finding = &check.finding;
+    match check.result {
+        CheckResult::Passed => CaseResult::Passed,
+        CheckResult::Failed if is_short => CaseResult::Failed(finding.clone()),
+        CheckResult::Failed => CaseResult::Skipped(format!("as expected: {finding}")),
+        CheckResult::Untested if is_short && !check.is_requirement() => CaseResult::Untested(finding.clone()),
+        CheckResult::Untested => CaseResult::Skipped(format!("untested: {finding}")),
+        CheckResult::Excused | CheckResult::NotJudged => CaseResult::Skipped(finding.clone()),
+    }
+}
+
+/// The document of a run.
 pub(crate) fn xml(manifest: &Manifest, figures: &Figures, verdict: &Verdict) -> askama::Result<String> {
-    let is_no_xml = |c: char| c.is_control() && c != '\n' || ('\u{fffe}'..='\u{ffff}').contains(&c);
-    Ok(Suite { manifest, figures, verdict }.render()?.replace(is_no_xml, "\u{fffd}"))
+    let name = format!("masseter.{}", manifest.scenario.name);
+    let properties = vec![("function", verdict.word.to_owned()), ("timing", verdict.timing.to_string())];
+    let run = JunitRun::new(&name, Ok(verdict), verdict.exit_code != Exit::Passed, figures.duration_s);
+    let timestamp = Some(manifest.began.trim_end_matches('Z'));
+    let run = JunitRun { class: "masseter.run".to_owned(), properties, timestamp, ..run };
+    Document { runs: &[run], suite_s: None }.xml()
+}
+
+/// The document of a suite of runs that took so long, s.
+///
+/// ```
+/// use masseter_report::{JunitRun, junit_of_suite};
+///
+/// let run = JunitRun::new("push", Err("it cannot be read"), true, 0.5);
+/// assert!(junit_of_suite(&[run], 1.0)?.contains("<error message=\"it cannot be read\"/>"));
+/// # Ok::<(), askama::Error>(())
+/// ```
+///
+/// # Errors
+/// When the text cannot be formatted.
+pub fn junit_of_suite(runs: &[JunitRun], took_s: f64) -> askama::Result<String> {
+    Document { runs, suite_s: Some(took_s) }.xml()
 }
 
 #[cfg(test)]

@@ -29,6 +29,7 @@ mod write_error;
 pub use candump_logs::CandumpLogs;
 pub use check::{Check, CheckFigures, CheckResult};
 pub use judgement::Judgement;
+pub use junit::{JunitRun, junit_of_suite};
 pub use run_report::{judge_run, report_past_run, report_run};
 pub use table::Detail;
 pub use timing::{Timing, TimingWord};

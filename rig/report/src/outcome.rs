@@ -31,6 +31,11 @@ impl Outcome {
         }
     }
 
+    /// The name of the outcome in `[expect]`. No scenario expects a run that cannot be judged.
+    pub(crate) fn named(self) -> Option<ExpectedVerdict> {
+        ExpectedVerdict::ALL.into_iter().find(|expected| Self::of(*expected) == self)
+    }
+
     /// The word in reports.
     pub(crate) fn word(self) -> &'static str {
         match self {
@@ -56,5 +61,18 @@ impl Outcome {
             Self::Incomplete => Exit::Incomplete,
             Self::Interrupted => Exit::Interrupted,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_exit_codes_of_scenarios_are_those_of_the_program() {
+        for expected in ExpectedVerdict::ALL {
+            assert_eq!(Outcome::of(expected).exit() as u8, expected.exit_code(), "{expected:?}");
+        }
+        assert_eq!((Outcome::Invalid.named(), Outcome::Died.named()), (None, Some(ExpectedVerdict::Died)));
     }
 }

@@ -19,6 +19,8 @@ pub enum TimingWord {
     Held,
     /// The machine lost some; the rig missed no more than the scenario allows.
     Disturbed,
+    /// Faults of the scenario stalled a loop; all other deadlines were kept as in a run whose timing held.
+    Stalled,
     /// The rig missed too many.
     Missed,
     /// There are none in simulated time.
@@ -39,6 +41,8 @@ pub struct Timing {
     pub lost: u64,
     /// Cycles that the rig missed by itself.
     pub missed: u64,
+    /// Cycles that faults of the scenario took from a loop.
+    pub stalled: u64,
     /// Those of controller and plant.
     #[serde(skip)]
     missed_by: [u64; 2],
@@ -59,8 +63,10 @@ impl Timing {
             let working = if is_work_excused { skips.while_working } else { 0 };
             skips.by_machine + working + skips.unknown_cause
         });
-        let missed_by = [0, 1].map(|index| loops[index].skipped.saturating_sub(lost_by[index]));
+        let missed_by = [0, 1]
+            .map(|index| loops[index].skipped.saturating_sub(lost_by[index] + loops[index].by_scenario));
         let (lost, missed) = (lost_by.iter().sum(), missed_by.iter().sum());
+        let stalled = loops.iter().map(|skips| skips.by_scenario).sum();
         let word = if figures.cycles == 0 {
             TimingWord::Unknown
         } else if manifest.clock != "rt" {
@@ -69,12 +75,14 @@ impl Timing {
             TimingWord::Missed
         } else if lost > 0 {
             TimingWord::Disturbed
+        } else if stalled > 0 {
+            TimingWord::Stalled
         } else {
             TimingWord::Held
         };
         let cycles = 2 * figures.cycles + loops[0].skipped + loops[1].skipped;
         let evidence = figures.overrun_attribution.map(in_words).unwrap_or_default();
-        Self { word, cycles, lost, missed, missed_by, evidence }
+        Self { word, cycles, lost, missed, stalled, missed_by, evidence }
     }
 
     /// Share of the cycles that the machine lost, %.
@@ -90,7 +98,7 @@ impl Timing {
 
 impl Display for Timing {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        let Self { lost, missed, cycles, .. } = self;
+        let Self { lost, missed, stalled, cycles, .. } = self;
         match self.word {
             TimingWord::Held if *missed > 0 => {
                 write!(f, "held ({} missed, as allowed)", counted(*missed, "cycle"))
@@ -103,6 +111,9 @@ impl Display for Timing {
                 grouped(*cycles),
                 self.lost_percent()
             ),
+            TimingWord::Stalled => {
+                return write!(f, "stalled by faults of the scenario ({})", counted(*stalled, "cycle"));
+            }
             TimingWord::Missed => match self.missed_by.map(grouped) {
                 [controller, _] if self.missed_by[1] == 0 => {
                     write!(f, "missed by the controller ({controller})")
@@ -112,7 +123,11 @@ impl Display for Timing {
             },
             TimingWord::Simulated => f.write_str("simulated"),
             TimingWord::Unknown => f.write_str("unknown, because no cycle ran"),
+        }?;
+        if *stalled > 0 {
+            write!(f, "; faults of the scenario stalled {} more", grouped(*stalled))?;
         }
+        Ok(())
     }
 }
 

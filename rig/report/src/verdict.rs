@@ -4,7 +4,9 @@
 
 use masseter_analysis::{EventRecord, Figures, Outage};
 use masseter_recording::{DmaLatency, Ending, Manifest, RunUsage};
-use masseter_shared::config::{CanConfig, ChecksConfig, ExpectedVerdict, Scenario, TimingConfig};
+use masseter_shared::config::{
+    CanConfig, ChecksConfig, ExpectConfig, ExpectedVerdict, Scenario, TimingConfig,
+};
 use masseter_shared::messages::codes::{Cause, EventKind};
 use masseter_shared::wording::counted;
 use masseter_terminal::Exit;
@@ -51,10 +53,9 @@ impl Verdict {
     pub fn new(manifest: &Manifest, figures: &Figures) -> Self {
         let timing = Timing::new(manifest, figures);
         let all = checks(manifest, figures, &timing);
-        let expected = manifest.scenario.expect.as_ref().and_then(|expect| expect.verdict);
-        // An expected outcome is that of the rig's own checks; the requirements are judged beside it.
-        let (requirements, checks): (Vec<_>, Vec<_>) =
-            all.iter().cloned().partition(|check| check.is_requirement() && expected.is_some());
+        let expect = manifest.scenario.expect.as_ref().filter(|expect| expect.has_outcome());
+        let is_beside = |check: &Check| expect.is_some_and(|expect| stands_beside(check, expect));
+        let (beside, checks): (Vec<_>, Vec<_>) = all.iter().cloned().partition(is_beside);
         let excuse = excuse(&manifest.ending, &timing, figures.outage);
         let is_too_late = left_its_path(&figures.tracking.actual, &manifest.scenario.checks)
             || checks.iter().any(|check| is_of_faults(check) && check.result == CheckResult::Failed);
@@ -73,8 +74,8 @@ impl Verdict {
             })
             .or_else(|| untested(&checks, figures.cycles))
             .unwrap_or_else(|| (Outcome::Passed, "every check passed".to_owned()));
-        if let Some(expected) = expected {
-            (outcome, reason) = against(expected, (outcome, reason), [&checks, &requirements], figures);
+        if let Some(expect) = expect {
+            (outcome, reason) = against(expect, (outcome, reason), [&checks, &beside], figures);
         }
         if outcome != Outcome::Passed {
             reason += &overload(&manifest.usage, manifest.scenario.rate_hz).unwrap_or_default();
@@ -98,11 +99,14 @@ impl Verdict {
         is_missing.then(|| remedy(manifest))
     }
 
-    /// Whether the checks decided it.
-    pub(crate) fn is_judged(&self) -> bool {
-        matches!(self.exit_code, Exit::Passed | Exit::Failed)
+    /// Whether checks alone decided it, so that their findings are the reason.
+    pub(crate) fn is_by_checks(&self) -> bool {
+        self.word == Outcome::Untested.word() || self.reason.starts_with(FAILED)
     }
 }
+
+/// What the reason of a run begins with that failed by its checks.
+const FAILED: &str = "failed: ";
 
 /// Share of its core above which a real-time process is too busy: the kernel throttles at 95 %, by default.
 const TOO_BUSY: f64 = 0.9;
@@ -239,7 +243,7 @@ fn excuse(ending: &Ending, timing: &Timing, outage: Option<Outage>) -> Option<St
 }
 
 fn failed(checks: &[Check]) -> Option<OutcomeReason> {
-    named(checks, CheckResult::Failed).map(|names| (Outcome::Failed, format!("failed: {names}")))
+    named(checks, CheckResult::Failed).map(|names| (Outcome::Failed, format!("{FAILED}{names}")))
 }
 
 /// What was not tested, with what to do. Without a cycle that was everything.
@@ -253,40 +257,52 @@ fn untested(checks: &[Check], cycles: u64) -> Option<OutcomeReason> {
     (!why.is_empty()).then_some((Outcome::Untested, why))
 }
 
-/// The outcome of a run that expects one: passed if the outcome is this one and every requirement is met. A run that the
+/// Whether a check counts beside the expected outcome, not towards it: an expected event always does. A requirement counts
+/// towards whether the run passes, but says nothing on how it ends.
+fn stands_beside(check: &Check, expect: &ExpectConfig) -> bool {
+    use ExpectedVerdict::{Fail, Pass, Untested};
+    let is_by_checks = [Pass, Fail, Untested].into_iter().any(|outcome| expect.accepts(outcome));
+    check.is_expected_event() || (check.is_requirement() && !is_by_checks)
+}
+
+/// The outcome of a run that expects one: passed if the outcome is this one, and what stands beside it holds. A run that the
 /// machine spoiled stays INVALID.
 fn against(
-    expected: ExpectedVerdict,
+    expect: &ExpectConfig,
     (outcome, reason): OutcomeReason,
-    [checks, requirements]: [&[Check]; 2],
+    [checks, beside]: [&[Check]; 2],
     figures: &Figures,
 ) -> OutcomeReason {
-    if outcome == Outcome::Invalid {
-        return (outcome, reason);
-    }
-    let wanted = Outcome::of(expected);
-    if outcome != wanted {
+    let Some(ending) = outcome.named() else { return (outcome, reason) };
+    if !expect.accepts(ending) {
         let reason =
             if outcome == Outcome::Passed { "every check of the rig passed" } else { reason.as_str() };
-        return (Outcome::Failed, format!("expected {}, but {}: {reason}", wanted.word(), outcome.word()));
+        return (Outcome::Failed, format!("expected {}, but {}: {reason}", wanted(expect), outcome.word()));
     }
     // The rig's own checks still count where the run goes on in order to its end.
     let own = || {
-        let is_in_order = matches!(wanted, Outcome::SafeStop | Outcome::Interrupted);
+        let is_in_order = matches!(outcome, Outcome::SafeStop | Outcome::Interrupted);
         let short = || incomplete(figures).or_else(|| failed(checks));
         let idle: Vec<_> = checks.iter().filter(|check| is_of_scenario(check)).cloned().collect();
         let in_order = is_in_order.then(short).flatten();
-        in_order.or_else(|| if wanted == Outcome::Untested { None } else { untested(&idle, figures.cycles) })
+        in_order.or_else(|| if outcome == Outcome::Untested { None } else { untested(&idle, figures.cycles) })
     };
     let lost = || {
-        let names = named(requirements, CheckResult::Excused)?;
+        let names = named(beside, CheckResult::Excused)?;
         Some((Outcome::Invalid, format!("lost cycles may explain: {names}")))
     };
     own()
-        .or_else(|| failed(requirements))
+        .or_else(|| failed(beside))
         .or_else(lost)
-        .or_else(|| untested(requirements, figures.cycles))
-        .unwrap_or_else(|| (Outcome::Passed, format!("{}, as expected: {reason}", wanted.word())))
+        .or_else(|| untested(beside, figures.cycles))
+        .unwrap_or_else(|| (Outcome::Passed, format!("{}, as expected: {reason}", outcome.word())))
+}
+
+/// The expected outcome, in words.
+fn wanted(expect: &ExpectConfig) -> String {
+    let outcomes = ExpectedVerdict::ALL.into_iter().filter(|outcome| expect.accepts(*outcome));
+    let words: Vec<_> = outcomes.map(|outcome| Outcome::of(outcome).word()).collect();
+    words.join(" or ")
 }
 
 /// Whether it is the check of the declared faults.

@@ -7,12 +7,14 @@
 mod section;
 
 mod can;
+mod circle;
 mod control;
 mod document;
 mod drive_profile;
 mod drives;
 mod dynamics;
 mod error;
+mod expect;
 mod faults;
 mod food;
 mod jaw;
@@ -37,13 +39,14 @@ pub use drive_profile::{
 pub use drives::{DriveConfig, DrivesConfig};
 pub use dynamics::DynamicsConfig;
 pub use error::ScenarioError;
+pub use expect::{ExpectConfig, ExpectedVerdict};
 pub use faults::{FaultConfig, FaultKindConfig, FaultLayer, FaultPlace, FaultSize};
 pub use food::FoodConfig;
 pub use jaw::JawConfig;
 pub use limits::TrajectoryLimitsConfig;
 pub use motion::*;
 pub use quantity::{Dimension, Quantity, QuantityError, UNITS, Unit};
-pub use requirements::{During, ExpectConfig, ExpectedVerdict, RequirementConfig, Statistic, TimeWindow};
+pub use requirements::{During, RequirementConfig, Statistic, TimeWindow};
 pub(crate) use scenario::RATES_HZ;
 pub use scenario::Scenario;
 pub use stimuli::{Shape, StimulusConfig};

@@ -1,6 +1,6 @@
 //! Numbers with their units, as users write them: `"50 um"`, `"0.2 N"`, `3`.
 //!
-//! The values are SI inside. No prefixes are derived and no units are combined: [`UNITS`] lists every unit.
+//! The values are SI inside. No prefixes are derived: [`UNITS`] lists every unit that can be written.
 
 use std::fmt::{self, Display, Formatter};
 use std::str::FromStr;
@@ -31,6 +31,10 @@ pub enum Dimension {
     AngularVelocity,
     /// Kilograms.
     Mass,
+    /// Watts.
+    Power,
+    /// Joules.
+    Energy,
 }
 
 /// A unit: its name, its kind, and its size in SI units.
@@ -45,7 +49,7 @@ pub struct Unit {
 }
 
 /// Every unit. The first of a kind is its SI unit.
-pub const UNITS: [Unit; 28] = {
+pub const UNITS: [Unit; 30] = {
     use Dimension as D;
     const fn unit(name: &'static str, dimension: Dimension, si: f64) -> Unit {
         Unit { name, dimension, si }
@@ -80,6 +84,8 @@ pub const UNITS: [Unit; 28] = {
         unit("deg/s", D::AngularVelocity, DEGREE),
         unit("kg", D::Mass, 1.0),
         unit("g", D::Mass, 1e-3),
+        unit("W", D::Power, 1.0),
+        unit("J", D::Energy, 1.0),
     ]
 };
 
@@ -107,6 +113,22 @@ fn significant(value: f64) -> String {
 }
 
 impl Dimension {
+    /// Its powers of metre, kilogram and second. As in SI, an angle is a number.
+    pub const fn exponents(self) -> [i8; 3] {
+        match self {
+            Self::One | Self::Angle => [0; 3],
+            Self::Length => [1, 0, 0],
+            Self::Velocity => [1, 0, -1],
+            Self::Acceleration => [1, 0, -2],
+            Self::Force => [1, 1, -2],
+            Self::Time => [0, 0, 1],
+            Self::AngularVelocity => [0, 0, -1],
+            Self::Mass => [0, 1, 0],
+            Self::Power => [2, 1, -3],
+            Self::Energy => [2, 1, -2],
+        }
+    }
+
     /// Its SI unit.
     pub fn si_unit(self) -> Unit {
         UNITS.into_iter().find(|unit| unit.dimension == self).expect("every kind has a unit")

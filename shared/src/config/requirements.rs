@@ -102,33 +102,3 @@ impl RequirementConfig {
         require_text("require.name", &self.name)
     }
 }
-
-/// The outcome of a run.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum ExpectedVerdict {
-    /// Every check passes.
-    Pass,
-    /// A check or a requirement fails.
-    Fail,
-    /// A safe stop.
-    SafeStop,
-    /// A process dies.
-    Died,
-    /// The operator ends the run, or asks for a stop.
-    Interrupted,
-    /// The recording is incomplete.
-    Incomplete,
-    /// Something was not tested.
-    Untested,
-}
-
-section! {
-    /// The expected outcome. The run passes if the outcome is this one.
-    pub struct ExpectConfig {
-        /// The outcome without this table; any when absent.
-        pub verdict: Option<ExpectedVerdict> = None,
-        /// Occurrences that the run must have.
-        pub events: Vec<String> = Vec::new(),
-    }
-}

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use toml::Table;
 
+use super::circle::refuse_circles;
 use super::document::{Document, place};
 use super::drive_profile::over_kinds;
 use super::error::ScenarioError;
@@ -261,8 +262,15 @@ impl Scenario {
         for (number, stimulus) in self.stimulus.iter().enumerate() {
             stimulus.validate(&entries).map_err(|error| error.of_entry(number))?;
         }
+        let faults = self.faults.iter().map(|fault| fault.when(&entries).map(|when| when.start));
+        let stimuli = self.stimulus.iter().map(|stimulus| stimulus.when(&entries).map(|when| when.start));
+        let [faults, stimuli] = [faults.collect::<Result<Vec<_>, _>>()?, stimuli.collect::<Result<_, _>>()?];
+        refuse_circles(&faults, &stimuli, &entries)?;
         for (number, requirement) in self.require.iter().enumerate() {
             requirement.validate().map_err(|error| error.of_entry(number))?;
+        }
+        if let Some(expect) = &self.expect {
+            expect.validate()?;
         }
         if let Some(food) = &self.food {
             food.validate()?;

@@ -12,7 +12,7 @@ use crate::messages::{Command, Event, Reading, State};
 use crate::named::Declared;
 
 pub use cycle::{ControllerPorts, Duties, run_cycle, set_parameters};
-pub use operator::{Operator, OperatorError};
+pub use operator::{Operator, OperatorError, is_seen_by_controller};
 pub use session::{Session, SessionError, Waited};
 
 /// A cycle's place in time.

@@ -3,7 +3,7 @@
 //!
 //! It sees what the controller sees: readings and its own states. It acts on nothing.
 
-use crate::config::{FaultLayer, Scenario, ScenarioError, Start, StimulusConfig, When};
+use crate::config::{FaultKindConfig, FaultLayer, Scenario, ScenarioError, Start, StimulusConfig, When};
 use crate::injection::{Injected, Injection};
 use crate::messages::Event;
 use crate::messages::codes::{Cause, ControllerState, EventKind, OF_OPERATOR, Source};
@@ -43,7 +43,7 @@ pub(crate) enum Due {
     Set { place: usize, value: f64 },
     /// An orderly stop is asked for.
     Stop,
-    /// A fault of a process, with its place in the scenario's list.
+    /// A fault of a process, with its place in the scenario's list. The supervisor knows whether it is to carry it out.
     Fault(usize),
 }
 
@@ -80,7 +80,7 @@ impl Operator {
                 continue;
             }
             let when = stimulus.when(&scenario.entry_names())?;
-            if !is_seen(when, scenario) {
+            if !is_seen_by_controller(when, scenario) {
                 return Err(OperatorError::Unseen { table: "[[stimulus]]", number: place + 1 });
             }
             let due = due(stimulus, declared)
@@ -88,11 +88,16 @@ impl Operator {
             waiting.push((Injected::Stimulus(place), due));
         }
         for (place, fault) in scenario.faults.iter().enumerate() {
-            if fault.kind.layer() != FaultLayer::Process {
+            let is_of_process = fault.kind.layer() == FaultLayer::Process;
+            if !is_of_process && fault.kind != FaultKindConfig::ControllerStall {
                 continue;
             }
             let when = fault.when(&scenario.entry_names())?;
-            if !is_seen(when, scenario) {
+            if !is_seen_by_controller(when, scenario) {
+                // In simulated time the plant alone stalls the commands; real time refuses this before the start.
+                if !is_of_process {
+                    continue;
+                }
                 return Err(OperatorError::Unseen { table: "[[faults]]", number: place + 1 });
             }
             waiting.push((Injected::Fault(place), Due::Fault(place)));
@@ -131,7 +136,7 @@ pub(crate) fn event(injected: Injected, cycle: u64, time_ns: u64) -> Option<Even
 }
 
 /// Whether the controller sees what the time counts from.
-fn is_seen(when: When, scenario: &Scenario) -> bool {
+pub fn is_seen_by_controller(when: When, scenario: &Scenario) -> bool {
     match when.start {
         Start::SwitchOn | Start::State(_) => true,
         Start::Stimulus(place) => scenario.stimulus.get(place).is_some_and(StimulusConfig::is_of_controller),
@@ -151,7 +156,7 @@ fn due(stimulus: &StimulusConfig, declared: &Declared) -> Result<Due, NameError>
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::{FaultConfig, FaultKindConfig};
+    use crate::config::FaultConfig;
     use crate::named::Parameter;
 
     const RUNNING: u32 = ControllerState::Running.code();

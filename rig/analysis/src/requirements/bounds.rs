@@ -168,8 +168,8 @@ impl Bounds {
         let Some(worst) = self.worst else {
             let why = if self.missing > 0 {
                 format!(
-                    "{} has no value{}: all {} samples are missing",
-                    self.of.text, self.window.text, self.missing
+                    "{} has no value{}: all {} samples are missing{}",
+                    self.of.text, self.window.text, self.missing, self.of.absence
                 )
             } else {
                 format!("no sample{}", self.window.text)

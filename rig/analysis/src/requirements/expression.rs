@@ -3,8 +3,10 @@
 //! Expressions are those of the crate `exmex`, in SI units, with signals in braces: `abs({l1.force}) + abs({l2.force})`.
 
 use exmex::{Express, FlatEx};
-use masseter_shared::config::{RequirementConfig, Unit};
+use masseter_shared::config::{Dimension, RequirementConfig, Unit};
 
+use super::base_exponents::BaseExponents;
+use super::dimension::derived;
 use crate::signals::Values;
 
 /// A signal or an expression.
@@ -14,6 +16,8 @@ pub(super) struct Quantified {
     pub(super) text: String,
     /// The unit in which it is shown.
     pub(super) unit: Unit,
+    /// Why it may have no value in a whole run; empty where nothing is known.
+    pub(super) absence: &'static str,
     source: Source,
 }
 
@@ -34,7 +38,8 @@ impl Quantified {
                         "{name} is a state, which has no bounds; use never, or when and then"
                     ));
                 }
-                Ok(Self { text: name.clone(), unit: named.shown(), source: Source::Signal(signal) })
+                let (unit, absence) = (named.shown(), named.absence());
+                Ok(Self { text: name.clone(), unit, absence, source: Source::Signal(signal) })
             }
             (None, Some(text)) => {
                 let name = config.unit.as_deref().unwrap_or_default();
@@ -56,10 +61,22 @@ impl Quantified {
                         values.signal(*state).name
                     ));
                 }
+                let of = |name: &str| {
+                    let place = parsed.var_names().iter().position(|known| known == name);
+                    let signal = place.map(|place| values.signal(signals[place]));
+                    signal.map_or(Dimension::One, |signal| signal.shown().dimension)
+                };
+                let derived = derived(text, of).map_err(|why| format!("expression = '{text}': {why}"))?;
+                if derived != BaseExponents::of(unit.dimension) {
+                    return Err(format!("unit = '{name}': the expression '{text}' has the unit {derived}"));
+                }
                 let arguments = vec![0.0; signals.len()];
+                let absences = signals.iter().map(|signal| values.signal(*signal).absence());
+                let absence = absences.into_iter().find(|absence| !absence.is_empty()).unwrap_or_default();
                 Ok(Self {
                     text: text.clone(),
                     unit,
+                    absence,
                     source: Source::Expression { parsed: Box::new(parsed), signals, arguments },
                 })
             }

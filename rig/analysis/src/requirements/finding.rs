@@ -82,6 +82,9 @@ pub struct RequirementFigures {
     /// Whether the machine may have caused a failure, where the machine lost cycles.
     #[serde(skip)]
     pub may_be_disturbed: bool,
+    /// Whether it is an event that `[expect]` names.
+    #[serde(skip)]
+    pub is_expected_event: bool,
     /// The signal over time, for plots.
     #[serde(skip)]
     pub plot: Option<RequirementPlot>,

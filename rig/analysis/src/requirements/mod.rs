@@ -3,9 +3,11 @@
 //! All are judged in one pass over the samples of the run, in the order of time. `docs/requirements.md` fixes the meaning
 //! of windows, missing samples and the run's end. What the outcomes mean for the verdict is the report's.
 
+mod base_exponents;
 mod bounds;
 mod condition;
 mod count;
+mod dimension;
 mod expression;
 mod finding;
 mod moment;

@@ -1,6 +1,6 @@
 //! Occurrences in the events of a run: `fault.NAME`, `stimulus.NAME`, their ends, and `SOURCE.CAUSE`.
 
-use masseter_shared::config::Scenario;
+use masseter_shared::config::{FaultConfig, FaultLayer, Scenario};
 use masseter_shared::messages::codes::{Cause, Source};
 use masseter_shared::wording::nearest;
 
@@ -107,11 +107,16 @@ const REPORTS: [(Source, &[Cause]); 4] = [
     (Source::Wire, &[Cause::ErrorActive, Cause::ErrorPassive, Cause::BusOff]),
 ];
 
-/// Whether the name is the end of a stimulus that has none.
+/// Whether the name is the end of a stimulus or of a fault that has none.
 fn is_endless(name: &str, scenario: &Scenario) -> bool {
-    let of_stimulus = name.strip_prefix("stimulus.").and_then(|rest| rest.strip_suffix(".ended"));
-    let mut endless = scenario.stimulus.iter().filter(|stimulus| stimulus.is_of_controller());
-    of_stimulus.is_some_and(|name| endless.any(|stimulus| stimulus.name() == name))
+    let Some(name) = name.strip_suffix(".ended") else { return false };
+    let is_of_process = |fault: &&FaultConfig| fault.kind.layer() == FaultLayer::Process;
+    let faults = scenario.faults.iter().filter(is_of_process).filter(|fault| fault.kind.size().is_none());
+    let stimuli = scenario.stimulus.iter().filter(|stimulus| stimulus.is_of_controller());
+    let mut endless = faults
+        .map(|fault| format!("fault.{}", fault.name()))
+        .chain(stimuli.map(|stimulus| format!("stimulus.{}", stimulus.name())));
+    endless.any(|endless| endless == name)
 }
 
 /// The names of the events of the rig that can be occurrences.

@@ -15,6 +15,7 @@ use crate::signals::Values;
 #[derive(Debug)]
 pub(super) struct Requirement {
     name: String,
+    is_expected_event: bool,
     kind: Kind,
 }
 
@@ -59,12 +60,17 @@ impl Requirement {
         };
         idle_key(config, given[0])
             .map_or(Ok(()), |key| Err(format!("{key} has no effect with {}", given[0])))?;
-        Ok(Self { name: config.name.clone(), kind })
+        Ok(Self { name: config.name.clone(), is_expected_event: false, kind })
     }
 
     /// A requirement that the run cannot test, for that reason.
     pub(super) fn unknown(config: &RequirementConfig, why: String) -> Self {
-        Self { name: config.name.clone(), kind: Kind::Unknown(why) }
+        Self { name: config.name.clone(), is_expected_event: false, kind: Kind::Unknown(why) }
+    }
+
+    /// The same as an event that `[expect]` names.
+    pub(super) fn into_expected_event(self) -> Self {
+        Self { is_expected_event: true, ..self }
     }
 
     pub(super) fn take(&mut self, moment: &Moment<'_>) {
@@ -113,6 +119,7 @@ impl Requirement {
             worst_ns: finding.worst_ns,
             latency_ms: finding.latency_s.map(|seconds| seconds * 1e3),
             may_be_disturbed: finding.may_be_disturbed,
+            is_expected_event: self.is_expected_event,
             plot,
         }
     }

@@ -1,7 +1,7 @@
 //! The requirements of a run, judged together.
 
 use masseter_recording::Recorded;
-use masseter_shared::config::Scenario;
+use masseter_shared::config::{RequirementConfig, Scenario};
 use masseter_shared::messages::codes::ControllerState;
 use masseter_shared::named::Declared;
 
@@ -16,7 +16,7 @@ use crate::signals::{Registry, Sample, Timeline, Values};
 /// ```
 /// use masseter_analysis::requirements::{RequirementResult, Requirements};
 /// use masseter_recording::Recorded;
-/// use masseter_shared::config::Scenario;
+/// use masseter_shared::config::{RequirementConfig, Scenario};
 /// use masseter_shared::messages::Reading;
 /// use masseter_shared::messages::codes::DriveState;
 /// use masseter_shared::named::Declared;
@@ -74,12 +74,12 @@ impl Requirements {
     pub fn new(scenario: &Scenario, declared: &Declared) -> Self {
         let mut values = Values::new(Registry::new(scenario, declared));
         let expected = scenario.expect.iter().flat_map(|expect| &expect.events).map(expected_event);
-        let configs: Vec<_> = scenario.require.iter().cloned().chain(expected).collect();
-        let read = |config| {
+        let mut read = |config: &RequirementConfig| {
             Requirement::new(config, scenario, &mut values)
                 .unwrap_or_else(|reason| Requirement::unknown(config, reason))
         };
-        let list = configs.iter().map(read).collect();
+        let mut list: Vec<_> = scenario.require.iter().map(&mut read).collect();
+        list.extend(expected.map(|config| read(&config).into_expected_event()));
         let state = values.choose("controller.state").expect("every run has this signal");
         Self { list, values, timeline: Timeline::default(), row: Vec::new(), state, motion_ns: None }
     }
@@ -128,8 +128,8 @@ impl Requirements {
 }
 
 /// The requirement that an expected event occurs.
-fn expected_event(name: &String) -> masseter_shared::config::RequirementConfig {
-    masseter_shared::config::RequirementConfig {
+fn expected_event(name: &String) -> RequirementConfig {
+    RequirementConfig {
         name: format!("expected event {name}"),
         event: Some(name.clone()),
         at_least: Some(1),

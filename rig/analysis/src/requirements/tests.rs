@@ -274,7 +274,7 @@ fn an_answer_that_the_end_of_the_run_cuts_is_said_to_be() {
 #[test]
 fn what_is_computed_to_no_number_fails() {
     let run = Run::of(&[1.0, -1.0, 2.0]);
-    let figures = run.judge("expression = 'ln({l1.force})'\nunit = ''\nmax = 5");
+    let figures = run.judge("expression = 'ln(signum({l1.force}))'\nunit = ''\nmax = 5");
     assert_eq!((figures.result, figures.margin), (Failed, None), "{figures:?}");
 }
 
@@ -349,4 +349,15 @@ fn signals_of_a_controller_are_checked_once_it_has_declared_them() {
     check_requirements(&scenario, Some(&declared)).unwrap();
     let found = Requirements::new(&scenario, &Declared::default()).finish();
     assert_eq!(found[0].result, Untested, "the controller has no such signal");
+}
+
+#[test]
+fn what_has_no_end_has_no_occurrence_of_it() {
+    let check = |kind: &str| {
+        let fault = format!("[[faults]]\nkind = '{kind}'\nname = 'it'\nat_s = 1.0\n");
+        let text = format!("{fault}[[require]]\nname = 'it'\nnever = 'fault.it.ended'");
+        check_requirements(&Scenario::parse("s.toml".as_ref(), &text).unwrap(), None)
+    };
+    assert!(check("plant_kill").unwrap_err().contains("'fault.it.ended' is no occurrence"));
+    assert_eq!(check("plant_stall"), Ok(()));
 }

@@ -21,6 +21,8 @@ pub struct CycleMessages {
     pub command: Option<Command>,
     /// The signals that the controller declares.
     pub signals: Option<Signals>,
+    /// Shares of their cores that the loops of controller and plant took since the message before.
+    pub cpu: [Option<f64>; 2],
     /// The controller's parameters, which hold until they change.
     pub parameters: Option<Parameters>,
 }

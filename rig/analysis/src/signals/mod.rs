@@ -3,6 +3,7 @@
 //! A [`Registry`] holds every signal that a run of a scenario has. A [`Timeline`] joins the messages of a cycle. The module
 //! judges nothing: see [`requirements`](crate::requirements).
 
+mod cpu_share;
 mod cycle;
 mod derived;
 mod registry;

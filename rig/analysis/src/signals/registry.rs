@@ -39,6 +39,9 @@ pub struct NamedSignal {
     shown: Unit,
     #[serde(skip)]
     states: Option<StateNames>,
+    /// Why it may have no value in a whole run.
+    #[serde(skip)]
+    absence: &'static str,
     #[serde(skip)]
     extract: Extract,
 }
@@ -53,6 +56,11 @@ impl NamedSignal {
     /// The unit in which it is shown.
     pub(crate) fn shown(&self) -> Unit {
         self.shown
+    }
+
+    /// Why it may have no value in a whole run; empty where nothing is known.
+    pub(crate) fn absence(&self) -> &'static str {
+        self.absence
     }
 
     /// The names of its values, where it is a state.
@@ -134,6 +142,7 @@ impl Registry {
             about: about.into(),
             shown,
             states: None,
+            absence: "",
             extract: Box::new(extract),
         });
     }
@@ -279,6 +288,17 @@ impl Registry {
     }
 
     fn add_timing(&mut self) {
+        for (place, role) in ["controller", "plant"].into_iter().enumerate() {
+            self.add(
+                format!("{role}.cpu"),
+                "%",
+                format!("Share of its core that the {role}'s loop took since its message before, by work and by spinning."),
+                move |messages| messages.cpu[place],
+            );
+            if let Some(signal) = self.signals.last_mut() {
+                signal.absence = "; simulated time takes no share of a core: use --clock rt";
+            }
+        }
         let seconds = |from_ns: u64, to_ns: u64| {
             (from_ns > 0 && to_ns > 0).then(|| (to_ns as f64 - from_ns as f64) / 1e9)
         };

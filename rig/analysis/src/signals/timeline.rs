@@ -7,6 +7,7 @@ use std::collections::VecDeque;
 use masseter_recording::Recorded;
 use masseter_shared::messages::{Parameters, State};
 
+use super::cpu_share::CpuShare;
 use super::cycle::CycleMessages;
 use crate::events::EventRecord;
 
@@ -33,6 +34,8 @@ pub struct Timeline {
     /// Events that were not handed out yet.
     events: Vec<EventRecord>,
     parameters: Option<Parameters>,
+    controller_cpu: CpuShare,
+    plant_cpu: CpuShare,
     /// The newest cycle whose sample a state was computed from.
     newest_reading: u64,
     last_ns: u64,
@@ -117,6 +120,9 @@ impl Timeline {
         let mut messages = self.cycles.pop_front()?;
         self.parameters = messages.parameters.or(self.parameters);
         messages.parameters = self.parameters;
+        let controller = messages.state.map(|state| [state.woke_ns, state.worked_ns + state.spun_ns]);
+        let plant = messages.reading.map(|reading| [reading.woke_ns, reading.worked_ns + reading.spun_ns]);
+        messages.cpu = [self.controller_cpu.take(controller), self.plant_cpu.take(plant)];
         let time_ns = messages.time_ns().filter(|time_ns| *time_ns > self.last_ns)?;
         self.last_ns = time_ns;
         let mut events = Vec::new();

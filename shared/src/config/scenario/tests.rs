@@ -176,6 +176,22 @@ const WRONG: &[(&str, &str)] = &[
         "[[faults]]\nkind = 'jam'\naxis = 'l2'\nat_s = 1.0\nafter = 'fault.jamm'",
         "faults.after = 'fault.jamm': use fault.NAME, stimulus.NAME or controller.STATE; did you mean 'fault.jam'?",
     ),
+    (
+        "[[faults]]\nkind = 'jam'\naxis = 'l2'\nat_s = 1.0\nafter = 'fault.jam'",
+        "faults.after = fault.jam after fault.jam: these times count from each other",
+    ),
+    (
+        "[[faults]]\nkind = 'jam'\naxis = 'l2'\nat_s = 1.0\nafter = 'stimulus.push'\n\
+         [[faults]]\nkind = 'plant_kill'\nat_s = 1.0\nafter = 'fault.drive_sto'\n\
+         [[faults]]\nkind = 'drive_sto'\naxis = 'l2'\nat_s = 1.0\nafter = 'fault.jam'\n\
+         [[stimulus]]\nat_s = 0.0\npush_n = [0, 0, 1]\nafter = 'fault.drive_sto'",
+        "faults.after = fault.jam after stimulus.push after fault.drive_sto after fault.jam: these times",
+    ),
+    ("[expect]\nexit_code = 3", "expect.exit_code = 3: use 0, 1, 4, 5, 6 or 130"),
+    (
+        "[expect]\nexit_code = 5\nverdict = 'fail'",
+        "expect.exit_code = 5: expect.verdict has the exit code 1: give one of both",
+    ),
     ("[[stimulus]]\nat_s = 1.0", "stimulus.push_n = none or several: give exactly one"),
     ("[[stimulus]]\nat_s = 1.0\nstop = true\nvalue = 1.0", "stimulus.value = given: leave it away"),
     ("[[stimulus]]\nat_s = 1.0\npush_n = [0, 0, 1]\nshape = 'ramp'", "stimulus.for_s = none"),

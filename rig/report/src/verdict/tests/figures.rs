@@ -195,7 +195,6 @@ fn each_thing_that_is_wrong_has_its_verdict() {
     for (change, outcome, reason) in cases {
         let verdict = Run::with(change);
         assert_eq!((verdict.exit_code, verdict.reason.as_str()), (outcome, reason));
-        assert_eq!(verdict.is_judged(), matches!(outcome, Exit::Passed | Exit::Failed), "{outcome:?}");
     }
 }
 

@@ -58,6 +58,25 @@ fn a_failure_is_excused_only_if_the_undisturbed_rest_passes() {
 }
 
 #[test]
+fn what_the_scenario_stalls_excuses_nothing_and_is_no_miss() {
+    let mut run = Run::new();
+    run.figures.plant_skips = SkipFigures { skipped: 50, by_scenario: 50, ..SkipFigures::default() };
+    let verdict = Verdict::new(&run.manifest, &run.figures);
+    assert_eq!((verdict.exit_code, verdict.colour()), (Exit::Passed, "pass"));
+    assert_eq!(verdict.timing.to_string(), "stalled by faults of the scenario (50 cycles)");
+    run.figures.tracking.actual.rms_mm = Some(3.0);
+    assert_eq!(Verdict::new(&run.manifest, &run.figures).exit_code, Exit::Failed);
+    run.disturb();
+    let verdict = Verdict::new(&run.manifest, &run.figures);
+    assert_eq!(verdict.exit_code, Exit::Invalid);
+    let said = verdict.timing.to_string();
+    assert!(
+        said.starts_with("disturbed by the machine (3 of ") && said.ends_with("stalled 50 more"),
+        "{said}"
+    );
+}
+
+#[test]
 fn too_many_lost_cycles_leave_nothing_to_judge() {
     let lose = |lost: u64| {
         let mut run = Run::new();

@@ -31,6 +31,7 @@ fn require(run: &mut Run, result: RequirementResult, may_be_disturbed: bool) {
         worst_ns: None,
         latency_ms: None,
         may_be_disturbed,
+        is_expected_event: false,
         plot: None,
     });
 }
@@ -87,4 +88,43 @@ fn a_requirement_that_lost_cycles_may_have_failed_is_excused() {
         require(&mut run, RequirementResult::Failed, may_be_disturbed);
         assert_eq!(judge(&run).0, word, "{}", judge(&run).1);
     }
+}
+
+#[test]
+fn a_failure_may_be_expected_of_a_requirement_but_not_of_an_expected_event() {
+    for (result, expected, word) in [
+        (RequirementResult::Failed, ExpectedVerdict::Fail, "PASS"),
+        (RequirementResult::Untested, ExpectedVerdict::Untested, "PASS"),
+        (RequirementResult::Failed, ExpectedVerdict::Untested, "FAIL"),
+        (RequirementResult::Passed, ExpectedVerdict::Fail, "FAIL"),
+        (RequirementResult::Failed, ExpectedVerdict::Pass, "FAIL"),
+    ] {
+        let mut run = Run::new();
+        expect(&mut run, expected);
+        require(&mut run, result, true);
+        assert_eq!(judge(&run).0, word, "{expected:?}, {result:?}: {}", judge(&run).1);
+    }
+    let mut run = Run::new();
+    expect(&mut run, ExpectedVerdict::Fail);
+    require(&mut run, RequirementResult::Failed, true);
+    assert_eq!(judge(&run).1, "FAIL, as expected: failed: stops");
+    require(&mut run, RequirementResult::Failed, true);
+    let event = run.figures.requirements.last_mut().unwrap();
+    (event.name, event.is_expected_event) = ("expected event it".to_owned(), true);
+    assert_eq!(judge(&run), ("FAIL", "failed: expected event it".to_owned()));
+}
+
+#[test]
+fn an_exit_code_is_expected_as_its_outcome_is() {
+    let code = |exit_code| Some(ExpectConfig { exit_code: Some(exit_code), ..ExpectConfig::default() });
+    let mut run = stopped();
+    run.manifest.scenario.expect = code(5);
+    assert_eq!(judge(&run).0, "PASS");
+    run.manifest.scenario.expect = code(1);
+    let (word, reason) = judge(&run);
+    assert!(word == "FAIL" && reason.starts_with("expected FAIL or UNTESTED, but SAFE STOP: "), "{reason}");
+    let mut failed = Run::new();
+    failed.manifest.scenario.expect = code(1);
+    require(&mut failed, RequirementResult::Failed, true);
+    assert_eq!(judge(&failed).0, "PASS");
 }
