@@ -27,6 +27,7 @@ use crate::plant::{self, PlantArgs};
 use crate::recorder::{self, RecorderArgs};
 use crate::recording_cli::{self, RecordingVerb};
 use crate::report_cli::{self, ReportArgs};
+use crate::robot::{self, RobotVerb};
 use crate::run::{
     self,
     args::{Readers, RunArgs},
@@ -98,6 +99,9 @@ enum Verb {
     Signals(SignalsArgs),
     /// Print the messages as types of C or Python
     Interface(InterfaceArgs),
+    /// Bring up a robot in steps: inspect, configure, and what follows
+    #[command(subcommand, after_help = "Example:\n  masseter robot inspect robot.toml --can can0,can1")]
+    Robot(RobotVerb),
     /// Emulate the six drives and the mechanism on real CAN interfaces
     Plant(PlantArgs),
     /// Write the report of a run again, or compare two runs
@@ -186,6 +190,7 @@ fn execute(verb: Verb) -> Result<Exit, Failure> {
         Verb::Fk(args) => kinematics_cli::forward(&args).usage(),
         Verb::Ik(args) => kinematics_cli::inverse(&args).usage(),
         Verb::Can(verb) => can::execute(&verb).usage(),
+        Verb::Robot(verb) => robot::execute(&verb),
         Verb::Uniqueness(verb) => uniqueness::uniqueness(&verb).usage(),
         Verb::Kinematics(args) => paper_study::study(&args).usage(),
         Verb::Doctor(args) => doctor::examine(&args).usage(),

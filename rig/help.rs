@@ -9,7 +9,7 @@ const GROUPS: [(&str, &[&str]); 6] = [
     ("Play a motion and judge it", &["init", "run", "test", "signals", "faults", "report", "recording"]),
     ("Bring your own controller", &["new", "interface", "controller", "param"]),
     ("Prepare this machine", &["doctor", "bench", "clean"]),
-    ("Work with CAN and the drives", &["can", "plant"]),
+    ("Work with CAN and the drives", &["robot", "can", "plant"]),
     ("Solve the kinematics", &["ik", "fk", "uniqueness", "kinematics"]),
     ("Set up the shell", &["completions", "man"]),
 ];

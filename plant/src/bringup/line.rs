@@ -26,6 +26,8 @@ const STEP_NS: u64 = MILLISECOND_NS;
 /// Silence of a server after which a request is repeated, and how often that is done.
 const TIMEOUT_NS: u64 = 500 * MILLISECOND_NS;
 const ATTEMPTS: u32 = 3;
+/// Time that a node has to answer a scan, ns.
+const SCAN_NS: u64 = 10 * MILLISECOND_NS;
 /// Bytes of the longest value that is read: no text of an identity is longer.
 const LONGEST_VALUE: usize = 256;
 
@@ -273,6 +275,22 @@ impl Line {
     pub fn command(&mut self, axis: usize, command: NmtCommand) -> Result<(), LineError> {
         let (bus, node) = self.addresses[axis];
         self.send(bus, Nmt { command, target: NmtTarget::Node(node) }.frame())
+    }
+
+    /// Asks every node id for its device type. Nodes that are none of the scenario's show as [strangers](Self::strangers).
+    ///
+    /// # Errors
+    /// [`LineError`] except those of transfers.
+    pub fn scan(&mut self) -> Result<(), LineError> {
+        let request = SdoRequest::InitiateUpload { object: ObjectAddress::new(0x1000, 0) };
+        for id in 1..=MASTER_NODE.get() {
+            let node = NodeId::new(id).expect("the id is in range");
+            for bus in 0..self.names.len() {
+                self.send(bus, request.frame(node))?;
+            }
+            self.listen(SCAN_NS)?;
+        }
+        Ok(())
     }
 
     /// Everything of the log is on its way to its file.

@@ -31,7 +31,7 @@ pub use id::CanId;
 pub use pdo::{EVERY_SYNC, Rpdo1, Tpdo1};
 pub use plan::{BusPlan, NoReleaser, Overload, PeriodicMessage, PlannedMessage, Release};
 pub use port_faults::{Faulty, NotByPort, PortFaults};
-pub use socket_can::{Interface, OpenError, SocketCan, is_supported};
+pub use socket_can::{Interface, InterfaceDetails, OpenError, SocketCan, is_supported};
 pub use tap::{Tapped, TappedFrame};
 pub use virtual_bus::{Port, VirtualWire, WireConfig};
 pub use wire::{Bitrate, BitrateError};

@@ -31,9 +31,11 @@
 mod clock;
 mod confinement;
 mod conversion;
+mod details;
 mod errno;
 mod interface;
 mod port;
 
+pub use details::InterfaceDetails;
 pub use interface::{Interface, OpenError, is_supported};
 pub use port::SocketCan;

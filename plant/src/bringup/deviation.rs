@@ -1,0 +1,254 @@
+//! What of a drive is not as scenario and profile need it, and what would mend that.
+
+use masseter_can::canopen::ObjectAddress;
+use masseter_can::cia402::Statusword;
+use masseter_shared::config::{AccelerationUnit, DriveProfile, ObjectRule, VelocityUnit};
+use serde::Serialize;
+
+use super::settings::{Difference, Settings};
+use super::survey::Survey;
+use super::wording::{object_name, value_text};
+use crate::wanted::{WantedDrive, WantedIdentity};
+
+/// Bit of 6502h: cyclic synchronous position.
+const CYCLIC_POSITION: u32 = 1 << 7;
+
+/// What becomes of a deviation.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Outcome {
+    /// `configure` mends it.
+    Mended,
+    /// Somebody should look at it; it stops nothing.
+    Doubtful,
+    /// `configure` cannot mend it and refuses.
+    Refused,
+}
+
+/// One deviation.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Deviation {
+    /// The object, such as `6066h:00h`.
+    pub object: String,
+    /// Its name.
+    pub name: &'static str,
+    /// The value that the rig needs.
+    pub wanted: String,
+    /// The value of the drive.
+    pub found: String,
+    /// What becomes of it.
+    pub outcome: Outcome,
+    /// What `configure` would do, or what the user should.
+    pub remedy: String,
+    /// The key of the scenario that decides.
+    pub key: String,
+}
+
+/// Every deviation of a drive.
+pub fn deviations(
+    survey: &Survey,
+    wanted: &WantedDrive,
+    settings: &Settings,
+    profile: &DriveProfile,
+) -> Vec<Deviation> {
+    let mut all: Vec<_> =
+        wanted.identity.iter().filter_map(|&identity| of_identity(survey, identity)).collect();
+    all.extend(of_state(survey));
+    all.extend(of_units(survey, profile));
+    let mut differences = settings.differences(survey);
+    // A unit that the profile lists as an object is compared as such.
+    all.retain(|deviation| {
+        !differences.iter().any(|difference| difference.object.to_string() == deviation.object)
+    });
+    all.extend(differences.drain(..).map(|difference| of_object(survey, &difference)));
+    all
+}
+
+fn new(
+    object: ObjectAddress,
+    [wanted, found]: [String; 2],
+    outcome: Outcome,
+    remedy: &str,
+    key: &str,
+) -> Deviation {
+    let (name, remedy, key) = (object_name(object), remedy.to_owned(), key.to_owned());
+    Deviation { object: object.to_string(), name, wanted, found, outcome, remedy, key }
+}
+
+/// A value, or why there is none.
+fn found_text(survey: &Survey, object: ObjectAddress) -> String {
+    survey.number(object).map(|value| value_text(object, value)).unwrap_or_else(|| {
+        survey.refusal(object).map_or_else(|| "not there".to_owned(), |reason| reason.to_string())
+    })
+}
+
+fn of_identity(survey: &Survey, WantedIdentity { object, mask, value }: WantedIdentity) -> Option<Deviation> {
+    let is_right = survey.number(object).is_some_and(|found| found & mask == value & mask);
+    let key = match object {
+        ObjectAddress { index: 0x1000, .. } => "drive_profile.identity.device_type",
+        ObjectAddress { subindex: 1, .. } => "drive_profile.identity.vendor_id",
+        ObjectAddress { subindex: 2, .. } => "drive_profile.identity.product_code",
+        _ => "drive_profile.identity.revision",
+    };
+    let values = [value_text(object, value & mask), found_text(survey, object)];
+    let remedy = "enter this drive's identity, or use the drive that the profile is for";
+    (!is_right).then(|| new(object, values, Outcome::Refused, remedy, key))
+}
+
+fn of_state(survey: &Survey) -> Vec<Deviation> {
+    let (modes, status) = (ObjectAddress::new(0x6502, 0), ObjectAddress::new(0x6041, 0));
+    let mut all = Vec::new();
+    if survey.number(modes).is_some_and(|modes| modes & CYCLIC_POSITION == 0) {
+        let values = ["bit 7".to_owned(), found_text(survey, modes)];
+        let remedy = "the drive has no cyclic synchronous position mode: the rig cannot use it";
+        all.push(new(modes, values, Outcome::Refused, remedy, ""));
+    }
+    let state = survey.number(status).map(|word| Statusword(word as u16).state());
+    if let Some(Ok(state)) = state
+        && state.is_powered()
+    {
+        let values = ["no voltage".to_owned(), format!("{state:?}")];
+        let remedy = "configure refuses unless --take-over may stop the drive";
+        all.push(new(status, values, Outcome::Doubtful, remedy, ""));
+    }
+    let error = ObjectAddress::new(0x603F, 0);
+    if survey.number(error).is_some_and(|code| code != 0) {
+        let values = ["0h".to_owned(), found_text(survey, error)];
+        all.push(new(error, values, Outcome::Doubtful, "find the cause in the drive's manual", ""));
+    }
+    all
+}
+
+/// The unit of a code, in words.
+fn unit_name(code: u32) -> Option<&'static str> {
+    const NAMES: [(u32, &str); 5] = [
+        (AccelerationUnit::IncrementsS2.code(), "increments/s²"),
+        (AccelerationUnit::RpmPerS.code(), "rpm/s"),
+        (VelocityUnit::IncrementsS.code(), "increments/s"),
+        (VelocityUnit::TenthIncrementsS.code(), "0.1 increments/s"),
+        (VelocityUnit::Rpm.code(), "rpm"),
+    ];
+    NAMES.iter().find(|(known, _)| *known == code).map(|(_, name)| *name)
+}
+
+fn of_units(survey: &Survey, profile: &DriveProfile) -> Vec<Deviation> {
+    let units = &profile.units;
+    let declared = [
+        (0x60A9, units.velocity.code(), "velocity", "drive_profile.units.velocity"),
+        (0x60AA, units.acceleration.code(), "acceleration", "drive_profile.units.acceleration"),
+    ];
+    let of_code = |(index, declared, quantity, key)| {
+        let object = ObjectAddress::new(index, 0);
+        let code = survey.number(object).filter(|&code| code != declared)?;
+        let declared = unit_name(declared).expect("every unit of a profile has a name");
+        // Drives use codes of their own for units that the rig has: such a code proves nothing.
+        let (found, outcome) = match unit_name(code) {
+            Some(name) => (name.to_owned(), Outcome::Refused),
+            None => (value_text(object, code), Outcome::Doubtful),
+        };
+        let remedy =
+            format!("the drive counts {quantity} in {found}, the profile declares {declared}: change one");
+        Some(new(object, [declared.to_owned(), found], outcome, &remedy, key))
+    };
+    let ratio = [1, 2].map(|part| survey.number(ObjectAddress::new(0x6091, part)).map(f64::from));
+    let of_gear = || {
+        let [Some(motor), Some(shaft)] = ratio else { return None };
+        let is_right = (motor / shaft / units.gear_ratio - 1.0).abs() < 1e-6;
+        let values = [units.gear_ratio.to_string(), format!("{motor}/{shaft}")];
+        let remedy = "compare with the gear: a wrong ratio scales every motion";
+        let object = ObjectAddress::new(0x6091, 1);
+        (!is_right)
+            .then(|| new(object, values, Outcome::Doubtful, remedy, "drive_profile.units.gear_ratio"))
+    };
+    declared.into_iter().filter_map(of_code).chain(of_gear()).collect()
+}
+
+fn of_object(survey: &Survey, difference: &Difference) -> Deviation {
+    let Difference { object, wanted, found, rule, key } = difference;
+    let is_pdo = (0x1400..0x1C00).contains(&object.index);
+    let (outcome, remedy) = match (rule, found) {
+        (ObjectRule::Expect, _) => (Outcome::Refused, "the profile expects another value".to_owned()),
+        (ObjectRule::Optional, None) => (Outcome::Doubtful, "left".to_owned()),
+        (_, None) if !is_pdo => {
+            let remedy = "the drive has no such object: give it the rule 'absent' or 'optional'";
+            (Outcome::Refused, remedy.to_owned())
+        }
+        (_, None) if object.index < 0x1600 || (0x1800..0x1A00).contains(&object.index) => {
+            (Outcome::Refused, "the drive has no such PDO".to_owned())
+        }
+        (_, None) => (Outcome::Mended, "map".to_owned()),
+        (_, Some(_)) if is_pdo && *wanted >> 31 == 1 => (Outcome::Mended, "switch off".to_owned()),
+        (_, Some(_)) => (Outcome::Mended, format!("write {}", value_text(*object, *wanted))),
+    };
+    let wanted = if is_pdo && *wanted >> 31 == 1 { "off".to_owned() } else { value_text(*object, *wanted) };
+    let key = if outcome == Outcome::Refused && found.is_none() && !is_pdo {
+        format!("drive_profile.objects (value: {key})")
+    } else {
+        key.clone()
+    };
+    new(*object, [wanted, found_text(survey, *object)], outcome, &remedy, &key)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io;
+    use std::path::Path;
+
+    use masseter_can::canopen::NodeId;
+    use masseter_shared::clock::MILLISECOND_NS;
+    use masseter_shared::config::Scenario;
+
+    use super::*;
+    use crate::bringup::Line;
+
+    /// What emulated drives lack of what this profile needs.
+    fn of_profile(text: &str) -> Vec<(String, Outcome, String)> {
+        let scenario = Scenario::parse(Path::new("robot.toml"), text).unwrap();
+        let mut line = Line::open(&Scenario::default(), Box::new(io::sink())).unwrap();
+        line.listen(100 * MILLISECOND_NS).unwrap();
+        let wanted = WantedDrive::of_axis(&scenario, 3, NodeId::new(4).unwrap()).unwrap();
+        let settings = Settings::wanted(&wanted);
+        let survey = Survey::take(&mut line, 3, settings.addresses()).unwrap();
+        let all = deviations(&survey, &wanted, &settings, scenario.profile(3));
+        all.into_iter().map(|one| (one.object, one.outcome, one.remedy)).collect()
+    }
+
+    #[test]
+    fn an_emulated_drive_has_all_that_the_rig_needs_but_the_event_timer() {
+        let timer = ("1400h:05h".to_owned(), Outcome::Mended, "write 150".to_owned());
+        assert_eq!(of_profile(""), [timer]);
+    }
+
+    #[test]
+    fn every_deviation_is_found_at_once_with_what_becomes_of_it() {
+        let all = of_profile(
+            "[[drive_profile]]\nidentity.revision = 7\nobjects.6066h = { value = 9 }\n\
+             objects.6007h = { rule = 'expect', value = 1 }\nobjects.2222h = { value = 1, bytes = 1 }\n\
+             homing = { home_object = '30B0h', home_position_m = 0.1 }",
+        );
+        let of = |object: &str| {
+            let found = all.iter().find(|(at, ..)| at == object);
+            found.map(|(_, outcome, remedy)| (*outcome, remedy.as_str()))
+        };
+        assert_eq!(of("6066h:00h"), Some((Outcome::Mended, "write 9")));
+        assert_eq!(of("6007h:00h"), Some((Outcome::Refused, "the profile expects another value")));
+        for object in ["1018h:03h", "2222h:00h", "30B0h:00h"] {
+            assert_eq!(of(object).map(|(outcome, _)| outcome), Some(Outcome::Refused), "{object}: {all:?}");
+        }
+    }
+
+    #[test]
+    fn a_unit_is_told_in_words() {
+        let mut survey = Survey::default();
+        survey.insert(ObjectAddress::new(0x60AA, 0), 0x00C0_0300);
+        survey.insert(ObjectAddress::new(0x6091, 1), 26);
+        survey.insert(ObjectAddress::new(0x6091, 2), 1);
+        let all = of_units(&survey, &DriveProfile::default());
+        assert_eq!(
+            all[0].remedy,
+            "the drive counts acceleration in rpm/s, the profile declares increments/s²: change one"
+        );
+        assert_eq!((all[0].outcome, all[1].outcome), (Outcome::Refused, Outcome::Doubtful));
+        assert_eq!(all[1].found, "26/1");
+    }
+}

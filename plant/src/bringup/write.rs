@@ -1,0 +1,327 @@
+//! Settings into a drive: PDOs by the standard's procedure, objects one by one, every value read back.
+
+use masseter_can::canopen::{AbortCode, CobId, NmtCommand, ObjectAddress};
+use masseter_shared::clock::MILLISECOND_NS;
+use masseter_shared::config::{DriveProfile, ObjectKey, ObjectRule};
+use masseter_shared::geometry::AXIS_NAMES;
+use serde::Serialize;
+
+use super::line::{Line, LineError};
+use super::settings::{PdoSetting, Setting, Settings, same};
+use super::survey::Survey;
+use super::wording::{object_name, value_text};
+use crate::wanted::COB_ID_BITS;
+
+/// The time that a drive gets to become pre-operational, ns.
+const ENTER_NS: u64 = 100 * MILLISECOND_NS;
+
+/// A value that was written.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Change {
+    /// The object, such as `6066h:00h`.
+    pub object: String,
+    /// Its name.
+    pub name: &'static str,
+    /// Its value before; none where it could not be read.
+    pub before: Option<String>,
+    /// Its value now.
+    pub after: String,
+}
+
+/// Why a drive does not have its settings.
+#[derive(Debug, thiserror::Error)]
+pub enum WriteError {
+    /// The drive refused a value.
+    #[error(
+        "{}: object {object} ({}) := {}: {code}{limits}; change {key}",
+        AXIS_NAMES[*axis], object_name(*object), value_text(*object, *value)
+    )]
+    Refused {
+        /// The axis.
+        axis: usize,
+        /// The object.
+        object: ObjectAddress,
+        /// The value.
+        value: u32,
+        /// The drive's reason.
+        code: AbortCode,
+        /// The limits of the profile in words; may be empty.
+        limits: String,
+        /// The key of the scenario that decides the value.
+        key: String,
+    },
+    /// The drive took a value and shows another one.
+    #[error(
+        "{}: object {object} ({}) := {}: the drive took it and shows {}; change {key}",
+        AXIS_NAMES[*axis], object_name(*object), value_text(*object, *value), value_text(*object, *found)
+    )]
+    NotKept {
+        /// The axis.
+        axis: usize,
+        /// The object.
+        object: ObjectAddress,
+        /// The value.
+        value: u32,
+        /// What the drive shows.
+        found: u32,
+        /// The key of the scenario that decides the value.
+        key: String,
+    },
+    /// The line.
+    #[error(transparent)]
+    Line(#[from] LineError),
+}
+
+/// Writes settings to one drive, and knows what it changed.
+#[derive(Debug)]
+pub struct Writer<'a> {
+    line: &'a mut Line,
+    axis: usize,
+    profile: &'a DriveProfile,
+    changes: Vec<Change>,
+}
+
+impl<'a> Writer<'a> {
+    /// For the drive of an axis.
+    pub fn new(line: &'a mut Line, axis: usize, profile: &'a DriveProfile) -> Self {
+        Self { line, axis, profile, changes: Vec::new() }
+    }
+
+    /// Every value that was written.
+    pub fn into_changes(self) -> Vec<Change> {
+        self.changes
+    }
+
+    /// Makes the drive pre-operational, since many drives take PDO parameters in no other state, and writes what differs from
+    /// the survey. The first refusal ends it.
+    ///
+    /// # Errors
+    /// [`WriteError`].
+    pub fn apply(&mut self, settings: &Settings, survey: &Survey) -> Result<(), WriteError> {
+        self.line.command(self.axis, NmtCommand::EnterPreOperational)?;
+        self.line.listen(ENTER_NS)?;
+        for pdo in &settings.pdos {
+            self.pdo(pdo, survey)?;
+        }
+        for setting in in_order(&settings.objects, survey) {
+            self.object(setting, survey)?;
+        }
+        Ok(())
+    }
+
+    /// The PDO ceases to exist while it changes (CiA 301, 7.5.2.36).
+    fn pdo(&mut self, pdo: &PdoSetting, survey: &Survey) -> Result<(), WriteError> {
+        let alone = Settings { pdos: vec![pdo.clone()], objects: Vec::new() };
+        let (cob_id, Some(found)) = (pdo.part(1), survey.number(pdo.part(1))) else { return Ok(()) };
+        if alone.differences(survey).is_empty() {
+            return Ok(());
+        }
+        let key = "can.node_ids";
+        let invalid = CobId(found).invalidated();
+        if CobId(found).is_valid() {
+            self.write(cob_id, invalid.0, 4, key, Some(found))?;
+        }
+        if let Some(layout) = &pdo.layout {
+            self.write(pdo.mapped(0), 0, 1, key, survey.number(pdo.mapped(0)))?;
+            for (place, &object) in (1..).zip(&layout.mapping) {
+                let before = survey.number(pdo.mapped(place));
+                if before != Some(object) {
+                    self.write(pdo.mapped(place), object, 4, key, before)?;
+                }
+            }
+            self.write(pdo.mapped(0), layout.mapping.len() as u32, 1, key, Some(0))?;
+            let parts = [(2, Some(layout.transmission), 1), (3, layout.inhibit, 2), (5, layout.event, 2)];
+            for (part, value, bytes) in parts {
+                let before = survey.number(pdo.part(part));
+                if let (Some(value), Some(before)) = (value, before)
+                    && value != before
+                {
+                    self.write(pdo.part(part), value, bytes, key, Some(before))?;
+                }
+            }
+        }
+        if CobId(pdo.cob_id).is_valid() {
+            // The drive keeps its bit for remote requests, which nobody sends.
+            let value = pdo.cob_id & COB_ID_BITS | found & !COB_ID_BITS;
+            self.write(cob_id, value, 4, key, Some(invalid.0))?;
+        }
+        Ok(())
+    }
+
+    fn object(&mut self, setting: &Setting, survey: &Survey) -> Result<(), WriteError> {
+        let Setting { object: ObjectKey(object), value, bytes, rule, key } = setting;
+        let before = survey.number(*object);
+        let is_right = before.is_some_and(|before| same(before, *value, *bytes));
+        let is_left = *rule == ObjectRule::Expect || (*rule == ObjectRule::Optional && before.is_none());
+        if is_right || is_left {
+            return Ok(());
+        }
+        match self.write(*object, *value, *bytes, key, before) {
+            Err(WriteError::Refused { .. }) if *rule == ObjectRule::Optional => Ok(()),
+            written => written,
+        }
+    }
+
+    fn write(
+        &mut self,
+        object: ObjectAddress,
+        value: u32,
+        bytes: usize,
+        key: &str,
+        before: Option<u32>,
+    ) -> Result<(), WriteError> {
+        let axis = self.axis;
+        match self.line.write(axis, object, value, bytes) {
+            Ok(()) => {}
+            Err(error) => {
+                let Some(code) = error.abort_code() else { return Err(error.into()) };
+                let (limits, key) = (self.limits(object), key.to_owned());
+                return Err(WriteError::Refused { axis, object, value, code, limits, key });
+            }
+        }
+        let found = self.line.read_number(axis, object)?;
+        self.changes.push(Change {
+            object: object.to_string(),
+            name: object_name(object),
+            before: before.map(|before| value_text(object, before)),
+            after: value_text(object, found),
+        });
+        if same(found, value, bytes) {
+            Ok(())
+        } else {
+            Err(WriteError::NotKept { axis, object, value, found, key: key.to_owned() })
+        }
+    }
+
+    fn limits(&self, object: ObjectAddress) -> String {
+        let config = self.profile.object(ObjectKey(object));
+        let end = |end: Option<i64>| end.map_or_else(|| "any".to_owned(), |end| end.to_string());
+        match (config.lowest, config.highest) {
+            (None, None) => String::new(),
+            (lowest, highest) => format!("; the profile takes {} to {}", end(lowest), end(highest)),
+        }
+    }
+}
+
+/// Drives refuse software limits that cross: the one that moves away from the other comes first.
+fn in_order<'s>(settings: &'s [Setting], survey: &Survey) -> Vec<&'s Setting> {
+    let mut settings: Vec<_> = settings.iter().collect();
+    let place = |subindex| {
+        let limit = ObjectKey(ObjectAddress::new(0x607D, subindex));
+        settings.iter().position(|setting| setting.object == limit)
+    };
+    if let (Some(lower), Some(upper)) = (place(1), place(2)) {
+        let old_upper = survey.number(ObjectAddress::new(0x607D, 2)).unwrap_or(0) as i32;
+        let is_upper_first = settings[lower].value as i32 > old_upper;
+        if is_upper_first != (upper < lower) {
+            settings.swap(lower, upper);
+        }
+    }
+    settings
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io;
+
+    use masseter_can::canopen::NodeId;
+    use masseter_shared::config::Scenario;
+
+    use super::*;
+    use crate::wanted::WantedDrive;
+
+    const AXIS: usize = 3;
+
+    fn line(scenario: &Scenario) -> (Line, Settings) {
+        let mut line = Line::open(scenario, Box::new(io::sink())).unwrap();
+        line.listen(100 * MILLISECOND_NS).unwrap();
+        let node = NodeId::new(scenario.can.node_ids[AXIS]).unwrap();
+        (line, Settings::wanted(&WantedDrive::of_axis(scenario, AXIS, node).unwrap()))
+    }
+
+    fn survey(line: &mut Line, settings: &Settings) -> Survey {
+        Survey::take(line, AXIS, settings.addresses()).unwrap()
+    }
+
+    fn set(line: &mut Line, index: u16, subindex: u8, value: u32, bytes: usize) {
+        line.write(AXIS, ObjectAddress::new(index, subindex), value, bytes).unwrap();
+    }
+
+    /// The drive of an EPOS4 as delivered: one object in each PDO, other types, a further PDO.
+    fn as_delivered(line: &mut Line) {
+        for (communication, object) in [(0x1400, 0x6040_0010), (0x1800, 0x6041_0010)] {
+            let cob_id = line.read_number(AXIS, ObjectAddress::new(communication, 1)).unwrap();
+            set(line, communication, 1, CobId(cob_id).invalidated().0, 4);
+            set(line, communication + 0x200, 0, 0, 1);
+            set(line, communication + 0x200, 1, object, 4);
+            set(line, communication + 0x200, 0, 1, 1);
+            set(line, communication, 2, 255, 1);
+            set(line, communication, 1, cob_id, 4);
+        }
+        set(line, 0x1601, 1, 0x6040_0010, 4);
+        set(line, 0x1601, 0, 1, 1);
+        set(line, 0x1401, 1, 0x304, 4);
+        set(line, 0x6066, 0, 7, 2);
+    }
+
+    #[test]
+    fn a_drive_as_delivered_gets_the_rigs_objects_and_its_own_back() {
+        let scenario = Scenario::default();
+        let (mut line, wanted) = line(&scenario);
+        as_delivered(&mut line);
+        let delivered = survey(&mut line, &wanted);
+        assert_eq!(wanted.differences(&delivered).len(), 10, "{:?}", wanted.differences(&delivered));
+        let before = wanted.found(&delivered);
+        let profile = scenario.profile(AXIS);
+        let mut writer = Writer::new(&mut line, AXIS, profile);
+        writer.apply(&wanted, &delivered).unwrap();
+        let changes = writer.into_changes();
+        assert_eq!(changes.last().unwrap().after, "20", "{changes:?}");
+        let configured = survey(&mut line, &wanted);
+        assert_eq!(wanted.differences(&configured), []);
+        let mut writer = Writer::new(&mut line, AXIS, profile);
+        writer.apply(&wanted, &configured).unwrap();
+        assert_eq!(writer.into_changes(), [], "equal values are not written again");
+        Writer::new(&mut line, AXIS, profile).apply(&before, &configured).unwrap();
+        assert_eq!(survey(&mut line, &wanted), delivered);
+    }
+
+    #[test]
+    fn a_refusal_names_object_value_limits_and_key() {
+        let text = "[[drive_profile]]\nobjects.60C2h = { rule = 'absent' }\n\
+                    objects.'60C2h:01' = { rule = 'absent' }\nobjects.'60C2h:02' = { value = -9, lowest = -9 }";
+        let scenario = Scenario::parse(std::path::Path::new("robot.toml"), text).unwrap();
+        let (mut line, wanted) = line(&scenario);
+        let found = survey(&mut line, &wanted);
+        let mut writer = Writer::new(&mut line, AXIS, scenario.profile(AXIS));
+        let refusal = writer.apply(&wanted, &found).unwrap_err().to_string();
+        assert_eq!(
+            refusal,
+            "l1: object 60C2h:02h (Interpolation time index) := -9: 06090032h (value is too low); the profile takes -9 to \
+             any; change rate_hz"
+        );
+    }
+
+    #[test]
+    fn software_limits_never_cross() {
+        let scenario = Scenario::default();
+        let (mut line, wanted) = line(&scenario);
+        let values = |subindex| {
+            let limit = ObjectKey(ObjectAddress::new(0x607D, subindex));
+            wanted.objects.iter().find(|setting| setting.object == limit).unwrap().value as i32
+        };
+        let [low, high] = [values(1), values(2)];
+        for [old_low, old_high] in [[low - 900, low - 800], [high + 800, high + 900], [low + 1, high - 1]] {
+            // The emulated drive refuses limits that cross.
+            set(&mut line, 0x607D, 1, i32::MIN as u32, 4);
+            set(&mut line, 0x607D, 2, old_high as u32, 4);
+            set(&mut line, 0x607D, 1, old_low as u32, 4);
+            let found = survey(&mut line, &wanted);
+            let mut writer = Writer::new(&mut line, AXIS, scenario.profile(AXIS));
+            writer.apply(&wanted, &found).unwrap();
+            let changes = writer.into_changes();
+            let limits = changes.iter().filter(|change| change.object.starts_with("607Dh"));
+            assert_eq!(limits.count(), 2, "{changes:?}");
+        }
+    }
+}

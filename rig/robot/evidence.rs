@@ -1,0 +1,172 @@
+//! What a step of the bring-up leaves behind: a numbered folder with the log of the buses and `result.json`.
+//!
+//! A result counts for the drives and the profiles with which it was made. It is written as not passed when a step begins,
+//! and replaced when the step ends: a killed step proves nothing.
+
+use std::fs::File;
+use std::io::{self, BufWriter, Write};
+use std::path::{Path, PathBuf};
+use std::time::UNIX_EPOCH;
+
+use masseter_can::canopen::NodeId;
+use masseter_plant::wanted::WantedDrive;
+use masseter_recording::RunFolder;
+use masseter_shared::clock;
+use masseter_shared::config::Scenario;
+use masseter_shared::geometry::{AXES, AXIS_NAMES};
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+use super::step::Step;
+
+/// What a result depends on: another drive or another profile makes it outdated.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct Basis {
+    /// Hash of everything that decides the objects and the scales of the drives.
+    pub(crate) profile_hash: String,
+    /// Serial numbers (1018h:04); none where a drive was not asked or has none.
+    pub(crate) serials: [Option<u32>; AXES],
+}
+
+impl Basis {
+    /// Of the scenario's profiles and these drives.
+    ///
+    /// # Errors
+    /// When a value of the scenario is not one that a profile allows.
+    pub(crate) fn new(scenario: &Scenario, serials: [Option<u32>; AXES]) -> anyhow::Result<Self> {
+        let mut hasher = crc32fast::Hasher::new();
+        for (axis, id) in scenario.can.node_ids.into_iter().enumerate() {
+            let wanted = WantedDrive::of_axis(scenario, axis, NodeId::new(id)?)?;
+            let parts = format!("{wanted:?}{:?}{:?}", scenario.profile(axis), scenario.scale(axis));
+            hasher.update(parts.as_bytes());
+        }
+        Ok(Self { profile_hash: format!("{:08x}", hasher.finalize()), serials })
+    }
+}
+
+/// `result.json`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Evidence {
+    /// Name of the step.
+    pub(crate) step: String,
+    /// When it began, UTC.
+    pub(crate) started: String,
+    /// Whether it ended well.
+    pub(crate) passed: bool,
+    /// See [`Basis`].
+    pub(crate) profile_hash: String,
+    /// See [`Basis`].
+    pub(crate) serials: [Option<u32>; AXES],
+    /// The axes of which it is evidence.
+    pub(crate) axes: Vec<String>,
+    /// The step's own data.
+    pub(crate) result: Value,
+}
+
+impl Evidence {
+    /// Whether it is about an axis.
+    pub(crate) fn is_about(&self, axis: usize) -> bool {
+        self.axes.iter().any(|name| name == AXIS_NAMES[axis])
+    }
+}
+
+/// The folder of a step under way.
+#[derive(Debug)]
+pub(crate) struct StepFolder {
+    folder: RunFolder,
+    evidence: Evidence,
+}
+
+impl StepFolder {
+    /// Makes the next folder, with a result that is not passed. The serial numbers are not known yet.
+    ///
+    /// # Errors
+    /// When the folder cannot be written, or the scenario has no right profiles.
+    pub(crate) fn begin(
+        parent: &Path,
+        step: Step,
+        axes: &[usize],
+        scenario: &Scenario,
+    ) -> anyhow::Result<Self> {
+        let number = numbered(parent)?.last().map_or(1, |(number, _)| number + 1);
+        let folder = RunFolder::create(&parent.join(format!("{number:02}-{step}")))?;
+        let Basis { profile_hash, serials } = Basis::new(scenario, [None; AXES])?;
+        let begun = Self {
+            folder,
+            evidence: Evidence {
+                step: step.to_string(),
+                started: humantime::format_rfc3339_seconds(UNIX_EPOCH + clock::wall_time()).to_string(),
+                passed: false,
+                profile_hash,
+                serials,
+                axes: axes.iter().map(|&axis| AXIS_NAMES[axis].to_owned()).collect(),
+                result: Value::Null,
+            },
+        };
+        begun.write()?;
+        Ok(begun)
+    }
+
+    /// The log of the buses, for a line.
+    ///
+    /// # Errors
+    /// When the file cannot be made.
+    pub(crate) fn log(&self) -> io::Result<Box<dyn Write + Send>> {
+        Ok(Box::new(BufWriter::new(File::create(self.folder.file("candump.log"))?)))
+    }
+
+    /// Writes a further file of the step.
+    ///
+    /// # Errors
+    /// When it cannot be written.
+    pub(crate) fn keep(&self, name: &str, text: &str) -> io::Result<()> {
+        self.folder.keep(&self.folder.file(name), text)
+    }
+
+    /// The folder itself.
+    pub(crate) fn path(&self) -> &Path {
+        self.folder.path()
+    }
+
+    /// What this step's result depends on, with serial numbers as far as they are noted.
+    pub(crate) fn basis(&self) -> Basis {
+        let Evidence { profile_hash, serials, .. } = self.evidence.clone();
+        Basis { profile_hash, serials }
+    }
+
+    /// Notes the serial numbers of the drives.
+    pub(crate) fn note_serials(&mut self, serials: [Option<u32>; AXES]) {
+        self.evidence.serials = serials;
+    }
+
+    /// Replaces the result by that of the ended step.
+    ///
+    /// # Errors
+    /// When it cannot be written.
+    pub(crate) fn finish(mut self, passed: bool, result: &impl Serialize) -> anyhow::Result<()> {
+        (self.evidence.passed, self.evidence.result) = (passed, serde_json::to_value(result)?);
+        Ok(self.write()?)
+    }
+
+    fn write(&self) -> io::Result<()> {
+        self.keep("result.json", &(serde_json::to_string_pretty(&self.evidence)? + "\n"))
+    }
+}
+
+/// The folders of past steps with their numbers, the oldest first; none where there is no folder yet.
+///
+/// # Errors
+/// When the folder cannot be read.
+pub(crate) fn numbered(parent: &Path) -> io::Result<Vec<(u32, PathBuf)>> {
+    let entries = match parent.read_dir() {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Vec::new()),
+        entries => entries?,
+    };
+    let number = |path: PathBuf| {
+        let (number, _) = path.file_name()?.to_str()?.split_once('-')?;
+        Some((number.parse().ok()?, path))
+    };
+    let mut found: Vec<_> = entries.filter_map(|entry| number(entry.ok()?.path())).collect();
+    found.sort();
+    Ok(found)
+}

@@ -1,0 +1,182 @@
+//! The past steps of a bring-up, and whether a further step may rely on them.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use masseter_shared::geometry::AXIS_NAMES;
+
+use super::evidence::{Basis, Evidence, numbered};
+use super::step::Step;
+
+/// Why a step has no evidence that counts.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub(crate) enum Lack {
+    /// It was never made.
+    #[error("not done")]
+    Missing,
+    /// The newest one did not pass, or was killed.
+    #[error("not passed at {0}")]
+    NotPassed(String),
+    /// The profiles or the values that decide objects are others.
+    #[error("outdated: the profiles changed since {0}")]
+    OtherProfile(String),
+    /// The drive is another one.
+    #[error("outdated: the drive's serial number was {}, and is {}", number(.before), number(.now))]
+    OtherDrive {
+        /// Its serial number then.
+        before: Option<u32>,
+        /// Its serial number now.
+        now: Option<u32>,
+    },
+    /// The drives got their old objects again.
+    #[error("outdated: restored at {0}")]
+    Restored(String),
+}
+
+fn number(serial: &Option<u32>) -> String {
+    serial.map_or_else(|| "unknown".to_owned(), |serial| serial.to_string())
+}
+
+/// A step that must pass first.
+#[derive(Debug, thiserror::Error)]
+#[error(
+    "{}: {step} {lack} (evidence in {}); run '{}' first", AXIS_NAMES[*axis], .folder.display(), step.command()
+)]
+pub(crate) struct EarlierStep {
+    axis: usize,
+    step: Step,
+    lack: Lack,
+    folder: PathBuf,
+}
+
+/// All past steps.
+#[derive(Debug)]
+pub(crate) struct Past {
+    folder: PathBuf,
+    /// Oldest first.
+    steps: Vec<(PathBuf, Evidence)>,
+}
+
+impl Past {
+    /// Reads the evidence in a folder. A folder without a readable result proves nothing and is left out.
+    ///
+    /// # Errors
+    /// When the folder itself cannot be read.
+    pub(crate) fn read(folder: &Path) -> anyhow::Result<Self> {
+        let read = |path: PathBuf| {
+            let text = fs::read_to_string(path.join("result.json")).ok()?;
+            Some((path, serde_json::from_str(&text).ok()?))
+        };
+        let steps = numbered(folder)?.into_iter().filter_map(|(_, path)| read(path)).collect();
+        Ok(Self { folder: folder.to_owned(), steps })
+    }
+
+    /// Every past step, the oldest first.
+    pub(crate) fn steps(&self) -> impl DoubleEndedIterator<Item = &(PathBuf, Evidence)> {
+        self.steps.iter()
+    }
+
+    /// The newest evidence of a step for an axis, with its folder.
+    pub(crate) fn newest(&self, step: Step, axis: usize) -> Option<&(PathBuf, Evidence)> {
+        let name = step.to_string();
+        self.steps.iter().rev().find(|(_, evidence)| evidence.step == name && evidence.is_about(axis))
+    }
+
+    /// Why the newest evidence of a step does not count for an axis, if so. An unknown serial number of now is not compared.
+    ///
+    /// # Errors
+    /// The reason.
+    pub(crate) fn check(&self, step: Step, axis: usize, basis: &Basis) -> Result<&Evidence, Lack> {
+        let (path, evidence) = self.newest(step, axis).ok_or(Lack::Missing)?;
+        let at = || evidence.started.clone();
+        let restored = self.newest(Step::Restore, axis).filter(|(restored, _)| restored > path);
+        match restored {
+            Some((_, restored)) if step >= Step::Configure => {
+                return Err(Lack::Restored(restored.started.clone()));
+            }
+            _ => {}
+        }
+        if !evidence.passed {
+            return Err(Lack::NotPassed(at()));
+        }
+        if evidence.profile_hash != basis.profile_hash {
+            return Err(Lack::OtherProfile(at()));
+        }
+        let (before, now) = (evidence.serials[axis], basis.serials[axis]);
+        if now.is_some() && before != now {
+            return Err(Lack::OtherDrive { before, now });
+        }
+        Ok(evidence)
+    }
+
+    /// Refuses to go on unless an earlier step passed for these axes, with the same drives and profiles.
+    ///
+    /// # Errors
+    /// [`EarlierStep`], which names the command to run first.
+    pub(crate) fn require(&self, step: Step, axes: &[usize], basis: &Basis) -> Result<(), EarlierStep> {
+        axes.iter().try_for_each(|&axis| {
+            let folder = self.folder.clone();
+            self.check(step, axis, basis).map(drop).map_err(|lack| EarlierStep { axis, step, lack, folder })
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use masseter_shared::config::Scenario;
+    use masseter_shared::geometry::AXES;
+
+    use super::*;
+    use crate::robot::evidence::StepFolder;
+
+    const ALL: [usize; AXES] = [0, 1, 2, 3, 4, 5];
+
+    fn take(parent: &Path, step: Step, axes: &[usize], passed: Option<bool>) {
+        let mut folder = StepFolder::begin(parent, step, axes, &Scenario::default()).unwrap();
+        folder.note_serials([1, 2, 3, 4, 5, 6].map(Some));
+        if let Some(passed) = passed {
+            folder.finish(passed, &"data").unwrap();
+        }
+    }
+
+    fn refusal(parent: &Path, step: Step, axes: &[usize], basis: &Basis) -> Option<String> {
+        Past::read(parent).unwrap().require(step, axes, basis).err().map(|error| error.lack.to_string())
+    }
+
+    #[test]
+    fn evidence_counts_for_the_same_drives_and_profiles_alone() {
+        let folder = tempfile::tempdir().unwrap();
+        let parent = folder.path().join("bringup");
+        let basis = Basis::new(&Scenario::default(), [1, 2, 3, 4, 5, 6].map(Some)).unwrap();
+        let check = |basis: &Basis| refusal(&parent, Step::Inspect, &ALL, basis);
+        let error = Past::read(&parent).unwrap().require(Step::Inspect, &[3], &basis).unwrap_err().to_string();
+        assert!(error.starts_with("l1: inspect not done (evidence in"), "{error}");
+        assert!(error.ends_with("run 'masseter robot inspect' first"), "{error}");
+        take(&parent, Step::Inspect, &ALL, Some(true));
+        assert_eq!(check(&basis), None);
+        let exchanged = Basis { serials: [1, 2, 3, 4, 5, 7].map(Some), ..basis.clone() };
+        assert_eq!(check(&exchanged).unwrap(), "outdated: the drive's serial number was 6, and is 7");
+        let changed = Scenario { rate_hz: 500, ..Scenario::default() };
+        let changed = Basis::new(&changed, basis.serials).unwrap();
+        assert!(check(&changed).unwrap().starts_with("outdated: the profiles changed"));
+        take(&parent, Step::Inspect, &ALL, None);
+        assert!(check(&basis).unwrap().starts_with("not passed at "), "a killed step proves nothing");
+        take(&parent, Step::Inspect, &ALL, Some(true));
+        assert_eq!(check(&basis), None);
+        assert!(parent.join("03-inspect/result.json").exists());
+    }
+
+    #[test]
+    fn a_step_of_one_axis_says_nothing_of_the_others_and_restore_undoes_configure() {
+        let folder = tempfile::tempdir().unwrap();
+        let basis = Basis::new(&Scenario::default(), [None; AXES]).unwrap();
+        let check = |axis| refusal(folder.path(), Step::Configure, &[axis], &basis);
+        take(folder.path(), Step::Configure, &[3], Some(true));
+        assert_eq!((check(3), check(4)), (None, Some("not done".to_owned())));
+        take(folder.path(), Step::Configure, &ALL, Some(true));
+        assert_eq!((check(3), check(4)), (None, None));
+        take(folder.path(), Step::Restore, &[3], Some(true));
+        assert!(check(3).unwrap().starts_with("outdated: restored at "));
+        assert_eq!(check(4), None);
+    }
+}

@@ -1,0 +1,82 @@
+//! The steps of the bring-up, in their order.
+
+use std::fmt::{self, Display, Formatter};
+
+use masseter_shared::geometry::{AXES, AXIS_NAMES};
+
+/// A step with evidence of its own.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Step {
+    /// All drives were read.
+    Inspect,
+    /// The drives have the rig's objects.
+    Configure,
+    /// The drives have their objects from before `Configure` again, whose evidence counts no more.
+    Restore,
+    /// An axis moved alone.
+    Jog(usize),
+    /// All axes know their zero.
+    Home,
+    /// The pose of the platform is the one that the axes tell.
+    CheckPose,
+    /// The motion was played slowly.
+    DryRun,
+}
+
+impl Step {
+    /// The steps that lead to a run.
+    pub(crate) fn chain() -> Vec<Self> {
+        let jogs = (0..AXES).map(Self::Jog);
+        let (first, last) = ([Self::Inspect, Self::Configure], [Self::Home, Self::CheckPose, Self::DryRun]);
+        first.into_iter().chain(jogs).chain(last).collect()
+    }
+
+    /// The step of that name.
+    pub(crate) fn named(name: &str) -> Option<Self> {
+        Self::chain().into_iter().chain([Self::Restore]).find(|step| step.to_string() == name)
+    }
+
+    /// The axes that the step must be about.
+    pub(crate) fn axes(self) -> Vec<usize> {
+        if let Self::Jog(axis) = self { vec![axis] } else { (0..AXES).collect() }
+    }
+
+    /// The command of the step.
+    pub(crate) fn command(self) -> String {
+        match self {
+            Self::Jog(axis) => format!("masseter robot jog --axis {}", AXIS_NAMES[axis]),
+            Self::DryRun => "masseter run --dry".to_owned(),
+            _ => format!("masseter robot {self}"),
+        }
+    }
+}
+
+impl Display for Step {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Inspect => f.write_str("inspect"),
+            Self::Configure => f.write_str("configure"),
+            Self::Restore => f.write_str("restore"),
+            Self::Jog(axis) => write!(f, "jog-{}", AXIS_NAMES[*axis]),
+            Self::Home => f.write_str("home"),
+            Self::CheckPose => f.write_str("check-pose"),
+            Self::DryRun => f.write_str("dry-run"),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_step_has_a_name_that_is_read_again_and_a_command() {
+        let chain = Step::chain();
+        assert_eq!(chain.len(), 5 + AXES);
+        assert!(chain.is_sorted());
+        for step in chain {
+            assert_eq!(Step::named(&step.to_string()), Some(step));
+            assert!(step.command().starts_with("masseter "));
+        }
+    }
+}

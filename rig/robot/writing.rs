@@ -1,0 +1,149 @@
+//! Settings into drives, with their old values kept first: the common part of `configure` and `restore`.
+
+use std::fmt::Write;
+
+use masseter_plant::bringup::{
+    Change, PowerError, Settings, Survey, WriteError, Writer, prove_no_power, reset, store, take_over,
+};
+use masseter_shared::geometry::AXIS_NAMES;
+use masseter_shared::wording::counted;
+use masseter_terminal::{Exit, Failure, OrFailure, Tone, result_with_tones};
+use serde::Serialize;
+
+use super::evidence::StepFolder;
+use super::robot_line::RobotLine;
+
+/// What became of one drive.
+#[derive(Debug, Serialize)]
+pub(super) struct Written {
+    axis: &'static str,
+    changes: Vec<Change>,
+    stored: bool,
+    error: Option<String>,
+}
+
+impl Written {
+    /// Whether the drive does not have its settings.
+    pub(super) fn failed(&self) -> bool {
+        self.error.is_some()
+    }
+}
+
+/// Name of the file with the old values of a drive.
+pub(super) fn before_file(axis: usize) -> String {
+    format!("before-{}.json", AXIS_NAMES[axis])
+}
+
+/// Proves that none of these drives has power, before anything is written to one of them.
+pub(super) fn prove_all(robot: &mut RobotLine, axes: &[usize], may_stop: bool) -> Result<(), Failure> {
+    robot.refuse_masters().map_err(|error| Failure::with(Exit::Failed, error))?;
+    for &axis in axes {
+        let noise_m = robot.scenario.profile(axis).homing.tolerance_m;
+        let noise = robot.scenario.scale(axis).window(noise_m);
+        match prove_no_power(&mut robot.line, axis, noise) {
+            Err(PowerError::Powered { .. }) if may_stop => {
+                take_over(&mut robot.line, axis, noise).died()?;
+                // A drive that the rig could not stop is the case of an emergency stop.
+                let proved = prove_no_power(&mut robot.line, axis, noise);
+                proved.map_err(|error| Failure::with(Exit::SafeStop, error))?;
+            }
+            Err(error @ PowerError::Line(_)) => return Err(error).died(),
+            proved => proved.map_err(|error| Failure::with(Exit::Failed, error))?,
+        }
+    }
+    Ok(())
+}
+
+/// Keeps the old values of a drive in a file, writes the new ones, and reads everything again; stores on request. A drive
+/// that does not take them is part of the result.
+pub(super) fn write(
+    robot: &mut RobotLine,
+    folder: &StepFolder,
+    axis: usize,
+    target: &Settings,
+    survey: &Survey,
+    stores: bool,
+) -> Result<Written, Failure> {
+    let before = serde_json::to_string_pretty(&target.found(survey)).incomplete()?;
+    folder.keep(&before_file(axis), &(before + "\n")).incomplete()?;
+    let profile = robot.scenario.profile(axis).clone();
+    let mut writer = Writer::new(&mut robot.line, axis, &profile);
+    let applied = writer.apply(target, survey);
+    let (changes, mut stored) = (writer.into_changes(), false);
+    let error = match applied {
+        Err(WriteError::Line(error)) => Some(error.to_string()),
+        Err(error) => Some(error.to_string()),
+        Ok(()) => check(robot, axis, target, "after writing").usage()?,
+    };
+    let error = match error {
+        None if stores => {
+            let error = store_and_check(robot, axis, target).usage()?;
+            stored = error.is_none();
+            error
+        }
+        error => error,
+    };
+    Ok(Written { axis: AXIS_NAMES[axis], changes, stored, error })
+}
+
+fn store_and_check(robot: &mut RobotLine, axis: usize, target: &Settings) -> anyhow::Result<Option<String>> {
+    let config = robot.scenario.profile(axis).store;
+    let stored = store(&mut robot.line, axis, config).and_then(|()| reset(&mut robot.line, axis));
+    match stored {
+        Err(error) => Ok(Some(error.to_string())),
+        Ok(()) => check(robot, axis, target, "after the reset, so the drive did not store it"),
+    }
+}
+
+/// Reads everything again; returns what is not as it was written.
+fn check(
+    robot: &mut RobotLine,
+    axis: usize,
+    target: &Settings,
+    when: &str,
+) -> anyhow::Result<Option<String>> {
+    let survey = robot.survey(axis)?;
+    // An optional object may keep a value of its own.
+    let wrong: Vec<_> = target
+        .differences(&survey)
+        .into_iter()
+        .filter(|difference| difference.rule != masseter_shared::config::ObjectRule::Optional)
+        .map(|difference| difference.object.to_string())
+        .collect();
+    Ok((!wrong.is_empty())
+        .then(|| format!("{}: {} differ {when}", AXIS_NAMES[axis], wrong.join(", "))))
+}
+
+/// Prints and keeps the result.
+pub(super) fn finish(
+    robot: &mut RobotLine,
+    folder: StepFolder,
+    all: &[Written],
+    stores: bool,
+) -> Result<Exit, Failure> {
+    robot.line.flush().incomplete()?;
+    let mut text = String::new();
+    for Written { axis, changes, stored, error } in all {
+        let count = counted(changes.len() as u64, "value");
+        let _ = writeln!(text, "{axis}: {count} written{}", if *stored { ", stored" } else { "" });
+        for Change { object, name, before, after } in changes {
+            let before = before.as_deref().unwrap_or("unreadable");
+            let _ = writeln!(text, "  {object} {name}: {before} -> {after}");
+        }
+        if let Some(error) = error {
+            let _ = writeln!(text, "failed: {error}");
+        }
+    }
+    let failed = all.iter().any(Written::failed);
+    let _ = match (failed, stores) {
+        (true, _) => writeln!(
+            text,
+            "the drives after it were not written; 'masseter robot restore' writes the old values back"
+        ),
+        (false, true) => writeln!(text, "passed: the values are stored"),
+        (false, false) => writeln!(text, "passed: the values last until a reset; --store keeps them"),
+    };
+    folder.finish(!failed, &all).incomplete()?;
+    result_with_tones(&text, &[("passed", Tone::Good), ("failed", Tone::Bad)]).usage()?;
+    Ok(if failed { Exit::Failed } else { Exit::Passed })
+}
