@@ -12,7 +12,7 @@ use masseter_terminal::{Exit, Failure, OrFailure, result};
 use super::args::{RobotArgs, parse_axis};
 use super::evidence::StepFolder;
 use super::past::Past;
-use super::robot_line::{RobotLine, serials};
+use super::robot_line::{RobotLine, failed, serials};
 use super::step::Step;
 use super::table::table;
 use super::writing::{Written, finish, prove_all, write};
@@ -46,7 +46,7 @@ pub(crate) fn configure(args: &WriteArgs) -> Result<Exit, Failure> {
     let (axes, past) = (args.axes(), Past::read(&args.robot.folder).usage()?);
     let mut folder = StepFolder::begin(&args.robot.folder, Step::Configure, &axes, &scenario).usage()?;
     let mut robot = RobotLine::open(scenario, folder.log().usage()?).usage()?;
-    let surveys = robot.surveys(&axes).died()?;
+    let surveys = robot.surveys(&axes).map_err(failed)?;
     folder.note_serials(serials(&surveys));
     past.require(Step::Inspect, &axes, &folder.basis()).usage()?;
     let refused = refused(&robot, &surveys);
@@ -58,9 +58,7 @@ pub(crate) fn configure(args: &WriteArgs) -> Result<Exit, Failure> {
         folder.finish(false, &refused).incomplete()?;
         return Ok(Exit::Failed);
     }
-    if let Err(failure) = prove_all(&mut robot, &axes, args.take_over) {
-        return Err(failure);
-    }
+    prove_all(&mut robot, &axes, args.take_over)?;
     let mut all: Vec<Written> = Vec::new();
     for (axis, survey) in surveys.iter().enumerate() {
         let Some(survey) = survey else { continue };

@@ -15,7 +15,7 @@ use serde::Serialize;
 use super::args::RobotArgs;
 use super::evidence::StepFolder;
 use super::interfaces::{InterfaceResult, interfaces};
-use super::robot_line::{RobotLine, masters, serials};
+use super::robot_line::{RobotLine, failed, masters, serials};
 use super::snapshot::dcf;
 use super::step::Step;
 use super::table::{axes_text, table};
@@ -64,7 +64,7 @@ pub(crate) fn inspect(args: &InspectArgs) -> Result<Exit, Failure> {
     let mut folder = StepFolder::begin(&args.robot.folder, Step::Inspect, &all, &scenario).usage()?;
     let interfaces = interfaces(&scenario.can);
     let mut robot = RobotLine::open(scenario, folder.log().usage()?).usage()?;
-    let surveys = read(&mut robot, args.scan).died()?;
+    let surveys = read(&mut robot, args.scan).map_err(failed)?;
     let result = InspectResult {
         interfaces,
         masters: masters(robot.line.strangers()),

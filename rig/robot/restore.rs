@@ -10,7 +10,7 @@ use masseter_terminal::{Exit, Failure, OrFailure};
 use super::configure::WriteArgs;
 use super::evidence::StepFolder;
 use super::past::Past;
-use super::robot_line::{RobotLine, serials};
+use super::robot_line::{RobotLine, failed, serials};
 use super::step::Step;
 use super::writing::{Written, before_file, finish, prove_all, write};
 
@@ -20,7 +20,7 @@ pub(crate) fn restore(args: &WriteArgs) -> Result<Exit, Failure> {
     let (axes, past) = (args.axes(), Past::read(&args.robot.folder).usage()?);
     let mut folder = StepFolder::begin(&args.robot.folder, Step::Restore, &axes, &scenario).usage()?;
     let mut robot = RobotLine::open(scenario, folder.log().usage()?).usage()?;
-    let surveys = robot.surveys(&axes).died()?;
+    let surveys = robot.surveys(&axes).map_err(failed)?;
     let serials = serials(&surveys);
     folder.note_serials(serials);
     let targets: Vec<_> = axes

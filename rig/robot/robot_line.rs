@@ -8,6 +8,7 @@ use masseter_plant::bringup::{Deviation, Line, Settings, Strangers, Survey, devi
 use masseter_plant::wanted::WantedDrive;
 use masseter_shared::config::Scenario;
 use masseter_shared::geometry::{AXES, AXIS_NAMES};
+use masseter_terminal::{Exit, Failure};
 
 /// Serial number.
 const SERIAL: ObjectAddress = ObjectAddress::new(0x1018, 4);
@@ -88,6 +89,11 @@ impl RobotLine {
                 .context("nothing was written; end that master first"),
         }
     }
+}
+
+/// A drive or a bus that is not as the step needs it: exit code 1.
+pub(crate) fn failed(error: impl Into<anyhow::Error>) -> Failure {
+    Failure::with(Exit::Failed, error)
 }
 
 /// Signs of other masters in words.

@@ -11,7 +11,7 @@ use masseter_terminal::{Exit, Failure, OrFailure, Tone, result_with_tones};
 use serde::Serialize;
 
 use super::evidence::StepFolder;
-use super::robot_line::RobotLine;
+use super::robot_line::{RobotLine, failed};
 
 /// What became of one drive.
 #[derive(Debug, Serialize)]
@@ -36,19 +36,18 @@ pub(super) fn before_file(axis: usize) -> String {
 
 /// Proves that none of these drives has power, before anything is written to one of them.
 pub(super) fn prove_all(robot: &mut RobotLine, axes: &[usize], may_stop: bool) -> Result<(), Failure> {
-    robot.refuse_masters().map_err(|error| Failure::with(Exit::Failed, error))?;
+    robot.refuse_masters().map_err(failed)?;
     for &axis in axes {
         let noise_m = robot.scenario.profile(axis).homing.tolerance_m;
         let noise = robot.scenario.scale(axis).window(noise_m);
         match prove_no_power(&mut robot.line, axis, noise) {
             Err(PowerError::Powered { .. }) if may_stop => {
-                take_over(&mut robot.line, axis, noise).died()?;
+                take_over(&mut robot.line, axis, noise).map_err(failed)?;
                 // A drive that the rig could not stop is the case of an emergency stop.
                 let proved = prove_no_power(&mut robot.line, axis, noise);
                 proved.map_err(|error| Failure::with(Exit::SafeStop, error))?;
             }
-            Err(error @ PowerError::Line(_)) => return Err(error).died(),
-            proved => proved.map_err(|error| Failure::with(Exit::Failed, error))?,
+            proved => proved.map_err(failed)?,
         }
     }
     Ok(())
