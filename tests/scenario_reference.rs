@@ -27,7 +27,7 @@ struct Section {
 }
 
 impl Section {
-    /// `can.identity` for `[can.identity]`; empty for the scenario itself.
+    /// `motion.phases` for `[motion.phases]`; empty for the scenario itself.
     fn path(&self) -> &str {
         let end = self.toml.find(']').unwrap_or(0);
         self.toml[..end].trim_start_matches('[')
